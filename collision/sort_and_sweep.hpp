@@ -1,0 +1,77 @@
+// Broad phase: which boxes overlap, told as changes from tick to tick (seed 5.2.2, I-COLLIDE).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "collision/types.hpp"
+
+namespace enfilade::collision {
+
+using StillId = std::uint32_t;  ///< index into the still boxes given at construction
+using MoverId = std::uint32_t;  ///< given by insert(); reused after remove()
+
+/// A moving box and a still one, or two moving ones (then `mover` < `other`).
+struct BoxPair {
+  MoverId mover;
+  std::uint32_t other;  ///< a StillId, or a MoverId when `otherMoves`
+  bool otherMoves;
+
+  auto operator<=>(const BoxPair&) const = default;
+};
+
+/// Counters of the last update(), for metrics and for tests of the complexity claim.
+struct SweepCounters {
+  std::uint64_t exchanges = 0;   ///< end points that passed one another, on all axes
+  std::uint64_t cellEntries = 0; ///< times a mover entered a cell and its lists were joined
+  std::uint64_t boxTests = 0;    ///< full box tests made because of an exchange or an entry
+};
+
+/// Keeps the set of overlapping pairs of closed boxes, exactly: after update() it equals what brute
+/// force over all boxes finds. Still boxes never change; still-still pairs never exist.
+class SortAndSweep {
+ public:
+  /// `stillBoxes` are finite and not empty; throws std::invalid_argument naming the index if not.
+  explicit SortAndSweep(std::span<const Box> stillBoxes);
+  ~SortAndSweep();
+  SortAndSweep(SortAndSweep&&) noexcept;
+  SortAndSweep& operator=(SortAndSweep&&) noexcept;
+
+  /// Movers are inserted, moved and removed between updates; the pairs follow at the next update().
+  /// Boxes are finite and not empty (std::invalid_argument otherwise; nothing is changed).
+  MoverId insert(const Box& box);
+  void move(MoverId mover, const Box& box);
+  void remove(MoverId mover);
+
+  /// Repairs the sorted lists and applies the status changes.
+  void update();
+
+  /// Status changes of the last update(), sorted; deterministic.
+  std::span<const BoxPair> begun() const;
+  std::span<const BoxPair> ended() const;
+  /// All pairs that overlap now in which `mover` takes part as `mover` or (mover-mover pairs) as
+  /// `other`, sorted by the partner: still partners first.
+  struct Partner {
+    std::uint32_t id;
+    bool moves;
+    auto operator<=>(const Partner& o) const {
+      return moves != o.moves ? moves <=> o.moves : id <=> o.id;
+    }
+    bool operator==(const Partner&) const = default;
+  };
+  std::span<const Partner> partners(MoverId mover) const;
+  std::size_t pairCount() const;
+  const SweepCounters& counters() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// The slow twin: every pair by brute force, sorted. `moverBoxes` holds live movers with their ids.
+std::vector<BoxPair> bruteForcePairs(std::span<const Box> stillBoxes,
+                                     std::span<const std::pair<MoverId, Box>> moverBoxes);
+
+}  // namespace enfilade::collision

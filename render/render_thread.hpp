@@ -1,0 +1,30 @@
+// One thread that owns the GL context and draws what is asked, in order.
+#pragma once
+
+#include <future>
+#include <memory>
+
+#include "render/renderer.hpp"
+
+namespace enfilade::render {
+
+class RenderThread {
+ public:
+  /// Starts the thread and its Renderer; throws RenderError when there can be none.
+  explicit RenderThread(std::shared_ptr<const scene::Scene> scene);
+  ~RenderThread();  ///< finishes what is queued
+  RenderThread(const RenderThread&) = delete;
+  RenderThread& operator=(const RenderThread&) = delete;
+
+  /// The frame, or the RenderError, comes through the future. Callable from any thread.
+  std::future<Frame> render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera,
+                            scene::EntityId hidden = 0);
+  const std::string& deviceName() const;
+  bool software() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace enfilade::render

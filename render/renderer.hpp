@@ -1,0 +1,39 @@
+// Draws snapshots of one scene with OpenGL 4.5 core on EGL, without a display.
+#pragma once
+
+#include <memory>
+#include <stdexcept>
+
+#include "render/frame.hpp"
+#include "scene/scene.hpp"
+
+namespace enfilade::render {
+
+/// Names the EGL or GL call, its error code and what to try.
+struct RenderError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Owns a GL context: make, use and destroy it on one thread. RenderThread does that for you.
+class Renderer {
+ public:
+  /// Throws RenderError when no EGL device gives a context.
+  explicit Renderer(std::shared_ptr<const scene::Scene> scene);
+  ~Renderer();
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
+
+  /// `hidden` is not drawn (the avatar whose eyes these are); 0: everything is drawn.
+  /// Throws RenderError for a camera that refusal() refuses.
+  Frame render(const scene::Snapshot& snapshot, const Camera& camera,
+               scene::EntityId hidden = 0);
+
+  const std::string& deviceName() const;  ///< GL_RENDERER
+  bool software() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace enfilade::render

@@ -1,0 +1,38 @@
+// Reads a model file. assimp does the parsing, in a child process of our own executable, because it
+// can crash, hang or eat the memory on a bad file; what comes back is one compact Model.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "scene/model.hpp"
+
+namespace enfilade::scene {
+
+struct ImportOptions {
+  /// Overrides what the file says (nullopt: as the file says, else one unit is one metre).
+  std::optional<double> metresPerUnit;
+  std::optional<char> up;  ///< 'x', 'y' or 'z'
+  double timeLimit = 120;  ///< seconds of wall-clock time
+  std::size_t memoryLimit = std::size_t{8} << 30;  ///< bytes of address space of the child
+};
+
+/// Names the file, the stage ("open", "parse", "convert", ...) and what to try.
+struct ImportError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// `progress` is called now and then with a stage and a fraction 0..1 (may be empty).
+using ImportProgress = std::function<void(const std::string& stage, double fraction)>;
+
+/// The model in metres, Y up, near its origin. Throws ImportError.
+Model importModel(const std::filesystem::path& file, const ImportOptions& options = {},
+                  const ImportProgress& progress = {});
+
+/// Parses `--unit`: m, mm, cm, ft, in or a positive number of metres. nullopt when it is neither.
+std::optional<double> metresPerUnitFrom(const std::string& text);
+
+}  // namespace enfilade::scene

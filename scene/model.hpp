@@ -1,0 +1,85 @@
+// What an importer delivers and everything else reads: meshes stored once, objects that place them.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "collision/types.hpp"
+
+namespace enfilade::scene {
+
+using collision::Box;
+using collision::Vec3;
+
+/// glTF's metallic-roughness subset. Colours are linear RGBA, 0..1.
+struct Material {
+  enum class Alpha : std::uint8_t { opaque, mask, blend };
+
+  std::string name;
+  Eigen::Vector4f baseColour{0.8f, 0.8f, 0.8f, 1.0f};
+  Eigen::Vector3f emissive{0, 0, 0};
+  float metallic = 0;
+  float roughness = 1;
+  Alpha alpha = Alpha::opaque;
+  float alphaCutoff = 0.5f;
+  bool doubleSided = false;
+  std::int32_t baseColourTexture = -1;  ///< index into Model::textures, -1: none
+};
+
+/// 8-bit sRGB with linear alpha, row 0 at the top, 4 bytes a pixel.
+struct Texture {
+  std::string name;
+  std::uint32_t width = 0, height = 0;
+  std::vector<std::uint8_t> rgba;
+};
+
+/// Triangles of one material, in the mesh's own frame and unit. Counter-clockwise is outside.
+struct Mesh {
+  std::string name;
+  std::vector<Eigen::Vector3f> positions;
+  std::vector<Eigen::Vector3f> normals;  ///< empty, or one a position; unit length
+  std::vector<Eigen::Vector2f> uvs;      ///< empty, or one a position; (0,0) is the image's top left
+  std::vector<std::uint32_t> indices;    ///< three a triangle
+  std::uint32_t material = 0;
+};
+
+/// One thing a person would name: a node that carries meshes. Its id is its index.
+struct Object {
+  std::string path;  ///< stable and unique: names from the root joined by '/', repeats as name#2
+  std::string globalId;               ///< IFC GlobalId, or empty
+  std::vector<std::uint32_t> meshes;  ///< indices into Model::meshes
+  /// metres, Y up, offset removed; may mirror and scale unequally.
+  Eigen::Affine3d worldFromMesh = Eigen::Affine3d::Identity();
+};
+
+/// Something the user should know about the file: degenerate triangles, missing textures, ...
+struct Problem {
+  std::string kind;     ///< a short stable word, as "missing_texture"
+  std::size_t count = 0;
+  std::string example;  ///< the first place it was met
+};
+
+struct Model {
+  std::string source;  ///< the file's path as given, or the generator's name
+  std::vector<Material> materials;
+  std::vector<Texture> textures;
+  std::vector<Mesh> meshes;
+  std::vector<Object> objects;
+
+  double metresPerUnit = 1;  ///< what one unit of the file was taken for
+  char up = 'y';             ///< the file's up axis, already turned to Y
+  /// Subtracted from the file's coordinates (in metres, Y up) so that the scene lies near its
+  /// origin; zero unless the scene lies far from it. file = scene + offset.
+  Vec3 offset = Vec3::Zero();
+  std::vector<Problem> problems;
+};
+
+/// The world position of a vertex, always by this one expression, so that all who ask agree to the
+/// last bit.
+inline Vec3 worldPosition(const Object& object, const Mesh& mesh, std::uint32_t vertex) {
+  return object.worldFromMesh * mesh.positions[vertex].cast<double>();
+}
+
+}  // namespace enfilade::scene
