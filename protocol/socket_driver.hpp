@@ -1,0 +1,36 @@
+// Drives a script over a connection, in lockstep.
+#pragma once
+
+#include "protocol/client.hpp"
+#include "protocol/script.hpp"
+
+namespace enfilade::protocol {
+
+/// What pictures a script's captures are.
+struct CaptureFormat {
+  std::uint32_t width = 640, height = 480;  ///< pixels
+  std::vector<v1::Channel> channels{v1::CHANNEL_RGB};
+  v1::Encoding rgbEncoding = v1::ENCODING_RAW;
+};
+
+class SocketDriver : public ScriptDriver {
+ public:
+  /// Takes the clock and subscribes to contacts and notices. `client` outlives the driver. Throws
+  /// ProtocolError when another client drives.
+  explicit SocketDriver(Client& client, CaptureFormat format = {});
+
+  double tickSeconds() const override;
+  std::optional<v1::Error> submit(const v1::Command& command) override;
+  StepOutcome step() override;
+
+ private:
+  CapturedFrame capture(const v1::Notice& notice, std::uint64_t tick);
+
+  Client& client_;
+  CaptureFormat format_;
+};
+
+/// What to ask for when `notice` says that a capture is due.
+v1::FrameRequest captureRequest(const v1::Notice& notice, const CaptureFormat& format);
+
+}  // namespace enfilade::protocol
