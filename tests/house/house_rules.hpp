@@ -1,0 +1,39 @@
+// The rules of the house, as functions on the text of the sources: which folder may include which,
+// where third parties may be seen, how long a file may be.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace enfilade::house {
+
+/// Path from the root of the repository (with '/'), and what is in the file.
+using Sources = std::map<std::string, std::string>;
+
+/// One line a fault: "file:line: what is wrong".
+using Faults = std::vector<std::string>;
+
+/// Every text file of the repository that people write; build folders, out/ and .git left out.
+Sources readSources(const std::filesystem::path& root);
+
+/// Quoted includes go by path from the root, exist, and follow
+/// collision <- scene <- render <- server, protocol <- server, scene <- assets.
+Faults includeDirections(const Sources& sources);
+
+/// A header that another folder can reach includes nothing but the standard library, Eigen,
+/// generated messages and our own.
+Faults thirdPartiesInPublicHeaders(const Sources& sources);
+
+/// A third party is used only in the folders it was chosen for.
+Faults thirdPartiesOutOfPlace(const Sources& sources);
+
+Faults headersWithoutPragmaOnce(const Sources& sources);
+Faults longFiles(const Sources& sources, int maxLines);
+Faults unfinishedWork(const Sources& sources);
+
+/// Links of the Markdown pages to files of the repository that are not there.
+Faults brokenLinks(const Sources& sources);
+
+}  // namespace enfilade::house
