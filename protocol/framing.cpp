@@ -1,0 +1,149 @@
+#include "protocol/framing.hpp"
+
+#include <google/protobuf/message_lite.h>
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+namespace enfilade::protocol {
+namespace {
+
+constexpr std::size_t kLengthBytes = 4;
+
+std::uint32_t littleEndian(const std::uint8_t* bytes) {
+  return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8 |
+         static_cast<std::uint32_t>(bytes[2]) << 16 | static_cast<std::uint32_t>(bytes[3]) << 24;
+}
+
+void appendLittleEndian(std::vector<std::uint8_t>& bytes, std::uint32_t value) {
+  for (int shift = 0; shift < 32; shift += 8) {
+    bytes.push_back(static_cast<std::uint8_t>(value >> shift & 0xFFu));
+  }
+}
+
+/// The bytes as hexadecimal digits and, where they are all printable, as text.
+std::string shown(std::span<const std::uint8_t> bytes) {
+  static constexpr char digits[] = "0123456789abcdef";
+  std::string hex, text;
+  for (const std::uint8_t byte : bytes) {
+    hex += digits[byte >> 4];
+    hex += digits[byte & 15];
+    if (byte >= 0x20 && byte < 0x7F) text += static_cast<char>(byte);
+  }
+  return text.size() == bytes.size() ? hex + " (\"" + text + "\")" : hex;
+}
+
+}  // namespace
+
+Decoder::Decoder(const FramingLimits& limits, Expect expect)
+    : limits_(limits), magicSeen_(expect == Expect::messages) {}
+
+std::optional<Message> Decoder::next(std::span<const std::uint8_t>& bytes) {
+  if (error_) return std::nullopt;
+  if (!magicSeen_ && !takeMagic(bytes)) return std::nullopt;
+  if (!takeLengths(bytes)) return std::nullopt;
+  if (!takePart(bytes, message_.header, headerLength_)) return std::nullopt;
+  if (!takePart(bytes, message_.attachment, attachmentLength_)) return std::nullopt;
+  prefixLength_ = 0;
+  return std::exchange(message_, Message{});
+}
+
+std::size_t Decoder::bytesHeld() const {
+  return message_.header.capacity() + message_.attachment.capacity();
+}
+
+/// Fills prefix_ up to `wanted` bytes; false when more must come.
+bool Decoder::takePrefix(std::span<const std::uint8_t>& bytes, std::size_t wanted) {
+  const std::size_t count = std::min(wanted - prefixLength_, bytes.size());
+  if (count > 0) std::memcpy(prefix_.data() + prefixLength_, bytes.data(), count);
+  prefixLength_ += count;
+  offset_ += count;
+  bytes = bytes.subspan(count);
+  return prefixLength_ == wanted;
+}
+
+bool Decoder::takeMagic(std::span<const std::uint8_t>& bytes) {
+  const bool whole = takePrefix(bytes, kMagic.size());
+  // The first wrong byte is enough: a silent sender of garbage is not waited for.
+  if (!std::equal(prefix_.begin(), prefix_.begin() + static_cast<std::ptrdiff_t>(prefixLength_),
+                  kMagic.begin())) {
+    fail(FramingError::Code::badMagic, 0,
+         "the stream begins with " + shown({prefix_.data(), prefixLength_}) + " instead of " +
+             shown(kMagic));
+    return false;
+  }
+  if (!whole) return false;
+  magicSeen_ = true;
+  prefixLength_ = 0;
+  return true;
+}
+
+bool Decoder::takeLengths(std::span<const std::uint8_t>& bytes) {
+  constexpr std::size_t both = 2 * kLengthBytes;
+  if (prefixLength_ == both) return true;
+  if (!takePrefix(bytes, both)) return false;
+  const std::uint64_t start = offset_ - both;
+  const std::uint32_t total = littleEndian(prefix_.data());
+  headerLength_ = littleEndian(prefix_.data() + kLengthBytes);
+  if (total > limits_.total) {
+    fail(FramingError::Code::tooLarge, start,
+         "a message of " + std::to_string(total) + " bytes is above the limit of " +
+             std::to_string(limits_.total));
+  } else if (headerLength_ > limits_.header) {
+    fail(FramingError::Code::tooLarge, start + kLengthBytes,
+         "a header of " + std::to_string(headerLength_) + " bytes is above the limit of " +
+             std::to_string(limits_.header));
+  } else if (total < kLengthBytes || headerLength_ > total - kLengthBytes) {
+    fail(FramingError::Code::badLength, start,
+         "a header of " + std::to_string(headerLength_) + " bytes does not fit into a message of " +
+             std::to_string(total));
+  } else {
+    attachmentLength_ = total - static_cast<std::uint32_t>(kLengthBytes) - headerLength_;
+  }
+  return !error_;
+}
+
+/// Appends to `part` until it has `wanted` bytes; false when more must come. Room follows the bytes
+/// that came, not the length that was claimed.
+bool Decoder::takePart(std::span<const std::uint8_t>& bytes, std::vector<std::uint8_t>& part,
+                       std::size_t wanted) {
+  const std::size_t count = std::min(wanted - part.size(), bytes.size());
+  if (part.size() + count > part.capacity()) {
+    part.reserve(std::min(wanted, std::max(2 * part.capacity(), part.size() + count)));
+  }
+  const auto taken = bytes.first(count);
+  part.insert(part.end(), taken.begin(), taken.end());
+  offset_ += count;
+  bytes = bytes.subspan(count);
+  return part.size() == wanted;
+}
+
+void Decoder::fail(FramingError::Code code, std::uint64_t offset, std::string reason) {
+  error_ = FramingError{code, std::move(reason), offset};
+  message_ = Message{};
+}
+
+std::vector<std::uint8_t> encode(const google::protobuf::MessageLite& header,
+                                 std::span<const std::uint8_t> attachment) {
+  const std::size_t headerLength = header.ByteSizeLong();
+  const std::size_t total = kLengthBytes + headerLength + attachment.size();
+  // Protobuf itself ends at 2 GiB.
+  if (headerLength > std::numeric_limits<std::int32_t>::max() ||
+      total > std::numeric_limits<std::uint32_t>::max()) {
+    throw std::length_error("a message of " + std::to_string(total) +
+                            " bytes does not fit into its length field");
+  }
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(kLengthBytes + total);
+  appendLittleEndian(bytes, static_cast<std::uint32_t>(total));
+  appendLittleEndian(bytes, static_cast<std::uint32_t>(headerLength));
+  bytes.resize(2 * kLengthBytes + headerLength);
+  header.SerializeWithCachedSizesToArray(bytes.data() + 2 * kLengthBytes);
+  bytes.insert(bytes.end(), attachment.begin(), attachment.end());
+  return bytes;
+}
+
+}  // namespace enfilade::protocol
