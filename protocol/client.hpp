@@ -63,7 +63,8 @@ class Client {
   v1::Metrics metrics();
 
   /// What came unasked, in order: TickEvents, State or Bye. takeEvents() gives what came before the
-  /// last reply and does not wait; nextEvent() waits up to `patience` for one.
+  /// last reply and does not wait; nextEvent() waits up to `patience` for one. They are kept until
+  /// taken. After Bye the connection is broken, and the next call says so.
   std::deque<v1::ServerMessage> takeEvents();
   std::optional<v1::ServerMessage> nextEvent(std::chrono::milliseconds patience);
 

@@ -83,7 +83,8 @@ struct LineOutcome {
   enum class Kind : std::uint8_t {
     refused,     ///< not taken, or found impossible when its turn came
     blocked,     ///< a walk that made no progress
-    unfinished,  ///< the bound of ScriptLimits ended a wait before this order did
+    dropped,     ///< its avatar's queue was dropped, as after a refused spawn
+    unfinished,  ///< the bound of ScriptLimits ended this wait
     uncaptured   ///< no picture could be had
   };
   Kind kind = Kind::refused;
@@ -98,6 +99,7 @@ struct ScriptResult {
   double time = 0;  ///< seconds of simulated time
   std::uint64_t stateHash = 0;
   std::uint32_t spawned = 0, refused = 0, blocked = 0, arrived = 0, captured = 0;
+  std::uint32_t dropped = 0;          ///< orders of a dropped queue
   std::uint32_t uncaptured = 0;       ///< captures without a picture
   std::uint32_t unfinished = 0;       ///< waits that the bound ended
   std::vector<LineOutcome> outcomes;  ///< what did not go as written, in order of time

@@ -1,1 +1,167 @@
+// Runs a script tick by tick. What is submitted when depends on the script and on `idle` alone,
+// never on wall-clock time, so that every driver sees the same commands at the same ticks.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
 #include "protocol/script.hpp"
+
+namespace enfilade::protocol {
+namespace {
+
+/// A wait of a whole number of ticks, as 0.1 s of 1/60 s, is not made longer by rounding.
+constexpr double kWholeTicks = 1e-9;  // relative
+
+std::uint64_t ticksFor(double seconds, double tick) {
+  return static_cast<std::uint64_t>(std::ceil(seconds / tick * (1 - kWholeTicks)));
+}
+
+std::string pointText(const v1::Vec3& point) {
+  std::array<char, 128> text{};
+  std::snprintf(text.data(), text.size(), "(%.2f, %.2f, %.2f)", point.x(), point.y(), point.z());
+  return text.data();
+}
+
+class Run {
+ public:
+  Run(const Script& script, ScriptDriver& driver, const ScriptObserver& observer,
+      const ScriptLimits& limits)
+      : script_(script), driver_(driver), observer_(observer), limits_(limits) {
+    progress_.lines = script.lines.size();
+  }
+
+  ScriptResult run() {
+    for (const ScriptLine& line : script_.lines) {
+      if (const auto* wait = std::get_if<GlobalWait>(&line.what)) {
+        stepUntilIdle(line.number);
+        const std::uint64_t ticks = ticksFor(wait->seconds, driver_.tickSeconds());
+        for (std::uint64_t i = 0; i < ticks; ++i) step();
+        lineDone(line.number);
+      } else {
+        submit(line.number, std::get<v1::Command>(line.what));
+      }
+    }
+    if (!script_.lines.empty()) stepUntilIdle(script_.lines.back().number);
+    return std::move(result_);
+  }
+
+ private:
+  void submit(std::uint32_t line, const v1::Command& command) {
+    if (const auto error = driver_.submit(command)) {
+      ++result_.refused;
+      tell(LineOutcome::Kind::refused, line, command.avatar(),
+           "refused: " + (error->field().empty() ? "" : error->field() + ": ") + error->message());
+      lineDone(line);
+      return;
+    }
+    open_.emplace(line, command.avatar());
+    idle_ = false;
+  }
+
+  void stepUntilIdle(std::uint32_t line) {
+    const std::uint64_t most = ticksFor(limits_.untilIdle, driver_.tickSeconds());
+    for (std::uint64_t i = 0; i < most && !idle_; ++i) step();
+    if (!idle_) {
+      ++result_.unfinished;
+      std::array<char, 64> seconds{};
+      std::snprintf(seconds.data(), seconds.size(), "%g", limits_.untilIdle);
+      tell(LineOutcome::Kind::unfinished, line, "",
+           "the walk is not at rest after " + std::string(seconds.data()) +
+               " s of simulated time; the script goes on");
+      return;
+    }
+    for (const auto& [number, avatar] : open_) {
+      ++result_.dropped;
+      tell(LineOutcome::Kind::dropped, number, avatar,
+           "dropped with the queue of its avatar, unheard");
+      lineDone(number);
+    }
+    open_.clear();
+  }
+
+  void step() {
+    StepOutcome outcome = driver_.step();
+    ++result_.ticks;
+    result_.time = outcome.time;
+    result_.stateHash = outcome.stateHash;
+    idle_ = outcome.idle;
+    tick_ = outcome.tick;
+    for (const v1::Notice& notice : outcome.notices) hear(notice);
+    for (const CapturedFrame& frame : outcome.frames) count(frame);
+    if (observer_) observer_(outcome, progress_);
+  }
+
+  /// A notice with the tag and the avatar of a submitted line ends that line.
+  void hear(const v1::Notice& notice) {
+    const auto found = open_.find(static_cast<std::uint32_t>(notice.tag()));
+    if (notice.tag() > 0xFFFF'FFFFu || found == open_.end() || found->second != notice.avatar()) {
+      return;
+    }
+    const std::uint32_t line = found->first;
+    switch (notice.kind()) {
+      case v1::Notice::KIND_SPAWNED:
+        ++result_.spawned;
+        break;
+      case v1::Notice::KIND_ARRIVED:
+        ++result_.arrived;
+        break;
+      case v1::Notice::KIND_REFUSED:
+        ++result_.refused;
+        tell(LineOutcome::Kind::refused, line, notice.avatar(), "refused: " + notice.text());
+        break;
+      case v1::Notice::KIND_BLOCKED:
+        ++result_.blocked;
+        tell(LineOutcome::Kind::blocked, line, notice.avatar(),
+             "blocked by " +
+                 (notice.obstacle_name().empty() ? "something" : notice.obstacle_name()) + " at " +
+                 pointText(notice.position()));
+        break;
+      default:
+        break;
+    }
+    open_.erase(found);
+    lineDone(line);
+  }
+
+  void count(const CapturedFrame& frame) {
+    if (frame.error.empty()) {
+      ++result_.captured;
+      return;
+    }
+    ++result_.uncaptured;
+    tell(LineOutcome::Kind::uncaptured, static_cast<std::uint32_t>(frame.tag), frame.avatar,
+         "no picture \"" + frame.name + "\": " + frame.error);
+  }
+
+  void tell(LineOutcome::Kind kind, std::uint32_t line, const std::string& avatar,
+            const std::string& what) {
+    result_.outcomes.push_back({kind, line, tick_, avatar,
+                                script_.source + ":" + std::to_string(line) + ": " +
+                                    (avatar.empty() ? "" : avatar + ": ") + what});
+  }
+
+  void lineDone(std::uint32_t line) {
+    ++progress_.linesDone;
+    progress_.line = line;
+  }
+
+  const Script& script_;
+  ScriptDriver& driver_;
+  const ScriptObserver& observer_;
+  const ScriptLimits& limits_;
+  ScriptResult result_;
+  ScriptProgress progress_;
+  std::map<std::uint32_t, std::string> open_;  ///< submitted lines that have not ended; avatars
+  bool idle_ = true;
+  std::uint64_t tick_ = 0;
+};
+
+}  // namespace
+
+ScriptResult runScript(const Script& script, ScriptDriver& driver, const ScriptObserver& observer,
+                       const ScriptLimits& limits) {
+  return Run(script, driver, observer, limits).run();
+}
+
+}  // namespace enfilade::protocol

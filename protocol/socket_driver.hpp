@@ -1,6 +1,9 @@
 // Drives a script over a connection, in lockstep.
 #pragma once
 
+#include <set>
+#include <string>
+
 #include "protocol/client.hpp"
 #include "protocol/script.hpp"
 
@@ -24,10 +27,12 @@ class SocketDriver : public ScriptDriver {
   StepOutcome step() override;
 
  private:
-  CapturedFrame capture(const v1::Notice& notice, std::uint64_t tick);
+  CapturedFrame capture(const v1::Notice& notice);
+  bool concerns(const v1::ContactEvent& contact) const;
 
   Client& client_;
   CaptureFormat format_;
+  std::set<std::string> avatars_;  ///< that this script commands
 };
 
 /// What to ask for when `notice` says that a capture is due.
