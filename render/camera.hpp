@@ -18,10 +18,10 @@ struct Camera {
   Vec3 eye = Vec3::Zero();
   Vec3 forward = Vec3::UnitX();
   Vec3 up = Vec3::UnitY();
-  double fovY = 1.2;      ///< perspective: vertical opening, 0 < fovY < pi
-  double heightY = 10;    ///< orthographic: metres from the bottom to the top of the picture
-  double near = 0.05;     ///< metres along forward; what is nearer is cut away (plans use it)
-  double far = 1000;      ///< metres along forward; > near
+  double fovY = 1.2;    ///< perspective: vertical opening, 0 < fovY < pi
+  double heightY = 10;  ///< orthographic: metres from the bottom to the top of the picture
+  double near = 0.05;   ///< metres along forward; what is nearer is cut away (plans use it)
+  double far = 1000;    ///< metres along forward; > near
   int width = 640, height = 480;  ///< pixels, 1..4096
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -32,6 +33,9 @@ void drawDisc(Image& image, double x, double y, double radius, Colour c);
 /// ASCII text in an embedded font; (x, y) is its top left; `scale` 1 is about 8 pixels a letter.
 void drawText(Image& image, int x, int y, const std::string& text, int scale, Colour c);
 
+/// Box filter in linear light. `width` and `height` are at least 1.
+Image scaled(const Image& image, int width, int height);
+
 struct Captioned {
   Image image;
   std::string caption;
@@ -40,7 +44,7 @@ struct Captioned {
 Image contactSheet(const std::vector<Captioned>& pictures, const std::string& title, int columns);
 
 /// Pixel of a world point in a picture taken with `camera` (x right, y down, from the top left
-/// corner); the third is its z-distance.
+/// corner); the third is its z-distance. Not a number (x, y) when it is behind a perspective's eye.
 Vec3 project(const Camera& camera, const Vec3& worldPoint);
 
 }  // namespace enfilade::render

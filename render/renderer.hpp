@@ -25,8 +25,7 @@ class Renderer {
 
   /// `hidden` is not drawn (the avatar whose eyes these are); 0: everything is drawn.
   /// Throws RenderError for a camera that refusal() refuses.
-  Frame render(const scene::Snapshot& snapshot, const Camera& camera,
-               scene::EntityId hidden = 0);
+  Frame render(const scene::Snapshot& snapshot, const Camera& camera, scene::EntityId hidden = 0);
 
   const std::string& deviceName() const;  ///< GL_RENDERER
   bool software() const;

@@ -1,0 +1,157 @@
+#include "render/draw_list.hpp"
+
+#include <algorithm>
+#include <tuple>
+
+namespace enfilade::render {
+namespace {
+
+/// A mesh may come without a material of its own (hand-made models do).
+const scene::Material& materialOf(const scene::Model& model, std::uint32_t index) {
+  static const scene::Material plain;
+  return index < model.materials.size() ? model.materials[index] : plain;
+}
+
+std::int32_t textureOf(const scene::Model& model, const scene::Material& material) {
+  const auto index = material.baseColourTexture;
+  return index >= 0 && static_cast<std::size_t>(index) < model.textures.size() ? index : -1;
+}
+
+Pass passOf(const scene::Material& material) {
+  switch (material.alpha) {
+    case scene::Material::Alpha::mask:
+      return Pass::mask;
+    case scene::Material::Alpha::blend:
+      return Pass::blend;
+    case scene::Material::Alpha::opaque:
+      break;
+  }
+  return Pass::opaque;
+}
+
+scene::Box boxOf(const scene::Mesh& mesh) {
+  scene::Box box;
+  for (const Eigen::Vector3f& position : mesh.positions) box.include(position.cast<double>());
+  return box;
+}
+
+scene::Box placedBox(const Eigen::Affine3d& worldFromMesh, const scene::Box& box) {
+  const Vec3 centre = worldFromMesh * box.centre();
+  const Vec3 half = worldFromMesh.linear().cwiseAbs() * (0.5 * box.size());
+  return {centre - half, centre + half};
+}
+
+/// Parts of glass that may be seen, farthest first; equal distances keep their order.
+std::vector<const Part*> backToFront(std::vector<const Part*> glass, const Camera& camera) {
+  const bool perspective = camera.projection == Camera::Projection::perspective;
+  const Vec3 forward = viewOf(camera).forward;
+  const auto distance = [&](const Part* part) {
+    const Vec3 toPart = part->box.centre() - camera.eye;
+    return perspective ? toPart.squaredNorm() : forward.dot(toPart);
+  };
+  std::stable_sort(glass.begin(), glass.end(),
+                   [&](const Part* a, const Part* b) { return distance(a) > distance(b); });
+  return glass;
+}
+
+void append(DrawList& list, const Part& part, const MeshRange& range) {
+  const auto instance = static_cast<std::uint32_t>(list.instances.size() - 1);
+  const bool sameBatch = !list.batches.empty() && list.batches.back().pass == part.pass &&
+                         list.batches.back().texture == part.texture;
+  if (!sameBatch) {
+    list.batches.push_back(
+        {part.pass, part.texture, static_cast<std::uint32_t>(list.commands.size()), 0});
+  }
+  Batch& batch = list.batches.back();
+  // Neighbours in the order that share a mesh become one instanced draw.
+  if (batch.commandCount > 0 && list.commands.back().firstIndex == range.firstIndex &&
+      list.commands.back().count == range.indexCount) {
+    ++list.commands.back().instanceCount;
+    return;
+  }
+  list.commands.push_back({range.indexCount, 1, range.firstIndex, range.baseVertex, instance});
+  ++batch.commandCount;
+}
+
+}  // namespace
+
+MaterialData materialData(const scene::Model& model, const scene::Mesh& mesh) {
+  return materialData(materialOf(model, mesh.material));
+}
+
+MaterialData materialData(const scene::Material& material) {
+  MaterialData data{};
+  for (int i = 0; i < 4; ++i) data.baseColour[i] = material.baseColour[i];
+  for (int i = 0; i < 3; ++i) data.emissive[i] = material.emissive[i];
+  data.surface[0] = material.alphaCutoff;
+  data.surface[1] = material.metallic;
+  data.surface[2] = material.roughness;
+  data.surface[3] = material.doubleSided ? 1.0f : 0.0f;
+  return data;
+}
+
+std::vector<Part> partsOf(const scene::Model& model) {
+  std::vector<scene::Box> meshBoxes;
+  meshBoxes.reserve(model.meshes.size());
+  for (const scene::Mesh& mesh : model.meshes) meshBoxes.push_back(boxOf(mesh));
+
+  std::vector<Part> parts;
+  for (std::uint32_t o = 0; o < model.objects.size(); ++o) {
+    const scene::Object& object = model.objects[o];
+    for (const std::uint32_t m : object.meshes) {
+      if (model.meshes[m].indices.empty()) continue;
+      const std::uint32_t materialIndex = model.meshes[m].material;
+      const scene::Material& material = materialOf(model, materialIndex);
+      parts.push_back({placedBox(object.worldFromMesh, meshBoxes[m]), o, m,
+                       textureOf(model, material), passOf(material)});
+    }
+  }
+  const auto key = [](const Part& part) {
+    // Glass is sorted again in every picture; until then only its object counts.
+    return std::tuple(part.pass, part.pass == Pass::blend ? -1 : part.texture);
+  };
+  std::stable_sort(parts.begin(), parts.end(),
+                   [&](const Part& a, const Part& b) { return key(a) < key(b); });
+  return parts;
+}
+
+Instance placed(const Eigen::Affine3d& worldFromMesh, const Vec3& meshCentre, const Vec3& eye,
+                const MaterialData& material, scene::EntityId id) {
+  Instance instance{};
+  const Vec3 origin = worldFromMesh * meshCentre - eye;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      instance.relativeFromMesh[4 * row + column] =
+          static_cast<float>(worldFromMesh.linear()(row, column));
+    }
+    instance.relativeFromMesh[4 * row + 3] = static_cast<float>(origin[row]);
+  }
+  instance.material = material;
+  instance.material.emissive[3] = worldFromMesh.linear().determinant() < 0 ? 1.0f : 0.0f;
+  instance.id = id;
+  return instance;
+}
+
+void appendVisible(DrawList& list, const scene::Model& model, const std::vector<Part>& parts,
+                   const std::vector<MeshRange>& ranges, const std::vector<MaterialData>& materials,
+                   const Camera& camera, scene::EntityId hidden) {
+  const auto frustum = frustumOf(camera);
+  const auto draw = [&](const Part& part) {
+    const MeshRange& range = ranges[part.mesh];
+    list.instances.push_back(placed(model.objects[part.object].worldFromMesh, range.centre,
+                                    camera.eye, materials[part.mesh], part.object + 1));
+    append(list, part, range);
+  };
+  std::vector<const Part*> glass;
+  for (const Part& part : parts) {
+    if (part.object + 1 == hidden || !mayBeSeen(frustum, part.box)) continue;
+    if (part.pass == Pass::blend) {
+      glass.push_back(&part);
+    } else {
+      draw(part);
+    }
+  }
+  for (const Part* part : backToFront(std::move(glass), camera)) draw(*part);
+}
+
+}  // namespace enfilade::render

@@ -1,0 +1,81 @@
+// Which parts of the model a picture needs, in which order, with what data. Knows no GL.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "render/view.hpp"
+#include "scene/scene.hpp"
+
+namespace enfilade::render {
+
+enum class Pass : std::uint8_t { opaque, mask, blend };
+
+/// Where a mesh lies in the index and vertex buffers.
+struct MeshRange {
+  std::uint32_t firstIndex = 0, indexCount = 0;
+  std::int32_t baseVertex = 0;
+  Vec3 centre = Vec3::Zero();  ///< mesh frame; the buffer's positions are relative to it
+};
+
+/// A material as the shaders want it.
+struct MaterialData {
+  float baseColour[4];
+  float emissive[4];  ///< w: set for each instance
+  float surface[4];   ///< alpha cutoff, metallic, roughness, 1 when double-sided
+};
+
+/// One mesh of one object.
+struct Part {
+  scene::Box box;  ///< world
+  std::uint32_t object = 0, mesh = 0;
+  std::int32_t texture = -1;
+  Pass pass = Pass::opaque;
+};
+
+/// What the vertex shader gets for each instance (see Attribute).
+struct Instance {
+  float relativeFromMesh[12];  ///< three rows; to metres relative to the eye, world axes
+  MaterialData material;
+  std::uint32_t id;
+};
+
+/// As GL's DrawElementsIndirectCommand.
+struct DrawCommand {
+  std::uint32_t count, instanceCount, firstIndex;
+  std::int32_t baseVertex;
+  std::uint32_t baseInstance;
+};
+
+/// Consecutive commands that share program and texture.
+struct Batch {
+  Pass pass = Pass::opaque;
+  std::int32_t texture = -1;
+  std::uint32_t firstCommand = 0, commandCount = 0;
+};
+
+struct DrawList {
+  std::vector<Instance> instances;
+  std::vector<DrawCommand> commands;
+  std::vector<Batch> batches;
+};
+
+MaterialData materialData(const scene::Material& material);
+/// Of the mesh's material; a plain one when it names none.
+MaterialData materialData(const scene::Model& model, const scene::Mesh& mesh);
+
+/// All parts of the model, in the order in which they are drawn: by pass, texture, object. The
+/// order never depends on the camera, so that ties of depth fall the same way in every picture.
+std::vector<Part> partsOf(const scene::Model& model);
+
+/// Appends what `camera` may see of `parts`, glass from back to front. `hidden` is left out.
+/// `ranges` and `materials` have one entry a mesh.
+void appendVisible(DrawList& list, const scene::Model& model, const std::vector<Part>& parts,
+                   const std::vector<MeshRange>& ranges, const std::vector<MaterialData>& materials,
+                   const Camera& camera, scene::EntityId hidden);
+
+/// One instance; `worldFromMesh` is of the mesh as given, not of its centre.
+Instance placed(const Eigen::Affine3d& worldFromMesh, const Vec3& meshCentre, const Vec3& eye,
+                const MaterialData& material, scene::EntityId id);
+
+}  // namespace enfilade::render

@@ -1,0 +1,29 @@
+// What is drawn into: sRGB colour, object ids and 32-bit depth of one size, and reading them back.
+#pragma once
+
+#include "render/frame.hpp"
+#include "render/gl_objects.hpp"
+
+namespace enfilade::render {
+
+class FrameTarget {
+ public:
+  FrameTarget() = default;
+  /// Needs a current context. Throws RenderError when the device refuses the size.
+  FrameTarget(int width, int height);
+
+  bool fits(int width, int height) const { return width == width_ && height == height_; }
+  /// Binds it, all black, id 0 and depth 0 (the farthest).
+  void begin() const;
+  /// Draw into colour and ids, or into colour only.
+  void writeIds(bool on) const;
+  /// Colour, ids and depth into `frame`, whose camera is the one that was drawn with.
+  void read(Frame& frame) const;
+
+ private:
+  int width_ = 0, height_ = 0;
+  GlTexture colour_, ids_, depth_;
+  GlFramebuffer framebuffer_;
+};
+
+}  // namespace enfilade::render

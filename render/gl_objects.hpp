@@ -1,0 +1,52 @@
+// Move-only owners of GL names, and the check for GL errors. Needs a current context.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+namespace enfilade::render {
+
+enum class GlKind : std::uint8_t { buffer, texture, vertexArray, framebuffer, program };
+
+unsigned createGl(GlKind kind);
+void deleteGl(GlKind kind, unsigned name) noexcept;
+
+template <GlKind kind>
+class GlObject {
+ public:
+  GlObject() = default;
+  explicit GlObject(unsigned name) : name_(name) {}
+  ~GlObject() { reset(); }
+  GlObject(GlObject&& other) noexcept : name_(std::exchange(other.name_, 0)) {}
+  GlObject& operator=(GlObject&& other) noexcept {
+    if (this != &other) {
+      reset();
+      name_ = std::exchange(other.name_, 0);
+    }
+    return *this;
+  }
+  static GlObject create() { return GlObject(createGl(kind)); }
+  unsigned name() const { return name_; }
+
+ private:
+  void reset() noexcept {
+    if (name_ != 0) deleteGl(kind, name_);
+  }
+  unsigned name_ = 0;
+};
+
+using GlBuffer = GlObject<GlKind::buffer>;
+using GlTexture = GlObject<GlKind::texture>;
+using GlVertexArray = GlObject<GlKind::vertexArray>;
+using GlFramebuffer = GlObject<GlKind::framebuffer>;
+using GlProgram = GlObject<GlKind::program>;
+
+/// Throws RenderError naming `stage` and the error when GL has one.
+void checkGl(const char* stage);
+
+/// Compiles and links; throws RenderError with the compiler's words. `name` is for the message.
+GlProgram buildProgram(const std::string& name, const std::string& vertexSource,
+                       const std::string& fragmentSource);
+
+}  // namespace enfilade::render

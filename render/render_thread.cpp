@@ -1,0 +1,100 @@
+#include "render/render_thread.hpp"
+
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+namespace enfilade::render {
+
+struct RenderThread::State {
+  struct Job {
+    std::shared_ptr<const scene::Snapshot> snapshot;
+    Camera camera;
+    scene::EntityId hidden;
+    std::promise<Frame> done;
+  };
+
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::deque<Job> jobs;
+  bool closing = false;
+  std::string deviceName;
+  bool software = false;
+  std::thread thread;
+
+  /// nullopt when the queue is empty and no more will come.
+  std::optional<Job> nextJob() {
+    std::unique_lock lock(mutex);
+    changed.wait(lock, [&] { return closing || !jobs.empty(); });
+    if (jobs.empty()) return std::nullopt;
+    Job job = std::move(jobs.front());
+    jobs.pop_front();
+    return job;
+  }
+
+  void run(std::shared_ptr<const scene::Scene> scene, std::promise<void> started) {
+    std::unique_ptr<Renderer> renderer;
+    try {
+      renderer = std::make_unique<Renderer>(std::move(scene));
+      deviceName = renderer->deviceName();
+      software = renderer->software();
+    } catch (...) {
+      started.set_exception(std::current_exception());
+      return;
+    }
+    started.set_value();
+    while (auto job = nextJob()) {
+      try {
+        if (!job->snapshot) throw RenderError("RenderThread::render: there is no snapshot");
+        job->done.set_value(renderer->render(*job->snapshot, job->camera, job->hidden));
+      } catch (...) {
+        job->done.set_exception(std::current_exception());
+      }
+    }
+  }
+};
+
+RenderThread::RenderThread(std::shared_ptr<const scene::Scene> scene)
+    : state_(std::make_unique<State>()) {
+  std::promise<void> started;
+  std::future<void> ready = started.get_future();
+  state_->thread = std::thread(&State::run, state_.get(), std::move(scene), std::move(started));
+  try {
+    ready.get();
+  } catch (...) {
+    state_->thread.join();
+    throw;
+  }
+}
+
+RenderThread::~RenderThread() {
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->closing = true;
+  }
+  state_->changed.notify_one();
+  state_->thread.join();
+}
+
+std::future<Frame> RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot,
+                                        Camera camera, scene::EntityId hidden) {
+  State::Job job{std::move(snapshot), std::move(camera), hidden, {}};
+  std::future<Frame> frame = job.done.get_future();
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->jobs.push_back(std::move(job));
+  }
+  state_->changed.notify_one();
+  return frame;
+}
+
+const std::string& RenderThread::deviceName() const {
+  return state_->deviceName;
+}
+bool RenderThread::software() const {
+  return state_->software;
+}
+
+}  // namespace enfilade::render

@@ -1,0 +1,185 @@
+#include "render/shaders.hpp"
+
+namespace enfilade::render {
+namespace {
+
+constexpr const char* kVersion = "#version 450 core\n";
+
+constexpr const char* kFrameBlock = R"(
+layout(std140, binding = 0) uniform Frame {
+  mat4 clipFromRelative;
+  vec4 forward;
+  vec4 rightByX;
+  vec4 upByY;
+};
+)";
+
+constexpr const char* kSurfaceVertex = R"(
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec4 normal;  // w: 0 when the mesh has none
+layout(location = 2) in vec2 uv;
+layout(location = 3) in vec4 rowX;
+layout(location = 4) in vec4 rowY;
+layout(location = 5) in vec4 rowZ;
+layout(location = 6) in vec4 baseColour;
+layout(location = 7) in vec4 emissive;
+layout(location = 8) in vec4 surface;
+layout(location = 9) in uint id;
+
+out vec3 point;
+out vec3 softNormal;
+out vec2 place;
+flat out vec4 base;
+flat out vec4 glow;
+flat out vec4 finish;
+flat out uint entity;
+
+void main() {
+  vec4 p = vec4(position, 1.0);
+  point = vec3(dot(rowX, p), dot(rowY, p), dot(rowZ, p));
+  // The rows of the cofactor matrix: right for unequal scales, and for mirrors up to a sign that
+  // the fragment shader does not trust anyway.
+  softNormal = normal.w == 0.0 ? vec3(0.0)
+                               : vec3(dot(cross(rowY.xyz, rowZ.xyz), normal.xyz),
+                                      dot(cross(rowZ.xyz, rowX.xyz), normal.xyz),
+                                      dot(cross(rowX.xyz, rowY.xyz), normal.xyz));
+  place = uv;
+  base = baseColour;
+  glow = emissive;
+  finish = surface;
+  entity = id;
+  gl_Position = clipFromRelative * vec4(point, 1.0);
+}
+)";
+
+// Light without lamps, so that a model without any reads well indoors: six tints by orientation
+// (walls that meet differ), a weak sun, and a lamp carried at the eye that fades with distance.
+constexpr const char* kLight = R"(
+const vec3 kSunDirection = vec3(0.3841, 0.7682, 0.5122);
+
+vec3 ambientFor(vec3 n) {
+  vec3 weight = n * n;
+  vec3 alongX = n.x > 0.0 ? vec3(0.50, 0.48, 0.45) : vec3(0.33, 0.35, 0.39);
+  vec3 alongY = n.y > 0.0 ? vec3(0.48, 0.48, 0.48) : vec3(0.44, 0.42, 0.40);
+  vec3 alongZ = n.z > 0.0 ? vec3(0.43, 0.42, 0.41) : vec3(0.26, 0.28, 0.32);
+  return weight.x * alongX + weight.y * alongY + weight.z * alongZ;
+}
+
+vec3 lit(vec3 albedo, vec3 n, vec3 toEye, float distance, float metallic, float roughness) {
+  float facing = max(dot(n, toEye), 0.0);
+  float lamp = facing * (0.15 + 0.60 / (1.0 + distance * distance / 20.0));
+  float sun = 0.32 * max(dot(n, kSunDirection), 0.0);
+  vec3 light = ambientFor(n) + vec3(1.0, 0.97, 0.92) * lamp + vec3(1.0, 0.95, 0.86) * sun;
+  float gloss = (1.0 - roughness) * (1.0 - roughness);
+  float shine = gloss > 0.01 ? gloss * pow(facing, 8.0 + 56.0 * gloss) : 0.0;
+  vec3 mirrored = mix(vec3(0.15), albedo, metallic);
+  return albedo * light * (1.0 - 0.25 * metallic) + mirrored * shine * lamp * 2.0;
+}
+
+vec3 skyFor(vec3 direction) {
+  float h = direction.y;
+  vec3 above = mix(vec3(0.80, 0.86, 0.92), vec3(0.30, 0.46, 0.70), sqrt(clamp(h, 0.0, 1.0)));
+  vec3 below = mix(vec3(0.62, 0.62, 0.60), vec3(0.30, 0.29, 0.28), sqrt(clamp(-h, 0.0, 1.0)));
+  return mix(below, above, smoothstep(-0.02, 0.02, h));
+}
+
+vec3 exposed(vec3 radiance) { return 1.0 - exp(-1.5 * radiance); }
+)";
+
+constexpr const char* kSurfaceFragment = R"(
+in vec3 point;
+in vec3 softNormal;
+in vec2 place;
+flat in vec4 base;
+flat in vec4 glow;
+flat in vec4 finish;
+flat in uint entity;
+
+layout(location = 0) out vec4 colour;
+#ifndef BLEND
+layout(location = 1) out uint seen;
+#endif
+#ifdef TEXTURED
+layout(binding = 0) uniform sampler2D baseColourTexture;
+#endif
+
+// Always towards the eye: real models are wound both ways, mirrored, or have no normals at all.
+vec3 facingNormal(vec3 toEye) {
+  vec3 flat_ = cross(dFdx(point), dFdy(point));
+  if (dot(flat_, toEye) < 0.0) flat_ = -flat_;
+  float soft = dot(softNormal, softNormal);
+  if (soft > 0.0) return softNormal * (dot(softNormal, flat_) < 0.0 ? -1.0 : 1.0) / sqrt(soft);
+  float size = dot(flat_, flat_);
+  return size > 0.0 ? flat_ / sqrt(size) : toEye;
+}
+
+void main() {
+  vec4 albedo = base;
+#ifdef TEXTURED
+  albedo *= texture(baseColourTexture, place);
+#endif
+#ifdef MASK
+  if (albedo.a < finish.x) discard;
+#endif
+  bool plan = forward.w > 0.5;
+  float distance = plan ? 0.0 : length(point);
+  vec3 toEye = plan ? -forward.xyz : -point / max(distance, 1e-6);
+  vec3 n = facingNormal(toEye);
+  vec3 radiance = lit(albedo.rgb, n, toEye, distance, finish.y, finish.z) + 1.6 * glow.rgb;
+  // A plan cuts things open; their insides are darker, so that cut walls stand out.
+  bool inside = gl_FrontFacing == (glow.w > 0.5);
+  if (plan && inside && finish.w < 0.5) radiance *= 0.35;
+  if (!plan) radiance = mix(skyFor(-toEye), radiance, exp(-distance / 600.0));
+#ifdef BLEND
+  float rim = 1.0 - abs(dot(n, toEye));
+  colour = vec4(exposed(radiance), albedo.a + (1.0 - albedo.a) * 0.4 * rim * rim * rim * rim);
+#else
+  colour = vec4(exposed(radiance), 1.0);
+  seen = entity;
+#endif
+}
+)";
+
+constexpr const char* kSkyVertex = R"(
+out vec3 direction;
+
+void main() {
+  vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
+  direction = forward.xyz + corner.x * rightByX.xyz + corner.y * upByY.xyz;
+  gl_Position = vec4(corner, 0.0, 1.0);  // depth 0 is the farthest
+}
+)";
+
+constexpr const char* kSkyFragment = R"(
+in vec3 direction;
+layout(location = 0) out vec4 colour;
+
+void main() {
+  bool plan = forward.w > 0.5;
+  colour = vec4(plan ? vec3(0.80, 0.81, 0.82) : exposed(skyFor(normalize(direction))), 1.0);
+}
+)";
+
+}  // namespace
+
+std::string surfaceVertexSource() {
+  return std::string(kVersion) + kFrameBlock + kSurfaceVertex;
+}
+
+std::string surfaceFragmentSource(const SurfaceVariant& variant) {
+  std::string source = kVersion;
+  if (variant.textured) source += "#define TEXTURED\n";
+  if (variant.mask) source += "#define MASK\n";
+  if (variant.blend) source += "#define BLEND\n";
+  return source + kFrameBlock + kLight + kSurfaceFragment;
+}
+
+std::string skyVertexSource() {
+  return std::string(kVersion) + kFrameBlock + kSkyVertex;
+}
+
+std::string skyFragmentSource() {
+  return std::string(kVersion) + kFrameBlock + kLight + kSkyFragment;
+}
+
+}  // namespace enfilade::render
