@@ -1,0 +1,61 @@
+// The end points of the movers, sorted on three axes and repaired by insertion (seed 5.2.2).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "collision/types.hpp"
+
+namespace enfilade::collision {
+
+/// What a repair found: two movers whose overlap has changed. `a` < `b`.
+struct MoverChange {
+  std::uint32_t a, b;
+  bool begins;
+};
+
+/// Keeps one list of end points an axis, ascending; at equal coordinates lower ends come first, so
+/// that closed intervals which touch are in the order of intervals which overlap.
+class MoverLists {
+ public:
+  /// Boxes of all movers of an update are set first; then the lists are changed.
+  void setBox(std::uint32_t mover, const Box& box);
+
+  /// Takes movers out of the lists; tells nothing.
+  void remove(std::span<const std::uint32_t> movers);
+  /// Repairs the lists after the mover's box changed. Appends to `changes` each exchange of a lower
+  /// and an upper end whose status is confirmed by the boxes; one change may be told twice.
+  void move(std::uint32_t mover, std::vector<MoverChange>& changes);
+  /// Takes movers into the lists and appends their overlaps with all movers in the lists.
+  void insert(std::span<const std::uint32_t> movers, std::vector<MoverChange>& changes);
+
+  std::uint64_t exchanges = 0;  ///< counted up; the caller resets them
+  std::uint64_t boxTests = 0;
+
+ private:
+  struct End {
+    double at;
+    std::uint32_t tag;  ///< 2 * mover + (1 for the upper end)
+    bool upper() const { return (tag & 1) != 0; }
+    std::uint32_t mover() const { return tag >> 1; }
+  };
+  static bool before(const End& a, const End& b) {
+    return a.at != b.at ? a.at < b.at : a.upper() < b.upper();
+  }
+
+  void bubble(int axis, End end, std::vector<MoverChange>& changes);
+  void exchanged(const End& moving, const End& other, bool up, std::vector<MoverChange>& changes);
+  void renumber(int axis);
+  void sweep(std::span<const std::uint32_t> fresh, std::vector<MoverChange>& changes);
+  void confirm(std::uint32_t a, std::uint32_t b, std::vector<MoverChange>& changes);
+
+  std::vector<Box> boxes_;                              ///< by mover
+  std::array<std::vector<End>, 3> ends_;                ///< by axis
+  std::array<std::vector<std::uint32_t>, 3> position_;  ///< by axis and tag: index into ends_
+  std::vector<std::uint8_t> marked_;                    ///< by mover: removed, or fresh
+  std::array<std::vector<std::uint32_t>, 2> open_;      ///< sweep: open movers, old and fresh
+};
+
+}  // namespace enfilade::collision

@@ -1,0 +1,82 @@
+// Conservative advancement (Mirtich 1996, section 2.3; seed 5.1) for translation. If a plane with
+// normal n parts A and B by d, moving A by s * displacement leaves them at least
+// d - s * (displacement . n) apart. So A may advance by (d - target) / (displacement . n), after
+// which the closest points are computed anew. The first approach aims at `high` and remembers where
+// it got there; the second goes on to `low` to see whether the obstacle really stands in the way.
+#include "collision/time_of_impact.hpp"
+
+namespace enfilade::collision {
+namespace {
+
+constexpr int kAdvanceBound = 48;        // steps a target; a handful is usual
+constexpr double kArrived = 1.0 / 32;    // of (high - low): near enough to a target
+constexpr double kGrazing = 1e-9;        // of |displacement|: slower closing is rounding, not motion
+
+struct Advance {
+  double fraction;
+  bool reached;  ///< came as near as the target; else passed with the whole displacement
+  bool boundReached = false;
+  Decision last;
+};
+
+double closingSpeed(const Vec3& displacement, const Decision& at) {
+  const double closing = displacement.dot(at.normal);
+  return closing > kGrazing * displacement.norm() ? closing : 0;
+}
+
+Advance advanceTo(double target, double tolerance, double from, const ConvexBody& a,
+                  const Vec3& displacement, const ConvexBody& b, SeparationCache& cache,
+                  SweepResult& result) {
+  Advance advance{from, false, false, {}};
+  for (int i = 0; i < kAdvanceBound; ++i) {
+    const ConvexBody moved{a.vertices, a.translation + advance.fraction * displacement};
+    advance.last = decide(moved, b, cache);
+    ++result.queries;
+    if (advance.last.decidedBy == DecidedBy::rational) ++result.rationals;
+    const double distance = advance.last.distance - advance.last.errorBound;
+    const bool apart = advance.last.verdict == Verdict::separated;
+    const double closing = closingSpeed(displacement, advance.last);
+    if (apart && closing == 0) return advance;  // a plane parts them for the rest of the way
+    if (!apart || distance <= target + tolerance) {
+      advance.reached = true;
+      return advance;
+    }
+    const double step = (distance - target) / closing;
+    if (advance.fraction + step >= 1) return advance;
+    advance.fraction += step;
+  }
+  advance.reached = advance.boundReached = true;
+  return advance;
+}
+
+/// Bodies that already overlap: the axis of least overlap tells which moves close in further.
+bool partsOverlap(const Decision& at, const Vec3& displacement) {
+  return displacement.dot(at.normal) <= 0;
+}
+
+}  // namespace
+
+SweepResult sweep(const ConvexBody& a, const Vec3& displacement, const ConvexBody& b,
+                  const StoppingBand& band, SeparationCache& cache) {
+  SweepResult result;
+  const double length = displacement.norm();
+  if (!(length > 0) || provedSeparation(a, b, cache) > band.low + length) return result;
+
+  const double tolerance = kArrived * (band.high - band.low);
+  const Advance near =
+      advanceTo(band.high, tolerance, 0, a, displacement, b, cache, result);
+  if (!near.reached) return result;
+  Advance in = near;
+  const bool overlapping = near.last.verdict != Verdict::separated;
+  if (overlapping && partsOverlap(near.last, displacement)) return result;
+  if (!overlapping && !near.boundReached)
+    in = advanceTo(band.low, tolerance, near.fraction, a, displacement, b, cache, result);
+  if (!in.reached) return result;
+  result.stopped = true;
+  result.boundReached = in.boundReached;
+  result.fraction = near.fraction;
+  result.atStop = near.last;
+  return result;
+}
+
+}  // namespace enfilade::collision

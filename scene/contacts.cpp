@@ -1,0 +1,156 @@
+// Who touches what after the motion: for each avatar and each entity in its reach the nearest
+// convex piece decides. A contact is d < 2 epsilon (seed 5.1.1). Begin and end are differences to
+// the last tick.
+#include <algorithm>
+
+#include "scene/world_state.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using collision::Decision;
+using collision::Verdict;
+
+ContactEvent eventOf(const WorldState& world, ContactEvent::Kind kind, const Avatar& avatar,
+                     const Contact& contact) {
+  ContactEvent event;
+  event.tick = world.tick;
+  event.time = static_cast<double>(world.tick) * world.lengths.tick;
+  event.kind = kind;
+  event.a = avatar.id;
+  event.b = contact.other;
+  event.decision = contact.decision;
+  return event;
+}
+
+/// Other avatars moved after this one gathered its obstacles: take their place of now.
+void followOthers(const WorldState& world, Avatar& avatar) {
+  for (Obstacle& obstacle : avatar.obstacles) {
+    if (obstacle.entity < world.firstAvatarId()) continue;
+    const auto& name = world.avatarNames[obstacle.entity - world.firstAvatarId()];
+    const auto found = world.avatars.find(name);
+    if (found == world.avatars.end()) continue;
+    const Avatar& other = found->second;
+    obstacle.box = {other.hullBox.min + other.feet, other.hullBox.max + other.feet};
+    obstacle.body.translation = other.feet;
+  }
+}
+
+/// Penetrating before touching before separated, then by distance.
+bool nearer(const Decision& a, const Decision& b) {
+  return a.verdict != b.verdict ? a.verdict > b.verdict : a.distance < b.distance;
+}
+
+std::optional<Decision> decideCounted(const Avatar& avatar, Obstacle& obstacle, double limit,
+                                      QueryCount& count) {
+  ++count.narrow;
+  const auto decision = collision::decideWithin({avatar.hull->vertices, avatar.feet},
+                                                obstacle.body, limit, obstacle.cache);
+  if (decision && decision->decidedBy == collision::DecidedBy::rational) ++count.rational;
+  return decision;
+}
+
+/// All entities nearer than `limit`, each with its nearest piece, ascending.
+std::vector<Contact> nearOnes(Avatar& avatar, double limit, QueryCount& count) {
+  std::vector<Contact> found;
+  const Box box =
+      grown(Box{avatar.hullBox.min + avatar.feet, avatar.hullBox.max + avatar.feet}, limit);
+  for (Obstacle& obstacle : avatar.obstacles) {
+    if (!overlaps(box, obstacle.box)) continue;
+    const bool known = !found.empty() && found.back().other == obstacle.entity;
+    const double within = known ? found.back().decision.distance : limit;
+    const auto decision = decideCounted(avatar, obstacle, within, count);
+    if (!decision || !(decision->distance < limit)) continue;
+    if (!known) {
+      found.push_back({obstacle.entity, false, *decision});
+    } else if (nearer(*decision, found.back().decision)) {
+      found.back().decision = *decision;
+    }
+  }
+  return found;
+}
+
+/// How far apart they are now, for the event that ends a contact; last tick's if out of reach.
+Decision partedDecision(Avatar& avatar, const Contact& last, QueryCount& count) {
+  std::optional<Decision> best;
+  for (Obstacle& obstacle : avatar.obstacles) {
+    if (obstacle.entity != last.other) continue;
+    const auto decision =
+        decideCounted(avatar, obstacle, std::numeric_limits<double>::infinity(), count);
+    if (!best || nearer(*decision, *best)) best = decision;
+  }
+  return best.value_or(last.decision);
+}
+
+const Contact* find(const std::vector<Contact>& contacts, EntityId other) {
+  const auto at = std::lower_bound(contacts.begin(), contacts.end(), other,
+                                   [](const Contact& c, EntityId id) { return c.other < id; });
+  return at != contacts.end() && at->other == other ? &*at : nullptr;
+}
+
+void tellBegins(const WorldState& world, const Avatar& avatar, const std::vector<Contact>& now,
+                std::vector<ContactEvent>& events) {
+  for (const Contact& contact : now) {
+    const Contact* before = find(avatar.contacts, contact.other);
+    if (contact.touching && !(before && before->touching)) {
+      events.push_back(eventOf(world, ContactEvent::Kind::begin, avatar, contact));
+    } else if (!contact.touching && !before) {
+      events.push_back(eventOf(world, ContactEvent::Kind::near, avatar, contact));
+    }
+  }
+}
+
+void tellEnds(const WorldState& world, Avatar& avatar, const std::vector<Contact>& now,
+              std::vector<ContactEvent>& events, QueryCount& count) {
+  for (const Contact& before : avatar.contacts) {
+    const Contact* contact = find(now, before.other);
+    if (!before.touching || (contact && contact->touching)) continue;
+    Contact parted = contact ? *contact : before;
+    if (!contact) parted.decision = partedDecision(avatar, before, count);
+    events.push_back(eventOf(world, ContactEvent::Kind::end, avatar, parted));
+  }
+}
+
+void updateContacts(WorldState& world, Avatar& avatar, TickReport& report, QueryCount& count) {
+  followOthers(world, avatar);
+  const double contactBelow = 2 * world.lengths.epsilon;
+  std::vector<Contact> now =
+      nearOnes(avatar, std::max(contactBelow, world.lengths.nearMiss), count);
+  // A pair of avatars is told by the one with the lesser id.
+  std::erase_if(now, [&](const Contact& c) {
+    return c.other >= world.firstAvatarId() && c.other < avatar.id;
+  });
+  for (Contact& contact : now) contact.touching = contact.decision.distance < contactBelow;
+  tellBegins(world, avatar, now, report.contacts);
+  tellEnds(world, avatar, now, report.contacts, count);
+  avatar.contacts = std::move(now);
+}
+
+}  // namespace
+
+void findContacts(WorldState& world, TickReport& report, QueryCount& count) {
+  for (auto& [name, avatar] : world.avatars) {
+    if (!avatar.resting) updateContacts(world, avatar, report, count);
+    for (const Contact& contact : avatar.contacts) {
+      if (contact.touching) ++report.liveContacts;
+      report.worstPenetration = std::max(report.worstPenetration, contact.decision.penetration);
+    }
+  }
+}
+
+void endContactsOf(WorldState& world, Avatar& avatar, ContactEvent::Reason reason,
+                   std::vector<ContactEvent>& events) {
+  const auto tell = [&](const Avatar& a, const Contact& contact) {
+    if (!contact.touching) return;
+    events.push_back(eventOf(world, ContactEvent::Kind::end, a, contact));
+    events.back().reason = reason;
+  };
+  for (const Contact& contact : avatar.contacts) tell(avatar, contact);
+  avatar.contacts.clear();
+  for (auto& [name, other] : world.avatars) {
+    if (const Contact* contact = find(other.contacts, avatar.id)) tell(other, *contact);
+    std::erase_if(other.contacts, [&](const Contact& c) { return c.other == avatar.id; });
+  }
+}
+
+}  // namespace enfilade::scene

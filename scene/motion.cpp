@@ -1,0 +1,227 @@
+// How an avatar moves in one tick: collide and slide (up to kSlides planes), steps up to
+// Lengths::stepHeight, follows the ground down by as much, falls otherwise. Every piece of the way
+// is swept, so that nothing is crossed at any speed, and each ends epsilon away from what stopped
+// it. Sliding is a declared policy: what is left of a move after a stop goes on along the plane.
+#include <algorithm>
+#include <cmath>
+
+#include "scene/world_state.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr int kSlides = 5;          // planes met in one move: a corner of three and two to spare
+constexpr double kLowBand = 7.0 / 8;  // of epsilon: see StoppingBand
+constexpr double kHighBand = 1 + 1.0 / 32;
+constexpr double kNoMove = 1e-9;    // of epsilon: what is left of a move below this is not made
+constexpr double kWorthAStep = 1e-3;  // of the wish: a step must win at least this much ground
+
+/// One avatar's motion through one tick.
+struct Mover {
+  const Lengths& lengths;
+  Avatar& avatar;
+  QueryCount& count;
+  Vec3 feet;
+
+  collision::StoppingBand band() const {
+    return {kLowBand * lengths.epsilon, kHighBand * lengths.epsilon};
+  }
+  bool walkable(const Vec3& normal) const { return normal.y() >= lengths.walkableNormalY; }
+};
+
+struct SlideResult {
+  EntityId steep = 0;   ///< the first thing met that cannot be walked on
+  EntityId ground = 0;  ///< the last thing met that can
+};
+
+Stop sweepFrom(Mover& m, const Vec3& displacement) {
+  const Stop stop = sweepHull(m.avatar.hull->vertices, m.avatar.hullBox, m.feet, displacement,
+                              m.avatar.obstacles, m.band(), m.count);
+  m.feet += stop.fraction * displacement;
+  return stop;
+}
+
+/// `wish` with all parts into the planes removed: along one plane if that suits all others, else
+/// along the crease of two, else nothing.
+Vec3 alongPlanes(const Vec3& wish, const std::vector<Vec3>& normals) {
+  const auto suitsAll = [&](const Vec3& move) {
+    for (const Vec3& n : normals)
+      if (move.dot(n) < -1e-12 * wish.norm()) return false;
+    return true;
+  };
+  for (std::size_t i = normals.size(); i-- > 0;) {
+    const Vec3 move = wish - std::min(0.0, wish.dot(normals[i])) * normals[i];
+    if (suitsAll(move)) return move;
+  }
+  for (std::size_t i = normals.size(); i-- > 0;) {
+    for (std::size_t j = i; j-- > 0;) {
+      const Vec3 crease = normals[i].cross(normals[j]);
+      const double squared = crease.squaredNorm();
+      if (!(squared > 1e-12)) continue;
+      const Vec3 move = (wish.dot(crease) / squared) * crease;
+      if (suitsAll(move)) return move;
+    }
+  }
+  return Vec3::Zero();
+}
+
+/// A walker does not climb what is steep nor duck under what leans over it: such planes act as
+/// upright walls.
+Vec3 planeForWalking(const Mover& m, const Vec3& normal) {
+  if (m.walkable(normal)) return normal;
+  const Vec3 upright{normal.x(), 0, normal.z()};
+  const double length = upright.norm();
+  return length > 1e-6 ? Vec3(upright / length) : normal;
+}
+
+/// How a move goes on after a stop.
+enum class Manner : std::uint8_t {
+  walk,  ///< up slopes that can be walked on; what is steep acts as an upright wall
+  drop,  ///< straight down to the first thing that can be stood on, sliding off what is steep
+  fall   ///< as drop, but what is left of the move across the ground is still made
+};
+
+/// What is left of a move after it met a plane that can be stood on.
+Vec3 afterGround(const Vec3& rest, Manner manner) {
+  switch (manner) {
+    case Manner::walk: return rest;
+    case Manner::drop: return Vec3::Zero();
+    default: return {rest.x(), 0, rest.z()};
+  }
+}
+
+/// Moves by `wish`, sliding along what is met.
+SlideResult slide(Mover& m, Vec3 wish, Manner manner) {
+  SlideResult result;
+  std::vector<Vec3> planes;
+  const double enough = kNoMove * m.lengths.epsilon;
+  for (int i = 0; i < kSlides && wish.norm() > enough; ++i) {
+    const Stop stop = sweepFrom(m, wish);
+    if (stop.entity == 0) break;
+    Vec3 rest = (1 - stop.fraction) * wish;
+    if (m.walkable(stop.normal)) {
+      result.ground = stop.entity;
+      rest = afterGround(rest, manner);
+    } else if (result.steep == 0) {
+      result.steep = stop.entity;
+    }
+    planes.push_back(manner == Manner::walk ? planeForWalking(m, stop.normal) : stop.normal);
+    wish = alongPlanes(rest, planes);
+    // Back out to epsilon where grazing moves came nearer.
+    wish += std::max(0.0, m.lengths.epsilon - stop.distance) * planes.back();
+  }
+  return result;
+}
+
+/// Lets the feet down by at most `depth` onto something walkable; false (and unmoved) if there is
+/// nothing such.
+bool settle(Mover& m, double depth) {
+  const Vec3 before = m.feet;
+  if (slide(m, {0, -depth, 0}, Manner::drop).ground != 0) return true;
+  m.feet = before;
+  return false;
+}
+
+double progress(const Vec3& from, const Vec3& to, const Vec3& direction) {
+  return (to - from).dot(direction);
+}
+
+/// Tries the wish one step higher; true if that wins ground and ends on something walkable.
+bool stepUp(Mover& m, const Vec3& start, const Vec3& wish, double toBeat) {
+  const Vec3 low = m.feet;
+  m.feet = start;
+  sweepFrom(m, {0, m.lengths.stepHeight, 0});
+  const double raised = m.feet.y() - start.y();
+  slide(m, wish, Manner::walk);
+  const double length = wish.norm();
+  if (settle(m, raised + m.lengths.epsilon) &&
+      progress(start, m.feet, wish / length) > toBeat + kWorthAStep * length)
+    return true;
+  m.feet = low;
+  return false;
+}
+
+void walkOnGround(Mover& m, const Vec3& wish) {
+  const Vec3 start = m.feet;
+  const double length = wish.norm();
+  EntityId steep = 0;
+  if (length > 0) {
+    steep = slide(m, wish, Manner::walk).steep;
+    const double gained = progress(start, m.feet, wish / length);
+    if (steep != 0 && stepUp(m, start, wish, gained)) steep = 0;
+  }
+  m.avatar.grounded = settle(m, m.lengths.stepHeight);
+  m.avatar.fallSpeed = 0;
+  m.avatar.stoppedBy = steep;
+}
+
+void fall(Mover& m, const Vec3& wish) {
+  const double dt = m.lengths.tick;
+  m.avatar.fallSpeed = std::min(m.avatar.fallSpeed + m.lengths.gravity * dt, m.lengths.speedLimit);
+  const double before = m.feet.y();
+  const SlideResult met = slide(m, wish - Vec3(0, m.avatar.fallSpeed * dt, 0), Manner::fall);
+  m.avatar.stoppedBy = met.steep;
+  m.avatar.grounded = met.ground != 0;
+  const double fallen = std::max(0.0, before - m.feet.y());
+  m.avatar.fallSpeed = m.avatar.grounded ? 0 : std::min(m.avatar.fallSpeed, fallen / dt);
+}
+
+}  // namespace
+
+Box reachOf(const WorldState& world, Avatar& avatar, const Vec3& velocity) {
+  const Lengths& l = world.lengths;
+  const double across = velocity.norm() * l.tick;
+  const double down = (avatar.fallSpeed + l.gravity * l.tick) * l.tick;
+  // Slides back out by epsilon, contacts and near misses look a little further.
+  const double margin = 8 * l.epsilon + l.nearMiss;
+  Box box = collision::tightBox(*avatar.hull, {collision::Quat::Identity(), avatar.feet},
+                                avatar.extremes);
+  box.min -= Vec3(across, across + std::max(l.stepHeight, down), across);
+  box.max += Vec3(across, across + l.stepHeight, across);
+  return grown(box, margin);
+}
+
+void gatherObstacles(WorldState& world, Avatar& avatar) {
+  std::vector<Obstacle> last;
+  last.swap(avatar.obstacles);
+  for (const auto& partner : world.broadPhase.partners(avatar.mover)) {
+    if (!partner.moves) {
+      gatherTriangles(*world.scene, world.scene->solidObjects()[partner.id], avatar.reach,
+                      avatar.obstacles);
+      continue;
+    }
+    const Avatar& other = world.avatars.at(world.avatarOfMover.at(partner.id));
+    Obstacle obstacle;
+    obstacle.entity = other.id;
+    obstacle.box = {other.hullBox.min + other.feet, other.hullBox.max + other.feet};
+    obstacle.body = {other.hull->vertices, other.feet};
+    avatar.obstacles.push_back(obstacle);
+  }
+  // Movers' ids are reused and so not in the order of entities.
+  const auto byPart = [](const Obstacle& a, const Obstacle& b) {
+    return std::pair(a.entity, a.part) < std::pair(b.entity, b.part);
+  };
+  std::sort(avatar.obstacles.begin(), avatar.obstacles.end(), byPart);
+  // Hand the axes of last tick on by merging.
+  auto old = last.begin();
+  for (Obstacle& obstacle : avatar.obstacles) {
+    const auto key = std::pair(obstacle.entity, obstacle.part);
+    while (old != last.end() && std::pair(old->entity, old->part) < key) ++old;
+    if (old != last.end() && std::pair(old->entity, old->part) == key) obstacle.cache = old->cache;
+  }
+}
+
+void moveAvatar(WorldState& world, Avatar& avatar, const Vec3& velocity, QueryCount& count) {
+  Mover m{world.lengths, avatar, count, avatar.feet};
+  const Vec3 wish = velocity * world.lengths.tick;
+  avatar.stoppedBy = 0;
+  if (avatar.grounded) {
+    walkOnGround(m, wish);
+  } else {
+    fall(m, wish);
+  }
+  avatar.lastMove = m.feet - avatar.feet;
+  avatar.feet = m.feet;
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,54 @@
+// What one avatar could meet in one tick: triangles of still objects, hulls of other avatars.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "collision/narrow_phase.hpp"
+#include "collision/sort_and_sweep.hpp"
+#include "collision/time_of_impact.hpp"
+#include "scene/scene.hpp"
+#include "scene/snapshot.hpp"
+
+namespace enfilade::scene {
+
+struct Avatar;
+
+/// A convex piece of an entity, and last tick's separating axis towards it.
+struct Obstacle {
+  EntityId entity = 0;
+  std::uint32_t part = 0;  ///< triangle of a still object; 0 for an avatar
+  Box box;                 ///< world, metres
+  collision::ConvexBody body;
+  collision::SeparationCache cache;
+};
+
+/// Narrow-phase work done, for the tick's counters.
+struct QueryCount {
+  std::uint32_t narrow = 0;
+  std::uint32_t rational = 0;
+};
+
+/// The earliest thing in the way of a move.
+struct Stop {
+  double fraction = 1;  ///< of the displacement that may be made
+  EntityId entity = 0;  ///< 0: nothing in the way
+  Vec3 normal = Vec3::Zero();  ///< unit, from the obstacle to the avatar
+  double distance = 0;         ///< metres, at the stop
+};
+
+/// Moves the hull at `feet` by `displacement` as far as `obstacles` allow.
+Stop sweepHull(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet,
+               const Vec3& displacement, std::vector<Obstacle>& obstacles,
+               const collision::StoppingBand& band, QueryCount& count);
+
+/// Whether the hull at `feet` keeps at least `clearance` metres from every obstacle; if not,
+/// `nearest` names one that is nearer (deepest first is not promised).
+bool isFree(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet, double clearance,
+            std::vector<Obstacle>& obstacles, QueryCount& count, EntityId& nearest);
+
+/// Appends the triangles of still object `object` that `reach` may meet.
+void gatherTriangles(const Scene& scene, std::uint32_t object, const Box& reach,
+                     std::vector<Obstacle>& obstacles);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,13 @@
+// Directions from angles, by arithmetic alone: libm's sin and cos differ between processors.
+#pragma once
+
+#include "collision/types.hpp"
+
+namespace enfilade::scene {
+
+/// Unit vector in the ground plane: 0 degrees is +X, 90 is -Z (counter-clockwise seen from above).
+/// Finite `degrees` of any size; the result is within 1e-15 of the true direction for |degrees| up
+/// to 1e4 and always of unit length within 4 ulp.
+collision::Vec3 headingFromDegrees(double degrees);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,138 @@
+// The tick, a table of contents. Each stage is timed; what it does is in the file it is named after.
+#include <algorithm>
+#include <chrono>
+
+#include "scene/hasher.hpp"
+#include "scene/world_state.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+/// Times the stages one after another.
+class Stopwatch {
+ public:
+  explicit Stopwatch(TickReport& report) : report_(report) {}
+  void done(Stage stage) {
+    const auto now = std::chrono::steady_clock::now();
+    report_.stageSeconds[static_cast<std::size_t>(stage)] =
+        std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+  }
+
+ private:
+  TickReport& report_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+Vec3 wishOf(const Wish& wish, const std::string& name) {
+  const auto found = wish.find(name);
+  return found == wish.end() ? Vec3(Vec3::Zero()) : found->second;
+}
+
+void updateBroadPhase(WorldState& world, const Wish& wish) {
+  for (auto& [name, avatar] : world.avatars) {
+    avatar.reach = reachOf(world, avatar, wishOf(wish, name));
+    world.broadPhase.move(avatar.mover, avatar.reach);
+  }
+  world.broadPhase.update();
+}
+
+bool nobodyNear(const WorldState& world, const Avatar& avatar) {
+  const auto partners = world.broadPhase.partners(avatar.mover);
+  return partners.empty() || !partners.back().moves;  // movers come last
+}
+
+void moveAvatars(WorldState& world, const Wish& wish, QueryCount& count) {
+  for (auto& [name, avatar] : world.avatars) {
+    const Vec3 velocity = wishOf(wish, name);
+    avatar.resting = avatar.grounded && avatar.lastMove.isZero(0) && velocity.isZero(0) &&
+                     nobodyNear(world, avatar);
+    if (avatar.resting) continue;
+    gatherObstacles(world, avatar);
+    moveAvatar(world, avatar, velocity, count);
+  }
+}
+
+void hashState(WorldState& world) {
+  Hasher hash(world.hash);
+  hash.add(world.tick);
+  for (const auto& [name, avatar] : world.avatars) {
+    hash.add(std::uint64_t{avatar.id});
+    hash.add(avatar.feet);
+    hash.add(avatar.gaze);
+    hash.add(avatar.fallSpeed);
+    hash.add(std::uint64_t{avatar.grounded});
+    for (const Contact& contact : avatar.contacts)
+      hash.add((std::uint64_t{contact.other} << 1) | std::uint64_t{contact.touching});
+  }
+  for (const auto& [name, queue] : world.queues) {
+    hash.add(std::string_view(name));
+    hash.add(std::uint64_t{queue.size()});
+  }
+  world.hash = hash.value();
+}
+
+std::shared_ptr<const Snapshot> makeSnapshot(const WorldState& world) {
+  auto snapshot = std::make_shared<Snapshot>();
+  snapshot->tick = world.tick;
+  snapshot->time = static_cast<double>(world.tick) * world.lengths.tick;
+  snapshot->stateHash = world.hash;
+  for (const auto& [name, avatar] : world.avatars)
+    snapshot->avatars.push_back({avatar.id, name, avatar.feet, avatar.gaze, avatar.eyeHeight,
+                                 avatar.grounded, avatar.hull});
+  std::sort(snapshot->avatars.begin(), snapshot->avatars.end(),
+            [](const AvatarView& a, const AvatarView& b) { return a.id < b.id; });
+  return snapshot;
+}
+
+/// Still on its way: falling, or driven by a client.
+bool isBusy(const Avatar& avatar) {
+  return !avatar.drive.isZero(0) || (!avatar.grounded && !avatar.lastMove.isZero(0));
+}
+
+bool isIdle(const WorldState& world) {
+  for (const auto& [name, queue] : world.queues)
+    if (!queue.empty()) return false;
+  for (const auto& [name, avatar] : world.avatars)
+    if (isBusy(avatar)) return false;
+  return true;
+}
+
+}  // namespace
+
+TickReport tick(World& w) {
+  WorldState& world = w.state();
+  TickReport report;
+  QueryCount count;
+  Stopwatch stopwatch(report);
+  ++world.tick;
+
+  const Wish wish = followOrders(world, report, count);
+  stopwatch.done(Stage::commands);
+  updateBroadPhase(world, wish);
+  stopwatch.done(Stage::broad);
+  moveAvatars(world, wish, count);
+  stopwatch.done(Stage::avatars);
+  findContacts(world, report, count);
+  judgeWalks(world, report);
+  stopwatch.done(Stage::narrow);
+  hashState(world);
+  stopwatch.done(Stage::hash);
+  world.snapshot = makeSnapshot(world);
+  stopwatch.done(Stage::snapshot);
+
+  std::stable_sort(report.contacts.begin(), report.contacts.end(),
+                   [](const ContactEvent& x, const ContactEvent& y) {
+                     return std::tie(x.a, x.b, x.kind) < std::tie(y.a, y.b, y.kind);
+                   });
+  std::stable_sort(report.notices.begin(), report.notices.end(),
+                   [](const Notice& x, const Notice& y) { return x.avatar < y.avatar; });
+  report.snapshot = world.snapshot;
+  report.pairs = static_cast<std::uint32_t>(world.broadPhase.pairCount());
+  report.narrowQueries = count.narrow;
+  report.rationalQueries = count.rational;
+  report.idle = isIdle(world);
+  return report;
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,116 @@
+// What a World holds: plain data, acted on by orders.cpp, motion.cpp, contacts.cpp and tick.cpp.
+// Private to scene/.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "collision/bounding_box.hpp"
+#include "collision/sort_and_sweep.hpp"
+#include "scene/obstacles.hpp"
+#include "scene/world.hpp"
+
+namespace enfilade::scene {
+
+/// A contact that lasts, or a near miss.
+struct Contact {
+  EntityId other = 0;
+  bool touching = false;  ///< closer than 2 epsilon; else a near miss that was told
+  collision::Decision decision;
+};
+
+/// How a walk goes: measured as the shortest distance to its way point so far.
+struct WalkProgress {
+  std::size_t leg = 0;       ///< index of the way point that is walked to
+  double nearest = -1;       ///< metres, over the ground; -1: not measured yet
+  double patienceLeft = 0;   ///< seconds
+};
+
+struct Avatar {
+  EntityId id = 0;
+  std::shared_ptr<const collision::Hull> hull;
+  Box hullBox;                   ///< of the hull with the feet at the origin
+  Vec3 feet = Vec3::Zero();      ///< world, metres
+  Vec3 gaze = Vec3::UnitX();     ///< unit
+  double eyeHeight = 0;
+  double fallSpeed = 0;          ///< metres per second, downwards > 0
+  bool grounded = false;
+  Vec3 drive = Vec3::Zero();     ///< horizontal velocity asked for by Drive
+  WalkProgress walk;
+  double waitLeft = -1;          ///< seconds; negative: not waiting
+
+  // What the last motion left.
+  Vec3 lastMove = Vec3::Zero();
+  bool resting = false;  ///< stands, wants nothing, and nobody is near: nothing to work out
+  EntityId stoppedBy = 0;
+
+  // Caches from tick to tick; they change the work, never the result.
+  collision::MoverId mover = 0;
+  Box reach;                     ///< what it can meet in this tick
+  collision::ExtremalVertices extremes;
+  std::vector<Obstacle> obstacles;
+  std::vector<Contact> contacts;  ///< ascending `other`; also part of the state
+};
+
+struct QueuedOrder {
+  Order order;
+  std::uint64_t tag = 0;
+};
+
+struct WorldState {
+  WorldState(std::shared_ptr<const Scene> still, const Lengths& l);
+
+  std::shared_ptr<const Scene> scene;
+  Lengths lengths;
+  std::uint64_t tick = 0;
+  std::uint64_t hash = 0;  ///< chained over all ticks, seeded by scene and lengths
+
+  std::vector<Command> incoming;  ///< since the last tick
+  std::map<std::string, std::deque<QueuedOrder>> queues;
+  std::map<std::string, Avatar> avatars;
+  std::vector<std::string> avatarNames;  ///< of entity id scene objects + 1 + index, kept for ever
+
+  collision::SortAndSweep broadPhase;
+  std::map<collision::MoverId, std::string> avatarOfMover;
+  std::shared_ptr<const Snapshot> snapshot;
+
+  EntityId firstAvatarId() const {
+    return static_cast<EntityId>(scene->model().objects.size()) + 1;
+  }
+};
+
+// ---- the stages of the tick --------------------------------------------------------------------
+
+/// Where an avatar wants to go in this tick.
+using Wish = std::map<std::string, Vec3>;  ///< horizontal velocity, metres per second
+
+/// Takes in commands and starts or goes on with what the queues ask for (orders.cpp).
+Wish followOrders(WorldState& world, TickReport& report, QueryCount& count);
+/// Tells which walks arrived or are blocked after the motion, and who fell out of the scene
+/// (orders.cpp).
+void judgeWalks(WorldState& world, TickReport& report);
+
+/// The box that an avatar can reach in this tick with the given velocity (motion.cpp).
+Box reachOf(const WorldState& world, Avatar& avatar, const Vec3& velocity);
+/// Collects what the avatar can meet inside its reach (motion.cpp).
+void gatherObstacles(WorldState& world, Avatar& avatar);
+/// Walks, slides, steps, falls (motion.cpp).
+void moveAvatar(WorldState& world, Avatar& avatar, const Vec3& velocity, QueryCount& count);
+
+/// Finds who touches what now and what began and ended (contacts.cpp).
+void findContacts(WorldState& world, TickReport& report, QueryCount& count);
+/// Takes an avatar out of the world, its contacts ended and told (orders.cpp).
+void removeAvatar(WorldState& world, const std::string& name, std::vector<ContactEvent>& events);
+/// Ends all contacts of `avatar` and those of others with it (contacts.cpp).
+void endContactsOf(WorldState& world, Avatar& avatar, ContactEvent::Reason reason,
+                   std::vector<ContactEvent>& events);
+
+/// Whether a new avatar may stand at the order's place; sets its feet a hair above what it would
+/// touch. Returns why not (spawn.cpp).
+std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& order, Avatar& avatar,
+                                       QueryCount& count);
+
+}  // namespace enfilade::scene

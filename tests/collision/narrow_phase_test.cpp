@@ -1,0 +1,224 @@
+#include "collision/narrow_phase.hpp"
+
+#include <gtest/gtest.h>
+
+#include "collision/exact_verdict.hpp"
+#include "tests/collision/random_shapes.hpp"
+
+namespace enfilade::collision {
+namespace {
+
+using namespace testing;
+
+const std::vector<Vec3> kUnitCube{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
+                                  {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
+
+Decision decideCold(const ConvexBody& a, const ConvexBody& b) {
+  SeparationCache cache;
+  return decide(a, b, cache);
+}
+
+// ---- slow twins --------------------------------------------------------------------------------
+
+double pointSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const double t = std::clamp((p - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
+  return (p - (a + t * (b - a))).norm();
+}
+
+double segmentSegment(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  double best = std::min(std::min(pointSegment(a, c, d), pointSegment(b, c, d)),
+                         std::min(pointSegment(c, a, b), pointSegment(d, a, b)));
+  const Vec3 n = (b - a).cross(d - c);
+  if (n.squaredNorm() < 1e-24) return best;
+  const double s = (c - a).cross(d - c).dot(n) / n.squaredNorm();
+  const double t = (c - a).cross(b - a).dot(n) / n.squaredNorm();
+  if (s >= 0 && s <= 1 && t >= 0 && t <= 1)
+    best = std::min(best, std::abs((c - a).dot(n)) / n.norm());
+  return best;
+}
+
+double pointTriangle(const Vec3& p, const Triangle& t) {
+  double best = std::min(pointSegment(p, t[0], t[1]),
+                         std::min(pointSegment(p, t[1], t[2]), pointSegment(p, t[2], t[0])));
+  const Vec3 n = (t[1] - t[0]).cross(t[2] - t[0]);
+  for (int i = 0; i < 3; ++i)
+    if ((t[(i + 1) % 3] - t[i]).cross(p - t[i]).dot(n) < 0) return best;
+  return std::min(best, std::abs((p - t[0]).dot(n)) / n.norm());
+}
+
+/// Distance of two disjoint triangles: a vertex and a face, or two edges.
+double triangleTriangle(const Triangle& a, const Triangle& b) {
+  double best = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    best = std::min({best, pointTriangle(a[i], b), pointTriangle(b[i], a)});
+    for (int j = 0; j < 3; ++j)
+      best = std::min(best, segmentSegment(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]));
+  }
+  return best;
+}
+
+double bruteForceDistance(const std::vector<Triangle>& a, const std::vector<Triangle>& b) {
+  double best = std::numeric_limits<double>::infinity();
+  for (const Triangle& s : a)
+    for (const Triangle& t : b) best = std::min(best, triangleTriangle(s, t));
+  return best;
+}
+
+// ---- known answers -----------------------------------------------------------------------------
+
+TEST(NarrowPhase, CubesTwoMetresApartAreTwoMetresApart) {
+  const Decision d = decideCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}});
+  EXPECT_EQ(d.verdict, Verdict::separated);
+  EXPECT_EQ(d.decidedBy, DecidedBy::filter);
+  EXPECT_NEAR(d.distance, 2, 1e-15);
+  EXPECT_TRUE(d.normal.isApprox(Vec3::UnitX(), 1e-15));
+  EXPECT_NEAR((d.pointB - d.pointA).norm(), 2, 1e-14);
+}
+
+TEST(NarrowPhase, CubesFaceToFaceTouch) {
+  const Decision d = decideCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {1, 0.25, 0.5}});
+  EXPECT_EQ(d.verdict, Verdict::touching);
+  EXPECT_EQ(d.decidedBy, DecidedBy::rational);
+  EXPECT_EQ(d.distance, 0);
+}
+
+TEST(NarrowPhase, CubesThatShareOneCornerTouch) {
+  EXPECT_EQ(decideCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {1, 1, 1}}).verdict,
+            Verdict::touching);
+}
+
+TEST(NarrowPhase, OneUlpDecides) {
+  const double next = std::nextafter(1.0, 2.0), before = std::nextafter(1.0, 0.0);
+  const auto verdictAt = [](double x) {
+    return decideCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {x, 0.25, 0.5}}).verdict;
+  };
+  EXPECT_EQ(verdictAt(next), Verdict::separated);
+  EXPECT_EQ(verdictAt(1.0), Verdict::touching);
+  EXPECT_EQ(verdictAt(before), Verdict::penetrating);
+}
+
+TEST(NarrowPhase, DeepOverlapIsPenetratingWithADepthBound) {
+  const Decision d = decideCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {0.75, 0.1, 0.05}});
+  EXPECT_EQ(d.verdict, Verdict::penetrating);
+  EXPECT_NEAR(d.penetration, 0.25, 1e-12);
+}
+
+TEST(NarrowPhase, OverlappingPolygonsInOnePlaneOnlyTouch) {
+  const std::vector<Vec3> square{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  EXPECT_EQ(decideCold({square, Vec3::Zero()}, {square, {0.5, 0.5, 0}}).verdict,
+            Verdict::touching);
+}
+
+TEST(NarrowPhase, ASegmentThroughATriangleTouchesItsEdgeAndPenetratesItsInside) {
+  const std::vector<Vec3> triangle{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}};
+  const std::vector<Vec3> segment{{0, 0, -1}, {0, 0, 1}};
+  EXPECT_EQ(decideCold({segment, {0.5, 0.5, 0}}, {triangle, Vec3::Zero()}).verdict,
+            Verdict::penetrating);
+  EXPECT_EQ(decideCold({segment, {0.5, 0, 0}}, {triangle, Vec3::Zero()}).verdict,
+            Verdict::touching);
+}
+
+TEST(NarrowPhase, FarFromTheOriginNothingIsLost) {
+  const Vec3 far{1e7, -3e6, 5e6};
+  const double gap = 0x1p-20;  // about a micrometre, exact beside 1e7
+  const Decision d = decideCold({kUnitCube, far}, {kUnitCube, far + Vec3(1 + gap, 0, 0)});
+  EXPECT_EQ(d.verdict, Verdict::separated);
+  EXPECT_NEAR(d.distance, gap, 1e-15);
+}
+
+TEST(NarrowPhase, GivesUpAsSoonAsTheLimitIsProved) {
+  SeparationCache cache;
+  EXPECT_FALSE(decideWithin({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}}, 1.5, cache));
+  EXPECT_TRUE(decideWithin({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}}, 2.5, cache));
+  EXPECT_GT(provedSeparation({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}}, cache), 1.5);
+}
+
+// ---- against the twins -------------------------------------------------------------------------
+
+TEST(NarrowPhase, HullsAndTrianglesAgreeWithBruteForceOverFeatures) {
+  Random random(1);
+  int separated = 0;
+  for (int i = 0; i < 600; ++i) {
+    const Hull hull = buildHull(randomPoints(random, 14, 1));
+    const std::vector<Vec3> triangle = randomPoints(random, 3, 1.5);
+    const Vec3 at = randomPoint(random, 1.6);
+    const Decision d = decideCold({hull.vertices, at}, {triangle, Vec3::Zero()});
+    if (d.verdict != Verdict::separated) continue;
+    ++separated;
+    const double slow =
+        bruteForceDistance(boundary(hull, at), {{triangle[0], triangle[1], triangle[2]}});
+    EXPECT_NEAR(d.distance, slow, 1e-13) << "case " << i;
+    EXPECT_LE(std::abs(d.distance - slow), d.errorBound + 1e-14) << "case " << i;
+    EXPECT_LT(d.errorBound, 1e-12) << "case " << i;
+    EXPECT_NEAR((d.pointB - d.pointA).norm(), d.distance, 1e-13) << "case " << i;
+  }
+  EXPECT_GT(separated, 200);
+  EXPECT_LT(separated, 500);
+}
+
+TEST(NarrowPhase, VerdictsOnALatticeEqualExactArithmeticWhicheverWayTheyWereDecided) {
+  Random random(2);
+  std::array<int, 3> seen{};
+  for (int i = 0; i < 1500; ++i) {
+    const std::vector<Vec3> a = latticePoints(random, 1 + static_cast<int>(random() % 6), 2);
+    const std::vector<Vec3> b = latticePoints(random, 1 + static_cast<int>(random() % 6), 2);
+    const Vec3 at = latticePoints(random, 1, 2)[0];
+    const Verdict exact = exactVerdict({a, at}, {b, Vec3::Zero()});
+    EXPECT_EQ(decideCold({a, at}, {b, Vec3::Zero()}).verdict, exact) << "case " << i;
+    EXPECT_EQ(exactVerdict({b, Vec3::Zero()}, {a, at}), exact) << "case " << i;
+    ++seen[static_cast<std::size_t>(exact)];
+  }
+  for (const int count : seen) EXPECT_GT(count, 60);
+}
+
+TEST(NarrowPhase, SwappingTheBodiesSwapsTheAnswer) {
+  Random random(3);
+  for (int i = 0; i < 300; ++i) {
+    const std::vector<Vec3> a = randomPoints(random, 10, 1);
+    const std::vector<Vec3> b = randomPoints(random, 3, 2);
+    const Vec3 at = randomPoint(random, 3);
+    const Decision ab = decideCold({a, at}, {b, Vec3::Zero()});
+    const Decision ba = decideCold({b, Vec3::Zero()}, {a, at});
+    ASSERT_EQ(ab.verdict, ba.verdict);
+    if (ab.verdict != Verdict::separated) continue;
+    EXPECT_NEAR(ab.distance, ba.distance, 1e-13);
+    EXPECT_TRUE(ab.normal.isApprox(-ba.normal, 1e-7));
+  }
+}
+
+TEST(NarrowPhase, MovingByTheDistanceMakesContactAndNotEarlier) {
+  Random random(4);
+  int tried = 0;
+  for (int i = 0; i < 300; ++i) {
+    const std::vector<Vec3> a = randomPoints(random, 12, 1);
+    const std::vector<Vec3> b = randomPoints(random, 12, 1);
+    const Vec3 at = randomPoint(random, 4);
+    const Decision d = decideCold({a, at}, {b, Vec3::Zero()});
+    if (d.verdict != Verdict::separated) continue;
+    ++tried;
+    const auto moved = [&](double by) {
+      return decideCold({a, at + by * d.normal}, {b, Vec3::Zero()});
+    };
+    EXPECT_EQ(moved(d.distance - 1e-12).verdict, Verdict::separated);
+    EXPECT_LT(moved(d.distance).distance, 1e-12);
+    EXPECT_NEAR(moved(0.5 * d.distance).distance, 0.5 * d.distance, 1e-12);
+  }
+  EXPECT_GT(tried, 150);
+}
+
+TEST(NarrowPhase, AWarmStartChangesTheWorkAndNotTheAnswer) {
+  Random random(5);
+  const std::vector<Vec3> a = randomPoints(random, 20, 1);
+  const std::vector<Vec3> b = randomPoints(random, 20, 1);
+  SeparationCache cache;
+  for (int step = 0; step < 400; ++step) {
+    const Vec3 at{4.0 - 0.02 * step, 0.3, 0.2};
+    const Decision warm = decide({a, at}, {b, Vec3::Zero()}, cache);
+    const Decision cold = decideCold({a, at}, {b, Vec3::Zero()});
+    ASSERT_EQ(warm.verdict, cold.verdict) << "step " << step;
+    EXPECT_NEAR(warm.distance, cold.distance, 1e-13) << "step " << step;
+  }
+}
+
+}  // namespace
+}  // namespace enfilade::collision
