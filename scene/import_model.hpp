@@ -5,8 +5,10 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "scene/model.hpp"
 
@@ -15,8 +17,8 @@ namespace enfilade::scene {
 struct ImportOptions {
   /// Overrides what the file says (nullopt: as the file says, else one unit is one metre).
   std::optional<double> metresPerUnit;
-  std::optional<char> up;  ///< 'x', 'y' or 'z'
-  double timeLimit = 120;  ///< seconds of wall-clock time
+  std::optional<char> up;                          ///< 'x', 'y' or 'z'
+  double timeLimit = 120;                          ///< seconds of wall-clock time
   std::size_t memoryLimit = std::size_t{8} << 30;  ///< bytes of address space of the child
 };
 
@@ -31,6 +33,18 @@ using ImportProgress = std::function<void(const std::string& stage, double fract
 /// The model in metres, Y up, near its origin. Throws ImportError.
 Model importModel(const std::filesystem::path& file, const ImportOptions& options = {},
                   const ImportProgress& progress = {});
+
+/// Every program that imports calls this first in main(): importModel() starts the program again
+/// with hidden arguments, and that copy does the reading. Returns the copy's exit code, or nullopt
+/// when the arguments are not the hidden ones and the program goes on as usual.
+///
+/// For tests, the environment variable ENFILADE_IMPORT_FAULT makes the copy misbehave once it runs:
+/// `hang`, `crash`, `exit` (without an answer), `memory` (asks for more than it may) or `garbage`
+/// (answers with noise).
+std::optional<int> runImportChild(int argc, char** argv);
+
+/// Extensions that importModel() knows, lower case, with the dot.
+std::span<const std::string_view> importableExtensions();
 
 /// Parses `--unit`: m, mm, cm, ft, in or a positive number of metres. nullopt when it is neither.
 std::optional<double> metresPerUnitFrom(const std::string& text);

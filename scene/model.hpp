@@ -40,8 +40,8 @@ struct Mesh {
   std::string name;
   std::vector<Eigen::Vector3f> positions;
   std::vector<Eigen::Vector3f> normals;  ///< empty, or one a position; unit length
-  std::vector<Eigen::Vector2f> uvs;      ///< empty, or one a position; (0,0) is the image's top left
-  std::vector<std::uint32_t> indices;    ///< three a triangle
+  std::vector<Eigen::Vector2f> uvs;    ///< empty, or one a position; (0,0) is the image's top left
+  std::vector<std::uint32_t> indices;  ///< three a triangle
   std::uint32_t material = 0;
 };
 
@@ -50,13 +50,14 @@ struct Object {
   std::string path;  ///< stable and unique: names from the root joined by '/', repeats as name#2
   std::string globalId;               ///< IFC GlobalId, or empty
   std::vector<std::uint32_t> meshes;  ///< indices into Model::meshes
-  /// metres, Y up, offset removed; may mirror and scale unequally.
+  /// metres, Y up, offset removed; may mirror and scale unequally. Where its determinant is
+  /// negative, counter-clockwise in the mesh is clockwise in the world.
   Eigen::Affine3d worldFromMesh = Eigen::Affine3d::Identity();
 };
 
 /// Something the user should know about the file: degenerate triangles, missing textures, ...
 struct Problem {
-  std::string kind;     ///< a short stable word, as "missing_texture"
+  std::string kind;  ///< a short stable word, as "missing_texture"
   std::size_t count = 0;
   std::string example;  ///< the first place it was met
 };

@@ -1,0 +1,224 @@
+#include "scene/import_convert.hpp"
+
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace enfilade::scene {
+namespace {
+
+constexpr double kFarAway = 1000;  // metres: farther from the origin, floats lose the millimetre
+constexpr double kGreatest = 1e7;  // metres from the scene's origin: no world takes more
+
+/// Y up from `up`, a cyclic turn of the axes or the usual quarter turn.
+Eigen::Matrix3d yUpFrom(char up) {
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  if (up == 'z') turn << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  if (up == 'x') turn << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  return turn;
+}
+
+/// What assimp put before the root's own transform, to the bit of its floats.
+Eigen::Matrix3d assimpFromFile(const FileFacts& facts, ModelFormat format) {
+  Eigen::Matrix3d turn = yUpFrom(facts.assimpTurnsUp);
+  if (format == ModelFormat::ifc) {
+    aiMatrix4x4 m;
+    aiMatrix4x4::RotationX(-AI_MATH_HALF_PI_F, m);
+    turn << m.a1, m.a2, m.a3, m.b1, m.b2, m.b3, m.c1, m.c2, m.c3;
+  }
+  return turn * static_cast<double>(static_cast<float>(facts.assimpScale));
+}
+
+Box boxOf(const Mesh& mesh) {
+  Box box;
+  for (const std::uint32_t i : mesh.indices) box.include(mesh.positions[i].cast<double>());
+  return box;
+}
+
+Box movedBox(const Box& box, const Eigen::Affine3d& transform) {
+  Box result;
+  for (int corner = 0; corner < 8; ++corner) {
+    result.include(transform * Vec3((corner & 1) != 0 ? box.max.x() : box.min.x(),
+                                    (corner & 2) != 0 ? box.max.y() : box.min.y(),
+                                    (corner & 4) != 0 ? box.max.z() : box.min.z()));
+  }
+  return result;
+}
+
+Box boxOf(const ObjectDraft& draft, const std::vector<Box>& meshBoxes) {
+  Box box;
+  for (const auto& p : draft.placements) box.include(movedBox(meshBoxes[p.mesh], p.worldFromMesh));
+  return box;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Zero, or whole metres near the median of the objects' centres: a stray object far off does not
+/// move it.
+Vec3 sceneOffset(const std::vector<Box>& objectBoxes) {
+  Vec3 centre = Vec3::Zero();
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const Box& box : objectBoxes) values.push_back(box.centre()[axis]);
+    centre[axis] = median(values);
+  }
+  if (!centre.allFinite() || centre.norm() <= kFarAway) return Vec3::Zero();
+  return {std::round(centre.x()), std::round(centre.y()), std::round(centre.z())};
+}
+
+/// Meshes whose own coordinates are large are moved to their origin, in doubles, and their
+/// placements moved back, so that no renderer has to subtract large floats.
+void recentreMeshes(std::vector<ObjectDraft>& drafts, std::vector<Mesh>& meshes,
+                    std::vector<Box>& meshBoxes) {
+  std::vector<Vec3> shifts(meshes.size(), Vec3::Zero());
+  for (const ObjectDraft& draft : drafts) {
+    for (const auto& p : draft.placements) {
+      const Vec3 centre = meshBoxes[p.mesh].centre();
+      if ((p.worldFromMesh.linear() * centre).norm() <= kFarAway) continue;
+      shifts[p.mesh] = {std::round(centre.x()), std::round(centre.y()), std::round(centre.z())};
+    }
+  }
+  for (ObjectDraft& draft : drafts) {
+    for (auto& p : draft.placements) p.worldFromMesh.translate(shifts[p.mesh]);
+  }
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    if (shifts[i].isZero(0)) continue;
+    const Eigen::Affine3d back(Eigen::Translation3d(-shifts[i]));
+    meshes[i] = transformed(meshes[i], back);
+    meshBoxes[i] = boxOf(meshes[i]);
+  }
+}
+
+/// Draws from assimp's meshes those that the model needs, each once, and copies moved.
+class MeshTable {
+ public:
+  MeshTable(std::vector<Mesh>& from, Model& model)
+      : from_(from), model_(model), index_(from.size(), kUnused) {}
+
+  std::uint32_t shared(std::uint32_t mesh) {
+    if (index_[mesh] == kUnused) index_[mesh] = add(from_[mesh]);
+    return index_[mesh];
+  }
+  std::uint32_t moved(std::uint32_t mesh, const Eigen::Affine3d& transform) {
+    return add(transformed(from_[mesh], transform));
+  }
+
+ private:
+  static constexpr std::uint32_t kUnused = 0xffffffff;
+  std::uint32_t add(Mesh mesh) {
+    if (mesh.material >= model_.materials.size()) mesh.material = 0;
+    model_.meshes.push_back(std::move(mesh));
+    return static_cast<std::uint32_t>(model_.meshes.size() - 1);
+  }
+
+  std::vector<Mesh>& from_;
+  Model& model_;
+  std::vector<std::uint32_t> index_;
+};
+
+/// The frame that an object's meshes share: that of its first part, unless that one is flat and
+/// the others cannot be brought into it.
+Eigen::Affine3d sharedFrame(const ObjectDraft& draft, const Vec3& offset) {
+  const Eigen::Affine3d& first = draft.placements.front().worldFromMesh;
+  const bool oneFrame =
+      std::all_of(draft.placements.begin(), draft.placements.end(),
+                  [&](const auto& p) { return p.worldFromMesh.matrix() == first.matrix(); });
+  if (oneFrame || first.linear().determinant() != 0) return first;
+  return Eigen::Affine3d(Eigen::Translation3d(offset));
+}
+
+/// One transform an object: parts that lie otherwise are moved into the shared frame.
+Object finishObject(const ObjectDraft& draft, const Vec3& offset, MeshTable& meshes) {
+  Object object;
+  object.path = draft.path;
+  object.globalId = draft.globalId;
+  const Eigen::Affine3d frame = sharedFrame(draft, offset);
+  for (const auto& p : draft.placements) {
+    if (p.worldFromMesh.matrix() == frame.matrix()) {
+      object.meshes.push_back(meshes.shared(p.mesh));
+    } else {
+      const Eigen::Affine3d frameFromMesh = frame.inverse(Eigen::Affine) * p.worldFromMesh;
+      object.meshes.push_back(meshes.moved(p.mesh, frameFromMesh));
+    }
+  }
+  object.worldFromMesh = Eigen::Translation3d(-offset) * frame;
+  return object;
+}
+
+/// Drops objects that no world could hold, and says how many are mirrored or placed coarsely.
+void judgePlacements(std::vector<ObjectDraft>& drafts, const std::vector<Box>& meshBoxes,
+                     const Vec3& offset, ProblemLog& problems) {
+  std::erase_if(drafts, [&](const ObjectDraft& draft) {
+    const Box box = boxOf(draft, meshBoxes);
+    const double reach = std::max((box.min - offset).cwiseAbs().maxCoeff(),
+                                  (box.max - offset).cwiseAbs().maxCoeff());
+    if (reach <= kGreatest) return false;
+    problems.add("far_object_dropped", draft.path);
+    return true;
+  });
+  for (const ObjectDraft& draft : drafts) {
+    const double determinant = draft.placements.front().worldFromMesh.linear().determinant();
+    if (determinant < 0) problems.add("mirrored_object", draft.path);
+    if (determinant == 0) problems.add("flat_object", draft.path);
+  }
+}
+
+}  // namespace
+
+void ProblemLog::add(const std::string& kind, const std::string& example, std::size_t count) {
+  if (count == 0) return;
+  for (Problem& problem : problems_) {
+    if (problem.kind != kind) continue;
+    problem.count += count;
+    return;
+  }
+  problems_.push_back({kind, count, example});
+}
+
+Model convertScene(const aiScene& scene, const ConvertInput& input,
+                   const ImportProgress& progress) {
+  Model model;
+  ProblemLog problems;
+  for (const Problem& problem : input.facts.problems) {
+    // A unit that the user gave is not a guess.
+    const bool aboutUnit = problem.kind == "no_unit" || problem.kind == "unit_assumed";
+    if (aboutUnit && input.metresPerUnit) continue;
+    problems.add(problem.kind, problem.example, problem.count);
+  }
+  model.metresPerUnit = input.metresPerUnit.value_or(input.facts.metresPerUnit);
+  model.up = input.up.value_or(input.facts.up);
+  convertMaterials(scene, input, model, problems, progress);
+
+  if (progress) progress("convert", 0);
+  std::vector<Mesh> meshes = convertMeshes(scene, problems);
+  Eigen::Affine3d worldFromRoot = Eigen::Affine3d::Identity();
+  worldFromRoot.linear() =
+      yUpFrom(model.up) * model.metresPerUnit * assimpFromFile(input.facts, input.format).inverse();
+  std::vector<ObjectDraft> drafts =
+      collectObjects(scene, input.format, worldFromRoot, meshes, problems);
+  if (progress) progress("convert", 0.5);
+
+  std::vector<Box> meshBoxes, objectBoxes;
+  for (const Mesh& mesh : meshes) meshBoxes.push_back(boxOf(mesh));
+  recentreMeshes(drafts, meshes, meshBoxes);
+  for (const ObjectDraft& draft : drafts) objectBoxes.push_back(boxOf(draft, meshBoxes));
+  if (!drafts.empty()) model.offset = sceneOffset(objectBoxes);
+  judgePlacements(drafts, meshBoxes, model.offset, problems);
+  if (drafts.empty()) {
+    throw ImportError(input.file.string() + ": holds no triangles that can be used; export it " +
+                      "with meshes (convert)");
+  }
+  MeshTable table(meshes, model);
+  for (const ObjectDraft& draft : drafts) {
+    model.objects.push_back(finishObject(draft, model.offset, table));
+  }
+  model.problems = problems.problems();
+  return model;
+}
+
+}  // namespace enfilade::scene
