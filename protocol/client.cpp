@@ -208,8 +208,7 @@ std::optional<Received> Client::State::receive(Clock::time_point deadline) {
 
 Received Client::State::parsed(Message message) {
   Received received;
-  if (!received.message.ParseFromArray(message.header.data(),
-                                       static_cast<int>(message.header.size()))) {
+  if (!parse(message.header, received.message)) {
     breakOff(peer + " sent a message that is not a ServerMessage (before byte " +
              std::to_string(decoder.offset()) + "); do the versions fit?");
   }

@@ -1,6 +1,7 @@
 #include "protocol/framing.hpp"
 
 #include <google/protobuf/message_lite.h>
+#include <google/protobuf/stubs/logging.h>
 
 #include <algorithm>
 #include <cstring>
@@ -124,6 +125,13 @@ bool Decoder::takePart(std::span<const std::uint8_t>& bytes, std::vector<std::ui
 void Decoder::fail(FramingError::Code code, std::uint64_t offset, std::string reason) {
   error_ = FramingError{code, std::move(reason), offset};
   message_ = Message{};
+}
+
+bool parse(std::span<const std::uint8_t> header, google::protobuf::MessageLite& into) {
+  // For the whole process: libprotobuf has no other switch.
+  [[maybe_unused]] static const auto silenced = google::protobuf::SetLogHandler(nullptr);
+  return header.size() <= std::numeric_limits<std::int32_t>::max() &&
+         into.ParseFromArray(header.data(), static_cast<int>(header.size()));
 }
 
 std::vector<std::uint8_t> encode(const google::protobuf::MessageLite& header,

@@ -91,4 +91,8 @@ class Decoder {
 std::vector<std::uint8_t> encode(const google::protobuf::MessageLite& header,
                                  std::span<const std::uint8_t> attachment = {});
 
+/// Reads a message's header; false when it is none. Unlike ParseFromArray() it writes nothing to
+/// stderr, which a hostile peer could fill.
+bool parse(std::span<const std::uint8_t> header, google::protobuf::MessageLite& into);
+
 }  // namespace enfilade::protocol

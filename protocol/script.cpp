@@ -238,8 +238,10 @@ json parseObject(std::string_view text) {
   return line;
 }
 
-/// Throws LineProblem for bytes that are not UTF-8.
+/// Throws LineProblem for bytes that are not UTF-8 text.
 void checkUtf8(std::string_view text) {
+  // nlohmann takes a zero byte for the end of the text.
+  if (text.find('\0') != std::string_view::npos) refuse("", "has a zero byte; is it a text file?");
   try {
     static_cast<void>(json(std::string(text)).dump());
   } catch (const json::type_error&) {

@@ -1,0 +1,47 @@
+// A world of one rule: orders take a fixed number of ticks. It keeps a diary of what it was told at
+// which tick, so that drivers can be compared.
+//
+// Avatars are told by their names: "stuck..." never arrives, "ghost..." cannot spawn, "restless..."
+// is never idle, "blind..." cannot be captured. A speed above 10 is refused at once.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "protocol/script.hpp"
+
+namespace enfilade::protocol {
+
+class FakeWorld : public ScriptDriver {
+ public:
+  static constexpr std::uint64_t kWalkTicks = 5;   ///< a way point
+  static constexpr std::uint64_t kStuckTicks = 3;  ///< until a stuck walker gives up
+
+  double tickSeconds() const override { return 1.0 / 60.0; }
+  std::optional<v1::Error> submit(const v1::Command& command) override;
+  StepOutcome step() override;
+
+  std::uint64_t tick() const { return tick_; }
+  const std::vector<std::string>& diary() const { return diary_; }
+
+ private:
+  struct Avatar {
+    std::deque<v1::Command> queue;
+    std::uint64_t ticksLeft = 0;  ///< of the first order
+    bool begun = false;
+    bool here = false;
+    double x = 0;
+  };
+
+  void advance(const std::string& name, Avatar& avatar, StepOutcome& outcome);
+  void end(const std::string& name, Avatar& avatar, StepOutcome& outcome);
+  std::uint64_t ticksOf(const std::string& name, const v1::Command& command) const;
+
+  std::uint64_t tick_ = 0;
+  std::map<std::string, Avatar> avatars_;
+  std::vector<std::string> diary_;
+};
+
+}  // namespace enfilade::protocol

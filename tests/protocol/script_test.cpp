@@ -1,0 +1,208 @@
+#include "protocol/script.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+namespace enfilade::protocol {
+namespace {
+
+/// The message of the error that `text` must make; "" when there was none.
+std::string errorOf(std::string_view text) {
+  try {
+    parseScript(text, "tour.jsonl");
+  } catch (const ScriptError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+void expectError(std::string_view text, const std::string& start) {
+  const std::string error = errorOf(text);
+  EXPECT_TRUE(error.starts_with(start))
+      << text << "\n  said: " << error << "\n  and not: " << start;
+}
+
+v1::Command onlyCommand(std::string_view text) {
+  const Script script = parseScript(text, "tour.jsonl");
+  EXPECT_EQ(script.lines.size(), 1u);
+  return std::get<v1::Command>(script.lines.at(0).what);
+}
+
+TEST(Script, ASpawnHasItsPlaceAndWhatElseIsGiven) {
+  const v1::Command plain = onlyCommand(R"({"spawn":"ann","at":[1,-2.5,3e2]})");
+  EXPECT_EQ(plain.avatar(), "ann");
+  EXPECT_EQ(plain.tag(), 1u);
+  EXPECT_EQ(plain.spawn().at().x(), 1);
+  EXPECT_EQ(plain.spawn().at().y(), -2.5);
+  EXPECT_EQ(plain.spawn().at().z(), 300);
+  EXPECT_EQ(plain.spawn().facing(), 0);
+  EXPECT_FALSE(plain.spawn().has_radius());
+  EXPECT_FALSE(plain.spawn().has_height());
+  const v1::Command full =
+      onlyCommand(R"({"at":[0,0,0],"height":1.2,"facing":-90,"spawn":"B.o-b_2","radius":0.25})");
+  EXPECT_EQ(full.avatar(), "B.o-b_2");
+  EXPECT_EQ(full.spawn().facing(), -90);
+  EXPECT_EQ(full.spawn().radius(), 0.25);
+  EXPECT_EQ(full.spawn().height(), 1.2);
+}
+
+TEST(Script, AWalkGoesToOnePointOrAlongMany) {
+  const v1::Command to = onlyCommand(R"({"walk":"ann","to":[1,2,3],"speed":1.5})");
+  ASSERT_EQ(to.walk().along_size(), 1);
+  EXPECT_EQ(to.walk().along(0).z(), 3);
+  EXPECT_EQ(to.walk().speed(), 1.5);
+  const v1::Command along = onlyCommand(R"({"walk":"ann","along":[[1,2,3],[4,5,6]]})");
+  ASSERT_EQ(along.walk().along_size(), 2);
+  EXPECT_EQ(along.walk().along(1).y(), 5);
+  EXPECT_FALSE(along.walk().has_speed());
+}
+
+TEST(Script, LookWaitCaptureAndLeaveAreRead) {
+  EXPECT_EQ(onlyCommand(R"({"look":"ann","at":[1,2,3]})").look().at().y(), 2);
+  const v1::Command wait = onlyCommand(R"({"wait":0.5,"for":"ann"})");
+  EXPECT_EQ(wait.avatar(), "ann");
+  EXPECT_EQ(wait.wait().seconds(), 0.5);
+  EXPECT_EQ(onlyCommand(R"({"capture":"ann","as":"hall.1"})").capture().as(), "hall.1");
+  EXPECT_TRUE(onlyCommand(R"({"leave":"ann"})").has_leave());
+}
+
+TEST(Script, AWaitWithoutForIsForAll) {
+  const Script script = parseScript(R"({"wait":2})", "s");
+  EXPECT_EQ(std::get<GlobalWait>(script.lines.at(0).what).seconds, 2);
+}
+
+TEST(Script, BlankLinesCommentsBomAndCarriageReturnsAreTolerated) {
+  const Script script = parseScript(
+      "\xEF\xBB\xBF# a comment \xC3\xA9\r\n\r\n  \t\n{\"wait\":1}\r\n// more\n  # and {more}\n"
+      " {\"leave\":\"ann\"} ",
+      "s");
+  ASSERT_EQ(script.lines.size(), 2u);
+  EXPECT_EQ(script.lines[0].number, 4u);
+  EXPECT_EQ(script.lines[1].number, 7u);
+  EXPECT_EQ(std::get<v1::Command>(script.lines[1].what).tag(), 7u);
+  EXPECT_TRUE(parseScript("", "s").lines.empty());
+  EXPECT_TRUE(parseScript("\xEF\xBB\xBF", "s").lines.empty());
+}
+
+TEST(Script, WrongTypesAreToldWithTheField) {
+  expectError(R"({"walk":"ann","to":"door"})",
+              "tour.jsonl:1: to: must be three numbers [x, y, z] in metres, not \"door\"");
+  expectError(R"({"walk":"ann","to":[1,2]})", "tour.jsonl:1: to: must be three numbers");
+  expectError(R"({"walk":"ann","to":[1,null,3]})", "tour.jsonl:1: to.y: must be a number");
+  expectError(R"({"walk":"ann","along":[[1,2,3],[1,2,true]]})",
+              "tour.jsonl:1: along[1].z: must be a number");
+  expectError(R"({"walk":"ann","along":[]})", "tour.jsonl:1: along: must be a list of points");
+  expectError(R"({"walk":"ann","to":[1,2,3],"speed":"fast"})", "tour.jsonl:1: speed: must be");
+  expectError(R"({"spawn":"ann","at":[0,0,0],"facing":[1]})", "tour.jsonl:1: facing: must be");
+  expectError(R"({"spawn":7,"at":[0,0,0]})", "tour.jsonl:1: spawn: must be the avatar's name");
+  expectError(R"({"wait":"long"})", "tour.jsonl:1: wait: must be a number of seconds");
+  expectError(R"({"wait":1,"for":2})", "tour.jsonl:1: for: must be the avatar's name");
+  expectError(R"([1,2])", "tour.jsonl:1: must be an object");
+}
+
+TEST(Script, MissingKeysAreToldWithWhatToAdd) {
+  expectError(R"({"spawn":"ann"})", R"(tour.jsonl:1: at: is missing; add "at":[x,y,z])");
+  expectError(R"({"look":"ann"})", "tour.jsonl:1: at: is missing");
+  expectError(R"({"walk":"ann"})", "tour.jsonl:1: to: is missing");
+  expectError(R"({"capture":"ann"})", "tour.jsonl:1: as: is missing");
+  expectError(R"({})", "tour.jsonl:1: no command; a line has one of spawn, walk, look");
+  expectError(R"({"for":"ann"})", "tour.jsonl:1: no command");
+}
+
+TEST(Script, UnknownDoubledAndContradictingKeysAreTold) {
+  expectError(R"({"walk":"ann","to":[1,2,3],"sped":2})",
+              R"(tour.jsonl:1: "sped" is no key of a line that says walk; its keys are walk, to)");
+  expectError(R"({"jump":"ann"})", "tour.jsonl:1: no command");
+  expectError(R"({"leave":"ann","leave":"bob"})", "tour.jsonl:1: leave: stands twice");
+  expectError(R"({"walk":"ann","to":[1,2,3],"along":[[1,2,3]]})",
+              R"(tour.jsonl:1: to: stands beside "along")");
+  expectError(R"({"walk":"ann","leave":"ann"})",
+              R"(tour.jsonl:1: "walk" and "leave" stand in one line)");
+}
+
+TEST(Script, NumbersThatAreNoneAreRefused) {
+  for (const char* bad : {"NaN", "nan", "Infinity", "-inf", "1e", "0x10", "+1", "01", ".5"}) {
+    expectError(R"({"wait":)" + std::string(bad) + "}", "tour.jsonl:1: is not JSON at column ");
+  }
+  for (const char* huge : {"1e400", "-1e400", "1e999999999"}) {
+    expectError(R"({"walk":"ann","to":[0,0,)" + std::string(huge) + "]}",
+                "tour.jsonl:1: a number is beyond what a double holds");
+  }
+  expectError(R"({"wait":-1})", "tour.jsonl:1: wait: -1 is out of range");
+  expectError(R"({"wait":1e300})", "tour.jsonl:1: wait: ");
+  expectError(R"({"wait":-0.1,"for":"ann"})", "tour.jsonl:1: wait: -0.1 is out of range");
+}
+
+TEST(Script, NamesAreShortAndFitForFiles) {
+  expectError(R"({"leave":""})", "tour.jsonl:1: leave: is empty; give the avatar's name");
+  expectError(R"({"leave":")" + std::string(65, 'a') + "\"}", "tour.jsonl:1: leave: has 65");
+  EXPECT_EQ(errorOf(R"({"leave":")" + std::string(64, 'a') + "\"}"), "");
+  for (const char* bad : {"../x", "a b", "a/b", "\\u0000", "caf\xC3\xA9", ".hidden"}) {
+    expectError(R"({"capture":"ann","as":")" + std::string(bad) + "\"}", "tour.jsonl:1: as: ");
+  }
+  expectError("{\"capture\":\"ann\",\"as\":\"a\"}\n\n{\"capture\":\"bob\",\"as\":\"a\"}",
+              R"(tour.jsonl:3: as: "a" is already the picture of line 1)");
+}
+
+TEST(Script, WhatIsNotOneObjectALineIsRefused) {
+  expectError(R"({"wait":1} x)", "tour.jsonl:1: is not JSON at column 12");
+  expectError(R"({"wait":1}{"wait":1})", "tour.jsonl:1: is not JSON");
+  expectError(R"({"wait":1},)", "tour.jsonl:1: is not JSON");
+  expectError(R"({"wait":1)", "tour.jsonl:1: is not JSON");
+  expectError("{\"leave\":\n\"ann\"}", "tour.jsonl:1: is not JSON");
+  expectError("{'wait':1}", "tour.jsonl:1: is not JSON");
+  expectError(std::string("{\"wait\":1}\0", 11), "tour.jsonl:1: has a zero byte");
+  expectError(std::string(1'000'000, '['), "tour.jsonl:1: is not JSON");
+  expectError("{\"leave\":\"" + std::string(1u << 20, 'a') + "\"}", "tour.jsonl:1: has ");
+}
+
+TEST(Script, BytesThatAreNotUtf8AreRefusedEvenInComments) {
+  expectError("# caf\xE9\n", "tour.jsonl:1: is not UTF-8");
+  expectError("{\"wait\":1}\n{\"leave\":\"\xC0\xAF\"}", "tour.jsonl:2: is not UTF-8");
+  expectError("\xFF\xFE{\0", "tour.jsonl:1: is not UTF-8");
+}
+
+TEST(Script, EveryBadLineIsToldWithItsNumber) {
+  const std::string text = "{\"wait\":1}\n\nnonsense\n{\"leave\":\"\"}\n{\"leave\":\"ann\"}\n";
+  const std::string error = errorOf(text);
+  EXPECT_NE(error.find("tour.jsonl:3: is not JSON"), std::string::npos) << error;
+  EXPECT_NE(error.find("\ntour.jsonl:4: leave: is empty"), std::string::npos) << error;
+  try {
+    parseScript(text, "s");
+    FAIL();
+  } catch (const ScriptError& thrown) {
+    EXPECT_EQ(thrown.line, 3u);
+  }
+}
+
+TEST(Script, ManyBadLinesAreCounted) {
+  std::string text;
+  for (int i = 0; i < 1000; ++i) text += "x\n";
+  const std::string error = errorOf(text);
+  EXPECT_TRUE(error.ends_with("and 980 more bad lines")) << error.substr(error.size() - 60);
+}
+
+TEST(Script, AFileThatCannotBeReadIsNamed) {
+  for (const std::string file : {"/nonexistent/tour.jsonl", "/"}) {
+    try {
+      readScript(file);
+      FAIL() << file;
+    } catch (const ScriptError& error) {
+      EXPECT_TRUE(std::string(error.what()).starts_with(file + ": ")) << error.what();
+      EXPECT_EQ(error.line, 0u);
+    }
+  }
+}
+
+TEST(Script, AFileIsReadAsItsText) {
+  const auto file = std::filesystem::path(testing::TempDir()) / "enfilade_script_test.jsonl";
+  std::ofstream(file, std::ios::binary) << "{\"wait\":1}\r\n{\"leave\":\"ann\"}";
+  const Script script = readScript(file);
+  EXPECT_EQ(script.source, file.string());
+  EXPECT_EQ(script.lines.size(), 2u);
+  std::filesystem::remove(file);
+}
+
+}  // namespace
+}  // namespace enfilade::protocol

@@ -1,0 +1,56 @@
+// A server of one connection whose behaviour is a function: for testing clients.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "protocol/enfilade.pb.h"
+#include "protocol/framing.hpp"
+
+namespace enfilade::protocol {
+
+/// The server's end of a connection, blocking.
+class TestConnection {
+ public:
+  explicit TestConnection(int descriptor) : descriptor_(descriptor) {}
+
+  /// The client's next message; nullopt when it closed.
+  std::optional<v1::ClientMessage> receive();
+  void sendRaw(std::span<const std::uint8_t> bytes);
+  void sendRaw(const std::string& text);
+  void send(const v1::ServerMessage& message, std::span<const std::uint8_t> attachment = {});
+  /// Magic, and a Welcome to the Hello that it receives first and gives back.
+  v1::ClientMessage greet();
+  void untilClosed();  ///< swallows what comes until the client closes
+
+ private:
+  int descriptor_;
+  Decoder decoder_{kServerTakes};
+  std::vector<std::uint8_t> buffer_;
+  std::span<const std::uint8_t> unread_;
+};
+
+v1::ServerMessage welcomeTo(const v1::ClientMessage& hello);
+
+class TestServer {
+ public:
+  /// Serves the first connection with `behave` on a thread of its own, then closes it.
+  explicit TestServer(std::function<void(TestConnection&)> behave);
+  ~TestServer();  ///< waits for `behave`
+  TestServer(const TestServer&) = delete;
+  TestServer& operator=(const TestServer&) = delete;
+
+  std::uint16_t port() const { return port_; }
+
+ private:
+  int listener_;
+  std::uint16_t port_ = 0;
+  std::jthread thread_;
+};
+
+}  // namespace enfilade::protocol
