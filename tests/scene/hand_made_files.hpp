@@ -1,0 +1,124 @@
+// Tiny model files that tests write for themselves.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <unistd.h>
+
+namespace enfilade::tests {
+
+/// A folder of its own, gone at the end.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    static std::atomic<int> counter = 0;
+    path_ = std::filesystem::temp_directory_path() /
+            ("enfilade-" + std::to_string(getpid()) + "-" + std::to_string(++counter));
+    std::filesystem::create_directories(path_);
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path write(const std::string& name, const std::string& content) const {
+    std::ofstream(path_ / name, std::ios::binary) << content;
+    return path_ / name;
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+inline std::string base64(const std::string& bytes) {
+  static constexpr char kDigits[] =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const char c = i + k < bytes.size() ? bytes[i + k] : '\0';
+      group = group << 8 | static_cast<unsigned char>(c);
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      text += i + k > bytes.size() ? '=' : kDigits[group >> (18 - 6 * k) & 63];
+    }
+  }
+  return text;
+}
+
+/// A box of twelve triangles, counter-clockwise outside, from (0,0,0) to `size`.
+struct BoxMesh {
+  std::vector<std::array<float, 3>> positions;
+  std::vector<std::uint16_t> indices{0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                     2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+
+  explicit BoxMesh(std::array<float, 3> size, std::array<float, 3> from = {0, 0, 0}) {
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      positions.push_back({from[0] + ((corner & 1) != 0 ? size[0] : 0),
+                           from[1] + ((corner & 2) != 0 ? size[1] : 0),
+                           from[2] + ((corner & 4) != 0 ? size[2] : 0)});
+    }
+  }
+
+  /// Positions, then indices.
+  std::string bytes() const {
+    std::string text(positions.size() * 12 + indices.size() * 2, '\0');
+    std::memcpy(text.data(), positions.data(), positions.size() * 12);
+    std::memcpy(text.data() + positions.size() * 12, indices.data(), indices.size() * 2);
+    return text;
+  }
+};
+
+/// glTF JSON with one mesh 0 of material 0. `scene`: the root nodes, as "0,1"; `nodes`: JSON
+/// objects; `material`: its members; `buffer`: the buffer's members besides byteLength.
+inline std::string gltfJson(const BoxMesh& mesh, const std::string& scene, const std::string& nodes,
+                            const std::string& material, const std::string& buffer) {
+  const std::string count = std::to_string(mesh.positions.size());
+  const std::string vertexBytes = std::to_string(mesh.positions.size() * 12);
+  const std::string indexCount = std::to_string(mesh.indices.size());
+  const std::string indexBytes = std::to_string(mesh.indices.size() * 2);
+  return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[)" + scene +
+         R"(]}],"nodes":[)" + nodes + R"(],"materials":[{)" + material +
+         R"(}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],)" +
+         R"("accessors":[{"bufferView":0,"componentType":5126,"count":)" + count +
+         R"(,"type":"VEC3","min":[-1e30,-1e30,-1e30],"max":[1e30,1e30,1e30]},)" +
+         R"({"bufferView":1,"componentType":5123,"count":)" + indexCount +
+         R"(,"type":"SCALAR"}],"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":)" +
+         vertexBytes + R"(},{"buffer":0,"byteOffset":)" + vertexBytes + R"(,"byteLength":)" +
+         indexBytes + R"(}],"buffers":[{"byteLength":)" + std::to_string(mesh.bytes().size()) +
+         buffer + "}]}";
+}
+
+inline std::string gltf(const BoxMesh& mesh, const std::string& scene, const std::string& nodes,
+                        const std::string& material = R"("name":"paint")") {
+  return gltfJson(
+      mesh, scene, nodes, material,
+      R"(,"uri":"data:application/octet-stream;base64,)" + base64(mesh.bytes()) + R"(")");
+}
+
+/// The same as a GLB file.
+inline std::string glb(const BoxMesh& mesh, const std::string& scene, const std::string& nodes) {
+  const auto word = [](std::size_t value) {
+    std::string text(4, '\0');
+    for (std::size_t i = 0; i < 4; ++i) text[i] = static_cast<char>(value >> (8 * i) & 255);
+    return text;
+  };
+  std::string json = gltfJson(mesh, scene, nodes, R"("name":"paint")", "");
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  std::string binary = mesh.bytes();
+  binary.resize((binary.size() + 3) / 4 * 4, '\0');
+  return "glTF" + word(2) + word(12 + 8 + json.size() + 8 + binary.size()) + word(json.size()) +
+         "JSON" + json + word(binary.size()) + std::string("BIN\0", 4) + binary;
+}
+
+}  // namespace enfilade::tests

@@ -1,0 +1,158 @@
+// Every way in which an import can go wrong ends in an ImportError that says what to do.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cerrno>
+#include <cstdlib>
+
+#include "scene/import_model.hpp"
+#include "tests/scene/hand_made_files.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using tests::BoxMesh;
+using tests::TemporaryFolder;
+
+constexpr char kOneNode[] = R"({"mesh":0,"name":"box"})";
+
+/// What importing `file` fails with; "" when it does not.
+std::string failureOf(const std::filesystem::path& file, const ImportOptions& options = {}) {
+  try {
+    importModel(file, options);
+  } catch (const ImportError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// Sets ENFILADE_IMPORT_FAULT for as long as it lives.
+struct Fault {
+  explicit Fault(const char* kind) { setenv("ENFILADE_IMPORT_FAULT", kind, 1); }
+  ~Fault() { unsetenv("ENFILADE_IMPORT_FAULT"); }
+};
+
+void expectNoChildren() {
+  EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1);
+  EXPECT_EQ(errno, ECHILD);
+}
+
+TEST(ImportFailures, MissingFileFolderAndEmptyFileAreTold) {
+  const TemporaryFolder folder;
+  const auto missing = folder.path() / "missing.glb";
+  EXPECT_TRUE(contains(failureOf(missing), missing.string() + ": no such file"));
+  EXPECT_TRUE(contains(failureOf(folder.path()), "is a folder"));
+  EXPECT_TRUE(contains(failureOf(folder.write("empty.obj", "")), "empty.obj: is empty"));
+}
+
+TEST(ImportFailures, AnUnknownExtensionListsTheKnownOnes) {
+  const TemporaryFolder folder;
+  const std::string text = failureOf(folder.write("house.skp", "x"));
+  EXPECT_TRUE(contains(text, "'.skp'"));
+  for (const std::string_view known : importableExtensions()) {
+    EXPECT_TRUE(contains(text, std::string(known))) << known;
+  }
+  EXPECT_TRUE(contains(failureOf(folder.write("house.ifczip", "x")), "unzip it"));
+}
+
+TEST(ImportFailures, AGlbCutOffAnywhereIsAnError) {
+  const TemporaryFolder folder;
+  const std::string whole = tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode);
+  ASSERT_EQ(failureOf(folder.write("whole.glb", whole)), "");
+  for (std::size_t size = 1; size < whole.size(); size += 97) {
+    const std::string text = failureOf(folder.write("cut.glb", whole.substr(0, size)));
+    EXPECT_TRUE(contains(text, "cut.glb")) << size << ": " << text;
+  }
+}
+
+TEST(ImportFailures, AGlbWithNoiseInItNeverHurtsTheCaller) {
+  const TemporaryFolder folder;
+  const std::string whole = tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode);
+  std::size_t refused = 0;
+  for (std::size_t at = 0; at < whole.size(); at += 61) {
+    std::string noisy = whole;
+    noisy[at] = static_cast<char>(~noisy[at]);
+    refused += static_cast<std::size_t>(!failureOf(folder.write("noise.glb", noisy)).empty());
+  }
+  EXPECT_GT(refused, 5u);
+  expectNoChildren();
+}
+
+TEST(ImportFailures, TextFilesThatAreCutOffOrNotWhatTheySayAreErrors) {
+  const TemporaryFolder folder;
+  const std::string gltf = tests::gltf(BoxMesh({1, 1, 1}), "0", kOneNode);
+  EXPECT_TRUE(contains(failureOf(folder.write("cut.gltf", gltf.substr(0, 300))), "cut.gltf"));
+  EXPECT_TRUE(contains(failureOf(folder.write("x.dae", "<COLLADA><asset>")), "x.dae"));
+  EXPECT_TRUE(contains(failureOf(folder.write("x.ifc", "ISO-10303-21;\nDATA;\n")), "cut off"));
+  EXPECT_TRUE(contains(failureOf(folder.write("y.ifc", "hello")), "not an IFC file"));
+  EXPECT_TRUE(contains(failureOf(folder.write("x.fbx", "hello")), "x.fbx"));
+  EXPECT_TRUE(contains(failureOf(folder.write("x.obj", "v 0 0 0\n")), "x.obj"));
+}
+
+TEST(ImportFailures, AChildThatHangsIsKilledWhenTheTimeIsOver) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("box.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
+  const Fault fault("hang");
+  ImportOptions options;
+  options.timeLimit = 0.3;
+  const std::string text = failureOf(file, options);
+  EXPECT_TRUE(contains(text, "box.glb: not read within 0.3 s")) << text;
+  expectNoChildren();
+}
+
+TEST(ImportFailures, ACrashNamesTheFileTheStageAndARemedy) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("box.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
+  const Fault fault("crash");
+  const std::string text = failureOf(file);
+  EXPECT_TRUE(contains(text, "box.glb")) << text;
+  EXPECT_TRUE(contains(text, "crashed")) << text;
+  EXPECT_TRUE(contains(text, "'open'")) << text;
+  EXPECT_TRUE(contains(text, "re-export")) << text;
+  expectNoChildren();
+}
+
+TEST(ImportFailures, AChildThatAnswersNothingOrNoiseIsAnError) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("box.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
+  {
+    const Fault fault("exit");
+    EXPECT_TRUE(contains(failureOf(file), "ended without an answer"));
+  }
+  {
+    const Fault fault("garbage");
+    EXPECT_TRUE(contains(failureOf(file), "answered with noise"));
+  }
+  {
+    const Fault fault("memory");
+    EXPECT_TRUE(contains(failureOf(file), "MiB of memory"));
+  }
+  EXPECT_EQ(failureOf(file), "");
+  expectNoChildren();
+}
+
+TEST(ImportFailures, AnExceptionFromProgressLeavesNoChild) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("box.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
+  const auto interrupt = [](const std::string&, double) { throw std::runtime_error("enough"); };
+  EXPECT_THROW(importModel(file, {}, interrupt), std::runtime_error);
+  expectNoChildren();
+}
+
+TEST(ImportFailures, OptionsOutOfRangeAreRefused) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("box.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
+  ImportOptions options;
+  options.metresPerUnit = -1;
+  EXPECT_TRUE(contains(failureOf(file, options), "metres per unit"));
+  options.metresPerUnit.reset();
+  options.up = 'q';
+  EXPECT_TRUE(contains(failureOf(file, options), "up axis"));
+}
+
+}  // namespace
+}  // namespace enfilade::scene

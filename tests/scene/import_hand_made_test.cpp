@@ -1,0 +1,252 @@
+// Files with known answers, written by the tests.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "scene/import_model.hpp"
+#include "scene/scene.hpp"
+#include "tests/scene/hand_made_files.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using tests::BoxMesh;
+using tests::gltf;
+using tests::TemporaryFolder;
+
+std::size_t countOf(const Model& model, const std::string& kind) {
+  for (const Problem& problem : model.problems) {
+    if (problem.kind == kind) return problem.count;
+  }
+  return 0;
+}
+
+void expectBounds(const Scene& scene, const Vec3& min, const Vec3& max, double tolerance = 1e-6) {
+  EXPECT_LT((scene.bounds().min - min).norm(), tolerance) << scene.bounds().min.transpose();
+  EXPECT_LT((scene.bounds().max - max).norm(), tolerance) << scene.bounds().max.transpose();
+}
+
+std::vector<std::string> pathsOf(const Model& model) {
+  std::vector<std::string> paths;
+  for (const Object& object : model.objects) paths.push_back(object.path);
+  return paths;
+}
+
+constexpr char kOneNode[] = R"({"mesh":0,"name":"box"})";
+
+const std::string kObj =
+    "o box\nv 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+TEST(ImportHandMade, GltfBoxHasItsSizePathAndMaterial) {
+  const TemporaryFolder folder;
+  const auto file = folder.write(
+      "box.gltf",
+      gltf(BoxMesh({1, 2, 3}), "0", kOneNode,
+           R"("name":"glass","alphaMode":"BLEND","doubleSided":true,)"
+           R"("pbrMetallicRoughness":{"baseColorFactor":[0.25,0.5,1,0.5],"metallicFactor":0})"));
+  const Model model = importModel(file);
+  ASSERT_EQ(model.objects.size(), 1u);
+  EXPECT_EQ(model.objects[0].path, "box");
+  EXPECT_EQ(model.source, file.string());
+  const Material& material = model.materials[model.meshes[0].material];
+  EXPECT_EQ(material.name, "glass");
+  EXPECT_EQ(material.baseColour, Eigen::Vector4f(0.25f, 0.5f, 1, 0.5f));
+  EXPECT_EQ(material.alpha, Material::Alpha::blend);
+  EXPECT_TRUE(material.doubleSided);
+  expectBounds(Scene{Model(model)}, {0, 0, 0}, {1, 2, 3});
+}
+
+TEST(ImportHandMade, TransformsAreChainedInDoublesAndTheOffsetComesOff) {
+  const TemporaryFolder folder;
+  // A million metres away, a child 0.125 m further: floats would give multiples of 1/16 m there.
+  const auto file = folder.write(
+      "far.gltf", gltf(BoxMesh({1, 1, 1}), "0",
+                       R"({"name":"site","translation":[1000000,0,-2000000],"children":[1]},)"
+                       R"({"name":"a","translation":[0.0078125,0,0],"children":[2]},)"
+                       R"({"name":"b","translation":[0.001953125,0.25,0],"mesh":0})"));
+  const Model model = importModel(file);
+  ASSERT_EQ(model.objects.size(), 1u);
+  EXPECT_EQ(model.objects[0].path, "site/a/b");
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_EQ(model.offset[axis], std::round(model.offset[axis]));
+  }
+  const Vec3 corner = Vec3(1000000.009765625, 0.25, -2000000) - model.offset;
+  EXPECT_LT(corner.norm(), 10);
+  expectBounds(Scene{Model(model)}, corner, corner + Vec3::Ones(), 1e-9);
+}
+
+TEST(ImportHandMade, NoOffsetWithinAKilometre) {
+  const TemporaryFolder folder;
+  const auto file = folder.write(
+      "near.gltf", gltf(BoxMesh({1, 1, 1}), "0", R"({"mesh":0,"translation":[900,0,0]})"));
+  EXPECT_TRUE(importModel(file).offset.isZero(0));
+}
+
+TEST(ImportHandMade, VerticesFarFromTheirOriginAreRecentred) {
+  const TemporaryFolder folder;
+  const auto file =
+      folder.write("far.gltf", gltf(BoxMesh({4, 4, 4}, {400000, 100, -500000}), "0", kOneNode));
+  const Model model = importModel(file);
+  EXPECT_GT(model.offset.norm(), 600000);
+  for (const auto& p : model.meshes[0].positions) EXPECT_LT(p.norm(), 10);
+  const Vec3 min = Vec3(400000, 100, -500000) - model.offset;
+  expectBounds(Scene{Model(model)}, min, min + Vec3::Constant(4), 1e-9);
+}
+
+TEST(ImportHandMade, AStrayObjectFarAwayDoesNotMoveTheScene) {
+  const TemporaryFolder folder;
+  const auto file =
+      folder.write("stray.gltf", gltf(BoxMesh({1, 1, 1}), "0,1,2",
+                                      R"({"mesh":0},{"mesh":0,"translation":[2,0,0]},)"
+                                      R"({"mesh":0,"name":"stray","translation":[1e9,0,0]})"));
+  const Model model = importModel(file);
+  EXPECT_TRUE(model.offset.isZero(0));
+  EXPECT_EQ(model.objects.size(), 2u);
+  EXPECT_EQ(countOf(model, "far_object_dropped"), 1u);
+}
+
+TEST(ImportHandMade, MirroredNodesAreKeptAsTheyAreAndCounted) {
+  const TemporaryFolder folder;
+  const auto file = folder.write(
+      "mirror.gltf", gltf(BoxMesh({1, 2, 3}), "0,1",
+                          R"({"mesh":0},{"mesh":0,"scale":[-1,1,1],"name":"mirrored"})"));
+  const Model model = importModel(file);
+  EXPECT_EQ(countOf(model, "mirrored_object"), 1u);
+  EXPECT_LT(model.objects[1].worldFromMesh.linear().determinant(), 0);
+  expectBounds(Scene{Model(model)}, {-1, 0, 0}, {1, 2, 3});
+}
+
+TEST(ImportHandMade, RepeatedUnnamedAndSlashedNamesGiveUniquePaths) {
+  const TemporaryFolder folder;
+  const auto file = folder.write(
+      "names.gltf", gltf(BoxMesh({1, 1, 1}), "0",
+                         R"({"name":"house","children":[1,2,3,4,5,6]},{"mesh":0,"name":"door"},)"
+                         R"({"mesh":0,"name":"door"},{"mesh":0,"name":"door#2"},{"mesh":0},)"
+                         R"({"mesh":0,"name":"a/b"},{"mesh":0,"name":"100%"})"));
+  EXPECT_EQ(pathsOf(importModel(file)),
+            (std::vector<std::string>{"house/door", "house/door#2", "house/door#2#2", "house/node",
+                                      "house/a%2Fb", "house/100%25"}));
+}
+
+TEST(ImportHandMade, UnitAndUpOfTheUserWin) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("box.gltf", gltf(BoxMesh({1, 2, 3}), "0", kOneNode));
+  ImportOptions options;
+  options.metresPerUnit = 0.5;
+  options.up = 'z';
+  const Model model = importModel(file, options);
+  EXPECT_EQ(model.metresPerUnit, 0.5);
+  EXPECT_EQ(model.up, 'z');
+  // (x, y, z) with z up is (x, z, -y) with y up.
+  expectBounds(Scene{Model(model)}, {0, 0, -1}, {0.5, 1.5, 0});
+  options.up = 'x';
+  expectBounds(Scene(importModel(file, options)), {-1, 0, 0}, {0, 0.5, 1.5});
+}
+
+TEST(ImportHandMade, ObjIsMetresUnlessToldOtherwise) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("box.OBJ", kObj);
+  const Model model = importModel(file);
+  EXPECT_EQ(pathsOf(model), std::vector<std::string>{"box"});
+  EXPECT_EQ(countOf(model, "no_unit"), 1u);
+  expectBounds(Scene{Model(model)}, {0, 0, 0}, {1, 2, 3});
+  ImportOptions options;
+  options.metresPerUnit = metresPerUnitFrom("mm");
+  const Model small = importModel(file, options);
+  EXPECT_EQ(countOf(small, "no_unit"), 0u);
+  expectBounds(Scene{Model(small)}, {0, 0, 0}, {0.001, 0.002, 0.003}, 1e-9);
+}
+
+std::string colladaBox(const std::string& asset) {
+  return R"(<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>)" +
+         asset +
+         R"(</asset><library_geometries><geometry id="g"><mesh><source id="p">)"
+         R"(<float_array id="pa" count="12">0 0 0 1 0 0 0 2 0 0 0 3</float_array><technique_common>)"
+         R"(<accessor source="#pa" count="4" stride="3"><param name="X" type="float"/>)"
+         R"(<param name="Y" type="float"/><param name="Z" type="float"/></accessor>)"
+         R"(</technique_common></source><vertices id="v"><input semantic="POSITION" source="#p"/>)"
+         R"(</vertices><triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/>)"
+         R"(<p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry></library_geometries>)"
+         R"(<library_visual_scenes><visual_scene id="s"><node id="n" name="tip">)"
+         R"(<translate>10 20 30</translate><instance_geometry url="#g"/></node></visual_scene>)"
+         R"(</library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>)";
+}
+
+TEST(ImportHandMade, ColladaUnitAndUpAreAppliedOnceOrReplaced) {
+  const TemporaryFolder folder;
+  const auto file = folder.write(
+      "tip.dae", colladaBox(R"(<unit name="inch" meter="0.0254"/><up_axis>Z_UP</up_axis>)"));
+  const Model model = importModel(file);
+  EXPECT_EQ(model.metresPerUnit, 0.0254);
+  EXPECT_EQ(model.up, 'z');
+  EXPECT_EQ(pathsOf(model), std::vector<std::string>{"tip"});
+  expectBounds(Scene{Model(model)}, Vec3(10, 30, -22) * 0.0254, Vec3(11, 33, -20) * 0.0254);
+  ImportOptions options;
+  options.metresPerUnit = 1;
+  options.up = 'y';
+  expectBounds(Scene(importModel(file, options)), {10, 20, 30}, {11, 22, 33}, 1e-5);
+  const auto xUp = folder.write("x.dae", colladaBox("<up_axis>X_UP</up_axis>"));
+  const Model turned = importModel(xUp);
+  EXPECT_EQ(countOf(turned, "no_unit"), 1u);
+  expectBounds(Scene{Model(turned)}, {-22, 10, 30}, {-20, 11, 33}, 1e-5);
+}
+
+TEST(ImportHandMade, ATriangleWithANanVertexIsDroppedAndReported) {
+  const TemporaryFolder folder;
+  BoxMesh mesh({1, 1, 1});
+  mesh.positions.push_back({std::numeric_limits<float>::quiet_NaN(), 0, 0});
+  mesh.indices.insert(mesh.indices.end(), {0, 1, 8});
+  const Model model = importModel(folder.write("nan.gltf", gltf(mesh, "0", kOneNode)));
+  EXPECT_EQ(countOf(model, "broken_triangle_dropped"), 1u);
+  EXPECT_EQ(model.meshes[0].indices.size(), 36u);
+  expectBounds(Scene{Model(model)}, {0, 0, 0}, {1, 1, 1});
+}
+
+TEST(ImportHandMade, DegenerateTrianglesAreKeptForTheEyeAndSkippedForTouch) {
+  const TemporaryFolder folder;
+  BoxMesh mesh({1, 1, 1});
+  mesh.positions.push_back({9, 0, 0});
+  mesh.indices.insert(mesh.indices.end(), {0, 1, 8});  // on one line
+  const Model model = importModel(folder.write("flat.gltf", gltf(mesh, "0", kOneNode)));
+  EXPECT_EQ(countOf(model, "degenerate_triangle"), 1u);
+  const Scene scene{Model(model)};
+  EXPECT_EQ(scene.triangles(0).triangles().size(), 12u);
+  expectBounds(scene, {0, 0, 0}, {1, 1, 1});
+}
+
+TEST(ImportHandMade, AMissingTextureIsAProblemAndNoError) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("box.obj", "mtllib box.mtl\nusemtl wall\n" + kObj);
+  folder.write("box.mtl", "newmtl wall\nKd 0.5 0.5 0.5\nmap_Kd brick.png\n");
+  const Model model = importModel(file);
+  EXPECT_EQ(countOf(model, "missing_texture"), 1u);
+  const Material& material = model.materials[model.meshes[0].material];
+  EXPECT_EQ(material.baseColourTexture, -1);
+  EXPECT_NEAR(material.baseColour.x(), 0.2140f, 1e-3f) << "sRGB 0.5 in linear light";
+}
+
+TEST(ImportHandMade, ProgressNamesStagesInOrder) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("box.gltf", gltf(BoxMesh({1, 1, 1}), "0", kOneNode));
+  std::vector<std::string> stages;
+  importModel(file, {}, [&](const std::string& stage, double fraction) {
+    EXPECT_GE(fraction, 0);
+    EXPECT_LE(fraction, 1);
+    if (stages.empty() || stages.back() != stage) stages.push_back(stage);
+  });
+  EXPECT_EQ(stages, (std::vector<std::string>{"open", "parse", "textures", "convert", "send"}));
+}
+
+TEST(ImportHandMade, UnitsAreParsedOrRefused) {
+  EXPECT_EQ(metresPerUnitFrom("m"), 1);
+  EXPECT_EQ(metresPerUnitFrom("ft"), 0.3048);
+  EXPECT_EQ(metresPerUnitFrom("in"), 0.0254);
+  EXPECT_EQ(metresPerUnitFrom("0.05"), 0.05);
+  for (const char* wrong : {"", "0", "-1", "nan", "inf", "1 m", "yard", "1e400"}) {
+    EXPECT_FALSE(metresPerUnitFrom(wrong).has_value()) << wrong;
+  }
+}
+
+}  // namespace
+}  // namespace enfilade::scene

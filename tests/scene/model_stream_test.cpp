@@ -1,0 +1,122 @@
+#include "scene/model_stream.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <random>
+
+namespace enfilade::scene {
+namespace {
+
+Model smallModel() {
+  Model model;
+  model.source = "small.glb";
+  model.textures.push_back({"brick", 2, 1, {1, 2, 3, 4, 5, 6, 7, 8}});
+  model.materials.resize(2);
+  model.materials[1].name = "glass";
+  model.materials[1].alpha = Material::Alpha::blend;
+  model.materials[1].doubleSided = true;
+  model.materials[1].baseColourTexture = 0;
+  Mesh mesh;
+  mesh.name = "triangle";
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.normals.assign(3, Eigen::Vector3f::UnitZ());
+  mesh.uvs = {{0, 0}, {1, 0}, {0, 1}};
+  mesh.indices = {0, 1, 2};
+  mesh.material = 1;
+  model.meshes.assign(2, mesh);
+  Object object;
+  object.path = "house/door#2";
+  object.globalId = "2O2Fr$t4X7Zf8NOew3FNtn";
+  object.meshes = {0, 1};
+  object.worldFromMesh = Eigen::Translation3d(0.1, 0.2, 0.3) * Eigen::Scaling(-1.0, 2.0, 1.0);
+  model.objects.push_back(object);
+  model.metresPerUnit = 0.3048;
+  model.up = 'z';
+  model.offset = {459123, 113, -5428311};
+  model.problems.push_back({"missing_texture", 3, "wall.png"});
+  return model;
+}
+
+TEST(ModelStream, RoundTripKeepsEveryByte) {
+  const std::vector<std::byte> bytes = serialiseModel(smallModel());
+  const Model back = deserialiseModel(bytes);
+  EXPECT_EQ(serialiseModel(back), bytes);
+  EXPECT_EQ(back.objects[0].path, "house/door#2");
+  EXPECT_EQ(back.objects[0].worldFromMesh.matrix(), smallModel().objects[0].worldFromMesh.matrix());
+  EXPECT_EQ(back.meshes[1].positions, smallModel().meshes[1].positions);
+  EXPECT_EQ(back.textures[0].rgba, smallModel().textures[0].rgba);
+  EXPECT_EQ(back.materials[1].alpha, Material::Alpha::blend);
+  EXPECT_EQ(back.offset, smallModel().offset);
+  EXPECT_EQ(back.problems[0].count, 3u);
+}
+
+TEST(ModelStream, EveryShorterStreamIsRefused) {
+  const std::vector<std::byte> bytes = serialiseModel(smallModel());
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    std::vector<std::byte> cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+    EXPECT_THROW(deserialiseModel(cut), ModelStreamError) << size;
+    if (size < 16) continue;
+    const std::uint64_t length = size;  // the same, by somebody who mends the length
+    std::memcpy(cut.data() + 8, &length, sizeof length);
+    EXPECT_THROW(deserialiseModel(cut), ModelStreamError) << size;
+  }
+}
+
+TEST(ModelStream, AnotherVersionIsRefusedByItsNumber) {
+  std::vector<std::byte> bytes = serialiseModel(smallModel());
+  bytes[4] = std::byte{99};
+  try {
+    deserialiseModel(bytes);
+    FAIL();
+  } catch (const ModelStreamError& error) {
+    EXPECT_NE(std::string(error.what()).find("99"), std::string::npos);
+  }
+}
+
+/// What a reader of the model relies on without asking.
+void expectSafe(const Model& model) {
+  for (const Material& m : model.materials) {
+    ASSERT_LT(m.baseColourTexture, static_cast<std::int64_t>(model.textures.size()));
+  }
+  for (const Mesh& m : model.meshes) {
+    ASSERT_LT(m.material, model.materials.size());
+    for (const std::uint32_t i : m.indices) ASSERT_LT(i, m.positions.size());
+  }
+  for (const Object& o : model.objects) {
+    ASSERT_TRUE(o.worldFromMesh.matrix().allFinite());
+    for (const std::uint32_t mesh : o.meshes) ASSERT_LT(mesh, model.meshes.size());
+  }
+}
+
+TEST(ModelStream, CorruptedStreamsAreRefusedOrHarmless) {
+  const std::vector<std::byte> bytes = serialiseModel(smallModel());
+  std::mt19937 random(20240607);
+  const auto below = [&](std::size_t n) { return random() % n; };
+  std::size_t refused = 0;
+  for (int round = 0; round < 2000; ++round) {
+    std::vector<std::byte> noisy = bytes;
+    const std::size_t changes = 1 + below(8);
+    for (std::size_t i = 0; i < changes; ++i) {
+      const std::size_t at = 16 + below(noisy.size() - 16);
+      noisy[at] = static_cast<std::byte>(below(256));
+    }
+    try {
+      expectSafe(deserialiseModel(noisy));
+    } catch (const ModelStreamError&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 600u);
+  EXPECT_LT(refused, 2000u);
+}
+
+TEST(ModelStream, AHugeCountIsRefusedBeforeAnythingIsAllocated) {
+  std::vector<std::byte> bytes = serialiseModel(Model());
+  const std::uint64_t huge = std::uint64_t{1} << 60;
+  std::memcpy(bytes.data() + 16, &huge, sizeof huge);  // the length of the source's name
+  EXPECT_THROW(deserialiseModel(bytes), ModelStreamError);
+}
+
+}  // namespace
+}  // namespace enfilade::scene

@@ -1,0 +1,115 @@
+#include "scene/scene.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <thread>
+
+namespace enfilade::scene {
+namespace {
+
+/// Seeded triangles in `objects` objects, some of them without area.
+Model randomModel(unsigned seed, std::size_t objects) {
+  std::mt19937 random(seed);
+  const auto number = [&] { return static_cast<float>(random() % 2001) / 100.0f - 10.0f; };
+  Model model;
+  model.materials.emplace_back();
+  for (std::size_t i = 0; i < objects; ++i) {
+    Mesh mesh;
+    for (int v = 0; v < 12; ++v) {
+      const float x = number(), y = number(), z = number();
+      mesh.positions.emplace_back(x, y, z);
+    }
+    for (int t = 0; t < 20; ++t) {
+      for (int k = 0; k < 3; ++k) mesh.indices.push_back(static_cast<std::uint32_t>(random() % 12));
+    }
+    model.meshes.push_back(mesh);
+    Object object;
+    object.path = "object" + std::to_string(i);
+    object.meshes = {static_cast<std::uint32_t>(i)};
+    object.worldFromMesh.translation() = Vec3(number(), number(), number());
+    object.worldFromMesh.linear() *= 0.37;
+    model.objects.push_back(object);
+  }
+  return model;
+}
+
+TEST(Scene, BoxesAreExactlyTheExtremesOfTheTrianglesWithArea) {
+  const Scene scene(randomModel(7, 40));
+  std::size_t skipped = 0;
+  for (std::size_t i = 0; i < scene.solidObjects().size(); ++i) {
+    const Object& object = scene.model().objects[scene.solidObjects()[i]];
+    const Mesh& mesh = scene.model().meshes[object.meshes[0]];
+    Box box;
+    std::size_t solid = 0;
+    for (std::size_t t = 0; t < mesh.indices.size(); t += 3) {
+      const Vec3 a = worldPosition(object, mesh, mesh.indices[t]);
+      const Vec3 b = worldPosition(object, mesh, mesh.indices[t + 1]);
+      const Vec3 c = worldPosition(object, mesh, mesh.indices[t + 2]);
+      if (a == b || b == c || c == a) {
+        ++skipped;
+        continue;
+      }
+      ++solid;
+      for (const Vec3& p : {a, b, c}) box.include(p);
+    }
+    EXPECT_EQ(scene.stillBoxes()[i].min, box.min);
+    EXPECT_EQ(scene.stillBoxes()[i].max, box.max);
+    EXPECT_EQ(scene.triangles(scene.solidObjects()[i]).triangles().size(), solid);
+  }
+  EXPECT_GT(skipped, 50u);
+}
+
+TEST(Scene, ObjectsWithoutAreaCannotBeTouched) {
+  Model model = randomModel(8, 3);
+  model.meshes[1].indices = {0, 0, 1, 2, 2, 2};
+  const Scene scene(std::move(model));
+  EXPECT_EQ(scene.solidObjects(), (std::vector<std::uint32_t>{0, 2}));
+  EXPECT_TRUE(scene.triangles(1).triangles().empty());
+}
+
+TEST(Scene, AnEmptyModelIsAnEmptyScene) {
+  const Scene scene{Model()};
+  EXPECT_TRUE(scene.solidObjects().empty());
+  EXPECT_TRUE(scene.bounds().empty());
+}
+
+TEST(Scene, HashFollowsPositionsPathsAndPlacesOnly) {
+  const std::uint64_t hash = Scene(randomModel(9, 5)).hash();
+  EXPECT_EQ(Scene(randomModel(9, 5)).hash(), hash);
+  Model recoloured = randomModel(9, 5);
+  recoloured.materials[0].baseColour.setZero();
+  EXPECT_EQ(Scene(recoloured).hash(), hash);
+  Model moved = randomModel(9, 5);
+  moved.objects[3].worldFromMesh.translation().x() += 1e-12;
+  EXPECT_NE(Scene(moved).hash(), hash);
+  Model renamed = randomModel(9, 5);
+  renamed.objects[3].path += "x";
+  EXPECT_NE(Scene(renamed).hash(), hash);
+  Model bent = randomModel(9, 5);
+  bent.meshes[2].positions[4].y() = 11;
+  EXPECT_NE(Scene(bent).hash(), hash);
+}
+
+TEST(Scene, TreesAreBuiltOnceWhoeverAsks) {
+  const Scene scene(randomModel(10, 50));
+  std::vector<std::vector<const collision::TriangleTree*>> seen(4);
+  std::vector<std::thread> threads;
+  for (auto& list : seen) {
+    threads.emplace_back([&scene, &list] {
+      for (std::uint32_t i = 0; i < 50; ++i) list.push_back(&scene.triangles(i));
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const auto& list : seen) EXPECT_EQ(list, seen[0]);
+  EXPECT_THROW(scene.triangles(50), std::out_of_range);
+}
+
+TEST(Scene, IndicesThatPointNowhereAreRefused) {
+  Model model = randomModel(11, 2);
+  model.meshes[1].indices[4] = 12;
+  EXPECT_THROW(Scene{std::move(model)}, std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace enfilade::scene
