@@ -23,14 +23,24 @@ struct Point {
   Rational x, y, z;
 };
 
-Point operator-(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Point operator+(const Point& a, const Point& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-Point operator*(const Rational& s, const Point& a) { return {s * a.x, s * a.y, s * a.z}; }
-Rational dot(const Point& a, const Point& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+Point operator-(const Point& a, const Point& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+Point operator+(const Point& a, const Point& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+Point operator*(const Rational& s, const Point& a) {
+  return {s * a.x, s * a.y, s * a.z};
+}
+Rational dot(const Point& a, const Point& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 Point cross(const Point& a, const Point& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-bool isZero(const Point& a) { return sgn(a.x) == 0 && sgn(a.y) == 0 && sgn(a.z) == 0; }
+bool isZero(const Point& a) {
+  return sgn(a.x) == 0 && sgn(a.y) == 0 && sgn(a.z) == 0;
+}
 
 std::vector<Point> worldPoints(const ConvexBody& body) {
   const Point translation{body.translation.x(), body.translation.y(), body.translation.z()};

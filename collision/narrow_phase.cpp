@@ -1,7 +1,8 @@
 // Steps
 //  1. Both bodies go into one frame: A's vertices as they are, B's moved by tB - tA. Translations
 //     are subtracted before anything is rounded, so a scene far from the origin loses nothing.
-//  2. GJK (Gilbert, Johnson, Keerthi 1988) on M = B - A, started from last tick's axis. Each support
+//  2. GJK (Gilbert, Johnson, Keerthi 1988) on M = B - A, started from last tick's axis. Each
+//  support
 //     point gives a lower bound of the distance (the slab along the axis), each simplex an upper
 //     bound; it stops when they meet, or when doubles make no more progress.
 //  3. The filter: a lower bound above its own rounding bound proves `separated`; a tetrahedron that
@@ -15,7 +16,8 @@
 //  - A moved vertex of B is off by at most u (S + D), a coordinate.
 //  - axis . vertex: three products, two sums: at most 3u |axis|_1 S (1 + 2u).
 //  - gap = min over B - max over A: both of the above and one difference of size <= 2 |axis|_1 S:
-//    at most (3 + 3 + 1 + 2) u |axis|_1 S + u |axis|_1 D. kGapRounding rounds 9 up for second order.
+//    at most (3 + 3 + 1 + 2) u |axis|_1 S + u |axis|_1 D. kGapRounding rounds 9 up for second
+//    order.
 //  - The nearest point of a simplex, a combination of points of size <= 2S a coordinate, is off by
 //    at most kPointRounding u S (weights, products, sums; generous).
 #include "collision/narrow_phase.hpp"
@@ -28,12 +30,12 @@
 namespace enfilade::collision {
 namespace {
 
-constexpr double kUnit = 0x1p-53;          // half an ulp of 1
-constexpr double kGapRounding = 10;        // units of S, see the file's head
-constexpr double kPointRounding = 64;      // units of S, see the file's head
+constexpr double kUnit = 0x1p-53;             // half an ulp of 1
+constexpr double kGapRounding = 10;           // units of S, see the file's head
+constexpr double kPointRounding = 64;         // units of S, see the file's head
 constexpr double kDeterminantRounding = 256;  // units of S^3: 3x3 determinant of points <= 2S
 constexpr double kBoundsMeet = 4 * kUnit;     // relative: the normal is as good as the root of this
-constexpr int kIterationBound = 64;        // GJK on polytopes needs about 10
+constexpr int kIterationBound = 64;           // GJK on polytopes needs about 10
 
 /// Both bodies in one frame, with what the rounding bounds need.
 struct Pair {
@@ -145,7 +147,9 @@ Simplex nearestOnTriangle(const Simplex& s, int i, int j, int k) {
                 nearestOnSegment(s, k, i));
 }
 
-double determinant(const Vec3& a, const Vec3& b, const Vec3& c) { return a.dot(b.cross(c)); }
+double determinant(const Vec3& a, const Vec3& b, const Vec3& c) {
+  return a.dot(b.cross(c));
+}
 
 /// Four points: the origin is inside when every face has it on the side of the fourth point.
 /// `inside` is proved by the rounding bound, else the nearest face is taken.
@@ -165,10 +169,14 @@ Simplex nearestOnTetrahedron(const Simplex& s, const Pair& pair, bool& inside) {
 Simplex nearestOn(const Simplex& s, const Pair& pair, bool& inside) {
   inside = false;
   switch (s.size) {
-    case 1: return chosen(s, {0}, {1});
-    case 2: return nearestOnSegment(s, 0, 1);
-    case 3: return nearestOnTriangle(s, 0, 1, 2);
-    default: return nearestOnTetrahedron(s, pair, inside);
+    case 1:
+      return chosen(s, {0}, {1});
+    case 2:
+      return nearestOnSegment(s, 0, 1);
+    case 3:
+      return nearestOnTriangle(s, 0, 1, 2);
+    default:
+      return nearestOnTetrahedron(s, pair, inside);
   }
 }
 
@@ -259,8 +267,7 @@ void describeSeparation(const Pair& pair, const Search& search, Decision& decisi
 
 Vec3 startAxis(const ConvexBody& a, const ConvexBody& b, const SeparationCache& cache) {
   if (cache.axis.squaredNorm() > 0) return cache.axis;
-  const Vec3 between =
-      (b.vertices[0] - a.vertices[0]) + (b.translation - a.translation);
+  const Vec3 between = (b.vertices[0] - a.vertices[0]) + (b.translation - a.translation);
   return between.squaredNorm() > 0 ? between : Vec3(Vec3::UnitY());
 }
 

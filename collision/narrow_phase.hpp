@@ -20,11 +20,11 @@ enum class DecidedBy : std::uint8_t {
 struct Decision {
   Verdict verdict = Verdict::separated;
   DecidedBy decidedBy = DecidedBy::filter;
-  double distance = 0;      ///< metres, >= 0; 0 unless separated
-  double errorBound = 0;    ///< metres: the true distance lies within distance +- errorBound
-  double penetration = 0;   ///< metres: an upper bound of the depth; 0 unless penetrating
-  Vec3 pointA = Vec3::Zero();  ///< witness points, world. Separated: closest points.
-  Vec3 pointB = Vec3::Zero();  ///< Touching, penetrating: a common point, up to rounding.
+  double distance = 0;          ///< metres, >= 0; 0 unless separated
+  double errorBound = 0;        ///< metres: the true distance lies within distance +- errorBound
+  double penetration = 0;       ///< metres: an upper bound of the depth; 0 unless penetrating
+  Vec3 pointA = Vec3::Zero();   ///< witness points, world. Separated: closest points.
+  Vec3 pointB = Vec3::Zero();   ///< Touching, penetrating: a common point, up to rounding.
   Vec3 normal = Vec3::UnitY();  ///< unit, from A to B; separated only, else the least-overlap axis
 };
 

@@ -166,13 +166,13 @@ void SortAndSweep::State::mergeFound(MoverId id) {
   std::erase_if(found, [&](const Found& f) {
     return std::binary_search(mover.partners.begin(), mover.partners.end(), f.partner);
   });
-  const auto fresh = static_cast<std::ptrdiff_t>(found.size());
+  const auto added = static_cast<std::ptrdiff_t>(found.size());
   for (const Found& f : found) tellStill(id, f.partner);
   for (std::size_t i = 0; i < mover.rows.size(); ++i) {
     found.push_back({mover.partners[i], mover.rows[i]});
   }
-  std::inplace_merge(found.begin(), found.begin() + fresh, found.end(), byPartner);
-  mover.partners.insert(mover.partners.begin(), static_cast<std::size_t>(fresh), Partner{});
+  std::inplace_merge(found.begin(), found.begin() + added, found.end(), byPartner);
+  mover.partners.insert(mover.partners.begin(), static_cast<std::size_t>(added), Partner{});
   mover.rows.resize(found.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     mover.partners[i] = found[i].partner;

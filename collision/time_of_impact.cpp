@@ -8,9 +8,9 @@
 namespace enfilade::collision {
 namespace {
 
-constexpr int kAdvanceBound = 48;        // steps a target; a handful is usual
-constexpr double kArrived = 1.0 / 32;    // of (high - low): near enough to a target
-constexpr double kGrazing = 1e-9;        // of |displacement|: slower closing is rounding, not motion
+constexpr int kAdvanceBound = 48;      // steps a target; a handful is usual
+constexpr double kArrived = 1.0 / 32;  // of (high - low): near enough to a target
+constexpr double kGrazing = 1e-9;      // of |displacement|: slower closing is rounding, not motion
 
 struct Advance {
   double fraction;
@@ -63,8 +63,7 @@ SweepResult sweep(const ConvexBody& a, const Vec3& displacement, const ConvexBod
   if (!(length > 0) || provedSeparation(a, b, cache) > band.low + length) return result;
 
   const double tolerance = kArrived * (band.high - band.low);
-  const Advance near =
-      advanceTo(band.high, tolerance, 0, a, displacement, b, cache, result);
+  const Advance near = advanceTo(band.high, tolerance, 0, a, displacement, b, cache, result);
   if (!near.reached) return result;
   Advance in = near;
   const bool overlapping = near.last.verdict != Verdict::separated;

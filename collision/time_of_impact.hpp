@@ -20,7 +20,7 @@ struct SweepResult {
   bool boundReached = false;  ///< stopped because the iteration bound was reached, not proved near
   std::uint32_t queries = 0;  ///< narrow-phase queries made
   std::uint32_t rationals = 0;  ///< of those, decided by exact arithmetic
-  Decision atStop;            ///< at `fraction`; its normal points from A to B; only when stopped
+  Decision atStop;              ///< at `fraction`; its normal points from A to B; only when stopped
 };
 
 /// Moves A by `displacement` (metres, world) against B, which stands. Along the whole part that is

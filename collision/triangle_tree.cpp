@@ -52,8 +52,8 @@ TriangleTree::TriangleTree(std::vector<Triangle> triangles) {
     int axis = 0;
     centres.size().maxCoeff(&axis);
     const std::uint32_t middle = task.first + (task.last - task.first) / 2;
-    std::nth_element(order.begin() + task.first, order.begin() + middle,
-                     order.begin() + task.last, [&](std::uint32_t a, std::uint32_t b) {
+    std::nth_element(order.begin() + task.first, order.begin() + middle, order.begin() + task.last,
+                     [&](std::uint32_t a, std::uint32_t b) {
                        const double ca = boxes[a].min[axis] + boxes[a].max[axis];
                        const double cb = boxes[b].min[axis] + boxes[b].max[axis];
                        return ca != cb ? ca < cb : a < b;

@@ -44,8 +44,8 @@ bool nearer(const Decision& a, const Decision& b) {
 std::optional<Decision> decideCounted(const Avatar& avatar, Obstacle& obstacle, double limit,
                                       QueryCount& count) {
   ++count.narrow;
-  const auto decision = collision::decideWithin({avatar.hull->vertices, avatar.feet},
-                                                obstacle.body, limit, obstacle.cache);
+  const auto decision = collision::decideWithin({avatar.hull->vertices, avatar.feet}, obstacle.body,
+                                                limit, obstacle.cache);
   if (decision && decision->decidedBy == collision::DecidedBy::rational) ++count.rational;
   return decision;
 }

@@ -10,10 +10,10 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr int kSlides = 5;          // planes met in one move: a corner of three and two to spare
+constexpr int kSlides = 5;            // planes met in one move: a corner of three and two to spare
 constexpr double kLowBand = 7.0 / 8;  // of epsilon: see StoppingBand
 constexpr double kHighBand = 1 + 1.0 / 32;
-constexpr double kNoMove = 1e-9;    // of epsilon: what is left of a move below this is not made
+constexpr double kNoMove = 1e-9;      // of epsilon: what is left of a move below this is not made
 constexpr double kWorthAStep = 1e-3;  // of the wish: a step must win at least this much ground
 
 /// One avatar's motion through one tick.
@@ -84,9 +84,12 @@ enum class Manner : std::uint8_t {
 /// What is left of a move after it met a plane that can be stood on.
 Vec3 afterGround(const Vec3& rest, Manner manner) {
   switch (manner) {
-    case Manner::walk: return rest;
-    case Manner::drop: return Vec3::Zero();
-    default: return {rest.x(), 0, rest.z()};
+    case Manner::walk:
+      return rest;
+    case Manner::drop:
+      return Vec3::Zero();
+    default:
+      return {rest.x(), 0, rest.z()};
   }
 }
 

@@ -31,8 +31,8 @@ struct QueryCount {
 
 /// The earliest thing in the way of a move.
 struct Stop {
-  double fraction = 1;  ///< of the displacement that may be made
-  EntityId entity = 0;  ///< 0: nothing in the way
+  double fraction = 1;         ///< of the displacement that may be made
+  EntityId entity = 0;         ///< 0: nothing in the way
   Vec3 normal = Vec3::Zero();  ///< unit, from the obstacle to the avatar
   double distance = 0;         ///< metres, at the stop
 };

@@ -122,7 +122,9 @@ Outcome follow(const Leave&, Follower& f) {
   return Outcome::endedTick;
 }
 
-Outcome follow(const Drive&, Follower&) { return Outcome::ended; }  // taken in by takeIn()
+Outcome follow(const Drive&, Follower&) {
+  return Outcome::ended;
+}  // taken in by takeIn()
 
 Outcome followFront(Follower& f) {
   const Order order = f.queue.front().order;

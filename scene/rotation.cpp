@@ -33,10 +33,14 @@ collision::Vec3 headingFromDegrees(double degrees) {
   const double c = cosine(rest * kRadiansPerDegree);
   const double s = sine(rest * kRadiansPerDegree);
   switch (((quarters % 4) + 4) % 4) {
-    case 0: return {c, 0, -s};
-    case 1: return {-s, 0, -c};
-    case 2: return {-c, 0, s};
-    default: return {s, 0, c};
+    case 0:
+      return {c, 0, -s};
+    case 1:
+      return {-s, 0, -c};
+    case 2:
+      return {-c, 0, s};
+    default:
+      return {s, 0, c};
   }
 }
 

@@ -87,9 +87,8 @@ bool hasFloorBelow(const WorldState& world, const Avatar& avatar, QueryCount& co
   const double depth = avatar.feet.y() - world.scene->bounds().min.y() + kFloorMargin;
   if (!(depth > 0)) return false;
   const Vec3 down{0, -depth, 0};
-  const Box column =
-      collision::swept(Box{avatar.hullBox.min + avatar.feet, avatar.hullBox.max + avatar.feet},
-                       down);
+  const Box column = collision::swept(
+      Box{avatar.hullBox.min + avatar.feet, avatar.hullBox.max + avatar.feet}, down);
   std::vector<Obstacle> obstacles;
   gatherAll(world, column, obstacles);
   const double epsilon = world.lengths.epsilon;
@@ -129,8 +128,7 @@ std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& ord
     const Vec3 middle = avatar.feet + avatar.hullBox.centre();
     if (const EntityId solid = solidAround(world, middle))
       return "at " + text(order.at) + " it would stand inside " + pathOf(world, solid);
-    if (!hasFloorBelow(world, avatar, count))
-      return "there is no floor below " + text(order.at);
+    if (!hasFloorBelow(world, avatar, count)) return "there is no floor below " + text(order.at);
     return std::nullopt;
   }
   return "at " + text(order.at) + " it would stand in " + pathOf(world, inTheWay) +

@@ -1,4 +1,5 @@
-// The tick, a table of contents. Each stage is timed; what it does is in the file it is named after.
+// The tick, a table of contents. Each stage is timed; what it does is in the file it is named
+// after.
 #include <algorithm>
 #include <chrono>
 

@@ -35,8 +35,8 @@ Refusal badPoint(const std::string& field, const Vec3& point) {
 
 Refusal badName(const std::string& field, const std::string& name) {
   const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-           c == '.' || c == '_' || c == '-';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '_' || c == '-';
   };
   bool good = !name.empty() && name.size() <= kLongestName && name[0] != '.';
   for (const char c : name) good = good && allowed(c);
@@ -61,12 +61,18 @@ Refusal refusalOf(const Walk& walk, const Lengths& lengths) {
   return outside("speed", walk.speed, 0, lengths.speedLimit);
 }
 
-Refusal refusalOf(const Look& look, const Lengths&) { return badPoint("at", look.at); }
+Refusal refusalOf(const Look& look, const Lengths&) {
+  return badPoint("at", look.at);
+}
 Refusal refusalOf(const Wait& wait, const Lengths&) {
   return outside("seconds", wait.seconds, 0, kLongestWait);
 }
-Refusal refusalOf(const Capture& capture, const Lengths&) { return badName("as", capture.as); }
-Refusal refusalOf(const Leave&, const Lengths&) { return std::nullopt; }
+Refusal refusalOf(const Capture& capture, const Lengths&) {
+  return badName("as", capture.as);
+}
+Refusal refusalOf(const Leave&, const Lengths&) {
+  return std::nullopt;
+}
 Refusal refusalOf(const Drive& drive, const Lengths& lengths) {
   if (auto why = badPoint("velocity", drive.velocity)) return why;
   return outside("velocity's length", drive.velocity.norm(), 0, lengths.speedLimit);
@@ -98,9 +104,15 @@ World::~World() = default;
 World::World(World&&) noexcept = default;
 World& World::operator=(World&&) noexcept = default;
 
-const Scene& World::scene() const { return *state_->scene; }
-const Lengths& World::lengths() const { return state_->lengths; }
-std::shared_ptr<const Snapshot> World::snapshot() const { return state_->snapshot; }
+const Scene& World::scene() const {
+  return *state_->scene;
+}
+const Lengths& World::lengths() const {
+  return state_->lengths;
+}
+std::shared_ptr<const Snapshot> World::snapshot() const {
+  return state_->snapshot;
+}
 
 std::optional<std::string> refusal(const World& world, const Command& command) {
   if (auto why = badName("avatar", command.avatar)) return why;

@@ -92,20 +92,20 @@ struct Notice {
 
 enum class Stage : std::uint8_t { commands, broad, avatars, narrow, hash, snapshot };
 inline constexpr std::size_t kStages = 6;
-inline constexpr std::array<const char*, kStages> kStageNames{"commands", "broad",   "avatars",
-                                                              "narrow",   "hash", "snapshot"};
+inline constexpr std::array<const char*, kStages> kStageNames{"commands", "broad", "avatars",
+                                                              "narrow",   "hash",  "snapshot"};
 
 struct TickReport {
   std::shared_ptr<const Snapshot> snapshot;
   std::vector<ContactEvent> contacts;  ///< sorted by (a, b, kind)
   std::vector<Notice> notices;         ///< in order of avatar name, then as they happened
   std::array<double, kStages> stageSeconds{};
-  std::uint32_t pairs = 0;           ///< that the broad phase holds
-  std::uint32_t narrowQueries = 0;   ///< made by sweeps and contacts
-  std::uint32_t rationalQueries = 0; ///< of those, decided by exact arithmetic
+  std::uint32_t pairs = 0;            ///< that the broad phase holds
+  std::uint32_t narrowQueries = 0;    ///< made by sweeps and contacts
+  std::uint32_t rationalQueries = 0;  ///< of those, decided by exact arithmetic
   std::uint32_t liveContacts = 0;
-  double worstPenetration = 0;       ///< metres, by the exact verdict; 0 when nothing penetrates
-  bool idle = true;                  ///< every queue is empty and nobody is falling or driven
+  double worstPenetration = 0;  ///< metres, by the exact verdict; 0 when nothing penetrates
+  bool idle = true;             ///< every queue is empty and nobody is falling or driven
 };
 
 // ---- the world ---------------------------------------------------------------------------------

@@ -24,23 +24,23 @@ struct Contact {
 
 /// How a walk goes: measured as the shortest distance to its way point so far.
 struct WalkProgress {
-  std::size_t leg = 0;       ///< index of the way point that is walked to
-  double nearest = -1;       ///< metres, over the ground; -1: not measured yet
-  double patienceLeft = 0;   ///< seconds
+  std::size_t leg = 0;      ///< index of the way point that is walked to
+  double nearest = -1;      ///< metres, over the ground; -1: not measured yet
+  double patienceLeft = 0;  ///< seconds
 };
 
 struct Avatar {
   EntityId id = 0;
   std::shared_ptr<const collision::Hull> hull;
-  Box hullBox;                   ///< of the hull with the feet at the origin
-  Vec3 feet = Vec3::Zero();      ///< world, metres
-  Vec3 gaze = Vec3::UnitX();     ///< unit
+  Box hullBox;                ///< of the hull with the feet at the origin
+  Vec3 feet = Vec3::Zero();   ///< world, metres
+  Vec3 gaze = Vec3::UnitX();  ///< unit
   double eyeHeight = 0;
-  double fallSpeed = 0;          ///< metres per second, downwards > 0
+  double fallSpeed = 0;  ///< metres per second, downwards > 0
   bool grounded = false;
-  Vec3 drive = Vec3::Zero();     ///< horizontal velocity asked for by Drive
+  Vec3 drive = Vec3::Zero();  ///< horizontal velocity asked for by Drive
   WalkProgress walk;
-  double waitLeft = -1;          ///< seconds; negative: not waiting
+  double waitLeft = -1;  ///< seconds; negative: not waiting
 
   // What the last motion left.
   Vec3 lastMove = Vec3::Zero();
@@ -49,7 +49,7 @@ struct Avatar {
 
   // Caches from tick to tick; they change the work, never the result.
   collision::MoverId mover = 0;
-  Box reach;                     ///< what it can meet in this tick
+  Box reach;  ///< what it can meet in this tick
   collision::ExtremalVertices extremes;
   std::vector<Obstacle> obstacles;
   std::vector<Contact> contacts;  ///< ascending `other`; also part of the state

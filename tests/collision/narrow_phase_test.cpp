@@ -105,8 +105,7 @@ TEST(NarrowPhase, DeepOverlapIsPenetratingWithADepthBound) {
 
 TEST(NarrowPhase, OverlappingPolygonsInOnePlaneOnlyTouch) {
   const std::vector<Vec3> square{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
-  EXPECT_EQ(decideCold({square, Vec3::Zero()}, {square, {0.5, 0.5, 0}}).verdict,
-            Verdict::touching);
+  EXPECT_EQ(decideCold({square, Vec3::Zero()}, {square, {0.5, 0.5, 0}}).verdict, Verdict::touching);
 }
 
 TEST(NarrowPhase, ASegmentThroughATriangleTouchesItsEdgeAndPenetratesItsInside) {

@@ -1,0 +1,52 @@
+// Scenes of boxes with known answers, built by hand.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "scene/scene.hpp"
+
+namespace enfilade::scene::testing {
+
+struct NamedBox {
+  std::string path;
+  Vec3 min, max;
+};
+
+/// Twelve triangles, outward.
+inline Mesh boxMesh(const Vec3& min, const Vec3& max) {
+  Mesh mesh;
+  for (int i = 0; i < 8; ++i)
+    mesh.positions.push_back(
+        Vec3(i & 1 ? max.x() : min.x(), i & 2 ? max.y() : min.y(), i & 4 ? max.z() : min.z())
+            .cast<float>());
+  mesh.indices = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
+                  2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
+  return mesh;
+}
+
+inline Model boxModel(const std::vector<NamedBox>& boxes) {
+  Model model;
+  model.source = "boxes";
+  model.materials.emplace_back();
+  for (const NamedBox& box : boxes) {
+    model.meshes.push_back(boxMesh(box.min, box.max));
+    model.objects.push_back({box.path,
+                             "",
+                             {static_cast<std::uint32_t>(model.meshes.size() - 1)},
+                             Eigen::Affine3d::Identity()});
+  }
+  return model;
+}
+
+inline std::shared_ptr<const Scene> boxScene(const std::vector<NamedBox>& boxes) {
+  return std::make_shared<const Scene>(boxModel(boxes));
+}
+
+/// A floor of 20 x 20 m whose top is y = 0.
+inline NamedBox floorBox() {
+  return {"floor", {-10, -0.2, -10}, {10, 0, 10}};
+}
+
+}  // namespace enfilade::scene::testing

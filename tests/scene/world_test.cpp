@@ -1,0 +1,374 @@
+#include "scene/world.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <random>
+#include <set>
+
+#include "tests/scene/box_scene.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using namespace testing;
+using Kind = Notice::Kind;
+
+const double kNaN = std::nan("");
+
+/// A world and everything that its ticks told.
+struct Trial {
+  explicit Trial(const std::vector<NamedBox>& boxes, const Lengths& lengths = {})
+      : world(boxScene(boxes), lengths) {}
+
+  void order(const std::string& name, Order o) {
+    const auto why = submit(world, {name, std::move(o), 0});
+    ASSERT_FALSE(why) << *why;
+  }
+  void ticks(int count) {
+    for (int i = 0; i < count; ++i) step();
+  }
+  /// Steps until every queue is empty; fails after a simulated minute.
+  void untilIdle() {
+    for (int i = 0; i < 3600; ++i)
+      if (step().idle) return;
+    FAIL() << "not idle after a minute";
+  }
+  TickReport step() {
+    TickReport report = tick(world);
+    worstPenetration = std::max(worstPenetration, report.worstPenetration);
+    notices.insert(notices.end(), report.notices.begin(), report.notices.end());
+    for (const ContactEvent& e : report.contacts) take(e);
+    return report;
+  }
+  void take(const ContactEvent& e) {
+    events.push_back(e);
+    const std::pair pair(e.a, e.b);
+    if (e.kind == ContactEvent::Kind::begin) {
+      EXPECT_TRUE(open.insert(pair).second) << "begun twice";
+      EXPECT_LT(e.decision.distance, 2 * world.lengths().epsilon);
+    }
+    if (e.kind == ContactEvent::Kind::end) {
+      EXPECT_EQ(open.erase(pair), 1u) << "ended, not begun";
+    }
+  }
+  Vec3 feet(const std::string& name) const {
+    for (const AvatarView& a : world.snapshot()->avatars)
+      if (a.name == name) return a.feet;
+    ADD_FAILURE() << name << " is not in the world";
+    return Vec3::Zero();
+  }
+  int count(Kind kind) const {
+    return static_cast<int>(std::count_if(notices.begin(), notices.end(),
+                                          [&](const Notice& n) { return n.kind == kind; }));
+  }
+  bool touched(const std::string& name) const {
+    return std::any_of(events.begin(), events.end(), [&](const ContactEvent& e) {
+      return e.kind == ContactEvent::Kind::begin && nameOf(world, e.b) == name;
+    });
+  }
+
+  World world;
+  std::vector<Notice> notices;
+  std::vector<ContactEvent> events;
+  std::set<std::pair<EntityId, EntityId>> open;
+  double worstPenetration = 0;
+};
+
+Walk to(double x, double z, double speed = 1.5, double y = 0) {
+  return {{{x, y, z}}, speed};
+}
+
+TEST(World, ASpawnAtTheFloorsOwnHeightComesToRestOnIt) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.untilIdle();
+  EXPECT_GE(run.feet("ann").y(), run.world.lengths().epsilon);
+  EXPECT_LT(run.feet("ann").y(), 2 * run.world.lengths().epsilon);
+  EXPECT_TRUE(run.world.snapshot()->avatars[0].grounded);
+  EXPECT_TRUE(run.touched("floor"));
+}
+
+TEST(World, ASpawnALittleAboveAFloorDropsOntoIt) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{0, 1, 0}});
+  run.step();
+  EXPECT_GT(run.feet("ann").y(), 0.9);
+  run.untilIdle();
+  EXPECT_LT(run.feet("ann").y(), 0.001);
+  EXPECT_EQ(run.count(Kind::spawned), 1);
+}
+
+TEST(World, ASpawnInsideSomethingOrOffEveryFloorSaysSo) {
+  Trial run({floorBox(), {"pillar", {-1, 0, -1}, {1, 3, 1}}});
+  run.order("inside", Spawn{{0, 0.5, 0}});  // wholly inside the closed pillar
+  run.order("across", Spawn{{1, 0, 0}});    // cuts its surface
+  run.order("nowhere", Spawn{{50, 0, 0}});
+  run.order("nowhere", to(0, 0));
+  run.step();
+  ASSERT_EQ(run.count(Kind::refused), 3);
+  std::map<std::string, std::string> text;
+  for (const Notice& n : run.notices) text[n.avatar] = n.text;
+  EXPECT_NE(text["inside"].find("inside pillar"), std::string::npos) << text["inside"];
+  EXPECT_NE(text["across"].find("pillar"), std::string::npos) << text["across"];
+  EXPECT_NE(text["nowhere"].find("no floor"), std::string::npos) << text["nowhere"];
+  EXPECT_NE(text["nowhere"].find("1 queued"), std::string::npos) << text["nowhere"];
+  EXPECT_TRUE(run.world.snapshot()->avatars.empty());
+}
+
+TEST(World, AWalkArrivesExactlyWhereItWasSent) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{-5, 0, 0}});
+  run.order("ann", Walk{{{-2, 0, 1}, {3, 0, -2}}, 1.5});
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::arrived), 1);
+  EXPECT_NEAR(run.feet("ann").x(), 3, 1e-9);
+  EXPECT_NEAR(run.feet("ann").z(), -2, 1e-9);
+}
+
+TEST(World, AWallStopsAWalkAndIsTold) {
+  Trial run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.order("ann", to(5, 0));
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::blocked), 1);
+  EXPECT_EQ(nameOf(run.world, run.notices.back().obstacle), "wall");
+  EXPECT_TRUE(run.touched("wall"));
+  // The wall, less the radius, less a distance between epsilon and two.
+  EXPECT_LT(run.feet("ann").x(), 1.7 - run.world.lengths().epsilon * 0.8);
+  EXPECT_GT(run.feet("ann").x(), 1.7 - run.world.lengths().epsilon * 2);
+  EXPECT_EQ(run.worstPenetration, 0);
+  const bool blocked = std::any_of(run.events.begin(), run.events.end(), [](const auto& e) {
+    return e.kind == ContactEvent::Kind::blocked;
+  });
+  EXPECT_TRUE(blocked);
+}
+
+TEST(World, ASlantedPathSlidesAlongAWall) {
+  Trial run({floorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.order("ann", to(3, 6));
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::blocked), 1);
+  EXPECT_NEAR(run.feet("ann").z(), 6, 0.05);
+  EXPECT_EQ(run.worstPenetration, 0);
+}
+
+TEST(World, StepsUpToTheStepHeightAreClimbedAndHigherOnesBlock) {
+  Trial run({floorBox(), {"low", {2, 0, -3}, {4, 0.29, 3}}, {"high", {4, 0, -3}, {6, 0.65, 3}}});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.order("ann", Walk{{{3, 0.29, 0}, {5, 0.65, 0}}, 1.5});
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::blocked), 1);
+  EXPECT_NEAR(run.feet("ann").y(), 0.29, 0.001);
+  EXPECT_GT(run.feet("ann").x(), 3.5);
+  EXPECT_EQ(run.worstPenetration, 0);
+}
+
+std::vector<NamedBox> stair(double riser, double tread, int steps) {
+  std::vector<NamedBox> boxes{floorBox()};
+  for (int i = 0; i < steps; ++i)
+    boxes.push_back({"step" + std::to_string(i + 1),
+                     {tread * i, -0.1, -1},
+                     {tread * (i + 1) + (i + 1 == steps ? 2 : 0), riser * (i + 1), 1}});
+  return boxes;
+}
+
+TEST(World, AStairIsWalkedUpAndDown) {
+  for (const auto& [riser, tread] : {std::pair{0.17, 0.29}, {0.2, 0.2}, {0.1, 0.4}, {0.28, 0.25}}) {
+    Trial run(stair(riser, tread, 12));
+    const double top = 12 * riser, end = 12 * tread + 1;
+    run.order("ann", Spawn{{-2, 0, 0}});
+    run.order("ann", to(end, 0, 1.4, top));
+    run.untilIdle();
+    EXPECT_EQ(run.count(Kind::arrived), 1) << riser;
+    EXPECT_NEAR(run.feet("ann").y(), top, 0.001) << riser;
+    run.order("ann", to(-2, 0));
+    run.untilIdle();
+    EXPECT_EQ(run.count(Kind::arrived), 2) << riser;
+    EXPECT_NEAR(run.feet("ann").y(), 0, 0.001) << riser;
+    EXPECT_EQ(run.worstPenetration, 0) << riser;
+  }
+}
+
+TEST(World, ALedgeIsFallenFromAndLandedBelow) {
+  Trial run({floorBox(), {"platform", {-3, 0, -3}, {0, 2, 3}}});
+  run.order("ann", Spawn{{-1, 2, 0}});
+  run.order("ann", to(3, 0));
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::arrived), 1);
+  EXPECT_LT(run.feet("ann").y(), 0.001);
+  EXPECT_EQ(run.worstPenetration, 0);
+}
+
+TEST(World, FallingOutOfTheSceneIsLeavingIt) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{9, 0, 0}});
+  run.order("ann", to(30, 0));
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::left), 1);
+  EXPECT_TRUE(run.open.empty());
+}
+
+TEST(World, AvatarsBlockOneAnotherAndTouch) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{-3, 0, 0}});
+  run.order("bob", Spawn{{3, 0, 0}});
+  run.order("ann", to(3, 0));
+  run.order("bob", to(-3, 0));
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::blocked), 2);
+  EXPECT_GE(run.feet("bob").x() - run.feet("ann").x(), 0.6);
+  EXPECT_LT(run.feet("bob").x() - run.feet("ann").x(), 0.602);
+  EXPECT_TRUE(run.touched("bob"));
+  EXPECT_EQ(run.worstPenetration, 0);
+}
+
+TEST(World, APaneOfNoThicknessIsNotCrossedAtAnySpeed) {
+  Model model = boxModel({floorBox()});
+  Mesh pane;
+  pane.positions = {{2, 0, -9}, {2, 0, 9}, {2, 3, 9}, {2, 3, -9}};
+  pane.indices = {0, 1, 2, 0, 2, 3};
+  model.meshes.push_back(pane);
+  model.objects.push_back({"pane", "", {1}, Eigen::Affine3d::Identity()});
+  const auto scene = std::make_shared<const Scene>(model);
+  for (const double speed : {0.5, 10.0, 1000.0}) {
+    World world(scene);
+    ASSERT_FALSE(submit(world, {"ann", Spawn{{0, 0, 0}}, 0}));
+    ASSERT_FALSE(submit(world, {"ann", Walk{{{8, 0, 0}}, speed}, 0}));
+    for (int i = 0; i < 600; ++i) ASSERT_EQ(tick(world).worstPenetration, 0);
+    EXPECT_LT(world.snapshot()->avatars[0].feet.x(), 1.7) << speed;
+    EXPECT_GT(world.snapshot()->avatars[0].feet.x(), 1.69) << speed;
+  }
+}
+
+TEST(World, ARoomOfNoiseIsNeverPenetratedAndEventsBalance) {
+  std::mt19937_64 random(5);
+  const auto uniform = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+  };
+  std::vector<NamedBox> boxes{floorBox()};
+  for (int i = 0; i < 120; ++i) {
+    const double x = uniform(-9, 9), z = uniform(-9, 9), y = uniform(0, 0.6);
+    const double w = uniform(0.01, 0.8), h = uniform(0.01, 1.5), d = uniform(0.01, 0.8);
+    boxes.push_back({"box" + std::to_string(i), {x, y, z}, {x + w, y + h, z + d}});
+  }
+  Trial run(boxes);
+  for (int i = 0; i < 6; ++i) {
+    const std::string name = "a" + std::to_string(i);
+    run.order(name, Spawn{{uniform(-8, 8), 3, uniform(-8, 8)}});
+    for (int k = 0; k < 6; ++k) run.order(name, to(uniform(-9, 9), uniform(-9, 9), 2.5));
+  }
+  run.ticks(1500);
+  EXPECT_EQ(run.worstPenetration, 0);
+  EXPECT_GT(run.events.size(), 100u);
+  for (const ContactEvent& e : endContacts(run.world, ContactEvent::Reason::shutdown)) run.take(e);
+  EXPECT_TRUE(run.open.empty());
+}
+
+TEST(World, WaitsLooksAndCapturesRunInTheirOrder) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.order("ann", Look{{0, 1.6, -5}});
+  run.order("ann", Capture{"north"});
+  run.order("ann", Wait{0.5});
+  run.order("ann", Leave{});
+  std::uint64_t captured = 0, left = 0;
+  for (int i = 0; i < 60; ++i) {
+    const TickReport report = run.step();
+    for (const Notice& n : report.notices) {
+      if (n.kind == Kind::capture) {
+        captured = report.snapshot->tick;
+        EXPECT_EQ(n.text, "north");
+        EXPECT_NEAR(report.snapshot->avatars[0].gaze.z(), -1, 1e-3);
+      }
+      if (n.kind == Kind::left) left = report.snapshot->tick;
+    }
+  }
+  EXPECT_EQ(captured, 2u);
+  EXPECT_EQ(left, captured + 1 + 30);
+  EXPECT_TRUE(run.open.empty());
+  EXPECT_EQ(run.events.back().reason, ContactEvent::Reason::left);
+}
+
+TEST(World, DriveActsAtOnceAndZeroStops) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.untilIdle();
+  run.order("ann", Drive{{1.2, 0, 0}});
+  run.ticks(60);
+  EXPECT_NEAR(run.feet("ann").x(), 1.2, 1e-9);
+  run.order("ann", Drive{});
+  run.ticks(10);
+  EXPECT_NEAR(run.feet("ann").x(), 1.2, 1e-9);
+}
+
+TEST(World, AbsurdCommandsAreRefusedByNameAndChangeNothing) {
+  Trial run({floorBox()});
+  const auto why = [&](Order o, const std::string& name = "ann") {
+    const auto text = submit(run.world, {name, std::move(o), 0});
+    return text.value_or("taken");
+  };
+  EXPECT_NE(why(Spawn{{0, kNaN, 0}}).find("at.y is NaN"), std::string::npos);
+  EXPECT_NE(why(Spawn{{0, 1e9, 0}}).find("at.y"), std::string::npos);
+  EXPECT_NE(why(Spawn{{0, 0, 0}, kNaN}).find("facing"), std::string::npos);
+  EXPECT_NE(why(Walk{{}, 1}).find("along"), std::string::npos);
+  EXPECT_NE(why(Walk{{{0, 0, 0}, {0, 0, INFINITY}}, 1}).find("along[1].z"), std::string::npos);
+  EXPECT_NE(why(to(1, 1, 0)).find("speed"), std::string::npos);
+  EXPECT_NE(why(to(1, 1, 1e6)).find("speed"), std::string::npos);
+  EXPECT_NE(why(Wait{-1}).find("seconds"), std::string::npos);
+  EXPECT_NE(why(Capture{"../../etc"}).find("as"), std::string::npos);
+  EXPECT_NE(why(Drive{{kNaN, 0, 0}}).find("velocity.x"), std::string::npos);
+  EXPECT_NE(why(Leave{}, "a b").find("avatar"), std::string::npos);
+  EXPECT_TRUE(run.step().idle);
+  EXPECT_TRUE(run.notices.empty());
+}
+
+TEST(World, OrdersForNobodyAreRefusedWhenReached) {
+  Trial run({floorBox()});
+  run.order("ghost", to(1, 1));
+  run.order("ghost", Drive{{1, 0, 0}});
+  run.step();
+  EXPECT_GE(run.count(Kind::refused), 1);
+}
+
+TEST(World, TheSameCommandsGiveTheSameHashAndOthersDoNot) {
+  const auto hashOf = [](double speed) {
+    Trial run(stair(0.17, 0.29, 8));
+    run.order("ann", Spawn{{-2, 0, 0}, 33});
+    run.order("bob", Spawn{{-2, 0, 1.5}, 33});
+    run.order("ann", to(4, 0.2, speed, 1.36));
+    run.order("bob", to(4, 0, speed, 1.36));
+    run.ticks(400);
+    return run.world.snapshot()->stateHash;
+  };
+  EXPECT_EQ(hashOf(1.5), hashOf(1.5));
+  EXPECT_NE(hashOf(1.5), hashOf(1.5000000001));
+}
+
+TEST(World, ARestingAvatarCostsNoQueries) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.untilIdle();
+  run.ticks(3);
+  EXPECT_EQ(run.step().narrowQueries, 0u);
+  EXPECT_EQ(run.step().liveContacts, 1u);
+}
+
+TEST(World, NearMissesAreToldOnceAnApproach) {
+  Lengths lengths;
+  lengths.nearMiss = 0.05;
+  Trial run({floorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, lengths);
+  run.order("ann", Spawn{{-2, 0, 0}});
+  run.order("ann", to(2, 0));
+  run.untilIdle();
+  const auto nears = std::count_if(run.events.begin(), run.events.end(), [&](const auto& e) {
+    return e.kind == ContactEvent::Kind::near && nameOf(run.world, e.b) == "post";
+  });
+  EXPECT_EQ(nears, 1);
+  EXPECT_FALSE(run.touched("post"));
+}
+
+}  // namespace
+}  // namespace enfilade::scene
