@@ -45,11 +45,15 @@ FrameTarget::FrameTarget(int width, int height)
       colour_(plane(GL_SRGB8_ALPHA8, width, height)),
       ids_(plane(GL_R32UI, width, height)),
       depth_(plane(GL_DEPTH_COMPONENT32F, width, height)),
-      framebuffer_(GlFramebuffer::create()) {
+      framebuffer_(GlFramebuffer::create()),
+      overlay_(GlFramebuffer::create()) {
   const GLuint fbo = framebuffer_.name();
   glNamedFramebufferTexture(fbo, GL_COLOR_ATTACHMENT0, colour_.name(), 0);
   glNamedFramebufferTexture(fbo, GL_COLOR_ATTACHMENT1, ids_.name(), 0);
   glNamedFramebufferTexture(fbo, GL_DEPTH_ATTACHMENT, depth_.name(), 0);
+  glNamedFramebufferTexture(overlay_.name(), GL_COLOR_ATTACHMENT0, colour_.name(), 0);
+  glTextureParameteri(depth_.name(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glTextureParameteri(depth_.name(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
   checkGl("making the frame's buffers");
   const GLenum status = glCheckNamedFramebufferStatus(fbo, GL_FRAMEBUFFER);
   if (status != GL_FRAMEBUFFER_COMPLETE) {
@@ -77,6 +81,16 @@ void FrameTarget::writeIds(bool on) const {
   constexpr GLenum kColour = GL_COLOR_ATTACHMENT0;
   const std::array<GLenum, 2> targets{kColour, on ? GLenum{GL_COLOR_ATTACHMENT1} : GLenum{GL_NONE}};
   glNamedFramebufferDrawBuffers(framebuffer_.name(), 2, targets.data());
+}
+
+void FrameTarget::beginOverlay() const {
+  glBindFramebuffer(GL_FRAMEBUFFER, overlay_.name());
+  glBindTextureUnit(0, depth_.name());
+}
+
+void FrameTarget::endOverlay() const {
+  glBindTextureUnit(0, 0);
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
 }
 
 void FrameTarget::read(Frame& frame) const {

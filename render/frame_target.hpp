@@ -17,6 +17,9 @@ class FrameTarget {
   void begin() const;
   /// Draw into colour and ids, or into colour only.
   void writeIds(bool on) const;
+  /// Draw over the colour only, with no depth test, with depth as the texture of unit 0.
+  void beginOverlay() const;
+  void endOverlay() const;
   /// Colour, ids and depth into `frame`, whose camera is the one that was drawn with.
   void read(Frame& frame) const;
 
@@ -24,6 +27,7 @@ class FrameTarget {
   int width_ = 0, height_ = 0;
   GlTexture colour_, ids_, depth_;
   GlFramebuffer framebuffer_;
+  GlFramebuffer overlay_;  ///< colour alone, so that depth can be read while it is drawn to
 };
 
 }  // namespace enfilade::render

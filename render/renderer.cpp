@@ -55,6 +55,7 @@ FrameUniforms uniformsOf(const Camera& camera) {
   put(uniforms.forward, view.forward, plan ? 1 : 0);
   put(uniforms.rightByX, view.right / view.scaleX, 0);
   put(uniforms.upByY, view.up / view.scaleY, 0);
+  put(uniforms.range, Vec3(camera.near, camera.far, view.scaleY * camera.height / 2), 0);
   return uniforms;
 }
 
@@ -113,6 +114,7 @@ struct Renderer::State {
   GlVertexArray vertexArray;
   GlBuffer uniforms;
   GlProgram sky;
+  GlProgram hollows;
   std::array<std::optional<GlProgram>, 6> surfaces;  // see surfaceProgram()
   FrameTarget target;
 
@@ -124,6 +126,7 @@ struct Renderer::State {
                    bool glass);
   void drawAvatars(const AvatarMeshes& avatars, const Camera& camera);
   void drawSky();
+  void darkenHollows();
 };
 
 Renderer::State::State(std::shared_ptr<const scene::Scene> shared) : scene(std::move(shared)) {
@@ -134,6 +137,7 @@ Renderer::State::State(std::shared_ptr<const scene::Scene> shared) : scene(std::
   uniforms = GlBuffer::create();
   glNamedBufferStorage(uniforms.name(), sizeof(FrameUniforms), nullptr, GL_DYNAMIC_STORAGE_BIT);
   sky = buildProgram("sky", skyVertexSource(), skyFragmentSource());
+  hollows = buildProgram("hollows", skyVertexSource(), hollowFragmentSource());
   checkGl("setting up the renderer");
 }
 
@@ -171,7 +175,6 @@ void Renderer::State::setUp(const Camera& camera) {
   glEnable(GL_FRAMEBUFFER_SRGB);
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);  // real models are wound both ways
-  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
   target.begin();
 }
 
@@ -213,6 +216,17 @@ void Renderer::State::drawSky() {
   glDepthFunc(GL_GREATER);
 }
 
+void Renderer::State::darkenHollows() {
+  target.beginOverlay();
+  glDisable(GL_DEPTH_TEST);
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ZERO, GL_SRC_COLOR);
+  glUseProgram(hollows.name());
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glEnable(GL_DEPTH_TEST);
+  target.endOverlay();
+}
+
 Renderer::Renderer(std::shared_ptr<const scene::Scene> scene)
     : state_(std::make_unique<State>(std::move(scene))) {}
 
@@ -231,7 +245,8 @@ Frame Renderer::render(const scene::Snapshot& snapshot, const Camera& camera,
   s.drawAvatars(avatarMeshes(snapshot, hidden), camera);
   s.target.writeIds(false);
   s.drawSky();
-  glEnable(GL_BLEND);
+  s.darkenHollows();
+  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
   s.drawBatches(list, s.buffers.vertices, s.buffers.indices, true);
   Frame frame;
   frame.camera = camera;

@@ -11,6 +11,7 @@ layout(std140, binding = 0) uniform Frame {
   vec4 forward;
   vec4 rightByX;
   vec4 upByY;
+  vec4 range;
 };
 )";
 
@@ -59,15 +60,15 @@ const vec3 kSunDirection = vec3(0.3841, 0.7682, 0.5122);
 
 vec3 ambientFor(vec3 n) {
   vec3 weight = n * n;
-  vec3 alongX = n.x > 0.0 ? vec3(0.50, 0.48, 0.45) : vec3(0.33, 0.35, 0.39);
-  vec3 alongY = n.y > 0.0 ? vec3(0.48, 0.48, 0.48) : vec3(0.44, 0.42, 0.40);
-  vec3 alongZ = n.z > 0.0 ? vec3(0.43, 0.42, 0.41) : vec3(0.26, 0.28, 0.32);
+  vec3 alongX = n.x > 0.0 ? vec3(0.43, 0.41, 0.38) : vec3(0.27, 0.29, 0.33);
+  vec3 alongY = n.y > 0.0 ? vec3(0.38, 0.38, 0.38) : vec3(0.40, 0.38, 0.36);
+  vec3 alongZ = n.z > 0.0 ? vec3(0.35, 0.34, 0.33) : vec3(0.20, 0.22, 0.26);
   return weight.x * alongX + weight.y * alongY + weight.z * alongZ;
 }
 
 vec3 lit(vec3 albedo, vec3 n, vec3 toEye, float distance, float metallic, float roughness) {
   float facing = max(dot(n, toEye), 0.0);
-  float lamp = facing * (0.15 + 0.60 / (1.0 + distance * distance / 20.0));
+  float lamp = facing * (0.12 + 0.48 / (1.0 + distance * distance / 20.0));
   float sun = 0.32 * max(dot(n, kSunDirection), 0.0);
   vec3 light = ambientFor(n) + vec3(1.0, 0.97, 0.92) * lamp + vec3(1.0, 0.95, 0.86) * sun;
   float gloss = (1.0 - roughness) * (1.0 - roughness);
@@ -83,7 +84,7 @@ vec3 skyFor(vec3 direction) {
   return mix(below, above, smoothstep(-0.02, 0.02, h));
 }
 
-vec3 exposed(vec3 radiance) { return 1.0 - exp(-1.5 * radiance); }
+vec3 exposed(vec3 radiance) { return 1.0 - exp(-1.2 * radiance); }
 )";
 
 constexpr const char* kSurfaceFragment = R"(
@@ -160,6 +161,51 @@ void main() {
 }
 )";
 
+// Darkens hollows, from depth alone (after Luft, Colditz and Deussen 2006, but exact on planes:
+// reversed depth is affine over the picture wherever a surface is flat, so the mean of two opposite
+// neighbours differs from the middle only where surfaces meet). Multiplied into the colour.
+constexpr const char* kHollowFragment = R"(
+layout(binding = 0) uniform sampler2D depthPlane;
+layout(location = 0) out vec4 factor;
+
+const float kRadius = 0.30;     // metres around a point that can darken it
+const float kFewest = 2.0;      // pixels
+const float kMost = 48.0;       // pixels
+const float kStrength = 0.7;
+const int kPairs = 4;
+const vec2 kDirections[kPairs] =
+    vec2[](vec2(1.0, 0.2), vec2(-0.2, 1.0), vec2(0.3, 0.3), vec2(-0.3, 0.3));
+
+float metres(float d) {
+  float near = range.x, far = range.y;
+  return forward.w > 0.5 ? far - d * (far - near) : near * far / (near + d * (far - near));
+}
+
+void main() {
+  ivec2 here = ivec2(gl_FragCoord.xy);
+  ivec2 size = textureSize(depthPlane, 0);
+  float d = texelFetch(depthPlane, here, 0).r;
+  if (d <= 0.0) discard;
+  float z = metres(d);
+  float pixelsPerMetre = forward.w > 0.5 ? range.z : range.z / z;
+  float radius = clamp(kRadius * pixelsPerMetre, kFewest, kMost);
+  vec2 room = vec2(min(here, size - 1 - here));  // both neighbours must lie in the picture
+  float hollow = 0.0;
+  for (int i = 0; i < kPairs; ++i) {
+    vec2 wanted = kDirections[i] * radius;
+    vec2 fit = room / max(abs(wanted), vec2(1e-3));
+    ivec2 step_ = ivec2(round(wanted * min(1.0, min(fit.x, fit.y))));
+    if (step_ == ivec2(0)) continue;
+    ivec2 a = here + step_, b = here - step_;
+    float mean = 0.5 * (texelFetch(depthPlane, a, 0).r + texelFetch(depthPlane, b, 0).r);
+    float slope = (z - metres(mean)) * pixelsPerMetre / length(vec2(step_));
+    // What is far in front of a surface does not darken it.
+    hollow += clamp(slope, 0.0, 1.0) * (1.0 - smoothstep(1.0, 2.5, slope));
+  }
+  factor = vec4(vec3(1.0 - kStrength * hollow / float(kPairs)), 1.0);
+}
+)";
+
 }  // namespace
 
 std::string surfaceVertexSource() {
@@ -176,6 +222,10 @@ std::string surfaceFragmentSource(const SurfaceVariant& variant) {
 
 std::string skyVertexSource() {
   return std::string(kVersion) + kFrameBlock + kSkyVertex;
+}
+
+std::string hollowFragmentSource() {
+  return std::string(kVersion) + kFrameBlock + kHollowFragment;
 }
 
 std::string skyFragmentSource() {
