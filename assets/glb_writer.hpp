@@ -1,0 +1,23 @@
+// Writes a model as binary glTF 2.0: nodes nested by the segments of the objects' paths, meshes
+// stored once and shared by nodes. The same model gives the same bytes.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "assets/building.hpp"
+
+namespace enfilade::assets {
+
+/// Moving parts become the extras `walk_hinge` {axis, low, high: radians} and `walk_slide` {axis,
+/// low, high: metres} of their nodes, in the node's own frame and from where it stands. Textures
+/// and texture coordinates are not written. Throws std::length_error beyond GLB's 4 GiB, and
+/// std::invalid_argument naming an object that cannot be written.
+std::string glbBytes(const scene::Model& model, const std::vector<MovingPart>& movingParts = {});
+
+/// Throws std::runtime_error naming the file.
+void writeGlb(const std::filesystem::path& file, const scene::Model& model,
+              const std::vector<MovingPart>& movingParts = {});
+
+}  // namespace enfilade::assets

@@ -1,0 +1,88 @@
+// Solids made of triangles: boxes, prisms, turned bodies. Every add...() of a solid adds a closed
+// surface, wound counter-clockwise as seen from outside. Lengths in metres, Y up.
+//
+// Only + - * / and sqrt make coordinates, so that the same bytes come out everywhere.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "assets/palette.hpp"
+
+namespace enfilade::assets {
+
+using collision::Vec3;
+using Vec2 = Eigen::Vector2d;
+
+/// Triangles by paint, with one normal a vertex.
+struct Shape {
+  struct Part {
+    Paint paint;
+    std::vector<Vec3> positions;
+    std::vector<Vec3> normals;
+    std::vector<std::uint32_t> indices;
+  };
+  std::vector<Part> parts;  ///< one a paint, in order of first use
+};
+
+/// The paints of a box's six faces.
+struct BoxPaints {
+  Paint minusX, plusX, minusY, plusY, minusZ, plusZ;
+};
+inline BoxPaints allFaces(Paint paint) {
+  return {paint, paint, paint, paint, paint, paint};
+}
+
+/// Where a profile is swept: u x v = w, all of unit length.
+struct SweepFrame {
+  Vec3 origin, u, v, w;
+};
+
+/// A point of a turned body's outline.
+struct Ring {
+  double radius, y;
+};
+
+Eigen::Affine3d moved(const Vec3& by);
+/// Turned about +Y by quarter turns: 1 takes +X to -Z. Then moved.
+Eigen::Affine3d turned(int quarters, const Vec3& by = Vec3::Zero());
+/// Turned about +Y by the angle whose half has this tangent, then moved.
+Eigen::Affine3d turnedByHalfTangent(double tangent, const Vec3& by = Vec3::Zero());
+
+/// Corners of the regular polygon in the unit circle, counter-clockwise from (1, 0). `sides` is 4
+/// or 6 times a power of two.
+std::vector<Vec2> unitCircle(int sides);
+
+void addTriangle(Shape& shape, const Vec3& a, const Vec3& b, const Vec3& c, Paint paint);
+void addQuad(Shape& shape, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, Paint paint);
+
+void addBox(Shape& shape, const Vec3& low, const Vec3& high, const BoxPaints& paints);
+void addBox(Shape& shape, const Vec3& low, const Vec3& high, Paint paint);
+/// A box whose top is cut into cells at the given inner coordinates; `tone` paints a cell.
+void addTiledSlab(Shape& shape, const Vec3& low, const Vec3& high, int cellsX, int cellsZ,
+                  Paint side, const std::vector<Paint>& cellTones);
+/// A simple polygon in (u, v), counter-clockwise, swept along w.
+void addPrism(Shape& shape, const std::vector<Vec2>& profile, const SweepFrame& frame,
+              double length, Paint paint);
+/// The face of a simple polygon alone, seen from +w.
+void addPolygon(Shape& shape, const std::vector<Vec2>& profile, const SweepFrame& frame,
+                Paint paint);
+/// An outline from bottom to top, turned about the vertical through `base`. Closed at both ends.
+void addTurned(Shape& shape, const Vec3& base, const std::vector<Ring>& outline, int sides,
+               Paint paint);
+void addCylinder(Shape& shape, const Vec3& base, double radius, double height, int sides,
+                 Paint paint);
+/// A round bar from a to b.
+void addRod(Shape& shape, const Vec3& a, const Vec3& b, double radius, int sides, Paint paint);
+void addBall(Shape& shape, const Vec3& centre, const Vec3& radii, int sides, Paint paint);
+/// A ring about the vertical.
+void addTorus(Shape& shape, const Vec3& centre, double ringRadius, double tubeRadius, int sides,
+              int tubeSides, Paint paint);
+/// A straight bar of constant section whose ends are upright: a, b are the middles of its ends,
+/// which differ along one horizontal axis and in height (handrails, stringers).
+void addSlopedBar(Shape& shape, const Vec3& a, const Vec3& b, double width, double height,
+                  Paint paint);
+
+void append(Shape& shape, const Shape& other, const Eigen::Affine3d& shapeFromOther);
+
+}  // namespace enfilade::assets

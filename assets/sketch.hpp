@@ -1,0 +1,41 @@
+// A model in the making: shapes are placed under a path; equal meshes are stored once.
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+
+#include "assets/building.hpp"
+#include "assets/shape.hpp"
+
+namespace enfilade::assets {
+
+class Sketch {
+ public:
+  Sketch();
+
+  /// Throws std::logic_error when the path is taken: it is a mistake of ours.
+  void place(const std::string& path, const Shape& shape, const Eigen::Affine3d& worldFromShape);
+  /// The mesh is centred, so that equal boxes share it.
+  void box(const std::string& path, const Vec3& low, const Vec3& high, const BoxPaints& paints);
+  void box(const std::string& path, const Vec3& low, const Vec3& high, Paint paint);
+  /// The object placed last moves like this.
+  void moves(MovingPart::Kind kind, const Vec3& axis, double low, double high);
+
+  std::size_t size() const { return model_.objects.size(); }
+  scene::Model& model() { return model_; }
+  std::vector<MovingPart>& movingParts() { return movingParts_; }
+
+ private:
+  std::uint32_t meshIndex(const Shape::Part& part, const std::string& name);
+
+  scene::Model model_;
+  std::vector<MovingPart> movingParts_;
+  std::map<std::string, std::uint32_t> meshes_;  ///< by their bytes
+  std::set<std::string> paths_;
+};
+
+/// "name07": numbers of two digits sort as they count.
+std::string numbered(const std::string& name, int number);
+
+}  // namespace enfilade::assets

@@ -1,0 +1,80 @@
+// Walls with openings, and what belongs to a wall: skirting, cornice, frames, windows, doors.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "assets/sketch.hpp"
+
+namespace enfilade::assets {
+
+/// An upright wall along X (its thickness along Z) or along Z (its thickness along X).
+struct Wall {
+  enum class Along : std::uint8_t { x, z };
+  Along along;
+  double from, to;     ///< along its length
+  double low, high;    ///< of its thickness: the coordinates of its two faces
+  double bottom, top;  ///< y
+  Paint lowFace, highFace;
+  Paint ends = Paint::reveal;
+};
+
+/// A hole through a wall.
+struct Opening {
+  double from, to;     ///< along the wall
+  double bottom, top;  ///< y
+};
+
+/// A point given along the wall, up, and across its thickness.
+Vec3 wallPoint(Wall::Along along, double a, double y, double across);
+/// The box between two such points.
+void wallBox(Sketch& sketch, const std::string& path, Wall::Along along, const Vec3& low,
+             const Vec3& high, Paint paint);
+
+/// The wall in upright strips between the openings, with pieces above and below them.
+void addWall(Sketch& sketch, const std::string& path, const Wall& wall,
+             const std::vector<Opening>& openings);
+
+/// One face of a wall, seen from a room: `face` is its coordinate across, `inward` is +1 when the
+/// room lies at greater coordinates.
+struct Face {
+  Wall::Along along;
+  double from, to;
+  double face;
+  double inward;
+};
+void addSkirting(Sketch& sketch, const std::string& path, const Face& face, double floor,
+                 const std::vector<Opening>& openings);
+void addCornice(Sketch& sketch, const std::string& path, const Face& face, double ceiling);
+/// A moulded rail at the height `y`, all along.
+void addRail(Sketch& sketch, const std::string& path, const Face& face, double y, double height,
+             double depth, Paint paint);
+
+/// Casings on both faces and an architrave over the lintel.
+void addDoorFrame(Sketch& sketch, const std::string& path, const Wall& wall, const Opening& hole,
+                  Paint paint);
+void addThreshold(Sketch& sketch, const std::string& path, const Wall& wall, const Opening& hole,
+                  Paint paint);
+
+/// One leaf, hinged at `hinge` (on the floor), which extends from there to `tip`, `width` away.
+/// `closes` counts quarter turns about +Y from where it stands to closed.
+struct Leaf {
+  Vec3 hinge;
+  int quarters;  ///< where it points: 0 is +X, 1 is -Z, ...
+  double width, height;
+  double closes;
+  bool glazed = false;
+};
+void addLeaf(Sketch& sketch, const std::string& path, const Leaf& leaf);
+
+/// Casement with mullions, panes, sill; curtains on the inner side when `curtain` is not glass.
+struct WindowStyle {
+  int columns = 2, rows = 3;
+  Paint curtain = Paint::glass;
+  double inward = 1;  ///< +1 when the room lies at greater coordinates across
+  bool sill = true;
+};
+void addWindow(Sketch& sketch, const std::string& path, const Wall& wall, const Opening& hole,
+               const WindowStyle& style);
+
+}  // namespace enfilade::assets
