@@ -1,0 +1,72 @@
+// Boxes and panes made by hand, whose pictures can be worked out on paper.
+#pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "render/renderer.hpp"
+
+namespace enfilade::render {
+
+/// A box from -1/2 to 1/2 on each axis, eight corners, no normals.
+inline scene::Mesh unitCube() {
+  scene::Mesh mesh;
+  mesh.name = "cube";
+  for (int i = 0; i < 8; ++i) {
+    mesh.positions.emplace_back((i & 1) != 0 ? 0.5f : -0.5f, (i & 2) != 0 ? 0.5f : -0.5f,
+                                (i & 4) != 0 ? 0.5f : -0.5f);
+  }
+  mesh.indices = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
+                  2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
+  return mesh;
+}
+
+struct PlacedBox {
+  Vec3 centre, size;  ///< metres; a negative size mirrors
+  scene::Material material = {};
+};
+
+/// Object i is box i, so its id is i + 1.
+inline std::shared_ptr<const scene::Scene> sceneOf(const std::vector<PlacedBox>& boxes) {
+  scene::Model model;
+  model.source = "boxes made by hand";
+  for (const PlacedBox& box : boxes) {
+    const auto index = static_cast<std::uint32_t>(model.objects.size());
+    scene::Mesh mesh = unitCube();
+    mesh.material = index;
+    model.materials.push_back(box.material);
+    model.meshes.push_back(std::move(mesh));
+    scene::Object object;
+    object.path = "box" + std::to_string(index);
+    object.meshes = {index};
+    object.worldFromMesh.linear() = box.size.asDiagonal();
+    object.worldFromMesh.translation() = box.centre;
+    model.objects.push_back(std::move(object));
+  }
+  return std::make_shared<const scene::Scene>(std::move(model));
+}
+
+inline scene::Material coloured(float r, float g, float b, float alpha = 1) {
+  scene::Material material;
+  material.baseColour = {r, g, b, alpha};
+  if (alpha < 1) material.alpha = scene::Material::Alpha::blend;
+  return material;
+}
+
+/// At the origin, looking along -z, 90 degrees both ways: at distance z the picture is 2 z wide.
+inline Camera squareCamera(int size = 200) {
+  Camera camera;
+  camera.forward = -Vec3::UnitZ();
+  camera.fovY = 1.5707963267948966;
+  camera.width = size;
+  camera.height = size;
+  return camera;
+}
+
+inline std::size_t at(const Frame& frame, int x, int y) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(frame.camera.width) +
+         static_cast<std::size_t>(x);
+}
+
+}  // namespace enfilade::render

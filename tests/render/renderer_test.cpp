@@ -1,0 +1,262 @@
+#include "render/renderer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <set>
+
+#include "render/image.hpp"
+#include "tests/render/hand_made_scene.hpp"
+
+namespace enfilade::render {
+namespace {
+
+scene::AvatarView avatarAt(scene::EntityId id, const Vec3& feet) {
+  std::vector<Vec3> points;
+  for (const double y : {0.0, 1.75}) {
+    for (const double x : {-0.3, 0.3}) {
+      for (const double z : {-0.3, 0.3}) points.emplace_back(x, y, z);
+    }
+  }
+  scene::AvatarView avatar;
+  avatar.id = id;
+  avatar.feet = feet;
+  avatar.hull = std::make_shared<const collision::Hull>(collision::buildHull(points));
+  return avatar;
+}
+
+std::set<std::uint32_t> idsIn(const Frame& frame) {
+  return {frame.ids.begin(), frame.ids.end()};
+}
+
+/// A random crowd of boxes around the origin, some mirrored, some of glass.
+std::vector<PlacedBox> crowd(int count) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> place(-10, 10);
+  std::uniform_real_distribution<double> length(0.3, 2);
+  std::vector<PlacedBox> boxes;
+  for (int i = 0; i < count; ++i) {
+    PlacedBox box;
+    for (int axis = 0; axis < 3; ++axis) box.centre[axis] = place(random);
+    for (int axis = 0; axis < 3; ++axis) box.size[axis] = length(random);
+    if (i % 3 == 0) box.size.x() = -box.size.x();
+    const float shade = 0.1f * static_cast<float>(i % 9 + 1);
+    box.material = coloured(shade, 1 - shade, 0.5f, i % 7 == 0 ? 0.4f : 1.0f);
+    boxes.push_back(box);
+  }
+  return boxes;
+}
+
+TEST(Renderer, ABoxIsSeenExactlyWhereItsGeometrySays) {
+  // Its face is 2 m square, 4 m ahead, where the picture is 8 m wide: the middle 50 pixels of 200.
+  Renderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+  const Frame frame = renderer.render({}, squareCamera());
+  for (int y = 0; y < 200; ++y) {
+    for (int x = 0; x < 200; ++x) {
+      const bool inside = x >= 75 && x < 125 && y >= 75 && y < 125;
+      ASSERT_EQ(frame.ids[at(frame, x, y)], inside ? 1u : 0u) << x << ' ' << y;
+      const float depth = frame.depth[at(frame, x, y)];
+      if (inside) {
+        ASSERT_NEAR(depth, 4, 4e-4);
+      } else {
+        ASSERT_TRUE(std::isnan(depth));
+      }
+    }
+  }
+}
+
+TEST(Renderer, DepthIsTrueToRelative1e4NearAndFarInBothProjections) {
+  for (const double distance : {0.06, 0.5, 3.0, 40.0, 900.0}) {
+    Renderer renderer(sceneOf({{{0, 0, -distance - 5}, {4 * distance, 4 * distance, 10}, {}}}));
+    Camera camera = squareCamera(50);
+    const Frame perspective = renderer.render({}, camera);
+    camera.projection = Camera::Projection::orthographic;
+    camera.heightY = distance;
+    const Frame parallel = renderer.render({}, camera);
+    for (const float depth : perspective.depth) ASSERT_NEAR(depth, distance, 1e-4 * distance);
+    // A parallel picture spreads its precision evenly over near..far.
+    for (const float depth : parallel.depth) {
+      ASSERT_NEAR(depth, distance, 1e-4 * std::max(distance, 1.0));
+    }
+  }
+}
+
+TEST(Renderer, TheTopOfTheWorldIsAtTheTopOfThePictureAndXToTheRight) {
+  Renderer renderer(sceneOf({{{0, 2, -5}, {1, 1, 1}, {}}, {{2, 0, -5}, {1, 1, 1}, {}}}));
+  const Frame frame = renderer.render({}, squareCamera());
+  EXPECT_EQ(frame.ids[at(frame, 100, 55)], 1u);
+  EXPECT_EQ(frame.ids[at(frame, 145, 100)], 2u);
+  EXPECT_EQ(frame.ids[at(frame, 100, 145)], 0u);
+}
+
+TEST(Renderer, NearerHidesFartherWhateverTheirOrder) {
+  const PlacedBox near{{0, 0, -3}, {1, 1, 1}, {}}, far{{0, 0, -6}, {1, 1, 1}, {}};
+  Renderer one(sceneOf({near, far}));
+  Renderer other(sceneOf({far, near}));
+  EXPECT_EQ(one.render({}, squareCamera()).ids[100 * 200 + 100], 1u);
+  EXPECT_EQ(other.render({}, squareCamera()).ids[100 * 200 + 100], 2u);
+}
+
+TEST(Renderer, AMirroredObjectLooksLikeItsTwin) {
+  Renderer straight(sceneOf({{{0.3, 0.2, -4}, {2, 1, 1}, {}}}));
+  Renderer mirrored(sceneOf({{{0.3, 0.2, -4}, {-2, 1, 1}, {}}}));
+  const Frame a = straight.render({}, squareCamera());
+  const Frame b = mirrored.render({}, squareCamera());
+  EXPECT_EQ(a.ids, b.ids);
+  EXPECT_GT(std::count(a.ids.begin(), a.ids.end(), 1u), 100);
+  for (std::size_t i = 0; i < a.rgb.size(); ++i) ASSERT_NEAR(a.rgb[i], b.rgb[i], 3) << i;
+}
+
+TEST(Renderer, GlassTintsTheColourAndLetsIdsAndDepthThrough) {
+  const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, coloured(0.8f, 0.8f, 0.8f)};
+  const PlacedBox pane{{0, 0, -3}, {1, 1, 0.1}, coloured(0.05f, 0.05f, 0.9f, 0.5f)};
+  Renderer renderer(sceneOf({pane, wall}));
+  const Frame frame = renderer.render({}, squareCamera());
+  EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{2}));
+  const std::size_t through = at(frame, 100, 100), beside = at(frame, 20, 100);
+  EXPECT_NEAR(frame.depth[through], 5, 5e-4);
+  EXPECT_LT(frame.rgb[3 * through] + 30, frame.rgb[3 * beside]);
+  EXPECT_GT(frame.rgb[3 * through + 2], frame.rgb[3 * through] + 30);
+  EXPECT_NEAR(frame.rgb[3 * beside], frame.rgb[3 * beside + 2], 25);
+}
+
+TEST(Renderer, GlassBehindAWallIsNotSeen) {
+  const PlacedBox wall{{0, 0, -3}, {20, 20, 1}, {}};
+  const PlacedBox pane{{0, 0, -6}, {9, 9, 0.1}, coloured(0.9f, 0.0f, 0.0f, 0.5f)};
+  Renderer with(sceneOf({wall, pane}));
+  Renderer without(sceneOf({wall}));
+  EXPECT_EQ(with.render({}, squareCamera()).rgb, without.render({}, squareCamera()).rgb);
+}
+
+TEST(Renderer, AMaskCutsHolesIntoColourIdsAndDepth) {
+  scene::Model model;
+  scene::Material leaf;
+  leaf.alpha = scene::Material::Alpha::mask;
+  leaf.baseColourTexture = 0;
+  model.materials = {leaf};
+  model.textures = {{"half", 2, 1, {255, 255, 255, 255, 255, 255, 255, 0}}};
+  scene::Mesh square;
+  square.positions = {{-1, -1, -2}, {1, -1, -2}, {1, 1, -2}, {-1, 1, -2}};
+  square.uvs = {{0.25f, 0}, {0.75f, 0}, {0.75f, 1}, {0.25f, 1}};
+  square.indices = {0, 1, 2, 0, 2, 3};
+  model.meshes = {square};
+  model.objects.resize(1);
+  model.objects[0].meshes = {0};
+  Renderer renderer(std::make_shared<const scene::Scene>(std::move(model)));
+  const Frame frame = renderer.render({}, squareCamera());
+  EXPECT_EQ(frame.ids[at(frame, 60, 100)], 1u);
+  EXPECT_EQ(frame.ids[at(frame, 140, 100)], 0u);
+  EXPECT_TRUE(std::isnan(frame.depth[at(frame, 140, 100)]));
+}
+
+TEST(Renderer, AHiddenAvatarIsNotDrawnAndOthersAre) {
+  Renderer renderer(sceneOf({{{0, 0, -20}, {60, 60, 1}, {}}}));
+  scene::Snapshot snapshot;
+  snapshot.tick = 42;
+  snapshot.avatars = {avatarAt(2, {-1, -1, -4}), avatarAt(3, {1, -1, -4})};
+  const Frame both = renderer.render(snapshot, squareCamera());
+  EXPECT_EQ(both.tick, 42u);
+  EXPECT_EQ(idsIn(both), (std::set<std::uint32_t>{1, 2, 3}));
+  EXPECT_EQ(both.ids[at(both, 75, 100)], 2u);
+  EXPECT_EQ(both.ids[at(both, 125, 100)], 3u);
+  EXPECT_NEAR(both.depth[at(both, 75, 100)], 3.7, 1e-3);
+  EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera(), 2)), (std::set<std::uint32_t>{1, 3}));
+}
+
+TEST(Renderer, AnEmptySceneIsSkyAndNothingElse) {
+  Renderer renderer(std::make_shared<const scene::Scene>(scene::Model{}));
+  const Frame frame = renderer.render({}, squareCamera());
+  EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{0}));
+  EXPECT_GT(frame.rgb[2], 100);
+  EXPECT_EQ(frame.rgb.size(), 200u * 200u * 3u);
+}
+
+TEST(Renderer, TheSamePictureHasTheSameBytesInEveryRenderer) {
+  const auto scene = sceneOf(crowd(300));
+  scene::Snapshot snapshot;
+  snapshot.avatars = {avatarAt(301, {1, -1, -4})};
+  Camera camera = squareCamera(300);
+  Renderer first(scene);
+  const Frame a = first.render(snapshot, camera);
+  camera.forward = Vec3::UnitX();
+  first.render(snapshot, camera);
+  camera.forward = -Vec3::UnitZ();
+  const Frame again = first.render(snapshot, camera);
+  Renderer second(scene);
+  const Frame b = second.render(snapshot, camera);
+  EXPECT_EQ(a.rgb, again.rgb);
+  EXPECT_EQ(a.rgb, b.rgb);
+  EXPECT_EQ(a.ids, b.ids);
+  EXPECT_EQ(idsIn(a).count(301), 1u);
+}
+
+TEST(Renderer, ProjectAgreesWithThePictureOfIds) {
+  std::vector<PlacedBox> boxes = crowd(60);
+  for (PlacedBox& box : boxes) {
+    box.material.alpha = scene::Material::Alpha::opaque;
+    box.size = Vec3::Constant(0.15);
+  }
+  Renderer renderer(sceneOf(boxes));
+  int seen = 0;
+  for (const bool parallel : {false, true}) {
+    Camera camera;
+    camera.eye = {1, 2, 12};
+    camera.forward = {-0.1, -0.2, -1};
+    camera.heightY = 18;
+    if (parallel) camera.projection = Camera::Projection::orthographic;
+    const Frame frame = renderer.render({}, camera);
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      const Vec3 pixel = project(camera, boxes[i].centre);
+      if (!(pixel.x() >= 0 && pixel.x() < camera.width && pixel.y() >= 0 &&
+            pixel.y() < camera.height && pixel.z() > 0.2)) {
+        continue;
+      }
+      const std::size_t index = at(frame, static_cast<int>(pixel.x()), static_cast<int>(pixel.y()));
+      if (frame.depth[index] < pixel.z() - 0.2) continue;  // something stands in front
+      EXPECT_EQ(frame.ids[index], i + 1);
+      EXPECT_NEAR(frame.depth[index], pixel.z(), 0.15);
+      ++seen;
+    }
+  }
+  EXPECT_GT(seen, 60);
+}
+
+TEST(Renderer, ARefusedCameraIsAnErrorAndTheNextPictureIsFine) {
+  Renderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+  Camera bad = squareCamera();
+  bad.far = std::nan("");
+  EXPECT_THROW(renderer.render({}, bad), RenderError);
+  EXPECT_EQ(idsIn(renderer.render({}, squareCamera())), (std::set<std::uint32_t>{0, 1}));
+}
+
+TEST(Renderer, SizesMayChangeFromPictureToPicture) {
+  Renderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+  for (const auto& [width, height] : {std::pair(1, 1), std::pair(333, 7), std::pair(8, 8)}) {
+    Camera camera = squareCamera();
+    camera.width = width;
+    camera.height = height;
+    const Frame frame = renderer.render({}, camera);
+    EXPECT_EQ(frame.rgb.size(), 3 * frame.ids.size());
+    EXPECT_EQ(frame.ids[at(frame, width / 2, height / 2)], 1u) << width;
+  }
+}
+
+TEST(Renderer, FiftyCanBeMadeAndDestroyedAndTwoLiveTogether) {
+  const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
+  Renderer lasting(scene);
+  const Frame before = lasting.render({}, squareCamera(40));
+  for (int i = 0; i < 50; ++i) {
+    Renderer renderer(scene);
+    if (i % 10 == 0) {
+      EXPECT_EQ(renderer.render({}, squareCamera(40)).rgb, before.rgb);
+    }
+  }
+  EXPECT_EQ(lasting.render({}, squareCamera(40)).rgb, before.rgb);
+  EXPECT_FALSE(lasting.deviceName().empty());
+  EXPECT_EQ(before.renderer, lasting.deviceName());
+}
+
+}  // namespace
+}  // namespace enfilade::render
