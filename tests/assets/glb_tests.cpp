@@ -1,0 +1,133 @@
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+#include <gtest/gtest.h>
+
+#include <assimp/Importer.hpp>
+#include <cstring>
+
+#include "assets/building.hpp"
+#include "assets/glb_writer.hpp"
+
+namespace enfilade::assets {
+namespace {
+
+const std::string& buildingBytes() {
+  static const std::string bytes = [] {
+    std::vector<MovingPart> parts;
+    const scene::Model model = makeBuilding({}, &parts);
+    return glbBytes(model, parts);
+  }();
+  return bytes;
+}
+
+std::uint32_t wordAt(const std::string& bytes, std::size_t offset) {
+  std::uint32_t word = 0;
+  std::memcpy(&word, bytes.data() + offset, 4);
+  return word;
+}
+
+std::uint64_t fnv1a(const std::string& bytes) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
+  return hash;
+}
+
+TEST(Glb, IsTheSameFromRunToRunAndFromCompilerToCompiler) {
+  std::vector<MovingPart> parts;
+  const scene::Model again = makeBuilding({}, &parts);
+  EXPECT_EQ(glbBytes(again, parts), buildingBytes());
+  // Pinned: a change of the building changes this on purpose.
+  EXPECT_EQ(fnv1a(buildingBytes()), 0x2198267451256928u) << std::hex << fnv1a(buildingBytes());
+}
+
+TEST(Glb, DiffersWithTheSeed) {
+  EXPECT_NE(glbBytes(makeBuilding({2, 0})), glbBytes(makeBuilding({3, 0})));
+}
+
+TEST(Glb, HasAWellFormedHeaderAndStaysSmall) {
+  const std::string& glb = buildingBytes();
+  EXPECT_LT(glb.size(), 20u << 20);
+  EXPECT_EQ(glb.substr(0, 4), "glTF");
+  EXPECT_EQ(wordAt(glb, 4), 2u);
+  EXPECT_EQ(wordAt(glb, 8), glb.size());
+  const std::uint32_t json = wordAt(glb, 12);
+  EXPECT_EQ(glb.substr(16, 4), "JSON");
+  EXPECT_EQ(json % 4, 0u);
+  EXPECT_EQ(glb.substr(20 + json + 4, 4), std::string("BIN\0", 4));
+  EXPECT_EQ(20 + json + 8 + wordAt(glb, 20 + json), glb.size());
+  EXPECT_NE(glb.find("walk_hinge"), std::string::npos);
+  EXPECT_NE(glb.find("walk_slide"), std::string::npos);
+}
+
+struct Count {
+  std::size_t objects = 0, triangles = 0;
+  bool operator==(const Count&) const = default;
+};
+
+Count countOf(const aiScene& scene, const aiNode& node) {
+  Count count{node.mNumMeshes > 0, 0};
+  for (unsigned i = 0; i < node.mNumMeshes; ++i)
+    count.triangles += scene.mMeshes[node.mMeshes[i]]->mNumFaces;
+  for (unsigned i = 0; i < node.mNumChildren; ++i) {
+    const Count child = countOf(scene, *node.mChildren[i]);
+    count.objects += child.objects;
+    count.triangles += child.triangles;
+  }
+  return count;
+}
+
+TEST(Glb, IsReadBackByAssimpWithAllItsObjectsAndTriangles) {
+  Assimp::Importer importer;
+  const aiScene* scene =
+      importer.ReadFileFromMemory(buildingBytes().data(), buildingBytes().size(), 0, "glb");
+  ASSERT_NE(scene, nullptr) << importer.GetErrorString();
+  const scene::Model model = makeBuilding();
+  Count expected{model.objects.size(), 0};
+  for (const scene::Object& object : model.objects)
+    for (std::uint32_t mesh : object.meshes)
+      expected.triangles += model.meshes[mesh].indices.size() / 3;
+  EXPECT_EQ(countOf(*scene, *scene->mRootNode).objects, expected.objects);
+  EXPECT_EQ(countOf(*scene, *scene->mRootNode).triangles, expected.triangles);
+}
+
+TEST(Glb, KeepsAnObjectThatLiesUnderAnotherInPlace) {
+  scene::Model model;
+  model.materials.resize(1);
+  scene::Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.indices = {0, 1, 2};
+  model.meshes = {mesh};
+  scene::Object parent, child;
+  parent.path = "door";
+  parent.meshes = child.meshes = {0};
+  parent.worldFromMesh.translation() = collision::Vec3{2, 0, 0};
+  child.path = "door/handle";
+  child.worldFromMesh.translation() = collision::Vec3{3, 1, 0};
+  model.objects = {parent, child};
+  Assimp::Importer importer;
+  const std::string glb = glbBytes(model);
+  const aiScene* scene = importer.ReadFileFromMemory(glb.data(), glb.size(), 0, "glb");
+  ASSERT_NE(scene, nullptr) << importer.GetErrorString();
+  const aiNode* handle = scene->mRootNode->FindNode("handle");
+  ASSERT_NE(handle, nullptr);
+  EXPECT_EQ(handle->mTransformation.a4, 1);
+  EXPECT_EQ(handle->mTransformation.b4, 1);
+}
+
+TEST(Glb, RefusesWhatItCannotHold) {
+  EXPECT_THROW(glbBytes({}), std::invalid_argument);
+  scene::Model twins;
+  twins.meshes.resize(1);
+  twins.meshes[0].positions.resize(3);
+  twins.meshes[0].indices = {0, 1, 2};
+  twins.objects.resize(2);
+  for (scene::Object& object : twins.objects) {
+    object.path = "twin";
+    object.meshes = {0};
+  }
+  EXPECT_THROW(glbBytes(twins), std::invalid_argument);
+  EXPECT_THROW(writeGlb("/nowhere/at/all.glb", makeBuilding()), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace enfilade::assets
