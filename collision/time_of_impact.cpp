@@ -19,6 +19,16 @@ struct Advance {
   Decision last;
 };
 
+/// Whether last tick's axis alone proves that A keeps `distance` from B on its whole way.
+bool axisProvesMiss(const ConvexBody& a, const Vec3& displacement, const ConvexBody& b,
+                    double distance, const SeparationCache& cache) {
+  const double length = cache.axis.norm();
+  if (!(length > 0)) return false;
+  const double closing = std::max(0.0, displacement.dot(cache.axis) / length);
+  // The quotient rounds by a few ulp; the axis is as good as any after that much is given away.
+  return provedSeparation(a, b, cache) > distance + closing * (1 + 1e-12);
+}
+
 double closingSpeed(const Vec3& displacement, const Decision& at) {
   const double closing = displacement.dot(at.normal);
   return closing > kGrazing * displacement.norm() ? closing : 0;
@@ -30,8 +40,11 @@ Advance advanceTo(double target, double tolerance, double from, const ConvexBody
   Advance advance{from, false, false, {}};
   for (int i = 0; i < kAdvanceBound; ++i) {
     const ConvexBody moved{a.vertices, a.translation + advance.fraction * displacement};
-    advance.last = decide(moved, b, cache);
+    const double reach = target + tolerance + (1 - advance.fraction) * displacement.norm();
+    const std::optional<Decision> decision = decideWithin(moved, b, reach, cache);
     ++result.queries;
+    if (!decision) return advance;  // proved too far for the rest of the way
+    advance.last = *decision;
     if (advance.last.decidedBy == DecidedBy::rational) ++result.rationals;
     const double distance = advance.last.distance - advance.last.errorBound;
     const bool apart = advance.last.verdict == Verdict::separated;
@@ -59,8 +72,7 @@ bool partsOverlap(const Decision& at, const Vec3& displacement) {
 SweepResult sweep(const ConvexBody& a, const Vec3& displacement, const ConvexBody& b,
                   const StoppingBand& band, SeparationCache& cache) {
   SweepResult result;
-  const double length = displacement.norm();
-  if (!(length > 0) || provedSeparation(a, b, cache) > band.low + length) return result;
+  if (displacement.isZero(0) || axisProvesMiss(a, displacement, b, band.low, cache)) return result;
 
   const double tolerance = kArrived * (band.high - band.low);
   const Advance near = advanceTo(band.high, tolerance, 0, a, displacement, b, cache, result);

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <limits>
 
 namespace enfilade::collision {
 
@@ -42,6 +43,12 @@ struct Box {
 inline bool overlaps(const Box& a, const Box& b) {
   return a.min.x() <= b.max.x() && b.min.x() <= a.max.x() && a.min.y() <= b.max.y() &&
          b.min.y() <= a.max.y() && a.min.z() <= b.max.z() && b.min.z() <= a.max.z();
+}
+
+/// Whether `inner` lies wholly in `outer`; an empty `outer` holds nothing.
+inline bool contains(const Box& outer, const Box& inner) {
+  return (outer.min.array() <= inner.min.array()).all() &&
+         (inner.max.array() <= outer.max.array()).all();
 }
 
 /// The box of all points within `margin` metres of `box` along each axis.

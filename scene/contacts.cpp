@@ -23,19 +23,6 @@ ContactEvent eventOf(const WorldState& world, ContactEvent::Kind kind, const Ava
   return event;
 }
 
-/// Other avatars moved after this one gathered its obstacles: take their place of now.
-void followOthers(const WorldState& world, Avatar& avatar) {
-  for (Obstacle& obstacle : avatar.obstacles) {
-    if (obstacle.entity < world.firstAvatarId()) continue;
-    const auto& name = world.avatarNames[obstacle.entity - world.firstAvatarId()];
-    const auto found = world.avatars.find(name);
-    if (found == world.avatars.end()) continue;
-    const Avatar& other = found->second;
-    obstacle.box = {other.hullBox.min + other.feet, other.hullBox.max + other.feet};
-    obstacle.body.translation = other.feet;
-  }
-}
-
 /// Penetrating before touching before separated, then by distance.
 bool nearer(const Decision& a, const Decision& b) {
   return a.verdict != b.verdict ? a.verdict > b.verdict : a.distance < b.distance;

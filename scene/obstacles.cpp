@@ -6,20 +6,21 @@ Stop sweepHull(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet,
                const Vec3& displacement, std::vector<Obstacle>& obstacles,
                const collision::StoppingBand& band, QueryCount& count) {
   Stop stop;
-  const Box path =
-      grown(collision::swept(Box{hullBox.min + feet, hullBox.max + feet}, displacement), band.high);
+  const Box start{hullBox.min + feet, hullBox.max + feet};
+  Vec3 rest = displacement;  // only what lies before the earliest stop so far matters
+  Box path = grown(collision::swept(start, rest), band.high);
   for (Obstacle& obstacle : obstacles) {
     if (!overlaps(path, obstacle.box)) continue;
-    // Only what lies before the earliest stop so far matters.
-    const Vec3 rest = stop.fraction * displacement;
     const collision::SweepResult result =
         collision::sweep({hull, feet}, rest, obstacle.body, band, obstacle.cache);
     count.narrow += result.queries;
     count.rational += result.rationals;
-    if (!result.stopped) continue;
     const double fraction = stop.fraction * result.fraction;
-    if (stop.entity != 0 && fraction >= stop.fraction) continue;
+    if (!result.stopped || (stop.entity != 0 && fraction >= stop.fraction)) continue;
     stop = {fraction, obstacle.entity, -result.atStop.normal, result.atStop.distance};
+    if (fraction == 0) break;
+    rest = fraction * displacement;
+    path = grown(collision::swept(start, rest), band.high);
   }
   return stop;
 }

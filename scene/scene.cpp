@@ -1,9 +1,9 @@
 #include "scene/scene.hpp"
 
-#include <bit>
 #include <mutex>
 #include <stdexcept>
-#include <string_view>
+
+#include "scene/hasher.hpp"
 
 namespace enfilade::scene {
 
@@ -13,24 +13,6 @@ struct Scene::Lazy {
 };
 
 namespace {
-
-/// FNV-1a over 64-bit words, with a fold after each product so that high bits reach low ones.
-class Hasher {
- public:
-  void add(std::uint64_t word) {
-    state_ = (state_ ^ word) * 0x00000100000001b3ull;
-    state_ ^= state_ >> 29;
-  }
-  void add(double value) { add(std::bit_cast<std::uint64_t>(value)); }
-  void add(std::string_view text) {
-    add(std::uint64_t{text.size()});
-    for (const char c : text) add(std::uint64_t{static_cast<unsigned char>(c)});
-  }
-  std::uint64_t value() const { return state_; }
-
- private:
-  std::uint64_t state_ = 0xcbf29ce484222325ull;
-};
 
 std::uint64_t hashOf(const Mesh& mesh) {
   Hasher hash;

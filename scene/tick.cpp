@@ -43,13 +43,29 @@ bool nobodyNear(const WorldState& world, const Avatar& avatar) {
   return partners.empty() || !partners.back().moves;  // movers come last
 }
 
+/// The movers whose partners changed at the last update of the broad phase, ascending.
+std::vector<collision::MoverId> changedMovers(const collision::SortAndSweep& broadPhase) {
+  std::vector<collision::MoverId> changed;
+  for (const auto& pairs : {broadPhase.begun(), broadPhase.ended()}) {
+    for (const collision::BoxPair& pair : pairs) {
+      changed.push_back(pair.mover);
+      if (pair.otherMoves) changed.push_back(pair.other);
+    }
+  }
+  std::sort(changed.begin(), changed.end());
+  return changed;
+}
+
 void moveAvatars(WorldState& world, const Wish& wish, QueryCount& count) {
+  const std::vector<collision::MoverId> changed = changedMovers(world.broadPhase);
   for (auto& [name, avatar] : world.avatars) {
     const Vec3 velocity = wishOf(wish, name);
     avatar.resting = avatar.grounded && avatar.lastMove.isZero(0) && velocity.isZero(0) &&
                      nobodyNear(world, avatar);
+    const bool pairsChanged = std::binary_search(changed.begin(), changed.end(), avatar.mover);
+    avatar.resting = avatar.resting && !pairsChanged;
     if (avatar.resting) continue;
-    gatherObstacles(world, avatar);
+    gatherObstacles(world, avatar, pairsChanged);
     moveAvatar(world, avatar, velocity, count);
   }
 }

@@ -51,7 +51,8 @@ struct Avatar {
   collision::MoverId mover = 0;
   Box reach;  ///< what it can meet in this tick
   collision::ExtremalVertices extremes;
-  std::vector<Obstacle> obstacles;
+  Box gathered;                  ///< where `obstacles` are complete
+  std::vector<Obstacle> obstacles;  ///< ascending (entity, part)
   std::vector<Contact> contacts;  ///< ascending `other`; also part of the state
 };
 
@@ -95,8 +96,11 @@ void judgeWalks(WorldState& world, TickReport& report);
 
 /// The box that an avatar can reach in this tick with the given velocity (motion.cpp).
 Box reachOf(const WorldState& world, Avatar& avatar, const Vec3& velocity);
-/// Collects what the avatar can meet inside its reach (motion.cpp).
-void gatherObstacles(WorldState& world, Avatar& avatar);
+/// Collects what the avatar can meet inside its reach. `pairsChanged`: the broad phase gave it or
+/// took from it a partner, so what was collected before no longer serves (motion.cpp).
+void gatherObstacles(WorldState& world, Avatar& avatar, bool pairsChanged);
+/// Others moved since the obstacles were collected: they take their place of now (motion.cpp).
+void followOthers(const WorldState& world, Avatar& avatar);
 /// Walks, slides, steps, falls (motion.cpp).
 void moveAvatar(WorldState& world, Avatar& avatar, const Vec3& velocity, QueryCount& count);
 

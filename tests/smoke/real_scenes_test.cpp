@@ -1,0 +1,131 @@
+// An avatar walks for 600 ticks in each of the shared real buildings, and looks around.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <set>
+
+#include "render/renderer.hpp"
+#include "scene/import_model.hpp"
+#include "scene/world.hpp"
+#include "tests/support/shared_folder.hpp"
+
+namespace enfilade {
+namespace {
+
+using scene::ContactEvent;
+using scene::Notice;
+using scene::Vec3;
+
+constexpr int kTicks = 600;
+
+struct RealScene {
+  const char* name;
+  const char* file;
+  std::optional<double> metresPerUnit;
+};
+
+void PrintTo(const RealScene& scene, std::ostream* out) {
+  *out << scene.name;
+}
+
+class RealScenes : public ::testing::TestWithParam<RealScene> {};
+
+double uniform(std::mt19937_64& random, double low, double high) {
+  return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
+}
+
+/// Tries seeded places from the ground up until the world takes one that is not the roof.
+bool spawnSomewhere(scene::World& world, std::mt19937_64& random) {
+  const scene::Box& b = world.scene().bounds();
+  for (int attempt = 0; attempt < 400; ++attempt) {
+    const double x = uniform(random, b.min.x(), b.max.x());
+    const double z = uniform(random, b.min.z(), b.max.z());
+    const double y = uniform(random, b.min.y(), b.min.y() + 0.7 * b.size().y());
+    EXPECT_FALSE(submit(world, {"ann", scene::Spawn{{x, y, z}}, 0}));
+    for (const Notice& n : tick(world).notices)
+      if (n.kind == Notice::Kind::spawned) return true;
+  }
+  return false;
+}
+
+/// Each begin has its end.
+struct Balance {
+  std::set<std::pair<scene::EntityId, scene::EntityId>> open;
+  int begins = 0;
+
+  void take(const std::vector<ContactEvent>& events) {
+    for (const ContactEvent& e : events) {
+      const std::pair pair(e.a, e.b);
+      if (e.kind == ContactEvent::Kind::begin) {
+        EXPECT_TRUE(open.insert(pair).second);
+        ++begins;
+      }
+      if (e.kind == ContactEvent::Kind::end) {
+        EXPECT_EQ(open.erase(pair), 1u);
+      }
+    }
+  }
+};
+
+void expectSomethingSeen(const render::Frame& frame, const scene::World& world) {
+  std::set<std::array<std::uint8_t, 3>> colours;
+  std::set<scene::EntityId> ids(frame.ids.begin(), frame.ids.end());
+  for (std::size_t i = 0; i < frame.ids.size(); ++i)
+    colours.insert({frame.rgb[3 * i], frame.rgb[3 * i + 1], frame.rgb[3 * i + 2]});
+  EXPECT_GT(colours.size(), 8u) << "the frame is blank";
+  ids.erase(0);
+  EXPECT_FALSE(ids.empty());
+  for (const scene::EntityId id : ids) EXPECT_FALSE(nameOf(world, id).empty()) << id;
+}
+
+TEST_P(RealScenes, AnAvatarWalksAndNeverPenetrates) {
+  ENFILADE_NEED_SHARED(shared);
+  scene::ImportOptions options;
+  options.metresPerUnit = GetParam().metresPerUnit;
+  const auto still = std::make_shared<const scene::Scene>(
+      scene::importModel(*shared / "scenes" / GetParam().file, options));
+  scene::World world(still);
+  std::mt19937_64 random(2026);
+  ASSERT_TRUE(spawnSomewhere(world, random));
+
+  render::Renderer renderer(still);
+  Balance balance;
+  const scene::Box& b = still->bounds();
+  double worst = 0;
+  for (int i = 0; i < kTicks; ++i) {
+    if (i % 120 == 0 && !world.snapshot()->avatars.empty()) {
+      const Vec3 goal(uniform(random, b.min.x(), b.max.x()), 0,
+                      uniform(random, b.min.z(), b.max.z()));
+      const Vec3 way = goal - world.snapshot()->avatars[0].feet;
+      const Vec3 velocity = 1.5 * Vec3(way.x(), 0, way.z()).normalized();
+      EXPECT_FALSE(submit(world, {"ann", scene::Drive{velocity}, 0}));
+    }
+    const scene::TickReport report = tick(world);
+    worst = std::max(worst, report.worstPenetration);
+    balance.take(report.contacts);
+    if (i % 200 == 100 && !report.snapshot->avatars.empty()) {
+      const auto& ann = report.snapshot->avatars[0];
+      expectSomethingSeen(
+          renderer.render(*report.snapshot, render::firstPerson(ann, 320, 240), ann.id), world);
+    }
+  }
+  EXPECT_EQ(worst, 0);
+  EXPECT_GT(balance.begins, 0);
+  balance.take(endContacts(world, ContactEvent::Reason::shutdown));
+  EXPECT_TRUE(balance.open.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Shared, RealScenes,
+    ::testing::Values(RealScene{"small_house", "aws-small-house/small_house.gltf", {}},
+                      RealScene{"duplex", "duplex/Duplex_A_20110907.ifc", {}},
+                      RealScene{"willow", "willow-garage/meshes/willowgarage_visual.dae", {}},
+                      RealScene{"office_dae", "cpr-office/office.dae", {}},
+                      RealScene{"office_fbx", "cpr-office/cpr_office_ascii.fbx", {}},
+                      RealScene{"pandora", "pandora/pandora.obj", 0.05},
+                      RealScene{"estate", "schependomlaan/schependomlaan_estate.glb", {}}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+}  // namespace
+}  // namespace enfilade
