@@ -1,0 +1,100 @@
+#include "server/command_line.hpp"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+
+#include "scene/import_model.hpp"
+
+namespace enfilade::server {
+namespace {
+
+/// Where CLI11 leaves what it read; every verb has its own.
+struct ModelArguments {
+  std::string file, unit, up;
+};
+struct Arguments {
+  ModelArguments model;
+  std::string script, out, listen = "127.0.0.1:7878", connect;
+  bool strict = false;
+};
+
+std::string unitProblem(const std::string& text) {
+  if (scene::metresPerUnitFrom(text)) return {};
+  return "--unit " + text + ": give m, mm, cm, ft, in or a positive number of metres";
+}
+
+std::string endpointProblem(const std::string& text) {
+  if (endpointFrom(text)) return {};
+  return text + ": give HOST:PORT, as 127.0.0.1:7878, with a port from 0 to 65535";
+}
+
+void addModel(CLI::App& verb, ModelArguments& into) {
+  verb.add_option("SCENE", into.file, "The model: glTF, GLB, OBJ, COLLADA, FBX, IFC")->required();
+  verb.add_option("--unit", into.unit, "Length of the file's unit: m, mm, cm, ft, in or metres")
+      ->check(CLI::Validator(unitProblem, "UNIT"));
+  verb.add_option("--up", into.up, "The file's up axis")->check(CLI::IsMember({"x", "y", "z"}));
+}
+
+void addWalk(CLI::App& verb, Arguments& into) {
+  verb.add_option("SCRIPT", into.script, "The walk: JSON lines, see protocol/SCRIPT.md")
+      ->required();
+  verb.add_option("--out", into.out, "Folder for the pictures, contacts and summary")->required();
+  verb.add_flag("--strict", into.strict, "End with 3 when an order was refused or a walk blocked");
+}
+
+ModelOptions modelFrom(const ModelArguments& read) {
+  ModelOptions options{read.file, std::nullopt, std::nullopt};
+  if (!read.unit.empty()) options.metresPerUnit = scene::metresPerUnitFrom(read.unit);
+  if (!read.up.empty()) options.up = read.up.front();
+  return options;
+}
+
+}  // namespace
+
+std::optional<Endpoint> endpointFrom(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos || colon == 0) return std::nullopt;
+  Endpoint endpoint{text.substr(0, colon), 0};
+  const bool bracketed = endpoint.host.front() == '[' && endpoint.host.back() == ']';
+  if (bracketed) endpoint.host = endpoint.host.substr(1, endpoint.host.size() - 2);
+  if (endpoint.host.empty()) return std::nullopt;
+  if (!bracketed && endpoint.host.find(':') != std::string::npos) return std::nullopt;
+  const char* end = text.data() + text.size();
+  const auto parsed = std::from_chars(text.data() + colon + 1, end, endpoint.port);
+  if (parsed.ec != std::errc() || parsed.ptr != end) return std::nullopt;
+  return endpoint;
+}
+
+std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* const* argv) {
+  CLI::App app("Enfilade: virtual walk-throughs without a display", "enfilade");
+  app.require_subcommand(1);
+  Arguments read;
+  CLI::App* serve = app.add_subcommand("serve", "Serve a scene to clients over TCP");
+  addModel(*serve, read.model);
+  serve->add_option("--listen", read.listen, "Address and port; port 0 lets the system choose")
+      ->capture_default_str()
+      ->check(CLI::Validator(endpointProblem, "HOST:PORT"));
+  CLI::App* replay = app.add_subcommand("replay", "Run a walk script in a scene, in process");
+  addModel(*replay, read.model);
+  addWalk(*replay, read);
+  CLI::App* walk = app.add_subcommand("walk", "Run a walk script on a server");
+  addWalk(*walk, read);
+  walk->add_option("--connect", read.connect, "The server's address and port")
+      ->required()
+      ->check(CLI::Validator(endpointProblem, "HOST:PORT"));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
+      app.exit(error);
+      return ExitCode::done;
+    }
+    std::cerr << error.what() << "\n\n" << app.help();
+    return ExitCode::usage;
+  }
+  if (*serve) return ServeCommand{modelFrom(read.model), *endpointFrom(read.listen)};
+  if (*replay) return ReplayCommand{modelFrom(read.model), read.script, read.out, read.strict};
+  return WalkCommand{read.script, read.out, *endpointFrom(read.connect), read.strict};
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,48 @@
+// The program's command line, read into plain data.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "server/exit_code.hpp"
+
+namespace enfilade::server {
+
+/// Overrides what the model's file says; nullopt: as the file says.
+struct ModelOptions {
+  std::filesystem::path file;
+  std::optional<double> metresPerUnit;
+  std::optional<char> up;  ///< 'x', 'y' or 'z'
+};
+
+struct Endpoint {
+  std::string host;        ///< a name or an address, IPv6 without its brackets
+  std::uint16_t port = 0;  ///< listening: 0 lets the system choose
+};
+
+struct ServeCommand {
+  ModelOptions model;
+  Endpoint listen{"127.0.0.1", 7878};
+};
+struct ReplayCommand {
+  ModelOptions model;
+  std::filesystem::path script, out;
+  bool strict = false;
+};
+struct WalkCommand {
+  std::filesystem::path script, out;
+  Endpoint connect;
+  bool strict = false;
+};
+using ProgramCommand = std::variant<ServeCommand, ReplayCommand, WalkCommand>;
+
+/// What to do, or the code to end with at once (--help: done; a mistake: usage). Help goes to
+/// stdout, mistakes and the usage to stderr.
+std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* const* argv);
+
+/// Parses `HOST:PORT` or `[IPV6]:PORT`; nullopt when it is neither.
+std::optional<Endpoint> endpointFrom(const std::string& text);
+
+}  // namespace enfilade::server

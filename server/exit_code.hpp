@@ -1,0 +1,14 @@
+// How the program tells its caller what happened.
+#pragma once
+
+namespace enfilade::server {
+
+enum class ExitCode : int {
+  done = 0,
+  runtimeError = 1,
+  usage = 2,
+  violations = 3,  ///< a check found some: with --strict, refused orders or blocked walks
+  interrupted = 130
+};
+
+}  // namespace enfilade::server

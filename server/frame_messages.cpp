@@ -1,0 +1,165 @@
+#include "server/frame_messages.hpp"
+
+#include <cstring>
+
+#include "render/image.hpp"
+#include "server/world_messages.hpp"
+
+namespace enfilade::server {
+
+namespace {
+
+using CameraOrError = std::variant<View, v1::Error>;
+
+const scene::AvatarView* avatarNamed(const scene::Snapshot& snapshot, const std::string& name) {
+  for (const scene::AvatarView& avatar : snapshot.avatars) {
+    if (avatar.name == name) return &avatar;
+  }
+  return nullptr;
+}
+
+v1::Error unknownAvatar(const std::string& name, const char* field) {
+  return errorOf(v1::ERROR_UNKNOWN_AVATAR,
+                 "no avatar '" + name + "' is in the world: spawn it and make a tick first", field);
+}
+
+CameraOrError eyesOf(const v1::AvatarEyes& eyes, const scene::Snapshot& snapshot, int width,
+                     int height) {
+  const scene::AvatarView* avatar = avatarNamed(snapshot, eyes.avatar());
+  if (!avatar) return unknownAvatar(eyes.avatar(), "eyes.avatar");
+  View view{render::firstPerson(*avatar, width, height), avatar->id};
+  if (eyes.has_fov_y()) view.camera.fovY = eyes.fov_y();
+  if (eyes.has_near()) view.camera.near = eyes.near();
+  if (eyes.has_far()) view.camera.far = eyes.far();
+  return view;
+}
+
+CameraOrError freeView(const v1::FreeCamera& free, const scene::Snapshot& snapshot, int width,
+                       int height) {
+  View view;
+  render::Camera& camera = view.camera;
+  camera.width = width;
+  camera.height = height;
+  camera.eye = vectorFrom(free.eye());
+  if (free.has_forward()) camera.forward = vectorFrom(free.forward());
+  if (free.has_target()) camera.forward = vectorFrom(free.target()) - camera.eye;
+  if (free.has_up()) camera.up = vectorFrom(free.up());
+  if (free.has_fov_y()) camera.fovY = free.fov_y();
+  if (free.has_height_y()) {
+    camera.projection = render::Camera::Projection::orthographic;
+    camera.heightY = free.height_y();
+  }
+  if (free.has_near()) camera.near = free.near();
+  if (free.has_far()) camera.far = free.far();
+  if (free.hide_avatar().empty()) return view;
+  const scene::AvatarView* avatar = avatarNamed(snapshot, free.hide_avatar());
+  if (!avatar) return unknownAvatar(free.hide_avatar(), "free.hide_avatar");
+  view.hidden = avatar->id;
+  return view;
+}
+
+template <typename T>
+void append(std::vector<std::uint8_t>& bytes, const std::vector<T>& values) {
+  const std::size_t start = bytes.size();
+  bytes.resize(start + values.size() * sizeof(T));
+  if (!values.empty()) std::memcpy(bytes.data() + start, values.data(), values.size() * sizeof(T));
+}
+
+void appendChannel(std::vector<std::uint8_t>& bytes, const render::Frame& frame,
+                   v1::Channel channel, v1::Encoding encoding) {
+  if (channel == v1::CHANNEL_IDS) {
+    append(bytes, frame.ids);
+  } else if (channel == v1::CHANNEL_DEPTH) {
+    append(bytes, frame.depth);
+  } else if (encoding == v1::ENCODING_PNG) {
+    append(bytes, render::encodePng(render::colourOf(frame)));
+  } else {
+    append(bytes, frame.rgb);
+  }
+}
+
+void addPlane(v1::Frame& message, std::vector<std::uint8_t>& attachment, const render::Frame& frame,
+              v1::Channel channel, v1::Encoding rgbEncoding) {
+  const bool png = channel == v1::CHANNEL_RGB && rgbEncoding == v1::ENCODING_PNG;
+  v1::Plane& plane = *message.add_planes();
+  plane.set_channel(channel);
+  plane.set_encoding(png ? v1::ENCODING_PNG : v1::ENCODING_RAW);
+  plane.set_width(message.width());
+  plane.set_height(message.height());
+  plane.set_offset(attachment.size());
+  appendChannel(attachment, frame, channel, plane.encoding());
+  plane.set_length(attachment.size() - plane.offset());
+}
+
+std::optional<v1::Error> channelProblem(const v1::FrameRequest& request) {
+  bool asked[4] = {};
+  for (const int channel : request.channels()) {
+    const bool known = channel >= v1::CHANNEL_RGB && channel <= v1::CHANNEL_DEPTH;
+    if (!known || asked[channel]) {
+      return errorOf(
+          v1::ERROR_BAD_MESSAGE,
+          "channels: give rgb, ids and depth each at most once, not " + std::to_string(channel),
+          "channels");
+    }
+    asked[channel] = true;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+CameraOrError viewFrom(const v1::FrameRequest& request, const scene::Snapshot& snapshot) {
+  if (auto problem = channelProblem(request)) return *problem;
+  constexpr std::uint32_t kMost = 4096;
+  if (request.width() < 1 || request.width() > kMost || request.height() < 1 ||
+      request.height() > kMost) {
+    return errorOf(v1::ERROR_BAD_CAMERA, "width and height: give 1 to 4096 pixels", "width");
+  }
+  const int width = static_cast<int>(request.width());
+  const int height = static_cast<int>(request.height());
+  CameraOrError view = errorOf(v1::ERROR_BAD_CAMERA, "view is missing: give eyes or free", "view");
+  if (request.has_eyes()) view = eyesOf(request.eyes(), snapshot, width, height);
+  if (request.has_free()) view = freeView(request.free(), snapshot, width, height);
+  if (const View* usable = std::get_if<View>(&view)) {
+    if (const auto why = render::refusal(usable->camera)) {
+      return errorOf(v1::ERROR_BAD_CAMERA, *why, why->substr(0, why->find_first_of(" :=")));
+    }
+  }
+  return view;
+}
+
+v1::Frame messageOf(const render::Frame& frame, double time, const v1::FrameRequest& request,
+                    std::vector<std::uint8_t>& attachment) {
+  v1::Frame message;
+  message.set_tick(frame.tick);
+  message.set_time(time);
+  message.set_renderer(frame.renderer);
+  message.set_software(frame.software);
+  *message.mutable_camera() = messageOf(frame.camera);
+  message.set_width(static_cast<std::uint32_t>(frame.camera.width));
+  message.set_height(static_cast<std::uint32_t>(frame.camera.height));
+  for (const int channel : request.channels()) {
+    addPlane(message, attachment, frame, static_cast<v1::Channel>(channel), request.rgb_encoding());
+  }
+  if (request.channels().empty()) {
+    addPlane(message, attachment, frame, v1::CHANNEL_RGB, request.rgb_encoding());
+  }
+  return message;
+}
+
+v1::FreeCamera messageOf(const render::Camera& camera) {
+  v1::FreeCamera message;
+  *message.mutable_eye() = messageOf(camera.eye);
+  *message.mutable_forward() = messageOf(camera.forward);
+  *message.mutable_up() = messageOf(camera.up);
+  if (camera.projection == render::Camera::Projection::orthographic) {
+    message.set_height_y(camera.heightY);
+  } else {
+    message.set_fov_y(camera.fovY);
+  }
+  message.set_near(camera.near);
+  message.set_far(camera.far);
+  return message;
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,31 @@
+// Requests for pictures as cameras, and pictures as messages with an attachment.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "protocol/enfilade.pb.h"
+#include "render/frame.hpp"
+
+namespace enfilade::server {
+
+/// What a picture is taken with: a camera that can be used, and whom it does not show.
+struct View {
+  render::Camera camera;
+  scene::EntityId hidden = 0;
+};
+
+/// The view asked for, or why it cannot be had.
+std::variant<View, v1::Error> viewFrom(const v1::FrameRequest& request,
+                                       const scene::Snapshot& snapshot);
+
+/// The message's attachment is appended to `attachment`. `time` is in seconds.
+v1::Frame messageOf(const render::Frame& frame, double time, const v1::FrameRequest& request,
+                    std::vector<std::uint8_t>& attachment);
+
+/// The free camera that asks for the same picture.
+v1::FreeCamera messageOf(const render::Camera& camera);
+
+}  // namespace enfilade::server

@@ -1,0 +1,45 @@
+// Pictures for clients: the render thread draws, a second thread turns frames into replies, so that
+// neither the tick nor a socket ever waits for a picture.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "scene/scene.hpp"
+#include "server/frame_messages.hpp"
+#include "server/outgoing_queue.hpp"
+
+namespace enfilade::server {
+
+struct FrameJob {
+  std::shared_ptr<const scene::Snapshot> snapshot;
+  View view;
+  v1::FrameRequest request;
+  std::uint64_t requestId = 0;
+};
+
+class FrameService {
+ public:
+  /// Without a device it stays without a renderer and says why; that is no failure.
+  explicit FrameService(std::shared_ptr<const scene::Scene> scene);
+  ~FrameService();
+  FrameService(const FrameService&) = delete;
+  FrameService& operator=(const FrameService&) = delete;
+
+  const std::string& deviceName() const;  ///< "" without a renderer
+  bool software() const;
+  const std::string& whyNone() const;  ///< "" with a renderer
+  std::uint64_t drawn() const;         ///< pictures so far
+
+  /// `done` gets the whole reply (a Frame or an Error) on the service's thread, in the order of the
+  /// calls.
+  void draw(FrameJob job, std::function<void(Buffer)> done);
+  /// Waits for what was asked; nothing may be asked afterwards.
+  void finish();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace enfilade::server

@@ -1,0 +1,41 @@
+// Takes connections and keeps count of them. On the network thread alone.
+//
+// Asio appears in this header, which only listener.cpp and server.cpp include.
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <memory>
+#include <vector>
+
+#include "server/command_line.hpp"
+#include "server/tick_loop.hpp"
+
+namespace enfilade::server {
+
+class Session;
+
+class Listener {
+ public:
+  /// Throws ServerError.
+  Listener(boost::asio::io_context& context, const Endpoint& where, TickLoop& loop,
+           const ServerLimits& limits);
+
+  std::uint16_t port() const { return port_; }
+  void start();
+  /// Takes no more connections and ends those that there are.
+  void stop();
+
+ private:
+  void accept();
+  void take(boost::asio::ip::tcp::socket socket);
+
+  boost::asio::ip::tcp::acceptor acceptor_;
+  const std::uint16_t port_;  ///< asked once: other threads want to know it
+  boost::asio::steady_timer pause_;
+  TickLoop& loop_;
+  const ServerLimits limits_;
+  std::vector<std::weak_ptr<Session>> sessions_;
+};
+
+}  // namespace enfilade::server

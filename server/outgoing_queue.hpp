@@ -1,0 +1,69 @@
+// What waits to be sent to one client. Replies and events are never dropped: when they would exceed
+// the bound, the client is too slow and gets last words instead. Of what is latest-only, a newer
+// one takes the place of an unsent older one. Callable from any thread.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+namespace google::protobuf {
+class MessageLite;
+}
+
+namespace enfilade::server {
+
+/// One encoded message, shared by all who receive it.
+using Buffer = std::shared_ptr<const std::vector<std::uint8_t>>;
+
+Buffer encodeShared(const google::protobuf::MessageLite& message);
+
+struct OutgoingBounds {
+  std::size_t bytes = 0;   ///< of unsent replies and events, pictures not counted
+  std::size_t frames = 0;  ///< unsent pictures
+};
+
+class OutgoingQueue {
+ public:
+  /// `tooSlow` are the last words above the bounds. `wake` is called, without the lock, whenever
+  /// there is something to send.
+  OutgoingQueue(const OutgoingBounds& bounds, Buffer tooSlow, std::function<void()> wake);
+
+  void push(Buffer message);
+  void pushFrame(Buffer message);
+  void pushLatest(Buffer message);
+  /// Drops the unsent latest-only message; true when there was one.
+  bool dropLatest();
+  /// Sends what is queued, then `last`, then the connection closes. Later pushes are dropped.
+  void finish(Buffer last);
+
+  struct Next {
+    Buffer message;     ///< null: nothing to send
+    bool last = false;  ///< close after this one
+  };
+  Next pop();
+
+  bool finished() const;    ///< its last words are queued or sent
+  bool overflowed() const;  ///< finished because the client is too slow
+
+ private:
+  enum class Kind : std::uint8_t { kept, frame, latest, last };
+  struct Item {
+    Kind kind;
+    Buffer message;
+  };
+  void append(Kind kind, Buffer message);
+
+  const OutgoingBounds bounds_;
+  const Buffer tooSlow_;
+  const std::function<void()> wake_;
+  mutable std::mutex mutex_;
+  std::deque<Item> items_;
+  std::size_t bytes_ = 0, frames_ = 0;
+  bool finished_ = false, overflowed_ = false;
+};
+
+}  // namespace enfilade::server

@@ -1,0 +1,42 @@
+#include "server/program.hpp"
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <cstdio>
+
+#include "server/command_line.hpp"
+#include "server/serve.hpp"
+#include "server/walk_run.hpp"
+
+namespace enfilade::server {
+namespace {
+
+struct Do {
+  ExitCode operator()(const ServeCommand& command) const { return serve(command); }
+  ExitCode operator()(const ReplayCommand& command) const { return replay(command); }
+  ExitCode operator()(const WalkCommand& command) const { return walk(command); }
+};
+
+void logToStderr() {
+  auto logger = spdlog::get("enfilade");
+  if (!logger) logger = spdlog::stderr_color_mt("enfilade");
+  logger->set_pattern("%H:%M:%S.%e %^%l%$ %v");
+  spdlog::set_default_logger(std::move(logger));
+}
+
+}  // namespace
+
+ExitCode runProgram(int argc, const char* const* argv) {
+  logToStderr();
+  const auto command = readCommandLine(argc, argv);
+  if (const auto* code = std::get_if<ExitCode>(&command)) return *code;
+  try {
+    return std::visit(Do{}, std::get<ProgramCommand>(command));
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "enfilade: %s\n", error.what());
+    return ExitCode::runtimeError;
+  }
+}
+
+}  // namespace enfilade::server

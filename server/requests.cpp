@@ -1,0 +1,304 @@
+#include "server/requests.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "protocol/framing.hpp"
+#include "server/version.hpp"
+#include "server/world_messages.hpp"
+
+namespace enfilade::server {
+
+namespace {
+
+/// One request on its way to its answer.
+struct Asked {
+  ServedWorld& served;
+  ClientId id;
+  Client& client;
+  const v1::ClientMessage& message;
+};
+
+std::uint64_t lastTick(const ServedWorld& served) {
+  return served.world.snapshot()->tick;
+}
+
+void reply(const Asked& asked, v1::ServerMessage message) {
+  message.set_reply_to(asked.message.request_id());
+  send(asked.client, message);
+}
+
+void replyError(const Asked& asked, v1::Error error) {
+  sendError(asked.client, asked.message.request_id(), std::move(error));
+}
+
+void fill(v1::Clock& message, const ServedClock& clock) {
+  message.set_mode(clock.mode);
+  if (clock.mode == v1::Clock::MODE_FREE_RUN) message.set_speed(clock.speed);
+  message.set_has_driver(clock.driver.has_value());
+}
+
+// ---- commands ----------------------------------------------------------------------------------
+
+std::optional<v1::Error> ownershipProblem(const Asked& asked, const v1::Command& command) {
+  const auto owner = asked.served.owners.find(command.avatar());
+  if (owner == asked.served.owners.end() || owner->second.client == asked.id) return std::nullopt;
+  return errorOf(v1::ERROR_NOT_ALLOWED,
+                 "avatar '" + command.avatar() + "' belongs to another client: take another name",
+                 "avatar");
+}
+
+std::optional<v1::Error> limitProblem(const Asked& asked, const v1::Command& command) {
+  const ServerLimits& limits = asked.served.limits;
+  const auto most = static_cast<int>(limits.waypoints);
+  if (command.has_walk() && command.walk().along_size() > most) {
+    return errorOf(v1::ERROR_TOO_LARGE,
+                   "walk.along has " + std::to_string(command.walk().along_size()) +
+                       " way points; give at most " + std::to_string(most),
+                   "walk.along");
+  }
+  const bool isNew = command.has_spawn() && !asked.served.owners.contains(command.avatar());
+  if (isNew && asked.served.owners.size() >= limits.avatars) {
+    return errorOf(
+        v1::ERROR_TOO_LARGE,
+        "the world has its " + std::to_string(limits.avatars) + " avatars: wait until one leaves",
+        "spawn");
+  }
+  return std::nullopt;
+}
+
+std::optional<v1::Error> submitCommand(const Asked& asked, const v1::Command& command) {
+  if (auto problem = ownershipProblem(asked, command)) return problem;
+  if (auto problem = limitProblem(asked, command)) return problem;
+  std::variant<scene::Command, v1::Error> order = commandFrom(command);
+  if (auto* error = std::get_if<v1::Error>(&order)) return std::move(*error);
+  auto refused = scene::submit(asked.served.world, std::get<scene::Command>(std::move(order)));
+  if (refused) return refusalOf(command, *refused);
+  if (command.has_spawn()) {
+    Ownership& owner = asked.served.owners[command.avatar()];
+    owner.client = asked.id;
+    owner.pendingSpawns.push_back(command.tag());
+  }
+  return std::nullopt;
+}
+
+void answer(const Asked& asked, const v1::Command& command) {
+  v1::ServerMessage message;
+  v1::CommandReply& body = *message.mutable_command();
+  auto error = submitCommand(asked, command);
+  body.set_accepted(!error);
+  if (error) {
+    *body.mutable_error() = std::move(*error);
+  } else {
+    body.set_tick(lastTick(asked.served) + 1);
+  }
+  reply(asked, std::move(message));
+}
+
+// ---- time --------------------------------------------------------------------------------------
+
+/// Makes the client the driver where there is none.
+bool takeClock(const Asked& asked) {
+  std::optional<ClientId>& driver = asked.served.clock.driver;
+  if (!driver) driver = asked.id;
+  if (driver == asked.id) return true;
+  replyError(asked, errorOf(v1::ERROR_NOT_ALLOWED,
+                            "another client drives the clock: wait until it leaves"));
+  return false;
+}
+
+void answer(const Asked& asked, const v1::Step& step) {
+  const std::uint32_t most = asked.served.limits.ticksPerStep;
+  if (step.ticks() < 1 || step.ticks() > most) {
+    return replyError(asked, errorOf(v1::ERROR_BAD_MESSAGE,
+                                     "step.ticks = " + std::to_string(step.ticks()) +
+                                         ": give 1 to " + std::to_string(most),
+                                     "step.ticks"));
+  }
+  if (asked.served.clock.mode != v1::Clock::MODE_LOCKSTEP) {
+    return replyError(asked, errorOf(v1::ERROR_NOT_ALLOWED,
+                                     "the clock is not in lockstep: set it to lockstep first"));
+  }
+  if (takeClock(asked)) {
+    asked.client.step = {asked.message.request_id(), step.ticks(), step.avatars()};
+  }
+}
+
+void answer(const Asked& asked, const v1::SetClock& wanted) {
+  constexpr double kFastest = 1000;
+  const double speed = wanted.free_run().speed();
+  if (wanted.mode_case() == v1::SetClock::MODE_NOT_SET) {
+    return replyError(asked, errorOf(v1::ERROR_BAD_MESSAGE,
+                                     "mode is missing: give lockstep, free_run or pause", "mode"));
+  }
+  if (!(speed >= 0 && speed <= kFastest)) {
+    return replyError(asked, errorOf(v1::ERROR_BAD_MESSAGE,
+                                     "free_run.speed = " + std::to_string(speed) +
+                                         ": give more than 0 and at most 1000",
+                                     "free_run.speed"));
+  }
+  if (!takeClock(asked)) return;
+  ServedClock& clock = asked.served.clock;
+  clock.mode = wanted.has_lockstep()   ? v1::Clock::MODE_LOCKSTEP
+               : wanted.has_free_run() ? v1::Clock::MODE_FREE_RUN
+                                       : v1::Clock::MODE_PAUSED;
+  clock.speed = speed > 0 ? speed : 1;
+  clock.nextTick = std::chrono::steady_clock::now();
+  v1::ServerMessage message;
+  fill(*message.mutable_set_clock()->mutable_clock(), clock);
+  message.mutable_set_clock()->set_tick(lastTick(asked.served));
+  reply(asked, std::move(message));
+}
+
+// ---- listening and looking ---------------------------------------------------------------------
+
+void answer(const Asked& asked, const v1::Subscribe& subscription) {
+  if (!(subscription.state_rate() >= 0 && subscription.state_rate() <= 1e6)) {
+    return replyError(
+        asked, errorOf(v1::ERROR_BAD_MESSAGE, "subscribe.state_rate: give 0 to 1000000 a second",
+                       "subscribe.state_rate"));
+  }
+  asked.client.subscription = subscription;
+  asked.client.nextStateTime = 0;
+  v1::ServerMessage message;
+  message.mutable_subscribe()->set_tick(lastTick(asked.served));
+  if (subscription.contacts()) {
+    for (const auto& [pair, event] : asked.served.live) {
+      *message.mutable_subscribe()->add_live() = event;
+    }
+  }
+  reply(asked, std::move(message));
+}
+
+void answer(const Asked& asked, const v1::FrameRequest& request, const PostToTickThread& post) {
+  ServedWorld& served = asked.served;
+  const auto snapshot = served.world.snapshot();
+  if (request.has_tick() && request.tick() != snapshot->tick) {
+    return replyError(asked, errorOf(v1::ERROR_TICK_GONE,
+                                     "the last tick is " + std::to_string(snapshot->tick) +
+                                         ", not " + std::to_string(request.tick()),
+                                     "frame.tick"));
+  }
+  if (served.frames.deviceName().empty()) {
+    return replyError(asked, errorOf(v1::ERROR_NO_RENDERER, served.frames.whyNone()));
+  }
+  auto view = viewFrom(request, *snapshot);
+  if (auto* error = std::get_if<v1::Error>(&view)) return replyError(asked, std::move(*error));
+  asked.client.frameUnderWay = asked.message.request_id();
+  FrameJob job{snapshot, std::get<View>(view), request, asked.message.request_id()};
+  served.frames.draw(std::move(job), [out = asked.client.out, id = asked.id, post](Buffer whole) {
+    out->pushFrame(std::move(whole));
+    post([id, post](ServedWorld& then) {
+      const auto client = then.clients.find(id);
+      if (client == then.clients.end()) return;
+      client->second.frameUnderWay.reset();
+      answerWaiting(then, id, post);
+    });
+  });
+}
+
+v1::Entity entityOf(const scene::World& world, std::uint32_t id) {
+  const auto& objects = world.scene().model().objects;
+  v1::Entity entity;
+  entity.set_id(id);
+  entity.set_name(scene::nameOf(world, id));
+  if (id >= 1 && id <= objects.size()) {
+    entity.set_kind(v1::Entity::KIND_OBJECT);
+    entity.set_global_id(objects[id - 1].globalId);
+  } else if (!entity.name().empty()) {
+    entity.set_kind(v1::Entity::KIND_AVATAR);
+  }
+  return entity;
+}
+
+void answer(const Asked& asked, const v1::DescribeEntities& wanted) {
+  const scene::World& world = asked.served.world;
+  v1::ServerMessage message;
+  v1::EntityNames& names = *message.mutable_names();
+  for (const std::uint32_t id : wanted.ids()) *names.add_entities() = entityOf(world, id);
+  if (wanted.ids().empty()) {
+    const auto objects = static_cast<std::uint32_t>(world.scene().model().objects.size());
+    for (std::uint32_t id = 1; id <= objects; ++id) *names.add_entities() = entityOf(world, id);
+    for (const scene::AvatarView& avatar : world.snapshot()->avatars) {
+      *names.add_entities() = entityOf(world, avatar.id);
+    }
+  }
+  reply(asked, std::move(message));
+}
+
+void answerMetrics(const Asked& asked) {
+  ServedWorld& served = asked.served;
+  v1::ServerMessage message;
+  v1::Metrics& metrics = *message.mutable_metrics();
+  metrics = served.statistics.metrics();
+  metrics.set_clients(static_cast<std::uint32_t>(served.clients.size()));
+  metrics.set_avatars(static_cast<std::uint32_t>(served.world.snapshot()->avatars.size()));
+  metrics.set_frames(served.frames.drawn());
+  metrics.set_dropped(served.droppedStates);
+  reply(asked, std::move(message));
+}
+
+void answer(const Asked& asked, const PostToTickThread& post) {
+  const v1::ClientMessage& message = asked.message;
+  switch (message.body_case()) {
+    case v1::ClientMessage::kCommand:
+      return answer(asked, message.command());
+    case v1::ClientMessage::kStep:
+      return answer(asked, message.step());
+    case v1::ClientMessage::kSetClock:
+      return answer(asked, message.set_clock());
+    case v1::ClientMessage::kSubscribe:
+      return answer(asked, message.subscribe());
+    case v1::ClientMessage::kFrame:
+      return answer(asked, message.frame(), post);
+    case v1::ClientMessage::kDescribe:
+      return answer(asked, message.describe());
+    case v1::ClientMessage::kMetrics:
+      return answerMetrics(asked);
+    case v1::ClientMessage::kHello:
+      return replyError(asked, errorOf(v1::ERROR_NOT_ALLOWED, "hello was said already"));
+    case v1::ClientMessage::kBye:  // the session's to take
+    case v1::ClientMessage::BODY_NOT_SET:
+      break;
+  }
+  replyError(asked,
+             errorOf(v1::ERROR_UNSUPPORTED, "this server does not know the request", "body"));
+}
+
+}  // namespace
+
+v1::Welcome welcomeOf(const ServedWorld& served) {
+  v1::Welcome welcome;
+  welcome.set_protocol_version(protocol::kVersion);
+  welcome.set_server_version(kServerVersion);
+  welcome.add_capabilities("free_run");
+  if (!served.frames.deviceName().empty()) welcome.add_capabilities("frames");
+  *welcome.mutable_scene() = messageOf(served.world.scene());
+  *welcome.mutable_policies() = messageOf(served.world.lengths());
+  v1::Limits& limits = *welcome.mutable_limits();
+  limits.set_max_message(protocol::kServerTakes.total);
+  limits.set_max_avatars(served.limits.avatars);
+  limits.set_max_picture_width(served.limits.pictureSide);
+  limits.set_max_picture_height(served.limits.pictureSide);
+  limits.set_max_ticks_per_step(served.limits.ticksPerStep);
+  limits.set_max_waypoints(served.limits.waypoints);
+  welcome.set_tick(lastTick(served));
+  welcome.set_renderer(served.frames.deviceName());
+  welcome.set_software_renderer(served.frames.software());
+  fill(*welcome.mutable_clock(), served.clock);
+  return welcome;
+}
+
+void answerWaiting(ServedWorld& served, ClientId id, const PostToTickThread& post) {
+  const auto found = served.clients.find(id);
+  if (found == served.clients.end()) return;
+  Client& client = found->second;
+  while (!client.waiting.empty() && !client.step && !client.frameUnderWay) {
+    const WaitingRequest request = std::move(client.waiting.front());
+    client.waiting.pop_front();
+    client.waitingBytes -= request.bytes;
+    answer({served, id, client, request.message}, post);
+  }
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,67 @@
+#include "server/serve.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <csignal>
+#include <cstdio>
+#include <ctime>
+#include <nlohmann/json.hpp>
+
+#include "server/load_scene.hpp"
+#include "server/server.hpp"
+#include "server/world_messages.hpp"
+
+namespace enfilade::server {
+namespace {
+
+void tellReady(const Server& server, const scene::Scene& scene, const Endpoint& listen) {
+  char hash[17];
+  std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(scene.hash()));
+  const nlohmann::ordered_json ready{{"ready", true},
+                                     {"port", server.port()},
+                                     {"address", listen.host},
+                                     {"scene", messageOf(scene).source()},
+                                     {"scene_hash", hash},
+                                     {"objects", scene.model().objects.size()},
+                                     {"renderer", server.rendererName()}};
+  const auto replace = nlohmann::ordered_json::error_handler_t::replace;
+  std::printf("%s\n", ready.dump(-1, ' ', false, replace).c_str());
+  std::fflush(stdout);
+}
+
+/// Signals that end the program wait until somebody asks for them.
+sigset_t holdEndingSignals() {
+  sigset_t ending;
+  sigemptyset(&ending);
+  sigaddset(&ending, SIGINT);
+  sigaddset(&ending, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &ending, nullptr);
+  return ending;
+}
+
+/// The signal that came. Throws when the server failed before one did.
+int awaitEndingSignal(const sigset_t& ending, const Server& server) {
+  for (;;) {
+    const timespec moment{0, 250'000'000};
+    const int signal = sigtimedwait(&ending, nullptr, &moment);
+    if (signal > 0) return signal;
+    server.rethrowFailure();
+  }
+}
+
+}  // namespace
+
+ExitCode serve(const ServeCommand& command) {
+  const auto scene = loadScene(command.model);
+  // From here on: the threads that the server starts inherit the mask.
+  const sigset_t ending = holdEndingSignals();
+  Server server(scene, command.listen);
+  tellReady(server, *scene, command.listen);
+  const int signal = awaitEndingSignal(ending, server);
+  spdlog::info("{}: finishing the tick and telling the clients",
+               signal == SIGINT ? "interrupted" : "told to stop");
+  server.stop();
+  return signal == SIGINT ? ExitCode::interrupted : ExitCode::done;
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,191 @@
+#include "server/served_world.hpp"
+
+#include <algorithm>
+
+#include "protocol/framing.hpp"
+#include "server/world_messages.hpp"
+
+namespace enfilade::server {
+
+namespace {
+
+struct TickTold {
+  std::uint64_t tick = 0;
+  double time = 0;
+  std::vector<v1::ContactEvent> contacts;
+  std::vector<v1::Notice> notices;
+};
+
+TickTold messagesOf(const scene::World& world, const std::vector<scene::ContactEvent>& contacts,
+                    const std::vector<scene::Notice>& notices) {
+  const scene::Snapshot& snapshot = *world.snapshot();
+  TickTold told{snapshot.tick, snapshot.time, {}, {}};
+  for (const scene::ContactEvent& event : contacts) {
+    told.contacts.push_back(messageOf(world, event));
+  }
+  for (const scene::Notice& notice : notices) {
+    told.notices.push_back(messageOf(world, notice, snapshot.tick));
+  }
+  return told;
+}
+
+bool wants(const v1::Subscribe& subscription, const v1::ContactEvent& event) {
+  return event.kind() == v1::ContactEvent::KIND_NEAR ? subscription.near_misses()
+                                                     : subscription.contacts();
+}
+
+void sendEvents(Client& client, const TickTold& told) {
+  v1::ServerMessage message;
+  v1::TickEvents& events = *message.mutable_events();
+  for (const v1::ContactEvent& event : told.contacts) {
+    if (wants(client.subscription, event)) *events.add_contacts() = event;
+  }
+  if (client.subscription.notices()) {
+    events.mutable_notices()->Assign(told.notices.begin(), told.notices.end());
+  }
+  if (events.contacts().empty() && events.notices().empty()) return;
+  events.set_sequence(++client.sequence);
+  events.set_tick(told.tick);
+  events.set_time(told.time);
+  send(client, message);
+}
+
+void sendState(ServedWorld& served, Client& client, const scene::Snapshot& snapshot) {
+  const double tick = served.world.lengths().tick;
+  if (!client.subscription.state() || snapshot.time + tick / 2 < client.nextStateTime) return;
+  const double rate = client.subscription.state_rate();
+  client.nextStateTime = snapshot.time + (rate > 0 ? 1 / rate : 0);
+  if (client.out->dropLatest()) {
+    ++client.droppedStates;
+    ++served.droppedStates;
+  } else {
+    client.droppedStates = 0;
+  }
+  v1::ServerMessage message;
+  v1::State& state = *message.mutable_state();
+  state.set_tick(snapshot.tick);
+  state.set_time(snapshot.time);
+  state.set_hash(snapshot.stateHash);
+  for (const scene::AvatarView& avatar : snapshot.avatars) *state.add_avatars() = messageOf(avatar);
+  state.set_dropped(client.droppedStates);
+  client.out->pushLatest(encodeShared(message));
+}
+
+void finishStep(ServedWorld& served, Client& client, const scene::Snapshot& snapshot) {
+  if (!client.step || --client.step->remaining > 0) return;
+  v1::ServerMessage message;
+  message.set_reply_to(client.step->requestId);
+  v1::StepReply& reply = *message.mutable_step();
+  reply.set_tick(snapshot.tick);
+  reply.set_time(snapshot.time);
+  reply.set_state_hash(snapshot.stateHash);
+  reply.set_idle(served.idle);
+  if (client.step->avatars) {
+    for (const scene::AvatarView& avatar : snapshot.avatars) {
+      *reply.add_avatars() = messageOf(avatar);
+    }
+  }
+  client.step.reset();
+  send(client, message);
+}
+
+void keepLive(ServedWorld& served, const TickTold& told) {
+  for (const v1::ContactEvent& event : told.contacts) {
+    const std::pair pair{event.a(), event.b()};
+    if (event.kind() == v1::ContactEvent::KIND_BEGIN) served.live[pair] = event;
+    if (event.kind() == v1::ContactEvent::KIND_END) served.live.erase(pair);
+  }
+}
+
+bool isPresent(const scene::Snapshot& snapshot, const std::string& name) {
+  return std::any_of(snapshot.avatars.begin(), snapshot.avatars.end(),
+                     [&](const scene::AvatarView& avatar) { return avatar.name == name; });
+}
+
+/// A name is free again when its avatar is gone and no spawn of its owner is on the way.
+void settleOwner(ServedWorld& served, const scene::Notice& notice) {
+  const auto found = served.owners.find(notice.avatar);
+  if (found == served.owners.end()) return;
+  Ownership& owner = found->second;
+  const bool present = isPresent(*served.world.snapshot(), notice.avatar);
+  const auto spawn = std::find(owner.pendingSpawns.begin(), owner.pendingSpawns.end(), notice.tag);
+  if (spawn != owner.pendingSpawns.end()) {
+    using Kind = scene::Notice::Kind;
+    if (notice.kind == Kind::spawned) owner.pendingSpawns.erase(spawn);
+    // A refused spawn drops the queue, and with it the spawns that wait there.
+    if (notice.kind == Kind::refused && !present) owner.pendingSpawns.clear();
+  }
+  if (!present && owner.pendingSpawns.empty()) served.owners.erase(found);
+}
+
+void answerClosing(Client& client) {
+  const v1::Error error = errorOf(v1::ERROR_SHUTTING_DOWN, "the server ends");
+  if (client.frameUnderWay) sendError(client, *client.frameUnderWay, error);
+  if (client.step) sendError(client, client.step->requestId, error);
+  for (const WaitingRequest& request : client.waiting) {
+    sendError(client, request.message.request_id(), error);
+  }
+}
+
+}  // namespace
+
+ServedWorld::ServedWorld(std::shared_ptr<const scene::Scene> scene, FrameService& frameService,
+                         const ServerLimits& serverLimits)
+    : world(std::move(scene)), frames(frameService), limits(serverLimits) {}
+
+void send(Client& client, const v1::ServerMessage& message) {
+  client.out->push(encodeShared(message));
+}
+
+void sendError(Client& client, std::uint64_t requestId, v1::Error error) {
+  v1::ServerMessage message;
+  message.set_reply_to(requestId);
+  *message.mutable_error() = std::move(error);
+  send(client, message);
+}
+
+void advance(ServedWorld& served) {
+  const scene::TickReport report = scene::tick(served.world);
+  served.statistics.add(report);
+  served.idle = report.idle;
+  const TickTold told = messagesOf(served.world, report.contacts, report.notices);
+  for (const scene::Notice& notice : report.notices) settleOwner(served, notice);
+  keepLive(served, told);
+  for (auto& [id, client] : served.clients) {
+    sendEvents(client, told);
+    sendState(served, client, *report.snapshot);
+    finishStep(served, client, *report.snapshot);
+  }
+}
+
+void removeClient(ServedWorld& served, ClientId id) {
+  if (served.clients.erase(id) == 0) return;
+  if (served.clock.driver == id) served.clock.driver.reset();
+  for (auto owner = served.owners.begin(); owner != served.owners.end();) {
+    if (owner->second.client != id) {
+      ++owner;
+      continue;
+    }
+    // Leave queues; Drive first empties the queue, so that nobody walks on without an owner.
+    scene::submit(served.world, {owner->first, scene::Drive{}, 0});
+    scene::submit(served.world, {owner->first, scene::Leave{}, 0});
+    owner = served.owners.erase(owner);
+  }
+}
+
+void closeWorld(ServedWorld& served) {
+  const auto ended = scene::endContacts(served.world, scene::ContactEvent::Reason::shutdown);
+  const TickTold told = messagesOf(served.world, ended, {});
+  v1::ServerMessage bye;
+  bye.mutable_bye()->set_code(v1::ERROR_SHUTTING_DOWN);
+  bye.mutable_bye()->set_reason("the server ends");
+  const Buffer last = encodeShared(bye);
+  for (auto& [id, client] : served.clients) {
+    sendEvents(client, told);
+    answerClosing(client);
+    client.out->finish(last);
+  }
+  served.clients.clear();
+}
+
+}  // namespace enfilade::server

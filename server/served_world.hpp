@@ -1,0 +1,88 @@
+// The world and everyone who is connected to it. Only the tick thread reads or changes this.
+#pragma once
+
+#include <chrono>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "protocol/enfilade.pb.h"
+#include "scene/world.hpp"
+#include "server/frame_service.hpp"
+#include "server/outgoing_queue.hpp"
+#include "server/server_limits.hpp"
+#include "server/tick_statistics.hpp"
+
+namespace enfilade::server {
+
+using ClientId = std::uint64_t;
+
+/// A Step that is being made; the client's later requests wait for it.
+struct StepUnderWay {
+  std::uint64_t requestId = 0;
+  std::uint32_t remaining = 0;  ///< ticks
+  bool avatars = false;
+};
+
+struct WaitingRequest {
+  v1::ClientMessage message;
+  std::size_t bytes = 0;
+};
+
+struct Client {
+  std::string name;
+  std::shared_ptr<OutgoingQueue> out;
+  v1::Subscribe subscription;
+  std::uint64_t sequence = 0;          ///< of the last TickEvents
+  double nextStateTime = 0;            ///< seconds of simulated time
+  std::uint64_t droppedStates = 0;     ///< since the last one that was sent
+  std::deque<WaitingRequest> waiting;  ///< replies keep the order of the requests
+  std::size_t waitingBytes = 0;
+  std::optional<StepUnderWay> step;
+  std::optional<std::uint64_t> frameUnderWay;  ///< its request
+};
+
+/// Who may command an avatar, from its spawn order until it is gone.
+struct Ownership {
+  ClientId client = 0;
+  std::vector<std::uint64_t> pendingSpawns;  ///< tags of those ordered and not yet told about
+};
+
+struct ServedClock {
+  v1::Clock::Mode mode = v1::Clock::MODE_LOCKSTEP;
+  double speed = 1;  ///< simulated seconds per second
+  std::chrono::steady_clock::time_point nextTick;
+  std::optional<ClientId> driver;
+};
+
+struct ServedWorld {
+  ServedWorld(std::shared_ptr<const scene::Scene> scene, FrameService& frameService,
+              const ServerLimits& serverLimits);
+
+  scene::World world;
+  FrameService& frames;
+  ServerLimits limits;
+  ServedClock clock;
+  std::map<ClientId, Client> clients;
+  std::map<std::string, Ownership> owners;  ///< by the avatar's name
+  std::map<std::pair<scene::EntityId, scene::EntityId>, v1::ContactEvent> live;
+  TickStatistics statistics;
+  bool idle = true;                 ///< as the last tick told
+  std::uint64_t droppedStates = 0;  ///< of all clients
+};
+
+/// Makes one tick and tells everyone what they subscribed to.
+void advance(ServedWorld& served);
+
+/// Takes a client out; its avatars leave at the next tick.
+void removeClient(ServedWorld& served, ClientId id);
+
+/// Ends all contacts, answers what is open, and says goodbye to all.
+void closeWorld(ServedWorld& served);
+
+void send(Client& client, const v1::ServerMessage& message);
+void sendError(Client& client, std::uint64_t requestId, v1::Error error);
+
+}  // namespace enfilade::server

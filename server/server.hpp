@@ -1,0 +1,40 @@
+// A scene served to clients over TCP.
+#pragma once
+
+#include <memory>
+#include <stdexcept>
+
+#include "scene/scene.hpp"
+#include "server/command_line.hpp"
+#include "server/server_limits.hpp"
+
+namespace enfilade::server {
+
+/// Names the address and the remedy.
+struct ServerError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+class Server {
+ public:
+  /// Clients may connect when this returns. Throws ServerError: the address is not this machine's
+  /// own (loopback), or cannot be had.
+  Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
+         const ServerLimits& limits = {});
+  ~Server();  ///< stops
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  std::uint16_t port() const;
+  const std::string& rendererName() const;  ///< "" without a renderer
+  /// Throws what ended the tick thread, if anything did: a fault of ours.
+  void rethrowFailure() const;
+  /// Finishes the tick, ends the contacts, tells the clients, and closes.
+  void stop();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace enfilade::server

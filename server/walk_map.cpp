@@ -1,0 +1,251 @@
+// Steps: find the storeys where the walk went (peaks of a histogram of the feet's heights); take a
+// plan of each, cut 2 m above its floor, of the part of the scene that was walked in; draw paths,
+// contacts and captures on the plan of the storey that they are nearest to; put the plans below one
+// another with a title and a legend.
+#include "server/walk_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace enfilade::server {
+namespace {
+
+using render::Colour;
+using render::Image;
+
+constexpr double kBin = 0.25;         // metres of height
+constexpr double kStoreyApart = 2.0;  // metres; nearer peaks are one storey
+constexpr double kLeastShare = 0.08;  // of all ticks, for a storey to get its plan
+constexpr std::size_t kMostStoreys = 3;
+constexpr double kCut = 2.0;                       // metres above the floor
+constexpr double kBelow = 1.0;                     // metres below the floor that are still drawn
+constexpr double kMargin = 4.0;                    // metres around what was walked
+constexpr double kWidest = 1600, kHighest = 1100;  // pixels of one plan
+constexpr int kLine = 26;                          // pixels of a line of text
+constexpr double kFloorNormal = 0.7;               // steeper contacts are with floors and stairs
+
+constexpr Colour kInk{40, 40, 46}, kPaper{250, 249, 246}, kContact{214, 40, 40}, kStop{120, 0, 120},
+    kCamera{20, 20, 24};
+constexpr std::array<Colour, 8> kPathColours{{{0, 104, 214},
+                                              {224, 112, 0},
+                                              {0, 140, 80},
+                                              {150, 60, 190},
+                                              {190, 30, 90},
+                                              {0, 150, 170},
+                                              {120, 100, 0},
+                                              {90, 90, 100}}};
+
+Colour colourOf(std::size_t path) {
+  return kPathColours[path % kPathColours.size()];
+}
+
+struct Storey {
+  double floor = 0;
+  render::Camera camera;
+  Image image;
+};
+
+Storey* nearestStorey(std::vector<Storey>& storeys, double height) {
+  Storey* nearest = nullptr;
+  for (Storey& storey : storeys) {
+    if (!nearest || std::abs(storey.floor - height) < std::abs(nearest->floor - height)) {
+      nearest = &storey;
+    }
+  }
+  return nearest;
+}
+
+scene::Box walkedBounds(const std::vector<WalkedPath>& paths) {
+  scene::Box bounds;
+  for (const WalkedPath& path : paths) {
+    for (const Vec3& feet : path.feet) bounds.include(feet);
+  }
+  return collision::grown(bounds, kMargin);
+}
+
+render::Camera planOf(const scene::Box& bounds, double floor) {
+  const Vec3 size = bounds.size();
+  const double scale = std::min(kWidest / size.x(), kHighest / size.z());
+  const int width = std::max(64, static_cast<int>(size.x() * scale));
+  const int height = std::max(64, static_cast<int>(size.z() * scale));
+  return render::plan(bounds, floor - kBelow, floor + kCut, width, height);
+}
+
+struct Pixel {
+  double x = 0, y = 0;
+};
+
+Pixel pixelOf(const Storey& storey, const Vec3& point) {
+  const Vec3 projected = render::project(storey.camera, point);
+  return {projected.x(), projected.y()};
+}
+
+void drawDot(Storey& storey, const Vec3& point, double radius, Colour colour) {
+  const Pixel at = pixelOf(storey, point);
+  render::drawDisc(storey.image, at.x, at.y, radius + 1.5, kPaper);
+  render::drawDisc(storey.image, at.x, at.y, radius, colour);
+}
+
+void drawPath(std::vector<Storey>& storeys, const WalkedPath& path, Colour colour) {
+  for (std::size_t i = 1; i < path.feet.size(); ++i) {
+    Storey& storey = *nearestStorey(storeys, path.feet[i].y());
+    const Pixel from = pixelOf(storey, path.feet[i - 1]), to = pixelOf(storey, path.feet[i]);
+    if (from.x == to.x && from.y == to.y) continue;
+    render::drawLine(storey.image, from.x, from.y, to.x, to.y, 3, colour);
+  }
+  if (path.feet.empty()) return;
+  drawDot(*nearestStorey(storeys, path.feet.front().y()), path.feet.front(), 6, colour);
+}
+
+/// A small wedge that opens where the eyes look.
+void drawCapture(std::vector<Storey>& storeys, const MapCapture& capture) {
+  constexpr double kLength = 16, kHalfWidth = 8;
+  Storey& storey = *nearestStorey(storeys, capture.eye.y() - 1.6);
+  const Pixel eye = pixelOf(storey, capture.eye);
+  const double length = std::hypot(capture.gaze.x(), capture.gaze.z());
+  const double x = length > 0 ? capture.gaze.x() / length : 1;
+  const double y = length > 0 ? capture.gaze.z() / length : 0;
+  const Pixel left{eye.x + kLength * x + kHalfWidth * y, eye.y + kLength * y - kHalfWidth * x};
+  const Pixel right{eye.x + kLength * x - kHalfWidth * y, eye.y + kLength * y + kHalfWidth * x};
+  Image& image = storey.image;
+  render::drawLine(image, eye.x, eye.y, left.x, left.y, 2, kCamera);
+  render::drawLine(image, left.x, left.y, right.x, right.y, 2, kCamera);
+  render::drawLine(image, right.x, right.y, eye.x, eye.y, 2, kCamera);
+  render::drawText(image, static_cast<int>(eye.x) + 6, static_cast<int>(eye.y) + 6, capture.name, 1,
+                   kCamera);
+}
+
+/// Contacts with walls and furniture; every walker touches floors all the time.
+void drawContacts(std::vector<Storey>& storeys, const WalkTrace& trace) {
+  for (const MapContact& contact : trace.contacts) {
+    if (std::abs(contact.normal.y()) > kFloorNormal) continue;
+    drawDot(*nearestStorey(storeys, contact.point.y() - 0.8), contact.point, 3.5, kContact);
+  }
+  for (const MapContact& stop : trace.stops) {
+    drawDot(*nearestStorey(storeys, stop.point.y()), stop.point, 6, kStop);
+  }
+}
+
+/// Softens the plan, so that what is drawn on it is read first.
+void fade(Image& image) {
+  for (std::uint8_t& value : image.rgb) value = static_cast<std::uint8_t>(255 - (255 - value) / 2);
+}
+
+void paste(Image& onto, const Image& image, int left, int top) {
+  for (int y = 0; y < image.height; ++y) {
+    const auto from = image.rgb.begin() + static_cast<std::ptrdiff_t>(y) * image.width * 3;
+    const auto to =
+        onto.rgb.begin() + (static_cast<std::ptrdiff_t>(top + y) * onto.width + left) * 3;
+    std::copy(from, from + static_cast<std::ptrdiff_t>(image.width) * 3, to);
+  }
+}
+
+Image blankImage(int width, int height) {
+  Image image{width, height, {}};
+  image.rgb.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 3);
+  for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = kPaper[i % 3];
+  return image;
+}
+
+struct LegendEntry {
+  std::string text;
+  Colour colour;
+};
+
+std::vector<LegendEntry> legendOf(const WalkTrace& trace) {
+  std::vector<LegendEntry> entries;
+  for (std::size_t i = 0; i < trace.paths.size(); ++i) {
+    entries.push_back({trace.paths[i].avatar, colourOf(i)});
+  }
+  entries.push_back({"contact begins (floors left out)", kContact});
+  entries.push_back({"walk ends blocked", kStop});
+  entries.push_back({"picture taken", kCamera});
+  return entries;
+}
+
+void drawLegend(Image& image, const std::vector<LegendEntry>& entries, int top) {
+  int y = top;
+  for (const LegendEntry& entry : entries) {
+    render::drawDisc(image, 24, y + 7, 6, entry.colour);
+    render::drawText(image, 40, y, entry.text, 2, kInk);
+    y += kLine;
+  }
+}
+
+std::string heading(const Storey& storey) {
+  char text[64];
+  std::snprintf(text, sizeof text, "floor at %.2f m, cut %.1f m above", storey.floor, kCut);
+  return text;
+}
+
+Image composed(const WalkTrace& trace, const std::vector<Storey>& storeys) {
+  constexpr int kBorder = 16;
+  const std::vector<LegendEntry> legend = legendOf(trace);
+  int width = 640, height = 2 * kBorder + kLine;
+  for (const Storey& storey : storeys) {
+    width = std::max(width, storey.image.width + 2 * kBorder);
+    height += storey.image.height + kLine + kBorder;
+  }
+  height += static_cast<int>(legend.size()) * kLine;
+  Image whole = blankImage(width, height);
+  render::drawText(whole, kBorder, kBorder, trace.title, 2, kInk);
+  int y = kBorder + kLine;
+  for (const Storey& storey : storeys) {
+    render::drawText(whole, kBorder, y, heading(storey), 2, kInk);
+    paste(whole, storey.image, kBorder, y + kLine);
+    y += storey.image.height + kLine + kBorder;
+  }
+  drawLegend(whole, legend, y);
+  return whole;
+}
+
+}  // namespace
+
+std::vector<double> walkedStoreys(const std::vector<WalkedPath>& paths) {
+  std::map<long, std::vector<double>> bins;
+  std::size_t ticks = 0;
+  for (const WalkedPath& path : paths) {
+    ticks += path.feet.size();
+    for (const Vec3& feet : path.feet) bins[std::lround(feet.y() / kBin)].push_back(feet.y());
+  }
+  std::vector<std::vector<double>> peaks;
+  for (auto& [bin, heights] : bins) peaks.push_back(std::move(heights));
+  std::stable_sort(peaks.begin(), peaks.end(),
+                   [](const auto& a, const auto& b) { return a.size() > b.size(); });
+  std::vector<double> floors;
+  for (std::vector<double>& heights : peaks) {
+    const double share = static_cast<double>(heights.size()) / static_cast<double>(ticks);
+    if (floors.size() == kMostStoreys || (!floors.empty() && share < kLeastShare)) break;
+    std::nth_element(heights.begin(), heights.begin() + static_cast<long>(heights.size() / 2),
+                     heights.end());
+    const double floor = heights[heights.size() / 2];
+    const bool isNew = std::none_of(floors.begin(), floors.end(), [&](double other) {
+      return std::abs(other - floor) < kStoreyApart;
+    });
+    if (isNew) floors.push_back(floor);
+  }
+  std::sort(floors.begin(), floors.end());
+  return floors;
+}
+
+std::optional<Image> drawMap(const WalkTrace& trace, const TakePicture& picture) {
+  std::vector<Storey> storeys;
+  for (const double floor : walkedStoreys(trace.paths)) {
+    Storey storey{floor, planOf(walkedBounds(trace.paths), floor), {}};
+    std::optional<Image> image = picture(storey.camera);
+    if (!image) return std::nullopt;
+    storey.image = std::move(*image);
+    fade(storey.image);
+    storeys.push_back(std::move(storey));
+  }
+  if (storeys.empty()) return std::nullopt;
+  for (std::size_t i = 0; i < trace.paths.size(); ++i) {
+    drawPath(storeys, trace.paths[i], colourOf(i));
+  }
+  drawContacts(storeys, trace);
+  for (const MapCapture& capture : trace.captures) drawCapture(storeys, capture);
+  return composed(trace, storeys);
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,189 @@
+#include "server/walk_run.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+
+#include "protocol/socket_driver.hpp"
+#include "server/frame_messages.hpp"
+#include "server/in_process_driver.hpp"
+#include "server/load_scene.hpp"
+#include "server/progress.hpp"
+#include "server/walk_report.hpp"
+#include "server/world_messages.hpp"
+
+namespace enfilade::server {
+
+namespace {
+
+constexpr std::uint32_t kWidth = 960, kHeight = 540;  // pixels of a capture
+constexpr std::uint64_t kTicksPerSample = 16;         // of the broad phase's pairs
+
+volatile std::sig_atomic_t interrupted = 0;
+
+struct Interrupted {};
+
+/// The world that a script runs in, as far as the report asks for it.
+struct WalkedWorld {
+  protocol::ScriptDriver& driver;
+  std::function<protocol::ReceivedFrame(const v1::FrameRequest&)> frame;
+  std::function<v1::Metrics()> metrics;
+  /// Contacts that live at the end, as they are to be ended, given those that the report knows.
+  std::function<std::vector<v1::ContactEvent>(std::vector<v1::ContactEvent>)> lastContacts;
+  v1::Scene scene;
+  std::string renderer;
+};
+
+protocol::CaptureFormat captureFormat() {
+  protocol::CaptureFormat format;
+  format.width = kWidth;
+  format.height = kHeight;
+  return format;
+}
+
+TakePicture pictureOf(const WalkedWorld& world) {
+  return [&world](const render::Camera& camera) -> std::optional<render::Image> {
+    v1::FrameRequest request;
+    *request.mutable_free() = messageOf(camera);
+    request.set_width(static_cast<std::uint32_t>(camera.width));
+    request.set_height(static_cast<std::uint32_t>(camera.height));
+    try {
+      protocol::ReceivedFrame frame = world.frame(request);
+      return render::Image{camera.width, camera.height, std::move(frame.pixels)};
+    } catch (const protocol::ProtocolError& problem) {
+      spdlog::warn("no map: {}", problem.what());
+      return std::nullopt;
+    }
+  };
+}
+
+void showProgress(Progress& bar, const protocol::StepOutcome& outcome,
+                  const protocol::ScriptProgress& progress) {
+  char text[96];
+  std::snprintf(text, sizeof text, "line %u  tick %llu  %.1f s  %zu avatars", progress.line,
+                static_cast<unsigned long long>(outcome.tick), outcome.time,
+                outcome.avatars.size());
+  const double lines = static_cast<double>(std::max<std::size_t>(progress.lines, 1));
+  bar.show(static_cast<double>(progress.linesDone) / lines, text);
+}
+
+void tellPerson(const WalkReport& report, const WalkFacts& facts,
+                const protocol::ScriptResult& result) {
+  std::fprintf(stderr, "%s in %s (%u objects)\n", facts.script.c_str(),
+               facts.scene.source().c_str(), facts.scene.objects());
+  std::fprintf(stderr, "  %llu ticks = %.1f s walked in %.1f s; a tick takes %.0f us (median)\n",
+               static_cast<unsigned long long>(result.ticks), result.time, facts.wallSeconds,
+               facts.metrics.tick().median_us());
+  std::fprintf(stderr, "  walks: %u arrived, %u blocked; orders refused: %u\n", result.arrived,
+               result.blocked, result.refused);
+  std::fprintf(stderr, "  contacts: %llu begun in this world; worst penetration %g m\n",
+               static_cast<unsigned long long>(facts.metrics.contacts()),
+               facts.metrics.worst_penetration());
+  std::fprintf(stderr, "  pictures: %u by %s\n", result.captured,
+               facts.renderer.empty() ? "no renderer" : facts.renderer.c_str());
+  for (const protocol::LineOutcome& outcome : result.outcomes) {
+    std::fprintf(stderr, "  %s\n", outcome.text.c_str());
+  }
+  std::fprintf(stderr, "  written to %s/\n", report.folder().string().c_str());
+}
+
+ExitCode run(const protocol::Script& script, WalkReport& report, bool strict, WalkedWorld world) {
+  const auto start = std::chrono::steady_clock::now();
+  WalkFacts facts{std::filesystem::path(script.source).filename().string(),
+                  world.scene,
+                  world.renderer,
+                  {},
+                  0,
+                  0};
+  Progress bar;
+  const auto observe = [&](protocol::StepOutcome& outcome,
+                           const protocol::ScriptProgress& progress) {
+    if (interrupted != 0) throw Interrupted{};
+    report.add(outcome);
+    showProgress(bar, outcome, progress);
+    if (outcome.tick % kTicksPerSample == 0) {
+      facts.mostPairs = std::max(facts.mostPairs, world.metrics().pairs());
+    }
+  };
+  const protocol::ScriptResult result = protocol::runScript(script, world.driver, observe);
+  bar.clear();
+  facts.metrics = world.metrics();
+  facts.mostPairs = std::max(facts.mostPairs, facts.metrics.pairs());
+  report.writePictures(facts, pictureOf(world));
+  report.closeContacts(world.lastContacts(report.liveContacts()));
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  facts.wallSeconds = took.count();
+  std::printf("%s\n", report.writeSummary(facts, result).c_str());
+  std::fflush(stdout);
+  tellPerson(report, facts, result);
+  return strict && !result.outcomes.empty() ? ExitCode::violations : ExitCode::done;
+}
+
+/// Between two ticks a run looks whether it was interrupted.
+void listenForInterrupt() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { interrupted = 1; };
+  sigaction(SIGINT, &action, nullptr);
+}
+
+ExitCode interruptible(const std::function<ExitCode()>& work) {
+  listenForInterrupt();
+  try {
+    return work();
+  } catch (const Interrupted&) {
+    std::fputs("interrupted; nothing more is written\n", stderr);
+    return ExitCode::interrupted;
+  }
+}
+
+std::unique_ptr<render::Renderer> rendererOf(const std::shared_ptr<const scene::Scene>& scene) {
+  try {
+    return std::make_unique<render::Renderer>(scene);
+  } catch (const render::RenderError& error) {
+    spdlog::warn("no pictures: {}", error.what());
+    return nullptr;
+  }
+}
+
+}  // namespace
+
+ExitCode replay(const ReplayCommand& command) {
+  return interruptible([&] {
+    const protocol::Script script = protocol::readScript(command.script);
+    WalkReport report(command.out);
+    const std::shared_ptr<const scene::Scene> scene = loadScene(command.model);
+    const std::unique_ptr<render::Renderer> renderer = rendererOf(scene);
+    scene::World world(scene);
+    InProcessDriver driver(world, renderer.get(), captureFormat());
+    WalkedWorld walked{driver,
+                       [&](const v1::FrameRequest& request) { return driver.frame(request); },
+                       [&] { return driver.metrics(); },
+                       [&](const auto&) { return driver.endContacts(); },
+                       messageOf(*scene),
+                       renderer ? renderer->deviceName() : std::string()};
+    return run(script, report, command.strict, std::move(walked));
+  });
+}
+
+ExitCode walk(const WalkCommand& command) {
+  return interruptible([&] {
+    const protocol::Script script = protocol::readScript(command.script);
+    WalkReport report(command.out);
+    protocol::ClientOptions options;
+    options.name = "enfilade walk";
+    protocol::Client client(command.connect.host, command.connect.port, options);
+    protocol::SocketDriver driver(client, captureFormat());
+    WalkedWorld walked{driver,
+                       [&](const v1::FrameRequest& request) { return client.frame(request); },
+                       [&] { return client.metrics(); },
+                       // The server outlives the walk; for the report the walk's end is the end.
+                       [](std::vector<v1::ContactEvent> live) { return live; },
+                       client.welcome().scene(), client.welcome().renderer()};
+    return run(script, report, command.strict, std::move(walked));
+  });
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,232 @@
+#include "server/world_messages.hpp"
+
+#include <cmath>
+#include <filesystem>
+
+namespace enfilade::server {
+
+namespace {
+
+v1::ContactEvent::Kind kindOf(scene::ContactEvent::Kind kind) {
+  using Kind = scene::ContactEvent::Kind;
+  switch (kind) {
+    case Kind::begin:
+      return v1::ContactEvent::KIND_BEGIN;
+    case Kind::end:
+      return v1::ContactEvent::KIND_END;
+    case Kind::near:
+      return v1::ContactEvent::KIND_NEAR;
+    case Kind::blocked:
+      return v1::ContactEvent::KIND_BLOCKED;
+  }
+  return v1::ContactEvent::KIND_UNSPECIFIED;
+}
+
+v1::ContactEvent::Reason reasonOf(scene::ContactEvent::Reason reason) {
+  using Reason = scene::ContactEvent::Reason;
+  switch (reason) {
+    case Reason::parted:
+      return v1::ContactEvent::REASON_PARTED;
+    case Reason::left:
+      return v1::ContactEvent::REASON_LEFT;
+    case Reason::shutdown:
+      return v1::ContactEvent::REASON_SHUTDOWN;
+  }
+  return v1::ContactEvent::REASON_UNSPECIFIED;
+}
+
+v1::Verdict verdictOf(collision::Verdict verdict) {
+  switch (verdict) {
+    case collision::Verdict::separated:
+      return v1::VERDICT_SEPARATED;
+    case collision::Verdict::touching:
+      return v1::VERDICT_TOUCHING;
+    case collision::Verdict::penetrating:
+      return v1::VERDICT_PENETRATING;
+  }
+  return v1::VERDICT_UNSPECIFIED;
+}
+
+v1::Notice::Kind kindOf(scene::Notice::Kind kind) {
+  using Kind = scene::Notice::Kind;
+  switch (kind) {
+    case Kind::spawned:
+      return v1::Notice::KIND_SPAWNED;
+    case Kind::refused:
+      return v1::Notice::KIND_REFUSED;
+    case Kind::arrived:
+      return v1::Notice::KIND_ARRIVED;
+    case Kind::blocked:
+      return v1::Notice::KIND_BLOCKED;
+    case Kind::done:
+      return v1::Notice::KIND_DONE;
+    case Kind::capture:
+      return v1::Notice::KIND_CAPTURE;
+    case Kind::left:
+      return v1::Notice::KIND_LEFT;
+  }
+  return v1::Notice::KIND_UNSPECIFIED;
+}
+
+using OrderOrError = std::variant<scene::Order, v1::Error>;
+
+OrderOrError missing(const char* field) {
+  return errorOf(v1::ERROR_BAD_MESSAGE, std::string(field) + " is missing: give a point", field);
+}
+
+OrderOrError orderFrom(const v1::Spawn& message) {
+  if (!message.has_at()) return missing("spawn.at");
+  scene::Spawn spawn;
+  spawn.at = vectorFrom(message.at());
+  spawn.facing = message.facing();
+  if (message.has_radius()) spawn.radius = message.radius();
+  if (message.has_height()) spawn.height = message.height();
+  return scene::Order(spawn);
+}
+
+OrderOrError orderFrom(const v1::Walk& message) {
+  if (message.along().empty()) return missing("walk.along");
+  scene::Walk walk;
+  for (const v1::Vec3& point : message.along()) walk.along.push_back(vectorFrom(point));
+  if (message.has_speed()) walk.speed = message.speed();
+  return scene::Order(std::move(walk));
+}
+
+OrderOrError orderFrom(const v1::Command& message) {
+  switch (message.order_case()) {
+    case v1::Command::kSpawn:
+      return orderFrom(message.spawn());
+    case v1::Command::kWalk:
+      return orderFrom(message.walk());
+    case v1::Command::kLook:
+      if (!message.look().has_at()) return missing("look.at");
+      return scene::Order(scene::Look{vectorFrom(message.look().at())});
+    case v1::Command::kWait:
+      return scene::Order(scene::Wait{message.wait().seconds()});
+    case v1::Command::kCapture:
+      return scene::Order(scene::Capture{message.capture().as()});
+    case v1::Command::kLeave:
+      return scene::Order(scene::Leave{});
+    case v1::Command::kDrive:
+      if (!message.drive().has_velocity()) return missing("drive.velocity");
+      return scene::Order(scene::Drive{vectorFrom(message.drive().velocity())});
+    case v1::Command::ORDER_NOT_SET:
+      break;
+  }
+  return errorOf(v1::ERROR_BAD_MESSAGE,
+                 "order is missing: give spawn, walk, look, wait, capture, leave or drive",
+                 "order");
+}
+
+}  // namespace
+
+v1::Error errorOf(v1::ErrorCode code, std::string message, std::string field) {
+  v1::Error error;
+  error.set_code(code);
+  error.set_message(std::move(message));
+  error.set_field(std::move(field));
+  return error;
+}
+
+v1::Error refusalOf(const v1::Command& command, const std::string& why) {
+  const auto* order = v1::Command::descriptor()->FindFieldByNumber(command.order_case());
+  std::string field = why.substr(0, why.find_first_of(" '"));
+  if (order && field != "avatar") field = order->name() + "." + field;
+  return errorOf(v1::ERROR_REFUSED_COMMAND, why, field);
+}
+
+v1::Vec3 messageOf(const scene::Vec3& v) {
+  v1::Vec3 message;
+  message.set_x(v.x());
+  message.set_y(v.y());
+  message.set_z(v.z());
+  return message;
+}
+
+scene::Vec3 vectorFrom(const v1::Vec3& message) {
+  return {message.x(), message.y(), message.z()};
+}
+
+std::variant<scene::Command, v1::Error> commandFrom(const v1::Command& message) {
+  OrderOrError order = orderFrom(message);
+  if (auto* error = std::get_if<v1::Error>(&order)) return std::move(*error);
+  return scene::Command{message.avatar(), std::get<scene::Order>(std::move(order)), message.tag()};
+}
+
+v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent& event) {
+  const collision::Decision& decision = event.decision;
+  v1::ContactEvent message;
+  message.set_tick(event.tick);
+  message.set_time(event.time);
+  message.set_kind(kindOf(event.kind));
+  if (event.kind == scene::ContactEvent::Kind::end) message.set_reason(reasonOf(event.reason));
+  message.set_a(event.a);
+  message.set_b(event.b);
+  message.set_a_name(scene::nameOf(world, event.a));
+  message.set_b_name(scene::nameOf(world, event.b));
+  message.set_verdict(verdictOf(decision.verdict));
+  message.set_distance(decision.distance);
+  message.set_error_bound(decision.errorBound);
+  *message.mutable_point_a() = messageOf(decision.pointA);
+  *message.mutable_point_b() = messageOf(decision.pointB);
+  *message.mutable_normal() = messageOf(decision.normal);
+  message.set_decided_by(decision.decidedBy == collision::DecidedBy::filter
+                             ? v1::DECIDED_BY_FILTER
+                             : v1::DECIDED_BY_RATIONAL);
+  return message;
+}
+
+v1::Notice messageOf(const scene::World& world, const scene::Notice& notice, std::uint64_t tick) {
+  v1::Notice message;
+  message.set_tick(tick);
+  message.set_kind(kindOf(notice.kind));
+  message.set_avatar(notice.avatar);
+  message.set_id(notice.id);
+  message.set_tag(notice.tag);
+  *message.mutable_position() = messageOf(notice.position);
+  message.set_obstacle(notice.obstacle);
+  message.set_obstacle_name(scene::nameOf(world, notice.obstacle));
+  message.set_text(notice.text);
+  return message;
+}
+
+v1::AvatarState messageOf(const scene::AvatarView& avatar) {
+  v1::AvatarState message;
+  message.set_id(avatar.id);
+  message.set_name(avatar.name);
+  *message.mutable_feet() = messageOf(avatar.feet);
+  *message.mutable_gaze() = messageOf(avatar.gaze);
+  message.set_eye_height(avatar.eyeHeight);
+  message.set_grounded(avatar.grounded);
+  return message;
+}
+
+v1::Scene messageOf(const scene::Scene& scene) {
+  const scene::Model& model = scene.model();
+  v1::Scene message;
+  message.set_source(std::filesystem::path(model.source).filename().string());
+  message.set_hash(scene.hash());
+  message.set_objects(static_cast<std::uint32_t>(model.objects.size()));
+  *message.mutable_bounds()->mutable_min() = messageOf(scene.bounds().min);
+  *message.mutable_bounds()->mutable_max() = messageOf(scene.bounds().max);
+  message.set_metres_per_unit(model.metresPerUnit);
+  message.set_up(std::string(1, model.up));
+  *message.mutable_offset() = messageOf(model.offset);
+  return message;
+}
+
+v1::Policies messageOf(const scene::Lengths& lengths) {
+  v1::Policies message;
+  message.set_epsilon(lengths.epsilon);
+  message.set_step_height(lengths.stepHeight);
+  message.set_near_miss(lengths.nearMiss);
+  message.set_tick(lengths.tick);
+  message.set_speed_limit(lengths.speedLimit);
+  message.set_walkable_slope(std::acos(lengths.walkableNormalY));
+  message.set_gravity(lengths.gravity);
+  message.set_patience(lengths.patience);
+  message.set_sliding("slide");
+  return message;
+}
+
+}  // namespace enfilade::server

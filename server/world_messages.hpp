@@ -1,0 +1,28 @@
+// The world's plain data as messages, and messages as the world's commands.
+#pragma once
+
+#include <string>
+#include <variant>
+
+#include "protocol/enfilade.pb.h"
+#include "scene/world.hpp"
+
+namespace enfilade::server {
+
+/// The order, or what is missing in it, naming the field. Values are the world's to judge.
+std::variant<scene::Command, v1::Error> commandFrom(const v1::Command& message);
+
+v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent& event);
+v1::Notice messageOf(const scene::World& world, const scene::Notice& notice, std::uint64_t tick);
+v1::AvatarState messageOf(const scene::AvatarView& avatar);
+v1::Scene messageOf(const scene::Scene& scene);
+v1::Policies messageOf(const scene::Lengths& lengths);
+v1::Vec3 messageOf(const scene::Vec3& v);
+scene::Vec3 vectorFrom(const v1::Vec3& message);
+
+v1::Error errorOf(v1::ErrorCode code, std::string message, std::string field = {});
+
+/// A refusal of the world as an error; it begins with the field, whose path is completed.
+v1::Error refusalOf(const v1::Command& command, const std::string& why);
+
+}  // namespace enfilade::server
