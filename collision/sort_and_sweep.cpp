@@ -78,6 +78,38 @@ struct Mover {
   bool moved = false;
 };
 
+bool within(const Mover& mover) {
+  bool inside = true;
+  for (std::size_t k = 0; k < 6; ++k) {
+    inside &= mover.low[k] <= mover.reach[k] && mover.reach[k] < mover.high[k];
+  }
+  return inside;
+}
+
+Mover& known(std::vector<Mover>& movers, MoverId id) {
+  if (id >= movers.size() || movers[id].presence == Presence::free ||
+      movers[id].presence == Presence::leaving) {
+    throw std::invalid_argument("mover " + std::to_string(id) + " is not there");
+  }
+  return movers[id];
+}
+
+bool addPartner(std::vector<Partner>& partners, MoverId id) {
+  const Partner partner{id, true};
+  const auto at = std::lower_bound(partners.begin(), partners.end(), partner);
+  if (at != partners.end() && *at == partner) return false;
+  partners.insert(at, partner);
+  return true;
+}
+
+bool erasePartner(std::vector<Partner>& partners, MoverId id) {
+  const Partner partner{id, true};
+  const auto at = std::lower_bound(partners.begin(), partners.end(), partner);
+  if (at == partners.end() || *at != partner) return false;
+  partners.erase(at);
+  return true;
+}
+
 }  // namespace
 
 struct SortAndSweep::State {
@@ -113,26 +145,6 @@ struct SortAndSweep::State {
   bool advance(MoverId id, Membership& membership, std::size_t k);
   void updateMoving();
 };
-
-namespace {
-
-bool within(const Mover& mover) {
-  bool inside = true;
-  for (std::size_t k = 0; k < 6; ++k) {
-    inside &= mover.low[k] <= mover.reach[k] && mover.reach[k] < mover.high[k];
-  }
-  return inside;
-}
-
-Mover& known(std::vector<Mover>& movers, MoverId id) {
-  if (id >= movers.size() || movers[id].presence == Presence::free ||
-      movers[id].presence == Presence::leaving) {
-    throw std::invalid_argument("mover " + std::to_string(id) + " is not there");
-  }
-  return movers[id];
-}
-
-}  // namespace
 
 // ---- pairs -------------------------------------------------------------------------------------
 
@@ -201,26 +213,6 @@ void SortAndSweep::State::endStill(MoverId id, Row row) {
   --pairs;
 }
 
-namespace {
-
-bool addPartner(std::vector<Partner>& partners, MoverId id) {
-  const Partner partner{id, true};
-  const auto at = std::lower_bound(partners.begin(), partners.end(), partner);
-  if (at != partners.end() && *at == partner) return false;
-  partners.insert(at, partner);
-  return true;
-}
-
-bool erasePartner(std::vector<Partner>& partners, MoverId id) {
-  const Partner partner{id, true};
-  const auto at = std::lower_bound(partners.begin(), partners.end(), partner);
-  if (at == partners.end() || *at != partner) return false;
-  partners.erase(at);
-  return true;
-}
-
-}  // namespace
-
 void SortAndSweep::State::beginMoving(MoverId a, MoverId b) {
   if (!addPartner(movers[a].partners, b)) return;
   addPartner(movers[b].partners, a);
@@ -274,8 +266,8 @@ void SortAndSweep::State::recheck(MoverId id) {
 /// Cursors by binary search, then every box of the cell that overlaps on the half-axis where the
 /// fewest do.
 void SortAndSweep::State::place(MoverId id, Membership& membership) {
-  const Mover& mover = movers[id];
   std::size_t shortest = 0;
+  const Mover& mover = movers[id];
   for (std::size_t k = 0; k < 6; ++k) {
     const auto rows = still.sorted(membership.cell, k);
     const auto end =
@@ -389,7 +381,6 @@ void SortAndSweep::State::updateStill(MoverId id) {
   if (recheckHeld) recheck(id);
   if (!found.empty()) takeFound(id);
 }
-
 // ---- movers against movers ---------------------------------------------------------------------
 
 void SortAndSweep::State::updateMoving() {
@@ -422,9 +413,8 @@ SortAndSweep& SortAndSweep::operator=(SortAndSweep&&) noexcept = default;
 
 MoverId SortAndSweep::insert(const Box& box) {
   State& s = *state_;
-  const std::size_t next = s.freeIds.empty() ? s.movers.size() : s.freeIds.back();
-  requireBox(box, "mover", next);
-  const MoverId id = static_cast<MoverId>(next);
+  const MoverId id = s.freeIds.empty() ? static_cast<MoverId>(s.movers.size()) : s.freeIds.back();
+  requireBox(box, "mover", id);
   if (s.freeIds.empty()) {
     s.movers.emplace_back();
   } else {
@@ -504,23 +494,6 @@ std::size_t SortAndSweep::pairCount() const {
 }
 const SweepCounters& SortAndSweep::counters() const {
   return state_->counters;
-}
-
-std::vector<BoxPair> bruteForcePairs(std::span<const Box> stillBoxes,
-                                     std::span<const std::pair<MoverId, Box>> moverBoxes) {
-  std::vector<BoxPair> pairs;
-  for (const auto& [id, box] : moverBoxes) {
-    for (std::size_t other = 0; other < stillBoxes.size(); ++other) {
-      if (overlaps(box, stillBoxes[other])) {
-        pairs.push_back({id, static_cast<std::uint32_t>(other), false});
-      }
-    }
-    for (const auto& [otherId, otherBox] : moverBoxes) {
-      if (id < otherId && overlaps(box, otherBox)) pairs.push_back({id, otherId, true});
-    }
-  }
-  std::sort(pairs.begin(), pairs.end());
-  return pairs;
 }
 
 }  // namespace enfilade::collision

@@ -11,7 +11,7 @@
 namespace enfilade::collision {
 
 using StillId = std::uint32_t;  ///< index into the still boxes given at construction
-using MoverId = std::uint32_t;  ///< given by insert(); reused after remove()
+using MoverId = std::uint32_t;  ///< by insert(); reused after remove() and update()
 
 /// A moving box and a still one, or two moving ones (then `mover` < `other`).
 struct BoxPair {
@@ -24,9 +24,9 @@ struct BoxPair {
 
 /// Counters of the last update(), for metrics and for tests of the complexity claim.
 struct SweepCounters {
-  std::uint64_t exchanges = 0;   ///< end points that passed one another, on all axes
-  std::uint64_t cellEntries = 0; ///< times a mover entered a cell and its lists were joined
-  std::uint64_t boxTests = 0;    ///< full box tests made because of an exchange or an entry
+  std::uint64_t exchanges = 0;    ///< end points that passed one another, on all axes
+  std::uint64_t cellEntries = 0;  ///< times a mover entered a cell and its lists were joined
+  std::uint64_t boxTests = 0;     ///< full box tests made because of an exchange or an entry
 };
 
 /// Keeps the set of overlapping pairs of closed boxes, exactly: after update() it equals what brute
