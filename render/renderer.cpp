@@ -5,6 +5,7 @@
 
 #include <epoxy/gl.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <optional>
@@ -180,7 +181,8 @@ void Renderer::State::setUp(const Camera& camera) {
 
 void Renderer::State::drawBatches(const DrawList& list, const GlBuffer& vertices,
                                   const GlBuffer& indices, bool glass) {
-  if (list.commands.empty()) return;
+  const auto wanted = [&](const Batch& batch) { return (batch.pass == Pass::blend) == glass; };
+  if (std::none_of(list.batches.begin(), list.batches.end(), wanted)) return;
   const GlBuffer instances = uploaded(list.instances);
   const GlBuffer commands = uploaded(list.commands);
   glVertexArrayVertexBuffer(vertexArray.name(), kVertexBinding, vertices.name(), 0, sizeof(Vertex));
@@ -189,7 +191,7 @@ void Renderer::State::drawBatches(const DrawList& list, const GlBuffer& vertices
   glVertexArrayElementBuffer(vertexArray.name(), indices.name());
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands.name());
   for (const Batch& batch : list.batches) {
-    if ((batch.pass == Pass::blend) != glass) continue;
+    if (!wanted(batch)) continue;
     glUseProgram(surfaceProgram(batch));
     if (batch.texture >= 0) {
       glBindTextureUnit(0, buffers.textures[static_cast<std::size_t>(batch.texture)].name());

@@ -200,7 +200,7 @@ void main() {
     float mean = 0.5 * (texelFetch(depthPlane, a, 0).r + texelFetch(depthPlane, b, 0).r);
     float slope = (z - metres(mean)) * pixelsPerMetre / length(vec2(step_));
     // What is far in front of a surface does not darken it.
-    hollow += clamp(slope, 0.0, 1.0) * (1.0 - smoothstep(1.0, 2.5, slope));
+    hollow += clamp(slope, 0.0, 1.0) * (1.0 - smoothstep(0.6, 1.7, slope));
   }
   factor = vec4(vec3(1.0 - kStrength * hollow / float(kPairs)), 1.0);
 }
