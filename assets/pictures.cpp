@@ -143,9 +143,10 @@ void paintStillLife(Easel& e, Random& random) {
   e.layBox(-w * 0.7, -h * 0.8, w * 0.5, -h * 0.3, Paint::paintWhite);
   e.layOval(-r * 0.3, h * 0.0, r * 0.26, r * 0.4, Paint::paintBlue);
   e.layBox(-r * 0.4, h * 0.3, -r * 0.2, h * 0.62, Paint::paintBlue);
-  for (int i = 0; i < 5; ++i)
-    e.layOval(r * (-0.2 + 0.22 * i), -h * random.between(0.35, 0.55), r * 0.15, r * 0.15,
-              kBright[random.below(4)]);
+  for (int i = 0; i < 5; ++i) {
+    const double y = -h * random.between(0.35, 0.55);
+    e.layOval(r * (-0.2 + 0.22 * i), y, r * 0.15, r * 0.15, kBright[random.below(4)]);
+  }
 }
 
 void paintSomething(Easel& e, Random& random) {
