@@ -125,11 +125,7 @@ void Session::take(const protocol::Message& framed) {
                                            std::to_string(decoder_.offset()) + ")");
   }
   if (client_ == 0) return greet(message);
-  if (message.has_bye()) {
-    listening_ = false;
-    out_->finish(goodbye(v1::ERROR_UNSPECIFIED, "goodbye"));
-    return;
-  }
+  if (message.has_bye()) return close("it said goodbye");
   loop_.receive(client_, std::move(message), framed.header.size() + framed.attachment.size());
 }
 

@@ -127,9 +127,23 @@ void drawContacts(std::vector<Storey>& storeys, const WalkTrace& trace) {
   }
 }
 
-/// Softens the plan, so that what is drawn on it is read first.
-void fade(Image& image) {
-  for (std::uint8_t& value : image.rgb) value = static_cast<std::uint8_t>(255 - (255 - value) / 2);
+/// Softens the plan, so that what is drawn on it is read first, and outlines what stands there: a
+/// cut wall is hollow, and would be hard to tell from the floor by its colour.
+Image groundOf(const PlanPicture& plan) {
+  Image image = plan.colour;
+  const auto width = static_cast<std::size_t>(image.width);
+  for (std::size_t pixel = 0; pixel < plan.ids.size(); ++pixel) {
+    const bool lastColumn = pixel % width == width - 1;
+    const std::uint32_t right = plan.ids[lastColumn ? pixel : pixel + 1];
+    const std::uint32_t below = plan.ids[pixel + width < plan.ids.size() ? pixel + width : pixel];
+    const bool edge = plan.ids[pixel] != right || plan.ids[pixel] != below;
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      std::uint8_t& value = image.rgb[3 * pixel + channel];
+      const int soft = 255 - (255 - value) / 2;
+      value = static_cast<std::uint8_t>(edge ? soft * 2 / 5 : soft);
+    }
+  }
+  return image;
 }
 
 void paste(Image& onto, const Image& image, int left, int top) {
@@ -233,10 +247,9 @@ std::optional<Image> drawMap(const WalkTrace& trace, const TakePicture& picture)
   std::vector<Storey> storeys;
   for (const double floor : walkedStoreys(trace.paths)) {
     Storey storey{floor, planOf(walkedBounds(trace.paths), floor), {}};
-    std::optional<Image> image = picture(storey.camera);
-    if (!image) return std::nullopt;
-    storey.image = std::move(*image);
-    fade(storey.image);
+    const std::optional<PlanPicture> plan = picture(storey.camera);
+    if (!plan) return std::nullopt;
+    storey.image = groundOf(*plan);
     storeys.push_back(std::move(storey));
   }
   if (storeys.empty()) return std::nullopt;

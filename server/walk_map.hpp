@@ -38,8 +38,14 @@ struct WalkTrace {
 /// Heights of the floors that were walked on for long, ascending; empty when nobody walked.
 std::vector<double> walkedStoreys(const std::vector<WalkedPath>& paths);
 
+/// A plan as it was drawn, with the ids of what is seen, pixel by pixel.
+struct PlanPicture {
+  render::Image colour;
+  std::vector<std::uint32_t> ids;
+};
+
 /// Takes the picture that a camera asks for; nullopt when there is none to be had.
-using TakePicture = std::function<std::optional<render::Image>(const render::Camera&)>;
+using TakePicture = std::function<std::optional<PlanPicture>(const render::Camera&)>;
 
 /// nullopt when there is nothing to draw or no picture to draw on.
 std::optional<render::Image> drawMap(const WalkTrace& trace, const TakePicture& picture);

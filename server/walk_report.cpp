@@ -165,8 +165,6 @@ WalkReport::WalkReport(std::filesystem::path folder) : folder_(std::move(folder)
 }
 
 void WalkReport::add(const protocol::StepOutcome& outcome) {
-  tick_ = outcome.tick;
-  time_ = outcome.time;
   for (const v1::ContactEvent& event : outcome.contacts) addContact(event);
   for (const v1::Notice& notice : outcome.notices) addNotice(notice);
   for (const v1::AvatarState& avatar : outcome.avatars) {
@@ -179,10 +177,7 @@ void WalkReport::add(const protocol::StepOutcome& outcome) {
 
 void WalkReport::addContact(const v1::ContactEvent& event) {
   contactLines_ += contactLine(event) + "\n";
-  const std::pair pair{event.a(), event.b()};
-  if (event.kind() == v1::ContactEvent::KIND_END) live_.erase(pair);
   if (event.kind() != v1::ContactEvent::KIND_BEGIN) return;
-  live_[pair] = event;
   ++begun_;
   trace_.contacts.push_back({vectorFrom(event.point_b()), vectorFrom(event.normal())});
 }
@@ -190,6 +185,8 @@ void WalkReport::addContact(const v1::ContactEvent& event) {
 void WalkReport::addNotice(const v1::Notice& notice) {
   const bool blocked = notice.kind() == v1::Notice::KIND_BLOCKED;
   if (blocked) trace_.stops.push_back({vectorFrom(notice.position()), Vec3::UnitX()});
+  if (notice.kind() == v1::Notice::KIND_SPAWNED) present_.insert(notice.avatar());
+  if (notice.kind() == v1::Notice::KIND_LEFT) present_.erase(notice.avatar());
   if (blocked || notice.kind() == v1::Notice::KIND_ARRIVED ||
       notice.kind() == v1::Notice::KIND_REFUSED) {
     walks_.push_back(notice);
@@ -225,20 +222,8 @@ void WalkReport::addFrame(const protocol::CapturedFrame& frame,
   pictures_.push_back(std::move(picture));
 }
 
-std::vector<v1::ContactEvent> WalkReport::liveContacts() const {
-  std::vector<v1::ContactEvent> live;
-  for (const auto& [pair, event] : live_) live.push_back(event);
-  return live;
-}
-
-void WalkReport::closeContacts(std::vector<v1::ContactEvent> ended) {
-  for (v1::ContactEvent& event : ended) {
-    event.set_tick(tick_);
-    event.set_time(time_);
-    event.set_kind(v1::ContactEvent::KIND_END);
-    event.set_reason(v1::ContactEvent::REASON_SHUTDOWN);
-    addContact(event);
-  }
+void WalkReport::writeContacts(const std::vector<v1::ContactEvent>& ended) {
+  for (const v1::ContactEvent& event : ended) addContact(event);
   writeText(folder_ / "contacts.jsonl", contactLines_);
 }
 

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -34,10 +35,10 @@ class WalkReport {
 
   /// Takes note of one tick and writes its pictures.
   void add(const protocol::StepOutcome& outcome);
-  /// Ends what contacts live with the reason shutdown, and writes contacts.jsonl.
-  void closeContacts(std::vector<v1::ContactEvent> ended);
-  /// Contacts that began and did not end, as they began, ascending by pair.
-  std::vector<v1::ContactEvent> liveContacts() const;
+  /// Writes contacts.jsonl, with how the contacts ended that the walk left.
+  void writeContacts(const std::vector<v1::ContactEvent>& ended);
+  /// Who is in the world, of those that the walk moved.
+  const std::set<std::string>& present() const { return present_; }
 
   /// Draws sheet.png and map.png; what cannot be had is told and left out.
   void writePictures(const WalkFacts& facts, const TakePicture& picture);
@@ -59,9 +60,7 @@ class WalkReport {
 
   std::filesystem::path folder_;
   std::string contactLines_;
-  std::map<std::pair<std::uint32_t, std::uint32_t>, v1::ContactEvent> live_;
-  std::uint64_t tick_ = 0;
-  double time_ = 0;
+  std::set<std::string> present_;
   std::uint64_t begun_ = 0;
   std::map<std::string, std::size_t> pathOf_;  ///< index into trace_.paths by the avatar's name
   WalkTrace trace_;

@@ -6,6 +6,8 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
+#include <set>
 
 #include "protocol/socket_driver.hpp"
 #include "server/frame_messages.hpp"
@@ -31,8 +33,8 @@ struct WalkedWorld {
   protocol::ScriptDriver& driver;
   std::function<protocol::ReceivedFrame(const v1::FrameRequest&)> frame;
   std::function<v1::Metrics()> metrics;
-  /// Contacts that live at the end, as they are to be ended, given those that the report knows.
-  std::function<std::vector<v1::ContactEvent>(std::vector<v1::ContactEvent>)> lastContacts;
+  /// Ends what contacts live after the walk, and tells how.
+  std::function<std::vector<v1::ContactEvent>()> endContacts;
   v1::Scene scene;
   std::string renderer;
 };
@@ -45,14 +47,20 @@ protocol::CaptureFormat captureFormat() {
 }
 
 TakePicture pictureOf(const WalkedWorld& world) {
-  return [&world](const render::Camera& camera) -> std::optional<render::Image> {
+  return [&world](const render::Camera& camera) -> std::optional<PlanPicture> {
     v1::FrameRequest request;
     *request.mutable_free() = messageOf(camera);
     request.set_width(static_cast<std::uint32_t>(camera.width));
     request.set_height(static_cast<std::uint32_t>(camera.height));
+    request.add_channels(v1::CHANNEL_RGB);
+    request.add_channels(v1::CHANNEL_IDS);
     try {
-      protocol::ReceivedFrame frame = world.frame(request);
-      return render::Image{camera.width, camera.height, std::move(frame.pixels)};
+      const protocol::ReceivedFrame frame = world.frame(request);
+      const auto rgb = frame.plane(v1::CHANNEL_RGB), ids = frame.plane(v1::CHANNEL_IDS);
+      PlanPicture plan{{camera.width, camera.height, {rgb.begin(), rgb.end()}}, {}};
+      plan.ids.resize(ids.size() / sizeof(std::uint32_t));
+      std::memcpy(plan.ids.data(), ids.data(), plan.ids.size() * sizeof(std::uint32_t));
+      return plan;
     } catch (const protocol::ProtocolError& problem) {
       spdlog::warn("no map: {}", problem.what());
       return std::nullopt;
@@ -113,7 +121,7 @@ ExitCode run(const protocol::Script& script, WalkReport& report, bool strict, Wa
   facts.metrics = world.metrics();
   facts.mostPairs = std::max(facts.mostPairs, facts.metrics.pairs());
   report.writePictures(facts, pictureOf(world));
-  report.closeContacts(world.lastContacts(report.liveContacts()));
+  report.writeContacts(world.endContacts());
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   facts.wallSeconds = took.count();
   std::printf("%s\n", report.writeSummary(facts, result).c_str());
@@ -139,6 +147,19 @@ ExitCode interruptible(const std::function<ExitCode()>& work) {
   }
 }
 
+/// The server outlives the walk: those who still stand there leave in one tick more, which the
+/// walk's report does not count.
+std::vector<v1::ContactEvent> leaveWorld(protocol::ScriptDriver& driver,
+                                         const std::set<std::string>& avatars) {
+  for (const std::string& avatar : avatars) {
+    v1::Command leave;
+    leave.set_avatar(avatar);
+    leave.mutable_leave();
+    driver.submit(leave);
+  }
+  return avatars.empty() ? std::vector<v1::ContactEvent>() : driver.step().contacts;
+}
+
 std::unique_ptr<render::Renderer> rendererOf(const std::shared_ptr<const scene::Scene>& scene) {
   try {
     return std::make_unique<render::Renderer>(scene);
@@ -161,7 +182,7 @@ ExitCode replay(const ReplayCommand& command) {
     WalkedWorld walked{driver,
                        [&](const v1::FrameRequest& request) { return driver.frame(request); },
                        [&] { return driver.metrics(); },
-                       [&](const auto&) { return driver.endContacts(); },
+                       [&] { return driver.endContacts(); },
                        messageOf(*scene),
                        renderer ? renderer->deviceName() : std::string()};
     return run(script, report, command.strict, std::move(walked));
@@ -179,9 +200,9 @@ ExitCode walk(const WalkCommand& command) {
     WalkedWorld walked{driver,
                        [&](const v1::FrameRequest& request) { return client.frame(request); },
                        [&] { return client.metrics(); },
-                       // The server outlives the walk; for the report the walk's end is the end.
-                       [](std::vector<v1::ContactEvent> live) { return live; },
-                       client.welcome().scene(), client.welcome().renderer()};
+                       [&] { return leaveWorld(driver, report.present()); },
+                       client.welcome().scene(),
+                       client.welcome().renderer()};
     return run(script, report, command.strict, std::move(walked));
   });
 }

@@ -1,0 +1,203 @@
+// Clients that break the rules: each gets a clear error or is cut off, and nobody else notices.
+#include <thread>
+
+#include "tests/server/raw_connection.hpp"
+#include "tests/server/served_room.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+class BadClients : public ServedRoom {
+ protected:
+  /// The server still serves: someone who was there all the time goes on, and a new one may come.
+  void expectOthersGoOn(protocol::Client& other) {
+    const std::uint64_t tick = other.step().tick();
+    EXPECT_EQ(client("newcomer").welcome().tick(), tick);
+  }
+};
+
+TEST_F(BadClients, WrongMagicIsAnsweredWithAnError) {
+  serve();
+  protocol::Client other = client("other");
+  RawConnection raw(server_->port());
+  raw.send("GET / HTTP/1.1\r\n\r\n");
+  const RawConnection::End end = raw.readToEnd();
+  EXPECT_EQ(end.error.code(), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(end.bye.code(), v1::ERROR_BAD_MESSAGE);
+  expectOthersGoOn(other);
+}
+
+TEST_F(BadClients, AnOversizedMessageIsRefusedByItsLengthAlone) {
+  serve();
+  protocol::Client other = client("other");
+  RawConnection raw(server_->port());
+  raw.sendHello();
+  raw.send(std::vector<std::uint8_t>{0xFF, 0xFF, 0xFF, 0x7F, 0, 0, 0, 0});
+  EXPECT_EQ(raw.readToEnd().error.code(), v1::ERROR_TOO_LARGE);
+  expectOthersGoOn(other);
+}
+
+TEST_F(BadClients, BytesThatAreNoMessageAreRefused) {
+  serve();
+  protocol::Client other = client("other");
+  RawConnection raw(server_->port());
+  raw.sendHello();
+  raw.send(std::vector<std::uint8_t>{8, 0, 0, 0, 4, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF});
+  EXPECT_EQ(raw.readToEnd().error.code(), v1::ERROR_BAD_MESSAGE);
+  expectOthersGoOn(other);
+}
+
+TEST_F(BadClients, TheFirstMessageHasToBeHello) {
+  serve();
+  RawConnection raw(server_->port());
+  raw.sendMagic();
+  v1::ClientMessage step;
+  step.set_request_id(7);
+  step.mutable_step()->set_ticks(1);
+  raw.send(step);
+  const auto error = raw.receive();
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->reply_to(), 7u);
+  EXPECT_EQ(error->error().code(), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(client("other").step().tick(), 1u) << "it made no tick";
+}
+
+TEST_F(BadClients, AnotherMajorVersionIsRefused) {
+  serve();
+  for (const char* version : {"2.0.0", "0.9.0", "", "one", "1"}) {
+    RawConnection raw(server_->port());
+    raw.sendHello(version);
+    EXPECT_EQ(raw.readToEnd().error.code(), v1::ERROR_VERSION) << version;
+  }
+  RawConnection minor(server_->port());
+  minor.sendHello("1.7.3");
+  EXPECT_TRUE(minor.receive()->has_welcome());
+}
+
+TEST_F(BadClients, AMessageCutShortByClosingHarmsNobody) {
+  serve();
+  protocol::Client other = client("other");
+  {
+    RawConnection raw(server_->port());
+    raw.sendHello();
+    raw.send(std::vector<std::uint8_t>{100, 0, 0, 0, 50, 0, 0, 0, 1, 2, 3});
+    raw.closeSending();
+    EXPECT_TRUE(raw.readToEnd().closed);
+  }
+  expectOthersGoOn(other);
+}
+
+TEST_F(BadClients, SilenceBeforeHelloEndsTheConnection) {
+  ServerLimits limits;
+  limits.greeting = std::chrono::milliseconds(50);
+  serve(limits);
+  RawConnection raw(server_->port());
+  EXPECT_EQ(raw.readToEnd().error.code(), v1::ERROR_TIMEOUT);
+}
+
+TEST_F(BadClients, HalfAMessageAndThenSilenceEndsTheConnection) {
+  ServerLimits limits;
+  limits.message = std::chrono::milliseconds(50);
+  serve(limits);
+  RawConnection raw(server_->port());
+  raw.sendHello();
+  ASSERT_TRUE(raw.receive()->has_welcome());
+  raw.send(std::vector<std::uint8_t>{100, 0, 0, 0, 50, 0, 0, 0, 1, 2, 3});
+  EXPECT_EQ(raw.readToEnd().error.code(), v1::ERROR_TIMEOUT);
+}
+
+TEST_F(BadClients, SilenceBetweenMessagesIsNoFault) {
+  ServerLimits limits;
+  limits.greeting = limits.message = std::chrono::milliseconds(30);
+  serve(limits);
+  protocol::Client quiet = client("quiet");
+  std::this_thread::sleep_for(std::chrono::milliseconds(120));
+  EXPECT_EQ(quiet.step().tick(), 1u);
+}
+
+TEST_F(BadClients, WhoDoesNotReadIsDisconnectedWhileOthersGoOn) {
+  ServerLimits limits;
+  limits.outgoingBytes = 64 << 10;
+  limits.sendBuffer = 4096;
+  limits.farewell = std::chrono::milliseconds(200);
+  serve(limits);
+  protocol::Client other = client("other");
+  RawConnection raw(server_->port());
+  raw.sendHello();
+  v1::ClientMessage question;
+  question.set_request_id(2);
+  for (int i = 0; i < 2000; ++i) question.mutable_describe()->add_ids(kWall);
+  // Asks for far more than sockets and queue together can hold, and reads none of it. Sending fails
+  // when the server has closed.
+  bool cutOff = false;
+  for (int i = 0; i < 3000 && !cutOff; ++i) cutOff = !raw.send(question);
+  EXPECT_TRUE(cutOff);
+  expectOthersGoOn(other);
+}
+
+TEST_F(BadClients, WhoAsksWithoutWaitingForAnswersIsCutOff) {
+  ServerLimits limits;
+  limits.waitingBytes = 1000;
+  serve(limits);
+  protocol::Client other = client("other");
+  RawConnection raw(server_->port());
+  raw.sendHello();
+  v1::ClientMessage step;
+  step.set_request_id(2);
+  step.mutable_step()->set_ticks(36'000);
+  raw.send(step);
+  std::vector<std::uint8_t> flood;
+  for (int i = 0; i < 1000; ++i) {
+    const auto one = protocol::encode(step);
+    flood.insert(flood.end(), one.begin(), one.end());
+  }
+  raw.send(flood);
+  EXPECT_EQ(raw.readToEnd().bye.code(), v1::ERROR_TOO_LARGE);
+  expectOthersGoOn(other);
+}
+
+TEST_F(BadClients, MoreConnectionsThanTheServerTakesAreTurnedAway) {
+  ServerLimits limits;
+  limits.connections = 2;
+  serve(limits);
+  protocol::Client ann = client("ann"), bob = client("bob");
+  RawConnection third(server_->port());
+  EXPECT_EQ(third.readToEnd().bye.code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(ann.step().tick(), 1u);
+}
+
+TEST_F(BadClients, ManyVisitsOfNoiseLeaveTheServerServing) {
+  serve();
+  protocol::Client other = client("other");
+  std::uint32_t seed = 12345;
+  for (int visit = 0; visit < 50; ++visit) {
+    RawConnection raw(server_->port());
+    if (visit % 2 == 0) raw.sendHello();
+    std::vector<std::uint8_t> noise(200);
+    for (std::uint8_t& byte : noise) {
+      seed = seed * 1664525u + 1013904223u;
+      byte = static_cast<std::uint8_t>(seed >> 24);
+    }
+    raw.send(noise);
+  }
+  expectOthersGoOn(other);
+}
+
+TEST_F(BadClients, AWorldHasRoomForSoManyAvatars) {
+  ServerLimits limits;
+  limits.avatars = 2;
+  limits.waypoints = 2;
+  serve(limits);
+  protocol::Client ann = client("ann");
+  EXPECT_FALSE(ann.command(spawn("a", 0, 0.01, 0)));
+  EXPECT_FALSE(ann.command(spawn("b", 2, 0.01, 0)));
+  EXPECT_EQ(ann.command(spawn("c", 4, 0.01, 0))->code(), v1::ERROR_TOO_LARGE);
+  v1::Command walk = walkTo("a", 1, 0, 0);
+  *walk.mutable_walk()->add_along() = vec(2, 0, 0);
+  EXPECT_FALSE(ann.command(walk));
+  *walk.mutable_walk()->add_along() = vec(3, 0, 0);
+  EXPECT_EQ(ann.command(walk)->code(), v1::ERROR_TOO_LARGE);
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing

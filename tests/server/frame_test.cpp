@@ -1,0 +1,121 @@
+// Pictures through a connection: what is seen is what stands there.
+#include <cstring>
+
+#include "render/image.hpp"
+#include "tests/server/served_room.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+class Frames : public ServedRoom {
+ protected:
+  /// Ends the test where nothing can draw: as skipped, or in CI as failed.
+  void SetUp() override {
+    serve();
+    if (!server_->rendererName().empty()) return;
+    if (std::getenv("CI")) FAIL() << "no EGL device: install libegl-mesa0 and libgl1-mesa-dri";
+    GTEST_SKIP() << "no EGL device";
+  }
+};
+
+template <typename T>
+std::vector<T> valuesOf(const protocol::ReceivedFrame& frame, v1::Channel channel) {
+  const auto bytes = frame.plane(channel);
+  std::vector<T> values(bytes.size() / sizeof(T));
+  std::memcpy(values.data(), bytes.data(), values.size() * sizeof(T));
+  return values;
+}
+
+v1::FrameRequest eyesOf(const std::string& avatar) {
+  v1::FrameRequest request;
+  request.mutable_eyes()->set_avatar(avatar);
+  request.set_width(64);
+  request.set_height(48);
+  request.add_channels(v1::CHANNEL_IDS);
+  request.add_channels(v1::CHANNEL_DEPTH);
+  request.add_channels(v1::CHANNEL_RGB);
+  return request;
+}
+
+v1::ErrorCode codeOf(protocol::Client& client, const v1::FrameRequest& request) {
+  try {
+    client.frame(request);
+  } catch (const protocol::ProtocolError& error) {
+    return error.code;
+  }
+  return v1::ERROR_UNSPECIFIED;
+}
+
+TEST_F(Frames, AnAvatarSeesTheWallItFacesAtItsDistance) {
+  protocol::Client ann = client("ann");
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
+  const v1::StepReply step = ann.step(30, true);
+  v1::FrameRequest request = eyesOf("ann");
+  request.set_tick(step.tick());
+  const protocol::ReceivedFrame frame = ann.frame(request);
+  const auto ids = valuesOf<std::uint32_t>(frame, v1::CHANNEL_IDS);
+  const auto depth = valuesOf<float>(frame, v1::CHANNEL_DEPTH);
+  ASSERT_EQ(ids.size(), 64u * 48u);
+  ASSERT_EQ(depth.size(), 64u * 48u);
+  EXPECT_EQ(frame.plane(v1::CHANNEL_RGB).size(), 64u * 48u * 3u);
+  constexpr std::size_t middle = 24 * 64 + 32, below = 47 * 64 + 32;
+  EXPECT_EQ(ids[middle], kWall);
+  EXPECT_NEAR(depth[middle], 5 - step.avatars(0).feet().x(), 1e-3);
+  EXPECT_EQ(ids[below], kFloor);
+  EXPECT_EQ(frame.description.tick(), step.tick());
+  EXPECT_EQ(frame.description.renderer(), server_->rendererName());
+  for (const std::uint32_t id : ids) EXPECT_LE(id, 3u) << "the own body is not in the picture";
+}
+
+TEST_F(Frames, AnotherAvatarIsSeenFromAboveUnderItsOwnId) {
+  protocol::Client ann = client("ann");
+  ASSERT_FALSE(ann.command(spawn("ann", 1, 0.001, 1)));
+  const std::uint32_t id = ann.step(30, true).avatars(0).id();
+  v1::FrameRequest request = eyesOf("ann");
+  v1::FreeCamera& camera = *request.mutable_free();
+  *camera.mutable_eye() = vec(1, 6, 1);
+  *camera.mutable_forward() = vec(0, -1, 0);
+  *camera.mutable_up() = vec(0, 0, -1);
+  camera.set_height_y(4);
+  const auto ids = valuesOf<std::uint32_t>(ann.frame(request), v1::CHANNEL_IDS);
+  EXPECT_EQ(ids[24 * 64 + 32], id);
+  EXPECT_EQ(ids[0], kFloor);
+  camera.set_hide_avatar("ann");
+  EXPECT_EQ(valuesOf<std::uint32_t>(ann.frame(request), v1::CHANNEL_IDS)[24 * 64 + 32], kFloor);
+}
+
+TEST_F(Frames, APngHoldsTheSamePicture) {
+  protocol::Client ann = client("ann");
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
+  ann.step(30);
+  v1::FrameRequest request = eyesOf("ann");
+  const protocol::ReceivedFrame raw = ann.frame(request);
+  request.set_rgb_encoding(v1::ENCODING_PNG);
+  const protocol::ReceivedFrame packed = ann.frame(request);
+  const auto png = packed.plane(v1::CHANNEL_RGB), plain = raw.plane(v1::CHANNEL_RGB);
+  const render::Image image = render::decodePng({png.begin(), png.end()});
+  EXPECT_EQ(image.rgb, std::vector<std::uint8_t>(plain.begin(), plain.end()));
+}
+
+TEST_F(Frames, WhatCannotBePicturedIsRefusedByName) {
+  protocol::Client ann = client("ann");
+  v1::FrameRequest request = eyesOf("nobody");
+  EXPECT_EQ(codeOf(ann, request), v1::ERROR_UNKNOWN_AVATAR);
+  request.mutable_free();
+  request.set_width(5000);
+  EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_CAMERA);
+  request.set_width(64);
+  *request.mutable_free()->mutable_forward() = vec(0, 0, 0);
+  EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_CAMERA);
+  *request.mutable_free()->mutable_forward() = vec(1, 0, 0);
+  request.set_tick(77);
+  EXPECT_EQ(codeOf(ann, request), v1::ERROR_TICK_GONE);
+  request.clear_tick();
+  request.add_channels(v1::CHANNEL_RGB);
+  EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_MESSAGE) << "rgb twice";
+  request.clear_channels();
+  EXPECT_EQ(codeOf(ann, request), v1::ERROR_UNSPECIFIED);
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing

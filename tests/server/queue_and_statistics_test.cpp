@@ -1,0 +1,139 @@
+// Parts of the server that need no socket.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "server/command_line.hpp"
+#include "server/outgoing_queue.hpp"
+#include "server/tick_statistics.hpp"
+#include "server/walk_map.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+Buffer bytes(std::size_t count) {
+  return std::make_shared<const std::vector<std::uint8_t>>(count);
+}
+
+TEST(OutgoingQueue, KeepsRepliesInOrderAndOnlyTheLatestState) {
+  int woken = 0;
+  OutgoingQueue queue({1000, 2}, bytes(1), [&] { ++woken; });
+  queue.push(bytes(10));
+  queue.pushLatest(bytes(20));
+  EXPECT_TRUE(queue.dropLatest());
+  EXPECT_FALSE(queue.dropLatest());
+  queue.pushLatest(bytes(21));
+  queue.push(bytes(11));
+  EXPECT_EQ(queue.pop().message->size(), 10u);
+  EXPECT_EQ(queue.pop().message->size(), 21u);
+  EXPECT_EQ(queue.pop().message->size(), 11u);
+  EXPECT_FALSE(queue.pop().message);
+  EXPECT_EQ(woken, 4);
+}
+
+TEST(OutgoingQueue, AboveItsBoundOnlyTheLastWordsAreLeft) {
+  OutgoingQueue queue({100, 2}, bytes(7), [] {});
+  queue.push(bytes(60));
+  queue.push(bytes(40));
+  EXPECT_FALSE(queue.overflowed());
+  EXPECT_EQ(queue.pop().message->size(), 60u);
+  queue.push(bytes(61));
+  EXPECT_TRUE(queue.overflowed());
+  const OutgoingQueue::Next next = queue.pop();
+  EXPECT_EQ(next.message->size(), 7u);
+  EXPECT_TRUE(next.last);
+  queue.push(bytes(1));
+  EXPECT_FALSE(queue.pop().message) << "nothing is said after the last words";
+}
+
+TEST(OutgoingQueue, CountsPicturesAndNotTheirBytes) {
+  OutgoingQueue queue({100, 2}, bytes(7), [] {});
+  queue.pushFrame(bytes(5000));
+  queue.pushFrame(bytes(5000));
+  EXPECT_FALSE(queue.overflowed());
+  queue.pop();
+  queue.pushFrame(bytes(5000));
+  EXPECT_FALSE(queue.overflowed());
+  queue.pushFrame(bytes(5000));
+  EXPECT_TRUE(queue.overflowed());
+}
+
+TEST(OutgoingQueue, FinishingSendsWhatWaitsFirst) {
+  OutgoingQueue queue({100, 2}, bytes(7), [] {});
+  queue.push(bytes(1));
+  queue.finish(bytes(2));
+  queue.finish(bytes(3));
+  EXPECT_FALSE(queue.pop().last);
+  const OutgoingQueue::Next next = queue.pop();
+  EXPECT_EQ(next.message->size(), 2u);
+  EXPECT_TRUE(next.last);
+  EXPECT_FALSE(queue.pop().message);
+}
+
+TEST(DurationHistogram, AgreesWithSortingWithinABucket) {
+  std::mt19937_64 random(7);
+  std::lognormal_distribution<double> durations(-10, 1.5);
+  DurationHistogram histogram;
+  std::vector<double> all;
+  for (int i = 0; i < 5000; ++i) {
+    all.push_back(durations(random));
+    histogram.add(all.back());
+  }
+  std::sort(all.begin(), all.end());
+  for (const double fraction : {0.01, 0.5, 0.9, 0.99}) {
+    const double exact = all[static_cast<std::size_t>(fraction * 4999)];
+    EXPECT_NEAR(histogram.quantile(fraction) / exact, 1, 0.011) << fraction;
+  }
+  EXPECT_EQ(histogram.max(), all.back());
+  EXPECT_EQ(DurationHistogram{}.quantile(0.5), 0);
+}
+
+TEST(CommandLine, EndpointsAreHostAndPort) {
+  EXPECT_EQ(endpointFrom("127.0.0.1:7878")->port, 7878);
+  EXPECT_EQ(endpointFrom("[::1]:0")->host, "::1");
+  EXPECT_EQ(endpointFrom("localhost:65535")->host, "localhost");
+  for (const char* bad : {"", ":", "host", "host:", ":1", "host:x", "host:65536", "host:-1", "::1",
+                          "host:1 ", "[]:1", "host:1:2"}) {
+    EXPECT_FALSE(endpointFrom(bad)) << bad;
+  }
+}
+
+WalkedPath pathAt(std::initializer_list<std::pair<double, int>> heightsAndTicks) {
+  WalkedPath path{"ann", {}};
+  for (const auto& [height, ticks] : heightsAndTicks) {
+    for (int i = 0; i < ticks; ++i) path.feet.push_back(Vec3(i, height, 0));
+  }
+  return path;
+}
+
+TEST(WalkMap, StoreysAreTheHeightsWalkedOnForLong) {
+  EXPECT_TRUE(walkedStoreys({}).empty());
+  EXPECT_EQ(walkedStoreys({pathAt({{0.0005, 100}})}), std::vector<double>{0.0005});
+  const auto two = walkedStoreys({pathAt({{0, 300}, {1.1, 5}, {2.2, 5}, {4.2, 200}})});
+  EXPECT_EQ(two, (std::vector<double>{0, 4.2})) << "stairs are no storey";
+}
+
+TEST(WalkMap, PathsAreDrawnInTheirOwnColourOnThePlan) {
+  WalkTrace trace;
+  trace.paths = {pathAt({{0, 50}})};
+  int plans = 0;
+  const auto blank = [&](const render::Camera& camera) -> std::optional<PlanPicture> {
+    ++plans;
+    const std::size_t pixels = static_cast<std::size_t>(camera.width * camera.height);
+    PlanPicture plan{{camera.width, camera.height, {}}, std::vector<std::uint32_t>(pixels, 1)};
+    plan.colour.rgb.assign(3 * pixels, 200);
+    return plan;
+  };
+  const auto map = drawMap(trace, blank);
+  ASSERT_TRUE(map);
+  EXPECT_EQ(plans, 1);
+  std::size_t blue = 0;
+  for (std::size_t i = 0; i < map->rgb.size(); i += 3) {
+    blue += map->rgb[i + 2] > 200 && map->rgb[i] < 60;
+  }
+  EXPECT_GT(blue, 1000u);
+  EXPECT_FALSE(drawMap(trace, [](const auto&) { return std::optional<PlanPicture>(); }));
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing

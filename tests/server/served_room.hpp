@@ -1,0 +1,77 @@
+// A real server of the small room in the test's process, and clients' orders.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "protocol/client.hpp"
+#include "server/server.hpp"
+#include "tests/server/small_room.hpp"
+
+namespace enfilade::server::testing {
+
+class ServedRoom : public ::testing::Test {
+ protected:
+  void serve(const ServerLimits& limits = {}) {
+    server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, limits);
+  }
+  protocol::Client client(const std::string& name) {
+    protocol::ClientOptions options;
+    options.name = name;
+    return protocol::Client("127.0.0.1", server_->port(), options);
+  }
+
+  std::unique_ptr<Server> server_;
+};
+
+inline v1::Vec3 vec(double x, double y, double z) {
+  v1::Vec3 v;
+  v.set_x(x);
+  v.set_y(y);
+  v.set_z(z);
+  return v;
+}
+
+inline v1::Command spawn(const std::string& avatar, double x, double y, double z) {
+  v1::Command command;
+  command.set_avatar(avatar);
+  *command.mutable_spawn()->mutable_at() = vec(x, y, z);
+  return command;
+}
+
+inline v1::Command walkTo(const std::string& avatar, double x, double y, double z) {
+  v1::Command command;
+  command.set_avatar(avatar);
+  *command.mutable_walk()->add_along() = vec(x, y, z);
+  return command;
+}
+
+inline v1::Subscribe everything() {
+  v1::Subscribe subscription;
+  subscription.set_contacts(true);
+  subscription.set_notices(true);
+  subscription.set_state(true);
+  return subscription;
+}
+
+/// All contact events and notices among what came.
+struct Heard {
+  std::vector<v1::ContactEvent> contacts;
+  std::vector<v1::Notice> notices;
+
+  void add(const std::deque<v1::ServerMessage>& messages) {
+    for (const v1::ServerMessage& message : messages) {
+      const v1::TickEvents& events = message.events();
+      contacts.insert(contacts.end(), events.contacts().begin(), events.contacts().end());
+      notices.insert(notices.end(), events.notices().begin(), events.notices().end());
+    }
+  }
+  std::size_t count(v1::ContactEvent::Kind kind) const {
+    return static_cast<std::size_t>(
+        std::count_if(contacts.begin(), contacts.end(),
+                      [&](const v1::ContactEvent& event) { return event.kind() == kind; }));
+  }
+};
+
+}  // namespace enfilade::server::testing

@@ -1,0 +1,273 @@
+// Well-behaved clients of a real server.
+#include <functional>
+#include <limits>
+#include <thread>
+
+#include "scene/world.hpp"
+#include "tests/server/served_room.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+constexpr int kPatience = 500;  // tries, a few milliseconds apart
+
+class Sessions : public ServedRoom {};
+
+/// The code of the ProtocolError that `request` throws; ERROR_UNSPECIFIED when it throws none.
+v1::ErrorCode codeThrown(const std::function<void()>& request) {
+  try {
+    request();
+  } catch (const protocol::ProtocolError& error) {
+    return error.code;
+  }
+  return v1::ERROR_UNSPECIFIED;
+}
+
+bool becomesTrue(const std::function<bool()>& condition) {
+  for (int i = 0; i < kPatience; ++i) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return false;
+}
+
+TEST_F(Sessions, WelcomeTellsTheSceneAndHowItMoves) {
+  serve();
+  const protocol::Client ann = client("ann");
+  const v1::Welcome& welcome = ann.welcome();
+  EXPECT_EQ(welcome.protocol_version(), protocol::kVersion);
+  EXPECT_EQ(welcome.scene().source(), "small_room");
+  EXPECT_EQ(welcome.scene().objects(), 3u);
+  EXPECT_EQ(welcome.scene().hash(), smallRoom()->hash());
+  EXPECT_DOUBLE_EQ(welcome.scene().bounds().max().x(), 10);
+  EXPECT_DOUBLE_EQ(welcome.policies().tick(), scene::Lengths{}.tick);
+  EXPECT_NEAR(welcome.policies().walkable_slope(), 50 * 3.14159265358979 / 180, 1e-9);
+  EXPECT_EQ(welcome.limits().max_message(), protocol::kServerTakes.total);
+  EXPECT_EQ(welcome.tick(), 0u);
+  EXPECT_EQ(welcome.clock().mode(), v1::Clock::MODE_LOCKSTEP);
+  EXPECT_EQ(welcome.renderer(), server_->rendererName());
+}
+
+TEST_F(Sessions, TwoClientsHearTheSameContacts) {
+  serve();
+  protocol::Client ann = client("ann"), bob = client("bob");
+  bob.subscribe(everything());
+  ann.subscribe(everything());
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
+  ASSERT_FALSE(ann.command(walkTo("ann", 8, 0, 0)));
+  Heard annHeard, bobHeard;
+  for (int i = 0; i < 400; ++i) {
+    ann.step();
+    annHeard.add(ann.takeEvents());
+  }
+  bob.metrics();
+  bobHeard.add(bob.takeEvents());
+  ASSERT_GE(annHeard.count(v1::ContactEvent::KIND_BEGIN), 2u) << "the floor and the wall";
+  ASSERT_EQ(annHeard.contacts.size(), bobHeard.contacts.size());
+  for (std::size_t i = 0; i < annHeard.contacts.size(); ++i) {
+    EXPECT_EQ(annHeard.contacts[i].SerializeAsString(), bobHeard.contacts[i].SerializeAsString());
+  }
+  const auto blocked = std::find_if(
+      bobHeard.notices.begin(), bobHeard.notices.end(),
+      [](const v1::Notice& notice) { return notice.kind() == v1::Notice::KIND_BLOCKED; });
+  ASSERT_NE(blocked, bobHeard.notices.end());
+  EXPECT_EQ(blocked->obstacle_name(), "room_wall");
+}
+
+TEST_F(Sessions, OnlyTheDriverStepsAndTheNextOneMayWhenItLeft) {
+  serve();
+  protocol::Client bob = client("bob");
+  {
+    protocol::Client ann = client("ann");
+    ann.step();
+    EXPECT_EQ(codeThrown([&] { bob.step(); }), v1::ERROR_NOT_ALLOWED);
+    v1::SetClock pause;
+    pause.mutable_pause();
+    EXPECT_EQ(codeThrown([&] { bob.setClock(pause); }), v1::ERROR_NOT_ALLOWED);
+    EXPECT_EQ(ann.step().tick(), 2u) << "the refused step made no tick";
+  }
+  EXPECT_TRUE(
+      becomesTrue([&] { return codeThrown([&] { bob.step(); }) == v1::ERROR_UNSPECIFIED; }));
+}
+
+TEST_F(Sessions, StepsBeyondTheLimitAreRefused) {
+  serve();
+  protocol::Client ann = client("ann");
+  EXPECT_EQ(codeThrown([&] { ann.step(0); }), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(codeThrown([&] { ann.step(ann.welcome().limits().max_ticks_per_step() + 1); }),
+            v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(ann.step(50).tick(), 50u);
+}
+
+TEST_F(Sessions, AnAvatarObeysOnlyItsOwner) {
+  serve();
+  protocol::Client ann = client("ann"), bob = client("bob");
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
+  const auto error = bob.command(walkTo("ann", 1, 0, 0));
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(error->field(), "avatar");
+  ann.step();
+  EXPECT_TRUE(bob.command(spawn("ann", 3, 0.01, 0))) << "nor is its name free";
+}
+
+TEST_F(Sessions, ALeftAvatarsNameIsFreeAgain) {
+  serve();
+  protocol::Client ann = client("ann"), bob = client("bob");
+  ASSERT_FALSE(ann.command(spawn("guest", 0, 0.01, 0)));
+  ann.step();
+  v1::Command leave;
+  leave.set_avatar("guest");
+  leave.mutable_leave();
+  ASSERT_FALSE(ann.command(leave));
+  ann.step(3);
+  EXPECT_FALSE(bob.command(spawn("guest", 1, 0.01, 0)));
+  EXPECT_EQ(ann.step(2, true).avatars_size(), 1);
+}
+
+TEST_F(Sessions, AVanishedClientsAvatarLeavesAndItsContactsEnd) {
+  serve();
+  protocol::Client bob = client("bob");
+  bob.subscribe(everything());
+  Heard heard;
+  {
+    protocol::Client ann = client("ann");
+    ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
+    ASSERT_FALSE(ann.command(walkTo("ann", 9, 0, 6)));
+    bob.step(30);
+    heard.add(bob.takeEvents());
+    ASSERT_GE(heard.count(v1::ContactEvent::KIND_BEGIN), 1u);
+  }
+  EXPECT_TRUE(becomesTrue([&] {
+    const bool gone = bob.step(1, true).avatars().empty();
+    heard.add(bob.takeEvents());
+    return gone;
+  }));
+  EXPECT_EQ(heard.count(v1::ContactEvent::KIND_BEGIN), heard.count(v1::ContactEvent::KIND_END));
+  EXPECT_EQ(heard.contacts.back().reason(), v1::ContactEvent::REASON_LEFT);
+}
+
+TEST_F(Sessions, WhoSubscribesLateIsToldTheContactsThatLive) {
+  serve();
+  protocol::Client ann = client("ann"), bob = client("bob");
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
+  ann.step(60);
+  const v1::SubscribeReply reply = bob.subscribe(everything());
+  ASSERT_EQ(reply.live_size(), 1);
+  EXPECT_EQ(reply.live(0).b(), kFloor);
+  EXPECT_EQ(reply.live(0).b_name(), "room_floor");
+  EXPECT_EQ(reply.tick(), 60u);
+}
+
+TEST_F(Sessions, ANumberThatIsNoneIsRefusedNamingItsField) {
+  serve();
+  protocol::Client ann = client("ann");
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto spawned = ann.command(spawn("ann", 0, nan, 0));
+  ASSERT_TRUE(spawned);
+  EXPECT_EQ(spawned->code(), v1::ERROR_REFUSED_COMMAND);
+  EXPECT_EQ(spawned->field(), "spawn.at.y");
+  v1::Command far = walkTo("ann", 1, 0, 0);
+  *far.mutable_walk()->add_along() = vec(0, 0, 1e300);
+  EXPECT_EQ(ann.command(far)->field(), "walk.along[1].z");
+  v1::Command empty;
+  empty.set_avatar("ann");
+  EXPECT_EQ(ann.command(empty)->code(), v1::ERROR_BAD_MESSAGE);
+  empty.mutable_spawn();
+  EXPECT_EQ(ann.command(empty)->field(), "spawn.at");
+  EXPECT_EQ(ann.step(1, true).avatars_size(), 0);
+}
+
+TEST_F(Sessions, TheFreeRunningClockTicksByItselfUntilItIsPaused) {
+  serve();
+  protocol::Client ann = client("ann");
+  v1::SetClock clock;
+  clock.mutable_free_run()->set_speed(100);
+  EXPECT_EQ(ann.setClock(clock).clock().mode(), v1::Clock::MODE_FREE_RUN);
+  EXPECT_TRUE(becomesTrue([&] { return ann.metrics().ticks() > 20; }));
+  EXPECT_EQ(codeThrown([&] { ann.step(); }), v1::ERROR_NOT_ALLOWED);
+  clock.mutable_pause();
+  const std::uint64_t tick = ann.setClock(clock).tick();
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_EQ(ann.metrics().ticks(), tick);
+  clock.mutable_free_run()->set_speed(-1);
+  EXPECT_EQ(codeThrown([&] { ann.setClock(clock); }), v1::ERROR_BAD_MESSAGE);
+}
+
+TEST_F(Sessions, MetricsCountWhatHappened) {
+  serve();
+  protocol::Client ann = client("ann"), bob = client("bob");
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
+  ann.step(60);
+  const v1::Metrics metrics = ann.metrics();
+  EXPECT_EQ(metrics.ticks(), 60u);
+  EXPECT_EQ(metrics.clients(), 2u);
+  EXPECT_EQ(metrics.avatars(), 1u);
+  EXPECT_EQ(metrics.contacts(), 1u);
+  EXPECT_EQ(metrics.live_contacts(), 1u);
+  EXPECT_EQ(metrics.worst_penetration(), 0);
+  ASSERT_EQ(metrics.stages_size(), static_cast<int>(scene::kStages));
+  EXPECT_EQ(metrics.stages(0).name(), "commands");
+  EXPECT_GT(metrics.tick().max_us(), 0);
+  EXPECT_LE(metrics.tick().median_us(), metrics.tick().max_us());
+}
+
+TEST_F(Sessions, EntitiesAreDescribedByNameAndKind) {
+  serve();
+  protocol::Client ann = client("ann");
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
+  const std::uint32_t id = ann.step(1, true).avatars(0).id();
+  const std::vector<std::uint32_t> wanted{kColumn, id, 99};
+  const auto entities = ann.describe(wanted);
+  ASSERT_EQ(entities.size(), 3u);
+  EXPECT_EQ(entities[0].name(), "room_column");
+  EXPECT_EQ(entities[0].kind(), v1::Entity::KIND_OBJECT);
+  EXPECT_EQ(entities[1].name(), "ann");
+  EXPECT_EQ(entities[1].kind(), v1::Entity::KIND_AVATAR);
+  EXPECT_EQ(entities[2].kind(), v1::Entity::KIND_UNSPECIFIED);
+  EXPECT_EQ(ann.describe({}).size(), 4u);
+}
+
+TEST_F(Sessions, AtShutdownContactsEndAndClientsAreTold) {
+  serve();
+  protocol::Client ann = client("ann");
+  ann.subscribe(everything());
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
+  ann.step(60);
+  Heard heard;
+  heard.add(ann.takeEvents());
+  std::thread stopping([&] { server_->stop(); });
+  bool told = false;
+  while (!told) {
+    const auto message = ann.nextEvent(std::chrono::seconds(10));
+    ASSERT_TRUE(message);
+    heard.add({*message});
+    told = message->has_bye();
+    if (told) {
+      EXPECT_EQ(message->bye().code(), v1::ERROR_SHUTTING_DOWN);
+    }
+  }
+  EXPECT_EQ(heard.contacts.back().kind(), v1::ContactEvent::KIND_END);
+  EXPECT_EQ(heard.contacts.back().reason(), v1::ContactEvent::REASON_SHUTDOWN);
+  EXPECT_EQ(heard.count(v1::ContactEvent::KIND_BEGIN), heard.count(v1::ContactEvent::KIND_END));
+  stopping.join();
+}
+
+TEST(Serving, RefusesAddressesThatStrangersReach) {
+  for (const char* address : {"0.0.0.0", "192.0.2.1", "::", "example.invalid"}) {
+    EXPECT_THROW(Server(smallRoom(), {address, 0}), ServerError) << address;
+  }
+}
+
+TEST(Serving, SaysThatAPortIsTaken) {
+  const Server first(smallRoom(), {"127.0.0.1", 0});
+  try {
+    const Server second(smallRoom(), {"127.0.0.1", first.port()});
+    FAIL() << "two servers on one port";
+  } catch (const ServerError& error) {
+    EXPECT_NE(std::string(error.what()).find(std::to_string(first.port())), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing
