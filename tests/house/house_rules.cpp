@@ -141,7 +141,8 @@ bool skippedFolder(const std::string& name) {
 }
 
 bool writtenByPeople(const std::filesystem::path& file) {
-  static const Names endings{".cpp", ".hpp", ".proto", ".txt", ".cmake", ".md", ".json", ".py"};
+  static const Names endings{".cpp", ".hpp",  ".proto", ".txt", ".cmake",
+                             ".md",  ".json", ".jsonl", ".py"};
   static const Names names{"dev", "run", ".gitignore", ".clang-format"};
   return endings.count(file.extension().string()) != 0 ||
          names.count(file.filename().string()) != 0;
