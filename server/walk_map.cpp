@@ -118,12 +118,12 @@ void drawCapture(std::vector<Storey>& storeys, const MapCapture& capture) {
 
 /// Contacts with walls and furniture; every walker touches floors all the time.
 void drawContacts(std::vector<Storey>& storeys, const WalkTrace& trace) {
+  for (const MapContact& stop : trace.stops) {
+    drawDot(*nearestStorey(storeys, stop.point.y()), stop.point, 6, kStop);
+  }
   for (const MapContact& contact : trace.contacts) {
     if (std::abs(contact.normal.y()) > kFloorNormal) continue;
     drawDot(*nearestStorey(storeys, contact.point.y() - 0.8), contact.point, 3.5, kContact);
-  }
-  for (const MapContact& stop : trace.stops) {
-    drawDot(*nearestStorey(storeys, stop.point.y()), stop.point, 6, kStop);
   }
 }
 
@@ -178,12 +178,20 @@ std::vector<LegendEntry> legendOf(const WalkTrace& trace) {
   return entries;
 }
 
+constexpr int kLegendColumn = 460;  // pixels
+
+int legendRows(const std::vector<LegendEntry>& entries, int width) {
+  const int columns = std::max(1, width / kLegendColumn);
+  return (static_cast<int>(entries.size()) + columns - 1) / columns;
+}
+
 void drawLegend(Image& image, const std::vector<LegendEntry>& entries, int top) {
-  int y = top;
-  for (const LegendEntry& entry : entries) {
-    render::drawDisc(image, 24, y + 7, 6, entry.colour);
-    render::drawText(image, 40, y, entry.text, 2, kInk);
-    y += kLine;
+  const int rows = legendRows(entries, image.width);
+  for (int i = 0; i < static_cast<int>(entries.size()); ++i) {
+    const LegendEntry& entry = entries[static_cast<std::size_t>(i)];
+    const int x = 24 + i / rows * kLegendColumn, y = top + i % rows * kLine;
+    render::drawDisc(image, x, y + 7, 6, entry.colour);
+    render::drawText(image, x + 16, y, entry.text, 2, kInk);
   }
 }
 
@@ -201,7 +209,7 @@ Image composed(const WalkTrace& trace, const std::vector<Storey>& storeys) {
     width = std::max(width, storey.image.width + 2 * kBorder);
     height += storey.image.height + kLine + kBorder;
   }
-  height += static_cast<int>(legend.size()) * kLine;
+  height += legendRows(legend, width) * kLine;
   Image whole = blankImage(width, height);
   render::drawText(whole, kBorder, kBorder, trace.title, 2, kInk);
   int y = kBorder + kLine;
@@ -220,8 +228,12 @@ std::vector<double> walkedStoreys(const std::vector<WalkedPath>& paths) {
   std::map<long, std::vector<double>> bins;
   std::size_t ticks = 0;
   for (const WalkedPath& path : paths) {
-    ticks += path.feet.size();
-    for (const Vec3& feet : path.feet) bins[std::lround(feet.y() / kBin)].push_back(feet.y());
+    for (std::size_t i = 0; i < path.feet.size(); ++i) {
+      // Who stands still for long makes no storey more walked.
+      if (i > 0 && path.feet[i] == path.feet[i - 1]) continue;
+      bins[std::lround(path.feet[i].y() / kBin)].push_back(path.feet[i].y());
+      ++ticks;
+    }
   }
   std::vector<std::vector<double>> peaks;
   for (auto& [bin, heights] : bins) peaks.push_back(std::move(heights));
@@ -256,8 +268,8 @@ std::optional<Image> drawMap(const WalkTrace& trace, const TakePicture& picture)
   for (std::size_t i = 0; i < trace.paths.size(); ++i) {
     drawPath(storeys, trace.paths[i], colourOf(i));
   }
-  drawContacts(storeys, trace);
   for (const MapCapture& capture : trace.captures) drawCapture(storeys, capture);
+  drawContacts(storeys, trace);
   return composed(trace, storeys);
 }
 

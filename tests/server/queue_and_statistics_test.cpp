@@ -113,6 +113,12 @@ TEST(WalkMap, StoreysAreTheHeightsWalkedOnForLong) {
   EXPECT_EQ(two, (std::vector<double>{0, 4.2})) << "stairs are no storey";
 }
 
+TEST(WalkMap, WhoStandsStillMakesNoStorey) {
+  WalkedPath waiting{"bob", std::vector<Vec3>(5000, Vec3(0, 0, 0))};
+  const auto two = walkedStoreys({pathAt({{0, 100}, {4.2, 50}}), waiting});
+  EXPECT_EQ(two, (std::vector<double>{0, 4.2}));
+}
+
 TEST(WalkMap, PathsAreDrawnInTheirOwnColourOnThePlan) {
   WalkTrace trace;
   trace.paths = {pathAt({{0, 50}})};
