@@ -15,7 +15,8 @@ constexpr double kLowBand = 7.0 / 8;  // of epsilon: see StoppingBand
 constexpr double kHighBand = 1 + 1.0 / 32;
 constexpr double kNoMove = 1e-9;        // of epsilon: what is left of a move below this is not made
 constexpr double kGatherMargin = 0.15;  // metres: obstacles are collected for some ticks at once
-constexpr double kWorthAStep = 1e-3;    // of the wish: a step must win at least this much ground
+constexpr double kTread = 0.05;       // metres: what is less deep, as a skirting board, is no step
+constexpr double kWorthAStep = 1e-3;  // of the wish: a step must win at least this much ground
 
 /// One avatar's motion through one tick.
 struct Mover {
@@ -130,17 +131,28 @@ double progress(const Vec3& from, const Vec3& to, const Vec3& direction) {
   return (to - from).dot(direction);
 }
 
+/// Whether the way goes on for at least half a tread beyond `gained`; the feet stay.
+bool hasTread(Mover& m, const Vec3& direction, double gained) {
+  const Vec3 before = m.feet;
+  slide(m, (gained + kTread) * direction, Manner::walk);
+  const double room = progress(before, m.feet, direction);
+  m.feet = before;
+  return room > gained + 0.5 * kTread;
+}
+
 /// Tries the wish one step higher; true if that wins ground and ends on something walkable.
 bool stepUp(Mover& m, const Vec3& start, const Vec3& wish, double toBeat) {
   const Vec3 low = m.feet;
   m.feet = start;
   sweepFrom(m, {0, m.lengths.stepHeight, 0});
   const double raised = m.feet.y() - start.y();
-  slide(m, wish, Manner::walk);
   const double length = wish.norm();
-  if (settle(m, raised + m.lengths.epsilon) &&
-      progress(start, m.feet, wish / length) > toBeat + kWorthAStep * length)
-    return true;
+  if (hasTread(m, wish / length, toBeat)) {
+    slide(m, wish, Manner::walk);
+    if (settle(m, raised + m.lengths.epsilon) &&
+        progress(start, m.feet, wish / length) > toBeat + kWorthAStep * length)
+      return true;
+  }
   m.feet = low;
   return false;
 }
@@ -174,7 +186,7 @@ void fall(Mover& m, const Vec3& wish) {
 
 Box reachOf(const WorldState& world, Avatar& avatar, const Vec3& velocity) {
   const Lengths& l = world.lengths;
-  const double across = velocity.norm() * l.tick;
+  const double across = velocity.norm() * l.tick + kTread;
   const double down = (avatar.fallSpeed + l.gravity * l.tick) * l.tick;
   // Slides back out by epsilon, contacts and near misses look a little further.
   const double margin = 8 * l.epsilon + l.nearMiss;

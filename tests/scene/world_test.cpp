@@ -166,6 +166,16 @@ TEST(World, StepsUpToTheStepHeightAreClimbedAndHigherOnesBlock) {
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
+TEST(World, ASkirtingBoardIsNoStep) {
+  Trial run(
+      {floorBox(), {"skirting", {1.98, 0, -3}, {2, 0.1, 3}}, {"wall", {2, 0, -3}, {2.2, 3, 3}}});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.order("ann", to(5, 0));
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::blocked), 1);
+  EXPECT_LT(run.feet("ann").y(), 0.001);
+}
+
 std::vector<NamedBox> stair(double riser, double tread, int steps) {
   std::vector<NamedBox> boxes{floorBox()};
   for (int i = 0; i < steps; ++i)
