@@ -67,6 +67,8 @@ const char* wordOf(v1::Notice::Kind kind) {
       return "blocked";
     case v1::Notice::KIND_REFUSED:
       return "refused";
+    case v1::Notice::KIND_LEFT:
+      return "left";
     default:
       return "other";
   }
@@ -188,7 +190,7 @@ void WalkReport::addNotice(const v1::Notice& notice) {
   if (notice.kind() == v1::Notice::KIND_SPAWNED) present_.insert(notice.avatar());
   if (notice.kind() == v1::Notice::KIND_LEFT) present_.erase(notice.avatar());
   if (blocked || notice.kind() == v1::Notice::KIND_ARRIVED ||
-      notice.kind() == v1::Notice::KIND_REFUSED) {
+      notice.kind() == v1::Notice::KIND_REFUSED || notice.kind() == v1::Notice::KIND_LEFT) {
     walks_.push_back(notice);
   }
 }

@@ -45,6 +45,8 @@ class WalkReport {
   /// Writes summary.json and returns it as one line of JSON.
   std::string writeSummary(const WalkFacts& facts, const protocol::ScriptResult& result);
   const std::filesystem::path& folder() const { return folder_; }
+  /// How walks ended, in order: arrived, blocked, refused or left.
+  const std::vector<v1::Notice>& walks() const { return walks_; }
 
  private:
   struct Picture {
@@ -65,7 +67,7 @@ class WalkReport {
   std::map<std::string, std::size_t> pathOf_;  ///< index into trace_.paths by the avatar's name
   WalkTrace trace_;
   std::vector<Picture> pictures_;
-  std::vector<v1::Notice> walks_;  ///< arrived, blocked, refused
+  std::vector<v1::Notice> walks_;  ///< arrived, blocked, refused, left
 };
 
 /// One line of contacts.jsonl, without its end.

@@ -92,6 +92,11 @@ void tellPerson(const WalkReport& report, const WalkFacts& facts,
                facts.metrics.worst_penetration());
   std::fprintf(stderr, "  pictures: %u by %s\n", result.captured,
                facts.renderer.empty() ? "no renderer" : facts.renderer.c_str());
+  for (const v1::Notice& notice : report.walks()) {
+    // Nobody told it to leave, as when it fell out of the scene.
+    if (notice.kind() != v1::Notice::KIND_LEFT || notice.text().empty()) continue;
+    std::fprintf(stderr, "  %s left: %s\n", notice.avatar().c_str(), notice.text().c_str());
+  }
   for (const protocol::LineOutcome& outcome : result.outcomes) {
     std::fprintf(stderr, "  %s\n", outcome.text.c_str());
   }
