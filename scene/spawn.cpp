@@ -128,7 +128,9 @@ std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& ord
     const Vec3 middle = avatar.feet + avatar.hullBox.centre();
     if (const EntityId solid = solidAround(world, middle))
       return "at " + text(order.at) + " it would stand inside " + pathOf(world, solid);
-    if (!hasFloorBelow(world, avatar, count)) return "there is no floor below " + text(order.at);
+    if (!hasFloorBelow(world, avatar, count))
+      return "there is no floor below " + text(order.at) + "; the scene spans " +
+             text(world.scene->bounds().min) + " to " + text(world.scene->bounds().max);
     return std::nullopt;
   }
   return "at " + text(order.at) + " it would stand in " + pathOf(world, inTheWay) +
