@@ -1,6 +1,6 @@
 // The cost of a tick with walkers in a real or the bundled scene, by stage, in microseconds.
 //
-//   tick_bench SCENE [AVATARS [TICKS]]
+//   tick_bench [SCENE [AVATARS [TICKS]]]
 //
 // Avatars walk at 1.5 m/s towards seeded places and turn to new ones every two seconds, as people
 // who look around a building. Contacts are decided each tick; the worst penetration is printed
@@ -8,10 +8,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <random>
 
 #include "scene/import_model.hpp"
 #include "scene/world.hpp"
+#include "tests/support/shared_folder.hpp"
 
 namespace {
 
@@ -58,17 +60,8 @@ void row(const char* name, const std::vector<double>& seconds) {
               1e6 * quantile(seconds, 0.99), 1e6 * quantile(seconds, 1));
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  if (const auto code = scene::runImportChild(argc, argv)) return *code;
-  if (argc < 2) {
-    std::fprintf(stderr, "usage: tick_bench SCENE [AVATARS [TICKS]]\n");
-    return 2;
-  }
-  const int avatars = argc > 2 ? std::atoi(argv[2]) : 10;
-  const int ticks = argc > 3 ? std::atoi(argv[3]) : 3000;
-  const auto still = std::make_shared<const scene::Scene>(scene::importModel(argv[1]));
+void bench(const std::filesystem::path& file, int avatars, int ticks) {
+  const auto still = std::make_shared<const scene::Scene>(scene::importModel(file));
   scene::World world(still);
   std::mt19937_64 random(1);
   spawnAvatars(world, avatars, random);
@@ -94,8 +87,8 @@ int main(int argc, char** argv) {
     rationals += report.rationalQueries;
     pairs += report.pairs;
   }
-  std::printf("%s: %zu objects, %zu avatars, %d ticks\n", argv[1], still->model().objects.size(),
-              world.snapshot()->avatars.size(), ticks);
+  std::printf("%s: %zu objects, %zu avatars, %d ticks\n", file.c_str(),
+              still->model().objects.size(), world.snapshot()->avatars.size(), ticks);
   std::printf("| stage    | median us |    p99 us |    max us |\n|---|---|---|---|\n");
   for (std::size_t s = 0; s < scene::kStages; ++s) row(scene::kStageNames[s], stages[s]);
   row("tick", whole);
@@ -104,4 +97,26 @@ int main(int argc, char** argv) {
       "worst penetration %g m; state hash %016llx\n",
       double(pairs) / ticks, double(queries) / ticks, double(rationals) / ticks, worst,
       static_cast<unsigned long long>(world.snapshot()->stateHash));
+}
+
+/// The bundled building, and the shared estate of 16,395 objects where it is there.
+std::vector<std::filesystem::path> defaultScenes(const char* program) {
+  const auto built = std::filesystem::absolute(program).parent_path().parent_path();
+  std::vector<std::filesystem::path> scenes{built / "assets/building.glb"};
+  if (const auto shared = tests::sharedFolder())
+    scenes.push_back(*shared / "scenes/schependomlaan/schependomlaan_estate.glb");
+  return scenes;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (const auto code = scene::runImportChild(argc, argv)) return *code;
+  const int avatars = argc > 2 ? std::atoi(argv[2]) : 10;
+  const int ticks = argc > 3 ? std::atoi(argv[3]) : 3000;
+  if (argc > 1) {
+    bench(argv[1], avatars, ticks);
+  } else {
+    for (const auto& scene : defaultScenes(argv[0])) bench(scene, avatars, ticks);
+  }
 }
