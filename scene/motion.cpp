@@ -1,7 +1,9 @@
 // How an avatar moves in one tick: collide and slide (up to kSlides planes), steps up to
 // Lengths::stepHeight, follows the ground down by as much, falls otherwise. Every piece of the way
 // is swept, so that nothing is crossed at any speed, and each ends epsilon away from what stopped
-// it. Sliding is a declared policy: what is left of a move after a stop goes on along the plane.
+// it. No move leaves the box that the avatar announced to the broad phase: a slide that would, as
+// after a fast fall onto a steep roof, goes on in the next tick. Sliding is a declared policy: what
+// is left of a move after a stop goes on along the plane.
 #include <algorithm>
 #include <cmath>
 
@@ -24,6 +26,7 @@ struct Mover {
   Avatar& avatar;
   QueryCount& count;
   Vec3 feet;
+  Box feetRoom;  ///< the feet stay in here, so that the body stays inside Avatar::reach
 
   collision::StoppingBand band() const {
     return {kLowBand * lengths.epsilon, kHighBand * lengths.epsilon};
@@ -36,10 +39,31 @@ struct SlideResult {
   EntityId ground = 0;  ///< the last thing met that can
 };
 
+/// Where the feet may go: beyond the reach nothing was collected, so nothing would be in the way.
+Box feetRoomOf(const Avatar& avatar, const Lengths& lengths) {
+  const double clearance = 2 * lengths.epsilon + lengths.nearMiss;  // what contacts.cpp looks for
+  return grown(Box{avatar.reach.min - avatar.hullBox.min, avatar.reach.max - avatar.hullBox.max},
+               -clearance);
+}
+
+/// The part of a displacement, 0..1, that keeps the feet in their room.
+double partInside(const Box& room, const Vec3& feet, const Vec3& displacement) {
+  double part = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double way = displacement[axis];
+    const double left = (way > 0 ? room.max[axis] : room.min[axis]) - feet[axis];
+    if (way != 0) part = std::min(part, std::max(0.0, left / way));
+  }
+  return part;
+}
+
 Stop sweepFrom(Mover& m, const Vec3& displacement) {
-  const Stop stop = sweepHull(m.avatar.hull->vertices, m.avatar.hullBox, m.feet, displacement,
-                              m.avatar.obstacles, m.band(), m.count);
-  m.feet += stop.fraction * displacement;
+  const double part = partInside(m.feetRoom, m.feet, displacement);
+  const Vec3 granted = part * displacement;
+  Stop stop = sweepHull(m.avatar.hull->vertices, m.avatar.hullBox, m.feet, granted,
+                        m.avatar.obstacles, m.band(), m.count);
+  m.feet += stop.fraction * granted;
+  stop.fraction *= part;
   return stop;
 }
 
@@ -237,7 +261,7 @@ void gatherObstacles(WorldState& world, Avatar& avatar, bool pairsChanged) {
 }
 
 void moveAvatar(WorldState& world, Avatar& avatar, const Vec3& velocity, QueryCount& count) {
-  Mover m{world.lengths, avatar, count, avatar.feet};
+  Mover m{world.lengths, avatar, count, avatar.feet, feetRoomOf(avatar, world.lengths)};
   const Vec3 wish = velocity * world.lengths.tick;
   avatar.stoppedBy = 0;
   if (avatar.grounded) {

@@ -253,6 +253,30 @@ TEST(World, APaneOfNoThicknessIsNotCrossedAtAnySpeed) {
   }
 }
 
+TEST(World, ASteepRoofThrowsNobodyThroughTheWallBesideIt) {
+  // A fast fall onto a slope of 60 degrees goes on sideways, towards a pane that was not near.
+  Model model = boxModel({floorBox()});
+  Mesh roof;
+  roof.positions = {{-1, 2.4F, -3}, {-1, 2.4F, 3}, {0.4F, 0, 3}, {0.4F, 0, -3}};
+  roof.indices = {0, 1, 2, 0, 2, 3};
+  Mesh pane;
+  pane.positions = {{0.42F, 0, -3}, {0.42F, 0, 3}, {0.42F, 9, 3}, {0.42F, 9, -3}};
+  pane.indices = {0, 1, 2, 0, 2, 3};
+  model.meshes.insert(model.meshes.end(), {roof, pane});
+  model.objects.push_back({"roof", "", {1}, Eigen::Affine3d::Identity()});
+  model.objects.push_back({"pane", "", {2}, Eigen::Affine3d::Identity()});
+  const auto scene = std::make_shared<const Scene>(model);
+  for (double height = 50; height < 51; height += 0.07) {
+    World world(scene);
+    ASSERT_FALSE(submit(world, {"ann", Spawn{{0, height, 0}}, 0}));
+    for (int i = 0; i < 300; ++i) {
+      ASSERT_EQ(tick(world).worstPenetration, 0) << height << " m, tick " << i;
+      ASSERT_LT(world.snapshot()->avatars[0].feet.x(), 0.12) << height << " m, tick " << i;
+    }
+    EXPECT_LT(world.snapshot()->avatars[0].feet.y(), 3) << height;
+  }
+}
+
 TEST(World, ARoomOfNoiseIsNeverPenetratedAndEventsBalance) {
   std::mt19937_64 random(5);
   const auto uniform = [&](double low, double high) {
