@@ -23,9 +23,11 @@ ContactEvent eventOf(const WorldState& world, ContactEvent::Kind kind, const Ava
   return event;
 }
 
-/// Penetrating before touching before separated, then by distance.
+/// Penetrating before touching before separated, then by depth or distance.
 bool nearer(const Decision& a, const Decision& b) {
-  return a.verdict != b.verdict ? a.verdict > b.verdict : a.distance < b.distance;
+  if (a.verdict != b.verdict) return a.verdict > b.verdict;
+  return a.verdict == Verdict::penetrating ? a.penetration > b.penetration
+                                           : a.distance < b.distance;
 }
 
 std::optional<Decision> decideCounted(const Avatar& avatar, Obstacle& obstacle, double limit,
@@ -57,16 +59,16 @@ std::vector<Contact> nearOnes(Avatar& avatar, double limit, QueryCount& count) {
   return found;
 }
 
-/// How far apart they are now, for the event that ends a contact; last tick's if out of reach.
-Decision partedDecision(Avatar& avatar, const Contact& last, QueryCount& count) {
+/// How the avatar and `other` stand to one another now; nullopt if `other` is out of reach.
+std::optional<Decision> decisionWith(Avatar& avatar, EntityId other, QueryCount& count) {
   std::optional<Decision> best;
   for (Obstacle& obstacle : avatar.obstacles) {
-    if (obstacle.entity != last.other) continue;
+    if (obstacle.entity != other) continue;
     const auto decision =
         decideCounted(avatar, obstacle, std::numeric_limits<double>::infinity(), count);
     if (!best || nearer(*decision, *best)) best = decision;
   }
-  return best.value_or(last.decision);
+  return best;
 }
 
 const Contact* find(const std::vector<Contact>& contacts, EntityId other) {
@@ -93,7 +95,8 @@ void tellEnds(const WorldState& world, Avatar& avatar, const std::vector<Contact
     const Contact* contact = find(now, before.other);
     if (!before.touching || (contact && contact->touching)) continue;
     Contact parted = contact ? *contact : before;
-    if (!contact) parted.decision = partedDecision(avatar, before, count);
+    if (!contact)
+      parted.decision = decisionWith(avatar, before.other, count).value_or(before.decision);
     events.push_back(eventOf(world, ContactEvent::Kind::end, avatar, parted));
   }
 }
@@ -123,6 +126,13 @@ void findContacts(WorldState& world, TickReport& report, QueryCount& count) {
       report.worstPenetration = std::max(report.worstPenetration, contact.decision.penetration);
     }
   }
+}
+
+void tellBlocked(const WorldState& world, Avatar& avatar, TickReport& report, QueryCount& count) {
+  if (avatar.stoppedBy == 0) return;
+  if (const auto decision = decisionWith(avatar, avatar.stoppedBy, count))
+    report.contacts.push_back(
+        eventOf(world, ContactEvent::Kind::blocked, avatar, {avatar.stoppedBy, false, *decision}));
 }
 
 void endContactsOf(WorldState& world, Avatar& avatar, ContactEvent::Reason reason,

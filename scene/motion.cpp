@@ -263,7 +263,6 @@ void gatherObstacles(WorldState& world, Avatar& avatar, bool pairsChanged) {
 void moveAvatar(WorldState& world, Avatar& avatar, const Vec3& velocity, QueryCount& count) {
   Mover m{world.lengths, avatar, count, avatar.feet, feetRoomOf(avatar, world.lengths)};
   const Vec3 wish = velocity * world.lengths.tick;
-  avatar.stoppedBy = 0;
   if (avatar.grounded) {
     walkOnGround(m, wish);
   } else {

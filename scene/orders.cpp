@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kArrivedAcross = 1e-3;  // metres over the ground from the way point
 constexpr double kArrivedUp = 1.0;       // metres: a way point on another storey is not reached
-constexpr double kProgress = 0.01;       // metres nearer that count as progress
+constexpr double kProgress = 0.01;       // metres nearer that count as progress, less if slow
 constexpr double kTimeRounding = 1e-9;   // seconds: sums of ticks against whole waits
 constexpr double kBelowScene = 10;       // metres below the lowest point of the scene
 constexpr double kEyesBelowTop = 0.15;   // metres, at most a tenth of the height
@@ -127,7 +127,7 @@ Outcome follow(const Drive&, Follower&) {
 }  // taken in by takeIn()
 
 Outcome followFront(Follower& f) {
-  const Order order = f.queue.front().order;
+  const Order& order = f.queue.front().order;  // stays where it is until followQueue() pops it
   if (!f.avatar() && !std::holds_alternative<Spawn>(order)) {
     f.tell(Notice::Kind::refused, "there is no avatar of this name");
     return Outcome::ended;
@@ -146,13 +146,13 @@ void followQueue(Follower& f) {
 }
 
 void drive(WorldState& world, const Command& command, TickReport& report) {
-  world.queues[command.avatar].clear();
   const auto found = world.avatars.find(command.avatar);
   if (found == world.avatars.end()) {
     report.notices.push_back({Notice::Kind::refused, command.avatar, 0, command.tag, Vec3::Zero(),
                               0, "there is no avatar of this name"});
     return;
   }
+  world.queues[command.avatar].clear();
   Avatar& avatar = found->second;
   const Vec3& velocity = std::get<Drive>(command.order).velocity;
   avatar.drive = {velocity.x(), 0, velocity.z()};
@@ -197,21 +197,6 @@ std::string whyBlocked(const Follower& f, const Vec3& goal) {
   return "no progress for " + std::to_string(f.world.lengths.patience) + " s";
 }
 
-/// A blocked move is told when its walk ends so: which thing stood in the way, and how near.
-void tellBlockedBy(Follower& f) {
-  const Avatar& avatar = *f.avatar();
-  if (avatar.stoppedBy == 0) return;
-  ContactEvent event;
-  event.tick = f.world.tick;
-  event.time = static_cast<double>(f.world.tick) * f.world.lengths.tick;
-  event.kind = ContactEvent::Kind::blocked;
-  event.a = avatar.id;
-  event.b = avatar.stoppedBy;
-  for (const Contact& contact : avatar.contacts)
-    if (contact.other == avatar.stoppedBy) event.decision = contact.decision;
-  f.report.contacts.push_back(event);
-}
-
 void judge(const Walk& walk, Follower& f) {
   Avatar& avatar = *f.avatar();
   const Vec3& goal = walk.along[avatar.walk.leg];
@@ -220,14 +205,15 @@ void judge(const Walk& walk, Follower& f) {
     if (++avatar.walk.leg < walk.along.size()) return startLeg(avatar, walk, f.world.lengths);
     return endWalk(f, Notice::Kind::arrived);
   }
-  if (distance < avatar.walk.nearest - kProgress) {
+  const double couldBeWalked = walk.speed * f.world.lengths.patience;
+  if (distance < avatar.walk.nearest - std::min(kProgress, 0.5 * couldBeWalked)) {
     avatar.walk.nearest = distance;
     avatar.walk.patienceLeft = f.world.lengths.patience;
     return;
   }
   avatar.walk.patienceLeft -= f.world.lengths.tick;
   if (avatar.walk.patienceLeft > kTimeRounding) return;
-  tellBlockedBy(f);
+  tellBlocked(f.world, avatar, f.report, f.count);
   endWalk(f, Notice::Kind::blocked, whyBlocked(f, goal));
 }
 
@@ -273,10 +259,9 @@ void removeAvatar(WorldState& world, const std::string& name, std::vector<Contac
   world.avatars.erase(name);
 }
 
-void judgeWalks(WorldState& world, TickReport& report) {
-  QueryCount none;
+void judgeWalks(WorldState& world, TickReport& report, QueryCount& count) {
   for (auto& [name, queue] : world.queues) {
-    Follower follower{world, report, none, name, queue};
+    Follower follower{world, report, count, name, queue};
     if (queue.empty() || !follower.avatar() || follower.avatar()->walk.nearest < 0) continue;
     if (const Walk* walk = std::get_if<Walk>(&queue.front().order)) judge(*walk, follower);
   }

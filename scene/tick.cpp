@@ -60,6 +60,7 @@ void moveAvatars(WorldState& world, const Wish& wish, QueryCount& count) {
   const std::vector<collision::MoverId> changed = changedMovers(world.broadPhase);
   for (auto& [name, avatar] : world.avatars) {
     const Vec3 velocity = wishOf(wish, name);
+    avatar.stoppedBy = 0;
     avatar.resting = avatar.grounded && avatar.lastMove.isZero(0) && velocity.isZero(0) &&
                      nobodyNear(world, avatar);
     const bool pairsChanged = std::binary_search(changed.begin(), changed.end(), avatar.mover);
@@ -131,7 +132,7 @@ TickReport tick(World& w) {
   moveAvatars(world, wish, count);
   stopwatch.done(Stage::avatars);
   findContacts(world, report, count);
-  judgeWalks(world, report);
+  judgeWalks(world, report, count);
   stopwatch.done(Stage::narrow);
   hashState(world);
   stopwatch.done(Stage::hash);

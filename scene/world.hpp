@@ -65,9 +65,9 @@ struct ContactEvent {
   double time = 0;  ///< seconds
   Kind kind = Kind::begin;
   Reason reason = Reason::parted;  ///< for `end`
-  EntityId a = 0;                  ///< an avatar
-  EntityId b = 0;                  ///< an avatar with a greater id, or a still object
-  collision::Decision decision;    ///< points and normal (from a to b) in the scene's frame
+  EntityId a = 0;                  ///< an avatar; for `blocked` the one that was stopped
+  EntityId b = 0;                ///< a still object or an avatar: of a greater id unless `blocked`
+  collision::Decision decision;  ///< points and normal (from a to b) in the scene's frame
 };
 
 /// How an order went.

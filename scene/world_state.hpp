@@ -51,9 +51,9 @@ struct Avatar {
   collision::MoverId mover = 0;
   Box reach;  ///< what it can meet in this tick
   collision::ExtremalVertices extremes;
-  Box gathered;                  ///< where `obstacles` are complete
+  Box gathered;                     ///< where `obstacles` are complete
   std::vector<Obstacle> obstacles;  ///< ascending (entity, part)
-  std::vector<Contact> contacts;  ///< ascending `other`; also part of the state
+  std::vector<Contact> contacts;    ///< ascending `other`; also part of the state
 };
 
 struct QueuedOrder {
@@ -92,7 +92,7 @@ using Wish = std::map<std::string, Vec3>;  ///< horizontal velocity, metres per 
 Wish followOrders(WorldState& world, TickReport& report, QueryCount& count);
 /// Tells which walks arrived or are blocked after the motion, and who fell out of the scene
 /// (orders.cpp).
-void judgeWalks(WorldState& world, TickReport& report);
+void judgeWalks(WorldState& world, TickReport& report, QueryCount& count);
 
 /// The box that an avatar can reach in this tick with the given velocity (motion.cpp).
 Box reachOf(const WorldState& world, Avatar& avatar, const Vec3& velocity);
@@ -106,6 +106,9 @@ void moveAvatar(WorldState& world, Avatar& avatar, const Vec3& velocity, QueryCo
 
 /// Finds who touches what now and what began and ended (contacts.cpp).
 void findContacts(WorldState& world, TickReport& report, QueryCount& count);
+/// A blocked move is told when its walk ends so: what stopped it last, and how near that is now
+/// (contacts.cpp).
+void tellBlocked(const WorldState& world, Avatar& avatar, TickReport& report, QueryCount& count);
 /// Takes an avatar out of the world, its contacts ended and told (orders.cpp).
 void removeAvatar(WorldState& world, const std::string& name, std::vector<ContactEvent>& events);
 /// Ends all contacts of `avatar` and those of others with it (contacts.cpp).

@@ -235,6 +235,48 @@ TEST(World, AvatarsBlockOneAnotherAndTouch) {
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
+TEST(World, WhoeverIsBlockedByAnotherIsToldHowNearAndWhere) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{-3, 0, 0}});
+  run.order("bob", Spawn{{3, 0, 0}});
+  run.order("ann", to(3, 0));
+  run.order("bob", to(-3, 0));
+  run.untilIdle();
+  int blocked = 0;
+  for (const ContactEvent& e : run.events) {
+    if (e.kind != ContactEvent::Kind::blocked) continue;
+    ++blocked;
+    const double towards = nameOf(run.world, e.a) == "ann" ? 1 : -1;
+    EXPECT_NEAR(e.decision.normal.x(), towards, 1e-6);
+    EXPECT_GT(e.decision.distance, 0.8 * run.world.lengths().epsilon);
+    EXPECT_LT(e.decision.distance, 2 * run.world.lengths().epsilon);
+    EXPECT_NEAR(e.decision.pointA.x(), run.feet(nameOf(run.world, e.a)).x() + 0.3 * towards, 1e-3);
+    EXPECT_NEAR((e.decision.pointB - e.decision.pointA).norm(), e.decision.distance, 1e-12);
+  }
+  EXPECT_EQ(blocked, 2);
+}
+
+TEST(World, AVerySlowWalkArrives) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.order("ann", to(0.03, 0, 0.001));
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::arrived), 1);
+  EXPECT_EQ(run.count(Kind::blocked), 0);
+}
+
+TEST(World, AWalkToAPlaceOverheadIsBlockedByNothingOfTheLastWalk) {
+  Trial run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.order("ann", to(5, 0));
+  run.untilIdle();
+  EXPECT_NE(run.notices.back().obstacle, 0u);
+  run.order("ann", to(run.feet("ann").x(), run.feet("ann").z(), 1.5, 3));
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::blocked), 2);
+  EXPECT_EQ(run.notices.back().obstacle, 0u);
+}
+
 TEST(World, APaneOfNoThicknessIsNotCrossedAtAnySpeed) {
   Model model = boxModel({floorBox()});
   Mesh pane;
@@ -336,6 +378,42 @@ TEST(World, DriveActsAtOnceAndZeroStops) {
   run.order("ann", Drive{});
   run.ticks(10);
   EXPECT_NEAR(run.feet("ann").x(), 1.2, 1e-9);
+}
+
+TEST(World, ADriveOfNobodyIsRefusedAndLeavesTheQueue) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.order("ann", Drive{{1.2, 0, 0}});
+  run.ticks(10);
+  EXPECT_EQ(run.count(Kind::refused), 1);
+  EXPECT_EQ(run.count(Kind::spawned), 1);
+}
+
+TEST(World, OneWhoLeavesAndComesBackUnderTheSameNameIsAnother) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.order("bob", Spawn{{0.7, 0, 0}});
+  run.order("bob", to(0, 0));
+  run.ticks(30);
+  EXPECT_TRUE(run.touched("ann") || run.touched("bob"));
+  const EntityId before = run.world.snapshot()->avatars[0].id;
+  run.order("ann", Leave{});
+  run.order("ann", Spawn{{0, 0, 3}});
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::arrived), 1) << "bob still runs into the one that left";
+  ASSERT_EQ(run.world.snapshot()->avatars.size(), 2u);
+  EXPECT_GT(run.world.snapshot()->avatars[1].id, before + 1);
+  for (const ContactEvent& e : endContacts(run.world, ContactEvent::Reason::shutdown)) run.take(e);
+  EXPECT_TRUE(run.open.empty());
+}
+
+TEST(World, AWorldOfNothingTicksAndRefusesSpawns) {
+  Trial run({});
+  run.ticks(3);
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.ticks(3);
+  EXPECT_EQ(run.count(Kind::refused), 1);
+  EXPECT_TRUE(run.world.snapshot()->avatars.empty());
 }
 
 TEST(World, AbsurdCommandsAreRefusedByNameAndChangeNothing) {
