@@ -7,7 +7,6 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <utility>
 
@@ -22,15 +21,6 @@ using boost::system::error_code;
 std::string secondsText(std::chrono::milliseconds time) {
   const auto count = time.count();
   return count % 1000 == 0 ? std::to_string(count / 1000) + " s" : std::to_string(count) + " ms";
-}
-
-/// The number before the first dot; -1 when there is none.
-int majorOf(const std::string& version) {
-  int major = -1;
-  const auto [end, problem] =
-      std::from_chars(version.data(), version.data() + version.size(), major);
-  const bool dot = end != version.data() + version.size() && *end == '.';
-  return problem == std::errc{} && dot ? major : -1;
 }
 
 struct Received {

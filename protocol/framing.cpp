@@ -4,6 +4,7 @@
 #include <google/protobuf/stubs/logging.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstring>
 #include <limits>
 #include <stdexcept>
@@ -38,6 +39,13 @@ std::string shown(std::span<const std::uint8_t> bytes) {
 }
 
 }  // namespace
+
+int majorOf(std::string_view version) {
+  int major = -1;
+  const char* end = version.data() + version.size();
+  const auto [dot, problem] = std::from_chars(version.data(), end, major);
+  return problem == std::errc{} && dot != end && *dot == '.' ? major : -1;
+}
 
 Decoder::Decoder(const FramingLimits& limits, Expect expect)
     : limits_(limits), magicSeen_(expect == Expect::messages) {}

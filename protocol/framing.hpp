@@ -11,6 +11,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace google::protobuf {
@@ -24,6 +25,9 @@ inline constexpr std::array<std::uint8_t, 4> kMagic{'E', 'N', 'F', '1'};
 /// Semantic version of enfilade.proto and of the framing.
 inline constexpr const char* kVersion = "1.0.0";
 inline constexpr int kMajorVersion = 1;
+
+/// The number before the first dot of a semantic version; -1 when there is none.
+int majorOf(std::string_view version);
 
 /// What a receiver takes. A message above it is refused before memory is spent on it.
 struct FramingLimits {

@@ -4,7 +4,6 @@
 
 #include <boost/asio/post.hpp>
 #include <boost/asio/write.hpp>
-#include <charconv>
 
 #include "server/world_messages.hpp"
 
@@ -31,15 +30,6 @@ std::string addressOf(const tcp::socket& socket) {
   const tcp::endpoint endpoint = socket.remote_endpoint(problem);
   if (problem) return "a client that is gone";
   return endpoint.address().to_string() + ":" + std::to_string(endpoint.port());
-}
-
-/// The number before the first dot; -1 when it is none.
-int majorOf(const std::string& version) {
-  int number = -1;
-  const char* end = version.data() + version.size();
-  const auto parsed = std::from_chars(version.data(), end, number);
-  const bool whole = parsed.ec == std::errc() && parsed.ptr != end && *parsed.ptr == '.';
-  return whole ? number : -1;
 }
 
 v1::ErrorCode codeOf(protocol::FramingError::Code code) {
@@ -120,7 +110,7 @@ void Session::takeBytes(std::span<const std::uint8_t> bytes) {
 
 void Session::take(const protocol::Message& framed) {
   v1::ClientMessage message;
-  if (!message.ParseFromArray(framed.header.data(), static_cast<int>(framed.header.size()))) {
+  if (!protocol::parse(framed.header, message)) {
     return fail(v1::ERROR_BAD_MESSAGE, "not a ClientMessage (the message that ends at byte " +
                                            std::to_string(decoder_.offset()) + ")");
   }
@@ -135,7 +125,7 @@ void Session::greet(const v1::ClientMessage& message) {
   if (!message.has_hello()) {
     return fail(v1::ERROR_BAD_MESSAGE, "the first message has to be hello", message.request_id());
   }
-  if (majorOf(hello.protocol_version()) != protocol::kMajorVersion) {
+  if (protocol::majorOf(hello.protocol_version()) != protocol::kMajorVersion) {
     return fail(v1::ERROR_VERSION,
                 "this server speaks protocol " + std::string(protocol::kVersion) + ", not '" +
                     printable(hello.protocol_version().substr(0, kLongestName)) + "'",

@@ -286,5 +286,13 @@ TEST(Framing, CorruptStreamsDecodeAsTheSlowTwinSays) {
   EXPECT_GT(messages, kStreams / 20);
 }
 
+TEST(Version, ItsMajorNumberIsWhatStandsBeforeTheFirstDot) {
+  EXPECT_EQ(majorOf(kVersion), kMajorVersion);
+  EXPECT_EQ(majorOf("12.0.0-rc.1"), 12);
+  for (const char* none : {"", ".", ".1", "1", "x.1", " 1.0", "1x.0", "99999999999.0"}) {
+    EXPECT_EQ(majorOf(none), -1) << none;
+  }
+}
+
 }  // namespace
 }  // namespace enfilade::protocol

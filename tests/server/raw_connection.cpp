@@ -67,7 +67,9 @@ std::optional<v1::ServerMessage> RawConnection::receive() {
     unread_.assign(bytes.begin(), bytes.end());
     if (message) {
       v1::ServerMessage parsed;
-      parsed.ParseFromArray(message->header.data(), static_cast<int>(message->header.size()));
+      if (!protocol::parse(message->header, parsed)) {
+        throw std::runtime_error("the server sent what is no ServerMessage");
+      }
       return parsed;
     }
     if (decoder_.error()) throw std::runtime_error(decoder_.error()->reason);
