@@ -2,9 +2,8 @@
 //  1. Both bodies go into one frame: A's vertices as they are, B's moved by tB - tA. Translations
 //     are subtracted before anything is rounded, so a scene far from the origin loses nothing.
 //  2. GJK (Gilbert, Johnson, Keerthi 1988) on M = B - A, started from last tick's axis. Each
-//  support
-//     point gives a lower bound of the distance (the slab along the axis), each simplex an upper
-//     bound; it stops when they meet, or when doubles make no more progress.
+//     support point gives a lower bound of the distance (the slab along the axis), each simplex an
+//     upper bound; it stops when they meet, or when doubles make no more progress.
 //  3. The filter: a lower bound above its own rounding bound proves `separated`; a tetrahedron that
 //     holds the origin by more than the rounding bound proves `penetrating`.
 //  4. Else exact_verdict.cpp decides with rationals.
@@ -16,10 +15,14 @@
 //  - A moved vertex of B is off by at most u (S + D), a coordinate.
 //  - axis . vertex: three products, two sums: at most 3u |axis|_1 S (1 + 2u).
 //  - gap = min over B - max over A: both of the above and one difference of size <= 2 |axis|_1 S:
-//    at most (3 + 3 + 1 + 2) u |axis|_1 S + u |axis|_1 D. kGapRounding rounds 9 up for second
-//    order.
+//    at most u |axis|_1 (9 S + D). kGapRounding (S + D) leaves room for second order.
+//  - A point of M is off by e = u (3 S + D), a coordinate, and its coordinates are at most m = 2 S.
+//    A determinant of three such: each of nine entries has a cofactor of at most 2 m^2, so 18 e m^2
+//    come from the entries; its own five roundings of six products of at most m^3 are 30 u m^3.
+//    Together less than u S^2 (456 S + 72 D), which kDeterminantRounding (S + D) rounds up.
 //  - The nearest point of a simplex, a combination of points of size <= 2S a coordinate, is off by
 //    at most kPointRounding u S (weights, products, sums; generous).
+// Products that underflow lose less than kUnderflow besides; what overflows proves nothing.
 #include "collision/narrow_phase.hpp"
 
 #include <array>
@@ -33,7 +36,8 @@ namespace {
 constexpr double kUnit = 0x1p-53;             // half an ulp of 1
 constexpr double kGapRounding = 10;           // units of S, see the file's head
 constexpr double kPointRounding = 64;         // units of S, see the file's head
-constexpr double kDeterminantRounding = 256;  // units of S^3: 3x3 determinant of points <= 2S
+constexpr double kDeterminantRounding = 512;  // units of S^3, see the file's head
+constexpr double kUnderflow = 0x1p-1000;      // above what a few products can lose
 constexpr double kBoundsMeet = 4 * kUnit;     // relative: the normal is as good as the root of this
 constexpr int kIterationBound = 64;           // GJK on polytopes needs about 10
 
@@ -89,7 +93,7 @@ Slab supportAlong(const Pair& pair, const Vec3& axis) {
   const double length1 = axis.cwiseAbs().sum();
   return {{pair.pointB(bestB) - pair.a[bestA], bestA, bestB},
           leastB - mostA,
-          kUnit * length1 * (kGapRounding * pair.size + pair.lost)};
+          kUnit * length1 * kGapRounding * (pair.size + pair.lost) + kUnderflow};
 }
 
 /// Up to four points of M and the weights of the point nearest the origin.
@@ -155,7 +159,7 @@ double determinant(const Vec3& a, const Vec3& b, const Vec3& c) {
 /// `inside` is proved by the rounding bound, else the nearest face is taken.
 Simplex nearestOnTetrahedron(const Simplex& s, const Pair& pair, bool& inside) {
   const double bound =
-      kDeterminantRounding * kUnit * pair.size * pair.size * (pair.size + pair.lost);
+      kDeterminantRounding * kUnit * pair.size * pair.size * (pair.size + pair.lost) + kUnderflow;
   const double d0 = determinant(s[1], s[2], s[3]), d1 = -determinant(s[0], s[2], s[3]);
   const double d2 = determinant(s[0], s[1], s[3]), d3 = -determinant(s[0], s[1], s[2]);
   const double sum = d0 + d1 + d2 + d3;
@@ -195,10 +199,16 @@ struct Search {
   bool inside = false;                                      ///< proved to penetrate
 };
 
-void improve(Search& search, const Slab& slab, const Vec3& axis) {
-  // sqrt, the quotient and the difference round by less than 4u together: folded into the factor.
+/// The proved separation along an axis, in metres; minus infinity where doubles overflowed.
+double provedAlong(const Slab& slab, const Vec3& axis) {
+  if (!std::isfinite(slab.gap)) return -std::numeric_limits<double>::infinity();
+  // The norm, the quotient and the differences round by less than 8u together.
   const double bound = (slab.gap - slab.rounding) / axis.norm();
-  const double lower = bound - std::abs(bound) * 8 * kUnit;
+  return bound - std::abs(bound) * 8 * kUnit;
+}
+
+void improve(Search& search, const Slab& slab, const Vec3& axis) {
+  const double lower = provedAlong(slab, axis);
   if (lower > search.lower) search.lower = lower, search.axis = axis;
 }
 
@@ -248,7 +258,8 @@ void boundPenetration(const Pair& pair, const Search& search, Decision& decision
     for (const double sign : {1.0, -1.0}) {
       const Vec3 direction = sign * axis / axis.norm();
       const Slab slab = supportAlong(pair, direction);
-      const double overlap = std::max(0.0, -slab.gap + slab.rounding);
+      // The direction's length is off 1 by a few u.
+      const double overlap = std::max(0.0, -slab.gap + slab.rounding) * (1 + 8 * kUnit);
       if (overlap >= decision.penetration) continue;
       decision.penetration = overlap;
       decision.normal = direction;
@@ -307,10 +318,8 @@ Decision decide(const ConvexBody& a, const ConvexBody& b, SeparationCache& cache
 }
 
 double provedSeparation(const ConvexBody& a, const ConvexBody& b, const SeparationCache& cache) {
-  const double length = cache.axis.norm();
-  if (!(length > 0)) return -std::numeric_limits<double>::infinity();
-  const Slab slab = supportAlong(pairOf(a, b), cache.axis);
-  return (slab.gap - slab.rounding) / length * (1 - 8 * kUnit);
+  if (!(cache.axis.norm() > 0)) return -std::numeric_limits<double>::infinity();
+  return provedAlong(supportAlong(pairOf(a, b), cache.axis), cache.axis);
 }
 
 }  // namespace enfilade::collision

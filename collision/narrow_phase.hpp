@@ -48,8 +48,8 @@ Decision decide(const ConvexBody& a, const ConvexBody& b, SeparationCache& cache
 std::optional<Decision> decideWithin(const ConvexBody& a, const ConvexBody& b, double limit,
                                      SeparationCache& cache);
 
-/// A proved lower bound (metres) of the separation of A and B along the cached axis; negative or
-/// minus infinity when the axis proves nothing. Costs one pass over the vertices.
+/// A proved lower bound (metres) of the distance of A and B, by the cached axis alone; negative or
+/// minus infinity when the axis proves nothing. Costs two passes over the vertices.
 double provedSeparation(const ConvexBody& a, const ConvexBody& b, const SeparationCache& cache);
 
 }  // namespace enfilade::collision

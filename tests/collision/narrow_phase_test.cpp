@@ -170,6 +170,23 @@ TEST(NarrowPhase, VerdictsOnALatticeEqualExactArithmeticWhicheverWayTheyWereDeci
   for (const int count : seen) EXPECT_GT(count, 60);
 }
 
+TEST(NarrowPhase, TinyAndHugeBodiesAreDecidedExactlyThoughDoublesUnderAndOverflow) {
+  Random random(6);
+  std::array<int, 3> seen{};
+  for (int i = 0; i < 600; ++i) {
+    const double scale = std::array{0x1p-530, 0x1p-356, 0x1p520}[static_cast<std::size_t>(i % 3)];
+    std::vector<Vec3> a = latticePoints(random, 5, 2), b = latticePoints(random, 5, 2);
+    const Vec3 at = latticePoints(random, 1, 2)[0];
+    for (Vec3& p : a) p *= scale;
+    for (Vec3& p : b) p *= i % 2 == 0 ? scale : scale / 3;
+    const ConvexBody bodyA{a, scale * at}, bodyB{b};
+    const Verdict exact = exactVerdict(bodyA, bodyB);
+    EXPECT_EQ(decideCold(bodyA, bodyB).verdict, exact) << "case " << i;
+    ++seen[static_cast<std::size_t>(exact)];
+  }
+  for (const int count : seen) EXPECT_GT(count, 10);
+}
+
 TEST(NarrowPhase, SwappingTheBodiesSwapsTheAnswer) {
   Random random(3);
   for (int i = 0; i < 300; ++i) {
