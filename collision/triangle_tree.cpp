@@ -1,6 +1,7 @@
 // Built top down: the triangles of a node are halved at the median of their centres along the
-// longest axis of those centres (std::nth_element with the index as tie-break, so that the order is
-// one everywhere). Queried depth first without recursion.
+// longest axis of those centres. The index breaks ties, so that the halves are the same sets with
+// every standard library, and leaves are sorted, so that the order is one as well. Queried depth
+// first without recursion.
 #include "collision/triangle_tree.hpp"
 
 #include <algorithm>
@@ -43,6 +44,7 @@ TriangleTree::TriangleTree(std::vector<Triangle> triangles) {
       centres.include(boxes[order[i]].centre());
     }
     if (task.last - task.first <= kLeafSize) {
+      std::sort(order.begin() + task.first, order.begin() + task.last);
       node.first = task.first;
       node.count = task.last - task.first;
       nodes_.push_back(node);
