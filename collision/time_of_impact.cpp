@@ -10,7 +10,9 @@ namespace {
 
 constexpr int kAdvanceBound = 48;      // steps a target; a handful is usual
 constexpr double kArrived = 1.0 / 32;  // of (high - low): near enough to a target
-constexpr double kGrazing = 1e-9;      // of |displacement|: slower closing is rounding, not motion
+// Of |displacement|: slower closing is not told from none, since the direction of a small distance
+// beside large bodies is known no better.
+constexpr double kGrazing = 1e-9;
 
 struct Advance {
   double fraction;
@@ -25,8 +27,8 @@ bool axisProvesMiss(const ConvexBody& a, const Vec3& displacement, const ConvexB
   const double length = cache.axis.norm();
   if (!(length > 0)) return false;
   const double closing = std::max(0.0, displacement.dot(cache.axis) / length);
-  // The quotient rounds by a few ulp; the axis is as good as any after that much is given away.
-  return provedSeparation(a, b, cache) > distance + closing * (1 + 1e-12);
+  const double rounding = 0x1p-49 * displacement.norm();  // product, sums, length, quotient: < 10u
+  return provedSeparation(a, b, cache) > distance + closing + rounding;
 }
 
 double closingSpeed(const Vec3& displacement, const Decision& at) {

@@ -24,9 +24,9 @@ struct SweepResult {
 };
 
 /// Moves A by `displacement` (metres, world) against B, which stands. Along the whole part that is
-/// granted, A and B are proved at least min(band.low, their distance at the start) apart, up to the
-/// rounding that Decision::errorBound states. When they start nearer than `low` (or overlap), only
-/// moves that do not close in are granted.
+/// granted, A and B stay at least min(band.low, their distance at the start) apart, up to a
+/// billionth of the displacement and what Decision::errorBound states. When they start nearer than
+/// `low` (or overlap), only moves that do not close in are granted.
 SweepResult sweep(const ConvexBody& a, const Vec3& displacement, const ConvexBody& b,
                   const StoppingBand& band, SeparationCache& cache);
 
