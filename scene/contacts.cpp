@@ -42,8 +42,7 @@ std::optional<Decision> decideCounted(const Avatar& avatar, Obstacle& obstacle, 
 /// All entities nearer than `limit`, each with its nearest piece, ascending.
 std::vector<Contact> nearOnes(Avatar& avatar, double limit, QueryCount& count) {
   std::vector<Contact> found;
-  const Box box =
-      grown(Box{avatar.hullBox.min + avatar.feet, avatar.hullBox.max + avatar.feet}, limit);
+  const Box box = grown(boxAt(avatar.hullBox, avatar.feet), limit);
   for (Obstacle& obstacle : avatar.obstacles) {
     if (!overlaps(box, obstacle.box)) continue;
     const bool known = !found.empty() && found.back().other == obstacle.entity;

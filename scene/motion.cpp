@@ -227,7 +227,7 @@ void followOthers(const WorldState& world, Avatar& avatar) {
     if (obstacle.entity < world.firstAvatarId()) return;  // avatars come last
     const auto& name = world.avatarNames[obstacle.entity - world.firstAvatarId()];
     const Avatar& other = world.avatars.at(name);
-    obstacle.box = {other.hullBox.min + other.feet, other.hullBox.max + other.feet};
+    obstacle.box = boxAt(other.hullBox, other.feet);
     obstacle.body = {other.hull->vertices, other.feet};
   }
 }

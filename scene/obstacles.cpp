@@ -6,7 +6,7 @@ Stop sweepHull(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet,
                const Vec3& displacement, std::vector<Obstacle>& obstacles,
                const collision::StoppingBand& band, QueryCount& count) {
   Stop stop;
-  const Box start{hullBox.min + feet, hullBox.max + feet};
+  const Box start = boxAt(hullBox, feet);
   Vec3 rest = displacement;  // only what lies before the earliest stop so far matters
   Box path = grown(collision::swept(start, rest), band.high);
   for (Obstacle& obstacle : obstacles) {
@@ -27,7 +27,7 @@ Stop sweepHull(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet,
 
 bool isFree(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet, double clearance,
             std::vector<Obstacle>& obstacles, QueryCount& count, EntityId& nearest) {
-  const Box box = grown(Box{hullBox.min + feet, hullBox.max + feet}, clearance);
+  const Box box = grown(boxAt(hullBox, feet), clearance);
   for (Obstacle& obstacle : obstacles) {
     if (!overlaps(box, obstacle.box)) continue;
     ++count.narrow;

@@ -12,8 +12,6 @@
 
 namespace enfilade::scene {
 
-struct Avatar;
-
 /// A convex piece of an entity, and last tick's separating axis towards it.
 struct Obstacle {
   EntityId entity = 0;
@@ -36,6 +34,11 @@ struct Stop {
   Vec3 normal = Vec3::Zero();  ///< unit, from the obstacle to the avatar
   double distance = 0;         ///< metres, at the stop
 };
+
+/// The box of a hull, `hullBox` with the feet at the origin, that stands at `feet`.
+inline Box boxAt(const Box& hullBox, const Vec3& feet) {
+  return {hullBox.min + feet, hullBox.max + feet};
+}
 
 /// Moves the hull at `feet` by `displacement` as far as `obstacles` allow.
 Stop sweepHull(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet,

@@ -21,7 +21,7 @@ void gatherAll(const WorldState& world, const Box& box, std::vector<Obstacle>& o
   for (const auto& [name, other] : world.avatars) {
     Obstacle obstacle;
     obstacle.entity = other.id;
-    obstacle.box = {other.hullBox.min + other.feet, other.hullBox.max + other.feet};
+    obstacle.box = boxAt(other.hullBox, other.feet);
     obstacle.body = {other.hull->vertices, other.feet};
     if (overlaps(obstacle.box, box)) obstacles.push_back(obstacle);
   }
@@ -49,7 +49,7 @@ bool isClosed(const std::vector<collision::Triangle>& triangles) {
 
 /// How often the surface goes around `point`, by the signed crossings of a ray: 1 inside a solid
 /// whose faces look outwards. An edge seen from both its triangles gives exactly opposite areas, so
-/// that a ray never slips between two triangles.
+/// that a ray slips between two triangles only if it meets their edge to the last bit.
 int windingNumber(const std::vector<collision::Triangle>& triangles, const Vec3& point) {
   const Vec3 ray{0.8017, 0.5345, 0.2673};  // no axis of any building
   int winding = 0;
@@ -87,8 +87,7 @@ bool hasFloorBelow(const WorldState& world, const Avatar& avatar, QueryCount& co
   const double depth = avatar.feet.y() - world.scene->bounds().min.y() + kFloorMargin;
   if (!(depth > 0)) return false;
   const Vec3 down{0, -depth, 0};
-  const Box column = collision::swept(
-      Box{avatar.hullBox.min + avatar.feet, avatar.hullBox.max + avatar.feet}, down);
+  const Box column = collision::swept(boxAt(avatar.hullBox, avatar.feet), down);
   std::vector<Obstacle> obstacles;
   gatherAll(world, column, obstacles);
   const double epsilon = world.lengths.epsilon;
@@ -114,7 +113,7 @@ std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& ord
   avatar.hull = std::make_shared<const collision::Hull>(avatarHull(order.radius, order.height));
   for (const Vec3& v : avatar.hull->vertices) avatar.hullBox.include(v);
   const double epsilon = world.lengths.epsilon;
-  Box around{avatar.hullBox.min + order.at, avatar.hullBox.max + order.at};
+  Box around = boxAt(avatar.hullBox, order.at);
   around.max.y() += kLifts.back();
   std::vector<Obstacle> obstacles;
   gatherAll(world, grown(around, 2 * epsilon), obstacles);

@@ -47,7 +47,8 @@ struct Avatar {
   bool resting = false;  ///< stands, wants nothing, and nobody is near: nothing to work out
   EntityId stoppedBy = 0;
 
-  // Caches from tick to tick; they change the work, never the result.
+  // Caches from tick to tick. They change no verdict, but the last bits of distances and so of the
+  // way: they follow from the commands, as all else does, and a copy of a world must copy them.
   collision::MoverId mover = 0;
   Box reach;  ///< what it can meet in this tick
   collision::ExtremalVertices extremes;
