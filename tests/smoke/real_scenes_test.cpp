@@ -96,7 +96,7 @@ TEST_P(RealScenes, AnAvatarWalksAndNeverPenetrates) {
 
   render::Renderer renderer(still);
   const scene::Box& b = still->bounds();
-  double worst = 0;
+  double worst = 0, walked = 0;  // metres
   for (int i = 0; i < kTicks; ++i) {
     if (i % 120 == 0 && !world.snapshot()->avatars.empty()) {
       const Vec3 goal(uniform(random, b.min.x(), b.max.x()), 0,
@@ -105,9 +105,12 @@ TEST_P(RealScenes, AnAvatarWalksAndNeverPenetrates) {
       const Vec3 velocity = 1.5 * Vec3(way.x(), 0, way.z()).normalized();
       EXPECT_FALSE(submit(world, {"ann", scene::Drive{velocity}, 0}));
     }
+    const auto before = world.snapshot();
     const scene::TickReport report = tick(world);
     worst = std::max(worst, report.worstPenetration);
     balance.take(report.contacts);
+    if (!before->avatars.empty() && !report.snapshot->avatars.empty())
+      walked += (report.snapshot->avatars[0].feet - before->avatars[0].feet).norm();
     if (i % 200 == 100 && !report.snapshot->avatars.empty()) {
       const auto& ann = report.snapshot->avatars[0];
       render::Camera eyes = render::firstPerson(ann, 320, 240);
@@ -116,6 +119,7 @@ TEST_P(RealScenes, AnAvatarWalksAndNeverPenetrates) {
     }
   }
   EXPECT_EQ(worst, 0);
+  EXPECT_GT(walked, 5) << "it neither walked far nor stayed in the scene";
   EXPECT_GT(balance.begins, 0);
   balance.take(endContacts(world, ContactEvent::Reason::shutdown));
   EXPECT_TRUE(balance.open.empty());
