@@ -42,7 +42,7 @@ void fill(v1::Clock& message, const ServedClock& clock) {
 
 std::optional<v1::Error> ownershipProblem(const Asked& asked, const v1::Command& command) {
   const auto owner = asked.served.owners.find(command.avatar());
-  if (owner == asked.served.owners.end() || owner->second.client == asked.id) return std::nullopt;
+  if (owner == asked.served.owners.end() || owner->second == asked.id) return std::nullopt;
   return errorOf(v1::ERROR_NOT_ALLOWED,
                  "avatar '" + command.avatar() + "' belongs to another client: take another name",
                  "avatar");
@@ -75,9 +75,8 @@ std::optional<v1::Error> submitCommand(const Asked& asked, const v1::Command& co
   auto refused = scene::submit(asked.served.world, std::get<scene::Command>(std::move(order)));
   if (refused) return refusalOf(command, *refused);
   if (command.has_spawn()) {
-    Ownership& owner = asked.served.owners[command.avatar()];
-    owner.client = asked.id;
-    owner.pendingSpawns.push_back(command.tag());
+    asked.served.owners[command.avatar()] = asked.id;
+    asked.served.unsettled.insert(command.avatar());
   }
   return std::nullopt;
 }
@@ -125,17 +124,17 @@ void answer(const Asked& asked, const v1::Step& step) {
 }
 
 void answer(const Asked& asked, const v1::SetClock& wanted) {
-  constexpr double kFastest = 1000;
+  constexpr double kSlowest = 1e-3, kFastest = 1000;
   const double speed = wanted.free_run().speed();
   if (wanted.mode_case() == v1::SetClock::MODE_NOT_SET) {
     return replyError(asked, errorOf(v1::ERROR_BAD_MESSAGE,
                                      "mode is missing: give lockstep, free_run or pause", "mode"));
   }
-  if (!(speed >= 0 && speed <= kFastest)) {
-    return replyError(asked, errorOf(v1::ERROR_BAD_MESSAGE,
-                                     "free_run.speed = " + std::to_string(speed) +
-                                         ": give more than 0 and at most 1000",
-                                     "free_run.speed"));
+  if (speed != 0 && !(speed >= kSlowest && speed <= kFastest)) {
+    return replyError(asked,
+                      errorOf(v1::ERROR_BAD_MESSAGE,
+                              "free_run.speed = " + std::to_string(speed) + ": give 0.001 to 1000",
+                              "free_run.speed"));
   }
   if (!takeClock(asked)) return;
   ServedClock& clock = asked.served.clock;
@@ -293,7 +292,9 @@ void answerWaiting(ServedWorld& served, ClientId id, const PostToTickThread& pos
   const auto found = served.clients.find(id);
   if (found == served.clients.end()) return;
   Client& client = found->second;
-  while (!client.waiting.empty() && !client.step && !client.frameUnderWay) {
+  // Who is cut off hears no answer, and must not keep the others waiting for theirs.
+  while (!client.waiting.empty() && !client.step && !client.frameUnderWay &&
+         !client.out->finished()) {
     const WaitingRequest request = std::move(client.waiting.front());
     client.waiting.pop_front();
     client.waitingBytes -= request.bytes;

@@ -102,20 +102,22 @@ bool isPresent(const scene::Snapshot& snapshot, const std::string& name) {
                      [&](const scene::AvatarView& avatar) { return avatar.name == name; });
 }
 
-/// A name is free again when its avatar is gone and no spawn of its owner is on the way.
-void settleOwner(ServedWorld& served, const scene::Notice& notice) {
-  const auto found = served.owners.find(notice.avatar);
-  if (found == served.owners.end()) return;
-  Ownership& owner = found->second;
-  const bool present = isPresent(*served.world.snapshot(), notice.avatar);
-  const auto spawn = std::find(owner.pendingSpawns.begin(), owner.pendingSpawns.end(), notice.tag);
-  if (spawn != owner.pendingSpawns.end()) {
-    using Kind = scene::Notice::Kind;
-    if (notice.kind == Kind::spawned) owner.pendingSpawns.erase(spawn);
-    // A refused spawn drops the queue, and with it the spawns that wait there.
-    if (notice.kind == Kind::refused && !present) owner.pendingSpawns.clear();
+/// A name is free again when its avatar is gone and nothing is queued for it. Without an avatar
+/// every tick tells about a queue's next order, so that a tick without a notice shows it empty.
+void settleOwners(ServedWorld& served, const std::vector<scene::Notice>& notices) {
+  using Kind = scene::Notice::Kind;
+  std::set<std::string> told;
+  for (const scene::Notice& notice : notices) told.insert(notice.avatar);
+  std::erase_if(served.unsettled, [&](const std::string& name) {
+    if (told.contains(name)) return false;
+    if (!isPresent(*served.world.snapshot(), name)) served.owners.erase(name);
+    return true;
+  });
+  for (const scene::Notice& notice : notices) {
+    if (notice.kind == Kind::left || notice.kind == Kind::refused) {
+      served.unsettled.insert(notice.avatar);
+    }
   }
-  if (!present && owner.pendingSpawns.empty()) served.owners.erase(found);
 }
 
 void answerClosing(Client& client) {
@@ -149,7 +151,7 @@ void advance(ServedWorld& served) {
   served.statistics.add(report);
   served.idle = report.idle;
   const TickTold told = messagesOf(served.world, report.contacts, report.notices);
-  for (const scene::Notice& notice : report.notices) settleOwner(served, notice);
+  settleOwners(served, report.notices);
   keepLive(served, told);
   for (auto& [id, client] : served.clients) {
     sendEvents(client, told);
@@ -162,7 +164,7 @@ void removeClient(ServedWorld& served, ClientId id) {
   if (served.clients.erase(id) == 0) return;
   if (served.clock.driver == id) served.clock.driver.reset();
   for (auto owner = served.owners.begin(); owner != served.owners.end();) {
-    if (owner->second.client != id) {
+    if (owner->second != id) {
       ++owner;
       continue;
     }

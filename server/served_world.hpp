@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "protocol/enfilade.pb.h"
@@ -44,12 +45,6 @@ struct Client {
   std::optional<std::uint64_t> frameUnderWay;  ///< its request
 };
 
-/// Who may command an avatar, from its spawn order until it is gone.
-struct Ownership {
-  ClientId client = 0;
-  std::vector<std::uint64_t> pendingSpawns;  ///< tags of those ordered and not yet told about
-};
-
 struct ServedClock {
   v1::Clock::Mode mode = v1::Clock::MODE_LOCKSTEP;
   double speed = 1;  ///< simulated seconds per second
@@ -66,7 +61,9 @@ struct ServedWorld {
   ServerLimits limits;
   ServedClock clock;
   std::map<ClientId, Client> clients;
-  std::map<std::string, Ownership> owners;  ///< by the avatar's name
+  /// Who may command an avatar, by its name: from its spawn order until it and its orders are gone.
+  std::map<std::string, ClientId> owners;
+  std::set<std::string> unsettled;  ///< of `owners`: names that may be free
   std::map<std::pair<scene::EntityId, scene::EntityId>, v1::ContactEvent> live;
   TickStatistics statistics;
   bool idle = true;                 ///< as the last tick told

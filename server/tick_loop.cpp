@@ -37,6 +37,7 @@ void takeRequest(ServedWorld& served, ClientId id, WaitingRequest request,
   const auto found = served.clients.find(id);
   if (found == served.clients.end()) return;
   Client& client = found->second;
+  if (client.out->finished()) return;
   client.waitingBytes += request.bytes;
   client.waiting.push_back(std::move(request));
   answerWaiting(served, id, post);

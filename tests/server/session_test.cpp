@@ -1,4 +1,5 @@
 // Well-behaved clients of a real server.
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <thread>
@@ -125,6 +126,24 @@ TEST_F(Sessions, ALeftAvatarsNameIsFreeAgain) {
   EXPECT_EQ(ann.step(2, true).avatars_size(), 1);
 }
 
+TEST_F(Sessions, ANameIsFreeAlsoAfterItsSpawnWasRefused) {
+  serve();
+  protocol::Client ann = client("ann"), bob = client("bob");
+  v1::Command leave;
+  leave.set_avatar("guest");
+  leave.mutable_leave();
+  ASSERT_FALSE(ann.command(spawn("guest", 0, 0.01, 0)));
+  ASSERT_FALSE(ann.command(spawn("guest", 0, 0.01, 0)));  // refused: it is there already
+  ASSERT_FALSE(ann.command(leave));
+  ASSERT_FALSE(ann.command(spawn("guest", 0, 0.01, 0)));  // queued: the name is still ann's
+  EXPECT_EQ(ann.step(2, true).avatars_size(), 0);
+  EXPECT_TRUE(bob.command(spawn("guest", 1, 0.01, 0)));
+  EXPECT_EQ(ann.step(1, true).avatars_size(), 1);
+  ASSERT_FALSE(ann.command(leave));
+  ann.step(3);
+  EXPECT_FALSE(bob.command(spawn("guest", 1, 0.01, 0)));
+}
+
 TEST_F(Sessions, AVanishedClientsAvatarLeavesAndItsContactsEnd) {
   serve();
   protocol::Client bob = client("bob");
@@ -190,8 +209,10 @@ TEST_F(Sessions, TheFreeRunningClockTicksByItselfUntilItIsPaused) {
   const std::uint64_t tick = ann.setClock(clock).tick();
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   EXPECT_EQ(ann.metrics().ticks(), tick);
-  clock.mutable_free_run()->set_speed(-1);
-  EXPECT_EQ(codeThrown([&] { ann.setClock(clock); }), v1::ERROR_BAD_MESSAGE);
+  for (const double speed : {-1.0, 1e-300, 1001.0, std::nan("")}) {
+    clock.mutable_free_run()->set_speed(speed);
+    EXPECT_EQ(codeThrown([&] { ann.setClock(clock); }), v1::ERROR_BAD_MESSAGE) << speed;
+  }
 }
 
 TEST_F(Sessions, MetricsCountWhatHappened) {
