@@ -104,7 +104,7 @@ void Session::takeBytes(std::span<const std::uint8_t> bytes) {
   const bool halfway = !decoder_.betweenMessages();
   if (client_ == 0 || (halfway && messageHalfway_ && !whole)) return;  // the timer runs on
   messageHalfway_ = halfway;
-  timer_.cancel();
+  timer_.expires_at(Timer::time_point::max());
   if (halfway) armTimer(limits_.message, v1::ERROR_TIMEOUT, "half a message, then silence");
 }
 
@@ -113,6 +113,11 @@ void Session::take(const protocol::Message& framed) {
   if (!protocol::parse(framed.header, message)) {
     return fail(v1::ERROR_BAD_MESSAGE, "not a ClientMessage (the message that ends at byte " +
                                            std::to_string(decoder_.offset()) + ")");
+  }
+  if (message.request_id() == 0 && !message.has_bye()) {
+    return fail(v1::ERROR_BAD_MESSAGE,
+                "request_id: give a number above 0, so that it can be told "
+                "which request an answer is to");
   }
   if (client_ == 0) return greet(message);
   if (message.has_bye()) return close("it said goodbye");
@@ -197,7 +202,9 @@ void Session::armTimer(std::chrono::milliseconds time, v1::ErrorCode code, std::
   timer_.expires_after(time);
   timer_.async_wait([weak = weak_from_this(), code, reason = std::move(reason)](ErrorCode problem) {
     const auto self = weak.lock();
-    if (!problem && self && self->listening_) self->fail(code, reason);
+    if (problem || !self || !self->listening_) return;
+    // One that ran out may stand in line behind the bytes that put it off.
+    if (self->timer_.expiry() <= Timer::clock_type::now()) self->fail(code, reason);
   });
 }
 

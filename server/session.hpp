@@ -25,6 +25,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
  private:
   using ErrorCode = boost::system::error_code;
+  using Timer = boost::asio::steady_timer;
 
   void read();
   void takeBytes(std::span<const std::uint8_t> bytes);
@@ -38,7 +39,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void close(const std::string& why);
 
   boost::asio::ip::tcp::socket socket_;
-  boost::asio::steady_timer timer_;
+  Timer timer_;
   TickLoop& loop_;
   const ServerLimits limits_;
   std::string peer_;  ///< for logs: address and port, and the name that it gave itself

@@ -62,6 +62,18 @@ TEST_F(BadClients, TheFirstMessageHasToBeHello) {
   EXPECT_EQ(client("other").step().tick(), 1u) << "it made no tick";
 }
 
+TEST_F(BadClients, ARequestNeedsANumberForItsAnswer) {
+  serve();
+  RawConnection raw(server_->port());
+  raw.sendHello();
+  ASSERT_TRUE(raw.receive()->has_welcome());
+  v1::ClientMessage step;
+  step.mutable_step()->set_ticks(1);
+  raw.send(step);
+  EXPECT_EQ(raw.readToEnd().error.code(), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(client("other").step().tick(), 1u) << "it made no tick";
+}
+
 TEST_F(BadClients, AnotherMajorVersionIsRefused) {
   serve();
   for (const char* version : {"2.0.0", "0.9.0", "", "one", "1"}) {
