@@ -91,6 +91,12 @@ void addPlane(v1::Frame& message, std::vector<std::uint8_t>& attachment, const r
   plane.set_length(attachment.size() - plane.offset());
 }
 
+/// The field that a refusal of render:: names: "camera: far is 0; ...".
+std::string fieldOf(const std::string& refusal) {
+  const std::size_t start = refusal.find(": ") + 2;
+  return refusal.substr(start, refusal.find(' ', start) - start);
+}
+
 std::optional<v1::Error> channelProblem(const v1::FrameRequest& request) {
   bool asked[4] = {};
   for (const int channel : request.channels()) {
@@ -122,7 +128,7 @@ CameraOrError viewFrom(const v1::FrameRequest& request, const scene::Snapshot& s
   if (request.has_free()) view = freeView(request.free(), snapshot, width, height);
   if (const View* usable = std::get_if<View>(&view)) {
     if (const auto why = render::refusal(usable->camera)) {
-      return errorOf(v1::ERROR_BAD_CAMERA, *why, why->substr(0, why->find_first_of(" :=")));
+      return errorOf(v1::ERROR_BAD_CAMERA, *why, fieldOf(*why));
     }
   }
   return view;

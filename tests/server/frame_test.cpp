@@ -106,7 +106,13 @@ TEST_F(Frames, WhatCannotBePicturedIsRefusedByName) {
   EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_CAMERA);
   request.set_width(64);
   *request.mutable_free()->mutable_forward() = vec(0, 0, 0);
-  EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_CAMERA);
+  try {
+    ann.frame(request);
+    ADD_FAILURE() << "a camera that looks nowhere";
+  } catch (const protocol::ProtocolError& error) {
+    EXPECT_EQ(error.code, v1::ERROR_BAD_CAMERA);
+    EXPECT_EQ(error.field, "forward");
+  }
   *request.mutable_free()->mutable_forward() = vec(1, 0, 0);
   request.set_tick(77);
   EXPECT_EQ(codeOf(ann, request), v1::ERROR_TICK_GONE);
