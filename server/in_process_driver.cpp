@@ -64,11 +64,15 @@ protocol::ReceivedFrame InProcessDriver::frame(const v1::FrameRequest& request) 
     throw protocol::ProtocolError(error->code(), error->message(), error->field());
   }
   const View& usable = std::get<View>(view);
-  const render::Frame drawn = renderer_->render(*snapshot, usable.camera, usable.hidden);
-  ++frames_;
-  protocol::ReceivedFrame taken;
-  taken.description = messageOf(drawn, snapshot->time, request, taken.pixels);
-  return taken;
+  try {
+    const render::Frame drawn = renderer_->render(*snapshot, usable.camera, usable.hidden);
+    ++frames_;
+    protocol::ReceivedFrame taken;
+    taken.description = messageOf(drawn, snapshot->time, request, taken.pixels);
+    return taken;
+  } catch (const render::RenderError& error) {
+    throw protocol::ProtocolError(v1::ERROR_INTERNAL, error.what());
+  }
 }
 
 v1::Metrics InProcessDriver::metrics() const {

@@ -129,13 +129,16 @@ ExitCode run(const protocol::Script& script, WalkReport& report, bool strict, Wa
   report.writeContacts(world.endContacts());
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   facts.wallSeconds = took.count();
-  std::printf("%s\n", report.writeSummary(facts, result).c_str());
-  std::fflush(stdout);
+  const std::string summary = report.writeSummary(facts, result);
+  if (std::printf("%s\n", summary.c_str()) < 0 || std::fflush(stdout) != 0) {
+    throw ReportError("cannot write the summary to stdout; it stands in " +
+                      report.folder().string() + "/summary.json");
+  }
   tellPerson(report, facts, result);
   return strict && !result.outcomes.empty() ? ExitCode::violations : ExitCode::done;
 }
 
-/// Between two ticks a run looks whether it was interrupted.
+/// A run looks whether it was interrupted once the scene is there, and between two ticks.
 void listenForInterrupt() {
   struct sigaction action {};
   action.sa_handler = [](int) { interrupted = 1; };
@@ -146,10 +149,13 @@ ExitCode interruptible(const std::function<ExitCode()>& work) {
   listenForInterrupt();
   try {
     return work();
+  } catch (const std::exception&) {
+    // A terminal interrupts the whole group: the importer's child fails of it, not of its file.
+    if (interrupted == 0) throw;
   } catch (const Interrupted&) {
-    std::fputs("interrupted; nothing more is written\n", stderr);
-    return ExitCode::interrupted;
   }
+  std::fputs("interrupted; nothing more is written\n", stderr);
+  return ExitCode::interrupted;
 }
 
 /// The server outlives the walk: those who still stand there leave in one tick more, which the
@@ -181,6 +187,7 @@ ExitCode replay(const ReplayCommand& command) {
     const protocol::Script script = protocol::readScript(command.script);
     WalkReport report(command.out);
     const std::shared_ptr<const scene::Scene> scene = loadScene(command.model);
+    if (interrupted != 0) throw Interrupted{};
     const std::unique_ptr<render::Renderer> renderer = rendererOf(scene);
     scene::World world(scene);
     InProcessDriver driver(world, renderer.get(), captureFormat());

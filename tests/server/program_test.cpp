@@ -154,6 +154,14 @@ TEST_F(Program, AFolderThatCannotBeWrittenIsToldBeforeTheWalk) {
   EXPECT_EQ(ended.out, "");
 }
 
+TEST_F(Program, ASummaryThatStdoutDoesNotTakeEndsWithOne) {
+  fs::create_symlink("/dev/full", path("stdout"));
+  const int code =
+      codeOf(start({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out")}));
+  EXPECT_EQ(code, 1);
+  EXPECT_NE(textOf(path("stderr")).find("stdout"), std::string::npos) << textOf(path("stderr"));
+}
+
 TEST_F(Program, ServingAStrangersAddressEndsWithOne) {
   const Ended ended = run({"serve", path("room.obj"), "--listen", "0.0.0.0:0"});
   EXPECT_EQ(ended.code, 1);
