@@ -139,7 +139,6 @@ struct SortAndSweep::State {
 
   void updateStill(MoverId id);
   void enterRanges(MoverId id);
-  void enterRange(MoverId id, std::size_t level, const CellRange& from, const CellRange& to);
   void joinCell(MoverId id, Cell cell);
   void place(MoverId id, Membership& membership);
   bool advance(MoverId id, Membership& membership, std::size_t k);
@@ -287,29 +286,6 @@ void SortAndSweep::State::joinCell(MoverId id, Cell cell) {
   movers[id].cells.push_back(membership);
 }
 
-/// Joins the cells of `to` that are not of `from`.
-void SortAndSweep::State::enterRange(MoverId id, std::size_t level, const CellRange& from,
-                                     const CellRange& to) {
-  const Cell begin = still.cellsBegin(level);
-  const Cell end = still.cellsBegin(level + 1);
-  if (to.count() > end - begin) {  // a mover larger than the level: all of its cells are fewer
-    for (Cell cell = begin; cell < end; ++cell) {
-      const auto& at = still.placeOf(cell);
-      if (to.contains(at) && !from.contains(at)) joinCell(id, cell);
-    }
-    return;
-  }
-  for (std::int32_t x = to.low[0]; x <= to.high[0]; ++x) {
-    for (std::int32_t y = to.low[1]; y <= to.high[1]; ++y) {
-      for (std::int32_t z = to.low[2]; z <= to.high[2]; ++z) {
-        if (from.contains({x, y, z})) continue;
-        const Cell cell = still.find(level, {x, y, z});
-        if (cell != StillCells::kNoCell) joinCell(id, cell);
-      }
-    }
-  }
-}
-
 void SortAndSweep::State::enterRanges(MoverId id) {
   Mover& mover = movers[id];
   mover.ranges.resize(still.levelCount());
@@ -324,7 +300,7 @@ void SortAndSweep::State::enterRanges(MoverId id) {
     std::erase_if(mover.cells, [&](const Membership& m) {
       return still.levelOf(m.cell) == level && !to.contains(still.placeOf(m.cell));
     });
-    enterRange(id, level, from, to);
+    still.forEachCell(level, to, from, [&](Cell cell) { joinCell(id, cell); });
   }
 }
 
@@ -381,6 +357,7 @@ void SortAndSweep::State::updateStill(MoverId id) {
   if (recheckHeld) recheck(id);
   if (!found.empty()) takeFound(id);
 }
+
 // ---- movers against movers ---------------------------------------------------------------------
 
 void SortAndSweep::State::updateMoving() {
@@ -487,6 +464,22 @@ std::span<const BoxPair> SortAndSweep::ended() const {
 std::span<const SortAndSweep::Partner> SortAndSweep::partners(MoverId mover) const {
   if (mover >= state_->movers.size()) return {};
   return state_->movers[mover].partners;
+}
+
+std::vector<StillId> SortAndSweep::stillOverlapping(const Box& box) const {
+  const StillCells& still = state_->still;
+  const HalfAxes reach = reachOf(box);
+  std::vector<StillId> ids;
+  for (std::size_t level = 0; level < still.levelCount(); ++level) {
+    still.forEachCell(level, still.rangeOf(level, reach), CellRange{}, [&](Cell cell) {
+      for (const Row row : still.sorted(cell, 0)) {
+        if (meets(still.onset(row), reach)) ids.push_back(still.idOf(row));
+      }
+    });
+  }
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());  // met in several cells
+  return ids;
 }
 
 std::size_t SortAndSweep::pairCount() const {

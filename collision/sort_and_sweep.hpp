@@ -62,6 +62,10 @@ class SortAndSweep {
     bool operator==(const Partner&) const = default;
   };
   std::span<const Partner> partners(MoverId mover) const;
+  /// The still boxes that overlap a box which is no mover, ascending: for questions asked once, as
+  /// whether there is room. Costs what stands in the cells of the box.
+  std::vector<StillId> stillOverlapping(const Box& box) const;
+
   std::size_t pairCount() const;
   const SweepCounters& counters() const;
 

@@ -69,6 +69,11 @@ class StillCells {
   Cell cellsBegin(std::size_t level) const;
   Cell find(std::size_t level, const std::array<std::int32_t, 3>& at) const;
 
+  /// Calls `visit` with each cell of a level that lies in `range` and not in `except`.
+  template <typename Visit>
+  void forEachCell(std::size_t level, const CellRange& range, const CellRange& except,
+                   Visit&& visit) const;
+
   /// The cells of a level that a box lies in. Boxes that overlap share at least one cell of every
   /// level, because the cell of a coordinate is a monotone function of it, however rounded.
   CellRange rangeOf(std::size_t level, const HalfAxes& reach) const;
@@ -115,5 +120,27 @@ class StillCells {
   std::vector<Cell> slots_;  ///< open addressing, a power of two; kNoCell where free
   std::vector<Row> sorted_;  ///< per cell six lists
 };
+
+template <typename Visit>
+void StillCells::forEachCell(std::size_t level, const CellRange& range, const CellRange& except,
+                             Visit&& visit) const {
+  const Cell begin = cellsBegin(level);
+  const Cell end = cellsBegin(level + 1);
+  if (range.count() > end - begin) {  // larger than the level: all of its cells are fewer
+    for (Cell cell = begin; cell < end; ++cell) {
+      if (range.contains(placeOf(cell)) && !except.contains(placeOf(cell))) visit(cell);
+    }
+    return;
+  }
+  for (std::int32_t x = range.low[0]; x <= range.high[0]; ++x) {
+    for (std::int32_t y = range.low[1]; y <= range.high[1]; ++y) {
+      for (std::int32_t z = range.low[2]; z <= range.high[2]; ++z) {
+        if (except.contains({x, y, z})) continue;
+        const Cell cell = find(level, {x, y, z});
+        if (cell != kNoCell) visit(cell);
+      }
+    }
+  }
+}
 
 }  // namespace enfilade::collision

@@ -14,10 +14,8 @@ constexpr std::array<double, 4> kLifts{0, 0.002, 0.02, 0.1};  // metres
 constexpr double kFloorMargin = 1.0;  // metres below the scene's lowest point that are searched
 
 void gatherAll(const WorldState& world, const Box& box, std::vector<Obstacle>& obstacles) {
-  const auto& boxes = world.scene->stillBoxes();
-  for (std::size_t i = 0; i < boxes.size(); ++i)
-    if (overlaps(boxes[i], box))
-      gatherTriangles(*world.scene, world.scene->solidObjects()[i], box, obstacles);
+  for (const collision::StillId still : world.broadPhase.stillOverlapping(box))
+    gatherTriangles(*world.scene, world.scene->solidObjects()[still], box, obstacles);
   for (const auto& [name, other] : world.avatars) {
     Obstacle obstacle;
     obstacle.entity = other.id;
@@ -69,10 +67,8 @@ int windingNumber(const std::vector<collision::Triangle>& triangles, const Vec3&
 
 /// The solid object that holds `point`, or 0. Open shells and inside-out ones hold nothing.
 EntityId solidAround(const WorldState& world, const Vec3& point) {
-  const auto& boxes = world.scene->stillBoxes();
-  for (std::size_t i = 0; i < boxes.size(); ++i) {
-    if (!overlaps(boxes[i], Box{point, point})) continue;
-    const std::uint32_t object = world.scene->solidObjects()[i];
+  for (const collision::StillId still : world.broadPhase.stillOverlapping({point, point})) {
+    const std::uint32_t object = world.scene->solidObjects()[still];
     const auto& triangles = world.scene->triangles(object).triangles();
     if (!isClosed(triangles)) continue;
     const bool mirrored =

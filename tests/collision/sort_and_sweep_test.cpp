@@ -139,6 +139,26 @@ TEST(SortAndSweep, EqualsBruteForceForWalkersAmongFurniture) {
   EXPECT_GT(scene.movingBegins, 20u);
 }
 
+TEST(SortAndSweep, FindsTheStillBoxesAboutABoxThatIsNoMover) {
+  Random random(8);
+  const Vec3 extent(30, 6, 30);
+  const std::vector<Box> still = furnishedHall(random, 900, extent);
+  const SortAndSweep sweep(still);
+  std::size_t found = 0;
+  for (int k = 0; k < 300; ++k) {
+    const Vec3 size = Vec3::Constant(k % 3 == 0 ? 0 : k % 3 == 1 ? 1 : 40);
+    const Box box = boxAt(uniform3(random, Vec3::Constant(-2), extent), size);
+    std::vector<StillId> expected;
+    for (const BoxPair& pair : bruteForcePairs(still, std::vector{std::pair{MoverId{0}, box}})) {
+      expected.push_back(pair.other);
+    }
+    EXPECT_EQ(sweep.stillOverlapping(box), expected) << "box " << k;
+    found += expected.size();
+  }
+  EXPECT_GT(found, 3000u);
+  EXPECT_TRUE(SortAndSweep({}).stillOverlapping(boxAt(Vec3::Zero(), Vec3::Ones())).empty());
+}
+
 TEST(SortAndSweep, EqualsBruteForceForBodiesThatGrowAndShrink) {
   Random random(2);
   Watched scene(furnishedHall(random, 500, Vec3(12, 6, 12)));
