@@ -15,8 +15,7 @@ namespace {
 constexpr int kSlides = 5;            // planes met in one move: a corner of three and two to spare
 constexpr double kLowBand = 7.0 / 8;  // of epsilon: see StoppingBand
 constexpr double kHighBand = 1 + 1.0 / 32;
-constexpr double kNoMove = 1e-9;        // of epsilon: what is left of a move below this is not made
-constexpr double kGatherMargin = 0.15;  // metres: obstacles are collected for some ticks at once
+constexpr double kNoMove = 1e-9;      // of epsilon: what is left of a move below this is not made
 constexpr double kTread = 0.05;       // metres: what is less deep, as a skirting board, is no step
 constexpr double kWorthAStep = 1e-3;  // of the wish: a step must win at least this much ground
 
@@ -219,45 +218,6 @@ Box reachOf(const WorldState& world, Avatar& avatar, const Vec3& velocity) {
   box.min -= Vec3(across, across + std::max(l.stepHeight, down), across);
   box.max += Vec3(across, across + l.stepHeight, across);
   return grown(box, margin);
-}
-
-void followOthers(const WorldState& world, Avatar& avatar) {
-  for (std::size_t i = avatar.obstacles.size(); i-- > 0;) {
-    Obstacle& obstacle = avatar.obstacles[i];
-    if (obstacle.entity < world.firstAvatarId()) return;  // avatars come last
-    const auto& name = world.avatarNames[obstacle.entity - world.firstAvatarId()];
-    const Avatar& other = world.avatars.at(name);
-    obstacle.box = boxAt(other.hullBox, other.feet);
-    obstacle.body = {other.hull->vertices, other.feet};
-  }
-}
-
-void gatherObstacles(WorldState& world, Avatar& avatar, bool pairsChanged) {
-  if (!pairsChanged && contains(avatar.gathered, avatar.reach)) return followOthers(world, avatar);
-  std::vector<Obstacle> last;
-  last.swap(avatar.obstacles);
-  avatar.gathered = grown(avatar.reach, kGatherMargin);
-  for (const auto& partner : world.broadPhase.partners(avatar.mover)) {
-    if (!partner.moves) {
-      gatherTriangles(*world.scene, world.scene->solidObjects()[partner.id], avatar.gathered,
-                      avatar.obstacles);
-      continue;
-    }
-    Obstacle other;
-    other.entity = world.avatars.at(world.avatarOfMover.at(partner.id)).id;
-    avatar.obstacles.push_back(other);
-  }
-  // Movers' ids are reused and so not in the order of entities.
-  const auto key = [](const Obstacle& o) { return std::pair(o.entity, o.part); };
-  std::sort(avatar.obstacles.begin(), avatar.obstacles.end(),
-            [&](const Obstacle& a, const Obstacle& b) { return key(a) < key(b); });
-  followOthers(world, avatar);
-  // Hand the axes of last tick on by merging.
-  auto old = last.begin();
-  for (Obstacle& obstacle : avatar.obstacles) {
-    while (old != last.end() && key(*old) < key(obstacle)) ++old;
-    if (old != last.end() && key(*old) == key(obstacle)) obstacle.cache = old->cache;
-  }
 }
 
 void moveAvatar(WorldState& world, Avatar& avatar, const Vec3& velocity, QueryCount& count) {

@@ -1,6 +1,15 @@
 #include "scene/obstacles.hpp"
 
+#include <algorithm>
+
+#include "scene/world_state.hpp"
+
 namespace enfilade::scene {
+namespace {
+
+constexpr double kGatherMargin = 0.15;  // metres: obstacles are collected for some ticks at once
+
+}  // namespace
 
 Stop sweepHull(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet,
                const Vec3& displacement, std::vector<Obstacle>& obstacles,
@@ -55,6 +64,45 @@ void gatherTriangles(const Scene& scene, std::uint32_t object, const Box& reach,
     obstacle.box = {t[0].cwiseMin(t[1]).cwiseMin(t[2]), t[0].cwiseMax(t[1]).cwiseMax(t[2])};
     obstacle.body = {std::span<const Vec3>(t), Vec3::Zero()};
     obstacles.push_back(obstacle);
+  }
+}
+
+void followOthers(const WorldState& world, Avatar& avatar) {
+  for (std::size_t i = avatar.obstacles.size(); i-- > 0;) {
+    Obstacle& obstacle = avatar.obstacles[i];
+    if (obstacle.entity < world.firstAvatarId()) return;  // avatars come last
+    const auto& name = world.avatarNames[obstacle.entity - world.firstAvatarId()];
+    const Avatar& other = world.avatars.at(name);
+    obstacle.box = boxAt(other.hullBox, other.feet);
+    obstacle.body = {other.hull->vertices, other.feet};
+  }
+}
+
+void gatherObstacles(WorldState& world, Avatar& avatar, bool pairsChanged) {
+  if (!pairsChanged && contains(avatar.gathered, avatar.reach)) return followOthers(world, avatar);
+  std::vector<Obstacle> last;
+  last.swap(avatar.obstacles);
+  avatar.gathered = grown(avatar.reach, kGatherMargin);
+  for (const auto& partner : world.broadPhase.partners(avatar.mover)) {
+    if (!partner.moves) {
+      gatherTriangles(*world.scene, world.scene->solidObjects()[partner.id], avatar.gathered,
+                      avatar.obstacles);
+      continue;
+    }
+    Obstacle other;
+    other.entity = world.avatars.at(world.avatarOfMover.at(partner.id)).id;
+    avatar.obstacles.push_back(other);
+  }
+  // Movers' ids are reused and so not in the order of entities.
+  const auto key = [](const Obstacle& o) { return std::pair(o.entity, o.part); };
+  std::sort(avatar.obstacles.begin(), avatar.obstacles.end(),
+            [&](const Obstacle& a, const Obstacle& b) { return key(a) < key(b); });
+  followOthers(world, avatar);
+  // Hand the axes of last tick on by merging.
+  auto old = last.begin();
+  for (Obstacle& obstacle : avatar.obstacles) {
+    while (old != last.end() && key(*old) < key(obstacle)) ++old;
+    if (old != last.end() && key(*old) == key(obstacle)) obstacle.cache = old->cache;
   }
 }
 

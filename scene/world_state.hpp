@@ -98,9 +98,9 @@ void judgeWalks(WorldState& world, TickReport& report, QueryCount& count);
 /// The box that an avatar can reach in this tick with the given velocity (motion.cpp).
 Box reachOf(const WorldState& world, Avatar& avatar, const Vec3& velocity);
 /// Collects what the avatar can meet inside its reach. `pairsChanged`: the broad phase gave it or
-/// took from it a partner, so what was collected before no longer serves (motion.cpp).
+/// took from it a partner, so what was collected before no longer serves (obstacles.cpp).
 void gatherObstacles(WorldState& world, Avatar& avatar, bool pairsChanged);
-/// Others moved since the obstacles were collected: they take their place of now (motion.cpp).
+/// Others moved since the obstacles were collected: they take their place of now (obstacles.cpp).
 void followOthers(const WorldState& world, Avatar& avatar);
 /// Walks, slides, steps, falls (motion.cpp).
 void moveAvatar(WorldState& world, Avatar& avatar, const Vec3& velocity, QueryCount& count);
