@@ -148,6 +148,10 @@ bool writtenByPeople(const std::filesystem::path& file) {
          names.count(file.filename().string()) != 0;
 }
 
+bool onlyLinkedTo(const std::filesystem::path& file) {
+  return file.extension() == ".png" || file.filename() == "LICENSE";
+}
+
 }  // namespace
 
 Sources readSources(const std::filesystem::path& root) {
@@ -158,12 +162,15 @@ Sources readSources(const std::filesystem::path& root) {
       entry.disable_recursion_pending();
       continue;
     }
-    if (!entry->is_regular_file() || !writtenByPeople(entry->path())) continue;
+    if (!entry->is_regular_file()) continue;
+    const std::string path = entry->path().lexically_relative(root).generic_string();
+    if (onlyLinkedTo(entry->path())) sources[path] = "";
+    if (!writtenByPeople(entry->path())) continue;
     std::ifstream file(entry->path(), std::ios::binary);
     std::ostringstream text;
     text << file.rdbuf();
     if (!file) throw std::runtime_error(entry->path().string() + ": cannot be read");
-    sources[entry->path().lexically_relative(root).generic_string()] = text.str();
+    sources[path] = text.str();
   }
   return sources;
 }
@@ -247,7 +254,7 @@ Faults brokenLinks(const Sources& sources) {
       for (std::sregex_iterator it(line.begin(), line.end(), link), end; it != end; ++it) {
         const std::string target = (*it)[1];
         const auto file = (folder / target).lexically_normal().generic_string();
-        if (sources.count(file) == 0 && target != "LICENSE")
+        if (sources.count(file) == 0)
           faults.push_back(at(name, number) + ": links to " + target + ", which is not there");
       }
     });

@@ -15,7 +15,8 @@ using Sources = std::map<std::string, std::string>;
 /// One line a fault: "file:line: what is wrong".
 using Faults = std::vector<std::string>;
 
-/// Every text file of the repository that people write; build folders, out/ and .git left out.
+/// Every text file of the repository that people write, and, without their text, the pictures and
+/// the licence that pages link to; build folders, out/ and .git left out.
 Sources readSources(const std::filesystem::path& root);
 
 /// Quoted includes go by path from the root, exist, and follow
