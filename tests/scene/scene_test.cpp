@@ -27,7 +27,8 @@ Model randomModel(unsigned seed, std::size_t objects) {
     Object object;
     object.path = "object" + std::to_string(i);
     object.meshes = {static_cast<std::uint32_t>(i)};
-    object.worldFromMesh.translation() = Vec3(number(), number(), number());
+    const float x = number(), y = number(), z = number();
+    object.worldFromMesh.translation() = Vec3(x, y, z);
     object.worldFromMesh.linear() *= 0.37;
     model.objects.push_back(object);
   }

@@ -334,7 +334,10 @@ TEST(World, ARoomOfNoiseIsNeverPenetratedAndEventsBalance) {
   for (int i = 0; i < 6; ++i) {
     const std::string name = "a" + std::to_string(i);
     run.order(name, Spawn{{uniform(-8, 8), 3, uniform(-8, 8)}});
-    for (int k = 0; k < 6; ++k) run.order(name, to(uniform(-9, 9), uniform(-9, 9), 2.5));
+    for (int k = 0; k < 6; ++k) {
+      const double x = uniform(-9, 9), z = uniform(-9, 9);
+      run.order(name, to(x, z, 2.5));
+    }
   }
   run.ticks(1500);
   EXPECT_EQ(run.worstPenetration, 0);
