@@ -11,7 +11,7 @@ namespace {
 constexpr double kFarAway = 1000;  // metres: farther from the origin, floats lose the millimetre
 constexpr double kGreatest = 1e7;  // metres from the scene's origin: no world takes more
 
-/// Y up from `up`, a cyclic turn of the axes or the usual quarter turn.
+/// Y up from `up`, by a quarter turn about the axis that is neither.
 Eigen::Matrix3d yUpFrom(char up) {
   Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
   if (up == 'z') turn << 1, 0, 0, 0, 0, 1, 0, -1, 0;
