@@ -48,6 +48,11 @@ enum class Outcome : std::uint8_t {
   goesOn
 };
 
+/// "" for none.
+std::string toldDropped(std::size_t orders) {
+  return orders == 0 ? "" : "; " + std::to_string(orders) + " queued orders are dropped";
+}
+
 Outcome follow(const Spawn& spawn, Follower& f) {
   if (f.avatar()) {
     f.tell(Notice::Kind::refused, "an avatar of this name is already in the world");
@@ -55,10 +60,7 @@ Outcome follow(const Spawn& spawn, Follower& f) {
   }
   Avatar avatar;
   if (const auto why = placeAvatar(f.world, spawn, avatar, f.count)) {
-    std::string text = *why;
-    if (const std::size_t dropped = f.queue.size() - 1; dropped > 0)
-      text += "; " + std::to_string(dropped) + " queued orders are dropped";
-    f.tell(Notice::Kind::refused, text);
+    f.tell(Notice::Kind::refused, *why + toldDropped(f.queue.size() - 1));
     f.queue.resize(1);
     return Outcome::ended;
   }
@@ -146,13 +148,15 @@ void followQueue(Follower& f) {
 }
 
 void drive(WorldState& world, const Command& command, TickReport& report) {
+  std::deque<QueuedOrder>& queue = world.queues[command.avatar];
+  const std::string dropped = toldDropped(queue.size());
+  queue.clear();
   const auto found = world.avatars.find(command.avatar);
   if (found == world.avatars.end()) {
     report.notices.push_back({Notice::Kind::refused, command.avatar, 0, command.tag, Vec3::Zero(),
-                              0, "there is no avatar of this name"});
+                              0, "there is no avatar of this name" + dropped});
     return;
   }
-  world.queues[command.avatar].clear();
   Avatar& avatar = found->second;
   const Vec3& velocity = std::get<Drive>(command.order).velocity;
   avatar.drive = {velocity.x(), 0, velocity.z()};

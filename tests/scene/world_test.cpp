@@ -383,13 +383,16 @@ TEST(World, DriveActsAtOnceAndZeroStops) {
   EXPECT_NEAR(run.feet("ann").x(), 1.2, 1e-9);
 }
 
-TEST(World, ADriveOfNobodyIsRefusedAndLeavesTheQueue) {
+TEST(World, ADriveOfNobodyIsRefusedAndSaysWhatItDropped) {
   Trial run({floorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
+  run.order("ann", to(1, 0));
   run.order("ann", Drive{{1.2, 0, 0}});
   run.ticks(10);
-  EXPECT_EQ(run.count(Kind::refused), 1);
-  EXPECT_EQ(run.count(Kind::spawned), 1);
+  ASSERT_EQ(run.notices.size(), 1u);
+  EXPECT_EQ(run.notices[0].kind, Kind::refused);
+  EXPECT_NE(run.notices[0].text.find("2 queued orders are dropped"), std::string::npos);
+  EXPECT_TRUE(run.world.snapshot()->avatars.empty());
 }
 
 TEST(World, OneWhoLeavesAndComesBackUnderTheSameNameIsAnother) {
