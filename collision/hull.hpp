@@ -11,11 +11,11 @@ namespace enfilade::collision {
 /// The convex hull of a list of points, in the body's frame, in metres. It may be flat: a polygon,
 /// a segment or one point. Faces are convex polygons, counter-clockwise seen from outside.
 struct Hull {
-  std::vector<Vec3> vertices;                   ///< extreme points only, each once
+  std::vector<Vec3> vertices;                     ///< extreme points only, each once
   std::vector<std::vector<std::uint32_t>> faces;  ///< solids: >= 4; a polygon: 2; otherwise none
-  std::vector<std::uint32_t> neighbourStart;    ///< size vertices+1; offsets into `neighbours`
-  std::vector<std::uint32_t> neighbours;        ///< vertices joined by an edge, ascending
-  double radius = 0;                            ///< greatest distance of a vertex from the origin
+  std::vector<std::uint32_t> neighbourStart;      ///< size vertices+1; offsets into `neighbours`
+  std::vector<std::uint32_t> neighbours;          ///< vertices joined by an edge, ascending
+  double radius = 0;                              ///< greatest distance of a vertex from the origin
 
   std::span<const std::uint32_t> neighboursOf(std::uint32_t vertex) const {
     return {neighbours.data() + neighbourStart[vertex],
