@@ -24,6 +24,7 @@ Stop sweepHull(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet,
         collision::sweep({hull, feet}, rest, obstacle.body, band, obstacle.cache);
     count.narrow += result.queries;
     count.rational += result.rationals;
+    count.bounded += result.boundReached ? 1 : 0;
     const double fraction = stop.fraction * result.fraction;
     if (!result.stopped || (stop.entity != 0 && fraction >= stop.fraction)) continue;
     stop = {fraction, obstacle.entity, -result.atStop.normal, result.atStop.distance};

@@ -25,6 +25,7 @@ struct Obstacle {
 struct QueryCount {
   std::uint32_t narrow = 0;
   std::uint32_t rational = 0;
+  std::uint32_t bounded = 0;  ///< sweeps that stopped at their iteration bound
 };
 
 /// The earliest thing in the way of a move.

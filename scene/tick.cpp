@@ -80,6 +80,11 @@ void hashState(WorldState& world) {
     hash.add(avatar.gaze);
     hash.add(avatar.fallSpeed);
     hash.add(std::uint64_t{avatar.grounded});
+    hash.add(avatar.drive);
+    hash.add(std::uint64_t{avatar.walk.leg});
+    hash.add(avatar.walk.nearest);
+    hash.add(avatar.walk.patienceLeft);
+    hash.add(avatar.waitLeft);
     for (const Contact& contact : avatar.contacts)
       hash.add((std::uint64_t{contact.other} << 1) | std::uint64_t{contact.touching});
   }
@@ -149,6 +154,7 @@ TickReport tick(World& w) {
   report.pairs = static_cast<std::uint32_t>(world.broadPhase.pairCount());
   report.narrowQueries = count.narrow;
   report.rationalQueries = count.rational;
+  report.boundedSweeps = count.bounded;
   report.idle = isIdle(world);
   return report;
 }

@@ -103,6 +103,7 @@ struct TickReport {
   std::uint32_t pairs = 0;            ///< that the broad phase holds
   std::uint32_t narrowQueries = 0;    ///< made by sweeps and contacts
   std::uint32_t rationalQueries = 0;  ///< of those, decided by exact arithmetic
+  std::uint32_t boundedSweeps = 0;    ///< stopped by their iteration bound, before anything near
   std::uint32_t liveContacts = 0;
   double worstPenetration = 0;  ///< metres, by the exact verdict; 0 when nothing penetrates
   bool idle = true;             ///< every queue is empty and nobody is falling or driven

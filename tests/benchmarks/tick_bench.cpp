@@ -69,7 +69,7 @@ void bench(const std::filesystem::path& file, int avatars, int ticks) {
   std::array<std::vector<double>, scene::kStages> stages;
   std::vector<double> whole;
   double worst = 0;
-  std::uint64_t queries = 0, rationals = 0, pairs = 0;
+  std::uint64_t queries = 0, rationals = 0, pairs = 0, bounded = 0;
   for (int i = 0; i < ticks; ++i) {
     if (i % 120 == 0) {
       spawnAvatars(world, avatars, random);
@@ -86,6 +86,7 @@ void bench(const std::filesystem::path& file, int avatars, int ticks) {
     queries += report.narrowQueries;
     rationals += report.rationalQueries;
     pairs += report.pairs;
+    bounded += report.boundedSweeps;
   }
   std::printf("%s: %zu objects, %zu avatars, %d ticks\n", file.c_str(),
               still->model().objects.size(), world.snapshot()->avatars.size(), ticks);
@@ -94,8 +95,9 @@ void bench(const std::filesystem::path& file, int avatars, int ticks) {
   row("tick", whole);
   std::printf(
       "a tick: %.1f pairs, %.1f narrow queries, %.3f of them rational; "
-      "worst penetration %g m; state hash %016llx\n",
-      double(pairs) / ticks, double(queries) / ticks, double(rationals) / ticks, worst,
+      "%llu sweeps bounded; worst penetration %g m; state hash %016llx\n",
+      double(pairs) / ticks, double(queries) / ticks, double(rationals) / ticks,
+      static_cast<unsigned long long>(bounded), worst,
       static_cast<unsigned long long>(world.snapshot()->stateHash));
 }
 
