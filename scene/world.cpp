@@ -1,5 +1,6 @@
 #include "scene/world.hpp"
 
+#include <charconv>
 #include <cmath>
 
 #include "scene/hasher.hpp"
@@ -16,7 +17,9 @@ constexpr std::size_t kMostWayPoints = 100000;
 std::string number(double value) {
   if (std::isnan(value)) return "NaN";
   if (std::isinf(value)) return value > 0 ? "infinity" : "-infinity";
-  return std::to_string(value);
+  std::array<char, 32> text{};  // the shortest form that reads back as the value: 1e+300
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  return {text.data(), end};
 }
 
 using Refusal = std::optional<std::string>;

@@ -1,7 +1,8 @@
 #include "server/requests.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
-#include <cmath>
 
 #include "protocol/framing.hpp"
 #include "server/version.hpp"
@@ -210,17 +211,58 @@ v1::Entity entityOf(const scene::World& world, std::uint32_t id) {
   return entity;
 }
 
-void answer(const Asked& asked, const v1::DescribeEntities& wanted) {
-  const scene::World& world = asked.served.world;
-  v1::ServerMessage message;
-  v1::EntityNames& names = *message.mutable_names();
-  for (const std::uint32_t id : wanted.ids()) *names.add_entities() = entityOf(world, id);
-  if (wanted.ids().empty()) {
-    const auto objects = static_cast<std::uint32_t>(world.scene().model().objects.size());
-    for (std::uint32_t id = 1; id <= objects; ++id) *names.add_entities() = entityOf(world, id);
-    for (const scene::AvatarView& avatar : world.snapshot()->avatars) {
-      *names.add_entities() = entityOf(world, avatar.id);
+/// Adds to a reply what fits into ServerLimits::replyBytes.
+class BoundedNames {
+ public:
+  BoundedNames(const ServedWorld& served, v1::EntityNames& names)
+      : served_(served), names_(names) {}
+
+  /// False, and nothing is added, when the reply would become too large.
+  bool add(std::uint32_t id) {
+    constexpr std::size_t kFieldBytes = 8;  // an entity's tag and length in the message, at most
+    v1::Entity entity = entityOf(served_.world, id);
+    bytes_ += entity.ByteSizeLong() + kFieldBytes;
+    if (bytes_ > served_.limits.replyBytes) return false;
+    *names_.add_entities() = std::move(entity);
+    return true;
+  }
+  bool addAll() {
+    const auto& objects = served_.world.scene().model().objects;
+    for (std::uint32_t id = 1; id <= objects.size(); ++id) {
+      if (!add(id)) return false;
     }
+    const auto& avatars = served_.world.snapshot()->avatars;
+    return std::all_of(avatars.begin(), avatars.end(), [this](const auto& a) { return add(a.id); });
+  }
+
+ private:
+  const ServedWorld& served_;
+  v1::EntityNames& names_;
+  std::size_t bytes_ = 0;
+};
+
+void answer(const Asked& asked, const v1::DescribeEntities& wanted) {
+  const ServerLimits& limits = asked.served.limits;
+  const auto count = static_cast<std::size_t>(wanted.ids_size());
+  const std::string remedy =
+      "ask in pages, for at most " + std::to_string(limits.describedIds) + " ids at a time";
+  if (count > limits.describedIds) {
+    return replyError(
+        asked, errorOf(v1::ERROR_TOO_LARGE, "ids has " + std::to_string(count) + " ids: " + remedy,
+                       "ids"));
+  }
+  v1::ServerMessage message;
+  BoundedNames names(asked.served, *message.mutable_names());
+  const bool whole = count == 0 ? names.addAll()
+                                : std::all_of(wanted.ids().begin(), wanted.ids().end(),
+                                              [&](std::uint32_t id) { return names.add(id); });
+  if (!whole) {
+    return replyError(
+        asked,
+        errorOf(v1::ERROR_TOO_LARGE,
+                "the names take more than the " + std::to_string(limits.replyBytes) +
+                    " bytes of a reply: give ids and " + remedy + ", fewer where names are long",
+                "ids"));
   }
   reply(asked, std::move(message));
 }
@@ -264,6 +306,18 @@ void answer(const Asked& asked, const PostToTickThread& post) {
              errorOf(v1::ERROR_UNSUPPORTED, "this server does not know the request", "body"));
 }
 
+/// A request that we cannot answer for a fault of ours harms nobody but who asked.
+void answerOrSayWhyNot(const Asked& asked, const PostToTickThread& post) {
+  try {
+    answer(asked, post);
+  } catch (const std::exception& error) {
+    spdlog::error("a request of '{}' failed: {}", asked.client.name, error.what());
+    asked.client.frameUnderWay.reset();
+    asked.client.step.reset();
+    replyError(asked, errorOf(v1::ERROR_INTERNAL, error.what()));
+  }
+}
+
 }  // namespace
 
 v1::Welcome welcomeOf(const ServedWorld& served) {
@@ -298,7 +352,7 @@ void answerWaiting(ServedWorld& served, ClientId id, const PostToTickThread& pos
     const WaitingRequest request = std::move(client.waiting.front());
     client.waiting.pop_front();
     client.waitingBytes -= request.bytes;
-    answer({served, id, client, request.message}, post);
+    answerOrSayWhyNot({served, id, client, request.message}, post);
   }
 }
 

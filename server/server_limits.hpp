@@ -8,15 +8,17 @@
 namespace enfilade::server {
 
 struct ServerLimits {
-  std::uint32_t avatars = 1000;               ///< in the world
-  std::uint32_t pictureSide = 4096;           ///< pixels; render::refusal() allows no more
-  std::uint32_t ticksPerStep = 36'000;        ///< ten minutes at the default tick
-  std::uint32_t waypoints = 10'000;           ///< of one walk
-  std::size_t connections = 256;              ///< at one time
-  std::size_t waitingBytes = 4u << 20;        ///< of requests that a client may have under way
-  std::size_t outgoingBytes = 64u << 20;      ///< of unsent replies and events of one client
-  std::size_t outgoingFrames = 4;             ///< unsent pictures of one client
-  int sendBuffer = 0;                         ///< bytes in the system's hands; 0: as it likes
+  std::uint32_t avatars = 1000;           ///< in the world
+  std::uint32_t pictureSide = 4096;       ///< pixels; render::refusal() allows no more
+  std::uint32_t ticksPerStep = 36'000;    ///< ten minutes at the default tick
+  std::uint32_t waypoints = 10'000;       ///< of one walk
+  std::uint32_t describedIds = 65'536;    ///< of one DescribeEntities
+  std::size_t replyBytes = 8u << 20;      ///< of EntityNames; protocol::kClientTakes is twice it
+  std::size_t connections = 256;          ///< at one time
+  std::size_t waitingBytes = 4u << 20;    ///< of requests that a client may have under way
+  std::size_t outgoingBytes = 64u << 20;  ///< of unsent replies and events of one client
+  std::size_t outgoingFrames = 4;         ///< unsent pictures of one client
+  int sendBuffer = 0;                     ///< bytes in the system's hands; 0: as it likes
   std::chrono::milliseconds greeting{5'000};  ///< from the connection to the whole Hello
   std::chrono::milliseconds message{10'000};  ///< from a message's first byte to its last
   std::chrono::milliseconds farewell{2'000};  ///< for the last words to be taken

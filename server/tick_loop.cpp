@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "server/world_messages.hpp"
 
@@ -14,6 +15,9 @@ using SteadyClock = std::chrono::steady_clock;
 
 /// A free-running world that fell behind by more than this gives the lost time up.
 constexpr std::chrono::milliseconds kCatchUp{250};
+
+/// While a tick of a free-running world is due, requests are answered for so long before it.
+constexpr std::chrono::milliseconds kSlice{5};
 
 SteadyClock::duration tickPeriod(const ServedWorld& served) {
   const std::chrono::duration<double> seconds(served.world.lengths().tick / served.clock.speed);
@@ -30,6 +34,19 @@ ClientId steppingClient(const ServedWorld& served) {
     if (client.step) return id;
   }
   return 0;
+}
+
+/// Runs jobs in order and takes them out; in free-run a due tick goes first once kSlice is over.
+void runJobs(std::vector<std::function<void(ServedWorld&)>>& jobs, ServedWorld& served) {
+  const auto sliceEnd = SteadyClock::now() + kSlice;
+  std::size_t done = 0;
+  while (done < jobs.size()) {
+    jobs[done++](served);
+    if (freeRunning(served) && SteadyClock::now() >= std::max(sliceEnd, served.clock.nextTick)) {
+      break;
+    }
+  }
+  jobs.erase(jobs.begin(), jobs.begin() + static_cast<std::ptrdiff_t>(done));
 }
 
 void takeRequest(ServedWorld& served, ClientId id, WaitingRequest request,
@@ -117,8 +134,7 @@ std::exception_ptr TickLoop::failure() const {
 void TickLoop::run() {
   try {
     while (takeJobs()) {
-      for (Job& job : jobs_) job(served_);
-      jobs_.clear();
+      runJobs(jobs_, served_);
       if (stepTicks() || freeRunTicks()) advance(served_);
       const ClientId stepped = served_.clock.driver.value_or(0);
       answerWaiting(served_, stepped, [this](Job job) { post(std::move(job)); });
@@ -136,12 +152,14 @@ void TickLoop::run() {
 bool TickLoop::takeJobs() {
   std::unique_lock lock(mutex_);
   const auto awake = [this] { return stopping_ || !inbox_.empty(); };
-  if (freeRunning(served_)) {
+  const bool leftOver = !jobs_.empty();  // by the last slice
+  if (freeRunning(served_) && !leftOver) {
     posted_.wait_until(lock, served_.clock.nextTick, awake);
-  } else if (steppingClient(served_) == 0) {
+  } else if (!leftOver && steppingClient(served_) == 0) {
     posted_.wait(lock, awake);
   }
-  jobs_.swap(inbox_);
+  std::move(inbox_.begin(), inbox_.end(), std::back_inserter(jobs_));
+  inbox_.clear();
   return !stopping_;
 }
 

@@ -5,6 +5,8 @@
 #include <thread>
 
 #include "scene/world.hpp"
+#include "server/requests.hpp"
+#include "server/tick_loop.hpp"
 #include "tests/server/served_room.hpp"
 
 namespace enfilade::server::testing {
@@ -189,6 +191,7 @@ TEST_F(Sessions, ANumberThatIsNoneIsRefusedNamingItsField) {
   v1::Command far = walkTo("ann", 1, 0, 0);
   *far.mutable_walk()->add_along() = vec(0, 0, 1e300);
   EXPECT_EQ(ann.command(far)->field(), "walk.along[1].z");
+  EXPECT_NE(ann.command(far)->message().find("is 1e+300;"), std::string::npos);
   v1::Command empty;
   empty.set_avatar("ann");
   EXPECT_EQ(ann.command(empty)->code(), v1::ERROR_BAD_MESSAGE);
@@ -247,6 +250,88 @@ TEST_F(Sessions, EntitiesAreDescribedByNameAndKind) {
   EXPECT_EQ(entities[1].kind(), v1::Entity::KIND_AVATAR);
   EXPECT_EQ(entities[2].kind(), v1::Entity::KIND_UNSPECIFIED);
   EXPECT_EQ(ann.describe({}).size(), 4u);
+}
+
+TEST_F(Sessions, EntitiesAreDescribedInPagesOfBoundedSize) {
+  ServerLimits limits;
+  limits.describedIds = 3;
+  limits.replyBytes = 60;  // two of the room's objects
+  serve(limits);
+  protocol::Client ann = client("ann");
+  const auto refusal = [&](std::vector<std::uint32_t> ids) {
+    try {
+      ann.describe(ids);
+    } catch (const protocol::ProtocolError& error) {
+      EXPECT_NE(std::string(error.what()).find("in pages"), std::string::npos) << error.what();
+      EXPECT_EQ(error.field, "ids");
+      return error.code;
+    }
+    return v1::ERROR_UNSPECIFIED;
+  };
+  EXPECT_EQ(refusal({99, 99, 99, 99}), v1::ERROR_TOO_LARGE) << "four ids";
+  EXPECT_EQ(refusal({99, 99, 99}), v1::ERROR_UNSPECIFIED);
+  EXPECT_EQ(refusal({kFloor, kWall, kColumn}), v1::ERROR_TOO_LARGE) << "long names";
+  EXPECT_EQ(refusal({}), v1::ERROR_TOO_LARGE) << "everything";
+  EXPECT_EQ(refusal({kFloor, kWall}), v1::ERROR_UNSPECIFIED);
+}
+
+TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
+  FrameService frames(smallRoom());
+  TickLoop loop(smallRoom(), frames, {});
+  const auto out = std::make_shared<OutgoingQueue>(OutgoingBounds{std::size_t{1} << 30, 2},
+                                                   encodeShared(v1::Bye()), [] {});
+  const ClientId ann = loop.join("ann", out, 1);
+  v1::ClientMessage request;
+  request.set_request_id(2);
+  request.mutable_set_clock()->mutable_free_run()->set_speed(1000);
+  loop.receive(ann, request, 0);
+  request.mutable_describe()->mutable_ids()->Resize(20'000, kWall);
+  constexpr int kFlood = 60;
+  for (int i = 0; i < kFlood; ++i) loop.receive(ann, request, 0);
+  request.set_request_id(3);
+  request.mutable_metrics();
+  loop.receive(ann, request, 0);
+  std::optional<v1::Metrics> metrics;
+  ASSERT_TRUE(becomesTrue([&] {
+    while (const Buffer bytes = out->pop().message) {
+      protocol::Decoder decoder(protocol::kClientTakes, protocol::Decoder::Expect::messages);
+      std::span<const std::uint8_t> rest(*bytes);
+      v1::ServerMessage message;
+      if (!protocol::parse(decoder.next(rest)->header, message)) return false;
+      if (message.reply_to() == 3) metrics = message.metrics();
+    }
+    return metrics.has_value();
+  }));
+  EXPECT_GE(metrics->ticks(), 8u) << "not one after each slice";
+}
+
+TEST(Requests, OneThatFailsForAFaultOfOursIsToldAndTheNextIsAnswered) {
+  FrameService frames(smallRoom());
+  ServedWorld served(smallRoom(), frames, {});
+  bool faulty = true;  // the first message that is sent throws
+  const auto wake = [&] {
+    if (std::exchange(faulty, false)) throw std::length_error("too long");
+  };
+  Client& ann = served.clients[1];
+  ann.out = std::make_shared<OutgoingQueue>(OutgoingBounds{1000, 2}, encodeShared(v1::Bye()), wake);
+  for (const std::uint64_t id : {1, 2}) {
+    v1::ClientMessage describe;
+    describe.set_request_id(id);
+    describe.mutable_describe()->add_ids(kWall);
+    ann.waiting.push_back({describe, 0});
+  }
+  answerWaiting(served, 1, [](const auto&) {});
+  std::vector<v1::ServerMessage> said;
+  while (const Buffer bytes = ann.out->pop().message) {
+    protocol::Decoder decoder(protocol::kClientTakes, protocol::Decoder::Expect::messages);
+    std::span<const std::uint8_t> rest(*bytes);
+    ASSERT_TRUE(protocol::parse(decoder.next(rest)->header, said.emplace_back()));
+  }
+  ASSERT_EQ(said.size(), 3u) << "what failed in sending, the error, the second answer";
+  EXPECT_EQ(said[1].reply_to(), 1u);
+  EXPECT_EQ(said[1].error().code(), v1::ERROR_INTERNAL);
+  EXPECT_EQ(said[2].reply_to(), 2u);
+  EXPECT_TRUE(said[2].has_names());
 }
 
 TEST_F(Sessions, AtShutdownContactsEndAndClientsAreTold) {
