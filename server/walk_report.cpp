@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <cmath>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "server/world_messages.hpp"
@@ -13,6 +14,8 @@ using Json = nlohmann::ordered_json;
 namespace {
 
 constexpr int kSheetColumns = 4;
+/// Lists the pictures that walks wrote, one name a line: also those of a walk that was interrupted.
+constexpr const char* kWritten = "frames/.written";
 
 Json jsonOf(const v1::Vec3& v) {
   return Json::array({v.x(), v.y(), v.z()});
@@ -166,6 +169,23 @@ WalkReport::WalkReport(std::filesystem::path folder) : folder_(std::move(folder)
   }
 }
 
+void WalkReport::removeEarlier() {
+  try {
+    std::ifstream written(folder_ / kWritten);
+    for (std::string name; std::getline(written, name);) {
+      if (name.find('/') == std::string::npos) {
+        std::filesystem::remove(folder_ / "frames" / (name + ".png"));
+      }
+    }
+    for (const char* file : {"contacts.jsonl", "summary.json", "sheet.png", "map.png", kWritten}) {
+      std::filesystem::remove(folder_ / file);
+    }
+  } catch (const std::exception& error) {
+    throw ReportError("cannot remove an earlier walk from " + folder_.string() + ": " +
+                      error.what() + "; give another folder with --out");
+  }
+}
+
 void WalkReport::add(const protocol::StepOutcome& outcome) {
   for (const v1::ContactEvent& event : outcome.contacts) addContact(event);
   for (const v1::Notice& notice : outcome.notices) addNotice(notice);
@@ -218,6 +238,7 @@ void WalkReport::addFrame(const protocol::CapturedFrame& frame,
   for (const v1::AvatarState& avatar : outcome.avatars) {
     if (avatar.name() == frame.avatar) picture.feet = vectorFrom(avatar.feet());
   }
+  std::ofstream(folder_ / kWritten, std::ios::app) << picture.name << "\n";
   render::writePng(folder_ / picture.file, picture.image);
   const v1::FreeCamera& camera = frame.description.camera();
   trace_.captures.push_back({picture.name, vectorFrom(camera.eye()), vectorFrom(camera.forward())});

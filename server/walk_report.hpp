@@ -33,6 +33,8 @@ class WalkReport {
   /// Makes the folder and proves that it can be written. Throws ReportError.
   explicit WalkReport(std::filesystem::path folder);
 
+  /// Removes what an earlier walk left in the folder, and nothing else.
+  void removeEarlier();
   /// Takes note of one tick and writes its pictures.
   void add(const protocol::StepOutcome& outcome);
   /// Writes contacts.jsonl, with how the contacts ended that the walk left.

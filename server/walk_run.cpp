@@ -111,6 +111,7 @@ ExitCode run(const protocol::Script& script, WalkReport& report, bool strict, Wa
                   {},
                   0,
                   0};
+  report.removeEarlier();
   Progress bar;
   const auto observe = [&](protocol::StepOutcome& outcome,
                            const protocol::ScriptProgress& progress) {

@@ -154,6 +154,23 @@ TEST_F(Program, AFolderThatCannotBeWrittenIsToldBeforeTheWalk) {
   EXPECT_EQ(ended.out, "");
 }
 
+TEST_F(Program, ASecondWalkIntoAFolderRemovesWhatTheFirstWroteAndNothingElse) {
+  const auto replay = [&](const std::string& script) {
+    return run({"replay", path("room.obj"), path(script), "--out", path("out")}).code;
+  };
+  ASSERT_EQ(replay("walk.jsonl"), 0);
+  write(path("out/sheet.png"), "of a first walk with a renderer");
+  write(path("out/notes.txt"), "the visitor's own");
+  write(path("out/frames/mine.png"), "the visitor's own");
+  write(path("still.jsonl"), "{\"spawn\":\"ann\",\"at\":[0,0.01,0]}\n");
+  ASSERT_EQ(replay("still.jsonl"), 0);
+  EXPECT_FALSE(fs::exists(path("out/frames/wall.png")));
+  EXPECT_FALSE(fs::exists(path("out/sheet.png"))) << "this walk took no picture";
+  EXPECT_TRUE(fs::exists(path("out/summary.json")));
+  EXPECT_TRUE(fs::exists(path("out/notes.txt")));
+  EXPECT_TRUE(fs::exists(path("out/frames/mine.png")));
+}
+
 TEST_F(Program, ASummaryThatStdoutDoesNotTakeEndsWithOne) {
   fs::create_symlink("/dev/full", path("stdout"));
   const int code =
