@@ -74,7 +74,7 @@ class Run {
     for (const auto& [number, avatar] : open_) {
       ++result_.dropped;
       tell(LineOutcome::Kind::dropped, number, avatar,
-           "dropped with the queue of its avatar, unheard");
+           "not done: its avatar left the world, or never came into it");
       lineDone(number);
     }
     open_.clear();
@@ -113,9 +113,9 @@ class Run {
       case v1::Notice::KIND_BLOCKED:
         ++result_.blocked;
         tell(LineOutcome::Kind::blocked, line, notice.avatar(),
-             "blocked by " +
-                 (notice.obstacle_name().empty() ? "something" : notice.obstacle_name()) + " at " +
-                 pointText(notice.position()));
+             (notice.obstacle_name().empty() ? "blocked: " + notice.text()
+                                             : "blocked by " + notice.obstacle_name()) +
+                 " at " + pointText(notice.position()));
         break;
       default:
         break;

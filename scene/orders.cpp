@@ -1,7 +1,9 @@
 // The avatars' queues: commands come in, orders start, go on and end. An order that takes no time
 // ends in the tick that it starts in and the next one starts; a capture keeps the avatar still for
 // its tick, so that the picture shows the place it was asked for.
+#include <array>
 #include <cmath>
+#include <cstdio>
 
 #include "scene/rotation.hpp"
 #include "scene/world_state.hpp"
@@ -193,12 +195,17 @@ void endWalk(Follower& f, Notice::Kind kind, std::string text = {}) {
   f.queue.pop_front();
 }
 
+std::string shortNumber(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.3g", value);
+  return text.data();
+}
+
 std::string whyBlocked(const Follower& f, const Vec3& goal) {
   const double up = goal.y() - f.avatar()->feet.y();
   if (acrossGround(f.avatar()->feet, goal) <= kArrivedAcross)
-    return "the way point lies " + std::to_string(std::abs(up)) + " m " +
-           (up > 0 ? "above" : "below");
-  return "no progress for " + std::to_string(f.world.lengths.patience) + " s";
+    return "the way point lies " + shortNumber(std::abs(up)) + " m " + (up > 0 ? "above" : "below");
+  return "no progress for " + shortNumber(f.world.lengths.patience) + " s";
 }
 
 void judge(const Walk& walk, Follower& f) {

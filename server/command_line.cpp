@@ -20,7 +20,11 @@ struct Arguments {
 
 std::string unitProblem(const std::string& text) {
   if (scene::metresPerUnitFrom(text)) return {};
-  return "--unit " + text + ": give m, mm, cm, ft, in or a positive number of metres";
+  return text + ": give m, mm, cm, ft, in or a positive number of metres";
+}
+
+std::string folderProblem(const std::string& text) {
+  return text.empty() ? "the folder's name is empty: give one, as out" : "";
 }
 
 std::string endpointProblem(const std::string& text) {
@@ -38,7 +42,9 @@ void addModel(CLI::App& verb, ModelArguments& into) {
 void addWalk(CLI::App& verb, Arguments& into) {
   verb.add_option("SCRIPT", into.script, "The walk: JSON lines, see protocol/SCRIPT.md")
       ->required();
-  verb.add_option("--out", into.out, "Folder for the pictures, contacts and summary")->required();
+  verb.add_option("--out", into.out, "Folder for the pictures, contacts and summary")
+      ->required()
+      ->check(CLI::Validator(folderProblem, "DIR"));
   verb.add_flag("--strict", into.strict, "End with 3 when an order was refused or a walk blocked");
 }
 
