@@ -103,9 +103,8 @@ std::string globalIdIn(std::string_view name) {
 
 class Collector {
  public:
-  Collector(const aiScene& scene, ModelFormat format, const std::vector<Mesh>& meshes,
-            ProblemLog& problems)
-      : scene_(scene), ifc_(format == ModelFormat::ifc), meshes_(meshes), problems_(problems) {}
+  Collector(ModelFormat format, const std::vector<Mesh>& meshes, ProblemLog& problems)
+      : ifc_(format == ModelFormat::ifc), meshes_(meshes), problems_(problems) {}
 
   /// Where a node stands: what its parents made of the tree so far.
   struct Place {
@@ -178,7 +177,6 @@ class Collector {
     }
   }
 
-  const aiScene& scene_;
   bool ifc_;
   const std::vector<Mesh>& meshes_;
   ProblemLog& problems_;
@@ -198,7 +196,7 @@ bool rootIsNoNode(const aiNode& root, ModelFormat format) {
 std::vector<ObjectDraft> collectObjects(const aiScene& scene, ModelFormat format,
                                         const Eigen::Affine3d& worldFromRoot,
                                         const std::vector<Mesh>& meshes, ProblemLog& problems) {
-  Collector collector(scene, format, meshes, problems);
+  Collector collector(format, meshes, problems);
   SiblingNames names;
   Collector::Place place{worldFromRoot, "", &names};
   const aiNode& root = *scene.mRootNode;
