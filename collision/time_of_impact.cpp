@@ -5,6 +5,8 @@
 // it got there; the second goes on to `low` to see whether the obstacle really stands in the way.
 #include "collision/time_of_impact.hpp"
 
+#include "collision/penetration_depth.hpp"
+
 namespace enfilade::collision {
 namespace {
 
@@ -23,7 +25,7 @@ struct Advance {
 
 /// Whether last tick's axis alone proves that A keeps `distance` from B on its whole way.
 bool axisProvesMiss(const ConvexBody& a, const Vec3& displacement, const ConvexBody& b,
-                    double distance, const SeparationCache& cache) {
+                    double distance, const FeatureCache& cache) {
   const double length = cache.axis.norm();
   if (!(length > 0)) return false;
   const double closing = std::max(0.0, displacement.dot(cache.axis) / length);
@@ -37,11 +39,12 @@ double closingSpeed(const Vec3& displacement, const Decision& at) {
 }
 
 Advance advanceTo(double target, double tolerance, double from, const ConvexBody& a,
-                  const Vec3& displacement, const ConvexBody& b, SeparationCache& cache,
+                  const Vec3& displacement, const ConvexBody& b, FeatureCache& cache,
                   SweepResult& result) {
   Advance advance{from, false, false, {}};
   for (int i = 0; i < kAdvanceBound; ++i) {
-    const ConvexBody moved{a.vertices, a.translation + advance.fraction * displacement};
+    ConvexBody moved = a;
+    moved.translation += advance.fraction * displacement;
     const double reach = target + tolerance + (1 - advance.fraction) * displacement.norm();
     const std::optional<Decision> decision = decideWithin(moved, b, reach, cache);
     ++result.queries;
@@ -65,23 +68,33 @@ Advance advanceTo(double target, double tolerance, double from, const ConvexBody
 }
 
 /// Bodies that already overlap: the axis of least overlap tells which moves close in further.
-bool partsOverlap(const Decision& at, const Vec3& displacement) {
+/// Sets the normal of `at` to it where the bodies penetrate.
+bool partsOverlap(const ConvexBody& a, const ConvexBody& b, const Vec3& displacement,
+                  const FeatureCache& cache, Decision& at) {
+  if (at.verdict == Verdict::penetrating) {
+    DepthCache none;
+    at.normal = penetrationDepth(a, b, cache, none).normal;
+  }
   return displacement.dot(at.normal) <= 0;
 }
 
 }  // namespace
 
 SweepResult sweep(const ConvexBody& a, const Vec3& displacement, const ConvexBody& b,
-                  const StoppingBand& band, SeparationCache& cache) {
+                  const StoppingBand& band, FeatureCache& cache) {
   SweepResult result;
   if (displacement.isZero(0) || axisProvesMiss(a, displacement, b, band.low, cache)) return result;
 
   const double tolerance = kArrived * (band.high - band.low);
-  const Advance near = advanceTo(band.high, tolerance, 0, a, displacement, b, cache, result);
+  Advance near = advanceTo(band.high, tolerance, 0, a, displacement, b, cache, result);
   if (!near.reached) return result;
   Advance in = near;
   const bool overlapping = near.last.verdict != Verdict::separated;
-  if (overlapping && partsOverlap(near.last, displacement)) return result;
+  if (overlapping) {
+    ConvexBody moved = a;
+    moved.translation += near.fraction * displacement;
+    if (partsOverlap(moved, b, displacement, cache, near.last)) return result;
+  }
   if (!overlapping && !near.boundReached)
     in = advanceTo(band.low, tolerance, near.fraction, a, displacement, b, cache, result);
   if (!in.reached) return result;

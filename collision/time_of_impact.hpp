@@ -28,6 +28,6 @@ struct SweepResult {
 /// billionth of the displacement and what Decision::errorBound states. When they start nearer than
 /// `low` (or overlap), only moves that do not close in are granted.
 SweepResult sweep(const ConvexBody& a, const Vec3& displacement, const ConvexBody& b,
-                  const StoppingBand& band, SeparationCache& cache);
+                  const StoppingBand& band, FeatureCache& cache);
 
 }  // namespace enfilade::collision

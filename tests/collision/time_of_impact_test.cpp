@@ -14,7 +14,7 @@ const std::vector<Vec3> kUnitCube{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
 constexpr StoppingBand kBand{0.0004375, 0.000515625};
 
 SweepResult sweepCold(const ConvexBody& a, const Vec3& by, const ConvexBody& b) {
-  SeparationCache cache;
+  FeatureCache cache;
   return sweep(a, by, b, kBand, cache);
 }
 
@@ -69,7 +69,7 @@ TEST(Sweep, RandomSweepsEqualSmallStepsAndNeverPenetrate) {
     const std::vector<Vec3> b = randomPoints(random, 3, 1.5);
     const Vec3 at = randomPoint(random, 2);
     const Vec3 by = -2 * at + randomPoint(random, 1);
-    SeparationCache cache;
+    FeatureCache cache;
     if (decide({a, at}, {b}, cache).distance < 2 * kBand.high) continue;
     const SweepResult result = sweepCold({a, at}, by, {b});
     stops += result.stopped ? 1 : 0;
