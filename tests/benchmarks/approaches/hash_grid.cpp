@@ -1,0 +1,160 @@
+// Uniform spatial subdivision (seed 5.3.2): space is cut into equal cells, those in use are found
+// by hashing, every box is listed in all cells that it meets.
+//
+// Still boxes are listed once, in one array ordered by cell. Movers are listed afresh every tick.
+// A pair is told only in the cell that holds the low corner of its common box, so that it is told
+// once.
+#include <array>
+#include <cmath>
+
+#include "tests/benchmarks/broad_phase_method.hpp"
+
+namespace enfilade::benchmarks {
+namespace {
+
+constexpr double kEdge = 2;  // metres: about the size of an avatar, the usual advice
+
+using Place = std::array<std::int32_t, 3>;
+
+Place placeOf(const Vec3& p) {
+  const auto along = [&](int axis) {
+    return static_cast<std::int32_t>(std::floor(p[axis] / kEdge));
+  };
+  return {along(0), along(1), along(2)};
+}
+
+template <typename Visit>
+void forEachPlace(const Box& box, Visit&& visit) {
+  const Place low = placeOf(box.min);
+  const Place high = placeOf(box.max);
+  for (std::int32_t x = low[0]; x <= high[0]; ++x) {
+    for (std::int32_t y = low[1]; y <= high[1]; ++y) {
+      for (std::int32_t z = low[2]; z <= high[2]; ++z) visit(Place{x, y, z});
+    }
+  }
+}
+
+/// From places to numbers 0, 1, 2, ... in the order of their first use; open addressing.
+class PlaceTable {
+ public:
+  static constexpr std::uint32_t kNone = static_cast<std::uint32_t>(-1);
+
+  std::uint32_t find(const Place& place) const {
+    if (slots_.empty()) return kNone;
+    return slots_[slotOf(place)];
+  }
+  std::uint32_t findOrAdd(const Place& place) {
+    if (2 * (places_.size() + 1) > slots_.size()) grow();
+    const std::size_t slot = slotOf(place);
+    if (slots_[slot] == kNone) {
+      slots_[slot] = static_cast<std::uint32_t>(places_.size());
+      places_.push_back(place);
+    }
+    return slots_[slot];
+  }
+  void clear() {
+    std::fill(slots_.begin(), slots_.end(), kNone);
+    places_.clear();
+  }
+  std::size_t size() const { return places_.size(); }
+
+ private:
+  std::size_t slotOf(const Place& place) const {
+    // Teschner et al. 2003, "Optimized spatial hashing": three large primes.
+    const auto part = [](std::int32_t x, std::uint64_t prime) {
+      return static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) * prime;
+    };
+    std::uint64_t hash =
+        part(place[0], 73856093) ^ part(place[1], 19349663) ^ part(place[2], 83492791);
+    hash ^= hash >> 17;
+    std::size_t slot = hash & (slots_.size() - 1);
+    while (slots_[slot] != kNone && places_[slots_[slot]] != place) {
+      slot = (slot + 1) & (slots_.size() - 1);
+    }
+    return slot;
+  }
+  void grow() {
+    slots_.assign(std::max<std::size_t>(64, 2 * slots_.size()), kNone);
+    for (std::uint32_t k = 0; k < places_.size(); ++k) slots_[slotOf(places_[k])] = k;
+  }
+
+  std::vector<std::uint32_t> slots_;
+  std::vector<Place> places_;
+};
+
+class HashGrid : public BroadPhase {
+ public:
+  explicit HashGrid(std::span<const Box> still) : still_(still) {
+    std::vector<std::uint32_t> counts;
+    for (const Box& box : still) {
+      forEachPlace(box, [&](const Place& place) {
+        const std::uint32_t cell = stillCells_.findOrAdd(place);
+        if (cell == counts.size()) counts.push_back(0);
+        ++counts[cell];
+      });
+    }
+    first_.assign(counts.size() + 1, 0);
+    for (std::size_t k = 0; k < counts.size(); ++k) first_[k + 1] = first_[k] + counts[k];
+    listed_.resize(first_.back());
+    for (std::uint32_t s = 0; s < still.size(); ++s) {
+      forEachPlace(still[s], [&](const Place& place) {
+        const std::uint32_t cell = stillCells_.find(place);
+        listed_[first_[cell + 1] - counts[cell]--] = s;
+      });
+    }
+  }
+
+  void tick(std::span<const Box> movers, PairTally& tally) override {
+    moverCells_.clear();
+    for (auto& list : moverLists_) list.clear();
+    for (std::uint32_t id = 0; id < movers.size(); ++id) {
+      forEachPlace(movers[id], [&](const Place& place) {
+        tellStill(id, movers[id], place, tally);
+        tellMovers(id, movers, place, tally);
+      });
+    }
+  }
+
+ private:
+  static bool ownsPair(const Place& place, const Box& a, const Box& b) {
+    return placeOf(a.min.cwiseMax(b.min)) == place;
+  }
+
+  void tellStill(std::uint32_t id, const Box& box, const Place& place, PairTally& tally) {
+    const std::uint32_t cell = stillCells_.find(place);
+    if (cell == PlaceTable::kNone) return;
+    for (std::uint32_t k = first_[cell]; k < first_[cell + 1]; ++k) {
+      const Box& other = still_[listed_[k]];
+      if (collision::overlaps(box, other) && ownsPair(place, box, other)) {
+        tally.addStill(id, listed_[k]);
+      }
+    }
+  }
+
+  void tellMovers(std::uint32_t id, std::span<const Box> movers, const Place& place,
+                  PairTally& tally) {
+    const std::uint32_t cell = moverCells_.findOrAdd(place);
+    if (cell >= moverLists_.size()) moverLists_.resize(cell + 1);
+    for (const std::uint32_t other : moverLists_[cell]) {
+      if (collision::overlaps(movers[id], movers[other]) &&
+          ownsPair(place, movers[id], movers[other])) {
+        tally.addMovers(id, other);
+      }
+    }
+    moverLists_[cell].push_back(id);
+  }
+
+  std::span<const Box> still_;
+  PlaceTable stillCells_, moverCells_;
+  std::vector<std::uint32_t> first_;   ///< by cell, and one more: offsets into `listed_`
+  std::vector<std::uint32_t> listed_;  ///< still boxes by cell
+  std::vector<std::vector<std::uint32_t>> moverLists_;
+};
+
+}  // namespace
+
+BroadPhaseMethod hashGrid() {
+  return {"uniform hash grid", BroadPhaseMethod::Kind::approach, SIZE_MAX, "", maker<HashGrid>()};
+}
+
+}  // namespace enfilade::benchmarks

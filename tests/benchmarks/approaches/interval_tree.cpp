@@ -1,0 +1,175 @@
+// Interval tree for 2-D intersection tests (seed 5.2.3).
+//
+// A line sweeps along x. Where it meets the beginning of a box, the box's interval on z is put into
+// an interval tree and compared with those in it; at its end it is taken out. A pair of rectangles
+// that overlap is then tested on y. The still end points on x are sorted once and merged with the
+// movers' each tick; still and moving intervals lie in two trees, so that still boxes meet movers
+// only. Every tick sweeps over the whole still scene: O(n log n), as the seed says.
+//
+// Departures: the tree's split values are a sample of at most 4095 still ends, fixed for all ticks,
+// and a node's intervals are kept in no order and tested one by one.
+#include <algorithm>
+#include <array>
+
+#include "tests/benchmarks/broad_phase_method.hpp"
+
+namespace enfilade::benchmarks {
+namespace {
+
+constexpr std::size_t kMostSplits = 4095;
+
+class IntervalTree {
+ public:
+  /// `splits` ascending, 2^k - 1 of them.
+  IntervalTree(std::vector<double> splits, std::size_t ids)
+      : splits_(std::move(splits)), nodes_(splits_.size()), places_(ids) {}
+
+  void insert(std::uint32_t id, double low, double high) {
+    std::size_t first = 0, size = splits_.size();
+    while (true) {
+      const std::size_t middle = first + size / 2;
+      Node& node = nodes_[middle];
+      ++node.below;
+      if (size == 1 || (low <= splits_[middle] && splits_[middle] <= high)) {
+        places_[id] = {static_cast<std::uint32_t>(middle),
+                       static_cast<std::uint32_t>(node.ids.size())};
+        node.ids.push_back(id);
+        return;
+      }
+      if (low > splits_[middle]) first = middle + 1;
+      size /= 2;
+    }
+  }
+
+  void remove(std::uint32_t id) {
+    const Place place = places_[id];
+    std::size_t first = 0, size = splits_.size();
+    while (true) {  // the way down to the node, by its index
+      const std::size_t middle = first + size / 2;
+      --nodes_[middle].below;
+      if (middle == place.node) break;
+      if (place.node > middle) first = middle + 1;
+      size /= 2;
+    }
+    std::vector<std::uint32_t>& ids = nodes_[place.node].ids;
+    ids[place.at] = ids.back();
+    places_[ids[place.at]].at = place.at;
+    ids.pop_back();
+  }
+
+  /// Visits all intervals that may overlap [low, high], and none that cannot by its node.
+  template <typename Visit>
+  void ask(double low, double high, Visit&& visit) const {
+    ask(0, splits_.size(), low, high, visit);
+  }
+
+ private:
+  struct Node {
+    std::uint32_t below = 0;  ///< intervals here and in all nodes below
+    std::vector<std::uint32_t> ids;
+  };
+  struct Place {
+    std::uint32_t node, at;
+  };
+
+  template <typename Visit>
+  void ask(std::size_t first, std::size_t size, double low, double high, Visit& visit) const {
+    if (size == 0) return;
+    const std::size_t middle = first + size / 2;
+    if (nodes_[middle].below == 0) return;
+    for (const std::uint32_t id : nodes_[middle].ids) visit(id);
+    if (low <= splits_[middle]) ask(first, size / 2, low, high, visit);
+    if (high >= splits_[middle]) ask(middle + 1, size / 2, low, high, visit);
+  }
+
+  std::vector<double> splits_;
+  std::vector<Node> nodes_;    ///< in the order of the splits: an implicit balanced tree
+  std::vector<Place> places_;  ///< by id
+};
+
+class IntervalSweep : public BroadPhase {
+ public:
+  explicit IntervalSweep(std::span<const Box> still)
+      : still_(still), splits_(sampledSplits(still)), stillTree_(splits_, still.size()) {
+    for (std::uint32_t s = 0; s < still.size(); ++s) {
+      addEnds({still[s].min.x(), s, false, false}, still[s].max.x(), stillEnds_);
+    }
+    std::sort(stillEnds_.begin(), stillEnds_.end(), before);
+  }
+
+  void tick(std::span<const Box> movers, PairTally& tally) override {
+    if (!moverTree_) moverTree_ = std::make_unique<IntervalTree>(splits_, movers.size());
+    moverEnds_.clear();
+    for (std::uint32_t id = 0; id < movers.size(); ++id) {
+      addEnds({movers[id].min.x(), id, true, false}, movers[id].max.x(), moverEnds_);
+    }
+    std::sort(moverEnds_.begin(), moverEnds_.end(), before);
+    auto still = stillEnds_.begin();
+    for (const End& end : moverEnds_) {
+      for (; still != stillEnds_.end() && before(*still, end); ++still) meet(*still, movers, tally);
+      meet(end, movers, tally);
+    }
+    for (; still != stillEnds_.end(); ++still) meet(*still, movers, tally);
+  }
+
+ private:
+  struct End {
+    double at;
+    std::uint32_t id;
+    bool moves, upper;
+  };
+  /// At equal places lower ends come first: closed intervals that touch overlap.
+  static bool before(const End& a, const End& b) {
+    return a.at != b.at ? a.at < b.at : a.upper < b.upper;
+  }
+  static void addEnds(End lower, double upperAt, std::vector<End>& ends) {
+    ends.push_back(lower);
+    ends.push_back({upperAt, lower.id, lower.moves, true});
+  }
+
+  static std::vector<double> sampledSplits(std::span<const Box> still) {
+    std::vector<double> all;
+    for (const Box& box : still) all.insert(all.end(), {box.min.z(), box.max.z()});
+    std::sort(all.begin(), all.end());
+    std::size_t count = 1;
+    while (2 * count + 1 <= std::min(all.size(), kMostSplits)) count = 2 * count + 1;
+    std::vector<double> splits(count);
+    for (std::size_t k = 0; k < count; ++k) splits[k] = all[(k + 1) * all.size() / (count + 1)];
+    return splits;
+  }
+
+  void meet(const End& end, std::span<const Box> movers, PairTally& tally) {
+    const Box& box = end.moves ? movers[end.id] : still_[end.id];
+    IntervalTree& own = end.moves ? *moverTree_ : stillTree_;
+    if (end.upper) {
+      own.remove(end.id);
+      return;
+    }
+    moverTree_->ask(box.min.z(), box.max.z(), [&](std::uint32_t other) {
+      if (!collision::overlaps(box, movers[other])) return;
+      if (end.moves) tally.addMovers(end.id, other);
+      if (!end.moves) tally.addStill(other, end.id);
+    });
+    if (end.moves) {
+      stillTree_.ask(box.min.z(), box.max.z(), [&](std::uint32_t other) {
+        if (collision::overlaps(box, still_[other])) tally.addStill(end.id, other);
+      });
+    }
+    own.insert(end.id, box.min.z(), box.max.z());
+  }
+
+  std::span<const Box> still_;
+  std::vector<double> splits_;
+  IntervalTree stillTree_;
+  std::unique_ptr<IntervalTree> moverTree_;
+  std::vector<End> stillEnds_, moverEnds_;
+};
+
+}  // namespace
+
+BroadPhaseMethod intervalTree() {
+  return {"2-D interval tree", BroadPhaseMethod::Kind::approach, 100000,
+          "every tick sweeps over all still boxes", maker<IntervalSweep>()};
+}
+
+}  // namespace enfilade::benchmarks

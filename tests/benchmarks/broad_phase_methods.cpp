@@ -1,0 +1,68 @@
+#include "tests/benchmarks/broad_phase_method.hpp"
+
+namespace enfilade::benchmarks {
+namespace {
+
+class OurSortAndSweep : public BroadPhase {
+ public:
+  explicit OurSortAndSweep(std::span<const Box> still) : sweep_(still) {}
+
+  void tick(std::span<const Box> movers, PairTally& tally) override {
+    for (std::uint32_t id = 0; id < movers.size(); ++id) {
+      if (inserted_) {
+        sweep_.move(id, movers[id]);
+      } else {
+        sweep_.insert(movers[id]);
+      }
+    }
+    inserted_ = true;
+    sweep_.update();
+    for (std::uint32_t id = 0; id < movers.size(); ++id) {
+      for (const auto& partner : sweep_.partners(id)) {
+        if (!partner.moves) tally.addStill(id, partner.id);
+        if (partner.moves && id < partner.id) tally.addMovers(id, partner.id);
+      }
+    }
+  }
+
+ private:
+  collision::SortAndSweep sweep_;
+  bool inserted_ = false;
+};
+
+void append(std::vector<BroadPhaseMethod>& to, std::vector<BroadPhaseMethod> some) {
+  for (BroadPhaseMethod& method : some) to.push_back(std::move(method));
+}
+
+}  // namespace
+
+BroadPhaseMethod ourSortAndSweep() {
+  return {"ours: sort and sweep", BroadPhaseMethod::Kind::ours, SIZE_MAX, "",
+          maker<OurSortAndSweep>()};
+}
+
+std::vector<BroadPhaseMethod> broadPhaseMethods() {
+  std::vector<BroadPhaseMethod> all{ourSortAndSweep(), hashGrid(),     looseOctree(),
+                                    bspTree(),         intervalTree(), bruteForce()};
+#ifdef BENCH_BOOST
+  all.push_back(boostRtree());
+#endif
+#ifdef BENCH_BULLET
+  append(all, bulletBroadPhases());
+#endif
+#ifdef BENCH_EMBREE
+  all.push_back(embreeBvh());
+#endif
+#ifdef BENCH_FCL
+  append(all, fclBroadPhases());
+#endif
+#ifdef BENCH_ODE
+  append(all, odeSpaces());
+#endif
+#ifdef BENCH_CGAL
+  all.push_back(cgalBoxes());
+#endif
+  return all;
+}
+
+}  // namespace enfilade::benchmarks

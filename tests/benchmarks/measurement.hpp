@@ -1,0 +1,69 @@
+// What all benchmark programs share: a clock, quantiles, the lines of results, the command line.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace enfilade::benchmarks {
+
+using Clock = std::chrono::steady_clock;
+
+inline double secondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// The value below which a part `q` (0..1) of the values lies; NaN when there are none.
+inline double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
+}
+
+/// NaN and infinity have no place in JSON.
+inline nlohmann::json number(double x) {
+  return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(nullptr);
+}
+
+/// --quick, --out FILE (JSON lines; none: only the table on stdout), --only PART of a name.
+struct Arguments {
+  bool quick = false;
+  std::string out, only;
+
+  Arguments(int argc, char** argv) {
+    for (int k = 1; k < argc; ++k) {
+      if (std::strcmp(argv[k], "--quick") == 0) quick = true;
+      if (std::strcmp(argv[k], "--out") == 0 && k + 1 < argc) out = argv[++k];
+      if (std::strcmp(argv[k], "--only") == 0 && k + 1 < argc) only = argv[++k];
+    }
+  }
+  bool wants(const std::string& name) const { return name.find(only) != std::string::npos; }
+};
+
+/// One JSON object a line, for report.py.
+class Results {
+ public:
+  explicit Results(const Arguments& arguments) {
+    if (arguments.out.empty()) return;
+    file_.open(arguments.out);
+    if (!file_) {
+      std::fprintf(stderr, "cannot write %s\n", arguments.out.c_str());
+      std::exit(1);
+    }
+  }
+  void add(const nlohmann::json& line) {
+    if (file_.is_open()) file_ << line.dump() << std::endl;
+  }
+
+ private:
+  std::ofstream file_;
+};
+
+}  // namespace enfilade::benchmarks

@@ -1,0 +1,53 @@
+// Boost.Geometry: a packed R-tree of the still boxes, a second one of the movers every tick.
+#include <boost/geometry.hpp>
+#include <boost/geometry/index/rtree.hpp>
+
+#include "tests/benchmarks/broad_phase_method.hpp"
+
+namespace enfilade::benchmarks {
+namespace {
+
+namespace bgi = boost::geometry::index;
+
+class BoostRtree : public BroadPhase {
+ public:
+  explicit BoostRtree(std::span<const Box> still) : still_(values(still)) {}
+
+  void tick(std::span<const Box> movers, PairTally& tally) override {
+    const Tree moving(values(movers));
+    for (std::uint32_t id = 0; id < movers.size(); ++id) {
+      const BoostBox box = boostBox(movers[id]);
+      for (auto hit = still_.qbegin(bgi::intersects(box)); hit != still_.qend(); ++hit) {
+        tally.addStill(id, hit->second);
+      }
+      for (auto hit = moving.qbegin(bgi::intersects(box)); hit != moving.qend(); ++hit) {
+        if (id < hit->second) tally.addMovers(id, hit->second);
+      }
+    }
+  }
+
+ private:
+  using Point = boost::geometry::model::point<double, 3, boost::geometry::cs::cartesian>;
+  using BoostBox = boost::geometry::model::box<Point>;
+  using Value = std::pair<BoostBox, std::uint32_t>;
+  using Tree = bgi::rtree<Value, bgi::rstar<16>>;
+
+  static BoostBox boostBox(const Box& b) {
+    return {Point(b.min.x(), b.min.y(), b.min.z()), Point(b.max.x(), b.max.y(), b.max.z())};
+  }
+  static std::vector<Value> values(std::span<const Box> boxes) {
+    std::vector<Value> result;
+    for (std::uint32_t k = 0; k < boxes.size(); ++k) result.emplace_back(boostBox(boxes[k]), k);
+    return result;
+  }
+
+  Tree still_;
+};
+
+}  // namespace
+
+BroadPhaseMethod boostRtree() {
+  return {"Boost R-tree", BroadPhaseMethod::Kind::peer, SIZE_MAX, "", maker<BoostRtree>()};
+}
+
+}  // namespace enfilade::benchmarks

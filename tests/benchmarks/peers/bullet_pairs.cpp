@@ -1,0 +1,100 @@
+// Bullet in double precision: its dynamic tree of boxes (Dbvt) and its 32-bit axis sweep.
+//
+// Both keep a cache of pairs whose fattened or quantized boxes overlap; told are those whose exact
+// boxes overlap. Filter groups keep still boxes from pairing with one another. Dbvt takes about a
+// hundred ticks to move what stands into its tree of fixed boxes and to put that in order: they are
+// made at construction and count as building.
+#include <BulletCollision/BroadphaseCollision/btAxisSweep3.h>
+#include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
+
+#include "tests/benchmarks/broad_phase_method.hpp"
+
+namespace enfilade::benchmarks {
+namespace {
+
+constexpr int kSettlingTicks = 110;
+constexpr int kStillGroup = 1, kMoverGroup = 2;
+
+btVector3 bulletVector(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+/// A proxy's owner is an integer in a pointer: 2 * id, and 1 for movers.
+std::uintptr_t tagOf(const btBroadphaseProxy& proxy) {
+  return reinterpret_cast<std::uintptr_t>(proxy.m_clientObject);
+}
+
+class BulletPairs : public BroadPhase {
+ public:
+  BulletPairs(std::span<const Box> still, bool axisSweep) : still_(still) {
+    Box world;
+    for (const Box& box : still) world.include(box);
+    world = collision::grown(world, 10);
+    if (axisSweep) {
+      broadphase_ = std::make_unique<bt32BitAxisSweep3>(
+          bulletVector(world.min), bulletVector(world.max),
+          static_cast<unsigned>(still.size() + 2000), nullptr, true);
+    } else {
+      broadphase_ = std::make_unique<btDbvtBroadphase>();
+    }
+    for (std::size_t k = 0; k < still.size(); ++k) add(still[k], 2 * k, kStillGroup, kMoverGroup);
+    for (int k = 0; k < kSettlingTicks; ++k) broadphase_->calculateOverlappingPairs(nullptr);
+  }
+  ~BulletPairs() override {
+    for (btBroadphaseProxy* proxy : proxies_) broadphase_->destroyProxy(proxy, nullptr);
+  }
+  BulletPairs(const BulletPairs&) = delete;
+  BulletPairs& operator=(const BulletPairs&) = delete;
+
+  void tick(std::span<const Box> movers, PairTally& tally) override {
+    if (proxies_.size() == still_.size()) {
+      for (std::size_t k = 0; k < movers.size(); ++k) {
+        add(movers[k], 2 * k + 1, kMoverGroup, kStillGroup | kMoverGroup);
+      }
+    } else {
+      for (std::size_t k = 0; k < movers.size(); ++k) {
+        broadphase_->setAabb(proxies_[still_.size() + k], bulletVector(movers[k].min),
+                             bulletVector(movers[k].max), nullptr);
+      }
+    }
+    broadphase_->calculateOverlappingPairs(nullptr);
+    tell(movers, tally);
+  }
+
+ private:
+  void add(const Box& box, std::uintptr_t tag, int group, int mask) {
+    proxies_.push_back(broadphase_->createProxy(bulletVector(box.min), bulletVector(box.max), 0,
+                                                reinterpret_cast<void*>(tag), group, mask,
+                                                nullptr));
+  }
+
+  void tell(std::span<const Box> movers, PairTally& tally) const {
+    const btBroadphasePairArray& pairs =
+        broadphase_->getOverlappingPairCache()->getOverlappingPairArray();
+    for (int k = 0; k < pairs.size(); ++k) {
+      std::uintptr_t a = tagOf(*pairs[k].m_pProxy0);
+      std::uintptr_t b = tagOf(*pairs[k].m_pProxy1);
+      if (a % 2 == 0) std::swap(a, b);
+      const auto mover = static_cast<std::uint32_t>(a / 2);
+      const auto other = static_cast<std::uint32_t>(b / 2);
+      const bool moves = b % 2 == 1;
+      if (!collision::overlaps(movers[mover], moves ? movers[other] : still_[other])) continue;
+      if (moves) tally.addMovers(mover, other);
+      if (!moves) tally.addStill(mover, other);
+    }
+  }
+
+  std::span<const Box> still_;
+  std::unique_ptr<btBroadphaseInterface> broadphase_;
+  std::vector<btBroadphaseProxy*> proxies_;  ///< still ones, then movers
+};
+
+}  // namespace
+
+std::vector<BroadPhaseMethod> bulletBroadPhases() {
+  return {{"Bullet Dbvt", BroadPhaseMethod::Kind::peer, SIZE_MAX, "", maker<BulletPairs>(false)},
+          {"Bullet axis sweep", BroadPhaseMethod::Kind::peer, 10000, "minutes to build",
+           maker<BulletPairs>(true)}};
+}
+
+}  // namespace enfilade::benchmarks

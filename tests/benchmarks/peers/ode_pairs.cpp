@@ -1,0 +1,90 @@
+// ODE: sweep-and-prune and hash spaces; category bits keep still boxes apart. ODE sorts or
+// rehashes a space whenever it is asked. Boxes are made from a centre and sizes, so their bounds
+// may differ from the given ones by a rounding; the callback tests the given ones.
+#include <ode/ode.h>
+
+#include "tests/benchmarks/broad_phase_method.hpp"
+
+namespace enfilade::benchmarks {
+namespace {
+
+struct Asked {
+  std::span<const Box> still, movers;
+  PairTally* tally;
+};
+
+std::uintptr_t tagOf(dGeomID geom) {
+  return reinterpret_cast<std::uintptr_t>(dGeomGetData(geom));
+}
+
+void tell(void* data, dGeomID first, dGeomID second) {
+  const Asked& asked = *static_cast<Asked*>(data);
+  std::uintptr_t a = tagOf(first);
+  std::uintptr_t b = tagOf(second);
+  if (a % 2 == 0) std::swap(a, b);
+  const auto mover = static_cast<std::uint32_t>(a / 2);
+  const auto other = static_cast<std::uint32_t>(b / 2);
+  const bool moves = b % 2 == 1;
+  if (!collision::overlaps(asked.movers[mover], moves ? asked.movers[other] : asked.still[other])) {
+    return;
+  }
+  if (moves) asked.tally->addMovers(mover, other);
+  if (!moves) asked.tally->addStill(mover, other);
+}
+
+class OdeSpace : public BroadPhase {
+ public:
+  OdeSpace(std::span<const Box> still, bool hashed) : still_(still) {
+    static const int started = dInitODE2(0);
+    (void)started;
+    space_ = hashed ? dHashSpaceCreate(nullptr) : dSweepAndPruneSpaceCreate(nullptr, dSAP_AXES_XZY);
+    for (std::size_t k = 0; k < still.size(); ++k) add(still[k], 2 * k, 1, 2);
+  }
+  ~OdeSpace() override { dSpaceDestroy(space_); }
+  OdeSpace(const OdeSpace&) = delete;
+  OdeSpace& operator=(const OdeSpace&) = delete;
+
+  void tick(std::span<const Box> movers, PairTally& tally) override {
+    for (std::size_t k = 0; k < movers.size(); ++k) {
+      if (movers_.size() < movers.size()) {
+        movers_.push_back(add(movers[k], 2 * k + 1, 2, 3));
+      } else {
+        place(movers_[k], movers[k]);
+      }
+    }
+    Asked asked{still_, movers, &tally};
+    dSpaceCollide(space_, &asked, tell);
+  }
+
+ private:
+  /// Grown by more than the rounding of centre and sizes, so that no pair is lost by it.
+  static void place(dGeomID geom, const Box& box) {
+    const Vec3 centre = box.centre();
+    const Vec3 size = box.size() + Vec3::Constant(1e-9);
+    dGeomBoxSetLengths(geom, size.x(), size.y(), size.z());
+    dGeomSetPosition(geom, centre.x(), centre.y(), centre.z());
+  }
+  dGeomID add(const Box& box, std::uintptr_t tag, unsigned long category, unsigned long collides) {
+    dGeomID geom = dCreateBox(space_, 1, 1, 1);
+    place(geom, box);
+    dGeomSetData(geom, reinterpret_cast<void*>(tag));
+    dGeomSetCategoryBits(geom, category);
+    dGeomSetCollideBits(geom, collides);
+    return geom;
+  }
+
+  std::span<const Box> still_;
+  dSpaceID space_;
+  std::vector<dGeomID> movers_;
+};
+
+}  // namespace
+
+std::vector<BroadPhaseMethod> odeSpaces() {
+  const std::string reason = "every tick goes over all still boxes";
+  return {
+      {"ODE sweep and prune", BroadPhaseMethod::Kind::peer, 10000, reason, maker<OdeSpace>(false)},
+      {"ODE hash space", BroadPhaseMethod::Kind::peer, 10000, reason, maker<OdeSpace>(true)}};
+}
+
+}  // namespace enfilade::benchmarks
