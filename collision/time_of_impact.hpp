@@ -1,6 +1,8 @@
-// How far a convex body can move before it comes too near another: translation only.
+// When convex bodies meet: how far one may move (sweep: translation, what the tick uses), and the
+// time of impact of two that move and turn.
 #pragma once
 
+#include "collision/continuous_pose.hpp"
 #include "collision/narrow_phase.hpp"
 
 namespace enfilade::collision {
@@ -29,5 +31,26 @@ struct SweepResult {
 /// `low` (or overlap), only moves that do not close in are granted.
 SweepResult sweep(const ConvexBody& a, const Vec3& displacement, const ConvexBody& b,
                   const StoppingBand& band, FeatureCache& cache);
+
+enum class Impact : std::uint8_t {
+  none,     ///< proved: they do not meet before the horizon; lo = hi = horizon
+  contact,  ///< proved: they meet, for the first time within [lo, hi]
+  unproved  ///< apart on all of [0, lo); what comes after, up to hi = horizon, is not known
+};
+
+struct TimeOfImpact {
+  Impact impact = Impact::none;
+  double lo = 0;  ///< seconds: apart at all times before lo
+  double hi = 0;  ///< seconds: touching or penetrating at hi (contact only). hi - lo is at most
+                  ///< 1e-12 (1 s + hi), and more only where the bodies close in so slowly that the
+                  ///< rounding of a turned pose (PairAtTime::error()) hides the time
+  Vec3 normal = Vec3::UnitY();  ///< unit, from A to B; of the last plane found to part them
+  std::uint32_t queries = 0;    ///< narrow-phase queries made
+};
+
+/// The first time in [0, horizon] at which A and B touch; horizon >= 0, finite (seconds). `cache`
+/// as for decide(), of the bodies at time 0.
+TimeOfImpact timeOfImpact(const MovingBody& a, const MovingBody& b, double horizon,
+                          FeatureCache& cache);
 
 }  // namespace enfilade::collision

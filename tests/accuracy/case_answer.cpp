@@ -6,7 +6,9 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "collision/continuous.hpp"
 #include "collision/hull.hpp"
+#include "collision/time_of_impact.hpp"
 #include "tests/accuracy/mesh_brute_force.hpp"
 
 namespace enfilade::accuracy {
@@ -77,6 +79,19 @@ void answerAtRefine(const ConvexBody& a, const ConvexBody& b, Warmth& warmth, An
   answer.errorBound = 1e-12 * refined.penetration;
 }
 
+/// The bound that |vel|, |acc| and the distance alone allow, and the interval of the first contact;
+/// where that is not proved, from the last time proved to be before it to the end of the file's
+/// view.
+void answerCourse(const Course& course, const ConvexBody& a, const ConvexBody& b, Answer& answer) {
+  FeatureCache cache;
+  const double apart = refine(a, b, cache).distance * (1 - 1e-15);
+  const double up = 1 + 0x1p-50;
+  answer.tc = timeToContact(apart, {course.velocity.norm() * up, course.acceleration.norm() * up});
+  const MovingBody moving{a, {course.velocity, course.acceleration, Vec3::Zero()}};
+  const TimeOfImpact impact = timeOfImpact(moving, {b, {}}, kLastTime, cache);
+  if (impact.impact != Impact::none) answer.toi = {impact.lo, impact.hi};
+}
+
 void answerPair(const Case& asked, Level level, Warmth& warmth, Answer& answer) {
   const Hull hullA = buildHull(asked.a.points);
   const Hull hullB = buildHull(asked.b.points);
@@ -88,6 +103,7 @@ void answerPair(const Case& asked, Level level, Warmth& warmth, Answer& answer) 
     FeatureCache cache = warmth.features;
     answer.near = isNearerThan(a, b, 2 * *asked.clearance, cache);
   }
+  if (asked.course) answerCourse(*asked.course, a, b, answer);
   if (level == Level::decide)
     answerAtDecide(a, b, warmth, answer);
   else
