@@ -1,6 +1,9 @@
-// Narrow phase: the verdict on two convex polytopes, and how far apart they are.
+// Narrow phase, level `Decide`: the exact verdict on two convex polytopes, their distance in
+// doubles with a proved bound, and witness points. What the tick uses. (Level `Refine`:
+// refine.hpp.)
 #pragma once
 
+#include <array>
 #include <limits>
 #include <optional>
 #include <span>
@@ -9,47 +12,64 @@
 
 namespace enfilade::collision {
 
+struct Hull;
+
+/// As closed sets. Touching: they share a point, and an arbitrarily small translation parts them.
 enum class Verdict : std::uint8_t { separated, touching, penetrating };
 enum class DecidedBy : std::uint8_t {
-  filter,   ///< doubles with a proved rounding bound
-  rational  ///< exact arithmetic
+  filter,     ///< rounded arithmetic with a proved bound
+  expansion,  ///< exact sums of doubles
+  rational    ///< exact integers of any length
 };
 
-/// What is known of two closed convex bodies A and B. The verdict is exact for the vertices given;
-/// the other fields hold as said.
+/// A convex body for one query: the hull of `vertices` (body's frame, metres; at least one, all
+/// finite), placed at rotation * vertex + translation. The doubles are taken as they are: where a
+/// rotation is orthonormal only to rounding, the body is the very slightly sheared one.
+struct ConvexBody {
+  std::span<const Vec3> vertices;
+  Vec3 translation = Vec3::Zero();
+  const Mat3* rotation = nullptr;  ///< worldFromBody; null: none
+  const Hull* hull = nullptr;      ///< of exactly these vertices; null: every vertex is looked at
+};
+
+/// A vertex of A and a vertex of B: their difference is a point of the Minkowski difference B - A.
+struct VertexPair {
+  std::uint32_t a = 0, b = 0;
+  bool operator==(const VertexPair&) const = default;
+};
+
+/// The features that decided the same two bodies last time, given back to start from. Any value
+/// is right, a good one makes the query cost O(1).
+struct FeatureCache {
+  std::array<VertexPair, 4> pairs{};  ///< 1: vertices; 2, 3: their combinations up to two edges or
+  int size = 0;                       ///< a vertex and a face; 4: they penetrate; 0: nothing known
+  Vec3 axis = Vec3::Zero();           ///< from A to B, any length; zero: none yet
+};
+
+/// What is known of two closed convex bodies A and B. The verdict is exact.
 struct Decision {
   Verdict verdict = Verdict::separated;
   DecidedBy decidedBy = DecidedBy::filter;
   double distance = 0;          ///< metres, >= 0; 0 unless separated
-  double errorBound = 0;        ///< metres: the true distance lies within distance +- errorBound
-  double penetration = 0;       ///< metres: an upper bound of the depth; 0 unless penetrating
-  Vec3 pointA = Vec3::Zero();   ///< witness points, world. Separated: closest points.
-  Vec3 pointB = Vec3::Zero();   ///< Touching, penetrating: a common point, up to rounding.
-  Vec3 normal = Vec3::UnitY();  ///< unit, from A to B; separated only, else the least-overlap axis
-};
-
-/// A convex body for one query: the hull of `vertices`, moved by `translation`. Rotations are
-/// already applied. At least one vertex, all finite.
-struct ConvexBody {
-  std::span<const Vec3> vertices;
-  Vec3 translation = Vec3::Zero();
-};
-
-/// Last tick's answer for the same pair, given back to start from. Any value is right.
-struct SeparationCache {
-  Vec3 axis = Vec3::Zero();  ///< from A to B, any length; zero: none yet
+  double errorBound = 0;        ///< metres: the true distance lies within distance +- errorBound;
+                                ///< at most 16 units of rounding (2^-53) of the largest coordinate
+                                ///< after the translations are subtracted
+  Vec3 pointA = Vec3::Zero();   ///< world, up to rounding. Separated: closest points of A and B.
+  Vec3 pointB = Vec3::Zero();   ///< Touching, penetrating: a common point.
+  Vec3 normal = Vec3::UnitY();  ///< unit, from A to B. Separated: along the closest points;
+                                ///< touching: of a plane that parts them; penetrating: none (Y)
 };
 
 /// The verdict and, when separated, the closest points.
-Decision decide(const ConvexBody& a, const ConvexBody& b, SeparationCache& cache);
+Decision decide(const ConvexBody& a, const ConvexBody& b, FeatureCache& cache);
 
 /// As decide(), but gives up as soon as the distance is proved greater than `limit` (metres):
 /// nullopt then.
 std::optional<Decision> decideWithin(const ConvexBody& a, const ConvexBody& b, double limit,
-                                     SeparationCache& cache);
+                                     FeatureCache& cache);
 
 /// A proved lower bound (metres) of the distance of A and B, by the cached axis alone; negative or
-/// minus infinity when the axis proves nothing. Costs two passes over the vertices.
-double provedSeparation(const ConvexBody& a, const ConvexBody& b, const SeparationCache& cache);
+/// minus infinity when the axis proves nothing. Costs two supports.
+double provedSeparation(const ConvexBody& a, const ConvexBody& b, const FeatureCache& cache);
 
 }  // namespace enfilade::collision

@@ -3,6 +3,7 @@
 // the last tick.
 #include <algorithm>
 
+#include "collision/penetration_depth.hpp"
 #include "scene/world_state.hpp"
 
 namespace enfilade::scene {
@@ -23,11 +24,17 @@ ContactEvent eventOf(const WorldState& world, ContactEvent::Kind kind, const Ava
   return event;
 }
 
-/// Penetrating before touching before separated, then by depth or distance.
+/// Penetrating before touching before separated, then by distance.
 bool nearer(const Decision& a, const Decision& b) {
-  if (a.verdict != b.verdict) return a.verdict > b.verdict;
-  return a.verdict == Verdict::penetrating ? a.penetration > b.penetration
-                                           : a.distance < b.distance;
+  return a.verdict != b.verdict ? a.verdict > b.verdict : a.distance < b.distance;
+}
+
+double depthOf(const Avatar& avatar, const Obstacle& obstacle, const Decision& decision) {
+  if (decision.verdict != Verdict::penetrating) return 0;
+  collision::DepthCache none;  // avatars do not penetrate, so there is nothing to be coherent with
+  return collision::penetrationDepth({avatar.hull->vertices, avatar.feet}, obstacle.body,
+                                     obstacle.cache, none)
+      .depth;
 }
 
 std::optional<Decision> decideCounted(const Avatar& avatar, Obstacle& obstacle, double limit,
@@ -54,6 +61,8 @@ std::vector<Contact> nearOnes(Avatar& avatar, double limit, QueryCount& count) {
     } else if (nearer(*decision, found.back().decision)) {
       found.back().decision = *decision;
     }
+    double& penetration = found.back().penetration;
+    penetration = std::max(penetration, depthOf(avatar, obstacle, *decision));
   }
   return found;
 }
@@ -122,7 +131,7 @@ void findContacts(WorldState& world, TickReport& report, QueryCount& count) {
     if (!avatar.resting) updateContacts(world, avatar, report, count);
     for (const Contact& contact : avatar.contacts) {
       if (contact.touching) ++report.liveContacts;
-      report.worstPenetration = std::max(report.worstPenetration, contact.decision.penetration);
+      report.worstPenetration = std::max(report.worstPenetration, contact.penetration);
     }
   }
 }

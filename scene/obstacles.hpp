@@ -18,7 +18,7 @@ struct Obstacle {
   std::uint32_t part = 0;  ///< triangle of a still object; 0 for an avatar
   Box box;                 ///< world, metres
   collision::ConvexBody body;
-  collision::SeparationCache cache;
+  collision::FeatureCache cache;
 };
 
 /// Narrow-phase work done, for the tick's counters.

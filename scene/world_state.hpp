@@ -20,6 +20,7 @@ struct Contact {
   EntityId other = 0;
   bool touching = false;  ///< closer than 2 epsilon; else a near miss that was told
   collision::Decision decision;
+  double penetration = 0;  ///< metres; the depth, or an upper bound of it
 };
 
 /// How a walk goes: measured as the shortest distance to its way point so far.

@@ -2,8 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "collision/exact_verdict.hpp"
+#include "collision/penetration_depth.hpp"
 #include "tests/collision/random_shapes.hpp"
+#include "tests/collision/rational_verdict.hpp"
 
 namespace enfilade::collision {
 namespace {
@@ -14,7 +15,7 @@ const std::vector<Vec3> kUnitCube{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
                                   {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
 
 Decision decideCold(const ConvexBody& a, const ConvexBody& b) {
-  SeparationCache cache;
+  FeatureCache cache;
   return decide(a, b, cache);
 }
 
@@ -97,10 +98,15 @@ TEST(NarrowPhase, OneUlpDecides) {
   EXPECT_EQ(verdictAt(before), Verdict::penetrating);
 }
 
-TEST(NarrowPhase, DeepOverlapIsPenetratingWithADepthBound) {
-  const Decision d = decideCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {0.75, 0.1, 0.05}});
-  EXPECT_EQ(d.verdict, Verdict::penetrating);
-  EXPECT_NEAR(d.penetration, 0.25, 1e-12);
+TEST(NarrowPhase, DeepOverlapIsPenetratingByTheLeastDepth) {
+  const ConvexBody a{kUnitCube, Vec3::Zero()}, b{kUnitCube, {0.75, 0.1, 0.05}};
+  FeatureCache cache;
+  EXPECT_EQ(decide(a, b, cache).verdict, Verdict::penetrating);
+  DepthCache none;
+  const Depth depth = penetrationDepth(a, b, cache, none);
+  EXPECT_TRUE(depth.global);
+  EXPECT_NEAR(depth.depth, 0.25, 1e-15);
+  EXPECT_TRUE(depth.normal.isApprox(Vec3::UnitX(), 1e-15));
 }
 
 TEST(NarrowPhase, OverlappingPolygonsInOnePlaneOnlyTouch) {
@@ -126,7 +132,7 @@ TEST(NarrowPhase, FarFromTheOriginNothingIsLost) {
 }
 
 TEST(NarrowPhase, GivesUpAsSoonAsTheLimitIsProved) {
-  SeparationCache cache;
+  FeatureCache cache;
   EXPECT_FALSE(decideWithin({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}}, 1.5, cache));
   EXPECT_TRUE(decideWithin({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}}, 2.5, cache));
   EXPECT_GT(provedSeparation({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}}, cache), 1.5);
@@ -162,9 +168,9 @@ TEST(NarrowPhase, VerdictsOnALatticeEqualExactArithmeticWhicheverWayTheyWereDeci
     const std::vector<Vec3> a = latticePoints(random, 1 + static_cast<int>(random() % 6), 2);
     const std::vector<Vec3> b = latticePoints(random, 1 + static_cast<int>(random() % 6), 2);
     const Vec3 at = latticePoints(random, 1, 2)[0];
-    const Verdict exact = exactVerdict({a, at}, {b, Vec3::Zero()});
+    const Verdict exact = rationalVerdict({a, at}, {b, Vec3::Zero()});
     EXPECT_EQ(decideCold({a, at}, {b, Vec3::Zero()}).verdict, exact) << "case " << i;
-    EXPECT_EQ(exactVerdict({b, Vec3::Zero()}, {a, at}), exact) << "case " << i;
+    EXPECT_EQ(rationalVerdict({b, Vec3::Zero()}, {a, at}), exact) << "case " << i;
     ++seen[static_cast<std::size_t>(exact)];
   }
   for (const int count : seen) EXPECT_GT(count, 60);
@@ -180,7 +186,7 @@ TEST(NarrowPhase, TinyAndHugeBodiesAreDecidedExactlyThoughDoublesUnderAndOverflo
     for (Vec3& p : a) p *= scale;
     for (Vec3& p : b) p *= i % 2 == 0 ? scale : scale / 3;
     const ConvexBody bodyA{a, scale * at}, bodyB{b};
-    const Verdict exact = exactVerdict(bodyA, bodyB);
+    const Verdict exact = rationalVerdict(bodyA, bodyB);
     EXPECT_EQ(decideCold(bodyA, bodyB).verdict, exact) << "case " << i;
     ++seen[static_cast<std::size_t>(exact)];
   }
@@ -226,7 +232,7 @@ TEST(NarrowPhase, AWarmStartChangesTheWorkAndNotTheAnswer) {
   Random random(5);
   const std::vector<Vec3> a = randomPoints(random, 20, 1);
   const std::vector<Vec3> b = randomPoints(random, 20, 1);
-  SeparationCache cache;
+  FeatureCache cache;
   for (int step = 0; step < 400; ++step) {
     const Vec3 at{4.0 - 0.02 * step, 0.3, 0.2};
     const Decision warm = decide({a, at}, {b, Vec3::Zero()}, cache);

@@ -7,14 +7,14 @@
 //     interior if and only if the cone of the directions {b - p} and {p - a} is all of space. If it
 //     is not, and the directions span space, a plane through two of them supports the cone: every
 //     pair is tried.
-#include "collision/exact_verdict.hpp"
+#include "tests/collision/rational_verdict.hpp"
 
 #include <gmpxx.h>
 
 #include <array>
 #include <vector>
 
-namespace enfilade::collision {
+namespace enfilade::collision::testing {
 namespace {
 
 using Rational = mpq_class;
@@ -169,7 +169,7 @@ bool spanAllOfSpace(const std::vector<Point>& directions) {
 
 }  // namespace
 
-Verdict exactVerdict(const ConvexBody& bodyA, const ConvexBody& bodyB) {
+Verdict rationalVerdict(const ConvexBody& bodyA, const ConvexBody& bodyB) {
   const std::vector<Point> a = worldPoints(bodyA);
   const std::vector<Point> b = worldPoints(bodyB);
   Nearest nearest = nearestOf({Support{b.front() - a.front(), a.front()}});
@@ -190,4 +190,4 @@ Verdict exactVerdict(const ConvexBody& bodyA, const ConvexBody& bodyB) {
   return spanAllOfSpace(directions) ? Verdict::penetrating : Verdict::touching;
 }
 
-}  // namespace enfilade::collision
+}  // namespace enfilade::collision::testing

@@ -1,0 +1,68 @@
+// The verdict comes from decide(), with how it was found; the numbers come from exact integers,
+// rounded once at the end. Distances are those of the exact closest features, depths those of the
+// nearest facet of the Minkowski difference.
+#include "collision/refine.hpp"
+
+#include "collision/exact_answer.hpp"
+#include "collision/exact_depth.hpp"
+
+namespace enfilade::collision {
+namespace {
+
+void describePenetration(const ConvexBody& a, const ConvexBody& b, Refinement& refinement) {
+  const ExactFacet facet = nearestFacetExactly(a, b);
+  const mpf_class squared = precise(dot(facet.normal, facet.normal));
+  const mpf_class offset = precise(facet.offset);
+  refinement.penetration = toDouble(mpf_class(offset / sqrt(squared)), facet.scale);
+  const std::array<const Integer*, 3> normal{&facet.normal.x, &facet.normal.y, &facet.normal.z};
+  for (int i = 0; i < 3; ++i) {
+    const mpf_class way = -precise(*normal[i]) * offset / squared;
+    roundInTwo(way, facet.scale, refinement.closest[i], refinement.closestTail[i]);
+  }
+}
+
+/// |sum of weight * w / total| * 2^scale < limit, in integers.
+bool isNearerExactly(ExactDifference& difference, const ExactNearest& nearest, double limit) {
+  const ExactPoint sum = weightedSum(difference, nearest);
+  int exponent = 0;
+  Integer mantissa(std::ldexp(std::frexp(limit, &exponent), 53));
+  const int shift = exponent - 53 - difference.scale();
+  Integer bound = mantissa * nearest.face.total;
+  Integer squared = dot(sum, sum);
+  if (shift >= 0) {
+    bound <<= static_cast<unsigned>(shift);
+  } else {
+    squared <<= static_cast<unsigned>(-2 * shift);
+  }
+  return squared < bound * bound;
+}
+
+}  // namespace
+
+Refinement refine(const ConvexBody& a, const ConvexBody& b, FeatureCache& cache) {
+  Refinement refinement;
+  refinement.decidedBy = decide(a, b, cache).decidedBy;
+  ExactDifference difference(a, b);
+  const ExactAnswer exact = solveExactly(difference, cache);
+  refinement.verdict = exact.verdict;
+  refinement.distance = exact.distance;
+  refinement.closest = exact.closest;
+  refinement.closestTail = exact.closestTail;
+  refinement.pointA = exact.pointA;
+  refinement.pointB = exact.pointB;
+  if (exact.verdict == Verdict::penetrating) describePenetration(a, b, refinement);
+  return refinement;
+}
+
+bool isNearerThan(const ConvexBody& a, const ConvexBody& b, double limit, FeatureCache& cache) {
+  if (!(limit > 0)) return false;
+  const Decision decision = decide(a, b, cache);
+  if (decision.verdict != Verdict::separated) return true;
+  // The difference rounds by less than a unit of the limit.
+  const double margin = decision.errorBound + 4 * kUnit * limit;
+  if (std::abs(decision.distance - limit) > margin) return decision.distance < limit;
+  ExactDifference difference(a, b);
+  return isNearerExactly(difference, nearestExactly(difference, cache), limit);
+}
+
+}  // namespace enfilade::collision
