@@ -10,26 +10,25 @@
 
 namespace enfilade::collision {
 
-void MoverLists::setBox(std::uint32_t mover, const Box& box) {
-  if (mover >= boxes_.size()) {
-    boxes_.resize(mover + 1);
-    marked_.resize(mover + 1, 0);
-    for (auto& position : position_) position.resize(2 * std::size_t{mover} + 2, 0);
-  }
-  boxes_[mover] = box;
+void MoverLists::makeRoomFor(std::uint32_t mover) {
+  boxes_.resize(mover + std::size_t{1});
+  positions_.resize(mover + std::size_t{1});
+  marked_.resize(mover + std::size_t{1}, 0);
 }
 
-void MoverLists::renumber(int axis) {
-  const auto a = static_cast<std::size_t>(axis);
-  for (std::uint32_t k = 0; k < ends_[a].size(); ++k) position_[a][ends_[a][k].tag] = k;
+void MoverLists::renumber(std::size_t axis) {
+  const Ends& ends = ends_[axis];
+  for (std::uint32_t k = 1; k + 1 < ends.size(); ++k) positionOf(axis, ends[k].tag) = k;
 }
 
 void MoverLists::remove(std::span<const std::uint32_t> movers) {
   if (movers.empty()) return;
   for (const std::uint32_t mover : movers) marked_[mover] = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::erase_if(ends_[static_cast<std::size_t>(axis)],
-                  [this](const End& end) { return marked_[end.mover()] != 0; });
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Ends& ends = ends_[axis];
+    ends.erase(std::remove_if(ends.begin() + 1, ends.end() - 1,
+                              [this](const End& end) { return marked_[end.mover()] != 0; }),
+               ends.end() - 1);
     renumber(axis);
   }
   for (const std::uint32_t mover : movers) marked_[mover] = 0;
@@ -51,55 +50,68 @@ void MoverLists::exchanged(const End& moving, const End& other, bool up,
   if (overlaps(boxes_[a], boxes_[b]) == opens) changes.push_back({a, b, opens});
 }
 
-void MoverLists::bubble(int axis, End end, std::vector<MoverChange>& changes) {
-  std::vector<End>& ends = ends_[static_cast<std::size_t>(axis)];
-  std::vector<std::uint32_t>& position = position_[static_cast<std::size_t>(axis)];
-  std::uint32_t at = position[end.tag];
+void MoverLists::bubble(std::size_t axis, End end, std::vector<MoverChange>& changes) {
+  End* const ends = ends_[axis].data();
+  std::uint32_t at = positionOf(axis, end.tag);
   const std::uint32_t from = at;
-  while (at + 1 < ends.size() && before(ends[at + 1], end)) {
+  for (; before(ends[at + 1], end); ++at) {
     exchanged(end, ends[at + 1], true, changes);
     ends[at] = ends[at + 1];
-    position[ends[at].tag] = at;
-    ++at;
+    positionOf(axis, ends[at].tag) = at;
   }
-  while (at <= from && at > 0 && before(end, ends[at - 1])) {
+  for (; at <= from && before(end, ends[at - 1]); --at) {
     exchanged(end, ends[at - 1], false, changes);
     ends[at] = ends[at - 1];
-    position[ends[at].tag] = at;
-    --at;
+    positionOf(axis, ends[at].tag) = at;
   }
   ends[at] = end;
-  position[end.tag] = at;
+  positionOf(axis, end.tag) = at;
+}
+
+/// The end that leads goes first, so that a mover's two ends never pass one another.
+void MoverLists::repair(std::size_t axis, End lower, End upper, std::vector<MoverChange>& changes) {
+  if (upper.at >= ends_[axis][positionOf(axis, upper.tag)].at) {
+    bubble(axis, upper, changes);
+    bubble(axis, lower, changes);
+  } else {
+    bubble(axis, lower, changes);
+    bubble(axis, upper, changes);
+  }
 }
 
 void MoverLists::move(std::uint32_t mover, std::vector<MoverChange>& changes) {
   const Box& box = boxes_[mover];
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto a = static_cast<std::size_t>(axis);
-    const End lower{box.min[axis], 2 * mover};
-    const End upper{box.max[axis], 2 * mover + 1};
-    // The end that leads goes first, so that a mover's two ends never pass one another.
-    if (upper.at >= ends_[a][position_[a][upper.tag]].at) {
-      bubble(axis, upper, changes);
-      bubble(axis, lower, changes);
+  const std::array<std::uint32_t, 6> position = positions_[mover];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double low = box.min[static_cast<int>(axis)], high = box.max[static_cast<int>(axis)];
+    End* const lower = &ends_[axis][position[2 * axis]];
+    End* const upper = &ends_[axis][position[2 * axis + 1]];
+    if (lower->at == low && upper->at == high) continue;
+    // Mostly neither end meets another; ties are left to repair().
+    if (lower[-1].at < low && low < lower[1].at && upper[-1].at < high && high < upper[1].at) {
+      lower->at = low;
+      upper->at = high;
     } else {
-      bubble(axis, lower, changes);
-      bubble(axis, upper, changes);
+      repair(axis, {low, 2 * mover}, {high, 2 * mover + 1}, changes);
     }
   }
 }
 
 void MoverLists::insert(std::span<const std::uint32_t> movers, std::vector<MoverChange>& changes) {
   if (movers.empty()) return;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<End>& ends = ends_[static_cast<std::size_t>(axis)];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const int a = static_cast<int>(axis);
+    Ends& ends = ends_[axis];
+    const End last = ends.back();
+    ends.pop_back();
     const auto old = static_cast<std::ptrdiff_t>(ends.size());
     for (const std::uint32_t mover : movers) {
-      ends.push_back({boxes_[mover].min[axis], 2 * mover});
-      ends.push_back({boxes_[mover].max[axis], 2 * mover + 1});
+      ends.push_back({boxes_[mover].min[a], 2 * mover});
+      ends.push_back({boxes_[mover].max[a], 2 * mover + 1});
     }
     std::stable_sort(ends.begin() + old, ends.end(), before);
     std::inplace_merge(ends.begin(), ends.begin() + old, ends.end(), before);
+    ends.push_back(last);
     renumber(axis);
   }
   sweep(movers, changes);
@@ -108,7 +120,8 @@ void MoverLists::insert(std::span<const std::uint32_t> movers, std::vector<Mover
 /// One sweep over the x list; pairs of two old movers are known already.
 void MoverLists::sweep(std::span<const std::uint32_t> fresh, std::vector<MoverChange>& changes) {
   for (const std::uint32_t mover : fresh) marked_[mover] = 1;
-  for (const End& end : ends_[0]) {
+  for (std::size_t k = 1; k + 1 < ends_[0].size(); ++k) {
+    const End& end = ends_[0][k];
     const std::uint32_t mover = end.mover();
     std::vector<std::uint32_t>& own = open_[marked_[mover]];
     if (end.upper()) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -20,8 +21,13 @@ struct MoverChange {
 /// that closed intervals which touch are in the order of intervals which overlap.
 class MoverLists {
  public:
+  static constexpr std::uint32_t kMostMovers = 0x7fffffff;  ///< ids are below
+
   /// Boxes of all movers of an update are set first; then the lists are changed.
-  void setBox(std::uint32_t mover, const Box& box);
+  void setBox(std::uint32_t mover, const Box& box) {
+    if (mover >= boxes_.size()) makeRoomFor(mover);
+    boxes_[mover] = box;
+  }
 
   /// Takes movers out of the lists; tells nothing.
   void remove(std::span<const std::uint32_t> movers);
@@ -44,18 +50,30 @@ class MoverLists {
   static bool before(const End& a, const End& b) {
     return a.at != b.at ? a.at < b.at : a.upper() < b.upper();
   }
+  /// Before and after the ends of movers stand one at -infinity and one at +infinity, so that no
+  /// end has to ask whether it has a neighbour.
+  using Ends = std::vector<End>;
+  static Ends noEnds() {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    return {{-kInfinity, 0}, {kInfinity, 1}};
+  }
 
-  void bubble(int axis, End end, std::vector<MoverChange>& changes);
+  void makeRoomFor(std::uint32_t mover);
+  void repair(std::size_t axis, End lower, End upper, std::vector<MoverChange>& changes);
+  void bubble(std::size_t axis, End end, std::vector<MoverChange>& changes);
   void exchanged(const End& moving, const End& other, bool up, std::vector<MoverChange>& changes);
-  void renumber(int axis);
+  void renumber(std::size_t axis);
   void sweep(std::span<const std::uint32_t> fresh, std::vector<MoverChange>& changes);
   void confirm(std::uint32_t a, std::uint32_t b, std::vector<MoverChange>& changes);
+  std::uint32_t& positionOf(std::size_t axis, std::uint32_t tag) {
+    return positions_[tag >> 1][2 * axis + (tag & 1)];
+  }
 
-  std::vector<Box> boxes_;                              ///< by mover
-  std::array<std::vector<End>, 3> ends_;                ///< by axis
-  std::array<std::vector<std::uint32_t>, 3> position_;  ///< by axis and tag: index into ends_
-  std::vector<std::uint8_t> marked_;                    ///< by mover: removed, or fresh
-  std::array<std::vector<std::uint32_t>, 2> open_;      ///< sweep: open movers, old and fresh
+  std::vector<Box> boxes_;  ///< by mover
+  std::array<Ends, 3> ends_{noEnds(), noEnds(), noEnds()};
+  std::vector<std::array<std::uint32_t, 6>> positions_;  ///< by mover: of its ends in the lists
+  std::vector<std::uint8_t> marked_;                     ///< by mover: removed, or fresh
+  std::array<std::vector<std::uint32_t>, 2> open_;       ///< sweep: open movers, old and fresh
 };
 
 }  // namespace enfilade::collision

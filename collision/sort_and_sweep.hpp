@@ -10,7 +10,7 @@
 
 namespace enfilade::collision {
 
-using StillId = std::uint32_t;  ///< index into the still boxes given at construction
+using StillId = std::uint32_t;  ///< index into the boxes given at construction, or by insertStill()
 using MoverId = std::uint32_t;  ///< by insert(); reused after remove() and update()
 
 /// A moving box and a still one, or two moving ones (then `mover` < `other`).
@@ -26,11 +26,13 @@ struct BoxPair {
 struct SweepCounters {
   std::uint64_t exchanges = 0;    ///< end points that passed one another, on all axes
   std::uint64_t cellEntries = 0;  ///< times a mover entered a cell and its lists were joined
+  std::uint64_t stillEdits = 0;   ///< still boxes that came or went
+  std::uint64_t rebuilds = 0;     ///< 1 if the cells of all still boxes were built anew
   std::uint64_t boxTests = 0;     ///< full box tests made because of an exchange or an entry
 };
 
 /// Keeps the set of overlapping pairs of closed boxes, exactly: after update() it equals what brute
-/// force over all boxes finds. Still boxes never change; still-still pairs never exist.
+/// force over all boxes finds. Still-still pairs never exist.
 class SortAndSweep {
  public:
   /// `stillBoxes` are finite and not empty; throws std::invalid_argument naming the index if not.
@@ -44,6 +46,13 @@ class SortAndSweep {
   MoverId insert(const Box& box);
   void move(MoverId mover, const Box& box);
   void remove(MoverId mover);
+
+  /// Still boxes come and go between updates as well, and the pairs follow at the next update(). An
+  /// id is free for the next box only after the update that tells the end of its pairs. Cheap while
+  /// there are few at a time: after as many edits as half of the boxes all cells are built anew.
+  /// removeStill() throws std::invalid_argument if there is no such box.
+  StillId insertStill(const Box& box);
+  void removeStill(StillId still);
 
   /// Repairs the sorted lists and applies the status changes.
   void update();
@@ -63,10 +72,12 @@ class SortAndSweep {
   };
   std::span<const Partner> partners(MoverId mover) const;
   /// The still boxes that overlap a box which is no mover, ascending: for questions asked once, as
-  /// whether there is room. Costs what stands in the cells of the box.
+  /// whether there is room. Costs what stands in the cells of the box. As of the last update().
   std::vector<StillId> stillOverlapping(const Box& box) const;
 
   std::size_t pairCount() const;
+  std::size_t stillCount() const;              ///< as of the last update()
+  std::size_t bytesBesidesStillBoxes() const;  ///< memory of the still side, less 48 bytes a box
   const SweepCounters& counters() const;
 
  private:

@@ -1,146 +1,134 @@
-// The still boxes, binned into cells, with the sorted end points of each cell. Immutable once
-// built.
+// The still boxes, binned into cells, with the sorted end points of each cell. Built at once; then
+// boxes come and go one by one, and only the cells that they lie in are touched.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "collision/cell_grid.hpp"
 #include "collision/types.hpp"
 
 namespace enfilade::collision {
 
-/// A closed interval has two ends and space three axes: six half-axes, +x +y +z -x -y -z. On each a
-/// mover has a reach (how far its box goes: max, or -min) and a still box has an onset (from which
-/// reach on it is met: min, or -max). Boxes overlap exactly if every onset <= the reach beside it.
-using HalfAxes = std::array<double, 6>;
-
-inline HalfAxes reachOf(const Box& box) {
-  return {box.max.x(), box.max.y(), box.max.z(), -box.min.x(), -box.min.y(), -box.min.z()};
-}
-inline HalfAxes onsetOf(const Box& box) {
-  return {box.min.x(), box.min.y(), box.min.z(), -box.max.x(), -box.max.y(), -box.max.z()};
-}
-inline bool meets(const HalfAxes& onset, const HalfAxes& reach) {
-  bool met = true;
-  for (std::size_t k = 0; k < 6; ++k) met &= onset[k] <= reach[k];
-  return met;
-}
-
-/// Cells from `low` to `high`, both included, on one level.
-struct CellRange {
-  std::array<std::int32_t, 3> low{0, 0, 0};
-  std::array<std::int32_t, 3> high{-1, -1, -1};
-
-  bool contains(const std::array<std::int32_t, 3>& at) const {
-    return low[0] <= at[0] && at[0] <= high[0] && low[1] <= at[1] && at[1] <= high[1] &&
-           low[2] <= at[2] && at[2] <= high[2];
-  }
-  double count() const {
-    return (high[0] - low[0] + 1.0) * (high[1] - low[1] + 1.0) * (high[2] - low[2] + 1.0);
-  }
-  bool operator==(const CellRange&) const = default;
-};
-
 class StillCells {
  public:
-  using Row =
-      std::uint32_t;  ///< a still box in our own order: by cell, so that neighbours are near
-  using Cell = std::uint32_t;  ///< index of a cell that holds at least one box
+  /// A still box in our own order: those of the build by cell, so that neighbours are near.
+  using Row = std::uint32_t;
+  using Cell = std::uint32_t;  ///< index of a cell that holds at least one box, or held one once
   static constexpr Cell kNoCell = static_cast<Cell>(-1);
+  static constexpr Row kNoRow = static_cast<Row>(-1);
 
-  explicit StillCells(std::span<const Box> boxes);
+  /// `ids` beside `boxes`; boxes are finite and not empty. Throws std::length_error above 2^32 - 2
+  /// boxes or 2^32 - 2 cells; entries (a box in a cell) are limited by memory alone.
+  StillCells(std::span<const Box> boxes, std::span<const std::uint32_t> ids);
 
   const HalfAxes& onset(Row row) const { return onsets_[row]; }
-  std::uint32_t idOf(Row row) const { return ids_[row]; }  ///< index into the boxes given
+  std::uint32_t idOf(Row row) const { return ids_[row]; }
 
   /// Rows of a cell, ascending by their onset on half-axis `k`, ties by row.
   std::span<const Row> sorted(Cell cell, std::size_t k) const {
     const CellData& c = cells_[cell];
-    return {sorted_.data() + 6 * std::size_t{c.first} + k * c.count, c.count};
+    return {c.rows + k * c.room, c.count};
   }
-  std::uint32_t sizeOf(Cell cell) const { return cells_[cell].count; }
   std::size_t levelOf(Cell cell) const { return cells_[cell].level; }
-  const std::array<std::int32_t, 3>& placeOf(Cell cell) const { return cells_[cell].at; }
+  const CellPlace& placeOf(Cell cell) const { return cells_[cell].at; }
+  const CellGrid& grid() const { return grid_; }
 
-  std::size_t levelCount() const { return levels_.size(); }
-  /// The cells of a level are cellsBegin(level) .. cellsBegin(level + 1) - 1.
-  Cell cellsBegin(std::size_t level) const;
-  Cell find(std::size_t level, const std::array<std::int32_t, 3>& at) const;
+  /// Levels that have a cell, ascending.
+  std::span<const std::size_t> levels() const { return usedLevels_; }
+  std::span<const Cell> cellsOf(std::size_t level) const { return cellsOfLevel_[level]; }
+  Cell find(std::size_t level, const CellPlace& at) const;
 
   /// Calls `visit` with each cell of a level that lies in `range` and not in `except`.
   template <typename Visit>
   void forEachCell(std::size_t level, const CellRange& range, const CellRange& except,
                    Visit&& visit) const;
 
-  /// The cells of a level that a box lies in. Boxes that overlap share at least one cell of every
-  /// level, because the cell of a coordinate is a monotone function of it, however rounded.
-  CellRange rangeOf(std::size_t level, const HalfAxes& reach) const;
-  /// Narrows `low` <= reach < `high` to reaches that surely give the same range.
-  void narrowToRange(std::size_t level, const HalfAxes& reach, const CellRange& range,
-                     HalfAxes& low, HalfAxes& high) const;
+  // ---- boxes that come and go ----
 
-  /// Bytes held besides the boxes themselves.
+  /// What edits have touched since clearEdits().
+  struct Edits {
+    std::vector<Cell> cells;  ///< each once, whose lists changed
+    std::vector<Cell> added;  ///< those of them that are new
+    bool levelAdded = false;  ///< a level has its first cell
+    bool any() const { return !cells.empty(); }
+  };
+  const Edits& edits() const { return edits_; }
+  bool edited(Cell cell) const { return cells_[cell].edited; }
+
+  /// Whether `count` more boxes fit; when not, build anew. A build leaves room for half as many
+  /// edits as it took boxes, so that building costs O(log n) an edit in the long run.
+  bool hasRoomFor(std::size_t count) const;
+  void insert(const Box& box, std::uint32_t id);
+  /// Until clearEdits() the row stays, with the same id, and is met by nothing.
+  void remove(Row row);
+  Row rowOf(std::uint32_t id);  ///< kNoRow if there is none; O(1), but O(n) when first asked
+  void clearEdits();
+
+  /// Bytes held besides the boxes themselves. Room that was never touched is not counted.
   std::size_t bytesBesidesBoxes() const;
-  double edge() const { return levels_.empty() ? 0 : levels_.front().edge; }
 
  private:
-  struct Level {
-    double edge = 1;  ///< metres
-    double inverseEdge = 1;
-    Vec3 origin = Vec3::Zero();
-    std::array<std::int32_t, 3> cells{1, 1, 1};  ///< along each axis; the outer ones are endless
-    Cell begin = 0;                              ///< first cell of this level
-  };
   struct CellData {
-    std::array<std::int32_t, 3> at;
-    std::uint32_t level;
-    std::uint32_t first;  ///< entries of the cells before
-    std::uint32_t count;
+    CellPlace at;
+    std::uint16_t level;
+    bool edited;
+    Row* rows;            ///< six lists, `room` apart
+    std::uint32_t count;  ///< of each list
+    std::uint32_t room;
   };
+  struct Entries;  // of the build: which cells each box lies in
 
-  std::int32_t cellOf(const Level& level, int axis, double x) const;
-  std::size_t slotOf(std::size_t level, const std::array<std::int32_t, 3>& at) const;
-  Cell findOrAdd(std::size_t level, const std::array<std::int32_t, 3>& at);
+  std::size_t slotOf(std::size_t level, const CellPlace& at) const;
+  Cell findOrAdd(std::size_t level, const CellPlace& at);
   void rebuildSlots(std::size_t size);
-  void layLevels(std::span<const Box> boxes);
-  std::size_t levelFor(const HalfAxes& reach, CellRange& range) const;
-  void addCells(std::span<const Box> boxes);
-  void dropUnusedLevels();
-  void orderCells();
-  void orderRows(std::span<const Box> boxes);
-  void fillCells();
-  void sortCells();
 
+  Entries enterBoxes(std::span<const Box> boxes);
+  std::vector<Cell> orderCells();
+  void fill(std::span<const Box> boxes, std::span<const std::uint32_t> ids, const Entries& entries);
+  void listLevels();
+
+  void touch(Cell cell);
+  Cell openCell(std::size_t level, const CellPlace& at);
+  void growCell(CellData& cell);
+  void insertIntoCell(Cell cell, Row row);
+  void removeFromCell(Cell cell, Row row);
+
+  CellGrid grid_;
   std::vector<HalfAxes> onsets_;
   std::vector<std::uint32_t> ids_;
-  std::vector<Level> levels_;
   std::vector<CellData> cells_;
   std::vector<Cell> slots_;  ///< open addressing, a power of two; kNoCell where free
-  std::vector<Row> sorted_;  ///< per cell six lists
+  std::vector<std::size_t> usedLevels_;
+  std::vector<std::vector<Cell>> cellsOfLevel_;
+  std::unique_ptr<Row[]> sorted_;  ///< the lists as built, cell after cell
+  std::size_t sortedSize_ = 0;
+
+  std::vector<std::vector<Row>> grown_;  ///< the lists of cells that outgrew their room
+  std::vector<Row> rowOf_;               ///< by id; empty until first asked
+  std::vector<Row> freeRows_, removedRows_;
+  Edits edits_;
+  std::size_t editCount_ = 0, mostEdits_ = 0;
 };
 
 template <typename Visit>
 void StillCells::forEachCell(std::size_t level, const CellRange& range, const CellRange& except,
                              Visit&& visit) const {
-  const Cell begin = cellsBegin(level);
-  const Cell end = cellsBegin(level + 1);
-  if (range.count() > end - begin) {  // larger than the level: all of its cells are fewer
-    for (Cell cell = begin; cell < end; ++cell) {
+  const std::span<const Cell> all = cellsOf(level);
+  if (range.count() > static_cast<double>(all.size())) {  // to look at all of them is less
+    for (const Cell cell : all) {
       if (range.contains(placeOf(cell)) && !except.contains(placeOf(cell))) visit(cell);
     }
     return;
   }
-  for (std::int32_t x = range.low[0]; x <= range.high[0]; ++x) {
-    for (std::int32_t y = range.low[1]; y <= range.high[1]; ++y) {
-      for (std::int32_t z = range.low[2]; z <= range.high[2]; ++z) {
-        if (except.contains({x, y, z})) continue;
-        const Cell cell = find(level, {x, y, z});
-        if (cell != kNoCell) visit(cell);
-      }
-    }
-  }
+  forEachPlace(range, [&](const CellPlace& at) {
+    if (except.contains(at)) return;
+    const Cell cell = find(level, at);
+    if (cell != kNoCell) visit(cell);
+  });
 }
 
 }  // namespace enfilade::collision

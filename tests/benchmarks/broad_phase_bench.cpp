@@ -28,7 +28,6 @@
 #include <vector>
 
 #include "collision/sort_and_sweep.hpp"
-#include "collision/still_cells.hpp"
 
 namespace {
 
@@ -346,9 +345,9 @@ int main(int argc, char** argv) {
   int wrong = 0;
   for (std::size_t objects = 1000; objects <= most; objects *= 10) {
     const Building building = makeBuilding(objects);
-    const StillCells cells(building.still);
     const double bytes =
-        static_cast<double>(cells.bytesBesidesBoxes()) / static_cast<double>(building.still.size());
+        static_cast<double>(SortAndSweep(building.still).bytesBesidesStillBoxes()) /
+        static_cast<double>(building.still.size());
     for (const std::size_t movers : {10u, 100u, 1000u}) {
       wrong += report(building, movers, ticks, bytes);
     }
