@@ -11,6 +11,11 @@ namespace {
 using collision::DecidedBy;
 using collision::Verdict;
 
+void blame(const Case& asked, const char* what, int& counter, Score& score) {
+  ++counter;
+  score.faults.push_back(asked.id + ": " + what);
+}
+
 const char* nameOf(Verdict verdict) {
   if (verdict == Verdict::separated) return "separated";
   return verdict == Verdict::touching ? "touching" : "penetrating";
@@ -53,7 +58,7 @@ bool isSeparated(const Case& asked) {
 
 void scoreVerdict(const Case& asked, const Answer& answer, Score& score) {
   if (asked.truth.verdict == nameOf(answer.verdict)) return;
-  ++score.wrong;
+  blame(asked, "verdict", score.wrong, score);
   const std::string& text = isPenetrating(asked) ? asked.truth.penetration : asked.truth.distance;
   if (text.empty()) return;
   const mpf_class amount = preciseNumber(text);
@@ -72,14 +77,16 @@ void scoreDistance(const Case& asked, const Answer& answer, Level level, Score& 
   const double error = relativeError(answer.distance, truth);
   score.distanceErrors.push_back(error);
   if (level == Level::refine) {
-    if (!(error <= kDistanceError)) ++score.outsideBound;
+    if (!(error <= kDistanceError)) blame(asked, "distance", score.outsideBound, score);
     return;
   }
-  if (!within(answer.distance, truth, answer.errorBound)) ++score.outsideBound;
+  if (!within(answer.distance, truth, answer.errorBound))
+    blame(asked, "distance outside its bound", score.outsideBound, score);
   if (!asked.mesh.empty()) return;
   const Vec3 shift = asked.b.translation - asked.a.translation;
   const double reach = std::max(reachOf(asked.a, Vec3::Zero()), reachOf(asked.b, shift));
-  if (!(answer.errorBound <= kBoundUnits * 0x1p-53 * reach)) ++score.boundTooWide;
+  if (!(answer.errorBound <= kBoundUnits * 0x1p-53 * reach))
+    blame(asked, "error bound too wide", score.boundTooWide, score);
 }
 
 void scoreDepth(const Case& asked, const Answer& answer, Level level, Score& score) {
@@ -94,13 +101,13 @@ void scoreDepth(const Case& asked, const Answer& answer, Level level, Score& sco
   const double error = relativeError(*answer.penetration, truth);
   score.depthErrors.push_back(error);
   if (level == Level::refine) {
-    if (!(error <= kDepthError)) ++score.outsideBound;
+    if (!(error <= kDepthError)) blame(asked, "depth", score.outsideBound, score);
     return;
   }
   const bool inside = answer.depthIsGlobal
                           ? within(*answer.penetration, truth, answer.errorBound)
                           : preciseNumber(*answer.penetration) + answer.errorBound >= truth;
-  if (!inside) ++score.outsideBound;
+  if (!inside) blame(asked, "depth outside its bound", score.outsideBound, score);
 }
 
 bool isFinite(const Vec3& v) {
@@ -128,13 +135,13 @@ void scoreWitnesses(const Case& asked, const Answer& answer, const Meshes& meshe
     const Triangle& triangle = meshes.at(asked.mesh).at(*answer.nearestTriangle);
     b.points.assign(triangle.begin(), triangle.end());
   }
-  if (!witnessesHold(asked, b, answer)) ++score.witnessOff;
+  if (!witnessesHold(asked, b, answer)) blame(asked, "witness points", score.witnessOff, score);
 }
 
 void scoreMesh(const Case& asked, const Answer& answer, Score& score) {
   if (asked.mesh.empty()) return;
   if (answer.penetrated != asked.truth.penetrated || answer.touched != asked.truth.touched)
-    ++score.listsWrong;
+    blame(asked, "lists of triangles", score.listsWrong, score);
 }
 
 void scoreTime(const Case& asked, const Answer& answer, Score& score) {
@@ -147,7 +154,7 @@ void scoreTime(const Case& asked, const Answer& answer, Score& score) {
     right = lo <= (*truth)[1] && hi >= (*truth)[0] && hi - lo <= kTimeWidth * (1 + hi) &&
             *answer.tc <= (*truth)[1];
   }
-  if (!right) ++score.timeWrong;
+  if (!right) blame(asked, "time of impact", score.timeWrong, score);
 }
 
 bool isUsable(const Answer& answer) {
@@ -200,11 +207,12 @@ void addToScore(const Case& asked, const Answer& answer, Level level, const Mesh
                 Score& score) {
   ++score.count;
   if (!isUsable(answer)) {
-    ++score.noAnswer;
+    blame(asked, "no answer", score.noAnswer, score);
     return;
   }
   scoreVerdict(asked, answer, score);
-  if (asked.truth.near && answer.near != asked.truth.near) ++score.nearWrong;
+  if (asked.truth.near && answer.near != asked.truth.near)
+    blame(asked, "near", score.nearWrong, score);
   scoreDistance(asked, answer, level, score);
   scoreDepth(asked, answer, level, score);
   scoreWitnesses(asked, answer, meshes, score);
@@ -216,10 +224,8 @@ void addToScore(const Case& asked, const Answer& answer, Level level, const Mesh
   score.nanoseconds.push_back(answer.nanoseconds);
 }
 
-bool holds(const Score& s) {
-  return s.noAnswer + s.wrong + s.nearWrong + s.outsideBound + s.boundTooWide + s.witnessOff +
-             s.listsWrong + s.timeWrong ==
-         0;
+bool holds(const Score& score) {
+  return score.faults.empty();
 }
 
 void printScores(const std::map<std::string, Score>& scores, std::ostream& out) {

@@ -34,6 +34,7 @@ struct Score {
   int timeWrong = 0;   ///< tc or toi
   int noDepth = 0;     ///< penetrating without a depth
   int upperBounds = 0;
+  std::vector<std::string> faults;  ///< "id: what", of all that must hold
   int filter = 0, expansion = 0, rational = 0;
   std::vector<double> distanceErrors, depthErrors;  ///< relative
   std::vector<double> nanoseconds;
