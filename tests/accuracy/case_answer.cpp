@@ -121,12 +121,12 @@ void refineNearest(const ConvexBody& body, const TriangleTree& tree,
                    const std::vector<Triangle>& mesh, MeshCache& cache, MeshContact& contact) {
   FeatureCache features;
   const Refinement refined = refine(body, bodyOf(mesh[*contact.nearest]), features);
-  if (isAnythingNearer(body, tree, refined.distance * (1 - 1e-15), cache)) {
+  if (isAnythingNearer(body, tree, refined.distance * (1 - 0x1p-51), cache)) {
     contact = bruteForceContact(body, mesh, true);
     return;
   }
   contact.distance = refined.distance;
-  contact.errorBound = 2e-15 * refined.distance;
+  contact.errorBound = 1e-15 * refined.distance;
   contact.pointA = refined.pointA;
   contact.pointB = refined.pointB;
 }

@@ -1,0 +1,347 @@
+#include "tests/accuracy/families.hpp"
+
+#include <cmath>
+
+namespace enfilade::accuracy {
+namespace {
+
+using collision::testing::latticePoints;
+using collision::testing::randomPoint;
+using collision::testing::randomPoints;
+using collision::testing::uniform;
+using Points = std::vector<Vec3>;
+
+int below(Random& random, int count) {
+  return static_cast<int>(random() % static_cast<std::uint64_t>(count));
+}
+
+bool chance(Random& random, double part) {
+  return uniform(random, 0, 1) < part;
+}
+
+/// 10^low .. 10^high, evenly in the exponent.
+double magnitude(Random& random, double low, double high) {
+  const double exponent = uniform(random, low, high);
+  return std::exp(exponent * 2.302585092994046);
+}
+
+Mat3 randomRotation(Random& random) {
+  const Vec3 axis = randomPoint(random, 1);
+  const double angle = uniform(random, 0, 6.28);
+  return Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
+}
+
+/// A rotation by `angle` about a random axis.
+Mat3 smallRotation(Random& random, double angle) {
+  return Eigen::AngleAxisd(angle, randomPoint(random, 1).normalized()).toRotationMatrix();
+}
+
+/// Orthonormal only to about `steps` ulps: the product of many small turns, never made good.
+Mat3 driftedRotation(Random& random, int steps) {
+  Mat3 rotation = randomRotation(random);
+  const Mat3 step = smallRotation(random, 0.1);
+  for (int i = 0; i < steps; ++i) rotation = step * rotation;
+  return rotation;
+}
+
+void placeTogether(Case& pair, const Mat3& rotation, const Vec3& translation) {
+  pair.a.rotation = pair.b.rotation = rotation;
+  pair.a.translation = pair.b.translation = translation;
+}
+
+/// Lattice points on one side of a plane z = 0 that some of them lie in.
+Points latticeSide(Random& random, int count, double side) {
+  Points points = latticePoints(random, count, 3);
+  for (Vec3& p : points) p.z() = side * std::abs(p.z());
+  const int level = 1 + below(random, 4);
+  for (int i = 0; i < level; ++i) points[static_cast<std::size_t>(i)].z() = 0;
+  return points;
+}
+
+Points box(const Vec3& low, const Vec3& high) {
+  Points points;
+  for (int i = 0; i < 8; ++i)
+    points.emplace_back((i & 1) != 0 ? high.x() : low.x(), (i & 2) != 0 ? high.y() : low.y(),
+                        (i & 4) != 0 ? high.z() : low.z());
+  return points;
+}
+
+Points inPlane(Points points) {
+  for (Vec3& p : points) p.z() = 0;
+  return points;
+}
+
+void scalePair(Case& pair, double factor) {
+  for (Placed* body : {&pair.a, &pair.b}) {
+    for (Vec3& p : body->points) p *= factor;
+    body->translation *= factor;
+  }
+}
+
+Case driftedContact(Random& random) {
+  Case pair;
+  pair.a.points = latticeSide(random, 6, -1);
+  pair.b.points = latticeSide(random, 6, 1);
+  placeTogether(pair, driftedRotation(random, 300), randomPoint(random, 5));
+  return pair;
+}
+
+Case sliver(Random& random) {
+  Case pair;
+  pair.a.points = randomPoints(random, 5, 1);
+  const double thickness = magnitude(random, -14, -6);
+  for (Vec3& p : pair.a.points) p.z() *= thickness;
+  pair.b.points = randomPoints(random, 4, 1);
+  if (chance(random, 0.5))
+    for (Vec3& p : pair.b.points) p.z() = 1 + p.z() * thickness;
+  pair.b.translation = {0, 0, -1 + thickness * uniform(random, -2, 2)};
+  const Mat3 rotation = randomRotation(random);
+  pair.b.translation = rotation * pair.b.translation;
+  pair.a.rotation = pair.b.rotation = rotation;
+  return pair;
+}
+
+Case coincidentVertices(Random& random) {
+  Case pair;
+  pair.a.points = randomPoints(random, 5, 1);
+  pair.b.points = randomPoints(random, 4, 1);
+  const int shared = 1 + below(random, 3);
+  for (int i = 0; i < shared; ++i)
+    pair.b.points.push_back(pair.a.points[static_cast<std::size_t>(i)]);
+  pair.a.points.push_back(pair.a.points.front());
+  placeTogether(pair, driftedRotation(random, 20), randomPoint(random, 3));
+  return pair;
+}
+
+Case polygonsInOnePlane(Random& random) {
+  Case pair;
+  pair.a.points = inPlane(latticePoints(random, 6, 4));
+  pair.b.points = inPlane(latticePoints(random, 5, 2));
+  if (chance(random, 0.5)) {
+    const Vec3 shift(below(random, 13) - 6, below(random, 13) - 6, 0);
+    for (Vec3& p : pair.b.points) p += shift;
+  }
+  placeTogether(pair, driftedRotation(random, 50), randomPoint(random, 5));
+  return pair;
+}
+
+Case collinearSegments(Random& random) {
+  Case pair;
+  const Vec3 along = latticePoints(random, 1, 5).front() + Vec3(0, 0, 6);
+  const Vec3 start = latticePoints(random, 1, 5).front();
+  const auto point = [&] { return Vec3(start + (below(random, 9) - 4) * along); };
+  for (int i = 0; i < 2; ++i) pair.a.points.push_back(point());
+  for (int i = 0; i < 2; ++i) pair.b.points.push_back(point());
+  if (chance(random, 0.3)) pair.b.points.push_back(pair.b.points[0] + Vec3(1, 2, 0));
+  placeTogether(pair, driftedRotation(random, 30), randomPoint(random, 5));
+  return pair;
+}
+
+Case farOffset(Random& random) {
+  Case pair;
+  pair.a.points = randomPoints(random, 6, 1);
+  pair.b.points = randomPoints(random, 6, 1);
+  pair.a.rotation = randomRotation(random);
+  pair.b.rotation = randomRotation(random);
+  pair.a.translation = randomPoint(random, magnitude(random, 8, 13));
+  pair.b.translation = pair.a.translation + randomPoint(random, 1.2);
+  return pair;
+}
+
+Case tinyOrHuge(Random& random) {
+  Case pair;
+  pair.a.points = randomPoints(random, 6, 1);
+  pair.b.points = randomPoints(random, 6, 1);
+  pair.a.rotation = randomRotation(random);
+  pair.b.rotation = randomRotation(random);
+  pair.b.translation = randomPoint(random, 1.5);
+  scalePair(pair, chance(random, 0.5) ? magnitude(random, -60, -12) : magnitude(random, 8, 60));
+  return pair;
+}
+
+Case nearParallelFaces(Random& random) {
+  Case pair;
+  const Vec3 half(uniform(random, 0.2, 2), uniform(random, 0.2, 2), uniform(random, 0.2, 2));
+  pair.a.points = box(-half, half);
+  pair.b.points = box({-0.5, -0.5, 0}, {0.5, 0.5, 1});
+  const double gap = magnitude(random, -17, -4) * (chance(random, 0.5) ? 1 : -1);
+  const Mat3 rotation = randomRotation(random);
+  pair.a.rotation = rotation;
+  pair.b.rotation = smallRotation(random, magnitude(random, -17, -5)) * rotation;
+  pair.b.translation = rotation * Vec3(0, 0, half.z() + gap);
+  return pair;
+}
+
+Case deepInside(Random& random) {
+  Case pair;
+  const double size = magnitude(random, -6, 0);
+  pair.a.points = box({-1, -1, -1}, {1, 1, 1});
+  pair.b.points = chance(random, 0.5) ? randomPoints(random, 5, size)
+                                      : box(Vec3::Constant(-size), Vec3::Constant(size));
+  if (chance(random, 0.3)) pair.b.points.resize(1 + static_cast<std::size_t>(below(random, 4)));
+  if (chance(random, 0.5)) pair.a.rotation = randomRotation(random);
+  if (chance(random, 0.5)) pair.b.rotation = randomRotation(random);
+  if (chance(random, 0.5)) pair.b.translation = randomPoint(random, 0.3);
+  return pair;
+}
+
+Case crossingPolygons(Random& random) {
+  Case pair;
+  pair.a.points = inPlane(randomPoints(random, 5, 1));
+  pair.b.points = inPlane(randomPoints(random, 4, 1));
+  pair.a.rotation = driftedRotation(random, 30);
+  pair.b.rotation = driftedRotation(random, 30);
+  pair.b.translation = randomPoint(random, 0.7);
+  return pair;
+}
+
+Case pointsOnFeatures(Random& random) {
+  Case pair;
+  pair.a.points = latticePoints(random, 7, 4);
+  // A combination in quarters: on an edge, a face, or inside, exactly.
+  const auto pick = [&] { return pair.a.points[static_cast<std::size_t>(below(random, 7))]; };
+  const auto on = [&] {
+    const Vec3 p = pick(), q = pick(), r = pick();
+    return Vec3(0.25 * p + 0.25 * q + 0.5 * r);
+  };
+  const int count = 1 + below(random, 3);
+  for (int i = 0; i < count; ++i) pair.b.points.push_back(on());
+  if (chance(random, 0.4)) pair.b.points.push_back(latticePoints(random, 1, 8).front());
+  placeTogether(pair, driftedRotation(random, 100), randomPoint(random, 3));
+  return pair;
+}
+
+Case mixedSizes(Random& random) {
+  Case pair;
+  const double small = magnitude(random, -9, -3);
+  pair.a.points = randomPoints(random, 7, 1e3);
+  pair.b.points = randomPoints(random, 6, small);
+  const Vec3 p = pair.a.points[0], q = pair.a.points[1], r = pair.a.points[2];
+  const double s = uniform(random, 0, 0.5), t = uniform(random, 0, 0.5);
+  pair.b.translation = p + s * (q - p) + t * (r - p) + randomPoint(random, 2 * small);
+  return pair;
+}
+
+Case skewNeedles(Random& random) {
+  Case pair;
+  pair.a.points = {{-1, 0, 0}, {1, 0, 0}};
+  const double angle = magnitude(random, -12, 0);
+  pair.b.points = {{-1, -angle, 0}, {1, angle, 0}};
+  const double gap = chance(random, 0.3) ? 0 : magnitude(random, -18, -2);
+  if (chance(random, 0.5)) pair.a.points.push_back({0, magnitude(random, -9, -3), 0});
+  pair.b.translation = {uniform(random, -0.5, 0.5), 0, gap};
+  if (chance(random, 0.6)) {
+    const Mat3 rotation = randomRotation(random);
+    pair.b.translation = rotation * pair.b.translation;
+    pair.a.rotation = pair.b.rotation = rotation;
+  }
+  return pair;
+}
+
+Case nearlyEqualBodies(Random& random) {
+  Case pair;
+  pair.a.points = chance(random, 0.5) ? latticePoints(random, 7, 2) : randomPoints(random, 7, 1);
+  pair.b.points = pair.a.points;
+  placeTogether(pair, driftedRotation(random, 10), randomPoint(random, 2));
+  if (chance(random, 0.5)) pair.b.translation += randomPoint(random, magnitude(random, -17, -13));
+  if (chance(random, 0.3)) pair.b.rotation = smallRotation(random, 1e-16) * pair.b.rotation;
+  return pair;
+}
+
+Case lattice(Random& random) {
+  Case pair;
+  pair.a.points = latticePoints(random, 1 + below(random, 8), 2);
+  pair.b.points = latticePoints(random, 1 + below(random, 8), 2);
+  pair.b.translation = latticePoints(random, 1, 3).front();
+  Mat3 quarter;
+  quarter << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  Mat3 cycle;
+  cycle << 0, 1, 0, 0, 0, 1, 1, 0, 0;
+  if (chance(random, 0.5)) pair.a.rotation = quarter;
+  if (chance(random, 0.5)) pair.b.rotation = cycle * quarter;
+  return pair;
+}
+
+Case stackedGrids(Random& random) {
+  Case pair;
+  const auto grid = [&](double z) {
+    Points points;
+    for (int i = 0; i < 9; ++i) points.emplace_back(0.1 * (i % 3), 0.1 * (i / 3), z);
+    return points;
+  };
+  pair.a.points = grid(0);
+  pair.a.points.push_back({0.1, 0.1, -1});
+  pair.b.points = grid(0);
+  pair.b.points.push_back({0.1, 0.1, 1});
+  const int way = below(random, 3);
+  const double ulps = static_cast<double>(below(random, 5) - 2) * 0x1p-53;
+  pair.b.translation = {0.1 * below(random, 3), way == 1 ? 0.2 : 0, way == 2 ? ulps : 0};
+  if (chance(random, 0.5)) {
+    const Vec3 along = pair.b.translation;
+    placeTogether(pair, driftedRotation(random, 5), Vec3::Zero());
+    pair.b.translation = pair.b.rotation * along;
+  }
+  return pair;
+}
+
+std::string decimal(const mpf_class& value) {
+  std::array<char, 120> text{};
+  gmp_snprintf(text.data(), text.size(), "%.70Fe", value.get_mpf_t());
+  return text.data();
+}
+
+}  // namespace
+
+const std::vector<Family>& families() {
+  static const std::vector<Family> all{{"drifted_contact", driftedContact},
+                                       {"sliver", sliver},
+                                       {"coincident_vertices", coincidentVertices},
+                                       {"polygons_in_one_plane", polygonsInOnePlane},
+                                       {"collinear_segments", collinearSegments},
+                                       {"far_offset", farOffset},
+                                       {"tiny_or_huge", tinyOrHuge},
+                                       {"near_parallel_faces", nearParallelFaces},
+                                       {"deep_inside", deepInside},
+                                       {"crossing_polygons", crossingPolygons},
+                                       {"points_on_features", pointsOnFeatures},
+                                       {"mixed_sizes", mixedSizes},
+                                       {"skew_needles", skewNeedles},
+                                       {"nearly_equal_bodies", nearlyEqualBodies},
+                                       {"lattice", lattice},
+                                       {"stacked_grids", stackedGrids}};
+  return all;
+}
+
+Truth judged(const Case& asked) {
+  const TrueAnswer answer = trueAnswer(exactPair(asked.a, asked.b));
+  Truth truth;
+  truth.distance = decimal(answer.distance);
+  switch (answer.verdict) {
+    case TrueVerdict::separated:
+      truth.verdict = "separated";
+      break;
+    case TrueVerdict::touching:
+      truth.verdict = "touching";
+      break;
+    case TrueVerdict::penetrating:
+      truth.verdict = "penetrating";
+      truth.penetration = decimal(answer.depth);
+      break;
+  }
+  if (asked.clearance) truth.near = answer.distance < preciseNumber(2 * *asked.clearance);
+  return truth;
+}
+
+Case madeCase(const Family& family, Random& random, int number) {
+  Case made = family.make(random);
+  made.id = std::string(family.name) + '-' + std::to_string(number);
+  made.family = family.name;
+  const ExactPair pair = exactPair(made.a, made.b);
+  const double distance = lengthOf(nearestOfDifference(pair.a, pair.b), pair.bits).get_d();
+  made.clearance = distance * (0.5 + below(random, 5) * 0x1p-53 - 0x1p-52);
+  if (distance == 0) made.clearance = magnitude(random, -20, -3);
+  made.truth = judged(made);
+  return made;
+}
+
+}  // namespace enfilade::accuracy
