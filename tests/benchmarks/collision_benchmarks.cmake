@@ -71,3 +71,12 @@ bench_program(collision_broad_phase broad_phase_methods.cpp pairs
   collision_broad_phase.cpp building_workload.cpp approaches/brute_force.cpp
   approaches/bsp_tree.cpp approaches/hash_grid.cpp approaches/interval_tree.cpp
   approaches/loose_octree.cpp)
+
+set(accuracy ${PROJECT_SOURCE_DIR}/tests/accuracy)
+bench_program(collision_narrow_phase narrow_phase_methods.cpp convex
+  collision_narrow_phase.cpp convex_motions.cpp guarded_run.cpp our_narrow_phases.cpp
+  ${accuracy}/case_file.cpp ${accuracy}/exact_geometry.cpp)
+target_link_libraries(collision_narrow_phase PRIVATE gmpxx gmp)
+if(EXISTS ${PROJECT_SOURCE_DIR}/collision/refine.cpp)
+  target_compile_definitions(collision_narrow_phase PRIVATE BENCH_REFINE)
+endif()

@@ -1,0 +1,67 @@
+// Answers against the truth: counts, and relative errors.
+#pragma once
+
+#include "tests/benchmarks/measurement.hpp"
+#include "tests/benchmarks/narrow_phase_method.hpp"
+
+namespace enfilade::benchmarks {
+
+/// Metres; the larger precision of long double (64 bits) is enough to tell errors of a double.
+struct TrueAnswer {
+  bool collides = false;
+  long double distance = 0, depth = 0;  ///< depth 0: touching, or not known
+  double scale = 1;  ///< verdicts are told apart by whether they miss more than 1e-9 of this
+};
+
+struct Errors {
+  std::size_t count = 0, wrong = 0, wrongBeyond = 0, none = 0;
+  std::size_t filter = 0, expansion = 0, rational = 0;
+  std::vector<double> distance, depth;  ///< relative
+
+  void add(const Answer& answer, const TrueAnswer& truth) {
+    ++count;
+    if (answer.decidedBy == 0) ++filter;
+    if (answer.decidedBy == 1) ++expansion;
+    if (answer.decidedBy == 2) ++rational;
+    if (answer.verdict == Answer::Verdict::none) {
+      ++none;
+      return;
+    }
+    if ((answer.verdict == Answer::Verdict::collides) != truth.collides) {
+      ++wrong;
+      if (std::max(truth.distance, truth.depth) > 1e-9L * truth.scale) ++wrongBeyond;
+      return;
+    }
+    if (!truth.collides && !std::isnan(answer.distance)) {
+      distance.push_back(relative(answer.distance, truth.distance));
+    }
+    if (truth.depth > 0 && !std::isnan(answer.depth)) {
+      depth.push_back(relative(answer.depth, truth.depth));
+    }
+  }
+
+  nlohmann::json json() const {
+    return {{"count", count},
+            {"wrong", wrong},
+            {"wrong_beyond", wrongBeyond},
+            {"none", none},
+            {"filter", filter},
+            {"expansion", expansion},
+            {"rational", rational},
+            {"distance_error", quantiles(distance)},
+            {"depth_error", quantiles(depth)}};
+  }
+
+ private:
+  static double relative(double told, long double truth) {
+    return static_cast<double>(std::abs(told - truth) / truth);
+  }
+  /// Median, 99 %, greatest; null when nothing was told.
+  static nlohmann::json quantiles(const std::vector<double>& values) {
+    if (values.empty()) return nullptr;
+    return {number(quantile(values, 0.5)), number(quantile(values, 0.99)),
+            number(quantile(values, 1))};
+  }
+};
+
+}  // namespace enfilade::benchmarks

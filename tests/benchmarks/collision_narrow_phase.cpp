@@ -1,0 +1,303 @@
+// All narrow phases: time of a query beside its error and its wrong verdicts.
+//
+//   collision_narrow_phase [--quick] [--out FILE] [--only PART_OF_A_NAME]
+//
+// First polytopes of 8 to 200 vertices in coherent motion (convex_motions.hpp), cold and warm, the
+// methods in turns; the errors are those against our `refine` level. Then the families of the exact
+// cases, where the shared folder is there; the errors are those against the truth of the files,
+// also for `refine`. Methods run in child processes, because some peers abort.
+
+#include <cstdlib>
+
+#include "tests/accuracy/case_file.hpp"
+#include "tests/benchmarks/answer_errors.hpp"
+#include "tests/benchmarks/convex_motions.hpp"
+#include "tests/benchmarks/guarded_run.hpp"
+#include "tests/support/shared_folder.hpp"
+
+namespace {
+
+using namespace enfilade::benchmarks;
+namespace accuracy = enfilade::accuracy;
+using Methods = std::vector<NarrowPhaseMethod>;
+
+constexpr unsigned kMostSeconds = 60;  // a child that takes longer over one turn hangs
+
+constexpr unsigned kMostSecondsACase = 5;
+
+struct Effort {
+  std::size_t pairs, steps, turns;
+  double secondsATurn;    ///< a slow method makes fewer steps, at least kLeastSteps a pair
+  double secondsAnswers;  ///< and tells fewer answers
+  int repeats;            ///< of a cold case
+};
+
+nlohmann::json headOf(const NarrowPhaseMethod& method, const char* bench) {
+  return {
+      {"bench", bench}, {"method", method.name}, {"ours", method.ours}, {"level", method.level}};
+}
+
+// ---- coherent motion ---------------------------------------------------------------------------
+
+constexpr std::size_t kMostPairs = 16;
+constexpr std::size_t kLeastSteps = 3;
+
+/// Nanoseconds a query, by pair; a turn of one method.
+struct Turn {
+  std::array<double, kMostPairs> cold{}, warm{};
+};
+
+double nanosecondsOf(PairOfBodies& pair, const ConvexMotion& motion, std::size_t steps, bool warm) {
+  pair.forget();
+  const auto start = Clock::now();
+  for (std::size_t k = 0; k < steps; ++k) {
+    if (!warm) pair.forget();
+    pair.ask(motion.placesA[k], motion.placesB[k]);
+  }
+  return 1e9 * secondsSince(start) / static_cast<double>(steps);
+}
+
+Turn measureTurn(const NarrowPhaseMethod& method, const std::vector<ConvexMotion>& motions,
+                 double seconds) {
+  Turn turn;
+  const auto start = Clock::now();
+  const double secondsAPair = seconds / static_cast<double>(motions.size());
+  for (std::size_t k = 0; k < motions.size() && (k == 0 || secondsSince(start) < seconds); ++k) {
+    const auto pair = method.make(motions[k].a, motions[k].b);
+    // Fills the caches of the machine, and tells how many steps there is time for.
+    const double one = 1e-9 * nanosecondsOf(*pair, motions[k], kLeastSteps, true);
+    const auto steps = static_cast<std::size_t>(
+        std::clamp(secondsAPair / (2 * one), static_cast<double>(kLeastSteps),
+                   static_cast<double>(motions[k].placesA.size())));
+    turn.cold[k] = nanosecondsOf(*pair, motions[k], steps, false);
+    turn.warm[k] = method.warm ? nanosecondsOf(*pair, motions[k], steps, true) : turn.cold[k];
+  }
+  return turn;
+}
+
+struct Told {
+  Answer answer;
+  bool asked = true;  ///< false: past the time of a slow method
+};
+
+/// One for each step of each motion, warm.
+std::vector<Told> answersOf(const NarrowPhaseMethod& method,
+                            const std::vector<ConvexMotion>& motions, double seconds) {
+  const std::size_t steps = motions.front().placesA.size();
+  const double secondsAPair = seconds / static_cast<double>(motions.size());
+  std::unique_ptr<PairOfBodies> pair;
+  auto start = Clock::now();
+  return guarded<Told>(steps * motions.size(), kMostSeconds, [&](std::size_t k) {
+    const ConvexMotion& motion = motions[k / steps];
+    if (!pair || k % steps == 0) {
+      pair = method.make(motion.a, motion.b);
+      start = Clock::now();
+    }
+    if (secondsSince(start) > secondsAPair) return Told{{}, false};
+    return Told{pair->ask(motion.placesA[k % steps], motion.placesB[k % steps]), true};
+  });
+}
+
+/// Our most exact level is the truth here; nothing past its time.
+std::vector<std::optional<TrueAnswer>> truthOf(const Methods& methods,
+                                               const std::vector<ConvexMotion>& motions,
+                                               double seconds) {
+  const NarrowPhaseMethod* exact = &methods.front();
+  for (const auto& method : methods) {
+    if (method.ours && method.level == "refine") exact = &method;
+  }
+  std::vector<std::optional<TrueAnswer>> truth;
+  for (const auto& [answer, asked] : answersOf(*exact, motions, seconds)) {
+    const bool collides = answer.verdict == Answer::Verdict::collides;
+    const double depth = collides && !std::isnan(answer.depth) ? answer.depth : 0;
+    truth.emplace_back();
+    if (!asked || answer.verdict == Answer::Verdict::none) continue;
+    truth.back() = TrueAnswer{collides, collides ? 0 : answer.distance, depth, 2};
+  }
+  return truth;
+}
+
+void report(const NarrowPhaseMethod& method, std::size_t vertices, Gap gap, const Errors& errors,
+            const std::vector<double>& cold, const std::vector<double>& warm, Results& results) {
+  const double coldMedian = quantile(cold, 0.5);
+  const double warmMedian = quantile(warm, 0.5);
+  std::printf(
+      "%-26s %4zu %-11s | cold %10.0f  warm %10.0f ns | wrong %4zu none %4zu of %5zu |"
+      " error of distance %8.1e of depth %8.1e\n",
+      method.name.c_str(), vertices, nameOf(gap), coldMedian, warmMedian, errors.wrong, errors.none,
+      errors.count, quantile(errors.distance, 1), quantile(errors.depth, 1));
+  std::fflush(stdout);
+  auto line = headOf(method, "narrow");
+  line.update(errors.json());
+  line.update({{"vertices", vertices},
+               {"gap", nameOf(gap)},
+               {"warms", method.warm},
+               {"cold_ns", number(coldMedian)},
+               {"warm_ns", number(warmMedian)}});
+  results.add(line);
+}
+
+void measureMotion(const Methods& methods, std::size_t vertices, Gap gap, const Effort& effort,
+                   Results& results) {
+  const auto motions = convexMotions(vertices, gap, effort.pairs, effort.steps);
+  const auto truth = truthOf(methods, motions, effort.secondsAnswers);
+  const auto turns = guarded<Turn>(effort.turns * methods.size(), kMostSeconds, [&](std::size_t k) {
+    return measureTurn(methods[k % methods.size()], motions, effort.secondsATurn);
+  });
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    Errors errors;
+    const auto answers = answersOf(methods[m], motions, effort.secondsAnswers);
+    for (std::size_t k = 0; k < answers.size(); ++k) {
+      if (answers[k].asked && truth[k]) errors.add(answers[k].answer, *truth[k]);
+    }
+    std::vector<double> cold, warm;
+    for (std::size_t k = m; k < turns.size(); k += methods.size()) {
+      for (std::size_t pair = 0; pair < kMostPairs && turns[k].cold[pair] > 0; ++pair) {
+        cold.push_back(turns[k].cold[pair]);
+        warm.push_back(turns[k].warm[pair]);
+      }
+    }
+    report(methods[m], vertices, gap, errors, cold, warm, results);
+  }
+}
+
+// ---- families of exact cases -------------------------------------------------------------------
+
+struct TimedAnswer {
+  Answer answer;
+  double nanoseconds = 0;
+};
+
+Placement placementOf(const accuracy::Placed& body) {
+  return {body.rotation, body.translation};
+}
+
+double diagonal(const Points& points) {
+  enfilade::collision::Box box;
+  for (const Vec3& p : points) box.include(p);
+  return box.size().norm();
+}
+
+TrueAnswer truthOf(const accuracy::Case& asked) {
+  const auto parsed = [](const std::string& s) {
+    return s.empty() ? 0.0L : std::strtold(s.c_str(), nullptr);
+  };
+  TrueAnswer truth{asked.truth.verdict != "separated", parsed(asked.truth.distance),
+                   parsed(asked.truth.penetration), 0};
+  truth.scale = std::max(
+      {diagonal(asked.a.points), diagonal(asked.b.points), static_cast<double>(truth.distance)});
+  return truth;
+}
+
+/// Answers cases in order; the steps of one sequence warm, all others cold.
+class CaseAnswerer {
+ public:
+  CaseAnswerer(const NarrowPhaseMethod& method, int repeats) : method_(method), repeats_(repeats) {}
+
+  TimedAnswer answer(const accuracy::Case& asked) {
+    const bool goesOn = asked.sequence && sequence_ == asked.sequence &&
+                        asked.a.points == pointsA_ && asked.b.points == pointsB_;
+    if (!goesOn) {
+      pair_ = method_.make(asked.a.points, asked.b.points);
+      sequence_ = asked.sequence;
+      pointsA_ = asked.a.points;
+      pointsB_ = asked.b.points;
+    }
+    return goesOn ? ask(asked) : askCold(asked);
+  }
+
+ private:
+  TimedAnswer ask(const accuracy::Case& asked) {
+    const Placement a = placementOf(asked.a);
+    const Placement b = placementOf(asked.b);
+    const auto start = Clock::now();
+    const Answer answer = pair_->ask(a, b);
+    return {answer, 1e9 * secondsSince(start)};
+  }
+  TimedAnswer askCold(const accuracy::Case& asked) {
+    std::vector<double> times;
+    TimedAnswer timed;
+    for (int k = 0; k < repeats_; ++k) {
+      pair_->forget();
+      timed = ask(asked);
+      times.push_back(timed.nanoseconds);
+    }
+    timed.nanoseconds = quantile(times, 0.5);
+    return timed;
+  }
+
+  const NarrowPhaseMethod& method_;
+  int repeats_;
+  std::unique_ptr<PairOfBodies> pair_;
+  std::optional<long> sequence_;
+  Points pointsA_, pointsB_;
+};
+
+std::vector<accuracy::Case> pairCases(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string name = entry.path().filename();
+    if (entry.path().extension() == ".jsonl" && name.find("mesh") == std::string::npos) {
+      files.push_back(entry.path());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  std::vector<accuracy::Case> cases;
+  for (const auto& file : files) {
+    for (accuracy::Case& asked : accuracy::readCases(file)) cases.push_back(std::move(asked));
+  }
+  return cases;
+}
+
+void measureCases(const NarrowPhaseMethod& method, const std::vector<accuracy::Case>& cases,
+                  const Effort& effort, Results& results) {
+  CaseAnswerer answerer(method, effort.repeats);
+  const auto answers = guarded<TimedAnswer>(
+      cases.size(), kMostSecondsACase, [&](std::size_t k) { return answerer.answer(cases[k]); });
+  std::map<std::string, Errors> errors;
+  std::map<std::string, std::vector<double>> times;
+  for (std::size_t k = 0; k < cases.size(); ++k) {
+    for (const std::string& family : {cases[k].family, std::string("all")}) {
+      errors[family].add(answers[k].answer, truthOf(cases[k]));
+      if (answers[k].nanoseconds > 0) times[family].push_back(answers[k].nanoseconds);
+    }
+  }
+  for (const auto& [family, e] : errors) {
+    auto line = headOf(method, "family");
+    line.update(e.json());
+    line.update({{"family", family},
+                 {"ns", number(quantile(times[family], 0.5))},
+                 {"ns_99", number(quantile(times[family], 0.99))}});
+    results.add(line);
+    if (family != "all") continue;
+    std::printf(
+        "%-26s all cases | %8.0f ns | wrong %4zu (%zu beyond 1e-9) none %4zu of %5zu |"
+        " error of distance 99 %% %8.1e most %8.1e, of depth most %8.1e |"
+        " filter %zu expansion %zu rational %zu\n",
+        method.name.c_str(), quantile(times[family], 0.5), e.wrong, e.wrongBeyond, e.none, e.count,
+        quantile(e.distance, 0.99), quantile(e.distance, 1), quantile(e.depth, 1), e.filter,
+        e.expansion, e.rational);
+    std::fflush(stdout);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const Arguments arguments(argc, argv);
+  const Effort effort =
+      arguments.quick ? Effort{4, 100, 3, 0.02, 0.1, 1} : Effort{16, 200, 5, 0.3, 3, 3};
+  Results results(arguments);
+  Methods methods = narrowPhaseMethods();
+  std::erase_if(methods, [&](const auto& m) { return !arguments.wants(m.name); });
+  for (const std::size_t vertices : {8u, 20u, 50u, 200u}) {
+    for (const Gap gap : kGaps) measureMotion(methods, vertices, gap, effort, results);
+  }
+  const auto shared = enfilade::tests::sharedFolder();
+  if (!shared || !std::filesystem::is_directory(*shared / "cases")) {
+    std::printf("no shared cases: set ENFILADE_SHARED or put the folder beside the sources\n");
+    return 0;
+  }
+  const auto cases = pairCases(*shared / "cases");
+  for (const auto& method : methods) measureCases(method, cases, effort, results);
+}

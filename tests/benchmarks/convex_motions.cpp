@@ -1,0 +1,84 @@
+#include "tests/benchmarks/convex_motions.hpp"
+
+#include "collision/hull.hpp"
+#include "collision/narrow_phase.hpp"
+#include "tests/benchmarks/building_workload.hpp"
+
+namespace enfilade::benchmarks {
+namespace {
+
+constexpr double kRadiansPerDegree = 0.017453292519943295;
+constexpr double kFarApart = 10;  // metres: surely separated, for unit spheres
+
+Vec3 direction(Random& random) {
+  while (true) {
+    const double x = uniform(random, -1, 1);
+    const double y = uniform(random, -1, 1);
+    const double z = uniform(random, -1, 1);
+    const Vec3 v(x, y, z);
+    if (v.squaredNorm() > 0.01 && v.squaredNorm() < 1) return v.normalized();
+  }
+}
+
+Points sphericalPoints(Random& random, std::size_t count) {
+  Points points;
+  for (std::size_t k = 0; k < count; ++k) points.push_back(direction(random));
+  return points;
+}
+
+/// A steady turn about one axis.
+struct Turning {
+  Vec3 axis;
+  double start, step;  ///< radians
+
+  explicit Turning(Random& random) : axis(direction(random)) {
+    start = uniform(random, 0, 6.28);
+    step = uniform(random, 0.6, 1.8) * kRadiansPerDegree;
+  }
+  Mat3 at(std::size_t k) const {
+    return Eigen::AngleAxisd(start + step * static_cast<double>(k), axis).toRotationMatrix();
+  }
+};
+
+double gapOf(Gap gap) {
+  if (gap == Gap::separated) return 1;
+  return gap == Gap::near ? 1e-3 : -0.1;
+}
+
+ConvexMotion makeMotion(Random& random, std::size_t vertices, Gap gap, std::size_t steps) {
+  ConvexMotion motion{sphericalPoints(random, vertices), sphericalPoints(random, vertices), {}, {}};
+  const collision::Hull hullA = collision::buildHull(motion.a);
+  const collision::Hull hullB = collision::buildHull(motion.b);
+  const Turning turnA(random), turnB(random), orbit(random);
+  const Vec3 away = orbit.axis.unitOrthogonal();
+  for (std::size_t k = 0; k < steps; ++k) {
+    Placement a{turnA.at(k), Vec3(0.25, 0.5, 0.125)};
+    Placement b{turnB.at(k), a.translation + kFarApart * (orbit.at(k) * away)};
+    collision::FeatureCache none;
+    const auto told = collision::decide({hullA.vertices, a.translation, &a.rotation, &hullA},
+                                        {hullB.vertices, b.translation, &b.rotation, &hullB}, none);
+    b.translation -= (told.distance - gapOf(gap)) * told.normal;
+    motion.placesA.push_back(a);
+    motion.placesB.push_back(b);
+  }
+  return motion;
+}
+
+}  // namespace
+
+const char* nameOf(Gap gap) {
+  if (gap == Gap::separated) return "separated";
+  return gap == Gap::near ? "near" : "penetrating";
+}
+
+std::vector<ConvexMotion> convexMotions(std::size_t vertices, Gap gap, std::size_t pairs,
+                                        std::size_t steps) {
+  Random random(vertices);
+  std::vector<ConvexMotion> motions;
+  for (std::size_t k = 0; k < pairs; ++k) {
+    motions.push_back(makeMotion(random, vertices, gap, steps));
+  }
+  return motions;
+}
+
+}  // namespace enfilade::benchmarks

@@ -1,0 +1,80 @@
+// One interface for every narrow phase that is measured.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "collision/types.hpp"
+
+namespace enfilade::benchmarks {
+
+using collision::Mat3;
+using collision::Vec3;
+using Points = std::vector<Vec3>;
+
+/// World = rotation * local + translation, the doubles taken as they are.
+struct Placement {
+  Mat3 rotation = Mat3::Identity();
+  Vec3 translation = Vec3::Zero();
+};
+
+struct Answer {
+  enum class Verdict : std::uint8_t {
+    apart,
+    collides,  ///< touching counts
+    none       ///< it threw, gave up, returned what is no number, or died
+  } verdict = Verdict::none;
+  std::int8_t decidedBy = -1;  ///< ours: collision::DecidedBy; others: -1
+  double distance = std::numeric_limits<double>::quiet_NaN();  ///< metres; NaN: not told
+  double depth = std::numeric_limits<double>::quiet_NaN();
+};
+
+inline Answer apart(double distance) {
+  Answer answer;
+  if (!std::isfinite(distance)) return answer;
+  answer.verdict = Answer::Verdict::apart;
+  answer.distance = distance;
+  return answer;
+}
+inline Answer collides(double depth = std::numeric_limits<double>::quiet_NaN()) {
+  Answer answer;
+  answer.verdict = Answer::Verdict::collides;
+  answer.depth = depth;
+  return answer;
+}
+
+/// Two bodies, and whatever the method keeps of them from question to question.
+class PairOfBodies {
+ public:
+  virtual ~PairOfBodies() = default;
+  virtual Answer ask(const Placement& a, const Placement& b) = 0;
+  /// The next question is a cold one.
+  virtual void forget() {}
+};
+
+struct NarrowPhaseMethod {
+  std::string name;
+  bool ours;
+  std::string level;  ///< ours: "decide" or "refine", peers: what is asked
+  bool warm;          ///< keeps something from question to question
+  bool distance, depth;
+  std::function<std::unique_ptr<PairOfBodies>(const Points& a, const Points& b)> make;
+};
+
+/// Ours first.
+std::vector<NarrowPhaseMethod> narrowPhaseMethods();
+
+// One for each source file.
+std::vector<NarrowPhaseMethod> ourNarrowPhases();
+std::vector<NarrowPhaseMethod> bulletConvex();
+std::vector<NarrowPhaseMethod> ccdConvex();
+std::vector<NarrowPhaseMethod> cgalConvex();
+std::vector<NarrowPhaseMethod> fclConvex();
+std::vector<NarrowPhaseMethod> odeConvex();
+
+}  // namespace enfilade::benchmarks

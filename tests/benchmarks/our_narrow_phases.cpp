@@ -1,0 +1,94 @@
+// Ours at its two levels, and decide() with the depth that the solver uses.
+#include "collision/hull.hpp"
+#include "collision/narrow_phase.hpp"
+#include "collision/penetration_depth.hpp"
+#include "collision/refine.hpp"
+#include "tests/benchmarks/narrow_phase_method.hpp"
+
+namespace enfilade::benchmarks {
+namespace {
+
+using collision::ConvexBody;
+using collision::Hull;
+using collision::Verdict;
+
+class OurPair : public PairOfBodies {
+ public:
+  OurPair(const Points& a, const Points& b)
+      : hullA_(collision::buildHull(a)), hullB_(collision::buildHull(b)) {}
+  void forget() override { features_ = {}; }
+
+ protected:
+  static ConvexBody bodyOf(const Hull& hull, const Placement& at) {
+    return {hull.vertices, at.translation, &at.rotation, &hull};
+  }
+  Hull hullA_, hullB_;
+  collision::FeatureCache features_;
+};
+
+class Decides : public OurPair {
+ public:
+  using OurPair::OurPair;
+  Answer ask(const Placement& a, const Placement& b) override {
+    const auto told = collision::decide(bodyOf(hullA_, a), bodyOf(hullB_, b), features_);
+    Answer answer = told.verdict == Verdict::separated ? apart(told.distance) : collides();
+    answer.decidedBy = static_cast<std::int8_t>(told.decidedBy);
+    return answer;
+  }
+};
+
+class DecidesWithDepth : public OurPair {
+ public:
+  using OurPair::OurPair;
+  Answer ask(const Placement& a, const Placement& b) override {
+    const ConvexBody bodyA = bodyOf(hullA_, a);
+    const ConvexBody bodyB = bodyOf(hullB_, b);
+    const auto told = collision::decide(bodyA, bodyB, features_);
+    Answer answer = told.verdict == Verdict::separated ? apart(told.distance) : collides(0);
+    answer.decidedBy = static_cast<std::int8_t>(told.decidedBy);
+    if (told.verdict == Verdict::penetrating) {
+      answer.depth = collision::penetrationDepth(bodyA, bodyB, features_, depth_).depth;
+    }
+    return answer;
+  }
+  void forget() override {
+    OurPair::forget();
+    depth_ = {};
+  }
+
+ private:
+  collision::DepthCache depth_;
+};
+
+#ifdef BENCH_REFINE
+class Refines : public OurPair {
+ public:
+  using OurPair::OurPair;
+  Answer ask(const Placement& a, const Placement& b) override {
+    const auto told = collision::refine(bodyOf(hullA_, a), bodyOf(hullB_, b), features_);
+    Answer answer =
+        told.verdict == Verdict::separated ? apart(told.distance) : collides(told.penetration);
+    answer.decidedBy = static_cast<std::int8_t>(told.decidedBy);
+    return answer;
+  }
+};
+#endif
+
+template <typename Method>
+std::unique_ptr<PairOfBodies> make(const Points& a, const Points& b) {
+  return std::make_unique<Method>(a, b);
+}
+
+}  // namespace
+
+std::vector<NarrowPhaseMethod> ourNarrowPhases() {
+  std::vector<NarrowPhaseMethod> all{
+      {"ours: decide", true, "decide", true, true, false, make<Decides>},
+      {"ours: decide with depth", true, "decide", true, true, true, make<DecidesWithDepth>}};
+#ifdef BENCH_REFINE
+  all.push_back({"ours: refine", true, "refine", true, true, true, make<Refines>});
+#endif
+  return all;
+}
+
+}  // namespace enfilade::benchmarks

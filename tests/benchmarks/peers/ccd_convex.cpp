@@ -1,0 +1,98 @@
+// libccd's Minkowski portal refinement: a verdict, and a depth; no distance.
+#include <ccd/ccd.h>
+#include <ccd/quat.h>
+
+#include "collision/hull.hpp"
+#include "tests/benchmarks/narrow_phase_method.hpp"
+
+namespace enfilade::benchmarks {
+namespace {
+
+constexpr unsigned long kMostIterations = 1000;
+
+struct Shape {
+  Points vertices;
+  Vec3 centre = Vec3::Zero();
+  const Placement* at = nullptr;
+};
+
+Vec3 vectorOf(const ccd_vec3_t& v) {
+  return {ccdVec3X(&v), ccdVec3Y(&v), ccdVec3Z(&v)};
+}
+
+void support(const void* object, const ccd_vec3_t* direction, ccd_vec3_t* result) {
+  const Shape& shape = *static_cast<const Shape*>(object);
+  const Vec3 local = shape.at->rotation.transpose() * vectorOf(*direction);
+  const Vec3* best = &shape.vertices.front();
+  double most = best->dot(local);
+  for (const Vec3& vertex : shape.vertices) {
+    const double height = vertex.dot(local);
+    if (height > most) {
+      most = height;
+      best = &vertex;
+    }
+  }
+  const Vec3 world = shape.at->rotation * *best + shape.at->translation;
+  ccdVec3Set(result, world.x(), world.y(), world.z());
+}
+
+void centre(const void* object, ccd_vec3_t* result) {
+  const Shape& shape = *static_cast<const Shape*>(object);
+  const Vec3 world = shape.at->rotation * shape.centre + shape.at->translation;
+  ccdVec3Set(result, world.x(), world.y(), world.z());
+}
+
+Shape shapeOf(const Points& points) {
+  Shape shape{collision::buildHull(points).vertices};
+  for (const Vec3& vertex : shape.vertices) {
+    shape.centre += vertex / static_cast<double>(shape.vertices.size());
+  }
+  return shape;
+}
+
+class CcdPair : public PairOfBodies {
+ public:
+  CcdPair(const Points& a, const Points& b, bool depth)
+      : a_(shapeOf(a)), b_(shapeOf(b)), depth_(depth) {
+    CCD_INIT(&ccd_);
+    ccd_.support1 = ccd_.support2 = support;
+    ccd_.center1 = ccd_.center2 = centre;
+    ccd_.max_iterations = kMostIterations;
+  }
+
+  Answer ask(const Placement& a, const Placement& b) override {
+    a_.at = &a;
+    b_.at = &b;
+    if (!depth_) return ccdMPRIntersect(&a_, &b_, &ccd_) != 0 ? collides() : undistanced();
+    double depth = 0;
+    ccd_vec3_t direction, position;
+    const int parted = ccdMPRPenetration(&a_, &b_, &ccd_, &depth, &direction, &position);
+    return parted == 0 ? collides(depth) : undistanced();
+  }
+
+ private:
+  static Answer undistanced() {
+    Answer answer;
+    answer.verdict = Answer::Verdict::apart;
+    return answer;
+  }
+
+  Shape a_, b_;
+  bool depth_;
+  ccd_t ccd_;
+};
+
+auto maker(bool depth) {
+  return [depth](const Points& a, const Points& b) -> std::unique_ptr<PairOfBodies> {
+    return std::make_unique<CcdPair>(a, b, depth);
+  };
+}
+
+}  // namespace
+
+std::vector<NarrowPhaseMethod> ccdConvex() {
+  return {{"libccd MPR", false, "verdict", false, false, false, maker(false)},
+          {"libccd MPR with depth", false, "verdict and depth", false, false, true, maker(true)}};
+}
+
+}  // namespace enfilade::benchmarks

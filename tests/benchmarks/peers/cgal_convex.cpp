@@ -1,0 +1,54 @@
+// CGAL's distance of polytopes by quadratic programming, exact for the points it is given: they are
+// the world vertices rounded to doubles.
+#include <CGAL/Cartesian.h>
+#include <CGAL/Gmpzf.h>
+#include <CGAL/Polytope_distance_d.h>
+#include <CGAL/Polytope_distance_d_traits_3.h>
+
+#include "collision/hull.hpp"
+#include "tests/benchmarks/narrow_phase_method.hpp"
+
+namespace enfilade::benchmarks {
+namespace {
+
+using Kernel = CGAL::Cartesian<double>;
+using Traits = CGAL::Polytope_distance_d_traits_3<Kernel, CGAL::Gmpzf, double>;
+using Distance = CGAL::Polytope_distance_d<Traits>;
+
+std::vector<Kernel::Point_3> placed(const Points& vertices, const Placement& at) {
+  std::vector<Kernel::Point_3> result;
+  for (const Vec3& vertex : vertices) {
+    const Vec3 world = at.rotation * vertex + at.translation;
+    result.emplace_back(world.x(), world.y(), world.z());
+  }
+  return result;
+}
+
+class CgalPair : public PairOfBodies {
+ public:
+  CgalPair(const Points& a, const Points& b)
+      : a_(collision::buildHull(a).vertices), b_(collision::buildHull(b).vertices) {}
+
+  Answer ask(const Placement& a, const Placement& b) override {
+    const auto pointsA = placed(a_, a);
+    const auto pointsB = placed(b_, b);
+    const Distance distance(pointsA.begin(), pointsA.end(), pointsB.begin(), pointsB.end());
+    if (distance.is_zero()) return collides();
+    return apart(std::sqrt(CGAL::to_double(distance.squared_distance_numerator()) /
+                           CGAL::to_double(distance.squared_distance_denominator())));
+  }
+
+ private:
+  Points a_, b_;
+};
+
+}  // namespace
+
+std::vector<NarrowPhaseMethod> cgalConvex() {
+  return {{"CGAL polytope distance", false, "distance", false, true, false,
+           [](const Points& a, const Points& b) -> std::unique_ptr<PairOfBodies> {
+             return std::make_unique<CgalPair>(a, b);
+           }}};
+}
+
+}  // namespace enfilade::benchmarks
