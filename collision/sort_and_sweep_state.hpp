@@ -21,6 +21,8 @@ struct Membership {
   HalfAxes low, high;
   std::array<std::uint32_t, 6> cursor;
   StillCells::Cell cell;
+  CellPlace at;  ///< of the cell: kept here so that to leave it is not to look at it
+  std::uint32_t level;
 };
 
 enum class Presence : std::uint8_t { free, fresh, live, leaving };
@@ -33,6 +35,7 @@ struct Mover {
   std::vector<CellRange> ranges;                ///< by level
   std::vector<SortAndSweep::Partner> partners;  ///< sorted
   std::vector<StillCells::Row> rows;            ///< of the still partners, beside `partners`
+  std::array<std::uint8_t, 6> ahead{};          ///< steps of lookAhead() done, by half-axis
   Presence presence = Presence::free;
   bool moved = false;
   bool recheck = false;  ///< the partners it holds are to be tested once more
@@ -89,6 +92,8 @@ struct SortAndSweep::State {
   void placeByScan(const Mover& mover, Membership& membership);
   void placeBySearch(const Mover& mover, Membership& membership);
   void guard(Membership& membership, std::size_t k) const;
+  double border(Mover& mover, std::size_t k) const;
+  void lookAhead(const Mover& mover, std::size_t k) const;
   void advance(MoverId id, Membership& membership, std::size_t k);
 
   // Still boxes that come and go: sort_and_sweep_still.cpp.

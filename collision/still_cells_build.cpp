@@ -1,10 +1,13 @@
 // How the lists are built, in time linear in the boxes but for the sorts within a cell.
 //
-// 1. Each box is entered into the cells of its level, which are made as they are met.
-// 2. Cells are ordered by level and place, and boxes by the cell of their lower corner (a counting
-//    sort): what is near in space is near in memory.
-// 3. In that order each box gets its row and is put into the first list of each of its cells.
-// 4. Each cell's six lists are sorted. The order on +x starts that on -x and so on, back to front:
+// 1. The boxes are brought into a spatial order (a counting sort by the place of their lower
+//    corner), since a scene lists them in an order of its own, and what follows would otherwise
+//    wait for memory at every box.
+// 2. Each box is entered into the cells of its level, which are made as they are met.
+// 3. Cells are ordered by level and place, and boxes by the cell of their lower corner (a counting
+//    sort again): what is near in space is near in memory.
+// 4. In that order each box gets its row and is put into the first list of each of its cells.
+// 5. Each cell's six lists are sorted. The order on +x starts that on -x and so on, back to front:
 //    boxes that are small in their cell end in nearly the order in which they begin, so that
 //    sorting by insertion has little to do.
 
@@ -66,11 +69,47 @@ void sortLists(Row* lists, std::size_t count, const std::vector<HalfAxes>& onset
   }
 }
 
+/// The items 0 .. keys.size() - 1 by their key, stably. Keys are below `keyCount`.
+std::vector<Row> countingSort(std::span<const std::uint32_t> keys, std::size_t keyCount) {
+  std::vector<Row> start(keyCount + 1, 0);
+  for (const std::uint32_t key : keys) ++start[key + std::size_t{1}];
+  std::partial_sum(start.begin(), start.end(), start.begin());
+  std::vector<Row> order(keys.size());
+  for (Row k = 0; k < keys.size(); ++k) order[start[keys[k]]++] = k;
+  return order;
+}
+
+/// The boxes by the place of their lower corner on the finest level that has at most as many places
+/// as there are boxes (the last level has one).
+std::vector<Row> spatialOrder(std::span<const Box> boxes, const CellGrid& grid) {
+  Box bounds;
+  for (const Box& box : boxes) bounds.include(box);
+  std::size_t level = 0;
+  CellRange all = grid.rangeOf(level, reachOf(bounds));
+  while (all.count() > static_cast<double>(boxes.size()) && level + 1 < grid.levelCount()) {
+    all = grid.rangeOf(++level, reachOf(bounds));
+  }
+  const auto across = [&all](std::size_t axis) {
+    return static_cast<std::uint32_t>(all.high[axis] - all.low[axis]) + 1;
+  };
+  std::vector<std::uint32_t> keys;
+  keys.reserve(boxes.size());
+  for (const Box& box : boxes) {
+    const CellPlace at = grid.rangeOf(level, reachOf({box.min, box.min})).low;
+    const auto from = [&](std::size_t axis) {
+      return static_cast<std::uint32_t>(at[axis] - all.low[axis]);
+    };
+    keys.push_back((from(0) * across(1) + from(1)) * across(2) + from(2));
+  }
+  return countingSort(keys, static_cast<std::size_t>(all.count()));
+}
+
 }  // namespace
 
 struct StillCells::Entries {
-  std::vector<Cell> cells;           ///< of the first box, then of the second, ...
-  std::vector<std::uint8_t> counts;  ///< cells of each box, at most CellGrid::kMostCells
+  std::vector<Row> boxes;            ///< indices of the boxes, in spatial order
+  std::vector<Cell> cells;           ///< of the first of these boxes, then of the second, ...
+  std::vector<std::uint8_t> counts;  ///< cells of each of them, at most CellGrid::kMostCells
 };
 
 StillCells::StillCells(std::span<const Box> boxes, std::span<const std::uint32_t> ids)
@@ -88,12 +127,16 @@ StillCells::StillCells(std::span<const Box> boxes, std::span<const std::uint32_t
 
 StillCells::Entries StillCells::enterBoxes(std::span<const Box> boxes) {
   Entries entries;
+  if (!boxes.empty()) entries.boxes = spatialOrder(boxes, grid_);
   entries.counts.reserve(boxes.size());
   entries.cells.reserve(2 * boxes.size());
   rebuildSlots(boxes.size() / 4);
-  for (const Box& box : boxes) {
+  for (std::size_t k = 0; k < boxes.size(); ++k) {
+    if (k + kPrefetchAhead < boxes.size()) {
+      __builtin_prefetch(&boxes[entries.boxes[k + kPrefetchAhead]]);
+    }
     CellRange range;
-    const std::size_t level = grid_.levelFor(reachOf(box), range);
+    const std::size_t level = grid_.levelFor(reachOf(boxes[entries.boxes[k]]), range);
     const std::size_t before = entries.cells.size();
     forEachPlace(range, [&](const CellPlace& at) {
       const Cell cell = findOrAdd(level, at);
@@ -130,37 +173,34 @@ void StillCells::fill(std::span<const Box> boxes, std::span<const std::uint32_t>
                       const Entries& entries) {
   sortedSize_ = 6 * entries.cells.size();
   sorted_ = std::make_unique_for_overwrite<Row[]>(sortedSize_);
-  Row* at = sorted_.get();
+  Row* next = sorted_.get();
   for (CellData& cell : cells_) {
-    cell.rows = at;
+    cell.rows = next;
     cell.room = cell.count;
-    at += 6 * std::size_t{cell.count};
+    next += 6 * std::size_t{cell.count};
     cell.count = 0;
   }
   // Boxes by the cell of their lower corner.
   std::vector<std::size_t> firstEntry(boxes.size());
-  std::vector<Row> start(cells_.size() + 1, 0);
+  std::vector<Cell> home(boxes.size());
   for (std::size_t k = 0, entry = 0; k < boxes.size(); entry += entries.counts[k++]) {
     firstEntry[k] = entry;
-    ++start[entries.cells[entry] + std::size_t{1}];
+    home[k] = entries.cells[entry];
   }
-  std::partial_sum(start.begin(), start.end(), start.begin());
-  std::vector<Row> order(boxes.size());
-  for (Row k = 0; k < boxes.size(); ++k) order[start[entries.cells[firstEntry[k]]]++] = k;
+  const std::vector<Row> order = countingSort(home, cells_.size());
   // Rows in that order. The reserve is address space; it costs memory when it is used.
   onsets_.reserve(boxes.size() + mostEdits_);
   ids_.reserve(boxes.size() + mostEdits_);
   for (Row row = 0; row < boxes.size(); ++row) {
     if (row + kPrefetchAhead < boxes.size()) {
-      const Row next = order[row + kPrefetchAhead];
-      __builtin_prefetch(&boxes[next]);
-      __builtin_prefetch(&entries.cells[firstEntry[next]]);
+      __builtin_prefetch(&boxes[entries.boxes[order[row + kPrefetchAhead]]]);
     }
-    const Row box = order[row];
+    const Row at = order[row];
+    const Row box = entries.boxes[at];
     onsets_.push_back(onsetOf(boxes[box]));
     ids_.push_back(ids[box]);
-    for (std::size_t e = 0; e < entries.counts[box]; ++e) {
-      CellData& cell = cells_[entries.cells[firstEntry[box] + e]];
+    for (std::size_t e = 0; e < entries.counts[at]; ++e) {
+      CellData& cell = cells_[entries.cells[firstEntry[at] + e]];
       cell.rows[cell.count++] = row;
     }
   }
