@@ -6,26 +6,23 @@
 //     was last descended need not be looked at while it lasts. (The idea is the seed's time to
 //     contact, 5.1, measured in way instead of time, so that nothing is assumed of the motion.)
 //  2. Candidates, the triangles inside of the horizon, go from query to query with their features.
-//     One is decided anew only when its margin is used up (contacts) or cannot exclude that it is
-//     the nearest (distance); started from its last features, with a limit beyond which decide()
-//     gives up.
+//     When a margin is used up (contacts), or cannot exclude that the triangle is the nearest, a
+//     new one is looked for: along the last axis, or the normal of the triangle or the way between
+//     the centres where there is no last axis; for what was penetrated, inside of the body
+//     (hull_planes). Where that fails, decide() is asked, started from the last features.
 //  3. Gathering. When the horizon is used up, the tree is descended depth first, nearer child
 //  first,
-//     bounded by the nearest known triangle and a lookahead of kLookahead steps of the body. Lower
-//     bounds of the distance to a box: from the body's box, from its ball, and from the plane of
-//     the last closest points.
+//     bounded by the nearest known triangle and a lookahead of some steps of the body. Lower bounds
+//     of the distance to a box: from the body's box, from its ball, and from the plane of the last
+//     closest points (mesh_probe).
 // Departure from the usual best-first search with a queue: with the last nearest triangle as the
 // first bound, the queue costs more than the few boxes that it saves.
-//
-// Rounding. The search works in the tree's frame: the body's vertices are turned and moved by
-// t - origin. Everything there is smaller than L = extent + |t - origin| + 2r, a vertex is off by
-// less than 8u L, a box, a ball or a plane's gap by less than 16u L: kPad L = 64u L is subtracted
-// from each lower bound. (That weakens the search, not its answer: verdicts are decide()'s.)
 #include "collision/mesh_query.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "collision/mesh_probe.hpp"
 #include "collision/refine.hpp"
 
 namespace enfilade::collision {
@@ -33,10 +30,13 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kUnit = 0x1p-53;
-constexpr double kPad = 64 * kUnit;            // see the file's head
-constexpr double kLookahead = 8;               // steps of the body: gathers are rarer, lists longer
-constexpr double kMostWay = 64;                // horizons on the odometer until it is set back to 0
-constexpr std::size_t kMostCandidates = 1024;  // beyond, the farthest are left to the next gather
+constexpr double kMostWay = 64;  // horizons on the odometer until it is set back to 0
+
+// How far to look ahead: so many steps, but not farther than part of the body's radius. The longer,
+// the rarer is gathering and the longer are the lists; measured on 50,880 triangles.
+constexpr double kLookaheadSteps = 8;
+constexpr double kLookaheadRadii = 0.25;
+constexpr std::size_t kMostCandidates = 256;  // beyond, the farthest are left to the next gather
 
 using Candidate = MeshCache::Candidate;
 
@@ -86,126 +86,6 @@ bool seesAsFarAs(const MeshCache& cache, double distance) {
          cache.horizon - cache.odometer * (1 + 4 * kUnit) > distance;
 }
 
-// ---- deciding one triangle ---------------------------------------------------------------------
-
-double marginInside(const ConvexBody& body, const Triangle& triangle, MeshCache& cache) {
-  if (!body.hull) return 0;
-  if (!cache.planes.made) cache.planes = HullPlanes(*body.hull);
-  return clearanceInside(cache.planes, body, triangle);
-}
-
-/// decideWithin(), and what it tells for later.
-std::optional<Decision> decideCandidate(const ConvexBody& body, const TriangleTree& mesh,
-                                        double limit, MeshCache& cache, Candidate& candidate) {
-  const Triangle& triangle = mesh.triangles()[candidate.triangle];
-  const auto decision =
-      decideWithin(body, {std::span<const Vec3>(triangle)}, limit, candidate.features);
-  ++cache.decisions;
-  candidate.decided = true;
-  candidate.since = cache.odometer;
-  candidate.verdict = decision ? decision->verdict : Verdict::separated;
-  candidate.margin = 0;
-  if (!decision) {
-    candidate.margin = limit;
-  } else if (decision->verdict == Verdict::separated) {
-    candidate.margin = std::max(0.0, decision->distance - decision->errorBound);
-  } else if (decision->verdict == Verdict::penetrating) {
-    candidate.margin = marginInside(body, triangle, cache);
-  }
-  return decision;
-}
-
-/// A lower bound of the distance, by what is known.
-double knownDistance(const MeshCache& cache, const Candidate& candidate) {
-  return candidate.verdict == Verdict::separated ? std::max(0.0, wayLeft(cache, candidate)) : 0;
-}
-
-/// Decides the candidate if it may be nearer than `found`; `best` bounds the least distance.
-void decideIfNearer(const ConvexBody& body, const TriangleTree& mesh, MeshCache& cache,
-                    Candidate& candidate, double& best, std::optional<NearestTriangle>& found) {
-  if (found && (found->triangle == candidate.triangle || found->decision.distance == 0)) return;
-  if (knownDistance(cache, candidate) > best) return;
-  const auto decision =
-      decideCandidate(body, mesh, best + kLookahead * cache.step, cache, candidate);
-  if (!decision || decision->distance - decision->errorBound > best) return;
-  if (found && !(decision->distance < found->decision.distance)) return;
-  found = NearestTriangle{candidate.triangle, *decision};
-  best = std::min(best, decision->distance + decision->errorBound);
-}
-
-// ---- the search's lower bounds -----------------------------------------------------------------
-
-/// The body in the tree's frame.
-struct Probe {
-  Box box;
-  Vec3 centre = Vec3::Zero();
-  double radius = 0;         ///< of a ball around `centre` that holds the body
-  Vec3 axis = Vec3::Zero();  ///< unit or zero; the body lies below `support` along it
-  double support = 0;
-  double pad = 0;
-};
-
-Probe probeOf(const ConvexBody& body, const TriangleTree& mesh, const MeshCache& cache,
-              const Vec3& axis) {
-  thread_local std::vector<Vec3> turned;
-  turned.clear();
-  const Vec3 shift = body.translation - mesh.boxes().origin;
-  Probe probe;
-  const double length = axis.norm();
-  if (length > 0 && std::isfinite(length)) probe.axis = axis / length;
-  probe.support = -kInfinite;
-  for (const Vec3& v : body.vertices) {
-    turned.push_back((body.rotation ? Vec3(*body.rotation * v) : v) + shift);
-    probe.box.include(turned.back());
-    probe.support = std::max(probe.support, probe.axis.dot(turned.back()));
-  }
-  probe.centre = probe.box.centre();
-  double squared = 0;
-  for (const Vec3& v : turned) squared = std::max(squared, (v - probe.centre).squaredNorm());
-  probe.radius = std::sqrt(squared);
-  probe.pad = kPad * (mesh.boxes().extent + shift.cwiseAbs().sum() + 2 * cache.radius);
-  return probe;
-}
-
-double boxesApart(const Probe& probe, const Vec3& min, const Vec3& max) {
-  const Vec3 gap = (min - probe.box.max).cwiseMax(probe.box.min - max).cwiseMax(0.0);
-  const Vec3 out = (min - probe.centre).cwiseMax(probe.centre - max).cwiseMax(0.0);
-  return std::max(std::sqrt(gap.squaredNorm()), std::sqrt(out.squaredNorm()) - probe.radius);
-}
-
-double lowerBound(const Probe& probe, const NarrowBox& box) {
-  const Vec3 min(box.min[0], box.min[1], box.min[2]), max(box.max[0], box.max[1], box.max[2]);
-  double least = -probe.support;
-  for (int i = 0; i < 3; ++i) least += probe.axis[i] * (probe.axis[i] > 0 ? min[i] : max[i]);
-  return std::max(boxesApart(probe, min, max), least) - probe.pad;
-}
-
-double lowerBound(const Probe& probe, const Triangle& world, const Vec3& origin) {
-  const Triangle t{world[0] - origin, world[1] - origin, world[2] - origin};
-  const Box box = boxOf(t);
-  const double least =
-      std::min({probe.axis.dot(t[0]), probe.axis.dot(t[1]), probe.axis.dot(t[2])}) - probe.support;
-  return std::max(boxesApart(probe, box.min, box.max), least) - probe.pad;
-}
-
-// ---- gathering ---------------------------------------------------------------------------------
-
-/// What is being looked for: everything not farther than best + lookahead, and in a search for the
-/// nearest, `best` shrinks on the way.
-struct Gather {
-  const ConvexBody& body;
-  const TriangleTree& mesh;
-  MeshCache& cache;
-  Probe probe;
-  double best;  ///< contacts: 0; nearest: an upper bound of the distance, or the limit
-  double lookahead;
-  bool wantsNearest;
-  std::vector<Candidate> old;  ///< ascending in `triangle`
-  std::optional<NearestTriangle> found{};
-
-  double reach() const { return best + lookahead; }
-};
-
 std::optional<std::size_t> indexOf(const std::vector<Candidate>& list, std::uint32_t triangle) {
   const auto at = std::lower_bound(
       list.begin(), list.end(), triangle,
@@ -214,33 +94,177 @@ std::optional<std::size_t> indexOf(const std::vector<Candidate>& list, std::uint
   return static_cast<std::size_t>(at - list.begin());
 }
 
+/// Of the last closest points; zero where there are none.
+Vec3 lastAxis(const MeshCache& cache) {
+  const auto at = indexOf(cache.candidates, cache.nearest);
+  return at ? cache.candidates[*at].features.axis : Vec3(Vec3::Zero());
+}
+
+// ---- one query ---------------------------------------------------------------------------------
+
+struct Query {
+  const ConvexBody& body;
+  const TriangleTree& mesh;
+  MeshCache& cache;
+  double lookahead;
+  bool probed = false;
+
+  Query(const ConvexBody& asked, const TriangleTree& against, MeshCache& kept)
+      : body(asked), mesh(against), cache(kept) {
+    track(body, cache);
+    const double most = kLookaheadRadii * cache.radius;
+    lookahead = 2 * cache.step > most ? 0 : std::min(kLookaheadSteps * cache.step, most);
+  }
+
+  const Triangle& triangle(const Candidate& candidate) const {
+    return mesh.triangles()[candidate.triangle];
+  }
+  Triangle inTree(std::uint32_t i) const {
+    const Triangle& t = mesh.triangles()[i];
+    const Vec3& origin = mesh.boxes().origin;
+    return {t[0] - origin, t[1] - origin, t[2] - origin};
+  }
+  /// Placed when first needed: most queries of a body that hardly moves do without.
+  const MeshProbe& probe() {
+    if (!probed) placeProbe(body, cache.radius, mesh.boxes(), lastAxis(cache), cache.probe);
+    probed = true;
+    return cache.probe;
+  }
+};
+
+// ---- deciding one triangle ---------------------------------------------------------------------
+
+void settle(const Query& query, Candidate& candidate, Verdict verdict, double margin) {
+  candidate.decided = true;
+  candidate.verdict = verdict;
+  candidate.margin = margin;
+  candidate.since = query.cache.odometer;
+}
+
+/// A lower bound of the distance, by what is known.
+double knownDistance(const MeshCache& cache, const Candidate& candidate) {
+  return candidate.verdict == Verdict::separated ? std::max(0.0, wayLeft(cache, candidate)) : 0;
+}
+
+/// Whether a plane proves a distance above `wanted`; then it is known.
+bool provedFarther(Query& query, Candidate& candidate, double wanted) {
+  const Triangle triangle = query.inTree(candidate.triangle);
+  const MeshProbe& probe = query.probe();
+  const auto proves = [&](const Vec3& axis) {
+    const double lower = lowerBoundAlong(probe, axis, triangle);
+    if (!(lower > wanted)) return false;
+    settle(query, candidate, Verdict::separated, lower);
+    return true;
+  };
+  FeatureCache& features = candidate.features;
+  if (!features.axis.isZero(0)) return proves(features.axis);
+  const Vec3 between = (triangle[0] + triangle[1] + triangle[2]) / 3 - probe.centre;
+  Vec3 normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
+  if (normal.dot(between) < 0) normal = -normal;
+  features.axis = normal;
+  if (proves(normal)) return true;
+  if (proves(between)) {
+    features.axis = between;
+    return true;
+  }
+  return false;
+}
+
+double marginInside(Query& query, const Candidate& candidate) {
+  if (!query.body.hull) return 0;
+  HullPlanes& planes = query.cache.planes;
+  if (!planes.made) planes = HullPlanes(*query.body.hull);
+  return clearanceInside(planes, query.body, query.triangle(candidate));
+}
+
+/// decideWithin(), and what it tells for later.
+std::optional<Decision> decideCandidate(Query& query, Candidate& candidate, double limit) {
+  const ConvexBody triangle{std::span<const Vec3>(query.triangle(candidate))};
+  const auto decision = decideWithin(query.body, triangle, limit, candidate.features);
+  ++query.cache.decisions;
+  if (!decision) {
+    settle(query, candidate, Verdict::separated, limit);
+  } else if (decision->verdict == Verdict::separated) {
+    settle(query, candidate, Verdict::separated,
+           std::max(0.0, decision->distance - decision->errorBound));
+  } else {
+    const bool inside = decision->verdict == Verdict::penetrating;
+    settle(query, candidate, decision->verdict, inside ? marginInside(query, candidate) : 0);
+  }
+  return decision;
+}
+
+/// Makes the candidate's verdict hold, without its distance.
+void decideVerdict(Query& query, Candidate& candidate) {
+  if (holds(query.cache, candidate)) return;
+  if (candidate.verdict != Verdict::separated) {
+    const double margin = marginInside(query, candidate);
+    if (margin > 0) return settle(query, candidate, Verdict::penetrating, margin);
+  }
+  const bool fresh = candidate.features.axis.isZero(0);
+  if (provedFarther(query, candidate, 0)) return;
+  if (fresh) {
+    const double margin = marginInside(query, candidate);
+    if (margin > 0) return settle(query, candidate, Verdict::penetrating, margin);
+  }
+  decideCandidate(query, candidate, query.lookahead);
+}
+
+/// The nearest triangle so far; `best` bounds the least distance from above.
+struct Nearest {
+  double best;
+  std::optional<NearestTriangle> found{};
+
+  bool done() const { return found && found->decision.distance == 0; }
+};
+
+/// Decides the candidate if it may be nearer than what was found.
+void decideIfNearer(Query& query, Candidate& candidate, Nearest& nearest) {
+  auto& found = nearest.found;
+  if (nearest.done() || (found && found->triangle == candidate.triangle)) return;
+  if (knownDistance(query.cache, candidate) > nearest.best) return;
+  if (found && provedFarther(query, candidate, nearest.best)) return;
+  const auto decision = decideCandidate(query, candidate, nearest.best + query.lookahead);
+  if (!decision || decision->distance - decision->errorBound > nearest.best) return;
+  if (found && !(decision->distance < found->decision.distance)) return;
+  found = NearestTriangle{candidate.triangle, *decision};
+  nearest.best = std::min(nearest.best, decision->distance + decision->errorBound);
+}
+
+// ---- gathering ---------------------------------------------------------------------------------
+
+/// Everything not farther than best + lookahead is wanted; in a search for the nearest, `best`
+/// shrinks on the way.
+struct Gather {
+  Query& query;
+  Nearest nearest;
+  bool wantsNearest;
+  std::vector<Candidate> old{};  ///< ascending in `triangle`
+
+  double reach() const { return nearest.best + query.lookahead; }
+};
+
 /// Last query's candidate of this triangle, or a new one.
 Candidate candidateOf(const Gather& gather, std::uint32_t triangle) {
   if (const auto at = indexOf(gather.old, triangle)) return gather.old[*at];
   Candidate fresh;
   fresh.triangle = triangle;
-  fresh.features.axis = gather.probe.axis;
   return fresh;
 }
 
 /// Puts the triangle on the list if it is near enough, and in a search for the nearest decides it
 /// where it may be that.
 void consider(Gather& gather, std::uint32_t triangle) {
-  MeshCache& cache = gather.cache;
-  const double lower =
-      lowerBound(gather.probe, gather.mesh.triangles()[triangle], gather.mesh.boxes().origin);
+  MeshCache& cache = gather.query.cache;
+  const double lower = lowerBound(gather.query.probe(), gather.query.inTree(triangle));
   if (lower > gather.reach()) {
     cache.horizon = std::min(cache.horizon, lower);
     return;
   }
   Candidate candidate = candidateOf(gather, triangle);
-  if (lower > 0 && !(candidate.decided && wayLeft(cache, candidate) > lower)) {
-    candidate.verdict = Verdict::separated;
-    candidate.margin = lower;
-    candidate.since = cache.odometer;
-  }
-  if (gather.wantsNearest && lower <= gather.best)
-    decideIfNearer(gather.body, gather.mesh, cache, candidate, gather.best, gather.found);
+  if (lower > knownDistance(cache, candidate))
+    settle(gather.query, candidate, Verdict::separated, lower);
+  if (gather.wantsNearest) decideIfNearer(gather.query, candidate, gather.nearest);
   cache.candidates.push_back(candidate);
 }
 
@@ -250,22 +274,24 @@ void descend(Gather& gather) {
     const BoxTree::Branch* branch;
     double lower;
   };
-  const BoxTree& tree = gather.mesh.boxes();
+  const BoxTree& tree = gather.query.mesh.boxes();
+  const MeshProbe& probe = gather.query.probe();
+  MeshCache& cache = gather.query.cache;
   std::array<Open, kTreeDepthBound> stack;
   std::size_t depth = 0;
-  stack[depth++] = {&tree.root, lowerBound(gather.probe, tree.root.box)};
+  stack[depth++] = {&tree.root, lowerBound(probe, tree.root.box)};
   while (depth > 0) {  // each branch once
     const Open open = stack[--depth];
     if (open.lower > gather.reach()) {
-      gather.cache.horizon = std::min(gather.cache.horizon, open.lower);
+      cache.horizon = std::min(cache.horizon, open.lower);
       continue;
     }
     const BoxTree::Branch& branch = *open.branch;
     for (std::uint32_t i = branch.first; i < branch.first + branch.count; ++i) consider(gather, i);
     if (branch.isLeaf()) continue;
     const auto& children = tree.nodes[branch.first].children;
-    const Open left{&children[0], lowerBound(gather.probe, children[0].box)};
-    const Open right{&children[1], lowerBound(gather.probe, children[1].box)};
+    const Open left{&children[0], lowerBound(probe, children[0].box)};
+    const Open right{&children[1], lowerBound(probe, children[1].box)};
     const bool leftFirst = left.lower <= right.lower;
     stack[depth++] = leftFirst ? right : left;
     stack[depth++] = leftFirst ? left : right;
@@ -274,14 +300,14 @@ void descend(Gather& gather) {
 
 /// Drops candidates beyond the final reach, and the farthest of too many; the horizon follows.
 void trim(const Gather& gather) {
-  MeshCache& cache = gather.cache;
+  MeshCache& cache = gather.query.cache;
   auto& list = cache.candidates;
   double reach = gather.reach();
   if (list.size() > kMostCandidates) {
     std::vector<double> lower;
     for (const Candidate& candidate : list) lower.push_back(knownDistance(cache, candidate));
     std::nth_element(lower.begin(), lower.begin() + kMostCandidates, lower.end());
-    reach = std::max(gather.best, std::min(reach, lower[kMostCandidates]));
+    reach = std::max(gather.nearest.best, std::min(reach, lower[kMostCandidates]));
   }
   std::erase_if(list, [&](const Candidate& candidate) {
     const double lower = knownDistance(cache, candidate);
@@ -305,91 +331,76 @@ void resetOdometer(MeshCache& cache) {
   cache.quietUntil = -1;
 }
 
-/// Makes a new list of candidates: all triangles not farther than `gather`'s reach, and some.
+/// Makes a new list of candidates: all triangles not farther than the gather's reach, and some.
 void gatherCandidates(Gather& gather) {
-  MeshCache& cache = gather.cache;
+  MeshCache& cache = gather.query.cache;
   ++cache.gathers;
+  gather.query.probe();  // with the axis of the old list
   resetOdometer(cache);
   cache.horizon = kInfinite;
   gather.old.swap(cache.candidates);
-  if (!gather.mesh.triangles().empty()) descend(gather);
+  if (!gather.query.mesh.triangles().empty()) descend(gather);
   trim(gather);
-}
-
-Gather gatherFor(const ConvexBody& body, const TriangleTree& mesh, MeshCache& cache, double best,
-                 const Vec3& axis) {
-  return {body,  mesh, cache, probeOf(body, mesh, cache, axis), best, kLookahead * cache.step,
-          false, {}};
-}
-
-Vec3 lastAxis(const MeshCache& cache) {
-  const auto at = indexOf(cache.candidates, cache.nearest);
-  return at ? cache.candidates[*at].features.axis : Vec3(Vec3::Zero());
 }
 
 }  // namespace
 
 std::optional<NearestTriangle> nearestTriangle(const ConvexBody& body, const TriangleTree& mesh,
                                                MeshCache& cache, double limit) {
-  track(body, cache);
-  double best = limit;
-  std::optional<NearestTriangle> found;
+  Query query(body, mesh, cache);
+  Nearest nearest{limit};
   if (seesAsFarAs(cache, 0)) {
     if (const auto last = indexOf(cache.candidates, cache.nearest))
-      decideIfNearer(body, mesh, cache, cache.candidates[*last], best, found);
-    for (Candidate& candidate : cache.candidates)
-      decideIfNearer(body, mesh, cache, candidate, best, found);
+      decideIfNearer(query, cache.candidates[*last], nearest);
+    for (Candidate& candidate : cache.candidates) decideIfNearer(query, candidate, nearest);
   }
-  if (!seesAsFarAs(cache, found && found->decision.distance == 0 ? 0 : best)) {
-    const Vec3 axis = found ? found->decision.normal : lastAxis(cache);
-    Gather gather = gatherFor(body, mesh, cache, best, axis);
-    gather.wantsNearest = true;
-    gather.found = found;
+  if (!nearest.done() && !seesAsFarAs(cache, nearest.best)) {
+    Gather gather{query, nearest, true};
     gatherCandidates(gather);
-    found = gather.found;
+    nearest = gather.nearest;
   }
-  if (found) cache.nearest = found->triangle;
-  return found;
+  if (nearest.found) cache.nearest = nearest.found->triangle;
+  return nearest.found;
 }
 
 void findContacts(const ConvexBody& body, const TriangleTree& mesh, MeshCache& cache,
                   MeshContacts& contacts) {
   contacts.penetrated.clear();
   contacts.touched.clear();
-  track(body, cache);
+  Query query(body, mesh, cache);
   if (cache.odometer < cache.quietUntil) return;
   if (!seesAsFarAs(cache, 0)) {
-    Gather gather = gatherFor(body, mesh, cache, 0, lastAxis(cache));
+    Gather gather{query, {0}, false};
     gatherCandidates(gather);
   }
   double quiet = cache.horizon;
   for (Candidate& candidate : cache.candidates) {
-    if (!holds(cache, candidate))
-      decideCandidate(body, mesh, kLookahead * cache.step, cache, candidate);
+    decideVerdict(query, candidate);
     if (candidate.verdict == Verdict::penetrating)
       contacts.penetrated.push_back(candidate.triangle);
     if (candidate.verdict == Verdict::touching) contacts.touched.push_back(candidate.triangle);
-    quiet = std::min(quiet, candidate.since + candidate.margin * (1 - 8 * kUnit));
+    quiet = std::min(quiet, candidate.since + candidate.margin);
   }
-  cache.quietUntil = contacts.verdict() == Verdict::separated ? quiet * (1 - 8 * kUnit) : -1;
+  cache.quietUntil = contacts.verdict() == Verdict::separated ? quiet * (1 - 16 * kUnit) : -1;
 }
 
 bool isAnythingNearer(const ConvexBody& body, const TriangleTree& mesh, double limit,
                       MeshCache& cache) {
-  track(body, cache);
+  Query query(body, mesh, cache);
+  if (!(limit > 0)) return false;
   if (!seesAsFarAs(cache, limit)) {
-    Gather gather = gatherFor(body, mesh, cache, std::max(0.0, limit), lastAxis(cache));
+    Gather gather{query, {limit}, false};
     gatherCandidates(gather);
   }
   for (Candidate& candidate : cache.candidates) {
-    if (knownDistance(cache, candidate) >= limit) continue;
-    const auto decision =
-        decideCandidate(body, mesh, limit + kLookahead * cache.step, cache, candidate);
+    if (holds(cache, candidate) && candidate.verdict != Verdict::separated) return true;
+    if (knownDistance(cache, candidate) >= limit || provedFarther(query, candidate, limit))
+      continue;
+    const auto decision = decideCandidate(query, candidate, limit + query.lookahead);
     if (!decision || decision->distance - decision->errorBound >= limit) continue;
     if (decision->distance + decision->errorBound < limit) return true;
-    const Triangle& triangle = mesh.triangles()[candidate.triangle];
-    if (isNearerThan(body, {std::span<const Vec3>(triangle)}, limit, candidate.features))
-      return true;
+    const ConvexBody triangle{std::span<const Vec3>(query.triangle(candidate))};
+    if (isNearerThan(body, triangle, limit, candidate.features)) return true;
   }
   return false;
 }

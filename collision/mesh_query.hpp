@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "collision/hull_planes.hpp"
+#include "collision/mesh_probe.hpp"
 #include "collision/narrow_phase.hpp"
 #include "collision/triangle_tree.hpp"
 
@@ -35,6 +36,7 @@ struct MeshCache {
   Mat3 rotation = Mat3::Identity();
   double radius = -1;  ///< of the body, about its own origin; negative: not measured
   HullPlanes planes;   ///< of the body's hull, made when first needed
+  MeshProbe probe;     ///< the storage of the search
   std::uint64_t gathers = 0, decisions = 0;  ///< counters, for metrics and tests
 
   void reset() { *this = MeshCache{}; }
