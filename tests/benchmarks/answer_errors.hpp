@@ -16,7 +16,9 @@ struct TrueAnswer {
 struct Errors {
   std::size_t count = 0, wrong = 0, wrongBeyond = 0, none = 0;
   std::size_t filter = 0, expansion = 0, rational = 0;
-  std::vector<double> distance, depth;  ///< relative
+  std::size_t upperBounds = 0;          ///< depths that are not proved to be the least
+  std::vector<double> distance, depth;  ///< relative; depth: upper bounds as well
+  std::vector<double> provedDepth;      ///< relative; without them
 
   void add(const Answer& answer, const TrueAnswer& truth) {
     ++count;
@@ -37,6 +39,8 @@ struct Errors {
     }
     if (truth.depth > 0 && !std::isnan(answer.depth)) {
       depth.push_back(relative(answer.depth, truth.depth));
+      if (answer.depthProved) provedDepth.push_back(depth.back());
+      if (!answer.depthProved) ++upperBounds;
     }
   }
 
@@ -49,7 +53,9 @@ struct Errors {
             {"expansion", expansion},
             {"rational", rational},
             {"distance_error", quantiles(distance)},
-            {"depth_error", quantiles(depth)}};
+            {"depth_error", quantiles(depth)},
+            {"upper_bounds", upperBounds},
+            {"proved_depth_error", quantiles(provedDepth)}};
   }
 
  private:

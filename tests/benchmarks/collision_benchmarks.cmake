@@ -44,39 +44,47 @@ find_library(BENCH_EMBREE_LIBRARY embree3)
 bench_peer(embree "${BENCH_EMBREE_DIR}" INCLUDES ${BENCH_EMBREE_DIR}
   LIBRARIES ${BENCH_EMBREE_LIBRARY})
 
-# Each peer's part of a program, compiled with that peer's flags only; the tables of methods with
-# all their definitions.
-# bench_program(NAME TABLE SUFFIX SOURCES..): peers/PEER_SUFFIX.cpp where there is one.
-function(bench_program name table suffix)
-  set(libraries enfilade_collision nlohmann_json::nlohmann_json)
-  set(definitions "")
+# Each peer's part is compiled with that peer's flags only; the table of methods knows who is there.
+# bench_methods(NAME SUFFIX SOURCES..): a library of peers/PEER_SUFFIX.cpp and SOURCES; the first of
+# these is the table.
+function(bench_methods name suffix table)
+  add_library(${name} STATIC ${table} ${ARGN})
+  target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${name} PUBLIC enfilade_collision nlohmann_json::nlohmann_json)
   foreach(peer ${ENFILADE_PEERS})
     set(source ${CMAKE_CURRENT_SOURCE_DIR}/peers/${peer}_${suffix}.cpp)
     if(EXISTS ${source})
       add_library(${name}_${peer} OBJECT ${source})
       target_include_directories(${name}_${peer} PRIVATE ${PROJECT_SOURCE_DIR})
       target_link_libraries(${name}_${peer} PRIVATE enfilade_collision bench_${peer})
-      string(TOUPPER ${peer} upper)
-      list(APPEND definitions BENCH_${upper})
-      list(APPEND libraries ${name}_${peer} $<TARGET_PROPERTY:bench_${peer},INTERFACE_LINK_LIBRARIES>)
+      target_sources(${name} PRIVATE $<TARGET_OBJECTS:${name}_${peer}>)
+      target_link_libraries(${name} PUBLIC
+        $<TARGET_PROPERTY:bench_${peer},INTERFACE_LINK_LIBRARIES>)
+      string(TOUPPER BENCH_${peer} definition)
+      set_property(SOURCE ${table} APPEND PROPERTY COMPILE_DEFINITIONS ${definition})
     endif()
   endforeach()
-  enfilade_benchmark(${name} SOURCES ${ARGN} ${table} LIBRARIES ${libraries})
-  set_source_files_properties(${table} PROPERTIES COMPILE_DEFINITIONS "${definitions}")
-  add_dependencies(collision_benchmarks ${name})
 endfunction()
 
-add_custom_target(collision_benchmarks)
-bench_program(collision_broad_phase broad_phase_methods.cpp pairs
-  collision_broad_phase.cpp building_workload.cpp approaches/brute_force.cpp
-  approaches/bsp_tree.cpp approaches/hash_grid.cpp approaches/interval_tree.cpp
-  approaches/loose_octree.cpp)
+bench_methods(bench_broad_phases pairs broad_phase_methods.cpp
+  approaches/brute_force.cpp approaches/bsp_tree.cpp approaches/hash_grid.cpp
+  approaches/interval_tree.cpp approaches/loose_octree.cpp)
+bench_methods(bench_narrow_phases convex narrow_phase_methods.cpp our_narrow_phases.cpp)
+bench_methods(bench_mesh_queries mesh mesh_methods.cpp our_mesh_queries.cpp)
 
+enfilade_benchmark(collision_broad_phase
+  SOURCES collision_broad_phase.cpp building_workload.cpp
+  LIBRARIES bench_broad_phases)
 set(accuracy ${PROJECT_SOURCE_DIR}/tests/accuracy)
-bench_program(collision_narrow_phase narrow_phase_methods.cpp convex
-  collision_narrow_phase.cpp convex_motions.cpp guarded_run.cpp our_narrow_phases.cpp
-  ${accuracy}/case_file.cpp ${accuracy}/exact_geometry.cpp)
-target_link_libraries(collision_narrow_phase PRIVATE gmpxx gmp)
-if(EXISTS ${PROJECT_SOURCE_DIR}/collision/refine.cpp)
-  target_compile_definitions(collision_narrow_phase PRIVATE BENCH_REFINE)
-endif()
+enfilade_benchmark(collision_narrow_phase
+  SOURCES collision_narrow_phase.cpp convex_motions.cpp guarded_run.cpp ${accuracy}/case_file.cpp
+          ${accuracy}/exact_geometry.cpp
+  LIBRARIES bench_narrow_phases gmpxx gmp)
+enfilade_benchmark(collision_mesh
+  SOURCES collision_mesh.cpp
+  LIBRARIES bench_mesh_queries)
+enfilade_benchmark(collision_icollide
+  SOURCES collision_icollide.cpp
+  LIBRARIES bench_broad_phases bench_narrow_phases)
+add_custom_target(collision_benchmarks DEPENDS
+  collision_broad_phase collision_narrow_phase collision_mesh collision_icollide)

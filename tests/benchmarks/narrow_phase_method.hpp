@@ -32,6 +32,7 @@ struct Answer {
   std::int8_t decidedBy = -1;  ///< ours: collision::DecidedBy; others: -1
   double distance = std::numeric_limits<double>::quiet_NaN();  ///< metres; NaN: not told
   double depth = std::numeric_limits<double>::quiet_NaN();
+  bool depthProved = true;  ///< ours: false for an upper bound
 };
 
 inline Answer apart(double distance) {

@@ -47,7 +47,9 @@ class DecidesWithDepth : public OurPair {
     Answer answer = told.verdict == Verdict::separated ? apart(told.distance) : collides(0);
     answer.decidedBy = static_cast<std::int8_t>(told.decidedBy);
     if (told.verdict == Verdict::penetrating) {
-      answer.depth = collision::penetrationDepth(bodyA, bodyB, features_, depth_).depth;
+      const auto depth = collision::penetrationDepth(bodyA, bodyB, features_, depth_);
+      answer.depth = depth.depth;
+      answer.depthProved = depth.global;
     }
     return answer;
   }
@@ -60,7 +62,6 @@ class DecidesWithDepth : public OurPair {
   collision::DepthCache depth_;
 };
 
-#ifdef BENCH_REFINE
 class Refines : public OurPair {
  public:
   using OurPair::OurPair;
@@ -72,7 +73,6 @@ class Refines : public OurPair {
     return answer;
   }
 };
-#endif
 
 template <typename Method>
 std::unique_ptr<PairOfBodies> make(const Points& a, const Points& b) {
@@ -82,13 +82,9 @@ std::unique_ptr<PairOfBodies> make(const Points& a, const Points& b) {
 }  // namespace
 
 std::vector<NarrowPhaseMethod> ourNarrowPhases() {
-  std::vector<NarrowPhaseMethod> all{
-      {"ours: decide", true, "decide", true, true, false, make<Decides>},
-      {"ours: decide with depth", true, "decide", true, true, true, make<DecidesWithDepth>}};
-#ifdef BENCH_REFINE
-  all.push_back({"ours: refine", true, "refine", true, true, true, make<Refines>});
-#endif
-  return all;
+  return {{"ours: decide", true, "decide", true, true, false, make<Decides>},
+          {"ours: decide with depth", true, "decide", true, true, true, make<DecidesWithDepth>},
+          {"ours: refine", true, "refine", true, true, true, make<Refines>}};
 }
 
 }  // namespace enfilade::benchmarks

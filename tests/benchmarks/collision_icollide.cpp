@@ -1,0 +1,338 @@
+// I-COLLIDE's five sweeps (Cohen, Lin, Manocha and Ponamgi 1995): number, faces, density, rotation
+// and translation of moving convex polytopes, with missed and false contacts beside the time.
+//
+//   collision_icollide [--quick] [--out FILE] [--only PART_OF_A_NAME]
+//
+// The paper's middle: 1000 polytopes of 36 faces, 10 degrees and 10 % of the radius a frame,
+// density 1 % (volume of the bodies to that of the cube they fly in). They pass through one another
+// and are turned back at the walls. A frame is timed from the new poses to all contacts: boxes,
+// broad phase, narrow phase of every pair. The truth is another way through the same exact verdict:
+// all pairs of boxes of every vertex by brute force, each decided cold.
+
+#include <unordered_map>
+
+#include "collision/bounding_box.hpp"
+#include "collision/narrow_phase.hpp"
+#include "tests/benchmarks/broad_phase_method.hpp"
+#include "tests/benchmarks/building_workload.hpp"
+#include "tests/benchmarks/measurement.hpp"
+#include "tests/benchmarks/narrow_phase_method.hpp"
+
+namespace {
+
+using namespace enfilade::benchmarks;
+namespace collision = enfilade::collision;
+using collision::ConvexBody;
+using collision::Hull;
+using collision::Pose;
+using Contacts = std::vector<std::pair<std::uint32_t, std::uint32_t>>;  ///< a < b, ascending
+
+struct Setting {
+  std::size_t number = 1000, faces = 36;
+  double density = 0.01, degrees = 10, radii = 0.1;  ///< of a frame
+};
+
+// ---- the world ---------------------------------------------------------------------------------
+
+double volumeOf(const Hull& hull) {
+  double six = 0;
+  for (const auto& face : hull.faces) {
+    for (std::size_t k = 2; k < face.size(); ++k) {
+      six += hull.vertices[face[0]].dot(hull.vertices[face[k - 1]].cross(hull.vertices[face[k]]));
+    }
+  }
+  return six / 6;
+}
+
+Vec3 direction(Random& random) {
+  while (true) {
+    const double x = uniform(random, -1, 1);
+    const double y = uniform(random, -1, 1);
+    const double z = uniform(random, -1, 1);
+    const Vec3 v(x, y, z);
+    if (v.squaredNorm() > 0.01 && v.squaredNorm() < 1) return v.normalized();
+  }
+}
+
+/// Vertices on the unit sphere: faces are triangles, twice as many as vertices, less four.
+Hull polytope(Random& random, std::size_t faces) {
+  Points points;
+  for (std::size_t k = 0; k < faces / 2 + 2; ++k) points.push_back(direction(random));
+  return collision::buildHull(points);
+}
+
+struct Flyer {
+  Pose pose;
+  Mat3 rotation;  ///< of the pose
+  Vec3 velocity;  ///< metres a frame
+  collision::Quat turn;
+};
+
+class Swarm {
+ public:
+  explicit Swarm(const Setting& setting) : hull(polytope(random_, setting.faces)) {
+    const double volume = volumeOf(hull) * static_cast<double>(setting.number);
+    edge_ = std::cbrt(volume / setting.density);
+    for (std::size_t k = 0; k < setting.number; ++k) flyers.push_back(fresh(setting));
+  }
+
+  void step() {
+    for (Flyer& f : flyers) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const double at = f.pose.translation[axis];
+        if (at < 0) f.velocity[axis] = std::abs(f.velocity[axis]);
+        if (at > edge_) f.velocity[axis] = -std::abs(f.velocity[axis]);
+      }
+      f.pose.translation += f.velocity;
+      f.pose.rotation = (f.turn * f.pose.rotation).normalized();
+      f.rotation = f.pose.rotation.toRotationMatrix();
+    }
+  }
+  ConvexBody body(std::size_t k) const {
+    return {hull.vertices, flyers[k].pose.translation, &flyers[k].rotation, &hull};
+  }
+
+ private:
+  Random random_{7};
+
+ public:
+  const Hull hull;
+  std::vector<Flyer> flyers;
+
+ private:
+  Flyer fresh(const Setting& setting) {
+    Flyer f;
+    const double x = uniform(random_, 0, edge_);
+    const double y = uniform(random_, 0, edge_);
+    const double z = uniform(random_, 0, edge_);
+    f.pose.translation = Vec3(x, y, z);
+    const Vec3 axis = direction(random_);
+    f.velocity = setting.radii * direction(random_);
+    f.turn = Eigen::AngleAxisd(setting.degrees * 0.017453292519943295, axis);
+    f.rotation = Mat3::Identity();
+    return f;
+  }
+  double edge_ = 0;
+};
+
+Contacts truthOf(const Swarm& swarm) {
+  std::vector<Box> boxes;
+  for (const Flyer& f : swarm.flyers) boxes.push_back(tightBoxBruteForce(swarm.hull, f.pose));
+  Contacts contacts;
+  for (std::uint32_t a = 0; a < boxes.size(); ++a) {
+    for (std::uint32_t b = a + 1; b < boxes.size(); ++b) {
+      if (!collision::overlaps(boxes[a], boxes[b])) continue;
+      collision::FeatureCache cold;
+      const auto told = collision::decide(swarm.body(a), swarm.body(b), cold);
+      if (told.verdict != collision::Verdict::separated) contacts.emplace_back(a, b);
+    }
+  }
+  return contacts;
+}
+
+// ---- ours and the peers ------------------------------------------------------------------------
+
+class Detector {
+ public:
+  virtual ~Detector() = default;
+  /// Contacts of this frame in any order; returns the number of pairs that were decided.
+  virtual std::size_t frame(const Swarm& swarm, Contacts& contacts) = 0;
+};
+
+enum class Boxes { fixedCubes, tight };
+
+class BoxMaker {
+ public:
+  explicit BoxMaker(Boxes kind) : kind_(kind) {}
+  std::span<const Box> boxes(const Swarm& swarm) {
+    boxes_.resize(swarm.flyers.size());
+    extremal_.resize(swarm.flyers.size());
+    for (std::size_t k = 0; k < boxes_.size(); ++k) {
+      const Pose& pose = swarm.flyers[k].pose;
+      boxes_[k] = kind_ == Boxes::tight ? tightBox(swarm.hull, pose, extremal_[k])
+                                        : fixedCube(swarm.hull, pose);
+    }
+    return boxes_;
+  }
+
+ private:
+  Boxes kind_;
+  std::vector<Box> boxes_;
+  std::vector<collision::ExtremalVertices> extremal_;
+};
+
+/// Sort and sweep, and decide() from the features of the last frame.
+class OurDetector : public Detector {
+ public:
+  explicit OurDetector(Boxes kind) : boxes_(kind), sweep_({}) {}
+
+  std::size_t frame(const Swarm& swarm, Contacts& contacts) override {
+    const auto boxes = boxes_.boxes(swarm);
+    for (std::uint32_t k = 0; k < boxes.size(); ++k) {
+      if (inserted_) sweep_.move(k, boxes[k]);
+      if (!inserted_) sweep_.insert(boxes[k]);
+    }
+    inserted_ = true;
+    sweep_.update();
+    for (const BoxPair& pair : sweep_.ended()) features_.erase(keyOf(pair.mover, pair.other));
+    std::size_t pairs = 0;
+    for (std::uint32_t a = 0; a < boxes.size(); ++a) {
+      for (const auto& partner : sweep_.partners(a)) {
+        if (partner.id <= a) continue;
+        ++pairs;
+        const auto told = collision::decide(swarm.body(a), swarm.body(partner.id),
+                                            features_[keyOf(a, partner.id)]);
+        if (told.verdict != collision::Verdict::separated) contacts.emplace_back(a, partner.id);
+      }
+    }
+    return pairs;
+  }
+
+ private:
+  static std::uint64_t keyOf(std::uint32_t a, std::uint32_t b) {
+    return (std::uint64_t{a} << 32) + b;
+  }
+  BoxMaker boxes_;
+  collision::SortAndSweep sweep_;
+  bool inserted_ = false;
+  std::unordered_map<std::uint64_t, collision::FeatureCache> features_;
+};
+
+/// A peer's broad phase on fixed cubes, and its narrow phase.
+class PeerDetector : public Detector {
+ public:
+  PeerDetector(const BroadPhaseMethod& broad, const NarrowPhaseMethod& narrow, const Swarm& swarm)
+      : boxes_(Boxes::fixedCubes),
+        broad_(broad.make({})),
+        pair_(narrow.make(swarm.hull.vertices, swarm.hull.vertices)) {}
+
+  std::size_t frame(const Swarm& swarm, Contacts& contacts) override {
+    pairs_.clear();
+    PairTally tally;
+    tally.kept = &pairs_;
+    broad_->tick(boxes_.boxes(swarm), tally);
+    for (const BoxPair& pair : pairs_) {
+      pair_->forget();  // one pair of shapes stands for all
+      const Answer told =
+          pair_->ask(placementOf(swarm, pair.mover), placementOf(swarm, pair.other));
+      if (told.verdict == Answer::Verdict::collides) contacts.emplace_back(pair.mover, pair.other);
+    }
+    return pairs_.size();
+  }
+
+ private:
+  static Placement placementOf(const Swarm& swarm, std::uint32_t k) {
+    return {swarm.flyers[k].rotation, swarm.flyers[k].pose.translation};
+  }
+  BoxMaker boxes_;
+  std::unique_ptr<BroadPhase> broad_;
+  std::unique_ptr<PairOfBodies> pair_;
+  std::vector<BoxPair> pairs_;
+};
+
+struct Contestant {
+  std::string name;
+  std::unique_ptr<Detector> detector;
+  std::vector<double> milliseconds;
+  std::size_t pairs = 0, missed = 0, wrong = 0;
+};
+
+std::vector<Contestant> contestants(const Swarm& swarm, const Arguments& arguments) {
+  std::vector<Contestant> all;
+  const auto add = [&](const std::string& name, std::unique_ptr<Detector> detector) {
+    if (!arguments.wants(name)) return;
+    all.emplace_back();
+    all.back().name = name;
+    all.back().detector = std::move(detector);
+  };
+  add("ours, fixed cubes", std::make_unique<OurDetector>(Boxes::fixedCubes));
+  add("ours, tight boxes", std::make_unique<OurDetector>(Boxes::tight));
+  const std::pair<const char*, const char*> stacks[] = {{"FCL dynamic tree", "FCL libccd"},
+                                                        {"Bullet Dbvt", "Bullet GjkEpa2"}};
+  for (const BroadPhaseMethod& broad : broadPhaseMethods()) {
+    for (const NarrowPhaseMethod& narrow : narrowPhaseMethods()) {
+      for (const auto& [b, n] : stacks) {
+        if (broad.name != b || narrow.name != n) continue;
+        add(broad.name + " + " + narrow.name, std::make_unique<PeerDetector>(broad, narrow, swarm));
+      }
+    }
+  }
+  return all;
+}
+
+// ---- the sweeps --------------------------------------------------------------------------------
+
+/// Contacts of `a` that `b` does not have.
+std::size_t notIn(const Contacts& a, const Contacts& b) {
+  Contacts rest;
+  std::set_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(rest));
+  return rest.size();
+}
+
+void measure(const char* sweep, double value, const Setting& setting, std::size_t frames,
+             const Arguments& arguments, Results& results) {
+  Swarm swarm(setting);
+  auto all = contestants(swarm, arguments);
+  std::size_t trueContacts = 0;
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    swarm.step();
+    const Contacts truth = truthOf(swarm);
+    for (Contestant& one : all) {
+      Contacts told;
+      const auto start = Clock::now();
+      const std::size_t pairs = one.detector->frame(swarm, told);
+      const double milliseconds = 1e3 * secondsSince(start);
+      if (frame > 0) one.milliseconds.push_back(milliseconds);  // the first one inserts
+      std::sort(told.begin(), told.end());
+      one.pairs += pairs;
+      one.missed += notIn(truth, told);
+      one.wrong += notIn(told, truth);
+    }
+    trueContacts += truth.size();
+  }
+  for (const Contestant& one : all) {
+    const double median = quantile(one.milliseconds, 0.5);
+    std::printf(
+        "%-12s %8g | %-30s %9.3f ms a frame | %8.0f pairs %6.1f contacts a frame | "
+        "missed %zu false %zu\n",
+        sweep, value, one.name.c_str(), median,
+        static_cast<double>(one.pairs) / static_cast<double>(frames),
+        static_cast<double>(trueContacts) / static_cast<double>(frames), one.missed, one.wrong);
+    results.add({{"bench", "icollide"},
+                 {"sweep", sweep},
+                 {"value", value},
+                 {"method", one.name},
+                 {"ms", number(median)},
+                 {"ms_99", number(quantile(one.milliseconds, 0.99))},
+                 {"pairs", static_cast<double>(one.pairs) / static_cast<double>(frames)},
+                 {"contacts", trueContacts},
+                 {"missed", one.missed},
+                 {"false", one.wrong}});
+  }
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const Arguments arguments(argc, argv);
+  Results results(arguments);
+  const std::size_t frames = arguments.quick ? 8 : 60;
+  const auto sweep = [&](const char* name, const std::vector<double>& values, const auto& apply) {
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      if (arguments.quick && k % 2 != 0) continue;
+      Setting setting;
+      apply(setting, values[k]);
+      measure(name, values[k], setting, frames, arguments, results);
+    }
+  };
+  sweep("number", {100, 200, 500, 1000, 2000, 5000},
+        [](Setting& s, double value) { s.number = static_cast<std::size_t>(value); });
+  sweep("faces", {12, 20, 36, 100, 200, 400},
+        [](Setting& s, double value) { s.faces = static_cast<std::size_t>(value); });
+  sweep("density", {0.001, 0.005, 0.01, 0.02, 0.05, 0.1},
+        [](Setting& s, double value) { s.density = value; });
+  sweep("rotation", {0, 5, 10, 20, 30, 45}, [](Setting& s, double value) { s.degrees = value; });
+  sweep("translation", {0, 0.05, 0.1, 0.2, 0.3, 0.5},
+        [](Setting& s, double value) { s.radii = value; });
+}

@@ -1,0 +1,213 @@
+// A hull of 20 vertices against a mesh of 50,880 triangles: distance, and all triangles in contact.
+//
+//   collision_mesh [--quick] [--out FILE] [--only PART_OF_A_NAME]
+//
+// The mesh is a hilly terrain of 40 m x 40 m, the hull (radius 0.5 m) flies over it at 1.5 m/s and
+// turns by 1 degree a tick: clear at about 0.3 m, or dipping in by up to 0.2 m. Methods in turns;
+// the truth of sampled steps is our exact verdict on every triangle whose box is near.
+
+#include <algorithm>
+#include <numbers>
+
+#include "collision/hull.hpp"
+#include "collision/narrow_phase.hpp"
+#include "tests/benchmarks/building_workload.hpp"
+#include "tests/benchmarks/measurement.hpp"
+#include "tests/benchmarks/mesh_method.hpp"
+
+namespace {
+
+using namespace enfilade::benchmarks;
+namespace collision = enfilade::collision;
+
+constexpr int kAlongX = 160, kAlongZ = 159;
+constexpr double kStep = 0.25;  // metres
+constexpr double kRadius = 0.5;
+constexpr int kMostTruths = 40;
+
+double heightAt(double x, double z) {
+  return 0.6 * std::sin(0.5 * x) * std::cos(0.4 * z) + 0.15 * std::sin(2.1 * x + 1.3 * z) +
+         0.05 * std::sin(7 * x) * std::sin(6 * z);
+}
+
+Vec3 groundAt(int x, int z) {
+  return {kStep * x, heightAt(kStep * x, kStep * z), kStep * z};
+}
+
+Triangles terrain() {
+  Triangles triangles;
+  for (int x = 0; x < kAlongX; ++x) {
+    for (int z = 0; z < kAlongZ; ++z) {
+      triangles.push_back({groundAt(x, z), groundAt(x, z + 1), groundAt(x + 1, z + 1)});
+      triangles.push_back({groundAt(x, z), groundAt(x + 1, z + 1), groundAt(x + 1, z)});
+    }
+  }
+  return triangles;
+}
+
+Points bodyPoints() {
+  Random random(5);
+  Points points;
+  while (points.size() < 20) {
+    const double x = uniform(random, -1, 1);
+    const double y = uniform(random, -1, 1);
+    const double z = uniform(random, -1, 1);
+    const Vec3 v(x, y, z);
+    if (v.squaredNorm() > 0.01 && v.squaredNorm() < 1) points.push_back(kRadius * v.normalized());
+  }
+  return points;
+}
+
+std::vector<Placement> flight(bool dipping, std::size_t steps) {
+  const Vec3 axis = Vec3(0.3, 1, 0.2).normalized();
+  const double side = 0.25 * kStep * kAlongX;  // circles about the middle
+  std::vector<Placement> places;
+  for (std::size_t k = 0; k < steps; ++k) {
+    const double along = 0.025 * static_cast<double>(k) / side;
+    const double x = 2 * side + side * std::cos(along);
+    const double z = 2 * side + side * std::sin(along);
+    const double above =
+        dipping ? kRadius - 0.1 + 0.1 * std::sin(0.05 * static_cast<double>(k)) : kRadius + 0.35;
+    const double angle = std::numbers::pi / 180 * static_cast<double>(k);
+    places.push_back(
+        {Eigen::AngleAxisd(angle, axis).toRotationMatrix(), Vec3(x, heightAt(x, z) + above, z)});
+  }
+  return places;
+}
+
+/// Least distance and the contacts, by the exact verdict on every triangle that may matter.
+struct Truth {
+  double distance = std::numeric_limits<double>::infinity();
+  std::vector<std::uint32_t> contacts;
+};
+
+Truth truthOf(const collision::Hull& hull, const Placement& at, const Triangles& mesh) {
+  const collision::ConvexBody body{hull.vertices, at.translation, &at.rotation, &hull};
+  const Vec3 reach = Vec3::Constant(3 * kRadius);
+  const collision::Box near{at.translation - reach, at.translation + reach};
+  Truth truth;
+  for (std::uint32_t k = 0; k < mesh.size(); ++k) {
+    if (!collision::overlaps(near, collision::boxOf(mesh[k]))) continue;
+    collision::FeatureCache cold;
+    const auto told = collision::decide(body, {mesh[k]}, cold);
+    truth.distance = std::min(truth.distance, told.distance);
+    if (told.verdict != collision::Verdict::separated) truth.contacts.push_back(k);
+  }
+  return truth;
+}
+
+struct Row {
+  const MeshMethod* method = nullptr;
+  std::unique_ptr<MeshQuery> query;
+  double buildSeconds = 0;
+  std::vector<double> distance, contacts, coldDistance, coldContacts;  ///< microseconds
+  double worstError = 0;                                               ///< metres
+  std::size_t missed = 0, wrong = 0;                                   ///< triangles
+};
+
+template <typename Ask>
+double microsecondsOf(const Ask& ask) {
+  const auto start = Clock::now();
+  ask();
+  return 1e6 * secondsSince(start);
+}
+
+/// Two passes, so that the cache of one query is not warmed by the other: the library's own tick
+/// asks one of them.
+void fly(Row& row, std::span<const Placement> places, std::span<const Truth> truths,
+         std::size_t every) {
+  row.query->forget();
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    double told = 0;
+    const double time = microsecondsOf([&] { told = row.query->distance(places[k]); });
+    if (k > 0) row.distance.push_back(time);
+    if (k % every == 0) {
+      const double error = std::abs(told - truths[k / every].distance);
+      row.worstError = std::max(row.worstError, std::isfinite(error) ? error : 1e300);
+    }
+  }
+  row.query->forget();
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    std::vector<std::uint32_t> told;
+    const double time = microsecondsOf([&] { row.query->contacts(places[k], told); });
+    if (k > 0) row.contacts.push_back(time);
+    if (k % every != 0) continue;
+    std::sort(told.begin(), told.end());
+    const auto& truth = truths[k / every].contacts;
+    std::vector<std::uint32_t> rest;
+    std::set_difference(truth.begin(), truth.end(), told.begin(), told.end(),
+                        std::back_inserter(rest));
+    row.missed += rest.size();
+    rest.clear();
+    std::set_difference(told.begin(), told.end(), truth.begin(), truth.end(),
+                        std::back_inserter(rest));
+    row.wrong += rest.size();
+  }
+}
+
+void askCold(Row& row, std::span<const Placement> places, std::size_t every) {
+  for (std::size_t k = 0; k < places.size(); k += every) {
+    row.query->forget();
+    row.coldDistance.push_back(microsecondsOf([&] { row.query->distance(places[k]); }));
+    row.query->forget();
+    std::vector<std::uint32_t> told;
+    row.coldContacts.push_back(microsecondsOf([&] { row.query->contacts(places[k], told); }));
+  }
+}
+
+void print(const Row& row, const char* motion, Results& results) {
+  const auto median = [](const std::vector<double>& v) { return quantile(v, 0.5); };
+  std::printf(
+      "%-14s %-8s | distance %8.2f (cold %8.2f) us, error <= %8.1e m | contacts %8.2f "
+      "(cold %8.2f) us, %zu missed %zu false | build %.3f s\n",
+      row.method->name.c_str(), motion, median(row.distance), median(row.coldDistance),
+      row.worstError, median(row.contacts), median(row.coldContacts), row.missed, row.wrong,
+      row.buildSeconds);
+  results.add({{"bench", "mesh"},
+               {"method", row.method->name},
+               {"ours", row.method->ours},
+               {"motion", motion},
+               {"distance_us", number(median(row.distance))},
+               {"distance_cold_us", number(median(row.coldDistance))},
+               {"distance_99_us", number(quantile(row.distance, 0.99))},
+               {"contacts_us", number(median(row.contacts))},
+               {"contacts_cold_us", number(median(row.coldContacts))},
+               {"contacts_99_us", number(quantile(row.contacts, 0.99))},
+               {"error_m", row.worstError},
+               {"missed", row.missed},
+               {"false", row.wrong},
+               {"build_s", row.buildSeconds}});
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const Arguments arguments(argc, argv);
+  Results results(arguments);
+  const std::size_t steps = arguments.quick ? 200 : 1000;
+  const std::size_t every = steps / kMostTruths;
+  const int turns = arguments.quick ? 1 : 3;
+  const Triangles mesh = terrain();
+  const Points points = bodyPoints();
+  const collision::Hull hull = collision::buildHull(points);
+  const auto methods = meshMethods();
+  for (const bool dipping : {false, true}) {
+    const auto places = flight(dipping, steps);
+    std::vector<Truth> truths;
+    for (std::size_t k = 0; k < steps; k += every) truths.push_back(truthOf(hull, places[k], mesh));
+    std::vector<Row> rows;
+    for (const MeshMethod& method : methods) {
+      if (!arguments.wants(method.name)) continue;
+      rows.emplace_back();
+      rows.back().method = &method;
+      const auto start = Clock::now();
+      rows.back().query = method.make(points, mesh);
+      rows.back().buildSeconds = secondsSince(start);
+    }
+    for (int turn = 0; turn < turns; ++turn) {
+      for (Row& row : rows) fly(row, places, truths, every);
+    }
+    for (Row& row : rows) askCold(row, places, every);
+    for (const Row& row : rows) print(row, dipping ? "dipping" : "clear", results);
+  }
+}

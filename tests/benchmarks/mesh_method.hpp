@@ -1,0 +1,42 @@
+// One interface for every query of a convex body against a mesh that is measured.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "collision/triangle_tree.hpp"
+#include "tests/benchmarks/narrow_phase_method.hpp"
+
+namespace enfilade::benchmarks {
+
+using collision::Triangle;
+using Triangles = std::vector<Triangle>;
+
+/// One body against one mesh that stands, and whatever is kept from query to query.
+class MeshQuery {
+ public:
+  virtual ~MeshQuery() = default;
+  /// Metres; 0 when they meet.
+  virtual double distance(const Placement& body) = 0;
+  /// Appends the indices (into the list that the mesh was made of) of all triangles that the body
+  /// touches or penetrates, in any order.
+  virtual void contacts(const Placement& body, std::vector<std::uint32_t>& triangles) = 0;
+  virtual void forget() {}
+};
+
+struct MeshMethod {
+  std::string name;
+  bool ours, warm;
+  std::function<std::unique_ptr<MeshQuery>(const Points& body, const Triangles& mesh)> make;
+};
+
+std::vector<MeshMethod> meshMethods();
+
+// One for each source file.
+std::vector<MeshMethod> ourMeshQueries();
+std::vector<MeshMethod> bulletMesh();
+std::vector<MeshMethod> fclMesh();
+
+}  // namespace enfilade::benchmarks
