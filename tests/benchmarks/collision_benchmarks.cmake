@@ -1,5 +1,5 @@
-# The collision core beside its peers (`./dev bench collision`). A peer that is not installed is left
-# out, with a message; none of them is needed for anything else.
+# The collision core beside its peers: built only by `./dev bench collision`. A peer that is not
+# installed is left out, with a message.
 find_package(PkgConfig QUIET)
 find_package(nlohmann_json 3 REQUIRED)
 
@@ -48,13 +48,13 @@ bench_peer(embree "${BENCH_EMBREE_DIR}" INCLUDES ${BENCH_EMBREE_DIR}
 # bench_methods(NAME SUFFIX SOURCES..): a library of peers/PEER_SUFFIX.cpp and SOURCES; the first of
 # these is the table.
 function(bench_methods name suffix table)
-  add_library(${name} STATIC ${table} ${ARGN})
+  add_library(${name} STATIC EXCLUDE_FROM_ALL ${table} ${ARGN})
   target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PUBLIC enfilade_collision nlohmann_json::nlohmann_json)
   foreach(peer ${ENFILADE_PEERS})
     set(source ${CMAKE_CURRENT_SOURCE_DIR}/peers/${peer}_${suffix}.cpp)
     if(EXISTS ${source})
-      add_library(${name}_${peer} OBJECT ${source})
+      add_library(${name}_${peer} OBJECT EXCLUDE_FROM_ALL ${source})
       target_include_directories(${name}_${peer} PRIVATE ${PROJECT_SOURCE_DIR})
       target_link_libraries(${name}_${peer} PRIVATE enfilade_collision bench_${peer})
       target_sources(${name} PRIVATE $<TARGET_OBJECTS:${name}_${peer}>)
@@ -86,5 +86,6 @@ enfilade_benchmark(collision_mesh
 enfilade_benchmark(collision_icollide
   SOURCES collision_icollide.cpp
   LIBRARIES bench_broad_phases bench_narrow_phases)
-add_custom_target(collision_benchmarks DEPENDS
-  collision_broad_phase collision_narrow_phase collision_mesh collision_icollide)
+set(programs collision_broad_phase collision_narrow_phase collision_mesh collision_icollide)
+set_target_properties(${programs} PROPERTIES EXCLUDE_FROM_ALL ON)
+add_custom_target(collision_benchmarks DEPENDS ${programs})
