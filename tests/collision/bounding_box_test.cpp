@@ -3,7 +3,9 @@
 #include <gmpxx.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
+#include <vector>
 
 namespace enfilade::collision {
 namespace {
@@ -47,12 +49,13 @@ Rationals exactly(const Pose& pose, const Vec3& vertex) {
   return result;
 }
 
-void expectContains(const Box& box, const Hull& hull, const Pose& pose) {
+void expectContains(const Box& box, const Hull& hull, const Pose& pose, double clearance = 0) {
   for (const Vec3& vertex : hull.vertices) {
     const Rationals exact = exactly(pose, vertex);
     for (int axis = 0; axis < 3; ++axis) {
       const mpq_class& coordinate = exact[static_cast<std::size_t>(axis)];
-      ASSERT_TRUE(box.min[axis] <= coordinate && coordinate <= box.max[axis])
+      ASSERT_TRUE(box.min[axis] <= coordinate - clearance &&
+                  coordinate + clearance <= box.max[axis])
           << "axis " << axis << " of vertex " << vertex.transpose();
     }
   }
@@ -149,6 +152,101 @@ TEST(FixedCube, ContainsTheBodyInEveryAttitude) {
     expectContains(cube, hull, pose);
     EXPECT_NEAR(cube.size().x(), 2 * hull.radius, 1e-12);
   }
+}
+
+TEST(BoxesWithClearance, HoldTheExactBoxGrownByItWhateverTheSizes) {
+  std::mt19937 random(16);
+  int rounded = 0;
+  for (int body = 0; body < 60; ++body) {
+    const Hull hull = randomHull(random, 12);
+    const Pose pose = randomPose(random, std::ldexp(1.0, 5 * (body % 8)));
+    const double clearance = std::ldexp(0.7, body % 50 - 40);
+    ExtremalVertices climbed, walled;
+    const std::vector<Box> boxes{tightBox(hull, pose, climbed, clearance),
+                                 tightBoxByWalls(hull, pose, walled, clearance),
+                                 fixedCube(hull, pose, clearance)};
+    for (const Box& box : boxes) expectContains(box, hull, pose, clearance);
+    const double slack = 0x1p-44 * (hull.radius + pose.translation.norm() + clearance);
+    const Box brute = tightBoxBruteForce(hull, pose);
+    EXPECT_LE((boxes[0].max - brute.max).maxCoeff(), clearance + slack);
+    // Adding the clearance to the tight box with rounding to nearest would not do.
+    rounded += contains(grown(tightBoxBruteForce(hull, pose), clearance), boxes[0]) ? 0 : 1;
+  }
+  EXPECT_GT(rounded, 10);
+}
+
+TEST(TightBoxByWalls, IsTheBoxOfClimbingOverATumblingMotion) {
+  std::mt19937 random(17);
+  std::size_t changes = 0;
+  for (int body = 0; body < 20; ++body) {
+    const Hull hull = randomHull(random, 6 + 5 * static_cast<std::size_t>(body));
+    Pose pose = randomPose(random, 10.0);
+    ExtremalVertices climbed, walled;
+    for (int tick = 0; tick < 40; ++tick) {
+      pose.rotation = turnedBy(pose.rotation, Vec3(0.05, -0.03, 0.02));
+      const ExtremalVertices before = walled;
+      const Box box = tightBoxByWalls(hull, pose, walled);
+      expectContains(box, hull, pose);
+      const Box brute = tightBox(hull, pose, climbed);
+      const double slack = 0x1p-44 * (hull.radius + pose.translation.norm());
+      EXPECT_LE((box.min - brute.min).cwiseAbs().maxCoeff(), slack);
+      EXPECT_LE((box.max - brute.max).cwiseAbs().maxCoeff(), slack);
+      changes += before.vertex != walled.vertex ? 1 : 0;
+    }
+  }
+  EXPECT_GT(changes, 200u);
+}
+
+TEST(TightBoxByWalls, IsNotSentAstrayByAStartInAnotherHullOrALevelTop) {
+  std::vector<Vec3> corners;  // a disc that is all but edge-on, as above
+  for (int k = 0; k < 60; ++k) {
+    const double t = 0.02 * k - 0.6;
+    corners.emplace_back(t, 1 - t * t, 0);
+    corners.emplace_back(t, -1 + t * t, 0);
+  }
+  const Hull hull = buildHull(corners);
+  for (const double tilt : {0.0, 1e-19, 1e-16, 1e-15, 1e-8, 0.3}) {
+    const Pose pose{Quat(1, tilt, -tilt, 0).normalized(), Vec3::Zero()};
+    for (std::uint32_t start = 0; start < hull.vertices.size() + 5; start += 3) {
+      ExtremalVertices last;
+      last.vertex.fill(start);
+      expectContains(tightBoxByWalls(hull, pose, last), hull, pose);
+    }
+  }
+}
+
+Hull ellipsoid(std::mt19937& random, const Vec3& halfAxes) {
+  std::normal_distribution<double> normal;
+  std::vector<Vec3> points;
+  for (int k = 0; k < 40; ++k) {
+    const double x = normal(random), y = normal(random), z = normal(random);
+    points.push_back(Vec3(x, y, z).normalized().cwiseProduct(halfAxes));
+  }
+  return buildHull(points);
+}
+
+TEST(BoxMethod, IsTheCubeForTheSmallAndRoundAndTheTightBoxForTheOblongAmongMany) {
+  std::mt19937 random(18);
+  const Hull ball = ellipsoid(random, Vec3(0.25, 0.25, 0.25));
+  const Hull rod = ellipsoid(random, Vec3(1, 0.1, 0.1));
+  EXPECT_EQ(boxMethodFor(ball), BoxMethod::fixedCube);
+  EXPECT_EQ(boxMethodFor(rod), BoxMethod::tightBox);
+  const Surroundings sparse{0.001, 0.45};  // I-COLLIDE's scenes: next to nothing is ever met
+  EXPECT_EQ(boxMethodFor(rod, sparse), BoxMethod::fixedCube);
+  const Surroundings crowded{1000, 0.05};
+  EXPECT_EQ(boxMethodFor(ball, crowded), BoxMethod::tightBox);
+  const Pose pose = randomPose(random, 3);
+  for (const BoxMethod method : {BoxMethod::fixedCube, BoxMethod::tightBox}) {
+    ExtremalVertices last;
+    expectContains(boxBy(method, rod, pose, last, 0.125), rod, pose, 0.125);
+  }
+}
+
+TEST(BoxMethod, KnowsABodyThatIsFarFromItsOwnOrigin) {
+  std::mt19937 random(19);
+  std::vector<Vec3> moved = ellipsoid(random, Vec3(0.2, 0.2, 0.2)).vertices;
+  for (Vec3& vertex : moved) vertex += Vec3(1, 0, 0);
+  EXPECT_EQ(boxMethodFor(buildHull(moved)), BoxMethod::tightBox);
 }
 
 }  // namespace
