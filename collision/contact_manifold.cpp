@@ -1,0 +1,289 @@
+// Steps (after E. Coumans and E. Catto, "Contact manifolds", as in every rigid-body engine)
+//  1. The supporting feature of a body: of the faces at its vertex farthest along the normal the
+//  one
+//     that faces along it most; of that face the corners that lie within `limit` of the support
+//     plane: a polygon, an edge, or a vertex. (Bodies without faces: of all vertices.)
+//  2. Both features are projected along the normal and clipped against one another: polygons by
+//     Sutherland and Hodgman, an edge by a polygon (Cyrus and Beck), two edges by where they cross
+//     or overlap. A vertex stays a vertex.
+//  3. Where a corner of the clipped feature meets the other one along the normal, that is the other
+//     point, and the way between them the separation. Points farther than `limit` go.
+//  4. Of too many points, the deepest stays, and then again and again the one that is farthest from
+//     all that stay.
+// Departures: the features are cut by depth first, so that a leaning box has two points, and not
+// four of which two hang in the air; where the projections miss one another (they may, by rounding,
+// or where the feature is not a face), the seed's own points are the manifold.
+//
+// Tolerance: depths along the normal are known to kRounding u S, S the greatest coordinate; corners
+// within that and `limit` of the support plane lie in it. It is the rounding of the sums here, not
+// a length.
+#include "collision/contact_manifold.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "collision/hull.hpp"
+
+namespace enfilade::collision {
+namespace {
+
+constexpr double kRounding = 64 * 0x1p-53;  // see the file's head
+constexpr std::size_t kMostCorners = 128;   // of a feature, and of a clipped one; more are left out
+
+/// A frame whose third axis is the normal; x and y are the projection, z the depth.
+struct ContactFrame {
+  Vec3 origin, x, y, normal;
+
+  ContactFrame(const Vec3& at, const Vec3& along) : origin(at), normal(along) {
+    int least = 0;
+    normal.cwiseAbs().minCoeff(&least);
+    x = normal.cross(Vec3::Unit(least)).normalized();
+    y = normal.cross(x);
+  }
+  Vec3 inFrame(const Vec3& world) const {
+    const Vec3 p = world - origin;
+    return {p.dot(x), p.dot(y), p.dot(normal)};
+  }
+  Vec3 inWorld(const Vec3& p) const { return origin + p.x() * x + p.y() * y + p.z() * normal; }
+};
+
+/// Corners in the contact's frame, in order around.
+struct Feature {
+  std::array<Vec3, kMostCorners> corners;
+  std::size_t size = 0;
+
+  void add(const Vec3& corner) {
+    if (size < kMostCorners) corners[size++] = corner;
+  }
+  const Vec3& next(std::size_t i) const { return corners[i + 1 == size ? 0 : i + 1]; }
+};
+
+// ---- step 1 ------------------------------------------------------------------------------------
+
+Vec3 worldVertex(const ConvexBody& body, std::uint32_t i) {
+  const Vec3& v = body.vertices[i];
+  return (body.rotation ? Vec3(*body.rotation * v) : v) + body.translation;
+}
+
+/// `sense` 1: farthest along the normal (A), -1: against it (B).
+std::uint32_t supportVertex(const ConvexBody& body, const ContactFrame& frame, double sense) {
+  std::uint32_t best = 0;
+  double most = -std::numeric_limits<double>::infinity();
+  for (std::uint32_t i = 0; i < body.vertices.size(); ++i) {
+    const double along = sense * frame.inFrame(worldVertex(body, i)).z();
+    if (along > most) most = along, best = i;
+  }
+  return best;
+}
+
+/// Newell's normal of a face, any length.
+Vec3 normalOfFace(const ConvexBody& body, const ContactFrame& frame,
+                  const std::vector<std::uint32_t>& face) {
+  const Vec3 first = frame.inFrame(worldVertex(body, face[0]));
+  Vec3 normal = Vec3::Zero();
+  for (std::size_t i = 1; i + 1 < face.size(); ++i)
+    normal += (frame.inFrame(worldVertex(body, face[i])) - first)
+                  .cross(frame.inFrame(worldVertex(body, face[i + 1])) - first);
+  return normal;
+}
+
+/// The face at `vertex` that faces along the normal most.
+const std::vector<std::uint32_t>* supportFace(const ConvexBody& body, const ContactFrame& frame,
+                                              double sense, std::uint32_t vertex) {
+  const std::vector<std::uint32_t>* best = nullptr;
+  double most = -std::numeric_limits<double>::infinity();
+  for (const auto& face : body.hull->faces) {
+    if (std::find(face.begin(), face.end(), vertex) == face.end()) continue;
+    const Vec3 normal = normalOfFace(body, frame, face);
+    const double along = sense * normal.z() / normal.norm();
+    if (along > most) most = along, best = &face;
+  }
+  return best;
+}
+
+/// `slack`: metres below the support plane.
+Feature supportFeature(const ConvexBody& body, const ContactFrame& frame, double sense,
+                       double slack) {
+  const std::uint32_t vertex = supportVertex(body, frame, sense);
+  const double most = sense * frame.inFrame(worldVertex(body, vertex)).z();
+  Feature feature;
+  const auto take = [&](std::uint32_t i) {
+    const Vec3 corner = frame.inFrame(worldVertex(body, i));
+    if (sense * corner.z() >= most - slack) feature.add(corner);
+  };
+  const auto* face =
+      body.hull && !body.hull->faces.empty() ? supportFace(body, frame, sense, vertex) : nullptr;
+  if (face) {
+    for (const std::uint32_t i : *face) take(i);
+  } else if (body.vertices.size() <= 3) {
+    for (std::uint32_t i = 0; i < body.vertices.size(); ++i) take(i);
+  }
+  if (feature.size == 0) feature.add(frame.inFrame(worldVertex(body, vertex)));
+  return feature;
+}
+
+// ---- step 2, in the projection -----------------------------------------------------------------
+
+double cross(const Vec3& a, const Vec3& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+double dot(const Vec3& a, const Vec3& b) {
+  return a.x() * b.x() + a.y() * b.y();
+}
+
+double area(const Feature& polygon) {
+  double twice = 0;
+  for (std::size_t i = 1; i + 1 < polygon.size; ++i)
+    twice +=
+        cross(polygon.corners[i] - polygon.corners[0], polygon.corners[i + 1] - polygon.corners[0]);
+  return twice;
+}
+
+/// What of `subject` lies left of the edge from `from` to `to`, or on it.
+Feature clippedByEdge(const Feature& subject, const Vec3& from, const Vec3& to, double rounding) {
+  Feature kept;
+  const Vec3 edge = to - from;
+  const double slack = rounding * std::sqrt(dot(edge, edge));
+  const auto left = [&](const Vec3& p) { return cross(edge, p - from) + slack; };
+  for (std::size_t i = 0; i < subject.size; ++i) {
+    const Vec3 &here = subject.corners[i], &next = subject.next(i);
+    const double at = left(here), after = left(next);
+    if (at >= 0) kept.add(here);
+    const bool last = subject.size == 2 && i == 1;  // a segment goes there, but not back
+    if (!last && (at >= 0) != (after >= 0)) kept.add(here + at / (at - after) * (next - here));
+  }
+  return kept;
+}
+
+/// `polygon` has three corners or more, anticlockwise.
+Feature clippedByPolygon(Feature subject, const Feature& polygon, double rounding) {
+  for (std::size_t i = 0; i < polygon.size && subject.size > 0; ++i)
+    subject = clippedByEdge(subject, polygon.corners[i], polygon.next(i), rounding);
+  return subject;
+}
+
+/// What of edge `a` lies above edge `b`: nothing, a point, or where they run side by side.
+Feature clippedByEdge(const Feature& a, const Feature& b, double rounding) {
+  const Vec3 alongA = a.corners[1] - a.corners[0], alongB = b.corners[1] - b.corners[0];
+  const Vec3 between = b.corners[0] - a.corners[0];
+  const double area = cross(alongA, alongB);
+  const double lengthA = std::sqrt(dot(alongA, alongA)), lengthB = std::sqrt(dot(alongB, alongB));
+  Feature kept;
+  if (std::abs(area) > rounding * (lengthA + lengthB)) {
+    const double s = cross(between, alongB) / area, t = cross(between, alongA) / area;
+    if (s >= 0 && s <= 1 && t >= 0 && t <= 1) kept.add(a.corners[0] + s * alongA);
+    return kept;
+  }
+  const double squared = dot(alongA, alongA);
+  if (!(squared > 0)) return kept;
+  const double first = dot(between, alongA) / squared;
+  const double second = first + dot(alongB, alongA) / squared;
+  const double low = std::max(0.0, std::min(first, second));
+  const double high = std::min(1.0, std::max(first, second));
+  if (low > high) return kept;
+  kept.add(a.corners[0] + low * alongA);
+  if (high > low) kept.add(a.corners[0] + high * alongA);
+  return kept;
+}
+
+/// The points of `subject` that lie above `other`, both seen along the normal.
+Feature clipped(const Feature& subject, Feature other, double rounding) {
+  if (subject.size == 1 || other.size == 1) return subject.size == 1 ? subject : Feature{};
+  if (other.size == 2)
+    return subject.size == 2 ? clippedByEdge(subject, other, rounding) : Feature{};
+  if (area(other) < 0) std::reverse(other.corners.begin(), other.corners.begin() + other.size);
+  return clippedByPolygon(subject, other, rounding);
+}
+
+// ---- step 3 ------------------------------------------------------------------------------------
+
+/// The depth of a feature above or below a point of the projection.
+double depthAt(const Feature& feature, const Vec3& at) {
+  const auto begin = feature.corners.begin(), end = begin + feature.size;
+  const auto byDepth = [](const Vec3& a, const Vec3& b) { return a.z() < b.z(); };
+  const auto [least, most] = std::minmax_element(begin, end, byDepth);
+  double depth = feature.corners[0].z();
+  if (feature.size == 2) {
+    const Vec3 along = feature.corners[1] - feature.corners[0];
+    const double squared = dot(along, along);
+    if (squared > 0) depth += dot(at - feature.corners[0], along) / squared * along.z();
+  } else if (feature.size > 2) {
+    Vec3 normal = Vec3::Zero();
+    for (std::size_t i = 1; i + 1 < feature.size; ++i)
+      normal += (feature.corners[i] - feature.corners[0])
+                    .cross(feature.corners[i + 1] - feature.corners[0]);
+    const Vec3 away = at - feature.corners[0];
+    if (normal.z() != 0) depth -= dot(away, normal) / normal.z();
+  }
+  return std::clamp(depth, least->z(), most->z());  // no plane is trusted beyond its corners
+}
+
+// ---- step 4 ------------------------------------------------------------------------------------
+
+double spread(const ContactManifold& manifold, const ContactPoint& point) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const ContactPoint& kept : manifold.list())
+    least = std::min(least, (kept.pointA - point.pointA).squaredNorm());
+  return least;
+}
+
+void keepMostSpread(std::span<const ContactPoint> points, std::size_t most,
+                    ContactManifold& manifold) {
+  if (points.empty()) return;
+  const auto deepest = std::min_element(
+      points.begin(), points.end(),
+      [](const ContactPoint& a, const ContactPoint& b) { return a.separation < b.separation; });
+  manifold.points[manifold.size++] = *deepest;
+  while (manifold.size < std::min(most, ContactManifold::kMostPoints)) {
+    const ContactPoint* farthest = nullptr;
+    double distance = 0;
+    for (const ContactPoint& point : points) {
+      const double d = spread(manifold, point);
+      if (d > distance) distance = d, farthest = &point;
+    }
+    if (!farthest) return;
+    manifold.points[manifold.size++] = *farthest;
+  }
+}
+
+double sizeOf(const ConvexBody& body, const Vec3& origin) {
+  double size = 0;
+  for (std::uint32_t i = 0; i < body.vertices.size(); ++i)
+    size = std::max(size, (worldVertex(body, i) - origin).cwiseAbs().maxCoeff());
+  return size;
+}
+
+}  // namespace
+
+ContactManifold contactManifold(const ConvexBody& a, const ConvexBody& b, const ContactSeed& seed) {
+  ContactManifold manifold;
+  manifold.normal = seed.normal;
+  const ContactFrame frame(seed.pointA, seed.normal);
+  const double rounding =
+      kRounding * (sizeOf(a, frame.origin) + sizeOf(b, frame.origin) +
+                   a.translation.cwiseAbs().maxCoeff() + b.translation.cwiseAbs().maxCoeff());
+  const double nearest = frame.inFrame(seed.pointB).z();
+  if (nearest > seed.limit + rounding) return manifold;
+
+  const double slack = seed.limit - nearest + 2 * rounding;
+  const Feature onA = supportFeature(a, frame, 1, slack);
+  const Feature onB = supportFeature(b, frame, -1, slack);
+  const bool fromA = onA.size == 1 || (onB.size > 1 && (onA.size == 2 || onB.size > 2));
+  const Feature overlap = fromA ? clipped(onA, onB, rounding) : clipped(onB, onA, rounding);
+
+  std::array<ContactPoint, kMostCorners> points;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < overlap.size; ++i) {
+    Vec3 pointA = overlap.corners[i], pointB = pointA;
+    (fromA ? pointB : pointA).z() = fromA ? depthAt(onB, pointA) : depthAt(onA, pointB);
+    const double separation = pointB.z() - pointA.z();
+    if (separation <= seed.limit + 2 * rounding)
+      points[count++] = {frame.inWorld(pointA), frame.inWorld(pointB), separation};
+  }
+  if (count == 0) points[count++] = {seed.pointA, seed.pointB, nearest};
+  keepMostSpread({points.data(), count}, seed.most, manifold);
+  return manifold;
+}
+
+}  // namespace enfilade::collision
