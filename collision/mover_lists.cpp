@@ -1,8 +1,8 @@
 // Each mover's ends bubble to their place, one mover after the other. While the first ones are
 // repaired the ends of the others still stand where they stood, so an exchange may be undone later
-// in the same update. What an exchange means is therefore decided by the final boxes: if a pair's
-// overlap differs from the last update, then on some axis a lower and an upper end of the two are
-// in another order than before, so that they exchanged in the telling sense at least once.
+// in the same update. What an exchange means is therefore decided by the boxes before and after the
+// update: if a pair's overlap differs, then on some axis a lower and an upper end of the two are in
+// another order than before, so that they exchanged in the telling sense at least once.
 
 #include "collision/mover_lists.hpp"
 
@@ -12,8 +12,13 @@ namespace enfilade::collision {
 
 void MoverLists::makeRoomFor(std::uint32_t mover) {
   boxes_.resize(mover + std::size_t{1});
+  settled_.resize(mover + std::size_t{1});
   positions_.resize(mover + std::size_t{1});
   marked_.resize(mover + std::size_t{1}, 0);
+}
+
+void MoverLists::settle(std::span<const std::uint32_t> movers) {
+  for (const std::uint32_t mover : movers) settled_[mover] = boxes_[mover];
 }
 
 void MoverLists::renumber(std::size_t axis) {
@@ -39,44 +44,57 @@ void MoverLists::confirm(std::uint32_t a, std::uint32_t b, std::vector<MoverChan
   if (overlaps(boxes_[a], boxes_[b])) changes.push_back({std::min(a, b), std::max(a, b), true});
 }
 
-void MoverLists::exchanged(const End& moving, const End& other, bool up,
+/// `lower` and `upper` have passed one another: they opened an overlap, or closed one.
+void MoverLists::exchanged(const End& lower, const End& upper, bool opens,
                            std::vector<MoverChange>& changes) {
-  ++exchanges;
-  if (moving.upper() == other.upper()) return;
-  const bool opens = moving.upper() == up;
   ++boxTests;
-  const std::uint32_t a = std::min(moving.mover(), other.mover());
-  const std::uint32_t b = std::max(moving.mover(), other.mover());
-  if (overlaps(boxes_[a], boxes_[b]) == opens) changes.push_back({a, b, opens});
+  const std::uint32_t a = lower.mover(), b = upper.mover();
+  if (overlaps(settled_[a], settled_[b]) != opens && overlaps(boxes_[a], boxes_[b]) == opens) {
+    changes.push_back({std::min(a, b), std::max(a, b), opens});
+  }
 }
 
-void MoverLists::bubble(std::size_t axis, End end, std::vector<MoverChange>& changes) {
+void MoverLists::bubbleUp(std::size_t axis, End end, std::vector<MoverChange>& changes) {
   End* const ends = ends_[axis].data();
-  std::uint32_t at = positionOf(axis, end.tag);
-  const std::uint32_t from = at;
+  const std::uint32_t from = positionOf(axis, end.tag);
+  std::uint32_t at = from;
   for (; before(ends[at + 1], end); ++at) {
-    exchanged(end, ends[at + 1], true, changes);
-    ends[at] = ends[at + 1];
-    positionOf(axis, ends[at].tag) = at;
+    const End other = ends[at + 1];
+    if (end.upper() && !other.upper()) exchanged(other, end, true, changes);
+    if (!end.upper() && other.upper()) exchanged(end, other, false, changes);
+    ends[at] = other;
+    positionOf(axis, other.tag) = at;
   }
-  for (; at <= from && before(end, ends[at - 1]); --at) {
-    exchanged(end, ends[at - 1], false, changes);
-    ends[at] = ends[at - 1];
-    positionOf(axis, ends[at].tag) = at;
-  }
+  exchanges += at - from;
   ends[at] = end;
   positionOf(axis, end.tag) = at;
 }
 
-/// The end that leads goes first, so that a mover's two ends never pass one another.
-void MoverLists::repair(std::size_t axis, End lower, End upper, std::vector<MoverChange>& changes) {
-  if (upper.at >= ends_[axis][positionOf(axis, upper.tag)].at) {
-    bubble(axis, upper, changes);
-    bubble(axis, lower, changes);
-  } else {
-    bubble(axis, lower, changes);
-    bubble(axis, upper, changes);
+void MoverLists::bubbleDown(std::size_t axis, End end, std::vector<MoverChange>& changes) {
+  End* const ends = ends_[axis].data();
+  const std::uint32_t from = positionOf(axis, end.tag);
+  std::uint32_t at = from;
+  for (; before(end, ends[at - 1]); --at) {
+    const End other = ends[at - 1];
+    if (!end.upper() && other.upper()) exchanged(end, other, true, changes);
+    if (end.upper() && !other.upper()) exchanged(other, end, false, changes);
+    ends[at] = other;
+    positionOf(axis, other.tag) = at;
   }
+  exchanges += from - at;
+  ends[at] = end;
+  positionOf(axis, end.tag) = at;
+}
+
+/// An end that has not moved is where it belongs, and one that has can only go its way. The end
+/// that leads goes first, so that a mover's two ends never pass one another.
+void MoverLists::repair(std::size_t axis, End lower, End upper, std::vector<MoverChange>& changes) {
+  const double wasLower = ends_[axis][positionOf(axis, lower.tag)].at;
+  const double wasUpper = ends_[axis][positionOf(axis, upper.tag)].at;
+  if (upper.at > wasUpper) bubbleUp(axis, upper, changes);
+  if (lower.at > wasLower) bubbleUp(axis, lower, changes);
+  if (lower.at < wasLower) bubbleDown(axis, lower, changes);
+  if (upper.at < wasUpper) bubbleDown(axis, upper, changes);
 }
 
 void MoverLists::move(std::uint32_t mover, std::vector<MoverChange>& changes) {

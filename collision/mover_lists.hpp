@@ -37,6 +37,9 @@ class MoverLists {
   /// Takes movers into the lists and appends their overlaps with all movers in the lists.
   void insert(std::span<const std::uint32_t> movers, std::vector<MoverChange>& changes);
 
+  /// After an update, of each mover that was moved or inserted: its box is what it was from now on.
+  void settle(std::span<const std::uint32_t> movers);
+
   std::uint64_t exchanges = 0;  ///< counted up; the caller resets them
   std::uint64_t boxTests = 0;
 
@@ -60,8 +63,9 @@ class MoverLists {
 
   void makeRoomFor(std::uint32_t mover);
   void repair(std::size_t axis, End lower, End upper, std::vector<MoverChange>& changes);
-  void bubble(std::size_t axis, End end, std::vector<MoverChange>& changes);
-  void exchanged(const End& moving, const End& other, bool up, std::vector<MoverChange>& changes);
+  void bubbleUp(std::size_t axis, End end, std::vector<MoverChange>& changes);
+  void bubbleDown(std::size_t axis, End end, std::vector<MoverChange>& changes);
+  void exchanged(const End& lower, const End& upper, bool opens, std::vector<MoverChange>& changes);
   void renumber(std::size_t axis);
   void sweep(std::span<const std::uint32_t> fresh, std::vector<MoverChange>& changes);
   void confirm(std::uint32_t a, std::uint32_t b, std::vector<MoverChange>& changes);
@@ -69,7 +73,8 @@ class MoverLists {
     return positions_[tag >> 1][2 * axis + (tag & 1)];
   }
 
-  std::vector<Box> boxes_;  ///< by mover
+  std::vector<Box> boxes_;    ///< by mover
+  std::vector<Box> settled_;  ///< by mover: as of the last update
   std::array<Ends, 3> ends_{noEnds(), noEnds(), noEnds()};
   std::vector<std::array<std::uint32_t, 6>> positions_;  ///< by mover: of its ends in the lists
   std::vector<std::uint8_t> marked_;                     ///< by mover: removed, or fresh

@@ -94,6 +94,8 @@ void SortAndSweep::State::updateMoving() {
     if (movers[id].presence == Presence::live) lists.move(id, changes);
   }
   lists.insert(fresh, changes);
+  lists.settle(moved);
+  lists.settle(fresh);
   for (const MoverChange& change : changes) {
     if (change.begins) {
       beginMoving(change.a, change.b);
