@@ -132,14 +132,35 @@ Contacts truthOf(const Swarm& swarm) {
 
 // ---- ours and the peers ------------------------------------------------------------------------
 
+/// What a frame cost, in milliseconds.
+struct Frame {
+  std::size_t pairs = 0;  ///< decided by the narrow phase
+  double boxes = 0, broad = 0, narrow = 0;
+  double whole() const { return boxes + broad + narrow; }
+};
+
+class Stopwatch {
+ public:
+  /// Milliseconds since the last lap.
+  double lap() {
+    const auto now = Clock::now();
+    const double passed = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+    return passed;
+  }
+
+ private:
+  Clock::time_point last_ = Clock::now();
+};
+
 class Detector {
  public:
   virtual ~Detector() = default;
-  /// Contacts of this frame in any order; returns the number of pairs that were decided.
-  virtual std::size_t frame(const Swarm& swarm, Contacts& contacts) = 0;
+  /// Contacts of this frame in any order.
+  virtual Frame frame(const Swarm& swarm, Contacts& contacts) = 0;
 };
 
-enum class Boxes { fixedCubes, tight };
+enum class Boxes { fixedCubes, tight, tightByWalls };
 
 class BoxMaker {
  public:
@@ -149,8 +170,11 @@ class BoxMaker {
     extremal_.resize(swarm.flyers.size());
     for (std::size_t k = 0; k < boxes_.size(); ++k) {
       const Pose& pose = swarm.flyers[k].pose;
-      boxes_[k] = kind_ == Boxes::tight ? tightBox(swarm.hull, pose, extremal_[k])
-                                        : fixedCube(swarm.hull, pose);
+      if (kind_ == Boxes::fixedCubes) boxes_[k] = fixedCube(swarm.hull, pose);
+      if (kind_ == Boxes::tight) boxes_[k] = tightBox(swarm.hull, pose, extremal_[k]);
+      if (kind_ == Boxes::tightByWalls) {
+        boxes_[k] = tightBoxByWalls(swarm.hull, pose, extremal_[k]);
+      }
     }
     return boxes_;
   }
@@ -166,8 +190,11 @@ class OurDetector : public Detector {
  public:
   explicit OurDetector(Boxes kind) : boxes_(kind), sweep_({}) {}
 
-  std::size_t frame(const Swarm& swarm, Contacts& contacts) override {
+  Frame frame(const Swarm& swarm, Contacts& contacts) override {
+    Frame frame;
+    Stopwatch watch;
     const auto boxes = boxes_.boxes(swarm);
+    frame.boxes = watch.lap();
     for (std::uint32_t k = 0; k < boxes.size(); ++k) {
       if (inserted_) sweep_.move(k, boxes[k]);
       if (!inserted_) sweep_.insert(boxes[k]);
@@ -175,17 +202,18 @@ class OurDetector : public Detector {
     inserted_ = true;
     sweep_.update();
     for (const BoxPair& pair : sweep_.ended()) features_.erase(keyOf(pair.mover, pair.other));
-    std::size_t pairs = 0;
+    frame.broad = watch.lap();
     for (std::uint32_t a = 0; a < boxes.size(); ++a) {
       for (const auto& partner : sweep_.partners(a)) {
         if (partner.id <= a) continue;
-        ++pairs;
+        ++frame.pairs;
         const auto told = collision::decide(swarm.body(a), swarm.body(partner.id),
                                             features_[keyOf(a, partner.id)]);
         if (told.verdict != collision::Verdict::separated) contacts.emplace_back(a, partner.id);
       }
     }
-    return pairs;
+    frame.narrow = watch.lap();
+    return frame;
   }
 
  private:
@@ -206,18 +234,25 @@ class PeerDetector : public Detector {
         broad_(broad.make({})),
         pair_(narrow.make(swarm.hull.vertices, swarm.hull.vertices)) {}
 
-  std::size_t frame(const Swarm& swarm, Contacts& contacts) override {
+  Frame frame(const Swarm& swarm, Contacts& contacts) override {
+    Frame frame;
+    Stopwatch watch;
+    const auto boxes = boxes_.boxes(swarm);
+    frame.boxes = watch.lap();
     pairs_.clear();
     PairTally tally;
     tally.kept = &pairs_;
-    broad_->tick(boxes_.boxes(swarm), tally);
+    broad_->tick(boxes, tally);
+    frame.broad = watch.lap();
     for (const BoxPair& pair : pairs_) {
       pair_->forget();  // one pair of shapes stands for all
       const Answer told =
           pair_->ask(placementOf(swarm, pair.mover), placementOf(swarm, pair.other));
       if (told.verdict == Answer::Verdict::collides) contacts.emplace_back(pair.mover, pair.other);
     }
-    return pairs_.size();
+    frame.pairs = pairs_.size();
+    frame.narrow = watch.lap();
+    return frame;
   }
 
  private:
@@ -233,8 +268,15 @@ class PeerDetector : public Detector {
 struct Contestant {
   std::string name;
   std::unique_ptr<Detector> detector;
-  std::vector<double> milliseconds;
+  std::vector<double> whole, boxes, broad, narrow;  ///< milliseconds
   std::size_t pairs = 0, missed = 0, wrong = 0;
+
+  void add(const Frame& frame) {
+    whole.push_back(frame.whole());
+    boxes.push_back(frame.boxes);
+    broad.push_back(frame.broad);
+    narrow.push_back(frame.narrow);
+  }
 };
 
 std::vector<Contestant> contestants(const Swarm& swarm, const Arguments& arguments) {
@@ -247,6 +289,7 @@ std::vector<Contestant> contestants(const Swarm& swarm, const Arguments& argumen
   };
   add("ours, fixed cubes", std::make_unique<OurDetector>(Boxes::fixedCubes));
   add("ours, tight boxes", std::make_unique<OurDetector>(Boxes::tight));
+  add("ours, tight boxes by walls", std::make_unique<OurDetector>(Boxes::tightByWalls));
   const std::pair<const char*, const char*> stacks[] = {{"FCL dynamic tree", "FCL libccd"},
                                                         {"Bullet Dbvt", "Bullet GjkEpa2"}};
   for (const BroadPhaseMethod& broad : broadPhaseMethods()) {
@@ -279,31 +322,32 @@ void measure(const char* sweep, double value, const Setting& setting, std::size_
     const Contacts truth = truthOf(swarm);
     for (Contestant& one : all) {
       Contacts told;
-      const auto start = Clock::now();
-      const std::size_t pairs = one.detector->frame(swarm, told);
-      const double milliseconds = 1e3 * secondsSince(start);
-      if (frame > 0) one.milliseconds.push_back(milliseconds);  // the first one inserts
+      const Frame cost = one.detector->frame(swarm, told);
+      if (frame > 0) one.add(cost);  // the first one inserts
       std::sort(told.begin(), told.end());
-      one.pairs += pairs;
+      one.pairs += cost.pairs;
       one.missed += notIn(truth, told);
       one.wrong += notIn(told, truth);
     }
     trueContacts += truth.size();
   }
   for (const Contestant& one : all) {
-    const double median = quantile(one.milliseconds, 0.5);
+    const double median = quantile(one.whole, 0.5);
     std::printf(
-        "%-12s %8g | %-30s %9.3f ms a frame | %8.0f pairs %6.1f contacts a frame | "
-        "missed %zu false %zu\n",
-        sweep, value, one.name.c_str(), median,
-        static_cast<double>(one.pairs) / static_cast<double>(frames),
+        "%-12s %8g | %-30s %8.3f ms a frame (%.3f boxes, %.3f broad, %.3f narrow) | "
+        "%6.0f pairs %6.1f contacts a frame | missed %zu false %zu\n",
+        sweep, value, one.name.c_str(), median, quantile(one.boxes, 0.5), quantile(one.broad, 0.5),
+        quantile(one.narrow, 0.5), static_cast<double>(one.pairs) / static_cast<double>(frames),
         static_cast<double>(trueContacts) / static_cast<double>(frames), one.missed, one.wrong);
     results.add({{"bench", "icollide"},
                  {"sweep", sweep},
                  {"value", value},
                  {"method", one.name},
                  {"ms", number(median)},
-                 {"ms_99", number(quantile(one.milliseconds, 0.99))},
+                 {"ms_99", number(quantile(one.whole, 0.99))},
+                 {"boxes_ms", number(quantile(one.boxes, 0.5))},
+                 {"broad_ms", number(quantile(one.broad, 0.5))},
+                 {"narrow_ms", number(quantile(one.narrow, 0.5))},
                  {"pairs", static_cast<double>(one.pairs) / static_cast<double>(frames)},
                  {"contacts", trueContacts},
                  {"missed", one.missed},
@@ -317,7 +361,7 @@ void measure(const char* sweep, double value, const Setting& setting, std::size_
 int main(int argc, char** argv) {
   const Arguments arguments(argc, argv);
   Results results(arguments);
-  const std::size_t frames = arguments.quick ? 8 : 60;
+  const std::size_t frames = arguments.quick ? 20 : 150;
   const auto sweep = [&](const char* name, const std::vector<double>& values, const auto& apply) {
     for (std::size_t k = 0; k < values.size(); ++k) {
       if (arguments.quick && k % 2 != 0) continue;

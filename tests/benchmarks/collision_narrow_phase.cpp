@@ -286,7 +286,7 @@ void measureCases(const NarrowPhaseMethod& method, const std::vector<accuracy::C
 int main(int argc, char** argv) {
   const Arguments arguments(argc, argv);
   const Effort effort =
-      arguments.quick ? Effort{4, 100, 3, 0.02, 0.1, 1} : Effort{16, 200, 5, 0.3, 3, 3};
+      arguments.quick ? Effort{4, 100, 3, 0.02, 0.1, 1} : Effort{16, 200, 5, 0.15, 1, 3};
   Results results(arguments);
   Methods methods = narrowPhaseMethods();
   std::erase_if(methods, [&](const auto& m) { return !arguments.wants(m.name); });
