@@ -68,7 +68,7 @@ double timeToContact(double distance, const ClosingBounds& closing) {
   const Scaled s = scaledUp({distance, closing.speed, closing.acceleration});
   const double time = 2 * s.distance / (s.speed + std::sqrt(s.underRoot()));
   if (!(time >= kLeastTime)) return 0;
-  return time * (1 - 12 * kUnit);
+  return std::min(time, std::numeric_limits<double>::max()) * (1 - 12 * kUnit);
 }
 
 WakeUp wakeUp(double distance, const ClosingBounds& closing, double least, double clearance) {
