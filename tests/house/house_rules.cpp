@@ -22,6 +22,7 @@ const std::map<std::string, Names> kMayInclude{
     {"protocol", {}},
     {"server", {"collision", "scene", "render", "protocol"}},
     {"assets", {"collision", "scene"}},
+    {"examples", {"collision"}},
 };
 
 struct ThirdParty {

@@ -1,0 +1,12 @@
+# find_package(enfilade_collision): the target enfilade::collision, with Eigen 3.4 and GMP.
+include(CMakeFindDependencyMacro)
+find_dependency(Eigen3 3.4 NO_MODULE)
+find_library(enfilade_collision_gmp gmp)
+find_library(enfilade_collision_gmpxx gmpxx)
+mark_as_advanced(enfilade_collision_gmp enfilade_collision_gmpxx)
+if(NOT enfilade_collision_gmp OR NOT enfilade_collision_gmpxx)
+  set(enfilade_collision_FOUND FALSE)
+  set(enfilade_collision_NOT_FOUND_MESSAGE "GMP with its C++ part is missing (Debian: libgmp-dev)")
+  return()
+endif()
+include(${CMAKE_CURRENT_LIST_DIR}/enfilade_collision_targets.cmake)
