@@ -54,7 +54,9 @@ constexpr double kNarrow = 0x1p-40;     // the same: below 1e-12
 constexpr double kWidest = 0x1p-24;     // the same: after it the contact is called unproved
 constexpr double kSharp = 0x1p12;      // gap above this many errors: no need for the exact distance
 constexpr double kSlack = 64 * kUnit;  // see the file's head
-constexpr double kCapGrowth = 16;      // how much longer than the plain step a turned one may be
+constexpr double kCapGrowth =
+    16;  // a step with the plane turning: at most so much longer than the last
+constexpr int kGrowthBound = 16;  // tries of longer steps; a shorter one is right as well
 
 /// A plane that parts the bodies at some time.
 struct PartingPlane {
@@ -255,10 +257,16 @@ double longestStep(const Instant& at, const PartingPlane& plane, const FeatureCa
   best = std::max(best, spunStep(at, plane.normal, cap));
   const double length = at.apart.norm();
   if (length > 0) best = std::max(best, spunStep(at, at.apart / length, cap));
-  const double turnedCap = std::min(cap, kCapGrowth * best);
   const auto tryTurning = [&](const Vec3& spin) {
-    if (spin.isZero(0) || !(best < turnedCap)) return;
-    best = std::max(best, provedStep(gapBound(at, plane, spin, turnedCap), turnedCap));
+    // The bound of the curvature grows with the step it is for: longer ones only as they prove
+    // good.
+    bool reached = !spin.isZero(0) && best > 0;
+    for (int i = 0; i < kGrowthBound && reached && best < cap; ++i) {
+      const double longest = std::min(cap, kCapGrowth * best);
+      const double step = provedStep(gapBound(at, plane, spin, longest), longest);
+      reached = step >= longest;
+      best = std::max(best, step);
+    }
   };
   tryTurning(at.b.spin);
   tryTurning(at.a.spin);

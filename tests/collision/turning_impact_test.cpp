@@ -75,7 +75,7 @@ TEST(TurningImpact, ADoorMeetsAPostNearItsHingeInFewSteps) {
     const MovingBody a{{door}, spinning({0, 0.25, 0})};
     const TimeOfImpact impact = impactCold(a, b, 64);
     expectContactAt(impact, (angle - std::asin(0.02 / far)) / 0.25);
-    EXPECT_LE(impact.queries, 40u) << far;
+    EXPECT_LE(impact.queries, 25u) << far;
   }
 }
 
