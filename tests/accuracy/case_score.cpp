@@ -147,7 +147,9 @@ void scoreMesh(const Case& asked, const Answer& answer, Score& score) {
 void scoreTime(const Case& asked, const Answer& answer, Score& score) {
   if (!asked.course || asked.truth.tc.empty()) return;
   const auto& truth = asked.truth.toi;
-  bool right = answer.tc && preciseNumber(*answer.tc) <= preciseNumber(asked.truth.tc);
+  const mpf_class tc = preciseNumber(asked.truth.tc);
+  bool right =
+      answer.tc && preciseNumber(*answer.tc) <= tc && relativeError(*answer.tc, tc) < 1e-14;
   right = right && answer.toi.has_value() == truth.has_value();
   if (right && truth) {
     const auto [lo, hi] = *answer.toi;

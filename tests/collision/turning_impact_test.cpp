@@ -118,6 +118,44 @@ TEST(TurningImpact, ABallThrownUpComesBack) {
   expectContactAt(impactCold(cube, {{floor}, {}}, 10), time);
 }
 
+TEST(GrazingImpact, ABodyThatSlidesOnAFaceMeetsItWhenItsEdgeIsOverIt) {
+  // Their faces lie in one plane: they touch and never penetrate. Contact at x = 1.
+  const auto table = boxOf({1, -1, -5}, {9, 0, 5});
+  for (const double speed : {1.0, 0.3, 7.77}) {
+    const MovingBody a{{kCube, {-3, 1, 0}}, {{speed, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
+    expectContactAt(impactCold(a, {{table}, {}}, 60), 3 / speed);
+  }
+}
+
+TEST(GrazingImpact, OneUlpOfRoomIsRoom) {
+  const auto table = boxOf({1, -1, -5}, {9, 0, 5});
+  const MovingBody a{{kCube, {-3, 1 + 0x1p-52, 0}}, {{0.3, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
+  const TimeOfImpact impact = impactCold(a, {{table}, {}}, 60);
+  EXPECT_EQ(impact.impact, Impact::none);
+}
+
+TEST(GrazingImpact, OneUlpTooLittleIsAContact) {
+  const auto table = boxOf({1, -1, -5}, {9, 0, 5});
+  const MovingBody a{{kCube, {-3, 1 - 0x1p-53, 0}}, {{0.3, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
+  expectContactAt(impactCold(a, {{table}, {}}, 60), 10);
+}
+
+TEST(GrazingImpact, PolygonsInOnePlaneMeet) {
+  const std::vector<Vec3> square{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  const MovingBody a{{square}, {{0.7, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
+  expectContactAt(impactCold(a, {{square, {3, 0.5, 0}}, {}}, 60), 2 / 0.7);
+}
+
+TEST(GrazingImpact, AThrownCubeThatJustFailsToReachTheCeilingMisses) {
+  // It rises by 1/2 m: v^2 / 2g with v = g = 1.
+  const auto ceiling = boxOf({-5, 0, -5}, {5, 1, 5});
+  const Motion thrown{{0, 1, 0}, {0, -1, 0}, Vec3::Zero()};
+  const MovingBody low{{kCube, {0, -1.5 - 1e-12, 0}}, thrown};
+  EXPECT_EQ(impactCold(low, {{ceiling}, {}}, 2).impact, Impact::none);
+  const MovingBody high{{kCube, {0, -1.5 + 0x1p-20, 0}}, thrown};
+  expectContactAt(impactCold(high, {{ceiling}, {}}, 2), 1 - std::sqrt(0x1p-19));
+}
+
 struct Tumble {
   std::vector<Vec3> pointsA, pointsB;
   Mat3 rotationB;
