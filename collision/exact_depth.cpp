@@ -28,7 +28,7 @@ struct BodyFeatures {
 BodyFeatures featuresOf(const PlacedBody& placed) {
   BodyFeatures features{placed.body->hull, {}, {}};
   for (std::uint32_t i = 0; i < placed.vertexCount(); ++i) {
-    features.points.push_back(placed.turned(i));
+    features.points.push_back(placed.turned<Wide>(i));
     for (const std::uint32_t j : features.hull->neighboursOf(i))
       if (i < j) features.edges.push_back({i, j});
   }
@@ -52,7 +52,7 @@ class Sieve {
       Wide extent = 0, error = std::numeric_limits<Wide>::infinity();
       if (known) {
         const WideVec direction = way == 1 ? WideVec(-normal) : normal;
-        const Least least = leastAlong(difference_, -direction, hint_);
+        const Least least = leastAlong(difference_, -direction, length, hint_);
         extent = -least.along / length;
         error = (least.along - least.bound) / length + 2 * off / length * difference_.reach;
       }

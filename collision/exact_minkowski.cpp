@@ -260,8 +260,11 @@ VertexPair ExactDifference::leastAlong(const ExactPoint& direction, VertexPair& 
   const auto farthest = [&](Body& body, int sign, std::uint32_t& climbed) {
     std::optional<std::uint32_t> best;
     Integer most;
-    forEachFarthest(body.bounds, body.bounds.bodyFromWorld(sign * approximate),
-                    supportSlack(body.bounds), climbed, [&](std::uint32_t i) {
+    const WideVec towards = approximate.cast<Wide>() * static_cast<Wide>(sign);
+    const Vec3 local = body.bounds.bodyFromWorld<Wide>(towards).cast<double>();
+    const double length = approximate.lpNorm<1>() + local.lpNorm<1>();
+    forEachFarthest(body.bounds, local, supportSlack(body.bounds, length), climbed,
+                    [&](std::uint32_t i) {
                       const Integer along = sign * dot(direction, body.vertex(i, scale_));
                       if (best && along <= most) return;
                       best = i;

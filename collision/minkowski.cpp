@@ -10,47 +10,39 @@ double greatestRadius(const ConvexBody& body) {
   return greatest * 1.7320508075688774;  // sqrt(3); a norm might overflow
 }
 
-/// The greatest norm of a row or a column: 1 up to rounding for a rotation, but any matrix will do.
-double greatestNorm(const Mat3* rotation) {
-  if (!rotation) return 1;
-  return std::sqrt(std::max(rotation->rowwise().squaredNorm().maxCoeff(),
-                            rotation->colwise().squaredNorm().maxCoeff()));
+/// The greatest coordinate of a body along a direction of its own frame.
+struct Support {
+  std::uint32_t vertex = 0;
+  Wide along = 0;
+};
+
+Support farthest(const PlacedBody& placed, const WideVec& direction, std::uint32_t& hint) {
+  Support support;
+  bool first = true;
+  const Vec3 rounded = direction.cast<double>();
+  forEachFarthest(
+      placed, rounded, supportSlack(placed, rounded.lpNorm<1>()), hint, [&](std::uint32_t i) {
+        const Vec3& p = placed.body->vertices[i];
+        const Wide along = direction.x() * p.x() + direction.y() * p.y() + direction.z() * p.z();
+        if (!first && along <= support.along) return;
+        support = {i, along};
+        first = false;
+      });
+  hint = support.vertex;
+  return support;
 }
 
-/// The least value of sign * direction . point over one body, and the vertex.
-BodySupport farthest(const PlacedBody& placed, const WideVec& direction, const Vec3& rounded,
-                     std::uint32_t& hint) {
-  BodySupport support;
-  bool first = true;
-  const Vec3 local = placed.bodyFromWorld(rounded);
-  forEachFarthest(placed, local, supportSlack(placed), hint, [&](std::uint32_t i) {
-    const Wide along = direction.dot(placed.turned(i));
-    if (!first && along <= support.most) return;
-    support = {i, along};
-    first = false;
-  });
-  hint = support.best;
-  return support;
+/// Into the range of doubles, where products neither over- nor underflow.
+bool needsScaling(Wide length) {
+  return !(length > 1e-150L && length < 1e150L);
 }
 
 }  // namespace
 
 PlacedBody::PlacedBody(const ConvexBody& placed)
     : body(&placed),
-      size(greatestRadius(placed) * greatestNorm(placed.rotation) * (1 + 16 * kUnit)) {}
-
-WideVec PlacedBody::turned(std::uint32_t i) const {
-  const Vec3& p = body->vertices[i];
-  const Wide x = p.x(), y = p.y(), z = p.z();
-  if (!body->rotation) return {x, y, z};
-  const Mat3& r = *body->rotation;
-  return {r(0, 0) * x + r(0, 1) * y + r(0, 2) * z, r(1, 0) * x + r(1, 1) * y + r(1, 2) * z,
-          r(2, 0) * x + r(2, 1) * y + r(2, 2) * z};
-}
-
-Vec3 PlacedBody::bodyFromWorld(const Vec3& direction) const {
-  return body->rotation ? Vec3(body->rotation->transpose() * direction) : direction;
-}
+      size(greatestRadius(placed) * (placed.rotation ? placed.rotation->norm() : 1) *
+           (1 + 16 * kUnit)) {}
 
 MinkowskiDifference::MinkowskiDifference(const ConvexBody& bodyA, const ConvexBody& bodyB)
     : a(bodyA),
@@ -59,23 +51,23 @@ MinkowskiDifference::MinkowskiDifference(const ConvexBody& bodyA, const ConvexBo
       reach((a.size + b.size + static_cast<double>(shift.cwiseAbs().maxCoeff())) *
             (1 + 8 * kUnit)) {}
 
-Vec3 directionInDoubles(const WideVec& direction) {
-  int exponent = 0;
-  std::frexp(direction.cwiseAbs().maxCoeff(), &exponent);
-  return (direction * std::ldexp(Wide{1}, -exponent)).cast<double>();
-}
-
-Least leastAlong(const MinkowskiDifference& difference, const WideVec& direction,
+Least leastAlong(const MinkowskiDifference& difference, const WideVec& direction, Wide length,
                  VertexPair& hint) {
-  const Vec3 rounded = directionInDoubles(direction);
-  const BodySupport ofA = farthest(difference.a, direction, rounded, hint.a);
-  const BodySupport ofB = farthest(difference.b, -direction, -rounded, hint.b);
+  if (needsScaling(length)) {
+    const Wide scale = 1 / length;
+    Least least = leastAlong(difference, direction * scale, 1, hint);
+    least.along *= length;
+    least.bound = (least.bound - std::abs(least.bound) * 8 * kWideUnit) * length;
+    return least;
+  }
+  const Support ofA = farthest(difference.a, difference.a.bodyFromWorld<Wide>(direction), hint.a);
+  const Support ofB = farthest(difference.b, difference.b.bodyFromWorld<Wide>(-direction), hint.b);
   Least least;
-  least.pair = {ofA.best, ofB.best};
-  least.along = direction.dot(difference.shift) - ofB.most - ofA.most;
+  least.pair = {ofA.vertex, ofB.vertex};
+  least.along = direction.dot(difference.shift) - ofB.along - ofA.along;
   // Each of three products of a direction and a vector: the vector's own error, and 3 eta |d| reach
   // by Cauchy; |d|_1 <= sqrt(3) |d|; two differences of at most 3 |d| reach.
-  least.bound = least.along - 16 * kWideUnit * direction.norm() * difference.reach;
+  least.bound = least.along - 16 * kWideUnit * length * difference.reach;
   return least;
 }
 

@@ -3,7 +3,7 @@
 //
 // Rounding. `Wide` is long double; eta is its unit of rounding (2^-64 on x86-64; the bounds are
 // written in eta, so they hold where long double is another type). S_A bounds the radius of A's
-// vertices times the greatest norm of a row or a column of its rotation, S_B likewise, D is the
+// vertices times the Frobenius norm of its rotation, S_B likewise, D is the
 // greatest |coordinate| of t_B - t_A, and reach = S_A + S_B + D.
 //  - A rotated vertex: three products, two sums. By Cauchy the products of a coordinate sum up to
 //  at
@@ -28,6 +28,11 @@ using WideVec = Eigen::Matrix<Wide, 3, 1>;
 inline constexpr double kUnit = 0x1p-53;  ///< of double
 inline constexpr Wide kWideUnit = std::numeric_limits<Wide>::epsilon() / 2;
 
+template <class Real>
+constexpr Real unitOf() {
+  return std::numeric_limits<Real>::epsilon() / 2;
+}
+
 /// One body, ready to be asked: the bounds that the proofs need.
 struct PlacedBody {
   const ConvexBody* body;
@@ -35,17 +40,28 @@ struct PlacedBody {
 
   explicit PlacedBody(const ConvexBody& placed);
   std::uint32_t vertexCount() const { return static_cast<std::uint32_t>(body->vertices.size()); }
-  /// The vertex turned to world axes, not moved.
-  WideVec turned(std::uint32_t i) const;
-  /// A direction of the world's axes, in the body's.
-  Vec3 bodyFromWorld(const Vec3& direction) const;
-};
-
-/// A support of one body. `best` is the vertex that rounded arithmetic finds farthest along the
-/// direction, and `most` its coordinate along it in Wide.
-struct BodySupport {
-  std::uint32_t best = 0;
-  Wide most = 0;
+  /// A point of the body's frame turned to world axes, not moved.
+  template <class Real>
+  Eigen::Matrix<Real, 3, 1> turned(Real x, Real y, Real z) const {
+    if (!body->rotation) return {x, y, z};
+    const Mat3& r = *body->rotation;
+    return {r(0, 0) * x + r(0, 1) * y + r(0, 2) * z, r(1, 0) * x + r(1, 1) * y + r(1, 2) * z,
+            r(2, 0) * x + r(2, 1) * y + r(2, 2) * z};
+  }
+  template <class Real>
+  Eigen::Matrix<Real, 3, 1> turned(std::uint32_t i) const {
+    const Vec3& p = body->vertices[i];
+    return turned<Real>(p.x(), p.y(), p.z());
+  }
+  /// A direction of the world's axes, in the body's: n . (R p) = (R^T n) . p.
+  template <class Real>
+  Eigen::Matrix<Real, 3, 1> bodyFromWorld(const Eigen::Matrix<Real, 3, 1>& n) const {
+    if (!body->rotation) return n;
+    const Mat3& r = *body->rotation;
+    const Real x = n.x(), y = n.y(), z = n.z();
+    return {r(0, 0) * x + r(1, 0) * y + r(2, 0) * z, r(0, 1) * x + r(1, 1) * y + r(2, 1) * z,
+            r(0, 2) * x + r(1, 2) * y + r(2, 2) * z};
+  }
 };
 
 struct MinkowskiDifference {
@@ -55,10 +71,14 @@ struct MinkowskiDifference {
 
   MinkowskiDifference(const ConvexBody& bodyA, const ConvexBody& bodyB);
 
-  WideVec pointA(std::uint32_t i) const { return a.turned(i); }
-  WideVec pointB(std::uint32_t i) const { return b.turned(i) + shift; }
-  WideVec operator()(VertexPair pair) const { return pointB(pair.b) - pointA(pair.a); }
-  /// Of any coordinate of a point.
+  WideVec pointA(std::uint32_t i) const { return a.turned<Wide>(i); }
+  WideVec pointB(std::uint32_t i) const { return b.turned<Wide>(i) + shift; }
+  template <class Real>
+  Eigen::Matrix<Real, 3, 1> point(VertexPair pair) const {
+    return b.turned<Real>(pair.b) + shift.cast<Real>() - a.turned<Real>(pair.a);
+  }
+  WideVec operator()(VertexPair pair) const { return point<Wide>(pair); }
+  /// Of any coordinate of a point in Wide.
   Wide pointError() const { return 6 * kWideUnit * reach; }
 };
 
@@ -69,25 +89,28 @@ struct Least {
   Wide bound = 0;  ///< direction . w >= bound for every w of B - A, exactly
 };
 
-/// `direction`: any length, not zero. `hint`: vertices to climb from; the best ones afterwards.
-Least leastAlong(const MinkowskiDifference& difference, const WideVec& direction, VertexPair& hint);
+/// `direction`: not zero, `length` its length. `hint`: vertices to climb from; the best ones
+/// afterwards.
+Least leastAlong(const MinkowskiDifference& difference, const WideVec& direction, Wide length,
+                 VertexPair& hint);
 
-/// Scaled by a power of two so that its greatest |coordinate| lies in [1/2, 1), and rounded.
-Vec3 directionInDoubles(const WideVec& direction);
-
-/// Calls visit(i) for vertices of `placed` among which is, exactly, one that is farthest along
-/// `direction` (body's frame, each coordinate off by at most a few units of rounding of its
-/// length); `hint` is where the climb starts, and the best vertex afterwards.
+/// Calls visit(i) for vertices of `placed` among which is, exactly, one that is farthest along a
+/// direction; `direction` is that one in the body's frame, rounded to double. `hint` is where the
+/// climb starts, and the best vertex afterwards.
 ///
-/// Each product `direction . vertex` is off by less than `slack`/2 (proof: supportSlack). Climb to
-/// a vertex that no neighbour exceeds in doubles. From there an exact ascent over the edges leads
-/// to the exact maximum (convexity); all its vertices have, in doubles, at least the value of the
+/// Each product `direction . vertex` is off by less than `slack`/2 (supportSlack). Climb to a
+/// vertex that no neighbour exceeds in doubles. From there an exact ascent over the edges leads to
+/// the exact maximum (convexity); all its vertices have, in doubles, at least the value of the
 /// start less `slack`. So visiting all vertices that are linked to the start by such ones is
 /// enough.
 template <class Visit>
 void forEachFarthest(const PlacedBody& placed, const Vec3& direction, double slack,
                      std::uint32_t& hint, Visit visit) {
   const std::span<const Vec3> vertices = placed.body->vertices;
+  const auto visitAllAbove = [&](double least) {
+    for (std::uint32_t i = 0; i < vertices.size(); ++i)
+      if (direction.dot(vertices[i]) >= least) visit(i);
+  };
   const Hull* hull = placed.body->hull;
   if (!hull) {
     double most = -std::numeric_limits<double>::infinity();
@@ -95,8 +118,7 @@ void forEachFarthest(const PlacedBody& placed, const Vec3& direction, double sla
       const double along = direction.dot(vertices[i]);
       if (along > most) most = along, hint = i;
     }
-    for (std::uint32_t i = 0; i < vertices.size(); ++i)
-      if (direction.dot(vertices[i]) >= most - slack) visit(i);
+    visitAllAbove(most - slack);
     return;
   }
 
@@ -113,33 +135,29 @@ void forEachFarthest(const PlacedBody& placed, const Vec3& direction, double sla
     }
     hint = next;
   }
-  visit(hint);
-  if (alone) return;
+  if (alone) return visit(hint);
 
-  // Few vertices stand so near the maximum, except on nearly flat caps.
-  std::array<std::uint32_t, 48> reached{hint};
+  std::array<std::uint32_t, 48> reached;  // enough, except on nearly flat caps
+  reached[0] = hint;
   std::size_t count = 1;
   for (std::size_t k = 0; k < count; ++k) {
     for (const std::uint32_t neighbour : hull->neighboursOf(reached[k])) {
       if (direction.dot(vertices[neighbour]) < most - slack) continue;
       if (std::find(reached.begin(), reached.begin() + count, neighbour) != reached.begin() + count)
         continue;
-      if (count == reached.size()) {
-        for (std::uint32_t i = 0; i < vertices.size(); ++i)
-          if (direction.dot(vertices[i]) >= most - slack) visit(i);
-        return;
-      }
+      if (count == reached.size()) return visitAllAbove(most - slack);
       reached[count++] = neighbour;
-      visit(neighbour);
     }
   }
+  for (std::size_t k = 0; k < count; ++k) visit(reached[k]);
 }
 
-/// For a direction made by directionInDoubles and bodyFromWorld: with u = 2^-53 and |d| < sqrt(3),
-/// the direction is off by u |d| (rounded to double), its turning by 3 sqrt(3) u |d| (by Cauchy as
-/// above), the product by 3 u |d| S: less than 10 u |d| S together; the slack is twice that.
-inline double supportSlack(const PlacedBody& placed) {
-  return 40 * kUnit * placed.size + std::numeric_limits<double>::min();
+/// With u = 2^-53: a direction that is off by 4u `length` (rounded, or truncated from integers),
+/// and its product with a vertex, off by 3u `length` |p|: less than 8u `length` S together; the
+/// slack is twice that. `length`: at least that of the direction, in the world's and in the body's
+/// frame.
+inline double supportSlack(const PlacedBody& placed, double length) {
+  return 16 * kUnit * length * placed.size + std::numeric_limits<double>::min();
 }
 
 }  // namespace enfilade::collision

@@ -138,8 +138,9 @@ struct Bounds {
 /// M's extent along `direction` bounds the depth; returns the support.
 VertexPair boundAlong(const MinkowskiDifference& difference, const WideVec& direction,
                       VertexPair& hint, Bounds& bounds) {
-  const Least least = leastAlong(difference, -direction, hint);
-  const Wide upper = -least.bound / direction.norm() * (1 + 8 * kWideUnit);
+  const Wide length = direction.norm();
+  const Least least = leastAlong(difference, -direction, length, hint);
+  const Wide upper = -least.bound / length * (1 + 8 * kWideUnit);
   if (upper < bounds.upper) {
     bounds.upper = upper;
     bounds.direction = direction;
@@ -215,7 +216,7 @@ void describe(const MinkowskiDifference& difference, const Bounds& bounds, const
     for (int k = 0; k < 3; ++k) onA += weight[k] / sum * difference.pointA(polytope.pairs[c[k]].a);
   } else {
     VertexPair hint{};
-    onA = difference.pointA(leastAlong(difference, -normal, hint).pair.a);
+    onA = difference.pointA(leastAlong(difference, -normal, 1, hint).pair.a);
   }
   const Vec3 origin = difference.a.body->translation;
   depth.pointA = (onA + origin.cast<Wide>()).cast<double>();

@@ -9,118 +9,112 @@ namespace enfilade::collision {
 namespace {
 
 /// A face of a simplex with the point of it nearest the origin.
+template <class Real>
 struct Face {
-  std::array<int, 4> corner{};
-  std::array<Wide, 4> weight{};
-  int size = 0;
-  WideVec nearest = WideVec::Zero();
+  std::array<int, 4> corner;
+  std::array<Real, 4> weight;
+  int size;
+  Eigen::Matrix<Real, 3, 1> nearest;
 };
 
-const Face& closer(const Face& first, const Face& second) {
+template <class Real>
+const Face<Real>& closer(const Face<Real>& first, const Face<Real>& second) {
   return second.nearest.squaredNorm() < first.nearest.squaredNorm() ? second : first;
 }
 
-Face corner(const Simplex& s, int i) {
-  return {{i}, {1}, 1, s.corners[i].w};
+template <class Real>
+Face<Real> corner(const Simplex<Real>& s, int i) {
+  return {{i}, {1}, 1, s.points[i]};
 }
 
-Face segment(const Simplex& s, int i, int j) {
-  const WideVec& from = s.corners[i].w;
-  const WideVec edge = s.corners[j].w - from;
-  const Wide squared = edge.squaredNorm();
-  const Wide t = -from.dot(edge);
+template <class Real>
+Face<Real> segment(const Simplex<Real>& s, int i, int j) {
+  using Vec = typename Simplex<Real>::Vec;
+  const Vec& from = s.points[i];
+  const Vec edge = s.points[j] - from;
+  const Real squared = edge.squaredNorm();
+  const Real t = -from.dot(edge);
   if (!(t > 0)) return corner(s, i);
   if (t >= squared) return corner(s, j);
-  const Wide w = t / squared;
-  WideVec nearest = from + w * edge;
-  nearest -= (nearest.dot(edge) / squared) * edge;
-  return {{i, j}, {1 - w, w}, 2, nearest};
+  const Real inverse = 1 / squared;
+  const Real w = t * inverse;
+  const Vec near = from + w * edge;
+  return {{i, j}, {1 - w, w}, 2, near - (near.dot(edge) * inverse) * edge};
 }
 
-Face triangle(const Simplex& s, int i, int j, int k) {
-  const WideVec &a = s.corners[i].w, &b = s.corners[j].w, &c = s.corners[k].w;
-  const WideVec ab = b - a, ac = c - a;
-  const WideVec normal = ab.cross(ac);
-  const Wide squared = normal.squaredNorm();
+template <class Real>
+Face<Real> triangle(const Simplex<Real>& s, int i, int j, int k) {
+  using Vec = typename Simplex<Real>::Vec;
+  const Vec& a = s.points[i];
+  const Vec ab = s.points[j] - a, ac = s.points[k] - a;
+  const Vec normal = ab.cross(ac);
+  const Real squared = normal.squaredNorm();
   // Twice the signed areas that the origin's projection spans with each edge, times |normal|.
-  const WideVec an = a.cross(normal);
-  const Wide wk = -ab.dot(an);
-  const Wide wj = ac.dot(an);
-  const Wide wi = squared - wj - wk;
-  if (squared > 0 && wi > 0 && wj > 0 && wk > 0)
+  const Vec an = a.cross(normal);
+  const Real wk = -ab.dot(an);
+  const Real wj = ac.dot(an);
+  const Real wi = squared - wj - wk;
+  if (squared > 0 && wi > 0 && wj > 0 && wk > 0) {
+    const Real inverse = 1 / squared;
     return {{i, j, k},
-            {wi / squared, wj / squared, wk / squared},
+            {wi * inverse, wj * inverse, wk * inverse},
             3,
-            (a.dot(normal) / squared) * normal};
+            (a.dot(normal) * inverse) * normal};
+  }
   return closer(closer(segment(s, i, j), segment(s, j, k)), segment(s, i, k));
 }
 
-/// The determinants are off by less than 256 eta reach^3: each of nine entries, off by at most
-/// 8 eta reach, has a cofactor of at most 2 reach^2; the determinant's own five roundings of six
-/// products of at most reach^3 add 30 eta reach^3.
-Face tetrahedron(const Simplex& s, double reach, bool& inside) {
-  const WideVec &a = s.corners[0].w, &b = s.corners[1].w, &c = s.corners[2].w, &d = s.corners[3].w;
-  const WideVec ab = a.cross(b), cd = c.cross(d);
-  const Wide d0 = b.dot(cd), d1 = -a.dot(cd), d2 = d.dot(ab), d3 = -c.dot(ab);
-  const Wide sum = d0 + d1 + d2 + d3;
-  const Wide sign = sum < 0 ? -1 : 1;
-  const Wide bound = 256 * kWideUnit * reach * reach * reach;
+/// With u the unit of rounding of Real, the determinants are off by less than 256 u reach^3: each
+/// of nine entries, off by at most 8 u reach, has a cofactor of at most 2 reach^2; the
+/// determinant's own five roundings of six products of at most reach^3 add 30 u reach^3.
+template <class Real>
+Face<Real> tetrahedron(const Simplex<Real>& s, double reach, bool& inside) {
+  using Vec = typename Simplex<Real>::Vec;
+  const Vec &a = s.points[0], &b = s.points[1], &c = s.points[2], &d = s.points[3];
+  const Vec ab = a.cross(b), cd = c.cross(d);
+  const Real d0 = b.dot(cd), d1 = -a.dot(cd), d2 = d.dot(ab), d3 = -c.dot(ab);
+  const Real sum = d0 + d1 + d2 + d3;
+  const Real sign = sum < 0 ? -1 : 1;
+  const Real size = reach;
+  const Real bound = 256 * unitOf<Real>() * size * size * size + std::numeric_limits<Real>::min();
   inside = std::min(std::min(sign * d0, sign * d1), std::min(sign * d2, sign * d3)) > bound;
-  if (inside) return {{0, 1, 2, 3}, {d0 / sum, d1 / sum, d2 / sum, d3 / sum}, 4, WideVec::Zero()};
+  if (inside) return {{0, 1, 2, 3}, {d0 / sum, d1 / sum, d2 / sum, d3 / sum}, 4, Vec::Zero()};
   return closer(closer(triangle(s, 0, 1, 2), triangle(s, 0, 1, 3)),
                 closer(triangle(s, 0, 2, 3), triangle(s, 1, 2, 3)));
 }
 
 }  // namespace
 
-bool Simplex::holds(VertexPair pair) const {
+template <class Real>
+bool Simplex<Real>::holds(VertexPair pair) const {
   for (int i = 0; i < size; ++i)
-    if (corners[i].pair == pair) return true;
+    if (pairs[i] == pair) return true;
   return false;
 }
 
-void Simplex::add(const MinkowskiDifference& difference, VertexPair pair) {
-  Corner& added = corners[size++];
-  added.pair = pair;
-  added.onA = difference.pointA(pair.a);
-  added.onB = difference.pointB(pair.b);
-  added.w = added.onB - added.onA;
+template <class Real>
+void Simplex<Real>::add(const MinkowskiDifference& difference, VertexPair pair) {
+  pairs[size] = pair;
+  points[size++] = difference.point<Real>(pair);
 }
 
-void Simplex::reduce(const MinkowskiDifference& difference) {
-  Face face;
+template <class Real>
+void Simplex<Real>::reduce(const MinkowskiDifference& difference) {
   holdsOrigin = false;
-  switch (size) {
-    case 1:
-      face = corner(*this, 0);
-      break;
-    case 2:
-      face = segment(*this, 0, 1);
-      break;
-    case 3:
-      face = triangle(*this, 0, 1, 2);
-      break;
-    default:
-      face = tetrahedron(*this, difference.reach, holdsOrigin);
-  }
-  for (int i = 0; i < face.size; ++i) {
-    if (face.corner[i] != i) corners[i] = corners[face.corner[i]];
-    corners[i].weight = face.weight[i];
+  const Face<Real> face = size == 1   ? corner(*this, 0)
+                          : size == 2 ? segment(*this, 0, 1)
+                          : size == 3 ? triangle(*this, 0, 1, 2)
+                                      : tetrahedron(*this, difference.reach, holdsOrigin);
+  for (int i = 0; i < face.size; ++i) {  // corners ascend, so none is overwritten before it is read
+    pairs[i] = pairs[face.corner[i]];
+    points[i] = points[face.corner[i]];
+    weight[i] = face.weight[i];
   }
   size = face.size;
   nearest = face.nearest;
 }
 
-WideVec Simplex::pointOnA() const {
-  WideVec sum = WideVec::Zero();
-  for (int i = 0; i < size; ++i) sum += corners[i].weight * corners[i].onA;
-  return sum;
-}
-
-WideVec Simplex::pointOnB() const {
-  WideVec sum = WideVec::Zero();
-  for (int i = 0; i < size; ++i) sum += corners[i].weight * corners[i].onB;
-  return sum;
-}
+template struct Simplex<double>;
+template struct Simplex<Wide>;
 
 }  // namespace enfilade::collision

@@ -1,29 +1,29 @@
 // Up to four points of a Minkowski difference, and the point of their hull nearest the origin.
-// Internal to the narrow phase.
+// Internal to the narrow phase. Real is double or Wide.
 #pragma once
 
 #include "collision/minkowski.hpp"
 
 namespace enfilade::collision {
 
+template <class Real>
 struct Simplex {
-  struct Corner {
-    VertexPair pair;
-    WideVec onA, onB;  ///< world axes, from t_A
-    WideVec w;         ///< onB - onA
-    Wide weight = 1;   ///< of the nearest point; >= 0, the weights sum up to 1
-  };
-  std::array<Corner, 4> corners;
+  using Vec = Eigen::Matrix<Real, 3, 1>;
+
+  std::array<VertexPair, 4> pairs;
+  std::array<Vec, 4> points;   ///< of B - A
+  std::array<Real, 4> weight;  ///< of the nearest point; >= 0, their sum is 1 up to rounding
   int size = 0;
-  WideVec nearest = WideVec::Zero();
-  bool holdsOrigin = false;  ///< proved: strictly inside; only with four corners
+  Vec nearest;
+  bool holdsOrigin = false;  ///< proved: strictly inside; only with four points
 
   bool holds(VertexPair pair) const;
   void add(const MinkowskiDifference& difference, VertexPair pair);
   /// Keeps the corners of the face that holds the nearest point, and sets `nearest`.
   void reduce(const MinkowskiDifference& difference);
-  WideVec pointOnA() const;
-  WideVec pointOnB() const;
 };
+
+extern template struct Simplex<double>;
+extern template struct Simplex<Wide>;
 
 }  // namespace enfilade::collision
