@@ -22,10 +22,9 @@ double leastAlong(const Vec3& axis, const Triangle& t) {
   return std::min({axis.dot(t[0]), axis.dot(t[1]), axis.dot(t[2])});
 }
 
-double mostAlong(const Vec3& axis, const std::vector<Vec3>& vertices) {
-  double most = -std::numeric_limits<double>::infinity();
-  for (const Vec3& v : vertices) most = std::max(most, axis.dot(v));
-  return most;
+double mostAlong(const Vec3& axis, const Eigen::ArrayX3d& vertices) {
+  return (axis.x() * vertices.col(0) + axis.y() * vertices.col(1) + axis.z() * vertices.col(2))
+      .maxCoeff();
 }
 
 }  // namespace
@@ -33,16 +32,20 @@ double mostAlong(const Vec3& axis, const std::vector<Vec3>& vertices) {
 void placeProbe(const ConvexBody& body, double bodyRadius, const BoxTree& tree, const Vec3& axis,
                 MeshProbe& probe) {
   const Vec3 shift = body.translation - tree.origin;
-  probe.vertices.clear();
+  const auto count = static_cast<Eigen::Index>(body.vertices.size());
+  probe.vertices.resize(count, 3);
   probe.box = {};
-  for (const Vec3& v : body.vertices) {
-    probe.vertices.push_back((body.rotation ? Vec3(*body.rotation * v) : v) + shift);
-    probe.box.include(probe.vertices.back());
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Vec3& v = body.vertices[static_cast<std::size_t>(i)];
+    const Vec3 placed = (body.rotation ? Vec3(*body.rotation * v) : v) + shift;
+    probe.box.include(placed);
+    probe.vertices.row(i) = placed.transpose().array();
   }
   probe.centre = probe.box.centre();
   double squared = 0;
-  for (const Vec3& v : probe.vertices)
-    squared = std::max(squared, (v - probe.centre).squaredNorm());
+  for (Eigen::Index i = 0; i < count; ++i)
+    squared = std::max(
+        squared, (probe.vertices.row(i) - probe.centre.transpose().array()).matrix().squaredNorm());
   probe.radius = std::sqrt(squared);
   const double length = axis.norm();
   probe.axis = length > 0 && std::isfinite(length) ? Vec3(axis / length) : Vec3(Vec3::Zero());

@@ -2,8 +2,6 @@
 // triangles. Internal to mesh_query.cpp.
 #pragma once
 
-#include <vector>
-
 #include "collision/narrow_phase.hpp"
 #include "collision/triangle_tree.hpp"
 
@@ -11,7 +9,7 @@ namespace enfilade::collision {
 
 /// In the frame of the mesh's tree: world axes, the tree's origin.
 struct MeshProbe {
-  std::vector<Vec3> vertices;  ///< of the body, rounded
+  Eigen::ArrayX3d vertices;  ///< of the body, one a row, rounded
   Box box;
   Vec3 centre = Vec3::Zero();
   double radius = 0;         ///< of a ball around `centre` that holds the body
