@@ -65,7 +65,11 @@ Turn measureTurn(const NarrowPhaseMethod& method, const std::vector<ConvexMotion
   for (std::size_t k = 0; k < motions.size() && (k == 0 || secondsSince(start) < seconds); ++k) {
     const auto pair = method.make(motions[k].a, motions[k].b);
     // Fills the caches of the machine, and tells how many steps there is time for.
-    const double one = 1e-9 * nanosecondsOf(*pair, motions[k], kLeastSteps, true);
+    const double one = 1e-9 * nanosecondsOf(*pair, motions[k], 1, true);
+    if (one > secondsAPair) {  // that was already all the time there is
+      turn.cold[k] = turn.warm[k] = 1e9 * one;
+      continue;
+    }
     const auto steps = static_cast<std::size_t>(
         std::clamp(secondsAPair / (2 * one), static_cast<double>(kLeastSteps),
                    static_cast<double>(motions[k].placesA.size())));
@@ -98,21 +102,23 @@ std::vector<Told> answersOf(const NarrowPhaseMethod& method,
   });
 }
 
-/// Our most exact level is the truth here; nothing past its time.
+/// Our levels are the truth here: decide's verdict, which is exact, and refine's numbers. Where
+/// there was no time for refine the depth is not known.
 std::vector<std::optional<TrueAnswer>> truthOf(const Methods& methods,
                                                const std::vector<ConvexMotion>& motions,
                                                double seconds) {
-  const NarrowPhaseMethod* exact = &methods.front();
-  for (const auto& method : methods) {
-    if (method.ours && method.level == "refine") exact = &method;
-  }
-  std::vector<std::optional<TrueAnswer>> truth;
-  for (const auto& [answer, asked] : answersOf(*exact, motions, seconds)) {
-    const bool collides = answer.verdict == Answer::Verdict::collides;
-    const double depth = collides && !std::isnan(answer.depth) ? answer.depth : 0;
-    truth.emplace_back();
-    if (!asked || answer.verdict == Answer::Verdict::none) continue;
-    truth.back() = TrueAnswer{collides, collides ? 0 : answer.distance, depth, 2};
+  std::vector<std::optional<TrueAnswer>> truth(motions.size() * motions.front().placesA.size());
+  for (const NarrowPhaseMethod& method : methods) {
+    if (!method.ours) continue;
+    const auto told = answersOf(method, motions, seconds);
+    for (std::size_t k = 0; k < told.size(); ++k) {
+      const Answer& answer = told[k].answer;
+      if (!told[k].asked || answer.verdict == Answer::Verdict::none) continue;
+      const bool collides = answer.verdict == Answer::Verdict::collides;
+      const bool exactDepth = method.level == "refine" && collides;
+      truth[k] =
+          TrueAnswer{collides, collides ? 0 : answer.distance, exactDepth ? answer.depth : 0, 2};
+    }
   }
   return truth;
 }
