@@ -127,48 +127,28 @@ CellGrid::CellGrid(std::span<const Box> boxes) {
   levels_.push_back({kInfinity, 0});
 }
 
-std::int32_t CellGrid::placeOf(const Level& level, std::size_t axis, double x) const {
+std::int64_t CellGrid::finePlaceOf(const Level& level, std::size_t axis, double x) const {
+  constexpr double kFine = 1 << kFineBits;
   const double offset = std::clamp(x - origin_[axis], -1.7e308, 1.7e308);  // lest 0 * infinity
-  const double place = std::clamp(offset * level.inverseEdge, -kOutermost, kOutermost);
-  const auto truncated = static_cast<std::int32_t>(place);
-  return truncated - (place < truncated ? 1 : 0);
+  const double place = kFine * std::clamp(offset * level.inverseEdge, -kOutermost, kOutermost);
+  const auto truncated = static_cast<std::int64_t>(place);
+  return truncated - (place < static_cast<double>(truncated) ? 1 : 0);
 }
 
-CellRange CellGrid::rangeOf(std::size_t level, const HalfAxes& reach) const {
-  CellRange range;
+FinePlaces CellGrid::finePlacesOf(std::size_t level, const HalfAxes& reach) const {
+  FinePlaces places;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    range.low[axis] = placeOf(levels_[level], axis, -reach[axis + 3]);
-    range.high[axis] = placeOf(levels_[level], axis, reach[axis]);
+    places[axis] = -finePlaceOf(levels_[level], axis, -reach[axis]);
+    places[axis + 3] = finePlaceOf(levels_[level], axis, reach[axis + 3]);
   }
-  return range;
+  return places;
 }
 
-std::size_t CellGrid::levelFor(const HalfAxes& reach, CellRange& range) const {
+std::size_t CellGrid::levelFor(const HalfAxes& reach, FinePlaces& places) const {
   std::size_t level = 0;
   for (;; ++level) {  // on the last level everything lies in the one cell
-    range = rangeOf(level, reach);
-    if (range.count() <= kMostCells) return level;
-  }
-}
-
-void CellGrid::narrowToRange(std::size_t levelIndex, const HalfAxes& reach, const CellRange& range,
-                             HalfAxes& low, HalfAxes& high) const {
-  const Level& level = levels_[levelIndex];
-  if (level.inverseEdge == 0) return;
-  for (std::size_t k = 0; k < 6; ++k) {
-    const std::size_t axis = k % 3;
-    const std::int32_t cell = k < 3 ? range.high[axis] : range.low[axis];
-    const double x = k < 3 ? reach[k] : -reach[k];
-    // Where the cell ought to end, a little inside; kept only if placeOf() agrees, since then all
-    // coordinates between agree as well.
-    double from = origin_[axis] + (cell + 1e-9) * level.edge;
-    double to = origin_[axis] + (cell + (1 - 1e-9)) * level.edge;
-    if (!(from < x) || placeOf(level, axis, from) != cell) from = x;
-    if (!(to > x) || placeOf(level, axis, to) != cell) to = x;
-    // The guards are half-open (low <= reach < high): at x itself the other side is refused, and
-    // the mover is looked at again next time.
-    low[k] = std::max(low[k], k < 3 ? from : -to);
-    high[k] = std::min(high[k], k < 3 ? to : -from);
+    places = finePlacesOf(level, reach);
+    if (rangeOf(places).count() <= kMostCells) return level;
   }
 }
 

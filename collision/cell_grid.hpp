@@ -1,4 +1,4 @@
-// The grids that choose which still boxes share their sorted lists, and nothing more.
+// The grids that tell which still boxes may stand in a mover's own cell, and nothing more.
 #pragma once
 
 #include <array>
@@ -10,19 +10,22 @@
 
 namespace enfilade::collision {
 
-/// A closed interval has two ends and space three axes: six half-axes, +x +y +z -x -y -z. On each a
-/// mover has a reach (how far its box goes: max, or -min) and a still box has an onset (from which
-/// reach on it is met: min, or -max). Boxes overlap exactly if every onset <= the reach beside it.
+/// A closed interval has two ends and space three axes: six half-axes, -x -y -z +x +y +z. On each a
+/// mover has a reach (how far its box goes: -min, or max) and a still box has an onset (from which
+/// reach on it is met: -max, or min). Boxes overlap exactly if every onset <= the reach beside it.
 using HalfAxes = std::array<double, 6>;
 
 inline HalfAxes reachOf(const Box& box) {
-  return {box.max.x(), box.max.y(), box.max.z(), -box.min.x(), -box.min.y(), -box.min.z()};
+  return {-box.min.x(), -box.min.y(), -box.min.z(), box.max.x(), box.max.y(), box.max.z()};
 }
 inline HalfAxes onsetOf(const Box& box) {
-  return {box.min.x(), box.min.y(), box.min.z(), -box.max.x(), -box.max.y(), -box.max.z()};
+  return {-box.max.x(), -box.max.y(), -box.max.z(), box.min.x(), box.min.y(), box.min.z()};
+}
+inline Box boxOfReach(const HalfAxes& r) {
+  return {Vec3(-r[0], -r[1], -r[2]), Vec3(r[3], r[4], r[5])};
 }
 inline Box boxOfOnset(const HalfAxes& o) {
-  return {Vec3(o[0], o[1], o[2]), Vec3(-o[3], -o[4], -o[5])};
+  return {Vec3(o[3], o[4], o[5]), Vec3(-o[0], -o[1], -o[2])};
 }
 inline bool meets(const HalfAxes& onset, const HalfAxes& reach) {
   bool met = true;
@@ -44,8 +47,20 @@ struct CellRange {
   double count() const {
     return (1.0 + high[0] - low[0]) * (1.0 + high[1] - low[1]) * (1.0 + high[2] - low[2]);
   }
-  bool operator==(const CellRange&) const = default;
 };
+
+using FinePlaces = std::array<std::int64_t, 6>;
+constexpr int kFineBits = 6;  ///< of a fine place lie below its cell's
+
+/// The cells of a box whose reach has these fine places.
+inline CellRange rangeOf(const FinePlaces& reach) {
+  CellRange range;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    range.low[axis] = static_cast<std::int32_t>(-reach[axis] >> kFineBits);
+    range.high[axis] = static_cast<std::int32_t>(reach[axis + 3] >> kFineBits);
+  }
+  return range;
+}
 
 template <typename Visit>
 void forEachPlace(const CellRange& range, Visit&& visit) {
@@ -69,21 +84,19 @@ class CellGrid {
   std::size_t levelCount() const { return levels_.size(); }
   double edge(std::size_t level) const { return levels_[level].edge; }  ///< metres; last: infinite
 
-  /// The cells of a level that a box lies in. Boxes that overlap share at least one cell of every
-  /// level, because the place of a coordinate is a monotone function of it, however rounded.
-  CellRange rangeOf(std::size_t level, const HalfAxes& reach) const;
-  /// The finest level on which the box lies in at most kMostCells cells; `range` becomes those.
-  std::size_t levelFor(const HalfAxes& reach, CellRange& range) const;
-  /// Narrows `low` <= reach < `high` to reaches that surely give the same range.
-  void narrowToRange(std::size_t level, const HalfAxes& reach, const CellRange& range,
-                     HalfAxes& low, HalfAxes& high) const;
+  /// Where a box lies on a level, in 64ths of a cell, rounded down: on each half-axis the place of
+  /// its reach, by which boxes can be compared as by the reach itself: the place of a coordinate is
+  /// a monotone function of it, however rounded.
+  FinePlaces finePlacesOf(std::size_t level, const HalfAxes& reach) const;
+  /// The finest level on which the box lies in at most kMostCells cells; `places` are those on it.
+  std::size_t levelFor(const HalfAxes& reach, FinePlaces& places) const;
 
  private:
   struct Level {
     double edge;         ///< metres
     double inverseEdge;  ///< 0 on the last level
   };
-  std::int32_t placeOf(const Level& level, std::size_t axis, double x) const;
+  std::int64_t finePlaceOf(const Level& level, std::size_t axis, double x) const;
 
   std::array<double, 3> origin_{0, 0, 0};
   std::vector<Level> levels_;

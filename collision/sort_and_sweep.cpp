@@ -1,24 +1,28 @@
 // Sort and sweep with status changes (M. C. Lin, thesis 1993, section 5.2.2; J. Cohen, M. C. Lin,
 // D. Manocha and M. Ponamgi, "I-COLLIDE", 1995), laid out for a scene that mostly stands still.
 //
-// An update, in this order:
-// 1. Still boxes that were staged come and go (still_cells.cpp), and the movers whose cells that
-//    touched join those cells anew.
-// 2. For each mover that moved: on each of six half-axes (cell_grid.hpp) its reach is compared with
-//    two guards: the nearest end points on either side over all of its cells, and the borders of
-//    those cells. While it stays between them nothing has been exchanged and nothing more is done.
-//    a. Where it has not, and its cells are the same, its cursors into the sorted end points of the
-//       cells in question advance. An end point that is passed outward opens an overlap on that
-//       axis: a full box test tells whether a pair begins. One that is passed inward closes it: the
-//       pair ends if it was held.
-//    b. If it has crossed a border of cells, it drops the cells that it left, joins those that it
-//       entered (sort_and_sweep_still.cpp), and if it left one tests the pairs that it holds.
-// 3. Movers against movers: three sorted lists, repaired by insertion (mover_lists.hpp).
+// Each mover has a cell of its own: its box, grown by the way that it will go in some ticks. Of the
+// still boxes that meet the cell, those end points that the mover can come to in it stand in six
+// sorted lists, one a half-axis (cell_grid.hpp, mover_cell.hpp). A pair of a mover and a still box
+// overlaps when the mover's reach has passed its onset on all six; which of the six are lacking is
+// kept as six bits. The lists are the mover's, so that its steady tick reads what is its own.
 //
-// Departures from the source: still end points lie in sorted arrays a cell instead of three lists
-// over the whole scene, so that a walker passes the end points of its room only and still objects
-// cost nothing; and since the boxes of an update are final before any list is repaired, an exchange
-// is judged by them, so that a pair never begins and ends within one update.
+// An update, in this order:
+// 1. Still boxes that were staged come and go (still_cells.cpp), and the movers whose cells they
+//    meet have them laid anew.
+// 2. For each mover that moved: on each half-axis its reach is compared with two guards, the ends
+//    on either side. While it stays between them nothing has been exchanged and nothing more is
+//    done: that is found out in move() already. What it passes changes a bit, and the last bit
+//    begins or ends a pair. First all that is passed inward, then what is passed outward, so that a
+//    pair never begins and ends in one update.
+// 3. A mover that leaves its cell has the next one laid: a grid finds the still boxes about it
+//    (still_cells.cpp). Lest many do so in one tick, some movers are visited in turn and have
+//    theirs laid before they need it.
+// 4. Movers against movers (sort_and_sweep_moving.cpp).
+//
+// Departures from the source: lists a mover instead of three over the whole scene, so that a walker
+// passes the end points about it only and still objects cost nothing; movers are sorted by their
+// cells, and their own ends compared only while these meet.
 //
 // Limits: 2^31 - 1 movers, 2^32 - 2 still boxes and as many cells; else memory alone.
 
@@ -26,6 +30,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
@@ -72,6 +77,36 @@ Mover& known(std::vector<Mover>& movers, MoverId id) {
   return movers[id];
 }
 
+// Two half-axes at once, in a form that gcc and clang know on every processor. A comparison gives
+// -1 where it holds and 0 elsewhere.
+using Lanes = double __attribute__((vector_size(16)));
+using LaneMask = long long __attribute__((vector_size(16)));
+
+Lanes lanesAt(const double* from) {
+  Lanes lanes;
+  std::memcpy(&lanes, from, sizeof(lanes));
+  return lanes;
+}
+
+/// A box' reach, if the box is valid and the reach within the guards (which are finite).
+struct ReachInGuards {
+  std::array<Lanes, 3> reach;
+  bool inside;
+
+  ReachInGuards(const Box& box, const HalfAxes& low, const HalfAxes& high) {
+    static_assert(sizeof(Box) == 6 * sizeof(double));
+    std::array<double, 6> ends;
+    std::memcpy(ends.data(), &box, sizeof(box));
+    reach = {-lanesAt(&ends[0]), lanesAt(&ends[2]) * Lanes{-1, 1}, lanesAt(&ends[4])};
+    LaneMask in = lanesAt(&ends[0]) <= lanesAt(&ends[3]);
+    for (std::size_t pair = 0; pair < 3; ++pair) {
+      in &= lanesAt(&low[2 * pair]) <= reach[pair];
+      in &= reach[pair] < lanesAt(&high[2 * pair]);
+    }
+    inside = (in[0] & in[1]) != 0 && ends[2] <= ends[5];
+  }
+};
+
 std::vector<StillId> numbered(std::size_t count) {
   std::vector<StillId> ids(count);
   std::iota(ids.begin(), ids.end(), StillId{0});
@@ -84,28 +119,6 @@ SortAndSweep::State::State(std::span<const Box> stillBoxes)
     : still(stillBoxes, numbered(stillBoxes.size())),
       stillIds(stillBoxes.size()),
       stillCount(stillBoxes.size()) {}
-
-// ---- movers against movers ----
-
-void SortAndSweep::State::updateMoving() {
-  lists.exchanges = lists.boxTests = 0;
-  changes.clear();
-  for (const MoverId id : moved) {
-    if (movers[id].presence == Presence::live) lists.move(id, changes);
-  }
-  lists.insert(fresh, changes);
-  lists.settle(moved);
-  lists.settle(fresh);
-  for (const MoverChange& change : changes) {
-    if (change.begins) {
-      beginMoving(change.a, change.b);
-    } else {
-      endMoving(change.a, change.b);
-    }
-  }
-  counters.exchanges += lists.exchanges;
-  counters.boxTests += lists.boxTests;
-}
 
 // ---- the interface -----------------------------------------------------------------------------
 
@@ -128,23 +141,39 @@ MoverId SortAndSweep::insert(const Box& box) {
     s.freeIds.pop_back();
   }
   Mover& mover = s.movers[id];
-  mover.reach = reachOf(box);
-  mover.leaveCells();
+  mover.reach = mover.laidReach = reachOf(box);
+  mover.rate.fill(0);
+  mover.cell.close();
   mover.presence = Presence::fresh;
-  s.lists.setBox(id, box);
   s.fresh.push_back(id);
   return id;
 }
 
 void SortAndSweep::move(MoverId id, const Box& box) {
   State& s = *state_;
-  Mover& mover = known(s.movers, id);
+  if (id < s.movers.size()) {
+    Mover& mover = s.movers[id];
+    const ReachInGuards in(box, mover.cell.low, mover.cell.high);
+    if (in.inside && mover.neighbours.empty()) {
+      std::memcpy(&mover.reach, &in.reach, sizeof(mover.reach));
+      return;
+    }
+  }
+  s.moveSlowly(id, box);
+}
+
+void SortAndSweep::State::moveSlowly(MoverId id, const Box& box) {
+  Mover& mover = known(movers, id);
   requireBox(box, "mover", id);
-  mover.reach = reachOf(box);
-  s.lists.setBox(id, box);
-  if (mover.moved || mover.presence == Presence::fresh) return;
+  const HalfAxes reach = reachOf(box);
+  if (reach == mover.reach) return;
+  mover.reach = reach;
+  if (mover.presence == Presence::fresh) return;
+  if (!mover.moved) moved.push_back(id);
   mover.moved = true;
-  s.moved.push_back(id);
+  if (mover.neighbours.empty() || mover.stirred) return;
+  mover.stirred = true;
+  stirred.push_back(id);
 }
 
 void SortAndSweep::remove(MoverId id) {
@@ -190,22 +219,23 @@ void SortAndSweep::update() {
   s.begun.clear();
   s.ended.clear();
   s.counters = {};
+  ++s.tick;
   for (const MoverId id : s.leaving) s.dropAll(id);
   s.lists.remove(s.leaving);
   s.applyEdits();
   for (const MoverId id : s.moved) {
     if (s.movers[id].presence == Presence::live) s.updateStill(id);
   }
-  for (const MoverId id : s.fresh) s.updateStill(id);
+  for (const MoverId id : s.fresh) s.layCell(id);
+  s.visitMovers();
   s.updateMoving();
   for (const MoverId id : s.moved) s.movers[id].moved = false;
+  for (const MoverId id : s.stirred) s.movers[id].stirred = false;
+  for (const MoverId id : s.relaid) s.movers[id].relaid = false;
   for (const MoverId id : s.fresh) s.movers[id].presence = Presence::live;
   for (const MoverId id : s.leaving) s.movers[id].presence = Presence::free;
   s.freeIds.insert(s.freeIds.end(), s.leaving.begin(), s.leaving.end());
-  s.still.clearEdits();
-  s.moved.clear();
-  s.fresh.clear();
-  s.leaving.clear();
+  for (auto* ids : {&s.moved, &s.stirred, &s.relaid, &s.fresh, &s.leaving}) ids->clear();
   std::sort(s.begun.begin(), s.begun.end());
   std::sort(s.ended.begin(), s.ended.end());
 }
@@ -225,17 +255,13 @@ std::span<const SortAndSweep::Partner> SortAndSweep::partners(MoverId mover) con
 std::vector<StillId> SortAndSweep::stillOverlapping(const Box& box) const {
   const StillCells& still = state_->still;
   const HalfAxes reach = reachOf(box);
+  std::vector<StillCells::Row> rows;
+  still.gather(reach, rows);
   std::vector<StillId> ids;
-  for (const std::size_t level : still.levels()) {
-    const CellRange range = still.grid().rangeOf(level, reach);
-    still.forEachCell(level, range, CellRange{}, [&](StillCells::Cell cell) {
-      for (const StillCells::Row row : still.sorted(cell, 0)) {
-        if (meets(still.onset(row), reach)) ids.push_back(still.idOf(row));
-      }
-    });
+  for (const StillCells::Row row : rows) {
+    if (meets(still.onset(row), reach)) ids.push_back(still.idOf(row));
   }
   std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());  // met in several cells
   return ids;
 }
 

@@ -24,11 +24,11 @@ struct BoxPair {
 
 /// Counters of the last update(), for metrics and for tests of the complexity claim.
 struct SweepCounters {
-  std::uint64_t exchanges = 0;    ///< end points that passed one another, on all axes
-  std::uint64_t cellEntries = 0;  ///< times a mover entered a cell and its lists were joined
-  std::uint64_t stillEdits = 0;   ///< still boxes that came or went
-  std::uint64_t rebuilds = 0;     ///< 1 if the cells of all still boxes were built anew
-  std::uint64_t boxTests = 0;     ///< full box tests made because of an exchange or an entry
+  std::uint64_t exchanges = 0;   ///< end points that passed one another, on all axes
+  std::uint64_t cellsLaid = 0;   ///< movers whose surroundings were gathered and sorted anew
+  std::uint64_t stillEdits = 0;  ///< still boxes that came or went
+  std::uint64_t rebuilds = 0;    ///< 1 if the cells of all still boxes were built anew
+  std::uint64_t boxTests = 0;    ///< full box tests, nearly all of them to lay cells
 };
 
 /// Keeps the set of overlapping pairs of closed boxes, exactly: after update() it equals what brute

@@ -9,19 +9,14 @@ namespace {
 
 using Partner = SortAndSweep::Partner;
 
-// Up to so many new partners are inserted one by one; more are merged, lest it becomes quadratic.
-constexpr std::size_t kFewFound = 16;
-
-bool addPartner(std::vector<Partner>& partners, MoverId id) {
-  const Partner partner{id, true};
+bool addPartner(std::vector<Partner>& partners, const Partner& partner) {
   const auto at = std::lower_bound(partners.begin(), partners.end(), partner);
   if (at != partners.end() && *at == partner) return false;
   partners.insert(at, partner);
   return true;
 }
 
-bool erasePartner(std::vector<Partner>& partners, MoverId id) {
-  const Partner partner{id, true};
+bool erasePartner(std::vector<Partner>& partners, const Partner& partner) {
   const auto at = std::lower_bound(partners.begin(), partners.end(), partner);
   if (at == partners.end() || *at != partner) return false;
   partners.erase(at);
@@ -30,115 +25,65 @@ bool erasePartner(std::vector<Partner>& partners, MoverId id) {
 
 }  // namespace
 
-void SortAndSweep::State::test(const Mover& mover, Row row) {
-  ++counters.boxTests;
-  if (meets(still.onset(row), mover.reach)) found.push_back({{still.idOf(row), false}, row});
-}
-
-void SortAndSweep::State::tellStill(MoverId id, Partner partner) {
-  begun.push_back({id, partner.id, false});
+void SortAndSweep::State::beginStill(MoverId id, StillId other) {
+  if (!addPartner(movers[id].partners, {other, false})) return;
+  begun.push_back({id, other, false});
   ++pairs;
 }
 
-void SortAndSweep::State::insertFound(MoverId id) {
-  Mover& mover = movers[id];
-  for (const Found& f : found) {
-    const auto at = std::lower_bound(mover.partners.begin(), mover.partners.end(), f.partner);
-    if (at != mover.partners.end() && *at == f.partner) continue;  // known from another cell
-    mover.rows.insert(mover.rows.begin() + (at - mover.partners.begin()), f.row);
-    mover.partners.insert(at, f.partner);
-    tellStill(id, f.partner);
-  }
-}
-
-void SortAndSweep::State::mergeFound(MoverId id) {
-  Mover& mover = movers[id];
-  const auto byPartner = [](const Found& a, const Found& b) { return a.partner < b.partner; };
-  const auto samePartner = [](const Found& a, const Found& b) { return a.partner == b.partner; };
-  std::sort(found.begin(), found.end(), byPartner);
-  found.erase(std::unique(found.begin(), found.end(), samePartner), found.end());
-  std::erase_if(found, [&](const Found& f) {
-    return std::binary_search(mover.partners.begin(), mover.partners.end(), f.partner);
-  });
-  const auto added = static_cast<std::ptrdiff_t>(found.size());
-  for (const Found& f : found) tellStill(id, f.partner);
-  for (std::size_t i = 0; i < mover.rows.size(); ++i) {
-    found.push_back({mover.partners[i], mover.rows[i]});
-  }
-  std::inplace_merge(found.begin(), found.begin() + added, found.end(), byPartner);
-  mover.partners.insert(mover.partners.begin(), static_cast<std::size_t>(added), Partner{});
-  mover.rows.resize(found.size());
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    mover.partners[i] = found[i].partner;
-    mover.rows[i] = found[i].row;
-  }
-}
-
-/// Takes in the still boxes that were found to overlap; some are known already.
-void SortAndSweep::State::takeFound(MoverId id) {
-  if (found.size() <= kFewFound) {
-    insertFound(id);
-  } else {
-    mergeFound(id);
-  }
-  found.clear();
-}
-
-void SortAndSweep::State::endStill(MoverId id, Row row) {
-  Mover& mover = movers[id];
-  const auto at = std::find(mover.rows.begin(), mover.rows.end(), row);
-  if (at == mover.rows.end()) return;
-  mover.partners.erase(mover.partners.begin() + (at - mover.rows.begin()));
-  mover.rows.erase(at);
-  ended.push_back({id, still.idOf(row), false});
+void SortAndSweep::State::endStill(MoverId id, StillId other) {
+  if (!erasePartner(movers[id].partners, {other, false})) return;
+  ended.push_back({id, other, false});
   --pairs;
 }
 
+/// The still partners of the mover are those in `inReach` now, whatever they were.
+void SortAndSweep::State::replaceStill(MoverId id) {
+  std::vector<Partner>& partners = movers[id].partners;
+  std::sort(inReach.begin(), inReach.end());
+  merged.clear();
+  auto held = partners.begin();
+  const auto endHeldBefore = [&](StillId limit) {
+    for (; held != partners.end() && !held->moves && held->id < limit; ++held) {
+      ended.push_back({id, held->id, false});
+      --pairs;
+    }
+  };
+  for (const StillId other : inReach) {
+    endHeldBefore(other);
+    if (held != partners.end() && !held->moves && held->id == other) {
+      ++held;
+    } else {
+      begun.push_back({id, other, false});
+      ++pairs;
+    }
+    merged.push_back({other, false});
+  }
+  endHeldBefore(static_cast<StillId>(-1));
+  merged.insert(merged.end(), held, partners.end());
+  partners.assign(merged.begin(), merged.end());
+}
+
 void SortAndSweep::State::beginMoving(MoverId a, MoverId b) {
-  if (!addPartner(movers[a].partners, b)) return;
-  addPartner(movers[b].partners, a);
-  begun.push_back({a, b, true});
+  addPartner(movers[a].partners, {b, true});
+  addPartner(movers[b].partners, {a, true});
+  begun.push_back({std::min(a, b), std::max(a, b), true});
   ++pairs;
 }
 
 void SortAndSweep::State::endMoving(MoverId a, MoverId b) {
-  if (!erasePartner(movers[a].partners, b)) return;
-  erasePartner(movers[b].partners, a);
-  ended.push_back({a, b, true});
+  erasePartner(movers[a].partners, {b, true});
+  erasePartner(movers[b].partners, {a, true});
+  ended.push_back({std::min(a, b), std::max(a, b), true});
   --pairs;
 }
 
 void SortAndSweep::State::dropAll(MoverId id) {
   Mover& mover = movers[id];
-  while (!mover.partners.empty()) {
-    const Partner last = mover.partners.back();
-    if (last.moves) {
-      endMoving(std::min(id, last.id), std::max(id, last.id));
-    } else {
-      endStill(id, mover.rows.back());
-    }
-  }
-  mover.leaveCells();
-}
-
-/// Drops the still partners that the mover no longer meets.
-void SortAndSweep::State::recheck(MoverId id) {
-  Mover& mover = movers[id];
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < mover.rows.size(); ++i) {
-    ++counters.boxTests;
-    if (meets(still.onset(mover.rows[i]), mover.reach)) {
-      mover.rows[kept] = mover.rows[i];
-      mover.partners[kept++] = mover.partners[i];
-    } else {
-      ended.push_back({id, mover.partners[i].id, false});
-      --pairs;
-    }
-  }
-  const auto first = static_cast<std::ptrdiff_t>(kept);
-  const auto last = static_cast<std::ptrdiff_t>(mover.rows.size());
-  mover.partners.erase(mover.partners.begin() + first, mover.partners.begin() + last);
-  mover.rows.resize(kept);
+  while (!mover.neighbours.empty()) endNeighbours(id, mover.neighbours.back().id);
+  inReach.clear();
+  replaceStill(id);
+  mover.cell.close();
 }
 
 }  // namespace enfilade::collision

@@ -1,17 +1,8 @@
-// Movers against still boxes: guards, cursors, cells that are entered; and still boxes that come
-// and go.
-//
-// Joining a cell takes one pass over its boxes, which counts on each half-axis those within reach
-// (that is the cursor) and tests each box. Six binary searches would look at fewer boxes, but one
-// after the other, and a cell that a walker enters lies in no cache: all of its boxes are asked for
-// at once instead. Only cells of many boxes are searched.
-//
-// That leaves the wait for memory, which would make the tick of an entry stand out. So a mover that
-// comes near a border of cells asks for what lies behind it, the lists in one tick and the boxes in
-// the next (lookAhead): hints to the processor, which no answer depends on.
+// Movers against still boxes: guards, exchanges, cells that are laid; and still boxes that come and
+// go.
 
 #include <algorithm>
-#include <cstring>
+#include <cmath>
 #include <limits>
 
 #include "collision/sort_and_sweep_state.hpp"
@@ -19,26 +10,22 @@
 namespace enfilade::collision {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// End points that one cursor may pass before the cell is joined anew, which costs about as much.
-constexpr int kMostPassed = 32;
-constexpr std::size_t kFewRows = 64;  // that are joined by a pass over all of them
-// How near a border a mover looks beyond it, in edges of the finest cells. In cells of 2 m that is
-// ten ticks of a walker; what comes faster than in two waits for memory.
-constexpr double kLookAhead = 0.125;
-constexpr std::uint8_t kAllSeen = 2;  // steps of looking ahead: lists, then boxes
-constexpr std::size_t kRowsPerLine = 64 / sizeof(StillCells::Row);  // of a cache
+// A cell is laid for so many ticks at the rate of the last ones.
+constexpr double kHorizon = 25;
+// One mover in so many is looked at in a tick, and its cell laid anew if it will have left it when
+// it is looked at next.
+constexpr std::size_t kVisitEvery = 10;
+// Room for a change of course: so many ticks at the greatest rate of all half-axes, and a share of
+// the mover's size.
+constexpr double kSlackTicks = 3;
+constexpr double kSlackOfSize = 1.0 / 64;
+// A cell exceeds the mover by no more than its size, or this share of an edge of the finest cells,
+// so that what jumps does not gather half of the scene.
+constexpr double kMostOfEdge = 0.5;
+// More still boxes that come and go at once disturb all movers.
+constexpr std::size_t kFewEdits = 256;
 
-// Two half-axes at once, in a form that gcc and clang know on every processor. A comparison gives
-// -1 where it holds and 0 elsewhere.
-using Lanes = double __attribute__((vector_size(16)));
-using LaneMask = long long __attribute__((vector_size(16)));
-
-Lanes lanesOf(const HalfAxes& values, std::size_t pair) {
-  Lanes lanes;
-  std::memcpy(&lanes, values.data() + 2 * pair, sizeof(lanes));
-  return lanes;
-}
+constexpr double kLargest = std::numeric_limits<double>::max();
 
 bool within(const HalfAxes& low, const HalfAxes& reach, const HalfAxes& high) {
   bool inside = true;
@@ -46,215 +33,119 @@ bool within(const HalfAxes& low, const HalfAxes& reach, const HalfAxes& high) {
   return inside;
 }
 
+HalfAxes rateOf(const Mover& mover, std::uint64_t tick) {
+  HalfAxes rate = mover.rate;
+  if (tick == mover.laidAt) return rate;
+  const double share = 1 / static_cast<double>(tick - mover.laidAt);
+  for (std::size_t k = 0; k < 6; ++k) rate[k] = (mover.reach[k] - mover.laidReach[k]) * share;
+  return rate;
+}
+
+HalfAxes after(const HalfAxes& reach, const HalfAxes& rate, double ticks) {
+  HalfAxes later = reach;
+  for (std::size_t k = 0; k < 6; ++k) later[k] += ticks * rate[k];
+  return later;
+}
+
 }  // namespace
 
-void Mover::leaveCells() {
-  cells.clear();
-  ranges.clear();
-  low.fill(kInfinity);
-  cellLow.fill(kInfinity);
-}
+// ---- laying a cell -----------------------------------------------------------------------------
 
-// ---- joining cells -----------------------------------------------------------------------------
-
-/// Sets the guards of a half-axis to the end points beside the cursor.
-void SortAndSweep::State::guard(Membership& m, std::size_t k) const {
-  const auto rows = still.sorted(m.cell, k);
-  const std::uint32_t at = m.cursor[k];
-  m.low[k] = at > 0 ? still.onset(rows[at - 1])[k] : -kInfinity;
-  m.high[k] = at < rows.size() ? still.onset(rows[at])[k] : kInfinity;
-}
-
-void SortAndSweep::State::placeByScan(const Mover& mover, Membership& m) {
-  const auto rows = still.sorted(m.cell, 0);
-  const std::array<Lanes, 3> reach{lanesOf(mover.reach, 0), lanesOf(mover.reach, 1),
-                                   lanesOf(mover.reach, 2)};
-  std::array<LaneMask, 3> reached{};  // minus the number of boxes
-  for (const Row row : rows) {
-    const HalfAxes& onset = still.onset(row);
-    LaneMask met = {-1, -1};
-    for (std::size_t pair = 0; pair < 3; ++pair) {
-      const LaneMask inside = lanesOf(onset, pair) <= reach[pair];
-      reached[pair] += inside;
-      met &= inside;
-    }
-    if ((met[0] & met[1]) != 0) found.push_back({{still.idOf(row), false}, row});
-  }
-  counters.boxTests += rows.size();
+void SortAndSweep::State::setBorders(Mover& mover) const {
+  mover.rate = rateOf(mover, tick);
+  mover.laidReach = mover.reach;
+  mover.laidAt = tick;
+  double fastest = 0;
+  for (const double rate : mover.rate) fastest = std::max(fastest, std::abs(rate));
+  const double edge = still.grid().edge(0);
   for (std::size_t k = 0; k < 6; ++k) {
-    m.cursor[k] = static_cast<std::uint32_t>(-reached[k / 2][k % 2]);
+    const double reach = mover.reach[k], size = reach + mover.reach[(k + 3) % 6];
+    const double most = std::max(size, kMostOfEdge * edge);
+    const double slack = kSlackTicks * fastest + kSlackOfSize * size;
+    const double course = kHorizon * mover.rate[k];
+    mover.cell.farthest[k] =
+        std::min(reach + std::min(slack + std::max(course, 0.0), most), kLargest);
+    mover.cell.nearest[k] =
+        std::max(reach - std::min(slack + std::max(-course, 0.0), most), -kLargest);
   }
 }
 
-/// Cursors by binary search, then every box that overlaps on the half-axis where the fewest do.
-void SortAndSweep::State::placeBySearch(const Mover& mover, Membership& m) {
-  std::size_t shortest = 0;
-  for (std::size_t k = 0; k < 6; ++k) {
-    const auto rows = still.sorted(m.cell, k);
-    const auto end =
-        std::upper_bound(rows.begin(), rows.end(), mover.reach[k],
-                         [&](double reach, Row row) { return reach < still.onset(row)[k]; });
-    m.cursor[k] = static_cast<std::uint32_t>(end - rows.begin());
-    if (m.cursor[k] < m.cursor[shortest]) shortest = k;
-  }
-  for (const Row row : still.sorted(m.cell, shortest).first(m.cursor[shortest])) test(mover, row);
-}
-
-void SortAndSweep::State::place(const Mover& mover, Membership& m) {
-  if (still.sorted(m.cell, 0).size() <= kFewRows) {
-    placeByScan(mover, m);
-  } else {
-    placeBySearch(mover, m);
-  }
-  for (std::size_t k = 0; k < 6; ++k) guard(m, k);
-}
-
-/// Joins the cells in `entered`. What is needed of all of them is asked for before any is used.
-void SortAndSweep::State::joinCells(MoverId id) {
-  counters.cellEntries += entered.size();
-  for (const Cell cell : entered) __builtin_prefetch(still.sorted(cell, 0).data());
-  for (const Cell cell : entered) {
-    const auto rows = still.sorted(cell, 0);
-    for (const Row row : rows.first(std::min(rows.size(), kFewRows))) {
-      __builtin_prefetch(&still.onset(row));
-    }
-  }
-  for (const Cell cell : entered) {
-    Membership membership{
-        {}, {}, {}, cell, still.placeOf(cell), static_cast<std::uint32_t>(still.levelOf(cell))};
-    place(movers[id], membership);
-    movers[id].cells.push_back(membership);
-  }
-  entered.clear();
-}
-
-void SortAndSweep::State::enterRanges(MoverId id) {
+void SortAndSweep::State::layCell(MoverId id) {
   Mover& mover = movers[id];
-  mover.ranges.resize(still.grid().levelCount());
-  mover.cellLow.fill(-kInfinity);
-  mover.cellHigh.fill(kInfinity);
-  mover.ahead.fill(0);
-  for (const std::size_t level : still.levels()) {
-    const CellRange from = mover.ranges[level];
-    const CellRange to = still.grid().rangeOf(level, mover.reach);
-    still.grid().narrowToRange(level, mover.reach, to, mover.cellLow, mover.cellHigh);
-    if (from == to) continue;
-    mover.ranges[level] = to;
-    mover.recheck |= std::erase_if(mover.cells, [&](const Membership& m) {
-                       return m.level == level && !to.contains(m.at);
-                     }) > 0;
-    still.forEachCell(level, to, from, [&](Cell cell) { entered.push_back(cell); });
-  }
-  joinCells(id);
+  setBorders(mover);
+  rows.clear();
+  still.gather(mover.cell.farthest, rows);
+  for (const Row row : rows) __builtin_prefetch(&still.onset(row));
+  counters.boxTests += rows.size();
+  ++counters.cellsLaid;
+  std::erase_if(rows, [&](Row row) { return !meets(still.onset(row), mover.cell.farthest); });
+  mover.cell.lay(still, rows, mover.reach, inReach);
+  replaceStill(id);
+  if (mover.relaid) return;
+  mover.relaid = true;
+  relaid.push_back(id);
 }
 
-// ---- looking ahead -----------------------------------------------------------------------------
-
-/// Asks for the cells that the mover will enter on half-axis `k`: first their lists, then the boxes
-/// of these.
-void SortAndSweep::State::lookAhead(const Mover& mover, std::size_t k) const {
-  HalfAxes reach = mover.reach;
-  reach[k] += kLookAhead * still.grid().edge(0);
-  for (const std::size_t level : still.levels()) {
-    const CellRange to = still.grid().rangeOf(level, reach);
-    if (to == mover.ranges[level]) continue;
-    still.forEachCell(level, to, mover.ranges[level], [&](Cell cell) {
-      const auto rows = still.sorted(cell, 0);
-      if (rows.size() > kFewRows) return;
-      if (mover.ahead[k] == 0) {
-        for (std::size_t r = 0; r < 6 * rows.size(); r += kRowsPerLine) {
-          __builtin_prefetch(rows.data() + r);
-        }
-      } else {
-        for (const Row row : rows) __builtin_prefetch(&still.onset(row));
-      }
-    });
+void SortAndSweep::State::visitMovers() {
+  const std::size_t visits = (movers.size() + kVisitEvery - 1) / kVisitEvery;
+  for (std::size_t k = 0; k < visits; ++k) {
+    const auto id = static_cast<MoverId>(nextVisited++ % movers.size());
+    const Mover& mover = movers[id];
+    if (mover.presence != Presence::live || mover.relaid) continue;
+    const HalfAxes later = after(mover.reach, rateOf(mover, tick), kVisitEvery);
+    if (!within(mover.cell.nearest, later, mover.cell.farthest)) layCell(id);
   }
-}
-
-/// From which reach on the mover is to be looked at because of the border of its cells.
-double SortAndSweep::State::border(Mover& mover, std::size_t k) const {
-  const double high = mover.cellHigh[k];
-  if (mover.ahead[k] == kAllSeen) return high;
-  const double near = high - kLookAhead * still.grid().edge(0);
-  if (mover.reach[k] < near) return near;
-  lookAhead(mover, k);
-  return ++mover.ahead[k] == kAllSeen ? high : mover.reach[k];
 }
 
 // ---- from tick to tick -------------------------------------------------------------------------
 
-/// Moves one cursor to its place and tells what it passed.
-void SortAndSweep::State::advance(MoverId id, Membership& m, std::size_t k) {
+/// Moves on where the reach has shrunk; false if it has left its cell.
+bool SortAndSweep::State::passInward(MoverId id) {
   Mover& mover = movers[id];
-  const auto rows = still.sorted(m.cell, k);
-  const double reach = mover.reach[k];
-  std::uint32_t at = m.cursor[k];
-  int passed = 0;
-  for (; at < rows.size() && still.onset(rows[at])[k] <= reach; ++at) {
-    if (++passed > kMostPassed) break;
-    test(mover, rows[at]);
+  MoverCell& cell = mover.cell;
+  for (std::size_t k = 0; k < 6; ++k) {
+    if (!(mover.reach[k] < cell.low[k])) continue;
+    for (; cell.ends[cell.next[k] - 1].at > mover.reach[k]; --cell.next[k]) {
+      const std::uint32_t passed = cell.ends[cell.next[k] - 1].box;
+      if (passed == MoverCell::kBorder) return false;
+      ++counters.exchanges;
+      MoverCell::StillBox& box = cell.boxes[passed];
+      if (box.apart == 0) endStill(id, box.id);
+      box.apart = static_cast<std::uint8_t>(box.apart | 1u << k);
+    }
+    cell.guard(k);
   }
-  for (; at > 0 && still.onset(rows[at - 1])[k] > reach; --at) {
-    if (++passed > kMostPassed) break;
-    endStill(id, rows[at - 1]);
+  return true;
+}
+
+/// Moves on where the reach has grown; false if it has left its cell.
+bool SortAndSweep::State::passOutward(MoverId id) {
+  Mover& mover = movers[id];
+  MoverCell& cell = mover.cell;
+  for (std::size_t k = 0; k < 6; ++k) {
+    if (!(mover.reach[k] >= cell.high[k])) continue;
+    for (; cell.ends[cell.next[k]].at <= mover.reach[k]; ++cell.next[k]) {
+      const std::uint32_t passed = cell.ends[cell.next[k]].box;
+      if (passed == MoverCell::kBorder) return false;
+      ++counters.exchanges;
+      MoverCell::StillBox& box = cell.boxes[passed];
+      box.apart = static_cast<std::uint8_t>(box.apart & ~(1u << k));
+      if (box.apart == 0) beginStill(id, box.id);
+    }
+    cell.guard(k);
   }
-  counters.exchanges += static_cast<std::uint64_t>(passed);
-  if (passed > kMostPassed) {
-    mover.recheck = true;
-    place(mover, m);
-  } else {
-    m.cursor[k] = at;
-    guard(m, k);
-  }
+  return true;
 }
 
 void SortAndSweep::State::updateStill(MoverId id) {
-  Mover& mover = movers[id];
-  if (within(mover.low, mover.reach, mover.high)) return;
-  const bool sameCells = within(mover.cellLow, mover.reach, mover.cellHigh);
-  if (!sameCells) enterRanges(id);
-  for (std::size_t k = 0; k < 6; ++k) {
-    const double reach = mover.reach[k];
-    if (sameCells && mover.low[k] <= reach && reach < mover.high[k]) continue;
-    double low = mover.cellLow[k], high = border(mover, k);
-    for (Membership& m : mover.cells) {
-      if (!(m.low[k] <= reach && reach < m.high[k])) advance(id, m, k);
-      low = std::max(low, m.low[k]);
-      high = std::min(high, m.high[k]);
-    }
-    mover.low[k] = low;
-    mover.high[k] = high;
+  // A pair that is to end is apart before another half-axis closes in on it: told once at most.
+  if (!within(movers[id].cell.nearest, movers[id].reach, movers[id].cell.farthest) ||
+      !passInward(id) || !passOutward(id)) {
+    layCell(id);
   }
-  if (mover.recheck) recheck(id);
-  mover.recheck = false;
-  if (!found.empty()) takeFound(id);
 }
 
 // ---- still boxes that come and go --------------------------------------------------------------
-
-bool SortAndSweep::State::touchedByEdits(const Mover& mover) const {
-  for (const Membership& m : mover.cells) {
-    if (still.edited(m.cell)) return true;
-  }
-  for (const Cell cell : still.edits().added) {
-    if (mover.ranges[still.levelOf(cell)].contains(still.placeOf(cell))) return true;
-  }
-  return still.edits().levelAdded;
-}
-
-/// The partners that a live mover holds have other rows now, or have gone.
-void SortAndSweep::State::renumberRows(MoverId id) {
-  Mover& mover = movers[id];
-  for (std::size_t i = mover.rows.size(); i-- > 0;) {
-    mover.rows[i] = still.rowOf(mover.partners[i].id);
-    if (mover.rows[i] != StillCells::kNoRow) continue;
-    ended.push_back({id, mover.partners[i].id, false});
-    --pairs;
-    mover.rows.erase(mover.rows.begin() + static_cast<std::ptrdiff_t>(i));
-    mover.partners.erase(mover.partners.begin() + static_cast<std::ptrdiff_t>(i));
-  }
-}
 
 void SortAndSweep::State::rebuildStill() {
   ++counters.rebuilds;
@@ -271,26 +162,26 @@ void SortAndSweep::State::rebuildStill() {
     ids.push_back(id);
   }
   still = StillCells(boxes, ids);
-  for (MoverId id = 0; id < movers.size(); ++id) renumberRows(id);
 }
 
 void SortAndSweep::State::applyEdits() {
   const std::size_t edits = stagedIn.size() + stagedOut.size();
   if (edits == 0) return;
   counters.stillEdits = edits;
-  const bool anew = !still.hasRoomFor(edits);
-  if (anew) {
-    rebuildStill();
-  } else {
+  std::vector<HalfAxes> edited;
+  for (const StillId id : stagedOut) edited.push_back(still.onset(still.rowOf(id)));
+  for (const auto& [id, box] : stagedIn) edited.push_back(onsetOf(box));
+  if (still.hasRoomFor(edits)) {
     for (const StillId id : stagedOut) still.remove(still.rowOf(id));
     for (const auto& [id, box] : stagedIn) still.insert(box, id);
+  } else {
+    rebuildStill();
   }
   for (MoverId id = 0; id < movers.size(); ++id) {
-    Mover& mover = movers[id];
-    if (mover.presence != Presence::live || !(anew || touchedByEdits(mover))) continue;
-    mover.leaveCells();
-    mover.recheck = true;
-    updateStill(id);
+    if (movers[id].presence != Presence::live) continue;
+    const HalfAxes& farthest = movers[id].cell.farthest;
+    const auto touches = [&](const HalfAxes& onset) { return meets(onset, farthest); };
+    if (edits > kFewEdits || std::any_of(edited.begin(), edited.end(), touches)) layCell(id);
   }
   stillCount += stagedIn.size();
   stillCount -= stagedOut.size();

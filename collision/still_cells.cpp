@@ -1,23 +1,62 @@
-// Finding cells, and editing them.
+// Finding the boxes about a place, and editing the cells.
 //
-// Only cells that hold a box exist; they are found by hashing their place. A box that comes is put
-// into the six sorted lists of each cell that it lies in, one that goes is taken out of them: a
-// binary search and a short move of memory a list. The alternatives are an overlay of new boxes,
-// which every mover would have to look at besides its cells until it is merged, and a new build of
-// the touched cells, which sorts what is sorted. Lists that outgrow their room move to a block of
-// their own; the room is reclaimed by the next build of everything, which also measures the cells
-// anew. The build itself is in still_cells_build.cpp.
+// Only cells that hold a box exist; they are found by hashing their place. A cell's entries stand
+// in one array and tell in 16 bits a half-axis where a box lies in it, so that those that miss a
+// mover's surroundings, which are most, cost a few instructions and no memory but the array's. The
+// places are monotone in the coordinates: what overlaps is never passed over.
+//
+// A box is met in several cells, and told in one: where, on every axis, either its own low corner
+// or that of what is asked about lies.
+//
+// A box that comes is entered in each cell that it lies in, one that goes is taken out. A cell that
+// outgrows its room moves to a block of its own; the room is reclaimed by the next build of
+// everything, which also measures the cells anew. The build itself is in still_cells_build.cpp.
 
 #include "collision/still_cells.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 
 namespace enfilade::collision {
+namespace {
 
-StillCells::Cell StillCells::find(std::size_t level, const CellPlace& at) const {
-  return slots_[slotOf(level, at)];
+constexpr std::size_t kHalfAxesLanes = 6;  // of an entry; the last two hold the row
+using Words = std::int64_t __attribute__((vector_size(16)));
+constexpr Words kHalfAxesMask{-1, 0xffffffff};
+constexpr std::size_t kEntriesPerLine = 64 / sizeof(Words);  // of a cache
+
+}  // namespace
+
+// ---- entries -----------------------------------------------------------------------------------
+
+StillCells::Entry StillCells::lanesOf(const FinePlaces& places, const CellPlace& cell) {
+  constexpr std::int64_t kMost = std::numeric_limits<std::int16_t>::max();
+  Entry lanes{};
+  for (std::size_t k = 0; k < kHalfAxesLanes; ++k) {
+    const std::int64_t corner = std::int64_t{cell[k % 3]} * (1 << kFineBits);
+    const std::int64_t place = k < 3 ? places[k] + corner : places[k] - corner;
+    lanes[k] = static_cast<std::int16_t>(std::clamp(place, -kMost, kMost));
+  }
+  return lanes;
 }
+
+StillCells::Entry StillCells::entryOf(const FinePlaces& reach, const CellPlace& cell, Row row) {
+  const FinePlaces onset{-reach[3], -reach[4], -reach[5], -reach[0], -reach[1], -reach[2]};
+  Entry entry = lanesOf(onset, cell);
+  std::memcpy(reinterpret_cast<char*>(&entry) + kHalfAxesLanes * sizeof(entry[0]), &row,
+              sizeof(row));
+  return entry;
+}
+
+StillCells::Row StillCells::rowOf(const Entry& entry) {
+  Row row;
+  std::memcpy(&row, reinterpret_cast<const char*>(&entry) + kHalfAxesLanes * sizeof(entry[0]),
+              sizeof(row));
+  return row;
+}
+
+// ---- cells -------------------------------------------------------------------------------------
 
 /// The slot that holds the cell, or the free one where it belongs. At most half of the slots are
 /// taken, so the search ends.
@@ -37,7 +76,9 @@ StillCells::Cell StillCells::findOrAdd(std::size_t level, const CellPlace& at) {
   if (slots_[slot] != kNoCell) return slots_[slot];
   const Cell added = static_cast<Cell>(cells_.size());
   slots_[slot] = added;
-  cells_.push_back({at, static_cast<std::uint16_t>(level), false, nullptr, 0, 0});
+  cells_.push_back({at, static_cast<std::uint32_t>(level), nullptr, 0, 0});
+  const auto place = std::lower_bound(usedLevels_.begin(), usedLevels_.end(), level);
+  if (place == usedLevels_.end() || *place != level) usedLevels_.insert(place, level);
   if (2 * cells_.size() > slots_.size()) rebuildSlots(2 * slots_.size());
   return added;
 }
@@ -52,12 +93,61 @@ void StillCells::rebuildSlots(std::size_t size) {
   }
 }
 
+template <typename Visit>
+void StillCells::forEachCell(std::size_t level, const CellRange& range, Visit&& visit) const {
+  if (range.count() > static_cast<double>(cells_.size())) {  // to look at all of them is less
+    for (const CellData& cell : cells_) {
+      if (cell.level == level && range.contains(cell.at)) visit(cell);
+    }
+    return;
+  }
+  forEachPlace(range, [&](const CellPlace& at) {
+    const Cell cell = slots_[slotOf(level, at)];
+    if (cell != kNoCell) visit(cells_[cell]);
+  });
+}
+
+void StillCells::gatherFrom(const CellData& cell, const FinePlaces& reach, const CellRange& range,
+                            std::vector<Row>& rows) const {
+  const Entry reached = lanesOf(reach, cell.at);
+  Entry begunBefore{};  // lanes that are to be no less than 0, lest the box is told twice
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (cell.at[axis] != range.low[axis]) begunBefore[axis + 3] = -1;
+  }
+  for (std::uint32_t e = 0; e < cell.count; ++e) {
+    const Entry& entry = cell.entries[e];
+    const Entry missed = (entry > reached) | ((entry < 0) & begunBefore);
+    Words words;
+    std::memcpy(&words, &missed, sizeof(words));
+    words &= kHalfAxesMask;
+    if ((words[0] | words[1]) == 0) rows.push_back(rowOf(entry));
+  }
+}
+
+void StillCells::gather(const HalfAxes& reach, std::vector<Row>& rows) const {
+  for (const std::size_t level : usedLevels_) {
+    const FinePlaces places = grid_.finePlacesOf(level, reach);
+    const CellRange range = rangeOf(places);
+    forEachCell(level, range, [&](const CellData& cell) { gatherFrom(cell, places, range, rows); });
+  }
+}
+
+void StillCells::prefetch(const HalfAxes& reach) const {
+  for (const std::size_t level : usedLevels_) {
+    const CellRange range = rangeOf(grid_.finePlacesOf(level, reach));
+    forEachCell(level, range, [&](const CellData& cell) {
+      for (std::uint32_t e = 0; e < cell.count; e += kEntriesPerLine) {
+        __builtin_prefetch(cell.entries + e);
+      }
+    });
+  }
+}
+
 std::size_t StillCells::bytesBesidesBoxes() const {
   std::size_t bytes = sizeof(*this) + (ids_.size() + rowOf_.capacity()) * sizeof(Row) +
-                      cells_.capacity() * sizeof(CellData) +
-                      (slots_.capacity() + cells_.size()) * sizeof(Cell) +
-                      sortedSize_ * sizeof(Row);
-  for (const auto& block : grown_) bytes += block.capacity() * sizeof(Row) + sizeof(block);
+                      cells_.capacity() * sizeof(CellData) + slots_.capacity() * sizeof(Cell) +
+                      entries_.capacity() * sizeof(Entry);
+  for (const auto& block : grown_) bytes += block.capacity() * sizeof(Entry) + sizeof(block);
   return bytes;
 }
 
@@ -77,60 +167,12 @@ StillCells::Row StillCells::rowOf(std::uint32_t id) {
   return id < rowOf_.size() ? rowOf_[id] : kNoRow;
 }
 
-void StillCells::touch(Cell cell) {
-  if (cells_[cell].edited) return;
-  cells_[cell].edited = true;
-  edits_.cells.push_back(cell);
-}
-
-StillCells::Cell StillCells::openCell(std::size_t level, const CellPlace& at) {
-  const std::size_t before = cells_.size();
-  const Cell cell = findOrAdd(level, at);
-  if (cells_.size() == before) return cell;
-  edits_.added.push_back(cell);
-  if (cellsOfLevel_[level].empty()) {
-    usedLevels_.insert(std::upper_bound(usedLevels_.begin(), usedLevels_.end(), level), level);
-    edits_.levelAdded = true;
-  }
-  cellsOfLevel_[level].push_back(cell);
-  return cell;
-}
-
 void StillCells::growCell(CellData& cell) {
   const std::uint32_t room = cell.room + cell.room / 2 + 4;
-  std::vector<Row>& block = grown_.emplace_back(6 * std::size_t{room});
-  for (std::size_t k = 0; k < 6; ++k) {
-    std::copy_n(cell.rows + k * cell.room, cell.count, block.data() + k * room);
-  }
-  cell.rows = block.data();
+  std::vector<Entry>& block = grown_.emplace_back(room);
+  std::copy_n(cell.entries, cell.count, block.data());
+  cell.entries = block.data();
   cell.room = room;
-}
-
-void StillCells::insertIntoCell(Cell at, Row row) {
-  CellData& cell = cells_[at];
-  if (cell.count == cell.room) growCell(cell);
-  for (std::size_t k = 0; k < 6; ++k) {
-    Row* const list = cell.rows + k * cell.room;
-    Row* const place = std::upper_bound(list, list + cell.count, row, [&](Row a, Row b) {
-      const double x = onsets_[a][k], y = onsets_[b][k];
-      return x != y ? x < y : a < b;
-    });
-    std::copy_backward(place, list + cell.count, list + cell.count + 1);
-    *place = row;
-  }
-  ++cell.count;
-  touch(at);
-}
-
-void StillCells::removeFromCell(Cell at, Row row) {
-  CellData& cell = cells_[at];
-  for (std::size_t k = 0; k < 6; ++k) {
-    Row* const list = cell.rows + k * cell.room;
-    Row* const place = std::find(list, list + cell.count, row);
-    std::copy(place + 1, list + cell.count, place);
-  }
-  --cell.count;
-  touch(at);
 }
 
 void StillCells::insert(const Box& box, std::uint32_t id) {
@@ -148,26 +190,26 @@ void StillCells::insert(const Box& box, std::uint32_t id) {
   }
   if (id >= rowOf_.size()) rowOf_.resize(id + std::size_t{1}, kNoRow);
   rowOf_[id] = row;
-  CellRange range;
-  const std::size_t level = grid_.levelFor(reachOf(box), range);
-  forEachPlace(range, [&](const CellPlace& at) { insertIntoCell(openCell(level, at), row); });
+  FinePlaces places;
+  const std::size_t level = grid_.levelFor(reachOf(box), places);
+  forEachPlace(rangeOf(places), [&](const CellPlace& at) {
+    CellData& cell = cells_[findOrAdd(level, at)];
+    if (cell.count == cell.room) growCell(cell);
+    cell.entries[cell.count++] = entryOf(places, at, row);
+  });
 }
 
 void StillCells::remove(Row row) {
   ++editCount_;
-  CellRange range;
-  const std::size_t level = grid_.levelFor(reachOf(boxOfOnset(onsets_[row])), range);
-  forEachPlace(range, [&](const CellPlace& at) { removeFromCell(find(level, at), row); });
-  onsets_[row].fill(std::numeric_limits<double>::infinity());
+  FinePlaces places;
+  const std::size_t level = grid_.levelFor(reachOf(boxOfOnset(onsets_[row])), places);
+  forEachPlace(rangeOf(places), [&](const CellPlace& at) {
+    CellData& cell = cells_[slots_[slotOf(level, at)]];
+    Entry* const last = cell.entries + --cell.count;
+    *std::find_if(cell.entries, last, [row](const Entry& e) { return rowOf(e) == row; }) = *last;
+  });
   rowOf_[ids_[row]] = kNoRow;
-  removedRows_.push_back(row);
-}
-
-void StillCells::clearEdits() {
-  for (const Cell cell : edits_.cells) cells_[cell].edited = false;
-  edits_ = {};
-  freeRows_.insert(freeRows_.end(), removedRows_.begin(), removedRows_.end());
-  removedRows_.clear();
+  freeRows_.push_back(row);
 }
 
 }  // namespace enfilade::collision

@@ -255,7 +255,7 @@ std::vector<double> timeRun(const Building& building, std::size_t movers, int ti
     const double share = 1 / (static_cast<double>(movers) * ticks);
     times.exchanges += static_cast<double>(peer.counters().exchanges) * share;
     times.boxTests += static_cast<double>(peer.counters().boxTests) * share;
-    times.entries += static_cast<double>(peer.counters().cellEntries) * share;
+    times.entries += static_cast<double>(peer.counters().cellsLaid) * share;
   }
   return durations;
 }

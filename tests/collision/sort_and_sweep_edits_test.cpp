@@ -164,11 +164,11 @@ TEST(SortAndSweepEdits, AnEditDisturbsOnlyTheMoversBesideIt) {
     sweep.insert(boxAt(uniform3(random, Vec3::Zero(), Vec3(100, 1, 100)), Vec3(0.6, 1.75, 0.6)));
   }
   sweep.update();
-  const std::uint64_t all = sweep.counters().cellEntries;
+  const std::uint64_t all = sweep.counters().cellsLaid;
   sweep.insertStill(boxAt(Vec3(50, 0, 50), Vec3::Constant(0.3)));
   sweep.update();
   EXPECT_EQ(sweep.counters().rebuilds, 0u);
-  EXPECT_LT(sweep.counters().cellEntries, all / 10);
+  EXPECT_LT(sweep.counters().cellsLaid, all / 10);
 }
 
 TEST(BroadPhaseAudit, FindsNothingInARightSweepAndEachFaultThatIsMadeUp) {

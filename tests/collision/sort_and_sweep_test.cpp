@@ -298,12 +298,12 @@ TEST(SortAndSweep, CountsNothingWhileNothingMoves) {
     scene.insert(boxAt(uniform3(random, Vec3::Zero(), Vec3(10, 3, 10)), Vec3::Ones()));
   }
   scene.updateAndCheck();
-  EXPECT_GT(scene.sweep().counters().cellEntries, 0u);
+  EXPECT_GT(scene.sweep().counters().cellsLaid, 0u);
   EXPECT_GT(scene.sweep().pairCount(), 50u);
   for (const auto& [id, box] : scene.movers()) scene.sweep().move(id, box);
   scene.updateAndCheck();
   EXPECT_EQ(scene.sweep().counters().exchanges, 0u);
-  EXPECT_EQ(scene.sweep().counters().cellEntries, 0u);
+  EXPECT_EQ(scene.sweep().counters().cellsLaid, 0u);
   EXPECT_EQ(scene.sweep().counters().boxTests, 0u);
 }
 

@@ -1,0 +1,90 @@
+// Movers against movers.
+//
+// The cells of the movers are boxes as well, and change once in a while. Their ends stand in three
+// sorted lists that are repaired by insertion (mover_lists.hpp); an exchange tells that two cells
+// have met or parted. Movers whose cells do not meet cannot, and cost nothing. Of two whose cells
+// do, neighbours, the twelve end points are compared when one of them has moved.
+
+#include <algorithm>
+
+#include "collision/sort_and_sweep_state.hpp"
+
+namespace enfilade::collision {
+namespace {
+
+/// Closed boxes by their reach. A sum has the sign of the difference of the coordinates, exactly.
+bool overlapping(const HalfAxes& a, const HalfAxes& b) {
+  bool met = true;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    met &= a[axis] + b[axis + 3] >= 0;
+    met &= b[axis] + a[axis + 3] >= 0;
+  }
+  return met;
+}
+
+auto find(std::vector<Neighbour>& neighbours, MoverId id) {
+  return std::find_if(neighbours.begin(), neighbours.end(),
+                      [id](const Neighbour& n) { return n.id == id; });
+}
+
+}  // namespace
+
+void SortAndSweep::State::beginNeighbours(MoverId a, MoverId b) {
+  if (find(movers[a].neighbours, b) != movers[a].neighbours.end()) return;
+  const bool met = overlapping(movers[a].reach, movers[b].reach);
+  ++counters.boxTests;
+  movers[a].neighbours.push_back({b, met});
+  movers[b].neighbours.push_back({a, met});
+  if (met) beginMoving(a, b);
+}
+
+void SortAndSweep::State::endNeighbours(MoverId a, MoverId b) {
+  std::vector<Neighbour>&ofA = movers[a].neighbours, &ofB = movers[b].neighbours;
+  const auto at = find(ofA, b);
+  if (at == ofA.end()) return;
+  if (at->met) endMoving(a, b);
+  *at = ofA.back();
+  ofA.pop_back();
+  *find(ofB, a) = ofB.back();
+  ofB.pop_back();
+}
+
+void SortAndSweep::State::testNeighbours(MoverId id) {
+  for (Neighbour& neighbour : movers[id].neighbours) {
+    const Mover& other = movers[neighbour.id];
+    if (other.stirred && neighbour.id < id) continue;  // it tests the two
+    ++counters.boxTests;
+    const bool met = overlapping(movers[id].reach, other.reach);
+    if (met == neighbour.met) continue;
+    neighbour.met = met;
+    find(movers[neighbour.id].neighbours, id)->met = met;
+    if (met) {
+      beginMoving(id, neighbour.id);
+    } else {
+      endMoving(id, neighbour.id);
+    }
+  }
+}
+
+void SortAndSweep::State::updateMoving() {
+  lists.exchanges = lists.boxTests = 0;
+  changes.clear();
+  for (const MoverId id : relaid) lists.setBox(id, boxOfReach(movers[id].cell.farthest));
+  for (const MoverId id : relaid) {
+    if (movers[id].presence == Presence::live) lists.move(id, changes);
+  }
+  lists.insert(fresh, changes);
+  lists.settle(relaid);
+  for (const MoverChange& change : changes) {
+    if (change.begins) {
+      beginNeighbours(change.a, change.b);
+    } else {
+      endNeighbours(change.a, change.b);
+    }
+  }
+  for (const MoverId id : stirred) testNeighbours(id);
+  counters.exchanges += lists.exchanges;
+  counters.boxTests += lists.boxTests;
+}
+
+}  // namespace enfilade::collision
