@@ -6,32 +6,10 @@
 #include <span>
 #include <vector>
 
+#include "collision/half_axes.hpp"
 #include "collision/types.hpp"
 
 namespace enfilade::collision {
-
-/// A closed interval has two ends and space three axes: six half-axes, -x -y -z +x +y +z. On each a
-/// mover has a reach (how far its box goes: -min, or max) and a still box has an onset (from which
-/// reach on it is met: -max, or min). Boxes overlap exactly if every onset <= the reach beside it.
-using HalfAxes = std::array<double, 6>;
-
-inline HalfAxes reachOf(const Box& box) {
-  return {-box.min.x(), -box.min.y(), -box.min.z(), box.max.x(), box.max.y(), box.max.z()};
-}
-inline HalfAxes onsetOf(const Box& box) {
-  return {-box.max.x(), -box.max.y(), -box.max.z(), box.min.x(), box.min.y(), box.min.z()};
-}
-inline Box boxOfReach(const HalfAxes& r) {
-  return {Vec3(-r[0], -r[1], -r[2]), Vec3(r[3], r[4], r[5])};
-}
-inline Box boxOfOnset(const HalfAxes& o) {
-  return {Vec3(o[3], o[4], o[5]), Vec3(-o[0], -o[1], -o[2])};
-}
-inline bool meets(const HalfAxes& onset, const HalfAxes& reach) {
-  bool met = true;
-  for (std::size_t k = 0; k < 6; ++k) met &= onset[k] <= reach[k];
-  return met;
-}
 
 using CellPlace = std::array<std::int32_t, 3>;
 

@@ -4,7 +4,7 @@
 #include "collision/mover_cell.hpp"
 
 #include <algorithm>
-#include <limits>
+#include <bit>
 
 namespace enfilade::collision {
 namespace {
@@ -17,26 +17,22 @@ bool before(const End& a, const End& b) {
   return a.at < b.at;
 }
 
-/// Into an ascending list of `count`, before the end of which there is room.
+/// Into an ascending list of `count`; into a long one at its end, to be sorted at last.
 void insertSorted(End* list, std::uint32_t count, const End& end) {
-  for (; count > 0 && end.at < list[count - 1].at; --count) list[count] = list[count - 1];
+  for (; count > 0 && count < kFewEnds && end.at < list[count - 1].at; --count)
+    list[count] = list[count - 1];
   list[count] = end;
 }
 
 }  // namespace
 
-void MoverCell::close() {
-  low.fill(std::numeric_limits<double>::infinity());
-  ends.clear();
-  boxes.clear();
-}
-
 void MoverCell::lay(const StillCells& still, std::span<const StillCells::Row> rows,
                     const HalfAxes& reach, std::vector<std::uint32_t>& met) {
-  std::array<std::uint32_t, 6> count{}, within{}, first{};
+  std::array<std::uint32_t, 6> first, count{}, within{};
   for (const StillCells::Row row : rows) {
-    const HalfAxes& onset = still.onset(row);
-    for (std::size_t k = 0; k < 6; ++k) count[k] += onset[k] > nearest[k] ? 1u : 0u;
+    for (unsigned bits = beyond(still.onset(row), nearest); bits != 0; bits &= bits - 1) {
+      ++count[static_cast<std::size_t>(std::countr_zero(bits))];
+    }
   }
   std::uint32_t total = 0;
   for (std::size_t k = 0; k < 6; ++k) {
@@ -49,27 +45,16 @@ void MoverCell::lay(const StillCells& still, std::span<const StillCells::Row> ro
   count.fill(0);
   for (const StillCells::Row row : rows) {
     const HalfAxes& onset = still.onset(row);
-    const auto box = static_cast<std::uint32_t>(boxes.size());
-    unsigned apart = 0;
-    bool ending = false;
-    for (std::size_t k = 0; k < 6; ++k) {
-      if (!(onset[k] > nearest[k])) continue;
-      ending = true;
-      if (onset[k] > reach[k]) {
-        apart |= 1u << k;
-      } else {
-        ++within[k];
-      }
-      End* const list = ends.data() + first[k];
-      if (count[k] < kFewEnds) {
-        insertSorted(list, count[k], {onset[k], box});
-      } else {
-        list[count[k]] = {onset[k], box};
-      }
-      ++count[k];
-    }
+    const unsigned apart = beyond(onset, reach), ending = beyond(onset, nearest);
     if (apart == 0) met.push_back(still.idOf(row));
-    if (ending) boxes.push_back({still.idOf(row), static_cast<std::uint8_t>(apart)});
+    if (ending == 0) continue;
+    const auto box = static_cast<std::uint32_t>(boxes.size());
+    boxes.push_back({still.idOf(row), static_cast<std::uint8_t>(apart)});
+    for (unsigned bits = ending; bits != 0; bits &= bits - 1) {
+      const auto k = static_cast<std::size_t>(std::countr_zero(bits));
+      within[k] += ~apart >> k & 1;
+      insertSorted(ends.data() + first[k], count[k]++, {onset[k], box});
+    }
   }
   for (std::size_t k = 0; k < 6; ++k) {
     End* const list = ends.data() + first[k];
@@ -77,7 +62,6 @@ void MoverCell::lay(const StillCells& still, std::span<const StillCells::Row> ro
     list[count[k]] = {farthest[k], kBorder};
     if (count[k] > kFewEnds) std::sort(list, list + count[k], before);
     next[k] = first[k] + within[k];
-    guard(k);
   }
 }
 

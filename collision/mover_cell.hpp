@@ -13,7 +13,7 @@
 namespace enfilade::collision {
 
 /// On each half-axis the mover's reach is somewhere in nearest <= reach < farthest; what ends there
-/// stands in a list between these borders, and the guards are the entries beside the reach.
+/// stands in a list between these borders.
 struct MoverCell {
   static constexpr std::uint32_t kBorder = static_cast<std::uint32_t>(-1);
   struct End {
@@ -25,24 +25,19 @@ struct MoverCell {
     std::uint8_t apart;  ///< bit k: its onset on half-axis k is beyond the reach
   };
 
-  HalfAxes low{}, high{};               ///< guards: while low <= reach < high nothing was passed
   HalfAxes nearest{}, farthest{};       ///< borders
   std::array<std::uint32_t, 6> next{};  ///< by half-axis: the first end beyond the reach
   std::vector<End> ends;                ///< six lists, each ascending, a border at either side
   std::vector<StillBox> boxes;          ///< those with an end between the borders
 
-  /// No cell yet: the guards let nothing pass.
-  void close();
   /// Takes in the boxes of `rows`, all of which meet `farthest`, with the borders that are set.
   /// Writes the ids of those that meet `reach` into `met`, in the order of `rows`.
   void lay(const StillCells& still, std::span<const StillCells::Row> rows, const HalfAxes& reach,
            std::vector<std::uint32_t>& met);
 
-  /// Sets the guards of half-axis `k` beside its first end beyond the reach.
-  void guard(std::size_t k) {
-    low[k] = ends[next[k] - 1].at;
-    high[k] = ends[next[k]].at;
-  }
+  /// The ends beside the reach on half-axis `k`.
+  double endBefore(std::size_t k) const { return ends[next[k] - 1].at; }
+  double endBeyond(std::size_t k) const { return ends[next[k]].at; }
 };
 
 }  // namespace enfilade::collision

@@ -77,33 +77,35 @@ Mover& known(std::vector<Mover>& movers, MoverId id) {
   return movers[id];
 }
 
-// Two half-axes at once, in a form that gcc and clang know on every processor. A comparison gives
-// -1 where it holds and 0 elsewhere.
-using Lanes = double __attribute__((vector_size(16)));
-using LaneMask = long long __attribute__((vector_size(16)));
-
-Lanes lanesAt(const double* from) {
-  Lanes lanes;
-  std::memcpy(&lanes, from, sizeof(lanes));
-  return lanes;
-}
-
-/// A box' reach, if the box is valid and the reach within the guards (which are finite).
-struct ReachInGuards {
+/// A box' reach, and what is found out about it at once.
+struct MovedReach {
   std::array<Lanes, 3> reach;
-  bool inside;
+  LaneMask good;  ///< -1 where the box is not empty; the third axis is in `goodLast`
+  bool goodLast;
 
-  ReachInGuards(const Box& box, const HalfAxes& low, const HalfAxes& high) {
+  explicit MovedReach(const Box& box) {
     static_assert(sizeof(Box) == 6 * sizeof(double));
-    std::array<double, 6> ends;
-    std::memcpy(ends.data(), &box, sizeof(box));
-    reach = {-lanesAt(&ends[0]), lanesAt(&ends[2]) * Lanes{-1, 1}, lanesAt(&ends[4])};
-    LaneMask in = lanesAt(&ends[0]) <= lanesAt(&ends[3]);
-    for (std::size_t pair = 0; pair < 3; ++pair) {
-      in &= lanesAt(&low[2 * pair]) <= reach[pair];
-      in &= reach[pair] < lanesAt(&high[2 * pair]);
-    }
-    inside = (in[0] & in[1]) != 0 && ends[2] <= ends[5];
+    const double* const ends = box.min.data();
+    const Lanes minXY = lanesAt(ends), maxXY = lanesAt(box.max.data());
+    reach[0] = -minXY;
+    reach[1] = lanesAt(ends + 2) * Lanes{-1, 1};
+    reach[2] = lanesAt(box.max.data() + 1);
+    good = minXY <= maxXY;
+    goodLast = box.min.z() <= box.max.z();
+  }
+  /// Whether the box is valid and the reach between guards, which are finite.
+  bool within(const HalfAxes& low, const HalfAxes& high) const {
+    const LaneMask above = (lanesAt(&low[0]) <= reach[0]) & (lanesAt(&low[2]) <= reach[1]) &
+                           (lanesAt(&low[4]) <= reach[2]);
+    const LaneMask below = (reach[0] < lanesAt(&high[0])) & (reach[1] < lanesAt(&high[2])) &
+                           (reach[2] < lanesAt(&high[4]));
+    return bitsOf(good & above & below) == 3 && goodLast;
+  }
+  /// Whether the box is valid: neither empty nor endless, and all of it numbers.
+  bool valid() const {
+    constexpr double kMost = std::numeric_limits<double>::max();
+    const LaneMask finite = (reach[0] <= kMost) & (reach[1] <= kMost) & (reach[2] <= kMost);
+    return bitsOf(good & finite) == 3 && goodLast;
   }
 };
 
@@ -143,7 +145,7 @@ MoverId SortAndSweep::insert(const Box& box) {
   Mover& mover = s.movers[id];
   mover.reach = mover.laidReach = reachOf(box);
   mover.rate.fill(0);
-  mover.cell.close();
+  mover.low.fill(std::numeric_limits<double>::infinity());  // move() is not to let it pass
   mover.presence = Presence::fresh;
   s.fresh.push_back(id);
   return id;
@@ -151,26 +153,29 @@ MoverId SortAndSweep::insert(const Box& box) {
 
 void SortAndSweep::move(MoverId id, const Box& box) {
   State& s = *state_;
+  const MovedReach moved(box);
   if (id < s.movers.size()) {
     Mover& mover = s.movers[id];
-    const ReachInGuards in(box, mover.cell.low, mover.cell.high);
-    if (in.inside && mover.neighbours.empty()) {
-      std::memcpy(&mover.reach, &in.reach, sizeof(mover.reach));
+    if (moved.within(mover.low, mover.high) && mover.neighbours.empty()) {
+      std::memcpy(&mover.reach, &moved.reach, sizeof(mover.reach));
       return;
     }
   }
-  s.moveSlowly(id, box);
+  known(s.movers, id);
+  if (!moved.valid()) requireBox(box, "mover", id);
+  s.moveWatched(id, reachOf(box));
 }
 
-void SortAndSweep::State::moveSlowly(MoverId id, const Box& box) {
-  Mover& mover = known(movers, id);
-  requireBox(box, "mover", id);
-  const HalfAxes reach = reachOf(box);
+/// A mover that may have passed something, or has neighbours.
+void SortAndSweep::State::moveWatched(MoverId id, const HalfAxes& reach) {
+  Mover& mover = movers[id];
   if (reach == mover.reach) return;
   mover.reach = reach;
   if (mover.presence == Presence::fresh) return;
-  if (!mover.moved) moved.push_back(id);
-  mover.moved = true;
+  if (!mover.moved) {
+    mover.moved = true;
+    moved.push_back(id);
+  }
   if (mover.neighbours.empty() || mover.stirred) return;
   mover.stirred = true;
   stirred.push_back(id);

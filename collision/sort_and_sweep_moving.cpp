@@ -12,16 +12,6 @@
 namespace enfilade::collision {
 namespace {
 
-/// Closed boxes by their reach. A sum has the sign of the difference of the coordinates, exactly.
-bool overlapping(const HalfAxes& a, const HalfAxes& b) {
-  bool met = true;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    met &= a[axis] + b[axis + 3] >= 0;
-    met &= b[axis] + a[axis + 3] >= 0;
-  }
-  return met;
-}
-
 auto find(std::vector<Neighbour>& neighbours, MoverId id) {
   return std::find_if(neighbours.begin(), neighbours.end(),
                       [id](const Neighbour& n) { return n.id == id; });
@@ -31,11 +21,11 @@ auto find(std::vector<Neighbour>& neighbours, MoverId id) {
 
 void SortAndSweep::State::beginNeighbours(MoverId a, MoverId b) {
   if (find(movers[a].neighbours, b) != movers[a].neighbours.end()) return;
-  const bool met = overlapping(movers[a].reach, movers[b].reach);
+  const bool overlap = meets(onsetOfReach(movers[a].reach), movers[b].reach);
   ++counters.boxTests;
-  movers[a].neighbours.push_back({b, met});
-  movers[b].neighbours.push_back({a, met});
-  if (met) beginMoving(a, b);
+  movers[a].neighbours.push_back({b, overlap});
+  movers[b].neighbours.push_back({a, overlap});
+  if (overlap) beginMoving(a, b);
 }
 
 void SortAndSweep::State::endNeighbours(MoverId a, MoverId b) {
@@ -50,15 +40,16 @@ void SortAndSweep::State::endNeighbours(MoverId a, MoverId b) {
 }
 
 void SortAndSweep::State::testNeighbours(MoverId id) {
+  const HalfAxes onset = onsetOfReach(movers[id].reach);
   for (Neighbour& neighbour : movers[id].neighbours) {
     const Mover& other = movers[neighbour.id];
     if (other.stirred && neighbour.id < id) continue;  // it tests the two
     ++counters.boxTests;
-    const bool met = overlapping(movers[id].reach, other.reach);
-    if (met == neighbour.met) continue;
-    neighbour.met = met;
-    find(movers[neighbour.id].neighbours, id)->met = met;
-    if (met) {
+    const bool overlap = meets(onset, other.reach);
+    if (overlap == neighbour.met) continue;
+    neighbour.met = overlap;
+    find(movers[neighbour.id].neighbours, id)->met = overlap;
+    if (overlap) {
       beginMoving(id, neighbour.id);
     } else {
       endMoving(id, neighbour.id);

@@ -1,6 +1,7 @@
 // The pairs that a sweep holds: how they begin and end, and that each is told once.
 
 #include <algorithm>
+#include <limits>
 
 #include "collision/sort_and_sweep_state.hpp"
 
@@ -83,7 +84,7 @@ void SortAndSweep::State::dropAll(MoverId id) {
   while (!mover.neighbours.empty()) endNeighbours(id, mover.neighbours.back().id);
   inReach.clear();
   replaceStill(id);
-  mover.cell.close();
+  mover.low.fill(std::numeric_limits<double>::infinity());
 }
 
 }  // namespace enfilade::collision

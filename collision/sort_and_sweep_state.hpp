@@ -24,18 +24,21 @@ struct Neighbour {
   bool met;  ///< their boxes overlap, as of the last update
 };
 
-struct Mover {
-  MoverCell cell;
+struct alignas(64) Mover {
+  // What a steady tick reads comes first: three lines of a cache.
   HalfAxes reach{};
-  Presence presence = Presence::free;
-  bool moved = false;                           ///< passed a guard since the last update
-  bool stirred = false;                         ///< moved at all, and has neighbours
-  bool relaid = false;                          ///< its cell was laid anew in this update
+  HalfAxes low{}, high{};  ///< guards: while low <= reach < high nothing was passed
   std::vector<SortAndSweep::Partner> partners;  ///< sorted
   std::vector<Neighbour> neighbours;            ///< in the order in which they came
-  HalfAxes laidReach{};                         ///< when its cell was laid
-  HalfAxes rate{};                              ///< metres a tick that the reach grows, lately
-  std::uint64_t laidAt = 0;                     ///< tick
+
+  MoverCell cell;
+  Presence presence = Presence::free;
+  bool moved = false;        ///< may have passed a guard since the last update
+  bool stirred = false;      ///< moved at all, and has neighbours
+  bool relaid = false;       ///< its cell was laid anew in this update
+  std::uint64_t laidAt = 0;  ///< tick
+  HalfAxes laidReach{};      ///< then
+  HalfAxes rate{};           ///< metres a tick that the reach grows, as of then
 };
 
 struct SortAndSweep::State {
@@ -66,7 +69,7 @@ struct SortAndSweep::State {
   std::size_t pairs = 0;
   SweepCounters counters;
 
-  void moveSlowly(MoverId id, const Box& box);
+  void moveWatched(MoverId id, const HalfAxes& reach);
 
   // Pairs: sort_and_sweep_pairs.cpp.
   void beginStill(MoverId id, StillId other);

@@ -2,6 +2,7 @@
 // go.
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -28,9 +29,13 @@ constexpr std::size_t kFewEdits = 256;
 constexpr double kLargest = std::numeric_limits<double>::max();
 
 bool within(const HalfAxes& low, const HalfAxes& reach, const HalfAxes& high) {
-  bool inside = true;
-  for (std::size_t k = 0; k < 6; ++k) inside &= low[k] <= reach[k] && reach[k] < high[k];
-  return inside;
+  return (beyond(low, reach) | (0x3f & ~beyond(high, reach))) == 0;
+}
+
+/// Sets the guards of half-axis `k` to the ends beside the reach.
+void guard(Mover& mover, std::size_t k) {
+  mover.low[k] = mover.cell.endBefore(k);
+  mover.high[k] = mover.cell.endBeyond(k);
 }
 
 HalfAxes rateOf(const Mover& mover, std::uint64_t tick) {
@@ -80,6 +85,7 @@ void SortAndSweep::State::layCell(MoverId id) {
   ++counters.cellsLaid;
   std::erase_if(rows, [&](Row row) { return !meets(still.onset(row), mover.cell.farthest); });
   mover.cell.lay(still, rows, mover.reach, inReach);
+  for (std::size_t k = 0; k < 6; ++k) guard(mover, k);
   replaceStill(id);
   if (mover.relaid) return;
   mover.relaid = true;
@@ -103,9 +109,9 @@ void SortAndSweep::State::visitMovers() {
 bool SortAndSweep::State::passInward(MoverId id) {
   Mover& mover = movers[id];
   MoverCell& cell = mover.cell;
-  for (std::size_t k = 0; k < 6; ++k) {
-    if (!(mover.reach[k] < cell.low[k])) continue;
-    for (; cell.ends[cell.next[k] - 1].at > mover.reach[k]; --cell.next[k]) {
+  for (unsigned bits = beyond(mover.low, mover.reach); bits != 0; bits &= bits - 1) {
+    const auto k = static_cast<std::size_t>(std::countr_zero(bits));
+    for (; cell.endBefore(k) > mover.reach[k]; --cell.next[k]) {
       const std::uint32_t passed = cell.ends[cell.next[k] - 1].box;
       if (passed == MoverCell::kBorder) return false;
       ++counters.exchanges;
@@ -113,7 +119,7 @@ bool SortAndSweep::State::passInward(MoverId id) {
       if (box.apart == 0) endStill(id, box.id);
       box.apart = static_cast<std::uint8_t>(box.apart | 1u << k);
     }
-    cell.guard(k);
+    guard(mover, k);
   }
   return true;
 }
@@ -122,9 +128,9 @@ bool SortAndSweep::State::passInward(MoverId id) {
 bool SortAndSweep::State::passOutward(MoverId id) {
   Mover& mover = movers[id];
   MoverCell& cell = mover.cell;
-  for (std::size_t k = 0; k < 6; ++k) {
-    if (!(mover.reach[k] >= cell.high[k])) continue;
-    for (; cell.ends[cell.next[k]].at <= mover.reach[k]; ++cell.next[k]) {
+  for (unsigned bits = 0x3f & ~beyond(mover.high, mover.reach); bits != 0; bits &= bits - 1) {
+    const auto k = static_cast<std::size_t>(std::countr_zero(bits));
+    for (; cell.endBeyond(k) <= mover.reach[k]; ++cell.next[k]) {
       const std::uint32_t passed = cell.ends[cell.next[k]].box;
       if (passed == MoverCell::kBorder) return false;
       ++counters.exchanges;
@@ -132,17 +138,14 @@ bool SortAndSweep::State::passOutward(MoverId id) {
       box.apart = static_cast<std::uint8_t>(box.apart & ~(1u << k));
       if (box.apart == 0) beginStill(id, box.id);
     }
-    cell.guard(k);
+    guard(mover, k);
   }
   return true;
 }
 
+/// A pair that is to end is apart before another half-axis closes in on it: told once at most.
 void SortAndSweep::State::updateStill(MoverId id) {
-  // A pair that is to end is apart before another half-axis closes in on it: told once at most.
-  if (!within(movers[id].cell.nearest, movers[id].reach, movers[id].cell.farthest) ||
-      !passInward(id) || !passOutward(id)) {
-    layCell(id);
-  }
+  if (!passInward(id) || !passOutward(id)) layCell(id);
 }
 
 // ---- still boxes that come and go --------------------------------------------------------------

@@ -15,45 +15,55 @@
 #include "collision/still_cells.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <limits>
 
 namespace enfilade::collision {
 namespace {
 
-constexpr std::size_t kHalfAxesLanes = 6;  // of an entry; the last two hold the row
-using Words = std::int64_t __attribute__((vector_size(16)));
-constexpr Words kHalfAxesMask{-1, 0xffffffff};
-constexpr std::size_t kEntriesPerLine = 64 / sizeof(Words);  // of a cache
+constexpr std::size_t kEntriesPerLine = 4;
+
+using Shorts = std::int16_t __attribute__((vector_size(16)));
+
+/// Whether no lane of the half-axes is set.
+bool noneOf(Shorts mask) {
+#ifdef __SSE2__
+  using Chars = char __attribute__((vector_size(16)));
+  return (__builtin_ia32_pmovmskb128(reinterpret_cast<Chars>(mask)) & 0xfff) == 0;
+#else
+  std::array<std::uint64_t, 2> words;
+  std::memcpy(words.data(), &mask, sizeof(mask));
+  static_assert(std::endian::native == std::endian::little);
+  return (words[0] | (words[1] & 0xffffffff)) == 0;
+#endif
+}
 
 }  // namespace
 
 // ---- entries -----------------------------------------------------------------------------------
 
 StillCells::Entry StillCells::lanesOf(const FinePlaces& places, const CellPlace& cell) {
-  constexpr std::int64_t kMost = std::numeric_limits<std::int16_t>::max();
-  Entry lanes{};
-  for (std::size_t k = 0; k < kHalfAxesLanes; ++k) {
-    const std::int64_t corner = std::int64_t{cell[k % 3]} * (1 << kFineBits);
-    const std::int64_t place = k < 3 ? places[k] + corner : places[k] - corner;
-    lanes[k] = static_cast<std::int16_t>(std::clamp(place, -kMost, kMost));
-  }
-  return lanes;
+  const auto lane = [&](std::size_t k, std::int64_t corner) {
+    constexpr std::int64_t kMost = std::numeric_limits<std::int16_t>::max();
+    return static_cast<std::int16_t>(std::clamp(places[k] - corner, -kMost, kMost));
+  };
+  const std::int64_t x = std::int64_t{cell[0]} << kFineBits;
+  const std::int64_t y = std::int64_t{cell[1]} << kFineBits;
+  const std::int64_t z = std::int64_t{cell[2]} << kFineBits;
+  return Entry{lane(0, -x), lane(1, -y), lane(2, -z), lane(3, x), lane(4, y), lane(5, z), 0, 0};
 }
 
 StillCells::Entry StillCells::entryOf(const FinePlaces& reach, const CellPlace& cell, Row row) {
   const FinePlaces onset{-reach[3], -reach[4], -reach[5], -reach[0], -reach[1], -reach[2]};
   Entry entry = lanesOf(onset, cell);
-  std::memcpy(reinterpret_cast<char*>(&entry) + kHalfAxesLanes * sizeof(entry[0]), &row,
-              sizeof(row));
+  entry[6] = static_cast<std::int16_t>(row & 0xffff);
+  entry[7] = static_cast<std::int16_t>(row >> 16);
   return entry;
 }
 
 StillCells::Row StillCells::rowOf(const Entry& entry) {
-  Row row;
-  std::memcpy(&row, reinterpret_cast<const char*>(&entry) + kHalfAxesLanes * sizeof(entry[0]),
-              sizeof(row));
-  return row;
+  return static_cast<std::uint16_t>(entry[6]) | Row{static_cast<std::uint16_t>(entry[7])} << 16;
 }
 
 // ---- cells -------------------------------------------------------------------------------------
@@ -109,18 +119,14 @@ void StillCells::forEachCell(std::size_t level, const CellRange& range, Visit&& 
 
 void StillCells::gatherFrom(const CellData& cell, const FinePlaces& reach, const CellRange& range,
                             std::vector<Row>& rows) const {
-  const Entry reached = lanesOf(reach, cell.at);
-  Entry begunBefore{};  // lanes that are to be no less than 0, lest the box is told twice
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (cell.at[axis] != range.low[axis]) begunBefore[axis + 3] = -1;
+  const Entry most = lanesOf(reach, cell.at);
+  constexpr std::int16_t kAny = std::numeric_limits<std::int16_t>::min();
+  Entry least = {kAny, kAny, kAny, kAny, kAny, kAny, kAny, kAny};
+  for (std::size_t axis = 0; axis < 3; ++axis) {  // lest the box is told twice
+    if (cell.at[axis] != range.low[axis]) least[axis + 3] = 0;
   }
-  for (std::uint32_t e = 0; e < cell.count; ++e) {
-    const Entry& entry = cell.entries[e];
-    const Entry missed = (entry > reached) | ((entry < 0) & begunBefore);
-    Words words;
-    std::memcpy(&words, &missed, sizeof(words));
-    words &= kHalfAxesMask;
-    if ((words[0] | words[1]) == 0) rows.push_back(rowOf(entry));
+  for (const Entry *entry = cell.entries, *end = entry + cell.count; entry != end; ++entry) {
+    if (noneOf((*entry > most) | (*entry < least))) rows.push_back(rowOf(*entry));
   }
 }
 
