@@ -263,13 +263,14 @@ VertexPair ExactDifference::leastAlong(const ExactPoint& direction, VertexPair& 
     const WideVec towards = approximate.cast<Wide>() * static_cast<Wide>(sign);
     const Vec3 local = body.bounds.bodyFromWorld<Wide>(towards).cast<double>();
     const double length = approximate.lpNorm<1>() + local.lpNorm<1>();
-    forEachFarthest(body.bounds, local, supportSlack(body.bounds, length), climbed,
-                    [&](std::uint32_t i) {
-                      const Integer along = sign * dot(direction, body.vertex(i, scale_));
-                      if (best && along <= most) return;
-                      best = i;
-                      most = along;
-                    });
+    const double slack = supportSlack(body.bounds, length);
+    const Summit summit = climb(body.bounds, local, slack, climbed);
+    forEachFarthest(body.bounds, local, slack, summit, [&](std::uint32_t i) {
+      const Integer along = sign * dot(direction, body.vertex(i, scale_));
+      if (best && along <= most) return;
+      best = i;
+      most = along;
+    });
     climbed = *best;
     return *best;
   };

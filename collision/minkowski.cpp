@@ -16,20 +16,48 @@ struct Support {
   Wide along = 0;
 };
 
-Support farthest(const PlacedBody& placed, const WideVec& direction, std::uint32_t& hint) {
+Support farthest(const PlacedBody& placed, const WideVec& direction, const Vec3& rounded,
+                 double length, const Summit& summit) {
   Support support;
   bool first = true;
-  const Vec3 rounded = direction.cast<double>();
-  forEachFarthest(
-      placed, rounded, supportSlack(placed, rounded.lpNorm<1>()), hint, [&](std::uint32_t i) {
-        const Vec3& p = placed.body->vertices[i];
-        const Wide along = direction.x() * p.x() + direction.y() * p.y() + direction.z() * p.z();
-        if (!first && along <= support.along) return;
-        support = {i, along};
-        first = false;
-      });
-  hint = support.vertex;
+  forEachFarthest(placed, rounded, supportSlack(placed, length), summit, [&](std::uint32_t i) {
+    const Vec3& p = placed.body->vertices[i];
+    const Wide along = direction.x() * p.x() + direction.y() * p.y() + direction.z() * p.z();
+    if (!first && along <= support.along) return;
+    support = {i, along};
+    first = false;
+  });
   return support;
+}
+
+/// `rounded`: `direction` in doubles, `length` at least that of both.
+Least leastFrom(const MinkowskiDifference& difference, const WideVec& direction,
+                const Vec3& rounded, double length, const Summits& summits) {
+  const PlacedBody &a = difference.a, &b = difference.b;
+  Least least;
+  if (summits.alone()) {
+    least.pair = summits.pair();
+    least.along = direction.dot(difference(least.pair));
+  } else {
+    const Support ofA = farthest(a, a.bodyFromWorld<Wide>(direction),
+                                 a.bodyFromWorld<double>(rounded), length, summits.a);
+    const Support ofB = farthest(b, b.bodyFromWorld<Wide>(-direction),
+                                 b.bodyFromWorld<double>(-rounded), length, summits.b);
+    least.pair = {ofA.vertex, ofB.vertex};
+    least.along = direction.dot(difference.shift) - ofB.along - ofA.along;
+  }
+  // Either way at most 18 products and sums deep for each coordinate of a vector of at most reach:
+  // the point (or the direction) is off by 6 eta a coordinate, a product of two vectors by 3 eta
+  // |d| reach more by Cauchy; |d|_1 <= sqrt(3) |d|.
+  least.bound = least.along - 16 * kWideUnit * Wide{length} * difference.reach;
+  return least;
+}
+
+/// Of the Frobenius norm: sqrt(x) <= (x / c + c) / 2 for any c, and equal at x = c^2, which is 3
+/// for a rotation.
+double normBound(const Mat3& rotation) {
+  constexpr double c = 1.7320508075688774;
+  return rotation.squaredNorm() * (0.5 / c) + 0.5 * c;
 }
 
 /// Into the range of doubles, where products neither over- nor underflow.
@@ -41,33 +69,51 @@ bool needsScaling(Wide length) {
 
 PlacedBody::PlacedBody(const ConvexBody& placed)
     : body(&placed),
-      size(greatestRadius(placed) * (placed.rotation ? placed.rotation->norm() : 1) *
-           (1 + 16 * kUnit)) {}
+      size(greatestRadius(placed) * (placed.rotation ? normBound(*placed.rotation) : 1) *
+           (1 + 32 * kUnit)) {}
 
 MinkowskiDifference::MinkowskiDifference(const ConvexBody& bodyA, const ConvexBody& bodyB)
     : a(bodyA),
       b(bodyB),
       shift(bodyB.translation.cast<Wide>() - bodyA.translation.cast<Wide>()),
-      reach((a.size + b.size + static_cast<double>(shift.cwiseAbs().maxCoeff())) *
-            (1 + 8 * kUnit)) {}
+      roundedShift(bodyB.translation - bodyA.translation),
+      reach((a.size + b.size + roundedShift.cwiseAbs().maxCoeff()) * (1 + 8 * kUnit)) {}
+
+Summits climb(const MinkowskiDifference& difference, const Vec3& direction, double length,
+              VertexPair hint) {
+  const PlacedBody &a = difference.a, &b = difference.b;
+  return {climb(a, a.bodyFromWorld<double>(direction), supportSlack(a, length), hint.a),
+          climb(b, b.bodyFromWorld<double>(-direction), supportSlack(b, length), hint.b)};
+}
+
+Along alongOf(const MinkowskiDifference& difference, const Vec3& direction, double length,
+              const Summits& summits) {
+  Along along{direction.dot(difference.roundedShift) - summits.b.along - summits.a.along};
+  // Each product is off by half a slack, 16u length reach together; the shift's own rounding, its
+  // product and the two differences by less than as much again.
+  if (summits.alone()) along.bound = along.value - 40 * kUnit * length * difference.reach;
+  return along;
+}
+
+Least leastAlong(const MinkowskiDifference& difference, const Vec3& direction, double length,
+                 const Summits& summits) {
+  return leastFrom(difference, direction.cast<Wide>(), direction, length, summits);
+}
 
 Least leastAlong(const MinkowskiDifference& difference, const WideVec& direction, Wide length,
                  VertexPair& hint) {
   if (needsScaling(length)) {
     const Wide scale = 1 / length;
-    Least least = leastAlong(difference, direction * scale, 1, hint);
+    Least least = leastAlong(difference, WideVec(direction * scale), Wide{1}, hint);
     least.along *= length;
     least.bound = (least.bound - std::abs(least.bound) * 8 * kWideUnit) * length;
     return least;
   }
-  const Support ofA = farthest(difference.a, difference.a.bodyFromWorld<Wide>(direction), hint.a);
-  const Support ofB = farthest(difference.b, difference.b.bodyFromWorld<Wide>(-direction), hint.b);
-  Least least;
-  least.pair = {ofA.vertex, ofB.vertex};
-  least.along = direction.dot(difference.shift) - ofB.along - ofA.along;
-  // Each of three products of a direction and a vector: the vector's own error, and 3 eta |d| reach
-  // by Cauchy; |d|_1 <= sqrt(3) |d|; two differences of at most 3 |d| reach.
-  least.bound = least.along - 16 * kWideUnit * length * difference.reach;
+  const Vec3 rounded = direction.cast<double>();
+  const double longer = static_cast<double>(length) * (1 + 8 * kUnit);
+  const Least least =
+      leastFrom(difference, direction, rounded, longer, climb(difference, rounded, longer, hint));
+  hint = least.pair;
   return least;
 }
 

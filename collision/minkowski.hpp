@@ -66,8 +66,9 @@ struct PlacedBody {
 
 struct MinkowskiDifference {
   PlacedBody a, b;
-  WideVec shift;  ///< t_B - t_A
-  double reach;   ///< bounds every |coordinate| of a point of B - A, with room
+  WideVec shift;      ///< t_B - t_A
+  Vec3 roundedShift;  ///< the same, in doubles
+  double reach;       ///< bounds every |coordinate| of a point of B - A, with room
 
   MinkowskiDifference(const ConvexBody& bodyA, const ConvexBody& bodyB);
 
@@ -75,12 +76,42 @@ struct MinkowskiDifference {
   WideVec pointB(std::uint32_t i) const { return b.turned<Wide>(i) + shift; }
   template <class Real>
   Eigen::Matrix<Real, 3, 1> point(VertexPair pair) const {
-    return b.turned<Real>(pair.b) + shift.cast<Real>() - a.turned<Real>(pair.a);
+    if constexpr (std::is_same_v<Real, double>) {
+      return b.turned<double>(pair.b) + roundedShift - a.turned<double>(pair.a);
+    } else {
+      return b.turned<Real>(pair.b) + shift - a.turned<Real>(pair.a);
+    }
   }
   WideVec operator()(VertexPair pair) const { return point<Wide>(pair); }
   /// Of any coordinate of a point in Wide.
   Wide pointError() const { return 6 * kWideUnit * reach; }
 };
+
+/// Where a climb in doubles ends: a vertex that no neighbour exceeds.
+struct Summit {
+  std::uint32_t vertex = 0;
+  double along = 0;
+  bool alone = false;  ///< proved: no other vertex is as far
+};
+
+/// The summits of A along a direction and of B against it: the point of B - A least along it, up to
+/// rounding.
+struct Summits {
+  Summit a, b;
+  VertexPair pair() const { return {a.vertex, b.vertex}; }
+  bool alone() const { return a.alone && b.alone; }
+};
+Summits climb(const MinkowskiDifference& difference, const Vec3& direction, double length,
+              VertexPair hint);
+
+/// direction . w of the summits in doubles, and what every w of B - A has at least: nothing where a
+/// summit is not alone.
+struct Along {
+  double value = 0;
+  double bound = -std::numeric_limits<double>::infinity();
+};
+Along alongOf(const MinkowskiDifference& difference, const Vec3& direction, double length,
+              const Summits& summits);
 
 /// The point of B - A least along a direction, and the proof.
 struct Least {
@@ -94,58 +125,74 @@ struct Least {
 Least leastAlong(const MinkowskiDifference& difference, const WideVec& direction, Wide length,
                  VertexPair& hint);
 
+/// The same for a direction of doubles whose summits are known, both as in climb() and in the range
+/// where products neither over- nor underflow.
+Least leastAlong(const MinkowskiDifference& difference, const Vec3& direction, double length,
+                 const Summits& summits);
+
+/// Climbs over the hull's edges from `start`, or looks at every vertex where there is no hull.
+/// `slack` as for forEachFarthest(): a vertex whose neighbours are all less by it is the farthest,
+/// since an exact ascent would go on from any other.
+inline Summit climb(const PlacedBody& placed, const Vec3& direction, double slack,
+                    std::uint32_t start) {
+  const std::span<const Vec3> vertices = placed.body->vertices;
+  const Hull* hull = placed.body->hull;
+  double second = -std::numeric_limits<double>::infinity();
+  if (!hull) {
+    Summit summit{0, direction.dot(vertices[0])};
+    for (std::uint32_t i = 1; i < vertices.size(); ++i) {
+      const double along = direction.dot(vertices[i]);
+      second = std::max(second, std::min(along, summit.along));
+      if (along > summit.along) summit = {i, along};
+    }
+    summit.alone = second < summit.along - slack;
+    return summit;
+  }
+  Summit summit{start, direction.dot(vertices[start])};
+  while (true) {  // ends: `along` grows, and there are finitely many vertices
+    second = -std::numeric_limits<double>::infinity();
+    for (const std::uint32_t neighbour : hull->neighboursOf(summit.vertex)) {
+      const double along = direction.dot(vertices[neighbour]);
+      start = along > second ? neighbour : start;  // no branch: no guess of it to miss
+      second = std::max(second, along);
+    }
+    if (!(second > summit.along)) break;
+    summit.vertex = start, summit.along = second;
+  }
+  summit.alone = second < summit.along - slack;
+  return summit;
+}
+
 /// Calls visit(i) for vertices of `placed` among which is, exactly, one that is farthest along a
-/// direction; `direction` is that one in the body's frame, rounded to double. `hint` is where the
-/// climb starts, and the best vertex afterwards.
+/// direction; `direction` is that one in the body's frame, rounded to double, `summit` that of a
+/// climb along it.
 ///
-/// Each product `direction . vertex` is off by less than `slack`/2 (supportSlack). Climb to a
-/// vertex that no neighbour exceeds in doubles. From there an exact ascent over the edges leads to
-/// the exact maximum (convexity); all its vertices have, in doubles, at least the value of the
-/// start less `slack`. So visiting all vertices that are linked to the start by such ones is
-/// enough.
+/// Each product `direction . vertex` is off by less than `slack`/2 (supportSlack). From the summit
+/// an exact ascent over the edges leads to the exact maximum (convexity); all its vertices have, in
+/// doubles, at least the value of the summit less `slack`. So visiting all vertices that are linked
+/// to the summit by such ones is enough.
 template <class Visit>
 void forEachFarthest(const PlacedBody& placed, const Vec3& direction, double slack,
-                     std::uint32_t& hint, Visit visit) {
+                     const Summit& summit, Visit visit) {
+  if (summit.alone) return visit(summit.vertex);
+
   const std::span<const Vec3> vertices = placed.body->vertices;
-  const auto visitAllAbove = [&](double least) {
+  const double least = summit.along - slack;
+  const auto visitAllAbove = [&] {
     for (std::uint32_t i = 0; i < vertices.size(); ++i)
       if (direction.dot(vertices[i]) >= least) visit(i);
   };
   const Hull* hull = placed.body->hull;
-  if (!hull) {
-    double most = -std::numeric_limits<double>::infinity();
-    for (std::uint32_t i = 0; i < vertices.size(); ++i) {
-      const double along = direction.dot(vertices[i]);
-      if (along > most) most = along, hint = i;
-    }
-    visitAllAbove(most - slack);
-    return;
-  }
-
-  double most = direction.dot(vertices[hint]);
-  bool alone = false;
-  for (bool climbing = true; climbing;) {  // ends: `most` grows, and there are finitely many
-    climbing = false;
-    alone = true;
-    std::uint32_t next = hint;
-    for (const std::uint32_t neighbour : hull->neighboursOf(hint)) {
-      const double along = direction.dot(vertices[neighbour]);
-      if (along >= most - slack) alone = false;
-      if (along > most) most = along, next = neighbour, climbing = true;
-    }
-    hint = next;
-  }
-  if (alone) return visit(hint);
-
+  if (!hull) return visitAllAbove();
   std::array<std::uint32_t, 48> reached;  // enough, except on nearly flat caps
-  reached[0] = hint;
+  reached[0] = summit.vertex;
   std::size_t count = 1;
   for (std::size_t k = 0; k < count; ++k) {
     for (const std::uint32_t neighbour : hull->neighboursOf(reached[k])) {
-      if (direction.dot(vertices[neighbour]) < most - slack) continue;
+      if (direction.dot(vertices[neighbour]) < least) continue;
       if (std::find(reached.begin(), reached.begin() + count, neighbour) != reached.begin() + count)
         continue;
-      if (count == reached.size()) return visitAllAbove(most - slack);
+      if (count == reached.size()) return visitAllAbove();
       reached[count++] = neighbour;
     }
   }

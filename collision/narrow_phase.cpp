@@ -30,8 +30,10 @@
 namespace enfilade::collision {
 namespace {
 
-constexpr Wide kMostError = 15;      // units of rounding of the largest coordinate; one to spare
-constexpr Wide kFine = 0x1p-32L;     // of the distance: see describeSeparation
+constexpr Wide kMostError = 15;   // units of rounding of the largest coordinate; one to spare
+constexpr Wide kFine = 0x1p-32L;  // of the distance: see describeSeparation
+/// At least that of a unit direction that is rounded a few times.
+constexpr double kUnitLength = 1 + 16 * kUnit;
 constexpr int kIterationBound = 96;  // about 10 are usual, from nothing; reaching it: the next step
 
 bool valid(const FeatureCache& cache, const ConvexBody& a, const ConvexBody& b) {
@@ -42,30 +44,63 @@ bool valid(const FeatureCache& cache, const ConvexBody& a, const ConvexBody& b) 
   return true;
 }
 
+/// A proved bound along a direction as one in metres: bound / |direction|, a little less. Since
+/// |d|^2 = 1 + e with |e| small, 1 / |d| >= 1 - e / 2.
+Wide metresAlong(Wide bound, const WideVec& direction) {
+  const Wide excess = direction.squaredNorm() - 1;
+  return bound * (1 - excess / 2) - std::abs(bound) * (8 * kWideUnit + excess * excess);
+}
+
 /// What the walk over features found.
 template <class Real>
 struct Search {
+  using Vec = Eigen::Matrix<Real, 3, 1>;
+
   Simplex<Real> simplex;
-  VertexPair hint;
-  Real distance = 0;                                    ///< of simplex.nearest
+  Real distance = 0;            ///< of simplex.nearest
+  Vec direction = Vec::Zero();  ///< of simplex.nearest, unit up to rounding; of the last support
+  VertexPair hint;              ///< where the next support may be found
+  Summits summits;              ///< of the last support, when the walk is in doubles
   Wide lower = -std::numeric_limits<Wide>::infinity();  ///< of the true distance, proved
+
+  /// False: the simplex holds the origin, or all but touches it.
+  bool hasDirection() const {
+    return !simplex.holdsOrigin && distance > std::numeric_limits<double>::min();
+  }
 };
 
-/// The features of last time, or a first support.
+/// The features of last time, or any point.
 template <class Real>
 void start(const MinkowskiDifference& difference, const FeatureCache& cache, Search<Real>& search) {
   if (valid(cache, *difference.a.body, *difference.b.body)) {
     for (int i = 0; i < cache.size; ++i) search.simplex.add(difference, cache.pairs[i]);
     search.hint = cache.pairs[0];
   } else {
-    const WideVec between = difference({0, 0});
-    const Wide apart = between.norm();
-    const WideVec towards = apart > 0 ? between : WideVec(WideVec::UnitY());
-    const Least first = leastAlong(difference, towards, apart > 0 ? apart : 1, search.hint);
-    search.simplex.add(difference, first.pair);
+    search.simplex.add(difference, {});
   }
   search.simplex.reduce(difference);
   search.distance = search.simplex.nearest.norm();
+}
+
+/// A point of B - A that is the least along search.direction, up to rounding.
+struct Support {
+  VertexPair pair;
+  Wide along;  ///< metres
+};
+
+/// Raises search.lower if the support proves more.
+Support findSupport(const MinkowskiDifference& difference, Search<double>& search) {
+  search.summits = climb(difference, search.direction, kUnitLength, search.hint);
+  search.hint = search.summits.pair();
+  const Along along = alongOf(difference, search.direction, kUnitLength, search.summits);
+  if (along.bound > 0) search.lower = std::max(search.lower, Wide{along.bound / kUnitLength});
+  return {search.hint, along.value};
+}
+Support findSupport(const MinkowskiDifference& difference, Search<Wide>& search) {
+  const Least least = leastAlong(difference, search.direction, kUnitLength, search.hint);
+  if (least.bound > 0)
+    search.lower = std::max(search.lower, metresAlong(least.bound, search.direction));
+  return {least.pair, least.along};
 }
 
 /// Ends at the closest features, at a tetrahedron that holds the origin, where the distance is
@@ -74,17 +109,14 @@ template <class Real>
 void walk(const MinkowskiDifference& difference, Wide limit, Search<Real>& search) {
   const Real enough = 24 * unitOf<Real>() * static_cast<Real>(difference.reach);
   Simplex<Real>& simplex = search.simplex;
-  for (int i = 0; i < kIterationBound; ++i) {
-    if (simplex.holdsOrigin || !(search.distance > 0)) return;
-    const Wide length = search.distance * (1 + 8 * unitOf<Real>());
-    const Least least =
-        leastAlong(difference, simplex.nearest.template cast<Wide>(), length, search.hint);
-    search.lower = std::max(search.lower, least.bound / length * (1 - 2 * kWideUnit));
-    if (search.lower > limit || search.distance - search.lower <= enough ||
-        simplex.holds(least.pair))
+  for (int i = 0; i < kIterationBound && search.hasDirection(); ++i) {
+    search.direction = simplex.nearest * (1 / search.distance);
+    const Support support = findSupport(difference, search);
+    if (search.lower > limit || search.distance - support.along <= enough ||
+        simplex.holds(support.pair))
       return;
     Simplex<Real> next = simplex;
-    next.add(difference, least.pair);
+    next.add(difference, support.pair);
     next.reduce(difference);
     const Real distance = next.nearest.norm();
     if (!next.holdsOrigin && !(distance < search.distance)) return;
@@ -94,79 +126,84 @@ void walk(const MinkowskiDifference& difference, Wide limit, Search<Real>& searc
 }
 
 template <class Real>
-void remember(const Simplex<Real>& simplex, FeatureCache& cache) {
+void remember(const Search<Real>& search, FeatureCache& cache) {
+  const Simplex<Real>& simplex = search.simplex;
   cache.size = simplex.size;
   for (int i = 0; i < simplex.size; ++i) cache.pairs[i] = simplex.pairs[i];
-  const Real length = simplex.nearest.norm();
-  if (!simplex.holdsOrigin && length > 0)
-    cache.axis = (simplex.nearest * (1 / length)).template cast<double>();
+  if (search.direction.squaredNorm() > 0) cache.axis = search.direction.template cast<double>();
 }
 
 Vec3 inWorld(const WideVec& point, const ConvexBody& a) {
   return (point + a.translation.cast<Wide>()).cast<double>();
 }
 
-/// The combination of one body's vertices by the simplex' weights, in its own frame, then turned:
-/// world axes, from the body's translation.
-template <class Real>
-WideVec combination(const Simplex<Real>& simplex, const PlacedBody& placed,
-                    std::uint32_t VertexPair::*vertex) {
-  Wide sum = simplex.weight[0];
-  const auto& vertices = placed.body->vertices;
-  WideVec point = vertices[simplex.pairs[0].*vertex].template cast<Wide>() * sum;
-  for (int i = 1; i < simplex.size; ++i) {
-    const Wide weight = simplex.weight[i];
-    point += vertices[simplex.pairs[i].*vertex].template cast<Wide>() * weight;
-    sum += weight;
-  }
-  point *= 1 / sum;
-  return placed.turned<Wide>(point.x(), point.y(), point.z());
+double largestOf(const WideVec& v) {
+  return v.cast<double>().cwiseAbs().maxCoeff();
 }
 
-/// The points of A and B that the simplex' weights name: world axes, from t_A. Rigorous, since any
-/// weights >= 0 name points of the bodies.
+/// The points of A and B that the simplex' weights name: world axes, from t_A.
 struct Combination {
-  WideVec onA, onB;
-  Wide
-      largest;  ///< a lower bound of the largest |coordinate|: both points lie in the bodies' hulls
+  WideVec onA, onB, aToB;
+  double largest;  ///< of the |coordinates|, from below: both points lie in the bodies' hulls
 
   template <class Real>
   Combination(const MinkowskiDifference& difference, const Simplex<Real>& simplex)
-      : onA(combination(simplex, difference.a, &VertexPair::a)),
-        onB(combination(simplex, difference.b, &VertexPair::b) + difference.shift),
-        largest(std::max({onA.cwiseAbs().maxCoeff(), onB.cwiseAbs().maxCoeff(),
-                          difference.shift.cwiseAbs().maxCoeff()})) {}
+      : onA(pointOn(simplex, difference.a, &VertexPair::a)),
+        onB(pointOn(simplex, difference.b, &VertexPair::b) + difference.shift) {
+    aToB = onB - onA;
+    largest = (1 - 4 * kUnit) * std::max({largestOf(onA), largestOf(onB),
+                                          difference.roundedShift.cwiseAbs().maxCoeff()});
+  }
 };
 
-/// Fills in what holds of separated bodies; false when the bound is not good enough.
-bool describeSeparation(const MinkowskiDifference& difference, const Combination& at, Wide lower,
-                        Decision& decision) {
-  const WideVec aToB = at.onB - at.onA;
-  const Wide length = aToB.norm();
+/// The best lower bound of the distance along the direction that the walk ended with.
+Wide proveLower(const MinkowskiDifference& difference, const Search<double>& search) {
+  if (!search.hasDirection()) return 0;
+  const Least least = leastAlong(difference, search.direction, kUnitLength, search.summits);
+  return metresAlong(least.bound, search.direction.cast<Wide>());
+}
+Wide proveLower(const MinkowskiDifference&, const Search<Wide>& search) {
+  return search.lower;
+}
+
+enum class Outcome : std::uint8_t {
+  open,    ///< not proved, or not to the bound that Decision promises
+  beyond,  ///< proved: farther apart than the limit
+  decided
+};
+
+/// Fills in what holds of separated bodies that are proved to be `lower` apart.
+Outcome describeSeparation(const MinkowskiDifference& difference, const Combination& at, Wide lower,
+                           Decision& decision) {
   // Weights and sums round by less than 8 eta reach a coordinate besides the points' own error.
+  const Wide length = at.aToB.norm();
   const Wide upper = length + 4 * difference.pointError();
   decision.verdict = Verdict::separated;
   decision.distance = static_cast<double>(std::max(length, lower));
   const Wide distance = decision.distance;
   const Wide bound = std::max(upper - distance, distance - lower);
   decision.errorBound = static_cast<double>(bound) * (1 + 4 * kUnit);
-  decision.normal = (aToB * (1 / length)).cast<double>();
+  decision.normal = at.aToB.cast<double>() / decision.distance;
   // While the bounds differ by a small part of the distance, it is good to the square of that part.
-  return bound <= kUnit * at.largest * (bound <= kFine * distance ? kMostError : 1);
+  const Wide units = bound <= kFine * distance ? kMostError : 1;
+  return bound <= units * kUnit * at.largest ? Outcome::decided : Outcome::open;
 }
 
-/// True: the verdict is proved, and distance and points are good enough.
+/// Fills in what the features that the walk ended at prove.
 template <class Real>
-bool decided(const MinkowskiDifference& difference, const Search<Real>& search,
-             Decision& decision) {
-  if (!search.simplex.holdsOrigin && !(search.lower > 0)) return false;
+Outcome conclude(const MinkowskiDifference& difference, const Search<Real>& search, double limit,
+                 Decision& decision) {
+  const bool inside = search.simplex.holdsOrigin;
+  if (search.lower > limit) return Outcome::beyond;
+  const Wide lower = inside ? 0 : proveLower(difference, search);
+  if (lower > limit) return Outcome::beyond;
+  if (!inside && !(lower > 0)) return Outcome::open;
   const Combination at(difference, search.simplex);
   decision.pointA = inWorld(at.onA, *difference.a.body);
   decision.pointB = inWorld(at.onB, *difference.a.body);
-  if (!search.simplex.holdsOrigin)
-    return describeSeparation(difference, at, search.lower, decision);
+  if (!inside) return describeSeparation(difference, at, lower, decision);
   decision.verdict = Verdict::penetrating;
-  return (at.onB - at.onA).cwiseAbs().maxCoeff() <= 2 * kUnit * at.largest;
+  return largestOf(at.aToB) <= 2 * kUnit * at.largest ? Outcome::decided : Outcome::open;
 }
 
 Decision decideExactly(const MinkowskiDifference& difference, FeatureCache& cache) {
@@ -183,26 +220,27 @@ Decision decideExactly(const MinkowskiDifference& difference, FeatureCache& cach
   return decision;
 }
 
+/// The walk in Real from the cached features, and what it proves.
+template <class Real>
+Outcome search(const MinkowskiDifference& difference, double limit, FeatureCache& cache,
+               Decision& decision) {
+  Search<Real> search;
+  start(difference, cache, search);
+  walk(difference, limit, search);
+  remember(search, cache);
+  return conclude(difference, search, limit, decision);
+}
+
 }  // namespace
 
 std::optional<Decision> decideWithin(const ConvexBody& a, const ConvexBody& b, double limit,
                                      FeatureCache& cache) {
   const MinkowskiDifference difference(a, b);
   Decision decision;
-  Search<double> quick;
-  start(difference, cache, quick);
-  walk(difference, limit, quick);
-  remember(quick.simplex, cache);
-  if (quick.lower > limit) return std::nullopt;
-  if (decided(difference, quick, decision)) return decision;
-
-  Search<Wide> search;
-  start(difference, cache, search);
-  walk(difference, limit, search);
-  remember(search.simplex, cache);
-  if (search.lower > limit) return std::nullopt;
-  if (decided(difference, search, decision)) return decision;
-  return decideExactly(difference, cache);
+  Outcome outcome = search<double>(difference, limit, cache, decision);
+  if (outcome == Outcome::open) outcome = search<Wide>(difference, limit, cache, decision);
+  if (outcome == Outcome::beyond) return std::nullopt;
+  return outcome == Outcome::decided ? decision : decideExactly(difference, cache);
 }
 
 Decision decide(const ConvexBody& a, const ConvexBody& b, FeatureCache& cache) {

@@ -1,12 +1,15 @@
 // The expanding polytope (van den Bergen 2001), certified.
 // Steps
 //  1. A polytope of points of M = B - A around the origin: last tick's, where it still surrounds
-//     the origin, else the tetrahedron that proved the penetration.
+//     the origin, else the tetrahedron that proved the penetration, else supports around the
+//     simplex that the origin lies on.
 //  2. Its facet nearest the origin, and the support of M along that facet's normal. The plane of
-//  the
-//     support bounds the depth from above: moving by the support's distance parts the bodies.
+//     the support bounds the depth from above: moving by the support's distance parts the bodies.
 //  3. The facet bounds it from below (see the proof). Where both meet, that is the depth; else the
 //     support joins the polytope, in place of the facets that it sees.
+//  4. This goes in doubles. Where the bounds seem to meet, the nearest facet, its support and every
+//     facet that might be nearer than it are looked at again in extended precision: the proof.
+//     Where doubles do not lead there, as among slivers, all of it goes in extended precision.
 // Proof of the lower bound: the facets form a closed surface, and seen from the origin each is
 // turned the same way (its determinant is positive, beyond rounding). So the surface winds around
 // the origin at least once, and every ray from the origin meets a facet, not before the distance
@@ -18,113 +21,190 @@
 
 #include <algorithm>
 
-#include "collision/minkowski.hpp"
+#include "collision/simplex.hpp"
 
 namespace enfilade::collision {
 namespace {
 
-constexpr int kExpansionBound = 256;         // facets of M that may be tried; 10 to 30 are usual
+constexpr std::size_t kMostCorners = 256;    // of a polytope; 10 to 30 are usual
 constexpr std::size_t kMostRemembered = 40;  // corners; a polytope grown larger is begun anew
-constexpr Wide kBoundsMeet = 1e-12L;         // relative: upper and lower bound of the depth
+constexpr double kBoundsMeet = 1e-12;        // relative: upper and lower bound of the depth
 
+template <class Real>
 struct Facet {
   DepthCache::Facet corners;
-  WideVec normal;    ///< outward, any length
-  Wide determinant;  ///< of the corners; normal . corner of each
-  Wide distance;     ///< of the plane from the origin
+  Eigen::Matrix<Real, 3, 1> normal;  ///< outward, any length
+  Real offset;                       ///< the least normal . corner
+  Real nearness;                     ///< (offset / |normal|)^2, squared metres
 };
 
-struct Polytope {
-  const MinkowskiDifference& difference;
-  std::vector<VertexPair> pairs;
-  std::vector<WideVec> points;
-  std::vector<Facet> facets;
+template <class Real>
+Facet<Real> facetOf(const DepthCache::Facet& corners, const Eigen::Matrix<Real, 3, 1>& a,
+                    const Eigen::Matrix<Real, 3, 1>& b, const Eigen::Matrix<Real, 3, 1>& c) {
+  const Eigen::Matrix<Real, 3, 1> normal = (b - a).cross(c - a);
+  const Real offset = std::min(std::min(normal.dot(a), normal.dot(b)), normal.dot(c));
+  return {corners, normal, offset, offset * offset / normal.squaredNorm()};
+}
 
-  /// Of a facet's determinant; simplex.cpp has the sum.
-  Wide determinantError() const {
-    const Wide reach = difference.reach;
-    return 256 * kWideUnit * reach * reach * reach;
+/// How much nearer than sqrt(nearness) a facet may be, in metres. Whatever its normal n was rounded
+/// to: each of its points is a combination of its corners, so n . point is at least the least
+/// n . corner; a corner is off by 8u reach a coordinate and the product by 3u |n| reach more.
+template <class Real>
+Real facetError(double reach) {
+  return 24 * unitOf<Real>() * static_cast<Real>(reach);
+}
+
+template <class Real>
+struct Polytope {
+  using Vec = Eigen::Matrix<Real, 3, 1>;
+
+  const MinkowskiDifference& difference;
+  Real leastDeterminant;  ///< proves that three points are turned as their determinant says
+  std::array<VertexPair, kMostCorners> pairs;
+  std::array<Vec, kMostCorners> points;
+  std::array<Facet<Real>, 2 * kMostCorners> facets;
+  std::size_t corners = 0, facetCount = 0;
+
+  explicit Polytope(const MinkowskiDifference& of) : difference(of) {
+    const Real reach = of.reach;
+    // Nine entries off by at most 8u reach, with cofactors of at most 2 reach^2, and as much again
+    // for rounding the product of edges of up to 2 reach.
+    leastDeterminant = 512 * unitOf<Real>() * reach * reach * reach;
   }
-  void addPoint(VertexPair pair) {
-    pairs.push_back(pair);
-    points.push_back(difference(pair));
+  std::span<Facet<Real>> all() { return {facets.data(), facetCount}; }
+  bool holds(VertexPair pair) const {
+    return std::find(pairs.begin(), pairs.begin() + corners, pair) != pairs.begin() + corners;
+  }
+  std::uint16_t addCorner(VertexPair pair) {
+    pairs[corners] = pair;
+    points[corners] = difference.point<Real>(pair);
+    return static_cast<std::uint16_t>(corners++);
   }
   /// False, and nothing added, when the facet is not proved to face away from the origin.
-  bool addFacet(const DepthCache::Facet& corners) {
-    const WideVec &a = points[corners[0]], &b = points[corners[1]], &c = points[corners[2]];
-    const WideVec normal = (b - a).cross(c - a);
-    const Wide determinant = a.dot(b.cross(c));
-    if (!(determinant > determinantError())) return false;
-    facets.push_back({corners, normal, determinant, determinant / normal.norm()});
+  bool addFacet(const DepthCache::Facet& of) {
+    const Facet<Real> facet = facetOf<Real>(of, points[of[0]], points[of[1]], points[of[2]]);
+    if (!(facet.offset > leastDeterminant) || facetCount == facets.size()) return false;
+    facets[facetCount++] = facet;
     return true;
   }
 };
 
-bool restore(const DepthCache& cache, Polytope& polytope) {
+// ---- a polytope to start from ------------------------------------------------------------------
+
+template <class Real>
+bool restore(const DepthCache& cache, Polytope<Real>& polytope) {
+  const MinkowskiDifference& difference = polytope.difference;
   if (cache.facets.empty() || cache.vertices.size() > kMostRemembered) return false;
   for (const VertexPair& pair : cache.vertices) {
-    if (pair.a >= polytope.difference.a.vertexCount() ||
-        pair.b >= polytope.difference.b.vertexCount())
-      return false;
-    polytope.addPoint(pair);
+    if (pair.a >= difference.a.vertexCount() || pair.b >= difference.b.vertexCount()) return false;
+    polytope.addCorner(pair);
   }
-  for (const DepthCache::Facet& facet : cache.facets)
-    if (!polytope.addFacet(facet)) return false;
+  return std::all_of(cache.facets.begin(), cache.facets.end(),
+                     [&](const DepthCache::Facet& facet) { return polytope.addFacet(facet); });
+}
+
+template <class Real>
+std::uint16_t addSupport(const Eigen::Matrix<Real, 3, 1>& outward, Polytope<Real>& polytope) {
+  VertexPair hint{};
+  const WideVec inward = -outward.template cast<Wide>();
+  leastAlong(polytope.difference, inward, inward.norm(), hint);
+  return polytope.addCorner(hint);
+}
+
+/// Two tips and a ring between them, counter-clockwise seen from the upper one.
+template <class Real>
+bool addBipyramid(std::span<const std::uint16_t> ring, std::uint16_t upper, std::uint16_t lower,
+                  Polytope<Real>& polytope) {
+  for (std::size_t k = 0; k < ring.size(); ++k) {
+    const std::uint16_t from = ring[k], to = ring[(k + 1) % ring.size()];
+    if (!polytope.addFacet({from, to, upper}) || !polytope.addFacet({to, from, lower}))
+      return false;
+  }
   return true;
 }
 
-bool startFromTetrahedron(const FeatureCache& decided, Polytope& polytope) {
-  polytope.pairs.clear();
-  polytope.points.clear();
-  polytope.facets.clear();
-  if (decided.size != 4) return false;
-  for (const VertexPair& pair : decided.pairs) polytope.addPoint(pair);
+/// The simplex that decided, with supports on the sides that it is flat on.
+template <class Real>
+bool surround(const FeatureCache& decided, Polytope<Real>& polytope) {
+  using Vec = Eigen::Matrix<Real, 3, 1>;
+  for (int i = 0; i < decided.size; ++i) polytope.addCorner(decided.pairs[i]);
   const auto& p = polytope.points;
-  const bool turned = (p[1] - p[0]).dot((p[2] - p[0]).cross(p[3] - p[0])) < 0;
-  if (turned) {
-    std::swap(polytope.points[2], polytope.points[3]);
-    std::swap(polytope.pairs[2], polytope.pairs[3]);
+  if (decided.size == 4) {
+    const bool turned = (p[1] - p[0]).dot((p[2] - p[0]).cross(p[3] - p[0])) < 0;
+    const std::uint16_t second = turned ? 2 : 1, third = turned ? 1 : 2;
+    return polytope.addFacet({0, third, second}) && polytope.addFacet({0, second, 3}) &&
+           polytope.addFacet({0, 3, third}) && polytope.addFacet({second, third, 3});
   }
-  return polytope.addFacet({0, 2, 1}) && polytope.addFacet({0, 1, 3}) &&
-         polytope.addFacet({0, 3, 2}) && polytope.addFacet({1, 2, 3});
+  if (decided.size == 3) {
+    const Vec normal = (p[1] - p[0]).cross(p[2] - p[0]);
+    const std::array<std::uint16_t, 3> ring{0, 1, 2};
+    const std::uint16_t upper = addSupport<Real>(normal, polytope);
+    return addBipyramid<Real>(ring, upper, addSupport<Real>(-normal, polytope), polytope);
+  }
+  if (decided.size == 2) {
+    const Vec along = p[1] - p[0];
+    const Vec side = along.unitOrthogonal() * along.norm();
+    const Vec other = along.cross(side) / along.norm() * Real(0.8660254037844386);
+    std::array<std::uint16_t, 3> ring{};
+    ring[0] = addSupport<Real>(side, polytope);
+    ring[1] = addSupport<Real>(other - side / 2, polytope);
+    ring[2] = addSupport<Real>(-other - side / 2, polytope);
+    return addBipyramid<Real>(ring, 1, 0, polytope);
+  }
+  return false;
 }
 
-std::size_t nearestFacet(const Polytope& polytope) {
-  std::size_t best = 0;
-  for (std::size_t i = 1; i < polytope.facets.size(); ++i)
-    if (polytope.facets[i].distance < polytope.facets[best].distance) best = i;
-  return best;
+/// Supports along the axes of the world, one by one.
+template <class Real>
+bool surroundByAxes(Polytope<Real>& polytope) {
+  using Vec = Eigen::Matrix<Real, 3, 1>;
+  std::array<std::uint16_t, 6> tips{};
+  for (int k = 0; k < 6; ++k)
+    tips[k] =
+        addSupport<Real>(k % 2 == 0 ? Vec(Vec::Unit(k / 2)) : Vec(-Vec::Unit(k / 2)), polytope);
+  const std::array<std::uint16_t, 4> ring{tips[0], tips[2], tips[1], tips[3]};
+  return addBipyramid<Real>(ring, tips[4], tips[5], polytope);
 }
+
+// ---- its expansion -----------------------------------------------------------------------------
 
 using Edge = std::array<std::uint16_t, 2>;
 
-/// Takes away the facets that see `point`, and returns the rim of the hole, each edge as the facet
-/// that went had it.
-std::vector<Edge> openTowards(const WideVec& point, Polytope& polytope) {
-  std::vector<Edge> rim;
-  const auto toggle = [&](std::uint16_t from, std::uint16_t to) {
-    const auto twin = std::find(rim.begin(), rim.end(), Edge{to, from});
-    if (twin != rim.end()) {
-      rim.erase(twin);
-    } else {
-      rim.push_back({from, to});
-    }
-  };
-  std::erase_if(polytope.facets, [&](const Facet& facet) {
-    if (facet.normal.dot(point) <= facet.normal.dot(polytope.points[facet.corners[0]]))
-      return false;
-    for (int k = 0; k < 3; ++k) toggle(facet.corners[k], facet.corners[(k + 1) % 3]);
-    return true;
-  });
-  return rim;
-}
+/// The rim of a hole, each edge as the facet that went had it.
+struct Rim {
+  std::array<Edge, 6 * kMostCorners> edges;  // all edges of all facets
+  std::size_t count = 0;
 
-/// False when the polytope could not be grown with proof; it is then of no more use.
-bool expand(Polytope& polytope, VertexPair pair) {
-  polytope.addPoint(pair);
-  const auto added = static_cast<std::uint16_t>(polytope.points.size() - 1);
-  for (const Edge& edge : openTowards(polytope.points.back(), polytope))
-    if (!polytope.addFacet({edge[0], edge[1], added})) return false;
+  void toggle(std::uint16_t from, std::uint16_t to) {
+    const auto end = edges.begin() + count;
+    const auto twin = std::find(edges.begin(), end, Edge{to, from});
+    if (twin != end) {
+      *twin = edges[--count];
+    } else {
+      edges[count++] = {from, to};
+    }
+  }
+};
+
+/// Puts a point in place of the facets that it sees. False when the polytope could not be grown
+/// with proof; it is then of no more use.
+template <class Real>
+bool expand(VertexPair pair, Polytope<Real>& polytope) {
+  if (polytope.corners == kMostCorners) return false;
+  const std::uint16_t added = polytope.addCorner(pair);
+  Rim rim;
+  std::size_t kept = 0;
+  for (const Facet<Real>& facet : polytope.all()) {
+    const auto& corner = polytope.points[facet.corners[0]];
+    if (facet.normal.dot(polytope.points[added] - corner) > 0) {
+      for (int k = 0; k < 3; ++k) rim.toggle(facet.corners[k], facet.corners[(k + 1) % 3]);
+    } else {
+      polytope.facets[kept++] = facet;
+    }
+  }
+  polytope.facetCount = kept;
+  for (std::size_t k = 0; k < rim.count; ++k)
+    if (!polytope.addFacet({rim.edges[k][0], rim.edges[k][1], added})) return false;
   return true;
 }
 
@@ -133,40 +213,97 @@ struct Bounds {
   Wide lower = 0;
   Wide upper = std::numeric_limits<Wide>::infinity();
   WideVec direction = WideVec::UnitY();  ///< outward, any length
+  VertexPair support;                    ///< the farthest along it
+  std::array<VertexPair, 3> facet{};     ///< the corners of the nearest facet, if there is one
 };
 
-/// M's extent along `direction` bounds the depth; returns the support.
-VertexPair boundAlong(const MinkowskiDifference& difference, const WideVec& direction,
-                      VertexPair& hint, Bounds& bounds) {
+/// M's extent along `direction` bounds the depth.
+void boundAlong(const MinkowskiDifference& difference, const WideVec& direction, VertexPair hint,
+                Bounds& bounds) {
   const Wide length = direction.norm();
   const Least least = leastAlong(difference, -direction, length, hint);
   const Wide upper = -least.bound / length * (1 + 8 * kWideUnit);
-  if (upper < bounds.upper) {
-    bounds.upper = upper;
-    bounds.direction = direction;
+  if (!(upper < bounds.upper)) return;
+  bounds.upper = upper;
+  bounds.direction = direction;
+  bounds.support = least.pair;
+}
+
+/// In extended precision.
+template <class Real>
+Facet<Wide> sharpened(const Facet<Real>& facet, const Polytope<Real>& polytope) {
+  const auto& c = facet.corners;
+  const auto& pairs = polytope.pairs;
+  const MinkowskiDifference& difference = polytope.difference;
+  return facetOf<Wide>(c, difference(pairs[c[0]]), difference(pairs[c[1]]),
+                       difference(pairs[c[2]]));
+}
+
+/// What the polytope and a support along its nearest facet prove.
+template <class Real>
+Bounds prove(const Facet<Real>& nearest, Polytope<Real>& polytope) {
+  const double reach = polytope.difference.reach;
+  const Facet<Wide> sharp = sharpened(nearest, polytope);
+  Bounds bounds;
+  boundAlong(polytope.difference, sharp.normal, polytope.pairs[nearest.corners[0]], bounds);
+  for (int k = 0; k < 3; ++k) bounds.facet[k] = polytope.pairs[nearest.corners[k]];
+  Wide least = std::sqrt(sharp.nearness);
+  for (const Facet<Real>& facet : polytope.all()) {
+    const Wide clear = least + facetError<Real>(reach);
+    if (&facet == &nearest || facet.nearness * (1 - 8 * unitOf<Real>()) > clear * clear) continue;
+    least = std::min(least, std::sqrt(sharpened(facet, polytope).nearness));
   }
-  return least.pair;
+  bounds.lower = std::max(Wide{0}, least * (1 - 8 * kWideUnit) - facetError<Wide>(reach));
+  return bounds;
+}
+
+/// How far beyond the facet the farthest point of M lies, up to rounding, and which it is.
+struct Beyond {
+  VertexPair pair;
+  Wide metres;
+};
+Beyond beyond(const Facet<double>& facet, const Polytope<double>& polytope) {
+  const double length = facet.normal.norm();
+  const Vec3 inward = facet.normal * (-1 / length);
+  const Summits summits =
+      climb(polytope.difference, inward, 1 + 16 * kUnit, polytope.pairs[facet.corners[0]]);
+  const Along along = alongOf(polytope.difference, inward, 1, summits);
+  return {summits.pair(), -along.value - std::sqrt(facet.nearness)};
+}
+Beyond beyond(const Facet<Wide>& facet, const Polytope<Wide>& polytope) {
+  VertexPair hint = polytope.pairs[facet.corners[0]];
+  const Wide length = facet.normal.norm();
+  const Least least = leastAlong(polytope.difference, -facet.normal, length, hint);
+  return {least.pair, -least.along / length - std::sqrt(facet.nearness)};
+}
+
+bool meet(const Bounds& bounds, const MinkowskiDifference& difference) {
+  return bounds.upper - bounds.lower <= kBoundsMeet * bounds.lower + 16 * difference.pointError();
 }
 
 /// True: the bounds meet.
-bool expandUntilBoundsMeet(Polytope& polytope, Bounds& bounds) {
-  VertexPair hint = polytope.pairs[0];
-  for (int i = 0; i < kExpansionBound; ++i) {
-    const Facet& nearest = polytope.facets[nearestFacet(polytope)];
-    const Wide error = polytope.determinantError() / nearest.determinant + 8 * kWideUnit;
-    bounds.lower = std::max(bounds.lower, nearest.distance * (1 - error));
-    hint = polytope.pairs[nearest.corners[0]];
-    const VertexPair support = boundAlong(polytope.difference, nearest.normal, hint, bounds);
-    const Wide gap = bounds.upper - nearest.distance;
-    if (gap <= kBoundsMeet * nearest.distance + 16 * polytope.difference.pointError()) return true;
-    if (std::find(polytope.pairs.begin(), polytope.pairs.end(), support) != polytope.pairs.end())
-      return false;
-    if (!expand(polytope, support)) return false;
+template <class Real>
+bool expandUntilBoundsMeet(Polytope<Real>& polytope, Bounds& bounds) {
+  const Real little = 64 * unitOf<Real>() * static_cast<Real>(polytope.difference.reach);
+  while (true) {  // ends: each turn adds a corner
+    const Facet<Real>& nearest =
+        *std::min_element(polytope.all().begin(), polytope.all().end(),
+                          [](const auto& a, const auto& b) { return a.nearness < b.nearness; });
+    VertexPair next;
+    const Beyond farthest = beyond(nearest, polytope);
+    if (farthest.metres > little && !polytope.holds(farthest.pair)) {
+      next = farthest.pair;
+    } else {
+      bounds = prove(nearest, polytope);
+      if (meet(bounds, polytope.difference)) return true;
+      if (polytope.holds(bounds.support)) return false;
+      next = bounds.support;
+    }
+    if (!expand(next, polytope)) return false;
   }
-  return false;
 }
 
-/// For bodies that penetrate so little that no tetrahedron proves it: directions worth a try.
+/// For bodies that penetrate so little that no polytope proves it: directions worth a try.
 void boundBySomeAxes(const MinkowskiDifference& difference, const FeatureCache& decided,
                      Bounds& bounds) {
   std::vector<WideVec> axes{WideVec::UnitX(), WideVec::UnitY(), WideVec::UnitZ(),
@@ -177,49 +314,52 @@ void boundBySomeAxes(const MinkowskiDifference& difference, const FeatureCache& 
     for (std::size_t j = i + 1; j < points.size(); ++j)
       for (std::size_t k = j + 1; k < points.size(); ++k)
         axes.push_back((points[j] - points[i]).cross(points[k] - points[i]));
-  VertexPair hint = decided.pairs[0];
   for (const WideVec& axis : axes) {
     if (!(axis.squaredNorm() > 0)) continue;
-    boundAlong(difference, axis, hint, bounds);
-    boundAlong(difference, -axis, hint, bounds);
+    boundAlong(difference, axis, decided.pairs[0], bounds);
+    boundAlong(difference, -axis, decided.pairs[0], bounds);
   }
 }
 
-void remember(const Polytope& polytope, DepthCache& cache) {
-  cache.vertices = polytope.pairs;
+template <class Real>
+void remember(const Polytope<Real>& polytope, DepthCache& cache) {
+  cache.vertices.assign(polytope.pairs.begin(), polytope.pairs.begin() + polytope.corners);
   cache.facets.clear();
-  for (const Facet& facet : polytope.facets) cache.facets.push_back(facet.corners);
+  for (std::size_t k = 0; k < polytope.facetCount; ++k)
+    cache.facets.push_back(polytope.facets[k].corners);
+}
+
+/// From the first start that proves the depth, if any does.
+template <class Real>
+bool findDepth(const MinkowskiDifference& difference, const FeatureCache& decided,
+               DepthCache& cache, Bounds& bounds) {
+  Polytope<Real> polytope(difference);
+  const auto proves = [&](auto&& start) {
+    polytope.corners = polytope.facetCount = 0;
+    return start() && expandUntilBoundsMeet(polytope, bounds);
+  };
+  const bool proved = proves([&] { return restore(cache, polytope); }) ||
+                      proves([&] { return surround(decided, polytope); }) ||
+                      proves([&] { return surroundByAxes(polytope); });
+  if (proved) remember(polytope, cache);
+  return proved;
 }
 
 /// Where the features that are farthest along the normal meet: the deepest points.
-void describe(const MinkowskiDifference& difference, const Bounds& bounds, const Polytope& polytope,
-              Depth& depth) {
+void describe(const MinkowskiDifference& difference, const Bounds& bounds, Depth& depth) {
   depth.depth = static_cast<double>(bounds.upper);
   depth.errorBound = static_cast<double>(bounds.upper - std::min(bounds.lower, bounds.upper)) +
                      kUnit * depth.depth;
-  const WideVec normal = bounds.direction / bounds.direction.norm();
-  depth.normal = -normal.cast<double>();
-  WideVec onA = WideVec::Zero();
-  if (!polytope.facets.empty() && depth.global) {
-    const Facet& nearest = polytope.facets[nearestFacet(polytope)];
-    const auto& p = polytope.points;
-    const DepthCache::Facet& c = nearest.corners;
-    // Weights of the facet's point nearest the origin, by sub-areas, kept inside the facet.
-    const WideVec foot = nearest.distance / nearest.normal.norm() * nearest.normal;
-    std::array<Wide, 3> weight{};
-    Wide sum = 0;
-    for (int k = 0; k < 3; ++k) {
-      const WideVec &from = p[c[(k + 1) % 3]], &to = p[c[(k + 2) % 3]];
-      weight[k] = std::max(Wide{0}, (to - from).cross(foot - from).dot(nearest.normal));
-      sum += weight[k];
-    }
-    for (int k = 0; k < 3; ++k) onA += weight[k] / sum * difference.pointA(polytope.pairs[c[k]].a);
+  depth.normal = -(bounds.direction / bounds.direction.norm()).cast<double>();
+  Simplex<double> deepest;
+  if (depth.global && bounds.lower > 0) {
+    for (const VertexPair& pair : bounds.facet) deepest.add(difference, pair);
   } else {
-    VertexPair hint{};
-    onA = difference.pointA(leastAlong(difference, -normal, 1, hint).pair.a);
+    deepest.add(difference, bounds.support);
   }
-  const Vec3 origin = difference.a.body->translation;
-  depth.pointA = (onA + origin.cast<Wide>()).cast<double>();
+  deepest.reduce(difference);
+  const WideVec onA = pointOn(deepest, difference.a, &VertexPair::a);
+  depth.pointA = (onA + difference.a.body->translation.cast<Wide>()).cast<double>();
   depth.pointB = depth.pointA - depth.depth * depth.normal;
 }
 
@@ -228,20 +368,18 @@ void describe(const MinkowskiDifference& difference, const Bounds& bounds, const
 Depth penetrationDepth(const ConvexBody& a, const ConvexBody& b, const FeatureCache& decided,
                        DepthCache& cache) {
   const MinkowskiDifference difference(a, b);
-  Polytope polytope{difference, {}, {}, {}};
   Bounds bounds;
   Depth depth;
-  if (restore(cache, polytope) || startFromTetrahedron(decided, polytope)) {
-    depth.global = expandUntilBoundsMeet(polytope, bounds);
-    if (depth.global) remember(polytope, cache);
-  }
+  depth.global = findDepth<double>(difference, decided, cache, bounds) ||
+                 findDepth<Wide>(difference, decided, cache, bounds);
   if (!depth.global) {
     cache = {};
+    bounds = {};
     boundBySomeAxes(difference, decided, bounds);
     // A depth within rounding of nothing is known as well as any.
     depth.global = bounds.upper <= 16 * difference.pointError();
   }
-  describe(difference, bounds, polytope, depth);
+  describe(difference, bounds, depth);
   return depth;
 }
 

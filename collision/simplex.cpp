@@ -1,5 +1,7 @@
 // The nearest point of a segment, a triangle and a tetrahedron by the signs of sub-areas and
 // sub-volumes (Ericson, "Real-Time Collision Detection", 2005, sections 5.1.2, 5.1.5, 5.1.6).
+// Only faces and edges that the origin is beyond are looked at: the nearest point of a convex set
+// lies on one of those.
 // Departures: a triangle's nearest point is taken along its normal and a segment's is made
 // perpendicular to the segment once more, so that its direction is good to a few units of rounding
 // even where its length is tiny beside the coordinates.
@@ -18,8 +20,8 @@ struct Face {
 };
 
 template <class Real>
-const Face<Real>& closer(const Face<Real>& first, const Face<Real>& second) {
-  return second.nearest.squaredNorm() < first.nearest.squaredNorm() ? second : first;
+void keepCloser(const Face<Real>& face, Face<Real>& best) {
+  if (best.size == 0 || face.nearest.squaredNorm() < best.nearest.squaredNorm()) best = face;
 }
 
 template <class Real>
@@ -54,14 +56,21 @@ Face<Real> triangle(const Simplex<Real>& s, int i, int j, int k) {
   const Real wk = -ab.dot(an);
   const Real wj = ac.dot(an);
   const Real wi = squared - wj - wk;
-  if (squared > 0 && wi > 0 && wj > 0 && wk > 0) {
+  const bool flat = !(squared > 0);
+  const bool beyondIJ = flat || !(wk > 0), beyondIK = flat || !(wj > 0),
+             beyondJK = flat || !(wi > 0);
+  if (!beyondIJ && !beyondIK && !beyondJK) {
     const Real inverse = 1 / squared;
     return {{i, j, k},
             {wi * inverse, wj * inverse, wk * inverse},
             3,
             (a.dot(normal) * inverse) * normal};
   }
-  return closer(closer(segment(s, i, j), segment(s, j, k)), segment(s, i, k));
+  Face<Real> best{};
+  if (beyondIJ) keepCloser(segment(s, i, j), best);
+  if (beyondIK) keepCloser(segment(s, i, k), best);
+  if (beyondJK) keepCloser(segment(s, j, k), best);
+  return best;
 }
 
 /// With u the unit of rounding of Real, the determinants are off by less than 256 u reach^3: each
@@ -77,10 +86,17 @@ Face<Real> tetrahedron(const Simplex<Real>& s, double reach, bool& inside) {
   const Real sign = sum < 0 ? -1 : 1;
   const Real size = reach;
   const Real bound = 256 * unitOf<Real>() * size * size * size + std::numeric_limits<Real>::min();
-  inside = std::min(std::min(sign * d0, sign * d1), std::min(sign * d2, sign * d3)) > bound;
+  const bool flat = !(sign * sum > bound);
+  const bool sees0 = flat || !(sign * d0 > bound), sees1 = flat || !(sign * d1 > bound);
+  const bool sees2 = flat || !(sign * d2 > bound), sees3 = flat || !(sign * d3 > bound);
+  inside = !sees0 && !sees1 && !sees2 && !sees3;
   if (inside) return {{0, 1, 2, 3}, {d0 / sum, d1 / sum, d2 / sum, d3 / sum}, 4, Vec::Zero()};
-  return closer(closer(triangle(s, 0, 1, 2), triangle(s, 0, 1, 3)),
-                closer(triangle(s, 0, 2, 3), triangle(s, 1, 2, 3)));
+  Face<Real> best{};
+  if (sees3) keepCloser(triangle(s, 0, 1, 2), best);
+  if (sees2) keepCloser(triangle(s, 0, 1, 3), best);
+  if (sees1) keepCloser(triangle(s, 0, 2, 3), best);
+  if (sees0) keepCloser(triangle(s, 1, 2, 3), best);
+  return best;
 }
 
 }  // namespace
@@ -114,7 +130,29 @@ void Simplex<Real>::reduce(const MinkowskiDifference& difference) {
   nearest = face.nearest;
 }
 
+template <class Real>
+WideVec pointOn(const Simplex<Real>& simplex, const PlacedBody& placed,
+                std::uint32_t VertexPair::*vertex) {
+  int greatest = 0;
+  for (int i = 1; i < simplex.size; ++i)
+    if (simplex.weight[i] > simplex.weight[greatest]) greatest = i;
+  const auto& vertices = placed.body->vertices;
+  const Vec3& p = vertices[simplex.pairs[greatest].*vertex];
+  Wide x = p.x(), y = p.y(), z = p.z();
+  for (int i = 0; i < simplex.size; ++i) {
+    const Vec3& q = vertices[simplex.pairs[i].*vertex];
+    if (&q == &p) continue;
+    const Wide weight = simplex.weight[i];
+    x += weight * (Wide{q.x()} - p.x());
+    y += weight * (Wide{q.y()} - p.y());
+    z += weight * (Wide{q.z()} - p.z());
+  }
+  return placed.turned<Wide>(x, y, z);
+}
+
 template struct Simplex<double>;
 template struct Simplex<Wide>;
+template WideVec pointOn(const Simplex<double>&, const PlacedBody&, std::uint32_t VertexPair::*);
+template WideVec pointOn(const Simplex<Wide>&, const PlacedBody&, std::uint32_t VertexPair::*);
 
 }  // namespace enfilade::collision

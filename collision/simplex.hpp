@@ -23,6 +23,13 @@ struct Simplex {
   void reduce(const MinkowskiDifference& difference);
 };
 
+/// The point of one body that the weights name, turned: world axes, from the body's translation. It
+/// is a point of the body up to the error of a vertex: weights are >= 0, and the greatest (at least
+/// 1/4) is made to fill their sum up to 1.
+template <class Real>
+WideVec pointOn(const Simplex<Real>& simplex, const PlacedBody& placed,
+                std::uint32_t VertexPair::*vertex);
+
 extern template struct Simplex<double>;
 extern template struct Simplex<Wide>;
 
