@@ -13,11 +13,13 @@ namespace {
 class Stopwatch {
  public:
   explicit Stopwatch(TickReport& report) : report_(report) {}
-  void done(Stage stage) {
+  void done(Stage stage) { report_.stageSeconds[static_cast<std::size_t>(stage)] = lap(); }
+  /// Seconds since the last lap.
+  double lap() {
     const auto now = std::chrono::steady_clock::now();
-    report_.stageSeconds[static_cast<std::size_t>(stage)] =
-        std::chrono::duration<double>(now - last_).count();
+    const std::chrono::duration<double> seconds = now - last_;
     last_ = now;
+    return seconds.count();
   }
 
  private:
@@ -134,6 +136,10 @@ TickReport tick(World& w) {
   stopwatch.done(Stage::commands);
   updateBroadPhase(world, wish);
   stopwatch.done(Stage::broad);
+  if (auditIsDue(world)) {
+    report.audit = auditTick(world);
+    report.audit->seconds = stopwatch.lap();
+  }
   moveAvatars(world, wish, count);
   stopwatch.done(Stage::avatars);
   findContacts(world, report, count);

@@ -63,6 +63,12 @@ struct QueuedOrder {
   std::uint64_t tag = 0;
 };
 
+/// When ticks are audited, and whose turn it is (audit.cpp).
+struct AuditTurn {
+  std::uint32_t everyTicks = 0;  ///< 0: never
+  collision::MoverId next = 0;   ///< the first mover that has its turn, if it is still there
+};
+
 struct WorldState {
   WorldState(std::shared_ptr<const Scene> still, const Lengths& l);
 
@@ -79,6 +85,7 @@ struct WorldState {
   collision::SortAndSweep broadPhase;
   std::map<collision::MoverId, std::string> avatarOfMover;
   std::shared_ptr<const Snapshot> snapshot;
+  AuditTurn audit;  ///< no part of the state: it changes nothing that is told of the world
 
   EntityId firstAvatarId() const {
     return static_cast<EntityId>(scene->model().objects.size()) + 1;
@@ -98,6 +105,12 @@ void judgeWalks(WorldState& world, TickReport& report, QueryCount& count);
 
 /// The box that an avatar can reach in this tick with the given velocity (motion.cpp).
 Box reachOf(const WorldState& world, Avatar& avatar, const Vec3& velocity);
+/// Box tests that the audit of one tick may make, if they suffice for one avatar: some 2 ms.
+inline constexpr std::size_t kMostAuditTests = 2'000'000;
+/// Whether this tick is audited, and the audit: right after the update of the broad phase, before
+/// anybody moves on or leaves (audit.cpp).
+bool auditIsDue(const WorldState& world);
+TickAudit auditTick(WorldState& world, std::size_t mostBoxTests = kMostAuditTests);
 /// Collects what the avatar can meet inside its reach. `pairsChanged`: the broad phase gave it or
 /// took from it a partner, so what was collected before no longer serves (obstacles.cpp).
 void gatherObstacles(WorldState& world, Avatar& avatar, bool pairsChanged);

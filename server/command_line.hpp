@@ -25,11 +25,13 @@ struct Endpoint {
 struct ServeCommand {
   ModelOptions model;
   Endpoint listen{"127.0.0.1", 7878};
+  std::uint32_t auditEvery = 0;  ///< ticks; 0: never
 };
 struct ReplayCommand {
   ModelOptions model;
   std::filesystem::path script, out;
   bool strict = false;
+  std::uint32_t auditEvery = 0;  ///< ticks; 0: never
 };
 struct WalkCommand {
   std::filesystem::path script, out;

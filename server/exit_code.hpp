@@ -7,7 +7,7 @@ enum class ExitCode : int {
   done = 0,
   runtimeError = 1,
   usage = 2,
-  violations = 3,  ///< a check found some: with --strict, refused orders or blocked walks
+  violations = 3,  ///< a check found some: an audit, or with --strict refused or blocked orders
   interrupted = 130
 };
 

@@ -24,6 +24,7 @@ std::optional<v1::Error> InProcessDriver::submit(const v1::Command& command) {
 protocol::StepOutcome InProcessDriver::step() {
   const scene::TickReport report = scene::tick(world_);
   statistics_.add(report);
+  logFindings(world_, report);
   const scene::Snapshot& snapshot = *report.snapshot;
   protocol::StepOutcome outcome;
   outcome.tick = snapshot.tick;

@@ -55,13 +55,16 @@ ExitCode serve(const ServeCommand& command) {
   const auto scene = loadScene(command.model);
   // From here on: the threads that the server starts inherit the mask.
   const sigset_t ending = holdEndingSignals();
-  Server server(scene, command.listen);
+  Server server(scene, command.listen, {}, command.auditEvery);
   tellReady(server, *scene, command.listen);
   const int signal = awaitEndingSignal(ending, server);
   spdlog::info("{}: finishing the tick and telling the clients",
                signal == SIGINT ? "interrupted" : "told to stop");
   server.stop();
-  return signal == SIGINT ? ExitCode::interrupted : ExitCode::done;
+  const AuditTotals audit = server.auditTotals();
+  if (command.auditEvery != 0) logTotals(audit);
+  if (signal == SIGINT) return ExitCode::interrupted;
+  return audit.right() ? ExitCode::done : ExitCode::violations;
 }
 
 }  // namespace enfilade::server

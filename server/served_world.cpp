@@ -149,6 +149,7 @@ void sendError(Client& client, std::uint64_t requestId, v1::Error error) {
 void advance(ServedWorld& served) {
   const scene::TickReport report = scene::tick(served.world);
   served.statistics.add(report);
+  logFindings(served.world, report);
   served.idle = report.idle;
   const TickTold told = messagesOf(served.world, report.contacts, report.notices);
   settleOwners(served, report.notices);

@@ -10,9 +10,9 @@ namespace enfilade::server {
 
 struct Server::State {
   State(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
-        const ServerLimits& limits)
+        const ServerLimits& limits, std::uint32_t auditEvery)
       : frames(scene),
-        loop(std::move(scene), frames, limits),
+        loop(std::move(scene), frames, limits, auditEvery),
         listener(context, listen, loop, limits) {}
 
   boost::asio::io_context context{1};  ///< one thread: its handlers need no lock
@@ -23,8 +23,8 @@ struct Server::State {
 };
 
 Server::Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
-               const ServerLimits& limits)
-    : state_(std::make_unique<State>(std::move(scene), listen, limits)) {
+               const ServerLimits& limits, std::uint32_t auditEvery)
+    : state_(std::make_unique<State>(std::move(scene), listen, limits, auditEvery)) {
   state_->listener.start();
   state_->network = std::thread([state = state_.get()] { state->context.run(); });
 }
@@ -43,6 +43,10 @@ const std::string& Server::rendererName() const {
 
 void Server::rethrowFailure() const {
   if (const auto failure = state_->loop.failure()) std::rethrow_exception(failure);
+}
+
+AuditTotals Server::auditTotals() const {
+  return state_->loop.auditTotals();
 }
 
 void Server::stop() {

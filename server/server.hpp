@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "scene/scene.hpp"
+#include "server/audit_log.hpp"
 #include "server/command_line.hpp"
 #include "server/server_limits.hpp"
 
@@ -19,8 +20,9 @@ class Server {
  public:
   /// Clients may connect when this returns. Throws ServerError: the address is not this machine's
   /// own (loopback), or cannot be had.
+  /// Every `auditEvery`-th tick is audited; 0: none.
   Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
-         const ServerLimits& limits = {});
+         const ServerLimits& limits = {}, std::uint32_t auditEvery = 0);
   ~Server();  ///< stops
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -31,6 +33,8 @@ class Server {
   void rethrowFailure() const;
   /// Finishes the tick, ends the contacts, tells the clients, and closes.
   void stop();
+  /// Of all ticks that were audited; only after stop().
+  AuditTotals auditTotals() const;
 
  private:
   struct State;

@@ -70,8 +70,9 @@ void takeRequest(ServedWorld& served, ClientId id, WaitingRequest request,
 }  // namespace
 
 TickLoop::TickLoop(std::shared_ptr<const scene::Scene> scene, FrameService& frames,
-                   const ServerLimits& limits)
+                   const ServerLimits& limits, std::uint32_t auditEvery)
     : served_(std::move(scene), frames, limits) {
+  scene::auditBroadPhase(served_.world, auditEvery);
   thread_ = std::thread([this] { run(); });
 }
 
@@ -129,6 +130,10 @@ void TickLoop::stop() {
 std::exception_ptr TickLoop::failure() const {
   const std::lock_guard lock(mutex_);
   return failure_;
+}
+
+AuditTotals TickLoop::auditTotals() const {
+  return served_.statistics.audit();
 }
 
 void TickLoop::run() {

@@ -15,12 +15,12 @@ namespace enfilade::server {
 class TickLoop {
  public:
   TickLoop(std::shared_ptr<const scene::Scene> scene, FrameService& frames,
-           const ServerLimits& limits);
+           const ServerLimits& limits, std::uint32_t auditEvery = 0);
   ~TickLoop();  ///< stops
   TickLoop(const TickLoop&) = delete;
   TickLoop& operator=(const TickLoop&) = delete;
 
-  // All of these may be called from any thread.
+  // All of these but the last may be called from any thread.
 
   /// Greets a client: its Welcome answers `requestId`.
   ClientId join(std::string name, std::shared_ptr<OutgoingQueue> out, std::uint64_t requestId);
@@ -30,6 +30,8 @@ class TickLoop {
   void stop();
   /// What ended the thread, if anything but stop() did: a fault of ours.
   std::exception_ptr failure() const;
+  /// Of all ticks. Only after stop(): until then it is the thread's.
+  AuditTotals auditTotals() const;
 
  private:
   using Job = std::function<void(ServedWorld&)>;

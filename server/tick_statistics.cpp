@@ -28,6 +28,14 @@ void fill(v1::StageTiming& timing, const char* name, const DurationHistogram& du
   timing.set_max_us(durations.max() * 1e6);
 }
 
+void fill(v1::Audit& message, const AuditTotals& totals, const DurationHistogram& durations) {
+  message.set_ticks(totals.ticks);
+  message.set_pairs(totals.pairs);
+  message.set_missed(totals.missed);
+  message.set_extra(totals.extra);
+  fill(*message.mutable_timing(), "audit", durations);
+}
+
 }  // namespace
 
 void DurationHistogram::add(double seconds) {
@@ -54,6 +62,11 @@ void TickStatistics::add(const scene::TickReport& report) {
   for (std::size_t i = 0; i < scene::kStages; ++i) {
     stages_[i].add(report.stageSeconds[i]);
     whole += report.stageSeconds[i];
+  }
+  if (report.audit) {
+    audit_.add(*report.audit);
+    audited_.add(report.audit->seconds);
+    whole += report.audit->seconds;
   }
   tick_.add(whole);
   for (const scene::ContactEvent& event : report.contacts) {
@@ -84,6 +97,7 @@ v1::Metrics TickStatistics::metrics() const {
   metrics.set_rational_queries(rationalQueries_);
   metrics.set_worst_penetration(worstPenetration_);
   metrics.set_avatars(avatars_);
+  if (audit_.ticks > 0) fill(*metrics.mutable_audit(), audit_, audited_);
   return metrics;
 }
 

@@ -7,6 +7,7 @@
 
 #include "protocol/enfilade.pb.h"
 #include "scene/world.hpp"
+#include "server/audit_log.hpp"
 
 namespace enfilade::server {
 
@@ -30,6 +31,7 @@ class TickStatistics {
  public:
   void add(const scene::TickReport& report);
   double worstPenetration() const { return worstPenetration_; }
+  const AuditTotals& audit() const { return audit_; }
   /// Fills what ticks know; clients, frames and drops are the server's to fill.
   v1::Metrics metrics() const;
 
@@ -39,6 +41,8 @@ class TickStatistics {
   std::uint64_t contacts_ = 0, narrowQueries_ = 0, rationalQueries_ = 0;
   std::uint32_t pairs_ = 0, liveContacts_ = 0, avatars_ = 0;
   double worstPenetration_ = 0;  ///< metres
+  AuditTotals audit_;
+  DurationHistogram audited_;
 };
 
 }  // namespace enfilade::server

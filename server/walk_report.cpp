@@ -21,6 +21,13 @@ Json jsonOf(const v1::Vec3& v) {
   return Json::array({v.x(), v.y(), v.z()});
 }
 
+Json jsonOf(const v1::Audit& audit) {
+  return {{"ticks", audit.ticks()},
+          {"pairs", audit.pairs()},
+          {"missed", audit.missed()},
+          {"extra", audit.extra()}};
+}
+
 const char* wordOf(v1::ContactEvent::Kind kind) {
   switch (kind) {
     case v1::ContactEvent::KIND_BEGIN:
@@ -287,33 +294,34 @@ std::string WalkReport::writeSummary(const WalkFacts& facts, const protocol::Scr
   }
   Json walks = Json::array();
   for (const v1::Notice& notice : walks_) walks.push_back(walkOf(notice));
-  const Json summary{{"ticks", result.ticks},
-                     {"ticks_per_s", metrics.ticks_per_second()},
-                     {"stages_us", stages},
-                     {"pairs", facts.mostPairs},
-                     {"contacts", begun_},
-                     {"worst_penetration", metrics.worst_penetration()},
-                     {"state_hash", hexOf(result.stateHash)},
-                     {"time", result.time},
-                     {"wall_s", facts.wallSeconds},
-                     {"scene", facts.scene.source()},
-                     {"scene_hash", hexOf(facts.scene.hash())},
-                     {"objects", facts.scene.objects()},
-                     {"script", facts.script},
-                     {"renderer", facts.renderer},
-                     {"spawned", result.spawned},
-                     {"arrived", result.arrived},
-                     {"blocked", result.blocked},
-                     {"refused", result.refused},
-                     {"dropped", result.dropped},
-                     {"unfinished", result.unfinished},
-                     {"captured", result.captured},
-                     {"uncaptured", result.uncaptured},
-                     {"narrow_queries", metrics.narrow_queries()},
-                     {"rational_queries", metrics.rational_queries()},
-                     {"frames", frames},
-                     {"walks", walks},
-                     {"outcomes", outcomesOf(result)}};
+  Json summary{{"ticks", result.ticks},
+               {"ticks_per_s", metrics.ticks_per_second()},
+               {"stages_us", stages},
+               {"pairs", facts.mostPairs},
+               {"contacts", begun_},
+               {"worst_penetration", metrics.worst_penetration()},
+               {"state_hash", hexOf(result.stateHash)},
+               {"time", result.time},
+               {"wall_s", facts.wallSeconds},
+               {"scene", facts.scene.source()},
+               {"scene_hash", hexOf(facts.scene.hash())},
+               {"objects", facts.scene.objects()},
+               {"script", facts.script},
+               {"renderer", facts.renderer},
+               {"spawned", result.spawned},
+               {"arrived", result.arrived},
+               {"blocked", result.blocked},
+               {"refused", result.refused},
+               {"dropped", result.dropped},
+               {"unfinished", result.unfinished},
+               {"captured", result.captured},
+               {"uncaptured", result.uncaptured},
+               {"narrow_queries", metrics.narrow_queries()},
+               {"rational_queries", metrics.rational_queries()},
+               {"frames", frames},
+               {"walks", walks},
+               {"outcomes", outcomesOf(result)}};
+  if (metrics.has_audit()) summary["audit"] = jsonOf(metrics.audit());
   const auto replace = Json::error_handler_t::replace;
   writeText(folder_ / "summary.json", summary.dump(2, ' ', false, replace) + "\n");
   return summary.dump(-1, ' ', false, replace);

@@ -90,6 +90,14 @@ void tellPerson(const WalkReport& report, const WalkFacts& facts,
   std::fprintf(stderr, "  contacts: %llu begun in this world; worst penetration %g m\n",
                static_cast<unsigned long long>(facts.metrics.contacts()),
                facts.metrics.worst_penetration());
+  if (const v1::Audit& audit = facts.metrics.audit(); audit.ticks() > 0) {
+    std::fprintf(stderr,
+                 "  audit: %llu ticks, %llu pairs by brute force, %llu missed, %llu extra\n",
+                 static_cast<unsigned long long>(audit.ticks()),
+                 static_cast<unsigned long long>(audit.pairs()),
+                 static_cast<unsigned long long>(audit.missed()),
+                 static_cast<unsigned long long>(audit.extra()));
+  }
   std::fprintf(stderr, "  pictures: %u by %s\n", result.captured,
                facts.renderer.empty() ? "no renderer" : facts.renderer.c_str());
   for (const v1::Notice& notice : report.walks()) {
@@ -136,7 +144,7 @@ ExitCode run(const protocol::Script& script, WalkReport& report, bool strict, Wa
                       report.folder().string() + "/summary.json");
   }
   tellPerson(report, facts, result);
-  return strict && !result.outcomes.empty() ? ExitCode::violations : ExitCode::done;
+  return judge(result, facts.metrics, strict);
 }
 
 /// A run looks whether it was interrupted once the scene is there, and between two ticks.
@@ -183,6 +191,12 @@ std::unique_ptr<render::Renderer> rendererOf(const std::shared_ptr<const scene::
 
 }  // namespace
 
+ExitCode judge(const protocol::ScriptResult& result, const v1::Metrics& metrics, bool strict) {
+  const bool right = metrics.audit().missed() == 0 && metrics.audit().extra() == 0;
+  const bool asTold = !strict || result.outcomes.empty();
+  return right && asTold ? ExitCode::done : ExitCode::violations;
+}
+
 ExitCode replay(const ReplayCommand& command) {
   return interruptible([&] {
     const protocol::Script script = protocol::readScript(command.script);
@@ -191,6 +205,7 @@ ExitCode replay(const ReplayCommand& command) {
     if (interrupted != 0) throw Interrupted{};
     const std::unique_ptr<render::Renderer> renderer = rendererOf(scene);
     scene::World world(scene);
+    scene::auditBroadPhase(world, command.auditEvery);
     InProcessDriver driver(world, renderer.get(), captureFormat());
     WalkedWorld walked{driver,
                        [&](const v1::FrameRequest& request) { return driver.frame(request); },

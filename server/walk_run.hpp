@@ -2,11 +2,16 @@
 // socket (walk).
 #pragma once
 
+#include "protocol/script.hpp"
 #include "server/command_line.hpp"
 
 namespace enfilade::server {
 
 ExitCode replay(const ReplayCommand& command);
 ExitCode walk(const WalkCommand& command);
+
+/// How a walk ends that came to its end: a violation is what an audit found, and, if `strict`, a
+/// line of the script that did not go as it says.
+ExitCode judge(const protocol::ScriptResult& result, const v1::Metrics& metrics, bool strict);
 
 }  // namespace enfilade::server

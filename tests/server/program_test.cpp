@@ -113,6 +113,7 @@ TEST_F(Program, UsageMistakesEndWithTwoAndSayHow) {
       {"replay", "room.obj", "walk.jsonl"},
       {"replay", "room.obj", "walk.jsonl", "--out", "out", "--unit", "-1"},
       {"replay", "room.obj", "walk.jsonl", "--out", "out", "--up", "w"},
+      {"replay", "room.obj", "walk.jsonl", "--out", "out", "--audit", "1000001"},
       {"walk", "walk.jsonl", "--out", "out"}};
   for (const auto& arguments : mistakes) {
     const Ended ended = run(arguments);
@@ -209,7 +210,9 @@ TEST_F(Program, StrictTurnsABlockedWalkIntoThree) {
     if (strict) all.push_back("--strict");
     return all;
   };
-  EXPECT_EQ(run(arguments(false)).code, 0);
+  const Ended lenient = run(arguments(false));
+  EXPECT_EQ(lenient.code, 0);
+  EXPECT_FALSE(nlohmann::json::parse(lenient.out).contains("audit")) << "nobody asked for it";
   const Ended strict = run(arguments(true));
   EXPECT_EQ(strict.code, 3);
   EXPECT_NE(strict.err.find("room_wall"), std::string::npos) << strict.err;
@@ -249,11 +252,12 @@ void expectBalanced(const fs::path& out) {
 }
 
 TEST_F(Program, AWalkOverTheSocketIsTheReplayToTheLastBit) {
-  const Ended replayed =
-      run({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("replayed")});
+  const Ended replayed = run(
+      {"replay", path("room.obj"), path("walk.jsonl"), "--out", path("replayed"), "--audit", "10"});
   ASSERT_EQ(replayed.code, 0) << replayed.err;
   fs::remove(path("stdout"));
-  const pid_t server = start({"serve", path("room.obj"), "--listen", "127.0.0.1:0"});
+  const pid_t server =
+      start({"serve", path("room.obj"), "--listen", "127.0.0.1:0", "--audit", "10"});
   const std::string port = std::to_string(awaitReady());
   const Ended walked =
       run({"walk", path("walk.jsonl"), "--connect", "127.0.0.1:" + port, "--out", path("walked")});
@@ -265,11 +269,15 @@ TEST_F(Program, AWalkOverTheSocketIsTheReplayToTheLastBit) {
   const auto socketSummary = nlohmann::json::parse(walked.out);
   EXPECT_EQ(summary, nlohmann::json::parse(textOf(path("replayed/summary.json"))));
   for (const char* key : {"ticks", "state_hash", "contacts", "worst_penetration", "pairs", "walks",
-                          "outcomes", "scene_hash", "blocked", "arrived"}) {
+                          "outcomes", "scene_hash", "blocked", "arrived", "audit"}) {
     EXPECT_EQ(summary.at(key), socketSummary.at(key)) << key;
   }
   EXPECT_EQ(summary["state_hash"].get<std::string>().size(), 16u);
   EXPECT_EQ(summary["worst_penetration"], 0);
+  EXPECT_EQ(summary["audit"]["ticks"], summary["ticks"].get<std::uint64_t>() / 10);
+  EXPECT_GT(summary["audit"]["pairs"], summary["audit"]["ticks"]);
+  EXPECT_EQ(summary["audit"]["missed"], 0);
+  EXPECT_EQ(summary["audit"]["extra"], 0);
   for (const char* stage : {"commands", "broad", "avatars", "narrow", "hash", "snapshot"}) {
     EXPECT_TRUE(summary["stages_us"].contains(stage)) << stage;
   }

@@ -1,0 +1,143 @@
+// What --audit tells: in the metrics, in the log, and by the exit code.
+#include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
+
+#include <sstream>
+
+#include "scene/world_state.hpp"
+#include "server/in_process_driver.hpp"
+#include "server/walk_run.hpp"
+#include "tests/server/served_room.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+/// What is logged while it lives.
+class Log {
+ public:
+  Log() : before_(spdlog::default_logger()) {
+    auto sink = std::make_shared<spdlog::sinks::ostream_sink_mt>(text_);
+    spdlog::set_default_logger(std::make_shared<spdlog::logger>("test", std::move(sink)));
+  }
+  ~Log() { spdlog::set_default_logger(before_); }
+  Log(const Log&) = delete;
+  Log& operator=(const Log&) = delete;
+  std::string text() const { return text_.str(); }
+
+ private:
+  std::shared_ptr<spdlog::logger> before_;
+  std::ostringstream text_;
+};
+
+/// A broad phase that does not know where the wall is.
+void withholdTheWall(scene::World& world) {
+  std::vector<scene::Box> boxes = world.scene().stillBoxes();
+  boxes[kWall - 1] = {scene::Vec3::Constant(500), scene::Vec3::Constant(501)};
+  world.state().broadPhase = collision::SortAndSweep(boxes);
+}
+
+std::variant<ProgramCommand, ExitCode> read(std::vector<const char*> arguments) {
+  arguments.insert(arguments.begin(), "enfilade");
+  return readCommandLine(static_cast<int>(arguments.size()), arguments.data());
+}
+
+TEST(AuditOption, IsAWholeNumberOfTicksAndOffWithoutIt) {
+  const auto replay = [](std::vector<const char*> audit) {
+    std::vector<const char*> arguments{"replay", "room.obj", "walk.jsonl", "--out", "out"};
+    arguments.insert(arguments.end(), audit.begin(), audit.end());
+    return read(arguments);
+  };
+  const auto every = [&](const char* ticks) {
+    return std::get<ReplayCommand>(std::get<ProgramCommand>(replay({"--audit", ticks}))).auditEvery;
+  };
+  EXPECT_EQ(std::get<ReplayCommand>(std::get<ProgramCommand>(replay({}))).auditEvery, 0u);
+  EXPECT_EQ(every("0"), 0u);
+  EXPECT_EQ(every("10"), 10u);
+  EXPECT_EQ(every("1000000"), 1'000'000u);
+  for (const char* bad : {"-1", "1.5", "x", "", "1000001", "99999999999", "1 "}) {
+    const auto refused = replay({"--audit", bad});
+    ASSERT_TRUE(std::holds_alternative<ExitCode>(refused)) << bad;
+    EXPECT_EQ(std::get<ExitCode>(refused), ExitCode::usage);
+  }
+  const auto serve = std::get<ProgramCommand>(read({"serve", "room.obj", "--audit", "7"}));
+  EXPECT_EQ(std::get<ServeCommand>(serve).auditEvery, 7u);
+}
+
+TEST(AuditOfAWalk, AMissedPairIsCountedLoggedAndAViolation) {
+  scene::World world(smallRoom());
+  withholdTheWall(world);
+  scene::auditBroadPhase(world, 2);
+  InProcessDriver driver(world, nullptr);
+  const Log log;
+  ASSERT_FALSE(driver.submit(spawn("ann", 4.8, 0.01, 0)));
+  driver.step();
+  EXPECT_EQ(log.text(), "") << "the first tick is not audited";
+  driver.step();
+  const v1::Audit audit = driver.metrics().audit();
+  EXPECT_EQ(audit.ticks(), 1u);
+  EXPECT_EQ(audit.pairs(), 2u) << "the floor and the wall";
+  EXPECT_EQ(audit.missed(), 1u);
+  EXPECT_EQ(audit.extra(), 0u);
+  EXPECT_GT(audit.timing().max_us(), 0);
+  for (const char* told : {"error", "tick 2", "missed", "'ann'", "'room_wall'", "(5, 0, -4)"}) {
+    EXPECT_NE(log.text().find(told), std::string::npos) << told << " in " << log.text();
+  }
+  EXPECT_EQ(judge({}, driver.metrics(), false), ExitCode::violations);
+}
+
+TEST(AuditOfAWalk, ManyFindingsOfATickAreCountedAndTheFirstTold) {
+  scene::World world(smallRoom());
+  scene::TickReport report;
+  report.snapshot = world.snapshot();
+  report.audit.emplace();
+  report.audit->findings.resize(20);
+  AuditTotals totals;
+  totals.add(*report.audit);
+  EXPECT_EQ(totals.missed, 20u);
+  EXPECT_FALSE(totals.right());
+  const Log log;
+  logFindings(world, report);
+  EXPECT_NE(log.text().find("12 more"), std::string::npos) << log.text();
+}
+
+TEST(AuditOfAWalk, WhatIsRightIsNoViolation) {
+  v1::Metrics metrics;
+  EXPECT_EQ(judge({}, metrics, true), ExitCode::done);
+  metrics.mutable_audit()->set_pairs(5);
+  EXPECT_EQ(judge({}, metrics, true), ExitCode::done);
+  metrics.mutable_audit()->set_extra(1);
+  EXPECT_EQ(judge({}, metrics, false), ExitCode::violations);
+}
+
+class AuditedServer : public ServedRoom {};
+
+TEST_F(AuditedServer, TellsItsAuditInTheMetricsAndAtItsEnd) {
+  server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, ServerLimits{}, 5);
+  v1::Audit audit;
+  {
+    protocol::Client ann = client("ann");
+    ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
+    ASSERT_FALSE(ann.command(walkTo("ann", 8, 0, 0)));
+    ann.step(60);
+    audit = ann.metrics().audit();
+  }
+  EXPECT_EQ(audit.ticks(), 12u);
+  EXPECT_GE(audit.pairs(), 12u) << "the floor, at least";
+  EXPECT_EQ(audit.missed(), 0u);
+  EXPECT_EQ(audit.extra(), 0u);
+  server_->stop();
+  EXPECT_EQ(server_->auditTotals().ticks, 12u);
+  EXPECT_EQ(server_->auditTotals().pairs, audit.pairs());
+  EXPECT_TRUE(server_->auditTotals().right());
+}
+
+TEST_F(AuditedServer, SaysNothingOfAuditsUnlessAskedForThem) {
+  serve();
+  protocol::Client ann = client("ann");
+  ann.step(10);
+  EXPECT_FALSE(ann.metrics().has_audit());
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing
