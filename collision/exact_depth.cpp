@@ -2,8 +2,10 @@
 // edge of each. So the least extent of M along the normals of all faces and of all pairs of edges
 // is the depth: the extent along any direction bounds it from above, so that pairs of edges that
 // make no facet do no harm, and flat bodies need no case of their own. Steps
-//  1. The extents along all of these directions in extended precision, with a bound of the error.
-//  2. Those that the bound does not rule out are computed in integers and compared.
+//  1. Pairs of edges whose own plane is farther from the origin than the depth can be are left out,
+//     by doubles: M extends at least to that plane, so it holds no facet that matters.
+//  2. The extents along the other directions in extended precision, with a bound of the error.
+//  3. Those that the bound does not rule out are computed in integers and compared.
 #include "collision/exact_depth.hpp"
 
 #include <cmath>
@@ -19,18 +21,27 @@ struct Candidate {
   bool reversed = false;                       ///< the direction is second x first
 };
 
+struct Edge {
+  std::array<std::uint32_t, 2> ends;
+  WideVec along;
+  Vec3 rounded;
+};
+
 struct BodyFeatures {
   const Hull* hull;
   std::vector<WideVec> points;
-  std::vector<std::array<std::uint32_t, 2>> edges;
+  std::vector<Edge> edges;
 };
 
 BodyFeatures featuresOf(const PlacedBody& placed) {
   BodyFeatures features{placed.body->hull, {}, {}};
-  for (std::uint32_t i = 0; i < placed.vertexCount(); ++i) {
+  for (std::uint32_t i = 0; i < placed.vertexCount(); ++i)
     features.points.push_back(placed.turned<Wide>(i));
-    for (const std::uint32_t j : features.hull->neighboursOf(i))
-      if (i < j) features.edges.push_back({i, j});
+  for (std::uint32_t i = 0; i < placed.vertexCount(); ++i) {
+    for (const std::uint32_t j : features.hull->neighboursOf(i)) {
+      const WideVec along = features.points[j] - features.points[i];
+      if (i < j) features.edges.push_back({{i, j}, along, along.cast<double>()});
+    }
   }
   return features;
 }
@@ -38,7 +49,19 @@ BodyFeatures featuresOf(const PlacedBody& placed) {
 /// Collects candidates whose extent may be the least.
 class Sieve {
  public:
-  explicit Sieve(const MinkowskiDifference& difference) : difference_(difference) {}
+  Sieve(const MinkowskiDifference& difference, double atMost)
+      : difference_(difference), atMost_(atMost) {}
+
+  /// False: the plane through both edges is proved farther away than the depth. `w`: a point of it.
+  bool mayMatter(const Vec3& first, const Vec3& second, const Vec3& w) const {
+    const Vec3 normal = first.cross(second);
+    const double length = normal.norm();
+    // Of the normal, by the edges' own errors; where it is small beside the normal, the direction
+    // is off by less than 2^-20, and the plane's distance by less than four times that.
+    const double off = 64 * kUnit * difference_.reach * (first.norm() + second.norm());
+    if (!(off < 0x1p-20 * length)) return true;
+    return std::abs(normal.dot(w)) <= (atMost_ + 0x1p-17 * difference_.reach) * length;
+  }
 
   void consider(Candidate candidate, const WideVec& first, const WideVec& second) {
     const WideVec normal = first.cross(second);
@@ -71,7 +94,7 @@ class Sieve {
  private:
   const MinkowskiDifference& difference_;
   VertexPair hint_;
-  Wide atMost_ = std::numeric_limits<Wide>::infinity();
+  Wide atMost_;  ///< the depth, metres
   std::vector<std::pair<Wide, Candidate>> kept_;
 };
 
@@ -86,15 +109,18 @@ void considerFaces(const BodyFeatures& features, Candidate::Of of, Sieve& sieve)
   }
 }
 
-std::vector<Candidate> candidates(const MinkowskiDifference& difference) {
+std::vector<Candidate> candidates(const MinkowskiDifference& difference, double atMost) {
   const BodyFeatures a = featuresOf(difference.a), b = featuresOf(difference.b);
-  Sieve sieve(difference);
+  Sieve sieve(difference, atMost);
   considerFaces(a, Candidate::Of::faceOfA, sieve);
   considerFaces(b, Candidate::Of::faceOfB, sieve);
-  for (const auto& edgeA : a.edges)
-    for (const auto& edgeB : b.edges)
-      sieve.consider({Candidate::Of::edges, edgeA, edgeB}, a.points[edgeA[1]] - a.points[edgeA[0]],
-                     b.points[edgeB[1]] - b.points[edgeB[0]]);
+  for (const Edge& ofA : a.edges) {
+    for (const Edge& ofB : b.edges) {
+      const Vec3 w = difference.point<double>({ofA.ends[0], ofB.ends[0]});
+      if (!sieve.mayMatter(ofA.rounded, ofB.rounded, w)) continue;
+      sieve.consider({Candidate::Of::edges, ofA.ends, ofB.ends}, ofA.along, ofB.along);
+    }
+  }
   return sieve.survivors();
 }
 
@@ -126,13 +152,13 @@ ConvexBody withHull(const ConvexBody& body, std::optional<Hull>& hull) {
 
 }  // namespace
 
-ExactFacet nearestFacetExactly(const ConvexBody& bodyA, const ConvexBody& bodyB) {
+ExactFacet nearestFacetExactly(const ConvexBody& bodyA, const ConvexBody& bodyB, double atMost) {
   std::optional<Hull> hullA, hullB;
   const ConvexBody a = withHull(bodyA, hullA), b = withHull(bodyB, hullB);
   ExactDifference difference(a, b);
   std::optional<ExactFacet> nearest;
   VertexPair hint;
-  for (const Candidate& candidate : candidates(MinkowskiDifference(a, b))) {
+  for (const Candidate& candidate : candidates(MinkowskiDifference(a, b), atMost)) {
     ExactFacet facet{exactNormal(difference, candidate), {}, difference.scale()};
     if (isZero(facet.normal)) continue;
     const ExactPoint inward = Integer(-1) * facet.normal;

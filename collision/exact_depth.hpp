@@ -12,7 +12,9 @@ struct ExactFacet {
   int scale = 0;
 };
 
-/// For bodies that penetrate, exactly. Milliseconds for hulls of a hundred vertices.
-ExactFacet nearestFacetExactly(const ConvexBody& a, const ConvexBody& b);
+/// For bodies that penetrate, exactly. `atMost`: a proved upper bound of the depth in metres (any
+/// value, infinity too; a close one saves most of the work). Milliseconds for hulls of a hundred
+/// vertices.
+ExactFacet nearestFacetExactly(const ConvexBody& a, const ConvexBody& b, double atMost);
 
 }  // namespace enfilade::collision

@@ -25,7 +25,9 @@
 #include <cmath>
 
 #include "collision/exact_answer.hpp"
+#include "collision/polytope.hpp"
 #include "collision/simplex.hpp"
+#include "collision/touching_proof.hpp"
 
 namespace enfilade::collision {
 namespace {
@@ -127,10 +129,10 @@ void walk(const MinkowskiDifference& difference, Wide limit, Search<Real>& searc
 
 template <class Real>
 void remember(const Search<Real>& search, FeatureCache& cache) {
-  const Simplex<Real>& simplex = search.simplex;
-  cache.size = simplex.size;
-  for (int i = 0; i < simplex.size; ++i) cache.pairs[i] = simplex.pairs[i];
-  if (search.direction.squaredNorm() > 0) cache.axis = search.direction.template cast<double>();
+  cache.size = search.simplex.size;
+  std::copy_n(search.simplex.pairs.begin(), search.simplex.size, cache.pairs.begin());
+  // A nearest point that proves nothing may point anywhere: then the last axis is the better one.
+  if (search.lower > 0) cache.axis = search.direction.template cast<double>();
 }
 
 Vec3 inWorld(const WideVec& point, const ConvexBody& a) {
@@ -156,15 +158,15 @@ struct Combination {
   }
 };
 
-/// The best lower bound of the distance along the direction that the walk ended with.
-Wide proveLower(const MinkowskiDifference& difference, const Search<double>& search) {
-  if (!search.hasDirection()) return 0;
+/// Raises search.lower by a proof in extended precision, along the direction that the walk ended
+/// with.
+void proveLower(const MinkowskiDifference& difference, Search<double>& search) {
+  if (!search.hasDirection()) return;
   const Least least = leastAlong(difference, search.direction, kUnitLength, search.summits);
-  return metresAlong(least.bound, search.direction.cast<Wide>());
+  search.lower = std::max(search.lower, metresAlong(least.bound, search.direction.cast<Wide>()));
 }
-Wide proveLower(const MinkowskiDifference&, const Search<Wide>& search) {
-  return search.lower;
-}
+/// The walk has done that.
+void proveLower(const MinkowskiDifference&, Search<Wide>&) {}
 
 enum class Outcome : std::uint8_t {
   open,    ///< not proved, or not to the bound that Decision promises
@@ -189,21 +191,62 @@ Outcome describeSeparation(const MinkowskiDifference& difference, const Combinat
   return bound <= units * kUnit * at.largest ? Outcome::decided : Outcome::open;
 }
 
-/// Fills in what the features that the walk ended at prove.
+/// Whether the bodies are proved to touch along `axis`, the last one known, or along another that
+/// things often stand or lean along: the simplex' normal, the world's axes. Sets `axis`.
 template <class Real>
-Outcome conclude(const MinkowskiDifference& difference, const Search<Real>& search, double limit,
-                 Decision& decision) {
-  const bool inside = search.simplex.holdsOrigin;
+bool findTouching(const MinkowskiDifference& difference, const Search<Real>& search, Vec3& axis) {
+  std::array<Vec3, 9> directions{axis};
+  std::size_t count = 1;
+  const Simplex<Real>& simplex = search.simplex;
+  if (simplex.size == 3) {
+    const auto& p = simplex.points;
+    const Vec3 normal = (p[1] - p[0]).cross(p[2] - p[0]).template cast<double>();
+    directions[count++] = normal;
+    directions[count++] = -normal;
+  }
+  for (int k = 0; k < 3; ++k) {
+    directions[count++] = Vec3::Unit(k);
+    directions[count++] = -Vec3::Unit(k);
+  }
+  for (const Vec3& direction : std::span(directions).first(count)) {
+    if (!(direction.squaredNorm() > 0)) continue;
+    if (!provedTouching(difference, direction, search.hint)) continue;
+    axis = direction.normalized();
+    return true;
+  }
+  return false;
+}
+
+/// Whether the origin is proved to be strictly inside B - A though it lies on the simplex.
+template <class Real>
+bool findInside(const MinkowskiDifference& difference, const Simplex<Real>& simplex) {
+  Polytope<Real> polytope(difference);
+  return surround<Real>({simplex.pairs.data(), static_cast<std::size_t>(simplex.size)}, polytope);
+}
+
+/// Fills in what the features that the walk ended at prove. `axis` is the last one known to part
+/// the bodies.
+template <class Real>
+Outcome conclude(const MinkowskiDifference& difference, Search<Real>& search, double limit,
+                 Vec3& axis, Decision& decision) {
   if (search.lower > limit) return Outcome::beyond;
-  const Wide lower = inside ? 0 : proveLower(difference, search);
-  if (lower > limit) return Outcome::beyond;
-  if (!inside && !(lower > 0)) return Outcome::open;
+  const bool inside = search.simplex.holdsOrigin;
+  proveLower(difference, search);
+  if (search.lower > limit) return Outcome::beyond;
   const Combination at(difference, search.simplex);
   decision.pointA = inWorld(at.onA, *difference.a.body);
   decision.pointB = inWorld(at.onB, *difference.a.body);
-  if (!inside) return describeSeparation(difference, at, lower, decision);
+  if (search.lower > 0) return describeSeparation(difference, at, search.lower, decision);
+  if (largestOf(at.aToB) > 2 * kUnit * at.largest) return Outcome::open;  // no common point
+  if (!inside && findTouching(difference, search, axis)) {
+    decision.verdict = Verdict::touching;
+    decision.decidedBy = DecidedBy::expansion;
+    decision.normal = axis;
+    return Outcome::decided;
+  }
+  if (!inside && !findInside(difference, search.simplex)) return Outcome::open;
   decision.verdict = Verdict::penetrating;
-  return largestOf(at.aToB) <= 2 * kUnit * at.largest ? Outcome::decided : Outcome::open;
+  return Outcome::decided;
 }
 
 Decision decideExactly(const MinkowskiDifference& difference, FeatureCache& cache) {
@@ -216,7 +259,7 @@ Decision decideExactly(const MinkowskiDifference& difference, FeatureCache& cach
   decision.errorBound = 2 * kUnit * exact.distance;
   decision.pointA = exact.pointA;
   decision.pointB = exact.pointB;
-  if (exact.verdict != Verdict::penetrating) decision.normal = exact.normal;
+  if (exact.verdict != Verdict::penetrating) decision.normal = cache.axis = exact.normal;
   return decision;
 }
 
@@ -227,8 +270,9 @@ Outcome search(const MinkowskiDifference& difference, double limit, FeatureCache
   Search<Real> search;
   start(difference, cache, search);
   walk(difference, limit, search);
+  const Outcome outcome = conclude(difference, search, limit, cache.axis, decision);
   remember(search, cache);
-  return conclude(difference, search, limit, decision);
+  return outcome;
 }
 
 }  // namespace

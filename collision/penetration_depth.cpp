@@ -21,75 +21,14 @@
 
 #include <algorithm>
 
+#include "collision/polytope.hpp"
 #include "collision/simplex.hpp"
 
 namespace enfilade::collision {
 namespace {
 
-constexpr std::size_t kMostCorners = 256;    // of a polytope; 10 to 30 are usual
 constexpr std::size_t kMostRemembered = 40;  // corners; a polytope grown larger is begun anew
 constexpr double kBoundsMeet = 1e-12;        // relative: upper and lower bound of the depth
-
-template <class Real>
-struct Facet {
-  DepthCache::Facet corners;
-  Eigen::Matrix<Real, 3, 1> normal;  ///< outward, any length
-  Real offset;                       ///< the least normal . corner
-  Real nearness;                     ///< (offset / |normal|)^2, squared metres
-};
-
-template <class Real>
-Facet<Real> facetOf(const DepthCache::Facet& corners, const Eigen::Matrix<Real, 3, 1>& a,
-                    const Eigen::Matrix<Real, 3, 1>& b, const Eigen::Matrix<Real, 3, 1>& c) {
-  const Eigen::Matrix<Real, 3, 1> normal = (b - a).cross(c - a);
-  const Real offset = std::min(std::min(normal.dot(a), normal.dot(b)), normal.dot(c));
-  return {corners, normal, offset, offset * offset / normal.squaredNorm()};
-}
-
-/// How much nearer than sqrt(nearness) a facet may be, in metres. Whatever its normal n was rounded
-/// to: each of its points is a combination of its corners, so n . point is at least the least
-/// n . corner; a corner is off by 8u reach a coordinate and the product by 3u |n| reach more.
-template <class Real>
-Real facetError(double reach) {
-  return 24 * unitOf<Real>() * static_cast<Real>(reach);
-}
-
-template <class Real>
-struct Polytope {
-  using Vec = Eigen::Matrix<Real, 3, 1>;
-
-  const MinkowskiDifference& difference;
-  Real leastDeterminant;  ///< proves that three points are turned as their determinant says
-  std::array<VertexPair, kMostCorners> pairs;
-  std::array<Vec, kMostCorners> points;
-  std::array<Facet<Real>, 2 * kMostCorners> facets;
-  std::size_t corners = 0, facetCount = 0;
-
-  explicit Polytope(const MinkowskiDifference& of) : difference(of) {
-    const Real reach = of.reach;
-    // Nine entries off by at most 8u reach, with cofactors of at most 2 reach^2, and as much again
-    // for rounding the product of edges of up to 2 reach.
-    leastDeterminant = 512 * unitOf<Real>() * reach * reach * reach;
-  }
-  std::span<Facet<Real>> all() { return {facets.data(), facetCount}; }
-  bool holds(VertexPair pair) const {
-    return std::find(pairs.begin(), pairs.begin() + corners, pair) != pairs.begin() + corners;
-  }
-  std::uint16_t addCorner(VertexPair pair) {
-    pairs[corners] = pair;
-    points[corners] = difference.point<Real>(pair);
-    return static_cast<std::uint16_t>(corners++);
-  }
-  /// False, and nothing added, when the facet is not proved to face away from the origin.
-  bool addFacet(const DepthCache::Facet& of) {
-    const Facet<Real> facet = facetOf<Real>(of, points[of[0]], points[of[1]], points[of[2]]);
-    if (!(facet.offset > leastDeterminant) || facetCount == facets.size()) return false;
-    facets[facetCount++] = facet;
-    return true;
-  }
-};
-
-// ---- a polytope to start from ------------------------------------------------------------------
 
 template <class Real>
 bool restore(const DepthCache& cache, Polytope<Real>& polytope) {
@@ -102,71 +41,6 @@ bool restore(const DepthCache& cache, Polytope<Real>& polytope) {
   return std::all_of(cache.facets.begin(), cache.facets.end(),
                      [&](const DepthCache::Facet& facet) { return polytope.addFacet(facet); });
 }
-
-template <class Real>
-std::uint16_t addSupport(const Eigen::Matrix<Real, 3, 1>& outward, Polytope<Real>& polytope) {
-  VertexPair hint{};
-  const WideVec inward = -outward.template cast<Wide>();
-  leastAlong(polytope.difference, inward, inward.norm(), hint);
-  return polytope.addCorner(hint);
-}
-
-/// Two tips and a ring between them, counter-clockwise seen from the upper one.
-template <class Real>
-bool addBipyramid(std::span<const std::uint16_t> ring, std::uint16_t upper, std::uint16_t lower,
-                  Polytope<Real>& polytope) {
-  for (std::size_t k = 0; k < ring.size(); ++k) {
-    const std::uint16_t from = ring[k], to = ring[(k + 1) % ring.size()];
-    if (!polytope.addFacet({from, to, upper}) || !polytope.addFacet({to, from, lower}))
-      return false;
-  }
-  return true;
-}
-
-/// The simplex that decided, with supports on the sides that it is flat on.
-template <class Real>
-bool surround(const FeatureCache& decided, Polytope<Real>& polytope) {
-  using Vec = Eigen::Matrix<Real, 3, 1>;
-  for (int i = 0; i < decided.size; ++i) polytope.addCorner(decided.pairs[i]);
-  const auto& p = polytope.points;
-  if (decided.size == 4) {
-    const bool turned = (p[1] - p[0]).dot((p[2] - p[0]).cross(p[3] - p[0])) < 0;
-    const std::uint16_t second = turned ? 2 : 1, third = turned ? 1 : 2;
-    return polytope.addFacet({0, third, second}) && polytope.addFacet({0, second, 3}) &&
-           polytope.addFacet({0, 3, third}) && polytope.addFacet({second, third, 3});
-  }
-  if (decided.size == 3) {
-    const Vec normal = (p[1] - p[0]).cross(p[2] - p[0]);
-    const std::array<std::uint16_t, 3> ring{0, 1, 2};
-    const std::uint16_t upper = addSupport<Real>(normal, polytope);
-    return addBipyramid<Real>(ring, upper, addSupport<Real>(-normal, polytope), polytope);
-  }
-  if (decided.size == 2) {
-    const Vec along = p[1] - p[0];
-    const Vec side = along.unitOrthogonal() * along.norm();
-    const Vec other = along.cross(side) / along.norm() * Real(0.8660254037844386);
-    std::array<std::uint16_t, 3> ring{};
-    ring[0] = addSupport<Real>(side, polytope);
-    ring[1] = addSupport<Real>(other - side / 2, polytope);
-    ring[2] = addSupport<Real>(-other - side / 2, polytope);
-    return addBipyramid<Real>(ring, 1, 0, polytope);
-  }
-  return false;
-}
-
-/// Supports along the axes of the world, one by one.
-template <class Real>
-bool surroundByAxes(Polytope<Real>& polytope) {
-  using Vec = Eigen::Matrix<Real, 3, 1>;
-  std::array<std::uint16_t, 6> tips{};
-  for (int k = 0; k < 6; ++k)
-    tips[k] =
-        addSupport<Real>(k % 2 == 0 ? Vec(Vec::Unit(k / 2)) : Vec(-Vec::Unit(k / 2)), polytope);
-  const std::array<std::uint16_t, 4> ring{tips[0], tips[2], tips[1], tips[3]};
-  return addBipyramid<Real>(ring, tips[4], tips[5], polytope);
-}
-
-// ---- its expansion -----------------------------------------------------------------------------
 
 using Edge = std::array<std::uint16_t, 2>;
 
@@ -338,9 +212,12 @@ bool findDepth(const MinkowskiDifference& difference, const FeatureCache& decide
     polytope.corners = polytope.facetCount = 0;
     return start() && expandUntilBoundsMeet(polytope, bounds);
   };
-  const bool proved = proves([&] { return restore(cache, polytope); }) ||
-                      proves([&] { return surround(decided, polytope); }) ||
-                      proves([&] { return surroundByAxes(polytope); });
+  const bool proved =
+      proves([&] { return restore(cache, polytope); }) || proves([&] {
+        return surround<Real>({decided.pairs.data(), static_cast<std::size_t>(decided.size)},
+                              polytope);
+      }) ||
+      proves([&] { return surroundByAxes<Real>(polytope); });
   if (proved) remember(polytope, cache);
   return proved;
 }

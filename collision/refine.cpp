@@ -5,12 +5,16 @@
 
 #include "collision/exact_answer.hpp"
 #include "collision/exact_depth.hpp"
+#include "collision/penetration_depth.hpp"
 
 namespace enfilade::collision {
 namespace {
 
-void describePenetration(const ConvexBody& a, const ConvexBody& b, Refinement& refinement) {
-  const ExactFacet facet = nearestFacetExactly(a, b);
+void describePenetration(const ConvexBody& a, const ConvexBody& b, const FeatureCache& decided,
+                         Refinement& refinement) {
+  DepthCache none;
+  const Depth depth = penetrationDepth(a, b, decided, none);
+  const ExactFacet facet = nearestFacetExactly(a, b, depth.depth + depth.errorBound);
   const mpf_class squared = precise(dot(facet.normal, facet.normal));
   const mpf_class offset = precise(facet.offset);
   refinement.penetration = toDouble(mpf_class(offset / sqrt(squared)), facet.scale);
@@ -42,6 +46,7 @@ bool isNearerExactly(ExactDifference& difference, const ExactNearest& nearest, d
 Refinement refine(const ConvexBody& a, const ConvexBody& b, FeatureCache& cache) {
   Refinement refinement;
   refinement.decidedBy = decide(a, b, cache).decidedBy;
+  const FeatureCache decided = cache;
   ExactDifference difference(a, b);
   const ExactAnswer exact = solveExactly(difference, cache);
   refinement.verdict = exact.verdict;
@@ -50,7 +55,7 @@ Refinement refine(const ConvexBody& a, const ConvexBody& b, FeatureCache& cache)
   refinement.closestTail = exact.closestTail;
   refinement.pointA = exact.pointA;
   refinement.pointB = exact.pointB;
-  if (exact.verdict == Verdict::penetrating) describePenetration(a, b, refinement);
+  if (exact.verdict == Verdict::penetrating) describePenetration(a, b, decided, refinement);
   return refinement;
 }
 

@@ -1,0 +1,89 @@
+// A polytope of points of a Minkowski difference around the origin. Internal to the narrow phase.
+// Real is double or Wide.
+#pragma once
+
+#include "collision/minkowski.hpp"
+
+namespace enfilade::collision {
+
+inline constexpr std::size_t kMostCorners = 256;  // of a polytope; 10 to 30 are usual
+
+using Corners = std::array<std::uint16_t, 3>;  ///< counter-clockwise seen from outside
+
+template <class Real>
+struct Facet {
+  Corners corners;
+  Eigen::Matrix<Real, 3, 1> normal;  ///< outward, any length
+  Real offset;                       ///< the least normal . corner
+  Real nearness;                     ///< (offset / |normal|)^2, squared metres
+};
+
+template <class Real>
+Facet<Real> facetOf(const Corners& corners, const Eigen::Matrix<Real, 3, 1>& a,
+                    const Eigen::Matrix<Real, 3, 1>& b, const Eigen::Matrix<Real, 3, 1>& c) {
+  const Eigen::Matrix<Real, 3, 1> normal = (b - a).cross(c - a);
+  const Real offset = std::min(std::min(normal.dot(a), normal.dot(b)), normal.dot(c));
+  return {corners, normal, offset, offset * offset / normal.squaredNorm()};
+}
+
+/// How much nearer than sqrt(nearness) a facet may be, in metres. Whatever its normal n was rounded
+/// to: each of its points is a combination of its corners, so n . point is at least the least
+/// n . corner; a corner is off by 8u reach a coordinate and the product by 3u |n| reach more.
+template <class Real>
+Real facetError(double reach) {
+  return 24 * unitOf<Real>() * static_cast<Real>(reach);
+}
+
+/// Facets that form a closed surface, each turned away from the origin: so the surface winds around
+/// the origin, which is strictly inside.
+template <class Real>
+struct Polytope {
+  using Vec = Eigen::Matrix<Real, 3, 1>;
+
+  const MinkowskiDifference& difference;
+  Real leastDeterminant;  ///< proves that three points are turned as their determinant says
+  std::array<VertexPair, kMostCorners> pairs;
+  std::array<Vec, kMostCorners> points;
+  std::array<Facet<Real>, 2 * kMostCorners> facets;
+  std::size_t corners = 0, facetCount = 0;
+
+  explicit Polytope(const MinkowskiDifference& of) : difference(of) {
+    const Real reach = of.reach;
+    // Nine entries off by at most 8u reach, with cofactors of at most 2 reach^2, and as much again
+    // for rounding the product of edges of up to 2 reach.
+    leastDeterminant = 512 * unitOf<Real>() * reach * reach * reach;
+  }
+  std::span<Facet<Real>> all() { return {facets.data(), facetCount}; }
+  bool holds(VertexPair pair) const {
+    return std::find(pairs.begin(), pairs.begin() + corners, pair) != pairs.begin() + corners;
+  }
+  std::uint16_t addCorner(VertexPair pair) {
+    pairs[corners] = pair;
+    points[corners] = difference.point<Real>(pair);
+    return static_cast<std::uint16_t>(corners++);
+  }
+  /// False, and nothing added, when the facet is not proved to face away from the origin.
+  bool addFacet(const Corners& of) {
+    const Facet<Real> facet = facetOf<Real>(of, points[of[0]], points[of[1]], points[of[2]]);
+    if (!(facet.offset > leastDeterminant) || facetCount == facets.size()) return false;
+    facets[facetCount++] = facet;
+    return true;
+  }
+};
+
+/// Builds a polytope around the origin from a simplex that holds it, if only on a face, an edge or
+/// a corner (up to rounding): with supports on the sides that the simplex is flat on. `polytope` is
+/// empty before. False: not proved.
+template <class Real>
+bool surround(std::span<const VertexPair> simplex, Polytope<Real>& polytope);
+
+/// The same from supports along the world's axes.
+template <class Real>
+bool surroundByAxes(Polytope<Real>& polytope);
+
+extern template bool surround(std::span<const VertexPair>, Polytope<double>&);
+extern template bool surround(std::span<const VertexPair>, Polytope<Wide>&);
+extern template bool surroundByAxes(Polytope<double>&);
+extern template bool surroundByAxes(Polytope<Wide>&);
+
+}  // namespace enfilade::collision
