@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kMostEntries = 1.8;   // cells a box, on average, on the finest level
 constexpr double kLeastCompany = 12;   // boxes in a box' cell, on average
-constexpr double kLevelRatio = 4;      // of the edges of a level and the next finer one
+constexpr int kLevelBits = 2;          // a level's cells are 2^this as wide as the next finer ones
 constexpr double kOutermost = 0x1p30;  // place of the outermost cells
 constexpr std::size_t kSampledBoxes = 16384;
 constexpr int kEdgeSteps = 116;  // of the fourth root of 2: 2^-29 of the widest is the finest tried
@@ -112,42 +112,49 @@ std::uint64_t hashOf(std::size_t level, const CellPlace& at) {
 }
 
 CellGrid::CellGrid(std::span<const Box> boxes) {
-  double widest = 0, finest = 1;
+  double widest = 0;
   if (!boxes.empty()) {
     const Box bounds = boundsOf(boxes);
     origin_ = {bounds.min.x(), bounds.min.y(), bounds.min.z()};
     widest = std::min(bounds.size().maxCoeff(), 1e300);
-    finest = finestEdge(boxes, bounds.min, widest);
+    edge_ = finestEdge(boxes, bounds.min, widest);
+    inverseEdge_ = 1 / edge_;
   }
-  levels_.push_back({finest, 1 / finest});
-  while (levels_.back().edge < widest) {
-    const double edge = levels_.back().edge * kLevelRatio;
-    levels_.push_back({edge, 1 / edge});
-  }
-  levels_.push_back({kInfinity, 0});
+  for (double edge = edge_; edge < widest; edge *= 1 << kLevelBits) ++levelCount_;
 }
 
-std::int64_t CellGrid::finePlaceOf(const Level& level, std::size_t axis, double x) const {
+std::int64_t CellGrid::finePlaceOf(std::size_t axis, double x) const {
   constexpr double kFine = 1 << kFineBits;
   const double offset = std::clamp(x - origin_[axis], -1.7e308, 1.7e308);  // lest 0 * infinity
-  const double place = kFine * std::clamp(offset * level.inverseEdge, -kOutermost, kOutermost);
+  const double place = kFine * std::clamp(offset * inverseEdge_, -kOutermost, kOutermost);
   const auto truncated = static_cast<std::int64_t>(place);
   return truncated - (place < static_cast<double>(truncated) ? 1 : 0);
 }
 
-FinePlaces CellGrid::finePlacesOf(std::size_t level, const HalfAxes& reach) const {
+FinePlaces CellGrid::finePlacesOf(const HalfAxes& reach) const {
   FinePlaces places;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    places[axis] = -finePlaceOf(levels_[level], axis, -reach[axis]);
-    places[axis + 3] = finePlaceOf(levels_[level], axis, reach[axis + 3]);
+    places[axis] = -finePlaceOf(axis, -reach[axis]);
+    places[axis + 3] = finePlaceOf(axis, reach[axis + 3]);
   }
   return places;
 }
 
-std::size_t CellGrid::levelFor(const HalfAxes& reach, FinePlaces& places) const {
+FinePlaces CellGrid::onLevel(std::size_t level, const FinePlaces& finest) const {
+  FinePlaces places{};
+  if (level + 1 == levelCount_) return places;  // the cell that holds all of space
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    places[axis] = -(-finest[axis] >> (kLevelBits * level));
+    places[axis + 3] = finest[axis + 3] >> (kLevelBits * level);
+  }
+  return places;
+}
+
+std::size_t CellGrid::levelFor(FinePlaces& places) const {
+  const FinePlaces finest = places;
   std::size_t level = 0;
   for (;; ++level) {  // on the last level everything lies in the one cell
-    places = finePlacesOf(level, reach);
+    places = onLevel(level, finest);
     if (rangeOf(places).count() <= kMostCells) return level;
   }
 }

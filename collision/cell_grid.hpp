@@ -59,25 +59,25 @@ class CellGrid {
   /// Measures `boxes`; without any, cells of one metre.
   explicit CellGrid(std::span<const Box> boxes);
 
-  std::size_t levelCount() const { return levels_.size(); }
-  double edge(std::size_t level) const { return levels_[level].edge; }  ///< metres; last: infinite
+  std::size_t levelCount() const { return levelCount_; }
+  double edge() const { return edge_; }  ///< metres, of the finest cells
 
-  /// Where a box lies on a level, in 64ths of a cell, rounded down: on each half-axis the place of
-  /// its reach, by which boxes can be compared as by the reach itself: the place of a coordinate is
-  /// a monotone function of it, however rounded.
-  FinePlaces finePlacesOf(std::size_t level, const HalfAxes& reach) const;
-  /// The finest level on which the box lies in at most kMostCells cells; `places` are those on it.
-  std::size_t levelFor(const HalfAxes& reach, FinePlaces& places) const;
+  /// Where a box lies on the finest level, in 64ths of a cell, rounded down: on each half-axis the
+  /// place of its reach, by which boxes can be compared as by the reach itself: the place of a
+  /// coordinate is a monotone function of it, however rounded.
+  FinePlaces finePlacesOf(const HalfAxes& reach) const;
+  /// The same on another level, by what they are on the finest.
+  FinePlaces onLevel(std::size_t level, const FinePlaces& finest) const;
+  /// The finest level on which the box lies in at most kMostCells cells; `places` become those on
+  /// it.
+  std::size_t levelFor(FinePlaces& places) const;
 
  private:
-  struct Level {
-    double edge;         ///< metres
-    double inverseEdge;  ///< 0 on the last level
-  };
-  std::int64_t finePlaceOf(const Level& level, std::size_t axis, double x) const;
+  std::int64_t finePlaceOf(std::size_t axis, double x) const;
 
   std::array<double, 3> origin_{0, 0, 0};
-  std::vector<Level> levels_;
+  double edge_ = 1, inverseEdge_ = 1;  ///< metres, of the finest cells
+  std::size_t levelCount_ = 2;
 };
 
 std::uint64_t hashOf(std::size_t level, const CellPlace& at);

@@ -1,67 +1,63 @@
-// One pass over the boxes counts the ends of each list, a second puts them in by insertion (a list
-// mostly has a handful; long ones are sorted at last).
+// One pass a half-axis picks the ends that lie between the borders, without a branch: which do is
+// past guessing. A list mostly has a handful, which insertion sorts.
 
 #include "collision/mover_cell.hpp"
 
 #include <algorithm>
-#include <bit>
 
 namespace enfilade::collision {
 namespace {
 
 using End = MoverCell::End;
 
-constexpr std::uint32_t kFewEnds = 32;  // that are sorted by insertion
+constexpr std::size_t kFewEnds = 24;  // of a list, that are sorted by insertion
 
 bool before(const End& a, const End& b) {
   return a.at < b.at;
 }
 
-/// Into an ascending list of `count`; into a long one at its end, to be sorted at last.
-void insertSorted(End* list, std::uint32_t count, const End& end) {
-  for (; count > 0 && count < kFewEnds && end.at < list[count - 1].at; --count)
-    list[count] = list[count - 1];
-  list[count] = end;
+void sortEnds(End* first, End* last) {
+  if (static_cast<std::size_t>(last - first) > kFewEnds) {
+    std::sort(first, last, before);
+    return;
+  }
+  for (End* end = first; end != last; ++end) {
+    const End moving = *end;
+    End* to = end;
+    for (; to != first && moving.at < to[-1].at; --to) *to = to[-1];
+    *to = moving;
+  }
 }
 
 }  // namespace
 
 void MoverCell::lay(const StillCells& still, std::span<const StillCells::Row> rows,
                     const HalfAxes& reach, std::vector<std::uint32_t>& met) {
-  std::array<std::uint32_t, 6> first, count{}, within{};
-  for (const StillCells::Row row : rows) {
-    for (unsigned bits = beyond(still.onset(row), nearest); bits != 0; bits &= bits - 1) {
-      ++count[static_cast<std::size_t>(std::countr_zero(bits))];
-    }
+  boxes.resize(rows.size());
+  met.resize(rows.size());
+  std::size_t metCount = 0;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const unsigned apart = beyond(still.onset(rows[r]), reach);
+    boxes[r] = {still.idOf(rows[r]), static_cast<std::uint8_t>(apart)};
+    met[metCount] = boxes[r].id;
+    metCount += apart == 0 ? 1 : 0;
   }
-  std::uint32_t total = 0;
+  met.resize(metCount);
+  if (ends.size() < 6 * (rows.size() + 2)) ends.resize(6 * (rows.size() + 2));
+  End* end = ends.data();
   for (std::size_t k = 0; k < 6; ++k) {
-    first[k] = total + 1;
-    total += count[k] + 2;
-  }
-  ends.resize(total);
-  boxes.clear();
-  met.clear();
-  count.fill(0);
-  for (const StillCells::Row row : rows) {
-    const HalfAxes& onset = still.onset(row);
-    const unsigned apart = beyond(onset, reach), ending = beyond(onset, nearest);
-    if (apart == 0) met.push_back(still.idOf(row));
-    if (ending == 0) continue;
-    const auto box = static_cast<std::uint32_t>(boxes.size());
-    boxes.push_back({still.idOf(row), static_cast<std::uint8_t>(apart)});
-    for (unsigned bits = ending; bits != 0; bits &= bits - 1) {
-      const auto k = static_cast<std::size_t>(std::countr_zero(bits));
-      within[k] += ~apart >> k & 1;
-      insertSorted(ends.data() + first[k], count[k]++, {onset[k], box});
+    *end++ = {nearest[k], kBorder};
+    End* const first = end;
+    std::uint32_t within = 0;
+    for (std::uint32_t r = 0; r < rows.size(); ++r) {
+      const double onset = still.onset(rows[r])[k];
+      *end = {onset, r};
+      within += (onset > nearest[k]) & (onset <= reach[k]) ? 1 : 0;
+      end += onset > nearest[k] ? 1 : 0;
     }
-  }
-  for (std::size_t k = 0; k < 6; ++k) {
-    End* const list = ends.data() + first[k];
-    list[-1] = {nearest[k], kBorder};
-    list[count[k]] = {farthest[k], kBorder};
-    if (count[k] > kFewEnds) std::sort(list, list + count[k], before);
-    next[k] = first[k] + within[k];
+    sortEnds(first, end);
+    next[k] = static_cast<std::uint32_t>(first - ends.data()) + within;
+    *end++ = {farthest[k], kBorder};
   }
 }
 

@@ -27,11 +27,11 @@ struct MoverCell {
 
   HalfAxes nearest{}, farthest{};       ///< borders
   std::array<std::uint32_t, 6> next{};  ///< by half-axis: the first end beyond the reach
-  std::vector<End> ends;                ///< six lists, each ascending, a border at either side
-  std::vector<StillBox> boxes;          ///< those with an end between the borders
+  std::vector<End> ends;        ///< six lists, each ascending, a border at either side; room beyond
+  std::vector<StillBox> boxes;  ///< all that meet the cell
 
   /// Takes in the boxes of `rows`, all of which meet `farthest`, with the borders that are set.
-  /// Writes the ids of those that meet `reach` into `met`, in the order of `rows`.
+  /// `met` becomes the ids of those that meet `reach`, in the order of `rows`.
   void lay(const StillCells& still, std::span<const StillCells::Row> rows, const HalfAxes& reach,
            std::vector<std::uint32_t>& met);
 

@@ -11,14 +11,14 @@
 namespace enfilade::collision {
 
 void MoverLists::makeRoomFor(std::uint32_t mover) {
-  boxes_.resize(mover + std::size_t{1});
+  reach_.resize(mover + std::size_t{1});
   settled_.resize(mover + std::size_t{1});
   positions_.resize(mover + std::size_t{1});
   marked_.resize(mover + std::size_t{1}, 0);
 }
 
 void MoverLists::settle(std::span<const std::uint32_t> movers) {
-  for (const std::uint32_t mover : movers) settled_[mover] = boxes_[mover];
+  for (const std::uint32_t mover : movers) settled_[mover] = reach_[mover];
 }
 
 void MoverLists::renumber(std::size_t axis) {
@@ -41,7 +41,7 @@ void MoverLists::remove(std::span<const std::uint32_t> movers) {
 
 void MoverLists::confirm(std::uint32_t a, std::uint32_t b, std::vector<MoverChange>& changes) {
   ++boxTests;
-  if (overlaps(boxes_[a], boxes_[b])) changes.push_back({std::min(a, b), std::max(a, b), true});
+  if (overlapping(reach_[a], reach_[b])) changes.push_back({std::min(a, b), std::max(a, b), true});
 }
 
 /// `lower` and `upper` have passed one another: they opened an overlap, or closed one.
@@ -49,7 +49,10 @@ void MoverLists::exchanged(const End& lower, const End& upper, bool opens,
                            std::vector<MoverChange>& changes) {
   ++boxTests;
   const std::uint32_t a = lower.mover(), b = upper.mover();
-  if (overlaps(settled_[a], settled_[b]) != opens && overlaps(boxes_[a], boxes_[b]) == opens) {
+  // First the condition that seldom holds: most boxes that pass on one axis are far apart.
+  const std::vector<HalfAxes>&with = opens ? reach_ : settled_,
+        &without = opens ? settled_ : reach_;
+  if (overlapping(with[a], with[b]) && !overlapping(without[a], without[b])) {
     changes.push_back({std::min(a, b), std::max(a, b), opens});
   }
 }
@@ -98,10 +101,10 @@ void MoverLists::repair(std::size_t axis, End lower, End upper, std::vector<Move
 }
 
 void MoverLists::move(std::uint32_t mover, std::vector<MoverChange>& changes) {
-  const Box& box = boxes_[mover];
+  const HalfAxes& reach = reach_[mover];
   const std::array<std::uint32_t, 6> position = positions_[mover];
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double low = box.min[static_cast<int>(axis)], high = box.max[static_cast<int>(axis)];
+    const double low = -reach[axis], high = reach[axis + 3];
     End* const lower = &ends_[axis][position[2 * axis]];
     End* const upper = &ends_[axis][position[2 * axis + 1]];
     if (lower->at == low && upper->at == high) continue;
@@ -118,14 +121,13 @@ void MoverLists::move(std::uint32_t mover, std::vector<MoverChange>& changes) {
 void MoverLists::insert(std::span<const std::uint32_t> movers, std::vector<MoverChange>& changes) {
   if (movers.empty()) return;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const int a = static_cast<int>(axis);
     Ends& ends = ends_[axis];
     const End last = ends.back();
     ends.pop_back();
     const auto old = static_cast<std::ptrdiff_t>(ends.size());
     for (const std::uint32_t mover : movers) {
-      ends.push_back({boxes_[mover].min[a], 2 * mover});
-      ends.push_back({boxes_[mover].max[a], 2 * mover + 1});
+      ends.push_back({-reach_[mover][axis], 2 * mover});
+      ends.push_back({reach_[mover][axis + 3], 2 * mover + 1});
     }
     std::stable_sort(ends.begin() + old, ends.end(), before);
     std::inplace_merge(ends.begin(), ends.begin() + old, ends.end(), before);

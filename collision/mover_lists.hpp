@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "collision/types.hpp"
+#include "collision/half_axes.hpp"
 
 namespace enfilade::collision {
 
@@ -24,9 +24,9 @@ class MoverLists {
   static constexpr std::uint32_t kMostMovers = 0x7fffffff;  ///< ids are below
 
   /// Boxes of all movers of an update are set first; then the lists are changed.
-  void setBox(std::uint32_t mover, const Box& box) {
-    if (mover >= boxes_.size()) makeRoomFor(mover);
-    boxes_[mover] = box;
+  void setReach(std::uint32_t mover, const HalfAxes& reach) {
+    if (mover >= reach_.size()) makeRoomFor(mover);
+    reach_[mover] = reach;
   }
 
   /// Takes movers out of the lists; tells nothing.
@@ -73,8 +73,8 @@ class MoverLists {
     return positions_[tag >> 1][2 * axis + (tag & 1)];
   }
 
-  std::vector<Box> boxes_;    ///< by mover
-  std::vector<Box> settled_;  ///< by mover: as of the last update
+  std::vector<HalfAxes> reach_;    ///< by mover
+  std::vector<HalfAxes> settled_;  ///< by mover: as of the last update
   std::array<Ends, 3> ends_{noEnds(), noEnds(), noEnds()};
   std::vector<std::array<std::uint32_t, 6>> positions_;  ///< by mover: of its ends in the lists
   std::vector<std::uint8_t> marked_;                     ///< by mover: removed, or fresh

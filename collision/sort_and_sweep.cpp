@@ -60,8 +60,12 @@ bool isFinite(const Box& box) {
 }
 
 void requireBox(const Box& box, const char* what, std::size_t index) {
-  bool good = isFinite(box);
-  for (int axis = 0; axis < 3; ++axis) good &= box.min[axis] <= box.max[axis];
+  constexpr double kMost = std::numeric_limits<double>::max();
+  const HalfAxes reach = reachOf(box);
+  bool good = true;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    good &= reach[axis] <= kMost && reach[axis + 3] <= kMost && -reach[axis] <= reach[axis + 3];
+  }
   if (!good) refuse(box, what, index);
 }
 
@@ -77,35 +81,22 @@ Mover& known(std::vector<Mover>& movers, MoverId id) {
   return movers[id];
 }
 
-/// A box' reach, and what is found out about it at once.
+/// A box' reach, and whether the box is not empty.
 struct MovedReach {
   std::array<Lanes, 3> reach;
-  LaneMask good;  ///< -1 where the box is not empty; the third axis is in `goodLast`
-  bool goodLast;
+  bool full;
 
   explicit MovedReach(const Box& box) {
     static_assert(sizeof(Box) == 6 * sizeof(double));
-    const double* const ends = box.min.data();
-    const Lanes minXY = lanesAt(ends), maxXY = lanesAt(box.max.data());
-    reach[0] = -minXY;
-    reach[1] = lanesAt(ends + 2) * Lanes{-1, 1};
-    reach[2] = lanesAt(box.max.data() + 1);
-    good = minXY <= maxXY;
-    goodLast = box.min.z() <= box.max.z();
+    const double *const min = box.min.data(), *const max = box.max.data();
+    reach = {-lanesAt(min), lanesAt(min + 2) * Lanes{-1, 1}, lanesAt(max + 1)};
+    full = bitsOf(lanesAt(min) <= lanesAt(max)) == 3 && min[2] <= max[2];
   }
-  /// Whether the box is valid and the reach between guards, which are finite.
   bool within(const HalfAxes& low, const HalfAxes& high) const {
-    const LaneMask above = (lanesAt(&low[0]) <= reach[0]) & (lanesAt(&low[2]) <= reach[1]) &
-                           (lanesAt(&low[4]) <= reach[2]);
-    const LaneMask below = (reach[0] < lanesAt(&high[0])) & (reach[1] < lanesAt(&high[2])) &
-                           (reach[2] < lanesAt(&high[4]));
-    return bitsOf(good & above & below) == 3 && goodLast;
-  }
-  /// Whether the box is valid: neither empty nor endless, and all of it numbers.
-  bool valid() const {
-    constexpr double kMost = std::numeric_limits<double>::max();
-    const LaneMask finite = (reach[0] <= kMost) & (reach[1] <= kMost) & (reach[2] <= kMost);
-    return bitsOf(good & finite) == 3 && goodLast;
+    const auto pair = [&](std::size_t k) {
+      return bitsOf(lanesAt(&low[2 * k]) <= reach[k]) & bitsOf(reach[k] < lanesAt(&high[2 * k]));
+    };
+    return (pair(0) & pair(1) & pair(2)) == 3;
   }
 };
 
@@ -154,31 +145,36 @@ MoverId SortAndSweep::insert(const Box& box) {
 void SortAndSweep::move(MoverId id, const Box& box) {
   State& s = *state_;
   const MovedReach moved(box);
-  if (id < s.movers.size()) {
+  if (id < s.movers.size()) [[likely]] {
     Mover& mover = s.movers[id];
-    if (moved.within(mover.low, mover.high) && mover.neighbours.empty()) {
+    // Guards are finite: a reach between them is as well.
+    if (moved.within(mover.low, mover.high) && moved.full) {
+      if (!mover.neighbours.empty()) s.stir(id, moved.reach.data());
       std::memcpy(&mover.reach, &moved.reach, sizeof(mover.reach));
       return;
     }
   }
-  known(s.movers, id);
-  if (!moved.valid()) requireBox(box, "mover", id);
-  s.moveWatched(id, reachOf(box));
+  s.moveFarther(id, box);
 }
 
-/// A mover that may have passed something, or has neighbours.
-void SortAndSweep::State::moveWatched(MoverId id, const HalfAxes& reach) {
+/// Before a mover that has neighbours takes its new reach.
+void SortAndSweep::State::stir(MoverId id, const void* reach) {
   Mover& mover = movers[id];
-  if (reach == mover.reach) return;
-  mover.reach = reach;
-  if (mover.presence == Presence::fresh) return;
-  if (!mover.moved) {
-    mover.moved = true;
-    moved.push_back(id);
-  }
-  if (mover.neighbours.empty() || mover.stirred) return;
+  if (mover.stirred || std::memcmp(reach, &mover.reach, sizeof(mover.reach)) == 0) return;
   mover.stirred = true;
   stirred.push_back(id);
+}
+
+/// A mover that has passed a guard, or has none.
+void SortAndSweep::State::moveFarther(MoverId id, const Box& box) {
+  Mover& mover = known(movers, id);
+  requireBox(box, "mover", id);
+  const HalfAxes reach = reachOf(box);
+  if (!mover.neighbours.empty()) stir(id, &reach);
+  mover.reach = reach;
+  if (mover.moved || mover.presence == Presence::fresh) return;
+  mover.moved = true;
+  moved.push_back(id);
 }
 
 void SortAndSweep::remove(MoverId id) {
@@ -260,10 +256,10 @@ std::span<const SortAndSweep::Partner> SortAndSweep::partners(MoverId mover) con
 std::vector<StillId> SortAndSweep::stillOverlapping(const Box& box) const {
   const StillCells& still = state_->still;
   const HalfAxes reach = reachOf(box);
-  std::vector<StillCells::Row> rows;
+  StillCells::RowList rows;
   still.gather(reach, rows);
   std::vector<StillId> ids;
-  for (const StillCells::Row row : rows) {
+  for (const StillCells::Row row : rows.all()) {
     if (meets(still.onset(row), reach)) ids.push_back(still.idOf(row));
   }
   std::sort(ids.begin(), ids.end());

@@ -21,7 +21,7 @@ auto find(std::vector<Neighbour>& neighbours, MoverId id) {
 
 void SortAndSweep::State::beginNeighbours(MoverId a, MoverId b) {
   if (find(movers[a].neighbours, b) != movers[a].neighbours.end()) return;
-  const bool overlap = meets(onsetOfReach(movers[a].reach), movers[b].reach);
+  const bool overlap = overlapping(movers[a].reach, movers[b].reach);
   ++counters.boxTests;
   movers[a].neighbours.push_back({b, overlap});
   movers[b].neighbours.push_back({a, overlap});
@@ -40,12 +40,11 @@ void SortAndSweep::State::endNeighbours(MoverId a, MoverId b) {
 }
 
 void SortAndSweep::State::testNeighbours(MoverId id) {
-  const HalfAxes onset = onsetOfReach(movers[id].reach);
   for (Neighbour& neighbour : movers[id].neighbours) {
     const Mover& other = movers[neighbour.id];
     if (other.stirred && neighbour.id < id) continue;  // it tests the two
     ++counters.boxTests;
-    const bool overlap = meets(onset, other.reach);
+    const bool overlap = overlapping(movers[id].reach, other.reach);
     if (overlap == neighbour.met) continue;
     neighbour.met = overlap;
     find(movers[neighbour.id].neighbours, id)->met = overlap;
@@ -60,7 +59,7 @@ void SortAndSweep::State::testNeighbours(MoverId id) {
 void SortAndSweep::State::updateMoving() {
   lists.exchanges = lists.boxTests = 0;
   changes.clear();
-  for (const MoverId id : relaid) lists.setBox(id, boxOfReach(movers[id].cell.farthest));
+  for (const MoverId id : relaid) lists.setReach(id, movers[id].cell.farthest);
   for (const MoverId id : relaid) {
     if (movers[id].presence == Presence::live) lists.move(id, changes);
   }

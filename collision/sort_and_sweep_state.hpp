@@ -62,14 +62,15 @@ struct SortAndSweep::State {
   std::size_t nextVisited = 0;
 
   std::vector<MoverChange> changes;  ///< scratch
-  std::vector<Row> rows;             ///< scratch: the boxes about a mover
+  StillCells::RowList rows;          ///< scratch: the boxes about a mover
   std::vector<StillId> inReach;      ///< scratch: those that it meets
   std::vector<Partner> merged;       ///< scratch
   std::vector<BoxPair> begun, ended;
   std::size_t pairs = 0;
   SweepCounters counters;
 
-  void moveWatched(MoverId id, const HalfAxes& reach);
+  void stir(MoverId id, const void* reach);
+  void moveFarther(MoverId id, const Box& box);
 
   // Pairs: sort_and_sweep_pairs.cpp.
   void beginStill(MoverId id, StillId other);

@@ -12,16 +12,17 @@ namespace enfilade::collision {
 namespace {
 
 // A cell is laid for so many ticks at the rate of the last ones.
-constexpr double kHorizon = 25;
+constexpr double kHorizon = 40;
 // One mover in so many is looked at in a tick, and its cell laid anew if it will have left it when
 // it is looked at next.
-constexpr std::size_t kVisitEvery = 10;
+constexpr std::size_t kVisitEvery = 32;
 // Room for a change of course: so many ticks at the greatest rate of all half-axes, and a share of
 // the mover's size.
 constexpr double kSlackTicks = 3;
 constexpr double kSlackOfSize = 1.0 / 64;
-// A cell exceeds the mover by no more than its size, or this share of an edge of the finest cells,
-// so that what jumps does not gather half of the scene.
+// A cell exceeds the mover by no more than this share of its size, or of an edge of the finest
+// cells, so that what jumps does not gather half of the scene.
+constexpr double kMostOfSize = 1.5;
 constexpr double kMostOfEdge = 0.5;
 // More still boxes that come and go at once disturb all movers.
 constexpr std::size_t kFewEdits = 256;
@@ -62,29 +63,35 @@ void SortAndSweep::State::setBorders(Mover& mover) const {
   mover.laidAt = tick;
   double fastest = 0;
   for (const double rate : mover.rate) fastest = std::max(fastest, std::abs(rate));
-  const double edge = still.grid().edge(0);
-  for (std::size_t k = 0; k < 6; ++k) {
-    const double reach = mover.reach[k], size = reach + mover.reach[(k + 3) % 6];
-    const double most = std::max(size, kMostOfEdge * edge);
+  const double least = kMostOfEdge * still.grid().edge();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double size = mover.reach[axis] + mover.reach[axis + 3];
+    const double most = std::max(kMostOfSize * size, least);
     const double slack = kSlackTicks * fastest + kSlackOfSize * size;
-    const double course = kHorizon * mover.rate[k];
-    mover.cell.farthest[k] =
-        std::min(reach + std::min(slack + std::max(course, 0.0), most), kLargest);
-    mover.cell.nearest[k] =
-        std::max(reach - std::min(slack + std::max(-course, 0.0), most), -kLargest);
+    for (const std::size_t k : {axis, axis + 3}) {
+      const double course = kHorizon * mover.rate[k];
+      const double ahead = std::min(slack + std::max(course, 0.0), most);
+      const double behind = std::min(slack - std::min(course, 0.0), most);
+      mover.cell.farthest[k] = std::min(mover.reach[k] + ahead, kLargest);
+      mover.cell.nearest[k] = std::max(mover.reach[k] - behind, -kLargest);
+    }
   }
 }
 
 void SortAndSweep::State::layCell(MoverId id) {
   Mover& mover = movers[id];
   setBorders(mover);
-  rows.clear();
+  rows.count = 0;
   still.gather(mover.cell.farthest, rows);
-  for (const Row row : rows) __builtin_prefetch(&still.onset(row));
-  counters.boxTests += rows.size();
+  for (const Row row : rows.all()) __builtin_prefetch(&still.onset(row));
+  counters.boxTests += rows.count;
   ++counters.cellsLaid;
-  std::erase_if(rows, [&](Row row) { return !meets(still.onset(row), mover.cell.farthest); });
-  mover.cell.lay(still, rows, mover.reach, inReach);
+  std::size_t kept = 0;
+  for (const Row row : rows.all()) {
+    rows.rows[kept] = row;
+    kept += meets(still.onset(row), mover.cell.farthest) ? 1 : 0;
+  }
+  mover.cell.lay(still, std::span(rows.rows).first(kept), mover.reach, inReach);
   for (std::size_t k = 0; k < 6; ++k) guard(mover, k);
   replaceStill(id);
   if (mover.relaid) return;
@@ -93,12 +100,14 @@ void SortAndSweep::State::layCell(MoverId id) {
 }
 
 void SortAndSweep::State::visitMovers() {
-  const std::size_t visits = (movers.size() + kVisitEvery - 1) / kVisitEvery;
+  std::size_t visits = (movers.size() + kVisitEvery - 1) / kVisitEvery;
+  const double ticks = static_cast<double>(movers.size()) / static_cast<double>(visits);
+  visits -= std::min(visits, relaid.size());  // those that could not wait take their turn
   for (std::size_t k = 0; k < visits; ++k) {
     const auto id = static_cast<MoverId>(nextVisited++ % movers.size());
     const Mover& mover = movers[id];
     if (mover.presence != Presence::live || mover.relaid) continue;
-    const HalfAxes later = after(mover.reach, rateOf(mover, tick), kVisitEvery);
+    const HalfAxes later = after(mover.reach, rateOf(mover, tick), ticks);
     if (!within(mover.cell.nearest, later, mover.cell.farthest)) layCell(id);
   }
 }

@@ -15,27 +15,26 @@
 #include "collision/still_cells.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
 #include <limits>
 
 namespace enfilade::collision {
 namespace {
 
-constexpr std::size_t kEntriesPerLine = 4;
+constexpr std::size_t kRowOffset = 12;      // bytes, in an entry
+constexpr std::size_t kEntriesPerLine = 4;  // of a cache
 
 using Shorts = std::int16_t __attribute__((vector_size(16)));
 
-/// Whether no lane of the half-axes is set.
-bool noneOf(Shorts mask) {
+/// Whether no lane of the half-axes is set in either.
+bool noneOf(Shorts a, Shorts b) {
 #ifdef __SSE2__
   using Chars = char __attribute__((vector_size(16)));
-  return (__builtin_ia32_pmovmskb128(reinterpret_cast<Chars>(mask)) & 0xfff) == 0;
+  return (__builtin_ia32_pmovmskb128(reinterpret_cast<Chars>(a | b)) & 0xfff) == 0;
 #else
-  std::array<std::uint64_t, 2> words;
-  std::memcpy(words.data(), &mask, sizeof(mask));
-  static_assert(std::endian::native == std::endian::little);
-  return (words[0] | (words[1] & 0xffffffff)) == 0;
+  bool none = true;
+  for (std::size_t k = 0; k < 6; ++k) none &= (a[k] | b[k]) == 0;
+  return none;
 #endif
 }
 
@@ -57,13 +56,14 @@ StillCells::Entry StillCells::lanesOf(const FinePlaces& places, const CellPlace&
 StillCells::Entry StillCells::entryOf(const FinePlaces& reach, const CellPlace& cell, Row row) {
   const FinePlaces onset{-reach[3], -reach[4], -reach[5], -reach[0], -reach[1], -reach[2]};
   Entry entry = lanesOf(onset, cell);
-  entry[6] = static_cast<std::int16_t>(row & 0xffff);
-  entry[7] = static_cast<std::int16_t>(row >> 16);
+  std::memcpy(reinterpret_cast<char*>(&entry) + kRowOffset, &row, sizeof(row));
   return entry;
 }
 
 StillCells::Row StillCells::rowOf(const Entry& entry) {
-  return static_cast<std::uint16_t>(entry[6]) | Row{static_cast<std::uint16_t>(entry[7])} << 16;
+  Row row;
+  std::memcpy(&row, reinterpret_cast<const char*>(&entry) + kRowOffset, sizeof(row));
+  return row;
 }
 
 // ---- cells -------------------------------------------------------------------------------------
@@ -118,30 +118,36 @@ void StillCells::forEachCell(std::size_t level, const CellRange& range, Visit&& 
 }
 
 void StillCells::gatherFrom(const CellData& cell, const FinePlaces& reach, const CellRange& range,
-                            std::vector<Row>& rows) const {
+                            RowList& rows) const {
   const Entry most = lanesOf(reach, cell.at);
   constexpr std::int16_t kAny = std::numeric_limits<std::int16_t>::min();
   Entry least = {kAny, kAny, kAny, kAny, kAny, kAny, kAny, kAny};
   for (std::size_t axis = 0; axis < 3; ++axis) {  // lest the box is told twice
     if (cell.at[axis] != range.low[axis]) least[axis + 3] = 0;
   }
+  // Most miss, and which do is past guessing: every row is written, and counted if it is right.
+  if (rows.rows.size() < rows.count + cell.count) rows.rows.resize(2 * (rows.count + cell.count));
+  Row* next = rows.rows.data() + rows.count;
   for (const Entry *entry = cell.entries, *end = entry + cell.count; entry != end; ++entry) {
-    if (noneOf((*entry > most) | (*entry < least))) rows.push_back(rowOf(*entry));
+    *next = rowOf(*entry);
+    next += noneOf(*entry > most, *entry < least) ? 1 : 0;
   }
+  rows.count = static_cast<std::size_t>(next - rows.rows.data());
 }
 
-void StillCells::gather(const HalfAxes& reach, std::vector<Row>& rows) const {
+void StillCells::gather(const HalfAxes& reach, RowList& rows) const {
+  const FinePlaces finest = grid_.finePlacesOf(reach);
   for (const std::size_t level : usedLevels_) {
-    const FinePlaces places = grid_.finePlacesOf(level, reach);
+    const FinePlaces places = grid_.onLevel(level, finest);
     const CellRange range = rangeOf(places);
     forEachCell(level, range, [&](const CellData& cell) { gatherFrom(cell, places, range, rows); });
   }
 }
 
 void StillCells::prefetch(const HalfAxes& reach) const {
+  const FinePlaces finest = grid_.finePlacesOf(reach);
   for (const std::size_t level : usedLevels_) {
-    const CellRange range = rangeOf(grid_.finePlacesOf(level, reach));
-    forEachCell(level, range, [&](const CellData& cell) {
+    forEachCell(level, rangeOf(grid_.onLevel(level, finest)), [&](const CellData& cell) {
       for (std::uint32_t e = 0; e < cell.count; e += kEntriesPerLine) {
         __builtin_prefetch(cell.entries + e);
       }
@@ -196,8 +202,8 @@ void StillCells::insert(const Box& box, std::uint32_t id) {
   }
   if (id >= rowOf_.size()) rowOf_.resize(id + std::size_t{1}, kNoRow);
   rowOf_[id] = row;
-  FinePlaces places;
-  const std::size_t level = grid_.levelFor(reachOf(box), places);
+  FinePlaces places = grid_.finePlacesOf(reachOf(box));
+  const std::size_t level = grid_.levelFor(places);
   forEachPlace(rangeOf(places), [&](const CellPlace& at) {
     CellData& cell = cells_[findOrAdd(level, at)];
     if (cell.count == cell.room) growCell(cell);
@@ -207,8 +213,8 @@ void StillCells::insert(const Box& box, std::uint32_t id) {
 
 void StillCells::remove(Row row) {
   ++editCount_;
-  FinePlaces places;
-  const std::size_t level = grid_.levelFor(reachOf(boxOfOnset(onsets_[row])), places);
+  FinePlaces places = grid_.finePlacesOf(reachOf(boxOfOnset(onsets_[row])));
+  const std::size_t level = grid_.levelFor(places);
   forEachPlace(rangeOf(places), [&](const CellPlace& at) {
     CellData& cell = cells_[slots_[slotOf(level, at)]];
     Entry* const last = cell.entries + --cell.count;

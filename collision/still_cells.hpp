@@ -28,8 +28,15 @@ class StillCells {
   std::uint32_t idOf(Row row) const { return ids_[row]; }
   const CellGrid& grid() const { return grid_; }
 
+  /// Rows at the front of a vector that never shrinks, so that none are written but those asked
+  /// for.
+  struct RowList {
+    std::vector<Row> rows;
+    std::size_t count = 0;
+    std::span<Row> all() { return std::span(rows).first(count); }
+  };
   /// Appends the rows of all boxes that meet `reach`, each once, and some that miss it narrowly.
-  void gather(const HalfAxes& reach, std::vector<Row>& rows) const;
+  void gather(const HalfAxes& reach, RowList& rows) const;
   /// Asks for the memory that gather() will read. A hint to the processor only.
   void prefetch(const HalfAxes& reach) const;
 
@@ -61,7 +68,7 @@ class StillCells {
   static Entry entryOf(const FinePlaces& reach, const CellPlace& cell, Row row);
   static Row rowOf(const Entry& entry);
   void gatherFrom(const CellData& cell, const FinePlaces& reach, const CellRange& range,
-                  std::vector<Row>& rows) const;
+                  RowList& rows) const;
   template <typename Visit>
   void forEachCell(std::size_t level, const CellRange& range, Visit&& visit) const;
 

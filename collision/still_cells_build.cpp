@@ -39,9 +39,10 @@ std::vector<Row> spatialOrder(std::span<const Box> boxes, const CellGrid& grid) 
   Box bounds;
   for (const Box& box : boxes) bounds.include(box);
   std::size_t level = 0;
-  CellRange all = rangeOf(grid.finePlacesOf(level, reachOf(bounds)));
+  const FinePlaces finest = grid.finePlacesOf(reachOf(bounds));
+  CellRange all = rangeOf(finest);
   while (all.count() > static_cast<double>(boxes.size()) && level + 1 < grid.levelCount()) {
-    all = rangeOf(grid.finePlacesOf(++level, reachOf(bounds)));
+    all = rangeOf(grid.onLevel(++level, finest));
   }
   const auto across = [&all](std::size_t axis) {
     return static_cast<std::uint32_t>(all.high[axis] - all.low[axis]) + 1;
@@ -49,7 +50,8 @@ std::vector<Row> spatialOrder(std::span<const Box> boxes, const CellGrid& grid) 
   std::vector<std::uint32_t> keys;
   keys.reserve(boxes.size());
   for (const Box& box : boxes) {
-    const CellPlace at = rangeOf(grid.finePlacesOf(level, reachOf({box.min, box.min}))).low;
+    const CellPlace at =
+        rangeOf(grid.onLevel(level, grid.finePlacesOf(reachOf({box.min, box.min})))).low;
     const auto from = [&](std::size_t axis) {
       return static_cast<std::uint32_t>(at[axis] - all.low[axis]);
     };
@@ -86,8 +88,8 @@ StillCells::Placed StillCells::placeBoxes(std::span<const Box> boxes) {
     if (k + kPrefetchAhead < boxes.size()) {
       __builtin_prefetch(&boxes[placed.boxes[k + kPrefetchAhead]]);
     }
-    FinePlaces places;
-    const std::size_t level = grid_.levelFor(reachOf(boxes[placed.boxes[k]]), places);
+    FinePlaces places = grid_.finePlacesOf(reachOf(boxes[placed.boxes[k]]));
+    const std::size_t level = grid_.levelFor(places);
     const std::size_t before = placed.cells.size();
     forEachPlace(rangeOf(places), [&](const CellPlace& at) {
       const Cell cell = findOrAdd(level, at);
@@ -149,8 +151,8 @@ void StillCells::fill(std::span<const Box> boxes, std::span<const std::uint32_t>
     const Row box = placed.boxes[at];
     onsets_.push_back(onsetOf(boxes[box]));
     ids_.push_back(ids[box]);
-    const HalfAxes reach = reachOf(boxes[box]);
-    const FinePlaces places = grid_.finePlacesOf(cells_[home[at]].level, reach);
+    const FinePlaces places =
+        grid_.onLevel(cells_[home[at]].level, grid_.finePlacesOf(reachOf(boxes[box])));
     for (std::size_t e = 0; e < placed.counts[at]; ++e) {
       CellData& cell = cells_[placed.cells[firstCell[at] + e]];
       cell.entries[cell.count++] = entryOf(places, cell.at, row);
