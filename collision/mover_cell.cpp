@@ -29,34 +29,47 @@ void sortEnds(End* first, End* last) {
   }
 }
 
+/// Picks the rows that end on half-axis `k`; returns the end of `ends`.
+End* pickEnds(const StillCells& still, std::span<const StillCells::Row> rows, std::size_t k,
+              std::span<const MoverCell::StillBox> boxes, End* ends) {
+  End* picked = ends;
+  for (std::uint32_t r = 0; r < rows.size(); ++r) {
+    picked->box = r;
+    picked += boxes[r].ending >> k & 1;
+  }
+  for (End* end = ends; end != picked; ++end) end->at = still.onset(rows[end->box])[k];
+  sortEnds(ends, picked);
+  return picked;
+}
+
 }  // namespace
 
 void MoverCell::lay(const StillCells& still, std::span<const StillCells::Row> rows,
                     const HalfAxes& reach, std::vector<std::uint32_t>& met) {
-  boxes.resize(rows.size());
-  met.resize(rows.size());
+  if (boxes.size() < rows.size()) boxes.resize(rows.size());
+  if (met.size() < rows.size()) met.resize(rows.size());
+  if (ends.size() < 6 * (rows.size() + 2)) ends.resize(6 * (rows.size() + 2));
   std::size_t metCount = 0;
+  unsigned endingOnes = 0;
   for (std::size_t r = 0; r < rows.size(); ++r) {
-    const unsigned apart = beyond(still.onset(rows[r]), reach);
-    boxes[r] = {still.idOf(rows[r]), static_cast<std::uint8_t>(apart)};
-    met[metCount] = boxes[r].id;
+    const HalfAxes& onset = still.onset(rows[r]);
+    const unsigned apart = beyond(onset, reach), ending = beyond(onset, nearest);
+    const std::uint32_t id = still.idOf(rows[r]);
+    boxes[r] = {id, static_cast<std::uint8_t>(apart), static_cast<std::uint8_t>(ending)};
+    met[metCount] = id;
     metCount += apart == 0 ? 1 : 0;
+    endingOnes |= ending;
   }
   met.resize(metCount);
-  if (ends.size() < 6 * (rows.size() + 2)) ends.resize(6 * (rows.size() + 2));
   End* end = ends.data();
   for (std::size_t k = 0; k < 6; ++k) {
     *end++ = {nearest[k], kBorder};
-    End* const first = end;
-    std::uint32_t within = 0;
-    for (std::uint32_t r = 0; r < rows.size(); ++r) {
-      const double onset = still.onset(rows[r])[k];
-      *end = {onset, r};
-      within += (onset > nearest[k]) & (onset <= reach[k]) ? 1 : 0;
-      end += onset > nearest[k] ? 1 : 0;
+    End* beyondReach = end;
+    if ((endingOnes >> k & 1) != 0) {
+      end = pickEnds(still, rows, k, boxes, end);
+      while (beyondReach != end && beyondReach->at <= reach[k]) ++beyondReach;
     }
-    sortEnds(first, end);
-    next[k] = static_cast<std::uint32_t>(first - ends.data()) + within;
+    next[k] = static_cast<std::uint32_t>(beyondReach - ends.data());
     *end++ = {farthest[k], kBorder};
   }
 }

@@ -22,13 +22,14 @@ struct MoverCell {
   };
   struct StillBox {
     std::uint32_t id;
-    std::uint8_t apart;  ///< bit k: its onset on half-axis k is beyond the reach
+    std::uint8_t apart;   ///< bit k: its onset on half-axis k is beyond the reach
+    std::uint8_t ending;  ///< bit k: beyond the nearest border, as of when the cell was laid
   };
 
   HalfAxes nearest{}, farthest{};       ///< borders
   std::array<std::uint32_t, 6> next{};  ///< by half-axis: the first end beyond the reach
   std::vector<End> ends;        ///< six lists, each ascending, a border at either side; room beyond
-  std::vector<StillBox> boxes;  ///< all that meet the cell
+  std::vector<StillBox> boxes;  ///< all that meet the cell; room beyond
 
   /// Takes in the boxes of `rows`, all of which meet `farthest`, with the borders that are set.
   /// `met` becomes the ids of those that meet `reach`, in the order of `rows`.

@@ -156,7 +156,9 @@ void StillCells::prefetch(const HalfAxes& reach) const {
 }
 
 std::size_t StillCells::bytesBesidesBoxes() const {
-  std::size_t bytes = sizeof(*this) + (ids_.size() + rowOf_.capacity()) * sizeof(Row) +
+  std::size_t bytes = sizeof(*this) + onsets_.capacity() * sizeof(HalfAxes) -
+                      (onsets_.size() - freeRows_.size()) * sizeof(HalfAxes) +
+                      (ids_.capacity() + rowOf_.capacity() + freeRows_.capacity()) * sizeof(Row) +
                       cells_.capacity() * sizeof(CellData) + slots_.capacity() * sizeof(Cell) +
                       entries_.capacity() * sizeof(Entry);
   for (const auto& block : grown_) bytes += block.capacity() * sizeof(Entry) + sizeof(block);

@@ -49,7 +49,7 @@ class StillCells {
   void remove(Row row);
   Row rowOf(std::uint32_t id);  ///< kNoRow if there is none; O(1), but O(n) when first asked
 
-  /// Bytes held besides the boxes themselves. Room that was never touched is not counted.
+  /// Bytes held besides 48 for each box.
   std::size_t bytesBesidesBoxes() const;
 
  private:

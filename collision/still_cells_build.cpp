@@ -21,6 +21,7 @@ using Row = StillCells::Row;
 
 constexpr std::size_t kMostRows = 0xfffffffe;
 constexpr std::size_t kLeastEdits = 64;    // before a build of everything
+constexpr std::size_t kRoomShare = 32;     // of the boxes: room for those that come later
 constexpr std::size_t kPrefetchAhead = 8;  // boxes, which are read in no order
 
 /// The items 0 .. keys.size() - 1 by their key, stably. Keys are below `keyCount`.
@@ -140,9 +141,10 @@ void StillCells::fill(std::span<const Box> boxes, std::span<const std::uint32_t>
     home[k] = placed.cells[first];
   }
   const std::vector<Row> order = countingSort(home, cells_.size());
-  // Rows in that order. The reserve is address space; it costs memory when it is used.
-  onsets_.reserve(boxes.size() + mostEdits_);
-  ids_.reserve(boxes.size() + mostEdits_);
+  // Rows in that order, with room for some that come later.
+  const std::size_t room = boxes.size() + boxes.size() / kRoomShare + 1;
+  onsets_.reserve(room);
+  ids_.reserve(room);
   for (Row row = 0; row < boxes.size(); ++row) {
     if (row + kPrefetchAhead < boxes.size()) {
       __builtin_prefetch(&boxes[placed.boxes[order[row + kPrefetchAhead]]]);

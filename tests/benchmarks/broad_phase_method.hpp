@@ -53,6 +53,9 @@ class BroadPhase {
   virtual void tick(std::span<const Box> movers, PairTally& tally) = 0;
   /// Bytes that malloc does not know of.
   virtual std::size_t hiddenBytes() const { return 0; }
+  /// Whether it goes on reading the still boxes that it was given, so that it needs no copy of
+  /// them.
+  virtual bool readsGivenBoxes() const { return true; }
 };
 
 struct BroadPhaseMethod {

@@ -24,6 +24,7 @@ class OurSortAndSweep : public BroadPhase {
       }
     }
   }
+  bool readsGivenBoxes() const override { return false; }
 
  private:
   collision::SortAndSweep sweep_;

@@ -25,6 +25,7 @@ class BoostRtree : public BroadPhase {
       }
     }
   }
+  bool readsGivenBoxes() const override { return false; }
 
  private:
   using Point = boost::geometry::model::point<double, 3, boost::geometry::cs::cartesian>;

@@ -21,6 +21,7 @@ class CgalBoxes : public BroadPhase {
         movers_.begin(), movers_.end(),
         [&](const Handled& a, const Handled& b) { tally.addMovers(a.number, b.number); });
   }
+  bool readsGivenBoxes() const override { return false; }
 
  private:
   struct Handled : CGAL::Box_intersection_d::Box_d<double, 3> {
