@@ -144,8 +144,8 @@ std::optional<std::string> submit(World& world, Command command);
 TickReport tick(World& world);
 
 /// From now on every `everyTicks`-th tick is audited (0: none, as at first): its pairs beside brute
-/// force, avatars * (objects + avatars) box tests of about a nanosecond, but no more avatars at a
-/// time than take some 2 ms, in turn, and at least one.
+/// force, avatars * (objects + avatars) box tests of some 5 ns, but no more avatars at a time than
+/// take some 2 ms, in turn, and at least one.
 void auditBroadPhase(World& world, std::uint32_t everyTicks);
 
 /// Ends every contact with the given reason, as at shutdown; the world is not ticked after this.

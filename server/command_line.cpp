@@ -47,8 +47,9 @@ std::string auditProblem(const std::string& text) {
 void addAudit(CLI::App& verb, Arguments& into) {
   verb.add_option("--audit", into.auditEvery,
                   "Compare the pairs of every Nth tick with brute force; 0: never. An audited tick "
-                  "takes longer by avatars x objects box tests of about a nanosecond; above 2 ms "
-                  "the avatars take turns, at least one a time (a million objects: 1 ms)")
+                  "takes longer by avatars x objects box tests of some 5 ns; what takes more than "
+                  "2 ms the avatars share in turn, at least one a time (a million objects: 5 to "
+                  "10 ms). Ends with 3 if something was found")
       ->capture_default_str()
       ->check(CLI::Validator(auditProblem, "N"));
 }
