@@ -17,7 +17,7 @@ constexpr double kHorizon = 40;
 // it is looked at next.
 constexpr std::size_t kVisitEvery = 32;
 // Room for a change of course: so many ticks at the greatest rate of all half-axes, and a share of
-// the mover's size.
+// the mover's size; all of its size while nothing is known of its course.
 constexpr double kSlackTicks = 3;
 constexpr double kSlackOfSize = 1.0 / 64;
 // A cell exceeds the mover by no more than this share of its size, or of an edge of the finest
@@ -67,7 +67,8 @@ void SortAndSweep::State::setBorders(Mover& mover) const {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double size = mover.reach[axis] + mover.reach[axis + 3];
     const double most = std::max(kMostOfSize * size, least);
-    const double slack = kSlackTicks * fastest + kSlackOfSize * size;
+    const double slack =
+        mover.presence == Presence::fresh ? size : kSlackTicks * fastest + kSlackOfSize * size;
     for (const std::size_t k : {axis, axis + 3}) {
       const double course = kHorizon * mover.rate[k];
       const double ahead = std::min(slack + std::max(course, 0.0), most);

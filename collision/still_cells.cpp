@@ -23,6 +23,7 @@ namespace {
 
 constexpr std::size_t kRowOffset = 12;      // bytes, in an entry
 constexpr std::size_t kEntriesPerLine = 4;  // of a cache
+constexpr std::size_t kFewPlaces = 64;      // of a level, that are looked up side by side
 
 using Shorts = std::int16_t __attribute__((vector_size(16)));
 
@@ -71,12 +72,14 @@ StillCells::Row StillCells::rowOf(const Entry& entry) {
 /// The slot that holds the cell, or the free one where it belongs. At most half of the slots are
 /// taken, so the search ends.
 std::size_t StillCells::slotOf(std::size_t level, const CellPlace& at) const {
-  const std::size_t mask = slots_.size() - 1;
-  std::size_t slot = hashOf(level, at) & mask;
+  return probe(hashOf(level, at) & (slots_.size() - 1), level, at);
+}
+
+std::size_t StillCells::probe(std::size_t slot, std::size_t level, const CellPlace& at) const {
   while (slots_[slot] != kNoCell) {
     const CellData& cell = cells_[slots_[slot]];
     if (cell.level == level && cell.at == at) break;
-    slot = (slot + 1) & mask;
+    slot = (slot + 1) & (slots_.size() - 1);
   }
   return slot;
 }
@@ -135,23 +138,46 @@ void StillCells::gatherFrom(const CellData& cell, const FinePlaces& reach, const
   rows.count = static_cast<std::size_t>(next - rows.rows.data());
 }
 
+void StillCells::gatherPlaces(std::size_t level, const FinePlaces& places, const CellRange& range,
+                              RowList& rows) const {
+  // What is needed of all cells is asked for before any is used: a mover enters where no cache has
+  // been for long.
+  std::array<std::size_t, kFewPlaces> slots;
+  std::array<CellPlace, kFewPlaces> at;
+  std::size_t count = 0;
+  forEachPlace(range, [&](const CellPlace& place) {
+    at[count] = place;
+    slots[count] = hashOf(level, place) & (slots_.size() - 1);
+    __builtin_prefetch(&slots_[slots[count++]]);
+  });
+  for (std::size_t k = 0; k < count; ++k) {
+    const Cell cell = slots_[slots[k]];
+    if (cell != kNoCell) __builtin_prefetch(&cells_[cell]);
+  }
+  std::size_t found = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const Cell cell = slots_[probe(slots[k], level, at[k])];
+    if (cell == kNoCell) continue;
+    slots[found++] = cell;
+    const CellData& data = cells_[cell];
+    for (std::uint32_t e = 0; e < data.count; e += kEntriesPerLine) {
+      __builtin_prefetch(data.entries + e);
+    }
+  }
+  for (std::size_t k = 0; k < found; ++k) gatherFrom(cells_[slots[k]], places, range, rows);
+}
+
 void StillCells::gather(const HalfAxes& reach, RowList& rows) const {
   const FinePlaces finest = grid_.finePlacesOf(reach);
   for (const std::size_t level : usedLevels_) {
     const FinePlaces places = grid_.onLevel(level, finest);
     const CellRange range = rangeOf(places);
-    forEachCell(level, range, [&](const CellData& cell) { gatherFrom(cell, places, range, rows); });
-  }
-}
-
-void StillCells::prefetch(const HalfAxes& reach) const {
-  const FinePlaces finest = grid_.finePlacesOf(reach);
-  for (const std::size_t level : usedLevels_) {
-    forEachCell(level, rangeOf(grid_.onLevel(level, finest)), [&](const CellData& cell) {
-      for (std::uint32_t e = 0; e < cell.count; e += kEntriesPerLine) {
-        __builtin_prefetch(cell.entries + e);
-      }
-    });
+    if (range.count() <= kFewPlaces) {
+      gatherPlaces(level, places, range, rows);
+    } else {
+      forEachCell(level, range,
+                  [&](const CellData& cell) { gatherFrom(cell, places, range, rows); });
+    }
   }
 }
 

@@ -37,8 +37,6 @@ class StillCells {
   };
   /// Appends the rows of all boxes that meet `reach`, each once, and some that miss it narrowly.
   void gather(const HalfAxes& reach, RowList& rows) const;
-  /// Asks for the memory that gather() will read. A hint to the processor only.
-  void prefetch(const HalfAxes& reach) const;
 
   // ---- boxes that come and go ----
 
@@ -72,7 +70,11 @@ class StillCells {
   template <typename Visit>
   void forEachCell(std::size_t level, const CellRange& range, Visit&& visit) const;
 
+  void gatherPlaces(std::size_t level, const FinePlaces& places, const CellRange& range,
+                    RowList& rows) const;
+
   std::size_t slotOf(std::size_t level, const CellPlace& at) const;
+  std::size_t probe(std::size_t slot, std::size_t level, const CellPlace& at) const;
   Cell findOrAdd(std::size_t level, const CellPlace& at);
   void rebuildSlots(std::size_t size);
 
