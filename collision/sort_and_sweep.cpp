@@ -130,6 +130,7 @@ MoverId SortAndSweep::insert(const Box& box) {
   if (id >= MoverLists::kMostMovers) throw std::length_error("more than 2^31 - 1 movers");
   if (s.freeIds.empty()) {
     s.movers.emplace_back();
+    s.isStirred.push_back(0);
   } else {
     s.freeIds.pop_back();
   }
@@ -160,8 +161,8 @@ void SortAndSweep::move(MoverId id, const Box& box) {
 /// Before a mover that has neighbours takes its new reach.
 void SortAndSweep::State::stir(MoverId id, const void* reach) {
   Mover& mover = movers[id];
-  if (mover.stirred || std::memcmp(reach, &mover.reach, sizeof(mover.reach)) == 0) return;
-  mover.stirred = true;
+  if (isStirred[id] != 0 || std::memcmp(reach, &mover.reach, sizeof(mover.reach)) == 0) return;
+  isStirred[id] = 1;
   stirred.push_back(id);
 }
 
@@ -231,7 +232,7 @@ void SortAndSweep::update() {
   s.visitMovers();
   s.updateMoving();
   for (const MoverId id : s.moved) s.movers[id].moved = false;
-  for (const MoverId id : s.stirred) s.movers[id].stirred = false;
+  for (const MoverId id : s.stirred) s.isStirred[id] = 0;
   for (const MoverId id : s.relaid) s.movers[id].relaid = false;
   for (const MoverId id : s.fresh) s.movers[id].presence = Presence::live;
   for (const MoverId id : s.leaving) s.movers[id].presence = Presence::free;

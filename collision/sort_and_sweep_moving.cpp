@@ -41,8 +41,8 @@ void SortAndSweep::State::endNeighbours(MoverId a, MoverId b) {
 
 void SortAndSweep::State::testNeighbours(MoverId id) {
   for (Neighbour& neighbour : movers[id].neighbours) {
+    if (neighbour.id < id && isStirred[neighbour.id] != 0) continue;  // it tests the two
     const Mover& other = movers[neighbour.id];
-    if (other.stirred && neighbour.id < id) continue;  // it tests the two
     ++counters.boxTests;
     const bool overlap = overlapping(movers[id].reach, other.reach);
     if (overlap == neighbour.met) continue;

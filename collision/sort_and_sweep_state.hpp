@@ -34,7 +34,6 @@ struct alignas(64) Mover {
   MoverCell cell;
   Presence presence = Presence::free;
   bool moved = false;        ///< may have passed a guard since the last update
-  bool stirred = false;      ///< moved at all, and has neighbours
   bool relaid = false;       ///< its cell was laid anew in this update
   std::uint64_t laidAt = 0;  ///< tick
   HalfAxes laidReach{};      ///< then
@@ -58,6 +57,7 @@ struct SortAndSweep::State {
   std::vector<MoverId> freeIds;
   std::vector<MoverId> moved, stirred, fresh, leaving;  ///< since the last update
   std::vector<MoverId> relaid;                          ///< in this update
+  std::vector<std::uint8_t> isStirred;  ///< by mover: side by side, for its neighbours
   std::uint64_t tick = 0;
   std::size_t nextVisited = 0;
 
