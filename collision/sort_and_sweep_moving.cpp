@@ -12,31 +12,32 @@
 namespace enfilade::collision {
 namespace {
 
+/// The place of a mover among neighbours, or where it belongs.
 auto find(std::vector<Neighbour>& neighbours, MoverId id) {
-  return std::find_if(neighbours.begin(), neighbours.end(),
-                      [id](const Neighbour& n) { return n.id == id; });
+  return std::lower_bound(neighbours.begin(), neighbours.end(), id,
+                          [](const Neighbour& n, MoverId sought) { return n.id < sought; });
 }
 
 }  // namespace
 
 void SortAndSweep::State::beginNeighbours(MoverId a, MoverId b) {
-  if (find(movers[a].neighbours, b) != movers[a].neighbours.end()) return;
+  std::vector<Neighbour>&ofA = movers[a].neighbours, &ofB = movers[b].neighbours;
+  const auto at = find(ofA, b);
+  if (at != ofA.end() && at->id == b) return;
   const bool overlap = overlapping(movers[a].reach, movers[b].reach);
   ++counters.boxTests;
-  movers[a].neighbours.push_back({b, overlap});
-  movers[b].neighbours.push_back({a, overlap});
+  ofA.insert(at, {b, overlap});
+  ofB.insert(find(ofB, a), {a, overlap});
   if (overlap) beginMoving(a, b);
 }
 
 void SortAndSweep::State::endNeighbours(MoverId a, MoverId b) {
   std::vector<Neighbour>&ofA = movers[a].neighbours, &ofB = movers[b].neighbours;
   const auto at = find(ofA, b);
-  if (at == ofA.end()) return;
+  if (at == ofA.end() || at->id != b) return;
   if (at->met) endMoving(a, b);
-  *at = ofA.back();
-  ofA.pop_back();
-  *find(ofB, a) = ofB.back();
-  ofB.pop_back();
+  ofA.erase(at);
+  ofB.erase(find(ofB, a));
 }
 
 void SortAndSweep::State::testNeighbours(MoverId id) {

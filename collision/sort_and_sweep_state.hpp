@@ -29,7 +29,7 @@ struct alignas(64) Mover {
   HalfAxes reach{};
   HalfAxes low{}, high{};  ///< guards: while low <= reach < high nothing was passed
   std::vector<SortAndSweep::Partner> partners;  ///< sorted
-  std::vector<Neighbour> neighbours;            ///< in the order in which they came
+  std::vector<Neighbour> neighbours;            ///< sorted by id
 
   MoverCell cell;
   Presence presence = Presence::free;
