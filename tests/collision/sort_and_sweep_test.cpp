@@ -362,6 +362,40 @@ TEST(SortAndSweep, WorkAMoverDoesNotGrowWithTheScene) {
   EXPECT_LT(large, 20);
 }
 
+TEST(SortAndSweep, AWalkerOnAStraightCourseSeldomHasItsCellLaidAnew) {
+  Random random(12);
+  SortAndSweep sweep(furnishedHall(random, 20000, Vec3(100, 3, 100)));
+  std::vector<Box> boxes;
+  for (int k = 0; k < 50; ++k) {
+    boxes.push_back(boxAt(uniform3(random, Vec3(5, 0, 5), Vec3(80, 1, 80)), Vec3(0.6, 1.75, 0.6)));
+    sweep.insert(boxes.back());
+  }
+  sweep.update();
+  std::uint64_t laid = 0, most = 0, exchanges = 0;
+  for (int tick = 0; tick < 300; ++tick) {
+    for (MoverId id = 0; id < boxes.size(); ++id) {
+      const Vec3 step(0.02, 0, 0.015);
+      boxes[id] = {boxes[id].min + step, boxes[id].max + step};
+      sweep.move(id, boxes[id]);
+    }
+    sweep.update();
+    laid += sweep.counters().cellsLaid;
+    most = std::max(most, sweep.counters().cellsLaid);
+    exchanges += sweep.counters().exchanges;
+  }
+  EXPECT_GT(exchanges, 1000u);
+  EXPECT_GT(laid, 50u);
+  EXPECT_LT(laid, 300u * 50 / 20) << "a cell lasts for more than 20 ticks";
+  EXPECT_LT(most, 10u) << "few movers have theirs laid in one tick";
+}
+
+TEST(SortAndSweep, HoldsFewBytesBesidesTheBoxes) {
+  Random random(13);
+  const SortAndSweep sweep(furnishedHall(random, 50000, Vec3(150, 3, 150)));
+  EXPECT_GT(sweep.bytesBesidesStillBoxes(), 50000u * 16) << "an entry in a cell each at the least";
+  EXPECT_LT(sweep.bytesBesidesStillBoxes(), 50000u * 64);
+}
+
 TEST(SortAndSweep, GivesTheSameAnswersWhateverTheOrderOfTheStillBoxes) {
   Random random(11);
   std::vector<Box> still = furnishedHall(random, 400, Vec3(10, 3, 10));
