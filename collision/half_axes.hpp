@@ -19,9 +19,6 @@ inline HalfAxes reachOf(const Box& box) {
 inline HalfAxes onsetOf(const Box& box) {
   return {-box.max.x(), -box.max.y(), -box.max.z(), box.min.x(), box.min.y(), box.min.z()};
 }
-inline Box boxOfReach(const HalfAxes& r) {
-  return {Vec3(-r[0], -r[1], -r[2]), Vec3(r[3], r[4], r[5])};
-}
 inline Box boxOfOnset(const HalfAxes& o) {
   return {Vec3(o[3], o[4], o[5]), Vec3(-o[0], -o[1], -o[2])};
 }
