@@ -121,7 +121,8 @@ void walk(const MinkowskiDifference& difference, Wide limit, Search<Real>& searc
     next.add(difference, support.pair);
     next.reduce(difference);
     const Real distance = next.nearest.norm();
-    if (!next.holdsOrigin && !(distance < search.distance)) return;
+    // As near is good, too: it may be the feature whose direction proves that.
+    if (!next.holdsOrigin && !(distance <= search.distance)) return;
     simplex = next;
     search.distance = distance;
   }

@@ -60,8 +60,12 @@ Refinement refine(const ConvexBody& a, const ConvexBody& b, FeatureCache& cache)
 }
 
 bool isNearerThan(const ConvexBody& a, const ConvexBody& b, double limit, FeatureCache& cache) {
+  return isNearerThan(decide(a, b, cache), a, b, limit, cache);
+}
+
+bool isNearerThan(const Decision& decision, const ConvexBody& a, const ConvexBody& b, double limit,
+                  FeatureCache& cache) {
   if (!(limit > 0)) return false;
-  const Decision decision = decide(a, b, cache);
   if (decision.verdict != Verdict::separated) return true;
   // The difference rounds by less than a unit of the limit.
   const double margin = decision.errorBound + 4 * kUnit * limit;

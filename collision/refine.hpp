@@ -22,5 +22,8 @@ Refinement refine(const ConvexBody& a, const ConvexBody& b, FeatureCache& cache)
 
 /// Whether the distance is less than `limit` (metres, exactly this double): exact.
 bool isNearerThan(const ConvexBody& a, const ConvexBody& b, double limit, FeatureCache& cache);
+/// The same for bodies just decided.
+bool isNearerThan(const Decision& decision, const ConvexBody& a, const ConvexBody& b, double limit,
+                  FeatureCache& cache);
 
 }  // namespace enfilade::collision

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "collision/penetration_depth.hpp"
+#include "collision/refine.hpp"
 #include "scene/world_state.hpp"
 
 namespace enfilade::scene {
@@ -32,7 +33,7 @@ bool nearer(const Decision& a, const Decision& b) {
 double depthOf(const Avatar& avatar, const Obstacle& obstacle, const Decision& decision) {
   if (decision.verdict != Verdict::penetrating) return 0;
   collision::DepthCache none;  // avatars do not penetrate, so there is nothing to be coherent with
-  return collision::penetrationDepth({avatar.hull->vertices, avatar.feet}, obstacle.body,
+  return collision::penetrationDepth(bodyAt(*avatar.hull, avatar.feet), obstacle.body,
                                      obstacle.cache, none)
       .depth;
 }
@@ -40,8 +41,8 @@ double depthOf(const Avatar& avatar, const Obstacle& obstacle, const Decision& d
 std::optional<Decision> decideCounted(const Avatar& avatar, Obstacle& obstacle, double limit,
                                       QueryCount& count) {
   ++count.narrow;
-  const auto decision = collision::decideWithin({avatar.hull->vertices, avatar.feet}, obstacle.body,
-                                                limit, obstacle.cache);
+  const collision::ConvexBody body = bodyAt(*avatar.hull, avatar.feet);
+  const auto decision = collision::decideWithin(body, obstacle.body, limit, obstacle.cache);
   if (decision && decision->decidedBy == collision::DecidedBy::rational) ++count.rational;
   return decision;
 }
@@ -55,7 +56,9 @@ std::vector<Contact> nearOnes(Avatar& avatar, double limit, QueryCount& count) {
     const bool known = !found.empty() && found.back().other == obstacle.entity;
     const double within = known ? found.back().decision.distance : limit;
     const auto decision = decideCounted(avatar, obstacle, within, count);
-    if (!decision || !(decision->distance < limit)) continue;
+    if (!decision) continue;
+    const collision::ConvexBody body = bodyAt(*avatar.hull, avatar.feet);
+    if (!collision::isNearerThan(*decision, body, obstacle.body, limit, obstacle.cache)) continue;
     if (!known) {
       found.push_back({obstacle.entity, false, *decision});
     } else if (nearer(*decision, found.back().decision)) {

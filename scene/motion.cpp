@@ -59,8 +59,8 @@ double partInside(const Box& room, const Vec3& feet, const Vec3& displacement) {
 Stop sweepFrom(Mover& m, const Vec3& displacement) {
   const double part = partInside(m.feetRoom, m.feet, displacement);
   const Vec3 granted = part * displacement;
-  Stop stop = sweepHull(m.avatar.hull->vertices, m.avatar.hullBox, m.feet, granted,
-                        m.avatar.obstacles, m.band(), m.count);
+  Stop stop = sweepHull(*m.avatar.hull, m.avatar.hullBox, m.feet, granted, m.avatar.obstacles,
+                        m.band(), m.count);
   m.feet += stop.fraction * granted;
   stop.fraction *= part;
   return stop;

@@ -11,7 +11,7 @@ constexpr double kGatherMargin = 0.15;  // metres: obstacles are collected for s
 
 }  // namespace
 
-Stop sweepHull(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet,
+Stop sweepHull(const collision::Hull& hull, const Box& hullBox, const Vec3& feet,
                const Vec3& displacement, std::vector<Obstacle>& obstacles,
                const collision::StoppingBand& band, QueryCount& count) {
   Stop stop;
@@ -21,7 +21,7 @@ Stop sweepHull(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet,
   for (Obstacle& obstacle : obstacles) {
     if (!overlaps(path, obstacle.box)) continue;
     const collision::SweepResult result =
-        collision::sweep({hull, feet}, rest, obstacle.body, band, obstacle.cache);
+        collision::sweep(bodyAt(hull, feet), rest, obstacle.body, band, obstacle.cache);
     count.narrow += result.queries;
     count.rational += result.rationals;
     count.bounded += result.boundReached ? 1 : 0;
@@ -35,14 +35,14 @@ Stop sweepHull(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet,
   return stop;
 }
 
-bool isFree(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet, double clearance,
+bool isFree(const collision::Hull& hull, const Box& hullBox, const Vec3& feet, double clearance,
             std::vector<Obstacle>& obstacles, QueryCount& count, EntityId& nearest) {
   const Box box = grown(boxAt(hullBox, feet), clearance);
   for (Obstacle& obstacle : obstacles) {
     if (!overlaps(box, obstacle.box)) continue;
     ++count.narrow;
     const auto decision =
-        collision::decideWithin({hull, feet}, obstacle.body, clearance, obstacle.cache);
+        collision::decideWithin(bodyAt(hull, feet), obstacle.body, clearance, obstacle.cache);
     if (!decision) continue;
     if (decision->decidedBy == collision::DecidedBy::rational) ++count.rational;
     nearest = obstacle.entity;
@@ -75,7 +75,7 @@ void followOthers(const WorldState& world, Avatar& avatar) {
     const auto& name = world.avatarNames[obstacle.entity - world.firstAvatarId()];
     const Avatar& other = world.avatars.at(name);
     obstacle.box = boxAt(other.hullBox, other.feet);
-    obstacle.body = {other.hull->vertices, other.feet};
+    obstacle.body = bodyAt(*other.hull, other.feet);
   }
 }
 

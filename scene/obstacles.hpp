@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "collision/hull.hpp"
 #include "collision/narrow_phase.hpp"
 #include "collision/sort_and_sweep.hpp"
 #include "collision/time_of_impact.hpp"
@@ -41,14 +42,19 @@ inline Box boxAt(const Box& hullBox, const Vec3& feet) {
   return {hullBox.min + feet, hullBox.max + feet};
 }
 
+/// An upright hull that stands at `feet`.
+inline collision::ConvexBody bodyAt(const collision::Hull& hull, const Vec3& feet) {
+  return {hull.vertices, feet, nullptr, &hull};
+}
+
 /// Moves the hull at `feet` by `displacement` as far as `obstacles` allow.
-Stop sweepHull(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet,
+Stop sweepHull(const collision::Hull& hull, const Box& hullBox, const Vec3& feet,
                const Vec3& displacement, std::vector<Obstacle>& obstacles,
                const collision::StoppingBand& band, QueryCount& count);
 
 /// Whether the hull at `feet` keeps at least `clearance` metres from every obstacle; if not,
 /// `nearest` names one that is nearer (deepest first is not promised).
-bool isFree(std::span<const Vec3> hull, const Box& hullBox, const Vec3& feet, double clearance,
+bool isFree(const collision::Hull& hull, const Box& hullBox, const Vec3& feet, double clearance,
             std::vector<Obstacle>& obstacles, QueryCount& count, EntityId& nearest);
 
 /// Appends the triangles of still object `object` that `reach` may meet.

@@ -20,7 +20,7 @@ void gatherAll(const WorldState& world, const Box& box, std::vector<Obstacle>& o
     Obstacle obstacle;
     obstacle.entity = other.id;
     obstacle.box = boxAt(other.hullBox, other.feet);
-    obstacle.body = {other.hull->vertices, other.feet};
+    obstacle.body = bodyAt(*other.hull, other.feet);
     if (overlaps(obstacle.box, box)) obstacles.push_back(obstacle);
   }
 }
@@ -87,7 +87,7 @@ bool hasFloorBelow(const WorldState& world, const Avatar& avatar, QueryCount& co
   std::vector<Obstacle> obstacles;
   gatherAll(world, column, obstacles);
   const double epsilon = world.lengths.epsilon;
-  return sweepHull(avatar.hull->vertices, avatar.hullBox, avatar.feet, down, obstacles,
+  return sweepHull(*avatar.hull, avatar.hullBox, avatar.feet, down, obstacles,
                    {0.5 * epsilon, epsilon}, count)
              .entity != 0;
 }
@@ -117,8 +117,7 @@ std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& ord
   EntityId inTheWay = 0;
   for (const double lift : kLifts) {
     avatar.feet = order.at + Vec3(0, lift, 0);
-    if (!isFree(avatar.hull->vertices, avatar.hullBox, avatar.feet, epsilon, obstacles, count,
-                inTheWay))
+    if (!isFree(*avatar.hull, avatar.hullBox, avatar.feet, epsilon, obstacles, count, inTheWay))
       continue;
     const Vec3 middle = avatar.feet + avatar.hullBox.centre();
     if (const EntityId solid = solidAround(world, middle))

@@ -79,7 +79,7 @@ TEST(NarrowPhase, CubesTwoMetresApartAreTwoMetresApart) {
 TEST(NarrowPhase, CubesFaceToFaceTouch) {
   const Decision d = decideCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {1, 0.25, 0.5}});
   EXPECT_EQ(d.verdict, Verdict::touching);
-  EXPECT_EQ(d.decidedBy, DecidedBy::rational);
+  EXPECT_EQ(d.decidedBy, DecidedBy::expansion);
   EXPECT_EQ(d.distance, 0);
 }
 
