@@ -23,8 +23,6 @@ constexpr double kOutermost = 0x1p30;  // place of the outermost cells
 constexpr std::size_t kSampledBoxes = 16384;
 constexpr int kEdgeSteps = 116;  // of the fourth root of 2: 2^-29 of the widest is the finest tried
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 std::uint64_t mixed(std::uint64_t x) {  // the finaliser of SplitMix64
   x ^= x >> 30;
   x *= 0xbf58476d1ce4e5b9u;

@@ -58,7 +58,8 @@ inline bool meets(const HalfAxes& onset, const HalfAxes& reach) {
 inline bool overlapping(const HalfAxes& a, const HalfAxes& b) {
   const unsigned inXY =
       bitsOf(lanesAt(&a[0]) + lanesAt(&b[3]) >= 0) & bitsOf(lanesAt(&b[0]) + lanesAt(&a[3]) >= 0);
-  return (inXY == 3) & (a[2] + b[5] >= 0) & (b[2] + a[5] >= 0);
+  const unsigned inZ = unsigned{a[2] + b[5] >= 0} & unsigned{b[2] + a[5] >= 0};  // no branch
+  return (unsigned{inXY == 3} & inZ) != 0;
 }
 
 }  // namespace enfilade::collision

@@ -316,12 +316,16 @@ void keepCorners(Hull& hull, std::span<const Vec3> points, std::vector<Polygon> 
   hull.faces = std::move(faces);
 }
 
+/// Scaled, so that squares neither over- nor underflow.
 double greatestNorm(std::span<const Vec3> points) {
-  double greatest = 0;
+  double largest = 0, greatest = 0;
+  for (const Vec3& p : points) largest = std::max(largest, p.cwiseAbs().maxCoeff());
+  if (largest == 0) return 0;
   for (const Vec3& p : points) {
-    greatest = std::max(greatest, std::sqrt(p.x() * p.x() + p.y() * p.y() + p.z() * p.z()));
+    const double x = p.x() / largest, y = p.y() / largest, z = p.z() / largest;
+    greatest = std::max(greatest, std::sqrt(x * x + y * y + z * z));
   }
-  return greatest;
+  return greatest * largest;
 }
 
 // ---- validate ----------------------------------------------------------------------------------

@@ -46,9 +46,9 @@ Least leastFrom(const MinkowskiDifference& difference, const WideVec& direction,
     least.pair = {ofA.vertex, ofB.vertex};
     least.along = direction.dot(difference.shift) - ofB.along - ofA.along;
   }
-  // Either way at most 18 products and sums deep for each coordinate of a vector of at most reach:
-  // the point (or the direction) is off by 6 eta a coordinate, a product of two vectors by 3 eta
-  // |d| reach more by Cauchy; |d|_1 <= sqrt(3) |d|.
+  // The point is off by 6 eta reach a coordinate, so by 6 sqrt(3) eta reach along the direction;
+  // the product of two vectors rounds by 3 eta |d| |w|, |w| <= sqrt(3) reach. Turning the direction
+  // instead of the vertices loses less.
   least.bound = least.along - 16 * kWideUnit * Wide{length} * difference.reach;
   return least;
 }
@@ -89,8 +89,8 @@ Summits climb(const MinkowskiDifference& difference, const Vec3& direction, doub
 Along alongOf(const MinkowskiDifference& difference, const Vec3& direction, double length,
               const Summits& summits) {
   Along along{direction.dot(difference.roundedShift) - summits.b.along - summits.a.along};
-  // Each product is off by half a slack, 16u length reach together; the shift's own rounding, its
-  // product and the two differences by less than as much again.
+  // Each product is off by half a slack, 8u length (S_A + S_B) together; the shift's own rounding,
+  // its product and the two differences by less than three times as much again.
   if (summits.alone()) along.bound = along.value - 40 * kUnit * length * difference.reach;
   return along;
 }

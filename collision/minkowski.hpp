@@ -3,8 +3,8 @@
 //
 // Rounding. `Wide` is long double; eta is its unit of rounding (2^-64 on x86-64; the bounds are
 // written in eta, so they hold where long double is another type). S_A bounds the radius of A's
-// vertices times the Frobenius norm of its rotation, S_B likewise, D is the
-// greatest |coordinate| of t_B - t_A, and reach = S_A + S_B + D.
+// vertices times the Frobenius norm of its rotation, S_B likewise, D is the greatest |coordinate|
+// of t_B - t_A, and reach = S_A + S_B + D.
 //  - A rotated vertex: three products, two sums. By Cauchy the products of a coordinate sum up to
 //  at
 //    most S, so it is off by at most 3 eta S (second order left to the slack below).
@@ -86,6 +86,12 @@ struct MinkowskiDifference {
   /// Of any coordinate of a point in Wide.
   Wide pointError() const { return 6 * kWideUnit * reach; }
 };
+
+/// Whether products of six coordinates, and what little they differ by, stay in the range of
+/// doubles; outside it the search begins in extended precision.
+inline bool fitsDoubles(const MinkowskiDifference& difference) {
+  return difference.reach > 0x1p-160 && difference.reach < 0x1p160;
+}
 
 /// Where a climb in doubles ends: a vertex that no neighbour exceeds.
 struct Summit {
@@ -180,7 +186,7 @@ void forEachFarthest(const PlacedBody& placed, const Vec3& direction, double sla
   const double least = summit.along - slack;
   const auto visitAllAbove = [&] {
     for (std::uint32_t i = 0; i < vertices.size(); ++i)
-      if (direction.dot(vertices[i]) >= least) visit(i);
+      if (!(direction.dot(vertices[i]) < least)) visit(i);
   };
   const Hull* hull = placed.body->hull;
   if (!hull) return visitAllAbove();

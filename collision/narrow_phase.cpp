@@ -7,19 +7,18 @@
 //     vertex-face or edge-edge. It starts at last tick's features; a support along the nearest
 //     point, climbed to over the hulls' edges from last tick's vertices, proves them closest or
 //     names the feature to go on with. That is GJK (Gilbert, Johnson, Keerthi 1988) with the
-//     coherence of Lin and Canny (1991) as in Cameron, "Enhancing GJK" (1997); like V-Clip (Mirtich
-//     1998) it needs no tolerance and cannot cycle, since |nearest| falls at every step.
-//  3. The filter. A support proves that all of B - A lies beyond a plane; where that plane stands
-//     clear of the origin by more than the rounding bound, the bodies are `separated`, at least by
-//     that. A tetrahedron that holds the origin by more than the bound proves `penetrating`.
-//  4. The walk goes in doubles; its proofs (supports along the direction that it ends with, the
-//     distance of the points that it ends at) are in extended precision. Where that is not enough,
-//     as among slivers, the walk goes on in extended precision, too.
-//  5. Where the filter cannot decide, or its distance is not good enough: exact_minkowski.hpp.
-// Departures from V-Clip: no Voronoi regions. Points, segments, flat and coplanar faces need no
-// cases of their own, and one support proves what V-Clip proves region by region. The walk and its
-// proof are in extended precision (minkowski.hpp has the bounds), so that in practice only exact
-// contact, and what differs from it by less than about 2^-58 of the coordinates, is left to step 5.
+//     coherence of Lin and Canny (1991) as in Cameron, "Enhancing GJK" (1997). The walk is in
+//     doubles; it ends, since |nearest| falls at every step but a bounded number of equal ones.
+//  3. The filter. One support in extended precision proves that all of B - A lies beyond a plane;
+//     where that plane stands clear of the origin by more than the rounding bound, the bodies are
+//     `separated`, at least by that. A tetrahedron that holds the origin by more than the bound
+//     proves `penetrating`.
+//  4. An origin that lies on the simplex: exact sums of doubles may prove `touching`
+//     (touching_proof.hpp), a polytope grown from the simplex `penetrating` (polytope.hpp).
+//  5. Where that is not enough, as among slivers, steps 2 to 4 in extended precision.
+//  6. Where that cannot decide either, or the distance is not good enough: exact_answer.hpp.
+// Departures from V-Clip (Mirtich 1998): no Voronoi regions. Points, segments, flat and coplanar
+// faces need no cases of their own, and one support proves what V-Clip proves region by region.
 #include "collision/narrow_phase.hpp"
 
 #include <cmath>
@@ -34,6 +33,8 @@ namespace {
 
 constexpr Wide kMostError = 15;   // units of rounding of the largest coordinate; one to spare
 constexpr Wide kFine = 0x1p-32L;  // of the distance: see describeSeparation
+constexpr double kLeastInDoubles = 1e-140;  // metres: below, a squared length loses bits
+constexpr int kMostEqualSteps = 4;          // of a walk, that come no nearer
 /// At least that of a unit direction that is rounded a few times.
 constexpr double kUnitLength = 1 + 16 * kUnit;
 constexpr int kIterationBound = 96;  // about 10 are usual, from nothing; reaching it: the next step
@@ -67,7 +68,9 @@ struct Search {
 
   /// False: the simplex holds the origin, or all but touches it.
   bool hasDirection() const {
-    return !simplex.holdsOrigin && distance > std::numeric_limits<double>::min();
+    constexpr bool isDouble = std::is_same_v<Real, double>;
+    return !simplex.holdsOrigin &&
+           distance > (isDouble ? kLeastInDoubles : std::numeric_limits<double>::min());
   }
 };
 
@@ -111,6 +114,7 @@ template <class Real>
 void walk(const MinkowskiDifference& difference, Wide limit, Search<Real>& search) {
   const Real enough = 24 * unitOf<Real>() * static_cast<Real>(difference.reach);
   Simplex<Real>& simplex = search.simplex;
+  int equalSteps = 0;
   for (int i = 0; i < kIterationBound && search.hasDirection(); ++i) {
     search.direction = simplex.nearest * (1 / search.distance);
     const Support support = findSupport(difference, search);
@@ -121,8 +125,11 @@ void walk(const MinkowskiDifference& difference, Wide limit, Search<Real>& searc
     next.add(difference, support.pair);
     next.reduce(difference);
     const Real distance = next.nearest.norm();
-    // As near is good, too: it may be the feature whose direction proves that.
-    if (!next.holdsOrigin && !(distance <= search.distance)) return;
+    if (!next.holdsOrigin && !(distance < search.distance)) {
+      // As near may be good, too: the feature whose direction proves it.
+      if (!(distance <= search.distance) || !next.holds(support.pair)) return;
+      if (++equalSteps > kMostEqualSteps) return;
+    }
     simplex = next;
     search.distance = distance;
   }
@@ -136,26 +143,27 @@ void remember(const Search<Real>& search, FeatureCache& cache) {
   if (search.lower > 0) cache.axis = search.direction.template cast<double>();
 }
 
-Vec3 inWorld(const WideVec& point, const ConvexBody& a) {
-  return (point + a.translation.cast<Wide>()).cast<double>();
-}
-
-double largestOf(const WideVec& v) {
-  return v.cast<double>().cwiseAbs().maxCoeff();
+double largestOf(const Vec3& v) {
+  return v.cwiseAbs().maxCoeff();
 }
 
 /// The points of A and B that the simplex' weights name: world axes, from t_A.
 struct Combination {
-  WideVec onA, onB, aToB;
-  double largest;  ///< of the |coordinates|, from below: both points lie in the bodies' hulls
+  WideVec aToB;
+  Vec3 onA, onB;   ///< rounded
+  double largest;  ///< of the |coordinates| of both bodies, from below
 
   template <class Real>
-  Combination(const MinkowskiDifference& difference, const Simplex<Real>& simplex)
-      : onA(pointOn(simplex, difference.a, &VertexPair::a)),
-        onB(pointOn(simplex, difference.b, &VertexPair::b) + difference.shift) {
-    aToB = onB - onA;
-    largest = (1 - 4 * kUnit) * std::max({largestOf(onA), largestOf(onB),
-                                          difference.roundedShift.cwiseAbs().maxCoeff()});
+  Combination(const MinkowskiDifference& difference, const Simplex<Real>& simplex) {
+    const WideVec a = pointOn(simplex, difference.a, &VertexPair::a);
+    const WideVec b = pointOn(simplex, difference.b, &VertexPair::b) + difference.shift;
+    aToB = b - a;
+    onA = a.cast<double>();
+    onB = b.cast<double>();
+    largest = std::max(largestOf(onA), largestOf(onB));
+    for (int i = 0; i < simplex.size; ++i)  // a vertex of A or one of B has half of it
+      largest = std::max(largest, largestOf(simplex.points[i].template cast<double>()) / 2);
+    largest *= 1 - 8 * kUnit;
   }
 };
 
@@ -176,9 +184,11 @@ enum class Outcome : std::uint8_t {
 };
 
 /// Fills in what holds of separated bodies that are proved to be `lower` apart.
+/// `direction`: unit, along which that was proved.
 Outcome describeSeparation(const MinkowskiDifference& difference, const Combination& at, Wide lower,
-                           Decision& decision) {
-  // Weights and sums round by less than 8 eta reach a coordinate besides the points' own error.
+                           const Vec3& direction, Decision& decision) {
+  // Weights round by at most 8.1 eta S a body, turning by 3 eta S, shift and sums by eta (S_A +
+  // 2 S_B + 3 sqrt(3) D), the norm by 2.5 sqrt(3) eta reach: below 17.5 eta reach; this is 24.
   const Wide length = at.aToB.norm();
   const Wide upper = length + 4 * difference.pointError();
   decision.verdict = Verdict::separated;
@@ -186,33 +196,37 @@ Outcome describeSeparation(const MinkowskiDifference& difference, const Combinat
   const Wide distance = decision.distance;
   const Wide bound = std::max(upper - distance, distance - lower);
   decision.errorBound = static_cast<double>(bound) * (1 + 4 * kUnit);
-  decision.normal = at.aToB.cast<double>() / decision.distance;
-  // While the bounds differ by a small part of the distance, it is good to the square of that part.
-  const Wide units = bound <= kFine * distance ? kMostError : 1;
-  return bound <= units * kUnit * at.largest ? Outcome::decided : Outcome::open;
+  // Where the bound is no small part of the distance, the vector from point to point may lead
+  // anywhere, and only the last unit will do.
+  const bool fine = bound <= kFine * distance;
+  decision.normal = fine ? Vec3(at.aToB.cast<double>() / decision.distance) : direction;
+  return bound <= (fine ? kMostError : 1) * kUnit * at.largest ? Outcome::decided : Outcome::open;
 }
 
 /// Whether the bodies are proved to touch along `axis`, the last one known, or along another that
-/// things often stand or lean along: the simplex' normal, the world's axes. Sets `axis`.
+/// things often stand or lean along: the simplex' normal, the world's axes. Sets `axis`. `again`:
+/// all but the normal have been tried.
 template <class Real>
-bool findTouching(const MinkowskiDifference& difference, const Search<Real>& search, Vec3& axis) {
-  std::array<Vec3, 9> directions{axis};
-  std::size_t count = 1;
+bool findTouching(const MinkowskiDifference& difference, const Search<Real>& search, bool again,
+                  Vec3& axis) {
+  std::array<Vec3, 9> directions;
+  std::size_t count = 0;
   const Simplex<Real>& simplex = search.simplex;
+  if (!again) directions[count++] = axis;
   if (simplex.size == 3) {
     const auto& p = simplex.points;
     const Vec3 normal = (p[1] - p[0]).cross(p[2] - p[0]).template cast<double>();
     directions[count++] = normal;
     directions[count++] = -normal;
   }
-  for (int k = 0; k < 3; ++k) {
+  for (int k = 0; k < 3 && !again; ++k) {
     directions[count++] = Vec3::Unit(k);
     directions[count++] = -Vec3::Unit(k);
   }
   for (const Vec3& direction : std::span(directions).first(count)) {
     if (!(direction.squaredNorm() > 0)) continue;
     if (!provedTouching(difference, direction, search.hint)) continue;
-    axis = direction.normalized();
+    axis = direction;  // as it is: made unit, its sums would not come out exact
     return true;
   }
   return false;
@@ -235,14 +249,18 @@ Outcome conclude(const MinkowskiDifference& difference, Search<Real>& search, do
   proveLower(difference, search);
   if (search.lower > limit) return Outcome::beyond;
   const Combination at(difference, search.simplex);
-  decision.pointA = inWorld(at.onA, *difference.a.body);
-  decision.pointB = inWorld(at.onB, *difference.a.body);
-  if (search.lower > 0) return describeSeparation(difference, at, search.lower, decision);
-  if (largestOf(at.aToB) > 2 * kUnit * at.largest) return Outcome::open;  // no common point
-  if (!inside && findTouching(difference, search, axis)) {
+  decision.pointA = at.onA + difference.a.body->translation;
+  decision.pointB = at.onB + difference.a.body->translation;
+  if (search.lower > 0)
+    return describeSeparation(difference, at, search.lower,
+                              search.direction.template cast<double>(), decision);
+  const bool haveCommonPoint = at.aToB.norm() <= 2 * kUnit * at.largest;
+  if (!haveCommonPoint) return Outcome::open;
+  const bool again = std::is_same_v<Real, Wide> && fitsDoubles(difference);
+  if (!inside && findTouching(difference, search, again, axis)) {
     decision.verdict = Verdict::touching;
     decision.decidedBy = DecidedBy::expansion;
-    decision.normal = axis;
+    decision.normal = axis.stableNormalized();
     return Outcome::decided;
   }
   if (!inside && !findInside(difference, search.simplex)) return Outcome::open;
@@ -282,7 +300,8 @@ std::optional<Decision> decideWithin(const ConvexBody& a, const ConvexBody& b, d
                                      FeatureCache& cache) {
   const MinkowskiDifference difference(a, b);
   Decision decision;
-  Outcome outcome = search<double>(difference, limit, cache, decision);
+  Outcome outcome = Outcome::open;
+  if (fitsDoubles(difference)) outcome = search<double>(difference, limit, cache, decision);
   if (outcome == Outcome::open) outcome = search<Wide>(difference, limit, cache, decision);
   if (outcome == Outcome::beyond) return std::nullopt;
   return outcome == Outcome::decided ? decision : decideExactly(difference, cache);

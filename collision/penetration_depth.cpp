@@ -77,6 +77,7 @@ bool expand(VertexPair pair, Polytope<Real>& polytope) {
     }
   }
   polytope.facetCount = kept;
+  if (rim.count == 0) return false;
   for (std::size_t k = 0; k < rim.count; ++k)
     if (!polytope.addFacet({rim.edges[k][0], rim.edges[k][1], added})) return false;
   return true;
@@ -212,21 +213,20 @@ bool findDepth(const MinkowskiDifference& difference, const FeatureCache& decide
     polytope.corners = polytope.facetCount = 0;
     return start() && expandUntilBoundsMeet(polytope, bounds);
   };
-  const bool proved =
-      proves([&] { return restore(cache, polytope); }) || proves([&] {
-        return surround<Real>({decided.pairs.data(), static_cast<std::size_t>(decided.size)},
-                              polytope);
-      }) ||
-      proves([&] { return surroundByAxes<Real>(polytope); });
-  if (proved) remember(polytope, cache);
+  const std::span simplex(decided.pairs.data(), static_cast<std::size_t>(decided.size));
+  const bool proved = proves([&] { return restore(cache, polytope); }) ||
+                      proves([&] { return surround<Real>(simplex, polytope); }) ||
+                      proves([&] { return surroundByAxes<Real>(polytope); });
+  if (proved && polytope.corners <= kMostRemembered) remember(polytope, cache);
   return proved;
 }
 
 /// Where the features that are farthest along the normal meet: the deepest points.
 void describe(const MinkowskiDifference& difference, const Bounds& bounds, Depth& depth) {
-  depth.depth = static_cast<double>(bounds.upper);
-  depth.errorBound = static_cast<double>(bounds.upper - std::min(bounds.lower, bounds.upper)) +
-                     kUnit * depth.depth;
+  const Wide upper = std::max(Wide{0}, bounds.upper);
+  depth.depth = static_cast<double>(upper);
+  const Wide error = upper - std::min(bounds.lower, upper);
+  depth.errorBound = static_cast<double>(error) * (1 + 4 * kUnit) + kUnit * depth.depth;
   depth.normal = -(bounds.direction / bounds.direction.norm()).cast<double>();
   Simplex<double> deepest;
   if (depth.global && bounds.lower > 0) {
@@ -247,8 +247,9 @@ Depth penetrationDepth(const ConvexBody& a, const ConvexBody& b, const FeatureCa
   const MinkowskiDifference difference(a, b);
   Bounds bounds;
   Depth depth;
-  depth.global = findDepth<double>(difference, decided, cache, bounds) ||
-                 findDepth<Wide>(difference, decided, cache, bounds);
+  depth.global =
+      (fitsDoubles(difference) && findDepth<double>(difference, decided, cache, bounds)) ||
+      findDepth<Wide>(difference, decided, cache, bounds);
   if (!depth.global) {
     cache = {};
     bounds = {};

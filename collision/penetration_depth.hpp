@@ -7,8 +7,9 @@
 
 namespace enfilade::collision {
 
-/// Last tick's polytope around the origin, inside the Minkowski difference B - A. Any value is
-/// right, a good one makes the query cost little more than its two supports.
+/// Last tick's polytope around the origin, inside the Minkowski difference B - A. Any value that
+/// penetrationDepth() left is right, of whatever bodies; that of the same two makes the query cost
+/// little more than its two supports.
 struct DepthCache {
   using Facet = std::array<std::uint16_t, 3>;  ///< indices into `vertices`
   std::vector<VertexPair> vertices;
@@ -25,8 +26,9 @@ struct Depth {
   Vec3 pointB = Vec3::Zero();   ///< up to rounding
 };
 
-/// The depth of two bodies that decide() calls penetrating; 0 (not global) when no tetrahedron of
-/// their Minkowski difference holds the origin. `decided` is decide()'s cache for this pair.
+/// The depth of two bodies that decide() calls penetrating; an upper bound by some axes, not
+/// global, where no polytope is proved to hold the origin. `decided` is decide()'s cache for this
+/// pair.
 Depth penetrationDepth(const ConvexBody& a, const ConvexBody& b, const FeatureCache& decided,
                        DepthCache& cache);
 

@@ -2,6 +2,8 @@
 // Real is double or Wide.
 #pragma once
 
+#include <span>
+
 #include "collision/minkowski.hpp"
 
 namespace enfilade::collision {
@@ -51,7 +53,8 @@ struct Polytope {
     const Real reach = of.reach;
     // Nine entries off by at most 8u reach, with cofactors of at most 2 reach^2, and as much again
     // for rounding the product of edges of up to 2 reach.
-    leastDeterminant = 512 * unitOf<Real>() * reach * reach * reach;
+    leastDeterminant =
+        512 * unitOf<Real>() * reach * reach * reach + std::numeric_limits<Real>::min();
   }
   std::span<Facet<Real>> all() { return {facets.data(), facetCount}; }
   bool holds(VertexPair pair) const {

@@ -66,9 +66,10 @@ bool isNearerThan(const ConvexBody& a, const ConvexBody& b, double limit, Featur
 bool isNearerThan(const Decision& decision, const ConvexBody& a, const ConvexBody& b, double limit,
                   FeatureCache& cache) {
   if (!(limit > 0)) return false;
+  if (limit == std::numeric_limits<double>::infinity()) return true;
   if (decision.verdict != Verdict::separated) return true;
-  // The difference rounds by less than a unit of the limit.
-  const double margin = decision.errorBound + 4 * kUnit * limit;
+  // A limit at twice the distance or more is no question; below, the difference rounds by less.
+  const double margin = decision.errorBound * (1 + 4 * kUnit) + 4 * kUnit * limit;
   if (std::abs(decision.distance - limit) > margin) return decision.distance < limit;
   ExactDifference difference(a, b);
   return isNearerExactly(difference, nearestExactly(difference, cache), limit);

@@ -20,8 +20,13 @@ struct Face {
 };
 
 template <class Real>
+const Face<Real>& closer(const Face<Real>& first, const Face<Real>& second) {
+  return second.nearest.squaredNorm() < first.nearest.squaredNorm() ? second : first;
+}
+
+template <class Real>
 void keepCloser(const Face<Real>& face, Face<Real>& best) {
-  if (best.size == 0 || face.nearest.squaredNorm() < best.nearest.squaredNorm()) best = face;
+  best = best.size == 0 ? face : closer(best, face);
 }
 
 template <class Real>
@@ -38,6 +43,8 @@ Face<Real> segment(const Simplex<Real>& s, int i, int j) {
   const Real t = -from.dot(edge);
   if (!(t > 0)) return corner(s, i);
   if (t >= squared) return corner(s, j);
+  if (!(squared > std::numeric_limits<Real>::min()))  // 1 / squared might be infinite
+    return closer(corner(s, i), corner(s, j));
   const Real inverse = 1 / squared;
   const Real w = t * inverse;
   const Vec near = from + w * edge;
@@ -56,7 +63,7 @@ Face<Real> triangle(const Simplex<Real>& s, int i, int j, int k) {
   const Real wk = -ab.dot(an);
   const Real wj = ac.dot(an);
   const Real wi = squared - wj - wk;
-  const bool flat = !(squared > 0);
+  const bool flat = !(squared > std::numeric_limits<Real>::min());  // or 1 / squared is infinite
   const bool beyondIJ = flat || !(wk > 0), beyondIK = flat || !(wj > 0),
              beyondJK = flat || !(wi > 0);
   if (!beyondIJ && !beyondIK && !beyondJK) {

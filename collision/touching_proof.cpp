@@ -11,8 +11,11 @@
 #include "collision/touching_proof.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
+#include <span>
+#include <utility>
 
 namespace enfilade::collision {
 namespace {
@@ -51,9 +54,8 @@ class ExactSum {
   int sign() const { return count_ == 0 ? 0 : terms_[count_ - 1] > 0 ? 1 : -1; }
   /// Nothing when it is no double.
   std::optional<double> value() const {
-    if (count_ == 0) return 0.0;
-    if (count_ > 1 || !safe_) return std::nullopt;
-    return terms_[0];
+    if (!safe_ || count_ > 1) return std::nullopt;
+    return count_ == 0 ? 0.0 : terms_[0];
   }
 
  private:
@@ -124,7 +126,8 @@ struct Seen {
 /// Coordinates of at most `reach` are off by 10u reach.
 std::optional<int> turnOf(const Seen& p, const Seen& q, double reach) {
   const double cross = p.x * q.y - p.y * q.x;
-  if (std::abs(cross) > 64 * kUnit * reach * reach) return cross > 0 ? 1 : -1;
+  const double bound = 64 * kUnit * reach * reach + std::numeric_limits<double>::min();
+  if (std::abs(cross) > bound) return cross > 0 ? 1 : -1;
   if (!p.exact || !q.exact) return std::nullopt;
   ExactSum sum;
   sum.addProduct(p.x, q.y);
@@ -142,13 +145,11 @@ bool surroundsOrigin(std::span<const Seen> points, double reach) {
   const Seen* at = &points[0];
   const Seen* first = at;
   for (std::size_t step = 0; step < points.size(); ++step) {
+    if (step > 0 && turnsLeft(*at, *first, reach)) return true;
     const Seen* next = nullptr;
     for (const Seen& point : points)
       if (turnsLeft(*at, point, reach) && (!next || turnsLeft(*next, point, reach))) next = &point;
     if (!next) return false;
-    // Each step is less than a half-turn. The first point is met or passed when it lies left of
-    // `at`, but not of `next`.
-    if (step > 0 && turnsLeft(*at, *first, reach) && !turnsLeft(*next, *first, reach)) return true;
     at = next;
   }
   return false;
@@ -167,38 +168,46 @@ bool holdsOrigin(std::span<const Seen> points, double reach) {
   return false;
 }
 
+struct Farthest {
+  std::array<Known, kMostVertices> at;
+  std::size_t count = 0;
+  std::span<const Known> all() const { return {at.data(), count}; }
+};
+
 /// The vertices that may be farthest along `direction`; false when they are too many.
 bool collectFarthest(const PlacedBody& placed, const Vec3& direction, std::uint32_t start,
-                     std::vector<Known>& found) {
+                     Farthest& found) {
   const Vec3 local = placed.bodyFromWorld<double>(direction);
   const double slack = supportSlack(placed, direction.lpNorm<1>());
   const Summit summit = climb(placed, local, slack, start);
+  std::size_t seen = 0;
   forEachFarthest(placed, local, slack, summit, [&](std::uint32_t i) {
-    if (found.size() <= kMostVertices) found.push_back(turned(placed, i));
+    if (++seen <= kMostVertices) found.at[found.count++] = turned(placed, i);
   });
-  return found.size() <= kMostVertices;
+  return seen <= kMostVertices;
 }
 
 }  // namespace
 
 bool provedTouching(const MinkowskiDifference& difference, const Vec3& direction, VertexPair hint) {
-  std::vector<Known> ofA, ofB;
+  Farthest ofA, ofB;
   if (!collectFarthest(difference.a, direction, hint.a, ofA) ||
       !collectFarthest(difference.b, -direction, hint.b, ofB))
     return false;
   Eigen::Index along = 0;
   direction.cwiseAbs().maxCoeff(&along);
   const Eigen::Index x = (along + 1) % 3, y = (along + 2) % 3;
-  std::vector<Seen> inPlane;
-  for (const Known& a : ofA) {
-    for (const Known& b : ofB) {
+  std::array<Seen, kMostVertices * kMostVertices> inPlane;
+  std::size_t count = 0;
+  for (const Known& a : ofA.all()) {
+    for (const Known& b : ofB.all()) {
       const Known w = differenceOf(a, b, difference);
       const auto sign = signAlong(direction, w);
       if (!sign || *sign < 0) return false;
-      if (*sign == 0) inPlane.push_back({w.value[x], w.value[y], w.exact[x] && w.exact[y]});
+      if (*sign == 0) inPlane[count++] = {w.value[x], w.value[y], w.exact[x] && w.exact[y]};
     }
   }
-  return !inPlane.empty() && holdsOrigin(inPlane, difference.reach);
+  return count > 0 && holdsOrigin(std::span(inPlane).first(count), difference.reach);
 }
 
 }  // namespace enfilade::collision

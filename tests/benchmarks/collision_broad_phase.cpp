@@ -19,6 +19,8 @@
 
 #include <malloc.h>
 
+#include <cstdlib>
+#include <cstring>
 #include "tests/benchmarks/broad_phase_method.hpp"
 #include "tests/benchmarks/building_workload.hpp"
 #include "tests/benchmarks/measurement.hpp"

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
+#include <cstdlib>
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -39,9 +39,15 @@ struct Arguments {
 
   Arguments(int argc, char** argv) {
     for (int k = 1; k < argc; ++k) {
-      if (std::strcmp(argv[k], "--quick") == 0) quick = true;
-      if (std::strcmp(argv[k], "--out") == 0 && k + 1 < argc) out = argv[++k];
-      if (std::strcmp(argv[k], "--only") == 0 && k + 1 < argc) only = argv[++k];
+      const std::string argument = argv[k];
+      if (argument == "--quick") {
+        quick = true;
+      } else if ((argument == "--out" || argument == "--only") && k + 1 < argc) {
+        (argument == "--out" ? out : only) = argv[++k];
+      } else {
+        std::fprintf(stderr, "usage: %s [--quick] [--out FILE] [--only PART_OF_A_NAME]\n", argv[0]);
+        std::exit(2);
+      }
     }
   }
   bool wants(const std::string& name) const { return name.find(only) != std::string::npos; }

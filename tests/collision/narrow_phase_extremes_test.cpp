@@ -1,0 +1,89 @@
+// Where exponents run out, and where a body's own origin is far from it.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "collision/hull.hpp"
+#include "collision/penetration_depth.hpp"
+#include "collision/refine.hpp"
+
+namespace enfilade::collision {
+namespace {
+
+constexpr double kRounding = 0x1p-53;
+
+std::vector<Vec3> cubeAround(const Vec3& centre, double half) {
+  std::vector<Vec3> corners;
+  for (int k = 0; k < 8; ++k)
+    corners.emplace_back(centre +
+                         half * Vec3(k & 1 ? 1.0 : -1.0, k & 2 ? 1.0 : -1.0, k & 4 ? 1.0 : -1.0));
+  return corners;
+}
+
+TEST(NarrowPhaseExtremes, AnOriginFarFromItsBodyKeepsTheBound) {
+  const std::vector<Vec3> a = cubeAround({0, 0, 0}, 1), b = cubeAround({-1e6, 0, 0}, 1);
+  FeatureCache cache;
+  const Decision d = decide({a, Vec3::Zero()}, {b, {1e6 + 4, 0, 0}}, cache);
+  EXPECT_EQ(d.verdict, Verdict::separated);
+  EXPECT_LE(std::abs(d.distance - 2), d.errorBound);
+  EXPECT_LE(d.errorBound, 16 * kRounding * 5);  // the largest coordinate is B's far side
+}
+
+/// Hulls, so that the climb and its slack are at work.
+TEST(NarrowPhaseExtremes, HullsOfAnySizeHaveTheSameVerdicts) {
+  for (const int exponent : {-560, -530, -356, -200, 0, 200, 400, 500}) {
+    const double unit = std::ldexp(1.0, exponent);
+    const Hull a = buildHull(cubeAround({0, 0, 0}, unit));
+    const Hull b = buildHull(cubeAround({0, 0, 0}, unit / 2));
+    const auto verdictAt = [&](double x) {
+      FeatureCache cache;
+      return decide({a.vertices, Vec3::Zero(), nullptr, &a},
+                    {b.vertices, Vec3(x, 0.25, 0.125) * unit, nullptr, &b}, cache)
+          .verdict;
+    };
+    EXPECT_EQ(verdictAt(1.75), Verdict::separated) << exponent;
+    EXPECT_EQ(verdictAt(1.5), Verdict::touching) << exponent;
+    EXPECT_EQ(verdictAt(1.25), Verdict::penetrating) << exponent;
+  }
+}
+
+TEST(NarrowPhaseExtremes, DistancesOfAnySizeLieWithinTheirBound) {
+  const std::vector<Vec3> a{{0, 0, 0}};
+  for (int exponent = -1000; exponent <= 900; exponent += 50) {
+    const double distance = std::ldexp(1.58, exponent);
+    const std::vector<Vec3> b{{distance, 0, 0}};
+    FeatureCache cache;
+    const Decision d = decide({a, Vec3::Zero()}, {b, Vec3::Zero()}, cache);
+    EXPECT_EQ(d.verdict, Verdict::separated) << exponent;
+    EXPECT_LE(std::abs(d.distance - distance), d.errorBound) << exponent;
+    FeatureCache none;
+    EXPECT_TRUE(
+        decideWithin({a, Vec3::Zero()}, {b, Vec3::Zero()}, distance * 1.01, none).has_value())
+        << exponent;
+  }
+}
+
+TEST(NarrowPhaseExtremes, ADepthThatIsCalledGlobalIsTheDepthAtAnyScale) {
+  for (const int exponent : {-400, -170, -40, 0, 40, 200, 300}) {
+    const double unit = std::ldexp(1.0, exponent);
+    const std::vector<Vec3> box = cubeAround({0, 0, 0}, unit);
+    const ConvexBody a{box, Vec3::Zero()}, b{box, Vec3(1.75, 0.5, 0.25) * unit};
+    FeatureCache cache;
+    ASSERT_EQ(decide(a, b, cache).verdict, Verdict::penetrating) << exponent;
+    DepthCache none;
+    const Depth depth = penetrationDepth(a, b, cache, none);
+    EXPECT_TRUE(depth.global) << exponent;
+    EXPECT_NEAR(depth.depth / unit, 0.25, 1e-14) << exponent;
+  }
+}
+
+TEST(NarrowPhaseExtremes, NothingIsFartherThanInfinitelyFar) {
+  const std::vector<Vec3> cube = cubeAround({0, 0, 0}, 1);
+  FeatureCache cache;
+  EXPECT_TRUE(isNearerThan({cube, Vec3::Zero()}, {cube, {5, 0, 0}},
+                           std::numeric_limits<double>::infinity(), cache));
+}
+
+}  // namespace
+}  // namespace enfilade::collision
