@@ -86,6 +86,10 @@ enfilade_benchmark(collision_mesh
 enfilade_benchmark(collision_icollide
   SOURCES collision_icollide.cpp
   LIBRARIES bench_broad_phases bench_narrow_phases)
-set(programs collision_broad_phase collision_narrow_phase collision_mesh collision_icollide)
+enfilade_benchmark(collision_time_to_contact
+  SOURCES collision_time_to_contact.cpp building_workload.cpp
+  LIBRARIES enfilade_collision nlohmann_json::nlohmann_json)
+set(programs collision_broad_phase collision_narrow_phase collision_mesh collision_icollide
+  collision_time_to_contact)
 set_target_properties(${programs} PROPERTIES EXCLUDE_FROM_ALL ON)
 add_custom_target(collision_benchmarks DEPENDS ${programs})

@@ -1,0 +1,162 @@
+// How long two bodies can be left alone: our bound and the seed's, beside the true time of impact.
+//
+//   collision_time_to_contact [--quick] [--out FILE]
+//
+// Seed 5.1 takes for the closing speed that of the closest points, for the acceleration the
+// greatest of any vertex. A bound is broken when the bodies are proved to meet before it. `rod` is
+// the seed's counter-example: a rod along a wall turns about its middle, which is closest and at
+// rest.
+
+#include <functional>
+
+#include "collision/continuous.hpp"
+#include "collision/hull.hpp"
+#include "collision/time_of_impact.hpp"
+#include "tests/benchmarks/building_workload.hpp"
+#include "tests/benchmarks/measurement.hpp"
+
+namespace {
+
+using namespace enfilade::benchmarks;
+using namespace enfilade::collision;
+
+constexpr double kHorizon = 10;  // seconds
+
+struct Encounter {
+  Hull hullA, hullB;
+  Motion motionA, motionB;
+  Vec3 between;  ///< from A's reference point to B's
+
+  MovingBody a() const { return {{hullA.vertices, Vec3::Zero(), nullptr, &hullA}, motionA}; }
+  MovingBody b() const { return {{hullB.vertices, between, nullptr, &hullB}, motionB}; }
+};
+
+Vec3 vector(Random& random, double size) {
+  const double x = uniform(random, -size, size), y = uniform(random, -size, size);
+  const double z = uniform(random, -size, size);
+  return {x, y, z};
+}
+
+Hull boxHull(const Vec3& half) {
+  std::vector<Vec3> corners;
+  for (int k = 0; k < 8; ++k)
+    corners.emplace_back(k & 1 ? half.x() : -half.x(), k & 2 ? half.y() : -half.y(),
+                         k & 4 ? half.z() : -half.z());
+  return buildHull(corners);
+}
+
+Hull stone(Random& random) {
+  std::vector<Vec3> points;
+  for (int k = 0; k < 20; ++k) points.push_back(vector(random, 0.5));
+  return buildHull(points);
+}
+
+Encounter rod(Random& random) {
+  const double halfLength = uniform(random, 0.5, 2);
+  const double gap = std::pow(10.0, uniform(random, -5, -2));
+  Encounter e{boxHull({halfLength, 0.02, 0.02}), boxHull({5, 0.1, 5}), {}, {}, {0, 0, 0}};
+  e.between.y() = -(0.02 + gap + 0.1);
+  e.motionA.angularVelocity = Vec3(0, 0, uniform(random, 0.5, 3));
+  return e;
+}
+
+Encounter flight(Random& random, bool turning) {
+  Encounter e{stone(random), stone(random), {}, {}, {uniform(random, 2, 4), 0, 0}};
+  e.motionA.velocity = Vec3(uniform(random, 0.5, 3), 0, 0) + vector(random, 0.2);
+  e.motionB.acceleration = vector(random, 0.5);
+  if (!turning) return e;
+  e.motionA.angularVelocity = vector(random, 3);
+  e.motionB.angularVelocity = vector(random, 3);
+  return e;
+}
+
+MotionBounds boundsOf(const MovingBody& moving) {
+  const Motion& m = moving.motion;
+  return {m.velocity, m.acceleration.norm(), m.angularVelocity, 0, radiusOf(moving.body, false)};
+}
+
+/// Gap, normal and closest points, all that both bounds start from.
+double ourTime(const Encounter& e, const Decision& gap) {
+  const ClosingBounds closing =
+      closingBounds(boundsOf(e.a()), boundsOf(e.b()), gap.normal, kHorizon);
+  return timeToContact(gap.distance - gap.errorBound, closing);
+}
+
+double seedTime(const Encounter& e, const Decision& gap) {
+  const auto velocityAt = [](const MovingBody& moving, const Vec3& point) {
+    return Vec3(moving.motion.velocity +
+                moving.motion.angularVelocity.cross(point - moving.body.translation));
+  };
+  const auto accelerationOf = [](const MovingBody& moving) {
+    const Motion& m = moving.motion;
+    return m.acceleration.norm() + m.angularVelocity.squaredNorm() * radiusOf(moving.body, false);
+  };
+  const double v = (velocityAt(e.a(), gap.pointA) - velocityAt(e.b(), gap.pointB)).dot(gap.normal);
+  const double a = accelerationOf(e.a()) + accelerationOf(e.b());
+  if (a == 0) return v > 0 ? gap.distance / v : kHorizon;
+  return (std::sqrt(v * v + 2 * a * gap.distance) - v) / a;
+}
+
+struct Tally {
+  std::size_t broken = 0;
+  std::vector<double> share;  ///< of the true time
+  double seconds = 0;
+};
+
+void measure(const char* motion, const std::vector<Encounter>& encounters, Results& results) {
+  Tally ours, seeds, impacts;
+  std::size_t met = 0, unproved = 0;
+  for (const Encounter& e : encounters) {
+    FeatureCache cache;
+    const Decision gap = decide(e.a().body, e.b().body, cache);
+    auto start = Clock::now();
+    const TimeOfImpact impact = timeOfImpact(e.a(), e.b(), kHorizon, cache);
+    impacts.seconds += secondsSince(start);
+    unproved += impact.impact == Impact::unproved;
+    if (impact.impact != Impact::contact) continue;
+    ++met;
+    const auto judge = [&](Tally& tally, auto&& bound) {
+      start = Clock::now();
+      const double time = bound(e, gap);
+      tally.seconds += secondsSince(start);
+      tally.broken += time > impact.hi;
+      tally.share.push_back(time / impact.hi);
+    };
+    judge(ours, ourTime);
+    judge(seeds, seedTime);
+  }
+  const auto tell = [&](const char* name, const Tally& tally, std::size_t asked) {
+    const double ns = 1e9 * tally.seconds / static_cast<double>(asked);
+    const double median = quantile(tally.share, 0.5);
+    std::printf("%-12s %-22s | %5zu of %5zu broken | %8.3g of the true time | %9.0f ns\n", motion,
+                name, tally.broken, met, median, ns);
+    results.add({{"bench", "time"},
+                 {"motion", motion},
+                 {"method", name},
+                 {"met", met},
+                 {"unproved", unproved},
+                 {"broken", tally.broken},
+                 {"share", number(median)},
+                 {"ns", ns}});
+  };
+  tell("ours: bound", ours, met);
+  tell("the seed's bound", seeds, met);
+  tell("ours: time of impact", impacts, encounters.size());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const Arguments arguments(argc, argv);
+  Results results(arguments);
+  const std::size_t count = arguments.quick ? 100 : 1000;
+  Random random(5);
+  const auto some = [&](const std::function<Encounter()>& one) {
+    std::vector<Encounter> encounters;
+    for (std::size_t k = 0; k < count; ++k) encounters.push_back(one());
+    return encounters;
+  };
+  measure("translation", some([&] { return flight(random, false); }), results);
+  measure("turning", some([&] { return flight(random, true); }), results);
+  measure("rod", some([&] { return rod(random); }), results);
+}
