@@ -150,7 +150,8 @@ bool writtenByPeople(const std::filesystem::path& file) {
 }
 
 bool onlyLinkedTo(const std::filesystem::path& file) {
-  return file.extension() == ".png" || file.filename() == "LICENSE";
+  const std::string extension = file.extension().string();
+  return extension == ".png" || extension == ".svg" || file.filename() == "LICENSE";
 }
 
 }  // namespace
