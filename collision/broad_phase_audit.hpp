@@ -19,7 +19,7 @@ struct BroadPhaseAudit {
 
 /// Compares the pairs that `sweep` holds after an update() with brute force over the boxes that it
 /// was given: `stillBoxes` by StillId (an empty Box where there is none), all live movers with
-/// their ids. Costs movers * (still + movers) box tests: 1 ms at 10 movers among 1e5 still boxes.
+/// their ids. Costs movers * (still + movers) box tests of some 5 ns.
 BroadPhaseAudit compareWithBruteForce(const SortAndSweep& sweep, std::span<const Box> stillBoxes,
                                       std::span<const std::pair<MoverId, Box>> moverBoxes);
 

@@ -1,8 +1,9 @@
 // How the cells are laid.
 //
 // 1. The edge of the finest cells is measured (finestEdge): the smallest at which a box still lies
-//    in few cells on average, which bounds memory, and in company, which bounds the cells that a
-//    mover has to join. Both are means over samples: they steer cost, never an answer.
+//    in few cells on average, which bounds memory, and in company, which bounds the cells that are
+//    looked up for a mover beside the boxes found there. Both are means over samples: they steer
+//    cost, never an answer.
 // 2. Each coarser level has cells four times as wide. A box goes to the finest level on which it
 //    lies in at most kMostCells cells, so a floor slab or a terrain costs no more than a chair.
 // 3. The last level is one cell; what suits no other level lies there.
@@ -21,7 +22,7 @@ constexpr double kLeastCompany = 12;   // boxes in a box' cell, on average
 constexpr int kLevelBits = 2;          // a level's cells are 2^this as wide as the next finer ones
 constexpr double kOutermost = 0x1p30;  // place of the outermost cells
 constexpr std::size_t kSampledBoxes = 16384;
-constexpr int kEdgeSteps = 116;  // of the fourth root of 2: 2^-29 of the widest is the finest tried
+constexpr int kEdgeSteps = 116;  // of the fourth root of 2: down to 2^-28.75 of the widest
 
 std::uint64_t mixed(std::uint64_t x) {  // the finaliser of SplitMix64
   x ^= x >> 30;

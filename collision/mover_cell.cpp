@@ -4,6 +4,7 @@
 #include "collision/mover_cell.hpp"
 
 #include <algorithm>
+#include <bit>
 
 namespace enfilade::collision {
 namespace {
@@ -42,14 +43,22 @@ End* pickEnds(const StillCells& still, std::span<const StillCells::Row> rows, st
   return picked;
 }
 
+/// Room for `size` entries, without keeping that of a place much fuller.
+template <class T>
+void fit(std::vector<T>& room, std::size_t size) {
+  constexpr std::size_t kMuch = 8, kLittle = 1024;
+  if (room.size() > kMuch * size + kLittle) room = std::vector<T>();
+  if (room.size() < size) room.resize(size);
+}
+
 }  // namespace
 
 void MoverCell::lay(const StillCells& still, std::span<const StillCells::Row> rows,
                     const HalfAxes& reach, std::vector<std::uint32_t>& met) {
-  if (boxes.size() < rows.size()) boxes.resize(rows.size());
+  fit(boxes, rows.size());
   if (met.size() < rows.size()) met.resize(rows.size());
-  if (ends.size() < 6 * (rows.size() + 2)) ends.resize(6 * (rows.size() + 2));
   std::size_t metCount = 0;
+  std::size_t endCount = 12 + rows.size();  // borders, and what pickEnds() writes past its list
   unsigned endingOnes = 0;
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const HalfAxes& onset = still.onset(rows[r]);
@@ -59,7 +68,9 @@ void MoverCell::lay(const StillCells& still, std::span<const StillCells::Row> ro
     met[metCount] = id;
     metCount += apart == 0 ? 1 : 0;
     endingOnes |= ending;
+    endCount += static_cast<std::size_t>(std::popcount(ending));
   }
+  fit(ends, endCount);
   met.resize(metCount);
   End* end = ends.data();
   for (std::size_t k = 0; k < 6; ++k) {

@@ -8,6 +8,7 @@
 // kept as six bits. The lists are the mover's, so that its steady tick reads what is its own.
 //
 // An update, in this order:
+// 0. Movers that leave end their pairs.
 // 1. Still boxes that were staged come and go (still_cells.cpp), and the movers whose cells they
 //    meet have them laid anew.
 // 2. For each mover that moved: on each half-axis its reach is compared with two guards, the ends
@@ -21,8 +22,10 @@
 // 4. Movers against movers (sort_and_sweep_moving.cpp).
 //
 // Departures from the source: lists a mover instead of three over the whole scene, so that a walker
-// passes the end points about it only and still objects cost nothing; movers are sorted by their
-// cells, and their own ends compared only while these meet.
+// passes the end points about it only and still objects cost nothing. Between two layings of a cell
+// pairs follow from exchanges alone; when one is laid, which a jump does at once, the pairs of its
+// mover are those of the boxes that were gathered for it. Movers are sorted by their cells, and
+// exchanges there tell which cells meet; the boxes of two such movers are compared when one moves.
 //
 // Limits: 2^31 - 1 movers, 2^32 - 2 still boxes and as many cells; else memory alone.
 
@@ -188,6 +191,7 @@ void SortAndSweep::remove(MoverId id) {
     return;
   }
   mover.presence = Presence::leaving;
+  mover.low.fill(std::numeric_limits<double>::infinity());  // move() is not to let it pass
   s.leaving.push_back(id);
 }
 
@@ -255,6 +259,7 @@ std::span<const SortAndSweep::Partner> SortAndSweep::partners(MoverId mover) con
 }
 
 std::vector<StillId> SortAndSweep::stillOverlapping(const Box& box) const {
+  requireBox(box, "box asked about, number", 0);
   const StillCells& still = state_->still;
   const HalfAxes reach = reachOf(box);
   StillCells::RowList rows;

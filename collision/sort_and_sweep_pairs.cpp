@@ -84,7 +84,6 @@ void SortAndSweep::State::dropAll(MoverId id) {
   while (!mover.neighbours.empty()) endNeighbours(id, mover.neighbours.back().id);
   inReach.clear();
   replaceStill(id);
-  mover.low.fill(std::numeric_limits<double>::infinity());
 }
 
 }  // namespace enfilade::collision

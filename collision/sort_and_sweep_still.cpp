@@ -17,7 +17,8 @@ constexpr double kHorizon = 40;
 // it is looked at next.
 constexpr std::size_t kVisitEvery = 32;
 // Room for a change of course: so many ticks at the greatest rate of all half-axes, and a share of
-// the mover's size; all of its size while nothing is known of its course.
+// the mover's greatest size; all of that while nothing is known of its course: when it is new, and
+// when it went farther than its own size in a tick, which is taken for a jump.
 constexpr double kSlackTicks = 3;
 constexpr double kSlackOfSize = 1.0 / 64;
 // A cell exceeds the mover by no more than this share of its size, or of an edge of the finest
@@ -61,19 +62,23 @@ void SortAndSweep::State::setBorders(Mover& mover) const {
   mover.rate = rateOf(mover, tick);
   mover.laidReach = mover.reach;
   mover.laidAt = tick;
-  double fastest = 0;
+  double fastest = 0, widest = 0;
   for (const double rate : mover.rate) fastest = std::max(fastest, std::abs(rate));
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    widest = std::max(widest, mover.reach[axis] + mover.reach[axis + 3]);
+  const bool unknown = mover.presence == Presence::fresh || (widest > 0 && fastest > widest);
+  if (unknown) mover.rate.fill(0);
+  const double slack = unknown ? widest : kSlackTicks * fastest + kSlackOfSize * widest;
   const double least = kMostOfEdge * still.grid().edge();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double size = mover.reach[axis] + mover.reach[axis + 3];
     const double most = std::max(kMostOfSize * size, least);
-    const double slack =
-        mover.presence == Presence::fresh ? size : kSlackTicks * fastest + kSlackOfSize * size;
     for (const std::size_t k : {axis, axis + 3}) {
       const double course = kHorizon * mover.rate[k];
       const double ahead = std::min(slack + std::max(course, 0.0), most);
       const double behind = std::min(slack - std::min(course, 0.0), most);
-      mover.cell.farthest[k] = std::min(mover.reach[k] + ahead, kLargest);
+      const double beyondReach = std::nextafter(mover.reach[k], kLargest);  // lest ahead is lost
+      mover.cell.farthest[k] = std::min(std::max(mover.reach[k] + ahead, beyondReach), kLargest);
       mover.cell.nearest[k] = std::max(mover.reach[k] - behind, -kLargest);
     }
   }
@@ -101,6 +106,7 @@ void SortAndSweep::State::layCell(MoverId id) {
 }
 
 void SortAndSweep::State::visitMovers() {
+  if (movers.empty()) return;
   std::size_t visits = (movers.size() + kVisitEvery - 1) / kVisitEvery;
   const double ticks = static_cast<double>(movers.size()) / static_cast<double>(visits);
   visits -= std::min(visits, relaid.size());  // those that could not wait take their turn
@@ -153,7 +159,7 @@ bool SortAndSweep::State::passOutward(MoverId id) {
   return true;
 }
 
-/// A pair that is to end is apart before another half-axis closes in on it: told once at most.
+/// All that ends is ended before anything begins, so that a pair is told once at most.
 void SortAndSweep::State::updateStill(MoverId id) {
   if (!passInward(id) || !passOutward(id)) layCell(id);
 }

@@ -307,6 +307,48 @@ TEST(SortAndSweep, CountsNothingWhileNothingMoves) {
   EXPECT_EQ(scene.sweep().counters().boxTests, 0u);
 }
 
+TEST(SortAndSweep, LaysNoCellsForWhatStandsHoweverThinOrFarAwayItIs) {
+  const Box still = boxAt({0, 0, 0}, {1, 1, 1});
+  for (const Vec3& size : {Vec3(1, 0, 1), Vec3(0, 0, 0), Vec3(1, 1, 1)}) {
+    for (const double far : {0.0, 1e17}) {
+      SortAndSweep sweep(std::span(&still, 1));
+      const Box box = boxAt({far, 0, 0}, size);
+      const MoverId id = sweep.insert(box);
+      sweep.update();
+      for (int tick = 0; tick < 100; ++tick) {
+        sweep.move(id, box);
+        sweep.update();
+        EXPECT_EQ(sweep.counters().cellsLaid, 0U) << "tick " << tick;
+      }
+    }
+  }
+}
+
+TEST(SortAndSweep, AfterAllHaveJumpedTheyAreStrangersAgain) {
+  const Box slab = boxAt({-5000, -1, -5000}, {10000, 1, 10000});
+  SortAndSweep sweep(std::span(&slab, 1));
+  constexpr int kMovers = 100;
+  const auto boxOf = [](int k, double x) { return boxAt({x + 3 * k, 0.5, 0}, {1, 1, 1}); };
+  for (int k = 0; k < kMovers; ++k) sweep.insert(boxOf(k, 0));
+  sweep.update();
+  for (int tick = 1; tick < 5; ++tick) {
+    for (MoverId k = 0; k < kMovers; ++k)
+      sweep.move(k, boxOf(static_cast<int>(k), 100 + 0.001 * tick));
+    sweep.update();
+  }
+  EXPECT_LE(sweep.counters().boxTests, 4U * kMovers);  // those beside one another, not all of them
+}
+
+TEST(SortAndSweep, AMoverThatWasRemovedCannotBeMovedNotEvenToWhereItIs) {
+  const Box box = boxAt({0.5, 0.5, 0.5}, {1, 1, 1});
+  SortAndSweep sweep(std::span(&box, 1));
+  const MoverId id = sweep.insert(box);
+  sweep.update();
+  sweep.remove(id);
+  EXPECT_THROW(sweep.move(id, box), std::invalid_argument);
+  EXPECT_THROW(sweep.remove(id), std::invalid_argument);
+}
+
 TEST(SortAndSweep, CountsTheEndPointsThatAMoverPasses) {
   // Ten posts in a row; a walker passes both ends of the first five on x.
   std::vector<Box> posts;
