@@ -1,8 +1,8 @@
-// Steps (after E. Coumans and E. Catto, "Contact manifolds", as in every rigid-body engine)
+// Steps (E. Catto, "Contact Manifolds", Game Developers Conference 2007)
 //  1. The supporting feature of a body: of the faces at its vertex farthest along the normal the
 //  one
 //     that faces along it most; of that face the corners that lie within `limit` of the support
-//     plane: a polygon, an edge, or a vertex. (Bodies without faces: of all vertices.)
+//     plane: a polygon, an edge, or a vertex. (Of a body of three vertices at most: of them.)
 //  2. Both features are projected along the normal and clipped against one another: polygons by
 //     Sutherland and Hodgman, an edge by a polygon (Cyrus and Beck), two edges by where they cross
 //     or overlap. A vertex stays a vertex.
@@ -164,14 +164,14 @@ Feature clippedByPolygon(Feature subject, const Feature& polygon, double roundin
 }
 
 /// What of edge `a` lies above edge `b`: nothing, a point, or where they run side by side.
-Feature clippedByEdge(const Feature& a, const Feature& b, double rounding) {
+Feature edgesMeeting(const Feature& a, const Feature& b, double rounding) {
   const Vec3 alongA = a.corners[1] - a.corners[0], alongB = b.corners[1] - b.corners[0];
   const Vec3 between = b.corners[0] - a.corners[0];
-  const double area = cross(alongA, alongB);
+  const double spanned = cross(alongA, alongB);
   const double lengthA = std::sqrt(dot(alongA, alongA)), lengthB = std::sqrt(dot(alongB, alongB));
   Feature kept;
-  if (std::abs(area) > rounding * (lengthA + lengthB)) {
-    const double s = cross(between, alongB) / area, t = cross(between, alongA) / area;
+  if (std::abs(spanned) > rounding * (lengthA + lengthB)) {
+    const double s = cross(between, alongB) / spanned, t = cross(between, alongA) / spanned;
     if (s >= 0 && s <= 1 && t >= 0 && t <= 1) kept.add(a.corners[0] + s * alongA);
     return kept;
   }
@@ -191,7 +191,7 @@ Feature clippedByEdge(const Feature& a, const Feature& b, double rounding) {
 Feature clipped(const Feature& subject, Feature other, double rounding) {
   if (subject.size == 1 || other.size == 1) return subject.size == 1 ? subject : Feature{};
   if (other.size == 2)
-    return subject.size == 2 ? clippedByEdge(subject, other, rounding) : Feature{};
+    return subject.size == 2 ? edgesMeeting(subject, other, rounding) : Feature{};
   if (area(other) < 0) std::reverse(other.corners.begin(), other.corners.begin() + other.size);
   return clippedByPolygon(subject, other, rounding);
 }

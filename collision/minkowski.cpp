@@ -1,13 +1,30 @@
 #include "collision/minkowski.hpp"
 
+#include <stdexcept>
+#include <string>
+
 namespace enfilade::collision {
 namespace {
 
 double greatestRadius(const ConvexBody& body) {
+  if (body.vertices.empty()) throw std::invalid_argument("a body has no vertices");
   if (body.hull) return body.hull->radius;
-  double greatest = 0;
-  for (const Vec3& p : body.vertices) greatest = std::max(greatest, p.cwiseAbs().maxCoeff());
-  return greatest * 1.7320508075688774;  // sqrt(3); a norm might overflow
+  double greatest = 0, zero = 0;
+  for (const Vec3& p : body.vertices) {
+    greatest = std::max(greatest, p.cwiseAbs().maxCoeff());
+    zero += 0 * p.x() + 0 * p.y() + 0 * p.z();  // none, if a coordinate is none
+  }
+  return greatest * 1.7320508075688774 + zero;  // sqrt(3); a norm might overflow
+}
+
+void requireFinite(const ConvexBody& body, const char* name) {
+  const auto refuse = [&](const char* what) {
+    throw std::invalid_argument(std::string("body ") + name + ": " + what + " is not finite");
+  };
+  if (!body.translation.allFinite()) refuse("the translation");
+  if (body.rotation && !body.rotation->allFinite()) refuse("the rotation");
+  for (const Vec3& p : body.vertices)
+    if (!p.allFinite()) refuse("a vertex");
 }
 
 /// The greatest coordinate of a body along a direction of its own frame.
@@ -77,7 +94,12 @@ MinkowskiDifference::MinkowskiDifference(const ConvexBody& bodyA, const ConvexBo
       b(bodyB),
       shift(bodyB.translation.cast<Wide>() - bodyA.translation.cast<Wide>()),
       roundedShift(bodyB.translation - bodyA.translation),
-      reach((a.size + b.size + roundedShift.cwiseAbs().maxCoeff()) * (1 + 8 * kUnit)) {}
+      reach((a.size + b.size + roundedShift.cwiseAbs().maxCoeff()) * (1 + 8 * kUnit)) {
+  if (reach < std::numeric_limits<double>::infinity() && !roundedShift.hasNaN()) [[likely]]
+    return;
+  requireFinite(bodyA, "A");  // coordinates beyond 1e308 alone are no fault
+  requireFinite(bodyB, "B");
+}
 
 Summits climb(const MinkowskiDifference& difference, const Vec3& direction, double length,
               VertexPair hint) {

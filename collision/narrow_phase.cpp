@@ -236,7 +236,10 @@ bool findTouching(const MinkowskiDifference& difference, const Search<Real>& sea
 template <class Real>
 bool findInside(const MinkowskiDifference& difference, const Simplex<Real>& simplex) {
   Polytope<Real> polytope(difference);
-  return surround<Real>({simplex.pairs.data(), static_cast<std::size_t>(simplex.size)}, polytope);
+  const std::span pairs(simplex.pairs.data(), static_cast<std::size_t>(simplex.size));
+  if (surround<Real>(pairs, polytope)) return true;
+  polytope.clear();
+  return surroundBySearch<Real>(polytope);
 }
 
 /// Fills in what the features that the walk ended at prove. `axis` is the last one known to part

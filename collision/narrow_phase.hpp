@@ -23,7 +23,8 @@ enum class DecidedBy : std::uint8_t {
 };
 
 /// A convex body for one query: the hull of `vertices` (body's frame, metres; at least one, all
-/// finite), placed at rotation * vertex + translation. The doubles are taken as they are: where a
+/// finite), placed at rotation * vertex + translation, finite as well: every query throws
+/// std::invalid_argument naming what is not. The doubles are taken as they are: where a
 /// rotation is orthonormal only to rounding, the body is the very slightly sheared one.
 struct ConvexBody {
   std::span<const Vec3> vertices;

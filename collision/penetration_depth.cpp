@@ -42,47 +42,6 @@ bool restore(const DepthCache& cache, Polytope<Real>& polytope) {
                      [&](const DepthCache::Facet& facet) { return polytope.addFacet(facet); });
 }
 
-using Edge = std::array<std::uint16_t, 2>;
-
-/// The rim of a hole, each edge as the facet that went had it.
-struct Rim {
-  std::array<Edge, 6 * kMostCorners> edges;  // all edges of all facets
-  std::size_t count = 0;
-
-  void toggle(std::uint16_t from, std::uint16_t to) {
-    const auto end = edges.begin() + count;
-    const auto twin = std::find(edges.begin(), end, Edge{to, from});
-    if (twin != end) {
-      *twin = edges[--count];
-    } else {
-      edges[count++] = {from, to};
-    }
-  }
-};
-
-/// Puts a point in place of the facets that it sees. False when the polytope could not be grown
-/// with proof; it is then of no more use.
-template <class Real>
-bool expand(VertexPair pair, Polytope<Real>& polytope) {
-  if (polytope.corners == kMostCorners) return false;
-  const std::uint16_t added = polytope.addCorner(pair);
-  Rim rim;
-  std::size_t kept = 0;
-  for (const Facet<Real>& facet : polytope.all()) {
-    const auto& corner = polytope.points[facet.corners[0]];
-    if (facet.normal.dot(polytope.points[added] - corner) > 0) {
-      for (int k = 0; k < 3; ++k) rim.toggle(facet.corners[k], facet.corners[(k + 1) % 3]);
-    } else {
-      polytope.facets[kept++] = facet;
-    }
-  }
-  polytope.facetCount = kept;
-  if (rim.count == 0) return false;
-  for (std::size_t k = 0; k < rim.count; ++k)
-    if (!polytope.addFacet({rim.edges[k][0], rim.edges[k][1], added})) return false;
-  return true;
-}
-
 /// Bounds of the depth, and where the upper one is attained.
 struct Bounds {
   Wide lower = 0;
@@ -161,20 +120,23 @@ template <class Real>
 bool expandUntilBoundsMeet(Polytope<Real>& polytope, Bounds& bounds) {
   const Real little = 64 * unitOf<Real>() * static_cast<Real>(polytope.difference.reach);
   while (true) {  // ends: each turn adds a corner
-    const Facet<Real>& nearest =
-        *std::min_element(polytope.all().begin(), polytope.all().end(),
-                          [](const auto& a, const auto& b) { return a.nearness < b.nearness; });
-    VertexPair next;
+    // First those that are not proved to face away, as where the origin lies in their plane.
+    const Facet<Real>& nearest = *std::min_element(
+        polytope.all().begin(), polytope.all().end(), [&](const auto& a, const auto& b) {
+          const bool awayA = polytope.facesAway(a), awayB = polytope.facesAway(b);
+          return awayA != awayB ? awayB : a.nearness < b.nearness;
+        });
+    const bool away = polytope.facesAway(nearest);
     const Beyond farthest = beyond(nearest, polytope);
-    if (farthest.metres > little && !polytope.holds(farthest.pair)) {
-      next = farthest.pair;
-    } else {
+    VertexPair next = farthest.pair;
+    if ((away && farthest.metres <= little) || polytope.holds(next)) {
+      if (!away) return false;
       bounds = prove(nearest, polytope);
       if (meet(bounds, polytope.difference)) return true;
       if (polytope.holds(bounds.support)) return false;
       next = bounds.support;
     }
-    if (!expand(next, polytope)) return false;
+    if (!expand(next, true, polytope)) return false;
   }
 }
 
@@ -210,13 +172,13 @@ bool findDepth(const MinkowskiDifference& difference, const FeatureCache& decide
                DepthCache& cache, Bounds& bounds) {
   Polytope<Real> polytope(difference);
   const auto proves = [&](auto&& start) {
-    polytope.corners = polytope.facetCount = 0;
+    polytope.clear();
     return start() && expandUntilBoundsMeet(polytope, bounds);
   };
   const std::span simplex(decided.pairs.data(), static_cast<std::size_t>(decided.size));
   const bool proved = proves([&] { return restore(cache, polytope); }) ||
                       proves([&] { return surround<Real>(simplex, polytope); }) ||
-                      proves([&] { return surroundByAxes<Real>(polytope); });
+                      proves([&] { return surroundBySearch<Real>(polytope); });
   if (proved && polytope.corners <= kMostRemembered) remember(polytope, cache);
   return proved;
 }

@@ -56,6 +56,8 @@ struct Polytope {
     leastDeterminant =
         512 * unitOf<Real>() * reach * reach * reach + std::numeric_limits<Real>::min();
   }
+  void clear() { corners = facetCount = 0; }
+  bool facesAway(const Facet<Real>& facet) const { return facet.offset > leastDeterminant; }
   std::span<Facet<Real>> all() { return {facets.data(), facetCount}; }
   bool holds(VertexPair pair) const {
     return std::find(pairs.begin(), pairs.begin() + corners, pair) != pairs.begin() + corners;
@@ -65,10 +67,11 @@ struct Polytope {
     points[corners] = difference.point<Real>(pair);
     return static_cast<std::uint16_t>(corners++);
   }
-  /// False, and nothing added, when the facet is not proved to face away from the origin.
-  bool addFacet(const Corners& of) {
+  /// False, and nothing added, when the facet is not proved to face away from the origin (and
+  /// `anyTurn` is not set), or when there is no room.
+  bool addFacet(const Corners& of, bool anyTurn = false) {
     const Facet<Real> facet = facetOf<Real>(of, points[of[0]], points[of[1]], points[of[2]]);
-    if (!(facet.offset > leastDeterminant) || facetCount == facets.size()) return false;
+    if (!(anyTurn || facesAway(facet)) || facetCount == facets.size()) return false;
     facets[facetCount++] = facet;
     return true;
   }
@@ -80,13 +83,22 @@ struct Polytope {
 template <class Real>
 bool surround(std::span<const VertexPair> simplex, Polytope<Real>& polytope);
 
-/// The same from supports along the world's axes.
+/// The same from nothing: four points far apart, then supports along the facet that the origin is
+/// most beyond. For an origin that no simplex shows the inside of, as on a plane of symmetry.
 template <class Real>
-bool surroundByAxes(Polytope<Real>& polytope);
+bool surroundBySearch(Polytope<Real>& polytope);
+
+/// Puts a point in place of the facets that it sees. False when the polytope could not be grown
+/// with proof; it is then of no more use. `anyTurn`: without proof, for a polytope that the origin
+/// may be outside of.
+template <class Real>
+bool expand(VertexPair pair, bool anyTurn, Polytope<Real>& polytope);
 
 extern template bool surround(std::span<const VertexPair>, Polytope<double>&);
 extern template bool surround(std::span<const VertexPair>, Polytope<Wide>&);
-extern template bool surroundByAxes(Polytope<double>&);
-extern template bool surroundByAxes(Polytope<Wide>&);
+extern template bool surroundBySearch(Polytope<double>&);
+extern template bool surroundBySearch(Polytope<Wide>&);
+extern template bool expand(VertexPair, bool, Polytope<double>&);
+extern template bool expand(VertexPair, bool, Polytope<Wide>&);
 
 }  // namespace enfilade::collision

@@ -3,6 +3,7 @@
 // against the truth in the files instead, and what is wrong on stderr. Exit codes: 0 done, 1 a file
 // cannot be read, 2 usage, 3 --score found something that must hold and does not.
 #include <cstring>
+#include <filesystem>
 #include <iostream>
 #include <map>
 #include <stdexcept>
@@ -54,8 +55,12 @@ int run(const Options& options) {
   for (const std::string& file : options.meshes) meshes.merge(readMeshes(file));
   std::map<std::string, Score> scores;
   for (const std::string& file : options.files) {
+    if (std::filesystem::is_directory(file))
+      throw std::runtime_error(file + ": is a folder; name its files of cases");
     std::map<long, Warmth> sequences;
-    for (const Case& asked : readCases(file)) {
+    const auto cases = readCases(file);
+    if (cases.empty()) throw std::runtime_error(file + ": holds no cases");
+    for (const Case& asked : cases) {
       Warmth cold;
       Warmth& warmth = asked.sequence ? sequences[*asked.sequence] : cold;
       const Answer answer = answerCase(asked, meshes, options.level, warmth);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <stdexcept>
 
 #include "collision/hull.hpp"
 #include "collision/penetration_depth.hpp"
@@ -75,6 +76,39 @@ TEST(NarrowPhaseExtremes, ADepthThatIsCalledGlobalIsTheDepthAtAnyScale) {
     const Depth depth = penetrationDepth(a, b, cache, none);
     EXPECT_TRUE(depth.global) << exponent;
     EXPECT_NEAR(depth.depth / unit, 0.25, 1e-14) << exponent;
+  }
+}
+
+/// The origin lies in a plane of symmetry: on a face, an edge or a corner of every simplex.
+TEST(NarrowPhaseExtremes, ADepthIsGlobalInSymmetricPlacesToo) {
+  const double c = std::sqrt(0.5);
+  Mat3 turned;
+  turned << c, -c, 0, c, c, 0, 0, 0, 1;
+  const Hull box = buildHull(cubeAround({0, 0, 0}, 0.5));
+  for (const double x : {0.0, 0.3, 0.7, 1.1, 1.2}) {
+    const ConvexBody a{box.vertices, Vec3::Zero(), nullptr, &box};
+    const ConvexBody b{box.vertices, Vec3(x, 0, 0), &turned, &box};
+    FeatureCache cache;
+    ASSERT_EQ(decide(a, b, cache).verdict, Verdict::penetrating) << x;
+    DepthCache none;
+    const Depth depth = penetrationDepth(a, b, cache, none);
+    EXPECT_TRUE(depth.global) << x;
+    EXPECT_NEAR(depth.depth, std::min(1.0, 0.5 + c - x), 1e-14) << x;
+  }
+}
+
+TEST(NarrowPhaseExtremes, WhatIsNoNumberIsRefusedByName) {
+  const std::vector<Vec3> cube = cubeAround({0, 0, 0}, 1);
+  const double none = std::nan(""), infinite = std::numeric_limits<double>::infinity();
+  const Mat3 noRotation = Mat3::Constant(none);
+  const std::vector<Vec3> noCorner{{0, 0, 0}, {none, 0, 0}};
+  const ConvexBody good{cube, Vec3::Zero()};
+  for (const ConvexBody& bad : {ConvexBody{cube, {0, none, 0}}, ConvexBody{cube, {infinite, 0, 0}},
+                                ConvexBody{cube, Vec3::Zero(), &noRotation},
+                                ConvexBody{noCorner, Vec3::Zero()}, ConvexBody{{}, Vec3::Zero()}}) {
+    FeatureCache cache;
+    EXPECT_THROW(decide(good, bad, cache), std::invalid_argument);
+    EXPECT_THROW(refine(bad, good, cache), std::invalid_argument);
   }
 }
 
