@@ -5,21 +5,14 @@
 #pragma once
 
 #include <cstddef>
-#include <random>
 #include <span>
 #include <vector>
 
-#include "collision/types.hpp"
+#include "tests/benchmarks/random.hpp"
 
 namespace enfilade::benchmarks {
 
 using collision::Box;
-using collision::Vec3;
-using Random = std::mt19937_64;
-
-inline double uniform(Random& random, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(random);
-}
 
 struct Building {
   std::vector<Box> still;

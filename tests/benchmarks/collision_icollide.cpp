@@ -44,16 +44,6 @@ double volumeOf(const Hull& hull) {
   return six / 6;
 }
 
-Vec3 direction(Random& random) {
-  while (true) {
-    const double x = uniform(random, -1, 1);
-    const double y = uniform(random, -1, 1);
-    const double z = uniform(random, -1, 1);
-    const Vec3 v(x, y, z);
-    if (v.squaredNorm() > 0.01 && v.squaredNorm() < 1) return v.normalized();
-  }
-}
-
 /// Vertices on the unit sphere: faces are triangles, twice as many as vertices, less four.
 Hull polytope(Random& random, std::size_t faces) {
   Points points;

@@ -2,23 +2,13 @@
 
 #include "collision/hull.hpp"
 #include "collision/narrow_phase.hpp"
-#include "tests/benchmarks/building_workload.hpp"
+#include "tests/benchmarks/random.hpp"
 
 namespace enfilade::benchmarks {
 namespace {
 
 constexpr double kRadiansPerDegree = 0.017453292519943295;
 constexpr double kFarApart = 10;  // metres: surely separated, for unit spheres
-
-Vec3 direction(Random& random) {
-  while (true) {
-    const double x = uniform(random, -1, 1);
-    const double y = uniform(random, -1, 1);
-    const double z = uniform(random, -1, 1);
-    const Vec3 v(x, y, z);
-    if (v.squaredNorm() > 0.01 && v.squaredNorm() < 1) return v.normalized();
-  }
-}
 
 Points sphericalPoints(Random& random, std::size_t count) {
   Points points;
