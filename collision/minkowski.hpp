@@ -26,6 +26,8 @@ using Wide = long double;
 using WideVec = Eigen::Matrix<Wide, 3, 1>;
 
 inline constexpr double kUnit = 0x1p-53;  ///< of double
+/// At least the length of a unit direction that is rounded a few times.
+inline constexpr double kUnitLength = 1 + 16 * kUnit;
 inline constexpr Wide kWideUnit = std::numeric_limits<Wide>::epsilon() / 2;
 
 template <class Real>

@@ -35,8 +35,6 @@ constexpr Wide kMostError = 15;   // units of rounding of the largest coordinate
 constexpr Wide kFine = 0x1p-32L;  // of the distance: see describeSeparation
 constexpr double kLeastInDoubles = 1e-140;  // metres: below, a squared length loses bits
 constexpr int kMostEqualSteps = 4;          // of a walk, that come no nearer
-/// At least that of a unit direction that is rounded a few times.
-constexpr double kUnitLength = 1 + 16 * kUnit;
 constexpr int kIterationBound = 96;  // about 10 are usual, from nothing; reaching it: the next step
 
 bool valid(const FeatureCache& cache, const ConvexBody& a, const ConvexBody& b) {

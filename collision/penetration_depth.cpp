@@ -1,8 +1,8 @@
 // The expanding polytope (van den Bergen 2001), certified.
 // Steps
 //  1. A polytope of points of M = B - A around the origin: last tick's, where it still surrounds
-//     the origin, else the tetrahedron that proved the penetration, else supports around the
-//     simplex that the origin lies on.
+//     the origin, else the tetrahedron that proved the penetration or supports around the simplex
+//     that the origin lies on, else one that is searched for (polytope.hpp).
 //  2. Its facet nearest the origin, and the support of M along that facet's normal. The plane of
 //     the support bounds the depth from above: moving by the support's distance parts the bodies.
 //  3. The facet bounds it from below (see the proof). Where both meet, that is the depth; else the
@@ -15,8 +15,9 @@
 // the origin at least once, and every ray from the origin meets a facet, not before the distance
 // of that facet's plane. All corners are in M, which is convex and holds the origin: so does M hold
 // the ball of the least such distance. The polytope need not be convex, and is not asked to be.
-// Departures: termination is by the two bounds; a facet that cannot be proved to face outward ends
-// the search with an upper bound, never with an exception.
+// Departures: termination is by the two bounds; a facet that is not proved to face outward is
+// expanded before all others, and where that is in vain the search ends with an upper bound, never
+// with an exception.
 #include "collision/penetration_depth.hpp"
 
 #include <algorithm>
@@ -100,7 +101,7 @@ Beyond beyond(const Facet<double>& facet, const Polytope<double>& polytope) {
   const double length = facet.normal.norm();
   const Vec3 inward = facet.normal * (-1 / length);
   const Summits summits =
-      climb(polytope.difference, inward, 1 + 16 * kUnit, polytope.pairs[facet.corners[0]]);
+      climb(polytope.difference, inward, kUnitLength, polytope.pairs[facet.corners[0]]);
   const Along along = alongOf(polytope.difference, inward, 1, summits);
   return {summits.pair(), -along.value - std::sqrt(facet.nearness)};
 }
@@ -136,7 +137,7 @@ bool expandUntilBoundsMeet(Polytope<Real>& polytope, Bounds& bounds) {
       if (polytope.holds(bounds.support)) return false;
       next = bounds.support;
     }
-    if (!expand(next, true, polytope)) return false;
+    if (!expand(next, polytope)) return false;
   }
 }
 

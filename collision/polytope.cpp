@@ -102,11 +102,11 @@ bool surround(std::span<const VertexPair> simplex, Polytope<Real>& polytope) {
     ring[2] = addSupport<Real>(-other - side / 2, polytope);
     return addBipyramid<Real>(ring, 1, 0, polytope);
   }
-  return surroundBySearch(polytope);
+  return false;
 }
 
 template <class Real>
-bool expand(VertexPair pair, bool anyTurn, Polytope<Real>& polytope) {
+bool expand(VertexPair pair, Polytope<Real>& polytope) {
   if (polytope.corners == kMostCorners) return false;
   const std::uint16_t added = polytope.addCorner(pair);
   Rim rim;
@@ -122,7 +122,7 @@ bool expand(VertexPair pair, bool anyTurn, Polytope<Real>& polytope) {
   polytope.facetCount = kept;
   if (rim.count == 0) return false;
   for (std::size_t k = 0; k < rim.count; ++k)
-    if (!polytope.addFacet({rim.edges[k][0], rim.edges[k][1], added}, anyTurn)) return false;
+    if (!polytope.addFacet({rim.edges[k][0], rim.edges[k][1], added}, true)) return false;
   return true;
 }
 
@@ -143,7 +143,7 @@ bool surroundBySearch(Polytope<Real>& polytope) {
     VertexPair hint = polytope.pairs[worst.corners[0]];
     const WideVec inward = -worst.normal.template cast<Wide>();
     leastAlong(polytope.difference, inward, inward.norm(), hint);
-    if (polytope.holds(hint) || !expand(hint, true, polytope)) return false;
+    if (polytope.holds(hint) || !expand(hint, polytope)) return false;
   }
   return false;
 }
@@ -152,7 +152,7 @@ template bool surround(std::span<const VertexPair>, Polytope<double>&);
 template bool surround(std::span<const VertexPair>, Polytope<Wide>&);
 template bool surroundBySearch(Polytope<double>&);
 template bool surroundBySearch(Polytope<Wide>&);
-template bool expand(VertexPair, bool, Polytope<double>&);
-template bool expand(VertexPair, bool, Polytope<Wide>&);
+template bool expand(VertexPair, Polytope<double>&);
+template bool expand(VertexPair, Polytope<Wide>&);
 
 }  // namespace enfilade::collision

@@ -36,8 +36,8 @@ Real facetError(double reach) {
   return 24 * unitOf<Real>() * static_cast<Real>(reach);
 }
 
-/// Facets that form a closed surface, each turned away from the origin: so the surface winds around
-/// the origin, which is strictly inside.
+/// Facets that form a closed surface. Where each of them faces away from the origin, the surface
+/// winds around it, and the origin is strictly inside.
 template <class Real>
 struct Polytope {
   using Vec = Eigen::Matrix<Real, 3, 1>;
@@ -77,9 +77,9 @@ struct Polytope {
   }
 };
 
-/// Builds a polytope around the origin from a simplex that holds it, if only on a face, an edge or
-/// a corner (up to rounding): with supports on the sides that the simplex is flat on. `polytope` is
-/// empty before. False: not proved.
+/// Builds a polytope around the origin from a simplex of two to four points that holds it, if only
+/// on a face or an edge (up to rounding): with supports on the sides that the simplex is flat on.
+/// `polytope` is empty before. False: not proved.
 template <class Real>
 bool surround(std::span<const VertexPair> simplex, Polytope<Real>& polytope);
 
@@ -88,17 +88,17 @@ bool surround(std::span<const VertexPair> simplex, Polytope<Real>& polytope);
 template <class Real>
 bool surroundBySearch(Polytope<Real>& polytope);
 
-/// Puts a point in place of the facets that it sees. False when the polytope could not be grown
-/// with proof; it is then of no more use. `anyTurn`: without proof, for a polytope that the origin
-/// may be outside of.
+/// Puts a point in place of the facets that it sees, whether or not the new ones face away from the
+/// origin. False when there is no room, or it sees none or all; the polytope is then of no more
+/// use.
 template <class Real>
-bool expand(VertexPair pair, bool anyTurn, Polytope<Real>& polytope);
+bool expand(VertexPair pair, Polytope<Real>& polytope);
 
 extern template bool surround(std::span<const VertexPair>, Polytope<double>&);
 extern template bool surround(std::span<const VertexPair>, Polytope<Wide>&);
 extern template bool surroundBySearch(Polytope<double>&);
 extern template bool surroundBySearch(Polytope<Wide>&);
-extern template bool expand(VertexPair, bool, Polytope<double>&);
-extern template bool expand(VertexPair, bool, Polytope<Wide>&);
+extern template bool expand(VertexPair, Polytope<double>&);
+extern template bool expand(VertexPair, Polytope<Wide>&);
 
 }  // namespace enfilade::collision
