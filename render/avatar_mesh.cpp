@@ -44,10 +44,13 @@ void endPiece(AvatarMeshes& meshes, AvatarMeshes::Piece piece) {
 
 void addBody(AvatarMeshes& meshes, const scene::AvatarView& avatar) {
   const AvatarMeshes::Piece piece = beginPiece(meshes, avatar, avatarColour(avatar.id), 0.10f);
-  for (const auto& face : avatar.hull->faces) {
-    std::vector<Vec3> corners;
-    for (const std::uint32_t vertex : face) corners.push_back(avatar.hull->vertices[vertex]);
-    addPolygon(meshes, piece.range, corners);
+  for (const scene::AvatarPart& part : avatar.shape->parts) {
+    for (const auto& face : part.hull->faces) {
+      std::vector<Vec3> corners;
+      for (const std::uint32_t vertex : face)
+        corners.push_back(part.rotation * part.hull->vertices[vertex] + part.offset);
+      addPolygon(meshes, piece.range, corners);
+    }
   }
   endPiece(meshes, piece);
 }
@@ -55,7 +58,8 @@ void addBody(AvatarMeshes& meshes, const scene::AvatarView& avatar) {
 /// A pale wedge at the height of the eyes: its tip points where the avatar looks.
 void addVisor(AvatarMeshes& meshes, const scene::AvatarView& avatar) {
   double reach = 0;  // metres from the axis to the rim of the hull
-  for (const Vec3& v : avatar.hull->vertices) reach = std::max(reach, std::hypot(v.x(), v.z()));
+  for (const Vec3& v : avatar.shape->parts.front().hull->vertices)
+    reach = std::max(reach, std::hypot(v.x(), v.z()));
   Vec3 ahead(avatar.gaze.x(), 0, avatar.gaze.z());
   ahead = ahead.norm() > 1e-6 ? ahead.normalized() : Vec3(Vec3::UnitX());
   const Vec3 aside = ahead.cross(Vec3::UnitY());
@@ -91,7 +95,7 @@ Eigen::Vector3f avatarColour(scene::EntityId id) {
 AvatarMeshes avatarMeshes(const scene::Snapshot& snapshot, scene::EntityId hidden) {
   AvatarMeshes meshes;
   for (const scene::AvatarView& avatar : snapshot.avatars) {
-    if (avatar.id == hidden || !avatar.hull) continue;
+    if (avatar.id == hidden || !avatar.shape) continue;
     addBody(meshes, avatar);
     addVisor(meshes, avatar);
   }

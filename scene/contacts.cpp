@@ -30,42 +30,50 @@ bool nearer(const Decision& a, const Decision& b) {
   return a.verdict != b.verdict ? a.verdict > b.verdict : a.distance < b.distance;
 }
 
-double depthOf(const Avatar& avatar, const Obstacle& obstacle, const Decision& decision) {
+double depthOf(const collision::ConvexBody& part, const Obstacle& obstacle,
+               const collision::FeatureCache& cache, const Decision& decision) {
   if (decision.verdict != Verdict::penetrating) return 0;
   collision::DepthCache none;  // avatars do not penetrate, so there is nothing to be coherent with
-  return collision::penetrationDepth(bodyAt(*avatar.hull, avatar.feet), obstacle.body,
-                                     obstacle.cache, none)
-      .depth;
+  return collision::penetrationDepth(part, obstacle.body, cache, none).depth;
 }
 
-std::optional<Decision> decideCounted(const Avatar& avatar, Obstacle& obstacle, double limit,
+std::optional<Decision> decideCounted(const collision::ConvexBody& part, const Obstacle& obstacle,
+                                      double limit, collision::FeatureCache& cache,
                                       QueryCount& count) {
   ++count.narrow;
-  const collision::ConvexBody body = bodyAt(*avatar.hull, avatar.feet);
-  const auto decision = collision::decideWithin(body, obstacle.body, limit, obstacle.cache);
+  const auto decision = collision::decideWithin(part, obstacle.body, limit, cache);
   if (decision && decision->decidedBy == collision::DecidedBy::rational) ++count.rational;
   return decision;
+}
+
+/// Adds what part `i` of the avatar has to do with the obstacle to what was found so far.
+void addNear(const Avatar& avatar, std::size_t i, Obstacle& obstacle, double limit,
+             std::vector<Contact>& found, QueryCount& count) {
+  const AvatarPart& part = avatar.shape->parts[i];
+  if (!overlaps(grown(boxAt(part.box, avatar.feet), limit), obstacle.box)) return;
+  const bool known = !found.empty() && found.back().other == obstacle.entity;
+  const double within = known ? found.back().decision.distance : limit;
+  const collision::ConvexBody body = bodyAt(part, avatar.feet);
+  collision::FeatureCache& cache = obstacle.cacheOf(i);
+  const auto decision = decideCounted(body, obstacle, within, cache, count);
+  if (!decision || !collision::isNearerThan(*decision, body, obstacle.body, limit, cache)) return;
+  if (!known) {
+    found.push_back({obstacle.entity, false, *decision});
+  } else if (nearer(*decision, found.back().decision)) {
+    found.back().decision = *decision;
+  }
+  double& penetration = found.back().penetration;
+  penetration = std::max(penetration, depthOf(body, obstacle, cache, *decision));
 }
 
 /// All entities nearer than `limit`, each with its nearest piece, ascending.
 std::vector<Contact> nearOnes(Avatar& avatar, double limit, QueryCount& count) {
   std::vector<Contact> found;
-  const Box box = grown(boxAt(avatar.hullBox, avatar.feet), limit);
+  const std::size_t parts = avatar.shape->parts.size();
+  const Box box = grown(boxAt(avatar.shape->box, avatar.feet), limit);
   for (Obstacle& obstacle : avatar.obstacles) {
     if (!overlaps(box, obstacle.box)) continue;
-    const bool known = !found.empty() && found.back().other == obstacle.entity;
-    const double within = known ? found.back().decision.distance : limit;
-    const auto decision = decideCounted(avatar, obstacle, within, count);
-    if (!decision) continue;
-    const collision::ConvexBody body = bodyAt(*avatar.hull, avatar.feet);
-    if (!collision::isNearerThan(*decision, body, obstacle.body, limit, obstacle.cache)) continue;
-    if (!known) {
-      found.push_back({obstacle.entity, false, *decision});
-    } else if (nearer(*decision, found.back().decision)) {
-      found.back().decision = *decision;
-    }
-    double& penetration = found.back().penetration;
-    penetration = std::max(penetration, depthOf(avatar, obstacle, *decision));
+    for (std::size_t i = 0; i < parts; ++i) addNear(avatar, i, obstacle, limit, found, count);
   }
   return found;
 }
@@ -75,9 +83,12 @@ std::optional<Decision> decisionWith(Avatar& avatar, EntityId other, QueryCount&
   std::optional<Decision> best;
   for (Obstacle& obstacle : avatar.obstacles) {
     if (obstacle.entity != other) continue;
-    const auto decision =
-        decideCounted(avatar, obstacle, std::numeric_limits<double>::infinity(), count);
-    if (!best || nearer(*decision, *best)) best = decision;
+    for (std::size_t i = 0; i < avatar.shape->parts.size(); ++i) {
+      const auto decision =
+          decideCounted(bodyAt(avatar.shape->parts[i], avatar.feet), obstacle,
+                        std::numeric_limits<double>::infinity(), obstacle.cacheOf(i), count);
+      if (!best || nearer(*decision, *best)) best = decision;
+    }
   }
   return best;
 }

@@ -41,8 +41,8 @@ struct SlideResult {
 /// Where the feet may go: beyond the reach nothing was collected, so nothing would be in the way.
 Box feetRoomOf(const Avatar& avatar, const Lengths& lengths) {
   const double clearance = 2 * lengths.epsilon + lengths.nearMiss;  // what contacts.cpp looks for
-  return grown(Box{avatar.reach.min - avatar.hullBox.min, avatar.reach.max - avatar.hullBox.max},
-               -clearance);
+  const Box& body = avatar.shape->box;
+  return grown(Box{avatar.reach.min - body.min, avatar.reach.max - body.max}, -clearance);
 }
 
 /// The part of a displacement, 0..1, that keeps the feet in their room.
@@ -59,8 +59,7 @@ double partInside(const Box& room, const Vec3& feet, const Vec3& displacement) {
 Stop sweepFrom(Mover& m, const Vec3& displacement) {
   const double part = partInside(m.feetRoom, m.feet, displacement);
   const Vec3 granted = part * displacement;
-  Stop stop = sweepHull(*m.avatar.hull, m.avatar.hullBox, m.feet, granted, m.avatar.obstacles,
-                        m.band(), m.count);
+  Stop stop = sweepShape(*m.avatar.shape, m.feet, granted, m.avatar.obstacles, m.band(), m.count);
   m.feet += stop.fraction * granted;
   stop.fraction *= part;
   return stop;
@@ -207,14 +206,13 @@ void fall(Mover& m, const Vec3& wish) {
 
 }  // namespace
 
-Box reachOf(const WorldState& world, Avatar& avatar, const Vec3& velocity) {
+Box reachOf(const WorldState& world, const Avatar& avatar, const Vec3& velocity) {
   const Lengths& l = world.lengths;
   const double across = velocity.norm() * l.tick + kTread;
   const double down = (avatar.fallSpeed + l.gravity * l.tick) * l.tick;
   // Slides back out by epsilon, contacts and near misses look a little further.
   const double margin = 8 * l.epsilon + l.nearMiss;
-  Box box = collision::tightBox(*avatar.hull, {collision::Quat::Identity(), avatar.feet},
-                                avatar.extremes);
+  Box box = boxAt(avatar.shape->box, avatar.feet);
   box.min -= Vec3(across, across + std::max(l.stepHeight, down), across);
   box.max += Vec3(across, across + l.stepHeight, across);
   return grown(box, margin);

@@ -11,42 +11,47 @@ constexpr double kGatherMargin = 0.15;  // metres: obstacles are collected for s
 
 }  // namespace
 
-Stop sweepHull(const collision::Hull& hull, const Box& hullBox, const Vec3& feet,
-               const Vec3& displacement, std::vector<Obstacle>& obstacles,
-               const collision::StoppingBand& band, QueryCount& count) {
+Stop sweepShape(const AvatarShape& shape, const Vec3& feet, const Vec3& displacement,
+                std::vector<Obstacle>& obstacles, const collision::StoppingBand& band,
+                QueryCount& count) {
   Stop stop;
-  const Box start = boxAt(hullBox, feet);
   Vec3 rest = displacement;  // only what lies before the earliest stop so far matters
-  Box path = grown(collision::swept(start, rest), band.high);
-  for (Obstacle& obstacle : obstacles) {
-    if (!overlaps(path, obstacle.box)) continue;
-    const collision::SweepResult result =
-        collision::sweep(bodyAt(hull, feet), rest, obstacle.body, band, obstacle.cache);
-    count.narrow += result.queries;
-    count.rational += result.rationals;
-    count.bounded += result.boundReached ? 1 : 0;
-    const double fraction = stop.fraction * result.fraction;
-    if (!result.stopped || (stop.entity != 0 && fraction >= stop.fraction)) continue;
-    stop = {fraction, obstacle.entity, -result.atStop.normal, result.atStop.distance};
-    if (fraction == 0) break;
-    rest = fraction * displacement;
-    path = grown(collision::swept(start, rest), band.high);
+  for (std::size_t i = 0; i < shape.parts.size(); ++i) {
+    const Box start = boxAt(shape.parts[i].box, feet);
+    Box path = grown(collision::swept(start, rest), band.high);
+    for (Obstacle& obstacle : obstacles) {
+      if (!overlaps(path, obstacle.box)) continue;
+      const collision::SweepResult result = collision::sweep(
+          bodyAt(shape.parts[i], feet), rest, obstacle.body, band, obstacle.cacheOf(i));
+      count.narrow += result.queries;
+      count.rational += result.rationals;
+      count.bounded += result.boundReached ? 1 : 0;
+      const double fraction = stop.fraction * result.fraction;
+      if (!result.stopped || (stop.entity != 0 && fraction >= stop.fraction)) continue;
+      stop = {fraction, obstacle.entity, -result.atStop.normal, result.atStop.distance,
+              result.atStop};
+      if (fraction == 0) return stop;
+      rest = fraction * displacement;
+      path = grown(collision::swept(start, rest), band.high);
+    }
   }
   return stop;
 }
 
-bool isFree(const collision::Hull& hull, const Box& hullBox, const Vec3& feet, double clearance,
+bool isFree(const AvatarShape& shape, const Vec3& feet, double clearance,
             std::vector<Obstacle>& obstacles, QueryCount& count, EntityId& nearest) {
-  const Box box = grown(boxAt(hullBox, feet), clearance);
-  for (Obstacle& obstacle : obstacles) {
-    if (!overlaps(box, obstacle.box)) continue;
-    ++count.narrow;
-    const auto decision =
-        collision::decideWithin(bodyAt(hull, feet), obstacle.body, clearance, obstacle.cache);
-    if (!decision) continue;
-    if (decision->decidedBy == collision::DecidedBy::rational) ++count.rational;
-    nearest = obstacle.entity;
-    return false;
+  for (std::size_t i = 0; i < shape.parts.size(); ++i) {
+    const Box box = grown(boxAt(shape.parts[i].box, feet), clearance);
+    for (Obstacle& obstacle : obstacles) {
+      if (!overlaps(box, obstacle.box)) continue;
+      ++count.narrow;
+      const auto decision = collision::decideWithin(bodyAt(shape.parts[i], feet), obstacle.body,
+                                                    clearance, obstacle.cacheOf(i));
+      if (!decision) continue;
+      if (decision->decidedBy == collision::DecidedBy::rational) ++count.rational;
+      nearest = obstacle.entity;
+      return false;
+    }
   }
   return true;
 }
@@ -74,8 +79,9 @@ void followOthers(const WorldState& world, Avatar& avatar) {
     if (obstacle.entity < world.firstAvatarId()) return;  // avatars come last
     const auto& name = world.avatarNames[obstacle.entity - world.firstAvatarId()];
     const Avatar& other = world.avatars.at(name);
-    obstacle.box = boxAt(other.hullBox, other.feet);
-    obstacle.body = bodyAt(*other.hull, other.feet);
+    const AvatarPart& part = other.shape->parts[obstacle.part];
+    obstacle.box = boxAt(part.box, other.feet);
+    obstacle.body = bodyAt(part, other.feet);
   }
 }
 
@@ -90,9 +96,12 @@ void gatherObstacles(WorldState& world, Avatar& avatar, bool pairsChanged) {
                       avatar.obstacles);
       continue;
     }
-    Obstacle other;
-    other.entity = world.avatars.at(world.avatarOfMover.at(partner.id)).id;
-    avatar.obstacles.push_back(other);
+    const Avatar& other = world.avatars.at(world.avatarOfMover.at(partner.id));
+    for (std::uint32_t part = 0; part < other.shape->parts.size(); ++part) {
+      avatar.obstacles.emplace_back();
+      avatar.obstacles.back().entity = other.id;
+      avatar.obstacles.back().part = part;
+    }
   }
   // Movers' ids are reused and so not in the order of entities.
   const auto key = [](const Obstacle& o) { return std::pair(o.entity, o.part); };
@@ -103,7 +112,10 @@ void gatherObstacles(WorldState& world, Avatar& avatar, bool pairsChanged) {
   auto old = last.begin();
   for (Obstacle& obstacle : avatar.obstacles) {
     while (old != last.end() && key(*old) < key(obstacle)) ++old;
-    if (old != last.end() && key(*old) == key(obstacle)) obstacle.cache = old->cache;
+    if (old != last.end() && key(*old) == key(obstacle)) {
+      obstacle.cache = old->cache;
+      obstacle.moreCaches = std::move(old->moreCaches);
+    }
   }
 }
 

@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-#include "collision/hull.hpp"
 #include "collision/narrow_phase.hpp"
 #include "collision/sort_and_sweep.hpp"
 #include "collision/time_of_impact.hpp"
+#include "scene/avatar_shape.hpp"
 #include "scene/scene.hpp"
 #include "scene/snapshot.hpp"
 
@@ -16,10 +16,17 @@ namespace enfilade::scene {
 /// A convex piece of an entity, and last tick's separating axis towards it.
 struct Obstacle {
   EntityId entity = 0;
-  std::uint32_t part = 0;  ///< triangle of a still object; 0 for an avatar
+  std::uint32_t part = 0;  ///< triangle of a still object; part of an avatar
   Box box;                 ///< world, metres
   collision::ConvexBody body;
-  collision::FeatureCache cache;
+  collision::FeatureCache cache;                    ///< of the avatar's first part
+  std::vector<collision::FeatureCache> moreCaches;  ///< of its other parts, once they were near
+
+  collision::FeatureCache& cacheOf(std::size_t avatarPart) {
+    if (avatarPart == 0) return cache;
+    if (moreCaches.size() < avatarPart) moreCaches.resize(avatarPart);
+    return moreCaches[avatarPart - 1];
+  }
 };
 
 /// Narrow-phase work done, for the tick's counters.
@@ -35,26 +42,17 @@ struct Stop {
   EntityId entity = 0;         ///< 0: nothing in the way
   Vec3 normal = Vec3::Zero();  ///< unit, from the obstacle to the avatar
   double distance = 0;         ///< metres, at the stop
+  collision::Decision atStop;  ///< from the avatar to the obstacle
 };
 
-/// The box of a hull, `hullBox` with the feet at the origin, that stands at `feet`.
-inline Box boxAt(const Box& hullBox, const Vec3& feet) {
-  return {hullBox.min + feet, hullBox.max + feet};
-}
+/// Moves the shape at `feet` by `displacement` as far as `obstacles` allow.
+Stop sweepShape(const AvatarShape& shape, const Vec3& feet, const Vec3& displacement,
+                std::vector<Obstacle>& obstacles, const collision::StoppingBand& band,
+                QueryCount& count);
 
-/// An upright hull that stands at `feet`.
-inline collision::ConvexBody bodyAt(const collision::Hull& hull, const Vec3& feet) {
-  return {hull.vertices, feet, nullptr, &hull};
-}
-
-/// Moves the hull at `feet` by `displacement` as far as `obstacles` allow.
-Stop sweepHull(const collision::Hull& hull, const Box& hullBox, const Vec3& feet,
-               const Vec3& displacement, std::vector<Obstacle>& obstacles,
-               const collision::StoppingBand& band, QueryCount& count);
-
-/// Whether the hull at `feet` keeps at least `clearance` metres from every obstacle; if not,
+/// Whether the shape at `feet` keeps at least `clearance` metres from every obstacle; if not,
 /// `nearest` names one that is nearer (deepest first is not promised).
-bool isFree(const collision::Hull& hull, const Box& hullBox, const Vec3& feet, double clearance,
+bool isFree(const AvatarShape& shape, const Vec3& feet, double clearance,
             std::vector<Obstacle>& obstacles, QueryCount& count, EntityId& nearest);
 
 /// Appends the triangles of still object `object` that `reach` may meet.

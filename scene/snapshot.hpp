@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "collision/hull.hpp"
+#include "scene/avatar_shape.hpp"
 #include "scene/model.hpp"
 
 namespace enfilade::scene {
@@ -17,11 +17,11 @@ using EntityId = std::uint32_t;
 struct AvatarView {
   EntityId id = 0;
   std::string name;
-  Vec3 feet = Vec3::Zero();   ///< world, metres: the middle of the hull's bottom
+  Vec3 feet = Vec3::Zero();   ///< world, metres: the middle of the soles
   Vec3 gaze = Vec3::UnitX();  ///< world, unit length: where the eyes look
   double eyeHeight = 1.6;     ///< metres above the feet
   bool grounded = false;
-  std::shared_ptr<const collision::Hull> hull;  ///< its frame: origin at the feet, not turned
+  std::shared_ptr<const AvatarShape> shape;
 };
 
 struct Snapshot {

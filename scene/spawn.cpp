@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 
-#include "scene/avatar_hull.hpp"
 #include "scene/world_state.hpp"
 
 namespace enfilade::scene {
@@ -17,11 +16,14 @@ void gatherAll(const WorldState& world, const Box& box, std::vector<Obstacle>& o
   for (const collision::StillId still : world.broadPhase.stillOverlapping(box))
     gatherTriangles(*world.scene, world.scene->solidObjects()[still], box, obstacles);
   for (const auto& [name, other] : world.avatars) {
-    Obstacle obstacle;
-    obstacle.entity = other.id;
-    obstacle.box = boxAt(other.hullBox, other.feet);
-    obstacle.body = bodyAt(*other.hull, other.feet);
-    if (overlaps(obstacle.box, box)) obstacles.push_back(obstacle);
+    for (std::uint32_t part = 0; part < other.shape->parts.size(); ++part) {
+      Obstacle obstacle;
+      obstacle.entity = other.id;
+      obstacle.part = part;
+      obstacle.box = boxAt(other.shape->parts[part].box, other.feet);
+      obstacle.body = bodyAt(other.shape->parts[part], other.feet);
+      if (overlaps(obstacle.box, box)) obstacles.push_back(obstacle);
+    }
   }
 }
 
@@ -83,12 +85,11 @@ bool hasFloorBelow(const WorldState& world, const Avatar& avatar, QueryCount& co
   const double depth = avatar.feet.y() - world.scene->bounds().min.y() + kFloorMargin;
   if (!(depth > 0)) return false;
   const Vec3 down{0, -depth, 0};
-  const Box column = collision::swept(boxAt(avatar.hullBox, avatar.feet), down);
+  const Box column = collision::swept(boxAt(avatar.shape->box, avatar.feet), down);
   std::vector<Obstacle> obstacles;
   gatherAll(world, column, obstacles);
   const double epsilon = world.lengths.epsilon;
-  return sweepHull(*avatar.hull, avatar.hullBox, avatar.feet, down, obstacles,
-                   {0.5 * epsilon, epsilon}, count)
+  return sweepShape(*avatar.shape, avatar.feet, down, obstacles, {0.5 * epsilon, epsilon}, count)
              .entity != 0;
 }
 
@@ -106,10 +107,9 @@ std::string text(const Vec3& v) {
 
 std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& order, Avatar& avatar,
                                        QueryCount& count) {
-  avatar.hull = std::make_shared<const collision::Hull>(avatarHull(order.radius, order.height));
-  for (const Vec3& v : avatar.hull->vertices) avatar.hullBox.include(v);
+  avatar.shape = prismShape(order.radius, order.height, order.height);
   const double epsilon = world.lengths.epsilon;
-  Box around = boxAt(avatar.hullBox, order.at);
+  Box around = boxAt(avatar.shape->box, order.at);
   around.max.y() += kLifts.back();
   std::vector<Obstacle> obstacles;
   gatherAll(world, grown(around, 2 * epsilon), obstacles);
@@ -117,9 +117,8 @@ std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& ord
   EntityId inTheWay = 0;
   for (const double lift : kLifts) {
     avatar.feet = order.at + Vec3(0, lift, 0);
-    if (!isFree(*avatar.hull, avatar.hullBox, avatar.feet, epsilon, obstacles, count, inTheWay))
-      continue;
-    const Vec3 middle = avatar.feet + avatar.hullBox.centre();
+    if (!isFree(*avatar.shape, avatar.feet, epsilon, obstacles, count, inTheWay)) continue;
+    const Vec3 middle = avatar.feet + avatar.shape->box.centre();
     if (const EntityId solid = solidAround(world, middle))
       return "at " + text(order.at) + " it would stand inside " + pathOf(world, solid);
     if (!hasFloorBelow(world, avatar, count))

@@ -104,7 +104,7 @@ std::shared_ptr<const Snapshot> makeSnapshot(const WorldState& world) {
   snapshot->stateHash = world.hash;
   for (const auto& [name, avatar] : world.avatars)
     snapshot->avatars.push_back({avatar.id, name, avatar.feet, avatar.gaze, avatar.eyeHeight,
-                                 avatar.grounded, avatar.hull});
+                                 avatar.grounded, avatar.shape});
   std::sort(snapshot->avatars.begin(), snapshot->avatars.end(),
             [](const AvatarView& a, const AvatarView& b) { return a.id < b.id; });
   return snapshot;

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "collision/bounding_box.hpp"
 #include "collision/sort_and_sweep.hpp"
 #include "scene/obstacles.hpp"
 #include "scene/world.hpp"
@@ -32,8 +31,7 @@ struct WalkProgress {
 
 struct Avatar {
   EntityId id = 0;
-  std::shared_ptr<const collision::Hull> hull;
-  Box hullBox;                ///< of the hull with the feet at the origin
+  std::shared_ptr<const AvatarShape> shape;
   Vec3 feet = Vec3::Zero();   ///< world, metres
   Vec3 gaze = Vec3::UnitX();  ///< unit
   double eyeHeight = 0;
@@ -51,8 +49,7 @@ struct Avatar {
   // Caches from tick to tick. They change no verdict, but the last bits of distances and so of the
   // way: they follow from the commands, as all else does, and a copy of a world must copy them.
   collision::MoverId mover = 0;
-  Box reach;  ///< what it can meet in this tick
-  collision::ExtremalVertices extremes;
+  Box reach;                        ///< what it can meet in this tick
   Box gathered;                     ///< where `obstacles` are complete
   std::vector<Obstacle> obstacles;  ///< ascending (entity, part)
   std::vector<Contact> contacts;    ///< ascending `other`; also part of the state
@@ -104,7 +101,7 @@ Wish followOrders(WorldState& world, TickReport& report, QueryCount& count);
 void judgeWalks(WorldState& world, TickReport& report, QueryCount& count);
 
 /// The box that an avatar can reach in this tick with the given velocity (motion.cpp).
-Box reachOf(const WorldState& world, Avatar& avatar, const Vec3& velocity);
+Box reachOf(const WorldState& world, const Avatar& avatar, const Vec3& velocity);
 /// Box tests that the audit of one tick may make, if they suffice for one avatar: some 2 ms, as a
 /// test takes 5 ns (brute force does not foresee its branches).
 inline constexpr std::size_t kMostAuditTests = 400'000;

@@ -23,7 +23,9 @@ scene::AvatarView avatarAt(scene::EntityId id, const Vec3& feet) {
   scene::AvatarView avatar;
   avatar.id = id;
   avatar.feet = feet;
-  avatar.hull = std::make_shared<const collision::Hull>(collision::buildHull(points));
+  avatar.shape = scene::shapeOf(
+      {scene::placedPart(std::make_shared<const collision::Hull>(collision::buildHull(points)),
+                         Vec3::Zero(), collision::Mat3::Identity())});
   return avatar;
 }
 

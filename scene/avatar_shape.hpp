@@ -1,0 +1,57 @@
+// The shape of an avatar: convex parts at poses in its frame, whose origin is at the feet and whose
+// axes are the world's. An avatar does not turn; only the links of a chain do.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "collision/hull.hpp"
+#include "collision/narrow_phase.hpp"
+
+namespace enfilade::scene {
+
+using collision::Box;
+using collision::Mat3;
+using collision::Vec3;
+
+struct AvatarPart {
+  std::shared_ptr<const collision::Hull> hull;
+  Vec3 offset = Vec3::Zero();        ///< metres, of the hull's origin in the avatar's frame
+  Mat3 rotation = Mat3::Identity();  ///< avatarFromHull
+  bool turned = false;               ///< `rotation` is not the identity
+  Box box;                           ///< of the placed hull, in the avatar's frame
+};
+
+/// Never changed once made: an avatar that crouches or bends gets another one.
+struct AvatarShape {
+  std::vector<AvatarPart> parts;  ///< at least one
+  Box box;                        ///< of all parts
+};
+
+/// `hull` placed in the avatar's frame, its box worked out.
+AvatarPart placedPart(std::shared_ptr<const collision::Hull> hull, const Vec3& offset,
+                      const Mat3& avatarFromHull);
+
+std::shared_ptr<const AvatarShape> shapeOf(std::vector<AvatarPart> parts);
+
+/// A bevelled prism on twelve sides: origin in the middle of the bottom, +Y up, metres; the widest
+/// ring has the given radius. The bevels at bottom and top let it glide over seams and small
+/// ledges. Their height is that of an avatar of `standing` metres, so that the prism of one who
+/// crouches lies inside the one who stands; height >= standing / 4.
+collision::Hull avatarHull(double radius, double height, double standing);
+
+/// One part: the prism.
+std::shared_ptr<const AvatarShape> prismShape(double radius, double height, double standing);
+
+/// The box of `box` in the avatar's frame when the feet are at `feet`.
+inline Box boxAt(const Box& box, const Vec3& feet) {
+  return {box.min + feet, box.max + feet};
+}
+
+/// The part of an avatar that stands at `feet`. It points into `part`.
+inline collision::ConvexBody bodyAt(const AvatarPart& part, const Vec3& feet) {
+  return {part.hull->vertices, feet + part.offset, part.turned ? &part.rotation : nullptr,
+          part.hull.get()};
+}
+
+}  // namespace enfilade::scene
