@@ -137,6 +137,7 @@ Object finishObject(const ObjectDraft& draft, const Vec3& offset, MeshTable& mes
   Object object;
   object.path = draft.path;
   object.globalId = draft.globalId;
+  object.ifcClass = draft.ifcClass;
   const Eigen::Affine3d frame = sharedFrame(draft, offset);
   for (const auto& p : draft.placements) {
     if (p.worldFromMesh.matrix() == frame.matrix()) {
@@ -183,6 +184,7 @@ void ProblemLog::add(const std::string& kind, const std::string& example, std::s
 Model convertScene(const aiScene& scene, const ConvertInput& input,
                    const ImportProgress& progress) {
   Model model;
+  model.reader = "assimp";
   ProblemLog problems;
   for (const Problem& problem : input.facts.problems) {
     // A unit that the user gave is not a guess.

@@ -47,7 +47,7 @@ struct ObjectDraft {
     std::uint32_t mesh;  ///< assimp's index
     Eigen::Affine3d worldFromMesh;
   };
-  std::string path, globalId;
+  std::string path, globalId, ifcClass;
   std::vector<Placement> placements;
 };
 

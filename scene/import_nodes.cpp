@@ -130,7 +130,10 @@ class Collector {
     }
     const std::string path = place.parentPath + place.siblings->claim(segmentFor(name));
     const std::size_t draft = drafts_.size();
-    drafts_.push_back({path, ifc_ ? globalIdIn(name) : std::string(), {}});
+    ObjectDraft& made = drafts_.emplace_back();
+    made.path = path;
+    if (ifc_) made.globalId = globalIdIn(name);
+    if (!made.globalId.empty()) made.ifcClass = name.substr(0, name.find('_'));
     if (isSolid(name, node)) place_(node, worldFromNode, drafts_[draft]);
     const bool takesParts = ifc_ && isSolid(name, node);
     SiblingNames names;

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,14 @@ struct Object {
   /// metres, Y up, offset removed; may mirror and scale unequally. Where its determinant is
   /// negative, counter-clockwise in the mesh is clockwise in the world.
   Eigen::Affine3d worldFromMesh = Eigen::Affine3d::Identity();
+  std::string ifcClass = {};   ///< as "IfcDoor", "IfcTransportElement", or empty
+  std::string operation = {};  ///< IFC OperationType or its like: "SINGLE_SWING_LEFT", "ELEVATOR"
+  /// IFC's OverallWidth and OverallHeight of doors and windows in metres; 0: not told.
+  double overallWidth = 0, overallHeight = 0;
+  /// Where an IFC product was placed, in metres and without scale; nullopt: not told. Its own axes
+  /// are IFC's: of a door x runs along its width from the lower corner, y is the side to which it
+  /// opens, z is up.
+  std::optional<Eigen::Affine3d> worldFromPlacement = std::nullopt;
 };
 
 /// Something the user should know about the file: degenerate triangles, missing textures, ...
@@ -64,6 +73,7 @@ struct Problem {
 
 struct Model {
   std::string source;  ///< the file's path as given, or the generator's name
+  std::string reader;  ///< what read the file: "assimp", "web-ifc", "ifcplusplus"; else empty
   std::vector<Material> materials;
   std::vector<Texture> textures;
   std::vector<Mesh> meshes;

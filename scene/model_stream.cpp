@@ -210,20 +210,34 @@ Mesh readMesh(Reader& in, std::size_t materials) {
 void write(Writer& out, const Object& o) {
   out.put(o.path);
   out.put(o.globalId);
+  out.put(o.ifcClass);
+  out.put(o.operation);
   out.putArray(o.meshes);
   out.putMatrix(o.worldFromMesh.matrix().topRows<3>());
+  out.put(o.overallWidth);
+  out.put(o.overallHeight);
+  out.put(static_cast<std::uint8_t>(o.worldFromPlacement.has_value()));
+  if (o.worldFromPlacement) out.putMatrix(o.worldFromPlacement->matrix().topRows<3>());
 }
 
 Object readObject(Reader& in, std::size_t meshes) {
   Object o;
   o.path = in.getText("object path");
   o.globalId = in.getText("GlobalId");
+  o.ifcClass = in.getText("IFC class");
+  o.operation = in.getText("operation");
   o.meshes = in.getArray<std::uint32_t>("object meshes");
   for (const std::uint32_t mesh : o.meshes) {
     if (mesh >= meshes) in.fail("object meshes", "no mesh " + std::to_string(mesh));
   }
   using Rows = Eigen::Matrix<double, 3, 4>;
   o.worldFromMesh.matrix().topRows<3>() = in.getMatrix<Rows>("object transform");
+  o.overallWidth = in.getFinite("overall width");
+  o.overallHeight = in.getFinite("overall height");
+  if (in.getBool("has a placement")) {
+    o.worldFromPlacement.emplace(Eigen::Affine3d::Identity());
+    o.worldFromPlacement->matrix().topRows<3>() = in.getMatrix<Rows>("placement");
+  }
   return o;
 }
 
@@ -285,6 +299,7 @@ std::vector<std::byte> serialiseModel(const Model& model) {
   out.put(kModelStreamVersion);
   out.put(std::uint64_t{0});  // the length, set by finish()
   out.put(model.source);
+  out.put(model.reader);
   writeAll(out, model.textures);
   writeAll(out, model.materials);
   writeAll(out, model.meshes);
@@ -301,11 +316,12 @@ Model deserialiseModel(std::span<const std::byte> bytes) {
   readHeader(in, bytes.size());
   Model model;
   model.source = in.getText("source");
+  model.reader = in.getText("reader");
   readAll(in, model.textures, 24, "textures", [&] { return readTexture(in); });
   readAll(in, model.materials, 50, "materials",
           [&] { return readMaterial(in, model.textures.size()); });
   readAll(in, model.meshes, 44, "meshes", [&] { return readMesh(in, model.materials.size()); });
-  readAll(in, model.objects, 120, "objects", [&] { return readObject(in, model.meshes.size()); });
+  readAll(in, model.objects, 153, "objects", [&] { return readObject(in, model.meshes.size()); });
   model.metresPerUnit = in.getFinite("metres per unit");
   if (model.metresPerUnit <= 0) in.fail("metres per unit", "not positive");
   model.up = static_cast<char>(in.get<std::uint8_t>("up axis"));

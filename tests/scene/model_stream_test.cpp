@@ -11,6 +11,7 @@ namespace {
 Model smallModel() {
   Model model;
   model.source = "small.glb";
+  model.reader = "assimp";
   model.textures.push_back({"brick", 2, 1, {1, 2, 3, 4, 5, 6, 7, 8}});
   model.materials.resize(2);
   model.materials[1].name = "glass";
@@ -28,6 +29,11 @@ Model smallModel() {
   Object object;
   object.path = "house/door#2";
   object.globalId = "2O2Fr$t4X7Zf8NOew3FNtn";
+  object.ifcClass = "IfcDoor";
+  object.operation = "SINGLE_SWING_LEFT";
+  object.overallWidth = 0.9;
+  object.overallHeight = 2.1;
+  object.worldFromPlacement = Eigen::Affine3d(Eigen::Translation3d(4, 5, 6));
   object.meshes = {0, 1};
   object.worldFromMesh = Eigen::Translation3d(0.1, 0.2, 0.3) * Eigen::Scaling(-1.0, 2.0, 1.0);
   model.objects.push_back(object);
@@ -48,6 +54,12 @@ TEST(ModelStream, RoundTripKeepsEveryByte) {
   EXPECT_EQ(back.textures[0].rgba, smallModel().textures[0].rgba);
   EXPECT_EQ(back.materials[1].alpha, Material::Alpha::blend);
   EXPECT_EQ(back.offset, smallModel().offset);
+  EXPECT_EQ(back.reader, "assimp");
+  EXPECT_EQ(back.objects[0].ifcClass, "IfcDoor");
+  EXPECT_EQ(back.objects[0].operation, "SINGLE_SWING_LEFT");
+  EXPECT_EQ(back.objects[0].overallHeight, 2.1);
+  ASSERT_TRUE(back.objects[0].worldFromPlacement);
+  EXPECT_EQ(back.objects[0].worldFromPlacement->translation(), Vec3(4, 5, 6));
   EXPECT_EQ(back.problems[0].count, 3u);
 }
 
