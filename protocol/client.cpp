@@ -8,6 +8,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 namespace enfilade::protocol {
@@ -390,6 +391,30 @@ ReceivedFrame Client::frame(const v1::FrameRequest& frameRequest) {
     }
   }
   return frame;
+}
+
+v1::RayReply Client::rays(const v1::RayQuery& query, ReceivedScan* scan) {
+  v1::ClientMessage message;
+  *message.mutable_rays() = query;
+  std::vector<std::uint8_t> bytes;
+  v1::ServerMessage reply = request(std::move(message), &bytes);
+  expectBody(reply, v1::ServerMessage::kRays, "RayReply");
+  const std::size_t count = std::size_t{reply.rays().columns()} * reply.rays().rows();
+  if (bytes.size() != count * 8) {
+    throw ProtocolError(v1::ERROR_BAD_MESSAGE,
+                        "the scan's attachment has " + std::to_string(bytes.size()) +
+                            " bytes, not 8 for each of " + std::to_string(count) + " rays",
+                        "rays");
+  }
+  if (scan) {
+    scan->distances.resize(count);
+    scan->entities.resize(count);
+    if (count > 0) {
+      std::memcpy(scan->distances.data(), bytes.data(), 4 * count);
+      std::memcpy(scan->entities.data(), bytes.data() + 4 * count, 4 * count);
+    }
+  }
+  return std::move(*reply.mutable_rays());
 }
 
 std::vector<v1::Entity> Client::describe(std::span<const std::uint32_t> ids) {

@@ -44,6 +44,12 @@ struct ReceivedFrame {
   std::span<const std::uint8_t> plane(v1::Channel channel) const;
 };
 
+/// Row by row from above, each from the left.
+struct ReceivedScan {
+  std::vector<float> distances;         ///< metres along each ray, NaN: nothing was met
+  std::vector<std::uint32_t> entities;  ///< 0: nothing was met
+};
+
 class Client {
  public:
   /// Connects and greets. Throws ConnectionError, or ProtocolError (ERROR_VERSION).
@@ -60,6 +66,8 @@ class Client {
   v1::SetClockReply setClock(const v1::SetClock& clock);
   v1::SubscribeReply subscribe(const v1::Subscribe& subscription);
   ReceivedFrame frame(const v1::FrameRequest& request);
+  /// `scan` gets what the attachment holds when a scan was asked for.
+  v1::RayReply rays(const v1::RayQuery& query, ReceivedScan* scan = nullptr);
   std::vector<v1::Entity> describe(std::span<const std::uint32_t> ids);
   v1::Metrics metrics();
 

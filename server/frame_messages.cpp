@@ -11,18 +11,6 @@ namespace {
 
 using CameraOrError = std::variant<View, v1::Error>;
 
-const scene::AvatarView* avatarNamed(const scene::Snapshot& snapshot, const std::string& name) {
-  for (const scene::AvatarView& avatar : snapshot.avatars) {
-    if (avatar.name == name) return &avatar;
-  }
-  return nullptr;
-}
-
-v1::Error unknownAvatar(const std::string& name, const char* field) {
-  return errorOf(v1::ERROR_UNKNOWN_AVATAR,
-                 "no avatar '" + name + "' is in the world: spawn it and make a tick first", field);
-}
-
 CameraOrError eyesOf(const v1::AvatarEyes& eyes, const scene::Snapshot& snapshot, int width,
                      int height) {
   const scene::AvatarView* avatar = avatarNamed(snapshot, eyes.avatar());

@@ -4,8 +4,9 @@
 
 namespace enfilade::server {
 
-Buffer encodeShared(const google::protobuf::MessageLite& message) {
-  return std::make_shared<const std::vector<std::uint8_t>>(protocol::encode(message));
+Buffer encodeShared(const google::protobuf::MessageLite& message,
+                    std::span<const std::uint8_t> attachment) {
+  return std::make_shared<const std::vector<std::uint8_t>>(protocol::encode(message, attachment));
 }
 
 OutgoingQueue::OutgoingQueue(const OutgoingBounds& bounds, Buffer tooSlow,

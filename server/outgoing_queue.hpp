@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <vector>
 
 namespace google::protobuf {
@@ -19,7 +20,8 @@ namespace enfilade::server {
 /// One encoded message, shared by all who receive it.
 using Buffer = std::shared_ptr<const std::vector<std::uint8_t>>;
 
-Buffer encodeShared(const google::protobuf::MessageLite& message);
+Buffer encodeShared(const google::protobuf::MessageLite& message,
+                    std::span<const std::uint8_t> attachment = {});
 
 struct OutgoingBounds {
   std::size_t bytes = 0;   ///< of unsent replies and events, pictures not counted

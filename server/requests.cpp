@@ -170,31 +170,59 @@ void answer(const Asked& asked, const v1::Subscribe& subscription) {
   reply(asked, std::move(message));
 }
 
+std::optional<v1::Error> tickGone(const Asked& asked, std::uint64_t wanted, const char* field) {
+  const std::uint64_t last = lastTick(asked.served);
+  if (wanted == last) return std::nullopt;
+  return errorOf(v1::ERROR_TICK_GONE,
+                 "the last tick is " + std::to_string(last) + ", not " + std::to_string(wanted),
+                 field);
+}
+
+/// A service works on the request: the client's later ones wait until what is returned is called,
+/// on the service's thread, with the reply, which `deliver` hands to the client's queue.
+std::function<void(Buffer)> untilAnswered(const Asked& asked, const PostToTickThread& post,
+                                          void (OutgoingQueue::*deliver)(Buffer)) {
+  asked.client.answerUnderWay = asked.message.request_id();
+  return [out = asked.client.out, id = asked.id, post, deliver](Buffer whole) {
+    ((*out).*deliver)(std::move(whole));
+    post([id, post](ServedWorld& then) {
+      const auto client = then.clients.find(id);
+      if (client == then.clients.end()) return;
+      client->second.answerUnderWay.reset();
+      answerWaiting(then, id, post);
+    });
+  };
+}
+
 void answer(const Asked& asked, const v1::FrameRequest& request, const PostToTickThread& post) {
   ServedWorld& served = asked.served;
-  const auto snapshot = served.world.snapshot();
-  if (request.has_tick() && request.tick() != snapshot->tick) {
-    return replyError(asked, errorOf(v1::ERROR_TICK_GONE,
-                                     "the last tick is " + std::to_string(snapshot->tick) +
-                                         ", not " + std::to_string(request.tick()),
-                                     "frame.tick"));
+  if (request.has_tick()) {
+    if (auto gone = tickGone(asked, request.tick(), "frame.tick")) {
+      return replyError(asked, std::move(*gone));
+    }
   }
   if (served.frames.deviceName().empty()) {
     return replyError(asked, errorOf(v1::ERROR_NO_RENDERER, served.frames.whyNone()));
   }
+  const auto snapshot = served.world.snapshot();
   auto view = viewFrom(request, *snapshot);
   if (auto* error = std::get_if<v1::Error>(&view)) return replyError(asked, std::move(*error));
-  asked.client.frameUnderWay = asked.message.request_id();
   FrameJob job{snapshot, std::get<View>(view), request, asked.message.request_id()};
-  served.frames.draw(std::move(job), [out = asked.client.out, id = asked.id, post](Buffer whole) {
-    out->pushFrame(std::move(whole));
-    post([id, post](ServedWorld& then) {
-      const auto client = then.clients.find(id);
-      if (client == then.clients.end()) return;
-      client->second.frameUnderWay.reset();
-      answerWaiting(then, id, post);
-    });
-  });
+  served.frames.draw(std::move(job), untilAnswered(asked, post, &OutgoingQueue::pushFrame));
+}
+
+void answer(const Asked& asked, const v1::RayQuery& query, const PostToTickThread& post) {
+  ServedWorld& served = asked.served;
+  if (query.has_tick()) {
+    if (auto gone = tickGone(asked, query.tick(), "rays.tick")) {
+      return replyError(asked, std::move(*gone));
+    }
+  }
+  const auto snapshot = served.world.snapshot();
+  auto rays = raysFrom(query, *snapshot, served.limits);
+  if (auto* error = std::get_if<v1::Error>(&rays)) return replyError(asked, std::move(*error));
+  RayJob job{snapshot, std::get<AskedRays>(std::move(rays)), asked.message.request_id()};
+  served.rays.cast(std::move(job), untilAnswered(asked, post, &OutgoingQueue::push));
 }
 
 v1::Entity entityOf(const scene::World& world, std::uint32_t id) {
@@ -292,6 +320,8 @@ void answer(const Asked& asked, const PostToTickThread& post) {
       return answer(asked, message.subscribe());
     case v1::ClientMessage::kFrame:
       return answer(asked, message.frame(), post);
+    case v1::ClientMessage::kRays:
+      return answer(asked, message.rays(), post);
     case v1::ClientMessage::kDescribe:
       return answer(asked, message.describe());
     case v1::ClientMessage::kMetrics:
@@ -312,7 +342,7 @@ void answerOrSayWhyNot(const Asked& asked, const PostToTickThread& post) {
     answer(asked, post);
   } catch (const std::exception& error) {
     spdlog::error("a request of '{}' failed: {}", asked.client.name, error.what());
-    asked.client.frameUnderWay.reset();
+    asked.client.answerUnderWay.reset();
     asked.client.step.reset();
     replyError(asked, errorOf(v1::ERROR_INTERNAL, error.what()));
   }
@@ -325,6 +355,7 @@ v1::Welcome welcomeOf(const ServedWorld& served) {
   welcome.set_protocol_version(protocol::kVersion);
   welcome.set_server_version(kServerVersion);
   welcome.add_capabilities("free_run");
+  welcome.add_capabilities("rays");
   if (!served.frames.deviceName().empty()) welcome.add_capabilities("frames");
   *welcome.mutable_scene() = messageOf(served.world.scene());
   *welcome.mutable_policies() = messageOf(served.world.lengths());
@@ -335,6 +366,8 @@ v1::Welcome welcomeOf(const ServedWorld& served) {
   limits.set_max_picture_height(served.limits.pictureSide);
   limits.set_max_ticks_per_step(served.limits.ticksPerStep);
   limits.set_max_waypoints(served.limits.waypoints);
+  limits.set_max_rays(served.limits.rays);
+  limits.set_max_scan_rays(served.limits.scanRays);
   welcome.set_tick(lastTick(served));
   welcome.set_renderer(served.frames.deviceName());
   welcome.set_software_renderer(served.frames.software());
@@ -347,7 +380,7 @@ void answerWaiting(ServedWorld& served, ClientId id, const PostToTickThread& pos
   if (found == served.clients.end()) return;
   Client& client = found->second;
   // Who is cut off hears no answer, and must not keep the others waiting for theirs.
-  while (!client.waiting.empty() && !client.step && !client.frameUnderWay &&
+  while (!client.waiting.empty() && !client.step && !client.answerUnderWay &&
          !client.out->finished()) {
     const WaitingRequest request = std::move(client.waiting.front());
     client.waiting.pop_front();

@@ -122,7 +122,7 @@ void settleOwners(ServedWorld& served, const std::vector<scene::Notice>& notices
 
 void answerClosing(Client& client) {
   const v1::Error error = errorOf(v1::ERROR_SHUTTING_DOWN, "the server ends");
-  if (client.frameUnderWay) sendError(client, *client.frameUnderWay, error);
+  if (client.answerUnderWay) sendError(client, *client.answerUnderWay, error);
   if (client.step) sendError(client, client.step->requestId, error);
   for (const WaitingRequest& request : client.waiting) {
     sendError(client, request.message.request_id(), error);
@@ -132,8 +132,8 @@ void answerClosing(Client& client) {
 }  // namespace
 
 ServedWorld::ServedWorld(std::shared_ptr<const scene::Scene> scene, FrameService& frameService,
-                         const ServerLimits& serverLimits)
-    : world(std::move(scene)), frames(frameService), limits(serverLimits) {}
+                         RayService& rayService, const ServerLimits& serverLimits)
+    : world(std::move(scene)), frames(frameService), rays(rayService), limits(serverLimits) {}
 
 void send(Client& client, const v1::ServerMessage& message) {
   client.out->push(encodeShared(message));

@@ -13,6 +13,7 @@
 #include "scene/world.hpp"
 #include "server/frame_service.hpp"
 #include "server/outgoing_queue.hpp"
+#include "server/ray_service.hpp"
 #include "server/server_limits.hpp"
 #include "server/tick_statistics.hpp"
 
@@ -42,7 +43,7 @@ struct Client {
   std::deque<WaitingRequest> waiting;  ///< replies keep the order of the requests
   std::size_t waitingBytes = 0;
   std::optional<StepUnderWay> step;
-  std::optional<std::uint64_t> frameUnderWay;  ///< its request
+  std::optional<std::uint64_t> answerUnderWay;  ///< the request that a service works on
 };
 
 struct ServedClock {
@@ -54,10 +55,11 @@ struct ServedClock {
 
 struct ServedWorld {
   ServedWorld(std::shared_ptr<const scene::Scene> scene, FrameService& frameService,
-              const ServerLimits& serverLimits);
+              RayService& rayService, const ServerLimits& serverLimits);
 
   scene::World world;
   FrameService& frames;
+  RayService& rays;
   ServerLimits limits;
   ServedClock clock;
   std::map<ClientId, Client> clients;

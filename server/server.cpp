@@ -12,11 +12,13 @@ struct Server::State {
   State(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
         const ServerLimits& limits, std::uint32_t auditEvery)
       : frames(scene),
-        loop(std::move(scene), frames, limits, auditEvery),
+        rays(scene),
+        loop(std::move(scene), frames, rays, limits, auditEvery),
         listener(context, listen, loop, limits) {}
 
   boost::asio::io_context context{1};  ///< one thread: its handlers need no lock
   FrameService frames;
+  RayService rays;
   TickLoop loop;
   Listener listener;
   std::thread network;
@@ -55,6 +57,7 @@ void Server::stop() {
   boost::asio::post(state_->context, [state = state_.get()] { state->listener.stop(); });
   state_->network.join();  // when the last session is closed
   state_->frames.finish();
+  state_->rays.finish();
 }
 
 }  // namespace enfilade::server

@@ -12,6 +12,8 @@ struct ServerLimits {
   std::uint32_t pictureSide = 4096;       ///< pixels; render::refusal() allows no more
   std::uint32_t ticksPerStep = 36'000;    ///< ten minutes at the default tick
   std::uint32_t waypoints = 10'000;       ///< of one walk
+  std::uint32_t rays = 10'000;            ///< of one RayQuery
+  std::uint32_t scanRays = 1'000'000;     ///< of one RangeScan
   std::uint32_t describedIds = 65'536;    ///< of one DescribeEntities
   std::size_t replyBytes = 8u << 20;      ///< of EntityNames; protocol::kClientTakes is twice it
   std::size_t connections = 256;          ///< at one time

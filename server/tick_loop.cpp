@@ -70,8 +70,8 @@ void takeRequest(ServedWorld& served, ClientId id, WaitingRequest request,
 }  // namespace
 
 TickLoop::TickLoop(std::shared_ptr<const scene::Scene> scene, FrameService& frames,
-                   const ServerLimits& limits, std::uint32_t auditEvery)
-    : served_(std::move(scene), frames, limits) {
+                   RayService& rays, const ServerLimits& limits, std::uint32_t auditEvery)
+    : served_(std::move(scene), frames, rays, limits) {
   scene::auditBroadPhase(served_.world, auditEvery);
   thread_ = std::thread([this] { run(); });
 }

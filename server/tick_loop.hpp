@@ -14,7 +14,7 @@ namespace enfilade::server {
 
 class TickLoop {
  public:
-  TickLoop(std::shared_ptr<const scene::Scene> scene, FrameService& frames,
+  TickLoop(std::shared_ptr<const scene::Scene> scene, FrameService& frames, RayService& rays,
            const ServerLimits& limits, std::uint32_t auditEvery = 0);
   ~TickLoop();  ///< stops
   TickLoop(const TickLoop&) = delete;

@@ -128,6 +128,25 @@ v1::Error errorOf(v1::ErrorCode code, std::string message, std::string field) {
   return error;
 }
 
+const scene::AvatarView* avatarNamed(const scene::Snapshot& snapshot, const std::string& name) {
+  for (const scene::AvatarView& avatar : snapshot.avatars) {
+    if (avatar.name == name) return &avatar;
+  }
+  return nullptr;
+}
+
+v1::Error unknownAvatar(const std::string& name, const std::string& field) {
+  return errorOf(v1::ERROR_UNKNOWN_AVATAR,
+                 "no avatar '" + name + "' is in the world: spawn it and make a tick first", field);
+}
+
+Buffer errorReply(std::uint64_t requestId, v1::Error error) {
+  v1::ServerMessage reply;
+  reply.set_reply_to(requestId);
+  *reply.mutable_error() = std::move(error);
+  return encodeShared(reply);
+}
+
 v1::Error refusalOf(const v1::Command& command, const std::string& why) {
   const auto* order = v1::Command::descriptor()->FindFieldByNumber(command.order_case());
   std::string field = why.substr(0, why.find_first_of(" '"));

@@ -6,6 +6,7 @@
 
 #include "protocol/enfilade.pb.h"
 #include "scene/world.hpp"
+#include "server/outgoing_queue.hpp"
 
 namespace enfilade::server {
 
@@ -21,6 +22,13 @@ v1::Vec3 messageOf(const scene::Vec3& v);
 scene::Vec3 vectorFrom(const v1::Vec3& message);
 
 v1::Error errorOf(v1::ErrorCode code, std::string message, std::string field = {});
+
+/// Null when there is none.
+const scene::AvatarView* avatarNamed(const scene::Snapshot& snapshot, const std::string& name);
+v1::Error unknownAvatar(const std::string& name, const std::string& field);
+
+/// The whole reply to a request that failed.
+Buffer errorReply(std::uint64_t requestId, v1::Error error);
 
 /// A refusal of the world as an error; it begins with the field, whose path is completed.
 v1::Error refusalOf(const v1::Command& command, const std::string& why);

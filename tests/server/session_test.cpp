@@ -277,7 +277,8 @@ TEST_F(Sessions, EntitiesAreDescribedInPagesOfBoundedSize) {
 
 TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
   FrameService frames(smallRoom());
-  TickLoop loop(smallRoom(), frames, {});
+  RayService rays(smallRoom());
+  TickLoop loop(smallRoom(), frames, rays, {});
   const auto out = std::make_shared<OutgoingQueue>(OutgoingBounds{std::size_t{1} << 30, 2},
                                                    encodeShared(v1::Bye()), [] {});
   const ClientId ann = loop.join("ann", out, 1);
@@ -307,7 +308,8 @@ TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
 
 TEST(Requests, OneThatFailsForAFaultOfOursIsToldAndTheNextIsAnswered) {
   FrameService frames(smallRoom());
-  ServedWorld served(smallRoom(), frames, {});
+  RayService rays(smallRoom());
+  ServedWorld served(smallRoom(), frames, rays, {});
   bool faulty = true;  // the first message that is sent throws
   const auto wake = [&] {
     if (std::exchange(faulty, false)) throw std::length_error("too long");

@@ -1,0 +1,34 @@
+// A thread that does what it is given, in order.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <thread>
+
+namespace enfilade::server {
+
+class WorkThread {
+ public:
+  WorkThread();
+  ~WorkThread();  ///< finishes
+  WorkThread(const WorkThread&) = delete;
+  WorkThread& operator=(const WorkThread&) = delete;
+
+  /// `work` must not throw. Nothing may be given after finish().
+  void post(std::function<void()> work);
+  /// Waits until all is done.
+  void finish();
+
+ private:
+  void run();
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<std::function<void()>> work_;
+  bool finishing_ = false;
+  std::thread thread_;  // last: it uses the others
+};
+
+}  // namespace enfilade::server

@@ -1,0 +1,205 @@
+#include "scene/ray_caster.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <random>
+
+#include "collision/hull.hpp"
+#include "scene/avatar_hull.hpp"
+#include "tests/scene/box_scene.hpp"
+
+namespace enfilade::scene::testing {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kPi = std::numbers::pi;
+
+std::shared_ptr<const Scene> wallAndPane() {
+  Model model =
+      boxModel({floorBox(), {"pane", {2, 0, -3}, {2.01, 3, 3}}, {"wall", {5, 0, -3}, {5.2, 3, 3}}});
+  model.materials.emplace_back().alpha = Material::Alpha::blend;
+  model.meshes[1].material = 1;
+  return std::make_shared<const Scene>(std::move(model));
+}
+
+Snapshot someoneAt(const Vec3& feet) {
+  Snapshot snapshot;
+  AvatarView ann;
+  ann.id = 100;
+  ann.name = "ann";
+  ann.feet = feet;
+  ann.hull = std::make_shared<const collision::Hull>(avatarHull(0.3, 1.75));
+  snapshot.avatars.push_back(ann);
+  return snapshot;
+}
+
+TEST(RayCaster, TellsWhatIsMetFirstWhereAndHowItFaces) {
+  const RayCaster caster(wallAndPane());
+  const auto hit = caster.firstHit({{0, 1, 0}, {3, 0, 0}});
+  ASSERT_TRUE(hit);
+  EXPECT_EQ(hit->entity, 2u);
+  EXPECT_DOUBLE_EQ(hit->distance, 2);
+  EXPECT_EQ(hit->point, Vec3(2, 1, 0));
+  EXPECT_EQ(hit->normal, Vec3(-1, 0, 0));
+}
+
+TEST(RayCaster, LooksThroughGlassWhenAskedTo) {
+  const RayCaster caster(wallAndPane());
+  const auto hit = caster.firstHit({{0, 1, 0}, Vec3::UnitX()}, {0, true});
+  ASSERT_TRUE(hit);
+  EXPECT_EQ(hit->entity, 3u);
+  EXPECT_DOUBLE_EQ(hit->distance, 5);
+}
+
+TEST(RayCaster, EndsAtItsReach) {
+  const RayCaster caster(wallAndPane());
+  EXPECT_FALSE(caster.firstHit({{0, 1, 0}, Vec3::UnitX(), 1.999}));
+  EXPECT_TRUE(caster.firstHit({{0, 1, 0}, Vec3::UnitX(), 2.0}));
+  EXPECT_FALSE(caster.firstHit({{0, 1, 0}, -Vec3::UnitX()}));
+  EXPECT_FALSE(caster.isBlocked({{0, 1, 0}, Vec3::UnitX(), 1.999}));
+  EXPECT_TRUE(caster.isBlocked({{0, 1, 0}, Vec3::UnitX(), 2.5}));
+}
+
+TEST(RayCaster, SeesTheSurfaceThatItLooksAt) {
+  const RayCaster caster(wallAndPane());
+  const Ray toThePane{{0, 1, 0}, Vec3::UnitX(), 2.0};
+  EXPECT_FALSE(caster.isBlocked(toThePane)) << "its own end is not in its way";
+}
+
+TEST(RayCaster, MeetsAvatarsWhereTheyAreNow) {
+  RayCaster caster(boxScene({floorBox()}));
+  const Ray ray{{-5, 1, 0}, Vec3::UnitX()};
+  EXPECT_FALSE(caster.firstHit(ray));
+  caster.follow(someoneAt({3, 0, 0}));
+  const auto hit = caster.firstHit(ray);
+  ASSERT_TRUE(hit);
+  EXPECT_EQ(hit->entity, 100u);
+  EXPECT_NEAR(hit->distance, 7.7, 0.05);
+  EXPECT_FALSE(caster.firstHit(ray, {100, false})) << "the one that looks does not see itself";
+  EXPECT_TRUE(caster.isBlocked(ray));
+  EXPECT_FALSE(caster.isBlocked(ray, {100, false}));
+  caster.follow(someoneAt({3, 0, 4}));
+  EXPECT_FALSE(caster.firstHit(ray));
+  caster.follow({});
+  EXPECT_FALSE(caster.firstHit({{-5, 1, 4}, Vec3::UnitX()}));
+}
+
+/// Möller and Trumbore's test with every triangle, in doubles.
+std::optional<double> slowDistance(const Scene& scene, const Ray& ray) {
+  std::optional<double> nearest;
+  for (const std::uint32_t object : scene.solidObjects()) {
+    for (const collision::Triangle& t : scene.triangles(object).triangles()) {
+      const Vec3 a = t[1] - t[0], b = t[2] - t[0], p = ray.direction.cross(b);
+      const double determinant = a.dot(p);
+      if (determinant == 0) continue;
+      const Vec3 s = ray.origin - t[0];
+      const double u = s.dot(p) / determinant, v = ray.direction.dot(s.cross(a)) / determinant;
+      const double distance = b.dot(s.cross(a)) / determinant;
+      if (u < 0 || v < 0 || u + v > 1 || distance < 0) continue;
+      if (!nearest || distance < *nearest) nearest = distance;
+    }
+  }
+  return nearest;
+}
+
+/// Boxes of all turns, scattered.
+Model tumbledBoxes(std::mt19937& random) {
+  std::uniform_real_distribution<double> place(-20, 20), size(0.1, 2), turn(-1, 1);
+  Model model = boxModel({{"box", {-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}}});
+  model.objects.clear();
+  for (int i = 0; i < 200; ++i) {
+    const Vec3 at(place(random), place(random), place(random));
+    const Vec3 scale(size(random), size(random), size(random));
+    const Vec3 axis(turn(random), turn(random), turn(random));
+    Eigen::Affine3d worldFromMesh = Eigen::Translation3d(at) *
+                                    Eigen::AngleAxisd(3 * turn(random), axis.normalized()) *
+                                    Eigen::Scaling(scale);
+    model.objects.push_back({"box#" + std::to_string(i), "", {0}, worldFromMesh});
+  }
+  return model;
+}
+
+TEST(RayCaster, AgreesWithDoublesOverAllTriangles) {
+  std::mt19937 random(17);
+  const auto scene = std::make_shared<const Scene>(tumbledBoxes(random));
+  const RayCaster caster(scene);
+  std::uniform_real_distribution<double> any(-1, 1);
+  int hits = 0, differ = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const Vec3 way(any(random), any(random), any(random));
+    const Ray ray{25 * Vec3(any(random), any(random), any(random)), way.normalized()};
+    const auto slow = slowDistance(*scene, ray);
+    const auto fast = caster.firstHit(ray);
+    if (slow.has_value() != fast.has_value()) {
+      ++differ;  // by an edge that one of them passes
+      continue;
+    }
+    if (!slow) continue;
+    ++hits;
+    if (std::abs(*slow - fast->distance) > 1e-12 * (1 + *slow)) ++differ;
+  }
+  EXPECT_GT(hits, 200);
+  EXPECT_LE(differ, 2) << "rays within a float's rounding of an edge";
+}
+
+TEST(RayCaster, LosesNothingFarFromTheOrigin) {
+  const RayCaster caster(boxScene({{"far", {2000, 0, -1}, {2001, 2, 1}}}));
+  const auto hit = caster.firstHit({{0, 1, 0}, {1, 1e-4, 0}});
+  ASSERT_TRUE(hit);
+  EXPECT_DOUBLE_EQ(hit->distance, 2000 * std::sqrt(1 + 1e-8));
+}
+
+TEST(RayCaster, RefusesWhatIsNoRay) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(refusal(Ray{}));
+  EXPECT_TRUE(refusal(Ray{{nan, 0, 0}, Vec3::UnitX()}));
+  EXPECT_TRUE(refusal(Ray{{1e8, 0, 0}, Vec3::UnitX()}));
+  EXPECT_TRUE(refusal(Ray{Vec3::Zero(), Vec3::Zero()}));
+  EXPECT_TRUE(refusal(Ray{Vec3::Zero(), {kInfinity, 0, 0}}));
+  EXPECT_TRUE(refusal(Ray{Vec3::Zero(), Vec3::UnitX(), 0}));
+  EXPECT_TRUE(refusal(Ray{Vec3::Zero(), Vec3::UnitX(), nan}));
+  RangeScan scan;
+  EXPECT_FALSE(refusal(scan));
+  scan.up = scan.forward;
+  EXPECT_TRUE(refusal(scan));
+}
+
+TEST(RangeScan, GoesFromLeftToRightAndFromAboveToBelow) {
+  RangeScan scan;
+  scan.width = kPi / 2;
+  scan.height = kPi / 4;
+  scan.columns = 3;
+  scan.rows = 2;
+  const std::vector<Ray> rays = raysOf(scan);
+  ASSERT_EQ(rays.size(), 6u);
+  const double half = std::sqrt(0.5);
+  EXPECT_LT(rays[0].direction.z(), 0) << "left of +X is -Z";
+  EXPECT_GT(rays[2].direction.z(), 0);
+  EXPECT_NEAR(rays[1].direction.z(), 0, 1e-15);
+  EXPECT_NEAR(rays[0].direction.x() / rays[2].direction.x(), 1, 1e-12);
+  EXPECT_NEAR(rays[1].direction.y(), std::sin(kPi / 8), 1e-15);
+  EXPECT_NEAR(rays[4].direction.y(), -std::sin(kPi / 8), 1e-15);
+  EXPECT_NEAR(-rays[0].direction.z() / rays[0].direction.x(), 1, 1e-12);
+  EXPECT_NEAR(rays[0].direction.x(), half * std::cos(kPi / 8), 1e-15);
+  for (const Ray& ray : rays) EXPECT_NEAR(ray.direction.norm(), 1, 1e-15);
+}
+
+TEST(RangeScan, OfAFullTurnMeetsAllFourWallsOnce) {
+  const RayCaster caster(boxScene({{"east", {3, 0, -9}, {4, 3, 9}},
+                                   {"west", {-5, 0, -9}, {-4, 3, 9}},
+                                   {"south", {-9, 0, 6}, {9, 3, 7}},
+                                   {"north", {-9, 0, -6}, {9, 3, -5}}}));
+  RangeScan scan;
+  scan.at = {0, 1, 0};
+  scan.width = 2 * kPi;
+  scan.columns = 4;
+  std::vector<double> distances;
+  for (const Ray& ray : raysOf(scan)) distances.push_back(caster.firstHit(ray).value().distance);
+  // From behind, over the left (north) and ahead (east), to the right (south).
+  const std::vector<double> expected{4, 5, 3, 6};
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(distances[i], expected[i], 1e-12) << i;
+}
+
+}  // namespace
+}  // namespace enfilade::scene::testing
