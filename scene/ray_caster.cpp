@@ -299,10 +299,13 @@ void RayCaster::follow(const Snapshot& snapshot) {
   s.moving.embree = newScene(s.device.get());
   std::erase_if(s.hulls, [](const auto& entry) { return entry.second.hull.use_count() == 1; });
   for (const AvatarView& avatar : snapshot.avatars) {
-    const Surface& surface = s.surfaceOfHull(avatar.hull);
-    if (surface.hullTriangles.empty()) continue;
-    place(s.device.get(), s.moving,
-          {avatar.id, &surface, Eigen::Affine3d(Eigen::Translation3d(avatar.feet))}, kSolidBit);
+    for (const AvatarPart& part : avatar.shape->parts) {
+      const Surface& surface = s.surfaceOfHull(part.hull);
+      if (surface.hullTriangles.empty()) continue;
+      Eigen::Affine3d worldFromHull = Eigen::Affine3d(Eigen::Translation3d(avatar.feet));
+      worldFromHull.translate(part.offset).rotate(part.rotation);
+      place(s.device.get(), s.moving, {avatar.id, &surface, worldFromHull}, kSolidBit);
+    }
   }
   rtcCommitScene(s.moving.embree.get());
   throwIfFailed(s.device.get());

@@ -5,8 +5,7 @@
 #include <numbers>
 #include <random>
 
-#include "collision/hull.hpp"
-#include "scene/avatar_hull.hpp"
+#include "scene/avatar_shape.hpp"
 #include "tests/scene/box_scene.hpp"
 
 namespace enfilade::scene::testing {
@@ -29,7 +28,7 @@ Snapshot someoneAt(const Vec3& feet) {
   ann.id = 100;
   ann.name = "ann";
   ann.feet = feet;
-  ann.hull = std::make_shared<const collision::Hull>(avatarHull(0.3, 1.75));
+  ann.shape = prismShape(0.3, 1.75, 1.75);
   snapshot.avatars.push_back(ann);
   return snapshot;
 }
