@@ -166,6 +166,7 @@ void endContactsOf(WorldState& world, Avatar& avatar, ContactEvent::Reason reaso
   };
   for (const Contact& contact : avatar.contacts) tell(avatar, contact);
   avatar.contacts.clear();
+  leaveTriggers(world, avatar.id, reason, events);
   for (auto& [name, other] : world.avatars) {
     if (const Contact* contact = find(other.contacts, avatar.id)) tell(other, *contact);
     std::erase_if(other.contacts, [&](const Contact& c) { return c.other == avatar.id; });

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "collision/types.hpp"
+#include "scene/body_spec.hpp"
 
 namespace enfilade::scene {
 
@@ -78,6 +79,7 @@ struct Model {
   std::vector<Texture> textures;
   std::vector<Mesh> meshes;
   std::vector<Object> objects;
+  std::vector<BodySpec> bodies;  ///< what moves; Scene refuses a model whose bodies are wrong
 
   double metresPerUnit = 1;  ///< what one unit of the file was taken for
   char up = 'y';             ///< the file's up axis, already turned to Y

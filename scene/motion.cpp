@@ -13,8 +13,6 @@ namespace enfilade::scene {
 namespace {
 
 constexpr int kSlides = 5;            // planes met in one move: a corner of three and two to spare
-constexpr double kLowBand = 7.0 / 8;  // of epsilon: see StoppingBand
-constexpr double kHighBand = 1 + 1.0 / 32;
 constexpr double kNoMove = 1e-9;      // of epsilon: what is left of a move below this is not made
 constexpr double kTread = 0.05;       // metres: what is less deep, as a skirting board, is no step
 constexpr double kWorthAStep = 1e-3;  // of the wish: a step must win at least this much ground
@@ -27,9 +25,7 @@ struct Mover {
   Vec3 feet;
   Box feetRoom;  ///< the feet stay in here, so that the body stays inside Avatar::reach
 
-  collision::StoppingBand band() const {
-    return {kLowBand * lengths.epsilon, kHighBand * lengths.epsilon};
-  }
+  collision::StoppingBand band() const { return bandOf(lengths); }
   bool walkable(const Vec3& normal) const { return normal.y() >= lengths.walkableNormalY; }
 };
 
@@ -40,20 +36,7 @@ struct SlideResult {
 
 /// Where the feet may go: beyond the reach nothing was collected, so nothing would be in the way.
 Box feetRoomOf(const Avatar& avatar, const Lengths& lengths) {
-  const double clearance = 2 * lengths.epsilon + lengths.nearMiss;  // what contacts.cpp looks for
-  const Box& body = avatar.shape->box;
-  return grown(Box{avatar.reach.min - body.min, avatar.reach.max - body.max}, -clearance);
-}
-
-/// The part of a displacement, 0..1, that keeps the feet in their room.
-double partInside(const Box& room, const Vec3& feet, const Vec3& displacement) {
-  double part = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double way = displacement[axis];
-    const double left = (way > 0 ? room.max[axis] : room.min[axis]) - feet[axis];
-    if (way != 0) part = std::min(part, std::max(0.0, left / way));
-  }
-  return part;
+  return feetRoomIn(avatar.reach, avatar.shape->box, lookoutOf(lengths));
 }
 
 Stop sweepFrom(Mover& m, const Vec3& displacement) {

@@ -56,6 +56,20 @@ bool isFree(const AvatarShape& shape, const Vec3& feet, double clearance,
   return true;
 }
 
+Box feetRoomIn(const Box& reach, const Box& shapeBox, double clearance) {
+  return grown(Box{reach.min - shapeBox.min, reach.max - shapeBox.max}, -clearance);
+}
+
+double partInside(const Box& room, const Vec3& feet, const Vec3& displacement) {
+  double part = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double way = displacement[axis];
+    const double left = (way > 0 ? room.max[axis] : room.min[axis]) - feet[axis];
+    if (way != 0) part = std::min(part, std::max(0.0, left / way));
+  }
+  return part;
+}
+
 void gatherTriangles(const Scene& scene, std::uint32_t object, const Box& reach,
                      std::vector<Obstacle>& obstacles) {
   const collision::TriangleTree& tree = scene.triangles(object);
@@ -73,10 +87,27 @@ void gatherTriangles(const Scene& scene, std::uint32_t object, const Box& reach,
   }
 }
 
-void followOthers(const WorldState& world, Avatar& avatar) {
-  for (std::size_t i = avatar.obstacles.size(); i-- > 0;) {
-    Obstacle& obstacle = avatar.obstacles[i];
-    if (obstacle.entity < world.firstAvatarId()) return;  // avatars come last
+namespace {
+
+/// All parts of a body; triggers are not solid.
+void listParts(const WorldState& world, std::uint32_t index, std::vector<Obstacle>& obstacles) {
+  const Body& body = world.bodies[index];
+  if (body.spec->kind == BodyKind::trigger) return;
+  for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part) {
+    Obstacle obstacle;
+    obstacle.entity = body.id;
+    obstacle.part = part;
+    obstacle.ofBody = index;
+    obstacles.push_back(obstacle);
+  }
+}
+
+void follow(const WorldState& world, Obstacle& obstacle) {
+  if (obstacle.ofBody != kNoBody) {
+    const Body& body = world.bodies[obstacle.ofBody];
+    obstacle.box = body.partBoxes[obstacle.part];
+    obstacle.body = partOf(body, obstacle.part);
+  } else if (obstacle.entity >= world.firstAvatarId()) {
     const auto& name = world.avatarNames[obstacle.entity - world.firstAvatarId()];
     const Avatar& other = world.avatars.at(name);
     const AvatarPart& part = other.shape->parts[obstacle.part];
@@ -85,38 +116,71 @@ void followOthers(const WorldState& world, Avatar& avatar) {
   }
 }
 
-void gatherObstacles(WorldState& world, Avatar& avatar, bool pairsChanged) {
-  if (!pairsChanged && contains(avatar.gathered, avatar.reach)) return followOthers(world, avatar);
-  std::vector<Obstacle> last;
-  last.swap(avatar.obstacles);
-  avatar.gathered = grown(avatar.reach, kGatherMargin);
-  for (const auto& partner : world.broadPhase.partners(avatar.mover)) {
-    if (!partner.moves) {
-      gatherTriangles(*world.scene, world.scene->solidObjects()[partner.id], avatar.gathered,
-                      avatar.obstacles);
-      continue;
-    }
-    const Avatar& other = world.avatars.at(world.avatarOfMover.at(partner.id));
-    for (std::uint32_t part = 0; part < other.shape->parts.size(); ++part) {
-      avatar.obstacles.emplace_back();
-      avatar.obstacles.back().entity = other.id;
-      avatar.obstacles.back().part = part;
-    }
-  }
+/// Ascending; the axes of last tick are handed on by merging.
+void sortAndHandOn(std::vector<Obstacle>& obstacles, std::vector<Obstacle>& last) {
   // Movers' ids are reused and so not in the order of entities.
   const auto key = [](const Obstacle& o) { return std::pair(o.entity, o.part); };
-  std::sort(avatar.obstacles.begin(), avatar.obstacles.end(),
+  std::sort(obstacles.begin(), obstacles.end(),
             [&](const Obstacle& a, const Obstacle& b) { return key(a) < key(b); });
-  followOthers(world, avatar);
-  // Hand the axes of last tick on by merging.
   auto old = last.begin();
-  for (Obstacle& obstacle : avatar.obstacles) {
+  for (Obstacle& obstacle : obstacles) {
     while (old != last.end() && key(*old) < key(obstacle)) ++old;
     if (old != last.end() && key(*old) == key(obstacle)) {
       obstacle.cache = old->cache;
       obstacle.moreCaches = std::move(old->moreCaches);
     }
   }
+}
+
+}  // namespace
+
+void gatherParts(const WorldState& world, std::uint32_t body, const Box& reach,
+                 std::vector<Obstacle>& obstacles) {
+  if (!overlaps(world.bodies[body].reach, reach)) return;
+  std::vector<Obstacle> all;
+  listParts(world, body, all);
+  for (Obstacle& obstacle : all) {
+    follow(world, obstacle);
+    if (overlaps(obstacle.box, reach)) obstacles.push_back(obstacle);
+  }
+}
+
+void followOthers(const WorldState& world, Avatar& avatar) {
+  for (std::size_t i = avatar.obstacles.size(); i-- > 0;) {
+    Obstacle& obstacle = avatar.obstacles[i];
+    // Avatars come last, bodies anywhere.
+    if (!avatar.meetsBodies && obstacle.entity < world.firstAvatarId()) return;
+    follow(world, obstacle);
+  }
+}
+
+void gatherObstacles(WorldState& world, Avatar& avatar) {
+  const bool complete = !avatar.pairsChanged && contains(avatar.gathered, avatar.reach);
+  avatar.pairsChanged = false;
+  if (complete) return followOthers(world, avatar);
+  std::vector<Obstacle> last;
+  last.swap(avatar.obstacles);
+  avatar.meetsBodies = false;
+  avatar.gathered = grown(avatar.reach, kGatherMargin);
+  for (const auto& partner : world.broadPhase.partners(avatar.mover)) {
+    if (!partner.moves) {
+      gatherTriangles(*world.scene, world.scene->solidObjects()[partner.id], avatar.gathered,
+                      avatar.obstacles);
+    } else if (const auto body = world.bodyOfMover.find(partner.id);
+               body != world.bodyOfMover.end()) {
+      listParts(world, body->second, avatar.obstacles);
+      avatar.meetsBodies = true;
+    } else {
+      const Avatar& other = world.avatars.at(world.avatarOfMover.at(partner.id));
+      for (std::uint32_t part = 0; part < other.shape->parts.size(); ++part) {
+        avatar.obstacles.emplace_back();
+        avatar.obstacles.back().entity = other.id;
+        avatar.obstacles.back().part = part;
+      }
+    }
+  }
+  sortAndHandOn(avatar.obstacles, last);
+  followOthers(world, avatar);
 }
 
 }  // namespace enfilade::scene

@@ -1,4 +1,5 @@
-// What one avatar could meet in one tick: triangles of still objects, hulls of other avatars.
+// What one mover could meet in one tick: triangles of still objects, parts of bodies, hulls of
+// other avatars.
 #pragma once
 
 #include <span>
@@ -8,16 +9,21 @@
 #include "collision/sort_and_sweep.hpp"
 #include "collision/time_of_impact.hpp"
 #include "scene/avatar_shape.hpp"
+#include "scene/lengths.hpp"
 #include "scene/scene.hpp"
 #include "scene/snapshot.hpp"
 
 namespace enfilade::scene {
 
+/// Of Obstacle::body: it is no body's part.
+inline constexpr std::uint32_t kNoBody = 0xFFFF'FFFFu;
+
 /// A convex piece of an entity, and last tick's separating axis towards it.
 struct Obstacle {
   EntityId entity = 0;
-  std::uint32_t part = 0;  ///< triangle of a still object; part of an avatar
-  Box box;                 ///< world, metres
+  std::uint32_t part = 0;          ///< triangle of a still object; part of a body or an avatar
+  std::uint32_t ofBody = kNoBody;  ///< index into WorldState::bodies
+  Box box;                         ///< world, metres
   collision::ConvexBody body;
   collision::FeatureCache cache;                    ///< of the avatar's first part
   std::vector<collision::FeatureCache> moreCaches;  ///< of its other parts, once they were near
@@ -54,6 +60,18 @@ Stop sweepShape(const AvatarShape& shape, const Vec3& feet, const Vec3& displace
 /// `nearest` names one that is nearer (deepest first is not promised).
 bool isFree(const AvatarShape& shape, const Vec3& feet, double clearance,
             std::vector<Obstacle>& obstacles, QueryCount& count, EntityId& nearest);
+
+/// A move stops at about `high`, but only what would come nearer than `low` stops it.
+inline collision::StoppingBand bandOf(const Lengths& lengths) {
+  return {7.0 / 8 * lengths.epsilon, (1 + 1.0 / 32) * lengths.epsilon};
+}
+
+/// Where the feet may go so that the body stays inside `reach`, where its obstacles were collected,
+/// with `clearance` metres to spare.
+Box feetRoomIn(const Box& reach, const Box& shapeBox, double clearance);
+
+/// The part of a displacement, 0..1, that keeps the feet in their room.
+double partInside(const Box& room, const Vec3& feet, const Vec3& displacement);
 
 /// Appends the triangles of still object `object` that `reach` may meet.
 void gatherTriangles(const Scene& scene, std::uint32_t object, const Box& reach,

@@ -23,9 +23,12 @@ double cosine(double x) {
   return 1 + sum;
 }
 
-}  // namespace
+struct SineAndCosine {
+  double sine, cosine;
+};
 
-collision::Vec3 headingFromDegrees(double degrees) {
+/// Of any finite angle; whole quarter turns are taken off in degrees, where they are exact.
+SineAndCosine ofDegrees(double degrees) {
   double rest = std::fmod(degrees, 360.0);
   int quarters = 0;
   while (rest > 45) rest -= 90, ++quarters;
@@ -34,14 +37,27 @@ collision::Vec3 headingFromDegrees(double degrees) {
   const double s = sine(rest * kRadiansPerDegree);
   switch (((quarters % 4) + 4) % 4) {
     case 0:
-      return {c, 0, -s};
+      return {s, c};
     case 1:
-      return {-s, 0, -c};
+      return {c, -s};
     case 2:
-      return {-c, 0, s};
+      return {-s, -c};
     default:
-      return {s, 0, c};
+      return {-c, s};
   }
+}
+
+}  // namespace
+
+collision::Vec3 headingFromDegrees(double degrees) {
+  const auto [s, c] = ofDegrees(degrees);
+  return {c, 0, -s};
+}
+
+collision::Quat rotationAbout(const collision::Vec3& axis, double radians) {
+  if (radians == 0) return collision::Quat::Identity();
+  const auto [s, c] = ofDegrees(0.5 * radians / kRadiansPerDegree);
+  return {c, s * axis.x(), s * axis.y(), s * axis.z()};
 }
 
 }  // namespace enfilade::scene

@@ -10,4 +10,8 @@ namespace enfilade::scene {
 /// to 1e4 and always of unit length within 4 ulp.
 collision::Vec3 headingFromDegrees(double degrees);
 
+/// The rotation about `axis` (unit) by `radians`, finite: by whole turns, then as
+/// headingFromDegrees(). A unit quaternion within 4 ulp; the identity to the last bit for 0.
+collision::Quat rotationAbout(const collision::Vec3& axis, double radians);
+
 }  // namespace enfilade::scene

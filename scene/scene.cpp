@@ -27,6 +27,29 @@ std::uint64_t hashOf(const Mesh& mesh) {
   return hash.value();
 }
 
+/// Nothing for a scene without bodies.
+void addBodies(Hasher& hash, const std::vector<BodySpec>& bodies) {
+  for (const BodySpec& body : bodies) {
+    hash.add(std::string_view(body.name));
+    hash.add(static_cast<std::uint64_t>(body.kind));
+    for (const std::uint32_t object : body.objects) hash.add(std::uint64_t{object});
+    hash.add(body.anchor);
+    hash.add(body.axis);
+    for (const double number :
+         {body.low, body.high, body.speed, body.acceleration, body.closesAfter.value_or(-1),
+          body.density, body.mass.value_or(-1), body.friction, body.restitution})
+      hash.add(number);
+    for (const double stop : body.stops) hash.add(stop);
+    hash.add(static_cast<std::uint64_t>(body.openedBy));
+    hash.add((std::uint64_t{body.loops} << 1) | std::uint64_t{body.runs});
+    for (const PathKey& key : body.keys) {
+      hash.add(key.time);
+      hash.add(key.offset);
+      hash.add(key.turn);
+    }
+  }
+}
+
 /// Meshes are hashed once and placed often, so that a scene of many copies stays cheap.
 std::uint64_t hashOf(const Model& model) {
   std::vector<std::uint64_t> meshHashes;
@@ -41,6 +64,7 @@ std::uint64_t hashOf(const Model& model) {
     hash.add(std::uint64_t{object.meshes.size()});
     for (const std::uint32_t mesh : object.meshes) hash.add(meshHashes[mesh]);
   }
+  addBodies(hash, model.bodies);
   return hash.value();
 }
 
@@ -90,15 +114,22 @@ void requireValidIndices(const Model& model) {
 
 Scene::Scene(Model model) : model_(std::move(model)) {
   requireValidIndices(model_);
+  if (const auto why = refusalOfBodies(model_)) throw std::invalid_argument(*why);
+  std::vector<bool> moves(model_.objects.size());
+  for (const BodySpec& body : model_.bodies) {
+    for (const std::uint32_t object : body.objects) moves[object] = true;
+    shapes_.push_back(std::make_shared<const BodyShape>(shapeOf(model_, body)));
+  }
   for (std::uint32_t i = 0; i < model_.objects.size(); ++i) {
     Box box;
     forEachSolidTriangle(model_, model_.objects[i], [&](const collision::Triangle& triangle) {
       for (const Vec3& corner : triangle) box.include(corner);
     });
     if (box.empty()) continue;
+    bounds_.include(box);
+    if (moves[i]) continue;
     solidObjects_.push_back(i);
     stillBoxes_.push_back(box);
-    bounds_.include(box);
   }
   hash_ = hashOf(model_);
   lazy_ = std::make_unique<Lazy[]>(model_.objects.size());
@@ -113,12 +144,17 @@ const collision::TriangleTree& Scene::triangles(std::uint32_t object) const {
   }
   Lazy& lazy = lazy_[object];
   std::call_once(lazy.once, [&] {
-    std::vector<collision::Triangle> triangles;
-    forEachSolidTriangle(model_, model_.objects[object],
-                         [&](const collision::Triangle& t) { triangles.push_back(t); });
-    if (!triangles.empty()) lazy.tree = collision::TriangleTree(std::move(triangles));
+    const std::vector<collision::Triangle> triangles = solidTriangles(model_, object);
+    if (!triangles.empty()) lazy.tree = collision::TriangleTree(triangles);
   });
   return lazy.tree;
+}
+
+std::vector<collision::Triangle> solidTriangles(const Model& model, std::uint32_t object) {
+  std::vector<collision::Triangle> triangles;
+  forEachSolidTriangle(model, model.objects[object],
+                       [&](const collision::Triangle& t) { triangles.push_back(t); });
+  return triangles;
 }
 
 }  // namespace enfilade::scene

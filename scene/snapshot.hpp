@@ -11,7 +11,8 @@
 namespace enfilade::scene {
 
 /// One numbering for all that can be touched or seen. 0 is nothing; still object i of the model is
-/// i + 1; avatars follow the objects and are never reused.
+/// i + 1, and so is object i of a body: the first one's id is the body's; avatars follow the
+/// objects and are never reused.
 using EntityId = std::uint32_t;
 
 struct AvatarView {
@@ -24,11 +25,25 @@ struct AvatarView {
   std::shared_ptr<const AvatarShape> shape;
 };
 
+struct BodyView {
+  EntityId id = 0;          ///< of its first object
+  std::uint32_t index = 0;  ///< into Model::bodies
+  /// worldFromBody; the body's frame has its origin at Scene::shapeOfBody(index).origin.
+  collision::Pose pose;
+  bool displaced = false;  ///< not where it was authored
+  double coordinate = 0;   ///< as BodySpec says; 0 for rigid bodies and triggers
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< m/s, rad/s, scene frame
+  bool moving = false;                                ///< in this tick, or rigid and awake
+  EntityId blockedBy = 0;                             ///< what it cannot push aside; 0: nothing
+};
+
 struct Snapshot {
   std::uint64_t tick = 0;
   double time = 0;  ///< seconds
   std::uint64_t stateHash = 0;
   std::vector<AvatarView> avatars;  ///< ascending ids
+  /// As Model::bodies; never null. Shared with the last snapshot when nothing of it changed.
+  std::shared_ptr<const std::vector<BodyView>> bodies;
 };
 
 }  // namespace enfilade::scene

@@ -15,6 +15,7 @@ constexpr double kFloorMargin = 1.0;  // metres below the scene's lowest point t
 void gatherAll(const WorldState& world, const Box& box, std::vector<Obstacle>& obstacles) {
   for (const collision::StillId still : world.broadPhase.stillOverlapping(box))
     gatherTriangles(*world.scene, world.scene->solidObjects()[still], box, obstacles);
+  for (std::uint32_t i = 0; i < world.bodies.size(); ++i) gatherParts(world, i, box, obstacles);
   for (const auto& [name, other] : world.avatars) {
     for (std::uint32_t part = 0; part < other.shape->parts.size(); ++part) {
       Obstacle obstacle;
@@ -95,6 +96,8 @@ bool hasFloorBelow(const WorldState& world, const Avatar& avatar, QueryCount& co
 
 std::string pathOf(const WorldState& world, EntityId id) {
   const EntityId first = world.firstAvatarId();
+  if (const auto body = world.bodyOfId.find(id); body != world.bodyOfId.end())
+    return world.bodies[body->second].spec->name;
   return id >= first ? world.avatarNames[id - first] : world.scene->model().objects[id - 1].path;
 }
 

@@ -32,19 +32,6 @@ Vec3 wishOf(const Wish& wish, const std::string& name) {
   return found == wish.end() ? Vec3(Vec3::Zero()) : found->second;
 }
 
-void updateBroadPhase(WorldState& world, const Wish& wish) {
-  for (auto& [name, avatar] : world.avatars) {
-    avatar.reach = reachOf(world, avatar, wishOf(wish, name));
-    world.broadPhase.move(avatar.mover, avatar.reach);
-  }
-  world.broadPhase.update();
-}
-
-bool nobodyNear(const WorldState& world, const Avatar& avatar) {
-  const auto partners = world.broadPhase.partners(avatar.mover);
-  return partners.empty() || !partners.back().moves;  // movers come last
-}
-
 /// The movers whose partners changed at the last update of the broad phase, ascending.
 std::vector<collision::MoverId> changedMovers(const collision::SortAndSweep& broadPhase) {
   std::vector<collision::MoverId> changed;
@@ -58,18 +45,64 @@ std::vector<collision::MoverId> changedMovers(const collision::SortAndSweep& bro
   return changed;
 }
 
-void moveAvatars(WorldState& world, const Wish& wish, QueryCount& count) {
+void updateBroadPhase(WorldState& world, const Wish& wish) {
+  for (auto& [name, avatar] : world.avatars) {
+    avatar.reach = reachOf(world, avatar, wishOf(wish, name));
+    if (!world.goingBodies.empty())
+      avatar.reach = grown(avatar.reach, pushRoom(world, avatar.reach));
+    world.broadPhase.move(avatar.mover, avatar.reach);
+  }
+  world.broadPhase.update();
   const std::vector<collision::MoverId> changed = changedMovers(world.broadPhase);
+  for (auto& [name, avatar] : world.avatars)
+    if (std::binary_search(changed.begin(), changed.end(), avatar.mover))
+      avatar.pairsChanged = true;
+}
+
+/// Bodies that stand are as still objects.
+bool mayMove(const WorldState& world, collision::MoverId mover) {
+  const auto found = world.bodyOfMover.find(mover);
+  if (found == world.bodyOfMover.end()) return true;
+  const Body& body = world.bodies[found->second];
+  return body.moved || (body.spec->kind == BodyKind::rigid && !body.asleep);
+}
+
+bool nobodyNear(const WorldState& world, const Avatar& avatar) {
+  const auto partners = world.broadPhase.partners(avatar.mover);
+  for (std::size_t i = partners.size(); i-- > 0 && partners[i].moves;)  // movers come last
+    if (mayMove(world, partners[i].id)) return false;
+  return true;
+}
+
+void moveAvatars(WorldState& world, const Wish& wish, QueryCount& count) {
   for (auto& [name, avatar] : world.avatars) {
     const Vec3 velocity = wishOf(wish, name);
     avatar.stoppedBy = 0;
     avatar.resting = avatar.grounded && avatar.lastMove.isZero(0) && velocity.isZero(0) &&
-                     nobodyNear(world, avatar);
-    const bool pairsChanged = std::binary_search(changed.begin(), changed.end(), avatar.mover);
-    avatar.resting = avatar.resting && !pairsChanged;
+                     !avatar.pairsChanged && nobodyNear(world, avatar);
     if (avatar.resting) continue;
-    gatherObstacles(world, avatar, pairsChanged);
+    gatherObstacles(world, avatar);
     moveAvatar(world, avatar, velocity, count);
+  }
+}
+
+/// Of bodies that stand nothing is new since the tick in which they came to rest.
+void hashBodies(const WorldState& world, Hasher& hash) {
+  for (const Body& body : world.bodies) {
+    const BodyDrive& drive = body.drive;
+    for (const EntityId id : body.inside) hash.add(std::uint64_t{id});
+    if (!body.moved && !drive.going && drive.closesIn < 0) continue;
+    hash.add(std::uint64_t{body.id});
+    hash.add(body.position);
+    for (const double number :
+         {body.orientation.w(), body.orientation.x(), body.orientation.y(), body.orientation.z()})
+      hash.add(number);
+    hash.add(body.velocity);
+    hash.add(body.spin);
+    for (const double number :
+         {drive.coordinate, drive.rate, drive.target, drive.speed, drive.closesIn})
+      hash.add(number);
+    hash.add((std::uint64_t{body.blockedBy} << 1) | std::uint64_t{drive.going});
   }
 }
 
@@ -94,11 +127,13 @@ void hashState(WorldState& world) {
     hash.add(std::string_view(name));
     hash.add(std::uint64_t{queue.size()});
   }
+  hashBodies(world, hash);
   world.hash = hash.value();
 }
 
 std::shared_ptr<const Snapshot> makeSnapshot(const WorldState& world) {
   auto snapshot = std::make_shared<Snapshot>();
+  snapshot->bodies = viewsOfBodies(world);
   snapshot->tick = world.tick;
   snapshot->time = static_cast<double>(world.tick) * world.lengths.tick;
   snapshot->stateHash = world.hash;
@@ -120,6 +155,8 @@ bool isIdle(const WorldState& world) {
     if (!queue.empty()) return false;
   for (const auto& [name, avatar] : world.avatars)
     if (isBusy(avatar)) return false;
+  for (const Body& body : world.bodies)
+    if (isBusy(body)) return false;
   return true;
 }
 
@@ -132,7 +169,9 @@ TickReport tick(World& w) {
   Stopwatch stopwatch(report);
   ++world.tick;
 
+  followBodyCommands(world);
   const Wish wish = followOrders(world, report, count);
+  planBodies(world);
   stopwatch.done(Stage::commands);
   updateBroadPhase(world, wish);
   stopwatch.done(Stage::broad);
@@ -140,9 +179,12 @@ TickReport tick(World& w) {
     report.audit = auditTick(world);
     report.audit->seconds = stopwatch.lap();
   }
+  moveBodies(world, report, count);
+  stopwatch.done(Stage::bodies);
   moveAvatars(world, wish, count);
   stopwatch.done(Stage::avatars);
   findContacts(world, report, count);
+  watchTriggers(world, report, count);
   judgeWalks(world, report, count);
   stopwatch.done(Stage::narrow);
   hashState(world);

@@ -56,18 +56,38 @@ struct Command {
   std::uint64_t tag = 0;  ///< given back in the notices that this command causes
 };
 
+/// Tells a kinematic body what to do. Acts at the next tick; the last one wins.
+struct BodyCommand {
+  enum class Action : std::uint8_t {
+    open,   ///< doors: to the limit that is farther from the closed place
+    close,  ///< doors: to coordinate 0
+    stop,   ///< where it is
+    to,     ///< to coordinate `to` (radians or metres); not for paths
+    level,  ///< lifts: to stop number `level`, counted from 0
+    run     ///< paths: on, from where it stopped; from the beginning when it is through
+  };
+  std::string body;  ///< BodySpec::name
+  Action action = Action::open;
+  double to = 0;
+  std::uint32_t level = 0;
+  std::optional<double> speed;  ///< of the coordinate, from now on; none: BodySpec::speed
+};
+
 // ---- what a tick tells -------------------------------------------------------------------------
 
 struct ContactEvent {
-  enum class Kind : std::uint8_t { begin, end, near, blocked };
+  enum class Kind : std::uint8_t { begin, end, near, blocked, enter, leave };
   enum class Reason : std::uint8_t { parted, left, shutdown };
 
   std::uint64_t tick = 0;
   double time = 0;  ///< seconds
   Kind kind = Kind::begin;
-  Reason reason = Reason::parted;  ///< for `end`
-  EntityId a = 0;                  ///< an avatar; for `blocked` the one that was stopped
-  EntityId b = 0;                ///< a still object or an avatar: of a greater id unless `blocked`
+  Reason reason = Reason::parted;  ///< for `end` and `leave`
+  /// An avatar or a rigid body; for `blocked` the one that was stopped, which may be any body.
+  EntityId a = 0;
+  /// What it met. A pair is told once: by the avatar of lesser id, by the avatar before a body, by
+  /// the body of lesser id. For `enter` and `leave` the trigger.
+  EntityId b = 0;
   collision::Decision decision;  ///< points and normal (from a to b) in the scene's frame
 };
 
@@ -91,10 +111,10 @@ struct Notice {
   std::string text;
 };
 
-enum class Stage : std::uint8_t { commands, broad, avatars, narrow, hash, snapshot };
-inline constexpr std::size_t kStages = 6;
-inline constexpr std::array<const char*, kStages> kStageNames{"commands", "broad", "avatars",
-                                                              "narrow",   "hash",  "snapshot"};
+enum class Stage : std::uint8_t { commands, broad, bodies, avatars, narrow, hash, snapshot };
+inline constexpr std::size_t kStages = 7;
+inline constexpr std::array<const char*, kStages> kStageNames{
+    "commands", "broad", "bodies", "avatars", "narrow", "hash", "snapshot"};
 
 struct TickReport {
   std::shared_ptr<const Snapshot> snapshot;
@@ -108,7 +128,8 @@ struct TickReport {
   std::uint32_t liveContacts = 0;
   double worstPenetration = 0;     ///< metres, by the exact verdict; 0 when nothing penetrates
   std::optional<TickAudit> audit;  ///< when the tick was audited
-  bool idle = true;                ///< every queue is empty and nobody is falling or driven
+  /// Every queue is empty, nobody is falling or driven, and no body is on its way, but for paths.
+  bool idle = true;
 };
 
 // ---- the world ---------------------------------------------------------------------------------
@@ -140,6 +161,10 @@ std::optional<std::string> refusal(const World& world, const Command& command);
 /// Hands a command to the next tick. Returns refusal() and does nothing when there is one.
 std::optional<std::string> submit(World& world, Command command);
 
+/// The same for a body's command.
+std::optional<std::string> refusal(const World& world, const BodyCommand& command);
+std::optional<std::string> submit(World& world, BodyCommand command);
+
 /// Advances the world by Lengths::tick.
 TickReport tick(World& world);
 
@@ -151,7 +176,8 @@ void auditBroadPhase(World& world, std::uint32_t everyTicks);
 /// Ends every contact with the given reason, as at shutdown; the world is not ticked after this.
 std::vector<ContactEvent> endContacts(World& world, ContactEvent::Reason reason);
 
-/// Path of a still object or name of an avatar (also one that left); "" for 0 or unknown.
+/// Path of a still object, name of a body or of an avatar (also one that left); "" for 0 or
+/// unknown.
 std::string nameOf(const World& world, EntityId id);
 
 }  // namespace enfilade::scene

@@ -9,18 +9,11 @@
 #include <vector>
 
 #include "collision/sort_and_sweep.hpp"
+#include "scene/body.hpp"
 #include "scene/obstacles.hpp"
 #include "scene/world.hpp"
 
 namespace enfilade::scene {
-
-/// A contact that lasts, or a near miss.
-struct Contact {
-  EntityId other = 0;
-  bool touching = false;  ///< closer than 2 epsilon; else a near miss that was told
-  collision::Decision decision;
-  double penetration = 0;  ///< metres; the depth, or an upper bound of it
-};
 
 /// How a walk goes: measured as the shortest distance to its way point so far.
 struct WalkProgress {
@@ -45,6 +38,8 @@ struct Avatar {
   Vec3 lastMove = Vec3::Zero();
   bool resting = false;  ///< stands, wants nothing, and nobody is near: nothing to work out
   EntityId stoppedBy = 0;
+  bool pairsChanged =
+      true;  ///< the broad phase gave it or took from it a partner since it gathered
 
   // Caches from tick to tick. They change no verdict, but the last bits of distances and so of the
   // way: they follow from the commands, as all else does, and a copy of a world must copy them.
@@ -52,6 +47,7 @@ struct Avatar {
   Box reach;                        ///< what it can meet in this tick
   Box gathered;                     ///< where `obstacles` are complete
   std::vector<Obstacle> obstacles;  ///< ascending (entity, part)
+  bool meetsBodies = false;         ///< some of them are parts of bodies
   std::vector<Contact> contacts;    ///< ascending `other`; also part of the state
 };
 
@@ -79,8 +75,15 @@ struct WorldState {
   std::map<std::string, Avatar> avatars;
   std::vector<std::string> avatarNames;  ///< of entity id scene objects + 1 + index, kept for ever
 
+  std::vector<BodyCommand> incomingForBodies;       ///< since the last tick
+  std::vector<Body> bodies;                         ///< as Model::bodies; never grows or shrinks
+  std::map<EntityId, std::uint32_t> bodyOfId;       ///< index into `bodies`
+  std::vector<std::uint32_t> kinematics, triggers;  ///< indices into `bodies`, ascending
+  std::vector<std::uint32_t> goingBodies;           ///< kinematic, in this tick; ascending
+
   collision::SortAndSweep broadPhase;
   std::map<collision::MoverId, std::string> avatarOfMover;
+  std::map<collision::MoverId, std::uint32_t> bodyOfMover;
   std::shared_ptr<const Snapshot> snapshot;
   AuditTurn audit;  ///< no part of the state: it changes nothing that is told of the world
 
@@ -100,6 +103,30 @@ Wish followOrders(WorldState& world, TickReport& report, QueryCount& count);
 /// (orders.cpp).
 void judgeWalks(WorldState& world, TickReport& report, QueryCount& count);
 
+// Kinematic bodies: body_drive.cpp plans, body_motion.cpp moves.
+/// Where it is in the beginning.
+void startDrive(Body& body);
+/// Why the body cannot take the command.
+std::optional<std::string> refusalOf(const Body& body, const BodyCommand& command,
+                                     const Lengths& lengths);
+/// Takes in the commands for bodies.
+void followBodyCommands(WorldState& world);
+/// Where each kinematic body wants to be at the end of the tick, and its reach.
+void planBodies(WorldState& world);
+/// For the snapshot: as Model::bodies; what the last one had when no body moved.
+std::shared_ptr<const std::vector<BodyView>> viewsOfBodies(const WorldState& world);
+/// How much farther an avatar with this reach may be pushed or carried in this tick, metres.
+double pushRoom(const WorldState& world, const Box& reach);
+/// Moves them as far as what is in the way yields; riders are carried.
+void moveBodies(WorldState& world, TickReport& report, QueryCount& count);
+/// A kinematic body is still on its way, and not blocked.
+bool isBusy(const Body& body);
+
+/// How far contacts and near misses look, metres.
+inline double lookoutOf(const Lengths& lengths) {
+  return 2 * lengths.epsilon + lengths.nearMiss;
+}
+
 /// The box that an avatar can reach in this tick with the given velocity (motion.cpp).
 Box reachOf(const WorldState& world, const Avatar& avatar, const Vec3& velocity);
 /// Box tests that the audit of one tick may make, if they suffice for one avatar: some 2 ms, as a
@@ -109,9 +136,12 @@ inline constexpr std::size_t kMostAuditTests = 400'000;
 /// anybody moves on or leaves (audit.cpp).
 bool auditIsDue(const WorldState& world);
 TickAudit auditTick(WorldState& world, std::size_t mostBoxTests = kMostAuditTests);
-/// Collects what the avatar can meet inside its reach. `pairsChanged`: the broad phase gave it or
-/// took from it a partner, so what was collected before no longer serves (obstacles.cpp).
-void gatherObstacles(WorldState& world, Avatar& avatar, bool pairsChanged);
+/// Collects what the avatar can meet inside its reach, unless what was collected before serves
+/// (obstacles.cpp).
+void gatherObstacles(WorldState& world, Avatar& avatar);
+/// Appends the parts of a body that `reach` meets, where they are now (obstacles.cpp).
+void gatherParts(const WorldState& world, std::uint32_t body, const Box& reach,
+                 std::vector<Obstacle>& obstacles);
 /// Others moved since the obstacles were collected: they take their place of now (obstacles.cpp).
 void followOthers(const WorldState& world, Avatar& avatar);
 /// Walks, slides, steps, falls (motion.cpp).
@@ -124,6 +154,11 @@ void findContacts(WorldState& world, TickReport& report, QueryCount& count);
 void tellBlocked(const WorldState& world, Avatar& avatar, TickReport& report, QueryCount& count);
 /// Takes an avatar out of the world, its contacts ended and told (orders.cpp).
 void removeAvatar(WorldState& world, const std::string& name, std::vector<ContactEvent>& events);
+/// Who is in which trigger now, and who came and went (triggers.cpp).
+void watchTriggers(WorldState& world, TickReport& report, QueryCount& count);
+/// Tells that `who` leaves all triggers.
+void leaveTriggers(WorldState& world, EntityId who, ContactEvent::Reason reason,
+                   std::vector<ContactEvent>& events);
 /// Ends all contacts of `avatar` and those of others with it (contacts.cpp).
 void endContactsOf(WorldState& world, Avatar& avatar, ContactEvent::Reason reason,
                    std::vector<ContactEvent>& events);

@@ -38,6 +38,10 @@ const char* wordOf(v1::ContactEvent::Kind kind) {
       return "near";
     case v1::ContactEvent::KIND_BLOCKED:
       return "blocked";
+    case v1::ContactEvent::KIND_ENTER:
+      return "enter";
+    case v1::ContactEvent::KIND_LEAVE:
+      return "leave";
     default:
       return "unknown";
   }
@@ -159,7 +163,8 @@ std::string contactLine(const v1::ContactEvent& event) {
             {"point_b", jsonOf(event.point_b())},
             {"normal", jsonOf(event.normal())},
             {"decided_by", event.decided_by() == v1::DECIDED_BY_FILTER ? "filter" : "rational"}};
-  if (event.kind() == v1::ContactEvent::KIND_END) line["reason"] = wordOf(event.reason());
+  if (event.kind() == v1::ContactEvent::KIND_END || event.kind() == v1::ContactEvent::KIND_LEAVE)
+    line["reason"] = wordOf(event.reason());
   // Names come from files: what is not UTF-8 in them is replaced, not thrown at the walker.
   return line.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -18,6 +18,10 @@ v1::ContactEvent::Kind kindOf(scene::ContactEvent::Kind kind) {
       return v1::ContactEvent::KIND_NEAR;
     case Kind::blocked:
       return v1::ContactEvent::KIND_BLOCKED;
+    case Kind::enter:
+      return v1::ContactEvent::KIND_ENTER;
+    case Kind::leave:
+      return v1::ContactEvent::KIND_LEAVE;
   }
   return v1::ContactEvent::KIND_UNSPECIFIED;
 }
@@ -178,7 +182,9 @@ v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent&
   message.set_tick(event.tick);
   message.set_time(event.time);
   message.set_kind(kindOf(event.kind));
-  if (event.kind == scene::ContactEvent::Kind::end) message.set_reason(reasonOf(event.reason));
+  if (event.kind == scene::ContactEvent::Kind::end ||
+      event.kind == scene::ContactEvent::Kind::leave)
+    message.set_reason(reasonOf(event.reason));
   message.set_a(event.a);
   message.set_b(event.b);
   message.set_a_name(scene::nameOf(world, event.a));

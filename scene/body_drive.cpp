@@ -1,0 +1,272 @@
+// What kinematic bodies are about: commands, closers, doors that are walked into; and from that
+// where each wants to be at the end of the tick.
+#include <algorithm>
+#include <cmath>
+
+#include "scene/world_state.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr double kTimeRounding = 1e-9;  // seconds: sums of ticks against whole delays
+
+bool goesRound(const BodySpec& spec) {
+  return spec.kind == BodyKind::path && spec.loops;
+}
+
+/// Where a path is at a time between its first key and its last.
+BodyPlace placeOnPath(const std::vector<PathKey>& keys, double time) {
+  const auto after = std::upper_bound(keys.begin() + 1, keys.end() - 1, time,
+                                      [](double t, const PathKey& key) { return t < key.time; });
+  const PathKey &a = *(after - 1), &b = *after;
+  const double s = (time - a.time) / (b.time - a.time);
+  return {a.offset + s * (b.offset - a.offset), a.turn + s * (b.turn - a.turn)};
+}
+
+BodyPlace placeOf(const BodySpec& spec, double coordinate) {
+  switch (spec.kind) {
+    case BodyKind::hinged:
+      return {Vec3::Zero(), coordinate};
+    case BodyKind::path:
+      return placeOnPath(spec.keys, coordinate);
+    default:
+      return {coordinate * spec.axis, 0};
+  }
+}
+
+/// The limits of the coordinate.
+std::pair<double, double> limitsOf(const BodySpec& spec) {
+  if (spec.kind == BodyKind::path) return {0, spec.keys.back().time};
+  return {spec.low, spec.high};
+}
+
+double openEnd(const BodySpec& spec) {
+  const auto [low, high] = limitsOf(spec);
+  return high >= -low ? high : low;
+}
+
+void goTo(Body& body, double target, double speed) {
+  BodyDrive& drive = body.drive;
+  drive.target = target;
+  drive.speed = speed;
+  drive.going = goesRound(*body.spec) || target != drive.coordinate;
+  drive.closesIn = -1;
+}
+
+void follow(Body& body, const BodyCommand& command) {
+  const double speed = command.speed.value_or(body.spec->speed);
+  switch (command.action) {
+    case BodyCommand::Action::open:
+    case BodyCommand::Action::run:
+      return goTo(body, openEnd(*body.spec), speed);
+    case BodyCommand::Action::close:
+      return goTo(body, 0, speed);
+    case BodyCommand::Action::to:
+      return goTo(body, command.to, speed);
+    case BodyCommand::Action::level:
+      return goTo(body, body.spec->stops[command.level], speed);
+    case BodyCommand::Action::stop:
+      body.drive.going = false;
+      body.drive.rate = 0;
+      body.drive.closesIn = -1;
+  }
+}
+
+/// A door that is walked into opens away from who does, or the other way where it only opens so.
+void openFor(Body& body, const Contact& contact) {
+  const BodySpec& spec = *body.spec;
+  if (spec.openedBy != OpenedBy::touch || body.drive.going) return;
+  const Vec3 push = contact.decision.normal;  // from the avatar to the body
+  const Vec3 arm = contact.decision.pointB - body.position;
+  const double way = spec.kind == BodyKind::hinged ? spec.axis.dot(arm.cross(push)) : 0;
+  double target = openEnd(spec);
+  if (way > 0 && spec.high > 0) target = spec.high;
+  if (way < 0 && spec.low < 0) target = spec.low;
+  goTo(body, target, spec.speed);
+}
+
+void openForWalkers(WorldState& world) {
+  for (const auto& [name, avatar] : world.avatars) {
+    const auto found = world.bodyOfId.find(avatar.stoppedBy);
+    if (avatar.stoppedBy == 0 || found == world.bodyOfId.end()) continue;
+    Body& body = world.bodies[found->second];
+    for (const Contact& contact : avatar.contacts)
+      if (contact.other == body.id) openFor(body, contact);
+  }
+}
+
+/// A closer waits while the door stands open, and then closes it.
+void runCloser(Body& body, double tick) {
+  BodyDrive& drive = body.drive;
+  if (!body.spec->closesAfter || drive.going || drive.coordinate == 0) return;
+  if (drive.closesIn < 0) drive.closesIn = *body.spec->closesAfter;
+  drive.closesIn -= tick;
+  if (drive.closesIn <= kTimeRounding) {
+    goTo(body, 0, body.spec->speed);
+  }
+}
+
+/// The signed rate for this tick: speeds up and slows down by the spec's acceleration.
+double nextRate(const Body& body, double gap, double tick) {
+  const BodyDrive& drive = body.drive;
+  const double sense = gap < 0 ? -1 : 1;
+  const double a = body.spec->acceleration;
+  if (a == 0) return sense * drive.speed;
+  const double along = std::min(sense * drive.rate + a * tick, drive.speed);
+  return sense * std::min(along, std::sqrt(2 * a * std::abs(gap)));
+}
+
+/// Where it wants to be at the end of the tick, and how fast that is.
+std::pair<double, double> nextCoordinate(const Body& body, double tick) {
+  const BodyDrive& drive = body.drive;
+  if (goesRound(*body.spec)) {
+    const double next = drive.coordinate + drive.speed * tick;
+    return {std::fmod(next, body.spec->keys.back().time), drive.speed};
+  }
+  const double gap = drive.target - drive.coordinate;
+  const double rate = nextRate(body, gap, tick);
+  if (std::abs(rate) * tick >= std::abs(gap) && rate * gap >= 0) return {drive.target, 0};
+  const auto [low, high] = limitsOf(*body.spec);
+  return {std::clamp(drive.coordinate + rate * tick, low, high), rate};
+}
+
+void plan(Body& body, double tick) {
+  body.plan = {body.drive.place, body.drive.coordinate, 0};
+  if (!body.drive.going) return;
+  const auto [coordinate, rate] = nextCoordinate(body, tick);
+  body.drive.rate = rate;
+  body.plan.coordinate = coordinate;
+  body.plan.place = placeOf(*body.spec, coordinate);
+  body.plan.farthest = (body.plan.place.offset - body.drive.place.offset).norm() +
+                       std::abs(body.plan.place.turn - body.drive.place.turn) * body.shape->radius;
+}
+
+}  // namespace
+
+void startDrive(Body& body) {
+  BodyDrive& drive = body.drive;
+  drive.speed = body.spec->speed;
+  drive.place = placeOf(*body.spec, 0);
+  drive.going = body.spec->kind == BodyKind::path && body.spec->runs;
+  drive.target = drive.going ? openEnd(*body.spec) : 0;
+  const collision::Pose pose = poseAt(*body.spec, drive.place);
+  placeBody(body, pose.translation, pose.rotation);
+}
+
+void followBodyCommands(WorldState& world) {
+  for (const BodyCommand& command : world.incomingForBodies) {
+    for (Body& body : world.bodies)
+      if (body.spec->name == command.body) follow(body, command);
+  }
+  world.incomingForBodies.clear();
+  openForWalkers(world);
+}
+
+void planBodies(WorldState& world) {
+  world.goingBodies.clear();
+  for (const std::uint32_t i : world.kinematics) {
+    Body& body = world.bodies[i];
+    const bool reachedOut = body.moved || body.plan.farthest > 0;
+    body.moved = false;
+    body.velocity = body.spin = Vec3::Zero();
+    runCloser(body, world.lengths.tick);
+    plan(body, world.lengths.tick);
+    if (body.drive.going) world.goingBodies.push_back(i);
+    if (body.plan.farthest == 0 && !reachedOut) continue;
+    body.reach = grown(boxOf(body), body.plan.farthest);
+    world.broadPhase.move(body.mover, body.reach);
+  }
+}
+
+double pushRoom(const WorldState& world, const Box& reach) {
+  const double lookout = lookoutOf(world.lengths);
+  std::vector<std::uint32_t> rest = world.goingBodies;
+  double room = 0;
+  // What one pushes may come into the way of another: at most as many rounds as bodies.
+  for (bool more = !rest.empty(); more;) {
+    more = false;
+    const Box within = grown(reach, room + lookout);
+    std::erase_if(rest, [&](std::uint32_t i) {
+      const Body& body = world.bodies[i];
+      if (!overlaps(within, body.reach)) return false;
+      room += body.plan.farthest + 4 * world.lengths.epsilon;
+      return more = true;
+    });
+  }
+  return room;
+}
+
+bool isBusy(const Body& body) {
+  const BodyDrive& drive = body.drive;
+  if (!isKinematic(body.spec->kind)) return !body.asleep;
+  if (goesRound(*body.spec)) return false;
+  return (drive.going && body.blockedBy == 0) || drive.closesIn >= 0;
+}
+
+namespace {
+
+BodyView viewOf(const Body& body, std::uint32_t index) {
+  BodyView view;
+  view.id = body.id;
+  view.index = index;
+  view.pose = {body.orientation, body.position};
+  view.displaced = body.turned || body.position != body.shape->origin;
+  view.coordinate = body.drive.coordinate;
+  view.velocity = body.velocity;
+  view.spin = body.spin;
+  view.moving = body.moved || (body.spec->kind == BodyKind::rigid && !body.asleep);
+  view.blockedBy = body.blockedBy;
+  return view;
+}
+
+bool isAsViewed(const Body& body, const BodyView& view) {
+  return !view.moving && !body.moved && (body.asleep || isKinematic(body.spec->kind)) &&
+         view.blockedBy == body.blockedBy;
+}
+
+}  // namespace
+
+std::shared_ptr<const std::vector<BodyView>> viewsOfBodies(const WorldState& world) {
+  if (world.snapshot) {
+    const std::vector<BodyView>& last = *world.snapshot->bodies;
+    bool same = true;
+    for (std::size_t i = 0; same && i < last.size(); ++i)
+      same = isAsViewed(world.bodies[i], last[i]);
+    if (same) return world.snapshot->bodies;
+  }
+  auto views = std::make_shared<std::vector<BodyView>>();
+  for (const Body& body : world.bodies)
+    views->push_back(viewOf(body, static_cast<std::uint32_t>(views->size())));
+  return views;
+}
+
+std::optional<std::string> refusalOf(const Body& body, const BodyCommand& command,
+                                     const Lengths& lengths) {
+  using Action = BodyCommand::Action;
+  const BodySpec& spec = *body.spec;
+  const std::string kind = wordOf(spec.kind);
+  if (!isKinematic(spec.kind))
+    return "body '" + spec.name + "' is " + kind + ": it takes no commands";
+  const bool door = spec.kind == BodyKind::hinged || spec.kind == BodyKind::sliding;
+  const auto [low, high] = limitsOf(spec);
+  if ((command.action == Action::open || command.action == Action::close) && !door)
+    return "body '" + spec.name + "' is no door but " + kind + ": give to, level, run or stop";
+  if (command.action == Action::run && spec.kind != BodyKind::path)
+    return "run is for paths; body '" + spec.name + "' is " + kind;
+  if (command.action == Action::to && goesRound(spec))
+    return "to: body '" + spec.name + "' goes round; give run or stop";
+  if (command.action == Action::to && !(command.to >= low && command.to <= high))
+    return "to is " + std::to_string(command.to) + "; it must lie in " + std::to_string(low) +
+           ".." + std::to_string(high);
+  if (command.action == Action::level && command.level >= spec.stops.size())
+    return "level is " + std::to_string(command.level) + "; body '" + spec.name + "' has " +
+           std::to_string(spec.stops.size()) + " stops, counted from 0";
+  if (!command.speed) return std::nullopt;
+  const double radius = spec.kind == BodyKind::hinged ? body.shape->radius : 1;
+  if (*command.speed > 0 && *command.speed * radius <= lengths.speedLimit) return std::nullopt;
+  return "speed is " + std::to_string(*command.speed) +
+         "; it must be above 0, and no point may be faster than " +
+         std::to_string(lengths.speedLimit) + " m/s";
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,34 @@
+// The shape of a body: convex parts in the body's frame, and how its mass lies in it. Made once a
+// scene; worlds and bodies share it.
+#pragma once
+
+#include <vector>
+
+#include "collision/hull.hpp"
+#include "scene/model.hpp"
+
+namespace enfilade::scene {
+
+struct BodyShape {
+  /// Solids for closed convex pieces, else triangles (a hull of three vertices); rigid bodies and
+  /// triggers take the hull of each connected piece.
+  std::vector<collision::Hull> parts;
+  Vec3 origin = Vec3::Zero();  ///< of the body's frame, in the scene's, where it was authored
+  Box box;                     ///< of all parts, body's frame
+  double radius = 0;           ///< greatest distance of a vertex from the origin; not below it
+  std::uint32_t hulls = 0;     ///< of the parts, those that are solids or flat polygons
+  /// Pieces that a hull stands for although it is larger than they are. 0: exact.
+  std::uint32_t approximate = 0;
+
+  // Of rigid bodies: the parts as solids of one density (overlaps count twice).
+  double volume = 0;  ///< cubic metres; > 0, else the box's, a millimetre thick at least
+  double mass = 0;    ///< kilograms
+  /// kg m^2 about the origin, the centre of mass, axes of the body's frame.
+  collision::Mat3 inertia = collision::Mat3::Identity();
+};
+
+/// Of a body that refusalOfBodies() has nothing against. Throws std::invalid_argument, naming the
+/// body, when its objects have no triangle with an area.
+BodyShape shapeOf(const Model& model, const BodySpec& spec);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,282 @@
+#include <random>
+
+#include "tests/scene/body_trial.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using namespace testing;
+using Action = BodyCommand::Action;
+using Event = ContactEvent::Kind;
+
+constexpr double kQuarter = 1.5707963267948966;
+
+/// A door leaf of 1 m in the plane z = 0, hinged at x = 0, that opens towards +z or -z.
+Model hingedDoor(std::vector<NamedBox> others = {}) {
+  others.insert(others.begin(), {floorBox(), {"leaf", {0, 0.01, -0.02}, {1, 2.1, 0.02}}});
+  Model model = boxModel(others);
+  BodySpec door = bodySpec("door", BodyKind::hinged, {1});
+  door.low = -kQuarter, door.high = kQuarter;
+  door.speed = kQuarter;  // a quarter turn a second
+  model.bodies.push_back(door);
+  return model;
+}
+
+/// A platform of 2 x 2 m whose top is y = 0.1 at the lowest of three stops.
+Model lift(std::vector<NamedBox> others = {}) {
+  others.insert(others.begin(), {floorBox(), {"car", {-1, 0.05, -1}, {1, 0.1, 1}}});
+  Model model = boxModel(others);
+  BodySpec spec = bodySpec("lift", BodyKind::lift, {1});
+  spec.high = 6;
+  spec.stops = {0, 3, 6};
+  spec.speed = 1.5;
+  spec.acceleration = 1;
+  model.bodies.push_back(spec);
+  return model;
+}
+
+TEST(Bodies, ADoorOpensAtItsSpeedAndStandsThere) {
+  BodyTrial t(hingedDoor());
+  t.tell({"door", Action::open, 0, 0, {}});
+  t.ticks(30);
+  EXPECT_NEAR(t.body("door").drive.coordinate, kQuarter / 2, 1e-12);
+  EXPECT_NEAR(t.body("door").spin.y(), kQuarter, 1e-9);
+  t.untilIdle();
+  EXPECT_EQ(t.body("door").drive.coordinate, kQuarter);
+  EXPECT_LE(t.world.state().tick, 61u);
+  const Vec3 tip = t.body("door").rotation * Vec3(1, 0, 0) + t.body("door").position;
+  EXPECT_NEAR((tip - Vec3(0, 0, -1)).norm(), 0, 1e-12);  // counter-clockwise from above
+}
+
+TEST(Bodies, ACloserClosesTheDoorAfterItsDelay) {
+  Model model = hingedDoor();
+  model.bodies[0].closesAfter = 0.5;
+  BodyTrial t(std::move(model));
+  t.tell({"door", Action::to, 0.3, 0, {}});
+  t.ticks(12);
+  EXPECT_EQ(t.body("door").drive.coordinate, 0.3);
+  t.ticks(29);
+  EXPECT_EQ(t.body("door").drive.coordinate, 0.3);
+  t.untilIdle();
+  EXPECT_EQ(t.body("door").drive.coordinate, 0);
+}
+
+TEST(Bodies, ADoorPushesWhoCanYieldAndTouchesHim) {
+  BodyTrial t(hingedDoor());
+  t.order("ann", Spawn{{0.6, 0.01, -0.5}, 0, 0.3, 1.75});
+  t.ticks(30);
+  t.tell({"door", Action::open, 0, 0, {}});
+  t.untilIdle();
+  EXPECT_EQ(t.body("door").drive.coordinate, kQuarter);
+  EXPECT_EQ(t.told(Event::blocked, "door", "ann"), 0);
+  EXPECT_GE(t.told(Event::begin, "ann", "door"), 1);
+  EXPECT_EQ(whoPenetrates(t.world), "");
+  EXPECT_LT(t.feet("ann").x(), 0) << "swept aside";
+}
+
+TEST(Bodies, ADoorStopsAtWhoStandsAgainstAWallAndSaysSoOnce) {
+  // Behind her a wall, at her sides as well: she cannot yield.
+  BodyTrial t(hingedDoor({{"wall", {-2, 0, -1.2}, {2, 3, -1}},
+                          {"left", {0.2, 0, -1}, {0.25, 3, -0.4}},
+                          {"right", {0.9, 0, -1}, {0.95, 3, -0.4}}}));
+  t.order("ann", Spawn{{0.575, 0.01, -0.68}, 0, 0.3, 1.75});
+  t.ticks(30);
+  t.tell({"door", Action::open, 0, 0, {}});
+  t.ticks(90);
+  EXPECT_EQ(t.told(Event::blocked, "door", "ann"), 1);
+  EXPECT_GT(t.body("door").drive.coordinate, 0.05);
+  EXPECT_LT(t.body("door").drive.coordinate, 0.8);
+  EXPECT_EQ(whoPenetrates(t.world), "");
+  // When she is gone it goes on.
+  t.order("ann", Leave{});
+  t.untilIdle();
+  EXPECT_EQ(t.body("door").drive.coordinate, kQuarter);
+}
+
+TEST(Bodies, DoorsOfAnySpeedCrossNobody) {
+  std::mt19937 random(7);
+  const auto uniform = [&](double low, double high) {
+    return low + (high - low) * (static_cast<double>(random()) / 4294967296.0);
+  };
+  int touched = 0;
+  for (int run = 0; run < 60; ++run) {
+    Model model = hingedDoor({{"wall", {-2, 0, -1.6}, {2, 3, -1.5}}});
+    // 0.01 to 100 m/s at the tip, even on a scale of powers.
+    const double tip = std::pow(10.0, uniform(-2, 2));
+    model.bodies[0].speed = tip;
+    BodyTrial t(std::move(model));
+    const double radius = uniform(0.1, 0.45);
+    t.order(
+        "ann",
+        Spawn{{uniform(-0.3, 1.2), 0.01, -uniform(radius + 0.05, 1.4 - radius)}, 0, radius, 1.75});
+    t.ticks(10);
+    if (t.world.state().avatars.empty()) continue;
+    const bool startsInTheWay = t.feet("ann").x() > 0 && t.feet("ann").norm() < 0.8;
+    t.tell({"door", Action::open, 0, 0, {}});
+    for (int i = 0; i < 40; ++i) {
+      t.step();
+      ASSERT_EQ(whoPenetrates(t.world), "") << "run " << run << ", tip " << tip;
+    }
+    // Who stood in the leaf's way, and not at its tip, cannot be behind it now.
+    const Vec3 local = t.body("door").rotation.transpose() * t.feet("ann");
+    if (startsInTheWay && local.x() > 0 && local.x() < 1) {
+      EXPECT_LT(local.z(), 0) << "run " << run;
+    }
+    touched += t.told(Event::begin, "ann", "door") > 0;
+  }
+  EXPECT_GT(touched, 15);
+}
+
+TEST(Bodies, ALiftCarriesItsRiderUpAndDown) {
+  BodyTrial t(lift());
+  t.order("ann", Spawn{{0, 0.1, 0}, 0, 0.3, 1.75});
+  t.ticks(30);
+  t.tell({"lift", Action::level, 0, 2, {}});
+  for (int i = 0; i < 600; ++i) {
+    if (t.step().idle) break;
+    const double above = t.feet("ann").y() - (t.body("lift").position.y() + 0.1);
+    ASSERT_GT(above, 0);
+    ASSERT_LT(above, 2 * t.world.lengths().epsilon) << "tick " << i;
+  }
+  EXPECT_EQ(t.body("lift").drive.coordinate, 6);
+  EXPECT_NEAR(t.feet("ann").y(), 6.1, 1e-3);
+  t.tell({"lift", Action::level, 0, 0, {}});
+  for (int i = 0; i < 600; ++i) {
+    if (t.step().idle) break;
+    ASSERT_LT(t.feet("ann").y() - (t.body("lift").position.y() + 0.1),
+              2 * t.world.lengths().epsilon);
+  }
+  EXPECT_NEAR(t.feet("ann").y(), 0.1, 1e-3);
+  EXPECT_EQ(t.told(Event::begin, "ann", "lift"), 1) << "she never lost touch";
+}
+
+TEST(Bodies, ALiftThatComesDownOnSomeoneStopsAtTheHead) {
+  BodyTrial t(lift());
+  t.tell({"lift", Action::level, 0, 1, {}});
+  t.untilIdle();
+  t.order("ann", Spawn{{0.2, 0.01, 0}, 0, 0.3, 1.75});
+  t.ticks(30);
+  t.tell({"lift", Action::level, 0, 0, 30.0});
+  t.ticks(120);
+  EXPECT_EQ(t.told(Event::blocked, "lift", "ann"), 1);
+  EXPECT_EQ(whoPenetrates(t.world), "");
+  EXPECT_NEAR(t.body("lift").position.y() + 0.05, 1.75, 0.01);
+  EXPECT_NEAR(t.feet("ann").y(), 0, 1e-3);
+}
+
+TEST(Bodies, ALiftStopsWhereItsRiderMeetsTheCeiling) {
+  BodyTrial t(lift({{"ceiling", {-3, 4, -3}, {3, 4.2, 3}}}));
+  t.order("ann", Spawn{{0, 0.1, 0}, 0, 0.3, 1.75});
+  t.ticks(30);
+  t.tell({"lift", Action::level, 0, 2, {}});
+  t.ticks(400);
+  EXPECT_EQ(t.told(Event::blocked, "lift", "ann"), 1);
+  EXPECT_EQ(whoPenetrates(t.world), "");
+  EXPECT_NEAR(t.body("lift").position.y() + 0.1 + 1.75, 4, 0.01);
+}
+
+TEST(Bodies, APlatformCarriesSidewaysAndATurntableRound) {
+  Model model =
+      boxModel({{"plate", {-2, 0, -2}, {2, 0.1, 2}}, {"ground", {-9, -1, -9}, {9, -0.9, 9}}});
+  BodySpec spec = bodySpec("plate", BodyKind::path, {0});
+  spec.keys = {{0, {0, 0, 0}, 0}, {2, {3, 0, 0}, 0}, {4, {3, 0, 0}, 4 * kQuarter}};
+  model.bodies.push_back(spec);
+  BodyTrial t(std::move(model));
+  t.tell({"plate", Action::stop, 0, 0, {}});
+  t.order("ann", Spawn{{1, 0.1, 0}, 0, 0.3, 1.75});
+  t.ticks(30);
+  t.tell({"plate", Action::run, 0, 0, {}});
+  t.ticks(120);
+  EXPECT_NEAR(t.feet("ann").x(), 4, 0.02);
+  t.ticks(60);
+  EXPECT_NEAR(t.feet("ann").x(), 2, 0.1);
+  t.untilIdle();
+  EXPECT_NEAR(t.feet("ann").x(), 4, 0.1);
+  EXPECT_EQ(whoPenetrates(t.world), "");
+}
+
+TEST(Bodies, ADoorOpensAwayFromWhoWalksIntoIt) {
+  Model model = hingedDoor(
+      {{"left", {-4, 0, -0.1}, {-0.01, 3, 0.1}}, {"right", {1.01, 0, -0.1}, {4, 3, 0.1}}});
+  model.bodies[0].openedBy = OpenedBy::touch;
+  BodyTrial t(std::move(model));
+  t.order("ann", Spawn{{0.6, 0.01, 2}, 0, 0.2, 1.75});
+  t.order("ann", Walk{{{0.6, 0, -2}}, 1.4});
+  t.untilIdle();
+  EXPECT_NEAR(t.feet("ann").z(), -2, 0.01);
+  EXPECT_GT(t.body("door").drive.coordinate, 0.5);
+}
+
+TEST(Bodies, TriggersTellWhoEntersAndLeaves) {
+  Model model = boxModel({floorBox(), {"zone", {1, 0, -1}, {2, 2, 1}}});
+  model.bodies.push_back(bodySpec("zone", BodyKind::trigger, {1}));
+  BodyTrial t(std::move(model));
+  t.order("ann", Spawn{{-1, 0.01, 0}, 0, 0.3, 1.75});
+  t.order("ann", Walk{{{4, 0, 0}}, 2});
+  t.untilIdle();
+  EXPECT_NEAR(t.feet("ann").x(), 4, 0.01) << "not solid";
+  ASSERT_EQ(t.told(Event::enter, "ann", "zone"), 1);
+  ASSERT_EQ(t.told(Event::leave, "ann", "zone"), 1);
+  for (const ContactEvent& e : t.events) {
+    const bool apart = e.decision.verdict == collision::Verdict::separated;
+    if (e.kind == Event::enter || e.kind == Event::leave) {
+      EXPECT_EQ(apart, e.kind == Event::leave);
+    }
+  }
+}
+
+TEST(Bodies, WhoLeavesTheWorldLeavesItsTriggers) {
+  Model model = boxModel({floorBox(), {"zone", {1, 0, -1}, {2, 2, 1}}});
+  model.bodies.push_back(bodySpec("zone", BodyKind::trigger, {1}));
+  BodyTrial t(std::move(model));
+  t.order("ann", Spawn{{1.5, 0.01, 0}, 0, 0.3, 1.75});
+  t.ticks(5);
+  EXPECT_EQ(t.told(Event::enter, "ann", "zone"), 1);
+  t.order("ann", Leave{});
+  t.ticks(2);
+  EXPECT_EQ(t.told(Event::leave, "ann", "zone"), 1);
+}
+
+TEST(Bodies, AbsurdCommandsAreRefusedAndChangeNothing) {
+  BodyTrial t(hingedDoor()), twin(hingedDoor());
+  const double nan = std::nan("");
+  for (const BodyCommand& command :
+       {BodyCommand{"door", Action::to, nan, 0, {}}, BodyCommand{"door", Action::to, 7, 0, {}},
+        BodyCommand{"door", Action::level, 0, 1, {}}, BodyCommand{"door", Action::run, 0, 0, {}},
+        BodyCommand{"door", Action::open, 0, 0, nan}, BodyCommand{"door", Action::open, 0, 0, -1},
+        BodyCommand{"door", Action::open, 0, 0, 1e9},
+        BodyCommand{"gate", Action::open, 0, 0, {}}}) {
+    EXPECT_TRUE(submit(t.world, command));
+    t.step();
+    twin.step();
+  }
+  EXPECT_EQ(t.world.snapshot()->stateHash, twin.world.snapshot()->stateHash);
+}
+
+TEST(Bodies, TheSameCommandsGiveTheSameBits) {
+  const auto run = [] {
+    BodyTrial t(hingedDoor({{"wall", {-2, 0, -1.6}, {2, 3, -1.5}}}));
+    t.order("ann", Spawn{{0.6, 0.01, -0.5}, 0, 0.3, 1.75});
+    t.ticks(10);
+    t.tell({"door", Action::open, 0, 0, {}});
+    t.ticks(100);
+    return t.world.snapshot()->stateHash;
+  };
+  EXPECT_EQ(run(), run());
+}
+
+TEST(Bodies, WhatIsWrongWithASpecIsNamed) {
+  Model model = hingedDoor();
+  model.bodies[0].axis = {0, 2, 0};
+  EXPECT_NE(refusalOfBodies(model).value_or("").find("axis"), std::string::npos);
+  model = hingedDoor();
+  model.bodies.push_back(model.bodies[0]);
+  EXPECT_NE(refusalOfBodies(model).value_or("").find("two bodies"), std::string::npos);
+  model = hingedDoor();
+  model.bodies[0].low = std::nan("");
+  EXPECT_NE(refusalOfBodies(model).value_or("").find("low"), std::string::npos);
+  EXPECT_THROW(Scene{model}, std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace enfilade::scene
