@@ -1,0 +1,163 @@
+// A plane with normal n parts both bodies at the start by g0 and at the end by g1. Were the ways of
+// all vertices straight and even, the gap along n would be a concave function of time (least of
+// linear ones), and never below min(g0, g1). A vertex that turns by theta about the centre at
+// radius rho departs from its chord by at most rho theta^2 / 8 (|p''| = rho theta^2, and a function
+// with that second derivative departs from its chord by at most 1/8 of it). So
+//   min(g0, g1) > rho_A theta_A^2 / 8 + rho_B theta_B^2 / 8
+// proves them apart all the way. Where neither the plane of the start nor that of the end does, the
+// way is halved: the middle of an even turn from q0 to q1 is q0 + q1, normalised, up to rounding.
+//
+// Where they move by less than their distance, no plane is needed.
+//
+// theta from the quaternions: |q0 - q1| = 2 sin(theta / 4) for the nearer of +-q1, and sin x >= x -
+// x^3 / 6 gives theta / 4 <= s (1 + s^2) for s = sin(theta / 4) <= sin(pi / 4).
+#include "scene/passage.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace enfilade::scene {
+namespace {
+
+using collision::ConvexBody;
+using collision::FeatureCache;
+using collision::Quat;
+using collision::Verdict;
+
+constexpr double kUp = 1 + 0x1p-40;  // above what a few roundings lose
+
+/// q1 or -q1, whichever is nearer to q0.
+Quat nearer(const Quat& q0, const Quat& q1) {
+  if (q0.dot(q1) >= 0) return q1;
+  return Quat(-q1.w(), -q1.x(), -q1.y(), -q1.z());
+}
+
+/// Radians, at least.
+double turnOf(const Passage& p) {
+  const Quat to = nearer(p.fromRotation, p.toRotation);
+  const double s = 0.5 * (to.coeffs() - p.fromRotation.coeffs()).norm();
+  return 4 * s * (1 + s * s) * kUp;
+}
+
+double bulgeOf(const Passage& p) {
+  const double turn = turnOf(p);
+  return p.radius * turn * turn / 8 * kUp;
+}
+
+/// A part at an end of its way.
+struct PlacedPart {
+  Mat3 rotation;
+  ConvexBody body;
+
+  PlacedPart(const SolidPart& part, const Vec3& centre, const Quat& turned, const Vec3& inFrame)
+      : rotation(turned.toRotationMatrix()) {
+    body = {part.vertices, centre - rotation * inFrame, &rotation, part.hull};
+  }
+  PlacedPart(const PlacedPart&) = delete;
+  PlacedPart& operator=(const PlacedPart&) = delete;
+};
+
+/// The pair at one time: what is known there.
+struct Known {
+  FeatureCache cache;
+  double apart = 0;  ///< metres, proved; 0: not separated
+};
+
+struct Search {
+  const SolidPart& partA;
+  const SolidPart& partB;
+  std::uint32_t queries = 0;
+
+  /// Separated at the end, and by how much?
+  Known ask(const Passage& a, const Passage& b, bool atEnd, const FeatureCache& hint) {
+    const PlacedPart placedA = place(partA, a, atEnd), placedB = place(partB, b, atEnd);
+    Known known{hint, 0};
+    const collision::Decision decision = collision::decide(placedA.body, placedB.body, known.cache);
+    ++queries;
+    if (decision.verdict == Verdict::separated)
+      known.apart = decision.distance - decision.errorBound;
+    return known;
+  }
+  /// The gap along the axis of `known`, at the end or the start.
+  double along(const Passage& a, const Passage& b, bool atEnd, const Known& known) const {
+    const PlacedPart placedA = place(partA, a, atEnd), placedB = place(partB, b, atEnd);
+    return collision::provedSeparation(placedA.body, placedB.body, known.cache);
+  }
+
+ private:
+  static PlacedPart place(const SolidPart& part, const Passage& p, bool atEnd) {
+    return PlacedPart(part, atEnd ? p.toCentre : p.fromCentre,
+                      atEnd ? p.toRotation : p.fromRotation, p.centreInFrame);
+  }
+};
+
+/// Proved from the two ends alone.
+bool provedClear(const Search& search, const Passage& a, const Passage& b, const Known& start,
+                 const Known& end) {
+  const double moves = lengthOf(a) + lengthOf(b);
+  if (moves < start.apart || moves < end.apart) return true;
+  const double bulge = bulgeOf(a) + bulgeOf(b);
+  const double least = std::min(start.apart, end.apart);
+  if (!(least > bulge)) return false;
+  return search.along(a, b, true, start) > bulge || search.along(a, b, false, end) > bulge;
+}
+
+/// The part of the way that is proved clear. The end's answer is not known to be separated.
+double clearPart(Search& search, const Passage& a, const Passage& b, const Known& start,
+                 const Known& end, int halvings) {
+  if (end.apart > 0 && provedClear(search, a, b, start, end)) return 1;
+  if (halvings == 0) return 0;
+  const PassagePose middleA = middleOf(a), middleB = middleOf(b);
+  const Passage firstA = firstHalf(a, middleA), firstB = firstHalf(b, middleB);
+  const Known middle = search.ask(firstA, firstB, true, start.cache);
+  const double first = clearPart(search, firstA, firstB, start, middle, halvings - 1);
+  if (first < 1) return 0.5 * first;
+  return 0.5 + 0.5 * clearPart(search, secondHalf(a, middleA), secondHalf(b, middleB), middle, end,
+                               halvings - 1);
+}
+
+}  // namespace
+
+Passage standing(const Solid& solid) {
+  return {solid.motion.centre,   solid.motion.centre, solid.motion.rotation,
+          solid.motion.rotation, solid.radius,        solid.centreInFrame};
+}
+
+double lengthOf(const Passage& p) {
+  const Vec3 way = p.toCentre - p.fromCentre;
+  return (way.norm() + turnOf(p) * p.radius) * kUp;
+}
+
+PassagePose middleOf(const Passage& p) {
+  PassagePose middle;
+  middle.centre = 0.5 * (p.fromCentre + p.toCentre);
+  middle.rotation.coeffs() =
+      p.fromRotation.coeffs() + nearer(p.fromRotation, p.toRotation).coeffs();
+  const double length = std::sqrt(middle.rotation.squaredNorm());
+  middle.rotation.coeffs() /= length;
+  return middle;
+}
+
+Passage firstHalf(const Passage& p, const PassagePose& middle) {
+  Passage half = p;
+  half.toCentre = middle.centre, half.toRotation = middle.rotation;
+  return half;
+}
+
+Passage secondHalf(const Passage& p, const PassagePose& middle) {
+  Passage half = p;
+  half.fromCentre = middle.centre, half.fromRotation = middle.rotation;
+  return half;
+}
+
+Clearance clearance(const SolidPart& partA, const Passage& a, const SolidPart& partB,
+                    const Passage& b, const FeatureCache& cache) {
+  Search search{partA, partB};
+  const Known start = search.ask(a, b, false, cache);
+  if (!(start.apart > 0)) return {0, search.queries};
+  const Known end = search.ask(a, b, true, start.cache);
+  const double fraction = clearPart(search, a, b, start, end, kMostHalvings);
+  return {fraction, search.queries};
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,47 @@
+// Whether two parts stay clear of one another while both move and turn: proved, not sampled.
+#pragma once
+
+#include "collision/narrow_phase.hpp"
+#include "scene/solid.hpp"
+
+namespace enfilade::scene {
+
+/// A solid's way within a step: its centre goes straight and it turns evenly, by the shorter way,
+/// from one rotation to the other.
+struct Passage {
+  Vec3 fromCentre = Vec3::Zero(), toCentre = Vec3::Zero();
+  collision::Quat fromRotation = collision::Quat::Identity();
+  collision::Quat toRotation = collision::Quat::Identity();
+  double radius = 0;                  ///< about the centre: no vertex is farther, metres
+  Vec3 centreInFrame = Vec3::Zero();  ///< of the parts' frame
+};
+
+/// The way of a solid that stands.
+Passage standing(const Solid& solid);
+
+/// Metres: no point goes farther on this way.
+double lengthOf(const Passage& passage);
+
+/// Where the passage is at its middle, exactly half way in both place and turn.
+struct PassagePose {
+  Vec3 centre = Vec3::Zero();
+  collision::Quat rotation = collision::Quat::Identity();
+};
+PassagePose middleOf(const Passage& passage);
+
+/// The first half, the second half.
+Passage firstHalf(const Passage& passage, const PassagePose& middle);
+Passage secondHalf(const Passage& passage, const PassagePose& middle);
+
+struct Clearance {
+  double fraction = 1;        ///< proved clear up to here: a multiple of 2^-kMostHalvings, or 0
+  std::uint32_t queries = 0;  ///< narrow-phase queries
+};
+inline constexpr int kMostHalvings = 6;
+
+/// How far both parts can go, both at the same part of their ways, with the bodies separated all
+/// the way. `cache`: of decide() at the start, where they are separated.
+Clearance clearance(const SolidPart& partA, const Passage& a, const SolidPart& partB,
+                    const Passage& b, const collision::FeatureCache& cache);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,67 @@
+// What free bodies meet and are: rigid things of convex parts, free, driven or still.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "collision/narrow_phase.hpp"
+#include "collision/triangle_tree.hpp"
+#include "scene/rigid_body.hpp"
+
+namespace enfilade::scene {
+
+/// Its vertices are in the solid's frame, and live elsewhere.
+struct SolidPart {
+  std::span<const Vec3> vertices;
+  const collision::Hull* hull = nullptr;  ///< of these vertices; null: at most three of them
+  std::vector<Vec3> faceNormals;          ///< of the hull's faces, unit, outwards
+};
+
+/// The part of a hull, which has to outlive it.
+SolidPart partOfHull(const collision::Hull& hull);
+
+struct Solid {
+  RigidBody motion;                               ///< inverse mass 0: driven, or still
+  Vec3 centreInFrame = Vec3::Zero();              ///< of mass, in the frame of the parts
+  std::vector<SolidPart> parts;                   ///< empty if there is a mesh
+  const collision::TriangleTree* mesh = nullptr;  ///< its triangles are the parts, and it is still
+  double radius = 0;                              ///< metres about the centre: no vertex is farther
+  bool asleep = false;  ///< a free body that stands until something wakes it
+  double calmFor = 0;   ///< seconds
+  /// Who pushes (an avatar) stands as a still thing, and gives what it is held back from by this
+  /// velocity up to `mostPush` newtons. 0: no push.
+  Vec3 pushVelocity = Vec3::Zero();
+  double mostPush = 0;
+
+  // Set by placeSolid() from the motion.
+  Mat3 rotation = Mat3::Identity();
+  Vec3 position = Vec3::Zero();  ///< of the frame's origin
+  double odometer = 0;           ///< metres: no point went farther
+
+  bool isFree() const { return motion.inverseMass > 0; }
+  bool isAwake() const { return isFree() && !asleep; }
+  /// m/s: no point goes faster.
+  double fastest() const {
+    return asleep ? 0 : motion.velocity.norm() + motion.spin.norm() * radius;
+  }
+};
+
+void placeSolid(Solid& solid);
+
+/// Part `part` where the solid is.
+inline collision::ConvexBody partOf(const Solid& solid, std::uint32_t part) {
+  if (solid.mesh) return {solid.mesh->triangles()[part], Vec3::Zero(), nullptr, nullptr};
+  const SolidPart& p = solid.parts[part];
+  return {p.vertices, solid.position, &solid.rotation, p.hull};
+}
+
+/// A free solid of convex parts (hulls in one frame, uniform `density` in kg / m^3).
+Solid freeSolid(std::span<const collision::Hull* const> hulls, double density,
+                const collision::Pose& worldFromFrame);
+/// The same, standing or driven: its centre is the frame's origin.
+Solid heldSolid(std::span<const collision::Hull* const> hulls,
+                const collision::Pose& worldFromFrame);
+/// Triangles of the world, still.
+Solid stillSolid(const collision::TriangleTree& mesh);
+
+}  // namespace enfilade::scene
