@@ -245,34 +245,89 @@ struct RayCaster::State {
   std::shared_ptr<const Scene> scene;
   Device device{rtcNewDevice("threads=1,set_affinity=0")};
   std::vector<Surface> meshes;  ///< one a mesh of the model, without a tree where nothing uses it
-  Placement still;
-  std::map<const collision::Hull*, Surface> hulls;  ///< of those who move now
-  Placement moving;
+  std::map<const collision::Hull*, Surface> hulls;  ///< of the avatars that are there now
+  Placement still, bodies, avatars;
+  std::shared_ptr<const std::vector<BodyView>> followed;  ///< where `bodies` has them
 
+  /// Places an object's meshes; `worldFromAuthored` moves it from where it was authored.
+  void placeObject(Placement& placement, std::uint32_t object, EntityId entity,
+                   const Eigen::Affine3d& worldFromAuthored);
   void placeStill();
+  void placeBodies(const std::vector<BodyView>& views);
+  void placeAvatars(const std::vector<AvatarView>& views);
+  const Surface& surfaceOfMesh(std::uint32_t mesh);
   const Surface& surfaceOfHull(const std::shared_ptr<const collision::Hull>& hull);
+  void commit(Placement& placement) const;
 };
 
-void RayCaster::State::placeStill() {
+void RayCaster::State::commit(Placement& placement) const {
+  rtcCommitScene(placement.embree.get());
+  throwIfFailed(device.get());
+}
+
+const Surface& RayCaster::State::surfaceOfMesh(std::uint32_t mesh) {
+  Surface& surface = meshes[mesh];
+  if (!surface.mesh) {
+    surface.mesh = &scene->model().meshes[mesh];
+    surface.embree = sceneOf(device.get(), surface.mesh->positions, surface.mesh->indices);
+  }
+  return surface;
+}
+
+void RayCaster::State::placeObject(Placement& placement, std::uint32_t object, EntityId entity,
+                                   const Eigen::Affine3d& worldFromAuthored) {
   const Model& model = scene->model();
-  meshes.resize(model.meshes.size());
+  for (const std::uint32_t m : model.objects[object].meshes) {
+    const Mesh& mesh = model.meshes[m];
+    if (mesh.indices.size() < 3) continue;
+    const bool glass = model.materials.size() > mesh.material &&
+                       model.materials[mesh.material].alpha == Material::Alpha::blend;
+    place(device.get(), placement,
+          {entity, &surfaceOfMesh(m), worldFromAuthored * model.objects[object].worldFromMesh},
+          glass ? kGlassBit : kSolidBit);
+  }
+}
+
+void RayCaster::State::placeStill() {
+  meshes.resize(scene->model().meshes.size());
   still.embree = newScene(device.get());
-  for (const std::uint32_t object : scene->solidObjects()) {
-    for (const std::uint32_t m : model.objects[object].meshes) {
-      const Mesh& mesh = model.meshes[m];
-      if (mesh.indices.size() < 3) continue;
-      if (!meshes[m].mesh) {
-        meshes[m].mesh = &mesh;
-        meshes[m].embree = sceneOf(device.get(), mesh.positions, mesh.indices);
-      }
-      const bool glass = model.materials.size() > mesh.material &&
-                         model.materials[mesh.material].alpha == Material::Alpha::blend;
-      place(device.get(), still, {object + 1, &meshes[m], model.objects[object].worldFromMesh},
-            glass ? kGlassBit : kSolidBit);
+  for (const std::uint32_t object : scene->solidObjects())
+    placeObject(still, object, object + 1, Eigen::Affine3d::Identity());
+  commit(still);
+}
+
+void RayCaster::State::placeBodies(const std::vector<BodyView>& views) {
+  bodies = {};
+  bodies.embree = newScene(device.get());
+  for (const BodyView& view : views) {
+    const BodySpec& spec = scene->model().bodies[view.index];
+    if (spec.kind == BodyKind::trigger) continue;
+    Eigen::Affine3d worldFromAuthored = Eigen::Affine3d::Identity();
+    if (view.displaced) {
+      worldFromAuthored.translate(view.pose.translation)
+          .rotate(view.pose.rotation)
+          .translate(-scene->shapeOfBody(view.index)->origin);
+    }
+    for (const std::uint32_t object : spec.objects)
+      placeObject(bodies, object, view.id, worldFromAuthored);
+  }
+  commit(bodies);
+}
+
+void RayCaster::State::placeAvatars(const std::vector<AvatarView>& views) {
+  avatars = {};
+  avatars.embree = newScene(device.get());
+  std::erase_if(hulls, [](const auto& entry) { return entry.second.hull.use_count() == 1; });
+  for (const AvatarView& avatar : views) {
+    for (const AvatarPart& part : avatar.shape->parts) {
+      const Surface& surface = surfaceOfHull(part.hull);
+      if (surface.hullTriangles.empty()) continue;
+      Eigen::Affine3d worldFromHull = Eigen::Affine3d(Eigen::Translation3d(avatar.feet));
+      worldFromHull.translate(part.offset).rotate(part.rotation);
+      place(device.get(), avatars, {avatar.id, &surface, worldFromHull}, kSolidBit);
     }
   }
-  rtcCommitScene(still.embree.get());
-  throwIfFailed(device.get());
+  commit(avatars);
 }
 
 const Surface& RayCaster::State::surfaceOfHull(const std::shared_ptr<const collision::Hull>& hull) {
@@ -294,34 +349,28 @@ RayCaster::RayCaster(RayCaster&&) noexcept = default;
 RayCaster& RayCaster::operator=(RayCaster&&) noexcept = default;
 
 void RayCaster::follow(const Snapshot& snapshot) {
-  State& s = *state_;
-  s.moving = {};
-  s.moving.embree = newScene(s.device.get());
-  std::erase_if(s.hulls, [](const auto& entry) { return entry.second.hull.use_count() == 1; });
-  for (const AvatarView& avatar : snapshot.avatars) {
-    for (const AvatarPart& part : avatar.shape->parts) {
-      const Surface& surface = s.surfaceOfHull(part.hull);
-      if (surface.hullTriangles.empty()) continue;
-      Eigen::Affine3d worldFromHull = Eigen::Affine3d(Eigen::Translation3d(avatar.feet));
-      worldFromHull.translate(part.offset).rotate(part.rotation);
-      place(s.device.get(), s.moving, {avatar.id, &surface, worldFromHull}, kSolidBit);
-    }
+  if (snapshot.bodies != state_->followed) {
+    state_->followed.reset();  // until they are all placed
+    state_->placeBodies(*snapshot.bodies);
+    state_->followed = snapshot.bodies;
   }
-  rtcCommitScene(s.moving.embree.get());
-  throwIfFailed(s.device.get());
+  state_->placeAvatars(snapshot.avatars);
 }
 
 std::optional<RayHit> RayCaster::firstHit(const Ray& ray, const RayFilter& filter) const {
   const Vec3 unit = ray.direction.normalized();
-  auto hit = firstOf(state_->still, ray, unit, ray.reach, filter);
-  const double reach = hit ? hit->distance : ray.reach;
-  if (auto nearer = firstOf(state_->moving, ray, unit, reach, filter)) hit = nearer;
-  return hit;
+  std::optional<RayHit> nearest;
+  for (const Placement* placement : {&state_->still, &state_->bodies, &state_->avatars}) {
+    const double reach = nearest ? nearest->distance : ray.reach;
+    if (const auto hit = firstOf(*placement, ray, unit, reach, filter)) nearest = hit;
+  }
+  return nearest;
 }
 
 bool RayCaster::isBlocked(const Ray& ray, const RayFilter& filter) const {
   const Vec3 unit = ray.direction.normalized();
-  return anyOf(state_->moving, ray, unit, filter) || anyOf(state_->still, ray, unit, filter);
+  return anyOf(state_->avatars, ray, unit, filter) || anyOf(state_->bodies, ray, unit, filter) ||
+         anyOf(state_->still, ray, unit, filter);
 }
 
 // ---- scans --------------------------------------------------------------------------------------

@@ -65,7 +65,8 @@ class RayCaster {
   RayCaster(RayCaster&&) noexcept;
   RayCaster& operator=(RayCaster&&) noexcept;
 
-  /// Takes avatars where `snapshot` has them.
+  /// Takes avatars and bodies where `snapshot` has them: bodies as they are drawn, under the id of
+  /// their first object; triggers are not there. Before the first call there are none.
   void follow(const Snapshot& snapshot);
 
   /// What a ray that refusal() lets pass meets first.

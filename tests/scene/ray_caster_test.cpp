@@ -6,7 +6,7 @@
 #include <random>
 
 #include "scene/avatar_shape.hpp"
-#include "tests/scene/box_scene.hpp"
+#include "tests/scene/body_trial.hpp"
 
 namespace enfilade::scene::testing {
 namespace {
@@ -82,6 +82,33 @@ TEST(RayCaster, MeetsAvatarsWhereTheyAreNow) {
   EXPECT_FALSE(caster.firstHit(ray));
   caster.follow({});
   EXPECT_FALSE(caster.firstHit({{-5, 1, 4}, Vec3::UnitX()}));
+}
+
+TEST(RayCaster, MeetsADoorWhereItHasTurnedTo) {
+  Model model = boxModel({floorBox(), {"door", {2, 0, 0}, {2.0625, 2, 1}}});
+  model.bodies.push_back(bodySpec("door", BodyKind::hinged, {1}));
+  model.bodies[0].anchor = {2, 0, 0};
+  model.bodies[0].high = 2;
+  RayCaster caster(std::make_shared<const Scene>(std::move(model)));
+  const Ray atTheLeaf{{0, 1, 0.5}, Vec3::UnitX(), 5};
+  EXPECT_FALSE(caster.firstHit(atTheLeaf)) << "not placed before it is followed";
+  Snapshot snapshot;
+  BodyView door;
+  door.id = 2;
+  snapshot.bodies = std::make_shared<const std::vector<BodyView>>(1, door);
+  caster.follow(snapshot);
+  ASSERT_TRUE(caster.firstHit(atTheLeaf));
+  EXPECT_EQ(caster.firstHit(atTheLeaf)->entity, 2u);
+  EXPECT_DOUBLE_EQ(caster.firstHit(atTheLeaf)->distance, 2);
+  door.displaced = true;  // by a right angle: it lies along +X from its hinge
+  door.pose = {collision::Quat(std::sqrt(0.5), 0, std::sqrt(0.5), 0), {2, 0, 0}};
+  snapshot.bodies = std::make_shared<const std::vector<BodyView>>(1, door);
+  caster.follow(snapshot);
+  EXPECT_FALSE(caster.isBlocked(atTheLeaf));
+  const auto hit = caster.firstHit({{2.5, 1, -3}, Vec3::UnitZ()});
+  ASSERT_TRUE(hit);
+  EXPECT_EQ(hit->entity, 2u);
+  EXPECT_NEAR(hit->distance, 2.9375, 1e-12);
 }
 
 /// Möller and Trumbore's test with every triangle, in doubles.
