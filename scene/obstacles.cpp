@@ -70,19 +70,26 @@ double partInside(const Box& room, const Vec3& feet, const Vec3& displacement) {
   return part;
 }
 
-void gatherTriangles(const Scene& scene, std::uint32_t object, const Box& reach,
-                     std::vector<Obstacle>& obstacles) {
-  const collision::TriangleTree& tree = scene.triangles(object);
+void gatherStill(const Scene& scene, std::uint32_t object, const Box& reach,
+                 std::vector<Obstacle>& obstacles) {
+  const ObjectParts& parts = scene.parts(object);
   thread_local std::vector<std::uint32_t> found;
   found.clear();
-  tree.query(reach, found);
-  for (const std::uint32_t i : found) {
-    const collision::Triangle& t = tree.triangles()[i];
+  parts.query(reach, found);
+  const auto hulls = static_cast<std::uint32_t>(parts.hulls.size());
+  for (const std::uint32_t part : found) {
     Obstacle obstacle;
     obstacle.entity = object + 1;
-    obstacle.part = i;
-    obstacle.box = {t[0].cwiseMin(t[1]).cwiseMin(t[2]), t[0].cwiseMax(t[1]).cwiseMax(t[2])};
-    obstacle.body = {std::span<const Vec3>(t), Vec3::Zero()};
+    obstacle.part = part;
+    if (part < hulls) {
+      const collision::Hull& hull = parts.hulls[part];
+      obstacle.box = parts.hullBoxes[part];
+      obstacle.body = {hull.vertices, Vec3::Zero(), nullptr, &hull};
+    } else {
+      const collision::Triangle& t = parts.triangles.triangles()[part - hulls];
+      obstacle.box = collision::boxOf(t);
+      obstacle.body = {std::span<const Vec3>(t), Vec3::Zero()};
+    }
     obstacles.push_back(obstacle);
   }
 }
@@ -164,8 +171,8 @@ void gatherObstacles(WorldState& world, Avatar& avatar) {
   avatar.gathered = grown(avatar.reach, kGatherMargin);
   for (const auto& partner : world.broadPhase.partners(avatar.mover)) {
     if (!partner.moves) {
-      gatherTriangles(*world.scene, world.scene->solidObjects()[partner.id], avatar.gathered,
-                      avatar.obstacles);
+      gatherStill(*world.scene, world.scene->solidObjects()[partner.id], avatar.gathered,
+                  avatar.obstacles);
     } else if (const auto body = world.bodyOfMover.find(partner.id);
                body != world.bodyOfMover.end()) {
       listParts(world, body->second, avatar.obstacles);

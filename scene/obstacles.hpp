@@ -1,5 +1,5 @@
-// What one mover could meet in one tick: triangles of still objects, parts of bodies, hulls of
-// other avatars.
+// What one mover could meet in one tick: hulls and triangles of still objects, parts of bodies,
+// hulls of other avatars.
 #pragma once
 
 #include <span>
@@ -21,7 +21,7 @@ inline constexpr std::uint32_t kNoBody = 0xFFFF'FFFFu;
 /// A convex piece of an entity, and last tick's separating axis towards it.
 struct Obstacle {
   EntityId entity = 0;
-  std::uint32_t part = 0;          ///< triangle of a still object; part of a body or an avatar
+  std::uint32_t part = 0;          ///< of a still object (see ObjectParts), a body or an avatar
   std::uint32_t ofBody = kNoBody;  ///< index into WorldState::bodies
   Box box;                         ///< world, metres
   collision::ConvexBody body;
@@ -73,8 +73,8 @@ Box feetRoomIn(const Box& reach, const Box& shapeBox, double clearance);
 /// The part of a displacement, 0..1, that keeps the feet in their room.
 double partInside(const Box& room, const Vec3& feet, const Vec3& displacement);
 
-/// Appends the triangles of still object `object` that `reach` may meet.
-void gatherTriangles(const Scene& scene, std::uint32_t object, const Box& reach,
-                     std::vector<Obstacle>& obstacles);
+/// Appends the parts of still object `object` that `reach` may meet.
+void gatherStill(const Scene& scene, std::uint32_t object, const Box& reach,
+                 std::vector<Obstacle>& obstacles);
 
 }  // namespace enfilade::scene

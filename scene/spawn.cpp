@@ -14,7 +14,7 @@ constexpr double kFloorMargin = 1.0;  // metres below the scene's lowest point t
 
 void gatherAll(const WorldState& world, const Box& box, std::vector<Obstacle>& obstacles) {
   for (const collision::StillId still : world.broadPhase.stillOverlapping(box))
-    gatherTriangles(*world.scene, world.scene->solidObjects()[still], box, obstacles);
+    gatherStill(*world.scene, world.scene->solidObjects()[still], box, obstacles);
   for (std::uint32_t i = 0; i < world.bodies.size(); ++i) gatherParts(world, i, box, obstacles);
   for (const auto& [name, other] : world.avatars) {
     for (std::uint32_t part = 0; part < other.shape->parts.size(); ++part) {
@@ -28,56 +28,25 @@ void gatherAll(const WorldState& world, const Box& box, std::vector<Obstacle>& o
   }
 }
 
-using Edge = std::array<double, 6>;
-
-Edge edgeOf(const Vec3& from, const Vec3& to) {
-  return {from.x(), from.y(), from.z(), to.x(), to.y(), to.z()};
-}
-
-/// Closed and consistently wound: every directed edge has its opposite, as often.
-bool isClosed(const std::vector<collision::Triangle>& triangles) {
-  std::vector<Edge> forth, back;
-  for (const collision::Triangle& t : triangles) {
-    for (int i = 0; i < 3; ++i) {
-      forth.push_back(edgeOf(t[i], t[(i + 1) % 3]));
-      back.push_back(edgeOf(t[(i + 1) % 3], t[i]));
-    }
+bool isInsideHull(const ObjectParts& parts, const Vec3& point) {
+  const std::array<Vec3, 1> vertex{point};
+  for (std::size_t i = 0; i < parts.hulls.size(); ++i) {
+    if (!overlaps(parts.hullBoxes[i], {point, point})) continue;
+    const collision::Hull& hull = parts.hulls[i];
+    collision::FeatureCache cache;
+    const auto decision = collision::decide({vertex, Vec3::Zero(), nullptr, nullptr},
+                                            {hull.vertices, Vec3::Zero(), nullptr, &hull}, cache);
+    if (decision.verdict != collision::Verdict::separated) return true;
   }
-  std::sort(forth.begin(), forth.end());
-  std::sort(back.begin(), back.end());
-  return forth == back;
+  return false;
 }
 
-/// How often the surface goes around `point`, by the signed crossings of a ray: 1 inside a solid
-/// whose faces look outwards. An edge seen from both its triangles gives exactly opposite areas, so
-/// that a ray slips between two triangles only if it meets their edge to the last bit.
-int windingNumber(const std::vector<collision::Triangle>& triangles, const Vec3& point) {
-  const Vec3 ray{0.8017, 0.5345, 0.2673};  // no axis of any building
-  int winding = 0;
-  for (const collision::Triangle& t : triangles) {
-    const std::array<Vec3, 3> p{t[0] - point, t[1] - point, t[2] - point};
-    std::array<double, 3> area;
-    for (int i = 0; i < 3; ++i) area[i] = ray.dot(p[i].cross(p[(i + 1) % 3]));
-    const bool leaves = area[0] > 0 && area[1] > 0 && area[2] > 0;
-    const bool enters = area[0] < 0 && area[1] < 0 && area[2] < 0;
-    if (!leaves && !enters) continue;
-    const Vec3 normal = (p[1] - p[0]).cross(p[2] - p[0]);
-    const bool ahead = (normal.dot(p[0]) > 0) == (normal.dot(ray) > 0);
-    if (ahead) winding += leaves ? 1 : -1;
-  }
-  return winding;
-}
-
-/// The solid object that holds `point`, or 0. Open shells and inside-out ones hold nothing.
+/// The object whose solid holds `point`, or 0.
 EntityId solidAround(const WorldState& world, const Vec3& point) {
   for (const collision::StillId still : world.broadPhase.stillOverlapping({point, point})) {
     const std::uint32_t object = world.scene->solidObjects()[still];
-    const auto& triangles = world.scene->triangles(object).triangles();
-    if (!isClosed(triangles)) continue;
-    const bool mirrored =
-        world.scene->model().objects[object].worldFromMesh.linear().determinant() < 0;
-    const int winding = windingNumber(triangles, point);
-    if ((mirrored ? -winding : winding) > 0) return object + 1;
+    const ObjectParts& parts = world.scene->parts(object);
+    if (isInsideHull(parts, point) || surrounds(parts, point)) return object + 1;
   }
   return 0;
 }
@@ -129,6 +98,8 @@ std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& ord
              text(world.scene->bounds().min) + " to " + text(world.scene->bounds().max);
     return std::nullopt;
   }
+  if (const EntityId solid = solidAround(world, order.at + avatar.shape->box.centre()))
+    return "at " + text(order.at) + " it would stand inside " + pathOf(world, solid);
   return "at " + text(order.at) + " it would stand in " + pathOf(world, inTheWay) +
          "; move it at least " + std::to_string(epsilon) + " m clear";
 }

@@ -211,7 +211,7 @@ TEST(ImportHandMade, DegenerateTrianglesAreKeptForTheEyeAndSkippedForTouch) {
   const Model model = importModel(folder.write("flat.gltf", gltf(mesh, "0", kOneNode)));
   EXPECT_EQ(countOf(model, "degenerate_triangle"), 1u);
   const Scene scene{Model(model)};
-  EXPECT_EQ(scene.triangles(0).triangles().size(), 12u);
+  EXPECT_EQ(scene.shape(0).triangles.size(), 12u);
   expectBounds(scene, {0, 0, 0}, {1, 1, 1});
 }
 

@@ -56,7 +56,10 @@ TEST(Scene, BoxesAreExactlyTheExtremesOfTheTrianglesWithArea) {
     }
     EXPECT_EQ(scene.stillBoxes()[i].min, box.min);
     EXPECT_EQ(scene.stillBoxes()[i].max, box.max);
-    EXPECT_EQ(scene.triangles(scene.solidObjects()[i]).triangles().size(), solid);
+    const Shape& shape = scene.shape(scene.solidObjects()[i]);
+    EXPECT_EQ(shape.triangles.size() + shape.duplicate, solid);
+    EXPECT_EQ(shape.degenerate, mesh.indices.size() / 3 - solid);
+    EXPECT_EQ(scene.parts(scene.solidObjects()[i]).size(), shape.triangles.size());
   }
   EXPECT_GT(skipped, 50u);
 }
@@ -66,7 +69,7 @@ TEST(Scene, ObjectsWithoutAreaCannotBeTouched) {
   model.meshes[1].indices = {0, 0, 1, 2, 2, 2};
   const Scene scene(std::move(model));
   EXPECT_EQ(scene.solidObjects(), (std::vector<std::uint32_t>{0, 2}));
-  EXPECT_TRUE(scene.triangles(1).triangles().empty());
+  EXPECT_EQ(scene.parts(1).size(), 0u);
 }
 
 TEST(Scene, AnEmptyModelIsAnEmptyScene) {
@@ -92,18 +95,43 @@ TEST(Scene, HashFollowsPositionsPathsAndPlacesOnly) {
   EXPECT_NE(Scene(bent).hash(), hash);
 }
 
-TEST(Scene, TreesAreBuiltOnceWhoeverAsks) {
+TEST(Scene, PartsAreOneListWhoeverAsks) {
   const Scene scene(randomModel(10, 50));
-  std::vector<std::vector<const collision::TriangleTree*>> seen(4);
+  std::vector<std::vector<const ObjectParts*>> seen(4);
   std::vector<std::thread> threads;
   for (auto& list : seen) {
     threads.emplace_back([&scene, &list] {
-      for (std::uint32_t i = 0; i < 50; ++i) list.push_back(&scene.triangles(i));
+      for (std::uint32_t i = 0; i < 50; ++i) list.push_back(&scene.parts(i));
     });
   }
   for (std::thread& thread : threads) thread.join();
   for (const auto& list : seen) EXPECT_EQ(list, seen[0]);
-  EXPECT_THROW(scene.triangles(50), std::out_of_range);
+  EXPECT_THROW(scene.parts(50), std::out_of_range);
+  EXPECT_THROW(scene.shape(50), std::out_of_range);
+}
+
+TEST(Scene, NothingIsCopiedForCollisionBeforePartsAreAskedFor) {
+  Model model = randomModel(12, 3);
+  std::size_t unique = 0;
+  for (const Mesh& mesh : model.meshes)
+    unique += mesh.positions.size() * sizeof(mesh.positions[0]) + mesh.indices.size() * 4;
+  const Object first = model.objects[0];
+  for (int copy = 0; copy < 400; ++copy) model.objects.push_back(first);
+  const Scene scene(std::move(model));
+  EXPECT_EQ(scene.memory().geometry, 0u);
+  EXPECT_EQ(scene.memory().parts, 0u);
+  EXPECT_LT(scene.memory().perObject, 403 * 80);
+  // Copies of a mesh share one shape, and all shapes together take no more than twice the meshes.
+  for (std::uint32_t object = 3; object < 403; ++object) {
+    ASSERT_EQ(&scene.shape(object), &scene.shape(0));
+  }
+  scene.shape(1);
+  scene.shape(2);
+  EXPECT_EQ(scene.shapeCount(), 3u);
+  EXPECT_GT(scene.memory().geometry, 0u);
+  EXPECT_LE(scene.memory().geometry, 2 * unique + 3 * (sizeof(Shape) + 20 * sizeof(Surface)));
+  scene.parts(0);
+  EXPECT_GT(scene.memory().parts, 0u);
 }
 
 TEST(Scene, IndicesThatPointNowhereAreRefused) {

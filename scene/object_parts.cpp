@@ -1,0 +1,153 @@
+#include "scene/object_parts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace enfilade::scene {
+namespace {
+
+constexpr std::uint32_t kLeafSize = 4;  // hulls: as triangles, see triangle_tree.cpp
+
+Vec3 at(const Shape& shape, std::uint32_t vertex, const Eigen::Affine3d& placed) {
+  return placed * shape.vertices[vertex].cast<double>();  // as worldPosition()
+}
+
+collision::Triangle triangleAt(const Shape& shape, std::size_t t, const Eigen::Affine3d& placed) {
+  const auto& corners = shape.triangles[t];
+  return {at(shape, corners[0], placed), at(shape, corners[1], placed),
+          at(shape, corners[2], placed)};
+}
+
+/// 3 V / A of what the surface encloses, metres.
+double thickness(const Shape& shape, const Surface& surface, const Eigen::Affine3d& placed) {
+  const Vec3 origin = at(shape, shape.triangles[surface.first][0], placed);
+  double sixfoldVolume = 0, doubleArea = 0;
+  for (std::size_t t = surface.first; t < surface.first + surface.count; ++t) {
+    const auto [a, b, c] = triangleAt(shape, t, placed);
+    const Vec3 normal = (b - a).cross(c - a);
+    sixfoldVolume += (a - origin).dot(normal);
+    doubleArea += normal.norm();
+  }
+  return doubleArea > 0 ? std::abs(sixfoldVolume) / doubleArea : 0;
+}
+
+/// The box of an outward surface of the shape holds that of `surface`: it is a cavity of a solid.
+bool isCavity(const Shape& shape, const Surface& surface) {
+  return surface.inward && std::any_of(shape.surfaces.begin(), shape.surfaces.end(),
+                                       [](const Surface& other) { return other.hollow; });
+}
+
+collision::Hull hullOf(const Shape& shape, const Surface& surface, const Eigen::Affine3d& placed) {
+  std::vector<Vec3> points;
+  points.reserve(3 * std::size_t{surface.count});
+  for (std::size_t t = surface.first; t < surface.first + surface.count; ++t) {
+    for (const Vec3& corner : triangleAt(shape, t, placed)) points.push_back(corner);
+  }
+  return collision::buildHull(points);
+}
+
+void addHull(collision::Hull hull, ObjectParts& parts) {
+  Box box;
+  for (const Vec3& v : hull.vertices) box.include(v);
+  parts.hullBoxes.push_back(box);
+  parts.hulls.push_back(std::move(hull));
+}
+
+/// How often one surface goes around `point`, by the signed crossings of a ray: 1 inside a solid
+/// whose faces look outwards. An edge seen from both its triangles gives exactly opposite areas, so
+/// that a ray slips between two triangles only if it meets their edge to the last bit.
+int crossing(const collision::Triangle& t, const Vec3& point) {
+  const Vec3 ray{0.8017, 0.5345, 0.2673};  // no axis of any building
+  const std::array<Vec3, 3> p{t[0] - point, t[1] - point, t[2] - point};
+  std::array<double, 3> area;
+  for (std::size_t i = 0; i < 3; ++i) area[i] = ray.dot(p[i].cross(p[(i + 1) % 3]));
+  const bool leaves = area[0] > 0 && area[1] > 0 && area[2] > 0;
+  const bool enters = area[0] < 0 && area[1] < 0 && area[2] < 0;
+  if (!leaves && !enters) return 0;
+  const Vec3 normal = (p[1] - p[0]).cross(p[2] - p[0]);
+  const bool ahead = (normal.dot(p[0]) > 0) == (normal.dot(ray) > 0);
+  return ahead ? (leaves ? 1 : -1) : 0;
+}
+
+}  // namespace
+
+bool hasArea(const collision::Triangle& t) {
+  // Equal corners are asked for by themselves: their cross product is zero only up to overflow.
+  if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return false;
+  return !(t[1] - t[0]).cross(t[2] - t[0]).isZero(0.0);
+}
+
+bool becomesHull(const Shape& shape, const Surface& surface, const Eigen::Affine3d& placed) {
+  if (!surface.isConvex() || surface.hollow) return false;
+  if (!surface.inward) return true;
+  return !isCavity(shape, surface) && thickness(shape, surface, placed) < kRoomRadius;
+}
+
+ObjectParts partsOf(const Shape& shape, const Eigen::Affine3d& placed) {
+  ObjectParts parts;
+  std::vector<collision::Triangle> triangles;
+  std::vector<signed char> sides;
+  const signed char outside = placed.linear().determinant() < 0 ? -1 : 1;
+  for (const Surface& surface : shape.surfaces) {
+    if (becomesHull(shape, surface, placed)) {
+      addHull(hullOf(shape, surface, placed), parts);
+      continue;
+    }
+    for (std::size_t t = surface.first; t < surface.first + surface.count; ++t) {
+      const collision::Triangle triangle = triangleAt(shape, t, placed);
+      if (!hasArea(triangle)) continue;
+      triangles.push_back(triangle);
+      sides.push_back(surface.bounds() ? outside : static_cast<signed char>(0));
+    }
+  }
+  if (!parts.hulls.empty()) parts.hullTree = collision::buildBoxTree(parts.hullBoxes, kLeafSize);
+  if (triangles.empty()) return parts;
+  parts.triangles = collision::TriangleTree(triangles);
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+    parts.sides.push_back(sides[parts.triangles.given(i)]);
+  }
+  return parts;
+}
+
+void ObjectParts::query(const Box& box, std::vector<std::uint32_t>& parts) const {
+  const auto begin = static_cast<std::ptrdiff_t>(parts.size());
+  collision::forEachLeafMeeting(hullTree, collision::narrowed(box, hullTree.origin),
+                                [&](std::uint32_t first, std::uint32_t count) {
+                                  for (std::uint32_t i = first; i < first + count; ++i) {
+                                    const std::uint32_t hull = hullTree.order[i];
+                                    if (overlaps(hullBoxes[hull], box)) parts.push_back(hull);
+                                  }
+                                });
+  std::sort(parts.begin() + begin, parts.end());
+  const std::size_t hullsFound = parts.size();
+  triangles.query(box, parts);
+  for (std::size_t i = hullsFound; i < parts.size(); ++i) {
+    parts[i] += static_cast<std::uint32_t>(hulls.size());
+  }
+}
+
+std::size_t ObjectParts::bytes() const {
+  std::size_t sum = sizeof *this + sides.capacity() + hullBoxes.capacity() * sizeof(Box) +
+                    triangles.triangles().capacity() * sizeof(collision::Triangle);
+  for (const collision::BoxTree* tree : {&hullTree, &triangles.boxes()}) {
+    sum += tree->nodes.capacity() * sizeof(collision::BoxTree::Node) +
+           tree->order.capacity() * sizeof(std::uint32_t);
+  }
+  for (const collision::Hull& hull : hulls) {
+    sum += sizeof hull + hull.vertices.capacity() * sizeof(Vec3);
+    sum += (hull.neighbourStart.capacity() + hull.neighbours.capacity()) * sizeof(std::uint32_t);
+    for (const auto& face : hull.faces) sum += sizeof face + face.capacity() * sizeof(face[0]);
+  }
+  return sum;
+}
+
+bool surrounds(const ObjectParts& parts, const Vec3& point) {
+  int winding = 0;
+  const auto& triangles = parts.triangles.triangles();
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    if (parts.sides[i] != 0) winding += parts.sides[i] * crossing(triangles[i], point);
+  }
+  return winding > 0;
+}
+
+}  // namespace enfilade::scene
