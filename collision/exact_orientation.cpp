@@ -2,7 +2,8 @@
 // Robust Geometric Predicates" (1997): a determinant of differences is off by at most a small
 // multiple of its permanent. His bounds hold while nothing under- or overflows; the filters below
 // therefore trust only determinants of differences below kLargeDifference that exceed kUnderflow
-// besides. What they cannot decide is decided with the coordinates scaled to common integers.
+// besides. What they cannot decide is decided with the coordinates scaled to common integers: of
+// 128 bits where that suffices, as for most coordinates that were floats, else of any length.
 
 #include "collision/exact_orientation.hpp"
 
@@ -11,7 +12,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <optional>
 
 namespace enfilade::collision {
 namespace {
@@ -23,6 +26,41 @@ constexpr double kBound2 = (3.0 + 16.0 * kEpsilon) * kEpsilon;  // Shewchuk's cc
 // factor that stays below 1e-230.
 constexpr double kLargeDifference = 1e90;
 constexpr double kUnderflow = 1e-220;
+
+/// The sign of u . (v x w) when the nine numbers are multiples of one power of two by less than
+/// 2^40, so that 128 bits hold all sums of triple products; nullopt when they are not.
+std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w, double largest) {
+  __extension__ typedef __int128 Wide;
+  int exponent = 0;
+  std::frexp(largest, &exponent);  // largest < 2^exponent
+  if (exponent < -900 || exponent > 900) return std::nullopt;
+  const double scale = std::ldexp(1.0, 40 - exponent);
+  std::array<std::array<std::int64_t, 3>, 3> n{};
+  const std::array<const Vec3*, 3> rows{&u, &v, &w};
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double scaled = (*rows[row])[static_cast<Eigen::Index>(k)] * scale;
+      n[row][k] = static_cast<std::int64_t>(scaled);
+      if (static_cast<double>(n[row][k]) != scaled) return std::nullopt;
+    }
+  }
+  Wide sum = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t i = (k + 1) % 3, j = (k + 2) % 3;
+    sum += n[0][k] * (Wide{n[1][i]} * n[2][j] - Wide{n[1][j]} * n[2][i]);
+  }
+  return sum > 0 ? 1 : sum < 0 ? -1 : 0;
+}
+
+/// Whether `difference`, b - a as it was computed, is b - a: added to a (D. E. Knuth's two-sum) it
+/// gives b and loses nothing.
+bool isExact(const Vec3& difference, const Vec3& a, const Vec3& b) {
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    const double d = difference[k], sum = d + a[k], rest = sum - d;
+    if (sum != b[k] || (d - (sum - rest)) + (a[k] - rest) != 0) return false;
+  }
+  return true;
+}
 
 /// Doubles as integers of one common scale, which is a power of two.
 template <std::size_t N>
@@ -79,6 +117,9 @@ int orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
     const double bound = kBound3 * permanent + kUnderflow;
     if (determinant > bound) return 1;
     if (determinant < -bound) return -1;
+    if (isExact(u, a, b) && isExact(v, a, c) && isExact(w, a, d)) {
+      if (const auto sign = signInFixedPoint(w, u, v, largest)) return *sign;
+    }
   }
   return exactOrientation(a, b, c, d);
 }

@@ -235,12 +235,12 @@ ConvexityVerdict judgeConvexity(std::span<const Eigen::Vector3f> vertices,
   if (!hull.isSolid()) return verdict;
   const int sense = exactSense(body, hull);
   if (sense != 0) {
-    verdict.kind = Surface::Kind::convex;
+    verdict.kind = Shell::Kind::convex;
     verdict.inward = sense < 0;
   } else if (isRounded(body, hull, sixfold)) {
-    verdict.kind = Surface::Kind::rounded;
+    verdict.kind = Shell::Kind::rounded;
   }
-  verdict.untried = verdict.kind == Surface::Kind::closed && hull.gaveUp();
+  verdict.untried = verdict.kind == Shell::Kind::closed && hull.gaveUp();
   return verdict;
 }
 

@@ -29,12 +29,12 @@
 namespace enfilade::scene {
 
 struct ConvexityVerdict {
-  Surface::Kind kind = Surface::Kind::closed;  ///< closed, convex or rounded
-  bool inward = false;                         ///< the triangles look into the solid
+  Shell::Kind kind = Shell::Kind::closed;  ///< closed, convex or rounded
+  bool inward = false;                     ///< the triangles look into the solid
   bool untried = false;  ///< the tests would take too many steps; it is told as closed
 };
 
-/// `triangles` are those of one closed surface, wound alike, corners into `vertices`.
+/// `triangles` are those of one closed shell, wound alike, corners into `vertices`.
 ConvexityVerdict judgeConvexity(std::span<const Eigen::Vector3f> vertices,
                                 std::span<const std::array<std::uint32_t, 3>> triangles);
 

@@ -8,6 +8,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <assimp/DefaultIOSystem.h>
 #include <assimp/Importer.hpp>
 #include <assimp/ProgressHandler.hpp>
 #include <cerrno>
@@ -142,8 +143,28 @@ void misbehaveIfAsked() {
   }
 }
 
-const aiScene& parse(Assimp::Importer& importer, const Request& request) {
-  importer.SetProgressHandler(new ForwardProgress);  // the importer deletes it
+/// Takes down which files assimp opens and looks for.
+class WatchedFiles : public Assimp::DefaultIOSystem {
+ public:
+  explicit WatchedFiles(std::vector<std::string>& names) : names_(names) {}
+
+  bool Exists(const char* file) const override {
+    names_.emplace_back(file);
+    return DefaultIOSystem::Exists(file);
+  }
+  Assimp::IOStream* Open(const char* file, const char* mode) override {
+    names_.emplace_back(file);
+    return DefaultIOSystem::Open(file, mode);
+  }
+
+ private:
+  std::vector<std::string>& names_;
+};
+
+const aiScene& parse(Assimp::Importer& importer, const Request& request,
+                     std::vector<std::string>& files) {
+  importer.SetIOHandler(new WatchedFiles(files));  // the importer deletes it, and what follows
+  importer.SetProgressHandler(new ForwardProgress);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, false);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, true);
   const aiScene* scene =
@@ -170,8 +191,10 @@ int answer(const Request& request) {
 
   sendProgress("parse", 0);
   auto* importer = new Assimp::Importer;  // left to _exit: tearing a large scene down takes time
-  const aiScene& scene = parse(*importer, request);
-  const Model model = convertScene(scene, input, sendProgress);
+  std::vector<std::string> files;
+  const aiScene& scene = parse(*importer, request, files);
+  Model model = convertScene(scene, input, sendProgress);
+  model.filesBeside.insert(model.filesBeside.end(), files.begin(), files.end());
   sendProgress("send", 0);
   const std::vector<std::byte> stream = serialiseModel(model);
   sendFrame(ImportFrame::model, stream.data(), stream.size());

@@ -57,14 +57,17 @@ std::string percentDecoded(const std::string& text) {
   return result;
 }
 
-/// As the file says it, then with %20 and the like read, then beside the model.
-std::optional<fs::path> findImage(const fs::path& model, std::string name) {
+/// As the file says it, then with %20 and the like read, then beside the model. `looked` takes down
+/// where it was looked for.
+std::optional<fs::path> findImage(const fs::path& model, std::string name,
+                                  std::vector<std::string>& looked) {
   std::replace(name.begin(), name.end(), '\\', '/');
   if (name.starts_with("file://")) name.erase(0, 7);
   const fs::path folder = model.parent_path();
   const fs::path decoded = percentDecoded(name);
   for (const fs::path& candidate : {folder / name, folder / decoded, folder / decoded.filename()}) {
     std::error_code error;
+    looked.push_back(candidate.string());
     if (fs::is_regular_file(candidate, error)) return candidate;
   }
   return std::nullopt;
@@ -118,7 +121,7 @@ class Textures {
                                             embedded->mWidth)),
                     name);
     }
-    const std::optional<fs::path> file = findImage(input_.file, name);
+    const std::optional<fs::path> file = findImage(input_.file, name, model_.filesBeside);
     const auto bytes = file ? readImageFile(*file) : std::nullopt;
     if (!bytes) {
       problems_.add("missing_texture", name);

@@ -87,6 +87,9 @@ struct Model {
   /// origin; zero unless the scene lies far from it. file = scene + offset.
   Vec3 offset = Vec3::Zero();
   std::vector<Problem> problems;
+  /// Files beside `source` that were read or looked for, some of them twice or in vain: what they
+  /// hold shaped the model as well.
+  std::vector<std::string> filesBeside;
 };
 
 /// The world position of a vertex, always by this one expression, so that all who ask agree to the

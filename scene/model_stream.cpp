@@ -266,6 +266,7 @@ template <class T, class Read>
 void readAll(Reader& in, std::vector<T>& values, std::size_t smallest, const char* field,
              const Read& read) {
   const std::size_t n = in.count(smallest, field);
+  values.reserve(n);  // no more than some times the bytes that remain
   for (std::size_t i = 0; i < n; ++i) values.push_back(read());
 }
 
@@ -308,6 +309,8 @@ std::vector<std::byte> serialiseModel(const Model& model) {
   out.put(static_cast<std::uint8_t>(model.up));
   out.putMatrix(model.offset);
   writeAll(out, model.problems);
+  out.put(std::uint64_t{model.filesBeside.size()});
+  for (const std::string& file : model.filesBeside) out.put(file);
   return out.finish();
 }
 
@@ -328,6 +331,7 @@ Model deserialiseModel(std::span<const std::byte> bytes) {
   if (model.up < 'x' || model.up > 'z') in.fail("up axis", "neither x, y nor z");
   model.offset = in.getMatrix<Vec3>("offset");
   readAll(in, model.problems, 24, "problems", [&] { return readProblem(in); });
+  readAll(in, model.filesBeside, 8, "files beside", [&] { return in.getText("file beside"); });
   if (in.remaining() != 0) in.fail("end", std::to_string(in.remaining()) + " bytes too many");
   return model;
 }

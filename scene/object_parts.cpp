@@ -19,10 +19,10 @@ collision::Triangle triangleAt(const Shape& shape, std::size_t t, const Eigen::A
 }
 
 /// 3 V / A of what the surface encloses, metres.
-double thickness(const Shape& shape, const Surface& surface, const Eigen::Affine3d& placed) {
-  const Vec3 origin = at(shape, shape.triangles[surface.first][0], placed);
+double thickness(const Shape& shape, const Shell& shell, const Eigen::Affine3d& placed) {
+  const Vec3 origin = at(shape, shape.triangles[shell.first][0], placed);
   double sixfoldVolume = 0, doubleArea = 0;
-  for (std::size_t t = surface.first; t < surface.first + surface.count; ++t) {
+  for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
     const auto [a, b, c] = triangleAt(shape, t, placed);
     const Vec3 normal = (b - a).cross(c - a);
     sixfoldVolume += (a - origin).dot(normal);
@@ -31,16 +31,16 @@ double thickness(const Shape& shape, const Surface& surface, const Eigen::Affine
   return doubleArea > 0 ? std::abs(sixfoldVolume) / doubleArea : 0;
 }
 
-/// The box of an outward surface of the shape holds that of `surface`: it is a cavity of a solid.
-bool isCavity(const Shape& shape, const Surface& surface) {
-  return surface.inward && std::any_of(shape.surfaces.begin(), shape.surfaces.end(),
-                                       [](const Surface& other) { return other.hollow; });
+/// It looks into the solid of another surface of the shape.
+bool isCavity(const Shape& shape, const Shell& shell) {
+  return shell.inward && std::any_of(shape.shells.begin(), shape.shells.end(),
+                                     [](const Shell& other) { return other.hollow; });
 }
 
-collision::Hull hullOf(const Shape& shape, const Surface& surface, const Eigen::Affine3d& placed) {
+collision::Hull hullOf(const Shape& shape, const Shell& shell, const Eigen::Affine3d& placed) {
   std::vector<Vec3> points;
-  points.reserve(3 * std::size_t{surface.count});
-  for (std::size_t t = surface.first; t < surface.first + surface.count; ++t) {
+  points.reserve(3 * std::size_t{shell.count});
+  for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
     for (const Vec3& corner : triangleAt(shape, t, placed)) points.push_back(corner);
   }
   return collision::buildHull(points);
@@ -77,10 +77,10 @@ bool hasArea(const collision::Triangle& t) {
   return !(t[1] - t[0]).cross(t[2] - t[0]).isZero(0.0);
 }
 
-bool becomesHull(const Shape& shape, const Surface& surface, const Eigen::Affine3d& placed) {
-  if (!surface.isConvex() || surface.hollow) return false;
-  if (!surface.inward) return true;
-  return !isCavity(shape, surface) && thickness(shape, surface, placed) < kRoomRadius;
+bool becomesHull(const Shape& shape, const Shell& shell, const Eigen::Affine3d& placed) {
+  if (!shell.isConvex() || shell.hollow) return false;
+  if (!shell.inward) return true;
+  return !isCavity(shape, shell) && thickness(shape, shell, placed) < kRoomRadius;
 }
 
 ObjectParts partsOf(const Shape& shape, const Eigen::Affine3d& placed) {
@@ -88,16 +88,16 @@ ObjectParts partsOf(const Shape& shape, const Eigen::Affine3d& placed) {
   std::vector<collision::Triangle> triangles;
   std::vector<signed char> sides;
   const signed char outside = placed.linear().determinant() < 0 ? -1 : 1;
-  for (const Surface& surface : shape.surfaces) {
-    if (becomesHull(shape, surface, placed)) {
-      addHull(hullOf(shape, surface, placed), parts);
+  for (const Shell& shell : shape.shells) {
+    if (becomesHull(shape, shell, placed)) {
+      addHull(hullOf(shape, shell, placed), parts);
       continue;
     }
-    for (std::size_t t = surface.first; t < surface.first + surface.count; ++t) {
+    for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
       const collision::Triangle triangle = triangleAt(shape, t, placed);
       if (!hasArea(triangle)) continue;
       triangles.push_back(triangle);
-      sides.push_back(surface.bounds() ? outside : static_cast<signed char>(0));
+      sides.push_back(shell.bounds() ? outside : static_cast<signed char>(0));
     }
   }
   if (!parts.hulls.empty()) parts.hullTree = collision::buildBoxTree(parts.hullBoxes, kLeafSize);

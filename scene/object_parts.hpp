@@ -45,7 +45,7 @@ ObjectParts partsOf(const Shape& shape, const Eigen::Affine3d& placed);
 bool hasArea(const collision::Triangle& t);
 
 /// Whether collision takes the hull of this surface of the shape, so placed.
-bool becomesHull(const Shape& shape, const Surface& surface, const Eigen::Affine3d& placed);
+bool becomesHull(const Shape& shape, const Shell& shell, const Eigen::Affine3d& placed);
 
 /// Whether `point` lies inside of a closed surface of the triangles (not of the hulls), by how
 /// often they go around it. Points on the surface may be told either way.

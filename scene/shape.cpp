@@ -165,12 +165,12 @@ class SurfaceWalk {
       for (std::size_t k = 0; k < 3; ++k) open = !visit(link, k, sense_[found_[i]]) || open;
     }
     std::sort(found_.begin(), found_.end());
-    Surface surface;
-    surface.kind = open ? Surface::Kind::open : Surface::Kind::closed;
-    surface.first = static_cast<Index>(shape.triangles.size());
-    surface.count = static_cast<Index>(found_.size());
+    Shell shell;
+    shell.kind = open ? Shell::Kind::open : Shell::Kind::closed;
+    shell.first = static_cast<Index>(shape.triangles.size());
+    shell.count = static_cast<Index>(found_.size());
     windAlike(shape);
-    shape.surfaces.push_back(surface);
+    shape.shells.push_back(shell);
   }
 
  private:
@@ -223,9 +223,9 @@ void keepUsedVertices(Shape& shape) {
   shape.vertices = std::move(kept);
 }
 
-Box boxOf(const Shape& shape, const Surface& surface) {
+Box boxOf(const Shape& shape, const Shell& shell) {
   Box box;
-  for (Index t = surface.first; t < surface.first + surface.count; ++t) {
+  for (Index t = shell.first; t < shell.first + shell.count; ++t) {
     for (const Index v : shape.triangles[t]) box.include(shape.vertices[v].cast<double>());
   }
   return box;
@@ -234,11 +234,11 @@ Box boxOf(const Shape& shape, const Surface& surface) {
 /// A solid with a cavity is not what its outer surface bounds.
 void findCavities(Shape& shape) {
   std::vector<Box> inwardBoxes;
-  for (const Surface& s : shape.surfaces) {
+  for (const Shell& s : shape.shells) {
     if (s.bounds() && s.inward) inwardBoxes.push_back(boxOf(shape, s));
   }
   if (inwardBoxes.empty()) return;
-  for (Surface& s : shape.surfaces) {
+  for (Shell& s : shape.shells) {
     if (!s.bounds() || s.inward) continue;
     const Box box = boxOf(shape, s);
     s.hollow = std::any_of(inwardBoxes.begin(), inwardBoxes.end(),
@@ -263,12 +263,12 @@ Shape shapeOf(std::span<const Mesh* const> meshes) {
     if (!walk.taken(t)) walk.take(t, shape);
   }
   keepUsedVertices(shape);
-  for (Surface& surface : shape.surfaces) {
-    if (!surface.bounds()) continue;
+  for (Shell& shell : shape.shells) {
+    if (!shell.bounds()) continue;
     const ConvexityVerdict verdict = judgeConvexity(
-        shape.vertices, std::span(shape.triangles).subspan(surface.first, surface.count));
-    surface.kind = verdict.kind;
-    surface.inward = verdict.inward;
+        shape.vertices, std::span(shape.triangles).subspan(shell.first, shell.count));
+    shell.kind = verdict.kind;
+    shell.inward = verdict.inward;
     if (verdict.untried) ++shape.untried;
   }
   findCavities(shape);

@@ -11,8 +11,8 @@
 
 namespace enfilade::scene {
 
-/// Triangles joined by edges that exactly two of them share.
-struct Surface {
+/// A surface: triangles joined by edges that exactly two of them share.
+struct Shell {
   enum class Kind : std::uint8_t {
     open,    ///< an edge with one triangle, or with three and more, or one-sided as a Möbius strip
     closed,  ///< each edge has two triangles; it bounds a solid that is not convex
@@ -35,7 +35,7 @@ struct Shape {
   /// Those of one surface are neighbours in the list, wound alike (as most of them were).
   /// Counter-clockwise is outside, unless the surface is `inward`.
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<Surface> surfaces;
+  std::vector<Shell> shells;
 
   // What was left out or mended.
   std::uint32_t degenerate = 0;     ///< triangles whose corners lie on one line, exactly
@@ -47,7 +47,7 @@ struct Shape {
 
   std::size_t bytes() const {
     return vertices.capacity() * sizeof(vertices[0]) + triangles.capacity() * sizeof(triangles[0]) +
-           surfaces.capacity() * sizeof(surfaces[0]);
+           shells.capacity() * sizeof(shells[0]);
   }
 };
 

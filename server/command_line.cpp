@@ -12,11 +12,12 @@ namespace {
 /// Where CLI11 leaves what it read; every verb has its own.
 struct ModelArguments {
   std::string file, unit, up;
+  bool noCache = false;
 };
 struct Arguments {
   ModelArguments model;
-  std::string script, out, listen = "127.0.0.1:7878", connect;
-  bool strict = false;
+  std::string script, out, plan, listen = "127.0.0.1:7878", connect;
+  bool strict = false, json = false, objects = false;
   std::uint32_t auditEvery = 0;
 };
 
@@ -59,6 +60,8 @@ void addModel(CLI::App& verb, ModelArguments& into) {
   verb.add_option("--unit", into.unit, "Length of the file's unit: m, mm, cm, ft, in or metres")
       ->check(CLI::Validator(unitProblem, "UNIT"));
   verb.add_option("--up", into.up, "The file's up axis")->check(CLI::IsMember({"x", "y", "z"}));
+  verb.add_flag("--no-cache", into.noCache,
+                "Import the model even if an earlier start kept what it made of it");
 }
 
 void addWalk(CLI::App& verb, Arguments& into) {
@@ -70,8 +73,18 @@ void addWalk(CLI::App& verb, Arguments& into) {
   verb.add_flag("--strict", into.strict, "End with 3 when an order was refused or a walk blocked");
 }
 
+void addInspect(CLI::App& verb, Arguments& into) {
+  verb.add_flag("--json", into.json, "Tell it as one JSON object");
+  verb.add_flag("--objects", into.objects, "List every object too: id, path, box, class");
+  verb.add_flag("--strict", into.strict, "End with 3 when there are problems");
+  verb.add_option("--plan", into.plan, "Folder for a picture of the plan of each storey")
+      ->check(CLI::Validator(folderProblem, "DIR"));
+}
+
 ModelOptions modelFrom(const ModelArguments& read) {
-  ModelOptions options{read.file, std::nullopt, std::nullopt};
+  ModelOptions options;
+  options.file = read.file;
+  options.cache = !read.noCache;
   if (!read.unit.empty()) options.metresPerUnit = scene::metresPerUnitFrom(read.unit);
   if (!read.up.empty()) options.up = read.up.front();
   return options;
@@ -112,6 +125,10 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   walk->add_option("--connect", read.connect, "The server's address and port")
       ->required()
       ->check(CLI::Validator(endpointProblem, "HOST:PORT"));
+  CLI::App* inspect =
+      app.add_subcommand("inspect", "Tell what is in a scene, and what is wrong with it");
+  addModel(*inspect, read.model);
+  addInspect(*inspect, read);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -128,6 +145,8 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
     return ReplayCommand{modelFrom(read.model), read.script, read.out, read.strict,
                          read.auditEvery};
   }
+  if (*inspect)
+    return InspectCommand{modelFrom(read.model), read.json, read.objects, read.strict, read.plan};
   return WalkCommand{read.script, read.out, *endpointFrom(read.connect), read.strict};
 }
 

@@ -15,6 +15,7 @@ struct ModelOptions {
   std::filesystem::path file;
   std::optional<double> metresPerUnit;
   std::optional<char> up;  ///< 'x', 'y' or 'z'
+  bool cache = true;       ///< whether what an earlier start kept of the file may serve
 };
 
 struct Endpoint {
@@ -38,7 +39,14 @@ struct WalkCommand {
   Endpoint connect;
   bool strict = false;
 };
-using ProgramCommand = std::variant<ServeCommand, ReplayCommand, WalkCommand>;
+struct InspectCommand {
+  ModelOptions model;
+  bool json = false;
+  bool objects = false;        ///< list each object
+  bool strict = false;         ///< problems end it with `violations`
+  std::filesystem::path plan;  ///< folder for a picture a storey; empty: none
+};
+using ProgramCommand = std::variant<ServeCommand, ReplayCommand, WalkCommand, InspectCommand>;
 
 /// What to do, or the code to end with at once (--help: done; a mistake: usage). Help goes to
 /// stdout, mistakes and the usage to stderr.

@@ -2,32 +2,48 @@
 
 #include <spdlog/spdlog.h>
 
-#include "scene/import_model.hpp"
+#include <chrono>
+
+#include "scene/model_cache.hpp"
 #include "server/progress.hpp"
 
 namespace enfilade::server {
+namespace {
 
-std::shared_ptr<const scene::Scene> loadScene(const ModelOptions& options) {
+void tell(const scene::Scene& scene, const std::string& name, const LoadedScene& loaded) {
+  const scene::Model& model = scene.model();
+  for (const scene::Problem& problem : model.problems)
+    spdlog::info("{}: {} x {}, as {}", name, problem.count, problem.kind, problem.example);
+  const scene::Vec3 size =
+      scene.bounds().empty() ? scene::Vec3::Zero().eval() : scene.bounds().size();
+  spdlog::info("{}: {} objects, {:.1f} x {:.1f} x {:.1f} m, unit {} m, up {}, {} in {:.2f} s", name,
+               model.objects.size(), size.x(), size.y(), size.z(), model.metresPerUnit, model.up,
+               loaded.fromCache ? "from the cache" : "imported", loaded.loadSeconds);
+}
+
+}  // namespace
+
+LoadedScene loadSceneTimed(const ModelOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
   scene::ImportOptions import;
   import.metresPerUnit = options.metresPerUnit;
   import.up = options.up;
   Progress bar;
-  auto model = scene::importModel(
-      options.file, import,
+  scene::LoadedModel model = scene::loadModel(
+      options.file, import, options.cache ? scene::modelCacheOfEnvironment() : std::nullopt,
       [&](const std::string& stage, double fraction) { bar.show(fraction, stage); });
   bar.clear();
-  for (const scene::Problem& problem : model.problems) {
-    spdlog::info("{}: {} x {}, as {}", options.file.filename().string(), problem.count,
-                 problem.kind, problem.example);
-  }
-  auto scene = std::make_shared<const scene::Scene>(std::move(model));
-  const auto& made = scene->model();
-  const scene::Vec3 size =
-      scene->bounds().empty() ? scene::Vec3::Zero().eval() : scene->bounds().size();
-  spdlog::info("{}: {} objects, {:.1f} x {:.1f} x {:.1f} m, unit {} m, up {}",
-               options.file.filename().string(), made.objects.size(), size.x(), size.y(), size.z(),
-               made.metresPerUnit, made.up);
-  return scene;
+  for (const std::string& note : model.notes) spdlog::warn("cache: {}", note);
+  LoadedScene loaded{nullptr, model.fromCache, model.importSeconds, 0};
+  loaded.scene = std::make_shared<const scene::Scene>(std::move(model.model));
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  loaded.loadSeconds = took.count();
+  tell(*loaded.scene, options.file.filename().string(), loaded);
+  return loaded;
+}
+
+std::shared_ptr<const scene::Scene> loadScene(const ModelOptions& options) {
+  return loadSceneTimed(options).scene;
 }
 
 }  // namespace enfilade::server

@@ -8,7 +8,15 @@
 
 namespace enfilade::server {
 
+struct LoadedScene {
+  std::shared_ptr<const scene::Scene> scene;
+  bool fromCache = false;
+  double importSeconds = 0;  ///< that the import took, now or when the cache's entry was made
+  double loadSeconds = 0;    ///< from the file to the scene, now
+};
+
 /// Throws scene::ImportError.
+LoadedScene loadSceneTimed(const ModelOptions& options);
 std::shared_ptr<const scene::Scene> loadScene(const ModelOptions& options);
 
 }  // namespace enfilade::server

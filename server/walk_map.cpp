@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 namespace enfilade::server {
 namespace {
@@ -14,19 +13,15 @@ namespace {
 using render::Colour;
 using render::Image;
 
-constexpr double kBin = 0.25;         // metres of height
-constexpr double kStoreyApart = 2.0;  // metres; nearer peaks are one storey
 constexpr double kLeastShare = 0.08;  // of all ticks, for a storey to get its plan
 constexpr std::size_t kMostStoreys = 3;
-constexpr double kCut = 2.0;                       // metres above the floor
-constexpr double kBelow = 1.0;                     // metres below the floor that are still drawn
 constexpr double kMargin = 4.0;                    // metres around what was walked
 constexpr double kWidest = 1600, kHighest = 1100;  // pixels of one plan
 constexpr int kLine = 26;                          // pixels of a line of text
 constexpr double kFloorNormal = 0.7;               // steeper contacts are with floors and stairs
 
-constexpr Colour kInk{40, 40, 46}, kPaper{250, 249, 246}, kContact{214, 40, 40}, kStop{120, 0, 120},
-    kCamera{20, 20, 24};
+constexpr Colour kInk = kPlanInk, kPaper = kPlanPaper, kContact{214, 40, 40}, kStop{120, 0, 120},
+                 kCamera{20, 20, 24};
 constexpr std::array<Colour, 8> kPathColours{{{0, 104, 214},
                                               {224, 112, 0},
                                               {0, 140, 80},
@@ -62,14 +57,6 @@ scene::Box walkedBounds(const std::vector<WalkedPath>& paths) {
     for (const Vec3& feet : path.feet) bounds.include(feet);
   }
   return collision::grown(bounds, kMargin);
-}
-
-render::Camera planOf(const scene::Box& bounds, double floor) {
-  const Vec3 size = bounds.size();
-  const double scale = std::min(kWidest / size.x(), kHighest / size.z());
-  const int width = std::max(64, static_cast<int>(size.x() * scale));
-  const int height = std::max(64, static_cast<int>(size.z() * scale));
-  return render::plan(bounds, floor - kBelow, floor + kCut, width, height);
 }
 
 struct Pixel {
@@ -127,41 +114,6 @@ void drawContacts(std::vector<Storey>& storeys, const WalkTrace& trace) {
   }
 }
 
-/// Softens the plan, so that what is drawn on it is read first, and outlines what stands there: a
-/// cut wall is hollow, and would be hard to tell from the floor by its colour.
-Image groundOf(const PlanPicture& plan) {
-  Image image = plan.colour;
-  const auto width = static_cast<std::size_t>(image.width);
-  for (std::size_t pixel = 0; pixel < plan.ids.size(); ++pixel) {
-    const bool lastColumn = pixel % width == width - 1;
-    const std::uint32_t right = plan.ids[lastColumn ? pixel : pixel + 1];
-    const std::uint32_t below = plan.ids[pixel + width < plan.ids.size() ? pixel + width : pixel];
-    const bool edge = plan.ids[pixel] != right || plan.ids[pixel] != below;
-    for (std::size_t channel = 0; channel < 3; ++channel) {
-      std::uint8_t& value = image.rgb[3 * pixel + channel];
-      const int soft = 255 - (255 - value) / 2;
-      value = static_cast<std::uint8_t>(edge ? soft * 2 / 5 : soft);
-    }
-  }
-  return image;
-}
-
-void paste(Image& onto, const Image& image, int left, int top) {
-  for (int y = 0; y < image.height; ++y) {
-    const auto from = image.rgb.begin() + static_cast<std::ptrdiff_t>(y) * image.width * 3;
-    const auto to =
-        onto.rgb.begin() + (static_cast<std::ptrdiff_t>(top + y) * onto.width + left) * 3;
-    std::copy(from, from + static_cast<std::ptrdiff_t>(image.width) * 3, to);
-  }
-}
-
-Image blankImage(int width, int height) {
-  Image image{width, height, {}};
-  image.rgb.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 3);
-  for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = kPaper[i % 3];
-  return image;
-}
-
 struct LegendEntry {
   std::string text;
   Colour colour;
@@ -197,7 +149,7 @@ void drawLegend(Image& image, const std::vector<LegendEntry>& entries, int top) 
 
 std::string heading(const Storey& storey) {
   char text[64];
-  std::snprintf(text, sizeof text, "floor at %.2f m, cut %.1f m above", storey.floor, kCut);
+  std::snprintf(text, sizeof text, "floor at %.2f m, cut %.1f m above", storey.floor, kPlanCut);
   return text;
 }
 
@@ -225,43 +177,23 @@ Image composed(const WalkTrace& trace, const std::vector<Storey>& storeys) {
 }  // namespace
 
 std::vector<double> walkedStoreys(const std::vector<WalkedPath>& paths) {
-  std::map<long, std::vector<double>> bins;
-  std::size_t ticks = 0;
+  std::vector<WeightedHeight> heights;
   for (const WalkedPath& path : paths) {
     for (std::size_t i = 0; i < path.feet.size(); ++i) {
       // Who stands still for long makes no storey more walked.
-      if (i > 0 && path.feet[i] == path.feet[i - 1]) continue;
-      bins[std::lround(path.feet[i].y() / kBin)].push_back(path.feet[i].y());
-      ++ticks;
+      if (i == 0 || path.feet[i] != path.feet[i - 1]) heights.push_back({path.feet[i].y(), 1});
     }
   }
-  std::vector<std::vector<double>> peaks;
-  for (auto& [bin, heights] : bins) peaks.push_back(std::move(heights));
-  std::stable_sort(peaks.begin(), peaks.end(),
-                   [](const auto& a, const auto& b) { return a.size() > b.size(); });
-  std::vector<double> floors;
-  for (std::vector<double>& heights : peaks) {
-    const double share = static_cast<double>(heights.size()) / static_cast<double>(ticks);
-    if (floors.size() == kMostStoreys || (!floors.empty() && share < kLeastShare)) break;
-    std::nth_element(heights.begin(), heights.begin() + static_cast<long>(heights.size() / 2),
-                     heights.end());
-    const double floor = heights[heights.size() / 2];
-    const bool isNew = std::none_of(floors.begin(), floors.end(), [&](double other) {
-      return std::abs(other - floor) < kStoreyApart;
-    });
-    if (isNew) floors.push_back(floor);
-  }
-  std::sort(floors.begin(), floors.end());
-  return floors;
+  return storeyHeights(heights, kLeastShare, kMostStoreys);
 }
 
 std::optional<Image> drawMap(const WalkTrace& trace, const TakePicture& picture) {
   std::vector<Storey> storeys;
   for (const double floor : walkedStoreys(trace.paths)) {
-    Storey storey{floor, planOf(walkedBounds(trace.paths), floor), {}};
+    Storey storey{floor, planCamera(walkedBounds(trace.paths), floor, kWidest, kHighest), {}};
     const std::optional<PlanPicture> plan = picture(storey.camera);
     if (!plan) return std::nullopt;
-    storey.image = groundOf(*plan);
+    storey.image = planGround(*plan);
     storeys.push_back(std::move(storey));
   }
   if (storeys.empty()) return std::nullopt;

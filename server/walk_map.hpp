@@ -1,16 +1,13 @@
 // A plan of the scene, a picture a storey, with what happened in a walk drawn on it.
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "render/image.hpp"
+#include "server/plan_picture.hpp"
 
 namespace enfilade::server {
-
-using collision::Vec3;
 
 /// Where an avatar's feet were, tick by tick; scene frame, metres.
 struct WalkedPath {
@@ -37,15 +34,6 @@ struct WalkTrace {
 
 /// Heights of the floors that were walked on for long, ascending; empty when nobody walked.
 std::vector<double> walkedStoreys(const std::vector<WalkedPath>& paths);
-
-/// A plan as it was drawn, with the ids of what is seen, pixel by pixel.
-struct PlanPicture {
-  render::Image colour;
-  std::vector<std::uint32_t> ids;
-};
-
-/// Takes the picture that a camera asks for; nullopt when there is none to be had.
-using TakePicture = std::function<std::optional<PlanPicture>(const render::Camera&)>;
 
 /// nullopt when there is nothing to draw or no picture to draw on.
 std::optional<render::Image> drawMap(const WalkTrace& trace, const TakePicture& picture);

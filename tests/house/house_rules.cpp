@@ -31,7 +31,7 @@ struct ThirdParty {
   Names folders;        ///< where it may be used
 };
 
-const std::array<ThirdParty, 14> kThirdParties{{
+const std::array<ThirdParty, 15> kThirdParties{{
     {"GMP", "gmp.*", {"collision"}},
     {"assimp", "assimp/.*", {"scene"}},
     {"Embree", "embree.*", {"scene", "render"}},
@@ -39,6 +39,7 @@ const std::array<ThirdParty, 14> kThirdParties{{
     {"libpng", "png.*", {"scene", "render"}},
     {"libjpeg", "(jpeglib|turbojpeg).*", {"scene", "render"}},
     {"libzip", "zip.*", {"scene"}},
+    {"xxHash", "xxh.*", {"scene"}},
     {"zstd", "zstd.*", {"protocol", "render", "server"}},
     {"Boost.Asio and Beast", "boost/(asio|beast|system).*", {"protocol", "server"}},
     {"other Boost", "boost/(?!asio|beast|system).*", {}},

@@ -41,6 +41,7 @@ Model smallModel() {
   model.up = 'z';
   model.offset = {459123, 113, -5428311};
   model.problems.push_back({"missing_texture", 3, "wall.png"});
+  model.filesBeside = {"small.bin", "textures/wall.png"};
   return model;
 }
 
@@ -61,6 +62,7 @@ TEST(ModelStream, RoundTripKeepsEveryByte) {
   ASSERT_TRUE(back.objects[0].worldFromPlacement);
   EXPECT_EQ(back.objects[0].worldFromPlacement->translation(), Vec3(4, 5, 6));
   EXPECT_EQ(back.problems[0].count, 3u);
+  EXPECT_EQ(back.filesBeside, smallModel().filesBeside);
 }
 
 TEST(ModelStream, EveryShorterStreamIsRefused) {

@@ -115,7 +115,12 @@ TEST(RayCaster, MeetsADoorWhereItHasTurnedTo) {
 std::optional<double> slowDistance(const Scene& scene, const Ray& ray) {
   std::optional<double> nearest;
   for (const std::uint32_t object : scene.solidObjects()) {
-    for (const collision::Triangle& t : scene.triangles(object).triangles()) {
+    const Shape& shape = scene.shape(object);
+    for (const auto& corners : shape.triangles) {
+      std::array<Vec3, 3> t;
+      for (std::size_t k = 0; k < 3; ++k)
+        t[k] =
+            scene.model().objects[object].worldFromMesh * shape.vertices[corners[k]].cast<double>();
       const Vec3 a = t[1] - t[0], b = t[2] - t[0], p = ray.direction.cross(b);
       const double determinant = a.dot(p);
       if (determinant == 0) continue;

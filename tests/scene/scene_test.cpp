@@ -129,7 +129,7 @@ TEST(Scene, NothingIsCopiedForCollisionBeforePartsAreAskedFor) {
   scene.shape(2);
   EXPECT_EQ(scene.shapeCount(), 3u);
   EXPECT_GT(scene.memory().geometry, 0u);
-  EXPECT_LE(scene.memory().geometry, 2 * unique + 3 * (sizeof(Shape) + 20 * sizeof(Surface)));
+  EXPECT_LE(scene.memory().geometry, 2 * unique + 3 * (sizeof(Shape) + 20 * sizeof(Shell)));
   scene.parts(0);
   EXPECT_GT(scene.memory().parts, 0u);
 }

@@ -85,9 +85,9 @@ TEST(Shape, ABoxIsOneConvexSolidHoweverItsCornersAreStored) {
     const Shape shape = shapeOfOne(mesh);
     EXPECT_EQ(shape.vertices.size(), 8u);
     EXPECT_EQ(shape.triangles.size(), 12u);
-    ASSERT_EQ(shape.surfaces.size(), 1u);
-    EXPECT_EQ(shape.surfaces[0].kind, Surface::Kind::convex);
-    EXPECT_FALSE(shape.surfaces[0].inward);
+    ASSERT_EQ(shape.shells.size(), 1u);
+    EXPECT_EQ(shape.shells[0].kind, Shell::Kind::convex);
+    EXPECT_FALSE(shape.shells[0].inward);
     EXPECT_EQ(shape.boundaryEdges + shape.crowdedEdges + shape.duplicate + shape.degenerate, 0u);
   }
 }
@@ -99,9 +99,9 @@ TEST(Shape, ABoxOfSeveralMeshesIsStillOneSolid) {
   sides.indices.assign(box.indices.begin() + 6, box.indices.end());
   const Mesh* both[] = {&sides, &lid};
   const Shape shape = shapeOf(both);
-  ASSERT_EQ(shape.surfaces.size(), 1u);
-  EXPECT_TRUE(shape.surfaces[0].isConvex());
-  EXPECT_EQ(shapeOfOne(sides).surfaces[0].kind, Surface::Kind::open);
+  ASSERT_EQ(shape.shells.size(), 1u);
+  EXPECT_TRUE(shape.shells[0].isConvex());
+  EXPECT_EQ(shapeOfOne(sides).shells[0].kind, Shell::Kind::open);
   EXPECT_EQ(shapeOfOne(sides).boundaryEdges, 4u);
 }
 
@@ -113,10 +113,10 @@ TEST(Shape, TurnedBoxesAndPrismsAreConvexUpToTheRoundingOfTheirFloats) {
         turned(i % 2 ? boxMesh({-4, 0, -0.1}, {4, 2.7, 0.1}) : prism(3 + i % 60, 1, 2), random,
                i % 3 ? 500 : 0);
     const Shape shape = shapeOfOne(mesh);
-    ASSERT_EQ(shape.surfaces.size(), 1u);
-    EXPECT_TRUE(shape.surfaces[0].isConvex()) << i;
-    EXPECT_FALSE(shape.surfaces[0].inward) << i;
-    exact += shape.surfaces[0].kind == Surface::Kind::convex ? 1 : 0;
+    ASSERT_EQ(shape.shells.size(), 1u);
+    EXPECT_TRUE(shape.shells[0].isConvex()) << i;
+    EXPECT_FALSE(shape.shells[0].inward) << i;
+    exact += shape.shells[0].kind == Shell::Kind::convex ? 1 : 0;
   }
   EXPECT_LT(exact, 100) << "rounding bends most of them";
 }
@@ -130,11 +130,11 @@ TEST(Shape, ADentDeeperThanRoundingIsNotConvex) {
     for (const auto& [a, b] : {std::pair{2, 6}, {6, 7}, {7, 3}, {3, 2}})
       mesh.indices.insert(mesh.indices.end(), {8u, std::uint32_t(a), std::uint32_t(b)});
     const Shape shape = shapeOfOne(mesh);
-    ASSERT_EQ(shape.surfaces.size(), 1u) << depth;
-    const Surface::Kind expected = depth == 0     ? Surface::Kind::convex
-                                   : depth < 3e-7 ? Surface::Kind::rounded
-                                                  : Surface::Kind::closed;
-    EXPECT_EQ(shape.surfaces[0].kind, expected) << depth;
+    ASSERT_EQ(shape.shells.size(), 1u) << depth;
+    const Shell::Kind expected = depth == 0     ? Shell::Kind::convex
+                                 : depth < 3e-7 ? Shell::Kind::rounded
+                                                : Shell::Kind::closed;
+    EXPECT_EQ(shape.shells[0].kind, expected) << depth;
   }
 }
 
@@ -161,8 +161,8 @@ TEST(Shape, SplitFacesAndPointsInsideOfFacesDoNoHarm) {
     }
   }
   const Shape shape = shapeOfOne(mesh);
-  ASSERT_EQ(shape.surfaces.size(), 1u);
-  EXPECT_EQ(shape.surfaces[0].kind, Surface::Kind::convex);
+  ASSERT_EQ(shape.shells.size(), 1u);
+  EXPECT_EQ(shape.shells[0].kind, Shell::Kind::convex);
   EXPECT_EQ(shape.vertices.size(), 98u);
 }
 
@@ -177,14 +177,14 @@ TEST(Shape, TrianglesWithoutAreaAndRepeatedOnesAreCountedAndLeftOut) {
   EXPECT_EQ(shape.duplicate, 2u);
   EXPECT_EQ(shape.triangles.size(), 12u);
   EXPECT_EQ(shape.vertices.size(), 8u);
-  EXPECT_TRUE(shape.surfaces.at(0).isConvex());
+  EXPECT_TRUE(shape.shells.at(0).isConvex());
 }
 
 TEST(Shape, InsideOutSolidsAreRecognised) {
   const Shape shape = shapeOfOne(insideOut(boxMesh({0, 0, 0}, {1, 2, 3})));
-  ASSERT_EQ(shape.surfaces.size(), 1u);
-  EXPECT_TRUE(shape.surfaces[0].isConvex());
-  EXPECT_TRUE(shape.surfaces[0].inward);
+  ASSERT_EQ(shape.shells.size(), 1u);
+  EXPECT_TRUE(shape.shells[0].isConvex());
+  EXPECT_TRUE(shape.shells[0].inward);
 }
 
 TEST(Shape, FacesWoundAgainstTheRestAreTurned) {
@@ -193,9 +193,9 @@ TEST(Shape, FacesWoundAgainstTheRestAreTurned) {
   std::swap(mesh.indices[22], mesh.indices[23]);
   const Shape shape = shapeOfOne(mesh);
   EXPECT_EQ(shape.rewound, 2u);
-  ASSERT_EQ(shape.surfaces.size(), 1u);
-  EXPECT_EQ(shape.surfaces[0].kind, Surface::Kind::convex);
-  EXPECT_FALSE(shape.surfaces[0].inward);
+  ASSERT_EQ(shape.shells.size(), 1u);
+  EXPECT_EQ(shape.shells[0].kind, Shell::Kind::convex);
+  EXPECT_FALSE(shape.shells[0].inward);
 }
 
 TEST(Shape, ACavityMakesTheSolidAroundItHollow) {
@@ -203,24 +203,24 @@ TEST(Shape, ACavityMakesTheSolidAroundItHollow) {
   append(mesh, insideOut(boxMesh({0.2, 0.2, 0.2}, {4.8, 2.8, 4.8})));
   append(mesh, boxMesh({10, 0, 0}, {11, 1, 1}));
   const Shape shape = shapeOfOne(mesh);
-  ASSERT_EQ(shape.surfaces.size(), 3u);
-  EXPECT_TRUE(shape.surfaces[0].hollow);
-  EXPECT_TRUE(shape.surfaces[1].inward);
-  EXPECT_FALSE(shape.surfaces[1].hollow);
-  EXPECT_FALSE(shape.surfaces[2].hollow);
+  ASSERT_EQ(shape.shells.size(), 3u);
+  EXPECT_TRUE(shape.shells[0].hollow);
+  EXPECT_TRUE(shape.shells[1].inward);
+  EXPECT_FALSE(shape.shells[1].hollow);
+  EXPECT_FALSE(shape.shells[2].hollow);
 }
 
 TEST(Shape, SolidsThatShareAnEdgeOrACornerAreNotOneSolid) {
   Mesh corner = boxMesh({0, 0, 0}, {1, 1, 1});
   append(corner, boxMesh({1, 1, 1}, {2, 2, 2}));
   const Shape two = shapeOfOne(corner);
-  ASSERT_EQ(two.surfaces.size(), 2u);
-  EXPECT_TRUE(two.surfaces[0].isConvex() && two.surfaces[1].isConvex());
+  ASSERT_EQ(two.shells.size(), 2u);
+  EXPECT_TRUE(two.shells[0].isConvex() && two.shells[1].isConvex());
   Mesh edge = boxMesh({0, 0, 0}, {1, 1, 1});
   append(edge, boxMesh({1, 1, 0}, {2, 2, 1}));
   const Shape crowded = shapeOfOne(edge);
   EXPECT_EQ(crowded.crowdedEdges, 1u);
-  for (const Surface& surface : crowded.surfaces) EXPECT_FALSE(surface.isConvex());
+  for (const Shell& shell : crowded.shells) EXPECT_FALSE(shell.isConvex());
 }
 
 TEST(Shape, WhatIsConcaveOrFlatBoundsNoConvexSolid) {
@@ -242,13 +242,13 @@ TEST(Shape, WhatIsConcaveOrFlatBoundsNoConvexSolid) {
     stairs.indices.insert(stairs.indices.end(), {2 * a + 1, 2 * b + 1, 2 * c + 1});
   }
   const Shape concave = shapeOfOne(stairs);
-  ASSERT_EQ(concave.surfaces.size(), 1u);
-  EXPECT_EQ(concave.surfaces[0].kind, Surface::Kind::closed);
-  EXPECT_FALSE(concave.surfaces[0].inward);
+  ASSERT_EQ(concave.shells.size(), 1u);
+  EXPECT_EQ(concave.shells[0].kind, Shell::Kind::closed);
+  EXPECT_FALSE(concave.shells[0].inward);
   Mesh pillow;  // both sides of a square, cut along different diagonals
   pillow.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
   pillow.indices = {0, 1, 2, 0, 2, 3, 0, 3, 1, 1, 3, 2};
-  EXPECT_FALSE(shapeOfOne(pillow).surfaces.at(0).isConvex());
+  EXPECT_FALSE(shapeOfOne(pillow).shells.at(0).isConvex());
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -293,6 +294,58 @@ TEST_F(Program, AWalkOverTheSocketIsTheReplayToTheLastBit) {
     EXPECT_FALSE(textOf(path("replayed/") + file).empty()) << file;
     EXPECT_EQ(textOf(path("replayed/") + file), textOf(path("walked/") + file)) << file;
   }
+}
+
+TEST_F(Program, InspectTellsAsJsonWhatIsInTheScene) {
+  const Ended told = run({"inspect", path("room.obj"), "--json", "--unit", "m", "--objects"});
+  ASSERT_EQ(told.code, 0) << told.err;
+  const auto all = nlohmann::json::parse(told.out);
+  EXPECT_EQ(all.at("objects"), 3);
+  EXPECT_EQ(all.at("meshes"), 3);
+  EXPECT_EQ(all.at("triangles"), all.at("unique_triangles"));
+  EXPECT_EQ(all.at("convex_parts"), 3);
+  EXPECT_EQ(all.at("unit"), 1);
+  EXPECT_EQ(all.at("up"), "y");
+  EXPECT_EQ(all.at("offset"), nlohmann::json({0.0, 0.0, 0.0}));
+  EXPECT_EQ(all.at("bounds").at("size").at(0), 20);
+  EXPECT_TRUE(all.at("bodies").is_array());
+  EXPECT_TRUE(all.at("problems").empty()) << told.out;
+  EXPECT_GT(all.at("import_seconds"), 0);
+  EXPECT_GT(all.at("peak_mb"), 1);
+  ASSERT_EQ(all.at("object_list").size(), 3u);
+  EXPECT_EQ(all.at("object_list").at(1).at("path"), "room_wall");
+  EXPECT_EQ(all.at("object_list").at(1).at("box").at("min").at(0), 5);
+}
+
+TEST_F(Program, InspectStrictEndsWithThreeWhenThereAreProblems) {
+  EXPECT_EQ(run({"inspect", path("room.obj"), "--strict", "--unit", "m"}).code, 0);
+  write(folder_ / "room.obj", smallRoomObj() + "o again\nf 1 2 3\nf 1 2 3\n");
+  EXPECT_EQ(run({"inspect", path("room.obj"), "--unit", "m"}).code, 0);
+  const Ended strict = run({"inspect", path("room.obj"), "--strict", "--unit", "m"});
+  EXPECT_EQ(strict.code, 3);
+  EXPECT_NE(strict.out.find("duplicate_triangle"), std::string::npos) << strict.out;
+  EXPECT_LT(std::count(strict.out.begin(), strict.out.end(), '\n'), 40);
+}
+
+TEST_F(Program, InspectDrawsAPlanOfEachStorey) {
+  const Ended drawn = run({"inspect", path("room.obj"), "--plan", path("plans")});
+  ASSERT_EQ(drawn.code, 0) << drawn.err;
+  EXPECT_TRUE(fs::exists(folder_ / "plans/storey-1.png"));
+  EXPECT_FALSE(fs::exists(folder_ / "plans/storey-2.png"));
+}
+
+TEST_F(Program, ASecondStartReadsWhatTheFirstOneKept) {
+  const auto fromCache = [&](const std::string& option) {
+    const Ended told = run({"inspect", path("room.obj"), "--json", option});
+    return nlohmann::json::parse(told.out).at("from_cache").get<bool>();
+  };
+  setenv("ENFILADE_CACHE", path("cache").c_str(), 1);
+  EXPECT_FALSE(fromCache("--unit=m"));
+  EXPECT_TRUE(fromCache("--unit=m"));
+  EXPECT_FALSE(fromCache("--no-cache"));
+  EXPECT_FALSE(fromCache("--unit=ft"));
+  setenv("ENFILADE_CACHE", "off", 1);
+  EXPECT_FALSE(fromCache("--unit=m"));
 }
 
 }  // namespace

@@ -1,0 +1,44 @@
+#include "server/inspect.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <cstdio>
+#include <stdexcept>
+
+#include "render/renderer.hpp"
+#include "server/inspection.hpp"
+#include "server/storey_plans.hpp"
+
+namespace enfilade::server {
+namespace {
+
+void drawPlans(const std::shared_ptr<const scene::Scene>& scene,
+               const std::filesystem::path& folder) {
+  render::Renderer renderer(scene);
+  const TakePicture picture = [&](const render::Camera& camera) {
+    const render::Frame frame = renderer.render(scene::Snapshot(), camera);
+    return std::optional(PlanPicture{render::colourOf(frame), frame.ids});
+  };
+  std::filesystem::create_directories(folder);
+  int number = 0;
+  for (const StoreyFloor& storey : storeysOf(*scene)) {
+    const auto file = folder / ("storey-" + std::to_string(++number) + ".png");
+    render::writePng(file, drawStoreyPlan(*scene, storey, picture).value());
+    spdlog::info("floor at {:.2f} m: {}", storey.height, file.string());
+  }
+}
+
+}  // namespace
+
+ExitCode inspect(const InspectCommand& command) {
+  const Inspection inspection = inspected(loadSceneTimed(command.model));
+  const std::string text = command.json ? inspectionJson(inspection, command.objects) + "\n"
+                                        : inspectionTable(inspection, command.objects);
+  if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
+    throw std::runtime_error("stdout cannot be written");
+  if (!command.plan.empty()) drawPlans(inspection.loaded.scene, command.plan);
+  const bool wrong = command.strict && !inspection.report.problems.empty();
+  return wrong ? ExitCode::violations : ExitCode::done;
+}
+
+}  // namespace enfilade::server

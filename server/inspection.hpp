@@ -1,0 +1,26 @@
+// What `inspect` tells of a scene, as a table for people and as JSON for programs.
+#pragma once
+
+#include <string>
+
+#include "scene/scene_report.hpp"
+#include "server/load_scene.hpp"
+
+namespace enfilade::server {
+
+struct Inspection {
+  LoadedScene loaded;
+  scene::SceneReport report;
+  double peakMegabytes = 0;  ///< of resident memory: the program's or the import's, the greater
+};
+
+/// Reports on the scene, and asks the system for the peak.
+Inspection inspected(LoadedScene loaded);
+
+/// One JSON object, indented; with `objects` also the list "object_list".
+std::string inspectionJson(const Inspection& inspection, bool objects);
+
+/// Lines for a terminal, some dozens; with `objects` one more for each object.
+std::string inspectionTable(const Inspection& inspection, bool objects);
+
+}  // namespace enfilade::server

@@ -1,0 +1,67 @@
+#include "scene/scene_report.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/scene/box_scene.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+std::size_t countOf(const SceneReport& report, const std::string& kind) {
+  for (const Problem& problem : report.problems) {
+    if (problem.kind == kind) return problem.count;
+  }
+  return 0;
+}
+
+TEST(SceneReport, CountsObjectsTrianglesAndConvexParts) {
+  Model model = testing::boxModel({{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {2, 0, 0}, {3, 1, 1}}});
+  model.objects.push_back({"copy", "", {0}, Eigen::Affine3d(Eigen::Translation3d(5, 0, 0))});
+  Mesh open = model.meshes[0];
+  open.indices.resize(30);
+  model.meshes.push_back(open);
+  model.objects.push_back({"open", "", {2}, Eigen::Affine3d(Eigen::Translation3d(7, 0, 0))});
+  const SceneReport report = reportOn(Scene(std::move(model)));
+  EXPECT_EQ(report.objects, 4u);
+  EXPECT_EQ(report.meshes, 3u);
+  EXPECT_EQ(report.triangles, 46u);
+  EXPECT_EQ(report.uniqueTriangles, 34u);
+  EXPECT_EQ(report.shells.exact, 3u);
+  EXPECT_EQ(report.shells.open, 1u);
+  EXPECT_EQ(report.hullTriangles, 36u);
+  EXPECT_EQ(report.partTriangles, 10u);
+  EXPECT_TRUE(report.problems.empty());
+}
+
+TEST(SceneReport, TellsWhatIsOddWithItsFirstExample) {
+  Model model = testing::boxModel({{"right", {0, 0, 0}, {1, 1, 1}},
+                                   {"repeats", {0, 0, 0}, {1, 2, 1}},
+                                   {"turned", {4, 0, 0}, {5, 1, 0.2}},
+                                   {"flat", {6, 0, 0}, {7, 1, 1}},
+                                   {"twisted", {8, 0, 0}, {9, 1, 1}}});
+  auto& repeats = model.meshes[1].indices;
+  repeats.insert(repeats.end(), {0, 2, 3, 0, 3, 1, 1, 1, 1});
+  auto& turned = model.meshes[2].indices;
+  for (std::size_t i = 0; i < turned.size(); i += 3) std::swap(turned[i], turned[i + 1]);
+  model.meshes[3].indices = {0, 0, 1};
+  std::swap(model.meshes[4].indices[0], model.meshes[4].indices[1]);
+  Object again = model.objects[0];
+  again.path = "again";
+  model.objects.push_back(again);
+  model.problems.push_back({"missing_texture", 2, "wall.png"});
+  const SceneReport report = reportOn(Scene(std::move(model)));
+  EXPECT_EQ(report.problems.at(0).kind, "missing_texture");
+  EXPECT_EQ(countOf(report, "duplicate_triangle"), 2u);
+  EXPECT_EQ(countOf(report, "degenerate_triangle"), 2u);
+  EXPECT_EQ(countOf(report, "inside_out_solid"), 1u);
+  EXPECT_EQ(countOf(report, "inconsistent_winding"), 1u);
+  EXPECT_EQ(countOf(report, "object_without_area"), 1u);
+  EXPECT_EQ(countOf(report, "repeated_object"), 1u);
+  for (const Problem& problem : report.problems) {
+    if (problem.kind == "repeated_object") EXPECT_EQ(problem.example, "again");
+    if (problem.kind == "inside_out_solid") EXPECT_EQ(problem.example, "turned");
+  }
+}
+
+}  // namespace
+}  // namespace enfilade::scene
