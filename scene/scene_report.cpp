@@ -91,11 +91,23 @@ void findRepeats(const Scene& scene, Findings& findings) {
 
 }  // namespace
 
+Box boxOf(const Scene& scene, std::uint32_t object) {
+  const auto& still = scene.solidObjects();
+  const auto at = std::lower_bound(still.begin(), still.end(), object);
+  if (at != still.end() && *at == object)
+    return scene.stillBoxes()[static_cast<std::size_t>(at - still.begin())];
+  Box box;
+  const Eigen::Affine3d& placed = scene.model().objects[object].worldFromMesh;
+  if (scene.parts(object).size() == 0) return box;
+  for (const Eigen::Vector3f& v : scene.shape(object).vertices)
+    box.include(placed * v.cast<double>());
+  return box;
+}
+
 SceneReport reportOn(const Scene& scene) {
   const Model& model = scene.model();
   SceneReport report;
   report.objects = model.objects.size();
-  report.solidObjects = scene.solidObjects().size();
   report.meshes = model.meshes.size();
   report.problems = model.problems;
   for (const Mesh& mesh : model.meshes) {
@@ -113,11 +125,9 @@ SceneReport reportOn(const Scene& scene) {
     if (!seen[scene.shapeNumber(i)]) findInShape(shape, object.path, degenerateTold, findings);
     seen[scene.shapeNumber(i)] = true;
     for (const Shell& shell : shape.shells) countShell(shape, shell, object, report, findings);
-  }
-  for (std::size_t i = 0, solid = 0; i < model.objects.size(); ++i) {
-    const bool isSolid = solid < scene.solidObjects().size() && scene.solidObjects()[solid] == i;
-    solid += isSolid ? 1 : 0;
-    if (!isSolid) findings.add("object_without_area", 1, model.objects[i].path);
+    const bool solid = !boxOf(scene, i).empty();
+    if (!solid) findings.add("object_without_area", 1, object.path);
+    report.solidObjects += solid ? 1 : 0;
   }
   findRepeats(scene, findings);
   return report;

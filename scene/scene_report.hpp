@@ -33,7 +33,10 @@ struct SceneReport {
   std::vector<Problem> problems;
 };
 
-/// Works out every shape; parts are not built.
+/// The box of an object as it was authored, still or not; empty when it has no area.
+Box boxOf(const Scene& scene, std::uint32_t object);
+
+/// Works out every shape; parts of still objects are not built.
 SceneReport reportOn(const Scene& scene);
 
 }  // namespace enfilade::scene

@@ -16,6 +16,7 @@ using scene::Box;
 using scene::Vec3;
 
 constexpr std::size_t kLargest = 5;  // objects that the table names
+constexpr std::size_t kBodies = 12;  // bodies that the table names
 
 double megabytes(int who) {
   rusage usage{};
@@ -49,17 +50,46 @@ json problemsOf(const scene::SceneReport& report) {
 
 json objectsOf(const scene::Scene& scene) {
   json list = json::array();
-  std::size_t solid = 0;
   for (std::uint32_t i = 0; i < scene.model().objects.size(); ++i) {
     const scene::Object& object = scene.model().objects[i];
-    const bool isSolid = solid < scene.solidObjects().size() && scene.solidObjects()[solid] == i;
-    json entry{{"id", i + 1}, {"path", object.path}};
-    entry["box"] = isSolid ? jsonOf(scene.stillBoxes()[solid]) : json(nullptr);
+    json entry{{"id", i + 1}, {"path", object.path}, {"box", jsonOf(boxOf(scene, i))}};
     if (!object.globalId.empty()) entry["global_id"] = object.globalId;
     if (!object.ifcClass.empty()) entry["class"] = object.ifcClass;
-    solid += isSolid ? 1 : 0;
     list.push_back(std::move(entry));
   }
+  return list;
+}
+
+/// Where it is, how far it goes: what depends on the kind is there only for that kind.
+json jsonOf(const scene::Model& model, const scene::BodySpec& body) {
+  json objects = json::array();
+  for (const std::uint32_t object : body.objects) objects.push_back(model.objects[object].path);
+  json entry{{"name", body.name},
+             {"kind", wordOf(body.kind)},
+             {"source", wordOf(body.source)},
+             {"objects", std::move(objects)},
+             {"anchor", jsonOf(body.anchor)},
+             {"axis", jsonOf(body.axis)}};
+  using scene::BodyKind;
+  const bool limited = body.kind == BodyKind::hinged || body.kind == BodyKind::sliding ||
+                       body.kind == BodyKind::lift;
+  if (limited) {
+    entry["low"] = body.low;
+    entry["high"] = body.high;
+    entry["speed"] = body.speed;
+  }
+  if (body.kind == BodyKind::lift) entry["stops"] = body.stops;
+  if (body.kind == BodyKind::path) entry["seconds"] = body.keys.back().time;
+  if (body.kind == BodyKind::rigid) {
+    if (body.mass) entry["mass"] = *body.mass;
+    entry["density"] = body.density;
+  }
+  return entry;
+}
+
+json bodiesOf(const scene::Model& model) {
+  json list = json::array();
+  for (const scene::BodySpec& body : model.bodies) list.push_back(jsonOf(model, body));
   return list;
 }
 
@@ -138,18 +168,29 @@ void addProblems(const scene::SceneReport& report, Table& table) {
     table.line("  %8zu  %-26s as %s", p.count, p.kind.c_str(), p.example.c_str());
 }
 
+/// How many of each kind, and the first ones by name.
+void addBodies(const scene::Model& model, Table& table) {
+  table.line("\nbodies: %s", model.bodies.empty() ? "none; everything stands still" : "");
+  for (std::size_t i = 0; i < std::min(kBodies, model.bodies.size()); ++i) {
+    const scene::BodySpec& body = model.bodies[i];
+    table.line("  %-10s %-24s %s, from %s", wordOf(body.kind), body.name.c_str(),
+               model.objects[body.objects.front()].path.c_str(), wordOf(body.source));
+  }
+  if (model.bodies.size() > kBodies)
+    table.line("  and %zu more: --json tells them all", model.bodies.size() - kBodies);
+}
+
 void addObjects(const scene::Scene& scene, Table& table) {
   table.line("\nobjects: id, from, to, path");
-  std::size_t solid = 0;
   for (std::uint32_t i = 0; i < scene.model().objects.size(); ++i) {
     const std::string& path = scene.model().objects[i].path;
-    if (solid >= scene.solidObjects().size() || scene.solidObjects()[solid] != i) {
+    const Box b = boxOf(scene, i);
+    if (b.empty()) {
       table.line("%8u  (nothing to touch)  %s", i + 1, path.c_str());
-      continue;
+    } else {
+      table.line("%8u  %.3f,%.3f,%.3f  %.3f,%.3f,%.3f  %s", i + 1, b.min.x(), b.min.y(), b.min.z(),
+                 b.max.x(), b.max.y(), b.max.z(), path.c_str());
     }
-    const Box& b = scene.stillBoxes()[solid++];
-    table.line("%8u  %.3f,%.3f,%.3f  %.3f,%.3f,%.3f  %s", i + 1, b.min.x(), b.min.y(), b.min.z(),
-               b.max.x(), b.max.y(), b.max.z(), path.c_str());
   }
 }
 
@@ -184,7 +225,7 @@ std::string inspectionJson(const Inspection& inspection, bool objects) {
   all["convex_triangles"] = report.hullTriangles;
   all["triangle_parts"] = report.partTriangles;
   all["shells"] = jsonOf(report.shells);
-  all["bodies"] = json::array();
+  all["bodies"] = bodiesOf(model);
   all["problems"] = problemsOf(report);
   all["import_seconds"] = inspection.loaded.importSeconds;
   all["load_seconds"] = inspection.loaded.loadSeconds;
@@ -198,6 +239,7 @@ std::string inspectionTable(const Inspection& inspection, bool objects) {
   Table table;
   addSummary(inspection, table);
   addLargest(*inspection.loaded.scene, table);
+  addBodies(inspection.loaded.scene->model(), table);
   addProblems(inspection.report, table);
   if (objects) addObjects(*inspection.loaded.scene, table);
   return table.take();
