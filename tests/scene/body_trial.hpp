@@ -34,7 +34,7 @@ inline std::string whoPenetrates(const World& world) {
     for (const AvatarPart& limb : avatar.shape->parts) {
       const collision::ConvexBody hull = bodyAt(limb, avatar.feet);
       for (const std::uint32_t object : state.scene->solidObjects())
-        for (const collision::Triangle& t : state.scene->triangles(object).triangles())
+        for (const collision::Triangle& t : solidTriangles(state.scene->model(), object))
           if (penetrates(hull, {std::span<const Vec3>(t), Vec3::Zero()}))
             found += name + " in " + state.scene->model().objects[object].path + "; ";
       for (const Body& body : state.bodies)

@@ -14,6 +14,13 @@ std::size_t countOf(const SceneReport& report, const std::string& kind) {
   return 0;
 }
 
+std::string exampleOf(const SceneReport& report, const std::string& kind) {
+  for (const Problem& problem : report.problems) {
+    if (problem.kind == kind) return problem.example;
+  }
+  return "";
+}
+
 TEST(SceneReport, CountsObjectsTrianglesAndConvexParts) {
   Model model = testing::boxModel({{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {2, 0, 0}, {3, 1, 1}}});
   model.objects.push_back({"copy", "", {0}, Eigen::Affine3d(Eigen::Translation3d(5, 0, 0))});
@@ -57,10 +64,8 @@ TEST(SceneReport, TellsWhatIsOddWithItsFirstExample) {
   EXPECT_EQ(countOf(report, "inconsistent_winding"), 1u);
   EXPECT_EQ(countOf(report, "object_without_area"), 1u);
   EXPECT_EQ(countOf(report, "repeated_object"), 1u);
-  for (const Problem& problem : report.problems) {
-    if (problem.kind == "repeated_object") EXPECT_EQ(problem.example, "again");
-    if (problem.kind == "inside_out_solid") EXPECT_EQ(problem.example, "turned");
-  }
+  EXPECT_EQ(exampleOf(report, "repeated_object"), "again");
+  EXPECT_EQ(exampleOf(report, "inside_out_solid"), "turned");
 }
 
 }  // namespace
