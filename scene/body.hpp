@@ -61,6 +61,7 @@ struct Body {
   Vec3 spin = Vec3::Zero();      ///< rad/s, scene frame
   bool asleep = true;            ///< rigid: stands until something wakes it; others: false
   bool moved = false;            ///< in this tick
+  bool left = false;             ///< rigid: it left the world, and stays where it was caught
   EntityId blockedBy = 0;        ///< what a kinematic body cannot push aside; 0: nothing
 
   BodyDrive drive;  ///< kinematic

@@ -43,7 +43,7 @@ NearPairStep nearStep(const DynamicsStep& settings) {
 }
 
 bool mayMatter(const Solid& a, const Solid& b) {
-  return a.isAwake() || b.isAwake();
+  return a.isAwake() || b.isAwake() || (a.isMoved() && b.isFree()) || (b.isMoved() && a.isFree());
 }
 
 void wake(Solid& solid) {
@@ -53,25 +53,29 @@ void wake(Solid& solid) {
 
 // ---- step 1 ------------------------------------------------------------------------------------
 
+/// Whether the points lean on one another, or will at the end of the step by the motion of now.
+bool comesToLean(const NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step) {
+  const auto velocityAt = [](const Solid& s, const Vec3& arm) {
+    if (s.asleep) return Vec3(Vec3::Zero());
+    return Vec3(s.motion.velocity + s.motion.spin.cross(arm) + s.pushVelocity);
+  };
+  for (const PatchPoint& point : pair.patch.list()) {
+    const Vec3 opening = velocityAt(b, point.armB) - velocityAt(a, point.armA);
+    const double closing = std::max(0.0, -pair.patch.normal.dot(opening));
+    if (point.separation < 2 * step.epsilon + step.seconds * closing) return true;
+  }
+  return false;
+}
+
 /// Looks at a pair; wakes who is leant on. Returns whether somebody woke.
 bool lookAt(Dynamics& dynamics, NearPair& pair, const NearPairStep& step, Work& work) {
   Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
   if (look(pair, a, b, step)) ++work.report.looks;
   work.report.deepest = std::max(work.report.deepest, pair.penetration);
-  const bool sleeper = (a.isFree() && a.asleep) || (b.isFree() && b.asleep);
-  if (!sleeper || !leans(pair, step.epsilon)) return false;
-  wake(a.isFree() && a.asleep ? a : b);
+  const bool sleeperA = a.isFree() && a.asleep, sleeperB = b.isFree() && b.asleep;
+  if ((!sleeperA && !sleeperB) || !comesToLean(pair, a, b, step)) return false;
+  wake(sleeperA ? a : b);
   return true;
-}
-
-/// Driven solids that move wake who leans on them.
-void wakeByDriven(Dynamics& dynamics) {
-  for (const NearPair& pair : dynamics.pairs) {
-    Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
-    if (pair.patch.size == 0) continue;
-    if (!a.isFree() && a.fastest() > 0 && b.asleep) wake(b);
-    if (!b.isFree() && b.fastest() > 0 && a.asleep) wake(a);
-  }
 }
 
 void wakeJointed(Dynamics& dynamics) {
@@ -83,7 +87,6 @@ void wakeJointed(Dynamics& dynamics) {
 }
 
 void findPatches(Dynamics& dynamics, const NearPairStep& step, Work& work) {
-  wakeByDriven(dynamics);
   wakeJointed(dynamics);
   work.isActive.assign(dynamics.pairs.size(), 0);
   // Each round but the last wakes a solid.
@@ -173,12 +176,13 @@ void keepImpulses(Dynamics& dynamics, const Work& work) {
 Passage passageOf(const Solid& solid, const RigidBody& goal) {
   Passage passage = standing(solid);
   passage.toCentre = goal.centre, passage.toRotation = goal.rotation;
+  passage.stands = nullptr;
   return passage;
 }
 
 /// The first `fraction` of a passage: a multiple of 2^-kMostHalvings.
 Passage firstPart(Passage passage, double fraction) {
-  if (fraction == 1) return passage;
+  if (fraction == 1 || passage.stands) return passage;
   Passage done = passage;
   done.toCentre = passage.fromCentre, done.toRotation = passage.fromRotation;
   for (int i = 0; i < kMostHalvings && fraction > 0; ++i) {
@@ -228,10 +232,26 @@ bool shorten(const Dynamics& dynamics, const NearPair& pair, double part, Work& 
   return any;
 }
 
+/// Who would go farther than its leash goes less far; its speed is its own.
+void leash(const Solid& solid, Passage& passage) {
+  for (int i = 0; i < kMostHalvings && lengthOf(passage) > solid.leash; ++i)
+    passage = firstHalf(passage, middleOf(passage));
+  if (lengthOf(passage) > solid.leash) passage = standing(solid);
+}
+
+/// Ways of all that go; the others stand.
+void findPassages(const Dynamics& dynamics, Work& work) {
+  for (std::size_t i = 0; i < work.bodies.size(); ++i) {
+    const Solid& solid = dynamics.solids[work.solids[i]];
+    const bool goes = solid.isAwake() || (!solid.isFree() && solid.fastest() > 0);
+    work.passages.push_back(goes ? passageOf(solid, work.bodies[i]) : standing(solid));
+    if (solid.isAwake()) leash(solid, work.passages.back());
+  }
+}
+
 void provePassages(const Dynamics& dynamics, Work& work) {
   work.fractions.assign(work.bodies.size(), 1);
-  for (std::size_t i = 0; i < work.bodies.size(); ++i)
-    work.passages.push_back(passageOf(dynamics.solids[work.solids[i]], work.bodies[i]));
+  findPassages(dynamics, work);
   std::vector<std::uint8_t> open(work.bodies.size(), 1), changed(work.bodies.size(), 0);
   // Each round but the last shortens a way, after kPartialRounds to nothing.
   const std::size_t bound = work.bodies.size() + kPartialRounds + 1;
@@ -286,13 +306,26 @@ Islands findIslands(const Dynamics& dynamics, double epsilon, const Work& work) 
   return islands;
 }
 
+std::vector<std::uint8_t> whoLeansOnRestless(const Dynamics& dynamics, const DynamicsStep& settings,
+                                             const Work& work) {
+  std::vector<std::uint8_t> restless(dynamics.solids.size(), 0);
+  for (const std::uint32_t i : work.active) {
+    const NearPair& pair = dynamics.pairs[i];
+    const bool a = dynamics.solids[pair.key.a].restless, b = dynamics.solids[pair.key.b].restless;
+    if ((!a && !b) || !leans(pair, settings.solver.epsilon)) continue;
+    restless[a ? pair.key.b : pair.key.a] = 1;
+  }
+  return restless;
+}
+
 void rest(Dynamics& dynamics, const DynamicsStep& settings, Work& work) {
   Islands islands = findIslands(dynamics, settings.solver.epsilon, work);
+  const std::vector<std::uint8_t> restless = whoLeansOnRestless(dynamics, settings, work);
   std::vector<double> calm(dynamics.solids.size(), settings.rest.calmFor);
   for (std::uint32_t i = 0; i < dynamics.solids.size(); ++i) {
     Solid& solid = dynamics.solids[i];
     if (!solid.isAwake()) continue;
-    const bool isCalm = solid.fastest() < settings.rest.calmSpeed;
+    const bool isCalm = solid.fastest() < settings.rest.calmSpeed && !restless[i];
     solid.calmFor = isCalm ? solid.calmFor + settings.solver.seconds : 0;
     double& least = calm[islands.leaderOf(i)];
     least = std::min(least, solid.calmFor);

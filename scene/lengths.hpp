@@ -18,6 +18,8 @@ struct Lengths {
   double gravity = 9.80665;
   /// metres per second. A fall gets no faster; also the fastest speed that a command may ask for.
   double speedLimit = 1000;
+  /// newtons. What an avatar pushes a free body with at most.
+  double pushForce = 300;
   /// seconds of simulated time.
   double tick = 1.0 / 60.0;
   /// seconds of simulated time without progress after which a walk ends as blocked.

@@ -40,6 +40,7 @@ double turnOf(const Passage& p) {
 }
 
 double bulgeOf(const Passage& p) {
+  if (p.stands) return 0;
   const double turn = turnOf(p);
   return p.radius * turn * turn / 8 * kUp;
 }
@@ -49,9 +50,13 @@ struct PlacedPart {
   Mat3 rotation;
   ConvexBody body;
 
-  PlacedPart(const SolidPart& part, const Vec3& centre, const Quat& turned, const Vec3& inFrame)
-      : rotation(turned.toRotationMatrix()) {
-    body = {part.vertices, centre - rotation * inFrame, &rotation, part.hull};
+  PlacedPart(const SolidPart& part, const Passage& p, bool atEnd) {
+    const Quat& turned = atEnd ? p.toRotation : p.fromRotation;
+    rotation = p.stands ? p.stands->rotation : turned.toRotationMatrix();
+    const Vec3 position = p.stands
+                              ? p.stands->position
+                              : (atEnd ? p.toCentre : p.fromCentre) - rotation * p.centreInFrame;
+    body = {part.vertices, position, &rotation, part.hull};
   }
   PlacedPart(const PlacedPart&) = delete;
   PlacedPart& operator=(const PlacedPart&) = delete;
@@ -70,7 +75,7 @@ struct Search {
 
   /// Separated at the end, and by how much?
   Known ask(const Passage& a, const Passage& b, bool atEnd, const FeatureCache& hint) {
-    const PlacedPart placedA = place(partA, a, atEnd), placedB = place(partB, b, atEnd);
+    const PlacedPart placedA(partA, a, atEnd), placedB(partB, b, atEnd);
     Known known{hint, 0};
     const collision::Decision decision = collision::decide(placedA.body, placedB.body, known.cache);
     ++queries;
@@ -80,14 +85,8 @@ struct Search {
   }
   /// The gap along the axis of `known`, at the end or the start.
   double along(const Passage& a, const Passage& b, bool atEnd, const Known& known) const {
-    const PlacedPart placedA = place(partA, a, atEnd), placedB = place(partB, b, atEnd);
+    const PlacedPart placedA(partA, a, atEnd), placedB(partB, b, atEnd);
     return collision::provedSeparation(placedA.body, placedB.body, known.cache);
-  }
-
- private:
-  static PlacedPart place(const SolidPart& part, const Passage& p, bool atEnd) {
-    return PlacedPart(part, atEnd ? p.toCentre : p.fromCentre,
-                      atEnd ? p.toRotation : p.fromRotation, p.centreInFrame);
   }
 };
 
@@ -119,11 +118,17 @@ double clearPart(Search& search, const Passage& a, const Passage& b, const Known
 }  // namespace
 
 Passage standing(const Solid& solid) {
-  return {solid.motion.centre,   solid.motion.centre, solid.motion.rotation,
-          solid.motion.rotation, solid.radius,        solid.centreInFrame};
+  return {solid.motion.centre,
+          solid.motion.centre,
+          solid.motion.rotation,
+          solid.motion.rotation,
+          solid.radius,
+          solid.centreInFrame,
+          &solid};
 }
 
 double lengthOf(const Passage& p) {
+  if (p.stands) return 0;
   const Vec3 way = p.toCentre - p.fromCentre;
   return (way.norm() + turnOf(p) * p.radius) * kUp;
 }

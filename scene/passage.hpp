@@ -14,6 +14,7 @@ struct Passage {
   collision::Quat toRotation = collision::Quat::Identity();
   double radius = 0;                  ///< about the centre: no vertex is farther, metres
   Vec3 centreInFrame = Vec3::Zero();  ///< of the parts' frame
+  const Solid* stands = nullptr;      ///< it does not move: its frame is there to the last bit
 };
 
 /// The way of a solid that stands.

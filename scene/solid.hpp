@@ -32,6 +32,9 @@ struct Solid {
   /// velocity up to `mostPush` newtons. 0: no push.
   Vec3 pushVelocity = Vec3::Zero();
   double mostPush = 0;
+  /// Metres: no point may go farther in a step, since what is there was not asked for.
+  double leash = std::numeric_limits<double>::infinity();
+  bool restless = false;  ///< who leans on it does not sleep: it goes without being driven
 
   // Set by placeSolid() from the motion.
   Mat3 rotation = Mat3::Identity();
@@ -40,6 +43,11 @@ struct Solid {
 
   bool isFree() const { return motion.inverseMass > 0; }
   bool isAwake() const { return isFree() && !asleep; }
+  /// Driven, or somebody who pushes.
+  bool isMoved() const {
+    return !isFree() && (!motion.velocity.isZero(0) || !motion.spin.isZero(0) ||
+                         (mostPush > 0 && !pushVelocity.isZero(0)));
+  }
   /// m/s: no point goes faster.
   double fastest() const {
     return asleep ? 0 : motion.velocity.norm() + motion.spin.norm() * radius;

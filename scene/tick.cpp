@@ -172,6 +172,7 @@ TickReport tick(World& w) {
   followBodyCommands(world);
   const Wish wish = followOrders(world, report, count);
   planBodies(world);
+  planRigids(world);
   stopwatch.done(Stage::commands);
   updateBroadPhase(world, wish);
   stopwatch.done(Stage::broad);
@@ -183,6 +184,8 @@ TickReport tick(World& w) {
   stopwatch.done(Stage::bodies);
   moveAvatars(world, wish, count);
   stopwatch.done(Stage::avatars);
+  moveRigids(world, wish, report, count);
+  stopwatch.done(Stage::solver);
   findContacts(world, report, count);
   watchTriggers(world, report, count);
   judgeWalks(world, report, count);

@@ -84,7 +84,7 @@ Refusal refusalOf(const Drive& drive, const Lengths& lengths) {
 std::uint64_t seedHash(const Scene& scene, const Lengths& l) {
   Hasher hash(scene.hash());
   for (const double length : {l.epsilon, l.stepHeight, l.nearMiss, l.walkableNormalY, l.gravity,
-                              l.speedLimit, l.tick, l.patience})
+                              l.speedLimit, l.tick, l.patience, l.pushForce})
     hash.add(length);
   return hash.value();
 }
@@ -120,6 +120,7 @@ WorldState::WorldState(std::shared_ptr<const Scene> still, const Lengths& l)
       hash(seedHash(*scene, l)),
       broadPhase(scene->stillBoxes()) {
   makeBodies(*this);
+  startRigids(*this);
   auto first = std::make_shared<Snapshot>();
   first->stateHash = hash;
   first->bodies = viewsOfBodies(*this);

@@ -76,7 +76,7 @@ struct BodyCommand {
 // ---- what a tick tells -------------------------------------------------------------------------
 
 struct ContactEvent {
-  enum class Kind : std::uint8_t { begin, end, near, blocked, enter, leave };
+  enum class Kind : std::uint8_t { begin, end, near, blocked, enter, leave, leftWorld };
   enum class Reason : std::uint8_t { parted, left, shutdown };
 
   std::uint64_t tick = 0;
@@ -86,7 +86,8 @@ struct ContactEvent {
   /// An avatar or a rigid body; for `blocked` the one that was stopped, which may be any body.
   EntityId a = 0;
   /// What it met. A pair is told once: by the avatar of lesser id, by the avatar before a body, by
-  /// the body of lesser id. For `enter` and `leave` the trigger.
+  /// the body of lesser id. For `enter` and `leave` the trigger; for
+  /// `leftWorld`, told of a free body that fell or flew far beyond the scene, nothing.
   EntityId b = 0;
   collision::Decision decision;  ///< points and normal (from a to b) in the scene's frame
 };
@@ -111,10 +112,19 @@ struct Notice {
   std::string text;
 };
 
-enum class Stage : std::uint8_t { commands, broad, bodies, avatars, narrow, hash, snapshot };
-inline constexpr std::size_t kStages = 7;
+enum class Stage : std::uint8_t {
+  commands,
+  broad,
+  bodies,
+  avatars,
+  solver,
+  narrow,
+  hash,
+  snapshot
+};
+inline constexpr std::size_t kStages = 8;
 inline constexpr std::array<const char*, kStages> kStageNames{
-    "commands", "broad", "bodies", "avatars", "narrow", "hash", "snapshot"};
+    "commands", "broad", "bodies", "avatars", "solver", "narrow", "hash", "snapshot"};
 
 struct TickReport {
   std::shared_ptr<const Snapshot> snapshot;
@@ -126,8 +136,9 @@ struct TickReport {
   std::uint32_t rationalQueries = 0;  ///< of those, decided by exact arithmetic
   std::uint32_t boundedSweeps = 0;    ///< stopped by their iteration bound, before anything near
   std::uint32_t liveContacts = 0;
-  double worstPenetration = 0;     ///< metres, by the exact verdict; 0 when nothing penetrates
-  std::optional<TickAudit> audit;  ///< when the tick was audited
+  std::uint32_t squeezedBodies = 0;  ///< pairs of a kinematic body and a free one without way out
+  double worstPenetration = 0;       ///< metres, by the exact verdict; 0 when nothing penetrates
+  std::optional<TickAudit> audit;    ///< when the tick was audited
   /// Every queue is empty, nobody is falling or driven, and no body is on its way, but for paths.
   bool idle = true;
 };

@@ -11,6 +11,7 @@
 #include "collision/sort_and_sweep.hpp"
 #include "scene/body.hpp"
 #include "scene/obstacles.hpp"
+#include "scene/rigid_stage.hpp"
 #include "scene/world.hpp"
 
 namespace enfilade::scene {
@@ -80,6 +81,7 @@ struct WorldState {
   std::map<EntityId, std::uint32_t> bodyOfId;       ///< index into `bodies`
   std::vector<std::uint32_t> kinematics, triggers;  ///< indices into `bodies`, ascending
   std::vector<std::uint32_t> goingBodies;           ///< kinematic, in this tick; ascending
+  RigidStage rigids;                                ///< free bodies
 
   collision::SortAndSweep broadPhase;
   std::map<collision::MoverId, std::string> avatarOfMover;
@@ -121,6 +123,14 @@ double pushRoom(const WorldState& world, const Box& reach);
 void moveBodies(WorldState& world, TickReport& report, QueryCount& count);
 /// A kinematic body is still on its way, and not blocked.
 bool isBusy(const Body& body);
+
+// Free bodies (rigid_bodies.cpp).
+/// All are awake in the beginning, so that what was authored in the air falls.
+void startRigids(WorldState& world);
+/// What each awake one can reach in this tick.
+void planRigids(WorldState& world);
+/// The solver, and the sweep that keeps them out of avatars and one another.
+void moveRigids(WorldState& world, const Wish& wish, TickReport& report, QueryCount& count);
 
 /// How far contacts and near misses look, metres.
 inline double lookoutOf(const Lengths& lengths) {

@@ -42,6 +42,8 @@ const char* wordOf(v1::ContactEvent::Kind kind) {
       return "enter";
     case v1::ContactEvent::KIND_LEAVE:
       return "leave";
+    case v1::ContactEvent::KIND_LEFT_WORLD:
+      return "left_world";
     default:
       return "unknown";
   }

@@ -22,6 +22,8 @@ v1::ContactEvent::Kind kindOf(scene::ContactEvent::Kind kind) {
       return v1::ContactEvent::KIND_ENTER;
     case Kind::leave:
       return v1::ContactEvent::KIND_LEAVE;
+    case Kind::leftWorld:
+      return v1::ContactEvent::KIND_LEFT_WORLD;
   }
   return v1::ContactEvent::KIND_UNSPECIFIED;
 }

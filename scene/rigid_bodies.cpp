@@ -1,0 +1,315 @@
+// Free bodies in the tick. Before the broad phase each awake one says what it can reach; after the
+// avatars the solver moves them among all that they meet there:
+//  - still objects, their triangles;
+//  - other bodies: free ones, also those that sleep and may be woken, and what of them these lean
+//  on;
+//    kinematic ones, which have moved already, as driven from where they were;
+//  - avatars, which have moved already too: they stand, and push by what they want and could not
+//  do.
+// A body goes no farther in a tick than it said it can reach: what stands beyond was not asked for.
+#include <algorithm>
+#include <set>
+
+#include "scene/world_state.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+/// Metres that a body may go in a tick beyond its own speed, when something sets it in motion.
+constexpr double kSpareReach = 0.1;
+constexpr double kBelowScene = 50;     // metres: who falls so far has left the world
+constexpr double kBesideScene = 1000;  // metres: or flew so far
+
+DynamicsStep settingsOf(const Lengths& lengths) {
+  DynamicsStep step;
+  step.solver.seconds = lengths.tick;
+  step.solver.gravity = {0, -lengths.gravity, 0};
+  step.solver.epsilon = lengths.epsilon;
+  return step;
+}
+
+bool isSolid(const Body& body) {
+  return body.spec->kind != BodyKind::trigger;
+}
+
+// ---- solids ------------------------------------------------------------------------------------
+
+Solid solidOf(const Body& body) {
+  Solid solid;
+  for (const collision::Hull& hull : body.shape->parts) solid.parts.push_back(partOfHull(hull));
+  solid.radius = body.shape->radius;
+  solid.motion.friction = body.spec->friction;
+  solid.motion.centre = body.position;
+  solid.motion.rotation = body.orientation;
+  if (body.spec->kind == BodyKind::rigid) {
+    solid.motion.inverseMass = 1 / body.shape->mass;
+    solid.motion.inertia = body.shape->inertia;
+    solid.motion.inverseInertia = body.shape->inertia.inverse();
+    solid.motion.restitution = body.spec->restitution;
+  }
+  placeSolid(solid);
+  return solid;
+}
+
+/// The index of the entity's solid; it is made when it is first met.
+template <class Make>
+std::uint32_t solidFor(RigidStage& stage, EntityId entity, std::uint32_t part, Make make) {
+  const auto [at, isNew] = stage.solids.try_emplace(
+      {entity, part}, static_cast<std::uint32_t>(stage.dynamics.solids.size()));
+  if (isNew) {
+    stage.dynamics.solids.push_back(make());
+    stage.entities.push_back(entity);
+  }
+  return at->second;
+}
+
+std::uint32_t solidForBody(RigidStage& stage, const Body& body) {
+  return solidFor(stage, body.id, 0, [&] { return solidOf(body); });
+}
+
+std::uint32_t solidForStill(WorldState& world, std::uint32_t object) {
+  return solidFor(world.rigids, object + 1, 0,
+                  [&] { return stillSolid(world.scene->triangles(object)); });
+}
+
+/// Places the solid of an avatar's part where the avatar is now, to the last bit.
+std::uint32_t solidForPart(WorldState& world, const Avatar& avatar, std::uint32_t index,
+                           const Wish& wish) {
+  RigidStage& stage = world.rigids;
+  const AvatarPart& part = avatar.shape->parts[index];
+  const std::uint32_t i = solidFor(stage, avatar.id, index, [] { return Solid{}; });
+  Solid& solid = stage.dynamics.solids[i];
+  const Vec3 before = solid.position;
+  if (solid.parts.empty() || solid.parts[0].hull != part.hull.get()) {
+    solid.parts = {partOfHull(*part.hull)};
+    solid.radius = part.hull->radius;
+    solid.restless = true;
+    solid.odometer += 1e9;  // another shape: nothing that was known holds
+  }
+  const collision::ConvexBody placed = bodyAt(part, avatar.feet);
+  solid.position = solid.motion.centre = placed.translation;
+  if (part.rotation != solid.rotation) solid.odometer += 2 * solid.radius;
+  solid.rotation = part.rotation;
+  solid.motion.rotation = collision::Quat(part.rotation);
+  solid.odometer += (solid.position - before).norm() * (1 + 0x1p-40);
+  const auto wanted = wish.find(world.avatarNames[avatar.id - world.firstAvatarId()]);
+  const Vec3 velocity = wanted == wish.end() ? Vec3(Vec3::Zero()) : wanted->second;
+  solid.pushVelocity = velocity;
+  solid.mostPush = velocity.isZero(0) ? 0 : world.lengths.pushForce;
+  return i;
+}
+
+// ---- who may meet whom -------------------------------------------------------------------------
+
+/// Collects the pairs of parts of one free body.
+struct PairWriter {
+  WorldState& world;
+  const Wish& wish;
+  std::vector<PartPairKey>& keys;
+  double margin;
+
+  void add(std::uint32_t solid, std::uint32_t part, std::uint32_t other, std::uint32_t otherPart) {
+    if (solid < other) {
+      keys.push_back({solid, other, part, otherPart});
+    } else {
+      keys.push_back({other, solid, otherPart, part});
+    }
+  }
+  void addStill(const Body& body, std::uint32_t solid, std::uint32_t object) {
+    const collision::TriangleTree& tree = world.scene->triangles(object);
+    std::vector<std::uint32_t> found;
+    tree.query(body.reach, found);
+    if (found.empty()) return;
+    const std::uint32_t other = solidForStill(world, object);
+    for (const std::uint32_t triangle : found)
+      for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
+        if (overlaps(reachOfPart(body, part), collision::boxOf(tree.triangles()[triangle])))
+          add(solid, part, other, triangle);
+  }
+  void addBody(const Body& body, std::uint32_t solid, const Body& met) {
+    const std::uint32_t other = solidForBody(world.rigids, met);
+    for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
+      for (std::uint32_t otherPart = 0; otherPart < met.partBoxes.size(); ++otherPart)
+        if (overlaps(reachOfPart(body, part), reachOfPart(met, otherPart)))
+          add(solid, part, other, otherPart);
+  }
+  void addAvatar(const Body& body, std::uint32_t solid, const Avatar& avatar) {
+    for (std::uint32_t i = 0; i < avatar.shape->parts.size(); ++i) {
+      const std::uint32_t other = solidForPart(world, avatar, i, wish);
+      const Box box = boxAt(avatar.shape->parts[i].box, avatar.feet);
+      for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
+        if (overlaps(reachOfPart(body, part), box)) add(solid, part, other, 0);
+    }
+  }
+  /// Where a part of a body comes in this tick.
+  Box reachOfPart(const Body& body, std::uint32_t part) const {
+    double spare = margin;
+    if (isKinematic(body.spec->kind)) spare += body.plan.farthest;
+    if (body.spec->kind == BodyKind::rigid)
+      spare += world.rigids.dynamics.solids[world.rigids.solids.at({body.id, 0})].leash;
+    return grown(body.partBoxes[part], spare);
+  }
+};
+
+/// Bodies that are awake, and those that may be woken.
+std::vector<std::uint32_t> findSeeds(const WorldState& world) {
+  std::set<std::uint32_t> seeds;
+  std::vector<std::uint32_t> open;
+  const auto add = [&](std::uint32_t body) {
+    if (world.bodies[body].spec->kind == BodyKind::rigid && seeds.insert(body).second)
+      open.push_back(body);
+  };
+  const auto addPartners = [&](collision::MoverId mover) {
+    for (const auto& partner : world.broadPhase.partners(mover)) {
+      if (!partner.moves) continue;
+      const auto found = world.bodyOfMover.find(partner.id);
+      if (found != world.bodyOfMover.end()) add(found->second);
+    }
+  };
+  for (const std::uint32_t i : world.rigids.bodies)
+    if (!world.bodies[i].asleep) add(i);
+  for (const std::uint32_t i : world.goingBodies) addPartners(world.bodies[i].mover);
+  for (const auto& [name, avatar] : world.avatars)
+    if (world.bodyOfId.contains(avatar.stoppedBy)) add(world.bodyOfId.at(avatar.stoppedBy));
+  // What one that wakes leans on wakes too. Each body is added once.
+  while (!open.empty()) {
+    const std::uint32_t body = open.back();
+    open.pop_back();
+    addPartners(world.bodies[body].mover);
+  }
+  return {seeds.begin(), seeds.end()};
+}
+
+void gatherPairs(WorldState& world, const Wish& wish) {
+  RigidStage& stage = world.rigids;
+  std::vector<PartPairKey> keys;
+  PairWriter writer{world, wish, keys, lookoutOf(world.lengths)};
+  for (const std::uint32_t i : stage.seeds) {
+    const Body& body = world.bodies[i];
+    const std::uint32_t solid = solidForBody(stage, body);
+    for (const auto& partner : world.broadPhase.partners(body.mover)) {
+      if (!partner.moves) {
+        writer.addStill(body, solid, world.scene->solidObjects()[partner.id]);
+      } else if (const auto met = world.bodyOfMover.find(partner.id);
+                 met != world.bodyOfMover.end()) {
+        if (isSolid(world.bodies[met->second]))
+          writer.addBody(body, solid, world.bodies[met->second]);
+      } else {
+        writer.addAvatar(body, solid, world.avatars.at(world.avatarOfMover.at(partner.id)));
+      }
+    }
+  }
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  setPairs(stage.dynamics, keys);
+}
+
+// ---- before and after the solver ---------------------------------------------------------------
+
+/// Kinematic bodies have moved: their solids go from where they were to where they are.
+void driveSolids(WorldState& world) {
+  for (const std::uint32_t i : world.kinematics) {
+    const Body& body = world.bodies[i];
+    const auto found = world.rigids.solids.find({body.id, 0});
+    if (found == world.rigids.solids.end()) continue;
+    Solid& solid = world.rigids.dynamics.solids[found->second];
+    solid.motion.velocity = body.velocity, solid.motion.spin = body.spin;
+    if (!body.moved && solid.position != body.position) solid = solidOf(body);
+  }
+}
+
+/// They stand where the body says, to the last bit.
+void settleDriven(WorldState& world) {
+  for (const std::uint32_t i : world.kinematics) {
+    const Body& body = world.bodies[i];
+    const auto found = world.rigids.solids.find({body.id, 0});
+    if (found == world.rigids.solids.end()) continue;
+    Solid& solid = world.rigids.dynamics.solids[found->second];
+    if (solid.position == body.position && solid.rotation == body.rotation) continue;
+    // The solver took the same way, but for rounding.
+    solid.odometer += (solid.position - body.position).norm() +
+                      (solid.rotation - body.rotation).norm() * solid.radius;
+    solid.motion.centre = body.position, solid.motion.rotation = body.orientation;
+    placeSolid(solid);
+  }
+}
+
+void takeOver(Body& body, const Solid& solid) {
+  body.moved = solid.position != body.position ||
+               solid.motion.rotation.coeffs() != body.orientation.coeffs();
+  if (body.moved) placeBody(body, solid.motion.centre, solid.motion.rotation);
+  body.velocity = solid.motion.velocity;
+  body.spin = solid.motion.spin;
+  body.asleep = solid.asleep;
+}
+
+bool hasLeft(const WorldState& world, const Body& body) {
+  const Box& bounds = world.scene->bounds();
+  const Box within{bounds.min - Vec3(kBesideScene, kBelowScene, kBesideScene),
+                   bounds.max + Vec3::Constant(kBesideScene)};
+  return !contains(within, Box{body.position, body.position});
+}
+
+/// It stays where it is, asleep, and is told.
+void catchBody(WorldState& world, Body& body, Solid& solid, TickReport& report) {
+  body.left = true;
+  body.asleep = solid.asleep = true;
+  body.velocity = body.spin = solid.motion.velocity = solid.motion.spin = Vec3::Zero();
+  solid.motion.inverseMass = 0;
+  ContactEvent event;
+  event.tick = world.tick;
+  event.time = static_cast<double>(world.tick) * world.lengths.tick;
+  event.kind = ContactEvent::Kind::leftWorld;
+  event.a = body.id;
+  event.decision.pointA = event.decision.pointB = body.position;
+  report.contacts.push_back(event);
+}
+
+}  // namespace
+
+void startRigids(WorldState& world) {
+  for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
+    Body& body = world.bodies[i];
+    if (body.spec->kind != BodyKind::rigid) continue;
+    body.asleep = false;
+    world.rigids.bodies.push_back(i);
+    solidForBody(world.rigids, body);
+  }
+}
+
+void planRigids(WorldState& world) {
+  const double lookout = lookoutOf(world.lengths), tick = world.lengths.tick;
+  for (const std::uint32_t i : world.rigids.bodies) {
+    Body& body = world.bodies[i];
+    Solid& solid = world.rigids.dynamics.solids[world.rigids.solids.at({body.id, 0})];
+    const bool wasAwake = solid.leash > lookout;
+    if (body.asleep && !wasAwake) continue;
+    body.moved = false;
+    const double falls = world.lengths.gravity * tick * tick;
+    solid.leash = body.asleep ? lookout : solid.fastest() * tick + falls + kSpareReach;
+    body.reach = grown(boxOf(body), solid.leash + lookout);
+    world.broadPhase.move(body.mover, body.reach);
+  }
+}
+
+void moveRigids(WorldState& world, const Wish& wish, TickReport& report, QueryCount& count) {
+  RigidStage& stage = world.rigids;
+  if (stage.bodies.empty()) return;
+  stage.seeds = findSeeds(world);
+  if (stage.seeds.empty()) return;
+  gatherPairs(world, wish);
+  driveSolids(world);
+  stage.last = step(stage.dynamics, settingsOf(world.lengths));
+  settleDriven(world);
+  count.narrow += stage.last.looks + stage.last.proofs;
+  report.squeezedBodies = stage.last.squeezed;
+  for (const std::uint32_t i : stage.seeds) {
+    Body& body = world.bodies[i];
+    Solid& solid = stage.dynamics.solids[stage.solids.at({body.id, 0})];
+    if (body.left) continue;
+    takeOver(body, solid);
+    if (hasLeft(world, body)) catchBody(world, body, solid, report);
+  }
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,155 @@
+#include <gtest/gtest.h>
+
+#include "tests/scene/body_trial.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using namespace testing;
+using Event = ContactEvent::Kind;
+
+/// A floor, and free boxes.
+Model loose(const std::vector<NamedBox>& boxes, const std::vector<NamedBox>& still = {}) {
+  std::vector<NamedBox> all{floorBox()};
+  all.insert(all.end(), still.begin(), still.end());
+  const auto first = static_cast<std::uint32_t>(all.size());
+  all.insert(all.end(), boxes.begin(), boxes.end());
+  Model model = boxModel(all);
+  for (std::uint32_t i = 0; i < boxes.size(); ++i)
+    model.bodies.push_back(bodySpec(boxes[i].path, BodyKind::rigid, {first + i}));
+  return model;
+}
+
+/// Whether any free body penetrates a triangle or another body, by the exact verdict.
+bool anyBodyPenetrates(const World& world) {
+  const WorldState& state = world.state();
+  const auto penetrate = [](const collision::ConvexBody& a, const collision::ConvexBody& b) {
+    collision::FeatureCache cache;
+    return collision::decide(a, b, cache).verdict == collision::Verdict::penetrating;
+  };
+  for (std::size_t i = 0; i < state.bodies.size(); ++i) {
+    const Body& body = state.bodies[i];
+    if (body.spec->kind != BodyKind::rigid) continue;
+    for (const std::uint32_t object : state.scene->solidObjects())
+      for (const collision::Triangle& t : state.scene->triangles(object).triangles())
+        if (penetrate(partOf(body, 0), {std::span<const Vec3>(t), Vec3::Zero()})) return true;
+    for (std::size_t k = 0; k < i; ++k)
+      if (penetrate(partOf(body, 0), partOf(state.bodies[k], 0))) return true;
+  }
+  return false;
+}
+
+TEST(RigidBodies, ABoxFallsOntoTheFloorRestsThereAndCostsNothingAsleep) {
+  BodyTrial t(loose({{"box", {0, 1, 0}, {0.4, 1.4, 0.4}}}));
+  t.ticks(150);
+  const Body& box = t.body("box");
+  EXPECT_TRUE(box.asleep);
+  EXPECT_NEAR(box.position.y(), 0.2, 0.5e-3);
+  EXPECT_GT(box.position.y(), 0.2);
+  const Vec3 rest = box.position;
+  const TickReport report = t.step();
+  EXPECT_TRUE(report.idle);
+  EXPECT_EQ(report.narrowQueries, 0u);
+  t.ticks(100);
+  EXPECT_EQ(t.body("box").position, rest);
+}
+
+TEST(RigidBodies, ATowerStaysAndSleepsWithoutPenetration) {
+  std::vector<NamedBox> tower;
+  for (int i = 0; i < 5; ++i) {
+    const double low = 0.001 + 0.301 * i;
+    tower.push_back({"b" + std::to_string(i), {0, low, 0}, {0.3, low + 0.3, 0.3}});
+  }
+  BodyTrial t(loose(tower));
+  for (int i = 0; i < 240; ++i) {
+    t.step();
+    ASSERT_FALSE(anyBodyPenetrates(t.world)) << i;
+  }
+  for (int i = 0; i < 5; ++i) {
+    const Body& box = t.body("b" + std::to_string(i));
+    EXPECT_TRUE(box.asleep) << i;
+    EXPECT_NEAR(box.position.x(), 0.15, 2e-3) << i;
+  }
+}
+
+TEST(RigidBodies, AHeavyBoxThatFallsOntoAnAvatarBesideAWallLeavesItOutside) {
+  for (const double speed : {5.0, 50.0, 500.0}) {
+    Model model = loose({{"crate", {-0.4, 3, -0.4}, {0.7, 4, 0.6}}},
+                        {{"wall", {0.31, 0, -3}, {0.5, 2.9, 3}}});
+    model.bodies[0].mass = 5000;
+    BodyTrial t(std::move(model));
+    t.order("ann", Spawn{.at = {0, 0.001, 0}});
+    t.ticks(2);
+    auto& stage = t.world.state().rigids;
+    stage.dynamics.solids[0].motion.velocity = {0.3 * speed, -speed, 0};
+    for (int i = 0; i < 120; ++i) {
+      t.step();
+      ASSERT_EQ(whoPenetrates(t.world), "") << speed << " tick " << i;
+    }
+    EXPECT_LT(t.body("crate").position.y(), 3.2) << "it never came down";
+  }
+}
+
+TEST(RigidBodies, AnAvatarPushesALightBoxAlongAndNotAHeavyOne) {
+  for (const bool heavy : {false, true}) {
+    Model model = loose({{"box", {1, 0.0005, -0.3}, {1.6, 0.6, 0.3}}});
+    model.bodies[0].mass = heavy ? 2000 : 20;
+    BodyTrial t(std::move(model));
+    t.order("ann", Spawn{.at = {0, 0.001, 0}});
+    t.step();
+    t.order("ann", Drive{{1, 0, 0}});
+    for (int i = 0; i < 180; ++i) {
+      t.step();
+      ASSERT_EQ(whoPenetrates(t.world), "") << i;
+    }
+    const double moved = t.body("box").position.x() - 1.3;
+    if (heavy) {
+      EXPECT_LT(std::abs(moved), 1e-3);
+    } else {
+      EXPECT_GT(moved, 1.5);
+      EXPECT_LT(moved, 3);
+    }
+  }
+}
+
+TEST(RigidBodies, ASleepingBoxIsWokenByADoorThatPushesIt) {
+  Model model = loose({{"box", {0.5, 0.0005, 0.1}, {0.8, 0.3, 0.4}}},
+                      {{"leaf", {0, 0.01, -0.02}, {1, 2.1, 0.02}}});
+  BodySpec door = bodySpec("door", BodyKind::hinged, {1});
+  door.low = -1.5, door.high = 1.5, door.speed = 1;
+  model.bodies.push_back(door);
+  BodyTrial t(std::move(model));
+  t.ticks(120);
+  ASSERT_TRUE(t.body("box").asleep);
+  const Vec3 before = t.body("box").position;
+  t.tell({"door", BodyCommand::Action::to, -1.2, 0, {}});
+  t.ticks(200);
+  EXPECT_GT((t.body("box").position - before).norm(), 0.2);
+  EXPECT_FALSE(anyBodyPenetrates(t.world));
+}
+
+TEST(RigidBodies, ABodyThatFallsOutOfTheWorldIsToldAndTakenOut) {
+  BodyTrial t(loose({{"box", {12, 1, 0}, {12.4, 1.4, 0.4}}}));
+  t.ticks(400);
+  EXPECT_EQ(t.told(Event::leftWorld, "box", ""), 1);
+  const Body& box = t.body("box");
+  EXPECT_TRUE(box.left);
+  const Vec3 caught = box.position;
+  EXPECT_TRUE(t.step().idle);
+  EXPECT_EQ(t.body("box").position, caught);
+}
+
+TEST(RigidBodies, TwoRunsHaveOneHash) {
+  const auto run = [] {
+    BodyTrial t(loose({{"a", {0, 1, 0}, {0.4, 1.4, 0.4}}, {"b", {0.1, 2, 0.1}, {0.5, 2.3, 0.6}}}));
+    t.order("ann", Spawn{.at = {2, 0.001, 0}});
+    t.step();
+    t.order("ann", Drive{{-1, 0, 0}});
+    t.ticks(200);
+    return t.world.state().hash;
+  };
+  EXPECT_EQ(run(), run());
+}
+
+}  // namespace
+}  // namespace enfilade::scene
