@@ -200,7 +200,8 @@ Passage firstPart(Passage passage, double fraction) {
 }
 
 SolidPart partAsSuch(const Solid& solid, std::uint32_t part) {
-  if (solid.mesh) return {solid.mesh->triangles()[part], nullptr, {}};
+  if (part >= solid.parts.size())
+    return {solid.mesh->triangles()[part - solid.parts.size()], nullptr, {}};
   return solid.parts[part];
 }
 

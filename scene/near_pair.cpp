@@ -57,7 +57,7 @@ Vec3 facing(const Solid& solid, std::uint32_t part, const ConvexBody& body, cons
     const Vec3 world = body.rotation ? Vec3(*body.rotation * normal) : normal;
     return (along < 0 ? -1 : 1) / length * world;
   }
-  if (solid.mesh || solid.parts[part].faceNormals.empty()) return Vec3::Zero();
+  if (part >= solid.parts.size() || solid.parts[part].faceNormals.empty()) return Vec3::Zero();
   const Vec3 inBody = toBody(body, direction);
   const Vec3* best = nullptr;
   double most = -2;

@@ -69,7 +69,7 @@ std::uint32_t solidForBody(RigidStage& stage, const Body& body) {
 
 std::uint32_t solidForStill(WorldState& world, std::uint32_t object) {
   return solidFor(world.rigids, object + 1, 0,
-                  [&] { return stillSolid(world.scene->triangles(object)); });
+                  [&] { return stillSolid(world.scene->parts(object)); });
 }
 
 /// Places the solid of an avatar's part where the avatar is now, to the last bit.
@@ -116,15 +116,18 @@ struct PairWriter {
     }
   }
   void addStill(const Body& body, std::uint32_t solid, std::uint32_t object) {
-    const collision::TriangleTree& tree = world.scene->triangles(object);
+    const ObjectParts& parts = world.scene->parts(object);
     std::vector<std::uint32_t> found;
-    tree.query(body.reach, found);
+    parts.query(body.reach, found);
     if (found.empty()) return;
     const std::uint32_t other = solidForStill(world, object);
-    for (const std::uint32_t triangle : found)
+    for (const std::uint32_t met : found) {
+      const Box box = met < parts.hulls.size()
+                          ? parts.hullBoxes[met]
+                          : collision::boxOf(parts.triangles.triangles()[met - parts.hulls.size()]);
       for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
-        if (overlaps(reachOfPart(body, part), collision::boxOf(tree.triangles()[triangle])))
-          add(solid, part, other, triangle);
+        if (overlaps(reachOfPart(body, part), box)) add(solid, part, other, met);
+    }
   }
   void addBody(const Body& body, std::uint32_t solid, const Body& met) {
     const std::uint32_t other = solidForBody(world.rigids, met);

@@ -63,10 +63,14 @@ Solid heldSolid(std::span<const collision::Hull* const> hulls,
   return solid;
 }
 
-Solid stillSolid(const collision::TriangleTree& mesh) {
+Solid stillSolid(const ObjectParts& parts) {
   Solid solid;
-  solid.mesh = &mesh;
-  for (const collision::Triangle& triangle : mesh.triangles())
+  for (const collision::Hull& hull : parts.hulls) {
+    solid.parts.push_back(partOfHull(hull));
+    solid.radius = std::max(solid.radius, hull.radius * kUp);
+  }
+  solid.mesh = &parts.triangles;
+  for (const collision::Triangle& triangle : parts.triangles.triangles())
     for (const Vec3& corner : triangle) solid.radius = std::max(solid.radius, corner.norm() * kUp);
   return solid;
 }

@@ -6,6 +6,7 @@
 
 #include "collision/narrow_phase.hpp"
 #include "collision/triangle_tree.hpp"
+#include "scene/object_parts.hpp"
 #include "scene/rigid_body.hpp"
 
 namespace enfilade::scene {
@@ -21,11 +22,12 @@ struct SolidPart {
 SolidPart partOfHull(const collision::Hull& hull);
 
 struct Solid {
-  RigidBody motion;                               ///< inverse mass 0: driven, or still
-  Vec3 centreInFrame = Vec3::Zero();              ///< of mass, in the frame of the parts
-  std::vector<SolidPart> parts;                   ///< empty if there is a mesh
-  const collision::TriangleTree* mesh = nullptr;  ///< its triangles are the parts, and it is still
-  double radius = 0;                              ///< metres about the centre: no vertex is farther
+  RigidBody motion;                   ///< inverse mass 0: driven, or still
+  Vec3 centreInFrame = Vec3::Zero();  ///< of mass, in the frame of the parts
+  std::vector<SolidPart> parts;
+  /// Of what is still: its triangles are parts too, numbered after the others.
+  const collision::TriangleTree* mesh = nullptr;
+  double radius = 0;    ///< metres about the centre: no vertex is farther
   bool asleep = false;  ///< a free body that stands until something wakes it
   double calmFor = 0;   ///< seconds
   /// Who pushes (an avatar) stands as a still thing, and gives what it is held back from by this
@@ -58,7 +60,8 @@ void placeSolid(Solid& solid);
 
 /// Part `part` where the solid is.
 inline collision::ConvexBody partOf(const Solid& solid, std::uint32_t part) {
-  if (solid.mesh) return {solid.mesh->triangles()[part], Vec3::Zero(), nullptr, nullptr};
+  if (part >= solid.parts.size())
+    return {solid.mesh->triangles()[part - solid.parts.size()], Vec3::Zero(), nullptr, nullptr};
   const SolidPart& p = solid.parts[part];
   return {p.vertices, solid.position, &solid.rotation, p.hull};
 }
@@ -69,7 +72,8 @@ Solid freeSolid(std::span<const collision::Hull* const> hulls, double density,
 /// The same, standing or driven: its centre is the frame's origin.
 Solid heldSolid(std::span<const collision::Hull* const> hulls,
                 const collision::Pose& worldFromFrame);
-/// Triangles of the world, still.
-Solid stillSolid(const collision::TriangleTree& mesh);
+/// What is still: hulls and triangles in the world's frame, numbered as ObjectParts does. `parts`
+/// has to outlive it.
+Solid stillSolid(const ObjectParts& parts);
 
 }  // namespace enfilade::scene

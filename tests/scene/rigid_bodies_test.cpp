@@ -31,7 +31,7 @@ bool anyBodyPenetrates(const World& world) {
     const Body& body = state.bodies[i];
     if (body.spec->kind != BodyKind::rigid) continue;
     for (const std::uint32_t object : state.scene->solidObjects())
-      for (const collision::Triangle& t : state.scene->triangles(object).triangles())
+      for (const collision::Triangle& t : solidTriangles(state.scene->model(), object))
         if (penetrate(partOf(body, 0), {std::span<const Vec3>(t), Vec3::Zero()})) return true;
     for (std::size_t k = 0; k < i; ++k)
       if (penetrate(partOf(body, 0), partOf(state.bodies[k], 0))) return true;

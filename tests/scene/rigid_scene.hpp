@@ -65,7 +65,7 @@ struct RigidScene {
     std::vector<PartPairKey> keys;
     const auto& solids = dynamics.solids;
     const auto partsOf = [](const Solid& s) {
-      return static_cast<std::uint32_t>(s.mesh ? s.mesh->triangles().size() : s.parts.size());
+      return static_cast<std::uint32_t>(s.parts.size() + (s.mesh ? s.mesh->triangles().size() : 0));
     };
     for (std::uint32_t a = 0; a < solids.size(); ++a)
       for (std::uint32_t b = a + 1; b < solids.size(); ++b)
