@@ -1,25 +1,28 @@
-// The hidden verb: reads one file with assimp and writes what it found into a pipe. It runs in a
-// process of its own, so nothing that assimp does can hurt the program that asked.
+// The hidden verb: what copies of our own executable do for an import. Each runs in a process of
+// its own, so nothing that a reader does can hurt the program that asked.
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <assimp/DefaultIOSystem.h>
+#include <algorithm>
 #include <assimp/Importer.hpp>
 #include <assimp/ProgressHandler.hpp>
 #include <cerrno>
-#include <charconv>
 #include <cstdlib>
 #include <cstring>
 #include <new>
 #include <string_view>
 
+#include "scene/ifc_plus_plus.hpp"
 #include "scene/import_convert.hpp"
-#include "scene/import_frames.hpp"
+#include "scene/import_ifc.hpp"
+#include "scene/import_process.hpp"
 #include "scene/model_stream.hpp"
 
 namespace enfilade::scene {
@@ -37,40 +40,6 @@ constexpr bool kSanitized = false;
 constexpr bool kSanitized = false;
 #endif
 
-// ---- towards the parent -------------------------------------------------------------------------
-
-void writeAll(const void* data, std::size_t size) {
-  const auto* bytes = static_cast<const char*>(data);
-  while (size > 0) {
-    const ssize_t written = write(kImportPipe, bytes, size);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) _exit(1);  // the parent is gone
-    bytes += written;
-    size -= static_cast<std::size_t>(written);
-  }
-}
-
-void sendFrame(ImportFrame kind, const void* data, std::size_t size) {
-  const std::uint64_t length = size;
-  char header[ImportFrameHeader::kSize];
-  header[0] = static_cast<char>(kind);
-  std::memcpy(header + 1, &length, sizeof length);
-  writeAll(header, sizeof header);
-  writeAll(data, size);
-}
-
-void sendProgress(const std::string& stage, double fraction) {
-  std::string frame(sizeof fraction, '\0');
-  std::memcpy(frame.data(), &fraction, sizeof fraction);
-  frame += stage;
-  sendFrame(ImportFrame::progress, frame.data(), frame.size());
-}
-
-int sendError(const std::string& text) {
-  sendFrame(ImportFrame::error, text.data(), text.size());
-  return 1;
-}
-
 /// Passes assimp's progress on, at most a hundred times.
 class ForwardProgress : public Assimp::ProgressHandler {
  public:
@@ -87,48 +56,45 @@ class ForwardProgress : public Assimp::ProgressHandler {
 
 // ---- the work -----------------------------------------------------------------------------------
 
-struct Request {
-  std::string file;
-  std::optional<double> metresPerUnit;
-  std::optional<char> up;
-  rlim_t memoryLimit = RLIM_INFINITY;
-  pid_t parent = 0;
-};
-
-template <class T>
-T numberFrom(std::string_view text) {
-  T value{};
-  std::from_chars(text.data(), text.data() + text.size(), value);
-  return value;
-}
-
-/// Arguments after the verb: parent's process id, memory limit, unit or -, up or -, file.
-std::optional<Request> requestFrom(int argc, char** argv) {
-  if (argc != 7) return std::nullopt;
-  Request request;
-  request.parent = numberFrom<pid_t>(argv[2]);
-  request.memoryLimit = numberFrom<rlim_t>(argv[3]);
-  if (std::string_view(argv[4]) != "-") request.metresPerUnit = numberFrom<double>(argv[4]);
-  if (std::string_view(argv[5]) != "-") request.up = argv[5][0];
-  request.file = argv[6];
-  return request;
-}
-
 /// No core files, no more memory than allowed, no life after the parent's.
-void limitThisProcess(const Request& request) {
+void limitThisProcess(const ImportRequest& request, pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != request.parent) _exit(1);  // it died before the line above
+  if (getppid() != parent) _exit(1);  // it died before the line above
   const rlimit none{0, 0};
   setrlimit(RLIMIT_CORE, &none);
-  const rlimit memory{request.memoryLimit, request.memoryLimit};
-  // Sanitizers reserve terabytes of address space.
-  if (!kSanitized && request.memoryLimit > 0) setrlimit(RLIMIT_AS, &memory);
+  // Only the soft limit: Node.js, which may be started from here, reserves address space by the
+  // tens of gigabytes and is limited in what it writes to. So do sanitizers.
+  const bool node = request.task == ImportTask::webIfc;
+  rlimit memory{};
+  getrlimit(RLIMIT_AS, &memory);
+  const bool limited = request.memoryLimit > 0 && !kSanitized;
+  memory.rlim_cur = limited && !node ? request.memoryLimit : memory.rlim_max;
+  setrlimit(RLIMIT_AS, &memory);
+  const rlimit data{request.memoryLimit, request.memoryLimit};
+  if (node && request.memoryLimit > 0) setrlimit(RLIMIT_DATA, &data);
+}
+
+/// What ENFILADE_IMPORT_FAULT calls a copy with this task, with the colon.
+std::string_view faultPrefix(ImportTask task) {
+  switch (task) {
+    case ImportTask::model:
+      return "";
+    case ImportTask::assimp:
+      return "assimp:";
+    case ImportTask::webIfc:
+      return "web-ifc:";
+    case ImportTask::ifcPlusPlus:
+      return "ifcplusplus:";
+  }
+  return "";
 }
 
 /// Misbehaves as ENFILADE_IMPORT_FAULT says; see import_model.hpp.
-void misbehaveIfAsked() {
+void misbehaveIfAsked(ImportTask task) {
   const char* wanted = std::getenv("ENFILADE_IMPORT_FAULT");
-  const std::string_view fault = wanted == nullptr ? "" : wanted;
+  std::string_view fault = wanted == nullptr ? "" : wanted;
+  if (!fault.starts_with(faultPrefix(task))) return;
+  fault.remove_prefix(faultPrefix(task).size());
   if (fault == "hang") pause();
   if (fault == "crash") {
     signal(SIGSEGV, SIG_DFL);
@@ -161,62 +127,118 @@ class WatchedFiles : public Assimp::DefaultIOSystem {
   std::vector<std::string>& names_;
 };
 
-const aiScene& parse(Assimp::Importer& importer, const Request& request,
+std::string readDescriptor(int descriptor) {
+  struct stat status {};
+  std::string text;
+  if (fstat(descriptor, &status) == 0) text.resize(static_cast<std::size_t>(status.st_size));
+  std::size_t done = 0;
+  while (done < text.size()) {
+    const ssize_t size =
+        pread(descriptor, text.data() + done, text.size() - done, static_cast<off_t>(done));
+    if (size <= 0) throw ImportError("the file cannot be read from memory (open)");
+    done += static_cast<std::size_t>(size);
+  }
+  return text;
+}
+
+/// `text`: the file in memory, where it was unzipped or mended; else assimp opens it, and `files`
+/// takes down which others.
+const aiScene& parse(Assimp::Importer& importer, const ConvertInput& input, const std::string& text,
                      std::vector<std::string>& files) {
   importer.SetIOHandler(new WatchedFiles(files));  // the importer deletes it, and what follows
   importer.SetProgressHandler(new ForwardProgress);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, false);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, true);
-  const aiScene* scene =
-      importer.ReadFile(request.file, aiProcess_Triangulate | aiProcess_JoinIdenticalVertices);
+  constexpr unsigned kSteps = aiProcess_Triangulate | aiProcess_JoinIdenticalVertices;
+  const char* hint = input.format == ModelFormat::ifc ? "ifc" : "dae";
+  const aiScene* scene = text.empty()
+                             ? importer.ReadFile(input.file.string(), kSteps)
+                             : importer.ReadFileFromMemory(text.data(), text.size(), kSteps, hint);
   if (scene == nullptr || scene->mRootNode == nullptr) {
     const std::string why = importer.GetErrorString();
     if (why.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
-    throw ImportError(request.file + ": cannot be read: " + why +
+    throw ImportError(input.file.string() + ": cannot be read: " + why +
                       "; check the file in the program that wrote it, or re-export it as glTF "
                       "(parse)");
   }
   return *scene;
 }
 
-int answer(const Request& request) {
-  sendProgress("open", 0);
-  misbehaveIfAsked();
+Model modelByAssimp(const ImportRequest& request) {
   ConvertInput input;
   input.file = request.file;
   input.format = modelFormatOf(request.file).value();  // the parent has looked
-  input.facts = readFileFacts(request.file, input.format);
   input.metresPerUnit = request.metresPerUnit;
   input.up = request.up;
-
+  std::string text;
+  if (request.task == ImportTask::assimp) {
+    text = readDescriptor(kIfcFile);
+    input.facts = ifcFileFacts(text);
+  } else {
+    input.facts = readFileFacts(request.file, input.format);
+    if (input.format == ModelFormat::collada) text = mendedCollada(request.file, input.facts);
+  }
   sendProgress("parse", 0);
   auto* importer = new Assimp::Importer;  // left to _exit: tearing a large scene down takes time
   std::vector<std::string> files;
-  const aiScene& scene = parse(*importer, request, files);
-  Model model = convertScene(scene, input, sendProgress);
+  Model model = convertScene(parse(*importer, input, text, files), input, sendProgress);
   model.filesBeside.insert(model.filesBeside.end(), files.begin(), files.end());
+  return model;
+}
+
+void sendModel(const Model& model) {
   sendProgress("send", 0);
   const std::vector<std::byte> stream = serialiseModel(model);
   sendFrame(ImportFrame::model, stream.data(), stream.size());
-  return 0;
+}
+
+/// Returns only when it cannot be done.
+void becomeNode(const ImportRequest& request) {
+  const std::size_t megabytes = std::max<std::size_t>(request.memoryLimit >> 21, 256);
+  const std::string heap = "--max-old-space-size=" + std::to_string(megabytes);
+  const std::string first = std::to_string(request.firstProduct);
+  unsetenv("NODE_OPTIONS");
+  execl(request.program.c_str(), request.program.c_str(), heap.c_str(), request.script.c_str(),
+        first.c_str(), nullptr);
+  throw ImportError(request.program + " cannot be started: " + std::strerror(errno));
+}
+
+void answer(const ImportRequest& request) {
+  sendProgress("open", 0);
+  misbehaveIfAsked(request.task);
+  switch (request.task) {
+    case ImportTask::model:
+      if (modelFormatOf(request.file) == ModelFormat::ifc) {
+        return sendModel(importIfc(request, sendProgress));
+      }
+      return sendModel(modelByAssimp(request));
+    case ImportTask::assimp:
+      return sendModel(modelByAssimp(request));
+    case ImportTask::webIfc:
+      return becomeNode(request);
+    case ImportTask::ifcPlusPlus:
+      return sendShapesByIfcPlusPlus(readDescriptor(kIfcFile));
+  }
 }
 
 }  // namespace
 
 std::optional<int> runImportChild(int argc, char** argv) {
   if (argc < 2 || std::string_view(argv[1]) != kImportVerb) return std::nullopt;
-  const std::optional<Request> request = requestFrom(argc, argv);
+  int parent = 0;
+  const std::optional<ImportRequest> request = importRequestFrom(argc, argv, parent);
   if (!request) return 2;
-  limitThisProcess(*request);
+  limitThisProcess(*request, parent);
   int code = 1;
   try {
-    code = answer(*request);
+    answer(*request);
+    code = 0;
   } catch (const std::bad_alloc&) {
-    code = sendError(request->file + ": needs more than the " +
-                     std::to_string(request->memoryLimit >> 20) +
-                     " MiB of memory that an import may take; split the file or raise the limit");
+    sendError(request->file + ": needs more than the " +
+              std::to_string(request->memoryLimit >> 20) +
+              " MiB of memory that an import may take; split the file or raise the limit");
   } catch (const std::exception& error) {
-    code = sendError(error.what());
+    sendError(error.what());
   }
   _exit(code);
 }

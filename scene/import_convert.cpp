@@ -8,16 +8,11 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kFarAway = 1000;  // metres: farther from the origin, floats lose the millimetre
-constexpr double kGreatest = 1e7;  // metres from the scene's origin: no world takes more
-
-/// Y up from `up`, by a quarter turn about the axis that is neither.
-Eigen::Matrix3d yUpFrom(char up) {
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
-  if (up == 'z') turn << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-  if (up == 'x') turn << 0, -1, 0, 1, 0, 0, 0, 0, 1;
-  return turn;
-}
+constexpr double kFarAway = 1000;     // metres: farther from the origin, floats lose the millimetre
+constexpr double kGreatest = 1e7;     // metres from the scene's centre: no world takes more
+constexpr double kStrayFactor = 30;   // times the median reach; a town's outskirts are at about 5
+constexpr double kMostStrays = 0.05;  // of all objects; more are no strays but a second site
+constexpr double kCoarse = 1e-4;      // metres between neighbouring floats that deserve a word
 
 /// What assimp put before the root's own transform, to the bit of its floats.
 Eigen::Matrix3d assimpFromFile(const FileFacts& facts, ModelFormat format) {
@@ -58,15 +53,19 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Zero, or whole metres near the median of the objects' centres: a stray object far off does not
-/// move it.
-Vec3 sceneOffset(const std::vector<Box>& objectBoxes) {
+Vec3 medianCentre(const std::vector<Box>& boxes) {
   Vec3 centre = Vec3::Zero();
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
-    for (const Box& box : objectBoxes) values.push_back(box.centre()[axis]);
+    for (const Box& box : boxes) values.push_back(box.centre()[axis]);
     centre[axis] = median(values);
   }
+  return centre;
+}
+
+/// Zero, or whole metres near the median of the objects' centres.
+Vec3 sceneOffset(const std::vector<Box>& objectBoxes) {
+  const Vec3 centre = medianCentre(objectBoxes);
   if (!centre.allFinite() || centre.norm() <= kFarAway) return Vec3::Zero();
   return {std::round(centre.x()), std::round(centre.y()), std::round(centre.z())};
 }
@@ -74,12 +73,18 @@ Vec3 sceneOffset(const std::vector<Box>& objectBoxes) {
 /// Meshes whose own coordinates are large are moved to their origin, in doubles, and their
 /// placements moved back, so that no renderer has to subtract large floats.
 void recentreMeshes(std::vector<ObjectDraft>& drafts, std::vector<Mesh>& meshes,
-                    std::vector<Box>& meshBoxes) {
+                    std::vector<Box>& meshBoxes, ProblemLog& problems) {
   std::vector<Vec3> shifts(meshes.size(), Vec3::Zero());
   for (const ObjectDraft& draft : drafts) {
     for (const auto& p : draft.placements) {
       const Vec3 centre = meshBoxes[p.mesh].centre();
-      if ((p.worldFromMesh.linear() * centre).norm() <= kFarAway) continue;
+      const double distance = (p.worldFromMesh.linear() * centre).norm();
+      if (!(distance > kFarAway)) continue;
+      if (shifts[p.mesh].isZero(0) && distance * 0x1p-23 > kCoarse) {
+        problems.add("coarse_coordinates", meshes[p.mesh].name + ": steps of " +
+                                               std::to_string(distance * 0x1p-23) +
+                                               " m; export it near its origin, placed by its node");
+      }
       shifts[p.mesh] = {std::round(centre.x()), std::round(centre.y()), std::round(centre.z())};
     }
   }
@@ -134,10 +139,7 @@ Eigen::Affine3d sharedFrame(const ObjectDraft& draft, const Vec3& offset) {
 
 /// One transform an object: parts that lie otherwise are moved into the shared frame.
 Object finishObject(const ObjectDraft& draft, const Vec3& offset, MeshTable& meshes) {
-  Object object;
-  object.path = draft.path;
-  object.globalId = draft.globalId;
-  object.ifcClass = draft.ifcClass;
+  Object object = draft.object;
   const Eigen::Affine3d frame = sharedFrame(draft, offset);
   for (const auto& p : draft.placements) {
     if (p.worldFromMesh.matrix() == frame.matrix()) {
@@ -148,28 +150,72 @@ Object finishObject(const ObjectDraft& draft, const Vec3& offset, MeshTable& mes
     }
   }
   object.worldFromMesh = Eigen::Translation3d(-offset) * frame;
+  if (object.worldFromPlacement) object.worldFromPlacement->pretranslate(-offset);
   return object;
 }
 
-/// Drops objects that no world could hold, and says how many are mirrored or placed coarsely.
-void judgePlacements(std::vector<ObjectDraft>& drafts, const std::vector<Box>& meshBoxes,
-                     const Vec3& offset, ProblemLog& problems) {
-  std::erase_if(drafts, [&](const ObjectDraft& draft) {
-    const Box box = boxOf(draft, meshBoxes);
-    const double reach = std::max((box.min - offset).cwiseAbs().maxCoeff(),
-                                  (box.max - offset).cwiseAbs().maxCoeff());
-    if (reach <= kGreatest) return false;
-    problems.add("far_object_dropped", draft.path);
-    return true;
-  });
+/// How far from `centre` a box begins, and how far its farthest corner is.
+struct Reach {
+  double nearest, farthest;
+};
+
+Reach reachOf(const Box& box, const Vec3& centre) {
+  const Vec3 low = box.min - centre, high = box.max - centre;
+  return {low.cwiseMax(-high).cwiseMax(Vec3::Zero()).norm(),
+          low.cwiseAbs().cwiseMax(high.cwiseAbs()).norm()};
+}
+
+/// Drops what no world could hold, and strays: objects that begin farther from the scene's centre
+/// than kStrayFactor times the median object reaches (and a kilometre), if they are few. A stray
+/// would stretch the scene's bounds over nothing.
+void dropFarObjects(std::vector<ObjectDraft>& drafts, std::vector<Box>& boxes,
+                    ProblemLog& problems) {
+  if (drafts.empty()) return;
+  const Vec3 centre = medianCentre(boxes);
+  std::vector<double> reaches;
+  for (const Box& box : boxes) reaches.push_back(reachOf(box, centre).farthest);
+  const double limit = std::max(kFarAway, kStrayFactor * median(reaches));
+  const auto isStray = [&](const Box& box) { return !(reachOf(box, centre).nearest <= limit); };
+  const auto strays = static_cast<double>(std::count_if(boxes.begin(), boxes.end(), isStray));
+  // Of two things that lie far apart, none is the stray.
+  const bool few =
+      boxes.size() > 2 && strays <= std::max(1.0, kMostStrays * static_cast<double>(boxes.size()));
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < drafts.size(); ++i) {
+    const Reach reach = reachOf(boxes[i], centre);
+    if (!(reach.farthest <= kGreatest) || (few && isStray(boxes[i]))) {
+      problems.add("far_object_dropped", drafts[i].object.path + ": " +
+                                             std::to_string(std::llround(reach.nearest)) +
+                                             " m from the middle of the others");
+      continue;
+    }
+    if (isStray(boxes[i])) problems.add("far_object", drafts[i].object.path);
+    if (kept != i) {
+      drafts[kept] = std::move(drafts[i]);
+      boxes[kept] = boxes[i];
+    }
+    ++kept;
+  }
+  drafts.resize(kept);
+  boxes.resize(kept);
+}
+
+void countOddPlacements(const std::vector<ObjectDraft>& drafts, ProblemLog& problems) {
   for (const ObjectDraft& draft : drafts) {
     const double determinant = draft.placements.front().worldFromMesh.linear().determinant();
-    if (determinant < 0) problems.add("mirrored_object", draft.path);
-    if (determinant == 0) problems.add("flat_object", draft.path);
+    if (determinant < 0) problems.add("mirrored_object", draft.object.path);
+    if (determinant == 0) problems.add("flat_object", draft.object.path);
   }
 }
 
 }  // namespace
+
+Eigen::Matrix3d yUpFrom(char up) {
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  if (up == 'z') turn << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  if (up == 'x') turn << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  return turn;
+}
 
 void ProblemLog::add(const std::string& kind, const std::string& example, std::size_t count) {
   if (count == 0) return;
@@ -205,22 +251,28 @@ Model convertScene(const aiScene& scene, const ConvertInput& input,
       collectObjects(scene, input.format, worldFromRoot, meshes, problems);
   if (progress) progress("convert", 0.5);
 
+  finishModel(std::move(drafts), std::move(meshes), input.file, model, problems);
+  model.problems = problems.problems();
+  return model;
+}
+
+void finishModel(std::vector<ObjectDraft> drafts, std::vector<Mesh> meshes,
+                 const std::filesystem::path& file, Model& model, ProblemLog& problems) {
   std::vector<Box> meshBoxes, objectBoxes;
   for (const Mesh& mesh : meshes) meshBoxes.push_back(boxOf(mesh));
-  recentreMeshes(drafts, meshes, meshBoxes);
+  recentreMeshes(drafts, meshes, meshBoxes, problems);
   for (const ObjectDraft& draft : drafts) objectBoxes.push_back(boxOf(draft, meshBoxes));
-  if (!drafts.empty()) model.offset = sceneOffset(objectBoxes);
-  judgePlacements(drafts, meshBoxes, model.offset, problems);
+  dropFarObjects(drafts, objectBoxes, problems);
   if (drafts.empty()) {
-    throw ImportError(input.file.string() + ": holds no triangles that can be used; export it " +
-                      "with meshes (convert)");
+    throw ImportError(file.string() + ": holds no triangles that can be used; export it with " +
+                      "meshes (convert)");
   }
+  model.offset = sceneOffset(objectBoxes);
+  countOddPlacements(drafts, problems);
   MeshTable table(meshes, model);
   for (const ObjectDraft& draft : drafts) {
     model.objects.push_back(finishObject(draft, model.offset, table));
   }
-  model.problems = problems.problems();
-  return model;
 }
 
 }  // namespace enfilade::scene

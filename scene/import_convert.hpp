@@ -2,6 +2,11 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "scene/import_file_facts.hpp"
 #include "scene/import_model.hpp"
@@ -44,11 +49,37 @@ Mesh transformed(const Mesh& mesh, const Eigen::Affine3d& transform);
 /// What a node of the file becomes: placements are metres, Y up, offset not yet removed.
 struct ObjectDraft {
   struct Placement {
-    std::uint32_t mesh;  ///< assimp's index
+    std::uint32_t mesh;  ///< into the meshes that come with the drafts
     Eigen::Affine3d worldFromMesh;
   };
-  std::string path, globalId, ifcClass;
+  Object object;  ///< without meshes and their transform; worldFromPlacement as the placements
   std::vector<Placement> placements;
+};
+
+/// From drafts to the model's objects and meshes: the offset removed, what lies too far away
+/// dropped, one transform an object. Materials are there before. Throws ImportError, naming `file`,
+/// when nothing is left.
+void finishModel(std::vector<ObjectDraft> drafts, std::vector<Mesh> meshes,
+                 const std::filesystem::path& file, Model& model, ProblemLog& problems);
+
+/// Y up from `up`, by a quarter turn about the axis that is neither.
+Eigen::Matrix3d yUpFrom(char up);
+
+/// A channel of a colour, 0..1.
+float linearFromSrgb(float c);
+
+/// One segment of a path: '/', '%', control characters and what is not UTF-8 are percent-encoded.
+std::string encodedName(std::string_view name);
+
+/// Names given out below one parent.
+class SiblingNames {
+ public:
+  /// `name`, or `name#2`, `name#3`, ... where it is taken.
+  std::string claim(const std::string& name);
+
+ private:
+  std::set<std::string> taken_;
+  std::map<std::string, std::size_t> repeats_;
 };
 
 /// The nodes that carry triangles, in document order. `worldFromRoot` goes before the root's own

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <map>
 #include <string_view>
 
+#include "scene/ifc_facts.hpp"
 #include "scene/import_model.hpp"
 
 namespace enfilade::scene {
@@ -147,130 +147,12 @@ FileFacts fbxFacts(const std::filesystem::path& file) {
   return facts;
 }
 
-// ---- IFC ----------------------------------------------------------------------------------------
-
-struct StepStatement {
-  std::string type, arguments;
-};
-
-/// Calls `take(id, type, arguments)` with each `#id=TYPE(arguments);` of a STEP file.
-template <class Take>
-void forEachStatement(std::string_view text, const Take& take) {
-  std::size_t begin = 0;
-  bool quoted = false;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text[i] == '\'') quoted = !quoted;
-    if (text[i] != ';' || quoted) continue;
-    std::string_view statement = text.substr(begin, i - begin);
-    begin = i + 1;
-    const std::size_t hash = statement.find_first_not_of(" \t\r\n");
-    const std::size_t equals = statement.find('=');
-    if (hash == std::string_view::npos || statement[hash] != '#' ||
-        equals == std::string_view::npos) {
-      continue;
-    }
-    const std::size_t type = statement.find_first_not_of(" \t\r\n", equals + 1);
-    const std::size_t open = statement.find('(', equals);
-    if (type == std::string_view::npos || open == std::string_view::npos || open < type) continue;
-    std::uint64_t id = 0;
-    std::from_chars(statement.data() + hash + 1, statement.data() + equals, id);
-    std::string_view name = statement.substr(type, open - type);
-    while (!name.empty() && name.back() <= ' ') name.remove_suffix(1);
-    take(id, name, statement.substr(open + 1));
-  }
-}
-
-std::vector<std::uint64_t> referencesIn(std::string_view arguments) {
-  std::vector<std::uint64_t> ids;
-  for (std::size_t i = arguments.find('#'); i != std::string_view::npos;
-       i = arguments.find('#', i + 1)) {
-    std::uint64_t id = 0;
-    std::from_chars(arguments.data() + i + 1, arguments.data() + arguments.size(), id);
-    ids.push_back(id);
-  }
-  return ids;
-}
-
-using UnitStatements = std::map<std::uint64_t, StepStatement>;
-
-double siPrefix(const std::string& arguments) {
-  static const std::map<std::string, double> kPrefixes{
-      {".EXA.", 1e18},  {".PETA.", 1e15},  {".TERA.", 1e12},   {".GIGA.", 1e9},
-      {".MEGA.", 1e6},  {".KILO.", 1e3},   {".HECTO.", 1e2},   {".DECA.", 1e1},
-      {".DECI.", 1e-1}, {".CENTI.", 1e-2}, {".MILLI.", 1e-3},  {".MICRO.", 1e-6},
-      {".NANO.", 1e-9}, {".PICO.", 1e-12}, {".FEMTO.", 1e-15}, {".ATTO.", 1e-18}};
-  for (const auto& [name, factor] : kPrefixes) {
-    if (arguments.find(name) != std::string::npos) return factor;
-  }
-  return 1;
-}
-
-/// Metres in the length unit `id`; a conversion-based unit is a number of another unit. The number
-/// of steps is bounded, since a broken file may refer in a circle.
-std::optional<double> metresIn(const UnitStatements& units, std::uint64_t id, int steps = 4) {
-  const auto unit = units.find(id);
-  if (unit == units.end() || steps == 0) return std::nullopt;
-  const auto& [type, arguments] = unit->second;
-  if (type == "IFCSIUNIT") return siPrefix(arguments);
-  if (type == "IFCCONVERSIONBASEDUNIT") {
-    const std::vector<std::uint64_t> references = referencesIn(arguments);
-    return references.empty() ? std::nullopt : metresIn(units, references.back(), steps - 1);
-  }
-  // IFCMEASUREWITHUNIT(IFCLENGTHMEASURE(0.3048),#12)
-  const std::size_t open = arguments.find('(');
-  const auto value = open == std::string::npos
-                         ? std::nullopt
-                         : numberIn(std::string_view(arguments).substr(open + 1));
-  const std::vector<std::uint64_t> references = referencesIn(arguments);
-  if (!value || references.empty()) return std::nullopt;
-  const auto base = metresIn(units, references.back(), steps - 1);
-  return base ? std::optional(*value * *base) : std::nullopt;
-}
-
-void setLengthUnit(FileFacts& facts, const UnitStatements& units,
-                   const std::vector<std::uint64_t>& assigned) {
-  for (const std::uint64_t id : assigned) {
-    const auto unit = units.find(id);
-    if (unit == units.end() || unit->second.arguments.find(".LENGTHUNIT.") == std::string::npos) {
-      continue;
-    }
-    const auto metres = metresIn(units, id);
-    if (!metres || !(*metres > 0)) break;
-    facts.metresPerUnit = *metres;
-    // assimp knows SI prefixes and takes every other unit for a metre.
-    facts.assimpScale = unit->second.type == "IFCSIUNIT" ? *metres : 1;
-    return;
-  }
-  facts.problems.push_back({"no_unit", 1, "no length unit in IFCUNITASSIGNMENT: taken for metres"});
-}
-
-FileFacts ifcFacts(const std::filesystem::path& file) {
-  const std::string text = readStart(file, std::string::npos);
-  if (text.find("ISO-10303-21") == std::string::npos) {
-    throw ImportError(file.string() + ": not an IFC file (it does not begin with ISO-10303-21); " +
-                      "export it again as IFC2x3 (open)");
-  }
-  if (text.find("END-ISO-10303-21") == std::string::npos) {
-    throw ImportError(file.string() + ": cut off: END-ISO-10303-21 is missing at its end; copy " +
-                      "or download it again (open)");
-  }
-  FileFacts facts;
-  facts.up = facts.assimpTurnsUp = 'z';
-  UnitStatements units;
-  std::vector<std::uint64_t> assigned;
-  Problem spaces{"skipped_spaces", 0, ""};
-  forEachStatement(text, [&](std::uint64_t id, std::string_view type, std::string_view arguments) {
-    if (type == "IFCSIUNIT" || type == "IFCCONVERSIONBASEDUNIT" || type == "IFCMEASUREWITHUNIT") {
-      units[id] = {std::string(type), std::string(arguments)};
-    } else if (type == "IFCUNITASSIGNMENT" && assigned.empty()) {
-      assigned = referencesIn(arguments);
-    } else if (type == "IFCSPACE" && spaces.count++ == 0) {
-      spaces.example = "#" + std::to_string(id);
-    }
-  });
-  setLengthUnit(facts, units, assigned);
-  if (spaces.count > 0) facts.problems.push_back(spaces);
-  return facts;
+/// Whether a blank stands where assimp 5.2.5 wants a number: between '>' and its first character.
+bool isBlankBeforeNumber(std::string_view text, std::size_t i) {
+  if (text[i] != '>') return false;
+  const std::size_t next = text.find_first_not_of(" \t\r\n", i + 1);
+  return next != std::string_view::npos && next > i + 1 &&
+         std::strchr("+-.0123456789", text[next]) != nullptr;
 }
 
 }  // namespace
@@ -282,7 +164,7 @@ std::optional<ModelFormat> modelFormatOf(const std::filesystem::path& file) {
   if (extension == ".obj") return ModelFormat::obj;
   if (extension == ".dae") return ModelFormat::collada;
   if (extension == ".fbx") return ModelFormat::fbx;
-  if (extension == ".ifc") return ModelFormat::ifc;
+  if (extension == ".ifc" || extension == ".ifczip") return ModelFormat::ifc;
   return std::nullopt;
 }
 
@@ -302,9 +184,37 @@ FileFacts readFileFacts(const std::filesystem::path& file, ModelFormat format) {
     case ModelFormat::fbx:
       return fbxFacts(file);
     case ModelFormat::ifc:
-      return ifcFacts(file);
+      break;
   }
   return facts;
+}
+
+FileFacts ifcFileFacts(const std::string& text) {
+  FileFacts facts;
+  facts.up = facts.assimpTurnsUp = 'z';
+  bool siUnit = true;
+  facts.metresPerUnit = ifcMetresPerUnit(StepFile(text), siUnit).value_or(1);
+  // assimp knows SI prefixes and takes every other unit for a metre.
+  facts.assimpScale = siUnit ? facts.metresPerUnit : 1;
+  return facts;
+}
+
+std::string mendedCollada(const std::filesystem::path& file, FileFacts& facts) {
+  const std::string text = readStart(file, std::string::npos);
+  std::string mended;
+  std::size_t begin = 0, count = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (!isBlankBeforeNumber(text, i)) continue;
+    mended.append(text, begin, i + 1 - begin);
+    begin = text.find_first_not_of(" \t\r\n", i + 1);
+    i = begin - 1;
+    ++count;
+  }
+  if (count == 0) return {};
+  mended.append(text, begin);
+  facts.problems.push_back(
+      {"mended_text", count, "blanks before the first number of an element were taken out"});
+  return mended;
 }
 
 }  // namespace enfilade::scene

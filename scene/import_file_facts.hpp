@@ -21,10 +21,18 @@ struct FileFacts {
   /// What assimp multiplies onto the root by itself, to be undone: a scale, and a turn.
   double assimpScale = 1;
   char assimpTurnsUp = 'y';
-  std::vector<Problem> problems;  ///< no_unit, unit_assumed, skipped_spaces
+  std::vector<Problem> problems;  ///< no_unit, unit_assumed, mended_text
 };
 
-/// Reads the file. Throws ImportError when it was cut off or is not what its extension says.
+/// Reads the file. Throws ImportError when it was cut off or is not what its extension says. Not
+/// for IFC, whose text may come out of an archive.
 FileFacts readFileFacts(const std::filesystem::path& file, ModelFormat format);
+
+/// The same of the text of an IFC file, for assimp.
+FileFacts ifcFileFacts(const std::string& text);
+
+/// A COLLADA file's text as assimp 5.2.5 can read it, where that is another; else empty. What was
+/// mended joins `facts.problems`.
+std::string mendedCollada(const std::filesystem::path& file, FileFacts& facts);
 
 }  // namespace enfilade::scene

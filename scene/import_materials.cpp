@@ -19,11 +19,6 @@ constexpr std::uint32_t kLongestSide = 1024;       // pixels: what a walk-throug
 constexpr std::size_t kTextureBytes = 256u << 20;  // of all textures of a scene, decoded
 constexpr std::uintmax_t kLargestImageFile = 1u << 30;  // bytes
 
-float linearFromSrgb(float c) {
-  const double s = std::clamp(static_cast<double>(c), 0.0, 1.0);
-  return static_cast<float>(s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4));
-}
-
 float unitInterval(float value, float otherwise) {
   return std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : otherwise;
 }
@@ -223,6 +218,11 @@ Material convertMaterial(const aiMaterial& from, bool gltf, Textures& textures,
 }
 
 }  // namespace
+
+float linearFromSrgb(float c) {
+  const double s = std::clamp(static_cast<double>(c), 0.0, 1.0);
+  return static_cast<float>(s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4));
+}
 
 void convertMaterials(const aiScene& scene, const ConvertInput& input, Model& model,
                       ProblemLog& problems, const ImportProgress& progress) {

@@ -14,12 +14,17 @@
 
 namespace enfilade::scene {
 
+/// Who reads IFC. `automatic`: web-ifc in Node.js; where that is missing or fails, and for products
+/// that it leaves out, ifcplusplus; assimp last. The others: that one alone.
+enum class IfcReader : std::uint8_t { automatic, webIfc, ifcPlusPlus, assimp };
+
 struct ImportOptions {
   /// Overrides what the file says (nullopt: as the file says, else one unit is one metre).
   std::optional<double> metresPerUnit;
-  std::optional<char> up;                          ///< 'x', 'y' or 'z'
+  std::optional<char> up;  ///< 'x', 'y' or 'z'
+  IfcReader ifcReader = IfcReader::automatic;
   double timeLimit = 120;                          ///< seconds of wall-clock time
-  std::size_t memoryLimit = std::size_t{8} << 30;  ///< bytes of address space of the child
+  std::size_t memoryLimit = std::size_t{8} << 30;  ///< bytes, of each process that reads
 };
 
 /// Names the file, the stage ("open", "parse", "convert", ...) and what to try.
@@ -40,11 +45,15 @@ Model importModel(const std::filesystem::path& file, const ImportOptions& option
 ///
 /// For tests, the environment variable ENFILADE_IMPORT_FAULT makes the copy misbehave once it runs:
 /// `hang`, `crash`, `exit` (without an answer), `memory` (asks for more than it may) or `garbage`
-/// (answers with noise).
+/// (answers with noise). `web-ifc:hang` and the like make only the copy that is to become that
+/// reader of IFC misbehave: web-ifc, ifcplusplus or assimp.
 std::optional<int> runImportChild(int argc, char** argv);
 
 /// Extensions that importModel() knows, lower case, with the dot.
 std::span<const std::string_view> importableExtensions();
+
+/// Parses `--ifc-reader`: auto, web-ifc, ifcplusplus or assimp.
+std::optional<IfcReader> ifcReaderFrom(const std::string& text);
 
 /// Parses `--unit`: m, mm, cm, ft, in or a positive number of metres. nullopt when it is neither.
 std::optional<double> metresPerUnitFrom(const std::string& text);

@@ -39,7 +39,8 @@ std::size_t sequenceLength(std::string_view text, std::size_t i) {
   return length;
 }
 
-/// One segment of a path: '/', '%', control characters and what is not UTF-8 are percent-encoded.
+}  // namespace
+
 std::string encodedName(std::string_view name) {
   static constexpr char kDigits[] = "0123456789ABCDEF";
   std::string result;
@@ -59,6 +60,18 @@ std::string encodedName(std::string_view name) {
   return result;
 }
 
+std::string SiblingNames::claim(const std::string& name) {
+  std::string unique = name;
+  std::size_t& repeats = repeats_[name];
+  while (!taken_.insert(unique).second) {
+    ++repeats;
+    unique = name + "#" + std::to_string(repeats + 1);
+  }
+  return unique;
+}
+
+namespace {
+
 bool isDigits(std::string_view text) {
   return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
 }
@@ -71,25 +84,6 @@ bool isMadeUp(std::string_view name) {
   }
   return name.starts_with("nodes_") && isDigits(name.substr(6));
 }
-
-/// Names given out below one parent.
-class SiblingNames {
- public:
-  /// `name`, or `name#2`, `name#3`, ... where it is taken.
-  std::string claim(const std::string& name) {
-    std::string unique = name;
-    std::size_t& repeats = repeats_[name];
-    while (!taken_.insert(unique).second) {
-      ++repeats;
-      unique = name + "#" + std::to_string(repeats + 1);
-    }
-    return unique;
-  }
-
- private:
-  std::set<std::string> taken_;
-  std::map<std::string, std::size_t> repeats_;
-};
 
 /// `IfcDoor_<Name>_<GlobalId>`: the last 22 characters, in the alphabet of GlobalIds.
 std::string globalIdIn(std::string_view name) {
@@ -131,9 +125,9 @@ class Collector {
     const std::string path = place.parentPath + place.siblings->claim(segmentFor(name));
     const std::size_t draft = drafts_.size();
     ObjectDraft& made = drafts_.emplace_back();
-    made.path = path;
-    if (ifc_) made.globalId = globalIdIn(name);
-    if (!made.globalId.empty()) made.ifcClass = name.substr(0, name.find('_'));
+    made.object.path = path;
+    if (ifc_) made.object.globalId = globalIdIn(name);
+    if (!made.object.globalId.empty()) made.object.ifcClass = name.substr(0, name.find('_'));
     if (isSolid(name, node)) place_(node, worldFromNode, drafts_[draft]);
     const bool takesParts = ifc_ && isSolid(name, node);
     SiblingNames names;
@@ -171,7 +165,7 @@ class Collector {
     const bool sane = worldFromNode.matrix().cwiseAbs().maxCoeff() <= kGreatestEntry &&
                       worldFromNode.matrix().allFinite();
     if (node.mNumMeshes > 0 && !sane) {
-      problems_.add("broken_transform_dropped", draft.path);
+      problems_.add("broken_transform_dropped", draft.object.path);
       return;
     }
     for (const unsigned mesh : std::span(node.mMeshes, node.mNumMeshes)) {

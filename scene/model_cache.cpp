@@ -18,10 +18,12 @@
 #include <cstring>
 
 #include "scene/content_hash.hpp"
+#include "scene/import_file_facts.hpp"
 #include "scene/model_cache_entry.hpp"
 #include "scene/model_stream.hpp"
 #include "scene/reader_version.hpp"
 #include "scene/share_meshes.hpp"
+#include "scene/web_ifc.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -46,7 +48,27 @@ std::string optionText(const ImportOptions& options) {
               : "-";
   text += " up ";
   text += options.up ? std::string(1, *options.up) : "-";
+  text += " ifc reader " + std::to_string(static_cast<int>(options.ifcReader));
   return text;
+}
+
+/// Readers that are no libraries of this program.
+std::string outerReaders(const fs::path& file) {
+  if (modelFormatOf(file) != ModelFormat::ifc) return {};
+  const WebIfcPlace place = findWebIfc();
+  if (!place.missing.empty()) return " without web-ifc";
+  const fs::path script = place.script;
+  std::string text = " web-ifc";
+  for (const fs::path& part : {script, script.parent_path() / "node_modules/web-ifc/package.json"})
+    text += " " + hexOf(contentHashOfFile(part).value_or(ContentHash{}));
+  return text;
+}
+
+/// Whether another import of the same file might make more of it: a reader took too long, or was
+/// brought down by something that may not last.
+bool isMakeshift(const Model& model) {
+  return std::any_of(model.problems.begin(), model.problems.end(),
+                     [](const Problem& problem) { return problem.kind == "ifc_reader_failed"; });
 }
 
 /// nullopt when the file cannot be read: the import will say why.
@@ -56,7 +78,8 @@ std::optional<ContentHash> keyOf(const fs::path& file, const ImportOptions& opti
   std::string extension = file.extension().string();
   for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   return contentHash(hexOf(*content) + extension + " " + optionText(options) + " stream " +
-                     std::to_string(kModelStreamVersion) + " " + readerVersions());
+                     std::to_string(kModelStreamVersion) + " " + readerVersions() +
+                     outerReaders(file));
 }
 
 /// As it is now; the path is taken relative to the model's folder where the entry says so.
@@ -260,7 +283,7 @@ LoadedModel loadModel(const fs::path& file, const ImportOptions& options,
     loaded = imported(file, options, progress);
     CacheEntry made{*key, loaded.importSeconds, filesBeside(file, loaded.model), {}};
     // Somebody may have saved the file while it was read.
-    if (keyOf(file, options) == key) {
+    if (!isMakeshift(loaded.model) && keyOf(file, options) == key) {
       made.model = std::move(loaded.model);
       const std::string wrong = keep(*cache, path, made);
       if (!wrong.empty()) notes.push_back("not kept for the next start: " + wrong);

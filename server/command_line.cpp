@@ -11,7 +11,7 @@ namespace {
 
 /// Where CLI11 leaves what it read; every verb has its own.
 struct ModelArguments {
-  std::string file, unit, up;
+  std::string file, unit, up, ifcReader = "auto";
   bool noCache = false;
 };
 struct Arguments {
@@ -56,12 +56,19 @@ void addAudit(CLI::App& verb, Arguments& into) {
 }
 
 void addModel(CLI::App& verb, ModelArguments& into) {
-  verb.add_option("SCENE", into.file, "The model: glTF, GLB, OBJ, COLLADA, FBX, IFC")->required();
+  verb.add_option("SCENE", into.file, "The model: glTF, GLB, OBJ, COLLADA, FBX, IFC, IFCZIP")
+      ->required();
   verb.add_option("--unit", into.unit, "Length of the file's unit: m, mm, cm, ft, in or metres")
       ->check(CLI::Validator(unitProblem, "UNIT"));
   verb.add_option("--up", into.up, "The file's up axis")->check(CLI::IsMember({"x", "y", "z"}));
   verb.add_flag("--no-cache", into.noCache,
                 "Import the model even if an earlier start kept what it made of it");
+  verb.add_option(
+          "--ifc-reader", into.ifcReader,
+          "Who reads IFC. auto: web-ifc; ifcplusplus where that fails or Node.js is missing "
+          "and for products that it leaves out; assimp last")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "web-ifc", "ifcplusplus", "assimp"}));
 }
 
 void addWalk(CLI::App& verb, Arguments& into) {
@@ -87,6 +94,7 @@ ModelOptions modelFrom(const ModelArguments& read) {
   options.cache = !read.noCache;
   if (!read.unit.empty()) options.metresPerUnit = scene::metresPerUnitFrom(read.unit);
   if (!read.up.empty()) options.up = read.up.front();
+  options.ifcReader = scene::ifcReaderFrom(read.ifcReader).value_or(scene::IfcReader::automatic);
   return options;
 }
 

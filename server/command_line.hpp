@@ -6,6 +6,7 @@
 #include <string>
 #include <variant>
 
+#include "scene/import_model.hpp"
 #include "server/exit_code.hpp"
 
 namespace enfilade::server {
@@ -16,6 +17,7 @@ struct ModelOptions {
   std::optional<double> metresPerUnit;
   std::optional<char> up;  ///< 'x', 'y' or 'z'
   bool cache = true;       ///< whether what an earlier start kept of the file may serve
+  scene::IfcReader ifcReader = scene::IfcReader::automatic;
 };
 
 struct Endpoint {

@@ -16,9 +16,10 @@ void tell(const scene::Scene& scene, const std::string& name, const LoadedScene&
     spdlog::info("{}: {} x {}, as {}", name, problem.count, problem.kind, problem.example);
   const scene::Vec3 size =
       scene.bounds().empty() ? scene::Vec3::Zero().eval() : scene.bounds().size();
-  spdlog::info("{}: {} objects, {:.1f} x {:.1f} x {:.1f} m, unit {} m, up {}, {} in {:.2f} s", name,
-               model.objects.size(), size.x(), size.y(), size.z(), model.metresPerUnit, model.up,
-               loaded.fromCache ? "from the cache" : "imported", loaded.loadSeconds);
+  spdlog::info(
+      "{}: {} objects, {:.1f} x {:.1f} x {:.1f} m, unit {} m, up {}, read by {}, {} in {:.2f} s",
+      name, model.objects.size(), size.x(), size.y(), size.z(), model.metresPerUnit, model.up,
+      model.reader, loaded.fromCache ? "from the cache" : "imported", loaded.loadSeconds);
 }
 
 }  // namespace
@@ -28,6 +29,7 @@ LoadedScene loadSceneTimed(const ModelOptions& options) {
   scene::ImportOptions import;
   import.metresPerUnit = options.metresPerUnit;
   import.up = options.up;
+  import.ifcReader = options.ifcReader;
   Progress bar;
   scene::LoadedModel model = scene::loadModel(
       options.file, import, options.cache ? scene::modelCacheOfEnvironment() : std::nullopt,
