@@ -119,6 +119,7 @@ IfcReading readByWebIfc(const IfcInput& input, double timeLimit, const ImportPro
   const WebIfcPlace place = findWebIfc();
   if (!place.missing.empty()) {
     reading.failure = place.missing;
+    reading.absent = true;
     return reading;
   }
   const auto start = Clock::now();

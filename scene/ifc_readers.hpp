@@ -35,6 +35,7 @@ class IfcInput {
 struct IfcReading {
   IfcShapes shapes;
   std::string failure;  ///< why it ended before the end; empty: it did not
+  bool absent = false;  ///< the reader is not installed; `failure` says how to get it
 };
 
 /// Both return what they got, even where they fail. `timeLimit`: seconds for all of it.

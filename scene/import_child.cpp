@@ -4,6 +4,7 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <signal.h>
+#include <sys/personality.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -157,6 +158,7 @@ const aiScene& parse(Assimp::Importer& importer, const ConvertInput& input, cons
   if (scene == nullptr || scene->mRootNode == nullptr) {
     const std::string why = importer.GetErrorString();
     if (why.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
+    if (input.format == ModelFormat::ifc) throw ImportError(why);  // others may have tried too
     throw ImportError(input.file.string() + ": cannot be read: " + why +
                       "; check the file in the program that wrote it, or re-export it as glTF "
                       "(parse)");
@@ -190,6 +192,15 @@ void sendModel(const Model& model) {
   sendProgress("send", 0);
   const std::vector<std::byte> stream = serialiseModel(model);
   sendFrame(ImportFrame::model, stream.data(), stream.size());
+}
+
+/// Starts this program once more, in the same process, without randomised addresses: ifcplusplus'
+/// results vary with them. Where that is not allowed, they vary.
+void steadyAddresses(char** argv) {
+  const int now = personality(0xffffffff);
+  if (now < 0 || (now & ADDR_NO_RANDOMIZE) != 0) return;
+  if (personality(static_cast<unsigned long>(now | ADDR_NO_RANDOMIZE)) < 0) return;
+  if ((personality(0xffffffff) & ADDR_NO_RANDOMIZE) != 0) execv("/proc/self/exe", argv);
 }
 
 /// Returns only when it cannot be done.
@@ -229,6 +240,7 @@ std::optional<int> runImportChild(int argc, char** argv) {
   const std::optional<ImportRequest> request = importRequestFrom(argc, argv, parent);
   if (!request) return 2;
   limitThisProcess(*request, parent);
+  if (request->task == ImportTask::ifcPlusPlus) steadyAddresses(argv);
   int code = 1;
   try {
     answer(*request);

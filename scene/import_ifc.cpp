@@ -266,7 +266,7 @@ class IfcImport {
     if (why.empty() && !hasTriangles(reading.shapes)) why = "delivers no triangles";
     if (why.empty()) return;
     failures_ += (failures_.empty() ? "" : "; ") + reader + ": " + why;
-    problems_.add("ifc_reader_failed", reader + ": " + why);
+    problems_.add(reading.absent ? "ifc_reader_absent" : "ifc_reader_failed", reader + ": " + why);
   }
 
   bool hasTriangles(const IfcShapes& shapes) const {

@@ -31,9 +31,11 @@ struct ThirdParty {
   Names folders;        ///< where it may be used
 };
 
-const std::array<ThirdParty, 15> kThirdParties{{
+const std::array<ThirdParty, 17> kThirdParties{{
     {"GMP", "gmp.*", {"collision"}},
     {"assimp", "assimp/.*", {"scene"}},
+    {"ifcplusplus", "(ifcpp|carve)/.*", {"scene"}},
+    {"libzip", "zip\\.h", {"scene"}},
     {"Embree", "embree.*", {"scene", "render"}},
     {"EGL and OpenGL", "(epoxy|EGL|GL|GLES.*)/.*", {"render"}},
     {"libpng", "png.*", {"scene", "render"}},
@@ -139,12 +141,13 @@ std::optional<std::string> faultOfInclude(const Sources& sources, const std::str
 }
 
 bool skippedFolder(const std::string& name) {
-  return name == ".git" || name == "out" || name == ".cache" || name.rfind("build", 0) == 0;
+  return name == ".git" || name == "out" || name == "node_modules" || name == ".cache" ||
+         name.rfind("build", 0) == 0;
 }
 
 bool writtenByPeople(const std::filesystem::path& file) {
   static const Names endings{".cpp", ".hpp",  ".proto", ".txt", ".cmake",
-                             ".md",  ".json", ".jsonl", ".py"};
+                             ".md",  ".json", ".jsonl", ".py",  ".js"};
   static const Names names{"dev", "run", ".gitignore", ".clang-format"};
   return endings.count(file.extension().string()) != 0 ||
          names.count(file.filename().string()) != 0;

@@ -1,0 +1,88 @@
+// A storey with one wall, an opening in it and a door in that: small IFC files that tests write for
+// themselves, IFC2x3 or IFC4.
+#pragma once
+
+#include <string>
+
+namespace enfilade::tests {
+
+struct IfcHouse {
+  std::string schema = "IFC4";
+  /// The lengths below are in this unit.
+  std::string unit = "IFCSIUNIT(*,.LENGTHUNIT.,.MILLI.,.METRE.)";
+  double unitsPerMetre = 1000;
+  std::string offset = "0.,0.,0.";  ///< of the building, in units
+  bool voids = true;                ///< the opening is cut out of the wall
+  bool door = true;
+  std::string more;  ///< statements, numbers from 500 on
+
+  std::string length(double metres) const { return std::to_string(metres * unitsPerMetre); }
+
+  /// A box with a corner at its placement, and the numbers id .. id + 9 for it.
+  std::string box(int id, double width, double depth, double height) const {
+    const auto n = [&](int k) { return "#" + std::to_string(id + k); };
+    return n(0) + "=IFCCARTESIANPOINT((" + length(width / 2) + "," + length(depth / 2) + "));\n" +
+           n(1) + "=IFCAXIS2PLACEMENT2D(" + n(0) + ",$);\n" + n(2) +
+           "=IFCRECTANGLEPROFILEDEF(.AREA.,$," + n(1) + "," + length(width) + "," + length(depth) +
+           ");\n" + n(3) + "=IFCEXTRUDEDAREASOLID(" + n(2) + ",#11,#13," + length(height) + ");\n" +
+           n(4) + "=IFCSHAPEREPRESENTATION(#20,'Body','SweptSolid',(" + n(3) + "));\n" + n(5) +
+           "=IFCPRODUCTDEFINITIONSHAPE($,$,(" + n(4) + "));\n";
+  }
+  std::string placement(int id, const std::string& parent, double x, double y, double z) const {
+    const auto n = [&](int k) { return "#" + std::to_string(id + k); };
+    return n(0) + "=IFCCARTESIANPOINT((" + length(x) + "," + length(y) + "," + length(z) + "));\n" +
+           n(1) + "=IFCAXIS2PLACEMENT3D(" + n(0) + ",$,$);\n" + n(2) + "=IFCLOCALPLACEMENT(" +
+           parent + "," + n(1) + ");\n";
+  }
+
+  std::string text() const {
+    const bool four = schema == "IFC4";
+    const std::string tail = four ? ",$" : "";  // IFC4 has a predefined type behind the tag
+    std::string t =
+        "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),"
+        "(''),'','','');\nFILE_SCHEMA(('" +
+        schema + "'));\nENDSEC;\nDATA;\n";
+    t += "#1=IFCPROJECT('0000000000000000000001',$,'Test house',$,$,$,$,(#20),#30);\n";
+    t += "#10=IFCCARTESIANPOINT((" + offset + "));\n#11=IFCAXIS2PLACEMENT3D(#12,$,$);\n";
+    t += "#12=IFCCARTESIANPOINT((0.,0.,0.));\n#13=IFCDIRECTION((0.,0.,1.));\n";
+    t += "#14=IFCAXIS2PLACEMENT3D(#10,$,$);\n#15=IFCLOCALPLACEMENT($,#14);\n";
+    t += "#20=IFCGEOMETRICREPRESENTATIONCONTEXT($,'Model',3,1.E-05,#11,$);\n";
+    t += "#30=IFCUNITASSIGNMENT((#31));\n#31=" + unit + ";\n";
+    t += "#40=IFCBUILDING('0000000000000000000002',$,'House',$,$,#15,$,$,.ELEMENT.,$,$,$);\n";
+    t += "#41=IFCBUILDINGSTOREY('0000000000000000000003',$,'Ground/"
+         "floor',$,$,#15,$,$,.ELEMENT.,0.);\n";
+    t += "#42=IFCRELAGGREGATES('0000000000000000000004',$,$,$,#1,(#40));\n";
+    t += "#43=IFCRELAGGREGATES('0000000000000000000005',$,$,$,#40,(#41));\n";
+    t += placement(100, "#15", 0, 0, 0) + box(110, 4, 0.3, 3);
+    t += "#120=IFCWALL('000000000000000000Wall',$,'Wall',$,$,#102,#115,$" + tail + ");\n";
+    t += placement(200, "#102", 1.5, 0, 0) + box(210, 0.9, 0.3, 2.1);
+    t += "#220=IFCOPENINGELEMENT('000000000000000Opening',$,$,$,$,#202,#215,$" + tail + ");\n";
+    std::string contained = "#120";
+    if (door) {
+      t += placement(300, "#202", 0, 0.1, 0) + box(310, 0.9, 0.05, 2.1);
+      t += "#320=IFCDOOR('000000000000000000Door',$,'Front door',$,$,#302,#315,$," + length(2.1) +
+           "," + length(0.9) + (four ? ",.DOOR.,.SINGLE_SWING_LEFT.,$" : "") + ");\n";
+      t += "#321=IFCRELFILLSELEMENT('0000000000000000000006',$,$,$,#220,#320);\n";
+      contained += ",#320";
+    }
+    if (voids) t += "#221=IFCRELVOIDSELEMENT('0000000000000000000007',$,$,$,#120,#220);\n";
+    t += "#44=IFCRELCONTAINEDINSPATIALSTRUCTURE('0000000000000000000008',$,$,$,(" + contained +
+         "),#41);\n";
+    if (!four) t = withOwners(t);
+    return t + more + "ENDSEC;\nEND-ISO-10303-21;\n";
+  }
+
+  /// IFC2x3 insists on an owner of each thing, and assimp with it.
+  static std::string withOwners(std::string t) {
+    const std::string nobody = "',$,";
+    for (std::size_t at = t.find("'0000"); at != std::string::npos; at = t.find("'0000", at + 1)) {
+      if (t.compare(at + 23, nobody.size(), nobody) == 0) t.replace(at + 23, 4, "',#5,");
+    }
+    return t +
+           "#2=IFCPERSON($,$,'',$,$,$,$,$);\n#3=IFCORGANIZATION($,'x',$,$,$);\n"
+           "#4=IFCPERSONANDORGANIZATION(#2,#3,$);\n#6=IFCAPPLICATION(#3,'1','x','x');\n"
+           "#5=IFCOWNERHISTORY(#4,#6,$,.ADDED.,$,$,$,0);\n";
+  }
+};
+
+}  // namespace enfilade::tests

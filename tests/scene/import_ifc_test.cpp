@@ -1,0 +1,281 @@
+// IFC by each of its readers, on houses that are known to the millimetre; what happens when one of
+// them fails; archives.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <random>
+
+#include "scene/import_model.hpp"
+#include "scene/scene.hpp"
+#include "scene/web_ifc.hpp"
+#include "tests/scene/hand_made_files.hpp"
+#include "tests/scene/hand_made_ifc.hpp"
+#include "tests/scene/stored_zip.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using tests::IfcHouse;
+using tests::TemporaryFolder;
+
+ImportOptions by(IfcReader reader) {
+  ImportOptions options;
+  options.ifcReader = reader;
+  return options;
+}
+
+bool hasWebIfc() {
+  return findWebIfc().missing.empty();
+}
+
+std::vector<IfcReader> readersHere() {
+  std::vector<IfcReader> readers{IfcReader::ifcPlusPlus};
+  if (hasWebIfc()) readers.push_back(IfcReader::webIfc);
+  return readers;
+}
+
+const Problem* problemOf(const Model& model, const std::string& kind) {
+  for (const Problem& problem : model.problems) {
+    if (problem.kind == kind) return &problem;
+  }
+  return nullptr;
+}
+
+std::string failureOf(const std::filesystem::path& file, const ImportOptions& options = {}) {
+  try {
+    importModel(file, options);
+  } catch (const ImportError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+const Object& objectOf(const Model& model, const std::string& ifcClass) {
+  for (const Object& object : model.objects) {
+    if (object.ifcClass == ifcClass) return object;
+  }
+  throw std::runtime_error("no " + ifcClass);
+}
+
+/// Sets an environment variable for as long as it lives.
+struct Environment {
+  Environment(const char* variable, const std::string& value) : name(variable) {
+    setenv(name, value.c_str(), 1);
+  }
+  ~Environment() { unsetenv(name); }
+  const char* name;
+};
+
+void expectSize(const Model& model, const Vec3& size) {
+  const Scene scene{Model(model)};
+  EXPECT_LT((scene.bounds().size() - size).cwiseAbs().maxCoeff(), 1e-5)
+      << scene.bounds().size().transpose();
+}
+
+TEST(ImportIfc, EachReaderGivesTheSameHouse) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("house.ifc", IfcHouse().text());
+  for (const IfcReader reader : readersHere()) {
+    const Model model = importModel(file, by(reader));
+    SCOPED_TRACE(model.reader);
+    ASSERT_EQ(model.objects.size(), 2u);
+    expectSize(model, {4, 3, 0.3});
+    EXPECT_EQ(model.metresPerUnit, 0.001);
+    EXPECT_EQ(model.up, 'z');
+    const Object& door = objectOf(model, "IfcDoor");
+    EXPECT_EQ(door.path, "Test house/House/Ground%2Ffloor/Front door");
+    EXPECT_EQ(door.globalId, "000000000000000000Door");
+    EXPECT_EQ(door.operation, "SINGLE_SWING_LEFT");
+    EXPECT_NEAR(door.overallWidth, 0.9, 1e-9);
+    ASSERT_TRUE(door.worldFromPlacement);
+    // The file's y is our -z, its z our y.
+    EXPECT_LT((*door.worldFromPlacement * Vec3(0, 1, 2) - Vec3(1.5, 2, -1.1)).norm(), 1e-9);
+    EXPECT_EQ(problemOf(model, "uncut_opening"), nullptr);
+    ASSERT_NE(problemOf(model, "skipped_openings"), nullptr);
+  }
+}
+
+TEST(ImportIfc, ADoorInAWallWithoutAHoleIsReportedByItsGlobalId) {
+  const TemporaryFolder folder;
+  IfcHouse house;
+  // The hole lies beside the door.
+  std::string text = house.text();
+  const std::string place = "#200=IFCCARTESIANPOINT((" + house.length(1.5);
+  text.replace(text.find(place), place.size(), "#200=IFCCARTESIANPOINT((" + house.length(0.2));
+  const std::string door = "#300=IFCCARTESIANPOINT((" + house.length(0);
+  text.replace(text.find(door), door.size(), "#300=IFCCARTESIANPOINT((" + house.length(2));
+  const auto file = folder.write("house.ifc", text);
+  for (const IfcReader reader : readersHere()) {
+    const Model model = importModel(file, by(reader));
+    SCOPED_TRACE(model.reader);
+    const Problem* uncut = problemOf(model, "uncut_opening");
+    ASSERT_NE(uncut, nullptr);
+    EXPECT_EQ(uncut->count, 1u);
+    EXPECT_NE(uncut->example.find("000000000000000000Door"), std::string::npos);
+    EXPECT_NE(uncut->example.find("0 of 9"), std::string::npos) << uncut->example;
+  }
+}
+
+TEST(ImportIfc, UnitAndUpAxisOfTheUserWin) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("house.ifc", IfcHouse().text());
+  ImportOptions options = by(IfcReader::ifcPlusPlus);
+  options.metresPerUnit = 0.002;
+  options.up = 'y';
+  const Model model = importModel(file, options);
+  expectSize(model, {8, 0.6, 6});
+  EXPECT_NEAR(objectOf(model, "IfcDoor").overallWidth, 1.8, 1e-9);
+  EXPECT_EQ(problemOf(model, "uncut_opening"), nullptr);
+}
+
+TEST(ImportIfc, AHouseFarFromTheOriginKeepsItsMillimetres) {
+  const TemporaryFolder folder;
+  IfcHouse house;
+  house.offset = "459123400.,5428310700.,112600.";  // millimetres: a place in UTM
+  const auto file = folder.write("far.ifc", house.text());
+  for (const IfcReader reader : readersHere()) {
+    const Model model = importModel(file, by(reader));
+    SCOPED_TRACE(model.reader);
+    expectSize(model, {4, 3, 0.3});
+    EXPECT_NEAR(model.offset.x(), 459123.4, 10);
+    EXPECT_NEAR(model.offset.z(), -5428310.7, 10);
+    const Vec3 door = objectOf(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
+    EXPECT_LT((door - Vec3(459124.9, 112.6, -5428310.8)).norm(), 1e-6);
+    EXPECT_EQ(problemOf(model, "uncut_opening"), nullptr);
+  }
+}
+
+TEST(ImportIfc, ACutOffFileIsReadAsFarAsItGoesAndSaysSo) {
+  const TemporaryFolder folder;
+  const std::string text = IfcHouse().text();
+  const auto file = folder.write("cut.ifc", text.substr(0, text.find("ENDSEC;\nEND-ISO")));
+  const Model model = importModel(file, by(IfcReader::ifcPlusPlus));
+  EXPECT_EQ(model.objects.size(), 2u);
+  EXPECT_NE(problemOf(model, "cut_off_file"), nullptr);
+}
+
+TEST(ImportIfc, AReaderThatFailsIsFollowedByTheNext) {
+  const TemporaryFolder folder;
+  IfcHouse house;
+  house.schema = "IFC2X3";  // what assimp reads
+  const auto file = folder.write("house.ifc", house.text());
+  for (const char* kind : {"web-ifc:crash", "web-ifc:garbage", "web-ifc:exit", "web-ifc:memory"}) {
+    const Environment fault("ENFILADE_IMPORT_FAULT", kind);
+    const Model model = importModel(file);
+    EXPECT_EQ(model.reader, "ifcplusplus") << kind;
+    EXPECT_EQ(model.objects.size(), 2u);
+    if (!hasWebIfc()) continue;
+    ASSERT_NE(problemOf(model, "ifc_reader_failed"), nullptr);
+    EXPECT_TRUE(problemOf(model, "ifc_reader_failed")->example.starts_with("web-ifc: "));
+  }
+  const Environment fault("ENFILADE_IMPORT_FAULT", "ifcplusplus:crash");
+  const Environment noNode("ENFILADE_WEB_IFC", folder.path());
+  const Model model = importModel(file);
+  EXPECT_EQ(model.reader, "assimp");
+  EXPECT_NE(problemOf(model, "ifc_reader_absent"), nullptr);
+  EXPECT_NE(problemOf(model, "ifc_reader_failed"), nullptr);
+  EXPECT_EQ(objectOf(model, "IfcDoor").path, "Test house/House/Ground%2Ffloor/Front door");
+}
+
+TEST(ImportIfc, AReaderThatHangsLeavesTimeForTheNext) {
+  if (!hasWebIfc()) GTEST_SKIP() << findWebIfc().missing;
+  const TemporaryFolder folder;
+  const auto file = folder.write("house.ifc", IfcHouse().text());
+  const Environment fault("ENFILADE_IMPORT_FAULT", "web-ifc:hang");
+  ImportOptions options;
+  options.timeLimit = 5;
+  EXPECT_EQ(importModel(file, options).reader, "ifcplusplus");
+}
+
+TEST(ImportIfc, WithoutNodeTheNextReaderDoesItAndTheUserIsTold) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("house.ifc", IfcHouse().text());
+  const Environment nowhere("ENFILADE_WEB_IFC", folder.path());
+  const Model model = importModel(file);
+  EXPECT_EQ(model.reader, "ifcplusplus");
+  ASSERT_NE(problemOf(model, "ifc_reader_absent"), nullptr);
+  EXPECT_NE(problemOf(model, "ifc_reader_absent")->example.find("npm ci"), std::string::npos);
+  const std::string failure = failureOf(file, by(IfcReader::webIfc));
+  EXPECT_NE(failure.find("house.ifc: cannot be read: web-ifc: "), std::string::npos) << failure;
+  EXPECT_NE(failure.find("--ifc-reader auto"), std::string::npos) << failure;
+}
+
+TEST(ImportIfc, WhenAllReadersFailTheErrorSaysWhyOfEach) {
+  const TemporaryFolder folder;
+  IfcHouse house;
+  std::string text = house.text();
+  for (std::size_t at = text.find("IFCEXTRUDEDAREASOLID"); at != std::string::npos;
+       at = text.find("IFCEXTRUDEDAREASOLID", at)) {
+    text.replace(at, 20, "IFCNOSUCHTHINGATALL1");
+  }
+  const std::string failure = failureOf(folder.write("empty.ifc", text));
+  for (const char* part : {"empty.ifc", "web-ifc: ", "ifcplusplus: ", "assimp: ", "re-export"}) {
+    EXPECT_NE(failure.find(part), std::string::npos) << failure;
+  }
+}
+
+TEST(ImportIfc, ProgressTellsOfTheReaders) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("house.ifc", IfcHouse().text());
+  std::vector<std::string> stages;
+  importModel(file, {}, [&](const std::string& stage, double fraction) {
+    EXPECT_GE(fraction, 0);
+    EXPECT_LE(fraction, 1);
+    if (stages.empty() || stages.back() != stage) stages.push_back(stage);
+  });
+  const std::string shapes = hasWebIfc() ? "shapes (web-ifc)" : "shapes (ifcplusplus)";
+  for (const std::string& stage : {std::string("index"), shapes, std::string("openings")}) {
+    EXPECT_NE(std::find(stages.begin(), stages.end(), stage), stages.end()) << stage;
+  }
+}
+
+TEST(ImportIfc, AnArchiveIsUnpacked) {
+  const TemporaryFolder folder;
+  const std::string text = IfcHouse().text();
+  const auto file = folder.write(
+      "house.ifczip", tests::storedZip({{"__MACOSX/._house.ifc", "x"}, {"sub/House.IFC", text}}));
+  EXPECT_EQ(importModel(file, by(IfcReader::ifcPlusPlus)).objects.size(), 2u);
+  const auto misnamed = folder.write("zipped.ifc", tests::storedZip({{"a.ifc", text}}));
+  EXPECT_EQ(importModel(misnamed, by(IfcReader::ifcPlusPlus)).objects.size(), 2u);
+  const auto unzipped = folder.write("plain.ifczip", text);
+  EXPECT_EQ(importModel(unzipped, by(IfcReader::ifcPlusPlus)).objects.size(), 2u);
+}
+
+TEST(ImportIfc, AnArchiveWithNoneOrSeveralOrTooMuchIsRefused) {
+  const TemporaryFolder folder;
+  const auto none = folder.write("none.ifczip", tests::storedZip({{"readme.txt", "x"}}));
+  EXPECT_NE(failureOf(none).find("none.ifczip: holds no .ifc file"), std::string::npos);
+  const auto two = folder.write("two.ifczip", tests::storedZip({{"a.ifc", "x"}, {"b.ifc", "x"}}));
+  EXPECT_NE(failureOf(two).find("holds 2 .ifc files (a.ifc, b.ifc)"), std::string::npos);
+  const auto noise = folder.write("noise.ifczip", "PK\3\4 and then nothing");
+  EXPECT_NE(failureOf(noise).find("noise.ifczip: cannot be unzipped"), std::string::npos);
+  const auto large =
+      folder.write("large.ifczip", tests::storedZip({{"a.ifc", std::string(40 << 20, ' ')}}));
+  ImportOptions options;
+  options.memoryLimit = std::size_t{256} << 20;  // an eighth of it may be text
+  EXPECT_NE(failureOf(large, options).find("unpacks to more than the 32 MiB"), std::string::npos);
+}
+
+TEST(ImportIfc, DamagedFilesEndInModelsOrInErrorsThatNameThem) {
+  const TemporaryFolder folder;
+  const std::string whole = IfcHouse().text();
+  std::mt19937_64 random(2026);
+  std::size_t loaded = 0, refused = 0;
+  for (int i = 0; i < 12; ++i) {
+    std::string text = whole;
+    if (i % 3 == 0) text.resize(random() % text.size());
+    for (int k = 0; k < 4 && i % 3 != 0; ++k) {
+      text[random() % text.size()] = static_cast<char>(random());
+    }
+    const auto file = folder.write("damaged.ifc", text);
+    const std::string failure =
+        failureOf(file, by(i < 4 ? IfcReader::automatic : IfcReader::ifcPlusPlus));
+    ++(failure.empty() ? loaded : refused);
+    EXPECT_TRUE(failure.empty() || failure.find("damaged.ifc") != std::string::npos) << failure;
+  }
+  EXPECT_GT(loaded, 3u);
+  EXPECT_GT(refused, 0u);
+}
+
+}  // namespace
+}  // namespace enfilade::scene

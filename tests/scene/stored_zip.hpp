@@ -1,0 +1,42 @@
+// A zip archive whose members are stored as they are.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace enfilade::tests {
+
+inline std::uint32_t crc32Of(const std::string& bytes) {
+  std::uint32_t crc = 0xffffffff;
+  for (const char c : bytes) {
+    crc ^= static_cast<unsigned char>(c);
+    for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ ((crc & 1) != 0 ? 0xedb88320u : 0u);
+  }
+  return ~crc;
+}
+
+/// Names and contents. The layout is that of PKWARE's APPNOTE.TXT, 4.3.
+inline std::string storedZip(const std::vector<std::pair<std::string, std::string>>& members) {
+  const auto number = [](std::size_t value, std::size_t bytes) {
+    std::string text;
+    for (std::size_t i = 0; i < bytes; ++i) text += static_cast<char>(value >> (8 * i) & 255);
+    return text;
+  };
+  std::string archive, directory;
+  for (const auto& [name, content] : members) {
+    // Version, flags, method, time and date; checksum, both sizes, the name's length, no more.
+    const std::string facts = number(10, 2) + number(0, 8) + number(crc32Of(content), 4) +
+                              number(content.size(), 4) + number(content.size(), 4) +
+                              number(name.size(), 2) + number(0, 2);
+    directory +=
+        "PK\1\2" + number(10, 2) + facts + number(0, 10) + number(archive.size(), 4) + name;
+    archive += "PK\3\4" + facts + name + content;
+  }
+  return archive + directory + "PK\5\6" + number(0, 4) + number(members.size(), 2) +
+         number(members.size(), 2) + number(directory.size(), 4) + number(archive.size(), 4) +
+         number(0, 2);
+}
+
+}  // namespace enfilade::tests
