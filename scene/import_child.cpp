@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include <assimp/DefaultIOSystem.h>
+#include <assimp/MemoryIOWrapper.h>
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <assimp/ProgressHandler.hpp>
@@ -110,10 +111,11 @@ void misbehaveIfAsked(ImportTask task) {
   }
 }
 
-/// Takes down which files assimp opens and looks for.
+/// Takes down which files assimp opens and looks for, and gives it a mended text for one of them.
 class WatchedFiles : public Assimp::DefaultIOSystem {
  public:
-  explicit WatchedFiles(std::vector<std::string>& names) : names_(names) {}
+  WatchedFiles(std::vector<std::string>& names, std::string mendedFile, const std::string& text)
+      : names_(names), mendedFile_(std::move(mendedFile)), text_(text) {}
 
   bool Exists(const char* file) const override {
     names_.emplace_back(file);
@@ -121,11 +123,16 @@ class WatchedFiles : public Assimp::DefaultIOSystem {
   }
   Assimp::IOStream* Open(const char* file, const char* mode) override {
     names_.emplace_back(file);
-    return DefaultIOSystem::Open(file, mode);
+    if (text_.empty() || file != mendedFile_) return DefaultIOSystem::Open(file, mode);
+    // assimp only reads from it, and the text lives longer.
+    return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(text_.data()),
+                                      text_.size());
   }
 
  private:
   std::vector<std::string>& names_;
+  std::string mendedFile_;
+  const std::string& text_;
 };
 
 std::string readDescriptor(int descriptor) {
@@ -142,19 +149,19 @@ std::string readDescriptor(int descriptor) {
   return text;
 }
 
-/// `text`: the file in memory, where it was unzipped or mended; else assimp opens it, and `files`
-/// takes down which others.
+/// `text`: the file in memory, where it was unzipped or mended; else assimp opens it. `files` takes
+/// down which others it opened or looked for.
 const aiScene& parse(Assimp::Importer& importer, const ConvertInput& input, const std::string& text,
                      std::vector<std::string>& files) {
-  importer.SetIOHandler(new WatchedFiles(files));  // the importer deletes it, and what follows
+  // The importer deletes both.
+  importer.SetIOHandler(new WatchedFiles(files, input.file.string(), text));
   importer.SetProgressHandler(new ForwardProgress);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, false);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, true);
   constexpr unsigned kSteps = aiProcess_Triangulate | aiProcess_JoinIdenticalVertices;
-  const char* hint = input.format == ModelFormat::ifc ? "ifc" : "dae";
-  const aiScene* scene = text.empty()
-                             ? importer.ReadFile(input.file.string(), kSteps)
-                             : importer.ReadFileFromMemory(text.data(), text.size(), kSteps, hint);
+  const bool ifc = input.format == ModelFormat::ifc;  // it may come out of an archive
+  const aiScene* scene = ifc ? importer.ReadFileFromMemory(text.data(), text.size(), kSteps, "ifc")
+                             : importer.ReadFile(input.file.string(), kSteps);
   if (scene == nullptr || scene->mRootNode == nullptr) {
     const std::string why = importer.GetErrorString();
     if (why.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
@@ -179,6 +186,12 @@ Model modelByAssimp(const ImportRequest& request) {
   } else {
     input.facts = readFileFacts(request.file, input.format);
     if (input.format == ModelFormat::collada) text = mendedCollada(request.file, input.facts);
+    if (input.format == ModelFormat::obj) {
+      const double unit = request.metresPerUnit.value_or(input.facts.metresPerUnit);
+      ShiftedText shifted = shiftedObj(request.file, kFarAway / unit);
+      text = std::move(shifted.text);
+      input.shift = shifted.shift;
+    }
   }
   sendProgress("parse", 0);
   auto* importer = new Assimp::Importer;  // left to _exit: tearing a large scene down takes time

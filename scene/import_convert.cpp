@@ -8,11 +8,10 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kFarAway = 1000;     // metres: farther from the origin, floats lose the millimetre
 constexpr double kGreatest = 1e7;     // metres from the scene's centre: no world takes more
+constexpr double kWildFactor = 10;    // times that again: a corner of it must be wrong
 constexpr double kStrayFactor = 30;   // times the median reach; a town's outskirts are at about 5
 constexpr double kMostStrays = 0.05;  // of all objects; more are no strays but a second site
-constexpr double kCoarse = 1e-4;      // metres between neighbouring floats that deserve a word
 
 /// What assimp put before the root's own transform, to the bit of its floats.
 Eigen::Matrix3d assimpFromFile(const FileFacts& facts, ModelFormat format) {
@@ -190,6 +189,10 @@ void dropFarObjects(std::vector<ObjectDraft>& drafts, std::vector<Box>& boxes,
       continue;
     }
     if (isStray(boxes[i])) problems.add("far_object", drafts[i].object.path);
+    if (!isStray(boxes[i]) && reach.farthest > kWildFactor * limit) {
+      problems.add("far_reaching_object", drafts[i].object.path + ": as far as " +
+                                              std::to_string(std::llround(reach.farthest)) + " m");
+    }
     if (kept != i) {
       drafts[kept] = std::move(drafts[i]);
       boxes[kept] = boxes[i];
@@ -247,8 +250,12 @@ Model convertScene(const aiScene& scene, const ConvertInput& input,
   Eigen::Affine3d worldFromRoot = Eigen::Affine3d::Identity();
   worldFromRoot.linear() =
       yUpFrom(model.up) * model.metresPerUnit * assimpFromFile(input.facts, input.format).inverse();
+  worldFromRoot.translate(input.shift);
+  const bool gltf = input.format == ModelFormat::gltf || input.format == ModelFormat::glb;
+  const NodeTransforms exact =
+      gltf ? exactGltfTransforms(scene, input.file, input.format) : NodeTransforms();
   std::vector<ObjectDraft> drafts =
-      collectObjects(scene, input.format, worldFromRoot, meshes, problems);
+      collectObjects(scene, input.format, worldFromRoot, exact, meshes, problems);
   if (progress) progress("convert", 0.5);
 
   finishModel(std::move(drafts), std::move(meshes), input.file, model, problems);

@@ -11,6 +11,7 @@
 #include "scene/import_file_facts.hpp"
 #include "scene/import_model.hpp"
 
+struct aiNode;
 struct aiScene;
 
 namespace enfilade::scene {
@@ -31,7 +32,20 @@ struct ConvertInput {
   FileFacts facts;
   std::optional<double> metresPerUnit;  ///< the user's, which replaces the file's
   std::optional<char> up;
+  Vec3 shift = Vec3::Zero();  ///< in the file's units and axes: taken off before assimp read it
 };
+
+/// A file's text with `shift` taken off its coordinates; empty: it may stay as it is.
+struct ShiftedText {
+  std::string text;
+  Vec3 shift = Vec3::Zero();
+};
+
+/// Of an OBJ file whose vertices lie farther than `farAway` (in its units) from its origin.
+ShiftedText shiftedObj(const std::filesystem::path& file, double farAway);
+
+constexpr double kFarAway = 1000;  ///< metres: farther from the origin, floats lose the millimetre
+constexpr double kCoarse = 1e-4;   ///< metres between neighbouring floats that deserve a word
 
 /// Throws ImportError when nothing solid is left. `input.facts` must be of the same file.
 Model convertScene(const aiScene& scene, const ConvertInput& input, const ImportProgress& progress);
@@ -82,10 +96,18 @@ class SiblingNames {
   std::map<std::string, std::size_t> repeats_;
 };
 
+/// Transforms of nodes to their parents, where they are known better than assimp knows them.
+using NodeTransforms = std::map<const aiNode*, Eigen::Affine3d>;
+
+/// What a glTF file says of its nodes, in doubles; those that cannot be found again are left out.
+NodeTransforms exactGltfTransforms(const aiScene& scene, const std::filesystem::path& file,
+                                   ModelFormat format);
+
 /// The nodes that carry triangles, in document order. `worldFromRoot` goes before the root's own
 /// transform.
 std::vector<ObjectDraft> collectObjects(const aiScene& scene, ModelFormat format,
                                         const Eigen::Affine3d& worldFromRoot,
+                                        const NodeTransforms& exact,
                                         const std::vector<Mesh>& meshes, ProblemLog& problems);
 
 }  // namespace enfilade::scene

@@ -18,7 +18,6 @@ constexpr double kOwnShare = 0.95;     // of the time limit: the rest is for the
 constexpr double kReaderShare = 0.6;   // of what is left, for a reader that others may follow
 constexpr std::size_t kTextShare = 8;  // the file's text may take this part of the memory
 constexpr std::size_t kLargestText = std::size_t{4} << 30;  // bytes, where memory has no limit
-constexpr double kCoarse = 1e-4;  // metres between neighbouring floats that are too many
 
 class Paths {
  public:

@@ -97,8 +97,14 @@ std::string globalIdIn(std::string_view name) {
 
 class Collector {
  public:
-  Collector(ModelFormat format, const std::vector<Mesh>& meshes, ProblemLog& problems)
-      : ifc_(format == ModelFormat::ifc), meshes_(meshes), problems_(problems) {}
+  Collector(ModelFormat format, const NodeTransforms& exact, const std::vector<Mesh>& meshes,
+            ProblemLog& problems)
+      : ifc_(format == ModelFormat::ifc), exact_(exact), meshes_(meshes), problems_(problems) {}
+
+  Eigen::Affine3d parentFromNode(const aiNode& node) const {
+    const auto exact = exact_.find(&node);
+    return exact == exact_.end() ? toDouble(node.mTransformation) : exact->second;
+  }
 
   /// Where a node stands: what its parents made of the tree so far.
   struct Place {
@@ -110,13 +116,25 @@ class Collector {
   };
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
+  /// Tells of a node that floats place by steps that one could see.
+  void judgePlacement(const aiNode& node, const Place& place) {
+    if (exact_.contains(&node)) return;
+    const Vec3 translation = toDouble(node.mTransformation).translation();
+    const double step = (place.worldFromParent.linear() * translation).norm() * 0x1p-23;
+    if (!(step > kCoarse)) return;
+    problems_.add("coarse_placement", std::string(node.mName.C_Str(), node.mName.length) +
+                                          ": steps of " + std::to_string(step) +
+                                          " m; export it as glTF, whose numbers are read whole");
+  }
+
   void visit(const aiNode& node, const Place& place) {
     if (place.depth > kDeepest) {
       throw ImportError("nodes are nested more than " + std::to_string(kDeepest) +
                         " levels deep; re-export the file with a flatter tree (convert)");
     }
     const std::string_view name(node.mName.C_Str(), node.mName.length);
-    const Eigen::Affine3d worldFromNode = place.worldFromParent * toDouble(node.mTransformation);
+    const Eigen::Affine3d worldFromNode = place.worldFromParent * parentFromNode(node);
+    judgePlacement(node, place);
     if (ifc_ && name.starts_with("$Rel")) return visitChildren(node, passOn(place, worldFromNode));
     if (ifc_ && place.product != kNone && globalIdIn(name).empty()) {
       place_(node, worldFromNode, drafts_[place.product]);
@@ -175,6 +193,7 @@ class Collector {
   }
 
   bool ifc_;
+  const NodeTransforms& exact_;
   const std::vector<Mesh>& meshes_;
   ProblemLog& problems_;
   std::vector<ObjectDraft> drafts_;
@@ -192,13 +211,14 @@ bool rootIsNoNode(const aiNode& root, ModelFormat format) {
 
 std::vector<ObjectDraft> collectObjects(const aiScene& scene, ModelFormat format,
                                         const Eigen::Affine3d& worldFromRoot,
+                                        const NodeTransforms& exact,
                                         const std::vector<Mesh>& meshes, ProblemLog& problems) {
-  Collector collector(format, meshes, problems);
+  Collector collector(format, exact, meshes, problems);
   SiblingNames names;
   Collector::Place place{worldFromRoot, "", &names};
   const aiNode& root = *scene.mRootNode;
   if (rootIsNoNode(root, format)) {
-    place.worldFromParent = worldFromRoot * toDouble(root.mTransformation);
+    place.worldFromParent = worldFromRoot * collector.parentFromNode(root);
     collector.visitChildren(root, place);
   } else {
     collector.visit(root, place);

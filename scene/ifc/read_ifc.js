@@ -81,6 +81,11 @@ function isBroken(error) {
   return error instanceof WebAssembly.RuntimeError || error instanceof RangeError;
 }
 
+function textOf(error) {
+  if (error instanceof WebAssembly.Exception) return 'web-ifc threw an exception';
+  return String(error?.message ?? error);
+}
+
 async function main() {
   const first = Number(process.argv[2]);
   const { IfcAPI, LogLevel } = createRequire(import.meta.url)('web-ifc');
@@ -101,7 +106,7 @@ async function main() {
     try {
       api.StreamMeshes(model, [wanted[i]], (mesh) => sendProduct(api, model, mesh, known));
     } catch (error) {
-      sendFrame('F', words(wanted[i]), Buffer.from(String(error?.message ?? error)));
+      sendFrame('F', words(wanted[i]), Buffer.from(textOf(error)));
       if (isBroken(error)) return 1; // the importer starts another process for the rest
     }
   }
@@ -112,7 +117,7 @@ async function main() {
 main().then(
   (code) => process.exit(code),
   (error) => {
-    sendFrame('E', Buffer.from(String(error?.message ?? error)));
+    sendFrame('E', Buffer.from(textOf(error)));
     process.exit(1);
   },
 );

@@ -76,6 +76,64 @@ TEST(ImportHandMade, TransformsAreChainedInDoublesAndTheOffsetComesOff) {
   expectBounds(Scene{Model(model)}, corner, corner + Vec3::Ones(), 1e-9);
 }
 
+TEST(ImportHandMade, TranslationsThatFloatsCannotHoldAreReadWhole) {
+  const TemporaryFolder folder;
+  // Each node has its own place on the map; floats step by half a metre there.
+  const std::string nodes = R"({"mesh":0,"translation":[459123.4,112.6,-5428310.7]},)"
+                            R"({"mesh":0,"translation":[459125.53,112.6,-5428309.31]})";
+  const BoxMesh mesh({1, 1, 1});
+  for (const auto& file : {folder.write("map.gltf", gltf(mesh, "0,1", nodes)),
+                           folder.write("map.glb", tests::glb(mesh, "0,1", nodes))}) {
+    const Model model = importModel(file);
+    ASSERT_EQ(model.objects.size(), 2u);
+    const Vec3 apart =
+        model.objects[1].worldFromMesh.translation() - model.objects[0].worldFromMesh.translation();
+    EXPECT_LT((apart - Vec3(2.13, 0, 1.39)).norm(), 1e-8) << apart.transpose();
+    const Vec3 place = model.objects[0].worldFromMesh.translation() + model.offset;
+    EXPECT_LT((place - Vec3(459123.4, 112.6, -5428310.7)).norm(), 1e-8);
+    EXPECT_EQ(countOf(model, "coarse_placement"), 0u);
+  }
+}
+
+TEST(ImportHandMade, ObjVerticesOnAMapKeepTheirMillimetres) {
+  const TemporaryFolder folder;
+  std::string text = "# on a map\no one\n";
+  for (const char* vertex : {"459123.401 112.6 5428310.702", "459124.401 112.6 5428310.702",
+                             "459123.401 112.6 5428311.706", "459123.401 114.607 5428310.702"}) {
+    text += std::string("v ") + vertex + "\n";
+  }
+  const auto file = folder.write("map.obj", text + "f 1 2 3\nf 1 4 2\n");
+  const Model model = importModel(file);
+  EXPECT_NEAR(model.offset.x(), 459123, 2);
+  const Scene scene{Model(model)};
+  EXPECT_LT((scene.bounds().size() - Vec3(1, 2.007, 1.004)).norm(), 1e-5)
+      << scene.bounds().size().transpose();
+  EXPECT_LT((scene.bounds().min + model.offset - Vec3(459123.401, 112.6, 5428310.702)).norm(),
+            1e-5);
+}
+
+TEST(ImportHandMade, AnObjectThreeHundredKilometresOffIsLeftOutAndReported) {
+  const TemporaryFolder folder;
+  const auto file = folder.write(
+      "stray.gltf",
+      gltf(BoxMesh({1, 1, 1}), "0,1,2,3",
+           R"({"mesh":0},{"mesh":0,"translation":[2,0,0]},{"mesh":0,"translation":[0,0,3]},)"
+           R"({"mesh":0,"name":"stray","translation":[300000,0,0]})"));
+  const Model model = importModel(file);
+  EXPECT_EQ(model.objects.size(), 3u);
+  EXPECT_EQ(countOf(model, "far_object_dropped"), 1u);
+  EXPECT_TRUE(model.offset.isZero(0));
+  expectBounds(Scene{Model(model)}, {0, 0, 0}, {3, 1, 4});
+}
+
+TEST(ImportHandMade, TwoSitesFarApartAreBothKept) {
+  const TemporaryFolder folder;
+  const auto file = folder.write(
+      "sites.gltf",
+      gltf(BoxMesh({1, 1, 1}), "0,1", R"({"mesh":0},{"mesh":0,"translation":[5000,0,0]})"));
+  EXPECT_EQ(importModel(file).objects.size(), 2u);
+}
+
 TEST(ImportHandMade, NoOffsetWithinAKilometre) {
   const TemporaryFolder folder;
   const auto file = folder.write(

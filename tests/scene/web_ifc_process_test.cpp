@@ -1,0 +1,113 @@
+// The process that becomes Node.js, with scripts in the place of ours that misbehave.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "scene/import_model.hpp"
+#include "scene/web_ifc.hpp"
+#include "tests/scene/hand_made_files.hpp"
+#include "tests/scene/hand_made_ifc.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+/// A folder with `script` where web-ifc is looked for, as long as it lives.
+class ScriptedNode {
+ public:
+  explicit ScriptedNode(const std::string& script) {
+    std::filesystem::create_directories(folder_.path() / "node_modules/web-ifc");
+    folder_.write("package.json", R"({"type":"module"})");
+    folder_.write("read_ifc.js", kFrames + script);
+    setenv("ENFILADE_WEB_IFC", folder_.path().c_str(), 1);
+  }
+  ~ScriptedNode() { unsetenv("ENFILADE_WEB_IFC"); }
+  ScriptedNode(const ScriptedNode&) = delete;
+  ScriptedNode& operator=(const ScriptedNode&) = delete;
+
+  std::filesystem::path house() const {
+    return folder_.write("house.ifc", tests::IfcHouse().text());
+  }
+  bool possible() const { return findWebIfc().missing.empty(); }
+
+ private:
+  static constexpr const char* kFrames = R"(
+import fs from 'node:fs';
+const first = Number(process.argv[2]);
+const words = (...n) => Buffer.from(Uint32Array.from(n).buffer);
+const send = (kind, body) => {
+  const head = Buffer.alloc(9);
+  head.write(kind, 0, 'latin1');
+  head.writeBigUInt64LE(BigInt(body.length), 1);
+  fs.writeSync(3, Buffer.concat([head, body]));
+};
+)";
+  tests::TemporaryFolder folder_;
+};
+
+std::string exampleOf(const Model& model, const std::string& kind) {
+  for (const Problem& problem : model.problems) {
+    if (problem.kind == kind) return problem.example;
+  }
+  return {};
+}
+
+TEST(WebIfcProcess, AProductThatBringsItDownIsLeftOutAndTheRestIsRead) {
+  // It dies of the first product (the wall, #120), and has a triangle for the second (the door).
+  const ScriptedNode node(R"(
+send('T', words(first));
+if (first === 0) process.kill(process.pid, 'SIGKILL');
+if (first === 1) {
+  const vertices = Buffer.from(new Float32Array([0,0,0,0,0,1, 1,0,0,0,0,1, 0,1,0,0,0,1]).buffer);
+  send('G', Buffer.concat([words(7, 3, 3), vertices, words(0, 1, 2)]));
+  const numbers = new Float64Array([1,0,0,1, 1,0,0,0, 0,1,0,0, 0,0,1,0, 2,0,0,1]);
+  send('O', Buffer.concat([words(320, 1), words(7), Buffer.from(numbers.buffer)]));
+}
+if (first !== 0) send('D', Buffer.alloc(0));
+setTimeout(() => {}, first === 0 ? 10000 : 0);
+)");
+  if (!node.possible()) GTEST_SKIP() << findWebIfc().missing;
+  const Model model = importModel(node.house());
+  EXPECT_EQ(model.reader, "web-ifc");
+  ASSERT_EQ(model.objects.size(), 2u);
+  EXPECT_NE(exampleOf(model, "openings_unverified").find("000000000000000000Wall"),
+            std::string::npos)
+      << "ifcplusplus reads the wall";
+
+  ImportOptions alone;
+  alone.ifcReader = IfcReader::webIfc;
+  const Model left = importModel(node.house(), alone);
+  ASSERT_EQ(left.objects.size(), 1u);
+  EXPECT_EQ(left.objects[0].ifcClass, "IfcDoor");
+  EXPECT_NE(exampleOf(left, "missing_product").find("crashed (Killed)"), std::string::npos)
+      << exampleOf(left, "missing_product");
+}
+
+TEST(WebIfcProcess, ARunawayIsStoppedByItsMemoryLimit) {
+  const ScriptedNode node(R"(
+const all = [];
+for (;;) all.push(Buffer.alloc(1 << 24, 1));
+)");
+  if (!node.possible()) GTEST_SKIP() << findWebIfc().missing;
+  ImportOptions options;
+  options.memoryLimit = std::size_t{700} << 20;
+  options.timeLimit = 60;
+  const Model model = importModel(node.house(), options);
+  EXPECT_EQ(model.reader, "ifcplusplus");
+  const std::string why = exampleOf(model, "ifc_reader_failed");
+  EXPECT_TRUE(why.starts_with("web-ifc: ")) << why;
+  EXPECT_EQ(why.find("too long"), std::string::npos) << why;
+}
+
+TEST(WebIfcProcess, NoiseAndSilenceAreFailures) {
+  for (const char* script :
+       {"send('X', words(1));", "send('G', words(1, 5, 5));", "", "throw 1;"}) {
+    const ScriptedNode node(script);
+    if (!node.possible()) GTEST_SKIP() << findWebIfc().missing;
+    const Model model = importModel(node.house());
+    EXPECT_EQ(model.reader, "ifcplusplus") << script;
+    EXPECT_NE(exampleOf(model, "ifc_reader_failed"), "") << script;
+  }
+}
+
+}  // namespace
+}  // namespace enfilade::scene
