@@ -6,7 +6,8 @@
 //  the
 //     free bodies go only as far as is proved, and less fast; then their other pairs are looked at
 //     again, until nobody needs to stop. It ends, since a body goes less far each time, and after a
-//     few times not at all.
+//     few times not at all. A group that leans on one driven body and nothing else that stands or
+//     is driven, such as parts in a tray, goes with it at least.
 //  4. Groups of bodies that lean on one another and were calm for a while fall asleep.
 #include "scene/dynamics.hpp"
 
@@ -36,6 +37,7 @@ struct Work {
   std::vector<std::uint32_t> jointOf;
   std::vector<double> fractions;  ///< of each of `bodies`, of its way
   std::vector<Passage> passages;
+  std::vector<Vec3> carried;  ///< of each of `bodies`: metres that it goes in any case
 };
 
 NearPairStep nearStep(const DynamicsStep& settings) {
@@ -130,6 +132,7 @@ void gatherBodies(const Dynamics& dynamics, Work& work) {
 }
 
 void gatherPatches(const Dynamics& dynamics, double epsilon, Work& work) {
+  work.patches.reserve(work.active.size());
   for (const std::uint32_t i : work.active) {
     const NearPair& pair = dynamics.pairs[i];
     if (pair.patch.size == 0) continue;
@@ -199,21 +202,15 @@ Passage firstPart(Passage passage, double fraction) {
   return done;
 }
 
-SolidPart partAsSuch(const Solid& solid, std::uint32_t part) {
-  if (part >= solid.parts.size())
-    return {solid.mesh->triangles()[part - solid.parts.size()], nullptr, {}};
-  return solid.parts[part];
-}
-
 /// How far the pair is proved clear; 1 for one that was not separated when it set out.
 double clearFraction(const Dynamics& dynamics, const NearPair& pair, Work& work) {
   if (pair.verdict != collision::Verdict::separated) return 1;
   const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
   const Passage& wayA = work.passages[work.local[pair.key.a]];
   const Passage& wayB = work.passages[work.local[pair.key.b]];
-  if (lengthOf(wayA) + lengthOf(wayB) < apartNow(pair, a, b)) return 1;
+  if (closingOf(wayA, wayB) < apartNow(pair, a, b)) return 1;
   ++work.report.proofs;
-  return clearance(partAsSuch(a, pair.key.partA), wayA, partAsSuch(b, pair.key.partB), wayB,
+  return clearance(shapeOf(a, pair.key.partA), wayA, shapeOf(b, pair.key.partB), wayB,
                    pair.features)
       .fraction;
 }
@@ -226,7 +223,10 @@ bool shorten(const Dynamics& dynamics, const NearPair& pair, double part, Work& 
     const std::uint32_t i = work.local[solid];
     if (!dynamics.solids[solid].isAwake() || work.fractions[i] == 0) continue;
     work.fractions[i] *= part;
-    work.passages[i] = firstPart(work.passages[i], part);
+    Passage& way = work.passages[i];
+    way.toCentre -= work.carried[i];
+    way = firstPart(way, part);
+    way.toCentre += work.carried[i];
     changed[i] = 1;
     any = true;
   }
@@ -240,6 +240,40 @@ void leash(const Solid& solid, Passage& passage) {
   if (lengthOf(passage) > solid.leash) passage = standing(solid);
 }
 
+/// Which of `bodies` each group of patches is carried by: the one driven body that it meets, if
+/// that does not turn. kNone: none; kSeveral: it meets something else that is not free.
+constexpr std::uint32_t kSeveral = kNone - 1;
+
+std::vector<std::uint32_t> findCarriers(const Dynamics& dynamics, const Work& work,
+                                        Islands& islands) {
+  const auto isFree = [&](std::uint32_t body) {
+    return dynamics.solids[work.solids[body]].isAwake();
+  };
+  for (const ContactPatch& patch : work.patches)
+    if (isFree(patch.a) && isFree(patch.b)) islands.join(patch.a, patch.b);
+  std::vector<std::uint32_t> carriers(work.bodies.size(), kNone);
+  for (const ContactPatch& patch : work.patches) {
+    if (isFree(patch.a) == isFree(patch.b)) continue;
+    const std::uint32_t held = isFree(patch.a) ? patch.b : patch.a;
+    std::uint32_t& carrier = carriers[islands.leaderOf(isFree(patch.a) ? patch.a : patch.b)];
+    const bool carries = work.bodies[held].spin.isZero(0) && (carrier == kNone || carrier == held);
+    carrier = carries ? held : kSeveral;
+  }
+  return carriers;
+}
+
+void findCarried(const Dynamics& dynamics, double seconds, Work& work) {
+  Islands islands(work.bodies.size());
+  const std::vector<std::uint32_t> carriers = findCarriers(dynamics, work, islands);
+  work.carried.assign(work.bodies.size(), Vec3::Zero());
+  for (std::uint32_t i = 0; i < work.bodies.size(); ++i) {
+    const std::uint32_t carrier = carriers[islands.leaderOf(i)];
+    if (!dynamics.solids[work.solids[i]].isAwake() || carrier >= kSeveral) continue;
+    const Solid& solid = dynamics.solids[work.solids[carrier]];
+    if (!solid.isFree()) work.carried[i] = seconds * solid.motion.velocity;
+  }
+}
+
 /// Ways of all that go; the others stand.
 void findPassages(const Dynamics& dynamics, Work& work) {
   for (std::size_t i = 0; i < work.bodies.size(); ++i) {
@@ -250,8 +284,9 @@ void findPassages(const Dynamics& dynamics, Work& work) {
   }
 }
 
-void provePassages(const Dynamics& dynamics, Work& work) {
+void provePassages(const Dynamics& dynamics, double seconds, Work& work) {
   work.fractions.assign(work.bodies.size(), 1);
+  findCarried(dynamics, seconds, work);
   findPassages(dynamics, work);
   std::vector<std::uint8_t> open(work.bodies.size(), 1), changed(work.bodies.size(), 0);
   // Each round but the last shortens a way, after kPartialRounds to nothing.
@@ -275,7 +310,7 @@ void provePassages(const Dynamics& dynamics, Work& work) {
   }
 }
 
-void setOut(Dynamics& dynamics, Work& work) {
+void setOut(Dynamics& dynamics, double seconds, Work& work) {
   for (std::size_t i = 0; i < work.bodies.size(); ++i) {
     Solid& solid = dynamics.solids[work.solids[i]];
     const bool isAwake = solid.isAwake();
@@ -283,7 +318,8 @@ void setOut(Dynamics& dynamics, Work& work) {
     const Passage& way = work.passages[i];
     solid.motion.centre = way.toCentre, solid.motion.rotation = way.toRotation;
     if (isAwake) {
-      solid.motion.velocity = work.fractions[i] * work.bodies[i].velocity;
+      const Vec3 with = work.carried[i] / seconds;
+      solid.motion.velocity = with + work.fractions[i] * (work.bodies[i].velocity - with);
       solid.motion.spin = work.fractions[i] * work.bodies[i].spin;
       if (work.fractions[i] < 1) ++work.report.shortened;
     }
@@ -364,8 +400,8 @@ DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings) {
   gatherJoints(dynamics, work);
   solve(work.bodies, work.patches, work.joints, settings.solver);
   keepImpulses(dynamics, work);
-  provePassages(dynamics, work);
-  setOut(dynamics, work);
+  provePassages(dynamics, settings.solver.seconds, work);
+  setOut(dynamics, settings.solver.seconds, work);
   rest(dynamics, settings, work);
   return work.report;
 }

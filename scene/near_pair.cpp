@@ -117,10 +117,15 @@ Axis axisFor(const Axis& closest, const NearPair& pair, const Solid& a, const So
 
 /// Metres by which the pair can close in within the step, by the speeds of now.
 double reachOf(const Solid& a, const Solid& b, const NearPairStep& step) {
-  const double falls = (a.isAwake() ? 1 : 0) + (b.isAwake() ? 1 : 0);
-  const double speed =
-      (a.isFree() && a.asleep ? 0 : a.fastest()) + (b.isFree() && b.asleep ? 0 : b.fastest());
-  return step.seconds * (speed + falls * step.gravity.norm() * step.seconds);
+  const auto velocityOf = [](const Solid& s) {
+    return s.asleep ? Vec3(Vec3::Zero()) : s.motion.velocity;
+  };
+  const auto tipOf = [](const Solid& s) { return s.asleep ? 0 : s.motion.spin.norm() * s.radius; };
+  const double speed = (velocityOf(a) - velocityOf(b)).norm() + tipOf(a) + tipOf(b);
+  const bool falls = a.isAwake() || b.isAwake();
+  const double pushed =
+      a.mostPush > 0 || b.mostPush > 0 ? (a.pushVelocity - b.pushVelocity).norm() : 0;
+  return step.seconds * (speed + pushed + (falls ? step.gravity.norm() * step.seconds : 0));
 }
 
 /// The closest or deepest points, and what is known of the distance.

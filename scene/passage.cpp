@@ -1,11 +1,11 @@
 // A plane with normal n parts both bodies at the start by g0 and at the end by g1. Were the ways of
-// all vertices straight and even, the gap along n would be a concave function of time (least of
-// linear ones), and never below min(g0, g1). A vertex that turns by theta about the centre at
-// radius rho departs from its chord by at most rho theta^2 / 8 (|p''| = rho theta^2, and a function
-// with that second derivative departs from its chord by at most 1/8 of it). So
-//   min(g0, g1) > rho_A theta_A^2 / 8 + rho_B theta_B^2 / 8
-// proves them apart all the way. Where neither the plane of the start nor that of the end does, the
-// way is halved: the middle of an even turn from q0 to q1 is q0 + q1, normalised, up to rounding.
+// all vertices straight and even, the gap along n would be concave in time (least of linear ones),
+// so at least (1 - t) g0 + t g1 for t in 0..1. A vertex that turns by theta about the centre at
+// radius rho departs from its chord by at most rho theta^2 t (1 - t) / 2, since |p''| = rho
+// theta^2. With B = (rho_A theta_A^2 + rho_B theta_B^2) / 2 the gap is positive all the way if
+//   g0 / t + g1 / (1 - t) > B, that is, by its least value, (sqrt g0 + sqrt g1)^2 > B.
+// Where neither the plane of the start nor that of the end proves so much, the way is halved: the
+// middle of an even turn from q0 to q1 is q0 + q1, normalised, up to rounding.
 //
 // Where they move by less than their distance, no plane is needed.
 //
@@ -42,7 +42,7 @@ double turnOf(const Passage& p) {
 double bulgeOf(const Passage& p) {
   if (p.stands) return 0;
   const double turn = turnOf(p);
-  return p.radius * turn * turn / 8 * kUp;
+  return p.radius * turn * turn / 2 * kUp;
 }
 
 /// A part at an end of its way.
@@ -50,7 +50,7 @@ struct PlacedPart {
   Mat3 rotation;
   ConvexBody body;
 
-  PlacedPart(const SolidPart& part, const Passage& p, bool atEnd) {
+  PlacedPart(const PartShape& part, const Passage& p, bool atEnd) {
     const Quat& turned = atEnd ? p.toRotation : p.fromRotation;
     rotation = p.stands ? p.stands->rotation : turned.toRotationMatrix();
     const Vec3 position = p.stands
@@ -69,8 +69,8 @@ struct Known {
 };
 
 struct Search {
-  const SolidPart& partA;
-  const SolidPart& partB;
+  const PartShape& partA;
+  const PartShape& partB;
   std::uint32_t queries = 0;
 
   /// Separated at the end, and by how much?
@@ -90,15 +90,21 @@ struct Search {
   }
 };
 
+/// Whether a plane with these gaps at the ends parts the bodies all the way.
+bool partsAllTheWay(double atStart, double atEnd, double bulge) {
+  if (!(atStart > 0) || !(atEnd > 0)) return false;
+  const double roots = std::sqrt(atStart) + std::sqrt(atEnd);
+  return roots * roots > bulge * kUp;
+}
+
 /// Proved from the two ends alone.
 bool provedClear(const Search& search, const Passage& a, const Passage& b, const Known& start,
                  const Known& end) {
-  const double moves = lengthOf(a) + lengthOf(b);
+  const double moves = closingOf(a, b);
   if (moves < start.apart || moves < end.apart) return true;
   const double bulge = bulgeOf(a) + bulgeOf(b);
-  const double least = std::min(start.apart, end.apart);
-  if (!(least > bulge)) return false;
-  return search.along(a, b, true, start) > bulge || search.along(a, b, false, end) > bulge;
+  return partsAllTheWay(start.apart, search.along(a, b, true, start), bulge) ||
+         partsAllTheWay(search.along(a, b, false, end), end.apart, bulge);
 }
 
 /// The part of the way that is proved clear. The end's answer is not known to be separated.
@@ -133,6 +139,13 @@ double lengthOf(const Passage& p) {
   return (way.norm() + turnOf(p) * p.radius) * kUp;
 }
 
+double closingOf(const Passage& a, const Passage& b) {
+  const Vec3 way = (a.toCentre - a.fromCentre) - (b.toCentre - b.fromCentre);
+  return (way.norm() + (a.stands ? 0 : turnOf(a) * a.radius) +
+          (b.stands ? 0 : turnOf(b) * b.radius)) *
+         kUp;
+}
+
 PassagePose middleOf(const Passage& p) {
   PassagePose middle;
   middle.centre = 0.5 * (p.fromCentre + p.toCentre);
@@ -155,7 +168,7 @@ Passage secondHalf(const Passage& p, const PassagePose& middle) {
   return half;
 }
 
-Clearance clearance(const SolidPart& partA, const Passage& a, const SolidPart& partB,
+Clearance clearance(const PartShape& partA, const Passage& a, const PartShape& partB,
                     const Passage& b, const FeatureCache& cache) {
   Search search{partA, partB};
   const Known start = search.ask(a, b, false, cache);

@@ -23,6 +23,9 @@ Passage standing(const Solid& solid);
 /// Metres: no point goes farther on this way.
 double lengthOf(const Passage& passage);
 
+/// Metres: the distance of the two changes by no more.
+double closingOf(const Passage& a, const Passage& b);
+
 /// Where the passage is at its middle, exactly half way in both place and turn.
 struct PassagePose {
   Vec3 centre = Vec3::Zero();
@@ -42,7 +45,7 @@ inline constexpr int kMostHalvings = 6;
 
 /// How far both parts can go, both at the same part of their ways, with the bodies separated all
 /// the way. `cache`: of decide() at the start, where they are separated.
-Clearance clearance(const SolidPart& partA, const Passage& a, const SolidPart& partB,
+Clearance clearance(const PartShape& partA, const Passage& a, const PartShape& partB,
                     const Passage& b, const collision::FeatureCache& cache);
 
 }  // namespace enfilade::scene

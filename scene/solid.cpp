@@ -30,7 +30,7 @@ void addParts(std::span<const collision::Hull* const> hulls, Solid& solid) {
 }  // namespace
 
 SolidPart partOfHull(const collision::Hull& hull) {
-  SolidPart part{hull.vertices, &hull, {}};
+  SolidPart part{{hull.vertices, &hull}, {}};
   for (const auto& face : hull.faces) part.faceNormals.push_back(normalOfFace(hull, face));
   return part;
 }

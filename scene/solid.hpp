@@ -12,9 +12,12 @@
 namespace enfilade::scene {
 
 /// Its vertices are in the solid's frame, and live elsewhere.
-struct SolidPart {
+struct PartShape {
   std::span<const Vec3> vertices;
   const collision::Hull* hull = nullptr;  ///< of these vertices; null: at most three of them
+};
+
+struct SolidPart : PartShape {
   std::vector<Vec3> faceNormals;          ///< of the hull's faces, unit, outwards
 };
 
@@ -57,6 +60,12 @@ struct Solid {
 };
 
 void placeSolid(Solid& solid);
+
+inline PartShape shapeOf(const Solid& solid, std::uint32_t part) {
+  if (part >= solid.parts.size())
+    return {solid.mesh->triangles()[part - solid.parts.size()], nullptr};
+  return solid.parts[part];
+}
 
 /// Part `part` where the solid is.
 inline collision::ConvexBody partOf(const Solid& solid, std::uint32_t part) {

@@ -1,0 +1,242 @@
+#include "tests/support/parts_feeder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "collision/penetration_depth.hpp"
+
+namespace enfilade::testing {
+namespace {
+
+using collision::Box;
+using collision::Pose;
+
+constexpr double kTick = 1.0 / 60;
+constexpr double kGravity = 9.80665;
+constexpr double kWallThickness = 0.1;
+/// Metres that a part may go in a tick beyond what its own speed has it.
+constexpr double kSpareReach = 5e-3;
+
+std::vector<Vec3> boxCorners(const Vec3& half) {
+  std::vector<Vec3> corners;
+  for (int i = 0; i < 8; ++i)
+    corners.emplace_back((i & 1) ? half.x() : -half.x(), (i & 2) ? half.y() : -half.y(),
+                         (i & 4) ? half.z() : -half.z());
+  return corners;
+}
+
+/// A prism of `sides` along y; tapered to `top` of its radius.
+std::vector<Vec3> prism(int sides, double radius, double halfHeight, double top) {
+  std::vector<Vec3> corners;
+  for (int i = 0; i < sides; ++i) {
+    const double angle = 2 * 3.14159265358979 * i / sides;
+    const Vec3 out{radius * std::cos(angle), 0, radius * std::sin(angle)};
+    corners.push_back(out - halfHeight * Vec3::UnitY());
+    corners.push_back(top * out + halfHeight * Vec3::UnitY());
+  }
+  return corners;
+}
+
+Quat anyRotation(std::mt19937& random) {
+  std::normal_distribution<double> number;
+  Quat q(number(random), number(random), number(random), number(random));
+  q.normalize();
+  return q;
+}
+
+void layTray(FeederPlan& plan) {
+  const double in = plan.inner, out = in + kWallThickness, high = plan.wall;
+  plan.tray.push_back({Vec3(-out, -kWallThickness, -out), Vec3(out, 0, out)});
+  plan.tray.push_back({Vec3(-out, 0, -out), Vec3(-in, high, out)});
+  plan.tray.push_back({Vec3(in, 0, -out), Vec3(out, high, out)});
+  plan.tray.push_back({Vec3(-in, 0, -out), Vec3(in, high, -in)});
+  plan.tray.push_back({Vec3(-in, 0, in), Vec3(in, high, out)});
+}
+
+Hull boxHull(const std::array<Vec3, 2>& box) {
+  std::vector<Vec3> corners = boxCorners(0.5 * (box[1] - box[0]));
+  for (Vec3& corner : corners) corner += 0.5 * (box[0] + box[1]);
+  return collision::buildHull(corners);
+}
+
+}  // namespace
+
+FeederPlan planFeeder(std::size_t count, unsigned seed) {
+  std::mt19937 random(seed);
+  FeederPlan plan;
+  plan.kinds = {boxCorners({0.010, 0.005, 0.007}), prism(6, 0.009, 0.004, 1),
+                prism(3, 0.010, 0.006, 0.6), prism(8, 0.006, 0.010, 0.7),
+                prism(4, 0.010, 0.003, 0.5)};
+  const double spacing = 0.026;
+  const auto across =
+      static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(count) / 4)));
+  plan.inner = 0.5 * spacing * static_cast<double>(across);
+  plan.wall = 0.25;
+  layTray(plan);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t row = i % across, column = i / across % across, layer = i / across / across;
+    const Vec3 cell(static_cast<double>(row) + 0.5, static_cast<double>(layer) + 0.7,
+                    static_cast<double>(column) + 0.5);
+    plan.parts.push_back({i % plan.kinds.size(), spacing * cell - Vec3(plan.inner, 0, plan.inner),
+                          anyRotation(random)});
+  }
+  return plan;
+}
+
+Vec3 trayAt(const FeederPlan& plan, double time, bool driven) {
+  if (!driven) return Vec3::Zero();
+  const double sine = std::sin(2 * 3.14159265358979 * plan.frequency * time);
+  return sine * Vec3(plan.sidewards, plan.amplitude, 0);
+}
+
+// ---- the judge ---------------------------------------------------------------------------------
+
+FeederJudge::FeederJudge(const FeederPlan& plan) : plan_(plan) {
+  for (const auto& corners : plan.kinds) kinds_.push_back(collision::buildHull(corners));
+  for (const auto& box : plan.tray) tray_.push_back(boxHull(box));
+}
+
+FeederJudgement FeederJudge::judge(const std::vector<PlacedPart>& parts, const Vec3& tray) const {
+  FeederJudgement found;
+  std::vector<collision::Mat3> rotations;
+  collision::SortAndSweep near({});
+  for (const PlacedPart& part : parts) rotations.push_back(part.rotation.toRotationMatrix());
+  const auto bodyOf = [&](std::size_t i) {
+    if (i >= parts.size()) {
+      const Hull& hull = tray_[i - parts.size()];
+      return collision::ConvexBody{hull.vertices, tray, nullptr, &hull};
+    }
+    const Hull& hull = kinds_[plan_.parts[i].kind];
+    return collision::ConvexBody{hull.vertices, parts[i].position, &rotations[i], &hull};
+  };
+  for (std::size_t i = 0; i < parts.size() + tray_.size(); ++i) {
+    const auto body = bodyOf(i);
+    near.insert(collision::tightBoxBruteForce(
+        *body.hull, {i < parts.size() ? parts[i].rotation : Quat::Identity(), body.translation}));
+  }
+  near.update();
+  for (const auto& pair : near.begun()) {
+    if (pair.mover >= parts.size() && pair.other >= parts.size()) continue;
+    collision::FeatureCache cache;
+    const auto a = bodyOf(pair.mover), b = bodyOf(pair.other);
+    if (collision::decide(a, b, cache).verdict != collision::Verdict::penetrating) continue;
+    collision::DepthCache none;
+    ++found.penetrating;
+    found.deepest = std::max(found.deepest, collision::penetrationDepth(a, b, cache, none).depth);
+  }
+  for (const PlacedPart& part : parts) {
+    const Vec3 at = part.position - tray;
+    const bool inside = std::abs(at.x()) < plan_.inner && std::abs(at.z()) < plan_.inner &&
+                        at.y() > 0 && at.y() < 4 * plan_.wall;
+    if (!inside) ++found.outside;
+  }
+  return found;
+}
+
+// ---- ours --------------------------------------------------------------------------------------
+
+Feeder::Feeder(const FeederPlan& plan) : plan_(plan), broadPhase_({}) {
+  settings_.solver.substeps = plan.substeps / plan.looks;
+  settings_.solver.seconds = kTick / plan.looks;
+  settings_.solver.iterations = 4;
+  std::vector<const Hull*> trayHulls, kinds;
+  for (const auto& box : plan.tray)
+    hulls_.push_back(boxHull(box)), trayHulls.push_back(&hulls_.back());
+  for (const auto& corners : plan.kinds)
+    hulls_.push_back(collision::buildHull(corners)), kinds.push_back(&hulls_.back());
+  dynamics_.solids.push_back(scene::heldSolid(trayHulls, {}));
+  for (const FeederPlan::Part& part : plan.parts) {
+    const Hull* hull = kinds[part.kind];
+    dynamics_.solids.push_back(
+        scene::freeSolid({&hull, 1}, plan.density, {part.rotation, part.at}));
+  }
+  for (scene::Solid& solid : dynamics_.solids) solid.motion.friction = plan.friction;
+  extremes_.resize(dynamics_.solids.size());
+  for (std::uint32_t i = 0; i < trayHulls.size(); ++i)
+    trayMovers_.push_back(broadPhase_.insert(Box{plan.tray[i][0], plan.tray[i][1]}));
+  for (std::size_t i = 1; i < dynamics_.solids.size(); ++i)
+    movers_.push_back(broadPhase_.insert({Vec3::Zero(), Vec3::Zero()}));
+  // A fresh broad phase counts up: the tray's boxes first, then the parts.
+  for (std::uint32_t i = 0; i < trayHulls.size(); ++i)
+    solidOfMover_.push_back(0), partOfMover_.push_back(i);
+  for (std::uint32_t i = 1; i < dynamics_.solids.size(); ++i)
+    solidOfMover_.push_back(i), partOfMover_.push_back(0);
+}
+
+/// Once a tick: each part by what it can reach until the next.
+void Feeder::findPairs() {
+  const double lookout = 2 * settings_.solver.epsilon;
+  for (std::size_t i = 1; i < dynamics_.solids.size(); ++i) {
+    scene::Solid& solid = dynamics_.solids[i];
+    solid.leash =
+        solid.asleep ? lookout : solid.fastest() * kTick + kGravity * kTick * kTick + kSpareReach;
+    const Pose pose{solid.motion.rotation, solid.position};
+    broadPhase_.move(movers_[i - 1], collision::tightBox(*solid.parts[0].hull, pose, extremes_[i],
+                                                         solid.leash + lookout));
+  }
+  for (std::size_t i = 0; i < trayMovers_.size(); ++i) {
+    const Box box{plan_.tray[i][0], plan_.tray[i][1]};
+    const double moves = 2 * (plan_.amplitude + plan_.sidewards);
+    broadPhase_.move(trayMovers_[i], grown(box, moves + lookout));
+  }
+  broadPhase_.update();
+  std::vector<scene::PartPairKey> keys;
+  for (std::size_t i = 1; i < dynamics_.solids.size(); ++i) {
+    for (const auto& partner : broadPhase_.partners(movers_[i - 1])) {
+      const std::uint32_t other = solidOfMover_[partner.id];
+      if (other < i)
+        keys.push_back({other, static_cast<std::uint32_t>(i), partOfMover_[partner.id], 0});
+    }
+  }
+  std::sort(keys.begin(), keys.end());
+  scene::setPairs(dynamics_, keys);
+}
+
+void Feeder::tick(bool driven) {
+  findPairs();
+  scene::Solid& tray = dynamics_.solids[0];
+  std::vector<double> reach;
+  for (const scene::Solid& solid : dynamics_.solids) reach.push_back(solid.odometer + solid.leash);
+  report_ = {};
+  for (int i = 0; i < plan_.looks; ++i) {
+    const double seconds = settings_.solver.seconds;
+    for (std::size_t k = 1; k < reach.size(); ++k)
+      dynamics_.solids[k].leash = std::max(0.0, reach[k] - dynamics_.solids[k].odometer);
+    const Vec3 next = trayAt(plan_, time_ + seconds, driven);
+    tray.motion.velocity = (next - tray.motion.centre) / seconds;
+    const scene::DynamicsReport step = scene::step(dynamics_, settings_);
+    time_ += seconds;
+    report_.awake = step.awake;
+    report_.islands = step.islands;
+    report_.looks += step.looks;
+    report_.patches += step.patches;
+    report_.leaning += step.leaning;
+    report_.proofs += step.proofs;
+    report_.shortened += step.shortened;
+    report_.squeezed += step.squeezed;
+    report_.deepest = std::max(report_.deepest, step.deepest);
+  }
+}
+
+std::vector<PlacedPart> Feeder::parts() const {
+  std::vector<PlacedPart> placed;
+  for (std::size_t i = 1; i < dynamics_.solids.size(); ++i)
+    placed.push_back({dynamics_.solids[i].position, dynamics_.solids[i].motion.rotation});
+  return placed;
+}
+
+Vec3 Feeder::tray() const {
+  return dynamics_.solids[0].position;
+}
+
+double Feeder::energy() const {
+  double sum = 0;
+  for (const scene::Solid& solid : dynamics_.solids)
+    if (solid.isFree())
+      sum += scene::kineticEnergy(solid.motion) +
+             kGravity * solid.motion.centre.y() / solid.motion.inverseMass;
+  return sum;
+}
+
+}  // namespace enfilade::testing
