@@ -180,6 +180,7 @@ Passage passageOf(const Solid& solid, const RigidBody& goal) {
   Passage passage = standing(solid);
   passage.toCentre = goal.centre, passage.toRotation = goal.rotation;
   passage.stands = nullptr;
+  measure(passage);
   return passage;
 }
 
@@ -199,6 +200,7 @@ Passage firstPart(Passage passage, double fraction) {
       passage = firstHalf(passage, middle);
     }
   }
+  measure(done);
   return done;
 }
 
@@ -326,6 +328,11 @@ void setOut(Dynamics& dynamics, double seconds, Work& work) {
     solid.odometer += lengthOf(way);
     placeSolid(solid);
   }
+  for (const std::uint32_t i : work.active) {
+    NearPair& pair = dynamics.pairs[i];
+    pair.apart -=
+        closingOf(work.passages[work.local[pair.key.a]], work.passages[work.local[pair.key.b]]);
+  }
 }
 
 // ---- step 4 ------------------------------------------------------------------------------------
@@ -362,7 +369,9 @@ void rest(Dynamics& dynamics, const DynamicsStep& settings, Work& work) {
   for (std::uint32_t i = 0; i < dynamics.solids.size(); ++i) {
     Solid& solid = dynamics.solids[i];
     if (!solid.isAwake()) continue;
-    const bool isCalm = solid.fastest() < settings.rest.calmSpeed && !restless[i];
+    // By how far it went, not by its speed: who is stopped on every way is at rest, too.
+    const double went = lengthOf(work.passages[work.local[i]]);
+    const bool isCalm = went < settings.rest.calmSpeed * settings.solver.seconds && !restless[i];
     solid.calmFor = isCalm ? solid.calmFor + settings.solver.seconds : 0;
     double& least = calm[islands.leaderOf(i)];
     least = std::min(least, solid.calmFor);

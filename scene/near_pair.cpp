@@ -230,7 +230,7 @@ bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& st
   const double farthest = limit + kForesight * (reach + step.epsilon);
   const ConvexBody bodyA = partOf(a, pair.key.partA), bodyB = partOf(b, pair.key.partB);
   const auto decision = collision::decideWithin(bodyA, bodyB, farthest, pair.features);
-  pair.since = a.odometer + b.odometer;
+  pair.since = a.jumped + b.jumped;
   pair.penetration = 0;
   pair.verdict = decision ? decision->verdict : Verdict::separated;
   if (!decision) {

@@ -24,7 +24,8 @@ struct NearPair {
   collision::FeatureCache features;
   std::unique_ptr<collision::DepthCache> depth;                ///< once they penetrated
   collision::Verdict verdict = collision::Verdict::separated;  ///< when last looked at
-  /// Metres: they were at least this far apart when their odometers' sum was `since`.
+  /// Metres: they are at least this far apart, less what was added to Solid::jumped of both since
+  /// its sum was `since`.
   double apart = -1;
   double since = 0;
   double penetration = 0;       ///< metres, when last looked at: the depth, or an upper bound of it
@@ -46,7 +47,7 @@ bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& st
 
 /// A lower bound of the distance by what was known; may be negative.
 inline double apartNow(const NearPair& pair, const Solid& a, const Solid& b) {
-  return pair.apart - (a.odometer + b.odometer - pair.since);
+  return pair.apart - (a.jumped + b.jumped - pair.since);
 }
 
 /// Whether the points lean on one another: nearer than 2 epsilon.

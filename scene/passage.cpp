@@ -40,9 +40,7 @@ double turnOf(const Passage& p) {
 }
 
 double bulgeOf(const Passage& p) {
-  if (p.stands) return 0;
-  const double turn = turnOf(p);
-  return p.radius * turn * turn / 2 * kUp;
+  return p.radius * p.turn * p.turn / 2 * kUp;
 }
 
 /// A part at an end of its way.
@@ -130,20 +128,22 @@ Passage standing(const Solid& solid) {
           solid.motion.rotation,
           solid.radius,
           solid.centreInFrame,
-          &solid};
+          &solid,
+          0};
+}
+
+void measure(Passage& passage) {
+  passage.turn = turnOf(passage);
 }
 
 double lengthOf(const Passage& p) {
-  if (p.stands) return 0;
   const Vec3 way = p.toCentre - p.fromCentre;
-  return (way.norm() + turnOf(p) * p.radius) * kUp;
+  return (way.norm() + p.turn * p.radius) * kUp;
 }
 
 double closingOf(const Passage& a, const Passage& b) {
   const Vec3 way = (a.toCentre - a.fromCentre) - (b.toCentre - b.fromCentre);
-  return (way.norm() + (a.stands ? 0 : turnOf(a) * a.radius) +
-          (b.stands ? 0 : turnOf(b) * b.radius)) *
-         kUp;
+  return (way.norm() + a.turn * a.radius + b.turn * b.radius) * kUp;
 }
 
 PassagePose middleOf(const Passage& p) {
@@ -159,12 +159,14 @@ PassagePose middleOf(const Passage& p) {
 Passage firstHalf(const Passage& p, const PassagePose& middle) {
   Passage half = p;
   half.toCentre = middle.centre, half.toRotation = middle.rotation;
+  measure(half);
   return half;
 }
 
 Passage secondHalf(const Passage& p, const PassagePose& middle) {
   Passage half = p;
   half.fromCentre = middle.centre, half.fromRotation = middle.rotation;
+  measure(half);
   return half;
 }
 

@@ -15,10 +15,14 @@ struct Passage {
   double radius = 0;                  ///< about the centre: no vertex is farther, metres
   Vec3 centreInFrame = Vec3::Zero();  ///< of the parts' frame
   const Solid* stands = nullptr;      ///< it does not move: its frame is there to the last bit
+  double turn = 0;                    ///< radians, at least; set by measure()
 };
 
 /// The way of a solid that stands.
 Passage standing(const Solid& solid);
+
+/// To be called when the rotations were set.
+void measure(Passage& passage);
 
 /// Metres: no point goes farther on this way.
 double lengthOf(const Passage& passage);

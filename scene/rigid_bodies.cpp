@@ -84,14 +84,14 @@ std::uint32_t solidForPart(WorldState& world, const Avatar& avatar, std::uint32_
     solid.parts = {partOfHull(*part.hull)};
     solid.radius = part.hull->radius;
     solid.restless = true;
-    solid.odometer += 1e9;  // another shape: nothing that was known holds
+    solid.jumped += 1e9;  // another shape: nothing that was known holds
   }
   const collision::ConvexBody placed = bodyAt(part, avatar.feet);
   solid.position = solid.motion.centre = placed.translation;
-  if (part.rotation != solid.rotation) solid.odometer += 2 * solid.radius;
+  if (part.rotation != solid.rotation) solid.jumped += 2 * solid.radius;
   solid.rotation = part.rotation;
   solid.motion.rotation = collision::Quat(part.rotation);
-  solid.odometer += (solid.position - before).norm() * (1 + 0x1p-40);
+  solid.jumped += (solid.position - before).norm() * (1 + 0x1p-40);
   const auto wanted = wish.find(world.avatarNames[avatar.id - world.firstAvatarId()]);
   const Vec3 velocity = wanted == wish.end() ? Vec3(Vec3::Zero()) : wanted->second;
   solid.pushVelocity = velocity;
@@ -217,7 +217,6 @@ void driveSolids(WorldState& world) {
     if (found == world.rigids.solids.end()) continue;
     Solid& solid = world.rigids.dynamics.solids[found->second];
     solid.motion.velocity = body.velocity, solid.motion.spin = body.spin;
-    if (!body.moved && solid.position != body.position) solid = solidOf(body);
   }
 }
 
@@ -230,8 +229,8 @@ void settleDriven(WorldState& world) {
     Solid& solid = world.rigids.dynamics.solids[found->second];
     if (solid.position == body.position && solid.rotation == body.rotation) continue;
     // The solver took the same way, but for rounding.
-    solid.odometer += (solid.position - body.position).norm() +
-                      (solid.rotation - body.rotation).norm() * solid.radius;
+    solid.jumped += (solid.position - body.position).norm() +
+                    (solid.rotation - body.rotation).norm() * solid.radius;
     solid.motion.centre = body.position, solid.motion.rotation = body.orientation;
     placeSolid(solid);
   }

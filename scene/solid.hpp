@@ -18,7 +18,7 @@ struct PartShape {
 };
 
 struct SolidPart : PartShape {
-  std::vector<Vec3> faceNormals;          ///< of the hull's faces, unit, outwards
+  std::vector<Vec3> faceNormals;  ///< of the hull's faces, unit, outwards
 };
 
 /// The part of a hull, which has to outlive it.
@@ -44,7 +44,8 @@ struct Solid {
   // Set by placeSolid() from the motion.
   Mat3 rotation = Mat3::Identity();
   Vec3 position = Vec3::Zero();  ///< of the frame's origin
-  double odometer = 0;           ///< metres: no point went farther
+  double odometer = 0;           ///< metres that no point exceeded in all steps
+  double jumped = 0;             ///< metres that no point exceeded when it was placed from outside
 
   bool isFree() const { return motion.inverseMass > 0; }
   bool isAwake() const { return isFree() && !asleep; }

@@ -93,3 +93,26 @@ set(programs collision_broad_phase collision_narrow_phase collision_mesh collisi
   collision_time_to_contact)
 set_target_properties(${programs} PROPERTIES EXCLUDE_FROM_ALL ON)
 add_custom_target(collision_benchmarks DEPENDS ${programs})
+
+# The parts feeder beside the two peers that simulate; built by `./dev bench feeder`.
+find_library(BENCH_BULLET_DYNAMICS BulletDynamics-float64)
+enfilade_benchmark(parts_feeder
+  SOURCES parts_feeder.cpp ../support/parts_feeder.cpp
+  LIBRARIES enfilade_scene)
+set_target_properties(parts_feeder PROPERTIES EXCLUDE_FROM_ALL ON)
+foreach(peer bullet ode)
+  if(NOT TARGET bench_${peer} OR (peer STREQUAL bullet AND NOT BENCH_BULLET_DYNAMICS))
+    continue()
+  endif()
+  add_library(feeder_${peer} OBJECT EXCLUDE_FROM_ALL peers/${peer}_feeder.cpp)
+  target_include_directories(feeder_${peer} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(feeder_${peer} PRIVATE enfilade_scene bench_${peer})
+  string(TOUPPER BENCH_${peer} definition)
+  target_compile_definitions(parts_feeder PRIVATE ${definition})
+  target_sources(parts_feeder PRIVATE $<TARGET_OBJECTS:feeder_${peer}>)
+  if(peer STREQUAL bullet)
+    target_link_libraries(parts_feeder PRIVATE ${BENCH_BULLET_DYNAMICS})
+  endif()
+  target_link_libraries(parts_feeder PRIVATE
+    $<TARGET_PROPERTY:bench_${peer},INTERFACE_LINK_LIBRARIES>)
+endforeach()

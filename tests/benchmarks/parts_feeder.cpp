@@ -1,0 +1,134 @@
+// The parts feeder of the seed's 5.4 beside its peers: a vibrating tray with small convex parts,
+// one thread each. Prints speed against penetration, judged alike for all by the exact narrow
+// phase, and the checks of ours; ends with 1 when one of ours fails.
+//   parts_feeder [PARTS [TICKS]]        1000 parts and 240 ticks when left out; 10000 for the full
+//   run
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+
+#include "tests/benchmarks/feeder_engine.hpp"
+
+namespace enfilade::benchmarks {
+namespace {
+
+using testing::FeederJudge;
+using testing::FeederJudgement;
+using testing::FeederPlan;
+
+constexpr int kJudgeEvery = 20;  // ticks
+
+class OurFeeder : public FeederEngine {
+ public:
+  explicit OurFeeder(const FeederPlan& plan) : feeder_(plan) {}
+  void tick(bool driven) override { feeder_.tick(driven); }
+  std::vector<testing::PlacedPart> parts() const override { return feeder_.parts(); }
+  testing::Vec3 tray() const override { return feeder_.tray(); }
+  double energy() const { return feeder_.energy(); }
+  const scene::DynamicsReport& report() const { return feeder_.report(); }
+  double epsilon() { return feeder_.settings().solver.epsilon; }
+
+ private:
+  testing::Feeder feeder_;
+};
+
+struct Row {
+  double seconds = 0;  ///< of the ticks
+  double cpu = 0;      ///< of the ticks, of this thread
+  FeederJudgement worst;
+  std::size_t judged = 0;
+};
+
+double cpuSeconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+Row run(FeederEngine& engine, const FeederJudge& judge, int ticks, bool driven,
+        const std::function<void()>& afterTick = {}) {
+  Row row;
+  for (int i = 1; i <= ticks; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    const double cpu = cpuSeconds();
+    engine.tick(driven);
+    row.cpu += cpuSeconds() - cpu;
+    row.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (afterTick) afterTick();
+    if (i % kJudgeEvery != 0) continue;
+    const FeederJudgement now = judge.judge(engine.parts(), engine.tray());
+    row.worst.deepest = std::max(row.worst.deepest, now.deepest);
+    row.worst.penetrating = std::max(row.worst.penetrating, now.penetrating);
+    row.worst.outside = std::max(row.worst.outside, now.outside);
+    ++row.judged;
+  }
+  return row;
+}
+
+void print(const char* name, const Row& row, int ticks) {
+  std::printf("%-16s %10.2f %10.2f %10.2f %14.4f %12zu %9zu\n", name, 1e3 * row.seconds / ticks,
+              1e3 * row.cpu / ticks, ticks / 60.0 / row.cpu, 1e3 * row.worst.deepest,
+              row.worst.penetrating, row.worst.outside);
+}
+
+bool check(bool holds, const char* what) {
+  std::printf("  %s  %s\n", holds ? "holds " : "BROKEN", what);
+  return holds;
+}
+
+bool checkOurs(const FeederPlan& plan, const FeederJudge& judge, int ticks) {
+  OurFeeder still(plan);
+  const double start = still.energy();
+  double most = start;
+  const Row off = run(still, judge, ticks, false, [&] { most = std::max(most, still.energy()); });
+  OurFeeder driven(plan);
+  std::uint64_t shortened = 0, squeezed = 0, solids = 0;
+  const Row on = run(driven, judge, ticks, true, [&] {
+    shortened += driven.report().shortened;
+    squeezed += driven.report().squeezed;
+    solids += plan.parts.size() * static_cast<std::uint64_t>(plan.looks);
+  });
+  print("ours, drive off", off, ticks);
+  print("ours", on, ticks);
+  std::printf(
+      "  energy with the drive off: at most %.6f of its start; stopped on their way: %.2f %%"
+      " of all ways, %llu squeezed pairs\n",
+      most / start, 100.0 * static_cast<double>(shortened) / static_cast<double>(solids),
+      static_cast<unsigned long long>(squeezed));
+  bool all = check(most <= 1.001 * start, "drive off: energy never above its start + 0.1 %");
+  all &= check(off.worst.outside + on.worst.outside == 0, "all parts inside");
+  all &= check(std::max(off.worst.deepest, on.worst.deepest) <= driven.epsilon(),
+               "penetration <= epsilon");
+  return all;
+}
+
+int main(int count, char** words) {
+  const std::size_t parts = count > 1 ? std::strtoul(words[1], nullptr, 10) : 1000;
+  const int ticks = count > 2 ? std::atoi(words[2]) : 240;
+  if (parts < 1 || parts > 100'000 || ticks < kJudgeEvery) {
+    std::fprintf(stderr, "parts_feeder [PARTS 1..100000 [TICKS, at least %d]]\n", kJudgeEvery);
+    return 2;
+  }
+  const FeederPlan plan = testing::planFeeder(parts, 1);
+  const FeederJudge judge(plan);
+  std::printf("%zu parts, %d ticks of 1/60 s in %d substeps, drive %g Hz, judged every %d ticks\n",
+              parts, ticks, plan.substeps, plan.frequency, kJudgeEvery);
+  std::printf("%-16s %10s %10s %10s %14s %12s %9s\n", "", "ms a tick", "cpu ms", "real time",
+              "deepest mm", "penetrating", "outside");
+  const bool good = checkOurs(plan, judge, ticks);
+#ifdef BENCH_BULLET
+  print("Bullet", run(*makeBulletFeeder(plan), judge, ticks, true), ticks);
+#endif
+#ifdef BENCH_ODE
+  print("ODE", run(*makeOdeFeeder(plan), judge, ticks, true), ticks);
+#endif
+  return good ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace enfilade::benchmarks
+
+int main(int count, char** words) {
+  return enfilade::benchmarks::main(count, words);
+}

@@ -1,0 +1,58 @@
+#include "tests/support/parts_feeder.hpp"
+
+#include <gtest/gtest.h>
+
+namespace enfilade::testing {
+namespace {
+
+TEST(PartsFeeder, WithTheDriveOffNoEnergyIsMadeAndAllComeToRest) {
+  const FeederPlan plan = planFeeder(50, 1);
+  const FeederJudge judge(plan);
+  Feeder feeder(plan);
+  const double start = feeder.energy();
+  double most = start;
+  for (int i = 0; i < 360; ++i) {
+    feeder.tick(false);
+    most = std::max(most, feeder.energy());
+    if (i % 20 != 0) continue;
+    const FeederJudgement judgement = judge.judge(feeder.parts(), feeder.tray());
+    ASSERT_EQ(judgement.penetrating, 0u) << i;
+    ASSERT_EQ(judgement.outside, 0u) << i;
+  }
+  EXPECT_LE(most, 1.001 * start);
+  EXPECT_LT(feeder.energy(), 0.5 * start) << "they fell";
+  EXPECT_LT(feeder.report().awake, 10u);
+}
+
+TEST(PartsFeeder, WithTheDriveOnAllStayInsideAndNonePenetratesByMoreThanEpsilon) {
+  const FeederPlan plan = planFeeder(50, 2);
+  const FeederJudge judge(plan);
+  Feeder feeder(plan);
+  double low = 1;
+  for (int i = 0; i < 300; ++i) {
+    feeder.tick(true);
+    low = std::min(low, feeder.tray().y());
+    EXPECT_EQ(feeder.report().squeezed, 0u) << i;
+    const FeederJudgement judgement = judge.judge(feeder.parts(), feeder.tray());
+    ASSERT_LE(judgement.deepest, feeder.settings().solver.epsilon) << i;
+    ASSERT_EQ(judgement.outside, 0u) << i;
+  }
+  EXPECT_LT(low, -0.9 * plan.amplitude);
+  EXPECT_EQ(feeder.report().awake, 50u) << "a vibrating tray lets nobody sleep";
+}
+
+TEST(PartsFeeder, TwoRunsEndAtTheSameBits) {
+  const FeederPlan plan = planFeeder(20, 3);
+  const auto run = [&] {
+    Feeder feeder(plan);
+    for (int i = 0; i < 60; ++i) feeder.tick(true);
+    std::vector<double> numbers;
+    for (const PlacedPart& part : feeder.parts())
+      for (int k = 0; k < 3; ++k) numbers.push_back(part.position[k]);
+    return numbers;
+  };
+  EXPECT_EQ(run(), run());
+}
+
+}  // namespace
+}  // namespace enfilade::testing
