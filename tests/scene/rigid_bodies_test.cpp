@@ -82,11 +82,13 @@ TEST(RigidBodies, AHeavyBoxThatFallsOntoAnAvatarBesideAWallLeavesItOutside) {
     t.ticks(2);
     auto& stage = t.world.state().rigids;
     stage.dynamics.solids[0].motion.velocity = {0.3 * speed, -speed, 0};
+    double low = 3.5;
     for (int i = 0; i < 120; ++i) {
       t.step();
       ASSERT_EQ(whoPenetrates(t.world), "") << speed << " tick " << i;
+      low = std::min(low, t.body("crate").position.y());
     }
-    EXPECT_LT(t.body("crate").position.y(), 3.2) << "it never came down";
+    EXPECT_LT(low, 3.45) << speed << ": it never came down onto the wall";
   }
 }
 

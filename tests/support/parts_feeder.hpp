@@ -31,10 +31,10 @@ struct FeederPlan {
   double wall = 0;                        ///< height of the walls
   double density = 2700;                  ///< aluminium, kg / m^3
   double friction = 0.4;
-  int substeps = 4;           ///< of a tick of 1/60 s
-  int looks = 2;              ///< a tick: how often contacts are found; divides `substeps`
-  double frequency = 30;      ///< of the drive, Hz: at most 60 * substeps / 8
-  double amplitude = 1e-3;    ///< upwards
+  int substeps = 4;         ///< of a tick of 1/60 s
+  int looks = 2;            ///< a tick: how often contacts are found; divides `substeps`
+  double frequency = 15;    ///< of the drive, Hz: at most 60 * looks / 8, as it is set at each look
+  double amplitude = 2e-3;  ///< upwards: 1.8 times the weight
   double sidewards = 0.5e-3;  ///< along x, in phase
 };
 
