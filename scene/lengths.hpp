@@ -1,7 +1,18 @@
-// The one home of the motion's lengths and limits. Verdicts have no tolerance; motion has these.
+// The one home of the motion's lengths, limits and policies. Verdicts have no tolerance; motion has
+// these.
 #pragma once
 
+#include <cstdint>
+#include <optional>
+#include <string>
+
 namespace enfilade::scene {
+
+/// What is left of a move when something that cannot be walked on stops it.
+enum class Sliding : std::uint8_t {
+  slide,  ///< goes on along what stopped it
+  stop    ///< is not made
+};
 
 /// Told to clients in Welcome and part of the configuration's hash.
 struct Lengths {
@@ -24,6 +35,14 @@ struct Lengths {
   double tick = 1.0 / 60.0;
   /// seconds of simulated time without progress after which a walk ends as blocked.
   double patience = 2;
+  /// metres. The highest jump that a command may ask for.
+  double jumpLimit = 2.5;
+  /// radians or metres per second. The fastest that a command may move a joint.
+  double jointSpeedLimit = 20;
+  Sliding sliding = Sliding::slide;
 };
+
+/// Why a world cannot have these lengths, naming the one that is wrong; nullopt when it can.
+std::optional<std::string> lengthsProblem(const Lengths& lengths);
 
 }  // namespace enfilade::scene

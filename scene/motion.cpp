@@ -2,8 +2,9 @@
 // Lengths::stepHeight, follows the ground down by as much, falls otherwise. Every piece of the way
 // is swept, so that nothing is crossed at any speed, and each ends epsilon away from what stopped
 // it. No move leaves the box that the avatar announced to the broad phase: a slide that would, as
-// after a fast fall onto a steep roof, goes on in the next tick. Sliding is a declared policy: what
-// is left of a move after a stop goes on along the plane.
+// after a fast fall onto a steep roof, goes on in the next tick. Sliding is a declared policy
+// (Lengths::sliding): what is left of a move after a stop goes on along the plane, or is not made.
+// Who flies is swept in all directions and feels neither ground nor gravity.
 #include <algorithm>
 #include <cmath>
 
@@ -30,7 +31,7 @@ struct Mover {
 };
 
 struct SlideResult {
-  EntityId steep = 0;   ///< the first thing met that cannot be walked on
+  Stop steep;           ///< the first thing met that cannot be walked on, if any
   EntityId ground = 0;  ///< the last thing met that can
 };
 
@@ -85,7 +86,8 @@ Vec3 planeForWalking(const Mover& m, const Vec3& normal) {
 enum class Manner : std::uint8_t {
   walk,  ///< up slopes that can be walked on; what is steep acts as an upright wall
   drop,  ///< straight down to the first thing that can be stood on, sliding off what is steep
-  fall   ///< as drop, but what is left of the move across the ground is still made
+  fall,  ///< as drop, but what is left of the move across the ground is still made
+  fly    ///< nothing is ground
 };
 
 /// What is left of a move after it met a plane that can be stood on.
@@ -100,6 +102,12 @@ Vec3 afterGround(const Vec3& rest, Manner manner) {
   }
 }
 
+/// What is left of a move after it met a plane that cannot: gravity goes on whatever the policy.
+Vec3 afterSteep(const Vec3& rest, Manner manner, Sliding sliding) {
+  if (sliding == Sliding::slide || manner == Manner::drop) return rest;
+  return manner == Manner::fall ? Vec3(0, std::min(0.0, rest.y()), 0) : Vec3(Vec3::Zero());
+}
+
 /// Moves by `wish`, sliding along what is met.
 SlideResult slide(Mover& m, Vec3 wish, Manner manner) {
   SlideResult result;
@@ -109,11 +117,12 @@ SlideResult slide(Mover& m, Vec3 wish, Manner manner) {
     const Stop stop = sweepFrom(m, wish);
     if (stop.entity == 0) break;
     Vec3 rest = (1 - stop.fraction) * wish;
-    if (m.walkable(stop.normal)) {
+    if (manner != Manner::fly && m.walkable(stop.normal)) {
       result.ground = stop.entity;
       rest = afterGround(rest, manner);
-    } else if (result.steep == 0) {
-      result.steep = stop.entity;
+    } else {
+      if (result.steep.entity == 0) result.steep = stop;
+      rest = afterSteep(rest, manner, m.lengths.sliding);
     }
     planes.push_back(manner == Manner::walk ? planeForWalking(m, stop.normal) : stop.normal);
     wish = alongPlanes(rest, planes);
@@ -123,13 +132,13 @@ SlideResult slide(Mover& m, Vec3 wish, Manner manner) {
   return result;
 }
 
-/// Lets the feet down by at most `depth` onto something walkable; false (and unmoved) if there is
-/// nothing such.
-bool settle(Mover& m, double depth) {
+/// Lets the feet down by at most `depth` onto something walkable and returns that; 0 (and unmoved)
+/// if there is nothing such.
+EntityId settle(Mover& m, double depth) {
   const Vec3 before = m.feet;
-  if (slide(m, {0, -depth, 0}, Manner::drop).ground != 0) return true;
-  m.feet = before;
-  return false;
+  const EntityId ground = slide(m, {0, -depth, 0}, Manner::drop).ground;
+  if (ground == 0) m.feet = before;
+  return ground;
 }
 
 double progress(const Vec3& from, const Vec3& to, const Vec3& direction) {
@@ -154,7 +163,7 @@ bool stepUp(Mover& m, const Vec3& start, const Vec3& wish, double toBeat) {
   const double length = wish.norm();
   if (hasTread(m, wish / length, toBeat)) {
     slide(m, wish, Manner::walk);
-    if (settle(m, raised + m.lengths.epsilon) &&
+    if (settle(m, raised + m.lengths.epsilon) != 0 &&
         progress(start, m.feet, wish / length) > toBeat + kWorthAStep * length)
       return true;
   }
@@ -162,55 +171,89 @@ bool stepUp(Mover& m, const Vec3& start, const Vec3& wish, double toBeat) {
   return false;
 }
 
+void stoppedBy(Avatar& avatar, const Stop& stop) {
+  avatar.stoppedBy = stop.entity;
+  avatar.atStop = stop.atStop;
+  avatar.pushing = stop.entity != 0 ? -stop.normal : Vec3(Vec3::Zero());
+}
+
+void standOn(Avatar& avatar, EntityId ground) {
+  avatar.standsOn = ground;
+  avatar.grounded = ground != 0;
+}
+
 void walkOnGround(Mover& m, const Vec3& wish) {
   const Vec3 start = m.feet;
   const double length = wish.norm();
-  EntityId steep = 0;
+  Stop steep;
   if (length > 0) {
     steep = slide(m, wish, Manner::walk).steep;
     const double gained = progress(start, m.feet, wish / length);
-    if (steep != 0 && stepUp(m, start, wish, gained)) steep = 0;
+    if (steep.entity != 0 && stepUp(m, start, wish, gained)) steep = {};
   }
-  m.avatar.grounded = settle(m, m.lengths.stepHeight);
+  standOn(m.avatar, settle(m, m.lengths.stepHeight));
   m.avatar.fallSpeed = 0;
-  m.avatar.stoppedBy = steep;
+  stoppedBy(m.avatar, steep);
 }
 
+/// The speed of a fall after a tick that asked for `asked` metres downwards and got `made`: what
+/// holds up a fall, or meets the head of one who rises, takes its speed.
+double speedAfter(double speed, double asked, double made, double tick) {
+  constexpr double kHeldUp = 0.99;  // of the way: less than that is not the rounding of a slide
+  const bool heldUp = asked > 0 ? made < kHeldUp * asked : made > kHeldUp * asked;
+  if (!heldUp) return speed;
+  return speed > 0 ? std::min(speed, std::max(0.0, made / tick)) : 0;
+}
+
+/// Falls, or rises after a jump: exactly on the parabola, tick by tick.
 void fall(Mover& m, const Vec3& wish) {
-  const double dt = m.lengths.tick;
-  m.avatar.fallSpeed = std::min(m.avatar.fallSpeed + m.lengths.gravity * dt, m.lengths.speedLimit);
-  const double before = m.feet.y();
-  const SlideResult met = slide(m, wish - Vec3(0, m.avatar.fallSpeed * dt, 0), Manner::fall);
-  m.avatar.stoppedBy = met.steep;
-  m.avatar.grounded = met.ground != 0;
-  const double fallen = std::max(0.0, before - m.feet.y());
-  m.avatar.fallSpeed = m.avatar.grounded ? 0 : std::min(m.avatar.fallSpeed, fallen / dt);
+  const Lengths& l = m.lengths;
+  const double before = m.avatar.fallSpeed;
+  const double after = std::min(before + l.gravity * l.tick, l.speedLimit);
+  const double down = 0.5 * (before + after) * l.tick;
+  const double height = m.feet.y();
+  const SlideResult met = slide(m, wish - Vec3(0, down, 0), Manner::fall);
+  stoppedBy(m.avatar, met.steep);
+  standOn(m.avatar, met.ground);
+  const double made = height - m.feet.y();
+  m.avatar.fallSpeed = m.avatar.grounded ? 0 : speedAfter(after, down, made, l.tick);
+}
+
+void fly(Mover& m, const Vec3& wish) {
+  m.avatar.fallSpeed = 0;
+  standOn(m.avatar, 0);
+  stoppedBy(m.avatar, slide(m, wish, Manner::fly).steep);
 }
 
 }  // namespace
 
 Box reachOf(const WorldState& world, const Avatar& avatar, const Vec3& velocity) {
   const Lengths& l = world.lengths;
-  const double across = velocity.norm() * l.tick + kTread;
-  const double down = (avatar.fallSpeed + l.gravity * l.tick) * l.tick;
+  const double across = velocity.norm() * l.tick + kTread + chainReach(avatar.chain, l.tick);
+  const double down = (std::abs(avatar.fallSpeed) + l.gravity * l.tick) * l.tick;
   // Slides back out by epsilon, contacts and near misses look a little further.
   const double margin = 8 * l.epsilon + l.nearMiss;
   Box box = boxAt(avatar.shape->box, avatar.feet);
   box.min -= Vec3(across, across + std::max(l.stepHeight, down), across);
-  box.max += Vec3(across, across + l.stepHeight, across);
+  box.max += Vec3(across, across + std::max(l.stepHeight, down), across);
   return grown(box, margin);
 }
 
 void moveAvatar(WorldState& world, Avatar& avatar, const Vec3& velocity, QueryCount& count) {
   Mover m{world.lengths, avatar, count, avatar.feet, feetRoomOf(avatar, world.lengths)};
   const Vec3 wish = velocity * world.lengths.tick;
-  if (avatar.grounded) {
+  if (avatar.flying) {
+    fly(m, wish);
+  } else if (avatar.grounded) {
     walkOnGround(m, wish);
   } else {
     fall(m, wish);
   }
+  avatar.asked = wish;
   avatar.lastMove = m.feet - avatar.feet;
   avatar.feet = m.feet;
+  avatar.stirred = false;
+  if (avatar.chain.speed > 0) moveJoints(world, avatar, count);
 }
 
 }  // namespace enfilade::scene

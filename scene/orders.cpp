@@ -1,12 +1,10 @@
 // The avatars' queues: commands come in, orders start, go on and end. An order that takes no time
 // ends in the tick that it starts in and the next one starts; a capture keeps the avatar still for
 // its tick, so that the picture shows the place it was asked for.
-#include <array>
 #include <cmath>
-#include <cstdio>
 
+#include "scene/follower.hpp"
 #include "scene/rotation.hpp"
-#include "scene/world_state.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -14,41 +12,18 @@ namespace {
 constexpr double kArrivedAcross = 1e-3;  // metres over the ground from the way point
 constexpr double kArrivedUp = 1.0;       // metres: a way point on another storey is not reached
 constexpr double kProgress = 0.01;       // metres nearer that count as progress, less if slow
-constexpr double kTimeRounding = 1e-9;   // seconds: sums of ticks against whole waits
 constexpr double kBelowScene = 10;       // metres below the lowest point of the scene
-constexpr double kEyesBelowTop = 0.15;   // metres, at most a tenth of the height
+constexpr double kBeyondScene = 1000;    // metres out of the scene's bounds that may be flown
 
 double acrossGround(const Vec3& from, const Vec3& to) {
   const double x = to.x() - from.x(), z = to.z() - from.z();
   return std::sqrt(x * x + z * z);
 }
 
-/// One avatar's name, queue and body, while its orders are followed in this tick.
-struct Follower {
-  WorldState& world;
-  TickReport& report;
-  QueryCount& count;
-  const std::string& name;
-  std::deque<QueuedOrder>& queue;
-
-  Avatar* avatar() const {
-    const auto found = world.avatars.find(name);
-    return found == world.avatars.end() ? nullptr : &found->second;
-  }
-  std::uint64_t tag() const { return queue.front().tag; }
-  void tell(Notice::Kind kind, std::string text = {}, EntityId obstacle = 0) const {
-    Notice notice{kind, name, 0, tag(), Vec3::Zero(), obstacle, std::move(text)};
-    if (const Avatar* a = avatar()) notice.id = a->id, notice.position = a->feet;
-    report.notices.push_back(std::move(notice));
-  }
-};
-
-/// What following the front order came to.
-enum class Outcome : std::uint8_t {
-  ended,      ///< took no time: the next order may start in this tick
-  endedTick,  ///< done, but the avatar stays as it is until the next tick
-  goesOn
-};
+/// Metres still to go: over the ground, or in space for who flies.
+double wayLeft(const Avatar& avatar, const Vec3& goal) {
+  return avatar.flying ? (goal - avatar.feet).norm() : acrossGround(avatar.feet, goal);
+}
 
 /// "" for none.
 std::string toldDropped(std::size_t orders) {
@@ -61,24 +36,24 @@ Outcome follow(const Spawn& spawn, Follower& f) {
     return Outcome::ended;
   }
   Avatar avatar;
-  if (const auto why = placeAvatar(f.world, spawn, avatar, f.count)) {
+  std::string told;
+  if (const auto why = placeAvatar(f.world, spawn, avatar, told, f.count)) {
     f.tell(Notice::Kind::refused, *why + toldDropped(f.queue.size() - 1));
     f.queue.resize(1);
     return Outcome::ended;
   }
   avatar.id = f.world.firstAvatarId() + static_cast<EntityId>(f.world.avatarNames.size());
   avatar.gaze = headingFromDegrees(spawn.facing);
-  avatar.eyeHeight = spawn.height - std::min(kEyesBelowTop, 0.1 * spawn.height);
   avatar.mover = f.world.broadPhase.insert(reachOf(f.world, avatar, Vec3::Zero()));
   f.world.avatarOfMover[avatar.mover] = f.name;
   f.world.avatarNames.push_back(f.name);
   f.world.avatars.emplace(f.name, std::move(avatar));
-  f.tell(Notice::Kind::spawned);
+  f.tell(Notice::Kind::spawned, told);
   return Outcome::endedTick;
 }
 
 void startLeg(Avatar& avatar, const Walk& walk, const Lengths& lengths) {
-  avatar.walk.nearest = acrossGround(avatar.feet, walk.along[avatar.walk.leg]);
+  avatar.walk.nearest = wayLeft(avatar, walk.along[avatar.walk.leg]);
   avatar.walk.patienceLeft = lengths.patience;
 }
 
@@ -149,7 +124,9 @@ void followQueue(Follower& f) {
   }
 }
 
-void drive(WorldState& world, const Command& command, TickReport& report) {
+/// Drops what the avatar was told before, as for an order that does not queue. Its body, if it is
+/// in the world; else that is told.
+Avatar* dropOrders(WorldState& world, const Command& command, TickReport& report) {
   std::deque<QueuedOrder>& queue = world.queues[command.avatar];
   const std::string dropped = toldDropped(queue.size());
   queue.clear();
@@ -157,19 +134,27 @@ void drive(WorldState& world, const Command& command, TickReport& report) {
   if (found == world.avatars.end()) {
     report.notices.push_back({Notice::Kind::refused, command.avatar, 0, command.tag, Vec3::Zero(),
                               0, "there is no avatar of this name" + dropped});
-    return;
+    return nullptr;
   }
   Avatar& avatar = found->second;
-  const Vec3& velocity = std::get<Drive>(command.order).velocity;
-  avatar.drive = {velocity.x(), 0, velocity.z()};
   avatar.walk = {};
   avatar.waitLeft = -1;
+  avatar.jumping = false;
+  avatar.chain.speed = 0;
+  return &avatar;
+}
+
+bool actsAtOnce(const Order& order) {
+  const auto* joints = std::get_if<DriveJoints>(&order);
+  return std::holds_alternative<Drive>(order) || (joints && joints->atOnce);
 }
 
 void takeIn(WorldState& world, TickReport& report) {
   for (Command& command : world.incoming) {
-    if (std::holds_alternative<Drive>(command.order)) {
-      drive(world, command, report);
+    Avatar* avatar = nullptr;
+    if (actsAtOnce(command.order) && !(avatar = dropOrders(world, command, report))) continue;
+    if (const Drive* drive = std::get_if<Drive>(&command.order)) {
+      avatar->drive = drive->velocity;
     } else {
       world.queues[command.avatar].push_back({std::move(command.order), command.tag});
     }
@@ -177,16 +162,31 @@ void takeIn(WorldState& world, TickReport& report) {
   world.incoming.clear();
 }
 
-/// The horizontal velocity that the front order asks for. A walk's last tick ends on its way point.
+Vec3 overGround(const Vec3& velocity) {
+  return {velocity.x(), 0, velocity.z()};
+}
+
+/// The velocity of a walk; its last tick ends on its way point.
+Vec3 velocityOf(const WorldState& world, const Avatar& avatar, const Walk& walk) {
+  const Vec3& goal = walk.along[avatar.walk.leg];
+  const double distance = wayLeft(avatar, goal);
+  if (!(distance > 0)) return Vec3::Zero();
+  const double speed = std::min(walk.speed, distance / world.lengths.tick);
+  const Vec3 way = goal - avatar.feet;
+  return (avatar.flying ? way : overGround(way)) * (speed / distance);
+}
+
+/// The velocity that the front order asks for.
 Vec3 velocityOf(const WorldState& world, const Avatar& avatar,
                 const std::deque<QueuedOrder>& queue) {
-  const Walk* walk = queue.empty() ? nullptr : std::get_if<Walk>(&queue.front().order);
-  if (!walk || avatar.walk.nearest < 0) return queue.empty() ? avatar.drive : Vec3(Vec3::Zero());
-  const Vec3& goal = walk->along[avatar.walk.leg];
-  const double distance = acrossGround(avatar.feet, goal);
-  if (!(distance > 0)) return Vec3::Zero();
-  const double speed = std::min(walk->speed, distance / world.lengths.tick);
-  return Vec3(goal.x() - avatar.feet.x(), 0, goal.z() - avatar.feet.z()) * (speed / distance);
+  const Vec3 driven = avatar.flying ? avatar.drive : overGround(avatar.drive);
+  if (queue.empty()) return driven;
+  const Order& order = queue.front().order;
+  if (const Walk* walk = std::get_if<Walk>(&order))
+    return avatar.walk.nearest < 0 ? Vec3(Vec3::Zero()) : velocityOf(world, avatar, *walk);
+  if (const Jump* jump = std::get_if<Jump>(&order); jump && avatar.jumping)
+    return jump->velocity ? overGround(*jump->velocity) : driven;
+  return std::holds_alternative<DriveJoints>(order) ? driven : Vec3(Vec3::Zero());
 }
 
 void endWalk(Follower& f, Notice::Kind kind, std::string text = {}) {
@@ -195,15 +195,9 @@ void endWalk(Follower& f, Notice::Kind kind, std::string text = {}) {
   f.queue.pop_front();
 }
 
-std::string shortNumber(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g", value);
-  return text.data();
-}
-
 std::string whyBlocked(const Follower& f, const Vec3& goal) {
   const double up = goal.y() - f.avatar()->feet.y();
-  if (acrossGround(f.avatar()->feet, goal) <= kArrivedAcross)
+  if (!f.avatar()->flying && acrossGround(f.avatar()->feet, goal) <= kArrivedAcross)
     return "the way point lies " + shortNumber(std::abs(up)) + " m " + (up > 0 ? "above" : "below");
   return "no progress for " + shortNumber(f.world.lengths.patience) + " s";
 }
@@ -211,7 +205,7 @@ std::string whyBlocked(const Follower& f, const Vec3& goal) {
 void judge(const Walk& walk, Follower& f) {
   Avatar& avatar = *f.avatar();
   const Vec3& goal = walk.along[avatar.walk.leg];
-  const double distance = acrossGround(avatar.feet, goal);
+  const double distance = wayLeft(avatar, goal);
   if (distance <= kArrivedAcross && std::abs(goal.y() - avatar.feet.y()) <= kArrivedUp) {
     if (++avatar.walk.leg < walk.along.size()) return startLeg(avatar, walk, f.world.lengths);
     return endWalk(f, Notice::Kind::arrived);
@@ -228,15 +222,34 @@ void judge(const Walk& walk, Follower& f) {
   endWalk(f, Notice::Kind::blocked, whyBlocked(f, goal));
 }
 
-/// Nobody falls for ever: below the scene an avatar leaves it, and its queue is dropped.
-void removeFallen(WorldState& world, TickReport& report) {
-  std::vector<std::string> fallen;
+/// A driven avatar or joint that something stops: told when that begins, not as long as it lasts.
+void tellDrivenAgainst(WorldState& world, TickReport& report, QueryCount& count) {
+  for (auto& [name, avatar] : world.avatars) {
+    const bool driven = !avatar.drive.isZero(0) && world.queues[name].empty();
+    const bool blocked = (driven || avatar.chain.speed > 0) && avatar.stoppedBy != 0;
+    if (blocked && !avatar.blockedTold) tellBlocked(world, avatar, report, count);
+    avatar.blockedTold = blocked;
+  }
+}
+
+/// Why an avatar cannot stay in the world; "" when it can.
+std::string whyOut(const WorldState& world, const Avatar& avatar) {
+  const Box& bounds = world.scene->bounds();
+  if (avatar.feet.y() < bounds.min.y() - kBelowScene) return "fell out of the scene";
+  if (!contains(grown(bounds, kBeyondScene), {avatar.feet, avatar.feet}))
+    return "is " + shortNumber(kBeyondScene) + " m out of the scene";
+  return "";
+}
+
+/// Nobody falls or flies for ever: outside the scene an avatar leaves it, and its queue is dropped.
+void removeLost(WorldState& world, TickReport& report) {
+  std::map<std::string, std::string> lost;
   for (const auto& [name, avatar] : world.avatars)
-    if (avatar.feet.y() < world.scene->bounds().min.y() - kBelowScene) fallen.push_back(name);
-  for (const std::string& name : fallen) {
+    if (std::string why = whyOut(world, avatar); !why.empty()) lost[name] = std::move(why);
+  for (const auto& [name, why] : lost) {
     const Avatar& avatar = world.avatars.at(name);
     report.notices.push_back({Notice::Kind::left, name, avatar.id, 0, avatar.feet, 0,
-                              "fell out of the scene; its queued orders are dropped"});
+                              why + "; its queued orders are dropped"});
     world.queues[name].clear();
     removeAvatar(world, name, report.contacts);
   }
@@ -276,7 +289,8 @@ void judgeWalks(WorldState& world, TickReport& report, QueryCount& count) {
     if (queue.empty() || !follower.avatar() || follower.avatar()->walk.nearest < 0) continue;
     if (const Walk* walk = std::get_if<Walk>(&queue.front().order)) judge(*walk, follower);
   }
-  removeFallen(world, report);
+  tellDrivenAgainst(world, report, count);
+  removeLost(world, report);
 }
 
 }  // namespace enfilade::scene

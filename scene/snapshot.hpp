@@ -15,6 +15,20 @@ namespace enfilade::scene {
 /// objects and are never reused.
 using EntityId = std::uint32_t;
 
+/// How far an avatar came in one tick, and what stopped it.
+struct MoveResult {
+  Vec3 asked = Vec3::Zero();     ///< metres: what its orders asked for; gravity is not among it
+  Vec3 made = Vec3::Zero();      ///< metres: how far the feet came, falls and steps among it
+  EntityId stoppedBy = 0;        ///< what it met that cannot be walked on, the first; 0: nothing
+  collision::Decision decision;  ///< with it, where it stopped, from the avatar to it
+};
+
+/// A joint after one tick.
+struct JointView {
+  double value = 0;        ///< radians or metres
+  EntityId stoppedBy = 0;  ///< what one of the links met that it moves; 0: nothing
+};
+
 struct AvatarView {
   EntityId id = 0;
   std::string name;
@@ -23,6 +37,11 @@ struct AvatarView {
   double eyeHeight = 1.6;     ///< metres above the feet
   bool grounded = false;
   std::shared_ptr<const AvatarShape> shape;
+  bool flying = false;
+  EntityId standsOn = 0;  ///< 0: on nothing
+  double height = 1.75;   ///< metres, of the prism as it is now; 0 where parts make the shape
+  MoveResult move;
+  std::vector<JointView> joints;  ///< of a chain; else empty
 };
 
 struct BodyView {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 
-#include "scene/hasher.hpp"
 #include "scene/world_state.hpp"
 
 namespace enfilade::scene {
@@ -78,8 +77,10 @@ void moveAvatars(WorldState& world, const Wish& wish, QueryCount& count) {
   for (auto& [name, avatar] : world.avatars) {
     const Vec3 velocity = wishOf(wish, name);
     avatar.stoppedBy = 0;
+    avatar.pushing = avatar.asked = Vec3::Zero();
     avatar.resting = avatar.grounded && avatar.lastMove.isZero(0) && velocity.isZero(0) &&
-                     !avatar.pairsChanged && nobodyNear(world, avatar);
+                     !avatar.stirred && avatar.chain.speed == 0 && !avatar.pairsChanged &&
+                     nobodyNear(world, avatar);
     if (avatar.resting) continue;
     gatherObstacles(world, avatar);
     moveAvatar(world, avatar, velocity, count);
@@ -109,20 +110,7 @@ void hashBodies(const WorldState& world, Hasher& hash) {
 void hashState(WorldState& world) {
   Hasher hash(world.hash);
   hash.add(world.tick);
-  for (const auto& [name, avatar] : world.avatars) {
-    hash.add(std::uint64_t{avatar.id});
-    hash.add(avatar.feet);
-    hash.add(avatar.gaze);
-    hash.add(avatar.fallSpeed);
-    hash.add(std::uint64_t{avatar.grounded});
-    hash.add(avatar.drive);
-    hash.add(std::uint64_t{avatar.walk.leg});
-    hash.add(avatar.walk.nearest);
-    hash.add(avatar.walk.patienceLeft);
-    hash.add(avatar.waitLeft);
-    for (const Contact& contact : avatar.contacts)
-      hash.add((std::uint64_t{contact.other} << 1) | std::uint64_t{contact.touching});
-  }
+  for (const auto& [name, avatar] : world.avatars) hashAvatar(avatar, hash);
   for (const auto& [name, queue] : world.queues) {
     hash.add(std::string_view(name));
     hash.add(std::uint64_t{queue.size()});
@@ -138,8 +126,7 @@ std::shared_ptr<const Snapshot> makeSnapshot(const WorldState& world) {
   snapshot->time = static_cast<double>(world.tick) * world.lengths.tick;
   snapshot->stateHash = world.hash;
   for (const auto& [name, avatar] : world.avatars)
-    snapshot->avatars.push_back({avatar.id, name, avatar.feet, avatar.gaze, avatar.eyeHeight,
-                                 avatar.grounded, avatar.shape});
+    snapshot->avatars.push_back(viewOf(name, avatar));
   std::sort(snapshot->avatars.begin(), snapshot->avatars.end(),
             [](const AvatarView& a, const AvatarView& b) { return a.id < b.id; });
   return snapshot;

@@ -13,48 +13,13 @@
 #include "collision/narrow_phase.hpp"
 #include "scene/audit.hpp"
 #include "scene/lengths.hpp"
+#include "scene/orders.hpp"
 #include "scene/scene.hpp"
 #include "scene/snapshot.hpp"
 
 namespace enfilade::scene {
 
 // ---- commands ----------------------------------------------------------------------------------
-// Each avatar has a queue, keyed by its name; its orders run in order, different avatars together.
-// Positions are in the scene's frame, in metres.
-
-struct Spawn {
-  Vec3 at = Vec3::Zero();  ///< the feet
-  double facing = 0;       ///< degrees about +Y; 0 looks along +X, 90 along -Z
-  double radius = 0.3;     ///< metres, 0.05..5
-  double height = 1.75;    ///< metres, 0.2..10
-};
-struct Walk {
-  std::vector<Vec3> along;  ///< way points, at least one
-  double speed = 1.4;       ///< metres per second, > 0
-};
-struct Look {
-  Vec3 at;
-};
-struct Wait {
-  double seconds = 0;
-};
-struct Capture {
-  std::string as;  ///< a file-name stem: letters, digits, '.', '_', '-'
-};
-struct Leave {};
-/// Walks with this horizontal velocity from now on, until the next Drive; (0,0,0) stops.
-/// Unlike the others it does not queue: it drops what is queued and acts at the next tick.
-struct Drive {
-  Vec3 velocity = Vec3::Zero();
-};
-
-using Order = std::variant<Spawn, Walk, Look, Wait, Capture, Leave, Drive>;
-
-struct Command {
-  std::string avatar;  ///< name: 1..64 letters, digits, '.', '_', '-'
-  Order order;
-  std::uint64_t tag = 0;  ///< given back in the notices that this command causes
-};
 
 /// Tells a kinematic body what to do. Acts at the next tick; the last one wins.
 struct BodyCommand {

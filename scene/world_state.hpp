@@ -10,6 +10,8 @@
 
 #include "collision/sort_and_sweep.hpp"
 #include "scene/body.hpp"
+#include "scene/chain.hpp"
+#include "scene/hasher.hpp"
 #include "scene/obstacles.hpp"
 #include "scene/rigid_stage.hpp"
 #include "scene/world.hpp"
@@ -19,7 +21,7 @@ namespace enfilade::scene {
 /// How a walk goes: measured as the shortest distance to its way point so far.
 struct WalkProgress {
   std::size_t leg = 0;      ///< index of the way point that is walked to
-  double nearest = -1;      ///< metres, over the ground; -1: not measured yet
+  double nearest = -1;      ///< metres, over the ground or, flying, in space; -1: not measured yet
   double patienceLeft = 0;  ///< seconds
 };
 
@@ -31,16 +33,29 @@ struct Avatar {
   double eyeHeight = 0;
   double fallSpeed = 0;  ///< metres per second, downwards > 0
   bool grounded = false;
-  Vec3 drive = Vec3::Zero();  ///< horizontal velocity asked for by Drive
+  EntityId standsOn = 0;  ///< what it came to stand on; 0 when it is not grounded
+  bool flying = false;
+  bool jumping = false;
+  double standing = 0;  ///< metres, the prism's height as spawned; 0 where parts make the shape
+  double height = 0;    ///< metres, the prism's height now
+  double radius = 0;    ///< metres, the prism's
+  std::vector<AvatarPart> base;  ///< what of `shape` is no link; empty without a chain
+  Chain chain;
+  Vec3 drive = Vec3::Zero();  ///< velocity asked for by Drive
   WalkProgress walk;
   double waitLeft = -1;  ///< seconds; negative: not waiting
 
   // What the last motion left.
   Vec3 lastMove = Vec3::Zero();
-  bool resting = false;  ///< stands, wants nothing, and nobody is near: nothing to work out
+  Vec3 asked = Vec3::Zero();  ///< metres
+  bool resting = false;       ///< stands, wants nothing, and nobody is near: nothing to work out
+  bool stirred = false;       ///< its shape changed since: it does not rest this tick
   EntityId stoppedBy = 0;
   bool pairsChanged =
       true;  ///< the broad phase gave it or took from it a partner since it gathered
+  collision::Decision atStop;   ///< with `stoppedBy`, where the move ended
+  Vec3 pushing = Vec3::Zero();  ///< unit, into what stopped it; zero: nothing did
+  bool blockedTold = false;     ///< driven against something, which was told when it began
 
   // Caches from tick to tick. They change no verdict, but the last bits of distances and so of the
   // way: they follow from the commands, as all else does, and a copy of a world must copy them.
@@ -94,10 +109,13 @@ struct WorldState {
   }
 };
 
+/// As refusal() of world.hpp (order_refusals.cpp).
+std::optional<std::string> refusalOf(const Command& command, const Lengths& lengths);
+
 // ---- the stages of the tick --------------------------------------------------------------------
 
 /// Where an avatar wants to go in this tick.
-using Wish = std::map<std::string, Vec3>;  ///< horizontal velocity, metres per second
+using Wish = std::map<std::string, Vec3>;  ///< velocity, metres per second
 
 /// Takes in commands and starts or goes on with what the queues ask for (orders.cpp).
 Wish followOrders(WorldState& world, TickReport& report, QueryCount& count);
@@ -157,6 +175,13 @@ void followOthers(const WorldState& world, Avatar& avatar);
 /// Walks, slides, steps, falls (motion.cpp).
 void moveAvatar(WorldState& world, Avatar& avatar, const Vec3& velocity, QueryCount& count);
 
+/// Moves the joints of a chain towards their targets (joint_motion.cpp).
+void moveJoints(WorldState& world, Avatar& avatar, QueryCount& count);
+
+/// What decides how an avatar goes on, for the state hash, and what it shows (avatar_state.cpp).
+void hashAvatar(const Avatar& avatar, Hasher& hash);
+AvatarView viewOf(const std::string& name, const Avatar& avatar);
+
 /// Finds who touches what now and what began and ended (contacts.cpp).
 void findContacts(WorldState& world, TickReport& report, QueryCount& count);
 /// A blocked move is told when its walk ends so: what stopped it last, and how near that is now
@@ -173,9 +198,12 @@ void leaveTriggers(WorldState& world, EntityId who, ContactEvent::Reason reason,
 void endContactsOf(WorldState& world, Avatar& avatar, ContactEvent::Reason reason,
                    std::vector<ContactEvent>& events);
 
-/// Whether a new avatar may stand at the order's place; sets its feet a hair above what it would
-/// touch. Returns why not (spawn.cpp).
+/// All that `box` may meet, but for the avatar `except` (spawn.cpp).
+std::vector<Obstacle> obstaclesIn(const WorldState& world, const Box& box, EntityId except);
+/// Whether a new avatar may stand at the order's place; gives it its shape and sets its feet a hair
+/// above what it would touch. Returns why not; else what is worth telling comes in `told`, or ""
+/// (spawn.cpp).
 std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& order, Avatar& avatar,
-                                       QueryCount& count);
+                                       std::string& told, QueryCount& count);
 
 }  // namespace enfilade::scene

@@ -1,0 +1,210 @@
+// Jumping, flying, crouching, and what a move tells of itself.
+#include <cmath>
+
+#include "tests/scene/trial.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using namespace testing;
+using Kind = Notice::Kind;
+
+TEST(Jump, RisesToItsHeightAndEndsOnTheFloor) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.untilIdle();
+  const double ground = run.feet("ann").y();
+  run.order("ann", Jump{0.8});
+  double top = 0;
+  for (int i = 0; i < 120 && run.count(Kind::done) == 0; ++i) {
+    run.step();
+    top = std::max(top, run.feet("ann").y() - ground);
+  }
+  EXPECT_EQ(run.count(Kind::done), 1);
+  // On the parabola; the highest tick is at most half a tick from its top.
+  EXPECT_LE(top, 0.8 + 1e-9);
+  EXPECT_GT(top, 0.8 - 0.5 * 9.80665 / 120 / 120 - 1e-9);
+  EXPECT_NEAR(run.feet("ann").y(), ground, 1e-3);
+  EXPECT_TRUE(run.view("ann").grounded);
+}
+
+TEST(Jump, OffALedgeGoesFartherThanWalkingOff) {
+  const std::vector<NamedBox> scene{floorBox(), {"ledge", {-9, 0, -2}, {0, 2, 2}}};
+  Trial run(scene);
+  run.order("ann", Spawn{{-0.1, 2, 0}});
+  run.untilIdle();
+  run.order("ann", Jump{0.5, Vec3(2, 0, 0)});
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::done), 1);
+  // 2 m/s for the time up and down: sqrt(2 h / g) + sqrt(2 (h + 2) / g).
+  const double g = 9.80665, air = std::sqrt(2 * 0.5 / g) + std::sqrt(2 * 2.5 / g);
+  EXPECT_NEAR(run.feet("ann").x(), -0.1 + 2 * air, 2.0 / 60 + 1e-3);
+  EXPECT_EQ(run.worstPenetration, 0);
+}
+
+TEST(Jump, ACeilingEndsTheRiseAndIsNotCrossed) {
+  Trial run({floorBox(), {"ceiling", {-9, 2, -9}, {9, 2.001, 9}}});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.untilIdle();
+  run.order("ann", Jump{2});
+  double top = 0;
+  for (int i = 0; i < 120; ++i) {
+    run.step();
+    top = std::max(top, run.feet("ann").y());
+  }
+  EXPECT_LT(top, 0.25);
+  EXPECT_GT(top, 0.248);
+  EXPECT_TRUE(run.touched("ceiling"));
+  EXPECT_EQ(run.count(Kind::done), 1);
+  EXPECT_EQ(run.worstPenetration, 0);
+}
+
+TEST(Jump, InTheAirOrAbsurdlyHighIsRefused) {
+  Trial run({floorBox()});
+  EXPECT_TRUE(submit(run.world, {"ann", Jump{std::nan("")}, 0}));
+  EXPECT_TRUE(submit(run.world, {"ann", Jump{0}, 0}));
+  EXPECT_TRUE(submit(run.world, {"ann", Jump{run.world.lengths().jumpLimit * 1.01}, 0}));
+  EXPECT_TRUE(submit(run.world, {"ann", Jump{0.5, Vec3(0, INFINITY, 0)}, 0}));
+  run.order("ann", Spawn{{0, 5, 0}});
+  run.order("ann", Jump{0.5});
+  run.ticks(2);
+  EXPECT_EQ(run.count(Kind::refused), 1);
+}
+
+TEST(Fly, GoesStraightThroughTheAirAndStopsAtWhatIsThere) {
+  Trial run({floorBox(), {"beam", {4, 2, -3}, {5, 6, 3}}});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.order("ann", Fly{});
+  run.order("ann", Walk{{{0, 3, 2}}, 2});
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::arrived), 1);
+  EXPECT_NEAR((run.feet("ann") - Vec3(0, 3, 2)).norm(), 0, 1e-3);
+  run.ticks(60);
+  EXPECT_NEAR((run.feet("ann") - Vec3(0, 3, 2)).norm(), 0, 1e-3) << "hovers";
+  run.order("ann", Drive{{500, 0, 0}});
+  run.ticks(5);
+  EXPECT_NEAR(run.feet("ann").x(), 4 - 0.3, 0.01);
+  EXPECT_EQ(run.view("ann").move.stoppedBy, 2u);
+  run.order("ann", Drive{});
+  run.order("ann", Fly{false});
+  run.untilIdle();
+  EXPECT_LT(run.feet("ann").y(), 0.001);
+  EXPECT_TRUE(run.view("ann").grounded);
+  EXPECT_EQ(run.worstPenetration, 0);
+}
+
+TEST(Fly, ASpawnInTheAirNeedsNoFloorAndNobodyFliesForEver) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{.at = {50, 20, 0}, .flying = true});
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::spawned), 1);
+  run.order("ann", Drive{{0, 900, 0}});
+  run.ticks(120);
+  EXPECT_EQ(run.count(Kind::left), 1);
+  EXPECT_NE(run.text(Kind::left).find("out of the scene"), std::string::npos);
+}
+
+TEST(Crouch, GoesUnderWhatIsTooLowAndStandsUpOnlyWhereThereIsRoom) {
+  Trial run({floorBox(), {"duct", {2, 1.2, -3}, {4, 1.3, 3}}});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.order("ann", to(3, 0));
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::blocked), 1);
+  run.order("ann", Crouch{1.0});
+  run.order("ann", to(3, 0));
+  run.order("ann", Crouch{});
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::arrived), 1);
+  EXPECT_EQ(run.count(Kind::refused), 1);
+  EXPECT_EQ(run.notices.back().obstacle, 2u) << "the duct";
+  EXPECT_EQ(run.view("ann").height, 1.0);
+  run.order("ann", to(6, 0));
+  run.order("ann", Crouch{});
+  run.untilIdle();
+  EXPECT_EQ(run.view("ann").height, 1.75);
+  EXPECT_EQ(run.worstPenetration, 0);
+}
+
+TEST(Crouch, WhatIsLowerThanAThirdOrHigherThanSpawnedIsRefused) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.order("ann", Crouch{0.3});
+  run.order("ann", Crouch{1.8});
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::refused), 2);
+  EXPECT_EQ(run.view("ann").height, 1.75);
+}
+
+TEST(MoveResult, SaysHowFarADriveWentAndWhatStoppedIt) {
+  Trial run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.untilIdle();
+  run.order("ann", Drive{{1.2, 0, 0}});
+  run.step();
+  EXPECT_NEAR(run.view("ann").move.asked.x(), 0.02, 1e-12);
+  EXPECT_NEAR(run.view("ann").move.made.x(), 0.02, 1e-12);
+  EXPECT_EQ(run.view("ann").move.stoppedBy, 0u);
+  run.ticks(200);
+  const MoveResult move = run.view("ann").move;
+  EXPECT_NEAR(move.asked.x(), 0.02, 1e-12);
+  EXPECT_NEAR(move.made.norm(), 0, 1e-9);
+  EXPECT_EQ(nameOf(run.world, move.stoppedBy), "wall");
+  EXPECT_EQ(move.decision.verdict, collision::Verdict::separated);
+  EXPECT_LT(move.decision.distance, 2 * run.world.lengths().epsilon);
+  EXPECT_NEAR(move.decision.normal.x(), 1, 1e-9);
+}
+
+TEST(MoveResult, ADrivenAvatarIsToldBlockedOnceEachTimeItBegins) {
+  Trial run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.untilIdle();
+  const auto told = [&] {
+    return std::count_if(run.events.begin(), run.events.end(), [](const ContactEvent& e) {
+      return e.kind == ContactEvent::Kind::blocked;
+    });
+  };
+  run.order("ann", Drive{{1.5, 0, 0}});
+  run.ticks(300);
+  EXPECT_EQ(told(), 1);
+  run.order("ann", Drive{{-1.5, 0, 0}});
+  run.ticks(30);
+  EXPECT_EQ(told(), 1);
+  run.order("ann", Drive{{1.5, 0, 0}});
+  run.ticks(100);
+  EXPECT_EQ(told(), 2);
+}
+
+TEST(Sliding, StopLeavesNothingOfAMoveAlongAWall) {
+  Lengths lengths;
+  lengths.sliding = Sliding::stop;
+  Trial run({floorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}}, lengths);
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.order("ann", to(3, 6));
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::blocked), 1);
+  // 3 m across and 6 along: at the wall, 1.7 m across, it came 3.4 m along, and stays there.
+  EXPECT_NEAR(run.feet("ann").z(), 3.4, 0.01);
+  EXPECT_EQ(run.worstPenetration, 0);
+  Trial slides({floorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}});
+  EXPECT_NE(run.world.snapshot()->stateHash, slides.world.snapshot()->stateHash);
+}
+
+TEST(Spawn, WhereThereIsNoRoomItSaysWhereThereIs) {
+  Trial run({floorBox(), {"pillar", {-1, 0, -1}, {1, 3, 1}}});
+  run.order("ann", Spawn{{0.9, 0, 0}});
+  run.step();
+  const std::string text = run.text(Kind::refused);
+  EXPECT_NE(text.find("there is room at [1.4"), std::string::npos) << text;
+}
+
+TEST(Spawn, HighAboveTheFloorIsToldAndAbsurdlyHighRefused) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{0, 30, 0}});
+  run.order("bob", Spawn{{2, 500, 0}});
+  run.step();
+  EXPECT_NE(run.text(Kind::spawned).find("drops 30 m to floor"), std::string::npos);
+  EXPECT_NE(run.text(Kind::refused).find("nobody drops farther"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace enfilade::scene

@@ -1,0 +1,265 @@
+// Chains of links: how their joints move, what stops them, and that nothing is crossed.
+#include <cmath>
+#include <random>
+
+#include "scene/avatar_shape.hpp"
+#include "tests/scene/trial.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using namespace testing;
+using Kind = Notice::Kind;
+
+std::vector<Vec3> boxPoints(const Vec3& min, const Vec3& max) {
+  std::vector<Vec3> points;
+  for (int i = 0; i < 8; ++i)
+    points.emplace_back(i & 1 ? max.x() : min.x(), i & 2 ? max.y() : min.y(),
+                        i & 4 ? max.z() : min.z());
+  return points;
+}
+
+/// A turntable on a low base, an upper and a lower arm of 0.8 m, and a hand that slides out.
+Spawn armAt(const Vec3& at) {
+  Spawn spawn;
+  spawn.at = at;
+  spawn.parts = {boxPoints({-0.2, 0, -0.2}, {0.2, 0.5, 0.2})};
+  Link table{-1,
+             {Joint::Kind::revolute, {0, 0.51, 0}, {0, 1, 0}, -3, 3},
+             boxPoints({-0.15, 0, -0.15}, {0.15, 0.1, 0.15})};
+  Link upper{0,
+             {Joint::Kind::revolute, {0, 0.2, 0}, {0, 0, 1}, -0.5, 3.2},
+             boxPoints({0, -0.05, -0.05}, {0.8, 0.05, 0.05}),
+             1.5};
+  Link lower{1,
+             {Joint::Kind::revolute, {0.85, 0, 0}, {0, 0, 1}, -2.8, 2.8},
+             boxPoints({0, -0.04, -0.04}, {0.8, 0.04, 0.04})};
+  Link hand{2,
+            {Joint::Kind::prismatic, {0.82, 0, 0}, {1, 0, 0}, 0, 0.4},
+            boxPoints({0, -0.1, -0.1}, {0.05, 0.1, 0.1})};
+  spawn.links = {table, upper, lower, hand};
+  return spawn;
+}
+
+DriveJoints joints(std::vector<std::optional<double>> to, double speed = 1) {
+  return {std::move(to), speed};
+}
+
+TEST(Chain, JointsComeExactlyToTheirTargets) {
+  Trial run({floorBox()});
+  run.order("arm", armAt({0, 0, 0}));
+  run.order("arm", joints({1.0, 0.7, {}, 0.25}));
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::done), 1);
+  const auto view = run.view("arm");
+  ASSERT_EQ(view.joints.size(), 4u);
+  EXPECT_EQ(view.joints[0].value, 1.0);
+  EXPECT_EQ(view.joints[1].value, 0.7);
+  EXPECT_EQ(view.joints[2].value, 0.0);
+  EXPECT_EQ(view.joints[3].value, 0.25);
+  // The hand: 0.85 + 0.82 + 0.25 along the arm, raised by 0.7, turned by 1 about +Y.
+  const double along = 1.92, up = 0.71 + along * std::sin(0.7), out = along * std::cos(0.7);
+  const Vec3 hand = view.shape->parts.back().offset;
+  EXPECT_NEAR((hand - Vec3(out * std::cos(1.0), up, -out * std::sin(1.0))).norm(), 0, 1e-9);
+  EXPECT_EQ(run.worstPenetration, 0);
+}
+
+TEST(Chain, ATurnTakesAsLongAsItsSpeedSays) {
+  Trial run({floorBox()});
+  run.order("arm", armAt({0, 0, 0}));
+  run.untilIdle();
+  run.order("arm", joints({1.5}, 3));
+  run.ticks(29);
+  EXPECT_NEAR(run.view("arm").joints[0].value, 1.45, 1e-9);
+  EXPECT_EQ(run.count(Kind::done), 0);
+}
+
+TEST(Chain, AWallStopsTheArmAtEpsilonAndIsNamed) {
+  Trial run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
+  run.order("arm", armAt({0, 0, 0}));
+  run.order("arm", joints({0, 0}));
+  run.order("arm", joints({1.5}, 2));  // towards -Z
+  run.untilIdle();
+  ASSERT_EQ(run.count(Kind::blocked), 1);
+  EXPECT_EQ(nameOf(run.world, run.notices.back().obstacle), "wall");
+  const double value = run.view("arm").joints[0].value;
+  EXPECT_GT(value, 0.5);
+  EXPECT_LT(value, 0.8);
+  EXPECT_NE(run.notices.back().text.find("joints at ["), std::string::npos);
+  EXPECT_TRUE(run.touched("wall"));
+  EXPECT_EQ(run.worstPenetration, 0);
+  double nearest = 1;
+  for (const ContactEvent& e : run.events)
+    if (e.kind == ContactEvent::Kind::blocked) nearest = e.decision.distance;
+  EXPECT_GT(nearest, 0.85 * run.world.lengths().epsilon);
+  EXPECT_LT(nearest, 1.1 * run.world.lengths().epsilon);
+}
+
+TEST(Chain, AtAnySpeedAPaneOfNoThicknessIsNotCrossed) {
+  Model model = boxModel({floorBox()});
+  Mesh pane;
+  pane.positions = {{-5, 0, -1.2F}, {5, 0, -1.2F}, {5, 3, -1.2F}, {-5, 3, -1.2F}};
+  pane.indices = {0, 1, 2, 0, 2, 3};
+  model.meshes.push_back(pane);
+  model.objects.push_back({"pane", "", {1}, Eigen::Affine3d::Identity()});
+  const auto scene = std::make_shared<const Scene>(model);
+  for (const double speed : {0.3, 5.0, 20.0}) {
+    Trial run(scene);
+    run.order("arm", armAt({0, 0, 0}));
+    run.order("arm", joints({0, 0}, speed));
+    run.order("arm", joints({3}, speed));
+    run.untilIdle();
+    EXPECT_EQ(run.count(Kind::blocked), 1) << speed;
+    EXPECT_NEAR(run.view("arm").joints[0].value, 0.69, 0.05) << speed;
+    EXPECT_EQ(run.worstPenetration, 0);
+  }
+}
+
+TEST(Chain, TheOtherJointsGoOnWhereOneIsStopped) {
+  Trial run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
+  run.order("arm", armAt({0, 0, 0}));
+  run.order("arm", joints({0, 0}));
+  run.order("arm", joints({1.5, 0.4, {}, 0.1}));
+  run.untilIdle();
+  EXPECT_EQ(run.view("arm").joints[1].value, 0.4);
+  EXPECT_LT(run.view("arm").joints[0].value, 1.5);
+}
+
+TEST(Chain, AHandSlidesAlongATableAndPushesOntoIt) {
+  Trial run({floorBox(), {"table", {0.9, 0, -2}, {2.4, 0.6, 2}}});
+  run.order("arm", armAt({0, 0, 0}));
+  run.order("arm", joints({-0.5, 0.3}));
+  run.order("arm", joints({{}, -0.5}));  // down onto the table
+  run.untilIdle();
+  ASSERT_EQ(run.count(Kind::blocked), 1);
+  EXPECT_TRUE(run.touched("table"));
+  run.order("arm", joints({0.5}));  // along it
+  run.untilIdle();
+  EXPECT_EQ(run.view("arm").joints[0].value, 0.5);
+  EXPECT_EQ(run.worstPenetration, 0);
+}
+
+TEST(Chain, SomebodyInTheWayStopsItAndTheArmStopsSomebody) {
+  Trial run({floorBox()});
+  run.order("arm", armAt({0, 0, 0}));
+  run.order("arm", joints({-1.2, 0.2}));
+  run.order("bob", Spawn{{1.2, 0, 0}});
+  run.untilIdle();
+  run.order("arm", joints({1.2}));
+  run.untilIdle();
+  ASSERT_EQ(run.count(Kind::blocked), 1);
+  EXPECT_EQ(nameOf(run.world, run.notices.back().obstacle), "bob");
+  run.order("ann", Spawn{{-2, 0, 1.2}});
+  run.order("ann", to(4, 1.2));
+  run.order("ann", to(4, 0.5));
+  run.untilIdle();
+  EXPECT_EQ(run.worstPenetration, 0);
+}
+
+TEST(Chain, LinksThatAreNoNeighboursStopOneAnotherWhenAsked) {
+  for (const bool selfContact : {false, true}) {
+    Trial run({floorBox()});
+    Spawn arm = armAt({0, 0, 0});
+    arm.selfContact = selfContact;
+    run.order("arm", arm);
+    run.order("arm", joints({{}, 2.6}));
+    run.order("arm", joints({{}, {}, 2.8}));  // the hand would come down into the base
+    run.untilIdle();
+    EXPECT_EQ(run.count(Kind::blocked) > 0, selfContact);
+  }
+}
+
+TEST(Chain, AnArmOnABaseThatWalksIsSweptWhole) {
+  Trial run({floorBox(), {"post", {3, 0, 0.9}, {3.1, 3, 1.0}}});
+  run.order("arm", armAt({0, 0, 0}));
+  run.order("arm", joints({-1.5, 0}));  // the arm sticks out towards +Z
+  run.order("arm", to(6, 0));
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::blocked), 1);
+  EXPECT_EQ(nameOf(run.world, run.notices.back().obstacle), "post");
+  EXPECT_LT(run.feet("arm").x(), 3);
+  EXPECT_EQ(run.worstPenetration, 0);
+}
+
+TEST(Chain, RandomDrivesThroughClutterNeverPenetrate) {
+  std::mt19937_64 random(9);
+  const auto uniform = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+  };
+  std::vector<NamedBox> boxes{floorBox()};
+  for (int i = 0; i < 30; ++i) {
+    const double angle = uniform(0, 6.28), far = uniform(0.8, 2), y = uniform(0, 1.8);
+    const double x = far * std::cos(angle), z = far * std::sin(angle);
+    const double size = uniform(0.02, 0.2);
+    boxes.push_back({"box" + std::to_string(i), {x, y, z}, {x + size, y + 0.5 * size, z + 0.05}});
+  }
+  Trial run(boxes);
+  run.order("arm", armAt({0, 0, 0}));
+  run.step();
+  if (run.count(Kind::spawned) == 0) GTEST_FAIL() << run.text(Kind::refused);
+  for (int k = 0; k < 60; ++k) {
+    const double turn = uniform(-3, 3), up = uniform(-0.5, 3.2), bend = uniform(-2.8, 2.8);
+    run.order("arm", DriveJoints{{turn, up, bend, uniform(0, 0.4)}, uniform(0.5, 20), true});
+    run.ticks(30);
+  }
+  EXPECT_EQ(run.worstPenetration, 0);
+  EXPECT_GT(run.events.size(), 15u);
+}
+
+TEST(Chain, AbsurdLinksAndTargetsAreRefusedAndChangeNothing) {
+  Trial run({floorBox()});
+  const auto refused = [&](Spawn spawn) { return submit(run.world, {"x", spawn, 0}).value_or(""); };
+  Spawn bad = armAt({0, 0, 0});
+  bad.links[1].parent = 1;
+  EXPECT_NE(refused(bad).find("links[1].parent"), std::string::npos);
+  bad = armAt({0, 0, 0});
+  bad.links[2].joint.axis = Vec3::Zero();
+  EXPECT_NE(refused(bad).find("links[2].axis"), std::string::npos);
+  bad = armAt({0, 0, 0});
+  bad.links[0].points[3].y() = std::nan("");
+  EXPECT_NE(refused(bad).find("links[0].points[3].y"), std::string::npos);
+  bad = armAt({0, 0, 0});
+  bad.links[3].value = 0.5;
+  EXPECT_NE(refused(bad).find("links[3].value"), std::string::npos);
+  bad = armAt({0, 0, 0});
+  bad.parts.resize(kMostParts + 1, bad.parts[0]);
+  EXPECT_NE(refused(bad).find("parts"), std::string::npos);
+  EXPECT_TRUE(submit(run.world, {"x", joints({std::nan("")}), 0}));
+  EXPECT_TRUE(submit(run.world, {"x", joints({1.0}, 0), 0}));
+  EXPECT_TRUE(submit(run.world, {"x", joints({1.0}, 21), 0}));
+  EXPECT_TRUE(submit(run.world, {"x", joints({}), 0}));
+  run.order("arm", armAt({0, 0, 0}));
+  run.order("arm", joints({3.5}));
+  run.order("arm", joints({0, 0, 0, 0, 0}));
+  run.order("arm", Crouch{1});
+  run.untilIdle();
+  EXPECT_EQ(run.count(Kind::refused), 3);
+}
+
+TEST(Chain, PartsTurnAsTheSpawnFaces) {
+  Trial run({floorBox()});
+  Spawn spawn;
+  spawn.facing = 90;
+  spawn.parts = {boxPoints({0, 0, -0.1}, {1, 1, 0.1})};
+  run.order("box", spawn);
+  run.untilIdle();
+  const Box box = run.view("box").shape->box;
+  EXPECT_NEAR(box.min.z(), -1, 1e-12);
+  EXPECT_NEAR(box.max.z(), 0, 1e-12);
+  EXPECT_NEAR(box.max.x(), 0.1, 1e-12);
+}
+
+TEST(Chain, TheSameDrivesGiveTheSameHash) {
+  const auto hashOf = [](double turn) {
+    Trial run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
+    run.order("arm", armAt({0, 0, 0}));
+    run.order("arm", joints({turn, 0.3, -0.4}, 3));
+    run.ticks(200);
+    return run.world.snapshot()->stateHash;
+  };
+  EXPECT_EQ(hashOf(1.5), hashOf(1.5));
+  EXPECT_NE(hashOf(0.5), hashOf(0.5000000001));
+}
+
+}  // namespace
+}  // namespace enfilade::scene

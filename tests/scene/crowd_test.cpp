@@ -1,0 +1,80 @@
+// Avatars in one another's way: nobody trembles, nobody is inside anybody, nobody leaves the
+// corridor.
+#include <random>
+
+#include "tests/scene/trial.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using namespace testing;
+
+std::vector<NamedBox> corridor(double width, double length) {
+  return {{"floor", {-length, -0.2, -5}, {length, 0, 5}},
+          {"left", {-length, 0, -0.5 * width - 0.1}, {length, 3, -0.5 * width}},
+          {"right", {-length, 0, 0.5 * width}, {length, 3, 0.5 * width + 0.1}},
+          {"west", {-length - 0.1, 0, -5}, {-length, 3, 5}},
+          {"east", {length, 0, -5}, {length + 0.1, 3, 5}}};
+}
+
+TEST(Crowd, TwoWhoWalkIntoEachOtherStandStillToTheLastBit) {
+  for (const double aside : {0.0, 0.05, 0.2, 0.5}) {
+    Trial run(corridor(1.0, 10));
+    run.order("ann", Spawn{{-2, 0, -0.1}});
+    run.order("bob", Spawn{{2, 0, -0.1 + (aside > 0.19 ? 0.19 : aside)}});
+    run.untilIdle();
+    run.order("ann", Drive{{1.3, 0, 0.1 * aside}});
+    run.order("bob", Drive{{-1.4, 0, 0.2 * aside}});
+    run.ticks(400);
+    const Vec3 ann = run.feet("ann"), bob = run.feet("bob");
+    for (int i = 0; i < 100; ++i) {
+      run.step();
+      ASSERT_EQ(run.feet("ann"), ann) << "aside " << aside << ", tick " << i;
+      ASSERT_EQ(run.feet("bob"), bob) << "aside " << aside << ", tick " << i;
+    }
+    EXPECT_LT(bob.x() - ann.x(), 0.65) << aside;
+    EXPECT_EQ(run.worstPenetration, 0);
+  }
+}
+
+TEST(Crowd, OneWhoIsDrivenIntoACornerStandsStill) {
+  for (const double angle : {0.1, 0.5, 0.9}) {
+    Trial run(corridor(1.0, 10));
+    run.order("ann", Spawn{{9, 0, 0}});
+    run.untilIdle();
+    run.order("ann", Drive{{1 - angle, 0, angle}});
+    run.ticks(900);
+    const Vec3 feet = run.feet("ann");
+    for (int i = 0; i < 100; ++i) {
+      run.step();
+      ASSERT_EQ(run.feet("ann"), feet) << angle << ", tick " << i;
+    }
+    EXPECT_GT(feet.x(), 9.6);
+  }
+}
+
+TEST(Crowd, TwoHundredInACorridorNeverPenetrateAndNobodyGetsOut) {
+  Trial run(corridor(4, 30));
+  for (int i = 0; i < 200; ++i) {
+    const double x = -24.5 + 1.0 * (i / 4), z = -1.5 + 1.0 * (i % 4);
+    run.order("a" + std::to_string(i), Spawn{{x, 0, z}});
+  }
+  run.step();
+  ASSERT_EQ(run.count(Notice::Kind::spawned), 200);
+  std::mt19937_64 random(4);
+  for (int i = 0; i < 200; ++i) {
+    const double speed = 0.5 + static_cast<double>(random() % 1000) / 400;
+    const double aside = static_cast<double>(random() % 1000) / 1000 - 0.5;
+    run.order("a" + std::to_string(i), Drive{{i % 2 ? speed : -speed, 0, aside}});
+  }
+  for (int i = 0; i < 240; ++i) run.step();
+  EXPECT_EQ(run.worstPenetration, 0);
+  for (const AvatarView& a : run.world.snapshot()->avatars) {
+    EXPECT_LT(std::abs(a.feet.z()), 1.7) << a.name;
+    EXPECT_LT(std::abs(a.feet.x()), 29.7) << a.name;
+    EXPECT_LT(a.feet.y(), 0.3) << a.name;
+  }
+}
+
+}  // namespace
+}  // namespace enfilade::scene
