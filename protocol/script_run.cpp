@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <set>
 #include <utility>
 
 #include "protocol/script.hpp"
@@ -43,19 +44,46 @@ class Run {
       }
     }
     if (!script_.lines.empty()) stepUntilIdle(script_.lines.back().number);
+    for (const auto& [avatar, absent] : absent_) tellDropped(avatar, absent);
     return std::move(result_);
   }
 
  private:
+  /// An avatar whose spawn was refused: what else it was told is dropped, and told once.
+  struct Absent {
+    std::uint32_t spawnLine = 0;
+    std::uint32_t dropped = 0;
+  };
+
+  void tellDropped(const std::string& avatar, const Absent& absent) {
+    if (absent.dropped == 0) return;
+    const bool one = absent.dropped == 1;
+    tell(LineOutcome::Kind::dropped, absent.spawnLine, avatar,
+         "it never came into the world: " + std::to_string(absent.dropped) +
+             (one ? " line that follows is" : " lines that follow are") + " not done");
+  }
+
   void submit(std::uint32_t line, const v1::Command& command) {
+    const auto found = absent_.find(command.avatar());
+    if (found != absent_.end() && command.has_spawn()) {
+      tellDropped(found->first, found->second);
+      absent_.erase(found);
+    } else if (found != absent_.end()) {
+      ++result_.dropped;
+      ++found->second.dropped;
+      lineDone(line);
+      return;
+    }
     if (const auto error = driver_.submit(command)) {
       ++result_.refused;
+      if (command.has_spawn()) absent_[command.avatar()] = {line, 0};
       tell(LineOutcome::Kind::refused, line, command.avatar(),
            "refused: " + (error->field().empty() ? "" : error->field() + ": ") + error->message());
       lineDone(line);
       return;
     }
     open_.emplace(line, command.avatar());
+    if (command.has_spawn()) spawns_.insert(line);
     idle_ = false;
   }
 
@@ -73,9 +101,13 @@ class Run {
     }
     for (const auto& [number, avatar] : open_) {
       ++result_.dropped;
+      lineDone(number);
+      if (const auto found = absent_.find(avatar); found != absent_.end()) {
+        ++found->second.dropped;
+        continue;
+      }
       tell(LineOutcome::Kind::dropped, number, avatar,
            "not done: its avatar left the world, or never came into it");
-      lineDone(number);
     }
     open_.clear();
   }
@@ -108,6 +140,7 @@ class Run {
         break;
       case v1::Notice::KIND_REFUSED:
         ++result_.refused;
+        if (spawns_.contains(line)) absent_[notice.avatar()] = {line, 0};
         tell(LineOutcome::Kind::refused, line, notice.avatar(), "refused: " + notice.text());
         break;
       case v1::Notice::KIND_BLOCKED:
@@ -153,6 +186,8 @@ class Run {
   ScriptResult result_;
   ScriptProgress progress_;
   std::map<std::uint32_t, std::string> open_;  ///< submitted lines that have not ended; avatars
+  std::set<std::uint32_t> spawns_;             ///< submitted lines that spawn
+  std::map<std::string, Absent> absent_;
   bool idle_ = true;
   std::uint64_t tick_ = 0;
 };

@@ -5,6 +5,7 @@
 
 #include "scene/audit.hpp"
 #include "scene/import_model.hpp"
+#include "scene/rotation.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -18,7 +19,7 @@ struct Arguments {
   ModelArguments model;
   std::string script, out, plan, listen = "127.0.0.1:7878", connect;
   bool strict = false, json = false, objects = false;
-  std::uint32_t auditEvery = 0;
+  std::string auditEvery = "0", epsilon, stepHeight, slope, sliding = "slide";
 };
 
 std::string unitProblem(const std::string& text) {
@@ -35,12 +36,19 @@ std::string endpointProblem(const std::string& text) {
   return text + ": give HOST:PORT, as 127.0.0.1:7878, with a port from 0 to 65535";
 }
 
-std::string auditProblem(const std::string& text) {
+/// The number that the whole text is, in decimal; nullopt when it is none.
+template <typename Number>
+std::optional<Number> numberFrom(const std::string& text) {
   const char* end = text.data() + text.size();
-  std::uint32_t ticks = 0;
-  const auto parsed = std::from_chars(text.data(), end, ticks);
-  const bool whole = parsed.ec == std::errc() && parsed.ptr == end;
-  if (whole && ticks <= scene::kSparsestAudit) return {};
+  Number number{};
+  const auto parsed = std::from_chars(text.data(), end, number);
+  if (parsed.ec != std::errc() || parsed.ptr != end) return std::nullopt;
+  return number;
+}
+
+std::string auditProblem(const std::string& text) {
+  const auto ticks = numberFrom<std::uint32_t>(text);
+  if (ticks && *ticks <= scene::kSparsestAudit) return {};
   return text + ": give a whole number of ticks from 1 to " +
          std::to_string(scene::kSparsestAudit) + ", or 0 for no audit";
 }
@@ -53,6 +61,53 @@ void addAudit(CLI::App& verb, Arguments& into) {
                   "10 ms). Ends with 3 if something was found")
       ->capture_default_str()
       ->check(CLI::Validator(auditProblem, "N"));
+}
+
+/// Sets one length from its option's text; the text says why it cannot.
+std::string setLength(scene::Lengths& lengths, double scene::Lengths::*length,
+                      const std::string& text) {
+  const auto number = numberFrom<double>(text);
+  if (!number) return text + " is no number";
+  lengths.*length = *number;
+  return scene::lengthsProblem(lengths).value_or("");
+}
+
+std::string slopeProblem(const std::string& text) {
+  const auto degrees = numberFrom<double>(text);
+  return degrees && *degrees >= 0 && *degrees <= 89 ? "" : text + ": give 0 to 89 degrees";
+}
+
+CLI::Validator lengthCheck(double scene::Lengths::*length) {
+  return CLI::Validator(
+      [length](const std::string& text) {
+        scene::Lengths lengths;
+        return setLength(lengths, length, text);
+      },
+      "METRES");
+}
+
+/// What is left out stays as scene/lengths.hpp has it.
+void addMotion(CLI::App& verb, Arguments& into) {
+  verb.add_option("--step-height", into.stepHeight, "Highest ledge that is walked up (0.3)")
+      ->check(lengthCheck(&scene::Lengths::stepHeight));
+  verb.add_option("--epsilon", into.epsilon, "Movers rest so far from what they lean on (0.0005)")
+      ->check(lengthCheck(&scene::Lengths::epsilon));
+  verb.add_option("--slope", into.slope, "Steepest ground that is stood on, in degrees (50)")
+      ->check(CLI::Validator(slopeProblem, "DEGREES"));
+  verb.add_option("--sliding", into.sliding, "What blocks an avatar turns or stops it")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"slide", "stop"}));
+}
+
+scene::Lengths lengthsFrom(const Arguments& read) {
+  scene::Lengths lengths;
+  if (!read.stepHeight.empty()) setLength(lengths, &scene::Lengths::stepHeight, read.stepHeight);
+  if (!read.epsilon.empty()) setLength(lengths, &scene::Lengths::epsilon, read.epsilon);
+  // The heading's cosine is the same on every processor, as what decides motion must be.
+  if (!read.slope.empty())
+    lengths.walkableNormalY = scene::headingFromDegrees(*numberFrom<double>(read.slope)).x();
+  lengths.sliding = read.sliding == "stop" ? scene::Sliding::stop : scene::Sliding::slide;
+  return lengths;
 }
 
 void addModel(CLI::App& verb, ModelArguments& into) {
@@ -124,10 +179,12 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
       ->capture_default_str()
       ->check(CLI::Validator(endpointProblem, "HOST:PORT"));
   addAudit(*serve, read);
+  addMotion(*serve, read);
   CLI::App* replay = app.add_subcommand("replay", "Run a walk script in a scene, in process");
   addModel(*replay, read.model);
   addWalk(*replay, read);
   addAudit(*replay, read);
+  addMotion(*replay, read);
   CLI::App* walk = app.add_subcommand("walk", "Run a walk script on a server");
   addWalk(*walk, read);
   walk->add_option("--connect", read.connect, "The server's address and port")
@@ -144,14 +201,19 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
       app.exit(error);
       return ExitCode::done;
     }
-    std::cerr << error.what() << "\n\n" << app.help();
+    const auto verbs = app.get_subcommands();
+    std::cerr << "enfilade: " << error.what() << "\n"
+              << "enfilade " << (verbs.empty() ? "" : verbs[0]->get_name() + " ")
+              << "--help tells what there is\n";
     return ExitCode::usage;
   }
+  const std::uint32_t audit = numberFrom<std::uint32_t>(read.auditEvery).value_or(0);
   if (*serve)
-    return ServeCommand{modelFrom(read.model), *endpointFrom(read.listen), read.auditEvery};
+    return ServeCommand{modelFrom(read.model), *endpointFrom(read.listen), audit,
+                        lengthsFrom(read)};
   if (*replay) {
-    return ReplayCommand{modelFrom(read.model), read.script, read.out, read.strict,
-                         read.auditEvery};
+    return ReplayCommand{modelFrom(read.model), read.script, read.out,
+                         read.strict,           audit,       lengthsFrom(read)};
   }
   if (*inspect)
     return InspectCommand{modelFrom(read.model), read.json, read.objects, read.strict, read.plan};

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "scene/import_model.hpp"
+#include "scene/lengths.hpp"
 #include "server/exit_code.hpp"
 
 namespace enfilade::server {
@@ -29,12 +30,14 @@ struct ServeCommand {
   ModelOptions model;
   Endpoint listen{"127.0.0.1", 7878};
   std::uint32_t auditEvery = 0;  ///< ticks; 0: never
+  scene::Lengths lengths;
 };
 struct ReplayCommand {
   ModelOptions model;
   std::filesystem::path script, out;
   bool strict = false;
   std::uint32_t auditEvery = 0;  ///< ticks; 0: never
+  scene::Lengths lengths;
 };
 struct WalkCommand {
   std::filesystem::path script, out;

@@ -38,7 +38,7 @@ protocol::StepOutcome InProcessDriver::step() {
       outcome.frames.push_back(capture(outcome.notices.back()));
     }
   }
-  for (const auto& avatar : snapshot.avatars) outcome.avatars.push_back(messageOf(avatar));
+  for (const auto& avatar : snapshot.avatars) outcome.avatars.push_back(messageOf(world_, avatar));
   return outcome;
 }
 

@@ -55,7 +55,7 @@ ExitCode serve(const ServeCommand& command) {
   const auto scene = loadScene(command.model);
   // From here on: the threads that the server starts inherit the mask.
   const sigset_t ending = holdEndingSignals();
-  Server server(scene, command.listen, {}, command.auditEvery);
+  Server server(scene, command.listen, {}, command.auditEvery, command.lengths);
   tellReady(server, *scene, command.listen);
   const int signal = awaitEndingSignal(ending, server);
   spdlog::info("{}: finishing the tick and telling the clients",

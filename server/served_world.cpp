@@ -66,7 +66,9 @@ void sendState(ServedWorld& served, Client& client, const scene::Snapshot& snaps
   state.set_tick(snapshot.tick);
   state.set_time(snapshot.time);
   state.set_hash(snapshot.stateHash);
-  for (const scene::AvatarView& avatar : snapshot.avatars) *state.add_avatars() = messageOf(avatar);
+  for (const scene::AvatarView& avatar : snapshot.avatars) {
+    *state.add_avatars() = messageOf(served.world, avatar);
+  }
   state.set_dropped(client.droppedStates);
   client.out->pushLatest(encodeShared(message));
 }
@@ -82,7 +84,7 @@ void finishStep(ServedWorld& served, Client& client, const scene::Snapshot& snap
   reply.set_idle(served.idle);
   if (client.step->avatars) {
     for (const scene::AvatarView& avatar : snapshot.avatars) {
-      *reply.add_avatars() = messageOf(avatar);
+      *reply.add_avatars() = messageOf(served.world, avatar);
     }
   }
   client.step.reset();
@@ -132,8 +134,12 @@ void answerClosing(Client& client) {
 }  // namespace
 
 ServedWorld::ServedWorld(std::shared_ptr<const scene::Scene> scene, FrameService& frameService,
-                         RayService& rayService, const ServerLimits& serverLimits)
-    : world(std::move(scene)), frames(frameService), rays(rayService), limits(serverLimits) {}
+                         RayService& rayService, const ServerLimits& serverLimits,
+                         const scene::Lengths& lengths)
+    : world(std::move(scene), lengths),
+      frames(frameService),
+      rays(rayService),
+      limits(serverLimits) {}
 
 void send(Client& client, const v1::ServerMessage& message) {
   client.out->push(encodeShared(message));

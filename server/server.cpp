@@ -10,10 +10,10 @@ namespace enfilade::server {
 
 struct Server::State {
   State(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
-        const ServerLimits& limits, std::uint32_t auditEvery)
+        const ServerLimits& limits, std::uint32_t auditEvery, const scene::Lengths& lengths)
       : frames(scene),
         rays(scene),
-        loop(std::move(scene), frames, rays, limits, auditEvery),
+        loop(std::move(scene), frames, rays, limits, auditEvery, lengths),
         listener(context, listen, loop, limits) {}
 
   boost::asio::io_context context{1};  ///< one thread: its handlers need no lock
@@ -25,8 +25,8 @@ struct Server::State {
 };
 
 Server::Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
-               const ServerLimits& limits, std::uint32_t auditEvery)
-    : state_(std::make_unique<State>(std::move(scene), listen, limits, auditEvery)) {
+               const ServerLimits& limits, std::uint32_t auditEvery, const scene::Lengths& lengths)
+    : state_(std::make_unique<State>(std::move(scene), listen, limits, auditEvery, lengths)) {
   state_->listener.start();
   state_->network = std::thread([state = state_.get()] { state->context.run(); });
 }

@@ -4,6 +4,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "scene/lengths.hpp"
 #include "scene/scene.hpp"
 #include "server/audit_log.hpp"
 #include "server/command_line.hpp"
@@ -22,7 +23,8 @@ class Server {
   /// own (loopback), or cannot be had.
   /// Every `auditEvery`-th tick is audited; 0: none.
   Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
-         const ServerLimits& limits = {}, std::uint32_t auditEvery = 0);
+         const ServerLimits& limits = {}, std::uint32_t auditEvery = 0,
+         const scene::Lengths& lengths = {});
   ~Server();  ///< stops
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

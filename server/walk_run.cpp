@@ -204,7 +204,7 @@ ExitCode replay(const ReplayCommand& command) {
     const std::shared_ptr<const scene::Scene> scene = loadScene(command.model);
     if (interrupted != 0) throw Interrupted{};
     const std::unique_ptr<render::Renderer> renderer = rendererOf(scene);
-    scene::World world(scene);
+    scene::World world(scene, command.lengths);
     scene::auditBroadPhase(world, command.auditEvery);
     InProcessDriver driver(world, renderer.get(), captureFormat());
     WalkedWorld walked{driver,

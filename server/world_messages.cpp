@@ -53,6 +53,11 @@ v1::Verdict verdictOf(collision::Verdict verdict) {
   return v1::VERDICT_UNSPECIFIED;
 }
 
+v1::DecidedBy decidedByOf(collision::DecidedBy decidedBy) {
+  return decidedBy == collision::DecidedBy::filter ? v1::DECIDED_BY_FILTER
+                                                   : v1::DECIDED_BY_RATIONAL;
+}
+
 v1::Notice::Kind kindOf(scene::Notice::Kind kind) {
   using Kind = scene::Notice::Kind;
   switch (kind) {
@@ -72,56 +77,6 @@ v1::Notice::Kind kindOf(scene::Notice::Kind kind) {
       return v1::Notice::KIND_LEFT;
   }
   return v1::Notice::KIND_UNSPECIFIED;
-}
-
-using OrderOrError = std::variant<scene::Order, v1::Error>;
-
-OrderOrError missing(const char* field) {
-  return errorOf(v1::ERROR_BAD_MESSAGE, std::string(field) + " is missing: give a point", field);
-}
-
-OrderOrError orderFrom(const v1::Spawn& message) {
-  if (!message.has_at()) return missing("spawn.at");
-  scene::Spawn spawn;
-  spawn.at = vectorFrom(message.at());
-  spawn.facing = message.facing();
-  if (message.has_radius()) spawn.radius = message.radius();
-  if (message.has_height()) spawn.height = message.height();
-  return scene::Order(spawn);
-}
-
-OrderOrError orderFrom(const v1::Walk& message) {
-  if (message.along().empty()) return missing("walk.along");
-  scene::Walk walk;
-  for (const v1::Vec3& point : message.along()) walk.along.push_back(vectorFrom(point));
-  if (message.has_speed()) walk.speed = message.speed();
-  return scene::Order(std::move(walk));
-}
-
-OrderOrError orderFrom(const v1::Command& message) {
-  switch (message.order_case()) {
-    case v1::Command::kSpawn:
-      return orderFrom(message.spawn());
-    case v1::Command::kWalk:
-      return orderFrom(message.walk());
-    case v1::Command::kLook:
-      if (!message.look().has_at()) return missing("look.at");
-      return scene::Order(scene::Look{vectorFrom(message.look().at())});
-    case v1::Command::kWait:
-      return scene::Order(scene::Wait{message.wait().seconds()});
-    case v1::Command::kCapture:
-      return scene::Order(scene::Capture{message.capture().as()});
-    case v1::Command::kLeave:
-      return scene::Order(scene::Leave{});
-    case v1::Command::kDrive:
-      if (!message.drive().has_velocity()) return missing("drive.velocity");
-      return scene::Order(scene::Drive{vectorFrom(message.drive().velocity())});
-    case v1::Command::ORDER_NOT_SET:
-      break;
-  }
-  return errorOf(v1::ERROR_BAD_MESSAGE,
-                 "order is missing: give spawn, walk, look, wait, capture, leave or drive",
-                 "order");
 }
 
 }  // namespace
@@ -172,12 +127,6 @@ scene::Vec3 vectorFrom(const v1::Vec3& message) {
   return {message.x(), message.y(), message.z()};
 }
 
-std::variant<scene::Command, v1::Error> commandFrom(const v1::Command& message) {
-  OrderOrError order = orderFrom(message);
-  if (auto* error = std::get_if<v1::Error>(&order)) return std::move(*error);
-  return scene::Command{message.avatar(), std::get<scene::Order>(std::move(order)), message.tag()};
-}
-
 v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent& event) {
   const collision::Decision& decision = event.decision;
   v1::ContactEvent message;
@@ -197,9 +146,7 @@ v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent&
   *message.mutable_point_a() = messageOf(decision.pointA);
   *message.mutable_point_b() = messageOf(decision.pointB);
   *message.mutable_normal() = messageOf(decision.normal);
-  message.set_decided_by(decision.decidedBy == collision::DecidedBy::filter
-                             ? v1::DECIDED_BY_FILTER
-                             : v1::DECIDED_BY_RATIONAL);
+  message.set_decided_by(decidedByOf(decision.decidedBy));
   return message;
 }
 
@@ -217,7 +164,25 @@ v1::Notice messageOf(const scene::World& world, const scene::Notice& notice, std
   return message;
 }
 
-v1::AvatarState messageOf(const scene::AvatarView& avatar) {
+namespace {
+
+v1::MoveResult messageOf(const scene::World& world, const scene::MoveResult& move) {
+  v1::MoveResult message;
+  *message.mutable_asked() = messageOf(move.asked);
+  *message.mutable_made() = messageOf(move.made);
+  if (move.stoppedBy == 0) return message;
+  message.set_stopped_by(move.stoppedBy);
+  message.set_stopped_by_name(scene::nameOf(world, move.stoppedBy));
+  message.set_verdict(verdictOf(move.decision.verdict));
+  message.set_distance(move.decision.distance);
+  *message.mutable_normal() = messageOf(move.decision.normal);
+  message.set_decided_by(decidedByOf(move.decision.decidedBy));
+  return message;
+}
+
+}  // namespace
+
+v1::AvatarState messageOf(const scene::World& world, const scene::AvatarView& avatar) {
   v1::AvatarState message;
   message.set_id(avatar.id);
   message.set_name(avatar.name);
@@ -225,6 +190,15 @@ v1::AvatarState messageOf(const scene::AvatarView& avatar) {
   *message.mutable_gaze() = messageOf(avatar.gaze);
   message.set_eye_height(avatar.eyeHeight);
   message.set_grounded(avatar.grounded);
+  *message.mutable_move() = messageOf(world, avatar.move);
+  message.set_flying(avatar.flying);
+  message.set_stands_on(avatar.standsOn);
+  message.set_height(avatar.height);
+  for (const scene::JointView& joint : avatar.joints) {
+    v1::JointState& state = *message.add_joints();
+    state.set_value(joint.value);
+    state.set_stopped_by(joint.stoppedBy);
+  }
   return message;
 }
 
@@ -252,7 +226,10 @@ v1::Policies messageOf(const scene::Lengths& lengths) {
   message.set_walkable_slope(std::acos(lengths.walkableNormalY));
   message.set_gravity(lengths.gravity);
   message.set_patience(lengths.patience);
-  message.set_sliding("slide");
+  message.set_sliding(lengths.sliding == scene::Sliding::slide ? "slide" : "stop");
+  message.set_jump_limit(lengths.jumpLimit);
+  message.set_joint_speed_limit(lengths.jointSpeedLimit);
+  message.set_push_force(lengths.pushForce);
   return message;
 }
 

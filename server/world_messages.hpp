@@ -10,12 +10,13 @@
 
 namespace enfilade::server {
 
-/// The order, or what is missing in it, naming the field. Values are the world's to judge.
+/// The order, or what is missing in it, naming the field. Values are the world's to judge
+/// (order_messages.cpp).
 std::variant<scene::Command, v1::Error> commandFrom(const v1::Command& message);
 
 v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent& event);
 v1::Notice messageOf(const scene::World& world, const scene::Notice& notice, std::uint64_t tick);
-v1::AvatarState messageOf(const scene::AvatarView& avatar);
+v1::AvatarState messageOf(const scene::World& world, const scene::AvatarView& avatar);
 v1::Scene messageOf(const scene::Scene& scene);
 v1::Policies messageOf(const scene::Lengths& lengths);
 v1::Vec3 messageOf(const scene::Vec3& v);

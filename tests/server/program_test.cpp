@@ -121,6 +121,8 @@ TEST_F(Program, UsageMistakesEndWithTwoAndSayHow) {
     EXPECT_EQ(ended.code, 2) << ::testing::PrintToString(arguments);
     EXPECT_EQ(ended.out, "") << "stdout is for data";
     EXPECT_NE(ended.err.find("enfilade"), std::string::npos) << ended.err;
+    EXPECT_NE(ended.err.find("--help"), std::string::npos) << ended.err;
+    EXPECT_EQ(std::count(ended.err.begin(), ended.err.end(), '\n'), 2) << ended.err;
   }
   EXPECT_EQ(run({"--help"}).code, 0);
 }
