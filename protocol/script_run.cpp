@@ -52,15 +52,21 @@ class Run {
   /// An avatar whose spawn was refused: what else it was told is dropped, and told once.
   struct Absent {
     std::uint32_t spawnLine = 0;
+    std::uint32_t firstLine = 0;  ///< of those dropped
     std::uint32_t dropped = 0;
+
+    void drop(std::uint32_t line) {
+      if (dropped++ == 0) firstLine = line;
+    }
   };
 
   void tellDropped(const std::string& avatar, const Absent& absent) {
     if (absent.dropped == 0) return;
-    const bool one = absent.dropped == 1;
-    tell(LineOutcome::Kind::dropped, absent.spawnLine, avatar,
-         "it never came into the world: " + std::to_string(absent.dropped) +
-             (one ? " line that follows is" : " lines that follow are") + " not done");
+    std::string what =
+        "not done: its spawn of line " + std::to_string(absent.spawnLine) + " was refused";
+    if (absent.dropped > 1)
+      what += "; nor is what it is told in " + std::to_string(absent.dropped - 1) + " lines more";
+    tell(LineOutcome::Kind::dropped, absent.firstLine, avatar, what);
   }
 
   void submit(std::uint32_t line, const v1::Command& command) {
@@ -70,13 +76,13 @@ class Run {
       absent_.erase(found);
     } else if (found != absent_.end()) {
       ++result_.dropped;
-      ++found->second.dropped;
+      found->second.drop(line);
       lineDone(line);
       return;
     }
     if (const auto error = driver_.submit(command)) {
       ++result_.refused;
-      if (command.has_spawn()) absent_[command.avatar()] = {line, 0};
+      if (command.has_spawn()) absent_[command.avatar()] = {line, 0, 0};
       tell(LineOutcome::Kind::refused, line, command.avatar(),
            "refused: " + (error->field().empty() ? "" : error->field() + ": ") + error->message());
       lineDone(line);
@@ -103,7 +109,7 @@ class Run {
       ++result_.dropped;
       lineDone(number);
       if (const auto found = absent_.find(avatar); found != absent_.end()) {
-        ++found->second.dropped;
+        found->second.drop(number);
         continue;
       }
       tell(LineOutcome::Kind::dropped, number, avatar,
@@ -140,7 +146,7 @@ class Run {
         break;
       case v1::Notice::KIND_REFUSED:
         ++result_.refused;
-        if (spawns_.contains(line)) absent_[notice.avatar()] = {line, 0};
+        if (spawns_.contains(line)) absent_[notice.avatar()] = {line, 0, 0};
         tell(LineOutcome::Kind::refused, line, notice.avatar(), "refused: " + notice.text());
         break;
       case v1::Notice::KIND_BLOCKED:

@@ -166,7 +166,7 @@ v1::Notice messageOf(const scene::World& world, const scene::Notice& notice, std
 
 namespace {
 
-v1::MoveResult messageOf(const scene::World& world, const scene::MoveResult& move) {
+v1::MoveResult moveMessageOf(const scene::World& world, const scene::MoveResult& move) {
   v1::MoveResult message;
   *message.mutable_asked() = messageOf(move.asked);
   *message.mutable_made() = messageOf(move.made);
@@ -190,7 +190,7 @@ v1::AvatarState messageOf(const scene::World& world, const scene::AvatarView& av
   *message.mutable_gaze() = messageOf(avatar.gaze);
   message.set_eye_height(avatar.eyeHeight);
   message.set_grounded(avatar.grounded);
-  *message.mutable_move() = messageOf(world, avatar.move);
+  *message.mutable_move() = moveMessageOf(world, avatar.move);
   message.set_flying(avatar.flying);
   message.set_stands_on(avatar.standsOn);
   message.set_height(avatar.height);

@@ -9,10 +9,12 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <random>
 
 #include "scene/import_model.hpp"
 #include "scene/world.hpp"
+#include "tests/scene/thin_things.hpp"
 #include "tests/support/shared_folder.hpp"
 
 namespace {
@@ -60,21 +62,15 @@ void row(const char* name, const std::vector<double>& seconds) {
               1e6 * quantile(seconds, 0.99), 1e6 * quantile(seconds, 1));
 }
 
-void bench(const std::filesystem::path& file, int avatars, int ticks) {
-  const auto still = std::make_shared<const scene::Scene>(scene::importModel(file));
-  scene::World world(still);
-  std::mt19937_64 random(1);
-  spawnAvatars(world, avatars, random);
-
+/// Makes the ticks, `before` each of them, and prints what they cost.
+void measure(const std::string& title, scene::World& world, int ticks,
+             const std::function<void(int tick)>& before) {
   std::array<std::vector<double>, scene::kStages> stages;
   std::vector<double> whole;
   double worst = 0;
   std::uint64_t queries = 0, rationals = 0, pairs = 0, bounded = 0;
   for (int i = 0; i < ticks; ++i) {
-    if (i % 120 == 0) {
-      spawnAvatars(world, avatars, random);
-      turnAll(world, random);
-    }
+    before(i);
     const scene::TickReport report = tick(world);
     double sum = 0;
     for (std::size_t s = 0; s < scene::kStages; ++s) {
@@ -88,8 +84,8 @@ void bench(const std::filesystem::path& file, int avatars, int ticks) {
     pairs += report.pairs;
     bounded += report.boundedSweeps;
   }
-  std::printf("%s: %zu objects, %zu avatars, %d ticks\n", file.c_str(),
-              still->model().objects.size(), world.snapshot()->avatars.size(), ticks);
+  std::printf("%s: %zu objects, %zu avatars, %d ticks\n", title.c_str(),
+              world.scene().model().objects.size(), world.snapshot()->avatars.size(), ticks);
   std::printf("| stage    | median us |    p99 us |    max us |\n|---|---|---|---|\n");
   for (std::size_t s = 0; s < scene::kStages; ++s) row(scene::kStageNames[s], stages[s]);
   row("tick", whole);
@@ -99,6 +95,37 @@ void bench(const std::filesystem::path& file, int avatars, int ticks) {
       double(pairs) / ticks, double(queries) / ticks, double(rationals) / ticks,
       static_cast<unsigned long long>(bounded), worst,
       static_cast<unsigned long long>(world.snapshot()->stateHash));
+}
+
+void bench(const std::filesystem::path& file, int avatars, int ticks) {
+  const auto still = std::make_shared<const scene::Scene>(scene::importModel(file));
+  scene::World world(still);
+  std::mt19937_64 random(1);
+  spawnAvatars(world, avatars, random);
+  measure(file.string(), world, ticks, [&](int i) {
+    if (i % 120 != 0) return;
+    spawnAvatars(world, avatars, random);
+    turnAll(world, random);
+  });
+}
+
+/// 200 walkers who want both ways along a corridor of 4 m: everyone is in somebody's way.
+void benchCrowd(int ticks) {
+  constexpr int kCrowd = 200;
+  scene::testing::Builder builder;
+  scene::testing::sheetCell(builder, "corridor", {-30, 0, -2}, {30, 3, 2}, false);
+  scene::World world(std::make_shared<const scene::Scene>(builder.model));
+  const auto name = [](int i) { return "walker" + std::to_string(i); };
+  for (int i = 0; i < kCrowd; ++i)
+    submit(world, {name(i), scene::Spawn{{-24.5 + i / 4, 0, -1.5 + i % 4}}, 0});
+  tick(world);
+  measure("a crowd in a corridor", world, ticks, [&](int i) {
+    if (i % 120 != 0) return;
+    for (int k = 0; k < kCrowd; ++k) {
+      const double along = (k + i / 120) % 2 ? 1.3 : -1.3;
+      submit(world, {name(k), scene::Drive{{along, 0, 0.3 - 0.2 * (k % 4)}}, 0});
+    }
+  });
 }
 
 /// The bundled building, and the shared estate of 16,395 objects where it is there.
@@ -120,5 +147,6 @@ int main(int argc, char** argv) {
     bench(argv[1], avatars, ticks);
   } else {
     for (const auto& scene : defaultScenes(argv[0])) bench(scene, avatars, ticks);
+    benchCrowd(600);
   }
 }

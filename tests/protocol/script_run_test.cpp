@@ -122,6 +122,25 @@ TEST(RunScript, ARefusedSpawnTellsWhatIsDroppedWithIt) {
   EXPECT_EQ(result.outcomes[1].kind, LineOutcome::Kind::dropped);
 }
 
+TEST(RunScript, WhatFollowsARefusedSpawnIsToldInOneLine) {
+  FakeWorld world;
+  const ScriptResult result = runScript(script(R"({"spawn":"ghost","at":[0,0,0]}
+{"walk":"ghost","to":[1,0,0]}
+{"wait":0.1}
+{"look":"ghost","at":[1,0,0]}
+{"wait":0.1}
+{"leave":"ghost"}
+)"),
+                                        world);
+  EXPECT_EQ(result.refused, 1u);
+  EXPECT_EQ(result.dropped, 3u);
+  ASSERT_EQ(result.outcomes.size(), 2u);
+  EXPECT_EQ(
+      result.outcomes[1].text,
+      "tour.jsonl:2: ghost: not done: its spawn of line 1 was refused; nor is what it is told "
+      "in 2 lines more");
+}
+
 TEST(RunScript, ABlockedWalkNamesItsObstacleAndTheNextCommandBegins) {
   FakeWorld world;
   const ScriptResult result = runScript(script(R"({"spawn":"stuck","at":[4,0,0]}

@@ -134,6 +134,66 @@ TEST(Script, NumbersThatAreNoneAreRefused) {
   expectError(R"({"wait":-0.1,"for":"ann"})", "tour.jsonl:1: wait: -0.1 is out of range");
 }
 
+TEST(Script, NumbersThatNoWorldTakesAreFoundBeforeAnythingMoves) {
+  expectError(R"({"spawn":"a","at":[2e7,0,0]})", "tour.jsonl:1: at.x: ");
+  expectError(R"({"spawn":"a","at":[0,0,0],"radius":0.01})", "tour.jsonl:1: radius: ");
+  expectError(R"({"spawn":"a","at":[0,0,0],"height":11})", "tour.jsonl:1: height: ");
+  expectError(R"({"spawn":"a","at":[0,0,0],"facing":1e7})", "tour.jsonl:1: facing: ");
+  expectError(R"({"walk":"a","to":[0,0,0],"speed":0})", "tour.jsonl:1: speed: ");
+  expectError(R"({"walk":"a","to":[0,0,0],"speed":1001})", "tour.jsonl:1: speed: ");
+  expectError(R"({"wait":86401,"for":"a"})", "tour.jsonl:1: wait: ");
+  expectError(R"({"jump":"a","height":0})", "tour.jsonl:1: height: ");
+  expectError(R"({"crouch":"a","height":-1})", "tour.jsonl:1: height: ");
+  expectError(R"({"joints":"a","to":[1e4]})", "tour.jsonl:1: to[0]: ");
+  expectError(R"({"joints":"a","to":[1],"speed":21})", "tour.jsonl:1: speed: ");
+}
+
+TEST(Script, JumpsFlightsCrouchesAndJointsAreRead) {
+  const v1::Command jump = onlyCommand(R"({"jump":"ann","height":0.4,"velocity":[2,0,1]})");
+  EXPECT_EQ(jump.jump().height(), 0.4);
+  EXPECT_EQ(jump.jump().velocity().z(), 1);
+  EXPECT_FALSE(onlyCommand(R"({"jump":"ann"})").jump().has_velocity());
+  EXPECT_TRUE(onlyCommand(R"({"fly":"ann"})").fly().on());
+  EXPECT_FALSE(onlyCommand(R"({"fly":"ann","on":false})").fly().on());
+  EXPECT_EQ(onlyCommand(R"({"crouch":"ann","height":0.9})").crouch().height(), 0.9);
+  const v1::Command stand = onlyCommand(R"({"stand":"ann"})");
+  EXPECT_TRUE(stand.has_crouch());
+  EXPECT_FALSE(stand.crouch().has_height());
+  const v1::Command joints = onlyCommand(R"({"joints":"arm","to":[1.5,null,-0.2],"speed":2})");
+  ASSERT_EQ(joints.drive_joints().to_size(), 3);
+  EXPECT_EQ(joints.drive_joints().to(0).value(), 1.5);
+  EXPECT_FALSE(joints.drive_joints().to(1).has_value());
+  EXPECT_EQ(joints.drive_joints().speed(), 2);
+}
+
+TEST(Script, ASpawnHasPartsAndLinks) {
+  const v1::Command command = onlyCommand(
+      R"({"spawn":"arm","at":[0,0,0],"self_contact":true,"flying":true,)"
+      R"("parts":[{"box":[[-1,0,-1],[1,0.5,1]]},{"points":[[0,0,0],[1,0,0],[0,1,0],[0,0,1]]}],)"
+      R"("links":[{"joint":"revolute","axis":[0,1,0],"anchor":[0,0.5,0],"limits":[-1,2],"value":1,)"
+      R"("box":[[0,0,0],[1,1,1]]},{"parent":0,"joint":"prismatic","axis":[1,0,0],)"
+      R"("points":[[0,0,0]]}]})");
+  const v1::Spawn& spawn = command.spawn();
+  EXPECT_TRUE(spawn.self_contact());
+  EXPECT_TRUE(spawn.flying());
+  ASSERT_EQ(spawn.parts_size(), 2);
+  EXPECT_EQ(spawn.parts(0).box().max().y(), 0.5);
+  EXPECT_EQ(spawn.parts(1).points_size(), 4);
+  ASSERT_EQ(spawn.links_size(), 2);
+  EXPECT_FALSE(spawn.links(0).has_parent());
+  EXPECT_EQ(spawn.links(0).joint().high(), 2);
+  EXPECT_EQ(spawn.links(0).value(), 1);
+  EXPECT_EQ(spawn.links(1).joint().kind(), v1::Joint::KIND_PRISMATIC);
+  expectError(R"({"spawn":"a","at":[0,0,0],"links":[{"axis":[0,1,0]}]})",
+              "tour.jsonl:1: links[0].joint: must be");
+  expectError(R"({"spawn":"a","at":[0,0,0],"links":[{"joint":"revolute","axis":[0,1,0]}]})",
+              "tour.jsonl:1: links[0]: must have either");
+  expectError(R"({"spawn":"a","at":[0,0,0],"links":[{"joint":"revolute","axes":[0,1,0]}]})",
+              R"(tour.jsonl:1: links[0]: "axes" is no key)");
+  expectError(R"({"spawn":"a","at":[0,0,0],"parts":[{"box":[[0,0,0]]}]})",
+              "tour.jsonl:1: parts[0].box: must be two");
+}
+
 TEST(Script, NamesAreShortAndFitForFiles) {
   expectError(R"({"leave":""})", "tour.jsonl:1: leave: is empty; give the avatar's name");
   expectError(R"({"leave":")" + std::string(65, 'a') + "\"}", "tour.jsonl:1: leave: has 65");

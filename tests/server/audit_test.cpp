@@ -54,6 +54,7 @@ TEST(AuditOption, IsAWholeNumberOfTicksAndOffWithoutIt) {
   EXPECT_EQ(std::get<ReplayCommand>(std::get<ProgramCommand>(replay({}))).auditEvery, 0u);
   EXPECT_EQ(every("0"), 0u);
   EXPECT_EQ(every("10"), 10u);
+  EXPECT_EQ(every("010"), 10u) << "decimal, not octal";
   EXPECT_EQ(every("1000000"), 1'000'000u);
   for (const char* bad : {"-1", "1.5", "x", "", "1000001", "99999999999", "1 "}) {
     const auto refused = replay({"--audit", bad});

@@ -1,0 +1,176 @@
+// Prints the state hash at the end of some worlds in which everything that moves moves: walkers on
+// stairs, a crowd, flyers among slivers, a driven arm, doors and a lift. The scenes and commands
+// are made without libm, so that every build on every processor is given the same ones and must
+// print the same lines.
+#include <cstdio>
+#include <memory>
+
+#include "scene/world.hpp"
+#include "tests/scene/thin_things.hpp"
+
+namespace {
+
+using namespace enfilade::scene;
+using namespace enfilade::scene::testing;
+
+int refusedCommands = 0;
+
+void order(World& world, const std::string& name, Order o) {
+  if (submit(world, {name, std::move(o), 0})) ++refusedCommands;
+}
+
+void ticks(World& world, int count) {
+  for (int i = 0; i < count; ++i) tick(world);
+}
+
+void print(const char* name, const World& world) {
+  std::printf("%-8s %016llx after %llu ticks, %zu avatars\n", name,
+              static_cast<unsigned long long>(world.snapshot()->stateHash),
+              static_cast<unsigned long long>(world.snapshot()->tick),
+              world.snapshot()->avatars.size());
+}
+
+Vec3 anyVelocity(Seeded& random, double most, bool flies) {
+  const double x = random.uniform(-most, most), z = random.uniform(-most, most);
+  return {x, flies ? random.uniform(-most, most) : 0, z};
+}
+
+void stairs() {
+  Builder b;
+  b.box("floor", {-10, -0.2, -10}, {10, 0, 10});
+  for (int i = 0; i < 10; ++i)
+    b.box("step", {0.3 * i, -0.1, -2}, {0.3 * i + 0.3, 0.17 * i + 0.17, 2});
+  World world(std::make_shared<const Scene>(b.model));
+  for (int i = 0; i < 6; ++i) {
+    const std::string name = "walker" + std::to_string(i);
+    const double z = 0.65 * i - 1.6;
+    order(world, name, Spawn{{-2, 0, z}, 33.0 * i});
+    order(world, name, Walk{{{2.8, 1.7, 0.5 * z}}, 1.1 + 0.1 * i});
+    order(world, name, Jump{0.3 + 0.05 * i, Vec3(-2, 0, 0.1 * i)});
+    order(world, name, Crouch{0.9});
+    order(world, name, Walk{{{-3, 0, z}}, 1.4});
+    order(world, name, Crouch{});
+  }
+  ticks(world, 700);
+  print("stairs", world);
+}
+
+void crowd() {
+  Builder b;
+  sheetCell(b, "hall", {-6, 0, -2}, {6, 3, 2}, true);
+  World world(std::make_shared<const Scene>(b.model));
+  Seeded random(11);
+  for (int i = 0; i < 40; ++i)
+    order(world, "w" + std::to_string(i), Spawn{{-4.9 + i / 4, 0, -1.4 + 0.9 * (i % 4)}});
+  for (int k = 0; k < 8; ++k) {
+    ticks(world, 40);
+    for (int i = 0; i < 40; ++i)
+      order(world, "w" + std::to_string(i), Drive{anyVelocity(random, 3, false)});
+  }
+  print("crowd", world);
+}
+
+void flyers() {
+  Builder b;
+  Seeded random(12);
+  sheetCell(b, "hall", {-4, 0, -4}, {4, 6, 4}, true);
+  for (int i = 0; i < 40; ++i) {
+    const Vec3 at = anyVelocity(random, 3.5, true) + Vec3(0, 3.2, 0);
+    b.sheet("pane", {at, at + Vec3(0.3, 0.1, 0), at + Vec3(0.4, 0.8, 0.3), at + Vec3(0, 0.7, 0.2)});
+  }
+  World world(std::make_shared<const Scene>(b.model));
+  for (int i = 0; i < 16; ++i) {
+    Spawn spawn;
+    spawn.at = {-3.2 + 2 * (i % 4), 0.3 + 0.9 * (i / 8), -3.2 + 2 * (i / 4)};
+    spawn.height = 0.6;
+    spawn.flying = true;
+    order(world, "f" + std::to_string(i), spawn);
+  }
+  for (int k = 0; k < 10; ++k) {
+    ticks(world, 20);
+    for (int i = 0; i < 16; ++i)
+      order(world, "f" + std::to_string(i), Drive{anyVelocity(random, k + 1, true)});
+  }
+  print("flyers", world);
+}
+
+void arm() {
+  Builder b;
+  b.box("floor", {-5, -0.2, -5}, {5, 0, 5});
+  b.box("table", {0.9, 0, -2}, {2.4, 0.6, 2});
+  b.sheet("pane", {{-5, 0, -1.2}, {5, 0, -1.2}, {5, 3, -1.2}, {-5, 3, -1.2}});
+  World world(std::make_shared<const Scene>(b.model));
+  Spawn spawn;
+  spawn.facing = 7;
+  Link upper, lower;
+  upper.joint = {Joint::Kind::revolute, {0, 1.2, 0}, {0, 1, 0.2}, -3, 3};
+  upper.points = {{0.4, -0.05, -0.05}, {1.2, -0.05, 0}, {1.2, 0.05, 0.05}, {0.4, 0.1, 0}};
+  lower.parent = 0;
+  lower.joint = {Joint::Kind::revolute, {1.25, 0, 0}, {0, 0, 1}, -2.5, 2.5};
+  lower.points = {{0, -0.04, -0.04}, {0.7, 0, 0}, {0, 0.05, 0}, {0, 0, 0.05}};
+  spawn.links = {upper, lower};
+  order(world, "arm", spawn);
+  order(world, "bob", Spawn{{-1.5, 0, 1}});
+  ticks(world, 2);
+  Seeded random(13);
+  for (int k = 0; k < 20; ++k) {
+    const double turn = random.uniform(-3, 3);
+    order(world, "arm", DriveJoints{{turn, random.uniform(-2.5, 2.5)}, 1.0 + k, true});
+    if (k % 4 == 0) order(world, "bob", Drive{anyVelocity(random, 2, false)});
+    ticks(world, 20);
+  }
+  print("arm", world);
+}
+
+void doors() {
+  Builder b;
+  b.box("floor", {-5, -0.2, -5}, {5, 0, 5});
+  b.box("door", {0, 0.01, 0}, {0.9, 2, 0.04});
+  b.box("platform", {2, 0.01, -1}, {4, 0.1, 1});
+  BodySpec door;
+  door.name = "door";
+  door.kind = BodyKind::hinged;
+  door.objects = {1};
+  door.axis = Vec3::UnitY();
+  door.low = -1.5;
+  door.high = 1.5;
+  door.speed = 2;
+  BodySpec lift = door;
+  lift.name = "lift";
+  lift.kind = BodyKind::lift;
+  lift.objects = {2};
+  lift.anchor = {3, 0, 0};
+  lift.low = 0;
+  lift.high = 3;
+  lift.stops = {0, 3};
+  lift.speed = 0.7;
+  b.model.bodies = {door, lift};
+  World world(std::make_shared<const Scene>(b.model));
+  order(world, "ann", Spawn{{0.5, 0, -1}});
+  order(world, "bob", Spawn{{3, 0.1, 0}});
+  order(world, "ann", Walk{{{0.5, 0, 1}}, 1});
+  ticks(world, 30);
+  for (int k = 0; k < 4; ++k) {
+    BodyCommand swing, rise;
+    swing.body = "door";
+    swing.action = k % 2 ? BodyCommand::Action::close : BodyCommand::Action::open;
+    rise.body = "lift";
+    rise.action = BodyCommand::Action::to;
+    rise.to = k % 2 ? 0 : 3;
+    if (submit(world, swing)) ++refusedCommands;
+    if (submit(world, rise)) ++refusedCommands;
+    ticks(world, 150);
+  }
+  print("doors", world);
+}
+
+}  // namespace
+
+int main() {
+  stairs();
+  crowd();
+  flyers();
+  arm();
+  doors();
+  std::printf("refused  %d commands\n", refusedCommands);
+}
