@@ -80,12 +80,12 @@ std::string text(const Vec3& v) {
 std::optional<std::string> whyNotThere(Search& search, const Avatar& avatar,
                                        std::vector<Obstacle>& obstacles) {
   const WorldState& world = search.world;
-  EntityId inTheWay = 0;
-  if (!isFree(*avatar.shape, avatar.feet, world.lengths.epsilon, obstacles, search.count, inTheWay))
-    return "it would stand in " + pathOf(world, inTheWay);
   for (const AvatarPart& part : avatar.shape->parts)
     if (const EntityId solid = solidAround(search, avatar.feet + part.box.centre()))
       return "it would stand inside " + pathOf(world, solid);
+  EntityId inTheWay = 0;
+  if (!isFree(*avatar.shape, avatar.feet, world.lengths.epsilon, obstacles, search.count, inTheWay))
+    return "it would stand in " + pathOf(world, inTheWay);
   if (avatar.flying) return std::nullopt;
   const Floor floor = floorBelow(search, avatar);
   if (floor.entity == 0)
@@ -179,16 +179,22 @@ std::vector<Obstacle> obstaclesIn(const WorldState& world, const Box& box, Entit
       if (overlaps(obstacle.box, box)) obstacles.push_back(obstacle);
     }
   }
-  /// A search for a place, and what it costs.
-  struct Search {
-    const WorldState& world;
-    QueryCount& count;
-  };
+  return obstacles;
+}
 
-  if (const EntityId solid = solidAround(world, order.at + avatar.shape->box.centre()))
-    return "at " + text(order.at) + " it would stand inside " + pathOf(world, solid);
-  return "at " + text(order.at) + " it would stand in " + pathOf(world, inTheWay) +
-         "; move it at least " + std::to_string(epsilon) + " m clear";
+std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& order, Avatar& avatar,
+                                       std::string& told, QueryCount& count) {
+  shapeAvatar(order, avatar);
+  Search search{world, count};
+  if (const auto why = tryPlace(search, order.at, avatar)) {
+    const std::string room = nearestRoom(search, order.at, avatar);
+    return "at " + text(order.at) + " " + *why + room;
+  }
+  if (avatar.flying) return std::nullopt;
+  const Floor floor = floorBelow(search, avatar);
+  if (floor.depth > kDropTold)
+    told = "drops " + shortNumber(floor.depth) + " m to " + pathOf(world, floor.entity);
+  return std::nullopt;
 }
 
 }  // namespace enfilade::scene
