@@ -18,8 +18,8 @@ double reachBeyond(const Chain& chain, std::size_t link) {
   double reach = radiusOf(chain.links[link]);
   for (std::size_t child = link + 1; child < chain.links.size(); ++child) {
     if (chain.links[child].parent != static_cast<std::int32_t>(link)) continue;
-    const Joint& joint = chain.links[child].joint;
-    const bool slides = joint.kind == Joint::Kind::prismatic;
+    const LinkJoint& joint = chain.links[child].joint;
+    const bool slides = joint.kind == LinkJoint::Kind::prismatic;
     const double travel = slides ? std::max(std::abs(joint.low), std::abs(joint.high)) : 0;
     reach = std::max(reach, joint.anchor.norm() + travel + chain.links[child].reach);
   }
@@ -55,7 +55,7 @@ std::vector<LinkPose> posesOf(const Chain& chain) {
     LinkPose pose;
     pose.axis = parent.rotation * link.joint.axis;
     pose.origin = parent.origin + parent.rotation * link.joint.anchor;
-    if (link.joint.kind == Joint::Kind::prismatic) {
+    if (link.joint.kind == LinkJoint::Kind::prismatic) {
       pose.rotation = parent.rotation;
       pose.origin += link.value * pose.axis;
     } else {
@@ -87,7 +87,7 @@ double chainReach(const Chain& chain, double tick) {
   double reach = 0;
   for (const ChainLink& link : chain.links) {
     const double step = std::min(std::abs(link.target - link.value), chain.speed * tick);
-    reach += step * (link.joint.kind == Joint::Kind::revolute ? link.reach : 1);
+    reach += step * (link.joint.kind == LinkJoint::Kind::revolute ? link.reach : 1);
   }
   return reach;
 }

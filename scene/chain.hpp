@@ -13,7 +13,7 @@ namespace enfilade::scene {
 
 struct ChainLink {
   std::int32_t parent = -1;
-  Joint joint;  ///< its axis a unit vector
+  LinkJoint joint;  ///< its axis a unit vector
   std::shared_ptr<const collision::Hull> hull;
   double reach = 0;  ///< metres from the joint's axis that no point of what it moves exceeds, ever
 

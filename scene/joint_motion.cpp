@@ -105,7 +105,7 @@ JointStep stepOf(const Avatar& avatar, const LinkPose& pose, std::size_t joint, 
   JointStep step;
   step.joint = joint;
   step.by = by;
-  step.turns = link.joint.kind == Joint::Kind::revolute;
+  step.turns = link.joint.kind == LinkJoint::Kind::revolute;
   step.pivot = avatar.feet + pose.origin;
   step.axis = pose.axis;
   step.reach = std::abs(by) * (step.turns ? link.reach : 1);

@@ -174,7 +174,6 @@ bool stepUp(Mover& m, const Vec3& start, const Vec3& wish, double toBeat) {
 void stoppedBy(Avatar& avatar, const Stop& stop) {
   avatar.stoppedBy = stop.entity;
   avatar.atStop = stop.atStop;
-  avatar.pushing = stop.entity != 0 ? -stop.normal : Vec3(Vec3::Zero());
 }
 
 void standOn(Avatar& avatar, EntityId ground) {

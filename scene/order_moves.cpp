@@ -57,7 +57,7 @@ std::string jointProblem(const Chain& chain, const DriveJoints& drive) {
     return "to has " + std::to_string(drive.to.size()) + " values for " +
            std::to_string(chain.links.size()) + " joints";
   for (std::size_t i = 0; i < drive.to.size(); ++i) {
-    const Joint& joint = chain.links[i].joint;
+    const LinkJoint& joint = chain.links[i].joint;
     if (!drive.to[i] || (*drive.to[i] >= joint.low && *drive.to[i] <= joint.high)) continue;
     return "to[" + std::to_string(i) + "] is " + shortNumber(*drive.to[i]) +
            "; the joint goes from " + shortNumber(joint.low) + " to " + shortNumber(joint.high);

@@ -69,11 +69,11 @@ Refusal badLink(const std::string& field, const Link& link, std::size_t index) {
   if (link.parent < -1 || link.parent >= static_cast<std::int32_t>(index))
     return field + ".parent is " + std::to_string(link.parent) +
            "; it must be an earlier link, counted from 0, or -1 for the base";
-  const Joint& joint = link.joint;
+  const LinkJoint& joint = link.joint;
   if (auto why = badPoint(field + ".anchor", joint.anchor, kLargestPart)) return why;
   if (auto why = badPoint(field + ".axis", joint.axis, kLargestPart)) return why;
   if (!(joint.axis.norm() > 1e-6)) return field + ".axis has no direction; give one, as [0, 1, 0]";
-  const bool turns = joint.kind == Joint::Kind::revolute;
+  const bool turns = joint.kind == LinkJoint::Kind::revolute;
   const double most = turns ? kMostTurn : kLargestPart;
   if (auto why = outside(field + ".low", joint.low, -most, most)) return why;
   if (auto why = outside(field + ".high", joint.high, joint.low, most)) return why;

@@ -15,7 +15,7 @@ namespace enfilade::scene {
 using collision::Vec3;
 
 /// How a link hangs on the one before it, in the frame of that one (or of the avatar).
-struct Joint {
+struct LinkJoint {
   enum class Kind : std::uint8_t { revolute, prismatic };
   Kind kind = Kind::revolute;
   Vec3 anchor = Vec3::Zero();      ///< metres: origin of the link's frame when `value` is 0
@@ -27,7 +27,7 @@ struct Joint {
 /// A convex piece that a joint moves. Links make a tree: `parent` comes before its links.
 struct Link {
   std::int32_t parent = -1;  ///< index of a link; -1: the avatar's base
-  Joint joint;
+  LinkJoint joint;
   std::vector<Vec3> points;  ///< metres, in the link's frame: their hull is the link
   double value = 0;          ///< radians or metres, as it enters the world
 };

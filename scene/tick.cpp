@@ -77,7 +77,7 @@ void moveAvatars(WorldState& world, const Wish& wish, QueryCount& count) {
   for (auto& [name, avatar] : world.avatars) {
     const Vec3 velocity = wishOf(wish, name);
     avatar.stoppedBy = 0;
-    avatar.pushing = avatar.asked = Vec3::Zero();
+    avatar.asked = Vec3::Zero();
     avatar.resting = avatar.grounded && avatar.lastMove.isZero(0) && velocity.isZero(0) &&
                      !avatar.stirred && avatar.chain.speed == 0 && !avatar.pairsChanged &&
                      nobodyNear(world, avatar);

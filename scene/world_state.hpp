@@ -53,9 +53,8 @@ struct Avatar {
   EntityId stoppedBy = 0;
   bool pairsChanged =
       true;  ///< the broad phase gave it or took from it a partner since it gathered
-  collision::Decision atStop;   ///< with `stoppedBy`, where the move ended
-  Vec3 pushing = Vec3::Zero();  ///< unit, into what stopped it; zero: nothing did
-  bool blockedTold = false;     ///< driven against something, which was told when it began
+  collision::Decision atStop;  ///< with `stoppedBy`, where the move ended
+  bool blockedTold = false;    ///< driven against something, which was told when it began
 
   // Caches from tick to tick. They change no verdict, but the last bits of distances and so of the
   // way: they follow from the commands, as all else does, and a copy of a world must copy them.

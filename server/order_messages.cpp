@@ -29,7 +29,7 @@ scene::Link linkFrom(const v1::Link& message) {
   if (message.has_parent()) link.parent = message.parent();
   const v1::Joint& joint = message.joint();
   if (joint.kind() == v1::Joint::KIND_PRISMATIC) {
-    link.joint.kind = scene::Joint::Kind::prismatic;
+    link.joint.kind = scene::LinkJoint::Kind::prismatic;
     link.joint.low = 0;
     link.joint.high = 1;
   }

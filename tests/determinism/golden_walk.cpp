@@ -103,10 +103,10 @@ void arm() {
   Spawn spawn;
   spawn.facing = 7;
   Link upper, lower;
-  upper.joint = {Joint::Kind::revolute, {0, 1.2, 0}, {0, 1, 0.2}, -3, 3};
+  upper.joint = {LinkJoint::Kind::revolute, {0, 1.2, 0}, {0, 1, 0.2}, -3, 3};
   upper.points = {{0.4, -0.05, -0.05}, {1.2, -0.05, 0}, {1.2, 0.05, 0.05}, {0.4, 0.1, 0}};
   lower.parent = 0;
-  lower.joint = {Joint::Kind::revolute, {1.25, 0, 0}, {0, 0, 1}, -2.5, 2.5};
+  lower.joint = {LinkJoint::Kind::revolute, {1.25, 0, 0}, {0, 0, 1}, -2.5, 2.5};
   lower.points = {{0, -0.04, -0.04}, {0.7, 0, 0}, {0, 0.05, 0}, {0, 0, 0.05}};
   spawn.links = {upper, lower};
   order(world, "arm", spawn);

@@ -25,17 +25,17 @@ Spawn armAt(const Vec3& at) {
   spawn.at = at;
   spawn.parts = {boxPoints({-0.2, 0, -0.2}, {0.2, 0.5, 0.2})};
   Link table{-1,
-             {Joint::Kind::revolute, {0, 0.51, 0}, {0, 1, 0}, -3, 3},
+             {LinkJoint::Kind::revolute, {0, 0.51, 0}, {0, 1, 0}, -3, 3},
              boxPoints({-0.15, 0, -0.15}, {0.15, 0.1, 0.15})};
   Link upper{0,
-             {Joint::Kind::revolute, {0, 0.2, 0}, {0, 0, 1}, -0.5, 3.2},
+             {LinkJoint::Kind::revolute, {0, 0.2, 0}, {0, 0, 1}, -0.5, 3.2},
              boxPoints({0, -0.05, -0.05}, {0.8, 0.05, 0.05}),
              1.5};
   Link lower{1,
-             {Joint::Kind::revolute, {0.85, 0, 0}, {0, 0, 1}, -2.8, 2.8},
+             {LinkJoint::Kind::revolute, {0.85, 0, 0}, {0, 0, 1}, -2.8, 2.8},
              boxPoints({0, -0.04, -0.04}, {0.8, 0.04, 0.04})};
   Link hand{2,
-            {Joint::Kind::prismatic, {0.82, 0, 0}, {1, 0, 0}, 0, 0.4},
+            {LinkJoint::Kind::prismatic, {0.82, 0, 0}, {1, 0, 0}, 0, 0.4},
             boxPoints({0, -0.1, -0.1}, {0.05, 0.1, 0.1})};
   spawn.links = {table, upper, lower, hand};
   return spawn;
