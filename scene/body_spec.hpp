@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "collision/types.hpp"
@@ -80,6 +81,9 @@ struct BodySpec {
 constexpr bool isKinematic(BodyKind kind) {
   return kind != BodyKind::rigid && kind != BodyKind::trigger;
 }
+
+/// Of the coordinate of a kinematic body: low, high.
+std::pair<double, double> limitsOf(const BodySpec& spec);
 
 const char* wordOf(BodyKind kind);
 const char* wordOf(BodySource source);

@@ -64,7 +64,7 @@ void addBodies(Hasher& hash, const std::vector<BodySpec>& bodies) {
     hash.add(body.anchor);
     hash.add(body.axis);
     for (const double number :
-         {body.low, body.high, body.speed, body.acceleration, body.closesAfter.value_or(-1),
+         {body.low, body.high, body.closed, body.speed, body.acceleration, body.closesAfter.value_or(-1),
           body.density, body.mass.value_or(-1), body.friction, body.restitution})
       hash.add(number);
     for (const double stop : body.stops) hash.add(stop);

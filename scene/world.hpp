@@ -25,7 +25,7 @@ namespace enfilade::scene {
 struct BodyCommand {
   enum class Action : std::uint8_t {
     open,   ///< doors: to the limit that is farther from the closed place
-    close,  ///< doors: to coordinate 0
+    close,  ///< doors: to BodySpec::closed
     stop,   ///< where it is
     to,     ///< to coordinate `to` (radians or metres); not for paths
     level,  ///< lifts: to stop number `level`, counted from 0

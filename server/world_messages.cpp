@@ -1,5 +1,7 @@
 #include "server/world_messages.hpp"
 
+#include "server/body_messages.hpp"
+
 #include <cmath>
 #include <filesystem>
 
@@ -213,6 +215,8 @@ v1::Scene messageOf(const scene::Scene& scene) {
   message.set_metres_per_unit(model.metresPerUnit);
   message.set_up(std::string(1, model.up));
   *message.mutable_offset() = messageOf(model.offset);
+  for (std::size_t i = 0; i < model.bodies.size(); ++i)
+    *message.add_bodies() = bodyMessageOf(scene, i);
   return message;
 }
 
@@ -230,6 +234,7 @@ v1::Policies messageOf(const scene::Lengths& lengths) {
   message.set_jump_limit(lengths.jumpLimit);
   message.set_joint_speed_limit(lengths.jointSpeedLimit);
   message.set_push_force(lengths.pushForce);
+  message.set_bodies("push");
   return message;
 }
 
