@@ -59,6 +59,7 @@ struct BodySpec {
 
   // hinged, sliding, lift: low <= 0 <= high.
   double low = 0, high = 0;           ///< of the coordinate
+  double closed = 0;                  ///< doors: coordinate; open: the limit farther from it
   std::vector<double> stops;          ///< lift: coordinates, ascending
   double speed = 1;                   ///< of the coordinate per second, > 0
   double acceleration = 0;            ///< of the coordinate; 0: it has its speed at once
