@@ -11,7 +11,7 @@
 
 namespace enfilade::scene {
 
-/// "file: bodies[2].axis: what is wrong; remedy".
+/// "file.bodies[2].axis: what is wrong; remedy".
 struct SidecarError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
