@@ -129,6 +129,25 @@ scene::Vec3 vectorFrom(const v1::Vec3& message) {
   return {message.x(), message.y(), message.z()};
 }
 
+namespace {
+
+v1::ContactEvent::Phase phaseOf(scene::ContactEvent::Phase phase) {
+  using Phase = scene::ContactEvent::Phase;
+  switch (phase) {
+    case Phase::begin:
+      return v1::ContactEvent::PHASE_BEGIN;
+    case Phase::min:
+      return v1::ContactEvent::PHASE_MIN;
+    case Phase::end:
+      return v1::ContactEvent::PHASE_END;
+    case Phase::none:
+      break;
+  }
+  return v1::ContactEvent::PHASE_UNSPECIFIED;
+}
+
+}  // namespace
+
 v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent& event) {
   const collision::Decision& decision = event.decision;
   v1::ContactEvent message;
@@ -138,6 +157,7 @@ v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent&
   if (event.kind == scene::ContactEvent::Kind::end ||
       event.kind == scene::ContactEvent::Kind::leave)
     message.set_reason(reasonOf(event.reason));
+  message.set_phase(phaseOf(event.phase));
   message.set_a(event.a);
   message.set_b(event.b);
   message.set_a_name(scene::nameOf(world, event.a));
