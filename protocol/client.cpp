@@ -333,6 +333,16 @@ void expectBody(const v1::ServerMessage& reply, v1::ServerMessage::BodyCase want
 std::optional<v1::Error> Client::command(const v1::Command& command) {
   v1::ClientMessage message;
   *message.mutable_command() = command;
+  return tell(std::move(message));
+}
+
+std::optional<v1::Error> Client::bodyCommand(const v1::BodyCommand& command) {
+  v1::ClientMessage message;
+  *message.mutable_body_command() = command;
+  return tell(std::move(message));
+}
+
+std::optional<v1::Error> Client::tell(v1::ClientMessage message) {
   v1::ServerMessage reply;
   try {
     reply = request(std::move(message));

@@ -62,6 +62,7 @@ class Client {
 
   /// Why the world does not take it; nullopt when it does.
   std::optional<v1::Error> command(const v1::Command& command);
+  std::optional<v1::Error> bodyCommand(const v1::BodyCommand& command);
   v1::StepReply step(std::uint32_t ticks = 1, bool withAvatars = false);
   v1::SetClockReply setClock(const v1::SetClock& clock);
   v1::SubscribeReply subscribe(const v1::Subscribe& subscription);
@@ -82,6 +83,8 @@ class Client {
                             std::vector<std::uint8_t>* attachment = nullptr);
 
  private:
+  /// Sends a command; why it was not taken.
+  std::optional<v1::Error> tell(v1::ClientMessage message);
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -26,7 +26,7 @@ struct GlobalWait {
 
 struct ScriptLine {
   std::uint32_t number = 0;  ///< from 1; also the command's tag
-  std::variant<v1::Command, GlobalWait> what;
+  std::variant<v1::Command, v1::BodyCommand, GlobalWait> what;
 };
 
 struct Script {
@@ -75,6 +75,7 @@ class ScriptDriver {
   virtual double tickSeconds() const = 0;
   /// Hands a command to the next tick. Why the world does not take it; nullopt when it does.
   virtual std::optional<v1::Error> submit(const v1::Command& command) = 0;
+  virtual std::optional<v1::Error> submit(const v1::BodyCommand& command) = 0;
   virtual StepOutcome step() = 0;  ///< makes one tick
 };
 

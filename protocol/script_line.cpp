@@ -23,6 +23,8 @@ using nlohmann::json;
 constexpr std::size_t kLongestName = 64;
 constexpr double kLongestWait = 1e6;         // seconds; eleven days are a slip of the pen
 constexpr double kLongestWaitOfOne = 86400;  // seconds
+constexpr std::size_t kLongestBodyName = 1000;
+constexpr double kRadiansPerDegree = 0.017453292519943295;  // as the sidecar's reader has it
 constexpr std::size_t kLongestQuote = 40;
 // What a world takes at most (scene/order_refusals.cpp); its own limits may be lower.
 constexpr double kFarthest = 1e7;  // metres
@@ -295,7 +297,8 @@ const std::vector<Verb>& verbs() {
       {"fly", {"on"}},
       {"crouch", {"height"}},
       {"stand", {}},
-      {"joints", {"to", "speed"}}};
+      {"joints", {"to", "speed"}},
+      {"body", {"do", "to", "turn", "level", "speed", "turn_speed"}}};
   return all;
 }
 
@@ -349,6 +352,55 @@ void readOrder(const json& line, const std::string& verb, v1::Command& command) 
   if (verb == "joints") readJoints(line, command.mutable_drive_joints());
 }
 
+/// Bodies may be named as the file's nodes are.
+std::string bodyName(const json& value) {
+  if (!value.is_string()) refuse("body", "must be a body's name in quotes, not " + excerpt(value));
+  const std::string text = value.get<std::string>();
+  if (text.empty() || text.size() > kLongestBodyName)
+    refuse("body", "must have 1 to " + std::to_string(kLongestBodyName) + " letters");
+  return text;
+}
+
+void readAction(const json& value, v1::BodyCommand& command) {
+  if (value == "open") {
+    command.mutable_open();
+  } else if (value == "close") {
+    command.mutable_close();
+  } else if (value == "stop") {
+    command.mutable_stop();
+  } else if (value == "run") {
+    command.mutable_run();
+  } else {
+    refuse("do", R"(must be "open", "close", "stop" or "run", not )" + excerpt(value));
+  }
+}
+
+v1::BodyCommand readBodyCommand(const json& line) {
+  v1::BodyCommand command;
+  command.set_body(bodyName(line["body"]));
+  int said = 0;
+  for (const char* key : {"do", "to", "turn", "level"}) said += line.contains(key) ? 1 : 0;
+  if (said != 1) refuse("body", R"(needs one of "do", "to", "turn" and "level")");
+  if (line.contains("to")) {
+    command.set_to(number(line["to"], "to", "a number of metres, or of seconds of a path"));
+  } else if (line.contains("turn")) {
+    command.set_to(kRadiansPerDegree * number(line["turn"], "turn", "a number of degrees"));
+  } else if (line.contains("level")) {
+    const json& level = line["level"];
+    if (!level.is_number_integer() || level < 0 || level > 10000)
+      refuse("level", "must be a whole number from 0 to 10000, not " + excerpt(level));
+    command.set_level(level.get<std::uint32_t>());
+  } else {
+    readAction(line["do"], command);
+  }
+  if (line.contains("speed"))
+    command.set_speed(number(line["speed"], "speed", "a number of metres per second"));
+  if (line.contains("turn_speed"))
+    command.set_speed(kRadiansPerDegree *
+                      number(line["turn_speed"], "turn_speed", "a number of degrees per second"));
+  return command;
+}
+
 // ---- lines -------------------------------------------------------------------------------------
 
 /// The object of a line. nlohmann keeps the last of two equal keys; we refuse them.
@@ -390,13 +442,15 @@ void checkUtf8(std::string_view text) {
   }
 }
 
-std::variant<v1::Command, GlobalWait> parseLine(std::string_view text, std::uint32_t number) {
+std::variant<v1::Command, v1::BodyCommand, GlobalWait> parseLine(std::string_view text,
+                                                                 std::uint32_t number) {
   const json line = parseObject(text);
   const Verb& verb = verbOf(line);
   refuseUnknownKeys(line, verb);
   if (verb.name == std::string_view("wait") && !line.contains("for")) {
     return GlobalWait{readWaitSeconds(line)};
   }
+  if (verb.name == std::string_view("body")) return readBodyCommand(line);
   v1::Command command;
   command.set_tag(number);
   readOrder(line, verb.name, command);

@@ -17,6 +17,7 @@ struct LineProblem {
 void checkUtf8(std::string_view text);
 
 /// Throws LineProblem. `number` of the line is the command's tag.
-std::variant<v1::Command, GlobalWait> parseLine(std::string_view text, std::uint32_t number);
+std::variant<v1::Command, v1::BodyCommand, GlobalWait> parseLine(std::string_view text,
+                                                                 std::uint32_t number);
 
 }  // namespace enfilade::protocol

@@ -39,6 +39,8 @@ class Run {
         const std::uint64_t ticks = ticksFor(wait->seconds, driver_.tickSeconds());
         for (std::uint64_t i = 0; i < ticks; ++i) step();
         lineDone(line.number);
+      } else if (const auto* order = std::get_if<v1::BodyCommand>(&line.what)) {
+        submit(line.number, *order);
       } else {
         submit(line.number, std::get<v1::Command>(line.what));
       }
@@ -91,6 +93,17 @@ class Run {
     open_.emplace(line, command.avatar());
     if (command.has_spawn()) spawns_.insert(line);
     idle_ = false;
+  }
+
+  /// Nothing is heard of it later: the line has ended when it is taken.
+  void submit(std::uint32_t line, const v1::BodyCommand& command) {
+    if (const auto error = driver_.submit(command)) {
+      ++result_.refused;
+      tell(LineOutcome::Kind::refused, line, command.body(), "refused: " + error->message());
+    } else {
+      idle_ = false;
+    }
+    lineDone(line);
   }
 
   void stepUntilIdle(std::uint32_t line) {

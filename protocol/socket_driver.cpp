@@ -27,10 +27,17 @@ std::optional<v1::Error> SocketDriver::submit(const v1::Command& command) {
   return error;
 }
 
-/// Other clients' avatars are in the same world; their doings are not this script's.
+std::optional<v1::Error> SocketDriver::submit(const v1::BodyCommand& command) {
+  return client_.bodyCommand(command);
+}
+
+/// Other clients' avatars are in the same world; their doings are not this script's. What bodies do
+/// to one another is everybody's.
 bool SocketDriver::concerns(const v1::ContactEvent& contact) const {
-  const bool bIsObject = contact.b() <= client_.welcome().scene().objects();
-  return avatars_.contains(contact.a_name()) || (!bIsObject && avatars_.contains(contact.b_name()));
+  const auto isAvatar = [&](std::uint32_t id) { return id > client_.welcome().scene().objects(); };
+  const bool a = isAvatar(contact.a()), b = isAvatar(contact.b());
+  if (!a && !b) return true;
+  return (a && avatars_.contains(contact.a_name())) || (b && avatars_.contains(contact.b_name()));
 }
 
 StepOutcome SocketDriver::step() {

@@ -24,6 +24,7 @@ class SocketDriver : public ScriptDriver {
 
   double tickSeconds() const override;
   std::optional<v1::Error> submit(const v1::Command& command) override;
+  std::optional<v1::Error> submit(const v1::BodyCommand& command) override;
   StepOutcome step() override;
 
  private:

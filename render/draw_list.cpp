@@ -41,16 +41,28 @@ scene::Box placedBox(const Eigen::Affine3d& worldFromMesh, const scene::Box& box
   return {centre - half, centre + half};
 }
 
+/// A part at the place where it is drawn.
+struct PlacedPart {
+  const Part* part;
+  scene::Box box;  ///< world
+};
+
+PlacedPart placedPart(const Part& part, const std::vector<BodyPlacement>& bodies) {
+  if (part.body == kStill || !bodies[part.body].displaced) return {&part, part.box};
+  return {&part, placedBox(bodies[part.body].sceneFromAuthored, part.box)};
+}
+
 /// Parts of glass that may be seen, farthest first; equal distances keep their order.
-std::vector<const Part*> backToFront(std::vector<const Part*> glass, const Camera& camera) {
+std::vector<PlacedPart> backToFront(std::vector<PlacedPart> glass, const Camera& camera) {
   const bool perspective = camera.projection == Camera::Projection::perspective;
   const Vec3 forward = viewOf(camera).forward;
-  const auto distance = [&](const Part* part) {
-    const Vec3 toPart = part->box.centre() - camera.eye;
+  const auto distance = [&](const PlacedPart& part) {
+    const Vec3 toPart = part.box.centre() - camera.eye;
     return perspective ? toPart.squaredNorm() : forward.dot(toPart);
   };
-  std::stable_sort(glass.begin(), glass.end(),
-                   [&](const Part* a, const Part* b) { return distance(a) > distance(b); });
+  std::stable_sort(glass.begin(), glass.end(), [&](const PlacedPart& a, const PlacedPart& b) {
+    return distance(a) > distance(b);
+  });
   return glass;
 }
 
@@ -73,7 +85,29 @@ void append(DrawList& list, const Part& part, const MeshRange& range) {
   ++batch.commandCount;
 }
 
+/// Of each object, the body that it belongs to, or kStill.
+std::vector<std::uint32_t> bodiesOfObjects(const scene::Model& model) {
+  std::vector<std::uint32_t> bodies(model.objects.size(), kStill);
+  for (std::uint32_t b = 0; b < model.bodies.size(); ++b)
+    for (const std::uint32_t object : model.bodies[b].objects) bodies[object] = b;
+  return bodies;
+}
+
 }  // namespace
+
+std::vector<BodyPlacement> placementsOf(const scene::Scene& scene,
+                                        const scene::Snapshot& snapshot) {
+  std::vector<BodyPlacement> placements(scene.model().bodies.size());
+  if (!snapshot.bodies) return placements;
+  for (const scene::BodyView& view : *snapshot.bodies) {
+    if (!view.displaced) continue;
+    BodyPlacement& placement = placements[view.index];
+    placement.displaced = true;
+    placement.sceneFromAuthored = Eigen::Translation3d(view.pose.translation) * view.pose.rotation *
+                                  Eigen::Translation3d(-scene.shapeOfBody(view.index)->origin);
+  }
+  return placements;
+}
 
 MaterialData materialData(const scene::Model& model, const scene::Mesh& mesh) {
   return materialData(materialOf(model, mesh.material));
@@ -95,15 +129,18 @@ std::vector<Part> partsOf(const scene::Model& model) {
   meshBoxes.reserve(model.meshes.size());
   for (const scene::Mesh& mesh : model.meshes) meshBoxes.push_back(boxOf(mesh));
 
+  const std::vector<std::uint32_t> bodyOf = bodiesOfObjects(model);
   std::vector<Part> parts;
   for (std::uint32_t o = 0; o < model.objects.size(); ++o) {
     const scene::Object& object = model.objects[o];
+    const std::uint32_t body = bodyOf[o];
+    if (body != kStill && model.bodies[body].kind == scene::BodyKind::trigger) continue;
     for (const std::uint32_t m : object.meshes) {
       if (model.meshes[m].indices.empty()) continue;
       const std::uint32_t materialIndex = model.meshes[m].material;
       const scene::Material& material = materialOf(model, materialIndex);
       parts.push_back({placedBox(object.worldFromMesh, meshBoxes[m]), o, m,
-                       textureOf(model, material), passOf(material)});
+                       textureOf(model, material), passOf(material), body});
     }
   }
   const auto key = [](const Part& part) {
@@ -132,26 +169,31 @@ Instance placed(const Eigen::Affine3d& worldFromMesh, const Vec3& meshCentre, co
   return instance;
 }
 
-void appendVisible(DrawList& list, const scene::Model& model, const std::vector<Part>& parts,
-                   const std::vector<MeshRange>& ranges, const std::vector<MaterialData>& materials,
-                   const Camera& camera, scene::EntityId hidden) {
+void appendVisible(DrawList& list, const Drawable& drawable,
+                   const std::vector<BodyPlacement>& bodies, const Camera& camera,
+                   scene::EntityId hidden) {
   const auto frustum = frustumOf(camera);
   const auto draw = [&](const Part& part) {
-    const MeshRange& range = ranges[part.mesh];
-    list.instances.push_back(placed(model.objects[part.object].worldFromMesh, range.centre,
-                                    camera.eye, materials[part.mesh], part.object + 1));
+    const MeshRange& range = drawable.ranges[part.mesh];
+    Eigen::Affine3d worldFromMesh = drawable.model.objects[part.object].worldFromMesh;
+    if (part.body != kStill && bodies[part.body].displaced)
+      worldFromMesh = bodies[part.body].sceneFromAuthored * worldFromMesh;
+    list.instances.push_back(placed(worldFromMesh, range.centre, camera.eye,
+                                    drawable.materials[part.mesh], part.object + 1));
     append(list, part, range);
   };
-  std::vector<const Part*> glass;
-  for (const Part& part : parts) {
-    if (part.object + 1 == hidden || !mayBeSeen(frustum, part.box)) continue;
+  std::vector<PlacedPart> glass;
+  for (const Part& part : drawable.parts) {
+    if (part.object + 1 == hidden) continue;
+    const PlacedPart placed = placedPart(part, bodies);
+    if (!mayBeSeen(frustum, placed.box)) continue;
     if (part.pass == Pass::blend) {
-      glass.push_back(&part);
+      glass.push_back(placed);
     } else {
       draw(part);
     }
   }
-  for (const Part* part : backToFront(std::move(glass), camera)) draw(*part);
+  for (const PlacedPart& placed : backToFront(std::move(glass), camera)) draw(*placed.part);
 }
 
 }  // namespace enfilade::render

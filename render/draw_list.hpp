@@ -6,6 +6,7 @@
 
 #include "render/view.hpp"
 #include "scene/scene.hpp"
+#include "scene/snapshot.hpp"
 
 namespace enfilade::render {
 
@@ -25,12 +26,22 @@ struct MaterialData {
   float surface[4];   ///< alpha cutoff, metallic, roughness, 1 when double-sided
 };
 
+/// Of Part::body: of no body.
+inline constexpr std::uint32_t kStill = 0xFFFF'FFFFu;
+
 /// One mesh of one object.
 struct Part {
-  scene::Box box;  ///< world
+  scene::Box box;  ///< world, as authored
   std::uint32_t object = 0, mesh = 0;
   std::int32_t texture = -1;
   Pass pass = Pass::opaque;
+  std::uint32_t body = kStill;  ///< index into Model::bodies
+};
+
+/// Where a body is drawn: sceneFromAuthored takes a point of the model to where the body has it.
+struct BodyPlacement {
+  bool displaced = false;  ///< else it is drawn as the model has it
+  Eigen::Affine3d sceneFromAuthored = Eigen::Affine3d::Identity();
 };
 
 /// What the vertex shader gets for each instance (see Attribute).
@@ -64,15 +75,27 @@ MaterialData materialData(const scene::Material& material);
 /// Of the mesh's material; a plain one when it names none.
 MaterialData materialData(const scene::Model& model, const scene::Mesh& mesh);
 
-/// All parts of the model, in the order in which they are drawn: by pass, texture, object. The
-/// order never depends on the camera, so that ties of depth fall the same way in every picture.
+/// Of all bodies of the scene.
+std::vector<BodyPlacement> placementsOf(const scene::Scene& scene, const scene::Snapshot& snapshot);
+
+/// All parts of the model but those of triggers, in the order in which they are drawn: by pass,
+/// texture, object. The order never depends on the camera, so that ties of depth fall the same way
+/// in every picture.
 std::vector<Part> partsOf(const scene::Model& model);
 
-/// Appends what `camera` may see of `parts`, glass from back to front. `hidden` is left out.
-/// `ranges` and `materials` have one entry a mesh.
-void appendVisible(DrawList& list, const scene::Model& model, const std::vector<Part>& parts,
-                   const std::vector<MeshRange>& ranges, const std::vector<MaterialData>& materials,
-                   const Camera& camera, scene::EntityId hidden);
+/// What a scene is drawn from; `ranges` and `materials` have one entry a mesh.
+struct Drawable {
+  const scene::Model& model;
+  const std::vector<Part>& parts;
+  const std::vector<MeshRange>& ranges;
+  const std::vector<MaterialData>& materials;
+};
+
+/// Appends what `camera` may see, glass from back to front. `hidden` is left out. `bodies`: one
+/// entry a body of the model.
+void appendVisible(DrawList& list, const Drawable& drawable,
+                   const std::vector<BodyPlacement>& bodies, const Camera& camera,
+                   scene::EntityId hidden);
 
 /// One instance; `worldFromMesh` is of the mesh as given, not of its centre.
 Instance placed(const Eigen::Affine3d& worldFromMesh, const Vec3& meshCentre, const Vec3& eye,

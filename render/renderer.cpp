@@ -1,6 +1,6 @@
-// A picture, step by step: the still parts that the camera may see, then the avatars (both write
-// colour, id and depth), then the sky where nothing was drawn, then glass over it all (colour
-// only).
+// A picture, step by step: the parts of the model that the camera may see, bodies where they are,
+// then the avatars (both write colour, id and depth), then the sky where nothing was drawn, then
+// glass over it all (colour only).
 #include "render/renderer.hpp"
 
 #include <epoxy/gl.h>
@@ -240,8 +240,8 @@ Frame Renderer::render(const scene::Snapshot& snapshot, const Camera& camera,
   State& s = *state_;
   s.context.makeCurrent();
   DrawList list;
-  appendVisible(list, s.scene->model(), s.parts, s.buffers.ranges, s.buffers.materials, camera,
-                hidden);
+  appendVisible(list, {s.scene->model(), s.parts, s.buffers.ranges, s.buffers.materials},
+                placementsOf(*s.scene, snapshot), camera, hidden);
   s.setUp(camera);
   s.drawBatches(list, s.buffers.vertices, s.buffers.indices, false);
   s.drawAvatars(avatarMeshes(snapshot, hidden), camera);

@@ -24,7 +24,10 @@ struct Contact {
   EntityId other = 0;
   bool touching = false;  ///< closer than 2 epsilon; else a near miss that was told
   collision::Decision decision;
-  double penetration = 0;  ///< metres; the depth, or an upper bound of it
+  double penetration = 0;       ///< metres; the depth, or an upper bound of it
+  bool nearTold = false;        ///< a near miss is under way
+  collision::Decision closest;  ///< of the near miss so far
+  std::uint64_t closestTick = 0;
 };
 
 /// What a kinematic body is about. All of it is part of the state.
@@ -70,8 +73,7 @@ struct Body {
   collision::MoverId mover = 0;
   Box reach;  ///< what it can meet in this tick
 
-  std::vector<Contact> contacts;  ///< ascending `other`; rigid bodies
-  std::vector<EntityId> inside;   ///< triggers: who is in it, ascending
+  std::vector<EntityId> inside;  ///< triggers: who is in it, ascending
 };
 
 /// Puts a body somewhere: pose and boxes.

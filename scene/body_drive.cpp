@@ -34,15 +34,9 @@ BodyPlace placeOf(const BodySpec& spec, double coordinate) {
   }
 }
 
-/// The limits of the coordinate.
-std::pair<double, double> limitsOf(const BodySpec& spec) {
-  if (spec.kind == BodyKind::path) return {0, spec.keys.back().time};
-  return {spec.low, spec.high};
-}
-
 double openEnd(const BodySpec& spec) {
   const auto [low, high] = limitsOf(spec);
-  return high >= -low ? high : low;
+  return high - spec.closed >= spec.closed - low ? high : low;
 }
 
 void goTo(Body& body, double target, double speed) {
@@ -60,7 +54,7 @@ void follow(Body& body, const BodyCommand& command) {
     case BodyCommand::Action::run:
       return goTo(body, openEnd(*body.spec), speed);
     case BodyCommand::Action::close:
-      return goTo(body, 0, speed);
+      return goTo(body, body.spec->closed, speed);
     case BodyCommand::Action::to:
       return goTo(body, command.to, speed);
     case BodyCommand::Action::level:
@@ -80,9 +74,8 @@ void openFor(Body& body, const Contact& contact) {
   const Vec3 arm = contact.decision.pointB - body.position;
   const double way = spec.kind == BodyKind::hinged ? spec.axis.dot(arm.cross(push)) : 0;
   double target = openEnd(spec);
-  if (way > 0 && spec.high > 0) target = spec.high;
-  if (way < 0 && spec.low < 0) target = spec.low;
-  goTo(body, target, spec.speed);
+  if (way != 0) target = way > 0 ? spec.high : spec.low;
+  goTo(body, target == spec.closed ? openEnd(spec) : target, spec.speed);
 }
 
 void openForWalkers(WorldState& world) {
@@ -98,11 +91,11 @@ void openForWalkers(WorldState& world) {
 /// A closer waits while the door stands open, and then closes it.
 void runCloser(Body& body, double tick) {
   BodyDrive& drive = body.drive;
-  if (!body.spec->closesAfter || drive.going || drive.coordinate == 0) return;
+  if (!body.spec->closesAfter || drive.going || drive.coordinate == body.spec->closed) return;
   if (drive.closesIn < 0) drive.closesIn = *body.spec->closesAfter;
   drive.closesIn -= tick;
   if (drive.closesIn <= kTimeRounding) {
-    goTo(body, 0, body.spec->speed);
+    goTo(body, body.spec->closed, body.spec->speed);
   }
 }
 

@@ -34,6 +34,7 @@ Refusal refusalOfLimits(const BodySpec& body) {
   if (auto why = outside("low", body.low, -kFarthest, 0)) return why;
   if (auto why = outside("high", body.high, 0, kFarthest)) return why;
   if (!(body.low < body.high)) return "low and high are both 0: it could not move";
+  if (auto why = outside("closed", body.closed, body.low, body.high)) return why;
   double last = body.low;
   for (const double stop : body.stops) {
     if (auto why = outside("stops", stop, last, body.high)) return *why + ", ascending";
@@ -94,6 +95,11 @@ Refusal refusalOfObjects(const BodySpec& body, const Model& model, std::vector<b
 }
 
 }  // namespace
+
+std::pair<double, double> limitsOf(const BodySpec& spec) {
+  if (spec.kind == BodyKind::path) return {0, spec.keys.back().time};
+  return {spec.low, spec.high};
+}
 
 const char* wordOf(BodyKind kind) {
   switch (kind) {

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "collision/types.hpp"
@@ -58,6 +59,7 @@ struct BodySpec {
 
   // hinged, sliding, lift: low <= 0 <= high.
   double low = 0, high = 0;           ///< of the coordinate
+  double closed = 0;                  ///< doors: coordinate; open: the limit farther from it
   std::vector<double> stops;          ///< lift: coordinates, ascending
   double speed = 1;                   ///< of the coordinate per second, > 0
   double acceleration = 0;            ///< of the coordinate; 0: it has its speed at once
@@ -80,6 +82,9 @@ struct BodySpec {
 constexpr bool isKinematic(BodyKind kind) {
   return kind != BodyKind::rigid && kind != BodyKind::trigger;
 }
+
+/// Of the coordinate of a kinematic body: low, high.
+std::pair<double, double> limitsOf(const BodySpec& spec);
 
 const char* wordOf(BodyKind kind);
 const char* wordOf(BodySource source);

@@ -13,18 +13,6 @@ namespace {
 using collision::Decision;
 using collision::Verdict;
 
-ContactEvent eventOf(const WorldState& world, ContactEvent::Kind kind, const Avatar& avatar,
-                     const Contact& contact) {
-  ContactEvent event;
-  event.tick = world.tick;
-  event.time = static_cast<double>(world.tick) * world.lengths.tick;
-  event.kind = kind;
-  event.a = avatar.id;
-  event.b = contact.other;
-  event.decision = contact.decision;
-  return event;
-}
-
 /// Penetrating before touching before separated, then by distance.
 bool nearer(const Decision& a, const Decision& b) {
   return a.verdict != b.verdict ? a.verdict > b.verdict : a.distance < b.distance;
@@ -58,7 +46,9 @@ void addNear(const Avatar& avatar, std::size_t i, Obstacle& obstacle, double lim
   const auto decision = decideCounted(body, obstacle, within, cache, count);
   if (!decision || !collision::isNearerThan(*decision, body, obstacle.body, limit, cache)) return;
   if (!known) {
-    found.push_back({obstacle.entity, false, *decision});
+    found.emplace_back();
+    found.back().other = obstacle.entity;
+    found.back().decision = *decision;
   } else if (nearer(*decision, found.back().decision)) {
     found.back().decision = *decision;
   }
@@ -99,28 +89,19 @@ const Contact* find(const std::vector<Contact>& contacts, EntityId other) {
   return at != contacts.end() && at->other == other ? &*at : nullptr;
 }
 
-void tellBegins(const WorldState& world, const Avatar& avatar, const std::vector<Contact>& now,
+void tellBegins(const WorldState& world, const Avatar& avatar, std::vector<Contact>& now,
                 std::vector<ContactEvent>& events) {
-  for (const Contact& contact : now) {
-    const Contact* before = find(avatar.contacts, contact.other);
-    if (contact.touching && !(before && before->touching)) {
-      events.push_back(eventOf(world, ContactEvent::Kind::begin, avatar, contact));
-    } else if (!contact.touching && !before) {
-      events.push_back(eventOf(world, ContactEvent::Kind::near, avatar, contact));
-    }
-  }
+  for (Contact& contact : now)
+    tellBegin(world, avatar.id, find(avatar.contacts, contact.other), contact, events);
 }
 
 void tellEnds(const WorldState& world, Avatar& avatar, const std::vector<Contact>& now,
               std::vector<ContactEvent>& events, QueryCount& count) {
-  for (const Contact& before : avatar.contacts) {
-    const Contact* contact = find(now, before.other);
-    if (!before.touching || (contact && contact->touching)) continue;
-    Contact parted = contact ? *contact : before;
-    if (!contact)
-      parted.decision = decisionWith(avatar, before.other, count).value_or(before.decision);
-    events.push_back(eventOf(world, ContactEvent::Kind::end, avatar, parted));
-  }
+  for (const Contact& before : avatar.contacts)
+    tellEnd(
+        world, avatar.id, before, find(now, before.other),
+        [&] { return decisionWith(avatar, before.other, count).value_or(before.decision); },
+        events);
 }
 
 void updateContacts(WorldState& world, Avatar& avatar, TickReport& report, QueryCount& count) {
@@ -138,7 +119,67 @@ void updateContacts(WorldState& world, Avatar& avatar, TickReport& report, Query
   avatar.contacts = std::move(now);
 }
 
+Contact stopped(EntityId by, const Decision& decision) {
+  Contact contact;
+  contact.other = by;
+  contact.decision = decision;
+  return contact;
+}
+
+ContactEvent nearEvent(const WorldState& world, EntityId a, const Contact& contact,
+                       ContactEvent::Phase phase) {
+  ContactEvent event = eventOf(world, ContactEvent::Kind::near, a, contact);
+  event.phase = phase;
+  if (phase == ContactEvent::Phase::min) {
+    event.tick = contact.closestTick;
+    event.time = static_cast<double>(contact.closestTick) * world.lengths.tick;
+    event.decision = contact.closest;
+  }
+  return event;
+}
+
 }  // namespace
+
+ContactEvent eventOf(const WorldState& world, ContactEvent::Kind kind, EntityId a,
+                     const Contact& contact) {
+  ContactEvent event;
+  event.tick = world.tick;
+  event.time = static_cast<double>(world.tick) * world.lengths.tick;
+  event.kind = kind;
+  event.a = a;
+  event.b = contact.other;
+  event.decision = contact.decision;
+  return event;
+}
+
+void tellBegin(const WorldState& world, EntityId a, const Contact* before, Contact& now,
+               std::vector<ContactEvent>& events) {
+  if (now.touching) {
+    if (!before || !before->touching)
+      events.push_back(eventOf(world, ContactEvent::Kind::begin, a, now));
+    return;
+  }
+  if (before && !before->nearTold) return;  // they parted from a contact
+  now.nearTold = true;
+  if (before) now.closest = before->closest, now.closestTick = before->closestTick;
+  if (!before || now.decision.distance < now.closest.distance)
+    now.closest = now.decision, now.closestTick = world.tick;
+  if (!before) events.push_back(nearEvent(world, a, now, ContactEvent::Phase::begin));
+}
+
+void tellEnd(const WorldState& world, EntityId a, const Contact& before, const Contact* now,
+             const std::function<collision::Decision()>& parted,
+             std::vector<ContactEvent>& events) {
+  const bool contactEnds = before.touching && !(now && now->touching);
+  const bool nearEnds = before.nearTold && !(now && now->nearTold);
+  if (!contactEnds && !nearEnds) return;
+  Contact last = before;
+  last.decision = now ? now->decision : parted();
+  if (contactEnds) events.push_back(eventOf(world, ContactEvent::Kind::end, a, last));
+  if (!nearEnds) return;
+  if (!now) events.push_back(nearEvent(world, a, last, ContactEvent::Phase::min));
+  events.push_back(nearEvent(world, a, last, ContactEvent::Phase::end));
+}
 
 void findContacts(WorldState& world, TickReport& report, QueryCount& count) {
   for (auto& [name, avatar] : world.avatars) {
@@ -153,15 +194,15 @@ void findContacts(WorldState& world, TickReport& report, QueryCount& count) {
 void tellBlocked(const WorldState& world, Avatar& avatar, TickReport& report, QueryCount& count) {
   if (avatar.stoppedBy == 0) return;
   if (const auto decision = decisionWith(avatar, avatar.stoppedBy, count))
-    report.contacts.push_back(
-        eventOf(world, ContactEvent::Kind::blocked, avatar, {avatar.stoppedBy, false, *decision}));
+    report.contacts.push_back(eventOf(world, ContactEvent::Kind::blocked, avatar.id,
+                                      stopped(avatar.stoppedBy, *decision)));
 }
 
 void endContactsOf(WorldState& world, Avatar& avatar, ContactEvent::Reason reason,
                    std::vector<ContactEvent>& events) {
   const auto tell = [&](const Avatar& a, const Contact& contact) {
     if (!contact.touching) return;
-    events.push_back(eventOf(world, ContactEvent::Kind::end, a, contact));
+    events.push_back(eventOf(world, ContactEvent::Kind::end, a.id, contact));
     events.back().reason = reason;
   };
   for (const Contact& contact : avatar.contacts) tell(avatar, contact);

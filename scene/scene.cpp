@@ -63,9 +63,9 @@ void addBodies(Hasher& hash, const std::vector<BodySpec>& bodies) {
     for (const std::uint32_t object : body.objects) hash.add(std::uint64_t{object});
     hash.add(body.anchor);
     hash.add(body.axis);
-    for (const double number :
-         {body.low, body.high, body.speed, body.acceleration, body.closesAfter.value_or(-1),
-          body.density, body.mass.value_or(-1), body.friction, body.restitution})
+    for (const double number : {body.low, body.high, body.closed, body.speed, body.acceleration,
+                                body.closesAfter.value_or(-1), body.density, body.mass.value_or(-1),
+                                body.friction, body.restitution})
       hash.add(number);
     for (const double stop : body.stops) hash.add(stop);
     hash.add(static_cast<std::uint64_t>(body.openedBy));

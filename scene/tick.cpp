@@ -116,6 +116,9 @@ void hashState(WorldState& world) {
     hash.add(std::uint64_t{queue.size()});
   }
   hashBodies(world, hash);
+  if (!world.rigids.seeds.empty())
+    for (const auto& [key, contact] : world.bodyContacts)
+      hash.add((std::uint64_t{key.first} << 32) | std::uint64_t{key.second});
   world.hash = hash.value();
 }
 
@@ -174,6 +177,7 @@ TickReport tick(World& w) {
   moveRigids(world, wish, report, count);
   stopwatch.done(Stage::solver);
   findContacts(world, report, count);
+  findBodyContacts(world, report, count);
   watchTriggers(world, report, count);
   judgeWalks(world, report, count);
   stopwatch.done(Stage::narrow);

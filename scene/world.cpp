@@ -96,6 +96,7 @@ std::vector<ContactEvent> endContacts(World& world, ContactEvent::Reason reason)
   std::vector<ContactEvent> events;
   for (auto& [name, avatar] : world.state().avatars)
     endContactsOf(world.state(), avatar, reason, events);
+  endBodyContacts(world.state(), reason, events);
   for (const Body& trigger : world.state().bodies) {
     const std::vector<EntityId> inside = trigger.inside;  // grows shorter on the way
     for (const EntityId who : inside) leaveTriggers(world.state(), who, reason, events);

@@ -25,7 +25,7 @@ namespace enfilade::scene {
 struct BodyCommand {
   enum class Action : std::uint8_t {
     open,   ///< doors: to the limit that is farther from the closed place
-    close,  ///< doors: to coordinate 0
+    close,  ///< doors: to BodySpec::closed
     stop,   ///< where it is
     to,     ///< to coordinate `to` (radians or metres); not for paths
     level,  ///< lifts: to stop number `level`, counted from 0
@@ -43,16 +43,20 @@ struct BodyCommand {
 struct ContactEvent {
   enum class Kind : std::uint8_t { begin, end, near, blocked, enter, leave, leftWorld };
   enum class Reason : std::uint8_t { parted, left, shutdown };
+  /// Of `near`: it begins, was closest (with tick and decision of then; told when it is over
+  /// without a contact), and is over.
+  enum class Phase : std::uint8_t { none, begin, min, end };
 
   std::uint64_t tick = 0;
   double time = 0;  ///< seconds
   Kind kind = Kind::begin;
   Reason reason = Reason::parted;  ///< for `end` and `leave`
+  Phase phase = Phase::none;
   /// An avatar or a rigid body; for `blocked` the one that was stopped, which may be any body.
   EntityId a = 0;
-  /// What it met. A pair is told once: by the avatar of lesser id, by the avatar before a body, by
-  /// the body of lesser id. For `enter` and `leave` the trigger; for
-  /// `leftWorld`, told of a free body that fell or flew far beyond the scene, nothing.
+  /// What it met. A pair is told once: by the avatar of lesser id, by an avatar before a body, by a
+  /// rigid body before others, by the rigid body of lesser id. For `enter` and `leave` the trigger;
+  /// for `leftWorld`, told of a free body that fell or flew far beyond the scene, nothing.
   EntityId b = 0;
   collision::Decision decision;  ///< points and normal (from a to b) in the scene's frame
 };

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -90,9 +91,10 @@ struct WorldState {
   std::map<std::string, Avatar> avatars;
   std::vector<std::string> avatarNames;  ///< of entity id scene objects + 1 + index, kept for ever
 
-  std::vector<BodyCommand> incomingForBodies;       ///< since the last tick
-  std::vector<Body> bodies;                         ///< as Model::bodies; never grows or shrinks
-  std::map<EntityId, std::uint32_t> bodyOfId;       ///< index into `bodies`
+  std::vector<BodyCommand> incomingForBodies;  ///< since the last tick
+  std::vector<Body> bodies;                    ///< as Model::bodies; never grows or shrinks
+  std::map<EntityId, std::uint32_t> bodyOfId;  ///< index into `bodies`
+  std::map<std::pair<EntityId, EntityId>, Contact> bodyContacts;  ///< as told: a, b
   std::vector<std::uint32_t> kinematics, triggers;  ///< indices into `bodies`, ascending
   std::vector<std::uint32_t> goingBodies;           ///< kinematic, in this tick; ascending
   RigidStage rigids;                                ///< free bodies
@@ -181,6 +183,21 @@ void moveJoints(WorldState& world, Avatar& avatar, QueryCount& count);
 void hashAvatar(const Avatar& avatar, Hasher& hash);
 AvatarView viewOf(const std::string& name, const Avatar& avatar);
 
+/// An event of this tick, told by `a`.
+ContactEvent eventOf(const WorldState& world, ContactEvent::Kind kind, EntityId a,
+                     const Contact& contact);
+/// Tells the contact or near miss of `a` that began; `before`: of last tick, or null
+/// (contacts.cpp).
+void tellBegin(const WorldState& world, EntityId a, const Contact* before, Contact& now,
+               std::vector<ContactEvent>& events);
+/// Tells what ended of `before`; `now`: of this tick, or null. `parted` gives how they stand to one
+/// another when `now` is null.
+void tellEnd(const WorldState& world, EntityId a, const Contact& before, const Contact* now,
+             const std::function<collision::Decision()>& parted, std::vector<ContactEvent>& events);
+/// Contacts of bodies with what is no avatar (body_contacts.cpp).
+void findBodyContacts(WorldState& world, TickReport& report, QueryCount& count);
+void endBodyContacts(WorldState& world, ContactEvent::Reason reason,
+                     std::vector<ContactEvent>& events);
 /// Finds who touches what now and what began and ended (contacts.cpp).
 void findContacts(WorldState& world, TickReport& report, QueryCount& count);
 /// A blocked move is told when its walk ends so: what stopped it last, and how near that is now

@@ -1,5 +1,6 @@
 #include "server/in_process_driver.hpp"
 
+#include "server/body_messages.hpp"
 #include "server/frame_messages.hpp"
 #include "server/world_messages.hpp"
 
@@ -19,6 +20,10 @@ std::optional<v1::Error> InProcessDriver::submit(const v1::Command& command) {
   auto refused = scene::submit(world_, std::get<scene::Command>(std::move(order)));
   if (refused) return refusalOf(command, *refused);
   return std::nullopt;
+}
+
+std::optional<v1::Error> InProcessDriver::submit(const v1::BodyCommand& command) {
+  return server::submit(world_, command);
 }
 
 protocol::StepOutcome InProcessDriver::step() {

@@ -17,6 +17,7 @@ class InProcessDriver : public protocol::ScriptDriver {
 
   double tickSeconds() const override;
   std::optional<v1::Error> submit(const v1::Command& command) override;
+  std::optional<v1::Error> submit(const v1::BodyCommand& command) override;
   protocol::StepOutcome step() override;
 
   /// A picture of the last tick. Throws protocol::ProtocolError, as over a connection.

@@ -4,7 +4,9 @@
 
 #include <chrono>
 
+#include "scene/find_bodies.hpp"
 #include "scene/model_cache.hpp"
+#include "scene/sidecar.hpp"
 #include "server/progress.hpp"
 
 namespace enfilade::server {
@@ -36,6 +38,11 @@ LoadedScene loadSceneTimed(const ModelOptions& options) {
       [&](const std::string& stage, double fraction) { bar.show(fraction, stage); });
   bar.clear();
   for (const std::string& note : model.notes) spdlog::warn("cache: {}", note);
+  const scene::BodyFindings bodies = scene::findBodies(model.model, options.file);
+  if (!model.model.bodies.empty())
+    spdlog::info("{}: {} bodies, {} of them from {}", options.file.filename().string(),
+                 model.model.bodies.size(), bodies.sidecar,
+                 scene::sidecarOf(options.file).filename().string());
   LoadedScene loaded{nullptr, model.fromCache, model.importSeconds, 0};
   loaded.scene = std::make_shared<const scene::Scene>(std::move(model.model));
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "protocol/framing.hpp"
+#include "server/body_messages.hpp"
 #include "server/version.hpp"
 #include "server/world_messages.hpp"
 
@@ -82,10 +83,9 @@ std::optional<v1::Error> submitCommand(const Asked& asked, const v1::Command& co
   return std::nullopt;
 }
 
-void answer(const Asked& asked, const v1::Command& command) {
+void replyCommand(const Asked& asked, std::optional<v1::Error> error) {
   v1::ServerMessage message;
   v1::CommandReply& body = *message.mutable_command();
-  auto error = submitCommand(asked, command);
   body.set_accepted(!error);
   if (error) {
     *body.mutable_error() = std::move(*error);
@@ -93,6 +93,14 @@ void answer(const Asked& asked, const v1::Command& command) {
     body.set_tick(lastTick(asked.served) + 1);
   }
   reply(asked, std::move(message));
+}
+
+void answer(const Asked& asked, const v1::Command& command) {
+  replyCommand(asked, submitCommand(asked, command));
+}
+
+void answer(const Asked& asked, const v1::BodyCommand& command) {
+  replyCommand(asked, submit(asked.served.world, command));
 }
 
 // ---- time --------------------------------------------------------------------------------------
@@ -312,6 +320,8 @@ void answer(const Asked& asked, const PostToTickThread& post) {
   switch (message.body_case()) {
     case v1::ClientMessage::kCommand:
       return answer(asked, message.command());
+    case v1::ClientMessage::kBodyCommand:
+      return answer(asked, message.body_command());
     case v1::ClientMessage::kStep:
       return answer(asked, message.step());
     case v1::ClientMessage::kSetClock:

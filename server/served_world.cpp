@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "protocol/framing.hpp"
+#include "server/body_messages.hpp"
 #include "server/world_messages.hpp"
 
 namespace enfilade::server {
@@ -69,6 +70,8 @@ void sendState(ServedWorld& served, Client& client, const scene::Snapshot& snaps
   for (const scene::AvatarView& avatar : snapshot.avatars) {
     *state.add_avatars() = messageOf(served.world, avatar);
   }
+  for (const scene::BodyView& body : *snapshot.bodies)
+    if (body.displaced || body.moving) *state.add_bodies() = messageOf(served.world, body);
   state.set_dropped(client.droppedStates);
   client.out->pushLatest(encodeShared(message));
 }

@@ -153,6 +153,23 @@ Json walkOf(const v1::Notice& notice) {
 
 }  // namespace
 
+namespace {
+
+const char* wordOf(v1::ContactEvent::Phase phase) {
+  switch (phase) {
+    case v1::ContactEvent::PHASE_BEGIN:
+      return "begin";
+    case v1::ContactEvent::PHASE_MIN:
+      return "min";
+    case v1::ContactEvent::PHASE_END:
+      return "end";
+    default:
+      return "unknown";
+  }
+}
+
+}  // namespace
+
 std::string contactLine(const v1::ContactEvent& event) {
   Json line{{"tick", event.tick()},
             {"time", event.time()},
@@ -167,6 +184,7 @@ std::string contactLine(const v1::ContactEvent& event) {
             {"decided_by", event.decided_by() == v1::DECIDED_BY_FILTER ? "filter" : "rational"}};
   if (event.kind() == v1::ContactEvent::KIND_END || event.kind() == v1::ContactEvent::KIND_LEAVE)
     line["reason"] = wordOf(event.reason());
+  if (event.kind() == v1::ContactEvent::KIND_NEAR) line["phase"] = wordOf(event.phase());
   // Names come from files: what is not UTF-8 in them is replaced, not thrown at the walker.
   return line.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -1,5 +1,7 @@
 #include "server/world_messages.hpp"
 
+#include "server/body_messages.hpp"
+
 #include <cmath>
 #include <filesystem>
 
@@ -127,6 +129,25 @@ scene::Vec3 vectorFrom(const v1::Vec3& message) {
   return {message.x(), message.y(), message.z()};
 }
 
+namespace {
+
+v1::ContactEvent::Phase phaseOf(scene::ContactEvent::Phase phase) {
+  using Phase = scene::ContactEvent::Phase;
+  switch (phase) {
+    case Phase::begin:
+      return v1::ContactEvent::PHASE_BEGIN;
+    case Phase::min:
+      return v1::ContactEvent::PHASE_MIN;
+    case Phase::end:
+      return v1::ContactEvent::PHASE_END;
+    case Phase::none:
+      break;
+  }
+  return v1::ContactEvent::PHASE_UNSPECIFIED;
+}
+
+}  // namespace
+
 v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent& event) {
   const collision::Decision& decision = event.decision;
   v1::ContactEvent message;
@@ -136,6 +157,7 @@ v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent&
   if (event.kind == scene::ContactEvent::Kind::end ||
       event.kind == scene::ContactEvent::Kind::leave)
     message.set_reason(reasonOf(event.reason));
+  message.set_phase(phaseOf(event.phase));
   message.set_a(event.a);
   message.set_b(event.b);
   message.set_a_name(scene::nameOf(world, event.a));
@@ -213,6 +235,8 @@ v1::Scene messageOf(const scene::Scene& scene) {
   message.set_metres_per_unit(model.metresPerUnit);
   message.set_up(std::string(1, model.up));
   *message.mutable_offset() = messageOf(model.offset);
+  for (std::size_t i = 0; i < model.bodies.size(); ++i)
+    *message.add_bodies() = bodyMessageOf(scene, i);
   return message;
 }
 
@@ -230,6 +254,7 @@ v1::Policies messageOf(const scene::Lengths& lengths) {
   message.set_jump_limit(lengths.jumpLimit);
   message.set_joint_speed_limit(lengths.jointSpeedLimit);
   message.set_push_force(lengths.pushForce);
+  message.set_bodies("push");
   return message;
 }
 

@@ -73,6 +73,18 @@ void FakeWorld::advance(const std::string& name, Avatar& avatar, StepOutcome& ou
   if (avatar.ticksLeft == 0) end(name, avatar, outcome);
 }
 
+std::optional<v1::Error> FakeWorld::submit(const v1::BodyCommand& command) {
+  if (command.body().starts_with("no-")) {
+    v1::Error error;
+    error.set_code(v1::ERROR_REFUSED_COMMAND);
+    error.set_message("there is no body of this name");
+    return error;
+  }
+  diary_.push_back(std::to_string(tick_) + " " + command.body() + " " +
+                   std::to_string(command.action_case()));
+  return std::nullopt;
+}
+
 StepOutcome FakeWorld::step() {
   StepOutcome outcome;
   outcome.tick = ++tick_;

@@ -2,7 +2,8 @@
 // which tick, so that drivers can be compared.
 //
 // Avatars are told by their names: "stuck..." never arrives, "ghost..." cannot spawn, "restless..."
-// is never idle, "blind..." cannot be captured. A speed above 10 is refused at once.
+// is never idle, "blind..." cannot be captured. A speed above 10 is refused at once. Bodies do as
+// they are told in no time; there is none called "no-...".
 #pragma once
 
 #include <deque>
@@ -21,6 +22,7 @@ class FakeWorld : public ScriptDriver {
 
   double tickSeconds() const override { return 1.0 / 60.0; }
   std::optional<v1::Error> submit(const v1::Command& command) override;
+  std::optional<v1::Error> submit(const v1::BodyCommand& command) override;
   StepOutcome step() override;
 
   std::uint64_t tick() const { return tick_; }

@@ -237,6 +237,45 @@ TEST(Bodies, WhoLeavesTheWorldLeavesItsTriggers) {
   EXPECT_EQ(t.told(Event::leave, "ann", "zone"), 1);
 }
 
+TEST(Bodies, ANearMissBeginsIsClosestAndEnds) {
+  Lengths lengths;
+  lengths.nearMiss = 0.2;
+  BodyTrial t(boxModel({floorBox(), {"pillar", {-0.1, 0, 0.4}, {0.1, 2, 0.6}}}), lengths);
+  t.order("ann", Spawn{{-2, 0.01, 0}, 0, 0.3, 1.75});
+  t.order("ann", Walk{{{2, 0, 0}}, 1.5});
+  t.untilIdle();
+  std::vector<ContactEvent> near;
+  for (const ContactEvent& e : t.events)
+    if (e.kind == Event::near && nameOf(t.world, e.b) == "pillar") near.push_back(e);
+  ASSERT_EQ(near.size(), 3u);
+  EXPECT_EQ(near[0].phase, ContactEvent::Phase::begin);
+  EXPECT_EQ(near[1].phase, ContactEvent::Phase::min);
+  EXPECT_EQ(near[2].phase, ContactEvent::Phase::end);
+  EXPECT_NEAR(near[1].decision.distance, 0.1, 1e-6);
+  EXPECT_LT(near[0].tick, near[1].tick);
+  EXPECT_LT(near[1].tick, near[2].tick);
+  EXPECT_GE(near[2].decision.distance, 0.2);
+}
+
+TEST(Bodies, AFreeBodyTellsWhatItLandsOnAndWhatItLeaves) {
+  Model model = boxModel(
+      {floorBox(), {"crate", {0, 0.5, 0}, {0.5, 1, 0.5}}, {"slab", {-1, 0.2, -1}, {1, 0.3, 1}}});
+  model.bodies.push_back(bodySpec("crate", BodyKind::rigid, {1}));
+  BodySpec slab = bodySpec("slab", BodyKind::sliding, {2});
+  slab.axis = Vec3::UnitX();
+  slab.low = -4;
+  slab.speed = 100;
+  model.bodies.push_back(slab);
+  BodyTrial t(std::move(model));
+  t.ticks(90);
+  EXPECT_EQ(t.told(Event::begin, "crate", "slab"), 1);
+  EXPECT_EQ(t.told(Event::begin, "crate", "floor"), 0);
+  t.tell({"slab", Action::open, 0, 0, {}});
+  t.ticks(120);
+  EXPECT_EQ(t.told(Event::end, "crate", "slab"), 1);
+  EXPECT_EQ(t.told(Event::begin, "crate", "floor"), 1);
+}
+
 TEST(Bodies, AbsurdCommandsAreRefusedAndChangeNothing) {
   BodyTrial t(hingedDoor()), twin(hingedDoor());
   const double nan = std::nan("");

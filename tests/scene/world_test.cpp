@@ -418,7 +418,8 @@ TEST(World, NearMissesAreToldOnceAnApproach) {
   run.order("ann", to(2, 0));
   run.untilIdle();
   const auto nears = std::count_if(run.events.begin(), run.events.end(), [&](const auto& e) {
-    return e.kind == ContactEvent::Kind::near && nameOf(run.world, e.b) == "post";
+    return e.kind == ContactEvent::Kind::near && e.phase == ContactEvent::Phase::begin &&
+           nameOf(run.world, e.b) == "post";
   });
   EXPECT_EQ(nears, 1);
   EXPECT_FALSE(run.touched("post"));

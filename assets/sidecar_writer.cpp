@@ -1,0 +1,71 @@
+#include "assets/sidecar_writer.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "assets/plan.hpp"
+
+namespace enfilade::assets {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr char kPrefix[] = "building/";
+constexpr double kDegreesPerRadian = 57.29577951308232;
+constexpr double kDecimals = 1e6;
+
+double rounded(double value) {
+  return std::round(value * kDecimals) / kDecimals + 0.0;
+}
+
+Json listOf(const collision::Vec3& v) {
+  return {rounded(v.x()), rounded(v.y()), rounded(v.z())};
+}
+
+std::string nameOf(const std::string& path) {
+  return path.starts_with(kPrefix) ? path.substr(sizeof kPrefix - 1) : path;
+}
+
+Json doorOf(const scene::Object& object, const MovingPart& part) {
+  const bool turns = part.kind == MovingPart::Kind::hinge;
+  const double scale = turns ? kDegreesPerRadian : 1;
+  const double low = rounded(scale * part.low), high = rounded(scale * part.high);
+  Json body{{"name", nameOf(object.path)},
+            {"kind", turns ? "hinged" : "sliding"},
+            {"objects", {object.path}},
+            {"axis", listOf(object.worldFromMesh.linear() * part.axis)},
+            {"limits", {low, high}}};
+  if (!turns) return body;  // the lift's doors stand closed
+  body["anchor"] = listOf(object.worldFromMesh.translation());
+  body["closed"] = high > -low ? high : low;
+  body["opened_by"] = "touch";
+  return body;
+}
+
+Json liftOf(const scene::Object& object, const MovingPart& part) {
+  return {{"name", nameOf(object.path)},
+          {"kind", "lift"},
+          {"objects", {object.path}},
+          {"stops", {rounded(part.low), rounded(part.high)}},
+          {"speed", 1.5},
+          {"acceleration", 1}};
+}
+
+}  // namespace
+
+std::string sidecarText(const scene::Model& model, const std::vector<MovingPart>& movingParts) {
+  Json bodies = Json::array();
+  for (const MovingPart& part : movingParts) {
+    const scene::Object& object = model.objects[part.object];
+    const bool upwards = part.axis.y() > 0 && part.kind == MovingPart::Kind::slide;
+    bodies.push_back(upwards ? liftOf(object, part) : doorOf(object, part));
+  }
+  bodies.push_back({{"name", "hall/entrance"},
+                    {"kind", "trigger"},
+                    {"box",
+                     {{plan::kHallWest, 0, -plan::kDoorHalf},
+                      {plan::kHallWest + 1, plan::kDoorHeight, plan::kDoorHalf}}}});
+  return Json{{"walk", 1}, {"bodies", bodies}}.dump(1) + "\n";
+}
+
+}  // namespace enfilade::assets

@@ -1,0 +1,132 @@
+// Who touches what among bodies: free ones with still objects, with driven ones and with one
+// another. (What avatars touch, avatars tell.) The solver's pairs are asked, and of those only the
+// ones that are not proved to be farther apart, of bodies that moved: a contact of two that stand
+// lasts.
+#include <algorithm>
+
+#include "collision/penetration_depth.hpp"
+#include "scene/world_state.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using collision::Decision;
+using collision::Verdict;
+using Key = std::pair<EntityId, EntityId>;
+
+bool hasMoved(const WorldState& world, EntityId id) {
+  const auto found = world.bodyOfId.find(id);
+  return found != world.bodyOfId.end() && world.bodies[found->second].moved;
+}
+
+/// Free before driven before still, and among free ones in the order of their ids.
+bool tellsFirst(const WorldState& world, EntityId a, EntityId b) {
+  const auto rank = [&](EntityId id) {
+    const auto found = world.bodyOfId.find(id);
+    return found != world.bodyOfId.end() &&
+                   world.bodies[found->second].spec->kind == BodyKind::rigid
+               ? 0
+               : 1;
+  };
+  return std::pair(rank(a), a) < std::pair(rank(b), b);
+}
+
+double depthOf(const Solid& a, const Solid& b, const NearPair& pair, const Decision& decision,
+               const collision::FeatureCache& features) {
+  if (decision.verdict != Verdict::penetrating) return 0;
+  collision::DepthCache none;
+  return collision::penetrationDepth(partOf(a, pair.key.partA), partOf(b, pair.key.partB), features,
+                                     none)
+      .depth;
+}
+
+bool nearer(const Decision& a, const Decision& b) {
+  return a.verdict != b.verdict ? a.verdict > b.verdict : a.distance < b.distance;
+}
+
+/// Takes what two parts are to one another into what their bodies are.
+void take(std::map<Key, Contact>& now, const Key& key, const Decision& decision, double depth) {
+  const auto [at, isNew] = now.try_emplace(key);
+  Contact& contact = at->second;
+  contact.other = key.second;
+  if (isNew || nearer(decision, contact.decision)) contact.decision = decision;
+  contact.penetration = std::max(contact.penetration, depth);
+}
+
+/// All pairs of which one moved and that are nearer than `limit`, or were in the last tick.
+std::map<Key, Contact> nearBodies(WorldState& world, double limit, QueryCount& count) {
+  const RigidStage& stage = world.rigids;
+  std::map<Key, Contact> now;
+  for (const NearPair& pair : stage.dynamics.pairs) {
+    EntityId a = stage.entities[pair.key.a], b = stage.entities[pair.key.b];
+    if (std::max(a, b) >= world.firstAvatarId()) continue;
+    if (!hasMoved(world, a) && !hasMoved(world, b)) continue;
+    const bool swapped = !tellsFirst(world, a, b);
+    if (swapped) std::swap(a, b);
+    const bool lasted = world.bodyContacts.contains({a, b});
+    const Solid& solidA = stage.dynamics.solids[pair.key.a];
+    const Solid& solidB = stage.dynamics.solids[pair.key.b];
+    if (!lasted && apartNow(pair, solidA, solidB) > limit) continue;
+    const double within = lasted ? std::numeric_limits<double>::infinity() : limit;
+    collision::FeatureCache features = pair.features;
+    ++count.narrow;
+    auto decision = collision::decideWithin(partOf(solidA, pair.key.partA),
+                                            partOf(solidB, pair.key.partB), within, features);
+    if (!decision) continue;
+    if (decision->decidedBy == collision::DecidedBy::rational) ++count.rational;
+    const double depth = depthOf(solidA, solidB, pair, *decision, features);
+    if (swapped) {
+      std::swap(decision->pointA, decision->pointB);
+      decision->normal = -decision->normal;
+    }
+    take(now, {a, b}, *decision, depth);
+  }
+  return now;
+}
+
+}  // namespace
+
+void findBodyContacts(WorldState& world, TickReport& report, QueryCount& count) {
+  const double contactBelow = 2 * world.lengths.epsilon;
+  const double limit = std::max(contactBelow, world.lengths.nearMiss);
+  std::map<Key, Contact> now, parted;
+  if (!world.rigids.seeds.empty()) now = nearBodies(world, limit, count);
+  for (auto at = now.begin(); at != now.end();) {
+    at->second.touching = at->second.decision.distance < contactBelow;
+    const auto next = std::next(at);
+    if (!(at->second.decision.distance < limit)) parted.insert(now.extract(at));
+    at = next;
+  }
+  for (const auto& [key, before] : world.bodyContacts)  // a contact of two that stand lasts
+    if (!hasMoved(world, key.first) && !hasMoved(world, key.second)) now.try_emplace(key, before);
+  for (auto& [key, contact] : now) {
+    const auto before = world.bodyContacts.find(key);
+    tellBegin(world, key.first, before == world.bodyContacts.end() ? nullptr : &before->second,
+              contact, report.contacts);
+  }
+  for (const auto& [key, before] : world.bodyContacts) {
+    const auto after = now.find(key);
+    const auto gone = parted.find(key);
+    tellEnd(
+        world, key.first, before, after == now.end() ? nullptr : &after->second,
+        [&] { return gone == parted.end() ? before.decision : gone->second.decision; },
+        report.contacts);
+  }
+  world.bodyContacts = std::move(now);
+  for (const auto& [key, contact] : world.bodyContacts) {
+    if (contact.touching) ++report.liveContacts;
+    report.worstPenetration = std::max(report.worstPenetration, contact.penetration);
+  }
+}
+
+void endBodyContacts(WorldState& world, ContactEvent::Reason reason,
+                     std::vector<ContactEvent>& events) {
+  for (const auto& [key, contact] : world.bodyContacts) {
+    if (!contact.touching) continue;
+    events.push_back(eventOf(world, ContactEvent::Kind::end, key.first, contact));
+    events.back().reason = reason;
+  }
+  world.bodyContacts.clear();
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,93 @@
+#include "scene/sidecar.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/scene/box_scene.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using namespace testing;
+
+Model rooms() {
+  return boxModel({floorBox(),
+                   {"hall/leaf", {0, 0, 0}, {1, 2, 0.05}},
+                   {"hall/chair1", {3, 0, 0}, {3.5, 1, 0.5}},
+                   {"hall/chair2", {4, 0, 0}, {4.5, 1, 0.5}}});
+}
+
+/// What is wrong with the bodies of a sidecar; "" when nothing is.
+std::string complaint(const std::string& bodies) {
+  Model model = rooms();
+  try {
+    applySidecar(model, R"({"walk":1,"bodies":[)" + bodies + "]}", "s.walk.json");
+    return "";
+  } catch (const SidecarError& error) {
+    EXPECT_TRUE(model.bodies.empty()) << "left as it was";
+    EXPECT_EQ(model.objects.size(), rooms().objects.size());
+    return error.what();
+  }
+}
+
+TEST(Sidecar, SaysWhatMovesInRadiansAndMetres) {
+  Model model = rooms();
+  applySidecar(model, R"({"walk":1,"bodies":[
+    {"name":"door","kind":"hinged","objects":["hall/leaf"],"anchor":[0,0,0],"axis":[0,2,0],
+     "limits":[-90,90],"closed":-90,"closes_after":2,"opened_by":"touch"},
+    {"name":"chair","kind":"rigid","objects":["hall/chair*"],"each":true,"mass":6}]})",
+               "s.walk.json");
+  ASSERT_EQ(model.bodies.size(), 3u);
+  const BodySpec& door = model.bodies[0];
+  EXPECT_EQ(door.axis, Vec3(0, 1, 0));
+  EXPECT_NEAR(door.high, 1.5707963267948966, 1e-15);
+  EXPECT_EQ(door.closed, door.low);
+  EXPECT_EQ(door.closesAfter, 2.0);
+  EXPECT_EQ(door.openedBy, OpenedBy::touch);
+  EXPECT_EQ(model.bodies[1].name, "chair#1");
+  EXPECT_EQ(model.bodies[2].objects, std::vector<std::uint32_t>{3});
+  EXPECT_NO_THROW(Scene{model});
+}
+
+TEST(Sidecar, ABoxBecomesATriggersObject) {
+  Model model = rooms();
+  applySidecar(model,
+               R"({"walk":1,"bodies":[{"name":"exit","kind":"trigger","box":[[9,0,1],[8,2,-1]]}]})",
+               "s.walk.json");
+  ASSERT_EQ(model.objects.size(), 5u);
+  const Scene scene(std::move(model));
+  EXPECT_EQ(scene.shapeOfBody(0)->parts.size(), 1u);
+  EXPECT_EQ(scene.solidObjects().size(), 4u) << "not solid";
+}
+
+TEST(Sidecar, MistakesAreNamedWithTheirPlace) {
+  const auto has = [](const std::string& text, const char* part) {
+    EXPECT_NE(text.find(part), std::string::npos) << text;
+  };
+  has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"],"anchr":[0,0,0]})"),
+      "s.walk.json.bodies[0]: unknown key \"anchr\"");
+  has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/gate"],"anchor":[0,0,0]})"),
+      "bodies[0].objects[0]: there is no object \"hall/gate\"");
+  has(complaint(R"({"name":"d","kind":"spinning","objects":["hall/leaf"]})"), "bodies[0].kind");
+  has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"]})"), "anchor is missing");
+  has(complaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[3,1]})"), "stops");
+  has(complaint(R"({"name":"d","kind":"trigger","box":[[0,0,0],[1,1,0]]})"), "no volume");
+  has(complaint(R"({"name":"d","kind":"trigger","box":[[0,0,0],[1,1,1]]},
+                   {"name":"d","kind":"rigid","objects":["hall/leaf"]})"),
+      "another body has it");
+  has(complaint(R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":"6"})"), "number");
+}
+
+TEST(Sidecar, WhatIsNoSidecarIsSaidSo) {
+  Model model = rooms();
+  EXPECT_THROW(applySidecar(model, "{", "s"), SidecarError);
+  EXPECT_THROW(applySidecar(model, "[]", "s"), SidecarError);
+  EXPECT_THROW(applySidecar(model, R"({"bodies":[]})", "s"), SidecarError);
+  EXPECT_THROW(applySidecar(model, R"({"walk":1,"still":["nothing"]})", "s"), SidecarError);
+}
+
+TEST(Sidecar, LiesBesideItsModel) {
+  EXPECT_EQ(sidecarOf("a/hall.glb"), "a/hall.walk.json");
+}
+
+}  // namespace
+}  // namespace enfilade::scene
