@@ -6,6 +6,7 @@
 #include "scene/model_cache.hpp"
 
 #include <fcntl.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -108,30 +109,43 @@ std::vector<FileBeside> filesBeside(const fs::path& file, const Model& model) {
 
 // ---- reading ------------------------------------------------------------------------------------
 
-std::optional<std::vector<std::byte>> bytesOf(const fs::path& path) {
-  const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) return std::nullopt;
-  struct stat status {};
-  std::vector<std::byte> bytes;
-  if (fstat(fd, &status) == 0) bytes.resize(static_cast<std::size_t>(status.st_size));
-  std::size_t got = 0;
-  while (got < bytes.size()) {  // to the end, or to the first failure
-    const ssize_t size = read(fd, bytes.data() + got, bytes.size() - got);
-    if (size < 0 && errno == EINTR) continue;
-    if (size <= 0) break;
-    got += static_cast<std::size_t>(size);
+/// An entry's bytes as the file holds them, not copied. Entries are replaced and removed, and never
+/// cut short while somebody may read them.
+class EntryFile {
+ public:
+  explicit EntryFile(const fs::path& path) {
+    const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (fd < 0) return;
+    there_ = true;
+    struct stat status {};
+    if (fstat(fd, &status) == 0 && status.st_size > 0) {
+      size_ = static_cast<std::size_t>(status.st_size);
+      data_ = mmap(nullptr, size_, PROT_READ, MAP_PRIVATE | MAP_POPULATE, fd, 0);
+      if (data_ == MAP_FAILED) size_ = 0;
+    }
+    close(fd);
   }
-  close(fd);
-  bytes.resize(got);
-  return bytes;
-}
+  ~EntryFile() {
+    if (size_ > 0) munmap(data_, size_);
+  }
+  EntryFile(const EntryFile&) = delete;
+  EntryFile& operator=(const EntryFile&) = delete;
+
+  bool there() const { return there_; }
+  std::span<const std::byte> bytes() const { return {static_cast<const std::byte*>(data_), size_}; }
+
+ private:
+  bool there_ = false;
+  void* data_ = nullptr;
+  std::size_t size_ = 0;
+};
 
 std::optional<CacheEntry> entryFor(const fs::path& file, const fs::path& path,
                                    const ContentHash& key, std::vector<std::string>& notes) {
-  const auto bytes = bytesOf(path);
-  if (!bytes) return std::nullopt;
+  const EntryFile kept(path);
+  if (!kept.there()) return std::nullopt;
   try {
-    CacheEntry entry = deserialiseEntry(*bytes);
+    CacheEntry entry = deserialiseEntry(kept.bytes());
     if (!(entry.key == key)) throw ModelStreamError("cache entry: of another file");
     const bool same =
         std::all_of(entry.beside.begin(), entry.beside.end(),

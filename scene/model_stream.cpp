@@ -80,6 +80,12 @@ class Reader {
     take(text.data(), text.size(), field);
     return text;
   }
+  std::vector<std::uint8_t> getBytes(const char* field) {
+    const std::size_t size = count(1, field);
+    const auto* first = reinterpret_cast<const std::uint8_t*>(bytes_.data() + position_);
+    position_ += size;
+    return {first, first + size};
+  }
   template <class T>
   std::vector<T> getArray(const char* field) {
     std::vector<T> values(count(kPackedSize<T>, field));
@@ -168,7 +174,7 @@ Texture readTexture(Reader& in) {
   t.name = in.getText("texture name");
   t.width = in.get<std::uint32_t>("texture width");
   t.height = in.get<std::uint32_t>("texture height");
-  t.rgba = in.getArray<std::uint8_t>("texture pixels");
+  t.rgba = in.getBytes("texture pixels");
   const std::uint64_t pixels = std::uint64_t{t.width} * t.height;
   if (pixels > t.rgba.size() || pixels * 4 != t.rgba.size()) {
     in.fail("texture pixels", "not width * height * 4 bytes");

@@ -37,20 +37,43 @@ bool isCavity(const Shape& shape, const Shell& shell) {
                                      [](const Shell& other) { return other.hollow; });
 }
 
-collision::Hull hullOf(const Shape& shape, const Shell& shell, const Eigen::Affine3d& placed) {
+/// A whole number near the middle of low..high that can be subtracted from all numbers between them
+/// without rounding: by P. H. Sterbenz' lemma from those between its half and its double.
+double exactOrigin(double low, double high) {
+  const double middle = std::round(0.5 * low + 0.5 * high);
+  const double least = low > 0 ? low : -high, most = low > 0 ? high : -low;
+  const double size = std::abs(middle);
+  return size <= 2 * least && most <= 2 * size ? middle : 0;
+}
+
+Vec3 originFor(const Shape& shape, const Eigen::Affine3d& placed) {
+  Box box;
+  for (std::uint32_t v = 0; v < shape.vertices.size(); ++v) box.include(at(shape, v, placed));
+  if (box.empty()) return Vec3::Zero();
+  return {exactOrigin(box.min.x(), box.max.x()), exactOrigin(box.min.y(), box.max.y()),
+          exactOrigin(box.min.z(), box.max.z())};
+}
+
+collision::Triangle relative(collision::Triangle triangle, const Vec3& origin) {
+  for (Vec3& corner : triangle) corner -= origin;
+  return triangle;
+}
+
+collision::Hull hullOf(const Shape& shape, const Shell& shell, const Eigen::Affine3d& placed,
+                       const Vec3& origin) {
   std::vector<Vec3> points;
   points.reserve(3 * std::size_t{shell.count});
   for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
-    for (const Vec3& corner : triangleAt(shape, t, placed)) points.push_back(corner);
+    for (const Vec3& corner : triangleAt(shape, t, placed)) points.emplace_back(corner - origin);
   }
   return collision::buildHull(points);
 }
 
 void addHull(collision::Hull hull, ObjectParts& parts) {
   Box box;
-  for (const Vec3& v : hull.vertices) box.include(v);
+  for (const Vec3& v : hull.vertices) box.include(v + parts.origin);
   parts.hullBoxes.push_back(box);
-  parts.hulls.push_back(std::move(hull));
+  parts.localHulls.push_back(std::move(hull));
 }
 
 /// How often one surface goes around `point`, by the signed crossings of a ray: 1 inside a solid
@@ -85,28 +108,42 @@ bool becomesHull(const Shape& shape, const Shell& shell, const Eigen::Affine3d& 
 
 ObjectParts partsOf(const Shape& shape, const Eigen::Affine3d& placed) {
   ObjectParts parts;
+  parts.origin = originFor(shape, placed);
   std::vector<collision::Triangle> triangles;
   std::vector<signed char> sides;
   const signed char outside = placed.linear().determinant() < 0 ? -1 : 1;
   for (const Shell& shell : shape.shells) {
     if (becomesHull(shape, shell, placed)) {
-      addHull(hullOf(shape, shell, placed), parts);
+      addHull(hullOf(shape, shell, placed, parts.origin), parts);
       continue;
     }
     for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
-      const collision::Triangle triangle = triangleAt(shape, t, placed);
+      const auto triangle = relative(triangleAt(shape, t, placed), parts.origin);
       if (!hasArea(triangle)) continue;
       triangles.push_back(triangle);
       sides.push_back(shell.bounds() ? outside : static_cast<signed char>(0));
     }
   }
-  if (!parts.hulls.empty()) parts.hullTree = collision::buildBoxTree(parts.hullBoxes, kLeafSize);
+  if (!parts.localHulls.empty())
+    parts.hullTree = collision::buildBoxTree(parts.hullBoxes, kLeafSize);
   if (triangles.empty()) return parts;
-  parts.triangles = collision::TriangleTree(triangles);
+  parts.localTriangles = collision::TriangleTree(triangles);
   for (std::uint32_t i = 0; i < triangles.size(); ++i) {
-    parts.sides.push_back(sides[parts.triangles.given(i)]);
+    parts.sides.push_back(sides[parts.localTriangles.given(i)]);
   }
   return parts;
+}
+
+collision::ConvexBody ObjectParts::body(std::uint32_t part) const {
+  if (const collision::Hull* own = hull(part)) return {own->vertices, origin, nullptr, own};
+  const collision::Triangle& t = localTriangles.triangles()[part - hullCount()];
+  return {std::span<const Vec3>(t), origin};
+}
+
+Box ObjectParts::box(std::uint32_t part) const {
+  if (part < hullCount()) return hullBoxes[part];
+  const Box local = collision::boxOf(localTriangles.triangles()[part - hullCount()]);
+  return {local.min + origin, local.max + origin};
 }
 
 void ObjectParts::query(const Box& box, std::vector<std::uint32_t>& parts) const {
@@ -119,21 +156,24 @@ void ObjectParts::query(const Box& box, std::vector<std::uint32_t>& parts) const
                                   }
                                 });
   std::sort(parts.begin() + begin, parts.end());
-  const std::size_t hullsFound = parts.size();
-  triangles.query(box, parts);
-  for (std::size_t i = hullsFound; i < parts.size(); ++i) {
-    parts[i] += static_cast<std::uint32_t>(hulls.size());
-  }
+  // The subtraction may round: two units wider, and what comes too much goes.
+  const Vec3 rounding = 0x1p-51 * box.min.cwiseAbs().cwiseMax(box.max.cwiseAbs());
+  const auto hullsEnd = static_cast<std::ptrdiff_t>(parts.size());
+  localTriangles.query({box.min - origin - rounding, box.max - origin + rounding}, parts);
+  for (auto part = parts.begin() + hullsEnd; part != parts.end(); ++part) *part += hullCount();
+  parts.erase(std::remove_if(parts.begin() + hullsEnd, parts.end(),
+                             [&](std::uint32_t part) { return !overlaps(this->box(part), box); }),
+              parts.end());
 }
 
 std::size_t ObjectParts::bytes() const {
   std::size_t sum = sizeof *this + sides.capacity() + hullBoxes.capacity() * sizeof(Box) +
-                    triangles.triangles().capacity() * sizeof(collision::Triangle);
-  for (const collision::BoxTree* tree : {&hullTree, &triangles.boxes()}) {
+                    localTriangles.triangles().capacity() * sizeof(collision::Triangle);
+  for (const collision::BoxTree* tree : {&hullTree, &localTriangles.boxes()}) {
     sum += tree->nodes.capacity() * sizeof(collision::BoxTree::Node) +
            tree->order.capacity() * sizeof(std::uint32_t);
   }
-  for (const collision::Hull& hull : hulls) {
+  for (const collision::Hull& hull : localHulls) {
     sum += sizeof hull + hull.vertices.capacity() * sizeof(Vec3);
     sum += (hull.neighbourStart.capacity() + hull.neighbours.capacity()) * sizeof(std::uint32_t);
     for (const auto& face : hull.faces) sum += sizeof face + face.capacity() * sizeof(face[0]);
@@ -143,9 +183,10 @@ std::size_t ObjectParts::bytes() const {
 
 bool surrounds(const ObjectParts& parts, const Vec3& point) {
   int winding = 0;
-  const auto& triangles = parts.triangles.triangles();
+  const auto& triangles = parts.localTriangles.triangles();
+  const Vec3 local = point - parts.origin;
   for (std::size_t i = 0; i < triangles.size(); ++i) {
-    if (parts.sides[i] != 0) winding += parts.sides[i] * crossing(triangles[i], point);
+    if (parts.sides[i] != 0) winding += parts.sides[i] * crossing(triangles[i], local);
   }
   return winding > 0;
 }

@@ -6,28 +6,40 @@
 
 #include "collision/box_tree.hpp"
 #include "collision/hull.hpp"
+#include "collision/narrow_phase.hpp"
 #include "collision/triangle_tree.hpp"
 #include "scene/shape.hpp"
 
 namespace enfilade::scene {
 
-/// In the frame that the shape was placed in, metres. A part's number is that of its hull, or
-/// hulls.size() + the index of its triangle in triangles.triangles().
+/// In the frame that the shape was placed in, metres; a part's number is that of its hull, or the
+/// number of hulls + the index of its triangle.
 struct ObjectParts {
+  /// Hulls and triangles are stored relative to this place near them, so that bodies far from the
+  /// scene's origin lose no digits. Subtracting it rounded nothing: the parts are where they were.
+  Vec3 origin = Vec3::Zero();
   /// Solids: each holds every triangle of its surface, and is the surface's solid exactly, or up to
   /// the rounding of the coordinates (convex_surface.hpp).
-  std::vector<collision::Hull> hulls;
-  std::vector<Box> hullBoxes;
-  collision::BoxTree hullTree;  ///< over hullBoxes
-
-  collision::TriangleTree triangles;  ///< closed, without thickness
+  std::vector<collision::Hull> localHulls;
+  collision::TriangleTree localTriangles;  ///< closed, without thickness
   /// Of each triangle: 1 when it is part of a closed surface and counter-clockwise seen from
   /// outside, -1 when clockwise (the placement mirrors), 0 when its surface bounds nothing.
   std::vector<signed char> sides;
 
+  std::vector<Box> hullBoxes;   ///< not relative to the origin
+  collision::BoxTree hullTree;  ///< over hullBoxes
+
+  std::uint32_t hullCount() const { return static_cast<std::uint32_t>(localHulls.size()); }
   std::uint32_t size() const {
-    return static_cast<std::uint32_t>(hulls.size() + triangles.triangles().size());
+    return hullCount() + static_cast<std::uint32_t>(localTriangles.triangles().size());
   }
+  /// Null for a triangle.
+  const collision::Hull* hull(std::uint32_t part) const {
+    return part < hullCount() ? &localHulls[part] : nullptr;
+  }
+  /// Where it stands, and its exact box.
+  collision::ConvexBody body(std::uint32_t part) const;
+  Box box(std::uint32_t part) const;
   /// Appends the numbers of all parts whose boxes overlap `box`, ascending.
   void query(const Box& box, std::vector<std::uint32_t>& parts) const;
   std::size_t bytes() const;

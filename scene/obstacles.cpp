@@ -76,20 +76,12 @@ void gatherStill(const Scene& scene, std::uint32_t object, const Box& reach,
   thread_local std::vector<std::uint32_t> found;
   found.clear();
   parts.query(reach, found);
-  const auto hulls = static_cast<std::uint32_t>(parts.hulls.size());
   for (const std::uint32_t part : found) {
     Obstacle obstacle;
     obstacle.entity = object + 1;
     obstacle.part = part;
-    if (part < hulls) {
-      const collision::Hull& hull = parts.hulls[part];
-      obstacle.box = parts.hullBoxes[part];
-      obstacle.body = {hull.vertices, Vec3::Zero(), nullptr, &hull};
-    } else {
-      const collision::Triangle& t = parts.triangles.triangles()[part - hulls];
-      obstacle.box = collision::boxOf(t);
-      obstacle.body = {std::span<const Vec3>(t), Vec3::Zero()};
-    }
+    obstacle.box = parts.box(part);
+    obstacle.body = parts.body(part);
     obstacles.push_back(obstacle);
   }
 }

@@ -16,13 +16,11 @@ constexpr double kDeepestDrop = 100;  // metres: who is put higher is a slip of 
 constexpr double kDropTold = 2;       // metres: a drop that is worth telling
 
 bool isInsideHull(const ObjectParts& parts, const Vec3& point) {
-  const std::array<Vec3, 1> vertex{point};
-  for (std::size_t i = 0; i < parts.hulls.size(); ++i) {
+  const std::array<Vec3, 1> vertex{Vec3::Zero()};
+  for (std::uint32_t i = 0; i < parts.hullCount(); ++i) {
     if (!overlaps(parts.hullBoxes[i], {point, point})) continue;
-    const collision::Hull& hull = parts.hulls[i];
     collision::FeatureCache cache;
-    const auto decision = collision::decide({vertex, Vec3::Zero(), nullptr, nullptr},
-                                            {hull.vertices, Vec3::Zero(), nullptr, &hull}, cache);
+    const auto decision = collision::decide({vertex, point}, parts.body(i), cache);
     if (decision.verdict != collision::Verdict::separated) return true;
   }
   return false;

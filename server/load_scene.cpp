@@ -12,8 +12,6 @@ namespace {
 
 void tell(const scene::Scene& scene, const std::string& name, const LoadedScene& loaded) {
   const scene::Model& model = scene.model();
-  for (const scene::Problem& problem : model.problems)
-    spdlog::info("{}: {} x {}, as {}", name, problem.count, problem.kind, problem.example);
   const scene::Vec3 size =
       scene.bounds().empty() ? scene::Vec3::Zero().eval() : scene.bounds().size();
   spdlog::info(
@@ -45,7 +43,11 @@ LoadedScene loadSceneTimed(const ModelOptions& options) {
 }
 
 std::shared_ptr<const scene::Scene> loadScene(const ModelOptions& options) {
-  return loadSceneTimed(options).scene;
+  std::shared_ptr<const scene::Scene> scene = loadSceneTimed(options).scene;
+  for (const scene::Problem& problem : scene->model().problems)
+    spdlog::info("{}: {} x {}, as {}", options.file.filename().string(), problem.count,
+                 problem.kind, problem.example);
+  return scene;
 }
 
 }  // namespace enfilade::server

@@ -17,6 +17,7 @@ struct LoadedScene {
 
 /// Throws scene::ImportError.
 LoadedScene loadSceneTimed(const ModelOptions& options);
+/// The same, and logs the problems that the import met.
 std::shared_ptr<const scene::Scene> loadScene(const ModelOptions& options);
 
 }  // namespace enfilade::server

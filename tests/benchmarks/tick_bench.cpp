@@ -2,17 +2,23 @@
 //
 //   tick_bench [SCENE [AVATARS [TICKS]]]
 //
+// SCENE is a file, or district:N for a district of N objects straight from its generator.
 // Avatars walk at 1.5 m/s towards seeded places and turn to new ones every two seconds, as people
 // who look around a building. Contacts are decided each tick; the worst penetration is printed
 // beside the times, so that no speed is bought with an error.
+#include <sys/resource.h>
+#include <time.h>
+
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <random>
 
-#include "scene/import_model.hpp"
+#include "assets/building.hpp"
+#include "scene/model_cache.hpp"
 #include "scene/world.hpp"
 #include "tests/scene/thin_things.hpp"
 #include "tests/support/shared_folder.hpp"
@@ -62,16 +68,49 @@ void row(const char* name, const std::vector<double>& seconds) {
               1e6 * quantile(seconds, 0.99), 1e6 * quantile(seconds, 1));
 }
 
+/// Of this thread, seconds: what others do on the machine does not count.
+double processorTime() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+double peakMegabytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+scene::Model modelOf(const std::filesystem::path& file) {
+  const std::string name = file.string(), district = "district:";
+  if (!name.starts_with(district))
+    return scene::loadModel(file, {}, scene::modelCacheOfEnvironment()).model;
+  assets::BuildingOptions options;
+  options.objects = std::stoul(name.substr(district.size()));
+  return assets::makeBuilding(options);
+}
+
+std::shared_ptr<const scene::Scene> load(const std::filesystem::path& file) {
+  const auto start = std::chrono::steady_clock::now();
+  auto still = std::make_shared<const scene::Scene>(modelOf(file));
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  std::printf("%s: %zu objects loaded in %.2f s, %.0f MB at most\n", file.c_str(),
+              still->model().objects.size(), took.count(), peakMegabytes());
+  return still;
+}
+
 /// Makes the ticks, `before` each of them, and prints what they cost.
 void measure(const std::string& title, scene::World& world, int ticks,
              const std::function<void(int tick)>& before) {
   std::array<std::vector<double>, scene::kStages> stages;
-  std::vector<double> whole;
+  std::vector<double> whole, processor;
   double worst = 0;
   std::uint64_t queries = 0, rationals = 0, pairs = 0, bounded = 0;
   for (int i = 0; i < ticks; ++i) {
     before(i);
+    const double start = processorTime();
     const scene::TickReport report = tick(world);
+    processor.push_back(processorTime() - start);
     double sum = 0;
     for (std::size_t s = 0; s < scene::kStages; ++s) {
       stages[s].push_back(report.stageSeconds[s]);
@@ -89,6 +128,7 @@ void measure(const std::string& title, scene::World& world, int ticks,
   std::printf("| stage    | median us |    p99 us |    max us |\n|---|---|---|---|\n");
   for (std::size_t s = 0; s < scene::kStages; ++s) row(scene::kStageNames[s], stages[s]);
   row("tick", whole);
+  row("on a CPU", processor);
   std::printf(
       "a tick: %.1f pairs, %.1f narrow queries, %.3f of them rational; "
       "%llu sweeps bounded; worst penetration %g m; state hash %016llx\n",
@@ -98,7 +138,7 @@ void measure(const std::string& title, scene::World& world, int ticks,
 }
 
 void bench(const std::filesystem::path& file, int avatars, int ticks) {
-  const auto still = std::make_shared<const scene::Scene>(scene::importModel(file));
+  const auto still = load(file);
   scene::World world(still);
   std::mt19937_64 random(1);
   spawnAvatars(world, avatars, random);

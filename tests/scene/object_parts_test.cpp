@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "collision/exact_orientation.hpp"
@@ -41,14 +42,14 @@ TEST(ObjectParts, AHullHoldsEveryCornerOfItsSurfaceHoweverItIsPlaced) {
   for (int i = 0; i < 100; ++i) {
     const Eigen::Affine3d placed = randomPlacement(random, i % 2 == 1);
     const ObjectParts parts = partsOf(shape, placed);
-    ASSERT_EQ(parts.hulls.size(), 1u);
-    EXPECT_TRUE(parts.triangles.triangles().empty());
-    for (const auto& face : parts.hulls[0].faces) {
-      const auto& v = parts.hulls[0].vertices;
+    ASSERT_EQ(parts.localHulls.size(), 1u);
+    EXPECT_TRUE(parts.localTriangles.triangles().empty());
+    for (const auto& face : parts.localHulls[0].faces) {
+      const auto& v = parts.localHulls[0].vertices;
       for (const Eigen::Vector3f& p : shape.vertices) {
-        EXPECT_LE(
-            collision::orientation(v[face[0]], v[face[1]], v[face[2]], placed * p.cast<double>()),
-            0);
+        EXPECT_LE(collision::orientation(v[face[0]], v[face[1]], v[face[2]],
+                                         placed * p.cast<double>() - parts.origin),
+                  0);
       }
     }
   }
@@ -67,8 +68,8 @@ TEST(ObjectParts, QueriesFindWhatBruteForceFinds) {
     for (const std::uint32_t index : box.indices) mesh.indices.push_back(first + index);
   }
   const ObjectParts parts = partsOf(shapeOfOne(mesh), Eigen::Affine3d::Identity());
-  EXPECT_EQ(parts.hulls.size(), 30u);
-  EXPECT_EQ(parts.triangles.triangles().size(), 110u);
+  EXPECT_EQ(parts.localHulls.size(), 30u);
+  EXPECT_EQ(parts.localTriangles.triangles().size(), 110u);
   std::size_t hits = 0;
   for (int i = 0; i < 200; ++i) {
     const double x = number(random), y = number(random), z = number(random);
@@ -76,8 +77,10 @@ TEST(ObjectParts, QueriesFindWhatBruteForceFinds) {
     std::vector<std::uint32_t> found, expected;
     parts.query(box, found);
     for (std::uint32_t part = 0; part < parts.size(); ++part) {
-      const Box own = part < 30 ? parts.hullBoxes[part]
-                                : collision::boxOf(parts.triangles.triangles()[part - 30]);
+      Box own;
+      const collision::ConvexBody body = parts.body(part);
+      for (const Vec3& v : body.vertices) own.include(v + body.translation);
+      EXPECT_EQ(own.min, parts.box(part).min);
       if (overlaps(own, box)) expected.push_back(part);
     }
     EXPECT_EQ(found, expected);
@@ -86,14 +89,41 @@ TEST(ObjectParts, QueriesFindWhatBruteForceFinds) {
   EXPECT_GT(hits, 80u);
 }
 
+TEST(ObjectParts, FarPartsAreStoredNearTheirOriginAndAreWhereTheyWere) {
+  std::mt19937 random(7);
+  const Mesh mesh = boxMesh({0, 0, 0}, {0.3, 2, 5});
+  Mesh open = mesh;
+  open.indices.resize(33);
+  const Shape shape = shapeOfOne(mesh), sheets = shapeOfOne(open);
+  for (int i = 0; i < 100; ++i) {
+    Eigen::Affine3d placed = randomPlacement(random, false);
+    placed.linear() *= 0.1;
+    placed.translation() *= i % 4 ? 1000 : 1;
+    std::vector<Vec3> expected, found;
+    for (const Eigen::Vector3f& p : shape.vertices) expected.push_back(placed * p.cast<double>());
+    const ObjectParts parts = partsOf(shape, placed);
+    for (const Vec3& v : parts.localHulls.at(0).vertices) found.push_back(v + parts.origin);
+    for (const Vec3& v : expected)
+      EXPECT_EQ(std::count(found.begin(), found.end(), v), 1) << v.transpose();
+    const ObjectParts rest = partsOf(sheets, placed);
+    for (const collision::Triangle& t : rest.localTriangles.triangles()) {
+      for (const Vec3& corner : t)
+        EXPECT_EQ(std::count(expected.begin(), expected.end(), corner + rest.origin), 1);
+    }
+    if (placed.translation().cwiseAbs().minCoeff() > 100) {
+      EXPECT_LT(parts.localHulls[0].radius, 12);
+    }
+  }
+}
+
 TEST(ObjectParts, InsideOutWallsAreSolidAndInsideOutRoomsAreRooms) {
   const Eigen::Affine3d as = Eigen::Affine3d::Identity();
   const Shape wall = shapeOfOne(insideOut(boxMesh({0, 0, 0}, {5, 3, 0.2})));
-  EXPECT_EQ(partsOf(wall, as).hulls.size(), 1u);
+  EXPECT_EQ(partsOf(wall, as).localHulls.size(), 1u);
   const Shape room = shapeOfOne(insideOut(boxMesh({0, 0, 0}, {5, 3, 4})));
-  EXPECT_EQ(partsOf(room, as).hulls.size(), 0u);
-  EXPECT_EQ(partsOf(room, as).triangles.triangles().size(), 12u);
-  EXPECT_EQ(partsOf(room, Eigen::Affine3d(Eigen::Scaling(0.05))).hulls.size(), 1u);
+  EXPECT_EQ(partsOf(room, as).localHulls.size(), 0u);
+  EXPECT_EQ(partsOf(room, as).localTriangles.triangles().size(), 12u);
+  EXPECT_EQ(partsOf(room, Eigen::Affine3d(Eigen::Scaling(0.05))).localHulls.size(), 1u);
 }
 
 /// Whether an avatar may come into the world at `at`.

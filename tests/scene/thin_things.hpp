@@ -99,8 +99,8 @@ inline int penetrations(const World& world) {
     for (const collision::Triangle& t : triangles.back())
       still.push_back({collision::boxOf(t), {std::span<const Vec3>(t), Vec3::Zero()}});
     const ObjectParts& parts = world.scene().parts(object);
-    for (std::size_t i = 0; i < parts.hulls.size(); ++i)
-      still.push_back({parts.hullBoxes[i], {parts.hulls[i].vertices, Vec3::Zero()}});
+    for (std::uint32_t i = 0; i < parts.hullCount(); ++i)
+      still.push_back({parts.box(i), parts.body(i)});
   }
   int found = 0;
   const auto judge = [&](const collision::ConvexBody& a, const Box& boxA,
