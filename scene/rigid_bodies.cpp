@@ -122,9 +122,7 @@ struct PairWriter {
     if (found.empty()) return;
     const std::uint32_t other = solidForStill(world, object);
     for (const std::uint32_t met : found) {
-      const Box box = met < parts.hulls.size()
-                          ? parts.hullBoxes[met]
-                          : collision::boxOf(parts.triangles.triangles()[met - parts.hulls.size()]);
+      const Box box = parts.box(met);
       for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
         if (overlaps(reachOfPart(body, part), box)) add(solid, part, other, met);
     }

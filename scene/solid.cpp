@@ -65,13 +65,15 @@ Solid heldSolid(std::span<const collision::Hull* const> hulls,
 
 Solid stillSolid(const ObjectParts& parts) {
   Solid solid;
-  for (const collision::Hull& hull : parts.hulls) {
+  solid.motion.centre = parts.origin;
+  for (const collision::Hull& hull : parts.localHulls) {
     solid.parts.push_back(partOfHull(hull));
     solid.radius = std::max(solid.radius, hull.radius * kUp);
   }
-  solid.mesh = &parts.triangles;
-  for (const collision::Triangle& triangle : parts.triangles.triangles())
+  solid.mesh = &parts.localTriangles;
+  for (const collision::Triangle& triangle : parts.localTriangles.triangles())
     for (const Vec3& corner : triangle) solid.radius = std::max(solid.radius, corner.norm() * kUp);
+  placeSolid(solid);
   return solid;
 }
 

@@ -71,7 +71,7 @@ inline PartShape shapeOf(const Solid& solid, std::uint32_t part) {
 /// Part `part` where the solid is.
 inline collision::ConvexBody partOf(const Solid& solid, std::uint32_t part) {
   if (part >= solid.parts.size())
-    return {solid.mesh->triangles()[part - solid.parts.size()], Vec3::Zero(), nullptr, nullptr};
+    return {solid.mesh->triangles()[part - solid.parts.size()], solid.position, nullptr, nullptr};
   const SolidPart& p = solid.parts[part];
   return {p.vertices, solid.position, &solid.rotation, p.hull};
 }
@@ -82,8 +82,8 @@ Solid freeSolid(std::span<const collision::Hull* const> hulls, double density,
 /// The same, standing or driven: its centre is the frame's origin.
 Solid heldSolid(std::span<const collision::Hull* const> hulls,
                 const collision::Pose& worldFromFrame);
-/// What is still: hulls and triangles in the world's frame, numbered as ObjectParts does. `parts`
-/// has to outlive it.
+/// What is still: hulls and triangles about the parts' origin, numbered as ObjectParts does.
+/// `parts` has to outlive it.
 Solid stillSolid(const ObjectParts& parts);
 
 }  // namespace enfilade::scene

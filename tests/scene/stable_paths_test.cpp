@@ -1,0 +1,94 @@
+// A model that is exported again keeps the names of its objects where the modeller kept them.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+
+#include "scene/import_model.hpp"
+#include "scene/scene.hpp"
+#include "scene/scene_report.hpp"
+#include "tests/scene/hand_made_files.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using tests::BoxMesh;
+using tests::gltf;
+using tests::TemporaryFolder;
+
+/// Where each path's object lies.
+std::map<std::string, Vec3> placesOf(const Model& model) {
+  const Scene scene{Model(model)};
+  std::map<std::string, Vec3> places;
+  for (std::uint32_t i = 0; i < model.objects.size(); ++i)
+    places[model.objects[i].path] = boxOf(scene, i).min + model.offset;
+  return places;
+}
+
+std::string node(const std::string& name, int x, const std::string& more = "") {
+  return R"({"name":")" + name + R"(","mesh":0,"translation":[)" + std::to_string(x) + ",0,0]" +
+         more + "}";
+}
+
+std::map<std::string, Vec3> imported(const TemporaryFolder& folder, const std::string& roots,
+                                     const std::string& nodes) {
+  return placesOf(importModel(folder.write("model.gltf", gltf(BoxMesh({1, 1, 1}), roots, nodes))));
+}
+
+TEST(StablePaths, AnotherOrderOfNodesAndAnotherNumberingChangeNothing) {
+  const TemporaryFolder folder;
+  const auto first = imported(folder, "0",
+                              R"({"name":"hall","children":[1,2]},)" + node("door", 3) + "," +
+                                  node("table", 7, R"(,"children":[3])") + "," + node("lamp", 1));
+  const auto again =
+      imported(folder, "3",
+               node("lamp", 1) + "," + node("door", 3) + "," +
+                   node("table", 7, R"(,"children":[0])") + R"(,{"name":"hall","children":[2,1]})");
+  ASSERT_EQ(first.size(), 3u);
+  EXPECT_EQ(first, again);
+  EXPECT_TRUE(first.contains("hall/table/lamp"));
+}
+
+TEST(StablePaths, NewSiblingsAndNamelessOnesRenameNobodyElse) {
+  const TemporaryFolder folder;
+  const auto first =
+      imported(folder, "0,1,2", node("chair", 1) + "," + node("chair", 2) + "," + node("desk", 3));
+  const auto again =
+      imported(folder, "0,1,2,3,4",
+               R"({"mesh":0,"translation":[9,0,0]},)" + node("plant", 8) + "," + node("chair", 1) +
+                   "," + node("chair", 2) + "," + node("desk", 3));
+  ASSERT_EQ(first.size(), 3u);
+  for (const auto& [path, place] : first) {
+    ASSERT_TRUE(again.contains(path)) << path;
+    EXPECT_EQ(again.at(path), place) << path;
+  }
+  EXPECT_TRUE(first.contains("chair#2"));
+}
+
+TEST(StablePaths, RepeatsBelowOneParentLeaveThoseBelowAnotherAlone) {
+  const TemporaryFolder folder;
+  const auto paths =
+      imported(folder, "0,1",
+               R"({"name":"north","children":[2]},{"name":"south","children":[3,4]},)" +
+                   node("bed", 1) + "," + node("bed", 2) + "," + node("bed", 3));
+  EXPECT_TRUE(paths.contains("north/bed"));
+  EXPECT_TRUE(paths.contains("south/bed"));
+  EXPECT_TRUE(paths.contains("south/bed#2"));
+}
+
+TEST(StablePaths, AMeshThatManyNodesUseIsStoredOnce) {
+  const TemporaryFolder folder;
+  std::string nodes, roots;
+  for (int i = 0; i < 400; ++i) {
+    nodes += (i == 0 ? "" : ",") + node("chair", i);
+    roots += (i == 0 ? "" : ",") + std::to_string(i);
+  }
+  const Model model =
+      importModel(folder.write("model.gltf", gltf(BoxMesh({1, 1, 1}), roots, nodes)));
+  EXPECT_EQ(model.objects.size(), 400u);
+  EXPECT_EQ(model.meshes.size(), 1u);
+  EXPECT_EQ(Scene{Model(model)}.shapeCount(), 1u);
+}
+
+}  // namespace
+}  // namespace enfilade::scene
