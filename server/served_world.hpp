@@ -56,7 +56,7 @@ struct ServedClock {
 struct ServedWorld {
   ServedWorld(std::shared_ptr<const scene::Scene> scene, FrameService& frameService,
               RayService& rayService, const ServerLimits& serverLimits,
-              const scene::Lengths& lengths);
+              const scene::Lengths& lengths = {});
 
   scene::World world;
   FrameService& frames;

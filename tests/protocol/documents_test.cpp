@@ -65,7 +65,7 @@ TEST(Documents, EveryCommandOfScriptMdParses) {
     EXPECT_EQ(parseScript(command, "SCRIPT.md").lines.size(), 1u) << command;
     ++commands;
   }
-  EXPECT_EQ(commands, 7);
+  EXPECT_EQ(commands, 12);
 }
 
 TEST(Documents, TheClientsBytesOfProtocolMdAreAHello) {

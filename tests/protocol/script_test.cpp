@@ -113,7 +113,7 @@ TEST(Script, MissingKeysAreToldWithWhatToAdd) {
 TEST(Script, UnknownDoubledAndContradictingKeysAreTold) {
   expectError(R"({"walk":"ann","to":[1,2,3],"sped":2})",
               R"(tour.jsonl:1: "sped" is no key of a line that says walk; its keys are walk, to)");
-  expectError(R"({"jump":"ann"})", "tour.jsonl:1: no command");
+  expectError(R"({"hop":"ann"})", "tour.jsonl:1: no command");
   expectError(R"({"leave":"ann","leave":"bob"})", "tour.jsonl:1: leave: stands twice");
   expectError(R"({"walk":"ann","to":[1,2,3],"along":[[1,2,3]]})",
               R"(tour.jsonl:1: to: stands beside "along")");
