@@ -58,14 +58,16 @@ TEST(Documents, EveryCommandOfScriptMdParses) {
     for (const auto& [placeholder, value] : {std::pair<std::string, std::string>{"NAME", "\"ann\""},
                                              {"FILE", "\"hall\""},
                                              {"[x,y,z]", "[1,2,3]"},
-                                             {":seconds", ":1"}}) {
+                                             {":seconds", ":1"},
+                                             {":degrees", ":90"},
+                                             {":N}", ":0}"}}) {
       const std::size_t at = command.find(placeholder);
       if (at != std::string::npos) command.replace(at, placeholder.size(), value);
     }
     EXPECT_EQ(parseScript(command, "SCRIPT.md").lines.size(), 1u) << command;
     ++commands;
   }
-  EXPECT_EQ(commands, 12);
+  EXPECT_EQ(commands, 15);
 }
 
 TEST(Documents, TheClientsBytesOfProtocolMdAreAHello) {
