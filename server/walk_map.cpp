@@ -124,9 +124,11 @@ std::vector<LegendEntry> legendOf(const WalkTrace& trace) {
   for (std::size_t i = 0; i < trace.paths.size(); ++i) {
     entries.push_back({trace.paths[i].avatar, colourOf(i)});
   }
-  entries.push_back({"contact begins (floors left out)", kContact});
-  entries.push_back({"walk ends blocked", kStop});
-  entries.push_back({"picture taken", kCamera});
+  for (const auto& [text, colour] :
+       {std::pair{"contact begins (floors left out)", kContact},
+        std::pair{"walk ends blocked", kStop}, std::pair{"picture taken", kCamera}}) {
+    entries.push_back({text, colour});
+  }
   return entries;
 }
 
