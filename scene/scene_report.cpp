@@ -91,6 +91,10 @@ void findRepeats(const Scene& scene, Findings& findings) {
 
 }  // namespace
 
+bool isNote(const Problem& problem) {
+  return problem.kind == "skipped_spaces" || problem.kind == "skipped_openings";
+}
+
 Box boxOf(const Scene& scene, std::uint32_t object) {
   const auto& still = scene.solidObjects();
   const auto at = std::lower_bound(still.begin(), still.end(), object);

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <stdexcept>
 
@@ -37,7 +38,9 @@ ExitCode inspect(const InspectCommand& command) {
   if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
     throw std::runtime_error("stdout cannot be written");
   if (!command.plan.empty()) drawPlans(inspection.loaded.scene, command.plan);
-  const bool wrong = command.strict && !inspection.report.problems.empty();
+  const auto& problems = inspection.report.problems;
+  const bool wrong =
+      command.strict && !std::all_of(problems.begin(), problems.end(), scene::isNote);
   return wrong ? ExitCode::violations : ExitCode::done;
 }
 

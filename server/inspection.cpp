@@ -44,7 +44,8 @@ json jsonOf(const scene::ShellCounts& shells) {
 json problemsOf(const scene::SceneReport& report) {
   json list = json::array();
   for (const scene::Problem& p : report.problems)
-    list.push_back({{"kind", p.kind}, {"count", p.count}, {"example", p.example}});
+    list.push_back(
+        {{"kind", p.kind}, {"count", p.count}, {"example", p.example}, {"note", scene::isNote(p)}});
   return list;
 }
 
@@ -165,7 +166,8 @@ void addLargest(const scene::Scene& scene, Table& table) {
 void addProblems(const scene::SceneReport& report, Table& table) {
   table.line("\nproblems: %s", report.problems.empty() ? "none" : "");
   for (const scene::Problem& p : report.problems)
-    table.line("  %8zu  %-26s as %s", p.count, p.kind.c_str(), p.example.c_str());
+    table.line("  %8zu  %-26s %sas %s", p.count, p.kind.c_str(),
+               scene::isNote(p) ? "(nothing is wrong) " : "", p.example.c_str());
 }
 
 /// How many of each kind, and the first ones by name.

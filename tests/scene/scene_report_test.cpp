@@ -68,5 +68,11 @@ TEST(SceneReport, TellsWhatIsOddWithItsFirstExample) {
   EXPECT_EQ(exampleOf(report, "inside_out_solid"), "turned");
 }
 
+TEST(SceneReport, SpacesThatAreAirAreNotedAndNothingIsWrongWithThem) {
+  EXPECT_TRUE(isNote({"skipped_spaces", 3, "hall"}));
+  EXPECT_TRUE(isNote({"skipped_openings", 1, "door's"}));
+  EXPECT_FALSE(isNote({"uncut_opening", 1, "door"}));
+}
+
 }  // namespace
 }  // namespace enfilade::scene
