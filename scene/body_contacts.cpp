@@ -107,10 +107,10 @@ void findBodyContacts(WorldState& world, TickReport& report, QueryCount& count) 
   for (const auto& [key, before] : world.bodyContacts) {
     const auto after = now.find(key);
     const auto gone = parted.find(key);
+    const Contact& last = gone == parted.end() ? before : gone->second;
     tellEnd(
         world, key.first, before, after == now.end() ? nullptr : &after->second,
-        [&] { return gone == parted.end() ? before.decision : gone->second.decision; },
-        report.contacts);
+        [&last] { return last.decision; }, report.contacts);
   }
   world.bodyContacts = std::move(now);
   for (const auto& [key, contact] : world.bodyContacts) {
