@@ -87,8 +87,7 @@ std::uint64_t FrameService::drawn() const {
 }
 
 void FrameService::draw(FrameJob job, std::function<void(Buffer)> done) {
-  const auto drawing = const auto drawing =
-      std::make_shared<Drawing>(Drawing{std::move(job), {}, std::move(done)});
+  const auto drawing = std::make_shared<Drawing>(Drawing{std::move(job), {}, std::move(done)});
   if (state_->renderer) {
     const View& view = drawing->job.view;
     drawing->frame = state_->renderer->render(drawing->job.snapshot, view.camera, view.hidden);
