@@ -200,9 +200,11 @@ void addLift(Sketch& sketch) {
          Paint::chrome);
   sketch.place(path + "cabin", cabin, moved(at));
   sketch.moves(MovingPart::Kind::slide, {0, 1, 0}, 0, kUpper);
+  // It stands still: only what the cabin leaves free at its upper stop.
+  const double roof = kUpper + 2.4;
   Shape cable;
-  addRod(cable, {0, 0, 0}, {0, top - 2.4, 0}, 0.012, 8, Paint::darkIron);
-  sketch.place(path + "cable", cable, moved({mid, 2.355, at.z()}));
+  addRod(cable, {0, 0, 0}, {0, top - roof - 0.045, 0}, 0.012, 8, Paint::darkIron);
+  sketch.place(path + "cable", cable, moved({mid, roof, at.z()}));
 }
 
 }  // namespace enfilade::assets
