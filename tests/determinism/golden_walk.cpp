@@ -1,7 +1,7 @@
 // Prints the state hash at the end of some worlds in which everything that moves moves: walkers on
-// stairs, a crowd, flyers among slivers, a driven arm, doors and a lift. The scenes and commands
-// are made without libm, so that every build on every processor is given the same ones and must
-// print the same lines.
+// stairs, a crowd, flyers among slivers, a driven arm, doors and a lift, a heap of free bodies. The
+// scenes and commands are made without libm, so that every build on every processor is given the
+// same ones and must print the same lines.
 #include <cstdio>
 #include <memory>
 
@@ -164,6 +164,29 @@ void doors() {
   print("doors", world);
 }
 
+/// Boxes, slabs and wedges thrown on a heap that somebody walks into.
+void heap() {
+  Builder b;
+  b.box("floor", {-5, -0.2, -5}, {5, 0, 5});
+  Seeded random(14);
+  for (std::uint32_t i = 0; i < 24; ++i) {
+    const Vec3 at(0.45 * (i % 3) - 0.45, 0.1 + 0.5 * (i / 6), 0.4 * (i % 2));
+    const double wide = random.uniform(0.15, 0.35), high = random.uniform(0.1, 0.4);
+    b.box("piece", at, at + Vec3(wide, high, random.uniform(0.15, 0.35)));
+    BodySpec piece;
+    piece.name = "piece" + std::to_string(i);
+    piece.objects = {i + 1};
+    piece.friction = random.uniform(0.1, 0.8);
+    piece.restitution = random.uniform(0, 0.4);
+    b.model.bodies.push_back(piece);
+  }
+  World world(std::make_shared<const Scene>(b.model));
+  order(world, "ann", Spawn{{-2.5, 0, 0.2}});
+  order(world, "ann", Walk{{{2.5, 0, 0.2}}, 1.2});
+  ticks(world, 300);
+  print("heap", world);
+}
+
 }  // namespace
 
 int main() {
@@ -172,5 +195,6 @@ int main() {
   flyers();
   arm();
   doors();
+  heap();
   std::printf("refused  %d commands\n", refusedCommands);
 }
