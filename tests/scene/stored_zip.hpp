@@ -19,9 +19,9 @@ inline std::uint32_t crc32Of(const std::string& bytes) {
 
 /// Names and contents. The layout is that of PKWARE's APPNOTE.TXT, 4.3.
 inline std::string storedZip(const std::vector<std::pair<std::string, std::string>>& members) {
-  const auto number = [](std::size_t value, std::size_t bytes) {
+  const auto number = [](std::size_t value, std::size_t bytes) {  // little-endian
     std::string text;
-    for (std::size_t i = 0; i < bytes; ++i) text += static_cast<char>(value >> (8 * i) & 255);
+    for (std::size_t i = 0; i < bytes; ++i, value >>= 8) text += static_cast<char>(value & 255);
     return text;
   };
   std::string archive, directory;
