@@ -24,14 +24,11 @@ std::string readWhole(const std::filesystem::path& file) {
 
 }  // namespace
 
-BodyFindings findBodies(Model& model, const std::filesystem::path& file) {
-  BodyFindings findings;
+void findBodies(Model& model, const std::filesystem::path& file) {
   const std::filesystem::path sidecar = sidecarOf(file);
   std::error_code problem;
   if (std::filesystem::exists(sidecar, problem))
     applySidecar(model, readWhole(sidecar), sidecar.filename().string());
-  findings.sidecar = model.bodies.size();
-  return findings;
 }
 
 }  // namespace enfilade::scene

@@ -36,11 +36,10 @@ LoadedScene loadSceneTimed(const ModelOptions& options) {
       [&](const std::string& stage, double fraction) { bar.show(fraction, stage); });
   bar.clear();
   for (const std::string& note : model.notes) spdlog::warn("cache: {}", note);
-  const scene::BodyFindings bodies = scene::findBodies(model.model, options.file);
+  scene::findBodies(model.model, options.file);
   if (!model.model.bodies.empty())
-    spdlog::info("{}: {} bodies, {} of them from {}", options.file.filename().string(),
-                 model.model.bodies.size(), bodies.sidecar,
-                 scene::sidecarOf(options.file).filename().string());
+    spdlog::info("{}: {} bodies from {}", options.file.filename().string(),
+                 model.model.bodies.size(), scene::sidecarOf(options.file).filename().string());
   LoadedScene loaded{nullptr, model.fromCache, model.importSeconds, 0};
   loaded.scene = std::make_shared<const scene::Scene>(std::move(model.model));
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
