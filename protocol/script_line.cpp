@@ -26,7 +26,7 @@ constexpr double kLongestWaitOfOne = 86400;  // seconds
 constexpr std::size_t kLongestBodyName = 1000;
 constexpr double kRadiansPerDegree = 0.017453292519943295;  // as the sidecar's reader has it
 constexpr std::size_t kLongestQuote = 40;
-// What a world takes at most (scene/order_refusals.cpp); its own limits may be lower.
+// What a world takes at most (scene/avatars/order_refusals.cpp); its own limits may be lower.
 constexpr double kFarthest = 1e7;  // metres
 constexpr double kFastest = 1000;  // metres per second
 constexpr double kMostDegrees = 1e6;

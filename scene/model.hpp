@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "collision/types.hpp"
-#include "scene/body_spec.hpp"
+#include "scene/bodies/body_spec.hpp"
 
 namespace enfilade::scene {
 

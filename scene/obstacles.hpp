@@ -8,7 +8,7 @@
 #include "collision/narrow_phase.hpp"
 #include "collision/sort_and_sweep.hpp"
 #include "collision/time_of_impact.hpp"
-#include "scene/avatar_shape.hpp"
+#include "scene/avatars/avatar_shape.hpp"
 #include "scene/lengths.hpp"
 #include "scene/scene.hpp"
 #include "scene/snapshot.hpp"

@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "scene/body_shape.hpp"
+#include "scene/bodies/body_shape.hpp"
 #include "scene/model.hpp"
-#include "scene/object_parts.hpp"
+#include "scene/shapes/object_parts.hpp"
 
 namespace enfilade::scene {
 

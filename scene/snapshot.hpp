@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "scene/avatar_shape.hpp"
+#include "scene/avatars/avatar_shape.hpp"
 #include "scene/model.hpp"
 
 namespace enfilade::scene {

@@ -12,8 +12,8 @@
 
 #include "collision/narrow_phase.hpp"
 #include "scene/audit.hpp"
+#include "scene/avatars/orders.hpp"
 #include "scene/lengths.hpp"
-#include "scene/orders.hpp"
 #include "scene/scene.hpp"
 #include "scene/snapshot.hpp"
 

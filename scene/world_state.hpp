@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "collision/sort_and_sweep.hpp"
-#include "scene/body.hpp"
-#include "scene/chain.hpp"
+#include "scene/avatars/chain.hpp"
+#include "scene/bodies/body.hpp"
 #include "scene/hasher.hpp"
 #include "scene/obstacles.hpp"
-#include "scene/rigid_stage.hpp"
+#include "scene/rigid/rigid_stage.hpp"
 #include "scene/world.hpp"
 
 namespace enfilade::scene {

@@ -4,7 +4,7 @@
 #include <charconv>
 
 #include "scene/audit.hpp"
-#include "scene/import_model.hpp"
+#include "scene/import/import_model.hpp"
 #include "scene/rotation.hpp"
 
 namespace enfilade::server {

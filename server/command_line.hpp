@@ -6,7 +6,7 @@
 #include <string>
 #include <variant>
 
-#include "scene/import_model.hpp"
+#include "scene/import/import_model.hpp"
 #include "scene/lengths.hpp"
 #include "server/exit_code.hpp"
 

@@ -4,9 +4,9 @@
 
 #include <chrono>
 
-#include "scene/find_bodies.hpp"
-#include "scene/model_cache.hpp"
-#include "scene/sidecar.hpp"
+#include "scene/bodies/find_bodies.hpp"
+#include "scene/bodies/sidecar.hpp"
+#include "scene/import/model_cache.hpp"
 #include "server/progress.hpp"
 
 namespace enfilade::server {

@@ -1,4 +1,4 @@
-#include "scene/import_model.hpp"
+#include "scene/import/import_model.hpp"
 #include "server/program.hpp"
 
 int main(int argc, char** argv) {

@@ -18,7 +18,7 @@
 #include <random>
 
 #include "assets/building.hpp"
-#include "scene/model_cache.hpp"
+#include "scene/import/model_cache.hpp"
 #include "scene/world.hpp"
 #include "tests/scene/thin_things.hpp"
 #include "tests/support/shared_folder.hpp"

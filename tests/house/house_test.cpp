@@ -70,6 +70,18 @@ TEST(HouseRules, AnUpwardIncludeIsAFault) {
             Faults{"collision/hull.cpp:2: collision/ may not include scene/"});
 }
 
+TEST(HouseRules, ARoomOfTheSceneMayIncludeOnlyWhatItIsToldTo) {
+  const Sources sources{{"scene/model.hpp", ""},
+                        {"scene/world.hpp", ""},
+                        {"scene/shapes/shape.hpp", "#include \"scene/model.hpp\"\n"},
+                        {"scene/rigid/solver.cpp", "#include \"scene/shapes/shape.hpp\"\n"},
+                        {"scene/world.cpp", "#include \"scene/shapes/shape.hpp\"\n"},
+                        {"scene/import/ifc/facts.cpp",
+                         "#include \"scene/model.hpp\"\n#include \"scene/world.hpp\"\n"}};
+  EXPECT_EQ(includeDirections(sources),
+            Faults{"scene/import/ifc/facts.cpp:2: scene/import/ may not include scene/world.hpp"});
+}
+
 TEST(HouseRules, ProtocolKnowsNobody) {
   const Sources sources{{"collision/hull.hpp", ""},
                         {"protocol/client.cpp", "#include \"collision/hull.hpp\"\n"}};

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <random>
 
-#include "scene/avatar_shape.hpp"
+#include "scene/avatars/avatar_shape.hpp"
 #include "tests/scene/trial.hpp"
 
 namespace enfilade::scene {

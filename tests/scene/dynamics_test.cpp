@@ -1,4 +1,4 @@
-#include "scene/dynamics.hpp"
+#include "scene/rigid/dynamics.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
-#include "scene/ifc_facts.hpp"
+#include "scene/import/ifc/facts.hpp"
 
 #include <gtest/gtest.h>
 
-#include "scene/import_ifc.hpp"
+#include "scene/import/ifc/import_ifc.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
 
 namespace enfilade::scene {

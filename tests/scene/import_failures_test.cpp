@@ -5,7 +5,7 @@
 #include <cerrno>
 #include <cstdlib>
 
-#include "scene/import_model.hpp"
+#include "scene/import/import_model.hpp"
 #include "tests/scene/hand_made_files.hpp"
 
 namespace enfilade::scene {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "scene/import_model.hpp"
+#include "scene/import/import_model.hpp"
 #include "scene/scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
 

@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <random>
 
-#include "scene/import_model.hpp"
+#include "scene/import/ifc/web_ifc.hpp"
+#include "scene/import/import_model.hpp"
 #include "scene/scene.hpp"
-#include "scene/web_ifc.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
 #include "tests/scene/stored_zip.hpp"

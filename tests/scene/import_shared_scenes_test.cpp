@@ -8,9 +8,9 @@
 #include <random>
 #include <set>
 
-#include "scene/import_model.hpp"
+#include "scene/import/ifc/web_ifc.hpp"
+#include "scene/import/import_model.hpp"
 #include "scene/scene.hpp"
-#include "scene/web_ifc.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/support/shared_folder.hpp"
 

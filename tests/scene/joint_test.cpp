@@ -1,4 +1,4 @@
-#include "scene/joint.hpp"
+#include "scene/rigid/joint.hpp"
 
 #include <gtest/gtest.h>
 

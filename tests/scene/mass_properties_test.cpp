@@ -1,4 +1,4 @@
-#include "scene/mass_properties.hpp"
+#include "scene/shapes/mass_properties.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // A second start reads what the first one kept; whatever is not as it was is imported again.
-#include "scene/model_cache.hpp"
+#include "scene/import/model_cache.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <fstream>
 #include <random>
 
-#include "scene/model_stream.hpp"
-#include "scene/share_meshes.hpp"
+#include "scene/import/model_stream.hpp"
+#include "scene/import/share_meshes.hpp"
 #include "tests/scene/box_scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
 

@@ -1,5 +1,5 @@
 // What stands in an avatar's way: hulls hold their triangles, and solids are solid.
-#include "scene/object_parts.hpp"
+#include "scene/shapes/object_parts.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <random>
 
-#include "scene/avatar_shape.hpp"
+#include "scene/avatars/avatar_shape.hpp"
 #include "tests/scene/body_trial.hpp"
 
 namespace enfilade::scene::testing {

@@ -1,4 +1,4 @@
-#include "scene/rigid_body.hpp"
+#include "scene/rigid/rigid_body.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "collision/hull.hpp"
-#include "scene/dynamics.hpp"
+#include "scene/rigid/dynamics.hpp"
 
 namespace enfilade::scene {
 

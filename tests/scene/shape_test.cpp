@@ -1,5 +1,5 @@
 // Shapes with known answers: what is closed, what is convex, which way it looks.
-#include "scene/shape.hpp"
+#include "scene/shapes/shape.hpp"
 
 #include <gtest/gtest.h>
 

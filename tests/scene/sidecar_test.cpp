@@ -1,4 +1,4 @@
-#include "scene/sidecar.hpp"
+#include "scene/bodies/sidecar.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <map>
 
-#include "scene/import_model.hpp"
+#include "scene/import/import_model.hpp"
 #include "scene/scene.hpp"
 #include "scene/scene_report.hpp"
 #include "tests/scene/hand_made_files.hpp"

@@ -1,4 +1,4 @@
-#include "scene/step_file.hpp"
+#include "scene/import/ifc/step_file.hpp"
 
 #include <gtest/gtest.h>
 

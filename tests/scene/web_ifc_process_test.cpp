@@ -3,8 +3,8 @@
 
 #include <cstdlib>
 
-#include "scene/import_model.hpp"
-#include "scene/web_ifc.hpp"
+#include "scene/import/ifc/web_ifc.hpp"
+#include "scene/import/import_model.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
 

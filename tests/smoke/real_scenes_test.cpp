@@ -6,7 +6,7 @@
 #include <set>
 
 #include "render/renderer.hpp"
-#include "scene/import_model.hpp"
+#include "scene/import/import_model.hpp"
 #include "scene/world.hpp"
 #include "tests/support/shared_folder.hpp"
 

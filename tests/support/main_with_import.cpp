@@ -1,7 +1,7 @@
 // main() of test programs that import models: importModel() starts the program again.
 #include <gtest/gtest.h>
 
-#include "scene/import_model.hpp"
+#include "scene/import/import_model.hpp"
 
 int main(int argc, char** argv) {
   if (const auto code = enfilade::scene::runImportChild(argc, argv)) return *code;

@@ -8,7 +8,7 @@
 #include "collision/bounding_box.hpp"
 #include "collision/hull.hpp"
 #include "collision/sort_and_sweep.hpp"
-#include "scene/dynamics.hpp"
+#include "scene/rigid/dynamics.hpp"
 
 namespace enfilade::testing {
 

@@ -1,0 +1,91 @@
+// A body in a world: where it is, how it moves, and what it met. The model says which bodies there
+// are; they stay as long as the world does. Those that stand cost nothing.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "collision/sort_and_sweep.hpp"
+#include "scene/bodies/body_shape.hpp"
+#include "scene/obstacles.hpp"
+
+namespace enfilade::scene {
+
+/// Where a kinematic body is, relative to its authored place. Between two of these, within a tick,
+/// both change evenly.
+struct BodyPlace {
+  Vec3 offset = Vec3::Zero();  ///< metres, scene frame
+  double turn = 0;             ///< radians about the spec's axis through the anchor
+};
+
+/// A contact that lasts, or a near miss.
+struct Contact {
+  EntityId other = 0;
+  bool touching = false;  ///< closer than 2 epsilon; else a near miss that was told
+  collision::Decision decision;
+  double penetration = 0;       ///< metres; the depth, or an upper bound of it
+  bool nearTold = false;        ///< a near miss is under way
+  collision::Decision closest;  ///< of the near miss so far
+  std::uint64_t closestTick = 0;
+};
+
+/// What a kinematic body is about. All of it is part of the state.
+struct BodyDrive {
+  BodyPlace place;
+  double coordinate = 0;  ///< along its one degree of freedom, as the spec says
+  double rate = 0;        ///< of the coordinate, per second; signed
+  double target = 0;      ///< coordinate that it goes to; of no meaning for a path that loops
+  double speed = 0;       ///< most |rate|, > 0
+  bool going = false;     ///< to its target, or round its path
+  double closesIn = -1;   ///< seconds; negative: it stays as it is
+};
+
+/// Where a kinematic body wants to be at the end of the tick; it gets there unless it is blocked.
+struct BodyPlan {
+  BodyPlace place;
+  double coordinate = 0;
+  double farthest = 0;  ///< metres: no point of the body moves farther; 0: it does not move
+};
+
+struct Body {
+  EntityId id = 0;  ///< of its first object
+  const BodySpec* spec = nullptr;
+  std::shared_ptr<const BodyShape> shape;
+
+  // worldFromBody: a point p of the body's frame is at rotation * p + position. Set by placeBody().
+  Vec3 position = Vec3::Zero();  ///< scene frame, metres; shape->origin where it was authored
+  collision::Quat orientation = collision::Quat::Identity();  ///< unit
+  collision::Mat3 rotation = collision::Mat3::Identity();     ///< of `orientation`
+  bool turned = false;         ///< `rotation` is not the identity to the last bit
+  std::vector<Box> partBoxes;  ///< scene frame; at least the exact ones
+
+  Vec3 velocity = Vec3::Zero();  ///< of the origin of its frame, m/s, scene frame
+  Vec3 spin = Vec3::Zero();      ///< rad/s, scene frame
+  bool asleep = true;            ///< rigid: stands until something wakes it; others: false
+  bool moved = false;            ///< in this tick
+  bool left = false;             ///< rigid: it left the world, and stays where it was caught
+  EntityId blockedBy = 0;        ///< what a kinematic body cannot push aside; 0: nothing
+
+  BodyDrive drive;  ///< kinematic
+  BodyPlan plan;    ///< kinematic, of this tick
+
+  collision::MoverId mover = 0;
+  Box reach;  ///< what it can meet in this tick
+
+  std::vector<EntityId> inside;  ///< triggers: who is in it, ascending
+};
+
+/// Puts a body somewhere: pose and boxes.
+void placeBody(Body& body, const Vec3& position, const collision::Quat& orientation);
+
+/// Part `part` as the narrow phase takes it. Points into the body.
+collision::ConvexBody partOf(const Body& body, std::uint32_t part);
+
+/// Of all parts, scene frame.
+Box boxOf(const Body& body);
+
+/// The pose that a kinematic body has at a place.
+collision::Pose poseAt(const BodySpec& spec, const BodyPlace& place);
+
+}  // namespace enfilade::scene

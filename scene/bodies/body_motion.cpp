@@ -1,0 +1,217 @@
+// How doors, lifts and things on paths move: each in turn, in the order of the model, swept against
+// avatars and other bodies that can yield, where these stand now.
+//  1. Riders that the body would lift go first; what it leaves behind follows it afterwards.
+//  2. The body goes until it comes near something. That is pushed along the normal by as much as
+//     the body still needs, by a sweep of its own, so that a push crosses nothing.
+//  3. Where that gains nothing, the body stops and says so; it tries again in the next tick.
+// Still objects stop no kinematic body: its limits say where it may go, and doors touch their
+// frames as drawn.
+#include <algorithm>
+#include <cmath>
+
+#include "scene/bodies/body_sweep.hpp"
+#include "scene/world_state.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr int kPushes = 64;         // in one tick of one body
+constexpr int kPushSlides = 3;      // planes along which one push goes on
+constexpr double kYield = 1e-3;     // of epsilon: a push that gains less is none
+constexpr double kSidewards = 0.7;  // |normal.y| below which a push stays level
+
+BodyWay wayOf(const Body& body, const BodyPlace& to) {
+  const BodyPlace& from = body.drive.place;
+  return {body.rotation, body.position, to.offset - from.offset, body.spec->axis,
+          to.turn - from.turn};
+}
+
+/// Where a point that moves with the body would come to.
+Vec3 carried(const Body& body, const BodyPlace& to, const Vec3& point) {
+  const collision::Pose pose = poseAt(*body.spec, to);
+  const Vec3 local = body.rotation.transpose() * (point - body.position);
+  return pose.rotation.toRotationMatrix() * local + pose.translation;
+}
+
+/// Moves the avatar by `wish` as far as it can, sliding along what is met.
+void shove(WorldState& world, Avatar& avatar, Vec3 wish, QueryCount& count) {
+  gatherObstacles(world, avatar);
+  const Box room = feetRoomIn(avatar.reach, avatar.shape->box, lookoutOf(world.lengths));
+  for (int i = 0; i < kPushSlides && !wish.isZero(0); ++i) {
+    const Vec3 granted = partInside(room, avatar.feet, wish) * wish;
+    const Stop stop = sweepShape(*avatar.shape, avatar.feet, granted, avatar.obstacles,
+                                 bandOf(world.lengths), count);
+    avatar.feet += stop.fraction * granted;
+    if (stop.entity == 0) return;
+    const Vec3 rest = (1 - stop.fraction) * granted;
+    wish = rest - std::min(0.0, rest.dot(stop.normal)) * stop.normal;
+  }
+}
+
+/// Where an avatar goes that must give way by `distance` along `normal`: across the ground, unless
+/// it is pushed up or down.
+Vec3 yieldingWay(const Vec3& normal, double distance) {
+  if (std::abs(normal.y()) >= kSidewards) return distance * normal;
+  const Vec3 level{normal.x(), 0, normal.z()};
+  const double length = level.norm();
+  return distance / (length * length) * level;
+}
+
+/// Who stops the body, and where.
+struct Encounter {
+  Avatar* avatar = nullptr;
+  BodySweep sweep;
+};
+
+void meet(const Body& body, const BodyWay& way, double farthest, Avatar& avatar,
+          const WorldState& world, Encounter& first, QueryCount& count) {
+  const collision::StoppingBand band = bandOf(world.lengths);
+  for (const AvatarPart& limb : avatar.shape->parts) {
+    const Box box = grown(boxAt(limb.box, avatar.feet), band.high + farthest);
+    for (std::size_t part = 0; part < body.partBoxes.size(); ++part) {
+      if (!overlaps(box, body.partBoxes[part])) continue;
+      const BodySweep sweep =
+          sweepTurning(body.shape->parts[part], way, bodyAt(limb, avatar.feet), band, count);
+      if (sweep.stopped && (!first.avatar || sweep.fraction < first.sweep.fraction))
+        first = {&avatar, sweep};
+    }
+  }
+}
+
+/// Avatars that the broad phase has near the body, in order of name.
+std::vector<Avatar*> avatarsNear(WorldState& world, const Body& body) {
+  std::vector<std::string> names;
+  for (const auto& partner : world.broadPhase.partners(body.mover)) {
+    if (!partner.moves) continue;
+    const auto found = world.avatarOfMover.find(partner.id);
+    if (found != world.avatarOfMover.end()) names.push_back(found->second);
+  }
+  std::sort(names.begin(), names.end());
+  std::vector<Avatar*> avatars;
+  for (const std::string& name : names) avatars.push_back(&world.avatars.at(name));
+  return avatars;
+}
+
+struct Rider {
+  Avatar* avatar;
+  Vec3 contact;  ///< on the body, scene frame, before it moves
+};
+
+/// Who stands on the body.
+std::vector<Rider> ridersOf(const WorldState& world, const Body& body,
+                            const std::vector<Avatar*>& near) {
+  std::vector<Rider> riders;
+  for (Avatar* avatar : near) {
+    if (!avatar->grounded) continue;
+    for (const Contact& contact : avatar->contacts) {
+      const bool below = -contact.decision.normal.y() >= world.lengths.walkableNormalY;
+      if (contact.other == body.id && contact.touching && below)
+        riders.push_back({avatar, contact.decision.pointB});
+    }
+  }
+  return riders;
+}
+
+void commit(Body& body, const BodyPlace& to, double fraction) {
+  BodyPlace& place = body.drive.place;
+  if (fraction == 1) {
+    place = to;
+  } else {
+    place.offset += fraction * (to.offset - place.offset);
+    place.turn += fraction * (to.turn - place.turn);
+  }
+  const collision::Pose pose = poseAt(*body.spec, place);
+  placeBody(body, pose.translation, pose.rotation);
+  body.moved = body.moved || fraction > 0;
+}
+
+/// Pushes who is in the way; false when that gains the body nothing.
+bool push(WorldState& world, const Body& body, const BodyPlace& to, const Encounter& met,
+          QueryCount& count) {
+  const collision::Decision& at = met.sweep.atStop;
+  if (at.verdict != collision::Verdict::separated) return false;
+  const double needed = at.normal.dot(carried(body, to, at.pointA) - at.pointA);
+  const double apart = std::max(0.0, bandOf(world.lengths).high - at.distance);
+  const Vec3 before = met.avatar->feet;
+  shove(world, *met.avatar, yieldingWay(at.normal, std::max(0.0, needed) + apart), count);
+  return (met.avatar->feet - before).dot(at.normal) > kYield * world.lengths.epsilon;
+}
+
+void tellBlocked(const WorldState& world, Body& body, const Encounter& met, TickReport& report) {
+  const bool told = body.blockedBy == met.avatar->id;
+  body.blockedBy = met.avatar->id;
+  body.drive.rate = 0;
+  if (told) return;
+  ContactEvent event;
+  event.tick = world.tick;
+  event.time = static_cast<double>(world.tick) * world.lengths.tick;
+  event.kind = ContactEvent::Kind::blocked;
+  event.a = body.id;
+  event.b = met.avatar->id;
+  event.decision = met.sweep.atStop;
+  report.contacts.push_back(event);
+}
+
+/// Goes on, pushing, until the body is there or blocked; what part of the coordinate was made.
+double advance(WorldState& world, Body& body, const std::vector<Avatar*>& near, TickReport& report,
+               QueryCount& count) {
+  const BodyPlace to = body.plan.place;
+  double left = 1;
+  Encounter met;
+  for (int i = 0; i < kPushes; ++i) {
+    met = {};
+    const BodyWay way = wayOf(body, to);
+    for (Avatar* avatar : near) meet(body, way, body.plan.farthest, *avatar, world, met, count);
+    commit(body, to, met.sweep.fraction);
+    left *= 1 - met.sweep.fraction;
+    if (!met.avatar) {
+      body.blockedBy = 0;
+      return 1;
+    }
+    if (!push(world, body, to, met, count)) break;
+    if (i + 1 == kPushes) ++count.bounded;
+  }
+  tellBlocked(world, body, met, report);
+  return 1 - left;
+}
+
+void arrive(Body& body, double made) {
+  BodyDrive& drive = body.drive;
+  if (made == 1) {
+    drive.coordinate = body.plan.coordinate;
+    const bool goesRound = body.spec->kind == BodyKind::path && body.spec->loops;
+    if (!goesRound && drive.coordinate == drive.target) drive.going = false;
+  } else if (body.plan.coordinate > drive.coordinate || !body.spec->loops) {
+    drive.coordinate += made * (body.plan.coordinate - drive.coordinate);
+  }
+}
+
+void moveBody(WorldState& world, Body& body, TickReport& report, QueryCount& count) {
+  const std::vector<Avatar*> near = avatarsNear(world, body);
+  const Vec3 position = body.position;
+  const double turn = body.drive.place.turn;
+  const std::vector<Rider> riders = ridersOf(world, body, near);
+  std::vector<Vec3> local;
+  for (const Rider& rider : riders) {
+    local.push_back(body.rotation.transpose() * (rider.contact - position));
+    const Vec3 way = carried(body, body.plan.place, rider.contact) - rider.contact;
+    if (way.y() > 0) shove(world, *rider.avatar, way, count);
+  }
+  arrive(body, advance(world, body, near, report, count));
+  for (std::size_t i = 0; i < riders.size(); ++i) {
+    const Vec3 way = body.rotation * local[i] + body.position - riders[i].contact;
+    if (way.y() <= 0) shove(world, *riders[i].avatar, way, count);
+  }
+  const double tick = world.lengths.tick;
+  body.velocity = (body.position - position) / tick;
+  body.spin = (body.drive.place.turn - turn) / tick * body.spec->axis;
+}
+
+}  // namespace
+
+void moveBodies(WorldState& world, TickReport& report, QueryCount& count) {
+  for (const std::uint32_t index : world.goingBodies)
+    moveBody(world, world.bodies[index], report, count);
+}
+
+}  // namespace enfilade::scene

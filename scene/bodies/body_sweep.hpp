@@ -1,0 +1,35 @@
+// How far a body that moves and turns may go towards something that stands.
+#pragma once
+
+#include "collision/time_of_impact.hpp"
+#include "scene/bodies/body.hpp"
+
+namespace enfilade::scene {
+
+/// A way between two places, made evenly: the origin of the body's frame moves by `move`, and the
+/// body turns about it by `turn`.
+struct BodyWay {
+  collision::Mat3 rotation;   ///< worldFromBody at the start
+  Vec3 position;              ///< of the origin of the body's frame at the start
+  Vec3 move = Vec3::Zero();   ///< metres
+  Vec3 axis = Vec3::UnitY();  ///< unit
+  double turn = 0;            ///< radians
+  collision::Mat3 rotationAt(double s) const;
+  Vec3 positionAt(double s) const { return position + s * move; }
+};
+
+struct BodySweep {
+  double fraction = 1;         ///< 0..1 of the way that may be made
+  bool stopped = false;        ///< by what stands; else `fraction` is 1
+  collision::Decision atStop;  ///< at `fraction`, from the body to what stands; only when stopped
+};
+
+/// Moves a part (`radius` about the body's origin) along the way towards `other`, which stands. As
+/// for collision::sweep(): over what is granted the two stay at least min(band.low, their distance
+/// at the start) apart, up to the rounding of a turned pose, and a stop is at about band.high.
+/// Where they start nearer than band.low, only what does not close in is granted.
+BodySweep sweepTurning(const collision::Hull& part, const BodyWay& way,
+                       const collision::ConvexBody& other, const collision::StoppingBand& band,
+                       QueryCount& count);
+
+}  // namespace enfilade::scene

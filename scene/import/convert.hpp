@@ -1,0 +1,113 @@
+// From assimp's scene to ours. Runs in the import child only.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "scene/import/file_facts.hpp"
+#include "scene/import/import_model.hpp"
+
+struct aiNode;
+struct aiScene;
+
+namespace enfilade::scene {
+
+/// Counts problems by kind and keeps the first example of each.
+class ProblemLog {
+ public:
+  void add(const std::string& kind, const std::string& example, std::size_t count = 1);
+  const std::vector<Problem>& problems() const { return problems_; }
+
+ private:
+  std::vector<Problem> problems_;
+};
+
+struct ConvertInput {
+  std::filesystem::path file;
+  ModelFormat format = ModelFormat::gltf;
+  FileFacts facts;
+  std::optional<double> metresPerUnit;  ///< the user's, which replaces the file's
+  std::optional<char> up;
+  Vec3 shift = Vec3::Zero();  ///< in the file's units and axes: taken off before assimp read it
+};
+
+/// A file's text with `shift` taken off its coordinates; empty: it may stay as it is.
+struct ShiftedText {
+  std::string text;
+  Vec3 shift = Vec3::Zero();
+};
+
+/// Of an OBJ file whose vertices lie farther than `farAway` (in its units) from its origin.
+ShiftedText shiftedObj(const std::filesystem::path& file, double farAway);
+
+constexpr double kFarAway = 1000;  ///< metres: farther from the origin, floats lose the millimetre
+constexpr double kCoarse = 1e-4;   ///< metres between neighbouring floats that deserve a word
+
+/// Throws ImportError when nothing solid is left. `input.facts` must be of the same file.
+Model convertScene(const aiScene& scene, const ConvertInput& input, const ImportProgress& progress);
+
+/// Materials in assimp's order and the textures that they use, decoded.
+void convertMaterials(const aiScene& scene, const ConvertInput& input, Model& model,
+                      ProblemLog& problems, const ImportProgress& progress);
+
+/// One mesh for each of assimp's, some of them without triangles.
+std::vector<Mesh> convertMeshes(const aiScene& scene, ProblemLog& problems);
+
+/// `mesh` moved by `transform`, which may mirror: outside stays outside.
+Mesh transformed(const Mesh& mesh, const Eigen::Affine3d& transform);
+
+/// What a node of the file becomes: placements are metres, Y up, offset not yet removed.
+struct ObjectDraft {
+  struct Placement {
+    std::uint32_t mesh;  ///< into the meshes that come with the drafts
+    Eigen::Affine3d worldFromMesh;
+  };
+  Object object;  ///< without meshes and their transform; worldFromPlacement as the placements
+  std::vector<Placement> placements;
+};
+
+/// From drafts to the model's objects and meshes: the offset removed, what lies too far away
+/// dropped, one transform an object. Materials are there before. Throws ImportError, naming `file`,
+/// when nothing is left.
+void finishModel(std::vector<ObjectDraft> drafts, std::vector<Mesh> meshes,
+                 const std::filesystem::path& file, Model& model, ProblemLog& problems);
+
+/// Y up from `up`, by a quarter turn about the axis that is neither.
+Eigen::Matrix3d yUpFrom(char up);
+
+/// A channel of a colour, 0..1.
+float linearFromSrgb(float c);
+
+/// One segment of a path: '/', '%', control characters and what is not UTF-8 are percent-encoded.
+std::string encodedName(std::string_view name);
+
+/// Names given out below one parent.
+class SiblingNames {
+ public:
+  /// `name`, or `name#2`, `name#3`, ... where it is taken.
+  std::string claim(const std::string& name);
+
+ private:
+  std::set<std::string> taken_;
+  std::map<std::string, std::size_t> repeats_;
+};
+
+/// Transforms of nodes to their parents, where they are known better than assimp knows them.
+using NodeTransforms = std::map<const aiNode*, Eigen::Affine3d>;
+
+/// What a glTF file says of its nodes, in doubles; those that cannot be found again are left out.
+NodeTransforms exactGltfTransforms(const aiScene& scene, const std::filesystem::path& file,
+                                   ModelFormat format);
+
+/// The nodes that carry triangles, in document order. `worldFromRoot` goes before the root's own
+/// transform.
+std::vector<ObjectDraft> collectObjects(const aiScene& scene, ModelFormat format,
+                                        const Eigen::Affine3d& worldFromRoot,
+                                        const NodeTransforms& exact,
+                                        const std::vector<Mesh>& meshes, ProblemLog& problems);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,170 @@
+// Whether doors and windows stand in holes. Readers of IFC cut openings out of walls by solid
+// modelling, which can fail in silence; what is left then is a wall that nobody can walk through.
+//
+// Through each door and window a grid of rays is sent, square to its host, and met with the host's
+// triangles alone. The opening is taken for cut where nearly all pass: a bar or a sill may stand in
+// the way of a few.
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "scene/import/ifc/import_ifc.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr int kGrid = 3;                // rays in a row
+constexpr int kEnough = 7;              // of kGrid * kGrid that have to pass
+constexpr double kBeyond = 0.5;         // metres that a ray goes on before and behind the door
+constexpr double kOblong = 1.5;         // a door's leaf drawn open makes its box square
+constexpr double kAlike = 0.2;          // OverallWidth and the box' width, relative
+constexpr std::size_t kMostNamed = 10;  // openings in one problem
+
+/// The door's or window's box in its own placement: x and y level, z up.
+struct Frame {
+  Eigen::Affine3d worldFromFrame;
+  Box box;      // metres
+  int through;  // 0 or 1: the level axis that goes through the wall
+};
+
+/// The axis that is not the door's width.
+int throughAxis(const Object& object, const Vec3& size) {
+  const auto like = [&](double extent) {
+    return object.overallWidth > 0 &&
+           std::abs(extent - object.overallWidth) <= kAlike * object.overallWidth;
+  };
+  if (size.x() > kOblong * size.y()) return 1;
+  if (size.y() > kOblong * size.x()) return 0;
+  return !like(size.x()) && like(size.y()) ? 0 : 1;
+}
+
+std::optional<Frame> frameOf(const Model& model, const Object& object) {
+  if (!object.worldFromPlacement) return std::nullopt;
+  Frame frame{*object.worldFromPlacement, {}, 1};
+  const Eigen::Affine3d frameFromMesh =
+      frame.worldFromFrame.inverse(Eigen::Isometry) * object.worldFromMesh;
+  for (const std::uint32_t mesh : object.meshes) {
+    for (const std::uint32_t i : model.meshes[mesh].indices) {
+      frame.box.include(frameFromMesh * model.meshes[mesh].positions[i].cast<double>());
+    }
+  }
+  if (frame.box.empty()) return std::nullopt;
+  frame.through = throughAxis(object, frame.box.size());
+  return frame;
+}
+
+using Corners = std::array<Vec3, 3>;
+
+/// Möller and Trumbore, Fast, minimum storage ray/triangle intersection (1997): a segment from
+/// `from` along `way` against a triangle.
+bool meets(const Vec3& from, const Vec3& way, const Corners& triangle) {
+  const Vec3 a = triangle[1] - triangle[0], b = triangle[2] - triangle[0];
+  const Vec3 p = way.cross(b);
+  const double determinant = a.dot(p);
+  if (determinant == 0) return false;  // seen from its edge
+  const Vec3 s = from - triangle[0];
+  const double u = s.dot(p) / determinant;
+  const Vec3 q = s.cross(a);
+  const double v = way.dot(q) / determinant;
+  const double t = b.dot(q) / determinant;
+  return u >= 0 && v >= 0 && u + v <= 1 && t >= 0 && t <= 1;
+}
+
+/// The triangles of `hosts` near the door, in its frame.
+std::vector<Corners> trianglesNear(const Model& model, const std::vector<const Object*>& hosts,
+                                   const Frame& frame) {
+  const Box reach = grown(frame.box, kBeyond);
+  std::vector<Corners> near;
+  for (const Object* host : hosts) {
+    const Eigen::Affine3d frameFromMesh =
+        frame.worldFromFrame.inverse(Eigen::Isometry) * host->worldFromMesh;
+    for (const std::uint32_t index : host->meshes) {
+      const Mesh& mesh = model.meshes[index];
+      for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+        Corners corners;
+        Box box;
+        for (std::size_t k = 0; k < 3; ++k) {
+          corners[k] = frameFromMesh * mesh.positions[mesh.indices[i + k]].cast<double>();
+          box.include(corners[k]);
+        }
+        if (collision::overlaps(box, reach)) near.push_back(corners);
+      }
+    }
+  }
+  return near;
+}
+
+int raysThatPass(const Frame& frame, const std::vector<Corners>& triangles) {
+  const int across = 1 - frame.through;
+  const Vec3 size = frame.box.size();
+  int passed = 0;
+  for (int i = 0; i < kGrid * kGrid; ++i) {
+    const double column = (i % kGrid + 1.0) / (kGrid + 1), row = (i / kGrid + 1.0) / (kGrid + 1);
+    Vec3 from = frame.box.min;
+    from[across] += column * size[across];
+    from.z() += row * size.z();
+    from[frame.through] -= kBeyond;
+    Vec3 way = Vec3::Zero();
+    way[frame.through] = size[frame.through] + 2 * kBeyond;
+    const bool blocked = std::any_of(triangles.begin(), triangles.end(),
+                                     [&](const Corners& t) { return meets(from, way, t); });
+    if (!blocked) ++passed;
+  }
+  return passed;
+}
+
+/// Objects by the express ids of what they are and of what they are parts of.
+std::multimap<std::uint32_t, const Object*> objectsByProduct(
+    const std::map<std::string, const IfcProduct*>& products, const Model& model) {
+  std::multimap<std::uint32_t, const Object*> objects;
+  for (const Object& object : model.objects) {
+    const auto product = products.find(object.globalId);
+    if (product == products.end()) continue;
+    objects.emplace(product->second->id, &object);
+    if (product->second->parent != 0) objects.emplace(product->second->parent, &object);
+  }
+  return objects;
+}
+
+}  // namespace
+
+OpeningCheck checkOpenings(const Model& model, const IfcFacts& facts) {
+  std::map<std::string, const IfcProduct*> products;
+  for (const IfcProduct& product : facts.products) products.emplace(product.globalId, &product);
+  const auto objects = objectsByProduct(products, model);
+  OpeningCheck check;
+  for (const Object& object : model.objects) {
+    const auto product = products.find(object.globalId);
+    if (product == products.end() || product->second->host == 0) continue;
+    std::vector<const Object*> hosts;
+    const auto [begin, end] = objects.equal_range(product->second->host);
+    for (auto host = begin; host != end; ++host) {
+      if (host->second != &object) hosts.push_back(host->second);
+    }
+    const std::optional<Frame> frame = frameOf(model, object);
+    if (!frame) {
+      check.unchecked.push_back(&object);
+      continue;
+    }
+    const int passed = raysThatPass(*frame, trianglesNear(model, hosts, *frame));
+    ++check.looked;
+    if (passed < kEnough) check.uncut.push_back({&object, product->second->host, passed});
+  }
+  return check;
+}
+
+void reportOpenings(const OpeningCheck& check, ProblemLog& problems) {
+  for (const Object* object : check.unchecked) {
+    problems.add("opening_unchecked", object->globalId + " (" + object->path + ")");
+  }
+  std::string named;
+  for (std::size_t i = 0; i < check.uncut.size() && i < kMostNamed; ++i) {
+    const UncutOpening& uncut = check.uncut[i];
+    named += (named.empty() ? "" : "; ") + uncut.object->globalId + " (" + uncut.object->path +
+             "): " + std::to_string(uncut.raysPassed) + " of " + std::to_string(kGrid * kGrid) +
+             " rays pass";
+  }
+  problems.add("uncut_opening", named, check.uncut.size());
+}
+
+}  // namespace enfilade::scene

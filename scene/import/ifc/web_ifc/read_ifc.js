@@ -1,0 +1,123 @@
+// Reads the shapes of IFC products with web-ifc. The importer starts this in a process of its own:
+//
+//   node read_ifc.js FIRST
+//
+// File descriptor 3 takes the answer, 4 is the IFC file, 5 the products that are wanted: their
+// express ids as 32-bit numbers, of which those before index FIRST are done. The answer is frames of
+// a kind (one byte), a length (64 bits) and that many bytes, all little-endian; what they hold is
+// written at the head of scene/import/ifc/shapes.hpp.
+import fs from 'node:fs';
+import { createRequire } from 'node:module';
+
+const ANSWER = 3;
+const IFC_FILE = 4;
+const WANTED = 5;
+const FLOATS_A_VERTEX = 6; // position and normal, as web-ifc delivers them
+
+function sendFrame(kind, ...parts) {
+  const bytes = Buffer.concat(parts);
+  const header = Buffer.alloc(9);
+  header.write(kind, 0, 'latin1');
+  header.writeBigUInt64LE(BigInt(bytes.length), 1);
+  for (const block of [header, bytes]) {
+    for (let sent = 0; sent < block.length; ) sent += fs.writeSync(ANSWER, block, sent);
+  }
+}
+
+function doubles(...values) {
+  return Buffer.from(Float64Array.from(values).buffer);
+}
+
+function words(...values) {
+  return Buffer.from(Uint32Array.from(values).buffer);
+}
+
+function bytesOf(typedArray) {
+  return Buffer.from(typedArray.buffer, typedArray.byteOffset, typedArray.byteLength);
+}
+
+function sendProgress(stage, fraction) {
+  sendFrame('P', doubles(fraction), Buffer.from(stage));
+}
+
+function readAll(descriptor) {
+  const size = fs.fstatSync(descriptor).size;
+  const bytes = new Uint8Array(size);
+  for (let done = 0; done < size; ) {
+    const count = fs.readSync(descriptor, bytes, done, size - done, done);
+    if (count === 0) throw new Error('the file became shorter while it was read');
+    done += count;
+  }
+  return bytes;
+}
+
+// Each geometry is sent once, before the first product that is made of it.
+function sendGeometry(api, model, id, known) {
+  if (known.has(id)) return;
+  known.add(id);
+  const geometry = api.GetGeometry(model, id);
+  const vertices = api.GetVertexArray(geometry.GetVertexData(), geometry.GetVertexDataSize());
+  const indices = api.GetIndexArray(geometry.GetIndexData(), geometry.GetIndexDataSize());
+  sendFrame('G', words(id, vertices.length / FLOATS_A_VERTEX, indices.length), bytesOf(vertices),
+            bytesOf(indices));
+  geometry.delete();
+}
+
+function sendProduct(api, model, mesh, known) {
+  const parts = [];
+  const count = mesh.geometries.size();
+  for (let i = 0; i < count; ++i) {
+    const placed = mesh.geometries.get(i);
+    sendGeometry(api, model, placed.geometryExpressID, known);
+    const { x, y, z, w } = placed.color;
+    parts.push(words(placed.geometryExpressID), doubles(x, y, z, w, ...placed.flatTransformation));
+  }
+  sendFrame('O', words(mesh.expressID, count), ...parts);
+}
+
+// True when the heap of web-ifc can no longer be trusted: its own exceptions leave it whole, a trap
+// of WebAssembly does not.
+function isBroken(error) {
+  return error instanceof WebAssembly.RuntimeError || error instanceof RangeError;
+}
+
+function textOf(error) {
+  if (error instanceof WebAssembly.Exception) return 'web-ifc threw an exception';
+  return String(error?.message ?? error);
+}
+
+async function main() {
+  const first = Number(process.argv[2]);
+  const { IfcAPI, LogLevel } = createRequire(import.meta.url)('web-ifc');
+  const api = new IfcAPI();
+  await api.Init();
+  api.SetLogLevel(LogLevel.LOG_LEVEL_OFF); // it would log to stdout
+  const wantedBytes = readAll(WANTED);
+  const wanted = new Uint32Array(wantedBytes.buffer, 0, wantedBytes.length / 4);
+  const model = api.OpenModel(readAll(IFC_FILE));
+  if (model < 0) {
+    sendFrame('E', Buffer.from('web-ifc does not know its schema'));
+    return 1;
+  }
+  const known = new Set();
+  for (let i = first; i < wanted.length; ++i) {
+    sendFrame('T', words(i)); // whoever listens knows what was tried, should this process die
+    if (i % 64 === 0) sendProgress('shapes (web-ifc)', i / wanted.length);
+    try {
+      api.StreamMeshes(model, [wanted[i]], (mesh) => sendProduct(api, model, mesh, known));
+    } catch (error) {
+      sendFrame('F', words(wanted[i]), Buffer.from(textOf(error)));
+      if (isBroken(error)) return 1; // the importer starts another process for the rest
+    }
+  }
+  sendFrame('D');
+  return 0;
+}
+
+main().then(
+  (code) => process.exit(code),
+  (error) => {
+    sendFrame('E', Buffer.from(textOf(error)));
+    process.exit(1);
+  },
+);

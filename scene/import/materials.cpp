@@ -1,0 +1,239 @@
+// Materials and textures of assimp's scene.
+#include <assimp/GltfMaterial.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+
+#include "scene/import/convert.hpp"
+#include "scene/import/decode_image.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint32_t kLongestSide = 1024;       // pixels: what a walk-through can tell apart
+constexpr std::size_t kTextureBytes = 256u << 20;  // of all textures of a scene, decoded
+constexpr std::uintmax_t kLargestImageFile = 1u << 30;  // bytes
+
+float unitInterval(float value, float otherwise) {
+  return std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : otherwise;
+}
+
+Eigen::Vector3f colourOf(const aiColor4D& c, bool linear) {
+  const Eigen::Vector3f colour{unitInterval(c.r, 0.8f), unitInterval(c.g, 0.8f),
+                               unitInterval(c.b, 0.8f)};
+  return linear ? colour : colour.unaryExpr(&linearFromSrgb).eval();
+}
+
+std::string textOf(const aiString& text) {
+  return {text.C_Str(), text.length};
+}
+
+// ---- textures -----------------------------------------------------------------------------------
+
+std::string percentDecoded(const std::string& text) {
+  const auto digit = [](char c) {
+    if (c >= '0' && c <= '9') return c - '0';
+    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+    if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+    return -1;
+  };
+  std::string result;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const int high = i + 2 < text.size() && text[i] == '%' ? digit(text[i + 1]) : -1;
+    const int low = high >= 0 ? digit(text[i + 2]) : -1;
+    result += low >= 0 ? static_cast<char>(high * 16 + low) : text[i];
+    if (low >= 0) i += 2;
+  }
+  return result;
+}
+
+/// As the file says it, then with %20 and the like read, then beside the model. `looked` takes down
+/// where it was looked for.
+std::optional<fs::path> findImage(const fs::path& model, std::string name,
+                                  std::vector<std::string>& looked) {
+  std::replace(name.begin(), name.end(), '\\', '/');
+  if (name.starts_with("file://")) name.erase(0, 7);
+  const fs::path folder = model.parent_path();
+  const fs::path decoded = percentDecoded(name);
+  for (const fs::path& candidate : {folder / name, folder / decoded, folder / decoded.filename()}) {
+    std::error_code error;
+    looked.push_back(candidate.string());
+    if (fs::is_regular_file(candidate, error)) return candidate;
+  }
+  return std::nullopt;
+}
+
+std::optional<std::vector<std::byte>> readImageFile(const fs::path& file) {
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error || size > kLargestImageFile) return std::nullopt;
+  std::vector<std::byte> bytes(static_cast<std::size_t>(size));
+  std::ifstream in(file, std::ios::binary);
+  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
+  return in ? std::optional(std::move(bytes)) : std::nullopt;
+}
+
+Texture rawTexture(const aiTexture& image) {
+  Texture texture;
+  texture.width = image.mWidth;
+  texture.height = image.mHeight;
+  const std::size_t pixels = std::size_t{image.mWidth} * image.mHeight;
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const aiTexel& t = image.pcData[i];
+    texture.rgba.insert(texture.rgba.end(), {t.r, t.g, t.b, t.a});
+  }
+  while (std::max(texture.width, texture.height) > kLongestSide) halve(texture);
+  return texture;
+}
+
+class Textures {
+ public:
+  Textures(const aiScene& scene, const ConvertInput& input, Model& model, ProblemLog& problems)
+      : scene_(scene), input_(input), model_(model), problems_(problems) {}
+
+  /// The index of the texture named so by a material, read at the first call; -1: cannot be had.
+  std::int32_t index(const std::string& name) {
+    const auto [known, isNew] = indices_.try_emplace(name, -1);
+    if (!isNew) return known->second;
+    std::optional<Texture> texture = load(name);
+    if (!texture) return -1;
+    texture->name = name;
+    known->second = static_cast<std::int32_t>(model_.textures.size());
+    model_.textures.push_back(std::move(*texture));
+    return known->second;
+  }
+
+ private:
+  std::optional<Texture> load(const std::string& name) {
+    if (const aiTexture* embedded = scene_.GetEmbeddedTexture(name.c_str())) {
+      if (embedded->mHeight > 0) return rawTexture(*embedded);
+      return decode(std::as_bytes(std::span(reinterpret_cast<const char*>(embedded->pcData),
+                                            embedded->mWidth)),
+                    name);
+    }
+    const std::optional<fs::path> file = findImage(input_.file, name, model_.filesBeside);
+    const auto bytes = file ? readImageFile(*file) : std::nullopt;
+    if (!bytes) {
+      problems_.add("missing_texture", name);
+      return std::nullopt;
+    }
+    return decode(*bytes, name);
+  }
+
+  std::optional<Texture> decode(std::span<const std::byte> bytes, const std::string& name) {
+    auto image = decodeImage(bytes, kLongestSide);
+    if (auto* texture = std::get_if<Texture>(&image)) return std::move(*texture);
+    problems_.add("unreadable_texture", name + ": " + std::get<std::string>(image));
+    return std::nullopt;
+  }
+
+  const aiScene& scene_;
+  const ConvertInput& input_;
+  Model& model_;
+  ProblemLog& problems_;
+  std::map<std::string, std::int32_t> indices_;
+};
+
+/// Halves the largest textures until all together fit.
+void fitTextures(Model& model, ProblemLog& problems) {
+  std::size_t total = 0;
+  for (const Texture& t : model.textures) total += t.rgba.size();
+  while (total > kTextureBytes) {
+    const auto largest = std::max_element(
+        model.textures.begin(), model.textures.end(),
+        [](const Texture& a, const Texture& b) { return a.rgba.size() < b.rgba.size(); });
+    total -= largest->rgba.size();
+    halve(*largest);
+    total += largest->rgba.size();
+    problems.add("reduced_texture", largest->name);
+  }
+}
+
+// ---- materials ----------------------------------------------------------------------------------
+
+void setAlpha(const aiMaterial& from, bool gltf, Material& to, ProblemLog& problems) {
+  ai_real opacity = 1;
+  from.Get(AI_MATKEY_OPACITY, opacity);
+  if (!gltf) {
+    if (opacity == 0) {
+      // Exporters disagree on what 0 means; nobody models walls that cannot be seen at all.
+      problems.add("opacity_zero", to.name + ": taken for opaque");
+      opacity = 1;
+    }
+    to.baseColour.w() = unitInterval(opacity, 1);
+    if (to.baseColour.w() < 1) to.alpha = Material::Alpha::blend;
+    return;
+  }
+  aiString mode;
+  from.Get(AI_MATKEY_GLTF_ALPHAMODE, mode);
+  from.Get(AI_MATKEY_GLTF_ALPHACUTOFF, to.alphaCutoff);
+  if (textOf(mode) == "MASK") to.alpha = Material::Alpha::mask;
+  if (textOf(mode) == "BLEND") to.alpha = Material::Alpha::blend;
+}
+
+void setTexture(const aiMaterial& from, Textures& textures, Material& to) {
+  for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
+    aiString name;
+    if (from.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) continue;
+    to.baseColourTexture = textures.index(textOf(name));
+    return;
+  }
+}
+
+Material convertMaterial(const aiMaterial& from, bool gltf, Textures& textures,
+                         ProblemLog& problems) {
+  Material to;
+  to.name = textOf(const_cast<aiMaterial&>(from).GetName());
+  aiColor4D colour;
+  if (from.Get(AI_MATKEY_BASE_COLOR, colour) == AI_SUCCESS ||
+      from.Get(AI_MATKEY_COLOR_DIFFUSE, colour) == AI_SUCCESS) {
+    to.baseColour.head<3>() = colourOf(colour, gltf);
+    if (gltf) to.baseColour.w() = unitInterval(colour.a, 1);
+  }
+  aiColor4D emissive(0, 0, 0, 1);
+  from.Get(AI_MATKEY_COLOR_EMISSIVE, emissive);
+  to.emissive = colourOf(emissive, gltf);
+  if (from.GetTextureCount(aiTextureType_EMISSIVE) > 0 && !to.emissive.isZero(0)) {
+    // The factor alone would make all of it glow.
+    problems.add("emissive_texture_ignored", to.name);
+    to.emissive.setZero();
+  }
+  from.Get(AI_MATKEY_METALLIC_FACTOR, to.metallic);
+  from.Get(AI_MATKEY_ROUGHNESS_FACTOR, to.roughness);
+  to.metallic = unitInterval(to.metallic, 0);
+  to.roughness = unitInterval(to.roughness, 1);
+  // Only glTF's exporters mean it when they say one side: elsewhere a wall would vanish.
+  bool doubleSided = !gltf;
+  if (gltf) from.Get(AI_MATKEY_TWOSIDED, doubleSided);
+  to.doubleSided = doubleSided;
+  setAlpha(from, gltf, to, problems);
+  to.alphaCutoff = unitInterval(to.alphaCutoff, 0.5f);
+  setTexture(from, textures, to);
+  return to;
+}
+
+}  // namespace
+
+float linearFromSrgb(float c) {
+  const double s = std::clamp(static_cast<double>(c), 0.0, 1.0);
+  return static_cast<float>(s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4));
+}
+
+void convertMaterials(const aiScene& scene, const ConvertInput& input, Model& model,
+                      ProblemLog& problems, const ImportProgress& progress) {
+  const bool gltf = input.format == ModelFormat::gltf || input.format == ModelFormat::glb;
+  Textures textures(scene, input, model, problems);
+  for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
+    if (progress) progress("textures", static_cast<double>(i) / scene.mNumMaterials);
+    model.materials.push_back(convertMaterial(*scene.mMaterials[i], gltf, textures, problems));
+  }
+  if (model.materials.empty()) model.materials.emplace_back();
+  fitTextures(model, problems);
+}
+
+}  // namespace enfilade::scene

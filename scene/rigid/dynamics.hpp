@@ -1,0 +1,55 @@
+// Free bodies among all that they can meet: one step of their motion, from contacts to rest. What
+// pairs may meet is told from outside (a broad phase); nothing here knows a world.
+#pragma once
+
+#include <vector>
+
+#include "scene/rigid/joint.hpp"
+#include "scene/rigid/near_pair.hpp"
+#include "scene/rigid/solver.hpp"
+
+namespace enfilade::scene {
+
+struct Dynamics {
+  std::vector<Solid> solids;
+  std::vector<Joint> joints;    ///< of solids
+  std::vector<NearPair> pairs;  ///< ascending by key: set by setPairs()
+};
+
+/// When a body sleeps, and when not.
+struct RestLimits {
+  double calmSpeed = 0.01;  ///< m/s: no point is faster
+  double calmFor = 0.5;     ///< seconds
+};
+
+struct DynamicsStep {
+  SolverStep solver;
+  RestLimits rest;
+};
+
+struct DynamicsReport {
+  std::uint32_t awake = 0;      ///< free solids
+  std::uint32_t looks = 0;      ///< pairs that the narrow phase was asked about
+  std::uint32_t patches = 0;    ///< given to the solver
+  std::uint32_t leaning = 0;    ///< of those, nearer than 2 epsilon
+  std::uint32_t islands = 0;    ///< awake ones
+  std::uint32_t proofs = 0;     ///< pairs whose way had to be proved clear
+  std::uint32_t shortened = 0;  ///< free solids that went less far than the solver had it
+  std::uint32_t squeezed = 0;   ///< pairs of which a driven solid runs into a free one that has no
+                                ///< way out: they may penetrate
+  double deepest = 0;           ///< metres: penetration at the start of the step
+};
+
+/// The pairs that may meet in the next steps; ascending, a < b, at least one of them free. What is
+/// known of a pair that was there before is kept.
+void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates);
+
+/// Goes on by one step. Free bodies that were separated from all that stands or is free stay so, by
+/// the exact verdict and all the way: a body that the solver would bring through another is stopped
+/// on its way.
+DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings);
+
+/// Nothing is proved of this solid any more: its pose was set from outside. Wakes it.
+void disturb(Dynamics& dynamics, std::uint32_t solid);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,56 @@
+// Two parts of two solids that may meet: what is known of them from step to step, and the patch
+// that the solver is given.
+#pragma once
+
+#include <compare>
+#include <memory>
+
+#include "collision/penetration_depth.hpp"
+#include "scene/rigid/contact_patch.hpp"
+#include "scene/rigid/solid.hpp"
+
+namespace enfilade::scene {
+
+/// Indices of two solids and of their parts; a < b.
+struct PartPairKey {
+  std::uint32_t a = 0, b = 0, partA = 0, partB = 0;
+  auto operator<=>(const PartPairKey&) const = default;
+};
+
+using PatchAnchors = std::array<Vec3, ContactPatch::kMostPoints>;
+
+struct NearPair {
+  PartPairKey key;
+  collision::FeatureCache features;
+  std::unique_ptr<collision::DepthCache> depth;                ///< once they penetrated
+  collision::Verdict verdict = collision::Verdict::separated;  ///< when last looked at
+  /// Metres: they are at least this far apart, less what was added to Solid::jumped of both since
+  /// its sum was `since`.
+  double apart = -1;
+  double since = 0;
+  double penetration = 0;       ///< metres, when last looked at: the depth, or an upper bound of it
+  Vec3 normal = Vec3::UnitY();  ///< from A to B, unit: where they are looked at and near
+  ContactPatch patch;           ///< its size is 0 where they are far; a, b are not set
+  PatchAnchors anchors;         ///< of the points, on the free body
+};
+
+struct NearPairStep {
+  double seconds = 0;
+  Vec3 gravity = Vec3::Zero();
+  double epsilon = 0;
+};
+
+/// Looks at the pair where its solids are now: verdict, distance, patch. Does nothing where they
+/// were so far apart that they cannot come to epsilon within the step by their speeds of now.
+/// Returns whether the narrow phase was asked.
+bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step);
+
+/// A lower bound of the distance by what was known; may be negative.
+inline double apartNow(const NearPair& pair, const Solid& a, const Solid& b) {
+  return pair.apart - (a.jumped + b.jumped - pair.since);
+}
+
+/// Whether the points lean on one another: nearer than 2 epsilon.
+bool leans(const NearPair& pair, double epsilon);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,183 @@
+// A plane with normal n parts both bodies at the start by g0 and at the end by g1. Were the ways of
+// all vertices straight and even, the gap along n would be concave in time (least of linear ones),
+// so at least (1 - t) g0 + t g1 for t in 0..1. A vertex that turns by theta about the centre at
+// radius rho departs from its chord by at most rho theta^2 t (1 - t) / 2, since |p''| = rho
+// theta^2. With B = (rho_A theta_A^2 + rho_B theta_B^2) / 2 the gap is positive all the way if
+//   g0 / t + g1 / (1 - t) > B, that is, by its least value, (sqrt g0 + sqrt g1)^2 > B.
+// Where neither the plane of the start nor that of the end proves so much, the way is halved: the
+// middle of an even turn from q0 to q1 is q0 + q1, normalised, up to rounding.
+//
+// Where they move by less than their distance, no plane is needed.
+//
+// theta from the quaternions: |q0 - q1| = 2 sin(theta / 4) for the nearer of +-q1, and sin x >= x -
+// x^3 / 6 gives theta / 4 <= s (1 + s^2) for s = sin(theta / 4) <= sin(pi / 4).
+#include "scene/rigid/passage.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace enfilade::scene {
+namespace {
+
+using collision::ConvexBody;
+using collision::FeatureCache;
+using collision::Quat;
+using collision::Verdict;
+
+constexpr double kUp = 1 + 0x1p-40;  // above what a few roundings lose
+
+/// q1 or -q1, whichever is nearer to q0.
+Quat nearer(const Quat& q0, const Quat& q1) {
+  if (q0.dot(q1) >= 0) return q1;
+  return Quat(-q1.w(), -q1.x(), -q1.y(), -q1.z());
+}
+
+/// Radians, at least.
+double turnOf(const Passage& p) {
+  const Quat to = nearer(p.fromRotation, p.toRotation);
+  const double s = 0.5 * (to.coeffs() - p.fromRotation.coeffs()).norm();
+  return 4 * s * (1 + s * s) * kUp;
+}
+
+double bulgeOf(const Passage& p) {
+  return p.radius * p.turn * p.turn / 2 * kUp;
+}
+
+/// A part at an end of its way.
+struct PlacedPart {
+  Mat3 rotation;
+  ConvexBody body;
+
+  PlacedPart(const PartShape& part, const Passage& p, bool atEnd) {
+    const Quat& turned = atEnd ? p.toRotation : p.fromRotation;
+    rotation = p.stands ? p.stands->rotation : turned.toRotationMatrix();
+    const Vec3 position = p.stands
+                              ? p.stands->position
+                              : (atEnd ? p.toCentre : p.fromCentre) - rotation * p.centreInFrame;
+    body = {part.vertices, position, &rotation, part.hull};
+  }
+  PlacedPart(const PlacedPart&) = delete;
+  PlacedPart& operator=(const PlacedPart&) = delete;
+};
+
+/// The pair at one time: what is known there.
+struct Known {
+  FeatureCache cache;
+  double apart = 0;  ///< metres, proved; 0: not separated
+};
+
+struct Search {
+  const PartShape& partA;
+  const PartShape& partB;
+  std::uint32_t queries = 0;
+
+  /// Separated at the end, and by how much?
+  Known ask(const Passage& a, const Passage& b, bool atEnd, const FeatureCache& hint) {
+    const PlacedPart placedA(partA, a, atEnd), placedB(partB, b, atEnd);
+    Known known{hint, 0};
+    const collision::Decision decision = collision::decide(placedA.body, placedB.body, known.cache);
+    ++queries;
+    if (decision.verdict == Verdict::separated)
+      known.apart = decision.distance - decision.errorBound;
+    return known;
+  }
+  /// The gap along the axis of `known`, at the end or the start.
+  double along(const Passage& a, const Passage& b, bool atEnd, const Known& known) const {
+    const PlacedPart placedA(partA, a, atEnd), placedB(partB, b, atEnd);
+    return collision::provedSeparation(placedA.body, placedB.body, known.cache);
+  }
+};
+
+/// Whether a plane with these gaps at the ends parts the bodies all the way.
+bool partsAllTheWay(double atStart, double atEnd, double bulge) {
+  if (!(atStart > 0) || !(atEnd > 0)) return false;
+  const double roots = std::sqrt(atStart) + std::sqrt(atEnd);
+  return roots * roots > bulge * kUp;
+}
+
+/// Proved from the two ends alone.
+bool provedClear(const Search& search, const Passage& a, const Passage& b, const Known& start,
+                 const Known& end) {
+  const double moves = closingOf(a, b);
+  if (moves < start.apart || moves < end.apart) return true;
+  const double bulge = bulgeOf(a) + bulgeOf(b);
+  return partsAllTheWay(start.apart, search.along(a, b, true, start), bulge) ||
+         partsAllTheWay(search.along(a, b, false, end), end.apart, bulge);
+}
+
+/// The part of the way that is proved clear. The end's answer is not known to be separated.
+double clearPart(Search& search, const Passage& a, const Passage& b, const Known& start,
+                 const Known& end, int halvings) {
+  if (end.apart > 0 && provedClear(search, a, b, start, end)) return 1;
+  if (halvings == 0) return 0;
+  const PassagePose middleA = middleOf(a), middleB = middleOf(b);
+  const Passage firstA = firstHalf(a, middleA), firstB = firstHalf(b, middleB);
+  const Known middle = search.ask(firstA, firstB, true, start.cache);
+  const double first = clearPart(search, firstA, firstB, start, middle, halvings - 1);
+  if (first < 1) return 0.5 * first;
+  return 0.5 + 0.5 * clearPart(search, secondHalf(a, middleA), secondHalf(b, middleB), middle, end,
+                               halvings - 1);
+}
+
+}  // namespace
+
+Passage standing(const Solid& solid) {
+  return {solid.motion.centre,
+          solid.motion.centre,
+          solid.motion.rotation,
+          solid.motion.rotation,
+          solid.radius,
+          solid.centreInFrame,
+          &solid,
+          0};
+}
+
+void measure(Passage& passage) {
+  passage.turn = turnOf(passage);
+}
+
+double lengthOf(const Passage& p) {
+  const Vec3 way = p.toCentre - p.fromCentre;
+  return (way.norm() + p.turn * p.radius) * kUp;
+}
+
+double closingOf(const Passage& a, const Passage& b) {
+  const Vec3 way = (a.toCentre - a.fromCentre) - (b.toCentre - b.fromCentre);
+  return (way.norm() + a.turn * a.radius + b.turn * b.radius) * kUp;
+}
+
+PassagePose middleOf(const Passage& p) {
+  PassagePose middle;
+  middle.centre = 0.5 * (p.fromCentre + p.toCentre);
+  middle.rotation.coeffs() =
+      p.fromRotation.coeffs() + nearer(p.fromRotation, p.toRotation).coeffs();
+  const double length = std::sqrt(middle.rotation.squaredNorm());
+  middle.rotation.coeffs() /= length;
+  return middle;
+}
+
+Passage firstHalf(const Passage& p, const PassagePose& middle) {
+  Passage half = p;
+  half.toCentre = middle.centre, half.toRotation = middle.rotation;
+  measure(half);
+  return half;
+}
+
+Passage secondHalf(const Passage& p, const PassagePose& middle) {
+  Passage half = p;
+  half.fromCentre = middle.centre, half.fromRotation = middle.rotation;
+  measure(half);
+  return half;
+}
+
+Clearance clearance(const PartShape& partA, const Passage& a, const PartShape& partB,
+                    const Passage& b, const FeatureCache& cache) {
+  Search search{partA, partB};
+  const Known start = search.ask(a, b, false, cache);
+  if (!(start.apart > 0)) return {0, search.queries};
+  const Known end = search.ask(a, b, true, start.cache);
+  const double fraction = clearPart(search, a, b, start, end, kMostHalvings);
+  return {fraction, search.queries};
+}
+
+}  // namespace enfilade::scene

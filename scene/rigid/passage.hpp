@@ -1,0 +1,55 @@
+// Whether two parts stay clear of one another while both move and turn: proved, not sampled.
+#pragma once
+
+#include "collision/narrow_phase.hpp"
+#include "scene/rigid/solid.hpp"
+
+namespace enfilade::scene {
+
+/// A solid's way within a step: its centre goes straight and it turns evenly, by the shorter way,
+/// from one rotation to the other.
+struct Passage {
+  Vec3 fromCentre = Vec3::Zero(), toCentre = Vec3::Zero();
+  collision::Quat fromRotation = collision::Quat::Identity();
+  collision::Quat toRotation = collision::Quat::Identity();
+  double radius = 0;                  ///< about the centre: no vertex is farther, metres
+  Vec3 centreInFrame = Vec3::Zero();  ///< of the parts' frame
+  const Solid* stands = nullptr;      ///< it does not move: its frame is there to the last bit
+  double turn = 0;                    ///< radians, at least; set by measure()
+};
+
+/// The way of a solid that stands.
+Passage standing(const Solid& solid);
+
+/// To be called when the rotations were set.
+void measure(Passage& passage);
+
+/// Metres: no point goes farther on this way.
+double lengthOf(const Passage& passage);
+
+/// Metres: the distance of the two changes by no more.
+double closingOf(const Passage& a, const Passage& b);
+
+/// Where the passage is at its middle, exactly half way in both place and turn.
+struct PassagePose {
+  Vec3 centre = Vec3::Zero();
+  collision::Quat rotation = collision::Quat::Identity();
+};
+PassagePose middleOf(const Passage& passage);
+
+/// The first half, the second half.
+Passage firstHalf(const Passage& passage, const PassagePose& middle);
+Passage secondHalf(const Passage& passage, const PassagePose& middle);
+
+struct Clearance {
+  double fraction = 1;        ///< proved clear up to here: a multiple of 2^-kMostHalvings, or 0
+  std::uint32_t queries = 0;  ///< narrow-phase queries
+};
+inline constexpr int kMostHalvings = 6;
+
+/// How far both parts can go, both at the same part of their ways, with the bodies separated all
+/// the way. `cache`: of decide() at the start, where they are separated.
+Clearance clearance(const PartShape& partA, const Passage& a, const PartShape& partB,
+                    const Passage& b, const collision::FeatureCache& cache);
+
+}  // namespace enfilade::scene

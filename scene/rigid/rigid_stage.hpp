@@ -1,0 +1,25 @@
+// The free bodies of a world as the solver sees them, with all that they met so far. What is here
+// beside the bodies themselves are last tick's impulses and features: they follow from the
+// commands, as all else does, and a copy of a world must copy them.
+#pragma once
+
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "scene/rigid/dynamics.hpp"
+#include "scene/snapshot.hpp"
+
+namespace enfilade::scene {
+
+struct RigidStage {
+  Dynamics dynamics;
+  std::vector<std::uint32_t> bodies;  ///< indices of the rigid ones into WorldState::bodies
+  /// Solids by entity; an avatar has one for each of its parts.
+  std::map<std::pair<EntityId, std::uint32_t>, std::uint32_t> solids;
+  std::vector<EntityId> entities;    ///< of each solid
+  std::vector<std::uint32_t> seeds;  ///< bodies whose surroundings matter in this tick, ascending
+  DynamicsReport last;               ///< of the last tick in which a body was awake
+};
+
+}  // namespace enfilade::scene

@@ -1,0 +1,28 @@
+// How bodies that touch or are jointed go on: sequential impulses in small steps. Free functions on
+// plain arrays; nothing is kept but the impulses in the patches and joints. Only + - * / and sqrt,
+// in the order of the arrays.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "scene/rigid/contact_patch.hpp"
+#include "scene/rigid/joint.hpp"
+
+namespace enfilade::scene {
+
+struct SolverStep {
+  double seconds = 1.0 / 60;     ///< of the whole step, > 0
+  int substeps = 4;              ///< >= 1
+  int iterations = 4;            ///< of the velocities in a substep, >= 1
+  Vec3 gravity{0, -9.80665, 0};  ///< m/s^2
+  double epsilon = 0.5e-3;  ///< metres: bodies come to rest between half of it and all of it apart
+};
+
+/// Moves `bodies` by a step. No patch lets its points come nearer than epsilon, to first order and
+/// as far as the iterations converge; points that are nearer part without gaining speed. Bodies
+/// whose inverse mass is 0 keep their velocity and go on with it. Impulses are of one substep.
+void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::span<Joint> joints,
+           const SolverStep& step);
+
+}  // namespace enfilade::scene
