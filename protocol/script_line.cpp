@@ -31,6 +31,8 @@ constexpr double kFarthest = 1e7;  // metres
 constexpr double kFastest = 1000;  // metres per second
 constexpr double kMostDegrees = 1e6;
 constexpr double kMostJoint = 1000;   // radians or metres
+// Degrees per second: how fast a body's farthest point then is, the world knows and bounds.
+constexpr double kFastestTurn = 1e6;
 constexpr double kFastestJoint = 20;  // radians or metres per second
 
 /// A value as the script has it, cut to fit a message.
@@ -375,6 +377,17 @@ void readAction(const json& value, v1::BodyCommand& command) {
   }
 }
 
+void readBodySpeed(const json& line, v1::BodyCommand& command) {
+  const bool turns = line.contains("turn_speed");
+  if (turns && line.contains("speed")) refuse("speed", R"(stands beside "turn_speed"; keep one)");
+  if (!turns && !line.contains("speed")) return;
+  const char* key = turns ? "turn_speed" : "speed";
+  const double most = turns ? kFastestTurn : kFastest;
+  const char* what = turns ? "a number of degrees per second" : "a number of metres per second";
+  const double speed = within(line[key], key, what, 0, most, true);
+  command.set_speed(turns ? kRadiansPerDegree * speed : speed);
+}
+
 v1::BodyCommand readBodyCommand(const json& line) {
   v1::BodyCommand command;
   command.set_body(bodyName(line["body"]));
@@ -393,11 +406,7 @@ v1::BodyCommand readBodyCommand(const json& line) {
   } else {
     readAction(line["do"], command);
   }
-  if (line.contains("speed"))
-    command.set_speed(number(line["speed"], "speed", "a number of metres per second"));
-  if (line.contains("turn_speed"))
-    command.set_speed(kRadiansPerDegree *
-                      number(line["turn_speed"], "turn_speed", "a number of degrees per second"));
+  readBodySpeed(line, command);
   return command;
 }
 

@@ -6,6 +6,7 @@
 #include "scene/audit.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/rotation.hpp"
+#include "server/version.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -172,6 +173,7 @@ std::optional<Endpoint> endpointFrom(const std::string& text) {
 std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* const* argv) {
   CLI::App app("Enfilade: virtual walk-throughs without a display", "enfilade");
   app.require_subcommand(1);
+  app.set_version_flag("--version", std::string("enfilade ") + kServerVersion);
   Arguments read;
   CLI::App* serve = app.add_subcommand("serve", "Serve a scene to clients over TCP");
   addModel(*serve, read.model);

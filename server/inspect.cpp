@@ -3,8 +3,12 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
 #include <stdexcept>
+#include <system_error>
 
 #include "render/renderer.hpp"
 #include "server/inspection.hpp"
@@ -13,6 +17,19 @@
 namespace enfilade::server {
 namespace {
 
+/// Makes the folder. Throws when it cannot be written to: better before a long import than after.
+void prepareFolder(const std::filesystem::path& folder) {
+  const std::filesystem::path probe = folder / ".writable";
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (!error && !std::ofstream(probe).put(' ').flush())
+    error = std::error_code(errno, std::generic_category());
+  if (error)
+    throw std::runtime_error("cannot write into " + folder.string() + ": " + error.message() +
+                             "; give another folder with --plan");
+  std::filesystem::remove(probe);
+}
+
 void drawPlans(const std::shared_ptr<const scene::Scene>& scene,
                const std::filesystem::path& folder) {
   render::Renderer renderer(scene);
@@ -20,7 +37,6 @@ void drawPlans(const std::shared_ptr<const scene::Scene>& scene,
     const render::Frame frame = renderer.render(scene::Snapshot(), camera);
     return std::optional(PlanPicture{render::colourOf(frame), frame.ids});
   };
-  std::filesystem::create_directories(folder);
   int number = 0;
   for (const StoreyFloor& storey : storeysOf(*scene)) {
     const auto file = folder / ("storey-" + std::to_string(++number) + ".png");
@@ -32,6 +48,7 @@ void drawPlans(const std::shared_ptr<const scene::Scene>& scene,
 }  // namespace
 
 ExitCode inspect(const InspectCommand& command) {
+  if (!command.plan.empty()) prepareFolder(command.plan);
   const Inspection inspection = inspected(loadSceneTimed(command.model));
   const std::string text = command.json ? inspectionJson(inspection, command.objects) + "\n"
                                         : inspectionTable(inspection, command.objects);

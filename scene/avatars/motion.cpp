@@ -108,15 +108,18 @@ Vec3 afterSteep(const Vec3& rest, Manner manner, Sliding sliding) {
   return manner == Manner::fall ? Vec3(0, std::min(0.0, rest.y()), 0) : Vec3(Vec3::Zero());
 }
 
-/// Moves by `wish`, sliding along what is met.
-SlideResult slide(Mover& m, Vec3 wish, Manner manner) {
+/// Moves by `wish`, sliding along what is met. What is left of the wish itself is put along the
+/// planes, not what an earlier plane made of it: that may point against the wish, and who stands in
+/// a notch would go to and fro in it for ever.
+SlideResult slide(Mover& m, const Vec3& wish, Manner manner) {
   SlideResult result;
   std::vector<Vec3> planes;
   const double enough = kNoMove * m.lengths.epsilon;
-  for (int i = 0; i < kSlides && wish.norm() > enough; ++i) {
-    const Stop stop = sweepFrom(m, wish);
+  Vec3 rest = wish, move = wish;
+  for (int i = 0; i < kSlides && move.norm() > enough; ++i) {
+    const Stop stop = sweepFrom(m, move);
     if (stop.entity == 0) break;
-    Vec3 rest = (1 - stop.fraction) * wish;
+    rest *= 1 - stop.fraction;
     if (manner != Manner::fly && m.walkable(stop.normal)) {
       result.ground = stop.entity;
       rest = afterGround(rest, manner);
@@ -125,9 +128,9 @@ SlideResult slide(Mover& m, Vec3 wish, Manner manner) {
       rest = afterSteep(rest, manner, m.lengths.sliding);
     }
     planes.push_back(manner == Manner::walk ? planeForWalking(m, stop.normal) : stop.normal);
-    wish = alongPlanes(rest, planes);
+    move = alongPlanes(rest, planes);
     // Back out to epsilon where grazing moves came nearer.
-    wish += std::max(0.0, m.lengths.epsilon - stop.distance) * planes.back();
+    move += std::max(0.0, m.lengths.epsilon - stop.distance) * planes.back();
   }
   return result;
 }

@@ -194,6 +194,52 @@ TEST(Script, ASpawnHasPartsAndLinks) {
               "tour.jsonl:1: parts[0].box: must be two");
 }
 
+v1::BodyCommand onlyBodyCommand(std::string_view text) {
+  const Script script = parseScript(text, "tour.jsonl");
+  EXPECT_EQ(script.lines.size(), 1u);
+  return std::get<v1::BodyCommand>(script.lines.at(0).what);
+}
+
+TEST(Script, ABodyIsToldWhatToDoInItsOwnUnits) {
+  const v1::BodyCommand open = onlyBodyCommand(R"({"body":"Hall/Front door","do":"open"})");
+  EXPECT_EQ(open.body(), "Hall/Front door");
+  EXPECT_TRUE(open.has_open());
+  EXPECT_FALSE(open.has_speed());
+  EXPECT_TRUE(onlyBodyCommand(R"({"body":"d","do":"close"})").has_close());
+  EXPECT_TRUE(onlyBodyCommand(R"({"body":"d","do":"stop"})").has_stop());
+  EXPECT_TRUE(onlyBodyCommand(R"({"body":"d","do":"run"})").has_run());
+  const v1::BodyCommand turned = onlyBodyCommand(R"({"body":"d","turn":90,"turn_speed":45})");
+  EXPECT_NEAR(turned.to(), 1.5707963267948966, 1e-15);
+  EXPECT_NEAR(turned.speed(), 0.78539816339744831, 1e-15);
+  const v1::BodyCommand slid = onlyBodyCommand(R"({"body":"gate","to":-0.75,"speed":2})");
+  EXPECT_EQ(slid.to(), -0.75);
+  EXPECT_EQ(slid.speed(), 2);
+  const v1::BodyCommand called = onlyBodyCommand(R"({"body":"lift","level":0})");
+  EXPECT_TRUE(called.has_level());
+  EXPECT_EQ(onlyBodyCommand(R"({"body":"lift","level":10000})").level(), 10000u);
+}
+
+TEST(Script, ABodyLineThatMakesNoSenseIsToldWithItsField) {
+  expectError(R"({"body":7,"do":"open"})", "tour.jsonl:1: body: must be a body's name in quotes");
+  expectError(R"({"body":"","do":"open"})", "tour.jsonl:1: body: must have 1 to");
+  expectError(R"({"body":"d"})", R"(tour.jsonl:1: body: needs one of "do", "to", "turn")");
+  expectError(R"({"body":"d","do":"open","to":1})", "tour.jsonl:1: body: needs one of");
+  expectError(R"({"body":"d","do":"dance"})", R"(tour.jsonl:1: do: must be "open", "close")");
+  expectError(R"({"body":"d","do":1})", "tour.jsonl:1: do: must be");
+  expectError(R"({"body":"d","to":"up"})", "tour.jsonl:1: to: must be a number of metres");
+  expectError(R"({"body":"d","to":1e999})", "tour.jsonl:1: a number is beyond");
+  expectError(R"({"body":"d","turn":NaN})", "tour.jsonl:1: is not JSON");
+  expectError(R"({"body":"d","level":-1})", "tour.jsonl:1: level: must be a whole number");
+  expectError(R"({"body":"d","level":1.5})", "tour.jsonl:1: level: must be a whole number");
+  expectError(R"({"body":"d","level":10001})", "tour.jsonl:1: level: must be a whole number");
+  expectError(R"({"body":"d","do":"open","speed":"fast"})", "tour.jsonl:1: speed: must be");
+  expectError(R"({"body":"d","do":"open","speed":0})", "tour.jsonl:1: speed: 0 is out of range");
+  expectError(R"({"body":"d","turn":1,"turn_speed":-3})", "tour.jsonl:1: turn_speed: -3 is out of range");
+  expectError(R"({"body":"d","turn":1,"speed":1,"turn_speed":3})",
+              R"(tour.jsonl:1: speed: stands beside "turn_speed")");
+  expectError(R"({"body":"d","do":"open","at":[0,0,0]})", R"(tour.jsonl:1: "at" is no key)");
+}
+
 TEST(Script, NamesAreShortAndFitForFiles) {
   expectError(R"({"leave":""})", "tour.jsonl:1: leave: is empty; give the avatar's name");
   expectError(R"({"leave":")" + std::string(65, 'a') + "\"}", "tour.jsonl:1: leave: has 65");

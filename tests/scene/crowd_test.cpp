@@ -76,5 +76,50 @@ TEST(Crowd, TwoHundredInACorridorNeverPenetrateAndNobodyGetsOut) {
   }
 }
 
+TEST(Crowd, WhoIsDrivenIntoAGapThatIsTooNarrowStandsStill) {
+  for (int i = 0; i < 24; ++i) {
+    const double gap = 0.1 + 0.02 * i, turn = 0.5 - 0.04 * i;  // less than 0.6 m
+    Trial run({{"floor", {-10, -0.2, -10}, {10, 0, 10}},
+               {"left", {2, 0, -6}, {2.05, 3, -0.5 * gap}},
+               {"right", {2, 0, 0.5 * gap}, {2.05, 3, 6}}});
+    run.order("ann", Spawn{{0, 0, 0.003 * i}});
+    run.untilIdle();
+    run.order("ann", Drive{{1.3, 0, 0.1 * turn}});
+    run.ticks(200);
+    const Vec3 feet = run.feet("ann");
+    EXPECT_LT(feet.x(), 2.2);
+    for (int tick = 0; tick < 30; ++tick) {
+      run.step();
+      ASSERT_EQ(run.feet("ann"), feet) << gap << ", tick " << tick;
+    }
+  }
+}
+
+/// All press towards one end, each a little aside as well, until they stand.
+TEST(Crowd, WhoStandsBlockedInAThrongDoesNotTremble) {
+  constexpr int kThrong = 120;
+  Trial run(corridor(4, 30));
+  for (int i = 0; i < kThrong; ++i) {
+    const double x = 13.5 + 0.66 * (i / 5), z = -1.5 + 0.75 * (i % 5);
+    run.order("a" + std::to_string(i), Spawn{{x, 0, z}});
+  }
+  run.step();
+  ASSERT_EQ(run.count(Notice::Kind::spawned), kThrong);
+  for (int i = 0; i < kThrong; ++i)
+    run.order("a" + std::to_string(i), Drive{{1.3, 0, 0.1 * (i % 7 - 3)}});
+  run.ticks(420);
+  const auto feetOfAll = [&] {
+    std::vector<Vec3> feet;
+    for (const AvatarView& a : run.world.snapshot()->avatars) feet.push_back(a.feet);
+    return feet;
+  };
+  const std::vector<Vec3> before = feetOfAll();
+  for (int tick = 0; tick < 30; ++tick) {
+    run.step();
+    ASSERT_EQ(feetOfAll(), before) << "tick " << tick;
+  }
+  EXPECT_EQ(run.worstPenetration, 0);
+}
+
 }  // namespace
 }  // namespace enfilade::scene

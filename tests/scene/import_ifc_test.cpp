@@ -5,16 +5,17 @@
 #include <cstdlib>
 #include <random>
 
-#include "scene/import/ifc/web_ifc.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
 #include "tests/scene/stored_zip.hpp"
+#include "tests/support/web_ifc_here.hpp"
 
 namespace enfilade::scene {
 namespace {
 
+using tests::hasWebIfc;
 using tests::IfcHouse;
 using tests::TemporaryFolder;
 
@@ -22,10 +23,6 @@ ImportOptions by(IfcReader reader) {
   ImportOptions options;
   options.ifcReader = reader;
   return options;
-}
-
-bool hasWebIfc() {
-  return findWebIfc().missing.empty();
 }
 
 std::vector<IfcReader> readersHere() {
@@ -178,7 +175,7 @@ TEST(ImportIfc, AReaderThatFailsIsFollowedByTheNext) {
 }
 
 TEST(ImportIfc, AReaderThatHangsLeavesTimeForTheNext) {
-  if (!hasWebIfc()) GTEST_SKIP() << findWebIfc().missing;
+  ENFILADE_NEED_WEB_IFC();
   const TemporaryFolder folder;
   const auto file = folder.write("house.ifc", IfcHouse().text());
   const Environment fault("ENFILADE_IMPORT_FAULT", "web-ifc:hang");

@@ -8,11 +8,11 @@
 #include <random>
 #include <set>
 
-#include "scene/import/ifc/web_ifc.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/support/shared_folder.hpp"
+#include "tests/support/web_ifc_here.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -181,7 +181,9 @@ TEST_P(ImportSharedScene, GivesItsObjectsTrianglesAndTrueExtents) {
   const Expected& expected = GetParam();
   const bool node = expected.reader == kWeb || expected.reader == IfcReader::automatic;
   const bool ifc = std::string_view(expected.file).find(".ifc") != std::string_view::npos;
-  if (ifc && node && !findWebIfc().missing.empty()) GTEST_SKIP() << findWebIfc().missing;
+  if (ifc && node) {
+    ENFILADE_NEED_WEB_IFC();
+  }
   Model model = importShared(*shared / "scenes" / expected.file, expected.reader, expected.given);
   EXPECT_EQ(model.objects.size(), expected.objects);
   // ifcplusplus' solid modelling varies with addresses, where they cannot be held still.
@@ -283,7 +285,7 @@ TEST(ImportSharedScenes, IfcReadersAgreeOnWhatAProductIs) {
   ENFILADE_NEED_SHARED(shared);
   const auto file = *shared / "scenes/duplex/Duplex_A_20110907.ifc";
   std::vector<IfcReader> readers{kPlus, kAssimp};
-  if (findWebIfc().missing.empty()) readers.push_back(kWeb);
+  if (tests::hasWebIfc()) readers.push_back(kWeb);
   std::map<std::string, std::string> known;  // path and operation by GlobalId
   for (const IfcReader reader : readers) {
     const Model model = importShared(file, reader);
@@ -322,7 +324,7 @@ TEST(ImportSharedScenes, WebIfcCutsEveryOpeningAndIfcPlusPlusLeavesSome) {
   const std::size_t left = countOf(importShared(file, kPlus), "uncut_opening");
   EXPECT_GE(left, 1u);  // 4 of 36 in the measurements of this reader
   EXPECT_LE(left, 8u);
-  if (!findWebIfc().missing.empty()) GTEST_SKIP() << findWebIfc().missing;
+  ENFILADE_NEED_WEB_IFC();
   for (const char* name : {"duplex/Duplex_A_20110907.ifc", "fzk-haus/AC14-FZK-Haus.ifc"}) {
     const Model model = importShared(*shared / "scenes" / name, kWeb);
     EXPECT_EQ(countOf(model, "uncut_opening"), 0u) << name;

@@ -2,8 +2,11 @@
 // was: every triangle against every part by the narrow phase, and on which side of each sheet.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -136,8 +139,12 @@ inline Vec3 randomVelocity(Seeded& random, bool flies) {
   return speed * Vec3(std::cos(angle), up, std::sin(angle)).normalized();
 }
 
+/// Where one avatar enters and has to stay.
 struct Cell {
   Vec3 min, max;
+  std::optional<Vec3> entry = {};  ///< none: the middle
+  /// Metres: the feet are never lower over this place; empty: than the cell.
+  std::function<double(const Vec3& feet)> ground = {};
 };
 
 /// Drives one avatar a cell about and holds it to its cell; what goes wrong is counted.
@@ -154,8 +161,9 @@ struct CellTrial {
   void spawn(double height = 1.75, double radius = 0.3) {
     for (std::size_t i = 0; i < cells.size(); ++i) {
       const Vec3 middle = 0.5 * (cells[i].min + cells[i].max);
+      const Vec3 at = cells[i].entry.value_or(Vec3(middle.x(), cells[i].min.y(), middle.z()));
       Spawn spawn;
-      spawn.at = {middle.x(), cells[i].min.y() + 0.01, middle.z()};
+      spawn.at = at + Vec3(0, 0.01, 0);
       spawn.height = height;
       spawn.radius = radius;
       command(i, spawn);
@@ -189,6 +197,8 @@ struct CellTrial {
       const Cell& cell = cells[std::stoul(avatar.name.substr(1)) - 100];
       const Box body = boxAt(avatar.shape->box, avatar.feet);
       outside += !contains(Box{cell.min, cell.max}, body);
+      // What it stands on may give way by the rounding of the file's floats.
+      outside += cell.ground && avatar.feet.y() + 1e-6 < cell.ground(avatar.feet);
       blocked += avatar.move.stoppedBy != 0;
     }
     penetrating += report.worstPenetration > 0;
@@ -206,6 +216,81 @@ inline std::vector<Cell> gridOfCells(Builder& b, int side, double size, double h
     cells.push_back({min, max});
   }
   return cells;
+}
+
+/// Rooms of panes a millimetre thick, with ledges, needles and plates in them.
+inline std::vector<Cell> paneRooms(Builder& b, int count, Seeded& random) {
+  std::vector<Cell> cells;
+  for (int i = 0; i < count; ++i) {
+    const Vec3 min{3.0 * i, 0, 0}, max{3.0 * i + 2.999, 3, 3};
+    const std::string room = "room" + std::to_string(i);
+    b.box(room + "/floor", min - Vec3(0.1, 0.2, 0.1), {max.x() + 0.1, 0, 3.1});
+    b.box(room + "/roof", {min.x() - 0.1, 3, -0.1}, max + Vec3(0.1, 0.001, 0.1));
+    b.box(room + "/south", min - Vec3(0, 0, 0.001), {max.x(), 3, 0});
+    b.box(room + "/north", {min.x(), 0, 3}, max + Vec3(0, 0, 0.001));
+    b.box(room + "/west", min - Vec3(0.001, 0, 0), {min.x(), 3, 3});
+    b.box(room + "/east", {max.x(), 0, 0}, max + Vec3(0.001, 0, 0));
+    for (int k = 0; k < 12; ++k) {
+      const double x = min.x() + random.uniform(0, 2.9), z = random.uniform(0, 2.9);
+      const bool whereOneEnters = std::abs(x - min.x() - 1.5) < 0.6 && std::abs(z - 1.5) < 0.6;
+      if (whereOneEnters) continue;
+      const double y = random.uniform(0, 2);
+      b.box(room + "/bit" + std::to_string(k), {x, y, z},
+            {x + random.uniform(1e-4, 0.1), y + random.uniform(1e-4, 0.4), z + 0.001});
+    }
+    cells.push_back({min, max});
+  }
+  return cells;
+}
+
+/// Two rooms of sheets each, with a wall of no thickness across x = 0 of each pair that has a gap of
+/// `gap` metres in its middle. They stand one beside the other along z.
+inline std::vector<Cell> gapRooms(Builder& b, int count, double gap) {
+  std::vector<Cell> cells;
+  for (int i = 0; i < count; ++i) {
+    const double z = 2.0 * i, south = z - 1, north = z + 1;
+    const Vec3 min{-1.5, 0, south}, max{1.5, 2.5, north};
+    const std::string room = "rooms" + std::to_string(i);
+    sheetCell(b, room, min, max, false);
+    const double left = z - 0.5 * gap, right = z + 0.5 * gap;
+    b.sheet(room + "/left", {{0, 0, south}, {0, 0, left}, {0, 2.5, left}, {0, 2.5, south}});
+    b.sheet(room + "/right", {{0, 0, right}, {0, 0, north}, {0, 2.5, north}, {0, 2.5, right}});
+    cells.push_back({min, max, Vec3(-0.8, 0, z)});
+  }
+  return cells;
+}
+
+/// A straight flight of sheets, without thickness, between two side walls of sheets; it rises along
+/// +x from x = 0, in the middle of z.
+inline Cell stairCell(Builder& b, const std::string& name, double riser, double tread, int steps,
+                      double z) {
+  const double top = riser * steps, end = tread * steps, south = z - 1, north = z + 1;
+  const double roof = top + 4;
+  const auto sheet = [&](const char* part, const std::vector<Vec3>& corners) {
+    b.sheet(name + "/" + part, corners);
+  };
+  const auto level = [&](const char* part, double x0, double x1, double y) {
+    sheet(part, {{x0, y, south}, {x1, y, south}, {x1, y, north}, {x0, y, north}});
+  };
+  const auto across = [&](const char* part, double x, double y0, double y1) {
+    sheet(part, {{x, y0, south}, {x, y1, south}, {x, y1, north}, {x, y0, north}});
+  };
+  for (int i = 0; i < steps; ++i) {
+    level("tread", tread * i, tread * (i + 1), riser * (i + 1));
+    across("riser", tread * i, riser * i, riser * (i + 1));
+  }
+  level("below", -2, 0, 0);
+  level("above", end, end + 2, top);
+  level("roof", -2, end + 2, roof);
+  across("west", -2, -1, roof);
+  across("east", end + 2, -1, roof);
+  for (const double side : {south, north})
+    sheet("side", {{-2, -1, side}, {end + 2, -1, side}, {end + 2, roof, side}, {-2, roof, side}});
+  // Under the middle of the soles something holds, whatever the way was.
+  const auto ground = [=](const Vec3& feet) {
+    return riser * std::max(0.0, std::min(double(steps), std::floor(feet.x() / tread) + 1));
+  };
+  return {{-2, 0, south}, {end + 2, roof, north}, Vec3(-1, 0, z), ground};
 }
 
 }  // namespace enfilade::scene::testing

@@ -3,10 +3,10 @@
 
 #include <cstdlib>
 
-#include "scene/import/ifc/web_ifc.hpp"
 #include "scene/import/import_model.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
+#include "tests/support/web_ifc_here.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -27,7 +27,6 @@ class ScriptedNode {
   std::filesystem::path house() const {
     return folder_.write("house.ifc", tests::IfcHouse().text());
   }
-  bool possible() const { return findWebIfc().missing.empty(); }
 
  private:
   static constexpr const char* kFrames = R"(
@@ -65,7 +64,7 @@ if (first === 1) {
 if (first !== 0) send('D', Buffer.alloc(0));
 setTimeout(() => {}, first === 0 ? 10000 : 0);
 )");
-  if (!node.possible()) GTEST_SKIP() << findWebIfc().missing;
+  ENFILADE_NEED_WEB_IFC();
   const Model model = importModel(node.house());
   EXPECT_EQ(model.reader, "web-ifc");
   ASSERT_EQ(model.objects.size(), 2u);
@@ -87,7 +86,7 @@ TEST(WebIfcProcess, ARunawayIsStoppedByItsMemoryLimit) {
 const all = [];
 for (;;) all.push(Buffer.alloc(1 << 24, 1));
 )");
-  if (!node.possible()) GTEST_SKIP() << findWebIfc().missing;
+  ENFILADE_NEED_WEB_IFC();
   ImportOptions options;
   options.memoryLimit = std::size_t{700} << 20;
   options.timeLimit = 60;
@@ -102,7 +101,7 @@ TEST(WebIfcProcess, NoiseAndSilenceAreFailures) {
   for (const char* script :
        {"send('X', words(1));", "send('G', words(1, 5, 5));", "", "throw 1;"}) {
     const ScriptedNode node(script);
-    if (!node.possible()) GTEST_SKIP() << findWebIfc().missing;
+    ENFILADE_NEED_WEB_IFC();
     const Model model = importModel(node.house());
     EXPECT_EQ(model.reader, "ifcplusplus") << script;
     EXPECT_NE(exampleOf(model, "ifc_reader_failed"), "") << script;

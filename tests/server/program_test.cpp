@@ -1,22 +1,8 @@
-// The program itself, as its users start it: exit codes, what it says, what it writes.
-#include <fcntl.h>
-#include <gtest/gtest.h>
-#include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
+// The program as its users start it: exit codes, what it says, what it writes.
+#include "tests/server/program_trial.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
-#include <sstream>
-#include <thread>
-
-#include "tests/server/small_room.hpp"
-
-extern char** environ;
+#include <map>
 
 namespace enfilade::server::testing {
 namespace {
@@ -33,74 +19,12 @@ constexpr const char* kWalk = R"({"spawn":"ann","at":[0,0.01,0],"facing":0}
 {"leave":"bob"}
 )";
 
-std::string textOf(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
-
-void write(const fs::path& file, const std::string& text) {
-  std::ofstream(file, std::ios::binary) << text;
-}
-
-class Program : public ::testing::Test {
+class Program : public ProgramTrial {
  protected:
-  struct Ended {
-    int code = -1;
-    std::string out, err;
-  };
-
   void SetUp() override {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() /
-              (std::string("enfilade_") + test->name() + "_" + std::to_string(::getpid()));
-    fs::create_directories(folder_);
-    write(folder_ / "room.obj", smallRoomObj());
+    ProgramTrial::SetUp();
     write(folder_ / "walk.jsonl", kWalk);
   }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-
-  pid_t start(std::vector<std::string> arguments) const {
-    arguments.insert(arguments.begin(), ENFILADE_PROGRAM);
-    std::vector<char*> argv;
-    for (std::string& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    const int flags = O_WRONLY | O_CREAT | O_TRUNC;
-    posix_spawn_file_actions_addopen(&actions, 1, path("stdout").c_str(), flags, 0600);
-    posix_spawn_file_actions_addopen(&actions, 2, path("stderr").c_str(), flags, 0600);
-    pid_t child = -1;
-    EXPECT_EQ(posix_spawn(&child, ENFILADE_PROGRAM, &actions, nullptr, argv.data(), environ), 0);
-    posix_spawn_file_actions_destroy(&actions);
-    return child;
-  }
-
-  static int codeOf(pid_t child) {
-    int status = 0;
-    waitpid(child, &status, 0);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
-  }
-
-  Ended run(const std::vector<std::string>& arguments) const {
-    const int code = codeOf(start(arguments));
-    return {code, textOf(path("stdout")), textOf(path("stderr"))};
-  }
-
-  /// The port of the ready line, when it is there.
-  int awaitReady() const {
-    for (int i = 0; i < 3000; ++i) {
-      const auto ready = nlohmann::json::parse(textOf(path("stdout")), nullptr, false);
-      if (!ready.is_discarded() && ready.value("ready", false)) return ready.at("port");
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-    return 0;
-  }
-
-  fs::path folder_;
 };
 
 TEST_F(Program, UsageMistakesEndWithTwoAndSayHow) {
@@ -296,44 +220,6 @@ TEST_F(Program, AWalkOverTheSocketIsTheReplayToTheLastBit) {
     EXPECT_FALSE(textOf(path("replayed/") + file).empty()) << file;
     EXPECT_EQ(textOf(path("replayed/") + file), textOf(path("walked/") + file)) << file;
   }
-}
-
-TEST_F(Program, InspectTellsAsJsonWhatIsInTheScene) {
-  const Ended told = run({"inspect", path("room.obj"), "--json", "--unit", "m", "--objects"});
-  ASSERT_EQ(told.code, 0) << told.err;
-  const auto all = nlohmann::json::parse(told.out);
-  EXPECT_EQ(all.at("objects"), 3);
-  EXPECT_EQ(all.at("meshes"), 3);
-  EXPECT_EQ(all.at("triangles"), all.at("unique_triangles"));
-  EXPECT_EQ(all.at("convex_parts"), 3);
-  EXPECT_EQ(all.at("unit"), 1);
-  EXPECT_EQ(all.at("up"), "y");
-  EXPECT_EQ(all.at("offset"), nlohmann::json({0.0, 0.0, 0.0}));
-  EXPECT_EQ(all.at("bounds").at("size").at(0), 20);
-  EXPECT_TRUE(all.at("bodies").is_array());
-  EXPECT_TRUE(all.at("problems").empty()) << told.out;
-  EXPECT_GT(all.at("import_seconds"), 0);
-  EXPECT_GT(all.at("peak_mb"), 1);
-  ASSERT_EQ(all.at("object_list").size(), 3u);
-  EXPECT_EQ(all.at("object_list").at(1).at("path"), "room_wall");
-  EXPECT_EQ(all.at("object_list").at(1).at("box").at("min").at(0), 5);
-}
-
-TEST_F(Program, InspectStrictEndsWithThreeWhenThereAreProblems) {
-  EXPECT_EQ(run({"inspect", path("room.obj"), "--strict", "--unit", "m"}).code, 0);
-  write(folder_ / "room.obj", smallRoomObj() + "o again\nf 1 2 3\nf 1 2 3\n");
-  EXPECT_EQ(run({"inspect", path("room.obj"), "--unit", "m"}).code, 0);
-  const Ended strict = run({"inspect", path("room.obj"), "--strict", "--unit", "m"});
-  EXPECT_EQ(strict.code, 3);
-  EXPECT_NE(strict.out.find("duplicate_triangle"), std::string::npos) << strict.out;
-  EXPECT_LT(std::count(strict.out.begin(), strict.out.end(), '\n'), 40);
-}
-
-TEST_F(Program, InspectDrawsAPlanOfEachStorey) {
-  const Ended drawn = run({"inspect", path("room.obj"), "--plan", path("plans")});
-  ASSERT_EQ(drawn.code, 0) << drawn.err;
-  EXPECT_TRUE(fs::exists(folder_ / "plans/storey-1.png"));
-  EXPECT_FALSE(fs::exists(folder_ / "plans/storey-2.png"));
 }
 
 TEST_F(Program, ASecondStartReadsWhatTheFirstOneKept) {

@@ -13,8 +13,9 @@ namespace enfilade::server::testing {
 
 class ServedRoom : public ::testing::Test {
  protected:
-  void serve(const ServerLimits& limits = {}) {
-    server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, limits);
+  void serve(const ServerLimits& limits = {},
+             std::shared_ptr<const scene::Scene> scene = smallRoom()) {
+    server_ = std::make_unique<Server>(std::move(scene), Endpoint{"127.0.0.1", 0}, limits);
   }
   protocol::Client client(const std::string& name) {
     protocol::ClientOptions options;

@@ -1,0 +1,105 @@
+// `enfilade inspect`: what it tells, and how it ends when it is used wrongly.
+#include <algorithm>
+
+#include "server/version.hpp"
+#include "tests/server/program_trial.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+namespace fs = std::filesystem;
+class Inspect : public ProgramTrial {};
+
+TEST_F(Inspect, TellsAsJsonWhatIsInTheScene) {
+  const Ended told = run({"inspect", path("room.obj"), "--json", "--unit", "m", "--objects"});
+  ASSERT_EQ(told.code, 0) << told.err;
+  const auto all = nlohmann::json::parse(told.out);
+  EXPECT_EQ(all.at("objects"), 3);
+  EXPECT_EQ(all.at("meshes"), 3);
+  EXPECT_EQ(all.at("triangles"), all.at("unique_triangles"));
+  EXPECT_EQ(all.at("convex_parts"), 3);
+  EXPECT_EQ(all.at("unit"), 1);
+  EXPECT_EQ(all.at("up"), "y");
+  EXPECT_EQ(all.at("offset"), nlohmann::json({0.0, 0.0, 0.0}));
+  EXPECT_EQ(all.at("bounds").at("size").at(0), 20);
+  EXPECT_TRUE(all.at("bodies").is_array());
+  EXPECT_TRUE(all.at("problems").empty()) << told.out;
+  EXPECT_GT(all.at("import_seconds"), 0);
+  EXPECT_GT(all.at("peak_mb"), 1);
+  ASSERT_EQ(all.at("object_list").size(), 3u);
+  EXPECT_EQ(all.at("object_list").at(1).at("path"), "room_wall");
+  EXPECT_EQ(all.at("object_list").at(1).at("box").at("min").at(0), 5);
+}
+
+TEST_F(Inspect, StrictEndsWithThreeWhenThereAreProblems) {
+  EXPECT_EQ(run({"inspect", path("room.obj"), "--strict", "--unit", "m"}).code, 0);
+  write(folder_ / "room.obj", smallRoomObj() + "o again\nf 1 2 3\nf 1 2 3\n");
+  EXPECT_EQ(run({"inspect", path("room.obj"), "--unit", "m"}).code, 0);
+  const Ended strict = run({"inspect", path("room.obj"), "--strict", "--unit", "m"});
+  EXPECT_EQ(strict.code, 3);
+  EXPECT_NE(strict.out.find("duplicate_triangle"), std::string::npos) << strict.out;
+  EXPECT_LT(std::count(strict.out.begin(), strict.out.end(), '\n'), 40);
+}
+
+TEST_F(Inspect, DrawsAPlanOfEachStorey) {
+  const Ended drawn = run({"inspect", path("room.obj"), "--plan", path("plans")});
+  ASSERT_EQ(drawn.code, 0) << drawn.err;
+  EXPECT_TRUE(fs::exists(folder_ / "plans/storey-1.png"));
+  EXPECT_FALSE(fs::exists(folder_ / "plans/storey-2.png"));
+}
+
+TEST_F(Inspect, WrongUseEndsWithTwoAndWhatCannotBeReadWithOne) {
+  const std::vector<std::vector<std::string>> mistakes{
+      {"inspect"},
+      {"inspect", path("room.obj"), path("room.obj")},
+      {"inspect", path("room.obj"), "--plan"},
+      {"inspect", path("room.obj"), "--plan", ""},
+      {"inspect", path("room.obj"), "--jsno"},
+      {"inspect", path("room.obj"), "--up", "North"}};
+  for (const auto& arguments : mistakes) {
+    const Ended ended = run(arguments);
+    EXPECT_EQ(ended.code, 2) << ::testing::PrintToString(arguments);
+    EXPECT_EQ(ended.out, "");
+    EXPECT_NE(ended.err.find("inspect --help"), std::string::npos) << ended.err;
+  }
+  for (const std::string& file : {path("absent.obj"), folder_.string()}) {
+    const Ended ended = run({"inspect", file});
+    EXPECT_EQ(ended.code, 1);
+    EXPECT_EQ(ended.out, "");
+    EXPECT_NE(ended.err.find(file), std::string::npos) << ended.err;
+  }
+}
+
+TEST_F(Inspect, APlanThatCannotBeWrittenIsToldBeforeTheModelIsRead) {
+  write(path("file"), "in the way");
+  for (const std::string& folder : {path("file"), path("file") + "/below", std::string("/proc/x")}) {
+    const Ended ended = run({"inspect", path("absent.obj"), "--plan", folder});
+    EXPECT_EQ(ended.code, 1);
+    EXPECT_EQ(ended.out, "");
+    EXPECT_NE(ended.err.find("cannot write into " + folder), std::string::npos) << ended.err;
+    EXPECT_NE(ended.err.find("--plan"), std::string::npos) << ended.err;
+  }
+  EXPECT_EQ(textOf(path("file")), "in the way");
+}
+
+TEST_F(Inspect, AFullDiskEndsWithOneAndIsNamed) {
+  fs::create_symlink("/dev/full", path("stdout"));
+  EXPECT_EQ(codeOf(start({"inspect", path("room.obj"), "--json"})), 1);
+  EXPECT_NE(textOf(path("stderr")).find("stdout"), std::string::npos) << textOf(path("stderr"));
+  fs::remove(path("stdout"));
+  fs::create_directories(path("plans"));
+  fs::create_symlink("/dev/full", path("plans/storey-1.png"));
+  const Ended ended = run({"inspect", path("room.obj"), "--plan", path("plans")});
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_NE(ended.err.find("storey-1.png"), std::string::npos) << ended.err;
+}
+
+TEST_F(Inspect, TheProgramTellsItsVersion) {
+  const Ended told = run({"--version"});
+  EXPECT_EQ(told.code, 0);
+  EXPECT_EQ(told.out, std::string("enfilade ") + kServerVersion + "\n");
+  EXPECT_EQ(told.err, "");
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing

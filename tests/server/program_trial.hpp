@@ -1,0 +1,94 @@
+// The program itself, started in a folder of its own as its users start it.
+#pragma once
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "tests/server/small_room.hpp"
+
+extern char** environ;
+
+namespace enfilade::server::testing {
+
+inline std::string textOf(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+inline void write(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream(file, std::ios::binary) << text;
+}
+
+/// With the small room as room.obj.
+class ProgramTrial : public ::testing::Test {
+ protected:
+  struct Ended {
+    int code = -1;
+    std::string out, err;
+  };
+
+  void SetUp() override {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = std::filesystem::temp_directory_path() /
+              (std::string("enfilade_") + test->name() + "_" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder_);
+    write(folder_ / "room.obj", smallRoomObj());
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  pid_t start(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), ENFILADE_PROGRAM);
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    const int flags = O_WRONLY | O_CREAT | O_TRUNC;
+    posix_spawn_file_actions_addopen(&actions, 1, path("stdout").c_str(), flags, 0600);
+    posix_spawn_file_actions_addopen(&actions, 2, path("stderr").c_str(), flags, 0600);
+    pid_t child = -1;
+    EXPECT_EQ(posix_spawn(&child, ENFILADE_PROGRAM, &actions, nullptr, argv.data(), environ), 0);
+    posix_spawn_file_actions_destroy(&actions);
+    return child;
+  }
+
+  static int codeOf(pid_t child) {
+    int status = 0;
+    waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+
+  Ended run(const std::vector<std::string>& arguments) const {
+    const int code = codeOf(start(arguments));
+    return {code, textOf(path("stdout")), textOf(path("stderr"))};
+  }
+
+  /// The port of the ready line, when it is there.
+  int awaitReady() const {
+    for (int i = 0; i < 3000; ++i) {
+      const auto ready = nlohmann::json::parse(textOf(path("stdout")), nullptr, false);
+      if (!ready.is_discarded() && ready.value("ready", false)) return ready.at("port");
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return 0;
+  }
+
+  std::filesystem::path folder_;
+};
+
+}  // namespace enfilade::server::testing

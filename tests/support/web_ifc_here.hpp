@@ -1,0 +1,25 @@
+// Whether web-ifc can read IFC here: it needs Node.js and one `npm ci`.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "scene/import/ifc/web_ifc.hpp"
+
+namespace enfilade::tests {
+
+/// Tests leave out what needs web-ifc where it is missing. In CI that is a failure of the test that
+/// asks, so that no reader goes untested unnoticed.
+inline bool hasWebIfc() {
+  const std::string missing = scene::findWebIfc().missing;
+  if (!missing.empty() && std::getenv("CI") != nullptr)
+    ADD_FAILURE() << "CI tests every reader of IFC, but " << missing;
+  return missing.empty();
+}
+
+}  // namespace enfilade::tests
+
+/// Ends the test where web-ifc is missing: as skipped, or in CI as failed.
+#define ENFILADE_NEED_WEB_IFC() \
+  if (!enfilade::tests::hasWebIfc()) GTEST_SKIP() << enfilade::scene::findWebIfc().missing
