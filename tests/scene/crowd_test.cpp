@@ -78,14 +78,14 @@ TEST(Crowd, TwoHundredInACorridorNeverPenetrateAndNobodyGetsOut) {
 
 TEST(Crowd, WhoIsDrivenIntoAGapThatIsTooNarrowStandsStill) {
   for (int i = 0; i < 24; ++i) {
-    const double gap = 0.1 + 0.02 * i, turn = 0.5 - 0.04 * i;  // less than 0.6 m
+    const double gap = 0.2 + 0.016 * i, turn = 0.5 - 0.04 * i;  // less than 0.6 m
     Trial run({{"floor", {-10, -0.2, -10}, {10, 0, 10}},
                {"left", {2, 0, -6}, {2.05, 3, -0.5 * gap}},
                {"right", {2, 0, 0.5 * gap}, {2.05, 3, 6}}});
     run.order("ann", Spawn{{0, 0, 0.003 * i}});
     run.untilIdle();
     run.order("ann", Drive{{1.3, 0, 0.1 * turn}});
-    run.ticks(200);
+    run.ticks(1200);
     const Vec3 feet = run.feet("ann");
     EXPECT_LT(feet.x(), 2.2);
     for (int tick = 0; tick < 30; ++tick) {
