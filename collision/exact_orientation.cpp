@@ -27,6 +27,13 @@ constexpr double kBound2 = (3.0 + 16.0 * kEpsilon) * kEpsilon;  // Shewchuk's cc
 constexpr double kLargeDifference = 1e90;
 constexpr double kUnderflow = 1e-220;
 
+/// `value` * `scale` where that is a whole number and no part of it was lost to underflow.
+bool toInteger(double value, double scale, std::int64_t& integer) {
+  const double scaled = value * scale;
+  integer = static_cast<std::int64_t>(scaled);
+  return static_cast<double>(integer) == scaled && (integer != 0 || value == 0);
+}
+
 /// The sign of u . (v x w) when the nine numbers are multiples of one power of two by less than
 /// 2^40, so that 128 bits hold all sums of triple products; nullopt when they are not.
 std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w, double largest) {
@@ -39,9 +46,8 @@ std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w,
   const std::array<const Vec3*, 3> rows{&u, &v, &w};
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t k = 0; k < 3; ++k) {
-      const double scaled = (*rows[row])[static_cast<Eigen::Index>(k)] * scale;
-      n[row][k] = static_cast<std::int64_t>(scaled);
-      if (static_cast<double>(n[row][k]) != scaled) return std::nullopt;
+      if (!toInteger((*rows[row])[static_cast<Eigen::Index>(k)], scale, n[row][k]))
+        return std::nullopt;
     }
   }
   Wide sum = 0;
@@ -52,14 +58,32 @@ std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w,
   return sum > 0 ? 1 : sum < 0 ? -1 : 0;
 }
 
-/// Whether `difference`, b - a as it was computed, is b - a: added to a (D. E. Knuth's two-sum) it
-/// gives b and loses nothing.
+/// The sign of ux vy - uy vx when the four numbers are multiples of one power of two by less than
+/// 2^62; nullopt when they are not.
+std::optional<int> signInFixedPoint(double ux, double uy, double vx, double vy, double largest) {
+  __extension__ typedef __int128 Wide;
+  int exponent = 0;
+  std::frexp(largest, &exponent);
+  if (exponent < -900 || exponent > 900) return std::nullopt;
+  const double scale = std::ldexp(1.0, 62 - exponent);
+  std::array<std::int64_t, 4> n{};
+  const std::array<double, 4> values{ux, uy, vx, vy};
+  for (std::size_t i = 0; i < 4; ++i)
+    if (!toInteger(values[i], scale, n[i])) return std::nullopt;
+  const Wide left = Wide{n[0]} * n[3], right = Wide{n[1]} * n[2];
+  return left > right ? 1 : left < right ? -1 : 0;
+}
+
+/// Whether `d`, b - a as it was computed, is b - a: added to a (D. E. Knuth's two-sum) it gives b
+/// and loses nothing.
+bool isExact(double d, double a, double b) {
+  const double sum = d + a, rest = sum - d;
+  return sum == b && (d - (sum - rest)) + (a - rest) == 0;
+}
+
 bool isExact(const Vec3& difference, const Vec3& a, const Vec3& b) {
-  for (Eigen::Index k = 0; k < 3; ++k) {
-    const double d = difference[k], sum = d + a[k], rest = sum - d;
-    if (sum != b[k] || (d - (sum - rest)) + (a[k] - rest) != 0) return false;
-  }
-  return true;
+  return isExact(difference.x(), a.x(), b.x()) && isExact(difference.y(), a.y(), b.y()) &&
+         isExact(difference.z(), a.z(), b.z());
 }
 
 /// Doubles as integers of one common scale, which is a power of two.
@@ -131,10 +155,15 @@ int turn(const Vec3& a, const Vec3& b, const Vec3& c, int dropped) {
   const double vx = c[i] - a[i], vy = c[j] - a[j];
   const double left = ux * vy;
   const double right = uy * vx;
-  if (std::max({std::abs(ux), std::abs(uy), std::abs(vx), std::abs(vy)}) < kLargeDifference) {
+  const double largest = std::max({std::abs(ux), std::abs(uy), std::abs(vx), std::abs(vy)});
+  if (largest < kLargeDifference) {
     const double bound = kBound2 * (std::abs(left) + std::abs(right)) + kUnderflow;
     if (left - right > bound) return 1;
     if (left - right < -bound) return -1;
+    if (isExact(ux, a[i], b[i]) && isExact(uy, a[j], b[j]) && isExact(vx, a[i], c[i]) &&
+        isExact(vy, a[j], c[j])) {
+      if (const auto sign = signInFixedPoint(ux, uy, vx, vy, largest)) return *sign;
+    }
   }
   return exactTurn(a[i], a[j], b[i], b[j], c[i], c[j]);
 }

@@ -30,7 +30,7 @@ constexpr std::size_t kLongestQuote = 40;
 constexpr double kFarthest = 1e7;  // metres
 constexpr double kFastest = 1000;  // metres per second
 constexpr double kMostDegrees = 1e6;
-constexpr double kMostJoint = 1000;   // radians or metres
+constexpr double kMostJoint = 1000;  // radians or metres
 // Degrees per second: how fast a body's farthest point then is, the world knows and bounds.
 constexpr double kFastestTurn = 1e6;
 constexpr double kFastestJoint = 20;  // radians or metres per second

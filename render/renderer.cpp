@@ -118,9 +118,11 @@ struct Renderer::State {
   GlProgram hollows;
   std::array<std::optional<GlProgram>, 6> surfaces;  // see surfaceProgram()
   FrameTarget target;
+  bool prepared = false;  // all between the context and the target is there
 
   explicit State(std::shared_ptr<const scene::Scene> shared);
   ~State();
+  void prepare();
   GLuint surfaceProgram(const Batch& batch);
   void setUp(const Camera& camera);
   void drawBatches(const DrawList& list, const GlBuffer& vertices, const GlBuffer& indices,
@@ -132,6 +134,11 @@ struct Renderer::State {
 
 Renderer::State::State(std::shared_ptr<const scene::Scene> shared) : scene(std::move(shared)) {
   if (!scene) throw RenderError("Renderer: there is no scene");
+}
+
+/// A scene that nobody looks at is never brought to the device.
+void Renderer::State::prepare() {
+  if (prepared) return;
   buffers = uploadModel(scene->model());
   parts = partsOf(scene->model());
   vertexArray = render::vertexArray();
@@ -140,6 +147,7 @@ Renderer::State::State(std::shared_ptr<const scene::Scene> shared) : scene(std::
   sky = buildProgram("sky", skyVertexSource(), skyFragmentSource());
   hollows = buildProgram("hollows", skyVertexSource(), hollowFragmentSource());
   checkGl("setting up the renderer");
+  prepared = true;
 }
 
 Renderer::State::~State() {
@@ -239,6 +247,7 @@ Frame Renderer::render(const scene::Snapshot& snapshot, const Camera& camera,
   if (const auto why = refusal(camera)) throw RenderError(*why);
   State& s = *state_;
   s.context.makeCurrent();
+  s.prepare();
   DrawList list;
   appendVisible(list, {s.scene->model(), s.parts, s.buffers.ranges, s.buffers.materials},
                 placementsOf(*s.scene, snapshot), camera, hidden);

@@ -17,14 +17,15 @@ struct RenderError : std::runtime_error {
 /// Owns a GL context: make, use and destroy it on one thread. RenderThread does that for you.
 class Renderer {
  public:
-  /// Throws RenderError when no EGL device gives a context.
+  /// Throws RenderError when no EGL device gives a context. The scene is brought to the device with
+  /// the first picture.
   explicit Renderer(std::shared_ptr<const scene::Scene> scene);
   ~Renderer();
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
 
   /// `hidden` is not drawn (the avatar whose eyes these are); 0: everything is drawn.
-  /// Throws RenderError for a camera that refusal() refuses.
+  /// Throws RenderError for a camera that refusal() refuses, and for a scene too large to draw.
   Frame render(const scene::Snapshot& snapshot, const Camera& camera, scene::EntityId hidden = 0);
 
   const std::string& deviceName() const;  ///< GL_RENDERER

@@ -49,7 +49,9 @@ void drawPlans(const std::shared_ptr<const scene::Scene>& scene,
 
 ExitCode inspect(const InspectCommand& command) {
   if (!command.plan.empty()) prepareFolder(command.plan);
-  const Inspection inspection = inspected(loadSceneTimed(command.model));
+  const Inspection inspection =
+      inspected(loadSceneTimed(command.model),
+                command.model.cache ? scene::modelCacheOfEnvironment() : std::nullopt);
   const std::string text = command.json ? inspectionJson(inspection, command.objects) + "\n"
                                         : inspectionTable(inspection, command.objects);
   if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0)

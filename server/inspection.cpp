@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "server/kept_report.hpp"
+
 namespace enfilade::server {
 namespace {
 
@@ -198,9 +200,9 @@ void addObjects(const scene::Scene& scene, Table& table) {
 
 }  // namespace
 
-Inspection inspected(LoadedScene loaded) {
+Inspection inspected(LoadedScene loaded, const std::optional<scene::ModelCache>& cache) {
   Inspection inspection;
-  inspection.report = scene::reportOn(*loaded.scene);
+  inspection.report = reportFor(*loaded.scene, cache);
   inspection.loaded = std::move(loaded);
   inspection.peakMegabytes = std::max(megabytes(RUSAGE_SELF), megabytes(RUSAGE_CHILDREN));
   return inspection;

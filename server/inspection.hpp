@@ -1,8 +1,10 @@
 // What `inspect` tells of a scene, as a table for people and as JSON for programs.
 #pragma once
 
+#include <optional>
 #include <string>
 
+#include "scene/import/model_cache.hpp"
 #include "scene/scene_report.hpp"
 #include "server/load_scene.hpp"
 
@@ -14,8 +16,8 @@ struct Inspection {
   double peakMegabytes = 0;  ///< of resident memory: the program's or the import's, the greater
 };
 
-/// Reports on the scene, and asks the system for the peak.
-Inspection inspected(LoadedScene loaded);
+/// Reports on the scene, by the cache where it can, and asks the system for the peak.
+Inspection inspected(LoadedScene loaded, const std::optional<scene::ModelCache>& cache);
 
 /// One JSON object, indented; with `objects` also the list "object_list".
 std::string inspectionJson(const Inspection& inspection, bool objects);

@@ -16,6 +16,15 @@ v1::Error bad(const std::string& field, const std::string& why) {
   return errorOf(v1::ERROR_BAD_RAYS, field + why, field);
 }
 
+/// More than there is from one end of the world to the other.
+constexpr double kFarthestReach = 1e8;
+
+/// Of a message: 0 has no end, and what is not finite is no number of this protocol.
+std::optional<v1::Error> badReach(const std::string& field, double metres) {
+  if (metres == 0 || (metres > 0 && metres <= kFarthestReach)) return std::nullopt;
+  return bad(field + ".reach", ": give metres above 0 and up to 1e8, or 0 for no end");
+}
+
 double reachFrom(double metres) {
   return metres == 0 ? std::numeric_limits<double>::infinity() : metres;
 }
@@ -42,6 +51,7 @@ AskedOrError listed(const v1::RayQuery& query, const ServerLimits& limits) {
     const std::string field = "rays.rays[" + std::to_string(i) + "]";
     if (!message.has_origin()) return bad(field + ".origin", " is missing");
     if (!message.has_direction()) return bad(field + ".direction", " is missing");
+    if (auto error = badReach(field, message.reach())) return std::move(*error);
     const scene::Ray ray{vectorFrom(message.origin()), vectorFrom(message.direction()),
                          reachFrom(message.reach())};
     if (const auto why = scene::refusal(ray)) return refused(field, *why);
@@ -78,6 +88,7 @@ AskedOrError scanned(const v1::RangeScan& message, const scene::Snapshot& snapsh
   scan.height = message.height();
   scan.columns = message.columns();
   scan.rows = std::max(1u, message.rows());
+  if (auto error = badReach("rays.scan", message.reach())) return std::move(*error);
   scan.reach = reachFrom(message.reach());
   if (const auto why = scene::refusal(scan)) return refused("rays.scan", *why);
   const std::size_t count = std::size_t{scan.columns} * scan.rows;

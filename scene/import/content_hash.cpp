@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <fstream>
 #include <memory>
-#include <vector>
 
 namespace enfilade::scene {
 namespace {
@@ -35,10 +34,10 @@ std::optional<ContentHash> contentHashOfFile(const std::filesystem::path& file) 
                                                                        &XXH3_freeState);
   if (!in || !state) return std::nullopt;
   XXH3_128bits_reset(state.get());
-  std::vector<char> chunk(kChunk);
+  const auto chunk = std::make_unique_for_overwrite<char[]>(kChunk);
   while (in) {  // to the file's end
-    in.read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
-    XXH3_128bits_update(state.get(), chunk.data(), static_cast<std::size_t>(in.gcount()));
+    in.read(chunk.get(), kChunk);
+    XXH3_128bits_update(state.get(), chunk.get(), static_cast<std::size_t>(in.gcount()));
   }
   if (!in.eof()) return std::nullopt;
   return from(XXH3_128bits_digest(state.get()));

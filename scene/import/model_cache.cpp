@@ -33,6 +33,7 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr const char* kEnding = ".model";
+constexpr const char* kTextEnding = ".text";
 constexpr const char* kUnfinished = ".unfinished";
 constexpr auto kAbandoned = std::chrono::hours(1);  // an unfinished entry that nobody finishes
 
@@ -176,7 +177,8 @@ std::vector<Entry> entriesIn(const fs::path& folder) {
     const auto used = found.last_write_time(error);
     if (path.extension() == kUnfinished && used < fs::file_time_type::clock::now() - kAbandoned)
       fs::remove(path, error);
-    if (path.extension() == kEnding) entries.push_back({path, found.file_size(error), used});
+    if (path.extension() == kEnding || path.extension() == kTextEnding)
+      entries.push_back({path, found.file_size(error), used});
   }
   return entries;
 }
@@ -221,17 +223,25 @@ std::string writeWhole(const fs::path& path, const std::vector<std::byte>& bytes
   return path.string() + ": " + std::strerror(error);
 }
 
-std::string keep(const ModelCache& cache, const fs::path& path, const CacheEntry& entry) {
+std::string keepBytes(const ModelCache& cache, const fs::path& path,
+                      const std::vector<std::byte>& bytes) {
   std::error_code error;
   fs::create_directories(cache.folder, error);
   if (error) return cache.folder.string() + ": " + error.message();
-  const std::vector<std::byte> bytes = serialiseEntry(entry);
   if (bytes.size() > cache.mostBytes) {
     return path.string() + ": " + std::to_string(bytes.size() >> 20) +
            " MB are more than the cache may hold";
   }
   makeRoom(cache, bytes.size());
   return writeWhole(path, bytes);
+}
+
+/// The name of a kept text and, before the text itself, its checksum.
+fs::path textPath(const ModelCache& cache, const std::string& key) {
+  return cache.folder / (hexOf(contentHash(key + " " + readerVersions())) + kTextEnding);
+}
+std::string checksumOf(const std::string& key, std::string_view text) {
+  return hexOf(contentHash(key + " " + std::string(text)));
 }
 
 LoadedModel imported(const fs::path& file, const ImportOptions& options,
@@ -299,7 +309,7 @@ LoadedModel loadModel(const fs::path& file, const ImportOptions& options,
     // Somebody may have saved the file while it was read.
     if (!isMakeshift(loaded.model) && keyOf(file, options) == key) {
       made.model = std::move(loaded.model);
-      const std::string wrong = keep(*cache, path, made);
+      const std::string wrong = keepBytes(*cache, path, serialiseEntry(made));
       if (!wrong.empty()) notes.push_back("not kept for the next start: " + wrong);
       loaded.model = std::move(made.model);
     }
@@ -307,6 +317,24 @@ LoadedModel loadModel(const fs::path& file, const ImportOptions& options,
   loaded.notes = std::move(notes);
   loaded.loadSeconds = secondsSince(start);
   return loaded;
+}
+
+std::optional<std::string> keptText(const ModelCache& cache, const std::string& key) {
+  const fs::path path = textPath(cache, key);
+  const EntryFile kept(path);
+  const std::string_view whole(reinterpret_cast<const char*>(kept.bytes().data()),
+                               kept.bytes().size());
+  const std::size_t sum = checksumOf(key, "").size();
+  if (whole.size() < sum || whole.substr(0, sum) != checksumOf(key, whole.substr(sum)))
+    return std::nullopt;
+  utimensat(AT_FDCWD, path.c_str(), nullptr, 0);
+  return std::string(whole.substr(sum));
+}
+
+std::string keepText(const ModelCache& cache, const std::string& key, const std::string& text) {
+  const std::string whole = checksumOf(key, text) + text;
+  const auto* first = reinterpret_cast<const std::byte*>(whole.data());
+  return keepBytes(cache, textPath(cache, key), {first, first + whole.size()});
 }
 
 }  // namespace enfilade::scene

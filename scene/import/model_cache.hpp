@@ -40,4 +40,12 @@ struct LoadedModel {
 LoadedModel loadModel(const std::filesystem::path& file, const ImportOptions& options,
                       const std::optional<ModelCache>& cache, const ImportProgress& progress = {});
 
+/// What was worked out of a model at some cost, as a text kept beside the entries under `key`,
+/// which says all that it follows from but the program, which is added. nullopt when none is kept,
+/// or the checksum does not hold.
+std::optional<std::string> keptText(const ModelCache& cache, const std::string& key);
+
+/// Keeps it for the next start. Returns what went wrong, or "".
+std::string keepText(const ModelCache& cache, const std::string& key, const std::string& text);
+
 }  // namespace enfilade::scene

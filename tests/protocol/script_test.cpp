@@ -234,7 +234,8 @@ TEST(Script, ABodyLineThatMakesNoSenseIsToldWithItsField) {
   expectError(R"({"body":"d","level":10001})", "tour.jsonl:1: level: must be a whole number");
   expectError(R"({"body":"d","do":"open","speed":"fast"})", "tour.jsonl:1: speed: must be");
   expectError(R"({"body":"d","do":"open","speed":0})", "tour.jsonl:1: speed: 0 is out of range");
-  expectError(R"({"body":"d","turn":1,"turn_speed":-3})", "tour.jsonl:1: turn_speed: -3 is out of range");
+  expectError(R"({"body":"d","turn":1,"turn_speed":-3})",
+              "tour.jsonl:1: turn_speed: -3 is out of range");
   expectError(R"({"body":"d","turn":1,"speed":1,"turn_speed":3})",
               R"(tour.jsonl:1: speed: stands beside "turn_speed")");
   expectError(R"({"body":"d","do":"open","at":[0,0,0]})", R"(tour.jsonl:1: "at" is no key)");

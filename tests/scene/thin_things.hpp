@@ -243,8 +243,8 @@ inline std::vector<Cell> paneRooms(Builder& b, int count, Seeded& random) {
   return cells;
 }
 
-/// Two rooms of sheets each, with a wall of no thickness across x = 0 of each pair that has a gap of
-/// `gap` metres in its middle. They stand one beside the other along z.
+/// Two rooms of sheets each, with a wall of no thickness across x = 0 of each pair that has a gap
+/// of `gap` metres in its middle. They stand one beside the other along z.
 inline std::vector<Cell> gapRooms(Builder& b, int count, double gap) {
   std::vector<Cell> cells;
   for (int i = 0; i < count; ++i) {

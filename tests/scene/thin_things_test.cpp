@@ -62,7 +62,8 @@ TEST_P(ThinThings, AreNotCrossedByRandomMovesOfAnySpeed) {
 std::vector<Shut> shutUp() {
   std::vector<Shut> all;
   for (std::uint64_t seed = 1; seed <= 3; ++seed)
-    for (const char* in : {"Sheets", "Slivers", "Panes", "Gaps", "Stairs"}) all.push_back({in, seed});
+    for (const char* in : {"Sheets", "Slivers", "Panes", "Gaps", "Stairs"})
+      all.push_back({in, seed});
   all.push_back({"Stairs", 4});
   return all;
 }

@@ -5,12 +5,12 @@
 #include <memory>
 
 #include "scene/scene.hpp"
+#include "scene/snapshot.hpp"
 #include "tests/scene/box_scene.hpp"
 
 namespace enfilade::server::testing {
 
-inline constexpr scene::EntityId kRoomFloor = 1, kLeft = 2, kRight = 3, kEnd = 4, kLeaf = 5,
-                                 kZone = 6, kCrate = 7;
+inline constexpr scene::EntityId kEnd = 4, kLeaf = 5, kZone = 6, kCrate = 7;
 
 /// Floor x, z in -10..10 with its top at 0; a wall at x = 2 with an opening z in -0.6..0.6, in it
 /// the leaf "door", hinged at z = -0.6, that opens towards +x; a wall at x = 6; the volume "zone"

@@ -1,10 +1,9 @@
 // Bodies through a connection: commands to them, what they meet, where they are in pictures.
-#include "tests/server/body_room.hpp"
-
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 
+#include "tests/server/body_room.hpp"
 #include "tests/server/served_room.hpp"
 
 namespace enfilade::server::testing {
@@ -96,8 +95,7 @@ TEST_F(ServedBodies, WhoStandsInATightPlaceBlocksTheDoorWhichIsTold) {
   const auto messages = ann.takeEvents();
   Heard heard;
   heard.add(messages);
-  const v1::ContactEvent* blocked =
-      eventOf(heard, v1::ContactEvent::KIND_BLOCKED, "door", "ann");
+  const v1::ContactEvent* blocked = eventOf(heard, v1::ContactEvent::KIND_BLOCKED, "door", "ann");
   const auto door = stateOf(messages, "door");
   ASSERT_TRUE(door);
   ASSERT_NE(blocked, nullptr) << door->coordinate();

@@ -16,8 +16,7 @@ using google::protobuf::Message;
 
 /// Calls `visit` once for each number of the message and of those in it, while it is `bad`.
 template <class Visit>
-void spoilEach(Message& part, const std::string& path, double bad,
-               const Visit& visit) {
+void spoilEach(Message& part, const std::string& path, double bad, const Visit& visit) {
   const auto* reflection = part.GetReflection();
   std::vector<const FieldDescriptor*> fields;
   reflection->ListFields(part, &fields);

@@ -1,0 +1,80 @@
+// Signs of determinants against rationals, where they are near zero, zero, huge, tiny and mixed.
+#include "collision/exact_orientation.hpp"
+
+#include <gmpxx.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace enfilade::collision {
+namespace {
+
+int rationalTurn(const Vec3& a, const Vec3& b, const Vec3& c, int dropped) {
+  const int i = (dropped + 1) % 3, j = (dropped + 2) % 3;
+  const mpq_class ux = mpq_class(b[i]) - a[i], uy = mpq_class(b[j]) - a[j];
+  const mpq_class vx = mpq_class(c[i]) - a[i], vy = mpq_class(c[j]) - a[j];
+  return sgn(ux * vy - uy * vx);
+}
+
+int rationalOrientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  const auto minus = [](const Vec3& p, const Vec3& q) {
+    return std::array<mpq_class, 3>{mpq_class(p.x()) - q.x(), mpq_class(p.y()) - q.y(),
+                                    mpq_class(p.z()) - q.z()};
+  };
+  const auto u = minus(b, a), v = minus(c, a), w = minus(d, a);
+  return sgn(w[0] * (u[1] * v[2] - u[2] * v[1]) + w[1] * (u[2] * v[0] - u[0] * v[2]) +
+             w[2] * (u[0] * v[1] - u[1] * v[0]));
+}
+
+/// Coordinates as models have them and as nobody has: whole, floats, doubles, of mixed size.
+struct Coordinates {
+  std::mt19937_64 random{11};
+  double next(int kind) {
+    const auto whole = static_cast<double>(static_cast<int>(random() % 7) - 3);
+    const double unit = static_cast<double>(random() >> 11) * 0x1p-53;
+    switch (kind) {
+      case 0:
+        return whole;
+      case 1:
+        return static_cast<double>(static_cast<float>(whole + 1e-3 * unit));
+      case 2:
+        return whole + unit * 0x1p-40;
+      case 3:
+        return whole * std::ldexp(1.0, static_cast<int>(random() % 2000) - 1050);
+      default:
+        return random() % 2 == 0 ? whole * 1e80 : whole * 1e-300;
+    }
+  }
+  Vec3 point(int kind) {
+    const double x = next(kind), y = next(kind), z = next(kind);
+    return {x, y, z};
+  }
+};
+
+TEST(ExactOrientation, SignsAreThoseOfRationals) {
+  Coordinates coordinates;
+  std::array<int, 3> turns{}, orientations{};
+  for (int i = 0; i < 20000; ++i) {
+    const int kind = i % 5;
+    const Vec3 a = coordinates.point(kind), b = coordinates.point(kind);
+    // Half of the time on the line through the first two, as far as doubles can have it.
+    const Vec3 c = i % 2 ? coordinates.point(kind) : Vec3(a + 2 * (b - a));
+    const Vec3 d = coordinates.point(kind);
+    for (int dropped = 0; dropped < 3; ++dropped) {
+      const int sign = turn(a, b, c, dropped);
+      ASSERT_EQ(sign, rationalTurn(a, b, c, dropped))
+          << a.transpose() << " | " << b.transpose() << " | " << c.transpose();
+      ++turns.at(static_cast<std::size_t>(sign + 1));
+    }
+    const int sign = orientation(a, b, c, d);
+    ASSERT_EQ(sign, rationalOrientation(a, b, c, d))
+        << a.transpose() << " | " << b.transpose() << " | " << c.transpose();
+    ++orientations.at(static_cast<std::size_t>(sign + 1));
+  }
+  for (const int count : turns) EXPECT_GT(count, 2000);
+  for (const int count : orientations) EXPECT_GT(count, 2000);
+}
+
+}  // namespace
+}  // namespace enfilade::collision
