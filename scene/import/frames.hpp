@@ -1,6 +1,6 @@
 // What passes through the pipe from an importing process to the one that started it: frames of a
-// kind, a length and that many bytes, little-endian. scene/import/ifc/web_ifc/read_ifc.js writes them as
-// well.
+// kind, a length and that many bytes, little-endian. scene/import/ifc/web_ifc/read_ifc.js writes
+// them as well.
 #pragma once
 
 #include <cstddef>
