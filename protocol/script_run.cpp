@@ -106,6 +106,16 @@ class Run {
     lineDone(line);
   }
 
+  /// Why the world is not at rest, as far as the script's own lines tell.
+  std::string whoGoesOn() const {
+    if (open_.empty())
+      return "somebody still falls, or a body moves ({\"body\":NAME,\"do\":\"stop\"} stops one)";
+    const auto& [line, avatar] = *open_.begin();
+    const std::string others =
+        open_.size() == 1 ? "" : " and " + std::to_string(open_.size() - 1) + " more";
+    return "line " + std::to_string(line) + " (" + avatar + ")" + others + " has not ended";
+  }
+
   void stepUntilIdle(std::uint32_t line) {
     const std::uint64_t most = ticksFor(limits_.untilIdle, driver_.tickSeconds());
     for (std::uint64_t i = 0; i < most && !idle_; ++i) step();
@@ -114,8 +124,8 @@ class Run {
       std::array<char, 64> seconds{};
       std::snprintf(seconds.data(), seconds.size(), "%g", limits_.untilIdle);
       tell(LineOutcome::Kind::unfinished, line, "",
-           "the walk is not at rest after " + std::string(seconds.data()) +
-               " s of simulated time; the script goes on");
+           "after " + std::string(seconds.data()) + " s of simulated time " + whoGoesOn() +
+               "; the script goes on");
       return;
     }
     for (const auto& [number, avatar] : open_) {

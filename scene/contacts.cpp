@@ -2,6 +2,7 @@
 // convex piece decides. A contact is d < 2 epsilon (seed 5.1.1). Begin and end are differences to
 // the last tick.
 #include <algorithm>
+#include <limits>
 
 #include "collision/penetration_depth.hpp"
 #include "collision/refine.hpp"
@@ -12,11 +13,6 @@ namespace {
 
 using collision::Decision;
 using collision::Verdict;
-
-/// Penetrating before touching before separated, then by distance.
-bool nearer(const Decision& a, const Decision& b) {
-  return a.verdict != b.verdict ? a.verdict > b.verdict : a.distance < b.distance;
-}
 
 double depthOf(const collision::ConvexBody& part, const Obstacle& obstacle,
                const collision::FeatureCache& cache, const Decision& decision) {
@@ -35,12 +31,13 @@ std::optional<Decision> decideCounted(const collision::ConvexBody& part, const O
 }
 
 /// Adds what part `i` of the avatar has to do with the obstacle to what was found so far.
-void addNear(const Avatar& avatar, std::size_t i, Obstacle& obstacle, double limit,
+void addNear(const Avatar& avatar, std::size_t i, Obstacle& obstacle, const Nearness& nearness,
              std::vector<Contact>& found, QueryCount& count) {
+  const double limit = nearness.limit;
   const AvatarPart& part = avatar.shape->parts[i];
   if (!overlaps(grown(boxAt(part.box, avatar.feet), limit), obstacle.box)) return;
   const bool known = !found.empty() && found.back().other == obstacle.entity;
-  const double within = known ? found.back().decision.distance : limit;
+  const double within = known ? std::max(found.back().decision.distance, nearness.contact) : limit;
   const collision::ConvexBody body = bodyAt(part, avatar.feet);
   collision::FeatureCache& cache = obstacle.cacheOf(i);
   const auto decision = decideCounted(body, obstacle, within, cache, count);
@@ -52,18 +49,22 @@ void addNear(const Avatar& avatar, std::size_t i, Obstacle& obstacle, double lim
   } else if (nearer(*decision, found.back().decision)) {
     found.back().decision = *decision;
   }
-  double& penetration = found.back().penetration;
+  Contact& contact = found.back();
+  contact.touching =
+      contact.touching || nearness.contact == limit ||
+      collision::isNearerThan(*decision, body, obstacle.body, nearness.contact, cache);
+  double& penetration = contact.penetration;
   penetration = std::max(penetration, depthOf(body, obstacle, cache, *decision));
 }
 
-/// All entities nearer than `limit`, each with its nearest piece, ascending.
-std::vector<Contact> nearOnes(Avatar& avatar, double limit, QueryCount& count) {
+/// All entities nearer than the limit, each with its nearest piece, ascending.
+std::vector<Contact> nearOnes(Avatar& avatar, const Nearness& nearness, QueryCount& count) {
   std::vector<Contact> found;
   const std::size_t parts = avatar.shape->parts.size();
-  const Box box = grown(boxAt(avatar.shape->box, avatar.feet), limit);
+  const Box box = grown(boxAt(avatar.shape->box, avatar.feet), nearness.limit);
   for (Obstacle& obstacle : avatar.obstacles) {
     if (!overlaps(box, obstacle.box)) continue;
-    for (std::size_t i = 0; i < parts; ++i) addNear(avatar, i, obstacle, limit, found, count);
+    for (std::size_t i = 0; i < parts; ++i) addNear(avatar, i, obstacle, nearness, found, count);
   }
   return found;
 }
@@ -104,26 +105,40 @@ void tellEnds(const WorldState& world, Avatar& avatar, const std::vector<Contact
         events);
 }
 
-void updateContacts(WorldState& world, Avatar& avatar, TickReport& report, QueryCount& count) {
-  followOthers(world, avatar);
-  const double contactBelow = 2 * world.lengths.epsilon;
-  std::vector<Contact> now =
-      nearOnes(avatar, std::max(contactBelow, world.lengths.nearMiss), count);
-  // A pair of avatars is told by the one with the lesser id.
-  std::erase_if(now, [&](const Contact& c) {
-    return c.other >= world.firstAvatarId() && c.other < avatar.id;
-  });
-  for (Contact& contact : now) contact.touching = contact.decision.distance < contactBelow;
-  tellBegins(world, avatar, now, report.contacts);
-  tellEnds(world, avatar, now, report.contacts, count);
-  avatar.contacts = std::move(now);
-}
-
 Contact stopped(EntityId by, const Decision& decision) {
   Contact contact;
   contact.other = by;
   contact.decision = decision;
   return contact;
+}
+
+/// Who stopped the avatar in this tick touched it, even if it has given way since.
+void addWhatGaveWay(const WorldState& world, const Avatar& avatar, std::vector<Contact>& now) {
+  if (!world.bodyOfId.contains(avatar.stoppedBy)) return;
+  const auto at = std::lower_bound(now.begin(), now.end(), avatar.stoppedBy,
+                                   [](const Contact& c, EntityId id) { return c.other < id; });
+  const bool listed = at != now.end() && at->other == avatar.stoppedBy;
+  if (listed && at->touching) return;
+  Contact contact = stopped(avatar.stoppedBy, avatar.atStop);
+  contact.touching = true;
+  if (listed) {
+    *at = contact;
+  } else {
+    now.insert(at, contact);
+  }
+}
+
+void updateContacts(WorldState& world, Avatar& avatar, TickReport& report, QueryCount& count) {
+  followOthers(world, avatar);
+  std::vector<Contact> now = nearOnes(avatar, nearnessOf(world.lengths), count);
+  // A pair of avatars is told by the one with the lesser id.
+  std::erase_if(now, [&](const Contact& c) {
+    return c.other >= world.firstAvatarId() && c.other < avatar.id;
+  });
+  addWhatGaveWay(world, avatar, now);
+  tellBegins(world, avatar, now, report.contacts);
+  tellEnds(world, avatar, now, report.contacts, count);
+  avatar.contacts = std::move(now);
 }
 
 ContactEvent nearEvent(const WorldState& world, EntityId a, const Contact& contact,
@@ -139,6 +154,15 @@ ContactEvent nearEvent(const WorldState& world, EntityId a, const Contact& conta
 }
 
 }  // namespace
+
+bool nearer(const Decision& a, const Decision& b) {
+  return a.verdict != b.verdict ? a.verdict > b.verdict : a.distance < b.distance;
+}
+
+Nearness nearnessOf(const Lengths& lengths) {
+  const double contact = 2 * lengths.epsilon;
+  return {contact, std::max(contact, lengths.nearMiss)};
+}
 
 ContactEvent eventOf(const WorldState& world, ContactEvent::Kind kind, EntityId a,
                      const Contact& contact) {
@@ -183,7 +207,9 @@ void tellEnd(const WorldState& world, EntityId a, const Contact& before, const C
 
 void findContacts(WorldState& world, TickReport& report, QueryCount& count) {
   for (auto& [name, avatar] : world.avatars) {
-    if (!avatar.resting) updateContacts(world, avatar, report, count);
+    // A free body may have been woken beside it after it was found to rest.
+    if (!avatar.resting || !nobodyMovesNear(world, avatar))
+      updateContacts(world, avatar, report, count);
     for (const Contact& contact : avatar.contacts) {
       if (contact.touching) ++report.liveContacts;
       report.worstPenetration = std::max(report.worstPenetration, contact.penetration);

@@ -131,7 +131,22 @@ void sortAndHandOn(std::vector<Obstacle>& obstacles, std::vector<Obstacle>& last
   }
 }
 
+/// Bodies that stand are as still objects.
+bool mayMove(const WorldState& world, collision::MoverId mover) {
+  const auto found = world.bodyOfMover.find(mover);
+  if (found == world.bodyOfMover.end()) return true;
+  const Body& body = world.bodies[found->second];
+  return body.moved || (body.spec->kind == BodyKind::rigid && !body.asleep);
+}
+
 }  // namespace
+
+bool nobodyMovesNear(const WorldState& world, const Avatar& avatar) {
+  const auto partners = world.broadPhase.partners(avatar.mover);
+  for (std::size_t i = partners.size(); i-- > 0 && partners[i].moves;)  // movers come last
+    if (mayMove(world, partners[i].id)) return false;
+  return true;
+}
 
 void gatherParts(const WorldState& world, std::uint32_t body, const Box& reach,
                  std::vector<Obstacle>& obstacles) {

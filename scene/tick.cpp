@@ -2,6 +2,7 @@
 // after.
 #include <algorithm>
 #include <chrono>
+#include <tuple>
 
 #include "scene/world_state.hpp"
 
@@ -58,21 +59,6 @@ void updateBroadPhase(WorldState& world, const Wish& wish) {
       avatar.pairsChanged = true;
 }
 
-/// Bodies that stand are as still objects.
-bool mayMove(const WorldState& world, collision::MoverId mover) {
-  const auto found = world.bodyOfMover.find(mover);
-  if (found == world.bodyOfMover.end()) return true;
-  const Body& body = world.bodies[found->second];
-  return body.moved || (body.spec->kind == BodyKind::rigid && !body.asleep);
-}
-
-bool nobodyNear(const WorldState& world, const Avatar& avatar) {
-  const auto partners = world.broadPhase.partners(avatar.mover);
-  for (std::size_t i = partners.size(); i-- > 0 && partners[i].moves;)  // movers come last
-    if (mayMove(world, partners[i].id)) return false;
-  return true;
-}
-
 void moveAvatars(WorldState& world, const Wish& wish, QueryCount& count) {
   for (auto& [name, avatar] : world.avatars) {
     const Vec3 velocity = wishOf(wish, name);
@@ -80,7 +66,7 @@ void moveAvatars(WorldState& world, const Wish& wish, QueryCount& count) {
     avatar.asked = Vec3::Zero();
     avatar.resting = avatar.grounded && avatar.lastMove.isZero(0) && velocity.isZero(0) &&
                      !avatar.stirred && avatar.chain.speed == 0 && !avatar.pairsChanged &&
-                     nobodyNear(world, avatar);
+                     nobodyMovesNear(world, avatar);
     if (avatar.resting) continue;
     gatherObstacles(world, avatar);
     moveAvatar(world, avatar, velocity, count);
@@ -91,7 +77,10 @@ void moveAvatars(WorldState& world, const Wish& wish, QueryCount& count) {
 void hashBodies(const WorldState& world, Hasher& hash) {
   for (const Body& body : world.bodies) {
     const BodyDrive& drive = body.drive;
-    for (const EntityId id : body.inside) hash.add(std::uint64_t{id});
+    if (!body.inside.empty()) {
+      hash.add((std::uint64_t{body.id} << 32) | body.inside.size());
+      for (const EntityId id : body.inside) hash.add(std::uint64_t{id});
+    }
     if (!body.moved && !drive.going && drive.closesIn < 0) continue;
     hash.add(std::uint64_t{body.id});
     hash.add(body.position);

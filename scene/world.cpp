@@ -76,7 +76,12 @@ std::optional<std::string> refusal(const World& world, const Command& command) {
 
 std::optional<std::string> submit(World& world, Command command) {
   if (auto why = refusal(world, command)) return why;
-  world.state().incoming.push_back(std::move(command));
+  WorldState& state = world.state();
+  if (state.waiting + sizeOf(command.order) > kMostWaiting)
+    return std::to_string(kMostWaiting) +
+           " orders and way points wait already; send more when some have ended";
+  state.waiting += sizeOf(command.order);
+  state.incoming.push_back(std::move(command));
   return std::nullopt;
 }
 

@@ -45,12 +45,13 @@ struct Avatar {
   Vec3 drive = Vec3::Zero();  ///< velocity asked for by Drive
   WalkProgress walk;
   double waitLeft = -1;  ///< seconds; negative: not waiting
+  double hangsFor = 0;   ///< seconds that a jump, or who wants to, is in the air and does not move
 
   // What the last motion left.
   Vec3 lastMove = Vec3::Zero();
   Vec3 asked = Vec3::Zero();  ///< metres
   bool resting = false;       ///< stands, wants nothing, and nobody is near: nothing to work out
-  bool stirred = false;       ///< its shape changed since: it does not rest this tick
+  bool stirred = false;       ///< its shape or place was changed since: it does not rest this tick
   EntityId stoppedBy = 0;
   bool pairsChanged =
       true;  ///< the broad phase gave it or took from it a partner since it gathered
@@ -87,6 +88,7 @@ struct WorldState {
   std::uint64_t hash = 0;  ///< chained over all ticks, seeded by scene and lengths
 
   std::vector<Command> incoming;  ///< since the last tick
+  std::size_t waiting = 0;        ///< orders and way points in `incoming` and `queues`, at least
   std::map<std::string, std::deque<QueuedOrder>> queues;
   std::map<std::string, Avatar> avatars;
   std::vector<std::string> avatarNames;  ///< of entity id scene objects + 1 + index, kept for ever
@@ -112,6 +114,9 @@ struct WorldState {
 
 /// As refusal() of world.hpp (order_refusals.cpp).
 std::optional<std::string> refusalOf(const Command& command, const Lengths& lengths);
+
+/// How much an order counts among kMostWaiting: its way points, and itself (orders.cpp).
+std::size_t sizeOf(const Order& order);
 
 // ---- the stages of the tick --------------------------------------------------------------------
 
@@ -148,6 +153,10 @@ bool isBusy(const Body& body);
 void startRigids(WorldState& world);
 /// What each awake one can reach in this tick.
 void planRigids(WorldState& world);
+/// Wakes the free bodies that touch the avatar: it goes, or is another shape.
+void wakeLeaning(WorldState& world, const Avatar& avatar);
+/// Nothing of the avatar is left among the solids.
+void forgetAvatar(WorldState& world, const Avatar& avatar);
 /// The solver, and the sweep that keeps them out of avatars and one another.
 void moveRigids(WorldState& world, const Wish& wish, TickReport& report, QueryCount& count);
 
@@ -158,6 +167,9 @@ inline double lookoutOf(const Lengths& lengths) {
 
 /// The box that an avatar can reach in this tick with the given velocity (motion.cpp).
 Box reachOf(const WorldState& world, const Avatar& avatar, const Vec3& velocity);
+/// Where the feet may go in this tick: nothing was collected beyond the reach, and what the joints
+/// may swing is left to them (motion.cpp).
+Box feetRoomOf(const Lengths& lengths, const Avatar& avatar);
 /// Box tests that the audit of one tick may make, if they suffice for one avatar: some 2 ms, as a
 /// test takes 5 ns (brute force does not foresee its branches).
 inline constexpr std::size_t kMostAuditTests = 400'000;
@@ -171,6 +183,9 @@ void gatherObstacles(WorldState& world, Avatar& avatar);
 /// Appends the parts of a body that `reach` meets, where they are now (obstacles.cpp).
 void gatherParts(const WorldState& world, std::uint32_t body, const Box& reach,
                  std::vector<Obstacle>& obstacles);
+/// Whether none of the avatar's partners that can move did so, or may do so in this tick
+/// (obstacles.cpp).
+bool nobodyMovesNear(const WorldState& world, const Avatar& avatar);
 /// Others moved since the obstacles were collected: they take their place of now (obstacles.cpp).
 void followOthers(const WorldState& world, Avatar& avatar);
 /// Walks, slides, steps, falls (motion.cpp).
@@ -183,6 +198,14 @@ void moveJoints(WorldState& world, Avatar& avatar, QueryCount& count);
 void hashAvatar(const Avatar& avatar, Hasher& hash);
 AvatarView viewOf(const std::string& name, const Avatar& avatar);
 
+/// Penetrating before touching before separated, then by distance (contacts.cpp).
+bool nearer(const collision::Decision& a, const collision::Decision& b);
+/// Below which distances two are told, metres: `contact` <= `limit` (contacts.cpp).
+struct Nearness {
+  double contact;  ///< 2 epsilon: they are in contact (seed 5.1.1)
+  double limit;    ///< a contact or a near miss
+};
+Nearness nearnessOf(const Lengths& lengths);
 /// An event of this tick, told by `a`.
 ContactEvent eventOf(const WorldState& world, ContactEvent::Kind kind, EntityId a,
                      const Contact& contact);

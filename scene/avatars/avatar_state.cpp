@@ -33,6 +33,7 @@ void hashAvatar(const Avatar& avatar, Hasher& hash) {
   hash.add(avatar.walk.nearest);
   hash.add(avatar.walk.patienceLeft);
   hash.add(avatar.waitLeft);
+  hash.add(avatar.hangsFor);
   hashWhatIsRare(avatar, hash);
   for (const Contact& contact : avatar.contacts)
     hash.add((std::uint64_t{contact.other} << 1) | std::uint64_t{contact.touching});

@@ -35,11 +35,6 @@ struct SlideResult {
   EntityId ground = 0;  ///< the last thing met that can
 };
 
-/// Where the feet may go: beyond the reach nothing was collected, so nothing would be in the way.
-Box feetRoomOf(const Avatar& avatar, const Lengths& lengths) {
-  return feetRoomIn(avatar.reach, avatar.shape->box, lookoutOf(lengths));
-}
-
 Stop sweepFrom(Mover& m, const Vec3& displacement) {
   const double part = partInside(m.feetRoom, m.feet, displacement);
   const Vec3 granted = part * displacement;
@@ -229,6 +224,11 @@ void fly(Mover& m, const Vec3& wish) {
 
 }  // namespace
 
+Box feetRoomOf(const Lengths& lengths, const Avatar& avatar) {
+  return feetRoomIn(avatar.reach, avatar.shape->box,
+                    lookoutOf(lengths) + chainReach(avatar.chain, lengths.tick));
+}
+
 Box reachOf(const WorldState& world, const Avatar& avatar, const Vec3& velocity) {
   const Lengths& l = world.lengths;
   const double across = velocity.norm() * l.tick + kTread + chainReach(avatar.chain, l.tick);
@@ -242,7 +242,7 @@ Box reachOf(const WorldState& world, const Avatar& avatar, const Vec3& velocity)
 }
 
 void moveAvatar(WorldState& world, Avatar& avatar, const Vec3& velocity, QueryCount& count) {
-  Mover m{world.lengths, avatar, count, avatar.feet, feetRoomOf(avatar, world.lengths)};
+  Mover m{world.lengths, avatar, count, avatar.feet, feetRoomOf(world.lengths, avatar)};
   const Vec3 wish = velocity * world.lengths.tick;
   if (avatar.flying) {
     fly(m, wish);

@@ -20,20 +20,19 @@ void startJump(Avatar& avatar, const Jump& jump, const Lengths& lengths) {
   avatar.standsOn = 0;
   avatar.fallSpeed = -std::sqrt(2 * lengths.gravity * jump.height);
   avatar.walk = {};
-  avatar.walk.patienceLeft = lengths.patience;
+  avatar.hangsFor = 0;
 }
 
 /// In the air, but not on its way: held by what cannot be stood on.
 bool hangs(Avatar& avatar, const Lengths& lengths) {
-  if (avatar.lastMove.norm() > lengths.epsilon) {
-    avatar.walk.patienceLeft = lengths.patience;
-    return false;
-  }
-  avatar.walk.patienceLeft -= lengths.tick;
-  return avatar.walk.patienceLeft <= kTimeRounding;
+  const bool goes = avatar.lastMove.norm() > lengths.epsilon;
+  avatar.hangsFor = goes ? 0 : avatar.hangsFor + lengths.tick;
+  return avatar.hangsFor >= lengths.patience - kTimeRounding;
 }
 
-void setHeight(Avatar& avatar, std::shared_ptr<const AvatarShape> shape, double height) {
+void setHeight(WorldState& world, Avatar& avatar, std::shared_ptr<const AvatarShape> shape,
+               double height) {
+  wakeLeaning(world, avatar);
   avatar.shape = std::move(shape);
   avatar.height = height;
   avatar.eyeHeight = eyeHeightOf(height);
@@ -112,11 +111,13 @@ std::string shortNumber(double value) {
 Outcome follow(const Jump& jump, Follower& f) {
   Avatar& avatar = *f.avatar();
   if (!avatar.jumping) {
-    if (!avatar.grounded) {
-      f.tell(Notice::Kind::refused,
-             avatar.flying ? "who flies does not jump" : "it stands on nothing to jump from");
+    if (avatar.flying || (!avatar.grounded && hangs(avatar, f.world.lengths))) {
+      f.tell(Notice::Kind::refused, avatar.flying ? "who flies does not jump; fly off first"
+                                                  : "it hangs on what nobody can jump from");
+      avatar.hangsFor = 0;
       return Outcome::ended;
     }
+    if (!avatar.grounded) return Outcome::goesOn;  // as after a spawn: it has to land first
     startJump(avatar, jump, f.world.lengths);
     return Outcome::goesOn;
   }
@@ -166,7 +167,7 @@ Outcome follow(const Crouch& crouch, Follower& f) {
            obstacle);
     return Outcome::ended;
   }
-  setHeight(avatar, std::move(shape), height);
+  setHeight(f.world, avatar, std::move(shape), height);
   f.tell(Notice::Kind::done);
   return Outcome::ended;
 }

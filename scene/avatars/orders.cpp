@@ -140,6 +140,7 @@ Avatar* dropOrders(WorldState& world, const Command& command, TickReport& report
   avatar.walk = {};
   avatar.waitLeft = -1;
   avatar.jumping = false;
+  avatar.hangsFor = 0;
   avatar.chain.speed = 0;
   return &avatar;
 }
@@ -257,6 +258,11 @@ void removeLost(WorldState& world, TickReport& report) {
 
 }  // namespace
 
+std::size_t sizeOf(const Order& order) {
+  const Walk* walk = std::get_if<Walk>(&order);
+  return 1 + (walk ? walk->along.size() : 0);
+}
+
 Wish followOrders(WorldState& world, TickReport& report, QueryCount& count) {
   takeIn(world, report);
   Wish wish;
@@ -272,11 +278,17 @@ Wish followOrders(WorldState& world, TickReport& report, QueryCount& count) {
   std::erase_if(world.queues, [&](const auto& entry) {
     return entry.second.empty() && !world.avatars.contains(entry.first);
   });
+  if (world.waiting > 0) {
+    world.waiting = 0;
+    for (const auto& [name, queue] : world.queues)
+      for (const QueuedOrder& queued : queue) world.waiting += sizeOf(queued.order);
+  }
   return wish;
 }
 
 void removeAvatar(WorldState& world, const std::string& name, std::vector<ContactEvent>& events) {
   Avatar& avatar = world.avatars.at(name);
+  forgetAvatar(world, avatar);
   endContactsOf(world, avatar, ContactEvent::Reason::left, events);
   world.broadPhase.remove(avatar.mover);
   world.avatarOfMover.erase(avatar.mover);

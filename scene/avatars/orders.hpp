@@ -14,6 +14,9 @@ namespace enfilade::scene {
 
 using collision::Vec3;
 
+/// Orders and way points that may wait in one world: some 30 MB.
+inline constexpr std::size_t kMostWaiting = 1'000'000;
+
 /// How a link hangs on the one before it, in the frame of that one (or of the avatar).
 struct LinkJoint {
   enum class Kind : std::uint8_t { revolute, prismatic };

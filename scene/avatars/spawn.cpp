@@ -14,6 +14,9 @@ constexpr std::array<double, 4> kLifts{0, 0.002, 0.02, 0.1};  // metres
 constexpr double kFloorMargin = 1.0;  // metres below the scene's lowest point that are searched
 constexpr double kDeepestDrop = 100;  // metres: who is put higher is a slip of the pen
 constexpr double kDropTold = 2;       // metres: a drop that is worth telling
+// Triangles and narrow-phase queries that the search for room near a refused place may cost: some
+// milliseconds, since it is made inside a tick.
+constexpr std::uint64_t kMostSearched = 300'000;
 
 bool isInsideHull(const ObjectParts& parts, const Vec3& point) {
   const std::array<Vec3, 1> vertex{Vec3::Zero()};
@@ -30,14 +33,17 @@ bool isInsideHull(const ObjectParts& parts, const Vec3& point) {
 struct Search {
   const WorldState& world;
   QueryCount& count;
+  std::uint64_t triangles = 0;  ///< looked at
+  std::uint64_t cost() const { return triangles + count.narrow; }
 };
 
 /// The object whose solid holds `point`, or 0.
-EntityId solidAround(const Search& search, const Vec3& point) {
+EntityId solidAround(Search& search, const Vec3& point) {
   const WorldState& world = search.world;
   for (const collision::StillId still : world.broadPhase.stillOverlapping({point, point})) {
     const std::uint32_t object = world.scene->solidObjects()[still];
     const ObjectParts& parts = world.scene->parts(object);
+    search.triangles += parts.localTriangles.triangles().size();
     if (isInsideHull(parts, point) || surrounds(parts, point)) return object + 1;
   }
   return 0;
@@ -116,8 +122,10 @@ std::string nearestRoom(Search& search, const Vec3& at, Avatar& avatar) {
   constexpr std::array<double, 5> kRings{0.2, 0.5, 1, 2, 4};  // metres
   constexpr std::array<double, 2> kHeights{0, 1};             // metres
   constexpr int kDirections = 8;
+  const std::uint64_t enough = search.cost() + kMostSearched;
   for (const double height : kHeights) {
     for (const double ring : kRings) {
+      if (search.cost() > enough) return "; room near it was not searched for any longer";
       for (int i = 0; i < kDirections; ++i) {
         const Vec3 place =
             at + ring * headingFromDegrees(360.0 / kDirections * i) + Vec3(0, height, 0);
@@ -183,7 +191,7 @@ std::vector<Obstacle> obstaclesIn(const WorldState& world, const Box& box, Entit
 std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& order, Avatar& avatar,
                                        std::string& told, QueryCount& count) {
   shapeAvatar(order, avatar);
-  Search search{world, count};
+  Search search{world, count, 0};
   if (const auto why = tryPlace(search, order.at, avatar)) {
     const std::string room = nearestRoom(search, order.at, avatar);
     return "at " + text(order.at) + " " + *why + room;

@@ -60,6 +60,10 @@ struct Body {
   bool turned = false;         ///< `rotation` is not the identity to the last bit
   std::vector<Box> partBoxes;  ///< scene frame; at least the exact ones
 
+  // Of a kinematic body that goes: where it was before the tick moved it.
+  Vec3 positionBefore = Vec3::Zero();
+  collision::Quat orientationBefore = collision::Quat::Identity();
+
   Vec3 velocity = Vec3::Zero();  ///< of the origin of its frame, m/s, scene frame
   Vec3 spin = Vec3::Zero();      ///< rad/s, scene frame
   bool asleep = true;            ///< rigid: stands until something wakes it; others: false

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "collision/penetration_depth.hpp"
+#include "collision/refine.hpp"
 #include "scene/world_state.hpp"
 
 namespace enfilade::scene {
@@ -40,21 +41,25 @@ double depthOf(const Solid& a, const Solid& b, const NearPair& pair, const Decis
       .depth;
 }
 
-bool nearer(const Decision& a, const Decision& b) {
-  return a.verdict != b.verdict ? a.verdict > b.verdict : a.distance < b.distance;
-}
+/// What two parts are to one another.
+struct PartContact {
+  Decision decision;
+  bool touching = false;
+  double depth = 0;
+};
 
-/// Takes what two parts are to one another into what their bodies are.
-void take(std::map<Key, Contact>& now, const Key& key, const Decision& decision, double depth) {
+/// Takes it into what their bodies are.
+void take(std::map<Key, Contact>& now, const Key& key, const PartContact& parts) {
   const auto [at, isNew] = now.try_emplace(key);
   Contact& contact = at->second;
   contact.other = key.second;
-  if (isNew || nearer(decision, contact.decision)) contact.decision = decision;
-  contact.penetration = std::max(contact.penetration, depth);
+  if (isNew || nearer(parts.decision, contact.decision)) contact.decision = parts.decision;
+  contact.touching = contact.touching || parts.touching;
+  contact.penetration = std::max(contact.penetration, parts.depth);
 }
 
-/// All pairs of which one moved and that are nearer than `limit`, or were in the last tick.
-std::map<Key, Contact> nearBodies(WorldState& world, double limit, QueryCount& count) {
+/// All pairs of which one moved and that are nearer than the limit, or were in the last tick.
+std::map<Key, Contact> nearBodies(WorldState& world, const Nearness& nearness, QueryCount& count) {
   const RigidStage& stage = world.rigids;
   std::map<Key, Contact> now;
   for (const NearPair& pair : stage.dynamics.pairs) {
@@ -66,20 +71,23 @@ std::map<Key, Contact> nearBodies(WorldState& world, double limit, QueryCount& c
     const bool lasted = world.bodyContacts.contains({a, b});
     const Solid& solidA = stage.dynamics.solids[pair.key.a];
     const Solid& solidB = stage.dynamics.solids[pair.key.b];
-    if (!lasted && apartNow(pair, solidA, solidB) > limit) continue;
-    const double within = lasted ? std::numeric_limits<double>::infinity() : limit;
+    if (!lasted && apartNow(pair, solidA, solidB) > nearness.limit) continue;
+    const double within = lasted ? std::numeric_limits<double>::infinity() : nearness.limit;
     collision::FeatureCache features = pair.features;
     ++count.narrow;
-    auto decision = collision::decideWithin(partOf(solidA, pair.key.partA),
-                                            partOf(solidB, pair.key.partB), within, features);
+    const collision::ConvexBody partA = partOf(solidA, pair.key.partA);
+    const collision::ConvexBody partB = partOf(solidB, pair.key.partB);
+    auto decision = collision::decideWithin(partA, partB, within, features);
     if (!decision) continue;
     if (decision->decidedBy == collision::DecidedBy::rational) ++count.rational;
     const double depth = depthOf(solidA, solidB, pair, *decision, features);
+    const bool touching =
+        collision::isNearerThan(*decision, partA, partB, nearness.contact, features);
     if (swapped) {
       std::swap(decision->pointA, decision->pointB);
       decision->normal = -decision->normal;
     }
-    take(now, {a, b}, *decision, depth);
+    take(now, {a, b}, {*decision, touching, depth});
   }
   return now;
 }
@@ -87,14 +95,13 @@ std::map<Key, Contact> nearBodies(WorldState& world, double limit, QueryCount& c
 }  // namespace
 
 void findBodyContacts(WorldState& world, TickReport& report, QueryCount& count) {
-  const double contactBelow = 2 * world.lengths.epsilon;
-  const double limit = std::max(contactBelow, world.lengths.nearMiss);
+  const Nearness nearness = nearnessOf(world.lengths);
   std::map<Key, Contact> now, parted;
-  if (!world.rigids.seeds.empty()) now = nearBodies(world, limit, count);
+  if (!world.rigids.seeds.empty()) now = nearBodies(world, nearness, count);
   for (auto at = now.begin(); at != now.end();) {
-    at->second.touching = at->second.decision.distance < contactBelow;
     const auto next = std::next(at);
-    if (!(at->second.decision.distance < limit)) parted.insert(now.extract(at));
+    const bool near = at->second.touching || at->second.decision.distance < nearness.limit;
+    if (!near) parted.insert(now.extract(at));
     at = next;
   }
   for (const auto& [key, before] : world.bodyContacts)  // a contact of two that stand lasts

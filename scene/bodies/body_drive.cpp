@@ -162,6 +162,8 @@ void planBodies(WorldState& world) {
     const bool reachedOut = body.moved || body.plan.farthest > 0;
     body.moved = false;
     body.velocity = body.spin = Vec3::Zero();
+    body.positionBefore = body.position;
+    body.orientationBefore = body.orientation;
     runCloser(body, world.lengths.tick);
     plan(body, world.lengths.tick);
     if (body.drive.going) world.goingBodies.push_back(i);

@@ -1,5 +1,6 @@
 // How doors, lifts and things on paths move: each in turn, in the order of the model, swept against
-// avatars and other bodies that can yield, where these stand now.
+// the avatars where these stand now. (Free bodies give way in the solver, or are pushed there;
+// driven ones are not asked for by one another.)
 //  1. Riders that the body would lift go first; what it leaves behind follows it afterwards.
 //  2. The body goes until it comes near something. That is pushed along the normal by as much as
 //     the body still needs, by a sweep of its own, so that a push crosses nothing.
@@ -36,7 +37,8 @@ Vec3 carried(const Body& body, const BodyPlace& to, const Vec3& point) {
 /// Moves the avatar by `wish` as far as it can, sliding along what is met.
 void shove(WorldState& world, Avatar& avatar, Vec3 wish, QueryCount& count) {
   gatherObstacles(world, avatar);
-  const Box room = feetRoomIn(avatar.reach, avatar.shape->box, lookoutOf(world.lengths));
+  const Box room = feetRoomOf(world.lengths, avatar);
+  avatar.stirred = true;  // who was moved looks where it stands now, even if the body then stays
   for (int i = 0; i < kPushSlides && !wish.isZero(0); ++i) {
     const Vec3 granted = partInside(room, avatar.feet, wish) * wish;
     const Stop stop = sweepShape(*avatar.shape, avatar.feet, granted, avatar.obstacles,
@@ -122,7 +124,7 @@ void commit(Body& body, const BodyPlace& to, double fraction) {
   }
   const collision::Pose pose = poseAt(*body.spec, place);
   placeBody(body, pose.translation, pose.rotation);
-  body.moved = body.moved || fraction > 0;
+  body.moved = body.moved || (fraction > 0 && body.plan.farthest > 0);
 }
 
 /// Pushes who is in the way; false when that gains the body nothing.
@@ -142,14 +144,10 @@ void tellBlocked(const WorldState& world, Body& body, const Encounter& met, Tick
   body.blockedBy = met.avatar->id;
   body.drive.rate = 0;
   if (told) return;
-  ContactEvent event;
-  event.tick = world.tick;
-  event.time = static_cast<double>(world.tick) * world.lengths.tick;
-  event.kind = ContactEvent::Kind::blocked;
-  event.a = body.id;
-  event.b = met.avatar->id;
-  event.decision = met.sweep.atStop;
-  report.contacts.push_back(event);
+  Contact contact;
+  contact.other = met.avatar->id;
+  contact.decision = met.sweep.atStop;
+  report.contacts.push_back(eventOf(world, ContactEvent::Kind::blocked, body.id, contact));
 }
 
 /// Goes on, pushing, until the body is there or blocked; what part of the coordinate was made.

@@ -1,6 +1,7 @@
 // Who is in which trigger volume: an avatar or a body that touches or penetrates it, by the exact
 // verdict. Only movers are asked for, and only those that moved since the last tick.
 #include <algorithm>
+#include <limits>
 
 #include "scene/world_state.hpp"
 
@@ -59,9 +60,7 @@ Decision decide(const Visitor& visitor, const Body& trigger, QueryCount& count) 
       const Decision decision = collision::decide(part, partOf(trigger, i), cache);
       ++count.narrow;
       if (decision.decidedBy == collision::DecidedBy::rational) ++count.rational;
-      const bool nearer = decision.verdict != best.verdict ? decision.verdict > best.verdict
-                                                           : decision.distance < best.distance;
-      if (nearer) best = decision;
+      if (nearer(decision, best)) best = decision;
     }
   }
   return best;
@@ -69,14 +68,10 @@ Decision decide(const Visitor& visitor, const Body& trigger, QueryCount& count) 
 
 void tell(const WorldState& world, ContactEvent::Kind kind, EntityId who, const Body& trigger,
           const Decision& decision, std::vector<ContactEvent>& events) {
-  ContactEvent event;
-  event.tick = world.tick;
-  event.time = static_cast<double>(world.tick) * world.lengths.tick;
-  event.kind = kind;
-  event.a = who;
-  event.b = trigger.id;
-  event.decision = decision;
-  events.push_back(event);
+  Contact contact;
+  contact.other = trigger.id;
+  contact.decision = decision;
+  events.push_back(eventOf(world, kind, who, contact));
 }
 
 /// An avatar or a body of the world, or nobody.
@@ -92,11 +87,13 @@ Visitor visitorOf(const WorldState& world, EntityId who) {
 void watch(const WorldState& world, Body& trigger, TickReport& report, QueryCount& count) {
   std::vector<EntityId> inside;
   std::vector<EntityId> near;
+  const bool first = world.tick == 1;  // who stands in it from the beginning enters it then
   for (const Visitor& visitor : visitorsOf(world, trigger)) {
+    const bool moved = visitor.moved || first;
     near.push_back(visitor.id);
     const bool was = std::binary_search(trigger.inside.begin(), trigger.inside.end(), visitor.id);
-    if (!visitor.moved && was) inside.push_back(visitor.id);
-    if (!visitor.moved) continue;
+    if (!moved && was) inside.push_back(visitor.id);
+    if (!moved) continue;
     const Decision decision = decide(visitor, trigger, count);
     const bool is = decision.verdict != collision::Verdict::separated;
     if (is) inside.push_back(visitor.id);

@@ -14,6 +14,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <thread>
+#include <utility>
 
 extern char** environ;
 
@@ -24,7 +27,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kReadSize = 1 << 18;  // bytes taken from the pipe at once
 constexpr int kFirstOwnDescriptor = 10;     // above those that a copy expects, so that none collide
-constexpr double kLongestWait = 3600;       // seconds; poll() counts milliseconds in an int
+constexpr double kFarewell = 10;       // seconds between the end of the pipe and of the process
+constexpr double kLongestWait = 3600;  // seconds; poll() counts milliseconds in an int
 
 // ---- owners -------------------------------------------------------------------------------------
 
@@ -35,6 +39,7 @@ class FileDescriptor {
   FileDescriptor(const FileDescriptor&) = delete;
   FileDescriptor& operator=(const FileDescriptor&) = delete;
   int get() const { return fd_; }
+  int release() { return std::exchange(fd_, -1); }
   void close() {
     if (fd_ >= 0) ::close(fd_);
     fd_ = -1;
@@ -57,7 +62,23 @@ class Child {
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
-  /// The status as waitpid() gives it; -1 when somebody else has taken it.
+  /// The status as waitpid() gives it; -1 when somebody else has taken it. Who has closed the pipe
+  /// and is not gone in `patience` seconds is killed.
+  int waitFor(double patience) {
+    const auto start = Clock::now();
+    int status = -1;
+    while (std::chrono::duration<double>(Clock::now() - start).count() < patience) {
+      const pid_t gone = waitpid(pid_, &status, WNOHANG);
+      if (gone == 0) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      } else if (gone == pid_ || errno != EINTR) {
+        pid_ = -1;
+        return status;
+      }
+    }
+    kill(pid_, SIGKILL);
+    return wait();
+  }
   int wait() {
     int status = -1;
     while (waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
@@ -157,12 +178,11 @@ std::array<int, 2> openPipe(const ImportRequest& request) {
                       " (start)");
   };
   if (pipe2(ends.data(), O_CLOEXEC) != 0) fail();
-  for (int& end : ends) {
-    const FileDescriptor low(end);
-    end = fcntl(low.get(), F_DUPFD_CLOEXEC, kFirstOwnDescriptor);
-    if (end < 0) fail();
-  }
-  return ends;
+  const FileDescriptor lowRead(ends[0]), lowWrite(ends[1]);
+  FileDescriptor readEnd(fcntl(lowRead.get(), F_DUPFD_CLOEXEC, kFirstOwnDescriptor));
+  FileDescriptor writeEnd(fcntl(lowWrite.get(), F_DUPFD_CLOEXEC, kFirstOwnDescriptor));
+  if (readEnd.get() < 0 || writeEnd.get() < 0) fail();
+  return {readEnd.release(), writeEnd.release()};
 }
 
 // ---- listening ----------------------------------------------------------------------------------
@@ -174,6 +194,8 @@ bool isFrameKind(std::uint8_t kind) {
 /// Makes frames of bytes as they come.
 class FrameBuffer {
  public:
+  /// No frame may be longer than all that its writer may hold in memory.
+  explicit FrameBuffer(std::size_t longest) : longest_(longest) {}
   /// False when the bytes make no sense.
   bool take(std::span<const std::byte> bytes, const TakeFrame& takeFrame) {
     buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
@@ -182,7 +204,7 @@ class FrameBuffer {
       ImportFrameHeader header{};
       header.kind = static_cast<std::uint8_t>(buffer_[used]);
       std::memcpy(&header.size, buffer_.data() + used + 1, sizeof header.size);
-      if (!isFrameKind(header.kind)) return false;
+      if (!isFrameKind(header.kind) || header.size > longest_) return false;
       if (header.size > buffer_.size() - used - ImportFrameHeader::kSize) break;
       const std::span body(buffer_.data() + used + ImportFrameHeader::kSize, header.size);
       if (!takeFrame(static_cast<ImportFrame>(header.kind), body)) return false;
@@ -193,6 +215,7 @@ class FrameBuffer {
   }
 
  private:
+  std::size_t longest_;
   std::vector<std::byte> buffer_;
 };
 
@@ -206,7 +229,8 @@ ImportEnd::How listen(int readEnd, const ImportRequest& request, const TakeFrame
   const auto start = Clock::now();
   auto heard = start;
   std::vector<std::byte> chunk(kReadSize);
-  FrameBuffer frames;
+  FrameBuffer frames(request.memoryLimit > 0 ? request.memoryLimit
+                                             : std::numeric_limits<std::size_t>::max());
   for (;;) {  // ends with the time limit at the latest
     const double left = request.timeLimit - secondsSince(start);
     const double patience = stallLimit() - secondsSince(heard);
@@ -263,7 +287,7 @@ ImportEnd runImportProcess(const ImportRequest& request, const TakeFrame& take,
   writeEnd.close();
   ImportEnd end;
   end.how = listen(readEnd.get(), request, take, stallLimit);
-  if (end.how == ImportEnd::How::exited) end.status = child.wait();
+  if (end.how == ImportEnd::How::exited) end.status = child.waitFor(kFarewell);
   return end;
 }
 

@@ -415,13 +415,9 @@ DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings) {
   return work.report;
 }
 
-void disturb(Dynamics& dynamics, std::uint32_t index) {
-  Solid& solid = dynamics.solids[index];
-  placeSolid(solid);
-  wake(solid);
-  for (NearPair& pair : dynamics.pairs)
-    if (pair.key.a == index || pair.key.b == index)
-      pair.apart = -1, pair.verdict = collision::Verdict::separated;
+void forgetPairsOf(Dynamics& dynamics, std::uint32_t solid) {
+  std::erase_if(dynamics.pairs,
+                [&](const NearPair& pair) { return pair.key.a == solid || pair.key.b == solid; });
 }
 
 }  // namespace enfilade::scene

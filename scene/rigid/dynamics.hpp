@@ -49,7 +49,7 @@ void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates);
 /// on its way.
 DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings);
 
-/// Nothing is proved of this solid any more: its pose was set from outside. Wakes it.
-void disturb(Dynamics& dynamics, std::uint32_t solid);
+/// Nothing that was found out about pairs of this solid holds any more: its shape is another one.
+void forgetPairsOf(Dynamics& dynamics, std::uint32_t solid);
 
 }  // namespace enfilade::scene

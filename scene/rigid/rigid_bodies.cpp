@@ -1,9 +1,8 @@
 // Free bodies in the tick. Before the broad phase each awake one says what it can reach; after the
 // avatars the solver moves them among all that they meet there:
 //  - still objects, their triangles;
-//  - other bodies: free ones, also those that sleep and may be woken, and what of them these lean
-//  on;
-//    kinematic ones, which have moved already, as driven from where they were;
+//  - other free bodies, also those that sleep and may be woken, and what of them these lean on;
+//  - kinematic bodies, which have moved already, as driven from where they were before;
 //  - avatars, which have moved already too: they stand, and push by what they want and could not
 //  do.
 // A body goes no farther in a tick than it said it can reach: what stands beyond was not asked for.
@@ -54,12 +53,18 @@ Solid solidOf(const Body& body) {
 /// The index of the entity's solid; it is made when it is first met.
 template <class Make>
 std::uint32_t solidFor(RigidStage& stage, EntityId entity, std::uint32_t part, Make make) {
-  const auto [at, isNew] = stage.solids.try_emplace(
-      {entity, part}, static_cast<std::uint32_t>(stage.dynamics.solids.size()));
-  if (isNew) {
-    stage.dynamics.solids.push_back(make());
-    stage.entities.push_back(entity);
+  const auto [at, isNew] = stage.solids.try_emplace({entity, part}, 0);
+  if (!isNew) return at->second;
+  if (stage.vacant.empty()) {
+    at->second = static_cast<std::uint32_t>(stage.dynamics.solids.size());
+    stage.dynamics.solids.emplace_back();
+    stage.entities.emplace_back();
+  } else {
+    at->second = stage.vacant.back();
+    stage.vacant.pop_back();
   }
+  stage.dynamics.solids[at->second] = make();
+  stage.entities[at->second] = entity;
   return at->second;
 }
 
@@ -80,11 +85,11 @@ std::uint32_t solidForPart(WorldState& world, const Avatar& avatar, std::uint32_
   const std::uint32_t i = solidFor(stage, avatar.id, index, [] { return Solid{}; });
   Solid& solid = stage.dynamics.solids[i];
   const Vec3 before = solid.position;
-  if (solid.parts.empty() || solid.parts[0].hull != part.hull.get()) {
+  if (solid.hull != part.hull) {
+    solid.hull = part.hull;
     solid.parts = {partOfHull(*part.hull)};
     solid.radius = part.hull->radius;
-    solid.restless = true;
-    solid.jumped += 1e9;  // another shape: nothing that was known holds
+    forgetPairsOf(stage.dynamics, i);
   }
   const collision::ConvexBody placed = bodyAt(part, avatar.feet);
   solid.position = solid.motion.centre = placed.translation;
@@ -96,6 +101,8 @@ std::uint32_t solidForPart(WorldState& world, const Avatar& avatar, std::uint32_
   const Vec3 velocity = wanted == wish.end() ? Vec3(Vec3::Zero()) : wanted->second;
   solid.pushVelocity = velocity;
   solid.mostPush = velocity.isZero(0) ? 0 : world.lengths.pushForce;
+  // Who leans on somebody that goes on does not sleep; on somebody that stands it may.
+  solid.restless = !(velocity.isZero(0) && avatar.lastMove.isZero(0) && avatar.chain.speed == 0);
   return i;
 }
 
@@ -207,6 +214,19 @@ void gatherPairs(WorldState& world, const Wish& wish) {
 
 // ---- before and after the solver ---------------------------------------------------------------
 
+/// Places the solid of a kinematic body; the solver comes there too, but for rounding.
+void placeDriven(Solid& solid, const Vec3& position, const collision::Quat& orientation) {
+  if (solid.motion.centre == position && solid.motion.rotation.coeffs() == orientation.coeffs())
+    return;
+  const Vec3 before = solid.position;
+  const Mat3 turned = solid.rotation;
+  solid.motion.centre = position;
+  solid.motion.rotation = orientation;
+  placeSolid(solid);
+  solid.jumped +=
+      (solid.position - before).norm() + (solid.rotation - turned).norm() * solid.radius;
+}
+
 /// Kinematic bodies have moved: their solids go from where they were to where they are.
 void driveSolids(WorldState& world) {
   for (const std::uint32_t i : world.kinematics) {
@@ -214,7 +234,9 @@ void driveSolids(WorldState& world) {
     const auto found = world.rigids.solids.find({body.id, 0});
     if (found == world.rigids.solids.end()) continue;
     Solid& solid = world.rigids.dynamics.solids[found->second];
-    solid.motion.velocity = body.velocity, solid.motion.spin = body.spin;
+    placeDriven(solid, body.positionBefore, body.orientationBefore);
+    solid.motion.velocity = body.velocity;
+    solid.motion.spin = body.spin;
   }
 }
 
@@ -224,13 +246,7 @@ void settleDriven(WorldState& world) {
     const Body& body = world.bodies[i];
     const auto found = world.rigids.solids.find({body.id, 0});
     if (found == world.rigids.solids.end()) continue;
-    Solid& solid = world.rigids.dynamics.solids[found->second];
-    if (solid.position == body.position && solid.rotation == body.rotation) continue;
-    // The solver took the same way, but for rounding.
-    solid.jumped += (solid.position - body.position).norm() +
-                    (solid.rotation - body.rotation).norm() * solid.radius;
-    solid.motion.centre = body.position, solid.motion.rotation = body.orientation;
-    placeSolid(solid);
+    placeDriven(world.rigids.dynamics.solids[found->second], body.position, body.orientation);
   }
 }
 
@@ -256,13 +272,19 @@ void catchBody(WorldState& world, Body& body, Solid& solid, TickReport& report) 
   body.asleep = solid.asleep = true;
   body.velocity = body.spin = solid.motion.velocity = solid.motion.spin = Vec3::Zero();
   solid.motion.inverseMass = 0;
-  ContactEvent event;
-  event.tick = world.tick;
-  event.time = static_cast<double>(world.tick) * world.lengths.tick;
-  event.kind = ContactEvent::Kind::leftWorld;
-  event.a = body.id;
-  event.decision.pointA = event.decision.pointB = body.position;
-  report.contacts.push_back(event);
+  Contact nowhere;
+  nowhere.decision.pointA = nowhere.decision.pointB = body.position;
+  report.contacts.push_back(eventOf(world, ContactEvent::Kind::leftWorld, body.id, nowhere));
+}
+
+/// How far one that sleeps may have to go in this tick out of the way of driven bodies, metres.
+double drivenAway(const WorldState& world, const Body& body, double lookout) {
+  const Box box = grown(boxOf(body), lookout);
+  double farthest = 0;
+  for (const std::uint32_t i : world.goingBodies)
+    if (overlaps(world.bodies[i].reach, box))
+      farthest = std::max(farthest, world.bodies[i].plan.farthest);
+  return farthest;
 }
 
 }  // namespace
@@ -282,19 +304,49 @@ void planRigids(WorldState& world) {
   for (const std::uint32_t i : world.rigids.bodies) {
     Body& body = world.bodies[i];
     Solid& solid = world.rigids.dynamics.solids[world.rigids.solids.at({body.id, 0})];
+    const double driven = body.asleep ? drivenAway(world, body, lookout) : 0;
     const bool wasAwake = solid.leash > lookout;
-    if (body.asleep && !wasAwake) continue;
+    if (body.asleep && !wasAwake && driven == 0) continue;
     body.moved = false;
+    const bool stands = body.asleep && driven == 0;
     const double falls = world.lengths.gravity * tick * tick;
-    solid.leash = body.asleep ? lookout : solid.fastest() * tick + falls + kSpareReach;
+    solid.leash = stands ? lookout : solid.fastest() * tick + driven + falls + kSpareReach;
     body.reach = grown(boxOf(body), solid.leash + lookout);
     world.broadPhase.move(body.mover, body.reach);
   }
 }
 
+void wakeLeaning(WorldState& world, const Avatar& avatar) {
+  for (const Contact& contact : avatar.contacts) {
+    const auto found = world.bodyOfId.find(contact.other);
+    if (found == world.bodyOfId.end()) continue;
+    Body& body = world.bodies[found->second];
+    if (body.spec->kind != BodyKind::rigid || body.left) continue;
+    Solid& solid = world.rigids.dynamics.solids[world.rigids.solids.at({body.id, 0})];
+    body.asleep = solid.asleep = false;
+    solid.calmFor = 0;
+  }
+}
+
+void forgetAvatar(WorldState& world, const Avatar& avatar) {
+  wakeLeaning(world, avatar);
+  RigidStage& stage = world.rigids;
+  const auto first = stage.solids.lower_bound({avatar.id, 0});
+  const auto end = stage.solids.lower_bound({avatar.id + 1, 0});
+  for (auto at = first; at != end; ++at) {
+    forgetPairsOf(stage.dynamics, at->second);
+    stage.dynamics.solids[at->second] = {};
+    stage.entities[at->second] = 0;
+    stage.vacant.push_back(at->second);
+  }
+  stage.solids.erase(first, end);
+}
+
 void moveRigids(WorldState& world, const Wish& wish, TickReport& report, QueryCount& count) {
   RigidStage& stage = world.rigids;
   if (stage.bodies.empty()) return;
+  for (const auto& [name, avatar] : world.avatars)
+    if (!avatar.lastMove.isZero(0) || avatar.chain.speed > 0) wakeLeaning(world, avatar);
   stage.seeds = findSeeds(world);
   if (stage.seeds.empty()) return;
   gatherPairs(world, wish);

@@ -17,9 +17,10 @@ struct RigidStage {
   std::vector<std::uint32_t> bodies;  ///< indices of the rigid ones into WorldState::bodies
   /// Solids by entity; an avatar has one for each of its parts.
   std::map<std::pair<EntityId, std::uint32_t>, std::uint32_t> solids;
-  std::vector<EntityId> entities;    ///< of each solid
-  std::vector<std::uint32_t> seeds;  ///< bodies whose surroundings matter in this tick, ascending
-  DynamicsReport last;               ///< of the last tick in which a body was awake
+  std::vector<EntityId> entities;     ///< of each solid; 0: nobody's
+  std::vector<std::uint32_t> vacant;  ///< solids of avatars that left, to be used again
+  std::vector<std::uint32_t> seeds;   ///< bodies whose surroundings matter in this tick, ascending
+  DynamicsReport last;                ///< of the last tick in which a body was awake
 };
 
 }  // namespace enfilade::scene

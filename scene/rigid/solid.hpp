@@ -1,6 +1,8 @@
 // What free bodies meet and are: rigid things of convex parts, free, driven or still.
 #pragma once
 
+#include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -25,6 +27,8 @@ struct SolidPart : PartShape {
 SolidPart partOfHull(const collision::Hull& hull);
 
 struct Solid {
+  /// Keeps the part of an avatar's; what all other parts point at outlives the world.
+  std::shared_ptr<const collision::Hull> hull;
   RigidBody motion;                   ///< inverse mass 0: driven, or still
   Vec3 centreInFrame = Vec3::Zero();  ///< of mass, in the frame of the parts
   std::vector<SolidPart> parts;

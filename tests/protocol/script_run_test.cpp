@@ -194,8 +194,8 @@ TEST(RunScript, AWaitThatNeverEndsIsBoundedAndTold) {
   ASSERT_EQ(result.outcomes.size(), 2u);
   EXPECT_EQ(result.outcomes[0].kind, LineOutcome::Kind::unfinished);
   EXPECT_EQ(result.outcomes[0].text,
-            "tour.jsonl:2: the walk is not at rest after 10 s of simulated time; the script goes "
-            "on");
+            "tour.jsonl:2: after 10 s of simulated time somebody still falls, or a body moves "
+            "({\"body\":NAME,\"do\":\"stop\"} stops one); the script goes on");
   EXPECT_EQ(result.outcomes[1].line, 3u);
 }
 

@@ -28,6 +28,19 @@ TEST(Jump, RisesToItsHeightAndEndsOnTheFloor) {
   EXPECT_TRUE(run.view("ann").grounded);
 }
 
+TEST(Jump, RightAfterASpawnWaitsForTheLanding) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{.at = {0, 0.3, 0}});
+  run.order("ann", Jump{.height = 0.5});
+  double top = 0;
+  for (int i = 0; i < 120; ++i) {
+    run.step();
+    top = std::max(top, run.feet("ann").y());
+  }
+  EXPECT_EQ(run.count(Notice::Kind::refused), 0) << run.text(Notice::Kind::refused);
+  EXPECT_NEAR(top, 0.5, 0.02);
+}
+
 TEST(Jump, OffALedgeGoesFartherThanWalkingOff) {
   const std::vector<NamedBox> scene{floorBox(), {"ledge", {-9, 0, -2}, {0, 2, 2}}};
   Trial run(scene);
@@ -59,13 +72,13 @@ TEST(Jump, ACeilingEndsTheRiseAndIsNotCrossed) {
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
-TEST(Jump, InTheAirOrAbsurdlyHighIsRefused) {
+TEST(Jump, OfOneWhoFliesOrAbsurdlyHighIsRefused) {
   Trial run({floorBox()});
   EXPECT_TRUE(submit(run.world, {"ann", Jump{std::nan("")}, 0}));
   EXPECT_TRUE(submit(run.world, {"ann", Jump{0}, 0}));
   EXPECT_TRUE(submit(run.world, {"ann", Jump{run.world.lengths().jumpLimit * 1.01}, 0}));
   EXPECT_TRUE(submit(run.world, {"ann", Jump{0.5, Vec3(0, INFINITY, 0)}, 0}));
-  run.order("ann", Spawn{{0, 5, 0}});
+  run.order("ann", Spawn{.at = {0, 5, 0}, .flying = true});
   run.order("ann", Jump{0.5});
   run.ticks(2);
   EXPECT_EQ(run.count(Kind::refused), 1);

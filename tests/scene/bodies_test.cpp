@@ -175,6 +175,40 @@ TEST(Bodies, ALiftStopsWhereItsRiderMeetsTheCeiling) {
   EXPECT_NEAR(t.body("lift").position.y() + 0.1 + 1.75, 4, 0.01);
 }
 
+TEST(Bodies, OnABlockedLiftNobodyRises) {
+  Model model = boxModel({floorBox(),
+                          {"platform", {-1, 0.01, -1}, {1, 0.1, 1}},
+                          {"beam", {-1, 2.6, -1}, {-0.2, 2.8, 1}}});
+  BodySpec spec = bodySpec("lift", BodyKind::lift, {1});
+  spec.high = 3, spec.speed = 1.5;
+  spec.stops = {0, 3};
+  model.bodies.push_back(spec);
+  BodyTrial t(std::move(model));
+  t.order("tall", Spawn{.at = {-0.5, 0.2, 0}});
+  t.order("free", Spawn{.at = {0.5, 0.2, 0}});
+  t.untilIdle();
+  for (int again = 0; again < 3; ++again) {
+    t.tell({"lift", Action::to, 3, 0, {}});
+    t.ticks(120);
+    const double top = t.body("lift").position.y() - t.body("lift").shape->origin.y() + 0.1;
+    EXPECT_LT(t.feet("free").y() - top, 2 * t.world.lengths().epsilon) << again;
+    EXPECT_EQ(whoPenetrates(t.world), "");
+    t.tell({"lift", Action::stop, 0, 0, {}});
+    t.ticks(60);
+  }
+}
+
+TEST(Bodies, WhatStandsInATriggerFromTheBeginningEntersIt) {
+  Model model =
+      boxModel({floorBox(), {"door", {0, 0.01, 0}, {1, 2, 0.1}}, {"zone", {0, 0, -1}, {1, 1, 1}}});
+  BodySpec door = bodySpec("door", BodyKind::hinged, {1});
+  door.high = 1.5;
+  model.bodies = {door, bodySpec("zone", BodyKind::trigger, {2})};
+  BodyTrial t(std::move(model));
+  t.ticks(5);
+  EXPECT_EQ(t.told(ContactEvent::Kind::enter, "door", "zone"), 1);
+}
+
 TEST(Bodies, APlatformCarriesSidewaysAndATurntableRound) {
   Model model =
       boxModel({{"plate", {-2, 0, -2}, {2, 0.1, 2}}, {"ground", {-9, -1, -9}, {9, -0.9, 9}}});

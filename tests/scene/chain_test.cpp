@@ -115,6 +115,38 @@ TEST(Chain, AtAnySpeedAPaneOfNoThicknessIsNotCrossed) {
   }
 }
 
+TEST(Chain, AnArmThatSwingsWhileItsBaseSlidesOffARoofCrossesNoPane) {
+  // The base uses up the room of its fall and goes on sideways while the arm swings fast.
+  Model model = boxModel({{"ground", {-20, -0.2, -20}, {20, 0, 20}}});
+  Mesh roof;
+  roof.positions = {{-1, 2.4F, -3}, {-1, 2.4F, 3}, {0.4F, 0, 3}, {0.4F, 0, -3}};
+  roof.indices = {0, 1, 2, 0, 2, 3};
+  Mesh pane;
+  pane.positions = {{2.2F, 0, -6}, {2.2F, 0, 6}, {2.2F, 60, 6}, {2.2F, 60, -6}};
+  pane.indices = {0, 1, 2, 0, 2, 3};
+  model.meshes.insert(model.meshes.end(), {roof, pane});
+  model.objects.push_back({"roof", "", {1}, Eigen::Affine3d::Identity()});
+  model.objects.push_back({"pane", "", {2}, Eigen::Affine3d::Identity()});
+  const auto scene = std::make_shared<const Scene>(model);
+  for (double height = 20; height < 21; height += 0.13) {
+    Trial run(scene);
+    run.order("arm", armAt({0, height, 0}));
+    run.order("arm", joints({{}, 0.0}, 20));
+    run.ticks(10);
+    for (int i = 0; i < 240; ++i) {
+      if (i % 20 == 0) {
+        DriveJoints swing = joints({i % 40 == 0 ? 2.9 : -2.9, 0.0}, 20);
+        swing.atOnce = true;
+        run.order("arm", swing);
+      }
+      run.step();
+      const AvatarView arm = run.view("arm");
+      for (const AvatarPart& part : arm.shape->parts)
+        ASSERT_LT(boxAt(part.box, arm.feet).max.x(), 2.2001) << height << " m, tick " << i;
+    }
+  }
+}
+
 TEST(Chain, TheOtherJointsGoOnWhereOneIsStopped) {
   Trial run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
   run.order("arm", armAt({0, 0, 0}));

@@ -20,7 +20,8 @@ Model loose(const std::vector<NamedBox>& boxes, const std::vector<NamedBox>& sti
   return model;
 }
 
-/// Whether any free body penetrates a triangle or another body, by the exact verdict.
+/// Whether any free body penetrates a triangle or another body, driven or free, by the exact
+/// verdict.
 bool anyBodyPenetrates(const World& world) {
   const WorldState& state = world.state();
   const auto penetrate = [](const collision::ConvexBody& a, const collision::ConvexBody& b) {
@@ -33,8 +34,8 @@ bool anyBodyPenetrates(const World& world) {
     for (const std::uint32_t object : state.scene->solidObjects())
       for (const collision::Triangle& t : solidTriangles(state.scene->model(), object))
         if (penetrate(partOf(body, 0), {std::span<const Vec3>(t), Vec3::Zero()})) return true;
-    for (std::size_t k = 0; k < i; ++k)
-      if (penetrate(partOf(body, 0), partOf(state.bodies[k], 0))) return true;
+    for (std::size_t k = 0; k < state.bodies.size(); ++k)
+      if (k != i && penetrate(partOf(body, 0), partOf(state.bodies[k], 0))) return true;
   }
   return false;
 }
@@ -114,20 +115,97 @@ TEST(RigidBodies, AnAvatarPushesALightBoxAlongAndNotAHeavyOne) {
   }
 }
 
-TEST(RigidBodies, ASleepingBoxIsWokenByADoorThatPushesIt) {
-  Model model = loose({{"box", {0.5, 0.0005, 0.1}, {0.8, 0.3, 0.4}}},
-                      {{"leaf", {0, 0.01, -0.02}, {1, 2.1, 0.02}}});
-  BodySpec door = bodySpec("door", BodyKind::hinged, {1});
-  door.low = -1.5, door.high = 1.5, door.speed = 1;
-  model.bodies.push_back(door);
+TEST(RigidBodies, ASleepingBoxIsWokenByADoorOfAnySpeedThatPushesIt) {
+  for (const double speed : {0.5, 1.0, 1.05}) {
+    Model model = loose({{"box", {0.5, 0.0005, 0.1}, {0.8, 0.3, 0.4}}},
+                        {{"leaf", {0, 0.01, -0.02}, {1, 2.1, 0.02}}});
+    BodySpec door = bodySpec("door", BodyKind::hinged, {1});
+    door.low = -1.5, door.high = 1.5, door.speed = speed;
+    model.bodies.push_back(door);
+    BodyTrial t(std::move(model));
+    t.ticks(120);
+    ASSERT_TRUE(t.body("box").asleep);
+    const Vec3 before = t.body("box").position;
+    t.tell({"door", BodyCommand::Action::to, -1.2, 0, {}});
+    for (int i = 0; i < 180; ++i) {
+      EXPECT_EQ(t.step().squeezedBodies, 0u) << speed << " tick " << i;
+      ASSERT_FALSE(anyBodyPenetrates(t.world)) << speed << " tick " << i;
+    }
+    EXPECT_GT((t.body("box").position - before).norm(), 0.2) << speed;
+    // On the side of the leaf to which it was pushed.
+    const Body& leaf = t.body("door");
+    const Vec3 seen = leaf.rotation.transpose() * (t.body("box").position - leaf.position);
+    EXPECT_GT(seen.z(), 0.02) << speed;
+  }
+}
+
+TEST(RigidBodies, AFastPlateTakesASleepingBoxAlong) {
+  Model model = loose({{"box", {0.5, 0.0005, -0.2}, {0.9, 0.4, 0.2}}},
+                      {{"plate", {0.43, 0.01, -1}, {0.48, 1, 1}}});
+  BodySpec plate = bodySpec("plate", BodyKind::sliding, {1});
+  plate.axis = Vec3::UnitX(), plate.low = 0, plate.high = 3, plate.speed = 10;
+  model.bodies.push_back(plate);
   BodyTrial t(std::move(model));
   t.ticks(120);
   ASSERT_TRUE(t.body("box").asleep);
-  const Vec3 before = t.body("box").position;
-  t.tell({"door", BodyCommand::Action::to, -1.2, 0, {}});
-  t.ticks(200);
-  EXPECT_GT((t.body("box").position - before).norm(), 0.2);
-  EXPECT_FALSE(anyBodyPenetrates(t.world));
+  t.tell({"plate", BodyCommand::Action::open, 0, 0, {}});
+  for (int i = 0; i < 60; ++i) {
+    t.step();
+    ASSERT_FALSE(anyBodyPenetrates(t.world)) << i;
+  }
+  EXPECT_GT(t.body("box").position.x(), 3.48 + 0.2);
+}
+
+TEST(RigidBodies, ABoxHeldBetweenAnAvatarAndAWallComesToRestAndIsToldAsTouched) {
+  Model model =
+      loose({{"box", {1, 0.0005, -0.2}, {1.4, 0.4, 0.2}}}, {{"wall", {2, 0, -3}, {2.2, 3, 3}}});
+  model.bodies[0].mass = 10;
+  BodyTrial t(std::move(model));
+  t.order("ann", Spawn{.at = {0, 0.001, 0}});
+  t.order("ann", Walk{{{3, 0, 0}}, 1.3});
+  t.untilIdle();
+  EXPECT_TRUE(t.body("box").asleep);
+  ASSERT_GE(t.told(Event::begin, "ann", "box"), 1);
+  const auto hit = std::find_if(t.events.begin(), t.events.end(), [&](const ContactEvent& e) {
+    return e.kind == Event::begin && nameOf(t.world, e.b) == "box" && nameOf(t.world, e.a) == "ann";
+  });
+  EXPECT_LT(hit->time, 0.8) << "told only when the box was stuck";
+  EXPECT_LT(hit->decision.distance, 2 * t.world.lengths().epsilon);
+}
+
+TEST(RigidBodies, ABoxThatSleepsOnSomeonesHeadFallsWhenHeGoesOrLeavesOrCrouches) {
+  for (int how = 0; how < 3; ++how) {
+    Model model = loose({{"box", {-0.4, 1.76, -0.4}, {0.4, 2.0, 0.4}}});
+    BodyTrial t(std::move(model));
+    t.order("ann", Spawn{.at = {0, 0.001, 0}});
+    t.untilIdle();
+    const double height = t.body("box").position.y();
+    ASSERT_TRUE(t.body("box").asleep) << how << " " << t.body("box").position.transpose();
+    ASSERT_GT(height, 1.7) << how;
+    if (how == 0) t.order("ann", Drive{{3, 0, 0}});
+    if (how == 1) t.order("ann", Leave{});
+    if (how == 2) t.order("ann", Crouch{.height = 1});
+    for (int i = 0; i < 90; ++i) {
+      t.step();
+      ASSERT_EQ(whoPenetrates(t.world), "") << how << " tick " << i;
+    }
+    EXPECT_LT(t.body("box").position.y(), height - 0.5) << how;
+  }
+}
+
+TEST(RigidBodies, WhoComesAndGoesLeavesNothingBehind) {
+  BodyTrial t(loose({{"box", {0.5, 0.0005, -0.2}, {0.9, 0.4, 0.2}}}));
+  std::size_t most = 0;
+  for (int i = 0; i < 30; ++i) {
+    t.order("ann", Spawn{.at = {0, 0.001, 0}});
+    t.order("ann", Walk{{{0.3, 0, 0}}, 1});
+    t.ticks(20);
+    t.order("ann", Leave{});
+    t.ticks(3);
+    const std::size_t solids = t.world.state().rigids.dynamics.solids.size();
+    if (i == 0) most = solids;
+    EXPECT_LE(solids, most) << i;
+  }
 }
 
 TEST(RigidBodies, ABodyThatFallsOutOfTheWorldIsToldAndTakenOut) {

@@ -114,6 +114,17 @@ ImportRequest IfcInput::requestFor(ImportTask task, double timeLimit) const {
   return request;
 }
 
+namespace {
+
+/// What was never tried is no product of which nothing was left.
+void giveUpFrom(std::size_t first, const std::vector<std::uint32_t>& wanted, IfcReading& reading) {
+  for (std::size_t i = first; i < wanted.size(); ++i)
+    if (!reading.shapes.products.contains(wanted[i]))
+      reading.shapes.failures.try_emplace(wanted[i], "not tried: web-ifc " + reading.failure);
+}
+
+}  // namespace
+
 IfcReading readByWebIfc(const IfcInput& input, double timeLimit, const ImportProgress& progress) {
   IfcReading reading;
   const WebIfcPlace place = findWebIfc();
@@ -139,13 +150,18 @@ IfcReading readByWebIfc(const IfcInput& input, double timeLimit, const ImportPro
         [&] { return hearing.trying ? kPatience : forever(); });
     reading.failure = failureOf(hearing, end);
     const bool overOne = hearing.trying && *hearing.trying < input.wanted().size();
-    if (hearing.done || !overOne || end.how == ImportEnd::How::timeLimit) return reading;
+    if (hearing.done) return reading;
+    if (!overOne || end.how == ImportEnd::How::timeLimit) {
+      giveUpFrom(hearing.trying.value_or(first), input.wanted(), reading);
+      return reading;
+    }
     // One product brought it down: leave that one out, keep what it has of the others.
     const std::uint32_t culprit = input.wanted()[*hearing.trying];
     reading.shapes.products.erase(culprit);
     reading.shapes.failures.try_emplace(culprit, "web-ifc " + reading.failure);
     first = *hearing.trying + 1;
   }
+  giveUpFrom(first, input.wanted(), reading);
   return reading;
 }
 
