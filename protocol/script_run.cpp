@@ -144,7 +144,7 @@ class Run {
   void step() {
     StepOutcome outcome = driver_.step();
     ++result_.ticks;
-    result_.time = outcome.time;
+    result_.time = static_cast<double>(result_.ticks) * driver_.tickSeconds();
     result_.stateHash = outcome.stateHash;
     idle_ = outcome.idle;
     tick_ = outcome.tick;

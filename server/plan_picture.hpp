@@ -22,7 +22,8 @@ struct PlanPicture {
 /// Takes the picture that a camera asks for; nullopt when there is none to be had.
 using TakePicture = std::function<std::optional<PlanPicture>(const render::Camera&)>;
 
-inline constexpr double kPlanCut = 2.0;  ///< metres above the floor at which storeys are cut
+inline constexpr double kPlanCut = 1.2;  ///< metres above the floor at which storeys are cut, as
+                                         ///< plans are drawn: through the windows
 
 inline constexpr render::Colour kPlanInk{40, 40, 46}, kPlanPaper{250, 249, 246};
 

@@ -1,5 +1,5 @@
 // Steps: find the storeys where the walk went (peaks of a histogram of the feet's heights); take a
-// plan of each, cut 2 m above its floor, of the part of the scene that was walked in; draw paths,
+// plan of each, cut 1.2 m above its floor, of the part of the scene that was walked in; draw paths,
 // contacts and captures on the plan of the storey that they are nearest to; put the plans below one
 // another with a title and a legend.
 #include "server/walk_map.hpp"

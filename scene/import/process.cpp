@@ -272,6 +272,9 @@ std::string ImportEnd::words() const {
   if (how == How::timeLimit) return "took too long";
   if (how == How::stallLimit) return "hung";
   if (how == How::garbled) return "answered with noise";
+  if (status != -1 && WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) {
+    return "was killed, by hand or by the system for want of memory";
+  }
   if (status != -1 && WIFSIGNALED(status)) {
     return std::string("crashed (") + strsignal(WTERMSIG(status)) + ")";
   }
