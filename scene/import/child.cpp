@@ -16,9 +16,12 @@
 #include <assimp/Importer.hpp>
 #include <assimp/ProgressHandler.hpp>
 #include <cerrno>
+#include <charconv>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <new>
+#include <set>
 #include <string_view>
 
 #include "scene/import/convert.hpp"
@@ -111,6 +114,32 @@ void misbehaveIfAsked(ImportTask task) {
   }
 }
 
+/// With each %XY replaced by the byte of these two hexadecimal digits.
+std::string withoutPercents(const std::string& uri) {
+  std::string plain;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    unsigned char byte = 0;
+    const char* digits = uri.data() + i + 1;
+    const bool coded = uri[i] == '%' && i + 2 < uri.size() &&
+                       std::from_chars(digits, digits + 2, byte, 16).ptr == digits + 2;
+    plain += coded ? static_cast<char>(byte) : uri[i];
+    if (coded) i += 2;
+  }
+  return plain;
+}
+
+/// Materials of OBJ files stand in files of their own, which go missing when models are passed on.
+void tellMissingMaterials(const std::vector<std::string>& files, std::vector<Problem>& problems) {
+  std::set<std::string> missing;
+  for (const std::string& file : files) {
+    std::error_code error;
+    if (file.ends_with(".mtl") && !std::filesystem::exists(file, error)) missing.insert(file);
+  }
+  if (!missing.empty())
+    problems.push_back({"missing_material_file", missing.size(),
+                        std::filesystem::path(*missing.begin()).filename().string()});
+}
+
 /// Takes down which files assimp opens and looks for, and gives it a mended text for one of them.
 class WatchedFiles : public Assimp::DefaultIOSystem {
  public:
@@ -119,17 +148,30 @@ class WatchedFiles : public Assimp::DefaultIOSystem {
 
   bool Exists(const char* file) const override {
     names_.emplace_back(file);
-    return DefaultIOSystem::Exists(file);
+    return DefaultIOSystem::Exists(file) || !decoded(file).empty();
   }
   Assimp::IOStream* Open(const char* file, const char* mode) override {
     names_.emplace_back(file);
-    if (text_.empty() || file != mendedFile_) return DefaultIOSystem::Open(file, mode);
+    if (text_.empty() || file != mendedFile_) {
+      const std::string other = decoded(file);
+      return DefaultIOSystem::Open(other.empty() ? file : other.c_str(), mode);
+    }
     // assimp only reads from it, and the text lives longer.
     return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(text_.data()),
                                       text_.size());
   }
 
  private:
+  /// URIs say %20 for a blank (RFC 3986), which assimp 5.2.5 leaves as it is. The name without
+  /// such, if only that is there; else empty.
+  std::string decoded(const std::string& file) const {
+    if (DefaultIOSystem::Exists(file.c_str())) return "";
+    std::string name = withoutPercents(file);
+    if (name == file) return "";
+    names_.push_back(name);
+    return DefaultIOSystem::Exists(name.c_str()) ? name : "";
+  }
+
   std::vector<std::string>& names_;
   std::string mendedFile_;
   const std::string& text_;
@@ -197,6 +239,7 @@ Model modelByAssimp(const ImportRequest& request) {
   auto* importer = new Assimp::Importer;  // left to _exit: tearing a large scene down takes time
   std::vector<std::string> files;
   Model model = convertScene(parse(*importer, input, text, files), input, sendProgress);
+  tellMissingMaterials(files, model.problems);
   model.filesBeside.insert(model.filesBeside.end(), files.begin(), files.end());
   return model;
 }
@@ -263,7 +306,10 @@ std::optional<int> runImportChild(int argc, char** argv) {
               std::to_string(request->memoryLimit >> 20) +
               " MiB of memory that an import may take; split the file or raise the limit");
   } catch (const std::exception& error) {
-    sendError(error.what());
+    // Readers of IFC leave the name to who asked them.
+    const std::string text = error.what();
+    const bool named = request->task != ImportTask::model || text.starts_with(request->file);
+    sendError(named ? text : request->file + ": " + text);
   }
   _exit(code);
 }

@@ -230,6 +230,18 @@ void ProblemLog::add(const std::string& kind, const std::string& example, std::s
   problems_.push_back({kind, count, example});
 }
 
+/// assimp leaves out triangles of vertices that are not there, in silence.
+void tellLostTriangles(const aiScene& scene, const FileFacts& facts, ProblemLog& problems) {
+  std::size_t read = 0;
+  for (const aiMesh* mesh : std::span(scene.mMeshes, scene.mNumMeshes)) {
+    for (const aiFace& face : std::span(mesh->mFaces, mesh->mNumFaces))
+      read += face.mNumIndices == 3 ? 1 : 0;
+  }
+  if (facts.triangles && read < *facts.triangles)
+    problems.add("broken_triangle_dropped", "indices of vertices that are not there",
+                 *facts.triangles - read);
+}
+
 Model convertScene(const aiScene& scene, const ConvertInput& input,
                    const ImportProgress& progress) {
   Model model;
@@ -247,6 +259,7 @@ Model convertScene(const aiScene& scene, const ConvertInput& input,
 
   if (progress) progress("convert", 0);
   std::vector<Mesh> meshes = convertMeshes(scene, problems);
+  tellLostTriangles(scene, input.facts, problems);
   Eigen::Affine3d worldFromRoot = Eigen::Affine3d::Identity();
   worldFromRoot.linear() =
       yUpFrom(model.up) * model.metresPerUnit * assimpFromFile(input.facts, input.format).inverse();

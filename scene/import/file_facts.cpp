@@ -7,6 +7,7 @@
 #include <fstream>
 #include <string_view>
 
+#include "scene/import/gltf_facts.hpp"
 #include "scene/import/ifc/facts.hpp"
 #include "scene/import/import_model.hpp"
 
@@ -62,6 +63,14 @@ void requireWholeGlb(const std::filesystem::path& file) {
                       " bytes, the file has " + std::to_string(file_size(file)) +
                       "; copy or download it again (open)");
   }
+}
+
+/// What is called .gltf, but is a GLB.
+void requireText(const std::filesystem::path& file) {
+  if (readStart(file, 4) == "glTF")
+    throw ImportError(file.string() +
+                      ": is a GLB file by its first bytes; check where it comes from and rename " +
+                      "it to .glb (open)");
 }
 
 // ---- COLLADA ------------------------------------------------------------------------------------
@@ -172,9 +181,12 @@ FileFacts readFileFacts(const std::filesystem::path& file, ModelFormat format) {
   FileFacts facts;
   switch (format) {
     case ModelFormat::gltf:
+      requireText(file);
+      facts.triangles = gltfTriangles(file, format);
       break;
     case ModelFormat::glb:
       requireWholeGlb(file);
+      facts.triangles = gltfTriangles(file, format);
       break;
     case ModelFormat::obj:
       facts.problems.push_back({"no_unit", 1, "OBJ has no unit: taken for metres"});

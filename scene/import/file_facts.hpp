@@ -21,6 +21,8 @@ struct FileFacts {
   /// What assimp multiplies onto the root by itself, to be undone: a scale, and a turn.
   double assimpScale = 1;
   char assimpTurnsUp = 'y';
+  /// That the file says it has, each mesh once; nullopt: not known.
+  std::optional<std::size_t> triangles;
   std::vector<Problem> problems;  ///< no_unit, unit_assumed, mended_text
 };
 

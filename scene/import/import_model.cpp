@@ -37,6 +37,11 @@ void requireReadableModel(const fs::path& file) {
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
   if (!fs::exists(status)) {
+    const bool absent = !error || error == std::errc::no_such_file_or_directory ||
+                        error == std::errc::not_a_directory;
+    if (!absent)
+      throw ImportError(name + ": cannot be read: " + error.message() +
+                        "; check the path and its permissions (open)");
     throw ImportError(name + ": no such file; check the path (open)");
   }
   if (fs::is_directory(status)) {
@@ -52,7 +57,8 @@ void requireReadableModel(const fs::path& file) {
     throw ImportError(name + ": is empty; export or copy it again (open)");
   }
   if (access(file.c_str(), R_OK) != 0) {
-    throw ImportError(name + ": cannot be read: " + std::strerror(errno) + " (open)");
+    throw ImportError(name + ": cannot be read: " + std::strerror(errno) +
+                      "; check its permissions (open)");
   }
 }
 
