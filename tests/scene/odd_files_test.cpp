@@ -2,6 +2,7 @@
 // that names the file, the stage and what to do.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <cstdlib>
 
@@ -213,13 +214,13 @@ TEST(OddFiles, WhatMayNotBeReadIsToldAsThat) {
   EXPECT_NE(failureOf(pipe).find("pipe.glb: is not a regular file"), std::string::npos);
   // Root may read all: as somebody else, in a process of its own.
   const auto asNobody = [&] {
-    if (geteuid() == 0 && (setgid(65534) != 0 || setuid(65534) != 0)) std::exit(9);
+    if (geteuid() == 0 && (setgid(65534) != 0 || setuid(65534) != 0)) _exit(9);
     for (const fs::path& file : {locked, below}) {
       const std::string error = failureOf(file);
       std::fprintf(stderr, "%s\n", error.c_str());
-      if (!error.starts_with(file.string() + ": cannot be read: Permission denied")) std::exit(1);
+      if (!error.starts_with(file.string() + ": cannot be read: Permission denied")) _exit(1);
     }
-    std::exit(0);
+    _exit(0);
   };
   EXPECT_EXIT(asNobody(), ::testing::ExitedWithCode(0), "Permission denied");
   fs::permissions(below.parent_path(), fs::perms::owner_all);
