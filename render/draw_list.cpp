@@ -135,6 +135,7 @@ std::vector<Part> partsOf(const scene::Model& model) {
     const scene::Object& object = model.objects[o];
     const std::uint32_t body = bodyOf[o];
     if (body != kStill && model.bodies[body].kind == scene::BodyKind::trigger) continue;
+    if (object.use == scene::Object::Use::solid) continue;
     for (const std::uint32_t m : object.meshes) {
       if (model.meshes[m].indices.empty()) continue;
       const std::uint32_t materialIndex = model.meshes[m].material;

@@ -49,6 +49,10 @@ struct Mesh {
 
 /// One thing a person would name: a node that carries meshes. Its id is its index.
 struct Object {
+  /// What it is there for. Where a file has a simpler shape for collision, the object itself is
+  /// only drawn, and the shape is only solid.
+  enum class Use : std::uint8_t { whole, drawn, solid };
+
   std::string path;  ///< stable and unique: names from the root joined by '/', repeats as name#2
   std::string globalId;               ///< IFC GlobalId, or empty
   std::vector<std::uint32_t> meshes;  ///< indices into Model::meshes
@@ -63,6 +67,10 @@ struct Object {
   /// are IFC's: of a door x runs along its width from the lower corner, y is the side to which it
   /// opens, z is up.
   std::optional<Eigen::Affine3d> worldFromPlacement = std::nullopt;
+  Use use = Use::whole;
+  /// The object that it is a piece of and that people would name: of a collision shape what is
+  /// drawn in its place, of a door's frame the door.
+  std::optional<std::uint32_t> pieceOf = std::nullopt;
 };
 
 /// Something the user should know about the file: degenerate triangles, missing textures, ...

@@ -2,6 +2,7 @@
 
 #include <embree3/rtcore.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -252,6 +253,8 @@ struct RayCaster::State {
   /// Places an object's meshes; `worldFromAuthored` moves it from where it was authored.
   void placeObject(Placement& placement, std::uint32_t object, EntityId entity,
                    const Eigen::Affine3d& worldFromAuthored);
+  /// Still objects that have an area, those that are only drawn among them; ascending.
+  std::vector<std::uint32_t> stillDrawn() const;
   void placeStill();
   void placeBodies(const std::vector<BodyView>& views);
   void placeAvatars(const std::vector<AvatarView>& views);
@@ -277,6 +280,7 @@ const Surface& RayCaster::State::surfaceOfMesh(std::uint32_t mesh) {
 void RayCaster::State::placeObject(Placement& placement, std::uint32_t object, EntityId entity,
                                    const Eigen::Affine3d& worldFromAuthored) {
   const Model& model = scene->model();
+  if (model.objects[object].use == Object::Use::solid) return;  // rays see what is drawn
   for (const std::uint32_t m : model.objects[object].meshes) {
     const Mesh& mesh = model.meshes[m];
     if (mesh.indices.size() < 3) continue;
@@ -288,10 +292,22 @@ void RayCaster::State::placeObject(Placement& placement, std::uint32_t object, E
   }
 }
 
+std::vector<std::uint32_t> RayCaster::State::stillDrawn() const {
+  const Model& model = scene->model();
+  std::vector<std::uint32_t> objects = scene->solidObjects();
+  std::vector<bool> moves(model.objects.size());
+  for (const BodySpec& body : model.bodies)
+    for (const std::uint32_t object : body.objects) moves[object] = true;
+  for (std::uint32_t i = 0; i < model.objects.size(); ++i)
+    if (model.objects[i].use == Object::Use::drawn && !moves[i]) objects.push_back(i);
+  std::sort(objects.begin(), objects.end());
+  return objects;
+}
+
 void RayCaster::State::placeStill() {
   meshes.resize(scene->model().meshes.size());
   still.embree = newScene(device.get());
-  for (const std::uint32_t object : scene->solidObjects())
+  for (const std::uint32_t object : stillDrawn())
     placeObject(still, object, object + 1, Eigen::Affine3d::Identity());
   commit(still);
 }

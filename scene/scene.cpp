@@ -70,6 +70,10 @@ void addBodies(Hasher& hash, const std::vector<BodySpec>& bodies) {
     for (const double stop : body.stops) hash.add(stop);
     hash.add(static_cast<std::uint64_t>(body.openedBy));
     hash.add((std::uint64_t{body.loops} << 1) | std::uint64_t{body.runs});
+    if (!body.velocity.isZero(0) || !body.spin.isZero(0)) {
+      hash.add(body.velocity);
+      hash.add(body.spin);
+    }
     for (const PathKey& key : body.keys) {
       hash.add(key.time);
       hash.add(key.offset);
@@ -91,6 +95,7 @@ std::uint64_t hashOf(const Model& model) {
     }
     hash.add(std::uint64_t{object.meshes.size()});
     for (const std::uint32_t mesh : object.meshes) hash.add(meshHashes[mesh]);
+    if (object.use != Object::Use::whole) hash.add(static_cast<std::uint64_t>(object.use));
   }
   addBodies(hash, model.bodies);
   return hash.value();
@@ -200,7 +205,7 @@ void Scene::boxObjects(const std::vector<bool>& moves) {
     Box box;
     for (const Eigen::Vector3f& p : own) box.include(placed * p.cast<double>());
     bounds_.include(box);
-    if (moves[i]) continue;
+    if (moves[i] || model_.objects[i].use == Object::Use::drawn) continue;
     solidObjects_.push_back(i);
     stillBoxes_.push_back(box);
   }

@@ -20,8 +20,8 @@ class Scene {
   Scene& operator=(const Scene&) = delete;
 
   const Model& model() const { return model_; }
-  /// Still objects with at least one triangle that has an area; besides bodies, only these can be
-  /// touched. Box i belongs to object solidObjects()[i].
+  /// Still objects with at least one triangle that has an area, and not only drawn; besides bodies,
+  /// only these can be touched. Box i belongs to object solidObjects()[i].
   const std::vector<std::uint32_t>& solidObjects() const { return solidObjects_; }
   const std::vector<Box>& stillBoxes() const { return stillBoxes_; }
   const Box& bounds() const { return bounds_; }  ///< of all objects, scene frame, metres

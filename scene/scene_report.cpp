@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <string_view>
 
 namespace enfilade::scene {
 namespace {
@@ -92,7 +93,10 @@ void findRepeats(const Scene& scene, Findings& findings) {
 }  // namespace
 
 bool isNote(const Problem& problem) {
-  return problem.kind == "skipped_spaces" || problem.kind == "skipped_openings";
+  static constexpr std::array<std::string_view, 7> kNotes{
+      "skipped_spaces", "skipped_openings", "guessed_doors",  "still_doors",
+      "still_lifts",    "collision_suffix", "replaced_bodies"};
+  return std::find(kNotes.begin(), kNotes.end(), problem.kind) != kNotes.end();
 }
 
 Box boxOf(const Scene& scene, std::uint32_t object) {
@@ -111,7 +115,9 @@ Box boxOf(const Scene& scene, std::uint32_t object) {
 SceneReport reportOn(const Scene& scene) {
   const Model& model = scene.model();
   SceneReport report;
-  report.objects = model.objects.size();
+  report.objects =
+      static_cast<std::size_t>(std::count_if(model.objects.begin(), model.objects.end(),
+                                             [](const Object& object) { return !object.pieceOf; }));
   report.meshes = model.meshes.size();
   report.problems = model.problems;
   for (const Mesh& mesh : model.meshes) {
@@ -131,7 +137,8 @@ SceneReport reportOn(const Scene& scene) {
     for (const Shell& shell : shape.shells) countShell(shape, shell, object, report, findings);
     const bool solid = !boxOf(scene, i).empty();
     if (!solid) findings.add("object_without_area", 1, object.path);
-    report.solidObjects += solid ? 1 : 0;
+    const bool counts = solid && !object.pieceOf && object.use != Object::Use::drawn;
+    report.solidObjects += counts ? 1 : 0;
   }
   findRepeats(scene, findings);
   return report;

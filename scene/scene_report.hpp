@@ -20,7 +20,7 @@ struct ShellCounts {
 };
 
 struct SceneReport {
-  std::size_t objects = 0;
+  std::size_t objects = 0;       ///< pieces of others left out
   std::size_t solidObjects = 0;  ///< with an area, so that they can be touched
   std::size_t meshes = 0;
   std::size_t triangles = 0;        ///< of all objects

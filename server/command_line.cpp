@@ -13,7 +13,7 @@ namespace {
 
 /// Where CLI11 leaves what it read; every verb has its own.
 struct ModelArguments {
-  std::string file, unit, up, ifcReader = "auto";
+  std::string file, unit, up, ifcReader = "auto", ifcDoors = "move";
   bool noCache = false;
 };
 struct Arguments {
@@ -125,6 +125,11 @@ void addModel(CLI::App& verb, ModelArguments& into) {
           "and for products that it leaves out; assimp last")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "web-ifc", "ifcplusplus", "assimp"}));
+  verb.add_option("--ifc-doors", into.ifcDoors,
+                  "Doors and lifts of IFC. move: they are bodies where the file says enough; "
+                  "still: only what a sidecar names moves")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"move", "still"}));
 }
 
 void addWalk(CLI::App& verb, Arguments& into) {
@@ -151,6 +156,7 @@ ModelOptions modelFrom(const ModelArguments& read) {
   if (!read.unit.empty()) options.metresPerUnit = scene::metresPerUnitFrom(read.unit);
   if (!read.up.empty()) options.up = read.up.front();
   options.ifcReader = scene::ifcReaderFrom(read.ifcReader).value_or(scene::IfcReader::automatic);
+  options.doors = read.ifcDoors == "still" ? scene::IfcDoors::still : scene::IfcDoors::move;
   return options;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <variant>
 
+#include "scene/bodies/find_bodies.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/lengths.hpp"
 #include "server/exit_code.hpp"
@@ -19,6 +20,7 @@ struct ModelOptions {
   std::optional<char> up;  ///< 'x', 'y' or 'z'
   bool cache = true;       ///< whether what an earlier start kept of the file may serve
   scene::IfcReader ifcReader = scene::IfcReader::automatic;
+  scene::IfcDoors doors = scene::IfcDoors::move;
 };
 
 struct Endpoint {

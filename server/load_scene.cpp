@@ -5,7 +5,6 @@
 #include <chrono>
 
 #include "scene/bodies/find_bodies.hpp"
-#include "scene/bodies/sidecar.hpp"
 #include "scene/import/model_cache.hpp"
 #include "server/progress.hpp"
 
@@ -36,10 +35,10 @@ LoadedScene loadSceneTimed(const ModelOptions& options) {
       [&](const std::string& stage, double fraction) { bar.show(fraction, stage); });
   bar.clear();
   for (const std::string& note : model.notes) spdlog::warn("cache: {}", note);
-  scene::findBodies(model.model, options.file);
+  scene::findBodies(model.model, options.file, options.doors);
   if (!model.model.bodies.empty())
-    spdlog::info("{}: {} bodies from {}", options.file.filename().string(),
-                 model.model.bodies.size(), scene::sidecarOf(options.file).filename().string());
+    spdlog::info("{}: {} bodies: {}", options.file.filename().string(), model.model.bodies.size(),
+                 scene::sourcesOf(model.model));
   LoadedScene loaded{nullptr, model.fromCache, model.importSeconds, 0};
   loaded.scene = std::make_shared<const scene::Scene>(std::move(model.model));
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;

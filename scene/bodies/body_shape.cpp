@@ -189,8 +189,10 @@ void measure(BodyShape& shape) {
 
 BodyShape shapeOf(const Model& model, const BodySpec& spec) {
   std::vector<Triangle> triangles;
-  for (const std::uint32_t object : spec.objects)
+  for (const std::uint32_t object : spec.objects) {
+    if (model.objects[object].use == Object::Use::drawn) continue;
     for (const Triangle& t : solidTriangles(model, object)) triangles.push_back(t);
+  }
   if (triangles.empty())
     throw std::invalid_argument("body '" + spec.name + "': its objects have no triangles; '" +
                                 model.objects[spec.objects[0]].path + "' is the first of them");

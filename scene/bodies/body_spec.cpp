@@ -69,6 +69,10 @@ Refusal refusalOfMatter(const BodySpec& body) {
     if (auto why = outside("mass", *body.mass, 1e-6, 1e9)) return why;
   }
   if (auto why = outside("friction", body.friction, 0, 100)) return why;
+  for (int i = 0; i < 3; ++i) {
+    if (auto why = outside("velocity", body.velocity[i], -kFastest, kFastest)) return why;
+    if (auto why = outside("spin", body.spin[i], -kFastest, kFastest)) return why;
+  }
   return outside("restitution", body.restitution, 0, 1);
 }
 
@@ -133,6 +137,10 @@ const char* wordOf(BodySource source) {
       return "ifc";
   }
   return "unknown";
+}
+
+std::optional<std::string> refusalOfBody(const BodySpec& body) {
+  return refusalOf(body);
 }
 
 std::optional<std::string> refusalOfBodies(const Model& model) {

@@ -72,10 +72,12 @@ struct BodySpec {
   bool runs = true;           ///< from the first tick on; else when it is told
 
   // rigid
-  double density = 500;        ///< kilograms per cubic metre
-  std::optional<double> mass;  ///< kilograms; none: from the density
-  double friction = 0.5;       ///< Coulomb's, >= 0
-  double restitution = 0;      ///< 0..1
+  double density = 500;          ///< kilograms per cubic metre
+  std::optional<double> mass;    ///< kilograms; none: from the density
+  double friction = 0.5;         ///< Coulomb's, >= 0
+  double restitution = 0;        ///< 0..1
+  Vec3 velocity = Vec3::Zero();  ///< at the start, of the centre of mass, m/s, scene frame
+  Vec3 spin = Vec3::Zero();      ///< at the start, rad/s, scene frame
 };
 
 /// Driven along its coordinate, and nothing but what cannot yield stops it.
@@ -88,6 +90,9 @@ std::pair<double, double> limitsOf(const BodySpec& spec);
 
 const char* wordOf(BodyKind kind);
 const char* wordOf(BodySource source);
+
+/// What is wrong with one body's numbers, naming the field; nullopt when nothing is.
+std::optional<std::string> refusalOfBody(const BodySpec& body);
 
 /// What is wrong with the model's bodies, naming body and field; nullopt when nothing is.
 std::optional<std::string> refusalOfBodies(const Model& model);

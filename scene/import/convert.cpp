@@ -265,14 +265,17 @@ Model convertScene(const aiScene& scene, const ConvertInput& input,
       yUpFrom(model.up) * model.metresPerUnit * assimpFromFile(input.facts, input.format).inverse();
   worldFromRoot.translate(input.shift);
   const bool gltf = input.format == ModelFormat::gltf || input.format == ModelFormat::glb;
-  const NodeTransforms exact =
-      gltf ? exactGltfTransforms(scene, input.file, input.format) : NodeTransforms();
+  const GltfNodes exact = gltf ? exactGltfNodes(scene, input.file, input.format) : GltfNodes();
+  NodePlaces places;
   std::vector<ObjectDraft> drafts =
-      collectObjects(scene, input.format, worldFromRoot, exact, meshes, problems);
+      collectObjects(scene, input.format, worldFromRoot, exact, meshes, problems, places);
   if (progress) progress("convert", 0.5);
 
   finishModel(std::move(drafts), std::move(meshes), input.file, model, problems);
   model.problems = problems.problems();
+  std::set<std::uint32_t> still;
+  if (gltf) still = addGltfBodies(input.file, input.format, places, model);
+  if (input.format != ModelFormat::ifc) addNamedBodies(model, still);
   return model;
 }
 

@@ -96,18 +96,41 @@ class SiblingNames {
   std::map<std::string, std::size_t> repeats_;
 };
 
-/// Transforms of nodes to their parents, where they are known better than assimp knows them.
-using NodeTransforms = std::map<const aiNode*, Eigen::Affine3d>;
+/// A node as the glTF file itself knows it, better than assimp does.
+struct GltfNode {
+  Eigen::Affine3d parentFromNode;
+  std::size_t number;  ///< in the file's list of nodes
+};
+using GltfNodes = std::map<const aiNode*, GltfNode>;
 
 /// What a glTF file says of its nodes, in doubles; those that cannot be found again are left out.
-NodeTransforms exactGltfTransforms(const aiScene& scene, const std::filesystem::path& file,
-                                   ModelFormat format);
+GltfNodes exactGltfNodes(const aiScene& scene, const std::filesystem::path& file,
+                         ModelFormat format);
+
+/// The JSON of a glTF or GLB file; empty when it cannot be read.
+std::string gltfText(const std::filesystem::path& file, ModelFormat format);
+
+/// Where a node of a glTF file came to stand.
+struct NodePlace {
+  std::string path;                  ///< of its object, if it has meshes
+  Eigen::Affine3d worldFromNode;     ///< as the drafts' placements
+  std::optional<std::size_t> above;  ///< the number of its parent
+};
+using NodePlaces = std::map<std::size_t, NodePlace>;  ///< by the node's number
 
 /// The nodes that carry triangles, in document order. `worldFromRoot` goes before the root's own
-/// transform.
+/// transform. Where the nodes of `exact` stand is added to `places`.
 std::vector<ObjectDraft> collectObjects(const aiScene& scene, ModelFormat format,
                                         const Eigen::Affine3d& worldFromRoot,
-                                        const NodeTransforms& exact,
-                                        const std::vector<Mesh>& meshes, ProblemLog& problems);
+                                        const GltfNodes& exact, const std::vector<Mesh>& meshes,
+                                        ProblemLog& problems, NodePlaces& places);
+
+/// Adds the bodies and collision shapes that a glTF file tells of its nodes. Returns the objects of
+/// which it says that they are no bodies. Throws ImportError.
+std::set<std::uint32_t> addGltfBodies(const std::filesystem::path& file, ModelFormat format,
+                                      const NodePlaces& places, Model& model);
+
+/// Adds those that names of objects tell by their suffixes and prefixes, but none of `still`.
+void addNamedBodies(Model& model, const std::set<std::uint32_t>& still);
 
 }  // namespace enfilade::scene

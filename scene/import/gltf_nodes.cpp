@@ -21,20 +21,6 @@ constexpr int kDeepest = 2000;   // levels; collectObjects() refuses more
 constexpr double kAlike = 1e-4;  // of the largest entry: what a float's rounding may make of it
 constexpr std::size_t kGlbHeader = 20;  // bytes: file header and that of the first chunk
 
-std::string jsonText(const std::filesystem::path& file, ModelFormat format) {
-  std::ifstream in(file, std::ios::binary);
-  if (format == ModelFormat::gltf) return {std::istreambuf_iterator<char>(in), {}};
-  std::array<char, kGlbHeader> header{};
-  in.read(header.data(), header.size());
-  std::uint32_t length = 0;
-  std::memcpy(&length, header.data() + 12, sizeof length);
-  std::error_code error;
-  if (!in || length > file_size(file, error)) return {};
-  std::string text(length, '\0');
-  in.read(text.data(), length);
-  return text;
-}
-
 /// `count` finite numbers, or nullopt.
 template <std::size_t count>
 std::optional<std::array<double, count>> numbersOf(const Json& node, const char* key) {
@@ -80,7 +66,7 @@ bool alike(const Eigen::Affine3d& exact, const aiMatrix4x4& rounded) {
 
 class Walker {
  public:
-  Walker(const Json& nodes, NodeTransforms& into) : nodes_(nodes), into_(into) {}
+  Walker(const Json& nodes, GltfNodes& into) : nodes_(nodes), into_(into) {}
 
   /// Stops where the trees are not the same: assimp's numbers hold there.
   void visit(const Json& index, const aiNode& node, int depth) {
@@ -90,7 +76,7 @@ class Walker {
     const Json& json = nodes_[i];
     const Eigen::Affine3d exact = transformOf(json);
     if (!alike(exact, node.mTransformation)) return;
-    into_.emplace(&node, exact);
+    into_.emplace(&node, GltfNode{exact, i});
     visitAll(json.value("children", Json::array()), node, depth + 1);
   }
 
@@ -103,16 +89,31 @@ class Walker {
 
  private:
   const Json& nodes_;
-  NodeTransforms& into_;
+  GltfNodes& into_;
 };
 
 }  // namespace
 
-NodeTransforms exactGltfTransforms(const aiScene& scene, const std::filesystem::path& file,
-                                   ModelFormat format) {
-  NodeTransforms transforms;
-  const Json json = Json::parse(jsonText(file, format), nullptr, false);
+std::string gltfText(const std::filesystem::path& file, ModelFormat format) {
+  std::ifstream in(file, std::ios::binary);
+  if (format == ModelFormat::gltf) return {std::istreambuf_iterator<char>(in), {}};
+  std::array<char, kGlbHeader> header{};
+  in.read(header.data(), header.size());
+  std::uint32_t length = 0;
+  std::memcpy(&length, header.data() + 12, sizeof length);
+  std::error_code error;
+  if (!in || length > file_size(file, error)) return {};
+  std::string text(length, '\0');
+  in.read(text.data(), length);
+  return text;
+}
+
+GltfNodes exactGltfNodes(const aiScene& scene, const std::filesystem::path& file,
+                         ModelFormat format) {
+  GltfNodes transforms;
+  const Json json = Json::parse(gltfText(file, format), nullptr, false);
   if (!json.is_object() || !json.contains("nodes") || !json.contains("scenes")) return transforms;
+  if (!json["nodes"].is_array()) return transforms;
   const Json chosen = json.value("scene", Json(0u));
   const std::size_t index = chosen.is_number_unsigned() ? chosen.get<std::size_t>() : 0;
   if (!json["scenes"].is_array() || index >= json["scenes"].size()) return transforms;

@@ -1,5 +1,6 @@
 #include "scene/import/model_stream.hpp"
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -10,6 +11,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the stream is written as memory lies");
 
+constexpr std::uint32_t kNoObject = 0xffffffff;
 constexpr std::uint32_t kMagic = 0x4d464e45;  // "ENFM"
 
 /// The scalars of a vector of scalars or of fixed-size Eigen vectors, which lie without gaps.
@@ -224,8 +226,11 @@ void write(Writer& out, const Object& o) {
   out.put(o.overallHeight);
   out.put(static_cast<std::uint8_t>(o.worldFromPlacement.has_value()));
   if (o.worldFromPlacement) out.putMatrix(o.worldFromPlacement->matrix().topRows<3>());
+  out.put(static_cast<std::uint8_t>(o.use));
+  out.put(o.pieceOf.value_or(kNoObject));
 }
 
+/// Pieces may come before what they are pieces of: that is looked at when all are there.
 Object readObject(Reader& in, std::size_t meshes) {
   Object o;
   o.path = in.getText("object path");
@@ -244,7 +249,83 @@ Object readObject(Reader& in, std::size_t meshes) {
     o.worldFromPlacement.emplace(Eigen::Affine3d::Identity());
     o.worldFromPlacement->matrix().topRows<3>() = in.getMatrix<Rows>("placement");
   }
+  o.use = static_cast<Object::Use>(in.getUpTo(2, "object use"));
+  const auto whole = in.get<std::uint32_t>("piece of");
+  if (whole != kNoObject) o.pieceOf = whole;
   return o;
+}
+
+void write(Writer& out, const PathKey& key) {
+  out.put(key.time);
+  out.putMatrix(key.offset);
+  out.put(key.turn);
+}
+
+PathKey readPathKey(Reader& in) {
+  PathKey key;
+  key.time = in.getFinite("key time");
+  key.offset = in.getMatrix<Vec3>("key offset");
+  key.turn = in.getFinite("key turn");
+  return key;
+}
+
+/// Numbers of a body that are always there, in the order of the stream.
+std::array<double BodySpec::*, 8> numbersOfBody() {
+  return {&BodySpec::low,          &BodySpec::high,    &BodySpec::closed,   &BodySpec::speed,
+          &BodySpec::acceleration, &BodySpec::density, &BodySpec::friction, &BodySpec::restitution};
+}
+
+void write(Writer& out, const std::optional<double>& number) {
+  out.put(static_cast<std::uint8_t>(number.has_value()));
+  out.put(number.value_or(0));
+}
+
+std::optional<double> readOptional(Reader& in, const char* field) {
+  const bool there = in.getBool(field);
+  const double number = in.getFinite(field);
+  return there ? std::optional(number) : std::nullopt;
+}
+
+void write(Writer& out, const BodySpec& b) {
+  out.put(b.name);
+  out.put(static_cast<std::uint8_t>(b.kind));
+  out.put(static_cast<std::uint8_t>(b.source));
+  out.putArray(b.objects);
+  out.putMatrix(b.anchor);
+  out.putMatrix(b.axis);
+  for (const auto number : numbersOfBody()) out.put(b.*number);
+  out.putArray(b.stops);
+  write(out, b.closesAfter);
+  out.put(static_cast<std::uint8_t>(b.openedBy));
+  out.put(std::uint64_t{b.keys.size()});
+  for (const PathKey& key : b.keys) write(out, key);
+  out.put(static_cast<std::uint8_t>(b.loops));
+  out.put(static_cast<std::uint8_t>(b.runs));
+  write(out, b.mass);
+  out.putMatrix(b.velocity);
+  out.putMatrix(b.spin);
+}
+
+BodySpec readBodySpec(Reader& in) {
+  BodySpec b;
+  b.name = in.getText("body name");
+  b.kind = static_cast<BodyKind>(in.getUpTo(5, "body kind"));
+  b.source = static_cast<BodySource>(in.getUpTo(4, "body source"));
+  b.objects = in.getArray<std::uint32_t>("body objects");
+  b.anchor = in.getMatrix<Vec3>("body anchor");
+  b.axis = in.getMatrix<Vec3>("body axis");
+  for (const auto number : numbersOfBody()) b.*number = in.getFinite("body number");
+  b.stops = in.getArray<double>("body stops");
+  b.closesAfter = readOptional(in, "closes after");
+  b.openedBy = static_cast<OpenedBy>(in.getUpTo(1, "opened by"));
+  const std::size_t keys = in.count(40, "path keys");
+  for (std::size_t i = 0; i < keys; ++i) b.keys.push_back(readPathKey(in));
+  b.loops = in.getBool("loops");
+  b.runs = in.getBool("runs");
+  b.mass = readOptional(in, "mass");
+  b.velocity = in.getMatrix<Vec3>("body velocity");
+  b.spin = in.getMatrix<Vec3>("body spin");
+  return b;
 }
 
 void write(Writer& out, const Problem& p) {
@@ -311,6 +392,7 @@ std::vector<std::byte> serialiseModel(const Model& model) {
   writeAll(out, model.materials);
   writeAll(out, model.meshes);
   writeAll(out, model.objects);
+  writeAll(out, model.bodies);
   out.put(model.metresPerUnit);
   out.put(static_cast<std::uint8_t>(model.up));
   out.putMatrix(model.offset);
@@ -330,7 +412,13 @@ Model deserialiseModel(std::span<const std::byte> bytes) {
   readAll(in, model.materials, 50, "materials",
           [&] { return readMaterial(in, model.textures.size()); });
   readAll(in, model.meshes, 44, "meshes", [&] { return readMesh(in, model.materials.size()); });
-  readAll(in, model.objects, 153, "objects", [&] { return readObject(in, model.meshes.size()); });
+  readAll(in, model.objects, 158, "objects", [&] { return readObject(in, model.meshes.size()); });
+  for (const Object& object : model.objects) {
+    if (object.pieceOf && *object.pieceOf >= model.objects.size())
+      in.fail("piece of", "no object " + std::to_string(*object.pieceOf));
+  }
+  readAll(in, model.bodies, 215, "bodies", [&] { return readBodySpec(in); });
+  if (const auto why = refusalOfBodies(model)) in.fail("bodies", *why);
   model.metresPerUnit = in.getFinite("metres per unit");
   if (model.metresPerUnit <= 0) in.fail("metres per unit", "not positive");
   model.up = static_cast<char>(in.get<std::uint8_t>("up axis"));

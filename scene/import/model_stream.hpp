@@ -11,7 +11,7 @@
 namespace enfilade::scene {
 
 /// Grows by one whenever the layout changes; other versions are refused.
-inline constexpr std::uint32_t kModelStreamVersion = 3;
+inline constexpr std::uint32_t kModelStreamVersion = 4;
 
 /// Says what is wrong and at which byte.
 struct ModelStreamError : std::runtime_error {

@@ -97,13 +97,17 @@ std::string globalIdIn(std::string_view name) {
 
 class Collector {
  public:
-  Collector(ModelFormat format, const NodeTransforms& exact, const std::vector<Mesh>& meshes,
-            ProblemLog& problems)
-      : ifc_(format == ModelFormat::ifc), exact_(exact), meshes_(meshes), problems_(problems) {}
+  Collector(ModelFormat format, const GltfNodes& exact, const std::vector<Mesh>& meshes,
+            ProblemLog& problems, NodePlaces& places)
+      : ifc_(format == ModelFormat::ifc),
+        exact_(exact),
+        meshes_(meshes),
+        problems_(problems),
+        places_(places) {}
 
   Eigen::Affine3d parentFromNode(const aiNode& node) const {
     const auto exact = exact_.find(&node);
-    return exact == exact_.end() ? toDouble(node.mTransformation) : exact->second;
+    return exact == exact_.end() ? toDouble(node.mTransformation) : exact->second.parentFromNode;
   }
 
   /// Where a node stands: what its parents made of the tree so far.
@@ -113,6 +117,7 @@ class Collector {
     SiblingNames* siblings;
     std::size_t product = kNone;  ///< index of the draft that takes meshes of nameless parts
     int depth = 0;
+    std::optional<std::size_t> above = std::nullopt;  ///< number of the glTF node that it is of
   };
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
@@ -149,8 +154,13 @@ class Collector {
     if (isSolid(name, node)) place_(node, worldFromNode, drafts_[draft]);
     const bool takesParts = ifc_ && isSolid(name, node);
     SiblingNames names;
-    visitChildren(node,
-                  {worldFromNode, path + "/", &names, takesParts ? draft : kNone, place.depth + 1});
+    Place below{worldFromNode,   path + "/", &names, takesParts ? draft : kNone,
+                place.depth + 1, place.above};
+    if (const auto known = exact_.find(&node); known != exact_.end()) {
+      below.above = known->second.number;
+      places_.emplace(known->second.number, NodePlace{path, worldFromNode, place.above});
+    }
+    visitChildren(node, below);
   }
 
   void visitChildren(const aiNode& node, const Place& place) {
@@ -193,9 +203,10 @@ class Collector {
   }
 
   bool ifc_;
-  const NodeTransforms& exact_;
+  const GltfNodes& exact_;
   const std::vector<Mesh>& meshes_;
   ProblemLog& problems_;
+  NodePlaces& places_;
   std::vector<ObjectDraft> drafts_;
 };
 
@@ -211,9 +222,9 @@ bool rootIsNoNode(const aiNode& root, ModelFormat format) {
 
 std::vector<ObjectDraft> collectObjects(const aiScene& scene, ModelFormat format,
                                         const Eigen::Affine3d& worldFromRoot,
-                                        const NodeTransforms& exact,
-                                        const std::vector<Mesh>& meshes, ProblemLog& problems) {
-  Collector collector(format, exact, meshes, problems);
+                                        const GltfNodes& exact, const std::vector<Mesh>& meshes,
+                                        ProblemLog& problems, NodePlaces& places) {
+  Collector collector(format, exact, meshes, problems, places);
   SiblingNames names;
   Collector::Place place{worldFromRoot, "", &names};
   const aiNode& root = *scene.mRootNode;

@@ -45,6 +45,7 @@ Solid solidOf(const Body& body) {
     solid.motion.inertia = body.shape->inertia;
     solid.motion.inverseInertia = body.shape->inertia.inverse();
     solid.motion.restitution = body.spec->restitution;
+    solid.motion.velocity = body.velocity, solid.motion.spin = body.spin;
   }
   placeSolid(solid);
   return solid;
@@ -294,6 +295,7 @@ void startRigids(WorldState& world) {
     Body& body = world.bodies[i];
     if (body.spec->kind != BodyKind::rigid) continue;
     body.asleep = false;
+    body.velocity = body.spec->velocity, body.spin = body.spec->spin;
     world.rigids.bodies.push_back(i);
     solidForBody(world.rigids, body);
   }

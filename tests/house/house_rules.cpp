@@ -28,10 +28,12 @@ const std::map<std::string, Names> kMayInclude{
 /// Inside scene/: which of its rooms a room may include besides itself. What lies in scene/ itself
 /// is the world that all of them are about; the import knows the plain data of it alone.
 const std::map<std::string, Names> kRoomMayInclude{
-    {"scene/import", {"scene/model.hpp", "scene/hasher.hpp"}},
+    {"scene/import",
+     {"scene/model.hpp", "scene/hasher.hpp", "scene/bodies/body_fields.hpp",
+      "scene/bodies/body_precedence.hpp", "scene/bodies/sidecar.hpp", "scene/rotation.hpp"}},
     {"scene/shapes", {"scene"}},
     {"scene/rigid", {"scene", "scene/shapes"}},
-    {"scene/bodies", {"scene"}},
+    {"scene/bodies", {"scene", "scene/shapes"}},
     {"scene/avatars", {"scene"}},
 };
 

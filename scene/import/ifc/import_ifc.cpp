@@ -178,6 +178,7 @@ class IfcImport {
     model.source = request_.file;
     tell("openings", 0);
     reportOpenings(checkOpenings(model, facts_), problems_);
+    findLifts(model, facts_, problems_);
     for (const Problem& problem : problems_.problems()) model.problems.push_back(problem);
     return model;
   }

@@ -33,4 +33,7 @@ OpeningCheck checkOpenings(const Model& model, const IfcFacts& facts);
 
 void reportOpenings(const OpeningCheck& check, ProblemLog& problems);
 
+/// Adds a body for each elevator whose stops can be told; the others are counted as `still_lifts`.
+void findLifts(Model& model, const IfcFacts& facts, ProblemLog& problems);
+
 }  // namespace enfilade::scene

@@ -1,0 +1,381 @@
+// Doors and lifts of IFC as bodies: which leaf opens to which side, what is left alone and why, and
+// what becomes of the doors of real buildings.
+#include <gtest/gtest.h>
+
+#include "scene/bodies/find_bodies.hpp"
+#include "scene/bodies/ifc_doors.hpp"
+#include "scene/import/ifc/web_ifc.hpp"
+#include "scene/import/import_model.hpp"
+#include "tests/scene/body_trial.hpp"
+#include "tests/scene/hand_made_files.hpp"
+#include "tests/scene/hand_made_ifc.hpp"
+#include "tests/support/shared_folder.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using namespace testing;
+using tests::IfcHouse;
+using tests::TemporaryFolder;
+
+constexpr double kQuarter = 1.5707963267948966;
+
+void join(Mesh& mesh, const Mesh& other) {
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());
+  for (const std::uint32_t i : other.indices) mesh.indices.push_back(first + i);
+}
+
+/// x along the width, y to where it opens, z up.
+struct DoorPart {
+  Vec3 min, max;
+};
+
+/// A jamb at each side and a head, of 5 x 10 cm.
+std::vector<DoorPart> frameParts(double width) {
+  return {{{0, 0, 0}, {0.05, 0.1, 2.1}},
+          {{width - 0.05, 0, 0}, {width, 0.1, 2.1}},
+          {{0.05, 0, 2.05}, {width - 0.05, 0.1, 2.1}}};
+}
+
+/// A floor, and a door at (2, 0, 3) that opens towards the scene's -z: IFC's y.
+Model doorModel(const std::string& operation, const std::vector<DoorPart>& parts,
+                double width = 1) {
+  Model model = boxModel({floorBox()});
+  Mesh mesh;
+  for (const DoorPart& part : parts) join(mesh, boxMesh(part.min, part.max));
+  model.meshes.push_back(std::move(mesh));
+  Object door;
+  door.path = "house/door";
+  door.globalId = "0123456789012345678901";
+  door.ifcClass = "IfcDoor";
+  door.operation = operation;
+  door.overallWidth = width;
+  door.overallHeight = 2.1;
+  door.meshes = {1};
+  Eigen::Affine3d placed(Eigen::Translation3d(2, 0, 3));
+  placed.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  door.worldFromPlacement = placed;
+  door.worldFromMesh = placed;
+  model.objects.push_back(std::move(door));
+  return model;
+}
+
+std::vector<DoorPart> withLeaf(double width, std::vector<DoorPart> leaves) {
+  std::vector<DoorPart> parts = frameParts(width);
+  parts.insert(parts.end(), leaves.begin(), leaves.end());
+  return parts;
+}
+
+std::vector<DoorPart> singleDoor() {
+  return withLeaf(1, {{{0.06, 0.02, 0.01}, {0.94, 0.06, 2.04}}});
+}
+
+std::vector<DoorPart> doubleDoor() {
+  return withLeaf(
+      2, {{{0.06, 0.02, 0.01}, {0.99, 0.06, 2.04}}, {{1.01, 0.02, 0.01}, {1.94, 0.06, 2.04}}});
+}
+
+std::string toldOf(const Model& model, const std::string& kind) {
+  for (const Problem& problem : model.problems)
+    if (problem.kind == kind) return problem.example;
+  return "";
+}
+
+std::size_t countOf(const Model& model, const std::string& kind) {
+  for (const Problem& problem : model.problems)
+    if (problem.kind == kind) return problem.count;
+  return 0;
+}
+
+Model found(Model model, IfcDoors doors = IfcDoors::move) {
+  findBodies(model, "no such folder/door.ifc", doors);
+  return model;
+}
+
+/// Where a point of the body that lay there when it was closed is when it is open.
+Vec3 whenOpen(const Model& model, const std::string& name, const Vec3& point) {
+  BodyTrial trial{Model(model)};
+  trial.tell({name, BodyCommand::Action::open, 0, 0, {}});
+  trial.untilIdle();
+  const Body& body = trial.body(name);
+  return body.rotation * (point - body.shape->origin) + body.position;
+}
+
+TEST(IfcDoors, LeftHasItsHingesAtTheLowEndAndOpensTowardsY) {
+  const Model model = found(doorModel("SINGLE_SWING_LEFT", singleDoor()));
+  ASSERT_EQ(model.bodies.size(), 1u) << toldOf(model, "still_doors");
+  const BodySpec& door = model.bodies[0];
+  EXPECT_EQ(door.name, "house/door");
+  EXPECT_EQ(door.source, BodySource::ifc);
+  EXPECT_EQ(door.objects, std::vector<std::uint32_t>{1});
+  EXPECT_EQ(door.openedBy, OpenedBy::touch);
+  EXPECT_NEAR(door.anchor.x(), 2.06, 1e-6);
+  const Vec3 tip = whenOpen(model, "house/door", {2.94, 1, 2.94});  // at its far edge, y = 0.06
+  EXPECT_NEAR(tip.x(), 2.06, 1e-6);
+  EXPECT_NEAR(tip.z(), 2.94 - 0.88, 1e-6) << "towards -z, IFC's y";
+  EXPECT_EQ(countOf(model, "guessed_doors"), 0u);
+}
+
+TEST(IfcDoors, RightHasItsHingesAtTheHighEndAndOpensTowardsY) {
+  const Model model = found(doorModel("SINGLE_SWING_RIGHT", singleDoor()));
+  ASSERT_EQ(model.bodies.size(), 1u) << toldOf(model, "still_doors");
+  EXPECT_NEAR(model.bodies[0].anchor.x(), 2.94, 1e-6);
+  const Vec3 tip = whenOpen(model, "house/door", {2.06, 1, 2.94});
+  EXPECT_NEAR(tip.x(), 2.94, 1e-6);
+  EXPECT_NEAR(tip.z(), 2.94 - 0.88, 1e-6);
+}
+
+TEST(IfcDoors, OnlyTheLeafMovesAndTheFrameStands) {
+  const Model model = found(doorModel("SINGLE_SWING_LEFT", singleDoor()));
+  ASSERT_EQ(model.objects.size(), 3u);
+  EXPECT_EQ(model.objects[2].path, "house/door/frame");
+  EXPECT_EQ(model.objects[2].pieceOf, 1u);
+  EXPECT_TRUE(model.objects[2].globalId.empty()) << "the GlobalId is the leaf's alone";
+  EXPECT_EQ(solidTriangles(model, 1).size(), 12u);
+  EXPECT_EQ(solidTriangles(model, 2).size(), 36u);
+  EXPECT_EQ(model.meshes.size(), 3u) << "what was cut is gone";
+  const Scene scene{Model(model)};
+  EXPECT_EQ(scene.solidObjects(), (std::vector<std::uint32_t>{0, 2}));
+}
+
+TEST(IfcDoors, TwoLeavesOpenApart) {
+  const Model swing = found(doorModel("DOUBLE_DOOR_SINGLE_SWING", doubleDoor(), 2));
+  ASSERT_EQ(swing.bodies.size(), 2u) << toldOf(swing, "still_doors");
+  EXPECT_EQ(swing.bodies[1].name, "house/door/leaf2");
+  EXPECT_NEAR(swing.bodies[0].anchor.x(), 2.06, 1e-6);
+  EXPECT_NEAR(swing.bodies[1].anchor.x(), 3.94, 1e-6);
+  EXPECT_LT(whenOpen(swing, "house/door", {2.99, 1, 2.94}).z(), 2.1);
+  EXPECT_LT(whenOpen(swing, "house/door/leaf2", {3.01, 1, 2.94}).z(), 2.1);
+  const Model slide = found(doorModel("DOUBLE_DOOR_SLIDING", doubleDoor(), 2));
+  ASSERT_EQ(slide.bodies.size(), 2u);
+  EXPECT_NEAR(whenOpen(slide, "house/door", {2.99, 1, 2.95}).x(), 2.06, 1e-6);
+  EXPECT_NEAR(whenOpen(slide, "house/door/leaf2", {3.01, 1, 2.95}).x(), 3.94, 1e-6);
+}
+
+TEST(IfcDoors, SlidingDoorsSlideTheirWidth) {
+  const Model left = found(doorModel("SLIDING_TO_LEFT", singleDoor()));
+  ASSERT_EQ(left.bodies.size(), 1u);
+  EXPECT_NEAR(whenOpen(left, "house/door", {2.94, 1, 2.95}).x(), 2.06, 1e-6);
+  const Model right = found(doorModel("SLIDING_TO_RIGHT", singleDoor()));
+  EXPECT_NEAR(whenOpen(right, "house/door", {2.06, 1, 2.95}).x(), 2.94, 1e-6);
+}
+
+TEST(IfcDoors, AHandleTellsWhereTheHingesAreAndTheGuessIsTold) {
+  auto parts = singleDoor();
+  parts.push_back({{0.1, -0.04, 1}, {0.22, 0.0, 1.03}});  // at the low end
+  const Model model = found(doorModel("NOTDEFINED", parts));
+  ASSERT_EQ(model.bodies.size(), 1u) << toldOf(model, "still_doors");
+  EXPECT_NEAR(model.bodies[0].anchor.x(), 2.94, 1e-6);
+  EXPECT_EQ(model.bodies[0].low, -kQuarter);
+  EXPECT_EQ(model.bodies[0].high, kQuarter);
+  EXPECT_EQ(solidTriangles(model, 1).size(), 24u) << "the handle goes with the leaf";
+  EXPECT_EQ(countOf(model, "guessed_doors"), 1u);
+  EXPECT_NE(toldOf(model, "guessed_doors").find("house/door: NOTDEFINED; hinged at the right"),
+            std::string::npos)
+      << toldOf(model, "guessed_doors");
+}
+
+TEST(IfcDoors, APaneBelongsToTheLeafThatHoldsIt) {
+  // Two stiles and two rails as one surface would be a ring; four boxes that share faces are one.
+  Model model = doorModel("SINGLE_SWING_LEFT", {});
+  Mesh& mesh = model.meshes[1];
+  const auto ring = [&](double x0, double x1, double z0, double z1, double rail) {
+    // A ring of one surface: inner and outer rectangle, front and back.
+    const double xs[] = {x0, x1, x1, x0, x0 + rail, x1 - rail, x1 - rail, x0 + rail};
+    const double zs[] = {z0, z0, z1, z1, z0 + rail, z0 + rail, z1 - rail, z1 - rail};
+    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+    for (const double y : {0.02, 0.06})
+      for (int i = 0; i < 8; ++i) mesh.positions.push_back(Vec3(xs[i], y, zs[i]).cast<float>());
+    const auto quad = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) {
+      for (const std::uint32_t i : {a, b, c, a, c, d}) mesh.indices.push_back(first + i);
+    };
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      const std::uint32_t next = (i + 1) % 4;
+      quad(i, next, 4 + next, 4 + i);
+      quad(8 + next, 8 + i, 12 + i, 12 + next);
+      quad(next, i, 8 + i, 8 + next);
+      quad(4 + i, 4 + next, 12 + next, 12 + i);
+    }
+  };
+  ring(0, 1, 0, 2.1, 0.05);           // the frame
+  ring(0.06, 0.94, 0.06, 2.04, 0.1);  // the leaf
+  join(mesh, boxMesh({0.17, 0.035, 0.17}, {0.83, 0.045, 1.93}));
+  const Model split = found(model);
+  ASSERT_EQ(split.bodies.size(), 1u) << toldOf(split, "still_doors");
+  EXPECT_EQ(solidTriangles(split, 1).size(), 44u) << "the ring's 32 and the pane's 12";
+  EXPECT_NEAR(split.bodies[0].anchor.x(), 2.06, 1e-6);
+}
+
+TEST(IfcDoors, WhatCannotBeDecidedStaysAndIsTold) {
+  const auto still = [](const Model& given) {
+    const Model model = found(given);
+    EXPECT_TRUE(model.bodies.empty());
+    EXPECT_EQ(model.objects.size(), given.objects.size());
+    EXPECT_EQ(model.meshes.size(), given.meshes.size());
+    return toldOf(model, "still_doors");
+  };
+  const auto has = [](const std::string& text, const char* part) {
+    EXPECT_NE(text.find(part), std::string::npos) << text;
+  };
+  has(still(doorModel("SINGLE_SWING_LEFT", frameParts(1))), "no surface fills its middle");
+  has(still(doorModel("REVOLVING", singleDoor())), "REVOLVING");
+  has(still(doorModel("SINGLE_SWING_LEFT", doubleDoor(), 2)), "does not go with 2 leaves");
+  has(still(doorModel("SINGLE_SWING_LEFT", {{{0, 0, 0}, {1, 0.5, 2.1}}})), "too thick");
+  Model lying = doorModel("SINGLE_SWING_LEFT", singleDoor());
+  lying.objects[1].worldFromPlacement->linear() = Eigen::Matrix3d::Identity();
+  has(still(lying), "upright");
+  Model nowhere = doorModel("SINGLE_SWING_LEFT", singleDoor());
+  nowhere.objects[1].worldFromPlacement.reset();
+  has(still(nowhere), "placement is not known");
+}
+
+TEST(IfcDoors, AllStandWhereTheUserSaysSoAndIdsStayTheSame) {
+  const Model model = found(doorModel("SINGLE_SWING_LEFT", singleDoor()), IfcDoors::still);
+  EXPECT_TRUE(model.bodies.empty());
+  EXPECT_EQ(model.objects.size(), 3u);
+}
+
+TEST(IfcDoors, ASidecarSaysBetterOfTheLeafAlone) {
+  const TemporaryFolder folder;
+  folder.write("door.walk.json",
+               R"({"walk":1,"bodies":[{"name":"mine","kind":"hinged","anchor":[2.94,0,2.95],)"
+               R"("objects":["0123456789012345678901"]}]})");
+  Model model = doorModel("SINGLE_SWING_LEFT", singleDoor());
+  findBodies(model, folder.path() / "door.ifc");
+  ASSERT_EQ(model.bodies.size(), 1u);
+  EXPECT_EQ(model.bodies[0].source, BodySource::sidecar);
+  EXPECT_EQ(model.bodies[0].objects, std::vector<std::uint32_t>{1});
+}
+
+TEST(IfcDoors, AnAvatarWalksThroughAGuessedDoorFromEitherSide) {
+  const Model model = found(
+      doorModel("NOTDEFINED", withLeaf(1.2, {{{0.06, 0.02, 0.01}, {1.14, 0.06, 2.04}}}), 1.2));
+  ASSERT_EQ(model.bodies.size(), 1u) << toldOf(model, "still_doors");
+  for (const double side : {1.0, -1.0}) {
+    BodyTrial trial{Model(model)};
+    trial.order("ann", Spawn{{2.65, 0.001, 2.95 + 1.5 * side}, 0, 0.3, 1.75});
+    trial.order("ann", Walk{{{2.65, 0, 2.95 - 1.5 * side}}, 1});
+    trial.ticks(600);
+    EXPECT_LT(side * (trial.feet("ann").z() - 2.95), -1.4) << trial.feet("ann").transpose();
+    EXPECT_EQ(whoPenetrates(trial.world), "");
+  }
+}
+
+// ---- files --------------------------------------------------------------------------------------
+
+std::vector<IfcReader> readersHere() {
+  std::vector<IfcReader> readers{IfcReader::ifcPlusPlus};
+  if (findWebIfc().missing.empty()) readers.push_back(IfcReader::webIfc);
+  return readers;
+}
+
+Model imported(const std::filesystem::path& file, IfcReader reader) {
+  ImportOptions options;
+  options.ifcReader = reader;
+  Model model = importModel(file, options);
+  findBodies(model, file);
+  return model;
+}
+
+TEST(IfcDoors, OfAFileOpenTowardsItsY) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("house.ifc", IfcHouse().text());
+  for (const IfcReader reader : readersHere()) {
+    const Model model = imported(file, reader);
+    ASSERT_EQ(model.bodies.size(), 1u) << toldOf(model, "still_doors");
+    // A slab of 0.9 x 0.05 m from (1.5, 0.1) in the file, whose y is our -z.
+    EXPECT_LT((model.bodies[0].anchor - Vec3(1.5, 0, -0.15)).norm(), 1e-5)
+        << model.bodies[0].anchor.transpose();
+    EXPECT_NEAR(model.bodies[0].low, 0, 0);
+    EXPECT_EQ(model.bodies[0].high, kQuarter);
+  }
+}
+
+/// Two storeys 3 m apart, and a cabin of 1.5 x 1.5 x 2.4 m at (10, 10) on the lower one.
+std::string houseWithLift(double cabin, const std::string& slab) {
+  IfcHouse house;
+  house.more =
+      house.placement(500, "#15", 10, 10, 0) + house.box(510, 1.5, 1.5, cabin) +
+      "#520=IFCTRANSPORTELEMENT('000000000000000000Lift',$,'Lift',$,$,#502,#515,$,"
+      ".ELEVATOR.);\n" +
+      house.placement(530, "#15", 0, 0, 3) +
+      "#540=IFCBUILDINGSTOREY('000000000000000Storey2',$,'Upper',$,$,#532,$,$,.ELEMENT.,"
+      "3000.);\n#541=IFCRELAGGREGATES('0000000000000000000010',$,$,$,#40,(#540));\n"
+      "#542=IFCRELCONTAINEDINSPATIALSTRUCTURE('0000000000000000000011',$,$,$,(#520),#41);\n" +
+      (slab.empty() ? ""
+                    : house.placement(550, "#15", 9, 9, 2.9) + house.box(560, 4, 4, 0.1) + slab);
+  return house.text();
+}
+
+TEST(IfcLifts, StopAtTheStoreysThatTheirShaftIsOpenTo) {
+  const TemporaryFolder folder;
+  const auto open = folder.write("open.ifc", houseWithLift(2.4, ""));
+  const auto closed = folder.write(
+      "closed.ifc",
+      houseWithLift(2.4,
+                    "#570=IFCSLAB('000000000000000000Slab',$,'Slab',$,$,#552,#565,$,.FLOOR.);\n"));
+  const auto tall = folder.write("tall.ifc", houseWithLift(6, ""));
+  for (const IfcReader reader : readersHere()) {
+    const Model lift = imported(open, reader);
+    ASSERT_EQ(lift.bodies.size(), 2u) << toldOf(lift, "still_lifts");
+    const BodySpec& body = lift.bodies[1].kind == BodyKind::lift ? lift.bodies[1] : lift.bodies[0];
+    EXPECT_EQ(body.kind, BodyKind::lift);
+    ASSERT_EQ(body.stops.size(), 2u);
+    EXPECT_NEAR(body.stops[0], 0, 1e-9);
+    EXPECT_NEAR(body.stops[1], 3, 1e-9);
+    EXPECT_NE(toldOf(imported(closed, reader), "still_lifts").find("no other storey"),
+              std::string::npos);
+    EXPECT_NE(toldOf(imported(tall, reader), "still_lifts").find("taller than a cabin"),
+              std::string::npos);
+  }
+}
+
+struct Building {
+  const char* file;
+  std::size_t doors, leaves, guessed, still;
+};
+
+// By web-ifc; the doors of the file, and what became of them.
+const Building kBuildings[] = {
+    {"fzk-haus/AC14-FZK-Haus.ifc", 5, 4, 4, 1},  // the fifth has three panes side by side
+    {"duplex/Duplex_A_20110907.ifc", 14, 14, 0, 0},
+};
+
+TEST(IfcDoors, OfRealBuildingsBecomeBodiesOrAreTold) {
+  ENFILADE_NEED_SHARED(shared);
+  if (!findWebIfc().missing.empty()) GTEST_SKIP() << findWebIfc().missing;
+  for (const Building& building : kBuildings) {
+    SCOPED_TRACE(building.file);
+    const Model model = imported(*shared / "scenes" / building.file, IfcReader::webIfc);
+    const auto doors = std::count_if(
+        model.objects.begin(), model.objects.end(),
+        [](const Object& object) { return object.ifcClass == "IfcDoor" && !object.pieceOf; });
+    EXPECT_EQ(static_cast<std::size_t>(doors), building.doors);
+    EXPECT_EQ(model.bodies.size(), building.leaves);
+    EXPECT_EQ(countOf(model, "guessed_doors"), building.guessed) << toldOf(model, "guessed_doors");
+    EXPECT_EQ(countOf(model, "still_doors"), building.still) << toldOf(model, "still_doors");
+    EXPECT_NO_THROW(Scene{Model(model)});
+  }
+}
+
+TEST(IfcDoors, AnAvatarWalksThroughARealDoorFromEitherSide) {
+  ENFILADE_NEED_SHARED(shared);
+  if (!findWebIfc().missing.empty()) GTEST_SKIP() << findWebIfc().missing;
+  const auto file = *shared / "scenes/fzk-haus/AC14-FZK-Haus.ifc";
+  const Model model = imported(file, IfcReader::webIfc);
+  for (const double side : {1.0, -1.0}) {
+    BodyTrial trial{Model(model)};
+    const std::string name = "Projekt/Gelände/AC14-FZK-Haus/0. Erdgeschoss/Innentuer-2";
+    const Box leaf = boxOf(trial.body(name));
+    const Vec3 ahead(0, 0, 0.9 * side), middle(leaf.centre().x(), leaf.min.y(), leaf.centre().z());
+    trial.order("ann", Spawn{middle + ahead + Vec3(0, 0.01, 0), 0, 0.3, 1.75});
+    trial.order("ann", Walk{{middle - ahead}, 1});
+    trial.ticks(900);
+    EXPECT_GT(side * (middle.z() - trial.feet("ann").z()), 0.85) << trial.feet("ann").transpose();
+    EXPECT_NE(trial.body(name).drive.coordinate, 0);
+  }
+}
+
+}  // namespace
+}  // namespace enfilade::scene
