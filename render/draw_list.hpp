@@ -78,9 +78,9 @@ MaterialData materialData(const scene::Model& model, const scene::Mesh& mesh);
 /// Of all bodies of the scene.
 std::vector<BodyPlacement> placementsOf(const scene::Scene& scene, const scene::Snapshot& snapshot);
 
-/// All parts of the model but those of triggers and of what is only solid, in the order in which they are drawn: by pass,
-/// texture, object. The order never depends on the camera, so that ties of depth fall the same way
-/// in every picture.
+/// All parts of the model but those of triggers and of what is only solid, in the order in which
+/// they are drawn: by pass, texture, object. The order never depends on the camera, so that ties of
+/// depth fall the same way in every picture.
 std::vector<Part> partsOf(const scene::Model& model);
 
 /// What a scene is drawn from; `ranges` and `materials` have one entry a mesh.

@@ -1,174 +1,177 @@
 // Steps
-//  1. The triangles of the body's objects are welded by exact position and split into connected
-//     pieces.
-//  2. A piece that is closed and encloses what its hull encloses becomes that hull: convex but for
-//     the rounding of its coordinates. Others stay triangles in kinematic bodies, and become their
-//     hull in rigid bodies and triggers, which is counted.
-//  3. Mass: each hull is cut into tetrahedra from one point, their covariances are summed (Blow and
-//     Binstock 2004, "How to find the inertia tensor").
+//  1. Each object of the body is split into surfaces (shapes/shape.hpp). A closed convex one
+//  becomes
+//     its hull, by the rule that still objects have.
+//  2. The rest stays triangles in kinematic bodies. In rigid bodies and triggers, surfaces that
+//  hang
+//     together by shared corners become one hull, which is counted where it is larger than they
+//     are.
+//  3. Mass: that of the hulls (shapes/mass_properties.hpp).
 #include "scene/bodies/body_shape.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 #include <numeric>
+#include <span>
 #include <stdexcept>
 
 #include "scene/scene.hpp"
+#include "scene/shapes/mass_properties.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 using collision::Hull;
-using collision::Mat3;
 using collision::Triangle;
 
-constexpr double kSameVolume = 1e-6;  // of the hull's: float coordinates round to 6e-8
 constexpr double kLeastThick = 1e-3;  // metres: sheets have mass as if they were so thick
 
-using Key = std::array<double, 3>;
+/// One object of the body: what it is made of, and where.
+struct PlacedShape {
+  Shape shape;
+  Eigen::Affine3d worldFromMesh;
 
-Key keyOf(const Vec3& v) {
-  return {v.x(), v.y(), v.z()};
+  /// A corner where the body was authored, by the expression of worldPosition().
+  Vec3 at(std::uint32_t vertex) const {
+    return worldFromMesh * shape.vertices[vertex].cast<double>();
+  }
+  Triangle triangle(std::size_t t) const {
+    const auto& corners = shape.triangles[t];
+    return {at(corners[0]), at(corners[1]), at(corners[2])};
+  }
+};
+
+std::vector<PlacedShape> shapesOf(const Model& model, const BodySpec& spec) {
+  std::vector<PlacedShape> shapes;
+  for (const std::uint32_t index : spec.objects) {
+    const Object& object = model.objects[index];
+    if (object.use == Object::Use::drawn) continue;
+    std::vector<const Mesh*> meshes;
+    for (const std::uint32_t mesh : object.meshes) meshes.push_back(&model.meshes[mesh]);
+    shapes.push_back({shapeOf(std::span<const Mesh* const>(meshes)), object.worldFromMesh});
+  }
+  return shapes;
 }
 
-/// Triangles that hang together by shared corners.
-using Piece = std::vector<Triangle>;
-
-class Welder {
- public:
-  explicit Welder(const std::vector<Triangle>& triangles) {
-    for (const Triangle& t : triangles) {
-      const std::uint32_t first = corner(t[0]);
-      join(first, corner(t[1]));
-      join(first, corner(t[2]));
-    }
-    std::map<std::uint32_t, std::size_t> pieceOfRoot;  // pieces in order of their first triangle
-    for (const Triangle& t : triangles) {
-      const auto [at, isNew] = pieceOfRoot.try_emplace(rootOf(corner(t[0])), pieces_.size());
-      if (isNew) pieces_.emplace_back();
-      pieces_[at->second].push_back(t);
+/// Shells that hang together by shared corners, in order of their first ones.
+std::vector<std::vector<std::uint32_t>> piecesOf(const Shape& shape) {
+  const auto count = static_cast<std::uint32_t>(shape.shells.size());
+  std::vector<std::uint32_t> parent(count), shellOfVertex(shape.vertices.size(), count);
+  std::iota(parent.begin(), parent.end(), 0u);
+  const auto rootOf = [&](std::uint32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  for (std::uint32_t s = 0; s < count; ++s) {
+    const Shell& shell = shape.shells[s];
+    for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
+      for (const std::uint32_t vertex : shape.triangles[t]) {
+        std::uint32_t& other = shellOfVertex[vertex];
+        if (other == count) other = s;
+        const std::uint32_t a = rootOf(other), b = rootOf(s);
+        parent[std::max(a, b)] = std::min(a, b);
+      }
     }
   }
-  const std::vector<Piece>& pieces() const { return pieces_; }
+  std::vector<std::vector<std::uint32_t>> pieces(count);
+  for (std::uint32_t s = 0; s < count; ++s) pieces[rootOf(s)].push_back(s);
+  std::erase_if(pieces, [](const auto& piece) { return piece.empty(); });
+  return pieces;
+}
+
+class ShapeBuilder {
+ public:
+  ShapeBuilder(const Vec3& origin, bool keepsTriangles, BodyShape& into)
+      : origin_(origin), keepsTriangles_(keepsTriangles), into_(into) {}
+
+  void add(const PlacedShape& placed) {
+    for (const std::vector<std::uint32_t>& piece : piecesOf(placed.shape)) {
+      if (keepsTriangles_) {
+        for (const std::uint32_t s : piece) addKinematic(placed, placed.shape.shells[s]);
+      } else {
+        addSolid(placed, piece);
+      }
+    }
+  }
 
  private:
-  std::uint32_t corner(const Vec3& v) {
-    const auto [at, isNew] =
-        corners_.try_emplace(keyOf(v), static_cast<std::uint32_t>(parent_.size()));
-    if (isNew) parent_.push_back(at->second);
-    return at->second;
+  void addKinematic(const PlacedShape& placed, const Shell& shell) {
+    if (becomesHull(placed.shape, shell, placed.worldFromMesh)) return addHull(placed, {&shell, 1});
+    for (std::size_t t = shell.first; t < shell.first + shell.count; ++t)
+      if (const auto corners = relative(placed.triangle(t)); hasArea(corners))
+        into_.parts.push_back(collision::buildHull(corners));
   }
-  std::uint32_t rootOf(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(std::uint32_t a, std::uint32_t b) { parent_[rootOf(b)] = rootOf(a); }
 
-  std::map<Key, std::uint32_t> corners_;
-  std::vector<std::uint32_t> parent_;
-  std::vector<Piece> pieces_;
+  /// Convex solids that only share a corner or an edge stay what they are.
+  void addSolid(const PlacedShape& placed, const std::vector<std::uint32_t>& piece) {
+    std::vector<Shell> shells;
+    for (const std::uint32_t s : piece) shells.push_back(placed.shape.shells[s]);
+    const bool exact = std::all_of(shells.begin(), shells.end(), [](const Shell& shell) {
+      return (shell.isConvex() && !shell.hollow) || shell.count == 1;
+    });
+    if (!exact) {
+      ++into_.approximate;
+      return addHull(placed, shells);
+    }
+    for (const Shell& shell : shells) addHull(placed, {&shell, 1});
+  }
+
+  void addHull(const PlacedShape& placed, std::span<const Shell> shells) {
+    std::vector<Vec3> points;
+    for (const Shell& shell : shells)
+      for (std::size_t t = shell.first; t < shell.first + shell.count; ++t)
+        for (const Vec3& corner : relative(placed.triangle(t))) points.push_back(corner);
+    ++into_.hulls;
+    into_.parts.push_back(collision::buildHull(points));
+  }
+
+  Triangle relative(Triangle triangle) const {
+    for (Vec3& corner : triangle) corner -= origin_;
+    return triangle;
+  }
+
+  Vec3 origin_;
+  bool keepsTriangles_;
+  BodyShape& into_;
 };
 
-/// Every directed edge has its opposite, as often.
-bool isClosed(const Piece& piece) {
-  std::vector<std::pair<Key, Key>> forth, back;
-  for (const Triangle& t : piece) {
-    for (std::size_t i = 0; i < 3; ++i) {
-      forth.emplace_back(keyOf(t[i]), keyOf(t[(i + 1) % 3]));
-      back.emplace_back(keyOf(t[(i + 1) % 3]), keyOf(t[i]));
+/// A solid box of this mass, for bodies whose parts are all flat.
+MassProperties boxOfMass(const Box& box, double density) {
+  const Vec3 size = box.size().cwiseMax(kLeastThick), square = size.cwiseProduct(size);
+  MassProperties mass;
+  mass.volume = size.prod();
+  mass.mass = density * mass.volume;
+  mass.centre = box.centre();
+  mass.inertia.diagonal() = mass.mass / 12 * (Vec3::Constant(square.sum()) - square);
+  return mass;
+}
+
+MassProperties massOf(const BodySpec& spec, const BodyShape& shape) {
+  std::vector<MassProperties> parts;
+  for (const Hull& hull : shape.parts) {
+    if (hull.faces.size() < 4) continue;  // flat
+    try {
+      parts.push_back(massOfHull(hull, spec.density));
+    } catch (const std::invalid_argument&) {
+      // As good as flat.
     }
   }
-  std::sort(forth.begin(), forth.end());
-  std::sort(back.begin(), back.end());
-  return forth == back;
-}
-
-/// Six times the signed volume of the tetrahedron from the origin.
-double sixVolumes(const Vec3& a, const Vec3& b, const Vec3& c) {
-  return a.dot(b.cross(c));
-}
-
-double volumeOf(const Piece& piece) {
-  const Vec3 from = piece.front()[0];
-  double sum = 0;
-  for (const Triangle& t : piece) sum += sixVolumes(t[0] - from, t[1] - from, t[2] - from);
-  return std::abs(sum) / 6;
-}
-
-/// What a solid of density 1 is: volume, first and second moments about the origin.
-struct Moments {
-  double volume = 0;
-  Vec3 first = Vec3::Zero();
-  Mat3 second = Mat3::Zero();
-
-  void add(const Vec3& from, const Vec3& a, const Vec3& b, const Vec3& c) {
-    const double v = sixVolumes(a - from, b - from, c - from) / 6;
-    const Vec3 sum = from + a + b + c;
-    volume += v;
-    first += v / 4 * sum;
-    second += v / 20 *
-              (sum * sum.transpose() + from * from.transpose() + a * a.transpose() +
-               b * b.transpose() + c * c.transpose());
-  }
-};
-
-void addHull(Moments& moments, const Hull& hull) {
-  if (hull.faces.size() < 4) return;  // flat
-  const Vec3& from = hull.vertices[0];
-  for (const auto& face : hull.faces)
-    for (std::size_t i = 1; i + 1 < face.size(); ++i)
-      moments.add(from, hull.vertices[face[0]], hull.vertices[face[i]], hull.vertices[face[i + 1]]);
-}
-
-double volumeOf(const Hull& hull) {
-  Moments moments;
-  addHull(moments, hull);
-  return moments.volume;
-}
-
-void addTriangles(const Piece& piece, BodyShape& shape) {
-  for (const Triangle& t : piece) shape.parts.push_back(collision::buildHull(t));
-}
-
-void addPiece(const Piece& piece, bool keepsHollows, BodyShape& shape) {
-  std::vector<Vec3> points;
-  for (const Triangle& t : piece) points.insert(points.end(), t.begin(), t.end());
-  Hull hull = collision::buildHull(points);
-  const double volume = volumeOf(hull);
-  const bool filled = isClosed(piece) && std::abs(volume - volumeOf(piece)) <= kSameVolume * volume;
-  const bool exact = filled || piece.size() == 1;
-  if (!exact && keepsHollows) return addTriangles(piece, shape);
-  if (!exact) ++shape.approximate;
-  ++shape.hulls;
-  shape.parts.push_back(std::move(hull));
-}
-
-/// A solid box, for bodies whose parts are all flat.
-Moments boxMoments(const Box& box) {
-  const Vec3 size = box.size().cwiseMax(kLeastThick);
-  Moments moments;
-  moments.volume = size.prod();
-  moments.first = moments.volume * box.centre();
-  moments.second = moments.volume * box.centre() * box.centre().transpose();
-  for (int i = 0; i < 3; ++i) moments.second(i, i) += moments.volume * size[i] * size[i] / 12;
-  return moments;
+  const double least = kLeastThick * kLeastThick * kLeastThick;
+  MassProperties mass;
+  if (!parts.empty()) mass = together(parts);
+  if (!(mass.volume > least)) mass = boxOfMass(shape.box, spec.density);
+  return spec.mass ? withMass(mass, *spec.mass) : mass;
 }
 
 /// Moves the frame's origin to the centre of mass, and says how the mass lies about it.
 void weigh(const BodySpec& spec, BodyShape& shape) {
-  Moments moments;
-  for (const Hull& hull : shape.parts) addHull(moments, hull);
-  if (!(moments.volume > kLeastThick * kLeastThick * kLeastThick)) moments = boxMoments(shape.box);
-  shape.volume = moments.volume;
-  shape.mass = spec.mass.value_or(spec.density * shape.volume);
-  const Vec3 centre = moments.first / moments.volume;
-  const Mat3 about = moments.second - moments.volume * centre * centre.transpose();
-  shape.inertia = shape.mass / shape.volume * (about.trace() * Mat3::Identity() - about);
-  shape.origin += centre;
+  const MassProperties mass = massOf(spec, shape);
+  shape.volume = mass.volume;
+  shape.mass = mass.mass;
+  shape.inertia = mass.inertia;
+  shape.origin += mass.centre;
   for (Hull& hull : shape.parts)
-    for (Vec3& vertex : hull.vertices) vertex -= centre;
+    for (Vec3& vertex : hull.vertices) vertex -= mass.centre;
 }
 
 void measure(BodyShape& shape) {
@@ -188,25 +191,20 @@ void measure(BodyShape& shape) {
 }  // namespace
 
 BodyShape shapeOf(const Model& model, const BodySpec& spec) {
-  std::vector<Triangle> triangles;
-  for (const std::uint32_t object : spec.objects) {
-    if (model.objects[object].use == Object::Use::drawn) continue;
-    for (const Triangle& t : solidTriangles(model, object)) triangles.push_back(t);
-  }
-  if (triangles.empty())
-    throw std::invalid_argument("body '" + spec.name + "': its objects have no triangles; '" +
-                                model.objects[spec.objects[0]].path + "' is the first of them");
+  const std::vector<PlacedShape> shapes = shapesOf(model, spec);
   BodyShape shape;
   shape.origin = spec.anchor;
   if (spec.kind == BodyKind::rigid) {
     Box box;
-    for (const Triangle& t : triangles) box.include(collision::boxOf(t));
-    shape.origin = box.centre();  // near by, until the centre of mass is known
+    for (const PlacedShape& placed : shapes)
+      for (std::uint32_t v = 0; v < placed.shape.vertices.size(); ++v) box.include(placed.at(v));
+    if (!box.empty()) shape.origin = box.centre();  // near by, until the centre of mass is known
   }
-  for (Triangle& t : triangles)
-    for (Vec3& corner : t) corner -= shape.origin;
-  const Welder welder(triangles);
-  for (const Piece& piece : welder.pieces()) addPiece(piece, isKinematic(spec.kind), shape);
+  ShapeBuilder builder(shape.origin, isKinematic(spec.kind), shape);
+  for (const PlacedShape& placed : shapes) builder.add(placed);
+  if (shape.parts.empty())
+    throw std::invalid_argument("body '" + spec.name + "': its objects have no triangles; '" +
+                                model.objects[spec.objects[0]].path + "' is the first of them");
   measure(shape);
   if (spec.kind == BodyKind::rigid) {
     weigh(spec, shape);

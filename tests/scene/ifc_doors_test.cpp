@@ -4,12 +4,12 @@
 
 #include "scene/bodies/find_bodies.hpp"
 #include "scene/bodies/ifc_doors.hpp"
-#include "scene/import/ifc/web_ifc.hpp"
 #include "scene/import/import_model.hpp"
 #include "tests/scene/body_trial.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
 #include "tests/support/shared_folder.hpp"
+#include "tests/support/web_ifc_here.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -266,7 +266,7 @@ TEST(IfcDoors, AnAvatarWalksThroughAGuessedDoorFromEitherSide) {
 
 std::vector<IfcReader> readersHere() {
   std::vector<IfcReader> readers{IfcReader::ifcPlusPlus};
-  if (findWebIfc().missing.empty()) readers.push_back(IfcReader::webIfc);
+  if (tests::hasWebIfc()) readers.push_back(IfcReader::webIfc);
   return readers;
 }
 
@@ -344,7 +344,7 @@ const Building kBuildings[] = {
 
 TEST(IfcDoors, OfRealBuildingsBecomeBodiesOrAreTold) {
   ENFILADE_NEED_SHARED(shared);
-  if (!findWebIfc().missing.empty()) GTEST_SKIP() << findWebIfc().missing;
+  ENFILADE_NEED_WEB_IFC();
   for (const Building& building : kBuildings) {
     SCOPED_TRACE(building.file);
     const Model model = imported(*shared / "scenes" / building.file, IfcReader::webIfc);
@@ -361,7 +361,7 @@ TEST(IfcDoors, OfRealBuildingsBecomeBodiesOrAreTold) {
 
 TEST(IfcDoors, AnAvatarWalksThroughARealDoorFromEitherSide) {
   ENFILADE_NEED_SHARED(shared);
-  if (!findWebIfc().missing.empty()) GTEST_SKIP() << findWebIfc().missing;
+  ENFILADE_NEED_WEB_IFC();
   const auto file = *shared / "scenes/fzk-haus/AC14-FZK-Haus.ifc";
   const Model model = imported(file, IfcReader::webIfc);
   for (const double side : {1.0, -1.0}) {
