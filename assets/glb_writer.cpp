@@ -181,11 +181,11 @@ void addTransform(Json& json, const Eigen::Affine3d& t) {
 }
 
 Json motionJson(const MovingPart& part) {
-  const char* name = part.kind == MovingPart::Kind::hinge ? "walk_hinge" : "walk_slide";
-  return {{name,
-           {{"axis", {part.axis.x(), part.axis.y(), part.axis.z()}},
-            {"low", part.low},
-            {"high", part.high}}}};
+  const bool turns = part.kind == MovingPart::Kind::hinge;
+  const double scale = turns ? 57.29577951308232 : 1;  // degrees per radian
+  return {{"walk_kind", turns ? "hinged" : "sliding"},
+          {"walk_axis", {part.axis.x(), part.axis.y(), part.axis.z()}},
+          {"walk_limits", {scale * part.low, scale * part.high}}};
 }
 
 /// The nodes one by one as text: a district's would not fit in memory as JSON values.

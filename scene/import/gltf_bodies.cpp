@@ -35,8 +35,15 @@ class ExtrasReader {
  public:
   ExtrasReader(const std::filesystem::path& file, GltfTree& tree)
       : file_(file.filename().string()), tree_(tree) {
-    for (const auto& [number, unused] : tree.places())
-      if (hasWalkKeys(tree.node(number))) marked_.insert(number);
+    for (const auto& [number, place] : tree.places()) {
+      if (!hasWalkKeys(tree.node(number))) continue;
+      if (tree.node(number).at("extras").contains("walk_kind")) {
+        marked_.insert(number);
+      } else {  // perhaps the words of another program
+        addProblem(tree.model(), "extras_without_kind",
+                   "node '" + place.path + "': has walk_* but no walk_kind; it is no body");
+      }
+    }
   }
 
   std::vector<BodySpec> read(std::set<std::uint32_t>& still) {
@@ -47,8 +54,6 @@ class ExtrasReader {
       const JsonPlace extras{tree_.node(number).at("extras"),
                              file_ + ": node '" + path + "': extras", kPrefix};
       const auto objects = owned.find(number);
-      if (!extras.has("kind"))
-        extras.fail("walk_kind is missing: hinged, sliding, lift, path, rigid, trigger or still");
       if (objects == owned.end())
         extras.fail("neither the node nor one below it has a mesh that could move");
       if (extras.at("kind").value == "still") {

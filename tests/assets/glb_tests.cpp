@@ -55,8 +55,8 @@ TEST(Glb, HasAWellFormedHeaderAndStaysSmall) {
   EXPECT_EQ(json % 4, 0u);
   EXPECT_EQ(glb.substr(20 + json + 4, 4), std::string("BIN\0", 4));
   EXPECT_EQ(20 + json + 8 + wordAt(glb, 20 + json), glb.size());
-  EXPECT_NE(glb.find("walk_hinge"), std::string::npos);
-  EXPECT_NE(glb.find("walk_slide"), std::string::npos);
+  EXPECT_NE(glb.find("\"walk_kind\":\"hinged\""), std::string::npos);
+  EXPECT_NE(glb.find("\"walk_kind\":\"sliding\""), std::string::npos);
 }
 
 struct Count {

@@ -100,9 +100,14 @@ TEST(Extras, MistakesNameTheFileTheNodeAndTheField) {
       "hall.gltf: node 'door': extras.walk_axis: has no direction");
   has(failureOf(R"({"walk_kind":"hinged","walk_axes":[0,1,0]})"), "known here are walk_anchor");
   has(failureOf(R"({"walk_kind":"revolving"})"), "extras.walk_kind: must be hinged");
-  has(failureOf(R"({"walk_speed":3})"), "walk_kind is missing");
   has(failureOf(R"({"walk_kind":"sliding"})"), "limits is missing");
   has(failureOf(R"({"walk_kind":"rigid","walk_mass":-1})"), "mass is -1");
+}
+
+TEST(Extras, WithoutAKindMakeNoBodyAndAreTold) {
+  const Model model = modelOf("0", R"({"name":"a","mesh":0,"extras":{"walk_speed":3}})");
+  EXPECT_TRUE(model.bodies.empty());
+  EXPECT_EQ(countOf(model, "extras_without_kind"), 1u);
 }
 
 TEST(Extras, OfOthersAreNotOurs) {
