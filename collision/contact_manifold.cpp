@@ -52,6 +52,15 @@ struct Feature {
   std::array<Vec3, kMostCorners> corners;
   std::size_t size = 0;
 
+  Feature() = default;
+  Feature(const Feature& other) : size(other.size) {
+    std::copy_n(other.corners.begin(), size, corners.begin());
+  }
+  Feature& operator=(const Feature& other) {
+    size = other.size;
+    std::copy_n(other.corners.begin(), size, corners.begin());
+    return *this;
+  }
   void add(const Vec3& corner) {
     if (size < kMostCorners) corners[size++] = corner;
   }
@@ -65,60 +74,75 @@ Vec3 worldVertex(const ConvexBody& body, std::uint32_t i) {
   return (body.rotation ? Vec3(*body.rotation * v) : v) + body.translation;
 }
 
-/// `sense` 1: farthest along the normal (A), -1: against it (B).
-std::uint32_t supportVertex(const ConvexBody& body, const ContactFrame& frame, double sense) {
+/// A body, seen along the contact's normal.
+struct Seen {
+  const ConvexBody& body;
+  const ContactFrame& frame;
+  std::span<const Vec3> normals;  ///< of its faces, unit, body's frame; or none
+  Vec3 outwards;                  ///< towards the other body, body's frame
+
+  /// `sense` 1: along the normal (A), -1: against it (B).
+  Seen(const ConvexBody& b, const ContactFrame& f, std::span<const Vec3> n, double sense)
+      : body(b), frame(f), normals(n) {
+    outwards = sense * f.normal;
+    if (b.rotation) outwards = b.rotation->transpose() * outwards;
+  }
+  Vec3 corner(std::uint32_t i) const { return frame.inFrame(worldVertex(body, i)); }
+};
+
+std::uint32_t supportVertex(const Seen& seen) {
   std::uint32_t best = 0;
   double most = -std::numeric_limits<double>::infinity();
-  for (std::uint32_t i = 0; i < body.vertices.size(); ++i) {
-    const double along = sense * frame.inFrame(worldVertex(body, i)).z();
-    if (along > most) most = along, best = i;
+  for (std::uint32_t i = 0; i < seen.body.vertices.size(); ++i) {
+    const double along = seen.outwards.dot(seen.body.vertices[i]);
+    best = along > most ? i : best;
+    most = std::max(most, along);
   }
   return best;
 }
 
-/// Newell's normal of a face, any length.
-Vec3 normalOfFace(const ConvexBody& body, const ContactFrame& frame,
-                  const std::vector<std::uint32_t>& face) {
-  const Vec3 first = frame.inFrame(worldVertex(body, face[0]));
+/// Newell's normal of a face, unit, body's frame.
+Vec3 normalOfFace(const ConvexBody& body, const std::vector<std::uint32_t>& face) {
+  const Vec3& first = body.vertices[face[0]];
   Vec3 normal = Vec3::Zero();
   for (std::size_t i = 1; i + 1 < face.size(); ++i)
-    normal += (frame.inFrame(worldVertex(body, face[i])) - first)
-                  .cross(frame.inFrame(worldVertex(body, face[i + 1])) - first);
-  return normal;
+    normal += (body.vertices[face[i]] - first).cross(body.vertices[face[i + 1]] - first);
+  return normal / normal.norm();
 }
 
-/// The face at `vertex` that faces along the normal most.
-const std::vector<std::uint32_t>* supportFace(const ConvexBody& body, const ContactFrame& frame,
-                                              double sense, std::uint32_t vertex) {
+/// The face at `vertex` that faces the other body most.
+const std::vector<std::uint32_t>* supportFace(const Seen& seen, std::uint32_t vertex) {
   const std::vector<std::uint32_t>* best = nullptr;
   double most = -std::numeric_limits<double>::infinity();
-  for (const auto& face : body.hull->faces) {
-    if (std::find(face.begin(), face.end(), vertex) == face.end()) continue;
-    const Vec3 normal = normalOfFace(body, frame, face);
-    const double along = sense * normal.z() / normal.norm();
-    if (along > most) most = along, best = &face;
+  const auto& faces = seen.body.hull->faces;
+  const bool known = seen.normals.size() == faces.size();
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    const auto has = [&] { return std::find(faces[i].begin(), faces[i].end(), vertex); };
+    if (!known && has() == faces[i].end()) continue;
+    const Vec3 normal = known ? seen.normals[i] : normalOfFace(seen.body, faces[i]);
+    const double along = seen.outwards.dot(normal);
+    if (along > most && has() != faces[i].end()) most = along, best = &faces[i];
   }
   return best;
 }
 
 /// `slack`: metres below the support plane.
-Feature supportFeature(const ConvexBody& body, const ContactFrame& frame, double sense,
-                       double slack) {
-  const std::uint32_t vertex = supportVertex(body, frame, sense);
-  const double most = sense * frame.inFrame(worldVertex(body, vertex)).z();
+Feature supportFeature(const Seen& seen, double sense, double slack) {
+  const ConvexBody& body = seen.body;
+  const std::uint32_t vertex = supportVertex(seen);
+  const Vec3 summit = seen.corner(vertex);
   Feature feature;
   const auto take = [&](std::uint32_t i) {
-    const Vec3 corner = frame.inFrame(worldVertex(body, i));
-    if (sense * corner.z() >= most - slack) feature.add(corner);
+    const Vec3 corner = i == vertex ? summit : seen.corner(i);
+    if (sense * corner.z() >= sense * summit.z() - slack) feature.add(corner);
   };
-  const auto* face =
-      body.hull && !body.hull->faces.empty() ? supportFace(body, frame, sense, vertex) : nullptr;
+  const auto* face = body.hull && !body.hull->faces.empty() ? supportFace(seen, vertex) : nullptr;
   if (face) {
     for (const std::uint32_t i : *face) take(i);
   } else if (body.vertices.size() <= 3) {
     for (std::uint32_t i = 0; i < body.vertices.size(); ++i) take(i);
   }
-  if (feature.size == 0) feature.add(frame.inFrame(worldVertex(body, vertex)));
+  if (feature.size == 0) feature.add(summit);
   return feature;
 }
 
@@ -221,33 +245,43 @@ double depthAt(const Feature& feature, const Vec3& at) {
 
 // ---- step 4 ------------------------------------------------------------------------------------
 
-double spread(const ContactManifold& manifold, const ContactPoint& point) {
+/// A point that may stay. (No initial values: most are never written.)
+struct Candidate {
+  Vec3 pointA, pointB;
+  double separation;
+};
+
+double spread(const ContactManifold& manifold, const Candidate& point) {
   double least = std::numeric_limits<double>::infinity();
   for (const ContactPoint& kept : manifold.list())
     least = std::min(least, (kept.pointA - point.pointA).squaredNorm());
   return least;
 }
 
-void keepMostSpread(std::span<const ContactPoint> points, std::size_t most,
+void keepMostSpread(std::span<const Candidate> points, std::size_t most,
                     ContactManifold& manifold) {
   if (points.empty()) return;
-  const auto deepest = std::min_element(
-      points.begin(), points.end(),
-      [](const ContactPoint& a, const ContactPoint& b) { return a.separation < b.separation; });
-  manifold.points[manifold.size++] = *deepest;
+  const auto keep = [&](const Candidate& point) {
+    manifold.points[manifold.size++] = {point.pointA, point.pointB, point.separation};
+  };
+  keep(*std::min_element(points.begin(), points.end(), [](const Candidate& a, const Candidate& b) {
+    return a.separation < b.separation;
+  }));
   while (manifold.size < std::min(most, ContactManifold::kMostPoints)) {
-    const ContactPoint* farthest = nullptr;
+    const Candidate* farthest = nullptr;
     double distance = 0;
-    for (const ContactPoint& point : points) {
+    for (const Candidate& point : points) {
       const double d = spread(manifold, point);
       if (d > distance) distance = d, farthest = &point;
     }
     if (!farthest) return;
-    manifold.points[manifold.size++] = *farthest;
+    keep(*farthest);
   }
 }
 
+/// At least about the greatest coordinate of its corners, seen from `origin`.
 double sizeOf(const ConvexBody& body, const Vec3& origin) {
+  if (body.hull) return body.hull->radius + (body.translation - origin).cwiseAbs().maxCoeff();
   double size = 0;
   for (std::uint32_t i = 0; i < body.vertices.size(); ++i)
     size = std::max(size, (worldVertex(body, i) - origin).cwiseAbs().maxCoeff());
@@ -267,12 +301,12 @@ ContactManifold contactManifold(const ConvexBody& a, const ConvexBody& b, const 
   if (nearest > seed.limit + rounding) return manifold;
 
   const double slack = seed.limit - nearest + 2 * rounding;
-  const Feature onA = supportFeature(a, frame, 1, slack);
-  const Feature onB = supportFeature(b, frame, -1, slack);
+  const Feature onA = supportFeature({a, frame, seed.normalsA, 1}, 1, slack);
+  const Feature onB = supportFeature({b, frame, seed.normalsB, -1}, -1, slack);
   const bool fromA = onA.size == 1 || (onB.size > 1 && (onA.size == 2 || onB.size > 2));
   const Feature overlap = fromA ? clipped(onA, onB, rounding) : clipped(onB, onA, rounding);
 
-  std::array<ContactPoint, kMostCorners> points;
+  std::array<Candidate, kMostCorners> points;
   std::size_t count = 0;
   for (std::size_t i = 0; i < overlap.size; ++i) {
     Vec3 pointA = overlap.corners[i], pointB = pointA;
@@ -281,6 +315,7 @@ ContactManifold contactManifold(const ConvexBody& a, const ConvexBody& b, const 
     if (separation <= seed.limit + 2 * rounding)
       points[count++] = {frame.inWorld(pointA), frame.inWorld(pointB), separation};
   }
+  manifold.overlap = count > 0;
   if (count == 0) points[count++] = {seed.pointA, seed.pointB, nearest};
   keepMostSpread({points.data(), count}, seed.most, manifold);
   return manifold;

@@ -23,6 +23,7 @@ struct ContactManifold {
   Vec3 normal = Vec3::UnitY();  ///< unit, from A to B
   std::array<ContactPoint, kMostPoints> points;
   std::size_t size = 0;
+  bool overlap = false;  ///< the features lie above one another; false: the one point is the seed's
 
   std::span<const ContactPoint> list() const { return {points.data(), size}; }
 };
@@ -34,6 +35,8 @@ struct ContactSeed {
   Vec3 pointA, pointB;   ///< closest or deepest points, world
   double limit = 0;      ///< metres, >= 0: farther points of the features are left out
   std::size_t most = 4;  ///< points wanted, 1 to kMostPoints: the deepest, and the most spread
+  /// Of the faces of the bodies' hulls, unit, outwards, body's frame; none: they are worked out.
+  std::span<const Vec3> normalsA = {}, normalsB = {};
 };
 
 /// At least one point if the bodies are as near as `limit` along the normal, else none. Numbers are

@@ -148,6 +148,10 @@ std::optional<std::string> submit(World& world, BodyCommand command);
 /// Advances the world by Lengths::tick.
 TickReport tick(World& world);
 
+/// How many threads the solver may use for many free bodies: from 1 on, but no more than there are
+/// processors; 0: two, as at first. Nothing that is told depends on it.
+void setThreads(World& world, int threads);
+
 /// From now on every `everyTicks`-th tick is audited (0: none, as at first): its pairs beside brute
 /// force, avatars * (objects + avatars) box tests of some 5 ns, but no more avatars at a time than
 /// take some 2 ms, in turn, and at least one.

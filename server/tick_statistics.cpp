@@ -74,6 +74,7 @@ void TickStatistics::add(const scene::TickReport& report) {
   }
   narrowQueries_ += report.narrowQueries;
   rationalQueries_ += report.rationalQueries;
+  squeezedBodies_ += report.squeezedBodies;
   pairs_ = report.pairs;
   liveContacts_ = report.liveContacts;
   avatars_ = static_cast<std::uint32_t>(report.snapshot->avatars.size());
@@ -96,6 +97,7 @@ v1::Metrics TickStatistics::metrics() const {
   metrics.set_narrow_queries(narrowQueries_);
   metrics.set_rational_queries(rationalQueries_);
   metrics.set_worst_penetration(worstPenetration_);
+  metrics.set_squeezed_bodies(squeezedBodies_);
   metrics.set_avatars(avatars_);
   if (audit_.ticks > 0) fill(*metrics.mutable_audit(), audit_, audited_);
   return metrics;

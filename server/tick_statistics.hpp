@@ -38,7 +38,7 @@ class TickStatistics {
  private:
   std::array<DurationHistogram, scene::kStages> stages_;
   DurationHistogram tick_;
-  std::uint64_t contacts_ = 0, narrowQueries_ = 0, rationalQueries_ = 0;
+  std::uint64_t contacts_ = 0, narrowQueries_ = 0, rationalQueries_ = 0, squeezedBodies_ = 0;
   std::uint32_t pairs_ = 0, liveContacts_ = 0, avatars_ = 0;
   double worstPenetration_ = 0;  ///< metres
   AuditTotals audit_;

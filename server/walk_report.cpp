@@ -325,6 +325,7 @@ std::string WalkReport::writeSummary(const WalkFacts& facts, const protocol::Scr
                {"pairs", facts.mostPairs},
                {"contacts", begun_},
                {"worst_penetration", metrics.worst_penetration()},
+               {"squeezed_bodies", metrics.squeezed_bodies()},
                {"state_hash", hexOf(result.stateHash)},
                {"time", result.time},
                {"wall_s", facts.wallSeconds},

@@ -2,6 +2,7 @@
 // are; they stay as long as the world does. Those that stand cost nothing.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -41,11 +42,19 @@ struct BodyDrive {
   double closesIn = -1;   ///< seconds; negative: it stays as it is
 };
 
+/// Of a tick: a path is seen as often by what leans on the body.
+inline constexpr int kSolverSubsteps = 4;
+
 /// Where a kinematic body wants to be at the end of the tick; it gets there unless it is blocked.
 struct BodyPlan {
   BodyPlace place;
   double coordinate = 0;
   double farthest = 0;  ///< metres: no point of the body moves farther; 0: it does not move
+  /// Of a path: where it is between, at the end of each of the solver's substeps, and where it
+  /// began. What meets it is swept along the straight way all the same.
+  bool winds = false;
+  BodyPlace from;
+  std::array<BodyPlace, kSolverSubsteps> between;
 };
 
 struct Body {

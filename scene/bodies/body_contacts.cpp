@@ -19,17 +19,19 @@ bool hasMoved(const WorldState& world, EntityId id) {
   const auto found = world.bodyOfId.find(id);
   return found != world.bodyOfId.end() && world.bodies[found->second].moved;
 }
+bool solidHasMoved(const WorldState& world, std::uint32_t solid) {
+  const std::uint32_t body = world.rigids.bodyOf[solid];
+  return body != kNoRigid && world.bodies[body].moved;
+}
 
 /// Free before driven before still, and among free ones in the order of their ids.
-bool tellsFirst(const WorldState& world, EntityId a, EntityId b) {
-  const auto rank = [&](EntityId id) {
-    const auto found = world.bodyOfId.find(id);
-    return found != world.bodyOfId.end() &&
-                   world.bodies[found->second].spec->kind == BodyKind::rigid
-               ? 0
-               : 1;
+bool tellsFirst(const WorldState& world, std::uint32_t solidA, std::uint32_t solidB) {
+  const auto rank = [&](std::uint32_t solid) {
+    const std::uint32_t body = world.rigids.bodyOf[solid];
+    const bool isFree = body != kNoRigid && world.bodies[body].spec->kind == BodyKind::rigid;
+    return std::pair(isFree ? 0 : 1, world.rigids.entities[solid]);
   };
-  return std::pair(rank(a), a) < std::pair(rank(b), b);
+  return rank(solidA) < rank(solidB);
 }
 
 double depthOf(const Solid& a, const Solid& b, const NearPair& pair, const Decision& decision,
@@ -60,20 +62,21 @@ void take(std::map<Key, Contact>& now, const Key& key, const PartContact& parts)
 
 /// All pairs of which one moved and that are nearer than the limit, or were in the last tick.
 std::map<Key, Contact> nearBodies(WorldState& world, const Nearness& nearness, QueryCount& count) {
-  const RigidStage& stage = world.rigids;
+  RigidStage& stage = world.rigids;
   std::map<Key, Contact> now;
-  for (const NearPair& pair : stage.dynamics.pairs) {
-    EntityId a = stage.entities[pair.key.a], b = stage.entities[pair.key.b];
-    if (std::max(a, b) >= world.firstAvatarId()) continue;
-    if (!hasMoved(world, a) && !hasMoved(world, b)) continue;
-    const bool swapped = !tellsFirst(world, a, b);
-    if (swapped) std::swap(a, b);
-    const bool lasted = world.bodyContacts.contains({a, b});
+  for (NearPair& pair : stage.dynamics.pairs) {
     const Solid& solidA = stage.dynamics.solids[pair.key.a];
     const Solid& solidB = stage.dynamics.solids[pair.key.b];
+    const bool lasted = pair.told;
     if (!lasted && apartNow(pair, solidA, solidB) > nearness.limit) continue;
+    EntityId a = stage.entities[pair.key.a], b = stage.entities[pair.key.b];
+    if (std::max(a, b) >= world.firstAvatarId()) continue;
+    if (!solidHasMoved(world, pair.key.a) && !solidHasMoved(world, pair.key.b)) continue;
+    pair.told = false;
+    const bool swapped = !tellsFirst(world, pair.key.a, pair.key.b);
+    if (swapped) std::swap(a, b);
     const double within = lasted ? std::numeric_limits<double>::infinity() : nearness.limit;
-    collision::FeatureCache features = pair.features;
+    collision::FeatureCache features = pair.features();
     ++count.narrow;
     const collision::ConvexBody partA = partOf(solidA, pair.key.partA);
     const collision::ConvexBody partB = partOf(solidB, pair.key.partB);
@@ -83,6 +86,7 @@ std::map<Key, Contact> nearBodies(WorldState& world, const Nearness& nearness, Q
     const double depth = depthOf(solidA, solidB, pair, *decision, features);
     const bool touching =
         collision::isNearerThan(*decision, partA, partB, nearness.contact, features);
+    pair.told = touching || decision->distance < nearness.limit;
     if (swapped) {
       std::swap(decision->pointA, decision->pointB);
       decision->normal = -decision->normal;

@@ -123,8 +123,28 @@ std::pair<double, double> nextCoordinate(const Body& body, double tick) {
   return {std::clamp(drive.coordinate + rate * tick, low, high), rate};
 }
 
+/// Where a path is between; `coordinate`: at the end of the tick.
+void planBetween(Body& body, double coordinate, double tick) {
+  BodyPlan& plan = body.plan;
+  plan.from = body.drive.place;
+  const double now = body.drive.coordinate;
+  for (int i = 1; i < kSolverSubsteps; ++i) {
+    const double part = static_cast<double>(i) / kSolverSubsteps;
+    const double at = goesRound(*body.spec) ? std::fmod(now + part * body.drive.speed * tick,
+                                                        body.spec->keys.back().time)
+                                            : now + part * (coordinate - now);
+    plan.between[static_cast<std::size_t>(i) - 1] = placeOf(*body.spec, at);
+  }
+  plan.between.back() = plan.place;
+  plan.winds = std::any_of(plan.between.begin(), plan.between.end(), [&](const BodyPlace& at) {
+    return at.offset != plan.from.offset || at.turn != plan.from.turn;
+  });
+}
+
 void plan(Body& body, double tick) {
-  body.plan = {body.drive.place, body.drive.coordinate, 0};
+  body.plan = {};
+  body.plan.place = body.drive.place;
+  body.plan.coordinate = body.drive.coordinate;
   if (!body.drive.going) return;
   const auto [coordinate, rate] = nextCoordinate(body, tick);
   body.drive.rate = rate;
@@ -132,6 +152,7 @@ void plan(Body& body, double tick) {
   body.plan.place = placeOf(*body.spec, coordinate);
   body.plan.farthest = (body.plan.place.offset - body.drive.place.offset).norm() +
                        std::abs(body.plan.place.turn - body.drive.place.turn) * body.shape->radius;
+  if (body.spec->kind == BodyKind::path) planBetween(body, coordinate, tick);
 }
 
 }  // namespace

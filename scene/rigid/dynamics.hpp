@@ -25,11 +25,12 @@ struct RestLimits {
 struct DynamicsStep {
   SolverStep solver;
   RestLimits rest;
+  Workers* workers = nullptr;  ///< who do it; the result is the same. null: the caller alone
 };
 
 struct DynamicsReport {
   std::uint32_t awake = 0;      ///< free solids
-  std::uint32_t looks = 0;      ///< pairs that the narrow phase was asked about
+  std::uint32_t looks = 0;      ///< pairs whose shapes were looked at
   std::uint32_t patches = 0;    ///< given to the solver
   std::uint32_t leaning = 0;    ///< of those, nearer than 2 epsilon
   std::uint32_t islands = 0;    ///< awake ones
@@ -39,6 +40,10 @@ struct DynamicsReport {
                                 ///< way out: they may penetrate
   double deepest = 0;           ///< metres: penetration at the start of the step
 };
+
+/// Whether two free solids can come within `lookout` metres while neither uses up its leash, by the
+/// spheres about their centres. True where one is not free.
+bool mayMeet(const Solid& a, const Solid& b, double lookout);
 
 /// The pairs that may meet in the next steps; ascending, a < b, at least one of them free. What is
 /// known of a pair that was there before is kept.

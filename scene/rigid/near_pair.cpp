@@ -6,12 +6,17 @@
 //  - On the way the one is best under which the motion of now needs to change least. A box that
 //    slides over a floor of triangles comes near the edges of those ahead, and the closest points'
 //    plane would stop it there; one that falls beside a table's top would be stopped by the top's.
+//
+// Most pairs are answered without the narrow phase: their spheres are apart, or the plane that
+// parted them last does still, by a proved gap; and who rested on a face goes on to, while the gap
+// along it is about the distance of the nearest two points that lie above one another.
 #include "scene/rigid/near_pair.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "collision/contact_manifold.hpp"
+#include "collision/gap.hpp"
 #include "collision/hull.hpp"
 
 namespace enfilade::scene {
@@ -27,6 +32,8 @@ constexpr double kForesight = 1;
 constexpr double kFaceAtRest = 0.8;
 /// Of the lesser radius: a point that wandered less is last step's point.
 constexpr double kSamePoint = 0.25;
+/// Of the coordinates: more than what spheres lose by rounding, here and where solids are placed.
+constexpr double kOfSpheres = 0x1p-44;
 
 struct Axis {
   Vec3 normal = Vec3::UnitY();  ///< from A to B
@@ -68,22 +75,9 @@ Vec3 facing(const Solid& solid, std::uint32_t part, const ConvexBody& body, cons
   return body.rotation ? Vec3(*body.rotation * *best) : *best;
 }
 
-/// The vertex that is farthest along a direction, in the world.
-Vec3 farthest(const ConvexBody& body, const Vec3& direction) {
-  const Vec3 inBody = toBody(body, direction);
-  std::size_t best = 0;
-  double most = -std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < body.vertices.size(); ++i) {
-    const double along = inBody.dot(body.vertices[i]);
-    if (along > most) most = along, best = i;
-  }
-  return worldVertex(body, best);
-}
-
 /// The gap along a normal from A to B.
-Axis axisAlong(const Vec3& normal, const ConvexBody& a, const ConvexBody& b) {
-  Axis axis{normal, 0, farthest(a, normal), farthest(b, -normal)};
-  axis.gap = normal.dot(axis.pointB - axis.pointA);
+Axis axisAlong(const Vec3& normal, const ConvexBody& a, const collision::Gap& gap) {
+  Axis axis{normal, gap.value, worldVertex(a, gap.vertices.a), Vec3::Zero()};
   // A manifold starts from two points that face one another.
   axis.pointB = axis.pointA + axis.gap * normal;
   return axis;
@@ -96,22 +90,23 @@ Vec3 velocityToCome(const Solid& solid, const NearPairStep& step) {
 
 /// See the file's head. `closest`: the bodies are apart.
 Axis axisFor(const Axis& closest, const NearPair& pair, const Solid& a, const Solid& b,
-             const NearPairStep& step) {
+             const NearPairStep& step, CloseUp::Plane& plane) {
   const ConvexBody bodyA = partOf(a, pair.key.partA), bodyB = partOf(b, pair.key.partB);
   const Vec3 way = step.seconds * (velocityToCome(b, step) - velocityToCome(a, step));
   const auto room = [&](const Axis& axis) { return axis.gap + axis.normal.dot(way); };
   const bool resting = closest.gap < 2 * step.epsilon;
   Axis best = closest;
   double most = resting ? kFaceAtRest * closest.gap : room(closest);
-  const auto consider = [&](const Vec3& normal) {
+  const auto consider = [&](const Vec3& normal, CloseUp::Plane of) {
     if (normal.isZero(0)) return;
-    const Axis axis = axisAlong(normal, bodyA, bodyB);
+    const Axis axis = axisAlong(normal, bodyA, collision::gapAlong(bodyA, bodyB, normal));
     if (!(axis.gap > 0)) return;
     const double value = resting ? axis.gap : room(axis);
-    if (value > most) most = value, best = axis;
+    if (value > most) most = value, best = axis, plane = of;
   };
-  consider(facing(a, pair.key.partA, bodyA, closest.normal));
-  consider(-facing(b, pair.key.partB, bodyB, -closest.normal));
+  plane = CloseUp::Plane::closest;
+  consider(facing(a, pair.key.partA, bodyA, closest.normal), CloseUp::Plane::faceOfA);
+  consider(-facing(b, pair.key.partB, bodyB, -closest.normal), CloseUp::Plane::faceOfB);
   return best;
 }
 
@@ -125,7 +120,8 @@ double reachOf(const Solid& a, const Solid& b, const NearPairStep& step) {
   const bool falls = a.isAwake() || b.isAwake();
   const double pushed =
       a.mostPush > 0 || b.mostPush > 0 ? (a.pushVelocity - b.pushVelocity).norm() : 0;
-  return step.seconds * (speed + pushed + (falls ? step.gravity.norm() * step.seconds : 0));
+  return step.seconds * (speed + pushed + a.swing() + b.swing() +
+                         (falls ? step.gravity.norm() * step.seconds : 0));
 }
 
 /// The closest or deepest points, and what is known of the distance.
@@ -134,10 +130,11 @@ Axis measure(NearPair& pair, const ConvexBody& a, const ConvexBody& b, const Dec
     pair.apart = decision.distance - decision.errorBound;
     return {decision.normal, decision.distance, decision.pointA, decision.pointB};
   }
-  if (!pair.depth) pair.depth = std::make_unique<collision::DepthCache>();
-  const collision::Depth depth = collision::penetrationDepth(a, b, pair.features, *pair.depth);
+  CloseUp& close = *pair.close;
+  if (!close.depth) close.depth = std::make_unique<collision::DepthCache>();
+  const collision::Depth depth = collision::penetrationDepth(a, b, close.features, *close.depth);
   pair.apart = 0;
-  pair.penetration = depth.depth;
+  close.penetration = depth.depth;
   return {depth.normal, -depth.depth, depth.pointA, depth.pointB};
 }
 
@@ -166,7 +163,8 @@ std::size_t samePoint(const ContactPatch& before, const PatchAnchors& anchorsBef
 /// Impulses of last step's points go to the points that took their place, and these stand in the
 /// order of last step: a solver that takes them in turn comes to rest only so.
 void inherit(const ContactPatch& before, const PatchAnchors& anchorsBefore, double same,
-             NearPair& pair) {
+             CloseUp& pair) {
+  if (before.size == 0) return;
   ContactPatch& patch = pair.patch;
   std::array<bool, ContactPatch::kMostPoints> taken{};
   std::array<std::size_t, ContactPatch::kMostPoints> from{};
@@ -196,64 +194,160 @@ void setPush(const Solid& a, const Solid& b, ContactPatch& patch) {
   }
 }
 
-void makePatch(NearPair& pair, const Axis& axis, double limit, const Solid& a, const Solid& b) {
-  const ContactPatch before = pair.patch;
-  const auto anchorsBefore = pair.anchors;
-  const collision::ContactManifold manifold = collision::contactManifold(
+collision::ContactManifold manifoldOf(const NearPair& pair, const Axis& axis, double limit,
+                                      const Solid& a, const Solid& b) {
+  const auto normalsOf = [](const Solid& solid, std::uint32_t part) {
+    return part < solid.parts.size() ? std::span<const Vec3>(solid.parts[part].faceNormals)
+                                     : std::span<const Vec3>();
+  };
+  return collision::contactManifold(
       partOf(a, pair.key.partA), partOf(b, pair.key.partB),
-      {axis.normal, axis.pointA, axis.pointB, limit, ContactPatch::kMostPoints});
-  pair.normal = axis.normal;
-  ContactPatch& patch = pair.patch;
+      {axis.normal, axis.pointA, axis.pointB, limit, ContactPatch::kMostPoints,
+       normalsOf(a, pair.key.partA), normalsOf(b, pair.key.partB)});
+}
+
+void makePatch(NearPair& pair, const collision::ContactManifold& manifold, const Solid& a,
+               const Solid& b) {
+  CloseUp& close = *pair.close;
+  const ContactPatch before = pair.hasPatch ? close.patch : ContactPatch{};
+  const auto anchorsBefore = close.anchors;
+  pair.hasPatch = manifold.size > 0;
+  pair.axis = manifold.normal;
+  ContactPatch& patch = close.patch;
   patch = ContactPatch{};
-  patch.normal = axis.normal;
+  patch.normal = manifold.normal;
   patch.friction = std::sqrt(a.motion.friction * b.motion.friction);
   patch.restitution = std::max(a.motion.restitution, b.motion.restitution);
   const Solid& carrier = anchorBody(a, b);
   for (const collision::ContactPoint& point : manifold.list()) {
-    pair.anchors[patch.size] =
+    close.anchors[patch.size] =
         carrier.rotation.transpose() * (point.pointB - carrier.motion.centre);
     patch.points[patch.size++] = {point.pointA - a.motion.centre, point.pointB - b.motion.centre,
                                   point.separation, 0, 0};
   }
   setPush(a, b, patch);
-  inherit(before, anchorsBefore, kSamePoint * std::min(a.radius, b.radius), pair);
+  inherit(before, anchorsBefore, kSamePoint * std::min(a.radius, b.radius), close);
+}
+
+// ---- what needs no narrow phase ----------------------------------------------------------------
+
+void setApart(NearPair& pair, double apart, const Solid& a, const Solid& b) {
+  pair.apart = apart;
+  pair.since = a.jumped + b.jumped;
+  pair.verdict = Verdict::separated;
+}
+
+/// The spheres about the solids' centres are farther apart than `limit`.
+bool farBySpheres(NearPair& pair, const Solid& a, const Solid& b, double limit) {
+  const Vec3 between = b.motion.centre - a.motion.centre;
+  const double radii = a.radius + b.radius;
+  const double least = (radii + limit) * (1 + kOfSpheres);
+  if (!(between.squaredNorm() > least * least)) return false;
+  const double coordinates =
+      a.motion.centre.cwiseAbs().maxCoeff() + b.motion.centre.cwiseAbs().maxCoeff() + radii;
+  const double apart = between.norm() - radii - kOfSpheres * coordinates;
+  if (!(apart > limit)) return false;
+  setApart(pair, apart, a, b);
+  return true;
+}
+
+/// The axis of last time still parts them by more than `limit`.
+bool farAlongAxis(NearPair& pair, const ConvexBody& bodyA, const ConvexBody& bodyB, const Solid& a,
+                  const Solid& b, double limit) {
+  if (pair.axis.isZero(0) || pair.patch()) return false;
+  const collision::Gap gap = collision::gapAlong(bodyA, bodyB, pair.axis);
+  if (!(gap.proved > limit)) return false;
+  setApart(pair, gap.proved, a, b);
+  return true;
+}
+
+/// Of the faces that look at the other body, that of A and that of B, the one with the wider gap.
+struct FaceGap {
+  CloseUp::Plane plane = CloseUp::Plane::closest;  ///< closest: there is no face
+  Vec3 normal;
+  collision::Gap gap;
+};
+FaceGap widestFace(const NearPair& pair, const ConvexBody& bodyA, const ConvexBody& bodyB,
+                   const Solid& a, const Solid& b, const Vec3& along) {
+  FaceGap best;
+  const auto consider = [&](const Vec3& normal, CloseUp::Plane plane) {
+    if (normal.isZero(0)) return;
+    const collision::Gap gap = collision::gapAlong(bodyA, bodyB, normal);
+    if (best.plane == CloseUp::Plane::closest || gap.value > best.gap.value)
+      best = {plane, normal, gap};
+  };
+  consider(facing(a, pair.key.partA, bodyA, along), CloseUp::Plane::faceOfA);
+  consider(-facing(b, pair.key.partB, bodyB, -along), CloseUp::Plane::faceOfB);
+  return best;
+}
+
+/// See the file's head.
+bool restsAsBefore(NearPair& pair, const ConvexBody& bodyA, const ConvexBody& bodyB, const Solid& a,
+                   const Solid& b, double limit, double epsilon) {
+  const ContactPatch* patch = pair.patch();
+  if (!patch || pair.close->plane == CloseUp::Plane::closest) return false;
+  const FaceGap face = widestFace(pair, bodyA, bodyB, a, b, patch->normal);
+  if (face.plane == CloseUp::Plane::closest) return false;
+  if (!(face.gap.proved > 0 && face.gap.value < 2 * epsilon)) return false;
+  const collision::ContactManifold manifold =
+      manifoldOf(pair, axisAlong(face.normal, bodyA, face.gap), limit, a, b);
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const collision::ContactPoint& point : manifold.list())
+    nearest = std::min(nearest, point.separation);
+  if (!manifold.overlap || !(face.gap.value >= kFaceAtRest * nearest)) return false;
+  pair.close->plane = face.plane;
+  setApart(pair, face.gap.proved, a, b);
+  makePatch(pair, manifold, a, b);
+  return true;
+}
+
+// ---- what does ---------------------------------------------------------------------------------
+
+/// Leaves the pair without a patch where they are farther apart than `limit`.
+void ask(NearPair& pair, const ConvexBody& bodyA, const ConvexBody& bodyB, const Solid& a,
+         const Solid& b, double limit, double farthest, const NearPairStep& step) {
+  if (!pair.close) pair.close = std::make_unique<CloseUp>();
+  CloseUp& close = *pair.close;
+  const auto decision = collision::decideWithin(bodyA, bodyB, farthest, close.features);
+  setApart(pair, farthest, a, b);
+  if (!close.features.axis.isZero(0)) pair.axis = close.features.axis.stableNormalized();
+  if (!decision) {
+    pair.hasPatch = false;
+    return;
+  }
+  pair.verdict = decision->verdict;
+  const Axis closest = measure(pair, bodyA, bodyB, *decision);
+  close.plane = CloseUp::Plane::closest;
+  Axis axis = closest;
+  if (closest.gap > 0 && closest.gap <= limit)
+    axis = axisFor(closest, pair, a, b, step, close.plane);
+  if (axis.gap > limit) {
+    pair.hasPatch = false;
+  } else {
+    makePatch(pair, manifoldOf(pair, axis, limit, a, b), a, b);
+  }
 }
 
 }  // namespace
 
 bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step) {
   const double reach = reachOf(a, b, step), limit = 2 * step.epsilon + reach;
-  if (apartNow(pair, a, b) > limit) {
-    pair.patch.size = 0;
+  const double farthest = limit + kForesight * (reach + step.epsilon);
+  if (apartNow(pair, a, b) > limit || farBySpheres(pair, a, b, farthest)) {
+    pair.hasPatch = false;
     return false;
   }
-  const double farthest = limit + kForesight * (reach + step.epsilon);
   const ConvexBody bodyA = partOf(a, pair.key.partA), bodyB = partOf(b, pair.key.partB);
-  const auto decision = collision::decideWithin(bodyA, bodyB, farthest, pair.features);
-  pair.since = a.jumped + b.jumped;
-  pair.penetration = 0;
-  pair.verdict = decision ? decision->verdict : Verdict::separated;
-  if (!decision) {
-    pair.apart = farthest;
-    pair.patch.size = 0;
-    return true;
-  }
-  const Axis closest = measure(pair, bodyA, bodyB, *decision);
-  if (closest.gap > limit) {
-    pair.patch.size = 0;
-    return true;
-  }
-  const Axis axis = closest.gap > 0 ? axisFor(closest, pair, a, b, step) : closest;
-  if (axis.gap > limit) {
-    pair.patch.size = 0;
-  } else {
-    makePatch(pair, axis, limit, a, b);
-  }
+  if (farAlongAxis(pair, bodyA, bodyB, a, b, limit)) return true;
+  if (!restsAsBefore(pair, bodyA, bodyB, a, b, limit, step.epsilon))
+    ask(pair, bodyA, bodyB, a, b, limit, farthest, step);
   return true;
 }
 
 bool leans(const NearPair& pair, double epsilon) {
-  for (const PatchPoint& point : pair.patch.list())
+  const ContactPatch* patch = pair.patch();
+  if (!patch) return false;
+  for (const PatchPoint& point : patch->list())
     if (point.separation < 2 * epsilon) return true;
   return false;
 }

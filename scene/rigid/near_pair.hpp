@@ -19,19 +19,39 @@ struct PartPairKey {
 
 using PatchAnchors = std::array<Vec3, ContactPatch::kMostPoints>;
 
+/// What is known of a pair that came near enough for the narrow phase.
+struct CloseUp {
+  collision::FeatureCache features;
+  std::unique_ptr<collision::DepthCache> depth;  ///< once they penetrated
+  double penetration = 0;  ///< metres, when they penetrate: the depth, or an upper bound of it
+  ContactPatch patch;      ///< where NearPair::hasPatch; a, b are not set
+  PatchAnchors anchors;    ///< of the points, on the free body
+  enum class Plane : std::uint8_t { closest, faceOfA, faceOfB } plane = Plane::closest;
+};
+
+/// Most pairs are far from one another in every step: they are kept small.
 struct NearPair {
   PartPairKey key;
-  collision::FeatureCache features;
-  std::unique_ptr<collision::DepthCache> depth;                ///< once they penetrated
-  collision::Verdict verdict = collision::Verdict::separated;  ///< when last looked at
   /// Metres: they are at least this far apart, less what was added to Solid::jumped of both since
   /// its sum was `since`.
   double apart = -1;
   double since = 0;
-  double penetration = 0;       ///< metres, when last looked at: the depth, or an upper bound of it
-  Vec3 normal = Vec3::UnitY();  ///< from A to B, unit: where they are looked at and near
-  ContactPatch patch;           ///< its size is 0 where they are far; a, b are not set
-  PatchAnchors anchors;         ///< of the points, on the free body
+  Vec3 axis = Vec3::Zero();  ///< world, from A to B, unit: parted them last; zero: none yet
+  collision::Verdict verdict = collision::Verdict::separated;  ///< when last looked at
+  std::unique_ptr<CloseUp> close;                              ///< null: never asked about
+
+  bool hasPatch = false;
+  bool told = false;  ///< it was near when contacts were last told
+
+  /// Null: they are far.
+  ContactPatch* patch() { return hasPatch ? &close->patch : nullptr; }
+  const ContactPatch* patch() const { return hasPatch ? &close->patch : nullptr; }
+  double penetration() const {
+    return verdict == collision::Verdict::penetrating ? close->penetration : 0;
+  }
+  collision::FeatureCache features() const {
+    return close ? close->features : collision::FeatureCache{};
+  }
 };
 
 struct NearPairStep {

@@ -16,6 +16,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/gap.hpp"
+
 namespace enfilade::scene {
 namespace {
 
@@ -25,6 +27,9 @@ using collision::Quat;
 using collision::Verdict;
 
 constexpr double kUp = 1 + 0x1p-40;  // above what a few roundings lose
+constexpr double kParts = 1 << kMostHalvings;
+constexpr int kTries = 3;         // to cut a way where its plane is used up
+constexpr double kShorter = 0.1;  // of a way, at each try
 
 /// q1 or -q1, whichever is nearer to q0.
 Quat nearer(const Quat& q0, const Quat& q1) {
@@ -44,21 +49,10 @@ double bulgeOf(const Passage& p) {
 }
 
 /// A part at an end of its way.
-struct PlacedPart {
-  Mat3 rotation;
-  ConvexBody body;
-
-  PlacedPart(const PartShape& part, const Passage& p, bool atEnd) {
-    const Quat& turned = atEnd ? p.toRotation : p.fromRotation;
-    rotation = p.stands ? p.stands->rotation : turned.toRotationMatrix();
-    const Vec3 position = p.stands
-                              ? p.stands->position
-                              : (atEnd ? p.toCentre : p.fromCentre) - rotation * p.centreInFrame;
-    body = {part.vertices, position, &rotation, part.hull};
-  }
-  PlacedPart(const PlacedPart&) = delete;
-  PlacedPart& operator=(const PlacedPart&) = delete;
-};
+ConvexBody placed(const PartShape& part, const Passage& p, bool atEnd) {
+  return {part.vertices, atEnd ? p.toPosition : p.fromPosition, atEnd ? &p.toTurned : &p.fromTurned,
+          part.hull};
+}
 
 /// The pair at one time: what is known there.
 struct Known {
@@ -73,9 +67,9 @@ struct Search {
 
   /// Separated at the end, and by how much?
   Known ask(const Passage& a, const Passage& b, bool atEnd, const FeatureCache& hint) {
-    const PlacedPart placedA(partA, a, atEnd), placedB(partB, b, atEnd);
     Known known{hint, 0};
-    const collision::Decision decision = collision::decide(placedA.body, placedB.body, known.cache);
+    const collision::Decision decision =
+        collision::decide(placed(partA, a, atEnd), placed(partB, b, atEnd), known.cache);
     ++queries;
     if (decision.verdict == Verdict::separated)
       known.apart = decision.distance - decision.errorBound;
@@ -83,13 +77,13 @@ struct Search {
   }
   /// The gap along the axis of `known`, at the end or the start.
   double along(const Passage& a, const Passage& b, bool atEnd, const Known& known) const {
-    const PlacedPart placedA(partA, a, atEnd), placedB(partB, b, atEnd);
-    return collision::provedSeparation(placedA.body, placedB.body, known.cache);
+    return collision::provedSeparation(placed(partA, a, atEnd), placed(partB, b, atEnd),
+                                       known.cache);
   }
 };
 
 /// Whether a plane with these gaps at the ends parts the bodies all the way.
-bool partsAllTheWay(double atStart, double atEnd, double bulge) {
+bool planeParts(double atStart, double atEnd, double bulge) {
   if (!(atStart > 0) || !(atEnd > 0)) return false;
   const double roots = std::sqrt(atStart) + std::sqrt(atEnd);
   return roots * roots > bulge * kUp;
@@ -101,8 +95,8 @@ bool provedClear(const Search& search, const Passage& a, const Passage& b, const
   const double moves = closingOf(a, b);
   if (moves < start.apart || moves < end.apart) return true;
   const double bulge = bulgeOf(a) + bulgeOf(b);
-  return partsAllTheWay(start.apart, search.along(a, b, true, start), bulge) ||
-         partsAllTheWay(search.along(a, b, false, end), end.apart, bulge);
+  return planeParts(start.apart, search.along(a, b, true, start), bulge) ||
+         planeParts(search.along(a, b, false, end), end.apart, bulge);
 }
 
 /// The part of the way that is proved clear. The end's answer is not known to be separated.
@@ -122,18 +116,24 @@ double clearPart(Search& search, const Passage& a, const Passage& b, const Known
 }  // namespace
 
 Passage standing(const Solid& solid) {
-  return {solid.motion.centre,
-          solid.motion.centre,
-          solid.motion.rotation,
-          solid.motion.rotation,
-          solid.radius,
-          solid.centreInFrame,
-          &solid,
-          0};
+  Passage passage;
+  passage.fromCentre = passage.toCentre = solid.motion.centre;
+  passage.fromRotation = passage.toRotation = solid.motion.rotation;
+  passage.radius = solid.radius;
+  passage.centreInFrame = solid.centreInFrame;
+  passage.stands = &solid;
+  passage.fromTurned = passage.toTurned = solid.rotation;
+  passage.fromPosition = passage.toPosition = solid.position;
+  return passage;
 }
 
 void measure(Passage& passage) {
   passage.turn = turnOf(passage);
+  // As placeSolid() has it, to the last bit.
+  passage.fromTurned = passage.fromRotation.toRotationMatrix();
+  passage.toTurned = passage.toRotation.toRotationMatrix();
+  passage.fromPosition = passage.fromCentre - passage.fromTurned * passage.centreInFrame;
+  passage.toPosition = passage.toCentre - passage.toTurned * passage.centreInFrame;
 }
 
 double lengthOf(const Passage& p) {
@@ -168,6 +168,64 @@ Passage secondHalf(const Passage& p, const PassagePose& middle) {
   half.fromCentre = middle.centre, half.fromRotation = middle.rotation;
   measure(half);
   return half;
+}
+
+Passage firstPart(Passage passage, double fraction) {
+  if (fraction == 1 || passage.stands) return passage;
+  Passage done = passage;
+  done.toCentre = passage.fromCentre, done.toRotation = passage.fromRotation;
+  for (int i = 0; i < kMostHalvings && fraction > 0; ++i) {
+    const PassagePose middle = middleOf(passage);
+    fraction *= 2;
+    if (fraction >= 1) {
+      done.toCentre = middle.centre, done.toRotation = middle.rotation;
+      passage = secondHalf(passage, middle);
+      fraction -= 1;
+    } else {
+      passage = firstHalf(passage, middle);
+    }
+  }
+  measure(done);
+  return done;
+}
+
+namespace {
+
+/// Whether the plane at right angles to `axis` parts the two all the way.
+bool partsAllTheWay(const PartShape& partA, const Passage& a, const PartShape& partB,
+                    const Passage& b, const Vec3& axis) {
+  const auto gap = [&](bool atEnd) {
+    return collision::gapAlong(placed(partA, a, atEnd), placed(partB, b, atEnd), axis).proved;
+  };
+  const double atEnd = gap(true);
+  return atEnd > 0 && planeParts(gap(false), atEnd, bulgeOf(a) + bulgeOf(b));
+}
+
+}  // namespace
+
+double clearAlong(const PartShape& partA, const Passage& a, const PartShape& partB,
+                  const Passage& b, const Vec3& axis) {
+  const auto gap = [&](bool atEnd) {
+    return collision::gapAlong(placed(partA, a, atEnd), placed(partB, b, atEnd), axis).proved;
+  };
+  const double atStart = gap(false), atEnd = gap(true);
+  const double bulge = bulgeOf(a) + bulgeOf(b);
+  if (planeParts(atStart, atEnd, bulge)) return 1;
+  if (!(atStart > 0 && atStart < std::numeric_limits<double>::infinity())) return 0;
+  // Were it linear in time, the gap would be gone at this part.
+  double part = std::min(1.0, atStart / (atStart - std::min(0.0, atEnd) + bulge));
+  for (int i = 0; i < kTries; ++i) {
+    part = std::floor((1 - kShorter) * part * kParts) / kParts;
+    if (!(part > 0)) return 0;
+    if (partsAllTheWay(partA, firstPart(a, part), partB, firstPart(b, part), axis)) return part;
+  }
+  return 0;
+}
+
+bool separatedAtEnd(const PartShape& partA, const Passage& a, const PartShape& partB,
+                    const Passage& b, FeatureCache cache) {
+  return collision::decide(placed(partA, a, true), placed(partB, b, true), cache).verdict ==
+         Verdict::separated;
 }
 
 Clearance clearance(const PartShape& partA, const Passage& a, const PartShape& partB,

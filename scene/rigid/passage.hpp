@@ -16,12 +16,15 @@ struct Passage {
   Vec3 centreInFrame = Vec3::Zero();  ///< of the parts' frame
   const Solid* stands = nullptr;      ///< it does not move: its frame is there to the last bit
   double turn = 0;                    ///< radians, at least; set by measure()
+  /// Of the frame, at both ends; set by measure().
+  Mat3 fromTurned = Mat3::Identity(), toTurned = Mat3::Identity();
+  Vec3 fromPosition = Vec3::Zero(), toPosition = Vec3::Zero();
 };
 
 /// The way of a solid that stands.
 Passage standing(const Solid& solid);
 
-/// To be called when the rotations were set.
+/// To be called when centres or rotations were set.
 void measure(Passage& passage);
 
 /// Metres: no point goes farther on this way.
@@ -40,6 +43,18 @@ PassagePose middleOf(const Passage& passage);
 /// The first half, the second half.
 Passage firstHalf(const Passage& passage, const PassagePose& middle);
 Passage secondHalf(const Passage& passage, const PassagePose& middle);
+
+/// The first `fraction` of a passage: a multiple of 2^-kMostHalvings.
+Passage firstPart(Passage passage, double fraction);
+
+/// Up to which part of the way the plane at right angles to `axis` (unit, from A to B) parts the
+/// two: a cheap proof, which where it gives 0 says nothing.
+double clearAlong(const PartShape& partA, const Passage& a, const PartShape& partB,
+                  const Passage& b, const Vec3& axis);
+
+/// Whether they are separated where their ways end.
+bool separatedAtEnd(const PartShape& partA, const Passage& a, const PartShape& partB,
+                    const Passage& b, collision::FeatureCache cache);
 
 struct Clearance {
   double fraction = 1;        ///< proved clear up to here: a multiple of 2^-kMostHalvings, or 0

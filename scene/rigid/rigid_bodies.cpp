@@ -7,21 +7,27 @@
 //  do.
 // A body goes no farther in a tick than it said it can reach: what stands beyond was not asked for.
 #include <algorithm>
-#include <set>
+#include <thread>
 
 #include "scene/world_state.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-/// Metres that a body may go in a tick beyond its own speed, when something sets it in motion.
-constexpr double kSpareReach = 0.1;
+/// Metres, or of the radius, whichever is less, that a body may go in a tick beyond its own speed
+/// when something sets it in motion.
+constexpr double kSpareReach = 0.1, kSpareOfRadius = 0.5;
+/// The same by which the broad phase's box is larger than it needs to be, so as to move less often.
+constexpr double kSpareBox = 0.02, kSpareBoxOfRadius = 0.2;
+constexpr std::size_t kWorthThreads = 64;  // bodies: fewer are done before a thread is woken
+constexpr int kThreads = 2;
 constexpr double kBelowScene = 50;     // metres: who falls so far has left the world
 constexpr double kBesideScene = 1000;  // metres: or flew so far
 
 DynamicsStep settingsOf(const Lengths& lengths) {
   DynamicsStep step;
   step.solver.seconds = lengths.tick;
+  step.solver.substeps = kSolverSubsteps;
   step.solver.gravity = {0, -lengths.gravity, 0};
   step.solver.epsilon = lengths.epsilon;
   return step;
@@ -60,6 +66,7 @@ std::uint32_t solidFor(RigidStage& stage, EntityId entity, std::uint32_t part, M
     at->second = static_cast<std::uint32_t>(stage.dynamics.solids.size());
     stage.dynamics.solids.emplace_back();
     stage.entities.emplace_back();
+    stage.bodyOf.push_back(kNoRigid);
   } else {
     at->second = stage.vacant.back();
     stage.vacant.pop_back();
@@ -69,8 +76,23 @@ std::uint32_t solidFor(RigidStage& stage, EntityId entity, std::uint32_t part, M
   return at->second;
 }
 
-std::uint32_t solidForBody(RigidStage& stage, const Body& body) {
-  return solidFor(stage, body.id, 0, [&] { return solidOf(body); });
+std::uint32_t solidForBody(WorldState& world, std::uint32_t body) {
+  RigidStage& stage = world.rigids;
+  std::uint32_t& solid = stage.solidOf[body];
+  if (solid == kNoRigid) {
+    solid = solidFor(stage, world.bodies[body].id, 0, [&] { return solidOf(world.bodies[body]); });
+    stage.bodyOf[solid] = body;
+  }
+  return solid;
+}
+
+/// kNoRigid: the mover is an avatar.
+std::uint32_t bodyAt(const RigidStage& stage, collision::MoverId mover) {
+  return mover < stage.bodyAt.size() ? stage.bodyAt[mover] : kNoRigid;
+}
+
+Solid& solidOfRigid(RigidStage& stage, std::uint32_t body) {
+  return stage.dynamics.solids[stage.solidOf[body]];
 }
 
 std::uint32_t solidForStill(WorldState& world, std::uint32_t object) {
@@ -115,6 +137,7 @@ struct PairWriter {
   const Wish& wish;
   std::vector<PartPairKey>& keys;
   double margin;
+  std::vector<std::uint8_t> isSeed = {};  ///< of each body
 
   void add(std::uint32_t solid, std::uint32_t part, std::uint32_t other, std::uint32_t otherPart) {
     if (solid < other) {
@@ -135,8 +158,12 @@ struct PairWriter {
         if (overlaps(reachOfPart(body, part), box)) add(solid, part, other, met);
     }
   }
-  void addBody(const Body& body, std::uint32_t solid, const Body& met) {
-    const std::uint32_t other = solidForBody(world.rigids, met);
+  void addBody(std::uint32_t index, std::uint32_t solid, std::uint32_t otherIndex) {
+    if (isSeed[otherIndex] && otherIndex < index) return;  // it has added the pair
+    const Body &body = world.bodies[index], &met = world.bodies[otherIndex];
+    const std::uint32_t other = solidForBody(world, otherIndex);
+    const std::vector<Solid>& solids = world.rigids.dynamics.solids;
+    if (!mayMeet(solids[solid], solids[other], margin)) return;
     for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
       for (std::uint32_t otherPart = 0; otherPart < met.partBoxes.size(); ++otherPart)
         if (overlaps(reachOfPart(body, part), reachOfPart(met, otherPart)))
@@ -155,24 +182,25 @@ struct PairWriter {
     double spare = margin;
     if (isKinematic(body.spec->kind)) spare += body.plan.farthest;
     if (body.spec->kind == BodyKind::rigid)
-      spare += world.rigids.dynamics.solids[world.rigids.solids.at({body.id, 0})].leash;
+      spare += solidOfRigid(world.rigids, bodyAt(world.rigids, body.mover)).leash;
     return grown(body.partBoxes[part], spare);
   }
 };
 
 /// Bodies that are awake, and those that may be woken.
 std::vector<std::uint32_t> findSeeds(const WorldState& world) {
-  std::set<std::uint32_t> seeds;
+  std::vector<std::uint8_t> isSeed(world.bodies.size(), 0);
   std::vector<std::uint32_t> open;
   const auto add = [&](std::uint32_t body) {
-    if (world.bodies[body].spec->kind == BodyKind::rigid && seeds.insert(body).second)
-      open.push_back(body);
+    if (world.bodies[body].spec->kind != BodyKind::rigid || isSeed[body]) return;
+    isSeed[body] = 1;
+    open.push_back(body);
   };
   const auto addPartners = [&](collision::MoverId mover) {
     for (const auto& partner : world.broadPhase.partners(mover)) {
       if (!partner.moves) continue;
-      const auto found = world.bodyOfMover.find(partner.id);
-      if (found != world.bodyOfMover.end()) add(found->second);
+      const std::uint32_t body = bodyAt(world.rigids, partner.id);
+      if (body != kNoRigid) add(body);
     }
   };
   for (const std::uint32_t i : world.rigids.bodies)
@@ -186,23 +214,26 @@ std::vector<std::uint32_t> findSeeds(const WorldState& world) {
     open.pop_back();
     addPartners(world.bodies[body].mover);
   }
-  return {seeds.begin(), seeds.end()};
+  std::vector<std::uint32_t> seeds;
+  for (const std::uint32_t i : world.rigids.bodies)
+    if (isSeed[i]) seeds.push_back(i);
+  return seeds;
 }
 
 void gatherPairs(WorldState& world, const Wish& wish) {
   RigidStage& stage = world.rigids;
   std::vector<PartPairKey> keys;
   PairWriter writer{world, wish, keys, lookoutOf(world.lengths)};
+  writer.isSeed.assign(world.bodies.size(), 0);
+  for (const std::uint32_t i : stage.seeds) writer.isSeed[i] = 1;
   for (const std::uint32_t i : stage.seeds) {
     const Body& body = world.bodies[i];
-    const std::uint32_t solid = solidForBody(stage, body);
+    const std::uint32_t solid = solidForBody(world, i);
     for (const auto& partner : world.broadPhase.partners(body.mover)) {
       if (!partner.moves) {
         writer.addStill(body, solid, world.scene->solidObjects()[partner.id]);
-      } else if (const auto met = world.bodyOfMover.find(partner.id);
-                 met != world.bodyOfMover.end()) {
-        if (isSolid(world.bodies[met->second]))
-          writer.addBody(body, solid, world.bodies[met->second]);
+      } else if (const std::uint32_t met = bodyAt(stage, partner.id); met != kNoRigid) {
+        if (isSolid(world.bodies[met])) writer.addBody(i, solid, met);
       } else {
         writer.addAvatar(body, solid, world.avatars.at(world.avatarOfMover.at(partner.id)));
       }
@@ -228,16 +259,31 @@ void placeDriven(Solid& solid, const Vec3& position, const collision::Quat& orie
       (solid.position - before).norm() + (solid.rotation - turned).norm() * solid.radius;
 }
 
+/// The motion in each substep of a path that was gone all the way.
+std::vector<Gait> gaitsOf(const Body& body, double tick) {
+  std::vector<Gait> gaits;
+  const BodyPlan& plan = body.plan;
+  if (!plan.winds || !body.drive.going || body.blockedBy != 0) return gaits;
+  const double seconds = tick / kSolverSubsteps;
+  BodyPlace last = plan.from;
+  for (const BodyPlace& place : plan.between) {
+    gaits.push_back({(place.offset - last.offset) / seconds,
+                     (place.turn - last.turn) / seconds * body.spec->axis});
+    last = place;
+  }
+  return gaits;
+}
+
 /// Kinematic bodies have moved: their solids go from where they were to where they are.
 void driveSolids(WorldState& world) {
   for (const std::uint32_t i : world.kinematics) {
     const Body& body = world.bodies[i];
-    const auto found = world.rigids.solids.find({body.id, 0});
-    if (found == world.rigids.solids.end()) continue;
-    Solid& solid = world.rigids.dynamics.solids[found->second];
+    if (world.rigids.solidOf[i] == kNoRigid) continue;
+    Solid& solid = solidOfRigid(world.rigids, i);
     placeDriven(solid, body.positionBefore, body.orientationBefore);
     solid.motion.velocity = body.velocity;
     solid.motion.spin = body.spin;
+    solid.gaits = gaitsOf(body, world.lengths.tick);
   }
 }
 
@@ -245,9 +291,8 @@ void driveSolids(WorldState& world) {
 void settleDriven(WorldState& world) {
   for (const std::uint32_t i : world.kinematics) {
     const Body& body = world.bodies[i];
-    const auto found = world.rigids.solids.find({body.id, 0});
-    if (found == world.rigids.solids.end()) continue;
-    placeDriven(world.rigids.dynamics.solids[found->second], body.position, body.orientation);
+    if (world.rigids.solidOf[i] == kNoRigid) continue;
+    placeDriven(solidOfRigid(world.rigids, i), body.position, body.orientation);
   }
 }
 
@@ -291,13 +336,17 @@ double drivenAway(const WorldState& world, const Body& body, double lookout) {
 }  // namespace
 
 void startRigids(WorldState& world) {
+  RigidStage& stage = world.rigids;
+  stage.solidOf.assign(world.bodies.size(), kNoRigid);
   for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
     Body& body = world.bodies[i];
+    if (body.mover >= stage.bodyAt.size()) stage.bodyAt.resize(body.mover + 1, kNoRigid);
+    stage.bodyAt[body.mover] = i;
     if (body.spec->kind != BodyKind::rigid) continue;
     body.asleep = false;
     body.velocity = body.spec->velocity, body.spin = body.spec->spin;
-    world.rigids.bodies.push_back(i);
-    solidForBody(world.rigids, body);
+    stage.bodies.push_back(i);
+    solidForBody(world, i);
   }
 }
 
@@ -305,15 +354,18 @@ void planRigids(WorldState& world) {
   const double lookout = lookoutOf(world.lengths), tick = world.lengths.tick;
   for (const std::uint32_t i : world.rigids.bodies) {
     Body& body = world.bodies[i];
-    Solid& solid = world.rigids.dynamics.solids[world.rigids.solids.at({body.id, 0})];
+    Solid& solid = solidOfRigid(world.rigids, i);
     const double driven = body.asleep ? drivenAway(world, body, lookout) : 0;
     const bool wasAwake = solid.leash > lookout;
     if (body.asleep && !wasAwake && driven == 0) continue;
     body.moved = false;
     const bool stands = body.asleep && driven == 0;
     const double falls = world.lengths.gravity * tick * tick;
-    solid.leash = stands ? lookout : solid.fastest() * tick + driven + falls + kSpareReach;
-    body.reach = grown(boxOf(body), solid.leash + lookout);
+    const double spare = std::min(kSpareReach, kSpareOfRadius * solid.radius);
+    solid.leash = stands ? lookout : solid.fastest() * tick + driven + falls + spare;
+    const Box needed = grown(boxOf(body), solid.leash + lookout);
+    if (!stands && contains(body.reach, needed)) continue;
+    body.reach = grown(needed, std::min(kSpareBox, kSpareBoxOfRadius * solid.radius));
     world.broadPhase.move(body.mover, body.reach);
   }
 }
@@ -324,7 +376,7 @@ void wakeLeaning(WorldState& world, const Avatar& avatar) {
     if (found == world.bodyOfId.end()) continue;
     Body& body = world.bodies[found->second];
     if (body.spec->kind != BodyKind::rigid || body.left) continue;
-    Solid& solid = world.rigids.dynamics.solids[world.rigids.solids.at({body.id, 0})];
+    Solid& solid = solidOfRigid(world.rigids, found->second);
     body.asleep = solid.asleep = false;
     solid.calmFor = 0;
   }
@@ -344,6 +396,25 @@ void forgetAvatar(WorldState& world, const Avatar& avatar) {
   stage.solids.erase(first, end);
 }
 
+namespace {
+
+/// Who solves for so many bodies; null: the caller alone.
+Workers* workersFor(RigidStage& stage, std::size_t bodies) {
+  if (bodies < kWorthThreads) return nullptr;
+  const int processors = static_cast<int>(std::thread::hardware_concurrency());
+  const int threads = std::min(stage.threads > 0 ? stage.threads : kThreads, processors);
+  if (threads < 2) return nullptr;
+  if (!stage.workers || stage.workers->count() != threads)
+    stage.workers = std::make_unique<Workers>(threads);
+  return stage.workers.get();
+}
+
+}  // namespace
+
+void setThreads(World& world, int threads) {
+  world.state().rigids.threads = threads;
+}
+
 void moveRigids(WorldState& world, const Wish& wish, TickReport& report, QueryCount& count) {
   RigidStage& stage = world.rigids;
   if (stage.bodies.empty()) return;
@@ -353,13 +424,15 @@ void moveRigids(WorldState& world, const Wish& wish, TickReport& report, QueryCo
   if (stage.seeds.empty()) return;
   gatherPairs(world, wish);
   driveSolids(world);
-  stage.last = step(stage.dynamics, settingsOf(world.lengths));
+  DynamicsStep settings = settingsOf(world.lengths);
+  settings.workers = workersFor(stage, stage.seeds.size());
+  stage.last = step(stage.dynamics, settings);
   settleDriven(world);
   count.narrow += stage.last.looks + stage.last.proofs;
   report.squeezedBodies = stage.last.squeezed;
   for (const std::uint32_t i : stage.seeds) {
     Body& body = world.bodies[i];
-    Solid& solid = stage.dynamics.solids[stage.solids.at({body.id, 0})];
+    Solid& solid = solidOfRigid(stage, i);
     if (body.left) continue;
     takeOver(body, solid);
     if (hasLeft(world, body)) catchBody(world, body, solid, report);

@@ -4,23 +4,32 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "scene/rigid/dynamics.hpp"
+#include "scene/rigid/workers.hpp"
 #include "scene/snapshot.hpp"
 
 namespace enfilade::scene {
+
+inline constexpr std::uint32_t kNoRigid = ~0u;
 
 struct RigidStage {
   Dynamics dynamics;
   std::vector<std::uint32_t> bodies;  ///< indices of the rigid ones into WorldState::bodies
   /// Solids by entity; an avatar has one for each of its parts.
   std::map<std::pair<EntityId, std::uint32_t>, std::uint32_t> solids;
-  std::vector<EntityId> entities;     ///< of each solid; 0: nobody's
-  std::vector<std::uint32_t> vacant;  ///< solids of avatars that left, to be used again
-  std::vector<std::uint32_t> seeds;   ///< bodies whose surroundings matter in this tick, ascending
-  DynamicsReport last;                ///< of the last tick in which a body was awake
+  std::vector<EntityId> entities;      ///< of each solid; 0: nobody's
+  std::vector<std::uint32_t> vacant;   ///< solids of avatars that left, to be used again
+  std::vector<std::uint32_t> bodyOf;   ///< of each solid: index into WorldState::bodies; kNoRigid
+  std::vector<std::uint32_t> solidOf;  ///< of each body, once it is met; kNoRigid
+  std::vector<std::uint32_t> bodyAt;   ///< of each mover up to the last body's; kNoRigid
+  std::unique_ptr<Workers> workers;    ///< once there are many bodies; no part of the state
+  int threads = 0;                     ///< that may be used; 0: kThreads, or the processors
+  std::vector<std::uint32_t> seeds;    ///< bodies whose surroundings matter in this tick, ascending
+  DynamicsReport last;                 ///< of the last tick in which a body was awake
 };
 
 }  // namespace enfilade::scene

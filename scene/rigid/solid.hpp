@@ -1,6 +1,7 @@
 // What free bodies meet and are: rigid things of convex parts, free, driven or still.
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <memory>
 #include <span>
@@ -26,6 +27,12 @@ struct SolidPart : PartShape {
 /// The part of a hull, which has to outlive it.
 SolidPart partOfHull(const collision::Hull& hull);
 
+/// How what is driven moves in a substep.
+struct Gait {
+  Vec3 velocity = Vec3::Zero();  ///< of the centre, m/s
+  Vec3 spin = Vec3::Zero();      ///< rad/s
+};
+
 struct Solid {
   /// Keeps the part of an avatar's; what all other parts point at outlives the world.
   std::shared_ptr<const collision::Hull> hull;
@@ -43,6 +50,9 @@ struct Solid {
   double mostPush = 0;
   /// Metres: no point may go farther in a step, since what is there was not asked for.
   double leash = std::numeric_limits<double>::infinity();
+  /// Of what is driven back and forth within a step: one for each of the solver's substeps, else
+  /// none. `motion` has the mean of them, and its way is taken to be straight.
+  std::vector<Gait> gaits;
   bool restless = false;  ///< who leans on it does not sleep: it goes without being driven
 
   // Set by placeSolid() from the motion.
@@ -55,10 +65,18 @@ struct Solid {
   bool isAwake() const { return isFree() && !asleep; }
   /// Driven, or somebody who pushes.
   bool isMoved() const {
-    return !isFree() && (!motion.velocity.isZero(0) || !motion.spin.isZero(0) ||
+    return !isFree() && (!gaits.empty() || !motion.velocity.isZero(0) || !motion.spin.isZero(0) ||
                          (mostPush > 0 && !pushVelocity.isZero(0)));
   }
-  /// m/s: no point goes faster.
+  /// m/s: no point of it, driven as it is, departs faster from its mean motion.
+  double swing() const {
+    double most = 0;
+    for (const Gait& gait : gaits)
+      most = std::max(most, (gait.velocity - motion.velocity).norm() +
+                                (gait.spin - motion.spin).norm() * radius);
+    return most;
+  }
+  /// m/s: no point goes faster; in the mean.
   double fastest() const {
     return asleep ? 0 : motion.velocity.norm() + motion.spin.norm() * radius;
   }

@@ -27,9 +27,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scene/rigid/solver_rows.hpp"
+
 namespace enfilade::scene {
 namespace {
 
+constexpr std::size_t kPatchBlock = 16;  // patches, and bodies, that a thread takes at a time
+constexpr std::size_t kBodyBlock = 32;
 constexpr double kPushBack = 0.25;  // of what is too near, a substep
 /// Of epsilon: what is nearer is too near. Between it and epsilon bodies rest: were each of a
 /// stack's points lifted to epsilon itself, the stack would rock on the lifts for ever.
@@ -42,205 +46,38 @@ constexpr double kJointPushBack = 0.2;  // of a joint's error, a substep
 
 constexpr int kPartings = 2;  // iterations of step 4
 
-/// How a body moves, and what an impulse does to it.
-struct Mover {
-  Vec3 velocity, spin;
-  Vec3 partingVelocity, partingSpin;  ///< of step 4
-  double inverseMass;
-  Mat3 inverseInertia;  ///< world axes
-};
-
-/// A direction in which two bodies meet: B is pushed along it at armB, A against it at armA.
-struct Direction {
-  Vec3 along, angularA, angularB;  ///< arm x along
-  Vec3 turnA, turnB;               ///< what an impulse of 1 turns them by, rad/s
-
-  Direction() = default;
-  Direction(const Vec3& direction, const Vec3& crossA, const Vec3& crossB, const Mover& a,
-            const Mover& b)
-      : along(direction),
-        angularA(crossA),
-        angularB(crossB),
-        turnA(a.inverseInertia * crossA),
-        turnB(b.inverseInertia * crossB) {}
-  double speed(const Mover& a, const Mover& b) const {
-    return along.dot(b.velocity - a.velocity) + angularB.dot(b.spin) - angularA.dot(a.spin);
-  }
-  void push(Mover& a, Mover& b, double impulse) const {
-    a.velocity -= (impulse * a.inverseMass) * along;
-    a.spin -= impulse * turnA;
-    b.velocity += (impulse * b.inverseMass) * along;
-    b.spin += impulse * turnB;
-  }
-  /// The same of step 4's velocities.
-  double partingSpeed(const Mover& a, const Mover& b) const {
-    return along.dot(b.partingVelocity - a.partingVelocity) + angularB.dot(b.partingSpin) -
-           angularA.dot(a.partingSpin);
-  }
-  void part(Mover& a, Mover& b, double impulse) const {
-    a.partingVelocity -= (impulse * a.inverseMass) * along;
-    a.partingSpin -= impulse * turnA;
-    b.partingVelocity += (impulse * b.inverseMass) * along;
-    b.partingSpin += impulse * turnB;
-  }
-};
-
-/// What an impulse along `given` changes of the speed along `felt`.
-double response(const Direction& felt, const Direction& given, double inverseMasses) {
-  return inverseMasses * felt.along.dot(given.along) + felt.angularA.dot(given.turnA) +
-         felt.angularB.dot(given.turnB);
-}
-
-double inverted(double value) {
-  return value > 0 ? 1 / value : 0;
-}
-
-struct PointRow {
-  Direction normal;
-  double mass;        ///< of the two bodies here, kg
-  double separation;  ///< metres, now
-  double arrival;     ///< speed along the normal at the start of the step; < 0 closing
-  double impulse, push;
-  double parting;  ///< impulse of step 4
-  double sum;      ///< of the impulses of all substeps of this step
-};
-
-/// Friction at the middle of a patch.
-struct RubRow {
-  Direction first, second;
-  double m11, m12, m22;  ///< inverse of the response of the two
-  double rub1, rub2;
-  Vec3 turnA, turnB;  ///< of a moment of 1 about the normal
-  double twistMass, arm, twist;
-};
-
-struct PatchRow {
-  std::uint32_t a, b;
-  std::uint32_t firstPoint, size;
-  double friction, restitution, pushSpeed, mostPush;  ///< the push of one point and substep, N s
-  Vec3 normal;
-  RubRow rub;
-};
-
-struct AngularRow {
-  JointRow row;
-  Direction direction;
-  double mass, impulse, parting;
-};
-
-/// All that is solved, in the order of the arrays.
-struct System {
-  std::vector<Mover> movers;
-  std::vector<PatchRow> patches;
-  std::vector<PointRow> points;
-  std::vector<AngularRow> joints;
-  double seconds = 0;  ///< of a substep
-  double epsilon = 0;
-};
-
-Mover moverOf(const RigidBody& body) {
-  return {body.velocity,    body.spin,
-          Vec3::Zero(),     Vec3::Zero(),
-          body.inverseMass, body.inverseMass == 0 ? Mat3(Mat3::Zero()) : worldInverseInertia(body)};
-}
-
-// ---- setting up --------------------------------------------------------------------------------
-
-PointRow pointRow(const ContactPatch& patch, const PatchPoint& point, const Mover& a,
-                  const Mover& b) {
-  PointRow row;
-  row.normal =
-      Direction(patch.normal, point.armA.cross(patch.normal), point.armB.cross(patch.normal), a, b);
-  row.mass = inverted(response(row.normal, row.normal, a.inverseMass + b.inverseMass));
-  row.separation = point.separation;
-  row.arrival = row.normal.speed(a, b);
-  row.impulse = point.impulse;
-  row.sum = row.parting = 0;
-  row.push = point.push;
-  return row;
-}
-
-/// Two tangents that depend on the normal alone.
-std::array<Vec3, 2> tangents(const Vec3& normal) {
-  int least = 0;
-  normal.cwiseAbs().minCoeff(&least);
-  const Vec3 first = normal.cross(Vec3::Unit(least)).normalized();
-  return {first, normal.cross(first)};
-}
-
-RubRow rubRow(const ContactPatch& patch, const Mover& a, const Mover& b) {
-  RubRow row;
-  Vec3 armA = Vec3::Zero(), armB = Vec3::Zero();
-  for (const PatchPoint& point : patch.list()) armA += point.armA, armB += point.armB;
-  armA /= static_cast<double>(patch.size), armB /= static_cast<double>(patch.size);
-  const auto [first, second] = tangents(patch.normal);
-  row.first = Direction(first, armA.cross(first), armB.cross(first), a, b);
-  row.second = Direction(second, armA.cross(second), armB.cross(second), a, b);
-  const double masses = a.inverseMass + b.inverseMass;
-  const double k11 = response(row.first, row.first, masses);
-  const double k12 = response(row.first, row.second, masses);
-  const double k22 = response(row.second, row.second, masses);
-  const double over = inverted(k11 * k22 - k12 * k12);
-  row.m11 = k22 * over, row.m12 = -k12 * over, row.m22 = k11 * over;
-  row.rub1 = patch.rub.dot(first), row.rub2 = patch.rub.dot(second);
-  row.arm = 0;
-  for (const PatchPoint& point : patch.list()) row.arm += (point.armB - armB).norm();
-  row.arm /= static_cast<double>(patch.size);
-  row.turnA = a.inverseInertia * patch.normal, row.turnB = b.inverseInertia * patch.normal;
-  row.twistMass = inverted(patch.normal.dot(row.turnA) + patch.normal.dot(row.turnB));
-  row.twist = patch.twist;
-  return row;
-}
-
-void addPatch(const ContactPatch& patch, System& system) {
-  const Mover &a = system.movers[patch.a], &b = system.movers[patch.b];
-  PatchRow row;
-  row.a = patch.a, row.b = patch.b;
-  row.firstPoint = static_cast<std::uint32_t>(system.points.size());
-  row.size = static_cast<std::uint32_t>(patch.size);
-  row.friction = patch.friction, row.restitution = patch.restitution;
-  row.pushSpeed = patch.pushSpeed;
-  row.mostPush = patch.mostPush * system.seconds / static_cast<double>(patch.size);
-  row.normal = patch.normal;
-  row.rub = rubRow(patch, a, b);
-  for (const PatchPoint& point : patch.list())
-    system.points.push_back(pointRow(patch, point, a, b));
-  system.patches.push_back(row);
-}
-
-/// The joints' rows for the poses of now; their impulses are the joints'.
-void placeJoints(std::span<const RigidBody> bodies, std::span<const Joint> joints, System& system) {
-  std::vector<JointRow> rows;
-  for (std::uint32_t i = 0; i < joints.size(); ++i)
-    appendRows(joints[i], i, bodies, system.seconds, rows);
-  system.joints.clear();
-  for (const JointRow& row : rows) {
-    const Joint& joint = joints[row.joint];
-    const Mover &a = system.movers[joint.a], &b = system.movers[joint.b];
-    const Direction direction(row.linear, row.angularA, row.angularB, a, b);
-    const double mass = inverted(response(direction, direction, a.inverseMass + b.inverseMass));
-    system.joints.push_back({row, direction, mass, joint.impulses[row.slot], 0});
-  }
-}
-
 // ---- one substep -------------------------------------------------------------------------------
 
-void warmStart(System& system, std::span<const Joint> joints) {
+/// Calls each(patch) for all patches: a colour at a time, the last one by one thread.
+template <class Each>
+void forPatches(System& system, Workers& workers, const Each& each) {
+  std::uint32_t from = 0;
+  for (std::size_t colour = 0; colour < system.colours.size(); ++colour) {
+    const std::uint32_t end = system.colours[colour];
+    const std::size_t size = end - from;
+    const std::size_t block = colour + 1 == system.colours.size() ? size : kPatchBlock;
+    workers.share(size, block, [&](std::size_t first, std::size_t last) {
+      for (std::size_t k = first; k < last; ++k) each(system.patches[from + k]);
+    });
+    from = end;
+  }
+}
+
+void warmStart(System& system, std::span<const Joint> joints, Workers& workers) {
   for (const AngularRow& row : system.joints) {
     const Joint& joint = joints[row.row.joint];
     row.direction.push(system.movers[joint.a], system.movers[joint.b], row.impulse);
   }
-  for (const PatchRow& patch : system.patches) {
+  forPatches(system, workers, [&](const PatchRow& patch) {
     Mover &a = system.movers[patch.a], &b = system.movers[patch.b];
     patch.rub.first.push(a, b, patch.rub.rub1);
     patch.rub.second.push(a, b, patch.rub.rub2);
-    a.spin -= patch.rub.twist * patch.rub.turnA;
-    b.spin += patch.rub.twist * patch.rub.turnB;
+    patch.rub.turn(a, b, patch.rub.twist);
     for (std::uint32_t i = 0; i < patch.size; ++i) {
       const PointRow& point = system.points[patch.firstPoint + i];
       point.normal.push(a, b, point.impulse + point.push);
     }
-  }
+  });
 }
 
 /// The rub within Coulomb's cone.
@@ -262,8 +99,7 @@ void solveRub(PatchRow& patch, double normalImpulse, Mover& a, Mover& b) {
   const double turning = patch.normal.dot(b.spin - a.spin);
   const double twist =
       std::clamp(row.twist - row.twistMass * turning, -most * row.arm, most * row.arm);
-  a.spin -= (twist - row.twist) * row.turnA;
-  b.spin += (twist - row.twist) * row.turnB;
+  row.turn(a, b, twist - row.twist);
   row.twist = twist;
 }
 
@@ -336,13 +172,13 @@ void partJoints(System& system, std::span<const Joint> joints) {
 }
 
 /// Step 4.
-void part(System& system, std::span<const Joint> joints) {
+void part(System& system, std::span<const Joint> joints, Workers& workers) {
   for (Mover& mover : system.movers) mover.partingVelocity = mover.partingSpin = Vec3::Zero();
   for (PointRow& point : system.points) point.parting = 0;
   for (AngularRow& row : system.joints) row.parting = 0;
   for (int i = 0; i < kPartings; ++i) {
     partJoints(system, joints);
-    for (PatchRow& patch : system.patches) partPatch(patch, system);
+    forPatches(system, workers, [&](PatchRow& patch) { partPatch(patch, system); });
   }
 }
 
@@ -363,14 +199,16 @@ void solveJoints(System& system, std::span<const Joint> joints) {
   }
 }
 
-void goOn(System& system, std::span<RigidBody> bodies) {
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    const Mover& mover = system.movers[i];
-    bodies[i].velocity = mover.velocity + mover.partingVelocity;
-    bodies[i].spin = mover.spin + mover.partingSpin;
-    advance(bodies[i], system.seconds);
-  }
-  for (const PatchRow& patch : system.patches) {
+void goOn(System& system, std::span<RigidBody> bodies, Workers& workers) {
+  workers.share(bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      const Mover& mover = system.movers[i];
+      bodies[i].velocity = mover.velocity + mover.partingVelocity;
+      bodies[i].spin = mover.spin + mover.partingSpin;
+      advance(bodies[i], system.seconds);
+    }
+  });
+  forPatches(system, workers, [&](const PatchRow& patch) {
     const Mover &a = system.movers[patch.a], &b = system.movers[patch.b];
     for (std::uint32_t i = 0; i < patch.size; ++i) {
       PointRow& point = system.points[patch.firstPoint + i];
@@ -378,18 +216,21 @@ void goOn(System& system, std::span<RigidBody> bodies) {
       point.separation += system.seconds * speed;
       point.sum += point.impulse;
     }
-  }
+  });
 }
 
-void applyForces(System& system, std::span<RigidBody> bodies, const Vec3& gravity) {
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    Mover& mover = system.movers[i];
-    if (mover.inverseMass == 0) continue;
-    bodies[i].spin = mover.spin;
-    bendSpin(bodies[i], system.seconds);
-    mover.spin = bodies[i].spin;
-    mover.velocity += system.seconds * gravity;
-  }
+void applyForces(System& system, std::span<RigidBody> bodies, const Vec3& gravity,
+                 Workers& workers) {
+  workers.share(bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      Mover& mover = system.movers[i];
+      if (!mover.yields()) continue;
+      bodies[i].spin = mover.spin;
+      bendSpin(bodies[i], system.seconds);
+      mover.spin = bodies[i].spin;
+      mover.velocity += system.seconds * gravity;
+    }
+  });
 }
 
 void keepImpulses(const System& system, std::span<Joint> joints) {
@@ -398,16 +239,16 @@ void keepImpulses(const System& system, std::span<Joint> joints) {
 }
 
 void substep(System& system, std::span<RigidBody> bodies, std::span<Joint> joints,
-             const SolverStep& step) {
-  applyForces(system, bodies, step.gravity);
+             const SolverStep& step, Workers& workers) {
+  applyForces(system, bodies, step.gravity, workers);
   placeJoints(bodies, joints, system);
-  warmStart(system, joints);
+  warmStart(system, joints, workers);
   for (int i = 0; i < step.iterations; ++i) {
     solveJoints(system, joints);
-    for (PatchRow& patch : system.patches) solvePatch(patch, system);
+    forPatches(system, workers, [&](PatchRow& patch) { solvePatch(patch, system); });
   }
-  part(system, joints);
-  goOn(system, bodies);
+  part(system, joints, workers);
+  goOn(system, bodies, workers);
   keepImpulses(system, joints);
 }
 
@@ -436,9 +277,8 @@ void keep(const System& system, std::span<RigidBody> bodies, std::span<ContactPa
     bodies[i].velocity = system.movers[i].velocity;
     bodies[i].spin = system.movers[i].spin;
   }
-  for (std::size_t k = 0; k < patches.size(); ++k) {
-    const PatchRow& row = system.patches[k];
-    ContactPatch& patch = patches[k];
+  for (const PatchRow& row : system.patches) {
+    ContactPatch& patch = patches[row.patch];
     for (std::uint32_t i = 0; i < row.size; ++i) {
       const PointRow& point = system.points[row.firstPoint + i];
       patch.points[i].separation = point.separation;
@@ -453,15 +293,18 @@ void keep(const System& system, std::span<RigidBody> bodies, std::span<ContactPa
 }  // namespace
 
 void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::span<Joint> joints,
-           const SolverStep& step) {
+           std::span<const DrivenBody> driven, const SolverStep& step, Workers& workers) {
   System system;
   system.seconds = step.seconds / step.substeps;
   system.epsilon = step.epsilon;
-  system.movers.reserve(bodies.size());
-  for (const RigidBody& body : bodies) system.movers.push_back(moverOf(body));
-  system.patches.reserve(patches.size());
-  for (const ContactPatch& patch : patches) addPatch(patch, system);
-  for (int i = 0; i < step.substeps; ++i) substep(system, bodies, joints, step);
+  setUp(bodies, patches, system, workers);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(step.substeps); ++i) {
+    for (const DrivenBody& body : driven) {
+      system.movers[body.body].velocity = body.gaits[i].velocity;
+      system.movers[body.body].spin = body.gaits[i].spin;
+    }
+    substep(system, bodies, joints, step, workers);
+  }
   bounce(system, step);
   keep(system, bodies, patches);
 }

@@ -8,6 +8,8 @@
 
 #include "scene/rigid/contact_patch.hpp"
 #include "scene/rigid/joint.hpp"
+#include "scene/rigid/solid.hpp"
+#include "scene/rigid/workers.hpp"
 
 namespace enfilade::scene {
 
@@ -19,10 +21,17 @@ struct SolverStep {
   double epsilon = 0.5e-3;  ///< metres: bodies come to rest between half of it and all of it apart
 };
 
+/// A body of inverse mass 0 that changes its motion from substep to substep.
+struct DrivenBody {
+  std::uint32_t body = 0;
+  std::span<const Gait> gaits;  ///< one for each substep
+};
+
 /// Moves `bodies` by a step. No patch lets its points come nearer than epsilon, to first order and
 /// as far as the iterations converge; points that are nearer part without gaining speed. Bodies
-/// whose inverse mass is 0 keep their velocity and go on with it. Impulses are of one substep.
+/// whose inverse mass is 0 keep their velocity and go on with it. Impulses are of one substep. The
+/// result is the same with any number of workers.
 void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::span<Joint> joints,
-           const SolverStep& step);
+           std::span<const DrivenBody> driven, const SolverStep& step, Workers& workers);
 
 }  // namespace enfilade::scene

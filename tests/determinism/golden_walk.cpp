@@ -1,7 +1,8 @@
 // Prints the state hash at the end of some worlds in which everything that moves moves: walkers on
-// stairs, a crowd, flyers among slivers, a driven arm, doors and a lift, a heap of free bodies. The
-// scenes and commands are made without libm, so that every build on every processor is given the
-// same ones and must print the same lines.
+// stairs, a crowd, flyers among slivers, a driven arm, doors and a lift, a heap of free bodies, a
+// vibrating tray (by one thread and by two: these two lines must agree). The scenes and commands
+// are made without libm, so that every build on every processor is given the same ones and must
+// print the same lines.
 #include <cstdio>
 #include <memory>
 
@@ -187,6 +188,37 @@ void heap() {
   print("heap", world);
 }
 
+/// Small boxes on a tray that vibrates: so many that the solver shares them out.
+void tray(int threads, const char* name) {
+  Builder b;
+  b.box("floor", {-5, -0.2, -5}, {5, 0, 5});
+  b.box("plate", {-0.2, 0.5, -0.2}, {0.2, 0.52, 0.2});
+  Seeded random(15);
+  for (std::uint32_t i = 0; i < 120; ++i) {
+    const Vec3 at(0.032 * (i % 5) - 0.08, 0.525 + 0.03 * (i / 25), 0.032 * (i / 5 % 5) - 0.08);
+    const double wide = random.uniform(0.01, 0.03), high = random.uniform(0.01, 0.025);
+    b.box("piece", at, at + Vec3(wide, high, random.uniform(0.01, 0.03)));
+    BodySpec piece;
+    piece.name = "piece" + std::to_string(i);
+    piece.objects = {i + 2};
+    b.model.bodies.push_back(piece);
+  }
+  BodySpec plate;
+  plate.name = "plate";
+  plate.kind = BodyKind::path;
+  plate.objects = {1};
+  plate.loops = true;
+  for (int i = 0; i <= 8; ++i) {
+    const double up = i < 4 ? i - 2 : 6 - i;  // a triangle's wave
+    plate.keys.push_back({i / 120.0, {0.2e-3 * up, 0.7e-3 * up, 0}, 0});
+  }
+  b.model.bodies.push_back(plate);
+  World world(std::make_shared<const Scene>(b.model));
+  setThreads(world, threads);
+  ticks(world, 90);
+  print(name, world);
+}
+
 }  // namespace
 
 int main() {
@@ -196,5 +228,7 @@ int main() {
   arm();
   doors();
   heap();
+  tray(1, "tray/1");
+  tray(2, "tray/2");
   std::printf("refused  %d commands\n", refusedCommands);
 }

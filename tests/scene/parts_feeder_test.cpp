@@ -41,17 +41,23 @@ TEST(PartsFeeder, WithTheDriveOnAllStayInsideAndNonePenetratesByMoreThanEpsilon)
   EXPECT_EQ(feeder.report().awake, 50u) << "a vibrating tray lets nobody sleep";
 }
 
-TEST(PartsFeeder, TwoRunsEndAtTheSameBits) {
-  const FeederPlan plan = planFeeder(20, 3);
-  const auto run = [&] {
-    Feeder feeder(plan);
-    for (int i = 0; i < 60; ++i) feeder.tick(true);
+TEST(PartsFeeder, EndsAtTheSameBitsWithAnyNumberOfThreads) {
+  const FeederPlan plan = planFeeder(120, 3);
+  const auto run = [&](int threads) {
+    Feeder feeder(plan, threads);
+    for (int i = 0; i < 40; ++i) feeder.tick(true);
+    EXPECT_GT(feeder.report().patches, 300u) << "enough to be shared out";
     std::vector<double> numbers;
-    for (const PlacedPart& part : feeder.parts())
+    for (const PlacedPart& part : feeder.parts()) {
       for (int k = 0; k < 3; ++k) numbers.push_back(part.position[k]);
+      for (int k = 0; k < 4; ++k) numbers.push_back(part.rotation.coeffs()[k]);
+    }
     return numbers;
   };
-  EXPECT_EQ(run(), run());
+  const std::vector<double> alone = run(1);
+  EXPECT_EQ(alone, run(1));
+  EXPECT_EQ(alone, run(2));
+  EXPECT_EQ(alone, run(3));
 }
 
 }  // namespace

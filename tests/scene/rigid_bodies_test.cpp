@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "tests/scene/body_trial.hpp"
 
 namespace enfilade::scene {
@@ -217,6 +219,35 @@ TEST(RigidBodies, ABodyThatFallsOutOfTheWorldIsToldAndTakenOut) {
   const Vec3 caught = box.position;
   EXPECT_TRUE(t.step().idle);
   EXPECT_EQ(t.body("box").position, caught);
+}
+
+/// A tray that comes back to where it was in every tick, with a box on it.
+Model shaker(double amplitude) {
+  Model model = boxModel({floorBox(),
+                          {"tray", {-0.5, 0.2, -0.5}, {0.5, 0.25, 0.5}},
+                          {"box", {-0.1, 0.2505, -0.1}, {0.1, 0.35, 0.1}}});
+  BodySpec tray = bodySpec("tray", BodyKind::path, {1});
+  tray.loops = true;
+  const std::array<double, 5> heights{0, amplitude, 0, -amplitude, 0};
+  for (std::size_t i = 0; i < heights.size(); ++i)
+    tray.keys.push_back({static_cast<double>(i) / 240, {0, heights[i], 0}, 0});
+  model.bodies = {tray, bodySpec("box", BodyKind::rigid, {2})};
+  return model;
+}
+
+TEST(RigidBodies, ATrayThatShakesWithinATickThrowsWhatLiesOnIt) {
+  BodyTrial still(shaker(0)), shaken(shaker(1e-3));
+  double highest = 0;
+  for (int i = 0; i < 200; ++i) {
+    still.step();
+    shaken.step();
+    highest = std::max(highest, shaken.body("box").position.y());
+    ASSERT_EQ(shaken.body("tray").position, still.body("tray").position) << i;
+    ASSERT_FALSE(anyBodyPenetrates(shaken.world)) << i;
+  }
+  EXPECT_TRUE(still.body("box").asleep);
+  EXPECT_FALSE(shaken.body("box").asleep);
+  EXPECT_GT(highest, still.body("box").position.y() + 0.5e-3);
 }
 
 TEST(RigidBodies, TwoRunsHaveOneHash) {

@@ -17,6 +17,7 @@ constexpr double kGravity = 9.80665;
 constexpr double kWallThickness = 0.1;
 /// Metres that a part may go in a tick beyond what its own speed has it.
 constexpr double kSpareReach = 5e-3;
+constexpr double kSpareBox = 2e-3;  // metres: a box that is asked for may come to lie so far out
 
 std::vector<Vec3> boxCorners(const Vec3& half) {
   std::vector<Vec3> corners;
@@ -136,7 +137,9 @@ FeederJudgement FeederJudge::judge(const std::vector<PlacedPart>& parts, const V
 
 // ---- ours --------------------------------------------------------------------------------------
 
-Feeder::Feeder(const FeederPlan& plan) : plan_(plan), broadPhase_({}) {
+Feeder::Feeder(const FeederPlan& plan, int threads)
+    : plan_(plan), workers_(threads), broadPhase_({}) {
+  settings_.workers = &workers_;
   settings_.solver.substeps = plan.substeps / plan.looks;
   settings_.solver.seconds = kTick / plan.looks;
   settings_.solver.iterations = 4;
@@ -153,8 +156,11 @@ Feeder::Feeder(const FeederPlan& plan) : plan_(plan), broadPhase_({}) {
   }
   for (scene::Solid& solid : dynamics_.solids) solid.motion.friction = plan.friction;
   extremes_.resize(dynamics_.solids.size());
-  for (std::uint32_t i = 0; i < trayHulls.size(); ++i)
-    trayMovers_.push_back(broadPhase_.insert(Box{plan.tray[i][0], plan.tray[i][1]}));
+  boxes_.resize(dynamics_.solids.size());
+  for (std::uint32_t i = 0; i < trayHulls.size(); ++i) {
+    const double moves = 2 * (plan.amplitude + plan.sidewards) + 2 * settings_.solver.epsilon;
+    broadPhase_.insert(grown(Box{plan.tray[i][0], plan.tray[i][1]}, moves));
+  }
   for (std::size_t i = 1; i < dynamics_.solids.size(); ++i)
     movers_.push_back(broadPhase_.insert({Vec3::Zero(), Vec3::Zero()}));
   // A fresh broad phase counts up: the tray's boxes first, then the parts.
@@ -164,32 +170,38 @@ Feeder::Feeder(const FeederPlan& plan) : plan_(plan), broadPhase_({}) {
     solidOfMover_.push_back(i), partOfMover_.push_back(0);
 }
 
-/// Once a tick: each part by what it can reach until the next.
-void Feeder::findPairs() {
-  const double lookout = 2 * settings_.solver.epsilon;
+/// Once a tick: each part by what it can reach until the next. Its box is moved when it left the
+/// one that it had, which is larger.
+void Feeder::moveBoxes(double lookout) {
   for (std::size_t i = 1; i < dynamics_.solids.size(); ++i) {
     scene::Solid& solid = dynamics_.solids[i];
     solid.leash =
         solid.asleep ? lookout : solid.fastest() * kTick + kGravity * kTick * kTick + kSpareReach;
     const Pose pose{solid.motion.rotation, solid.position};
-    broadPhase_.move(movers_[i - 1], collision::tightBox(*solid.parts[0].hull, pose, extremes_[i],
-                                                         solid.leash + lookout));
-  }
-  for (std::size_t i = 0; i < trayMovers_.size(); ++i) {
-    const Box box{plan_.tray[i][0], plan_.tray[i][1]};
-    const double moves = 2 * (plan_.amplitude + plan_.sidewards);
-    broadPhase_.move(trayMovers_[i], grown(box, moves + lookout));
+    const Box box =
+        collision::tightBox(*solid.parts[0].hull, pose, extremes_[i], solid.leash + lookout);
+    if (contains(boxes_[i], box)) continue;
+    boxes_[i] = grown(box, kSpareBox);
+    broadPhase_.move(movers_[i - 1], boxes_[i]);
   }
   broadPhase_.update();
+}
+
+void Feeder::findPairs() {
+  const double lookout = 2 * settings_.solver.epsilon;
+  moveBoxes(lookout);
   std::vector<scene::PartPairKey> keys;
-  for (std::size_t i = 1; i < dynamics_.solids.size(); ++i) {
+  const std::uint32_t size = static_cast<std::uint32_t>(dynamics_.solids.size());
+  for (std::uint32_t i = 1; i < size; ++i)
+    for (const auto& partner : broadPhase_.partners(movers_[i - 1]))
+      if (solidOfMover_[partner.id] == 0) keys.push_back({0, i, partOfMover_[partner.id], 0});
+  for (std::uint32_t i = 1; i < size; ++i)
     for (const auto& partner : broadPhase_.partners(movers_[i - 1])) {
       const std::uint32_t other = solidOfMover_[partner.id];
-      if (other < i)
-        keys.push_back({other, static_cast<std::uint32_t>(i), partOfMover_[partner.id], 0});
+      if (other > i && scene::mayMeet(dynamics_.solids[i], dynamics_.solids[other], lookout))
+        keys.push_back({i, other, 0, 0});
     }
-  }
-  std::sort(keys.begin(), keys.end());
+  if (!std::is_sorted(keys.begin(), keys.end())) std::sort(keys.begin(), keys.end());
   scene::setPairs(dynamics_, keys);
 }
 
@@ -203,8 +215,15 @@ void Feeder::tick(bool driven) {
     const double seconds = settings_.solver.seconds;
     for (std::size_t k = 1; k < reach.size(); ++k)
       dynamics_.solids[k].leash = std::max(0.0, reach[k] - dynamics_.solids[k].odometer);
-    const Vec3 next = trayAt(plan_, time_ + seconds, driven);
-    tray.motion.velocity = (next - tray.motion.centre) / seconds;
+    const double substep = seconds / settings_.solver.substeps;
+    Vec3 at = tray.motion.centre;
+    tray.gaits.clear();
+    for (int n = 1; driven && n <= settings_.solver.substeps; ++n) {
+      const Vec3 next = trayAt(plan_, time_ + n * substep, driven);
+      tray.gaits.push_back({(next - at) / substep, Vec3::Zero()});
+      at = next;
+    }
+    tray.motion.velocity = (at - tray.motion.centre) / seconds;
     const scene::DynamicsReport step = scene::step(dynamics_, settings_);
     time_ += seconds;
     report_.awake = step.awake;

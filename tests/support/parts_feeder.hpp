@@ -9,6 +9,7 @@
 #include "collision/hull.hpp"
 #include "collision/sort_and_sweep.hpp"
 #include "scene/rigid/dynamics.hpp"
+#include "scene/rigid/workers.hpp"
 
 namespace enfilade::testing {
 
@@ -31,10 +32,10 @@ struct FeederPlan {
   double wall = 0;                        ///< height of the walls
   double density = 2700;                  ///< aluminium, kg / m^3
   double friction = 0.4;
-  int substeps = 4;         ///< of a tick of 1/60 s
-  int looks = 2;            ///< a tick: how often contacts are found; divides `substeps`
-  double frequency = 15;    ///< of the drive, Hz: at most 60 * looks / 8, as it is set at each look
-  double amplitude = 2e-3;  ///< upwards: 1.8 times the weight
+  int substeps = 4;           ///< of a tick of 1/60 s
+  int looks = 1;              ///< a tick: how often contacts are found; divides `substeps`
+  double frequency = 15;      ///< of the drive, Hz: at most an eighth of the substeps'
+  double amplitude = 2e-3;    ///< upwards: 1.8 times the weight
   double sidewards = 0.5e-3;  ///< along x, in phase
 };
 
@@ -67,7 +68,7 @@ class FeederJudge {
 /// Ours.
 class Feeder {
  public:
-  explicit Feeder(const FeederPlan& plan);
+  explicit Feeder(const FeederPlan& plan, int threads = 1);
   void tick(bool driven);
   std::vector<PlacedPart> parts() const;
   Vec3 tray() const;
@@ -77,17 +78,19 @@ class Feeder {
   scene::DynamicsStep& settings() { return settings_; }
 
  private:
+  void moveBoxes(double lookout);
   void findPairs();
 
   const FeederPlan& plan_;
   std::deque<Hull> hulls_;
   scene::Dynamics dynamics_;
+  scene::Workers workers_;
   scene::DynamicsStep settings_;
   scene::DynamicsReport report_;
   collision::SortAndSweep broadPhase_;
   std::vector<collision::MoverId> movers_;  ///< of the parts
   std::vector<collision::ExtremalVertices> extremes_;
-  std::vector<collision::MoverId> trayMovers_;
+  std::vector<collision::Box> boxes_;  ///< of the parts, as the broad phase has them
   std::vector<std::uint32_t> solidOfMover_, partOfMover_;
   double time_ = 0;
 };

@@ -1,0 +1,123 @@
+#include "assets/feeder.hpp"
+
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "assets/random.hpp"
+#include "assets/sketch.hpp"
+
+namespace enfilade::assets {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kTop = 0.9;        // metres: of the tray's floor
+constexpr double kPlate = 0.02;     // thickness of the tray's plates
+constexpr double kWall = 0.25;      // height of its walls
+constexpr double kGap = 0.01;       // between the tray at its lowest, nearly, and its stand
+constexpr double kSpacing = 0.026;  // of the parts as they are strewn: more than any is long
+constexpr std::size_t kMostParts = 20000;
+
+constexpr int kKeys = 16;                     // of a period; 240 a second, one a substep
+constexpr double kPeriod = 16.0 / 240;        // seconds
+constexpr double kUp = 2e-3, kSide = 0.5e-3;  // metres: 1.8 times the weight at 15 Hz
+
+/// Half the tray's inner width: about two layers.
+double innerOf(std::size_t parts) {
+  const double across = std::ceil(std::sqrt(static_cast<double>(parts) / 4));
+  return 0.5 * kSpacing * across;
+}
+
+Shape turnedPart(double radius, double halfHeight, double top, int sides, Paint paint) {
+  Shape shape;
+  addTurned(shape, Vec3::Zero(), {{radius, -halfHeight}, {top * radius, halfHeight}}, sides, paint);
+  return shape;
+}
+
+std::array<Shape, 5> kindsOfParts() {
+  std::array<Shape, 5> kinds;
+  addBox(kinds[0], Vec3(-0.010, -0.005, -0.007), Vec3(0.010, 0.005, 0.007), Paint::steel);
+  kinds[1] = turnedPart(0.009, 0.004, 1, 6, Paint::brass);
+  addPrism(kinds[2], {{-0.009, -0.005}, {0.009, -0.005}, {0, 0.010}},
+           {Vec3(0, 0, -0.006), Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}, 0.012, Paint::chrome);
+  kinds[3] = turnedPart(0.006, 0.010, 0.7, 8, Paint::darkIron);
+  kinds[4] = turnedPart(0.010, 0.003, 0.5, 4, Paint::blackMetal);
+  return kinds;
+}
+
+/// Uniform over all rotations, without a sine: four numbers in the unit ball, made unit.
+Eigen::Quaterniond anyRotation(Random& random) {
+  while (true) {  // ends: three of ten are taken
+    Eigen::Vector4d q;
+    for (int i = 0; i < 4; ++i) q[i] = random.between(-1, 1);
+    const double squared = q.squaredNorm();
+    if (squared > 1 || squared < 0.01) continue;
+    q /= std::sqrt(squared);
+    return {q[0], q[1], q[2], q[3]};
+  }
+}
+
+void placeTray(Sketch& sketch, double in) {
+  const double out = in + kPlate, top = kTop + kWall;
+  const Paint paint = Paint::paintedWood;
+  sketch.box("feeder/tray/floor", {-out, kTop - kPlate, -out}, {out, kTop, out}, paint);
+  sketch.box("feeder/tray/west", {-out, kTop, -out}, {-in, top, out}, paint);
+  sketch.box("feeder/tray/east", {in, kTop, -out}, {out, top, out}, paint);
+  sketch.box("feeder/tray/north", {-in, kTop, -out}, {in, top, -in}, paint);
+  sketch.box("feeder/tray/south", {-in, kTop, in}, {in, top, out}, paint);
+}
+
+void placeParts(Sketch& sketch, const FeederOptions& options, double in) {
+  Random random(options.seed);
+  const std::array<Shape, 5> kinds = kindsOfParts();
+  const auto across = static_cast<std::size_t>(std::lround(2 * in / kSpacing));
+  for (std::size_t i = 0; i < options.parts; ++i) {
+    const std::size_t row = i % across, column = i / across % across, layer = i / across / across;
+    const Vec3 cell(static_cast<double>(row) + 0.5, static_cast<double>(layer) + 0.7,
+                    static_cast<double>(column) + 0.5);
+    Eigen::Affine3d worldFromPart = Eigen::Affine3d::Identity();
+    worldFromPart.linear() = anyRotation(random).toRotationMatrix();
+    worldFromPart.translation() = kSpacing * cell + Vec3(-in, kTop, -in);
+    sketch.place(numbered("feeder/part", static_cast<int>(i + 1)), kinds[i % kinds.size()],
+                 worldFromPart);
+  }
+}
+
+Json keysOfDrive() {
+  const std::vector<Vec2> circle = unitCircle(kKeys);
+  Json keys = Json::array();
+  for (int i = 0; i <= kKeys; ++i) {
+    const double sine = i % (kKeys / 2) == 0 ? 0 : circle[static_cast<std::size_t>(i % kKeys)].y();
+    keys.push_back({{"time", kPeriod * i / kKeys}, {"offset", {kSide * sine, kUp * sine, 0}}});
+  }
+  return keys;
+}
+
+}  // namespace
+
+scene::Model makeFeeder(const FeederOptions& options) {
+  if (options.parts < 1 || options.parts > kMostParts)
+    throw std::invalid_argument("a feeder has 1 to " + std::to_string(kMostParts) + " parts");
+  const double in = innerOf(options.parts), out = in + kPlate;
+  Sketch sketch;
+  sketch.box("room/floor", {-out - 3, -0.2, -out - 3}, {out + 3, 0, out + 3}, Paint::concrete);
+  sketch.box("room/stand", {-out, 0, -out}, {out, kTop - kPlate - kGap, out}, Paint::oakDark);
+  placeTray(sketch, in);
+  placeParts(sketch, options, in);
+  return sketch.model();
+}
+
+std::string feederSidecar() {
+  const Json tray{{"name", "tray"},
+                  {"kind", "path"},
+                  {"objects", {"feeder/tray/*"}},
+                  {"loops", true},
+                  {"keys", keysOfDrive()}};
+  const Json parts{{"name", "part"}, {"kind", "rigid"}, {"objects", {"feeder/part*"}},
+                   {"each", true},   {"density", 2700}, {"friction", 0.4}};
+  return Json{{"walk", 1}, {"bodies", {tray, parts}}}.dump(1) + "\n";
+}
+
+}  // namespace enfilade::assets

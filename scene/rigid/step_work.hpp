@@ -1,0 +1,39 @@
+// What belongs to one step of dynamics.hpp. Private to its files.
+#pragma once
+
+#include "scene/rigid/dynamics.hpp"
+#include "scene/rigid/passage.hpp"
+#include "scene/rigid/workers.hpp"
+
+namespace enfilade::scene {
+
+inline constexpr std::uint32_t kNoPlace = ~0u;
+inline constexpr std::size_t kPairBlock = 64;  ///< pairs that a thread takes at a time
+
+struct StepWork {
+  explicit StepWork(Workers& all) : workers(all) {}
+
+  Workers& workers;
+  DynamicsReport report;
+  static constexpr std::uint8_t kActive = 1, kAsked = 2, kWakes = 4;
+  std::vector<std::uint8_t> looks;     ///< of each pair, these flags
+  std::vector<std::uint32_t> active;   ///< indices of pairs that were looked at or may matter
+  std::vector<std::uint32_t> patched;  ///< of those, with a patch
+  std::vector<std::uint32_t> local;    ///< of each solid: its place in `bodies`; kNoPlace: none
+  std::vector<std::uint32_t> solids;   ///< of each of `bodies`
+  std::vector<RigidBody> bodies;
+  std::vector<DrivenBody> driven;
+  std::vector<ContactPatch> patches;
+  std::vector<std::uint32_t> patchPairs;
+  std::vector<Joint> joints;
+  std::vector<std::uint32_t> jointOf;
+  std::vector<double> fractions;  ///< of each of `bodies`, of its way
+  std::vector<Passage> passages;
+  std::vector<double> closing;  ///< of each of `active`: metres, by the ways as they are now
+  std::vector<Vec3> carried;    ///< of each of `bodies`: metres that it goes in any case
+};
+
+/// Step 3: the ways to where the solver has the bodies, as far as they are proved (ways.cpp).
+void proveWays(const Dynamics& dynamics, double seconds, StepWork& work);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,172 @@
+// How far each body goes towards where the solver has it: step 3 at the head of dynamics.cpp.
+#include <algorithm>
+
+#include "scene/rigid/islands.hpp"
+#include "scene/rigid/step_work.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr int kPartialRounds = 4;  // then who is in the way does not move at all
+
+Passage passageOf(const Solid& solid, const RigidBody& goal) {
+  Passage passage = standing(solid);
+  passage.toCentre = goal.centre, passage.toRotation = goal.rotation;
+  passage.stands = nullptr;
+  measure(passage);
+  return passage;
+}
+
+/// How far the pair is proved clear; 1 for one that was not separated when it set out.
+/// `proof`: set where the narrow phase had to be asked.
+double clearFraction(const Dynamics& dynamics, const NearPair& pair, double closing,
+                     const StepWork& work, std::uint8_t& proof) {
+  if (pair.verdict != collision::Verdict::separated) return 1;
+  const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
+  if (closing < apartNow(pair, a, b)) return 1;
+  const Passage& wayA = work.passages[work.local[pair.key.a]];
+  const Passage& wayB = work.passages[work.local[pair.key.b]];
+  const PartShape partA = shapeOf(a, pair.key.partA), partB = shapeOf(b, pair.key.partB);
+  const double along = pair.axis.isZero(0) ? 0 : clearAlong(partA, wayA, partB, wayB, pair.axis);
+  if (along == 1) return 1;
+  proof = 1;
+  // Where they end in one another, the plane that the solver kept them on is as good as any.
+  if (along > 0 && !separatedAtEnd(partA, wayA, partB, wayB, pair.features())) return along;
+  return clearance(partA, wayA, partB, wayB, pair.features()).fraction;
+}
+
+/// Who would go farther than its leash goes less far; its speed is its own.
+void leash(const Solid& solid, Passage& passage) {
+  for (int i = 0; i < kMostHalvings && lengthOf(passage) > solid.leash; ++i)
+    passage = firstHalf(passage, middleOf(passage));
+  if (lengthOf(passage) > solid.leash) passage = standing(solid);
+}
+
+/// Which of `bodies` each group of patches is carried by: the one driven body that it meets, if
+/// that does not turn. kNoPlace: none; kSeveral: it meets something else that is not free.
+constexpr std::uint32_t kSeveral = kNoPlace - 1;
+
+std::vector<std::uint32_t> findCarriers(const Dynamics& dynamics, const StepWork& work,
+                                        Islands& islands) {
+  const auto isFree = [&](std::uint32_t body) {
+    return dynamics.solids[work.solids[body]].isAwake();
+  };
+  for (const ContactPatch& patch : work.patches)
+    if (isFree(patch.a) && isFree(patch.b)) islands.join(patch.a, patch.b);
+  std::vector<std::uint32_t> carriers(work.bodies.size(), kNoPlace);
+  for (const ContactPatch& patch : work.patches) {
+    if (isFree(patch.a) == isFree(patch.b)) continue;
+    const std::uint32_t held = isFree(patch.a) ? patch.b : patch.a;
+    std::uint32_t& carrier = carriers[islands.leaderOf(isFree(patch.a) ? patch.a : patch.b)];
+    const bool carries =
+        work.bodies[held].spin.isZero(0) && (carrier == kNoPlace || carrier == held);
+    carrier = carries ? held : kSeveral;
+  }
+  return carriers;
+}
+
+void findCarried(const Dynamics& dynamics, double seconds, StepWork& work) {
+  Islands islands(work.bodies.size());
+  const std::vector<std::uint32_t> carriers = findCarriers(dynamics, work, islands);
+  work.carried.assign(work.bodies.size(), Vec3::Zero());
+  for (std::uint32_t i = 0; i < work.bodies.size(); ++i) {
+    const std::uint32_t carrier = carriers[islands.leaderOf(i)];
+    if (!dynamics.solids[work.solids[i]].isAwake() || carrier >= kSeveral) continue;
+    const Solid& solid = dynamics.solids[work.solids[carrier]];
+    if (!solid.isFree()) work.carried[i] = seconds * solid.motion.velocity;
+  }
+}
+
+/// Ways of all that go; the others stand.
+void findPassages(const Dynamics& dynamics, StepWork& work) {
+  for (std::size_t i = 0; i < work.bodies.size(); ++i) {
+    const Solid& solid = dynamics.solids[work.solids[i]];
+    const bool goes =
+        solid.isAwake() || (!solid.isFree() && solid.isMoved() && solid.mostPush == 0);
+    work.passages.push_back(goes ? passageOf(solid, work.bodies[i]) : standing(solid));
+    if (solid.isAwake()) leash(solid, work.passages.back());
+  }
+}
+
+/// What one round of proofs finds.
+struct Round {
+  std::vector<std::uint8_t> open;    ///< of each of `bodies`: its way is new
+  std::vector<double> parts;         ///< of each of `active`: of the ways as they are, proved
+  std::vector<double> least;         ///< of each of `bodies`, of the parts of its pairs
+  std::vector<std::uint8_t> proofs;  ///< of each of `active`: the narrow phase was asked
+};
+
+void proveRound(const Dynamics& dynamics, StepWork& work, Round& round) {
+  round.parts.assign(work.active.size(), 1);
+  round.proofs.assign(work.active.size(), 0);
+  work.workers.share(work.active.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; k < to; ++k) {
+      const NearPair& pair = dynamics.pairs[work.active[k]];
+      const std::uint32_t a = work.local[pair.key.a], b = work.local[pair.key.b];
+      if (!round.open[a] && !round.open[b]) continue;
+      work.closing[k] = closingOf(work.passages[a], work.passages[b]);
+      round.parts[k] = clearFraction(dynamics, pair, work.closing[k], work, round.proofs[k]);
+    }
+  });
+  for (const std::uint8_t proof : round.proofs) work.report.proofs += proof;
+}
+
+/// Whether a free solid has any way left that can be shortened.
+bool canYield(const Dynamics& dynamics, std::uint32_t solid, const StepWork& work) {
+  return dynamics.solids[solid].isAwake() && work.fractions[work.local[solid]] > 0;
+}
+
+/// Shortens the way of one of `bodies` to a part.
+void shorten(std::uint32_t body, double part, StepWork& work) {
+  work.fractions[body] *= part;
+  Passage& way = work.passages[body];
+  way.toCentre -= work.carried[body];
+  way = firstPart(way, part);
+  way.toCentre += work.carried[body];
+  measure(way);
+}
+
+/// Shortens the ways of all whose pairs are not proved clear. Returns whether any was.
+bool shortenAll(const Dynamics& dynamics, bool toNothing, StepWork& work, Round& round) {
+  round.least.assign(work.bodies.size(), 1);
+  for (std::size_t k = 0; k < work.active.size(); ++k) {
+    if (round.parts[k] == 1) continue;
+    const NearPair& pair = dynamics.pairs[work.active[k]];
+    bool any = false;
+    for (const std::uint32_t solid : {pair.key.a, pair.key.b}) {
+      if (!canYield(dynamics, solid, work)) continue;
+      double& least = round.least[work.local[solid]];
+      least = std::min(least, toNothing ? 0 : round.parts[k]);
+      any = true;
+    }
+    if (!any) ++work.report.squeezed;
+  }
+  bool any = false;
+  for (std::uint32_t i = 0; i < work.bodies.size(); ++i) {
+    round.open[i] = round.least[i] < 1;
+    if (!round.open[i]) continue;
+    shorten(i, round.least[i], work);
+    any = true;
+  }
+  return any;
+}
+
+}  // namespace
+
+void proveWays(const Dynamics& dynamics, double seconds, StepWork& work) {
+  work.fractions.assign(work.bodies.size(), 1);
+  work.closing.assign(work.active.size(), 0);
+  findCarried(dynamics, seconds, work);
+  findPassages(dynamics, work);
+  Round round;
+  round.open.assign(work.bodies.size(), 1);
+  // Each round but the last shortens a way, after kPartialRounds to nothing.
+  const std::size_t bound = work.bodies.size() + kPartialRounds + 1;
+  bool any = true;
+  for (std::size_t i = 0; i < bound && any; ++i) {
+    proveRound(dynamics, work, round);
+    any = shortenAll(dynamics, i >= kPartialRounds, work, round);
+  }
+}
+
+}  // namespace enfilade::scene
