@@ -178,7 +178,7 @@ void keepImpulses(Dynamics& dynamics, const StepWork& work) {
 
 // ---- after step 3 ------------------------------------------------------------------------------
 
-void setOut(Dynamics& dynamics, double seconds, StepWork& work) {
+void setOut(Dynamics& dynamics, StepWork& work) {
   for (std::size_t i = 0; i < work.bodies.size(); ++i) {
     Solid& solid = dynamics.solids[work.solids[i]];
     const bool isAwake = solid.isAwake();
@@ -186,9 +186,10 @@ void setOut(Dynamics& dynamics, double seconds, StepWork& work) {
     const Passage& way = work.passages[i];
     solid.motion.centre = way.toCentre, solid.motion.rotation = way.toRotation;
     if (isAwake) {
-      const Vec3 with = work.carried[i] / seconds;
+      const Carry& carry = work.carried[i];
+      const Vec3 with = carry.velocityAt(way.fromCentre);
       solid.motion.velocity = with + work.fractions[i] * (work.bodies[i].velocity - with);
-      solid.motion.spin = work.fractions[i] * work.bodies[i].spin;
+      solid.motion.spin = carry.spin + work.fractions[i] * (work.bodies[i].spin - carry.spin);
       if (work.fractions[i] < 1) ++work.report.shortened;
     }
     solid.odometer += lengthOf(way);
@@ -280,7 +281,7 @@ DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings) {
   solve(work.bodies, work.patches, work.joints, work.driven, settings.solver, work.workers);
   keepImpulses(dynamics, work);
   proveWays(dynamics, settings.solver.seconds, work);
-  setOut(dynamics, settings.solver.seconds, work);
+  setOut(dynamics, work);
   rest(dynamics, settings, work);
   return work.report;
 }

@@ -323,7 +323,7 @@ void catchBody(WorldState& world, Body& body, Solid& solid, TickReport& report) 
   report.contacts.push_back(eventOf(world, ContactEvent::Kind::leftWorld, body.id, nowhere));
 }
 
-/// How far one that sleeps may have to go in this tick out of the way of driven bodies, metres.
+/// How far it may have to go in this tick out of the way of driven bodies, or with them, metres.
 double drivenAway(const WorldState& world, const Body& body, double lookout) {
   const Box box = grown(boxOf(body), lookout);
   double farthest = 0;
@@ -355,7 +355,7 @@ void planRigids(WorldState& world) {
   for (const std::uint32_t i : world.rigids.bodies) {
     Body& body = world.bodies[i];
     Solid& solid = solidOfRigid(world.rigids, i);
-    const double driven = body.asleep ? drivenAway(world, body, lookout) : 0;
+    const double driven = drivenAway(world, body, lookout);
     const bool wasAwake = solid.leash > lookout;
     if (body.asleep && !wasAwake && driven == 0) continue;
     body.moved = false;

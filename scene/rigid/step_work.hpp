@@ -10,6 +10,18 @@ namespace enfilade::scene {
 inline constexpr std::uint32_t kNoPlace = ~0u;
 inline constexpr std::size_t kPairBlock = 64;  ///< pairs that a thread takes at a time
 
+/// The way of a driven body, which takes along what it pushes: x goes to
+/// turn * (x - pivot) + pivot + shift.
+struct Carry {
+  std::uint32_t by = kNoPlace;  ///< which of `bodies`; kNoPlace: nobody carries
+  Vec3 pivot = Vec3::Zero(), shift = Vec3::Zero();
+  collision::Quat turn = collision::Quat::Identity();
+  bool turns = false;
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< the carrier's, mean of the step
+
+  Vec3 velocityAt(const Vec3& point) const { return velocity + spin.cross(point - pivot); }
+};
+
 struct StepWork {
   explicit StepWork(Workers& all) : workers(all) {}
 
@@ -30,7 +42,7 @@ struct StepWork {
   std::vector<double> fractions;  ///< of each of `bodies`, of its way
   std::vector<Passage> passages;
   std::vector<double> closing;  ///< of each of `active`: metres, by the ways as they are now
-  std::vector<Vec3> carried;    ///< of each of `bodies`: metres that it goes in any case
+  std::vector<Carry> carried;   ///< of each of `bodies`: the way that it goes in any case
 };
 
 /// Step 3: the ways to where the solver has the bodies, as far as they are proved (ways.cpp).

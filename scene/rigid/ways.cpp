@@ -42,38 +42,51 @@ void leash(const Solid& solid, Passage& passage) {
   if (lengthOf(passage) > solid.leash) passage = standing(solid);
 }
 
-/// Which of `bodies` each group of patches is carried by: the one driven body that it meets, if
-/// that does not turn. kNoPlace: none; kSeveral: it meets something else that is not free.
+/// Which of `bodies` each group of patches is carried by: the one driven body that it meets.
+/// kNoPlace: none; kSeveral: more than one. What stands besides may stop it (see drop()).
 constexpr std::uint32_t kSeveral = kNoPlace - 1;
 
 std::vector<std::uint32_t> findCarriers(const Dynamics& dynamics, const StepWork& work,
                                         Islands& islands) {
-  const auto isFree = [&](std::uint32_t body) {
-    return dynamics.solids[work.solids[body]].isAwake();
+  const auto solidOf = [&](std::uint32_t body) -> const Solid& {
+    return dynamics.solids[work.solids[body]];
   };
   for (const ContactPatch& patch : work.patches)
-    if (isFree(patch.a) && isFree(patch.b)) islands.join(patch.a, patch.b);
+    if (solidOf(patch.a).isAwake() && solidOf(patch.b).isAwake()) islands.join(patch.a, patch.b);
   std::vector<std::uint32_t> carriers(work.bodies.size(), kNoPlace);
   for (const ContactPatch& patch : work.patches) {
-    if (isFree(patch.a) == isFree(patch.b)) continue;
-    const std::uint32_t held = isFree(patch.a) ? patch.b : patch.a;
-    std::uint32_t& carrier = carriers[islands.leaderOf(isFree(patch.a) ? patch.a : patch.b)];
-    const bool carries =
-        work.bodies[held].spin.isZero(0) && (carrier == kNoPlace || carrier == held);
-    carrier = carries ? held : kSeveral;
+    const bool firstIsFree = solidOf(patch.a).isAwake();
+    if (firstIsFree == solidOf(patch.b).isAwake()) continue;
+    const std::uint32_t held = firstIsFree ? patch.b : patch.a;
+    if (work.passages[held].stands) continue;
+    std::uint32_t& carrier = carriers[islands.leaderOf(firstIsFree ? patch.a : patch.b)];
+    carrier = carrier == kNoPlace || carrier == held ? held : kSeveral;
   }
   return carriers;
+}
+
+Carry carryBy(std::uint32_t carrier, double seconds, const StepWork& work) {
+  const Passage& way = work.passages[carrier];
+  Carry carry;
+  carry.by = carrier;
+  carry.pivot = way.fromCentre;
+  carry.shift = way.toCentre - way.fromCentre;
+  carry.turn = way.toRotation * way.fromRotation.conjugate();
+  carry.turns = way.turn > 0;
+  carry.velocity = carry.shift / seconds;
+  carry.spin = work.bodies[carrier].spin;
+  return carry;
 }
 
 void findCarried(const Dynamics& dynamics, double seconds, StepWork& work) {
   Islands islands(work.bodies.size());
   const std::vector<std::uint32_t> carriers = findCarriers(dynamics, work, islands);
-  work.carried.assign(work.bodies.size(), Vec3::Zero());
+  work.carried.assign(work.bodies.size(), {});
   for (std::uint32_t i = 0; i < work.bodies.size(); ++i) {
     const std::uint32_t carrier = carriers[islands.leaderOf(i)];
     if (!dynamics.solids[work.solids[i]].isAwake() || carrier >= kSeveral) continue;
-    const Solid& solid = dynamics.solids[work.solids[carrier]];
-    if (!solid.isFree()) work.carried[i] = seconds * solid.motion.velocity;
+    if (!dynamics.solids[work.solids[carrier]].isFree())
+      work.carried[i] = carryBy(carrier, seconds, work);
   }
 }
 
@@ -111,19 +124,44 @@ void proveRound(const Dynamics& dynamics, StepWork& work, Round& round) {
   for (const std::uint8_t proof : round.proofs) work.report.proofs += proof;
 }
 
-/// Whether a free solid has any way left that can be shortened.
-bool canYield(const Dynamics& dynamics, std::uint32_t solid, const StepWork& work) {
-  return dynamics.solids[solid].isAwake() && work.fractions[work.local[solid]] > 0;
-}
-
-/// Shortens the way of one of `bodies` to a part.
+/// Shortens the way of one of `bodies` to a part of what it is beside its carrier's.
 void shorten(std::uint32_t body, double part, StepWork& work) {
   work.fractions[body] *= part;
   Passage& way = work.passages[body];
-  way.toCentre -= work.carried[body];
-  way = firstPart(way, part);
-  way.toCentre += work.carried[body];
+  const Carry& carry = work.carried[body];
+  if (carry.by != kNoPlace) way.stands = nullptr;
+  way.toCentre -= carry.shift;
+  if (carry.turns) {
+    way.toCentre = carry.turn.conjugate() * (way.toCentre - carry.pivot) + carry.pivot;
+    way.toRotation = carry.turn.conjugate() * way.toRotation;
+  }
   measure(way);
+  way = firstPart(way, part);
+  if (carry.turns) {
+    way.toCentre = carry.turn * (way.toCentre - carry.pivot) + carry.pivot;
+    way.toRotation = (carry.turn * way.toRotation).normalized();
+  }
+  way.toCentre += carry.shift;
+  measure(way);
+}
+
+/// What its carrier would take it through stops it: nothing is penetrated that stands, rather the
+/// driven body penetrates what it drives.
+void drop(const Dynamics& dynamics, std::uint32_t body, StepWork& work) {
+  work.fractions[body] = 0;
+  work.carried[body] = {};
+  work.passages[body] = standing(dynamics.solids[work.solids[body]]);
+}
+
+/// Whether one of `bodies` has any way of its own left.
+bool canYield(const Dynamics& dynamics, std::uint32_t body, const StepWork& work) {
+  return dynamics.solids[work.solids[body]].isAwake() && work.fractions[body] > 0;
+}
+
+/// Whether it only goes where its carrier takes it, and `other` neither carries it nor goes along.
+bool isTakenInto(std::uint32_t body, std::uint32_t other, const StepWork& work) {
+  const std::uint32_t carrier = work.carried[body].by;
+  return carrier != kNoPlace && carrier != other && work.carried[other].by != carrier;
 }
 
 /// Shortens the ways of all whose pairs are not proved clear. Returns whether any was.
@@ -132,20 +170,25 @@ bool shortenAll(const Dynamics& dynamics, bool toNothing, StepWork& work, Round&
   for (std::size_t k = 0; k < work.active.size(); ++k) {
     if (round.parts[k] == 1) continue;
     const NearPair& pair = dynamics.pairs[work.active[k]];
-    bool any = false;
-    for (const std::uint32_t solid : {pair.key.a, pair.key.b}) {
-      if (!canYield(dynamics, solid, work)) continue;
-      double& least = round.least[work.local[solid]];
-      least = std::min(least, toNothing ? 0 : round.parts[k]);
-      any = true;
+    const std::uint32_t a = work.local[pair.key.a], b = work.local[pair.key.b];
+    bool yieldsA = canYield(dynamics, a, work), yieldsB = canYield(dynamics, b, work);
+    if (!yieldsA && !yieldsB) {
+      yieldsA = isTakenInto(a, b, work);
+      yieldsB = isTakenInto(b, a, work);
     }
-    if (!any) ++work.report.squeezed;
+    const double part = toNothing ? 0 : round.parts[k];
+    if (yieldsA) round.least[a] = std::min(round.least[a], part);
+    if (yieldsB) round.least[b] = std::min(round.least[b], part);
+    if (!yieldsA && !yieldsB) ++work.report.squeezed;
   }
   bool any = false;
   for (std::uint32_t i = 0; i < work.bodies.size(); ++i) {
     round.open[i] = round.least[i] < 1;
     if (!round.open[i]) continue;
-    shorten(i, round.least[i], work);
+    const bool goesOn = work.fractions[i] > 0;
+    if (goesOn) shorten(i, round.least[i], work);
+    const double leash = dynamics.solids[work.solids[i]].leash;
+    if (!goesOn || lengthOf(work.passages[i]) > leash) drop(dynamics, i, work);
     any = true;
   }
   return any;
@@ -156,12 +199,12 @@ bool shortenAll(const Dynamics& dynamics, bool toNothing, StepWork& work, Round&
 void proveWays(const Dynamics& dynamics, double seconds, StepWork& work) {
   work.fractions.assign(work.bodies.size(), 1);
   work.closing.assign(work.active.size(), 0);
-  findCarried(dynamics, seconds, work);
   findPassages(dynamics, work);
+  findCarried(dynamics, seconds, work);
   Round round;
   round.open.assign(work.bodies.size(), 1);
-  // Each round but the last shortens a way, after kPartialRounds to nothing.
-  const std::size_t bound = work.bodies.size() + kPartialRounds + 1;
+  // Each round but the last shortens a way, after kPartialRounds to nothing, or drops one.
+  const std::size_t bound = 2 * work.bodies.size() + kPartialRounds + 1;
   bool any = true;
   for (std::size_t i = 0; i < bound && any; ++i) {
     proveRound(dynamics, work, round);
