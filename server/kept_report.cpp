@@ -39,10 +39,17 @@ std::string dumped(const json& value) {
   return value.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
-/// The report follows from what the scene's hash is of, and from what the import found.
+/// The report follows from what the scene's hash is of, from how the model shares its meshes and
+/// objects belong together, and from what the import found.
 std::string keyOf(const scene::Scene& scene) {
-  return "report 1 scene " + std::to_string(scene.hash()) + " problems " +
-         dumped(jsonOf(scene.model().problems));
+  const scene::Model& model = scene.model();
+  std::string key = "report 2 scene " + std::to_string(scene.hash()) + " meshes";
+  for (const scene::Mesh& mesh : model.meshes)
+    key += " " + std::to_string(mesh.positions.size()) + "/" + std::to_string(mesh.indices.size());
+  key += " pieces";
+  for (std::size_t i = 0; i < model.objects.size(); ++i)
+    if (model.objects[i].pieceOf) key += " " + std::to_string(i);
+  return key + " problems " + dumped(jsonOf(model.problems));
 }
 
 }  // namespace

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/avatar_mesh.hpp"
+
 namespace enfilade::server {
 namespace {
 
@@ -22,17 +24,14 @@ constexpr double kFloorNormal = 0.7;               // steeper contacts are with 
 
 constexpr Colour kInk = kPlanInk, kPaper = kPlanPaper, kContact{214, 40, 40}, kStop{120, 0, 120},
                  kCamera{20, 20, 24};
-constexpr std::array<Colour, 8> kPathColours{{{0, 104, 214},
-                                              {224, 112, 0},
-                                              {0, 140, 80},
-                                              {150, 60, 190},
-                                              {190, 30, 90},
-                                              {0, 150, 170},
-                                              {120, 100, 0},
-                                              {90, 90, 100}}};
 
-Colour colourOf(std::size_t path) {
-  return kPathColours[path % kPathColours.size()];
+/// As the avatar is painted in the pictures.
+Colour colourOf(const WalkedPath& path) {
+  const Eigen::Vector3f linear = render::avatarColour(path.id);
+  const auto byte = [&](int i) {
+    return static_cast<std::uint8_t>(std::lround(255 * std::pow(linear[i], 1 / 2.2f)));
+  };
+  return {byte(0), byte(1), byte(2)};
 }
 
 struct Storey {
@@ -85,20 +84,24 @@ void drawPath(std::vector<Storey>& storeys, const WalkedPath& path, Colour colou
   drawDot(*nearestStorey(storeys, path.feet.front().y()), path.feet.front(), 6, colour);
 }
 
-/// A small wedge that opens where the eyes look.
+/// The angle of view at `eye`: it opens along the unit vector (x, y) in which the eyes look.
+void drawWedge(Image& image, const Pixel& eye, double x, double y) {
+  constexpr double kLength = 18, kHalfWidth = 9;
+  const Pixel left{eye.x + kLength * x + kHalfWidth * y, eye.y + kLength * y - kHalfWidth * x};
+  const Pixel right{eye.x + kLength * x - kHalfWidth * y, eye.y + kLength * y + kHalfWidth * x};
+  render::drawLine(image, eye.x, eye.y, left.x, left.y, 2, kCamera);
+  render::drawLine(image, right.x, right.y, eye.x, eye.y, 2, kCamera);
+  render::drawDisc(image, eye.x, eye.y, 3, kCamera);
+}
+
 void drawCapture(std::vector<Storey>& storeys, const MapCapture& capture) {
-  constexpr double kLength = 16, kHalfWidth = 8;
   Storey& storey = *nearestStorey(storeys, capture.eye.y() - 1.6);
   const Pixel eye = pixelOf(storey, capture.eye);
   const double length = std::hypot(capture.gaze.x(), capture.gaze.z());
   const double x = length > 0 ? capture.gaze.x() / length : 1;
   const double y = length > 0 ? capture.gaze.z() / length : 0;
-  const Pixel left{eye.x + kLength * x + kHalfWidth * y, eye.y + kLength * y - kHalfWidth * x};
-  const Pixel right{eye.x + kLength * x - kHalfWidth * y, eye.y + kLength * y + kHalfWidth * x};
   Image& image = storey.image;
-  render::drawLine(image, eye.x, eye.y, left.x, left.y, 2, kCamera);
-  render::drawLine(image, left.x, left.y, right.x, right.y, 2, kCamera);
-  render::drawLine(image, right.x, right.y, eye.x, eye.y, 2, kCamera);
+  drawWedge(image, eye, x, y);
   render::drawText(image, static_cast<int>(eye.x) + 6, static_cast<int>(eye.y) + 6, capture.name, 1,
                    kCamera);
 }
@@ -117,18 +120,16 @@ void drawContacts(std::vector<Storey>& storeys, const WalkTrace& trace) {
 struct LegendEntry {
   std::string text;
   Colour colour;
+  bool wedge;  ///< the sign of a capture; else a dot
 };
 
 std::vector<LegendEntry> legendOf(const WalkTrace& trace) {
   std::vector<LegendEntry> entries;
-  for (std::size_t i = 0; i < trace.paths.size(); ++i) {
-    entries.push_back({trace.paths[i].avatar, colourOf(i)});
-  }
-  for (const auto& [text, colour] :
-       {std::pair{"contact begins (floors left out)", kContact},
-        std::pair{"walk ends blocked", kStop}, std::pair{"picture taken", kCamera}}) {
-    entries.push_back({text, colour});
-  }
+  for (const WalkedPath& path : trace.paths)
+    entries.push_back({path.avatar, colourOf(path), false});
+  entries.push_back({"contact begins (floors left out)", kContact, false});
+  entries.push_back({"walk ends blocked", kStop, false});
+  entries.push_back({"picture taken, towards the open end", kCamera, true});
   return entries;
 }
 
@@ -144,7 +145,11 @@ void drawLegend(Image& image, const std::vector<LegendEntry>& entries, int top) 
   for (int i = 0; i < static_cast<int>(entries.size()); ++i) {
     const LegendEntry& entry = entries[static_cast<std::size_t>(i)];
     const int x = 24 + i / rows * kLegendColumn, y = top + i % rows * kLine;
-    render::drawDisc(image, x, y + 7, 6, entry.colour);
+    if (entry.wedge) {
+      drawWedge(image, {x - 8.0, y + 7.0}, 1, 0);
+    } else {
+      render::drawDisc(image, x, y + 7, 6, entry.colour);
+    }
     render::drawText(image, x + 16, y, entry.text, 2, kInk);
   }
 }
@@ -199,9 +204,7 @@ std::optional<Image> drawMap(const WalkTrace& trace, const TakePicture& picture)
     storeys.push_back(std::move(storey));
   }
   if (storeys.empty()) return std::nullopt;
-  for (std::size_t i = 0; i < trace.paths.size(); ++i) {
-    drawPath(storeys, trace.paths[i], colourOf(i));
-  }
+  for (const WalkedPath& path : trace.paths) drawPath(storeys, path, colourOf(path));
   for (const MapCapture& capture : trace.captures) drawCapture(storeys, capture);
   drawContacts(storeys, trace);
   return composed(trace, storeys);

@@ -13,6 +13,7 @@ namespace enfilade::server {
 struct WalkedPath {
   std::string avatar;
   std::vector<Vec3> feet;
+  scene::EntityId id = 0;  ///< its colour is that of the avatar in the pictures
 };
 struct MapContact {
   Vec3 point = Vec3::Zero();

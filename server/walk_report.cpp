@@ -223,7 +223,7 @@ void WalkReport::add(const protocol::StepOutcome& outcome) {
   for (const v1::Notice& notice : outcome.notices) addNotice(notice);
   for (const v1::AvatarState& avatar : outcome.avatars) {
     const auto [found, isNew] = pathOf_.try_emplace(avatar.name(), trace_.paths.size());
-    if (isNew) trace_.paths.push_back({avatar.name(), {}});
+    if (isNew) trace_.paths.push_back({avatar.name(), {}, avatar.id()});
     trace_.paths[found->second].feet.push_back(vectorFrom(avatar.feet()));
   }
   for (const protocol::CapturedFrame& frame : outcome.frames) addFrame(frame, outcome);

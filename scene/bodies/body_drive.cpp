@@ -123,6 +123,12 @@ std::pair<double, double> nextCoordinate(const Body& body, double tick) {
   return {std::clamp(drive.coordinate + rate * tick, low, high), rate};
 }
 
+/// A path that loops may have turned: the same pose, counted so that it is nearest to `turn`.
+double onBranchOf(double turn, double wound, const BodySpec& spec) {
+  const double round = spec.keys.back().turn - spec.keys.front().turn;
+  return round == 0 ? wound : wound - std::round((wound - turn) / round) * round;
+}
+
 /// Where a path is between; `coordinate`: at the end of the tick.
 void planBetween(Body& body, double coordinate, double tick) {
   BodyPlan& plan = body.plan;
@@ -133,7 +139,9 @@ void planBetween(Body& body, double coordinate, double tick) {
     const double at = goesRound(*body.spec) ? std::fmod(now + part * body.drive.speed * tick,
                                                         body.spec->keys.back().time)
                                             : now + part * (coordinate - now);
-    plan.between[static_cast<std::size_t>(i) - 1] = placeOf(*body.spec, at);
+    BodyPlace& between = plan.between[static_cast<std::size_t>(i) - 1];
+    between = placeOf(*body.spec, at);
+    if (body.spec->loops) between.turn = onBranchOf(plan.from.turn, between.turn, *body.spec);
   }
   plan.between.back() = plan.place;
   plan.winds = std::any_of(plan.between.begin(), plan.between.end(), [&](const BodyPlace& at) {
@@ -150,6 +158,10 @@ void plan(Body& body, double tick) {
   body.drive.rate = rate;
   body.plan.coordinate = coordinate;
   body.plan.place = placeOf(*body.spec, coordinate);
+  if (goesRound(*body.spec)) {
+    double& turn = body.drive.place.turn;
+    turn = onBranchOf(body.plan.place.turn, turn, *body.spec);
+  }
   body.plan.farthest = (body.plan.place.offset - body.drive.place.offset).norm() +
                        std::abs(body.plan.place.turn - body.drive.place.turn) * body.shape->radius;
   if (body.spec->kind == BodyKind::path) planBetween(body, coordinate, tick);

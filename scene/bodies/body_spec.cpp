@@ -1,6 +1,7 @@
 #include "scene/bodies/body_spec.hpp"
 
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "scene/model.hpp"
@@ -60,6 +61,9 @@ Refusal refusalOfPath(const BodySpec& body) {
   const PathKey &first = body.keys.front(), &end = body.keys.back();
   const bool closed = (first.offset - end.offset).cwiseAbs().maxCoeff() <= kSameEnd;
   if (body.loops && !closed) return "keys: a path that loops must end where it begins";
+  const double turns = (end.turn - first.turn) / (2 * std::numbers::pi);
+  if (body.loops && std::abs(turns - std::round(turns)) > kSameEnd)
+    return "keys: a path that loops must end turned as it begins, or by whole turns more";
   return std::nullopt;
 }
 

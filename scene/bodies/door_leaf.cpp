@@ -32,6 +32,7 @@ constexpr double kLowest = 1.4;         // metres: a person goes through
 constexpr double kLeastShare = 0.65;    // of the door's width that its leaves have
 constexpr double kLeastHeight = 0.7;    // of the door's height
 constexpr double kNarrowest = 0.3;      // metres
+constexpr double kWidest = 1.6;         // metres: what is wider does not turn on hinges
 constexpr double kOblong = 1.5;         // a door is so much wider than thick, or see throughAxis
 constexpr double kHandleShare = 0.4;    // of the leaf's width that a handle takes at most
 constexpr double kHandleAside = 0.2;    // of it that a handle sits from the middle at least
@@ -176,22 +177,27 @@ std::vector<const Surface*> ringsAround(const DoorShape& shape, const Box& panel
   return rings;
 }
 
+/// Boxes that lie over one another as seen from above become one; from left to right.
+std::vector<Box> joined(std::vector<Box> groups) {
+  std::sort(groups.begin(), groups.end(),
+            [](const Box& a, const Box& b) { return a.min.x() < b.min.x(); });
+  std::vector<Box> apart;
+  for (const Box& box : groups) {
+    if (!apart.empty() && box.min.x() < apart.back().max.x() - kSlack) {
+      apart.back().include(box);
+    } else {
+      apart.push_back(box);
+    }
+  }
+  return apart;
+}
+
 /// Leaves as boxes of panels that overlap in x, ascending.
 std::vector<Box> panelGroups(const DoorShape& shape) {
   std::vector<Box> groups;
   for (const Surface& surface : shape.surfaces)
     if (surface.panel) groups.push_back(surface.box);
-  std::sort(groups.begin(), groups.end(),
-            [](const Box& a, const Box& b) { return a.min.x() < b.min.x(); });
-  std::vector<Box> joined;
-  for (const Box& box : groups) {
-    if (!joined.empty() && box.min.x() < joined.back().max.x() - kSlack) {
-      joined.back().include(box);
-    } else {
-      joined.push_back(box);
-    }
-  }
-  return joined;
+  return joined(std::move(groups));
 }
 
 /// A pane's leaf is what holds it.
@@ -285,12 +291,22 @@ DoorPieces piecesOfDoor(const Model& model, const Object& door) {
   for (Surface& surface : shape.surfaces) surface.panel = isPanel(surface, shape.box);
   std::vector<Box> panels = panelGroups(shape);
   growToRings(shape, panels);
+  panels = joined(std::move(panels));  // two panes of one leaf grew to the same one
   const double drawn = shape.box.empty() ? 0 : shape.box.size().x();
   const double width = door.overallWidth > 0 ? std::min(door.overallWidth, drawn) : drawn;
   result.turned = shape.turned;
   result.why = refusalOf(shape, panels, width);
+  const bool slides = door.operation.rfind("SLIDING", 0) == 0;
+  for (const Box& panel : panels)
+    if (result.why.empty() && !slides && panel.size().x() > kWidest)
+      result.why = "what fills its middle is too wide for one leaf that turns";
   if (!result.why.empty()) return result;
   const std::vector<std::uint8_t> pieces = assignSurfaces(shape, panels);
+  for (std::size_t leaf = 0; leaf < panels.size(); ++leaf)
+    if (std::count(pieces.begin(), pieces.end(), leaf) == 0) {
+      result.why = "what fills its middle is of no leaf";
+      return result;
+    }
   for (std::size_t leaf = 0; leaf < panels.size(); ++leaf) {
     const auto number = static_cast<std::uint8_t>(leaf);
     DoorLeaf& made = result.leaves.emplace_back();

@@ -34,6 +34,34 @@ Sidecar applySidecarBeside(Model& model, const std::filesystem::path& file) {
   return applySidecar(model, readWhole(sidecar), sidecar.filename().string());
 }
 
+bool hasArea(const Mesh& mesh) {
+  for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+    const auto corner = [&](std::size_t k) -> Vec3 {
+      return mesh.positions[mesh.indices[i + k]].cast<double>();
+    };
+    const Vec3 origin = corner(0);
+    if ((corner(1) - origin).cross(corner(2) - origin).squaredNorm() > 0) return true;
+  }
+  return false;
+}
+
+/// A file that other programs wrote must not keep the scene from loading: what it calls a body and
+/// has no surface to collide with stays out, told. (A sidecar's is an error.)
+void dropBodiesWithoutArea(Model& model) {
+  std::erase_if(model.bodies, [&](const BodySpec& body) {
+    if (body.source == BodySource::sidecar) return false;
+    for (const std::uint32_t index : body.objects) {
+      const Object& object = model.objects[index];
+      if (object.use == Object::Use::drawn) continue;
+      for (const std::uint32_t mesh : object.meshes)
+        if (hasArea(model.meshes[mesh])) return false;
+    }
+    addProblem(model, "body_without_area",
+               body.name + " of " + wordOf(body.source) + ": its objects have no surface");
+    return true;
+  });
+}
+
 }  // namespace
 
 void findBodies(Model& model, const std::filesystem::path& file, IfcDoors doors) {
@@ -51,6 +79,7 @@ void findBodies(Model& model, const std::filesystem::path& file, IfcDoors doors)
   addLowerBodies(model, std::move(ofFile), sidecar.still);
   if (doors == IfcDoors::move) addLowerBodies(model, std::move(ofIfc), sidecar.still);
   takeCollisionShapesAlong(model);
+  dropBodiesWithoutArea(model);
 }
 
 std::string sourcesOf(const Model& model) {

@@ -12,6 +12,7 @@
 #include "scene/rigid/dynamics.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "scene/rigid/islands.hpp"
 #include "scene/rigid/step_work.hpp"
@@ -195,8 +196,10 @@ void setOut(Dynamics& dynamics, StepWork& work) {
     solid.odometer += lengthOf(way);
     placeSolid(solid);
   }
-  for (std::size_t k = 0; k < work.active.size(); ++k)
-    dynamics.pairs[work.active[k]].apart -= work.closing[k];
+  for (std::size_t k = 0; k < work.active.size(); ++k) {
+    double& apart = dynamics.pairs[work.active[k]].apart;
+    apart -= work.closing[k] + 0x1p-51 * (std::abs(apart) + work.closing[k]);
+  }
 }
 
 // ---- step 4 ------------------------------------------------------------------------------------

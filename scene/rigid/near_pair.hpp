@@ -2,6 +2,7 @@
 // that the solver is given.
 #pragma once
 
+#include <cmath>
 #include <compare>
 #include <memory>
 
@@ -67,7 +68,9 @@ bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& st
 
 /// A lower bound of the distance by what was known; may be negative.
 inline double apartNow(const NearPair& pair, const Solid& a, const Solid& b) {
-  return pair.apart - (a.jumped + b.jumped - pair.since);
+  const double moved = a.jumped + b.jumped;
+  const double rounding = 0x1p-51 * (moved + pair.since + std::abs(pair.apart));
+  return pair.apart - (moved - pair.since) - rounding;
 }
 
 /// Whether the points lean on one another: nearer than 2 epsilon.

@@ -255,8 +255,8 @@ void placeDriven(Solid& solid, const Vec3& position, const collision::Quat& orie
   solid.motion.centre = position;
   solid.motion.rotation = orientation;
   placeSolid(solid);
-  solid.jumped +=
-      (solid.position - before).norm() + (solid.rotation - turned).norm() * solid.radius;
+  solid.jumped += (1 + 0x1p-40) * ((solid.position - before).norm() +
+                                   (solid.rotation - turned).norm() * solid.radius);
 }
 
 /// The motion in each substep of a path that was gone all the way.
@@ -404,8 +404,10 @@ Workers* workersFor(RigidStage& stage, std::size_t bodies) {
   const int processors = static_cast<int>(std::thread::hardware_concurrency());
   const int threads = std::min(stage.threads > 0 ? stage.threads : kThreads, processors);
   if (threads < 2) return nullptr;
-  if (!stage.workers || stage.workers->count() != threads)
+  if (!stage.workers || stage.workersAsked != threads) {
     stage.workers = std::make_unique<Workers>(threads);
+    stage.workersAsked = threads;
+  }
   return stage.workers.get();
 }
 

@@ -107,6 +107,8 @@ struct Round {
   std::vector<double> parts;         ///< of each of `active`: of the ways as they are, proved
   std::vector<double> least;         ///< of each of `bodies`, of the parts of its pairs
   std::vector<std::uint8_t> proofs;  ///< of each of `active`: the narrow phase was asked
+  /// Solids of which neither could be kept from the other.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> squeezed;
 };
 
 void proveRound(const Dynamics& dynamics, StepWork& work, Round& round) {
@@ -179,7 +181,7 @@ bool shortenAll(const Dynamics& dynamics, bool toNothing, StepWork& work, Round&
     const double part = toNothing ? 0 : round.parts[k];
     if (yieldsA) round.least[a] = std::min(round.least[a], part);
     if (yieldsB) round.least[b] = std::min(round.least[b], part);
-    if (!yieldsA && !yieldsB) ++work.report.squeezed;
+    if (!yieldsA && !yieldsB) round.squeezed.emplace_back(pair.key.a, pair.key.b);
   }
   bool any = false;
   for (std::uint32_t i = 0; i < work.bodies.size(); ++i) {
@@ -210,6 +212,9 @@ void proveWays(const Dynamics& dynamics, double seconds, StepWork& work) {
     proveRound(dynamics, work, round);
     any = shortenAll(dynamics, i >= kPartialRounds, work, round);
   }
+  std::sort(round.squeezed.begin(), round.squeezed.end());
+  const auto end = std::unique(round.squeezed.begin(), round.squeezed.end());
+  work.report.squeezed = static_cast<std::uint32_t>(end - round.squeezed.begin());
 }
 
 }  // namespace enfilade::scene

@@ -2,6 +2,8 @@
 // take to be woken, and only then sleeps.
 #include "scene/rigid/workers.hpp"
 
+#include <system_error>
+
 namespace enfilade::scene {
 namespace {
 
@@ -19,8 +21,13 @@ void pause() {
 Workers::Workers(int threads) {
   const int count = std::clamp(threads, 1, kMost);
   failures_.resize(static_cast<std::size_t>(count));
-  for (int i = 1; i < count; ++i)
-    helpers_.emplace_back([this, i] { help(static_cast<std::size_t>(i)); });
+  helpers_.reserve(static_cast<std::size_t>(count) - 1);
+  try {
+    for (int i = 1; i < count; ++i)
+      helpers_.emplace_back([this, i] { help(static_cast<std::size_t>(i)); });
+  } catch (const std::system_error&) {
+    // The system gives no more threads: those that there are do it, with the same result.
+  }
 }
 
 Workers::~Workers() {

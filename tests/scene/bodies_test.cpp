@@ -229,6 +229,36 @@ TEST(Bodies, APlatformCarriesSidewaysAndATurntableRound) {
   EXPECT_EQ(whoPenetrates(t.world), "");
 }
 
+TEST(Bodies, ATurntableThatLoopsTurnsOnEvenlyAndCarriesWhoStandsOnIt) {
+  Model model =
+      boxModel({{"plate", {-2, 0, -2}, {2, 0.1, 2}}, {"ground", {-9, -1, -9}, {9, -0.9, 9}}});
+  BodySpec spec = bodySpec("plate", BodyKind::path, {0});
+  const double round = 8 * std::atan(1.0);
+  spec.keys = {{0, Vec3::Zero(), 0}, {2, Vec3::Zero(), round}};
+  spec.loops = true;
+  model.bodies.push_back(spec);
+  BodyTrial t(std::move(model));
+  t.order("ann", Spawn{.at = {1, 0.1, 0}});
+  t.ticks(30);
+  for (int i = 0; i < 300; ++i) {
+    t.step();
+    EXPECT_NEAR(t.body("plate").spin.y(), round / 2, 1e-9) << i;
+    EXPECT_NEAR(t.feet("ann").norm(), 1, 0.2) << i;
+  }
+  EXPECT_TRUE(t.told(ContactEvent::Kind::blocked, "plate", "ann") == 0);
+}
+
+TEST(Bodies, APathThatLoopsEndsTurnedAsItBegan) {
+  Model model = boxModel({floorBox(), {"plate", {0, 1, 0}, {1, 2, 1}}});
+  BodySpec spec = bodySpec("plate", BodyKind::path, {1});
+  spec.keys = {{0, Vec3::Zero(), 0}, {2, Vec3::Zero(), 1}};
+  spec.loops = true;
+  model.bodies.push_back(spec);
+  const auto why = refusalOfBodies(model);
+  ASSERT_TRUE(why);
+  EXPECT_NE(why->find("turned as it begins"), std::string::npos) << *why;
+}
+
 TEST(Bodies, ADoorOpensAwayFromWhoWalksIntoIt) {
   Model model = hingedDoor(
       {{"left", {-4, 0, -0.1}, {-0.01, 3, 0.1}}, {"right", {1.01, 0, -0.1}, {4, 3, 0.1}}});

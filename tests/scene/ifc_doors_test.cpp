@@ -338,7 +338,7 @@ struct Building {
 
 // By web-ifc; the doors of the file, and what became of them.
 const Building kBuildings[] = {
-    {"fzk-haus/AC14-FZK-Haus.ifc", 5, 4, 4, 1},  // the fifth has three panes side by side
+    {"fzk-haus/AC14-FZK-Haus.ifc", 5, 4, 4, 1},  // the fifth has three panes in one sash of 1.9 m
     {"duplex/Duplex_A_20110907.ifc", 14, 14, 0, 0},
 };
 

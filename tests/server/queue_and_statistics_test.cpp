@@ -99,7 +99,7 @@ TEST(CommandLine, EndpointsAreHostAndPort) {
 }
 
 WalkedPath pathAt(std::initializer_list<std::pair<double, int>> heightsAndTicks) {
-  WalkedPath path{"ann", {}};
+  WalkedPath path{"ann", {}, 1};
   for (const auto& [height, ticks] : heightsAndTicks) {
     for (int i = 0; i < ticks; ++i) path.feet.push_back(Vec3(i, height, 0));
   }
@@ -114,7 +114,7 @@ TEST(WalkMap, StoreysAreTheHeightsWalkedOnForLong) {
 }
 
 TEST(WalkMap, WhoStandsStillMakesNoStorey) {
-  WalkedPath waiting{"bob", std::vector<Vec3>(5000, Vec3(0, 0, 0))};
+  WalkedPath waiting{"bob", std::vector<Vec3>(5000, Vec3(0, 0, 0)), 2};
   const auto two = walkedStoreys({pathAt({{0, 100}, {4.2, 50}}), waiting});
   EXPECT_EQ(two, (std::vector<double>{0, 4.2}));
 }
