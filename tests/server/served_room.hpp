@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "protocol/client.hpp"
 #include "server/server.hpp"
@@ -25,6 +26,18 @@ class ServedRoom : public ::testing::Test {
 
   std::unique_ptr<Server> server_;
 };
+
+/// Whether the server can draw. In CI it must: Mesa's software is enough.
+inline bool drawsPictures(const Server& server) {
+  const bool draws = !server.rendererName().empty();
+  if (!draws && std::getenv("CI") != nullptr)
+    ADD_FAILURE() << "no EGL device: install libegl-mesa0 and libgl1-mesa-dri";
+  return draws;
+}
+
+/// Ends the test where nothing can be drawn: as skipped, or in CI as failed.
+#define ENFILADE_NEED_PICTURES(server) \
+  if (!drawsPictures(server)) GTEST_SKIP() << "no EGL device: install libegl-mesa0"
 
 inline v1::Vec3 vec(double x, double y, double z) {
   v1::Vec3 v;
