@@ -2,22 +2,10 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 
 #include "assets/building.hpp"
 #include "assets/glb_writer.hpp"
 #include "assets/sidecar_writer.hpp"
-
-namespace {
-
-void writeSidecar(std::filesystem::path file, const std::string& text) {
-  file.replace_extension(".walk.json");
-  std::ofstream stream(file, std::ios::binary);
-  stream << text;
-  if (!stream.flush()) throw std::runtime_error("cannot write " + file.string());
-}
-
-}  // namespace
 
 int main(int argc, char** argv) {
   using namespace enfilade;
@@ -37,7 +25,7 @@ int main(int argc, char** argv) {
     std::vector<assets::MovingPart> movingParts;
     const scene::Model model = assets::makeBuilding(options, &movingParts);
     assets::writeGlb(file, model, movingParts);
-    if (options.objects == 0) writeSidecar(file, assets::sidecarText(model, movingParts));
+    if (options.objects == 0) assets::writeSidecarOf(file, assets::sidecarText(model, movingParts));
     std::printf("%s: %zu objects, %zu meshes, %zu materials, %.1f MB\n", file.c_str(),
                 model.objects.size(), model.meshes.size(), model.materials.size(),
                 static_cast<double>(std::filesystem::file_size(file)) / 1e6);

@@ -2,10 +2,10 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 
 #include "assets/feeder.hpp"
 #include "assets/glb_writer.hpp"
+#include "assets/sidecar_writer.hpp"
 
 int main(int argc, char** argv) {
   using namespace enfilade;
@@ -22,11 +22,7 @@ int main(int argc, char** argv) {
   }
   try {
     assets::writeGlb(file, assets::makeFeeder(options));
-    const std::filesystem::path sidecar =
-        std::filesystem::path(file).replace_extension(".walk.json");
-    std::ofstream stream(sidecar, std::ios::binary);
-    stream << assets::feederSidecar();
-    if (!stream.flush()) throw std::runtime_error("cannot write " + sidecar.string());
+    assets::writeSidecarOf(file, assets::feederSidecar());
     std::printf("%s: a tray and %zu parts\n", file.c_str(), options.parts);
   } catch (const std::invalid_argument& error) {
     std::fprintf(stderr, "make_feeder: %s\n", error.what());

@@ -1,7 +1,9 @@
 #include "assets/sidecar_writer.hpp"
 
 #include <cmath>
+#include <fstream>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "assets/plan.hpp"
 
@@ -66,6 +68,13 @@ std::string sidecarText(const scene::Model& model, const std::vector<MovingPart>
                      {{plan::kHallWest, 0, -plan::kDoorHalf},
                       {plan::kHallWest + 1, plan::kDoorHeight, plan::kDoorHalf}}}});
   return Json{{"walk", 1}, {"bodies", bodies}}.dump(1) + "\n";
+}
+
+void writeSidecarOf(std::filesystem::path glb, const std::string& text) {
+  const std::filesystem::path file = glb.replace_extension(".walk.json");
+  std::ofstream stream(file, std::ios::binary);
+  stream << text;
+  if (!stream.flush()) throw std::runtime_error("cannot write " + file.string());
 }
 
 }  // namespace enfilade::assets
