@@ -325,6 +325,7 @@ void catchBody(WorldState& world, Body& body, Solid& solid, TickReport& report) 
 
 /// How far it may have to go in this tick out of the way of driven bodies, or with them, metres.
 double drivenAway(const WorldState& world, const Body& body, double lookout) {
+  if (world.goingBodies.empty()) return 0;
   const Box box = grown(boxOf(body), lookout);
   double farthest = 0;
   for (const std::uint32_t i : world.goingBodies)
