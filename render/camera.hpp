@@ -28,7 +28,7 @@ struct Camera {
 /// Why the camera cannot be used, naming the field and its value; nullopt when it can.
 std::optional<std::string> refusal(const Camera& camera);
 
-/// The eyes of an avatar. Its own hull is not drawn in pictures taken with it (see Renderer).
+/// The eyes of an avatar. Its own hull is not drawn in pictures taken with it (see GlRenderer).
 Camera firstPerson(const scene::AvatarView& avatar, int width, int height, double fovY = 1.2);
 
 /// A plan: looks straight down at `bounds` (x to the right, z downwards in the picture), cutting

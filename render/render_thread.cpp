@@ -35,9 +35,9 @@ struct RenderThread::State {
   }
 
   void run(std::shared_ptr<const scene::Scene> scene, std::promise<void> started) {
-    std::unique_ptr<Renderer> renderer;
+    std::unique_ptr<GlRenderer> renderer;
     try {
-      renderer = std::make_unique<Renderer>(std::move(scene));
+      renderer = std::make_unique<GlRenderer>(std::move(scene));
       deviceName = renderer->deviceName();
       software = renderer->software();
     } catch (...) {

@@ -4,13 +4,13 @@
 #include <future>
 #include <memory>
 
-#include "render/renderer.hpp"
+#include "render/gl/gl_renderer.hpp"
 
 namespace enfilade::render {
 
 class RenderThread {
  public:
-  /// Starts the thread and its Renderer; throws RenderError when there can be none.
+  /// Starts the thread and its GlRenderer; throws RenderError when there can be none.
   explicit RenderThread(std::shared_ptr<const scene::Scene> scene);
   ~RenderThread();  ///< finishes what is queued
   RenderThread(const RenderThread&) = delete;

@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "render/image.hpp"
+#include "render/pictures/image.hpp"
 #include "server/world_messages.hpp"
 
 namespace enfilade::server {

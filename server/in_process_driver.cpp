@@ -6,7 +6,7 @@
 
 namespace enfilade::server {
 
-InProcessDriver::InProcessDriver(scene::World& world, render::Renderer* renderer,
+InProcessDriver::InProcessDriver(scene::World& world, render::GlRenderer* renderer,
                                  protocol::CaptureFormat format)
     : world_(world), renderer_(renderer), format_(std::move(format)) {}
 

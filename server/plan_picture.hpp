@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "render/image.hpp"
+#include "render/pictures/image.hpp"
 
 namespace enfilade::server {
 

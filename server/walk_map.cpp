@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "render/avatar_mesh.hpp"
+#include "render/gl/avatar_mesh.hpp"
 
 namespace enfilade::server {
 namespace {

@@ -35,6 +35,8 @@ const std::map<std::string, Names> kRoomMayInclude{
     {"scene/rigid", {"scene", "scene/shapes"}},
     {"scene/bodies", {"scene", "scene/shapes"}},
     {"scene/avatars", {"scene"}},
+    {"render/gl", {"render"}},
+    {"render/pictures", {"render"}},
 };
 
 struct ThirdParty {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "render/image.hpp"
+#include "render/pictures/image.hpp"
 #include "render/view.hpp"
 
 namespace enfilade::render {

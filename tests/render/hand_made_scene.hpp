@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "render/renderer.hpp"
+#include "render/gl/gl_renderer.hpp"
 
 namespace enfilade::render {
 

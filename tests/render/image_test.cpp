@@ -1,4 +1,4 @@
-#include "render/image.hpp"
+#include "render/pictures/image.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <fstream>
 #include <random>
 
-#include "render/font.hpp"
+#include "render/pictures/font.hpp"
 
 namespace enfilade::render {
 namespace {

@@ -1,7 +1,7 @@
 // Pictures through a connection: what is seen is what stands there.
 #include <cstring>
 
-#include "render/image.hpp"
+#include "render/pictures/image.hpp"
 #include "tests/server/served_room.hpp"
 
 namespace enfilade::server::testing {

@@ -5,7 +5,7 @@
 #include <random>
 #include <set>
 
-#include "render/renderer.hpp"
+#include "render/gl/gl_renderer.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/world.hpp"
 #include "tests/support/shared_folder.hpp"
@@ -94,7 +94,7 @@ TEST_P(RealScenes, AnAvatarWalksAndNeverPenetrates) {
   Balance balance;
   ASSERT_TRUE(standSomewhere(world, random, balance));
 
-  render::Renderer renderer(still);
+  render::GlRenderer renderer(still);
   const scene::Box& b = still->bounds();
   double worst = 0, walked = 0;  // metres
   for (int i = 0; i < kTicks; ++i) {

@@ -1,4 +1,4 @@
-#include "render/draw_list.hpp"
+#include "render/gl/draw_list.hpp"
 
 #include <algorithm>
 #include <tuple>

@@ -1,7 +1,7 @@
 // A picture, step by step: the parts of the model that the camera may see, bodies where they are,
 // then the avatars (both write colour, id and depth), then the sky where nothing was drawn, then
 // glass over it all (colour only).
-#include "render/renderer.hpp"
+#include "render/gl/gl_renderer.hpp"
 
 #include <epoxy/gl.h>
 
@@ -10,13 +10,13 @@
 #include <cstddef>
 #include <optional>
 
-#include "render/avatar_mesh.hpp"
-#include "render/draw_list.hpp"
-#include "render/egl_context.hpp"
-#include "render/frame_target.hpp"
-#include "render/model_buffers.hpp"
-#include "render/shaders.hpp"
-#include "render/vertex.hpp"
+#include "render/gl/avatar_mesh.hpp"
+#include "render/gl/draw_list.hpp"
+#include "render/gl/egl_context.hpp"
+#include "render/gl/frame_target.hpp"
+#include "render/gl/model_buffers.hpp"
+#include "render/gl/shaders.hpp"
+#include "render/gl/vertex.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -107,7 +107,7 @@ GlBuffer uploaded(const std::vector<Item>& items) {
 
 }  // namespace
 
-struct Renderer::State {
+struct GlRenderer::State {
   std::shared_ptr<const scene::Scene> scene;
   EglContext context;  // before all that lives in it
   ModelBuffers buffers;
@@ -132,12 +132,12 @@ struct Renderer::State {
   void darkenHollows();
 };
 
-Renderer::State::State(std::shared_ptr<const scene::Scene> shared) : scene(std::move(shared)) {
-  if (!scene) throw RenderError("Renderer: there is no scene");
+GlRenderer::State::State(std::shared_ptr<const scene::Scene> shared) : scene(std::move(shared)) {
+  if (!scene) throw RenderError("GlRenderer: there is no scene");
 }
 
 /// A scene that nobody looks at is never brought to the device.
-void Renderer::State::prepare() {
+void GlRenderer::State::prepare() {
   if (prepared) return;
   buffers = uploadModel(scene->model());
   parts = partsOf(scene->model());
@@ -150,7 +150,7 @@ void Renderer::State::prepare() {
   prepared = true;
 }
 
-Renderer::State::~State() {
+GlRenderer::State::~State() {
   // The members below the context delete their GL names in it.
   try {
     context.makeCurrent();
@@ -159,7 +159,7 @@ Renderer::State::~State() {
   }
 }
 
-GLuint Renderer::State::surfaceProgram(const Batch& batch) {
+GLuint GlRenderer::State::surfaceProgram(const Batch& batch) {
   const SurfaceVariant variant{batch.texture >= 0, batch.pass == Pass::mask,
                                batch.pass == Pass::blend};
   const std::size_t index = 2 * static_cast<std::size_t>(batch.pass) + (variant.textured ? 1 : 0);
@@ -170,7 +170,7 @@ GLuint Renderer::State::surfaceProgram(const Batch& batch) {
   return program->name();
 }
 
-void Renderer::State::setUp(const Camera& camera) {
+void GlRenderer::State::setUp(const Camera& camera) {
   if (!target.fits(camera.width, camera.height)) {
     target = FrameTarget(camera.width, camera.height);
   }
@@ -187,8 +187,8 @@ void Renderer::State::setUp(const Camera& camera) {
   target.begin();
 }
 
-void Renderer::State::drawBatches(const DrawList& list, const GlBuffer& vertices,
-                                  const GlBuffer& indices, bool glass) {
+void GlRenderer::State::drawBatches(const DrawList& list, const GlBuffer& vertices,
+                                    const GlBuffer& indices, bool glass) {
   const auto wanted = [&](const Batch& batch) { return (batch.pass == Pass::blend) == glass; };
   if (std::none_of(list.batches.begin(), list.batches.end(), wanted)) return;
   const GlBuffer instances = uploaded(list.instances);
@@ -211,14 +211,14 @@ void Renderer::State::drawBatches(const DrawList& list, const GlBuffer& vertices
   }
 }
 
-void Renderer::State::drawAvatars(const AvatarMeshes& avatars, const Camera& camera) {
+void GlRenderer::State::drawAvatars(const AvatarMeshes& avatars, const Camera& camera) {
   DrawList list;
   appendVisible(list, avatars, camera);
   if (list.commands.empty()) return;
   drawBatches(list, uploaded(avatars.vertices), uploaded(avatars.indices), false);
 }
 
-void Renderer::State::drawSky() {
+void GlRenderer::State::drawSky() {
   glDepthMask(GL_FALSE);
   glDepthFunc(GL_GEQUAL);
   glUseProgram(sky.name());
@@ -226,7 +226,7 @@ void Renderer::State::drawSky() {
   glDepthFunc(GL_GREATER);
 }
 
-void Renderer::State::darkenHollows() {
+void GlRenderer::State::darkenHollows() {
   target.beginOverlay();
   glDisable(GL_DEPTH_TEST);
   glEnable(GL_BLEND);
@@ -237,13 +237,13 @@ void Renderer::State::darkenHollows() {
   target.endOverlay();
 }
 
-Renderer::Renderer(std::shared_ptr<const scene::Scene> scene)
+GlRenderer::GlRenderer(std::shared_ptr<const scene::Scene> scene)
     : state_(std::make_unique<State>(std::move(scene))) {}
 
-Renderer::~Renderer() = default;
+GlRenderer::~GlRenderer() = default;
 
-Frame Renderer::render(const scene::Snapshot& snapshot, const Camera& camera,
-                       scene::EntityId hidden) {
+Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
+                         scene::EntityId hidden) {
   if (const auto why = refusal(camera)) throw RenderError(*why);
   State& s = *state_;
   s.context.makeCurrent();
@@ -269,10 +269,10 @@ Frame Renderer::render(const scene::Snapshot& snapshot, const Camera& camera,
   return frame;
 }
 
-const std::string& Renderer::deviceName() const {
+const std::string& GlRenderer::deviceName() const {
   return state_->context.deviceName();
 }
-bool Renderer::software() const {
+bool GlRenderer::software() const {
   return state_->context.software();
 }
 

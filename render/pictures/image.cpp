@@ -1,4 +1,4 @@
-#include "render/image.hpp"
+#include "render/pictures/image.hpp"
 
 #include <fcntl.h>
 #include <png.h>

@@ -1,4 +1,4 @@
-#include "render/model_buffers.hpp"
+#include "render/gl/model_buffers.hpp"
 
 #include <epoxy/gl.h>
 
@@ -7,8 +7,8 @@
 #include <limits>
 #include <string>
 
-#include "render/renderer.hpp"
-#include "render/vertex.hpp"
+#include "render/gl/vertex.hpp"
+#include "render/render_error.hpp"
 
 namespace enfilade::render {
 namespace {

@@ -1,4 +1,4 @@
-#include "render/egl_context.hpp"
+#include "render/gl/egl_context.hpp"
 
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "render/renderer.hpp"
+#include "render/render_error.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -153,7 +153,7 @@ void EglContext::makeCurrent() const {
   if (!eglBindAPI(EGL_OPENGL_API) ||
       !eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_)) {
     throw RenderError(eglFailure("eglMakeCurrent") +
-                      "; a Renderer must be made, used and destroyed on one thread");
+                      "; a GlRenderer must be made, used and destroyed on one thread");
   }
 }
 

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "render/draw_list.hpp"
-#include "render/gl_objects.hpp"
+#include "render/gl/draw_list.hpp"
+#include "render/gl/gl_objects.hpp"
 
 namespace enfilade::render {
 

@@ -1,4 +1,4 @@
-#include "render/font.hpp"
+#include "render/pictures/font.hpp"
 
 #include <array>
 

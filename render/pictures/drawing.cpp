@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "render/font.hpp"
-#include "render/image.hpp"
+#include "render/pictures/font.hpp"
+#include "render/pictures/image.hpp"
 
 namespace enfilade::render {
 namespace {

@@ -1,4 +1,4 @@
-#include "render/avatar_mesh.hpp"
+#include "render/gl/avatar_mesh.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "render/shaders.hpp"
+#include "render/gl/shaders.hpp"
 
 namespace enfilade::render {
 namespace {

@@ -1,10 +1,10 @@
-#include "render/gl_objects.hpp"
+#include "render/gl/gl_objects.hpp"
 
 #include <epoxy/gl.h>
 
 #include <array>
 
-#include "render/renderer.hpp"
+#include "render/render_error.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -35,7 +35,7 @@ const char* remedy(GLenum error) {
     case GL_OUT_OF_MEMORY:
       return "ask for a smaller picture or load a smaller scene";
     case GL_CONTEXT_LOST:
-      return "the device was reset: make a new Renderer";
+      return "the device was reset: make a new GlRenderer";
     default:
       return "this is a fault of Enfilade or the driver: please report it";
   }

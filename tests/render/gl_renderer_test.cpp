@@ -1,4 +1,4 @@
-#include "render/renderer.hpp"
+#include "render/gl/gl_renderer.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <random>
 #include <set>
 
-#include "render/image.hpp"
+#include "render/pictures/image.hpp"
 #include "tests/render/hand_made_scene.hpp"
 
 namespace enfilade::render {
@@ -51,9 +51,9 @@ std::vector<PlacedBox> crowd(int count) {
   return boxes;
 }
 
-TEST(Renderer, ABoxIsSeenExactlyWhereItsGeometrySays) {
+TEST(GlRenderer, ABoxIsSeenExactlyWhereItsGeometrySays) {
   // Its face is 2 m square, 4 m ahead, where the picture is 8 m wide: the middle 50 pixels of 200.
-  Renderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+  GlRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
   const Frame frame = renderer.render({}, squareCamera());
   for (int y = 0; y < 200; ++y) {
     for (int x = 0; x < 200; ++x) {
@@ -69,9 +69,9 @@ TEST(Renderer, ABoxIsSeenExactlyWhereItsGeometrySays) {
   }
 }
 
-TEST(Renderer, DepthIsTrueToRelative1e4NearAndFarInBothProjections) {
+TEST(GlRenderer, DepthIsTrueToRelative1e4NearAndFarInBothProjections) {
   for (const double distance : {0.06, 0.5, 3.0, 40.0, 900.0}) {
-    Renderer renderer(sceneOf({{{0, 0, -distance - 5}, {4 * distance, 4 * distance, 10}, {}}}));
+    GlRenderer renderer(sceneOf({{{0, 0, -distance - 5}, {4 * distance, 4 * distance, 10}, {}}}));
     Camera camera = squareCamera(50);
     const Frame perspective = renderer.render({}, camera);
     camera.projection = Camera::Projection::orthographic;
@@ -85,25 +85,25 @@ TEST(Renderer, DepthIsTrueToRelative1e4NearAndFarInBothProjections) {
   }
 }
 
-TEST(Renderer, TheTopOfTheWorldIsAtTheTopOfThePictureAndXToTheRight) {
-  Renderer renderer(sceneOf({{{0, 2, -5}, {1, 1, 1}, {}}, {{2, 0, -5}, {1, 1, 1}, {}}}));
+TEST(GlRenderer, TheTopOfTheWorldIsAtTheTopOfThePictureAndXToTheRight) {
+  GlRenderer renderer(sceneOf({{{0, 2, -5}, {1, 1, 1}, {}}, {{2, 0, -5}, {1, 1, 1}, {}}}));
   const Frame frame = renderer.render({}, squareCamera());
   EXPECT_EQ(frame.ids[at(frame, 100, 55)], 1u);
   EXPECT_EQ(frame.ids[at(frame, 145, 100)], 2u);
   EXPECT_EQ(frame.ids[at(frame, 100, 145)], 0u);
 }
 
-TEST(Renderer, NearerHidesFartherWhateverTheirOrder) {
+TEST(GlRenderer, NearerHidesFartherWhateverTheirOrder) {
   const PlacedBox near{{0, 0, -3}, {1, 1, 1}, {}}, far{{0, 0, -6}, {1, 1, 1}, {}};
-  Renderer one(sceneOf({near, far}));
-  Renderer other(sceneOf({far, near}));
+  GlRenderer one(sceneOf({near, far}));
+  GlRenderer other(sceneOf({far, near}));
   EXPECT_EQ(one.render({}, squareCamera()).ids[100 * 200 + 100], 1u);
   EXPECT_EQ(other.render({}, squareCamera()).ids[100 * 200 + 100], 2u);
 }
 
-TEST(Renderer, AMirroredObjectLooksLikeItsTwin) {
-  Renderer straight(sceneOf({{{0.3, 0.2, -4}, {2, 1, 1}, {}}}));
-  Renderer mirrored(sceneOf({{{0.3, 0.2, -4}, {-2, 1, 1}, {}}}));
+TEST(GlRenderer, AMirroredObjectLooksLikeItsTwin) {
+  GlRenderer straight(sceneOf({{{0.3, 0.2, -4}, {2, 1, 1}, {}}}));
+  GlRenderer mirrored(sceneOf({{{0.3, 0.2, -4}, {-2, 1, 1}, {}}}));
   const Frame a = straight.render({}, squareCamera());
   const Frame b = mirrored.render({}, squareCamera());
   EXPECT_EQ(a.ids, b.ids);
@@ -111,10 +111,10 @@ TEST(Renderer, AMirroredObjectLooksLikeItsTwin) {
   for (std::size_t i = 0; i < a.rgb.size(); ++i) ASSERT_NEAR(a.rgb[i], b.rgb[i], 3) << i;
 }
 
-TEST(Renderer, GlassTintsTheColourAndLetsIdsAndDepthThrough) {
+TEST(GlRenderer, GlassTintsTheColourAndLetsIdsAndDepthThrough) {
   const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, coloured(0.8f, 0.8f, 0.8f)};
   const PlacedBox pane{{0, 0, -3}, {1, 1, 0.1}, coloured(0.05f, 0.05f, 0.9f, 0.5f)};
-  Renderer renderer(sceneOf({pane, wall}));
+  GlRenderer renderer(sceneOf({pane, wall}));
   const Frame frame = renderer.render({}, squareCamera());
   EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{2}));
   const std::size_t through = at(frame, 100, 100), beside = at(frame, 20, 100);
@@ -124,15 +124,15 @@ TEST(Renderer, GlassTintsTheColourAndLetsIdsAndDepthThrough) {
   EXPECT_NEAR(frame.rgb[3 * beside], frame.rgb[3 * beside + 2], 25);
 }
 
-TEST(Renderer, GlassBehindAWallIsNotSeen) {
+TEST(GlRenderer, GlassBehindAWallIsNotSeen) {
   const PlacedBox wall{{0, 0, -3}, {20, 20, 1}, {}};
   const PlacedBox pane{{0, 0, -6}, {9, 9, 0.1}, coloured(0.9f, 0.0f, 0.0f, 0.5f)};
-  Renderer with(sceneOf({wall, pane}));
-  Renderer without(sceneOf({wall}));
+  GlRenderer with(sceneOf({wall, pane}));
+  GlRenderer without(sceneOf({wall}));
   EXPECT_EQ(with.render({}, squareCamera()).rgb, without.render({}, squareCamera()).rgb);
 }
 
-TEST(Renderer, AMaskCutsHolesIntoColourIdsAndDepth) {
+TEST(GlRenderer, AMaskCutsHolesIntoColourIdsAndDepth) {
   scene::Model model;
   scene::Material leaf;
   leaf.alpha = scene::Material::Alpha::mask;
@@ -146,15 +146,15 @@ TEST(Renderer, AMaskCutsHolesIntoColourIdsAndDepth) {
   model.meshes = {square};
   model.objects.resize(1);
   model.objects[0].meshes = {0};
-  Renderer renderer(std::make_shared<const scene::Scene>(std::move(model)));
+  GlRenderer renderer(std::make_shared<const scene::Scene>(std::move(model)));
   const Frame frame = renderer.render({}, squareCamera());
   EXPECT_EQ(frame.ids[at(frame, 60, 100)], 1u);
   EXPECT_EQ(frame.ids[at(frame, 140, 100)], 0u);
   EXPECT_TRUE(std::isnan(frame.depth[at(frame, 140, 100)]));
 }
 
-TEST(Renderer, AHiddenAvatarIsNotDrawnAndOthersAre) {
-  Renderer renderer(sceneOf({{{0, 0, -20}, {60, 60, 1}, {}}}));
+TEST(GlRenderer, AHiddenAvatarIsNotDrawnAndOthersAre) {
+  GlRenderer renderer(sceneOf({{{0, 0, -20}, {60, 60, 1}, {}}}));
   scene::Snapshot snapshot;
   snapshot.tick = 42;
   snapshot.avatars = {avatarAt(2, {-1, -1, -4}), avatarAt(3, {1, -1, -4})};
@@ -167,26 +167,26 @@ TEST(Renderer, AHiddenAvatarIsNotDrawnAndOthersAre) {
   EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera(), 2)), (std::set<std::uint32_t>{1, 3}));
 }
 
-TEST(Renderer, AnEmptySceneIsSkyAndNothingElse) {
-  Renderer renderer(std::make_shared<const scene::Scene>(scene::Model{}));
+TEST(GlRenderer, AnEmptySceneIsSkyAndNothingElse) {
+  GlRenderer renderer(std::make_shared<const scene::Scene>(scene::Model{}));
   const Frame frame = renderer.render({}, squareCamera());
   EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{0}));
   EXPECT_GT(frame.rgb[2], 100);
   EXPECT_EQ(frame.rgb.size(), 200u * 200u * 3u);
 }
 
-TEST(Renderer, TheSamePictureHasTheSameBytesInEveryRenderer) {
+TEST(GlRenderer, TheSamePictureHasTheSameBytesInEveryRenderer) {
   const auto scene = sceneOf(crowd(300));
   scene::Snapshot snapshot;
   snapshot.avatars = {avatarAt(301, {1, -1, -4})};
   Camera camera = squareCamera(300);
-  Renderer first(scene);
+  GlRenderer first(scene);
   const Frame a = first.render(snapshot, camera);
   camera.forward = Vec3::UnitX();
   first.render(snapshot, camera);
   camera.forward = -Vec3::UnitZ();
   const Frame again = first.render(snapshot, camera);
-  Renderer second(scene);
+  GlRenderer second(scene);
   const Frame b = second.render(snapshot, camera);
   EXPECT_EQ(a.rgb, again.rgb);
   EXPECT_EQ(a.rgb, b.rgb);
@@ -194,13 +194,13 @@ TEST(Renderer, TheSamePictureHasTheSameBytesInEveryRenderer) {
   EXPECT_EQ(idsIn(a).count(301), 1u);
 }
 
-TEST(Renderer, ProjectAgreesWithThePictureOfIds) {
+TEST(GlRenderer, ProjectAgreesWithThePictureOfIds) {
   std::vector<PlacedBox> boxes = crowd(60);
   for (PlacedBox& box : boxes) {
     box.material.alpha = scene::Material::Alpha::opaque;
     box.size = Vec3::Constant(0.15);
   }
-  Renderer renderer(sceneOf(boxes));
+  GlRenderer renderer(sceneOf(boxes));
   int seen = 0;
   for (const bool parallel : {false, true}) {
     Camera camera;
@@ -225,16 +225,16 @@ TEST(Renderer, ProjectAgreesWithThePictureOfIds) {
   EXPECT_GT(seen, 60);
 }
 
-TEST(Renderer, ARefusedCameraIsAnErrorAndTheNextPictureIsFine) {
-  Renderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+TEST(GlRenderer, ARefusedCameraIsAnErrorAndTheNextPictureIsFine) {
+  GlRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
   Camera bad = squareCamera();
   bad.far = std::nan("");
   EXPECT_THROW(renderer.render({}, bad), RenderError);
   EXPECT_EQ(idsIn(renderer.render({}, squareCamera())), (std::set<std::uint32_t>{0, 1}));
 }
 
-TEST(Renderer, SizesMayChangeFromPictureToPicture) {
-  Renderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+TEST(GlRenderer, SizesMayChangeFromPictureToPicture) {
+  GlRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
   for (const auto& [width, height] : {std::pair(1, 1), std::pair(333, 7), std::pair(8, 8)}) {
     Camera camera = squareCamera();
     camera.width = width;
@@ -245,12 +245,12 @@ TEST(Renderer, SizesMayChangeFromPictureToPicture) {
   }
 }
 
-TEST(Renderer, FiftyCanBeMadeAndDestroyedAndTwoLiveTogether) {
+TEST(GlRenderer, FiftyCanBeMadeAndDestroyedAndTwoLiveTogether) {
   const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
-  Renderer lasting(scene);
+  GlRenderer lasting(scene);
   const Frame before = lasting.render({}, squareCamera(40));
   for (int i = 0; i < 50; ++i) {
-    Renderer renderer(scene);
+    GlRenderer renderer(scene);
     if (i % 10 == 0) {
       EXPECT_EQ(renderer.render({}, squareCamera(40)).rgb, before.rgb);
     }

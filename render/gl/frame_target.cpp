@@ -1,11 +1,11 @@
-#include "render/frame_target.hpp"
+#include "render/gl/frame_target.hpp"
 
 #include <epoxy/gl.h>
 
 #include <array>
 #include <limits>
 
-#include "render/renderer.hpp"
+#include "render/render_error.hpp"
 
 namespace enfilade::render {
 namespace {

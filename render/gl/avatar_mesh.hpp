@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "render/draw_list.hpp"
-#include "render/vertex.hpp"
+#include "render/gl/draw_list.hpp"
+#include "render/gl/vertex.hpp"
 
 namespace enfilade::render {
 

@@ -2,27 +2,22 @@
 #pragma once
 
 #include <memory>
-#include <stdexcept>
 
 #include "render/frame.hpp"
+#include "render/render_error.hpp"
 #include "scene/scene.hpp"
 
 namespace enfilade::render {
 
-/// Names the EGL or GL call, its error code and what to try.
-struct RenderError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
 /// Owns a GL context: make, use and destroy it on one thread. RenderThread does that for you.
-class Renderer {
+class GlRenderer {
  public:
   /// Throws RenderError when no EGL device gives a context. The scene is brought to the device with
   /// the first picture.
-  explicit Renderer(std::shared_ptr<const scene::Scene> scene);
-  ~Renderer();
-  Renderer(const Renderer&) = delete;
-  Renderer& operator=(const Renderer&) = delete;
+  explicit GlRenderer(std::shared_ptr<const scene::Scene> scene);
+  ~GlRenderer();
+  GlRenderer(const GlRenderer&) = delete;
+  GlRenderer& operator=(const GlRenderer&) = delete;
 
   /// `hidden` is not drawn (the avatar whose eyes these are); 0: everything is drawn.
   /// Throws RenderError for a camera that refusal() refuses, and for a scene too large to draw.

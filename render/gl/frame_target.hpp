@@ -2,7 +2,7 @@
 #pragma once
 
 #include "render/frame.hpp"
-#include "render/gl_objects.hpp"
+#include "render/gl/gl_objects.hpp"
 
 namespace enfilade::render {
 

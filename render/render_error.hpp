@@ -1,0 +1,13 @@
+// What goes wrong in drawing.
+#pragma once
+
+#include <stdexcept>
+
+namespace enfilade::render {
+
+/// Names the call or the thing refused, its error code and what to try.
+struct RenderError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace enfilade::render
