@@ -13,6 +13,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "render/pictures/encode.hpp"
 #include "render/view.hpp"
 
 namespace enfilade::render {
@@ -82,24 +83,7 @@ Image colourOf(const Frame& frame) {
 }
 
 std::vector<std::uint8_t> encodePng(const Image& image) {
-  if (image.width < 1 || image.height < 1 || image.rgb.size() != 3 * pixelCount(image)) {
-    throw std::runtime_error("encodePng: " + std::to_string(image.rgb.size()) +
-                             " bytes are not a picture of " + std::to_string(image.width) + "x" +
-                             std::to_string(image.height) + " pixels");
-  }
-  png_image png{};
-  png.version = PNG_IMAGE_VERSION;
-  png.width = static_cast<png_uint_32>(image.width);
-  png.height = static_cast<png_uint_32>(image.height);
-  png.format = PNG_FORMAT_RGB;
-  png.flags = PNG_IMAGE_FLAG_FAST;
-  png_alloc_size_t bytes = PNG_IMAGE_PNG_SIZE_MAX(png);
-  std::vector<std::uint8_t> file(bytes);
-  if (!png_image_write_to_memory(&png, file.data(), &bytes, 0, image.rgb.data(), 0, nullptr)) {
-    throw pngFailure("png_image_write_to_memory", png);
-  }
-  file.resize(bytes);
-  return file;
+  return encodePng(Raster<std::uint8_t>{image.width, image.height, 3, image.rgb});
 }
 
 Image decodePng(const std::vector<std::uint8_t>& bytes) {
