@@ -56,11 +56,24 @@ std::optional<std::string> badDistances(const Camera& camera) {
   return std::nullopt;
 }
 
+std::optional<std::string> badPinhole(const Pinhole& pinhole) {
+  constexpr double kShortest = 1e-3, kLongest = 1e7, kAside = 1e5;  // pixels
+  const auto focal = [](double f) { return f >= kShortest && f <= kLongest; };
+  if (!focal(pinhole.fx)) return badField("pinhole.fx", pinhole.fx, "1e-3 to 1e7 pixels");
+  if (!focal(pinhole.fy)) return badField("pinhole.fy", pinhole.fy, "1e-3 to 1e7 pixels");
+  const auto centre = [](double c) { return std::abs(c) <= kAside; };
+  if (!centre(pinhole.cx)) return badField("pinhole.cx", pinhole.cx, "within 1e5 pixels");
+  if (!centre(pinhole.cy)) return badField("pinhole.cy", pinhole.cy, "within 1e5 pixels");
+  return std::nullopt;
+}
+
 std::optional<std::string> badOpening(const Camera& camera) {
   if (camera.projection == Camera::Projection::perspective) {
+    if (camera.pinhole) return badPinhole(*camera.pinhole);
     if (camera.fovY > 0 && camera.fovY < std::numbers::pi) return std::nullopt;
     return badField("fovY", camera.fovY, "between 0 and pi radians");
   }
+  if (camera.pinhole) return badField("pinhole", "given", "absent in an orthographic camera");
   if (camera.heightY >= kNearest && camera.heightY <= kFarthest) return std::nullopt;
   return badField("heightY", camera.heightY, "1e-6 to 1e9 metres");
 }
@@ -80,6 +93,12 @@ std::optional<std::string> refusal(const Camera& camera) {
   if (auto why = badAxes(camera)) return why;
   if (auto why = badDistances(camera)) return why;
   return badOpening(camera);
+}
+
+Pinhole intrinsicsOf(const Camera& camera) {
+  if (camera.pinhole) return *camera.pinhole;
+  const double focal = camera.height / (2 * std::tan(camera.fovY / 2));
+  return {focal, focal, camera.width / 2.0, camera.height / 2.0};
 }
 
 Camera firstPerson(const scene::AvatarView& avatar, int width, int height, double fovY) {
@@ -121,23 +140,34 @@ View viewOf(const Camera& camera) {
   const bool perspective = camera.projection == Camera::Projection::perspective;
   view.scaleY = perspective ? 1 / std::tan(camera.fovY / 2) : 2 / camera.heightY;
   view.scaleX = view.scaleY * camera.height / camera.width;
+  view.shiftX = view.shiftY = 0;
+  if (perspective && camera.pinhole) {
+    const Pinhole& pinhole = *camera.pinhole;
+    view.scaleX = 2 * pinhole.fx / camera.width;
+    view.scaleY = 2 * pinhole.fy / camera.height;
+    view.shiftX = 2 * pinhole.cx / camera.width - 1;
+    view.shiftY = 1 - 2 * pinhole.cy / camera.height;
+  }
   return view;
 }
 
 std::array<Plane, 6> frustumOf(const Camera& camera) {
   const View view = viewOf(camera);
   const bool perspective = camera.projection == Camera::Projection::perspective;
-  // |scale * sideways| <= ahead (perspective) or <= 1 (orthographic), both ways on both axes.
+  // |scale * sideways + shift * ahead| <= ahead (perspective) or |scale * sideways| <= 1
+  // (orthographic), both ways on both axes.
   const Vec3 ahead = perspective ? view.forward : Vec3::Zero();
   const double one = perspective ? 0 : 1;
   const auto side = [&](const Vec3& sideways) {
     const Vec3 normal = ahead - sideways;
     return Plane{normal, one - normal.dot(camera.eye)};
   };
-  return {side(view.scaleX * view.right),
-          side(-view.scaleX * view.right),
-          side(view.scaleY * view.up),
-          side(-view.scaleY * view.up),
+  const Vec3 aside = view.scaleX * view.right + view.shiftX * ahead;
+  const Vec3 upwards = view.scaleY * view.up + view.shiftY * ahead;
+  return {side(aside),
+          side(-aside),
+          side(upwards),
+          side(-upwards),
           Plane{view.forward, -view.forward.dot(camera.eye) - camera.near},
           Plane{-view.forward, view.forward.dot(camera.eye) + camera.far}};
 }

@@ -12,7 +12,7 @@ struct RenderThread::State {
   struct Job {
     std::shared_ptr<const scene::Snapshot> snapshot;
     Camera camera;
-    scene::EntityId hidden;
+    FrameOptions options;
     std::promise<Frame> done;
   };
 
@@ -20,7 +20,7 @@ struct RenderThread::State {
   std::condition_variable changed;
   std::deque<Job> jobs;
   bool closing = false;
-  std::string deviceName;
+  std::string deviceName, deviceNote;
   bool software = false;
   std::thread thread;
 
@@ -34,11 +34,13 @@ struct RenderThread::State {
     return job;
   }
 
-  void run(std::shared_ptr<const scene::Scene> scene, std::promise<void> started) {
+  void run(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device,
+           std::promise<void> started) {
     std::unique_ptr<GlRenderer> renderer;
     try {
-      renderer = std::make_unique<GlRenderer>(std::move(scene));
+      renderer = std::make_unique<GlRenderer>(std::move(scene), device);
       deviceName = renderer->deviceName();
+      deviceNote = renderer->deviceNote();
       software = renderer->software();
     } catch (...) {
       started.set_exception(std::current_exception());
@@ -48,7 +50,7 @@ struct RenderThread::State {
     while (auto job = nextJob()) {
       try {
         if (!job->snapshot) throw RenderError("RenderThread::render: there is no snapshot");
-        job->done.set_value(renderer->render(*job->snapshot, job->camera, job->hidden));
+        job->done.set_value(renderer->render(*job->snapshot, job->camera, job->options));
       } catch (...) {
         job->done.set_exception(std::current_exception());
       }
@@ -56,11 +58,12 @@ struct RenderThread::State {
   }
 };
 
-RenderThread::RenderThread(std::shared_ptr<const scene::Scene> scene)
+RenderThread::RenderThread(std::shared_ptr<const scene::Scene> scene, DeviceChoice device)
     : state_(std::make_unique<State>()) {
   std::promise<void> started;
   std::future<void> ready = started.get_future();
-  state_->thread = std::thread(&State::run, state_.get(), std::move(scene), std::move(started));
+  state_->thread = std::thread(&State::run, state_.get(), std::move(scene), std::move(device),
+                               std::move(started));
   try {
     ready.get();
   } catch (...) {
@@ -79,8 +82,8 @@ RenderThread::~RenderThread() {
 }
 
 std::future<Frame> RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot,
-                                        Camera camera, scene::EntityId hidden) {
-  State::Job job{std::move(snapshot), std::move(camera), hidden, {}};
+                                        Camera camera, FrameOptions options) {
+  State::Job job{std::move(snapshot), std::move(camera), options, {}};
   std::future<Frame> frame = job.done.get_future();
   {
     const std::lock_guard lock(state_->mutex);
@@ -92,6 +95,9 @@ std::future<Frame> RenderThread::render(std::shared_ptr<const scene::Snapshot> s
 
 const std::string& RenderThread::deviceName() const {
   return state_->deviceName;
+}
+const std::string& RenderThread::deviceNote() const {
+  return state_->deviceNote;
 }
 bool RenderThread::software() const {
   return state_->software;

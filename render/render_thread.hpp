@@ -11,16 +11,17 @@ namespace enfilade::render {
 class RenderThread {
  public:
   /// Starts the thread and its GlRenderer; throws RenderError when there can be none.
-  explicit RenderThread(std::shared_ptr<const scene::Scene> scene);
+  explicit RenderThread(std::shared_ptr<const scene::Scene> scene, DeviceChoice device = {});
   ~RenderThread();  ///< finishes what is queued
   RenderThread(const RenderThread&) = delete;
   RenderThread& operator=(const RenderThread&) = delete;
 
   /// The frame, or the RenderError, comes through the future. Callable from any thread.
   std::future<Frame> render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera,
-                            scene::EntityId hidden = 0);
+                            FrameOptions options = {});
   const std::string& deviceName() const;
   bool software() const;
+  const std::string& deviceNote() const;  ///< as GlRenderer's
 
  private:
   struct State;

@@ -17,6 +17,8 @@ struct View {
   Vec3 right, up, forward;  ///< unit length, square to one another, world frame
   /// From metres to the picture's -1..1: perspective at distance 1, orthographic anywhere.
   double scaleX, scaleY;
+  /// Where in the picture's -1..1 (to the right, upwards) the axis lies; 0 but for pinholes.
+  double shiftX, shiftY;
 };
 
 /// Of a camera that refusal() lets pass.

@@ -15,7 +15,7 @@ CameraOrError eyesOf(const v1::AvatarEyes& eyes, const scene::Snapshot& snapshot
                      int height) {
   const scene::AvatarView* avatar = avatarNamed(snapshot, eyes.avatar());
   if (!avatar) return unknownAvatar(eyes.avatar(), "eyes.avatar");
-  View view{render::firstPerson(*avatar, width, height), avatar->id};
+  View view{render::firstPerson(*avatar, width, height), {.hidden = avatar->id}};
   if (eyes.has_fov_y()) view.camera.fovY = eyes.fov_y();
   if (eyes.has_near()) view.camera.near = eyes.near();
   if (eyes.has_far()) view.camera.far = eyes.far();
@@ -42,7 +42,7 @@ CameraOrError freeView(const v1::FreeCamera& free, const scene::Snapshot& snapsh
   if (free.hide_avatar().empty()) return view;
   const scene::AvatarView* avatar = avatarNamed(snapshot, free.hide_avatar());
   if (!avatar) return unknownAvatar(free.hide_avatar(), "free.hide_avatar");
-  view.hidden = avatar->id;
+  view.options.hidden = avatar->id;
   return view;
 }
 
@@ -57,6 +57,10 @@ void appendChannel(std::vector<std::uint8_t>& bytes, const render::Frame& frame,
                    v1::Channel channel, v1::Encoding encoding) {
   if (channel == v1::CHANNEL_IDS) {
     append(bytes, frame.ids);
+  } else if (channel == v1::CHANNEL_NORMALS) {
+    append(bytes, frame.normals);
+  } else if (channel == v1::CHANNEL_RANGE) {
+    append(bytes, render::rangeOf(frame));
   } else if (channel == v1::CHANNEL_DEPTH) {
     append(bytes, frame.depth);
   } else if (encoding == v1::ENCODING_PNG) {
@@ -82,28 +86,64 @@ void addPlane(v1::Frame& message, std::vector<std::uint8_t>& attachment, const r
 /// The field that a refusal of render:: names: "camera: far is 0; ...".
 std::string fieldOf(const std::string& refusal) {
   const std::size_t start = refusal.find(": ") + 2;
-  return refusal.substr(start, refusal.find(' ', start) - start);
+  const std::string field = refusal.substr(start, refusal.find(' ', start) - start);
+  const std::string pinhole = "pinhole";
+  return field.starts_with(pinhole) ? "intrinsics" + field.substr(pinhole.size()) : field;
 }
 
 std::optional<v1::Error> channelProblem(const v1::FrameRequest& request) {
-  bool asked[4] = {};
+  bool asked[v1::Channel_MAX + 1] = {};
   for (const int channel : request.channels()) {
-    const bool known = channel >= v1::CHANNEL_RGB && channel <= v1::CHANNEL_DEPTH;
+    const bool known = v1::Channel_IsValid(channel) && channel != v1::CHANNEL_UNSPECIFIED;
     if (!known || asked[channel]) {
-      return errorOf(
-          v1::ERROR_BAD_MESSAGE,
-          "channels: give rgb, ids and depth each at most once, not " + std::to_string(channel),
-          "channels");
+      return errorOf(v1::ERROR_BAD_MESSAGE,
+                     "channels: give rgb, ids, depth, normals and range each at most once, not " +
+                         std::to_string(channel),
+                     "channels");
     }
     asked[channel] = true;
   }
   return std::nullopt;
 }
 
+render::Channels channelsOf(const v1::FrameRequest& request) {
+  if (request.channels().empty()) return {true, false, false, false};
+  render::Channels channels{false, false, false, false};
+  for (const int channel : request.channels()) {
+    if (channel == v1::CHANNEL_RGB) channels.rgb = true;
+    if (channel == v1::CHANNEL_IDS) channels.ids = true;
+    if (channel == v1::CHANNEL_DEPTH || channel == v1::CHANNEL_RANGE) channels.depth = true;
+    if (channel == v1::CHANNEL_NORMALS) channels.normals = true;
+  }
+  return channels;
+}
+
+/// Gives the camera the intrinsics asked for; an error when they contradict what else is asked.
+std::optional<v1::Error> addIntrinsics(render::Camera& camera, const v1::FrameRequest& request) {
+  if (!request.has_intrinsics()) return std::nullopt;
+  const bool opening = request.has_eyes()
+                           ? request.eyes().has_fov_y()
+                           : request.free().projection_case() != v1::FreeCamera::PROJECTION_NOT_SET;
+  if (opening) {
+    return errorOf(v1::ERROR_BAD_CAMERA,
+                   "intrinsics: give them or fov_y or height_y, one of the three", "intrinsics");
+  }
+  const v1::Intrinsics& given = request.intrinsics();
+  camera.pinhole = render::Pinhole{given.fx(), given.fy(), given.cx(), given.cy()};
+  return std::nullopt;
+}
+
+std::optional<v1::Error> glassProblem(const v1::FrameRequest& request) {
+  if (v1::Glass_IsValid(request.glass())) return std::nullopt;
+  return errorOf(v1::ERROR_BAD_MESSAGE,
+                 "glass: give clear or solid, not " + std::to_string(request.glass()), "glass");
+}
+
 }  // namespace
 
 CameraOrError viewFrom(const v1::FrameRequest& request, const scene::Snapshot& snapshot) {
   if (auto problem = channelProblem(request)) return *problem;
+  if (auto problem = glassProblem(request)) return *problem;
   constexpr std::uint32_t kMost = 4096;
   if (request.width() < 1 || request.width() > kMost || request.height() < 1 ||
       request.height() > kMost) {
@@ -114,7 +154,10 @@ CameraOrError viewFrom(const v1::FrameRequest& request, const scene::Snapshot& s
   CameraOrError view = errorOf(v1::ERROR_BAD_CAMERA, "view is missing: give eyes or free", "view");
   if (request.has_eyes()) view = eyesOf(request.eyes(), snapshot, width, height);
   if (request.has_free()) view = freeView(request.free(), snapshot, width, height);
-  if (const View* usable = std::get_if<View>(&view)) {
+  if (View* usable = std::get_if<View>(&view)) {
+    usable->options.channels = channelsOf(request);
+    if (request.glass() == v1::GLASS_SOLID) usable->options.glass = render::Glass::solid;
+    if (auto problem = addIntrinsics(usable->camera, request)) return *problem;
     if (const auto why = render::refusal(usable->camera)) {
       return errorOf(v1::ERROR_BAD_CAMERA, *why, fieldOf(*why));
     }
@@ -132,6 +175,15 @@ v1::Frame messageOf(const render::Frame& frame, double time, const v1::FrameRequ
   *message.mutable_camera() = messageOf(frame.camera);
   message.set_width(static_cast<std::uint32_t>(frame.camera.width));
   message.set_height(static_cast<std::uint32_t>(frame.camera.height));
+  if (frame.camera.projection == render::Camera::Projection::perspective) {
+    const render::Pinhole pinhole = render::intrinsicsOf(frame.camera);
+    v1::Intrinsics& intrinsics = *message.mutable_intrinsics();
+    intrinsics.set_fx(pinhole.fx);
+    intrinsics.set_fy(pinhole.fy);
+    intrinsics.set_cx(pinhole.cx);
+    intrinsics.set_cy(pinhole.cy);
+  }
+  message.set_glass(request.glass() == v1::GLASS_SOLID ? v1::GLASS_SOLID : v1::GLASS_CLEAR);
   for (const int channel : request.channels()) {
     addPlane(message, attachment, frame, static_cast<v1::Channel>(channel), request.rgb_encoding());
   }
@@ -148,7 +200,7 @@ v1::FreeCamera messageOf(const render::Camera& camera) {
   *message.mutable_up() = messageOf(camera.up);
   if (camera.projection == render::Camera::Projection::orthographic) {
     message.set_height_y(camera.heightY);
-  } else {
+  } else if (!camera.pinhole) {
     message.set_fov_y(camera.fovY);
   }
   message.set_near(camera.near);

@@ -11,10 +11,10 @@
 
 namespace enfilade::server {
 
-/// What a picture is taken with: a camera that can be used, and whom it does not show.
+/// What a picture is taken with: a camera that can be used, and what is wanted of the picture.
 struct View {
   render::Camera camera;
-  scene::EntityId hidden = 0;
+  render::FrameOptions options;
 };
 
 /// The view asked for, or why it cannot be had.

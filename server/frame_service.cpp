@@ -59,6 +59,9 @@ FrameService::FrameService(std::shared_ptr<const scene::Scene> scene)
     state_->renderer = std::make_unique<render::RenderThread>(std::move(scene));
     state_->deviceName = state_->renderer->deviceName();
     state_->software = state_->renderer->software();
+    if (const std::string& note = state_->renderer->deviceNote(); !note.empty()) {
+      spdlog::warn(note);
+    }
   } catch (const render::RenderError& error) {
     state_->whyNone = error.what();
     spdlog::warn("no pictures: {}", error.what());
@@ -90,7 +93,7 @@ void FrameService::draw(FrameJob job, std::function<void(Buffer)> done) {
   const auto drawing = std::make_shared<Drawing>(Drawing{std::move(job), {}, std::move(done)});
   if (state_->renderer) {
     const View& view = drawing->job.view;
-    drawing->frame = state_->renderer->render(drawing->job.snapshot, view.camera, view.hidden);
+    drawing->frame = state_->renderer->render(drawing->job.snapshot, view.camera, view.options);
   }
   state_->thread.post([state = state_.get(), drawing] { drawing->done(state->reply(*drawing)); });
 }

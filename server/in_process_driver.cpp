@@ -71,7 +71,7 @@ protocol::ReceivedFrame InProcessDriver::frame(const v1::FrameRequest& request) 
   }
   const View& usable = std::get<View>(view);
   try {
-    const render::Frame drawn = renderer_->render(*snapshot, usable.camera, usable.hidden);
+    const render::Frame drawn = renderer_->render(*snapshot, usable.camera, usable.options);
     ++frames_;
     protocol::ReceivedFrame taken;
     taken.description = messageOf(drawn, snapshot->time, request, taken.pixels);

@@ -66,13 +66,13 @@ std::vector<PlacedPart> backToFront(std::vector<PlacedPart> glass, const Camera&
   return glass;
 }
 
-void append(DrawList& list, const Part& part, const MeshRange& range) {
+void append(DrawList& list, const Part& part, Pass pass, const MeshRange& range) {
   const auto instance = static_cast<std::uint32_t>(list.instances.size() - 1);
-  const bool sameBatch = !list.batches.empty() && list.batches.back().pass == part.pass &&
+  const bool sameBatch = !list.batches.empty() && list.batches.back().pass == pass &&
                          list.batches.back().texture == part.texture;
   if (!sameBatch) {
     list.batches.push_back(
-        {part.pass, part.texture, static_cast<std::uint32_t>(list.commands.size()), 0});
+        {pass, part.texture, static_cast<std::uint32_t>(list.commands.size()), 0});
   }
   Batch& batch = list.batches.back();
   // Neighbours in the order that share a mesh become one instanced draw.
@@ -172,8 +172,9 @@ Instance placed(const Eigen::Affine3d& worldFromMesh, const Vec3& meshCentre, co
 
 void appendVisible(DrawList& list, const Drawable& drawable,
                    const std::vector<BodyPlacement>& bodies, const Camera& camera,
-                   scene::EntityId hidden) {
+                   const FrameOptions& options) {
   const auto frustum = frustumOf(camera);
+  const bool solid = options.glass == Glass::solid;
   const auto draw = [&](const Part& part) {
     const MeshRange& range = drawable.ranges[part.mesh];
     Eigen::Affine3d worldFromMesh = drawable.model.objects[part.object].worldFromMesh;
@@ -181,14 +182,14 @@ void appendVisible(DrawList& list, const Drawable& drawable,
       worldFromMesh = bodies[part.body].sceneFromAuthored * worldFromMesh;
     list.instances.push_back(placed(worldFromMesh, range.centre, camera.eye,
                                     drawable.materials[part.mesh], part.object + 1));
-    append(list, part, range);
+    append(list, part, solid && part.pass == Pass::blend ? Pass::opaque : part.pass, range);
   };
   std::vector<PlacedPart> glass;
   for (const Part& part : drawable.parts) {
-    if (part.object + 1 == hidden) continue;
+    if (part.object + 1 == options.hidden) continue;
     const PlacedPart placed = placedPart(part, bodies);
     if (!mayBeSeen(frustum, placed.box)) continue;
-    if (part.pass == Pass::blend) {
+    if (part.pass == Pass::blend && !solid) {
       glass.push_back(placed);
     } else {
       draw(part);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "render/frame.hpp"
 #include "render/view.hpp"
 #include "scene/scene.hpp"
 #include "scene/snapshot.hpp"
@@ -91,11 +92,11 @@ struct Drawable {
   const std::vector<MaterialData>& materials;
 };
 
-/// Appends what `camera` may see, glass from back to front. `hidden` is left out. `bodies`: one
-/// entry a body of the model.
+/// Appends what `camera` may see, glass from back to front, or in its order among the opaque where
+/// it is solid. `bodies`: one entry a body of the model.
 void appendVisible(DrawList& list, const Drawable& drawable,
                    const std::vector<BodyPlacement>& bodies, const Camera& camera,
-                   scene::EntityId hidden);
+                   const FrameOptions& options);
 
 /// One instance; `worldFromMesh` is of the mesh as given, not of its centre.
 Instance placed(const Eigen::Affine3d& worldFromMesh, const Vec3& meshCentre, const Vec3& eye,

@@ -2,15 +2,19 @@
 #pragma once
 
 #include <string>
+#include <vector>
+
+#include "render/device.hpp"
 
 namespace enfilade::render {
 
-/// Move-only owner of one context. The best device that gives one is taken: EGL devices with
-/// hardware first, then Mesa's surfaceless platform, which draws on the CPU.
+/// Move-only owner of one context.
 class EglContext {
  public:
-  /// Makes the context and makes it current. Throws RenderError listing all that was tried.
-  EglContext();
+  /// Makes a context on the device chosen and makes it current: EGL devices with hardware first,
+  /// then those that draw on the CPU, then Mesa's surfaceless platform. Throws RenderError listing
+  /// all that was tried.
+  explicit EglContext(const DeviceChoice& choice = {});
   ~EglContext();
   EglContext(EglContext&& other) noexcept;
   EglContext& operator=(EglContext&& other) noexcept;
@@ -20,6 +24,8 @@ class EglContext {
 
   const std::string& deviceName() const { return deviceName_; }  ///< GL_RENDERER
   bool software() const { return software_; }
+  /// What was tried before in vain, one sentence; empty when nothing was.
+  const std::string& note() const { return note_; }
 
  private:
   void release() noexcept;
@@ -27,7 +33,12 @@ class EglContext {
   void* display_ = nullptr;  ///< EGLDisplay; shared with other contexts, never terminated
   void* context_ = nullptr;  ///< EGLContext
   std::string deviceName_;
+  std::string note_;
   bool software_ = false;
 };
+
+/// Tries each device in the order in which `DeviceChoice::device` counts them. Never throws: a
+/// machine without EGL has none, and why.
+DeviceReport tryDevices();
 
 }  // namespace enfilade::render

@@ -16,17 +16,27 @@ GlTexture plane(GLenum format, int width, int height) {
   return texture;
 }
 
-/// From the buffer's 1 (near) .. 0 (far) to metres along forward; NaN where nothing was drawn.
+void checkComplete(GLuint framebuffer, int width, int height) {
+  checkGl("making the frame's buffers");
+  const GLenum status = glCheckNamedFramebufferStatus(framebuffer, GL_FRAMEBUFFER);
+  if (status != GL_FRAMEBUFFER_COMPLETE) {
+    throw RenderError("glCheckNamedFramebufferStatus says " + std::to_string(status) + " for " +
+                      std::to_string(width) + "x" + std::to_string(height) +
+                      " pixels; try a smaller picture or another driver");
+  }
+}
+
+/// From the buffer's 1 (near) .. 0 (far) to metres along forward; NaN where nothing was drawn. In
+/// floats: that adds some 2e-7 of the distance to what the buffer rounded.
 void toMetres(std::vector<float>& depth, const Camera& camera) {
-  const double near = camera.near, far = camera.far, range = far - near;
-  const bool perspective = camera.projection == Camera::Projection::perspective;
-  for (float& d : depth) {
-    if (d <= 0) {
-      d = std::numeric_limits<float>::quiet_NaN();
-    } else {
-      const double z = perspective ? near * far / (near + d * range) : far - d * range;
-      d = static_cast<float>(z);
-    }
+  constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
+  const auto near = static_cast<float>(camera.near), far = static_cast<float>(camera.far);
+  const auto range = static_cast<float>(camera.far - camera.near);
+  if (camera.projection == Camera::Projection::perspective) {
+    const auto product = static_cast<float>(camera.near * camera.far);
+    for (float& d : depth) d = d > 0 ? product / (near + d * range) : kNothing;
+  } else {
+    for (float& d : depth) d = d > 0 ? far - d * range : kNothing;
   }
 }
 
@@ -54,33 +64,37 @@ FrameTarget::FrameTarget(int width, int height)
   glNamedFramebufferTexture(overlay_.name(), GL_COLOR_ATTACHMENT0, colour_.name(), 0);
   glTextureParameteri(depth_.name(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
   glTextureParameteri(depth_.name(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  checkGl("making the frame's buffers");
-  const GLenum status = glCheckNamedFramebufferStatus(fbo, GL_FRAMEBUFFER);
-  if (status != GL_FRAMEBUFFER_COMPLETE) {
-    throw RenderError("glCheckNamedFramebufferStatus says " + std::to_string(status) + " for " +
-                      std::to_string(width) + "x" + std::to_string(height) +
-                      " pixels; try a smaller picture or another driver");
-  }
+  checkComplete(fbo, width, height);
 }
 
-void FrameTarget::begin() const {
+void FrameTarget::addNormals() {
+  normals_ = plane(GL_RGBA32F, width_, height_);
+  glNamedFramebufferTexture(framebuffer_.name(), GL_COLOR_ATTACHMENT2, normals_.name(), 0);
+  checkComplete(framebuffer_.name(), width_, height_);
+}
+
+void FrameTarget::begin(const Channels& channels) {
+  if (channels.normals && normals_.name() == 0) addNormals();
   const GLuint fbo = framebuffer_.name();
   glBindFramebuffer(GL_FRAMEBUFFER, fbo);
-  writeIds(true);
+  drawInto(channels);
   glViewport(0, 0, width_, height_);
-  constexpr std::array<GLfloat, 4> kBlack{0, 0, 0, 1};
+  constexpr std::array<GLfloat, 4> kBlack{0, 0, 0, 1}, kNone{0, 0, 0, 0};
   constexpr std::array<GLuint, 4> kNothing{0, 0, 0, 0};
   constexpr GLfloat kFarthest = 0;
   glDepthMask(GL_TRUE);
-  glClearNamedFramebufferfv(fbo, GL_COLOR, 0, kBlack.data());
-  glClearNamedFramebufferuiv(fbo, GL_COLOR, 1, kNothing.data());
+  if (channels.rgb) glClearNamedFramebufferfv(fbo, GL_COLOR, 0, kBlack.data());
+  if (channels.ids) glClearNamedFramebufferuiv(fbo, GL_COLOR, 1, kNothing.data());
+  if (channels.normals) glClearNamedFramebufferfv(fbo, GL_COLOR, 2, kNone.data());
   glClearNamedFramebufferfv(fbo, GL_DEPTH, 0, &kFarthest);
 }
 
-void FrameTarget::writeIds(bool on) const {
-  constexpr GLenum kColour = GL_COLOR_ATTACHMENT0;
-  const std::array<GLenum, 2> targets{kColour, on ? GLenum{GL_COLOR_ATTACHMENT1} : GLenum{GL_NONE}};
-  glNamedFramebufferDrawBuffers(framebuffer_.name(), 2, targets.data());
+void FrameTarget::drawInto(const Channels& channels) const {
+  const auto target = [](bool on, GLenum attachment) { return on ? attachment : GLenum{GL_NONE}; };
+  const std::array<GLenum, 3> targets{target(channels.rgb, GL_COLOR_ATTACHMENT0),
+                                      target(channels.ids, GL_COLOR_ATTACHMENT1),
+                                      target(channels.normals, GL_COLOR_ATTACHMENT2)};
+  glNamedFramebufferDrawBuffers(framebuffer_.name(), 3, targets.data());
 }
 
 void FrameTarget::beginOverlay() const {
@@ -93,20 +107,32 @@ void FrameTarget::endOverlay() const {
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
 }
 
-void FrameTarget::read(Frame& frame) const {
+void FrameTarget::read(Frame& frame, const Channels& channels) const {
   const std::size_t pixels = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
+  const auto readPlane = [&](GLenum attachment, GLenum format, GLenum type, void* data) {
+    if (attachment != GL_NONE) glNamedFramebufferReadBuffer(framebuffer_.name(), attachment);
+    glReadPixels(0, 0, width_, height_, format, type, data);
+  };
   glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.name());
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  frame.rgb.resize(4 * pixels);
-  glNamedFramebufferReadBuffer(framebuffer_.name(), GL_COLOR_ATTACHMENT0);
-  glReadPixels(0, 0, width_, height_, GL_RGBA, GL_UNSIGNED_BYTE, frame.rgb.data());
-  dropAlpha(frame.rgb, pixels);
-  frame.ids.resize(pixels);
-  glNamedFramebufferReadBuffer(framebuffer_.name(), GL_COLOR_ATTACHMENT1);
-  glReadPixels(0, 0, width_, height_, GL_RED_INTEGER, GL_UNSIGNED_INT, frame.ids.data());
-  frame.depth.resize(pixels);
-  glReadPixels(0, 0, width_, height_, GL_DEPTH_COMPONENT, GL_FLOAT, frame.depth.data());
-  toMetres(frame.depth, frame.camera);
+  if (channels.rgb) {
+    frame.rgb.resize(4 * pixels);
+    readPlane(GL_COLOR_ATTACHMENT0, GL_RGBA, GL_UNSIGNED_BYTE, frame.rgb.data());
+    dropAlpha(frame.rgb, pixels);
+  }
+  if (channels.ids) {
+    frame.ids.resize(pixels);
+    readPlane(GL_COLOR_ATTACHMENT1, GL_RED_INTEGER, GL_UNSIGNED_INT, frame.ids.data());
+  }
+  if (channels.normals) {
+    frame.normals.resize(3 * pixels);
+    readPlane(GL_COLOR_ATTACHMENT2, GL_RGB, GL_FLOAT, frame.normals.data());
+  }
+  if (channels.depth) {
+    frame.depth.resize(pixels);
+    readPlane(GL_NONE, GL_DEPTH_COMPONENT, GL_FLOAT, frame.depth.data());
+    toMetres(frame.depth, frame.camera);
+  }
 }
 
 }  // namespace enfilade::render

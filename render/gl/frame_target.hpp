@@ -1,4 +1,5 @@
-// What is drawn into: sRGB colour, object ids and 32-bit depth of one size, and reading them back.
+// What is drawn into: sRGB colour, object ids, 32-bit depth and, when somebody wants them, normals,
+// all of one size; and reading them back.
 #pragma once
 
 #include "render/frame.hpp"
@@ -13,19 +14,22 @@ class FrameTarget {
   FrameTarget(int width, int height);
 
   bool fits(int width, int height) const { return width == width_ && height == height_; }
-  /// Binds it, all black, id 0 and depth 0 (the farthest).
-  void begin() const;
-  /// Draw into colour and ids, or into colour only.
-  void writeIds(bool on) const;
+  /// Binds it, all black, id 0, normals 0 and depth 0 (the farthest); draws into `channels`. Throws
+  /// RenderError when the device refuses normals.
+  void begin(const Channels& channels);
+  /// Draw into these channels; depth is written as the depth mask says.
+  void drawInto(const Channels& channels) const;
   /// Draw over the colour only, with no depth test, with depth as the texture of unit 0.
   void beginOverlay() const;
   void endOverlay() const;
-  /// Colour, ids and depth into `frame`, whose camera is the one that was drawn with.
-  void read(Frame& frame) const;
+  /// The channels into `frame`, whose camera is the one that was drawn with.
+  void read(Frame& frame, const Channels& channels) const;
 
  private:
+  void addNormals();
+
   int width_ = 0, height_ = 0;
-  GlTexture colour_, ids_, depth_;
+  GlTexture colour_, ids_, depth_, normals_;
   GlFramebuffer framebuffer_;
   GlFramebuffer overlay_;  ///< colour alone, so that depth can be read while it is drawn to
 };

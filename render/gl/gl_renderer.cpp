@@ -34,6 +34,8 @@ Eigen::Matrix4d clipFromRelative(const Camera& camera, const View& view) {
   clip.row(0).head<3>() = view.scaleX * view.right.transpose();
   clip.row(1).head<3>() = view.scaleY * view.up.transpose();
   if (camera.projection == Camera::Projection::perspective) {
+    clip.row(0).head<3>() += view.shiftX * view.forward.transpose();
+    clip.row(1).head<3>() += view.shiftY * view.forward.transpose();
     clip.row(2).head<3>() = -camera.near / range * view.forward.transpose();
     clip(2, 3) = camera.near * camera.far / range;
     clip.row(3).head<3>() = view.forward.transpose();
@@ -54,6 +56,9 @@ FrameUniforms uniformsOf(const Camera& camera) {
     uniforms.clipFromRelative[i] = static_cast<float>(clip(i % 4, i / 4));
   }
   put(uniforms.forward, view.forward, plan ? 1 : 0);
+  put(uniforms.middle,
+      view.forward - view.shiftX / view.scaleX * view.right - view.shiftY / view.scaleY * view.up,
+      0);
   put(uniforms.rightByX, view.right / view.scaleX, 0);
   put(uniforms.upByY, view.up / view.scaleY, 0);
   put(uniforms.range, Vec3(camera.near, camera.far, view.scaleY * camera.height / 2), 0);
@@ -116,23 +121,25 @@ struct GlRenderer::State {
   GlBuffer uniforms;
   GlProgram sky;
   GlProgram hollows;
-  std::array<std::optional<GlProgram>, 6> surfaces;  // see surfaceProgram()
+  std::array<std::optional<GlProgram>, 12> surfaces;  // see surfaceProgram()
   FrameTarget target;
   bool prepared = false;  // all between the context and the target is there
 
-  explicit State(std::shared_ptr<const scene::Scene> shared);
+  State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device);
   ~State();
   void prepare();
-  GLuint surfaceProgram(const Batch& batch);
-  void setUp(const Camera& camera);
+  GLuint surfaceProgram(const Batch& batch, bool normals);
+  void setUp(const Camera& camera, const Channels& channels);
   void drawBatches(const DrawList& list, const GlBuffer& vertices, const GlBuffer& indices,
-                   bool glass);
-  void drawAvatars(const AvatarMeshes& avatars, const Camera& camera);
+                   bool glass, bool normals);
+  void drawAvatars(const AvatarMeshes& avatars, const Camera& camera, bool normals);
+  void drawAir(const DrawList& list);
   void drawSky();
   void darkenHollows();
 };
 
-GlRenderer::State::State(std::shared_ptr<const scene::Scene> shared) : scene(std::move(shared)) {
+GlRenderer::State::State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device)
+    : scene(std::move(shared)), context(device) {
   if (!scene) throw RenderError("GlRenderer: there is no scene");
 }
 
@@ -159,10 +166,11 @@ GlRenderer::State::~State() {
   }
 }
 
-GLuint GlRenderer::State::surfaceProgram(const Batch& batch) {
+GLuint GlRenderer::State::surfaceProgram(const Batch& batch, bool normals) {
   const SurfaceVariant variant{batch.texture >= 0, batch.pass == Pass::mask,
-                               batch.pass == Pass::blend};
-  const std::size_t index = 2 * static_cast<std::size_t>(batch.pass) + (variant.textured ? 1 : 0);
+                               batch.pass == Pass::blend, normals};
+  const std::size_t index =
+      4 * static_cast<std::size_t>(batch.pass) + (variant.textured ? 2 : 0) + (normals ? 1 : 0);
   std::optional<GlProgram>& program = surfaces[index];
   if (!program) {
     program = buildProgram("surface", surfaceVertexSource(), surfaceFragmentSource(variant));
@@ -170,7 +178,7 @@ GLuint GlRenderer::State::surfaceProgram(const Batch& batch) {
   return program->name();
 }
 
-void GlRenderer::State::setUp(const Camera& camera) {
+void GlRenderer::State::setUp(const Camera& camera, const Channels& channels) {
   if (!target.fits(camera.width, camera.height)) {
     target = FrameTarget(camera.width, camera.height);
   }
@@ -184,11 +192,11 @@ void GlRenderer::State::setUp(const Camera& camera) {
   glEnable(GL_FRAMEBUFFER_SRGB);
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);  // real models are wound both ways
-  target.begin();
+  target.begin(channels);
 }
 
 void GlRenderer::State::drawBatches(const DrawList& list, const GlBuffer& vertices,
-                                    const GlBuffer& indices, bool glass) {
+                                    const GlBuffer& indices, bool glass, bool normals) {
   const auto wanted = [&](const Batch& batch) { return (batch.pass == Pass::blend) == glass; };
   if (std::none_of(list.batches.begin(), list.batches.end(), wanted)) return;
   const GlBuffer instances = uploaded(list.instances);
@@ -200,7 +208,7 @@ void GlRenderer::State::drawBatches(const DrawList& list, const GlBuffer& vertic
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands.name());
   for (const Batch& batch : list.batches) {
     if (!wanted(batch)) continue;
-    glUseProgram(surfaceProgram(batch));
+    glUseProgram(surfaceProgram(batch, normals));
     if (batch.texture >= 0) {
       glBindTextureUnit(0, buffers.textures[static_cast<std::size_t>(batch.texture)].name());
     }
@@ -211,11 +219,21 @@ void GlRenderer::State::drawBatches(const DrawList& list, const GlBuffer& vertic
   }
 }
 
-void GlRenderer::State::drawAvatars(const AvatarMeshes& avatars, const Camera& camera) {
+void GlRenderer::State::drawAvatars(const AvatarMeshes& avatars, const Camera& camera,
+                                    bool normals) {
   DrawList list;
   appendVisible(list, avatars, camera);
   if (list.commands.empty()) return;
-  drawBatches(list, uploaded(avatars.vertices), uploaded(avatars.indices), false);
+  drawBatches(list, uploaded(avatars.vertices), uploaded(avatars.indices), false, normals);
+}
+
+/// What has a colour only: the sky, the shade in hollows, and glass.
+void GlRenderer::State::drawAir(const DrawList& list) {
+  target.drawInto({true, false, false, false});
+  drawSky();
+  darkenHollows();
+  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
+  drawBatches(list, buffers.vertices, buffers.indices, true, false);
 }
 
 void GlRenderer::State::drawSky() {
@@ -237,38 +255,38 @@ void GlRenderer::State::darkenHollows() {
   target.endOverlay();
 }
 
-GlRenderer::GlRenderer(std::shared_ptr<const scene::Scene> scene)
-    : state_(std::make_unique<State>(std::move(scene))) {}
+GlRenderer::GlRenderer(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device)
+    : state_(std::make_unique<State>(std::move(scene), device)) {}
 
 GlRenderer::~GlRenderer() = default;
 
 Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
-                         scene::EntityId hidden) {
+                         const FrameOptions& options) {
   if (const auto why = refusal(camera)) throw RenderError(*why);
   State& s = *state_;
   s.context.makeCurrent();
   s.prepare();
+  const Channels& channels = options.channels;
   DrawList list;
   appendVisible(list, {s.scene->model(), s.parts, s.buffers.ranges, s.buffers.materials},
-                placementsOf(*s.scene, snapshot), camera, hidden);
-  s.setUp(camera);
-  s.drawBatches(list, s.buffers.vertices, s.buffers.indices, false);
-  s.drawAvatars(avatarMeshes(snapshot, hidden), camera);
-  s.target.writeIds(false);
-  s.drawSky();
-  s.darkenHollows();
-  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
-  s.drawBatches(list, s.buffers.vertices, s.buffers.indices, true);
+                placementsOf(*s.scene, snapshot), camera, options);
+  s.setUp(camera, channels);
+  s.drawBatches(list, s.buffers.vertices, s.buffers.indices, false, channels.normals);
+  s.drawAvatars(avatarMeshes(snapshot, options.hidden), camera, channels.normals);
+  if (channels.rgb) s.drawAir(list);
   Frame frame;
   frame.camera = camera;
   frame.tick = snapshot.tick;
   frame.renderer = deviceName();
   frame.software = software();
-  s.target.read(frame);
+  s.target.read(frame, channels);
   checkGl("drawing a frame");
   return frame;
 }
 
+const std::string& GlRenderer::deviceNote() const {
+  return state_->context.note();
+}
 const std::string& GlRenderer::deviceName() const {
   return state_->context.deviceName();
 }

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "render/device.hpp"
 #include "render/frame.hpp"
 #include "render/render_error.hpp"
 #include "scene/scene.hpp"
@@ -12,19 +13,21 @@ namespace enfilade::render {
 /// Owns a GL context: make, use and destroy it on one thread. RenderThread does that for you.
 class GlRenderer {
  public:
-  /// Throws RenderError when no EGL device gives a context. The scene is brought to the device with
-  /// the first picture.
-  explicit GlRenderer(std::shared_ptr<const scene::Scene> scene);
+  /// Throws RenderError when no device that is chosen gives a context. The scene is brought to the
+  /// device with the first picture.
+  explicit GlRenderer(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device = {});
   ~GlRenderer();
   GlRenderer(const GlRenderer&) = delete;
   GlRenderer& operator=(const GlRenderer&) = delete;
 
-  /// `hidden` is not drawn (the avatar whose eyes these are); 0: everything is drawn.
   /// Throws RenderError for a camera that refusal() refuses, and for a scene too large to draw.
-  Frame render(const scene::Snapshot& snapshot, const Camera& camera, scene::EntityId hidden = 0);
+  Frame render(const scene::Snapshot& snapshot, const Camera& camera,
+               const FrameOptions& options = {});
 
   const std::string& deviceName() const;  ///< GL_RENDERER
   bool software() const;
+  /// Which better devices were tried in vain, one sentence; empty when none was.
+  const std::string& deviceNote() const;
 
  private:
   struct State;

@@ -9,6 +9,7 @@ constexpr const char* kFrameBlock = R"(
 layout(std140, binding = 0) uniform Frame {
   mat4 clipFromRelative;
   vec4 forward;
+  vec4 middle;
   vec4 rightByX;
   vec4 upByY;
   vec4 range;
@@ -100,6 +101,9 @@ layout(location = 0) out vec4 colour;
 #ifndef BLEND
 layout(location = 1) out uint seen;
 #endif
+#ifdef NORMALS
+layout(location = 2) out vec4 facing;
+#endif
 #ifdef TEXTURED
 layout(binding = 0) uniform sampler2D baseColourTexture;
 #endif
@@ -138,6 +142,9 @@ void main() {
   colour = vec4(exposed(radiance), 1.0);
   seen = entity;
 #endif
+#ifdef NORMALS
+  facing = vec4(n, 0.0);
+#endif
 }
 )";
 
@@ -146,7 +153,7 @@ out vec3 direction;
 
 void main() {
   vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
-  direction = forward.xyz + corner.x * rightByX.xyz + corner.y * upByY.xyz;
+  direction = middle.xyz + corner.x * rightByX.xyz + corner.y * upByY.xyz;
   gl_Position = vec4(corner, 0.0, 1.0);  // depth 0 is the farthest
 }
 )";
@@ -217,6 +224,7 @@ std::string surfaceFragmentSource(const SurfaceVariant& variant) {
   if (variant.textured) source += "#define TEXTURED\n";
   if (variant.mask) source += "#define MASK\n";
   if (variant.blend) source += "#define BLEND\n";
+  if (variant.normals) source += "#define NORMALS\n";
   return source + kFrameBlock + kLight + kSurfaceFragment;
 }
 

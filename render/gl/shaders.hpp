@@ -9,8 +9,9 @@ namespace enfilade::render {
 /// surfaces pay for nothing else.
 struct SurfaceVariant {
   bool textured = false;
-  bool mask = false;   ///< cuts holes: costs the early depth test
-  bool blend = false;  ///< colour only, with alpha
+  bool mask = false;     ///< cuts holes: costs the early depth test
+  bool blend = false;    ///< colour only, with alpha
+  bool normals = false;  ///< writes them to colour attachment 2
 };
 
 std::string surfaceVertexSource();
@@ -26,6 +27,7 @@ std::string hollowFragmentSource();
 struct FrameUniforms {
   float clipFromRelative[16];  ///< column-major; reversed depth: near 1, far 0
   float forward[4];            ///< w: 1 orthographic, 0 perspective
+  float middle[4];             ///< world direction of the picture's middle; z along forward is 1
   float rightByX[4];           ///< world right, divided by View::scaleX
   float upByY[4];              ///< world up, divided by View::scaleY
   float range[4];              ///< near, far, pixels a metre (perspective: at distance 1)

@@ -165,8 +165,8 @@ Vec3 project(const Camera& camera, const Vec3& worldPoint) {
   constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
   if (perspective && !(z > 0)) return {kNowhere, kNowhere, z};
   const double shrink = perspective ? z : 1;
-  const double x = view.scaleX * view.right.dot(toPoint) / shrink;
-  const double y = view.scaleY * view.up.dot(toPoint) / shrink;
+  const double x = view.scaleX * view.right.dot(toPoint) / shrink + view.shiftX;
+  const double y = view.scaleY * view.up.dot(toPoint) / shrink + view.shiftY;
   return {(1 + x) * camera.width / 2, (1 - y) * camera.height / 2, z};
 }
 

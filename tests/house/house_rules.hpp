@@ -31,6 +31,7 @@ Faults thirdPartiesInPublicHeaders(const Sources& sources);
 Faults thirdPartiesOutOfPlace(const Sources& sources);
 
 Faults headersWithoutPragmaOnce(const Sources& sources);
+/// A schema (.proto) may be twice as long: it is read as one document.
 Faults longFiles(const Sources& sources, int maxLines);
 Faults unfinishedWork(const Sources& sources);
 

@@ -53,6 +53,27 @@ TEST(Camera, RefusalsNameTheField) {
          c.projection = Camera::Projection::orthographic;
          c.heightY = 0;
        }},
+      {"pinhole.fx",
+       [](Camera& c) {
+         c.pinhole = Pinhole{0, 100, 320, 240};
+       }},
+      {"pinhole.fy",
+       [](Camera& c) {
+         c.pinhole = Pinhole{100, kNaN, 320, 240};
+       }},
+      {"pinhole.cx",
+       [](Camera& c) {
+         c.pinhole = Pinhole{100, 100, kInfinity, 240};
+       }},
+      {"pinhole.cy",
+       [](Camera& c) {
+         c.pinhole = Pinhole{100, 100, 320, -1e6};
+       }},
+      {"pinhole",
+       [](Camera& c) {
+         c.projection = Camera::Projection::orthographic;
+         c.pinhole = Pinhole{100, 100, 320, 240};
+       }},
   };
   for (const Bad& bad : all) {
     Camera camera;
@@ -104,6 +125,28 @@ TEST(Camera, APlanShowsTheBoundsWithXToTheRightAndZDownwards) {
   }
 }
 
+TEST(Camera, APinholeProjectsAsItsIntrinsicsSay) {
+  Camera camera;
+  camera.eye = {1, 2, 3};
+  camera.forward = {0, 0, -2};
+  camera.pinhole = Pinhole{500, 450, 100, 400};
+  ASSERT_EQ(refusal(camera), std::nullopt);
+  const Vec3 pixel = project(camera, camera.eye + Vec3(0.3, -0.2, -2));
+  EXPECT_NEAR(pixel.x(), 100 + 500 * 0.15, 1e-9);
+  EXPECT_NEAR(pixel.y(), 400 + 450 * 0.10, 1e-9);
+  EXPECT_NEAR(pixel.z(), 2, 1e-12);
+}
+
+TEST(Camera, TheIntrinsicsOfAnOpeningAngleGiveTheSamePicture) {
+  Camera camera;
+  camera.forward = {0.3, -0.2, 1};
+  const Vec3 point = 7 * camera.forward + Vec3(0.4, 0.5, 0);
+  const Vec3 angle = project(camera, point);
+  camera.pinhole = intrinsicsOf(camera);
+  EXPECT_EQ(camera.pinhole->cx, camera.width / 2.0);
+  EXPECT_LT((project(camera, point) - angle).norm(), 1e-9);
+}
+
 TEST(Camera, CullingKeepsEveryBoxThatHoldsAPointOfThePicture) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -119,6 +162,7 @@ TEST(Camera, CullingKeepsEveryBoxThatHoldsAPointOfThePicture) {
     camera.forward = vector(1);
     camera.far = 20;
     if (i % 2 == 1) camera.projection = Camera::Projection::orthographic;
+    if (i % 4 == 2) camera.pinhole = Pinhole{300, 400, 320 + 300 * unit(random), 240};
     const Vec3 centre = vector(15);
     const Vec3 half = vector(2).cwiseAbs();
     const bool kept = mayBeSeen(frustumOf(camera), {centre - half, centre + half});

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <random>
 #include <set>
 
@@ -132,6 +133,106 @@ TEST(GlRenderer, GlassBehindAWallIsNotSeen) {
   EXPECT_EQ(with.render({}, squareCamera()).rgb, without.render({}, squareCamera()).rgb);
 }
 
+TEST(GlRenderer, SolidGlassIsAFirstHitInAllChannels) {
+  const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, coloured(0.8f, 0.8f, 0.8f)};
+  const PlacedBox pane{{0, 0, -3}, {1, 1, 0.2}, coloured(0.05f, 0.05f, 0.9f, 0.5f)};
+  PlacedBox opaque = pane;
+  opaque.material = coloured(0.05f, 0.05f, 0.9f);
+  const FrameOptions options{.channels = {true, true, true, true}, .glass = Glass::solid};
+  const Frame solid = GlRenderer(sceneOf({pane, wall})).render({}, squareCamera(), options);
+  const Frame twin = GlRenderer(sceneOf({opaque, wall})).render({}, squareCamera(), options);
+  EXPECT_EQ(solid.ids[at(solid, 100, 100)], 1u);
+  EXPECT_NEAR(solid.depth[at(solid, 100, 100)], 2.9, 3e-4);
+  EXPECT_EQ(solid.rgb, twin.rgb);
+  EXPECT_EQ(solid.ids, twin.ids);
+  EXPECT_EQ(solid.normals, twin.normals);
+}
+
+TEST(GlRenderer, NormalsAreThoseOfTheFacesAndLookAtTheEye) {
+  GlRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, -3, -5}, {40, 1, 4}, {}}}));
+  Camera camera = squareCamera();
+  camera.pinhole = Pinhole{100, 100, 100, 100};
+  const Frame frame = renderer.render({}, camera, {.channels = {false, true, true, true}});
+  EXPECT_TRUE(frame.rgb.empty());
+  ASSERT_EQ(frame.normals.size(), 3u * 200u * 200u);
+  const auto normal = [&](int x, int y) {
+    const float* n = &frame.normals[3 * at(frame, x, y)];
+    return Eigen::Vector3f(n[0], n[1], n[2]);
+  };
+  EXPECT_LT((normal(100, 100) - Eigen::Vector3f::UnitZ()).norm(), 1e-4f);
+  ASSERT_EQ(frame.ids[at(frame, 100, 160)], 2u);
+  EXPECT_LT((normal(100, 160) - Eigen::Vector3f::UnitY()).norm(), 1e-4f);
+  EXPECT_EQ(normal(3, 3), Eigen::Vector3f(0, 0, 0));
+}
+
+TEST(GlRenderer, EachChannelIsTheSameWhateverElseIsAskedFor) {
+  GlRenderer renderer(sceneOf(crowd(200)));
+  const Frame all = renderer.render({}, squareCamera(), {.channels = {true, true, true, true}});
+  for (int asked = 0; asked < 16; ++asked) {
+    const Channels channels{(asked & 1) != 0, (asked & 2) != 0, (asked & 4) != 0, (asked & 8) != 0};
+    const Frame some = renderer.render({}, squareCamera(), {.channels = channels});
+    EXPECT_EQ(some.rgb, channels.rgb ? all.rgb : std::vector<std::uint8_t>{}) << asked;
+    EXPECT_EQ(some.ids, channels.ids ? all.ids : std::vector<std::uint32_t>{}) << asked;
+    EXPECT_EQ(some.normals, channels.normals ? all.normals : std::vector<float>{}) << asked;
+    ASSERT_EQ(some.depth.size(), channels.depth ? all.depth.size() : 0) << asked;
+    EXPECT_EQ(std::memcmp(some.depth.data(), all.depth.data(), some.depth.size() * sizeof(float)),
+              0);
+  }
+}
+
+TEST(GlRenderer, APinholeBesideTheMiddleSeesThePartOfALargerPicture) {
+  // The right half of a picture twice as wide: same focal length, the axis at the left border.
+  GlRenderer renderer(sceneOf(crowd(200)));
+  Camera wide = squareCamera(100);
+  wide.width = 200;
+  wide.pinhole = Pinhole{50, 50, 100, 50};
+  Camera right = squareCamera(100);
+  right.pinhole = Pinhole{50, 50, 0, 50};
+  const Frame whole = renderer.render({}, wide), half = renderer.render({}, right);
+  int differing = 0;
+  for (int y = 0; y < 100; ++y) {
+    for (int x = 0; x < 100; ++x) {
+      const bool same = half.ids[at(half, x, y)] == whole.ids[at(whole, 100 + x, y)];
+      differing += same ? 0 : 1;
+      const std::size_t a = 3 * at(half, x, y), b = 3 * at(whole, 100 + x, y);
+      if (same) {
+        ASSERT_NEAR(half.rgb[a], whole.rgb[b], 60) << x << ' ' << y;
+      }
+    }
+  }
+  EXPECT_LT(differing, 20) << "rounding at edges";
+}
+
+TEST(GlRenderer, RangeIsTheDistanceFromTheEye) {
+  GlRenderer renderer(sceneOf({{{0, 0, -5}, {40, 40, 2}, {}}}));
+  Camera camera = squareCamera();
+  const Frame frame = renderer.render({}, camera);
+  const std::vector<float> range = rangeOf(frame);
+  EXPECT_NEAR(range[at(frame, 100, 100)], 4, 1e-3);
+  const double aside = 0.5 / 100 - 1;  // of the first pixel's centre, at distance 1
+  EXPECT_NEAR(range[at(frame, 0, 0)], 4 * std::sqrt(1 + 2 * aside * aside), 2e-3);
+  camera.projection = Camera::Projection::orthographic;
+  const Frame parallel = renderer.render({}, camera);
+  EXPECT_EQ(rangeOf(parallel)[0], parallel.depth[0]);
+}
+
+TEST(GlRenderer, ADeviceThatIsNotThereIsRefusedWithAllThatWereTried) {
+  const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
+  try {
+    GlRenderer renderer(scene, {.device = "no such device"});
+    ADD_FAILURE() << "drawn with " << renderer.deviceName();
+  } catch (const RenderError& error) {
+    EXPECT_NE(std::string(error.what()).find("EGL"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("no such device"), std::string::npos);
+  }
+  const GlRenderer first(scene, {.device = "0"});
+  const GlRenderer named(scene, {.device = first.deviceName().substr(0, 4)});
+  EXPECT_EQ(named.deviceName(), first.deviceName());
+  if (first.software()) {
+    EXPECT_THROW(GlRenderer(scene, {.device = "0", .requireGpu = true}), RenderError);
+  }
+}
+
 TEST(GlRenderer, AMaskCutsHolesIntoColourIdsAndDepth) {
   scene::Model model;
   scene::Material leaf;
@@ -164,7 +265,8 @@ TEST(GlRenderer, AHiddenAvatarIsNotDrawnAndOthersAre) {
   EXPECT_EQ(both.ids[at(both, 75, 100)], 2u);
   EXPECT_EQ(both.ids[at(both, 125, 100)], 3u);
   EXPECT_NEAR(both.depth[at(both, 75, 100)], 3.7, 1e-3);
-  EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera(), 2)), (std::set<std::uint32_t>{1, 3}));
+  EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera(), {.hidden = 2})),
+            (std::set<std::uint32_t>{1, 3}));
 }
 
 TEST(GlRenderer, AnEmptySceneIsSkyAndNothingElse) {

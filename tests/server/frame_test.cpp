@@ -95,6 +95,44 @@ TEST_F(Frames, APngHoldsTheSamePicture) {
   EXPECT_EQ(image.rgb, std::vector<std::uint8_t>(plain.begin(), plain.end()));
 }
 
+TEST_F(Frames, IntrinsicsRangeAndNormalsTravel) {
+  protocol::Client ann = client("ann");
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
+  ann.step(30);
+  v1::FrameRequest request = eyesOf("ann");
+  request.add_channels(v1::CHANNEL_RANGE);
+  request.add_channels(v1::CHANNEL_NORMALS);
+  request.set_glass(v1::GLASS_SOLID);
+  v1::Intrinsics& intrinsics = *request.mutable_intrinsics();
+  intrinsics.set_fx(40);
+  intrinsics.set_fy(40);
+  intrinsics.set_cx(12.5);  // the axis goes through the middle of column 12
+  intrinsics.set_cy(24.5);
+  const protocol::ReceivedFrame frame = ann.frame(request);
+  EXPECT_EQ(frame.description.intrinsics().cx(), 12.5);
+  EXPECT_EQ(frame.description.glass(), v1::GLASS_SOLID);
+  EXPECT_FALSE(frame.description.camera().has_fov_y());
+  const auto depth = valuesOf<float>(frame, v1::CHANNEL_DEPTH);
+  const auto range = valuesOf<float>(frame, v1::CHANNEL_RANGE);
+  const auto normals = valuesOf<float>(frame, v1::CHANNEL_NORMALS);
+  ASSERT_EQ(range.size(), 64u * 48u);
+  ASSERT_EQ(normals.size(), 3u * 64u * 48u);
+  constexpr std::size_t axis = 24 * 64 + 12, aside = 24 * 64 + 42;
+  EXPECT_NEAR(range[axis], depth[axis], 1e-5);
+  EXPECT_NEAR(range[aside], depth[aside] * 1.25, 1e-4);  // 30 pixels aside: 3, 4, 5
+  EXPECT_NEAR(normals[3 * axis], -1, 1e-4) << "the wall ahead looks back along x";
+  request.mutable_eyes()->set_fov_y(1);
+  EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_CAMERA) << "both kinds of opening";
+  request.mutable_eyes()->clear_fov_y();
+  intrinsics.set_fx(0);
+  try {
+    ann.frame(request);
+    ADD_FAILURE() << "no focal length";
+  } catch (const protocol::ProtocolError& error) {
+    EXPECT_EQ(error.field, "intrinsics.fx");
+  }
+}
+
 TEST_F(Frames, WhatCannotBePicturedIsRefusedByName) {
   protocol::Client ann = client("ann");
   v1::FrameRequest request = eyesOf("nobody");

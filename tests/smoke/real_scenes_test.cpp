@@ -115,7 +115,7 @@ TEST_P(RealScenes, AnAvatarWalksAndNeverPenetrates) {
       const auto& ann = report.snapshot->avatars[0];
       render::Camera eyes = render::firstPerson(ann, 320, 240);
       eyes.forward = b.centre() - eyes.eye;  // into the building, wherever the walk is heading
-      expectSomethingSeen(renderer.render(*report.snapshot, eyes, ann.id), world);
+      expectSomethingSeen(renderer.render(*report.snapshot, eyes, {.hidden = ann.id}), world);
     }
   }
   EXPECT_EQ(worst, 0);
