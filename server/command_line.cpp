@@ -19,7 +19,7 @@ struct ModelArguments {
 struct Arguments {
   ModelArguments model;
   std::string script, out, plan, listen = "127.0.0.1:7878", connect;
-  bool strict = false, json = false, objects = false;
+  bool strict = false, json = false, objects = false, stopAtEndOfInput = false;
   std::string auditEvery = "0", epsilon, stepHeight, slope, sliding = "slide";
 };
 
@@ -186,6 +186,9 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   serve->add_option("--listen", read.listen, "Address and port; port 0 lets the system choose")
       ->capture_default_str()
       ->check(CLI::Validator(endpointProblem, "HOST:PORT"));
+  serve->add_flag(
+      "--stop-at-end-of-input", read.stopAtEndOfInput,
+      "End when standard input is closed: so the server does not outlive who started it");
   addAudit(*serve, read);
   addMotion(*serve, read);
   CLI::App* replay = app.add_subcommand("replay", "Run a walk script in a scene, in process");
@@ -217,8 +220,8 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   }
   const std::uint32_t audit = numberFrom<std::uint32_t>(read.auditEvery).value_or(0);
   if (*serve)
-    return ServeCommand{modelFrom(read.model), *endpointFrom(read.listen), audit,
-                        lengthsFrom(read)};
+    return ServeCommand{modelFrom(read.model), *endpointFrom(read.listen), audit, lengthsFrom(read),
+                        read.stopAtEndOfInput};
   if (*replay) {
     return ReplayCommand{modelFrom(read.model), read.script, read.out,
                          read.strict,           audit,       lengthsFrom(read)};

@@ -33,6 +33,7 @@ struct ServeCommand {
   Endpoint listen{"127.0.0.1", 7878};
   std::uint32_t auditEvery = 0;  ///< ticks; 0: never
   scene::Lengths lengths;
+  bool stopAtEndOfInput = false;  ///< ends when whoever started it has closed its standard input
 };
 struct ReplayCommand {
   ModelOptions model;

@@ -15,7 +15,9 @@ CameraOrError eyesOf(const v1::AvatarEyes& eyes, const scene::Snapshot& snapshot
                      int height) {
   const scene::AvatarView* avatar = avatarNamed(snapshot, eyes.avatar());
   if (!avatar) return unknownAvatar(eyes.avatar(), "eyes.avatar");
-  View view{render::firstPerson(*avatar, width, height), {.hidden = avatar->id}};
+  scene::AvatarView seer = *avatar;
+  if (eyes.has_forward()) seer.gaze = vectorFrom(eyes.forward()).normalized();
+  View view{render::firstPerson(seer, width, height), {.hidden = avatar->id}};
   if (eyes.has_fov_y()) view.camera.fovY = eyes.fov_y();
   if (eyes.has_near()) view.camera.near = eyes.near();
   if (eyes.has_far()) view.camera.far = eyes.far();

@@ -158,6 +158,21 @@ void answer(const Asked& asked, const v1::SetClock& wanted) {
   reply(asked, std::move(message));
 }
 
+void answer(const Asked& asked, const v1::Restart&) {
+  if (asked.served.clock.mode != v1::Clock::MODE_LOCKSTEP) {
+    return replyError(asked, errorOf(v1::ERROR_NOT_ALLOWED,
+                                     "a world begins anew only in lockstep: set the clock to "
+                                     "lockstep first"));
+  }
+  if (!takeClock(asked)) return;
+  restartWorld(asked.served);
+  const auto snapshot = asked.served.world.snapshot();
+  v1::ServerMessage message;
+  message.mutable_restart()->set_tick(snapshot->tick);
+  message.mutable_restart()->set_state_hash(snapshot->stateHash);
+  reply(asked, std::move(message));
+}
+
 // ---- listening and looking ---------------------------------------------------------------------
 
 void answer(const Asked& asked, const v1::Subscribe& subscription) {
@@ -326,6 +341,8 @@ void answer(const Asked& asked, const PostToTickThread& post) {
       return answer(asked, message.step());
     case v1::ClientMessage::kSetClock:
       return answer(asked, message.set_clock());
+    case v1::ClientMessage::kRestart:
+      return answer(asked, message.restart());
     case v1::ClientMessage::kSubscribe:
       return answer(asked, message.subscribe());
     case v1::ClientMessage::kFrame:
@@ -366,6 +383,7 @@ v1::Welcome welcomeOf(const ServedWorld& served) {
   welcome.set_server_version(kServerVersion);
   welcome.add_capabilities("free_run");
   welcome.add_capabilities("rays");
+  welcome.add_capabilities("restart");
   if (!served.frames.deviceName().empty()) welcome.add_capabilities("frames");
   *welcome.mutable_scene() = messageOf(served.world.scene());
   *welcome.mutable_policies() = messageOf(served.world.lengths());

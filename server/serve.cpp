@@ -1,6 +1,8 @@
 #include "server/serve.hpp"
 
+#include <poll.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <cstdio>
@@ -39,12 +41,22 @@ sigset_t holdEndingSignals() {
   return ending;
 }
 
-/// The signal that came. Throws when the server failed before one did.
-int awaitEndingSignal(const sigset_t& ending, const Server& server) {
+/// Whether standard input is at its end. What comes before it is thrown away.
+bool inputEnded() {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  if (::poll(&input, 1, 0) <= 0) return false;
+  char thrownAway[4096];
+  return ::read(STDIN_FILENO, thrownAway, sizeof thrownAway) == 0;
+}
+
+/// The signal that came; SIGTERM also for the end of input, if that ends the server. Throws when
+/// the server failed before.
+int awaitEndingSignal(const sigset_t& ending, const Server& server, bool stopAtEndOfInput) {
   for (;;) {
     const timespec moment{0, 250'000'000};
     const int signal = sigtimedwait(&ending, nullptr, &moment);
     if (signal > 0) return signal;
+    if (stopAtEndOfInput && inputEnded()) return SIGTERM;
     server.rethrowFailure();
   }
 }
@@ -57,7 +69,7 @@ ExitCode serve(const ServeCommand& command) {
   const sigset_t ending = holdEndingSignals();
   Server server(scene, command.listen, {}, command.auditEvery, command.lengths);
   tellReady(server, *scene, command.listen);
-  const int signal = awaitEndingSignal(ending, server);
+  const int signal = awaitEndingSignal(ending, server, command.stopAtEndOfInput);
   spdlog::info("{}: finishing the tick and telling the clients",
                signal == SIGINT ? "interrupted" : "told to stop");
   server.stop();

@@ -136,13 +136,17 @@ void answerClosing(Client& client) {
 
 }  // namespace
 
-ServedWorld::ServedWorld(std::shared_ptr<const scene::Scene> scene, FrameService& frameService,
+ServedWorld::ServedWorld(std::shared_ptr<const scene::Scene> served, FrameService& frameService,
                          RayService& rayService, const ServerLimits& serverLimits,
-                         const scene::Lengths& lengths)
-    : world(std::move(scene), lengths),
+                         const scene::Lengths& lengths, std::uint32_t auditEveryTicks)
+    : scene(std::move(served)),
+      auditEvery(auditEveryTicks),
+      world(scene, lengths),
       frames(frameService),
       rays(rayService),
-      limits(serverLimits) {}
+      limits(serverLimits) {
+  scene::auditBroadPhase(world, auditEvery);
+}
 
 void send(Client& client, const v1::ServerMessage& message) {
   client.out->push(encodeShared(message));
@@ -168,6 +172,32 @@ void advance(ServedWorld& served) {
     sendState(served, client, *report.snapshot);
     finishStep(served, client, *report.snapshot);
   }
+}
+
+void restartWorld(ServedWorld& served) {
+  std::vector<scene::Notice> left;
+  for (const scene::AvatarView& avatar : served.world.snapshot()->avatars) {
+    scene::Notice notice;
+    notice.kind = scene::Notice::Kind::left;
+    notice.avatar = avatar.name;
+    notice.id = avatar.id;
+    notice.position = avatar.feet;
+    notice.text = "the world begins anew";
+    left.push_back(std::move(notice));
+  }
+  const auto ended = scene::endContacts(served.world, scene::ContactEvent::Reason::left);
+  TickTold told = messagesOf(served.world, ended, left);
+  for (v1::ContactEvent& event : told.contacts) event.set_reason(v1::ContactEvent::REASON_RESTART);
+  for (auto& [id, client] : served.clients) {
+    sendEvents(client, told);
+    client.nextStateTime = 0;
+  }
+  served.world = scene::World(served.scene, served.world.lengths());
+  scene::auditBroadPhase(served.world, served.auditEvery);
+  served.owners.clear();
+  served.unsettled.clear();
+  served.live.clear();
+  served.idle = true;
 }
 
 void removeClient(ServedWorld& served, ClientId id) {

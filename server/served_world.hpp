@@ -56,8 +56,10 @@ struct ServedClock {
 struct ServedWorld {
   ServedWorld(std::shared_ptr<const scene::Scene> scene, FrameService& frameService,
               RayService& rayService, const ServerLimits& serverLimits,
-              const scene::Lengths& lengths = {});
+              const scene::Lengths& lengths = {}, std::uint32_t auditEveryTicks = 0);
 
+  std::shared_ptr<const scene::Scene> scene;
+  std::uint32_t auditEvery = 0;  ///< ticks; 0: never
   scene::World world;
   FrameService& frames;
   RayService& rays;
@@ -75,6 +77,9 @@ struct ServedWorld {
 
 /// Makes one tick and tells everyone what they subscribed to.
 void advance(ServedWorld& served);
+
+/// The world as it was at first. Everyone is told that contacts ended and avatars left.
+void restartWorld(ServedWorld& served);
 
 /// Takes a client out; its avatars leave at the next tick.
 void removeClient(ServedWorld& served, ClientId id);

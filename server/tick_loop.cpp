@@ -72,8 +72,7 @@ void takeRequest(ServedWorld& served, ClientId id, WaitingRequest request,
 TickLoop::TickLoop(std::shared_ptr<const scene::Scene> scene, FrameService& frames,
                    RayService& rays, const ServerLimits& limits, std::uint32_t auditEvery,
                    const scene::Lengths& lengths)
-    : served_(std::move(scene), frames, rays, limits, lengths) {
-  scene::auditBroadPhase(served_.world, auditEvery);
+    : served_(std::move(scene), frames, rays, limits, lengths, auditEvery) {
   thread_ = std::thread([this] { run(); });
 }
 

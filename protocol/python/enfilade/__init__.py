@@ -1,0 +1,28 @@
+"""Client of Enfilade, the server for virtual walk-throughs.
+
+    import enfilade
+
+    with enfilade.serve("building.glb") as server, server.connect() as client:
+        client.subscribe(contacts=True)
+        ann = client.spawn("ann", at=(1.5, 0, 0))
+        ann.walk((6, 0, 0))
+        client.run_until_idle()
+        for contact in client.contacts():
+            print(contact.tick, contact.kind, contact.b_name, contact.distance)
+        picture = ann.frame(width=320, height=240, channels=("rgb", "depth"))
+
+Metres, seconds, radians; right-handed, Y up. PROTOCOL.md tells what happens on the wire.
+"""
+
+from . import messages
+from .client import Avatar, Client, connect
+from .environment import VectorWalkEnv, WalkEnv
+from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError, StartFailed
+from .process import Server, serve
+from .results import AvatarState, Contact, Frame, Hits, Notice, Scan, State, Step
+
+__all__ = [
+    "Avatar", "AvatarState", "Client", "ConnectionFailed", "Contact", "EnfiladeError", "Frame",
+    "Hits", "Notice", "OrderFailed", "Scan", "Server", "ServerError", "StartFailed", "State", "Step",
+    "VectorWalkEnv", "WalkEnv", "connect", "messages", "serve",
+]

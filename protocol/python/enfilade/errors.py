@@ -1,0 +1,58 @@
+"""What can go wrong, as exceptions."""
+
+from __future__ import annotations
+
+from . import messages
+
+# What helps, by the code. The server's own sentence is more exact where it names a remedy, too.
+_REMEDIES = {
+    "ERROR_BAD_MESSAGE": "give the field that is named a value that can be used",
+    "ERROR_TOO_LARGE": "ask for less at a time; Client.limits tells what the server takes",
+    "ERROR_VERSION": "use the client of the server's release",
+    "ERROR_NOT_ALLOWED": "another client may have to leave, or the clock must be set first",
+    "ERROR_UNKNOWN_AVATAR": "spawn the avatar, and step until it has entered",
+    "ERROR_REFUSED_COMMAND": "change the field that is named",
+    "ERROR_BAD_CAMERA": "change the field that is named",
+    "ERROR_NO_RENDERER": "install libegl-mesa0 and libgl1-mesa-dri where the server runs",
+    "ERROR_INTERNAL": "look into the server's log, and report it",
+    "ERROR_SHUTTING_DOWN": "start the server again",
+    "ERROR_TOO_SLOW": "read events as they come, or subscribe to less",
+    "ERROR_TICK_GONE": "ask before the next step, or without a tick",
+    "ERROR_TIMEOUT": "send whole messages without long pauses",
+    "ERROR_UNSUPPORTED": "use a server that offers it; see Client.capabilities",
+    "ERROR_BAD_RAYS": "change the field that is named",
+}
+
+
+class EnfiladeError(Exception):
+    """All errors of this package."""
+
+
+class ConnectionFailed(EnfiladeError):
+    """The connection could not be made, broke or fell silent. The client is of no more use."""
+
+
+class ServerError(EnfiladeError):
+    """The server's own words. `fatal` ones came with the end of the connection."""
+
+    def __init__(self, number: int, message: str, field: str = "", fatal: bool = False) -> None:
+        value = messages.ErrorCode.values_by_number.get(number)
+        self.code: str = value.name if value else f"ERROR_{number}"
+        self.message = message
+        self.field = field
+        self.fatal = fatal
+        self.remedy: str = _REMEDIES.get(self.code, "")
+        text = f"{self.code}: {message}"
+        if field:
+            text += f" (field: {field})"
+        if self.remedy:
+            text += f"; {self.remedy}"
+        super().__init__(text)
+
+
+class OrderFailed(EnfiladeError):
+    """An order was taken, and could not be done: a spawn without room, a walk that is blocked."""
+
+
+class StartFailed(EnfiladeError):
+    """A server process did not come up; the text has its last words."""

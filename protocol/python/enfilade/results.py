@@ -1,0 +1,231 @@
+"""What the server tells, as plain Python data. Metres, seconds, radians; the scene's frame, Y up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Dict, List, Optional, Tuple
+
+import numpy as np
+
+from . import messages
+
+Vector = Tuple[float, float, float]
+
+
+def vector(message: Any) -> Vector:
+    return (message.x, message.y, message.z)
+
+
+def _verdict(number: int) -> str:
+    return messages.word(messages.Verdict, number, "VERDICT_")
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A contact event: ContactEvent of the .proto."""
+
+    tick: int
+    time: float
+    kind: str  # "begin", "end", "near", "blocked", "enter", "leave", "left_world"
+    reason: str  # of an end: "parted", "left", "shutdown", "restart"
+    phase: str  # of "near": "begin", "min", "end"
+    a: int
+    b: int
+    a_name: str
+    b_name: str
+    verdict: str  # "separated", "touching", "penetrating": exact
+    distance: float
+    error_bound: float
+    point_a: Vector
+    point_b: Vector
+    normal: Vector  # unit, from a to b
+    decided_by: str  # "filter" or "rational"
+
+
+def contact(event: Any) -> Contact:
+    kinds = messages.ContactEvent.DESCRIPTOR.enum_types_by_name
+    return Contact(
+        tick=event.tick, time=event.time,
+        kind=messages.word(kinds["Kind"], event.kind, "KIND_"),
+        reason=messages.word(kinds["Reason"], event.reason, "REASON_") if event.reason else "",
+        phase=messages.word(kinds["Phase"], event.phase, "PHASE_") if event.phase else "",
+        a=event.a, b=event.b, a_name=event.a_name, b_name=event.b_name,
+        verdict=_verdict(event.verdict), distance=event.distance, error_bound=event.error_bound,
+        point_a=vector(event.point_a), point_b=vector(event.point_b), normal=vector(event.normal),
+        decided_by=messages.word(messages.DecidedBy, event.decided_by, "DECIDED_BY_"))
+
+
+@dataclass(frozen=True)
+class Notice:
+    """How an order went: Notice of the .proto."""
+
+    tick: int
+    kind: str  # "spawned", "refused", "arrived", "blocked", "done", "capture", "left"
+    avatar: str
+    id: int
+    tag: int
+    position: Vector
+    obstacle: int
+    obstacle_name: str
+    text: str
+
+
+def notice(message: Any) -> Notice:
+    kinds = messages.Notice.DESCRIPTOR.enum_types_by_name["Kind"]
+    return Notice(
+        tick=message.tick, kind=messages.word(kinds, message.kind, "KIND_"),
+        avatar=message.avatar, id=message.id, tag=message.tag, position=vector(message.position),
+        obstacle=message.obstacle, obstacle_name=message.obstacle_name, text=message.text)
+
+
+@dataclass(frozen=True)
+class AvatarState:
+    """Where an avatar is, and how its last move went: AvatarState of the .proto."""
+
+    id: int
+    name: str
+    feet: Vector
+    gaze: Vector
+    eye_height: float
+    grounded: bool
+    flying: bool
+    asked: Vector  # metres: what its orders asked for in the tick
+    made: Vector  # metres: how far the feet came
+    stopped_by: int  # entity id; 0: nothing
+    stopped_by_name: str
+    joints: Tuple[float, ...] = ()
+
+    @property
+    def eyes(self) -> Vector:
+        return (self.feet[0], self.feet[1] + self.eye_height, self.feet[2])
+
+
+def avatar_state(message: Any) -> AvatarState:
+    move = message.move
+    return AvatarState(
+        id=message.id, name=message.name, feet=vector(message.feet), gaze=vector(message.gaze),
+        eye_height=message.eye_height, grounded=message.grounded, flying=message.flying,
+        asked=vector(move.asked), made=vector(move.made), stopped_by=move.stopped_by,
+        stopped_by_name=move.stopped_by_name, joints=tuple(j.value for j in message.joints))
+
+
+@dataclass(frozen=True)
+class Step:
+    tick: int
+    time: float
+    state_hash: int  # equal hashes: equal worlds, to the last bit
+    idle: bool  # every queue is empty and nobody is falling or driven
+    avatars: Dict[str, AvatarState] = field(default_factory=dict)  # when asked for
+
+
+def step(reply: Any) -> Step:
+    states = {one.name: avatar_state(one) for one in reply.avatars}
+    return Step(reply.tick, reply.time, reply.state_hash, reply.idle, states)
+
+
+@dataclass(frozen=True)
+class State:
+    """Where everyone is: State of the .proto. `dropped` were left out since the last one."""
+
+    tick: int
+    time: float
+    state_hash: int
+    avatars: Dict[str, AvatarState]
+    dropped: int
+    message: Any  # with the bodies
+
+
+def state(message: Any) -> State:
+    states = {one.name: avatar_state(one) for one in message.avatars}
+    return State(message.tick, message.time, message.hash, states, message.dropped, message)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A picture. Channels that were not asked for are None. The arrays are writable and nobody
+    else's; they share one piece of memory."""
+
+    tick: int
+    time: float
+    renderer: str
+    software: bool
+    rgb: Optional[np.ndarray]  # height x width x 3, uint8, sRGB
+    depth: Optional[np.ndarray]  # height x width, float32: metres along the axis; NaN: nothing
+    ids: Optional[np.ndarray]  # height x width, uint32: entity ids; 0: nothing
+    normals: Optional[np.ndarray]  # height x width x 3, float32: unit, facing the eye; 0: nothing
+    range: Optional[np.ndarray]  # height x width, float32: metres along the ray; NaN: nothing
+    message: Any  # the Frame of the .proto, with the camera as it was used
+
+
+# The bytes of rgb last, so that the numbers of the others are aligned.
+_CHANNELS = {"depth": ("CHANNEL_DEPTH", np.float32, 1),
+             "ids": ("CHANNEL_IDS", np.uint32, 1), "range": ("CHANNEL_RANGE", np.float32, 1),
+             "normals": ("CHANNEL_NORMALS", np.float32, 3), "rgb": ("CHANNEL_RGB", np.uint8, 3)}
+
+
+def channels(names: Any) -> List[int]:
+    """The numbers of channels, in the order of _CHANNELS."""
+    unknown = set(names) - set(_CHANNELS)
+    if unknown:
+        raise ValueError(f"channels: {sorted(unknown)} are none; give of {sorted(_CHANNELS)}")
+    return [getattr(messages, _CHANNELS[name][0]) for name in _CHANNELS if name in names]
+
+
+def frame(message: Any, attachment: memoryview) -> Frame:
+    found: Dict[str, np.ndarray] = {}
+    for plane in message.planes:
+        for name, (channel, kind, depth) in _CHANNELS.items():
+            if plane.channel != getattr(messages, channel):
+                continue
+            shape = (plane.height, plane.width) + ((depth,) if depth > 1 else ())
+            count = plane.height * plane.width * depth
+            if plane.encoding > messages.ENCODING_RAW or \
+                    plane.length != count * np.dtype(kind).itemsize:
+                raise ValueError(f"the frame's {name} is not raw pixels of its size")
+            found[name] = np.frombuffer(attachment, kind, count, plane.offset).reshape(shape)
+    return Frame(message.tick, message.time, message.renderer, message.software, found.get("rgb"),
+                 found.get("depth"), found.get("ids"), found.get("normals"), found.get("range"),
+                 message)
+
+
+@dataclass(frozen=True)
+class Hits:
+    """What rays meet, an entry a ray. Where nothing is met: entity 0, NaN elsewhere."""
+
+    tick: int
+    entity: np.ndarray  # uint32
+    distance: np.ndarray  # float64, metres from the origin
+    point: np.ndarray  # N x 3
+    normal: np.ndarray  # N x 3, unit, towards where the ray comes from
+    names: List[str]
+
+
+def hits(reply: Any) -> Hits:
+    count = len(reply.hits)
+    distance = np.full(count, np.nan)
+    point, normal = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
+    for i, hit in enumerate(reply.hits):
+        if hit.met:
+            distance[i] = hit.distance
+            point[i], normal[i] = vector(hit.point), vector(hit.normal)
+    entity = np.array([hit.entity for hit in reply.hits], np.uint32)
+    return Hits(reply.tick, entity, distance, point, normal, [hit.name for hit in reply.hits])
+
+
+@dataclass(frozen=True)
+class Scan:
+    """A range scan, row by row from above, each from the left."""
+
+    tick: int
+    distance: np.ndarray  # rows x columns, float32, metres along each ray; NaN: nothing
+    entity: np.ndarray  # rows x columns, uint32; 0: nothing
+
+
+def scan(reply: Any, attachment: memoryview) -> Scan:
+    shape = (reply.rows, reply.columns)
+    count = reply.rows * reply.columns
+    if len(attachment) != 8 * count:
+        raise ValueError(f"the scan has {len(attachment)} bytes, not 8 for each of {count} rays")
+    distance = np.frombuffer(attachment, np.float32, count, 0).reshape(shape)
+    entity = np.frombuffer(attachment, np.uint32, count, 4 * count).reshape(shape)
+    return Scan(reply.tick, distance, entity)

@@ -1,0 +1,216 @@
+"""The Python client against the real server."""
+
+import math
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+import enfilade
+from enfilade import messages
+from room import COLUMN, WALL, RoomCase
+
+
+class Walking(RoomCase):
+    def test_a_walk_to_the_wall_ends_at_the_wall(self):
+        ann = self.client.spawn("ann", at=(0, 0.01, 0))
+        self.assertEqual(ann.enter().name, "ann")
+        tag = ann.walk((8, 0, 0))
+        end = self.client.run_until_idle()
+        # The prism's edge rests at epsilon from the wall.
+        self.assertAlmostEqual(end.avatars["ann"].feet[0], 5 - 0.3 - 0.0005, delta=0.03)
+        blocked = [one for one in self.client.notices() if one.kind == "blocked"]
+        self.assertEqual([one.tag for one in blocked], [tag])
+        self.assertEqual(blocked[0].obstacle_name, "wall")
+        touched = [one for one in self.client.contacts() if one.b == WALL and one.kind == "begin"]
+        self.assertEqual(len(touched), 1)
+        self.assertEqual(touched[0].verdict, "separated")
+        self.assertGreater(touched[0].normal[0], 0.9)
+
+    def test_the_same_orders_after_a_restart_give_the_same_hash(self):
+        hashes = []
+        for _ in range(2):
+            self.client.restart()
+            ann = self.client.spawn("ann", at=(0, 0.01, 0))
+            ann.enter()
+            ann.drive((1, 0, 0.3))
+            hashes.append(self.client.step(200).state_hash)
+        self.assertEqual(*hashes)
+
+    def test_a_restart_tells_others_who_left(self):
+        with self.server.connect() as other:
+            other.subscribe(contacts=True, notices=True)
+            self.client.spawn("ann", at=(0, 0, 0)).enter()
+            self.client.step(30)
+            self.client.restart()
+            self.assertEqual(self.client.step().tick, 1)
+            other.metrics()
+            self.assertEqual([one.reason for one in other.contacts() if one.kind == "end"],
+                             ["restart"])
+            self.assertEqual([one.avatar for one in other.notices() if one.kind == "left"], ["ann"])
+
+    def test_the_clock_runs_freely_and_contacts_are_waited_for(self):
+        self.client.spawn("ann", at=(0, 0.3, 0)).enter()
+        self.client.free_run(speed=4)
+        first = next(self.client.contacts(seconds=10))
+        self.assertEqual((first.kind, first.b_name), ("begin", "floor"))
+        self.client.subscribe(state=True)
+        ticks = [next(self.client.states(seconds=10)).tick for _ in range(3)]
+        self.assertEqual(ticks, sorted(set(ticks)))
+
+    def test_a_pipeline_is_answered_in_order(self):
+        asked = [{"step": messages.Step(ticks=i)} for i in (1, 2, 3)]
+        replies = self.client.pipeline(asked)
+        self.assertEqual([reply.step.tick for reply, _ in replies], [1, 3, 6])
+
+
+class Refusals(RoomCase):
+    def test_an_error_carries_code_field_and_remedy(self):
+        with self.assertRaises(enfilade.ServerError) as caught:
+            self.client.spawn("ann", at=(math.nan, 0, 0))
+        error = caught.exception
+        self.assertEqual((error.code, error.field), ("ERROR_REFUSED_COMMAND", "spawn.at.x"))
+        self.assertIn("finite" if "finite" in error.message else "must", error.message)
+        self.assertTrue(error.remedy)
+        self.assertEqual(self.client.step().tick, 1)
+
+    def test_a_spawn_inside_the_column_says_why(self):
+        with self.assertRaisesRegex(enfilade.OrderFailed, "column"):
+            self.client.spawn("ann", at=(0, 0, 6)).enter()
+
+    def test_a_second_driver_is_refused(self):
+        with self.server.connect() as other, self.assertRaises(enfilade.ServerError) as caught:
+            other.step()
+        self.assertEqual(caught.exception.code, "ERROR_NOT_ALLOWED")
+
+    def test_the_first_error_of_a_pipeline_leaves_the_others_answered(self):
+        with self.assertRaises(enfilade.ServerError):
+            self.client.pipeline([{"step": messages.Step(ticks=0)}, {"step": messages.Step(ticks=2)}])
+        self.assertEqual(self.client.step().tick, 3)
+
+
+class Seeing(RoomCase):
+    def test_a_frame_has_the_wall_where_it_stands(self):
+        self.need_pictures()
+        frame = self.client.frame(eye=(0, 1, 0), forward=(1, 0, 0), width=33, height=21,
+                                  channels=("rgb", "depth", "ids", "normals", "range"))
+        np.testing.assert_allclose(frame.normals[10, 16], (-1, 0, 0), atol=1e-6)
+        self.assertGreater(frame.range[0, 0], frame.depth[0, 0])
+        self.assertEqual((frame.rgb.shape, frame.rgb.dtype), ((21, 33, 3), np.uint8))
+        self.assertEqual((frame.depth.shape, frame.depth.dtype), ((21, 33), np.float32))
+        self.assertEqual((frame.ids.shape, frame.ids.dtype), ((21, 33), np.uint32))
+        self.assertEqual(frame.ids[10, 16], WALL)
+        self.assertAlmostEqual(frame.depth[10, 16], 5, places=3)
+        self.assertTrue(frame.depth.flags.aligned and frame.depth.flags.writeable)
+
+    def test_eyes_look_along_forward_without_turning_the_avatar(self):
+        self.need_pictures()
+        ann = self.client.spawn("ann", at=(0, 0.01, 0), facing=0)
+        ann.enter()
+        side = ann.frame(forward=(0, 0, 3), width=9, height=9, channels=("ids",))
+        self.assertEqual(side.ids[4, 4], COLUMN)
+        self.assertIsNone(side.rgb)
+        self.assertEqual(self.client.step(avatars=True).avatars["ann"].gaze[0], 1)
+
+    def test_rays_and_scans_meet_what_is_there(self):
+        hits = self.client.rays([(0, 1, 0), (0, 1, 0)], [(2, 0, 0), (-1, 0, 0)])
+        self.assertEqual(hits.entity.tolist(), [WALL, 0])
+        self.assertEqual(hits.distance[0], 5)
+        self.assertTrue(np.isnan(hits.distance[1]))
+        np.testing.assert_array_equal(hits.normal[0], (-1, 0, 0))
+        self.assertFalse(self.client.sees((0, 1, 0), (8, 1, 0)))
+        self.assertTrue(self.client.sees((0, 1, 0), (4.9, 1, 0)))
+        scan = self.client.scan(at=(0, 1, 0), columns=4)
+        self.assertEqual(scan.distance.shape, (1, 4))
+        self.assertIn(WALL, scan.entity)
+
+    def test_names_come_for_ids(self):
+        self.assertEqual(self.client.names([WALL, COLUMN, 99]),
+                         {WALL: "wall", COLUMN: "column", 99: ""})
+
+
+class Connections(RoomCase):
+    def test_nobody_listening_is_told_with_a_remedy(self):
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            with self.assertRaisesRegex(enfilade.ConnectionFailed, "enfilade serve"):
+                enfilade.connect(f"127.0.0.1:{free.getsockname()[1]}")
+
+    def _fake(self, answer):
+        listener = socket.create_server(("127.0.0.1", 0))
+        self.addCleanup(listener.close)
+
+        def serve():
+            peer = listener.accept()[0]
+            peer.recv(1000)
+            peer.sendall(answer)
+            time.sleep(0.05)
+            peer.close()
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        self.addCleanup(thread.join)
+        return f"127.0.0.1:{listener.getsockname()[1]}"
+
+    def test_another_kind_of_server_is_told(self):
+        with self.assertRaisesRegex(enfilade.ConnectionFailed, "does not speak this protocol"):
+            enfilade.connect(self._fake(b"HTTP/1.1 400 Bad Request\r\n\r\n"))
+
+    def test_a_message_that_claims_too_much_is_not_waited_for(self):
+        with self.assertRaisesRegex(enfilade.ConnectionFailed, "claims 4294967295 bytes"):
+            enfilade.connect(self._fake(b"ENF1\xff\xff\xff\xff\x04\0\0\0"))
+
+    def test_half_a_message_and_then_the_end_is_told(self):
+        with self.assertRaises(enfilade.ConnectionFailed):
+            enfilade.connect(self._fake(b"ENF1\x20\0\0\0\x16\0\0\0\x08"))
+
+    def test_a_silent_server_is_given_up_in_time(self):
+        with socket.create_server(("127.0.0.1", 0)) as listener:
+            with self.assertRaisesRegex(enfilade.ConnectionFailed, "within 0.1 s"):
+                enfilade.connect(f"127.0.0.1:{listener.getsockname()[1]}", timeout=0.1)
+
+    def test_the_end_of_a_server_comes_with_its_reason(self):
+        server = enfilade.serve(self.scene)
+        client = server.connect()
+        self.addCleanup(client.close)
+        self.assertEqual(server.stop(), 0)
+        with self.assertRaises(enfilade.ServerError) as caught:
+            client.step()
+        self.assertEqual(caught.exception.code, "ERROR_SHUTTING_DOWN")
+        self.assertTrue(caught.exception.fatal)
+
+
+class Processes(RoomCase):
+    def test_a_scene_that_is_not_there_is_told_at_once(self):
+        with self.assertRaisesRegex(enfilade.StartFailed, "nowhere.glb"):
+            enfilade.serve("nowhere.glb")
+
+    def test_a_server_does_not_outlive_the_python_that_started_it(self):
+        code = ("import enfilade, os, sys, time\n"
+                "server = enfilade.serve(sys.argv[1])\n"
+                "print(server.process.pid, flush=True)\n"
+                "time.sleep(60)\n")
+        python = subprocess.Popen([sys.executable, "-c", code, str(self.scene)],
+                                  stdout=subprocess.PIPE)
+        server = int(python.stdout.readline())
+        python.send_signal(signal.SIGKILL)
+        python.communicate()
+        for _ in range(1000):
+            try:
+                stat = Path(f"/proc/{server}/stat").read_text()
+            except FileNotFoundError:
+                return
+            if stat.rpartition(")")[2].split()[0] == "Z":
+                return
+            time.sleep(0.01)
+        self.fail("the server still runs")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,102 @@
+"""The environments: Gymnasium's API, and the same seed for the same observations."""
+
+import unittest
+
+import numpy as np
+
+import enfilade
+from room import RoomCase
+
+_STARTS = [(0, 0.01, 0), (-3, 0.01, 2)]
+
+
+def walk(env, seed, steps):
+    """All that is seen on a walk of random actions."""
+    told = [env.reset(seed=seed)]
+    told += [env.step(env.action_space.sample()) for _ in range(steps)]
+    return told
+
+
+class Environments(RoomCase):
+    def environment(self, **options):
+        options = {"starts": _STARTS, "size": (16, 12), **options}
+        env = enfilade.WalkEnv(self.scene, **options)
+        self.addCleanup(env.close)
+        return env
+
+    def assert_same(self, one, other):
+        self.assertEqual(one.keys(), other.keys())
+        for name in one:
+            np.testing.assert_array_equal(one[name], other[name], name)
+
+    def test_the_same_seed_gives_the_same_observations(self):
+        self.need_pictures()
+        env = self.environment()
+        first, again, another = walk(env, 7, 12), walk(env, 7, 12), walk(env, 8, 12)
+        for one, other in zip(first, again):
+            self.assert_same(one[0], other[0])
+            self.assertEqual(one[-1]["state_hash"], other[-1]["state_hash"])
+        self.assertNotEqual(first[-1][-1]["state_hash"], another[-1][-1]["state_hash"])
+
+    def test_observations_lie_in_their_space(self):
+        self.need_pictures()
+        env = self.environment(channels=("rgb", "depth", "ids"), goal=(3, 0, 0))
+        for told in walk(env, 1, 5):
+            self.assertTrue(env.observation_space.contains(told[0]))
+        self.assertEqual(env.render().shape, (12, 16, 3))
+
+    def test_who_goes_ahead_comes_to_the_goal(self):
+        env = self.environment(starts=[(0, 0.01, 0, 0)], goal=(2, 0, 0), channels=(), discrete=True)
+        env.reset(seed=0)
+        rewards = []
+        for _ in range(100):
+            seen, reward, terminated, truncated, info = env.step(1)
+            rewards.append(reward)
+            if terminated:
+                break
+        self.assertTrue(terminated)
+        self.assertLessEqual(np.hypot(*seen["to_goal"][[0, 2]]), 0.5)
+        self.assertAlmostEqual(sum(rewards), seen["position"][0], places=6)
+
+    def test_turning_left_turns_towards_minus_z(self):
+        env = self.environment(starts=[(0, 0.01, 0, 0)], channels=(), turn_speed=np.pi / 2,
+                               ticks_per_step=60)
+        env.reset(seed=0)
+        seen = env.step([1, 1])[0]
+        np.testing.assert_allclose(seen["heading"], (0, 1), atol=1e-12)
+        self.assertLess(seen["position"][2], -1)
+
+    def test_the_wall_is_told_and_ends_the_way(self):
+        env = self.environment(starts=[(4, 0.01, 0, 0)], channels=(), max_steps=12)
+        env.reset(seed=0)
+        for _ in range(12):
+            seen, reward, terminated, truncated, info = env.step([1, 0])
+        self.assertEqual(info["stopped_by"], "wall")
+        self.assertEqual((terminated, truncated), (False, True))
+        self.assertLess(reward, 1e-9)
+
+    def test_a_start_without_room_is_an_error(self):
+        env = self.environment(starts=[(0, 0, 6)], channels=())
+        with self.assertRaisesRegex(enfilade.OrderFailed, "column"):
+            env.reset(seed=0)
+
+    def test_a_vector_of_environments_does_as_each_alone(self):
+        make = lambda _: enfilade.WalkEnv(self.scene, starts=_STARTS, channels=(), max_steps=3)
+        vector = enfilade.VectorWalkEnv(make, 2)
+        self.addCleanup(vector.close)
+        alone = self.environment(channels=(), max_steps=3)
+        seen, _ = vector.reset(seed=5)
+        expected = alone.reset(seed=6)[0]
+        np.testing.assert_array_equal(seen["position"][1], expected["position"])
+        for _ in range(3):
+            seen, rewards, terminated, truncated, infos = vector.step([[1, 0.5]] * 2)
+            expected = alone.step([1, 0.5])
+            np.testing.assert_array_equal(seen["position"][1], expected[0]["position"])
+        self.assertTrue(truncated.all())
+        seen, rewards, terminated, truncated, infos = vector.step([[1, 0]] * 2)
+        np.testing.assert_array_equal(rewards, [0, 0])
+        np.testing.assert_array_equal(infos["tick"], [1, 1])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,75 @@
+"""The package as its users have it: its messages, installed by pip, and its examples."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+from room import RoomCase
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / "protocol" / "python"
+
+
+class Package(RoomCase):
+    def run_python(self, *arguments, python=sys.executable, **options):
+        done = subprocess.run([python, *map(str, arguments)], capture_output=True, text=True,
+                              timeout=120, **options)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done.stdout
+
+    def test_the_messages_are_those_of_the_proto(self):
+        with tempfile.NamedTemporaryFile() as made:
+            subprocess.run(["protoc", f"--proto_path={ROOT}", f"--descriptor_set_out={made.name}",
+                            "protocol/enfilade.proto"], check=True, cwd=ROOT)
+            embedded = (PACKAGE / "enfilade" / "messages.desc").read_bytes()
+            self.assertEqual(embedded, made.read(), "build, and commit messages.desc")
+
+    def test_pip_installs_it_without_a_network(self):
+        env = Path(self.folder.name) / "env"
+        self.run_python("-m", "venv", "--system-site-packages", env)
+        python = env / "bin" / "python"
+        source = Path(self.folder.name) / "source"  # pip builds beside what it installs
+        subprocess.run(["cp", "-r", str(PACKAGE), str(source)], check=True)
+        self.run_python("-m", "pip", "install", "--no-build-isolation", "--no-index", "--no-deps",
+                        "--disable-pip-version-check", source, python=python)
+        plain = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+        code = ("import enfilade, sys\n"
+                "with enfilade.connect(sys.argv[1]) as client:\n"
+                "    print(enfilade.__file__, client.welcome.scene.source)\n")
+        told = self.run_python("-c", code, self.server.address, python=python, env=plain,
+                               cwd=self.folder.name)
+        self.assertIn(str(env), told)
+        self.assertIn("room.obj", told)
+
+    def test_the_random_walk_runs(self):
+        self.need_pictures()
+        told = self.run_python(PACKAGE / "examples" / "random_walk.py", self.scene, "--start", 0,
+                               0.01, 0, "--steps", 5)
+        self.assertIn("walked", told)
+
+    def test_the_data_set_is_recorded(self):
+        self.need_pictures()
+        out = Path(self.folder.name) / "set"
+        told = self.run_python(PACKAGE / "examples" / "record_data_set.py", self.scene, out,
+                               "--start", 0, 0.01, 0, "--to", 1, 0, 0, "--size", 20, 10)
+        self.assertIn("arrived", told)
+        index = json.loads((out / "index.json").read_text())
+        picture = np.load(out / index["pictures"][-1]["file"])
+        self.assertEqual(picture["depth"].shape, (10, 20))
+        self.assertIn("wall", index["names"].values())
+
+    def test_the_contact_log_is_json(self):
+        told = self.run_python(PACKAGE / "examples" / "contact_log.py", self.scene, "--start", 0, 0.01,
+                               0, "--to", 8, 0, 0)
+        events = [json.loads(line) for line in told.splitlines()]
+        self.assertIn(("begin", "wall"), [(one["kind"], one["b_name"]) for one in events])
+
+
+if __name__ == "__main__":
+    unittest.main()
