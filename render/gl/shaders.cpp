@@ -54,39 +54,12 @@ void main() {
 }
 )";
 
-// Light without lamps, so that a model without any reads well indoors: six tints by orientation
-// (walls that meet differ), a weak sun, and a lamp carried at the eye that fades with distance.
-constexpr const char* kLight = R"(
-const vec3 kSunDirection = vec3(0.3841, 0.7682, 0.5122);
-
-vec3 ambientFor(vec3 n) {
-  vec3 weight = n * n;
-  vec3 alongX = n.x > 0.0 ? vec3(0.43, 0.41, 0.38) : vec3(0.27, 0.29, 0.33);
-  vec3 alongY = n.y > 0.0 ? vec3(0.38, 0.38, 0.38) : vec3(0.40, 0.38, 0.36);
-  vec3 alongZ = n.z > 0.0 ? vec3(0.35, 0.34, 0.33) : vec3(0.20, 0.22, 0.26);
-  return weight.x * alongX + weight.y * alongY + weight.z * alongZ;
-}
-
-vec3 lit(vec3 albedo, vec3 n, vec3 toEye, float distance, float metallic, float roughness) {
-  float facing = max(dot(n, toEye), 0.0);
-  float lamp = facing * (0.12 + 0.48 / (1.0 + distance * distance / 20.0));
-  float sun = 0.32 * max(dot(n, kSunDirection), 0.0);
-  vec3 light = ambientFor(n) + vec3(1.0, 0.97, 0.92) * lamp + vec3(1.0, 0.95, 0.86) * sun;
-  float gloss = (1.0 - roughness) * (1.0 - roughness);
-  float shine = gloss > 0.01 ? gloss * pow(facing, 8.0 + 56.0 * gloss) : 0.0;
-  vec3 mirrored = mix(vec3(0.15), albedo, metallic);
-  return albedo * light * (1.0 - 0.25 * metallic) + mirrored * shine * lamp * 2.0;
-}
-
-vec3 skyFor(vec3 direction) {
-  float h = direction.y;
-  vec3 above = mix(vec3(0.80, 0.86, 0.92), vec3(0.30, 0.46, 0.70), sqrt(clamp(h, 0.0, 1.0)));
-  vec3 below = mix(vec3(0.62, 0.62, 0.60), vec3(0.30, 0.29, 0.28), sqrt(clamp(-h, 0.0, 1.0)));
-  return mix(below, above, smoothstep(-0.02, 0.02, h));
-}
-
-vec3 exposed(vec3 radiance) { return 1.0 - exp(-1.2 * radiance); }
-)";
+// As text of GLSL what the ray renderer compiles as C++.
+constexpr const char* kLight =
+#define LIGHT_TEXT(...) #__VA_ARGS__
+#include "render/light.inc"
+#undef LIGHT_TEXT
+    ;
 
 constexpr const char* kSurfaceFragment = R"(
 in vec3 point;
@@ -130,14 +103,13 @@ void main() {
   float distance = plan ? 0.0 : length(point);
   vec3 toEye = plan ? -forward.xyz : -point / max(distance, 1e-6);
   vec3 n = facingNormal(toEye);
-  vec3 radiance = lit(albedo.rgb, n, toEye, distance, finish.y, finish.z) + 1.6 * glow.rgb;
+  vec3 radiance = lit(albedo.rgb, n, toEye, distance, finish.y, finish.z) + kGlow * glow.rgb;
   // A plan cuts things open; their insides are darker, so that cut walls stand out.
   bool inside = gl_FrontFacing == (glow.w > 0.5);
-  if (plan && inside && finish.w < 0.5) radiance *= 0.35;
-  if (!plan) radiance = mix(skyFor(-toEye), radiance, exp(-distance / 600.0));
+  if (plan && inside && finish.w < 0.5) radiance *= kCutOpen;
+  if (!plan) radiance = inAir(radiance, -toEye, distance);
 #ifdef BLEND
-  float rim = 1.0 - abs(dot(n, toEye));
-  colour = vec4(exposed(radiance), albedo.a + (1.0 - albedo.a) * 0.4 * rim * rim * rim * rim);
+  colour = vec4(exposed(radiance), glassAlpha(albedo.a, n, toEye));
 #else
   colour = vec4(exposed(radiance), 1.0);
   seen = entity;
@@ -164,7 +136,7 @@ layout(location = 0) out vec4 colour;
 
 void main() {
   bool plan = forward.w > 0.5;
-  colour = vec4(plan ? vec3(0.80, 0.81, 0.82) : exposed(skyFor(normalize(direction))), 1.0);
+  colour = vec4(plan ? planPaper() : exposed(skyFor(normalize(direction))), 1.0);
 }
 )";
 
@@ -175,10 +147,6 @@ constexpr const char* kHollowFragment = R"(
 layout(binding = 0) uniform sampler2D depthPlane;
 layout(location = 0) out vec4 factor;
 
-const float kRadius = 0.30;     // metres around a point that can darken it
-const float kFewest = 2.0;      // pixels
-const float kMost = 48.0;       // pixels
-const float kStrength = 0.7;
 const int kPairs = 4;
 const vec2 kDirections[kPairs] =
     vec2[](vec2(1.0, 0.2), vec2(-0.2, 1.0), vec2(0.3, 0.3), vec2(-0.3, 0.3));
@@ -195,7 +163,7 @@ void main() {
   if (d <= 0.0) discard;
   float z = metres(d);
   float pixelsPerMetre = forward.w > 0.5 ? range.z : range.z / z;
-  float radius = clamp(kRadius * pixelsPerMetre, kFewest, kMost);
+  float radius = clamp(kHollowRadius * pixelsPerMetre, kHollowFewestPixels, kHollowMostPixels);
   vec2 room = vec2(min(here, size - 1 - here));  // both neighbours must lie in the picture
   float hollow = 0.0;
   for (int i = 0; i < kPairs; ++i) {
@@ -206,10 +174,9 @@ void main() {
     ivec2 a = here + step_, b = here - step_;
     float mean = 0.5 * (texelFetch(depthPlane, a, 0).r + texelFetch(depthPlane, b, 0).r);
     float slope = (z - metres(mean)) * pixelsPerMetre / length(vec2(step_));
-    // What is far in front of a surface does not darken it.
-    hollow += clamp(slope, 0.0, 1.0) * (1.0 - smoothstep(0.6, 1.7, slope));
+    hollow += hollowOf(slope);
   }
-  factor = vec4(vec3(1.0 - kStrength * hollow / float(kPairs)), 1.0);
+  factor = vec4(vec3(1.0 - kHollowStrength * hollow / float(kPairs)), 1.0);
 }
 )";
 
@@ -233,7 +200,7 @@ std::string skyVertexSource() {
 }
 
 std::string hollowFragmentSource() {
-  return std::string(kVersion) + kFrameBlock + kHollowFragment;
+  return std::string(kVersion) + kFrameBlock + kLight + kHollowFragment;
 }
 
 std::string skyFragmentSource() {

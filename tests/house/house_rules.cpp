@@ -37,6 +37,8 @@ const std::map<std::string, Names> kRoomMayInclude{
     {"scene/avatars", {"scene"}},
     {"render/gl", {"render"}},
     {"render/pictures", {"render"}},
+    // What is drawn and where is the same for both renderers.
+    {"render/rays", {"render", "render/gl/avatar_mesh.hpp", "render/gl/draw_list.hpp"}},
 };
 
 struct ThirdParty {
@@ -175,8 +177,8 @@ bool skippedFolder(const std::string& name) {
 }
 
 bool writtenByPeople(const std::filesystem::path& file) {
-  static const Names endings{".cpp", ".hpp",  ".proto", ".txt", ".cmake",
-                             ".md",  ".json", ".jsonl", ".py",  ".js"};
+  static const Names endings{".cpp", ".hpp",  ".inc",   ".proto", ".txt", ".cmake",
+                             ".md",  ".json", ".jsonl", ".py",    ".js"};
   static const Names names{"dev", "run", ".gitignore", ".clang-format"};
   return endings.count(file.extension().string()) != 0 ||
          names.count(file.filename().string()) != 0;

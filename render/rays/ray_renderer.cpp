@@ -1,0 +1,272 @@
+// A picture, step by step: rays in packets find each pixel's triangle; depth, id and normal follow
+// from that triangle's corners in doubles, run by run along the rows; then its colour. Over the
+// whole picture then come the hollows, and glass from back to front. Rows are shared among threads;
+// no pixel's result depends on another's thread.
+#include "render/rays/ray_renderer.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <span>
+
+#include "render/rays/cast.hpp"
+#include "render/rays/ray_scene.hpp"
+#include "scene/rigid/workers.hpp"
+
+namespace enfilade::render {
+namespace {
+
+/// Remembers what was made for the last keys; neighbouring rows meet the same triangles.
+template <class Value>
+class Recent {
+ public:
+  template <class Make>
+  const Value& of(HitKey key, const Make& make) {
+    // The triangle's number, spread by Fibonacci's constant, chooses the place.
+    Place& place = places_[(key * 0x9E37'79B9'7F4A'7C15u) >> (64 - kBits)];
+    if (place.key != key || !place.value) {
+      place.value.emplace(make());
+      place.key = key;
+    }
+    return *place.value;
+  }
+
+ private:
+  static constexpr int kBits = 7;
+  struct Place {
+    HitKey key = kMissed;
+    std::optional<Value> value;
+  };
+  std::vector<Place> places_ = std::vector<Place>(std::size_t{1} << kBits);
+};
+
+struct SeenPlane {
+  DepthOfPlane depth;
+  scene::EntityId id;
+};
+
+/// Fills the depths of a run of pixels that see one triangle.
+void fillDepth(const DepthOfPlane& plane, int x, int y, std::span<float> out) {
+  const double over = plane.over.at(x, y), under = plane.under.at(x, y);
+  const int count = static_cast<int>(out.size());
+  for (int i = 0; i < count; ++i) {
+    const double z = (over + i * plane.over.dx) / (under + i * plane.under.dx);
+    out[static_cast<std::size_t>(i)] = static_cast<float>(plane.bounded(z));
+  }
+}
+
+/// One picture in the making.
+class Picture {
+ public:
+  Picture(const Camera& camera, const FrameOptions& options, RayScene& scene,
+          const MipTextures& textures)
+      : options_(options),
+        rays_(pixelRaysOf(camera)),
+        shading_(rays_, textures),
+        solid_(scene.solid()),
+        origin_(scene.origin()) {
+    const bool seeGlass = options.glass == Glass::solid;
+    if (seeGlass || options.channels.rgb) {
+      const std::vector<const RayTree*> glass = scene.glass();
+      std::vector<const RayTree*>& where = seeGlass ? solid_ : glass_;
+      where.insert(where.end(), glass.begin(), glass.end());
+    }
+    const auto pixels =
+        static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+    frame.camera = camera;
+    constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
+    if (options.channels.depth || options.channels.rgb) frame.depth.assign(pixels, kNothing);
+    if (options.channels.ids) frame.ids.assign(pixels, 0);
+    if (options.channels.normals) frame.normals.assign(3 * pixels, 0.0f);
+    if (options.channels.rgb) linear_.resize(pixels), frame.rgb.resize(3 * pixels);
+  }
+
+  Frame frame;
+
+  void draw(scene::Workers& workers) {
+    const auto tiles = static_cast<std::size_t>((rays_.height + kTile - 1) / kTile);
+    constexpr std::size_t kBlock = 4;  // rows of tiles that a thread takes at a time
+    workers.share(tiles, kBlock, [&](std::size_t from, std::size_t to) { drawSolid(from, to); });
+    if (!options_.channels.rgb) return;
+    workers.share(tiles, kBlock, [&](std::size_t from, std::size_t to) { finish(from, to); });
+    if (!options_.channels.depth) frame.depth = {};
+  }
+
+ private:
+  Casting casting(const std::vector<const RayTree*>& trees) const {
+    return {trees, rays_, shading_, origin_, options_.hidden};
+  }
+  std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(rays_.width) +
+           static_cast<std::size_t>(x);
+  }
+  int endRow(std::size_t tile) const {
+    return std::min(rays_.height, static_cast<int>(tile) * kTile + kTile);
+  }
+
+  void drawSolid(std::size_t fromTile, std::size_t toTile);
+  void measureRow(const Casting& with, int y, std::span<const HitKey> keys,
+                  Recent<SeenPlane>& recent);
+  void paintRow(const Casting& with, int y, std::span<const HitKey> keys,
+                Recent<ShadedTriangle>& recent);
+  void finish(std::size_t fromTile, std::size_t toTile);
+  void blendGlass(const Casting& with, int y, Recent<ShadedTriangle>& recent);
+  void encodeRow(int y);
+
+  const FrameOptions& options_;
+  PixelRays rays_;
+  Shading shading_;
+  std::vector<const RayTree*> solid_, glass_;
+  Vec3 origin_;
+  std::vector<glsl::vec3> linear_;
+};
+
+void Picture::drawSolid(std::size_t fromTile, std::size_t toTile) {
+  const Casting with = casting(solid_);
+  const bool painted = options_.channels.rgb || options_.channels.normals;
+  std::vector<HitKey> keys;
+  Recent<SeenPlane> planes;
+  Recent<ShadedTriangle> triangles;
+  for (std::size_t tile = fromTile; tile < toTile; ++tile) {
+    const int top = static_cast<int>(tile) * kTile;
+    castRows(with, top, keys);
+    for (int y = top; y < endRow(tile); ++y) {
+      const auto width = static_cast<std::size_t>(rays_.width);
+      const std::span<const HitKey> row =
+          std::span(keys).subspan(static_cast<std::size_t>(y - top) * width, width);
+      measureRow(with, y, row, planes);
+      if (painted) paintRow(with, y, row, triangles);
+    }
+  }
+}
+
+void Picture::measureRow(const Casting& with, int y, std::span<const HitKey> keys,
+                         Recent<SeenPlane>& recent) {
+  for (std::size_t x = 0; x < keys.size();) {
+    const HitKey key = keys[x];
+    std::size_t end = x + 1;
+    while (end < keys.size() && keys[end] == key) ++end;
+    if (key != kMissed) {
+      const SeenPlane& seen = recent.of(key, [&] {
+        const PieceTriangle triangle = triangleOf(with, key);
+        return SeenPlane{depthOf(triangle.corners(rays_.eye), rays_), triangle.piece->id};
+      });
+      const std::size_t first = index(static_cast<int>(x), y), count = end - x;
+      if (!frame.depth.empty())
+        fillDepth(seen.depth, static_cast<int>(x), y, std::span(frame.depth).subspan(first, count));
+      if (!frame.ids.empty())
+        std::fill_n(frame.ids.begin() + static_cast<std::ptrdiff_t>(first), count, seen.id);
+    }
+    x = end;
+  }
+}
+
+void Picture::paintRow(const Casting& with, int y, std::span<const HitKey> keys,
+                       Recent<ShadedTriangle>& recent) {
+  for (int x = 0; x < rays_.width; ++x) {
+    const HitKey key = keys[static_cast<std::size_t>(x)];
+    const std::size_t pixel = index(x, y);
+    if (key == kMissed) {
+      if (options_.channels.rgb) linear_[pixel] = shading_.sky(x, y);
+      continue;
+    }
+    const ShadedTriangle& triangle =
+        recent.of(key, [&] { return ShadedTriangle(triangleOf(with, key), rays_); });
+    if (options_.channels.rgb)
+      linear_[pixel] = shading_.colour(triangle, x, y, triangle.depth.at(x, y)).rgb;
+    if (options_.channels.normals) {
+      const Vec3 normal = shading_.normal(triangle, x, y);
+      for (int i = 0; i < 3; ++i)
+        frame.normals[3 * pixel + static_cast<std::size_t>(i)] = static_cast<float>(normal[i]);
+    }
+  }
+}
+
+void Picture::finish(std::size_t fromTile, std::size_t toTile) {
+  const Casting with = casting(glass_);
+  Recent<ShadedTriangle> triangles;
+  for (std::size_t tile = fromTile; tile < toTile; ++tile) {
+    const int top = static_cast<int>(tile) * kTile;
+    darkenHollows(linear_, frame.depth, frame.camera, top, endRow(tile));
+    if (!glass_.empty()) blendGlass(with, top, triangles);
+    for (int y = top; y < endRow(tile); ++y) encodeRow(y);
+  }
+}
+
+void Picture::blendGlass(const Casting& with, int y, Recent<ShadedTriangle>& recent) {
+  struct Pane {
+    std::uint32_t pixel;
+    double z;
+    HitKey key;
+  };
+  std::vector<Crossing> crossings;
+  castThroughRows(with, y, frame.depth, crossings);
+  const auto triangle = [&](HitKey key) -> const ShadedTriangle& {
+    return recent.of(key, [&] { return ShadedTriangle(triangleOf(with, key), rays_); });
+  };
+  const auto column = [&](std::uint32_t pixel) { return static_cast<int>(pixel) % rays_.width; };
+  const auto row = [&](std::uint32_t pixel) { return static_cast<int>(pixel) / rays_.width; };
+  std::vector<Pane> panes;
+  for (const Crossing& crossing : crossings) {
+    const ShadedTriangle& seen = triangle(crossing.key);
+    if (seen.piece->id == options_.hidden) continue;
+    const double z = seen.depth.at(column(crossing.pixel), row(crossing.pixel));
+    if (z >= static_cast<double>(frame.depth[crossing.pixel])) continue;  // never of a NaN
+    panes.push_back({crossing.pixel, z, crossing.key});
+  }
+  // The key only decides between panes in one place, so that threads do not.
+  std::sort(panes.begin(), panes.end(), [](const Pane& a, const Pane& b) {
+    return std::tuple(a.pixel, -a.z, a.key) < std::tuple(b.pixel, -b.z, b.key);
+  });
+  for (const Pane& pane : panes) {
+    const SurfaceColour glass =
+        shading_.colour(triangle(pane.key), column(pane.pixel), row(pane.pixel), pane.z);
+    linear_[pane.pixel] = glsl::mix(linear_[pane.pixel], glass.rgb, glass.alpha);
+  }
+}
+
+void Picture::encodeRow(int y) {
+  for (int x = 0; x < rays_.width; ++x) {
+    const std::size_t pixel = index(x, y);
+    frame.rgb[3 * pixel] = srgbOfLinear(linear_[pixel].x);
+    frame.rgb[3 * pixel + 1] = srgbOfLinear(linear_[pixel].y);
+    frame.rgb[3 * pixel + 2] = srgbOfLinear(linear_[pixel].z);
+  }
+}
+
+}  // namespace
+
+struct RayRenderer::State {
+  RayScene scene;
+  MipTextures textures;
+  scene::Workers workers;
+  std::string name = embreeName();
+
+  State(std::shared_ptr<const scene::Scene> shared, const RayOptions& options)
+      : scene(std::move(shared), options.robust, maskFilter()),
+        textures(scene.model()),
+        workers(options.threads) {}
+};
+
+RayRenderer::RayRenderer(std::shared_ptr<const scene::Scene> scene, const RayOptions& options)
+    : state_(std::make_unique<State>(std::move(scene), options)) {}
+
+RayRenderer::~RayRenderer() = default;
+
+Frame RayRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
+                          const FrameOptions& options) {
+  if (const auto why = refusal(camera)) throw RenderError(*why);
+  state_->scene.follow(snapshot);
+  Picture picture(camera, options, state_->scene, state_->textures);
+  picture.draw(state_->workers);
+  picture.frame.tick = snapshot.tick;
+  picture.frame.renderer = state_->name;
+  picture.frame.software = true;
+  return std::move(picture.frame);
+}
+
+const std::string& RayRenderer::deviceName() const {
+  return state_->name;
+}
+
+}  // namespace enfilade::render

@@ -1,0 +1,307 @@
+#include "render/rays/ray_renderer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <random>
+#include <set>
+
+#include "render/gl/gl_renderer.hpp"
+#include "tests/render/brute_force_rays.hpp"
+#include "tests/render/things_to_see.hpp"
+
+namespace enfilade::render {
+namespace {
+
+std::set<std::uint32_t> idsIn(const Frame& frame) {
+  return {frame.ids.begin(), frame.ids.end()};
+}
+
+/// Cameras all around a crowd that reaches 10 m from `middle`, perspective and parallel in turn.
+std::vector<Camera> camerasAround(const Vec3& middle, int count, int width, int height) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  std::vector<Camera> cameras;
+  for (int i = 0; i < count; ++i) {
+    Camera camera;
+    camera.eye = middle + 9 * Vec3(unit(random), unit(random), unit(random));
+    camera.forward = middle - camera.eye + 3 * Vec3(unit(random), unit(random), unit(random));
+    camera.fovY = 0.6 + 0.5 * (unit(random) + 1);
+    camera.heightY = 12;
+    camera.far = i % 5 == 4 ? 8 : 60;
+    if (i % 3 == 2) camera.projection = Camera::Projection::orthographic;
+    camera.width = width;
+    camera.height = height;
+    cameras.push_back(camera);
+  }
+  return cameras;
+}
+
+/// Whether a neighbour shows something else.
+bool nearAnEdge(const Frame& frame, int x, int y) {
+  const Camera& camera = frame.camera;
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      const int u = std::clamp(x + dx, 0, camera.width - 1);
+      const int v = std::clamp(y + dy, 0, camera.height - 1);
+      if (frame.ids[at(frame, u, v)] != frame.ids[at(frame, x, y)]) return true;
+    }
+  }
+  return false;
+}
+
+struct Agreement {
+  std::size_t hits = 0, undecided = 0;
+  double worst = 0;  ///< metres of depth
+};
+
+Agreement compareWithBruteForce(const std::shared_ptr<const scene::Scene>& scene,
+                                const std::vector<Camera>& cameras) {
+  RayRenderer renderer(scene);
+  Agreement result;
+  for (const Camera& camera : cameras) {
+    const Frame frame = renderer.render({}, camera);
+    const std::vector<BruteHit> truth = bruteForceFrame(scene->model(), camera);
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      // At a silhouette, and where two surfaces meet, floats may choose the other one.
+      const bool clear =
+          truth[i].id == 0 || (truth[i].inside > 1e-4 && truth[i].second - truth[i].depth > 1e-4);
+      if (!clear || (frame.ids[i] != truth[i].id && truth[i].id == 0)) {
+        ++result.undecided;
+        continue;
+      }
+      EXPECT_EQ(frame.ids[i], truth[i].id) << i;
+      if (truth[i].id == 0 || frame.ids[i] != truth[i].id) continue;
+      ++result.hits;
+      result.worst =
+          std::max(result.worst, std::abs(static_cast<double>(frame.depth[i]) - truth[i].depth));
+    }
+  }
+  return result;
+}
+
+TEST(RayRenderer, ABoxIsSeenExactlyWhereItsGeometrySays) {
+  RayRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+  const Frame frame = renderer.render({}, squareCamera());
+  for (int y = 0; y < 200; ++y) {
+    for (int x = 0; x < 200; ++x) {
+      const bool inside = x >= 75 && x < 125 && y >= 75 && y < 125;
+      ASSERT_EQ(frame.ids[at(frame, x, y)], inside ? 1u : 0u) << x << ' ' << y;
+      const float depth = frame.depth[at(frame, x, y)];
+      if (inside) {
+        ASSERT_EQ(depth, 4);
+      } else {
+        ASSERT_TRUE(std::isnan(depth));
+      }
+    }
+  }
+}
+
+TEST(RayRenderer, DepthAndIdsAreThoseOfABruteForceSearchInDoubles) {
+  const auto scene = sceneOf(opaque(crowd(150)));
+  const auto cameras = camerasAround(Vec3::Zero(), 12, 67, 41);
+  const Agreement found = compareWithBruteForce(scene, cameras);
+  EXPECT_GT(found.hits, 12u * 67u * 41u / 4);
+  EXPECT_LT(found.undecided, 12u * 67u * 41u / 100);
+  EXPECT_LT(found.worst, 2e-6);  // half a unit of a float at 30 m
+}
+
+TEST(RayRenderer, DepthIsAsTrueAKilometreFromTheOriginOfTheScene) {
+  std::vector<PlacedBox> boxes = opaque(crowd(150));
+  const Vec3 far(900, 20, -700);
+  for (PlacedBox& box : boxes) box.centre += far;
+  boxes.push_back({{0, 0, 0}, {1, 1, 1}, {}});  // so that the scene's middle is elsewhere
+  const Agreement found = compareWithBruteForce(sceneOf(boxes), camerasAround(far, 6, 67, 41));
+  EXPECT_GT(found.hits, 6u * 67u * 41u / 4);
+  EXPECT_LT(found.worst, 1e-5);
+}
+
+TEST(RayRenderer, GlassTintsTheColourAndLetsIdsAndDepthThrough) {
+  const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, coloured(0.8f, 0.8f, 0.8f)};
+  const PlacedBox pane{{0, 0, -3}, {1, 1, 0.1}, coloured(0.05f, 0.05f, 0.9f, 0.5f)};
+  RayRenderer renderer(sceneOf({pane, wall}));
+  const Frame frame = renderer.render({}, squareCamera());
+  EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{2}));
+  const std::size_t through = at(frame, 100, 100), beside = at(frame, 20, 100);
+  EXPECT_EQ(frame.depth[through], 5);
+  EXPECT_LT(frame.rgb[3 * through] + 30, frame.rgb[3 * beside]);
+  EXPECT_GT(frame.rgb[3 * through + 2], frame.rgb[3 * through] + 30);
+  FrameOptions solid;
+  solid.glass = Glass::solid;
+  const Frame first = renderer.render({}, squareCamera(), solid);
+  EXPECT_EQ(first.ids[through], 1u);
+  EXPECT_NEAR(first.depth[through], 2.95, 1e-6);
+  EXPECT_EQ(first.ids[beside], 2u);
+}
+
+TEST(RayRenderer, GlassBehindAWallIsNotSeen) {
+  const PlacedBox wall{{0, 0, -3}, {20, 20, 1}, {}};
+  const PlacedBox pane{{0, 0, -6}, {9, 9, 0.1}, coloured(0.9f, 0.0f, 0.0f, 0.5f)};
+  RayRenderer with(sceneOf({wall, pane}));
+  RayRenderer without(sceneOf({wall}));
+  EXPECT_EQ(with.render({}, squareCamera()).rgb, without.render({}, squareCamera()).rgb);
+}
+
+TEST(RayRenderer, AMaskCutsHolesIntoColourIdsAndDepth) {
+  RayRenderer renderer(maskedSquare());
+  const Frame frame = renderer.render({}, squareCamera());
+  EXPECT_EQ(frame.ids[at(frame, 60, 100)], 1u);
+  EXPECT_EQ(frame.ids[at(frame, 140, 100)], 0u);
+  EXPECT_TRUE(std::isnan(frame.depth[at(frame, 140, 100)]));
+}
+
+TEST(RayRenderer, AHiddenAvatarIsNotDrawnAndOthersAre) {
+  RayRenderer renderer(sceneOf({{{0, 0, -20}, {60, 60, 1}, {}}}));
+  scene::Snapshot snapshot;
+  snapshot.tick = 42;
+  snapshot.avatars = {avatarAt(2, {-1, -1, -4}), avatarAt(3, {1, -1, -4})};
+  const Frame both = renderer.render(snapshot, squareCamera());
+  EXPECT_EQ(both.tick, 42u);
+  EXPECT_EQ(idsIn(both), (std::set<std::uint32_t>{1, 2, 3}));
+  EXPECT_EQ(both.ids[at(both, 75, 100)], 2u);
+  EXPECT_NEAR(both.depth[at(both, 75, 100)], 3.7, 1e-6);
+  FrameOptions eyes;
+  eyes.hidden = 2;
+  EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera(), eyes)),
+            (std::set<std::uint32_t>{1, 3}));
+  snapshot.avatars.front().feet.x() = 1;
+  snapshot.avatars.back().feet.x() = -1;
+  const Frame moved = renderer.render(snapshot, squareCamera());
+  EXPECT_EQ(moved.ids[at(moved, 75, 100)], 3u);
+  snapshot.avatars.clear();
+  EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera())), (std::set<std::uint32_t>{1}));
+}
+
+TEST(RayRenderer, ABodyIsSeenWhereTheSnapshotHasIt) {
+  const auto scene = sceneWithLift();
+  RayRenderer renderer(scene);
+  const scene::Snapshot authored = snapshotOfLift(*scene, 0), lifted = snapshotOfLift(*scene, 2);
+  const Frame before = renderer.render(authored, squareCamera());
+  const Frame after = renderer.render(lifted, squareCamera());
+  EXPECT_EQ(before.ids[at(before, 100, 100)], 2u);
+  EXPECT_EQ(before.ids[at(before, 100, 60)], 1u);
+  EXPECT_EQ(after.ids[at(after, 100, 100)], 1u);
+  EXPECT_EQ(after.ids[at(after, 100, 60)], 2u);
+  EXPECT_EQ(renderer.render(authored, squareCamera()).ids, before.ids);
+}
+
+TEST(RayRenderer, PicturesDoNotDependOnTheNumberOfThreads) {
+  const auto scene = sceneOf(crowd(300));
+  scene::Snapshot snapshot;
+  snapshot.avatars = {avatarAt(301, {1, -1, -4})};
+  RayRenderer one(scene, {1, true}), two(scene, {2, true}), five(scene, {5, true});
+  FrameOptions options;
+  options.channels.normals = true;
+  for (const Camera& camera : camerasAround(Vec3::Zero(), 6, 131, 97)) {
+    const Frame a = one.render(snapshot, camera, options);
+    for (RayRenderer* other : {&two, &five, &one}) {
+      const Frame b = other->render(snapshot, camera, options);
+      EXPECT_TRUE(a.rgb == b.rgb);
+      EXPECT_TRUE(a.ids == b.ids);
+      EXPECT_TRUE(a.normals == b.normals);
+      EXPECT_EQ(std::memcmp(a.depth.data(), b.depth.data(), a.depth.size() * sizeof(float)), 0);
+    }
+  }
+}
+
+TEST(RayRenderer, ChannelsNotAskedForAreEmptyAndTheOthersAreTheSame) {
+  RayRenderer renderer(sceneOf(crowd(100)));
+  const Camera camera = camerasAround(Vec3::Zero(), 1, 80, 60).front();
+  FrameOptions all;
+  all.channels.normals = true;
+  const Frame whole = renderer.render({}, camera, all);
+  for (int only = 0; only < 4; ++only) {
+    FrameOptions one;
+    one.channels = {only == 0, only == 1, only == 2, only == 3};
+    const Frame part = renderer.render({}, camera, one);
+    EXPECT_EQ(part.rgb, only == 0 ? whole.rgb : std::vector<std::uint8_t>{});
+    EXPECT_EQ(part.ids, only == 1 ? whole.ids : std::vector<std::uint32_t>{});
+    EXPECT_EQ(part.depth.size(), only == 2 ? whole.depth.size() : 0);
+    EXPECT_EQ(part.normals, only == 3 ? whole.normals : std::vector<float>{});
+  }
+}
+
+TEST(RayRenderer, NormalsHaveUnitLengthAndFaceTheEye) {
+  RayRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+  FrameOptions options;
+  options.channels.normals = true;
+  const Frame frame = renderer.render({}, squareCamera(), options);
+  const std::size_t box = 3 * at(frame, 100, 100), sky = 3 * at(frame, 10, 10);
+  EXPECT_EQ(frame.normals[box + 2], 1);
+  EXPECT_EQ(frame.normals[box], 0);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(frame.normals[sky + i], 0);
+}
+
+TEST(RayRenderer, NearAndFarCutAsInEveryPicture) {
+  RayRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {9, 9, 1}, {}}}));
+  Camera camera = squareCamera();
+  camera.near = 4.5;
+  const Frame inside = renderer.render({}, camera);
+  EXPECT_NEAR(inside.depth[at(inside, 100, 100)], 6, 1e-6);  // the box's back, from within
+  camera.near = 6.5;
+  EXPECT_EQ(renderer.render({}, camera).ids[at(inside, 100, 100)], 2u);
+  camera.far = 8;
+  EXPECT_EQ(idsIn(renderer.render({}, camera)), (std::set<std::uint32_t>{0}));
+}
+
+TEST(RayRenderer, AnEmptySceneIsSkyAndARefusedCameraAnError) {
+  RayRenderer renderer(std::make_shared<const scene::Scene>(scene::Model{}));
+  Camera camera = squareCamera();
+  const Frame frame = renderer.render({}, camera);
+  EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{0}));
+  EXPECT_GT(frame.rgb[2], 100);
+  EXPECT_EQ(frame.renderer.rfind("Embree ", 0), 0u);
+  camera.far = std::nan("");
+  EXPECT_THROW(renderer.render({}, camera), RenderError);
+}
+
+TEST(RayRenderer, IdsAreThoseOfThePictureThatGlDrawsBesidesEdges) {
+  const auto scene = sceneOf(crowd(300));
+  scene::Snapshot snapshot;
+  snapshot.avatars = {avatarAt(301, {1, -1, -4})};
+  RayRenderer rays(scene);
+  GlRenderer gl(scene);
+  std::size_t pixels = 0, differ = 0, awayFromEdges = 0;
+  double meanColour = 0;
+  for (const Camera& camera : camerasAround(Vec3::Zero(), 9, 201, 133)) {
+    const Frame a = rays.render(snapshot, camera), b = gl.render(snapshot, camera);
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        const std::size_t i = at(a, x, y);
+        ++pixels;
+        for (std::size_t c = 0; c < 3; ++c)
+          meanColour += std::abs(int{a.rgb[3 * i + c]} - int{b.rgb[3 * i + c]}) / 3.0;
+        if (a.ids[i] != b.ids[i]) {
+          ++differ;
+          if (!nearAnEdge(a, x, y)) ++awayFromEdges;
+        } else if (a.ids[i] != 0 && !nearAnEdge(a, x, y)) {
+          // GL's parallel pictures spread 24 bits evenly over 60 m.
+          ASSERT_NEAR(a.depth[i], b.depth[i], 3e-3);
+        }
+      }
+    }
+  }
+  EXPECT_LT(static_cast<double>(differ), 1e-3 * static_cast<double>(pixels));
+  EXPECT_EQ(awayFromEdges, 0u);
+  EXPECT_LT(meanColour / static_cast<double>(pixels), 0.6);  // of 255
+}
+
+TEST(RayRenderer, ColoursOfTexturesAndPlansAreThoseOfGl) {
+  const auto scene = texturedRoom();
+  RayRenderer rays(scene);
+  GlRenderer gl(scene);
+  for (const Camera& camera : {squareCamera(), plan(scene->bounds(), -1, 0.2, 190, 121)}) {
+    const Frame a = rays.render({}, camera), b = gl.render({}, camera);
+    double sum = 0;
+    for (std::size_t i = 0; i < a.rgb.size(); ++i) sum += std::abs(int{a.rgb[i]} - int{b.rgb[i]});
+    EXPECT_LT(sum / static_cast<double>(a.rgb.size()), 1.0);
+    std::size_t differ = 0;
+    for (std::size_t i = 0; i < a.ids.size(); ++i) differ += a.ids[i] != b.ids[i] ? 1 : 0;
+    EXPECT_LE(differ, a.ids.size() / 1000);
+  }
+}
+
+}  // namespace
+}  // namespace enfilade::render
