@@ -13,6 +13,7 @@ struct RenderThread::State {
     std::shared_ptr<const scene::Snapshot> snapshot;
     Camera camera;
     FrameOptions options;
+    RendererKind kind;
     std::promise<Frame> done;
   };
 
@@ -34,11 +35,11 @@ struct RenderThread::State {
     return job;
   }
 
-  void run(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device,
+  void run(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device, RendererKind kind,
            std::promise<void> started) {
-    std::unique_ptr<GlRenderer> renderer;
+    std::unique_ptr<Renderer> renderer;
     try {
-      renderer = std::make_unique<GlRenderer>(std::move(scene), device);
+      renderer = std::make_unique<Renderer>(std::move(scene), kind, device);
       deviceName = renderer->deviceName();
       deviceNote = renderer->deviceNote();
       software = renderer->software();
@@ -50,7 +51,7 @@ struct RenderThread::State {
     while (auto job = nextJob()) {
       try {
         if (!job->snapshot) throw RenderError("RenderThread::render: there is no snapshot");
-        job->done.set_value(renderer->render(*job->snapshot, job->camera, job->options));
+        job->done.set_value(renderer->render(*job->snapshot, job->camera, job->options, job->kind));
       } catch (...) {
         job->done.set_exception(std::current_exception());
       }
@@ -58,11 +59,12 @@ struct RenderThread::State {
   }
 };
 
-RenderThread::RenderThread(std::shared_ptr<const scene::Scene> scene, DeviceChoice device)
+RenderThread::RenderThread(std::shared_ptr<const scene::Scene> scene, DeviceChoice device,
+                           RendererKind kind)
     : state_(std::make_unique<State>()) {
   std::promise<void> started;
   std::future<void> ready = started.get_future();
-  state_->thread = std::thread(&State::run, state_.get(), std::move(scene), std::move(device),
+  state_->thread = std::thread(&State::run, state_.get(), std::move(scene), std::move(device), kind,
                                std::move(started));
   try {
     ready.get();
@@ -82,8 +84,8 @@ RenderThread::~RenderThread() {
 }
 
 std::future<Frame> RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot,
-                                        Camera camera, FrameOptions options) {
-  State::Job job{std::move(snapshot), std::move(camera), options, {}};
+                                        Camera camera, FrameOptions options, RendererKind kind) {
+  State::Job job{std::move(snapshot), std::move(camera), options, kind, {}};
   std::future<Frame> frame = job.done.get_future();
   {
     const std::lock_guard lock(state_->mutex);

@@ -1,27 +1,28 @@
-// One thread that owns the GL context and draws what is asked, in order.
+// One thread that owns the renderers and draws what is asked, in order.
 #pragma once
 
 #include <future>
 #include <memory>
 
-#include "render/gl/gl_renderer.hpp"
+#include "render/renderer.hpp"
 
 namespace enfilade::render {
 
 class RenderThread {
  public:
-  /// Starts the thread and its GlRenderer; throws RenderError when there can be none.
-  explicit RenderThread(std::shared_ptr<const scene::Scene> scene, DeviceChoice device = {});
+  /// Starts the thread and its Renderer; throws RenderError when there can be none.
+  explicit RenderThread(std::shared_ptr<const scene::Scene> scene, DeviceChoice device = {},
+                        RendererKind kind = RendererKind::automatic);
   ~RenderThread();  ///< finishes what is queued
   RenderThread(const RenderThread&) = delete;
   RenderThread& operator=(const RenderThread&) = delete;
 
   /// The frame, or the RenderError, comes through the future. Callable from any thread.
   std::future<Frame> render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera,
-                            FrameOptions options = {});
+                            FrameOptions options = {}, RendererKind kind = RendererKind::automatic);
   const std::string& deviceName() const;
   bool software() const;
-  const std::string& deviceNote() const;  ///< as GlRenderer's
+  const std::string& deviceNote() const;  ///< these three as Renderer's
 
  private:
   struct State;

@@ -141,11 +141,25 @@ std::optional<v1::Error> glassProblem(const v1::FrameRequest& request) {
                  "glass: give clear or solid, not " + std::to_string(request.glass()), "glass");
 }
 
+std::optional<v1::Error> rendererProblem(const v1::FrameRequest& request) {
+  if (v1::Renderer_IsValid(request.renderer())) return std::nullopt;
+  return errorOf(v1::ERROR_BAD_MESSAGE,
+                 "renderer: give gl or rays, not " + std::to_string(request.renderer()),
+                 "renderer");
+}
+
+render::RendererKind rendererOf(const v1::FrameRequest& request) {
+  if (request.renderer() == v1::RENDERER_GL) return render::RendererKind::gl;
+  if (request.renderer() == v1::RENDERER_RAYS) return render::RendererKind::rays;
+  return render::RendererKind::automatic;
+}
+
 }  // namespace
 
 CameraOrError viewFrom(const v1::FrameRequest& request, const scene::Snapshot& snapshot) {
   if (auto problem = channelProblem(request)) return *problem;
   if (auto problem = glassProblem(request)) return *problem;
+  if (auto problem = rendererProblem(request)) return *problem;
   constexpr std::uint32_t kMost = 4096;
   if (request.width() < 1 || request.width() > kMost || request.height() < 1 ||
       request.height() > kMost) {
@@ -159,6 +173,7 @@ CameraOrError viewFrom(const v1::FrameRequest& request, const scene::Snapshot& s
   if (View* usable = std::get_if<View>(&view)) {
     usable->options.channels = channelsOf(request);
     if (request.glass() == v1::GLASS_SOLID) usable->options.glass = render::Glass::solid;
+    usable->renderer = rendererOf(request);
     if (auto problem = addIntrinsics(usable->camera, request)) return *problem;
     if (const auto why = render::refusal(usable->camera)) {
       return errorOf(v1::ERROR_BAD_CAMERA, *why, fieldOf(*why));

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "protocol/enfilade.pb.h"
-#include "render/frame.hpp"
+#include "render/renderer.hpp"
 
 namespace enfilade::server {
 
@@ -15,6 +15,7 @@ namespace enfilade::server {
 struct View {
   render::Camera camera;
   render::FrameOptions options;
+  render::RendererKind renderer = render::RendererKind::automatic;
 };
 
 /// The view asked for, or why it cannot be had.

@@ -93,7 +93,8 @@ void FrameService::draw(FrameJob job, std::function<void(Buffer)> done) {
   const auto drawing = std::make_shared<Drawing>(Drawing{std::move(job), {}, std::move(done)});
   if (state_->renderer) {
     const View& view = drawing->job.view;
-    drawing->frame = state_->renderer->render(drawing->job.snapshot, view.camera, view.options);
+    drawing->frame =
+        state_->renderer->render(drawing->job.snapshot, view.camera, view.options, view.renderer);
   }
   state_->thread.post([state = state_.get(), drawing] { drawing->done(state->reply(*drawing)); });
 }

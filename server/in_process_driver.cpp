@@ -6,7 +6,7 @@
 
 namespace enfilade::server {
 
-InProcessDriver::InProcessDriver(scene::World& world, render::GlRenderer* renderer,
+InProcessDriver::InProcessDriver(scene::World& world, render::Renderer* renderer,
                                  protocol::CaptureFormat format)
     : world_(world), renderer_(renderer), format_(std::move(format)) {}
 
@@ -71,7 +71,8 @@ protocol::ReceivedFrame InProcessDriver::frame(const v1::FrameRequest& request) 
   }
   const View& usable = std::get<View>(view);
   try {
-    const render::Frame drawn = renderer_->render(*snapshot, usable.camera, usable.options);
+    const render::Frame drawn =
+        renderer_->render(*snapshot, usable.camera, usable.options, usable.renderer);
     ++frames_;
     protocol::ReceivedFrame taken;
     taken.description = messageOf(drawn, snapshot->time, request, taken.pixels);

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "protocol/socket_driver.hpp"
-#include "render/gl/gl_renderer.hpp"
+#include "render/renderer.hpp"
 #include "scene/world.hpp"
 #include "server/tick_statistics.hpp"
 
@@ -12,7 +12,7 @@ class InProcessDriver : public protocol::ScriptDriver {
  public:
   /// `renderer` may be null: captures then have no picture. Both outlive the driver, which is used
   /// on the renderer's thread.
-  InProcessDriver(scene::World& world, render::GlRenderer* renderer,
+  InProcessDriver(scene::World& world, render::Renderer* renderer,
                   protocol::CaptureFormat format = {});
 
   double tickSeconds() const override;
@@ -30,7 +30,7 @@ class InProcessDriver : public protocol::ScriptDriver {
   protocol::CapturedFrame capture(const v1::Notice& notice);
 
   scene::World& world_;
-  render::GlRenderer* renderer_;
+  render::Renderer* renderer_;
   protocol::CaptureFormat format_;
   TickStatistics statistics_;
   std::uint64_t frames_ = 0;

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "render/gl/gl_renderer.hpp"
+#include "render/renderer.hpp"
 #include "server/inspection.hpp"
 #include "server/storey_plans.hpp"
 
@@ -32,7 +32,7 @@ void prepareFolder(const std::filesystem::path& folder) {
 
 void drawPlans(const std::shared_ptr<const scene::Scene>& scene,
                const std::filesystem::path& folder) {
-  render::GlRenderer renderer(scene);
+  render::Renderer renderer(scene);
   const TakePicture picture = [&](const render::Camera& camera) {
     const render::Frame frame = renderer.render(scene::Snapshot(), camera);
     return std::optional(PlanPicture{render::colourOf(frame), frame.ids});

@@ -180,9 +180,9 @@ std::vector<v1::ContactEvent> leaveWorld(protocol::ScriptDriver& driver,
   return avatars.empty() ? std::vector<v1::ContactEvent>() : driver.step().contacts;
 }
 
-std::unique_ptr<render::GlRenderer> rendererOf(const std::shared_ptr<const scene::Scene>& scene) {
+std::unique_ptr<render::Renderer> rendererOf(const std::shared_ptr<const scene::Scene>& scene) {
   try {
-    return std::make_unique<render::GlRenderer>(scene);
+    return std::make_unique<render::Renderer>(scene);
   } catch (const render::RenderError& error) {
     spdlog::warn("no pictures: {}", error.what());
     return nullptr;
@@ -203,7 +203,7 @@ ExitCode replay(const ReplayCommand& command) {
     WalkReport report(command.out);
     const std::shared_ptr<const scene::Scene> scene = loadScene(command.model);
     if (interrupted != 0) throw Interrupted{};
-    const std::unique_ptr<render::GlRenderer> renderer = rendererOf(scene);
+    const std::unique_ptr<render::Renderer> renderer = rendererOf(scene);
     scene::World world(scene, command.lengths);
     scene::auditBroadPhase(world, command.auditEvery);
     InProcessDriver driver(world, renderer.get(), captureFormat());

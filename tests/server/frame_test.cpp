@@ -133,6 +133,25 @@ TEST_F(Frames, IntrinsicsRangeAndNormalsTravel) {
   }
 }
 
+TEST_F(Frames, TheRendererAskedForDrawsAndSeesTheSame) {
+  protocol::Client ann = client("ann");
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
+  ann.step(30);
+  v1::FrameRequest request = eyesOf("ann");
+  request.set_renderer(v1::RENDERER_GL);
+  const protocol::ReceivedFrame drawn = ann.frame(request);
+  request.set_renderer(v1::RENDERER_RAYS);
+  const protocol::ReceivedFrame cast = ann.frame(request);
+  EXPECT_EQ(cast.description.renderer().rfind("Embree ", 0), 0u);
+  EXPECT_NE(drawn.description.renderer(), cast.description.renderer());
+  constexpr std::size_t middle = 24 * 64 + 32;
+  EXPECT_EQ(valuesOf<std::uint32_t>(cast, v1::CHANNEL_IDS)[middle], kWall);
+  EXPECT_NEAR(valuesOf<float>(cast, v1::CHANNEL_DEPTH)[middle],
+              valuesOf<float>(drawn, v1::CHANNEL_DEPTH)[middle], 1e-3);
+  request.set_renderer(static_cast<v1::Renderer>(9));
+  EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_MESSAGE);
+}
+
 TEST_F(Frames, WhatCannotBePicturedIsRefusedByName) {
   protocol::Client ann = client("ann");
   v1::FrameRequest request = eyesOf("nobody");
