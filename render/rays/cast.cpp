@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace enfilade::render {
 namespace {
@@ -80,6 +81,22 @@ void noteAll(const RTCFilterFunctionNArguments* arguments) {
                                               keyOf(context.tree, instance, geometry, primitive)});
                 arguments->valid[lane] = 0;
               });
+}
+
+/// One pixel's ray, from depth to depth.
+RTCRayHit singleRay(const Casting& casting, int x, int y, double from, double to) {
+  const PixelRays& rays = casting.rays;
+  const Eigen::Vector3f start = (rays.eye - casting.origin + rays.originAt(x, y)).cast<float>();
+  const Eigen::Vector3f way = rays.directionAt(x, y).cast<float>();
+  RTCRayHit query{};
+  query.ray.org_x = start.x(), query.ray.org_y = start.y(), query.ray.org_z = start.z();
+  query.ray.dir_x = way.x(), query.ray.dir_y = way.y(), query.ray.dir_z = way.z();
+  query.ray.tnear = static_cast<float>(from);
+  query.ray.tfar = static_cast<float>(to);
+  query.ray.mask = 0xFFFF'FFFFu;
+  query.ray.id = static_cast<unsigned>(y * rays.width + x);
+  query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  return query;
 }
 
 /// A tile's rays and which of them are in the picture.
@@ -179,6 +196,35 @@ void castThroughRows(const Casting& casting, int y, const std::vector<float>& de
       intersect(packet, casting, context);
     }
   }
+}
+
+void castBetween(const Casting& casting, int x, int y, double from, double to,
+                 std::vector<HitKey>& keys) {
+  std::vector<Crossing> crossings;
+  for (std::size_t t = 0; t < casting.trees.size(); ++t) {
+    Context context = contextOf(casting, t);
+    context.crossings = &crossings;
+    context.embree.filter = noteAll;
+    RTCRayHit query = singleRay(casting, x, y, from, to);
+    rtcIntersect1(casting.trees[t]->embree(), &context.embree, &query);
+  }
+  for (const Crossing& crossing : crossings) {
+    const bool passed =
+        casting.through != 0 && triangleOf(casting, crossing.key).piece->id == casting.through;
+    if (!passed) keys.push_back(crossing.key);
+  }
+}
+
+double castBehind(const Casting& casting, int x, int y, double from) {
+  RTCRayHit query = singleRay(casting, x, y, from, casting.rays.far);
+  bool met = false;
+  for (std::size_t t = 0; t < casting.trees.size(); ++t) {
+    Context context = contextOf(casting, t);
+    if (casting.through != 0) context.embree.filter = rejectThrough;
+    rtcIntersect1(casting.trees[t]->embree(), &context.embree, &query);
+    met = met || query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+  }
+  return met ? static_cast<double>(query.ray.tfar) : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace enfilade::render

@@ -40,6 +40,12 @@ struct Crossing {
 void castThroughRows(const Casting& casting, int y, const std::vector<float>& depth,
                      std::vector<Crossing>& crossings);
 
+/// Of one pixel's ray, in the order of the trees: the keys of all triangles between two depths.
+void castBetween(const Casting& casting, int x, int y, double from, double to,
+                 std::vector<HitKey>& keys);
+/// The depth, in floats, of the first triangle of one pixel's ray behind `from`; NaN: none.
+double castBehind(const Casting& casting, int x, int y, double from);
+
 /// The filter to give to RayScene: cuts holes into Pass::mask where its texture is transparent.
 EmbreeFilter maskFilter();
 

@@ -62,7 +62,7 @@ const std::array<ThirdParty, 17> kThirdParties{{
     {"Boost.Asio and Beast", "boost/(asio|beast|system).*", {"protocol", "server"}},
     {"other Boost", "boost/(?!asio|beast|system).*", {}},
     {"protobuf", "google/protobuf/.*", {"protocol"}},
-    {"nlohmann-json", "nlohmann/.*", {"scene", "protocol", "server", "assets"}},
+    {"nlohmann-json", "nlohmann/.*", {"scene", "render", "protocol", "server", "assets"}},
     {"CLI11", "CLI/.*", {"server", "assets"}},
     {"spdlog", "(spdlog|fmt)/.*", {"server"}},
 }};
