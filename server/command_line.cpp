@@ -6,6 +6,7 @@
 #include "scene/audit.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/rotation.hpp"
+#include "server/capture/capture_arguments.hpp"
 #include "server/version.hpp"
 
 namespace enfilade::server {
@@ -20,6 +21,7 @@ struct Arguments {
   ModelArguments model;
   std::string script, out, plan, listen = "127.0.0.1:7878", connect;
   bool strict = false, json = false, objects = false, stopAtEndOfInput = false;
+  CaptureArguments capture;
   std::string auditEvery = "0", epsilon, stepHeight, slope, sliding = "slide";
 };
 
@@ -196,6 +198,10 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   addWalk(*replay, read);
   addAudit(*replay, read);
   addMotion(*replay, read);
+  CLI::App* capture =
+      app.add_subcommand("capture", "Take pictures along a camera path: colour, depth, ids");
+  addModel(*capture, read.model);
+  addCapture(*capture, read.capture);
   CLI::App* walk = app.add_subcommand("walk", "Run a walk script on a server");
   addWalk(*walk, read);
   walk->add_option("--connect", read.connect, "The server's address and port")
@@ -226,6 +232,9 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
     return ReplayCommand{modelFrom(read.model), read.script, read.out,
                          read.strict,           audit,       lengthsFrom(read)};
   }
+  if (*capture)
+    return CaptureCommand{modelFrom(read.model), read.capture.path, read.capture.out,
+                          picturesFrom(read.capture), captureRunFrom(read.capture)};
   if (*inspect)
     return InspectCommand{modelFrom(read.model), read.json, read.objects, read.strict, read.plan};
   return WalkCommand{read.script, read.out, *endpointFrom(read.connect), read.strict};

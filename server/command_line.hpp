@@ -9,6 +9,7 @@
 #include "scene/bodies/find_bodies.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/lengths.hpp"
+#include "server/capture/capture_options.hpp"
 #include "server/exit_code.hpp"
 
 namespace enfilade::server {
@@ -54,7 +55,14 @@ struct InspectCommand {
   bool strict = false;         ///< problems end it with `violations`
   std::filesystem::path plan;  ///< folder for a picture a storey; empty: none
 };
-using ProgramCommand = std::variant<ServeCommand, ReplayCommand, WalkCommand, InspectCommand>;
+struct CaptureCommand {
+  ModelOptions model;
+  std::filesystem::path path, out;
+  PictureOptions pictures;
+  CaptureRunOptions run;
+};
+using ProgramCommand =
+    std::variant<ServeCommand, ReplayCommand, CaptureCommand, WalkCommand, InspectCommand>;
 
 /// What to do, or the code to end with at once (--help: done; a mistake: usage). Help goes to
 /// stdout, mistakes and the usage to stderr.

@@ -5,6 +5,7 @@
 
 #include <cstdio>
 
+#include "server/capture/capture.hpp"
 #include "server/command_line.hpp"
 #include "server/inspect.hpp"
 #include "server/serve.hpp"
@@ -16,6 +17,7 @@ namespace {
 struct Do {
   ExitCode operator()(const ServeCommand& command) const { return serve(command); }
   ExitCode operator()(const ReplayCommand& command) const { return replay(command); }
+  ExitCode operator()(const CaptureCommand& command) const { return capture(command); }
   ExitCode operator()(const WalkCommand& command) const { return walk(command); }
   ExitCode operator()(const InspectCommand& command) const { return inspect(command); }
 };

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <set>
@@ -12,6 +11,7 @@
 #include "protocol/socket_driver.hpp"
 #include "server/frame_messages.hpp"
 #include "server/in_process_driver.hpp"
+#include "server/interrupt.hpp"
 #include "server/load_scene.hpp"
 #include "server/progress.hpp"
 #include "server/walk_report.hpp"
@@ -23,10 +23,6 @@ namespace {
 
 constexpr std::uint32_t kWidth = 960, kHeight = 540;  // pixels of a capture
 constexpr std::uint64_t kTicksPerSample = 16;         // of the broad phase's pairs
-
-volatile std::sig_atomic_t interrupted = 0;
-
-struct Interrupted {};
 
 /// The world that a script runs in, as far as the report asks for it.
 struct WalkedWorld {
@@ -123,7 +119,7 @@ ExitCode run(const protocol::Script& script, WalkReport& report, bool strict, Wa
   Progress bar;
   const auto observe = [&](protocol::StepOutcome& outcome,
                            const protocol::ScriptProgress& progress) {
-    if (interrupted != 0) throw Interrupted{};
+    if (interrupted()) throw Interrupted{};
     report.add(outcome);
     showProgress(bar, outcome, progress);
     if (outcome.tick % kTicksPerSample == 0) {
@@ -147,25 +143,7 @@ ExitCode run(const protocol::Script& script, WalkReport& report, bool strict, Wa
   return judge(result, facts.metrics, strict);
 }
 
-/// A run looks whether it was interrupted once the scene is there, and between two ticks.
-void listenForInterrupt() {
-  struct sigaction action {};
-  action.sa_handler = [](int) { interrupted = 1; };
-  sigaction(SIGINT, &action, nullptr);
-}
-
-ExitCode interruptible(const std::function<ExitCode()>& work) {
-  listenForInterrupt();
-  try {
-    return work();
-  } catch (const std::exception&) {
-    // A terminal interrupts the whole group: the importer's child fails of it, not of its file.
-    if (interrupted == 0) throw;
-  } catch (const Interrupted&) {
-  }
-  std::fputs("interrupted; nothing more is written\n", stderr);
-  return ExitCode::interrupted;
-}
+constexpr const char* kNoMore = "nothing more is written";
 
 /// The server outlives the walk: those who still stand there leave in one tick more, which the
 /// walk's report does not count.
@@ -198,41 +176,45 @@ ExitCode judge(const protocol::ScriptResult& result, const v1::Metrics& metrics,
 }
 
 ExitCode replay(const ReplayCommand& command) {
-  return interruptible([&] {
-    const protocol::Script script = protocol::readScript(command.script);
-    WalkReport report(command.out);
-    const std::shared_ptr<const scene::Scene> scene = loadScene(command.model);
-    if (interrupted != 0) throw Interrupted{};
-    const std::unique_ptr<render::Renderer> renderer = rendererOf(scene);
-    scene::World world(scene, command.lengths);
-    scene::auditBroadPhase(world, command.auditEvery);
-    InProcessDriver driver(world, renderer.get(), captureFormat());
-    WalkedWorld walked{driver,
-                       [&](const v1::FrameRequest& request) { return driver.frame(request); },
-                       [&] { return driver.metrics(); },
-                       [&] { return driver.endContacts(); },
-                       messageOf(*scene),
-                       renderer ? renderer->deviceName() : std::string()};
-    return run(script, report, command.strict, std::move(walked));
-  });
+  return interruptible(
+      [&] {
+        const protocol::Script script = protocol::readScript(command.script);
+        WalkReport report(command.out);
+        const std::shared_ptr<const scene::Scene> scene = loadScene(command.model);
+        if (interrupted()) throw Interrupted{};
+        const std::unique_ptr<render::Renderer> renderer = rendererOf(scene);
+        scene::World world(scene, command.lengths);
+        scene::auditBroadPhase(world, command.auditEvery);
+        InProcessDriver driver(world, renderer.get(), captureFormat());
+        WalkedWorld walked{driver,
+                           [&](const v1::FrameRequest& request) { return driver.frame(request); },
+                           [&] { return driver.metrics(); },
+                           [&] { return driver.endContacts(); },
+                           messageOf(*scene),
+                           renderer ? renderer->deviceName() : std::string()};
+        return run(script, report, command.strict, std::move(walked));
+      },
+      kNoMore);
 }
 
 ExitCode walk(const WalkCommand& command) {
-  return interruptible([&] {
-    const protocol::Script script = protocol::readScript(command.script);
-    WalkReport report(command.out);
-    protocol::ClientOptions options;
-    options.name = "enfilade walk";
-    protocol::Client client(command.connect.host, command.connect.port, options);
-    protocol::SocketDriver driver(client, captureFormat());
-    WalkedWorld walked{driver,
-                       [&](const v1::FrameRequest& request) { return client.frame(request); },
-                       [&] { return client.metrics(); },
-                       [&] { return leaveWorld(driver, report.present()); },
-                       client.welcome().scene(),
-                       client.welcome().renderer()};
-    return run(script, report, command.strict, std::move(walked));
-  });
+  return interruptible(
+      [&] {
+        const protocol::Script script = protocol::readScript(command.script);
+        WalkReport report(command.out);
+        protocol::ClientOptions options;
+        options.name = "enfilade walk";
+        protocol::Client client(command.connect.host, command.connect.port, options);
+        protocol::SocketDriver driver(client, captureFormat());
+        WalkedWorld walked{driver,
+                           [&](const v1::FrameRequest& request) { return client.frame(request); },
+                           [&] { return client.metrics(); },
+                           [&] { return leaveWorld(driver, report.present()); },
+                           client.welcome().scene(),
+                           client.welcome().renderer()};
+        return run(script, report, command.strict, std::move(walked));
+      },
+      kNoMore);
 }
 
 }  // namespace enfilade::server

@@ -1,0 +1,187 @@
+#include "server/capture/capture.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "render/renderer.hpp"
+#include "server/capture/capture_folder.hpp"
+#include "server/capture/capture_progress.hpp"
+#include "server/capture/documents.hpp"
+#include "server/capture/encode_queue.hpp"
+#include "server/capture/frame_files.hpp"
+#include "server/capture/video.hpp"
+#include "server/interrupt.hpp"
+#include "server/load_scene.hpp"
+
+namespace enfilade::server {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kEncoders = 2;    // threads
+constexpr std::size_t kMostInHand = 6;  // frames between drawing and the disk
+
+/// What a run did, for its summary.
+struct CaptureCounts {
+  std::size_t frames = 0;   ///< of the whole path
+  std::size_t mine = 0;     ///< of those, the shard's
+  std::size_t already = 0;  ///< of those, there before
+  std::atomic<std::size_t> written{0};
+  std::atomic<std::size_t> clamped{0};  ///< pixels
+  double seconds = 0;                   ///< of drawing and writing
+};
+
+std::vector<std::size_t> missingFrames(const CaptureCommand& command, const ShotList& list,
+                                       CaptureCounts& counts) {
+  std::vector<std::size_t> missing;
+  counts.frames = list.shots.size();
+  for (std::size_t i = 0; i < list.shots.size(); ++i) {
+    if (!takes(command.run.shard, i)) continue;
+    ++counts.mine;
+    if (isThere(command.out, command.pictures, i)) {
+      ++counts.already;
+    } else {
+      missing.push_back(i);
+    }
+  }
+  return missing;
+}
+
+render::FrameOptions frameOptions(const Shot& shot, const PictureOptions& options) {
+  const CaptureChannels& wanted = options.channels;
+  render::FrameOptions frame;
+  frame.hidden = shot.hidden;
+  frame.channels = {wanted.rgb, wanted.ids, wanted.depth || wanted.range, wanted.normals};
+  frame.glass = options.glass;
+  return frame;
+}
+
+/// Of pictures with these channels: `automatic` chooses by them, and the manifest must say it
+/// before the first frame is drawn.
+std::string whoDraws(render::Renderer& renderer, const PictureOptions& options) {
+  render::Camera smallest;
+  smallest.width = smallest.height = 1;
+  return renderer.render({}, smallest, frameOptions({}, options)).renderer;
+}
+
+/// Draws on this thread; others encode and write meanwhile.
+void takePictures(const CaptureCommand& command, const ShotList& list,
+                  const std::vector<std::size_t>& missing, render::Renderer& renderer,
+                  CaptureCounts& counts) {
+  CaptureMeter meter(command.run.progress, missing.size());
+  EncodeQueue queue(kEncoders, kMostInHand);
+  for (const std::size_t index : missing) {
+    if (interrupted()) break;
+    const Shot& shot = list.shots[index];
+    auto frame = std::make_shared<const render::Frame>(
+        renderer.render(*shot.snapshot, shot.camera, frameOptions(shot, command.pictures)));
+    queue.post([&command, &counts, index, frame = std::move(frame)] {
+      counts.clamped += writeFrame(command.out, command.pictures, index, *frame).clamped;
+      ++counts.written;
+    });
+    meter.show(counts.written);
+  }
+  queue.finish();
+  meter.finish(counts.written);
+  if (interrupted()) throw Interrupted{};
+}
+
+bool wholeSetIsThere(const CaptureCommand& command, const ShotList& list) {
+  for (std::size_t i = 0; i < list.shots.size(); ++i)
+    if (!isThere(command.out, command.pictures, i)) return false;
+  return true;
+}
+
+/// The film's file, or why there is none.
+Json videoOf(const CaptureCommand& command, const ShotList& list) {
+  if (!command.run.mp4 || !command.pictures.channels.rgb || list.shots.size() < 2) return nullptr;
+  if (!wholeSetIsThere(command, list)) {
+    spdlog::info("no video: the other shards' frames are not in this folder yet");
+    return nullptr;
+  }
+  const VideoResult video = makeVideo(command.out, list.shots, command.pictures);
+  if (video.made) return "video.mp4";
+  spdlog::info("no video: {}", video.why);
+  return nullptr;
+}
+
+void tellSummary(const CaptureCommand& command, const CaptureCounts& counts,
+                 const std::string& renderer, const Json& video) {
+  Json summary;
+  summary["out"] = command.out.string();
+  summary["frames"] = counts.frames;
+  summary["shard"] =
+      std::to_string(command.run.shard.index) + "/" + std::to_string(command.run.shard.count);
+  summary["written"] = counts.written.load();
+  summary["already_there"] = counts.already;
+  summary["clamped_pixels"] = counts.clamped.load();
+  summary["seconds"] = counts.seconds;
+  summary["frames_per_s"] =
+      counts.seconds > 0 ? static_cast<double>(counts.written) / counts.seconds : 0.0;
+  summary["renderer"] = renderer;
+  summary["video"] = video;
+  if (std::printf("%s\n", summary.dump().c_str()) < 0 || std::fflush(stdout) != 0)
+    throw std::runtime_error("stdout cannot be written; the capture itself is whole");
+}
+
+void tellPlan(const CaptureCommand& command, const ShotList& list, const CaptureCounts& counts) {
+  const render::Camera& camera = list.shots.front().camera;
+  Json plan;
+  plan["frames"] = counts.frames;
+  plan["shard_frames"] = counts.mine;
+  plan["already_there"] = counts.already;
+  plan["width"] = camera.width;
+  plan["height"] = camera.height;
+  plan["seconds_of_path"] = list.shots.back().time - list.shots.front().time;
+  plan["files_a_frame"] = filesOfFrame(command.pictures, 0).size();
+  if (std::printf("%s\n", plan.dump().c_str()) < 0 || std::fflush(stdout) != 0)
+    throw std::runtime_error("stdout cannot be written");
+}
+
+ExitCode run(const CaptureCommand& command) {
+  // A file beyond the shell's limit is then an error of write(), not the end of the process.
+  std::signal(SIGXFSZ, SIG_IGN);
+  if (!command.run.dryRun) prepareFolder(command.out);
+  const std::shared_ptr<const scene::Scene> scene = loadScene(command.model);
+  if (interrupted()) throw Interrupted{};
+  const ShotList list = planShots(scene, command.path, command.pictures, command.run.shard);
+  for (const std::string& note : list.notes) spdlog::warn("path: {}", note);
+  CaptureCounts counts;
+  if (command.run.dryRun) {
+    missingFrames(command, list, counts);
+    tellPlan(command, list, counts);
+    return ExitCode::done;
+  }
+  render::Renderer renderer(scene, command.pictures.renderer);
+  const std::string drawnBy = whoDraws(renderer, command.pictures);
+  claimFolder(
+      command.out, command.pictures,
+      manifestJson(*scene, command.path, list.shots, command.pictures, renderer.deviceName()));
+  writeDocuments(command.out, *scene, list, command.pictures);
+  const std::vector<std::size_t> missing = missingFrames(command, list, counts);
+  if (counts.already > 0)
+    spdlog::info("{} of {} frames are there already", counts.already, counts.mine);
+  const auto start = Clock::now();
+  takePictures(command, list, missing, renderer, counts);
+  counts.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  if (counts.clamped > 0)
+    spdlog::warn("{} pixels of depth are farther than 16 bits hold, and were written as 65535",
+                 counts.clamped.load());
+  tellSummary(command, counts, drawnBy, videoOf(command, list));
+  return ExitCode::done;
+}
+
+}  // namespace
+
+ExitCode capture(const CaptureCommand& command) {
+  return interruptible([&] { return run(command); },
+                       "the frames that are there are whole; the same command goes on from there");
+}
+
+}  // namespace enfilade::server

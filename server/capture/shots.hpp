@@ -1,0 +1,47 @@
+// The pictures that a capture takes: each with its camera and the moment that it shows.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "scene/scene.hpp"
+#include "server/capture/capture_options.hpp"
+
+namespace enfilade::server {
+
+struct Shot {
+  double time = 0;  ///< seconds
+  render::Camera camera;
+  scene::EntityId hidden = 0;  ///< not drawn: whose eyes these are
+  /// Null where another shard takes this picture.
+  std::shared_ptr<const scene::Snapshot> snapshot;
+  std::string name;  ///< of the script's capture, else empty
+};
+
+/// Someone who comes in while a script runs; the scene's own things are in its model.
+struct WalkerName {
+  scene::EntityId id = 0;
+  std::string name;
+};
+
+struct ShotList {
+  std::vector<Shot> shots;          ///< at least one; shot i is frame i, whatever the shard
+  std::vector<WalkerName> walkers;  ///< ascending ids
+  std::vector<std::string> notes;   ///< what was guessed or left out, for a person
+};
+
+/// Reads the path and works out every picture of it: a walk script runs in process for that.
+/// `shard` says which snapshots are kept. Throws CameraPathError, protocol::ScriptError,
+/// scene::ImportError; std::invalid_argument for cameras that render::refusal() refuses.
+ShotList planShots(const std::shared_ptr<const scene::Scene>& scene,
+                   const std::filesystem::path& path, const PictureOptions& options,
+                   const Shard& shard);
+
+/// Whether frame `index` is the shard's.
+inline bool takes(const Shard& shard, std::size_t index) {
+  return index % shard.count == shard.index;
+}
+
+}  // namespace enfilade::server

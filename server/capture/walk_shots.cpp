@@ -1,0 +1,131 @@
+#include "server/capture/walk_shots.hpp"
+
+#include "protocol/script.hpp"
+#include "server/in_process_driver.hpp"
+#include "server/world_messages.hpp"
+
+namespace enfilade::server {
+namespace {
+
+constexpr std::size_t kMostSnapshotBytes = std::size_t{2} << 30;
+constexpr std::size_t kMostShots = 10'000'000;
+
+/// What a snapshot holds that the one before does not, about.
+std::size_t bytesOf(const scene::Snapshot& snapshot, const scene::Snapshot* before) {
+  std::size_t bytes = sizeof snapshot + snapshot.avatars.size() * sizeof(scene::AvatarView);
+  if (snapshot.bodies && (!before || before->bodies != snapshot.bodies))
+    bytes += snapshot.bodies->size() * sizeof(scene::BodyView);
+  return bytes;
+}
+
+class Recorder {
+ public:
+  Recorder(const scene::World& world, const PictureOptions& options, const Shard& shard)
+      : world_(world), options_(options), shard_(shard) {}
+
+  void see(const protocol::StepOutcome& outcome) {
+    const auto snapshot = world_.snapshot();
+    for (const scene::AvatarView& avatar : snapshot->avatars)
+      names_.emplace(avatar.id, avatar.name);
+    if (options_.every == 0) {
+      for (const v1::Notice& notice : outcome.notices)
+        if (notice.kind() == v1::Notice::KIND_CAPTURE)
+          add(snapshot, notice.avatar(), notice.text());
+    } else if (snapshot->tick % options_.every == 0) {
+      add(snapshot, eyes(*snapshot), "");
+    }
+  }
+
+  ShotList finish() {
+    for (const auto& [id, name] : names_) list_.walkers.push_back({id, name});
+    return std::move(list_);
+  }
+
+ private:
+  std::string eyes(const scene::Snapshot& snapshot) {
+    if (options_.avatar.empty() && first_.empty() && !snapshot.avatars.empty())
+      first_ = snapshot.avatars.front().name;
+    return options_.avatar.empty() ? first_ : options_.avatar;
+  }
+
+  void add(const std::shared_ptr<const scene::Snapshot>& snapshot, const std::string& avatar,
+           const std::string& name) {
+    const scene::AvatarView* seer = avatarNamed(*snapshot, avatar);
+    if (!seer) return;  // not in the world now
+    Shot shot{snapshot->time, render::firstPerson(*seer, 1, 1), seer->id, nullptr, name};
+    if (takes(shard_, list_.shots.size())) keep(snapshot, shot);
+    if (list_.shots.size() == kMostShots)
+      throw CameraPathError("the walk makes more than 10,000,000 frames; give a larger --every");
+    list_.shots.push_back(std::move(shot));
+  }
+
+  void keep(const std::shared_ptr<const scene::Snapshot>& snapshot, Shot& shot) {
+    shot.snapshot = snapshot;
+    if (snapshot == last_) return;
+    bytes_ += bytesOf(*snapshot, last_.get());
+    last_ = snapshot;
+    if (bytes_ > kMostSnapshotBytes)
+      throw CameraPathError(
+          "what moves in this walk takes more than 2 GiB over all frames; give a larger --every, "
+          "or "
+          "--shard i/n one after the other");
+  }
+
+  const scene::World& world_;
+  const PictureOptions& options_;
+  const Shard& shard_;
+  ShotList list_;
+  std::map<scene::EntityId, std::string> names_;
+  std::string first_;
+  std::shared_ptr<const scene::Snapshot> last_;
+  std::size_t bytes_ = 0;
+};
+
+/// Without a renderer every capture would count as one that failed.
+class Unseen : public protocol::ScriptDriver {
+ public:
+  explicit Unseen(scene::World& world) : driver_(world, nullptr) {}
+  double tickSeconds() const override { return driver_.tickSeconds(); }
+  std::optional<v1::Error> submit(const v1::Command& command) override {
+    return driver_.submit(command);
+  }
+  std::optional<v1::Error> submit(const v1::BodyCommand& command) override {
+    return driver_.submit(command);
+  }
+  protocol::StepOutcome step() override {
+    protocol::StepOutcome outcome = driver_.step();
+    outcome.frames.clear();
+    return outcome;
+  }
+
+ private:
+  InProcessDriver driver_;
+};
+
+}  // namespace
+
+ShotList walkShots(const std::shared_ptr<const scene::Scene>& scene,
+                   const std::filesystem::path& script, const PictureOptions& options,
+                   const Shard& shard) {
+  const protocol::Script lines = protocol::readScript(script);
+  scene::World world(scene);
+  Unseen driver(world);
+  Recorder recorder(world, options, shard);
+  const protocol::ScriptResult result = protocol::runScript(
+      lines, driver, [&](protocol::StepOutcome& outcome, const protocol::ScriptProgress&) {
+        recorder.see(outcome);
+      });
+  ShotList list = recorder.finish();
+  for (const protocol::LineOutcome& outcome : result.outcomes) list.notes.push_back(outcome.text);
+  if (list.shots.empty())
+    throw CameraPathError(
+        script.string() +
+        (options.every == 0
+             ? ": the script captures nothing; add {\"capture\":NAME,\"as\":FILE}, or "
+               "give --every TICKS"
+             : ": nobody called so was in the world at any such tick; mend --avatar, "
+               "or give a smaller --every"));
+  return list;
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,195 @@
+// Cameras of files written here, whose places at each time are known.
+#include "scene/import/gltf_cameras.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "scene/import/import_model.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using Json = nlohmann::json;
+
+std::string base64(const std::string& bytes) {
+  static const char* letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    unsigned group = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      group = group << 8U | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+    for (std::size_t k = 0; k < 4; ++k)
+      text += i + k <= bytes.size() ? letters[group >> (18U - 6U * k) & 63U] : '=';
+  }
+  return text;
+}
+
+/// A glTF file with one camera below one node, to be animated.
+class GltfFile {
+ public:
+  GltfFile() {
+    json_ = Json::parse(R"({
+      "asset":{"version":"2.0"},
+      "cameras":[{"type":"perspective","perspective":{"yfov":0.8,"znear":0.1}}],
+      "nodes":[{"name":"rig","children":[1],"translation":[10,0,0]},{"name":"cam","camera":0}],
+      "scenes":[{"nodes":[0]}],"buffers":[],"bufferViews":[],"accessors":[],
+      "animations":[{"samplers":[],"channels":[]}]})");
+  }
+
+  Json& json() { return json_; }
+
+  std::size_t add(const std::vector<float>& values, const char* type, std::size_t count) {
+    std::string bytes(values.size() * 4, '\0');
+    std::memcpy(bytes.data(), values.data(), bytes.size());
+    json_["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", bytes_.size()}});
+    bytes_ += bytes;
+    json_["accessors"].push_back({{"bufferView", json_["bufferViews"].size() - 1},
+                                  {"componentType", 5126},
+                                  {"type", type},
+                                  {"count", count}});
+    return json_["accessors"].size() - 1;
+  }
+
+  void animate(std::size_t node, const char* path, const char* how, const std::vector<float>& times,
+               const std::vector<float>& values) {
+    Json& animation = json_["animations"][0];
+    const bool turns = std::string(path) == "rotation";
+    const std::size_t input = add(times, "SCALAR", times.size());
+    const std::size_t output =
+        add(values, turns ? "VEC4" : "VEC3", values.size() / (turns ? 4 : 3));
+    animation["channels"].push_back(
+        {{"sampler", animation["samplers"].size()}, {"target", {{"node", node}, {"path", path}}}});
+    animation["samplers"].push_back({{"input", input}, {"output", output}, {"interpolation", how}});
+  }
+
+  GltfCameraPath sample(double fps, const std::string& name = "") const {
+    const auto file = std::filesystem::temp_directory_path() /
+                      ("enfilade_camera_" + std::to_string(::getpid()) + ".gltf");
+    Json whole = json_;
+    whole["buffers"] = {{{"byteLength", bytes_.size()},
+                         {"uri", "data:application/octet-stream;base64," + base64(bytes_)}}};
+    std::ofstream(file) << whole.dump();
+    try {
+      GltfCameraPath path = sampleGltfCamera(file, name, fps);
+      std::filesystem::remove(file);
+      return path;
+    } catch (...) {
+      std::filesystem::remove(file);
+      throw;
+    }
+  }
+
+ private:
+  Json json_;
+  std::string bytes_;
+};
+
+TEST(GltfCamera, WithoutAnimationItIsOnePose) {
+  const GltfCameraPath path = GltfFile().sample(30);
+  EXPECT_EQ(path.name, "cam");
+  EXPECT_EQ(path.fovY, 0.8);
+  ASSERT_EQ(path.poses.size(), 1U);
+  EXPECT_EQ(path.poses[0].eye, Vec3(10, 0, 0));
+  EXPECT_EQ(path.poses[0].forward, Vec3(0, 0, -1));
+  EXPECT_EQ(path.poses[0].up, Vec3(0, 1, 0));
+}
+
+TEST(GltfCamera, LinearKeysAreMixedAndTheNodesAboveMoveIt) {
+  GltfFile file;
+  file.animate(1, "translation", "LINEAR", {0, 1, 2}, {0, 0, 0, 0, 4, 0, 0, 4, 8});
+  // A quarter turn of the rig to the left within two seconds.
+  const float h = std::sqrt(0.5f);
+  file.animate(0, "rotation", "LINEAR", {0, 2}, {0, 0, 0, 1, 0, h, 0, h});
+  const GltfCameraPath path = file.sample(2);
+  ASSERT_EQ(path.poses.size(), 5U);
+  EXPECT_EQ(path.poses[1].time, 0.5);
+  EXPECT_LT((path.poses[1].eye - Vec3(10, 2, 0)).norm(), 1e-6);
+  EXPECT_LT((path.poses[4].eye - Vec3(18, 4, 0)).norm(), 1e-6);
+  EXPECT_LT((path.poses[4].forward - Vec3(-1, 0, 0)).norm(), 1e-6);
+  const double eighth = std::sqrt(0.5);
+  EXPECT_LT((path.poses[2].forward - Vec3(-eighth, 0, -eighth)).norm(), 1e-6);
+}
+
+TEST(GltfCamera, StepKeysHoldAndTheFirstHoldsBeforeItself) {
+  GltfFile file;
+  file.animate(1, "translation", "STEP", {1, 2}, {1, 0, 0, 2, 0, 0});
+  const GltfCameraPath path = file.sample(2);
+  ASSERT_EQ(path.poses.size(), 5U);
+  const std::vector<double> x{11, 11, 11, 11, 12};
+  for (std::size_t i = 0; i < x.size(); ++i) EXPECT_EQ(path.poses[i].eye.x(), x[i]) << i;
+}
+
+TEST(GltfCamera, CubicSplinesFollowTheirTangents) {
+  GltfFile file;
+  // Hermite: from 0 to 0 in two seconds, leaving at 3 m/s and arriving at -3 m/s: at the middle
+  // h10 * 2 * 3 + h11 * 2 * (-3) = (0.125 + 0.125) * 6.
+  file.animate(1, "translation", "CUBICSPLINE", {0, 2},
+               {0, 0, 0, 0, 0, 0, 0, 3, 0, 0, -3, 0, 0, 0, 0, 0, 0, 0});
+  const GltfCameraPath path = file.sample(1);
+  ASSERT_EQ(path.poses.size(), 3U);
+  EXPECT_NEAR(path.poses[0].eye.y(), 0, 1e-12);
+  EXPECT_NEAR(path.poses[1].eye.y(), 1.5, 1e-12);
+  EXPECT_NEAR(path.poses[2].eye.y(), 0, 1e-12);
+}
+
+TEST(GltfCamera, TheNamedOneIsTakenAndElseTheOneThatMoves) {
+  GltfFile file;
+  file.json()["nodes"].push_back({{"name", "still"}, {"camera", 0}});
+  std::swap(file.json()["nodes"][1]["name"], file.json()["nodes"][2]["name"]);
+  file.json()["scenes"][0]["nodes"].push_back(2);
+  file.animate(2, "translation", "LINEAR", {0, 1}, {0, 0, 0, 1, 0, 0});
+  EXPECT_EQ(file.sample(1).name, "cam");
+  EXPECT_EQ(file.sample(1, "still").poses.size(), 1U);
+  try {
+    file.sample(1, "other");
+    ADD_FAILURE() << "a camera that is not there";
+  } catch (const ImportError& error) {
+    EXPECT_NE(std::string(error.what()).find("still, cam"), std::string::npos) << error.what();
+  }
+}
+
+TEST(GltfCamera, BrokenFilesAreErrors) {
+  GltfFile none;
+  none.json()["nodes"][1].erase("camera");
+  EXPECT_THROW(none.sample(1), ImportError);
+  GltfFile ring;
+  ring.json()["nodes"][1]["children"] = {0};
+  EXPECT_THROW(ring.sample(1), ImportError);
+  GltfFile flat;
+  flat.json()["nodes"][1]["scale"] = {0, 0, 0};
+  EXPECT_THROW(flat.sample(1), ImportError);
+  GltfFile orthographic;
+  orthographic.json()["cameras"][0] = {{"type", "orthographic"}};
+  EXPECT_THROW(orthographic.sample(1), ImportError);
+  GltfFile shortOne;
+  shortOne.animate(1, "translation", "LINEAR", {0, 1}, {0, 0, 0});
+  EXPECT_THROW(shortOne.sample(1), ImportError);
+  GltfFile back;
+  back.animate(1, "translation", "LINEAR", {1, 0}, {0, 0, 0, 1, 1, 1});
+  EXPECT_THROW(back.sample(1), ImportError);
+  GltfFile beyond;
+  beyond.animate(1, "translation", "LINEAR", {0, 1}, {0, 0, 0, 1, 1, 1});
+  beyond.json()["accessors"][1]["count"] = 3;
+  EXPECT_THROW(beyond.sample(1), ImportError);
+  beyond.json()["accessors"][1]["count"] = std::uint64_t{1} << 62U;
+  EXPECT_THROW(beyond.sample(1), ImportError);
+  beyond.json()["accessors"][1]["count"] = 2;
+  beyond.json()["bufferViews"][1]["byteOffset"] = 1000;
+  EXPECT_THROW(beyond.sample(1), ImportError);
+}
+
+TEST(GltfCamera, AbsurdStridesAndRatesAreErrors) {
+  GltfFile file;
+  file.animate(1, "translation", "LINEAR", {0, 1}, {0, 0, 0, 1, 1, 1});
+  EXPECT_THROW(file.sample(1e300), ImportError);
+  file.json()["bufferViews"][1]["byteStride"] = std::uint64_t{1} << 31U;
+  EXPECT_THROW(file.sample(1), ImportError);
+}
+
+}  // namespace
+}  // namespace enfilade::scene

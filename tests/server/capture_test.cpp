@@ -1,0 +1,406 @@
+// `enfilade capture` as its users run it, in the small room: what lies in the folder afterwards.
+#include <sys/resource.h>
+
+#include <cmath>
+#include <cstring>
+#include <map>
+
+#include "render/gl/gl_renderer.hpp"
+#include "render/pictures/image.hpp"
+#include "tests/server/program_trial.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+/// An array of a .npy file as it stands there.
+template <class Value>
+struct Array {
+  int height = 0, width = 0;
+  std::vector<Value> values;
+
+  const Value& at(int x, int y) const {
+    return values.at(static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                     static_cast<std::size_t>(x));
+  }
+};
+
+template <class Value>
+Array<Value> readNpy(const fs::path& file) {
+  const std::string bytes = textOf(file);
+  Array<Value> array;
+  const std::size_t shape = bytes.find("'shape': (");
+  if (shape == std::string::npos) return array;
+  std::sscanf(bytes.c_str() + shape, "'shape': (%d, %d", &array.height, &array.width);
+  const std::size_t start = bytes.find('\n') + 1;
+  array.values.resize((bytes.size() - start) / sizeof(Value));
+  std::memcpy(array.values.data(), bytes.data() + start, bytes.size() - start);
+  return array;
+}
+
+/// Every file below the folder with what is in it.
+std::map<std::string, std::string> treeOf(const fs::path& folder) {
+  std::map<std::string, std::string> tree;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file())
+      tree[entry.path().lexically_relative(folder).generic_string()] = textOf(entry.path());
+  }
+  return tree;
+}
+
+std::vector<std::string> namesOf(const std::map<std::string, std::string>& tree) {
+  std::vector<std::string> names;
+  for (const auto& [name, text] : tree) names.push_back(name);
+  return names;
+}
+
+bool picturesCanBeHad() {
+  static const bool can = [] {
+    try {
+      render::GlRenderer renderer(smallRoom());
+      return true;
+    } catch (const render::RenderError&) {
+      return false;
+    }
+  }();
+  return can;
+}
+
+/// `poses` along +x from x = 0, 0.2 m apart, at eye height, looking along +x; 30 a second.
+std::string ahead(int poses) {
+  std::ostringstream text;
+  for (int i = 0; i < poses; ++i)
+    text << i / 30.0 << " " << 0.2 * i << " 1.6 0 0 -0.7071067811865476 0 0.7071067811865476\n";
+  return text.str();
+}
+
+class Capture : public ProgramTrial {
+ protected:
+  void SetUp() override {
+    if (!picturesCanBeHad()) GTEST_SKIP() << "no device draws here";
+    ProgramTrial::SetUp();
+  }
+
+  Ended captured(const std::string& pathFile, const std::string& out,
+                 std::vector<std::string> options = {}) const {
+    std::vector<std::string> arguments{"capture", path("room.obj"), path(pathFile), "--out",
+                                       path(out)};
+    if (!film_) options.push_back("--no-mp4");
+    if (std::find(options.begin(), options.end(), "--size") == options.end())
+      options.insert(options.end(), {"--size", "64x48"});
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return run(arguments);
+  }
+
+  bool film_ = false;  ///< whether ffmpeg may be asked, which need not be here
+};
+
+TEST_F(Capture, FilesLieWhereTheLayoutSaysAndHoldWhatIsSeen) {
+  write(folder_ / "path.txt", ahead(2));
+  const Ended ended = captured("path.txt", "out", {"--fov", "90"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  EXPECT_EQ(namesOf(treeOf(folder_ / "out")),
+            (std::vector<std::string>{"capture.json", "depth/000000.npy", "depth/000001.npy",
+                                      "ids/000000.npy", "ids/000001.npy", "instances.json",
+                                      "rgb/000000.png", "rgb/000001.png", "transforms.json"}));
+  const auto summary = json::parse(ended.out);
+  EXPECT_EQ(summary.at("written"), 2);
+  const auto depth = readNpy<float>(folder_ / "out/depth/000001.npy");
+  const auto ids = readNpy<std::uint32_t>(folder_ / "out/ids/000001.npy");
+  ASSERT_EQ(depth.values.size(), 64U * 48U);
+  EXPECT_EQ(depth.width, 64);
+  EXPECT_NEAR(depth.at(32, 24), 4.8, 1e-3);  // the wall's face is at x = 5, the eye at 0.2
+  EXPECT_EQ(ids.at(32, 24), kWall);
+  EXPECT_EQ(ids.at(32, 47), kFloor);
+  EXPECT_EQ(ids.at(0, 0), 0U);  // past the wall's end and above its top
+  EXPECT_TRUE(std::isnan(depth.at(0, 0)));
+  const auto instances = json::parse(textOf(folder_ / "out/instances.json"));
+  EXPECT_EQ(instances.at("2").at("path"), "room_wall");
+}
+
+TEST_F(Capture, TransformsSayWhereAPixelLies) {
+  write(folder_ / "path.json",
+        R"([{"eye":[0,1.6,0],"look_at":[5,1,1]},{"eye":[-2,2.2,-1.5],"look_at":[5,1,0]}])");
+  ASSERT_EQ(captured("path.json", "out", {"--intrinsics", "40,50,30,25"}).code, 0);
+  const auto file = json::parse(textOf(folder_ / "out/transforms.json"));
+  struct View {
+    Eigen::Matrix4d worldFromCamera;
+    Array<float> depth;
+    Array<std::uint32_t> ids;
+  };
+  std::vector<View> views;
+  for (const auto& frame : file.at("frames")) {
+    View view;
+    for (int row = 0; row < 4; ++row)
+      for (int column = 0; column < 4; ++column)
+        view.worldFromCamera(row, column) = frame.at("transform_matrix").at(row).at(column);
+    view.depth = readNpy<float>(folder_ / "out" / frame.at("depth_file_path"));
+    view.ids = readNpy<std::uint32_t>(folder_ / "out" / frame.at("ids_file_path"));
+    views.push_back(std::move(view));
+  }
+  const double fx = file.at("fl_x"), fy = file.at("fl_y"), cx = file.at("cx"), cy = file.at("cy");
+  EXPECT_EQ(fx, 40);
+  EXPECT_EQ(cy, 25);
+  int seen = 0, agreeing = 0;
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      const double z = views[0].depth.at(x, y);
+      if (std::isnan(z)) continue;
+      const Eigen::Vector4d inFirst((x + 0.5 - cx) / fx * z, -(y + 0.5 - cy) / fy * z, -z, 1);
+      const Eigen::Vector4d world = views[0].worldFromCamera * inFirst;
+      // On the faces that the room is made of.
+      const double off = std::min({std::abs(world.y()), std::abs(world.x() - 5),
+                                   std::abs(world.y() - 3), std::abs(std::abs(world.z()) - 4)});
+      if (views[0].ids.at(x, y) != kColumn) {
+        EXPECT_LT(off, 2e-3) << world.transpose();
+      }
+      const Eigen::Vector4d inSecond = views[1].worldFromCamera.inverse() * world;
+      const double u = fx * inSecond.x() / -inSecond.z() + cx;
+      const double v = -fy * inSecond.y() / -inSecond.z() + cy;
+      if (!(inSecond.z() < 0 && u >= 0 && u < 64 && v >= 0 && v < 48)) continue;
+      const int column = static_cast<int>(u), row = static_cast<int>(v);
+      if (views[1].ids.at(column, row) != views[0].ids.at(x, y)) continue;  // hidden, or an edge
+      ++seen;
+      // The pixel's centre lies up to half a pixel away: floors slope under it.
+      agreeing += std::abs(views[1].depth.at(column, row) + inSecond.z()) < 0.35;
+    }
+  }
+  EXPECT_GT(seen, 1000);
+  EXPECT_GT(agreeing, seen * 97 / 100);
+}
+
+TEST_F(Capture, ShardsMergeToExactlyTheUnshardedSet) {
+  write(folder_ / "path.txt", ahead(5));
+  ASSERT_EQ(captured("path.txt", "whole").code, 0);
+  ASSERT_EQ(captured("path.txt", "first", {"--shard", "0/2"}).code, 0);
+  ASSERT_EQ(captured("path.txt", "second", {"--shard", "1/2"}).code, 0);
+  EXPECT_EQ(treeOf(folder_ / "first").size(), 3 + 3 * 3U);
+  EXPECT_EQ(treeOf(folder_ / "second").size(), 3 + 3 * 2U);
+  fs::copy(folder_ / "first", folder_ / "merged", fs::copy_options::recursive);
+  fs::copy(folder_ / "second", folder_ / "merged",
+           fs::copy_options::recursive | fs::copy_options::overwrite_existing);
+  EXPECT_EQ(treeOf(folder_ / "merged"), treeOf(folder_ / "whole"));
+}
+
+TEST_F(Capture, AStoppedRunGoesOnWhereItWasAndNothingElseDoes) {
+  write(folder_ / "path.txt", ahead(4));
+  ASSERT_EQ(captured("path.txt", "out").code, 0);
+  const auto whole = treeOf(folder_ / "out");
+  fs::remove(folder_ / "out/rgb/000001.png");
+  fs::remove(folder_ / "out/depth/000003.npy");
+  const Ended again = captured("path.txt", "out");
+  ASSERT_EQ(again.code, 0) << again.err;
+  EXPECT_EQ(json::parse(again.out).at("written"), 2);
+  EXPECT_EQ(json::parse(again.out).at("already_there"), 2);
+  EXPECT_EQ(treeOf(folder_ / "out"), whole);
+  const Ended other = captured("path.txt", "out", {"--size", "32x24"});
+  EXPECT_EQ(other.code, 1);
+  EXPECT_NE(other.err.find("holds another capture (lens: "), std::string::npos) << other.err;
+  EXPECT_NE(other.err.find("--out"), std::string::npos);
+  write(folder_ / "path.txt", ahead(4) + "9 0 1.6 0 0 0 0 1\n");
+  EXPECT_EQ(captured("path.txt", "out").code, 1);
+  EXPECT_EQ(treeOf(folder_ / "out"), whole);
+  fs::remove(folder_ / "out/capture.json");
+  EXPECT_NE(captured("path.txt", "out").err.find("that says whose"), std::string::npos);
+}
+
+TEST_F(Capture, AFullDiskLeavesWholeFilesOnlyAndIsTold) {
+  write(folder_ / "path.txt", ahead(3));
+  // A .npy of 64 x 48 floats has 12,416 bytes; the .png of the same picture and all else fit.
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit little{8192, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &little);
+  const pid_t child = start({"capture", path("room.obj"), path("path.txt"), "--out", path("out"),
+                             "--size", "64x48", "--no-cache", "--no-mp4"});
+  setrlimit(RLIMIT_FSIZE, &before);
+  EXPECT_EQ(codeOf(child), 1);
+  EXPECT_NE(textOf(path("stderr")).find("cannot write " + path("out") + "/depth/00000"),
+            std::string::npos)
+      << textOf(path("stderr"));
+  for (const auto& [name, text] : treeOf(folder_ / "out")) {
+    EXPECT_EQ(name.find(".part"), std::string::npos) << name;
+    EXPECT_FALSE(text.empty()) << name;
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "out/depth/000000.npy"));
+  EXPECT_EQ(captured("path.txt", "out").code, 0);
+  ASSERT_EQ(captured("path.txt", "fresh").code, 0);
+  EXPECT_EQ(treeOf(folder_ / "out"), treeOf(folder_ / "fresh"));
+}
+
+TEST_F(Capture, AnInterruptEndsItWith130AndWholeFiles) {
+  write(folder_ / "path.txt", ahead(4000));
+  const pid_t child = start({"capture", path("room.obj"), path("path.txt"), "--out", path("out"),
+                             "--size", "64x48", "--progress", "json"});
+  for (int i = 0; i < 3000 && !fs::exists(folder_ / "out/ids/000003.npy"); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  kill(child, SIGINT);
+  EXPECT_EQ(codeOf(child), 130);
+  const auto tree = treeOf(folder_ / "out");
+  EXPECT_GT(tree.size(), 3 + 3 * 3U);
+  EXPECT_LT(tree.size(), 3 + 3 * 4000U);
+  for (const auto& [name, text] : tree) EXPECT_EQ(name.find(".part"), std::string::npos) << name;
+  EXPECT_EQ(textOf(path("stdout")), "");
+  EXPECT_NE(textOf(path("stderr")).find("goes on from there"), std::string::npos);
+  EXPECT_NE(textOf(path("stderr")).find("{\"frames\":"), std::string::npos);
+}
+
+TEST_F(Capture, AWalkIsSeenThroughItsAvatarsEyes) {
+  write(folder_ / "walk.jsonl",
+        R"({"spawn":"ann","at":[0,0,0],"facing":0}
+{"spawn":"bob","at":[3,0,0],"facing":180}
+{"capture":"ann","as":"first"}
+{"walk":"ann","to":[1,0,0],"speed":1}
+{"capture":"ann","as":"second"}
+{"capture":"bob","as":"bobs"}
+)");
+  const Ended ended = captured("walk.jsonl", "out");
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  EXPECT_EQ(json::parse(ended.out).at("frames"), 3);
+  const auto instances = json::parse(textOf(folder_ / "out/instances.json"));
+  std::uint32_t ann = 0, bob = 0;
+  for (const auto& [id, one] : instances.items()) {
+    if (one.at("path") == "ann") ann = static_cast<std::uint32_t>(std::stoul(id));
+    if (one.at("path") == "bob") bob = static_cast<std::uint32_t>(std::stoul(id));
+  }
+  const auto frames = json::parse(textOf(folder_ / "out/transforms.json")).at("frames");
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const auto ids = readNpy<std::uint32_t>(folder_ / "out" / frames[i].at("ids_file_path"));
+    const bool annSees = frames[i].at("name") != "bobs";
+    const auto seen = [&](std::uint32_t id) {
+      return std::count(ids.values.begin(), ids.values.end(), id);
+    };
+    EXPECT_GT(seen(annSees ? bob : ann), 0) << i;
+    EXPECT_EQ(seen(annSees ? ann : bob), 0) << i;
+  }
+  const Ended every =
+      captured("walk.jsonl", "every",
+               {"--every", "6", "--avatar", "ann", "--channels", "rgb", "--shard", "1/4"});
+  ASSERT_EQ(every.code, 0) << every.err;
+  EXPECT_GT(json::parse(every.out).at("frames"), 9);
+  EXPECT_EQ(captured("walk.jsonl", "nobody", {"--every", "6", "--avatar", "eve"}).code, 1);
+}
+
+TEST_F(Capture, SixteenBitFilesRefuseWhatDoesNotFitUnlessTold) {
+  write(folder_ / "path.txt", ahead(1));
+  const Ended fits = captured("path.txt", "fits", {"--depth", "png", "--ids", "png"});
+  ASSERT_EQ(fits.code, 0) << fits.err;
+  EXPECT_TRUE(fs::exists(folder_ / "fits/depth/000000.png"));
+  EXPECT_TRUE(fs::exists(folder_ / "fits/ids/000000.png"));
+  const Ended refused =
+      captured("path.txt", "refused", {"--depth", "png", "--depth-scale", "14000"});
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_NE(refused.err.find("depth/000000.png: "), std::string::npos) << refused.err;
+  EXPECT_NE(refused.err.find("--too-far clamp"), std::string::npos) << refused.err;
+  EXPECT_FALSE(fs::exists(folder_ / "refused/depth/000000.png"));
+  const Ended clamped = captured(
+      "path.txt", "clamped", {"--depth", "zst", "--depth-scale", "14000", "--too-far", "clamp"});
+  ASSERT_EQ(clamped.code, 0) << clamped.err;
+  EXPECT_GT(json::parse(clamped.out).at("clamped_pixels"), 0);
+}
+
+TEST_F(Capture, TheTumLayoutIsReadBackAsTheSamePath) {
+  write(folder_ / "path.txt", ahead(3));
+  ASSERT_EQ(captured("path.txt", "tum", {"--layout", "tum", "--channels", "rgb,depth"}).code, 0);
+  EXPECT_NE(textOf(folder_ / "tum/rgb.txt").find("0.033333 rgb/000001.png"), std::string::npos);
+  EXPECT_NE(textOf(folder_ / "tum/depth.txt").find("0.066667 depth/000002.png"), std::string::npos);
+  const Ended again = captured(
+      "tum/groundtruth.txt", "again",
+      {"--axes", "opencv", "--channels", "rgb,depth", "--depth", "png", "--depth-scale", "5000"});
+  ASSERT_EQ(again.code, 0) << again.err;
+  for (const char* file : {"rgb/000000.png", "rgb/000002.png", "depth/000001.png"})
+    EXPECT_EQ(textOf(folder_ / "again" / file), textOf(folder_ / "tum" / file)) << file;
+  const Ended own = captured("tum/transforms.json", "own", {"--channels", "rgb"});
+  ASSERT_EQ(own.code, 0) << own.err;
+  EXPECT_EQ(textOf(folder_ / "own/rgb/000001.png"), textOf(folder_ / "tum/rgb/000001.png"));
+}
+
+TEST_F(Capture, EveryChannelIsWrittenWhenAskedFor) {
+  write(folder_ / "path.txt", ahead(1));
+  const Ended ended =
+      captured("path.txt", "out", {"--channels", "normals,range,depth,rgb", "--rgb", "jpeg"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  EXPECT_TRUE(fs::exists(folder_ / "out/rgb/000000.jpg"));
+  const auto depth = readNpy<float>(folder_ / "out/depth/000000.npy");
+  const auto range = readNpy<float>(folder_ / "out/range/000000.npy");
+  const auto normals = readNpy<float>(folder_ / "out/normals/000000.npy");
+  EXPECT_NEAR(range.at(32, 24), depth.at(32, 24), 1e-2);
+  EXPECT_GT(range.at(32, 40), depth.at(32, 40) + 0.1f);
+  const std::size_t middle = 3 * (24 * 64 + 32);
+  EXPECT_NEAR(normals.values.at(middle), -1, 1e-5);  // the wall faces the eye
+}
+
+TEST_F(Capture, RaysDrawTheSameSceneAndTheManifestTellsThem) {
+  write(folder_ / "path.txt", ahead(1));
+  const Ended gl = captured("path.txt", "gl", {"--renderer", "gl"});
+  const Ended rays = captured("path.txt", "rays", {"--renderer", "rays"});
+  ASSERT_EQ(gl.code, 0) << gl.err;
+  ASSERT_EQ(rays.code, 0) << rays.err;
+  EXPECT_NE(json::parse(rays.out).at("renderer"), json::parse(gl.out).at("renderer"));
+  EXPECT_EQ(json::parse(textOf(folder_ / "rays/capture.json")).at("renderer"),
+            json::parse(rays.out).at("renderer"));
+  const auto drawn = readNpy<std::uint32_t>(folder_ / "gl/ids/000000.npy");
+  const auto cast = readNpy<std::uint32_t>(folder_ / "rays/ids/000000.npy");
+  int other = 0;
+  for (std::size_t i = 0; i < drawn.values.size(); ++i) other += drawn.values[i] != cast.values[i];
+  EXPECT_LT(other, 64);  // along edges
+  const Ended mixed = captured("path.txt", "gl", {"--renderer", "rays"});
+  EXPECT_EQ(mixed.code, 1);
+  EXPECT_NE(mixed.err.find("renderer: "), std::string::npos) << mixed.err;
+}
+
+TEST_F(Capture, FfmpegMakesTheFilmWhenAllFramesAreThere) {
+  fs::create_directories(folder_ / "bin");
+  write(folder_ / "bin/ffmpeg", "#!/bin/sh\nfor last; do :; done\necho \"$@\" > \"$last\"\n");
+  fs::permissions(folder_ / "bin/ffmpeg", fs::perms::owner_all);
+  const std::string before = getenv("PATH") ? getenv("PATH") : "";
+  setenv("PATH", (path("bin") + ":" + before).c_str(), 1);
+  write(folder_ / "path.txt", ahead(4));
+  film_ = true;
+  const Ended half = captured("path.txt", "out", {"--shard", "0/2", "--channels", "rgb"});
+  EXPECT_TRUE(json::parse(half.out).at("video").is_null());
+  const Ended all = captured("path.txt", "out", {"--channels", "rgb"});
+  setenv("PATH", before.c_str(), 1);
+  EXPECT_EQ(json::parse(all.out).at("video"), "video.mp4") << all.err;
+  EXPECT_NE(textOf(folder_ / "out/video.mp4").find("-framerate 30 "), std::string::npos)
+      << textOf(folder_ / "out/video.mp4");
+}
+
+TEST_F(Capture, ADryRunTellsAndWritesNothing) {
+  write(folder_ / "path.txt", ahead(5));
+  const Ended ended = captured("path.txt", "out", {"--dry-run", "--shard", "1/2", "--limit", "4"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  EXPECT_EQ(json::parse(ended.out).at("frames"), 4);
+  EXPECT_EQ(json::parse(ended.out).at("shard_frames"), 2);
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+}
+
+TEST_F(Capture, MistakesAreToldBeforeAnythingIsWritten) {
+  write(folder_ / "path.txt", ahead(1));
+  for (const std::vector<std::string>& wrong : {std::vector<std::string>{"--size", "0x10"},
+                                                {"--size", "100000x10"},
+                                                {"--size", "64"},
+                                                {"--fov", "180"},
+                                                {"--intrinsics", "1,2,3"},
+                                                {"--shard", "2/2"},
+                                                {"--channels", "rgb,foo"},
+                                                {"--channels", ""},
+                                                {"--fov", "60", "--intrinsics", "9,9,9,9"},
+                                                {"--quality", "0"},
+                                                {"--near", "nan"}}) {
+    const Ended ended = captured("path.txt", "out", wrong);
+    EXPECT_EQ(ended.code, 2) << wrong[0] << " " << wrong[1] << ended.err;
+  }
+  write(folder_ / "nan.txt", "0 nan 0 0 0 0 0 1\n");
+  const Ended ended = captured("nan.txt", "out");
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_NE(ended.err.find("nan.txt:1: 'nan'"), std::string::npos) << ended.err;
+  EXPECT_EQ(captured("missing.txt", "out").code, 1);
+  EXPECT_EQ(captured("path.txt", "out", {"--near", "5", "--far", "4"}).code, 1);
+  EXPECT_TRUE(treeOf(folder_ / "out").empty());
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing
