@@ -41,7 +41,7 @@ std::size_t drawnTriangles(const scene::Model& model) {
 
 RendererKind automaticKind(bool softwareGl, std::size_t triangles, const Channels& channels) {
   // Below, GL on processors is as quick; measured (tests/benchmarks/report/render.md).
-  constexpr std::size_t kFewTriangles = 20'000;
+  constexpr std::size_t kFewTriangles = 200'000;
   if (!softwareGl || channels.rgb) return RendererKind::gl;
   return triangles < kFewTriangles ? RendererKind::gl : RendererKind::rays;
 }
