@@ -20,7 +20,8 @@ struct ModelArguments {
 struct Arguments {
   ModelArguments model;
   std::string script, out, plan, listen = "127.0.0.1:7878", connect;
-  bool strict = false, json = false, objects = false, stopAtEndOfInput = false;
+  std::string record;
+  bool strict = false, verify = false, json = false, objects = false, stopAtEndOfInput = false;
   CaptureArguments capture;
   std::string auditEvery = "0", epsilon, stepHeight, slope, sliding = "slide";
 };
@@ -32,6 +33,10 @@ std::string unitProblem(const std::string& text) {
 
 std::string folderProblem(const std::string& text) {
   return text.empty() ? "the folder's name is empty: give one, as out" : "";
+}
+
+std::string fileProblem(const std::string& text) {
+  return text.empty() ? "the file's name is empty: give one, as walk.mcap" : "";
 }
 
 std::string endpointProblem(const std::string& text) {
@@ -162,6 +167,19 @@ ModelOptions modelFrom(const ModelArguments& read) {
   return options;
 }
 
+/// The recording stands last; before it the scene, if it is named.
+VerifyCommand verifyFrom(const Arguments& read) {
+  if (read.script.empty()) return {{}, read.model.file, !read.model.noCache};
+  return {read.model.file, read.script, !read.model.noCache};
+}
+
+/// What a replay that verifies nothing cannot do without.
+std::optional<std::string> missingFrom(const Arguments& read) {
+  if (read.script.empty()) return "SCRIPT is required: the walk, JSON lines (protocol/SCRIPT.md)";
+  if (read.out.empty()) return "--out is required: a folder for the pictures, contacts and summary";
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<Endpoint> endpointFrom(const std::string& text) {
@@ -198,6 +216,11 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   addWalk(*replay, read);
   addAudit(*replay, read);
   addMotion(*replay, read);
+  replay->add_option("--record", read.record, "Write a recording (MCAP) of the walk")
+      ->check(CLI::Validator(fileProblem, "FILE"));
+  for (const char* needless : {"SCRIPT", "--out"}) replay->get_option(needless)->required(false);
+  replay->add_flag("--verify", read.verify,
+                   "[SCENE] RECORDING: make a recorded walk again; ends with 4 where it differs");
   CLI::App* capture =
       app.add_subcommand("capture", "Take pictures along a camera path: colour, depth, ids");
   addModel(*capture, read.model);
@@ -228,9 +251,14 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   if (*serve)
     return ServeCommand{modelFrom(read.model), *endpointFrom(read.listen), audit, lengthsFrom(read),
                         read.stopAtEndOfInput};
+  if (*replay && read.verify) return verifyFrom(read);
   if (*replay) {
-    return ReplayCommand{modelFrom(read.model), read.script, read.out,
-                         read.strict,           audit,       lengthsFrom(read)};
+    if (const auto missing = missingFrom(read)) {
+      std::cerr << "enfilade: " << *missing << "\n";
+      return ExitCode::usage;
+    }
+    return ReplayCommand{modelFrom(read.model), read.script, read.out, read.strict, audit,
+                         lengthsFrom(read),     read.record};
   }
   if (*capture)
     return CaptureCommand{modelFrom(read.model), read.capture.path, read.capture.out,

@@ -42,6 +42,12 @@ struct ReplayCommand {
   bool strict = false;
   std::uint32_t auditEvery = 0;  ///< ticks; 0: never
   scene::Lengths lengths;
+  std::filesystem::path record;  ///< a recording to write; empty: none
+};
+struct VerifyCommand {
+  std::filesystem::path scene;  ///< empty: where the recording says
+  std::filesystem::path recording;
+  bool cache = true;
 };
 struct WalkCommand {
   std::filesystem::path script, out;
@@ -61,8 +67,8 @@ struct CaptureCommand {
   PictureOptions pictures;
   CaptureRunOptions run;
 };
-using ProgramCommand =
-    std::variant<ServeCommand, ReplayCommand, CaptureCommand, WalkCommand, InspectCommand>;
+using ProgramCommand = std::variant<ServeCommand, ReplayCommand, VerifyCommand, CaptureCommand,
+                                    WalkCommand, InspectCommand>;
 
 /// What to do, or the code to end with at once (--help: done; a mistake: usage). Help goes to
 /// stdout, mistakes and the usage to stderr.

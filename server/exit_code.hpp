@@ -8,6 +8,7 @@ enum class ExitCode : int {
   runtimeError = 1,
   usage = 2,
   violations = 3,  ///< a check found some: an audit, or with --strict refused or blocked orders
+  diverged = 4,    ///< a replay ended otherwise than it was recorded
   interrupted = 130
 };
 

@@ -5,10 +5,22 @@
 #include "server/world_messages.hpp"
 
 namespace enfilade::server {
+namespace {
+
+v1::TickEvents eventsOf(const protocol::StepOutcome& outcome) {
+  v1::TickEvents events;
+  events.set_tick(outcome.tick);
+  events.set_time(outcome.time);
+  events.mutable_contacts()->Assign(outcome.contacts.begin(), outcome.contacts.end());
+  events.mutable_notices()->Assign(outcome.notices.begin(), outcome.notices.end());
+  return events;
+}
+
+}  // namespace
 
 InProcessDriver::InProcessDriver(scene::World& world, render::Renderer* renderer,
-                                 protocol::CaptureFormat format)
-    : world_(world), renderer_(renderer), format_(std::move(format)) {}
+                                 protocol::CaptureFormat format, Recorder* recorder)
+    : world_(world), renderer_(renderer), format_(std::move(format)), recorder_(recorder) {}
 
 double InProcessDriver::tickSeconds() const {
   return world_.lengths().tick;
@@ -19,11 +31,14 @@ std::optional<v1::Error> InProcessDriver::submit(const v1::Command& command) {
   if (auto* error = std::get_if<v1::Error>(&order)) return std::move(*error);
   auto refused = scene::submit(world_, std::get<scene::Command>(std::move(order)));
   if (refused) return refusalOf(command, *refused);
+  if (recorder_) recorder_->took(command);
   return std::nullopt;
 }
 
 std::optional<v1::Error> InProcessDriver::submit(const v1::BodyCommand& command) {
-  return server::submit(world_, command);
+  auto refused = server::submit(world_, command);
+  if (!refused && recorder_) recorder_->took(command);
+  return refused;
 }
 
 protocol::StepOutcome InProcessDriver::step() {
@@ -43,6 +58,7 @@ protocol::StepOutcome InProcessDriver::step() {
       outcome.frames.push_back(capture(outcome.notices.back()));
     }
   }
+  if (recorder_) recorder_->ticked(world_, eventsOf(outcome));
   for (const auto& avatar : snapshot.avatars) outcome.avatars.push_back(messageOf(world_, avatar));
   return outcome;
 }

@@ -4,16 +4,17 @@
 #include "protocol/socket_driver.hpp"
 #include "render/renderer.hpp"
 #include "scene/world.hpp"
+#include "server/recorder.hpp"
 #include "server/tick_statistics.hpp"
 
 namespace enfilade::server {
 
 class InProcessDriver : public protocol::ScriptDriver {
  public:
-  /// `renderer` may be null: captures then have no picture. Both outlive the driver, which is used
-  /// on the renderer's thread.
+  /// `renderer` may be null: captures then have no picture; so may `recorder`. All outlive the
+  /// driver, which is used on the renderer's thread.
   InProcessDriver(scene::World& world, render::Renderer* renderer,
-                  protocol::CaptureFormat format = {});
+                  protocol::CaptureFormat format = {}, Recorder* recorder = nullptr);
 
   double tickSeconds() const override;
   std::optional<v1::Error> submit(const v1::Command& command) override;
@@ -32,6 +33,7 @@ class InProcessDriver : public protocol::ScriptDriver {
   scene::World& world_;
   render::Renderer* renderer_;
   protocol::CaptureFormat format_;
+  Recorder* recorder_;
   TickStatistics statistics_;
   std::uint64_t frames_ = 0;
 };

@@ -9,6 +9,7 @@
 #include "server/command_line.hpp"
 #include "server/inspect.hpp"
 #include "server/serve.hpp"
+#include "server/verify.hpp"
 #include "server/walk_run.hpp"
 
 namespace enfilade::server {
@@ -17,6 +18,7 @@ namespace {
 struct Do {
   ExitCode operator()(const ServeCommand& command) const { return serve(command); }
   ExitCode operator()(const ReplayCommand& command) const { return replay(command); }
+  ExitCode operator()(const VerifyCommand& command) const { return verify(command); }
   ExitCode operator()(const CaptureCommand& command) const { return capture(command); }
   ExitCode operator()(const WalkCommand& command) const { return walk(command); }
   ExitCode operator()(const InspectCommand& command) const { return inspect(command); }

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "protocol/recording.hpp"
 #include "server/world_messages.hpp"
 
 namespace enfilade::server {
@@ -105,12 +106,6 @@ const char* wordOf(protocol::LineOutcome::Kind kind) {
       return "dropped";
   }
   return "unknown";
-}
-
-std::string hexOf(std::uint64_t value) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
-  return text;
 }
 
 void writeText(const std::filesystem::path& file, const std::string& text) {
@@ -326,11 +321,11 @@ std::string WalkReport::writeSummary(const WalkFacts& facts, const protocol::Scr
                {"contacts", begun_},
                {"worst_penetration", metrics.worst_penetration()},
                {"squeezed_bodies", metrics.squeezed_bodies()},
-               {"state_hash", hexOf(result.stateHash)},
+               {"state_hash", protocol::hexadecimal(result.stateHash)},
                {"time", result.time},
                {"wall_s", facts.wallSeconds},
                {"scene", facts.scene.source()},
-               {"scene_hash", hexOf(facts.scene.hash())},
+               {"scene_hash", protocol::hexadecimal(facts.scene.hash())},
                {"objects", facts.scene.objects()},
                {"script", facts.script},
                {"renderer", facts.renderer},

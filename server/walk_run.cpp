@@ -185,14 +185,18 @@ ExitCode replay(const ReplayCommand& command) {
         const std::unique_ptr<render::Renderer> renderer = rendererOf(scene);
         scene::World world(scene, command.lengths);
         scene::auditBroadPhase(world, command.auditEvery);
-        InProcessDriver driver(world, renderer.get(), captureFormat());
+        std::optional<Recorder> recorder;
+        if (!command.record.empty()) recorder.emplace(command.record, world, command.model);
+        InProcessDriver driver(world, renderer.get(), captureFormat(),
+                               recorder ? &*recorder : nullptr);
         WalkedWorld walked{driver,
                            [&](const v1::FrameRequest& request) { return driver.frame(request); },
                            [&] { return driver.metrics(); },
                            [&] { return driver.endContacts(); },
                            messageOf(*scene),
                            renderer ? renderer->deviceName() : std::string()};
-        return run(script, report, command.strict, std::move(walked));
+        const ExitCode code = run(script, report, command.strict, std::move(walked));
+        return recorder && recorder->close() ? ExitCode::runtimeError : code;
       },
       kNoMore);
 }

@@ -37,6 +37,7 @@ const std::map<std::string, Names> kRoomMayInclude{
     {"scene/avatars", {"scene"}},
     {"render/gl", {"render"}},
     {"render/pictures", {"render"}},
+    {"protocol/mcap", {}},
     // What is drawn and where is the same for both renderers.
     {"render/rays", {"render", "render/gl/avatar_mesh.hpp", "render/gl/draw_list.hpp"}},
     {"server/capture", {"server"}},
@@ -48,7 +49,7 @@ struct ThirdParty {
   Names folders;        ///< where it may be used
 };
 
-const std::array<ThirdParty, 17> kThirdParties{{
+const std::array<ThirdParty, 18> kThirdParties{{
     {"GMP", "gmp.*", {"collision"}},
     {"assimp", "assimp/.*", {"scene"}},
     {"ifcplusplus", "(ifcpp|carve)/.*", {"scene"}},
@@ -59,6 +60,7 @@ const std::array<ThirdParty, 17> kThirdParties{{
     {"libjpeg", "(jpeglib|turbojpeg).*", {"scene", "render"}},
     {"libzip", "zip.*", {"scene"}},
     {"xxHash", "xxh.*", {"scene"}},
+    {"zlib", "zlib.*", {"protocol"}},
     {"zstd", "zstd.*", {"protocol", "render", "server"}},
     {"Boost.Asio and Beast", "boost/(asio|beast|system).*", {"protocol", "server"}},
     {"other Boost", "boost/(?!asio|beast|system).*", {}},

@@ -1,0 +1,234 @@
+#include "protocol/mcap/reader.hpp"
+
+#include <zlib.h>
+#include <zstd.h>
+
+#include <algorithm>
+
+namespace enfilade::protocol::mcap {
+namespace {
+
+std::uint32_t crcOf(std::string_view bytes, std::uint32_t before = 0) {
+  return static_cast<std::uint32_t>(
+      crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+}  // namespace
+
+Reader::Reader(std::filesystem::path file) : file_(std::move(file)) {
+  std::error_code problem;
+  size_ = std::filesystem::file_size(file_, problem);
+  if (!problem) stream_.open(file_, std::ios::binary);
+  if (problem || !stream_)
+    throw RecordingError(file_.string() + ": cannot be read" +
+                         (problem ? ": " + problem.message() : std::string()));
+  std::string magic(kMagic.size(), '\0');
+  stream_.read(magic.data(), static_cast<std::streamsize>(magic.size()));
+  if (!stream_ || magic != kMagic) fail(0, "this is no MCAP file: it does not begin as one");
+  position_ = kMagic.size();
+  crc_ = crcOf(magic);
+  const auto header = readRecord();
+  if (!header || header->opcode != Opcode::header) fail(position_, "there is no header");
+  try {
+    Fields fields(header->content);
+    fields.string();  // the profile
+    library_ = fields.string();
+  } catch (const std::out_of_range& what) {
+    fail(header->start, what.what());
+  }
+  whole_ = position_;
+}
+
+void Reader::fail(std::uint64_t at, const std::string& what) const {
+  throw RecordingError(file_.string() + ": at byte " + std::to_string(at) + ": " + what);
+}
+
+/// nullopt when the file ends before the record does.
+std::optional<Reader::Record> Reader::readRecord() {
+  if (size_ - position_ < kRecordHead) return std::nullopt;
+  Record record{{}, position_, std::string(kRecordHead, '\0'), {}};
+  stream_.read(record.head.data(), static_cast<std::streamsize>(kRecordHead));
+  Fields fields(record.head);
+  record.opcode = static_cast<Opcode>(fields.number<std::uint8_t>());
+  const auto length = fields.number<std::uint64_t>();
+  if (length > 2 * kMostChunkBytes)
+    fail(position_, "a record claims " + std::to_string(length) + " bytes");
+  if (length > size_ - position_ - kRecordHead) return std::nullopt;
+  record.content.resize(length);
+  stream_.read(record.content.data(), static_cast<std::streamsize>(length));
+  if (!stream_) fail(position_, "the file cannot be read on");
+  position_ += kRecordHead + length;
+  // The CRC of the data section covers all that comes before the record that holds it.
+  if (record.opcode != Opcode::dataEnd) crc_ = crcOf(record.content, crcOf(record.head, crc_));
+  return record;
+}
+
+void Reader::readDefinition(Opcode opcode, std::string_view content) {
+  Fields fields(content);
+  const auto number = fields.number<std::uint16_t>();
+  if (opcode == Opcode::schema) {
+    schemas_[number] = fields.string();
+    return;
+  }
+  Channel channel;
+  const auto schema = fields.number<std::uint16_t>();
+  channel.topic = fields.string();
+  channel.messageEncoding = fields.string();
+  if (!schemas_.contains(schema)) throw std::out_of_range("a channel has no schema");
+  channel.schemaName = schemas_.at(schema);
+  channels_[number] = std::move(channel);
+}
+
+Message Reader::messageFrom(std::string_view content) const {
+  Fields fields(content);
+  const auto found = channels_.find(fields.number<std::uint16_t>());
+  if (found == channels_.end()) throw std::out_of_range("a message belongs to no channel");
+  Message message;
+  message.channel = &found->second;
+  message.sequence = fields.number<std::uint32_t>();
+  message.time = fields.number<std::uint64_t>();
+  fields.number<std::uint64_t>();  // when it was published
+  message.data = fields.rest();
+  return message;
+}
+
+/// Unpacks it, checks it against its CRC and its head, and notes what its indexes must say.
+void Reader::openChunk(const Record& record) {
+  Fields fields(record.content);
+  const auto first = fields.number<std::uint64_t>(), last = fields.number<std::uint64_t>();
+  const auto unpacked = fields.number<std::uint64_t>();
+  const auto crc = fields.number<std::uint32_t>();
+  const std::string_view packing = fields.string();
+  const std::string_view packed = fields.take(fields.number<std::uint64_t>());
+  if (!fields.empty()) fail(record.start, "a chunk is longer than what is in it");
+  if (unpacked > kMostChunkBytes) fail(record.start, "a chunk claims too many bytes");
+  if (packing == "zstd") {
+    chunk_.resize(unpacked);
+    const std::size_t size =
+        ZSTD_decompress(chunk_.data(), chunk_.size(), packed.data(), packed.size());
+    if (ZSTD_isError(size) || size != unpacked) fail(record.start, "a chunk cannot be unpacked");
+  } else if (packing.empty()) {
+    chunk_ = packed;
+  } else {
+    fail(record.start, "a chunk is packed by '" + std::string(packing) + "', not by zstd");
+  }
+  if (chunk_.size() != unpacked || crcOf(chunk_) != crc)
+    fail(record.start, "a chunk is not as it was written (its CRC differs)");
+  chunkStart_ = record.start;
+  inChunk_ = 0;
+
+  std::map<std::uint16_t, std::string> index;
+  std::uint64_t earliest = ~std::uint64_t{0}, latest = 0;
+  Fields records(chunk_);
+  while (!records.empty()) {
+    const std::uint64_t offset = chunk_.size() - Fields(records).rest().size();
+    const auto opcode = static_cast<Opcode>(records.number<std::uint8_t>());
+    const std::string_view content = records.take(records.number<std::uint64_t>());
+    if (opcode == Opcode::schema || opcode == Opcode::channel) readDefinition(opcode, content);
+    if (opcode != Opcode::message) continue;
+    const Message message = messageFrom(content);
+    earliest = std::min(earliest, message.time);
+    latest = std::max(latest, message.time);
+    std::string& entries = index[Fields(content).number<std::uint16_t>()];
+    putNumber(entries, message.time);
+    putNumber(entries, offset);
+  }
+  if (!index.empty() && (earliest != first || latest != last))
+    fail(record.start, "a chunk's times are not those of its messages");
+  expected_.clear();
+  for (const auto& [channel, entries] : index) {
+    std::string content;
+    putNumber(content, channel);
+    putString(content, entries);
+    expected_.push_back({channel, std::move(content)});
+  }
+}
+
+void Reader::checkIndex(const Record& record) {
+  if (expected_.empty() || expected_.front().index != record.content)
+    fail(record.start, "an index is not that of its chunk");
+  expected_.erase(expected_.begin());
+  if (expected_.empty()) whole_ = position_;
+}
+
+/// From the end of the data to the end of the file.
+void Reader::readSummary(const Record& dataEnd) {
+  if (Fields(dataEnd.content).number<std::uint32_t>() != crc_)
+    fail(dataEnd.start, "the data are not as they were written (their CRC differs)");
+  const std::uint64_t start = position_;
+  std::uint32_t crc = 0;
+  for (;;) {
+    const auto record = readRecord();
+    if (!record) return;  // cut off in the summary: the data are whole
+    if (record->opcode == Opcode::statistics &&
+        Fields(record->content).number<std::uint64_t>() != messages_)
+      fail(record->start, "the summary counts other messages than there are");
+    if (record->opcode != Opcode::footer) {
+      crc = crcOf(record->content, crcOf(record->head, crc));
+      continue;
+    }
+    Fields fields(record->content);
+    const std::string_view offsets = fields.take(16);
+    crc = crcOf(offsets, crcOf(record->head, crc));
+    if (Fields(offsets).number<std::uint64_t>() != start || fields.number<std::uint32_t>() != crc)
+      fail(record->start, "the summary is not as it was written (its CRC differs)");
+    std::string magic(kMagic.size(), '\0');
+    stream_.read(magic.data(), static_cast<std::streamsize>(magic.size()));
+    if (!stream_ || magic != kMagic || size_ != position_ + kMagic.size())
+      fail(position_, "the file does not end as an MCAP file");
+    whole_ = size_;
+    closed_ = true;
+    return;
+  }
+}
+
+/// Opens the next chunk; false at the end of the data.
+bool Reader::readMore() {
+  for (;;) {
+    const auto record = readRecord();
+    if (!record) return false;
+    if (!expected_.empty() && record->opcode != Opcode::messageIndex)
+      fail(record->start, "a chunk's index is missing");
+    switch (record->opcode) {
+      case Opcode::chunk:
+        openChunk(*record);
+        if (expected_.empty()) whole_ = position_;
+        return true;
+      case Opcode::messageIndex:
+        checkIndex(*record);
+        break;
+      case Opcode::dataEnd:
+        whole_ = position_;
+        readSummary(*record);
+        return false;
+      default:
+        fail(record->start, "an unknown record stands between the chunks");
+    }
+  }
+}
+
+std::optional<Message> Reader::next() {
+  try {
+    while (!ended_) {
+      while (inChunk_ < chunk_.size()) {
+        Fields fields(std::string_view(chunk_).substr(inChunk_));
+        const auto opcode = static_cast<Opcode>(fields.number<std::uint8_t>());
+        const std::string_view content = fields.take(fields.number<std::uint64_t>());
+        inChunk_ += kRecordHead + content.size();
+        if (opcode != Opcode::message) continue;
+        ++messages_;
+        return messageFrom(content);
+      }
+      ended_ = !readMore();
+    }
+  } catch (const std::out_of_range& what) {
+    ended_ = true;
+    fail(position_, what.what());
+  } catch (const RecordingError&) {
+    ended_ = true;
+    throw;
+  }
+  return std::nullopt;
+}
+
+}  // namespace enfilade::protocol::mcap

@@ -1,0 +1,235 @@
+#include "protocol/mcap/writer.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+#include <zlib.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+namespace enfilade::protocol::mcap {
+namespace {
+
+constexpr int kLevel = 1;  // of zstd: the tick waits for it
+
+std::uint32_t crcOf(std::string_view bytes, std::uint32_t before = 0) {
+  return static_cast<std::uint32_t>(
+      crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+template <class Map, class Put>
+std::string listOf(const Map& entries, const Put& put) {
+  std::string bytes;
+  for (const auto& entry : entries) put(bytes, entry);
+  std::string list;
+  putString(list, bytes);
+  return list;
+}
+
+}  // namespace
+
+Writer::Writer(std::filesystem::path file, WriterOptions options)
+    : file_(std::move(file)), options_(std::move(options)), sequences_(1), counts_(1) {
+  descriptor_ = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (descriptor_ < 0)
+    throw RecordingError(file_.string() + ": cannot be written: " + std::strerror(errno));
+  open_ = true;
+  std::string head(kMagic), header;
+  putString(header, "");  // no profile: every message brings its schema
+  putString(header, options_.library);
+  putRecord(head, Opcode::header, header);
+  append(head);
+}
+
+Writer::~Writer() {
+  try {
+    close();
+  } catch (const RecordingError&) {
+    // Who wants to know calls close().
+  }
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+/// All of it or, when the disk is full, nothing.
+void Writer::append(std::string_view bytes) {
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t wrote = ::write(descriptor_, bytes.data() + done, bytes.size() - done);
+    if (wrote < 0 && errno == EINTR) continue;
+    if (wrote <= 0) {
+      const int why = wrote < 0 ? errno : ENOSPC;
+      open_ = false;
+      const bool cut = ::ftruncate(descriptor_, static_cast<off_t>(position_)) == 0;
+      throw RecordingError(file_.string() + ": " + std::strerror(why) + "; it ends at byte " +
+                           std::to_string(position_) +
+                           (cut ? "" : ", with a torn record after it") +
+                           ", and what was written until then can be read");
+    }
+    done += static_cast<std::size_t>(wrote);
+  }
+  position_ += bytes.size();
+  dataCrc_ = crcOf(bytes, dataCrc_);
+}
+
+std::uint16_t Writer::addChannel(const ChannelSpec& spec) {
+  std::string records;
+  std::uint16_t& schema = schemas_[spec.schemaName];
+  if (schema == 0) {
+    schema = static_cast<std::uint16_t>(schemas_.size());
+    std::string content;
+    putNumber(content, schema);
+    putString(content, spec.schemaName);
+    putString(content, spec.schemaEncoding);
+    putString(content, spec.schema);
+    putRecord(records, Opcode::schema, content);
+  }
+  const auto channel = static_cast<std::uint16_t>(counts_.size());
+  std::string content;
+  putNumber(content, channel);
+  putNumber(content, schema);
+  putString(content, spec.topic);
+  putString(content, spec.messageEncoding);
+  putString(content, {});  // no metadata
+  putRecord(records, Opcode::channel, content);
+  sequences_.push_back(0);
+  counts_.push_back(0);
+  definitions_ += records;
+  chunk_ += records;
+  return channel;
+}
+
+void Writer::write(std::uint16_t channel, std::uint64_t time, std::string_view message) {
+  if (!open_) return;
+  const auto now = std::chrono::steady_clock::now();
+  if (index_.empty()) {
+    firstTime_ = lastTime_ = time;
+    chunkBegan_ = now;
+  }
+  firstTime_ = std::min(firstTime_, time);
+  lastTime_ = std::max(lastTime_, time);
+  index_[channel].push_back({time, chunk_.size()});
+  putNumber(chunk_, static_cast<std::uint8_t>(Opcode::message));
+  putNumber(chunk_, std::uint64_t{22} + message.size());
+  putNumber(chunk_, channel);
+  putNumber(chunk_, ++sequences_[channel]);
+  putNumber(chunk_, time);
+  putNumber(chunk_, time);  // published when it was logged
+  chunk_.append(message);
+  ++counts_[channel];
+  if (chunk_.size() >= options_.chunkBytes || now - chunkBegan_ >= options_.chunkAge) flush();
+}
+
+/// The chunk's record; `place` gets its sizes.
+std::string Writer::packedChunk(ChunkPlace& place) const {
+  std::string packed(ZSTD_compressBound(chunk_.size()), '\0');
+  const std::size_t size =
+      ZSTD_compress(packed.data(), packed.size(), chunk_.data(), chunk_.size(), kLevel);
+  if (ZSTD_isError(size)) throw RecordingError(file_.string() + ": " + ZSTD_getErrorName(size));
+  packed.resize(size);
+  std::string content;
+  putNumber(content, place.firstTime);
+  putNumber(content, place.lastTime);
+  putNumber(content, static_cast<std::uint64_t>(chunk_.size()));
+  putNumber(content, crcOf(chunk_));
+  putString(content, "zstd");
+  putNumber(content, static_cast<std::uint64_t>(packed.size()));
+  content += packed;
+  place.packed = packed.size();
+  place.unpacked = chunk_.size();
+  std::string record;
+  putRecord(record, Opcode::chunk, content);
+  place.length = record.size();
+  return record;
+}
+
+void Writer::flush() {
+  if (!open_ || chunk_.empty()) return;
+  ChunkPlace place;
+  place.firstTime = firstTime_;
+  place.lastTime = lastTime_;
+  place.start = position_;
+  std::string bytes = packedChunk(place);
+  for (const auto& [channel, entries] : index_) {
+    place.indexOffsets[channel] = position_ + bytes.size();
+    std::string content;
+    putNumber(content, channel);
+    content += listOf(entries, [](std::string& into, const Entry& entry) {
+      putNumber(into, entry.time);
+      putNumber(into, entry.offset);
+    });
+    putRecord(bytes, Opcode::messageIndex, content);
+  }
+  place.indexLength = bytes.size() - place.length;
+  append(bytes);
+  chunks_.push_back(std::move(place));
+  chunk_.clear();
+  index_.clear();
+}
+
+/// Schemas, channels, statistics and the chunks' places.
+std::string Writer::summary() const {
+  std::string records = definitions_;
+  std::uint64_t messages = 0;
+  for (const std::uint64_t count : counts_) messages += count;
+  std::uint64_t first = 0, last = 0;
+  for (const ChunkPlace& chunk : chunks_) {
+    first = &chunk == &chunks_.front() ? chunk.firstTime : std::min(first, chunk.firstTime);
+    last = std::max(last, chunk.lastTime);
+  }
+  std::string content;
+  putNumber(content, messages);
+  putNumber(content, static_cast<std::uint16_t>(schemas_.size()));
+  putNumber(content, static_cast<std::uint32_t>(counts_.size() - 1));
+  putNumber(content, std::uint32_t{0});  // attachments
+  putNumber(content, std::uint32_t{0});  // metadata
+  putNumber(content, static_cast<std::uint32_t>(chunks_.size()));
+  putNumber(content, first);
+  putNumber(content, last);
+  std::string perChannel;
+  for (std::size_t channel = 1; channel < counts_.size(); ++channel) {
+    putNumber(perChannel, static_cast<std::uint16_t>(channel));
+    putNumber(perChannel, counts_[channel]);
+  }
+  putString(content, perChannel);
+  putRecord(records, Opcode::statistics, content);
+  for (const ChunkPlace& chunk : chunks_) {
+    content.clear();
+    for (const std::uint64_t number : {chunk.firstTime, chunk.lastTime, chunk.start, chunk.length})
+      putNumber(content, number);
+    content += listOf(chunk.indexOffsets, [](std::string& into, const auto& offset) {
+      putNumber(into, offset.first);
+      putNumber(into, offset.second);
+    });
+    putNumber(content, chunk.indexLength);
+    putString(content, "zstd");
+    putNumber(content, chunk.packed);
+    putNumber(content, chunk.unpacked);
+    putRecord(records, Opcode::chunkIndex, content);
+  }
+  return records;
+}
+
+void Writer::close() {
+  if (!open_) return;
+  flush();
+  std::string content;
+  putNumber(content, dataCrc_);
+  std::string bytes;
+  putRecord(bytes, Opcode::dataEnd, content);
+  const std::uint64_t summaryStart = position_ + bytes.size();
+  std::string checked = summary();
+  // The footer's own head and its two offsets are under the summary's CRC too.
+  putNumber(checked, static_cast<std::uint8_t>(Opcode::footer));
+  putNumber(checked, std::uint64_t{20});
+  putNumber(checked, summaryStart);
+  putNumber(checked, std::uint64_t{0});  // no offsets of groups
+  bytes += checked;
+  putNumber(bytes, crcOf(checked));
+  bytes += kMagic;
+  append(bytes);
+  open_ = false;
+}
+
+}  // namespace enfilade::protocol::mcap

@@ -1,0 +1,179 @@
+#include "protocol/recording.hpp"
+
+#include <google/protobuf/descriptor.pb.h>
+#include <google/protobuf/text_format.h>
+#include <google/protobuf/util/message_differencer.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace enfilade::protocol {
+namespace {
+
+namespace pb = google::protobuf;
+
+constexpr const char* kStart = "/enfilade/start";
+constexpr const char* kCommands = "/enfilade/commands";
+constexpr const char* kEvents = "/enfilade/events";
+constexpr const char* kState = "/enfilade/state";
+
+void addWithImports(const pb::FileDescriptor& file, pb::FileDescriptorSet& set,
+                    std::set<std::string>& known) {
+  if (!known.insert(file.name()).second) return;
+  for (int i = 0; i < file.dependency_count(); ++i) addWithImports(*file.dependency(i), set, known);
+  file.CopyTo(set.add_file());
+}
+
+mcap::ChannelSpec channelOf(const char* topic, const pb::Descriptor& message) {
+  pb::FileDescriptorSet set;
+  std::set<std::string> known;
+  addWithImports(*message.file(), set, known);
+  return {topic, "protobuf", message.full_name(), "protobuf", set.SerializeAsString()};
+}
+
+std::uint64_t nanoseconds(double seconds) {
+  return static_cast<std::uint64_t>(std::llround(seconds * 1e9));
+}
+
+template <class Message>
+RecordedItem parsed(const mcap::Message& from, const std::filesystem::path& file) {
+  Message message;
+  if (!message.ParseFromArray(from.data.data(), static_cast<int>(from.data.size())))
+    throw mcap::RecordingError(file.string() + ": a message of " + from.channel->topic +
+                               " cannot be read");
+  return message;
+}
+
+/// The first field that differs, and its values.
+class FirstField : public pb::util::MessageDifferencer::Reporter {
+ public:
+  void ReportAdded(const pb::Message& /*recorded*/, const pb::Message& replayed,
+                   const std::vector<pb::util::MessageDifferencer::SpecificField>& path) override {
+    tell(path, "nothing", valueOf(replayed, path, true));
+  }
+  void ReportDeleted(
+      const pb::Message& recorded, const pb::Message& /*replayed*/,
+      const std::vector<pb::util::MessageDifferencer::SpecificField>& path) override {
+    tell(path, valueOf(recorded, path, false), "nothing");
+  }
+  void ReportModified(
+      const pb::Message& recorded, const pb::Message& replayed,
+      const std::vector<pb::util::MessageDifferencer::SpecificField>& path) override {
+    tell(path, valueOf(recorded, path, false), valueOf(replayed, path, true));
+  }
+  std::optional<StateDifference> found;
+
+ private:
+  using Path = std::vector<pb::util::MessageDifferencer::SpecificField>;
+
+  void tell(const Path& path, std::string recorded, std::string replayed) {
+    if (found) return;
+    std::string field;
+    for (const auto& step : path) {
+      if (!step.field) continue;
+      field += (field.empty() ? "" : ".") + step.field->name();
+      if (step.index >= 0) field += "[" + std::to_string(step.index) + "]";
+    }
+    found = {"", field, std::move(recorded), std::move(replayed)};
+  }
+  /// `message` is the one that the path's last step is a field of.
+  static std::string valueOf(const pb::Message& message, const Path& path, bool second) {
+    const auto& last = path.back();
+    pb::TextFormat::Printer printer;
+    printer.SetSingleLineMode(true);
+    std::string text;
+    const int index = second ? last.new_index : last.index;
+    printer.PrintFieldValueToString(message, last.field, last.field->is_repeated() ? index : -1,
+                                    &text);
+    return text;
+  }
+};
+
+std::optional<StateDifference> differenceOf(const std::string& who, const pb::Message& recorded,
+                                            const pb::Message& replayed) {
+  FirstField first;
+  pb::util::MessageDifferencer differencer;
+  differencer.ReportDifferencesTo(&first);
+  differencer.Compare(recorded, replayed);
+  if (first.found) first.found->who = who;
+  return first.found;
+}
+
+/// Of two lists in the same order, the first that is not in both or differs.
+template <class States>
+std::optional<StateDifference> listDifference(const States& recorded, const States& replayed) {
+  for (int i = 0; i < std::max(recorded.size(), replayed.size()); ++i) {
+    const bool inFirst = i < recorded.size(), inSecond = i < replayed.size();
+    if (inFirst && inSecond && recorded[i].name() == replayed[i].name()) {
+      if (auto found = differenceOf(recorded[i].name(), recorded[i], replayed[i])) return found;
+      continue;
+    }
+    return StateDifference{inFirst ? recorded[i].name() : replayed[i].name(), "presence",
+                           inFirst ? recorded[i].name() : "nobody",
+                           inSecond ? replayed[i].name() : "nobody"};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::string hexadecimal(std::uint64_t hash) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string text;
+  for (int shift = 60; shift >= 0; shift -= 4) text.push_back(kDigits[(hash >> shift) & 15]);
+  return text;
+}
+
+RecordingWriter::RecordingWriter(const std::filesystem::path& file, const std::string& library)
+    : file_(file, {library}),
+      start_(file_.addChannel(channelOf(kStart, *v1::RecordingStart::descriptor()))),
+      commands_(file_.addChannel(channelOf(kCommands, *v1::RecordedCommands::descriptor()))),
+      events_(file_.addChannel(channelOf(kEvents, *v1::TickEvents::descriptor()))),
+      state_(file_.addChannel(channelOf(kState, *v1::State::descriptor()))) {}
+
+void RecordingWriter::write(std::uint16_t channel, double time, const pb::MessageLite& message) {
+  message.SerializeToString(&bytes_);
+  file_.write(channel, nanoseconds(time), bytes_);
+}
+
+void RecordingWriter::write(const v1::RecordingStart& start) {
+  write(start_, 0, start);
+  file_.flush();  // a recording that cannot be begun again is worth nothing
+}
+
+void RecordingWriter::write(const v1::RecordedCommands& commands, double time) {
+  write(commands_, time, commands);
+}
+
+void RecordingWriter::write(const v1::TickEvents& events) {
+  write(events_, events.time(), events);
+}
+
+void RecordingWriter::write(const v1::State& state) {
+  write(state_, state.time(), state);
+}
+
+RecordingReader::RecordingReader(const std::filesystem::path& file) : path_(file), file_(file) {}
+
+std::optional<RecordedItem> RecordingReader::next() {
+  while (const auto message = file_.next()) {
+    const std::string& topic = message->channel->topic;
+    if (topic == kStart) return parsed<v1::RecordingStart>(*message, path_);
+    if (topic == kCommands) return parsed<v1::RecordedCommands>(*message, path_);
+    if (topic == kEvents) return parsed<v1::TickEvents>(*message, path_);
+    if (topic == kState) return parsed<v1::State>(*message, path_);
+  }
+  return std::nullopt;
+}
+
+std::optional<StateDifference> firstDifference(const v1::State& recorded,
+                                               const v1::State& replayed) {
+  if (auto found = listDifference(recorded.avatars(), replayed.avatars())) return found;
+  if (auto found = listDifference(recorded.bodies(), replayed.bodies())) return found;
+  if (recorded.hash() == replayed.hash()) return std::nullopt;
+  return StateDifference{"the world", "state hash", hexadecimal(recorded.hash()),
+                         hexadecimal(replayed.hash())};
+}
+
+}  // namespace enfilade::protocol

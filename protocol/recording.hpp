@@ -1,0 +1,67 @@
+// A recording: what a world was told and what became of it, tick by tick, as MCAP (RECORDING.md).
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "protocol/mcap/reader.hpp"
+#include "protocol/mcap/writer.hpp"
+#include "protocol/recording.pb.h"
+
+namespace enfilade::protocol {
+
+/// All functions throw mcap::RecordingError.
+class RecordingWriter {
+ public:
+  /// `library`: who writes, name and version.
+  RecordingWriter(const std::filesystem::path& file, const std::string& library);
+
+  void write(const v1::RecordingStart& start);
+  void write(const v1::RecordedCommands& commands, double time);
+  void write(const v1::TickEvents& events);
+  void write(const v1::State& state);
+  void close() { file_.close(); }
+  std::uint64_t bytesWritten() const { return file_.bytesWritten(); }
+
+ private:
+  void write(std::uint16_t channel, double time, const google::protobuf::MessageLite& message);
+
+  mcap::Writer file_;
+  std::string bytes_;  // kept, so that a tick allocates nothing
+  std::uint16_t start_, commands_, events_, state_;
+};
+
+using RecordedItem =
+    std::variant<v1::RecordingStart, v1::RecordedCommands, v1::TickEvents, v1::State>;
+
+class RecordingReader {
+ public:
+  explicit RecordingReader(const std::filesystem::path& file);
+
+  /// In the order in which it happened; what other programs may have added is left out.
+  std::optional<RecordedItem> next();
+  /// As mcap::Reader has them.
+  bool closed() const { return file_.closed(); }
+  std::uint64_t wholeBytes() const { return file_.wholeBytes(); }
+
+ private:
+  std::filesystem::path path_;
+  mcap::Reader file_;
+};
+
+/// 16 digits, as hashes are written everywhere.
+std::string hexadecimal(std::uint64_t hash);
+
+/// Where two states of the same tick differ first.
+struct StateDifference {
+  std::string who;    ///< an avatar's or a body's name; "the world"
+  std::string field;  ///< as "feet.x"; "state hash" where only that differs
+  std::string recorded, replayed;
+};
+/// nullopt when they are equal to the last bit.
+std::optional<StateDifference> firstDifference(const v1::State& recorded,
+                                               const v1::State& replayed);
+
+}  // namespace enfilade::protocol

@@ -1,0 +1,146 @@
+#include "server/recorder.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <array>
+#include <utility>
+
+#include "server/body_messages.hpp"
+#include "server/version.hpp"
+#include "server/world_messages.hpp"
+
+namespace enfilade::server {
+namespace {
+
+using protocol::mcap::RecordingError;
+
+constexpr std::array<std::pair<scene::IfcReader, const char*>, 4> kReaders{
+    {{scene::IfcReader::automatic, "auto"},
+     {scene::IfcReader::webIfc, "web-ifc"},
+     {scene::IfcReader::ifcPlusPlus, "ifcplusplus"},
+     {scene::IfcReader::assimp, "assimp"}}};
+
+v1::RecordingStart startOf(const scene::World& world, const ModelOptions& model) {
+  v1::RecordingStart start;
+  start.set_server_version(kServerVersion);
+  start.set_scene_file(std::filesystem::absolute(model.file).string());
+  *start.mutable_scene() = messageOf(world.scene());
+  *start.mutable_choices() = messageOf(model);
+  *start.mutable_lengths() = exactMessageOf(world.lengths());
+  start.set_state_hash(world.snapshot()->stateHash);
+  return start;
+}
+
+}  // namespace
+
+Recorder::Recorder(const std::filesystem::path& file, const scene::World& world,
+                   const ModelOptions& model)
+    : file_(file, std::string("enfilade ") + kServerVersion) {
+  file_.write(startOf(world, model));
+}
+
+void Recorder::took(const v1::Command& command) {
+  *commands_.add_commands()->mutable_avatar() = command;
+}
+
+void Recorder::took(const v1::BodyCommand& command) {
+  *commands_.add_commands()->mutable_body() = command;
+}
+
+template <class Work>
+void Recorder::unlessBroken(const Work& work) {
+  if (broken_) return;
+  try {
+    work();
+  } catch (const RecordingError& error) {
+    broken_ = error.what();
+    spdlog::error("the recording ends: {}", error.what());
+  }
+}
+
+void Recorder::ticked(const scene::World& world, const v1::TickEvents& events) {
+  unlessBroken([&] {
+    fill(state_, world);
+    if (!commands_.commands().empty()) {
+      commands_.set_tick(state_.tick());
+      file_.write(commands_, state_.time());
+    }
+    if (!events.contacts().empty() || !events.notices().empty()) file_.write(events);
+    file_.write(state_);
+  });
+  commands_.clear_commands();
+}
+
+std::optional<std::string> Recorder::close() {
+  unlessBroken([&] { file_.close(); });
+  return broken_;
+}
+
+void fill(v1::State& state, const scene::World& world) {
+  const scene::Snapshot& snapshot = *world.snapshot();
+  state.Clear();
+  state.set_tick(snapshot.tick);
+  state.set_time(snapshot.time);
+  state.set_hash(snapshot.stateHash);
+  for (const scene::AvatarView& avatar : snapshot.avatars)
+    *state.add_avatars() = messageOf(world, avatar);
+  for (const scene::BodyView& body : *snapshot.bodies)
+    if (body.displaced || body.moving) *state.add_bodies() = messageOf(world, body);
+}
+
+v1::Lengths exactMessageOf(const scene::Lengths& lengths) {
+  v1::Lengths message;
+  message.set_epsilon(lengths.epsilon);
+  message.set_step_height(lengths.stepHeight);
+  message.set_near_miss(lengths.nearMiss);
+  message.set_walkable_normal_y(lengths.walkableNormalY);
+  message.set_gravity(lengths.gravity);
+  message.set_speed_limit(lengths.speedLimit);
+  message.set_push_force(lengths.pushForce);
+  message.set_tick(lengths.tick);
+  message.set_patience(lengths.patience);
+  message.set_jump_limit(lengths.jumpLimit);
+  message.set_joint_speed_limit(lengths.jointSpeedLimit);
+  message.set_sliding(lengths.sliding == scene::Sliding::stop ? "stop" : "slide");
+  return message;
+}
+
+std::optional<scene::Lengths> lengthsFrom(const v1::Lengths& message) {
+  scene::Lengths lengths;
+  lengths.epsilon = message.epsilon();
+  lengths.stepHeight = message.step_height();
+  lengths.nearMiss = message.near_miss();
+  lengths.walkableNormalY = message.walkable_normal_y();
+  lengths.gravity = message.gravity();
+  lengths.speedLimit = message.speed_limit();
+  lengths.pushForce = message.push_force();
+  lengths.tick = message.tick();
+  lengths.patience = message.patience();
+  lengths.jumpLimit = message.jump_limit();
+  lengths.jointSpeedLimit = message.joint_speed_limit();
+  lengths.sliding = message.sliding() == "stop" ? scene::Sliding::stop : scene::Sliding::slide;
+  if (scene::lengthsProblem(lengths)) return std::nullopt;
+  return lengths;
+}
+
+v1::ModelChoices messageOf(const ModelOptions& model) {
+  v1::ModelChoices message;
+  if (model.metresPerUnit) message.set_metres_per_unit(*model.metresPerUnit);
+  if (model.up) message.set_up(std::string(1, *model.up));
+  for (const auto& [reader, name] : kReaders)
+    if (reader == model.ifcReader) message.set_ifc_reader(name);
+  message.set_ifc_doors(model.doors == scene::IfcDoors::still ? "still" : "move");
+  return message;
+}
+
+ModelOptions modelOptionsFrom(const v1::ModelChoices& message) {
+  ModelOptions model;
+  if (message.has_metres_per_unit()) model.metresPerUnit = message.metres_per_unit();
+  if (!message.up().empty()) model.up = message.up().front();
+  model.ifcReader =
+      scene::ifcReaderFrom(message.ifc_reader()).value_or(scene::IfcReader::automatic);
+  model.doors = message.ifc_doors() == "still" ? scene::IfcDoors::still : scene::IfcDoors::move;
+  return model;
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,94 @@
+// Recordings of a world: the messages, and where two states differ.
+#include "protocol/recording.hpp"
+
+#include <gtest/gtest.h>
+
+namespace enfilade::protocol {
+namespace {
+
+v1::State stateOf(std::uint64_t tick) {
+  v1::State state;
+  state.set_tick(tick);
+  state.set_time(static_cast<double>(tick) / 60);
+  state.set_hash(0x1234);
+  v1::AvatarState& ann = *state.add_avatars();
+  ann.set_name("ann");
+  ann.mutable_feet()->set_x(1.5);
+  v1::BodyState& door = *state.add_bodies();
+  door.set_name("door");
+  door.set_coordinate(0.25);
+  return state;
+}
+
+TEST(Recording, GivesBackItsMessagesInOrder) {
+  const auto file = std::filesystem::path(testing::TempDir()) / "enfilade_messages.mcap";
+  v1::RecordingStart start;
+  start.set_scene_file("/models/house.glb");
+  v1::RecordedCommands commands;
+  commands.set_tick(1);
+  commands.add_commands()->mutable_avatar()->set_avatar("ann");
+  v1::TickEvents events;
+  events.set_tick(1);
+  {
+    RecordingWriter writer(file, "recording_test");
+    writer.write(start);
+    writer.write(commands, 0);
+    writer.write(events);
+    writer.write(stateOf(1));
+    writer.close();
+  }
+  RecordingReader reader(file);
+  const auto bytesOf = [](const RecordedItem& item) {
+    return std::visit([](const auto& message) { return message.SerializeAsString(); }, item);
+  };
+  std::vector<std::string> read;
+  while (const auto item = reader.next())
+    read.push_back(std::to_string(item->index()) + bytesOf(*item));
+  EXPECT_EQ(read, (std::vector<std::string>{
+                      "0" + start.SerializeAsString(), "1" + commands.SerializeAsString(),
+                      "2" + events.SerializeAsString(), "3" + stateOf(1).SerializeAsString()}));
+  EXPECT_TRUE(reader.closed());
+}
+
+TEST(Recording, EqualStatesDoNotDiffer) {
+  EXPECT_FALSE(firstDifference(stateOf(3), stateOf(3)));
+}
+
+TEST(Recording, ADifferenceNamesWhoWhichFieldAndBothValues) {
+  v1::State other = stateOf(3);
+  other.mutable_avatars(0)->mutable_feet()->set_x(1.5000000000000002);
+  other.mutable_bodies(0)->set_coordinate(0.5);
+  auto found = firstDifference(stateOf(3), other);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->who, "ann");
+  EXPECT_EQ(found->field, "feet.x");
+  EXPECT_EQ(found->recorded, "1.5");
+  EXPECT_EQ(found->replayed, "1.5000000000000002");
+  other.mutable_avatars(0)->mutable_feet()->set_x(1.5);
+  found = firstDifference(stateOf(3), other);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->who + " " + found->field + " " + found->recorded + " " + found->replayed,
+            "door coordinate 0.25 0.5");
+}
+
+TEST(Recording, WhoIsMissingIsNamed) {
+  v1::State other = stateOf(3);
+  other.clear_avatars();
+  const auto found = firstDifference(stateOf(3), other);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->who, "ann");
+  EXPECT_EQ(found->replayed, "nobody");
+}
+
+TEST(Recording, WhatOnlyTheHashKnowsIsADifferenceToo) {
+  v1::State other = stateOf(3);
+  other.set_hash(0x1235);
+  const auto found = firstDifference(stateOf(3), other);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->field, "state hash");
+  EXPECT_EQ(found->recorded, "0000000000001234");
+  EXPECT_EQ(found->replayed, "0000000000001235");
+}
+
+}  // namespace
+}  // namespace enfilade::protocol
