@@ -19,7 +19,7 @@ v1::TickEvents eventsOf(const protocol::StepOutcome& outcome) {
 }  // namespace
 
 InProcessDriver::InProcessDriver(scene::World& world, render::Renderer* renderer,
-                                 protocol::CaptureFormat format, Recorder* recorder)
+                                 protocol::CaptureFormat format, WorldRecorder* recorder)
     : world_(world), renderer_(renderer), format_(std::move(format)), recorder_(recorder) {}
 
 double InProcessDriver::tickSeconds() const {

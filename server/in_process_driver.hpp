@@ -4,8 +4,8 @@
 #include "protocol/socket_driver.hpp"
 #include "render/renderer.hpp"
 #include "scene/world.hpp"
-#include "server/recorder.hpp"
 #include "server/tick_statistics.hpp"
+#include "server/world_recorder.hpp"
 
 namespace enfilade::server {
 
@@ -14,7 +14,7 @@ class InProcessDriver : public protocol::ScriptDriver {
   /// `renderer` may be null: captures then have no picture; so may `recorder`. All outlive the
   /// driver, which is used on the renderer's thread.
   InProcessDriver(scene::World& world, render::Renderer* renderer,
-                  protocol::CaptureFormat format = {}, Recorder* recorder = nullptr);
+                  protocol::CaptureFormat format = {}, WorldRecorder* recorder = nullptr);
 
   double tickSeconds() const override;
   std::optional<v1::Error> submit(const v1::Command& command) override;
@@ -33,7 +33,7 @@ class InProcessDriver : public protocol::ScriptDriver {
   scene::World& world_;
   render::Renderer* renderer_;
   protocol::CaptureFormat format_;
-  Recorder* recorder_;
+  WorldRecorder* recorder_;
   TickStatistics statistics_;
   std::uint64_t frames_ = 0;
 };

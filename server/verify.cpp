@@ -8,9 +8,9 @@
 #include "protocol/recording.hpp"
 #include "server/body_messages.hpp"
 #include "server/load_scene.hpp"
-#include "server/recorder.hpp"
 #include "server/tick_statistics.hpp"
 #include "server/world_messages.hpp"
+#include "server/world_recorder.hpp"
 
 namespace enfilade::server {
 namespace {

@@ -185,7 +185,7 @@ ExitCode replay(const ReplayCommand& command) {
         const std::unique_ptr<render::Renderer> renderer = rendererOf(scene);
         scene::World world(scene, command.lengths);
         scene::auditBroadPhase(world, command.auditEvery);
-        std::optional<Recorder> recorder;
+        std::optional<WorldRecorder> recorder;
         if (!command.record.empty()) recorder.emplace(command.record, world, command.model);
         InProcessDriver driver(world, renderer.get(), captureFormat(),
                                recorder ? &*recorder : nullptr);

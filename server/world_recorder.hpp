@@ -9,11 +9,12 @@
 
 namespace enfilade::server {
 
-class Recorder {
+class WorldRecorder {
  public:
   /// Begins `file` with the world as it is before its first tick. Throws protocol::mcap::
   /// RecordingError.
-  Recorder(const std::filesystem::path& file, const scene::World& world, const ModelOptions& model);
+  WorldRecorder(const std::filesystem::path& file, const scene::World& world,
+                const ModelOptions& model);
 
   /// What the world has taken for its next tick.
   void took(const v1::Command& command);

@@ -1,4 +1,4 @@
-#include "server/recorder.hpp"
+#include "server/world_recorder.hpp"
 
 #include <spdlog/spdlog.h>
 
@@ -33,22 +33,22 @@ v1::RecordingStart startOf(const scene::World& world, const ModelOptions& model)
 
 }  // namespace
 
-Recorder::Recorder(const std::filesystem::path& file, const scene::World& world,
-                   const ModelOptions& model)
+WorldRecorder::WorldRecorder(const std::filesystem::path& file, const scene::World& world,
+                             const ModelOptions& model)
     : file_(file, std::string("enfilade ") + kServerVersion) {
   file_.write(startOf(world, model));
 }
 
-void Recorder::took(const v1::Command& command) {
+void WorldRecorder::took(const v1::Command& command) {
   *commands_.add_commands()->mutable_avatar() = command;
 }
 
-void Recorder::took(const v1::BodyCommand& command) {
+void WorldRecorder::took(const v1::BodyCommand& command) {
   *commands_.add_commands()->mutable_body() = command;
 }
 
 template <class Work>
-void Recorder::unlessBroken(const Work& work) {
+void WorldRecorder::unlessBroken(const Work& work) {
   if (broken_) return;
   try {
     work();
@@ -58,7 +58,7 @@ void Recorder::unlessBroken(const Work& work) {
   }
 }
 
-void Recorder::ticked(const scene::World& world, const v1::TickEvents& events) {
+void WorldRecorder::ticked(const scene::World& world, const v1::TickEvents& events) {
   unlessBroken([&] {
     fill(state_, world);
     if (!commands_.commands().empty()) {
@@ -71,7 +71,7 @@ void Recorder::ticked(const scene::World& world, const v1::TickEvents& events) {
   commands_.clear_commands();
 }
 
-std::optional<std::string> Recorder::close() {
+std::optional<std::string> WorldRecorder::close() {
   unlessBroken([&] { file_.close(); });
   return broken_;
 }
