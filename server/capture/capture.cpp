@@ -14,6 +14,7 @@
 #include "server/capture/documents.hpp"
 #include "server/capture/encode_queue.hpp"
 #include "server/capture/frame_files.hpp"
+#include "server/capture/overlay.hpp"
 #include "server/capture/video.hpp"
 #include "server/interrupt.hpp"
 #include "server/load_scene.hpp"
@@ -57,7 +58,9 @@ render::FrameOptions frameOptions(const Shot& shot, const PictureOptions& option
   const CaptureChannels& wanted = options.channels;
   render::FrameOptions frame;
   frame.hidden = shot.hidden;
-  frame.channels = {wanted.rgb, wanted.ids, wanted.depth || wanted.range, wanted.normals};
+  const bool marked = options.overlay.any();
+  frame.channels = {wanted.rgb || marked, wanted.ids || marked,
+                    wanted.depth || wanted.range || marked, wanted.normals};
   frame.glass = options.glass;
   return frame;
 }
@@ -71,7 +74,7 @@ std::string whoDraws(render::Renderer& renderer, const PictureOptions& options) 
 }
 
 /// Draws on this thread; others encode and write meanwhile.
-void takePictures(const CaptureCommand& command, const ShotList& list,
+void takePictures(const CaptureCommand& command, const scene::Model& model, const ShotList& list,
                   const std::vector<std::size_t>& missing, render::Renderer& renderer,
                   CaptureCounts& counts) {
   CaptureMeter meter(command.run.progress, missing.size());
@@ -81,8 +84,11 @@ void takePictures(const CaptureCommand& command, const ShotList& list,
     const Shot& shot = list.shots[index];
     auto frame = std::make_shared<const render::Frame>(
         renderer.render(*shot.snapshot, shot.camera, frameOptions(shot, command.pictures)));
-    queue.post([&command, &counts, index, frame = std::move(frame)] {
-      counts.clamped += writeFrame(command.out, command.pictures, index, *frame).clamped;
+    queue.post([&, index, frame = std::move(frame)] {
+      const auto overlay = [&](const render::Frame& drawn) {
+        return drawOverlay(drawn, command.pictures.overlay, model, list, list.shots[index]);
+      };
+      counts.clamped += writeFrame(command.out, command.pictures, index, *frame, overlay).clamped;
       ++counts.written;
     });
     meter.show(counts.written);
@@ -168,7 +174,7 @@ ExitCode run(const CaptureCommand& command) {
   if (counts.already > 0)
     spdlog::info("{} of {} frames are there already", counts.already, counts.mine);
   const auto start = Clock::now();
-  takePictures(command, list, missing, renderer, counts);
+  takePictures(command, scene->model(), list, missing, renderer, counts);
   counts.seconds = std::chrono::duration<double>(Clock::now() - start).count();
   if (counts.clamped > 0)
     spdlog::warn("{} pixels of depth are farther than 16 bits hold, and were written as 65535",

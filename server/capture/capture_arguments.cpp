@@ -127,6 +127,26 @@ std::string channelsProblem(const std::string& text) {
   return text + ": give some of rgb, depth, ids, normals, range with commas between them";
 }
 
+/// nullopt for a word that is none.
+std::optional<OverlayChoice> overlayFrom(const std::string& text) {
+  OverlayChoice choice;
+  if (text.empty()) return choice;
+  for (const std::string& word : split(text, ',')) {
+    bool* chosen = word == "contacts" ? &choice.contacts
+                   : word == "boxes"  ? &choice.boxes
+                   : word == "names"  ? &choice.names
+                   : word == "paths"  ? &choice.paths
+                                      : nullptr;
+    if (!chosen) return std::nullopt;
+    *chosen = true;
+  }
+  return choice;
+}
+std::string overlayProblem(const std::string& text) {
+  if (overlayFrom(text)) return "";
+  return text + ": give some of contacts, boxes, names, paths with commas between them";
+}
+
 std::string folderProblem(const std::string& text) {
   return text.empty() ? "the folder's name is empty: give one, as out" : "";
 }
@@ -202,6 +222,11 @@ void addFiles(CLI::App& verb, CaptureArguments& into) {
                   "tum: rgb.txt, depth.txt and groundtruth.txt too, depth as 16 bit PNG")
       ->capture_default_str()
       ->check(CLI::IsMember({"plain", "tum"}));
+  verb.add_option(
+          "--overlay", into.overlay,
+          "Copies of the colour in overlay/ with marks for people: some of contacts, boxes, "
+          "names, paths; contacts and paths are a walk script's")
+      ->check(CLI::Validator(overlayProblem, "LIST"));
   verb.add_option("--glass", into.glass,
                   "Depth, ids and normals of what is transparent. clear: of what lies behind; "
                   "solid: of the glass, which hides it in the colour too")
@@ -263,6 +288,7 @@ PictureOptions picturesFrom(const CaptureArguments& read) {
   if (!read.depthScale.empty()) options.depthSteps = *numberFrom<double>(read.depthScale);
   options.tooFar = read.tooFar == "clamp" ? TooFar::clamp : TooFar::refuse;
   options.ids = read.ids == "png" ? IdsFile::png : IdsFile::npy;
+  options.overlay = *overlayFrom(read.overlay);
   options.renderer =
       render::rendererKindFrom(read.renderer).value_or(render::RendererKind::automatic);
   options.glass = read.glass == "solid" ? render::Glass::solid : render::Glass::clear;

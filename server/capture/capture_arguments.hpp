@@ -17,7 +17,7 @@ struct CaptureArguments {
   std::string rgb = "png", quality = "95", depth = "npy", depthScale, tooFar = "refuse";
   std::string ids = "npy", layout = "plain", axes = "opengl", fps = "30", every = "0", avatar;
   std::string camera, shard = "0/1", limit = "0", progress = "bar", glass = "clear",
-                      renderer = "auto";
+                      renderer = "auto", overlay;
   bool noMp4 = false, dryRun = false;
 };
 

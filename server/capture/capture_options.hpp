@@ -29,6 +29,12 @@ struct CaptureChannels {
   bool rgb = true, depth = true, ids = true, normals = false, range = false;
 };
 
+/// What is drawn for people on a copy of the colour.
+struct OverlayChoice {
+  bool contacts = false, boxes = false, names = false, paths = false;
+  bool any() const { return contacts || boxes || names || paths; }
+};
+
 /// Every `count`-th frame from `index` on, 0 <= index < count.
 struct Shard {
   std::uint32_t index = 0, count = 1;
@@ -54,6 +60,7 @@ struct PictureOptions {
   TooFar tooFar = TooFar::refuse;
   IdsFile ids = IdsFile::npy;
   FolderLayout layout = FolderLayout::plain;
+  OverlayChoice overlay;
   render::RendererKind renderer = render::RendererKind::automatic;
   render::Glass glass = render::Glass::clear;
 };

@@ -209,6 +209,8 @@ std::string manifestJson(const scene::Scene& scene, const std::filesystem::path&
   all["too_far"] = options.tooFar == TooFar::clamp ? "clamp" : "refuse";
   all["ids"] = options.ids == IdsFile::png ? "png" : "npy";
   all["layout"] = options.layout == FolderLayout::tum ? "tum" : "plain";
+  const OverlayChoice& marks = options.overlay;
+  all["overlay"] = {marks.contacts, marks.boxes, marks.names, marks.paths};
   all["glass"] = options.glass == render::Glass::solid ? "solid" : "clear";
   return all.dump(1) + "\n";
 }

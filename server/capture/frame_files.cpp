@@ -34,6 +34,7 @@ std::vector<ChannelFile> channelsOf(const PictureOptions& options) {
   if (wanted.ids) files.push_back({"ids", options.ids == IdsFile::png ? ".png" : ".npy"});
   if (wanted.normals) files.push_back({"normals", ".npy"});
   if (wanted.range) files.push_back({"range", extensionOf(options.depth)});
+  if (options.overlay.any()) files.push_back({"overlay", ".png"});
   return files;
 }
 
@@ -80,7 +81,8 @@ Bytes idBytes(const render::Frame& frame, const PictureOptions& options) {
 }
 
 Bytes bytesOf(const std::string& channel, const render::Frame& frame, const PictureOptions& options,
-              FrameFaults& faults) {
+              const DrawOverlay& overlay, FrameFaults& faults) {
+  if (channel == "overlay") return render::encodePng(overlay(frame));
   if (channel == "rgb") return rgbBytes(frame, options);
   if (channel == "depth") return depthBytes(frame, frame.depth, options, faults);
   if (channel == "ids") return idBytes(frame, options);
@@ -117,13 +119,13 @@ bool isThere(const fs::path& folder, const PictureOptions& options, std::size_t 
 }
 
 FrameFaults writeFrame(const fs::path& folder, const PictureOptions& options, std::size_t index,
-                       const render::Frame& frame) {
+                       const render::Frame& frame, const DrawOverlay& overlay) {
   FrameFaults faults;
   for (const ChannelFile& channel : channelsOf(options)) {
     const fs::path file = folder / fileOf(channel, index);
     Bytes bytes;
     try {
-      bytes = bytesOf(channel.folder, frame, options, faults);
+      bytes = bytesOf(channel.folder, frame, options, overlay, faults);
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(file.string() + ": " + error.what());
     }

@@ -11,13 +11,20 @@
 
 namespace enfilade::server {
 
+/// A contact or a near miss that lives in a tick.
+struct ContactMark {
+  Vec3 point = Vec3::Zero();  ///< scene frame, metres: where it began
+  bool near = false;
+};
+
 struct Shot {
   double time = 0;  ///< seconds
   render::Camera camera;
   scene::EntityId hidden = 0;  ///< not drawn: whose eyes these are
   /// Null where another shard takes this picture.
   std::shared_ptr<const scene::Snapshot> snapshot;
-  std::string name;  ///< of the script's capture, else empty
+  std::string name;                   ///< of the script's capture, else empty
+  std::vector<ContactMark> contacts;  ///< with an overlay of them
 };
 
 /// Someone who comes in while a script runs; the scene's own things are in its model.
@@ -26,9 +33,20 @@ struct WalkerName {
   std::string name;
 };
 
+/// Where someone's feet came, ascending ticks.
+struct WalkTrail {
+  struct Step {
+    std::uint64_t tick = 0;
+    Vec3 at = Vec3::Zero();  ///< scene frame, metres
+  };
+  scene::EntityId id = 0;
+  std::vector<Step> feet;
+};
+
 struct ShotList {
   std::vector<Shot> shots;          ///< at least one; shot i is frame i, whatever the shard
   std::vector<WalkerName> walkers;  ///< ascending ids
+  std::vector<WalkTrail> trails;    ///< of all walkers, with an overlay of paths
   std::vector<std::string> notes;   ///< what was guessed or left out, for a person
 };
 

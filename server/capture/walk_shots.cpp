@@ -1,5 +1,8 @@
 #include "server/capture/walk_shots.hpp"
 
+#include <algorithm>
+#include <tuple>
+
 #include "protocol/script.hpp"
 #include "server/in_process_driver.hpp"
 #include "server/world_messages.hpp"
@@ -8,6 +11,7 @@ namespace enfilade::server {
 namespace {
 
 constexpr std::size_t kMostSnapshotBytes = std::size_t{2} << 30;
+constexpr double kStride = 0.05;  // metres between two points of a trail
 constexpr std::size_t kMostShots = 10'000'000;
 
 /// What a snapshot holds that the one before does not, about.
@@ -27,6 +31,8 @@ class Recorder {
     const auto snapshot = world_.snapshot();
     for (const scene::AvatarView& avatar : snapshot->avatars)
       names_.emplace(avatar.id, avatar.name);
+    if (options_.overlay.paths) follow(*snapshot);
+    if (options_.overlay.contacts) note(outcome);
     if (options_.every == 0) {
       for (const v1::Notice& notice : outcome.notices)
         if (notice.kind() == v1::Notice::KIND_CAPTURE)
@@ -42,6 +48,29 @@ class Recorder {
   }
 
  private:
+  void follow(const scene::Snapshot& snapshot) {
+    for (const scene::AvatarView& avatar : snapshot.avatars) {
+      auto trail = std::find_if(list_.trails.begin(), list_.trails.end(),
+                                [&](const WalkTrail& t) { return t.id == avatar.id; });
+      if (trail == list_.trails.end()) trail = list_.trails.insert(trail, WalkTrail{avatar.id, {}});
+      if (trail->feet.empty() || (trail->feet.back().at - avatar.feet).norm() > kStride)
+        trail->feet.push_back({snapshot.tick, avatar.feet});
+    }
+  }
+
+  void note(const protocol::StepOutcome& outcome) {
+    using Event = v1::ContactEvent;
+    for (const Event& event : outcome.contacts) {
+      const bool near = event.kind() == Event::KIND_NEAR;
+      const bool begins =
+          near ? event.phase() == Event::PHASE_BEGIN : event.kind() == Event::KIND_BEGIN;
+      const bool ends = near ? event.phase() == Event::PHASE_END : event.kind() == Event::KIND_END;
+      const std::tuple key(near, event.a(), event.b());
+      if (begins) live_[key] = {vectorFrom(event.point_b()), near};
+      if (ends) live_.erase(key);
+    }
+  }
+
   std::string eyes(const scene::Snapshot& snapshot) {
     if (options_.avatar.empty() && first_.empty() && !snapshot.avatars.empty())
       first_ = snapshot.avatars.front().name;
@@ -52,7 +81,8 @@ class Recorder {
            const std::string& name) {
     const scene::AvatarView* seer = avatarNamed(*snapshot, avatar);
     if (!seer) return;  // not in the world now
-    Shot shot{snapshot->time, render::firstPerson(*seer, 1, 1), seer->id, nullptr, name};
+    Shot shot{snapshot->time, render::firstPerson(*seer, 1, 1), seer->id, nullptr, name, {}};
+    for (const auto& [key, mark] : live_) shot.contacts.push_back(mark);
     if (takes(shard_, list_.shots.size())) keep(snapshot, shot);
     if (list_.shots.size() == kMostShots)
       throw CameraPathError("the walk makes more than 10,000,000 frames; give a larger --every");
@@ -76,6 +106,7 @@ class Recorder {
   const Shard& shard_;
   ShotList list_;
   std::map<scene::EntityId, std::string> names_;
+  std::map<std::tuple<bool, std::uint32_t, std::uint32_t>, ContactMark> live_;
   std::string first_;
   std::shared_ptr<const scene::Snapshot> last_;
   std::size_t bytes_ = 0;

@@ -351,6 +351,47 @@ TEST_F(Capture, RaysDrawTheSameSceneAndTheManifestTellsThem) {
   EXPECT_NE(mixed.err.find("renderer: "), std::string::npos) << mixed.err;
 }
 
+TEST_F(Capture, AnOverlayMarksACopyAndLeavesTheColourAlone) {
+  write(folder_ / "walk.jsonl",
+        R"({"spawn":"ann","at":[0,0,0],"facing":0}
+{"spawn":"bob","at":[3,0,1],"facing":90}
+{"walk":"bob","to":[3,0,-0.5],"speed":1}
+{"wait":2,"for":"ann"}
+{"capture":"ann","as":"one"}
+)");
+  ASSERT_EQ(captured("walk.jsonl", "plain", {"--size", "160x120"}).code, 0);
+  const Ended ended = captured("walk.jsonl", "marked",
+                               {"--size", "160x120", "--overlay", "boxes,paths,contacts,names"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const auto imageOf = [&](const char* file) {
+    const std::string png = textOf(folder_ / file);
+    return render::decodePng({png.begin(), png.end()});
+  };
+  const render::Image plain = imageOf("plain/rgb/000000.png");
+  EXPECT_EQ(imageOf("marked/rgb/000000.png").rgb, plain.rgb);
+  const render::Image marked = imageOf("marked/overlay/000000.png");
+  const auto ids = readNpy<std::uint32_t>(folder_ / "marked/ids/000000.npy");
+  const auto changed = [&](int x, int y) {
+    const auto i = 3 * static_cast<std::ptrdiff_t>(y * 160 + x);
+    return !std::equal(marked.rgb.begin() + i, marked.rgb.begin() + i + 3, plain.rgb.begin() + i);
+  };
+  // Bob's own rectangle has its border marked, and so has the floor where he walked.
+  int top = 120, left = 160, floorMarked = 0;
+  for (int y = 0; y < 120; ++y) {
+    for (int x = 0; x < 160; ++x) {
+      if (ids.at(x, y) > kColumn) {
+        top = std::min(top, y);
+        left = std::min(left, x);
+      }
+      floorMarked += ids.at(x, y) == kFloor && changed(x, y);
+    }
+  }
+  ASSERT_LT(top, 120);
+  EXPECT_TRUE(changed(left, top));
+  EXPECT_GT(floorMarked, 20);
+  EXPECT_EQ(captured("walk.jsonl", "wrong", {"--overlay", "boxen"}).code, 2);
+}
+
 TEST_F(Capture, FfmpegMakesTheFilmWhenAllFramesAreThere) {
   fs::create_directories(folder_ / "bin");
   write(folder_ / "bin/ffmpeg", "#!/bin/sh\nfor last; do :; done\necho \"$@\" > \"$last\"\n");
