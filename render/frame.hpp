@@ -18,18 +18,35 @@ struct Channels {
 /// hide it as if they were opaque.
 enum class Glass : std::uint8_t { clear, solid };
 
+/// What is left out of the drawing. The picture is the same in all three, byte for byte.
+enum class Culling : std::uint8_t {
+  hidden,   ///< what lies beside the picture or behind what is drawn
+  outside,  ///< what lies beside the picture
+  singly    ///< as outside, and one draw an object: the slow twin of tests and benchmarks
+};
+
 struct FrameOptions {
   scene::EntityId hidden = 0;  ///< not drawn (the avatar whose eyes these are); 0: all is drawn
   Channels channels = {};
   Glass glass = Glass::clear;
+  Culling culling = Culling::hidden;
+};
+
+/// Meshes of objects, each counted once.
+struct FrameStatistics {
+  std::uint32_t drawn = 0;
+  std::uint32_t outside = 0;   ///< beside the picture
+  std::uint32_t occluded = 0;  ///< in the picture, behind what was drawn
+  std::uint32_t passes = 1;    ///< drawings that it took to find what is seen and to draw it
 };
 
 /// Row 0 is the top row; pixel (x, y) is at index y * width + x.
 struct Frame {
   Camera camera;
   std::uint64_t tick = 0;
-  std::string renderer;            ///< the device that made it (GL_RENDERER), or "Embree ..."
-  bool software = false;           ///< made by a CPU
+  std::string renderer;   ///< the device that made it (GL_RENDERER), or "Embree ..."
+  bool software = false;  ///< made by a CPU
+  FrameStatistics statistics;
   std::vector<std::uint8_t> rgb;   ///< sRGB, 3 bytes a pixel
   std::vector<std::uint32_t> ids;  ///< scene::EntityId of what is seen; 0: nothing
   std::vector<float> depth;        ///< z-distance along `forward` in metres; NaN: nothing

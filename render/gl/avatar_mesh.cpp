@@ -102,20 +102,22 @@ AvatarMeshes avatarMeshes(const scene::Snapshot& snapshot, scene::EntityId hidde
   return meshes;
 }
 
-void appendVisible(DrawList& list, const AvatarMeshes& avatars, const Camera& camera) {
-  const auto frustum = frustumOf(camera);
-  for (const AvatarMeshes::Piece& piece : avatars.pieces) {
-    if (!mayBeSeen(frustum, piece.box)) continue;
+DrawList drawList(const AvatarMeshes& avatars, const Camera& camera,
+                  const std::vector<std::uint32_t>& pieces) {
+  DrawList list;
+  if (!pieces.empty()) list.batches.push_back({});
+  for (const std::uint32_t index : pieces) {
+    const AvatarMeshes::Piece& piece = avatars.pieces[index];
     Eigen::Affine3d worldFromBody = Eigen::Affine3d::Identity();
     worldFromBody.translation() = piece.feet;
     const auto instance = static_cast<std::uint32_t>(list.instances.size());
     list.instances.push_back(
         placed(worldFromBody, Vec3::Zero(), camera.eye, piece.material, piece.id));
-    if (list.batches.empty()) list.batches.push_back({});
     list.commands.push_back(
         {piece.range.indexCount, 1, piece.range.firstIndex, piece.range.baseVertex, instance});
     ++list.batches.back().commandCount;
   }
+  return list;
 }
 
 }  // namespace enfilade::render

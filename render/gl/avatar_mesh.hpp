@@ -27,7 +27,8 @@ AvatarMeshes avatarMeshes(const scene::Snapshot& snapshot, scene::EntityId hidde
 /// Linear RGB; neighbours in number differ most.
 Eigen::Vector3f avatarColour(scene::EntityId id);
 
-/// Appends what the camera may see.
-void appendVisible(DrawList& list, const AvatarMeshes& avatars, const Camera& camera);
+/// The pieces given, in this order.
+DrawList drawList(const AvatarMeshes& avatars, const Camera& camera,
+                  const std::vector<std::uint32_t>& pieces);
 
 }  // namespace enfilade::render

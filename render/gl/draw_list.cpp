@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <tuple>
+#include <utility>
 
 namespace enfilade::render {
 namespace {
@@ -41,32 +42,24 @@ scene::Box placedBox(const Eigen::Affine3d& worldFromMesh, const scene::Box& box
   return {centre - half, centre + half};
 }
 
-/// A part at the place where it is drawn.
-struct PlacedPart {
-  const Part* part;
-  scene::Box box;  ///< world
-};
-
-PlacedPart placedPart(const Part& part, const std::vector<BodyPlacement>& bodies) {
-  if (part.body == kStill || !bodies[part.body].displaced) return {&part, part.box};
-  return {&part, placedBox(bodies[part.body].sceneFromAuthored, part.box)};
-}
-
-/// Parts of glass that may be seen, farthest first; equal distances keep their order.
-std::vector<PlacedPart> backToFront(std::vector<PlacedPart> glass, const Camera& camera) {
+/// Farthest first; equal distances keep their order.
+void sortBackToFront(std::vector<std::uint32_t>& glass, const std::vector<Part>& parts,
+                     const std::vector<BodyPlacement>& bodies, const Camera& camera) {
   const bool perspective = camera.projection == Camera::Projection::perspective;
   const Vec3 forward = viewOf(camera).forward;
-  const auto distance = [&](const PlacedPart& part) {
-    const Vec3 toPart = part.box.centre() - camera.eye;
-    return perspective ? toPart.squaredNorm() : forward.dot(toPart);
-  };
-  std::stable_sort(glass.begin(), glass.end(), [&](const PlacedPart& a, const PlacedPart& b) {
-    return distance(a) > distance(b);
-  });
-  return glass;
+  std::vector<std::pair<double, std::uint32_t>> sorted;
+  sorted.reserve(glass.size());
+  for (const std::uint32_t part : glass) {
+    const Vec3 toPart = placedBox(parts[part], bodies).centre() - camera.eye;
+    sorted.emplace_back(perspective ? toPart.squaredNorm() : forward.dot(toPart), part);
+  }
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::transform(sorted.begin(), sorted.end(), glass.begin(),
+                 [](const auto& entry) { return entry.second; });
 }
 
-void append(DrawList& list, const Part& part, Pass pass, const MeshRange& range) {
+void append(DrawList& list, const Part& part, Pass pass, const MeshRange& range, bool singly) {
   const auto instance = static_cast<std::uint32_t>(list.instances.size() - 1);
   const bool sameBatch = !list.batches.empty() && list.batches.back().pass == pass &&
                          list.batches.back().texture == part.texture;
@@ -76,7 +69,7 @@ void append(DrawList& list, const Part& part, Pass pass, const MeshRange& range)
   }
   Batch& batch = list.batches.back();
   // Neighbours in the order that share a mesh become one instanced draw.
-  if (batch.commandCount > 0 && list.commands.back().firstIndex == range.firstIndex &&
+  if (!singly && batch.commandCount > 0 && list.commands.back().firstIndex == range.firstIndex &&
       list.commands.back().count == range.indexCount) {
     ++list.commands.back().instanceCount;
     return;
@@ -170,32 +163,50 @@ Instance placed(const Eigen::Affine3d& worldFromMesh, const Vec3& meshCentre, co
   return instance;
 }
 
-void appendVisible(DrawList& list, const Drawable& drawable,
-                   const std::vector<BodyPlacement>& bodies, const Camera& camera,
-                   const FrameOptions& options) {
+scene::Box placedBox(const Part& part, const std::vector<BodyPlacement>& bodies) {
+  if (part.body == kStill || !bodies[part.body].displaced) return part.box;
+  return placedBox(bodies[part.body].sceneFromAuthored, part.box);
+}
+
+std::vector<std::uint32_t> partsInPicture(const std::vector<Part>& parts,
+                                          const std::vector<BodyPlacement>& bodies,
+                                          const Camera& camera, scene::EntityId hidden) {
   const auto frustum = frustumOf(camera);
+  std::vector<std::uint32_t> inside;
+  for (std::uint32_t i = 0; i < parts.size(); ++i) {
+    if (parts[i].object + 1 == hidden) continue;
+    if (mayBeSeen(frustum, placedBox(parts[i], bodies))) inside.push_back(i);
+  }
+  return inside;
+}
+
+DrawLists drawLists(const Drawable& drawable, const std::vector<BodyPlacement>& bodies,
+                    const Camera& camera, const FrameOptions& options,
+                    const std::vector<std::uint32_t>& parts) {
   const bool solid = options.glass == Glass::solid;
-  const auto draw = [&](const Part& part) {
+  const auto draw = [&](DrawList& list, const Part& part) {
     const MeshRange& range = drawable.ranges[part.mesh];
     Eigen::Affine3d worldFromMesh = drawable.model.objects[part.object].worldFromMesh;
     if (part.body != kStill && bodies[part.body].displaced)
       worldFromMesh = bodies[part.body].sceneFromAuthored * worldFromMesh;
     list.instances.push_back(placed(worldFromMesh, range.centre, camera.eye,
                                     drawable.materials[part.mesh], part.object + 1));
-    append(list, part, solid && part.pass == Pass::blend ? Pass::opaque : part.pass, range);
+    append(list, part, solid && part.pass == Pass::blend ? Pass::opaque : part.pass, range,
+           options.culling == Culling::singly);
   };
-  std::vector<PlacedPart> glass;
-  for (const Part& part : drawable.parts) {
-    if (part.object + 1 == options.hidden) continue;
-    const PlacedPart placed = placedPart(part, bodies);
-    if (!mayBeSeen(frustum, placed.box)) continue;
+  DrawLists lists;
+  std::vector<std::uint32_t> glass;
+  for (const std::uint32_t index : parts) {
+    const Part& part = drawable.parts[index];
     if (part.pass == Pass::blend && !solid) {
-      glass.push_back(placed);
+      glass.push_back(index);
     } else {
-      draw(part);
+      draw(lists.surfaces, part);
     }
   }
-  for (const PlacedPart& placed : backToFront(std::move(glass), camera)) draw(*placed.part);
+  sortBackToFront(glass, drawable.parts, bodies, camera);
+  for (const std::uint32_t index : glass) draw(lists.glass, drawable.parts[index]);
+  return lists;
 }
 
 }  // namespace enfilade::render

@@ -92,11 +92,24 @@ struct Drawable {
   const std::vector<MaterialData>& materials;
 };
 
-/// Appends what `camera` may see, glass from back to front, or in its order among the opaque where
-/// it is solid. `bodies`: one entry a body of the model.
-void appendVisible(DrawList& list, const Drawable& drawable,
-                   const std::vector<BodyPlacement>& bodies, const Camera& camera,
-                   const FrameOptions& options);
+/// Where a part is in this picture. `bodies`: one entry a body of the model.
+scene::Box placedBox(const Part& part, const std::vector<BodyPlacement>& bodies);
+
+/// Indices of the parts that may lie in the picture, ascending.
+std::vector<std::uint32_t> partsInPicture(const std::vector<Part>& parts,
+                                          const std::vector<BodyPlacement>& bodies,
+                                          const Camera& camera, scene::EntityId hidden);
+
+/// What is drawn first, and glass that is drawn over it.
+struct DrawLists {
+  DrawList surfaces, glass;
+};
+
+/// Of the parts given (ascending): surfaces in their order, glass from back to front, or among the
+/// surfaces where it is solid.
+DrawLists drawLists(const Drawable& drawable, const std::vector<BodyPlacement>& bodies,
+                    const Camera& camera, const FrameOptions& options,
+                    const std::vector<std::uint32_t>& parts);
 
 /// One instance; `worldFromMesh` is of the mesh as given, not of its centre.
 Instance placed(const Eigen::Affine3d& worldFromMesh, const Vec3& meshCentre, const Vec3& eye,

@@ -3,6 +3,7 @@
 #include <epoxy/gl.h>
 
 #include <array>
+#include <cstring>
 #include <limits>
 
 #include "render/render_error.hpp"
@@ -26,25 +27,12 @@ void checkComplete(GLuint framebuffer, int width, int height) {
   }
 }
 
-/// From the buffer's 1 (near) .. 0 (far) to metres along forward; NaN where nothing was drawn. In
-/// floats: that adds some 2e-7 of the distance to what the buffer rounded.
-void toMetres(std::vector<float>& depth, const Camera& camera) {
-  constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
-  const auto near = static_cast<float>(camera.near), far = static_cast<float>(camera.far);
-  const auto range = static_cast<float>(camera.far - camera.near);
-  if (camera.projection == Camera::Projection::perspective) {
-    const auto product = static_cast<float>(camera.near * camera.far);
-    for (float& d : depth) d = d > 0 ? product / (near + d * range) : kNothing;
-  } else {
-    for (float& d : depth) d = d > 0 ? far - d * range : kNothing;
-  }
-}
-
-void dropAlpha(std::vector<std::uint8_t>& rgba, std::size_t pixels) {
-  for (std::size_t i = 1; i < pixels; ++i) {
-    for (std::size_t c = 0; c < 3; ++c) rgba[3 * i + c] = rgba[4 * i + c];
-  }
-  rgba.resize(3 * pixels);
+/// Four bytes are copied to where three belong; the next pixel overwrites the fourth.
+void dropAlpha(const std::vector<std::uint8_t>& rgba, std::vector<std::uint8_t>& rgb) {
+  const std::size_t pixels = rgba.size() / 4;
+  rgb.resize(3 * pixels);
+  for (std::size_t i = 0; i + 1 < pixels; ++i) std::memcpy(&rgb[3 * i], &rgba[4 * i], 4);
+  if (pixels > 0) std::memcpy(&rgb[3 * pixels - 3], &rgba[4 * pixels - 4], 3);
 }
 
 }  // namespace
@@ -107,18 +95,18 @@ void FrameTarget::endOverlay() const {
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
 }
 
-void FrameTarget::read(Frame& frame, const Channels& channels) const {
+void FrameTarget::read(Frame& frame, const Channels& channels) {
   const std::size_t pixels = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
   const auto readPlane = [&](GLenum attachment, GLenum format, GLenum type, void* data) {
-    if (attachment != GL_NONE) glNamedFramebufferReadBuffer(framebuffer_.name(), attachment);
+    glNamedFramebufferReadBuffer(framebuffer_.name(), attachment);
     glReadPixels(0, 0, width_, height_, format, type, data);
   };
   glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.name());
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   if (channels.rgb) {
-    frame.rgb.resize(4 * pixels);
-    readPlane(GL_COLOR_ATTACHMENT0, GL_RGBA, GL_UNSIGNED_BYTE, frame.rgb.data());
-    dropAlpha(frame.rgb, pixels);
+    rgba_.resize(4 * pixels);
+    readPlane(GL_COLOR_ATTACHMENT0, GL_RGBA, GL_UNSIGNED_BYTE, rgba_.data());
+    dropAlpha(rgba_, frame.rgb);
   }
   if (channels.ids) {
     frame.ids.resize(pixels);
@@ -128,11 +116,30 @@ void FrameTarget::read(Frame& frame, const Channels& channels) const {
     frame.normals.resize(3 * pixels);
     readPlane(GL_COLOR_ATTACHMENT2, GL_RGB, GL_FLOAT, frame.normals.data());
   }
-  if (channels.depth) {
-    frame.depth.resize(pixels);
-    readPlane(GL_NONE, GL_DEPTH_COMPONENT, GL_FLOAT, frame.depth.data());
-    toMetres(frame.depth, frame.camera);
+}
+
+void FrameTarget::readDepth(std::vector<float>& depth) const {
+  depth.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.name());
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, width_, height_, GL_DEPTH_COMPONENT, GL_FLOAT, depth.data());
+}
+
+/// In floats: that adds some 2e-7 of the distance to what the buffer rounded.
+std::vector<float> metresOf(const std::vector<float>& depth, const Camera& camera) {
+  constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
+  const auto near = static_cast<float>(camera.near), far = static_cast<float>(camera.far);
+  const auto range = static_cast<float>(camera.far - camera.near);
+  std::vector<float> metres(depth.size());
+  if (camera.projection == Camera::Projection::perspective) {
+    const auto product = static_cast<float>(camera.near * camera.far);
+    for (std::size_t i = 0; i < depth.size(); ++i)
+      metres[i] = depth[i] > 0 ? product / (near + depth[i] * range) : kNothing;
+  } else {
+    for (std::size_t i = 0; i < depth.size(); ++i)
+      metres[i] = depth[i] > 0 ? far - depth[i] * range : kNothing;
   }
+  return metres;
 }
 
 }  // namespace enfilade::render

@@ -22,16 +22,22 @@ class FrameTarget {
   /// Draw over the colour only, with no depth test, with depth as the texture of unit 0.
   void beginOverlay() const;
   void endOverlay() const;
-  /// The channels into `frame`, whose camera is the one that was drawn with.
-  void read(Frame& frame, const Channels& channels) const;
+  /// The channels but depth into `frame`.
+  void read(Frame& frame, const Channels& channels);
+  /// As it is in the buffer: 1 near, 0 far and nothing.
+  void readDepth(std::vector<float>& depth) const;
 
  private:
   void addNormals();
 
   int width_ = 0, height_ = 0;
   GlTexture colour_, ids_, depth_, normals_;
+  std::vector<std::uint8_t> rgba_;  ///< kept for reading back
   GlFramebuffer framebuffer_;
   GlFramebuffer overlay_;  ///< colour alone, so that depth can be read while it is drawn to
 };
+
+/// From the buffer's depth to metres along forward; NaN where nothing is.
+std::vector<float> metresOf(const std::vector<float>& depth, const Camera& camera);
 
 }  // namespace enfilade::render

@@ -85,6 +85,9 @@ unsigned createGl(GlKind kind) {
     case GlKind::program:
       name = glCreateProgram();
       break;
+    case GlKind::query:
+      glCreateQueries(GL_ANY_SAMPLES_PASSED, 1, &name);
+      break;
   }
   return name;
 }
@@ -105,6 +108,9 @@ void deleteGl(GlKind kind, unsigned name) noexcept {
       break;
     case GlKind::program:
       glDeleteProgram(name);
+      break;
+    case GlKind::query:
+      glDeleteQueries(1, &name);
       break;
   }
 }

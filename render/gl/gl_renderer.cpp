@@ -1,114 +1,69 @@
 // A picture, step by step: the parts of the model that the camera may see, bodies where they are,
-// then the avatars (both write colour, id and depth), then the sky where nothing was drawn, then
-// glass over it all (colour only).
+// then the avatars (both write colour, id, depth and normals), then the sky where nothing was
+// drawn, shade in hollows, then glass over it all (colour only).
+//
+// Which parts are drawn:
+//
+// 1. Those that a picture from nearby showed are drawn.
+// 2. Their depth is read back, and what else may be seen in front of it is searched for
+//    (part_search.hpp). Mostly that is nothing, and the picture is done.
+// 3. Else what was found is drawn over it. Where two are equally near in some pixel, the order
+// would
+//    matter, and all is drawn again in its order. Where much was found (nothing was known of this
+//    view), it is searched among first: the nearest are drawn into the depth alone, which hides
+//    most of the others, then twice as many, and so on.
+//
+// Why the picture is that of drawing everything: in a pixel the nearest fragment wins, among equals
+// the one drawn first. What is left out lies, wherever it has a fragment, behind something that is
+// drawn; so each pixel's winner is among what is drawn, and what is drawn keeps its order.
 #include "render/gl/gl_renderer.hpp"
 
 #include <epoxy/gl.h>
 
 #include <algorithm>
-#include <array>
-#include <cstddef>
+#include <iterator>
 #include <optional>
+#include <utility>
 
-#include "render/gl/avatar_mesh.hpp"
-#include "render/gl/draw_list.hpp"
 #include "render/gl/egl_context.hpp"
 #include "render/gl/frame_target.hpp"
 #include "render/gl/model_buffers.hpp"
-#include "render/gl/shaders.hpp"
-#include "render/gl/vertex.hpp"
+#include "render/gl/moving_things.hpp"
+#include "render/gl/part_search.hpp"
+#include "render/gl/seen_memory.hpp"
+#include "render/gl/surface_pass.hpp"
 
 namespace enfilade::render {
 namespace {
 
-constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1, kFrameUniforms = 0;
+// So few that were not foreseen are drawn with what was; among more is searched first.
+constexpr std::size_t kFewMissing = 256;
+constexpr std::size_t kFirstChunk = 512;  // parts of the first drawing of a search; then twice ...
+constexpr int kMostChunks = 24;           // ... as many each time: more than there can be
+// What is drawn is looked at again every so many pictures: whether it is still seen, or in the
+// picture at all.
+constexpr std::uint64_t kLookAgain = 8, kForgetOutside = 64;
 
-void put(float (&target)[4], const Vec3& xyz, double w) {
-  for (int i = 0; i < 3; ++i) target[i] = static_cast<float>(xyz[i]);
-  target[3] = static_cast<float>(w);
+/// What is drawn of the model and of the avatars.
+struct Choice {
+  std::vector<std::uint32_t> parts;   ///< ascending
+  std::vector<std::uint32_t> pieces;  ///< of AvatarMeshes, ascending
+};
+
+void add(std::vector<std::uint32_t>& all, const std::vector<std::uint32_t>& more) {
+  std::vector<std::uint32_t> merged;
+  merged.reserve(all.size() + more.size());
+  std::set_union(all.begin(), all.end(), more.begin(), more.end(), std::back_inserter(merged));
+  all = std::move(merged);
 }
 
-Eigen::Matrix4d clipFromRelative(const Camera& camera, const View& view) {
-  const double range = camera.far - camera.near;
-  Eigen::Matrix4d clip = Eigen::Matrix4d::Zero();
-  clip.row(0).head<3>() = view.scaleX * view.right.transpose();
-  clip.row(1).head<3>() = view.scaleY * view.up.transpose();
-  if (camera.projection == Camera::Projection::perspective) {
-    clip.row(0).head<3>() += view.shiftX * view.forward.transpose();
-    clip.row(1).head<3>() += view.shiftY * view.forward.transpose();
-    clip.row(2).head<3>() = -camera.near / range * view.forward.transpose();
-    clip(2, 3) = camera.near * camera.far / range;
-    clip.row(3).head<3>() = view.forward.transpose();
-  } else {
-    clip.row(2).head<3>() = -1 / range * view.forward.transpose();
-    clip(2, 3) = camera.far / range;
-    clip(3, 3) = 1;
-  }
-  return clip;
-}
-
-FrameUniforms uniformsOf(const Camera& camera) {
-  const View view = viewOf(camera);
-  const bool plan = camera.projection == Camera::Projection::orthographic;
-  const Eigen::Matrix4d clip = clipFromRelative(camera, view);
-  FrameUniforms uniforms{};
-  for (int i = 0; i < 16; ++i) {
-    uniforms.clipFromRelative[i] = static_cast<float>(clip(i % 4, i / 4));
-  }
-  put(uniforms.forward, view.forward, plan ? 1 : 0);
-  put(uniforms.middle,
-      view.forward - view.shiftX / view.scaleX * view.right - view.shiftY / view.scaleY * view.up,
-      0);
-  put(uniforms.rightByX, view.right / view.scaleX, 0);
-  put(uniforms.upByY, view.up / view.scaleY, 0);
-  put(uniforms.range, Vec3(camera.near, camera.far, view.scaleY * camera.height / 2), 0);
-  return uniforms;
-}
-
-void attribute(GLuint array, Attribute which, GLuint binding, GLint components, GLenum type,
-               bool normalised, std::size_t offset) {
-  const auto place = static_cast<GLuint>(which);
-  glEnableVertexArrayAttrib(array, place);
-  glVertexArrayAttribFormat(array, place, components, type,
-                            static_cast<GLboolean>(normalised ? GL_TRUE : GL_FALSE),
-                            static_cast<GLuint>(offset));
-  glVertexArrayAttribBinding(array, place, binding);
-}
-
-GlVertexArray vertexArray() {
-  GlVertexArray result = GlVertexArray::create();
-  const GLuint array = result.name();
-  attribute(array, Attribute::position, kVertexBinding, 3, GL_FLOAT, false,
-            offsetof(Vertex, position));
-  attribute(array, Attribute::normal, kVertexBinding, 4, GL_INT_2_10_10_10_REV, true,
-            offsetof(Vertex, normal));
-  attribute(array, Attribute::uv, kVertexBinding, 2, GL_FLOAT, false, offsetof(Vertex, uv));
-  const std::array<std::pair<Attribute, std::size_t>, 6> rows{{
-      {Attribute::rowX, offsetof(Instance, relativeFromMesh)},
-      {Attribute::rowY, offsetof(Instance, relativeFromMesh) + 16},
-      {Attribute::rowZ, offsetof(Instance, relativeFromMesh) + 32},
-      {Attribute::baseColour, offsetof(Instance, material.baseColour)},
-      {Attribute::emissive, offsetof(Instance, material.emissive)},
-      {Attribute::surface, offsetof(Instance, material.surface)},
-  }};
-  for (const auto& [which, offset] : rows) {
-    attribute(array, which, kInstanceBinding, 4, GL_FLOAT, false, offset);
-  }
-  const auto id = static_cast<GLuint>(Attribute::id);
-  glEnableVertexArrayAttrib(array, id);
-  glVertexArrayAttribIFormat(array, id, 1, GL_UNSIGNED_INT, offsetof(Instance, id));
-  glVertexArrayAttribBinding(array, id, kInstanceBinding);
-  glVertexArrayBindingDivisor(array, kInstanceBinding, 1);
-  return result;
-}
-
-template <class Item>
-GlBuffer uploaded(const std::vector<Item>& items) {
-  GlBuffer buffer = GlBuffer::create();
-  glNamedBufferStorage(buffer.name(), static_cast<GLsizeiptr>(items.size() * sizeof(Item)),
-                       items.data(), 0);
-  return buffer;
-}
+/// One picture that is being made.
+struct Job {
+  const Camera& camera;
+  const FrameOptions& options;
+  BoxSight sight;
+  FrameStatistics statistics;
+};
 
 }  // namespace
 
@@ -117,25 +72,31 @@ struct GlRenderer::State {
   EglContext context;  // before all that lives in it
   ModelBuffers buffers;
   std::vector<Part> parts;
-  GlVertexArray vertexArray;
-  GlBuffer uniforms;
-  GlProgram sky;
-  GlProgram hollows;
-  std::array<std::optional<GlProgram>, 12> surfaces;  // see surfaceProgram()
+  std::optional<PartSearch> search;
+  std::optional<SurfacePass> pass;  // empty: nothing of the above was brought to the device yet
+  MovingThings moving;
   FrameTarget target;
-  bool prepared = false;  // all between the context and the target is there
+  SeenMemory memory;
+  DepthPyramid depth;
+  bool depthIsOfPicture = false;  // `depth` is that of all that is drawn
+  std::uint64_t picture = 0;
 
   State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device);
   ~State();
   void prepare();
-  GLuint surfaceProgram(const Batch& batch, bool normals);
-  void setUp(const Camera& camera, const Channels& channels);
-  void drawBatches(const DrawList& list, const GlBuffer& vertices, const GlBuffer& indices,
-                   bool glass, bool normals);
-  void drawAvatars(const AvatarMeshes& avatars, const Camera& camera, bool normals);
-  void drawAir(const DrawList& list);
-  void drawSky();
-  void darkenHollows();
+  scene::Box boxOf(std::uint32_t part) const;
+  bool isGlass(const Job& job, std::uint32_t part) const;
+  DrawList drawSurfaces(const Job& job, const Choice& choice);
+  DrawList glassOf(const Job& job, const std::vector<std::uint32_t>& chosen) const;
+  bool drawOnTop(const Job& job, const Choice& more);
+  void drawAir(const DrawList& glass);
+  void readDepth(const Camera& camera);
+  DrawList drawInside(Job& job);
+  DrawList drawSeen(Job& job);
+  Choice foreseen(const Job& job, const Seen& seen) const;
+  Choice missing(Job& job, const Choice& drawn);
+  Choice searchAmong(Job& job, Choice drawn, Choice missing);
+  void remember(const Job& job, const Choice& drawn, Seen& seen) const;
 };
 
 GlRenderer::State::State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device)
@@ -145,16 +106,11 @@ GlRenderer::State::State(std::shared_ptr<const scene::Scene> shared, const Devic
 
 /// A scene that nobody looks at is never brought to the device.
 void GlRenderer::State::prepare() {
-  if (prepared) return;
+  if (pass) return;
   buffers = uploadModel(scene->model());
   parts = partsOf(scene->model());
-  vertexArray = render::vertexArray();
-  uniforms = GlBuffer::create();
-  glNamedBufferStorage(uniforms.name(), sizeof(FrameUniforms), nullptr, GL_DYNAMIC_STORAGE_BIT);
-  sky = buildProgram("sky", skyVertexSource(), skyFragmentSource());
-  hollows = buildProgram("hollows", skyVertexSource(), hollowFragmentSource());
-  checkGl("setting up the renderer");
-  prepared = true;
+  search.emplace(parts);
+  pass.emplace();
 }
 
 GlRenderer::State::~State() {
@@ -166,93 +122,203 @@ GlRenderer::State::~State() {
   }
 }
 
-GLuint GlRenderer::State::surfaceProgram(const Batch& batch, bool normals) {
-  const SurfaceVariant variant{batch.texture >= 0, batch.pass == Pass::mask,
-                               batch.pass == Pass::blend, normals};
-  const std::size_t index =
-      4 * static_cast<std::size_t>(batch.pass) + (variant.textured ? 2 : 0) + (normals ? 1 : 0);
-  std::optional<GlProgram>& program = surfaces[index];
-  if (!program) {
-    program = buildProgram("surface", surfaceVertexSource(), surfaceFragmentSource(variant));
-  }
-  return program->name();
+scene::Box GlRenderer::State::boxOf(std::uint32_t part) const {
+  return placedBox(parts[part], moving.bodies());
 }
 
-void GlRenderer::State::setUp(const Camera& camera, const Channels& channels) {
-  if (!target.fits(camera.width, camera.height)) {
-    target = FrameTarget(camera.width, camera.height);
-  }
-  const FrameUniforms frame = uniformsOf(camera);
-  glNamedBufferSubData(uniforms.name(), 0, sizeof(frame), &frame);
-  glBindBufferBase(GL_UNIFORM_BUFFER, kFrameUniforms, uniforms.name());
-  glBindVertexArray(vertexArray.name());
-  glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);  // row 0 on top, reversed depth
-  glEnable(GL_DEPTH_TEST);
-  glDepthFunc(GL_GREATER);
-  glEnable(GL_FRAMEBUFFER_SRGB);
-  glDisable(GL_BLEND);
-  glDisable(GL_CULL_FACE);  // real models are wound both ways
-  target.begin(channels);
+bool GlRenderer::State::isGlass(const Job& job, std::uint32_t part) const {
+  return parts[part].pass == Pass::blend && job.options.glass == Glass::clear;
 }
 
-void GlRenderer::State::drawBatches(const DrawList& list, const GlBuffer& vertices,
-                                    const GlBuffer& indices, bool glass, bool normals) {
-  const auto wanted = [&](const Batch& batch) { return (batch.pass == Pass::blend) == glass; };
-  if (std::none_of(list.batches.begin(), list.batches.end(), wanted)) return;
-  const GlBuffer instances = uploaded(list.instances);
-  const GlBuffer commands = uploaded(list.commands);
-  glVertexArrayVertexBuffer(vertexArray.name(), kVertexBinding, vertices.name(), 0, sizeof(Vertex));
-  glVertexArrayVertexBuffer(vertexArray.name(), kInstanceBinding, instances.name(), 0,
-                            sizeof(Instance));
-  glVertexArrayElementBuffer(vertexArray.name(), indices.name());
-  glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands.name());
-  for (const Batch& batch : list.batches) {
-    if (!wanted(batch)) continue;
-    glUseProgram(surfaceProgram(batch, normals));
-    if (batch.texture >= 0) {
-      glBindTextureUnit(0, buffers.textures[static_cast<std::size_t>(batch.texture)].name());
-    }
-    const std::size_t offset = sizeof(DrawCommand) * batch.firstCommand;
-    glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT,
-                                reinterpret_cast<const void*>(offset),
-                                static_cast<GLsizei>(batch.commandCount), sizeof(DrawCommand));
-  }
+/// Returns the glass, which is to be drawn last.
+DrawList GlRenderer::State::drawSurfaces(const Job& job, const Choice& choice) {
+  DrawLists lists = drawLists({scene->model(), parts, buffers.ranges, buffers.materials},
+                              moving.bodies(), job.camera, job.options, choice.parts);
+  const bool normals = job.options.channels.normals;
+  pass->draw(lists.surfaces, {buffers.vertices.name(), buffers.indices.name(), buffers.textures},
+             normals);
+  pass->draw(drawList(moving.avatars(), job.camera, choice.pieces),
+             moving.avatarGeometry(buffers.textures), normals);
+  return std::move(lists.glass);
 }
 
-void GlRenderer::State::drawAvatars(const AvatarMeshes& avatars, const Camera& camera,
-                                    bool normals) {
-  DrawList list;
-  appendVisible(list, avatars, camera);
-  if (list.commands.empty()) return;
-  drawBatches(list, uploaded(avatars.vertices), uploaded(avatars.indices), false, normals);
+DrawList GlRenderer::State::glassOf(const Job& job,
+                                    const std::vector<std::uint32_t>& chosen) const {
+  std::vector<std::uint32_t> glass;
+  std::copy_if(chosen.begin(), chosen.end(), std::back_inserter(glass),
+               [&](std::uint32_t part) { return isGlass(job, part); });
+  return drawLists({scene->model(), parts, buffers.ranges, buffers.materials}, moving.bodies(),
+                   job.camera, job.options, glass)
+      .glass;
 }
 
-/// What has a colour only: the sky, the shade in hollows, and glass.
-void GlRenderer::State::drawAir(const DrawList& list) {
+/// Draws what is missing over what is there. False, and nothing is drawn, where two are equally
+/// near in some pixel: there the order of drawing decides.
+bool GlRenderer::State::drawOnTop(const Job& job, const Choice& more) {
+  target.drawInto({false, false, false, false});
+  pass->beginTieQuery();
+  drawSurfaces(job, more);
+  const bool ties = pass->endTieQuery();
+  target.drawInto(job.options.channels);
+  if (ties) return false;
+  drawSurfaces(job, more);
+  return true;
+}
+
+/// What has a colour only.
+void GlRenderer::State::drawAir(const DrawList& glass) {
   target.drawInto({true, false, false, false});
-  drawSky();
-  darkenHollows();
-  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
-  drawBatches(list, buffers.vertices, buffers.indices, true, false);
-}
-
-void GlRenderer::State::drawSky() {
-  glDepthMask(GL_FALSE);
-  glDepthFunc(GL_GEQUAL);
-  glUseProgram(sky.name());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
-  glDepthFunc(GL_GREATER);
-}
-
-void GlRenderer::State::darkenHollows() {
+  pass->drawSky();
   target.beginOverlay();
-  glDisable(GL_DEPTH_TEST);
-  glEnable(GL_BLEND);
-  glBlendFunc(GL_ZERO, GL_SRC_COLOR);
-  glUseProgram(hollows.name());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
-  glEnable(GL_DEPTH_TEST);
+  pass->darkenHollows();
   target.endOverlay();
+  pass->blendGlass();
+  pass->draw(glass, {buffers.vertices.name(), buffers.indices.name(), buffers.textures}, false);
+}
+
+void GlRenderer::State::readDepth(const Camera& camera) {
+  target.readDepth(depth.base(camera.width, camera.height));
+  depthIsOfPicture = true;
+}
+
+/// All that lies in the picture.
+DrawList GlRenderer::State::drawInside(Job& job) {
+  Choice all;
+  all.parts = partsInPicture(parts, moving.bodies(), job.camera, job.options.hidden);
+  const std::vector<AvatarMeshes::Piece>& pieces = moving.avatars().pieces;
+  for (std::uint32_t i = 0; i < pieces.size(); ++i) {
+    if (pieces[i].id == job.options.hidden) continue;
+    if (!job.sight.outside(job.sight.relative(pieces[i].box))) all.pieces.push_back(i);
+  }
+  job.statistics.drawn = static_cast<std::uint32_t>(all.parts.size());
+  job.statistics.outside = static_cast<std::uint32_t>(parts.size() - all.parts.size());
+  return drawSurfaces(job, all);
+}
+
+/// What was seen from nearby and lies in this picture.
+Choice GlRenderer::State::foreseen(const Job& job, const Seen& seen) const {
+  Choice choice;
+  for (const std::uint32_t part : seen.parts) {
+    if (parts[part].object + 1 == job.options.hidden) continue;
+    if (!job.sight.outside(job.sight.relative(boxOf(part)))) choice.parts.push_back(part);
+  }
+  const std::vector<AvatarMeshes::Piece>& pieces = moving.avatars().pieces;
+  for (std::uint32_t i = 0; i < pieces.size(); ++i) {
+    if (pieces[i].id == job.options.hidden) continue;
+    if (!std::binary_search(seen.avatars.begin(), seen.avatars.end(), pieces[i].id)) continue;
+    if (!job.sight.outside(job.sight.relative(pieces[i].box))) choice.pieces.push_back(i);
+  }
+  return choice;
+}
+
+/// What may be seen besides `drawn`, whose depth is in `depth`.
+Choice GlRenderer::State::missing(Job& job, const Choice& drawn) {
+  search->markDrawn(drawn.parts);
+  PartSearch::Found found = search->search(job.sight, depth, moving.bodies(), job.options.hidden);
+  job.statistics.outside = found.outside;
+  Choice choice;
+  choice.parts = std::move(found.parts);
+  const std::vector<AvatarMeshes::Piece>& pieces = moving.avatars().pieces;
+  for (std::uint32_t i = 0; i < pieces.size(); ++i) {
+    if (pieces[i].id == job.options.hidden) continue;
+    if (std::binary_search(drawn.pieces.begin(), drawn.pieces.end(), i)) continue;
+    const EyeBox box = job.sight.relative(pieces[i].box);
+    if (job.sight.look(box, depth) == Sight::maybe) choice.pieces.push_back(i);
+  }
+  return choice;
+}
+
+/// Draws what is missing into the depth alone, the nearest first, as long as any of it may be seen.
+/// Returns what may be seen of all that was drawn.
+Choice GlRenderer::State::searchAmong(Job& job, Choice drawn, Choice missing) {
+  const auto maybe = [&](std::uint32_t part) {
+    return job.sight.look(job.sight.relative(boxOf(part)), depth) == Sight::maybe;
+  };
+  std::vector<std::pair<double, std::uint32_t>> left;  // squared metres to the nearest point
+  for (const std::uint32_t part : missing.parts) {
+    const EyeBox box = job.sight.relative(boxOf(part));
+    left.emplace_back((box.centre.cwiseAbs() - box.half).cwiseMax(0.0).squaredNorm(), part);
+  }
+  std::sort(left.begin(), left.end());
+  target.drawInto({false, false, false, false});
+  std::size_t most = kFirstChunk;
+  for (int i = 0; i < kMostChunks && !left.empty(); ++i, most *= 2) {
+    const auto end = left.begin() + static_cast<std::ptrdiff_t>(std::min(most, left.size()));
+    Choice chunk;
+    for (auto entry = left.begin(); entry != end; ++entry) chunk.parts.push_back(entry->second);
+    std::sort(chunk.parts.begin(), chunk.parts.end());
+    if (i == 0) chunk.pieces = missing.pieces;
+    left.erase(left.begin(), end);
+    drawSurfaces(job, chunk);
+    add(drawn.parts, chunk.parts);
+    readDepth(job.camera);
+    depth.build();
+    ++job.statistics.passes;
+    std::erase_if(left, [&](const auto& entry) { return !maybe(entry.second); });
+  }
+  add(drawn.pieces, missing.pieces);
+  std::erase_if(drawn.parts, [&](std::uint32_t part) { return !maybe(part); });
+  return drawn;
+}
+
+/// For the next picture: what was drawn, less what is no longer seen, and what was seen and lies
+/// beside the picture now.
+void GlRenderer::State::remember(const Job& job, const Choice& drawn, Seen& seen) const {
+  std::vector<std::uint32_t> kept;
+  for (const std::uint32_t part : drawn.parts) {
+    const bool due = (part + picture) % kLookAgain == 0;
+    if (due && job.sight.look(job.sight.relative(boxOf(part)), depth) == Sight::hidden) continue;
+    kept.push_back(part);
+  }
+  for (const std::uint32_t part : seen.parts) {
+    if (std::binary_search(drawn.parts.begin(), drawn.parts.end(), part)) continue;
+    if ((part + picture) % kForgetOutside != 0) kept.push_back(part);
+  }
+  std::sort(kept.begin(), kept.end());
+  seen.parts = std::move(kept);
+  seen.avatars.clear();
+  for (const std::uint32_t piece : drawn.pieces)
+    seen.avatars.push_back(moving.avatars().pieces[piece].id);
+  std::sort(seen.avatars.begin(), seen.avatars.end());
+}
+
+/// What may be seen.
+DrawList GlRenderer::State::drawSeen(Job& job) {
+  Seen& seen = memory.recall(job.camera, ++picture);
+  Choice drawn = foreseen(job, seen);
+  DrawList glass = drawSurfaces(job, drawn);
+  readDepth(job.camera);
+  depth.build();
+  Choice more = missing(job, drawn);
+  const bool glassOnly =
+      more.pieces.empty() && std::all_of(more.parts.begin(), more.parts.end(),
+                                         [&](std::uint32_t p) { return isGlass(job, p); });
+  const bool many = more.parts.size() > kFewMissing;
+  bool done = glassOnly;
+  if (!glassOnly) {
+    depthIsOfPicture = false;
+    ++job.statistics.passes;
+    done = !many && drawOnTop(job, more);
+  }
+  if (!done && many) {
+    drawn = searchAmong(job, std::move(drawn), std::move(more));
+  } else {
+    add(drawn.parts, more.parts);
+    add(drawn.pieces, more.pieces);
+  }
+  if (!done) {
+    target.begin(job.options.channels);
+    depthIsOfPicture = false;
+    ++job.statistics.passes;
+    glass = drawSurfaces(job, drawn);
+  } else if (!more.parts.empty()) {
+    glass = glassOf(job, drawn.parts);
+  }
+  remember(job, drawn, seen);
+  job.statistics.drawn = static_cast<std::uint32_t>(drawn.parts.size());
+  job.statistics.occluded =
+      static_cast<std::uint32_t>(parts.size()) - job.statistics.drawn - job.statistics.outside;
+  return glass;
 }
 
 GlRenderer::GlRenderer(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device)
@@ -266,20 +332,27 @@ Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
   State& s = *state_;
   s.context.makeCurrent();
   s.prepare();
-  const Channels& channels = options.channels;
-  DrawList list;
-  appendVisible(list, {s.scene->model(), s.parts, s.buffers.ranges, s.buffers.materials},
-                placementsOf(*s.scene, snapshot), camera, options);
-  s.setUp(camera, channels);
-  s.drawBatches(list, s.buffers.vertices, s.buffers.indices, false, channels.normals);
-  s.drawAvatars(avatarMeshes(snapshot, options.hidden), camera, channels.normals);
-  if (channels.rgb) s.drawAir(list);
+  s.moving.follow(*s.scene, snapshot);
+  if (!s.target.fits(camera.width, camera.height)) {
+    s.target = FrameTarget(camera.width, camera.height);
+  }
+  s.pass->begin(camera);
+  s.target.begin(options.channels);
+  s.depthIsOfPicture = false;
+  Job job{camera, options, BoxSight(camera), {}};
+  const DrawList glass = options.culling == Culling::hidden ? s.drawSeen(job) : s.drawInside(job);
+  if (options.channels.rgb) s.drawAir(glass);
   Frame frame;
   frame.camera = camera;
   frame.tick = snapshot.tick;
   frame.renderer = deviceName();
   frame.software = software();
-  s.target.read(frame, channels);
+  frame.statistics = job.statistics;
+  s.target.read(frame, options.channels);
+  if (options.channels.depth) {
+    if (!s.depthIsOfPicture) s.readDepth(camera);
+    frame.depth = metresOf(s.depth.base(camera.width, camera.height), camera);
+  }
   checkGl("drawing a frame");
   return frame;
 }

@@ -1,0 +1,202 @@
+#include "render/gl/surface_pass.hpp"
+
+#include <epoxy/gl.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+
+#include "render/gl/shaders.hpp"
+#include "render/view.hpp"
+
+namespace enfilade::render {
+namespace {
+
+constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1, kFrameUniforms = 0;
+
+void put(float (&target)[4], const Vec3& xyz, double w) {
+  for (int i = 0; i < 3; ++i) target[i] = static_cast<float>(xyz[i]);
+  target[3] = static_cast<float>(w);
+}
+
+Eigen::Matrix4d clipFromRelative(const Camera& camera, const View& view) {
+  const double range = camera.far - camera.near;
+  Eigen::Matrix4d clip = Eigen::Matrix4d::Zero();
+  clip.row(0).head<3>() = view.scaleX * view.right.transpose();
+  clip.row(1).head<3>() = view.scaleY * view.up.transpose();
+  if (camera.projection == Camera::Projection::perspective) {
+    clip.row(0).head<3>() += view.shiftX * view.forward.transpose();
+    clip.row(1).head<3>() += view.shiftY * view.forward.transpose();
+    clip.row(2).head<3>() = -camera.near / range * view.forward.transpose();
+    clip(2, 3) = camera.near * camera.far / range;
+    clip.row(3).head<3>() = view.forward.transpose();
+  } else {
+    clip.row(2).head<3>() = -1 / range * view.forward.transpose();
+    clip(2, 3) = camera.far / range;
+    clip(3, 3) = 1;
+  }
+  return clip;
+}
+
+FrameUniforms uniformsOf(const Camera& camera) {
+  const View view = viewOf(camera);
+  const bool plan = camera.projection == Camera::Projection::orthographic;
+  const Eigen::Matrix4d clip = clipFromRelative(camera, view);
+  FrameUniforms uniforms{};
+  for (int i = 0; i < 16; ++i) {
+    uniforms.clipFromRelative[i] = static_cast<float>(clip(i % 4, i / 4));
+  }
+  put(uniforms.forward, view.forward, plan ? 1 : 0);
+  put(uniforms.middle,
+      view.forward - view.shiftX / view.scaleX * view.right - view.shiftY / view.scaleY * view.up,
+      0);
+  put(uniforms.rightByX, view.right / view.scaleX, 0);
+  put(uniforms.upByY, view.up / view.scaleY, 0);
+  put(uniforms.range, Vec3(camera.near, camera.far, view.scaleY * camera.height / 2), 0);
+  return uniforms;
+}
+
+void attribute(GLuint array, Attribute which, GLuint binding, GLint components, GLenum type,
+               bool normalised, std::size_t offset) {
+  const auto place = static_cast<GLuint>(which);
+  glEnableVertexArrayAttrib(array, place);
+  glVertexArrayAttribFormat(array, place, components, type,
+                            static_cast<GLboolean>(normalised ? GL_TRUE : GL_FALSE),
+                            static_cast<GLuint>(offset));
+  glVertexArrayAttribBinding(array, place, binding);
+}
+
+GlVertexArray makeVertexArray() {
+  GlVertexArray result = GlVertexArray::create();
+  const GLuint array = result.name();
+  attribute(array, Attribute::position, kVertexBinding, 3, GL_FLOAT, false,
+            offsetof(Vertex, position));
+  attribute(array, Attribute::normal, kVertexBinding, 4, GL_INT_2_10_10_10_REV, true,
+            offsetof(Vertex, normal));
+  attribute(array, Attribute::uv, kVertexBinding, 2, GL_FLOAT, false, offsetof(Vertex, uv));
+  const std::array<std::pair<Attribute, std::size_t>, 6> rows{{
+      {Attribute::rowX, offsetof(Instance, relativeFromMesh)},
+      {Attribute::rowY, offsetof(Instance, relativeFromMesh) + 16},
+      {Attribute::rowZ, offsetof(Instance, relativeFromMesh) + 32},
+      {Attribute::baseColour, offsetof(Instance, material.baseColour)},
+      {Attribute::emissive, offsetof(Instance, material.emissive)},
+      {Attribute::surface, offsetof(Instance, material.surface)},
+  }};
+  for (const auto& [which, offset] : rows) {
+    attribute(array, which, kInstanceBinding, 4, GL_FLOAT, false, offset);
+  }
+  const auto id = static_cast<GLuint>(Attribute::id);
+  glEnableVertexArrayAttrib(array, id);
+  glVertexArrayAttribIFormat(array, id, 1, GL_UNSIGNED_INT, offsetof(Instance, id));
+  glVertexArrayAttribBinding(array, id, kInstanceBinding);
+  glVertexArrayBindingDivisor(array, kInstanceBinding, 1);
+  return result;
+}
+
+}  // namespace
+
+void StreamBuffer::fill(const void* data, std::size_t bytes) {
+  if (bytes == 0) return;
+  if (bytes > room_) {
+    room_ = 2 * bytes;
+    buffer_ = GlBuffer::create();
+    glNamedBufferStorage(buffer_.name(), static_cast<GLsizeiptr>(room_), nullptr,
+                         GL_DYNAMIC_STORAGE_BIT);
+  }
+  glNamedBufferSubData(buffer_.name(), 0, static_cast<GLsizeiptr>(bytes), data);
+}
+
+SurfacePass::SurfacePass()
+    : vertexArray_(makeVertexArray()),
+      uniforms_(GlBuffer::create()),
+      sky_(buildProgram("sky", skyVertexSource(), skyFragmentSource())),
+      hollows_(buildProgram("hollows", skyVertexSource(), hollowFragmentSource())),
+      ties_(GlQuery::create()) {
+  glNamedBufferStorage(uniforms_.name(), sizeof(FrameUniforms), nullptr, GL_DYNAMIC_STORAGE_BIT);
+  checkGl("setting up the renderer");
+}
+
+unsigned SurfacePass::program(const Batch& batch, bool normals) {
+  const SurfaceVariant variant{batch.texture >= 0, batch.pass == Pass::mask,
+                               batch.pass == Pass::blend, normals};
+  const std::size_t index =
+      4 * static_cast<std::size_t>(batch.pass) + (variant.textured ? 2 : 0) + (normals ? 1 : 0);
+  std::optional<GlProgram>& program = surfaces_[index];
+  if (!program) {
+    program = buildProgram("surface", surfaceVertexSource(), surfaceFragmentSource(variant));
+  }
+  return program->name();
+}
+
+void SurfacePass::begin(const Camera& camera) {
+  const FrameUniforms frame = uniformsOf(camera);
+  glNamedBufferSubData(uniforms_.name(), 0, sizeof(frame), &frame);
+  glBindBufferBase(GL_UNIFORM_BUFFER, kFrameUniforms, uniforms_.name());
+  glBindVertexArray(vertexArray_.name());
+  glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);  // row 0 on top, reversed depth
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_GREATER);
+  glEnable(GL_FRAMEBUFFER_SRGB);
+  glDisable(GL_BLEND);
+  glDisable(GL_CULL_FACE);  // real models are wound both ways
+}
+
+void SurfacePass::draw(const DrawList& list, const Geometry& geometry, bool normals) {
+  if (list.commands.empty()) return;
+  instances_.fill(list.instances.data(), list.instances.size() * sizeof(Instance));
+  commands_.fill(list.commands.data(), list.commands.size() * sizeof(DrawCommand));
+  const GLuint array = vertexArray_.name();
+  glVertexArrayVertexBuffer(array, kVertexBinding, geometry.vertices, 0, sizeof(Vertex));
+  glVertexArrayVertexBuffer(array, kInstanceBinding, instances_.name(), 0, sizeof(Instance));
+  glVertexArrayElementBuffer(array, geometry.indices);
+  glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_.name());
+  for (const Batch& batch : list.batches) {
+    glUseProgram(program(batch, normals));
+    if (batch.texture >= 0) {
+      glBindTextureUnit(0, geometry.textures[static_cast<std::size_t>(batch.texture)].name());
+    }
+    const std::size_t offset = sizeof(DrawCommand) * batch.firstCommand;
+    glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT,
+                                reinterpret_cast<const void*>(offset),
+                                static_cast<GLsizei>(batch.commandCount), sizeof(DrawCommand));
+  }
+}
+
+void SurfacePass::beginTieQuery() {
+  glDepthMask(GL_FALSE);
+  glDepthFunc(GL_EQUAL);
+  glBeginQuery(GL_ANY_SAMPLES_PASSED, ties_.name());
+}
+
+bool SurfacePass::endTieQuery() const {
+  glEndQuery(GL_ANY_SAMPLES_PASSED);
+  glDepthMask(GL_TRUE);
+  glDepthFunc(GL_GREATER);
+  GLuint any = GL_TRUE;
+  glGetQueryObjectuiv(ties_.name(), GL_QUERY_RESULT, &any);
+  return any != GL_FALSE;
+}
+
+void SurfacePass::drawSky() const {
+  glDepthMask(GL_FALSE);
+  glDepthFunc(GL_GEQUAL);
+  glUseProgram(sky_.name());
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glDepthFunc(GL_GREATER);
+}
+
+void SurfacePass::darkenHollows() const {
+  glDisable(GL_DEPTH_TEST);
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ZERO, GL_SRC_COLOR);
+  glUseProgram(hollows_.name());
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glEnable(GL_DEPTH_TEST);
+}
+
+void SurfacePass::blendGlass() const {
+  glEnable(GL_BLEND);
+  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
+}
+
+}  // namespace enfilade::render

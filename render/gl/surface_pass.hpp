@@ -1,0 +1,58 @@
+// Draws lists of surfaces, the sky and the shade in hollows: programs, uniforms, streams.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "render/gl/draw_list.hpp"
+#include "render/gl/gl_objects.hpp"
+#include "render/gl/vertex.hpp"
+
+namespace enfilade::render {
+
+/// A buffer that is filled anew again and again; it only grows.
+class StreamBuffer {
+ public:
+  void fill(const void* data, std::size_t bytes);
+  unsigned name() const { return buffer_.name(); }
+
+ private:
+  GlBuffer buffer_;
+  std::size_t room_ = 0;
+};
+
+/// Where a list's vertices come from.
+struct Geometry {
+  unsigned vertices, indices;              ///< names of buffers
+  const std::vector<GlTexture>& textures;  ///< by Batch::texture
+};
+
+/// Needs a current context, always the same.
+class SurfacePass {
+ public:
+  SurfacePass();
+
+  /// The state that all drawing shares, and the camera.
+  void begin(const Camera& camera);
+  void draw(const DrawList& list, const Geometry& geometry, bool normals);
+  /// Between these, nothing is written; true: a pixel was as near as what is there.
+  void beginTieQuery();
+  bool endTieQuery() const;
+  void drawSky() const;
+  /// Over the colour, with depth as the texture of unit 0.
+  void darkenHollows() const;
+  void blendGlass() const;
+
+ private:
+  unsigned program(const Batch& batch, bool normals);
+
+  GlVertexArray vertexArray_;
+  GlBuffer uniforms_;
+  GlProgram sky_, hollows_;
+  GlQuery ties_;
+  std::array<std::optional<GlProgram>, 12> surfaces_;  ///< see program()
+  StreamBuffer instances_, commands_;
+};
+
+}  // namespace enfilade::render

@@ -1,0 +1,136 @@
+// How fast pictures are made: one draw an object with frustum culling beside what the renderer
+// does, in one run, over the same walks, with every channel compared byte by byte.
+//
+//   render_bench [SCENE [FRAMES]]
+//
+// SCENE is a file, or district:N for a district of N objects straight from its generator; without
+// one: the district of 1e5 objects, and the small house and the estate where the shared folder is.
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+
+#include "assets/building.hpp"
+#include "assets/landmarks.hpp"
+#include "render/gl/gl_renderer.hpp"
+#include "scene/import/import_model.hpp"
+#include "tests/support/seeded_walk.hpp"
+#include "tests/support/shared_folder.hpp"
+
+namespace {
+
+using namespace enfilade;
+using Clock = std::chrono::steady_clock;
+using collision::Vec3;
+
+struct Size {
+  int width, height;
+};
+
+scene::Model modelOf(const std::string& name) {
+  const std::string district = "district:";
+  if (name.starts_with(district))
+    return assets::makeDistrict(std::stoul(name.substr(district.size())), 1);
+  return scene::importModel(name, {});
+}
+
+std::vector<tests::WalkStop> walkIn(const std::shared_ptr<const scene::Scene>& scene,
+                                    const std::string& name, int frames) {
+  tests::SeededWalk walk(scene, 2026);
+  // In a district: through the rooms of the gallery in its first block.
+  const bool begun = name.starts_with("district:")
+                         ? walk.beginAt(Vec3(-26, 0.46, 0) + assets::landmarks::kRooms[2], 0)
+                         : walk.begin(0);
+  return begun ? walk.walk(frames) : std::vector<tests::WalkStop>{};
+}
+
+bool same(const render::Frame& a, const render::Frame& b) {
+  return a.rgb == b.rgb && a.ids == b.ids && a.depth.size() == b.depth.size() &&
+         std::memcmp(a.depth.data(), b.depth.data(), a.depth.size() * sizeof(float)) == 0;
+}
+
+struct Result {
+  double seconds = 0;
+  std::size_t frames = 0;
+  render::FrameStatistics statistics{0, 0, 0, 0};
+};
+
+render::Frame draw(render::GlRenderer& renderer, const tests::WalkStop& stop, Size size,
+                   render::Culling culling, Result& result) {
+  render::Camera camera = stop.camera;
+  camera.width = size.width;
+  camera.height = size.height;
+  const auto begin = Clock::now();
+  render::Frame frame =
+      renderer.render(*stop.snapshot, camera, {.hidden = stop.walker, .culling = culling});
+  result.seconds += std::chrono::duration<double>(Clock::now() - begin).count();
+  ++result.frames;
+  result.statistics.drawn += frame.statistics.drawn;
+  result.statistics.occluded += frame.statistics.occluded;
+  result.statistics.outside += frame.statistics.outside;
+  result.statistics.passes += frame.statistics.passes - 1;
+  return frame;
+}
+
+/// Walks once with culling alone, as it is used; then frames of both are compared.
+void measure(const std::shared_ptr<const scene::Scene>& scene, const std::string& name,
+             bool textured, Size size, int frames) {
+  const std::vector<tests::WalkStop> stops = walkIn(scene, name, frames);
+  if (stops.empty()) {
+    std::printf("%s: nowhere to stand\n", name.c_str());
+    return;
+  }
+  render::GlRenderer renderer(scene);
+  Result warm, culled, single, ignored;
+  for (int i = 0; i < 3; ++i) draw(renderer, stops[0], size, render::Culling::hidden, warm);
+  for (const auto& stop : stops) draw(renderer, stop, size, render::Culling::hidden, culled);
+  std::size_t different = 0, compared = 0;
+  draw(renderer, stops[0], size, render::Culling::singly, warm);
+  const std::size_t every = std::max<std::size_t>(1, stops.size() / 12);
+  for (std::size_t i = 0; i < stops.size(); i += every, ++compared) {
+    const render::Frame all = draw(renderer, stops[i], size, render::Culling::singly, single);
+    const render::Frame seen = draw(renderer, stops[i], size, render::Culling::hidden, ignored);
+    different += same(all, seen) ? 0 : 1;
+  }
+  const double n = static_cast<double>(culled.frames);
+  const double fast = n / culled.seconds, slow = static_cast<double>(single.frames) / single.seconds;
+  std::printf(
+      "%-28.28s %-5s %4dx%-4d %8.1f %8.2f %7.1f  drawn %6.0f of %6.0f  redrawn %4.1f%%  %s\n",
+      std::filesystem::path(name).filename().c_str(), textured ? "yes" : "no", size.width,
+      size.height, fast, slow, fast / slow, culled.statistics.drawn / n,
+      (culled.statistics.drawn + culled.statistics.occluded) / n,
+      100 * static_cast<double>(culled.statistics.passes) / n,
+      different == 0 ? "same bytes" : "DIFFERENT BYTES");
+  std::fflush(stdout);
+}
+
+void benchmark(const std::string& name, int frames) {
+  scene::Model model = modelOf(name);
+  const bool textures = !model.textures.empty();
+  const auto textured = std::make_shared<const scene::Scene>(model);
+  for (scene::Material& material : model.materials) material.baseColourTexture = -1;
+  const auto plain = textures ? std::make_shared<const scene::Scene>(std::move(model)) : textured;
+  for (const Size size : {Size{256, 256}, Size{640, 480}}) {
+    measure(plain, name, false, size, frames);
+    if (textures) measure(textured, name, true, size, frames);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (const auto code = scene::runImportChild(argc, argv)) return *code;
+  std::printf("scene                        text. size      frames/s one-each   ratio\n");
+  const int frames = argc > 2 ? std::atoi(argv[2]) : 240;
+  if (argc > 1) {
+    benchmark(argv[1], frames);
+    return 0;
+  }
+  benchmark("district:100000", frames);
+  if (const auto shared = tests::sharedFolder()) {
+    benchmark((*shared / "scenes/schependomlaan/schependomlaan_estate.glb").string(), frames);
+    benchmark((*shared / "scenes/aws-small-house/small_house.gltf").string(), frames);
+  }
+  return 0;
+}

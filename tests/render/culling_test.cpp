@@ -1,0 +1,181 @@
+// What is left out of a drawing leaves no trace in the picture.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <random>
+
+#include "render/gl/depth_pyramid.hpp"
+#include "tests/render/hand_made_scene.hpp"
+
+namespace enfilade::render {
+namespace {
+
+using Random = std::mt19937;
+
+double uniform(Random& random, double low, double high) {
+  return low + (high - low) * (static_cast<double>(random() >> 5) * 0x1p-27);
+}
+
+Vec3 within(Random& random, double size) {
+  const double x = uniform(random, -size, size), y = uniform(random, -size, size);
+  const double z = uniform(random, -size, size);
+  return {x, y, z};
+}
+
+/// Walls with much behind them, some of it glass, some in the same place as others.
+std::vector<PlacedBox> rooms(unsigned seed) {
+  Random random(seed);
+  std::vector<PlacedBox> boxes;
+  for (int i = -3; i <= 3; ++i) {
+    boxes.push_back({{4.0 * i, 0, 0}, {0.2, 4, 30}, coloured(0.7f, 0.7f, 0.6f)});
+    boxes.push_back({{0, 0, 4.0 * i}, {30, 4, 0.2}, coloured(0.5f, 0.6f, 0.7f)});
+  }
+  boxes.push_back({{0, -2, 0}, {30, 0.2, 30}, coloured(0.3f, 0.3f, 0.3f)});
+  for (int i = 0; i < 600; ++i) {
+    PlacedBox box{within(random, 12), (within(random, 0.5).cwiseAbs() + Vec3(0.05, 0.05, 0.05)),
+                  coloured(0.1f * static_cast<float>(i % 9), 0.5f, 0.4f, i % 11 == 0 ? 0.4f : 1)};
+    box.centre.y() *= 0.15;
+    if (i % 5 == 0) box.size.x() *= -1;
+    boxes.push_back(box);
+    if (i % 20 == 0) {  // in the same place, of another colour: a tie in every pixel
+      box.material = coloured(0.9f, 0.1f, 0.1f);
+      boxes.push_back(box);
+    }
+  }
+  return boxes;
+}
+
+void expectSame(const Frame& a, const Frame& b, const std::string& where) {
+  EXPECT_TRUE(a.rgb == b.rgb) << "colour, " << where;
+  EXPECT_TRUE(a.ids == b.ids) << "ids, " << where;
+  EXPECT_TRUE(a.normals == b.normals) << "normals, " << where;
+  ASSERT_EQ(a.depth.size(), b.depth.size());
+  EXPECT_EQ(std::memcmp(a.depth.data(), b.depth.data(), a.depth.size() * sizeof(float)), 0)
+      << "depth, " << where;
+}
+
+Camera cameraAt(Random& random, int kind) {
+  Camera camera;
+  camera.eye = within(random, 11);
+  camera.eye.y() *= 0.15;
+  camera.forward = within(random, 1);
+  camera.forward.y() *= 0.3;
+  camera.width = 90;
+  camera.height = 70;
+  if (kind == 1) camera.pinhole = Pinhole{60, 80, 20, 50};
+  if (kind == 2) {
+    camera.projection = Camera::Projection::orthographic;
+    camera.heightY = 9;
+  }
+  return camera;
+}
+
+TEST(DepthPyramid, HidesExactlyWhatEveryPixelHides) {
+  Random random(3);
+  DepthPyramid pyramid;
+  int hidden = 0, shown = 0;
+  for (int picture = 0; picture < 60; ++picture) {
+    const int width = 1 + static_cast<int>(random() % 90),
+              height = 1 + static_cast<int>(random() % 90);
+    std::vector<float>& depth = pyramid.base(width, height);
+    for (float& d : depth) d = random() % 200 == 0 ? 0.1f : 0.5f;
+    const std::vector<float> copy = depth;
+    pyramid.build();
+    for (int i = 0; i < 200; ++i) {
+      PixelRect r{static_cast<int>(random() % static_cast<unsigned>(width)),
+                  static_cast<int>(random() % static_cast<unsigned>(height)), 0, 0};
+      r.right = std::min(width - 1, r.left + static_cast<int>(random() % 30));
+      r.bottom = std::min(height - 1, r.top + static_cast<int>(random() % 30));
+      bool all = true;
+      for (int y = r.top; y <= r.bottom; ++y)
+        for (int x = r.left; x <= r.right; ++x)
+          all = all && copy[static_cast<std::size_t>(y * width + x)] > 0.3f;
+      ASSERT_EQ(pyramid.hides(r, 0.3f), all);
+      ++(all ? hidden : shown);
+    }
+  }
+  EXPECT_GT(hidden, 2000);
+  EXPECT_GT(shown, 2000);
+}
+
+TEST(Culling, PicturesFromAnywhereAreThoseOfDrawingEverything) {
+  GlRenderer renderer(sceneOf(rooms(1)));
+  Random random(5);
+  std::uint64_t occluded = 0;
+  for (int i = 0; i < 60; ++i) {
+    const Camera camera = cameraAt(random, i % 4);
+    FrameOptions options{.channels = {true, true, true, true},
+                         .glass = i % 3 == 0 ? Glass::solid : Glass::clear};
+    const Frame culled = renderer.render({}, camera, options);
+    options.culling = Culling::outside;
+    const Frame all = renderer.render({}, camera, options);
+    expectSame(culled, all, "picture " + std::to_string(i));
+    EXPECT_LE(culled.statistics.drawn, all.statistics.drawn);
+    occluded += culled.statistics.occluded;
+  }
+  EXPECT_GT(occluded, 60u * 50u);
+}
+
+TEST(Culling, AWalkKeepsItsPicturesAndMostlyDrawsOnce) {
+  GlRenderer renderer(sceneOf(rooms(2)));
+  Camera camera;
+  camera.width = camera.height = 80;
+  std::uint32_t passes = 0, drawn = 0, inside = 0;
+  constexpr int kSteps = 120;
+  for (int i = 0; i < kSteps; ++i) {
+    camera.eye = {-11 + 0.15 * i, 0.1, 1.7};
+    camera.forward = {std::cos(0.02 * i), 0, std::sin(0.02 * i)};
+    const Frame culled = renderer.render({}, camera);
+    const Frame single = renderer.render({}, camera, {.culling = Culling::singly});
+    expectSame(culled, single, "step " + std::to_string(i));
+    passes += culled.statistics.passes;
+    drawn += culled.statistics.drawn;
+    inside += single.statistics.drawn;
+  }
+  EXPECT_LT(passes, 2u * kSteps);
+  EXPECT_LT(3 * drawn, 2 * inside);
+}
+
+TEST(Culling, WhatIsInTheSamePlaceAndComesIntoViewLaterWinsOrLosesAsInDrawingEverything) {
+  // A red and a blue box in one place; the red one, first in order, is hidden from the guess by a
+  // smaller box of its own: the blue one is seen a picture earlier.
+  for (const bool swapped : {false, true}) {
+    PlacedBox red{{0, 0, -6}, {2, 2, 2}, coloured(1, 0, 0)};
+    PlacedBox blue{{0, 0, -5.5}, {2, 2, 1}, coloured(0, 0, 1)};
+    if (swapped) std::swap(red, blue);
+    GlRenderer renderer(sceneOf({red, blue, {{0, 0, -2}, {1, 6, 0.1}, coloured(0, 1, 0)}}));
+    Camera camera = squareCamera(64);
+    for (int i = -40; i <= 40; ++i) {
+      camera.eye.x() = 0.1 * i;
+      expectSame(renderer.render({}, camera),
+                 renderer.render({}, camera, {.culling = Culling::outside}),
+                 "step " + std::to_string(i));
+    }
+  }
+}
+
+TEST(Culling, SeveralCamerasInTurnEachKeepTheirPictures) {
+  GlRenderer renderer(sceneOf(rooms(4)));
+  std::vector<Camera> cameras;
+  Random random(8);
+  for (int i = 0; i < 6; ++i) cameras.push_back(cameraAt(random, 0));
+  for (int turn = 0; turn < 8; ++turn) {
+    for (Camera& camera : cameras) {
+      camera.eye += 0.05 * camera.forward;
+      const Frame culled = renderer.render({}, camera);
+      expectSame(culled, renderer.render({}, camera, {.culling = Culling::outside}), "a camera");
+    }
+  }
+}
+
+TEST(Culling, NothingIsLostWhereNothingHides) {
+  GlRenderer renderer(sceneOf({{{-1, 0, -5}, {0.5, 1, 1}, {}}, {{1, 0, -5}, {0.5, 1, 1}, {}}}));
+  const Frame frame = renderer.render({}, squareCamera(64));
+  EXPECT_EQ(frame.statistics.drawn, 2u);
+  EXPECT_EQ(frame.statistics.occluded, 0u);
+  EXPECT_EQ(frame.statistics.outside, 0u);
+}
+
+}  // namespace
+}  // namespace enfilade::render

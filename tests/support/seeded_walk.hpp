@@ -1,0 +1,113 @@
+// A walk through any scene, the same for the same seed: pictures of it are what tests and
+// benchmarks compare.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "render/camera.hpp"
+#include "scene/world.hpp"
+
+namespace enfilade::tests {
+
+struct WalkStop {
+  std::shared_ptr<const scene::Snapshot> snapshot;
+  render::Camera camera;       ///< the eyes of `walker`; its size is left to who draws
+  scene::EntityId walker = 0;  ///< not drawn
+};
+
+class SeededWalk {
+ public:
+  SeededWalk(std::shared_ptr<const scene::Scene> scene, unsigned seed)
+      : world_(std::move(scene)), random_(seed) {}
+
+  /// Stands `companions` and one avatar more near the middle of the scene, where there is ground;
+  /// false when there is none.
+  bool begin(int companions) {
+    if (!standSomewhere("ann", 400)) return false;
+    for (int i = 0; i < companions; ++i) standSomewhere("friend" + std::to_string(i), 5);
+    heading_ = uniform(0, 2 * std::numbers::pi);
+    return true;
+  }
+
+  /// Begins at a place that is known.
+  bool beginAt(const collision::Vec3& feet, double heading) {
+    heading_ = heading;
+    return stand("ann", feet);
+  }
+
+  /// `ticks` of walking towards seeded goals, looking around at the pace of a person. Empty when
+  /// the walker is gone.
+  std::vector<WalkStop> walk(int ticks, double goalEverySeconds = 2) {
+    std::vector<WalkStop> stops;
+    const int goalEvery = static_cast<int>(goalEverySeconds * 60);
+    for (int i = 0; i < ticks; ++i) {
+      if (i % goalEvery == 0) {
+        wanted_ = uniform(0, 2 * std::numbers::pi);
+        const collision::Vec3 way(std::cos(wanted_), 0, std::sin(wanted_));
+        for (const scene::AvatarView& avatar : world_.snapshot()->avatars)
+          submit(world_, {avatar.name, scene::Drive{1.5 * way}, 0});
+      }
+      const scene::TickReport report = tick(world_);
+      const auto& avatars = report.snapshot->avatars;
+      const auto ann = std::find_if(avatars.begin(), avatars.end(),
+                                    [](const auto& a) { return a.name == "ann"; });
+      if (ann == avatars.end()) break;
+      turn();
+      WalkStop stop{report.snapshot, render::firstPerson(*ann, 64, 64), ann->id};
+      stop.camera.forward =
+          collision::Vec3(std::cos(heading_), 0.2 * std::sin(0.01 * i), std::sin(heading_));
+      stops.push_back(std::move(stop));
+    }
+    return stops;
+  }
+
+ private:
+  double uniform(double low, double high) {
+    return low + (high - low) * (static_cast<double>(random_() >> 11) * 0x1p-53);
+  }
+
+  bool stand(const std::string& name, const collision::Vec3& feet) {
+    const auto isThere = [&]() -> const scene::AvatarView* {
+      for (const auto& avatar : world_.snapshot()->avatars)
+        if (avatar.name == name) return &avatar;
+      return nullptr;
+    };
+    if (submit(world_, {name, scene::Spawn{feet}, 0})) return false;
+    tick(world_);
+    if (!isThere()) return false;
+    for (int i = 0; i < 60; ++i) tick(world_);
+    if (isThere() && isThere()->grounded) return true;
+    submit(world_, {name, scene::Leave{}, 0});
+    tick(world_);
+    return false;
+  }
+
+  bool standSomewhere(const std::string& name, int attempts) {
+    const scene::Box& b = world_.scene().bounds();
+    for (int i = 0; i < attempts; ++i) {
+      const double x = uniform(b.min.x() + 0.2 * b.size().x(), b.max.x() - 0.2 * b.size().x());
+      const double z = uniform(b.min.z() + 0.2 * b.size().z(), b.max.z() - 0.2 * b.size().z());
+      const double y = uniform(b.min.y(), b.min.y() + 0.7 * b.size().y());
+      if (stand(name, {x, y, z})) return true;
+    }
+    return false;
+  }
+
+  /// Towards where the walk goes, at most 2 rad/s.
+  void turn() {
+    constexpr double kFastest = 2.0 / 60;  // radians a tick
+    heading_ +=
+        std::clamp(std::remainder(wanted_ - heading_, 2 * std::numbers::pi), -kFastest, kFastest);
+  }
+
+  scene::World world_;
+  std::mt19937_64 random_;
+  double heading_ = 0, wanted_ = 0;  ///< radians about +Y, from +X to +Z
+};
+
+}  // namespace enfilade::tests
