@@ -229,6 +229,7 @@ void Client::State::greet() {
   hello.set_request_id(++lastId);
   hello.mutable_hello()->set_protocol_version(kVersion);
   hello.mutable_hello()->set_client_name(options.name);
+  hello.mutable_hello()->set_token(options.token);
   send(hello, deadline);
   const auto received = receive(deadline);
   if (!received) {

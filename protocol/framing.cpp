@@ -79,9 +79,12 @@ bool Decoder::takeMagic(std::span<const std::uint8_t>& bytes) {
   // The first wrong byte is enough: a silent sender of garbage is not waited for.
   if (!std::equal(prefix_.begin(), prefix_.begin() + static_cast<std::ptrdiff_t>(prefixLength_),
                   kMagic.begin())) {
+    constexpr std::uint8_t kTlsHandshake = 0x16;
     fail(FramingError::Code::badMagic, 0,
          "the stream begins with " + shown({prefix_.data(), prefixLength_}) + " instead of " +
-             shown(kMagic));
+             shown(kMagic) +
+             (prefix_[0] == kTlsHandshake ? "; is that TLS? A proxy in front has to take that off"
+                                          : ""));
     return false;
   }
   if (!whole) return false;

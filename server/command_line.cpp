@@ -23,6 +23,8 @@ struct Arguments {
   std::string record;
   bool strict = false, verify = false, json = false, objects = false, stopAtEndOfInput = false;
   CaptureArguments capture;
+  std::string tokenFile;
+  Access access;
   std::string auditEvery = "0", epsilon, stepHeight, slope, sliding = "slide";
 };
 
@@ -118,6 +120,18 @@ scene::Lengths lengthsFrom(const Arguments& read) {
   return lengths;
 }
 
+void addAccess(CLI::App& verb, Arguments& into) {
+  verb.add_option("--token-file", into.tokenFile,
+                  "Lines of a role (observe, drive, admin) and a token; clients must have one")
+      ->check(CLI::ExistingFile);
+  verb.add_flag("--insecure", into.access.insecure,
+                "Listen, with a token file, where others can reach it, without encryption");
+  verb.add_option("--allow-host", into.access.hosts,
+                  "Names that browsers may call the server by, beside localhost and addresses");
+  verb.add_option("--allow-origin", into.access.origins,
+                  "Origins whose pages may connect, as https://example.org");
+}
+
 void addModel(CLI::App& verb, ModelArguments& into) {
   verb.add_option("SCENE", into.file, "The model: glTF, GLB, OBJ, COLLADA, FBX, IFC, IFCZIP")
       ->required();
@@ -206,6 +220,7 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   serve->add_option("--listen", read.listen, "Address and port; port 0 lets the system choose")
       ->capture_default_str()
       ->check(CLI::Validator(endpointProblem, "HOST:PORT"));
+  addAccess(*serve, read);
   serve->add_flag(
       "--stop-at-end-of-input", read.stopAtEndOfInput,
       "End when standard input is closed: so the server does not outlive who started it");
@@ -249,8 +264,9 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   }
   const std::uint32_t audit = numberFrom<std::uint32_t>(read.auditEvery).value_or(0);
   if (*serve)
-    return ServeCommand{modelFrom(read.model), *endpointFrom(read.listen), audit, lengthsFrom(read),
-                        read.stopAtEndOfInput};
+    return ServeCommand{
+        modelFrom(read.model), *endpointFrom(read.listen), audit, lengthsFrom(read), read.tokenFile,
+        read.access,           read.stopAtEndOfInput};
   if (*replay && read.verify) return verifyFrom(read);
   if (*replay) {
     if (const auto missing = missingFrom(read)) {

@@ -9,6 +9,7 @@
 #include "scene/bodies/find_bodies.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/lengths.hpp"
+#include "server/access.hpp"
 #include "server/capture/capture_options.hpp"
 #include "server/exit_code.hpp"
 
@@ -34,7 +35,9 @@ struct ServeCommand {
   Endpoint listen{"127.0.0.1", 7878};
   std::uint32_t auditEvery = 0;  ///< ticks; 0: never
   scene::Lengths lengths;
-  bool stopAtEndOfInput = false;  ///< ends when whoever started it has closed its standard input
+  std::filesystem::path tokenFile;  ///< empty: no tokens, everyone may do everything
+  Access access;                    ///< without the tokens
+  bool stopAtEndOfInput = false;    ///< ends when whoever started it has closed its standard input
 };
 struct ReplayCommand {
   ModelOptions model;

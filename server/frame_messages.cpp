@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "render/pictures/encode.hpp"
 #include "render/pictures/image.hpp"
 #include "server/world_messages.hpp"
 
@@ -65,6 +66,10 @@ void appendChannel(std::vector<std::uint8_t>& bytes, const render::Frame& frame,
     append(bytes, render::rangeOf(frame));
   } else if (channel == v1::CHANNEL_DEPTH) {
     append(bytes, frame.depth);
+  } else if (encoding == v1::ENCODING_JPEG) {
+    constexpr int kQuality = 85;
+    const render::Camera& camera = frame.camera;
+    append(bytes, render::encodeJpeg({camera.width, camera.height, 3, frame.rgb}, kQuality));
   } else if (encoding == v1::ENCODING_PNG) {
     append(bytes, render::encodePng(render::colourOf(frame)));
   } else {
@@ -74,10 +79,11 @@ void appendChannel(std::vector<std::uint8_t>& bytes, const render::Frame& frame,
 
 void addPlane(v1::Frame& message, std::vector<std::uint8_t>& attachment, const render::Frame& frame,
               v1::Channel channel, v1::Encoding rgbEncoding) {
-  const bool png = channel == v1::CHANNEL_RGB && rgbEncoding == v1::ENCODING_PNG;
+  const bool coded = channel == v1::CHANNEL_RGB &&
+                     (rgbEncoding == v1::ENCODING_PNG || rgbEncoding == v1::ENCODING_JPEG);
   v1::Plane& plane = *message.add_planes();
   plane.set_channel(channel);
-  plane.set_encoding(png ? v1::ENCODING_PNG : v1::ENCODING_RAW);
+  plane.set_encoding(coded ? rgbEncoding : v1::ENCODING_RAW);
   plane.set_width(message.width());
   plane.set_height(message.height());
   plane.set_offset(attachment.size());

@@ -25,6 +25,8 @@ Buffer frameReply(Drawing& drawing) {
   reply.set_reply_to(drawing.job.requestId);
   *reply.mutable_frame() =
       messageOf(frame, drawing.job.snapshot->time, drawing.job.request, attachment);
+  reply.mutable_frame()->set_watch(drawing.job.watch);
+  reply.mutable_frame()->set_dropped(drawing.job.dropped);
   return encodeShared(reply, attachment);
 }
 

@@ -15,7 +15,9 @@ struct FrameJob {
   std::shared_ptr<const scene::Snapshot> snapshot;
   View view;
   v1::FrameRequest request;
-  std::uint64_t requestId = 0;
+  std::uint64_t requestId = 0;  ///< 0: nobody asked for this one; it is of a watch
+  std::uint32_t watch = 0;      ///< 0: of none
+  std::uint64_t dropped = 0;    ///< Frame.dropped
 };
 
 class FrameService {

@@ -4,8 +4,8 @@
 
 #include <boost/asio/io_context.hpp>
 
+#include "server/arrival.hpp"
 #include "server/server.hpp"
-#include "server/session.hpp"
 
 namespace enfilade::server {
 namespace asio = boost::asio;
@@ -18,7 +18,7 @@ std::string textOf(const Endpoint& where) {
   return where.host + ":" + std::to_string(where.port);
 }
 
-tcp::endpoint loopbackEndpoint(const Endpoint& where) {
+tcp::endpoint endpointOf(const Endpoint& where) {
   error_code problem;
   const std::string host = where.host == "localhost" ? "127.0.0.1" : where.host;
   const asio::ip::address address = asio::ip::make_address(host, problem);
@@ -26,16 +26,22 @@ tcp::endpoint loopbackEndpoint(const Endpoint& where) {
     throw ServerError("cannot listen on " + textOf(where) +
                       ": give an address in numbers, as 127.0.0.1, or localhost");
   }
-  if (!address.is_loopback()) {
-    throw ServerError("will not listen on " + textOf(where) +
-                      ": this version has no token that would keep strangers out, so it takes only "
-                      "loopback (127.0.0.1, ::1); use a tunnel, as ssh -L, to reach it");
-  }
   return {address, where.port};
 }
 
-tcp::acceptor acceptorAt(asio::io_context& context, const Endpoint& where) {
-  const tcp::endpoint endpoint = loopbackEndpoint(where);
+void refuseStrangers(const Endpoint& where, const tcp::endpoint& endpoint, const Access& access) {
+  if (endpoint.address().is_loopback()) return;
+  if (access.tokens.empty() || !access.insecure) {
+    throw ServerError("will not listen on " + textOf(where) +
+                      ": others can reach that address, and what is said is not encrypted. Stay on "
+                      "127.0.0.1 and use a tunnel, as ssh -L, or a proxy that brings TLS; or give "
+                      "--token-file and --insecure");
+  }
+}
+
+tcp::acceptor acceptorAt(asio::io_context& context, const Endpoint& where, const Access& access) {
+  const tcp::endpoint endpoint = endpointOf(where);
+  refuseStrangers(where, endpoint, access);
   tcp::acceptor acceptor(context);
   try {
     acceptor.open(endpoint.protocol());
@@ -52,12 +58,11 @@ tcp::acceptor acceptorAt(asio::io_context& context, const Endpoint& where) {
 }  // namespace
 
 Listener::Listener(asio::io_context& context, const Endpoint& where, TickLoop& loop,
-                   const ServerLimits& limits)
-    : acceptor_(acceptorAt(context, where)),
+                   const ServerLimits& limits, Access access)
+    : acceptor_(acceptorAt(context, where, access)),
       port_(acceptor_.local_endpoint().port()),
       pause_(context),
-      loop_(loop),
-      limits_(limits) {}
+      reception_{loop, limits, std::move(access), {}} {}
 
 void Listener::start() {
   accept();
@@ -80,22 +85,22 @@ void Listener::accept() {
 }
 
 void Listener::take(tcp::socket socket) {
-  std::erase_if(sessions_, [](const auto& session) { return session.expired(); });
-  const bool full = sessions_.size() >= limits_.connections;
-  const auto session = std::make_shared<Session>(std::move(socket), loop_, limits_);
-  session->start();
-  sessions_.push_back(session);
-  if (full) session->end(v1::ERROR_NOT_ALLOWED, "the server has all the clients it takes");
+  const auto arrival = std::make_shared<Arrival>(std::move(socket), reception_);
+  arrival->start();
+  enlist(reception_, arrival);
+  if (reception_.connections.size() > reception_.limits.connections)
+    arrival->end(v1::ERROR_NOT_ALLOWED, "the server has all the clients it takes");
 }
 
 void Listener::stop() {
   error_code ignored;
   acceptor_.close(ignored);
   pause_.cancel();
-  for (const auto& weak : sessions_) {
-    if (const auto session = weak.lock()) {
-      session->end(v1::ERROR_SHUTTING_DOWN, "the server ends");
-    }
+  reception_.closed = true;
+  const auto connections = reception_.connections;  // who ends may enlist a successor
+  for (const auto& weak : connections) {
+    if (const auto connection = weak.lock())
+      connection->end(v1::ERROR_SHUTTING_DOWN, "the server ends");
   }
 }
 

@@ -9,17 +9,15 @@
 #include <vector>
 
 #include "server/command_line.hpp"
-#include "server/tick_loop.hpp"
+#include "server/reception.hpp"
 
 namespace enfilade::server {
-
-class Session;
 
 class Listener {
  public:
   /// Throws ServerError.
   Listener(boost::asio::io_context& context, const Endpoint& where, TickLoop& loop,
-           const ServerLimits& limits);
+           const ServerLimits& limits, Access access);
 
   std::uint16_t port() const { return port_; }
   void start();
@@ -33,9 +31,7 @@ class Listener {
   boost::asio::ip::tcp::acceptor acceptor_;
   const std::uint16_t port_;  ///< asked once: other threads want to know it
   boost::asio::steady_timer pause_;
-  TickLoop& loop_;
-  const ServerLimits limits_;
-  std::vector<std::weak_ptr<Session>> sessions_;
+  Reception reception_;
 };
 
 }  // namespace enfilade::server

@@ -14,30 +14,35 @@ OutgoingQueue::OutgoingQueue(const OutgoingBounds& bounds, Buffer tooSlow,
     : bounds_(bounds), tooSlow_(std::move(tooSlow)), wake_(std::move(wake)) {}
 
 void OutgoingQueue::push(Buffer message) {
-  append(Kind::kept, std::move(message));
+  append({Kind::kept, std::move(message)});
 }
 
 void OutgoingQueue::pushFrame(Buffer message) {
-  append(Kind::frame, std::move(message));
+  append({Kind::frame, std::move(message)});
 }
 
-void OutgoingQueue::pushLatest(Buffer message) {
-  append(Kind::latest, std::move(message));
+void OutgoingQueue::pushLatest(Buffer message, std::uint32_t which) {
+  append({Kind::latest, std::move(message), which});
 }
 
 void OutgoingQueue::finish(Buffer last) {
-  append(Kind::last, std::move(last));
+  append({Kind::last, std::move(last)});
 }
 
-void OutgoingQueue::append(Kind kind, Buffer message) {
+void OutgoingQueue::append(Item item) {
   {
     const std::lock_guard lock(mutex_);
     if (finished_) return;
-    if (kind == Kind::kept) bytes_ += message->size();
-    if (kind == Kind::frame) ++frames_;
-    items_.push_back({kind, std::move(message)});
-    finished_ = kind == Kind::last;
-    if (bytes_ > bounds_.bytes || frames_ > bounds_.frames) {
+    if (item.kind == Kind::kept) bytes_ += item.message->size();
+    if (item.kind == Kind::frame) {
+      ++frames_;
+      frameBytes_ += item.message->size();
+    }
+    finished_ = item.kind == Kind::last;
+    items_.push_back(std::move(item));
+    // One picture alone may be as large as it likes: its size has a limit of its own.
+    const bool framesTooLarge = frames_ > 1 && frameBytes_ > bounds_.frameBytes;
+    if (bytes_ > bounds_.bytes || frames_ > bounds_.frames || framesTooLarge) {
       overflowed_ = finished_ = true;
       items_.assign(1, {Kind::last, tooSlow_});
     }
@@ -45,9 +50,11 @@ void OutgoingQueue::append(Kind kind, Buffer message) {
   wake_();
 }
 
-bool OutgoingQueue::dropLatest() {
+bool OutgoingQueue::dropLatest(std::uint32_t which) {
   const std::lock_guard lock(mutex_);
-  return std::erase_if(items_, [](const Item& item) { return item.kind == Kind::latest; }) > 0;
+  return std::erase_if(items_, [&](const Item& item) {
+           return item.kind == Kind::latest && item.which == which;
+         }) > 0;
 }
 
 OutgoingQueue::Next OutgoingQueue::pop() {
@@ -56,7 +63,10 @@ OutgoingQueue::Next OutgoingQueue::pop() {
   Item item = std::move(items_.front());
   items_.pop_front();
   if (item.kind == Kind::kept) bytes_ -= item.message->size();
-  if (item.kind == Kind::frame) --frames_;
+  if (item.kind == Kind::frame) {
+    --frames_;
+    frameBytes_ -= item.message->size();
+  }
   return {std::move(item.message), item.kind == Kind::last};
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -25,7 +26,8 @@ Buffer encodeShared(const google::protobuf::MessageLite& message,
 
 struct OutgoingBounds {
   std::size_t bytes = 0;   ///< of unsent replies and events, pictures not counted
-  std::size_t frames = 0;  ///< unsent pictures
+  std::size_t frames = 0;  ///< unsent pictures that were asked for
+  std::size_t frameBytes = std::numeric_limits<std::size_t>::max();  ///< of those
 };
 
 class OutgoingQueue {
@@ -36,9 +38,10 @@ class OutgoingQueue {
 
   void push(Buffer message);
   void pushFrame(Buffer message);
-  void pushLatest(Buffer message);
-  /// Drops the unsent latest-only message; true when there was one.
-  bool dropLatest();
+  /// What is latest-only has a number that tells which of them it is.
+  void pushLatest(Buffer message, std::uint32_t which = 0);
+  /// Drops the unsent latest-only message of this number; true when there was one.
+  bool dropLatest(std::uint32_t which = 0);
   /// Sends what is queued, then `last`, then the connection closes. Later pushes are dropped.
   void finish(Buffer last);
 
@@ -56,15 +59,16 @@ class OutgoingQueue {
   struct Item {
     Kind kind;
     Buffer message;
+    std::uint32_t which = 0;  ///< of what is latest-only
   };
-  void append(Kind kind, Buffer message);
+  void append(Item item);
 
   const OutgoingBounds bounds_;
   const Buffer tooSlow_;
   const std::function<void()> wake_;
   mutable std::mutex mutex_;
   std::deque<Item> items_;
-  std::size_t bytes_ = 0, frames_ = 0;
+  std::size_t bytes_ = 0, frames_ = 0, frameBytes_ = 0;
   bool finished_ = false, overflowed_ = false;
 };
 

@@ -6,6 +6,7 @@
 
 #include "protocol/framing.hpp"
 #include "server/body_messages.hpp"
+#include "server/frame_watches.hpp"
 #include "server/version.hpp"
 #include "server/world_messages.hpp"
 
@@ -248,6 +249,14 @@ void answer(const Asked& asked, const v1::RayQuery& query, const PostToTickThrea
   served.rays.cast(std::move(job), untilAnswered(asked, post, &OutgoingQueue::push));
 }
 
+void answer(const Asked& asked, const v1::WatchFrames& wanted) {
+  if (auto problem = watchFrames(asked.served, asked.id, asked.client, wanted))
+    return replyError(asked, std::move(*problem));
+  v1::ServerMessage message;
+  message.mutable_watch_frames()->set_tick(lastTick(asked.served));
+  reply(asked, std::move(message));
+}
+
 v1::Entity entityOf(const scene::World& world, std::uint32_t id) {
   const auto& objects = world.scene().model().objects;
   v1::Entity entity;
@@ -326,12 +335,34 @@ void answerMetrics(const Asked& asked) {
   metrics.set_clients(static_cast<std::uint32_t>(served.clients.size()));
   metrics.set_avatars(static_cast<std::uint32_t>(served.world.snapshot()->avatars.size()));
   metrics.set_frames(served.frames.drawn());
-  metrics.set_dropped(served.droppedStates);
+  metrics.set_dropped(served.droppedStates + served.droppedFrames);
   reply(asked, std::move(message));
+}
+
+/// The least role that may ask this.
+Role roleNeeded(v1::ClientMessage::BodyCase body) {
+  switch (body) {
+    case v1::ClientMessage::kCommand:
+    case v1::ClientMessage::kBodyCommand:
+    case v1::ClientMessage::kStep:
+    case v1::ClientMessage::kSetClock:
+      return Role::drive;
+    case v1::ClientMessage::kRestart:
+      return Role::admin;
+    default:
+      return Role::observe;
+  }
 }
 
 void answer(const Asked& asked, const PostToTickThread& post) {
   const v1::ClientMessage& message = asked.message;
+  const Role needed = roleNeeded(message.body_case());
+  if (asked.client.role < needed) {
+    return replyError(
+        asked, errorOf(v1::ERROR_NOT_ALLOWED, std::string("this needs a token with the role ") +
+                                                  nameOf(needed) + ", and yours is " +
+                                                  nameOf(asked.client.role)));
+  }
   switch (message.body_case()) {
     case v1::ClientMessage::kCommand:
       return answer(asked, message.command());
@@ -347,6 +378,8 @@ void answer(const Asked& asked, const PostToTickThread& post) {
       return answer(asked, message.subscribe());
     case v1::ClientMessage::kFrame:
       return answer(asked, message.frame(), post);
+    case v1::ClientMessage::kWatchFrames:
+      return answer(asked, message.watch_frames());
     case v1::ClientMessage::kRays:
       return answer(asked, message.rays(), post);
     case v1::ClientMessage::kDescribe:
@@ -395,6 +428,7 @@ v1::Welcome welcomeOf(const ServedWorld& served) {
   limits.set_max_ticks_per_step(served.limits.ticksPerStep);
   limits.set_max_waypoints(served.limits.waypoints);
   limits.set_max_rays(served.limits.rays);
+  limits.set_max_watches(served.limits.watches);
   limits.set_max_scan_rays(served.limits.scanRays);
   welcome.set_tick(lastTick(served));
   welcome.set_renderer(served.frames.deviceName());

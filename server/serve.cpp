@@ -64,10 +64,12 @@ int awaitEndingSignal(const sigset_t& ending, const Server& server, bool stopAtE
 }  // namespace
 
 ExitCode serve(const ServeCommand& command) {
+  Access access = command.access;
+  if (!command.tokenFile.empty()) access.tokens = readTokens(command.tokenFile);
   const auto scene = loadScene(command.model);
   // From here on: the threads that the server starts inherit the mask.
   const sigset_t ending = holdEndingSignals();
-  Server server(scene, command.listen, {}, command.auditEvery, command.lengths);
+  Server server(scene, command.listen, {}, command.auditEvery, command.lengths, std::move(access));
   tellReady(server, *scene, command.listen);
   const int signal = awaitEndingSignal(ending, server, command.stopAtEndOfInput);
   spdlog::info("{}: finishing the tick and telling the clients",

@@ -4,6 +4,7 @@
 
 #include "protocol/framing.hpp"
 #include "server/body_messages.hpp"
+#include "server/frame_watches.hpp"
 #include "server/world_messages.hpp"
 
 namespace enfilade::server {
@@ -170,6 +171,7 @@ void advance(ServedWorld& served) {
   for (auto& [id, client] : served.clients) {
     sendEvents(client, told);
     sendState(served, client, *report.snapshot);
+    drawWatched(served, id, client);
     finishStep(served, client, *report.snapshot);
   }
 }
@@ -191,6 +193,7 @@ void restartWorld(ServedWorld& served) {
   for (auto& [id, client] : served.clients) {
     sendEvents(client, told);
     client.nextStateTime = 0;
+    for (auto& [number, watch] : client.watches) watch.nextTime = 0;
   }
   served.world = scene::World(served.scene, served.world.lengths());
   scene::auditBroadPhase(served.world, served.auditEvery);

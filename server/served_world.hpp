@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -11,6 +12,7 @@
 
 #include "protocol/enfilade.pb.h"
 #include "scene/world.hpp"
+#include "server/access.hpp"
 #include "server/frame_service.hpp"
 #include "server/outgoing_queue.hpp"
 #include "server/ray_service.hpp"
@@ -33,8 +35,19 @@ struct WaitingRequest {
   std::size_t bytes = 0;
 };
 
+/// Pictures that are sent unasked.
+struct FrameWatch {
+  v1::FrameRequest request;
+  double rate = 0;               ///< a second of simulated time; 0: every tick
+  double nextTime = 0;           ///< seconds of simulated time
+  bool underWay = false;         ///< one is being drawn
+  std::uint64_t dropped = 0;     ///< since the last one that was begun
+  std::uint64_t generation = 0;  ///< tells it from one that it replaced
+};
+
 struct Client {
   std::string name;
+  Role role = Role::observe;
   std::shared_ptr<OutgoingQueue> out;
   v1::Subscribe subscription;
   std::uint64_t sequence = 0;          ///< of the last TickEvents
@@ -43,6 +56,7 @@ struct Client {
   std::deque<WaitingRequest> waiting;  ///< replies keep the order of the requests
   std::size_t waitingBytes = 0;
   std::optional<StepUnderWay> step;
+  std::map<std::uint32_t, FrameWatch> watches;
   std::optional<std::uint64_t> answerUnderWay;  ///< the request that a service works on
 };
 
@@ -73,6 +87,10 @@ struct ServedWorld {
   TickStatistics statistics;
   bool idle = true;                 ///< as the last tick told
   std::uint64_t droppedStates = 0;  ///< of all clients
+  std::uint64_t droppedFrames = 0;  ///< of all watches
+  std::uint64_t lastWatch = 0;      ///< the last FrameWatch::generation
+  /// Hands a job to the tick thread; callable from any thread.
+  std::function<void(std::function<void(ServedWorld&)>)> post;
 };
 
 /// Makes one tick and tells everyone what they subscribed to.

@@ -10,11 +10,12 @@ namespace enfilade::server {
 
 struct Server::State {
   State(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
-        const ServerLimits& limits, std::uint32_t auditEvery, const scene::Lengths& lengths)
+        const ServerLimits& limits, std::uint32_t auditEvery, const scene::Lengths& lengths,
+        Access access)
       : frames(scene),
         rays(scene),
         loop(std::move(scene), frames, rays, limits, auditEvery, lengths),
-        listener(context, listen, loop, limits) {}
+        listener(context, listen, loop, limits, std::move(access)) {}
 
   boost::asio::io_context context{1};  ///< one thread: its handlers need no lock
   FrameService frames;
@@ -25,8 +26,10 @@ struct Server::State {
 };
 
 Server::Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
-               const ServerLimits& limits, std::uint32_t auditEvery, const scene::Lengths& lengths)
-    : state_(std::make_unique<State>(std::move(scene), listen, limits, auditEvery, lengths)) {
+               const ServerLimits& limits, std::uint32_t auditEvery, const scene::Lengths& lengths,
+               Access access)
+    : state_(std::make_unique<State>(std::move(scene), listen, limits, auditEvery, lengths,
+                                     std::move(access))) {
   state_->listener.start();
   state_->network = std::thread([state = state_.get()] { state->context.run(); });
 }

@@ -1,4 +1,4 @@
-// A scene served to clients over TCP.
+// A scene served to clients over TCP, WebSocket and HTTP.
 #pragma once
 
 #include <memory>
@@ -6,6 +6,7 @@
 
 #include "scene/lengths.hpp"
 #include "scene/scene.hpp"
+#include "server/access.hpp"
 #include "server/audit_log.hpp"
 #include "server/command_line.hpp"
 #include "server/server_limits.hpp"
@@ -19,12 +20,12 @@ struct ServerError : std::runtime_error {
 
 class Server {
  public:
-  /// Clients may connect when this returns. Throws ServerError: the address is not this machine's
-  /// own (loopback), or cannot be had.
+  /// Clients may connect when this returns. Throws ServerError: the address cannot be had, or
+  /// others can reach it and `access` does not allow that.
   /// Every `auditEvery`-th tick is audited; 0: none.
   Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
          const ServerLimits& limits = {}, std::uint32_t auditEvery = 0,
-         const scene::Lengths& lengths = {});
+         const scene::Lengths& lengths = {}, Access access = {});
   ~Server();  ///< stops
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

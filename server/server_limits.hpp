@@ -20,10 +20,12 @@ struct ServerLimits {
   std::size_t waitingBytes = 4u << 20;    ///< of requests that a client may have under way
   std::size_t outgoingBytes = 64u << 20;  ///< of unsent replies and events of one client
   std::size_t outgoingFrames = 4;         ///< unsent pictures of one client
-  int sendBuffer = 0;                     ///< bytes in the system's hands; 0: as it likes
-  std::chrono::milliseconds greeting{5'000};  ///< from the connection to the whole Hello
-  std::chrono::milliseconds message{10'000};  ///< from a message's first byte to its last
-  std::chrono::milliseconds farewell{2'000};  ///< for the last words to be taken
+  std::size_t outgoingFrameBytes = 512u << 20;  ///< of those, when there are several
+  std::uint32_t watches = 16;                   ///< subscriptions to pictures of one client
+  int sendBuffer = 0;                           ///< bytes in the system's hands; 0: as it likes
+  std::chrono::milliseconds greeting{5'000};    ///< from the connection to the whole Hello
+  std::chrono::milliseconds message{10'000};    ///< from a message's first byte to its last
+  std::chrono::milliseconds farewell{2'000};    ///< for the last words to be taken
 };
 
 }  // namespace enfilade::server

@@ -3,13 +3,11 @@
 #include <spdlog/spdlog.h>
 
 #include <boost/asio/post.hpp>
-#include <boost/asio/write.hpp>
 
 #include "server/world_messages.hpp"
 
 namespace enfilade::server {
 namespace asio = boost::asio;
-using asio::ip::tcp;
 
 namespace {
 
@@ -23,13 +21,6 @@ Buffer goodbye(v1::ErrorCode code, const std::string& reason) {
   message.mutable_bye()->set_code(code);
   message.mutable_bye()->set_reason(reason);
   return encodeShared(message);
-}
-
-std::string addressOf(const tcp::socket& socket) {
-  boost::system::error_code problem;
-  const tcp::endpoint endpoint = socket.remote_endpoint(problem);
-  if (problem) return "a client that is gone";
-  return endpoint.address().to_string() + ":" + std::to_string(endpoint.port());
 }
 
 v1::ErrorCode codeOf(protocol::FramingError::Code code) {
@@ -46,46 +37,44 @@ std::string printable(std::string text) {
 
 }  // namespace
 
-Session::Session(tcp::socket socket, TickLoop& loop, const ServerLimits& limits)
-    : socket_(std::move(socket)),
-      timer_(socket_.get_executor()),
-      loop_(loop),
-      limits_(limits),
-      peer_(addressOf(socket_)),
-      decoder_(protocol::kServerTakes) {}
+Session::Session(std::unique_ptr<Wire> wire, asio::any_io_executor executor, Reception& reception)
+    : wire_(std::move(wire)),
+      executor_(std::move(executor)),
+      timer_(executor_),
+      reception_(reception),
+      peer_(wire_->peer()),
+      decoder_(protocol::kServerTakes, wire_->beginsWithMagic()
+                                           ? protocol::Decoder::Expect::magicFirst
+                                           : protocol::Decoder::Expect::messages) {}
 
-void Session::start() {
-  ErrorCode ignored;  // a peer that is gone already is told by the first read
-  socket_.set_option(tcp::no_delay(true), ignored);
-  socket_.set_option(asio::socket_base::keep_alive(true), ignored);
-  if (limits_.sendBuffer > 0) {
-    socket_.set_option(asio::socket_base::send_buffer_size(limits_.sendBuffer), ignored);
-  }
-  const auto wake = [weak = weak_from_this(), executor = socket_.get_executor()] {
+void Session::start(Timer::time_point deadline, std::string token) {
+  token_ = std::move(token);
+  const auto wake = [weak = weak_from_this(), executor = executor_] {
     asio::post(executor, [weak] {
       if (const auto self = weak.lock()) self->sendNext();
     });
   };
+  const ServerLimits& limits = reception_.limits;
   out_ = std::make_shared<OutgoingQueue>(
-      OutgoingBounds{limits_.outgoingBytes, limits_.outgoingFrames},
+      OutgoingBounds{limits.outgoingBytes, limits.outgoingFrames, limits.outgoingFrameBytes},
       goodbye(v1::ERROR_TOO_SLOW, "replies and events were not read: more than " +
-                                      std::to_string(limits_.outgoingBytes) + " bytes or " +
-                                      std::to_string(limits_.outgoingFrames) + " frames wait"),
+                                      std::to_string(limits.outgoingBytes) + " bytes or " +
+                                      std::to_string(limits.outgoingFrames) + " frames wait"),
       wake);
-  out_->push(magic());
-  armTimer(limits_.greeting, v1::ERROR_TIMEOUT, "no whole hello came in time");
+  if (wire_->beginsWithMagic()) out_->push(magic());
+  armTimer(deadline, v1::ERROR_TIMEOUT, "no whole hello came in time");
   read();
 }
 
 // ---- in ----------------------------------------------------------------------------------------
 
 void Session::read() {
-  socket_.async_read_some(asio::buffer(in_),
-                          [self = shared_from_this()](ErrorCode problem, std::size_t bytes) {
-                            if (problem) return self->close(problem.message());
-                            self->takeBytes({self->in_.data(), bytes});
-                            if (!self->closed_) self->read();
-                          });
+  wire_->read(
+      [self = shared_from_this()](const std::string& problem, std::span<const std::uint8_t> bytes) {
+        if (!problem.empty()) return self->close(problem);
+        self->takeBytes(bytes);
+        if (!self->closed_) self->read();
+      });
 }
 
 void Session::takeBytes(std::span<const std::uint8_t> bytes) {
@@ -105,7 +94,9 @@ void Session::takeBytes(std::span<const std::uint8_t> bytes) {
   if (client_ == 0 || (halfway && messageHalfway_ && !whole)) return;  // the timer runs on
   messageHalfway_ = halfway;
   timer_.expires_at(Timer::time_point::max());
-  if (halfway) armTimer(limits_.message, v1::ERROR_TIMEOUT, "half a message, then silence");
+  if (halfway)
+    armTimer(Timer::clock_type::now() + reception_.limits.message, v1::ERROR_TIMEOUT,
+             "half a message, then silence");
 }
 
 void Session::take(const protocol::Message& framed) {
@@ -121,7 +112,8 @@ void Session::take(const protocol::Message& framed) {
   }
   if (client_ == 0) return greet(message);
   if (message.has_bye()) return close("it said goodbye");
-  loop_.receive(client_, std::move(message), framed.header.size() + framed.attachment.size());
+  reception_.loop.receive(client_, std::move(message),
+                          framed.header.size() + framed.attachment.size());
 }
 
 void Session::greet(const v1::ClientMessage& message) {
@@ -140,8 +132,16 @@ void Session::greet(const v1::ClientMessage& message) {
     return fail(v1::ERROR_BAD_MESSAGE, "hello.client_name: give at most 64 bytes",
                 message.request_id());
   }
+  const auto role = roleOf(reception_.access, hello.token().empty() ? token_ : hello.token());
+  if (!role) {
+    return fail(v1::ERROR_UNAUTHENTICATED,
+                hello.token().empty() && token_.empty()
+                    ? "this server wants a token: give hello.token"
+                    : "hello.token is none of this server's: ask whoever runs it for one",
+                message.request_id());
+  }
   if (!hello.client_name().empty()) peer_ += " (" + printable(hello.client_name()) + ")";
-  client_ = loop_.join(hello.client_name(), out_, message.request_id());
+  client_ = reception_.loop.join(hello.client_name(), *role, out_, message.request_id());
   spdlog::info("{} came", peer_);
 }
 
@@ -166,22 +166,22 @@ void Session::sendNext() {
   if (closed_) return;
   if (out_->finished()) sayGoodbye();
   if (sending_) return;
-  const OutgoingQueue::Next next = out_->pop();
+  OutgoingQueue::Next next = out_->pop();
   if (!next.message) return;
-  sending_ = next.message;
-  asio::async_write(socket_, asio::buffer(*sending_),
-                    [self = shared_from_this(), last = next.last](ErrorCode problem, std::size_t) {
-                      self->written(problem, last);
-                    });
+  sending_ = true;
+  wire_->write(std::move(next.message),
+               [self = shared_from_this(), last = next.last](const std::string& problem) {
+                 self->written(problem, last);
+               });
 }
 
-void Session::written(ErrorCode problem, bool last) {
-  sending_.reset();
-  if (problem) return close(problem.message());
+void Session::written(const std::string& problem, bool last) {
+  sending_ = false;
+  if (!problem.empty()) return close(problem);
   if (!last) return sendNext();
   // A socket closed with unread bytes would take the last words back (TCP resets); so the peer
   // closes first, or the farewell timer ends it.
-  socket_.shutdown(tcp::socket::shutdown_send, problem);
+  wire_->endSending([self = shared_from_this()] {});
 }
 
 /// The queue has its last words: they have limited time to get through.
@@ -192,14 +192,14 @@ void Session::sayGoodbye() {
     spdlog::warn("{}: too slow for its replies and events; disconnected", peer_);
   }
   listening_ = false;
-  timer_.expires_after(limits_.farewell);
+  timer_.expires_after(reception_.limits.farewell);
   timer_.async_wait([self = shared_from_this()](ErrorCode problem) {
     if (!problem) self->close("it did not close in time");
   });
 }
 
-void Session::armTimer(std::chrono::milliseconds time, v1::ErrorCode code, std::string reason) {
-  timer_.expires_after(time);
+void Session::armTimer(Timer::time_point deadline, v1::ErrorCode code, std::string reason) {
+  timer_.expires_at(deadline);
   timer_.async_wait([weak = weak_from_this(), code, reason = std::move(reason)](ErrorCode problem) {
     const auto self = weak.lock();
     if (problem || !self || !self->listening_) return;
@@ -213,11 +213,10 @@ void Session::close(const std::string& why) {
   closed_ = true;
   if (listening_ || client_ != 0) spdlog::info("{} left: {}", peer_, why);
   listening_ = false;
-  ErrorCode ignored;
-  socket_.close(ignored);
+  wire_->close();
   timer_.cancel();
   out_->finish(goodbye(v1::ERROR_UNSPECIFIED, "closed"));
-  if (client_ != 0) loop_.leave(client_);
+  if (client_ != 0) reception_.loop.leave(client_);
 }
 
 }  // namespace enfilade::server

@@ -1,27 +1,28 @@
-// One connection: bytes to messages and back. What a message means is the tick loop's to know.
+// One client: bytes to messages and back. What a message means is the tick loop's to know.
 // Lives on the network thread as long as one of its reads, writes or timers is under way.
 //
-// Asio appears in this header, which only session.cpp and listener.cpp include.
+// Asio appears in this header, which only those files include that take connections.
 #pragma once
 
-#include <array>
-#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <memory>
 #include <string>
 
 #include "protocol/framing.hpp"
-#include "server/tick_loop.hpp"
+#include "server/reception.hpp"
+#include "server/wire.hpp"
 
 namespace enfilade::server {
 
-class Session : public std::enable_shared_from_this<Session> {
+class Session : public Connection, public std::enable_shared_from_this<Session> {
  public:
-  Session(boost::asio::ip::tcp::socket socket, TickLoop& loop, const ServerLimits& limits);
+  Session(std::unique_ptr<Wire> wire, boost::asio::any_io_executor executor, Reception& reception);
 
-  void start();
+  /// The whole Hello has to be here by `deadline`. `token` is what the wire's own greeting had.
+  void start(std::chrono::steady_clock::time_point deadline, std::string token = {});
   /// Says goodbye and closes, within ServerLimits::farewell.
-  void end(v1::ErrorCode code, const std::string& reason);
+  void end(v1::ErrorCode code, const std::string& reason) override;
 
  private:
   using ErrorCode = boost::system::error_code;
@@ -33,20 +34,20 @@ class Session : public std::enable_shared_from_this<Session> {
   void greet(const v1::ClientMessage& message);
   void fail(v1::ErrorCode code, const std::string& reason, std::uint64_t requestId = 0);
   void sendNext();
-  void written(ErrorCode problem, bool last);
-  void armTimer(std::chrono::milliseconds time, v1::ErrorCode code, std::string reason);
+  void written(const std::string& problem, bool last);
+  void armTimer(Timer::time_point deadline, v1::ErrorCode code, std::string reason);
   void sayGoodbye();
   void close(const std::string& why);
 
-  boost::asio::ip::tcp::socket socket_;
+  const std::unique_ptr<Wire> wire_;
+  const boost::asio::any_io_executor executor_;
   Timer timer_;
-  TickLoop& loop_;
-  const ServerLimits limits_;
+  Reception& reception_;
   std::string peer_;  ///< for logs: address and port, and the name that it gave itself
+  std::string token_;
   protocol::Decoder decoder_;
-  std::array<std::uint8_t, 1 << 16> in_{};
   std::shared_ptr<OutgoingQueue> out_;
-  Buffer sending_;
+  bool sending_ = false;
   ClientId client_ = 0;  ///< 0: not greeted
   bool messageHalfway_ = false;
   bool listening_ = true;     ///< false: what still comes is thrown away

@@ -73,6 +73,7 @@ TickLoop::TickLoop(std::shared_ptr<const scene::Scene> scene, FrameService& fram
                    RayService& rays, const ServerLimits& limits, std::uint32_t auditEvery,
                    const scene::Lengths& lengths)
     : served_(std::move(scene), frames, rays, limits, lengths, auditEvery) {
+  served_.post = [this](Job job) { post(std::move(job)); };
   thread_ = std::thread([this] { run(); });
 }
 
@@ -80,20 +81,22 @@ TickLoop::~TickLoop() {
   stop();
 }
 
-ClientId TickLoop::join(std::string name, std::shared_ptr<OutgoingQueue> out,
+ClientId TickLoop::join(std::string name, Role role, std::shared_ptr<OutgoingQueue> out,
                         std::uint64_t requestId) {
   ClientId id = 0;
   {
     const std::lock_guard lock(mutex_);
     id = ++lastId_;
   }
-  post([id, requestId, name = std::move(name), out = std::move(out)](ServedWorld& served) {
+  post([id, role, requestId, name = std::move(name), out = std::move(out)](ServedWorld& served) {
     Client& client = served.clients[id];
     client.name = name;
+    client.role = role;
     client.out = out;
     v1::ServerMessage message;
     message.set_reply_to(requestId);
     *message.mutable_welcome() = welcomeOf(served);
+    message.mutable_welcome()->set_role(static_cast<v1::Role>(static_cast<int>(role) + 1));
     send(client, message);
   });
   return id;

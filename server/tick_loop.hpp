@@ -24,7 +24,8 @@ class TickLoop {
   // All of these but the last may be called from any thread.
 
   /// Greets a client: its Welcome answers `requestId`.
-  ClientId join(std::string name, std::shared_ptr<OutgoingQueue> out, std::uint64_t requestId);
+  ClientId join(std::string name, Role role, std::shared_ptr<OutgoingQueue> out,
+                std::uint64_t requestId);
   void receive(ClientId id, v1::ClientMessage message, std::size_t bytes);
   void leave(ClientId id);
   /// Finishes the tick, closes the world, and ends the thread. Later calls do nothing.

@@ -20,7 +20,7 @@ TEST_F(BadClients, WrongMagicIsAnsweredWithAnError) {
   serve();
   protocol::Client other = client("other");
   RawConnection raw(server_->port());
-  raw.send("GET / HTTP/1.1\r\n\r\n");
+  raw.send("EHLO there\r\n");
   const RawConnection::End end = raw.readToEnd();
   EXPECT_EQ(end.error.code(), v1::ERROR_BAD_MESSAGE);
   EXPECT_EQ(end.bye.code(), v1::ERROR_BAD_MESSAGE);

@@ -92,4 +92,16 @@ RawConnection::End RawConnection::readToEnd() {
   return end;
 }
 
+std::string RawConnection::readText(const std::string& end) {
+  std::string text;
+  pollfd descriptor{socket_, POLLIN, 0};
+  while (text.find(end) == std::string::npos && ::poll(&descriptor, 1, 20'000) > 0) {
+    std::array<char, 1 << 16> buffer{};
+    const auto count = ::recv(socket_, buffer.data(), buffer.size(), 0);
+    if (count <= 0) break;
+    text.append(buffer.data(), static_cast<std::size_t>(count));
+  }
+  return text;
+}
+
 }  // namespace enfilade::server::testing

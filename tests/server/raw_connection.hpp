@@ -34,6 +34,8 @@ class RawConnection {
     bool closed = false;
   };
   End readToEnd();
+  /// What comes until `end` stands in it, the server closes, or 20 s pass.
+  std::string readText(const std::string& end = "\x01 never");
 
  private:
   int socket_ = -1;

@@ -15,12 +15,14 @@ namespace enfilade::server::testing {
 class ServedRoom : public ::testing::Test {
  protected:
   void serve(const ServerLimits& limits = {},
-             std::shared_ptr<const scene::Scene> scene = smallRoom()) {
-    server_ = std::make_unique<Server>(std::move(scene), Endpoint{"127.0.0.1", 0}, limits);
+             std::shared_ptr<const scene::Scene> scene = smallRoom(), Access access = {}) {
+    server_ = std::make_unique<Server>(std::move(scene), Endpoint{"127.0.0.1", 0}, limits, 0,
+                                       scene::Lengths{}, std::move(access));
   }
-  protocol::Client client(const std::string& name) {
+  protocol::Client client(const std::string& name, const std::string& token = "") {
     protocol::ClientOptions options;
     options.name = name;
+    options.token = token;
     return protocol::Client("127.0.0.1", server_->port(), options);
   }
 

@@ -281,7 +281,7 @@ TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
   TickLoop loop(smallRoom(), frames, rays, {});
   const auto out = std::make_shared<OutgoingQueue>(OutgoingBounds{std::size_t{1} << 30, 2},
                                                    encodeShared(v1::Bye()), [] {});
-  const ClientId ann = loop.join("ann", out, 1);
+  const ClientId ann = loop.join("ann", Role::admin, out, 1);
   v1::ClientMessage request;
   request.set_request_id(2);
   request.mutable_set_clock()->mutable_free_run()->set_speed(1000);

@@ -23,13 +23,14 @@ def _vec(point: Point) -> Any:
     return messages.Vec3(x=x, y=y, z=z)
 
 
-def connect(address: str = "127.0.0.1:7878", *, name: str = "enfilade python",
+def connect(address: str = "127.0.0.1:7878", *, name: str = "enfilade python", token: str = "",
             timeout: float = 30.0) -> "Client":
-    """Connects to HOST:PORT. Raises ConnectionFailed, or ServerError when it is refused."""
+    """Connects to HOST:PORT, with a token where the server wants one. Raises ConnectionFailed, or ServerError when it is refused."""
     host, colon, port = address.rpartition(":")
     if not colon or not port.isdigit():
         raise ValueError(f"address: give HOST:PORT, as 127.0.0.1:7878, not {address!r}")
-    return Client(host.strip("[]"), int(port), name=name, timeout=timeout)
+    return Client(host.strip("[]"), int(port), name=name, token=token,
+                  timeout=timeout)
 
 
 class Client:
@@ -40,7 +41,7 @@ class Client:
     contacts(), notices() or states() take it.
     """
 
-    def __init__(self, host: str, port: int, *, name: str = "enfilade python",
+    def __init__(self, host: str, port: int, *, name: str = "enfilade python", token: str = "",
                  timeout: float = 30.0) -> None:
         self._connection = Connection(host, port, timeout)
         self._ids = itertools.count(1)
@@ -49,7 +50,8 @@ class Client:
         self._notices: Deque[Notice] = deque()
         self._states: Deque[State] = deque(maxlen=1)
         self._sequence = 0
-        hello = messages.Hello(protocol_version=PROTOCOL_VERSION, client_name=name)
+        hello = messages.Hello(protocol_version=PROTOCOL_VERSION, client_name=name,
+                               token=token)
         try:
             self.welcome: Any = self.request(hello=hello)[0].welcome
         except BaseException:

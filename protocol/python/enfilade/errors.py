@@ -20,6 +20,7 @@ _REMEDIES = {
     "ERROR_TICK_GONE": "ask before the next step, or without a tick",
     "ERROR_TIMEOUT": "send whole messages without long pauses",
     "ERROR_UNSUPPORTED": "use a server that offers it; see Client.capabilities",
+    "ERROR_UNAUTHENTICATED": "connect with token=",
     "ERROR_BAD_RAYS": "change the field that is named",
 }
 

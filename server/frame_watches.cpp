@@ -1,0 +1,88 @@
+#include "server/frame_watches.hpp"
+
+#include "server/world_messages.hpp"
+
+namespace enfilade::server {
+namespace {
+
+/// On the service's thread: hands the picture over, and lets the next one begin. An error, as of a
+/// device that was lost, is not the client's to hear again and again: the service's log has it.
+void deliver(ServedWorld& served, ClientId id, std::uint32_t number, std::uint64_t generation,
+             const std::shared_ptr<OutgoingQueue>& out, FrameJob job) {
+  served.frames.draw(
+      std::move(job), [out, number, generation, id, post = served.post](Buffer picture) {
+        out->pushLatest(std::move(picture), number);
+        post([id, number, generation](ServedWorld& then) {
+          const auto client = then.clients.find(id);
+          if (client == then.clients.end()) return;
+          const auto watch = client->second.watches.find(number);
+          if (watch != client->second.watches.end() && watch->second.generation == generation) {
+            watch->second.underWay = false;
+          }
+        });
+      });
+}
+
+void draw(ServedWorld& served, ClientId id, Client& client, std::uint32_t number,
+          FrameWatch& watch) {
+  const auto snapshot = served.world.snapshot();
+  auto view = viewFrom(watch.request, *snapshot);
+  if (std::holds_alternative<v1::Error>(view)) return;
+  if (client.out->dropLatest(number)) ++watch.dropped;
+  served.droppedFrames += watch.dropped;
+  watch.underWay = true;
+  FrameJob job{snapshot, std::get<View>(std::move(view)), watch.request, 0, number, watch.dropped};
+  watch.dropped = 0;
+  deliver(served, id, number, watch.generation, client.out, std::move(job));
+}
+
+}  // namespace
+
+std::optional<v1::Error> watchFrames(ServedWorld& served, ClientId id, Client& client,
+                                     const v1::WatchFrames& wanted) {
+  const std::uint32_t most = served.limits.watches;
+  if (wanted.watch() < 1 || wanted.watch() > most) {
+    return errorOf(v1::ERROR_BAD_MESSAGE, "watch: give a number from 1 to " + std::to_string(most),
+                   "watch_frames.watch");
+  }
+  if (!wanted.has_frame()) {
+    client.watches.erase(wanted.watch());
+    return std::nullopt;
+  }
+  if (!(wanted.rate() >= 0 && wanted.rate() <= 1e6)) {
+    return errorOf(v1::ERROR_BAD_MESSAGE, "rate: give 0 to 1000000 a second", "watch_frames.rate");
+  }
+  if (wanted.frame().has_tick()) {
+    return errorOf(v1::ERROR_BAD_MESSAGE, "frame.tick: a watch is of all ticks; leave it out",
+                   "watch_frames.frame.tick");
+  }
+  if (served.frames.deviceName().empty())
+    return errorOf(v1::ERROR_NO_RENDERER, served.frames.whyNone());
+  const auto view = viewFrom(wanted.frame(), *served.world.snapshot());
+  const auto* problem = std::get_if<v1::Error>(&view);
+  // An avatar may come later; all else that is wrong with a view stays wrong.
+  if (problem && problem->code() != v1::ERROR_UNKNOWN_AVATAR) return *problem;
+  FrameWatch watch;
+  watch.request = wanted.frame();
+  watch.rate = wanted.rate();
+  watch.generation = ++served.lastWatch;
+  FrameWatch& kept =
+      client.watches.insert_or_assign(wanted.watch(), std::move(watch)).first->second;
+  if (!problem) draw(served, id, client, wanted.watch(), kept);
+  return std::nullopt;
+}
+
+void drawWatched(ServedWorld& served, ClientId id, Client& client) {
+  const double now = served.world.snapshot()->time;
+  for (auto& [number, watch] : client.watches) {
+    if (now + served.world.lengths().tick / 2 < watch.nextTime) continue;
+    if (watch.underWay) {
+      ++watch.dropped;
+      continue;
+    }
+    watch.nextTime = now + (watch.rate > 0 ? 1 / watch.rate : 0);
+    draw(served, id, client, number, watch);
+  }
+}
+
+}  // namespace enfilade::server

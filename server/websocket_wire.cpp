@@ -1,0 +1,73 @@
+#include "server/websocket_wire.hpp"
+
+#include <boost/beast/websocket/rfc6455.hpp>
+
+#include "protocol/framing.hpp"
+#include "server/tcp_wire.hpp"
+#include "server/version.hpp"
+
+namespace enfilade::server {
+namespace asio = boost::asio;
+namespace websocket = boost::beast::websocket;
+using boost::system::error_code;
+
+namespace {
+
+std::string told(const error_code& problem) {
+  return problem ? problem.message() : std::string();
+}
+
+}  // namespace
+
+WebSocketWire::WebSocketWire(asio::ip::tcp::socket socket, Request request)
+    : peer_(addressOf(socket) + " by WebSocket"),
+      stream_(std::move(socket)),
+      request_(std::move(request)) {
+  constexpr std::size_t kLengths = 8;  // bytes, of the framing
+  stream_.read_message_max(protocol::kServerTakes.total + kLengths);
+  stream_.binary(true);
+  stream_.auto_fragment(false);
+  stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
+    response.set(boost::beast::http::field::server, std::string("enfilade ") + kServerVersion);
+  }));
+}
+
+/// The first read answers the upgrade first. Nothing is written before it: Session answers Hello.
+void WebSocketWire::read(Heard done) {
+  if (accepted_) return readMessage(std::move(done));
+  stream_.async_accept(request_, [this, done = std::move(done)](error_code problem) mutable {
+    if (problem) return done(problem.message(), {});
+    accepted_ = true;
+    readMessage(std::move(done));
+  });
+}
+
+void WebSocketWire::readMessage(Heard done) {
+  in_.clear();
+  stream_.async_read(in_, [this, done = std::move(done)](error_code problem, std::size_t) {
+    if (problem) return done(problem.message(), {});
+    if (!stream_.got_binary()) return done("it sent text; only binary messages are taken", {});
+    const auto data = in_.cdata();
+    done("", {static_cast<const std::uint8_t*>(data.data()), data.size()});
+  });
+}
+
+void WebSocketWire::write(Buffer bytes, Written done) {
+  if (!accepted_) return done("the upgrade was not answered yet");
+  const auto view = asio::buffer(*bytes);
+  stream_.async_write(view, [bytes = std::move(bytes), done = std::move(done)](
+                                error_code problem, std::size_t) { done(told(problem)); });
+}
+
+void WebSocketWire::endSending(std::function<void()> done) {
+  if (!accepted_) return done();
+  stream_.async_close(websocket::close_code::normal,
+                      [done = std::move(done)](error_code) { done(); });
+}
+
+void WebSocketWire::close() {
+  error_code ignored;
+  stream_.next_layer().close(ignored);
+}
+
+}  // namespace enfilade::server

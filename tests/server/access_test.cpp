@@ -1,0 +1,133 @@
+// Who may do what, and what a server on an address that strangers reach wants first.
+#include "server/access.hpp"
+
+#include <filesystem>
+#include <fstream>
+
+#include "tests/server/raw_connection.hpp"
+#include "tests/server/served_room.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+const std::string kLooker = "looker-0123456789", kDriver = "driver-0123456789",
+                  kAdmin = "keeper-0123456789";
+
+Access threeTokens() {
+  Access access;
+  access.tokens = {{Role::observe, kLooker}, {Role::drive, kDriver}, {Role::admin, kAdmin}};
+  return access;
+}
+
+template <typename Action>
+v1::ErrorCode codeOf(Action action) {
+  try {
+    action();
+  } catch (const protocol::ProtocolError& error) {
+    return error.code;
+  }
+  return v1::ERROR_UNSPECIFIED;
+}
+
+TEST(Access, WithoutTokensEveryoneIsAdmin) {
+  EXPECT_EQ(roleOf({}, ""), Role::admin);
+}
+
+TEST(Access, OnlyAWholeTokenIsTaken) {
+  const Access access = threeTokens();
+  EXPECT_EQ(roleOf(access, kDriver), Role::drive);
+  for (const std::string& wrong : {std::string(), kDriver.substr(1), kDriver + "0",
+                                   std::string(kDriver.size(), 'x'), kDriver + kDriver}) {
+    EXPECT_EQ(roleOf(access, wrong), std::nullopt) << wrong;
+  }
+}
+
+TEST(Access, BrowsersMayComeOnlyFromPagesThatAreKnown) {
+  Access access;
+  access.hosts = {"house.example.org"};
+  access.origins = {"https://viewer.example.org"};
+  EXPECT_FALSE(foreignPage(access, "127.0.0.1:7878", ""));
+  EXPECT_FALSE(foreignPage(access, "[::1]:7878", ""));
+  EXPECT_FALSE(foreignPage(access, "localhost:7878", "http://localhost:7878"));
+  EXPECT_FALSE(foreignPage(access, "house.example.org", "https://viewer.example.org"));
+  EXPECT_TRUE(foreignPage(access, "", ""));
+  EXPECT_TRUE(foreignPage(access, "rebound.example.com:7878", ""));
+  EXPECT_TRUE(foreignPage(access, "localhost:7878", "http://localhost:3000"));
+  EXPECT_TRUE(foreignPage(access, "localhost:7878", "https://evil.example.com"));
+  EXPECT_TRUE(foreignPage(access, "localhost:7878", "null"));
+}
+
+TEST(Access, ATokenFileIsReadOrItsLineNamed) {
+  const auto file =
+      std::filesystem::temp_directory_path() / ("enfilade_tokens_" + std::to_string(::getpid()));
+  const auto write = [&](const std::string& text) { std::ofstream(file) << text; };
+  write("# who looks\nobserve " + kLooker + "\n\nadmin " + kAdmin + "\n");
+  EXPECT_EQ(readTokens(file).size(), 2u);
+  for (const std::string& bad : {std::string(""), "observe\n" + kLooker, std::string("drive short"),
+                                 "king " + kAdmin, "admin " + kAdmin + " more"}) {
+    write(bad);
+    EXPECT_THROW(readTokens(file), std::runtime_error) << bad;
+  }
+  std::filesystem::remove(file);
+  EXPECT_THROW(readTokens(file), std::runtime_error);
+}
+
+class Roles : public ServedRoom {
+ protected:
+  void SetUp() override { serve({}, smallRoom(), threeTokens()); }
+};
+
+TEST_F(Roles, AWrongTokenOrNoneIsTurnedAway) {
+  EXPECT_EQ(codeOf([&] { client("none"); }), v1::ERROR_UNAUTHENTICATED);
+  EXPECT_EQ(codeOf([&] { client("wrong", kAdmin + "x"); }), v1::ERROR_UNAUTHENTICATED);
+  EXPECT_EQ(client("right", kLooker).welcome().role(), v1::ROLE_OBSERVE);
+}
+
+TEST_F(Roles, EachMayDoWhatItsRoleAllows) {
+  protocol::Client looker = client("looker", kLooker), driver = client("driver", kDriver);
+  v1::ClientMessage restart;
+  restart.mutable_restart();
+  EXPECT_EQ(codeOf([&] { looker.step(); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(looker.command(spawn("a", 0, 0, 0))->code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(looker.metrics().ticks(), 0u);
+  EXPECT_EQ(driver.step().tick(), 1u);
+  EXPECT_EQ(codeOf([&] { driver.request(restart); }), v1::ERROR_NOT_ALLOWED);
+}
+
+TEST_F(Roles, TheAdminMakesTheWorldAnew) {
+  protocol::Client admin = client("admin", kAdmin);
+  const std::uint64_t first = admin.step().state_hash();
+  admin.command(spawn("a", 0, 0.01, 0));
+  admin.step(10);
+  v1::ClientMessage restart;
+  restart.mutable_restart();
+  EXPECT_EQ(admin.request(restart).restart().tick(), 0u);
+  EXPECT_EQ(admin.step().state_hash(), first);
+}
+
+TEST_F(Roles, PagesWantATokenTooButHealthDoesNot) {
+  const auto get = [&](const std::string& target, const std::string& more = "") {
+    RawConnection raw(server_->port());
+    raw.send("GET " + target + " HTTP/1.1\r\nHost: localhost\r\n" + more + "\r\n");
+    return raw.readText().substr(0, 12);
+  };
+  EXPECT_EQ(get("/metrics"), "HTTP/1.1 401");
+  EXPECT_EQ(get("/metrics?token=" + kLooker), "HTTP/1.1 200");
+  EXPECT_EQ(get("/metrics", "Authorization: Bearer " + kLooker + "\r\n"), "HTTP/1.1 200");
+  EXPECT_EQ(get("/healthz"), "HTTP/1.1 200");
+}
+
+TEST(Listening, AnAddressOfStrangersWantsATokenAndInsecure) {
+  const Endpoint everywhere{"0.0.0.0", 0};
+  Access access;
+  EXPECT_THROW(Server(smallRoom(), everywhere), ServerError);
+  access.insecure = true;
+  EXPECT_THROW(Server(smallRoom(), everywhere, {}, 0, {}, access), ServerError);
+  access = threeTokens();
+  EXPECT_THROW(Server(smallRoom(), everywhere, {}, 0, {}, access), ServerError);
+  access.insecure = true;
+  EXPECT_GT(Server(smallRoom(), everywhere, {}, 0, {}, access).port(), 0);
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing

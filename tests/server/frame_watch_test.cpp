@@ -1,0 +1,109 @@
+// Subscriptions to pictures.
+#include "tests/server/served_room.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+class FrameWatches : public ServedRoom {
+ protected:
+  void SetUp() override {
+    serve();
+    ENFILADE_NEED_PICTURES(*server_);
+  }
+  static v1::ClientMessage watching(std::uint32_t number, double rate) {
+    v1::ClientMessage message;
+    v1::WatchFrames& watch = *message.mutable_watch_frames();
+    watch.set_watch(number);
+    watch.set_rate(rate);
+    watch.mutable_frame()->set_width(8);
+    watch.mutable_frame()->set_height(8);
+    watch.mutable_frame()->mutable_free()->mutable_forward()->set_x(1);
+    return message;
+  }
+  static std::optional<v1::Frame> nextFrame(protocol::Client& client, int patienceMs = 20'000) {
+    const auto event = client.nextEvent(std::chrono::milliseconds(patienceMs));
+    if (!event || !event->has_frame()) return std::nullopt;
+    return event->frame();
+  }
+  static v1::ErrorCode codeOf(protocol::Client& client, const v1::ClientMessage& message) {
+    try {
+      client.request(message);
+    } catch (const protocol::ProtocolError& error) {
+      return error.code;
+    }
+    return v1::ERROR_UNSPECIFIED;
+  }
+};
+
+TEST_F(FrameWatches, OneComesAtOnceAndThenOneATick) {
+  protocol::Client ann = client("ann");
+  ann.request(watching(3, 0));
+  const auto first = nextFrame(ann);
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->watch(), 3u);
+  EXPECT_EQ(first->tick(), 0u);
+  ann.step();
+  EXPECT_EQ(nextFrame(ann).value().tick(), 1u);
+}
+
+TEST_F(FrameWatches, WhatIsLeftOutIsCounted) {
+  protocol::Client ann = client("ann");
+  ann.request(watching(1, 0));
+  ann.step(500);
+  std::uint64_t told = 0, last = 0;
+  while (last < 500) {
+    const auto frame = nextFrame(ann, 300);
+    if (!frame) {  // the last tick's turn was missed while another was drawn
+      last = ann.step().tick() - 1;
+      continue;
+    }
+    EXPECT_GE(frame->tick(), last);
+    told += 1 + frame->dropped();
+    last = frame->tick();
+    EXPECT_LE(told, last + 1) << "each tick has one picture, sent or left out";
+  }
+  EXPECT_LT(told, 503u);
+}
+
+TEST_F(FrameWatches, ARateIsOfSimulatedTime) {
+  protocol::Client ann = client("ann");
+  ann.request(watching(1, 2));
+  EXPECT_EQ(nextFrame(ann).value().tick(), 0u);
+  std::vector<std::uint64_t> ticks;
+  for (int i = 0; i < 62; ++i) {
+    ann.step();
+    if (i % 30 == 0) ticks.push_back(nextFrame(ann).value().tick());
+  }
+  EXPECT_EQ(ticks, (std::vector<std::uint64_t>{1, 31, 61}));
+  EXPECT_FALSE(nextFrame(ann, 50)) << "and no others";
+}
+
+TEST_F(FrameWatches, AnAvatarMayComeLaterAndAWatchEnds) {
+  protocol::Client ann = client("ann");
+  v1::ClientMessage eyes = watching(1, 0);
+  eyes.mutable_watch_frames()->mutable_frame()->mutable_eyes()->set_avatar("ann");
+  ann.request(eyes);
+  ann.step();
+  EXPECT_FALSE(nextFrame(ann, 50));
+  ann.command(spawn("ann", 0, 0.01, 0));
+  ann.step();
+  EXPECT_EQ(nextFrame(ann).value().tick(), 2u);
+  v1::ClientMessage none;
+  none.mutable_watch_frames()->set_watch(1);
+  ann.request(none);
+  ann.step();
+  EXPECT_FALSE(nextFrame(ann, 50));
+}
+
+TEST_F(FrameWatches, WhatCannotBeWatchedIsRefused) {
+  protocol::Client ann = client("ann");
+  EXPECT_EQ(codeOf(ann, watching(0, 0)), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(codeOf(ann, watching(17, 0)), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(codeOf(ann, watching(1, -1)), v1::ERROR_BAD_MESSAGE);
+  v1::ClientMessage huge = watching(1, 0);
+  huge.mutable_watch_frames()->mutable_frame()->set_width(5000);
+  EXPECT_EQ(codeOf(ann, huge), v1::ERROR_BAD_CAMERA);
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing

@@ -1,0 +1,159 @@
+// HTTP and WebSocket on the same port, and what is neither.
+#include "server/http_pages.hpp"
+#include "tests/server/raw_connection.hpp"
+#include "tests/server/served_room.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+const std::string kHost = "Host: localhost\r\n";
+const std::string kUpgrade =
+    "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+
+/// A client's message of a WebSocket, masked by zeros: up to 125 bytes (RFC 6455, 5.2).
+std::vector<std::uint8_t> webSocketMessage(int opcode, const std::vector<std::uint8_t>& payload) {
+  std::vector<std::uint8_t> bytes{static_cast<std::uint8_t>(0x80 | opcode),
+                                  static_cast<std::uint8_t>(0x80 | payload.size()),
+                                  0,
+                                  0,
+                                  0,
+                                  0};
+  bytes.insert(bytes.end(), payload.begin(), payload.end());
+  return bytes;
+}
+
+std::vector<std::uint8_t> hello() {
+  v1::ClientMessage message;
+  message.set_request_id(1);
+  message.mutable_hello()->set_protocol_version(protocol::kVersion);
+  return protocol::encode(message);
+}
+
+class Http : public ServedRoom {
+ protected:
+  std::string answerTo(const std::string& request) {
+    RawConnection raw(server_->port());
+    raw.send(request);
+    return raw.readText();
+  }
+  std::string get(const std::string& target) {
+    return answerTo("GET " + target + " HTTP/1.1\r\n" + kHost + "\r\n");
+  }
+};
+
+TEST_F(Http, HealthIsOkAndUnknownPagesAreNamed) {
+  serve();
+  EXPECT_NE(get("/healthz").find("\r\n\r\nok\n"), std::string::npos);
+  EXPECT_EQ(get("/secrets").substr(0, 12), "HTTP/1.1 404");
+  EXPECT_EQ(answerTo("POST /metrics HTTP/1.1\r\n" + kHost + "\r\n").substr(0, 12), "HTTP/1.1 405");
+  EXPECT_EQ(answerTo("GET  nonsense\r\n\r\n").substr(0, 12), "HTTP/1.1 400");
+  EXPECT_EQ(answerTo("GET / HTTP/1.1\r\nX: " + std::string(20'000, 'x') + "\r\n\r\n").substr(0, 12),
+            "HTTP/1.1 431");
+}
+
+TEST_F(Http, MetricsTellTheTicks) {
+  serve();
+  protocol::Client other = client("other");
+  other.step(7);
+  const std::string page = get("/metrics");
+  EXPECT_NE(page.find("text/plain; version=0.0.4"), std::string::npos);
+  EXPECT_NE(page.find("\nenfilade_ticks_total 7\n"), std::string::npos) << page;
+  EXPECT_NE(page.find("\nenfilade_clients 2\n"), std::string::npos);
+  EXPECT_NE(page.find("enfilade_stage_microseconds{stage=\"tick\",quantile=\"0.5\"} "),
+            std::string::npos);
+}
+
+TEST_F(Http, PagesOfStrangersAreTurnedAway) {
+  serve();
+  const std::string upgrade = "GET / HTTP/1.1\r\n" + kUpgrade;
+  EXPECT_EQ(answerTo(upgrade + kHost + "Origin: https://evil.example.com\r\n\r\n").substr(0, 12),
+            "HTTP/1.1 403");
+  EXPECT_EQ(answerTo(upgrade + "Host: rebound.example.com\r\n\r\n").substr(0, 12), "HTTP/1.1 403");
+  EXPECT_EQ(answerTo("GET /metrics HTTP/1.1\r\n\r\n").substr(0, 12), "HTTP/1.1 403");
+}
+
+TEST_F(Http, AWebSocketSpeaksTheProtocol) {
+  serve();
+  RawConnection raw(server_->port());
+  raw.send("GET / HTTP/1.1\r\n" + kHost + "Origin: http://localhost\r\n" + kUpgrade + "\r\n");
+  const std::string head = raw.readText("\r\n\r\n");
+  EXPECT_EQ(head.substr(0, 12), "HTTP/1.1 101");
+  EXPECT_NE(head.find("s3pPLMBiTxaQ9kYGzzhZRbK+xOo="), std::string::npos) << "RFC 6455, 1.3";
+  raw.send(webSocketMessage(2, hello()));
+  EXPECT_NE(raw.readText("small_room").find("small_room"), std::string::npos);
+  raw.send(webSocketMessage(8, {}));
+  EXPECT_TRUE(raw.readText().ends_with(std::string("\x88\x00", 2))) << "closed in return";
+}
+
+TEST_F(Http, TextInAWebSocketAndTooLongMessagesEndIt) {
+  serve();
+  for (const auto& bytes :
+       {webSocketMessage(1, hello()),
+        std::vector<std::uint8_t>{0x82, 0xFF, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0}}) {
+    RawConnection raw(server_->port());
+    raw.send("GET / HTTP/1.1\r\n" + kHost + kUpgrade + "\r\n");
+    raw.readText("\r\n\r\n");
+    raw.send(bytes);
+    EXPECT_EQ(raw.readText("small_room").find("small_room"), std::string::npos);
+  }
+  EXPECT_EQ(client("other").step().tick(), 1u);
+}
+
+TEST_F(Http, WhoIsSlowWithARequestIsGivenUp) {
+  ServerLimits limits;
+  limits.greeting = std::chrono::milliseconds(50);
+  serve(limits);
+  EXPECT_EQ(answerTo("GET /healthz HTTP/1.1\r\nX-Slow: ").substr(0, 12), "HTTP/1.1 408");
+  RawConnection never(server_->port());
+  never.send("GE");
+  EXPECT_EQ(never.readToEnd().error.code(), v1::ERROR_BAD_MESSAGE);
+  RawConnection quiet(server_->port());
+  quiet.send("GET / HTTP/1.1\r\n" + kHost + kUpgrade + "\r\n");
+  EXPECT_NE(quiet.readText().find("no whole hello came in time"), std::string::npos);
+}
+
+TEST_F(Http, ATlsGreetingIsToldWhatIsWrong) {
+  serve();
+  RawConnection raw(server_->port());
+  raw.send(std::vector<std::uint8_t>{0x16, 0x03, 0x01, 0x02, 0x00, 0x01, 0x00, 0x01, 0xFC});
+  const v1::Error error = raw.readToEnd().error;
+  EXPECT_EQ(error.code(), v1::ERROR_BAD_MESSAGE);
+  EXPECT_NE(error.message().find("TLS"), std::string::npos) << error.message();
+}
+
+TEST_F(Http, PicturesFlowAsTheWorldMoves) {
+  serve();
+  ENFILADE_NEED_PICTURES(*server_);
+  protocol::Client other = client("other");
+  RawConnection raw(server_->port());
+  raw.send("GET /mjpeg/camera?eye=0,1,0&target=5,1,0&width=32&height=24&rate=0 HTTP/1.1\r\n" +
+           kHost + "\r\n");
+  EXPECT_NE(raw.readText("X-Tick: 0").find("multipart/x-mixed-replace"), std::string::npos);
+  other.step();
+  EXPECT_NE(raw.readText("X-Tick: 1").find("\xFF\xD8\xFF"), std::string::npos) << "a JPEG begins";
+  EXPECT_EQ(get("/mjpeg/camera?eye=0,1&target=5,1,0").substr(0, 12), "HTTP/1.1 400");
+  EXPECT_EQ(get("/mjpeg/camera?eye=0,1,0&target=5,1,0&width=9999").substr(0, 12), "HTTP/1.1 400");
+}
+
+TEST_F(Http, TheEndOfTheServerEndsItsVisits) {
+  serve();
+  RawConnection raw(server_->port());
+  raw.send("GET / HTTP/1.1\r\n" + kHost + kUpgrade + "\r\n");
+  raw.readText("\r\n\r\n");
+  raw.send(webSocketMessage(2, hello()));
+  raw.readText("small_room");
+  server_->stop();
+  EXPECT_NE(raw.readText().find("the server ends"), std::string::npos);
+}
+
+TEST(HttpPages, TargetsAreTakenApart) {
+  const Target target = targetOf("/mjpeg/avatar/a%2Eb?width=3&x=%zz&flag");
+  EXPECT_EQ(target.path, "/mjpeg/avatar/a.b");
+  EXPECT_EQ(target.query.at("width"), "3");
+  EXPECT_EQ(target.query.at("x"), "%zz");
+  EXPECT_EQ(target.query.at("flag"), "");
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing
