@@ -5,22 +5,22 @@
 namespace enfilade::server {
 namespace {
 
-/// On the service's thread: hands the picture over, and lets the next one begin. An error, as of a
-/// device that was lost, is not the client's to hear again and again: the service's log has it.
+/// Lets the next picture begin before this one is handed over: who saw it and then steps gets the
+/// next. So two may be unsent for a moment. An error, as of a device that was lost, is handed over
+/// too.
 void deliver(ServedWorld& served, ClientId id, std::uint32_t number, std::uint64_t generation,
              const std::shared_ptr<OutgoingQueue>& out, FrameJob job) {
-  served.frames.draw(
-      std::move(job), [out, number, generation, id, post = served.post](Buffer picture) {
-        out->pushLatest(std::move(picture), number);
-        post([id, number, generation](ServedWorld& then) {
-          const auto client = then.clients.find(id);
-          if (client == then.clients.end()) return;
-          const auto watch = client->second.watches.find(number);
-          if (watch != client->second.watches.end() && watch->second.generation == generation) {
-            watch->second.underWay = false;
-          }
-        });
-      });
+  const auto drawn = [id, number, generation](ServedWorld& then) {
+    const auto client = then.clients.find(id);
+    if (client == then.clients.end()) return;
+    const auto watch = client->second.watches.find(number);
+    if (watch != client->second.watches.end() && watch->second.generation == generation)
+      watch->second.underWay = false;
+  };
+  served.frames.draw(std::move(job), [out, number, drawn, post = served.post](Buffer picture) {
+    post(drawn);
+    out->pushLatest(std::move(picture), number);
+  });
 }
 
 void draw(ServedWorld& served, ClientId id, Client& client, std::uint32_t number,
