@@ -84,6 +84,17 @@ class Refusals(RoomCase):
         with self.assertRaisesRegex(enfilade.OrderFailed, "column"):
             self.client.spawn("ann", at=(0, 0, 6)).enter()
 
+    def test_a_server_with_tokens_wants_one(self):
+        tokens = Path(self.folder.name) / "tokens"
+        tokens.write_text("observe looker-0123456789\n")
+        with enfilade.serve(self.scene, "--token-file", str(tokens)) as server:
+            with self.assertRaises(enfilade.ServerError) as caught:
+                server.connect()
+            self.assertEqual(caught.exception.code, "ERROR_UNAUTHENTICATED")
+            with enfilade.connect(server.address, token="looker-0123456789") as looker:
+                with self.assertRaisesRegex(enfilade.ServerError, "role drive"):
+                    looker.step()
+
     def test_a_second_driver_is_refused(self):
         with self.server.connect() as other, self.assertRaises(enfilade.ServerError) as caught:
             other.step()
@@ -117,6 +128,18 @@ class Seeing(RoomCase):
         self.assertEqual(side.ids[4, 4], COLUMN)
         self.assertIsNone(side.rgb)
         self.assertEqual(self.client.step(avatars=True).avatars["ann"].gaze[0], 1)
+
+    def test_a_watch_sends_pictures_as_the_world_moves(self):
+        self.need_pictures()
+        self.client.watch(2, eye=(0, 1, 0), forward=(1, 0, 0), width=9, height=7,
+                          channels=("depth",))
+        first = next(self.client.frames(seconds=20))
+        self.assertEqual((first.message.watch, first.tick), (2, 0))
+        self.client.step()
+        self.assertEqual(next(self.client.frames(seconds=20)).tick, 1)
+        self.client.unwatch(2)
+        self.client.step()
+        self.assertEqual(list(self.client.frames(seconds=0.1)), [])
 
     def test_rays_and_scans_meet_what_is_there(self):
         hits = self.client.rays([(0, 1, 0), (0, 1, 0)], [(2, 0, 0), (-1, 0, 0)])

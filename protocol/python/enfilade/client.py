@@ -13,6 +13,7 @@ from .errors import ConnectionFailed, OrderFailed, ServerError
 from .results import AvatarState, Contact, Frame, Hits, Notice, Scan, State, Step
 
 PROTOCOL_VERSION = "1.0.0"
+KEPT_FRAMES = 16  # of watches, until frames() takes them; older ones go first
 LONGEST_RUN = 36_000  # ticks that run_until_idle() makes before it gives up
 
 Point = Sequence[float]
@@ -38,7 +39,7 @@ class Client:
 
     `timeout` (seconds) is for connecting and for each reply: a step's reply comes after all its
     ticks. Errors of the server are raised as ServerError; what it sends unasked is kept until
-    contacts(), notices() or states() take it.
+    contacts(), notices(), states() or frames() take it.
     """
 
     def __init__(self, host: str, port: int, *, name: str = "enfilade python", token: str = "",
@@ -49,6 +50,7 @@ class Client:
         self._contacts: Deque[Contact] = deque()
         self._notices: Deque[Notice] = deque()
         self._states: Deque[State] = deque(maxlen=1)
+        self._frames: Deque[Frame] = deque(maxlen=KEPT_FRAMES)
         self._sequence = 0
         hello = messages.Hello(protocol_version=PROTOCOL_VERSION, client_name=name,
                                token=token)
@@ -148,6 +150,8 @@ class Client:
             self._notices.extend(results.notice(one) for one in message.events.notices)
         elif body == "state":
             self._states.append(results.state(message.state))
+        elif body == "frame":
+            self._frames.append(results.frame(message.frame, attachment))
         elif body == "error":
             self._connection.broken = message.error.message
             raise server_error(message.error, fatal=True)
@@ -194,6 +198,7 @@ class Client:
         self._contacts.clear()
         self._notices.clear()
         self._states.clear()
+        self._frames.clear()
 
     # ---- avatars and bodies -----------------------------------------------------------------
 
@@ -274,6 +279,20 @@ class Client:
                               height=height, fov_y=fov_y, channels=channels, tick=tick)
         reply, attachment = self.request(frame=asked)
         return results.frame(reply.frame, attachment)
+
+    def watch(self, number: int = 1, avatar: str = "", *, rate: float = 0.0, **view: Any) -> None:
+        """Has pictures sent unasked: one at once, then as ticks are made, at most `rate` a second of
+        simulated time (0: one a tick). `view` is as of frame(); frames() gives them, the latest only."""
+        self.request(watch_frames=messages.WatchFrames(
+            watch=number, rate=rate, frame=frame_request(avatar, **view)))
+
+    def unwatch(self, number: int = 1) -> None:
+        self.request(watch_frames=messages.WatchFrames(watch=number))
+
+    def frames(self, seconds: float = 0.0) -> Iterator[Frame]:
+        """The pictures of watches that came: Frame.message.watch and .dropped tell of which, and how
+        many were left out."""
+        return self._taken(self._frames, seconds)
 
     def rays(self, origins: Sequence[Point], directions: Sequence[Point], *, reach: float = 0.0,
              through_avatar: str = "", through_glass: bool = False) -> Hits:
