@@ -5,28 +5,29 @@ from __future__ import annotations
 import itertools
 import time
 from collections import deque
-from typing import Any, Deque, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Deque, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple, Union
+
+import numpy as np
 
 from . import messages, results
-from .connection import Connection, server_error
-from .errors import ConnectionFailed, OrderFailed, ServerError
+from .connection import Connection, Received, server_error
+from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError
+from .questions import Point, frame_request, points, vec
 from .results import AvatarState, Contact, Frame, Hits, Notice, Scan, State, Step
 
 PROTOCOL_VERSION = "1.0.0"
 KEPT_FRAMES = 16  # of watches, until frames() takes them; older ones go first
 LONGEST_RUN = 36_000  # ticks that run_until_idle() makes before it gives up
+ENTRY_TICKS = 3  # that enter() makes: whoever had the name before leaves in the first
+MOST_AT_ONCE = 10_000  # messages that are taken without waiting, before what they told is given
 
-Point = Sequence[float]
-
-
-def _vec(point: Point) -> Any:
-    x, y, z = point
-    return messages.Vec3(x=x, y=y, z=z)
+Reply = Tuple[Any, memoryview]  # a message and its attachment
 
 
 def connect(address: str = "127.0.0.1:7878", *, name: str = "enfilade python", token: str = "",
             timeout: float = 30.0) -> "Client":
-    """Connects to HOST:PORT, with a token where the server wants one. Raises ConnectionFailed, or ServerError when it is refused."""
+    """Connects to HOST:PORT, with a token where the server wants one. Raises ConnectionFailed, or
+    ServerError when it is refused."""
     host, colon, port = address.rpartition(":")
     if not colon or not port.isdigit():
         raise ValueError(f"address: give HOST:PORT, as 127.0.0.1:7878, not {address!r}")
@@ -39,7 +40,8 @@ class Client:
 
     `timeout` (seconds) is for connecting and for each reply: a step's reply comes after all its
     ticks. Errors of the server are raised as ServerError; what it sends unasked is kept until
-    contacts(), notices(), states() or frames() take it.
+    contacts(), notices(), states() or frames() take it. An exception out of a signal's handler, as
+    KeyboardInterrupt, leaves the client usable: the reply to what was interrupted is left aside.
     """
 
     def __init__(self, host: str, port: int, *, name: str = "enfilade python", token: str = "",
@@ -51,14 +53,15 @@ class Client:
         self._notices: Deque[Notice] = deque()
         self._states: Deque[State] = deque(maxlen=1)
         self._frames: Deque[Frame] = deque(maxlen=KEPT_FRAMES)
-        self._sequence = 0
-        hello = messages.Hello(protocol_version=PROTOCOL_VERSION, client_name=name,
-                               token=token)
+        self._sequence = 0  # of the events that came last
+        self._answered = 0  # the request whose reply was taken last
+        hello = messages.Hello(protocol_version=PROTOCOL_VERSION, client_name=name, token=token)
         try:
             self.welcome: Any = self.request(hello=hello)[0].welcome
         except BaseException:
             self._connection.close()
             raise
+        self._connection.max_message = self.limits.max_message
 
     # ---- what the server is -----------------------------------------------------------------
 
@@ -86,7 +89,7 @@ class Client:
 
     # ---- requests ---------------------------------------------------------------------------
 
-    def pipeline(self, requests: Iterable[Dict[str, Any]]) -> List[Tuple[Any, memoryview]]:
+    def pipeline(self, requests: Iterable[Dict[str, Any]]) -> List[Reply]:
         """Sends several requests in one write and takes their replies, in order; each is given as
         {"step": messages.Step(ticks=1)}. The first that failed is raised when all were answered."""
         return self.take(self.post(requests))
@@ -101,14 +104,19 @@ class Client:
             raise
         return [one.request_id for one in asked]
 
-    def take(self, posted: List[int]) -> List[Tuple[Any, memoryview]]:
-        """The second half: the replies to what was posted before anything else was."""
-        replies = [self._reply_to(one) for one in posted]
+    def take(self, posted: List[int]) -> List[Reply]:
+        """The second half: the replies to what was posted, in the order in which it was. The first
+        that is a refusal is raised when all were taken."""
+        replies = self.replies(posted)
         for reply, _ in replies:
-            self._raise_refusal(reply)
+            raise_refusal(reply)
         return replies
 
-    def request(self, **body: Any) -> Tuple[Any, memoryview]:
+    def replies(self, posted: List[int]) -> List[Reply]:
+        """As take(), but refusals are not raised: see raise_refusal()."""
+        return [self._reply_to(one) for one in posted]
+
+    def request(self, **body: Any) -> Reply:
         """The reply to one request, given as step=messages.Step(ticks=1), and its attachment."""
         return self.pipeline([body])[0]
 
@@ -120,50 +128,65 @@ class Client:
         except ConnectionFailed:
             pass
 
-    def _reply_to(self, request_id: int) -> Tuple[Any, memoryview]:
+    def _reply_to(self, request_id: int) -> Reply:
+        if request_id <= self._answered:
+            raise EnfiladeError(f"the reply to request {request_id} was left aside: a later one was "
+                                "taken first")
         while True:
-            received = self._connection.receive()
-            assert received is not None  # only a receive with a time limit returns None
-            message, attachment = received
-            if message.reply_to == request_id:
-                return message, attachment
-            self._keep(message, attachment)
+            received = self._connection.next()
+            assert received is not None  # only with a time limit None is returned
+            if received.message.reply_to == request_id:
+                self._answered = request_id
+                self._connection.done(received)
+                return received.message, received.attachment
+            self._keep(received, request_id)
 
-    @staticmethod
-    def _raise_refusal(reply: Any) -> None:
-        if reply.HasField("error"):
-            raise server_error(reply.error)
-        if reply.HasField("command") and not reply.command.accepted:
-            raise server_error(reply.command.error)
-
-    def _keep(self, message: Any, attachment: memoryview) -> None:
+    def _keep(self, received: Received, awaited: int = 0) -> None:
+        """What is no reply to `awaited`. An interrupted one is done again for the same message."""
+        message = received.message
         body = message.WhichOneof("body")
         if message.reply_to != 0:
-            raise self._connection._failed(f"it answers request {message.reply_to}, which is not "
-                                           "the one that waits")
-        if body == "events":
-            self._sequence += 1
-            if message.events.sequence != self._sequence:
-                raise self._connection._failed(
-                    f"events {message.events.sequence} came in the place of {self._sequence}")
-            self._contacts.extend(results.contact(one) for one in message.events.contacts)
-            self._notices.extend(results.notice(one) for one in message.events.notices)
+            # Replies come in order: an earlier one is of a request that was interrupted.
+            if awaited and message.reply_to > awaited:
+                raise self._connection._failed(f"it answers request {message.reply_to}, which is not "
+                                               "the one that waits")
+        elif body == "events":
+            self._keep_events(received)
         elif body == "state":
             self._states.append(results.state(message.state))
         elif body == "frame":
-            self._frames.append(results.frame(message.frame, attachment))
+            if not self._frames or self._frames[-1].message != message.frame:
+                self._frames.append(results.frame(message.frame, received.attachment))
         elif body == "error":
             self._connection.broken = message.error.message
+            self._connection.done(received)
             raise server_error(message.error, fatal=True)
         elif body == "bye":
             self._connection.broken = f"it said goodbye: {message.bye.reason}"
+            self._connection.done(received)
             raise ServerError(message.bye.code, message.bye.reason, fatal=True)
+        self._connection.done(received)
+
+    def _keep_events(self, received: Received) -> None:
+        events = received.message.events
+        if received.marks is None:
+            received.marks = (self._sequence + 1, len(self._contacts), len(self._notices))
+        sequence, contacts, notices = received.marks
+        if events.sequence != sequence:
+            raise self._connection._failed(
+                f"events {events.sequence} came in the place of {sequence}")
+        for kept, length in ((self._contacts, contacts), (self._notices, notices)):
+            while len(kept) > length:  # of an attempt that was interrupted
+                kept.pop()
+        self._contacts.extend([results.contact(one) for one in events.contacts])
+        self._notices.extend([results.notice(one) for one in events.notices])
+        self._sequence = sequence
 
     def _await_events(self, seconds: float) -> bool:
         """Takes one message that comes unasked; False when none came in time."""
-        received = self._connection.receive(seconds)
+        received = self._connection.next(seconds)
         if received is not None:
-            self._keep(*received)
+            self._keep(received)
         return received is not None
 
     # ---- time -------------------------------------------------------------------------------
@@ -175,8 +198,10 @@ class Client:
 
     def run_until_idle(self, most: int = LONGEST_RUN, *, at_a_time: int = 60) -> Step:
         """Steps until every queue is empty. Raises OrderFailed after `most` ticks."""
-        for _ in range(-(-most // at_a_time)):
-            done = self.step(at_a_time, avatars=True)
+        if at_a_time < 1:
+            raise ValueError(f"at_a_time: give at least 1, not {at_a_time}")
+        for made in range(0, most, at_a_time):
+            done = self.step(min(at_a_time, most - made), avatars=True)
             if done.idle:
                 return done
         raise OrderFailed(f"the world is not idle after {most} ticks; is somebody driven?")
@@ -214,22 +239,23 @@ class Client:
         `options` are other fields of Spawn: radius, height, flying, parts, links. It is in the world
         after the next tick; Avatar.enter() makes it, and raises when there is no room."""
         avatar = Avatar(self, name)
-        avatar.entry = self.command(name, spawn=messages.Spawn(at=_vec(at), facing=facing, **options))
+        avatar.entry = self.command(name, spawn=messages.Spawn(at=vec(at), facing=facing, **options))
         return avatar
 
-    def body(self, name: str, *, speed: Optional[float] = None, **action: Any) -> None:
-        """Commands a door, a lift or something on a path: open=True, close=True, stop=True, run=True,
-        to=0.5 (its coordinate) or level=1 (a lift's stop)."""
-        command = messages.BodyCommand(body=name)
-        if speed is not None:
-            command.speed = speed
-        if len(action) != 1:
-            raise ValueError("body: give one of open, close, stop, run, to, level")
-        (what, value), = action.items()
-        if what in ("to", "level"):
-            setattr(command, what, value)
-        else:
-            getattr(command, what).SetInParent()
+    def body(self, name: str, *, open: bool = False, close: bool = False, stop: bool = False,
+             run: bool = False, to: Optional[float] = None, level: Optional[int] = None,
+             speed: Optional[float] = None) -> None:
+        """Commands a door, a lift or something on a path. One of open, close, stop, run, `to` (its
+        coordinate) and `level` (a lift's stop)."""
+        told = [what for what, on in (("open", open), ("close", close), ("stop", stop), ("run", run))
+                if on]
+        told += [what for what, value in (("to", to), ("level", level)) if value is not None]
+        if len(told) != 1:
+            raise ValueError("body: give one of open=True, close=True, stop=True, run=True, to, "
+                             f"level; {told or 'none'} given")
+        command = messages.BodyCommand(body=name, to=to, level=level, speed=speed)
+        if to is None and level is None:
+            getattr(command, told[0]).SetInParent()
         self.request(body_command=command)
 
     # ---- what happens -----------------------------------------------------------------------
@@ -237,15 +263,16 @@ class Client:
     def subscribe(self, *, contacts: bool = False, near_misses: bool = False, notices: bool = False,
                   state: bool = False, state_rate: float = 0.0) -> List[Contact]:
         """Says what the server sends unasked, in the place of what it sent before. Returns the
-        contacts that live now, as they began."""
+        contacts that live now, as they began. Contacts and notices are kept until they are taken,
+        however many they become."""
         reply, _ = self.request(subscribe=messages.Subscribe(
             contacts=contacts, near_misses=near_misses, notices=notices, state=state,
             state_rate=state_rate))
         return [results.contact(one) for one in reply.subscribe.live]
 
     def contacts(self, seconds: float = 0.0) -> Iterator[Contact]:
-        """The contact events that came, in order. With `seconds` it waits so long for each next one,
-        as is needed when the clock runs freely; subscribe(contacts=True) first."""
+        """The contact events that have come, in order. With `seconds` it waits so long for each next
+        one, as is needed when the clock runs freely; subscribe(contacts=True) first."""
         return self._taken(self._contacts, seconds)
 
     def notices(self, seconds: float = 0.0) -> Iterator[Notice]:
@@ -253,30 +280,52 @@ class Client:
         return self._taken(self._notices, seconds)
 
     def states(self, seconds: float = 0.0) -> Iterator[State]:
-        """Where everyone is: only the latest is kept. subscribe(state=True) first."""
+        """Where everyone is: of what has come only the latest. subscribe(state=True) first."""
         return self._taken(self._states, seconds)
 
     def _taken(self, kept: Deque[Any], seconds: float) -> Iterator[Any]:
         while True:
+            for _ in range(MOST_AT_ONCE):
+                if not self._await_events(0.0):
+                    break
+            if not kept and not self._waited_for(kept, seconds):
+                return
             while kept:
                 yield kept.popleft()
-            deadline = time.monotonic() + seconds
-            while not kept:
-                left = deadline - time.monotonic()
-                if left <= 0 or not self._await_events(left):
-                    return
+            if seconds <= 0:
+                return
+
+    def _waited_for(self, kept: Deque[Any], seconds: float) -> bool:
+        deadline = time.monotonic() + seconds
+        while not kept:
+            left = deadline - time.monotonic()
+            if left <= 0 or not self._await_events(left):
+                return False
+        return True
+
+    def _kept_contacts(self) -> List[Contact]:
+        """Those that came with replies: enough in lockstep."""
+        return [self._contacts.popleft() for _ in range(len(self._contacts))]
 
     # ---- pictures and questions -------------------------------------------------------------
 
     def frame(self, avatar: str = "", *, eye: Optional[Point] = None,
               target: Optional[Point] = None, forward: Optional[Point] = None,
-              width: int = 640, height: int = 480, fov_y: Optional[float] = None,
-              channels: Sequence[str] = ("rgb",), tick: Optional[int] = None) -> Frame:
+              up: Optional[Point] = None, width: int = 640, height: int = 480,
+              fov_y: Optional[float] = None, intrinsics: Optional[Sequence[float]] = None,
+              height_y: Optional[float] = None, near: Optional[float] = None,
+              far: Optional[float] = None, channels: Sequence[str] = ("rgb",), glass: str = "",
+              renderer: str = "", tick: Optional[int] = None) -> Frame:
         """A picture of the last tick: from the eyes of `avatar` (looking along `forward` where that is
         given), or from `eye` towards `target` or along `forward`, and then without `avatar` in it.
-        `channels` are of "rgb", "depth", "ids", "normals", "range"."""
-        asked = frame_request(avatar, eye=eye, target=target, forward=forward, width=width,
-                              height=height, fov_y=fov_y, channels=channels, tick=tick)
+        `up` (with an eye) must not lie along the gaze: straight down needs one. The lens: `fov_y`
+        radians, or `intrinsics` (fx, fy, cx, cy) in pixels from the top left corner, or, with an eye,
+        `height_y` metres of an orthographic picture. `channels` are of "rgb", "depth", "ids",
+        "normals", "range"; `glass` is "clear" or "solid", `renderer` "gl" or "rays"."""
+        asked = frame_request(avatar, eye=eye, target=target, forward=forward, up=up, width=width,
+                              height=height, fov_y=fov_y, intrinsics=intrinsics, height_y=height_y,
+                              near=near, far=far, channels=channels, glass=glass,
+                              renderer=renderer, tick=tick)
         reply, attachment = self.request(frame=asked)
         return results.frame(reply.frame, attachment)
 
@@ -294,44 +343,61 @@ class Client:
         many were left out."""
         return self._taken(self._frames, seconds)
 
-    def rays(self, origins: Sequence[Point], directions: Sequence[Point], *, reach: float = 0.0,
-             through_avatar: str = "", through_glass: bool = False) -> Hits:
-        """What each ray meets first, within `reach` metres (0: without end)."""
+    def rays(self, origins: Any, directions: Any, *, reach: float = 0.0, through_avatar: str = "",
+             through_glass: bool = False) -> Hits:
+        """What each ray meets first, within `reach` metres (0: without end); N x 3 numbers each.
+        As many requests as limits.max_rays makes it."""
+        origins, directions = points(origins, "origins"), points(directions, "directions")
         if len(origins) != len(directions):
             raise ValueError(f"rays: {len(origins)} origins and {len(directions)} directions")
-        rays = [messages.Ray(origin=_vec(origin), direction=_vec(direction), reach=reach)
-                for origin, direction in zip(origins, directions)]
-        reply, _ = self.request(rays=messages.RayQuery(
-            rays=rays, through_avatar=through_avatar, through_glass=through_glass))
-        return results.hits(reply.rays)
+        page = min(self.limits.max_rays, (self.limits.max_message - 512) // results.RAY_BYTES)
+        replies = []
+        for start in range(0, max(1, len(origins)), page):
+            query = results.ray_query(origins[start:start + page], directions[start:start + page],
+                                      reach)
+            query.through_avatar, query.through_glass = through_avatar, through_glass
+            replies.append(self.request(rays=query)[0].rays)
+        if replies[0].tick != replies[-1].tick:
+            raise EnfiladeError(f"rays: the clock went on between them, from tick {replies[0].tick} "
+                                f"to {replies[-1].tick}: pause() first, or ask at most {page}")
+        return results.hits(replies)
 
     def sees(self, origin: Point, target: Point, *, through_avatar: str = "") -> bool:
         """Whether nothing stands between two points."""
         direction = [t - o for o, t in zip(origin, target)]
         reach = sum(d * d for d in direction) ** 0.5
-        ray = messages.Ray(origin=_vec(origin), direction=_vec(direction), reach=reach)
+        ray = messages.Ray(origin=vec(origin), direction=vec(direction), reach=reach)
         reply, _ = self.request(rays=messages.RayQuery(
             rays=[ray], only_blocked=True, through_avatar=through_avatar))
         return not reply.rays.hits[0].met
 
     def scan(self, avatar: str = "", *, at: Optional[Point] = None, forward: Optional[Point] = None,
-             width: float = 6.283185307179586, height: float = 0.0, columns: int = 360,
-             rows: int = 1, reach: float = 0.0) -> Scan:
+             up: Optional[Point] = None, width: float = 6.283185307179586, height: float = 0.0,
+             columns: int = 360, rows: int = 1, reach: float = 0.0, through_avatar: str = "",
+             through_glass: bool = False) -> Scan:
         """A range scan over `width` x `height` radians, from an avatar's eyes or from `at`."""
+        if (at is None) == (not avatar):
+            raise ValueError("scan: give either an avatar or at")
         scan = messages.RangeScan(width=width, height=height, columns=columns, rows=rows,
                                   reach=reach)
         if at is not None:
-            scan.at.CopyFrom(_vec(at))
+            scan.at.CopyFrom(vec(at))
         else:
             scan.avatar = avatar
         if forward is not None:
-            scan.forward.CopyFrom(_vec(forward))
-        reply, attachment = self.request(rays=messages.RayQuery(scan=scan))
+            scan.forward.CopyFrom(vec(forward))
+        if up is not None:
+            scan.up.CopyFrom(vec(up))
+        reply, attachment = self.request(rays=messages.RayQuery(
+            scan=scan, through_avatar=through_avatar, through_glass=through_glass))
         return results.scan(reply.rays, attachment)
 
-    def names(self, ids: Iterable[int]) -> Dict[int, str]:
-        """An object's path or an avatar's name, by entity id; "" where no entity has the id."""
-        wanted = [int(one) for one in ids]
+    def names(self, ids: Union[np.ndarray, Iterable[int]]) -> Dict[int, str]:
+        """An object's path or an avatar's name, by entity id; "" where no entity has the id. An
+        array may have any shape: names(picture.ids)."""
+        if isinstance(ids, np.ndarray):
+            ids = np.unique(ids).tolist()
+        wanted = list(dict.fromkeys(int(one) for one in ids))
         found: Dict[int, str] = {}
         page = 4096
         for start in range(0, len(wanted), page):
@@ -355,6 +421,10 @@ class Client:
                 pass  # it ends either way
         self._connection.close()
 
+    def say_no_more(self) -> None:
+        """Lets a server go that ends; its last words can still be read."""
+        self._connection.say_no_more()
+
     def __enter__(self) -> "Client":
         return self
 
@@ -362,29 +432,11 @@ class Client:
         self.close()
 
 
-def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Optional[Point] = None,
-                  forward: Optional[Point] = None, width: int = 640, height: int = 480,
-                  fov_y: Optional[float] = None, channels: Sequence[str] = ("rgb",),
-                  tick: Optional[int] = None) -> Any:
-    """The FrameRequest that Client.frame() sends."""
-    asked = messages.FrameRequest(width=width, height=height, channels=results.channels(channels))
-    view = asked.eyes if eye is None else asked.free
-    if eye is None:
-        asked.eyes.avatar = avatar
-        if target is not None:
-            raise ValueError("frame: a target needs an eye; eyes of an avatar take forward")
-    else:
-        asked.free.eye.CopyFrom(_vec(eye))
-        asked.free.hide_avatar = avatar
-        if target is not None:
-            asked.free.target.CopyFrom(_vec(target))
-    if forward is not None:
-        view.forward.CopyFrom(_vec(forward))
-    if fov_y is not None:
-        view.fov_y = fov_y
-    if tick is not None:
-        asked.tick = tick
-    return asked
+def raise_refusal(reply: Any) -> None:
+    if reply.HasField("error"):
+        raise server_error(reply.error)
+    if reply.HasField("command") and not reply.command.accepted:
+        raise server_error(reply.command.error)
 
 
 class Avatar:
@@ -396,31 +448,35 @@ class Avatar:
         self.entry = 0  # the tag of its spawn
 
     def enter(self) -> AvatarState:
-        """Makes one tick, in lockstep, in which it enters. Raises OrderFailed where it cannot."""
-        state = self._client.step(1, avatars=True).avatars.get(self.name)
-        if state is None:
-            kept = self._client._notices
-            why = [one.text for one in kept if one.tag == self.entry and one.kind == "refused"]
-            raise OrderFailed(f"avatar {self.name!r} did not enter: " +
-                              (why[-1] if why else "subscribe to notices to learn why"))
-        return state
+        """Makes ticks, in lockstep, until it is in the world: one, or two where somebody of this name
+        is about to leave. Raises OrderFailed where it cannot enter."""
+        for _ in range(ENTRY_TICKS):
+            state = self._client.step(1, avatars=True).avatars.get(self.name)
+            if state is not None:
+                return state
+            why = [one.text for one in self._client._notices
+                   if one.tag == self.entry and one.avatar == self.name and one.kind == "refused"]
+            if why:
+                raise OrderFailed(f"avatar {self.name!r} did not enter: {why[-1]}")
+        raise OrderFailed(f"avatar {self.name!r} did not enter within {ENTRY_TICKS} ticks; "
+                          "subscribe(notices=True) first to be told why")
 
     def walk(self, *along: Point, speed: Optional[float] = None) -> int:
         """To each of the points in turn."""
-        order = messages.Walk(along=[_vec(point) for point in along])
+        order = messages.Walk(along=[vec(point) for point in along])
         if speed is not None:
             order.speed = speed
         return self._client.command(self.name, walk=order)
 
     def look(self, at: Point) -> int:
-        return self._client.command(self.name, look=messages.Look(at=_vec(at)))
+        return self._client.command(self.name, look=messages.Look(at=vec(at)))
 
     def wait(self, seconds: float) -> int:
         return self._client.command(self.name, wait=messages.Wait(seconds=seconds))
 
     def drive(self, velocity: Point) -> int:
         """From now on; drops what is queued. Zero stops."""
-        return self._client.command(self.name, drive=messages.Drive(velocity=_vec(velocity)))
+        return self._client.command(self.name, drive=messages.Drive(velocity=vec(velocity)))
 
     def jump(self, height: Optional[float] = None) -> int:
         return self._client.command(self.name, jump=messages.Jump(height=height))

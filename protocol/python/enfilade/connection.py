@@ -1,11 +1,18 @@
-"""Messages over a TCP connection: magic, lengths, deadlines. See PROTOCOL.md, "Framing"."""
+"""Messages over a TCP connection: magic, lengths, deadlines. See PROTOCOL.md, "Framing".
+
+An exception that a signal's handler raises (KeyboardInterrupt) may come between any two bytecodes,
+and nothing here may get out of step by it. So what a read or a write moved is noted by the same call
+of C that made it (_Moved), every other change of state is one assignment, and a message stays `next`
+until its reader says that it was kept.
+"""
 
 from __future__ import annotations
 
+import select
 import socket
 import struct
 import time
-from typing import Any, Iterable, Optional, Tuple
+from typing import Any, Iterable, List, Optional
 
 import numpy
 
@@ -17,6 +24,38 @@ LARGEST_MESSAGE = 1 << 28  # bytes, of what a server may send; the C++ client ta
 LARGEST_HEADER = 1 << 24
 _LENGTHS = struct.Struct("<II")
 _BUFFER = 1 << 16  # bytes; what is longer goes right into memory of its own
+_ALIGNMENT = 64  # bytes, of attachments
+
+
+class _Moved:
+    """Bytes on their way: the first sum(counts) of `view` came, or went; those before `start` were
+    used."""
+
+    __slots__ = ("view", "counts", "start")
+
+    def __init__(self, view: memoryview, count: int = 0, start: int = 0) -> None:
+        self.view = view
+        self.counts: List[int] = [count]
+        self.start = start
+
+    def move(self, call: Any) -> int:
+        """Gives the rest to recv_into() or send(). map() and extend() are C: no handler runs between
+        the call and the note of what it returned."""
+        self.counts.extend(map(call, (self.view[sum(self.counts):],)))
+        return self.counts[-1]
+
+
+class Received:
+    """A message, and its attachment, which nobody else holds."""
+
+    __slots__ = ("message", "attachment", "source", "end", "marks")
+
+    def __init__(self, message: Any, attachment: memoryview, source: _Moved, end: int) -> None:
+        self.message = message
+        self.attachment = attachment
+        self.source = source
+        self.end = end  # where the next one begins in `source`
+        self.marks: Any = None  # of the reader
 
 
 class Connection:
@@ -26,68 +65,83 @@ class Connection:
         self.peer = f"{host}:{port}"
         self.timeout = timeout
         self.broken = ""
+        self.max_message = 0  # bytes that the server takes; 0: not known yet
         try:
             self._socket = socket.create_connection((host, port), timeout)
-        except OSError as error:
+        except (OSError, OverflowError) as error:
             raise ConnectionFailed(
                 f"cannot connect to {self.peer}: {error}; is `enfilade serve` running there, and "
                 "is the port the one of its ready line?") from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._buffer = bytearray(_BUFFER)
-        self._view = memoryview(self._buffer)
-        self._start = self._end = 0  # of what is unread in the buffer
+        self._readable = select.poll()
+        self._readable.register(self._socket, select.POLLIN)
+        self._came = _Moved(memoryview(bytearray(_BUFFER)))
+        self._went = _Moved(memoryview(MAGIC))  # goes with the first message
+        self._next: Optional[Received] = None
         self._magic_seen = False
-        self._to_send = MAGIC  # goes with the first message
 
     def close(self) -> None:
         self.broken = self.broken or "the client was closed"
         self._socket.close()
 
+    def say_no_more(self) -> None:
+        """Ends this side of a connection that has something to read; that can still be read."""
+        try:
+            if self._readable.poll(0):
+                self._socket.shutdown(socket.SHUT_WR)
+        except OSError:
+            pass  # closed already, here or there
+
     def send(self, requests: Iterable[Any]) -> None:
-        """All of them in one write."""
+        """All of them in one write, after what an interrupted one left. Raises ValueError, and sends
+        nothing, when one is longer than the server takes."""
         if self.broken:
             raise ConnectionFailed(f"{self.peer}: {self.broken}")
-        parts = [self._to_send]
+        parts: List[Any] = [self._went.view[sum(self._went.counts):]]
         for request in requests:
             header = request.SerializeToString()
-            parts.append(_LENGTHS.pack(4 + len(header), len(header)))
-            parts.append(header)
-        self._to_send = b""
+            if self.max_message and 8 + len(header) > self.max_message:
+                raise ValueError(f"a request has {8 + len(header)} bytes, and the server takes "
+                                 f"{self.max_message} (limits.max_message): ask for less at a time")
+            parts += (_LENGTHS.pack(4 + len(header), len(header)), header)
+        self._went = went = _Moved(memoryview(b"".join(parts)))
+        deadline = time.monotonic() + self.timeout
         try:
-            self._socket.settimeout(self.timeout)
-            self._socket.sendall(b"".join(parts))
+            while sum(went.counts) < len(went.view):
+                went.move(self._socket.send)
+                if time.monotonic() > deadline:
+                    raise socket.timeout(f"it took nothing for {self.timeout:g} s")
         except OSError as error:
             # Not closed yet: what it said last may still be read.
             self.broken = f"the connection broke: {error}"
             raise ConnectionFailed(f"{self.peer}: {self.broken}") from error
 
-    def receive(self, timeout: Optional[float] = None) -> Optional[Tuple[Any, memoryview]]:
-        """The next message and its attachment, which nobody else holds; None when `timeout`
-        seconds passed between messages. Half a message is waited for as long as a reply is."""
-        deadline = time.monotonic() + (self.timeout if timeout is None else timeout)
-        if not self._fill(8, deadline, at_start=timeout is not None):
-            return None
+    def next(self, seconds: Optional[float] = None) -> Optional[Received]:
+        """The message that is next, the same one until done() is told; None when `seconds` passed
+        between messages. Half a message is waited for as long as a reply is."""
+        if self._next is not None:
+            return self._next
+        if self._socket.fileno() < 0:
+            raise ConnectionFailed(f"{self.peer}: {self.broken}")
+        came = self._came
+        if came.start == sum(came.counts):  # used up: begin at the start of a buffer
+            whole = len(came.view) == _BUFFER
+            self._came = came = _Moved(came.view if whole else memoryview(bytearray(_BUFFER)))
+            if seconds is not None and not self._readable.poll(max(0.0, seconds) * 1000):
+                return None
         if not self._magic_seen:
-            if bytes(self._view[self._start:self._start + 4]) != MAGIC:
+            self._fill(4)
+            if bytes(came.view[:4]) != MAGIC:
                 raise self._failed("it does not speak this protocol; is that an Enfilade server?")
-            self._start += 4
+            came.start = 4
             self._magic_seen = True
-            return self.receive(timeout)
-        total, header_length = _LENGTHS.unpack_from(self._buffer, self._start)
-        if total > LARGEST_MESSAGE or header_length > LARGEST_HEADER or 4 + header_length > total:
-            raise self._failed(f"a message claims {total} bytes, {header_length} of them header")
-        self._start += 8
-        deadline = max(deadline, time.monotonic() + self.timeout)
-        header = self._take(header_length, deadline)
-        attachment = memoryview(b"")
-        if total > 4 + header_length:
-            attachment = self._take_own(total - 4 - header_length, deadline)
-        message = messages.ServerMessage()
-        try:
-            message.ParseFromString(header)
-        except Exception as error:  # its class differs between protobuf's implementations
-            raise self._failed(f"a message does not parse: {error}; do the versions fit?") from error
-        return message, attachment
+        self._next = self._read_one()
+        return self._next
+
+    def done(self, received: Received) -> None:
+        """`received` was kept. To say so twice is to say so once."""
+        received.source.start = received.end
+        self._next = None
 
     # ---- bytes ------------------------------------------------------------------------------
 
@@ -96,61 +150,60 @@ class Connection:
         self._socket.close()
         return ConnectionFailed(f"{self.peer}: {why}")
 
-    def _read_into(self, place: memoryview, deadline: float) -> int:
-        """Bytes read, at least one; 0 when the deadline passed."""
-        left = deadline - time.monotonic()
+    def _read_one(self) -> Received:
+        self._fill(8)
+        total, header_length = _LENGTHS.unpack_from(self._came.view, self._came.start)
+        if total > LARGEST_MESSAGE or header_length > LARGEST_HEADER or 4 + header_length > total:
+            raise self._failed(f"a message claims {total} bytes, {header_length} of them header")
+        self._make_room(4 + total, 8 + header_length)
+        self._fill(4 + total)
+        came = self._came
+        header, end = came.start + 8, came.start + 4 + total
+        attachment = came.view[header + header_length:end]
+        if attachment and len(came.view) == _BUFFER:
+            # An array of numpy's, not a bytearray: nobody needs it zeroed first.
+            own = memoryview(numpy.empty(len(attachment), numpy.uint8))
+            own[:] = attachment
+            attachment = own
+        message = messages.ServerMessage()
         try:
-            self._socket.settimeout(max(left, 1e-6))
-            count = self._socket.recv_into(place)
-        except socket.timeout:
-            return 0
-        except OSError as error:
-            raise self._failed(f"the connection broke: {error}") from error
-        if count == 0:
-            raise self._failed("it closed the connection; its log says why")
-        return count
+            message.ParseFromString(came.view[header:header + header_length])
+        except Exception as error:  # its class differs between protobuf's implementations
+            raise self._failed(f"a message does not parse: {error}; do the versions fit?") from error
+        return Received(message, attachment, came, end)
 
-    def _fill(self, wanted: int, deadline: float, at_start: bool = False) -> bool:
-        """Has `wanted` bytes in the buffer; False when nothing of them came and that may be."""
-        if _BUFFER - self._start < wanted:
-            rest = self._end - self._start
-            self._view[:rest] = bytes(self._view[self._start:self._end])
-            self._start, self._end = 0, rest
-        while self._end - self._start < wanted:
-            if self._start == self._end:
-                self._start = self._end = 0
-            count = self._read_into(self._view[self._end:], deadline)
+    def _make_room(self, length: int, before_attachment: int) -> None:
+        """Has `length` bytes from the start on in one piece; a long message has it for itself."""
+        came = self._came
+        if came.start + length <= len(came.view):
+            return
+        start, size = 0, _BUFFER
+        if length >= _BUFFER:
+            start = -before_attachment % _ALIGNMENT
+            size = start + length
+        view = memoryview(numpy.empty(size, numpy.uint8))
+        rest = came.view[came.start:sum(came.counts)]
+        view[start:start + len(rest)] = rest
+        self._came = _Moved(view, start + len(rest), start)
+
+    def _fill(self, wanted: int) -> None:
+        """Has `wanted` unread bytes."""
+        came = self._came
+        if sum(came.counts) - came.start >= wanted:
+            return
+        deadline = time.monotonic() + self.timeout
+        while sum(came.counts) - came.start < wanted:
+            try:
+                count = came.move(self._socket.recv_into)
+            except socket.timeout:
+                count = -1
+            except OSError as error:
+                raise self._failed(f"the connection broke: {error}") from error
             if count == 0:
-                if at_start and self._start == self._end:
-                    return False
-                if at_start:  # a message has begun: its rest gets the time that a reply has
-                    at_start, deadline = False, time.monotonic() + self.timeout
-                    continue
+                raise self._failed("it closed the connection; its log says why")
+            if count < 0 or time.monotonic() > deadline:
                 raise self._failed(f"no answer within {self.timeout:g} s; is the server "
                                    "overloaded? A longer timeout may help")
-            self._end += count
-        return True
-
-    def _take(self, length: int, deadline: float) -> memoryview:
-        """Valid until the next call."""
-        if length > _BUFFER:
-            return self._take_own(length, deadline)
-        self._fill(length, deadline)
-        self._start += length
-        return self._view[self._start - length:self._start]
-
-    def _take_own(self, length: int, deadline: float) -> memoryview:
-        # An array of numpy's, not a bytearray: nobody needs it zeroed first.
-        own = memoryview(numpy.empty(length, numpy.uint8))
-        count = min(length, self._end - self._start)
-        own[:count] = self._view[self._start:self._start + count]
-        self._start += count
-        while count < length:
-            read = self._read_into(own[count:], deadline)
-            if read == 0:
-                raise self._failed(f"half a message, then silence for {self.timeout:g} s")
-            count += read
-        return own
 
 
 def server_error(error: Any, fatal: bool = False) -> ServerError:

@@ -8,24 +8,41 @@ actions give the same observations, pixel for pixel on the same renderer.
 from __future__ import annotations
 
 import math
+import operator
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from . import messages, results, spaces
-from .client import Client, connect, frame_request
+from .client import Client, Reply, connect, raise_refusal
 from .errors import OrderFailed
 from .process import Server, serve
+from .questions import frame_request
 
 Observation = Dict[str, np.ndarray]
+
+_CHANNELS = ("rgb", "depth", "ids")
+_DISCRETE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
+
+
+def _numbers(given: Any, name: str, counts: Sequence[int]) -> Tuple[float, ...]:
+    try:
+        numbers = tuple(map(float, given))
+    except (TypeError, ValueError):
+        numbers = ()
+    if len(numbers) not in counts or not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{name}: give {' or '.join(map(str, counts))} finite numbers, "
+                         f"not {given!r}")
+    return numbers
 
 
 class WalkEnv(spaces.EnvBase):
     """One avatar in a world of its own.
 
     scene or address: a model that a server process is started for, or HOST:PORT of one that runs
-        (this client must then be its driver).
+        (this client must then be its driver). Or client: one that is connected, which close() leaves
+        as it is.
     starts: places to begin at, (x, y, z) of the feet or (x, y, z, facing in degrees); one is chosen at
         each reset, and a facing where none is given.
     goal: where the walk ends well, within `goal_radius` metres on the ground.
@@ -37,6 +54,9 @@ class WalkEnv(spaces.EnvBase):
     Observations: the channels (depth in metres, inf where there is nothing), "position" of the feet,
     "heading" as its cosine and sine, and "to_goal" in metres when there is a goal. The reward is the way
     made towards the goal, or without one the way made, in metres; override reward() and is_over().
+
+    Raises ValueError, which names the argument, before anything is sent. An exception in the middle
+    of a step (KeyboardInterrupt) leaves it usable, though the world may have gone on by that step.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
@@ -49,10 +69,25 @@ class WalkEnv(spaces.EnvBase):
                  fov_y: float = 1.2, discrete: bool = False,
                  render_mode: Optional[str] = "rgb_array", server_arguments: Sequence[str] = (),
                  client: Optional[Client] = None) -> None:
-        if not starts:
+        if not len(starts):
             raise ValueError("starts: give at least one place to begin at")
-        self.starts = [tuple(map(float, start)) for start in starts]
-        self.goal = None if goal is None else np.asarray(goal, np.float64)
+        self.starts = [_numbers(start, f"starts[{i}]", (3, 4)) for i, start in enumerate(starts)]
+        self.goal = None if goal is None else np.array(_numbers(goal, "goal", (3,)))
+        self._first_goal = self.goal
+        if isinstance(channels, str) or set(channels) - set(_CHANNELS):
+            raise ValueError(f"channels: give some of {_CHANNELS}, not {channels!r}")
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"render_mode: give None or 'rgb_array', not {render_mode!r}")
+        if operator.index(ticks_per_step) < 1:
+            raise ValueError(f"ticks_per_step: give at least 1, not {ticks_per_step}")
+        if not 0 < fov_y < math.pi:
+            raise ValueError(f"fov_y: give radians between 0 and pi, not {fov_y}")
+        if not (0 < speed < math.inf and 0 <= turn_speed < math.inf):
+            raise ValueError(f"speed, turn_speed: {speed}, {turn_speed} cannot be gone")
+        if isinstance(server_arguments, str):
+            raise ValueError("server_arguments: give a list of strings")
+        if sum(one is not None for one in (scene, address or None, client)) != 1:
+            raise ValueError("give one of scene, address and client")
         self.goal_radius, self.size, self.channels = goal_radius, size, tuple(channels)
         self.ticks_per_step, self.speed, self.turn_speed = ticks_per_step, speed, turn_speed
         self.max_steps, self.fov_y, self.discrete = max_steps, fov_y, discrete
@@ -62,21 +97,35 @@ class WalkEnv(spaces.EnvBase):
             spaces.Box(-1.0, 1.0, (2,), np.float32)
         if not spaces.HAVE_GYMNASIUM:
             self.np_random = np.random.default_rng()
-        self.server: Optional[Server] = None
-        self.client = client or self._connected(scene, address, server_arguments)
-        self.client.lockstep()
-        self.client.subscribe(contacts=True, notices=True)
-        self._seconds = ticks_per_step * self.client.tick_seconds
         self._name = "walker"
         self._heading = 0.0
         self._steps = 0
+        self._tag = 0  # of the spawn that the last reset() sent
         self._state: Optional[results.AvatarState] = None
-        self._frame: Optional[results.Frame] = None
+        self._rgb: Optional[np.ndarray] = None
+        self.server: Optional[Server] = None
+        self._own_client = client is None
+        try:
+            self.client = client or self._connected(scene, address, server_arguments)
+            self._begin()
+        except BaseException:
+            self.close()
+            raise
+
+    def _begin(self) -> None:
+        self.client.lockstep()
+        self.client.subscribe(contacts=True, notices=True)
+        limit = self.client.welcome.policies.speed_limit
+        if self.speed > limit:
+            raise ValueError(f"speed: the server's limit is {limit:g} m/s, and {self.speed:g} is asked")
+        most = self.client.limits.max_ticks_per_step
+        if self.ticks_per_step > most:
+            raise ValueError(f"ticks_per_step: the server makes at most {most} at a time")
+        self._seconds = self.ticks_per_step * self.client.tick_seconds
+        self.metadata = {**self.metadata, "render_fps": 1 / self._seconds}
 
     def _connected(self, scene: Union[str, Path, None], address: str,
                    arguments: Sequence[str]) -> Client:
-        if (scene is None) == (not address):
-            raise ValueError("give either a scene or the address of a server")
         if scene is None:
             return connect(address, name="enfilade environment")
         self.server = serve(scene, *arguments)
@@ -118,94 +167,144 @@ class WalkEnv(spaces.EnvBase):
 
     def reset(self, *, seed: Optional[int] = None,
               options: Optional[Dict[str, Any]] = None) -> Tuple[Observation, Dict[str, Any]]:
-        """The world anew. `options` may have "start", as of `starts`, and "goal"."""
+        """The world anew. `options` may have "start", as of `starts`, and "goal", where the environment
+        was made with one: both for this episode."""
         return self._take_reset(self._post_reset(seed, options or {}))
 
     def step(self, action: Any) -> Tuple[Observation, float, bool, bool, Dict[str, Any]]:
-        return self._take_step(self._post_step(action))
+        return self._take_step(self._post_step(self._meaning(action)))
 
     def render(self) -> Optional[np.ndarray]:
-        """The colours that were seen last."""
+        """The colours that were seen last; None before reset() and after close()."""
         if self.render_mode is None or self._state is None:
             return None
-        if self._frame is not None and self._frame.rgb is not None:
-            return self._frame.rgb.copy()
+        if self._rgb is not None:
+            return self._rgb.copy()
         return self.client.frame(self._name, forward=self._forward(), width=self.size[0],
                                  height=self.size[1], fov_y=self.fov_y).rgb
 
     def close(self) -> None:
-        self.client.close()
+        self._state = None
+        if self._own_client and hasattr(self, "client"):
+            self.client.close()
         if self.server is not None:
             self.server.stop()
+
+    def __enter__(self) -> "WalkEnv":
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
 
     # ---- in two halves, so that several environments work at the same time --------------------
 
     def _post_reset(self, seed: Optional[int], options: Dict[str, Any]) -> List[int]:
+        start, self.goal = self._chosen(seed, options)
+        facing = start[3] if len(start) > 3 else float(self.np_random.uniform(0, 360))
+        self._state = self._rgb = None  # until it stands there
+        self._heading = math.radians(facing)
+        self._steps = 0
+        self._tag += 1
+        spawn = messages.Spawn(at=messages.Vec3(x=start[0], y=start[1], z=start[2]), facing=facing)
+        return self.client.post([
+            {"restart": messages.Restart()},
+            {"command": messages.Command(avatar=self._name, tag=self._tag, spawn=spawn)},
+            {"step": messages.Step(ticks=1, avatars=True)}, *self._picture()])
+
+    def _chosen(self, seed: Optional[int], options: Dict[str, Any]) -> Tuple[Any, Any]:
+        """Where the episode begins, and its goal."""
+        unknown = set(options) - {"start", "goal"}
+        if unknown:
+            raise ValueError(f"options: {sorted(unknown)} are none; there are start and goal")
+        goal = options.get("goal")
+        if goal is not None and self._first_goal is None:
+            raise ValueError("options: a goal is for an environment that was made with one")
+        goal = self._first_goal if goal is None else np.array(_numbers(goal, "goal", (3,)))
+        start = options.get("start")
+        if start is not None:
+            start = _numbers(start, "start", (3, 4))
         if spaces.HAVE_GYMNASIUM:
             super().reset(seed=seed)
         elif seed is not None:
             self.np_random = np.random.default_rng(seed)
         if seed is not None:
             self.action_space.seed(seed)
-        start = options.get("start", self.starts[int(self.np_random.integers(len(self.starts)))])
-        if "goal" in options and self.goal is not None:
-            self.goal = np.asarray(options["goal"], np.float64)
-        facing = start[3] if len(start) > 3 else float(self.np_random.uniform(0, 360))
-        self._heading = math.radians(facing)
-        self._steps = 0
-        spawn = messages.Spawn(at=messages.Vec3(x=start[0], y=start[1], z=start[2]), facing=facing)
-        return self.client.post([
-            {"restart": messages.Restart()},
-            {"command": messages.Command(avatar=self._name, tag=1, spawn=spawn)},
-            {"step": messages.Step(ticks=1, avatars=True)}, *self._picture()])
+        chosen = self.starts[int(self.np_random.integers(len(self.starts)))] \
+            if start is None else start
+        return chosen, goal
 
     def _take_reset(self, posted: List[int]) -> Tuple[Observation, Dict[str, Any]]:
-        replies = [self.client._reply_to(one) for one in posted]
+        replies = self.client.replies(posted)
         for reply, _ in replies[:3]:
-            self.client._raise_refusal(reply)
+            raise_refusal(reply)
         entered = results.step(replies[2][0].step)
-        contacts = [one for one in self.client.contacts() if one.reason != "restart"]
-        notices = list(self.client.notices())
+        contacts = [one for one in self.client._kept_contacts() if one.reason != "restart"]
+        why = self._refusals()
         if self._name not in entered.avatars:
-            why = [one.text for one in notices if one.kind == "refused"]
             raise OrderFailed(f"the avatar could not begin there: {' '.join(why)}")
         for reply, _ in replies[3:]:
-            self.client._raise_refusal(reply)
+            raise_refusal(reply)
         self._state = entered.avatars[self._name]
         return self._observation(replies[3:]), self._info(entered, contacts)
 
-    def _post_step(self, action: Any) -> List[int]:
+    def _refusals(self) -> List[str]:
+        """Of the spawn. Nothing here waits for the other notices."""
+        kept = self.client._notices
+        why = [one.text for one in kept if one.kind == "refused" and
+               (one.avatar, one.tag) == (self._name, self._tag)]
+        kept.clear()
+        return why
+
+    def _check_begun(self) -> None:
         if self._state is None:
-            raise RuntimeError("reset() comes before the first step()")
-        ahead, turn = self._meaning(action)
+            raise RuntimeError("reset() comes before step(): there is no episode, or the last reset() "
+                               "or step() failed, or the environment was closed")
+
+    def _post_step(self, meaning: Tuple[float, float]) -> List[int]:
+        self._check_begun()
+        ahead, turn = meaning
         self._heading = math.remainder(self._heading + turn * self.turn_speed * self._seconds,
                                        math.tau)
         x, _, z = self._forward()
         velocity = messages.Vec3(x=ahead * self.speed * x, z=ahead * self.speed * z)
-        drive = messages.Command(avatar=self._name, tag=2, drive=messages.Drive(velocity=velocity))
+        drive = messages.Command(avatar=self._name, drive=messages.Drive(velocity=velocity))
         return self.client.post([
             {"command": drive},
             {"step": messages.Step(ticks=self.ticks_per_step, avatars=True)}, *self._picture()])
 
     def _take_step(self, posted: List[int]) -> Tuple[Observation, float, bool, bool,
                                                      Dict[str, Any]]:
-        replies = self.client.take(posted)
-        assert self._state is not None
-        before = np.array(self._state.feet)
+        replies = self.client.replies(posted)
+        old, contacts = self._state, self.client._kept_contacts()
+        self.client._notices.clear()  # nothing here waits for them
+        self._state = None  # should this fail
+        for reply, _ in replies:
+            raise_refusal(reply)
+        assert old is not None
         made = results.step(replies[1][0].step)
+        if self._name not in made.avatars:
+            raise OrderFailed("the avatar is no longer in the world: somebody else acts in it")
         self._state = made.avatars[self._name]
         self._steps += 1
-        info = self._info(made, list(self.client.contacts()))
-        list(self.client.notices())  # nothing here waits for them
-        after = np.array(self._state.feet)
+        info = self._info(made, contacts)
+        before, after = np.array(old.feet), np.array(self._state.feet)
         return (self._observation(replies[2:]), self.reward(before, after, info),
                 self.is_over(after, info), self._steps >= self.max_steps, info)
 
     def _meaning(self, action: Any) -> Tuple[float, float]:
-        if not self.discrete:
-            ahead, turn = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
-            return float(ahead), float(turn)
-        return ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, -1.0))[int(action)]
+        """Ahead and turn. Raises ValueError."""
+        if self.discrete:
+            try:
+                return _DISCRETE[range(4).index(operator.index(action))]
+            except (TypeError, ValueError):
+                raise ValueError(f"action: give 0, 1, 2 or 3, not {action!r}") from None
+        try:
+            ahead, turn = map(float, action)
+        except (TypeError, ValueError):
+            raise ValueError(f"action: give two numbers, not {action!r}") from None
+        if math.isnan(ahead) or math.isnan(turn):
+            raise ValueError(f"action: {action!r} is not a number")
+        return min(max(ahead, -1.0), 1.0), min(max(turn, -1.0), 1.0)
 
     def _forward(self) -> Tuple[float, float, float]:
         return (math.cos(self._heading), 0.0, -math.sin(self._heading))
@@ -217,15 +316,17 @@ class WalkEnv(spaces.EnvBase):
                                         height=self.size[1], fov_y=self.fov_y,
                                         channels=self.channels)}]
 
-    def _observation(self, pictures: Sequence[Tuple[Any, memoryview]]) -> Observation:
+    def _observation(self, pictures: Sequence[Reply]) -> Observation:
         assert self._state is not None
         seen: Observation = {}
         if pictures:
             reply, attachment = pictures[0]
-            self._frame = results.frame(reply.frame, attachment)
+            frame = results.frame(reply.frame, attachment)
             for name in ("rgb", "depth", "ids"):
                 if name in self.channels:
-                    seen[name] = getattr(self._frame, name)
+                    seen[name] = getattr(frame, name)
+            if "rgb" in seen and self.render_mode is not None:
+                self._rgb = seen["rgb"].copy()  # the observation is its reader's own
             if "depth" in seen:
                 depth = seen["depth"]
                 depth[np.isnan(depth)] = np.inf
@@ -243,17 +344,24 @@ class WalkEnv(spaces.EnvBase):
 
 
 class VectorWalkEnv:
-    """Several WalkEnvs that work at the same time, with the API of Gymnasium's VectorEnv.
+    """Several WalkEnvs that work at the same time, with the methods of Gymnasium's VectorEnv.
 
     Each has a server process of its own. `make` makes one of them: make(number) is a WalkEnv. One whose
     episode ended begins anew with the next step(), whose action for it is left aside and whose reward is
     0 (Gymnasium's "next step" mode).
+
+    A wrong number of actions or seeds, or an action that is none, is a ValueError before anything is
+    sent. Where one environment fails later, all are waited for, its error is raised, and reset() comes
+    next; one whose server died has to be made anew.
     """
 
     metadata: Dict[str, Any] = {"autoreset_mode": "NextStep"}
 
     def __init__(self, make: Callable[[int], WalkEnv], num_envs: int) -> None:
+        if operator.index(num_envs) < 1:
+            raise ValueError(f"num_envs: give at least 1, not {num_envs}")
         self.num_envs = num_envs
+        self.closed = False
         self.envs: List[WalkEnv] = []
         try:
             for number in range(num_envs):
@@ -263,39 +371,84 @@ class VectorWalkEnv:
             raise
         self.single_observation_space = self.envs[0].observation_space
         self.single_action_space = self.envs[0].action_space
-        self._over = np.zeros(num_envs, bool)
+        self.observation_space = spaces.batched(self.single_observation_space, num_envs)
+        self.action_space = spaces.batched(self.single_action_space, num_envs)
+        self._over: Optional[np.ndarray] = None  # None: reset() comes next
 
     def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None,
               options: Optional[Dict[str, Any]] = None) -> Tuple[Observation, Dict[str, Any]]:
         """`seed` is one for each, or a number to which the environment's own number is added."""
-        seeds = [None if seed is None else seed + i for i in range(self.num_envs)] \
-            if seed is None or isinstance(seed, int) else list(seed)
-        posted = [env._post_reset(one, options or {}) for env, one in zip(self.envs, seeds)]
-        taken = [env._take_reset(ids) for env, ids in zip(self.envs, posted)]
-        self._over[:] = False
+        seeds = self._seeds(seed)
+        self._over = None
+        taken = self._each(lambda i: self.envs[i]._post_reset(seeds[i], options or {}),
+                           lambda i, ids: self.envs[i]._take_reset(ids))
+        self._over = np.zeros(self.num_envs, bool)
         return self._stacked([one[0] for one in taken]), self._gathered([one[1] for one in taken])
+
+    def _seeds(self, seed: Any) -> List[Optional[int]]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, (int, np.integer)):
+            return [int(seed) + i for i in range(self.num_envs)]
+        seeds = [None if one is None else operator.index(one) for one in seed]
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed: {len(seeds)} for {self.num_envs} environments")
+        return seeds
 
     def step(self, actions: Any) -> Tuple[Observation, np.ndarray, np.ndarray, np.ndarray,
                                           Dict[str, Any]]:
-        over = self._over.copy()
-        posted = [env._post_reset(None, {}) if ended else env._post_step(action)
-                  for env, ended, action in zip(self.envs, over, actions)]
-        taken: List[Tuple[Observation, float, bool, bool, Dict[str, Any]]] = []
-        for env, ended, ids in zip(self.envs, over, posted):
-            if ended:
-                seen, info = env._take_reset(ids)
-                taken.append((seen, 0.0, False, False, info))
-            else:
-                taken.append(env._take_step(ids))
-        observations, rewards, terminated, truncated, infos = zip(*taken)
-        self._over = np.array(terminated) | np.array(truncated)
+        over = self._over
+        if over is None:
+            raise RuntimeError("reset() comes before step(), also after one that failed")
+        actions = list(actions)
+        if len(actions) != self.num_envs:
+            raise ValueError(f"actions: {len(actions)} for {self.num_envs} environments")
+        meanings = [(0.0, 0.0) if ended else env._meaning(action)
+                    for env, ended, action in zip(self.envs, over, actions)]
+
+        def post(i: int) -> List[int]:
+            env = self.envs[i]
+            return env._post_reset(None, {}) if over[i] else env._post_step(meanings[i])
+
+        def take(i: int, ids: List[int]) -> Tuple[Observation, float, bool, bool, Dict[str, Any]]:
+            if not over[i]:
+                return self.envs[i]._take_step(ids)
+            seen, info = self.envs[i]._take_reset(ids)
+            return seen, 0.0, False, False, info
+
+        self._over = None
+        observations, rewards, terminated, truncated, infos = zip(*self._each(post, take))
+        self._over = np.array(terminated, bool) | np.array(truncated, bool)
         return (self._stacked(observations), np.array(rewards), np.array(terminated),
                 np.array(truncated), self._gathered(infos))
+
+    def _each(self, post: Callable[[int], List[int]], take: Callable[[int, List[int]], Any]) -> Any:
+        """Posts all and takes all, also where some fail; the first failure is raised then."""
+        failures: List[Exception] = []
+        posted: List[Optional[List[int]]] = []
+        taken: List[Any] = []
+        for i in range(self.num_envs):
+            try:
+                posted.append(post(i))
+            except Exception as error:
+                posted.append(None)
+                failures.append(error)
+        for i, ids in enumerate(posted):
+            try:
+                if ids is not None:
+                    taken.append(take(i, ids))
+            except Exception as error:
+                failures.append(error)
+        if failures:
+            raise failures[0]
+        return taken
 
     def render(self) -> List[Optional[np.ndarray]]:
         return [env.render() for env in self.envs]
 
     def close(self) -> None:
+        self.closed = True
+        self._over = None
         for env in self.envs:
             env.close()
 
@@ -305,11 +458,12 @@ class VectorWalkEnv:
 
     @staticmethod
     def _gathered(infos: Sequence[Dict[str, Any]]) -> Dict[str, Any]:
+        """Arrays of objects: a state hash has 64 bits, and contacts are lists. `_NAME`: who has it."""
         gathered: Dict[str, Any] = {}
-        for name in infos[0]:
+        for name in dict.fromkeys(name for info in infos for name in info):
             values = np.empty(len(infos), object)
             for number, info in enumerate(infos):
-                values[number] = info[name]
+                values[number] = info.get(name)
             gathered[name] = values
-            gathered["_" + name] = np.ones(len(infos), bool)
+            gathered["_" + name] = np.array([name in info for info in infos])
         return gathered

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from . import messages
 
 # What helps, by the code. The server's own sentence is more exact where it names a remedy, too.
@@ -37,6 +39,7 @@ class ServerError(EnfiladeError):
     """The server's own words. `fatal` ones came with the end of the connection."""
 
     def __init__(self, number: int, message: str, field: str = "", fatal: bool = False) -> None:
+        self._number = number
         value = messages.ErrorCode.values_by_number.get(number)
         self.code: str = value.name if value else f"ERROR_{number}"
         self.message = message
@@ -49,6 +52,9 @@ class ServerError(EnfiladeError):
         if self.remedy:
             text += f"; {self.remedy}"
         super().__init__(text)
+
+    def __reduce__(self) -> Any:  # made again of its parts, not of its text
+        return (type(self), (self._number, self.message, self.field, self.fatal))
 
 
 class OrderFailed(EnfiladeError):

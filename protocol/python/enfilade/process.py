@@ -7,35 +7,36 @@ import json
 import os
 import select
 import shutil
-import signal
 import subprocess
 import tempfile
 import time
 import weakref
 from pathlib import Path
-from typing import Any, List, Optional, Sequence, Union
+from typing import Any, List, Optional, Sequence, Set, Union
 
 from .client import Client, connect
 from .errors import StartFailed
 
 _STOPPING_SECONDS = 10.0  # from SIGTERM to SIGKILL
-_running: "weakref.WeakSet[Server]" = weakref.WeakSet()
+_CHECK_SECONDS = 0.02
 
 
 def find_program() -> str:
-    """The server's program: $ENFILADE, or `enfilade` on the PATH, or the build of this checkout."""
+    """The server's program: $ENFILADE, or `enfilade` on the PATH, or the build of the checkout that
+    this package is in, or that is the current folder."""
     named = os.environ.get("ENFILADE")
     if named:
         return named
     on_path = shutil.which("enfilade")
     if on_path:
         return on_path
-    for folder in Path(__file__).resolve().parents:
+    for folder in [*Path(__file__).resolve().parents, Path.cwd()]:
         built = folder / "build" / "enfilade"
-        if built.is_file() and os.access(built, os.X_OK):
+        ours = (folder / "protocol" / "enfilade.proto").is_file()
+        if ours and built.is_file() and os.access(built, os.X_OK):
             return str(built)
-    raise StartFailed("there is no program `enfilade`: put it on the PATH, name it by $ENFILADE, "
-                      "or give program=")
+    raise StartFailed("there is no program `enfilade`: put it on the PATH, name it by $ENFILADE "
+                      "(export ENFILADE=CHECKOUT/build/enfilade), or give program=")
 
 
 def serve(scene: Union[str, Path], *arguments: str, program: Optional[str] = None,
@@ -45,27 +46,91 @@ def serve(scene: Union[str, Path], *arguments: str, program: Optional[str] = Non
     return Server(scene, arguments, program or find_program(), seconds)
 
 
+class _Running:
+    """What a Server holds: apart from it, so that the Server may be collected."""
+
+    def __init__(self, command: List[str]) -> None:
+        self.said = ""
+        self.log = tempfile.TemporaryFile()
+        try:
+            self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                            stderr=self.log, start_new_session=True)
+        except OSError as error:
+            raise StartFailed(f"cannot start {command[0]}: {error}") from error
+        self.clients: "weakref.WeakSet[Client]" = weakref.WeakSet()
+        _running.add(self)
+
+    def tell(self) -> None:
+        """To end; does not wait. It ends by the end of its standard input, too."""
+        if self.process.poll() is None:
+            self.process.terminate()
+
+    def wait(self) -> int:
+        """Until it has ended, or is killed."""
+        deadline = time.monotonic() + _STOPPING_SECONDS
+        while self.process.poll() is None and time.monotonic() < deadline:
+            # It waits a while for clients that do not close; these have its last words to read.
+            for client in list(self.clients):
+                client.say_no_more()
+            try:
+                self.process.wait(_CHECK_SECONDS)
+            except subprocess.TimeoutExpired:
+                pass
+        if self.process.poll() is None:
+            self.process.kill()
+        code = self.process.wait()
+        if not self.log.closed:
+            self.said = self.read_log()
+        for stream in (self.process.stdin, self.process.stdout, self.log):
+            if stream is not None:
+                stream.close()
+        _running.discard(self)
+        return code
+
+    def read_log(self) -> str:
+        if self.log.closed:
+            return self.said
+        return os.pread(self.log.fileno(), 1 << 20, 0).decode(errors="replace")
+
+
+_running: Set[_Running] = set()
+
+
+def _reap() -> None:
+    """Lets go of servers that were told to end, and did."""
+    for one in list(_running):
+        if one.process.poll() is not None:
+            one.wait()
+
+
+@atexit.register
+def _stop_all() -> None:
+    for one in list(_running):
+        one.tell()
+    for one in list(_running):
+        one.wait()
+
+
 class Server:
-    """It is stopped by stop(), at the end of a `with`, and at the end of this Python; also when this
-    Python is killed: the server ends when the other end of its standard input is closed."""
+    """It is stopped by stop(), at the end of a `with`, when nobody holds it any more, and at the end of
+    this Python; also when this Python is killed: the server ends when the other end of its standard
+    input is closed."""
 
     def __init__(self, scene: Union[str, Path], arguments: Sequence[str], program: str,
                  seconds: float) -> None:
-        self._log = tempfile.TemporaryFile()
-        command: List[str] = [program, "serve", str(scene), "--listen", "127.0.0.1:0",
-                              "--stop-at-end-of-input", *arguments]
-        try:
-            self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                                            stderr=self._log, start_new_session=True)
-        except OSError as error:
-            raise StartFailed(f"cannot start {program}: {error}") from error
-        _running.add(self)
+        _reap()
+        command = [program, "serve", str(scene), "--listen", "127.0.0.1:0",
+                   "--stop-at-end-of-input", *arguments]
+        self._running = _Running(command)
+        # Does not wait: a collection must not stand still for it.
+        weakref.finalize(self, self._running.tell).atexit = False
+        self.process = self._running.process
         try:
             self.ready: Any = self._await_ready(time.monotonic() + seconds)
+            self.address: str = f"127.0.0.1:{self.ready['port']}"
         except BaseException:
             self.stop()
             raise
-        self.address: str = f"127.0.0.1:{self.ready['port']}"
 
     def _await_ready(self, deadline: float) -> Any:
         out = self.process.stdout
@@ -81,39 +146,30 @@ class Server:
                 raise StartFailed(f"the server ended with {self.process.returncode}; it said:\n"
                                   f"{self.log()}")
             line += piece
-        return json.loads(line)
+        try:
+            ready = json.loads(line)
+            int(ready["port"])
+        except (ValueError, KeyError, TypeError) as error:
+            raise StartFailed(f"{self.process.args[0]!r} is no Enfilade server: its first line is "
+                              f"{line[:200]!r}") from error
+        return ready
 
     def log(self) -> str:
-        """What it wrote to stderr so far."""
-        return os.pread(self._log.fileno(), 1 << 20, 0).decode(errors="replace")
+        """What it wrote to stderr so far; also after stop()."""
+        return self._running.read_log()
 
     def connect(self, *, name: str = "enfilade python", timeout: float = 30.0) -> Client:
-        return connect(self.address, name=name, timeout=timeout)
+        client = connect(self.address, name=name, timeout=timeout)
+        self._running.clients.add(client)
+        return client
 
     def stop(self) -> int:
         """Tells it to end, waits, kills it when it does not; its exit code."""
-        _running.discard(self)
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGTERM)
-            try:
-                self.process.wait(_STOPPING_SECONDS)
-            except subprocess.TimeoutExpired:
-                self.process.kill()
-        code = self.process.wait()
-        for stream in (self.process.stdin, self.process.stdout):
-            if stream is not None:
-                stream.close()
-        self._log.close()
-        return code
+        self._running.tell()
+        return self._running.wait()
 
     def __enter__(self) -> "Server":
         return self
 
     def __exit__(self, *_: Any) -> None:
         self.stop()
-
-
-@atexit.register
-def _stop_all() -> None:
-    for server in list(_running):
-        server.stop()

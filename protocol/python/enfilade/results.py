@@ -140,7 +140,7 @@ def state(message: Any) -> State:
     return State(message.tick, message.time, message.hash, states, message.dropped, message)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # arrays do not compare as one
 class Frame:
     """A picture. Channels that were not asked for are None. The arrays are writable and nobody
     else's; they share one piece of memory."""
@@ -188,7 +188,7 @@ def frame(message: Any, attachment: memoryview) -> Frame:
                  message)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # arrays do not compare as one
 class Hits:
     """What rays meet, an entry a ray. Where nothing is met: entity 0, NaN elsewhere."""
 
@@ -200,19 +200,41 @@ class Hits:
     names: List[str]
 
 
-def hits(reply: Any) -> Hits:
-    count = len(reply.hits)
-    distance = np.full(count, np.nan)
-    point, normal = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
-    for i, hit in enumerate(reply.hits):
-        if hit.met:
-            distance[i] = hit.distance
-            point[i], normal[i] = vector(hit.point), vector(hit.normal)
-    entity = np.array([hit.entity for hit in reply.hits], np.uint32)
-    return Hits(reply.tick, entity, distance, point, normal, [hit.name for hit in reply.hits])
+# A Ray as a field of a RayQuery, on the wire: keys and lengths, and little-endian doubles.
+_RAY = np.dtype([("ray", "V2"), ("origin", "V2"), ("x", "V1"), ("ox", "<f8"), ("y", "V1"),
+                 ("oy", "<f8"), ("z", "V1"), ("oz", "<f8"), ("direction", "V2"), ("x2", "V1"),
+                 ("dx", "<f8"), ("y2", "V1"), ("dy", "<f8"), ("z2", "V1"), ("dz", "<f8"),
+                 ("key", "V1"), ("reach", "<f8")])
+_KEYS = {"ray": b"\x0a\x43", "origin": b"\x0a\x1b", "direction": b"\x12\x1b", "x": b"\x09",
+         "y": b"\x11", "z": b"\x19", "x2": b"\x09", "y2": b"\x11", "z2": b"\x19", "key": b"\x19"}
+RAY_BYTES = _RAY.itemsize
 
 
-@dataclass(frozen=True)
+def ray_query(origins: np.ndarray, directions: np.ndarray, reach: float) -> Any:
+    """A RayQuery of N x 3 arrays. Made by numpy and parsed: ten times as quick as a message a ray."""
+    rays = np.empty(len(origins), _RAY)
+    for name, key in _KEYS.items():
+        rays[name] = np.void(key)
+    for axis, letter in enumerate("xyz"):
+        rays["o" + letter], rays["d" + letter] = origins[:, axis], directions[:, axis]
+    rays["reach"] = reach
+    return messages.RayQuery.FromString(rays.tobytes())
+
+
+def hits(replies: List[Any]) -> Hits:
+    """Of replies to parts of one question, in order."""
+    found = [hit for reply in replies for hit in reply.hits]
+    met = np.array([hit.met for hit in found], bool)
+    numbers = np.full((len(found), 7), np.nan)
+    if met.any():
+        numbers[met] = [(hit.distance, *vector(hit.point), *vector(hit.normal))
+                        for hit in found if hit.met]
+    entity = np.array([hit.entity for hit in found], np.uint32)
+    return Hits(replies[-1].tick, entity, numbers[:, 0], numbers[:, 1:4], numbers[:, 4:],
+                [hit.name for hit in found])
+
+
+@dataclass(frozen=True, eq=False)  # arrays do not compare as one
 class Scan:
     """A range scan, row by row from above, each from the left."""
 

@@ -16,6 +16,12 @@ class _Space:
     def seed(self, seed: Optional[int] = None) -> None:
         self._random = np.random.default_rng(seed)
 
+    def contains(self, x: Any) -> bool:
+        raise NotImplementedError
+
+    def __contains__(self, x: Any) -> bool:
+        return self.contains(x)
+
 
 class _Box(_Space):
     """Arrays between `low` and `high`."""
@@ -37,8 +43,12 @@ class _Box(_Space):
         return self._random.uniform(low, high, self.shape).astype(self.dtype)
 
     def contains(self, x: Any) -> bool:
-        x = np.asarray(x)
-        return x.shape == self.shape and bool(np.all(x >= self.low) and np.all(x <= self.high))
+        x = x if isinstance(x, np.ndarray) else np.asarray(x, self.dtype)
+        return np.can_cast(x.dtype, self.dtype) and x.shape == self.shape and \
+            bool(np.all(x >= self.low) and np.all(x <= self.high))
+
+    def __repr__(self) -> str:
+        return f"Box({self.low.min()}, {self.high.max()}, {self.shape}, {self.dtype})"
 
 
 class _Discrete(_Space):
@@ -52,7 +62,12 @@ class _Discrete(_Space):
         return int(self._random.integers(self.n))
 
     def contains(self, x: Any) -> bool:
-        return int(x) == x and 0 <= int(x) < self.n
+        if isinstance(x, np.ndarray) and x.shape == ():
+            x = x.item()
+        return isinstance(x, (int, np.integer)) and 0 <= x < self.n
+
+    def __repr__(self) -> str:
+        return f"Discrete({self.n})"
 
 
 class _Dict(_Space):
@@ -76,6 +91,9 @@ class _Dict(_Space):
     def __getitem__(self, name: str) -> Any:
         return self.spaces[name]
 
+    def __repr__(self) -> str:
+        return f"Dict({self.spaces})"
+
 
 EnvBase: Any = object
 Box: Any = _Box
@@ -90,3 +108,15 @@ else:
     HAVE_GYMNASIUM = True
     EnvBase = gymnasium.Env
     Box, Discrete, Dict = gymnasium.spaces.Box, gymnasium.spaces.Discrete, gymnasium.spaces.Dict
+
+
+def batched(space: Any, count: int) -> Any:
+    """The space of `count` values of `space`, stacked."""
+    if HAVE_GYMNASIUM:
+        from gymnasium.vector.utils import batch_space
+        return batch_space(space, count)
+    if isinstance(space, _Dict):
+        return _Dict({name: batched(one, count) for name, one in space.spaces.items()})
+    if isinstance(space, _Discrete):
+        return _Box(0, space.n - 1, (count,), np.int64)
+    return _Box(np.stack([space.low] * count), np.stack([space.high] * count), None, space.dtype)

@@ -1,0 +1,73 @@
+"""Requests for pictures, of Python's arguments; and points for all requests."""
+
+from __future__ import annotations
+
+from typing import Any, Optional, Sequence
+
+import numpy as np
+
+from . import messages, results
+
+Point = Sequence[float]
+
+
+def vec(point: Point) -> Any:
+    x, y, z = point
+    return messages.Vec3(x=x, y=y, z=z)
+
+
+def points(points: Any, name: str) -> np.ndarray:
+    array = np.asarray(points, np.float64)
+    if array.size == 0:
+        return array.reshape(0, 3)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"{name}: give N x 3 numbers, not of the shape {array.shape}")
+    return array
+
+
+def _named(prefix: str, name: str, argument: str) -> int:
+    number = messages._found.get(prefix + name.upper())
+    if number is None:
+        raise ValueError(f"{argument}: {name!r} is none")
+    return int(number)
+
+
+def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Optional[Point] = None,
+                  forward: Optional[Point] = None, up: Optional[Point] = None, width: int = 640,
+                  height: int = 480, fov_y: Optional[float] = None,
+                  intrinsics: Optional[Sequence[float]] = None, height_y: Optional[float] = None,
+                  near: Optional[float] = None, far: Optional[float] = None,
+                  channels: Sequence[str] = ("rgb",), glass: str = "", renderer: str = "",
+                  tick: Optional[int] = None) -> Any:
+    """The FrameRequest that Client.frame() sends."""
+    if sum(one is not None for one in (fov_y, intrinsics, height_y)) > 1:
+        raise ValueError("frame: give one of fov_y, intrinsics and height_y")
+    if target is not None and forward is not None:
+        raise ValueError("frame: give either a target or forward")
+    if eye is None and not avatar:
+        raise ValueError("frame: give an avatar or an eye")
+    if eye is None and not (target is None and up is None and height_y is None):
+        raise ValueError("frame: target, up and height_y need an eye; eyes of an avatar take forward")
+    asked = messages.FrameRequest(width=width, height=height, channels=results.channels(channels),
+                                  tick=tick)
+    if eye is None:
+        view = asked.eyes
+        view.avatar = avatar
+    else:
+        view = asked.free
+        view.eye.CopyFrom(vec(eye))
+        view.hide_avatar = avatar
+    for name, point in (("target", target), ("forward", forward), ("up", up)):
+        if point is not None:
+            getattr(view, name).CopyFrom(vec(point))
+    for name, value in (("fov_y", fov_y), ("height_y", height_y), ("near", near), ("far", far)):
+        if value is not None:
+            setattr(view, name, value)
+    if intrinsics is not None:
+        fx, fy, cx, cy = intrinsics
+        asked.intrinsics.CopyFrom(messages.Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy))
+    if glass:
+        asked.glass = _named("GLASS_", glass, "glass")
+    if renderer:
+        asked.renderer = _named("RENDERER_", renderer, "renderer")
+    return asked
