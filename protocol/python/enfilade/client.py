@@ -10,7 +10,7 @@ from typing import Any, Deque, Dict, Iterable, Iterator, List, Optional, Sequenc
 import numpy as np
 
 from . import messages, results
-from .connection import Connection, Received, server_error
+from .connection import Connection, Received, raise_refusal, server_error
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError
 from .questions import Point, frame_request, points, vec
 from .results import AvatarState, Contact, Frame, Hits, Notice, Scan, State, Step
@@ -430,13 +430,6 @@ class Client:
 
     def __exit__(self, *_: Any) -> None:
         self.close()
-
-
-def raise_refusal(reply: Any) -> None:
-    if reply.HasField("error"):
-        raise server_error(reply.error)
-    if reply.HasField("command") and not reply.command.accepted:
-        raise server_error(reply.command.error)
 
 
 class Avatar:

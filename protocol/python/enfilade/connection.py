@@ -208,3 +208,10 @@ class Connection:
 
 def server_error(error: Any, fatal: bool = False) -> ServerError:
     return ServerError(error.code, error.message, error.field, fatal)
+
+
+def raise_refusal(reply: Any) -> None:
+    if reply.HasField("error"):
+        raise server_error(reply.error)
+    if reply.HasField("command") and not reply.command.accepted:
+        raise server_error(reply.command.error)

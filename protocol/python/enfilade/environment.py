@@ -15,7 +15,8 @@ from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from . import messages, results, spaces
-from .client import Client, Reply, connect, raise_refusal
+from .client import Client, Reply, connect
+from .connection import raise_refusal
 from .errors import OrderFailed
 from .process import Server, serve
 from .questions import frame_request
