@@ -94,7 +94,8 @@ void measure(const std::shared_ptr<const scene::Scene>& scene, const std::string
     different += same(all, seen) ? 0 : 1;
   }
   const double n = static_cast<double>(culled.frames);
-  const double fast = n / culled.seconds, slow = static_cast<double>(single.frames) / single.seconds;
+  const double fast = n / culled.seconds,
+               slow = static_cast<double>(single.frames) / single.seconds;
   std::printf(
       "%-28.28s %-5s %4dx%-4d %8.1f %8.2f %7.1f  drawn %6.0f of %6.0f  redrawn %4.1f%%  %s\n",
       std::filesystem::path(name).filename().c_str(), textured ? "yes" : "no", size.width,
