@@ -57,10 +57,10 @@ std::optional<std::string> badDistances(const Camera& camera) {
 }
 
 std::optional<std::string> badPinhole(const Pinhole& pinhole) {
-  constexpr double kShortest = 1e-3, kLongest = 1e7, kAside = 1e5;  // pixels
+  constexpr double kShortest = 1e-3, kLongest = 1e6, kAside = 1e5;  // pixels
   const auto focal = [](double f) { return f >= kShortest && f <= kLongest; };
-  if (!focal(pinhole.fx)) return badField("pinhole.fx", pinhole.fx, "1e-3 to 1e7 pixels");
-  if (!focal(pinhole.fy)) return badField("pinhole.fy", pinhole.fy, "1e-3 to 1e7 pixels");
+  if (!focal(pinhole.fx)) return badField("pinhole.fx", pinhole.fx, "1e-3 to 1e6 pixels");
+  if (!focal(pinhole.fy)) return badField("pinhole.fy", pinhole.fy, "1e-3 to 1e6 pixels");
   const auto centre = [](double c) { return std::abs(c) <= kAside; };
   if (!centre(pinhole.cx)) return badField("pinhole.cx", pinhole.cx, "within 1e5 pixels");
   if (!centre(pinhole.cy)) return badField("pinhole.cy", pinhole.cy, "within 1e5 pixels");
@@ -70,8 +70,10 @@ std::optional<std::string> badPinhole(const Pinhole& pinhole) {
 std::optional<std::string> badOpening(const Camera& camera) {
   if (camera.projection == Camera::Projection::perspective) {
     if (camera.pinhole) return badPinhole(*camera.pinhole);
-    if (camera.fovY > 0 && camera.fovY < std::numbers::pi) return std::nullopt;
-    return badField("fovY", camera.fovY, "between 0 and pi radians");
+    const bool opens = camera.fovY > 0 && camera.fovY < std::numbers::pi;
+    if (opens && !badPinhole(intrinsicsOf(camera))) return std::nullopt;
+    return badField("fovY", camera.fovY,
+                    "between 0 and pi radians, with a focal length of 1e-3 to 1e6 pixels");
   }
   if (camera.pinhole) return badField("pinhole", "given", "absent in an orthographic camera");
   if (camera.heightY >= kNearest && camera.heightY <= kFarthest) return std::nullopt;

@@ -13,7 +13,7 @@ using collision::Vec3;
 /// A pinhole camera's intrinsics in pixels. cx and cy are measured from the top left corner of the
 /// picture, to the right and downwards: the centre of the first pixel is at (0.5, 0.5).
 struct Pinhole {
-  double fx = 0, fy = 0;  ///< focal lengths, 1e-3..1e7
+  double fx = 0, fy = 0;  ///< focal lengths, 1e-3..1e6
   double cx = 0, cy = 0;  ///< where the axis meets the picture, or beside it: within 1e5
 };
 

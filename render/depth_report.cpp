@@ -13,7 +13,7 @@ std::size_t binOf(double error) {
   constexpr std::size_t kLast = std::tuple_size_v<decltype(DepthErrors::bins)> - 1;
   if (error <= kFirstBinEnd) return 0;
   const double bin = std::ceil(DepthErrors::kBinsPerDecade * std::log10(error / kFirstBinEnd));
-  return std::min(kLast, static_cast<std::size_t>(std::max(0.0, bin)));
+  return static_cast<std::size_t>(std::clamp(bin, 0.0, static_cast<double>(kLast)));
 }
 
 /// To the nearest edge pixel, in pixels; `far` where there is none nearer.
@@ -105,10 +105,13 @@ double DepthErrors::percentile99() const {
 }
 
 DepthReport compareWithTruth(const Frame& frame, const TrueFrame& truth) {
-  if (frame.depth.size() != truth.depth.size()) {
+  if (frame.camera.width != truth.camera.width || frame.camera.height != truth.camera.height ||
+      frame.depth.size() != truth.depth.size() ||
+      (!frame.ids.empty() && frame.ids.size() != truth.ids.size())) {
     throw RenderError("depth report: the picture has " + std::to_string(frame.depth.size()) +
-                      " pixels of depth, its truth " + std::to_string(truth.depth.size()) +
-                      "; ask for the depth channel");
+                      " pixels of depth and " + std::to_string(frame.ids.size()) +
+                      " of ids, its truth " + std::to_string(truth.depth.size()) +
+                      "; ask for the depth channel, and for the truth of the same camera");
   }
   DepthReport report;
   report.renderer = frame.renderer;

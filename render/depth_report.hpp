@@ -16,7 +16,7 @@ struct DepthErrors {
   double sum = 0, greatest = 0;
   /// Pixels by size of error: bin b ends at 1e-10 * 10^(b / kBinsPerDecade) m; the last has no end.
   static constexpr int kBinsPerDecade = 40;
-  std::array<std::uint32_t, 13 * kBinsPerDecade + 1> bins{};
+  std::array<std::uint64_t, 13 * kBinsPerDecade + 1> bins{};
 
   void add(double error);
   void add(const DepthErrors& other);

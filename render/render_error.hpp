@@ -10,4 +10,9 @@ struct RenderError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The renderer that was asked for cannot be had here; another may.
+struct NoRenderer : RenderError {
+  using RenderError::RenderError;
+};
+
 }  // namespace enfilade::render

@@ -57,14 +57,20 @@ struct Renderer::State {
   std::string note;
 
   GlRenderer& glRenderer() {
-    if (!gl && !glFailure.empty()) throw RenderError(glFailure);
-    if (!gl) gl = std::make_unique<GlRenderer>(scene, device);
+    if (gl) return *gl;
+    if (!glFailure.empty()) throw NoRenderer(glFailure);
+    try {
+      gl = std::make_unique<GlRenderer>(scene, device);
+    } catch (const RenderError& error) {
+      glFailure = error.what();  // devices are not tried again with every picture
+      throw NoRenderer(glFailure);
+    }
     return *gl;
   }
 
   RayRenderer& rayRenderer() {
     if (device.requireGpu) {
-      throw RenderError("rays are cast on processors, and a GPU is required: ask for gl");
+      throw NoRenderer("rays are cast on processors, and a GPU is required: ask for gl");
     }
     if (!rays) rays = std::make_unique<RayRenderer>(scene);
     return *rays;
@@ -84,8 +90,7 @@ struct Renderer::State {
       note = glRenderer().deviceNote();
     } catch (const RenderError& error) {
       if (device.requireGpu || !device.device.empty()) throw;
-      glFailure = error.what();
-      note = "pictures are cast with rays, since there is no OpenGL: " + glFailure;
+      note = std::string("pictures are cast with rays, since there is no OpenGL: ") + error.what();
       rayRenderer();
     }
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <map>
 #include <numbers>
 #include <stdexcept>
@@ -32,16 +33,17 @@ struct Release {
 using Device = std::unique_ptr<std::remove_pointer_t<RTCDevice>, Release>;
 using EmbreeScene = std::unique_ptr<std::remove_pointer_t<RTCScene>, Release>;
 
-/// The corners of a surface that is placed, in its own frame: a mesh of the model or a hull.
+/// The corners of a surface that is placed, in its own frame: a mesh of the model, or triangles of
+/// a hull or of a mesh that is made flat.
 struct Surface {
   const Mesh* mesh = nullptr;
-  std::shared_ptr<const collision::Hull> hull;  ///< keeps what `hullTriangles` was made of
-  std::vector<Triangle> hullTriangles;
+  std::shared_ptr<const collision::Hull> hull;  ///< keeps what `triangles` was made of
+  std::vector<Triangle> triangles;
   EmbreeScene embree;
 
   Triangle corners(std::uint32_t triangle, const Eigen::Affine3d& worldFromSurface) const {
     if (!mesh) {
-      const Triangle& t = hullTriangles[triangle];
+      const Triangle& t = triangles[triangle];
       return {worldFromSurface * t[0], worldFromSurface * t[1], worldFromSurface * t[2]};
     }
     Triangle t;
@@ -62,6 +64,7 @@ struct Placed {
 /// Many placed surfaces under one tree.
 struct Placement {
   std::vector<Placed> placed;
+  std::deque<Surface> flat;  ///< of `placed`: those that cannot be instanced, in the world's frame
   EmbreeScene embree;
 };
 
@@ -106,6 +109,16 @@ EmbreeScene sceneOf(RTCDevice device, std::span<const Eigen::Vector3f> positions
   return scene;
 }
 
+std::vector<Triangle> trianglesOf(const Mesh& mesh, const Eigen::Affine3d& worldFromMesh) {
+  std::vector<Triangle> triangles;
+  const auto corner = [&](std::size_t i) {
+    return Vec3(worldFromMesh * mesh.positions[mesh.indices[i]].cast<double>());
+  };
+  for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3)
+    triangles.push_back({corner(i), corner(i + 1), corner(i + 2)});
+  return triangles;
+}
+
 /// Counter-clockwise fans of the hull's faces.
 std::vector<Triangle> trianglesOf(const collision::Hull& hull) {
   std::vector<Triangle> triangles;
@@ -118,13 +131,12 @@ std::vector<Triangle> trianglesOf(const collision::Hull& hull) {
   return triangles;
 }
 
-Surface surfaceOf(RTCDevice device, std::shared_ptr<const collision::Hull> hull) {
+Surface surfaceOf(RTCDevice device, std::vector<Triangle> triangles) {
   Surface surface;
-  surface.hullTriangles = trianglesOf(*hull);
-  surface.hull = std::move(hull);
+  surface.triangles = std::move(triangles);
   std::vector<Eigen::Vector3f> positions;
   std::vector<std::uint32_t> indices;
-  for (const Triangle& triangle : surface.hullTriangles) {
+  for (const Triangle& triangle : surface.triangles) {
     for (const Vec3& corner : triangle) {
       indices.push_back(static_cast<std::uint32_t>(positions.size()));
       positions.push_back(corner.cast<float>());
@@ -286,9 +298,15 @@ void RayCaster::State::placeObject(Placement& placement, std::uint32_t object, E
     if (mesh.indices.size() < 3) continue;
     const bool glass = model.materials.size() > mesh.material &&
                        model.materials[mesh.material].alpha == Material::Alpha::blend;
-    place(device.get(), placement,
-          {entity, &surfaceOfMesh(m), worldFromAuthored * model.objects[object].worldFromMesh},
-          glass ? kGlassBit : kSolidBit);
+    Placed placed{entity, nullptr, worldFromAuthored * model.objects[object].worldFromMesh};
+    if (canBeInstanced(placed.worldFromSurface)) {
+      placed.surface = &surfaceOfMesh(m);
+    } else {
+      placement.flat.push_back(surfaceOf(device.get(), trianglesOf(mesh, placed.worldFromSurface)));
+      placed.surface = &placement.flat.back();
+      placed.worldFromSurface.setIdentity();
+    }
+    place(device.get(), placement, placed, glass ? kGlassBit : kSolidBit);
   }
 }
 
@@ -337,7 +355,7 @@ void RayCaster::State::placeAvatars(const std::vector<AvatarView>& views) {
   for (const AvatarView& avatar : views) {
     for (const AvatarPart& part : avatar.shape->parts) {
       const Surface& surface = surfaceOfHull(part.hull);
-      if (surface.hullTriangles.empty()) continue;
+      if (surface.triangles.empty()) continue;
       Eigen::Affine3d worldFromHull = Eigen::Affine3d(Eigen::Translation3d(avatar.feet));
       worldFromHull.translate(part.offset).rotate(part.rotation);
       place(device.get(), avatars, {avatar.id, &surface, worldFromHull}, kSolidBit);
@@ -349,9 +367,17 @@ void RayCaster::State::placeAvatars(const std::vector<AvatarView>& views) {
 const Surface& RayCaster::State::surfaceOfHull(const std::shared_ptr<const collision::Hull>& hull) {
   auto found = hulls.find(hull.get());
   if (found == hulls.end()) {
-    found = hulls.emplace(hull.get(), surfaceOf(device.get(), hull)).first;
+    found = hulls.emplace(hull.get(), surfaceOf(device.get(), trianglesOf(*hull))).first;
+    found->second.hull = hull;
   }
   return found->second;
+}
+
+bool canBeInstanced(const Eigen::Affine3d& worldFromMesh) {
+  const Eigen::Matrix3f linear = worldFromMesh.linear().cast<float>();
+  const Eigen::Matrix3f inverse = linear.inverse();
+  const Eigen::Vector3f origin = inverse * worldFromMesh.translation().cast<float>();
+  return inverse.allFinite() && origin.allFinite();
 }
 
 RayCaster::RayCaster(std::shared_ptr<const Scene> scene) : state_(std::make_unique<State>()) {

@@ -58,6 +58,10 @@ std::vector<Ray> raysOf(const RangeScan& scan);
 
 /// The still scene, built at construction (meshes stored once), and what moves, as of a snapshot.
 /// One thread at a time may follow(); any number may cast between.
+/// Whether Embree can have an instance there. It inverts the transform in floats, and Debian's
+/// build of it ends the program where that cannot be done, as for an object that a file makes flat.
+bool canBeInstanced(const Eigen::Affine3d& worldFromMesh);
+
 class RayCaster {
  public:
   explicit RayCaster(std::shared_ptr<const Scene> scene);

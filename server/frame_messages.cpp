@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "protocol/framing.hpp"
 #include "render/pictures/encode.hpp"
 #include "render/pictures/image.hpp"
 #include "server/world_messages.hpp"
@@ -17,7 +18,7 @@ CameraOrError eyesOf(const v1::AvatarEyes& eyes, const scene::Snapshot& snapshot
   const scene::AvatarView* avatar = avatarNamed(snapshot, eyes.avatar());
   if (!avatar) return unknownAvatar(eyes.avatar(), "eyes.avatar");
   scene::AvatarView seer = *avatar;
-  if (eyes.has_forward()) seer.gaze = vectorFrom(eyes.forward()).normalized();
+  if (eyes.has_forward()) seer.gaze = vectorFrom(eyes.forward()).stableNormalized();
   View view{render::firstPerson(seer, width, height), {.hidden = avatar->id}};
   if (eyes.has_fov_y()) view.camera.fovY = eyes.fov_y();
   if (eyes.has_near()) view.camera.near = eyes.near();
@@ -154,6 +155,25 @@ std::optional<v1::Error> rendererProblem(const v1::FrameRequest& request) {
                  "renderer");
 }
 
+/// Pixels that no client of ours takes in one message are refused before they are drawn.
+std::optional<v1::Error> sizeProblem(const v1::FrameRequest& request) {
+  constexpr std::uint64_t kRoomForTheMessage = 65536;
+  std::uint64_t bytesPerPixel = request.channels().empty() ? 3 : 0;
+  for (const int channel : request.channels()) {
+    if (channel == v1::CHANNEL_NORMALS)
+      bytesPerPixel += 12;
+    else
+      bytesPerPixel += channel == v1::CHANNEL_RGB ? 3 : 4;
+  }
+  const std::uint64_t most = protocol::kClientTakes.total - kRoomForTheMessage;
+  const std::uint64_t bytes = bytesPerPixel * request.width() * request.height();
+  if (bytes <= most) return std::nullopt;
+  return errorOf(v1::ERROR_TOO_LARGE,
+                 "channels: these take " + std::to_string(bytes) + " bytes of pixels, at most " +
+                     std::to_string(most) + " fit a message; ask for fewer at a time",
+                 "channels");
+}
+
 render::RendererKind rendererOf(const v1::FrameRequest& request) {
   if (request.renderer() == v1::RENDERER_GL) return render::RendererKind::gl;
   if (request.renderer() == v1::RENDERER_RAYS) return render::RendererKind::rays;
@@ -171,6 +191,7 @@ CameraOrError viewFrom(const v1::FrameRequest& request, const scene::Snapshot& s
       request.height() > kMost) {
     return errorOf(v1::ERROR_BAD_CAMERA, "width and height: give 1 to 4096 pixels", "width");
   }
+  if (auto problem = sizeProblem(request)) return *problem;
   const int width = static_cast<int>(request.width());
   const int height = static_cast<int>(request.height());
   CameraOrError view = errorOf(v1::ERROR_BAD_CAMERA, "view is missing: give eyes or free", "view");

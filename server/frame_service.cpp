@@ -49,6 +49,9 @@ Buffer FrameService::State::reply(Drawing& drawing) {
     Buffer whole = frameReply(drawing);
     ++drawn;
     return whole;
+  } catch (const render::NoRenderer& error) {
+    return errorReply(drawing.job.requestId,
+                      errorOf(v1::ERROR_NO_RENDERER, error.what(), "renderer"));
   } catch (const std::exception& error) {
     spdlog::error("a picture could not be made: {}", error.what());
     return errorReply(drawing.job.requestId, errorOf(v1::ERROR_INTERNAL, error.what()));

@@ -86,13 +86,13 @@ void noteAll(const RTCFilterFunctionNArguments* arguments) {
 /// One pixel's ray, from depth to depth.
 RTCRayHit singleRay(const Casting& casting, int x, int y, double from, double to) {
   const PixelRays& rays = casting.rays;
-  const Eigen::Vector3f start = (rays.eye - casting.origin + rays.originAt(x, y)).cast<float>();
+  const Eigen::Vector3f start = (rays.eye - casting.origin + rays.startAt(x, y)).cast<float>();
   const Eigen::Vector3f way = rays.directionAt(x, y).cast<float>();
   RTCRayHit query{};
   query.ray.org_x = start.x(), query.ray.org_y = start.y(), query.ray.org_z = start.z();
   query.ray.dir_x = way.x(), query.ray.dir_y = way.y(), query.ray.dir_z = way.z();
-  query.ray.tnear = static_cast<float>(from);
-  query.ray.tfar = static_cast<float>(to);
+  query.ray.tnear = static_cast<float>(std::max(0.0, from - rays.start));
+  query.ray.tfar = static_cast<float>(to - rays.start);
   query.ray.mask = 0xFFFF'FFFFu;
   query.ray.id = static_cast<unsigned>(y * rays.width + x);
   query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
@@ -107,7 +107,7 @@ struct Packet {
 
 void aim(Packet& packet, const Casting& casting, int x0, int y0) {
   const PixelRays& rays = casting.rays;
-  const Eigen::Vector3f from = (rays.eye - casting.origin + rays.originAt(x0, y0)).cast<float>();
+  const Eigen::Vector3f from = (rays.eye - casting.origin + rays.startAt(x0, y0)).cast<float>();
   const Eigen::Vector3f way = rays.directionAt(x0, y0).cast<float>();
   const Eigen::Vector3f fromX = rays.originX.cast<float>(), fromY = rays.originY.cast<float>();
   const Eigen::Vector3f wayX = rays.directionX.cast<float>(), wayY = rays.directionY.cast<float>();
@@ -125,8 +125,8 @@ void aim(Packet& packet, const Casting& casting, int x0, int y0) {
     packet.valid[lane] = inside ? -1 : 0;
     // Embree 3.13 casts lanes that are not valid, too, where rays are said to be coherent: such
     // rays end before they begin.
-    ray.tnear[lane] = inside ? static_cast<float>(rays.near) : 1.0f;
-    ray.tfar[lane] = inside ? static_cast<float>(rays.far) : -1.0f;
+    ray.tnear[lane] = inside ? static_cast<float>(rays.near - rays.start) : 1.0f;
+    ray.tfar[lane] = inside ? static_cast<float>(rays.far - rays.start) : -1.0f;
     ray.time[lane] = 0;
     ray.mask[lane] = 0xFFFF'FFFFu;
     ray.flags[lane] = 0;
@@ -185,9 +185,9 @@ void castThroughRows(const Casting& casting, int y, const std::vector<float>& de
     aim(packet, casting, x, y);
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if (packet.valid[lane] == 0) continue;
-      const float z = depth[packet.query.ray.id[lane]];
+      const double z = static_cast<double>(depth[packet.query.ray.id[lane]]) - casting.rays.start;
       // Embree's own distances are only good to floats.
-      if (!std::isnan(z)) packet.query.ray.tfar[lane] = z * 1.0001f + 1e-4f;
+      if (!std::isnan(z)) packet.query.ray.tfar[lane] = static_cast<float>(z * 1.0001 + 1e-4);
     }
     for (std::size_t t = 0; t < casting.trees.size(); ++t) {
       Context context = contextOf(casting, t);
@@ -217,6 +217,7 @@ void castBetween(const Casting& casting, int x, int y, double from, double to,
 
 double castBehind(const Casting& casting, int x, int y, double from) {
   RTCRayHit query = singleRay(casting, x, y, from, casting.rays.far);
+  if (!(query.ray.tnear <= query.ray.tfar)) return std::numeric_limits<double>::quiet_NaN();
   bool met = false;
   for (std::size_t t = 0; t < casting.trees.size(); ++t) {
     Context context = contextOf(casting, t);
@@ -224,7 +225,8 @@ double castBehind(const Casting& casting, int x, int y, double from) {
     rtcIntersect1(casting.trees[t]->embree(), &context.embree, &query);
     met = met || query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
   }
-  return met ? static_cast<double>(query.ray.tfar) : std::numeric_limits<double>::quiet_NaN();
+  return met ? casting.rays.start + static_cast<double>(query.ray.tfar)
+             : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace enfilade::render

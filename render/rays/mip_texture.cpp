@@ -64,7 +64,7 @@ float linearOfSrgb(std::uint8_t value) {
 
 std::uint8_t srgbOfLinear(float value) {
   static const std::vector<std::uint8_t> kTable = encoded();
-  const float bounded = std::clamp(value, 0.0f, 1.0f);
+  const float bounded = value > 0 ? std::min(value, 1.0f) : 0.0f;  // a NaN is black
   return kTable[static_cast<std::size_t>(bounded * static_cast<float>(kEncodedSteps) + 0.5f)];
 }
 

@@ -11,10 +11,12 @@ PixelRays pixelRaysOf(const Camera& camera) {
   const Vec3 aside = view.right / view.scaleX, above = view.up / view.scaleY;
   const Vec3 corner =
       (-1 + 0.5 * stepX - view.shiftX) * aside + (1 + 0.5 * stepY - view.shiftY) * above;
-  PixelRays rays{camera.eye,   view.forward,  camera.near,  camera.far,
-                 camera.width, camera.height, Vec3::Zero(), Vec3::Zero(),
-                 Vec3::Zero(), view.forward,  Vec3::Zero(), Vec3::Zero()};
   const bool perspective = camera.projection == Camera::Projection::perspective;
+  PixelRays rays{!perspective, camera.eye,    view.forward,
+                 camera.near,  camera.far,    perspective ? 0 : camera.near,
+                 camera.width, camera.height, Vec3::Zero(),
+                 Vec3::Zero(), Vec3::Zero(),  view.forward,
+                 Vec3::Zero(), Vec3::Zero()};
   (perspective ? rays.direction : rays.origin) += corner;
   (perspective ? rays.directionX : rays.originX) = stepX * aside;
   (perspective ? rays.directionY : rays.originY) = stepY * above;

@@ -5,6 +5,7 @@
 #include "render/rays/ray_renderer.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <span>
@@ -218,7 +219,14 @@ void Picture::blendGlass(const Casting& with, int y, Recent<ShadedTriangle>& rec
   std::sort(panes.begin(), panes.end(), [](const Pane& a, const Pane& b) {
     return std::tuple(a.pixel, -a.z, a.key) < std::tuple(b.pixel, -b.z, b.key);
   });
+  const Pane* before = nullptr;
   for (const Pane& pane : panes) {
+    // A ray through the edge of two triangles meets both; a surface tints once.
+    const bool again = before && before->pixel == pane.pixel &&
+                       std::abs(before->z - pane.z) <= 1e-9 * std::abs(pane.z) &&
+                       shareEdge(triangleOf(with, before->key), triangleOf(with, pane.key));
+    before = &pane;
+    if (again) continue;
     const SurfaceColour glass =
         shading_.colour(triangle(pane.key), column(pane.pixel), row(pane.pixel), pane.z);
     linear_[pane.pixel] = glsl::mix(linear_[pane.pixel], glass.rgb, glass.alpha);

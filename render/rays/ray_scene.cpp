@@ -113,7 +113,7 @@ void RayScene::placePeople(const scene::Snapshot& snapshot) {
     return;
   }
   people_.reset();
-  followedPeople_ = snapshot.avatars;
+  followedPeople_.clear();  // until they are all placed
   peopleMeshes_.clear();
   worldFromPeople_.clear();
   peopleMaterials_.clear();
@@ -128,8 +128,9 @@ void RayScene::placePeople(const scene::Snapshot& snapshot) {
     pieces.push_back(
         {&peopleMeshes_[i], &worldFromPeople_[i], &peopleMaterials_[i], all.pieces[i].id});
   }
-  if (pieces.empty()) return;
-  people_.emplace(device_.get(), robust_, std::move(pieces), origin_, nullptr, meshes_);
+  if (!pieces.empty())
+    people_.emplace(device_.get(), robust_, std::move(pieces), origin_, nullptr, meshes_);
+  followedPeople_ = snapshot.avatars;
 }
 
 std::vector<const RayTree*> RayScene::solid() {

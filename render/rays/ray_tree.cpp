@@ -5,6 +5,7 @@
 #include <string>
 
 #include "render/render_error.hpp"
+#include "scene/ray_caster.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -46,16 +47,27 @@ class Copier {
 
 }  // namespace
 
+bool shareEdge(const PieceTriangle& a, const PieceTriangle& b) {
+  if (a.piece != b.piece) return false;
+  const scene::Mesh& mesh = *a.piece->mesh;
+  const auto corner = [&](const PieceTriangle& of, std::size_t i) -> const Eigen::Vector3f& {
+    return mesh.positions[mesh.indices[3 * std::size_t{of.triangle} + i]];
+  };
+  int common = 0;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) common += corner(a, i) == corner(b, j) ? 1 : 0;
+  return common >= 2;
+}
+
 RTCSceneTy* MeshTrees::treeOf(const scene::Mesh& mesh, EmbreeFilter filter) {
-  EmbreeScene& tree = trees_[&mesh];
-  if (tree) return tree.get();
-  tree = newEmbreeScene(device_, robust_);
+  if (const auto found = trees_.find(&mesh); found != trees_.end()) return found->second.get();
+  EmbreeScene tree = newEmbreeScene(device_, robust_);
   const OpenTriangles open = openTriangles(device_, mesh.positions.size(), trianglesOf(mesh));
   std::copy(mesh.positions.begin(), mesh.positions.end(), open.positions);
   std::copy_n(mesh.indices.begin(), 3 * trianglesOf(mesh), open.corners);
   closeTriangles(open, tree.get(), 0, filter);
   commit(device_, tree.get());
-  return tree.get();
+  return (trees_[&mesh] = std::move(tree)).get();
 }
 
 RayTree::RayTree(RTCDeviceTy* device, bool robust, std::vector<RayPiece> pieces, const Vec3& origin,
@@ -63,6 +75,8 @@ RayTree::RayTree(RTCDeviceTy* device, bool robust, std::vector<RayPiece> pieces,
     : pieces_(std::move(pieces)),
       firstTriangle_(pieces_.size(), 0),
       scene_(newEmbreeScene(device, robust)) {
+  for (RayPiece& piece : pieces_)
+    piece.instanced = piece.instanced && scene::canBeInstanced(*piece.worldFromMesh);
   copy(device, false, origin, nullptr);
   copy(device, true, origin, maskFilter);
   placeInstances(device, origin, maskFilter, meshes);

@@ -5,7 +5,7 @@ namespace {
 
 /// The weight of the corner across the edge from `a` to `b`.
 Affine weightAcross(const Vec3& a, const Vec3& b, const PixelRays& rays) {
-  if (rays.parallel()) {
+  if (rays.parallel) {
     // d.((a - o) x (b - o)) = d.(a x b) + d.((b - a) x o)
     const Vec3 edge = b - a;
     return {rays.direction.dot((a - rays.origin).cross(b - rays.origin)),

@@ -35,7 +35,8 @@ Shares sharesAt(const Weights& weights, int x, int y) {
   const double sumX = c[0].dx + c[1].dx + c[2].dx, sumY = c[0].dy + c[1].dy + c[2].dy;
   Shares shares;
   for (std::size_t i = 0; i < 3; ++i) {
-    shares.here[i] = sum != 0 ? w[i] / sum : 1.0 / 3;
+    // Within the triangle, though the exact ray may pass beside what Embree's floats met.
+    shares.here[i] = sum != 0 ? std::clamp(w[i] / sum, 0.0, 1.0) : 1.0 / 3;
     shares.byX[i] = sum != 0 ? (c[i].dx - shares.here[i] * sumX) / sum : 0;
     shares.byY[i] = sum != 0 ? (c[i].dy - shares.here[i] * sumY) / sum : 0;
   }
@@ -108,7 +109,7 @@ Vec3 Shading::normal(const ShadedTriangle& triangle, int x, int y) const {
 }
 
 SurfaceColour Shading::colour(const ShadedTriangle& triangle, int x, int y, double z) const {
-  const bool plan = rays_.parallel();
+  const bool plan = rays_.parallel;
   const Vec3 way = rays_.directionAt(x, y);
   const double length = way.norm();
   const Vec3 toEye = -way / length;
@@ -131,7 +132,7 @@ SurfaceColour Shading::colour(const ShadedTriangle& triangle, int x, int y, doub
 }
 
 glsl::vec3 Shading::sky(int x, int y) const {
-  if (rays_.parallel()) return glsl::planPaper();
+  if (rays_.parallel) return glsl::planPaper();
   return glsl::exposed(glsl::skyFor(floats(rays_.directionAt(x, y).normalized())));
 }
 

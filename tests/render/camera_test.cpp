@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -43,6 +45,9 @@ TEST(Camera, RefusalsNameTheField) {
       {"fovY", [](Camera& c) { c.fovY = 0; }},
       {"fovY", [](Camera& c) { c.fovY = 3.15; }},
       {"fovY", [](Camera& c) { c.fovY = kNaN; }},
+      {"fovY", [](Camera& c) { c.fovY = std::nextafter(std::numbers::pi, 0.0); }},
+      {"fovY", [](Camera& c) { c.fovY = 1e-12; }},
+      {"fovY", [](Camera& c) { c.fovY = 5e-324; }},
       {"heightY",
        [](Camera& c) {
          c.projection = Camera::Projection::orthographic;

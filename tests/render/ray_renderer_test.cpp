@@ -136,6 +136,44 @@ TEST(RayRenderer, GlassTintsTheColourAndLetsIdsAndDepthThrough) {
   EXPECT_EQ(first.ids[beside], 2u);
 }
 
+TEST(RayRenderer, APaneSeenSquarelyIsTintedOnceAlongItsDiagonalToo) {
+  // The middle of the picture is the pane's middle: rays go through the edge of its two triangles.
+  const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, coloured(0.8f, 0.8f, 0.8f)};
+  const PlacedBox pane{{0, 0, -3}, {1, 1, 0}, coloured(0.05f, 0.05f, 0.9f, 0.5f)};
+  RayRenderer renderer(sceneOf({pane, wall}));
+  Camera camera = squareCamera(201);
+  const Frame frame = renderer.render({}, camera);
+  const auto red = [&](int x, int y) { return int{frame.rgb[3 * at(frame, x, y)]}; };
+  for (int i = -14; i <= 14; ++i) {
+    EXPECT_NEAR(red(100 + i, 100 + i), red(100 + i, 100 + i + 2), 3) << i;
+    EXPECT_NEAR(red(100 + i, 100 - i), red(100 + i, 100 - i + 2), 3) << i;
+  }
+}
+
+TEST(RayRenderer, AParallelCameraSeesWhatIsBehindItsEyeWhereNearSaysSo) {
+  RayRenderer renderer(sceneOf({{{0, 0, 5}, {2, 2, 2}, {}}, {{0, 0, -5}, {20, 20, 2}, {}}}));
+  Camera camera = squareCamera();
+  camera.projection = Camera::Projection::orthographic;
+  camera.heightY = 4;
+  camera.near = -10;
+  const Frame frame = renderer.render({}, camera);
+  EXPECT_EQ(frame.ids[at(frame, 100, 100)], 1u);
+  EXPECT_EQ(frame.depth[at(frame, 100, 100)], -6);
+  EXPECT_EQ(frame.ids[at(frame, 10, 10)], 2u);
+  EXPECT_EQ(frame.depth[at(frame, 10, 10)], 4);
+}
+
+TEST(RayRenderer, ABodyMadeFlatIsSeen) {
+  const auto lift = sceneWithLift();
+  scene::Model model = lift->model();
+  const std::uint32_t object = model.bodies.front().objects.front();
+  model.objects[object].worldFromMesh.linear().col(2).setZero();
+  const auto scene = std::make_shared<const scene::Scene>(std::move(model));
+  RayRenderer renderer(scene);
+  const Frame frame = renderer.render(snapshotOfLift(*scene, 0), squareCamera());
+  EXPECT_TRUE(idsIn(frame).contains(object + 1));
+}
+
 TEST(RayRenderer, GlassBehindAWallIsNotSeen) {
   const PlacedBox wall{{0, 0, -3}, {20, 20, 1}, {}};
   const PlacedBox pane{{0, 0, -6}, {9, 9, 0.1}, coloured(0.9f, 0.0f, 0.0f, 0.5f)};

@@ -66,6 +66,17 @@ TEST(RayCaster, SeesTheSurfaceThatItLooksAt) {
   EXPECT_FALSE(caster.isBlocked(toThePane)) << "its own end is not in its way";
 }
 
+TEST(RayCaster, MeetsWhatAFileMakesFlat) {
+  Model model = boxModel({floorBox(), {"sheet", {2, 0, -3}, {3, 3, 3}}});
+  model.objects[1].worldFromMesh.linear().row(0).setZero();  // everything of it at x = 0
+  model.objects[1].worldFromMesh.translation().x() = 2;
+  const RayCaster caster(std::make_shared<const Scene>(std::move(model)));
+  const auto hit = caster.firstHit({{0, 1, 0}, Vec3::UnitX()});
+  ASSERT_TRUE(hit);
+  EXPECT_EQ(hit->entity, 2u);
+  EXPECT_DOUBLE_EQ(hit->distance, 2);
+}
+
 TEST(RayCaster, MeetsAvatarsWhereTheyAreNow) {
   RayCaster caster(boxScene({floorBox()}));
   const Ray ray{{-5, 1, 0}, Vec3::UnitX()};

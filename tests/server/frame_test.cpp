@@ -152,6 +152,18 @@ TEST_F(Frames, TheRendererAskedForDrawsAndSeesTheSame) {
   EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_MESSAGE);
 }
 
+TEST_F(Frames, APictureThatNoClientTakesIsRefusedAndTheConnectionLives) {
+  protocol::Client ann = client("ann");
+  v1::FrameRequest request;
+  request.mutable_free();
+  request.set_width(4096);
+  request.set_height(4096);
+  request.add_channels(v1::CHANNEL_DEPTH);
+  request.add_channels(v1::CHANNEL_NORMALS);
+  EXPECT_EQ(codeOf(ann, request), v1::ERROR_TOO_LARGE);
+  EXPECT_EQ(ann.step(1, false).tick(), 1u);
+}
+
 TEST_F(Frames, WhatCannotBePicturedIsRefusedByName) {
   protocol::Client ann = client("ann");
   v1::FrameRequest request = eyesOf("nobody");
