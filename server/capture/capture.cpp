@@ -11,6 +11,7 @@
 #include "render/renderer.hpp"
 #include "server/capture/capture_folder.hpp"
 #include "server/capture/capture_progress.hpp"
+#include "server/capture/depth_reports.hpp"
 #include "server/capture/documents.hpp"
 #include "server/capture/encode_queue.hpp"
 #include "server/capture/frame_files.hpp"
@@ -38,6 +39,13 @@ struct CaptureCounts {
   double seconds = 0;                   ///< of drawing and writing
 };
 
+/// A frame whose report is missing is drawn again to be measured; its files come out the same.
+bool isDone(const CaptureCommand& command, std::size_t index) {
+  const bool reported = !command.run.reportDepth ||
+                        std::filesystem::is_regular_file(command.out / depthReportOf(index));
+  return reported && isThere(command.out, command.pictures, index);
+}
+
 std::vector<std::size_t> missingFrames(const CaptureCommand& command, const ShotList& list,
                                        CaptureCounts& counts) {
   std::vector<std::size_t> missing;
@@ -45,7 +53,7 @@ std::vector<std::size_t> missingFrames(const CaptureCommand& command, const Shot
   for (std::size_t i = 0; i < list.shots.size(); ++i) {
     if (!takes(command.run.shard, i)) continue;
     ++counts.mine;
-    if (isThere(command.out, command.pictures, i)) {
+    if (isDone(command, i)) {
       ++counts.already;
     } else {
       missing.push_back(i);
@@ -76,14 +84,17 @@ std::string whoDraws(render::Renderer& renderer, const PictureOptions& options) 
 /// Draws on this thread; others encode and write meanwhile.
 void takePictures(const CaptureCommand& command, const scene::Model& model, const ShotList& list,
                   const std::vector<std::size_t>& missing, render::Renderer& renderer,
-                  CaptureCounts& counts) {
+                  DepthReports* reports, CaptureCounts& counts) {
   CaptureMeter meter(command.run.progress, missing.size());
   EncodeQueue queue(kEncoders, kMostInHand);
   for (const std::size_t index : missing) {
     if (interrupted()) break;
     const Shot& shot = list.shots[index];
+    render::FrameOptions options = frameOptions(shot, command.pictures);
+    options.channels.depth |= reports != nullptr;
     auto frame = std::make_shared<const render::Frame>(
-        renderer.render(*shot.snapshot, shot.camera, frameOptions(shot, command.pictures)));
+        renderer.render(*shot.snapshot, shot.camera, options));
+    if (reports) reports->measure(index, *frame, *shot.snapshot, options);
     queue.post([&, index, frame = std::move(frame)] {
       const auto overlay = [&](const render::Frame& drawn) {
         return drawOverlay(drawn, command.pictures.overlay, model, list, list.shots[index]);
@@ -95,6 +106,7 @@ void takePictures(const CaptureCommand& command, const scene::Model& model, cons
   }
   queue.finish();
   meter.finish(counts.written);
+  if (reports) reports->finish(command.run.shard);
   if (interrupted()) throw Interrupted{};
 }
 
@@ -174,7 +186,10 @@ ExitCode run(const CaptureCommand& command) {
   if (counts.already > 0)
     spdlog::info("{} of {} frames are there already", counts.already, counts.mine);
   const auto start = Clock::now();
-  takePictures(command, scene->model(), list, missing, renderer, counts);
+  std::optional<DepthReports> reports;
+  if (command.run.reportDepth && !missing.empty()) reports.emplace(command.out, scene);
+  takePictures(command, scene->model(), list, missing, renderer, reports ? &*reports : nullptr,
+               counts);
   counts.seconds = std::chrono::duration<double>(Clock::now() - start).count();
   if (counts.clamped > 0)
     spdlog::warn("{} pixels of depth are farther than 16 bits hold, and were written as 65535",

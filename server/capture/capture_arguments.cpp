@@ -248,6 +248,9 @@ void addRun(CLI::App& verb, CaptureArguments& into) {
       ->capture_default_str()
       ->check(CLI::IsMember({"bar", "json"}));
   verb.add_flag("--no-mp4", into.noMp4, "No video.mp4, which ffmpeg makes where it is installed");
+  verb.add_flag("--report-depth", into.reportDepth,
+                "Compare depth and ids of each frame with rays in doubles: depth_report.json, and "
+                "one a frame; a second or so a frame");
   verb.add_flag("--dry-run", into.dryRun, "Tell how many frames there are and write nothing");
 }
 
@@ -300,6 +303,7 @@ CaptureRunOptions captureRunFrom(const CaptureArguments& read) {
   run.shard = *shardFrom(read.shard);
   run.mp4 = !read.noMp4;
   run.dryRun = read.dryRun;
+  run.reportDepth = read.reportDepth;
   run.progress = read.progress == "json" ? CaptureProgress::json : CaptureProgress::bar;
   return run;
 }

@@ -392,6 +392,25 @@ TEST_F(Capture, AnOverlayMarksACopyAndLeavesTheColourAlone) {
   EXPECT_EQ(captured("walk.jsonl", "wrong", {"--overlay", "boxen"}).code, 2);
 }
 
+TEST_F(Capture, DepthReportsLieBesideTheFramesAndAreMadeUpForWhereTheyAreMissing) {
+  write(folder_ / "path.txt", ahead(3));
+  const std::vector<std::string> options{"--size", "64x48", "--channels", "rgb"};
+  ASSERT_EQ(captured("path.txt", "out", options).code, 0);
+  const auto before = treeOf(folder_ / "out");
+  std::vector<std::string> reporting = options;
+  reporting.push_back("--report-depth");
+  ASSERT_EQ(captured("path.txt", "out", reporting).code, 0);
+  const auto after = treeOf(folder_ / "out");
+  EXPECT_EQ(after.size(), before.size() + 4);
+  for (const auto& [name, text] : before) EXPECT_EQ(after.at(name), text) << name;
+  const json whole = json::parse(after.at("depth_report.json"));
+  EXPECT_EQ(whole["frames"], 3);
+  EXPECT_EQ(whole["pixels"], 3 * 64 * 48);
+  EXPECT_GT(whole["depth"]["away_from_edges"]["pixels"], 64 * 48);
+  EXPECT_LT(whole["depth"]["away_from_edges"]["max_mm"], 3);
+  EXPECT_EQ(json::parse(after.at("depth_report/000002.json"))["frames"], 1);
+}
+
 TEST_F(Capture, FfmpegMakesTheFilmWhenAllFramesAreThere) {
   fs::create_directories(folder_ / "bin");
   write(folder_ / "bin/ffmpeg", "#!/bin/sh\nfor last; do :; done\necho \"$@\" > \"$last\"\n");
