@@ -18,6 +18,7 @@ struct ModelArguments {
   bool noCache = false;
 };
 struct Arguments {
+  DoctorCommand doctor;
   ModelArguments model;
   std::string script, out, plan, listen = "127.0.0.1:7878", connect;
   std::string record;
@@ -170,6 +171,12 @@ void addInspect(CLI::App& verb, Arguments& into) {
       ->check(CLI::Validator(folderProblem, "DIR"));
 }
 
+void addDoctor(CLI::App& verb, DoctorCommand& into) {
+  verb.add_flag("--json", into.json, "Tell it as one JSON object");
+  verb.add_flag("--require-gpu", into.requireGpu, "End with 1 when only a CPU draws");
+  verb.add_option("--out", into.out, "Write the proof picture to this PNG file");
+}
+
 ModelOptions modelFrom(const ModelArguments& read) {
   ModelOptions options;
   options.file = read.file;
@@ -245,6 +252,9 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   walk->add_option("--connect", read.connect, "The server's address and port")
       ->required()
       ->check(CLI::Validator(endpointProblem, "HOST:PORT"));
+  CLI::App* doctor =
+      app.add_subcommand("doctor", "Try each device that could draw: is anything missing?");
+  addDoctor(*doctor, read.doctor);
   CLI::App* inspect =
       app.add_subcommand("inspect", "Tell what is in a scene, and what is wrong with it");
   addModel(*inspect, read.model);
@@ -279,6 +289,7 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   if (*capture)
     return CaptureCommand{modelFrom(read.model), read.capture.path, read.capture.out,
                           picturesFrom(read.capture), captureRunFrom(read.capture)};
+  if (*doctor) return read.doctor;
   if (*inspect)
     return InspectCommand{modelFrom(read.model), read.json, read.objects, read.strict, read.plan};
   return WalkCommand{read.script, read.out, *endpointFrom(read.connect), read.strict};

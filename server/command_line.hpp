@@ -70,8 +70,13 @@ struct CaptureCommand {
   PictureOptions pictures;
   CaptureRunOptions run;
 };
-using ProgramCommand = std::variant<ServeCommand, ReplayCommand, VerifyCommand, CaptureCommand,
-                                    WalkCommand, InspectCommand>;
+struct DoctorCommand {
+  bool json = false;
+  bool requireGpu = false;    ///< a CPU that draws is not enough
+  std::filesystem::path out;  ///< where the proof picture goes; empty: nowhere
+};
+using ProgramCommand = std::variant<DoctorCommand, ServeCommand, ReplayCommand, VerifyCommand,
+                                    CaptureCommand, WalkCommand, InspectCommand>;
 
 /// What to do, or the code to end with at once (--help: done; a mistake: usage). Help goes to
 /// stdout, mistakes and the usage to stderr.

@@ -7,6 +7,7 @@
 
 #include "server/capture/capture.hpp"
 #include "server/command_line.hpp"
+#include "server/doctor.hpp"
 #include "server/inspect.hpp"
 #include "server/serve.hpp"
 #include "server/verify.hpp"
@@ -16,6 +17,7 @@ namespace enfilade::server {
 namespace {
 
 struct Do {
+  ExitCode operator()(const DoctorCommand& command) const { return doctor(command); }
   ExitCode operator()(const ServeCommand& command) const { return serve(command); }
   ExitCode operator()(const ReplayCommand& command) const { return replay(command); }
   ExitCode operator()(const VerifyCommand& command) const { return verify(command); }

@@ -1,0 +1,65 @@
+// The doctor: the proof picture and EGL's vendor files.
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "render/gl/gl_renderer.hpp"
+#include "render/rays/ray_renderer.hpp"
+#include "server/egl_vendors.hpp"
+#include "server/proof_picture.hpp"
+
+namespace enfilade::server {
+namespace {
+
+TEST(Doctor, TheProofPictureIsTheGoldenOneAtEverySize) {
+  render::GlRenderer renderer(proofScene());
+  EXPECT_EQ(proofProblem(renderer.render({}, proofCamera(640, 480))), "");
+  EXPECT_EQ(proofProblem(renderer.render({}, proofCamera(320, 240))), "");
+}
+
+TEST(Doctor, RaysProveIdsAndDepthOfTheGoldenPicture) {
+  render::RayRenderer rays(proofScene());
+  const std::string problem = proofProblem(rays.render({}, proofCamera(640, 480)));
+  EXPECT_EQ(problem.find("ids"), std::string::npos) << problem;
+  EXPECT_EQ(problem.find("depth"), std::string::npos) << problem;
+}
+
+TEST(Doctor, AWrongPictureIsFound) {
+  render::GlRenderer renderer(proofScene());
+  const render::Frame right = renderer.render({}, proofCamera(320, 240));
+  render::Frame frame = right;
+  for (std::size_t i = 0; i < frame.rgb.size(); i += 3) std::swap(frame.rgb[i], frame.rgb[i + 2]);
+  EXPECT_NE(proofProblem(frame).find("colour"), std::string::npos);
+  frame = right;
+  std::reverse(frame.ids.begin(), frame.ids.end());
+  EXPECT_NE(proofProblem(frame).find("ids"), std::string::npos);
+  frame = right;
+  for (float& depth : frame.depth) depth *= 1.01f;
+  EXPECT_NE(proofProblem(frame).find("depth"), std::string::npos);
+}
+
+TEST(Doctor, VendorFilesAreReadAndWhatTheyLackIsTold) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("enfilade_icd_" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "a.json") << R"({"ICD":{"library_path":"libc.so.6"}})";
+  std::ofstream(folder / "b.json") << R"({"ICD":{"library_path":"libEGL_of_nobody.so.0"}})";
+  std::ofstream(folder / "c.json") << "{";
+  ::setenv("__EGL_VENDOR_LIBRARY_DIRS", folder.c_str(), 1);
+  const std::vector<EglVendor> vendors = eglVendors();
+  ::unsetenv("__EGL_VENDOR_LIBRARY_DIRS");
+  std::filesystem::remove_all(folder);
+  ASSERT_EQ(vendors.size(), 3u);
+  EXPECT_EQ(vendors[0].failure, "");
+  EXPECT_NE(vendors[1].failure.find("libEGL_of_nobody"), std::string::npos);
+  EXPECT_EQ(vendors[1].library, "libEGL_of_nobody.so.0");
+  EXPECT_NE(vendors[2].failure, "");
+}
+
+}  // namespace
+}  // namespace enfilade::server
