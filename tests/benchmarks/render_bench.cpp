@@ -87,7 +87,7 @@ void measure(const std::shared_ptr<const scene::Scene>& scene, const std::string
   for (const auto& stop : stops) draw(renderer, stop, size, render::Culling::hidden, culled);
   std::size_t different = 0, compared = 0;
   draw(renderer, stops[0], size, render::Culling::singly, warm);
-  const std::size_t every = std::max<std::size_t>(1, stops.size() / 12);
+  const std::size_t every = std::max<std::size_t>(1, stops.size() / 6);
   for (std::size_t i = 0; i < stops.size(); i += every, ++compared) {
     const render::Frame all = draw(renderer, stops[i], size, render::Culling::singly, single);
     const render::Frame seen = draw(renderer, stops[i], size, render::Culling::hidden, ignored);
@@ -123,7 +123,7 @@ void benchmark(const std::string& name, int frames) {
 int main(int argc, char** argv) {
   if (const auto code = scene::runImportChild(argc, argv)) return *code;
   std::printf("scene                        text. size      frames/s one-each   ratio\n");
-  const int frames = argc > 2 ? std::atoi(argv[2]) : 240;
+  const int frames = argc > 2 ? std::atoi(argv[2]) : 120;
   if (argc > 1) {
     benchmark(argv[1], frames);
     return 0;

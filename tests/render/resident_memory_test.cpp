@@ -1,0 +1,49 @@
+// Pictures and renderers leave no memory behind.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "tests/render/hand_made_scene.hpp"
+
+namespace enfilade::render {
+namespace {
+
+double residentMegabytes() {
+  std::ifstream statm("/proc/self/statm");
+  double all = 0, resident = 0;
+  statm >> all >> resident;
+  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+std::vector<PlacedBox> manyBoxes() {
+  std::vector<PlacedBox> boxes;
+  for (int i = 0; i < 900; ++i) {
+    const double x = i % 30 - 15.0, z = i / 30 - 15.0;
+    boxes.push_back({{x, 0, z}, {0.4, 1, 0.4}, coloured(0.5f, 0.6f, 0.7f, i % 9 == 0 ? 0.5f : 1)});
+  }
+  return boxes;
+}
+
+/// Reloads the scene `reloads` times and takes 20 pictures with each.
+void work(int reloads) {
+  for (int reload = 0; reload < reloads; ++reload) {
+    GlRenderer renderer(sceneOf(manyBoxes()));
+    for (int i = 0; i < 20; ++i) {
+      Camera camera = squareCamera(96);
+      camera.forward = {std::cos(0.3 * i), -0.1, std::sin(0.3 * i)};
+      renderer.render({}, camera, {.channels = {true, true, true, i % 2 == 0}});
+    }
+  }
+}
+
+TEST(ResidentMemory, IsFlatOverReloadsAndPictures) {
+  work(6);  // what is kept for good, as compiled shaders
+  const double before = residentMegabytes();
+  work(24);
+  EXPECT_LT(residentMegabytes() - before, 12) << "megabytes more after 24 reloads";
+}
+
+}  // namespace
+}  // namespace enfilade::render
