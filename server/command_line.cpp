@@ -280,7 +280,7 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   if (*replay && read.verify) return verifyFrom(read);
   if (*replay) {
     if (const auto missing = missingFrom(read)) {
-      std::cerr << "enfilade: " << *missing << "\n";
+      std::cerr << "enfilade: " << *missing << "\nenfilade replay --help tells what there is\n";
       return ExitCode::usage;
     }
     return ReplayCommand{modelFrom(read.model), read.script, read.out, read.strict, audit,
