@@ -24,6 +24,8 @@ struct Arguments {
   std::string record;
   bool strict = false, verify = false, json = false, objects = false, stopAtEndOfInput = false;
   CaptureArguments capture;
+  std::string renderer = "auto";
+  render::DeviceChoice device;
   std::string tokenFile;
   Access access;
   std::string auditEvery = "0", epsilon, stepHeight, slope, sliding = "slide";
@@ -154,6 +156,20 @@ void addModel(CLI::App& verb, ModelArguments& into) {
       ->check(CLI::IsMember({"move", "still"}));
 }
 
+void addDevice(CLI::App& verb, Arguments& into) {
+  verb.add_option("--device", into.device.device,
+                  "Who draws: an index, a part of the name or the UUID, as `enfilade doctor` lists "
+                  "them; left out: the best");
+  verb.add_flag("--require-gpu", into.device.requireGpu, "End with 1 when only a CPU draws");
+}
+
+void addRenderer(CLI::App& verb, Arguments& into) {
+  verb.add_option("--renderer", into.renderer,
+                  "gl: OpenGL; rays: cast with Embree; auto: the faster one, by channels and scene")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "gl", "rays"}));
+}
+
 void addWalk(CLI::App& verb, Arguments& into) {
   verb.add_option("SCRIPT", into.script, "The walk: JSON lines, see protocol/SCRIPT.md")
       ->required();
@@ -175,6 +191,11 @@ void addDoctor(CLI::App& verb, DoctorCommand& into) {
   verb.add_flag("--json", into.json, "Tell it as one JSON object");
   verb.add_flag("--require-gpu", into.requireGpu, "End with 1 when only a CPU draws");
   verb.add_option("--out", into.out, "Write the proof picture to this PNG file");
+}
+
+DrawingOptions drawingFrom(const Arguments& read) {
+  return {render::rendererKindFrom(read.renderer).value_or(render::RendererKind::automatic),
+          read.device};
 }
 
 ModelOptions modelFrom(const ModelArguments& read) {
@@ -231,11 +252,15 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   serve->add_flag(
       "--stop-at-end-of-input", read.stopAtEndOfInput,
       "End when standard input is closed: so the server does not outlive who started it");
+  addDevice(*serve, read);
+  addRenderer(*serve, read);
   addAudit(*serve, read);
   addMotion(*serve, read);
   CLI::App* replay = app.add_subcommand("replay", "Run a walk script in a scene, in process");
   addModel(*replay, read.model);
   addWalk(*replay, read);
+  addDevice(*replay, read);
+  addRenderer(*replay, read);
   addAudit(*replay, read);
   addMotion(*replay, read);
   replay->add_option("--record", read.record, "Write a recording (MCAP) of the walk")
@@ -247,6 +272,7 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
       app.add_subcommand("capture", "Take pictures along a camera path: colour, depth, ids");
   addModel(*capture, read.model);
   addCapture(*capture, read.capture);
+  addDevice(*capture, read);
   CLI::App* walk = app.add_subcommand("walk", "Run a walk script on a server");
   addWalk(*walk, read);
   walk->add_option("--connect", read.connect, "The server's address and port")
@@ -274,21 +300,30 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   }
   const std::uint32_t audit = numberFrom<std::uint32_t>(read.auditEvery).value_or(0);
   if (*serve)
-    return ServeCommand{
-        modelFrom(read.model), *endpointFrom(read.listen), audit, lengthsFrom(read), read.tokenFile,
-        read.access,           read.stopAtEndOfInput};
+    return ServeCommand{modelFrom(read.model),
+                        *endpointFrom(read.listen),
+                        audit,
+                        lengthsFrom(read),
+                        read.tokenFile,
+                        read.access,
+                        read.stopAtEndOfInput,
+                        drawingFrom(read)};
   if (*replay && read.verify) return verifyFrom(read);
   if (*replay) {
     if (const auto missing = missingFrom(read)) {
       std::cerr << "enfilade: " << *missing << "\nenfilade replay --help tells what there is\n";
       return ExitCode::usage;
     }
-    return ReplayCommand{modelFrom(read.model), read.script, read.out, read.strict, audit,
-                         lengthsFrom(read),     read.record};
+    return ReplayCommand{modelFrom(read.model), read.script, read.out,         read.strict, audit,
+                         lengthsFrom(read),     read.record, drawingFrom(read)};
   }
   if (*capture)
-    return CaptureCommand{modelFrom(read.model), read.capture.path, read.capture.out,
-                          picturesFrom(read.capture), captureRunFrom(read.capture)};
+    return CaptureCommand{modelFrom(read.model),
+                          read.capture.path,
+                          read.capture.out,
+                          picturesFrom(read.capture),
+                          captureRunFrom(read.capture),
+                          read.device};
   if (*doctor) return read.doctor;
   if (*inspect)
     return InspectCommand{modelFrom(read.model), read.json, read.objects, read.strict, read.plan};

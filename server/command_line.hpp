@@ -6,6 +6,7 @@
 #include <string>
 #include <variant>
 
+#include "render/renderer.hpp"
 #include "scene/bodies/find_bodies.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/lengths.hpp"
@@ -30,6 +31,18 @@ struct Endpoint {
   std::uint16_t port = 0;  ///< listening: 0 lets the system choose
 };
 
+/// Who draws the pictures.
+struct DrawingOptions {
+  render::RendererKind renderer = render::RendererKind::automatic;
+  render::DeviceChoice device;
+
+  /// Something was asked for: then there is no going on without pictures.
+  bool asked() const {
+    return renderer != render::RendererKind::automatic || device.requireGpu ||
+           !device.device.empty();
+  }
+};
+
 struct ServeCommand {
   ModelOptions model;
   Endpoint listen{"127.0.0.1", 7878};
@@ -38,6 +51,7 @@ struct ServeCommand {
   std::filesystem::path tokenFile;  ///< empty: no tokens, everyone may do everything
   Access access;                    ///< without the tokens
   bool stopAtEndOfInput = false;    ///< ends when whoever started it has closed its standard input
+  DrawingOptions drawing;
 };
 struct ReplayCommand {
   ModelOptions model;
@@ -46,6 +60,7 @@ struct ReplayCommand {
   std::uint32_t auditEvery = 0;  ///< ticks; 0: never
   scene::Lengths lengths;
   std::filesystem::path record;  ///< a recording to write; empty: none
+  DrawingOptions drawing;
 };
 struct VerifyCommand {
   std::filesystem::path scene;  ///< empty: where the recording says
@@ -69,6 +84,7 @@ struct CaptureCommand {
   std::filesystem::path path, out;
   PictureOptions pictures;
   CaptureRunOptions run;
+  render::DeviceChoice device;
 };
 struct DoctorCommand {
   bool json = false;

@@ -58,16 +58,18 @@ Buffer FrameService::State::reply(Drawing& drawing) {
   }
 }
 
-FrameService::FrameService(std::shared_ptr<const scene::Scene> scene)
+FrameService::FrameService(std::shared_ptr<const scene::Scene> scene, const DrawingOptions& drawing)
     : state_(std::make_unique<State>()) {
   try {
-    state_->renderer = std::make_unique<render::RenderThread>(std::move(scene));
+    state_->renderer =
+        std::make_unique<render::RenderThread>(std::move(scene), drawing.device, drawing.renderer);
     state_->deviceName = state_->renderer->deviceName();
     state_->software = state_->renderer->software();
     if (const std::string& note = state_->renderer->deviceNote(); !note.empty()) {
       spdlog::warn(note);
     }
   } catch (const render::RenderError& error) {
+    if (drawing.asked()) throw;
     state_->whyNone = error.what();
     spdlog::warn("no pictures: {}", error.what());
   }

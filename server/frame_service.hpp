@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "scene/scene.hpp"
+#include "server/command_line.hpp"
 #include "server/frame_messages.hpp"
 #include "server/outgoing_queue.hpp"
 
@@ -22,8 +23,10 @@ struct FrameJob {
 
 class FrameService {
  public:
-  /// Without a device it stays without a renderer and says why; that is no failure.
-  explicit FrameService(std::shared_ptr<const scene::Scene> scene);
+  /// Without a device it stays without a renderer and says why; that is no failure, unless
+  /// `drawing` asked for something: then RenderError is thrown.
+  explicit FrameService(std::shared_ptr<const scene::Scene> scene,
+                        const DrawingOptions& drawing = {});
   ~FrameService();
   FrameService(const FrameService&) = delete;
   FrameService& operator=(const FrameService&) = delete;

@@ -69,7 +69,8 @@ ExitCode serve(const ServeCommand& command) {
   const auto scene = loadScene(command.model);
   // From here on: the threads that the server starts inherit the mask.
   const sigset_t ending = holdEndingSignals();
-  Server server(scene, command.listen, {}, command.auditEvery, command.lengths, std::move(access));
+  Server server(scene, command.listen, {}, command.auditEvery, command.lengths, std::move(access),
+                command.drawing);
   tellReady(server, *scene, command.listen);
   const int signal = awaitEndingSignal(ending, server, command.stopAtEndOfInput);
   spdlog::info("{}: finishing the tick and telling the clients",

@@ -11,8 +11,8 @@ namespace enfilade::server {
 struct Server::State {
   State(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
         const ServerLimits& limits, std::uint32_t auditEvery, const scene::Lengths& lengths,
-        Access access)
-      : frames(scene),
+        Access access, const DrawingOptions& drawing)
+      : frames(scene, drawing),
         rays(scene),
         loop(std::move(scene), frames, rays, limits, auditEvery, lengths),
         listener(context, listen, loop, limits, std::move(access)) {}
@@ -27,9 +27,9 @@ struct Server::State {
 
 Server::Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
                const ServerLimits& limits, std::uint32_t auditEvery, const scene::Lengths& lengths,
-               Access access)
+               Access access, const DrawingOptions& drawing)
     : state_(std::make_unique<State>(std::move(scene), listen, limits, auditEvery, lengths,
-                                     std::move(access))) {
+                                     std::move(access), drawing)) {
   state_->listener.start();
   state_->network = std::thread([state = state_.get()] { state->context.run(); });
 }

@@ -21,11 +21,12 @@ struct ServerError : std::runtime_error {
 class Server {
  public:
   /// Clients may connect when this returns. Throws ServerError: the address cannot be had, or
-  /// others can reach it and `access` does not allow that.
+  /// others can reach it and `access` does not allow that; RenderError: as FrameService.
   /// Every `auditEvery`-th tick is audited; 0: none.
   Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
          const ServerLimits& limits = {}, std::uint32_t auditEvery = 0,
-         const scene::Lengths& lengths = {}, Access access = {});
+         const scene::Lengths& lengths = {}, Access access = {},
+         const DrawingOptions& drawing = {});
   ~Server();  ///< stops
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

@@ -158,10 +158,12 @@ std::vector<v1::ContactEvent> leaveWorld(protocol::ScriptDriver& driver,
   return avatars.empty() ? std::vector<v1::ContactEvent>() : driver.step().contacts;
 }
 
-std::unique_ptr<render::Renderer> rendererOf(const std::shared_ptr<const scene::Scene>& scene) {
+std::unique_ptr<render::Renderer> rendererOf(const std::shared_ptr<const scene::Scene>& scene,
+                                             const DrawingOptions& drawing) {
   try {
-    return std::make_unique<render::Renderer>(scene);
+    return std::make_unique<render::Renderer>(scene, drawing.renderer, drawing.device);
   } catch (const render::RenderError& error) {
+    if (drawing.asked()) throw;
     spdlog::warn("no pictures: {}", error.what());
     return nullptr;
   }
@@ -182,7 +184,7 @@ ExitCode replay(const ReplayCommand& command) {
         WalkReport report(command.out);
         const std::shared_ptr<const scene::Scene> scene = loadScene(command.model);
         if (interrupted()) throw Interrupted{};
-        const std::unique_ptr<render::Renderer> renderer = rendererOf(scene);
+        const std::unique_ptr<render::Renderer> renderer = rendererOf(scene, command.drawing);
         scene::World world(scene, command.lengths);
         scene::auditBroadPhase(world, command.auditEvery);
         std::optional<WorldRecorder> recorder;

@@ -176,7 +176,7 @@ ExitCode run(const CaptureCommand& command) {
     tellPlan(command, list, counts);
     return ExitCode::done;
   }
-  render::Renderer renderer(scene, command.pictures.renderer);
+  render::Renderer renderer(scene, command.pictures.renderer, command.device);
   const std::string drawnBy = whoDraws(renderer, command.pictures);
   claimFolder(
       command.out, command.pictures,

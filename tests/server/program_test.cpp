@@ -73,6 +73,31 @@ TEST_F(Program, WhatCannotBeReadEndsWithOneAndIsNamed) {
   EXPECT_FALSE(fs::exists(path("out") + "/summary.json"));
 }
 
+TEST_F(Program, ADeviceThatIsAskedForAndNotThereEndsWithOne) {
+  write(folder_ / "path.txt", "0 0 1 0 0 0 0 1\n");
+  for (const std::vector<std::string>& verb : std::vector<std::vector<std::string>>{
+           {"serve", path("room.obj"), "--listen", "127.0.0.1:0"},
+           {"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out")},
+           {"capture", path("room.obj"), path("path.txt"), "--out", path("frames")}}) {
+    std::vector<std::string> arguments = verb;
+    arguments.insert(arguments.end(), {"--device", "abacus of 1642"});
+    const Ended ended = run(arguments);
+    EXPECT_EQ(ended.code, 1) << verb[0];
+    EXPECT_NE(ended.err.find("abacus of 1642"), std::string::npos) << ended.err;
+  }
+  EXPECT_EQ(run({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out"), "--renderer",
+                 "rays", "--require-gpu"})
+                .code,
+            1);
+}
+
+TEST_F(Program, TheRendererAskedForDrawsTheWalk) {
+  const Ended ended = run(
+      {"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out"), "--renderer", "rays"});
+  EXPECT_EQ(ended.code, 0) << ended.err;
+  EXPECT_NE(ended.err.find("by Embree"), std::string::npos) << ended.err;
+}
+
 TEST_F(Program, AFolderThatCannotBeWrittenIsToldBeforeTheWalk) {
   write(path("file"), "in the way");
   const Ended ended =
