@@ -303,7 +303,8 @@ TEST_F(Capture, SixteenBitFilesRefuseWhatDoesNotFitUnlessTold) {
 
 TEST_F(Capture, TheTumLayoutIsReadBackAsTheSamePath) {
   write(folder_ / "path.txt", ahead(3));
-  ASSERT_EQ(captured("path.txt", "tum", {"--layout", "tum", "--channels", "rgb,depth"}).code, 0);
+  const Ended first = captured("path.txt", "tum", {"--layout", "tum", "--channels", "rgb,depth"});
+  ASSERT_EQ(first.code, 0) << first.err;
   EXPECT_NE(textOf(folder_ / "tum/rgb.txt").find("0.033333 rgb/000001.png"), std::string::npos);
   EXPECT_NE(textOf(folder_ / "tum/depth.txt").find("0.066667 depth/000002.png"), std::string::npos);
   const Ended again = captured(
