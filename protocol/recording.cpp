@@ -17,6 +17,7 @@ constexpr const char* kStart = "/enfilade/start";
 constexpr const char* kCommands = "/enfilade/commands";
 constexpr const char* kEvents = "/enfilade/events";
 constexpr const char* kState = "/enfilade/state";
+constexpr const char* kNames = "/enfilade/names";
 
 void addWithImports(const pb::FileDescriptor& file, pb::FileDescriptorSet& set,
                     std::set<std::string>& known) {
@@ -130,7 +131,8 @@ RecordingWriter::RecordingWriter(const std::filesystem::path& file, const std::s
       start_(file_.addChannel(channelOf(kStart, *v1::RecordingStart::descriptor()))),
       commands_(file_.addChannel(channelOf(kCommands, *v1::RecordedCommands::descriptor()))),
       events_(file_.addChannel(channelOf(kEvents, *v1::TickEvents::descriptor()))),
-      state_(file_.addChannel(channelOf(kState, *v1::State::descriptor()))) {}
+      state_(file_.addChannel(channelOf(kState, *v1::State::descriptor()))),
+      names_(file_.addChannel(channelOf(kNames, *v1::RecordedNames::descriptor()))) {}
 
 void RecordingWriter::write(std::uint16_t channel, double time, const pb::MessageLite& message) {
   message.SerializeToString(&bytes_);
@@ -154,6 +156,10 @@ void RecordingWriter::write(const v1::State& state) {
   write(state_, state.time(), state);
 }
 
+void RecordingWriter::write(const v1::RecordedNames& names) {
+  write(names_, 0, names);
+}
+
 RecordingReader::RecordingReader(const std::filesystem::path& file) : path_(file), file_(file) {}
 
 std::optional<RecordedItem> RecordingReader::next() {
@@ -162,6 +168,7 @@ std::optional<RecordedItem> RecordingReader::next() {
     if (topic == kStart) return parsed<v1::RecordingStart>(*message, path_);
     if (topic == kCommands) return parsed<v1::RecordedCommands>(*message, path_);
     if (topic == kEvents) return parsed<v1::TickEvents>(*message, path_);
+    if (topic == kNames) return parsed<v1::RecordedNames>(*message, path_);
     if (topic == kState) return parsed<v1::State>(*message, path_);
   }
   return std::nullopt;

@@ -22,6 +22,7 @@ class RecordingWriter {
   void write(const v1::RecordedCommands& commands, double time);
   void write(const v1::TickEvents& events);
   void write(const v1::State& state);
+  void write(const v1::RecordedNames& names);
   void close() { file_.close(); }
   std::uint64_t bytesWritten() const { return file_.bytesWritten(); }
 
@@ -30,11 +31,11 @@ class RecordingWriter {
 
   mcap::Writer file_;
   std::string bytes_;  // kept, so that a tick allocates nothing
-  std::uint16_t start_, commands_, events_, state_;
+  std::uint16_t start_, commands_, events_, state_, names_;
 };
 
-using RecordedItem =
-    std::variant<v1::RecordingStart, v1::RecordedCommands, v1::TickEvents, v1::State>;
+using RecordedItem = std::variant<v1::RecordingStart, v1::RecordedCommands, v1::TickEvents,
+                                  v1::State, v1::RecordedNames>;
 
 class RecordingReader {
  public:

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -20,6 +21,8 @@ constexpr std::array<std::pair<scene::IfcReader, const char*>, 4> kReaders{
      {scene::IfcReader::ifcPlusPlus, "ifcplusplus"},
      {scene::IfcReader::assimp, "assimp"}}};
 
+constexpr int kNamesAMessage = 4096;
+
 v1::RecordingStart startOf(const scene::World& world, const ModelOptions& model) {
   v1::RecordingStart start;
   start.set_server_version(kServerVersion);
@@ -37,6 +40,23 @@ WorldRecorder::WorldRecorder(const std::filesystem::path& file, const scene::Wor
                              const ModelOptions& model)
     : file_(file, std::string("enfilade ") + kServerVersion) {
   file_.write(startOf(world, model));
+  writeNames(world.scene().model());
+}
+
+/// In messages of a size that readers can be asked to hold.
+void WorldRecorder::writeNames(const scene::Model& model) {
+  const auto& objects = model.objects;
+  const bool global = std::any_of(objects.begin(), objects.end(),
+                                  [](const auto& object) { return !object.globalId.empty(); });
+  v1::RecordedNames names;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    if (names.paths().empty()) names.set_first_id(static_cast<std::uint32_t>(i + 1));
+    names.add_paths(objects[i].path);
+    if (global) names.add_global_ids(objects[i].globalId);
+    if (names.paths_size() < kNamesAMessage && i + 1 < objects.size()) continue;
+    file_.write(names);
+    names.Clear();
+  }
 }
 
 void WorldRecorder::took(const v1::Command& command) {

@@ -27,6 +27,7 @@ class WorldRecorder {
   std::optional<std::string> close();
 
  private:
+  void writeNames(const scene::Model& model);
   template <class Work>
   void unlessBroken(const Work& work);
 

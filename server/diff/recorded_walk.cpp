@@ -1,0 +1,169 @@
+#include "server/diff/recorded_walk.hpp"
+
+#include <tuple>
+
+#include "protocol/recording.hpp"
+#include "server/world_messages.hpp"
+
+namespace enfilade::server {
+namespace {
+
+using protocol::mcap::RecordingError;
+using Event = v1::ContactEvent;
+
+Happening happeningOf(const Event& event) {
+  Happening happening;
+  happening.a = event.a_name();
+  happening.b = event.b_name();
+  happening.tick = event.tick();
+  happening.time = event.time();
+  happening.point = vectorFrom(event.point_b());
+  happening.normal = vectorFrom(event.normal());
+  happening.distance = event.distance();
+  return happening;
+}
+
+/// Gathers a run, message by message.
+class RunGatherer {
+ public:
+  explicit RunGatherer(const v1::RecordingStart& start) {
+    run_.start = start;
+    run_.hash = start.state_hash();
+  }
+
+  void add(const v1::TickEvents& events) {
+    for (const Event& event : events.contacts()) add(event);
+    for (const v1::Notice& notice : events.notices()) add(notice, events.time());
+  }
+
+  void add(const v1::State& state) {
+    run_.ticks = state.tick();
+    run_.time = state.time();
+    run_.hash = state.hash();
+    for (const v1::AvatarState& avatar : state.avatars()) {
+      const Vec3 feet = vectorFrom(avatar.feet());
+      const auto [at, isNew] = run_.avatars.try_emplace(avatar.name());
+      const auto before = feet_.find(avatar.id());
+      if (isNew) at->second.entered = state.time();
+      if (before != feet_.end()) at->second.wayLength += (feet - before->second).norm();
+      at->second.last = state.time();
+      feet_[avatar.id()] = feet;
+    }
+  }
+
+  RecordedRun finish() { return std::move(run_); }
+
+ private:
+  /// What a stands on: b lies below, no steeper than ground may be.
+  bool isGround(const Event& event) const {
+    return -event.normal().y() >= run_.start.lengths().walkable_normal_y();
+  }
+
+  void add(const Event& event) {
+    PairRecord& pair = run_.pairs[{event.a_name(), event.b_name()}];
+    switch (event.kind()) {
+      case Event::KIND_BEGIN:
+        begin(pair, event);
+        break;
+      case Event::KIND_END:
+        end(event);
+        break;
+      case Event::KIND_NEAR:
+        noteDistance(pair, event);
+        break;
+      case Event::KIND_BLOCKED:
+        pair.blocked.push_back(happeningOf(event));
+        break;
+      case Event::KIND_ENTER:
+        pair.enters.push_back(happeningOf(event));
+        break;
+      case Event::KIND_LEAVE:
+        pair.leaves.push_back(happeningOf(event));
+        break;
+      case Event::KIND_LEFT_WORLD:
+        pair.falls.push_back(happeningOf(event));
+        break;
+      default:
+        break;
+    }
+  }
+
+  void begin(PairRecord& pair, const Event& event) {
+    auto& list = isGround(event) ? pair.ground : pair.contacts;
+    live_[{event.a(), event.b()}] = {&list, list.size()};
+    list.push_back(happeningOf(event));
+    noteDistance(pair, event);
+  }
+
+  void end(const Event& event) {
+    const auto found = live_.find({event.a(), event.b()});
+    if (found == live_.end()) return;
+    (*found->second.first)[found->second.second].ended = event.time();
+    live_.erase(found);
+  }
+
+  void noteDistance(PairRecord& pair, const Event& event) const {
+    if (isGround(event)) return;
+    if (pair.nearest && pair.nearest->distance <= event.distance()) return;
+    pair.nearest =
+        Nearest{event.distance(), event.tick(), event.time(), vectorFrom(event.point_b())};
+  }
+
+  void add(const v1::Notice& notice, double time) {
+    if (notice.kind() == v1::Notice::KIND_CAPTURE) return;
+    OrderEnd end;
+    end.kind = notice.kind();
+    end.avatar = notice.avatar();
+    end.tag = notice.tag();
+    end.repeat = ended_[{notice.avatar(), notice.tag(), isLeaving(notice)}]++;
+    end.tick = notice.tick();
+    end.time = time;
+    end.position = vectorFrom(notice.position());
+    end.obstacle = notice.obstacle_name();
+    end.text = notice.text();
+    run_.orders.push_back(std::move(end));
+  }
+
+  /// It ends no order that is counted.
+  static bool isLeaving(const v1::Notice& notice) { return notice.kind() == v1::Notice::KIND_LEFT; }
+
+  RecordedRun run_;
+  std::map<std::uint32_t, Vec3> feet_;  ///< by entity, as of the last tick
+  /// Where a contact that lasts stands, by the entities; lists of a std::map's values stay.
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::pair<std::vector<Happening>*, std::size_t>>
+      live_;
+  std::map<std::tuple<std::string, std::uint64_t, bool>, std::uint32_t> ended_;
+};
+
+void addNames(RecordedWalk& walk, const v1::RecordedNames& names) {
+  if (!walk.objects) walk.objects.emplace();
+  for (int i = 0; i < names.paths_size(); ++i)
+    walk.objects->emplace(names.paths(i), i < names.global_ids_size() ? names.global_ids(i) : "");
+}
+
+}  // namespace
+
+RecordedWalk readWalk(const std::filesystem::path& file) {
+  protocol::RecordingReader reader(file);
+  RecordedWalk walk;
+  walk.file = file;
+  std::optional<RunGatherer> run;
+  while (const auto item = reader.next()) {
+    if (const auto* start = std::get_if<v1::RecordingStart>(&*item)) {
+      if (run) walk.runs.push_back(run->finish());
+      run.emplace(*start);
+      continue;
+    }
+    if (!run) throw RecordingError(file.string() + ": does not begin with its scene");
+    if (const auto* names = std::get_if<v1::RecordedNames>(&*item)) addNames(walk, *names);
+    if (const auto* events = std::get_if<v1::TickEvents>(&*item)) run->add(*events);
+    if (const auto* state = std::get_if<v1::State>(&*item)) run->add(*state);
+  }
+  if (!run) throw RecordingError(file.string() + ": no recording of Enfilade begins in it");
+  walk.runs.push_back(run->finish());
+  walk.closed = reader.closed();
+  walk.wholeBytes = reader.wholeBytes();
+  return walk;
+}
+
+}  // namespace enfilade::server
