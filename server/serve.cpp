@@ -69,8 +69,12 @@ ExitCode serve(const ServeCommand& command) {
   const auto scene = loadScene(command.model);
   // From here on: the threads that the server starts inherit the mask.
   const sigset_t ending = holdEndingSignals();
-  Server server(scene, command.listen, {}, command.auditEvery, command.lengths, std::move(access),
-                command.drawing);
+  ServerOptions options;
+  options.world.lengths = command.lengths;
+  options.world.auditEvery = command.auditEvery;
+  options.access = std::move(access);
+  options.drawing = command.drawing;
+  Server server(scene, command.listen, std::move(options));
   tellReady(server, *scene, command.listen);
   const int signal = awaitEndingSignal(ending, server, command.stopAtEndOfInput);
   spdlog::info("{}: finishing the tick and telling the clients",

@@ -138,14 +138,13 @@ void answerClosing(Client& client) {
 }  // namespace
 
 ServedWorld::ServedWorld(std::shared_ptr<const scene::Scene> served, FrameService& frameService,
-                         RayService& rayService, const ServerLimits& serverLimits,
-                         const scene::Lengths& lengths, std::uint32_t auditEveryTicks)
+                         RayService& rayService, const WorldOptions& options)
     : scene(std::move(served)),
-      auditEvery(auditEveryTicks),
-      world(scene, lengths),
+      auditEvery(options.auditEvery),
+      world(scene, options.lengths),
       frames(frameService),
       rays(rayService),
-      limits(serverLimits) {
+      limits(options.limits) {
   scene::auditBroadPhase(world, auditEvery);
 }
 

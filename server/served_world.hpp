@@ -16,8 +16,8 @@
 #include "server/frame_service.hpp"
 #include "server/outgoing_queue.hpp"
 #include "server/ray_service.hpp"
-#include "server/server_limits.hpp"
 #include "server/tick_statistics.hpp"
+#include "server/world_options.hpp"
 
 namespace enfilade::server {
 
@@ -69,8 +69,7 @@ struct ServedClock {
 
 struct ServedWorld {
   ServedWorld(std::shared_ptr<const scene::Scene> scene, FrameService& frameService,
-              RayService& rayService, const ServerLimits& serverLimits,
-              const scene::Lengths& lengths = {}, std::uint32_t auditEveryTicks = 0);
+              RayService& rayService, const WorldOptions& options = {});
 
   std::shared_ptr<const scene::Scene> scene;
   std::uint32_t auditEvery = 0;  ///< ticks; 0: never

@@ -9,13 +9,11 @@
 namespace enfilade::server {
 
 struct Server::State {
-  State(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
-        const ServerLimits& limits, std::uint32_t auditEvery, const scene::Lengths& lengths,
-        Access access, const DrawingOptions& drawing)
-      : frames(scene, drawing),
+  State(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen, ServerOptions options)
+      : frames(scene, options.drawing),
         rays(scene),
-        loop(std::move(scene), frames, rays, limits, auditEvery, lengths),
-        listener(context, listen, loop, limits, std::move(access)) {}
+        loop(std::move(scene), frames, rays, options.world),
+        listener(context, listen, loop, options.world.limits, std::move(options.access)) {}
 
   boost::asio::io_context context{1};  ///< one thread: its handlers need no lock
   FrameService frames;
@@ -26,10 +24,8 @@ struct Server::State {
 };
 
 Server::Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
-               const ServerLimits& limits, std::uint32_t auditEvery, const scene::Lengths& lengths,
-               Access access, const DrawingOptions& drawing)
-    : state_(std::make_unique<State>(std::move(scene), listen, limits, auditEvery, lengths,
-                                     std::move(access), drawing)) {
+               ServerOptions options)
+    : state_(std::make_unique<State>(std::move(scene), listen, std::move(options))) {
   state_->listener.start();
   state_->network = std::thread([state = state_.get()] { state->context.run(); });
 }

@@ -4,12 +4,11 @@
 #include <memory>
 #include <stdexcept>
 
-#include "scene/lengths.hpp"
 #include "scene/scene.hpp"
 #include "server/access.hpp"
 #include "server/audit_log.hpp"
 #include "server/command_line.hpp"
-#include "server/server_limits.hpp"
+#include "server/world_options.hpp"
 
 namespace enfilade::server {
 
@@ -18,15 +17,18 @@ struct ServerError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+struct ServerOptions {
+  WorldOptions world;
+  Access access;
+  DrawingOptions drawing;
+};
+
 class Server {
  public:
   /// Clients may connect when this returns. Throws ServerError: the address cannot be had, or
   /// others can reach it and `access` does not allow that; RenderError: as FrameService.
-  /// Every `auditEvery`-th tick is audited; 0: none.
   Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
-         const ServerLimits& limits = {}, std::uint32_t auditEvery = 0,
-         const scene::Lengths& lengths = {}, Access access = {},
-         const DrawingOptions& drawing = {});
+         ServerOptions options = {});
   ~Server();  ///< stops
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

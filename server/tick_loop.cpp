@@ -70,9 +70,8 @@ void takeRequest(ServedWorld& served, ClientId id, WaitingRequest request,
 }  // namespace
 
 TickLoop::TickLoop(std::shared_ptr<const scene::Scene> scene, FrameService& frames,
-                   RayService& rays, const ServerLimits& limits, std::uint32_t auditEvery,
-                   const scene::Lengths& lengths)
-    : served_(std::move(scene), frames, rays, limits, lengths, auditEvery) {
+                   RayService& rays, const WorldOptions& options)
+    : served_(std::move(scene), frames, rays, options) {
   served_.post = [this](Job job) { post(std::move(job)); };
   thread_ = std::thread([this] { run(); });
 }

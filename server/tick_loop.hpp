@@ -15,8 +15,7 @@ namespace enfilade::server {
 class TickLoop {
  public:
   TickLoop(std::shared_ptr<const scene::Scene> scene, FrameService& frames, RayService& rays,
-           const ServerLimits& limits, std::uint32_t auditEvery = 0,
-           const scene::Lengths& lengths = {});
+           const WorldOptions& options = {});
   ~TickLoop();  ///< stops
   TickLoop(const TickLoop&) = delete;
   TickLoop& operator=(const TickLoop&) = delete;

@@ -114,7 +114,9 @@ TEST(AuditOfAWalk, WhatIsRightIsNoViolation) {
 class AuditedServer : public ServedRoom {};
 
 TEST_F(AuditedServer, TellsItsAuditInTheMetricsAndAtItsEnd) {
-  server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, ServerLimits{}, 5);
+  ServerOptions options;
+  options.world.auditEvery = 5;
+  server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
   v1::Audit audit;
   {
     protocol::Client ann = client("ann");

@@ -16,8 +16,11 @@ class ServedRoom : public ::testing::Test {
  protected:
   void serve(const ServerLimits& limits = {},
              std::shared_ptr<const scene::Scene> scene = smallRoom(), Access access = {}) {
-    server_ = std::make_unique<Server>(std::move(scene), Endpoint{"127.0.0.1", 0}, limits, 0,
-                                       scene::Lengths{}, std::move(access));
+    ServerOptions options;
+    options.world.limits = limits;
+    options.access = std::move(access);
+    server_ =
+        std::make_unique<Server>(std::move(scene), Endpoint{"127.0.0.1", 0}, std::move(options));
   }
   protocol::Client client(const std::string& name, const std::string& token = "") {
     protocol::ClientOptions options;

@@ -278,7 +278,7 @@ TEST_F(Sessions, EntitiesAreDescribedInPagesOfBoundedSize) {
 TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
   FrameService frames(smallRoom());
   RayService rays(smallRoom());
-  TickLoop loop(smallRoom(), frames, rays, {});
+  TickLoop loop(smallRoom(), frames, rays);
   const auto out = std::make_shared<OutgoingQueue>(OutgoingBounds{std::size_t{1} << 30, 2},
                                                    encodeShared(v1::Bye()), [] {});
   const ClientId ann = loop.join("ann", Role::admin, out, 1);
@@ -309,7 +309,7 @@ TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
 TEST(Requests, OneThatFailsForAFaultOfOursIsToldAndTheNextIsAnswered) {
   FrameService frames(smallRoom());
   RayService rays(smallRoom());
-  ServedWorld served(smallRoom(), frames, rays, {});
+  ServedWorld served(smallRoom(), frames, rays);
   bool faulty = true;  // the first message that is sent throws
   const auto wake = [&] {
     if (std::exchange(faulty, false)) throw std::length_error("too long");
