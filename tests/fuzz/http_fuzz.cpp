@@ -1,0 +1,49 @@
+// What we ourselves read of a request over HTTP: its target, and the headers that decide who may
+// come. The lines of the input are target, Authorization, Host and Origin.
+#include <array>
+#include <string_view>
+
+#include "server/access.hpp"
+#include "server/http_pages.hpp"
+#include "tests/fuzz/fuzz_target.hpp"
+
+namespace enfilade::fuzz {
+namespace {
+
+std::string_view takeLine(std::string_view& text) {
+  const std::size_t end = std::min(text.find('\n'), text.size());
+  const std::string_view line = text.substr(0, end);
+  text.remove_prefix(std::min(end + 1, text.size()));
+  return line;
+}
+
+server::Access twoTokens() {
+  server::Access access;
+  access.tokens = {{server::Role::observe, "0123456789abcdef"},
+                   {server::Role::drive, "fedcba9876543210"}};
+  access.hosts = {"walk.example"};
+  access.origins = {"https://page.example"};
+  return access;
+}
+
+}  // namespace
+
+void tryBytes(std::span<const std::uint8_t> bytes) {
+  static const server::Access access = twoTokens();
+  std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const server::Target target = server::targetOf(takeLine(text));
+  const std::string token = server::tokenOf(takeLine(text), target);
+  const auto role = server::roleOf(access, token);
+  require(!role || token == "0123456789abcdef" || token == "fedcba9876543210",
+          "only a token opens");
+  const std::string_view host = takeLine(text), origin = takeLine(text);
+  const auto why = server::foreignPage(access, host, origin);
+  require(!why || !why->empty(), "who is refused is told why");
+  const auto asked = server::requestFor(target);
+  if (const auto* problem = std::get_if<server::PageProblem>(&asked)) {
+    require(problem->status >= 400 && problem->status < 600, "a refusal has a status of one");
+    server::response(problem->status, "text/plain", problem->text);
+  }
+}
+
+}  // namespace enfilade::fuzz

@@ -1,0 +1,165 @@
+// Every request, answered by a small world: the input is a sequence of messages, each with who
+// sends it (a byte, of which the lowest bit counts) and its length (two bytes, little-endian)
+// before it. Steps are made at once, so that the world moves. Pictures are drawn by rays, and are
+// small.
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+
+#include "protocol/framing.hpp"
+#include "server/requests.hpp"
+#include "server/world_messages.hpp"
+#include "tests/fuzz/fuzz_target.hpp"
+#include "tests/server/body_room.hpp"
+
+namespace enfilade::fuzz {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+using server::Client;
+using server::ClientId;
+using server::ServedWorld;
+using Job = std::function<void(ServedWorld&)>;
+
+constexpr std::size_t kMostMessages = 64;  // of one input: a finding should be small
+constexpr std::uint32_t kPictureSide = 16;
+
+/// What the services hand to the tick thread, which is us.
+class Inbox {
+ public:
+  void post(Job job) {
+    const std::lock_guard lock(mutex_);
+    jobs_.push_back(std::move(job));
+    came_.notify_one();
+  }
+  Job next() {
+    std::unique_lock lock(mutex_);
+    came_.wait(lock, [this] { return !jobs_.empty(); });
+    Job job = std::move(jobs_.front());
+    jobs_.pop_front();
+    return job;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable came_;
+  std::deque<Job> jobs_;
+};
+
+/// What all inputs share, since no request changes it.
+struct House {
+  House() { spdlog::set_level(spdlog::level::off); }
+  std::shared_ptr<const scene::Scene> scene = server::testing::bodyRoom();
+  server::FrameService frames{scene, {render::RendererKind::rays, {}}};
+  server::RayService rays{scene};
+  Inbox inbox;
+};
+
+House& house() {
+  static House one;
+  return one;
+}
+
+server::ServerLimits smallLimits() {
+  server::ServerLimits limits;
+  limits.avatars = 4;
+  limits.ticksPerStep = 16;
+  limits.waypoints = 16;
+  limits.rays = 32;
+  limits.scanRays = 256;
+  limits.watches = 2;
+  return limits;
+}
+
+class SmallServer {
+ public:
+  SmallServer() : served_(house().scene, house().frames, house().rays, {smallLimits(), {}, 0}) {
+    served_.post = post_;
+    for (const ClientId id : {1, 2}) {
+      Client& client = served_.clients[id];
+      client.role = server::Role::admin;
+      client.out = std::make_shared<server::OutgoingQueue>(
+          server::OutgoingBounds{1u << 24, 64}, std::make_shared<std::vector<std::uint8_t>>(),
+          [] {});
+    }
+  }
+
+  /// Answers one message; its reply has to come, with the message's number.
+  void take(ClientId id, const v1::ClientMessage& message) {
+    Client& client = served_.clients.at(id);
+    client.waiting.push_back({message, 0});
+    server::answerWaiting(served_, id, post_);
+    while (client.answerUnderWay || drawing()) house().inbox.next()(served_);
+    for (std::uint32_t ticks = 0; client.step; ++ticks) {
+      require(ticks < served_.limits.ticksPerStep, "a step ends");
+      server::advance(served_);
+      while (drawing()) house().inbox.next()(served_);
+    }
+    if (!message.has_bye())
+      require(replied(client, message.request_id()), "each request is answered");
+    require(served_.statistics.metrics().worst_penetration() == 0, "nothing penetrates");
+  }
+  void end() { server::closeWorld(served_); }
+
+ private:
+  bool drawing() const {
+    return std::any_of(served_.clients.begin(), served_.clients.end(), [](const auto& one) {
+      const auto& watches = one.second.watches;
+      return std::any_of(watches.begin(), watches.end(),
+                         [](const auto& watch) { return watch.second.underWay; });
+    });
+  }
+  /// Reads all that was sent.
+  static bool replied(Client& client, std::uint64_t requestId) {
+    bool found = false;
+    for (auto next = client.out->pop(); next.message; next = client.out->pop()) {
+      protocol::Decoder decoder(protocol::kClientTakes, protocol::Decoder::Expect::messages);
+      Bytes bytes(*next.message);
+      const auto framed = decoder.next(bytes);
+      v1::ServerMessage reply;
+      require(framed && bytes.empty() && protocol::parse(framed->header, reply), "replies parse");
+      found = found || reply.reply_to() == requestId;
+    }
+    return found;
+  }
+
+  const server::PostToTickThread post_ = [](Job job) { house().inbox.post(std::move(job)); };
+  ServedWorld served_;
+};
+
+void shrink(v1::FrameRequest& request) {
+  const auto fit = [](std::uint32_t side) { return side > 4096 ? side : side % kPictureSide; };
+  request.set_width(fit(request.width()));
+  request.set_height(fit(request.height()));
+}
+
+/// What takes long for good reasons is made small.
+void shrink(v1::ClientMessage& message) {
+  if (message.has_frame()) shrink(*message.mutable_frame());
+  if (message.watch_frames().has_frame()) shrink(*message.mutable_watch_frames()->mutable_frame());
+}
+
+}  // namespace
+
+void tryBytes(Bytes bytes) {
+  constexpr std::size_t kHead = 3;
+  SmallServer server;
+  for (std::size_t count = 0; bytes.size() >= kHead && count < kMostMessages; ++count) {
+    const ClientId id = 1u + (bytes[0] & 1u);
+    const std::size_t length = bytes[1] | static_cast<std::size_t>(bytes[2]) << 8;
+    bytes = bytes.subspan(kHead);
+    const Bytes part = bytes.first(std::min(length, bytes.size()));
+    bytes = bytes.subspan(part.size());
+    v1::ClientMessage message;
+    if (!protocol::parse(part, message) || message.has_bye()) continue;  // the session's to take
+    message.set_request_id(count + 1);
+    shrink(message);
+    server.take(id, message);
+  }
+  server.end();
+}
+
+}  // namespace enfilade::fuzz
