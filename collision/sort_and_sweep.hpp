@@ -51,6 +51,19 @@ class SortAndSweep {
   void move(MoverId mover, const Box& box);
   void remove(MoverId mover);
 
+  /// What besides the boxes decides how movers go on: a copy needs it to give the same ids and to
+  /// tell the same changes.
+  struct Roll {
+    std::vector<MoverId> free;                     ///< given again, the last one first
+    std::vector<std::pair<MoverId, Box>> leaving;  ///< removed since the last update, in order
+    bool updated = false;                          ///< there was an update
+  };
+  Roll roll() const;
+  /// Takes these movers in the place of all that are there (`there`: ascending ids, without those
+  /// of the roll) as they were after an update. Only before the first update; ids are those of a
+  /// broad phase that gave them: throws std::invalid_argument where they cannot be.
+  void restore(std::span<const std::pair<MoverId, Box>> there, const Roll& roll);
+
   /// Still boxes come and go between updates as well, and the pairs follow at the next update(). An
   /// id is free for the next box only after the update that tells the end of its pairs. Cheap while
   /// there are few at a time: after as many edits as half of the boxes all cells are built anew.

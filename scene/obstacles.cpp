@@ -70,6 +70,20 @@ double partInside(const Box& room, const Vec3& feet, const Vec3& displacement) {
   return part;
 }
 
+void placeObstacle(const WorldState& world, Obstacle& obstacle) {
+  if (obstacle.ofBody != kNoBody) {
+    const Body& body = world.bodies[obstacle.ofBody];
+    obstacle.box = body.partBoxes[obstacle.part];
+    obstacle.body = partOf(body, obstacle.part);
+  } else if (obstacle.entity >= world.firstAvatarId()) {
+    const auto& name = world.avatarNames[obstacle.entity - world.firstAvatarId()];
+    const Avatar& other = world.avatars.at(name);
+    const AvatarPart& part = other.shape->parts[obstacle.part];
+    obstacle.box = boxAt(part.box, other.feet);
+    obstacle.body = bodyAt(part, other.feet);
+  }
+}
+
 void gatherStill(const Scene& scene, std::uint32_t object, const Box& reach,
                  std::vector<Obstacle>& obstacles) {
   const ObjectParts& parts = scene.parts(object);
@@ -98,20 +112,6 @@ void listParts(const WorldState& world, std::uint32_t index, std::vector<Obstacl
     obstacle.part = part;
     obstacle.ofBody = index;
     obstacles.push_back(obstacle);
-  }
-}
-
-void follow(const WorldState& world, Obstacle& obstacle) {
-  if (obstacle.ofBody != kNoBody) {
-    const Body& body = world.bodies[obstacle.ofBody];
-    obstacle.box = body.partBoxes[obstacle.part];
-    obstacle.body = partOf(body, obstacle.part);
-  } else if (obstacle.entity >= world.firstAvatarId()) {
-    const auto& name = world.avatarNames[obstacle.entity - world.firstAvatarId()];
-    const Avatar& other = world.avatars.at(name);
-    const AvatarPart& part = other.shape->parts[obstacle.part];
-    obstacle.box = boxAt(part.box, other.feet);
-    obstacle.body = bodyAt(part, other.feet);
   }
 }
 
@@ -154,7 +154,7 @@ void gatherParts(const WorldState& world, std::uint32_t body, const Box& reach,
   std::vector<Obstacle> all;
   listParts(world, body, all);
   for (Obstacle& obstacle : all) {
-    follow(world, obstacle);
+    placeObstacle(world, obstacle);
     if (overlaps(obstacle.box, reach)) obstacles.push_back(obstacle);
   }
 }
@@ -164,7 +164,7 @@ void followOthers(const WorldState& world, Avatar& avatar) {
     Obstacle& obstacle = avatar.obstacles[i];
     // Avatars come last, bodies anywhere.
     if (!avatar.meetsBodies && obstacle.entity < world.firstAvatarId()) return;
-    follow(world, obstacle);
+    placeObstacle(world, obstacle);
   }
 }
 

@@ -111,19 +111,6 @@ void hashState(WorldState& world) {
   world.hash = hash.value();
 }
 
-std::shared_ptr<const Snapshot> makeSnapshot(const WorldState& world) {
-  auto snapshot = std::make_shared<Snapshot>();
-  snapshot->bodies = viewsOfBodies(world);
-  snapshot->tick = world.tick;
-  snapshot->time = static_cast<double>(world.tick) * world.lengths.tick;
-  snapshot->stateHash = world.hash;
-  for (const auto& [name, avatar] : world.avatars)
-    snapshot->avatars.push_back(viewOf(name, avatar));
-  std::sort(snapshot->avatars.begin(), snapshot->avatars.end(),
-            [](const AvatarView& a, const AvatarView& b) { return a.id < b.id; });
-  return snapshot;
-}
-
 /// Still on its way: falling, or driven by a client.
 bool isBusy(const Avatar& avatar) {
   return !avatar.drive.isZero(0) || (!avatar.grounded && !avatar.lastMove.isZero(0));
@@ -140,6 +127,19 @@ bool isIdle(const WorldState& world) {
 }
 
 }  // namespace
+
+std::shared_ptr<const Snapshot> makeSnapshot(const WorldState& world) {
+  auto snapshot = std::make_shared<Snapshot>();
+  snapshot->bodies = viewsOfBodies(world);
+  snapshot->tick = world.tick;
+  snapshot->time = static_cast<double>(world.tick) * world.lengths.tick;
+  snapshot->stateHash = world.hash;
+  for (const auto& [name, avatar] : world.avatars)
+    snapshot->avatars.push_back(viewOf(name, avatar));
+  std::sort(snapshot->avatars.begin(), snapshot->avatars.end(),
+            [](const AvatarView& a, const AvatarView& b) { return a.id < b.id; });
+  return snapshot;
+}
 
 TickReport tick(World& w) {
   WorldState& world = w.state();

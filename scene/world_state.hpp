@@ -29,8 +29,9 @@ struct WalkProgress {
 struct Avatar {
   EntityId id = 0;
   std::shared_ptr<const AvatarShape> shape;
-  Vec3 feet = Vec3::Zero();   ///< world, metres
-  Vec3 gaze = Vec3::UnitX();  ///< unit
+  std::shared_ptr<const Spawn> madeOf;  ///< the order that gave it parts or links; null: a prism
+  Vec3 feet = Vec3::Zero();             ///< world, metres
+  Vec3 gaze = Vec3::UnitX();            ///< unit
   double eyeHeight = 0;
   double fallSpeed = 0;  ///< metres per second, downwards > 0
   bool grounded = false;
@@ -244,5 +245,17 @@ std::vector<Obstacle> obstaclesIn(const WorldState& world, const Box& box, Entit
 /// (spawn.cpp).
 std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& order, Avatar& avatar,
                                        std::string& told, QueryCount& count);
+/// Gives an avatar the shape, chain and height of its spawn order (spawn.cpp).
+void shapeAvatar(const Spawn& order, Avatar& avatar);
+
+// ---- for checkpoints, which tell a copy of a world what cannot be worked out -------------------
+
+/// Where a mover's part is now; what is still stays as it is (obstacles.cpp).
+void placeObstacle(const WorldState& world, Obstacle& obstacle);
+/// The solid of an entity's part as it is when the solver first meets it; of an avatar with its
+/// hull, to be placed (rigid_bodies.cpp).
+Solid unmetSolid(const WorldState& world, EntityId entity, std::uint32_t part);
+/// Of the last tick (tick.cpp).
+std::shared_ptr<const Snapshot> makeSnapshot(const WorldState& world);
 
 }  // namespace enfilade::scene

@@ -146,27 +146,6 @@ Mat3 turnedTo(const Vec3& heading) {
   return turn;
 }
 
-void shapeAvatar(const Spawn& order, Avatar& avatar) {
-  const Mat3 turn = turnedTo(headingFromDegrees(order.facing));
-  avatar.radius = order.radius;
-  avatar.flying = order.flying;
-  avatar.height = avatar.standing = order.parts.empty() ? order.height : 0;
-  avatar.shape = prismShape(order.radius, order.height, order.height);
-  if (!order.parts.empty()) {
-    std::vector<AvatarPart> parts;
-    for (const std::vector<Vec3>& points : order.parts) {
-      auto hull = std::make_shared<const collision::Hull>(collision::buildHull(points));
-      parts.push_back(placedPart(std::move(hull), Vec3::Zero(), turn));
-    }
-    avatar.shape = shapeOf(std::move(parts));
-  }
-  avatar.eyeHeight = eyeHeightOf(avatar.shape->box.max.y());
-  if (order.links.empty()) return;
-  avatar.base = avatar.shape->parts;
-  avatar.chain = chainOf(order, turn);
-  avatar.shape = shapeWith(avatar.base, avatar.chain);
-}
-
 }  // namespace
 
 std::vector<Obstacle> obstaclesIn(const WorldState& world, const Box& box, EntityId except) {
@@ -186,6 +165,29 @@ std::vector<Obstacle> obstaclesIn(const WorldState& world, const Box& box, Entit
     }
   }
   return obstacles;
+}
+
+void shapeAvatar(const Spawn& order, Avatar& avatar) {
+  const Mat3 turn = turnedTo(headingFromDegrees(order.facing));
+  avatar.radius = order.radius;
+  avatar.flying = order.flying;
+  avatar.height = avatar.standing = order.parts.empty() ? order.height : 0;
+  avatar.shape = prismShape(order.radius, order.height, order.height);
+  if (!order.parts.empty()) {
+    std::vector<AvatarPart> parts;
+    for (const std::vector<Vec3>& points : order.parts) {
+      auto hull = std::make_shared<const collision::Hull>(collision::buildHull(points));
+      parts.push_back(placedPart(std::move(hull), Vec3::Zero(), turn));
+    }
+    avatar.shape = shapeOf(std::move(parts));
+  }
+  if (!order.parts.empty() || !order.links.empty())
+    avatar.madeOf = std::make_shared<const Spawn>(order);
+  avatar.eyeHeight = eyeHeightOf(avatar.shape->box.max.y());
+  if (order.links.empty()) return;
+  avatar.base = avatar.shape->parts;
+  avatar.chain = chainOf(order, turn);
+  avatar.shape = shapeWith(avatar.base, avatar.chain);
 }
 
 std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& order, Avatar& avatar,

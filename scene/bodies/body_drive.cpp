@@ -249,7 +249,7 @@ BodyView viewOf(const Body& body, std::uint32_t index) {
 
 bool isAsViewed(const Body& body, const BodyView& view) {
   return !view.moving && !body.moved && (body.asleep || isKinematic(body.spec->kind)) &&
-         view.blockedBy == body.blockedBy;
+         view.blockedBy == body.blockedBy && view.coordinate == body.drive.coordinate;
 }
 
 }  // namespace

@@ -100,6 +100,13 @@ std::uint32_t solidForStill(WorldState& world, std::uint32_t object) {
                   [&] { return stillSolid(world.scene->parts(object)); });
 }
 
+/// Gives the solid of an avatar's part its shape.
+void dress(Solid& solid, const std::shared_ptr<const collision::Hull>& hull) {
+  solid.hull = hull;
+  solid.parts = {partOfHull(*hull)};
+  solid.radius = hull->radius;
+}
+
 /// Places the solid of an avatar's part where the avatar is now, to the last bit.
 std::uint32_t solidForPart(WorldState& world, const Avatar& avatar, std::uint32_t index,
                            const Wish& wish) {
@@ -109,9 +116,7 @@ std::uint32_t solidForPart(WorldState& world, const Avatar& avatar, std::uint32_
   Solid& solid = stage.dynamics.solids[i];
   const Vec3 before = solid.position;
   if (solid.hull != part.hull) {
-    solid.hull = part.hull;
-    solid.parts = {partOfHull(*part.hull)};
-    solid.radius = part.hull->radius;
+    dress(solid, part.hull);
     forgetPairsOf(stage.dynamics, i);
   }
   const collision::ConvexBody placed = bodyAt(part, avatar.feet);
@@ -349,6 +354,16 @@ void startRigids(WorldState& world) {
     stage.bodies.push_back(i);
     solidForBody(world, i);
   }
+}
+
+Solid unmetSolid(const WorldState& world, EntityId entity, std::uint32_t part) {
+  if (const auto body = world.bodyOfId.find(entity); body != world.bodyOfId.end())
+    return solidOf(world.bodies[body->second]);
+  if (entity < world.firstAvatarId()) return stillSolid(world.scene->parts(entity - 1));
+  const std::string& name = world.avatarNames[entity - world.firstAvatarId()];
+  Solid solid;
+  dress(solid, world.avatars.at(name).shape->parts[part].hull);
+  return solid;
 }
 
 void planRigids(WorldState& world) {

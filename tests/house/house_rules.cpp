@@ -35,6 +35,7 @@ const std::map<std::string, Names> kRoomMayInclude{
     {"scene/rigid", {"scene", "scene/shapes"}},
     {"scene/bodies", {"scene", "scene/shapes"}},
     {"scene/avatars", {"scene"}},
+    {"scene/checkpoint", {"scene"}},
     {"render/gl", {"render"}},
     {"render/pictures", {"render"}},
     {"protocol/mcap", {}},

@@ -1,0 +1,255 @@
+#include "scene/checkpoint/checkpoint.hpp"
+
+#include "tests/scene/body_trial.hpp"
+#include "tests/scene/checkpoint_trial.hpp"
+#include "tests/scene/trial.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using namespace testing;
+
+std::vector<Vec3> boxPoints(const Vec3& min, const Vec3& max) {
+  std::vector<Vec3> points;
+  for (int i = 0; i < 8; ++i)
+    points.emplace_back(i & 1 ? max.x() : min.x(), i & 2 ? max.y() : min.y(),
+                        i & 4 ? max.z() : min.z());
+  return points;
+}
+
+/// A room with all that moves: doors that are walked into and close again, a lift, a tray that
+/// shakes boxes, a tower of boxes, a step, a trigger.
+std::shared_ptr<const Scene> busyRoom() {
+  std::vector<NamedBox> boxes{floorBox(),
+                              {"north", {-10, 0, -10.2}, {10, 3, -10}},
+                              {"south", {-10, 0, 10}, {10, 3, 10.2}},
+                              {"west", {-10.2, 0, -10}, {-10, 3, 10}},
+                              {"east", {10, 0, -10}, {10.2, 3, 10}},
+                              {"step", {-9, 0, -2}, {-6, 0.25, 2}},
+                              {"low", {2, 1.3, -9}, {5, 1.5, -6}},
+                              {"hinged", {0, 0.01, 0}, {0.9, 2, 0.05}},
+                              {"sliding", {3, 0.01, 0}, {4, 2, 0.05}},
+                              {"lift", {-4, -0.1, 4}, {-2, 0.05, 6}},
+                              {"tray", {5, 0.5, 5}, {7, 0.6, 7}},
+                              {"trigger", {-3, 0, -6}, {3, 2, -3}}};
+  const auto firstFree = static_cast<std::uint32_t>(boxes.size());
+  for (int i = 0; i < 4; ++i) {
+    const double low = 0.001 + 0.301 * i;
+    boxes.push_back({"tower" + std::to_string(i), {-2, low, -1}, {-1.7, low + 0.3, -0.7}});
+  }
+  for (int i = 0; i < 6; ++i)
+    boxes.push_back({"shaken" + std::to_string(i),
+                     {5.3 + 0.2 * (i % 3), 0.65 + 0.2 * (i / 3), 6},
+                     {5.45 + 0.2 * (i % 3), 0.8 + 0.2 * (i / 3), 6.15}});
+  Model model = boxModel(boxes);
+  BodySpec hinged = bodySpec("hinged", BodyKind::hinged, {7});
+  hinged.low = -1.5, hinged.high = 1.5, hinged.closesAfter = 0.5, hinged.speed = 2;
+  hinged.openedBy = OpenedBy::touch;
+  BodySpec sliding = bodySpec("sliding", BodyKind::sliding, {8});
+  sliding.anchor = {3, 0, 0}, sliding.axis = Vec3::UnitX(), sliding.high = 0.9;
+  sliding.acceleration = 2;
+  BodySpec lift = bodySpec("lift", BodyKind::lift, {9});
+  lift.anchor = {-3, 0, 5}, lift.high = 2, lift.stops = {0, 1, 2}, lift.speed = 1.5;
+  BodySpec tray = bodySpec("tray", BodyKind::path, {10});
+  tray.anchor = {6, 0.5, 6}, tray.loops = true;
+  tray.keys = {{0, Vec3::Zero(), 0},
+               {0.1, {0, 0.02, 0.01}, 0},
+               {0.3, Vec3::Zero(), 0},
+               {0.5, Vec3::Zero(), 0}};
+  model.bodies = {hinged, sliding, lift, tray, bodySpec("trigger", BodyKind::trigger, {11})};
+  for (std::uint32_t i = firstFree; i < boxes.size(); ++i)
+    model.bodies.push_back(bodySpec(boxes[i].path, BodyKind::rigid, {i}));
+  return std::make_shared<const Scene>(std::move(model));
+}
+
+class Random {
+ public:
+  explicit Random(unsigned seed) : random_(seed) {}
+  double uniform(double low, double high) {
+    return low + (high - low) * (static_cast<double>(random_() >> 11) * 0x1p-53);
+  }
+  std::size_t below(std::size_t count) { return random_() % count; }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+Spawn spawnOf(std::size_t kind, Random& random) {
+  Spawn spawn;
+  spawn.at = {random.uniform(-8, 8), 0.3, random.uniform(-8, 8)};
+  spawn.facing = random.uniform(0, 360);
+  if (kind == 1)
+    spawn.parts = {boxPoints({-0.2, 0, -0.3}, {0.2, 0.9, 0.3}),
+                   boxPoints({-0.1, 0.9, -0.1}, {0.1, 1.2, 0.1})};
+  if (kind == 2) {
+    spawn.links = {{-1,
+                    {LinkJoint::Kind::revolute, {0, 1.8, 0}, {0, 1, 0}, -3, 3},
+                    boxPoints({0, 0, -0.05}, {0.8, 0.1, 0.05}),
+                    0.3},
+                   {0,
+                    {LinkJoint::Kind::prismatic, {0.8, 0, 0}, {1, 0, 0}, 0, 0.3},
+                    boxPoints({0, 0, -0.1}, {0.1, 0.1, 0.1}),
+                    0}};
+    spawn.selfContact = true;
+  }
+  spawn.flying = kind == 3;
+  return spawn;
+}
+
+Order orderOf(std::size_t kind, Random& random) {
+  const Vec3 there{random.uniform(-9, 9), 0, random.uniform(-9, 9)};
+  switch (random.below(9)) {
+    case 0:
+      return Walk{{there, Vec3(-there)}, random.uniform(0.5, 3)};
+    case 1:
+      return Jump{random.uniform(0.1, 0.6), {}};
+    case 2:
+      return Crouch{kind == 0 ? random.uniform(0.8, 1.75) : 0};
+    case 3:
+      return Look{there};
+    case 4:
+      return Wait{random.uniform(0, 0.5)};
+    case 5:
+      return DriveJoints{{random.uniform(-2, 2), random.uniform(0, 0.3)}, 2, random.below(2) == 0};
+    case 6:
+      return random.below(4) == 0 ? Order(Leave{}) : Order(Fly{random.below(2) == 0});
+    default:
+      return Drive{{random.uniform(-3, 3), 0, random.uniform(-3, 3)}};
+  }
+}
+
+std::map<std::uint64_t, ToldOnce> toldInTheRoom(unsigned seed, std::uint64_t until) {
+  constexpr std::size_t kAvatars = 12;
+  Random random(seed);
+  std::map<std::uint64_t, ToldOnce> told;
+  const auto nameOf = [](std::size_t i) { return "a" + std::to_string(i); };
+  std::uint64_t tag = 0;
+  for (std::size_t i = 0; i < kAvatars; ++i)
+    told[1].avatars.push_back({nameOf(i), spawnOf(i % 4, random), ++tag});
+  for (std::uint64_t t = 2; t < until; ++t) {
+    const std::size_t who = random.below(kAvatars);
+    if (random.below(3) == 0)
+      told[t].avatars.push_back({nameOf(who), orderOf(who % 4, random), ++tag});
+    if (random.below(60) == 0)
+      told[t].avatars.push_back({nameOf(who), spawnOf(who % 4, random), ++tag});
+    if (random.below(40) != 0) continue;
+    BodyCommand command;
+    command.body = std::array{"hinged", "sliding", "lift", "tray"}[random.below(4)];
+    if (command.body == "lift") {
+      command.action = BodyCommand::Action::level;
+      command.level = static_cast<std::uint32_t>(random.below(3));
+    } else if (command.body == "tray") {
+      command.action = random.below(2) ? BodyCommand::Action::run : BodyCommand::Action::stop;
+    } else {
+      command.action = random.below(2) ? BodyCommand::Action::open : BodyCommand::Action::close;
+    }
+    told[t].bodies.push_back(command);
+  }
+  return told;
+}
+
+Lengths watchful() {
+  Lengths lengths;
+  lengths.nearMiss = 0.1;
+  return lengths;
+}
+
+TEST(Checkpoint, ACopyGoesOnToTheLastBitFromAnyTickOfABusyRoom) {
+  const auto scene = busyRoom();
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    constexpr std::uint64_t kUntil = 800;
+    Random random(100 + seed);
+    std::vector<std::uint64_t> at{0, 1};
+    for (int i = 0; i < 8; ++i) at.push_back(2 + random.below(kUntil - 300));
+    goOnAlike(scene, watchful(), toldInTheRoom(seed, kUntil), kUntil, at, 300);
+    if (HasFatalFailure()) FAIL() << "seed " << seed;
+  }
+}
+
+/// The room after some time, in the middle of everything.
+World livelyWorld(std::uint64_t ticks = 200) {
+  World world(busyRoom(), watchful());
+  const auto told = toldInTheRoom(7, ticks);
+  for (std::uint64_t t = 1; t <= ticks; ++t) {
+    if (const auto now = told.find(t); now != told.end()) give(world, now->second);
+    tick(world);
+  }
+  return world;
+}
+
+TEST(Checkpoint, ACrowdTakesLessThanFourKilobytesAnAvatar) {
+  Trial run({floorBox()});
+  for (int i = 0; i < 40; ++i)
+    run.order("a" + std::to_string(i), Spawn{{-8.0 + (i % 8), 0, -4.0 + (i / 8)}});
+  run.ticks(10);
+  for (int i = 0; i < 40; ++i) run.order("a" + std::to_string(i), Drive{{0.5, 0, 0.3}});
+  run.ticks(100);
+  EXPECT_EQ(run.world.snapshot()->avatars.size(), 40u);
+  EXPECT_LT(checkpointOf(run.world).size(), 40u * 4096);
+}
+
+TEST(Checkpoint, BytesThatWereChangedOrCutOffAreRefused) {
+  const auto scene = busyRoom();
+  const World world = livelyWorld();
+  const auto bytes = checkpointOf(world);
+  ASSERT_GT(world.state().rigids.dynamics.pairs.size(), 20u);
+  Random random(3);
+  for (int i = 0; i < 3000; ++i) {
+    auto spoilt = bytes;
+    spoilt[i < 64 ? static_cast<std::size_t>(i) : random.below(bytes.size())] ^=
+        static_cast<std::uint8_t>(1 + random.below(255));
+    ASSERT_THROW(worldFrom(scene, spoilt), CheckpointError);
+  }
+  for (int i = 0; i < 200; ++i) {
+    const std::span cut(bytes.data(),
+                        i < 64 ? static_cast<std::size_t>(i) : random.below(bytes.size()));
+    ASSERT_THROW(worldFrom(scene, cut), CheckpointError) << cut.size();
+  }
+  auto longer = bytes;
+  longer.push_back(0);
+  EXPECT_THROW(worldFrom(scene, longer), CheckpointError);
+}
+
+/// With a checksum that fits: what bytes say is not believed either.
+TEST(Checkpoint, BytesThatWereForgedMakeAWorldThatTicksOrNone) {
+  const auto scene = busyRoom();
+  const auto bytes = checkpointOf(livelyWorld());
+  Random random(5);
+  int refused = 0, ticked = 0;
+  for (int i = 0; i < 150; ++i) {
+    auto forged = bytes;
+    const std::size_t at = 32 + random.below(bytes.size() - 40);
+    forged[at] = static_cast<std::uint8_t>(random.below(256));
+    sealCheckpoint(forged);
+    try {
+      World world = worldFrom(scene, forged);
+      for (int t = 0; t < 3; ++t) tick(world);
+      ++ticked;
+    } catch (const CheckpointError&) {
+      ++refused;
+    } catch (const std::invalid_argument&) {
+      ++refused;  // a coordinate that the narrow phase cannot take
+    }
+  }
+  EXPECT_GT(refused, 5);
+  EXPECT_GT(ticked, 30);
+}
+
+TEST(Checkpoint, OfAnotherSceneOrVersionIsRefusedWithBothNamed) {
+  const auto bytes = checkpointOf(livelyWorld(10));
+  const auto refusal = [](const std::shared_ptr<const Scene>& scene, const auto& from) {
+    try {
+      worldFrom(scene, from);
+    } catch (const CheckpointError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(refusal(boxScene({floorBox()}), bytes).find("another scene"), std::string::npos);
+  auto later = bytes;
+  ++later[8];
+  EXPECT_NE(refusal(busyRoom(), later).find("version 2"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace enfilade::scene
