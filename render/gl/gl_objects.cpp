@@ -85,9 +85,6 @@ unsigned createGl(GlKind kind) {
     case GlKind::program:
       name = glCreateProgram();
       break;
-    case GlKind::query:
-      glCreateQueries(GL_ANY_SAMPLES_PASSED, 1, &name);
-      break;
   }
   return name;
 }
@@ -108,9 +105,6 @@ void deleteGl(GlKind kind, unsigned name) noexcept {
       break;
     case GlKind::program:
       glDeleteProgram(name);
-      break;
-    case GlKind::query:
-      glDeleteQueries(1, &name);
       break;
   }
 }

@@ -7,7 +7,7 @@
 
 namespace enfilade::render {
 
-enum class GlKind : std::uint8_t { buffer, texture, vertexArray, framebuffer, program, query };
+enum class GlKind : std::uint8_t { buffer, texture, vertexArray, framebuffer, program };
 
 unsigned createGl(GlKind kind);
 void deleteGl(GlKind kind, unsigned name) noexcept;
@@ -41,7 +41,6 @@ using GlTexture = GlObject<GlKind::texture>;
 using GlVertexArray = GlObject<GlKind::vertexArray>;
 using GlFramebuffer = GlObject<GlKind::framebuffer>;
 using GlProgram = GlObject<GlKind::program>;
-using GlQuery = GlObject<GlKind::query>;  ///< GL_ANY_SAMPLES_PASSED
 
 /// Throws RenderError naming `stage` and the error when GL has one.
 void checkGl(const char* stage);

@@ -1,21 +1,19 @@
-// A picture, step by step: the parts of the model that the camera may see, bodies where they are,
-// then the avatars (both write colour, id, depth and normals), then the sky where nothing was
-// drawn, shade in hollows, then glass over it all (colour only).
+// A picture, step by step: the depth of what the camera may see of the model, of bodies where they
+// are, and of avatars; then colour, id and normal of what has that depth, once a pixel; then the
+// sky where nothing was drawn, shade in hollows, then glass over it all (colour only).
 //
 // Which parts are drawn:
 //
-// 1. Those that a picture from nearby showed are drawn.
-// 2. Their depth is read back, and what else may be seen in front of it is searched for
-//    (part_search.hpp). Mostly that is nothing, and the picture is done.
-// 3. Else what was found is drawn over it. Where two are equally near in some pixel, the order
-// would
-//    matter, and all is drawn again in its order. Where much was found (nothing was known of this
-//    view), it is searched among first: the nearest are drawn into the depth alone, which hides
-//    most of the others, then twice as many, and so on.
+// 1. Those that a picture from nearby showed are drawn into the depth.
+// 2. It is read back, and what else may be seen in front of it is searched for (part_search.hpp).
+//    Mostly that is nothing, or little, which is drawn into the depth, too. Where much was found
+//    (nothing was known of this view), it is searched among: the nearest are drawn first, which
+//    hides most of the others, then twice as many, and so on.
+// 3. What may be seen by the last depth that was read is shaded.
 //
 // Why the picture is that of drawing everything: in a pixel the nearest fragment wins, among equals
-// the one drawn first. What is left out lies, wherever it has a fragment, behind something that is
-// drawn; so each pixel's winner is among what is drawn, and what is drawn keeps its order.
+// the one drawn last. What is left out lies, wherever it has a fragment, behind something that is
+// drawn; so each pixel's winner is among what is drawn, and what is shaded keeps its order.
 #include "render/gl/gl_renderer.hpp"
 
 #include <epoxy/gl.h>
@@ -87,8 +85,6 @@ struct GlRenderer::State {
   scene::Box boxOf(std::uint32_t part) const;
   bool isGlass(const Job& job, std::uint32_t part) const;
   DrawList drawSurfaces(const Job& job, const Choice& choice);
-  DrawList glassOf(const Job& job, const std::vector<std::uint32_t>& chosen) const;
-  bool drawOnTop(const Job& job, const Choice& more);
   void drawAir(const DrawList& glass);
   void readDepth(const Camera& camera);
   DrawList drawInside(Job& job);
@@ -96,6 +92,7 @@ struct GlRenderer::State {
   Choice foreseen(const Job& job, const Seen& seen) const;
   Choice missing(Job& job, const Choice& drawn);
   Choice searchAmong(Job& job, Choice drawn, Choice missing);
+  Choice notHidden(const Job& job, const Choice& drawn) const;
   void remember(const Job& job, const Choice& drawn, Seen& seen) const;
 };
 
@@ -134,35 +131,10 @@ bool GlRenderer::State::isGlass(const Job& job, std::uint32_t part) const {
 DrawList GlRenderer::State::drawSurfaces(const Job& job, const Choice& choice) {
   DrawLists lists = drawLists({scene->model(), parts, buffers.ranges, buffers.materials},
                               moving.bodies(), job.camera, job.options, choice.parts);
-  const bool normals = job.options.channels.normals;
-  pass->draw(lists.surfaces, {buffers.vertices.name(), buffers.indices.name(), buffers.textures},
-             normals);
+  pass->draw(lists.surfaces, {buffers.vertices.name(), buffers.indices.name(), buffers.textures});
   pass->draw(drawList(moving.avatars(), job.camera, choice.pieces),
-             moving.avatarGeometry(buffers.textures), normals);
+             moving.avatarGeometry(buffers.textures));
   return std::move(lists.glass);
-}
-
-DrawList GlRenderer::State::glassOf(const Job& job,
-                                    const std::vector<std::uint32_t>& chosen) const {
-  std::vector<std::uint32_t> glass;
-  std::copy_if(chosen.begin(), chosen.end(), std::back_inserter(glass),
-               [&](std::uint32_t part) { return isGlass(job, part); });
-  return drawLists({scene->model(), parts, buffers.ranges, buffers.materials}, moving.bodies(),
-                   job.camera, job.options, glass)
-      .glass;
-}
-
-/// Draws what is missing over what is there. False, and nothing is drawn, where two are equally
-/// near in some pixel: there the order of drawing decides.
-bool GlRenderer::State::drawOnTop(const Job& job, const Choice& more) {
-  target.drawInto({false, false, false, false});
-  pass->beginTieQuery();
-  drawSurfaces(job, more);
-  const bool ties = pass->endTieQuery();
-  target.drawInto(job.options.channels);
-  if (ties) return false;
-  drawSurfaces(job, more);
-  return true;
 }
 
 /// What has a colour only.
@@ -173,7 +145,7 @@ void GlRenderer::State::drawAir(const DrawList& glass) {
   pass->darkenHollows();
   target.endOverlay();
   pass->blendGlass();
-  pass->draw(glass, {buffers.vertices.name(), buffers.indices.name(), buffers.textures}, false);
+  pass->draw(glass, {buffers.vertices.name(), buffers.indices.name(), buffers.textures});
 }
 
 void GlRenderer::State::readDepth(const Camera& camera) {
@@ -192,6 +164,7 @@ DrawList GlRenderer::State::drawInside(Job& job) {
   }
   job.statistics.drawn = static_cast<std::uint32_t>(all.parts.size());
   job.statistics.outside = static_cast<std::uint32_t>(parts.size() - all.parts.size());
+  pass->shadeAll(job.options.channels.normals);
   return drawSurfaces(job, all);
 }
 
@@ -228,7 +201,7 @@ Choice GlRenderer::State::missing(Job& job, const Choice& drawn) {
   return choice;
 }
 
-/// Draws what is missing into the depth alone, the nearest first, as long as any of it may be seen.
+/// Draws what is missing into the depth, the nearest first, as long as any of it may be seen.
 /// Returns what may be seen of all that was drawn.
 Choice GlRenderer::State::searchAmong(Job& job, Choice drawn, Choice missing) {
   const auto maybe = [&](std::uint32_t part) {
@@ -240,7 +213,6 @@ Choice GlRenderer::State::searchAmong(Job& job, Choice drawn, Choice missing) {
     left.emplace_back((box.centre.cwiseAbs() - box.half).cwiseMax(0.0).squaredNorm(), part);
   }
   std::sort(left.begin(), left.end());
-  target.drawInto({false, false, false, false});
   std::size_t most = kFirstChunk;
   for (int i = 0; i < kMostChunks && !left.empty(); ++i, most *= 2) {
     const auto end = left.begin() + static_cast<std::ptrdiff_t>(std::min(most, left.size()));
@@ -257,8 +229,7 @@ Choice GlRenderer::State::searchAmong(Job& job, Choice drawn, Choice missing) {
     std::erase_if(left, [&](const auto& entry) { return !maybe(entry.second); });
   }
   add(drawn.pieces, missing.pieces);
-  std::erase_if(drawn.parts, [&](std::uint32_t part) { return !maybe(part); });
-  return drawn;
+  return notHidden(job, drawn);
 }
 
 /// For the next picture: what was drawn, less what is no longer seen, and what was seen and lies
@@ -282,40 +253,47 @@ void GlRenderer::State::remember(const Job& job, const Choice& drawn, Seen& seen
   std::sort(seen.avatars.begin(), seen.avatars.end());
 }
 
+/// What may be seen by the depth that was read last.
+Choice GlRenderer::State::notHidden(const Job& job, const Choice& drawn) const {
+  Choice seen;
+  seen.pieces = drawn.pieces;
+  for (const std::uint32_t part : drawn.parts) {
+    if (job.sight.look(job.sight.relative(boxOf(part)), depth) == Sight::maybe)
+      seen.parts.push_back(part);
+  }
+  return seen;
+}
+
 /// What may be seen.
 DrawList GlRenderer::State::drawSeen(Job& job) {
   Seen& seen = memory.recall(job.camera, ++picture);
   Choice drawn = foreseen(job, seen);
-  DrawList glass = drawSurfaces(job, drawn);
+  target.drawInto({false, false, false, false});
+  pass->toDepth();
+  drawSurfaces(job, drawn);
   readDepth(job.camera);
   depth.build();
   Choice more = missing(job, drawn);
-  const bool glassOnly =
-      more.pieces.empty() && std::all_of(more.parts.begin(), more.parts.end(),
-                                         [&](std::uint32_t p) { return isGlass(job, p); });
-  const bool many = more.parts.size() > kFewMissing;
-  bool done = glassOnly;
-  if (!glassOnly) {
-    depthIsOfPicture = false;
-    ++job.statistics.passes;
-    done = !many && drawOnTop(job, more);
-  }
-  if (!done && many) {
+  if (more.parts.size() > kFewMissing) {
     drawn = searchAmong(job, std::move(drawn), std::move(more));
   } else {
+    const bool glassOnly =
+        more.pieces.empty() && std::all_of(more.parts.begin(), more.parts.end(),
+                                           [&](std::uint32_t p) { return isGlass(job, p); });
+    if (!glassOnly) {
+      drawSurfaces(job, more);
+      depthIsOfPicture = false;
+      ++job.statistics.passes;
+    }
     add(drawn.parts, more.parts);
     add(drawn.pieces, more.pieces);
   }
-  if (!done) {
-    target.begin(job.options.channels);
-    depthIsOfPicture = false;
-    ++job.statistics.passes;
-    glass = drawSurfaces(job, drawn);
-  } else if (!more.parts.empty()) {
-    glass = glassOf(job, drawn.parts);
-  }
+  target.drawInto(job.options.channels);
+  pass->shadeNearest(job.options.channels.normals);
+  const Choice shaded = notHidden(job, drawn);
+  DrawList glass = drawSurfaces(job, shaded);
   remember(job, drawn, seen);
-  job.statistics.drawn = static_cast<std::uint32_t>(drawn.parts.size());
+  job.statistics.drawn = static_cast<std::uint32_t>(shaded.parts.size());
   job.statistics.occluded =
       static_cast<std::uint32_t>(parts.size()) - job.statistics.drawn - job.statistics.outside;
   return glass;

@@ -28,6 +28,7 @@ layout(location = 7) in vec4 emissive;
 layout(location = 8) in vec4 surface;
 layout(location = 9) in uint id;
 
+invariant gl_Position;  // the depth of both passes is one
 out vec3 point;
 out vec3 softNormal;
 out vec2 place;
@@ -85,13 +86,19 @@ layout(binding = 0) uniform sampler2D baseColourTexture;
 vec3 facingNormal(vec3 toEye) {
   vec3 flat_ = cross(dFdx(point), dFdy(point));
   if (dot(flat_, toEye) < 0.0) flat_ = -flat_;
-  float soft = dot(softNormal, softNormal);
-  if (soft > 0.0) return softNormal * (dot(softNormal, flat_) < 0.0 ? -1.0 : 1.0) / sqrt(soft);
-  float size = dot(flat_, flat_);
-  return size > 0.0 ? flat_ / sqrt(size) : toEye;
+  vec3 n = softNormal * (dot(softNormal, flat_) < 0.0 ? -1.0 : 1.0);
+  if (n == vec3(0.0)) n = flat_;
+  float size = dot(n, n);
+  return size > 0.0 ? n * inversesqrt(size) : toEye;
 }
 
 void main() {
+#ifdef SHADED
+  bool plan = forward.w > 0.5;
+  float distance = plan ? 0.0 : length(point);
+  vec3 toEye = plan ? -forward.xyz : -point / max(distance, 1e-6);
+  vec3 n = facingNormal(toEye);  // before any discard: derivatives are undefined after it
+#endif
   vec4 albedo = base;
 #ifdef TEXTURED
   albedo *= texture(baseColourTexture, place);
@@ -99,15 +106,12 @@ void main() {
 #ifdef MASK
   if (albedo.a < finish.x) discard;
 #endif
-  bool plan = forward.w > 0.5;
-  float distance = plan ? 0.0 : length(point);
-  vec3 toEye = plan ? -forward.xyz : -point / max(distance, 1e-6);
-  vec3 n = facingNormal(toEye);
+#ifdef SHADED
   vec3 radiance = lit(albedo.rgb, n, toEye, distance, finish.y, finish.z) + kGlow * glow.rgb;
   // A plan cuts things open; their insides are darker, so that cut walls stand out.
   bool inside = gl_FrontFacing == (glow.w > 0.5);
   if (plan && inside && finish.w < 0.5) radiance *= kCutOpen;
-  if (!plan) radiance = inAir(radiance, -toEye, distance);
+  if (!plan) radiance = inAir(radiance, distance);
 #ifdef BLEND
   colour = vec4(exposed(radiance), glassAlpha(albedo.a, n, toEye));
 #else
@@ -116,6 +120,7 @@ void main() {
 #endif
 #ifdef NORMALS
   facing = vec4(n, 0.0);
+#endif
 #endif
 }
 )";
@@ -140,43 +145,38 @@ void main() {
 }
 )";
 
-// Darkens hollows, from depth alone (after Luft, Colditz and Deussen 2006, but exact on planes:
-// reversed depth is affine over the picture wherever a surface is flat, so the mean of two opposite
-// neighbours differs from the middle only where surfaces meet). Multiplied into the colour.
+// Multiplied into the colour; see light.inc.
 constexpr const char* kHollowFragment = R"(
 layout(binding = 0) uniform sampler2D depthPlane;
 layout(location = 0) out vec4 factor;
 
-const int kPairs = 4;
-const vec2 kDirections[kPairs] =
-    vec2[](vec2(1.0, 0.2), vec2(-0.2, 1.0), vec2(0.3, 0.3), vec2(-0.3, 0.3));
+float depthAt(ivec2 pixel) { return texelFetch(depthPlane, pixel, 0).r; }
 
-float metres(float d) {
-  float near = range.x, far = range.y;
-  return forward.w > 0.5 ? far - d * (far - near) : near * far / (near + d * (far - near));
+// `slopePerDepth` is for one pixel's step.
+float hollowAlong(vec2 direction, float reach, float d, float slopePerDepth) {
+  ivec2 here = ivec2(gl_FragCoord.xy);
+  vec2 room = vec2(min(here, textureSize(depthPlane, 0) - 1 - here));
+  float way = hollowReachWithin(reach, room.x, room.y, direction.x, direction.y);
+  ivec2 step_ = ivec2(round(direction * way));
+  float nearer = 0.5 * (depthAt(here + step_) + depthAt(here - step_)) - d;
+  // Metres by the mean of the depths: in a perspective near * far / (near + depth * (far - near)).
+  float bend = forward.w > 0.5 ? 1.0 : range.x + (d + nearer) * (range.y - range.x);
+  return hollowOf(nearer, slopePerDepth / (bend * max(way * length(direction), 1.0)));
 }
 
 void main() {
-  ivec2 here = ivec2(gl_FragCoord.xy);
-  ivec2 size = textureSize(depthPlane, 0);
-  float d = texelFetch(depthPlane, here, 0).r;
+  float d = depthAt(ivec2(gl_FragCoord.xy));
   if (d <= 0.0) discard;
-  float z = metres(d);
-  float pixelsPerMetre = forward.w > 0.5 ? range.z : range.z / z;
-  float radius = clamp(kHollowRadius * pixelsPerMetre, kHollowFewestPixels, kHollowMostPixels);
-  vec2 room = vec2(min(here, size - 1 - here));  // both neighbours must lie in the picture
-  float hollow = 0.0;
-  for (int i = 0; i < kPairs; ++i) {
-    vec2 wanted = kDirections[i] * radius;
-    vec2 fit = room / max(abs(wanted), vec2(1e-3));
-    ivec2 step_ = ivec2(round(wanted * min(1.0, min(fit.x, fit.y))));
-    if (step_ == ivec2(0)) continue;
-    ivec2 a = here + step_, b = here - step_;
-    float mean = 0.5 * (texelFetch(depthPlane, a, 0).r + texelFetch(depthPlane, b, 0).r);
-    float slope = (z - metres(mean)) * pixelsPerMetre / length(vec2(step_));
-    hollow += hollowOf(slope);
-  }
-  factor = vec4(vec3(1.0 - kHollowStrength * hollow / float(kPairs)), 1.0);
+  float deep = range.y - range.x;
+  float pixelsPerMetre =
+      forward.w > 0.5 ? range.z : range.z * (range.x + d * deep) / (range.x * range.y);
+  float reach = hollowReach(pixelsPerMetre);
+  float slope = deep * range.z;
+  float hollow = hollowAlong(vec2(kHollowLong, kHollowShort), reach, d, slope) +
+                 hollowAlong(vec2(-kHollowShort, kHollowLong), reach, d, slope) +
+                 hollowAlong(vec2(kHollowDiagonal, kHollowDiagonal), reach, d, slope) +
+                 hollowAlong(vec2(-kHollowDiagonal, kHollowDiagonal), reach, d, slope);
+  factor = vec4(vec3(1.0 - 0.25 * kHollowStrength * hollow), 1.0);
 }
 )";
 
@@ -192,6 +192,7 @@ std::string surfaceFragmentSource(const SurfaceVariant& variant) {
   if (variant.mask) source += "#define MASK\n";
   if (variant.blend) source += "#define BLEND\n";
   if (variant.normals) source += "#define NORMALS\n";
+  if (variant.shaded) source += "#define SHADED\n";
   return source + kFrameBlock + kLight + kSurfaceFragment;
 }
 

@@ -1,4 +1,4 @@
-// The GLSL of the one pass: how surfaces, glass, avatars and the sky are lit.
+// The GLSL of both passes: which depth surfaces have, and how what is nearest is lit.
 #pragma once
 
 #include <string>
@@ -12,6 +12,7 @@ struct SurfaceVariant {
   bool mask = false;     ///< cuts holes: costs the early depth test
   bool blend = false;    ///< colour only, with alpha
   bool normals = false;  ///< writes them to colour attachment 2
+  bool shaded = true;    ///< else its depth alone, to the last bit that of the shaded one
 };
 
 std::string surfaceVertexSource();

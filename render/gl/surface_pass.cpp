@@ -110,17 +110,22 @@ SurfacePass::SurfacePass()
     : vertexArray_(makeVertexArray()),
       uniforms_(GlBuffer::create()),
       sky_(buildProgram("sky", skyVertexSource(), skyFragmentSource())),
-      hollows_(buildProgram("hollows", skyVertexSource(), hollowFragmentSource())),
-      ties_(GlQuery::create()) {
+      hollows_(buildProgram("hollows", skyVertexSource(), hollowFragmentSource())) {
   glNamedBufferStorage(uniforms_.name(), sizeof(FrameUniforms), nullptr, GL_DYNAMIC_STORAGE_BIT);
   checkGl("setting up the renderer");
 }
 
-unsigned SurfacePass::program(const Batch& batch, bool normals) {
-  const SurfaceVariant variant{batch.texture >= 0, batch.pass == Pass::mask,
-                               batch.pass == Pass::blend, normals};
-  const std::size_t index =
-      4 * static_cast<std::size_t>(batch.pass) + (variant.textured ? 2 : 0) + (normals ? 1 : 0);
+unsigned SurfacePass::program(const Batch& batch) {
+  SurfaceVariant variant;
+  variant.mask = batch.pass == Pass::mask;
+  variant.shaded = shaded_;
+  variant.textured = batch.texture >= 0 && (shaded_ || variant.mask);
+  variant.blend = shaded_ && batch.pass == Pass::blend;
+  variant.normals = shaded_ && normals_;
+  std::size_t index = 0;
+  for (const bool has :
+       {variant.mask, variant.shaded, variant.textured, variant.blend, variant.normals})
+    index = 2 * index + (has ? 1 : 0);
   std::optional<GlProgram>& program = surfaces_[index];
   if (!program) {
     program = buildProgram("surface", surfaceVertexSource(), surfaceFragmentSource(variant));
@@ -141,7 +146,27 @@ void SurfacePass::begin(const Camera& camera) {
   glDisable(GL_CULL_FACE);  // real models are wound both ways
 }
 
-void SurfacePass::draw(const DrawList& list, const Geometry& geometry, bool normals) {
+void SurfacePass::toDepth() {
+  shaded_ = false;
+  glDepthMask(GL_TRUE);
+  glDepthFunc(GL_GREATER);
+}
+
+void SurfacePass::shadeNearest(bool normals) {
+  shaded_ = true;
+  normals_ = normals;
+  glDepthMask(GL_FALSE);
+  glDepthFunc(GL_EQUAL);
+}
+
+void SurfacePass::shadeAll(bool normals) {
+  shaded_ = true;
+  normals_ = normals;
+  glDepthMask(GL_TRUE);
+  glDepthFunc(GL_GEQUAL);  // as in shadeNearest(), the last of several equally near ones stays
+}
+
+void SurfacePass::draw(const DrawList& list, const Geometry& geometry) {
   if (list.commands.empty()) return;
   instances_.fill(list.instances.data(), list.instances.size() * sizeof(Instance));
   commands_.fill(list.commands.data(), list.commands.size() * sizeof(DrawCommand));
@@ -151,7 +176,7 @@ void SurfacePass::draw(const DrawList& list, const Geometry& geometry, bool norm
   glVertexArrayElementBuffer(array, geometry.indices);
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_.name());
   for (const Batch& batch : list.batches) {
-    glUseProgram(program(batch, normals));
+    glUseProgram(program(batch));
     if (batch.texture >= 0) {
       glBindTextureUnit(0, geometry.textures[static_cast<std::size_t>(batch.texture)].name());
     }
@@ -160,21 +185,6 @@ void SurfacePass::draw(const DrawList& list, const Geometry& geometry, bool norm
                                 reinterpret_cast<const void*>(offset),
                                 static_cast<GLsizei>(batch.commandCount), sizeof(DrawCommand));
   }
-}
-
-void SurfacePass::beginTieQuery() {
-  glDepthMask(GL_FALSE);
-  glDepthFunc(GL_EQUAL);
-  glBeginQuery(GL_ANY_SAMPLES_PASSED, ties_.name());
-}
-
-bool SurfacePass::endTieQuery() const {
-  glEndQuery(GL_ANY_SAMPLES_PASSED);
-  glDepthMask(GL_TRUE);
-  glDepthFunc(GL_GREATER);
-  GLuint any = GL_TRUE;
-  glGetQueryObjectuiv(ties_.name(), GL_QUERY_RESULT, &any);
-  return any != GL_FALSE;
 }
 
 void SurfacePass::drawSky() const {
@@ -194,7 +204,8 @@ void SurfacePass::darkenHollows() const {
   glEnable(GL_DEPTH_TEST);
 }
 
-void SurfacePass::blendGlass() const {
+void SurfacePass::blendGlass() {
+  normals_ = false;
   glEnable(GL_BLEND);
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
 }

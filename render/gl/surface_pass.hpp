@@ -35,23 +35,26 @@ class SurfacePass {
 
   /// The state that all drawing shares, and the camera.
   void begin(const Camera& camera);
-  void draw(const DrawList& list, const Geometry& geometry, bool normals);
-  /// Between these, nothing is written; true: a pixel was as near as what is there.
-  void beginTieQuery();
-  bool endTieQuery() const;
+  /// What is drawn after it has only a depth.
+  void toDepth();
+  /// What is drawn after it is shaded where it is as near as the depth that is there.
+  void shadeNearest(bool normals);
+  /// Both at once: what is drawn after it is shaded where nothing nearer was drawn before.
+  void shadeAll(bool normals);
+  void draw(const DrawList& list, const Geometry& geometry);
   void drawSky() const;
   /// Over the colour, with depth as the texture of unit 0.
   void darkenHollows() const;
-  void blendGlass() const;
+  void blendGlass();
 
  private:
-  unsigned program(const Batch& batch, bool normals);
+  unsigned program(const Batch& batch);
 
   GlVertexArray vertexArray_;
   GlBuffer uniforms_;
   GlProgram sky_, hollows_;
-  GlQuery ties_;
-  std::array<std::optional<GlProgram>, 12> surfaces_;  ///< see program()
+  std::array<std::optional<GlProgram>, 32> surfaces_;  ///< see program()
+  bool shaded_ = true, normals_ = false;
   StreamBuffer instances_, commands_;
 };
 

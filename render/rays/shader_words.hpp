@@ -37,6 +37,9 @@ constexpr float dot(const vec3& a, const vec3& b) {
 constexpr float max(float a, float b) {
   return a < b ? b : a;
 }
+constexpr float min(float a, float b) {
+  return b < a ? b : a;
+}
 constexpr float clamp(float x, float low, float high) {
   return std::min(std::max(x, low), high);
 }
@@ -52,12 +55,6 @@ inline float abs(float x) {
 }
 inline float sqrt(float x) {
   return std::sqrt(x);
-}
-inline float pow(float x, float y) {
-  return std::pow(x, y);
-}
-inline float exp(float x) {
-  return std::exp(x);
 }
 inline vec3 exp(const vec3& v) {
   return {std::exp(v.x), std::exp(v.y), std::exp(v.z)};

@@ -127,7 +127,7 @@ SurfaceColour Shading::colour(const ShadedTriangle& triangle, int x, int y, doub
     const bool behind = triangle.flatNormal.dot(toEye) < 0;
     if (behind != mirrored) radiance = radiance * glsl::kCutOpen;
   }
-  if (!plan) radiance = glsl::inAir(radiance, floats(-toEye), distance);
+  if (!plan) radiance = glsl::inAir(radiance, distance);
   return {glsl::exposed(radiance), glsl::glassAlpha(albedo[3], floats(n), floats(toEye))};
 }
 
@@ -138,9 +138,7 @@ glsl::vec3 Shading::sky(int x, int y) const {
 
 namespace {
 
-/// The depths of a frame as the depth buffer has them: affine over the picture where a surface is
-/// flat, so that the mean of two opposite neighbours differs from the middle only where surfaces
-/// meet.
+/// The depths of a frame as the depth buffer has them; the twin of the shader (shaders.cpp).
 class HollowsOf {
  public:
   HollowsOf(const std::vector<float>& depth, const Camera& camera)
@@ -152,19 +150,14 @@ class HollowsOf {
   float factor(int x, int y) const {
     const double z = depth_[index(x, y)];
     if (std::isnan(z)) return 1;
-    const double pixelsPerMetre = plan_ ? scale_ : scale_ / z;
-    const double radius = std::clamp<double>(glsl::kHollowRadius * pixelsPerMetre,
-                                             glsl::kHollowFewestPixels, glsl::kHollowMostPixels);
-    float hollow = 0;
-    for (const auto& [dx, dy] : kDirections)
-      hollow += along(x, y, radius * dx, radius * dy, z, pixelsPerMetre);
-    return 1 - glsl::kHollowStrength * hollow / static_cast<float>(kDirections.size());
+    const float reach = glsl::hollowReach(static_cast<float>(plan_ ? scale_ : scale_ / z));
+    const float far = glsl::kHollowLong, side = glsl::kHollowShort, both = glsl::kHollowDiagonal;
+    const float hollow = along(x, y, far, side, reach) + along(x, y, -side, far, reach) +
+                         along(x, y, both, both, reach) + along(x, y, -both, both, reach);
+    return 1 - 0.25f * glsl::kHollowStrength * hollow;
   }
 
  private:
-  static constexpr std::array<std::array<double, 2>, 4> kDirections{
-      {{1.0, 0.2}, {-0.2, 1.0}, {0.3, 0.3}, {-0.3, 0.3}}};
-
   std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width) +
            static_cast<std::size_t>(x);
@@ -175,23 +168,18 @@ class HollowsOf {
     if (std::isnan(z)) return 0;
     return plan_ ? (camera_.far - z) / range : camera_.near * (camera_.far - z) / (z * range);
   }
-  double metres(double d) const {
-    const double range = camera_.far - camera_.near;
-    return plan_ ? camera_.far - d * range
-                 : camera_.near * camera_.far / (camera_.near + d * range);
-  }
-  /// By two neighbours at opposite sides, nearer than asked where the picture ends.
-  float along(int x, int y, double wantedX, double wantedY, double z, double pixelsPerMetre) const {
-    const double roomX = std::min(x, camera_.width - 1 - x),
-                 roomY = std::min(y, camera_.height - 1 - y);
-    const double fit = std::min({1.0, roomX / std::max(std::abs(wantedX), 1e-3),
-                                 roomY / std::max(std::abs(wantedY), 1e-3)});
-    const int stepX = static_cast<int>(std::lround(wantedX * fit));
-    const int stepY = static_cast<int>(std::lround(wantedY * fit));
-    if (stepX == 0 && stepY == 0) return 0;
+  float along(int x, int y, float directionX, float directionY, float reach) const {
+    const auto roomX = static_cast<float>(std::min(x, camera_.width - 1 - x)),
+               roomY = static_cast<float>(std::min(y, camera_.height - 1 - y));
+    const float way = glsl::hollowReachWithin(reach, roomX, roomY, directionX, directionY);
+    const int stepX = static_cast<int>(std::lround(directionX * way));
+    const int stepY = static_cast<int>(std::lround(directionY * way));
+    const float length = std::max(way * std::hypot(directionX, directionY), 1.0f);
     const double mean = 0.5 * (buffered(x + stepX, y + stepY) + buffered(x - stepX, y - stepY));
-    const double slope = (z - metres(mean)) * pixelsPerMetre / std::hypot(stepX, stepY);
-    return glsl::hollowOf(static_cast<float>(slope));
+    const double deep = camera_.far - camera_.near;
+    const double bend = plan_ ? 1 : camera_.near + mean * deep;
+    return glsl::hollowOf(static_cast<float>(mean - buffered(x, y)),
+                          static_cast<float>(deep * scale_ / (bend * length)));
   }
 
   const std::vector<float>& depth_;
