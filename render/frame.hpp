@@ -1,4 +1,4 @@
-// A picture: colour, object ids, depth and normals of one tick, from one pass.
+// A picture: colour, object ids, depth and normals of one tick.
 #pragma once
 
 #include <cstdint>

@@ -46,7 +46,7 @@ inline BruteHit bruteForceHit(
   return best;
 }
 
-/// Row by row. `camera` without a pinhole.
+/// Row by row.
 inline std::vector<BruteHit> bruteForceFrame(const scene::Model& model, const Camera& camera) {
   std::vector<std::pair<scene::EntityId, collision::Triangle>> all;
   for (std::uint32_t o = 0; o < model.objects.size(); ++o)
@@ -55,8 +55,8 @@ inline std::vector<BruteHit> bruteForceFrame(const scene::Model& model, const Ca
   std::vector<BruteHit> hits;
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
-      const double right = ((x + 0.5) / camera.width * 2 - 1) / view.scaleX;
-      const double up = (1 - (y + 0.5) / camera.height * 2) / view.scaleY;
+      const double right = ((x + 0.5) / camera.width * 2 - 1 - view.shiftX) / view.scaleX;
+      const double up = (1 - (y + 0.5) / camera.height * 2 - view.shiftY) / view.scaleY;
       const Vec3 aside = right * view.right + up * view.up;
       const bool perspective = camera.projection == Camera::Projection::perspective;
       hits.push_back(bruteForceHit(all, camera, perspective ? camera.eye : Vec3(camera.eye + aside),

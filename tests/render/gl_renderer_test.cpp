@@ -5,51 +5,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <random>
 #include <set>
 
 #include "render/pictures/image.hpp"
-#include "tests/render/hand_made_scene.hpp"
+#include "tests/render/things_to_see.hpp"
 
 namespace enfilade::render {
 namespace {
 
-scene::AvatarView avatarAt(scene::EntityId id, const Vec3& feet) {
-  std::vector<Vec3> points;
-  for (const double y : {0.0, 1.75}) {
-    for (const double x : {-0.3, 0.3}) {
-      for (const double z : {-0.3, 0.3}) points.emplace_back(x, y, z);
-    }
-  }
-  scene::AvatarView avatar;
-  avatar.id = id;
-  avatar.feet = feet;
-  avatar.shape = scene::shapeOf(
-      {scene::placedPart(std::make_shared<const collision::Hull>(collision::buildHull(points)),
-                         Vec3::Zero(), collision::Mat3::Identity())});
-  return avatar;
-}
-
 std::set<std::uint32_t> idsIn(const Frame& frame) {
   return {frame.ids.begin(), frame.ids.end()};
-}
-
-/// A random crowd of boxes around the origin, some mirrored, some of glass.
-std::vector<PlacedBox> crowd(int count) {
-  std::mt19937 random(11);
-  std::uniform_real_distribution<double> place(-10, 10);
-  std::uniform_real_distribution<double> length(0.3, 2);
-  std::vector<PlacedBox> boxes;
-  for (int i = 0; i < count; ++i) {
-    PlacedBox box;
-    for (int axis = 0; axis < 3; ++axis) box.centre[axis] = place(random);
-    for (int axis = 0; axis < 3; ++axis) box.size[axis] = length(random);
-    if (i % 3 == 0) box.size.x() = -box.size.x();
-    const float shade = 0.1f * static_cast<float>(i % 9 + 1);
-    box.material = coloured(shade, 1 - shade, 0.5f, i % 7 == 0 ? 0.4f : 1.0f);
-    boxes.push_back(box);
-  }
-  return boxes;
 }
 
 TEST(GlRenderer, ABoxIsSeenExactlyWhereItsGeometrySays) {
@@ -234,20 +199,7 @@ TEST(GlRenderer, ADeviceThatIsNotThereIsRefusedWithAllThatWereTried) {
 }
 
 TEST(GlRenderer, AMaskCutsHolesIntoColourIdsAndDepth) {
-  scene::Model model;
-  scene::Material leaf;
-  leaf.alpha = scene::Material::Alpha::mask;
-  leaf.baseColourTexture = 0;
-  model.materials = {leaf};
-  model.textures = {{"half", 2, 1, {255, 255, 255, 255, 255, 255, 255, 0}}};
-  scene::Mesh square;
-  square.positions = {{-1, -1, -2}, {1, -1, -2}, {1, 1, -2}, {-1, 1, -2}};
-  square.uvs = {{0.25f, 0}, {0.75f, 0}, {0.75f, 1}, {0.25f, 1}};
-  square.indices = {0, 1, 2, 0, 2, 3};
-  model.meshes = {square};
-  model.objects.resize(1);
-  model.objects[0].meshes = {0};
-  GlRenderer renderer(std::make_shared<const scene::Scene>(std::move(model)));
+  GlRenderer renderer(maskedSquare());
   const Frame frame = renderer.render({}, squareCamera());
   EXPECT_EQ(frame.ids[at(frame, 60, 100)], 1u);
   EXPECT_EQ(frame.ids[at(frame, 140, 100)], 0u);

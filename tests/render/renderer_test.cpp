@@ -37,6 +37,15 @@ TEST(Renderer, EachKindDrawsWithItsOwnAndARequestGoesBeforeIt) {
   EXPECT_EQ(rays.render({}, camera).renderer, raysName);
 }
 
+TEST(Renderer, OnACpuRaysMeasureLargeScenesAndGlDrawsAllColours) {
+  for (const std::size_t triangles : {std::size_t{1'000'000}, std::size_t{100'000'000}}) {
+    EXPECT_EQ(automaticKind(true, triangles, kMeasured), RendererKind::rays) << triangles;
+    EXPECT_EQ(automaticKind(true, triangles, kColour), RendererKind::gl) << triangles;
+  }
+  for (const std::size_t triangles : {std::size_t{0}, std::size_t{10'000}})
+    EXPECT_EQ(automaticKind(true, triangles, kMeasured), RendererKind::gl) << triangles;
+}
+
 TEST(Renderer, AutomaticFollowsItsRule) {
   const auto scene = sceneOf(crowd(50));
   Renderer renderer(scene);
