@@ -230,6 +230,7 @@ void Client::State::greet() {
   hello.mutable_hello()->set_protocol_version(kVersion);
   hello.mutable_hello()->set_client_name(options.name);
   hello.mutable_hello()->set_token(options.token);
+  hello.mutable_hello()->set_world(options.world);
   send(hello, deadline);
   const auto received = receive(deadline);
   if (!received) {

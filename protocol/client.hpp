@@ -31,6 +31,7 @@ struct ProtocolError : std::runtime_error {
 struct ClientOptions {
   std::string name = "enfilade client";
   std::string token;  ///< for servers that want one
+  std::string world;  ///< that it enters; empty: the main one
   /// Of connecting, and of each reply (wall-clock time): a step's reply comes after all its ticks,
   /// so ask for fewer at a time, or give more time, where they take longer.
   std::chrono::milliseconds timeout{30'000};

@@ -21,6 +21,13 @@ std::string nameFor(const scene::World& world, scene::EntityId id) {
 
 }  // namespace
 
+void AuditTotals::add(const AuditTotals& others) {
+  ticks += others.ticks;
+  pairs += others.pairs;
+  missed += others.missed;
+  extra += others.extra;
+}
+
 void AuditTotals::add(const scene::TickAudit& audit) {
   using Kind = scene::AuditFinding::Kind;
   ++ticks;

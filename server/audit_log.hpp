@@ -16,6 +16,7 @@ struct AuditTotals {
   std::uint64_t extra = 0;   ///< held by the broad phase, but not found
 
   void add(const scene::TickAudit& audit);
+  void add(const AuditTotals& others);
   bool right() const { return missed == 0 && extra == 0; }
 };
 

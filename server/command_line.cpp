@@ -28,6 +28,7 @@ struct Arguments {
   render::DeviceChoice device;
   std::string tokenFile;
   Access access;
+  std::vector<std::filesystem::path> furtherScenes;
   std::string auditEvery = "0", epsilon, stepHeight, slope, sliding = "slide";
 };
 
@@ -245,6 +246,8 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   Arguments read;
   CLI::App* serve = app.add_subcommand("serve", "Serve a scene to clients over TCP");
   addModel(*serve, read.model);
+  serve->add_option("FURTHER", read.furtherScenes,
+                    "Further models: scenes of the same server, each with a world of its own");
   serve->add_option("--listen", read.listen, "Address and port; port 0 lets the system choose")
       ->capture_default_str()
       ->check(CLI::Validator(endpointProblem, "HOST:PORT"));
@@ -307,7 +310,8 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
                         read.tokenFile,
                         read.access,
                         read.stopAtEndOfInput,
-                        drawingFrom(read)};
+                        drawingFrom(read),
+                        read.furtherScenes};
   if (*replay && read.verify) return verifyFrom(read);
   if (*replay) {
     if (const auto missing = missingFrom(read)) {

@@ -52,6 +52,7 @@ struct ServeCommand {
   Access access;                    ///< without the tokens
   bool stopAtEndOfInput = false;    ///< ends when whoever started it has closed its standard input
   DrawingOptions drawing;
+  std::vector<std::filesystem::path> furtherScenes;  ///< read as `model` is
 };
 struct ReplayCommand {
   ModelOptions model;

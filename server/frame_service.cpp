@@ -2,8 +2,6 @@
 
 #include <spdlog/spdlog.h>
 
-#include <atomic>
-
 #include "render/render_thread.hpp"
 #include "server/work_thread.hpp"
 #include "server/world_messages.hpp"
@@ -36,7 +34,6 @@ struct FrameService::State {
   std::unique_ptr<render::RenderThread> renderer;
   std::string deviceName, whyNone;
   bool software = false;
-  std::atomic<std::uint64_t> drawn{0};
   WorkThread thread;
 
   Buffer reply(Drawing& drawing);
@@ -47,7 +44,7 @@ Buffer FrameService::State::reply(Drawing& drawing) {
     if (!renderer)
       return errorReply(drawing.job.requestId, errorOf(v1::ERROR_NO_RENDERER, whyNone));
     Buffer whole = frameReply(drawing);
-    ++drawn;
+    if (drawing.job.drawn) ++*drawing.job.drawn;
     return whole;
   } catch (const render::NoRenderer& error) {
     return errorReply(drawing.job.requestId,
@@ -91,9 +88,6 @@ bool FrameService::software() const {
 }
 const std::string& FrameService::whyNone() const {
   return state_->whyNone;
-}
-std::uint64_t FrameService::drawn() const {
-  return state_->drawn;
 }
 
 void FrameService::draw(FrameJob job, std::function<void(Buffer)> done) {

@@ -2,6 +2,7 @@
 // neither the tick nor a socket ever waits for a picture.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <memory>
 
@@ -19,6 +20,7 @@ struct FrameJob {
   std::uint64_t requestId = 0;  ///< 0: nobody asked for this one; it is of a watch
   std::uint32_t watch = 0;      ///< 0: of none
   std::uint64_t dropped = 0;    ///< Frame.dropped
+  std::shared_ptr<std::atomic<std::uint64_t>> drawn;  ///< counts it; may be null
 };
 
 class FrameService {
@@ -34,7 +36,6 @@ class FrameService {
   const std::string& deviceName() const;  ///< "" without a renderer
   bool software() const;
   const std::string& whyNone() const;  ///< "" with a renderer
-  std::uint64_t drawn() const;         ///< pictures so far
 
   /// `done` gets the whole reply (a Frame or an Error) on the service's thread, in the order of the
   /// calls.

@@ -31,7 +31,9 @@ void draw(ServedWorld& served, ClientId id, Client& client, std::uint32_t number
   if (client.out->dropLatest(number)) ++watch.dropped;
   served.droppedFrames += watch.dropped;
   watch.underWay = true;
-  FrameJob job{snapshot, std::get<View>(std::move(view)), watch.request, 0, number, watch.dropped};
+  FrameJob job{
+      snapshot,    std::get<View>(std::move(view)), watch.request, 0, number, watch.dropped,
+      served.drawn};
   watch.dropped = 0;
   deliver(served, id, number, watch.generation, client.out, std::move(job));
 }

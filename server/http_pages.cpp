@@ -1,5 +1,6 @@
 #include "server/http_pages.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <optional>
 #include <sstream>
@@ -136,25 +137,39 @@ const char* phraseOf(unsigned status) {
   }
 }
 
-/// One metric with its help and type, and a line for each value.
+/// Each metric with its help and type, and a line for each world.
 class MetricsText {
  public:
-  void add(const char* name, const char* type, const char* help, double value) {
+  explicit MetricsText(std::span<const WorldMetrics> worlds) : worlds_(worlds) {}
+
+  template <class Value>
+  void add(const char* name, const char* type, const char* help, const Value& value) {
     begin(name, type, help);
-    line(name, "", value);
+    for (const WorldMetrics& one : worlds_)
+      line(name, labelOf(one) + "}", static_cast<double>(value(one.metrics)));
   }
   void begin(const char* name, const char* type, const char* help) {
     text_ << "# HELP enfilade_" << name << ' ' << help << "\n# TYPE enfilade_" << name << ' '
           << type << '\n';
   }
+  void timing(const WorldMetrics& one, const v1::StageTiming& stage, const std::string& name) {
+    const std::string label = labelOf(one) + ",stage=\"" + name + "\",quantile=\"";
+    line("stage_microseconds", label + "0.5\"}", stage.median_us());
+    line("stage_microseconds", label + "0.99\"}", stage.p99_us());
+    line("stage_microseconds", label + "1\"}", stage.max_us());
+  }
+  std::string text() const { return text_.str(); }
+
+ private:
+  /// Names of worlds need no escapes.
+  static std::string labelOf(const WorldMetrics& one) { return "{world=\"" + one.world + "\""; }
   void line(const char* name, const std::string& labels, double value) {
     char digits[32];
     const auto end = std::to_chars(digits, digits + sizeof digits, value).ptr;
     text_ << "enfilade_" << name << labels << ' ' << std::string_view(digits, end) << '\n';
   }
-  std::string text() const { return text_.str(); }
 
- private:
+  std::span<const WorldMetrics> worlds_;
   std::ostringstream text_;
 };
 
@@ -192,39 +207,41 @@ std::variant<v1::ClientMessage, PageProblem> requestFor(const Target& target) {
   return PageProblem{404, "there are /healthz, /metrics and /mjpeg/..., and the WebSocket at /"};
 }
 
-std::string metricsPage(const v1::Metrics& metrics) {
-  const auto number = [](std::uint64_t value) { return static_cast<double>(value); };
-  MetricsText page;
-  page.add("ticks_total", "counter", "Ticks made.", number(metrics.ticks()));
-  page.add("contacts_total", "counter", "Contacts that began.", number(metrics.contacts()));
-  page.add("narrow_queries_total", "counter", "Pairs decided by the narrow phase.",
-           number(metrics.narrow_queries()));
-  page.add("rational_queries_total", "counter", "Of those, decided by exact arithmetic.",
-           number(metrics.rational_queries()));
-  page.add("frames_total", "counter", "Pictures drawn.", number(metrics.frames()));
-  page.add("dropped_total", "counter", "States and pictures left out for slow clients.",
-           number(metrics.dropped()));
-  page.add("squeezed_bodies_total", "counter", "Pairs that a driven body pressed together.",
-           number(metrics.squeezed_bodies()));
-  page.add("worst_penetration_metres", "gauge", "By the exact verdict; 0: nothing ever did.",
-           metrics.worst_penetration());
-  page.add("clients", "gauge", "Connected now, this request among them.", metrics.clients());
-  page.add("avatars", "gauge", "In the world now.", metrics.avatars());
-  page.add("pairs", "gauge", "That the broad phase held in the last tick.", metrics.pairs());
-  page.add("live_contacts", "gauge", "In the last tick.", metrics.live_contacts());
-  if (metrics.has_audit()) {
-    page.add("audit_missed_total", "counter", "Pairs that the broad phase missed; must be 0.",
-             number(metrics.audit().missed()));
+std::string metricsPage(std::span<const WorldMetrics> worlds) {
+  using M = v1::Metrics;
+  MetricsText page(worlds);
+  const auto add = [&page](const char* name, const char* type, const char* help,
+                           const auto& value) { page.add(name, type, help, value); };
+  add("ticks_total", "counter", "Ticks made.", [](const M& m) { return m.ticks(); });
+  add("contacts_total", "counter", "Contacts that began.", [](const M& m) { return m.contacts(); });
+  add("narrow_queries_total", "counter", "Pairs decided by the narrow phase.",
+      [](const M& m) { return m.narrow_queries(); });
+  add("rational_queries_total", "counter", "Of those, decided by exact arithmetic.",
+      [](const M& m) { return m.rational_queries(); });
+  add("frames_total", "counter", "Pictures drawn.", [](const M& m) { return m.frames(); });
+  add("dropped_total", "counter", "States and pictures left out for slow clients.",
+      [](const M& m) { return m.dropped(); });
+  add("squeezed_bodies_total", "counter", "Pairs that a driven body pressed together.",
+      [](const M& m) { return m.squeezed_bodies(); });
+  add("worst_penetration_metres", "gauge", "By the exact verdict; 0: nothing ever did.",
+      [](const M& m) { return m.worst_penetration(); });
+  add("clients", "gauge", "Connected now, this request among them.",
+      [](const M& m) { return m.clients(); });
+  add("avatars", "gauge", "In the world now.", [](const M& m) { return m.avatars(); });
+  add("pairs", "gauge", "That the broad phase held in the last tick.",
+      [](const M& m) { return m.pairs(); });
+  add("live_contacts", "gauge", "In the last tick.", [](const M& m) { return m.live_contacts(); });
+  // Worlds of one server are all audited, or none is.
+  if (std::any_of(worlds.begin(), worlds.end(),
+                  [](const WorldMetrics& one) { return one.metrics.has_audit(); })) {
+    add("audit_missed_total", "counter", "Pairs that the broad phase missed; must be 0.",
+        [](const M& m) { return m.audit().missed(); });
   }
   page.begin("stage_microseconds", "gauge", "Wall-clock time of a tick's stages.");
-  const auto timing = [&](const v1::StageTiming& stage, const std::string& name) {
-    const std::string label = "{stage=\"" + name + "\",quantile=\"";
-    page.line("stage_microseconds", label + "0.5\"}", stage.median_us());
-    page.line("stage_microseconds", label + "0.99\"}", stage.p99_us());
-    page.line("stage_microseconds", label + "1\"}", stage.max_us());
-  };
-  for (const v1::StageTiming& stage : metrics.stages()) timing(stage, stage.name());
-  timing(metrics.tick(), "tick");
+  for (const WorldMetrics& one : worlds) {
+    for (const v1::StageTiming& stage : one.metrics.stages()) page.timing(one, stage, stage.name());
+    page.timing(one, one.metrics.tick(), "tick");
+  }
   return page.text();
 }
 

@@ -34,8 +34,13 @@ std::variant<v1::ClientMessage, PageProblem> requestFor(const Target& target);
 
 inline constexpr const char* kMetricsType = "text/plain; version=0.0.4; charset=utf-8";
 
-/// In Prometheus' text format, version 0.0.4.
-std::string metricsPage(const v1::Metrics& metrics);
+struct WorldMetrics {
+  std::string world;  ///< its name
+  v1::Metrics metrics;
+};
+
+/// In Prometheus' text format, version 0.0.4: each metric of each world, labelled with its name.
+std::string metricsPage(std::span<const WorldMetrics> worlds);
 
 /// A whole response; the connection closes after it.
 std::string response(unsigned status, const std::string& type, const std::string& body);

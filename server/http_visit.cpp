@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <boost/asio/post.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/http/read.hpp>
@@ -88,9 +89,22 @@ void HttpVisit::route(Request request) {
   if (!role && path_ != "/healthz") return refuse(401, "this server wants a token");
   const auto asked = requestFor(target);
   if (const auto* why = std::get_if<PageProblem>(&asked)) return refuse(why->status, why->text);
+  if (!findWorlds(target)) return refuse(404, "there is no world of this name");
   armTimer(Clock::now() + reception_.limits.message, 503, "the tick loop did not answer in time");
-  join(role.value_or(Role::observe));
-  ask(std::get<v1::ClientMessage>(asked));
+  ask(std::get<v1::ClientMessage>(asked), role.value_or(Role::observe));
+}
+
+/// Those that are asked: the one that is named, for metrics else all, for pictures the main one.
+bool HttpVisit::findWorlds(const Target& target) {
+  const auto named = target.query.find("world");
+  const bool one = named != target.query.end() || path_.starts_with("/mjpeg");
+  if (one) {
+    ears_.emplace_back();
+    ears_[0].world = reception_.worlds.find(named == target.query.end() ? "" : named->second);
+    return ears_[0].world != nullptr;
+  }
+  for (auto& world : reception_.worlds.all()) ears_.emplace_back().world = std::move(world);
+  return true;
 }
 
 void HttpVisit::upgrade(Request request) {
@@ -109,49 +123,64 @@ void HttpVisit::upgrade(Request request) {
 
 // ---- asking the world --------------------------------------------------------------------------
 
-void HttpVisit::join(Role role) {
+void HttpVisit::ask(v1::ClientMessage request, Role role) {
+  request.set_request_id(2);
+  for (Ear& ear : ears_) {
+    join(ear, role);
+    if (ear.client != 0) ear.world->receive(ear.client, request, 0);
+    ear.ended = ear.client == 0;
+  }
+  noticeLeaving();
+  hear();
+}
+
+/// As a guest: nobody's world lasts because somebody looks at its metrics.
+void HttpVisit::join(Ear& ear, Role role) {
   const auto wake = [weak = weak_from_this(), executor = socket_.get_executor()] {
     asio::post(executor, [weak] {
       if (const auto self = weak.lock()) self->hear();
     });
   };
   const ServerLimits& limits = reception_.limits;
-  heard_ = std::make_shared<OutgoingQueue>(
+  ear.heard = std::make_shared<OutgoingQueue>(
       OutgoingBounds{limits.outgoingBytes, limits.outgoingFrames, limits.outgoingFrameBytes},
       bufferOf(""), wake);
-  client_ = reception_.loop.join("http", role, heard_, 1);
+  ear.client = ear.world->join("http", role, ear.heard, 1, true);
 }
 
-void HttpVisit::ask(v1::ClientMessage request) {
-  request.set_request_id(2);
-  reception_.loop.receive(client_, std::move(request), 0);
-  noticeLeaving();
-}
-
-/// Takes what the loop said, one picture at a time: what waits meanwhile is the loop's to drop.
 void HttpVisit::hear() {
-  while (!closed_ && !writing_) {
-    const OutgoingQueue::Next next = heard_->pop();
+  for (Ear& ear : ears_) hear(ear);
+  const bool told = std::all_of(ears_.begin(), ears_.end(),
+                                [](const Ear& ear) { return ear.metrics || ear.ended; });
+  if (closed_ || answered_ || !told) {
+    if (told && answered_ && !writing_) close();  // the world of a stream of pictures has ended
+    return;
+  }
+  if (path_.starts_with("/mjpeg")) return refuse(503, "the world has ended");
+  answerMetrics();
+}
+
+/// Takes what the world said, one picture at a time: what waits meanwhile is the loop's to drop.
+void HttpVisit::hear(Ear& ear) {
+  while (!closed_ && !writing_ && !ear.ended) {
+    const OutgoingQueue::Next next = ear.heard->pop();
     if (!next.message) return;
-    if (next.last) return close();
+    ear.ended = next.last;
     protocol::Decoder decoder(protocol::kClientTakes, protocol::Decoder::Expect::messages);
     std::span<const std::uint8_t> bytes(*next.message);
     auto framed = decoder.next(bytes);
     v1::ServerMessage message;
     if (framed && protocol::parse(framed->header, message))
-      take(std::move(message), std::move(framed->attachment));
+      take(ear, std::move(message), std::move(framed->attachment));
   }
 }
 
-void HttpVisit::take(v1::ServerMessage message, std::vector<std::uint8_t> attachment) {
+void HttpVisit::take(Ear& ear, v1::ServerMessage message, std::vector<std::uint8_t> attachment) {
   if (message.has_error()) {
     const bool missing = message.error().code() == v1::ERROR_UNKNOWN_AVATAR;
     return refuse(missing ? 404 : 400, message.error().message());
   }
-  if (message.has_metrics()) {
-    if (path_ == "/healthz") return answer(200, "text/plain", "ok\n");
-    return answer(200, kMetricsType, metricsPage(message.metrics()));
-  }
+  if (message.has_metrics()) ear.metrics = message.metrics();
   if (message.has_watch_frames()) {
     timer_.cancel();  // pictures come for as long as the other side stays
     answered_ = true;
@@ -161,6 +190,21 @@ void HttpVisit::take(v1::ServerMessage message, std::vector<std::uint8_t> attach
     std::vector<std::uint8_t> part = mjpegPart(message.frame(), attachment);
     return write(std::make_shared<const std::vector<std::uint8_t>>(std::move(part)), false);
   }
+}
+
+/// Of the worlds that live. One that failed makes the server ill; one that was dropped meanwhile
+/// does not.
+void HttpVisit::answerMetrics() {
+  std::vector<WorldMetrics> told;
+  for (Ear& ear : ears_) {
+    const std::string& name = ear.world->place().name;
+    if (ear.world->failure() && path_ == "/healthz")
+      return refuse(503, "the world '" + name + "' failed: drop it, or start the server anew");
+    if (ear.metrics) told.push_back({name, std::move(*ear.metrics)});
+  }
+  if (told.empty()) return refuse(503, "the server ends");
+  if (path_ == "/healthz") return answer(200, "text/plain", "ok\n");
+  answer(200, kMetricsType, metricsPage(told));
 }
 
 // ---- out ---------------------------------------------------------------------------------------
@@ -227,7 +271,8 @@ void HttpVisit::close() {
   timer_.cancel();
   error_code ignored;
   socket_.close(ignored);
-  if (client_ != 0) reception_.loop.leave(client_);
+  for (const Ear& ear : ears_)
+    if (ear.client != 0) ear.world->leave(ear.client);
 }
 
 }  // namespace enfilade::server

@@ -1,5 +1,5 @@
 // One request over HTTP/1.1: becomes a WebSocket, or is answered: /healthz, /metrics, /mjpeg/... It
-// asks the world as any client does, through the tick loop.
+// asks the worlds as any client does, through their tick loops.
 //
 // Asio and Beast appear in this header, which only files of connections include.
 #pragma once
@@ -10,6 +10,7 @@
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/string_body.hpp>
 
+#include "server/http_pages.hpp"
 #include "server/reception.hpp"
 
 namespace enfilade::server {
@@ -34,10 +35,22 @@ class HttpVisit : public Connection, public std::enable_shared_from_this<HttpVis
   void answer(unsigned status, const std::string& type, std::string body);
   void refuse(unsigned status, const std::string& why);
   void write(Buffer bytes, bool last);
-  void join(Role role);
-  void ask(v1::ClientMessage request);
+  /// What one world says to us.
+  struct Ear {
+    std::shared_ptr<TickLoop> world;
+    std::shared_ptr<OutgoingQueue> heard;
+    ClientId client = 0;
+    std::optional<v1::Metrics> metrics;
+    bool ended = false;  ///< it says nothing more
+  };
+
+  bool findWorlds(const Target& target);
+  void ask(v1::ClientMessage request, Role role);
+  void join(Ear& ear, Role role);
   void hear();
-  void take(v1::ServerMessage message, std::vector<std::uint8_t> attachment);
+  void hear(Ear& ear);
+  void take(Ear& ear, v1::ServerMessage message, std::vector<std::uint8_t> attachment);
+  void answerMetrics();
   void armTimer(Clock::time_point deadline, unsigned status, std::string why);
   void noticeLeaving();
   void close();
@@ -51,8 +64,7 @@ class HttpVisit : public Connection, public std::enable_shared_from_this<HttpVis
   boost::beast::http::request_parser<boost::beast::http::string_body> parser_;
   std::array<char, 256> thrownAway_{};
   std::string path_;
-  std::shared_ptr<OutgoingQueue> heard_;  ///< what the tick loop says to us
-  ClientId client_ = 0;
+  std::vector<Ear> ears_;  ///< one, or for metrics as many as there are worlds
   bool writing_ = false, answered_ = false, noticing_ = false, closed_ = false;
 };
 

@@ -57,12 +57,12 @@ tcp::acceptor acceptorAt(asio::io_context& context, const Endpoint& where, const
 
 }  // namespace
 
-Listener::Listener(asio::io_context& context, const Endpoint& where, TickLoop& loop,
+Listener::Listener(asio::io_context& context, const Endpoint& where, Worlds& worlds,
                    const ServerLimits& limits, Access access)
     : acceptor_(acceptorAt(context, where, access)),
       port_(acceptor_.local_endpoint().port()),
       pause_(context),
-      reception_{loop, limits, std::move(access), {}} {}
+      reception_{worlds, limits, std::move(access), {}} {}
 
 void Listener::start() {
   accept();

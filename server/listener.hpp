@@ -16,7 +16,7 @@ namespace enfilade::server {
 class Listener {
  public:
   /// Throws ServerError.
-  Listener(boost::asio::io_context& context, const Endpoint& where, TickLoop& loop,
+  Listener(boost::asio::io_context& context, const Endpoint& where, Worlds& worlds,
            const ServerLimits& limits, Access access);
 
   std::uint16_t port() const { return port_; }

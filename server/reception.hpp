@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "server/access.hpp"
-#include "server/tick_loop.hpp"
+#include "server/worlds/worlds.hpp"
 
 namespace enfilade::server {
 
@@ -20,7 +20,7 @@ class Connection {
 };
 
 struct Reception {
-  TickLoop& loop;
+  Worlds& worlds;
   const ServerLimits limits;
   const Access access;
   std::vector<std::weak_ptr<Connection>> connections;

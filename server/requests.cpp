@@ -9,6 +9,7 @@
 #include "server/frame_watches.hpp"
 #include "server/version.hpp"
 #include "server/world_messages.hpp"
+#include "server/worlds/worlds.hpp"
 
 namespace enfilade::server {
 
@@ -110,6 +111,7 @@ void answer(const Asked& asked, const v1::BodyCommand& command) {
 bool takeClock(const Asked& asked) {
   std::optional<ClientId>& driver = asked.served.clock.driver;
   if (!driver) driver = asked.id;
+  publish(asked.served);
   if (driver == asked.id) return true;
   replyError(asked, errorOf(v1::ERROR_NOT_ALLOWED,
                             "another client drives the clock: wait until it leaves"));
@@ -153,6 +155,7 @@ void answer(const Asked& asked, const v1::SetClock& wanted) {
                                        : v1::Clock::MODE_PAUSED;
   clock.speed = speed > 0 ? speed : 1;
   clock.nextTick = std::chrono::steady_clock::now();
+  publish(asked.served);
   v1::ServerMessage message;
   fill(*message.mutable_set_clock()->mutable_clock(), clock);
   message.mutable_set_clock()->set_tick(lastTick(asked.served));
@@ -167,6 +170,7 @@ void answer(const Asked& asked, const v1::Restart&) {
   }
   if (!takeClock(asked)) return;
   restartWorld(asked.served);
+  publish(asked.served);
   const auto snapshot = asked.served.world.snapshot();
   v1::ServerMessage message;
   message.mutable_restart()->set_tick(snapshot->tick);
@@ -206,8 +210,10 @@ std::optional<v1::Error> tickGone(const Asked& asked, std::uint64_t wanted, cons
 /// on the service's thread, with the reply, which `deliver` hands to the client's queue.
 std::function<void(Buffer)> untilAnswered(const Asked& asked, const PostToTickThread& post,
                                           void (OutgoingQueue::*deliver)(Buffer)) {
-  asked.client.answerUnderWay = asked.message.request_id();
-  return [out = asked.client.out, id = asked.id, post, deliver](Buffer whole) {
+  const AnswerUnderWay answer{asked.message.request_id()};
+  asked.client.answerUnderWay = answer;
+  return [out = asked.client.out, id = asked.id, post, deliver, answer](Buffer whole) {
+    if (!answer.claim()) return;  // the world ended, and said so
     ((*out).*deliver)(std::move(whole));
     post([id, post](ServedWorld& then) {
       const auto client = then.clients.find(id);
@@ -231,7 +237,8 @@ void answer(const Asked& asked, const v1::FrameRequest& request, const PostToTic
   const auto snapshot = served.world.snapshot();
   auto view = viewFrom(request, *snapshot);
   if (auto* error = std::get_if<v1::Error>(&view)) return replyError(asked, std::move(*error));
-  FrameJob job{snapshot, std::get<View>(view), request, asked.message.request_id()};
+  FrameJob job{snapshot, std::get<View>(view), request, asked.message.request_id(), 0,
+               0,        served.drawn};
   served.frames.draw(std::move(job), untilAnswered(asked, post, &OutgoingQueue::pushFrame));
 }
 
@@ -334,8 +341,52 @@ void answerMetrics(const Asked& asked) {
   metrics = served.statistics.metrics();
   metrics.set_clients(static_cast<std::uint32_t>(served.clients.size()));
   metrics.set_avatars(static_cast<std::uint32_t>(served.world.snapshot()->avatars.size()));
-  metrics.set_frames(served.frames.drawn());
+  metrics.set_frames(*served.drawn);
   metrics.set_dropped(served.droppedStates + served.droppedFrames);
+  reply(asked, std::move(message));
+}
+
+// ---- worlds -------------------------------------------------------------------------------------
+
+void replyAlone(const Asked& asked) {
+  replyError(asked, errorOf(v1::ERROR_UNSUPPORTED, "this server has one world and no others"));
+}
+
+void answer(const Asked& asked, const v1::CreateWorld& wanted, const PostToTickThread& post) {
+  const WorldPlace& here = asked.served.place;
+  if (!here.worlds) return replyAlone(asked);
+  const auto tell = [id = asked.message.request_id(),
+                     done = untilAnswered(asked, post, &OutgoingQueue::push)](
+                        std::variant<v1::World, v1::Error> made) {
+    v1::ServerMessage message;
+    message.set_reply_to(id);
+    if (auto* error = std::get_if<v1::Error>(&made)) return done(errorReply(id, std::move(*error)));
+    *message.mutable_create_world()->mutable_world() = std::get<v1::World>(std::move(made));
+    done(encodeShared(message));
+  };
+  const std::string scene = wanted.scene().empty() ? here.scene : wanted.scene();
+  here.worlds->create({wanted.name(), scene, wanted.drop_when_empty()}, tell);
+}
+
+void answer(const Asked& asked, const v1::DropWorld& wanted, const PostToTickThread& post) {
+  const WorldPlace& here = asked.served.place;
+  if (!here.worlds) return replyAlone(asked);
+  const auto tell =
+      [id = asked.message.request_id(),
+       done = untilAnswered(asked, post, &OutgoingQueue::push)](std::optional<v1::Error> problem) {
+        if (problem) return done(errorReply(id, std::move(*problem)));
+        v1::ServerMessage message;
+        message.set_reply_to(id);
+        message.mutable_drop_world();
+        done(encodeShared(message));
+      };
+  here.worlds->drop(wanted.name(), here.name, tell);
+}
+
+void answerList(const Asked& asked) {
+  if (!asked.served.place.worlds) return replyAlone(asked);
+  v1::ServerMessage message;
+  *message.mutable_worlds() = asked.served.place.worlds->list();
   reply(asked, std::move(message));
 }
 
@@ -348,6 +399,8 @@ Role roleNeeded(v1::ClientMessage::BodyCase body) {
     case v1::ClientMessage::kSetClock:
       return Role::drive;
     case v1::ClientMessage::kRestart:
+    case v1::ClientMessage::kCreateWorld:
+    case v1::ClientMessage::kDropWorld:
       return Role::admin;
     default:
       return Role::observe;
@@ -386,6 +439,12 @@ void answer(const Asked& asked, const PostToTickThread& post) {
       return answer(asked, message.describe());
     case v1::ClientMessage::kMetrics:
       return answerMetrics(asked);
+    case v1::ClientMessage::kCreateWorld:
+      return answer(asked, message.create_world(), post);
+    case v1::ClientMessage::kDropWorld:
+      return answer(asked, message.drop_world(), post);
+    case v1::ClientMessage::kListWorlds:
+      return answerList(asked);
     case v1::ClientMessage::kHello:
       return replyError(asked, errorOf(v1::ERROR_NOT_ALLOWED, "hello was said already"));
     case v1::ClientMessage::kBye:  // the session's to take
@@ -430,16 +489,22 @@ v1::Welcome welcomeOf(const ServedWorld& served) {
   limits.set_max_rays(served.limits.rays);
   limits.set_max_watches(served.limits.watches);
   limits.set_max_scan_rays(served.limits.scanRays);
+  limits.set_max_worlds(served.limits.worlds);
   welcome.set_tick(lastTick(served));
   welcome.set_renderer(served.frames.deviceName());
   welcome.set_software_renderer(served.frames.software());
   fill(*welcome.mutable_clock(), served.clock);
+  welcome.set_world(served.place.name);
+  if (served.place.worlds) {
+    welcome.add_capabilities("worlds");
+    for (const std::string& scene : served.place.worlds->sceneNames()) welcome.add_scenes(scene);
+  }
   return welcome;
 }
 
 void answerWaiting(ServedWorld& served, ClientId id, const PostToTickThread& post) {
   const auto found = served.clients.find(id);
-  if (found == served.clients.end()) return;
+  if (found == served.clients.end() || served.farewell) return;
   Client& client = found->second;
   // Who is cut off hears no answer, and must not keep the others waiting for theirs.
   while (!client.waiting.empty() && !client.step && !client.answerUnderWay &&

@@ -25,7 +25,8 @@ void tellReady(const Server& server, const scene::Scene& scene, const Endpoint& 
                                      {"scene", messageOf(scene).source()},
                                      {"scene_hash", hash},
                                      {"objects", scene.model().objects.size()},
-                                     {"renderer", server.rendererName()}};
+                                     {"renderer", server.rendererName()},
+                                     {"worlds", server.worldNames()}};
   const auto replace = nlohmann::ordered_json::error_handler_t::replace;
   std::printf("%s\n", ready.dump(-1, ' ', false, replace).c_str());
   std::fflush(stdout);
@@ -61,15 +62,26 @@ int awaitEndingSignal(const sigset_t& ending, const Server& server, bool stopAtE
   }
 }
 
+std::vector<std::shared_ptr<const scene::Scene>> loadFurther(const ServeCommand& command) {
+  std::vector<std::shared_ptr<const scene::Scene>> scenes;
+  ModelOptions model = command.model;
+  for (const std::filesystem::path& file : command.furtherScenes) {
+    model.file = file;
+    scenes.push_back(loadScene(model));
+  }
+  return scenes;
+}
+
 }  // namespace
 
 ExitCode serve(const ServeCommand& command) {
   Access access = command.access;
   if (!command.tokenFile.empty()) access.tokens = readTokens(command.tokenFile);
   const auto scene = loadScene(command.model);
+  ServerOptions options;
+  options.furtherScenes = loadFurther(command);
   // From here on: the threads that the server starts inherit the mask.
   const sigset_t ending = holdEndingSignals();
-  ServerOptions options;
   options.world.lengths = command.lengths;
   options.world.auditEvery = command.auditEvery;
   options.access = std::move(access);

@@ -126,26 +126,39 @@ void settleOwners(ServedWorld& served, const std::vector<scene::Notice>& notices
   }
 }
 
-void answerClosing(Client& client) {
-  const v1::Error error = errorOf(v1::ERROR_SHUTTING_DOWN, "the server ends");
-  if (client.answerUnderWay) sendError(client, *client.answerUnderWay, error);
+void answerClosing(Client& client, const v1::Bye& farewell) {
+  const v1::Error error = errorOf(farewell.code(), farewell.reason());
+  if (client.answerUnderWay && client.answerUnderWay->claim())
+    sendError(client, client.answerUnderWay->requestId, error);
   if (client.step) sendError(client, client.step->requestId, error);
   for (const WaitingRequest& request : client.waiting) {
     sendError(client, request.message.request_id(), error);
   }
 }
 
+void sayGoodbye(Client& client, const v1::Bye& farewell) {
+  answerClosing(client, farewell);
+  client.out->finish(goodbyeOf(farewell));
+}
+
 }  // namespace
 
 ServedWorld::ServedWorld(std::shared_ptr<const scene::Scene> served, FrameService& frameService,
-                         RayService& rayService, const WorldOptions& options)
-    : scene(std::move(served)),
+                         RayService& rayService, const WorldOptions& options, WorldPlace where)
+    : place(std::move(where)),
+      scene(std::move(served)),
       auditEvery(options.auditEvery),
       world(scene, options.lengths),
       frames(frameService),
       rays(rayService),
       limits(options.limits) {
   scene::auditBroadPhase(world, auditEvery);
+}
+
+Buffer goodbyeOf(const v1::Bye& farewell) {
+  v1::ServerMessage message;
+  *message.mutable_bye() = farewell;
+  return encodeShared(message);
 }
 
 void send(Client& client, const v1::ServerMessage& message) {
@@ -164,6 +177,7 @@ void advance(ServedWorld& served) {
   served.statistics.add(report);
   logFindings(served.world, report);
   served.idle = report.idle;
+  publish(served);
   const TickTold told = messagesOf(served.world, report.contacts, report.notices);
   settleOwners(served, report.notices);
   keepLive(served, told);
@@ -205,6 +219,7 @@ void restartWorld(ServedWorld& served) {
 void removeClient(ServedWorld& served, ClientId id) {
   if (served.clients.erase(id) == 0) return;
   if (served.clock.driver == id) served.clock.driver.reset();
+  publish(served);
   for (auto owner = served.owners.begin(); owner != served.owners.end();) {
     if (owner->second != id) {
       ++owner;
@@ -220,16 +235,23 @@ void removeClient(ServedWorld& served, ClientId id) {
 void closeWorld(ServedWorld& served) {
   const auto ended = scene::endContacts(served.world, scene::ContactEvent::Reason::shutdown);
   const TickTold told = messagesOf(served.world, ended, {});
-  v1::ServerMessage bye;
-  bye.mutable_bye()->set_code(v1::ERROR_SHUTTING_DOWN);
-  bye.mutable_bye()->set_reason("the server ends");
-  const Buffer last = encodeShared(bye);
   for (auto& [id, client] : served.clients) {
     sendEvents(client, told);
-    answerClosing(client);
-    client.out->finish(last);
+    sayGoodbye(client, *served.farewell);
   }
   served.clients.clear();
+}
+
+void failWorld(ServedWorld& served) {
+  for (auto& [id, client] : served.clients) sayGoodbye(client, *served.farewell);
+  served.clients.clear();
+}
+
+void publish(ServedWorld& served) {
+  served.glance.tick = served.world.snapshot()->tick;
+  served.glance.mode = served.clock.mode;
+  served.glance.speed = served.clock.speed;
+  served.glance.driven = served.clock.driver.has_value();
 }
 
 }  // namespace enfilade::server

@@ -1,6 +1,7 @@
 // The world and everyone who is connected to it. Only the tick thread reads or changes this.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <deque>
 #include <functional>
@@ -30,6 +31,14 @@ struct StepUnderWay {
   bool avatars = false;
 };
 
+/// A request that a service works on. Who claims it first answers it: the service, or the world
+/// that ends meanwhile.
+struct AnswerUnderWay {
+  std::uint64_t requestId = 0;
+  std::shared_ptr<std::atomic<bool>> claimed = std::make_shared<std::atomic<bool>>(false);
+  bool claim() const { return !claimed->exchange(true); }
+};
+
 struct WaitingRequest {
   v1::ClientMessage message;
   std::size_t bytes = 0;
@@ -57,7 +66,7 @@ struct Client {
   std::size_t waitingBytes = 0;
   std::optional<StepUnderWay> step;
   std::map<std::uint32_t, FrameWatch> watches;
-  std::optional<std::uint64_t> answerUnderWay;  ///< the request that a service works on
+  std::optional<AnswerUnderWay> answerUnderWay;
 };
 
 struct ServedClock {
@@ -67,10 +76,32 @@ struct ServedClock {
   std::optional<ClientId> driver;
 };
 
+class Worlds;
+
+/// Which of the server's worlds one is.
+struct WorldPlace {
+  std::string name = "main";
+  std::string scene;         ///< its name
+  Worlds* worlds = nullptr;  ///< null: it is the only one, and there can be no others
+  bool dropWhenEmpty = false;
+  /// The last client left, on the thread that told so. Only with dropWhenEmpty.
+  std::function<void()> becameEmpty;
+};
+
+/// What everyone may know of a world without asking its thread.
+struct WorldGlance {
+  std::atomic<std::uint64_t> tick{0};
+  std::atomic<v1::Clock::Mode> mode{v1::Clock::MODE_LOCKSTEP};
+  std::atomic<double> speed{1};
+  std::atomic<bool> driven{false};
+};
+
 struct ServedWorld {
   ServedWorld(std::shared_ptr<const scene::Scene> scene, FrameService& frameService,
-              RayService& rayService, const WorldOptions& options = {});
+              RayService& rayService, const WorldOptions& options = {}, WorldPlace place = {});
 
+  const WorldPlace place;
+  WorldGlance glance;
   std::shared_ptr<const scene::Scene> scene;
   std::uint32_t auditEvery = 0;  ///< ticks; 0: never
   scene::World world;
@@ -88,6 +119,11 @@ struct ServedWorld {
   std::uint64_t droppedStates = 0;  ///< of all clients
   std::uint64_t droppedFrames = 0;  ///< of all watches
   std::uint64_t lastWatch = 0;      ///< the last FrameWatch::generation
+  /// Pictures that were drawn of this world.
+  std::shared_ptr<std::atomic<std::uint64_t>> drawn =
+      std::make_shared<std::atomic<std::uint64_t>>(0);
+  /// What clients are told at the end; once it is given, no more requests are answered.
+  std::optional<v1::Bye> farewell;
   /// Hands a job to the tick thread; callable from any thread.
   std::function<void(std::function<void(ServedWorld&)>)> post;
 };
@@ -101,8 +137,16 @@ void restartWorld(ServedWorld& served);
 /// Takes a client out; its avatars leave at the next tick.
 void removeClient(ServedWorld& served, ClientId id);
 
-/// Ends all contacts, answers what is open, and says goodbye to all.
+/// Ends all contacts, answers what is open, and says goodbye to all by `farewell`.
 void closeWorld(ServedWorld& served);
+
+/// Says goodbye to all, where the world itself cannot be asked any more.
+void failWorld(ServedWorld& served);
+
+Buffer goodbyeOf(const v1::Bye& farewell);
+
+/// Lets everyone see how the world stands.
+void publish(ServedWorld& served);
 
 void send(Client& client, const v1::ServerMessage& message);
 void sendError(Client& client, std::uint64_t requestId, v1::Error error);

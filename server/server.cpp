@@ -8,17 +8,25 @@
 
 namespace enfilade::server {
 
+namespace {
+
+std::vector<std::shared_ptr<const scene::Scene>> joined(
+    std::shared_ptr<const scene::Scene> first,
+    std::vector<std::shared_ptr<const scene::Scene>> further) {
+  further.insert(further.begin(), std::move(first));
+  return further;
+}
+
+}  // namespace
+
 struct Server::State {
   State(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen, ServerOptions options)
-      : frames(scene, options.drawing),
-        rays(scene),
-        loop(std::move(scene), frames, rays, options.world),
-        listener(context, listen, loop, options.world.limits, std::move(options.access)) {}
+      : worlds(joined(std::move(scene), std::move(options.furtherScenes)), options.world,
+               options.drawing),
+        listener(context, listen, worlds, options.world.limits, std::move(options.access)) {}
 
   boost::asio::io_context context{1};  ///< one thread: its handlers need no lock
-  FrameService frames;
-  RayService rays;
-  TickLoop loop;
+  Worlds worlds;
   Listener listener;
   std::thread network;
 };
@@ -39,24 +47,29 @@ std::uint16_t Server::port() const {
 }
 
 const std::string& Server::rendererName() const {
-  return state_->frames.deviceName();
+  return state_->worlds.rendererName();
+}
+
+std::vector<std::string> Server::worldNames() const {
+  std::vector<std::string> names;
+  for (const auto& world : state_->worlds.all()) names.push_back(world->place().name);
+  return names;
 }
 
 void Server::rethrowFailure() const {
-  if (const auto failure = state_->loop.failure()) std::rethrow_exception(failure);
+  if (const auto failure = state_->worlds.mainWorld().failure()) std::rethrow_exception(failure);
 }
 
 AuditTotals Server::auditTotals() const {
-  return state_->loop.auditTotals();
+  return state_->worlds.auditTotals();
 }
 
 void Server::stop() {
   if (!state_->network.joinable()) return;
-  state_->loop.stop();
+  state_->worlds.stop();
   boost::asio::post(state_->context, [state = state_.get()] { state->listener.stop(); });
   state_->network.join();  // when the last session is closed
-  state_->frames.finish();
-  state_->rays.finish();
+  state_->worlds.finishServices();
 }
 
 }  // namespace enfilade::server

@@ -1,8 +1,10 @@
-// A scene served to clients over TCP, WebSocket and HTTP.
+// Scenes served to clients over TCP, WebSocket and HTTP.
 #pragma once
 
 #include <memory>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "scene/scene.hpp"
 #include "server/access.hpp"
@@ -18,6 +20,8 @@ struct ServerError : std::runtime_error {
 };
 
 struct ServerOptions {
+  /// Each has a world, as the first one has "main"; clients may make more of all of them.
+  std::vector<std::shared_ptr<const scene::Scene>> furtherScenes;
   WorldOptions world;
   Access access;
   DrawingOptions drawing;
@@ -35,7 +39,9 @@ class Server {
 
   std::uint16_t port() const;
   const std::string& rendererName() const;  ///< "" without a renderer
-  /// Throws what ended the tick thread, if anything did: a fault of ours.
+  /// Of all worlds, "main" first.
+  std::vector<std::string> worldNames() const;
+  /// Throws what ended the main world, if anything did: a fault of ours. Others end alone.
   void rethrowFailure() const;
   /// Finishes the tick, ends the contacts, tells the clients, and closes.
   void stop();

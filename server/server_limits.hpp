@@ -8,7 +8,8 @@
 namespace enfilade::server {
 
 struct ServerLimits {
-  std::uint32_t avatars = 1000;           ///< in the world
+  std::uint32_t worlds = 64;              ///< in the server, "main" among them
+  std::uint32_t avatars = 1000;           ///< in a world
   std::uint32_t pictureSide = 4096;       ///< pixels; render::refusal() allows no more
   std::uint32_t ticksPerStep = 36'000;    ///< ten minutes at the default tick
   std::uint32_t waypoints = 10'000;       ///< of one walk

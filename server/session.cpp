@@ -28,6 +28,8 @@ v1::ErrorCode codeOf(protocol::FramingError::Code code) {
                                                         : v1::ERROR_BAD_MESSAGE;
 }
 
+constexpr std::size_t kLongestName = 64;  // bytes, of what a client calls itself or a world
+
 std::string printable(std::string text) {
   for (char& c : text) {
     if (c < ' ' || c > '~') c = '?';
@@ -112,12 +114,10 @@ void Session::take(const protocol::Message& framed) {
   }
   if (client_ == 0) return greet(message);
   if (message.has_bye()) return close("it said goodbye");
-  reception_.loop.receive(client_, std::move(message),
-                          framed.header.size() + framed.attachment.size());
+  world_->receive(client_, std::move(message), framed.header.size() + framed.attachment.size());
 }
 
 void Session::greet(const v1::ClientMessage& message) {
-  constexpr std::size_t kLongestName = 64;
   const v1::Hello& hello = message.hello();
   if (!message.has_hello()) {
     return fail(v1::ERROR_BAD_MESSAGE, "the first message has to be hello", message.request_id());
@@ -141,8 +141,17 @@ void Session::greet(const v1::ClientMessage& message) {
                 message.request_id());
   }
   if (!hello.client_name().empty()) peer_ += " (" + printable(hello.client_name()) + ")";
-  client_ = reception_.loop.join(hello.client_name(), *role, out_, message.request_id());
-  spdlog::info("{} came", peer_);
+  enter(hello, *role, message.request_id());
+}
+
+void Session::enter(const v1::Hello& hello, Role role, std::uint64_t requestId) {
+  world_ = reception_.worlds.find(hello.world());
+  if (world_) client_ = world_->join(hello.client_name(), role, out_, requestId);
+  if (client_ != 0) return spdlog::info("{} came to world '{}'", peer_, world_->place().name);
+  fail(v1::ERROR_UNKNOWN_WORLD,
+       "there is no world '" + printable(hello.world().substr(0, kLongestName)) +
+           "', or it has ended: leave hello.world empty for the main one, and ask it by ListWorlds",
+       requestId);
 }
 
 void Session::fail(v1::ErrorCode code, const std::string& reason, std::uint64_t requestId) {
@@ -216,7 +225,7 @@ void Session::close(const std::string& why) {
   wire_->close();
   timer_.cancel();
   out_->finish(goodbye(v1::ERROR_UNSPECIFIED, "closed"));
-  if (client_ != 0) reception_.loop.leave(client_);
+  if (client_ != 0) world_->leave(client_);
 }
 
 }  // namespace enfilade::server

@@ -32,6 +32,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void takeBytes(std::span<const std::uint8_t> bytes);
   void take(const protocol::Message& message);
   void greet(const v1::ClientMessage& message);
+  void enter(const v1::Hello& hello, Role role, std::uint64_t requestId);
   void fail(v1::ErrorCode code, const std::string& reason, std::uint64_t requestId = 0);
   void sendNext();
   void written(const std::string& problem, bool last);
@@ -48,7 +49,8 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   protocol::Decoder decoder_;
   std::shared_ptr<OutgoingQueue> out_;
   bool sending_ = false;
-  ClientId client_ = 0;  ///< 0: not greeted
+  std::shared_ptr<TickLoop> world_;  ///< that it entered
+  ClientId client_ = 0;              ///< 0: not greeted
   bool messageHalfway_ = false;
   bool listening_ = true;     ///< false: what still comes is thrown away
   bool saidGoodbye_ = false;  ///< the farewell timer runs

@@ -67,12 +67,34 @@ void takeRequest(ServedWorld& served, ClientId id, WaitingRequest request,
   removeClient(served, id);
 }
 
+v1::Bye farewellOf(v1::ErrorCode code, const std::string& reason) {
+  v1::Bye farewell;
+  farewell.set_code(code);
+  farewell.set_reason(reason);
+  return farewell;
+}
+
+/// With the inbox locked. The first farewell stands.
+void end(TickInbox& inbox, v1::Bye farewell) {
+  if (inbox.closed) return;
+  inbox.closed = true;
+  inbox.farewell = std::move(farewell);
+}
+
+std::string whatOf(const std::exception_ptr& failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
 }  // namespace
 
 TickLoop::TickLoop(std::shared_ptr<const scene::Scene> scene, FrameService& frames,
-                   RayService& rays, const WorldOptions& options)
-    : served_(std::move(scene), frames, rays, options) {
-  served_.post = [this](Job job) { post(std::move(job)); };
+                   RayService& rays, const WorldOptions& options, WorldPlace place)
+    : served_(std::move(scene), frames, rays, options, std::move(place)) {
+  served_.post = [inbox = inbox_](Job job) { inbox->post(std::move(job)); };
   thread_ = std::thread([this] { run(); });
 }
 
@@ -81,13 +103,16 @@ TickLoop::~TickLoop() {
 }
 
 ClientId TickLoop::join(std::string name, Role role, std::shared_ptr<OutgoingQueue> out,
-                        std::uint64_t requestId) {
+                        std::uint64_t requestId, bool guest) {
   ClientId id = 0;
   {
-    const std::lock_guard lock(mutex_);
-    id = ++lastId_;
+    const std::lock_guard lock(inbox_->mutex);
+    if (inbox_->closed) return 0;
+    id = ++inbox_->lastId;
+    if (!guest) inbox_->members.insert(id);
   }
-  post([id, role, requestId, name = std::move(name), out = std::move(out)](ServedWorld& served) {
+  const auto greet = [id, role, requestId, name = std::move(name), out](ServedWorld& served) {
+    if (served.farewell) return out->finish(goodbyeOf(*served.farewell));
     Client& client = served.clients[id];
     client.name = name;
     client.role = role;
@@ -97,41 +122,79 @@ ClientId TickLoop::join(std::string name, Role role, std::shared_ptr<OutgoingQue
     *message.mutable_welcome() = welcomeOf(served);
     message.mutable_welcome()->set_role(static_cast<v1::Role>(static_cast<int>(role) + 1));
     send(client, message);
-  });
-  return id;
+  };
+  return post(greet) ? id : 0;
 }
 
 void TickLoop::receive(ClientId id, v1::ClientMessage message, std::size_t bytes) {
-  post([this, id, request = WaitingRequest{std::move(message), bytes}](ServedWorld& served) {
-    takeRequest(served, id, request, [this](Job job) { post(std::move(job)); });
+  post([id, request = WaitingRequest{std::move(message), bytes}](ServedWorld& served) {
+    takeRequest(served, id, request, served.post);
   });
 }
 
 void TickLoop::leave(ClientId id) {
   post([id](ServedWorld& served) { removeClient(served, id); });
+  bool empty = false;
+  {
+    const std::lock_guard lock(inbox_->mutex);
+    empty = inbox_->members.erase(id) != 0 && inbox_->members.empty() && !inbox_->closed;
+  }
+  if (empty && place().dropWhenEmpty) place().becameEmpty();
 }
 
-void TickLoop::post(Job job) {
+bool TickInbox::post(Job job) {
   {
-    const std::lock_guard lock(mutex_);
-    if (stopping_) return;
-    inbox_.push_back(std::move(job));
+    const std::lock_guard lock(mutex);
+    if (closed) return false;
+    jobs.push_back(std::move(job));
   }
-  posted_.notify_one();
+  posted.notify_one();
+  return true;
 }
 
-void TickLoop::stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
-  }
-  posted_.notify_one();
+v1::World TickLoop::glance() const {
+  const WorldGlance& seen = served_.glance;
+  v1::World world;
+  world.set_name(place().name);
+  world.set_scene(place().scene);
+  world.set_drop_when_empty(place().dropWhenEmpty);
+  world.set_tick(seen.tick);
+  world.mutable_clock()->set_mode(seen.mode);
+  if (seen.mode == v1::Clock::MODE_FREE_RUN) world.mutable_clock()->set_speed(seen.speed);
+  world.mutable_clock()->set_has_driver(seen.driven);
+  const std::lock_guard lock(inbox_->mutex);
+  world.set_clients(static_cast<std::uint32_t>(inbox_->members.size()));
+  if (inbox_->failure) world.set_failure(whatOf(inbox_->failure));
+  return world;
+}
+
+void TickLoop::stop(v1::ErrorCode code, const std::string& reason) {
+  askToStop(code, reason);
+  const std::lock_guard lock(joining_);
   if (thread_.joinable()) thread_.join();
 }
 
+void TickLoop::askToStop(v1::ErrorCode code, const std::string& reason) {
+  {
+    const std::lock_guard lock(inbox_->mutex);
+    end(*inbox_, farewellOf(code, reason));
+  }
+  inbox_->posted.notify_one();
+}
+
+bool TickLoop::askToStopIfEmpty(v1::ErrorCode code, const std::string& reason) {
+  {
+    const std::lock_guard lock(inbox_->mutex);
+    if (!inbox_->members.empty()) return false;
+    end(*inbox_, farewellOf(code, reason));
+  }
+  inbox_->posted.notify_one();
+  return true;
+}
+
 std::exception_ptr TickLoop::failure() const {
-  const std::lock_guard lock(mutex_);
-  return failure_;
+  const std::lock_guard lock(inbox_->mutex);
+  return inbox_->failure;
 }
 
 AuditTotals TickLoop::auditTotals() const {
@@ -144,30 +207,54 @@ void TickLoop::run() {
       runJobs(jobs_, served_);
       if (stepTicks() || freeRunTicks()) advance(served_);
       const ClientId stepped = served_.clock.driver.value_or(0);
-      answerWaiting(served_, stepped, [this](Job job) { post(std::move(job)); });
+      answerWaiting(served_, stepped, served_.post);
     }
+    runLeftOver();
     closeWorld(served_);
   } catch (const std::exception& error) {
-    spdlog::critical("the tick failed: {}", error.what());
-    const std::lock_guard lock(mutex_);
-    failure_ = std::current_exception();
-    stopping_ = true;
+    fail(error.what());
+  }
+}
+
+/// What was posted before the end: requests get an answer, who came is told to go.
+void TickLoop::runLeftOver() {
+  for (const Job& job : jobs_) job(served_);
+  jobs_.clear();
+}
+
+/// A fault of ours ends this world, and no other.
+void TickLoop::fail(const std::string& why) {
+  spdlog::critical("the tick of world '{}' failed: {}", place().name, why);
+  {
+    const std::lock_guard lock(inbox_->mutex);
+    inbox_->failure = std::current_exception();
+    end(*inbox_, farewellOf(v1::ERROR_INTERNAL, "the world failed: " + why));
+    std::move(inbox_->jobs.begin(), inbox_->jobs.end(), std::back_inserter(jobs_));
+    inbox_->jobs.clear();
+    served_.farewell = inbox_->farewell;
+  }
+  try {
+    failWorld(served_);
+    runLeftOver();
+  } catch (const std::exception& error) {
+    spdlog::critical("nor could its clients be told: {}", error.what());
   }
 }
 
 /// Waits until there are jobs or a tick is due; false when the loop has to end.
 bool TickLoop::takeJobs() {
-  std::unique_lock lock(mutex_);
-  const auto awake = [this] { return stopping_ || !inbox_.empty(); };
+  std::unique_lock lock(inbox_->mutex);
+  const auto awake = [this] { return inbox_->closed || !inbox_->jobs.empty(); };
   const bool leftOver = !jobs_.empty();  // by the last slice
   if (freeRunning(served_) && !leftOver) {
-    posted_.wait_until(lock, served_.clock.nextTick, awake);
+    inbox_->posted.wait_until(lock, served_.clock.nextTick, awake);
   } else if (!leftOver && steppingClient(served_) == 0) {
-    posted_.wait(lock, awake);
+    inbox_->posted.wait(lock, awake);
   }
-  std::move(inbox_.begin(), inbox_.end(), std::back_inserter(jobs_));
-  inbox_.clear();
-  return !stopping_;
+  std::move(inbox_->jobs.begin(), inbox_->jobs.end(), std::back_inserter(jobs_));
+  inbox_->jobs.clear();
+  served_.farewell = inbox_->farewell;
+  return !inbox_->closed;
 }
 
 bool TickLoop::stepTicks() {

@@ -122,11 +122,11 @@ TEST(Listening, AnAddressOfStrangersWantsATokenAndInsecure) {
   Access access;
   EXPECT_THROW(Server(smallRoom(), everywhere), ServerError);
   access.insecure = true;
-  EXPECT_THROW(Server(smallRoom(), everywhere, {{}, access, {}}), ServerError);
+  EXPECT_THROW(Server(smallRoom(), everywhere, {{}, {}, access, {}}), ServerError);
   access = threeTokens();
-  EXPECT_THROW(Server(smallRoom(), everywhere, {{}, access, {}}), ServerError);
+  EXPECT_THROW(Server(smallRoom(), everywhere, {{}, {}, access, {}}), ServerError);
   access.insecure = true;
-  EXPECT_GT(Server(smallRoom(), everywhere, {{}, access, {}}).port(), 0);
+  EXPECT_GT(Server(smallRoom(), everywhere, {{}, {}, access, {}}).port(), 0);
 }
 
 }  // namespace

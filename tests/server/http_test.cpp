@@ -58,10 +58,11 @@ TEST_F(Http, MetricsTellTheTicks) {
   other.step(7);
   const std::string page = get("/metrics");
   EXPECT_NE(page.find("text/plain; version=0.0.4"), std::string::npos);
-  EXPECT_NE(page.find("\nenfilade_ticks_total 7\n"), std::string::npos) << page;
-  EXPECT_NE(page.find("\nenfilade_clients 2\n"), std::string::npos);
-  EXPECT_NE(page.find("enfilade_stage_microseconds{stage=\"tick\",quantile=\"0.5\"} "),
-            std::string::npos);
+  EXPECT_NE(page.find("\nenfilade_ticks_total{world=\"main\"} 7\n"), std::string::npos) << page;
+  EXPECT_NE(page.find("\nenfilade_clients{world=\"main\"} 2\n"), std::string::npos);
+  EXPECT_NE(
+      page.find("enfilade_stage_microseconds{world=\"main\",stage=\"tick\",quantile=\"0.5\"} "),
+      std::string::npos);
 }
 
 TEST_F(Http, PagesOfStrangersAreTurnedAway) {

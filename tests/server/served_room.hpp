@@ -22,10 +22,12 @@ class ServedRoom : public ::testing::Test {
     server_ =
         std::make_unique<Server>(std::move(scene), Endpoint{"127.0.0.1", 0}, std::move(options));
   }
-  protocol::Client client(const std::string& name, const std::string& token = "") {
+  protocol::Client client(const std::string& name, const std::string& token = "",
+                          const std::string& world = "") {
     protocol::ClientOptions options;
     options.name = name;
     options.token = token;
+    options.world = world;
     return protocol::Client("127.0.0.1", server_->port(), options);
   }
 

@@ -7,6 +7,7 @@
 #include "scene/world.hpp"
 #include "server/requests.hpp"
 #include "server/tick_loop.hpp"
+#include "tests/server/becomes_true.hpp"
 #include "tests/server/served_room.hpp"
 
 namespace enfilade::server::testing {
@@ -24,14 +25,6 @@ v1::ErrorCode codeThrown(const std::function<void()>& request) {
     return error.code;
   }
   return v1::ERROR_UNSPECIFIED;
-}
-
-bool becomesTrue(const std::function<bool()>& condition) {
-  for (int i = 0; i < kPatience; ++i) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  return false;
 }
 
 TEST_F(Sessions, WelcomeTellsTheSceneAndHowItMoves) {

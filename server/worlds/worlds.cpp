@@ -1,0 +1,247 @@
+#include "server/worlds/worlds.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+
+#include "server/world_messages.hpp"
+
+namespace enfilade::server {
+
+namespace {
+
+constexpr std::size_t kLongestName = 64;  // characters
+
+bool isNameLetter(char c) {
+  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_' || c == '-';
+}
+
+/// As avatars are named.
+bool isName(const std::string& name) {
+  return !name.empty() && name.size() <= kLongestName && name.front() != '.' &&
+         std::all_of(name.begin(), name.end(), isNameLetter);
+}
+
+/// The model's file without its folder and its ending, as far as names go.
+std::string stemOf(const scene::Scene& scene) {
+  std::string stem = std::filesystem::path(scene.model().source).stem().string();
+  constexpr std::size_t kRoomForNumber = 8;
+  stem = stem.substr(0, kLongestName - kRoomForNumber);
+  for (char& c : stem)
+    if (!isNameLetter(c)) c = '_';
+  return isName(stem) ? stem : "scene";
+}
+
+/// "stem", or "stem-2" and so on where that is taken.
+template <class Taken>
+std::string freeNameOf(const std::string& stem, const Taken& taken) {
+  std::string name = stem;
+  for (std::size_t number = 2; taken(name); ++number) name = stem + "-" + std::to_string(number);
+  return name;
+}
+
+v1::Error shuttingDown() {
+  return errorOf(v1::ERROR_SHUTTING_DOWN, "the server ends");
+}
+
+v1::Error unknownWorld(const std::string& name) {
+  return errorOf(
+      v1::ERROR_UNKNOWN_WORLD,
+      "there is no world '" + name.substr(0, kLongestName) + "': ListWorlds tells which there are",
+      "drop_world.name");
+}
+
+}  // namespace
+
+ServedScene::ServedScene(std::string sceneName, std::shared_ptr<const scene::Scene> served,
+                         const DrawingOptions& drawing)
+    : name(std::move(sceneName)), scene(std::move(served)), frames(scene, drawing), rays(scene) {}
+
+Worlds::Worlds(const std::vector<std::shared_ptr<const scene::Scene>>& scenes,
+               const WorldOptions& options, const DrawingOptions& drawing)
+    : options_(options) {
+  for (const auto& scene : scenes) {
+    const std::string name = freeNameOf(
+        stemOf(*scene), [this](const std::string& one) { return sceneNamed(one) != nullptr; });
+    scenes_.push_back(std::make_unique<ServedScene>(name, scene, drawing));
+  }
+  for (const auto& scene : scenes_)
+    start(main_ ? freeName(scene->name) : kMainWorld, *scene, false);
+}
+
+Worlds::~Worlds() {
+  stop();
+}
+
+std::shared_ptr<TickLoop> Worlds::find(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = worlds_.find(name.empty() ? kMainWorld : name);
+  return found == worlds_.end() ? nullptr : found->second;
+}
+
+std::vector<std::shared_ptr<TickLoop>> Worlds::all() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<World> worlds{main_};
+  for (const auto& [name, world] : worlds_)
+    if (world != main_) worlds.push_back(world);
+  return worlds;
+}
+
+v1::WorldList Worlds::list() const {
+  v1::WorldList list;
+  for (const World& world : all()) *list.add_worlds() = world->glance();
+  return list;
+}
+
+std::vector<std::string> Worlds::sceneNames() const {
+  std::vector<std::string> names;
+  for (const auto& scene : scenes_) names.push_back(scene->name);
+  return names;
+}
+
+// ---- made and dropped ---------------------------------------------------------------------------
+
+/// Work for the thread; false when there is none any more.
+bool Worlds::give(std::function<void()> work) {
+  const std::lock_guard lock(mutex_);
+  if (!stopping_) thread_.post(std::move(work));
+  return !stopping_;
+}
+
+void Worlds::create(WorldToMake wanted,
+                    std::function<void(std::variant<v1::World, v1::Error>)> done) {
+  if (!give([this, wanted = std::move(wanted), done] { done(make(wanted)); })) done(shuttingDown());
+}
+
+void Worlds::drop(const std::string& name, const std::string& askedIn,
+                  std::function<void(std::optional<v1::Error>)> done) {
+  const auto work = [this, name, askedIn, done] {
+    auto taken = takeOut(name);
+    if (auto* error = std::get_if<v1::Error>(&taken)) return done(std::move(*error));
+    TickLoop& world = *std::get<World>(taken);
+    if (name == askedIn) done(std::nullopt);
+    end(world, v1::ERROR_WORLD_DROPPED, "the world '" + name + "' was dropped");
+    if (name != askedIn) done(std::nullopt);
+  };
+  if (!give(work)) done(shuttingDown());
+}
+
+void Worlds::dropIfEmpty(const std::string& name) {
+  const World world = find(name);
+  const std::string reason = "the world '" + name + "' was dropped when its last client left";
+  if (!world || !world->askToStopIfEmpty(v1::ERROR_WORLD_DROPPED, reason)) return;
+  takeOut(name);
+  end(*world, v1::ERROR_WORLD_DROPPED, reason);
+}
+
+std::variant<Worlds::World, v1::Error> Worlds::takeOut(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  const auto found = worlds_.find(name);
+  if (found == worlds_.end()) return unknownWorld(name);
+  if (found->second == main_) {
+    return errorOf(v1::ERROR_NOT_ALLOWED,
+                   "the world 'main' lasts as long as the server: Restart begins it anew",
+                   "drop_world.name");
+  }
+  World world = std::move(found->second);
+  worlds_.erase(found);
+  return world;
+}
+
+void Worlds::end(TickLoop& world, v1::ErrorCode code, const std::string& reason) {
+  world.stop(code, reason);
+  audit_.add(world.auditTotals());
+  spdlog::info("{}", reason);
+}
+
+std::variant<v1::World, v1::Error> Worlds::make(WorldToMake wanted) {
+  try {
+    if (auto problem = problemOf(wanted)) return std::move(*problem);
+    ServedScene& scene = *sceneNamed(wanted.scene);
+    if (wanted.name.empty()) wanted.name = freeName(scene.name);
+    const World world = start(wanted.name, scene, wanted.dropWhenEmpty);
+    spdlog::info("the world '{}' was made of '{}'", wanted.name, wanted.scene);
+    return world->glance();
+  } catch (const std::exception& error) {  // no memory, or no thread
+    spdlog::error("no world '{}': {}", wanted.name, error.what());
+    return errorOf(v1::ERROR_INTERNAL, std::string("the world could not be made: ") + error.what());
+  }
+}
+
+std::optional<v1::Error> Worlds::problemOf(const WorldToMake& wanted) const {
+  if (!wanted.name.empty() && !isName(wanted.name)) {
+    return errorOf(v1::ERROR_BAD_MESSAGE,
+                   "name must be 1 to 64 letters, digits, '.', '_' or '-', and not begin with '.'",
+                   "create_world.name");
+  }
+  if (!sceneNamed(wanted.scene)) {
+    return errorOf(v1::ERROR_UNKNOWN_WORLD,
+                   "this server has no scene '" + wanted.scene.substr(0, kLongestName) +
+                       "': Welcome.scenes names those that it was started with",
+                   "create_world.scene");
+  }
+  const std::lock_guard lock(mutex_);
+  if (worlds_.contains(wanted.name)) {
+    return errorOf(v1::ERROR_NOT_ALLOWED,
+                   "there is a world '" + wanted.name + "' already: enter it, or take another name",
+                   "create_world.name");
+  }
+  if (worlds_.size() >= options_.limits.worlds) {
+    return errorOf(
+        v1::ERROR_TOO_LARGE,
+        "the server has its " + std::to_string(options_.limits.worlds) + " worlds: drop one first");
+  }
+  return std::nullopt;
+}
+
+Worlds::World Worlds::start(const std::string& name, ServedScene& scene, bool dropWhenEmpty) {
+  WorldPlace place{name, scene.name, this, dropWhenEmpty, {}};
+  place.becameEmpty = [this, name] { give([this, name] { dropIfEmpty(name); }); };
+  auto world =
+      std::make_shared<TickLoop>(scene.scene, scene.frames, scene.rays, options_, std::move(place));
+  const std::lock_guard lock(mutex_);
+  if (!main_) main_ = world;
+  worlds_[name] = world;
+  return world;
+}
+
+std::string Worlds::freeName(const std::string& stem) const {
+  const std::lock_guard lock(mutex_);
+  return freeNameOf(stem, [this](const std::string& name) { return worlds_.contains(name); });
+}
+
+ServedScene* Worlds::sceneNamed(const std::string& name) const {
+  const auto found = std::find_if(scenes_.begin(), scenes_.end(),
+                                  [&](const auto& scene) { return scene->name == name; });
+  return found == scenes_.end() ? nullptr : found->get();
+}
+
+// ---- the end
+// -------------------------------------------------------------------------------------
+
+void Worlds::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (stopping_) return;
+    stopping_ = true;
+  }
+  thread_.finish();
+  const std::vector<World> worlds = all();
+  const std::string reason = "the server ends";
+  for (const World& world : worlds) world->askToStop(v1::ERROR_SHUTTING_DOWN, reason);
+  for (const World& world : worlds) {
+    world->stop(v1::ERROR_SHUTTING_DOWN, reason);
+    audit_.add(world->auditTotals());
+  }
+}
+
+void Worlds::finishServices() {
+  for (const auto& scene : scenes_) {
+    scene->frames.finish();
+    scene->rays.finish();
+  }
+}
+
+}  // namespace enfilade::server

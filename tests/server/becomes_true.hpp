@@ -1,0 +1,20 @@
+// Waits for what another thread brings about.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <thread>
+
+namespace enfilade::server::testing {
+
+/// Whether it does within some 20 s.
+inline bool becomesTrue(const std::function<bool()>& condition) {
+  constexpr int kPatience = 4000;
+  for (int i = 0; i < kPatience; ++i) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return false;
+}
+
+}  // namespace enfilade::server::testing

@@ -1,0 +1,410 @@
+// Several worlds in one server: made, entered, told apart, dropped.
+#include "server/worlds/worlds.hpp"
+
+#include <unistd.h>
+
+#include <fstream>
+#include <future>
+#include <numbers>
+
+#include "tests/server/becomes_true.hpp"
+#include "tests/server/raw_connection.hpp"
+#include "tests/server/served_room.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+class ServedWorlds : public ServedRoom {
+ protected:
+  protocol::Client clientIn(const std::string& world, const std::string& name = "ann") {
+    return client(name, "", world);
+  }
+};
+
+/// The error that a request got; ERROR_UNSPECIFIED: it got none.
+v1::ErrorCode codeOf(const std::function<void()>& request) {
+  try {
+    request();
+  } catch (const protocol::ProtocolError& error) {
+    return error.code;
+  }
+  return v1::ERROR_UNSPECIFIED;
+}
+
+v1::World create(protocol::Client& by, const std::string& name, const std::string& scene = "",
+                 bool dropWhenEmpty = false) {
+  v1::ClientMessage message;
+  message.mutable_create_world()->set_name(name);
+  message.mutable_create_world()->set_scene(scene);
+  message.mutable_create_world()->set_drop_when_empty(dropWhenEmpty);
+  return by.request(std::move(message)).create_world().world();
+}
+
+void drop(protocol::Client& by, const std::string& name) {
+  v1::ClientMessage message;
+  message.mutable_drop_world()->set_name(name);
+  by.request(std::move(message));
+}
+
+std::vector<v1::World> list(protocol::Client& by) {
+  v1::ClientMessage message;
+  message.mutable_list_worlds();
+  const v1::WorldList worlds = by.request(std::move(message)).worlds();
+  return {worlds.worlds().begin(), worlds.worlds().end()};
+}
+
+std::vector<std::string> namesOf(const std::vector<v1::World>& worlds) {
+  std::vector<std::string> names;
+  for (const v1::World& world : worlds) names.push_back(world.name());
+  return names;
+}
+
+/// The hashes of a walk to the wall.
+std::vector<std::uint64_t> hashesOfWalk(protocol::Client& walker) {
+  EXPECT_FALSE(walker.command(spawn("ann", 0, 0.001, 0)));
+  EXPECT_FALSE(walker.command(walkTo("ann", 8, 0, 1)));
+  std::vector<std::uint64_t> hashes;
+  for (int i = 0; i < 300; ++i) hashes.push_back(walker.step().state_hash());
+  return hashes;
+}
+
+v1::SetClock freeRun(double speed) {
+  v1::SetClock clock;
+  clock.mutable_free_run()->set_speed(speed);
+  return clock;
+}
+
+/// How the connection of somebody who waits in a world ends.
+v1::Bye lastWordsTo(protocol::Client& client) {
+  while (const auto event = client.nextEvent(std::chrono::seconds(20)))
+    if (event->has_bye()) return event->bye();
+  return {};
+}
+
+TEST_F(ServedWorlds, TheSameCommandsGiveTheSameBitsWhateverHappensInOtherWorlds) {
+  serve();
+  protocol::Client main = client("main");
+  create(main, "calm");
+  create(main, "busy");
+  protocol::Client crowd = clientIn("busy", "crowd");
+  for (int i = 0; i < 20; ++i)
+    ASSERT_FALSE(crowd.command(spawn("a" + std::to_string(i), -9 + 0.9 * i, 0.001, 3)));
+  for (int i = 0; i < 20; ++i)
+    ASSERT_FALSE(crowd.command(walkTo("a" + std::to_string(i), 9 - 0.9 * i, 0, -3)));
+  crowd.setClock(freeRun(1000));
+  protocol::Client calm = clientIn("calm");
+  EXPECT_EQ(hashesOfWalk(main), hashesOfWalk(calm));
+  EXPECT_GT(crowd.metrics().ticks(), 0u);
+  EXPECT_EQ(calm.metrics().avatars(), 1u);
+  EXPECT_EQ(crowd.metrics().avatars(), 20u);
+}
+
+TEST_F(ServedWorlds, EachIsListedWithItsOwnTicksAndClients) {
+  serve();
+  protocol::Client main = client("main");
+  EXPECT_EQ(main.welcome().world(), "main");
+  ASSERT_EQ(main.welcome().scenes_size(), 1);
+  EXPECT_EQ(main.welcome().scenes(0), "small_room");
+  EXPECT_EQ(create(main, "b").scene(), "small_room");
+  const std::string chosen = create(main, "").name();
+  protocol::Client bob = clientIn("b", "bob");
+  EXPECT_EQ(bob.welcome().world(), "b");
+  EXPECT_FALSE(bob.welcome().clock().has_driver()) << "each has a driver of its own";
+  main.step(5);
+  bob.step(7);
+  const std::vector<v1::World> worlds = list(main);
+  EXPECT_EQ(namesOf(worlds), (std::vector<std::string>{"main", "b", chosen}));
+  EXPECT_EQ(worlds[0].tick(), 5u);
+  EXPECT_EQ(worlds[1].tick(), 7u);
+  EXPECT_EQ(worlds[2].tick(), 0u);
+  EXPECT_EQ(worlds[1].clients(), 1u);
+  EXPECT_EQ(worlds[2].clients(), 0u);
+  EXPECT_TRUE(worlds[1].clock().has_driver());
+}
+
+TEST_F(ServedWorlds, NamesAreJudged) {
+  ServerLimits limits;
+  limits.worlds = 3;
+  serve(limits);
+  protocol::Client ann = client("ann");
+  EXPECT_EQ(ann.welcome().limits().max_worlds(), 3u);
+  for (const char* bad : {"a b", "../a", ".a", "a/b", "\xc3\xa9"})
+    EXPECT_EQ(codeOf([&] { create(ann, bad); }), v1::ERROR_BAD_MESSAGE) << bad;
+  EXPECT_EQ(codeOf([&] { create(ann, std::string(65, 'a')); }), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(codeOf([&] { create(ann, "b", "cathedral"); }), v1::ERROR_UNKNOWN_WORLD);
+  EXPECT_EQ(codeOf([&] { create(ann, "main"); }), v1::ERROR_NOT_ALLOWED);
+  create(ann, "b");
+  EXPECT_EQ(codeOf([&] { create(ann, "b"); }), v1::ERROR_NOT_ALLOWED);
+  create(ann, "c");
+  EXPECT_EQ(codeOf([&] { create(ann, "d"); }), v1::ERROR_TOO_LARGE);
+  EXPECT_EQ(codeOf([&] { drop(ann, "d"); }), v1::ERROR_UNKNOWN_WORLD);
+  EXPECT_EQ(codeOf([&] { drop(ann, "main"); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(codeOf([&] { clientIn("d"); }), v1::ERROR_UNKNOWN_WORLD);
+}
+
+TEST_F(ServedWorlds, OnlyAnAdminMakesAndDropsThem) {
+  Access access;
+  access.tokens = {{Role::drive, "driver-0123456789"}, {Role::admin, "admin-0123456789"}};
+  serve({}, smallRoom(), access);
+  protocol::Client driver = client("driver", "driver-0123456789");
+  protocol::Client admin = client("admin", "admin-0123456789");
+  EXPECT_EQ(codeOf([&] { create(driver, "b"); }), v1::ERROR_NOT_ALLOWED);
+  create(admin, "b");
+  EXPECT_EQ(codeOf([&] { drop(driver, "b"); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(list(driver).size(), 2u);
+  EXPECT_EQ(client("in b", "driver-0123456789", "b").welcome().role(), v1::ROLE_DRIVE);
+  drop(admin, "b");
+}
+
+TEST_F(ServedWorlds, WhoIsInADroppedOneIsToldAndSeesItsContactsEnd) {
+  serve();
+  protocol::Client main = client("main");
+  create(main, "b");
+  protocol::Client bob = clientIn("b");
+  bob.subscribe(everything());
+  ASSERT_FALSE(bob.command(spawn("bob", 0, 0.001, 0)));
+  bob.step(10);
+  drop(main, "b");
+  Heard heard;
+  v1::Bye bye;
+  while (const auto event = bob.nextEvent(std::chrono::seconds(20))) {
+    if (event->has_bye()) {
+      bye = event->bye();
+      break;
+    }
+    heard.add({*event});
+  }
+  EXPECT_EQ(bye.code(), v1::ERROR_WORLD_DROPPED);
+  EXPECT_EQ(bye.reason(), "the world 'b' was dropped");
+  EXPECT_EQ(heard.count(v1::ContactEvent::KIND_END), 1u);
+  EXPECT_EQ(main.step().tick(), 1u) << "the others go on";
+  EXPECT_EQ(codeOf([&] { clientIn("b"); }), v1::ERROR_UNKNOWN_WORLD);
+  EXPECT_EQ(create(main, "b").tick(), 0u) << "the name is free";
+}
+
+TEST_F(ServedWorlds, OneIsDroppedUnderAWaitingStep) {
+  serve();
+  protocol::Client main = client("main");
+  create(main, "b");
+  protocol::Client bob = clientIn("b");
+  ASSERT_FALSE(bob.command(spawn("bob", 0, 0.001, 0)));
+  bob.step(1);
+  auto stepping = std::async(std::launch::async, [&] {
+    return codeOf([&] {
+      for (;;) bob.step(36'000);
+    });
+  });
+  ASSERT_TRUE(becomesTrue([&] { return list(main)[1].tick() > 10; }));
+  drop(main, "b");
+  EXPECT_EQ(stepping.get(), v1::ERROR_WORLD_DROPPED);
+}
+
+TEST_F(ServedWorlds, OneIsDroppedWhileItsPicturesAreDrawn) {
+  serve();
+  ENFILADE_NEED_PICTURES(*server_);
+  protocol::Client main = client("main");
+  v1::FrameRequest request;
+  *request.mutable_free()->mutable_eye() = vec(0, 1, 0);
+  *request.mutable_free()->mutable_forward() = vec(1, 0, 0);
+  request.set_width(1000);
+  request.set_height(1000);
+  for (int round = 0; round < 5; ++round) {
+    create(main, "b");
+    RawConnection bob(server_->port());
+    bob.sendMagic();
+    v1::ClientMessage message;
+    message.set_request_id(1);
+    message.mutable_hello()->set_protocol_version(protocol::kVersion);
+    message.mutable_hello()->set_world("b");
+    bob.send(message);
+    for (std::uint64_t id = 2; id < 6; ++id) {
+      message.set_request_id(id);
+      *message.mutable_frame() = request;
+      bob.send(message);
+    }
+    ASSERT_TRUE(bob.receive().value().has_welcome());
+    drop(main, "b");
+    std::vector<std::uint64_t> answered;
+    std::optional<v1::ServerMessage> heard;
+    while ((heard = bob.receive()) && !heard->has_bye()) answered.push_back(heard->reply_to());
+    ASSERT_TRUE(heard) << "no last words";
+    EXPECT_EQ(heard->bye().code(), v1::ERROR_WORLD_DROPPED);
+    // Each once and in order; what the service claimed last may be lost with the connection.
+    for (std::size_t i = 0; i + 1 < answered.size(); ++i) EXPECT_LT(answered[i], answered[i + 1]);
+    EXPECT_EQ(main.frame(request).description.width(), 1000u);
+  }
+}
+
+TEST_F(ServedWorlds, WhoDropsItsOwnHasAnAnswerFirst) {
+  serve();
+  protocol::Client main = client("main");
+  create(main, "b");
+  protocol::Client bob = clientIn("b");
+  drop(bob, "b");
+  EXPECT_EQ(lastWordsTo(bob).code(), v1::ERROR_WORLD_DROPPED);
+  EXPECT_EQ(list(main).size(), 1u);
+}
+
+TEST_F(ServedWorlds, OneThatIsToGoWhenEmptyGoesWithItsLastClient) {
+  serve();
+  protocol::Client main = client("main");
+  EXPECT_TRUE(create(main, "b", "", true).drop_when_empty());
+  RawConnection http(server_->port());
+  http.send("GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_NE(http.readText().find("{world=\"b\"}"), std::string::npos);
+  EXPECT_EQ(list(main).size(), 2u) << "nobody has entered it yet";
+  {
+    protocol::Client first = clientIn("b"), second = clientIn("b");
+    { const protocol::Client leaves = std::move(first); }
+    ASSERT_TRUE(becomesTrue([&] { return list(main)[1].clients() == 1; }));
+    EXPECT_EQ(second.step().tick(), 1u);
+  }
+  EXPECT_TRUE(becomesTrue([&] { return list(main).size() == 1; }));
+}
+
+/// A hall 100 m wide, with as many posts as are asked for.
+std::shared_ptr<const scene::Scene> hall(int posts) {
+  scene::Model model = smallRoom()->model();
+  model.source = "halls/hall.glb";
+  for (int i = 0; i < posts; ++i) {
+    scene::Object post = model.objects[kColumn - 1];
+    post.path = "post" + std::to_string(i);
+    post.worldFromMesh =
+        Eigen::Affine3d(Eigen::Translation3d(20 + 0.7 * (i % 300), 0, 20 + 0.7 * (i / 300)));
+    model.objects.push_back(std::move(post));
+  }
+  return std::make_shared<const scene::Scene>(std::move(model));
+}
+
+TEST_F(ServedWorlds, ScenesThatAServerBeginsWithHaveAWorldEach) {
+  ServerOptions options;
+  options.furtherScenes = {hall(4), hall(5), smallRoom()};
+  server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
+  EXPECT_EQ(server_->worldNames(),
+            (std::vector<std::string>{"main", "hall", "hall-2", "small_room-2"}));
+  protocol::Client main = client("main");
+  EXPECT_EQ(main.welcome().scene().objects(), 3u);
+  EXPECT_EQ(main.welcome().scenes(1), "hall");
+  EXPECT_EQ(clientIn("hall").welcome().scene().objects(), 7u);
+  EXPECT_EQ(clientIn("hall-2").welcome().scene().objects(), 8u);
+  create(main, "more", "hall-2");
+  EXPECT_EQ(clientIn("more").welcome().scene().objects(), 8u);
+  protocol::Client inHall = clientIn("hall");
+  EXPECT_EQ(create(inHall, "own").scene(), "hall") << "its own where none is named";
+}
+
+TEST_F(ServedWorlds, MetricsAndHealthCoverAllOfThem) {
+  serve();
+  protocol::Client main = client("main");
+  create(main, "b");
+  protocol::Client bob = clientIn("b");
+  main.step(3);
+  bob.step(4);
+  const auto get = [&](const std::string& target) {
+    RawConnection raw(server_->port());
+    raw.send("GET " + target + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    return raw.readText();
+  };
+  const std::string page = get("/metrics"), alone = get("/metrics?world=b");
+  EXPECT_NE(page.find("\nenfilade_ticks_total{world=\"main\"} 3\n"), std::string::npos) << page;
+  EXPECT_NE(page.find("\nenfilade_ticks_total{world=\"b\"} 4\n"), std::string::npos);
+  EXPECT_EQ(alone.find("main"), std::string::npos);
+  EXPECT_NE(alone.find("{world=\"b\"} 4\n"), std::string::npos);
+  EXPECT_NE(get("/healthz").find("\r\n\r\nok\n"), std::string::npos);
+  EXPECT_EQ(get("/metrics?world=c").substr(0, 12), "HTTP/1.1 404");
+  EXPECT_EQ(get("/mjpeg/avatar/ann?world=c").substr(0, 12), "HTTP/1.1 404");
+}
+
+// ---- without sockets
+// -----------------------------------------------------------------------------
+
+/// What comes of a request for a world.
+std::variant<v1::World, v1::Error> made(Worlds& worlds, const std::string& name) {
+  std::promise<std::variant<v1::World, v1::Error>> promise;
+  worlds.create({name, "small_room", false}, [&](auto world) { promise.set_value(world); });
+  return promise.get_future().get();
+}
+
+std::optional<v1::Error> dropped(Worlds& worlds, const std::string& name) {
+  std::promise<std::optional<v1::Error>> promise;
+  worlds.drop(name, "main", [&](auto problem) { promise.set_value(problem); });
+  return promise.get_future().get();
+}
+
+TEST(Worlds, OneThatFailsIsToldAndTheOthersLive) {
+  Worlds worlds({smallRoom()}, {}, {});
+  ASSERT_TRUE(std::holds_alternative<v1::World>(made(worlds, "b")));
+  const auto world = worlds.find("b");
+  const auto out = std::make_shared<OutgoingQueue>(OutgoingBounds{1u << 20, 2}, Buffer(), [] {});
+  ASSERT_NE(world->join("bob", Role::admin, out, 1), 0u);
+  world->post([](ServedWorld&) { throw std::runtime_error("the roof came down"); });
+  ASSERT_TRUE(becomesTrue([&] { return world->failure() && out->finished(); }));
+  EXPECT_EQ(worlds.list().worlds(1).failure(), "the roof came down");
+  EXPECT_EQ(world->join("late", Role::admin, out, 1), 0u) << "nobody enters it";
+  EXPECT_FALSE(worlds.mainWorld().failure());
+  EXPECT_TRUE(worlds.mainWorld().post([](ServedWorld&) {}));
+  EXPECT_FALSE(dropped(worlds, "b"));
+  EXPECT_EQ(worlds.all().size(), 1u);
+}
+
+TEST(Worlds, WhatIsAskedOfThemAfterTheEndIsRefused) {
+  Worlds worlds({smallRoom()}, {}, {});
+  worlds.stop();
+  EXPECT_EQ(std::get<v1::Error>(made(worlds, "b")).code(), v1::ERROR_SHUTTING_DOWN);
+  EXPECT_EQ(dropped(worlds, "b")->code(), v1::ERROR_SHUTTING_DOWN);
+}
+
+/// Bytes of memory that are this process' own now.
+std::size_t residentBytes() {
+  std::ifstream file("/proc/self/statm");
+  std::size_t all = 0, resident = 0;
+  file >> all >> resident;
+  return resident * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+}
+
+constexpr std::size_t kMiB = 1u << 20;
+
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+constexpr bool kMemoryIsOurs = false;  // a sanitizer keeps what is freed
+#else
+constexpr bool kMemoryIsOurs = true;
+#endif
+
+TEST(Worlds, SixtyFourAreMadeAndDroppedOverAndOverInFlatMemory) {
+  Worlds worlds({smallRoom()}, {}, {});
+  std::vector<std::size_t> after;
+  for (int round = 0; round < 20; ++round) {
+    for (int i = 1; i < 64; ++i)
+      ASSERT_TRUE(std::holds_alternative<v1::World>(made(worlds, "w" + std::to_string(i))));
+    EXPECT_EQ(worlds.all().size(), 64u);
+    EXPECT_EQ(std::get<v1::Error>(made(worlds, "one-more")).code(), v1::ERROR_TOO_LARGE);
+    for (int i = 1; i < 64; ++i) ASSERT_FALSE(dropped(worlds, "w" + std::to_string(i)));
+    after.push_back(residentBytes());
+  }
+  EXPECT_EQ(worlds.all().size(), 1u);
+  if (kMemoryIsOurs) {
+    EXPECT_LT(after.back(), after[4] + 4 * kMiB);
+  }
+}
+
+TEST(Worlds, OneMoreOfASceneDoesNotCopyTheScene) {
+  constexpr int kPosts = 30'000;
+  const auto before = residentBytes();
+  const auto scene = hall(kPosts);
+  Worlds worlds({scene}, {}, {});
+  const std::size_t first = residentBytes() - before;
+  const auto one = residentBytes();
+  for (int i = 0; i < 20; ++i) {
+    std::promise<void> ready;
+    worlds.create({"w" + std::to_string(i), "hall", false}, [&](auto) { ready.set_value(); });
+    ready.get_future().get();
+  }
+  const std::size_t each = (residentBytes() - one) / 20;
+  EXPECT_EQ(worlds.all().size(), 21u);
+  if (kMemoryIsOurs) {
+    EXPECT_LT(each, first / 20) << first << " bytes for the first, " << each << " for each other";
+  }
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing
