@@ -235,6 +235,10 @@ void removeClient(ServedWorld& served, ClientId id) {
 void closeWorld(ServedWorld& served) {
   const auto ended = scene::endContacts(served.world, scene::ContactEvent::Reason::shutdown);
   const TickTold told = messagesOf(served.world, ended, {});
+  if (!served.farewell) {
+    served.farewell.emplace().set_code(v1::ERROR_SHUTTING_DOWN);
+    served.farewell->set_reason("the server ends");
+  }
   for (auto& [id, client] : served.clients) {
     sendEvents(client, told);
     sayGoodbye(client, *served.farewell);

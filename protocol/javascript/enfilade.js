@@ -40,10 +40,12 @@ async function webSocketClass() {
 }
 
 /**
- * Connects, for example to "ws://127.0.0.1:7878". Events go to `on.events`, `on.state`, `on.frame`
+ * Connects, for example to "ws://127.0.0.1:7878", and enters a world. Events go to `on.events`, `on.state`, `on.frame`
  * (with its attachment) and `on.bye`, in the order in which they come.
  */
-export async function connect(url, { name = "enfilade javascript", token = "", on = {} } = {}) {
+export async function connect(
+  url, { name = "enfilade javascript", token = "", world = "main", on = {} } = {},
+) {
   const schemas = await loadSchemas();
   const Socket = await webSocketClass();
   const socket = new Socket(url);
@@ -55,7 +57,7 @@ export async function connect(url, { name = "enfilade javascript", token = "", o
     )), { once: true });
   });
   const client = new Client(socket, schemas, on);
-  const hello = { protocolVersion: PROTOCOL_VERSION, clientName: name, token };
+  const hello = { protocolVersion: PROTOCOL_VERSION, clientName: name, token, world };
   client.welcome = (await client.request("hello", hello)).body;
   return client;
 }

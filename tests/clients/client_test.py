@@ -235,5 +235,29 @@ class Processes(RoomCase):
         self.fail("the server still runs")
 
 
+class Worlds(RoomCase):
+    def test_a_world_is_made_entered_listed_and_dropped(self):
+        self.assertEqual((self.client.world, self.client.scenes), ("main", ["room"]))
+        made = self.client.create_world("attic")
+        self.assertEqual((made.name, made.scene, made.tick, made.clock), ("attic", "room", 0, "lockstep"))
+        with self.server.connect(world="attic") as other:
+            other.step(3)
+            self.assertEqual(self.client.step().tick, 1)
+            seen = self.client.worlds()["attic"]
+            self.assertEqual((seen.clients, seen.tick, seen.driven), (1, 3, True))
+            self.client.drop_world("attic")
+            with self.assertRaisesRegex(enfilade.ServerError, "was dropped"):
+                other.step()
+        self.assertEqual(list(self.client.worlds()), ["main"])
+
+    def test_one_that_is_not_there_cannot_be_entered_or_dropped(self):
+        with self.assertRaisesRegex(enfilade.ServerError, "no world 'cellar'"):
+            self.server.connect(world="cellar")
+        with self.assertRaisesRegex(enfilade.ServerError, "no world 'cellar'"):
+            self.client.drop_world("cellar")
+        with self.assertRaisesRegex(enfilade.ServerError, "name"):
+            self.client.create_world("a b")
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -1,5 +1,6 @@
 """The environments: Gymnasium's API, and the same seed for the same observations."""
 
+import time
 import unittest
 
 import numpy as np
@@ -81,8 +82,7 @@ class Environments(RoomCase):
             env.reset(seed=0)
 
     def test_a_vector_of_environments_does_as_each_alone(self):
-        make = lambda _: enfilade.WalkEnv(self.scene, starts=_STARTS, channels=(), max_steps=3)
-        vector = enfilade.VectorWalkEnv(make, 2)
+        vector = enfilade.VectorWalkEnv(self.scene, 2, starts=_STARTS, channels=(), max_steps=3)
         self.addCleanup(vector.close)
         alone = self.environment(channels=(), max_steps=3)
         seen, _ = vector.reset(seed=5)
@@ -96,6 +96,32 @@ class Environments(RoomCase):
         seen, rewards, terminated, truncated, infos = vector.step([[1, 0]] * 2)
         np.testing.assert_array_equal(rewards, [0, 0])
         np.testing.assert_array_equal(infos["tick"], [1, 1])
+
+    def test_a_vector_has_worlds_of_one_server_and_leaves_none(self):
+        vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=3, starts=_STARTS,
+                                        size=(16, 12), channels=())
+        self.addCleanup(vector.close)
+        self.assertEqual(len(self.client.worlds()), 4)
+        self.assertEqual(vector.num_envs, 3)
+        self.assertEqual(vector.observation_space["position"].shape, (3, 3))
+        self.assertEqual(vector.single_action_space.shape, (2,))
+        self.assertIn("autoreset_mode", vector.metadata)
+        one, _ = vector.reset(seed=[4, 4, None])
+        np.testing.assert_array_equal(one["position"][0], one["position"][1])
+        hashes = vector.step([[1, 0]] * 3)[4]["state_hash"]
+        self.assertEqual(hashes[0], hashes[1])
+        self.assertEqual(self.client.step().tick, 1)  # nobody else's step made it
+        vector.close()
+        for _ in range(1000):
+            if list(self.client.worlds()) == ["main"]:
+                return
+            time.sleep(0.01)
+        self.fail(f"worlds were left: {self.client.worlds()}")
+
+    def test_a_vector_larger_than_the_server_takes_is_refused(self):
+        with self.assertRaisesRegex(ValueError, "num_envs"):
+            enfilade.VectorWalkEnv(address=self.server.address, num_envs=1000, starts=_STARTS)
+        self.assertEqual(list(self.client.worlds()), ["main"])
 
 
 if __name__ == "__main__":

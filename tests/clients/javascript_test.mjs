@@ -87,6 +87,23 @@ test("a picture comes as typed arrays, and a watch sends more", async (t) => {
   client.close();
 });
 
+test("a world is made, entered and dropped", async () => {
+  const main = await connect(`ws://127.0.0.1:${port}`);
+  const { body } = await main.request("createWorld", { name: "attic" });
+  assert.equal(body.world.scene, "room");
+  let bye;
+  const ended = new Promise((resolve) => { bye = resolve; });
+  const attic = await connect(`ws://127.0.0.1:${port}`, { world: "attic", on: { bye } });
+  assert.equal(attic.welcome.world, "attic");
+  assert.equal((await attic.step(3)).tick, 3n);
+  const { body: list } = await main.request("listWorlds");
+  assert.deepEqual(list.worlds.map((world) => world.name), ["main", "attic"]);
+  await main.request("dropWorld", { name: "attic" });
+  assert.match((await ended).reason, /'attic' was dropped/);
+  await assert.rejects(connect(`ws://127.0.0.1:${port}`, { world: "attic" }), ServerError);
+  main.close();
+});
+
 test("nobody listening is told", async () => {
   await assert.rejects(connect("ws://127.0.0.1:1"), ConnectionFailed);
 });

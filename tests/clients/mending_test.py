@@ -120,8 +120,8 @@ class Interrupts(RoomCase):
 
 class Vectors(RoomCase):
     def vector(self, **options):
-        made = enfilade.VectorWalkEnv(lambda i: enfilade.WalkEnv(
-            self.scene, **{"starts": [(0, 0.01, 0, 0)], "channels": (), **options}), 2)
+        made = enfilade.VectorWalkEnv(
+            self.scene, 2, **{"starts": [(0, 0.01, 0, 0)], "channels": (), **options})
         self.addCleanup(made.close)
         return made
 

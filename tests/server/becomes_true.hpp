@@ -9,7 +9,7 @@ namespace enfilade::server::testing {
 
 /// Whether it does within some 20 s.
 inline bool becomesTrue(const std::function<bool()>& condition) {
-  constexpr int kPatience = 4000;
+  constexpr int kPatience = 4000;  // tries
   for (int i = 0; i < kPatience; ++i) {
     if (condition()) return true;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));

@@ -13,8 +13,6 @@
 namespace enfilade::server::testing {
 namespace {
 
-constexpr int kPatience = 500;  // tries, a few milliseconds apart
-
 class Sessions : public ServedRoom {};
 
 /// The code of the ProtocolError that `request` throws; ERROR_UNSPECIFIED when it throws none.

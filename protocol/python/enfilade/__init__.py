@@ -16,13 +16,14 @@ Metres, seconds, radians; right-handed, Y up. PROTOCOL.md tells what happens on 
 
 from . import messages
 from .client import Avatar, Client, connect
-from .environment import VectorWalkEnv, WalkEnv
+from .environment import WalkEnv
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError, StartFailed
 from .process import Server, serve
-from .results import AvatarState, Contact, Frame, Hits, Notice, Scan, State, Step
+from .results import AvatarState, Contact, Frame, Hits, Notice, Scan, State, Step, World
+from .vector_environment import VectorWalkEnv
 
 __all__ = [
     "Avatar", "AvatarState", "Client", "ConnectionFailed", "Contact", "EnfiladeError", "Frame",
     "Hits", "Notice", "OrderFailed", "Scan", "Server", "ServerError", "StartFailed", "State", "Step",
-    "VectorWalkEnv", "WalkEnv", "connect", "messages", "serve",
+    "VectorWalkEnv", "WalkEnv", "World", "connect", "messages", "serve",
 ]

@@ -13,7 +13,7 @@ from . import messages, results
 from .connection import Connection, Received, raise_refusal, server_error
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError
 from .questions import Point, frame_request, points, vec
-from .results import AvatarState, Contact, Frame, Hits, Notice, Scan, State, Step
+from .results import AvatarState, Contact, Frame, Hits, Notice, Scan, State, Step, World
 
 PROTOCOL_VERSION = "1.0.0"
 KEPT_FRAMES = 16  # of watches, until frames() takes them; older ones go first
@@ -25,14 +25,14 @@ Reply = Tuple[Any, memoryview]  # a message and its attachment
 
 
 def connect(address: str = "127.0.0.1:7878", *, name: str = "enfilade python", token: str = "",
-            timeout: float = 30.0) -> "Client":
-    """Connects to HOST:PORT, with a token where the server wants one. Raises ConnectionFailed, or
-    ServerError when it is refused."""
+            timeout: float = 30.0, world: str = "main") -> "Client":
+    """Connects to HOST:PORT, with a token where the server wants one, and enters a world. Raises
+    ConnectionFailed, or ServerError when it is refused."""
     host, colon, port = address.rpartition(":")
     if not colon or not port.isdigit():
         raise ValueError(f"address: give HOST:PORT, as 127.0.0.1:7878, not {address!r}")
     return Client(host.strip("[]"), int(port), name=name, token=token,
-                  timeout=timeout)
+                  timeout=timeout, world=world)
 
 
 class Client:
@@ -45,7 +45,7 @@ class Client:
     """
 
     def __init__(self, host: str, port: int, *, name: str = "enfilade python", token: str = "",
-                 timeout: float = 30.0) -> None:
+                 timeout: float = 30.0, world: str = "main") -> None:
         self._connection = Connection(host, port, timeout)
         self._ids = itertools.count(1)
         self._tags = itertools.count(1)
@@ -55,7 +55,8 @@ class Client:
         self._frames: Deque[Frame] = deque(maxlen=KEPT_FRAMES)
         self._sequence = 0  # of the events that came last
         self._answered = 0  # the request whose reply was taken last
-        hello = messages.Hello(protocol_version=PROTOCOL_VERSION, client_name=name, token=token)
+        hello = messages.Hello(protocol_version=PROTOCOL_VERSION, client_name=name, token=token,
+                               world=world)
         try:
             self.welcome: Any = self.request(hello=hello)[0].welcome
         except BaseException:
@@ -224,6 +225,36 @@ class Client:
         self._notices.clear()
         self._states.clear()
         self._frames.clear()
+
+    # ---- worlds -----------------------------------------------------------------------------
+
+    @property
+    def world(self) -> str:
+        """The one that this client is in, from its beginning to its end."""
+        return self.welcome.world
+
+    @property
+    def scenes(self) -> List[str]:
+        """What worlds can be made of; the first is that of the main world."""
+        return list(self.welcome.scenes)
+
+    def worlds(self) -> Dict[str, World]:
+        """All of the server, by name."""
+        reply, _ = self.request(list_worlds=messages.ListWorlds())
+        return {one.name: results.world(one) for one in reply.worlds.worlds}
+
+    def create_world(self, name: str = "", *, scene: str = "",
+                     drop_when_empty: bool = False) -> World:
+        """Makes a world, for which the server finds a name where none is given; of the scene of this
+        client's own world where none is given. connect(..., world=NAME) enters it. It stays until
+        drop_world(), or, with `drop_when_empty`, until its last client has left."""
+        reply, _ = self.request(create_world=messages.CreateWorld(
+            name=name, scene=scene, drop_when_empty=drop_when_empty))
+        return results.world(reply.create_world.world)
+
+    def drop_world(self, name: str) -> None:
+        """Ends a world; whoever is in it is disconnected."""
+        self.request(drop_world=messages.DropWorld(name=name))
 
     # ---- avatars and bodies -----------------------------------------------------------------
 

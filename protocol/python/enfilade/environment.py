@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import operator
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -42,8 +42,8 @@ class WalkEnv(spaces.EnvBase):
     """One avatar in a world of its own.
 
     scene or address: a model that a server process is started for, or HOST:PORT of one that runs
-        (this client must then be its driver). Or client: one that is connected, which close() leaves
-        as it is.
+        (this client must then drive its world `world`). Or client: one that is connected, which
+        close() leaves as it is.
     starts: places to begin at, (x, y, z) of the feet or (x, y, z, facing in degrees); one is chosen at
         each reset, and a facing where none is given.
     goal: where the walk ends well, within `goal_radius` metres on the ground.
@@ -69,7 +69,7 @@ class WalkEnv(spaces.EnvBase):
                  speed: float = 1.4, turn_speed: float = math.pi / 2, max_steps: int = 1000,
                  fov_y: float = 1.2, discrete: bool = False,
                  render_mode: Optional[str] = "rgb_array", server_arguments: Sequence[str] = (),
-                 client: Optional[Client] = None) -> None:
+                 client: Optional[Client] = None, world: str = "main") -> None:
         if not len(starts):
             raise ValueError("starts: give at least one place to begin at")
         self.starts = [_numbers(start, f"starts[{i}]", (3, 4)) for i, start in enumerate(starts)]
@@ -107,7 +107,8 @@ class WalkEnv(spaces.EnvBase):
         self.server: Optional[Server] = None
         self._own_client = client is None
         try:
-            self.client = client or self._connected(scene, address, server_arguments)
+            self.client = client or self._connected(scene, address, server_arguments,
+                                                      world)
             self._begin()
         except BaseException:
             self.close()
@@ -126,11 +127,11 @@ class WalkEnv(spaces.EnvBase):
         self.metadata = {**self.metadata, "render_fps": 1 / self._seconds}
 
     def _connected(self, scene: Union[str, Path, None], address: str,
-                   arguments: Sequence[str]) -> Client:
+                   arguments: Sequence[str], world: str) -> Client:
         if scene is None:
-            return connect(address, name="enfilade environment")
+            return connect(address, name="enfilade environment", world=world)
         self.server = serve(scene, *arguments)
-        return self.server.connect(name="enfilade environment")
+        return self.server.connect(name="enfilade environment", world=world)
 
     def _observation_space(self) -> Any:
         width, height = self.size
@@ -342,129 +343,3 @@ class WalkEnv(spaces.EnvBase):
         assert self._state is not None
         return {"tick": made.tick, "state_hash": made.state_hash, "contacts": contacts,
                 "stopped_by": self._state.stopped_by_name}
-
-
-class VectorWalkEnv:
-    """Several WalkEnvs that work at the same time, with the methods of Gymnasium's VectorEnv.
-
-    Each has a server process of its own. `make` makes one of them: make(number) is a WalkEnv. One whose
-    episode ended begins anew with the next step(), whose action for it is left aside and whose reward is
-    0 (Gymnasium's "next step" mode).
-
-    A wrong number of actions or seeds, or an action that is none, is a ValueError before anything is
-    sent. Where one environment fails later, all are waited for, its error is raised, and reset() comes
-    next; one whose server died has to be made anew.
-    """
-
-    metadata: Dict[str, Any] = {"autoreset_mode": "NextStep"}
-
-    def __init__(self, make: Callable[[int], WalkEnv], num_envs: int) -> None:
-        if operator.index(num_envs) < 1:
-            raise ValueError(f"num_envs: give at least 1, not {num_envs}")
-        self.num_envs = num_envs
-        self.closed = False
-        self.envs: List[WalkEnv] = []
-        try:
-            for number in range(num_envs):
-                self.envs.append(make(number))
-        except BaseException:
-            self.close()
-            raise
-        self.single_observation_space = self.envs[0].observation_space
-        self.single_action_space = self.envs[0].action_space
-        self.observation_space = spaces.batched(self.single_observation_space, num_envs)
-        self.action_space = spaces.batched(self.single_action_space, num_envs)
-        self._over: Optional[np.ndarray] = None  # None: reset() comes next
-
-    def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None,
-              options: Optional[Dict[str, Any]] = None) -> Tuple[Observation, Dict[str, Any]]:
-        """`seed` is one for each, or a number to which the environment's own number is added."""
-        seeds = self._seeds(seed)
-        self._over = None
-        taken = self._each(lambda i: self.envs[i]._post_reset(seeds[i], options or {}),
-                           lambda i, ids: self.envs[i]._take_reset(ids))
-        self._over = np.zeros(self.num_envs, bool)
-        return self._stacked([one[0] for one in taken]), self._gathered([one[1] for one in taken])
-
-    def _seeds(self, seed: Any) -> List[Optional[int]]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, (int, np.integer)):
-            return [int(seed) + i for i in range(self.num_envs)]
-        seeds = [None if one is None else operator.index(one) for one in seed]
-        if len(seeds) != self.num_envs:
-            raise ValueError(f"seed: {len(seeds)} for {self.num_envs} environments")
-        return seeds
-
-    def step(self, actions: Any) -> Tuple[Observation, np.ndarray, np.ndarray, np.ndarray,
-                                          Dict[str, Any]]:
-        over = self._over
-        if over is None:
-            raise RuntimeError("reset() comes before step(), also after one that failed")
-        actions = list(actions)
-        if len(actions) != self.num_envs:
-            raise ValueError(f"actions: {len(actions)} for {self.num_envs} environments")
-        meanings = [(0.0, 0.0) if ended else env._meaning(action)
-                    for env, ended, action in zip(self.envs, over, actions)]
-
-        def post(i: int) -> List[int]:
-            env = self.envs[i]
-            return env._post_reset(None, {}) if over[i] else env._post_step(meanings[i])
-
-        def take(i: int, ids: List[int]) -> Tuple[Observation, float, bool, bool, Dict[str, Any]]:
-            if not over[i]:
-                return self.envs[i]._take_step(ids)
-            seen, info = self.envs[i]._take_reset(ids)
-            return seen, 0.0, False, False, info
-
-        self._over = None
-        observations, rewards, terminated, truncated, infos = zip(*self._each(post, take))
-        self._over = np.array(terminated, bool) | np.array(truncated, bool)
-        return (self._stacked(observations), np.array(rewards), np.array(terminated),
-                np.array(truncated), self._gathered(infos))
-
-    def _each(self, post: Callable[[int], List[int]], take: Callable[[int, List[int]], Any]) -> Any:
-        """Posts all and takes all, also where some fail; the first failure is raised then."""
-        failures: List[Exception] = []
-        posted: List[Optional[List[int]]] = []
-        taken: List[Any] = []
-        for i in range(self.num_envs):
-            try:
-                posted.append(post(i))
-            except Exception as error:
-                posted.append(None)
-                failures.append(error)
-        for i, ids in enumerate(posted):
-            try:
-                if ids is not None:
-                    taken.append(take(i, ids))
-            except Exception as error:
-                failures.append(error)
-        if failures:
-            raise failures[0]
-        return taken
-
-    def render(self) -> List[Optional[np.ndarray]]:
-        return [env.render() for env in self.envs]
-
-    def close(self) -> None:
-        self.closed = True
-        self._over = None
-        for env in self.envs:
-            env.close()
-
-    @staticmethod
-    def _stacked(observations: Sequence[Observation]) -> Observation:
-        return {name: np.stack([one[name] for one in observations]) for name in observations[0]}
-
-    @staticmethod
-    def _gathered(infos: Sequence[Dict[str, Any]]) -> Dict[str, Any]:
-        """Arrays of objects: a state hash has 64 bits, and contacts are lists. `_NAME`: who has it."""
-        gathered: Dict[str, Any] = {}
-        for name in dict.fromkeys(name for info in infos for name in info):
-            values = np.empty(len(infos), object)
-            for number, info in enumerate(infos):
-                values[number] = info.get(name)
-            gathered[name] = values
-            gathered["_" + name] = np.array([name in info for info in infos])
-        return gathered

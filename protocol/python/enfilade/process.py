@@ -158,8 +158,9 @@ class Server:
         """What it wrote to stderr so far; also after stop()."""
         return self._running.read_log()
 
-    def connect(self, *, name: str = "enfilade python", timeout: float = 30.0) -> Client:
-        client = connect(self.address, name=name, timeout=timeout)
+    def connect(self, *, name: str = "enfilade python", timeout: float = 30.0,
+                world: str = "main") -> Client:
+        client = connect(self.address, name=name, timeout=timeout, world=world)
         self._running.clients.add(client)
         return client
 

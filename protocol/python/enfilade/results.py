@@ -251,3 +251,26 @@ def scan(reply: Any, attachment: memoryview) -> Scan:
     distance = np.frombuffer(attachment, np.float32, count, 0).reshape(shape)
     entity = np.frombuffer(attachment, np.uint32, count, 4 * count).reshape(shape)
     return Scan(reply.tick, distance, entity)
+
+
+@dataclass(frozen=True)
+class World:
+    """One of the server's worlds: World of the .proto."""
+
+    name: str
+    scene: str
+    clients: int
+    tick: int
+    clock: str  # "lockstep", "free_run", "paused"
+    speed: float  # simulated seconds a second, when it runs freely
+    driven: bool  # some client holds its clock
+    drop_when_empty: bool
+    failure: str  # what ended it; "": it lives
+
+
+def world(message: Any) -> World:
+    modes = messages.Clock.DESCRIPTOR.enum_types_by_name
+    return World(name=message.name, scene=message.scene, clients=message.clients, tick=message.tick,
+                 clock=messages.word(modes["Mode"], message.clock.mode, "MODE_"),
+                 speed=message.clock.speed, driven=message.clock.has_driver,
+                 drop_when_empty=message.drop_when_empty, failure=message.failure)

@@ -96,6 +96,8 @@ class _Dict(_Space):
 
 
 EnvBase: Any = object
+VectorEnvBase: Any = object
+NEXT_STEP: Any = "NextStep"  # how episodes begin anew: gymnasium.vector.AutoresetMode's value
 Box: Any = _Box
 Discrete: Any = _Discrete
 Dict: Any = _Dict
@@ -107,6 +109,9 @@ except ImportError:
 else:
     HAVE_GYMNASIUM = True
     EnvBase = gymnasium.Env
+    VectorEnvBase = gymnasium.vector.VectorEnv
+    if hasattr(gymnasium.vector, "AutoresetMode"):  # from 1.1 on
+        NEXT_STEP = gymnasium.vector.AutoresetMode.NEXT_STEP
     Box, Discrete, Dict = gymnasium.spaces.Box, gymnasium.spaces.Discrete, gymnasium.spaces.Dict
 
 

@@ -1,0 +1,185 @@
+"""Several environments over one server: a world of its own for each."""
+
+from __future__ import annotations
+
+import operator
+from pathlib import Path
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from . import spaces
+from .client import Client, connect
+from .environment import Observation, WalkEnv
+from .process import Server, serve
+
+
+class VectorWalkEnv(spaces.VectorEnvBase):
+    """Several WalkEnvs that work at the same time in worlds of one server, which share its scene.
+    Gymnasium's VectorEnv where that is installed, and its methods and attributes everywhere.
+
+    scene or address: a model that a server process is started for, or HOST:PORT of one that runs and
+        lets this client make worlds (the role admin). They are dropped when their client leaves.
+    world_scene: one of the server's scenes, by name; empty: the first.
+    make: makes one environment for a client in a world of its own, make(number, client); by default
+        WalkEnv(client=client, **options).
+
+    One whose episode ended begins anew with the next step(), whose action for it is left aside and
+    whose reward is 0 (Gymnasium's "next step" mode).
+
+    A wrong number of actions or seeds, or an action that is none, is a ValueError before anything is
+    sent. Where one environment fails later, all are waited for, its error is raised, and reset() comes
+    next; when the server died, all have to be made anew.
+    """
+
+    metadata: Dict[str, Any] = {"render_modes": ["rgb_array"], "autoreset_mode": spaces.NEXT_STEP}
+
+    def __init__(self, scene: Union[str, Path, None] = None, num_envs: int = 1, *,
+                 address: str = "", world_scene: str = "",
+                 make: Optional[Callable[[int, Client], WalkEnv]] = None,
+                 server_arguments: Sequence[str] = (), **options: Any) -> None:
+        if operator.index(num_envs) < 1:
+            raise ValueError(f"num_envs: give at least 1, not {num_envs}")
+        if (scene is None) == (not address):
+            raise ValueError("give either a scene or an address")
+        if isinstance(server_arguments, str):
+            raise ValueError("server_arguments: give a list of strings")
+        if make is not None and options:
+            raise ValueError(f"make: it has to know {sorted(options)} itself")
+        self.num_envs = num_envs
+        self.closed = False
+        self.server: Optional[Server] = None
+        self._clients: List[Client] = []
+        self.envs: List[WalkEnv] = []
+        make = make or (lambda _, client: WalkEnv(client=client, **options))
+        try:
+            if scene is not None:
+                self.server = serve(scene, *server_arguments)
+                address = self.server.address
+            self._clients = self._in_worlds(address, world_scene)
+            for number, client in enumerate(self._clients):
+                self.envs.append(make(number, client))
+        except BaseException:
+            self.close()
+            raise
+        self.render_mode = self.envs[0].render_mode
+        self.metadata = {**self.envs[0].metadata, "autoreset_mode": spaces.NEXT_STEP}
+        self.single_observation_space = self.envs[0].observation_space
+        self.single_action_space = self.envs[0].action_space
+        self.observation_space = spaces.batched(self.single_observation_space, num_envs)
+        self.action_space = spaces.batched(self.single_action_space, num_envs)
+        self._over: Optional[np.ndarray] = None  # None: reset() comes next
+
+    def _in_worlds(self, address: str, scene: str) -> List[Client]:
+        """A client in each of as many new worlds."""
+        name = "enfilade environments"
+        with connect(address, name=name) as maker:
+            most = maker.limits.max_worlds - len(maker.worlds())
+            if self.num_envs > most:
+                raise ValueError(f"num_envs: the server takes {most} more worlds, not {self.num_envs}")
+            for _ in range(self.num_envs):
+                world = maker.create_world(scene=scene or maker.scenes[0], drop_when_empty=True)
+                try:
+                    self._clients.append(connect(address, name=name, world=world.name))
+                except BaseException:
+                    maker.drop_world(world.name)
+                    raise
+        return self._clients
+
+    def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None,
+              options: Optional[Dict[str, Any]] = None) -> Tuple[Observation, Dict[str, Any]]:
+        """`seed` is one for each, or a number to which the environment's own number is added."""
+        seeds = self._seeds(seed)
+        self._over = None
+        taken = self._each(lambda i: self.envs[i]._post_reset(seeds[i], options or {}),
+                           lambda i, ids: self.envs[i]._take_reset(ids))
+        self._over = np.zeros(self.num_envs, bool)
+        return self._stacked([one[0] for one in taken]), self._gathered([one[1] for one in taken])
+
+    def _seeds(self, seed: Any) -> List[Optional[int]]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, (int, np.integer)):
+            return [int(seed) + i for i in range(self.num_envs)]
+        seeds = [None if one is None else operator.index(one) for one in seed]
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed: {len(seeds)} for {self.num_envs} environments")
+        return seeds
+
+    def step(self, actions: Any) -> Tuple[Observation, np.ndarray, np.ndarray, np.ndarray,
+                                          Dict[str, Any]]:
+        over = self._over
+        if over is None:
+            raise RuntimeError("reset() comes before step(), also after one that failed")
+        actions = list(actions)
+        if len(actions) != self.num_envs:
+            raise ValueError(f"actions: {len(actions)} for {self.num_envs} environments")
+        meanings = [(0.0, 0.0) if ended else env._meaning(action)
+                    for env, ended, action in zip(self.envs, over, actions)]
+
+        def post(i: int) -> List[int]:
+            env = self.envs[i]
+            return env._post_reset(None, {}) if over[i] else env._post_step(meanings[i])
+
+        def take(i: int, ids: List[int]) -> Tuple[Observation, float, bool, bool, Dict[str, Any]]:
+            if not over[i]:
+                return self.envs[i]._take_step(ids)
+            seen, info = self.envs[i]._take_reset(ids)
+            return seen, 0.0, False, False, info
+
+        self._over = None
+        observations, rewards, terminated, truncated, infos = zip(*self._each(post, take))
+        self._over = np.array(terminated, bool) | np.array(truncated, bool)
+        return (self._stacked(observations), np.array(rewards), np.array(terminated),
+                np.array(truncated), self._gathered(infos))
+
+    def _each(self, post: Callable[[int], List[int]], take: Callable[[int, List[int]], Any]) -> Any:
+        """Posts all and takes all, also where some fail; the first failure is raised then."""
+        failures: List[Exception] = []
+        posted: List[Optional[List[int]]] = []
+        taken: List[Any] = []
+        for i in range(self.num_envs):
+            try:
+                posted.append(post(i))
+            except Exception as error:
+                posted.append(None)
+                failures.append(error)
+        for i, ids in enumerate(posted):
+            try:
+                if ids is not None:
+                    taken.append(take(i, ids))
+            except Exception as error:
+                failures.append(error)
+        if failures:
+            raise failures[0]
+        return taken
+
+    def render(self) -> List[Optional[np.ndarray]]:
+        return [env.render() for env in self.envs]
+
+    def close(self, **_: Any) -> None:
+        """Closes all, and the server that was started for them; worlds go with their clients."""
+        self.closed = True
+        self._over = None
+        for env in self.envs:
+            env.close()
+        for client in self._clients:
+            client.close()
+        if self.server is not None:
+            self.server.stop()
+
+    @staticmethod
+    def _stacked(observations: Sequence[Observation]) -> Observation:
+        return {name: np.stack([one[name] for one in observations]) for name in observations[0]}
+
+    @staticmethod
+    def _gathered(infos: Sequence[Dict[str, Any]]) -> Dict[str, Any]:
+        """Arrays of objects: a state hash has 64 bits, and contacts are lists. `_NAME`: who has it."""
+        gathered: Dict[str, Any] = {}
+        for name in dict.fromkeys(name for info in infos for name in info):
+            values = np.empty(len(infos), object)
+            for number, info in enumerate(infos):
+                values[number] = info.get(name)
+            gathered[name] = values
+            gathered["_" + name] = np.array([name in info for info in infos])
+        return gathered
