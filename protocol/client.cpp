@@ -2,32 +2,20 @@
 
 #include <poll.h>
 
-#include <array>
-#include <boost/asio/connect.hpp>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <cerrno>
-#include <cmath>
 #include <cstring>
 #include <utility>
+
+#include "protocol/connection.hpp"
 
 namespace enfilade::protocol {
 namespace {
 
-namespace asio = boost::asio;
-using asio::ip::tcp;
 using Clock = std::chrono::steady_clock;
-using boost::system::error_code;
 
 std::string secondsText(std::chrono::milliseconds time) {
   const auto count = time.count();
   return count % 1000 == 0 ? std::to_string(count / 1000) + " s" : std::to_string(count) + " ms";
 }
-
-struct Received {
-  v1::ServerMessage message;
-  std::vector<std::uint8_t> attachment;
-};
 
 }  // namespace
 
@@ -46,165 +34,78 @@ std::span<const std::uint8_t> ReceivedFrame::plane(v1::Channel channel) const {
 
 // ---- the connection ----------------------------------------------------------------------------
 
+/// Connection, with waiting.
 struct Client::State {
   State(const std::string& host, std::uint16_t port, const ClientOptions& clientOptions)
-      : peer(host + ":" + std::to_string(port)),
-        options(clientOptions),
-        decoder(clientOptions.limits) {}
+      : options(clientOptions), connection(host, port, clientOptions.limits) {}
 
-  void connect(const std::string& host, std::uint16_t port);
-  void greet();
+  void connect(Clock::time_point deadline);
+  void greet(Clock::time_point deadline);
   void send(const v1::ClientMessage& message, Clock::time_point deadline);
-  void write(std::span<const std::uint8_t> bytes, Clock::time_point deadline);
-  bool awaitSocket(short what, Clock::time_point deadline);
   std::optional<Received> receive(Clock::time_point deadline);
-  bool readSome(Clock::time_point deadline);
-  Received parsed(Message message);
   void keepUnasked(v1::ServerMessage message);
   [[noreturn]] void breakOff(const std::string& reason);
   void throwIfBroken() const;
+  bool over() const { return !ended.empty() || !connection.broken().empty(); }
 
-  std::string peer;
   ClientOptions options;
-  asio::io_context context;
-  tcp::socket socket{context};
-  Decoder decoder;
-  std::array<std::uint8_t, 1 << 16> buffer{};
-  std::span<const std::uint8_t> unread;  ///< of `buffer`
+  Connection connection;
   std::deque<v1::ServerMessage> events;
   v1::Welcome welcome;
   std::uint64_t lastId = 0;
-  std::string broken;  ///< not empty: why the connection is of no more use
+  std::string ended;  ///< not empty: the server ended the connection, and why
 };
 
 void Client::State::breakOff(const std::string& reason) {
-  broken = reason;
-  error_code ignored;
-  socket.close(ignored);
-  throw ConnectionError(broken);
+  connection.breakOff(reason);
+  throw ConnectionError(connection.broken());
 }
 
 void Client::State::throwIfBroken() const {
-  if (!broken.empty()) throw ConnectionError(broken);
+  if (!ended.empty()) throw ConnectionError(ended);
+  if (!connection.broken().empty()) throw ConnectionError(connection.broken());
 }
 
-void Client::State::connect(const std::string& host, std::uint16_t port) {
-  error_code problem = asio::error::timed_out;
-  tcp::resolver resolver(context);
-  resolver.async_resolve(
-      host, std::to_string(port),
-      [&](const error_code& resolveProblem, const tcp::resolver::results_type& addresses) {
-        problem = resolveProblem;
-        if (problem) return;
-        problem = asio::error::timed_out;
-        asio::async_connect(socket, addresses,
-                            [&](const error_code& connectProblem, const tcp::endpoint&) {
-                              problem = connectProblem;
-                            });
-      });
-  context.run_for(options.timeout);
-  if (!context.stopped()) {
-    resolver.cancel();
-    error_code ignored;
-    socket.close(ignored);
-    context.run();
-    problem = asio::error::timed_out;
-  }
-  if (problem) {
-    breakOff("cannot connect to " + peer + ": " + problem.message() +
-             "; is `enfilade serve` running there, and is the port the one of its ready line?");
-  }
-  socket.set_option(tcp::no_delay(true));
-  socket.non_blocking(true);
-}
-
-/// False when the deadline came first.
-bool Client::State::awaitSocket(short what, Clock::time_point deadline) {
-  for (;;) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
-    if (left.count() < 0) return false;
-    pollfd descriptor{socket.native_handle(), what, 0};
-    constexpr long long longest = 1'000'000;
-    const int ready =
-        ::poll(&descriptor, 1, static_cast<int>(std::min<long long>(left.count(), longest)));
-    if (ready > 0) return true;
-    if (ready == 0 && Clock::now() >= deadline) return false;
-    if (ready < 0 && errno != EINTR) {
-      breakOff(peer + ": cannot wait for the socket: " +
-               error_code(errno, boost::system::system_category()).message());
+void Client::State::connect(Clock::time_point deadline) {
+  while (connection.broken().empty() && !connection.connected()) {
+    if (!connection.await(POLLOUT, deadline)) {
+      breakOff("cannot connect to " + connection.peer() + ": nobody answered within " +
+               secondsText(options.timeout) +
+               "; is `enfilade serve` running there, and is the port the one of its ready line?");
     }
+    connection.advance();
   }
+  throwIfBroken();
 }
 
-void Client::State::write(std::span<const std::uint8_t> bytes, Clock::time_point deadline) {
-  while (!bytes.empty()) {
-    error_code problem;
-    const std::size_t count = socket.write_some(asio::buffer(bytes.data(), bytes.size()), problem);
-    bytes = bytes.subspan(count);
-    if (problem == asio::error::would_block) {
-      if (!awaitSocket(POLLOUT, deadline)) {
-        breakOff(peer + " took nothing for " + secondsText(options.timeout) +
-                 "; is the server stopped or overloaded?");
-      }
-    } else if (problem) {
+/// Returns when all was sent. What comes meanwhile waits in the socket.
+void Client::State::send(const v1::ClientMessage& message, Clock::time_point deadline) {
+  connection.send(message);
+  while (connection.unsent() > 0 && connection.broken().empty()) {
+    if (connection.writeFailed()) {
       // What the server said last is worth more than the broken pipe.
       while (auto received = receive(Clock::now())) {
         if (received->message.reply_to() == 0) keepUnasked(std::move(received->message));
         throwIfBroken();
       }
-      breakOff(peer + " closed the connection: " + problem.message());
+      breakOff(connection.peer() + " closed the connection");
     }
+    if (!connection.await(POLLOUT, deadline)) {
+      breakOff(connection.peer() + " took nothing for " + secondsText(options.timeout) +
+               "; is the server stopped or overloaded?");
+    }
+    connection.advance();
   }
-}
-
-void Client::State::send(const v1::ClientMessage& message, Clock::time_point deadline) {
-  write(encode(message), deadline);
-}
-
-/// Fills `buffer`, of which nothing is unread; false when the deadline came first.
-bool Client::State::readSome(Clock::time_point deadline) {
-  for (;;) {
-    error_code problem;
-    const std::size_t count = socket.read_some(asio::buffer(buffer), problem);
-    if (!problem) {
-      unread = std::span<const std::uint8_t>(buffer).first(count);
-      return true;
-    }
-    if (problem == asio::error::would_block) {
-      if (!awaitSocket(POLLIN, deadline)) return false;
-    } else if (problem == asio::error::eof && !decoder.magicSeen()) {
-      breakOff(peer + " closed the connection before it answered; is that an Enfilade server?");
-    } else if (problem == asio::error::eof) {
-      breakOff(peer + (decoder.betweenMessages()
-                           ? " closed the connection; its log says why"
-                           : " closed the connection in the middle of a message (byte " +
-                                 std::to_string(decoder.offset()) + "); its log says why"));
-    } else {
-      breakOff(peer + ": the connection broke: " + problem.message());
-    }
-  }
+  throwIfBroken();
 }
 
 /// The next message; nullopt when the deadline came first (what came of it is kept).
 std::optional<Received> Client::State::receive(Clock::time_point deadline) {
   for (;;) {
-    if (auto message = decoder.next(unread)) return parsed(std::move(*message));
-    if (decoder.error()) {
-      breakOff(peer + " does not speak this protocol: at byte " +
-               std::to_string(decoder.error()->offset) + ": " + decoder.error()->reason);
-    }
-    if (!readSome(deadline)) return std::nullopt;
+    if (auto received = connection.next()) return received;
+    throwIfBroken();
+    if (!connection.await(POLLIN, deadline)) return std::nullopt;
   }
-}
-
-Received Client::State::parsed(Message message) {
-  Received received;
-  if (!parse(message.header, received.message)) {
-    breakOff(peer + " sent a message that is not a ServerMessage (before byte " +
-             std::to_string(decoder.offset()) + "); do the versions fit?");
-  }
-  received.attachment = std::move(message.attachment);
-  return received;
 }
 
 /// Queues an event. After a Bye, which is the last, the connection is broken; errors of the
@@ -212,63 +113,46 @@ Received Client::State::parsed(Message message) {
 void Client::State::keepUnasked(v1::ServerMessage message) {
   if (message.has_error()) {
     const v1::Error& error = message.error();
-    broken = peer + " ended the connection: " + error.message();
-    throw ProtocolError(error.code(), broken, error.field());
+    ended = connection.peer() + " ended the connection: " + error.message();
+    throw ProtocolError(error.code(), ended, error.field());
   }
   if (message.has_bye()) {
     const std::string& reason = message.bye().reason();
-    broken = peer + " said goodbye: " + (reason.empty() ? "no reason given" : reason);
+    ended = connection.peer() + " said goodbye: " + (reason.empty() ? "no reason given" : reason);
   }
   events.push_back(std::move(message));
 }
 
-void Client::State::greet() {
-  const auto deadline = Clock::now() + options.timeout;
-  write(kMagic, deadline);
-  v1::ClientMessage hello;
+void Client::State::greet(Clock::time_point deadline) {
+  v1::ClientMessage hello = helloOf(options.name, options.token);
   hello.set_request_id(++lastId);
-  hello.mutable_hello()->set_protocol_version(kVersion);
-  hello.mutable_hello()->set_client_name(options.name);
-  hello.mutable_hello()->set_token(options.token);
   hello.mutable_hello()->set_world(options.world);
   send(hello, deadline);
-  const auto received = receive(deadline);
+  auto received = receive(deadline);
   if (!received) {
-    breakOff(peer + " did not answer the greeting within " + secondsText(options.timeout) +
-             "; is that an Enfilade server?");
-  }
-  if (received->message.has_error()) {
-    const v1::Error& error = received->message.error();
-    throw ProtocolError(error.code(), peer + " refused the greeting: " + error.message(),
-                        error.field());
+    breakOff(connection.peer() + " did not answer the greeting within " +
+             secondsText(options.timeout) + "; is that an Enfilade server?");
   }
   if (received->message.has_bye()) {
-    breakOff(peer + " refused the connection: " + received->message.bye().reason());
+    breakOff(connection.peer() + " refused the connection: " + received->message.bye().reason());
   }
-  welcome = received->message.welcome();
-  if (!received->message.has_welcome() || majorOf(welcome.protocol_version()) != kMajorVersion) {
-    throw ProtocolError(v1::ERROR_VERSION,
-                        peer + " speaks protocol version \"" + welcome.protocol_version() +
-                            "\" and this client " + kVersion +
-                            "; the first numbers must be equal: use a client of its release");
+  if (const auto problem = welcomeProblem(received->message, connection.peer())) {
+    throw ProtocolError(problem->code(), problem->message(), problem->field());
   }
-  const double tick = welcome.policies().tick();
-  if (!(tick > 0) || !std::isfinite(tick)) {
-    throw ProtocolError(v1::ERROR_BAD_MESSAGE, peer + " greets with a tick that is not positive",
-                        "welcome.policies.tick");
-  }
+  welcome = std::move(*received->message.mutable_welcome());
 }
 
 // ---- the client --------------------------------------------------------------------------------
 
 Client::Client(const std::string& host, std::uint16_t port, const ClientOptions& options)
     : state_(std::make_unique<State>(host, port, options)) {
-  state_->connect(host, port);
-  state_->greet();
+  const auto deadline = Clock::now() + options.timeout;
+  state_->connect(deadline);
+  state_->greet(deadline);
 }
 
 Client::~Client() {
-  if (!state_ || !state_->broken.empty()) return;
+  if (!state_ || state_->over()) return;
   v1::ClientMessage bye;
   bye.set_request_id(++state_->lastId);
   bye.mutable_bye();
@@ -296,7 +180,7 @@ v1::ServerMessage Client::request(v1::ClientMessage message,
   for (;;) {
     auto received = state_->receive(deadline);
     if (!received) {
-      state_->breakOff(state_->peer + " did not answer within " +
+      state_->breakOff(state_->connection.peer() + " did not answer within " +
                        secondsText(state_->options.timeout) +
                        "; is it overloaded? A longer timeout may help");
     }
@@ -306,7 +190,7 @@ v1::ServerMessage Client::request(v1::ClientMessage message,
       continue;
     }
     if (received->message.reply_to() != id) {
-      state_->breakOff(state_->peer + " answered request " +
+      state_->breakOff(state_->connection.peer() + " answered request " +
                        std::to_string(received->message.reply_to()) + " instead of " +
                        std::to_string(id));
     }
@@ -349,7 +233,7 @@ std::optional<v1::Error> Client::tell(v1::ClientMessage message) {
   try {
     reply = request(std::move(message));
   } catch (const ProtocolError& problem) {
-    if (!state_->broken.empty()) throw;
+    if (state_->over()) throw;
     v1::Error error;
     error.set_code(problem.code);
     error.set_message(problem.what());
@@ -455,7 +339,7 @@ std::optional<v1::ServerMessage> Client::nextEvent(std::chrono::milliseconds pat
     auto received = state_->receive(Clock::now() + patience);
     if (!received) return std::nullopt;
     if (received->message.reply_to() != 0) {
-      state_->breakOff(state_->peer + " answered a request that is not outstanding");
+      state_->breakOff(state_->connection.peer() + " answered a request that is not outstanding");
     }
     state_->keepUnasked(std::move(received->message));
   }

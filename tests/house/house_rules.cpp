@@ -22,7 +22,7 @@ const std::map<std::string, Names> kMayInclude{
     {"protocol", {}},
     {"server", {"collision", "scene", "render", "protocol"}},
     {"assets", {"collision", "scene"}},
-    {"examples", {"collision"}},
+    {"examples", {"collision", "protocol"}},
 };
 
 /// Inside scene/: which of its rooms a room may include besides itself. What lies in scene/ itself
@@ -64,7 +64,7 @@ const std::array<ThirdParty, 18> kThirdParties{{
     {"xxHash", "xxh.*", {"scene"}},
     {"zlib", "zlib.*", {"protocol"}},
     {"zstd", "zstd.*", {"protocol", "render", "server"}},
-    {"Boost.Asio and Beast", "boost/(asio|beast|system).*", {"protocol", "server"}},
+    {"Boost.Asio and Beast", "boost/(asio|beast|system).*", {"server"}},
     {"other Boost", "boost/(?!asio|beast|system).*", {}},
     {"protobuf", "google/protobuf/.*", {"protocol"}},
     {"nlohmann-json", "nlohmann/.*", {"scene", "render", "protocol", "server", "assets"}},

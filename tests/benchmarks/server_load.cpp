@@ -1,0 +1,154 @@
+// Many clients of one server on loopback, all in this process; then many who come and go.
+//
+//   server_load [CLIENTS [SECONDS [VISITS [STATE_RATE]]]]     200 10 2000 0
+//
+// Each client drives an avatar through the bundled building with 60 commands a second, hears
+// contacts and sees states (STATE_RATE a second; 0: of each tick). Exit code 3: something was lost,
+// doubled or left behind.
+#include <malloc.h>
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <thread>
+
+#include "protocol/client.hpp"
+#include "scene/import/model_cache.hpp"
+#include "server/server.hpp"
+#include "tests/support/server_load.hpp"
+
+namespace {
+
+using namespace enfilade;
+
+std::uint64_t quantile(const std::vector<std::uint64_t>& sorted, double q) {
+  return sorted.empty() ? 0 : sorted[static_cast<std::size_t>(q * double(sorted.size() - 1))];
+}
+
+double processorSeconds() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+void tell(const v1::StageTiming& timing) {
+  std::printf("| %-8s | %9.0f | %9.0f | %9.0f |\n", timing.name().c_str(), timing.median_us(),
+              timing.p99_us(), timing.max_us());
+}
+
+void tell(const v1::Metrics& metrics) {
+  std::printf("| stage    | median us |    p99 us |    max us |\n|---|---|---|---|\n");
+  for (const v1::StageTiming& stage : metrics.stages()) tell(stage);
+  tell(metrics.tick());
+  std::printf("worst penetration %g m; %llu State messages and pictures dropped\n",
+              metrics.worst_penetration(), static_cast<unsigned long long>(metrics.dropped()));
+}
+
+void tell(const tests::LoadResult& result, double processor) {
+  std::printf("%llu clients, %llu ticks in %.2f s (%.1f a second), %.2f processors used\n",
+              static_cast<unsigned long long>(result.clients),
+              static_cast<unsigned long long>(result.ticks), result.wallSeconds,
+              double(result.ticks) / result.wallSeconds, processor / result.wallSeconds);
+  std::printf(
+      "%llu commands, %llu replies, %llu refused; %llu TickEvents, %llu begins, %llu ends\n",
+      static_cast<unsigned long long>(result.commands),
+      static_cast<unsigned long long>(result.replies),
+      static_cast<unsigned long long>(result.refused),
+      static_cast<unsigned long long>(result.tickEvents),
+      static_cast<unsigned long long>(result.begins), static_cast<unsigned long long>(result.ends));
+  std::printf("%llu states seen, %llu dropped\n", static_cast<unsigned long long>(result.states),
+              static_cast<unsigned long long>(result.droppedStates));
+  for (const auto& [name, ticks] :
+       {std::pair{"taken", &result.acceptedToShown}, std::pair{"sent", &result.sentToShown}}) {
+    std::printf("ticks from %s to shown: p50 %llu, p99 %llu, most %llu, of %zu commands\n", name,
+                static_cast<unsigned long long>(quantile(*ticks, 0.5)),
+                static_cast<unsigned long long>(quantile(*ticks, 0.99)),
+                static_cast<unsigned long long>(quantile(*ticks, 1)), ticks->size());
+  }
+  for (const std::string& fault : result.faults) std::printf("FAULT %s\n", fault.c_str());
+}
+
+server::ServerOptions roomForMany() {
+  server::ServerOptions options;
+  options.world.limits.connections = 4096;
+  return options;
+}
+
+bool load(const std::shared_ptr<const scene::Scene>& scene, int clients, double seconds,
+          double stateRate) {
+  server::Server server(scene, {"127.0.0.1", 0}, roomForMany());
+  tests::LoadOptions options;
+  options.port = server.port();
+  options.places = tests::standingPlaces(scene, clients, 1);
+  options.seconds = seconds;
+  options.stateRate = stateRate;
+  const double before = processorSeconds();
+  double used = 0;
+  v1::Metrics metrics;
+  const auto atEnd = [&] {
+    used = processorSeconds() - before;
+    metrics = protocol::Client("127.0.0.1", server.port()).metrics();
+  };
+  const tests::LoadResult result = tests::runLoad(options, atEnd, [&] { server.stop(); });
+  tell(result, used);
+  tell(metrics);
+  return result.faults.empty() && result.begins == result.ends;
+}
+
+void tell(const char* when, const tests::Footprint& now) {
+  std::printf("%-18s %7.1f MB resident, %llu descriptors, %llu threads\n", when,
+              1e-6 * static_cast<double>(now.residentBytes),
+              static_cast<unsigned long long>(now.descriptors),
+              static_cast<unsigned long long>(now.threads));
+}
+
+/// Comes back when the server has forgotten all but the one who asks.
+bool settled(protocol::Client& client) {
+  constexpr int kTries = 1000;
+  for (int i = 0; i < kTries && client.metrics().clients() > 1; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  ::malloc_trim(0);  // what the allocator keeps for later is no leak
+  return client.metrics().clients() == 1;
+}
+
+bool visit(const std::shared_ptr<const scene::Scene>& scene, int visits) {
+  constexpr double kGrowth = 2e6;  // bytes; 2,000 sessions hold over 100 MB
+  server::Server server(scene, {"127.0.0.1", 0}, roomForMany());
+  protocol::Client stays("127.0.0.1", server.port());
+  tests::visitRudely(server.port(), visits / 10, 1);
+  if (!settled(stays)) return false;
+  const tests::Footprint before = tests::footprint();
+  tests::visitRudely(server.port(), visits, 2);
+  const bool alone = settled(stays);
+  const tests::Footprint after = tests::footprint();
+  std::printf("%d visits:\n", visits);
+  tell("before", before);
+  tell("after", after);
+  return alone && after.descriptors == before.descriptors && after.threads == before.threads &&
+         double(after.residentBytes) < double(before.residentBytes) + kGrowth;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (const auto code = scene::runImportChild(argc, argv)) return *code;
+  spdlog::set_level(spdlog::level::warn);
+  const int clients = argc > 1 ? std::atoi(argv[1]) : 200;
+  const double seconds = argc > 2 ? std::atof(argv[2]) : 10;
+  const int visits = argc > 3 ? std::atoi(argv[3]) : 2000;
+  const double stateRate = argc > 4 ? std::atof(argv[4]) : 0;
+  const auto built = std::filesystem::absolute(argv[0]).parent_path().parent_path();
+  const auto scene = std::make_shared<const scene::Scene>(
+      scene::loadModel(built / "assets/building.glb", {}, scene::modelCacheOfEnvironment()).model);
+  const bool right = load(scene, clients, seconds, stateRate);
+  const bool clean = visits == 0 || visit(scene, visits);
+  return right && clean ? 0 : 3;
+}

@@ -1,0 +1,235 @@
+#include "protocol/async_client.hpp"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+
+#include "tests/protocol/test_server.hpp"
+
+namespace enfilade::protocol {
+namespace {
+
+constexpr std::chrono::milliseconds kPatience{10'000};
+constexpr int kMostTurns = 10'000;
+
+/// Advances until `done` holds or the connection is over.
+template <typename Done>
+bool runUntil(AsyncClient& client, const Done& done) {
+  for (int i = 0; i < kMostTurns && !done(); ++i) {
+    if (!client.run(kPatience)) break;
+  }
+  return done();
+}
+
+v1::ClientMessage metricsRequest() {
+  v1::ClientMessage message;
+  message.mutable_metrics();
+  return message;
+}
+
+v1::ServerMessage metricsReply(const v1::ClientMessage& request, std::uint64_t ticks) {
+  v1::ServerMessage reply;
+  reply.set_reply_to(request.request_id());
+  reply.mutable_metrics()->set_ticks(ticks);
+  return reply;
+}
+
+v1::ServerMessage eventsOf(std::uint64_t sequence) {
+  v1::ServerMessage message;
+  message.mutable_events()->set_sequence(sequence);
+  return message;
+}
+
+TEST(AsyncClient, GreetsWithoutWaitingAndTellsTheWelcomeFirst) {
+  const TestServer server([](TestConnection& connection) {
+    connection.greet();
+    connection.send(eventsOf(1));
+    connection.untilClosed();
+  });
+  std::vector<std::string> told;
+  AsyncHandlers handlers;
+  handlers.welcome = [&](const v1::Welcome&) { told.push_back("welcome"); };
+  handlers.events = [&](const v1::TickEvents&) { told.push_back("events"); };
+  AsyncClient client("127.0.0.1", server.port(), handlers);
+  EXPECT_TRUE(told.empty()) << "nobody is told anything before advance()";
+  EXPECT_TRUE(runUntil(client, [&] { return told.size() == 2; }));
+  EXPECT_EQ(told, (std::vector<std::string>{"welcome", "events"}));
+}
+
+TEST(AsyncClient, RepliesComeToWhoAskedInTheOrderOfTheRequests) {
+  constexpr std::uint64_t kRequests = 100;
+  const TestServer server([](TestConnection& connection) {
+    connection.greet();
+    for (std::uint64_t i = 0; i < kRequests; ++i) {
+      connection.send(metricsReply(*connection.receive(), i));
+      connection.send(eventsOf(i + 1));
+    }
+    connection.untilClosed();
+  });
+  std::vector<std::uint64_t> ticks, sequences;
+  AsyncHandlers handlers;
+  handlers.events = [&](const v1::TickEvents& events) { sequences.push_back(events.sequence()); };
+  AsyncClient client("127.0.0.1", server.port(), handlers);
+  for (std::uint64_t i = 0; i < kRequests; ++i) {
+    client.request(metricsRequest(),
+                   [&](const Reply& reply) { ticks.push_back(reply.message.metrics().ticks()); });
+  }
+  EXPECT_TRUE(runUntil(client, [&] { return sequences.size() == kRequests; }));
+  ASSERT_EQ(ticks.size(), kRequests);
+  for (std::uint64_t i = 0; i < kRequests; ++i) EXPECT_EQ(ticks[i], i);
+  EXPECT_EQ(client.underWay(), 0u);
+}
+
+TEST(AsyncClient, AFutureGetsTheReplyWithItsAttachment) {
+  const TestServer server([](TestConnection& connection) {
+    connection.greet();
+    const std::vector<std::uint8_t> pixels{1, 2, 3};
+    connection.send(metricsReply(*connection.receive(), 7), pixels);
+    connection.untilClosed();
+  });
+  AsyncClient client("127.0.0.1", server.port(), {});
+  std::future<Reply> future = client.request(metricsRequest());
+  runUntil(client, [&] { return client.underWay() == 0; });
+  const Reply reply = future.get();
+  EXPECT_EQ(reply.message.metrics().ticks(), 7u);
+  EXPECT_EQ(reply.attachment, (std::vector<std::uint8_t>{1, 2, 3}));
+  EXPECT_FALSE(reply.lost);
+}
+
+TEST(AsyncClient, NobodyThereIsToldAndNotThrown) {
+  std::uint16_t port = 0;
+  {
+    const TestServer server([](TestConnection&) {});
+    port = server.port();
+    AsyncClient knock("127.0.0.1", port, {});
+    knock.run(kPatience);
+  }
+  std::optional<v1::Error> why;
+  AsyncHandlers handlers;
+  handlers.closed = [&](const v1::Error& error) { why = error; };
+  AsyncClient client("127.0.0.1", port, handlers);
+  EXPECT_TRUE(runUntil(client, [&] { return why.has_value(); }));
+  EXPECT_NE(why->message().find("cannot connect to 127.0.0.1:"), std::string::npos)
+      << why->message();
+  EXPECT_EQ(client.descriptor(), -1);
+}
+
+TEST(AsyncClient, WhatIsUnderWayWhenTheConnectionEndsIsToldAsLost) {
+  const TestServer server([](TestConnection& connection) {
+    connection.greet();
+    connection.receive();
+    v1::ServerMessage bye;
+    bye.mutable_bye()->set_code(v1::ERROR_SHUTTING_DOWN);
+    bye.mutable_bye()->set_reason("the server ends");
+    connection.send(bye);
+  });
+  std::vector<std::string> told;
+  AsyncHandlers handlers;
+  handlers.closed = [&](const v1::Error& why) {
+    EXPECT_EQ(why.code(), v1::ERROR_SHUTTING_DOWN);
+    EXPECT_NE(why.message().find("the server ends"), std::string::npos) << why.message();
+    told.push_back("closed");
+  };
+  AsyncClient client("127.0.0.1", server.port(), handlers);
+  for (int i = 0; i < 2; ++i) {
+    client.request(metricsRequest(), [&](const Reply& reply) {
+      EXPECT_TRUE(reply.lost);
+      EXPECT_EQ(reply.message.error().code(), v1::ERROR_SHUTTING_DOWN);
+      told.push_back("lost");
+    });
+  }
+  runUntil(client, [&] { return told.size() == 3; });
+  client.request(metricsRequest(), [&](const Reply& reply) {
+    EXPECT_TRUE(reply.lost);
+    told.push_back("late");
+  });
+  EXPECT_EQ(told, (std::vector<std::string>{"lost", "lost", "closed", "late"}));
+}
+
+TEST(AsyncClient, MayBeDestroyedInAnyOfItsFunctions) {
+  for (const std::string where : {"welcome", "events", "reply", "lost", "closed"}) {
+    const TestServer server([](TestConnection& connection) {
+      connection.greet();
+      connection.send(metricsReply(*connection.receive(), 1));
+      connection.send(eventsOf(1));
+      connection.receive();
+    });
+    std::optional<AsyncClient> client;
+    int calls = 0;
+    const auto destroyAt = [&](const std::string& here) {
+      EXPECT_TRUE(client) << here << " was told after " << where;
+      ++calls;
+      if (here == where) client.reset();
+    };
+    AsyncHandlers handlers;
+    handlers.welcome = [&](const v1::Welcome&) { destroyAt("welcome"); };
+    handlers.events = [&](const v1::TickEvents&) { destroyAt("events"); };
+    handlers.closed = [&](const v1::Error&) { destroyAt("closed"); };
+    client.emplace("127.0.0.1", server.port(), handlers);
+    client->request(metricsRequest(), [&](const Reply&) { destroyAt("reply"); });
+    client->request(metricsRequest(), [&](const Reply&) { destroyAt("lost"); });
+    for (int i = 0; i < kMostTurns && client && client->run(kPatience); ++i) {
+    }
+    EXPECT_FALSE(client) << where;
+    EXPECT_GT(calls, 0);
+  }
+}
+
+TEST(AsyncClient, DestructionBreaksFuturesAndTellsNobody) {
+  const TestServer server([](TestConnection& connection) {
+    connection.greet();
+    connection.untilClosed();
+  });
+  std::future<Reply> future;
+  {
+    AsyncClient client("127.0.0.1", server.port(), {});
+    future = client.request(metricsRequest());
+    client.request(metricsRequest(), [](const Reply&) { ADD_FAILURE() << "it is gone"; });
+  }
+  EXPECT_THROW(future.get(), std::future_error);
+}
+
+TEST(AsyncClient, TakesSoManyRequestsAndNoMore) {
+  const TestServer server([](TestConnection& connection) {
+    connection.greet();
+    connection.untilClosed();
+  });
+  AsyncOptions options;
+  options.requestsUnderWay = 4;  // the hello is one
+  AsyncClient client("127.0.0.1", server.port(), {}, options);
+  for (int i = 0; i < 3; ++i) client.request(metricsRequest(), [](const Reply&) {});
+  EXPECT_THROW(client.request(metricsRequest(), [](const Reply&) {}), TooManyRequests);
+}
+
+TEST(AsyncClient, RefusesAServerOfAnotherVersion) {
+  const TestServer server([](TestConnection& connection) {
+    v1::ServerMessage welcome = welcomeTo(*connection.receive());
+    welcome.mutable_welcome()->set_protocol_version("2.0.0");
+    connection.sendRaw(std::string(kMagic.begin(), kMagic.end()));
+    connection.send(welcome);
+    connection.untilClosed();
+  });
+  std::optional<v1::Error> why;
+  AsyncHandlers handlers;
+  handlers.welcome = [](const v1::Welcome&) { ADD_FAILURE(); };
+  handlers.closed = [&](const v1::Error& error) { why = error; };
+  AsyncClient client("127.0.0.1", server.port(), handlers);
+  ASSERT_TRUE(runUntil(client, [&] { return why.has_value(); }));
+  EXPECT_EQ(why->code(), v1::ERROR_VERSION);
+}
+
+TEST(AsyncClient, NoiseInTheAnswerEndsTheConnection) {
+  const TestServer server([](TestConnection& connection) {
+    connection.sendRaw("HTTP/1.1 400 Bad Request\r\n\r\n");
+    connection.untilClosed();
+  });
+  std::optional<v1::Error> why;
+  AsyncHandlers handlers;
+  handlers.closed = [&](const v1::Error& error) { why = error; };
+  AsyncClient client("127.0.0.1", server.port(), handlers);
+  ASSERT_TRUE(runUntil(client, [&] { return why.has_value(); }));
+  EXPECT_NE(why->message().find("does not speak this protocol"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace enfilade::protocol

@@ -1,0 +1,78 @@
+// A small load: what `./dev bench server` does with hundreds of clients, for seconds.
+#include <array>
+#include <cstdio>
+#include <thread>
+
+#include "tests/server/served_room.hpp"
+#include "tests/support/server_load.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+class Load : public ServedRoom {};
+
+std::string listed(const std::vector<std::string>& faults) {
+  std::string all;
+  for (const std::string& fault : faults) all += fault + "\n";
+  return all;
+}
+
+TEST_F(Load, TwentyClientsHearEveryEventOnce) {
+  constexpr int kClients = 20;
+  const auto room = smallRoom();
+  serve({}, room);
+  tests::LoadOptions options;
+  options.port = server_->port();
+  options.places = tests::standingPlaces(room, kClients, 1);
+  ASSERT_EQ(options.places.size(), std::size_t{kClients});
+  const tests::LoadResult result = tests::runLoad(
+      options, [] {}, [this] { server_->stop(); });
+  EXPECT_TRUE(result.faults.empty()) << listed(result.faults);
+  EXPECT_EQ(result.welcomed, result.clients);
+  EXPECT_EQ(result.spawned, result.clients);
+  EXPECT_EQ(result.closedInPeace, result.clients);
+  EXPECT_EQ(result.replies, result.commands);
+  EXPECT_EQ(result.refused, 0u);
+  EXPECT_GT(result.begins, 0u) << "nobody met anything";
+  EXPECT_EQ(result.begins, result.ends) << "all hear of all contacts, and all end with the server";
+  EXPECT_FALSE(result.acceptedToShown.empty());
+}
+
+TEST_F(Load, VisitorsLeaveNothingBehind) {
+  serve();
+  protocol::Client other = client("other");
+  tests::visitRudely(server_->port(), 20, 1);  // what is made once is made now
+  const auto alone = [&] {
+    for (int i = 0; i < 2000 && other.metrics().clients() > 1; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return other.metrics().clients() == 1;
+  };
+  ASSERT_TRUE(alone());
+  const tests::Footprint before = tests::footprint();
+  tests::visitRudely(server_->port(), 100, 2);
+  ASSERT_TRUE(alone());
+  EXPECT_EQ(tests::footprint().threads, before.threads);
+  // A session is gone from the world a moment before its socket is.
+  for (int i = 0; i < 2000 && tests::footprint().descriptors > before.descriptors; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_EQ(tests::footprint().descriptors, before.descriptors);
+  EXPECT_EQ(other.step().tick(), 1u);
+}
+
+TEST_F(Load, TheExampleClientWalksUntilTheWallStopsIt) {
+  serve();
+  const std::string command =
+      std::string(ENFILADE_EXAMPLE_CLIENT) + " " + std::to_string(server_->port());
+  const std::unique_ptr<FILE, int (*)(FILE*)> output(::popen(command.c_str(), "r"), &::pclose);
+  ASSERT_TRUE(output);
+  std::string text;
+  std::array<char, 4096> some{};
+  while (std::fgets(some.data(), some.size(), output.get())) text += some.data();
+  EXPECT_NE(text.find("KIND_BEGIN ann room_floor"), std::string::npos) << text;
+  EXPECT_NE(text.find("KIND_BLOCKED ann room_wall"), std::string::npos) << text;
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing

@@ -1,0 +1,368 @@
+#include "tests/support/server_load.hpp"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <deque>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <optional>
+#include <random>
+#include <set>
+
+#include "protocol/async_client.hpp"
+#include "scene/world.hpp"
+#include "tests/server/raw_connection.hpp"
+
+namespace enfilade::tests {
+
+using collision::Vec3;
+using Clock = std::chrono::steady_clock;
+
+namespace {
+
+double uniform(std::mt19937_64& random, double low, double high) {
+  return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
+}
+
+}  // namespace
+
+std::vector<Vec3> standingPlaces(std::shared_ptr<const scene::Scene> still, int count,
+                                 unsigned seed) {
+  constexpr int kTries = 400;  // for each place
+  const scene::Box bounds = still->bounds();
+  scene::World world(std::move(still));
+  std::mt19937_64 random(seed);
+  std::vector<Vec3> places;
+  for (int i = 0; i < kTries * count && static_cast<int>(places.size()) < count; ++i) {
+    const double x = uniform(random, bounds.min.x(), bounds.max.x());
+    const double y = uniform(random, bounds.min.y(), bounds.min.y() + 0.7 * bounds.size().y());
+    const double z = uniform(random, bounds.min.z(), bounds.max.z());
+    scene::submit(world, {"p" + std::to_string(i), scene::Spawn{Vec3(x, y, z)}, 0});
+    const scene::TickReport report = scene::tick(world);
+    for (const scene::Notice& notice : report.notices) {
+      if (notice.kind == scene::Notice::Kind::spawned) places.push_back(notice.position);
+    }
+  }
+  return places;
+}
+
+// ---- load --------------------------------------------------------------------------------------
+
+namespace {
+
+constexpr std::size_t kMostFaults = 3;  // told of one client
+
+struct Told {
+  std::uint64_t firstTick = 0;  ///< that sees the command
+  std::uint64_t heardTick = 0;  ///< when it was sent
+  Vec3 velocity;
+};
+
+/// One client, and what it must hear.
+class Visitor {
+ public:
+  Visitor(std::size_t number, const LoadOptions& options, LoadResult& result)
+      : options_(options),
+        result_(result),
+        name_("load" + std::to_string(number)),
+        random_(number + 1),
+        client_("127.0.0.1", options.port, handlers(), clientOptions()) {
+    subscribe();
+    spawn(options.places[number]);
+  }
+  Visitor(const Visitor&) = delete;
+
+  protocol::AsyncClient& client() { return client_; }
+  bool ready() const { return present_; }
+  bool over() const { return over_; }
+  bool answered() const { return client_.underWay() == 0; }
+  std::uint64_t heardTick() const { return heardTick_; }
+
+  void runClock() {
+    v1::ClientMessage message;
+    message.mutable_set_clock()->mutable_free_run()->set_speed(1);
+    ask(std::move(message), [](const protocol::Reply&) {});
+  }
+
+  /// A new way each time, so that a State shows which command it follows.
+  void drive() {
+    const double angle = uniform(random_, 0, 2 * std::numbers::pi);
+    const double speed = uniform(random_, 0.5, 1.5);
+    Told told{0, heardTick_, speed * Vec3(std::cos(angle), 0, std::sin(angle))};
+    v1::ClientMessage message;
+    message.mutable_command()->set_avatar(name_);
+    v1::Vec3& velocity = *message.mutable_command()->mutable_drive()->mutable_velocity();
+    velocity.set_x(told.velocity.x());
+    velocity.set_z(told.velocity.z());
+    ++result_.commands;
+    ask(std::move(message), [this, told](const protocol::Reply& reply) mutable {
+      ++result_.replies;
+      if (!reply.message.command().accepted()) {
+        ++result_.refused;
+        return;
+      }
+      told.firstTick = reply.message.command().tick();
+      told_.push_back(told);
+    });
+  }
+
+  void checkEnd() {
+    if (!open_.empty()) fault(std::to_string(open_.size()) + " contacts never ended");
+    if (lost_ > 0) fault(std::to_string(lost_) + " requests were not answered");
+  }
+
+ private:
+  protocol::AsyncOptions clientOptions() const {
+    protocol::AsyncOptions options;
+    options.name = name_;
+    return options;
+  }
+
+  protocol::AsyncHandlers handlers() {
+    protocol::AsyncHandlers handlers;
+    handlers.welcome = [this](const v1::Welcome& welcome) {
+      ++result_.welcomed;
+      tick_ = welcome.policies().tick();
+    };
+    handlers.events = [this](const v1::TickEvents& events) { hear(events); };
+    handlers.state = [this](const v1::State& state) { see(state); };
+    handlers.closed = [this](const v1::Error& why) {
+      over_ = true;
+      if (why.code() != v1::ERROR_SHUTTING_DOWN) return fault("cut off: " + why.message());
+      ++result_.closedInPeace;
+    };
+    return handlers;
+  }
+
+  void ask(v1::ClientMessage message, protocol::AsyncClient::OnReply onReply) {
+    client_.request(std::move(message), [this, onReply](protocol::Reply reply) {
+      const bool closing = reply.message.error().code() == v1::ERROR_SHUTTING_DOWN;
+      if (reply.lost && !closing) ++lost_;
+      if (reply.message.has_error() && !closing) fault(reply.message.error().message());
+      onReply(std::move(reply));
+    });
+  }
+
+  void subscribe() {
+    v1::ClientMessage message;
+    v1::Subscribe& wanted = *message.mutable_subscribe();
+    wanted.set_contacts(true);
+    wanted.set_notices(true);
+    wanted.set_state(true);
+    wanted.set_state_rate(options_.stateRate);
+    ask(std::move(message), [this](const protocol::Reply& reply) {
+      for (const v1::ContactEvent& live : reply.message.subscribe().live()) {
+        open_.insert({live.a(), live.b()});
+      }
+    });
+  }
+
+  void spawn(const Vec3& place) {
+    v1::ClientMessage message;
+    message.mutable_command()->set_avatar(name_);
+    v1::Vec3& at = *message.mutable_command()->mutable_spawn()->mutable_at();
+    at.set_x(place.x());
+    at.set_y(place.y() + 0.01);
+    at.set_z(place.z());
+    ask(std::move(message), [](const protocol::Reply&) {});
+  }
+
+  void hear(const v1::TickEvents& events) {
+    ++result_.tickEvents;
+    if (events.sequence() != ++sequence_) {
+      fault("TickEvents " + std::to_string(events.sequence()) + " came in the place of " +
+            std::to_string(sequence_));
+      sequence_ = events.sequence();
+    }
+    for (const v1::ContactEvent& event : events.contacts()) {
+      const std::pair pair{event.a(), event.b()};
+      if (event.kind() == v1::ContactEvent::KIND_BEGIN) {
+        ++result_.begins;
+        if (!open_.insert(pair).second) fault("a contact began twice");
+      } else if (event.kind() == v1::ContactEvent::KIND_END) {
+        ++result_.ends;
+        if (open_.erase(pair) == 0) fault("a contact ended that had not begun");
+      }
+    }
+    for (const v1::Notice& notice : events.notices()) {
+      if (notice.avatar() != name_) continue;
+      if (notice.kind() == v1::Notice::KIND_SPAWNED) {
+        present_ = true;
+        ++result_.spawned;
+      }
+      if (notice.kind() == v1::Notice::KIND_REFUSED) fault("refused: " + notice.text());
+    }
+  }
+
+  void see(const v1::State& state) {
+    ++result_.states;
+    result_.droppedStates += state.dropped();
+    if (state.tick() <= heardTick_ && heardTick_ != 0) fault("a State came out of order");
+    heardTick_ = state.tick();
+    if (told_.empty()) return;
+    for (const v1::AvatarState& avatar : state.avatars()) {
+      if (avatar.name() != name_) continue;
+      follow(state.tick(), Vec3(avatar.move().asked().x(), 0, avatar.move().asked().z()) / tick_);
+      return;
+    }
+  }
+
+  /// The newest command that the avatar follows was shown now, and those before it gave way.
+  void follow(std::uint64_t tick, const Vec3& velocity) {
+    constexpr double kSame = 1e-6;  // metres per second; commands differ by far more
+    for (std::size_t i = told_.size(); i-- > 0;) {
+      if ((told_[i].velocity - velocity).norm() > kSame) continue;
+      result_.acceptedToShown.push_back(tick + 1 - told_[i].firstTick);
+      result_.sentToShown.push_back(tick - told_[i].heardTick);
+      told_.erase(told_.begin(), told_.begin() + static_cast<std::ptrdiff_t>(i + 1));
+      return;
+    }
+  }
+
+  void fault(const std::string& text) {
+    if (faults_++ < kMostFaults) result_.faults.push_back(name_ + ": " + text);
+  }
+
+  const LoadOptions& options_;
+  LoadResult& result_;
+  const std::string name_;
+  std::mt19937_64 random_;
+  double tick_ = 1;  ///< seconds
+  bool present_ = false, over_ = false;
+  std::uint64_t sequence_ = 0, heardTick_ = 0, lost_ = 0;
+  std::size_t faults_ = 0;
+  std::set<std::pair<std::uint32_t, std::uint32_t>> open_;
+  std::deque<Told> told_;  ///< accepted, and not shown yet
+  protocol::AsyncClient client_;
+};
+
+using Visitors = std::vector<std::unique_ptr<Visitor>>;
+
+/// Lets all that can go on do so; waits up to `patience` where nobody can.
+void turn(Visitors& visitors, std::chrono::milliseconds patience) {
+  std::vector<pollfd> sockets;
+  for (const auto& visitor : visitors) {
+    sockets.push_back({visitor->client().descriptor(), visitor->client().wanted(), 0});
+  }
+  ::poll(sockets.data(), sockets.size(), static_cast<int>(patience.count()));
+  for (std::size_t i = 0; i < visitors.size(); ++i) {
+    if (sockets[i].revents != 0 || (sockets[i].fd < 0 && !visitors[i]->over())) {
+      visitors[i]->client().advance();
+    }
+  }
+}
+
+/// False when it took too long.
+bool turnUntil(Visitors& visitors, const std::function<bool(const Visitor&)>& done) {
+  constexpr std::chrono::seconds kPatience{60};
+  const auto giveUp = Clock::now() + kPatience;
+  const auto all = [&] {
+    return std::all_of(visitors.begin(), visitors.end(),
+                       [&](const auto& visitor) { return done(*visitor); });
+  };
+  while (!all() && Clock::now() < giveUp) turn(visitors, std::chrono::milliseconds(10));
+  return all();
+}
+
+/// Everyone drives at the rate, each at an own moment of the period.
+void driveAll(Visitors& visitors, const LoadOptions& options) {
+  const auto start = Clock::now();
+  const std::chrono::duration<double> period(1 / options.commandRate);
+  const auto steps =
+      static_cast<std::size_t>(options.seconds * options.commandRate) * visitors.size();
+  for (std::size_t step = 0; step < steps; ++step) {
+    const auto due = start + period * (static_cast<double>(step) / double(visitors.size()));
+    while (Clock::now() < due) {
+      const auto left = std::chrono::ceil<std::chrono::milliseconds>(due - Clock::now());
+      turn(visitors, left);
+    }
+    Visitor& visitor = *visitors[step % visitors.size()];
+    if (!visitor.over()) visitor.drive();
+    if (step % 8 == 0) turn(visitors, std::chrono::milliseconds(0));
+  }
+}
+
+}  // namespace
+
+LoadResult runLoad(const LoadOptions& options, const std::function<void()>& beforeStop,
+                   const std::function<void()>& stop) {
+  LoadResult result;
+  result.clients = options.places.size();
+  Visitors visitors;
+  for (std::size_t i = 0; i < options.places.size(); ++i) {
+    visitors.push_back(std::make_unique<Visitor>(i, options, result));
+    turn(visitors, std::chrono::milliseconds(0));
+  }
+  visitors.front()->runClock();
+  if (!turnUntil(visitors, [](const Visitor& one) { return one.ready() || one.over(); })) {
+    result.faults.push_back("not everyone was spawned in time");
+  }
+  const auto begin = Clock::now();
+  const std::uint64_t firstTick = visitors.front()->heardTick();
+  driveAll(visitors, options);
+  result.wallSeconds = std::chrono::duration<double>(Clock::now() - begin).count();
+  result.ticks = visitors.front()->heardTick() - firstTick;
+  const auto settled = [](const Visitor& one) { return one.over() || one.answered(); };
+  if (!turnUntil(visitors, settled)) result.faults.push_back("requests wait for their answers");
+  beforeStop();
+  stop();
+  if (!turnUntil(visitors, [](const Visitor& one) { return one.over(); })) {
+    result.faults.push_back("not everyone was told goodbye");
+  }
+  for (const auto& visitor : visitors) visitor->checkEnd();
+  std::sort(result.acceptedToShown.begin(), result.acceptedToShown.end());
+  std::sort(result.sentToShown.begin(), result.sentToShown.end());
+  return result;
+}
+
+// ---- visits ------------------------------------------------------------------------------------
+
+void visitRudely(std::uint16_t port, int count, unsigned seed) {
+  using server::testing::RawConnection;
+  std::mt19937_64 random(seed);
+  for (int i = 0; i < count; ++i) {
+    RawConnection raw(port);
+    const auto manner = random() % 6;
+    if (manner == 0) continue;  // closes at once
+    raw.sendHello();
+    if (manner == 1) continue;  // does not wait for the welcome
+    if (manner == 2) raw.receive();
+    if (manner <= 3) {
+      raw.send(std::vector<std::uint8_t>{100, 0, 0, 0, 50, 0, 0, 0, 1, 2, 3});
+      continue;  // in the middle of a message
+    }
+    raw.receive();
+    if (manner == 4) {
+      raw.closeSending();
+      raw.receive();
+      continue;
+    }
+    v1::ClientMessage bye;
+    bye.mutable_bye();
+    raw.send(bye);
+    raw.readToEnd();
+  }
+}
+
+Footprint footprint() {
+  const auto entries = [](const char* folder) {
+    std::uint64_t count = 0;
+    for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder)) ++count;
+    return count;
+  };
+  Footprint now;
+  std::ifstream statm("/proc/self/statm");
+  std::uint64_t pages = 0;
+  statm >> pages >> now.residentBytes;
+  now.residentBytes *= static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  now.descriptors = entries("/proc/self/fd");
+  now.threads = entries("/proc/self/task");
+  return now;
+}
+
+}  // namespace enfilade::tests
