@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 
+#include "protocol/mcap/reader.hpp"
 #include "scene/audit.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/rotation.hpp"
@@ -29,7 +30,10 @@ struct Arguments {
   std::string tokenFile;
   Access access;
   std::vector<std::filesystem::path> furtherScenes;
-  std::string auditEvery = "0", epsilon, stepHeight, slope, sliding = "slide";
+  std::string before, after, recording;
+  double tolerance = 0.001;
+  std::uint32_t pictures = 12;
+  std::string auditEvery = "0", epsilon, stepHeight, nearMiss, slope, sliding = "slide";
 };
 
 std::string unitProblem(const std::string& text) {
@@ -106,6 +110,9 @@ void addMotion(CLI::App& verb, Arguments& into) {
       ->check(lengthCheck(&scene::Lengths::stepHeight));
   verb.add_option("--epsilon", into.epsilon, "Movers rest so far from what they lean on (0.0005)")
       ->check(lengthCheck(&scene::Lengths::epsilon));
+  verb.add_option("--near-miss", into.nearMiss,
+                  "Tell pairs that come nearer than this without contact; 0: none (0)")
+      ->check(lengthCheck(&scene::Lengths::nearMiss));
   verb.add_option("--slope", into.slope, "Steepest ground that is stood on, in degrees (50)")
       ->check(CLI::Validator(slopeProblem, "DEGREES"));
   verb.add_option("--sliding", into.sliding, "What blocks an avatar turns or stops it")
@@ -117,6 +124,7 @@ scene::Lengths lengthsFrom(const Arguments& read) {
   scene::Lengths lengths;
   if (!read.stepHeight.empty()) setLength(lengths, &scene::Lengths::stepHeight, read.stepHeight);
   if (!read.epsilon.empty()) setLength(lengths, &scene::Lengths::epsilon, read.epsilon);
+  if (!read.nearMiss.empty()) setLength(lengths, &scene::Lengths::nearMiss, read.nearMiss);
   // The heading's cosine is the same on every processor, as what decides motion must be.
   if (!read.slope.empty())
     lengths.walkableNormalY = scene::headingFromDegrees(*numberFrom<double>(read.slope)).x();
@@ -188,6 +196,32 @@ void addInspect(CLI::App& verb, Arguments& into) {
       ->check(CLI::Validator(folderProblem, "DIR"));
 }
 
+void addTolerance(CLI::App& verb, Arguments& into) {
+  verb.add_option("--tolerance", into.tolerance,
+                  "Metres by which places and clearances may differ untold")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1000.0));
+}
+
+void addDiff(CLI::App& verb, Arguments& into) {
+  verb.add_option("BEFORE", into.before, "The earlier walk's recording (MCAP)")->required();
+  verb.add_option("AFTER", into.after, "The later walk's recording")->required();
+  verb.add_flag("--json", into.json, "Tell it as one JSON object");
+  addTolerance(verb, into);
+  verb.footer(
+      "Ends with 3 when something got worse: a contact (with anything but the ground), a blocked "
+      "move or a fall out of the scene that is new, an order that went well and does not any more, "
+      "a clearance that is smaller by more than the tolerance. Ends with 0 otherwise.");
+}
+
+void addExport(CLI::App& verb, Arguments& into) {
+  verb.add_option("RECORDING", into.recording, "The recording (MCAP)")->required();
+  verb.add_option("--out", into.out,
+                  "Folder for contacts.jsonl, the ways as TUM text, and cameras.glb")
+      ->required()
+      ->check(CLI::Validator(folderProblem, "DIR"));
+}
+
 void addDoctor(CLI::App& verb, DoctorCommand& into) {
   verb.add_flag("--json", into.json, "Tell it as one JSON object");
   verb.add_flag("--require-gpu", into.requireGpu, "End with 1 when only a CPU draws");
@@ -216,8 +250,16 @@ VerifyCommand verifyFrom(const Arguments& read) {
   return {read.model.file, read.script, !read.model.noCache};
 }
 
+RewalkCommand rewalkFrom(const Arguments& read) {
+  return {modelFrom(read.model), read.script, read.out,      read.record,
+          read.tolerance,        read.json,   read.pictures, drawingFrom(read)};
+}
+
 /// What a replay that verifies nothing cannot do without.
 std::optional<std::string> missingFrom(const Arguments& read) {
+  if (read.script.empty() && protocol::mcap::isMcap(read.model.file))
+    return "SCENE is required: the model to make the recorded walk again in; --verify and "
+           "`enfilade export` take a recording alone";
   if (read.script.empty()) return "SCRIPT is required: the walk, JSON lines (protocol/SCRIPT.md)";
   if (read.out.empty()) return "--out is required: a folder for the pictures, contacts and summary";
   return std::nullopt;
@@ -259,7 +301,8 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   addRenderer(*serve, read);
   addAudit(*serve, read);
   addMotion(*serve, read);
-  CLI::App* replay = app.add_subcommand("replay", "Run a walk script in a scene, in process");
+  CLI::App* replay =
+      app.add_subcommand("replay", "Run a walk script, or a recorded walk, in a scene");
   addModel(*replay, read.model);
   addWalk(*replay, read);
   addDevice(*replay, read);
@@ -271,6 +314,22 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   for (const char* needless : {"SCRIPT", "--out"}) replay->get_option(needless)->required(false);
   replay->add_flag("--verify", read.verify,
                    "[SCENE] RECORDING: make a recorded walk again; ends with 4 where it differs");
+  replay->add_flag("--json", read.json, "SCENE RECORDING: print what changed as one JSON object");
+  replay
+      ->add_option("--pictures", read.pictures,
+                   "SCENE RECORDING: of how many changes pictures are made, the worst first")
+      ->capture_default_str()
+      ->check(CLI::Range(0U, 1000U));
+  addTolerance(*replay, read);
+  replay->footer(
+      "SCENE RECORDING makes a recorded walk again in another model, writes what changed to "
+      "diff.txt, diff.json and changes/, and ends with 3 when something got worse, as `enfilade "
+      "diff` has it.");
+  CLI::App* diff = app.add_subcommand("diff", "Tell what changed between two recorded walks");
+  addDiff(*diff, read);
+  CLI::App* exporting =
+      app.add_subcommand("export", "Write a recording's contacts and ways as text and glTF");
+  addExport(*exporting, read);
   CLI::App* capture =
       app.add_subcommand("capture", "Take pictures along a camera path: colour, depth, ids");
   addModel(*capture, read.model);
@@ -284,8 +343,8 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   CLI::App* doctor =
       app.add_subcommand("doctor", "Try each device that could draw: is anything missing?");
   addDoctor(*doctor, read.doctor);
-  CLI::App* inspect =
-      app.add_subcommand("inspect", "Tell what is in a scene, and what is wrong with it");
+  CLI::App* inspect = app.add_subcommand(
+      "inspect", "Tell what is in a scene or a recording, and what is wrong with it");
   addModel(*inspect, read.model);
   addInspect(*inspect, read);
   try {
@@ -318,6 +377,7 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
       std::cerr << "enfilade: " << *missing << "\nenfilade replay --help tells what there is\n";
       return ExitCode::usage;
     }
+    if (protocol::mcap::isMcap(read.script)) return rewalkFrom(read);
     return ReplayCommand{modelFrom(read.model), read.script, read.out,         read.strict, audit,
                          lengthsFrom(read),     read.record, drawingFrom(read)};
   }
@@ -328,6 +388,8 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
                           picturesFrom(read.capture),
                           captureRunFrom(read.capture),
                           read.device};
+  if (*diff) return DiffCommand{read.before, read.after, read.tolerance, read.json};
+  if (*exporting) return ExportCommand{read.recording, read.out};
   if (*doctor) return read.doctor;
   if (*inspect)
     return InspectCommand{modelFrom(read.model), read.json, read.objects, read.strict, read.plan};

@@ -68,6 +68,26 @@ struct VerifyCommand {
   std::filesystem::path recording;
   bool cache = true;
 };
+/// What changed between two recorded walks.
+struct DiffCommand {
+  std::filesystem::path before, after;
+  double tolerance = 0.001;  ///< metres by which places and clearances may differ
+  bool json = false;
+};
+/// A recorded walk, made again in another model and compared.
+struct RewalkCommand {
+  ModelOptions model;
+  std::filesystem::path recording, out;
+  std::filesystem::path record;  ///< the new walk's recording; empty: new.mcap in `out`
+  double tolerance = 0.001;      ///< as DiffCommand's
+  bool json = false;
+  std::uint32_t pictures = 12;  ///< of changes, the most
+  DrawingOptions drawing;
+};
+/// A recording's contacts and ways as files that other programs read.
+struct ExportCommand {
+  std::filesystem::path recording, out;
+};
 struct WalkCommand {
   std::filesystem::path script, out;
   Endpoint connect;
@@ -92,8 +112,9 @@ struct DoctorCommand {
   bool requireGpu = false;    ///< a CPU that draws is not enough
   std::filesystem::path out;  ///< where the proof picture goes; empty: nowhere
 };
-using ProgramCommand = std::variant<DoctorCommand, ServeCommand, ReplayCommand, VerifyCommand,
-                                    CaptureCommand, WalkCommand, InspectCommand>;
+using ProgramCommand =
+    std::variant<DoctorCommand, ServeCommand, ReplayCommand, VerifyCommand, CaptureCommand,
+                 WalkCommand, InspectCommand, DiffCommand, RewalkCommand, ExportCommand>;
 
 /// What to do, or the code to end with at once (--help: done; a mistake: usage). Help goes to
 /// stdout, mistakes and the usage to stderr.

@@ -10,8 +10,10 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "protocol/mcap/reader.hpp"
 #include "render/renderer.hpp"
 #include "server/inspection.hpp"
+#include "server/recordings/inspect_recording.hpp"
 #include "server/storey_plans.hpp"
 
 namespace enfilade::server {
@@ -48,6 +50,8 @@ void drawPlans(const std::shared_ptr<const scene::Scene>& scene,
 }  // namespace
 
 ExitCode inspect(const InspectCommand& command) {
+  if (protocol::mcap::isMcap(command.model.file))
+    return inspectRecording(command.model.file, command.json, command.strict);
   if (!command.plan.empty()) prepareFolder(command.plan);
   const Inspection inspection =
       inspected(loadSceneTimed(command.model),

@@ -7,8 +7,11 @@
 
 #include "server/capture/capture.hpp"
 #include "server/command_line.hpp"
+#include "server/diff/diff.hpp"
+#include "server/diff/rewalk.hpp"
 #include "server/doctor.hpp"
 #include "server/inspect.hpp"
+#include "server/recordings/export.hpp"
 #include "server/serve.hpp"
 #include "server/verify.hpp"
 #include "server/walk_run.hpp"
@@ -23,6 +26,9 @@ struct Do {
   ExitCode operator()(const VerifyCommand& command) const { return verify(command); }
   ExitCode operator()(const CaptureCommand& command) const { return capture(command); }
   ExitCode operator()(const WalkCommand& command) const { return walk(command); }
+  ExitCode operator()(const DiffCommand& command) const { return diff(command); }
+  ExitCode operator()(const RewalkCommand& command) const { return rewalk(command); }
+  ExitCode operator()(const ExportCommand& command) const { return exportRecording(command); }
   ExitCode operator()(const InspectCommand& command) const { return inspect(command); }
 };
 

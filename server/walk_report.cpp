@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/recording.hpp"
+#include "server/event_words.hpp"
 #include "server/world_messages.hpp"
 
 namespace enfilade::server {
@@ -29,69 +30,7 @@ Json jsonOf(const v1::Audit& audit) {
           {"extra", audit.extra()}};
 }
 
-const char* wordOf(v1::ContactEvent::Kind kind) {
-  switch (kind) {
-    case v1::ContactEvent::KIND_BEGIN:
-      return "begin";
-    case v1::ContactEvent::KIND_END:
-      return "end";
-    case v1::ContactEvent::KIND_NEAR:
-      return "near";
-    case v1::ContactEvent::KIND_BLOCKED:
-      return "blocked";
-    case v1::ContactEvent::KIND_ENTER:
-      return "enter";
-    case v1::ContactEvent::KIND_LEAVE:
-      return "leave";
-    case v1::ContactEvent::KIND_LEFT_WORLD:
-      return "left_world";
-    default:
-      return "unknown";
-  }
-}
-
-const char* wordOf(v1::ContactEvent::Reason reason) {
-  switch (reason) {
-    case v1::ContactEvent::REASON_PARTED:
-      return "parted";
-    case v1::ContactEvent::REASON_LEFT:
-      return "left";
-    case v1::ContactEvent::REASON_SHUTDOWN:
-      return "shutdown";
-    default:
-      return "unknown";
-  }
-}
-
-const char* wordOf(v1::Verdict verdict) {
-  switch (verdict) {
-    case v1::VERDICT_SEPARATED:
-      return "separated";
-    case v1::VERDICT_TOUCHING:
-      return "touching";
-    case v1::VERDICT_PENETRATING:
-      return "penetrating";
-    default:
-      return "unknown";
-  }
-}
-
-const char* wordOf(v1::Notice::Kind kind) {
-  switch (kind) {
-    case v1::Notice::KIND_ARRIVED:
-      return "arrived";
-    case v1::Notice::KIND_BLOCKED:
-      return "blocked";
-    case v1::Notice::KIND_REFUSED:
-      return "refused";
-    case v1::Notice::KIND_LEFT:
-      return "left";
-    default:
-      return "other";
-  }
-}
-
-const char* wordOf(protocol::LineOutcome::Kind kind) {
+const char* outcomeWord(protocol::LineOutcome::Kind kind) {
   using Kind = protocol::LineOutcome::Kind;
   switch (kind) {
     case Kind::refused:
@@ -126,7 +65,7 @@ render::Image imageOf(const v1::Frame& description, const std::vector<std::uint8
 Json outcomesOf(const protocol::ScriptResult& result) {
   Json outcomes = Json::array();
   for (const protocol::LineOutcome& outcome : result.outcomes) {
-    outcomes.push_back({{"kind", wordOf(outcome.kind)},
+    outcomes.push_back({{"kind", outcomeWord(outcome.kind)},
                         {"line", outcome.line},
                         {"tick", outcome.tick},
                         {"avatar", outcome.avatar},
@@ -144,23 +83,6 @@ Json walkOf(const v1::Notice& notice) {
   if (!notice.obstacle_name().empty()) walk["obstacle"] = notice.obstacle_name();
   if (!notice.text().empty()) walk["text"] = notice.text();
   return walk;
-}
-
-}  // namespace
-
-namespace {
-
-const char* wordOf(v1::ContactEvent::Phase phase) {
-  switch (phase) {
-    case v1::ContactEvent::PHASE_BEGIN:
-      return "begin";
-    case v1::ContactEvent::PHASE_MIN:
-      return "min";
-    case v1::ContactEvent::PHASE_END:
-      return "end";
-    default:
-      return "unknown";
-  }
 }
 
 }  // namespace

@@ -158,6 +158,8 @@ std::vector<v1::ContactEvent> leaveWorld(protocol::ScriptDriver& driver,
   return avatars.empty() ? std::vector<v1::ContactEvent>() : driver.step().contacts;
 }
 
+}  // namespace
+
 std::unique_ptr<render::Renderer> rendererOf(const std::shared_ptr<const scene::Scene>& scene,
                                              const DrawingOptions& drawing) {
   try {
@@ -168,8 +170,6 @@ std::unique_ptr<render::Renderer> rendererOf(const std::shared_ptr<const scene::
     return nullptr;
   }
 }
-
-}  // namespace
 
 ExitCode judge(const protocol::ScriptResult& result, const v1::Metrics& metrics, bool strict) {
   const bool right = metrics.audit().missed() == 0 && metrics.audit().extra() == 0;

@@ -2,6 +2,8 @@
 // socket (walk).
 #pragma once
 
+#include <memory>
+
 #include "protocol/script.hpp"
 #include "server/command_line.hpp"
 
@@ -13,5 +15,9 @@ ExitCode walk(const WalkCommand& command);
 /// How a walk ends that came to its end: a violation is what an audit found, and, if `strict`, a
 /// line of the script that did not go as it says.
 ExitCode judge(const protocol::ScriptResult& result, const v1::Metrics& metrics, bool strict);
+
+/// Null, and told, where nothing draws and nothing was asked for. Throws render::RenderError.
+std::unique_ptr<render::Renderer> rendererOf(const std::shared_ptr<const scene::Scene>& scene,
+                                             const DrawingOptions& drawing);
 
 }  // namespace enfilade::server

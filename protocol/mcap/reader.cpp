@@ -15,6 +15,12 @@ std::uint32_t crcOf(std::string_view bytes, std::uint32_t before = 0) {
 
 }  // namespace
 
+bool isMcap(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::string magic(kMagic.size(), '\0');
+  return stream.read(magic.data(), static_cast<std::streamsize>(magic.size())) && magic == kMagic;
+}
+
 Reader::Reader(std::filesystem::path file) : file_(std::move(file)) {
   std::error_code problem;
   size_ = std::filesystem::file_size(file_, problem);
@@ -114,6 +120,7 @@ void Reader::openChunk(const Record& record) {
   }
   if (chunk_.size() != unpacked || crcOf(chunk_) != crc)
     fail(record.start, "a chunk is not as it was written (its CRC differs)");
+  ++chunks_;
   chunkStart_ = record.start;
   inChunk_ = 0;
 

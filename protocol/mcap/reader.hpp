@@ -27,6 +27,9 @@ struct Message {
   std::string_view data;
 };
 
+/// Whether the file is there and begins as MCAP files do.
+bool isMcap(const std::filesystem::path& file);
+
 class Reader {
  public:
   /// Throws RecordingError when the file cannot be read or is no MCAP file.
@@ -40,6 +43,7 @@ class Reader {
   /// middle, as when the writer was killed, and all that is whole was read.
   bool closed() const { return closed_; }
   std::uint64_t wholeBytes() const { return whole_; }  ///< read and found whole
+  std::uint64_t chunks() const { return chunks_; }     ///< opened so far
   const std::string& library() const { return library_; }
 
  private:
@@ -65,7 +69,7 @@ class Reader {
 
   std::filesystem::path file_;
   std::ifstream stream_;
-  std::uint64_t size_ = 0, position_ = 0, whole_ = 0, messages_ = 0;
+  std::uint64_t size_ = 0, position_ = 0, whole_ = 0, messages_ = 0, chunks_ = 0;
   std::uint32_t crc_ = 0;
   bool ended_ = false, closed_ = false;
   std::string library_;

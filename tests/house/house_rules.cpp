@@ -43,6 +43,8 @@ const std::map<std::string, Names> kRoomMayInclude{
     {"render/rays", {"render", "render/gl/avatar_mesh.hpp", "render/gl/draw_list.hpp"}},
     {"server/capture", {"server"}},
     {"server/worlds", {"server"}},
+    {"server/diff", {"server", "server/capture"}},
+    {"server/recordings", {"server", "server/capture"}},
 };
 
 struct ThirdParty {
