@@ -150,29 +150,35 @@ render::Camera cameraAt(const Vec3& eye, const Vec3& point) {
   return camera;
 }
 
+struct Standpoint {
+  render::Camera camera;
+  scene::EntityId hidden = 0;  ///< whose eyes these are
+};
+
 /// From which the place is seen: beside the one who came there, in the same room.
 class Standpoints {
  public:
   explicit Standpoints(const std::shared_ptr<const scene::Scene>& scene) : rays_(scene) {}
 
-  render::Camera find(const Moment& moment, const scene::Snapshot& snapshot) {
+  Standpoint find(const Moment& moment, const scene::Snapshot& snapshot) {
     rays_.follow(snapshot);
     const scene::AvatarView* who = avatarNamed(snapshot, moment.a);
     const Vec3 eyes = who ? Vec3(who->feet + Vec3(0, who->eyeHeight, 0)) : moment.point;
     const double heading = headingFrom(moment, who);
-    constexpr std::array<double, 10> kAside{0.9, -0.9, 0.5, -0.5, 1.3, -1.3, 1.8, -1.8, 2.6, -2.6};
+    const scene::EntityId id = who ? who->id : 0;
+    constexpr std::array<double, 10> kAside{1.2, -1.2, 0.9, -0.9, 0.5, -0.5, 1.6, -1.6, 2.4, -2.4};
     for (const double distance : {2.8, 2.0, 1.4, 4.0}) {
       for (const double aside : kAside) {
         const double angle = heading + aside;
         Vec3 eye = moment.point + distance * Vec3(std::cos(angle), 0, std::sin(angle));
         eye.y() = std::max(moment.point.y() + 0.5, eyes.y());
-        if (reaches(eyes, eye, who ? who->id : 0) && sees(eye, moment.point))
-          return cameraAt(eye, moment.point);
+        if (reaches(eyes, eye, id) && sees(eye, moment.point, id))
+          return {cameraAt(eye, moment.point)};
       }
     }
     // Nothing beside: through the walker's own eyes, or from above.
-    if (who && (moment.point - eyes).norm() > 0.2) return cameraAt(eyes, moment.point);
-    return cameraAt(moment.point + Vec3(0.3, 2, 0.3), moment.point);
+    if (who && (moment.point - eyes).norm() > 0.2) return {cameraAt(eyes, moment.point), id};
+    return {cameraAt(moment.point + Vec3(0.3, 2, 0.3), moment.point)};
   }
 
  private:
@@ -190,25 +196,46 @@ class Standpoints {
     return distance < 1e-6 || !rays_.isBlocked({from, to - from, distance + 0.15}, {through});
   }
 
-  bool sees(const Vec3& eye, const Vec3& point) const {
+  /// Whoever touches something stands before the place for most who look on.
+  bool sees(const Vec3& eye, const Vec3& point, scene::EntityId through) const {
     constexpr double kBefore = 0.03;  // metres that may hide it
     const double distance = (point - eye).norm();
-    return distance > kBefore && !rays_.isBlocked({eye, point - eye, distance - kBefore}, {});
+    return distance > kBefore &&
+           !rays_.isBlocked({eye, point - eye, distance - kBefore}, {through});
   }
 
   scene::RayCaster rays_;
 };
 
+/// A ring about the place, for the eye to find it.
+void drawRing(render::Image& image, const render::Camera& camera, const Vec3& point) {
+  constexpr int kCorners = 32;
+  constexpr double kRadius = 22, kTurn = 6.283185307179586;  // pixels
+  const Vec3 at = render::project(camera, point);
+  const auto corner = [&](int i) {
+    const double angle = kTurn * i / kCorners;
+    return std::pair(at.x() + kRadius * std::cos(angle), at.y() + kRadius * std::sin(angle));
+  };
+  for (int i = 0; i < kCorners; ++i) {
+    const auto [x0, y0] = corner(i);
+    const auto [x1, y1] = corner(i + 1);
+    render::drawLine(image, x0, y0, x1, y1, 2, {214, 40, 40});
+  }
+}
+
 render::Image drawn(render::Renderer& renderer, const scene::Scene& scene,
-                    const scene::Snapshot& snapshot, const render::Camera& camera,
-                    const Moment& moment) {
-  const render::Frame frame = renderer.render(snapshot, camera);
+                    const scene::Snapshot& snapshot, const Standpoint& from, const Moment& moment) {
+  render::FrameOptions options;
+  options.hidden = from.hidden;
+  const render::Frame frame = renderer.render(snapshot, from.camera, options);
   OverlayChoice choice;
   choice.contacts = true;
   Shot shot;
-  shot.camera = camera;
+  shot.camera = from.camera;
   shot.contacts = {{moment.point, false}};
-  return drawOverlay(frame, choice, scene.model(), {}, shot);
+  render::Image image = drawOverlay(frame, choice, scene.model(), {}, shot);
+  drawRing(image, from.camera, moment.point);
+  return image;
 }
 
 /// `before` may be empty.
@@ -245,13 +272,13 @@ void drawMoments(std::vector<Moment>& moments, const WalkDifference& difference,
   int number = 0;
   for (Moment& moment : moments) {
     const bool there = moment.later || !models.before;
-    const render::Camera camera = there ? afterStandpoints->find(moment, *after.at(moment.tick))
-                                        : beforeStandpoints->find(moment, *before.at(moment.tick));
+    const Standpoint from = there ? afterStandpoints->find(moment, *after.at(moment.tick))
+                                  : beforeStandpoints->find(moment, *before.at(moment.tick));
     render::Image was;
     if (models.before)
-      was = drawn(*beforeRenderer, *models.before, *before.at(moment.tick), camera, moment);
+      was = drawn(*beforeRenderer, *models.before, *before.at(moment.tick), from, moment);
     const render::Image is =
-        drawn(*models.afterRenderer, *models.after, *after.at(moment.tick), camera, moment);
+        drawn(*models.afterRenderer, *models.after, *after.at(moment.tick), from, moment);
     char name[40];
     std::snprintf(name, sizeof name, "changes/%03d.png", ++number);
     render::writePng(folder / name, sideBySide(was, is, moment));
