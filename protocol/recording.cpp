@@ -26,7 +26,7 @@ void addWithImports(const pb::FileDescriptor& file, pb::FileDescriptorSet& set,
   file.CopyTo(set.add_file());
 }
 
-mcap::ChannelSpec channelOf(const char* topic, const pb::Descriptor& message) {
+mcap::ChannelSpec channelOf(const std::string& topic, const pb::Descriptor& message) {
   pb::FileDescriptorSet set;
   std::set<std::string> known;
   addWithImports(*message.file(), set, known);
@@ -126,38 +126,47 @@ std::string hexadecimal(std::uint64_t hash) {
   return text;
 }
 
-RecordingWriter::RecordingWriter(const std::filesystem::path& file, const std::string& library)
-    : file_(file, {library}),
+RecordingWriter::RecordingWriter(const std::filesystem::path& file, const std::string& library,
+                                 bool replace)
+    : file_(file, {.library = library, .replace = replace}),
       start_(file_.addChannel(channelOf(kStart, *v1::RecordingStart::descriptor()))),
       commands_(file_.addChannel(channelOf(kCommands, *v1::RecordedCommands::descriptor()))),
       events_(file_.addChannel(channelOf(kEvents, *v1::TickEvents::descriptor()))),
       state_(file_.addChannel(channelOf(kState, *v1::State::descriptor()))),
       names_(file_.addChannel(channelOf(kNames, *v1::RecordedNames::descriptor()))) {}
 
-void RecordingWriter::write(std::uint16_t channel, double time, const pb::MessageLite& message) {
+void RecordingWriter::writeTo(std::uint16_t channel, double time, const pb::MessageLite& message) {
   message.SerializeToString(&bytes_);
-  file_.write(channel, nanoseconds(time), bytes_);
+  last_ = std::max(last_, fileTime(time));
+  file_.write(channel, nanoseconds(fileTime(time)), bytes_);
+}
+
+void RecordingWriter::write(const std::string& topic, double time, const pb::Message& message) {
+  std::uint16_t& channel = others_[topic];
+  if (channel == 0) channel = file_.addChannel(channelOf(topic, *message.GetDescriptor()));
+  writeTo(channel, time, message);
 }
 
 void RecordingWriter::write(const v1::RecordingStart& start) {
-  write(start_, 0, start);
+  began_ = last_;
+  writeTo(start_, 0, start);
   file_.flush();  // a recording that cannot be begun again is worth nothing
 }
 
 void RecordingWriter::write(const v1::RecordedCommands& commands, double time) {
-  write(commands_, time, commands);
+  writeTo(commands_, time, commands);
 }
 
 void RecordingWriter::write(const v1::TickEvents& events) {
-  write(events_, events.time(), events);
+  writeTo(events_, events.time(), events);
 }
 
 void RecordingWriter::write(const v1::State& state) {
-  write(state_, state.time(), state);
+  writeTo(state_, state.time(), state);
 }
 
 void RecordingWriter::write(const v1::RecordedNames& names) {
-  write(names_, 0, names);
+  writeTo(names_, 0, names);
 }
 
 RecordingReader::RecordingReader(const std::filesystem::path& file) : path_(file), file_(file) {}

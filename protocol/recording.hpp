@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <variant>
@@ -15,22 +16,31 @@ namespace enfilade::protocol {
 /// All functions throw mcap::RecordingError.
 class RecordingWriter {
  public:
-  /// `library`: who writes, name and version.
-  RecordingWriter(const std::filesystem::path& file, const std::string& library);
+  /// `library`: who writes, name and version. A file that is there is begun anew, or refused.
+  RecordingWriter(const std::filesystem::path& file, const std::string& library,
+                  bool replace = true);
 
   void write(const v1::RecordingStart& start);
   void write(const v1::RecordedCommands& commands, double time);
   void write(const v1::TickEvents& events);
   void write(const v1::State& state);
   void write(const v1::RecordedNames& names);
+  /// To a channel of that name, which is for this kind of message.
+  void write(const std::string& topic, double time, const google::protobuf::Message& message);
+
+  /// Seconds of simulated time as the file counts them: where the world began anew, they go on.
+  double fileTime(double time) const { return began_ + time; }
+  void flush() { file_.flush(); }
   void close() { file_.close(); }
   std::uint64_t bytesWritten() const { return file_.bytesWritten(); }
 
  private:
-  void write(std::uint16_t channel, double time, const google::protobuf::MessageLite& message);
+  void writeTo(std::uint16_t channel, double time, const google::protobuf::MessageLite& message);
 
   mcap::Writer file_;
   std::string bytes_;  // kept, so that a tick allocates nothing
+  std::map<std::string, std::uint16_t> others_;
+  double began_ = 0, last_ = 0;  ///< seconds in the file: of the world's beginning, written last
   std::uint16_t start_, commands_, events_, state_, names_;
 };
 

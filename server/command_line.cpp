@@ -22,7 +22,8 @@ struct Arguments {
   DoctorCommand doctor;
   ModelArguments model;
   std::string script, out, plan, listen = "127.0.0.1:7878", connect;
-  std::string record;
+  RecordingChoice record;
+  std::string recordChannels = "walk", recordFrames;
   bool strict = false, verify = false, json = false, objects = false, stopAtEndOfInput = false;
   CaptureArguments capture;
   std::string renderer = "auto";
@@ -62,6 +63,12 @@ std::optional<Number> numberFrom(const std::string& text) {
   const auto parsed = std::from_chars(text.data(), end, number);
   if (parsed.ec != std::errc() || parsed.ptr != end) return std::nullopt;
   return number;
+}
+
+std::string secondsProblem(const std::string& text) {
+  const auto seconds = numberFrom<double>(text);
+  if (seconds && *seconds >= 0 && *seconds <= 1e6) return {};
+  return text + ": give seconds from 0 to 1000000";
 }
 
 std::string auditProblem(const std::string& text) {
@@ -188,6 +195,23 @@ void addWalk(CLI::App& verb, Arguments& into) {
   verb.add_flag("--strict", into.strict, "End with 3 when an order was refused or a walk blocked");
 }
 
+void addRecording(CLI::App& verb, Arguments& into, const char* what) {
+  CLI::Option* file = verb.add_option("--record", into.record.file, what)
+                          ->check(CLI::Validator(fileProblem, "FILE"));
+  verb.add_option(
+          "--record-channels", into.recordChannels,
+          "walk: what makes the walk again; foxglove: beside it what Foxglove and Lichtblick "
+          "show as they are, ten times a second")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"walk", "foxglove"}))
+      ->needs(file);
+  verb.add_option("--record-frames", into.recordFrames,
+                  "Record what each avatar sees as JPEG, every so many simulated seconds, and what "
+                  "else is drawn through its eyes; 0: only that")
+      ->check(CLI::Validator(secondsProblem, "SECONDS"))
+      ->needs(file);
+}
+
 void addInspect(CLI::App& verb, Arguments& into) {
   verb.add_flag("--json", into.json, "Tell it as one JSON object");
   verb.add_flag("--objects", into.objects, "List every object too: id, path, box, class");
@@ -228,6 +252,13 @@ void addDoctor(CLI::App& verb, DoctorCommand& into) {
   verb.add_option("--out", into.out, "Write the proof picture to this PNG file");
 }
 
+RecordingChoice recordingFrom(const Arguments& read) {
+  RecordingChoice choice = read.record;
+  if (!read.recordFrames.empty()) choice.pictures = numberFrom<double>(read.recordFrames);
+  choice.viewers = choice.pictures || read.recordChannels == "foxglove";
+  return choice;
+}
+
 DrawingOptions drawingFrom(const Arguments& read) {
   return {render::rendererKindFrom(read.renderer).value_or(render::RendererKind::automatic),
           read.device};
@@ -251,7 +282,7 @@ VerifyCommand verifyFrom(const Arguments& read) {
 }
 
 RewalkCommand rewalkFrom(const Arguments& read) {
-  return {modelFrom(read.model), read.script, read.out,      read.record,
+  return {modelFrom(read.model), read.script, read.out,      read.record.file,
           read.tolerance,        read.json,   read.pictures, drawingFrom(read)};
 }
 
@@ -301,6 +332,7 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   addRenderer(*serve, read);
   addAudit(*serve, read);
   addMotion(*serve, read);
+  addRecording(*serve, read, "Write a recording (MCAP) of all that happens to a new file");
   CLI::App* replay =
       app.add_subcommand("replay", "Run a walk script, or a recorded walk, in a scene");
   addModel(*replay, read.model);
@@ -309,8 +341,7 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   addRenderer(*replay, read);
   addAudit(*replay, read);
   addMotion(*replay, read);
-  replay->add_option("--record", read.record, "Write a recording (MCAP) of the walk")
-      ->check(CLI::Validator(fileProblem, "FILE"));
+  addRecording(*replay, read, "Write a recording (MCAP) of the walk");
   for (const char* needless : {"SCRIPT", "--out"}) replay->get_option(needless)->required(false);
   replay->add_flag("--verify", read.verify,
                    "[SCENE] RECORDING: make a recorded walk again; ends with 4 where it differs");
@@ -370,7 +401,8 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
                         read.access,
                         read.stopAtEndOfInput,
                         drawingFrom(read),
-                        read.furtherScenes};
+                        read.furtherScenes,
+                        recordingFrom(read)};
   if (*replay && read.verify) return verifyFrom(read);
   if (*replay) {
     if (const auto missing = missingFrom(read)) {
@@ -378,8 +410,9 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
       return ExitCode::usage;
     }
     if (protocol::mcap::isMcap(read.script)) return rewalkFrom(read);
-    return ReplayCommand{modelFrom(read.model), read.script, read.out,         read.strict, audit,
-                         lengthsFrom(read),     read.record, drawingFrom(read)};
+    return ReplayCommand{
+        modelFrom(read.model), read.script,         read.out,         read.strict, audit,
+        lengthsFrom(read),     recordingFrom(read), drawingFrom(read)};
   }
   if (*capture)
     return CaptureCommand{modelFrom(read.model),

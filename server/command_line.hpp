@@ -43,6 +43,15 @@ struct DrawingOptions {
   }
 };
 
+/// A recording that is to be written.
+struct RecordingChoice {
+  std::filesystem::path file;  ///< empty: none
+  bool viewers = false;        ///< with the channels that viewers show as they are
+  /// With pictures of what each avatar sees, so many simulated seconds apart; 0: only those that
+  /// are taken anyway. Brings `viewers` along.
+  std::optional<double> pictures;
+};
+
 struct ServeCommand {
   ModelOptions model;
   Endpoint listen{"127.0.0.1", 7878};
@@ -53,6 +62,7 @@ struct ServeCommand {
   bool stopAtEndOfInput = false;    ///< ends when whoever started it has closed its standard input
   DrawingOptions drawing;
   std::vector<std::filesystem::path> furtherScenes;  ///< read as `model` is
+  RecordingChoice record;
 };
 struct ReplayCommand {
   ModelOptions model;
@@ -60,7 +70,7 @@ struct ReplayCommand {
   bool strict = false;
   std::uint32_t auditEvery = 0;  ///< ticks; 0: never
   scene::Lengths lengths;
-  std::filesystem::path record;  ///< a recording to write; empty: none
+  RecordingChoice record;
   DrawingOptions drawing;
 };
 struct VerifyCommand {

@@ -11,6 +11,8 @@ namespace enfilade::server {
 
 namespace {
 
+constexpr int kJpegQuality = 85;
+
 using CameraOrError = std::variant<View, v1::Error>;
 
 CameraOrError eyesOf(const v1::AvatarEyes& eyes, const scene::Snapshot& snapshot, int width,
@@ -68,9 +70,8 @@ void appendChannel(std::vector<std::uint8_t>& bytes, const render::Frame& frame,
   } else if (channel == v1::CHANNEL_DEPTH) {
     append(bytes, frame.depth);
   } else if (encoding == v1::ENCODING_JPEG) {
-    constexpr int kQuality = 85;
     const render::Camera& camera = frame.camera;
-    append(bytes, render::encodeJpeg({camera.width, camera.height, 3, frame.rgb}, kQuality));
+    append(bytes, render::encodeJpeg({camera.width, camera.height, 3, frame.rgb}, kJpegQuality));
   } else if (encoding == v1::ENCODING_PNG) {
     append(bytes, render::encodePng(render::colourOf(frame)));
   } else {
@@ -235,6 +236,33 @@ v1::Frame messageOf(const render::Frame& frame, double time, const v1::FrameRequ
     addPlane(message, attachment, frame, v1::CHANNEL_RGB, request.rgb_encoding());
   }
   return message;
+}
+
+v1::FrameRequest recordedView(const std::string& avatar) {
+  constexpr std::uint32_t kWidth = 640, kHeight = 360;
+  v1::FrameRequest request;
+  request.mutable_eyes()->set_avatar(avatar);
+  request.set_width(kWidth);
+  request.set_height(kHeight);
+  request.add_channels(v1::CHANNEL_RGB);
+  request.set_rgb_encoding(v1::ENCODING_JPEG);
+  return request;
+}
+
+std::optional<EncodedPicture> encodedPicture(const v1::Frame& frame,
+                                             std::span<const std::uint8_t> attachment) {
+  for (const v1::Plane& plane : frame.planes()) {
+    if (plane.channel() != v1::CHANNEL_RGB) continue;
+    const auto bytes = attachment.subspan(plane.offset(), plane.length());
+    if (plane.encoding() == v1::ENCODING_JPEG)
+      return EncodedPicture{"jpeg", {bytes.begin(), bytes.end()}};
+    if (plane.encoding() == v1::ENCODING_PNG)
+      return EncodedPicture{"png", {bytes.begin(), bytes.end()}};
+    const std::vector<std::uint8_t> rgb(bytes.begin(), bytes.end());
+    const int width = static_cast<int>(plane.width()), height = static_cast<int>(plane.height());
+    return EncodedPicture{"jpeg", render::encodeJpeg({width, height, 3, rgb}, kJpegQuality)};
+  }
+  return std::nullopt;
 }
 
 v1::FreeCamera messageOf(const render::Camera& camera) {

@@ -25,6 +25,7 @@ Buffer frameReply(Drawing& drawing) {
       messageOf(frame, drawing.job.snapshot->time, drawing.job.request, attachment);
   reply.mutable_frame()->set_watch(drawing.job.watch);
   reply.mutable_frame()->set_dropped(drawing.job.dropped);
+  if (drawing.job.seen) drawing.job.seen(reply.frame(), attachment);
   return encodeShared(reply, attachment);
 }
 

@@ -21,6 +21,8 @@ struct FrameJob {
   std::uint32_t watch = 0;      ///< 0: of none
   std::uint64_t dropped = 0;    ///< Frame.dropped
   std::shared_ptr<std::atomic<std::uint64_t>> drawn;  ///< counts it; may be null
+  /// Gets the picture before the reply is made of it, on the service's thread; may be empty.
+  std::function<void(const v1::Frame&, std::span<const std::uint8_t> attachment)> seen = {};
 };
 
 class FrameService {

@@ -35,6 +35,7 @@ void draw(ServedWorld& served, ClientId id, Client& client, std::uint32_t number
       snapshot,    std::get<View>(std::move(view)), watch.request, 0, number, watch.dropped,
       served.drawn};
   watch.dropped = 0;
+  job.seen = toRecording(served, watch.request);
   deliver(served, id, number, watch.generation, client.out, std::move(job));
 }
 
@@ -72,6 +73,40 @@ std::optional<v1::Error> watchFrames(ServedWorld& served, ClientId id, Client& c
       client.watches.insert_or_assign(wanted.watch(), std::move(watch)).first->second;
   if (!problem) draw(served, id, client, wanted.watch(), kept);
   return std::nullopt;
+}
+
+decltype(FrameJob::seen) toRecording(const ServedWorld& served, const v1::FrameRequest& request) {
+  const WorldRecorder* recorder = served.world.recorder();
+  if (!recorder || !recorder->takesPictures() || !request.has_eyes()) return {};
+  return [avatar = request.eyes().avatar(), post = served.post](
+             const v1::Frame& frame, std::span<const std::uint8_t> attachment) {
+    auto picture = encodedPicture(frame, attachment);
+    if (!picture) return;
+    post([avatar, frame, picture = std::move(*picture)](ServedWorld& then) {
+      if (WorldRecorder* taker = then.world.recorder()) taker->picture(avatar, frame, picture);
+    });
+  };
+}
+
+void drawRecorded(ServedWorld& served) {
+  WorldRecorder* recorder = served.world.recorder();
+  if (!recorder || served.frames.deviceName().empty() || !recorder->picturesDue(served.world))
+    return;
+  const auto snapshot = served.world.snapshot();
+  for (const scene::AvatarView& avatar : snapshot->avatars) {
+    // One that is not drawn yet is left out: the tick waits for no picture.
+    if (!served.recordedViews.insert(avatar.name).second) continue;
+    const v1::FrameRequest request = recordedView(avatar.name);
+    FrameJob job;
+    job.snapshot = snapshot;
+    job.view = std::get<View>(viewFrom(request, *snapshot));
+    job.request = request;
+    job.drawn = served.drawn;
+    job.seen = toRecording(served, request);
+    served.frames.draw(std::move(job), [name = avatar.name, post = served.post](Buffer) {
+      post([name](ServedWorld& then) { then.recordedViews.erase(name); });
+    });
+  }
 }
 
 void drawWatched(ServedWorld& served, ClientId id, Client& client) {

@@ -14,4 +14,11 @@ std::optional<v1::Error> watchFrames(ServedWorld& served, ClientId id, Client& c
 /// Has the pictures drawn that are due with this tick.
 void drawWatched(ServedWorld& served, ClientId id, Client& client);
 
+/// For a picture that is to be drawn: what hands it to the recording too, if that takes it; else
+/// empty.
+decltype(FrameJob::seen) toRecording(const ServedWorld& served, const v1::FrameRequest& request);
+
+/// What everyone sees, when the recording is to have it.
+void drawRecorded(ServedWorld& served);
+
 }  // namespace enfilade::server

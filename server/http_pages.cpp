@@ -173,6 +173,23 @@ class MetricsText {
   std::ostringstream text_;
 };
 
+/// Of the worlds that are recorded.
+std::string recordingPart(std::span<const WorldMetrics> worlds) {
+  using M = v1::Metrics;
+  std::vector<WorldMetrics> recorded;
+  for (const WorldMetrics& one : worlds)
+    if (one.metrics.has_recording()) recorded.push_back(one);
+  if (recorded.empty()) return {};
+  MetricsText page(recorded);
+  page.add("recorded_ticks_total", "counter", "Ticks that were written down.",
+           [](const M& m) { return m.recording().ticks(); });
+  page.add("recording_bytes", "gauge", "In the recording's file.",
+           [](const M& m) { return m.recording().bytes(); });
+  page.add("recording_broken", "gauge", "1: the file took no more; must be 0.",
+           [](const M& m) { return m.recording().broken() ? 1 : 0; });
+  return page.text();
+}
+
 }  // namespace
 
 Target targetOf(std::string_view text) {
@@ -242,7 +259,7 @@ std::string metricsPage(std::span<const WorldMetrics> worlds) {
     for (const v1::StageTiming& stage : one.metrics.stages()) page.timing(one, stage, stage.name());
     page.timing(one, one.metrics.tick(), "tick");
   }
-  return page.text();
+  return page.text() + recordingPart(worlds);
 }
 
 std::string response(unsigned status, const std::string& type, const std::string& body) {

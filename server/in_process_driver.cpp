@@ -1,48 +1,27 @@
 #include "server/in_process_driver.hpp"
 
-#include "server/body_messages.hpp"
 #include "server/frame_messages.hpp"
 #include "server/world_messages.hpp"
 
 namespace enfilade::server {
-namespace {
-
-v1::TickEvents eventsOf(const protocol::StepOutcome& outcome) {
-  v1::TickEvents events;
-  events.set_tick(outcome.tick);
-  events.set_time(outcome.time);
-  events.mutable_contacts()->Assign(outcome.contacts.begin(), outcome.contacts.end());
-  events.mutable_notices()->Assign(outcome.notices.begin(), outcome.notices.end());
-  return events;
-}
-
-}  // namespace
-
-InProcessDriver::InProcessDriver(scene::World& world, render::Renderer* renderer,
-                                 protocol::CaptureFormat format, WorldRecorder* recorder)
-    : world_(world), renderer_(renderer), format_(std::move(format)), recorder_(recorder) {}
+InProcessDriver::InProcessDriver(RecordedWorld& world, render::Renderer* renderer,
+                                 protocol::CaptureFormat format)
+    : world_(world), renderer_(renderer), format_(std::move(format)) {}
 
 double InProcessDriver::tickSeconds() const {
   return world_.lengths().tick;
 }
 
 std::optional<v1::Error> InProcessDriver::submit(const v1::Command& command) {
-  std::variant<scene::Command, v1::Error> order = commandFrom(command);
-  if (auto* error = std::get_if<v1::Error>(&order)) return std::move(*error);
-  auto refused = scene::submit(world_, std::get<scene::Command>(std::move(order)));
-  if (refused) return refusalOf(command, *refused);
-  if (recorder_) recorder_->took(command);
-  return std::nullopt;
+  return world_.submit(command);
 }
 
 std::optional<v1::Error> InProcessDriver::submit(const v1::BodyCommand& command) {
-  auto refused = server::submit(world_, command);
-  if (!refused && recorder_) recorder_->took(command);
-  return refused;
+  return world_.submit(command);
 }
 
 protocol::StepOutcome InProcessDriver::step() {
-  const scene::TickReport report = scene::tick(world_);
+  auto [report, events] = world_.tick();
   statistics_.add(report);
   logFindings(world_, report);
   const scene::Snapshot& snapshot = *report.snapshot;
@@ -51,14 +30,14 @@ protocol::StepOutcome InProcessDriver::step() {
   outcome.time = snapshot.time;
   outcome.stateHash = snapshot.stateHash;
   outcome.idle = report.idle;
-  for (const auto& event : report.contacts) outcome.contacts.push_back(messageOf(world_, event));
-  for (const auto& notice : report.notices) {
-    outcome.notices.push_back(messageOf(world_, notice, snapshot.tick));
-    if (notice.kind == scene::Notice::Kind::capture) {
+  for (v1::ContactEvent& event : *events.mutable_contacts())
+    outcome.contacts.push_back(std::move(event));
+  for (v1::Notice& notice : *events.mutable_notices()) {
+    outcome.notices.push_back(std::move(notice));
+    if (outcome.notices.back().kind() == v1::Notice::KIND_CAPTURE)
       outcome.frames.push_back(capture(outcome.notices.back()));
-    }
   }
-  if (recorder_) recorder_->ticked(world_, eventsOf(outcome));
+  recordPictures();
   for (const auto& avatar : snapshot.avatars) outcome.avatars.push_back(messageOf(world_, avatar));
   return outcome;
 }
@@ -70,12 +49,26 @@ protocol::CapturedFrame InProcessDriver::capture(const v1::Notice& notice) {
   captured.tag = notice.tag();
   try {
     protocol::ReceivedFrame taken = frame(protocol::captureRequest(notice, format_));
+    record(notice.avatar(), taken);
     captured.description = std::move(taken.description);
     captured.pixels = std::move(taken.pixels);
   } catch (const protocol::ProtocolError& problem) {
     captured.error = problem.what();
   }
   return captured;
+}
+
+void InProcessDriver::record(const std::string& avatar, const protocol::ReceivedFrame& taken) {
+  WorldRecorder* recorder = world_.recorder();
+  if (!recorder || !recorder->takesPictures()) return;
+  if (const auto picture = encodedPicture(taken.description, taken.pixels))
+    recorder->picture(avatar, taken.description, *picture);
+}
+
+void InProcessDriver::recordPictures() {
+  if (!renderer_ || !world_.recorder() || !world_.recorder()->picturesDue(world_)) return;
+  for (const scene::AvatarView& avatar : world_.snapshot()->avatars)
+    record(avatar.name, frame(recordedView(avatar.name)));
 }
 
 protocol::ReceivedFrame InProcessDriver::frame(const v1::FrameRequest& request) {
@@ -105,11 +98,8 @@ v1::Metrics InProcessDriver::metrics() const {
 }
 
 std::vector<v1::ContactEvent> InProcessDriver::endContacts() {
-  std::vector<v1::ContactEvent> messages;
-  for (const auto& event : scene::endContacts(world_, scene::ContactEvent::Reason::shutdown)) {
-    messages.push_back(messageOf(world_, event));
-  }
-  return messages;
+  const v1::TickEvents ended = world_.end(v1::ContactEvent::REASON_SHUTDOWN);
+  return {ended.contacts().begin(), ended.contacts().end()};
 }
 
 }  // namespace enfilade::server

@@ -3,18 +3,17 @@
 
 #include "protocol/socket_driver.hpp"
 #include "render/renderer.hpp"
-#include "scene/world.hpp"
+#include "server/recorded_world.hpp"
 #include "server/tick_statistics.hpp"
-#include "server/world_recorder.hpp"
 
 namespace enfilade::server {
 
 class InProcessDriver : public protocol::ScriptDriver {
  public:
-  /// `renderer` may be null: captures then have no picture; so may `recorder`. All outlive the
-  /// driver, which is used on the renderer's thread.
-  InProcessDriver(scene::World& world, render::Renderer* renderer,
-                  protocol::CaptureFormat format = {}, WorldRecorder* recorder = nullptr);
+  /// `renderer` may be null: captures then have no picture. Both outlive the driver, which is used
+  /// on the renderer's thread.
+  InProcessDriver(RecordedWorld& world, render::Renderer* renderer,
+                  protocol::CaptureFormat format = {});
 
   double tickSeconds() const override;
   std::optional<v1::Error> submit(const v1::Command& command) override;
@@ -29,11 +28,12 @@ class InProcessDriver : public protocol::ScriptDriver {
 
  private:
   protocol::CapturedFrame capture(const v1::Notice& notice);
+  void record(const std::string& avatar, const protocol::ReceivedFrame& taken);
+  void recordPictures();
 
-  scene::World& world_;
+  RecordedWorld& world_;
   render::Renderer* renderer_;
   protocol::CaptureFormat format_;
-  WorldRecorder* recorder_;
   TickStatistics statistics_;
   std::uint64_t frames_ = 0;
 };

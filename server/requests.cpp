@@ -74,10 +74,7 @@ std::optional<v1::Error> limitProblem(const Asked& asked, const v1::Command& com
 std::optional<v1::Error> submitCommand(const Asked& asked, const v1::Command& command) {
   if (auto problem = ownershipProblem(asked, command)) return problem;
   if (auto problem = limitProblem(asked, command)) return problem;
-  std::variant<scene::Command, v1::Error> order = commandFrom(command);
-  if (auto* error = std::get_if<v1::Error>(&order)) return std::move(*error);
-  auto refused = scene::submit(asked.served.world, std::get<scene::Command>(std::move(order)));
-  if (refused) return refusalOf(command, *refused);
+  if (auto refused = asked.served.world.submit(command)) return refused;
   if (command.has_spawn()) {
     asked.served.owners[command.avatar()] = asked.id;
     asked.served.unsettled.insert(command.avatar());
@@ -102,7 +99,7 @@ void answer(const Asked& asked, const v1::Command& command) {
 }
 
 void answer(const Asked& asked, const v1::BodyCommand& command) {
-  replyCommand(asked, submit(asked.served.world, command));
+  replyCommand(asked, asked.served.world.submit(command));
 }
 
 // ---- time --------------------------------------------------------------------------------------
@@ -239,6 +236,7 @@ void answer(const Asked& asked, const v1::FrameRequest& request, const PostToTic
   if (auto* error = std::get_if<v1::Error>(&view)) return replyError(asked, std::move(*error));
   FrameJob job{snapshot, std::get<View>(view), request, asked.message.request_id(), 0,
                0,        served.drawn};
+  job.seen = toRecording(served, request);
   served.frames.draw(std::move(job), untilAnswered(asked, post, &OutgoingQueue::pushFrame));
 }
 
@@ -343,6 +341,11 @@ void answerMetrics(const Asked& asked) {
   metrics.set_avatars(static_cast<std::uint32_t>(served.world.snapshot()->avatars.size()));
   metrics.set_frames(*served.drawn);
   metrics.set_dropped(served.droppedStates + served.droppedFrames);
+  if (const WorldRecorder* recorder = served.world.recorder()) {
+    metrics.mutable_recording()->set_ticks(recorder->ticks());
+    metrics.mutable_recording()->set_bytes(recorder->bytes());
+    metrics.mutable_recording()->set_broken(recorder->broken());
+  }
   reply(asked, std::move(message));
 }
 

@@ -86,6 +86,10 @@ ExitCode serve(const ServeCommand& command) {
   options.world.auditEvery = command.auditEvery;
   options.access = std::move(access);
   options.drawing = command.drawing;
+  if (!command.record.file.empty()) {
+    options.world.record = {command.record, command.model};
+    options.world.record->replace = false;  // what clients did cannot be had again
+  }
   Server server(scene, command.listen, std::move(options));
   tellReady(server, *scene, command.listen);
   const int signal = awaitEndingSignal(ending, server, command.stopAtEndOfInput);
@@ -94,6 +98,7 @@ ExitCode serve(const ServeCommand& command) {
   server.stop();
   const AuditTotals audit = server.auditTotals();
   if (command.auditEvery != 0) logTotals(audit);
+  if (!server.recordedAll()) return ExitCode::runtimeError;
   if (signal == SIGINT) return ExitCode::interrupted;
   return audit.right() ? ExitCode::done : ExitCode::violations;
 }

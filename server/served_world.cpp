@@ -11,44 +11,24 @@ namespace enfilade::server {
 
 namespace {
 
-struct TickTold {
-  std::uint64_t tick = 0;
-  double time = 0;
-  std::vector<v1::ContactEvent> contacts;
-  std::vector<v1::Notice> notices;
-};
-
-TickTold messagesOf(const scene::World& world, const std::vector<scene::ContactEvent>& contacts,
-                    const std::vector<scene::Notice>& notices) {
-  const scene::Snapshot& snapshot = *world.snapshot();
-  TickTold told{snapshot.tick, snapshot.time, {}, {}};
-  for (const scene::ContactEvent& event : contacts) {
-    told.contacts.push_back(messageOf(world, event));
-  }
-  for (const scene::Notice& notice : notices) {
-    told.notices.push_back(messageOf(world, notice, snapshot.tick));
-  }
-  return told;
-}
-
 bool wants(const v1::Subscribe& subscription, const v1::ContactEvent& event) {
   return event.kind() == v1::ContactEvent::KIND_NEAR ? subscription.near_misses()
                                                      : subscription.contacts();
 }
 
-void sendEvents(Client& client, const TickTold& told) {
+void sendEvents(Client& client, const v1::TickEvents& told) {
   v1::ServerMessage message;
   v1::TickEvents& events = *message.mutable_events();
-  for (const v1::ContactEvent& event : told.contacts) {
+  for (const v1::ContactEvent& event : told.contacts()) {
     if (wants(client.subscription, event)) *events.add_contacts() = event;
   }
   if (client.subscription.notices()) {
-    events.mutable_notices()->Assign(told.notices.begin(), told.notices.end());
+    *events.mutable_notices() = told.notices();
   }
   if (events.contacts().empty() && events.notices().empty()) return;
   events.set_sequence(++client.sequence);
-  events.set_tick(told.tick);
-  events.set_time(told.time);
+  events.set_tick(told.tick());
+  events.set_time(told.time());
   send(client, message);
 }
 
@@ -95,8 +75,8 @@ void finishStep(ServedWorld& served, Client& client, const scene::Snapshot& snap
   send(client, message);
 }
 
-void keepLive(ServedWorld& served, const TickTold& told) {
-  for (const v1::ContactEvent& event : told.contacts) {
+void keepLive(ServedWorld& served, const v1::TickEvents& told) {
+  for (const v1::ContactEvent& event : told.contacts()) {
     const std::pair pair{event.a(), event.b()};
     if (event.kind() == v1::ContactEvent::KIND_BEGIN) served.live[pair] = event;
     if (event.kind() == v1::ContactEvent::KIND_END) served.live.erase(pair);
@@ -141,6 +121,13 @@ void sayGoodbye(Client& client, const v1::Bye& farewell) {
   client.out->finish(goodbyeOf(farewell));
 }
 
+scene::World atItsBeginning(const std::shared_ptr<const scene::Scene>& scene,
+                            const scene::Lengths& lengths, std::uint32_t auditEvery) {
+  scene::World world(scene, lengths);
+  scene::auditBroadPhase(world, auditEvery);
+  return world;
+}
+
 }  // namespace
 
 ServedWorld::ServedWorld(std::shared_ptr<const scene::Scene> served, FrameService& frameService,
@@ -148,11 +135,11 @@ ServedWorld::ServedWorld(std::shared_ptr<const scene::Scene> served, FrameServic
     : place(std::move(where)),
       scene(std::move(served)),
       auditEvery(options.auditEvery),
-      world(scene, options.lengths),
+      world(atItsBeginning(scene, options.lengths, auditEvery)),
       frames(frameService),
       rays(rayService),
       limits(options.limits) {
-  scene::auditBroadPhase(world, auditEvery);
+  if (options.record) world.record(*options.record);
 }
 
 Buffer goodbyeOf(const v1::Bye& farewell) {
@@ -173,12 +160,11 @@ void sendError(Client& client, std::uint64_t requestId, v1::Error error) {
 }
 
 void advance(ServedWorld& served) {
-  const scene::TickReport report = scene::tick(served.world);
+  const auto [report, told] = served.world.tick();
   served.statistics.add(report);
   logFindings(served.world, report);
   served.idle = report.idle;
   publish(served);
-  const TickTold told = messagesOf(served.world, report.contacts, report.notices);
   settleOwners(served, report.notices);
   keepLive(served, told);
   for (auto& [id, client] : served.clients) {
@@ -187,29 +173,18 @@ void advance(ServedWorld& served) {
     drawWatched(served, id, client);
     finishStep(served, client, *report.snapshot);
   }
+  drawRecorded(served);
 }
 
 void restartWorld(ServedWorld& served) {
-  std::vector<scene::Notice> left;
-  for (const scene::AvatarView& avatar : served.world.snapshot()->avatars) {
-    scene::Notice notice;
-    notice.kind = scene::Notice::Kind::left;
-    notice.avatar = avatar.name;
-    notice.id = avatar.id;
-    notice.position = avatar.feet;
-    notice.text = "the world begins anew";
-    left.push_back(std::move(notice));
-  }
-  const auto ended = scene::endContacts(served.world, scene::ContactEvent::Reason::left);
-  TickTold told = messagesOf(served.world, ended, left);
-  for (v1::ContactEvent& event : told.contacts) event.set_reason(v1::ContactEvent::REASON_RESTART);
+  const v1::TickEvents told =
+      served.world.end(v1::ContactEvent::REASON_RESTART, "the world begins anew");
   for (auto& [id, client] : served.clients) {
     sendEvents(client, told);
     client.nextStateTime = 0;
     for (auto& [number, watch] : client.watches) watch.nextTime = 0;
   }
-  served.world = scene::World(served.scene, served.world.lengths());
-  scene::auditBroadPhase(served.world, served.auditEvery);
+  served.world.beginAnew(atItsBeginning(served.scene, served.world.lengths(), served.auditEvery));
   served.owners.clear();
   served.unsettled.clear();
   served.live.clear();
@@ -226,15 +201,19 @@ void removeClient(ServedWorld& served, ClientId id) {
       continue;
     }
     // Leave queues; Drive first empties the queue, so that nobody walks on without an owner.
-    scene::submit(served.world, {owner->first, scene::Drive{}, 0});
-    scene::submit(served.world, {owner->first, scene::Leave{}, 0});
+    v1::Command stop, leave;
+    stop.set_avatar(owner->first);
+    stop.mutable_drive()->mutable_velocity();
+    served.world.submit(stop);
+    leave.set_avatar(owner->first);
+    leave.mutable_leave();
+    served.world.submit(leave);
     owner = served.owners.erase(owner);
   }
 }
 
 void closeWorld(ServedWorld& served) {
-  const auto ended = scene::endContacts(served.world, scene::ContactEvent::Reason::shutdown);
-  const TickTold told = messagesOf(served.world, ended, {});
+  const v1::TickEvents told = served.world.end(v1::ContactEvent::REASON_SHUTDOWN);
   if (!served.farewell) {
     served.farewell.emplace().set_code(v1::ERROR_SHUTTING_DOWN);
     served.farewell->set_reason("the server ends");
@@ -244,6 +223,7 @@ void closeWorld(ServedWorld& served) {
     sayGoodbye(client, *served.farewell);
   }
   served.clients.clear();
+  if (WorldRecorder* recorder = served.world.recorder()) recorder->close();
 }
 
 void failWorld(ServedWorld& served) {

@@ -17,6 +17,7 @@
 #include "server/frame_service.hpp"
 #include "server/outgoing_queue.hpp"
 #include "server/ray_service.hpp"
+#include "server/recorded_world.hpp"
 #include "server/tick_statistics.hpp"
 #include "server/world_options.hpp"
 
@@ -104,7 +105,7 @@ struct ServedWorld {
   WorldGlance glance;
   std::shared_ptr<const scene::Scene> scene;
   std::uint32_t auditEvery = 0;  ///< ticks; 0: never
-  scene::World world;
+  RecordedWorld world;
   FrameService& frames;
   RayService& rays;
   ServerLimits limits;
@@ -124,6 +125,7 @@ struct ServedWorld {
       std::make_shared<std::atomic<std::uint64_t>>(0);
   /// What clients are told at the end; once it is given, no more requests are answered.
   std::optional<v1::Bye> farewell;
+  std::set<std::string> recordedViews;  ///< avatars whose view is being drawn for the recording
   /// Hands a job to the tick thread; callable from any thread.
   std::function<void(std::function<void(ServedWorld&)>)> post;
 };

@@ -64,6 +64,10 @@ AuditTotals Server::auditTotals() const {
   return state_->worlds.auditTotals();
 }
 
+bool Server::recordedAll() const {
+  return state_->worlds.mainWorld().recordedAll();
+}
+
 void Server::stop() {
   if (!state_->network.joinable()) return;
   state_->worlds.stop();

@@ -30,7 +30,8 @@ struct ServerOptions {
 class Server {
  public:
   /// Clients may connect when this returns. Throws ServerError: the address cannot be had, or
-  /// others can reach it and `access` does not allow that; RenderError: as FrameService.
+  /// others can reach it and `access` does not allow that; RenderError: as FrameService;
+  /// RecordingError: the recording cannot be begun.
   Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
          ServerOptions options = {});
   ~Server();  ///< stops
@@ -47,6 +48,8 @@ class Server {
   void stop();
   /// Of all ticks that were audited; only after stop().
   AuditTotals auditTotals() const;
+  /// Whether what was to be recorded is; only after stop().
+  bool recordedAll() const;
 
  private:
   struct State;

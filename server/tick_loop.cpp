@@ -19,6 +19,10 @@ constexpr std::chrono::milliseconds kCatchUp{250};
 /// While a tick of a free-running world is due, requests are answered for so long before it.
 constexpr std::chrono::milliseconds kSlice{5};
 
+/// When a world that waits for commands has stood still for so long, its recording is brought up to
+/// it.
+constexpr std::chrono::milliseconds kStill{500};
+
 SteadyClock::duration tickPeriod(const ServedWorld& served) {
   const std::chrono::duration<double> seconds(served.world.lengths().tick / served.clock.speed);
   return std::chrono::duration_cast<SteadyClock::duration>(seconds);
@@ -201,6 +205,10 @@ AuditTotals TickLoop::auditTotals() const {
   return served_.statistics.audit();
 }
 
+bool TickLoop::recordedAll() const {
+  return !served_.world.recorder() || !served_.world.recorder()->broken();
+}
+
 void TickLoop::run() {
   try {
     while (takeJobs()) {
@@ -249,7 +257,12 @@ bool TickLoop::takeJobs() {
   if (freeRunning(served_) && !leftOver) {
     inbox_->posted.wait_until(lock, served_.clock.nextTick, awake);
   } else if (!leftOver && steppingClient(served_) == 0) {
-    inbox_->posted.wait(lock, awake);
+    if (!inbox_->posted.wait_for(lock, kStill, awake)) {
+      lock.unlock();
+      if (WorldRecorder* recorder = served_.world.recorder()) recorder->flush();
+      lock.lock();
+      inbox_->posted.wait(lock, awake);
+    }
   }
   std::move(inbox_->jobs.begin(), inbox_->jobs.end(), std::back_inserter(jobs_));
   inbox_->jobs.clear();

@@ -38,7 +38,7 @@ class TickLoop {
   TickLoop(const TickLoop&) = delete;
   TickLoop& operator=(const TickLoop&) = delete;
 
-  // All of these but the last may be called from any thread.
+  // All of these but the last two may be called from any thread.
 
   const WorldPlace& place() const { return served_.place; }
   /// As ListWorlds tells it.
@@ -63,6 +63,8 @@ class TickLoop {
   std::exception_ptr failure() const;
   /// Of all ticks. Only after stop(): until then it is the thread's.
   AuditTotals auditTotals() const;
+  /// Whether what was to be recorded is. As auditTotals().
+  bool recordedAll() const;
 
  private:
   using Job = TickInbox::Job;

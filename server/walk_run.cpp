@@ -185,12 +185,11 @@ ExitCode replay(const ReplayCommand& command) {
         const std::shared_ptr<const scene::Scene> scene = loadScene(command.model);
         if (interrupted()) throw Interrupted{};
         const std::unique_ptr<render::Renderer> renderer = rendererOf(scene, command.drawing);
-        scene::World world(scene, command.lengths);
-        scene::auditBroadPhase(world, command.auditEvery);
-        std::optional<WorldRecorder> recorder;
-        if (!command.record.empty()) recorder.emplace(command.record, world, command.model);
-        InProcessDriver driver(world, renderer.get(), captureFormat(),
-                               recorder ? &*recorder : nullptr);
+        scene::World beginning(scene, command.lengths);
+        scene::auditBroadPhase(beginning, command.auditEvery);
+        RecordedWorld world(std::move(beginning));
+        if (!command.record.file.empty()) world.record({command.record, command.model});
+        InProcessDriver driver(world, renderer.get(), captureFormat());
         WalkedWorld walked{driver,
                            [&](const v1::FrameRequest& request) { return driver.frame(request); },
                            [&] { return driver.metrics(); },
@@ -198,7 +197,8 @@ ExitCode replay(const ReplayCommand& command) {
                            messageOf(*scene),
                            renderer ? renderer->deviceName() : std::string()};
         const ExitCode code = run(script, report, command.strict, std::move(walked));
-        return recorder && recorder->close() ? ExitCode::runtimeError : code;
+        const bool whole = !world.recorder() || !world.recorder()->close();
+        return whole ? code : ExitCode::runtimeError;
       },
       kNoMore);
 }

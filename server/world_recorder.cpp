@@ -36,11 +36,13 @@ v1::RecordingStart startOf(const scene::World& world, const ModelOptions& model)
 
 }  // namespace
 
-WorldRecorder::WorldRecorder(const std::filesystem::path& file, const scene::World& world,
-                             const ModelOptions& model)
-    : file_(file, std::string("enfilade ") + kServerVersion) {
-  file_.write(startOf(world, model));
+WorldRecorder::WorldRecorder(const RecordingOptions& options, const scene::World& world)
+    : file_(options.choice.file, std::string("enfilade ") + kServerVersion, options.replace),
+      model_(options.model),
+      picturesEvery_(options.choice.pictures) {
+  file_.write(startOf(world, model_));
   writeNames(world.scene().model());
+  if (options.choice.viewers) viewers_.emplace(file_).begin(world);
 }
 
 /// In messages of a size that readers can be asked to hold.
@@ -87,8 +89,44 @@ void WorldRecorder::ticked(const scene::World& world, const v1::TickEvents& even
     }
     if (!events.contacts().empty() || !events.notices().empty()) file_.write(events);
     file_.write(state_);
+    if (viewers_) viewers_->ticked(world, events);
+    ++ticks_;
   });
   commands_.clear_commands();
+}
+
+void WorldRecorder::ended(const v1::TickEvents& events) {
+  if (events.contacts().empty() && events.notices().empty()) return;
+  unlessBroken([&] {
+    file_.write(events);
+    if (viewers_) viewers_->ended(events);
+  });
+}
+
+void WorldRecorder::beganAnew(const scene::World& world) {
+  commands_.clear_commands();
+  nextPictures_ = 0;
+  unlessBroken([&] {
+    file_.write(startOf(world, model_));
+    if (viewers_) viewers_->begin(world);
+  });
+}
+
+bool WorldRecorder::picturesDue(const scene::World& world) {
+  const double time = world.snapshot()->time;
+  if (broken_ || picturesEvery_.value_or(0) <= 0) return false;
+  if (time + world.lengths().tick / 2 < nextPictures_) return false;
+  nextPictures_ = time + *picturesEvery_;
+  return true;
+}
+
+void WorldRecorder::picture(const std::string& avatar, const v1::Frame& description,
+                            const EncodedPicture& picture) {
+  unlessBroken([&] { viewers_->picture(avatar, description, picture); });
+}
+
+void WorldRecorder::flush() {
+  unlessBroken([&] { file_.flush(); });
 }
 
 std::optional<std::string> WorldRecorder::close() {

@@ -5,16 +5,16 @@
 
 #include "protocol/recording.hpp"
 #include "scene/world.hpp"
-#include "server/command_line.hpp"
+#include "server/foxglove/viewer_channels.hpp"
+#include "server/recording_options.hpp"
 
 namespace enfilade::server {
 
 class WorldRecorder {
  public:
-  /// Begins `file` with the world as it is before its first tick. Throws protocol::mcap::
+  /// Begins the file with the world as it is before its first tick. Throws protocol::mcap::
   /// RecordingError.
-  WorldRecorder(const std::filesystem::path& file, const scene::World& world,
-                const ModelOptions& model);
+  WorldRecorder(const RecordingOptions& options, const scene::World& world);
 
   /// What the world has taken for its next tick.
   void took(const v1::Command& command);
@@ -23,6 +23,22 @@ class WorldRecorder {
   /// recording, which is logged; the world goes on.
   void ticked(const scene::World& world, const v1::TickEvents& events);
 
+  /// What was told without a tick, when contacts end with the world.
+  void ended(const v1::TickEvents& events);
+  /// The world is at its beginning again; what it was told since its last tick is void.
+  void beganAnew(const scene::World& world);
+  /// Sends to the file what waits for more; for when no tick will come soon.
+  void flush();
+
+  bool takesPictures() const { return picturesEvery_.has_value(); }
+  /// Whether everyone's view of the last tick is due; asked once a tick.
+  bool picturesDue(const scene::World& world);
+  void picture(const std::string& avatar, const v1::Frame& description,
+               const EncodedPicture& picture);
+
+  std::uint64_t ticks() const { return ticks_; }
+  std::uint64_t bytes() const { return file_.bytesWritten(); }
+  bool broken() const { return broken_.has_value(); }
   /// Writes what is left. Why the recording is not whole; nullopt when it is.
   std::optional<std::string> close();
 
@@ -34,6 +50,11 @@ class WorldRecorder {
   protocol::RecordingWriter file_;
   v1::RecordedCommands commands_;
   v1::State state_;  // kept, so that a tick allocates little
+  ModelOptions model_;
+  std::optional<ViewerChannels> viewers_;
+  std::optional<double> picturesEvery_;  ///< seconds; 0: only those that are taken anyway
+  double nextPictures_ = 0;              ///< seconds of the world's time
+  std::uint64_t ticks_ = 0;
   std::optional<std::string> broken_;
 };
 

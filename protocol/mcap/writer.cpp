@@ -32,7 +32,10 @@ std::string listOf(const Map& entries, const Put& put) {
 
 Writer::Writer(std::filesystem::path file, WriterOptions options)
     : file_(std::move(file)), options_(std::move(options)), sequences_(1), counts_(1) {
-  descriptor_ = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  const int existing = options_.replace ? O_TRUNC : O_EXCL;
+  descriptor_ = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | existing, 0644);
+  if (descriptor_ < 0 && errno == EEXIST)
+    throw RecordingError(file_.string() + ": is there already: move it away, or name another file");
   if (descriptor_ < 0)
     throw RecordingError(file_.string() + ": cannot be written: " + std::strerror(errno));
   open_ = true;
@@ -230,6 +233,9 @@ void Writer::close() {
   bytes += kMagic;
   append(bytes);
   open_ = false;
+  if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != EROFS)
+    throw RecordingError(file_.string() + ": " + std::strerror(errno) +
+                         "; the disk may not have all of it");
 }
 
 }  // namespace enfilade::protocol::mcap

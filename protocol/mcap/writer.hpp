@@ -20,6 +20,7 @@ struct WriterOptions {
   /// A chunk goes to the file when it holds this much, or this long after its first message.
   std::size_t chunkBytes = std::size_t{256} << 10;
   std::chrono::milliseconds chunkAge{500};
+  bool replace = true;  ///< begins a file anew that is there; else that is an error
 };
 
 /// What messages of a channel are. Schemas of the same name are stored once.
@@ -30,7 +31,7 @@ struct ChannelSpec {
 
 class Writer {
  public:
-  /// Begins the file anew. Throws RecordingError.
+  /// Begins the file. Throws RecordingError.
   Writer(std::filesystem::path file, WriterOptions options);
   ~Writer();  ///< closes; what cannot be written then is lost in silence
   Writer(const Writer&) = delete;
@@ -43,7 +44,8 @@ class Writer {
   void write(std::uint16_t channel, std::uint64_t time, std::string_view message);
   /// Sends the open chunk to the file. Throws as write().
   void flush();
-  /// Writes the summary; nothing may be written afterwards. Throws as write().
+  /// Writes the summary and waits until the disk has it all; nothing may be written afterwards.
+  /// Throws as write().
   void close();
 
   std::uint64_t bytesWritten() const { return position_; }

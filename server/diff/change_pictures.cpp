@@ -114,12 +114,12 @@ Snapshots snapshotsAt(const std::shared_ptr<const scene::Scene>& scene,
   Snapshots found;
   if (!scene || ticks.empty()) return found;
   protocol::RecordingReader reader(recording);
-  std::optional<scene::World> world;
+  std::optional<RecordedWorld> world;
   std::optional<InProcessDriver> driver;
   while (const auto item = reader.next()) {
     if (const auto* start = std::get_if<v1::RecordingStart>(&*item)) {
       if (world) break;
-      world.emplace(scene, lengthsFrom(start->lengths()).value());
+      world.emplace(scene::World(scene, lengthsFrom(start->lengths()).value()));
       driver.emplace(*world, nullptr);
     }
     if (!driver) continue;

@@ -196,9 +196,12 @@ std::vector<RefusedCommand> walkAgain(const RewalkCommand& command,
   if (!lengths) throw RecordingError("the recording has lengths that no world can have");
   WalkReport report(command.out);
   report.removeEarlier();
-  scene::World world(scene, *lengths);
-  WorldRecorder recorder(record, world, command.model);
-  InProcessDriver driver(world, renderer, {}, &recorder);
+  RecordedWorld world(scene::World(scene, *lengths));
+  RecordingOptions options;
+  options.choice.file = record;
+  options.model = command.model;
+  world.record(options);
+  InProcessDriver driver(world, renderer);
   Walk walk(driver, report);
   walk.follow(recording, static_cast<double>(std::filesystem::file_size(command.recording)));
   walk.finish();
@@ -214,7 +217,7 @@ std::vector<RefusedCommand> walkAgain(const RewalkCommand& command,
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
   facts.wallSeconds = took.count();
   report.writeSummary(facts, walk.result);
-  if (const auto broken = recorder.close()) throw RecordingError(*broken);
+  if (const auto broken = world.recorder()->close()) throw RecordingError(*broken);
   return std::move(walk.refused);
 }
 

@@ -199,8 +199,10 @@ std::optional<v1::Error> Worlds::problemOf(const WorldToMake& wanted) const {
 Worlds::World Worlds::start(const std::string& name, ServedScene& scene, bool dropWhenEmpty) {
   WorldPlace place{name, scene.name, this, dropWhenEmpty, {}};
   place.becameEmpty = [this, name] { give([this, name] { dropIfEmpty(name); }); };
+  WorldOptions options = options_;
+  if (main_) options.record.reset();  // one file holds one world: the first
   auto world =
-      std::make_shared<TickLoop>(scene.scene, scene.frames, scene.rays, options_, std::move(place));
+      std::make_shared<TickLoop>(scene.scene, scene.frames, scene.rays, options, std::move(place));
   const std::lock_guard lock(mutex_);
   if (!main_) main_ = world;
   worlds_[name] = world;

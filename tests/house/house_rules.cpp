@@ -42,6 +42,7 @@ const std::map<std::string, Names> kRoomMayInclude{
     // What is drawn and where is the same for both renderers.
     {"render/rays", {"render", "render/gl/avatar_mesh.hpp", "render/gl/draw_list.hpp"}},
     {"server/capture", {"server"}},
+    {"server/foxglove", {"server"}},
     {"server/worlds", {"server"}},
     {"server/diff", {"server", "server/capture"}},
     {"server/recordings", {"server", "server/capture"}},

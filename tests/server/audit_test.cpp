@@ -66,9 +66,10 @@ TEST(AuditOption, IsAWholeNumberOfTicksAndOffWithoutIt) {
 }
 
 TEST(AuditOfAWalk, AMissedPairIsCountedLoggedAndAViolation) {
-  scene::World world(smallRoom());
-  withholdTheWall(world);
-  scene::auditBroadPhase(world, 2);
+  scene::World blind(smallRoom());
+  withholdTheWall(blind);
+  scene::auditBroadPhase(blind, 2);
+  RecordedWorld world(std::move(blind));
   InProcessDriver driver(world, nullptr);
   const Log log;
   ASSERT_FALSE(driver.submit(spawn("ann", 4.8, 0.01, 0)));

@@ -53,7 +53,7 @@ TEST(MotionOptions, WhatNoWorldCanHaveIsAMistakeOfUsage) {
 
 class AvatarOrders : public ::testing::Test {
  protected:
-  scene::World world{smallRoom()};
+  RecordedWorld world{scene::World(smallRoom())};
   InProcessDriver driver{world, nullptr};
 
   static v1::Command armAt(double x, double y, double z) {

@@ -1,26 +1,34 @@
 // Reads FILE with the reader of MCAP's own authors: by its index, or with --stream from front to back
-// up to where the file was cut off. Prints, as one JSON object, the messages of each channel.
+// up to where the file was cut off. Prints, as one JSON object, the messages of each channel; with
+// --messages each one, its bytes and the channels' schemas in base64.
 import { McapIndexedReader, McapStreamReader } from "@mcap/core";
 import { decompress } from "fzstd";
 import { readFileSync } from "node:fs";
 
-const stream = process.argv[2] === "--stream";
+const stream = process.argv.includes("--stream"), whole = process.argv.includes("--messages");
 const bytes = readFileSync(process.argv.at(-1));
 const decompressHandlers = { zstd: (packed, size) => decompress(packed, new Uint8Array(Number(size))) };
-const channels = {};
-const count = (channel, message) => {
-  const told = (channels[channel.topic] ??= { messages: 0, bytes: 0 });
+const channels = {}, messages = [];
+const base64 = (data) => Buffer.from(data).toString("base64");
+const count = (channel, schema, message) => {
+  const told = (channels[channel.topic] ??= { messages: 0, bytes: 0, type: schema.name });
   told.messages += 1;
   told.bytes += message.data.byteLength;
+  if (!whole) return;
+  told.schema ??= base64(schema.data);
+  messages.push([channel.topic, Number(message.logTime) / 1e9, base64(message.data)]);
 };
 
 if (stream) {
   const reader = new McapStreamReader({ validateCrcs: true, decompressHandlers });
   reader.append(bytes);
-  const known = new Map();
+  const known = new Map(), schemas = new Map();
   for (let record; (record = reader.nextRecord()); ) {
+    if (record.type === "Schema") schemas.set(record.id, record);
     if (record.type === "Channel") known.set(record.id, record);
-    if (record.type === "Message") count(known.get(record.channelId), record);
+    if (record.type !== "Message") continue;
+    const channel = known.get(record.channelId);
+    count(channel, schemas.get(channel.schemaId), record);
   }
 } else {
   const readable = {
@@ -29,7 +37,8 @@ if (stream) {
   };
   const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers });
   for await (const message of reader.readMessages()) {
-    count(reader.channelsById.get(message.channelId), message);
+    const channel = reader.channelsById.get(message.channelId);
+    count(channel, reader.schemasById.get(channel.schemaId), message);
   }
 }
-process.stdout.write(JSON.stringify(channels) + "\n");
+process.stdout.write(JSON.stringify(whole ? { channels, messages } : channels) + "\n");
