@@ -21,6 +21,9 @@ namespace {
 constexpr std::size_t kReadAtOnce = 1 << 16;   // bytes
 constexpr std::size_t kForgetAbove = 1 << 16;  // bytes sent that are still held
 
+constexpr const char* kRemedy =
+    "; is `enfilade serve` running there, and is the port the one of its ready line?";
+
 std::string textOf(int error) {
   return std::generic_category().message(error);
 }
@@ -49,34 +52,44 @@ void Connection::breakOff(const std::string& reason) {
   socket_ = -1;
 }
 
-/// The first address that answers at once or may answer later.
 void Connection::connect(const std::string& host, std::uint16_t port) {
-  constexpr const char* remedy =
-      "; is `enfilade serve` running there, and is the port the one of its ready line?";
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* list = nullptr;
   const int unknown = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &list);
   if (unknown != 0) {
-    return breakOff("cannot connect to " + peer_ + ": " + ::gai_strerror(unknown) + remedy);
+    return breakOff("cannot connect to " + peer_ + ": " + ::gai_strerror(unknown) + kRemedy);
   }
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses(list, &::freeaddrinfo);
-  int problem = 0;
   for (const addrinfo* one = list; one; one = one->ai_next) {
-    socket_ = ::socket(one->ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(one->ai_addr);
+    addresses_.emplace_back(bytes, bytes + one->ai_addrlen);
+  }
+  tryNext(0);
+}
+
+/// The next address that answers at once or may answer later; `problem`: of the one before.
+void Connection::tryNext(int problem) {
+  if (socket_ >= 0) ::close(socket_);
+  socket_ = -1;
+  while (!addresses_.empty()) {
+    const std::vector<std::uint8_t> address = std::move(addresses_.front());
+    addresses_.erase(addresses_.begin());
+    const auto* one = reinterpret_cast<const sockaddr*>(address.data());
+    socket_ = ::socket(one->sa_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (socket_ < 0) {
       problem = errno;
       continue;
     }
     const int yes = 1;
     ::setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-    connected_ = ::connect(socket_, one->ai_addr, one->ai_addrlen) == 0;
+    connected_ = ::connect(socket_, one, static_cast<socklen_t>(address.size())) == 0;
     if (connected_ || errno == EINPROGRESS) return;
     problem = errno;
     ::close(socket_);
     socket_ = -1;
   }
-  breakOff("cannot connect to " + peer_ + ": " + textOf(problem) + remedy);
+  breakOff("cannot connect to " + peer_ + ": " + textOf(problem) + kRemedy);
 }
 
 /// False while the other side has not answered.
@@ -88,10 +101,7 @@ bool Connection::finishConnecting() {
   socklen_t length = sizeof problem;
   ::getsockopt(socket_, SOL_SOCKET, SO_ERROR, &problem, &length);
   connected_ = problem == 0;
-  if (!connected_) {
-    breakOff("cannot connect to " + peer_ + ": " + textOf(problem) +
-             "; is `enfilade serve` running there, and is the port the one of its ready line?");
-  }
+  if (!connected_) tryNext(problem);
   return connected_;
 }
 

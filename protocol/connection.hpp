@@ -54,6 +54,7 @@ class Connection {
 
  private:
   void connect(const std::string& host, std::uint16_t port);
+  void tryNext(int problem);
   bool finishConnecting();
   void write();
   bool read();
@@ -61,6 +62,7 @@ class Connection {
 
   const std::string peer_;
   int socket_ = -1;
+  std::vector<std::vector<std::uint8_t>> addresses_;  ///< sockaddr: those that were not tried yet
   bool connected_ = false;
   Decoder decoder_;
   std::vector<std::uint8_t> out_;  ///< its first `sent_` bytes are sent

@@ -13,7 +13,6 @@ namespace {
 
 namespace pb = google::protobuf;
 
-constexpr const char* kStart = "/enfilade/start";
 constexpr const char* kCommands = "/enfilade/commands";
 constexpr const char* kEvents = "/enfilade/events";
 constexpr const char* kState = "/enfilade/state";
@@ -31,10 +30,6 @@ mcap::ChannelSpec channelOf(const std::string& topic, const pb::Descriptor& mess
   std::set<std::string> known;
   addWithImports(*message.file(), set, known);
   return {topic, "protobuf", message.full_name(), "protobuf", set.SerializeAsString()};
-}
-
-std::uint64_t nanoseconds(double seconds) {
-  return static_cast<std::uint64_t>(std::llround(seconds * 1e9));
 }
 
 template <class Message>
@@ -119,6 +114,10 @@ std::optional<StateDifference> listDifference(const States& recorded, const Stat
 
 }  // namespace
 
+std::uint64_t nanosecondsOf(double seconds) {
+  return static_cast<std::uint64_t>(std::llround(seconds * 1e9));
+}
+
 std::string hexadecimal(std::uint64_t hash) {
   constexpr const char* kDigits = "0123456789abcdef";
   std::string text;
@@ -129,16 +128,18 @@ std::string hexadecimal(std::uint64_t hash) {
 RecordingWriter::RecordingWriter(const std::filesystem::path& file, const std::string& library,
                                  bool replace)
     : file_(file, {.library = library, .replace = replace}),
-      start_(file_.addChannel(channelOf(kStart, *v1::RecordingStart::descriptor()))),
+      start_(file_.addChannel(channelOf(kStartTopic, *v1::RecordingStart::descriptor()))),
       commands_(file_.addChannel(channelOf(kCommands, *v1::RecordedCommands::descriptor()))),
       events_(file_.addChannel(channelOf(kEvents, *v1::TickEvents::descriptor()))),
       state_(file_.addChannel(channelOf(kState, *v1::State::descriptor()))),
-      names_(file_.addChannel(channelOf(kNames, *v1::RecordedNames::descriptor()))) {}
+      names_(file_.addChannel(channelOf(kNames, *v1::RecordedNames::descriptor()))),
+      checkpoint_(
+          file_.addChannel(channelOf(kCheckpointTopic, *v1::RecordedCheckpoint::descriptor()))) {}
 
 void RecordingWriter::writeTo(std::uint16_t channel, double time, const pb::MessageLite& message) {
   message.SerializeToString(&bytes_);
   last_ = std::max(last_, fileTime(time));
-  file_.write(channel, nanoseconds(fileTime(time)), bytes_);
+  file_.write(channel, nanosecondsOf(fileTime(time)), bytes_);
 }
 
 void RecordingWriter::write(const std::string& topic, double time, const pb::Message& message) {
@@ -147,9 +148,10 @@ void RecordingWriter::write(const std::string& topic, double time, const pb::Mes
   writeTo(channel, time, message);
 }
 
-void RecordingWriter::write(const v1::RecordingStart& start) {
-  began_ = last_;
-  writeTo(start_, 0, start);
+void RecordingWriter::write(const v1::RecordingStart& start, double time) {
+  startTime_ = time;
+  began_ = std::max(0.0, last_ - time);
+  writeTo(start_, time, start);
   file_.flush();  // a recording that cannot be begun again is worth nothing
 }
 
@@ -166,20 +168,34 @@ void RecordingWriter::write(const v1::State& state) {
 }
 
 void RecordingWriter::write(const v1::RecordedNames& names) {
-  writeTo(names_, 0, names);
+  writeTo(names_, startTime_, names);
+}
+
+std::uint64_t RecordingWriter::write(const v1::RecordedCheckpoint& checkpoint, double time) {
+  file_.flush();
+  const std::uint64_t before = bytesWritten();
+  writeTo(checkpoint_, time, checkpoint);
+  file_.flush();
+  return bytesWritten() - before;
 }
 
 RecordingReader::RecordingReader(const std::filesystem::path& file) : path_(file), file_(file) {}
 
+std::optional<RecordedItem> itemFrom(const mcap::Message& message,
+                                     const std::filesystem::path& file) {
+  const std::string& topic = message.channel->topic;
+  if (topic == kStartTopic) return parsed<v1::RecordingStart>(message, file);
+  if (topic == kCommands) return parsed<v1::RecordedCommands>(message, file);
+  if (topic == kEvents) return parsed<v1::TickEvents>(message, file);
+  if (topic == kState) return parsed<v1::State>(message, file);
+  if (topic == kNames) return parsed<v1::RecordedNames>(message, file);
+  if (topic == kCheckpointTopic) return parsed<v1::RecordedCheckpoint>(message, file);
+  return std::nullopt;
+}
+
 std::optional<RecordedItem> RecordingReader::next() {
-  while (const auto message = file_.next()) {
-    const std::string& topic = message->channel->topic;
-    if (topic == kStart) return parsed<v1::RecordingStart>(*message, path_);
-    if (topic == kCommands) return parsed<v1::RecordedCommands>(*message, path_);
-    if (topic == kEvents) return parsed<v1::TickEvents>(*message, path_);
-    if (topic == kNames) return parsed<v1::RecordedNames>(*message, path_);
-    if (topic == kState) return parsed<v1::State>(*message, path_);
-  }
+  while (const auto message = file_.next())
+    if (auto item = itemFrom(*message, path_)) return item;
   return std::nullopt;
 }
 

@@ -20,11 +20,15 @@ class RecordingWriter {
   RecordingWriter(const std::filesystem::path& file, const std::string& library,
                   bool replace = true);
 
-  void write(const v1::RecordingStart& start);
+  /// `time`: seconds of simulated time, above 0 for a branch.
+  void write(const v1::RecordingStart& start, double time = 0);
   void write(const v1::RecordedCommands& commands, double time);
   void write(const v1::TickEvents& events);
   void write(const v1::State& state);
   void write(const v1::RecordedNames& names);
+  /// In a chunk of its own, so that who seeks it unpacks nothing else. Returns the bytes that it
+  /// took in the file.
+  std::uint64_t write(const v1::RecordedCheckpoint& checkpoint, double time);
   /// To a channel of that name, which is for this kind of message.
   void write(const std::string& topic, double time, const google::protobuf::Message& message);
 
@@ -40,12 +44,22 @@ class RecordingWriter {
   mcap::Writer file_;
   std::string bytes_;  // kept, so that a tick allocates nothing
   std::map<std::string, std::uint16_t> others_;
+  double startTime_ = 0;         ///< seconds of the world's time
   double began_ = 0, last_ = 0;  ///< seconds in the file: of the world's beginning, written last
-  std::uint16_t start_, commands_, events_, state_, names_;
+  std::uint16_t start_, commands_, events_, state_, names_, checkpoint_;
 };
 
 using RecordedItem = std::variant<v1::RecordingStart, v1::RecordedCommands, v1::TickEvents,
-                                  v1::State, v1::RecordedNames>;
+                                  v1::State, v1::RecordedNames, v1::RecordedCheckpoint>;
+
+/// nullopt for messages of other programs.
+std::optional<RecordedItem> itemFrom(const mcap::Message& message,
+                                     const std::filesystem::path& file);
+inline constexpr const char* kStartTopic = "/enfilade/start";
+inline constexpr const char* kCheckpointTopic = "/enfilade/checkpoint";
+
+/// Nanoseconds, as recordings have them.
+std::uint64_t nanosecondsOf(double seconds);
 
 class RecordingReader {
  public:

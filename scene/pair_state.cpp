@@ -1,8 +1,7 @@
 // 1. An entity becomes placed trees of convex parts: of a still object its hulls and its triangles,
 //    of a body its parts, of an avatar each part by itself, since each is placed by itself.
 // 2. Those two are looked at with a clearance (collision/part_tree.*) that begins at twice the gap
-// of
-//    their boxes and doubles until something is found; what is found is the nearest when it is
+//    of their boxes and doubles until something is found; what is found is the nearest when it is
 //    nearer than the clearance, else it is the next clearance.
 // 3. Before which time they cannot touch follows from the distance and from bounds of their motion
 //    (seed 5.1, collision/continuous.*). The gap along the separating normal holds for two convex
@@ -165,8 +164,7 @@ std::vector<EntityId> candidatesIn(const SceneThen& then, const Box& box, Entity
   return ids;
 }
 
-// ---- time to contact
-// -----------------------------------------------------------------------------
+// ---- time to contact ----------------------------------------------------------------------------
 
 /// How one may move from now on.
 struct Motion {

@@ -42,9 +42,20 @@ void Arrival::end(v1::ErrorCode code, const std::string& reason) {
   socket_.cancel(none);
 }
 
+bool Arrival::giveWay() {
+  if (gone_) return false;
+  gone_ = true;
+  timer_.cancel();
+  spdlog::warn("{}: said nothing, and a newcomer takes its place", addressOf(socket_));
+  error_code none;
+  socket_.close(none);
+  return true;
+}
+
 void Arrival::read() {
   const auto room = asio::buffer(in_.data() + count_, in_.size() - count_);
   socket_.async_read_some(room, [self = shared_from_this()](error_code problem, std::size_t count) {
+    if (self->gone_) return;
     self->count_ += count;
     const bool stopped = problem == asio::error::operation_aborted;
     if (problem && !stopped) {

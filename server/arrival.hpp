@@ -17,6 +17,7 @@ class Arrival : public Connection, public std::enable_shared_from_this<Arrival> 
   Arrival(boost::asio::ip::tcp::socket socket, Reception& reception);
   void start();
   void end(v1::ErrorCode code, const std::string& reason) override;
+  bool giveWay() override;
 
  private:
   enum class Language : std::uint8_t { unknownYet, ours, http };

@@ -22,6 +22,7 @@ struct Arguments {
   DoctorCommand doctor;
   ModelArguments model;
   std::string script, out, plan, listen = "127.0.0.1:7878", connect;
+  std::string from, then;
   RecordingChoice record;
   std::string recordChannels = "walk", recordFrames;
   bool strict = false, verify = false, json = false, objects = false, stopAtEndOfInput = false;
@@ -195,6 +196,19 @@ void addWalk(CLI::App& verb, Arguments& into) {
   verb.add_flag("--strict", into.strict, "End with 3 when an order was refused or a walk blocked");
 }
 
+std::string tickProblem(const std::string& text) {
+  return numberFrom<std::uint64_t>(text) ? "" : text + ": give the number of a tick, as 600";
+}
+
+void addBranch(CLI::App& verb, Arguments& into) {
+  verb.add_option("--from", into.from,
+                  "[SCENE] RECORDING: begin after this tick, at the nearest checkpoint")
+      ->check(CLI::Validator(tickProblem, "TICK"));
+  verb.add_option("--then", into.then,
+                  "A script that takes over there: what was recorded after it is not done")
+      ->check(CLI::Validator(fileProblem, "SCRIPT"));
+}
+
 void addRecording(CLI::App& verb, Arguments& into, const char* what) {
   CLI::Option* file = verb.add_option("--record", into.record.file, what)
                           ->check(CLI::Validator(fileProblem, "FILE"));
@@ -275,10 +289,47 @@ ModelOptions modelFrom(const ModelArguments& read) {
   return options;
 }
 
-/// The recording stands last; before it the scene, if it is named.
+/// A recording stands last; before it the scene, if it is named.
 VerifyCommand verifyFrom(const Arguments& read) {
-  if (read.script.empty()) return {{}, read.model.file, !read.model.noCache};
-  return {read.model.file, read.script, !read.model.noCache};
+  const bool named = !read.script.empty();
+  VerifyCommand command{
+      named ? read.model.file : "", named ? read.script : read.model.file, !read.model.noCache, {}};
+  if (!read.from.empty()) command.from = numberFrom<std::uint64_t>(read.from);
+  return command;
+}
+
+/// The script of --then takes over a recording.
+void branchFrom(const Arguments& read, ReplayCommand& command) {
+  const VerifyCommand recorded = verifyFrom(read);
+  command.model.file = recorded.scene;
+  command.recording = recorded.recording;
+  command.script = read.then;
+  command.from = recorded.from.value_or(0);
+}
+
+/// What of a replay of a recording does not go with what; empty: all does.
+std::string branchProblem(const CLI::App& replay, const Arguments& read) {
+  if (read.from.empty()) return read.then.empty() ? "" : "--then needs --from TICK";
+  if (read.then.empty() && !read.verify)
+    return "--from needs --verify, or --then SCRIPT that goes on from there";
+  if (!read.then.empty() && read.verify) return "--then makes a new walk: it has nothing to verify";
+  for (const char* option :
+       {"--step-height", "--epsilon", "--slope", "--sliding", "--near-miss", "--unit", "--up"})
+    if (replay.count(option) > 0) return std::string(option) + " is the recording's to say";
+  return "";
+}
+
+bool isRewalk(const Arguments& read) {
+  return !read.verify && read.then.empty() && protocol::mcap::isMcap(read.script);
+}
+
+/// What a walk that is made again in another model does not take; empty: nothing of it is there.
+std::string rewalkProblem(const CLI::App& replay) {
+  for (const char* option : {"--strict", "--audit", "--step-height", "--epsilon", "--slope",
+                             "--sliding", "--near-miss", "--record-channels", "--record-frames"})
+    if (replay.count(option) > 0)
+      return std::string(option) + ": a recorded walk is made again as it was recorded";
+  return "";
 }
 
 RewalkCommand rewalkFrom(const Arguments& read) {
@@ -288,12 +339,31 @@ RewalkCommand rewalkFrom(const Arguments& read) {
 
 /// What a replay that verifies nothing cannot do without.
 std::optional<std::string> missingFrom(const Arguments& read) {
-  if (read.script.empty() && protocol::mcap::isMcap(read.model.file))
+  if (read.script.empty() && read.then.empty() && protocol::mcap::isMcap(read.model.file))
     return "SCENE is required: the model to make the recorded walk again in; --verify and "
            "`enfilade export` take a recording alone";
-  if (read.script.empty()) return "SCRIPT is required: the walk, JSON lines (protocol/SCRIPT.md)";
+  if (read.script.empty() && read.then.empty())
+    return "SCRIPT is required: the walk, JSON lines (protocol/SCRIPT.md)";
   if (read.out.empty()) return "--out is required: a folder for the pictures, contacts and summary";
   return std::nullopt;
+}
+
+std::variant<ProgramCommand, ExitCode> replayFrom(const CLI::App& replay, const Arguments& read,
+                                                  std::uint32_t audit) {
+  std::string problem = branchProblem(replay, read);
+  if (problem.empty() && isRewalk(read)) problem = rewalkProblem(replay);
+  if (problem.empty() && !read.verify) problem = missingFrom(read).value_or("");
+  if (!problem.empty()) {
+    std::cerr << "enfilade: " << problem << "\nenfilade replay --help tells what there is\n";
+    return ExitCode::usage;
+  }
+  if (read.verify) return verifyFrom(read);
+  if (isRewalk(read)) return rewalkFrom(read);
+  ReplayCommand command{
+      modelFrom(read.model), read.script,         read.out,         read.strict, audit,
+      lengthsFrom(read),     recordingFrom(read), drawingFrom(read)};
+  if (!read.then.empty()) branchFrom(read, command);
+  return command;
 }
 
 }  // namespace
@@ -332,7 +402,7 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   addRenderer(*serve, read);
   addAudit(*serve, read);
   addMotion(*serve, read);
-  addRecording(*serve, read, "Write a recording (MCAP) of all that happens to a new file");
+  addRecording(*serve, read, "Write a recording (MCAP) of the world main to a new file");
   CLI::App* replay =
       app.add_subcommand("replay", "Run a walk script, or a recorded walk, in a scene");
   addModel(*replay, read.model);
@@ -345,6 +415,7 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   for (const char* needless : {"SCRIPT", "--out"}) replay->get_option(needless)->required(false);
   replay->add_flag("--verify", read.verify,
                    "[SCENE] RECORDING: make a recorded walk again; ends with 4 where it differs");
+  addBranch(*replay, read);
   replay->add_flag("--json", read.json, "SCENE RECORDING: print what changed as one JSON object");
   replay
       ->add_option("--pictures", read.pictures,
@@ -403,17 +474,7 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
                         drawingFrom(read),
                         read.furtherScenes,
                         recordingFrom(read)};
-  if (*replay && read.verify) return verifyFrom(read);
-  if (*replay) {
-    if (const auto missing = missingFrom(read)) {
-      std::cerr << "enfilade: " << *missing << "\nenfilade replay --help tells what there is\n";
-      return ExitCode::usage;
-    }
-    if (protocol::mcap::isMcap(read.script)) return rewalkFrom(read);
-    return ReplayCommand{
-        modelFrom(read.model), read.script,         read.out,         read.strict, audit,
-        lengthsFrom(read),     recordingFrom(read), drawingFrom(read)};
-  }
+  if (*replay) return replayFrom(*replay, read, audit);
   if (*capture)
     return CaptureCommand{modelFrom(read.model),
                           read.capture.path,

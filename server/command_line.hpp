@@ -72,11 +72,16 @@ struct ReplayCommand {
   scene::Lengths lengths;
   RecordingChoice record;
   DrawingOptions drawing;
+  /// A recording that the script takes over after tick `from`; empty: a new world. The model's file
+  /// is then empty where the recording says which, and the lengths are the recording's.
+  std::filesystem::path recording = {};
+  std::uint64_t from = 0;
 };
 struct VerifyCommand {
   std::filesystem::path scene;  ///< empty: where the recording says
   std::filesystem::path recording;
   bool cache = true;
+  std::optional<std::uint64_t> from = {};  ///< a tick to begin after; none: all of it
 };
 /// What changed between two recorded walks.
 struct DiffCommand {

@@ -31,6 +31,8 @@ const char* wordOf(v1::ContactEvent::Reason reason) {
       return "left";
     case v1::ContactEvent::REASON_SHUTDOWN:
       return "shutdown";
+    case v1::ContactEvent::REASON_RESTART:
+      return "restart";
     default:
       return "unknown";
   }

@@ -98,6 +98,8 @@ std::string fieldOf(const std::string& refusal) {
   const std::size_t start = refusal.find(": ") + 2;
   const std::string field = refusal.substr(start, refusal.find(' ', start) - start);
   const std::string pinhole = "pinhole";
+  if (field == "fovY") return "fov_y";
+  if (field == "heightY") return "height_y";
   return field.starts_with(pinhole) ? "intrinsics" + field.substr(pinhole.size()) : field;
 }
 
@@ -156,6 +158,14 @@ std::optional<v1::Error> rendererProblem(const v1::FrameRequest& request) {
                  "renderer");
 }
 
+std::optional<v1::Error> encodingProblem(const v1::FrameRequest& request) {
+  if (v1::Encoding_IsValid(request.rgb_encoding())) return std::nullopt;
+  return errorOf(
+      v1::ERROR_BAD_MESSAGE,
+      "rgb_encoding: give raw, png or jpeg, not " + std::to_string(request.rgb_encoding()),
+      "rgb_encoding");
+}
+
 /// Pixels that no client of ours takes in one message are refused before they are drawn.
 std::optional<v1::Error> sizeProblem(const v1::FrameRequest& request) {
   constexpr std::uint64_t kRoomForTheMessage = 65536;
@@ -187,6 +197,7 @@ CameraOrError viewFrom(const v1::FrameRequest& request, const scene::Snapshot& s
   if (auto problem = channelProblem(request)) return *problem;
   if (auto problem = glassProblem(request)) return *problem;
   if (auto problem = rendererProblem(request)) return *problem;
+  if (auto problem = encodingProblem(request)) return *problem;
   constexpr std::uint32_t kMost = 4096;
   if (request.width() < 1 || request.width() > kMost || request.height() < 1 ||
       request.height() > kMost) {

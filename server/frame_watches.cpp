@@ -23,6 +23,12 @@ void deliver(ServedWorld& served, ClientId id, std::uint32_t number, std::uint64
   });
 }
 
+/// The error of a view, as one of the whole request.
+v1::Error ofWatch(v1::Error error) {
+  if (!error.field().empty()) error.set_field("watch_frames.frame." + error.field());
+  return error;
+}
+
 void draw(ServedWorld& served, ClientId id, Client& client, std::uint32_t number,
           FrameWatch& watch) {
   const auto snapshot = served.world.snapshot();
@@ -64,7 +70,7 @@ std::optional<v1::Error> watchFrames(ServedWorld& served, ClientId id, Client& c
   const auto view = viewFrom(wanted.frame(), *served.world.snapshot());
   const auto* problem = std::get_if<v1::Error>(&view);
   // An avatar may come later; all else that is wrong with a view stays wrong.
-  if (problem && problem->code() != v1::ERROR_UNKNOWN_AVATAR) return *problem;
+  if (problem && problem->code() != v1::ERROR_UNKNOWN_AVATAR) return ofWatch(*problem);
   FrameWatch watch;
   watch.request = wanted.frame();
   watch.rate = wanted.rate();

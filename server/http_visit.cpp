@@ -74,6 +74,13 @@ void HttpVisit::end(v1::ErrorCode, const std::string& reason) {
   answer(503, "text/plain", reason + "\n");
 }
 
+bool HttpVisit::giveWay() {
+  if (closed_ || answered_ || !ears_.empty()) return false;
+  spdlog::warn("{}: asked nothing, and a newcomer takes its place", peer_);
+  close();
+  return true;
+}
+
 // ---- what is asked -----------------------------------------------------------------------------
 
 void HttpVisit::route(Request request) {
@@ -127,7 +134,7 @@ void HttpVisit::ask(v1::ClientMessage request, Role role) {
   request.set_request_id(2);
   for (Ear& ear : ears_) {
     join(ear, role);
-    if (ear.client != 0) ear.world->receive(ear.client, request, 0);
+    if (ear.client != 0) ear.world->receive(ear.client, request, {});
     ear.ended = ear.client == 0;
   }
   noticeLeaving();

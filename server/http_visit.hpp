@@ -26,6 +26,7 @@ class HttpVisit : public Connection, public std::enable_shared_from_this<HttpVis
   /// The whole request has to be here by `deadline`.
   void start(Clock::time_point deadline);
   void end(v1::ErrorCode code, const std::string& reason) override;
+  bool giveWay() override;
 
  private:
   using Request = boost::beast::http::request<boost::beast::http::string_body>;

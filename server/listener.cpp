@@ -88,8 +88,18 @@ void Listener::take(tcp::socket socket) {
   const auto arrival = std::make_shared<Arrival>(std::move(socket), reception_);
   arrival->start();
   enlist(reception_, arrival);
-  if (reception_.connections.size() > reception_.limits.connections)
+  if (reception_.connections.size() > reception_.limits.connections && !makeRoom(*arrival))
     arrival->end(v1::ERROR_NOT_ALLOWED, "the server has all the clients it takes");
+}
+
+/// The one who came first of those who have not said who they are gives way: silence must not keep
+/// others out.
+bool Listener::makeRoom(const Connection& newcomer) {
+  for (const auto& weak : reception_.connections) {
+    const auto connection = weak.lock();
+    if (connection && connection.get() != &newcomer && connection->giveWay()) return true;
+  }
+  return false;
 }
 
 void Listener::stop() {

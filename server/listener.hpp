@@ -27,6 +27,7 @@ class Listener {
  private:
   void accept();
   void take(boost::asio::ip::tcp::socket socket);
+  bool makeRoom(const Connection& newcomer);
 
   boost::asio::ip::tcp::acceptor acceptor_;
   const std::uint16_t port_;  ///< asked once: other threads want to know it

@@ -55,6 +55,11 @@ OrderOrError orderFrom(const v1::Spawn& message) {
   for (const v1::Link& link : message.links()) {
     const std::string field = "spawn.links[" + std::to_string(spawn.links.size()) + "]";
     if (!link.has_joint() || !link.joint().has_axis()) return missing(field + ".joint.axis");
+    if (!v1::Joint::Kind_IsValid(link.joint().kind())) {
+      return errorOf(v1::ERROR_BAD_MESSAGE,
+                     "kind: give revolute or prismatic, not " + std::to_string(link.joint().kind()),
+                     field + ".joint.kind");
+    }
     spawn.links.push_back(linkFrom(link));
   }
   return scene::Order(std::move(spawn));

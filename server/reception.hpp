@@ -17,6 +17,8 @@ class Connection {
   virtual ~Connection() = default;
   /// Tells the reason, where that is possible, and closes.
   virtual void end(v1::ErrorCode code, const std::string& reason) = 0;
+  /// Closes at once if nobody knows yet who this is; false when it stays.
+  virtual bool giveWay() = 0;
 };
 
 struct Reception {

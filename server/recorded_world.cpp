@@ -37,8 +37,8 @@ std::vector<scene::Notice> everyoneLeaves(const scene::Snapshot& snapshot, const
 
 RecordedWorld::RecordedWorld(scene::World world) : world_(std::move(world)) {}
 
-void RecordedWorld::record(const RecordingOptions& options) {
-  recorder_ = std::make_unique<WorldRecorder>(options, world_);
+void RecordedWorld::record(const RecordingOptions& options, const v1::RecordingParent* parent) {
+  recorder_ = std::make_unique<WorldRecorder>(options, world_, parent);
 }
 
 std::optional<v1::Error> RecordedWorld::submit(const v1::Command& command) {

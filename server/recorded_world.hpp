@@ -12,9 +12,9 @@ class RecordedWorld {
  public:
   explicit RecordedWorld(scene::World world);
 
-  /// From now on, which is before the first command and tick, all is written down. Throws
-  /// protocol::mcap::RecordingError.
-  void record(const RecordingOptions& options);
+  /// From now on, which is before the first command and tick, all is written down; `parent` is that
+  /// of a branch, which begins later. Throws protocol::mcap::RecordingError.
+  void record(const RecordingOptions& options, const v1::RecordingParent* parent = nullptr);
 
   /// To look at; who tells the world something uses the functions below.
   operator const scene::World&() const { return world_; }

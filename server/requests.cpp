@@ -136,14 +136,15 @@ void answer(const Asked& asked, const v1::SetClock& wanted) {
   constexpr double kSlowest = 1e-3, kFastest = 1000;
   const double speed = wanted.free_run().speed();
   if (wanted.mode_case() == v1::SetClock::MODE_NOT_SET) {
-    return replyError(asked, errorOf(v1::ERROR_BAD_MESSAGE,
-                                     "mode is missing: give lockstep, free_run or pause", "mode"));
+    return replyError(
+        asked, errorOf(v1::ERROR_BAD_MESSAGE, "mode is missing: give lockstep, free_run or pause",
+                       "set_clock.mode"));
   }
   if (speed != 0 && !(speed >= kSlowest && speed <= kFastest)) {
     return replyError(asked,
                       errorOf(v1::ERROR_BAD_MESSAGE,
                               "free_run.speed = " + std::to_string(speed) + ": give 0.001 to 1000",
-                              "free_run.speed"));
+                              "set_clock.free_run.speed"));
   }
   if (!takeClock(asked)) return;
   ServedClock& clock = asked.served.clock;
@@ -233,7 +234,10 @@ void answer(const Asked& asked, const v1::FrameRequest& request, const PostToTic
   }
   const auto snapshot = served.world.snapshot();
   auto view = viewFrom(request, *snapshot);
-  if (auto* error = std::get_if<v1::Error>(&view)) return replyError(asked, std::move(*error));
+  if (auto* error = std::get_if<v1::Error>(&view)) {
+    if (!error->field().empty()) error->set_field("frame." + error->field());
+    return replyError(asked, std::move(*error));
+  }
   FrameJob job{snapshot, std::get<View>(view), request, asked.message.request_id(), 0,
                0,        served.drawn};
   job.seen = toRecording(served, request);
@@ -314,7 +318,7 @@ void answer(const Asked& asked, const v1::DescribeEntities& wanted) {
   if (count > limits.describedIds) {
     return replyError(
         asked, errorOf(v1::ERROR_TOO_LARGE, "ids has " + std::to_string(count) + " ids: " + remedy,
-                       "ids"));
+                       "describe.ids"));
   }
   v1::ServerMessage message;
   BoundedNames names(asked.served, *message.mutable_names());
@@ -327,7 +331,7 @@ void answer(const Asked& asked, const v1::DescribeEntities& wanted) {
         errorOf(v1::ERROR_TOO_LARGE,
                 "the names take more than the " + std::to_string(limits.replyBytes) +
                     " bytes of a reply: give ids and " + remedy + ", fewer where names are long",
-                "ids"));
+                "describe.ids"));
   }
   reply(asked, std::move(message));
 }
@@ -393,6 +397,13 @@ void answerList(const Asked& asked) {
   reply(asked, std::move(message));
 }
 
+/// What was asked before is answered by now; the session closes when it is sent.
+void answerBye(const Asked& asked) {
+  v1::ServerMessage message;
+  message.mutable_bye()->set_reason("you said goodbye");
+  asked.client.out->finish(encodeShared(message));
+}
+
 /// The least role that may ask this.
 Role roleNeeded(v1::ClientMessage::BodyCase body) {
   switch (body) {
@@ -450,7 +461,8 @@ void answer(const Asked& asked, const PostToTickThread& post) {
       return answerList(asked);
     case v1::ClientMessage::kHello:
       return replyError(asked, errorOf(v1::ERROR_NOT_ALLOWED, "hello was said already"));
-    case v1::ClientMessage::kBye:  // the session's to take
+    case v1::ClientMessage::kBye:
+      return answerBye(asked);
     case v1::ClientMessage::BODY_NOT_SET:
       break;
   }
@@ -514,7 +526,6 @@ void answerWaiting(ServedWorld& served, ClientId id, const PostToTickThread& pos
          !client.out->finished()) {
     const WaitingRequest request = std::move(client.waiting.front());
     client.waiting.pop_front();
-    client.waitingBytes -= request.bytes;
     answerOrSayWhyNot({served, id, client, request.message}, post);
   }
 }

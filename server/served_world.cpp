@@ -1,8 +1,9 @@
 #include "server/served_world.hpp"
 
 #include <algorithm>
+#include <array>
 
-#include "protocol/framing.hpp"
+#include "protocol/joined_message.hpp"
 #include "server/body_messages.hpp"
 #include "server/frame_watches.hpp"
 #include "server/world_messages.hpp"
@@ -11,28 +12,67 @@ namespace enfilade::server {
 
 namespace {
 
+/// What one tick tells. All who subscribed to the same get the same bytes, which are made when the
+/// first of them wants them: with hundreds of clients this is most of what a tick sends.
+struct TickTold {
+  const v1::TickEvents& told;                             ///< of everyone
+  std::array<std::optional<std::string>, 8> events = {};  ///< serialized; by what is subscribed
+  std::optional<std::string> state = {};                  ///< serialized
+};
+
+Buffer joined(int field, const std::string& own, const std::string& shared) {
+  return std::make_shared<const std::vector<std::uint8_t>>(
+      protocol::encodeJoined(static_cast<std::uint32_t>(field), own, shared));
+}
+
 bool wants(const v1::Subscribe& subscription, const v1::ContactEvent& event) {
   return event.kind() == v1::ContactEvent::KIND_NEAR ? subscription.near_misses()
                                                      : subscription.contacts();
 }
 
-void sendEvents(Client& client, const v1::TickEvents& told) {
-  v1::ServerMessage message;
-  v1::TickEvents& events = *message.mutable_events();
-  for (const v1::ContactEvent& event : told.contacts()) {
-    if (wants(client.subscription, event)) *events.add_contacts() = event;
+/// TickEvents without its sequence; empty when nothing of what is subscribed happened.
+const std::string& eventsFor(TickTold& tick, const v1::Subscribe& subscription) {
+  const std::size_t subscribed = (subscription.contacts() ? 1u : 0u) |
+                                 (subscription.near_misses() ? 2u : 0u) |
+                                 (subscription.notices() ? 4u : 0u);
+  std::optional<std::string>& bytes = tick.events[subscribed];
+  if (bytes) return *bytes;
+  v1::TickEvents events;
+  for (const v1::ContactEvent& event : tick.told.contacts()) {
+    if (wants(subscription, event)) *events.add_contacts() = event;
   }
-  if (client.subscription.notices()) {
-    *events.mutable_notices() = told.notices();
+  if (subscription.notices()) *events.mutable_notices() = tick.told.notices();
+  if (!events.contacts().empty() || !events.notices().empty()) {
+    events.set_tick(tick.told.tick());
+    events.set_time(tick.told.time());
   }
-  if (events.contacts().empty() && events.notices().empty()) return;
-  events.set_sequence(++client.sequence);
-  events.set_tick(told.tick());
-  events.set_time(told.time());
-  send(client, message);
+  return bytes.emplace(events.SerializeAsString());
 }
 
-void sendState(ServedWorld& served, Client& client, const scene::Snapshot& snapshot) {
+void sendEvents(Client& client, TickTold& told) {
+  const std::string& shared = eventsFor(told, client.subscription);
+  if (shared.empty()) return;
+  v1::TickEvents own;
+  own.set_sequence(++client.sequence);
+  client.out->push(joined(v1::ServerMessage::kEventsFieldNumber, own.SerializeAsString(), shared));
+}
+
+/// State without what was dropped.
+std::string stateOf(const scene::World& world, const scene::Snapshot& snapshot) {
+  v1::State state;
+  state.set_tick(snapshot.tick);
+  state.set_time(snapshot.time);
+  state.set_hash(snapshot.stateHash);
+  for (const scene::AvatarView& avatar : snapshot.avatars) {
+    *state.add_avatars() = messageOf(world, avatar);
+  }
+  for (const scene::BodyView& body : *snapshot.bodies)
+    if (body.displaced || body.moving) *state.add_bodies() = messageOf(world, body);
+  return state.SerializeAsString();
+}
+
+void sendState(ServedWorld& served, Client& client, const scene::Snapshot& snapshot,
+               TickTold& told) {
   const double tick = served.world.lengths().tick;
   if (!client.subscription.state() || snapshot.time + tick / 2 < client.nextStateTime) return;
   const double rate = client.subscription.state_rate();
@@ -43,18 +83,11 @@ void sendState(ServedWorld& served, Client& client, const scene::Snapshot& snaps
   } else {
     client.droppedStates = 0;
   }
-  v1::ServerMessage message;
-  v1::State& state = *message.mutable_state();
-  state.set_tick(snapshot.tick);
-  state.set_time(snapshot.time);
-  state.set_hash(snapshot.stateHash);
-  for (const scene::AvatarView& avatar : snapshot.avatars) {
-    *state.add_avatars() = messageOf(served.world, avatar);
-  }
-  for (const scene::BodyView& body : *snapshot.bodies)
-    if (body.displaced || body.moving) *state.add_bodies() = messageOf(served.world, body);
-  state.set_dropped(client.droppedStates);
-  client.out->pushLatest(encodeShared(message));
+  if (!told.state) told.state = stateOf(served.world, snapshot);
+  v1::State own;
+  own.set_dropped(client.droppedStates);
+  client.out->pushLatest(
+      joined(v1::ServerMessage::kStateFieldNumber, own.SerializeAsString(), *told.state));
 }
 
 void finishStep(ServedWorld& served, Client& client, const scene::Snapshot& snapshot) {
@@ -112,7 +145,7 @@ void answerClosing(Client& client, const v1::Bye& farewell) {
     sendError(client, client.answerUnderWay->requestId, error);
   if (client.step) sendError(client, client.step->requestId, error);
   for (const WaitingRequest& request : client.waiting) {
-    sendError(client, request.message.request_id(), error);
+    if (!request.message.has_bye()) sendError(client, request.message.request_id(), error);
   }
 }
 
@@ -165,11 +198,12 @@ void advance(ServedWorld& served) {
   logFindings(served.world, report);
   served.idle = report.idle;
   publish(served);
+  TickTold shared{told};
   settleOwners(served, report.notices);
   keepLive(served, told);
   for (auto& [id, client] : served.clients) {
-    sendEvents(client, told);
-    sendState(served, client, *report.snapshot);
+    sendEvents(client, shared);
+    sendState(served, client, *report.snapshot, shared);
     drawWatched(served, id, client);
     finishStep(served, client, *report.snapshot);
   }
@@ -179,8 +213,9 @@ void advance(ServedWorld& served) {
 void restartWorld(ServedWorld& served) {
   const v1::TickEvents told =
       served.world.end(v1::ContactEvent::REASON_RESTART, "the world begins anew");
+  TickTold shared{told};
   for (auto& [id, client] : served.clients) {
-    sendEvents(client, told);
+    sendEvents(client, shared);
     client.nextStateTime = 0;
     for (auto& [number, watch] : client.watches) watch.nextTime = 0;
   }
@@ -214,12 +249,13 @@ void removeClient(ServedWorld& served, ClientId id) {
 
 void closeWorld(ServedWorld& served) {
   const v1::TickEvents told = served.world.end(v1::ContactEvent::REASON_SHUTDOWN);
+  TickTold shared{told};
   if (!served.farewell) {
     served.farewell.emplace().set_code(v1::ERROR_SHUTTING_DOWN);
     served.farewell->set_reason("the server ends");
   }
   for (auto& [id, client] : served.clients) {
-    sendEvents(client, told);
+    sendEvents(client, shared);
     sayGoodbye(client, *served.farewell);
   }
   served.clients.clear();

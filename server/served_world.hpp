@@ -18,6 +18,7 @@
 #include "server/outgoing_queue.hpp"
 #include "server/ray_service.hpp"
 #include "server/recorded_world.hpp"
+#include "server/request_allowance.hpp"
 #include "server/tick_statistics.hpp"
 #include "server/world_options.hpp"
 
@@ -42,7 +43,7 @@ struct AnswerUnderWay {
 
 struct WaitingRequest {
   v1::ClientMessage message;
-  std::size_t bytes = 0;
+  RequestHold hold;
 };
 
 /// Pictures that are sent unasked.
@@ -64,7 +65,6 @@ struct Client {
   double nextStateTime = 0;            ///< seconds of simulated time
   std::uint64_t droppedStates = 0;     ///< since the last one that was sent
   std::deque<WaitingRequest> waiting;  ///< replies keep the order of the requests
-  std::size_t waitingBytes = 0;
   std::optional<StepUnderWay> step;
   std::map<std::uint32_t, FrameWatch> watches;
   std::optional<AnswerUnderWay> answerUnderWay;

@@ -21,13 +21,13 @@ std::vector<std::shared_ptr<const scene::Scene>> joined(
 
 struct Server::State {
   State(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen, ServerOptions options)
-      : worlds(joined(std::move(scene), std::move(options.furtherScenes)), options.world,
-               options.drawing),
-        listener(context, listen, worlds, options.world.limits, std::move(options.access)) {}
+      : listener(context, listen, worlds, options.world.limits, std::move(options.access)),
+        worlds(joined(std::move(scene), std::move(options.furtherScenes)), options.world,
+               options.drawing) {}
 
   boost::asio::io_context context{1};  ///< one thread: its handlers need no lock
+  Listener listener;                   ///< first: where its address is taken, no recording is begun
   Worlds worlds;
-  Listener listener;
   std::thread network;
 };
 

@@ -4,6 +4,9 @@
 
 #include <boost/asio/post.hpp>
 
+#include <utility>
+
+#include "server/printable.hpp"
 #include "server/world_messages.hpp"
 
 namespace enfilade::server {
@@ -30,13 +33,6 @@ v1::ErrorCode codeOf(protocol::FramingError::Code code) {
 
 constexpr std::size_t kLongestName = 64;  // bytes, of what a client calls itself or a world
 
-std::string printable(std::string text) {
-  for (char& c : text) {
-    if (c < ' ' || c > '~') c = '?';
-  }
-  return text;
-}
-
 }  // namespace
 
 Session::Session(std::unique_ptr<Wire> wire, asio::any_io_executor executor, Reception& reception)
@@ -47,7 +43,8 @@ Session::Session(std::unique_ptr<Wire> wire, asio::any_io_executor executor, Rec
       peer_(wire_->peer()),
       decoder_(protocol::kServerTakes, wire_->beginsWithMagic()
                                            ? protocol::Decoder::Expect::magicFirst
-                                           : protocol::Decoder::Expect::messages) {}
+                                           : protocol::Decoder::Expect::messages),
+      pause_(executor_) {}
 
 void Session::start(Timer::time_point deadline, std::string token) {
   token_ = std::move(token);
@@ -63,6 +60,12 @@ void Session::start(Timer::time_point deadline, std::string token) {
                                       std::to_string(limits.outgoingBytes) + " bytes or " +
                                       std::to_string(limits.outgoingFrames) + " frames wait"),
       wake);
+  allowance_ =
+      std::make_shared<RequestAllowance>(limits, [weak = weak_from_this(), executor = executor_] {
+        asio::post(executor, [weak] {
+          if (const auto self = weak.lock()) self->pause_.cancel();
+        });
+      });
   if (wire_->beginsWithMagic()) out_->push(magic());
   armTimer(deadline, v1::ERROR_TIMEOUT, "no whole hello came in time");
   read();
@@ -71,12 +74,43 @@ void Session::start(Timer::time_point deadline, std::string token) {
 // ---- in ----------------------------------------------------------------------------------------
 
 void Session::read() {
+  reading_ = true;
   wire_->read(
       [self = shared_from_this()](const std::string& problem, std::span<const std::uint8_t> bytes) {
+        self->reading_ = false;
         if (!problem.empty()) return self->close(problem);
         self->takeBytes(bytes);
-        if (!self->closed_) self->read();
+        self->keepReading();
       });
+}
+
+/// Reads on unless the client is ahead of its allowance; who ends is always heard.
+void Session::keepReading() {
+  if (closed_ || reading_) return;
+  if (!listening_) return read();
+  const bool room = allowance_->hasRoom();
+  if (room && ahead_ <= RequestAllowance::Clock::duration::zero()) return read();
+  pause(room ? Timer::clock_type::now() + std::exchange(ahead_, {}) : Timer::time_point::max());
+}
+
+/// Reads nothing until then, or until the allowance wakes it. The wait keeps the session alive:
+/// nothing else may be under way. What the client sent of a message is not timed meanwhile, since
+/// it is the server that does not read.
+void Session::pause(Timer::time_point end) {
+  if (std::exchange(messageHalfway_, false)) timer_.expires_at(Timer::time_point::max());
+  pause_.expires_at(end);
+  reading_ = true;
+  pause_.async_wait([self = shared_from_this()](ErrorCode) {
+    self->reading_ = false;
+    if (self->listening_ && !self->decoder_.betweenMessages()) self->timeHalfMessage();
+    self->keepReading();
+  });
+}
+
+void Session::timeHalfMessage() {
+  messageHalfway_ = true;
+  armTimer(Timer::clock_type::now() + reception_.limits.message, v1::ERROR_TIMEOUT,
+           "half a message, then silence");
 }
 
 void Session::takeBytes(std::span<const std::uint8_t> bytes) {
@@ -96,9 +130,7 @@ void Session::takeBytes(std::span<const std::uint8_t> bytes) {
   if (client_ == 0 || (halfway && messageHalfway_ && !whole)) return;  // the timer runs on
   messageHalfway_ = halfway;
   timer_.expires_at(Timer::time_point::max());
-  if (halfway)
-    armTimer(Timer::clock_type::now() + reception_.limits.message, v1::ERROR_TIMEOUT,
-             "half a message, then silence");
+  if (halfway) timeHalfMessage();
 }
 
 void Session::take(const protocol::Message& framed) {
@@ -113,8 +145,11 @@ void Session::take(const protocol::Message& framed) {
                 "which request an answer is to");
   }
   if (client_ == 0) return greet(message);
-  if (message.has_bye()) return close("it said goodbye");
-  world_->receive(client_, std::move(message), framed.header.size() + framed.attachment.size());
+  // Answered like all else in its turn: what was asked before is told first.
+  if (message.has_bye()) listening_ = false;
+  ahead_ = allowance_->pace(RequestAllowance::Clock::now());
+  world_->receive(client_, std::move(message),
+                  allowance_->hold(framed.header.size() + framed.attachment.size()));
 }
 
 void Session::greet(const v1::ClientMessage& message) {
@@ -125,7 +160,7 @@ void Session::greet(const v1::ClientMessage& message) {
   if (protocol::majorOf(hello.protocol_version()) != protocol::kMajorVersion) {
     return fail(v1::ERROR_VERSION,
                 "this server speaks protocol " + std::string(protocol::kVersion) + ", not '" +
-                    printable(hello.protocol_version().substr(0, kLongestName)) + "'",
+                    printable(hello.protocol_version(), kLongestName) + "'",
                 message.request_id());
   }
   if (hello.client_name().size() > kLongestName) {
@@ -140,7 +175,8 @@ void Session::greet(const v1::ClientMessage& message) {
                     : "hello.token is none of this server's: ask whoever runs it for one",
                 message.request_id());
   }
-  if (!hello.client_name().empty()) peer_ += " (" + printable(hello.client_name()) + ")";
+  if (!hello.client_name().empty())
+    peer_ += " (" + printable(hello.client_name(), kLongestName) + ")";
   enter(hello, *role, message.request_id());
 }
 
@@ -149,7 +185,7 @@ void Session::enter(const v1::Hello& hello, Role role, std::uint64_t requestId) 
   if (world_) client_ = world_->join(hello.client_name(), role, out_, requestId);
   if (client_ != 0) return spdlog::info("{} came to world '{}'", peer_, world_->place().name);
   fail(v1::ERROR_UNKNOWN_WORLD,
-       "there is no world '" + printable(hello.world().substr(0, kLongestName)) +
+       "there is no world '" + printable(hello.world(), kLongestName) +
            "', or it has ended: leave hello.world empty for the main one, and ask it by ListWorlds",
        requestId);
 }
@@ -167,6 +203,12 @@ void Session::end(v1::ErrorCode code, const std::string& reason) {
   listening_ = false;
   spdlog::warn("{}: {}; disconnected", peer_, reason);
   out_->finish(goodbye(code, reason));
+}
+
+bool Session::giveWay() {
+  if (client_ != 0 || !listening_) return false;
+  close("it said nothing, and a newcomer takes its place");
+  return true;
 }
 
 // ---- out ---------------------------------------------------------------------------------------
@@ -224,6 +266,7 @@ void Session::close(const std::string& why) {
   listening_ = false;
   wire_->close();
   timer_.cancel();
+  pause_.cancel();
   out_->finish(goodbye(v1::ERROR_UNSPECIFIED, "closed"));
   if (client_ != 0) world_->leave(client_);
 }

@@ -11,6 +11,7 @@
 
 #include "protocol/framing.hpp"
 #include "server/reception.hpp"
+#include "server/request_allowance.hpp"
 #include "server/wire.hpp"
 
 namespace enfilade::server {
@@ -23,6 +24,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void start(std::chrono::steady_clock::time_point deadline, std::string token = {});
   /// Says goodbye and closes, within ServerLimits::farewell.
   void end(v1::ErrorCode code, const std::string& reason) override;
+  bool giveWay() override;
 
  private:
   using ErrorCode = boost::system::error_code;
@@ -34,6 +36,9 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void greet(const v1::ClientMessage& message);
   void enter(const v1::Hello& hello, Role role, std::uint64_t requestId);
   void fail(v1::ErrorCode code, const std::string& reason, std::uint64_t requestId = 0);
+  void keepReading();
+  void pause(Timer::time_point end);
+  void timeHalfMessage();
   void sendNext();
   void written(const std::string& problem, bool last);
   void armTimer(Timer::time_point deadline, v1::ErrorCode code, std::string reason);
@@ -48,6 +53,10 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   std::string token_;
   protocol::Decoder decoder_;
   std::shared_ptr<OutgoingQueue> out_;
+  std::shared_ptr<RequestAllowance> allowance_;
+  Timer pause_;                                ///< of reading, where requests come too fast
+  RequestAllowance::Clock::duration ahead_{};  ///< by how much they do
+  bool reading_ = false;
   bool sending_ = false;
   std::shared_ptr<TickLoop> world_;  ///< that it entered
   ClientId client_ = 0;              ///< 0: not greeted

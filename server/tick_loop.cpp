@@ -59,16 +59,8 @@ void takeRequest(ServedWorld& served, ClientId id, WaitingRequest request,
   if (found == served.clients.end()) return;
   Client& client = found->second;
   if (client.out->finished()) return;
-  client.waitingBytes += request.bytes;
   client.waiting.push_back(std::move(request));
   answerWaiting(served, id, post);
-  if (client.waitingBytes <= served.limits.waitingBytes) return;
-  v1::ServerMessage bye;
-  bye.mutable_bye()->set_code(v1::ERROR_TOO_LARGE);
-  bye.mutable_bye()->set_reason("more than " + std::to_string(served.limits.waitingBytes) +
-                                " bytes of requests wait: read replies before sending more");
-  client.out->finish(encodeShared(bye));
-  removeClient(served, id);
 }
 
 v1::Bye farewellOf(v1::ErrorCode code, const std::string& reason) {
@@ -130,9 +122,10 @@ ClientId TickLoop::join(std::string name, Role role, std::shared_ptr<OutgoingQue
   return post(greet) ? id : 0;
 }
 
-void TickLoop::receive(ClientId id, v1::ClientMessage message, std::size_t bytes) {
-  post([id, request = WaitingRequest{std::move(message), bytes}](ServedWorld& served) {
-    takeRequest(served, id, request, served.post);
+void TickLoop::receive(ClientId id, v1::ClientMessage message, RequestHold hold) {
+  post([id, request =
+                WaitingRequest{std::move(message), std::move(hold)}](ServedWorld& served) mutable {
+    takeRequest(served, id, std::move(request), served.post);
   });
 }
 

@@ -47,7 +47,7 @@ class TickLoop {
   /// so. A guest is none of the clients that the world is told to have.
   ClientId join(std::string name, Role role, std::shared_ptr<OutgoingQueue> out,
                 std::uint64_t requestId, bool guest = false);
-  void receive(ClientId id, v1::ClientMessage message, std::size_t bytes);
+  void receive(ClientId id, v1::ClientMessage message, RequestHold hold);
   void leave(ClientId id);
   /// For what has to be done between two ticks. False: the world has ended.
   bool post(TickInbox::Job job) { return inbox_->post(std::move(job)); }

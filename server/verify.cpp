@@ -5,159 +5,147 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "protocol/recording.hpp"
-#include "server/body_messages.hpp"
+#include "scene/checkpoint/checkpoint.hpp"
+#include "server/interrupt.hpp"
 #include "server/load_scene.hpp"
-#include "server/tick_statistics.hpp"
-#include "server/world_messages.hpp"
-#include "server/world_recorder.hpp"
+#include "server/playback/playback.hpp"
+#include "server/progress.hpp"
 
 namespace enfilade::server {
 namespace {
 
 using protocol::mcap::RecordingError;
 
-/// Thrown at the first tick that ends otherwise than it was recorded.
-struct Diverged {
-  std::uint64_t tick = 0;
-  protocol::StateDifference difference;
-};
-
-/// A recording under way: the world that it tells of, made again.
+/// A recording that is read from front to back: every byte of it.
 class Replayed {
  public:
-  Replayed(const VerifyCommand& command, const v1::RecordingStart& start)
-      : scene_(loadScene(modelOf(command, start))) {
-    begin(start);
+  explicit Replayed(const VerifyCommand& command)
+      : command_(command), recording_(command.recording) {}
+
+  /// Throws Diverged.
+  void all() {
+    while (const auto item = recording_.next()) {
+      if (interrupted()) throw Interrupted{};
+      std::visit([this](const auto& message) { take(message); }, *item);
+    }
+    if (!scene_)
+      throw RecordingError(command_.recording.string() + ": no recording of Enfilade begins in it");
   }
 
-  void begin(const v1::RecordingStart& start) {
-    const auto lengths = lengthsFrom(start.lengths());
-    if (!lengths) throw RecordingError("the recording has lengths that no world can have");
-    world_.emplace(scene_, *lengths);
-    if (messageOf(*scene_).hash() != start.scene().hash())
-      throw Diverged{0,
-                     {"the scene", "hash", protocol::hexadecimal(start.scene().hash()),
-                      protocol::hexadecimal(messageOf(*scene_).hash())}};
-    if (world_->snapshot()->stateHash != start.state_hash())
-      throw Diverged{0,
-                     {"the world", "state hash", protocol::hexadecimal(start.state_hash()),
-                      protocol::hexadecimal(world_->snapshot()->stateHash)}};
-  }
-
-  void take(const v1::RecordedCommands& commands) {
-    if (commands.tick() != tick() + 1)
-      throw RecordingError("commands of tick " + std::to_string(commands.tick()) +
-                           " stand before tick " + std::to_string(tick() + 1));
-    for (const auto& one : commands.commands()) submit(one);
-  }
-
-  void make(const v1::State& recorded) {
-    const scene::TickReport report = scene::tick(*world_);
-    // Only what differs is worth a message.
-    if (report.snapshot->stateHash == recorded.hash() && report.snapshot->tick == recorded.tick())
-      return;
-    v1::State made;
-    fill(made, *world_);
-    auto found = protocol::firstDifference(recorded, made);
-    if (!found) found = {"the world", "tick", std::to_string(recorded.tick()), ""};
-    throw Diverged{report.snapshot->tick, *found};
-  }
-
-  std::uint64_t tick() const { return world_->snapshot()->tick; }
-  std::uint64_t hash() const { return world_->snapshot()->stateHash; }
+  std::uint64_t ticks() const { return ticks_; }
+  std::uint64_t hash() const { return world_ ? world_->snapshot()->stateHash : 0; }
+  const protocol::RecordingReader& recording() const { return recording_; }
 
  private:
-  static ModelOptions modelOf(const VerifyCommand& command, const v1::RecordingStart& start) {
-    ModelOptions model = modelOptionsFrom(start.choices());
-    model.file = command.scene.empty() ? std::filesystem::path(start.scene_file()) : command.scene;
-    model.cache = command.cache;
-    if (!std::filesystem::exists(model.file))
-      throw RecordingError(model.file.string() +
-                           ": the recorded scene is not there; name it: "
-                           "enfilade replay SCENE " +
-                           command.recording.string() + " --verify");
-    return model;
+  void take(const v1::RecordingStart& start) {
+    if (!scene_) scene_ = loadScene(recordedModel(start, command_.scene, command_.cache));
+    world_.reset();
+    if (!start.has_parent()) world_.emplace(worldAtStart(scene_, start));
   }
-
-  void submit(const v1::RecordedCommands::One& one) {
-    std::optional<v1::Error> refused;
-    if (one.has_body()) {
-      refused = server::submit(*world_, one.body());
-    } else {
-      auto command = commandFrom(one.avatar());
-      if (auto* error = std::get_if<v1::Error>(&command)) {
-        refused = *error;
-      } else if (auto why = scene::submit(*world_, std::get<scene::Command>(std::move(command)))) {
-        refused = refusalOf(one.avatar(), *why);
-      }
+  /// A branch begins with one; all others must be what is made again.
+  void take(const v1::RecordedCheckpoint& checkpoint) {
+    if (!scene_) throw RecordingError("the recording does not begin with its scene");
+    if (!world_) {
+      world_.emplace(worldAt(scene_, checkpoint));
+      return;
     }
-    if (refused)
-      throw Diverged{tick() + 1,
-                     {one.has_body() ? one.body().body() : one.avatar().avatar(), "command",
-                      "taken", "refused: " + refused->message()}};
+    const std::uint32_t version = scene::checkpointVersion(bytesOf(checkpoint));
+    if (version != scene::kCheckpointVersion) return;  // of another program; it is not read here
+    const auto made = scene::checkpointOf(*world_);
+    const auto recorded = bytesOf(checkpoint);
+    if (!std::equal(made.begin(), made.end(), recorded.begin(), recorded.end()))
+      throw Diverged{checkpoint.tick(),
+                     {"the world", "checkpoint", std::to_string(recorded.size()) + " bytes",
+                      std::to_string(made.size()) + " bytes"}};
+  }
+  void take(const v1::RecordedCommands& commands) { server::take(world(), commands); }
+  void take(const v1::State& recorded) {
+    scene::tick(world());
+    ++ticks_;
+    if (auto difference = differenceFrom(*world_, recorded))
+      throw Diverged{world_->snapshot()->tick, *difference};
+  }
+  template <class Other>
+  void take(const Other&) {}
+
+  static std::span<const std::uint8_t> bytesOf(const v1::RecordedCheckpoint& checkpoint) {
+    return {reinterpret_cast<const std::uint8_t*>(checkpoint.world().data()),
+            checkpoint.world().size()};
+  }
+  scene::World& world() {
+    if (!world_) throw RecordingError("the recording does not begin with its scene");
+    return *world_;
   }
 
+  const VerifyCommand& command_;
+  protocol::RecordingReader recording_;
   std::shared_ptr<const scene::Scene> scene_;
   std::optional<scene::World> world_;
+  std::uint64_t ticks_ = 0;
 };
 
-/// Replays all of it; throws Diverged.
-std::optional<Replayed> replayAll(const VerifyCommand& command,
-                                  protocol::RecordingReader& recording, std::uint64_t& ticks) {
-  std::optional<Replayed> replayed;
-  while (const auto item = recording.next()) {
-    if (const auto* start = std::get_if<v1::RecordingStart>(&*item)) {
-      if (replayed) {
-        replayed->begin(*start);
-      } else {
-        replayed.emplace(command, *start);
-      }
-      continue;
-    }
-    if (!replayed) throw RecordingError("the recording does not begin with its scene");
-    if (const auto* commands = std::get_if<v1::RecordedCommands>(&*item)) replayed->take(*commands);
-    if (const auto* state = std::get_if<v1::State>(&*item)) {
-      replayed->make(*state);
-      ++ticks;
-    }
+nlohmann::ordered_json verifyAll(const VerifyCommand& command) {
+  Replayed replayed(command);
+  replayed.all();
+  const protocol::RecordingReader& recording = replayed.recording();
+  nlohmann::ordered_json told{{"ticks", replayed.ticks()},
+                              {"state_hash", protocol::hexadecimal(replayed.hash())},
+                              {"closed", recording.closed()}};
+  if (!recording.closed()) {
+    told["whole_bytes"] = recording.wholeBytes();
+    spdlog::warn("{}: it was cut off after byte {}; what comes before was verified",
+                 command.recording.string(), recording.wholeBytes());
   }
-  return replayed;
+  return told;
+}
+
+/// From a tick on; what was recorded before is not read.
+nlohmann::ordered_json verifyFrom(const VerifyCommand& command, std::uint64_t from) {
+  Playback playback(command.recording);
+  const auto scene = loadScene(recordedModel(playback.start(), command.scene, command.cache));
+  Progress bar;
+  const auto tell = [&](std::uint64_t tick) {
+    if (interrupted()) throw Interrupted{};
+    bar.show(static_cast<double>(tick) / static_cast<double>(playback.lastTick()),
+             "tick " + std::to_string(tick));
+  };
+  scene::World world = playback.worldAfter(from, scene, tell);
+  while (playback.step(world)) tell(world.snapshot()->tick);
+  bar.clear();
+  return {{"from_tick", from},
+          {"from_checkpoint", playback.beganAt()},
+          {"ticks", world.snapshot()->tick - playback.beganAt()},
+          {"state_hash", protocol::hexadecimal(world.snapshot()->stateHash)},
+          {"closed", playback.closed()}};
+}
+
+ExitCode tell(const Diverged& diverged) {
+  const protocol::StateDifference& what = diverged.difference;
+  nlohmann::ordered_json told;
+  told["diverged"] = {{"tick", diverged.tick},
+                      {"who", what.who},
+                      {"field", what.field},
+                      {"recorded", what.recorded},
+                      {"replayed", what.replayed}};
+  std::fprintf(stderr, "enfilade: %s\n", textOf(diverged).c_str());
+  std::printf("%s\n", told.dump().c_str());
+  return ExitCode::diverged;
+}
+
+ExitCode verified(const VerifyCommand& command) {
+  try {
+    const auto told = command.from ? verifyFrom(command, *command.from) : verifyAll(command);
+    std::printf("%s\n", told.dump().c_str());
+    return ExitCode::done;
+  } catch (const Diverged& diverged) {
+    return tell(diverged);
+  }
 }
 
 }  // namespace
 
 ExitCode verify(const VerifyCommand& command) {
-  protocol::RecordingReader recording(command.recording);
-  nlohmann::ordered_json told;
-  std::uint64_t ticks = 0;
-  ExitCode code = ExitCode::done;
-  try {
-    const auto replayed = replayAll(command, recording, ticks);
-    if (!replayed)
-      throw RecordingError(command.recording.string() + ": no recording of Enfilade begins in it");
-    told["ticks"] = ticks;
-    told["state_hash"] = protocol::hexadecimal(replayed->hash());
-    told["closed"] = recording.closed();
-    if (!recording.closed()) {
-      told["whole_bytes"] = recording.wholeBytes();
-      spdlog::warn("{}: it was cut off after byte {}; what comes before was verified",
-                   command.recording.string(), recording.wholeBytes());
-    }
-  } catch (const Diverged& diverged) {
-    const protocol::StateDifference& what = diverged.difference;
-    told["diverged"] = {{"tick", diverged.tick},
-                        {"who", what.who},
-                        {"field", what.field},
-                        {"recorded", what.recorded},
-                        {"replayed", what.replayed}};
-    std::fprintf(stderr, "enfilade: tick %llu: %s: %s: recorded %s, replayed %s\n",
-                 static_cast<unsigned long long>(diverged.tick), what.who.c_str(),
-                 what.field.c_str(), what.recorded.c_str(), what.replayed.c_str());
-    code = ExitCode::diverged;
-  }
-  std::printf("%s\n", told.dump().c_str());
-  return code;
+  return interruptible([&] { return verified(command); }, "nothing was written");
 }
 
 }  // namespace enfilade::server

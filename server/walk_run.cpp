@@ -13,6 +13,7 @@
 #include "server/in_process_driver.hpp"
 #include "server/interrupt.hpp"
 #include "server/load_scene.hpp"
+#include "server/playback/playback.hpp"
 #include "server/progress.hpp"
 #include "server/walk_report.hpp"
 #include "server/world_messages.hpp"
@@ -158,6 +159,30 @@ std::vector<v1::ContactEvent> leaveWorld(protocol::ScriptDriver& driver,
   return avatars.empty() ? std::vector<v1::ContactEvent>() : driver.step().contacts;
 }
 
+/// The world after a recorded tick, whose avatars go on with what they were told.
+scene::World recordedWorld(Playback& playback, std::uint64_t tick,
+                           const std::shared_ptr<const scene::Scene>& scene) {
+  Progress bar;
+  try {
+    return playback.worldAfter(tick, scene, [&](std::uint64_t made) {
+      if (interrupted()) throw Interrupted{};
+      bar.show(static_cast<double>(made) / static_cast<double>(std::max<std::uint64_t>(tick, 1)),
+               "tick " + std::to_string(made) + " of the recording");
+    });
+  } catch (const Diverged& diverged) {
+    throw protocol::mcap::RecordingError(playback.file().string() +
+                                         ": it cannot be gone on with: " + textOf(diverged));
+  }
+}
+
+v1::RecordingParent parentOf(const ReplayCommand& command) {
+  v1::RecordingParent parent;
+  if (command.recording.empty()) return parent;
+  parent.set_file(std::filesystem::absolute(command.recording).string());
+  parent.set_tick(command.from);
+  return parent;
+}
+
 }  // namespace
 
 std::unique_ptr<render::Renderer> rendererOf(const std::shared_ptr<const scene::Scene>& scene,
@@ -182,13 +207,21 @@ ExitCode replay(const ReplayCommand& command) {
       [&] {
         const protocol::Script script = protocol::readScript(command.script);
         WalkReport report(command.out);
-        const std::shared_ptr<const scene::Scene> scene = loadScene(command.model);
+        std::optional<Playback> playback;
+        if (!command.recording.empty()) playback.emplace(command.recording);
+        const ModelOptions model =
+            playback ? recordedModel(playback->start(), command.model.file, command.model.cache)
+                     : command.model;
+        const std::shared_ptr<const scene::Scene> scene = loadScene(model);
         if (interrupted()) throw Interrupted{};
         const std::unique_ptr<render::Renderer> renderer = rendererOf(scene, command.drawing);
-        scene::World beginning(scene, command.lengths);
+        scene::World beginning = playback ? recordedWorld(*playback, command.from, scene)
+                                          : scene::World(scene, command.lengths);
         scene::auditBroadPhase(beginning, command.auditEvery);
         RecordedWorld world(std::move(beginning));
-        if (!command.record.file.empty()) world.record({command.record, command.model});
+        const v1::RecordingParent parent = parentOf(command);
+        if (!command.record.file.empty())
+          world.record({command.record, model}, playback ? &parent : nullptr);
         InProcessDriver driver(world, renderer.get(), captureFormat());
         WalkedWorld walked{driver,
                            [&](const v1::FrameRequest& request) { return driver.frame(request); },

@@ -13,6 +13,9 @@ using boost::system::error_code;
 
 namespace {
 
+constexpr std::chrono::seconds kHandshake{10};
+constexpr std::size_t kReadAtOnce = 1 << 16;  // bytes
+
 std::string told(const error_code& problem) {
   return problem ? problem.message() : std::string();
 }
@@ -27,6 +30,10 @@ WebSocketWire::WebSocketWire(asio::ip::tcp::socket socket, Request request)
   stream_.read_message_max(protocol::kServerTakes.total + kLengths);
   stream_.binary(true);
   stream_.auto_fragment(false);
+  // Silence is allowed, as over TCP, and a client whose requests wait in its socket cannot be heard
+  // answering pings. Half a message is the session's to time.
+  stream_.set_option(
+      websocket::stream_base::timeout{kHandshake, websocket::stream_base::none(), false});
   stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
     response.set(boost::beast::http::field::server, std::string("enfilade ") + kServerVersion);
   }));
@@ -44,12 +51,15 @@ void WebSocketWire::read(Heard done) {
 
 void WebSocketWire::readMessage(Heard done) {
   in_.clear();
-  stream_.async_read(in_, [this, done = std::move(done)](error_code problem, std::size_t) {
-    if (problem) return done(problem.message(), {});
-    if (!stream_.got_binary()) return done("it sent text; only binary messages are taken", {});
-    const auto data = in_.cdata();
-    done("", {static_cast<const std::uint8_t*>(data.data()), data.size()});
-  });
+  // In pieces as they come, so that the session knows when half a message stays half.
+  stream_.async_read_some(in_, kReadAtOnce,
+                          [this, done = std::move(done)](error_code problem, std::size_t) {
+                            if (problem) return done(problem.message(), {});
+                            if (!stream_.got_binary())
+                              return done("it sent text; only binary messages are taken", {});
+                            const auto data = in_.cdata();
+                            done("", {static_cast<const std::uint8_t*>(data.data()), data.size()});
+                          });
 }
 
 void WebSocketWire::write(Buffer bytes, Written done) {

@@ -6,6 +6,7 @@
 #include <array>
 #include <utility>
 
+#include "scene/checkpoint/checkpoint.hpp"
 #include "server/body_messages.hpp"
 #include "server/version.hpp"
 #include "server/world_messages.hpp"
@@ -20,6 +21,10 @@ constexpr std::array<std::pair<scene::IfcReader, const char*>, 4> kReaders{
      {scene::IfcReader::webIfc, "web-ifc"},
      {scene::IfcReader::ifcPlusPlus, "ifcplusplus"},
      {scene::IfcReader::assimp, "assimp"}}};
+
+// When a recording gets its next checkpoint: RECORDING.md tells people the same.
+constexpr double kCheckpointEvery = 10;          // seconds of simulated time, at least
+constexpr std::uint64_t kRestPerCheckpoint = 8;  // times as many bytes as it took lie between
 
 constexpr int kNamesAMessage = 4096;
 
@@ -36,13 +41,35 @@ v1::RecordingStart startOf(const scene::World& world, const ModelOptions& model)
 
 }  // namespace
 
-WorldRecorder::WorldRecorder(const RecordingOptions& options, const scene::World& world)
+WorldRecorder::WorldRecorder(const RecordingOptions& options, const scene::World& world,
+                             const v1::RecordingParent* parent)
     : file_(options.choice.file, std::string("enfilade ") + kServerVersion, options.replace),
       model_(options.model),
       picturesEvery_(options.choice.pictures) {
-  file_.write(startOf(world, model_));
+  v1::RecordingStart start = startOf(world, model_);
+  if (parent) *start.mutable_parent() = *parent;
+  file_.write(start, world.snapshot()->time);
   writeNames(world.scene().model());
+  if (parent) writeCheckpoint(world);
   if (options.choice.viewers) viewers_.emplace(file_).begin(world);
+}
+
+bool WorldRecorder::checkpointIsDue(const scene::World& world) const {
+  const double seconds =
+      static_cast<double>(world.snapshot()->tick - last_.tick) * world.lengths().tick;
+  return seconds >= kCheckpointEvery &&
+         file_.bytesWritten() - last_.end >= kRestPerCheckpoint * last_.bytes;
+}
+
+void WorldRecorder::writeCheckpoint(const scene::World& world) {
+  const scene::Snapshot& snapshot = *world.snapshot();
+  const std::vector<std::uint8_t> bytes = scene::checkpointOf(world);
+  v1::RecordedCheckpoint checkpoint;
+  checkpoint.set_tick(snapshot.tick);
+  checkpoint.set_state_hash(snapshot.stateHash);
+  checkpoint.set_world(bytes.data(), bytes.size());
+  const std::uint64_t took = file_.write(checkpoint, snapshot.time);
+  last_ = {snapshot.tick, took, file_.bytesWritten()};
 }
 
 /// In messages of a size that readers can be asked to hold.
@@ -90,6 +117,7 @@ void WorldRecorder::ticked(const scene::World& world, const v1::TickEvents& even
     if (!events.contacts().empty() || !events.notices().empty()) file_.write(events);
     file_.write(state_);
     if (viewers_) viewers_->ticked(world, events);
+    if (checkpointIsDue(world)) writeCheckpoint(world);
     ++ticks_;
   });
   commands_.clear_commands();
@@ -108,6 +136,7 @@ void WorldRecorder::beganAnew(const scene::World& world) {
   nextPictures_ = 0;
   unlessBroken([&] {
     file_.write(startOf(world, model_));
+    last_ = {0, 0, file_.bytesWritten()};
     if (viewers_) viewers_->begin(world);
   });
 }

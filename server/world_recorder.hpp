@@ -14,7 +14,9 @@ class WorldRecorder {
  public:
   /// Begins the file with the world as it is before its first tick. Throws protocol::mcap::
   /// RecordingError.
-  WorldRecorder(const RecordingOptions& options, const scene::World& world);
+  /// `parent`: of a branch, which begins with the world as it is.
+  WorldRecorder(const RecordingOptions& options, const scene::World& world,
+                const v1::RecordingParent* parent = nullptr);
 
   /// What the world has taken for its next tick.
   void took(const v1::Command& command);
@@ -47,7 +49,18 @@ class WorldRecorder {
   template <class Work>
   void unlessBroken(const Work& work);
 
+  void writeCheckpoint(const scene::World& world);
+  bool checkpointIsDue(const scene::World& world) const;
+
+  /// The last checkpoint, or the beginning.
+  struct Checkpointed {
+    std::uint64_t tick = 0;
+    std::uint64_t bytes = 0;  ///< of the file that it took
+    std::uint64_t end = 0;    ///< of the file after it
+  };
+
   protocol::RecordingWriter file_;
+  Checkpointed last_;
   v1::RecordedCommands commands_;
   v1::State state_;  // kept, so that a tick allocates little
   ModelOptions model_;

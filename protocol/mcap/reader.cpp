@@ -1,19 +1,8 @@
 #include "protocol/mcap/reader.hpp"
 
-#include <zlib.h>
-#include <zstd.h>
-
 #include <algorithm>
 
 namespace enfilade::protocol::mcap {
-namespace {
-
-std::uint32_t crcOf(std::string_view bytes, std::uint32_t before = 0) {
-  return static_cast<std::uint32_t>(
-      crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
-}
-
-}  // namespace
 
 bool isMcap(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -69,90 +58,23 @@ std::optional<Reader::Record> Reader::readRecord() {
   return record;
 }
 
-void Reader::readDefinition(Opcode opcode, std::string_view content) {
-  Fields fields(content);
-  const auto number = fields.number<std::uint16_t>();
-  if (opcode == Opcode::schema) {
-    schemas_[number] = fields.string();
-    return;
+/// Notes what the chunk's indexes must say.
+void Reader::takeChunk(const Record& record) {
+  Chunk chunk;
+  try {
+    chunk = openChunk(record.content, definitions_);
+  } catch (const std::out_of_range& what) {
+    fail(record.start, what.what());
   }
-  Channel channel;
-  const auto schema = fields.number<std::uint16_t>();
-  channel.topic = fields.string();
-  channel.messageEncoding = fields.string();
-  if (!schemas_.contains(schema)) throw std::out_of_range("a channel has no schema");
-  channel.schemaName = schemas_.at(schema);
-  channels_[number] = std::move(channel);
-}
-
-Message Reader::messageFrom(std::string_view content) const {
-  Fields fields(content);
-  const auto found = channels_.find(fields.number<std::uint16_t>());
-  if (found == channels_.end()) throw std::out_of_range("a message belongs to no channel");
-  Message message;
-  message.channel = &found->second;
-  message.sequence = fields.number<std::uint32_t>();
-  message.time = fields.number<std::uint64_t>();
-  fields.number<std::uint64_t>();  // when it was published
-  message.data = fields.rest();
-  return message;
-}
-
-/// Unpacks it, checks it against its CRC and its head, and notes what its indexes must say.
-void Reader::openChunk(const Record& record) {
-  Fields fields(record.content);
-  const auto first = fields.number<std::uint64_t>(), last = fields.number<std::uint64_t>();
-  const auto unpacked = fields.number<std::uint64_t>();
-  const auto crc = fields.number<std::uint32_t>();
-  const std::string_view packing = fields.string();
-  const std::string_view packed = fields.take(fields.number<std::uint64_t>());
-  if (!fields.empty()) fail(record.start, "a chunk is longer than what is in it");
-  if (unpacked > kMostChunkBytes) fail(record.start, "a chunk claims too many bytes");
-  if (packing == "zstd") {
-    chunk_.resize(unpacked);
-    const std::size_t size =
-        ZSTD_decompress(chunk_.data(), chunk_.size(), packed.data(), packed.size());
-    if (ZSTD_isError(size) || size != unpacked) fail(record.start, "a chunk cannot be unpacked");
-  } else if (packing.empty()) {
-    chunk_ = packed;
-  } else {
-    fail(record.start, "a chunk is packed by '" + std::string(packing) + "', not by zstd");
-  }
-  if (chunk_.size() != unpacked || crcOf(chunk_) != crc)
-    fail(record.start, "a chunk is not as it was written (its CRC differs)");
+  chunk_ = std::move(chunk.records);
   ++chunks_;
-  chunkStart_ = record.start;
   inChunk_ = 0;
-
-  std::map<std::uint16_t, std::string> index;
-  std::uint64_t earliest = ~std::uint64_t{0}, latest = 0;
-  Fields records(chunk_);
-  while (!records.empty()) {
-    const std::uint64_t offset = chunk_.size() - Fields(records).rest().size();
-    const auto opcode = static_cast<Opcode>(records.number<std::uint8_t>());
-    const std::string_view content = records.take(records.number<std::uint64_t>());
-    if (opcode == Opcode::schema || opcode == Opcode::channel) readDefinition(opcode, content);
-    if (opcode != Opcode::message) continue;
-    const Message message = messageFrom(content);
-    earliest = std::min(earliest, message.time);
-    latest = std::max(latest, message.time);
-    std::string& entries = index[Fields(content).number<std::uint16_t>()];
-    putNumber(entries, message.time);
-    putNumber(entries, offset);
-  }
-  if (!index.empty() && (earliest != first || latest != last))
-    fail(record.start, "a chunk's times are not those of its messages");
   expected_.clear();
-  for (const auto& [channel, entries] : index) {
-    std::string content;
-    putNumber(content, channel);
-    putString(content, entries);
-    expected_.push_back({channel, std::move(content)});
-  }
+  for (auto& [channel, content] : chunk.index) expected_.push_back(std::move(content));
 }
 
 void Reader::checkIndex(const Record& record) {
-  if (expected_.empty() || expected_.front().index != record.content)
+  if (expected_.empty() || expected_.front() != record.content)
     fail(record.start, "an index is not that of its chunk");
   expected_.erase(expected_.begin());
   if (expected_.empty()) whole_ = position_;
@@ -198,7 +120,7 @@ bool Reader::readMore() {
       fail(record->start, "a chunk's index is missing");
     switch (record->opcode) {
       case Opcode::chunk:
-        openChunk(*record);
+        takeChunk(*record);
         if (expected_.empty()) whole_ = position_;
         return true;
       case Opcode::messageIndex:
@@ -215,16 +137,12 @@ bool Reader::readMore() {
 }
 
 std::optional<Message> Reader::next() {
+  Message message;
   try {
     while (!ended_) {
-      while (inChunk_ < chunk_.size()) {
-        Fields fields(std::string_view(chunk_).substr(inChunk_));
-        const auto opcode = static_cast<Opcode>(fields.number<std::uint8_t>());
-        const std::string_view content = fields.take(fields.number<std::uint64_t>());
-        inChunk_ += kRecordHead + content.size();
-        if (opcode != Opcode::message) continue;
+      if (nextMessage(chunk_, inChunk_, definitions_, message)) {
         ++messages_;
-        return messageFrom(content);
+        return message;
       }
       ended_ = !readMore();
     }

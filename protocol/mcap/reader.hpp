@@ -5,27 +5,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "protocol/mcap/records.hpp"
+#include "protocol/mcap/chunk.hpp"
 
 namespace enfilade::protocol::mcap {
-
-struct Channel {
-  std::string topic, messageEncoding, schemaName;
-};
-
-/// Lives until the next call of Reader::next().
-struct Message {
-  const Channel* channel = nullptr;
-  std::uint32_t sequence = 0;
-  std::uint64_t time = 0;  ///< nanoseconds
-  std::string_view data;
-};
 
 /// Whether the file is there and begins as MCAP files do.
 bool isMcap(const std::filesystem::path& file);
@@ -53,19 +40,12 @@ class Reader {
     std::string head;         ///< opcode and length as they stand in the file
     std::string content;
   };
-  struct Expected {
-    std::uint16_t channel;
-    std::string index;  ///< the MessageIndex record's content
-  };
-
   [[noreturn]] void fail(std::uint64_t at, const std::string& what) const;
   std::optional<Record> readRecord();
   bool readMore();
-  void openChunk(const Record& record);
-  void readDefinition(Opcode opcode, std::string_view content);
+  void takeChunk(const Record& record);
   void checkIndex(const Record& record);
   void readSummary(const Record& dataEnd);
-  Message messageFrom(std::string_view content) const;
 
   std::filesystem::path file_;
   std::ifstream stream_;
@@ -73,12 +53,10 @@ class Reader {
   std::uint32_t crc_ = 0;
   bool ended_ = false, closed_ = false;
   std::string library_;
-  std::map<std::uint16_t, std::string> schemas_;
-  std::map<std::uint16_t, Channel> channels_;
+  Definitions definitions_;
   std::string chunk_;
   std::size_t inChunk_ = 0;
-  std::uint64_t chunkStart_ = 0;
-  std::vector<Expected> expected_;  ///< indexes that must follow the chunk
+  std::vector<std::string> expected_;  ///< indexes that must follow the chunk
 };
 
 }  // namespace enfilade::protocol::mcap

@@ -2,22 +2,18 @@
 
 #include <fcntl.h>
 #include <unistd.h>
-#include <zlib.h>
 #include <zstd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 
+#include "protocol/mcap/chunk.hpp"
+
 namespace enfilade::protocol::mcap {
 namespace {
 
 constexpr int kLevel = 1;  // of zstd: the tick waits for it
-
-std::uint32_t crcOf(std::string_view bytes, std::uint32_t before = 0) {
-  return static_cast<std::uint32_t>(
-      crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
-}
 
 template <class Map, class Put>
 std::string listOf(const Map& entries, const Put& put) {

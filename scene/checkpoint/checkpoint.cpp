@@ -36,8 +36,10 @@ std::uint64_t checksumOf(std::span<const std::uint8_t> bytes) {
 
 // ---- free bodies -------------------------------------------------------------------------------
 
+/// Its name may have gone to another one since.
 bool isThere(const WorldState& world, EntityId avatar) {
-  return world.avatars.contains(world.avatarNames[avatar - world.firstAvatarId()]);
+  const auto at = world.avatars.find(world.avatarNames[avatar - world.firstAvatarId()]);
+  return at != world.avatars.end() && at->second.id == avatar;
 }
 
 /// It stands where it was when it was first met, and nothing is known of it.
@@ -217,12 +219,18 @@ void sealCheckpoint(std::vector<std::uint8_t>& bytes) {
   bytes = std::move(sealed.bytes);
 }
 
-World worldFrom(std::shared_ptr<const Scene> scene, std::span<const std::uint8_t> checkpoint) {
-  const auto word = [&](std::size_t at) { return Reader(checkpoint.subspan(at)).fixed(); };
+std::uint32_t checkpointVersion(std::span<const std::uint8_t> checkpoint) {
   if (checkpoint.size() < kLeastSize ||
       !std::equal(kMagic.begin(), kMagic.end(), checkpoint.begin()))
-    throw CheckpointError("this is no checkpoint of a world");
-  if (const std::uint64_t version = word(kMagic.size()); version != kCheckpointVersion)
+    return 0;
+  return static_cast<std::uint32_t>(Reader(checkpoint.subspan(kMagic.size())).fixed());
+}
+
+World worldFrom(std::shared_ptr<const Scene> scene, std::span<const std::uint8_t> checkpoint) {
+  const auto word = [&](std::size_t at) { return Reader(checkpoint.subspan(at)).fixed(); };
+  const std::uint32_t version = checkpointVersion(checkpoint);
+  if (version == 0) throw CheckpointError("this is no checkpoint of a world");
+  if (version != kCheckpointVersion || word(kMagic.size()) != kCheckpointVersion)
     throw CheckpointError("the checkpoint is of version " + std::to_string(version) +
                           "; this program reads version " + std::to_string(kCheckpointVersion));
   if (word(kMagic.size() + 2 * kWord) != checkpoint.size() - kLeastSize)

@@ -33,6 +33,9 @@ std::vector<std::uint8_t> checkpointOf(const World& world);
 /// bytes are damaged, of another version or scene, or where no world can be as they say.
 World worldFrom(std::shared_ptr<const Scene> scene, std::span<const std::uint8_t> checkpoint);
 
+/// That the bytes say they are of; 0: they are no checkpoint.
+std::uint32_t checkpointVersion(std::span<const std::uint8_t> checkpoint);
+
 /// Makes the checksum fit bytes that were changed on purpose, as a test does.
 void sealCheckpoint(std::vector<std::uint8_t>& bytes);
 

@@ -53,6 +53,8 @@ struct Check {
     const Obstacle* last = nullptr;
     for (const Obstacle& obstacle : avatar.obstacles) {
       require(obstacle.part < partsOf(obstacle), name + " is near a part that is not there");
+      require(avatar.pairsChanged || !isAvatar(obstacle.entity) || this->avatar(obstacle.entity),
+              name + " is near somebody who left, and nobody will look");
       require(obstacle.moreCaches.size() < avatar.shape->parts.size(),
               name + " has fewer parts than are near something");
       require(

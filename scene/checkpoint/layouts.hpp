@@ -276,7 +276,7 @@ struct Layout<Chain> {
 };
 
 /// Shape, base and chain of an avatar of which what they follow from was read; refuses what no
-/// order can have made (checkpoint_checks.cpp).
+/// order can have made (checks.cpp).
 void shapeAsRead(const Reader& a, Avatar& avatar);
 
 template <>

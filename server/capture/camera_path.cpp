@@ -4,8 +4,6 @@
 #include <charconv>
 #include <cmath>
 
-#include "render/view.hpp"
-
 namespace enfilade::server {
 namespace {
 
@@ -73,13 +71,6 @@ std::array<double, 4> quaternionOf(const Mat3& rotation) {
   q.normalize();
   if (q.w() < 0) q.coeffs() = -q.coeffs();
   return {q.x(), q.y(), q.z(), q.w()};
-}
-
-Mat3 turnedOf(const render::Camera& camera) {
-  const render::View view = render::viewOf(camera);
-  Mat3 turned;
-  turned << view.right, view.up, -view.forward;
-  return turned;
 }
 
 Mat3 withAxes(const Mat3& turned, CameraAxes from, CameraAxes to) {

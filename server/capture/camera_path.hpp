@@ -60,9 +60,6 @@ CameraPath parseJsonPath(std::string_view text, const std::string& source, Camer
 Mat3 rotationOf(const std::array<double, 4>& xyzw);
 std::array<double, 4> quaternionOf(const Mat3& rotation);
 
-/// worldFromCamera of a camera, axes as CameraAxes::opengl.
-Mat3 turnedOf(const render::Camera& camera);
-
 /// The same camera with the other axes.
 Mat3 withAxes(const Mat3& turned, CameraAxes from, CameraAxes to);
 

@@ -92,10 +92,11 @@ void ViewerChannels::begin(const scene::World& world) {
   file_.write(kLooks, 0, looks);
   shown_.clear();
   nextTime_ = 0;
-  placeEveryone(world);
+  placeEveryone(world, true);
 }
 
-void ViewerChannels::placeEveryone(const scene::World& world) {
+/// `all`: what never moves, and what stands where the model has it, too.
+void ViewerChannels::placeEveryone(const scene::World& world, bool all) {
   const scene::Snapshot& snapshot = *world.snapshot();
   const double time = file_.fileTime(snapshot.time);
   foxglove::FrameTransforms places;
@@ -103,14 +104,14 @@ void ViewerChannels::placeEveryone(const scene::World& world) {
                          const Eigen::Quaterniond& turn) {
     *places.add_transforms() = transformOf(time, parent, child, at, turn);
   };
-  if (snapshot.tick == 0) place("map", "scene", scene::Vec3::Zero(), upright());
+  if (all) place("map", "scene", scene::Vec3::Zero(), upright());
   for (const scene::AvatarView& avatar : snapshot.avatars) {
     place("scene", "avatar/" + avatar.name, avatar.feet, Eigen::Quaterniond::Identity());
     place("avatar/" + avatar.name, "eyes/" + avatar.name, {0, avatar.eyeHeight, 0},
           opticalAxes(avatar));
   }
   for (const scene::BodyView& body : *snapshot.bodies)
-    if (snapshot.tick == 0 || body.displaced || body.moving)
+    if (all || body.displaced || body.moving)
       place("scene", "body/" + world.scene().model().bodies[body.index].name, body.pose.translation,
             Eigen::Quaterniond(body.pose.rotation));
   if (!places.transforms().empty()) file_.write(kTransforms, snapshot.time, places);
@@ -154,7 +155,7 @@ void ViewerChannels::ticked(const scene::World& world, const v1::TickEvents& eve
   showContacts(events);
   if (snapshot.time + world.lengths().tick / 2 < nextTime_ && !pictured) return;
   nextTime_ = snapshot.time + kPlacedEvery;
-  placeEveryone(world);
+  placeEveryone(world, false);
   showAvatars(world);
 }
 

@@ -28,7 +28,7 @@ class ViewerChannels {
                const EncodedPicture& picture);
 
  private:
-  void placeEveryone(const scene::World& world);
+  void placeEveryone(const scene::World& world, bool all);
   void showAvatars(const scene::World& world);
   void showContacts(const v1::TickEvents& events);
 

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <filesystem>
 
+#include "server/printable.hpp"
 #include "server/world_messages.hpp"
 
 namespace enfilade::server {
@@ -49,7 +50,7 @@ v1::Error shuttingDown() {
 v1::Error unknownWorld(const std::string& name) {
   return errorOf(
       v1::ERROR_UNKNOWN_WORLD,
-      "there is no world '" + name.substr(0, kLongestName) + "': ListWorlds tells which there are",
+      "there is no world '" + printable(name, kLongestName) + "': ListWorlds tells which there are",
       "drop_world.name");
 }
 
@@ -117,7 +118,9 @@ void Worlds::create(WorldToMake wanted,
 
 void Worlds::drop(const std::string& name, const std::string& askedIn,
                   std::function<void(std::optional<v1::Error>)> done) {
-  const auto work = [this, name, askedIn, done] {
+  // Another world may have the name by then.
+  const auto work = [this, name, askedIn, done, asked = find(name)] {
+    if (asked && find(name) != asked) return done(unknownWorld(name));
     auto taken = takeOut(name);
     if (auto* error = std::get_if<v1::Error>(&taken)) return done(std::move(*error));
     TickLoop& world = *std::get<World>(taken);
@@ -128,10 +131,10 @@ void Worlds::drop(const std::string& name, const std::string& askedIn,
   if (!give(work)) done(shuttingDown());
 }
 
-void Worlds::dropIfEmpty(const std::string& name) {
-  const World world = find(name);
+void Worlds::dropIfEmpty(const std::string& name, const World& world) {
   const std::string reason = "the world '" + name + "' was dropped when its last client left";
-  if (!world || !world->askToStopIfEmpty(v1::ERROR_WORLD_DROPPED, reason)) return;
+  if (!world || find(name) != world || !world->askToStopIfEmpty(v1::ERROR_WORLD_DROPPED, reason))
+    return;
   takeOut(name);
   end(*world, v1::ERROR_WORLD_DROPPED, reason);
 }
@@ -178,7 +181,7 @@ std::optional<v1::Error> Worlds::problemOf(const WorldToMake& wanted) const {
   }
   if (!sceneNamed(wanted.scene)) {
     return errorOf(v1::ERROR_UNKNOWN_WORLD,
-                   "this server has no scene '" + wanted.scene.substr(0, kLongestName) +
+                   "this server has no scene '" + printable(wanted.scene, kLongestName) +
                        "': Welcome.scenes names those that it was started with",
                    "create_world.scene");
   }
@@ -198,11 +201,15 @@ std::optional<v1::Error> Worlds::problemOf(const WorldToMake& wanted) const {
 
 Worlds::World Worlds::start(const std::string& name, ServedScene& scene, bool dropWhenEmpty) {
   WorldPlace place{name, scene.name, this, dropWhenEmpty, {}};
-  place.becameEmpty = [this, name] { give([this, name] { dropIfEmpty(name); }); };
+  const auto itself = std::make_shared<std::weak_ptr<TickLoop>>();
+  place.becameEmpty = [this, name, itself] {
+    give([this, name, world = itself->lock()] { dropIfEmpty(name, world); });
+  };
   WorldOptions options = options_;
   if (main_) options.record.reset();  // one file holds one world: the first
   auto world =
       std::make_shared<TickLoop>(scene.scene, scene.frames, scene.rays, options, std::move(place));
+  *itself = world;  // before anybody can enter, and so leave
   const std::lock_guard lock(mutex_);
   if (!main_) main_ = world;
   worlds_[name] = world;
@@ -220,8 +227,7 @@ ServedScene* Worlds::sceneNamed(const std::string& name) const {
   return found == scenes_.end() ? nullptr : found->get();
 }
 
-// ---- the end
-// -------------------------------------------------------------------------------------
+// ---- the end ------------------------------------------------------------------------------------
 
 void Worlds::stop() {
   {

@@ -84,7 +84,7 @@ class Worlds {
   std::string freeName(const std::string& stem) const;
   ServedScene* sceneNamed(const std::string& name) const;
   std::variant<World, v1::Error> takeOut(const std::string& name);
-  void dropIfEmpty(const std::string& name);
+  void dropIfEmpty(const std::string& name, const World& world);
   void end(TickLoop& world, v1::ErrorCode code, const std::string& reason);
 
   const WorldOptions options_;

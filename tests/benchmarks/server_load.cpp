@@ -17,6 +17,7 @@
 
 #include "protocol/client.hpp"
 #include "scene/import/model_cache.hpp"
+#include "server/load_scene.hpp"
 #include "server/server.hpp"
 #include "tests/support/server_load.hpp"
 
@@ -146,8 +147,9 @@ int main(int argc, char** argv) {
   const int visits = argc > 3 ? std::atoi(argv[3]) : 2000;
   const double stateRate = argc > 4 ? std::atof(argv[4]) : 0;
   const auto built = std::filesystem::absolute(argv[0]).parent_path().parent_path();
-  const auto scene = std::make_shared<const scene::Scene>(
-      scene::loadModel(built / "assets/building.glb", {}, scene::modelCacheOfEnvironment()).model);
+  server::ModelOptions model;
+  model.file = built / "assets/building.glb";
+  const auto scene = server::loadScene(model);
   const bool right = load(scene, clients, seconds, stateRate);
   const bool clean = visits == 0 || visit(scene, visits);
   return right && clean ? 0 : 3;

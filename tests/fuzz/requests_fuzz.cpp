@@ -76,7 +76,7 @@ server::ServerLimits smallLimits() {
 
 class SmallServer {
  public:
-  SmallServer() : served_(house().scene, house().frames, house().rays, {smallLimits(), {}, 0}) {
+  SmallServer() : served_(house().scene, house().frames, house().rays, {smallLimits(), {}, 0, {}}) {
     served_.post = post_;
     for (const ClientId id : {1, 2}) {
       Client& client = served_.clients[id];
@@ -90,7 +90,7 @@ class SmallServer {
   /// Answers one message; its reply has to come, with the message's number.
   void take(ClientId id, const v1::ClientMessage& message) {
     Client& client = served_.clients.at(id);
-    client.waiting.push_back({message, 0});
+    client.waiting.push_back({message, {}});
     server::answerWaiting(served_, id, post_);
     while (client.answerUnderWay || drawing()) house().inbox.next()(served_);
     for (std::uint32_t ticks = 0; client.step; ++ticks) {

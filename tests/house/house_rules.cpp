@@ -44,6 +44,7 @@ const std::map<std::string, Names> kRoomMayInclude{
     {"server/capture", {"server"}},
     {"server/foxglove", {"server"}},
     {"server/worlds", {"server"}},
+    {"server/playback", {"server"}},
     {"server/diff", {"server", "server/capture"}},
     {"server/recordings", {"server", "server/capture"}},
 };

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "protocol/enfilade.pb.h"
+#include "protocol/joined_message.hpp"
 
 namespace enfilade::protocol {
 namespace {
@@ -284,6 +285,25 @@ TEST(Framing, CorruptStreamsDecodeAsTheSlowTwinSays) {
   EXPECT_GT(errors, kStreams / 20);
   EXPECT_LT(errors, kStreams * 19 / 20);
   EXPECT_GT(messages, kStreams / 20);
+}
+
+TEST(Framing, AMessageJoinedOfTwoPartsIsTheMessageOfBoth) {
+  v1::TickEvents own, shared;
+  own.set_sequence(300);
+  shared.set_tick(7);
+  for (int i = 0; i < 20; ++i) shared.add_notices()->set_text("the shared part is longer than 127");
+  const auto bytes = encodeJoined(v1::ServerMessage::kEventsFieldNumber, own.SerializeAsString(),
+                                  shared.SerializeAsString());
+  v1::ServerMessage whole;
+  *whole.mutable_events() = shared;
+  whole.mutable_events()->set_sequence(300);
+  Decoder decoder(kClientTakes, Decoder::Expect::messages);
+  std::span<const std::uint8_t> unread(bytes);
+  const auto message = decoder.next(unread);
+  ASSERT_TRUE(message);
+  v1::ServerMessage parsed;
+  ASSERT_TRUE(parse(message->header, parsed));
+  EXPECT_EQ(parsed.SerializeAsString(), whole.SerializeAsString());
 }
 
 TEST(Version, ItsMajorNumberIsWhatStandsBeforeTheFirstDot) {

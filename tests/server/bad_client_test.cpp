@@ -150,25 +150,88 @@ TEST_F(BadClients, WhoDoesNotReadIsDisconnectedWhileOthersGoOn) {
   expectOthersGoOn(other);
 }
 
-TEST_F(BadClients, WhoAsksWithoutWaitingForAnswersIsCutOff) {
+TEST_F(BadClients, WhoAsksWithoutWaitingForAnswersIsHeldBackAndHearsThemAll) {
+  constexpr std::uint64_t kQuestions = 3000;
   ServerLimits limits;
-  limits.waitingBytes = 1000;
+  limits.waitingBytes = 100;
   serve(limits);
   protocol::Client other = client("other");
   RawConnection raw(server_->port());
   raw.sendHello();
-  v1::ClientMessage step;
-  step.set_request_id(2);
-  step.mutable_step()->set_ticks(36'000);
-  raw.send(step);
-  std::vector<std::uint8_t> flood;
-  for (int i = 0; i < 1000; ++i) {
-    const auto one = protocol::encode(step);
-    flood.insert(flood.end(), one.begin(), one.end());
+  ASSERT_TRUE(raw.receive()->has_welcome());
+  std::thread asker([&] {
+    for (std::uint64_t id = 2; id < 2 + kQuestions; ++id) {
+      v1::ClientMessage question;
+      question.set_request_id(id);
+      question.mutable_metrics();
+      raw.send(question);
+    }
+  });
+  for (std::uint64_t id = 2; id < 2 + kQuestions; ++id) {
+    const auto reply = raw.receive();
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->reply_to(), id);
+    EXPECT_TRUE(reply->has_metrics());
   }
-  raw.send(flood);
-  EXPECT_EQ(raw.readToEnd().bye.code(), v1::ERROR_TOO_LARGE);
+  asker.join();
   expectOthersGoOn(other);
+}
+
+TEST_F(BadClients, GoodbyeIsSaidWhenAllThatWasAskedIsAnswered) {
+  serve();
+  RawConnection raw(server_->port());
+  raw.sendHello();
+  ASSERT_TRUE(raw.receive()->has_welcome());
+  v1::ClientMessage step, bye;
+  step.mutable_step()->set_ticks(100);
+  bye.mutable_bye();
+  for (const std::uint64_t id : {2, 3}) {
+    step.set_request_id(id);
+    raw.send(step);
+  }
+  raw.send(bye);
+  raw.send(step);  // too late: nobody listens
+  for (const std::uint64_t id : {2, 3}) {
+    const auto reply = raw.receive();
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->reply_to(), id);
+    EXPECT_EQ(reply->step().tick(), 100 * (id - 1));
+  }
+  const auto last = raw.receive();
+  ASSERT_TRUE(last);
+  EXPECT_TRUE(last->has_bye());
+  EXPECT_FALSE(raw.receive());
+}
+
+TEST_F(BadClients, BytesThatDripInEndTheConnectionAllTheSame) {
+  ServerLimits limits;
+  limits.message = std::chrono::milliseconds(100);
+  serve(limits);
+  RawConnection raw(server_->port());
+  raw.sendHello();
+  ASSERT_TRUE(raw.receive()->has_welcome());
+  raw.send(std::vector<std::uint8_t>{100, 0, 0, 0, 50, 0, 0, 0});
+  bool cutOff = false;
+  for (int i = 0; i < 92 && !cutOff; ++i) {
+    cutOff = !raw.send(std::vector<std::uint8_t>{0});
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_EQ(raw.readToEnd().error.code(), v1::ERROR_TIMEOUT);
+}
+
+TEST_F(BadClients, WhoSaysNothingGivesWayToWhoComes) {
+  ServerLimits limits;
+  limits.connections = 3;
+  serve(limits);
+  protocol::Client ann = client("ann");
+  RawConnection first(server_->port()), second(server_->port());
+  protocol::Client bob = client("bob");
+  EXPECT_FALSE(first.receive()) << "closed, being the first of the silent ones";
+  second.sendHello();
+  EXPECT_TRUE(second.receive()->has_welcome()) << "there was no need for this one to go";
+  RawConnection late(server_->port());
+  EXPECT_EQ(late.readToEnd().bye.code(), v1::ERROR_NOT_ALLOWED) << "all are known";
+  EXPECT_EQ(ann.step().tick(), 1u);
 }
 
 TEST_F(BadClients, MoreConnectionsThanTheServerTakesAreTurnedAway) {

@@ -129,7 +129,7 @@ TEST_F(Frames, IntrinsicsRangeAndNormalsTravel) {
     ann.frame(request);
     ADD_FAILURE() << "no focal length";
   } catch (const protocol::ProtocolError& error) {
-    EXPECT_EQ(error.field, "intrinsics.fx");
+    EXPECT_EQ(error.field, "frame.intrinsics.fx");
   }
 }
 
@@ -178,7 +178,7 @@ TEST_F(Frames, WhatCannotBePicturedIsRefusedByName) {
     ADD_FAILURE() << "a camera that looks nowhere";
   } catch (const protocol::ProtocolError& error) {
     EXPECT_EQ(error.code, v1::ERROR_BAD_CAMERA);
-    EXPECT_EQ(error.field, "forward");
+    EXPECT_EQ(error.field, "frame.forward");
   }
   *request.mutable_free()->mutable_forward() = vec(1, 0, 0);
   request.set_tick(77);
@@ -187,6 +187,23 @@ TEST_F(Frames, WhatCannotBePicturedIsRefusedByName) {
   request.add_channels(v1::CHANNEL_RGB);
   EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_MESSAGE) << "rgb twice";
   request.clear_channels();
+  request.set_rgb_encoding(static_cast<v1::Encoding>(9));
+  try {
+    ann.frame(request);
+    ADD_FAILURE() << "an encoding that nobody knows";
+  } catch (const protocol::ProtocolError& error) {
+    EXPECT_EQ(error.code, v1::ERROR_BAD_MESSAGE);
+    EXPECT_EQ(error.field, "frame.rgb_encoding");
+  }
+  request.clear_rgb_encoding();
+  request.mutable_free()->set_fov_y(4);
+  try {
+    ann.frame(request);
+    ADD_FAILURE() << "a view of more than half a turn";
+  } catch (const protocol::ProtocolError& error) {
+    EXPECT_EQ(error.field, "frame.fov_y");
+  }
+  request.mutable_free()->clear_fov_y();
   EXPECT_EQ(codeOf(ann, request), v1::ERROR_UNSPECIFIED);
 }
 

@@ -188,6 +188,11 @@ TEST_F(Sessions, ANumberThatIsNoneIsRefusedNamingItsField) {
   EXPECT_EQ(ann.command(empty)->code(), v1::ERROR_BAD_MESSAGE);
   empty.mutable_spawn();
   EXPECT_EQ(ann.command(empty)->field(), "spawn.at");
+  v1::Command chain = spawn("arm", 0, 0.01, 0);
+  v1::Joint& joint = *chain.mutable_spawn()->add_links()->mutable_joint();
+  *joint.mutable_axis() = vec(0, 1, 0);
+  joint.set_kind(static_cast<v1::Joint::Kind>(7));
+  EXPECT_EQ(ann.command(chain)->field(), "spawn.links[0].joint.kind");
   EXPECT_EQ(ann.step(1, true).avatars_size(), 0);
 }
 
@@ -254,7 +259,7 @@ TEST_F(Sessions, EntitiesAreDescribedInPagesOfBoundedSize) {
       ann.describe(ids);
     } catch (const protocol::ProtocolError& error) {
       EXPECT_NE(std::string(error.what()).find("in pages"), std::string::npos) << error.what();
-      EXPECT_EQ(error.field, "ids");
+      EXPECT_EQ(error.field, "describe.ids");
       return error.code;
     }
     return v1::ERROR_UNSPECIFIED;
@@ -311,7 +316,7 @@ TEST(Requests, OneThatFailsForAFaultOfOursIsToldAndTheNextIsAnswered) {
     v1::ClientMessage describe;
     describe.set_request_id(id);
     describe.mutable_describe()->add_ids(kWall);
-    ann.waiting.push_back({describe, 0});
+    ann.waiting.push_back({describe, {}});
   }
   answerWaiting(served, 1, [](const auto&) {});
   std::vector<v1::ServerMessage> said;

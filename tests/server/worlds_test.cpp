@@ -316,8 +316,7 @@ TEST_F(ServedWorlds, MetricsAndHealthCoverAllOfThem) {
   EXPECT_EQ(get("/mjpeg/avatar/ann?world=c").substr(0, 12), "HTTP/1.1 404");
 }
 
-// ---- without sockets
-// -----------------------------------------------------------------------------
+// ---- without sockets ----------------------------------------------------------------------------
 
 /// What comes of a request for a world.
 std::variant<v1::World, v1::Error> made(Worlds& worlds, const std::string& name) {

@@ -1,0 +1,115 @@
+// Recordings that are begun in the middle: verified from there, and gone on with.
+#include "tests/server/program_trial.hpp"
+
+namespace enfilade::server {
+namespace {
+
+using testing::ProgramTrial;
+using testing::write;
+
+/// Ann walks to and fro for a minute; who takes over finds her on her way.
+class Playback : public ProgramTrial {
+ protected:
+  void SetUp() override {
+    ProgramTrial::SetUp();
+    std::string walk = R"({"spawn":"ann","at":[0,0,0]})"
+                       "\n"
+                       R"({"walk":"ann","along":[)";
+    for (int i = 0; i < 6; ++i) walk += "[4,0,2],[-8,0,-3],";
+    walk += "[0,0,0]]}\n";
+    write(path("walk.jsonl"), walk);
+    write(path("wait.jsonl"), "{\"wait\":10}\n");
+    ASSERT_EQ(replay({path("room.obj"), path("walk.jsonl"), "--out", path("out"), "--record",
+                      path("walk.mcap")})
+                  .code,
+              0);
+  }
+  Ended replay(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), "replay");
+    return run(arguments);
+  }
+  Ended verify(const std::string& file, std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {path(file), "--verify"});
+    return replay(more);
+  }
+  static nlohmann::json toldBy(const Ended& ended) {
+    return nlohmann::json::parse(ended.out, nullptr, false);
+  }
+};
+
+TEST_F(Playback, IsVerifiedFromTheCheckpointBeforeATick) {
+  const auto whole = toldBy(verify("walk.mcap"));
+  const std::uint64_t ticks = whole.value("ticks", 0u);
+  ASSERT_GT(ticks, 2400u);
+  const Ended late = verify("walk.mcap", {"--from", std::to_string(ticks - 100)});
+  EXPECT_EQ(late.code, 0) << late.err;
+  const auto told = toldBy(late);
+  const std::uint64_t began = told.value("from_checkpoint", 0u);
+  EXPECT_GT(began, 0u);
+  EXPECT_LE(began, ticks - 100);
+  EXPECT_EQ(told.value("ticks", 0u), ticks - began);
+  EXPECT_EQ(told.value("state_hash", ""), whole.value("state_hash", "-"));
+}
+
+TEST_F(Playback, AWalkThatIsGoneOnWithEndsAsItWouldHave) {
+  const Ended branched = replay({path("walk.mcap"), "--from", "1500", "--then", path("wait.jsonl"),
+                                 "--out", path("branch"), "--record", path("branch.mcap")});
+  ASSERT_EQ(branched.code, 0) << branched.err;
+  const auto whole = toldBy(verify("branch.mcap"));
+  EXPECT_GE(whole.value("ticks", 0u), 600u);
+  // She goes on with what she was told: after the same tick the recorded walk has the same hash.
+  const std::uint64_t end = 1500 + whole.value("ticks", std::uint64_t{0});
+  write(path("none.jsonl"), "{\"wait\":0}\n");
+  const Ended other =
+      replay({path("walk.mcap"), "--from", std::to_string(end), "--then", path("none.jsonl"),
+              "--out", path("other"), "--record", path("other.mcap")});
+  if (other.code == 0) {
+    const auto made = toldBy(verify("other.mcap"));
+    EXPECT_EQ(made.value("ticks", 1u), 0u);
+    EXPECT_EQ(made.value("state_hash", ""), whole.value("state_hash", "-"));
+  } else {  // the branch went on beyond the recording's end
+    EXPECT_NE(other.err.find("is not in it"), std::string::npos) << other.err;
+  }
+}
+
+TEST_F(Playback, ABranchIsARecordingThatCanBeSoughtAndLeftAgain) {
+  write(path("bob.jsonl"), R"({"spawn":"bob","at":[-3,0,5]})"
+                           "\n"
+                           R"({"walk":"ann","along":[[0,0,2]]})"
+                           "\n");
+  ASSERT_EQ(replay({path("room.obj"), path("walk.mcap"), "--from", "700", "--then",
+                    path("bob.jsonl"), "--out", path("b"), "--record", path("b.mcap")})
+                .code,
+            0);
+  const auto whole = toldBy(verify("b.mcap"));
+  const auto part = toldBy(verify("b.mcap", {"--from", "900"}));
+  EXPECT_EQ(part.value("state_hash", ""), whole.value("state_hash", "-"));
+  EXPECT_EQ(part.value("from_checkpoint", 0u), 700u);
+  const Ended early = verify("b.mcap", {"--from", "699"});
+  EXPECT_EQ(early.code, 1);
+  EXPECT_NE(early.err.find("give one from 700"), std::string::npos) << early.err;
+  EXPECT_EQ(replay({path("b.mcap"), "--from", "800", "--then", path("wait.jsonl"), "--out",
+                    path("c"), "--record", path("c.mcap")})
+                .code,
+            0);
+  EXPECT_EQ(verify("c.mcap").code, 0);
+}
+
+TEST_F(Playback, WhatCannotBeBegunIsRefusedWithTheReason) {
+  const Ended beyond = verify("walk.mcap", {"--from", "100000000"});
+  EXPECT_EQ(beyond.code, 1);
+  EXPECT_NE(beyond.err.find("give one from 0 to"), std::string::npos) << beyond.err;
+  write(path("other.obj"), "o floor\nv -9 0 -9\nv 9 0 -9\nv 9 0 9\nf 1 2 3\n");
+  const Ended other = replay({path("other.obj"), path("walk.mcap"), "--verify", "--from", "2400"});
+  EXPECT_NE(other.code, 0);
+  EXPECT_NE(other.err.find("another scene"), std::string::npos) << other.err;
+  EXPECT_EQ(replay({path("walk.mcap"), "--from", "5"}).code, 2);
+  EXPECT_EQ(replay({path("walk.mcap"), "--then", path("wait.jsonl"), "--out", path("x")}).code, 2);
+  EXPECT_EQ(replay({path("walk.mcap"), "--from", "5", "--then", path("wait.jsonl"), "--out",
+                    path("x"), "--epsilon", "0.001"})
+                .code,
+            2);
+}
+
+}  // namespace
+}  // namespace enfilade::server
