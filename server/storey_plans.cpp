@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <map>
 
+#include "server/plan_cut.hpp"
+
 namespace enfilade::server {
 namespace {
 
@@ -18,7 +20,7 @@ constexpr double kLeastShare = 0.04;   // of all floor, for a height to be a sto
 constexpr std::size_t kMostStoreys = 12;
 constexpr double kStandsFrom = 0.3, kStandsTo = 1.5;  // metres above a floor that walls span
 constexpr double kNameReach = 0.6;  // metres between a storey's floor and its objects
-constexpr double kMargin = 1.0;     // metres around the scene
+constexpr double kMargin = 2.0;     // metres around what the cut goes through
 constexpr double kWidest = 1600, kHighest = 1200;                // pixels of the plan
 constexpr int kLeft = 84, kTop = 64, kRight = 24, kBottom = 84;  // pixels of the frame around it
 constexpr double kLabelPixels = 80;  // between two numbers on the frame, at least
@@ -128,6 +130,26 @@ void drawDown(Sheet& sheet, double metres, double step) {
                    static_cast<int>(y) - 8, text, 2, kPlanInk);
 }
 
+void drawCut(Sheet& sheet, const std::vector<CutLine>& lines) {
+  for (const CutLine& line : lines)
+    render::drawLine(sheet.image, sheet.x(line.from.x()), sheet.y(line.from.z()),
+                     sheet.x(line.to.x()), sheet.y(line.to.z()), 2, kPlanInk);
+}
+
+/// Lawns and roofs are not what a plan is read for: it shows what is cut, or all where nothing is.
+Box drawnArea(const scene::Scene& scene, const std::vector<CutLine>& cut) {
+  Box area;
+  for (const CutLine& line : cut) {
+    area.include(line.from);
+    area.include(line.to);
+  }
+  if (cut.empty()) area = scene.bounds();
+  Box drawn = collision::grown(area, kMargin);
+  drawn.min.y() = std::min(drawn.min.y(), scene.bounds().min.y());
+  drawn.max.y() = std::max(drawn.max.y(), scene.bounds().max.y());
+  return drawn;
+}
+
 /// Lines with their coordinates; those through the origin in a colour of their own.
 void drawGrid(Sheet& sheet) {
   const double step = gridStep(sheet.pixelsPerMetre());
@@ -192,14 +214,15 @@ std::vector<StoreyFloor> storeysOf(const scene::Scene& scene) {
 std::optional<Image> drawStoreyPlan(const scene::Scene& scene, const StoreyFloor& storey,
                                     const TakePicture& picture) {
   Sheet sheet;
-  sheet.camera =
-      planCamera(collision::grown(scene.bounds(), kMargin), storey.height, kWidest, kHighest);
+  const std::vector<CutLine> cut = cutAt(scene, storey.height + kPlanCut);
+  sheet.camera = planCamera(drawnArea(scene, cut), storey.height, kWidest, kHighest);
   const std::optional<PlanPicture> plan = picture(sheet.camera);
   if (!plan) return std::nullopt;
   sheet.image = blankImage(std::max(720, kLeft + sheet.camera.width + kRight),
                            kTop + sheet.camera.height + kBottom);
   paste(sheet.image, planGround(*plan), kLeft, kTop);
   drawGrid(sheet);
+  drawCut(sheet, cut);
   drawFrame(sheet);
   drawScale(sheet);
   drawTitle(sheet, scene, storey);

@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "render/view.hpp"
+
 namespace enfilade::server {
 namespace {
 
@@ -22,15 +24,19 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
-/// Eight finite numbers apart by blanks (or commas).
+/// Eight finite numbers apart by blanks.
 std::array<double, 8> numbersOf(std::string_view line, const std::string& source,
                                 std::size_t number) {
+  if (line.find(',') != std::string_view::npos)
+    refuse(source, number,
+           "commas: is it a table of another order? Write t tx ty tz qx qy qz qw with blanks "
+           "between them, t in seconds (EuRoC has nanoseconds, and qw first)");
   std::array<double, 8> values{};
   std::size_t count = 0;
   while (!line.empty()) {
-    const std::size_t end = std::min(line.find_first_of(" \t,"), line.size());
+    const std::size_t end = std::min(line.find_first_of(" \t"), line.size());
     const std::string_view word = line.substr(0, end);
-    line.remove_prefix(std::min(line.find_first_not_of(" \t,", end), line.size()));
+    line.remove_prefix(std::min(line.find_first_not_of(" \t", end), line.size()));
     if (count == values.size())
       refuse(source, number, "more than eight numbers; write t tx ty tz qx qy qz qw");
     double value = 0;
@@ -71,6 +77,13 @@ std::array<double, 4> quaternionOf(const Mat3& rotation) {
   q.normalize();
   if (q.w() < 0) q.coeffs() = -q.coeffs();
   return {q.x(), q.y(), q.z(), q.w()};
+}
+
+Mat3 turnedOf(const render::Camera& camera) {
+  const render::View view = render::viewOf(camera);
+  Mat3 turned;
+  turned << view.right, view.up, -view.forward;
+  return turned;
 }
 
 Mat3 withAxes(const Mat3& turned, CameraAxes from, CameraAxes to) {

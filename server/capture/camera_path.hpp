@@ -44,6 +44,7 @@ struct CameraPose {
 struct CameraPath {
   std::vector<CameraPose> poses;  ///< at least one, times ascending
   std::optional<PathLens> lens;
+  std::optional<double> fovX;  ///< radians, where the file tells an opening and no size
 };
 
 /// Lines `t tx ty tz qx qy qz qw`, as the TUM RGB-D benchmark has them; blank lines and what
@@ -59,6 +60,9 @@ CameraPath parseJsonPath(std::string_view text, const std::string& source, Camer
 /// A rotation's quaternion, and the other way round; `x y z w` in this order, unit length.
 Mat3 rotationOf(const std::array<double, 4>& xyzw);
 std::array<double, 4> quaternionOf(const Mat3& rotation);
+
+/// worldFromCamera of a camera, axes as CameraAxes::opengl.
+Mat3 turnedOf(const render::Camera& camera);
 
 /// The same camera with the other axes.
 Mat3 withAxes(const Mat3& turned, CameraAxes from, CameraAxes to);

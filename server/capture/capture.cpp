@@ -2,8 +2,10 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -36,6 +38,7 @@ struct CaptureCounts {
   std::size_t already = 0;  ///< of those, there before
   std::atomic<std::size_t> written{0};
   std::atomic<std::size_t> clamped{0};  ///< pixels
+  std::vector<std::size_t> blind;       ///< of the drawn frames, those that show no object
   double seconds = 0;                   ///< of drawing and writing
 };
 
@@ -81,6 +84,15 @@ std::string whoDraws(render::Renderer& renderer, const PictureOptions& options) 
   return renderer.render({}, smallest, frameOptions({}, options)).renderer;
 }
 
+/// As from within a wall, below the ground or beside the scene. False where neither ids nor depth
+/// are drawn: then nobody can say.
+bool showsNothing(const render::Frame& frame) {
+  const auto noId = [](std::uint32_t id) { return id == 0; };
+  const auto noDepth = [](float depth) { return std::isnan(depth); };
+  if (!frame.ids.empty()) return std::all_of(frame.ids.begin(), frame.ids.end(), noId);
+  return !frame.depth.empty() && std::all_of(frame.depth.begin(), frame.depth.end(), noDepth);
+}
+
 /// Draws on this thread; others encode and write meanwhile.
 void takePictures(const CaptureCommand& command, const scene::Model& model, const ShotList& list,
                   const std::vector<std::size_t>& missing, render::Renderer& renderer,
@@ -95,6 +107,7 @@ void takePictures(const CaptureCommand& command, const scene::Model& model, cons
     auto frame = std::make_shared<const render::Frame>(
         renderer.render(*shot.snapshot, shot.camera, options));
     if (reports) reports->measure(index, *frame, *shot.snapshot, options);
+    if (showsNothing(*frame)) counts.blind.push_back(index);
     queue.post([&, index, frame = std::move(frame)] {
       const auto overlay = [&](const render::Frame& drawn) {
         return drawOverlay(drawn, command.pictures.overlay, model, list, list.shots[index]);
@@ -129,7 +142,7 @@ Json videoOf(const CaptureCommand& command, const ShotList& list) {
   return nullptr;
 }
 
-void tellSummary(const CaptureCommand& command, const CaptureCounts& counts,
+void tellSummary(const CaptureCommand& command, const CaptureCounts& counts, std::size_t wentWrong,
                  const std::string& renderer, const Json& video) {
   Json summary;
   summary["out"] = command.out.string();
@@ -139,6 +152,8 @@ void tellSummary(const CaptureCommand& command, const CaptureCounts& counts,
   summary["written"] = counts.written.load();
   summary["already_there"] = counts.already;
   summary["clamped_pixels"] = counts.clamped.load();
+  summary["blind_frames"] = counts.blind;
+  summary["went_wrong"] = wentWrong;
   summary["seconds"] = counts.seconds;
   summary["frames_per_s"] =
       counts.seconds > 0 ? static_cast<double>(counts.written) / counts.seconds : 0.0;
@@ -178,9 +193,8 @@ ExitCode run(const CaptureCommand& command) {
   }
   render::Renderer renderer(scene, command.pictures.renderer, command.device);
   const std::string drawnBy = whoDraws(renderer, command.pictures);
-  claimFolder(
-      command.out, command.pictures,
-      manifestJson(*scene, command.path, list.shots, command.pictures, renderer.deviceName()));
+  claimFolder(command.out, command.pictures,
+              manifestJson(*scene, command.path, command.pictures, renderer.deviceName()));
   writeDocuments(command.out, *scene, list, command.pictures);
   const std::vector<std::size_t> missing = missingFrames(command, list, counts);
   if (counts.already > 0)
@@ -188,14 +202,25 @@ ExitCode run(const CaptureCommand& command) {
   const auto start = Clock::now();
   std::optional<DepthReports> reports;
   if (command.run.reportDepth && !missing.empty()) reports.emplace(command.out, scene);
-  takePictures(command, scene->model(), list, missing, renderer, reports ? &*reports : nullptr,
-               counts);
+  try {
+    takePictures(command, scene->model(), list, missing, renderer, reports ? &*reports : nullptr,
+                 counts);
+  } catch (...) {
+    disclaimFolder(command.out);
+    throw;
+  }
   counts.seconds = std::chrono::duration<double>(Clock::now() - start).count();
   if (counts.clamped > 0)
     spdlog::warn("{} pixels of depth are farther than 16 bits hold, and were written as 65535",
                  counts.clamped.load());
-  tellSummary(command, counts, drawnBy, videoOf(command, list));
-  return ExitCode::done;
+  if (!counts.blind.empty())
+    spdlog::warn(
+        "{} frames show nothing at all, the first of them frame {}: does the camera stand "
+        "in a wall, below the floor or beside the scene?",
+        counts.blind.size(), counts.blind.front());
+  tellSummary(command, counts, list.wentWrong, drawnBy, videoOf(command, list));
+  const bool asTold = counts.blind.empty() && list.wentWrong == 0;
+  return asTold || !command.run.strict ? ExitCode::done : ExitCode::violations;
 }
 
 }  // namespace

@@ -251,6 +251,9 @@ void addRun(CLI::App& verb, CaptureArguments& into) {
   verb.add_flag("--report-depth", into.reportDepth,
                 "Compare depth and ids of each frame with rays in doubles: depth_report.json, and "
                 "one a frame; a second or so a frame");
+  verb.add_flag("--strict", into.strict,
+                "End with 3 when a walk script's order was refused or a walk blocked, or when a "
+                "frame shows nothing");
   verb.add_flag("--dry-run", into.dryRun, "Tell how many frames there are and write nothing");
 }
 
@@ -304,6 +307,7 @@ CaptureRunOptions captureRunFrom(const CaptureArguments& read) {
   run.mp4 = !read.noMp4;
   run.dryRun = read.dryRun;
   run.reportDepth = read.reportDepth;
+  run.strict = read.strict;
   run.progress = read.progress == "json" ? CaptureProgress::json : CaptureProgress::bar;
   return run;
 }

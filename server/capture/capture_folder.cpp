@@ -76,9 +76,10 @@ void claimFolder(const fs::path& folder, const PictureOptions& options,
                  const std::string& manifest) {
   const std::string remedy = "; give another folder with --out, or remove what is in this one";
   const std::optional<std::string> there = textOf(folder / kManifest);
-  if (there && *there != manifest)
-    throw std::runtime_error(folder.string() + " holds another capture (" +
-                             manifestDifference(*there, manifest) + ")" + remedy);
+  const std::string difference = there ? manifestDifference(*there, manifest) : "";
+  if (!difference.empty())
+    throw std::runtime_error(folder.string() + " holds another capture (" + difference + ")" +
+                             remedy);
   for (const fs::path& channel : foldersOf(options)) {
     if (!there && holdsFiles(folder / channel))
       throw std::runtime_error((folder / channel).string() + " holds files, but there is no " +
@@ -88,6 +89,13 @@ void claimFolder(const fs::path& folder, const PictureOptions& options,
   }
   removeHalfWritten(folder);
   if (!there) write(folder / kManifest, manifest);
+}
+
+void disclaimFolder(const fs::path& folder) {
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
+    if (entry.is_directory(error) && holdsFiles(entry.path())) return;
+  fs::remove(folder / kManifest, error);
 }
 
 void writeDocuments(const fs::path& folder, const scene::Scene& scene, const ShotList& list,

@@ -20,6 +20,9 @@ void prepareFolder(const std::filesystem::path& folder);
 void claimFolder(const std::filesystem::path& folder, const PictureOptions& options,
                  const std::string& manifest);
 
+/// A capture failed: a folder without a single finished frame is free for any other.
+void disclaimFolder(const std::filesystem::path& folder);
+
 /// instances.json, transforms.json, and the lists of the TUM layout.
 void writeDocuments(const std::filesystem::path& folder, const scene::Scene& scene,
                     const ShotList& list, const PictureOptions& options);

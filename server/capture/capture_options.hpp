@@ -70,6 +70,7 @@ struct CaptureRunOptions {
   Shard shard;
   bool mp4 = true;  ///< when all frames are there, and ffmpeg
   bool dryRun = false;
+  bool strict = false;       ///< a script that goes wrong, or a blind frame, is a violation
   bool reportDepth = false;  ///< each frame drawn is compared with rays in doubles
   CaptureProgress progress = CaptureProgress::bar;
 };

@@ -92,6 +92,13 @@ Json hashOf(const std::filesystem::path& file) {
   return hash ? Json(scene::hexOf(*hash)) : Json(nullptr);
 }
 
+/// Of capture.json, for people: the same files may be called otherwise the next time.
+constexpr const char* kNames = "names";
+
+std::string fileName(const std::filesystem::path& file) {
+  return file.filename().string();
+}
+
 Json lensOptions(const PictureOptions& options) {
   Json lens;
   if (options.fovY) lens["fov_radians"] = *options.fovY;
@@ -184,16 +191,15 @@ std::string tumGroundTruth(const std::vector<Shot>& shots) {
 }
 
 std::string manifestJson(const scene::Scene& scene, const std::filesystem::path& path,
-                         const std::vector<Shot>& shots, const PictureOptions& options,
-                         const std::string& renderer) {
+                         const PictureOptions& options, const std::string& renderer) {
   Json all;
   std::array<char, 24> hash{};
   std::snprintf(hash.data(), hash.size(), "%016llx", static_cast<unsigned long long>(scene.hash()));
   all["enfilade"] = kServerVersion;
+  all[kNames] = {{"scene", fileName(scene.model().source)}, {"path", fileName(path)}};
   all["scene"] = hash.data();
   all["scene_file"] = hashOf(scene.model().source);
   all["path"] = hashOf(path);
-  all["frames"] = shots.size();
   all["renderer"] = renderer;
   all["lens"] = lensOptions(options);
   all["axes"] = options.axes == CameraAxes::opencv ? "opencv" : "opengl";
@@ -210,7 +216,10 @@ std::string manifestJson(const scene::Scene& scene, const std::filesystem::path&
   all["ids"] = options.ids == IdsFile::png ? "png" : "npy";
   all["layout"] = options.layout == FolderLayout::tum ? "tum" : "plain";
   const OverlayChoice& marks = options.overlay;
-  all["overlay"] = {marks.contacts, marks.boxes, marks.names, marks.paths};
+  all["overlay"] = Json{{"contacts", marks.contacts},
+                        {"boxes", marks.boxes},
+                        {"names", marks.names},
+                        {"paths", marks.paths}};
   all["glass"] = options.glass == render::Glass::solid ? "solid" : "clear";
   return all.dump(1) + "\n";
 }
@@ -220,7 +229,7 @@ std::string manifestDifference(const std::string& one, const std::string& other)
   if (!a.is_object() || !b.is_object()) return "one of the two cannot be read";
   std::string text;
   for (const auto& [key, value] : b.items()) {
-    if (a.contains(key) && a[key] == value) continue;
+    if (key == kNames || (a.contains(key) && a[key] == value)) continue;
     text += (text.empty() ? "" : "; ") + key + ": " + (a.contains(key) ? a[key].dump() : "-") +
             " there, " + value.dump() + " now";
   }

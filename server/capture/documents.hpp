@@ -25,8 +25,7 @@ std::string tumGroundTruth(const std::vector<Shot>& shots);
 
 /// What the pictures are made of: two captures may share a folder when these are the same.
 std::string manifestJson(const scene::Scene& scene, const std::filesystem::path& path,
-                         const std::vector<Shot>& shots, const PictureOptions& options,
-                         const std::string& renderer);
+                         const PictureOptions& options, const std::string& renderer);
 
 /// The keys in which two manifests differ, with both values, for a person; empty: in none.
 std::string manifestDifference(const std::string& one, const std::string& other);

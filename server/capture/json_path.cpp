@@ -14,6 +14,7 @@ using Json = nlohmann::json;
 constexpr double kSquare = 1e-3;                   // a rotation's entries may be off by so much
 constexpr double kFarthest = 1e9;                  // metres
 constexpr double kRadians = 0.017453292519943295;  // a degree
+constexpr double kHalfTurn = 3.141592653589793;
 constexpr std::size_t kMostPoses = 10'000'000;
 constexpr std::size_t kLongestQuote = 60;
 
@@ -143,16 +144,26 @@ CameraPose poseOf(const Json& entry, const Place& place, CameraAxes axes, double
   return pose;
 }
 
+/// From side to side, radians, as Blender's exports tell it; nullopt where the file does not.
+std::optional<double> openingOf(const Json& file, const Place& place) {
+  if (!file.contains("camera_angle_x")) return std::nullopt;
+  const double radians = numberOf(file["camera_angle_x"], place.of("camera_angle_x"));
+  if (!(radians > 0 && radians < kHalfTurn))
+    place.of("camera_angle_x").refuse("must lie between 0 and pi radians");
+  return radians;
+}
+
 /// nullopt where the file says nothing of it. Distortion is refused: pictures here have none.
 std::optional<PathLens> lensOf(const Json& file, const Place& place) {
   for (const char* key : {"k1", "k2", "k3", "k4", "p1", "p2"}) {
     if (file.contains(key) && numberOf(file[key], place.of(key)) != 0)
       place.of(key).refuse("lens distortion is not drawn; set it to 0, or undistort first");
   }
-  if (!file.contains("fl_x")) return std::nullopt;
+  const bool byAngle = !file.contains("fl_x") && openingOf(file, place) && file.contains("w");
+  if (!file.contains("fl_x") && !byAngle) return std::nullopt;
   const auto number = [&](const char* key, std::optional<double> otherwise) {
     if (file.contains(key)) return numberOf(file[key], place.of(key));
-    if (!otherwise) place.refuse(std::string(key) + " is missing beside fl_x");
+    if (!otherwise) place.refuse(std::string(key) + " is missing beside the lens");
     return *otherwise;
   };
   PathLens lens;
@@ -161,7 +172,8 @@ std::optional<PathLens> lensOf(const Json& file, const Place& place) {
     place.of("w").refuse("w and h must be pixels, at least 1");
   lens.width = static_cast<int>(width);
   lens.height = static_cast<int>(height);
-  lens.pinhole.fx = number("fl_x", std::nullopt);
+  lens.pinhole.fx =
+      byAngle ? width / 2 / std::tan(*openingOf(file, place) / 2) : number("fl_x", std::nullopt);
   lens.pinhole.fy = number("fl_y", lens.pinhole.fx);
   lens.pinhole.cx = number("cx", width / 2);
   lens.pinhole.cy = number("cy", height / 2);
@@ -203,6 +215,7 @@ CameraPath parseJsonPath(std::string_view text, const std::string& source, Camer
                           "transforms.json has it");
   CameraPath path;
   if (!listed) path.lens = lensOf(file, whole);
+  if (!listed && !path.lens) path.fovX = openingOf(file, whole);
   const Json& entries = listed ? file : file["frames"];
   const Place list = listed ? Place{source + ": pose"} : whole.of("frames");
   if (entries.empty() || entries.size() > kMostPoses)

@@ -106,6 +106,11 @@ render::Pinhole resized(const PathLens& lens, Size size, const std::string& sour
   return {p.fx * across, p.fy * down, p.cx * across, p.cy * down};
 }
 
+render::Pinhole opened(double fovX, Size size) {
+  const double focal = size.width / 2.0 / std::tan(fovX / 2);
+  return {focal, focal, size.width / 2.0, size.height / 2.0};
+}
+
 /// Size, lens and cuts of every camera. What the command line says goes before the path's own.
 void fitLenses(std::vector<Shot>& shots, const PictureOptions& options, const CameraPath& path,
                const std::string& source) {
@@ -123,10 +128,27 @@ void fitLenses(std::vector<Shot>& shots, const PictureOptions& options, const Ca
       camera.pinhole = options.pinhole;
     } else if (own && !options.fovY) {
       camera.pinhole = resized(*own, size, source);
+    } else if (path.fovX && !options.fovY) {
+      camera.pinhole = opened(*path.fovX, size);
     }
     if (const auto why = render::refusal(camera))
       throw CameraPathError(source + ": frame " + std::to_string(i) + ": " + *why);
   }
+}
+
+/// Options that say nothing about a path of this kind.
+void tellUnused(const PictureOptions& options, bool script, bool gltf,
+                std::vector<std::string>& notes) {
+  const auto tell = [&](bool given, const char* option, const char* needs) {
+    if (given) notes.push_back(std::string(option) + " changes nothing: it is for " + needs);
+  };
+  constexpr const char* kScript = "walk scripts";
+  tell(!script && options.every > 0, "--every", kScript);
+  tell(!script && !options.avatar.empty(), "--avatar", kScript);
+  tell(!script && options.overlay.contacts, "--overlay contacts", kScript);
+  tell(!script && options.overlay.paths, "--overlay paths", kScript);
+  tell(script && !options.avatar.empty() && options.every == 0, "--avatar", "--every");
+  tell(!gltf && !options.camera.empty(), "--camera", "glTF paths");
 }
 
 }  // namespace
@@ -149,6 +171,7 @@ ShotList planShots(const std::shared_ptr<const scene::Scene>& scene,
     for (std::size_t i = 0; i < list.shots.size(); ++i)
       if (takes(shard, i)) list.shots[i].snapshot = still;
   }
+  tellUnused(options, kind == PathKind::script, kind == PathKind::gltf, list.notes);
   if (options.limit > 0 && list.shots.size() > options.limit) list.shots.resize(options.limit);
   fitLenses(list.shots, options, path, source);
   return list;

@@ -48,6 +48,7 @@ struct ShotList {
   std::vector<WalkerName> walkers;  ///< ascending ids
   std::vector<WalkTrail> trails;    ///< of all walkers, with an overlay of paths
   std::vector<std::string> notes;   ///< what was guessed or left out, for a person
+  std::size_t wentWrong = 0;  ///< orders of a script that were refused, blocked, ...: in notes
 };
 
 /// Reads the path and works out every picture of it: a walk script runs in process for that.

@@ -115,7 +115,7 @@ class Recorder {
 /// Without a renderer every capture would count as one that failed.
 class Unseen : public protocol::ScriptDriver {
  public:
-  explicit Unseen(scene::World& world) : driver_(world, nullptr) {}
+  explicit Unseen(RecordedWorld& world) : driver_(world, nullptr) {}
   double tickSeconds() const override { return driver_.tickSeconds(); }
   std::optional<v1::Error> submit(const v1::Command& command) override {
     return driver_.submit(command);
@@ -139,7 +139,7 @@ ShotList walkShots(const std::shared_ptr<const scene::Scene>& scene,
                    const std::filesystem::path& script, const PictureOptions& options,
                    const Shard& shard) {
   const protocol::Script lines = protocol::readScript(script);
-  scene::World world(scene);
+  RecordedWorld world{scene::World(scene)};
   Unseen driver(world);
   Recorder recorder(world, options, shard);
   const protocol::ScriptResult result = protocol::runScript(
@@ -148,6 +148,7 @@ ShotList walkShots(const std::shared_ptr<const scene::Scene>& scene,
       });
   ShotList list = recorder.finish();
   for (const protocol::LineOutcome& outcome : result.outcomes) list.notes.push_back(outcome.text);
+  list.wentWrong = result.outcomes.size();
   if (list.shots.empty())
     throw CameraPathError(
         script.string() +

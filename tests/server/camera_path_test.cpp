@@ -63,6 +63,8 @@ TEST(TumPath, WrongLinesAreToldWithFileLineAndValue) {
   EXPECT_TRUE(holds(saidOfTum(good + "0 0 0 0 0 0 0 1"), "path.txt:2: time"));
   EXPECT_TRUE(holds(saidOfTum(good + "1 2e9 0 0 0 0 0 1"), "path.txt:2: the place"));
   EXPECT_TRUE(holds(saidOfTum("# nothing\n\n"), "path.txt: holds no pose"));
+  EXPECT_TRUE(
+      holds(saidOfTum("#t [ns],p,q\n1403636579763555584,1,2,3,1,0,0,0"), "path.txt:2: commas"));
 }
 
 TEST(Quaternions, ComeBackFromTheirRotation) {
@@ -112,6 +114,22 @@ TEST(JsonPath, NerfstudiosTransformsGiveMatrixAndLens) {
   ASSERT_TRUE(path.poses[1].lens);
   EXPECT_EQ(path.poses[1].lens->pinhole.fx, 250);
   EXPECT_EQ(path.poses[1].lens->pinhole.cx, 300);
+}
+
+TEST(JsonPath, BlendersAngleIsTheOpeningFromSideToSide) {
+  const std::string frames = R"("frames":[{"transform_matrix":[[1,0,0,1],[0,1,0,2],[0,0,1,3]]}]})";
+  const auto read = [&](const std::string& head) {
+    return parseJsonPath("{" + head + "," + frames, "t.json", CameraAxes::opengl, kFps);
+  };
+  const CameraPath free = read(R"("camera_angle_x":1.2)");
+  EXPECT_FALSE(free.lens);
+  EXPECT_EQ(free.fovX, 1.2);
+  const CameraPath sized = read(R"("camera_angle_x":1.2,"w":64,"h":48)");
+  ASSERT_TRUE(sized.lens);
+  EXPECT_NEAR(sized.lens->pinhole.fx, 46.7742, 1e-4);  // 32 / tan 0.6
+  EXPECT_EQ(sized.lens->pinhole.fy, sized.lens->pinhole.fx);
+  EXPECT_EQ(sized.lens->pinhole.cy, 24);
+  EXPECT_TRUE(holds(saidOfJson(R"({"camera_angle_x":3.2,)" + frames), "between 0 and pi"));
 }
 
 TEST(JsonPath, WhatIsWrongIsToldWithItsPlace) {

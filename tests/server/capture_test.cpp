@@ -210,6 +210,55 @@ TEST_F(Capture, AStoppedRunGoesOnWhereItWasAndNothingElseDoes) {
   EXPECT_NE(captured("path.txt", "out").err.find("that says whose"), std::string::npos);
 }
 
+TEST_F(Capture, ATrialWithALimitGoesOnWithoutIt) {
+  write(folder_ / "path.txt", ahead(4));
+  ASSERT_EQ(captured("path.txt", "out", {"--limit", "2"}).code, 0);
+  const Ended all = captured("path.txt", "out");
+  ASSERT_EQ(all.code, 0) << all.err;
+  EXPECT_EQ(json::parse(all.out).at("already_there"), 2);
+  ASSERT_EQ(captured("path.txt", "fresh").code, 0);
+  EXPECT_EQ(treeOf(folder_ / "out"), treeOf(folder_ / "fresh"));
+  const json made = json::parse(textOf(folder_ / "out/capture.json"));
+  EXPECT_EQ(made.at("names").at("scene"), "room.obj");
+  EXPECT_EQ(made.at("names").at("path"), "path.txt");
+}
+
+TEST_F(Capture, ARunThatMadeNoFrameLeavesTheFolderFree) {
+  write(folder_ / "path.txt", ahead(1));
+  // 16 bits hold 7 cm: whatever is seen is farther.
+  const std::vector<std::string> fine{"--channels", "depth",         "--depth",
+                                      "png",        "--depth-scale", "1000000"};
+  const Ended refused = captured("path.txt", "out", fine);
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_NE(refused.err.find("--too-far clamp"), std::string::npos) << refused.err;
+  std::vector<std::string> clamped = fine;
+  clamped.insert(clamped.end(), {"--too-far", "clamp"});
+  EXPECT_EQ(captured("path.txt", "out", clamped).code, 0);
+  EXPECT_EQ(captured("path.txt", "out", fine).code, 1) << "now it holds a frame";
+}
+
+TEST_F(Capture, AFrameThatShowsNothingIsToldAndIsAViolationWithStrict) {
+  write(folder_ / "path.json",
+        R"([{"eye":[0,1.6,0],"look_at":[5,1,0]},{"eye":[1e6,0,0],"look_at":[2e6,0,0]}])");
+  const Ended blind = captured("path.json", "out", {"--every", "3"});
+  EXPECT_EQ(blind.code, 0) << blind.err;
+  EXPECT_EQ(json::parse(blind.out).at("blind_frames"), json::array({1}));
+  EXPECT_NE(blind.err.find("the first of them frame 1"), std::string::npos) << blind.err;
+  EXPECT_NE(blind.err.find("--every changes nothing"), std::string::npos) << blind.err;
+  EXPECT_EQ(captured("path.json", "strict", {"--strict"}).code, 3);
+}
+
+TEST_F(Capture, AScriptThatGoesWrongIsCountedAndIsAViolationWithStrict) {
+  write(folder_ / "path.jsonl", R"({"spawn":"ann","at":[0,0,0],"facing":0}
+{"walk":"bob","to":[1,0,0]}
+{"capture":"ann","as":"here"}
+)");
+  const Ended told = captured("path.jsonl", "out");
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_EQ(json::parse(told.out).at("went_wrong"), 1);
+  EXPECT_EQ(captured("path.jsonl", "strict", {"--strict"}).code, 3);
+}
+
 TEST_F(Capture, AFullDiskLeavesWholeFilesOnlyAndIsTold) {
   write(folder_ / "path.txt", ahead(3));
   // A .npy of 64 x 48 floats has 12,416 bytes; the .png of the same picture and all else fit.
