@@ -10,6 +10,7 @@
 #include "tests/server/becomes_true.hpp"
 #include "tests/server/raw_connection.hpp"
 #include "tests/server/served_room.hpp"
+#include "tests/support/sanitized.hpp"
 
 namespace enfilade::server::testing {
 namespace {
@@ -364,12 +365,6 @@ std::size_t residentBytes() {
 
 constexpr std::size_t kMiB = 1u << 20;
 
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr bool kMemoryIsOurs = false;  // a sanitizer keeps what is freed
-#else
-constexpr bool kMemoryIsOurs = true;
-#endif
-
 TEST(Worlds, SixtyFourAreMadeAndDroppedOverAndOverInFlatMemory) {
   Worlds worlds({smallRoom()}, {}, {});
   std::vector<std::size_t> after;
@@ -382,7 +377,7 @@ TEST(Worlds, SixtyFourAreMadeAndDroppedOverAndOverInFlatMemory) {
     after.push_back(residentBytes());
   }
   EXPECT_EQ(worlds.all().size(), 1u);
-  if (kMemoryIsOurs) {
+  if (!tests::kSanitized) {
     EXPECT_LT(after.back(), after[4] + 4 * kMiB);
   }
 }
@@ -401,7 +396,7 @@ TEST(Worlds, OneMoreOfASceneTakesNoMoreOfWhatStandsThanItsBoxes) {
   }
   const std::size_t each = (residentBytes() - one) / kWorlds;
   EXPECT_EQ(worlds.all().size(), kWorlds + 1);
-  if (kMemoryIsOurs) {
+  if (!tests::kSanitized) {
     EXPECT_LT(each, kPosts * kMostBytesABox + kMiB / 2) << one - before << " for the first";
     EXPECT_LT(each, (one - before) / 4);
   }
