@@ -1,5 +1,7 @@
 #include "protocol/mcap/indexed_reader.hpp"
 
+#include "protocol/mcap/reader.hpp"
+
 namespace enfilade::protocol::mcap {
 namespace {
 
@@ -34,14 +36,7 @@ std::string indexesOf(const Chunk& chunk) {
 }  // namespace
 
 IndexedReader::IndexedReader(std::filesystem::path file) : file_(std::move(file)) {
-  std::error_code problem;
-  size_ = std::filesystem::file_size(file_, problem);
-  if (!problem) stream_.open(file_, std::ios::binary);
-  if (problem || !stream_)
-    throw RecordingError(file_.string() + ": cannot be read" +
-                         (problem ? ": " + problem.message() : std::string()));
-  if (size_ < kMagic.size() || bytesAt(0, kMagic.size()) != kMagic)
-    fail(0, "this is no MCAP file: it does not begin as one");
+  stream_ = openMcap(file_, size_);
   closed_ = readSummary();
   if (!closed_) scan();
   if (!closed_) dropTornChunk();

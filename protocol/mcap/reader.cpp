@@ -10,18 +10,26 @@ bool isMcap(const std::filesystem::path& file) {
   return stream.read(magic.data(), static_cast<std::streamsize>(magic.size())) && magic == kMagic;
 }
 
-Reader::Reader(std::filesystem::path file) : file_(std::move(file)) {
+std::ifstream openMcap(const std::filesystem::path& file, std::uint64_t& size) {
   std::error_code problem;
-  size_ = std::filesystem::file_size(file_, problem);
-  if (!problem) stream_.open(file_, std::ios::binary);
-  if (problem || !stream_)
-    throw RecordingError(file_.string() + ": cannot be read" +
+  std::ifstream stream;
+  size = std::filesystem::file_size(file, problem);
+  if (!problem) stream.open(file, std::ios::binary);
+  if (problem || !stream)
+    throw RecordingError(file.string() + ": cannot be read" +
                          (problem ? ": " + problem.message() : std::string()));
   std::string magic(kMagic.size(), '\0');
-  stream_.read(magic.data(), static_cast<std::streamsize>(magic.size()));
-  if (!stream_ || magic != kMagic) fail(0, "this is no MCAP file: it does not begin as one");
+  stream.read(magic.data(), static_cast<std::streamsize>(magic.size()));
+  if (!stream || magic != kMagic)
+    throw RecordingError(file.string() +
+                         ": at byte 0: this is no MCAP file: it does not begin as one");
+  return stream;
+}
+
+Reader::Reader(std::filesystem::path file) : file_(std::move(file)) {
+  stream_ = openMcap(file_, size_);
   position_ = kMagic.size();
-  crc_ = crcOf(magic);
+  crc_ = crcOf(kMagic);
   const auto header = readRecord();
   if (!header || header->opcode != Opcode::header) fail(position_, "there is no header");
   try {

@@ -17,6 +17,10 @@ namespace enfilade::protocol::mcap {
 /// Whether the file is there and begins as MCAP files do.
 bool isMcap(const std::filesystem::path& file);
 
+/// Stands behind the magic bytes; `size`: of the file. Throws RecordingError when the file cannot
+/// be read or is no MCAP file.
+std::ifstream openMcap(const std::filesystem::path& file, std::uint64_t& size);
+
 class Reader {
  public:
   /// Throws RecordingError when the file cannot be read or is no MCAP file.
