@@ -92,13 +92,6 @@ void findRepeats(const Scene& scene, Findings& findings) {
 
 }  // namespace
 
-bool isNote(const Problem& problem) {
-  static constexpr std::array<std::string_view, 7> kNotes{
-      "skipped_spaces", "skipped_openings", "guessed_doors",  "still_doors",
-      "still_lifts",    "collision_suffix", "replaced_bodies"};
-  return std::find(kNotes.begin(), kNotes.end(), problem.kind) != kNotes.end();
-}
-
 Box boxOf(const Scene& scene, std::uint32_t object) {
   const auto& still = scene.solidObjects();
   const auto at = std::lower_bound(still.begin(), still.end(), object);

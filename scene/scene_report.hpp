@@ -33,9 +33,6 @@ struct SceneReport {
   std::vector<Problem> problems;
 };
 
-/// Told so that nobody looks for it, though nothing is wrong: as spaces of IFC, which are air.
-bool isNote(const Problem& problem);
-
 /// The box of an object as it was authored, still or not; empty when it has no area.
 Box boxOf(const Scene& scene, std::uint32_t object);
 

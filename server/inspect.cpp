@@ -12,6 +12,7 @@
 
 #include "protocol/mcap/reader.hpp"
 #include "render/renderer.hpp"
+#include "scene/problem_kinds.hpp"
 #include "server/inspection.hpp"
 #include "server/recordings/inspect_recording.hpp"
 #include "server/storey_plans.hpp"
@@ -62,8 +63,9 @@ ExitCode inspect(const InspectCommand& command) {
     throw std::runtime_error("stdout cannot be written");
   if (!command.plan.empty()) drawPlans(inspection.loaded.scene, command.plan);
   const auto& problems = inspection.report.problems;
-  const bool wrong =
-      command.strict && !std::all_of(problems.begin(), problems.end(), scene::isNote);
+  const bool wrong = command.strict &&
+                     std::any_of(problems.begin(), problems.end(),
+                                 [](const auto& problem) { return !scene::kindOf(problem).note; });
   return wrong ? ExitCode::violations : ExitCode::done;
 }
 

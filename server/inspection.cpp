@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "scene/problem_kinds.hpp"
 #include "server/kept_report.hpp"
 
 namespace enfilade::server {
@@ -45,9 +46,14 @@ json jsonOf(const scene::ShellCounts& shells) {
 
 json problemsOf(const scene::SceneReport& report) {
   json list = json::array();
-  for (const scene::Problem& p : report.problems)
-    list.push_back(
-        {{"kind", p.kind}, {"count", p.count}, {"example", p.example}, {"note", scene::isNote(p)}});
+  for (const scene::Problem& p : report.problems) {
+    const scene::ProblemKind kind = scene::kindOf(p);
+    list.push_back({{"kind", p.kind},
+                    {"count", p.count},
+                    {"example", p.example},
+                    {"note", kind.note},
+                    {"meaning", kind.meaning}});
+  }
   return list;
 }
 
@@ -170,9 +176,12 @@ void addLargest(const scene::Scene& scene, Table& table) {
 
 void addProblems(const scene::SceneReport& report, Table& table) {
   table.line("\nproblems: %s", report.problems.empty() ? "none" : "");
-  for (const scene::Problem& p : report.problems)
-    table.line("  %8zu  %-26s %sas %s", p.count, p.kind.c_str(),
-               scene::isNote(p) ? "(nothing is wrong) " : "", p.example.c_str());
+  for (const scene::Problem& p : report.problems) {
+    const scene::ProblemKind kind = scene::kindOf(p);
+    table.line("  %8zu  %-26s %s%.*s", p.count, p.kind.c_str(), kind.note ? "(all right) " : "",
+               static_cast<int>(kind.meaning.size()), kind.meaning.data());
+    table.line("            as %s", p.example.c_str());
+  }
 }
 
 /// How many of each kind, and the first ones by name.

@@ -9,12 +9,15 @@ corpus/NAME/ as found-WHAT.
 
 import pathlib
 import struct
+import subprocess
+import tempfile
 
-from google.protobuf import text_format
+from google.protobuf import descriptor_pb2, message_factory, text_format
 
 from enfilade.messages import ClientMessage
 
 CORPUS = pathlib.Path(__file__).parent / "corpus"
+ROOT = CORPUS.parent.parent.parent
 
 SPAWN = 'command { avatar: "ann" tag: 1 spawn { at { y: 0.01 } facing: 90 } }'
 BOX = "box { min { x: -0.1 y: 0.1 z: -0.1 } max { x: 0.1 y: 0.4 z: 0.1 } }"
@@ -63,6 +66,68 @@ SESSIONS = {
                 'command { avatar: "ann" }', "step { ticks: 0 }", "subscribe { state: true state_rate: -1 }"],
 }
 
+# Of recording_fuzz.cpp: the kind of each item, and the item.
+ITEMS = [
+    (1, "RecordedCommands", 'tick: 1 commands { avatar { avatar: "ann" spawn { at { y: 0.01 } } } }'),
+    (3, "State", "tick: 1 time: 0.0166 hash: 1"),
+    (2, "TickEvents", 'sequence: 1 tick: 1 contacts { tick: 1 kind: KIND_BEGIN a: 8 b: 1 a_name: "ann" b_name: "floor" } '
+                      'notices { tick: 1 kind: KIND_SPAWNED avatar: "ann" id: 8 }'),
+    (1, "RecordedCommands", 'tick: 2 commands { body { body: "door" open {} } }'),
+    (3, "State", 'tick: 2 time: 0.0333 avatars { id: 8 name: "ann" feet { y: 0.01 } }'),
+    (4, "RecordedNames", 'first_id: 1 paths: "floor" paths: "left" global_ids: "a" global_ids: ""'),
+    (5, "RecordedCheckpoint", "tick: 2 state_hash: 7 world: 'none'"),
+    (0, "RecordingStart", "parent { file: 'a.mcap' tick: 2 }"),
+    (3, "State", "tick: 3 time: 0.05"),
+]
+
+TEXTS = {
+    "tum": (0, "# a path\n0 0 1.7 0 0 0 0 1\n0.5 1 1.7 0 0 0.7071 0 0.7071\n1 1 1.7 1 0 1 0 0\n"),
+    "tum-opencv": (2, "1305031102.1758 1.3563 0.6305 1.6380 0.6132 0.5962 -0.3311 -0.3986\n"),
+    "poses": (1, '[{"time": 0, "eye": [0, 1.7, 0], "look_at": [1, 1.7, 0]}, {"time": 1, "eye": [1, 1.7, 0], "forward": [0, 0, -1]}]'),
+    "transforms": (3, '{"camera_angle_x": 1.2, "w": 64, "h": 48, "frames": [{"file_path": "a.png", "transform_matrix": '
+                      '[[1,0,0,0],[0,1,0,1.7],[0,0,1,0],[0,0,0,1]]}]}'),
+    "intrinsics": (1, '{"fl_x": 50, "fl_y": 50, "cx": 32, "cy": 24, "w": 64, "h": 48, "frames": [{"transform_matrix": '
+                      '[[0,0,1,3],[0,1,0,1.7],[-1,0,0,2],[0,0,0,1]], "time": 2}]}'),
+}
+
+
+def messages_of_recordings():
+    """The classes of recording.proto by their names."""
+    with tempfile.NamedTemporaryFile() as described:
+        subprocess.run(["protoc", f"--proto_path={ROOT}", "--include_imports", f"--descriptor_set_out={described.name}",
+                        "protocol/recording.proto"], cwd=ROOT, check=True)
+        files = descriptor_pb2.FileDescriptorSet.FromString(described.read())
+    return message_factory.GetMessages(files.file)
+
+
+def record(opcode, content):
+    return struct.pack("<BQ", opcode, len(content)) + content
+
+
+def text(content):
+    return struct.pack("<I", len(content)) + content
+
+
+def write_files_of_recordings():
+    kinds = messages_of_recordings()
+    items = [(kind, text_format.Parse(content, kinds["enfilade.v1." + name]()).SerializeToString())
+             for kind, name, content in ITEMS]
+    for count in (2, 3, 5, 7, len(items)):
+        write("recording", f"items-{count}", b"".join(struct.pack("<BH", kind, len(part)) + part for kind, part in items[:count]))
+    schema = record(3, struct.pack("<H", 1) + text(b"s") + text(b"protobuf") + text(b"?"))
+    channel = record(4, struct.pack("<HH", 1, 1) + text(b"/a") + text(b"protobuf") + text(b""))
+    message = record(5, struct.pack("<HIQQ", 1, 0, 5, 5) + b"hello")
+    write("mcap", "chunk", b"\x01" + schema + channel + message + message)
+    write("mcap", "unknown-channel", b"\x01" + message)
+    header = record(1, text(b"") + text(b"seed"))
+    write("mcap", "open", b"\x00\x89MCAP0\r\n" + header + schema + channel + message)
+    write("mcap", "long", b"\x00\x89MCAP0\r\n" + header + struct.pack("<BQ", 6, 1 << 62) + b"abcd")
+    for place in (8, 12, 20, 100, 500, 900, 1500):
+        write("checkpoint", f"changed-{place}", b"\x01" + struct.pack("<HB", place, 255) + struct.pack("<HB", place + 7, 0))
+    write("checkpoint", "none", b"\x00")
+    for name, (kind, content) in TEXTS.items():
+        write("camera_path", name, bytes([kind]) + content.encode())
+
 
 def messages(lines):
     for number, line in enumerate(lines, start=1):
@@ -94,6 +159,7 @@ def main():
     write("framing", "half", bytes([0]) + struct.pack("<II", 100, 90) + b"abcd")
     write("framing", "tls", bytes([1]) + b"\x16\x03\x01\x02\x00")
     write("framing", "http", bytes([1]) + b"GET / HTTP/1.1\r\n")
+    write_files_of_recordings()
 
 
 if __name__ == "__main__":

@@ -295,6 +295,25 @@ Faults unfinishedWork(const Sources& sources) {
   return faults;
 }
 
+Faults problemsWithoutMeaning(const Sources& sources) {
+  static const std::string table = "scene/problem_kinds.cpp";
+  static const std::regex told(
+      R"re((?:problems_?\.add|findings\.add|addProblem|problems\.push_back)\([^";]*"([a-z_]+)")re");
+  const auto meanings = sources.find(table);
+  if (meanings == sources.end()) return {};
+  Faults faults;
+  for (const auto& [path, text] : sources) {
+    if (path.rfind("scene/", 0) != 0) continue;
+    for (std::sregex_iterator it(text.begin(), text.end(), told), end; it != end; ++it) {
+      const std::string word = '"' + (*it)[1].str() + '"';
+      if (meanings->second.find(word) != std::string::npos) continue;
+      const auto line = 1 + std::count(text.begin(), text.begin() + it->position(), '\n');
+      faults.push_back(at(path, static_cast<int>(line)) + ": " + word + " is not in " + table);
+    }
+  }
+  return faults;
+}
+
 Faults brokenLinks(const Sources& sources) {
   static const std::regex link(R"(\]\(([A-Za-z0-9_./-]+)(#[^)]*)?\))");
   Faults faults;

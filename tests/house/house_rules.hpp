@@ -35,6 +35,9 @@ Faults headersWithoutPragmaOnce(const Sources& sources);
 Faults longFiles(const Sources& sources, int maxLines);
 Faults unfinishedWork(const Sources& sources);
 
+/// Each kind of problem that scene/ tells stands in scene/problem_kinds.cpp.
+Faults problemsWithoutMeaning(const Sources& sources);
+
 /// Links of the Markdown pages to files of the repository that are not there.
 Faults brokenLinks(const Sources& sources);
 

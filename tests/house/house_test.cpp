@@ -57,6 +57,11 @@ TEST(House, NothingIsLeftUnfinished) {
   EXPECT_EQ(faults, Faults{}) << listed(faults);
 }
 
+TEST(House, EveryProblemHasAMeaning) {
+  const Faults faults = problemsWithoutMeaning(repository());
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+}
+
 TEST(House, LinksLeadSomewhere) {
   const Faults faults = brokenLinks(repository());
   EXPECT_EQ(faults, Faults{}) << listed(faults);
@@ -80,6 +85,17 @@ TEST(HouseRules, ARoomOfTheSceneMayIncludeOnlyWhatItIsToldTo) {
                          "#include \"scene/model.hpp\"\n#include \"scene/world.hpp\"\n"}};
   EXPECT_EQ(includeDirections(sources),
             Faults{"scene/import/ifc/facts.cpp:2: scene/import/ may not include scene/world.hpp"});
+}
+
+TEST(HouseRules, AProblemThatIsNotExplainedIsAFault) {
+  const Sources sources{
+      {"scene/problem_kinds.cpp", "ProblemKind{\"far_object\", true, \"far\"}\n"},
+      {"scene/import/one.cpp", "problems.add(\"far_object\", name);\nx({\n\"un_told\", 1});\n"},
+      {"scene/import/two.cpp", "addProblem(model_,\n  \"no_words\", name);\n"},
+      {"scene/import/three.cpp", "facts.problems.push_back(\n  {\"no_sense\", 1, name});\n"}};
+  EXPECT_EQ(problemsWithoutMeaning(sources),
+            (Faults{"scene/import/three.cpp:1: \"no_sense\" is not in scene/problem_kinds.cpp",
+                    "scene/import/two.cpp:1: \"no_words\" is not in scene/problem_kinds.cpp"}));
 }
 
 TEST(HouseRules, ProtocolKnowsNobody) {

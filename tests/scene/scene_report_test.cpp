@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "scene/problem_kinds.hpp"
 #include "tests/scene/box_scene.hpp"
 
 namespace enfilade::scene {
@@ -69,9 +70,11 @@ TEST(SceneReport, TellsWhatIsOddWithItsFirstExample) {
 }
 
 TEST(SceneReport, SpacesThatAreAirAreNotedAndNothingIsWrongWithThem) {
-  EXPECT_TRUE(isNote({"skipped_spaces", 3, "hall"}));
-  EXPECT_TRUE(isNote({"skipped_openings", 1, "door's"}));
-  EXPECT_FALSE(isNote({"uncut_opening", 1, "door"}));
+  EXPECT_TRUE(kindOf({"skipped_spaces", 3, "hall"}).note);
+  EXPECT_TRUE(kindOf({"skipped_openings", 1, "door's"}).note);
+  EXPECT_FALSE(kindOf({"uncut_opening", 1, "door"}).note);
+  EXPECT_NE(kindOf({"uncut_opening", 1, "door"}).meaning, "");
+  EXPECT_EQ(kindOf({"of_a_later_version", 1, ""}).meaning, "");
 }
 
 }  // namespace

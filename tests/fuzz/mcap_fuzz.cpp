@@ -1,0 +1,85 @@
+// MCAP files. The first byte tells what the rest is: a file (even), or the records of a chunk (odd)
+// that is wrapped into a file whose CRC fits, since hardly a changed byte gets past one.
+#include <string>
+#include <vector>
+
+#include "protocol/mcap/indexed_reader.hpp"
+#include "protocol/mcap/reader.hpp"
+#include "tests/fuzz/memory_file.hpp"
+
+namespace enfilade::fuzz {
+namespace {
+
+using namespace protocol::mcap;
+
+/// What a reader got, and whether it came to the end of a file that its writer had closed.
+struct Read {
+  std::vector<std::string> messages;
+  bool whole = false;
+};
+
+std::string textOf(const Message& message) {
+  return message.channel->topic + '\n' + std::to_string(message.time) + '\n' +
+         std::string(message.data);
+}
+
+Read frontToBack(const std::filesystem::path& file) {
+  Read read;
+  try {
+    Reader reader(file);
+    while (const auto message = reader.next()) read.messages.push_back(textOf(*message));
+    read.whole = reader.closed();
+  } catch (const RecordingError& error) {
+    require(error.what()[0] != '\0', "an error says what is wrong");
+  }
+  return read;
+}
+
+Read byIndex(const std::filesystem::path& file) {
+  Read read;
+  try {
+    IndexedReader reader(file);
+    for (std::size_t chunk = 0; chunk < reader.chunks().size(); ++chunk) {
+      reader.open(chunk);
+      Message message;
+      while (reader.next(message)) read.messages.push_back(textOf(message));
+    }
+    read.whole = reader.closed();
+  } catch (const RecordingError& error) {
+    require(error.what()[0] != '\0', "an error says what is wrong");
+  }
+  return read;
+}
+
+/// A file that was cut off after its first chunk, which is not packed.
+std::vector<std::uint8_t> fileAround(std::string_view records) {
+  std::string head, chunk, file(kMagic);
+  putString(head, "");
+  putString(head, "fuzz");
+  putNumber(chunk, std::uint64_t{0});
+  putNumber(chunk, ~std::uint64_t{0} >> 1);
+  putNumber(chunk, static_cast<std::uint64_t>(records.size()));
+  putNumber(chunk, crcOf(records));
+  putString(chunk, "");
+  putNumber(chunk, static_cast<std::uint64_t>(records.size()));
+  chunk.append(records);
+  putRecord(file, Opcode::header, head);
+  putRecord(file, Opcode::chunk, chunk);
+  return {file.begin(), file.end()};
+}
+
+}  // namespace
+
+void tryBytes(std::span<const std::uint8_t> bytes) {
+  if (bytes.empty()) return;
+  const bool wrapped = bytes[0] & 1;
+  bytes = bytes.subspan(1);
+  const std::string_view records(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const MemoryFile file(wrapped ? fileAround(records)
+                                : std::vector<std::uint8_t>(bytes.begin(), bytes.end()));
+  const Read whole = frontToBack(file.path()), sought = byIndex(file.path());
+  if (whole.whole && sought.whole)
+    require(whole.messages == sought.messages, "both readers read the same");
+}
+
+}  // namespace enfilade::fuzz

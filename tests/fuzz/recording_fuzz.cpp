@@ -1,0 +1,119 @@
+// Recordings whose messages are any: a sequence of items, each with its kind (a byte) and its
+// length (two bytes, little-endian) before it. They stand behind the true start of a small room,
+// and are read as `diff`, `--verify` and a seek read them.
+#include <spdlog/spdlog.h>
+
+#include "protocol/framing.hpp"
+#include "scene/checkpoint/checkpoint.hpp"
+#include "server/diff/recorded_walk.hpp"
+#include "server/playback/playback.hpp"
+#include "server/recorded_world.hpp"
+#include "tests/fuzz/memory_file.hpp"
+#include "tests/server/body_room.hpp"
+
+namespace enfilade::fuzz {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+using protocol::RecordingWriter;
+using protocol::mcap::RecordingError;
+
+constexpr std::size_t kMostItems = 64;  // of one input: a finding should be small
+constexpr std::uint64_t kMostTicks = 64;
+
+std::shared_ptr<const scene::Scene> room() {
+  spdlog::set_level(spdlog::level::off);
+  static const std::shared_ptr<const scene::Scene> one = server::testing::bodyRoom();
+  return one;
+}
+
+/// As the room's recording begins.
+v1::RecordingStart trueStart() {
+  const MemoryFile file;
+  server::RecordingOptions options;
+  options.choice.file = file.path();
+  server::RecordedWorld world{scene::World(room())};
+  world.record(options);
+  world.tick();
+  world.recorder()->close();
+  return protocol::SeekableRecording(file.path()).start();
+}
+
+template <class Message>
+Message parsed(Bytes bytes) {
+  Message message;
+  message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+  return message;
+}
+
+void writeItem(RecordingWriter& file, std::uint8_t kind, Bytes bytes, double time) {
+  switch (kind % 6) {
+    case 0: {
+      static const v1::RecordingStart start = trueStart();
+      v1::RecordingStart changed = start;
+      changed.MergeFrom(parsed<v1::RecordingStart>(bytes));
+      return file.write(changed, time);
+    }
+    case 1:
+      return file.write(parsed<v1::RecordedCommands>(bytes), time);
+    case 2:
+      return file.write(parsed<v1::TickEvents>(bytes));
+    case 3:
+      return file.write(parsed<v1::State>(bytes));
+    case 4:
+      return file.write(parsed<v1::RecordedNames>(bytes));
+    default:
+      file.write(parsed<v1::RecordedCheckpoint>(bytes), time);
+  }
+}
+
+void writeItems(const std::filesystem::path& path, Bytes bytes) {
+  constexpr std::size_t kHead = 3;
+  RecordingWriter file(path, "fuzz");
+  writeItem(file, 0, {}, 0);
+  for (std::size_t count = 0; bytes.size() >= kHead && count < kMostItems; ++count) {
+    const std::uint8_t kind = bytes[0];
+    const std::size_t length = bytes[1] | static_cast<std::size_t>(bytes[2]) << 8;
+    bytes = bytes.subspan(kHead);
+    const Bytes part = bytes.first(std::min(length, bytes.size()));
+    bytes = bytes.subspan(part.size());
+    writeItem(file, kind, part, static_cast<double>(count) / 60);
+  }
+  file.close();
+}
+
+template <class Work>
+void readBy(const Work& work) {
+  try {
+    work();
+  } catch (const RecordingError& error) {
+    require(error.what()[0] != '\0', "an error says what is wrong");
+  } catch (const scene::CheckpointError&) {
+  } catch (const server::Diverged& diverged) {
+    require(!server::textOf(diverged).empty(), "it says what differs");
+  }
+}
+
+}  // namespace
+
+void tryBytes(Bytes bytes) {
+  const MemoryFile file;
+  try {
+    writeItems(file.path(), bytes);
+  } catch (const RecordingError&) {
+    return;  // times that no file can have
+  }
+  readBy([&] { server::readWalk(file.path()); });
+  readBy([&] {
+    server::Playback playback(file.path());
+    scene::World world = playback.worldAfter(playback.firstTick(), room());
+    for (std::uint64_t i = 0; i < kMostTicks && playback.step(world); ++i) continue;
+  });
+  readBy([&] {
+    server::Playback playback(file.path());
+    if (playback.lastTick() - playback.firstTick() < kMostTicks)
+      playback.worldAfter(playback.lastTick(), room());
+  });
+}
+
+}  // namespace enfilade::fuzz
