@@ -192,9 +192,12 @@ Shape pottedPlantShape(Random& random) {
     const Vec3 across{-0.06 * out.y(), 0, 0.06 * out.x()};
     const Vec3 down{0, -0.012, 0};
     const Paint leaf = kLeaves[random.below(3)];
-    const Vec3 a = bend - across, b = bend + across, c = bend + down;
-    for (const Vec3& end : {root, tip}) {  // two closed blades that meet at the bend
-      const Vec3 &p = end == root ? a : b, &q = end == root ? b : a;
+    // Two closed blades. They lap at the bend: if they met, the face there would stand twice.
+    const Vec3 lap = 0.002 * (bend - root).normalized();
+    for (const Vec3& end : {root, tip}) {
+      const double side = end == root ? -1 : 1;
+      const Vec3 middle = bend - side * lap;
+      const Vec3 p = middle + side * across, q = middle - side * across, c = middle + down;
       addTriangle(s, end, q, p, leaf);
       addTriangle(s, end, p, c, leaf);
       addTriangle(s, end, c, q, leaf);

@@ -172,8 +172,10 @@ Shape frameShape(double w, double h, Paint paint) {
   Shape s;
   addBox(s, {-0.003, -h, -w}, {out, -h + bar, w}, paint);
   addBox(s, {-0.003, h - bar, -w}, {out, h, w}, paint);
-  addBox(s, {-0.003, -h + bar, -w}, {out, h - bar, -w + bar}, paint);
-  addBox(s, {-0.003, -h + bar, w - bar}, {out, h - bar, w}, paint);
+  // A millimetre shallower: boxes that shared an edge would bound no solid each.
+  const double shallower = out - 0.001;
+  addBox(s, {-0.002, -h + bar, -w + 0.001}, {shallower, h - bar, -w + bar}, paint);
+  addBox(s, {-0.002, -h + bar, w - bar}, {shallower, h - bar, w - 0.001}, paint);
   return s;
 }
 

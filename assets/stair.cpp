@@ -193,7 +193,7 @@ void addLift(Sketch& sketch) {
   addBox(cabin, {-hx, -0.02, -hz}, {hx, 0.001, hz}, Paint::slateTile);
   addBox(cabin, {-hx, 0, -hz}, {-hx + d, 2.3, hz}, Paint::steel);
   addBox(cabin, {hx - d, 0, -hz}, {hx, 2.3, hz}, Paint::steel);
-  addBox(cabin, {-hx + d, 0, -hz}, {hx - d, 2.3, -hz + d}, Paint::chrome);
+  addBox(cabin, {-hx + d, 0, -hz + 0.001}, {hx - d, 2.3, -hz + d}, Paint::chrome);
   addBox(cabin, {-hx, 2.298, -hz}, {hx, 2.36, hz}, Paint::steel);
   addBox(cabin, {-0.3, 2.28, -0.3}, {0.3, 2.299, 0.3}, Paint::lampGlow);
   addRod(cabin, {-hx + 0.1, 0.95, -hz + 0.08}, {hx - 0.1, 0.95, -hz + 0.08}, 0.015, 8,

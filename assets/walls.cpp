@@ -191,8 +191,9 @@ void addLeaf(Sketch& sketch, const std::string& path, const Leaf& leaf) {
     const double stile = 0.10;
     addBox(s, {0.004, y0, -kHalf}, {stile, h, kHalf}, Paint::doorWood);
     addBox(s, {w - stile, y0, -kHalf}, {w, h, kHalf}, Paint::doorWood);
-    addBox(s, {stile, y0, -kHalf}, {w - stile, 0.35, kHalf}, Paint::doorWood);
-    addBox(s, {stile, h - stile, -kHalf}, {w - stile, h, kHalf}, Paint::doorWood);
+    const double rail = kHalf - 0.001;  // shallower than the stiles, so that no edge is shared
+    addBox(s, {stile, y0, -rail}, {w - stile, 0.35, rail}, Paint::doorWood);
+    addBox(s, {stile, h - stile, -rail}, {w - stile, h, rail}, Paint::doorWood);
     addBox(s, {stile - 0.005, 0.345, -0.004}, {w - stile + 0.005, h - stile + 0.005, 0.004},
            Paint::glass);
   } else {

@@ -12,6 +12,8 @@ constexpr std::array kKinds{
     // of the file
     ProblemKind{"cut_off_file", kWrong, "the file ends too early; copy or export it again"},
     ProblemKind{"damaged_statement", kWrong, "lines that are not STEP were left out"},
+    ProblemKind{"ifc_reader_absent", kWrong,
+                "a reader is not installed and another one read the file; ./dev installs all"},
     ProblemKind{"ifc_reader_failed", kWrong,
                 "a reader gave up and another one read the file; --ifc-reader chooses one"},
     ProblemKind{"mended_text", kWrong, "the text was mended in memory; export it again"},

@@ -1,6 +1,6 @@
 // Checkpoints, with a checksum that fits: they make a world that ticks, or none. The first byte
-// tells whether the rest stands for a checkpoint's bytes (even), or is laid over those of a busy
-// room (odd: a place, two bytes, and what stands there, again and again).
+// tells whether the rest stands for a world's bytes (even), or is laid over those of a busy room's
+// checkpoint (odd: a place, two bytes, and what stands there, again and again).
 #include <vector>
 
 #include "scene/checkpoint/checkpoint.hpp"
@@ -33,9 +33,24 @@ std::vector<std::uint8_t> busyRoom() {
   return scene::checkpointOf(world);
 }
 
+const std::vector<std::uint8_t>& genuine() {
+  static const std::vector<std::uint8_t> one = busyRoom();
+  return one;
+}
+
+/// What it is, the version, the scene, the length of the world, the world, room for the checksum.
+std::vector<std::uint8_t> wrapped(Bytes world) {
+  constexpr std::size_t kWord = 8;
+  std::vector<std::uint8_t> bytes(genuine().begin(), genuine().begin() + 3 * kWord);
+  for (std::size_t i = 0; i < kWord; ++i)
+    bytes.push_back(static_cast<std::uint8_t>(world.size() >> (8 * i)));
+  bytes.insert(bytes.end(), world.begin(), world.end());
+  bytes.resize(bytes.size() + kWord);
+  return bytes;
+}
+
 std::vector<std::uint8_t> overlaid(Bytes changes) {
-  static const std::vector<std::uint8_t> busy = busyRoom();
-  std::vector<std::uint8_t> bytes = busy;
+  std::vector<std::uint8_t> bytes = genuine();
   for (; changes.size() >= 3; changes = changes.subspan(3))
     bytes[(changes[0] | std::size_t{changes[1]} << 8) % bytes.size()] = changes[2];
   return bytes;
@@ -46,8 +61,7 @@ std::vector<std::uint8_t> overlaid(Bytes changes) {
 void tryBytes(Bytes bytes) {
   if (bytes.empty()) return;
   const Bytes rest = bytes.subspan(1);
-  std::vector<std::uint8_t> checkpoint =
-      bytes[0] & 1 ? overlaid(rest) : std::vector<std::uint8_t>(rest.begin(), rest.end());
+  std::vector<std::uint8_t> checkpoint = bytes[0] & 1 ? overlaid(rest) : wrapped(rest);
   scene::sealCheckpoint(checkpoint);
   try {
     scene::World world = scene::worldFrom(room(), checkpoint);

@@ -32,6 +32,7 @@ v1::RecordingStart trueStart() {
   const MemoryFile file;
   server::RecordingOptions options;
   options.choice.file = file.path();
+  options.model.file = "room.obj";
   server::RecordedWorld world{scene::World(room())};
   world.record(options);
   world.tick();
