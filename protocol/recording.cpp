@@ -32,12 +32,23 @@ mcap::ChannelSpec channelOf(const std::string& topic, const pb::Descriptor& mess
   return {topic, "protobuf", message.full_name(), "protobuf", set.SerializeAsString()};
 }
 
+/// Its tick's time, of the messages that have one.
+template <class Message>
+bool timeIsRight(const Message& message) {
+  if constexpr (requires { message.time(); })
+    return std::isfinite(message.time()) && message.time() >= 0;
+  return true;
+}
+
 template <class Message>
 RecordedItem parsed(const mcap::Message& from, const std::filesystem::path& file) {
   Message message;
   if (!message.ParseFromArray(from.data.data(), static_cast<int>(from.data.size())))
     throw mcap::RecordingError(file.string() + ": a message of " + from.channel->topic +
                                " cannot be read");
+  if (!timeIsRight(message))
+    throw mcap::RecordingError(file.string() + ": a message of " + from.channel->topic +
+                               " has a time that is none");
   return message;
 }
 

@@ -350,12 +350,22 @@ bool WalkDifference::none() const {
   return happenings.empty() && orders.empty() && clearances.empty() && ways.empty();
 }
 
+/// Of a recording that was cut off nobody knows how it went on: neither is the other one's rest
+/// compared.
+void readBoth(const std::filesystem::path& before, const std::filesystem::path& after,
+              WalkDifference& into) {
+  into.before = readWalk(before);
+  into.after = readWalk(after);
+  const WalkMoment endBefore = endOf(into.before), endAfter = endOf(into.after);
+  if (!into.after.closed && endAfter < endBefore) into.before = readWalk(before, endAfter);
+  if (!into.before.closed && endBefore < endAfter) into.after = readWalk(after, endBefore);
+}
+
 WalkDifference compareWalks(const std::filesystem::path& before, const std::filesystem::path& after,
                             double tolerance) {
   WalkDifference difference;
   difference.tolerance = tolerance;
-  difference.before = readWalk(before);
-  difference.after = readWalk(after);
+  readBoth(before, after, difference);
   auto &was = difference.before.runs, &is = difference.after.runs;
   const Names names(difference.before, difference.after);
   for (std::size_t run = 0; run < std::min(was.size(), is.size()); ++run)

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "protocol/mcap/records.hpp"
 #include "server/diff/walk_difference.hpp"
 
 namespace enfilade::server {
@@ -81,6 +82,8 @@ Pairs matchedHappenings(const std::vector<Happening>& before, const std::vector<
       a.last = std::min(a.last, firstAfter(after, until));
       b.last = std::max(b.last, b.first);
       a.last = std::max(a.last, a.first);
+      if (b.last == b.first && a.last == a.first)  // as no recorder writes them: times that descend
+        throw protocol::mcap::RecordingError("the recorded times do not ascend");
     }
     align(before, b, after, a, pairs);
     b.first = b.last;

@@ -1,6 +1,8 @@
 #include "server/diff/recorded_walk.hpp"
 
+#include <set>
 #include <tuple>
+#include <utility>
 
 #include "protocol/recording.hpp"
 #include "server/world_messages.hpp"
@@ -23,16 +25,38 @@ Happening happeningOf(const Event& event) {
   return happening;
 }
 
+/// As seen from `b`.
+void turnRound(Event& event) {
+  std::swap(*event.mutable_a_name(), *event.mutable_b_name());
+  std::swap(*event.mutable_point_a(), *event.mutable_point_b());
+  v1::Vec3& normal = *event.mutable_normal();
+  normal.set_x(-normal.x());
+  normal.set_y(-normal.y());
+  normal.set_z(-normal.z());
+  const std::uint32_t a = event.a();
+  event.set_a(event.b());
+  event.set_b(a);
+}
+
 /// Gathers a run, message by message.
 class RunGatherer {
  public:
   explicit RunGatherer(const v1::RecordingStart& start) {
     run_.start = start;
     run_.hash = start.state_hash();
+    for (const v1::Body& body : start.scene().bodies())
+      if (body.kind() == "rigid") rigid_.insert(body.name());
   }
 
   void add(const v1::TickEvents& events) {
-    for (const Event& event : events.contacts()) add(event);
+    for (const Event& event : events.contacts()) {
+      Event ordered = event;
+      // Of two free bodies the ids tell who comes first, and in another model they may be others.
+      if (rigid_.contains(event.a_name()) && rigid_.contains(event.b_name()) &&
+          event.b_name() < event.a_name())
+        turnRound(ordered);
+      add(ordered);
+    }
     for (const v1::Notice& notice : events.notices()) add(notice, events.time());
   }
 
@@ -54,9 +78,12 @@ class RunGatherer {
   RecordedRun finish() { return std::move(run_); }
 
  private:
-  /// What a stands on: b lies below, no steeper than ground may be.
+  /// One stands on the other: b lies below, no steeper than ground may be; of two free bodies
+  /// either.
   bool isGround(const Event& event) const {
-    return -event.normal().y() >= run_.start.lengths().walkable_normal_y();
+    const double down = -event.normal().y();
+    const double steepest = run_.start.lengths().walkable_normal_y();
+    return down >= steepest || (-down >= steepest && rigid_.contains(event.b_name()));
   }
 
   void add(const Event& event) {
@@ -128,6 +155,7 @@ class RunGatherer {
   static bool isLeaving(const v1::Notice& notice) { return notice.kind() == v1::Notice::KIND_LEFT; }
 
   RecordedRun run_;
+  std::set<std::string> rigid_;         ///< names of the free bodies
   std::map<std::uint32_t, Vec3> feet_;  ///< by entity, as of the last tick
   /// Where a contact that lasts stands, by the entities; lists of a std::map's values stay.
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::pair<std::vector<Happening>*, std::size_t>>
@@ -143,7 +171,11 @@ void addNames(RecordedWalk& walk, const v1::RecordedNames& names) {
 
 }  // namespace
 
-RecordedWalk readWalk(const std::filesystem::path& file) {
+WalkMoment endOf(const RecordedWalk& walk) {
+  return {walk.runs.size() - 1, walk.runs.back().ticks};
+}
+
+RecordedWalk readWalk(const std::filesystem::path& file, std::optional<WalkMoment> until) {
   protocol::RecordingReader reader(file);
   RecordedWalk walk;
   walk.file = file;
@@ -156,11 +188,17 @@ RecordedWalk readWalk(const std::filesystem::path& file) {
     }
     if (!run) throw RecordingError(file.string() + ": does not begin with its scene");
     if (const auto* names = std::get_if<v1::RecordedNames>(&*item)) addNames(walk, *names);
-    if (const auto* events = std::get_if<v1::TickEvents>(&*item)) run->add(*events);
-    if (const auto* state = std::get_if<v1::State>(&*item)) run->add(*state);
+    const auto wanted = [&](const auto& told) {
+      return !until || WalkMoment{walk.runs.size(), told.tick()} <= *until;
+    };
+    const auto* events = std::get_if<v1::TickEvents>(&*item);
+    if (events && wanted(*events)) run->add(*events);
+    const auto* state = std::get_if<v1::State>(&*item);
+    if (state && wanted(*state)) run->add(*state);
   }
   if (!run) throw RecordingError(file.string() + ": no recording of Enfilade begins in it");
   walk.runs.push_back(run->finish());
+  while (until && walk.runs.size() > until->run + 1) walk.runs.pop_back();
   walk.closed = reader.closed();
   walk.wholeBytes = reader.wholeBytes();
   return walk;

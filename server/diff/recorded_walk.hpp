@@ -2,6 +2,7 @@
 // orders ended, how near things came.
 #pragma once
 
+#include <compare>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -79,7 +80,16 @@ struct RecordedWalk {
   std::optional<std::unordered_map<std::string, std::string>> objects;
 };
 
-/// Throws protocol::mcap::RecordingError.
-RecordedWalk readWalk(const std::filesystem::path& file);
+/// A moment of a recording; orders by run, then by tick.
+struct WalkMoment {
+  std::size_t run = 0;
+  std::uint64_t tick = 0;
+  auto operator<=>(const WalkMoment&) const = default;
+};
+WalkMoment endOf(const RecordedWalk& walk);
+
+/// `until`: what comes after is left out. Throws protocol::mcap::RecordingError.
+RecordedWalk readWalk(const std::filesystem::path& file,
+                      std::optional<WalkMoment> until = std::nullopt);
 
 }  // namespace enfilade::server

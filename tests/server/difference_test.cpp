@@ -1,8 +1,9 @@
-// Which contacts of two walks are the same one.
+// Which contacts of two walks are the same one, and what is compared of two recordings.
 #include <gtest/gtest.h>
 
 #include <random>
 
+#include "protocol/recording.hpp"
 #include "server/diff/walk_difference.hpp"
 
 namespace enfilade::server {
@@ -95,6 +96,116 @@ TEST(MatchedHappenings, LongListsAreCutIntoPieces) {
     EXPECT_LT(pairs[i - 1].first, pairs[i].first);
     EXPECT_LT(pairs[i - 1].second, pairs[i].second);
   }
+}
+
+std::filesystem::path fileFor(const std::string& name) {
+  return std::filesystem::path(::testing::TempDir()) / ("enfilade_difference_" + name + ".mcap");
+}
+
+constexpr double kTick = 1.0 / 60;
+
+/// A walk of so many ticks. Ann arrives at tick 90, and a contact of two crates begins at tick 10.
+class Recorded {
+ public:
+  Recorded(const std::string& name, const v1::ContactEvent& contact)
+      : file_(fileFor(name)), writer_(file_, "test") {
+    v1::RecordingStart start;
+    start.mutable_lengths()->set_walkable_normal_y(0.6);
+    for (const char* body : {"barrel", "crate"}) {
+      v1::Body& free = *start.mutable_scene()->add_bodies();
+      free.set_name(body);
+      free.set_kind("rigid");
+    }
+    writer_.write(start);
+    contact_ = contact;
+  }
+
+  Recorded& go(std::uint64_t ticks) {
+    for (; tick_ < ticks; writeTick()) ++tick_;
+    writer_.flush();
+    return *this;
+  }
+  const std::filesystem::path& close() {
+    writer_.close();
+    return file_;
+  }
+  /// As a writer leaves it that is killed now.
+  std::filesystem::path cutOff() const {
+    auto cut = file_;
+    cut.replace_extension(".cut.mcap");
+    std::filesystem::copy_file(file_, cut, std::filesystem::copy_options::overwrite_existing);
+    return cut;
+  }
+
+ private:
+  void writeTick() {
+    v1::TickEvents events;
+    events.set_tick(tick_);
+    events.set_time(static_cast<double>(tick_) * kTick);
+    if (tick_ == 10) {
+      *events.add_contacts() = contact_;
+      events.mutable_contacts(0)->set_tick(tick_);
+      events.mutable_contacts(0)->set_time(events.time());
+    }
+    if (tick_ == 90) {
+      v1::Notice& arrived = *events.add_notices();
+      arrived.set_kind(v1::Notice::KIND_ARRIVED);
+      arrived.set_avatar("ann");
+      arrived.set_tick(tick_);
+    }
+    writer_.write(events);
+    v1::State state;
+    state.set_tick(tick_);
+    state.set_time(events.time());
+    writer_.write(state);
+  }
+
+  std::filesystem::path file_;
+  protocol::RecordingWriter writer_;
+  v1::ContactEvent contact_;
+  std::uint64_t tick_ = 0;
+};
+
+/// `a` stands beside `b`, at x = 1, where the normal from a to b goes along x by `sign`.
+v1::ContactEvent touch(const char* a, const char* b, double sign) {
+  v1::ContactEvent event;
+  event.set_kind(v1::ContactEvent::KIND_BEGIN);
+  event.set_a(5);
+  event.set_b(6);
+  event.set_a_name(a);
+  event.set_b_name(b);
+  event.mutable_point_a()->set_x(1);
+  event.mutable_point_b()->set_x(1);
+  event.mutable_normal()->set_x(sign);
+  return event;
+}
+
+TEST(ComparedWalks, WhatARecordingThatWasCutOffCannotTellIsNotWorse) {
+  const v1::ContactEvent contact = touch("barrel", "crate", 1);
+  const auto whole = Recorded("whole", contact).go(120).close();
+  const auto cut = Recorded("killed", contact).go(50).cutOff();
+  for (const auto& difference : {compareWalks(whole, cut, 1e-3), compareWalks(cut, whole, 1e-3)}) {
+    EXPECT_TRUE(difference.none());
+    EXPECT_EQ(difference.worse, 0u);
+    EXPECT_EQ(difference.before.runs.back().ticks, 50u);
+    EXPECT_EQ(difference.after.runs.back().ticks, 50u);
+    EXPECT_NE(difference.before.closed, difference.after.closed);
+  }
+  // One that was ended in order did end: Ann never arrived.
+  const auto shorter = Recorded("shorter", contact).go(50).close();
+  EXPECT_EQ(compareWalks(whole, shorter, 1e-3).worse, 1u);
+}
+
+TEST(ComparedWalks, WhichOfTwoFreeBodiesIsToldFirstIsNoDifference) {
+  const auto before = Recorded("barrel_first", touch("barrel", "crate", 1)).go(20).close();
+  const auto after = Recorded("crate_first", touch("crate", "barrel", -1)).go(20).close();
+  EXPECT_TRUE(compareWalks(before, after, 1e-3).none());
+}
+
+TEST(ComparedWalks, TimesThatDescendAreRefused) {
+  std::vector<Happening> list;
+  for (int i = 0; i < 5000; ++i) list.push_back(at(0, 5000 - i));
+  EXPECT_THROW(matchedHappenings(list, list), protocol::mcap::RecordingError);
 }
 
 }  // namespace
