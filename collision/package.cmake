@@ -7,6 +7,7 @@ include(CMakePackageConfigHelpers)
 set(public_headers
   bounding_box.hpp box_tree.hpp broad_phase_audit.hpp contact_manifold.hpp continuous.hpp
   continuous_pose.hpp hull.hpp hull_planes.hpp mesh_probe.hpp mesh_query.hpp narrow_phase.hpp
+  nearest_parts.hpp
   part_tree.hpp penetration_depth.hpp refine.hpp sort_and_sweep.hpp time_of_impact.hpp turning_sweep.hpp
   triangle_tree.hpp types.hpp wake_up_heap.hpp)
 target_sources(enfilade_collision PUBLIC

@@ -94,6 +94,8 @@ void AsyncClient::State::takeUnasked(Received received) {
     handlers.events(message.events());
   } else if (message.has_state() && handlers.state) {
     handlers.state(message.state());
+  } else if (message.has_replay() && handlers.replay) {
+    handlers.replay(message.replay());
   } else if (message.has_frame() && handlers.frame) {
     handlers.frame(message.frame(), std::move(received.attachment));
   }
@@ -130,13 +132,13 @@ AsyncClient& AsyncClient::operator=(AsyncClient&& other) noexcept {
 
 void AsyncClient::request(v1::ClientMessage message, OnReply onReply) {
   State& state = *state_;
+  if (state.over) return onReply(lostReply(state.why));
   if (state.awaited.size() >= state.options.requestsUnderWay ||
       state.connection.unsent() > state.options.unsentBytes) {
     throw TooManyRequests(state.connection.peer() + ": " + std::to_string(state.awaited.size()) +
                           " requests and " + std::to_string(state.connection.unsent()) +
                           " bytes are under way: let replies come first");
   }
-  if (state.over) return onReply(lostReply(state.why));
   message.set_request_id(++state.lastId);
   state.connection.send(message);
   state.awaited.push_back({state.lastId, std::move(onReply)});

@@ -46,6 +46,7 @@ struct AsyncHandlers {
   std::function<void(const v1::TickEvents&)> events;
   std::function<void(const v1::State&)> state;
   std::function<void(const v1::Frame&, std::vector<std::uint8_t> pixels)> frame;  ///< of a watch
+  std::function<void(const v1::Replay&)> replay;  ///< of a world that plays a recording
   /// The last call: the connection is over. Requests without an answer were told before.
   std::function<void(const v1::Error& why)> closed;
 };

@@ -262,6 +262,22 @@ v1::SetClockReply Client::setClock(const v1::SetClock& clock) {
   return std::move(*reply.mutable_set_clock());
 }
 
+v1::SeekReply Client::seek(std::uint64_t tick) {
+  v1::ClientMessage message;
+  message.mutable_seek()->set_tick(tick);
+  v1::ServerMessage reply = request(std::move(message));
+  expectBody(reply, v1::ServerMessage::kSeek, "SeekReply");
+  return std::move(*reply.mutable_seek());
+}
+
+v1::TakeOverReply Client::takeOver(const std::string& avatar) {
+  v1::ClientMessage message;
+  message.mutable_take_over()->set_avatar(avatar);
+  v1::ServerMessage reply = request(std::move(message));
+  expectBody(reply, v1::ServerMessage::kTakeOver, "TakeOverReply");
+  return std::move(*reply.mutable_take_over());
+}
+
 v1::SubscribeReply Client::subscribe(const v1::Subscribe& subscription) {
   v1::ClientMessage message;
   *message.mutable_subscribe() = subscription;
@@ -311,6 +327,30 @@ v1::RayReply Client::rays(const v1::RayQuery& query, ReceivedScan* scan) {
     }
   }
   return std::move(*reply.mutable_rays());
+}
+
+v1::DistanceReply Client::distances(const v1::DistanceQuery& query) {
+  v1::ClientMessage message;
+  *message.mutable_distances() = query;
+  v1::ServerMessage reply = request(std::move(message));
+  expectBody(reply, v1::ServerMessage::kDistances, "DistanceReply");
+  return std::move(*reply.mutable_distances());
+}
+
+v1::TouchingReply Client::touching(const v1::TouchingQuery& query) {
+  v1::ClientMessage message;
+  *message.mutable_touching() = query;
+  v1::ServerMessage reply = request(std::move(message));
+  expectBody(reply, v1::ServerMessage::kTouching, "TouchingReply");
+  return std::move(*reply.mutable_touching());
+}
+
+v1::CannotTouchReply Client::cannotTouch(const v1::CannotTouchQuery& query) {
+  v1::ClientMessage message;
+  *message.mutable_cannot_touch() = query;
+  v1::ServerMessage reply = request(std::move(message));
+  expectBody(reply, v1::ServerMessage::kCannotTouch, "CannotTouchReply");
+  return std::move(*reply.mutable_cannot_touch());
 }
 
 std::vector<v1::Entity> Client::describe(std::span<const std::uint32_t> ids) {

@@ -67,16 +67,24 @@ class Client {
   std::optional<v1::Error> bodyCommand(const v1::BodyCommand& command);
   v1::StepReply step(std::uint32_t ticks = 1, bool withAvatars = false);
   v1::SetClockReply setClock(const v1::SetClock& clock);
+  /// Of a world that plays a recording. Contacts that end and begin by it are events that come
+  /// before the reply.
+  v1::SeekReply seek(std::uint64_t tick);
+  /// `avatar`: that becomes the client's; empty: none, the world alone leaves the recording.
+  v1::TakeOverReply takeOver(const std::string& avatar = {});
   v1::SubscribeReply subscribe(const v1::Subscribe& subscription);
   ReceivedFrame frame(const v1::FrameRequest& request);
   /// `scan` gets what the attachment holds when a scan was asked for.
   v1::RayReply rays(const v1::RayQuery& query, ReceivedScan* scan = nullptr);
+  v1::DistanceReply distances(const v1::DistanceQuery& query);
+  v1::TouchingReply touching(const v1::TouchingQuery& query);
+  v1::CannotTouchReply cannotTouch(const v1::CannotTouchQuery& query);
   std::vector<v1::Entity> describe(std::span<const std::uint32_t> ids);
   v1::Metrics metrics();
 
-  /// What came unasked, in order: TickEvents, State or Bye. takeEvents() gives what came before the
-  /// last reply and does not wait; nextEvent() waits up to `patience` for one. They are kept until
-  /// taken. After Bye the connection is broken, and the next call says so.
+  /// What came unasked, in order: TickEvents, State, Replay or Bye. takeEvents() gives what came
+  /// before the last reply and does not wait; nextEvent() waits up to `patience` for one. They are
+  /// kept until taken. After Bye the connection is broken, and the next call says so.
   std::deque<v1::ServerMessage> takeEvents();
   std::optional<v1::ServerMessage> nextEvent(std::chrono::milliseconds patience);
 

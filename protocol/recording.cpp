@@ -14,7 +14,6 @@ namespace {
 namespace pb = google::protobuf;
 
 constexpr const char* kCommands = "/enfilade/commands";
-constexpr const char* kEvents = "/enfilade/events";
 constexpr const char* kState = "/enfilade/state";
 constexpr const char* kNames = "/enfilade/names";
 
@@ -141,7 +140,7 @@ RecordingWriter::RecordingWriter(const std::filesystem::path& file, const std::s
     : file_(file, {.library = library, .replace = replace}),
       start_(file_.addChannel(channelOf(kStartTopic, *v1::RecordingStart::descriptor()))),
       commands_(file_.addChannel(channelOf(kCommands, *v1::RecordedCommands::descriptor()))),
-      events_(file_.addChannel(channelOf(kEvents, *v1::TickEvents::descriptor()))),
+      events_(file_.addChannel(channelOf(kEventsTopic, *v1::TickEvents::descriptor()))),
       state_(file_.addChannel(channelOf(kState, *v1::State::descriptor()))),
       names_(file_.addChannel(channelOf(kNames, *v1::RecordedNames::descriptor()))),
       checkpoint_(
@@ -197,7 +196,7 @@ std::optional<RecordedItem> itemFrom(const mcap::Message& message,
   const std::string& topic = message.channel->topic;
   if (topic == kStartTopic) return parsed<v1::RecordingStart>(message, file);
   if (topic == kCommands) return parsed<v1::RecordedCommands>(message, file);
-  if (topic == kEvents) return parsed<v1::TickEvents>(message, file);
+  if (topic == kEventsTopic) return parsed<v1::TickEvents>(message, file);
   if (topic == kState) return parsed<v1::State>(message, file);
   if (topic == kNames) return parsed<v1::RecordedNames>(message, file);
   if (topic == kCheckpointTopic) return parsed<v1::RecordedCheckpoint>(message, file);

@@ -56,6 +56,7 @@ using RecordedItem = std::variant<v1::RecordingStart, v1::RecordedCommands, v1::
 std::optional<RecordedItem> itemFrom(const mcap::Message& message,
                                      const std::filesystem::path& file);
 inline constexpr const char* kStartTopic = "/enfilade/start";
+inline constexpr const char* kEventsTopic = "/enfilade/events";
 inline constexpr const char* kCheckpointTopic = "/enfilade/checkpoint";
 
 /// Nanoseconds, as recordings have them.

@@ -179,6 +179,8 @@ class Run {
                                              : "blocked by " + notice.obstacle_name()) +
                  " at " + pointText(notice.position()));
         break;
+      case v1::Notice::KIND_DROPPED:
+        return;  // told with all that came to nothing
       default:
         break;
     }

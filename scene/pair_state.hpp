@@ -2,75 +2,57 @@
 // shape. Questions that somebody asks, not what the tick does: nothing here touches a world.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
-#include "collision/continuous.hpp"
-#include "collision/part_tree.hpp"
-#include "collision/refine.hpp"
-#include "scene/lengths.hpp"
-#include "scene/scene.hpp"
-#include "scene/snapshot.hpp"
+#include "scene/scene_index.hpp"
 
 namespace enfilade::scene {
-
-/// A scene as it is at a tick. Both outlive what is asked of them.
-struct SceneThen {
-  const Scene& scene;
-  const Snapshot& snapshot;
-};
-
-/// The entity with this id; of an object of a body the body. 0: none is there.
-EntityId entityWith(const SceneThen& then, EntityId id);
-/// By an avatar's or a body's name, or an object's path, in this order; 0: none is there.
-EntityId entityNamed(const SceneThen& then, const std::string& name);
-/// Its name, or its path; "" for none.
-std::string nameOf(const SceneThen& then, EntityId entity);
 
 /// Two that were compared, `a` and `b` as they were asked for.
 struct PairState {
   EntityId a = 0, b = 0;
   collision::Decision decision;  ///< of their nearest parts, from a to b, scene frame
-  double penetration = 0;        ///< metres; only when it was refined
+  double penetration = 0;        ///< metres, of those parts; only when it was refined
 };
 
-/// Why an answer cannot be given: the field ("a", "b" or "entity"), and a sentence.
+/// Why an answer cannot be given.
 struct NoAnswer {
-  std::string field, why;
+  enum class Why : std::uint8_t {
+    notSolid,   ///< there is nothing of it to be touched
+    tooComplex  ///< it needs more work than was left
+  };
+  Why why = Why::notSolid;
+  std::string field;  ///< "a", "b" or "entity"
+  std::string text;   ///< a clause that follows the name of the field
 };
 
-/// More pairs of parts whose boxes meet are not looked at: two large meshes in one place.
-inline constexpr std::size_t kMostPairsOfParts = 200'000;
+/// What one answer may cost: pairs of boxes that are looked at, decisions on parts more, numbers
+/// that are refined much more (the constants below); some 0.3 s of one processor.
+inline constexpr std::size_t kMostWork = 4'000'000;
+/// What one entity may cost of it among all that are near.
+inline constexpr std::size_t kMostWorkOfNear = 400'000;
+/// To refine the numbers of two parts; of two that penetrate, for each pair of their vertices, too.
+inline constexpr std::size_t kRefinementWork = 2000, kDepthWork = 150;
 
 /// The verdict on two different entities that are there, exact, with their distance. `refined`: the
-/// numbers as by collision::refine().
+/// numbers as by collision::refine(). Takes what it does from `work`.
 std::variant<PairState, NoAnswer> stateOfPair(const SceneThen& then, EntityId a, EntityId b,
-                                              bool refined = false);
+                                              bool refined, std::size_t& work);
 
 /// Everything solid that touches `entity`, or is nearer than `within` (metres, >= 0): the nearest
-/// first, then by id. What has too many parts near is left out of `found` and counted.
+/// first, then by id. What the work does not suffice for is left out of `found` and counted.
 struct Near {
   std::vector<PairState> found;
   std::size_t leftOut = 0;
 };
-std::variant<Near, NoAnswer> nearTo(const SceneThen& then, EntityId entity, double within);
+std::variant<Near, NoAnswer> nearTo(const SceneThen& then, EntityId entity, double within,
+                                    std::size_t& work);
 
-/// What is assumed of the time to come.
-enum class Assume : std::uint8_t {
-  presentMotion,  ///< velocity and spin stay; who falls falls on; joints do all that they may
-  anyCommand      ///< avatars, doors and lifts go as fast as they may be told to, at once
-};
-
-struct TimeApart {
-  PairState now;
-  collision::ClosingBounds closing;
-  double contact = 0;       ///< seconds before which they cannot touch; infinity: never
-  collision::WakeUp again;  ///< with the least time that is worth waiting
-};
-/// `least` >= 0, seconds.
-std::variant<TimeApart, NoAnswer> timeApart(const SceneThen& then, const Lengths& lengths,
-                                            EntityId a, EntityId b, Assume assume, double least);
+/// Of an entity that is there, with why not when it has no solid part.
+std::variant<Placed, NoAnswer> solidParts(const SceneThen& then, EntityId entity,
+                                          const char* field);
+NoAnswer tooComplex(const char* field);
 
 }  // namespace enfilade::scene

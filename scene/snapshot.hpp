@@ -27,6 +27,8 @@ struct MoveResult {
 struct JointView {
   double value = 0;        ///< radians or metres
   EntityId stoppedBy = 0;  ///< what one of the links met that it moves; 0: nothing
+  /// Metres: as the value changes by 1, no point that it moves goes farther, however others stand.
+  double lever = 0;
 };
 
 struct AvatarView {
@@ -40,6 +42,7 @@ struct AvatarView {
   bool flying = false;
   EntityId standsOn = 0;  ///< 0: on nothing
   double height = 1.75;   ///< metres, of the prism as it is now; 0 where parts make the shape
+  double standing = 0;    ///< metres, of the prism as it was spawned; 0 where parts make the shape
   MoveResult move;
   std::vector<JointView> joints;  ///< of a chain; else empty
 };

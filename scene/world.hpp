@@ -66,6 +66,7 @@ struct Notice {
   enum class Kind : std::uint8_t {
     spawned,  ///< at `position`
     refused,  ///< the order cannot be done: `text` says why; for Spawn the queue is dropped too
+    dropped,  ///< the order was taken out of the queue and is not done: `text` says by what
     arrived,  ///< the walk reached its end
     blocked,  ///< no progress for Lengths::patience; `obstacle` is what stopped it, or 0
     done,     ///< looked or waited

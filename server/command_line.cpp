@@ -8,6 +8,7 @@
 #include "scene/import/import_model.hpp"
 #include "scene/rotation.hpp"
 #include "server/capture/capture_arguments.hpp"
+#include "server/server_limits.hpp"
 #include "server/version.hpp"
 
 namespace enfilade::server {
@@ -209,6 +210,17 @@ void addBranch(CLI::App& verb, Arguments& into) {
       ->check(CLI::Validator(fileProblem, "SCRIPT"));
 }
 
+void addPlayed(CLI::App& serve, Arguments& into) {
+  serve.add_option("--from", into.from, "RECORDING in the place of SCENE: begin after this tick")
+      ->check(CLI::Validator(tickProblem, "TICK"));
+  serve.footer(
+      "RECORDING (MCAP) in the place of SCENE, or after the one scene that it is played in: "
+      "clients "
+      "play it, seek in it and take it over (protocol/PROTOCOL.md). --record then writes down what "
+      "branches off it: FILE, FILE-2 and so on, each a recording of its own. Ends with 4 where the "
+      "recording cannot be made again.");
+}
+
 void addRecording(CLI::App& verb, Arguments& into, const char* what) {
   CLI::Option* file = verb.add_option("--record", into.record.file, what)
                           ->check(CLI::Validator(fileProblem, "FILE"));
@@ -307,16 +319,68 @@ void branchFrom(const Arguments& read, ReplayCommand& command) {
   command.from = recorded.from.value_or(0);
 }
 
+/// What a recording says itself; empty: nothing of it was given.
+std::string recordedProblem(const CLI::App& verb) {
+  for (const char* option : {"--step-height", "--epsilon", "--slope", "--sliding", "--near-miss",
+                             "--unit", "--up", "--ifc-reader", "--ifc-doors"})
+    if (verb.count(option) > 0) return std::string(option) + " is the recording's to say";
+  return "";
+}
+
+ExitCode misused(const char* verb, const std::string& problem) {
+  std::cerr << "enfilade: " << problem << "\nenfilade " << verb << " --help tells what there is\n";
+  return ExitCode::usage;
+}
+
 /// What of a replay of a recording does not go with what; empty: all does.
 std::string branchProblem(const CLI::App& replay, const Arguments& read) {
   if (read.from.empty()) return read.then.empty() ? "" : "--then needs --from TICK";
   if (read.then.empty() && !read.verify)
     return "--from needs --verify, or --then SCRIPT that goes on from there";
   if (!read.then.empty() && read.verify) return "--then makes a new walk: it has nothing to verify";
-  for (const char* option :
-       {"--step-height", "--epsilon", "--slope", "--sliding", "--near-miss", "--unit", "--up"})
-    if (replay.count(option) > 0) return std::string(option) + " is the recording's to say";
-  return "";
+  return recordedProblem(replay);
+}
+
+/// What `serve` does not take beside a recording that it plays, or without one; empty: all does.
+std::string playedProblem(const CLI::App& serve, const ServeCommand& command) {
+  if (command.recording.empty())
+    return command.from ? "--from needs a recording in the place of SCENE" : "";
+  for (const std::filesystem::path& further : command.furtherScenes)
+    if (protocol::mcap::isMcap(further))
+      return further.string() +
+             ": one recording is played: `serve RECORDING [FURTHER..]`, or "
+             "`serve SCENE RECORDING` in a scene that it does not name";
+  return recordedProblem(serve);
+}
+
+/// A recording stands in the place of the scene, or alone after it.
+void playedFrom(const Arguments& read, ServeCommand& command) {
+  using protocol::mcap::isMcap;
+  if (!read.from.empty()) command.from = numberFrom<std::uint64_t>(read.from);
+  if (isMcap(command.model.file)) {
+    command.recording = std::exchange(command.model.file, {});
+  } else if (!command.furtherScenes.empty() && isMcap(command.furtherScenes.front())) {
+    command.recording = std::move(command.furtherScenes.front());
+    command.furtherScenes.erase(command.furtherScenes.begin());
+  }
+}
+
+std::variant<ProgramCommand, ExitCode> serveFrom(const CLI::App& serve, const Arguments& read,
+                                                 std::uint32_t audit) {
+  ServeCommand command{modelFrom(read.model),
+                       *endpointFrom(read.listen),
+                       audit,
+                       lengthsFrom(read),
+                       read.tokenFile,
+                       read.access,
+                       read.stopAtEndOfInput,
+                       drawingFrom(read),
+                       read.furtherScenes,
+                       recordingFrom(read)};
+  playedFrom(read, command);
+  if (const std::string problem = playedProblem(serve, command); !problem.empty())
+    return misused("serve", problem);
+  return command;
 }
 
 bool isRewalk(const Arguments& read) {
@@ -353,10 +417,7 @@ std::variant<ProgramCommand, ExitCode> replayFrom(const CLI::App& replay, const 
   std::string problem = branchProblem(replay, read);
   if (problem.empty() && isRewalk(read)) problem = rewalkProblem(replay);
   if (problem.empty() && !read.verify) problem = missingFrom(read).value_or("");
-  if (!problem.empty()) {
-    std::cerr << "enfilade: " << problem << "\nenfilade replay --help tells what there is\n";
-    return ExitCode::usage;
-  }
+  if (!problem.empty()) return misused("replay", problem);
   if (read.verify) return verifyFrom(read);
   if (isRewalk(read)) return rewalkFrom(read);
   ReplayCommand command{
@@ -387,8 +448,10 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("enfilade ") + kServerVersion);
   Arguments read;
-  CLI::App* serve = app.add_subcommand("serve", "Serve a scene to clients over TCP");
+  CLI::App* serve =
+      app.add_subcommand("serve", "Serve a scene, or a recording, to clients over TCP");
   addModel(*serve, read.model);
+  addPlayed(*serve, read);
   serve->add_option("FURTHER", read.furtherScenes,
                     "Further models: scenes of the same server, each with a world of its own");
   serve->add_option("--listen", read.listen, "Address and port; port 0 lets the system choose")
@@ -402,7 +465,9 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   addRenderer(*serve, read);
   addAudit(*serve, read);
   addMotion(*serve, read);
-  addRecording(*serve, read, "Write a recording (MCAP) of the world main to a new file");
+  addRecording(
+      *serve, read,
+      "Write a recording (MCAP) of the world main, or of a replay's branches, to a new file");
   CLI::App* replay =
       app.add_subcommand("replay", "Run a walk script, or a recorded walk, in a scene");
   addModel(*replay, read.model);
@@ -462,18 +527,14 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
               << "--help tells what there is\n";
     return ExitCode::usage;
   }
+  const std::size_t worlds = 1 + read.furtherScenes.size(), mostWorlds = ServerLimits{}.worlds;
+  if (*serve && worlds > mostWorlds) {
+    std::cerr << "enfilade: serve: " << worlds << " scenes are more than the " << mostWorlds
+              << " worlds of a server: give fewer, or start another server\n";
+    return ExitCode::usage;
+  }
   const std::uint32_t audit = numberFrom<std::uint32_t>(read.auditEvery).value_or(0);
-  if (*serve)
-    return ServeCommand{modelFrom(read.model),
-                        *endpointFrom(read.listen),
-                        audit,
-                        lengthsFrom(read),
-                        read.tokenFile,
-                        read.access,
-                        read.stopAtEndOfInput,
-                        drawingFrom(read),
-                        read.furtherScenes,
-                        recordingFrom(read)};
+  if (*serve) return serveFrom(*serve, read, audit);
   if (*replay) return replayFrom(*replay, read, audit);
   if (*capture)
     return CaptureCommand{modelFrom(read.model),

@@ -53,7 +53,7 @@ struct RecordingChoice {
 };
 
 struct ServeCommand {
-  ModelOptions model;
+  ModelOptions model;  ///< its file is empty where `recording` says which
   Endpoint listen{"127.0.0.1", 7878};
   std::uint32_t auditEvery = 0;  ///< ticks; 0: never
   scene::Lengths lengths;
@@ -63,6 +63,10 @@ struct ServeCommand {
   DrawingOptions drawing;
   std::vector<std::filesystem::path> furtherScenes;  ///< read as `model` is
   RecordingChoice record;
+  /// A recording that clients play, from after tick `from` (nullopt: its first) on; empty: a new
+  /// world. The lengths are then the recording's.
+  std::filesystem::path recording = {};
+  std::optional<std::uint64_t> from = {};
 };
 struct ReplayCommand {
   ModelOptions model;

@@ -67,6 +67,8 @@ const char* wordOf(v1::Notice::Kind kind) {
       return "done";
     case v1::Notice::KIND_CAPTURE:
       return "capture";
+    case v1::Notice::KIND_DROPPED:
+      return "dropped";
     default:
       return "other";
   }

@@ -84,12 +84,13 @@ std::optional<v1::Error> watchFrames(ServedWorld& served, ClientId id, Client& c
 decltype(FrameJob::seen) toRecording(const ServedWorld& served, const v1::FrameRequest& request) {
   const WorldRecorder* recorder = served.world.recorder();
   if (!recorder || !recorder->takesPictures() || !request.has_eyes()) return {};
-  return [avatar = request.eyes().avatar(), post = served.post](
+  return [avatar = request.eyes().avatar(), branch = served.branches, post = served.post](
              const v1::Frame& frame, std::span<const std::uint8_t> attachment) {
     auto picture = encodedPicture(frame, attachment);
     if (!picture) return;
-    post([avatar, frame, picture = std::move(*picture)](ServedWorld& then) {
-      if (WorldRecorder* taker = then.world.recorder()) taker->picture(avatar, frame, picture);
+    post([avatar, branch, frame, picture = std::move(*picture)](ServedWorld& then) {
+      WorldRecorder* taker = then.world.recorder();
+      if (taker && then.branches == branch) taker->picture(avatar, frame, picture);
     });
   };
 }

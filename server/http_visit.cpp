@@ -29,6 +29,11 @@ Buffer bufferOf(const std::string& text) {
   return std::make_shared<const std::vector<std::uint8_t>>(text.begin(), text.end());
 }
 
+/// The world of a request went while it was asked: a fault of nobody's who asks.
+bool hasEnded(const TickLoop& world, v1::ErrorCode code) {
+  return code == v1::ERROR_WORLD_DROPPED || code == v1::ERROR_SHUTTING_DOWN || world.failure();
+}
+
 std::string textOf(boost::string_view view) {
   return {view.data(), view.size()};
 }
@@ -93,7 +98,10 @@ void HttpVisit::route(Request request) {
   if (boost::beast::websocket::is_upgrade(request)) return upgrade(std::move(request));
   if (request.method() != http::verb::get) return refuse(405, "only GET is taken");
   const auto role = roleOf(reception_.access, token);
-  if (!role && path_ != "/healthz") return refuse(401, "this server wants a token");
+  // Whether all is well may be known to all, but not what there is.
+  mayHearNames_ = role.has_value();
+  if (!role && (path_ != "/healthz" || target.query.contains("world")))
+    return refuse(401, "this server wants a token");
   const auto asked = requestFor(target);
   if (const auto* why = std::get_if<PageProblem>(&asked)) return refuse(why->status, why->text);
   if (!findWorlds(target)) return refuse(404, "there is no world of this name");
@@ -183,6 +191,10 @@ void HttpVisit::hear(Ear& ear) {
 }
 
 void HttpVisit::take(Ear& ear, v1::ServerMessage message, std::vector<std::uint8_t> attachment) {
+  if (message.has_error() && hasEnded(*ear.world, message.error().code())) {
+    ear.ended = true;  // the others answer
+    return;
+  }
   if (message.has_error()) {
     const bool missing = message.error().code() == v1::ERROR_UNKNOWN_AVATAR;
     return refuse(missing ? 404 : 400, message.error().message());
@@ -206,10 +218,11 @@ void HttpVisit::answerMetrics() {
   for (Ear& ear : ears_) {
     const std::string& name = ear.world->place().name;
     if (ear.world->failure() && path_ == "/healthz")
-      return refuse(503, "the world '" + name + "' failed: drop it, or start the server anew");
+      return refuse(503, (mayHearNames_ ? "the world '" + name + "'" : "a world") +
+                             " failed: drop it, or start the server anew");
     if (ear.metrics) told.push_back({name, std::move(*ear.metrics)});
   }
-  if (told.empty()) return refuse(503, "the server ends");
+  if (told.empty()) return refuse(503, "the world has ended");
   if (path_ == "/healthz") return answer(200, "text/plain", "ok\n");
   answer(200, kMetricsType, metricsPage(told));
 }

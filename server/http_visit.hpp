@@ -65,7 +65,8 @@ class HttpVisit : public Connection, public std::enable_shared_from_this<HttpVis
   boost::beast::http::request_parser<boost::beast::http::string_body> parser_;
   std::array<char, 256> thrownAway_{};
   std::string path_;
-  std::vector<Ear> ears_;  ///< one, or for metrics as many as there are worlds
+  std::vector<Ear> ears_;      ///< one, or for metrics as many as there are worlds
+  bool mayHearNames_ = false;  ///< of worlds
   bool writing_ = false, answered_ = false, noticing_ = false, closed_ = false;
 };
 

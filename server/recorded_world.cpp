@@ -37,8 +37,8 @@ std::vector<scene::Notice> everyoneLeaves(const scene::Snapshot& snapshot, const
 
 RecordedWorld::RecordedWorld(scene::World world) : world_(std::move(world)) {}
 
-void RecordedWorld::record(const RecordingOptions& options, const v1::RecordingParent* parent) {
-  recorder_ = std::make_unique<WorldRecorder>(options, world_, parent);
+void RecordedWorld::record(const RecordingOptions& options, const BranchPoint* branch) {
+  recorder_ = std::make_unique<WorldRecorder>(options, world_, branch);
 }
 
 std::optional<v1::Error> RecordedWorld::submit(const v1::Command& command) {
@@ -56,8 +56,18 @@ std::optional<v1::Error> RecordedWorld::submit(const v1::BodyCommand& command) {
   return refused;
 }
 
+/// What a tick was told that fails for a fault of ours is the first that is asked for: it is kept.
+scene::TickReport RecordedWorld::tickOrKeepCommands() {
+  try {
+    return scene::tick(world_);
+  } catch (...) {
+    if (recorder_) recorder_->tickFailed(world_);
+    throw;
+  }
+}
+
 RecordedWorld::Ticked RecordedWorld::tick() {
-  Ticked ticked{scene::tick(world_), {}};
+  Ticked ticked{tickOrKeepCommands(), {}};
   ticked.events = eventsOf(world_, ticked.report.contacts, ticked.report.notices);
   if (recorder_) recorder_->ticked(world_, ticked.events);
   return ticked;
@@ -70,13 +80,19 @@ v1::TickEvents RecordedWorld::end(v1::ContactEvent::Reason reason, const std::st
   v1::TickEvents events = eventsOf(world_, ended, leaving);
   for (v1::ContactEvent& event : *events.mutable_contacts())
     if (event.reason() == v1::ContactEvent::REASON_SHUTDOWN) event.set_reason(reason);
-  if (recorder_) recorder_->ended(events);
+  if (recorder_) recorder_->told(events);
   return events;
 }
 
 void RecordedWorld::beginAnew(scene::World world) {
   world_ = std::move(world);
   if (recorder_) recorder_->beganAnew(world_);
+}
+
+void RecordedWorld::goOnWith(scene::World world) {
+  world_ = std::move(world);
+  if (recorder_ && recorder_->close()) broke_ = true;
+  recorder_.reset();
 }
 
 }  // namespace enfilade::server

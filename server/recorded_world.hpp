@@ -12,9 +12,9 @@ class RecordedWorld {
  public:
   explicit RecordedWorld(scene::World world);
 
-  /// From now on, which is before the first command and tick, all is written down; `parent` is that
-  /// of a branch, which begins later. Throws protocol::mcap::RecordingError.
-  void record(const RecordingOptions& options, const v1::RecordingParent* parent = nullptr);
+  /// From now on all is written down: from before the first command and tick, or, of a `branch`,
+  /// from where it leaves another recording. Throws protocol::mcap::RecordingError.
+  void record(const RecordingOptions& options, const BranchPoint* branch = nullptr);
 
   /// To look at; who tells the world something uses the functions below.
   operator const scene::World&() const { return world_; }
@@ -37,14 +37,21 @@ class RecordedWorld {
   v1::TickEvents end(v1::ContactEvent::Reason reason, const std::string& left = {});
   /// Another world in its place: the same scene at its beginning.
   void beginAnew(scene::World world);
+  /// Another world of the same scene in its place, which is not recorded: a recording ends here.
+  void goOnWith(scene::World world);
 
   /// Null when it is not recorded.
   WorldRecorder* recorder() { return recorder_.get(); }
   const WorldRecorder* recorder() const { return recorder_.get(); }
+  /// Whether what was to be recorded is, so far.
+  bool recordedAll() const { return !broke_ && !(recorder_ && recorder_->broken()); }
 
  private:
+  scene::TickReport tickOrKeepCommands();
+
   scene::World world_;
   std::unique_ptr<WorldRecorder> recorder_;
+  bool broke_ = false;  ///< a recording that ended is not whole
 };
 
 }  // namespace enfilade::server

@@ -36,7 +36,8 @@ class RequestAllowance : public std::enable_shared_from_this<RequestAllowance> {
   void giveBack(std::size_t bytes);
   bool full() const;
 
-  const std::size_t mostBytes_;
+  const std::size_t mostRequests_, mostBytes_;
+  const std::chrono::nanoseconds price_;  ///< of one request, in time
   const std::function<void()> wake_;
   std::mutex mutex_;  // guards what follows
   std::size_t requests_ = 0, bytes_ = 0;

@@ -7,6 +7,7 @@
 #include "protocol/framing.hpp"
 #include "server/body_messages.hpp"
 #include "server/frame_watches.hpp"
+#include "server/replay_control.hpp"
 #include "server/version.hpp"
 #include "server/world_messages.hpp"
 #include "server/worlds/worlds.hpp"
@@ -36,17 +37,19 @@ void replyError(const Asked& asked, v1::Error error) {
   sendError(asked.client, asked.message.request_id(), std::move(error));
 }
 
-void fill(v1::Clock& message, const ServedClock& clock) {
-  message.set_mode(clock.mode);
-  if (clock.mode == v1::Clock::MODE_FREE_RUN) message.set_speed(clock.speed);
-  message.set_has_driver(clock.driver.has_value());
-}
-
 // ---- commands ----------------------------------------------------------------------------------
+
+/// Who walks on from a recording belongs to nobody until somebody takes it over.
+std::optional<v1::Error> recordedProblem(const ServedWorld& served, const std::string& avatar) {
+  if (!served.replay || !avatarNamed(*served.world.snapshot(), avatar)) return std::nullopt;
+  return errorOf(v1::ERROR_NOT_ALLOWED,
+                 "avatar '" + avatar + "' is the recording's: TakeOver makes it yours", "avatar");
+}
 
 std::optional<v1::Error> ownershipProblem(const Asked& asked, const v1::Command& command) {
   const auto owner = asked.served.owners.find(command.avatar());
-  if (owner == asked.served.owners.end() || owner->second == asked.id) return std::nullopt;
+  if (owner == asked.served.owners.end()) return recordedProblem(asked.served, command.avatar());
+  if (owner->second == asked.id) return std::nullopt;
   return errorOf(v1::ERROR_NOT_ALLOWED,
                  "avatar '" + command.avatar() + "' belongs to another client: take another name",
                  "avatar");
@@ -72,6 +75,7 @@ std::optional<v1::Error> limitProblem(const Asked& asked, const v1::Command& com
 }
 
 std::optional<v1::Error> submitCommand(const Asked& asked, const v1::Command& command) {
+  if (auto problem = onlyReplayed(asked.served)) return problem;
   if (auto problem = ownershipProblem(asked, command)) return problem;
   if (auto problem = limitProblem(asked, command)) return problem;
   if (auto refused = asked.served.world.submit(command)) return refused;
@@ -99,7 +103,8 @@ void answer(const Asked& asked, const v1::Command& command) {
 }
 
 void answer(const Asked& asked, const v1::BodyCommand& command) {
-  replyCommand(asked, asked.served.world.submit(command));
+  auto problem = onlyReplayed(asked.served);
+  replyCommand(asked, problem ? std::move(problem) : asked.served.world.submit(command));
 }
 
 // ---- time --------------------------------------------------------------------------------------
@@ -127,9 +132,9 @@ void answer(const Asked& asked, const v1::Step& step) {
     return replyError(asked, errorOf(v1::ERROR_NOT_ALLOWED,
                                      "the clock is not in lockstep: set it to lockstep first"));
   }
-  if (takeClock(asked)) {
-    asked.client.step = {asked.message.request_id(), step.ticks(), step.avatars()};
-  }
+  if (!takeClock(asked)) return;
+  if (auto ended = replayEnded(asked.served)) return replyError(asked, std::move(*ended));
+  asked.client.step = {asked.message.request_id(), step.ticks(), step.avatars()};
 }
 
 void answer(const Asked& asked, const v1::SetClock& wanted) {
@@ -154,13 +159,15 @@ void answer(const Asked& asked, const v1::SetClock& wanted) {
   clock.speed = speed > 0 ? speed : 1;
   clock.nextTick = std::chrono::steady_clock::now();
   publish(asked.served);
+  tellReplay(asked.served);
   v1::ServerMessage message;
-  fill(*message.mutable_set_clock()->mutable_clock(), clock);
+  *message.mutable_set_clock()->mutable_clock() = messageOf(clock);
   message.mutable_set_clock()->set_tick(lastTick(asked.served));
   reply(asked, std::move(message));
 }
 
 void answer(const Asked& asked, const v1::Restart&) {
+  if (auto problem = onlyReplayed(asked.served)) return replyError(asked, std::move(*problem));
   if (asked.served.clock.mode != v1::Clock::MODE_LOCKSTEP) {
     return replyError(asked, errorOf(v1::ERROR_NOT_ALLOWED,
                                      "a world begins anew only in lockstep: set the clock to "
@@ -173,6 +180,31 @@ void answer(const Asked& asked, const v1::Restart&) {
   v1::ServerMessage message;
   message.mutable_restart()->set_tick(snapshot->tick);
   message.mutable_restart()->set_state_hash(snapshot->stateHash);
+  reply(asked, std::move(message));
+}
+
+void answer(const Asked& asked, const v1::Seek& wanted) {
+  auto problem = seekProblem(asked.served, wanted);
+  if (problem) return replyError(asked, std::move(*problem));
+  if (!takeClock(asked)) return;
+  problem = seek(asked.served, wanted);
+  if (problem) return replyError(asked, std::move(*problem));
+  const auto snapshot = asked.served.world.snapshot();
+  v1::ServerMessage message;
+  message.mutable_seek()->set_tick(snapshot->tick);
+  message.mutable_seek()->set_time(snapshot->time);
+  message.mutable_seek()->set_state_hash(snapshot->stateHash);
+  reply(asked, std::move(message));
+}
+
+void answer(const Asked& asked, const v1::TakeOver& wanted) {
+  auto problem = takeOverProblem(asked.served, asked.id, wanted);
+  if (problem) return replyError(asked, std::move(*problem));
+  if (!asked.served.replay->branchedAt() && !takeClock(asked)) return;
+  problem = takeOver(asked.served, asked.id, wanted);
+  if (problem) return replyError(asked, std::move(*problem));
+  v1::ServerMessage message;
+  message.mutable_take_over()->set_tick(lastTick(asked.served));
   reply(asked, std::move(message));
 }
 
@@ -244,18 +276,16 @@ void answer(const Asked& asked, const v1::FrameRequest& request, const PostToTic
   served.frames.draw(std::move(job), untilAnswered(asked, post, &OutgoingQueue::pushFrame));
 }
 
-void answer(const Asked& asked, const v1::RayQuery& query, const PostToTickThread& post) {
+/// A question about the last tick: answered beside the ticks.
+template <class Query>
+void ask(const Asked& asked, const Query& query, const char* tick, const PostToTickThread& post) {
   ServedWorld& served = asked.served;
   if (query.has_tick()) {
-    if (auto gone = tickGone(asked, query.tick(), "rays.tick")) {
-      return replyError(asked, std::move(*gone));
-    }
+    if (auto gone = tickGone(asked, query.tick(), tick)) return replyError(asked, std::move(*gone));
   }
-  const auto snapshot = served.world.snapshot();
-  auto rays = raysFrom(query, *snapshot, served.limits);
-  if (auto* error = std::get_if<v1::Error>(&rays)) return replyError(asked, std::move(*error));
-  RayJob job{snapshot, std::get<AskedRays>(std::move(rays)), asked.message.request_id()};
-  served.rays.cast(std::move(job), untilAnswered(asked, post, &OutgoingQueue::push));
+  served.questions.ask(
+      {served.world.snapshot(), asked.message, served.world.lengths(), served.limits},
+      untilAnswered(asked, post, &OutgoingQueue::push));
 }
 
 void answer(const Asked& asked, const v1::WatchFrames& wanted) {
@@ -411,6 +441,8 @@ Role roleNeeded(v1::ClientMessage::BodyCase body) {
     case v1::ClientMessage::kBodyCommand:
     case v1::ClientMessage::kStep:
     case v1::ClientMessage::kSetClock:
+    case v1::ClientMessage::kSeek:
+    case v1::ClientMessage::kTakeOver:
       return Role::drive;
     case v1::ClientMessage::kRestart:
     case v1::ClientMessage::kCreateWorld:
@@ -441,6 +473,10 @@ void answer(const Asked& asked, const PostToTickThread& post) {
       return answer(asked, message.set_clock());
     case v1::ClientMessage::kRestart:
       return answer(asked, message.restart());
+    case v1::ClientMessage::kSeek:
+      return answer(asked, message.seek());
+    case v1::ClientMessage::kTakeOver:
+      return answer(asked, message.take_over());
     case v1::ClientMessage::kSubscribe:
       return answer(asked, message.subscribe());
     case v1::ClientMessage::kFrame:
@@ -448,7 +484,13 @@ void answer(const Asked& asked, const PostToTickThread& post) {
     case v1::ClientMessage::kWatchFrames:
       return answer(asked, message.watch_frames());
     case v1::ClientMessage::kRays:
-      return answer(asked, message.rays(), post);
+      return ask(asked, message.rays(), "rays.tick", post);
+    case v1::ClientMessage::kDistances:
+      return ask(asked, message.distances(), "distances.tick", post);
+    case v1::ClientMessage::kTouching:
+      return ask(asked, message.touching(), "touching.tick", post);
+    case v1::ClientMessage::kCannotTouch:
+      return ask(asked, message.cannot_touch(), "cannot_touch.tick", post);
     case v1::ClientMessage::kDescribe:
       return answer(asked, message.describe());
     case v1::ClientMessage::kMetrics:
@@ -490,6 +532,7 @@ v1::Welcome welcomeOf(const ServedWorld& served) {
   welcome.set_server_version(kServerVersion);
   welcome.add_capabilities("free_run");
   welcome.add_capabilities("rays");
+  welcome.add_capabilities("pairs");
   welcome.add_capabilities("restart");
   if (!served.frames.deviceName().empty()) welcome.add_capabilities("frames");
   *welcome.mutable_scene() = messageOf(served.world.scene());
@@ -505,10 +548,18 @@ v1::Welcome welcomeOf(const ServedWorld& served) {
   limits.set_max_watches(served.limits.watches);
   limits.set_max_scan_rays(served.limits.scanRays);
   limits.set_max_worlds(served.limits.worlds);
+  limits.set_max_pairs(served.limits.pairs);
+  limits.set_max_requests_under_way(served.limits.requestsUnderWay);
+  limits.set_max_bytes_under_way(served.limits.waitingBytes);
+  limits.set_requests_per_second(served.limits.requestsPerSecond);
   welcome.set_tick(lastTick(served));
   welcome.set_renderer(served.frames.deviceName());
   welcome.set_software_renderer(served.frames.software());
-  fill(*welcome.mutable_clock(), served.clock);
+  *welcome.mutable_clock() = messageOf(served.clock);
+  if (served.replay) {
+    welcome.add_capabilities("replay");
+    *welcome.mutable_replay() = replayOf(served);
+  }
   welcome.set_world(served.place.name);
   if (served.place.worlds) {
     welcome.add_capabilities("worlds");

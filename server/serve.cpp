@@ -9,24 +9,28 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
+#include "protocol/seekable_recording.hpp"
 #include "server/load_scene.hpp"
+#include "server/playback/replayed_world.hpp"
 #include "server/server.hpp"
 #include "server/world_messages.hpp"
+#include "server/world_recorder.hpp"
 
 namespace enfilade::server {
 namespace {
 
-void tellReady(const Server& server, const scene::Scene& scene, const Endpoint& listen) {
+void tellReady(const Server& server, const scene::Scene& scene, const ServeCommand& command) {
   char hash[17];
   std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(scene.hash()));
-  const nlohmann::ordered_json ready{{"ready", true},
-                                     {"port", server.port()},
-                                     {"address", listen.host},
-                                     {"scene", messageOf(scene).source()},
-                                     {"scene_hash", hash},
-                                     {"objects", scene.model().objects.size()},
-                                     {"renderer", server.rendererName()},
-                                     {"worlds", server.worldNames()}};
+  nlohmann::ordered_json ready{{"ready", true},
+                               {"port", server.port()},
+                               {"address", command.listen.host},
+                               {"scene", messageOf(scene).source()},
+                               {"scene_hash", hash},
+                               {"objects", scene.model().objects.size()},
+                               {"renderer", server.rendererName()},
+                               {"worlds", server.worldNames()}};
+  if (!command.recording.empty()) ready["recording"] = command.recording.filename().string();
   const auto replace = nlohmann::ordered_json::error_handler_t::replace;
   std::printf("%s\n", ready.dump(-1, ' ', false, replace).c_str());
   std::fflush(stdout);
@@ -72,9 +76,38 @@ std::vector<std::shared_ptr<const scene::Scene>> loadFurther(const ServeCommand&
   return scenes;
 }
 
-}  // namespace
+/// The command as the recording that is to be played has it: the scene's file, how it is imported,
+/// and the lengths.
+ServeCommand asRecorded(const ServeCommand& asked) {
+  ServeCommand command = asked;
+  if (asked.recording.empty()) return command;
+  const protocol::SeekableRecording recording(asked.recording);
+  command.model = recordedModel(recording.start(), asked.model.file, asked.model.cache);
+  const auto lengths = lengthsFrom(recording.start().lengths());
+  if (!lengths)
+    throw protocol::mcap::RecordingError(asked.recording.string() +
+                                         ": it has lengths that no world can have");
+  command.lengths = *lengths;
+  if (!command.from) command.from = recording.firstTick();
+  return command;
+}
 
-ExitCode serve(const ServeCommand& command) {
+WorldOptions worldOf(const ServeCommand& command) {
+  WorldOptions world;
+  world.lengths = command.lengths;
+  world.auditEvery = command.auditEvery;
+  if (!command.recording.empty()) world.replay = {command.recording, *command.from};
+  if (command.record.file.empty()) return world;
+  world.record = {command.record, command.model};
+  world.record->replace = false;  // what clients did cannot be had again
+  // A branch is not recorded before there is one: that is late to say so.
+  if (world.replay && std::filesystem::exists(command.record.file))
+    throw protocol::mcap::RecordingError(command.record.file.string() +
+                                         ": is there already: move it away, or name another file");
+  return world;
+}
+
+ExitCode serveUntilSignal(const ServeCommand& command) {
   Access access = command.access;
   if (!command.tokenFile.empty()) access.tokens = readTokens(command.tokenFile);
   const auto scene = loadScene(command.model);
@@ -82,16 +115,11 @@ ExitCode serve(const ServeCommand& command) {
   options.furtherScenes = loadFurther(command);
   // From here on: the threads that the server starts inherit the mask.
   const sigset_t ending = holdEndingSignals();
-  options.world.lengths = command.lengths;
-  options.world.auditEvery = command.auditEvery;
+  options.world = worldOf(command);
   options.access = std::move(access);
   options.drawing = command.drawing;
-  if (!command.record.file.empty()) {
-    options.world.record = {command.record, command.model};
-    options.world.record->replace = false;  // what clients did cannot be had again
-  }
   Server server(scene, command.listen, std::move(options));
-  tellReady(server, *scene, command.listen);
+  tellReady(server, *scene, command);
   const int signal = awaitEndingSignal(ending, server, command.stopAtEndOfInput);
   spdlog::info("{}: finishing the tick and telling the clients",
                signal == SIGINT ? "interrupted" : "told to stop");
@@ -101,6 +129,18 @@ ExitCode serve(const ServeCommand& command) {
   if (!server.recordedAll()) return ExitCode::runtimeError;
   if (signal == SIGINT) return ExitCode::interrupted;
   return audit.right() ? ExitCode::done : ExitCode::violations;
+}
+
+}  // namespace
+
+ExitCode serve(const ServeCommand& command) {
+  try {
+    return serveUntilSignal(asRecorded(command));
+  } catch (const Diverged& diverged) {
+    std::fprintf(stderr, "enfilade: %s: it cannot be played: %s\n",
+                 command.recording.string().c_str(), textOf(diverged).c_str());
+    return ExitCode::diverged;
+  }
 }
 
 }  // namespace enfilade::server

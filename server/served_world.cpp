@@ -6,6 +6,7 @@
 #include "protocol/joined_message.hpp"
 #include "server/body_messages.hpp"
 #include "server/frame_watches.hpp"
+#include "server/replay_control.hpp"
 #include "server/world_messages.hpp"
 
 namespace enfilade::server {
@@ -90,8 +91,7 @@ void sendState(ServedWorld& served, Client& client, const scene::Snapshot& snaps
       joined(v1::ServerMessage::kStateFieldNumber, own.SerializeAsString(), *told.state));
 }
 
-void finishStep(ServedWorld& served, Client& client, const scene::Snapshot& snapshot) {
-  if (!client.step || --client.step->remaining > 0) return;
+void answerStep(ServedWorld& served, Client& client, const scene::Snapshot& snapshot) {
   v1::ServerMessage message;
   message.set_reply_to(client.step->requestId);
   v1::StepReply& reply = *message.mutable_step();
@@ -106,6 +106,15 @@ void finishStep(ServedWorld& served, Client& client, const scene::Snapshot& snap
   }
   client.step.reset();
   send(client, message);
+}
+
+/// `stopped`: there are no more ticks.
+void finishStep(ServedWorld& served, Client& client, bool stopped) {
+  if (!client.step || (client.step->remaining > 0 && !stopped)) return;
+  if (client.step->made > 0) return answerStep(served, client, *served.world.snapshot());
+  const std::uint64_t id = client.step->requestId;
+  client.step.reset();
+  sendError(client, id, *replayEnded(served));
 }
 
 void keepLive(ServedWorld& served, const v1::TickEvents& told) {
@@ -154,6 +163,41 @@ void sayGoodbye(Client& client, const v1::Bye& farewell) {
   client.out->finish(goodbyeOf(farewell));
 }
 
+void tellEveryone(ServedWorld& served, const v1::TickEvents& told) {
+  TickTold shared{told};
+  for (auto& [id, client] : served.clients) sendEvents(client, shared);
+}
+
+void tellTick(ServedWorld& served, const RecordedWorld::Ticked& ticked) {
+  const auto& [report, told] = ticked;
+  served.statistics.add(report);
+  logFindings(served.world, report);
+  served.idle = report.idle;
+  publish(served);
+  TickTold shared{told};
+  settleOwners(served, report.notices);
+  keepLive(served, told);
+  for (auto& [id, client] : served.clients) {
+    sendEvents(client, shared);
+    sendState(served, client, *report.snapshot, shared);
+    drawWatched(served, id, client);
+    if (client.step) --client.step->remaining, ++client.step->made;
+  }
+  drawRecorded(served);
+}
+
+void forgetSubscribedTimes(Client& client) {
+  client.nextStateTime = 0;
+  for (auto& [number, watch] : client.watches) watch.nextTime = 0;
+}
+
+/// Nothing more is played until somebody seeks or takes over.
+void stopReplay(ServedWorld& served) {
+  if (served.clock.mode == v1::Clock::MODE_FREE_RUN) served.clock.mode = v1::Clock::MODE_PAUSED;
+  publish(served);
+  tellReplay(served);
+}
+
 scene::World atItsBeginning(const std::shared_ptr<const scene::Scene>& scene,
                             const scene::Lengths& lengths, std::uint32_t auditEvery) {
   scene::World world(scene, lengths);
@@ -164,15 +208,25 @@ scene::World atItsBeginning(const std::shared_ptr<const scene::Scene>& scene,
 }  // namespace
 
 ServedWorld::ServedWorld(std::shared_ptr<const scene::Scene> served, FrameService& frameService,
-                         RayService& rayService, const WorldOptions& options, WorldPlace where)
+                         QuestionService& questionService, const WorldOptions& options,
+                         WorldPlace where)
     : place(std::move(where)),
       scene(std::move(served)),
       auditEvery(options.auditEvery),
-      world(atItsBeginning(scene, options.lengths, auditEvery)),
+      replay(options.replay ? std::make_unique<Replay>(options.replay->file, scene, auditEvery)
+                            : nullptr),
+      world(replay ? replay->seek(options.replay->from)
+                   : atItsBeginning(scene, options.lengths, auditEvery)),
       frames(frameService),
-      rays(rayService),
+      questions(questionService),
       limits(options.limits) {
-  if (options.record) world.record(*options.record);
+  if (replay) {
+    keepLive(*this, replay->livingIn(world));
+    branchRecording = options.record;
+    glance.tick = options.replay->from;
+  } else if (options.record) {
+    world.record(*options.record);
+  }
 }
 
 Buffer goodbyeOf(const v1::Bye& farewell) {
@@ -193,37 +247,49 @@ void sendError(Client& client, std::uint64_t requestId, v1::Error error) {
 }
 
 void advance(ServedWorld& served) {
-  const auto [report, told] = served.world.tick();
-  served.statistics.add(report);
-  logFindings(served.world, report);
-  served.idle = report.idle;
-  publish(served);
-  TickTold shared{told};
-  settleOwners(served, report.notices);
-  keepLive(served, told);
-  for (auto& [id, client] : served.clients) {
-    sendEvents(client, shared);
-    sendState(served, client, *report.snapshot, shared);
-    drawWatched(served, id, client);
-    finishStep(served, client, *report.snapshot);
-  }
-  drawRecorded(served);
+  const auto ticked =
+      served.replay ? served.replay->tick(served.world) : std::optional(served.world.tick());
+  if (ticked) tellTick(served, *ticked);
+  const bool stopped = !ticked || (served.replay && served.replay->atEnd());
+  if (stopped) stopReplay(served);
+  for (auto& [id, client] : served.clients) finishStep(served, client, stopped);
 }
 
 void restartWorld(ServedWorld& served) {
   const v1::TickEvents told =
       served.world.end(v1::ContactEvent::REASON_RESTART, "the world begins anew");
-  TickTold shared{told};
-  for (auto& [id, client] : served.clients) {
-    sendEvents(client, shared);
-    client.nextStateTime = 0;
-    for (auto& [number, watch] : client.watches) watch.nextTime = 0;
-  }
+  tellEveryone(served, told);
+  for (auto& [id, client] : served.clients) forgetSubscribedTimes(client);
   served.world.beginAnew(atItsBeginning(served.scene, served.world.lengths(), served.auditEvery));
   served.owners.clear();
   served.unsettled.clear();
   served.live.clear();
   served.idle = true;
+}
+
+void goTo(ServedWorld& served, scene::World world, const v1::TickEvents& living) {
+  tellEveryone(served, served.world.end(v1::ContactEvent::REASON_SEEK));
+  served.world.goOnWith(std::move(world));
+  served.owners.clear();
+  served.unsettled.clear();
+  served.live.clear();
+  keepLive(served, living);
+  publish(served);
+  TickTold shared{living};
+  for (auto& [id, client] : served.clients) {
+    sendEvents(client, shared);
+    forgetSubscribedTimes(client);
+    sendState(served, client, *served.world.snapshot(), shared);
+    drawWatched(served, id, client);
+  }
+}
+
+/// A Drive that stops empties the queue first.
+void haltAvatar(ServedWorld& served, const std::string& avatar) {
+  v1::Command stop;
+  stop.set_avatar(avatar);
+  stop.mutable_drive()->mutable_velocity();
+  served.world.submit(stop);
 }
 
 void removeClient(ServedWorld& served, ClientId id) {
@@ -235,11 +301,8 @@ void removeClient(ServedWorld& served, ClientId id) {
       ++owner;
       continue;
     }
-    // Leave queues; Drive first empties the queue, so that nobody walks on without an owner.
-    v1::Command stop, leave;
-    stop.set_avatar(owner->first);
-    stop.mutable_drive()->mutable_velocity();
-    served.world.submit(stop);
+    haltAvatar(served, owner->first);  // nobody walks on without an owner
+    v1::Command leave;
     leave.set_avatar(owner->first);
     leave.mutable_leave();
     served.world.submit(leave);
@@ -249,15 +312,12 @@ void removeClient(ServedWorld& served, ClientId id) {
 
 void closeWorld(ServedWorld& served) {
   const v1::TickEvents told = served.world.end(v1::ContactEvent::REASON_SHUTDOWN);
-  TickTold shared{told};
+  tellEveryone(served, told);
   if (!served.farewell) {
     served.farewell.emplace().set_code(v1::ERROR_SHUTTING_DOWN);
     served.farewell->set_reason("the server ends");
   }
-  for (auto& [id, client] : served.clients) {
-    sendEvents(client, shared);
-    sayGoodbye(client, *served.farewell);
-  }
+  for (auto& [id, client] : served.clients) sayGoodbye(client, *served.farewell);
   served.clients.clear();
   if (WorldRecorder* recorder = served.world.recorder()) recorder->close();
 }
@@ -265,6 +325,14 @@ void closeWorld(ServedWorld& served) {
 void failWorld(ServedWorld& served) {
   for (auto& [id, client] : served.clients) sayGoodbye(client, *served.farewell);
   served.clients.clear();
+}
+
+v1::Clock messageOf(const ServedClock& clock) {
+  v1::Clock message;
+  message.set_mode(clock.mode);
+  if (clock.mode == v1::Clock::MODE_FREE_RUN) message.set_speed(clock.speed);
+  message.set_has_driver(clock.driver.has_value());
+  return message;
 }
 
 void publish(ServedWorld& served) {

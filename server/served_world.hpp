@@ -16,7 +16,8 @@
 #include "server/access.hpp"
 #include "server/frame_service.hpp"
 #include "server/outgoing_queue.hpp"
-#include "server/ray_service.hpp"
+#include "server/playback/replay.hpp"
+#include "server/question_service.hpp"
 #include "server/recorded_world.hpp"
 #include "server/request_allowance.hpp"
 #include "server/tick_statistics.hpp"
@@ -31,6 +32,7 @@ struct StepUnderWay {
   std::uint64_t requestId = 0;
   std::uint32_t remaining = 0;  ///< ticks
   bool avatars = false;
+  std::uint32_t made = 0;  ///< ticks
 };
 
 /// A request that a service works on. Who claims it first answers it: the service, or the world
@@ -98,16 +100,22 @@ struct WorldGlance {
 };
 
 struct ServedWorld {
+  /// Throws protocol::mcap::RecordingError, and Diverged where a recording cannot be played.
   ServedWorld(std::shared_ptr<const scene::Scene> scene, FrameService& frameService,
-              RayService& rayService, const WorldOptions& options = {}, WorldPlace place = {});
+              QuestionService& questionService, const WorldOptions& options = {},
+              WorldPlace place = {});
 
   const WorldPlace place;
   WorldGlance glance;
   std::shared_ptr<const scene::Scene> scene;
-  std::uint32_t auditEvery = 0;  ///< ticks; 0: never
+  std::uint32_t auditEvery = 0;    ///< ticks; 0: never
+  std::unique_ptr<Replay> replay;  ///< null: the world plays no recording
+  /// Of a replay: how its branches are recorded; nullopt: they are not.
+  std::optional<RecordingOptions> branchRecording;
+  std::uint64_t branches = 0;  ///< recordings of branches that were begun
   RecordedWorld world;
   FrameService& frames;
-  RayService& rays;
+  QuestionService& questions;
   ServerLimits limits;
   ServedClock clock;
   std::map<ClientId, Client> clients;
@@ -128,13 +136,22 @@ struct ServedWorld {
   std::set<std::string> recordedViews;  ///< avatars whose view is being drawn for the recording
   /// Hands a job to the tick thread; callable from any thread.
   std::function<void(std::function<void(ServedWorld&)>)> post;
+  /// Whether the world is to end: long work on the tick thread gives up then.
+  std::function<bool()> ending = [] { return false; };
 };
 
-/// Makes one tick and tells everyone what they subscribed to.
+/// Makes one tick and tells everyone what they subscribed to. A replay that has no more stops.
 void advance(ServedWorld& served);
 
 /// The world as it was at first. Everyone is told that contacts ended and avatars left.
 void restartWorld(ServedWorld& served);
+
+/// Another world of the same scene: contacts that live are told as ended by a seek, `living` as
+/// those that live now, and everyone gets states and pictures of it. Avatars belong to nobody then.
+void goTo(ServedWorld& served, scene::World world, const v1::TickEvents& living);
+
+/// Drops what the avatar was told, and stops it.
+void haltAvatar(ServedWorld& served, const std::string& avatar);
 
 /// Takes a client out; its avatars leave at the next tick.
 void removeClient(ServedWorld& served, ClientId id);
@@ -149,6 +166,8 @@ Buffer goodbyeOf(const v1::Bye& farewell);
 
 /// Lets everyone see how the world stands.
 void publish(ServedWorld& served);
+
+v1::Clock messageOf(const ServedClock& clock);
 
 void send(Client& client, const v1::ServerMessage& message);
 void sendError(Client& client, std::uint64_t requestId, v1::Error error);

@@ -31,6 +31,8 @@ v1::ErrorCode codeOf(protocol::FramingError::Code code) {
                                                         : v1::ERROR_BAD_MESSAGE;
 }
 
+/// So often a client that is not read is looked after: it may have gone.
+constexpr std::chrono::seconds kLookForEnd{1};
 constexpr std::size_t kLongestName = 64;  // bytes, of what a client calls itself or a world
 
 }  // namespace
@@ -90,7 +92,10 @@ void Session::keepReading() {
   if (!listening_) return read();
   const bool room = allowance_->hasRoom();
   if (room && ahead_ <= RequestAllowance::Clock::duration::zero()) return read();
-  pause(room ? Timer::clock_type::now() + std::exchange(ahead_, {}) : Timer::time_point::max());
+  // What is left to read is no more than the system keeps for a socket: the end stands behind it.
+  if (wire_->peerEnded()) return read();
+  pause(Timer::clock_type::now() +
+        (room ? std::exchange(ahead_, {}) : RequestAllowance::Clock::duration(kLookForEnd)));
 }
 
 /// Reads nothing until then, or until the allowance wakes it. The wait keeps the session alive:
@@ -184,6 +189,8 @@ void Session::enter(const v1::Hello& hello, Role role, std::uint64_t requestId) 
   world_ = reception_.worlds.find(hello.world());
   if (world_) client_ = world_->join(hello.client_name(), role, out_, requestId);
   if (client_ != 0) return spdlog::info("{} came to world '{}'", peer_, world_->place().name);
+  if (reception_.worlds.stopping())
+    return fail(v1::ERROR_SHUTTING_DOWN, "the server ends", requestId);
   fail(v1::ERROR_UNKNOWN_WORLD,
        "there is no world '" + printable(hello.world(), kLongestName) +
            "', or it has ended: leave hello.world empty for the main one, and ask it by ListWorlds",

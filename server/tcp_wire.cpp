@@ -1,5 +1,7 @@
 #include "server/tcp_wire.hpp"
 
+#include <poll.h>
+
 #include <boost/asio/post.hpp>
 #include <boost/asio/write.hpp>
 
@@ -21,6 +23,11 @@ std::string addressOf(const tcp::socket& socket) {
   const tcp::endpoint endpoint = socket.remote_endpoint(problem);
   if (problem) return "a client that is gone";
   return endpoint.address().to_string() + ":" + std::to_string(endpoint.port());
+}
+
+bool peerEnded(tcp::socket& socket) {
+  pollfd asked{socket.native_handle(), POLLRDHUP, 0};
+  return ::poll(&asked, 1, 0) > 0;  // it, an error or a hang-up
 }
 
 TcpWire::TcpWire(tcp::socket socket, std::vector<std::uint8_t> first)
@@ -50,6 +57,10 @@ void TcpWire::endSending(std::function<void()> done) {
   error_code ignored;
   socket_.shutdown(tcp::socket::shutdown_send, ignored);
   done();
+}
+
+bool TcpWire::peerEnded() {
+  return server::peerEnded(socket_);
 }
 
 void TcpWire::close() {

@@ -10,6 +10,8 @@
 namespace enfilade::server {
 
 std::string addressOf(const boost::asio::ip::tcp::socket& socket);
+/// As Wire::peerEnded().
+bool peerEnded(boost::asio::ip::tcp::socket& socket);
 
 class TcpWire : public Wire {
  public:
@@ -19,6 +21,7 @@ class TcpWire : public Wire {
   void write(Buffer bytes, Written done) override;
   void endSending(std::function<void()> done) override;
   void close() override;
+  bool peerEnded() override;
   const std::string& peer() const override { return peer_; }
   bool beginsWithMagic() const override { return true; }
 

@@ -88,9 +88,13 @@ std::string whatOf(const std::exception_ptr& failure) {
 }  // namespace
 
 TickLoop::TickLoop(std::shared_ptr<const scene::Scene> scene, FrameService& frames,
-                   RayService& rays, const WorldOptions& options, WorldPlace place)
-    : served_(std::move(scene), frames, rays, options, std::move(place)) {
+                   QuestionService& questions, const WorldOptions& options, WorldPlace place)
+    : served_(std::move(scene), frames, questions, options, std::move(place)) {
   served_.post = [inbox = inbox_](Job job) { inbox->post(std::move(job)); };
+  served_.ending = [inbox = inbox_] {
+    const std::lock_guard lock(inbox->mutex);
+    return inbox->closed;
+  };
   thread_ = std::thread([this] { run(); });
 }
 
@@ -199,7 +203,7 @@ AuditTotals TickLoop::auditTotals() const {
 }
 
 bool TickLoop::recordedAll() const {
-  return !served_.world.recorder() || !served_.world.recorder()->broken();
+  return served_.world.recordedAll();
 }
 
 void TickLoop::run() {

@@ -32,8 +32,8 @@ struct TickInbox {
 
 class TickLoop {
  public:
-  TickLoop(std::shared_ptr<const scene::Scene> scene, FrameService& frames, RayService& rays,
-           const WorldOptions& options = {}, WorldPlace place = {});
+  TickLoop(std::shared_ptr<const scene::Scene> scene, FrameService& frames,
+           QuestionService& questions, const WorldOptions& options = {}, WorldPlace place = {});
   ~TickLoop();  ///< stops
   TickLoop(const TickLoop&) = delete;
   TickLoop& operator=(const TickLoop&) = delete;

@@ -13,6 +13,7 @@
 #include "server/in_process_driver.hpp"
 #include "server/interrupt.hpp"
 #include "server/load_scene.hpp"
+#include "server/playback/contact_history.hpp"
 #include "server/playback/playback.hpp"
 #include "server/progress.hpp"
 #include "server/walk_report.hpp"
@@ -175,12 +176,12 @@ scene::World recordedWorld(Playback& playback, std::uint64_t tick,
   }
 }
 
-v1::RecordingParent parentOf(const ReplayCommand& command) {
-  v1::RecordingParent parent;
-  if (command.recording.empty()) return parent;
-  parent.set_file(std::filesystem::absolute(command.recording).string());
-  parent.set_tick(command.from);
-  return parent;
+BranchPoint branchOf(const ReplayCommand& command, const scene::World& world) {
+  BranchPoint branch;
+  branch.parent.set_file(std::filesystem::absolute(command.recording).string());
+  branch.parent.set_tick(command.from);
+  branch.living = ContactHistory(command.recording, command.from).livingIn(world);
+  return branch;
 }
 
 }  // namespace
@@ -219,9 +220,10 @@ ExitCode replay(const ReplayCommand& command) {
                                           : scene::World(scene, command.lengths);
         scene::auditBroadPhase(beginning, command.auditEvery);
         RecordedWorld world(std::move(beginning));
-        const v1::RecordingParent parent = parentOf(command);
-        if (!command.record.file.empty())
-          world.record({command.record, model}, playback ? &parent : nullptr);
+        if (!command.record.file.empty()) {
+          const auto branch = playback ? std::optional(branchOf(command, world)) : std::nullopt;
+          world.record({command.record, model}, branch ? &*branch : nullptr);
+        }
         InProcessDriver driver(world, renderer.get(), captureFormat());
         WalkedWorld walked{driver,
                            [&](const v1::FrameRequest& request) { return driver.frame(request); },

@@ -75,6 +75,10 @@ void WebSocketWire::endSending(std::function<void()> done) {
                       [done = std::move(done)](error_code) { done(); });
 }
 
+bool WebSocketWire::peerEnded() {
+  return server::peerEnded(stream_.next_layer());
+}
+
 void WebSocketWire::close() {
   error_code ignored;
   stream_.next_layer().close(ignored);

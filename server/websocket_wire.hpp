@@ -22,6 +22,7 @@ class WebSocketWire : public Wire {
   void write(Buffer bytes, Written done) override;
   void endSending(std::function<void()> done) override;
   void close() override;
+  bool peerEnded() override;
   const std::string& peer() const override { return peer_; }
   bool beginsWithMagic() const override { return false; }
 

@@ -24,6 +24,8 @@ class Wire {
   /// Nothing more will be written; the peer may still send. Once, after the last write.
   virtual void endSending(std::function<void()> done) = 0;
   virtual void close() = 0;
+  /// The peer sends nothing any more: what it sent may still have to be read.
+  virtual bool peerEnded() = 0;
   virtual const std::string& peer() const = 0;  ///< for logs: address and port
   virtual bool beginsWithMagic() const = 0;     ///< in both directions
 };

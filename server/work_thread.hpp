@@ -1,9 +1,11 @@
 // A thread that does what it is given, in order.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <thread>
 
@@ -18,15 +20,19 @@ class WorkThread {
 
   /// `work` must not throw. Nothing may be given after finish().
   void post(std::function<void()> work);
+  /// The same, after some time; what is not due when the thread finishes is not done.
+  void postAfter(std::chrono::milliseconds time, std::function<void()> work);
   /// Waits until all is done.
   void finish();
 
  private:
   void run();
+  void takeDue();
 
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<std::function<void()>> work_;
+  std::multimap<std::chrono::steady_clock::time_point, std::function<void()>> later_;  ///< by due
   bool finishing_ = false;
   std::thread thread_;  // last: it uses the others
 };

@@ -43,23 +43,6 @@ v1::ContactEvent::Reason reasonOf(scene::ContactEvent::Reason reason) {
   return v1::ContactEvent::REASON_UNSPECIFIED;
 }
 
-v1::Verdict verdictOf(collision::Verdict verdict) {
-  switch (verdict) {
-    case collision::Verdict::separated:
-      return v1::VERDICT_SEPARATED;
-    case collision::Verdict::touching:
-      return v1::VERDICT_TOUCHING;
-    case collision::Verdict::penetrating:
-      return v1::VERDICT_PENETRATING;
-  }
-  return v1::VERDICT_UNSPECIFIED;
-}
-
-v1::DecidedBy decidedByOf(collision::DecidedBy decidedBy) {
-  return decidedBy == collision::DecidedBy::filter ? v1::DECIDED_BY_FILTER
-                                                   : v1::DECIDED_BY_RATIONAL;
-}
-
 v1::Notice::Kind kindOf(scene::Notice::Kind kind) {
   using Kind = scene::Notice::Kind;
   switch (kind) {
@@ -77,11 +60,30 @@ v1::Notice::Kind kindOf(scene::Notice::Kind kind) {
       return v1::Notice::KIND_CAPTURE;
     case Kind::left:
       return v1::Notice::KIND_LEFT;
+    case Kind::dropped:
+      return v1::Notice::KIND_DROPPED;
   }
   return v1::Notice::KIND_UNSPECIFIED;
 }
 
 }  // namespace
+
+v1::Verdict messageOf(collision::Verdict verdict) {
+  switch (verdict) {
+    case collision::Verdict::separated:
+      return v1::VERDICT_SEPARATED;
+    case collision::Verdict::touching:
+      return v1::VERDICT_TOUCHING;
+    case collision::Verdict::penetrating:
+      return v1::VERDICT_PENETRATING;
+  }
+  return v1::VERDICT_UNSPECIFIED;
+}
+
+v1::DecidedBy messageOf(collision::DecidedBy decidedBy) {
+  return decidedBy == collision::DecidedBy::filter ? v1::DECIDED_BY_FILTER
+                                                   : v1::DECIDED_BY_RATIONAL;
+}
 
 v1::Error errorOf(v1::ErrorCode code, std::string message, std::string field) {
   v1::Error error;
@@ -149,7 +151,6 @@ v1::ContactEvent::Phase phaseOf(scene::ContactEvent::Phase phase) {
 }  // namespace
 
 v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent& event) {
-  const collision::Decision& decision = event.decision;
   v1::ContactEvent message;
   message.set_tick(event.tick);
   message.set_time(event.time);
@@ -162,13 +163,7 @@ v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent&
   message.set_b(event.b);
   message.set_a_name(scene::nameOf(world, event.a));
   message.set_b_name(scene::nameOf(world, event.b));
-  message.set_verdict(verdictOf(decision.verdict));
-  message.set_distance(decision.distance);
-  message.set_error_bound(decision.errorBound);
-  *message.mutable_point_a() = messageOf(decision.pointA);
-  *message.mutable_point_b() = messageOf(decision.pointB);
-  *message.mutable_normal() = messageOf(decision.normal);
-  message.set_decided_by(decidedByOf(decision.decidedBy));
+  putDecision(event.decision, message);
   return message;
 }
 
@@ -195,10 +190,10 @@ v1::MoveResult moveMessageOf(const scene::World& world, const scene::MoveResult&
   if (move.stoppedBy == 0) return message;
   message.set_stopped_by(move.stoppedBy);
   message.set_stopped_by_name(scene::nameOf(world, move.stoppedBy));
-  message.set_verdict(verdictOf(move.decision.verdict));
+  message.set_verdict(messageOf(move.decision.verdict));
   message.set_distance(move.decision.distance);
   *message.mutable_normal() = messageOf(move.decision.normal);
-  message.set_decided_by(decidedByOf(move.decision.decidedBy));
+  message.set_decided_by(messageOf(move.decision.decidedBy));
   return message;
 }
 

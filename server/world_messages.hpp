@@ -21,6 +21,20 @@ v1::Scene messageOf(const scene::Scene& scene);
 v1::Policies messageOf(const scene::Lengths& lengths);
 v1::Vec3 messageOf(const scene::Vec3& v);
 scene::Vec3 vectorFrom(const v1::Vec3& message);
+v1::Verdict messageOf(collision::Verdict verdict);
+v1::DecidedBy messageOf(collision::DecidedBy decidedBy);
+
+/// Into a message that tells of two entities.
+template <class Message>
+void putDecision(const collision::Decision& decision, Message& message) {
+  message.set_verdict(messageOf(decision.verdict));
+  message.set_distance(decision.distance);
+  message.set_error_bound(decision.errorBound);
+  *message.mutable_point_a() = messageOf(decision.pointA);
+  *message.mutable_point_b() = messageOf(decision.pointB);
+  *message.mutable_normal() = messageOf(decision.normal);
+  message.set_decided_by(messageOf(decision.decidedBy));
+}
 
 v1::Error errorOf(v1::ErrorCode code, std::string message, std::string field = {});
 

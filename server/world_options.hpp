@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 
 #include "scene/lengths.hpp"
@@ -10,11 +11,20 @@
 
 namespace enfilade::server {
 
+/// A recording that clients play.
+struct PlayedRecording {
+  std::filesystem::path file;
+  std::uint64_t from = 0;  ///< the tick after which it stands at first
+};
+
 struct WorldOptions {
   ServerLimits limits;
   scene::Lengths lengths;
   std::uint32_t auditEvery = 0;            ///< ticks; 0: none is audited
   std::optional<RecordingOptions> record;  ///< nullopt: nothing is written down
+  /// The world is a recorded one, which has the lengths above, and `record` is for what branches
+  /// off it; nullopt: it is new.
+  std::optional<PlayedRecording> replay;
 };
 
 }  // namespace enfilade::server

@@ -42,16 +42,17 @@ v1::RecordingStart startOf(const scene::World& world, const ModelOptions& model)
 }  // namespace
 
 WorldRecorder::WorldRecorder(const RecordingOptions& options, const scene::World& world,
-                             const v1::RecordingParent* parent)
+                             const BranchPoint* branch)
     : file_(options.choice.file, std::string("enfilade ") + kServerVersion, options.replace),
       model_(options.model),
       picturesEvery_(options.choice.pictures) {
   v1::RecordingStart start = startOf(world, model_);
-  if (parent) *start.mutable_parent() = *parent;
+  if (branch) *start.mutable_parent() = branch->parent;
   file_.write(start, world.snapshot()->time);
   writeNames(world.scene().model());
-  if (parent) writeCheckpoint(world);
+  if (branch) writeCheckpoint(world);
   if (options.choice.viewers) viewers_.emplace(file_).begin(world);
+  if (branch) told(branch->living);
 }
 
 bool WorldRecorder::checkpointIsDue(const scene::World& world) const {
@@ -110,10 +111,7 @@ void WorldRecorder::unlessBroken(const Work& work) {
 void WorldRecorder::ticked(const scene::World& world, const v1::TickEvents& events) {
   unlessBroken([&] {
     fill(state_, world);
-    if (!commands_.commands().empty()) {
-      commands_.set_tick(state_.tick());
-      file_.write(commands_, state_.time());
-    }
+    writeCommands(state_.tick(), state_.time());
     if (!events.contacts().empty() || !events.notices().empty()) file_.write(events);
     file_.write(state_);
     if (viewers_) viewers_->ticked(world, events);
@@ -123,11 +121,25 @@ void WorldRecorder::ticked(const scene::World& world, const v1::TickEvents& even
   commands_.clear_commands();
 }
 
-void WorldRecorder::ended(const v1::TickEvents& events) {
+void WorldRecorder::tickFailed(const scene::World& world) {
+  const std::uint64_t tick = world.snapshot()->tick + 1;
+  unlessBroken([&] {
+    writeCommands(tick, static_cast<double>(tick) * world.lengths().tick);
+    file_.flush();
+  });
+}
+
+void WorldRecorder::writeCommands(std::uint64_t tick, double time) {
+  if (commands_.commands().empty()) return;
+  commands_.set_tick(tick);
+  file_.write(commands_, time);
+}
+
+void WorldRecorder::told(const v1::TickEvents& events) {
   if (events.contacts().empty() && events.notices().empty()) return;
   unlessBroken([&] {
     file_.write(events);
-    if (viewers_) viewers_->ended(events);
+    if (viewers_) viewers_->told(events);
   });
 }
 

@@ -10,13 +10,18 @@
 
 namespace enfilade::server {
 
+/// Where a branch leaves the recording that it comes of.
+struct BranchPoint {
+  v1::RecordingParent parent;
+  v1::TickEvents living;  ///< what lives there, as it began
+};
+
 class WorldRecorder {
  public:
-  /// Begins the file with the world as it is before its first tick. Throws protocol::mcap::
-  /// RecordingError.
-  /// `parent`: of a branch, which begins with the world as it is.
+  /// Begins the file with the world as it is: before its first tick, or where a branch begins.
+  /// Throws protocol::mcap::RecordingError.
   WorldRecorder(const RecordingOptions& options, const scene::World& world,
-                const v1::RecordingParent* parent = nullptr);
+                const BranchPoint* branch = nullptr);
 
   /// What the world has taken for its next tick.
   void took(const v1::Command& command);
@@ -25,8 +30,10 @@ class WorldRecorder {
   /// recording, which is logged; the world goes on.
   void ticked(const scene::World& world, const v1::TickEvents& events);
 
-  /// What was told without a tick, when contacts end with the world.
-  void ended(const v1::TickEvents& events);
+  /// A tick that could not be made: what `world` was told before it is written, and no more.
+  void tickFailed(const scene::World& world);
+  /// What was told without a tick: contacts that end with the world, or that a branch begins with.
+  void told(const v1::TickEvents& events);
   /// The world is at its beginning again; what it was told since its last tick is void.
   void beganAnew(const scene::World& world);
   /// Sends to the file what waits for more; for when no tick will come soon.
@@ -46,6 +53,7 @@ class WorldRecorder {
 
  private:
   void writeNames(const scene::Model& model);
+  void writeCommands(std::uint64_t tick, double time);
   template <class Work>
   void unlessBroken(const Work& work);
 

@@ -41,7 +41,7 @@ async function webSocketClass() {
 
 /**
  * Connects, for example to "ws://127.0.0.1:7878", and enters a world. Events go to `on.events`, `on.state`, `on.frame`
- * (with its attachment) and `on.bye`, in the order in which they come.
+ * (with its attachment), `on.replay` and `on.bye`, in the order in which they come.
  */
 export async function connect(
   url, { name = "enfilade javascript", token = "", world = "main", on = {} } = {},
@@ -118,6 +118,16 @@ export class Client {
 
   step(ticks = 1, avatars = false) {
     return this.request("step", { ticks, avatars }).then((reply) => reply.body);
+  }
+
+  /** Of a world that plays a recording: goes on from another tick. */
+  seek(tick) {
+    return this.request("seek", { tick: BigInt(tick) }).then((reply) => reply.body);
+  }
+
+  /** Leaves the recording here; `avatar`, if any, becomes this client's. */
+  takeOver(avatar = "") {
+    return this.request("takeOver", { avatar }).then((reply) => reply.body);
   }
 
   close() {

@@ -51,9 +51,10 @@ AvatarView viewOf(const std::string& name, const Avatar& avatar) {
   view.flying = avatar.flying;
   view.standsOn = avatar.standsOn;
   view.height = avatar.height;
+  view.standing = avatar.standing;
   view.move = {avatar.asked, avatar.lastMove, avatar.stoppedBy, avatar.atStop};
   for (const ChainLink& link : avatar.chain.links)
-    view.joints.push_back({link.value, link.stoppedBy});
+    view.joints.push_back({link.value, link.stoppedBy, leverOf(link)});
   return view;
 }
 

@@ -83,11 +83,15 @@ bool moves(const Chain& chain, std::size_t joint, std::size_t link) {
   return false;
 }
 
+double leverOf(const ChainLink& link) {
+  return link.joint.kind == LinkJoint::Kind::revolute ? link.reach : 1;
+}
+
 double chainReach(const Chain& chain, double tick) {
   double reach = 0;
   for (const ChainLink& link : chain.links) {
     const double step = std::min(std::abs(link.target - link.value), chain.speed * tick);
-    reach += step * (link.joint.kind == LinkJoint::Kind::revolute ? link.reach : 1);
+    reach += step * leverOf(link);
   }
   return reach;
 }

@@ -50,6 +50,9 @@ std::shared_ptr<const AvatarShape> shapeWith(const std::vector<AvatarPart>& base
 /// Whether joint `joint` moves link `link`: it is the link itself or one it hangs on.
 bool moves(const Chain& chain, std::size_t joint, std::size_t link);
 
+/// Metres: no point that the joint moves goes farther as its value changes by 1.
+double leverOf(const ChainLink& link);
+
 /// Metres: no point of the chain moves farther in one tick of `tick` seconds.
 double chainReach(const Chain& chain, double tick);
 

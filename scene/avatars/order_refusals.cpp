@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "scene/names.hpp"
 #include "scene/world_state.hpp"
 
 namespace enfilade::scene {
@@ -11,7 +12,6 @@ namespace {
 
 constexpr double kFarthest = 1e7;       // metres: doubles still resolve a nanometre there
 constexpr double kLongestWait = 86400;  // seconds
-constexpr std::size_t kLongestName = 64;
 constexpr std::size_t kMostWayPoints = 100000;
 constexpr double kMostTurn = 1000;  // radians: a joint's limits
 
@@ -44,14 +44,8 @@ Refusal badPoint(const std::string& field, const Vec3& point, double farthest = 
 }
 
 Refusal badName(const std::string& field, const std::string& name) {
-  const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
-           c == '_' || c == '-';
-  };
-  bool good = !name.empty() && name.size() <= kLongestName && name[0] != '.';
-  for (const char c : name) good = good && allowed(c);
-  if (good) return std::nullopt;
-  return field + " must be 1 to 64 letters, digits, '.', '_' or '-', and not begin with '.'";
+  if (isName(name)) return std::nullopt;
+  return field + kNameRule;
 }
 
 Refusal badPart(const std::string& field, const std::vector<Vec3>& points) {

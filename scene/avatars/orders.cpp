@@ -1,6 +1,7 @@
 // The avatars' queues: commands come in, orders start, go on and end. An order that takes no time
 // ends in the tick that it starts in and the next one starts; a capture keeps the avatar still for
 // its tick, so that the picture shows the place it was asked for.
+#include <algorithm>
 #include <cmath>
 
 #include "scene/avatars/follower.hpp"
@@ -30,6 +31,23 @@ std::string toldDropped(std::size_t orders) {
   return orders == 0 ? "" : "; " + std::to_string(orders) + " queued orders are dropped";
 }
 
+/// Takes all orders but the first `kept` out of a queue and tells each, as `like` does but for its
+/// tag; `by`: what did it. Of very many the last that is told counts the others.
+void dropQueued(std::deque<QueuedOrder>& queue, std::size_t kept, Notice like,
+                const std::string& by, TickReport& report) {
+  constexpr std::size_t kMostTold = 10'000;  // some 1 MB in a message
+  like.kind = Notice::Kind::dropped;
+  like.text = by;
+  const std::size_t told = std::min(queue.size(), kept + kMostTold);
+  for (std::size_t i = kept; i < told; ++i) {
+    like.tag = queue[i].tag;
+    if (i + 1 == told && told < queue.size())
+      like.text += ", and " + std::to_string(queue.size() - told) + " more orders";
+    report.notices.push_back(like);
+  }
+  queue.resize(std::min(queue.size(), kept));
+}
+
 Outcome follow(const Spawn& spawn, Follower& f) {
   if (f.avatar()) {
     f.tell(Notice::Kind::refused, "an avatar of this name is already in the world");
@@ -39,7 +57,7 @@ Outcome follow(const Spawn& spawn, Follower& f) {
   std::string told;
   if (const auto why = placeAvatar(f.world, spawn, avatar, told, f.count)) {
     f.tell(Notice::Kind::refused, *why + toldDropped(f.queue.size() - 1));
-    f.queue.resize(1);
+    dropQueued(f.queue, 1, f.report.notices.back(), "by a refused Spawn", f.report);
     return Outcome::ended;
   }
   avatar.id = f.world.firstAvatarId() + static_cast<EntityId>(f.world.avatarNames.size());
@@ -124,16 +142,24 @@ void followQueue(Follower& f) {
   }
 }
 
+/// What of the orders that act at once it is.
+std::string byWhat(const Order& order) {
+  return std::holds_alternative<Drive>(order) ? "by a Drive" : "by a DriveJoints at once";
+}
+
 /// Drops what the avatar was told before, as for an order that does not queue. Its body, if it is
 /// in the world; else that is told.
 Avatar* dropOrders(WorldState& world, const Command& command, TickReport& report) {
   std::deque<QueuedOrder>& queue = world.queues[command.avatar];
-  const std::string dropped = toldDropped(queue.size());
-  queue.clear();
+  const std::string counted = toldDropped(queue.size());
   const auto found = world.avatars.find(command.avatar);
-  if (found == world.avatars.end()) {
-    report.notices.push_back({Notice::Kind::refused, command.avatar, 0, command.tag, Vec3::Zero(),
-                              0, "there is no avatar of this name" + dropped});
+  const bool absent = found == world.avatars.end();
+  Notice notice{Notice::Kind::refused, command.avatar, 0, command.tag, Vec3::Zero(), 0, {}};
+  if (!absent) notice.id = found->second.id, notice.position = found->second.feet;
+  dropQueued(queue, 0, notice, byWhat(command.order), report);
+  if (absent) {
+    notice.text = "there is no avatar of this name" + counted;
+    report.notices.push_back(std::move(notice));
     return nullptr;
   }
   Avatar& avatar = found->second;
@@ -249,9 +275,10 @@ void removeLost(WorldState& world, TickReport& report) {
     if (std::string why = whyOut(world, avatar); !why.empty()) lost[name] = std::move(why);
   for (const auto& [name, why] : lost) {
     const Avatar& avatar = world.avatars.at(name);
-    report.notices.push_back({Notice::Kind::left, name, avatar.id, 0, avatar.feet, 0,
-                              why + "; its queued orders are dropped"});
-    world.queues[name].clear();
+    const Notice left{Notice::Kind::left, name, avatar.id, 0, avatar.feet, 0,
+                      why + "; its queued orders are dropped"};
+    report.notices.push_back(left);
+    dropQueued(world.queues[name], 0, left, "as the avatar left the scene", report);
     removeAvatar(world, name, report.contacts);
   }
 }

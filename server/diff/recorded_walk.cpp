@@ -137,7 +137,7 @@ class RunGatherer {
   }
 
   void add(const v1::Notice& notice, double time) {
-    if (notice.kind() == v1::Notice::KIND_CAPTURE) return;
+    if (!isEnd(notice)) return;
     OrderEnd end;
     end.kind = notice.kind();
     end.avatar = notice.avatar();
@@ -151,6 +151,10 @@ class RunGatherer {
     run_.orders.push_back(std::move(end));
   }
 
+  /// What is dropped was not told in older recordings, and has no outcome to compare.
+  static bool isEnd(const v1::Notice& notice) {
+    return notice.kind() != v1::Notice::KIND_CAPTURE && notice.kind() != v1::Notice::KIND_DROPPED;
+  }
   /// It ends no order that is counted.
   static bool isLeaving(const v1::Notice& notice) { return notice.kind() == v1::Notice::KIND_LEFT; }
 

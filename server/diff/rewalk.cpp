@@ -44,7 +44,9 @@ ModelOptions modelLike(const ModelOptions& asked, const v1::ModelChoices& record
 class OrderEnds {
  public:
   void add(const v1::Notice& notice, int count) {
-    if (notice.kind() == v1::Notice::KIND_LEFT || notice.kind() == v1::Notice::KIND_CAPTURE) return;
+    if (notice.kind() == v1::Notice::KIND_LEFT || notice.kind() == v1::Notice::KIND_CAPTURE ||
+        notice.kind() == v1::Notice::KIND_DROPPED)
+      return;
     int& missing = missing_[{notice.avatar(), notice.tag()}];
     open_ += (missing + count > 0 ? 1 : 0) - (missing > 0 ? 1 : 0);
     missing += count;

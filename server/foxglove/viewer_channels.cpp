@@ -159,7 +159,7 @@ void ViewerChannels::ticked(const scene::World& world, const v1::TickEvents& eve
   showAvatars(world);
 }
 
-void ViewerChannels::ended(const v1::TickEvents& events) {
+void ViewerChannels::told(const v1::TickEvents& events) {
   showContacts(events);
 }
 

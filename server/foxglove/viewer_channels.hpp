@@ -22,7 +22,8 @@ class ViewerChannels {
   void begin(const scene::World& world);
   /// After a tick: contacts as they come and go, everything else ten times a second.
   void ticked(const scene::World& world, const v1::TickEvents& events);
-  void ended(const v1::TickEvents& events);
+  /// Without a tick.
+  void told(const v1::TickEvents& events);
   /// A picture through the eyes of `avatar`.
   void picture(const std::string& avatar, const v1::Frame& description,
                const EncodedPicture& picture);

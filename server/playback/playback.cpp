@@ -42,7 +42,10 @@ scene::World Playback::worldAfter(std::uint64_t tick, std::shared_ptr<const scen
   if (tick < firstTick() || tick > lastTick())
     throw RecordingError(file_.string() + ": tick " + std::to_string(tick) +
                          " is not in it; give one from " + std::to_string(firstTick()) + " to " +
-                         std::to_string(lastTick()));
+                         std::to_string(lastTick()) +
+                         (recording_.beginsAnew() ? "; the world begins anew after that, and only "
+                                                    "the first walk is played"
+                                                  : ""));
   beganAt_ = firstTick();
   scene::World world = nearestWorld(tick, scene);
   recording_.seek(beganAt_);
@@ -54,9 +57,11 @@ scene::World Playback::worldAfter(std::uint64_t tick, std::shared_ptr<const scen
   return world;
 }
 
-bool Playback::feed(scene::World& world) {
+bool Playback::readTick() {
+  commands_.clear();
   while (auto item = recording_.next()) {
-    if (const auto* commands = std::get_if<v1::RecordedCommands>(&*item)) take(world, *commands);
+    if (auto* commands = std::get_if<v1::RecordedCommands>(&*item))
+      commands_.push_back(std::move(*commands));
     if (auto* state = std::get_if<v1::State>(&*item)) {
       recorded_ = std::move(*state);
       return true;
@@ -65,12 +70,19 @@ bool Playback::feed(scene::World& world) {
   return false;
 }
 
+bool Playback::feed(std::uint64_t next, const Submit& submit) {
+  if (!readTick()) return false;
+  for (const v1::RecordedCommands& commands : commands_) take(next, commands, submit);
+  return true;
+}
+
 std::optional<protocol::StateDifference> Playback::judge(const scene::World& world) const {
   return differenceFrom(world, recorded_);
 }
 
 bool Playback::step(scene::World& world) {
-  if (!feed(world)) return false;
+  if (!readTick()) return false;
+  for (const v1::RecordedCommands& commands : commands_) take(world, commands);
   scene::tick(world);
   if (auto difference = judge(world)) throw Diverged{world.snapshot()->tick, *difference};
   return true;

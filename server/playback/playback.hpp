@@ -1,6 +1,8 @@
 // A recording that is played from any tick on.
 #pragma once
 
+#include <vector>
+
 #include "protocol/seekable_recording.hpp"
 #include "server/playback/replayed_world.hpp"
 
@@ -26,9 +28,12 @@ class Playback {
   /// What worldAfter() began with: the tick of a checkpoint, or firstTick().
   std::uint64_t beganAt() const { return beganAt_; }
 
-  /// Gives `world` what it was told before its next tick; false at the recording's end. Throws
-  /// Diverged where the world does not take it.
-  bool feed(scene::World& world);
+  /// feed() goes on with what was recorded after `tick`.
+  void resume(std::uint64_t tick) { recording_.seek(tick); }
+  /// Gives `submit` what the world was told before tick `next`; false, and nothing is given, at the
+  /// recording's end. Throws Diverged where the world does not take it; RecordingError before
+  /// anything is given.
+  bool feed(std::uint64_t next, const Submit& submit);
   /// After that tick: how it differs from the recorded one; nullopt: not.
   std::optional<protocol::StateDifference> judge(const scene::World& world) const;
   /// feed(), the tick, judge(); throws Diverged. False at the end.
@@ -36,11 +41,13 @@ class Playback {
 
  private:
   scene::World nearestWorld(std::uint64_t tick, const std::shared_ptr<const scene::Scene>& scene);
+  bool readTick();
 
   std::filesystem::path file_;
   protocol::SeekableRecording recording_;
   std::uint64_t beganAt_ = 0;
-  v1::State recorded_;  ///< of the tick that was fed
+  std::vector<v1::RecordedCommands> commands_;  ///< before the tick that is fed
+  v1::State recorded_;                          ///< after it
 };
 
 }  // namespace enfilade::server

@@ -63,16 +63,20 @@ scene::World worldAt(std::shared_ptr<const scene::Scene> scene,
   return world;
 }
 
-void take(scene::World& world, const v1::RecordedCommands& commands) {
-  const std::uint64_t next = world.snapshot()->tick + 1;
+void take(std::uint64_t next, const v1::RecordedCommands& commands, const Submit& submit) {
   if (commands.tick() != next)
     throw RecordingError("commands of tick " + std::to_string(commands.tick()) +
                          " stand before tick " + std::to_string(next));
   for (const auto& one : commands.commands())
-    if (const auto refused = submit(world, one))
+    if (const auto refused = submit(one))
       throw Diverged{next,
                      {one.has_body() ? one.body().body() : one.avatar().avatar(), "command",
                       "taken", "refused: " + refused->message()}};
+}
+
+void take(scene::World& world, const v1::RecordedCommands& commands) {
+  take(world.snapshot()->tick + 1, commands,
+       [&](const v1::RecordedCommands::One& one) { return submit(world, one); });
 }
 
 std::optional<protocol::StateDifference> differenceFrom(const scene::World& world,

@@ -32,7 +32,12 @@ scene::World worldAtStart(std::shared_ptr<const scene::Scene> scene,
 scene::World worldAt(std::shared_ptr<const scene::Scene> scene,
                      const v1::RecordedCheckpoint& checkpoint);
 
-/// Gives the world what it was told before its next tick. Throws Diverged where it is refused.
+/// Hands a recorded command to a world; why that does not take it.
+using Submit = std::function<std::optional<v1::Error>(const v1::RecordedCommands::One&)>;
+
+/// Gives `submit` what the world was told before tick `next`. Throws Diverged where it is refused.
+void take(std::uint64_t next, const v1::RecordedCommands& commands, const Submit& submit);
+/// The same for the next tick of `world`.
 void take(scene::World& world, const v1::RecordedCommands& commands);
 
 /// How the last tick's state differs from the recorded one; nullopt: not.

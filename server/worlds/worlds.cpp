@@ -3,9 +3,9 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 
+#include "scene/names.hpp"
 #include "server/printable.hpp"
 #include "server/world_messages.hpp"
 
@@ -13,17 +13,7 @@ namespace enfilade::server {
 
 namespace {
 
-constexpr std::size_t kLongestName = 64;  // characters
-
-bool isNameLetter(char c) {
-  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_' || c == '-';
-}
-
-/// As avatars are named.
-bool isName(const std::string& name) {
-  return !name.empty() && name.size() <= kLongestName && name.front() != '.' &&
-         std::all_of(name.begin(), name.end(), isNameLetter);
-}
+using scene::kLongestName;
 
 /// The model's file without its folder and its ending, as far as names go.
 std::string stemOf(const scene::Scene& scene) {
@@ -31,8 +21,8 @@ std::string stemOf(const scene::Scene& scene) {
   constexpr std::size_t kRoomForNumber = 8;
   stem = stem.substr(0, kLongestName - kRoomForNumber);
   for (char& c : stem)
-    if (!isNameLetter(c)) c = '_';
-  return isName(stem) ? stem : "scene";
+    if (!scene::isNameLetter(c)) c = '_';
+  return scene::isName(stem) ? stem : "scene";
 }
 
 /// "stem", or "stem-2" and so on where that is taken.
@@ -58,7 +48,10 @@ v1::Error unknownWorld(const std::string& name) {
 
 ServedScene::ServedScene(std::string sceneName, std::shared_ptr<const scene::Scene> served,
                          const DrawingOptions& drawing)
-    : name(std::move(sceneName)), scene(std::move(served)), frames(scene, drawing), rays(scene) {}
+    : name(std::move(sceneName)),
+      scene(std::move(served)),
+      frames(scene, drawing),
+      questions(scene) {}
 
 Worlds::Worlds(const std::vector<std::shared_ptr<const scene::Scene>>& scenes,
                const WorldOptions& options, const DrawingOptions& drawing)
@@ -88,6 +81,11 @@ std::vector<std::shared_ptr<TickLoop>> Worlds::all() const {
   for (const auto& [name, world] : worlds_)
     if (world != main_) worlds.push_back(world);
   return worlds;
+}
+
+bool Worlds::stopping() const {
+  const std::lock_guard lock(mutex_);
+  return stopping_;
 }
 
 v1::WorldList Worlds::list() const {
@@ -131,8 +129,8 @@ void Worlds::drop(const std::string& name, const std::string& askedIn,
   if (!give(work)) done(shuttingDown());
 }
 
-void Worlds::dropIfEmpty(const std::string& name, const World& world) {
-  const std::string reason = "the world '" + name + "' was dropped when its last client left";
+void Worlds::dropIfEmpty(const std::string& name, const World& world, const std::string& why) {
+  const std::string reason = "the world '" + name + "' was dropped " + why;
   if (!world || find(name) != world || !world->askToStopIfEmpty(v1::ERROR_WORLD_DROPPED, reason))
     return;
   takeOut(name);
@@ -174,9 +172,8 @@ std::variant<v1::World, v1::Error> Worlds::make(WorldToMake wanted) {
 }
 
 std::optional<v1::Error> Worlds::problemOf(const WorldToMake& wanted) const {
-  if (!wanted.name.empty() && !isName(wanted.name)) {
-    return errorOf(v1::ERROR_BAD_MESSAGE,
-                   "name must be 1 to 64 letters, digits, '.', '_' or '-', and not begin with '.'",
+  if (!wanted.name.empty() && !scene::isName(wanted.name)) {
+    return errorOf(v1::ERROR_BAD_MESSAGE, std::string("name") + scene::kNameRule,
                    "create_world.name");
   }
   if (!sceneNamed(wanted.scene)) {
@@ -203,13 +200,20 @@ Worlds::World Worlds::start(const std::string& name, ServedScene& scene, bool dr
   WorldPlace place{name, scene.name, this, dropWhenEmpty, {}};
   const auto itself = std::make_shared<std::weak_ptr<TickLoop>>();
   place.becameEmpty = [this, name, itself] {
-    give([this, name, world = itself->lock()] { dropIfEmpty(name, world); });
+    give([this, name, world = itself->lock()] {
+      dropIfEmpty(name, world, "when its last client left");
+    });
   };
   WorldOptions options = options_;
-  if (main_) options.record.reset();  // one file holds one world: the first
-  auto world =
-      std::make_shared<TickLoop>(scene.scene, scene.frames, scene.rays, options, std::move(place));
+  if (main_) options.record.reset(), options.replay.reset();  // one file holds one world: the first
+  auto world = std::make_shared<TickLoop>(scene.scene, scene.frames, scene.questions, options,
+                                          std::move(place));
   *itself = world;  // before anybody can enter, and so leave
+  if (dropWhenEmpty) {
+    thread_.postAfter(options_.limits.entry, [this, name, itself] {
+      dropIfEmpty(name, itself->lock(), "since nobody entered it");
+    });
+  }
   const std::lock_guard lock(mutex_);
   if (!main_) main_ = world;
   worlds_[name] = world;
@@ -248,7 +252,7 @@ void Worlds::stop() {
 void Worlds::finishServices() {
   for (const auto& scene : scenes_) {
     scene->frames.finish();
-    scene->rays.finish();
+    scene->questions.finish();
   }
 }
 

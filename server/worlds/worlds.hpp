@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "server/frame_service.hpp"
-#include "server/ray_service.hpp"
+#include "server/question_service.hpp"
 #include "server/tick_loop.hpp"
 #include "server/work_thread.hpp"
 
@@ -28,7 +28,7 @@ struct ServedScene {
   const std::string name;  ///< as Welcome.scenes tells it
   const std::shared_ptr<const scene::Scene> scene;
   FrameService frames;
-  RayService rays;
+  QuestionService questions;
 };
 
 /// What a client asks for; "" lets the server choose.
@@ -57,6 +57,8 @@ class Worlds {
   std::vector<std::shared_ptr<TickLoop>> all() const;
   v1::WorldList list() const;
   std::vector<std::string> sceneNames() const;
+  /// The server ends, and all worlds with it.
+  bool stopping() const;
   /// Of the first scene; "" without a renderer.
   const std::string& rendererName() const { return scenes_.front()->frames.deviceName(); }
 
@@ -84,7 +86,7 @@ class Worlds {
   std::string freeName(const std::string& stem) const;
   ServedScene* sceneNamed(const std::string& name) const;
   std::variant<World, v1::Error> takeOut(const std::string& name);
-  void dropIfEmpty(const std::string& name, const World& world);
+  void dropIfEmpty(const std::string& name, const World& world, const std::string& why);
   void end(TickLoop& world, v1::ErrorCode code, const std::string& reason);
 
   const WorldOptions options_;

@@ -14,7 +14,7 @@ import numpy as np
 
 import enfilade
 from enfilade import messages
-from room import COLUMN, WALL, RoomCase
+from room import COLUMN, FLOOR, WALL, RoomCase
 
 
 class Walking(RoomCase):
@@ -152,6 +152,54 @@ class Seeing(RoomCase):
         scan = self.client.scan(at=(0, 1, 0), columns=4)
         self.assertEqual(scan.distance.shape, (1, 4))
         self.assertIn(WALL, scan.entity)
+
+    def test_pairs_are_told_by_id_name_and_avatar(self):
+        ann = self.client.spawn("ann", at=(0, 0, 0))
+        ann.enter()
+        wall = self.client.distance("wall", COLUMN)
+        self.assertAlmostEqual(wall.distance, (4.75 ** 2 + 1.75 ** 2) ** 0.5, places=6)
+        self.assertEqual((wall.a, wall.a_name, wall.b_name), (WALL, "wall", "column"))
+        first, second = self.client.distances([(ann, WALL), ("ann", "floor")], refined=True)
+        self.assertAlmostEqual(first.distance, 4.7, delta=0.02)
+        self.assertEqual(second.verdict, "separated")
+        self.assertLess(second.distance, 0.01)
+        self.assertEqual(len(self.client.distances([(WALL, FLOOR)] * 2001)), 2001)
+        self.assertEqual(self.client.distances([]), [])
+
+    def test_what_is_near_comes_nearest_first(self):
+        ann = self.client.spawn("ann", at=(0, 0, 0))
+        ann.enter()
+        near = self.client.touching(ann, within=5)
+        self.assertEqual([one.b_name for one in near.found], ["floor", "wall"])
+        self.assertEqual(near.left_out, 0)
+        self.assertEqual([one.b_name for one in self.client.touching(COLUMN).found], ["floor"])
+
+    def test_two_do_not_touch_before_the_time_that_is_told(self):
+        ann = self.client.spawn("ann", at=(0, 0, 0))
+        ann.enter()
+        ann.drive((2, 0, 0))
+        self.client.step(10)
+        told = self.client.cannot_touch_before(ann, "wall")
+        self.assertAlmostEqual(told.before, told.now.distance / 2, delta=0.02)
+        self.assertTrue(told.proved)
+        self.client.step(int(told.before / self.client.tick_seconds) - 1)
+        self.assertEqual(self.client.distance(ann, "wall").verdict, "separated")
+        self.assertLess(self.client.distance(ann, "wall").distance, 0.1)
+        sooner = self.client.cannot_touch_before(ann, "column", assume="any_command")
+        self.assertLess(sooner.before, 0.1)
+        self.assertEqual(self.client.cannot_touch_before("wall", "column").before, float("inf"))
+
+    def test_questions_about_nobody_are_refused(self):
+        for which in ("nobody", 99):
+            with self.assertRaises(enfilade.ServerError) as caught:
+                self.client.distance(which, "wall")
+            self.assertEqual(caught.exception.code, "ERROR_UNKNOWN_ENTITY")
+            self.assertEqual(caught.exception.field, "distances.pairs[0].a")
+        with self.assertRaises(enfilade.ServerError) as caught:
+            self.client.touching("wall", within=float("nan"))
+        self.assertEqual(caught.exception.field, "touching.within")
+        with self.assertRaises(ValueError):
+            self.client.cannot_touch_before("wall", "column", assume="luck")
 
     def test_names_come_for_ids(self):
         self.assertEqual(self.client.names([WALL, COLUMN, 99]),

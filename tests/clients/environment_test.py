@@ -2,6 +2,7 @@
 
 import time
 import unittest
+from pathlib import Path
 
 import numpy as np
 
@@ -96,6 +97,20 @@ class Environments(RoomCase):
         seen, rewards, terminated, truncated, infos = vector.step([[1, 0]] * 2)
         np.testing.assert_array_equal(rewards, [0, 0])
         np.testing.assert_array_equal(infos["tick"], [1, 1])
+
+    def test_a_server_with_tokens_takes_them_from_environments(self):
+        tokens = Path(self.folder.name) / "tokens"
+        tokens.write_text("admin keeper-0123456789\n")
+        with enfilade.serve(self.scene, "--token-file", str(tokens)) as server:
+            options = {"address": server.address, "starts": _STARTS, "channels": ()}
+            with self.assertRaises(enfilade.ServerError):
+                enfilade.VectorWalkEnv(num_envs=2, **options)
+            vector = enfilade.VectorWalkEnv(num_envs=2, token="keeper-0123456789", **options)
+            vector.reset(seed=1)
+            vector.close()
+            env = enfilade.WalkEnv(token="keeper-0123456789", **options)
+            env.reset(seed=1)
+            env.close()
 
     def test_a_vector_has_worlds_of_one_server_and_leaves_none(self):
         vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=3, starts=_STARTS,

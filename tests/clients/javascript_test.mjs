@@ -1,6 +1,7 @@
 // The JavaScript client against the real server. Run by `node --test`.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
+import { once } from "node:events";
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -53,6 +54,43 @@ test("a walk over a WebSocket meets the wall, and is told so", async () => {
   const begin = client.schemas.ContactEvent.nestedEnums[0].values.find((v) => v.name === "KIND_BEGIN");
   assert.deepEqual(heard.filter((c) => c.kind === begin.number).map((c) => c.bName), ["floor", "wall"]);
   client.close();
+});
+
+/** A server of its own; resolves to it and its port. */
+async function serve(...what) {
+  const process_ = spawn(process.env.ENFILADE, ["serve", ...what, "--listen", "127.0.0.1:0",
+    "--stop-at-end-of-input"], { stdio: ["pipe", "pipe", "ignore"] });
+  const [line] = await once(process_.stdout, "data");
+  return { process_, url: `ws://127.0.0.1:${JSON.parse(line).port}` };
+}
+
+async function stop(process_) {
+  process_.kill("SIGTERM");
+  await once(process_, "exit");
+}
+
+test("a recording is played, sought and taken over", async () => {
+  const walk = join(folder, "walk.mcap");
+  const recording = await serve(join(folder, "room.obj"), "--record", walk);
+  const walker = await connect(recording.url);
+  await walker.command("ann", "spawn", { at: { x: 0, y: 0.01, z: 0 } });
+  const recorded = (await walker.step(100)).stateHash;
+  await walker.step(50);
+  walker.close();
+  await stop(recording.process_);
+
+  const told = [];
+  const played = await serve(walk);
+  const client = await connect(played.url, { on: { replay: (replay) => told.push(replay) } });
+  assert.equal(client.welcome.replay.lastTick, 150n);
+  assert.equal((await client.seek(100)).stateHash, recorded);
+  assert.equal((await client.step(1)).tick, 101n);
+  await assert.rejects(client.command("ann", "walk", { along: [{ x: 3, y: 0, z: 0 }] }), /TakeOver/);
+  assert.equal((await client.takeOver("ann")).tick, 101n);
+  await client.command("ann", "walk", { along: [{ x: 3, y: 0, z: 0 }] });
+  assert.deepEqual(told.map((replay) => [replay.tick, replay.branched]), [[100n, false], [101n, true]]);
+  client.close();
+  await stop(played.process_);
 });
 
 test("several requests are under way, and refusals carry their code", async () => {

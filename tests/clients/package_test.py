@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+import enfilade
 from room import RoomCase
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -69,6 +70,16 @@ class Package(RoomCase):
                                0, "--to", 8, 0, 0)
         events = [json.loads(line) for line in told.splitlines()]
         self.assertIn(("begin", "wall"), [(one["kind"], one["b_name"]) for one in events])
+
+    def test_a_recording_is_played_and_taken_over(self):
+        walk, branch = (Path(self.folder.name) / name for name in ("walk.mcap", "branch.mcap"))
+        with enfilade.serve(self.scene, "--record", str(walk)) as server, server.connect() as client:
+            client.spawn("ann", at=(0, 0.01, 0)).walk((3, 0, 0))
+            client.run_until_idle()
+        told = self.run_python(PACKAGE / "examples" / "replay_and_take_over.py", walk, "--tick", 60,
+                               "--avatar", "ann", "--to", 0, 0, 3, "--record", branch)
+        self.assertIn("ann arrived", told)
+        self.assertTrue(branch.exists())
 
 
 if __name__ == "__main__":

@@ -54,7 +54,7 @@ struct House {
   House() { spdlog::set_level(spdlog::level::off); }
   std::shared_ptr<const scene::Scene> scene = server::testing::bodyRoom();
   server::FrameService frames{scene, {render::RendererKind::rays, {}}};
-  server::RayService rays{scene};
+  server::QuestionService questions{scene};
   Inbox inbox;
 };
 
@@ -76,7 +76,8 @@ server::ServerLimits smallLimits() {
 
 class SmallServer {
  public:
-  SmallServer() : served_(house().scene, house().frames, house().rays, {smallLimits(), {}, 0, {}}) {
+  SmallServer()
+      : served_(house().scene, house().frames, house().questions, {smallLimits(), {}, 0, {}}) {
     served_.post = post_;
     for (const ClientId id : {1, 2}) {
       Client& client = served_.clients[id];

@@ -201,6 +201,24 @@ TEST(AsyncClient, TakesSoManyRequestsAndNoMore) {
   EXPECT_THROW(client.request(metricsRequest(), [](const Reply&) {}), TooManyRequests);
 }
 
+TEST(AsyncClient, TellsThatTheConnectionIsLostBeforeItCountsWhatWasNotSent) {
+  std::uint16_t gone = 0;
+  {
+    const TestServer server([](TestConnection&) {});
+    gone = server.port();
+  }
+  std::optional<v1::Error> why;
+  AsyncHandlers handlers;
+  handlers.closed = [&](const v1::Error& error) { why = error; };
+  AsyncOptions options;
+  options.unsentBytes = 0;
+  AsyncClient client("127.0.0.1", gone, handlers, options);
+  ASSERT_TRUE(runUntil(client, [&] { return why.has_value(); }));
+  bool lost = false;
+  client.request(metricsRequest(), [&](const Reply& reply) { lost = reply.lost; });
+  EXPECT_TRUE(lost);
+}
+
 TEST(AsyncClient, RefusesAServerOfAnotherVersion) {
   const TestServer server([](TestConnection& connection) {
     v1::ServerMessage welcome = welcomeTo(*connection.receive());

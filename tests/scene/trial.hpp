@@ -81,6 +81,11 @@ struct Trial {
   double worstPenetration = 0;
 };
 
+/// The scene of a world that outlives what is asked of it.
+inline std::shared_ptr<const Scene> sharedScene(const World& world) {
+  return {std::shared_ptr<void>(), &world.scene()};
+}
+
 inline Walk to(double x, double z, double speed = 1.5, double y = 0) {
   return {{{x, y, z}}, speed};
 }

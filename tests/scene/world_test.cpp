@@ -45,7 +45,8 @@ TEST(World, ASpawnInsideSomethingOrOffEveryFloorSaysSo) {
   run.step();
   ASSERT_EQ(run.count(Kind::refused), 3);
   std::map<std::string, std::string> text;
-  for (const Notice& n : run.notices) text[n.avatar] = n.text;
+  for (const Notice& n : run.notices)
+    if (n.kind == Kind::refused) text[n.avatar] = n.text;
   EXPECT_NE(text["inside"].find("inside pillar"), std::string::npos) << text["inside"];
   EXPECT_NE(text["across"].find("pillar"), std::string::npos) << text["across"];
   EXPECT_NE(text["nowhere"].find("no floor"), std::string::npos) << text["nowhere"];
@@ -325,10 +326,60 @@ TEST(World, ADriveOfNobodyIsRefusedAndSaysWhatItDropped) {
   run.order("ann", to(1, 0));
   run.order("ann", Drive{{1.2, 0, 0}});
   run.ticks(10);
-  ASSERT_EQ(run.notices.size(), 1u);
-  EXPECT_EQ(run.notices[0].kind, Kind::refused);
-  EXPECT_NE(run.notices[0].text.find("2 queued orders are dropped"), std::string::npos);
+  ASSERT_EQ(run.notices.size(), 3u);
+  EXPECT_EQ(run.count(Kind::dropped), 2);
+  EXPECT_EQ(run.notices[2].kind, Kind::refused);
+  EXPECT_NE(run.notices[2].text.find("2 queued orders are dropped"), std::string::npos);
   EXPECT_TRUE(run.world.snapshot()->avatars.empty());
+}
+
+/// Tags of the orders that were told to be dropped, in order; each with what did it.
+std::vector<std::uint64_t> droppedTags(const Trial& run, const std::string& by) {
+  std::vector<std::uint64_t> tags;
+  for (const Notice& notice : run.notices) {
+    if (notice.kind != Kind::dropped) continue;
+    EXPECT_EQ(notice.text, by);
+    tags.push_back(notice.tag);
+  }
+  return tags;
+}
+
+TEST(World, OrdersThatADriveDropsAreToldWithTheirTags) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.untilIdle();
+  submit(run.world, {"ann", to(3, 0), 7});
+  submit(run.world, {"ann", Wait{5}, 8});
+  submit(run.world, {"bob", Wait{5}, 9});
+  run.ticks(10);
+  run.notices.clear();
+  submit(run.world, {"ann", Drive{{0, 0, 1}}, 10});
+  run.ticks(2);
+  EXPECT_EQ(droppedTags(run, "by a Drive"), (std::vector<std::uint64_t>{7, 8}));
+  EXPECT_EQ(run.notices[0].id, run.view("ann").id);
+  run.ticks(60);
+  EXPECT_EQ(run.count(Kind::arrived), 0);
+}
+
+TEST(World, OrdersThatWaitForARefusedSpawnAreToldAsDropped) {
+  Trial run({floorBox(), {"block", {-1, 0, -1}, {1, 2, 1}}});
+  submit(run.world, {"ann", Spawn{{0, 0.5, 0}}, 1});
+  submit(run.world, {"ann", to(3, 0), 2});
+  submit(run.world, {"ann", Leave{}, 3});
+  run.ticks(2);
+  EXPECT_EQ(run.count(Kind::refused), 1);
+  EXPECT_EQ(droppedTags(run, "by a refused Spawn"), (std::vector<std::uint64_t>{2, 3}));
+}
+
+TEST(World, OfVeryManyDroppedOrdersTheLastThatIsToldCountsTheOthers) {
+  Trial run({floorBox()});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.untilIdle();
+  for (int i = 0; i < 10'500; ++i) run.order("ann", Wait{5});
+  run.order("ann", Drive{});
+  run.ticks(1);
+  EXPECT_EQ(run.count(Kind::dropped), 10'000);
+  EXPECT_EQ(run.notices.back().text, "by a Drive, and 500 more orders");
 }
 
 TEST(World, OneWhoLeavesAndComesBackUnderTheSameNameIsAnother) {

@@ -115,6 +115,10 @@ TEST_F(Roles, PagesWantATokenTooButHealthDoesNot) {
   EXPECT_EQ(get("/metrics?token=" + kLooker), "HTTP/1.1 200");
   EXPECT_EQ(get("/metrics", "Authorization: Bearer " + kLooker + "\r\n"), "HTTP/1.1 200");
   EXPECT_EQ(get("/healthz"), "HTTP/1.1 200");
+  // Which worlds there are is told to those alone who may ask.
+  EXPECT_EQ(get("/healthz?world=main"), "HTTP/1.1 401");
+  EXPECT_EQ(get("/healthz?world=nowhere"), "HTTP/1.1 401");
+  EXPECT_EQ(get("/healthz?world=main&token=" + kLooker), "HTTP/1.1 200");
 }
 
 TEST(Listening, AnAddressOfStrangersWantsATokenAndInsecure) {

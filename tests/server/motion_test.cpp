@@ -134,5 +134,17 @@ TEST_F(AvatarOrders, WhatIsAbsurdIsRefusedWithItsFieldAndChangesNothing) {
   EXPECT_TRUE(world.snapshot()->avatars.empty());
 }
 
+TEST(CommandLine, MoreScenesThanAServerHasWorldsAreRefused) {
+  std::vector<const char*> arguments{"enfilade", "serve"};
+  const auto read = [&] {
+    return readCommandLine(static_cast<int>(arguments.size()), arguments.data());
+  };
+  for (int i = 0; i < 64; ++i) arguments.push_back("room.obj");
+  EXPECT_TRUE(std::holds_alternative<ProgramCommand>(read()));
+  arguments.push_back("room.obj");
+  ASSERT_TRUE(std::holds_alternative<ExitCode>(read()));
+  EXPECT_EQ(std::get<ExitCode>(read()), ExitCode::usage);
+}
+
 }  // namespace
 }  // namespace enfilade::server::testing

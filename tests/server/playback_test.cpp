@@ -1,4 +1,7 @@
 // Recordings that are begun in the middle: verified from there, and gone on with.
+#include <set>
+
+#include "protocol/recording.hpp"
 #include "tests/server/program_trial.hpp"
 
 namespace enfilade::server {
@@ -93,6 +96,38 @@ TEST_F(Playback, ABranchIsARecordingThatCanBeSoughtAndLeftAgain) {
                 .code,
             0);
   EXPECT_EQ(verify("c.mcap").code, 0);
+}
+
+/// The contacts that live when a recording begins, and were told so; what ends must have begun.
+std::set<std::pair<std::string, std::string>> livingAtItsBeginning(const std::string& file) {
+  protocol::RecordingReader reader(file);
+  std::set<std::pair<std::string, std::string>> live, first;
+  bool ticked = false;
+  while (const auto item = reader.next()) {
+    ticked = ticked || std::holds_alternative<v1::State>(*item);
+    const auto* events = std::get_if<v1::TickEvents>(&*item);
+    if (!events) continue;
+    for (const v1::ContactEvent& event : events->contacts()) {
+      const std::pair pair{event.a_name(), event.b_name()};
+      const bool begins = event.kind() == v1::ContactEvent::KIND_BEGIN;
+      const bool ends = event.kind() == v1::ContactEvent::KIND_END;
+      EXPECT_TRUE(!begins || live.insert(pair).second) << event.ShortDebugString();
+      EXPECT_TRUE(!ends || live.erase(pair) == 1) << event.ShortDebugString();
+      EXPECT_TRUE(event.tick() >= 700 || !ticked) << event.ShortDebugString();
+    }
+    if (events->tick() == 700) first = live;
+  }
+  EXPECT_TRUE(live.empty());
+  return first;
+}
+
+TEST_F(Playback, WhatLivesWhereABranchBeginsIsToldThere) {
+  ASSERT_EQ(replay({path("walk.mcap"), "--from", "700", "--then", path("wait.jsonl"), "--out",
+                    path("b"), "--record", path("b.mcap")})
+                .code,
+            0);
+  EXPECT_TRUE(livingAtItsBeginning(path("b.mcap")).contains({"ann", "room_floor"}));
+  EXPECT_EQ(verify("b.mcap").code, 0);
 }
 
 TEST_F(Playback, WhatCannotBeBegunIsRefusedWithTheReason) {

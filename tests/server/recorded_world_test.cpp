@@ -86,6 +86,20 @@ TEST(RecordedWorld, WhatIsRefusedIsNotInTheFileAndWhatIsTakenIs) {
   EXPECT_EQ(commands, 1);
 }
 
+TEST(RecordedWorld, WhatATickThatFailedWasToldIsInTheFile) {
+  const auto file = fileFor("failed");
+  RecordedWorld world{scene::World(smallRoom())};
+  world.record(optionsFor(file));
+  world.tick();
+  EXPECT_FALSE(world.submit(spawn("ann", 0, 0, 0)));
+  world.recorder()->tickFailed(world);
+  protocol::RecordingReader reader(file);
+  std::uint64_t tick = 0;
+  while (const auto item = reader.next())
+    if (const auto* told = std::get_if<v1::RecordedCommands>(&*item)) tick = told->tick();
+  EXPECT_EQ(tick, 2u);
+}
+
 TEST(RecordedWorld, WhatWasToldBeforeAWorldBeganAnewIsVoid) {
   const auto file = fileFor("void");
   RecordedWorld world{scene::World(smallRoom())};

@@ -273,8 +273,8 @@ TEST_F(Sessions, EntitiesAreDescribedInPagesOfBoundedSize) {
 
 TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
   FrameService frames(smallRoom());
-  RayService rays(smallRoom());
-  TickLoop loop(smallRoom(), frames, rays);
+  QuestionService questions(smallRoom());
+  TickLoop loop(smallRoom(), frames, questions);
   const auto out = std::make_shared<OutgoingQueue>(OutgoingBounds{std::size_t{1} << 30, 2},
                                                    encodeShared(v1::Bye()), [] {});
   const ClientId ann = loop.join("ann", Role::admin, out, 1);
@@ -304,8 +304,8 @@ TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
 
 TEST(Requests, OneThatFailsForAFaultOfOursIsToldAndTheNextIsAnswered) {
   FrameService frames(smallRoom());
-  RayService rays(smallRoom());
-  ServedWorld served(smallRoom(), frames, rays);
+  QuestionService questions(smallRoom());
+  ServedWorld served(smallRoom(), frames, questions);
   bool faulty = true;  // the first message that is sent throws
   const auto wake = [&] {
     if (std::exchange(faulty, false)) throw std::length_error("too long");

@@ -3,10 +3,14 @@
 
 #include <unistd.h>
 
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
 #include <fstream>
 #include <future>
 #include <numbers>
+#include <thread>
 
+#include "server/listener.hpp"
 #include "tests/server/becomes_true.hpp"
 #include "tests/server/raw_connection.hpp"
 #include "tests/server/served_room.hpp"
@@ -264,6 +268,49 @@ TEST_F(ServedWorlds, OneThatIsToGoWhenEmptyGoesWithItsLastClient) {
   EXPECT_TRUE(becomesTrue([&] { return list(main).size() == 1; }));
 }
 
+TEST_F(ServedWorlds, OneThatNobodyEntersGoesAfterAWhile) {
+  ServerLimits limits;
+  limits.entry = std::chrono::milliseconds(300);
+  serve(limits);
+  protocol::Client main = client("main");
+  create(main, "stays");
+  create(main, "entered", "", true);
+  const protocol::Client inside = clientIn("entered");
+  create(main, "forgotten", "", true);
+  EXPECT_EQ(list(main).size(), 4u);
+  ASSERT_TRUE(becomesTrue([&] { return list(main).size() == 3; }));
+  for (const v1::World& world : list(main)) EXPECT_NE(world.name(), "forgotten");
+}
+
+TEST_F(ServedWorlds, AClientThatGoesWhileItIsNotReadIsNoticed) {
+  ServerLimits limits;
+  limits.requestsUnderWay = 4;
+  limits.ticksPerStep = 1'000'000'000;  // days
+  serve(limits);
+  protocol::Client watch = client("watch");
+  create(watch, "b");
+  {
+    RawConnection bob(server_->port());
+    bob.sendMagic();
+    v1::ClientMessage message;
+    message.set_request_id(1);
+    message.mutable_hello()->set_protocol_version("1.0.0");
+    message.mutable_hello()->set_world("b");
+    bob.send(message);
+    ASSERT_TRUE(bob.receive().value().has_welcome());
+    message.set_request_id(2);
+    message.mutable_step()->set_ticks(limits.ticksPerStep);
+    bob.send(message);
+    for (std::uint64_t id = 3; id < 20; ++id) {
+      message.set_request_id(id);
+      message.mutable_metrics();
+      bob.send(message);
+    }
+    ASSERT_TRUE(becomesTrue([&] { return list(watch)[1].tick() > 10; }));
+  }
+  EXPECT_TRUE(becomesTrue([&] { return list(watch)[1].clients() == 0; }));
+}
+
 /// A hall 100 m wide, with as many posts as are asked for.
 std::shared_ptr<const scene::Scene> hall(std::size_t posts) {
   scene::Model model = smallRoom()->model();
@@ -315,6 +362,21 @@ TEST_F(ServedWorlds, MetricsAndHealthCoverAllOfThem) {
   EXPECT_NE(get("/healthz").find("\r\n\r\nok\n"), std::string::npos);
   EXPECT_EQ(get("/metrics?world=c").substr(0, 12), "HTTP/1.1 404");
   EXPECT_EQ(get("/mjpeg/avatar/ann?world=c").substr(0, 12), "HTTP/1.1 404");
+}
+
+TEST(Listening, WhoComesWhileTheWorldsEndIsToldSo) {
+  boost::asio::io_context context{1};
+  Worlds worlds({smallRoom()}, {}, {});
+  Listener listener(context, {"127.0.0.1", 0}, worlds, {}, {});
+  listener.start();
+  std::thread network([&] { context.run(); });
+  worlds.stop();
+  const v1::ErrorCode code =
+      codeOf([&] { protocol::Client("127.0.0.1", listener.port(), protocol::ClientOptions{}); });
+  EXPECT_EQ(code, v1::ERROR_SHUTTING_DOWN);
+  boost::asio::post(context, [&] { listener.stop(); });
+  network.join();
+  worlds.finishServices();
 }
 
 // ---- without sockets ----------------------------------------------------------------------------

@@ -19,11 +19,12 @@ from .client import Avatar, Client, connect
 from .environment import WalkEnv
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError, StartFailed
 from .process import Server, serve
-from .results import AvatarState, Contact, Frame, Hits, Notice, Scan, State, Step, World
+from .results import (Apart, AvatarState, Contact, Frame, Hits, Notice, Pair, Replay, Scan, State,
+                      Step, Touching, World)
 from .vector_environment import VectorWalkEnv
 
 __all__ = [
-    "Avatar", "AvatarState", "Client", "ConnectionFailed", "Contact", "EnfiladeError", "Frame",
-    "Hits", "Notice", "OrderFailed", "Scan", "Server", "ServerError", "StartFailed", "State", "Step",
-    "VectorWalkEnv", "WalkEnv", "World", "connect", "messages", "serve",
+    "Apart", "Avatar", "AvatarState", "Client", "ConnectionFailed", "Contact", "EnfiladeError", "Frame",
+    "Hits", "Notice", "OrderFailed", "Pair", "Replay", "Scan", "Server", "ServerError", "StartFailed",
+    "State", "Step", "Touching", "VectorWalkEnv", "WalkEnv", "World", "connect", "messages", "serve",
 ]

@@ -12,8 +12,9 @@ import numpy as np
 from . import messages, results
 from .connection import Connection, Received, raise_refusal, server_error
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError
-from .questions import Point, frame_request, points, vec
-from .results import AvatarState, Contact, Frame, Hits, Notice, Scan, State, Step, World
+from .questions import Point, cannot_touch_query, entity, frame_request, points, vec
+from .results import (Apart, AvatarState, Contact, Frame, Hits, Notice, Pair, Replay, Scan, State,
+                      Step, Touching, World)
 
 PROTOCOL_VERSION = "1.0.0"
 KEPT_FRAMES = 16  # of watches, until frames() takes them; older ones go first
@@ -21,6 +22,7 @@ LONGEST_RUN = 36_000  # ticks that run_until_idle() makes before it gives up
 ENTRY_TICKS = 3  # that enter() makes: whoever had the name before leaves in the first
 MOST_AT_ONCE = 10_000  # messages that are taken without waiting, before what they told is given
 
+Entity = Union[int, str, "Avatar"]  # an id, a name or a path
 Reply = Tuple[Any, memoryview]  # a message and its attachment
 
 
@@ -53,6 +55,7 @@ class Client:
         self._notices: Deque[Notice] = deque()
         self._states: Deque[State] = deque(maxlen=1)
         self._frames: Deque[Frame] = deque(maxlen=KEPT_FRAMES)
+        self._replay: Optional[Replay] = None  # as the server told it last
         self._sequence = 0  # of the events that came last
         self._answered = 0  # the request whose reply was taken last
         hello = messages.Hello(protocol_version=PROTOCOL_VERSION, client_name=name, token=token,
@@ -63,6 +66,8 @@ class Client:
             self._connection.close()
             raise
         self._connection.max_message = self.limits.max_message
+        if self._replay is None and self.welcome.HasField("replay"):
+            self._replay = results.replay(self.welcome.replay)
 
     # ---- what the server is -----------------------------------------------------------------
 
@@ -155,6 +160,8 @@ class Client:
             self._keep_events(received)
         elif body == "state":
             self._states.append(results.state(message.state))
+        elif body == "replay":
+            self._replay = results.replay(message.replay)
         elif body == "frame":
             if not self._frames or self._frames[-1].message != message.frame:
                 self._frames.append(results.frame(message.frame, received.attachment))
@@ -226,6 +233,29 @@ class Client:
         self._states.clear()
         self._frames.clear()
 
+    # ---- recordings -------------------------------------------------------------------------
+
+    @property
+    def replay(self) -> Optional[Replay]:
+        """How the recording stands that this world plays, as far as the server told it: at each
+        change, which is not each tick. None: the world plays none."""
+        for _ in range(MOST_AT_ONCE):
+            if self._connection.broken or not self._await_events(0.0):
+                break
+        return self._replay
+
+    def seek(self, tick: int) -> Step:
+        """Goes on from another tick of the recording, replay.first_tick to replay.last_tick; a branch
+        is given up. Contacts that end by it (reason "seek") and begin by it are among contacts()."""
+        reply, _ = self.request(seek=messages.Seek(tick=tick))
+        return Step(reply.seek.tick, reply.seek.time, reply.seek.state_hash, False)
+
+    def take_over(self, avatar: str = "") -> Optional["Avatar"]:
+        """Leaves the recording and goes on from here: from now on orders are taken. `avatar` becomes
+        this client's and forgets what it was told; without one the world alone leaves."""
+        self.request(take_over=messages.TakeOver(avatar=avatar))
+        return Avatar(self, avatar) if avatar else None
+
     # ---- worlds -----------------------------------------------------------------------------
 
     @property
@@ -247,7 +277,8 @@ class Client:
                      drop_when_empty: bool = False) -> World:
         """Makes a world, for which the server finds a name where none is given; of the scene of this
         client's own world where none is given. connect(..., world=NAME) enters it. It stays until
-        drop_world(), or, with `drop_when_empty`, until its last client has left."""
+        drop_world(), or, with `drop_when_empty`, until its last client has left, or nobody entered it
+        within a minute."""
         reply, _ = self.request(create_world=messages.CreateWorld(
             name=name, scene=scene, drop_when_empty=drop_when_empty))
         return results.world(reply.create_world.world)
@@ -422,6 +453,45 @@ class Client:
         reply, attachment = self.request(rays=messages.RayQuery(
             scan=scan, through_avatar=through_avatar, through_glass=through_glass))
         return results.scan(reply.rays, attachment)
+
+    def distance(self, a: Entity, b: Entity, refined: bool = False, *,
+                 tick: Optional[int] = None) -> Pair:
+        """How two things stand to one another, exactly: each an entity id, a name, a path or an
+        Avatar. `refined`: within 1e-15 of the distance, and with the depth of penetration."""
+        return self.distances([(a, b)], refined, tick=tick)[0]
+
+    def distances(self, pairs: Sequence[Tuple[Entity, Entity]], refined: bool = False, *,
+                  tick: Optional[int] = None) -> List[Pair]:
+        """distance() of many pairs at one tick, in their order; as many requests as
+        limits.max_pairs makes it."""
+        found: List[Pair] = []
+        page = self.limits.max_pairs
+        for start in range(0, len(pairs), page):
+            query = messages.DistanceQuery(refined=refined, tick=tick, pairs=[
+                messages.DistanceQuery.Pair(a=entity(a), b=entity(b))
+                for a, b in pairs[start:start + page]])
+            reply = self.request(distances=query)[0].distances
+            found += [results.pair(one, reply.tick) for one in reply.pairs]
+        if found and found[0].tick != found[-1].tick:
+            raise EnfiladeError(f"distances: the clock went on between them, from tick "
+                                f"{found[0].tick} to {found[-1].tick}: pause() first, or ask at "
+                                f"most {page}")
+        return found
+
+    def touching(self, which: Entity, within: float = 0.0, *,
+                 tick: Optional[int] = None) -> Touching:
+        """What touches an entity or penetrates it, and what is nearer than `within` metres."""
+        reply, _ = self.request(touching=messages.TouchingQuery(
+            entity=entity(which), within=within, tick=tick))
+        return results.touching(reply.touching)
+
+    def cannot_touch_before(self, a: Entity, b: Entity, *, assume: str = "present_motion",
+                            least: float = 0.0, tick: Optional[int] = None) -> Apart:
+        """Before which time two certainly do not touch: as long as "present_motion" stays, or
+        whatever avatars and bodies are told ("any_command"). `least`: the shortest time (seconds)
+        that is worth waiting before looking again."""
+        reply, _ = self.request(cannot_touch=cannot_touch_query(a, b, assume, least, tick))
+        return results.apart(reply.cannot_touch)
 
     def names(self, ids: Union[np.ndarray, Iterable[int]]) -> Dict[int, str]:
         """An object's path or an avatar's name, by entity id; "" where no entity has the id. An

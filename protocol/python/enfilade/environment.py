@@ -69,7 +69,7 @@ class WalkEnv(spaces.EnvBase):
                  speed: float = 1.4, turn_speed: float = math.pi / 2, max_steps: int = 1000,
                  fov_y: float = 1.2, discrete: bool = False,
                  render_mode: Optional[str] = "rgb_array", server_arguments: Sequence[str] = (),
-                 client: Optional[Client] = None, world: str = "main") -> None:
+                 client: Optional[Client] = None, world: str = "main", token: str = "") -> None:
         if not len(starts):
             raise ValueError("starts: give at least one place to begin at")
         self.starts = [_numbers(start, f"starts[{i}]", (3, 4)) for i, start in enumerate(starts)]
@@ -107,8 +107,8 @@ class WalkEnv(spaces.EnvBase):
         self.server: Optional[Server] = None
         self._own_client = client is None
         try:
-            self.client = client or self._connected(scene, address, server_arguments,
-                                                      world)
+            self.client = client or self._connected(scene, address, server_arguments, world=world,
+                                                    token=token)
             self._begin()
         except BaseException:
             self.close()
@@ -127,11 +127,11 @@ class WalkEnv(spaces.EnvBase):
         self.metadata = {**self.metadata, "render_fps": 1 / self._seconds}
 
     def _connected(self, scene: Union[str, Path, None], address: str,
-                   arguments: Sequence[str], world: str) -> Client:
+                   arguments: Sequence[str], **options: str) -> Client:
         if scene is None:
-            return connect(address, name="enfilade environment", world=world)
+            return connect(address, name="enfilade environment", **options)
         self.server = serve(scene, *arguments)
-        return self.server.connect(name="enfilade environment", world=world)
+        return self.server.connect(name="enfilade environment", **options)
 
     def _observation_space(self) -> Any:
         width, height = self.size

@@ -24,6 +24,9 @@ _REMEDIES = {
     "ERROR_UNSUPPORTED": "use a server that offers it; see Client.capabilities",
     "ERROR_UNAUTHENTICATED": "connect with token=",
     "ERROR_BAD_RAYS": "change the field that is named",
+    "ERROR_REPLAY_ENDED": "seek() goes elsewhere, take_over() goes on from here",
+    "ERROR_UNKNOWN_ENTITY": "give an id, a name or a path of what is in the world now",
+    "ERROR_TOO_COMPLEX": "ask for fewer pairs, or for smaller pieces",
 }
 
 

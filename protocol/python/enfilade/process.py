@@ -41,8 +41,8 @@ def find_program() -> str:
 
 def serve(scene: Union[str, Path], *arguments: str, program: Optional[str] = None,
           seconds: float = 120.0) -> "Server":
-    """Serves `scene` on a free port of 127.0.0.1 and returns when clients may connect. `arguments`
-    are further ones of `enfilade serve`. Raises StartFailed after `seconds`, or when it ends."""
+    """Serves `scene`, a model or a recording that is played, on a free port of 127.0.0.1 and returns
+    when clients may connect. `arguments` are further ones of `enfilade serve`. Raises StartFailed after `seconds`, or when it ends."""
     return Server(scene, arguments, program or find_program(), seconds)
 
 
@@ -158,9 +158,9 @@ class Server:
         """What it wrote to stderr so far; also after stop()."""
         return self._running.read_log()
 
-    def connect(self, *, name: str = "enfilade python", timeout: float = 30.0,
+    def connect(self, *, name: str = "enfilade python", token: str = "", timeout: float = 30.0,
                 world: str = "main") -> Client:
-        client = connect(self.address, name=name, timeout=timeout, world=world)
+        client = connect(self.address, name=name, token=token, timeout=timeout, world=world)
         self._running.clients.add(client)
         return client
 

@@ -25,11 +25,29 @@ def points(points: Any, name: str) -> np.ndarray:
     return array
 
 
+def entity(which: Any) -> Any:
+    """An EntityRef of an id, of a name or path, or of what has a name, as an Avatar."""
+    if isinstance(which, str):
+        return messages.EntityRef(name=which)
+    if isinstance(getattr(which, "name", None), str):
+        return messages.EntityRef(name=which.name)
+    return messages.EntityRef(id=which)
+
+
 def _named(prefix: str, name: str, argument: str) -> int:
     number = messages._found.get(prefix + name.upper())
     if number is None:
         raise ValueError(f"{argument}: {name!r} is none")
     return int(number)
+
+
+def cannot_touch_query(a: Any, b: Any, assume: str, least: float, tick: Optional[int]) -> Any:
+    kinds = messages.CannotTouchQuery.DESCRIPTOR.enum_types_by_name["Assume"].values_by_name
+    kind = kinds.get("ASSUME_" + assume.upper())
+    if kind is None or kind.number == 0:
+        raise ValueError(f"assume: {assume!r} is none; give present_motion or any_command")
+    return messages.CannotTouchQuery(a=entity(a), b=entity(b), assume=kind.number, least=least,
+                                     tick=tick)
 
 
 def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Optional[Point] = None,

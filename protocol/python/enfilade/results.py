@@ -27,7 +27,7 @@ class Contact:
     tick: int
     time: float
     kind: str  # "begin", "end", "near", "blocked", "enter", "leave", "left_world"
-    reason: str  # of an end: "parted", "left", "shutdown", "restart"
+    reason: str  # of an end: "parted", "left", "shutdown", "restart", "seek"
     phase: str  # of "near": "begin", "min", "end"
     a: int
     b: int
@@ -60,7 +60,8 @@ class Notice:
     """How an order went: Notice of the .proto."""
 
     tick: int
-    kind: str  # "spawned", "refused", "arrived", "blocked", "done", "capture", "left"
+    kind: str  # "spawned", "refused", "arrived", "blocked", "done", "capture", "left",
+    #            "dropped"
     avatar: str
     id: int
     tag: int
@@ -254,6 +255,97 @@ def scan(reply: Any, attachment: memoryview) -> Scan:
 
 
 @dataclass(frozen=True)
+class Replay:
+    """How the recording that a world plays stands: Replay of the .proto."""
+
+    file: str
+    first_tick: int  # that can be sought
+    last_tick: int
+    tick: int  # when this was told
+    at_end: bool
+    branched: bool  # somebody took over
+    branched_at: int  # the last recorded tick before
+    clock: str  # "lockstep", "free_run", "paused"
+    speed: float  # simulated seconds a second, when it runs freely
+    diverged: str  # why it cannot go on as recorded; "": it can
+
+
+def replay(message: Any) -> Replay:
+    return Replay(file=message.file, first_tick=message.first_tick, last_tick=message.last_tick,
+                  tick=message.tick, at_end=message.at_end, branched=message.branched,
+                  branched_at=message.branched_at, clock=_mode(message.clock),
+                  speed=message.clock.speed, diverged=message.diverged)
+
+
+def _mode(clock: Any) -> str:
+    modes = messages.Clock.DESCRIPTOR.enum_types_by_name
+    return messages.word(modes["Mode"], clock.mode, "MODE_")
+
+
+@dataclass(frozen=True)
+class Pair:
+    """How two entities stand to one another: PairState of the .proto. Exact for its tick."""
+
+    tick: int
+    a: int
+    b: int
+    a_name: str
+    b_name: str
+    verdict: str  # "separated", "touching", "penetrating"
+    distance: float  # metres; 0 unless separated
+    error_bound: float
+    point_a: Vector
+    point_b: Vector
+    normal: Vector  # unit, from a to b
+    decided_by: str  # "filter" or "rational"
+    penetration: float  # metres, of the nearest parts; only when it was refined
+
+
+def pair(message: Any, tick: int) -> Pair:
+    return Pair(
+        tick=tick, a=message.a, b=message.b, a_name=message.a_name, b_name=message.b_name,
+        verdict=_verdict(message.verdict), distance=message.distance,
+        error_bound=message.error_bound, point_a=vector(message.point_a),
+        point_b=vector(message.point_b), normal=vector(message.normal),
+        decided_by=messages.word(messages.DecidedBy, message.decided_by, "DECIDED_BY_"),
+        penetration=message.penetration)
+
+
+@dataclass(frozen=True)
+class Touching:
+    """What touches an entity, or is near to it; the nearest first."""
+
+    tick: int
+    found: List[Pair]  # `a` is the entity that was asked about
+    left_out: int  # that were near, but took more work or room than one answer is given
+
+
+def touching(reply: Any) -> Touching:
+    return Touching(reply.tick, [pair(one, reply.tick) for one in reply.found], reply.left_out)
+
+
+@dataclass(frozen=True)
+class Apart:
+    """Until when two certainly stay apart: CannotTouchReply of the .proto."""
+
+    tick: int
+    now: Pair
+    before: float  # seconds from now; 0: nothing is known; infinity: they cannot touch at all
+    closing_speed: float
+    closing_acceleration: float
+    look_again: float  # seconds
+    proved: bool  # nothing is missed by looking again only then
+
+
+def apart(reply: Any) -> Apart:
+    return Apart(tick=reply.tick, now=pair(reply.now, reply.tick),
+                 before=float("inf") if reply.never else reply.before,
+                 closing_speed=reply.closing_speed,
+                 closing_acceleration=reply.closing_acceleration,
+                 look_again=reply.look_again, proved=reply.proved)
+
+
+@dataclass(frozen=True)
 class World:
     """One of the server's worlds: World of the .proto."""
 
@@ -269,8 +361,6 @@ class World:
 
 
 def world(message: Any) -> World:
-    modes = messages.Clock.DESCRIPTOR.enum_types_by_name
     return World(name=message.name, scene=message.scene, clients=message.clients, tick=message.tick,
-                 clock=messages.word(modes["Mode"], message.clock.mode, "MODE_"),
-                 speed=message.clock.speed, driven=message.clock.has_driver,
+                 clock=_mode(message.clock), speed=message.clock.speed, driven=message.clock.has_driver,
                  drop_when_empty=message.drop_when_empty, failure=message.failure)

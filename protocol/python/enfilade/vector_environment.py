@@ -21,6 +21,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
     scene or address: a model that a server process is started for, or HOST:PORT of one that runs and
         lets this client make worlds (the role admin). They are dropped when their client leaves.
     world_scene: one of the server's scenes, by name; empty: the first.
+    token: where the server wants one, of the role admin.
     make: makes one environment for a client in a world of its own, make(number, client); by default
         WalkEnv(client=client, **options).
 
@@ -35,7 +36,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
     metadata: Dict[str, Any] = {"render_modes": ["rgb_array"], "autoreset_mode": spaces.NEXT_STEP}
 
     def __init__(self, scene: Union[str, Path, None] = None, num_envs: int = 1, *,
-                 address: str = "", world_scene: str = "",
+                 address: str = "", world_scene: str = "", token: str = "",
                  make: Optional[Callable[[int, Client], WalkEnv]] = None,
                  server_arguments: Sequence[str] = (), **options: Any) -> None:
         if operator.index(num_envs) < 1:
@@ -56,7 +57,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
             if scene is not None:
                 self.server = serve(scene, *server_arguments)
                 address = self.server.address
-            self._clients = self._in_worlds(address, world_scene)
+            self._clients = self._in_worlds(address, world_scene, token)
             for number, client in enumerate(self._clients):
                 self.envs.append(make(number, client))
         except BaseException:
@@ -70,17 +71,18 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         self.action_space = spaces.batched(self.single_action_space, num_envs)
         self._over: Optional[np.ndarray] = None  # None: reset() comes next
 
-    def _in_worlds(self, address: str, scene: str) -> List[Client]:
+    def _in_worlds(self, address: str, scene: str, token: str) -> List[Client]:
         """A client in each of as many new worlds."""
         name = "enfilade environments"
-        with connect(address, name=name) as maker:
+        with connect(address, name=name, token=token) as maker:
             most = maker.limits.max_worlds - len(maker.worlds())
             if self.num_envs > most:
                 raise ValueError(f"num_envs: the server takes {most} more worlds, not {self.num_envs}")
             for _ in range(self.num_envs):
                 world = maker.create_world(scene=scene or maker.scenes[0], drop_when_empty=True)
                 try:
-                    self._clients.append(connect(address, name=name, world=world.name))
+                    self._clients.append(connect(address, name=name, token=token,
+                                                 world=world.name))
                 except BaseException:
                     maker.drop_world(world.name)
                     raise

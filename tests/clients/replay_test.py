@@ -1,0 +1,111 @@
+"""`serve RECORDING`: the program plays it to clients, who seek in it and branch off."""
+
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+import enfilade
+import enfilade.process
+from recorded import verify
+from room import obj
+
+TICKS = 900
+
+
+class Replay(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = Path(folder.name)
+        cls.scene = cls.folder / "room.obj"
+        cls.scene.write_text(obj())
+        cls.walk = cls.folder / "walk.mcap"
+        with enfilade.serve(cls.scene, "--record", str(cls.walk)) as server, \
+                server.connect() as client:
+            ann = client.spawn("ann", at=(0, 0, 0))
+            for x in (8, -8) * 4:
+                ann.walk((x, 0, 1))
+            cls.hashes = [client.step().state_hash for _ in range(TICKS)]
+
+    def play(self, *more):
+        server = enfilade.serve(self.walk, *more)
+        self.addCleanup(server.stop)
+        return server
+
+    def run_program(self, *arguments):
+        return subprocess.run([enfilade.process.find_program(), *map(str, arguments)],
+                              capture_output=True, text=True, timeout=120)
+
+    def test_it_is_played_from_any_tick(self):
+        server = self.play("--from", "400")
+        self.assertEqual(server.ready["recording"], "walk.mcap")
+        with server.connect() as client:
+            self.assertIn("replay", client.capabilities)
+            self.assertEqual((client.replay.first_tick, client.replay.last_tick), (0, TICKS))
+            self.assertEqual(client.replay.tick, 400)
+            self.assertEqual(client.step().state_hash, self.hashes[400])
+            self.assertEqual(client.seek(7).state_hash, self.hashes[6])
+            self.assertEqual(client.step(93).state_hash, self.hashes[99])
+            with self.assertRaises(enfilade.ServerError) as refused:
+                client.spawn("bob", at=(0, 0, 3))
+            self.assertEqual(refused.exception.code, "ERROR_NOT_ALLOWED")
+            self.assertEqual(client.step(TICKS).tick, TICKS)
+            self.assertTrue(client.replay.at_end)
+            with self.assertRaises(enfilade.ServerError) as ended:
+                client.step()
+            self.assertEqual(ended.exception.code, "ERROR_REPLAY_ENDED")
+            self.assertIn("take_over()", ended.exception.remedy)
+
+    def test_play_and_pause_are_told_to_everyone(self):
+        server = self.play()
+        with server.connect() as driver, server.connect() as other:
+            driver.free_run(0.5)
+            other.metrics()
+            self.assertEqual((other.replay.clock, other.replay.speed), ("free_run", 0.5))
+            driver.pause()
+            other.metrics()
+            self.assertEqual(other.replay.clock, "paused")
+
+    def test_a_branch_is_recorded_and_verified(self):
+        branch = self.folder / "branch.mcap"
+        with self.play("--record", str(branch)) as server, server.connect() as client:
+            client.seek(300)
+            ann = client.take_over("ann")
+            ann.walk((0, 0, 5))
+            client.spawn("bob", at=(0, 0, -3))
+            last = client.run_until_idle()
+            self.assertTrue(client.replay.branched)
+            self.assertEqual(client.replay.branched_at, 300)
+        code, told, errors = verify(branch)
+        self.assertEqual(code, 0, errors)
+        self.assertEqual(told["state_hash"], f"{last.state_hash:016x}")
+        again = self.run_program("serve", self.walk, "--record", branch, "--listen", "127.0.0.1:0")
+        self.assertEqual(again.returncode, 1)
+        self.assertIn("move it away, or name another file", again.stderr)
+
+    def test_what_cannot_be_played_is_said(self):
+        other = self.folder / "other.obj"
+        other.write_text(obj().replace("5.2", "5.3"))
+        changed = self.run_program("serve", other, self.walk, "--listen", "127.0.0.1:0")
+        self.assertEqual(changed.returncode, 4, changed.stderr)
+        self.assertIn("the scene: hash", changed.stderr)
+        beyond = self.run_program("serve", self.walk, "--from", TICKS + 1, "--listen", "127.0.0.1:0")
+        self.assertEqual(beyond.returncode, 1)
+        self.assertIn("give one from 0 to 900", beyond.stderr)
+        for wrong in ([self.scene, "--from", "3"], [self.walk, "--epsilon", "0.001"],
+                      [self.walk, self.walk]):
+            self.assertEqual(self.run_program("serve", *wrong).returncode, 2, wrong)
+
+    def test_it_is_played_in_the_scene_that_is_named(self):
+        moved = self.folder / "moved.obj"
+        moved.write_text(obj())
+        server = enfilade.serve(moved, str(self.walk))
+        self.addCleanup(server.stop)
+        with server.connect() as client:
+            self.assertEqual(client.step(50).state_hash, self.hashes[49])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,221 @@
+// Questions about pairs through a connection: distances, what touches what, until when nothing
+// does.
+#include <cmath>
+#include <limits>
+
+#include "tests/server/body_room.hpp"
+#include "tests/server/served_room.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+constexpr std::uint32_t kRoomFloor = 1;
+
+v1::EntityRef entity(std::uint32_t id) {
+  v1::EntityRef ref;
+  ref.set_id(id);
+  return ref;
+}
+
+v1::EntityRef entity(const std::string& name) {
+  v1::EntityRef ref;
+  ref.set_name(name);
+  return ref;
+}
+
+template <class A, class B>
+v1::DistanceQuery between(const A& a, const B& b) {
+  v1::DistanceQuery query;
+  v1::DistanceQuery::Pair& pair = *query.add_pairs();
+  *pair.mutable_a() = entity(a);
+  *pair.mutable_b() = entity(b);
+  return query;
+}
+
+template <class A>
+v1::TouchingQuery near(const A& which, double within) {
+  v1::TouchingQuery query;
+  *query.mutable_entity() = entity(which);
+  query.set_within(within);
+  return query;
+}
+
+v1::CannotTouchQuery apart(const std::string& a, const std::string& b, double least = 0) {
+  v1::CannotTouchQuery query;
+  *query.mutable_a() = entity(a);
+  *query.mutable_b() = entity(b);
+  query.set_least(least);
+  return query;
+}
+
+class Pairs : public ServedRoom {
+ protected:
+  void SetUp() override { serve({}, bodyRoom()); }
+
+  /// A client whose avatar "ann" stands at x = 0, 2 m before the door's wall.
+  protocol::Client inTheRoom() {
+    protocol::Client ann = client("ann");
+    EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
+    ann.step(30);
+    return ann;
+  }
+};
+
+template <class Ask>
+protocol::ProtocolError refusalOf(const Ask& ask) {
+  try {
+    ask();
+  } catch (const protocol::ProtocolError& error) {
+    return error;
+  }
+  ADD_FAILURE() << "it was answered";
+  return {v1::ERROR_UNSPECIFIED, "answered"};
+}
+
+TEST_F(Pairs, DistancesAreThoseThatWereBuiltByIdAndByName) {
+  protocol::Client ann = inTheRoom();
+  v1::DistanceQuery query = between("left", "end");
+  *query.add_pairs() = between("ann", "left").pairs(0);
+  *query.add_pairs() = between(kLeaf, kRoomFloor).pairs(0);
+  *query.add_pairs() = between("left", "floor").pairs(0);
+  const v1::DistanceReply reply = ann.distances(query);
+  ASSERT_EQ(reply.pairs_size(), 4);
+  EXPECT_EQ(reply.tick(), 30u);
+  EXPECT_NEAR(reply.pairs(0).distance(), 3.9, 1e-6) << "floats in the file";
+  EXPECT_EQ(reply.pairs(0).verdict(), v1::VERDICT_SEPARATED);
+  EXPECT_NEAR(reply.pairs(0).normal().x(), 1, 1e-12);
+  EXPECT_NEAR(reply.pairs(1).distance(), std::hypot(2, 0.6) - 0.3, 0.02);
+  EXPECT_EQ(reply.pairs(1).a_name(), "ann");
+  EXPECT_EQ(reply.pairs(2).a_name(), "door") << "a body goes by its own name";
+  EXPECT_NEAR(reply.pairs(2).distance(), 0.01, 1e-6);
+  EXPECT_EQ(reply.pairs(3).verdict(), v1::VERDICT_TOUCHING);
+}
+
+TEST_F(Pairs, RefinedOnesTellTheDepth) {
+  const auto block =
+      scene::testing::boxModel({{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {0.75, 0, 0}, {2, 1, 1}}});
+  serve({}, std::make_shared<const scene::Scene>(block));
+  protocol::Client ann = client("ann");
+  v1::DistanceQuery query = between("a", "b");
+  EXPECT_EQ(ann.distances(query).pairs(0).penetration(), 0);
+  query.set_refined(true);
+  const v1::PairState state = ann.distances(query).pairs(0);
+  EXPECT_EQ(state.verdict(), v1::VERDICT_PENETRATING);
+  EXPECT_EQ(state.penetration(), 0.25);
+}
+
+TEST_F(Pairs, WhatTouchesOrIsNearComesNearestFirst) {
+  protocol::Client ann = inTheRoom();
+  const v1::TouchingReply touching = ann.touching(near("left", 0));
+  ASSERT_EQ(touching.found_size(), 1);
+  EXPECT_EQ(touching.found(0).b_name(), "floor");
+  const v1::TouchingReply around = ann.touching(near("ann", 2.5));
+  std::vector<std::string> names;
+  for (const v1::PairState& one : around.found()) names.push_back(one.b_name());
+  EXPECT_EQ(names, (std::vector<std::string>{"floor", "door", "left", "right"}));
+  EXPECT_EQ(around.left_out(), 0u);
+}
+
+TEST_F(Pairs, WhatDoesNotFitIntoOneAnswerIsCounted) {
+  ServerLimits limits;
+  limits.replyBytes = 400;  // two pairs
+  serve(limits, bodyRoom());
+  protocol::Client ann = inTheRoom();
+  const v1::TouchingReply around = ann.touching(near("ann", 2.5));
+  EXPECT_EQ(around.found_size() + static_cast<int>(around.left_out()), 4);
+  EXPECT_GT(around.left_out(), 0u);
+  EXPECT_EQ(around.found(0).b_name(), "floor");
+}
+
+TEST_F(Pairs, ADriverTouchesTheWallWhenItWasTold) {
+  protocol::Client ann = inTheRoom();
+  v1::Command drive;
+  drive.set_avatar("ann");
+  *drive.mutable_drive()->mutable_velocity() = vec(2, 0, -1);
+  ASSERT_FALSE(ann.command(drive));
+  ann.step(1);
+  const v1::CannotTouchReply said = ann.cannotTouch(apart("ann", "left"));
+  EXPECT_FALSE(said.never());
+  EXPECT_TRUE(said.proved());
+  EXPECT_GT(said.before(), 0);
+  EXPECT_EQ(said.look_again(), said.before());
+  EXPECT_TRUE(ann.cannotTouch(apart("left", "end")).never());
+  EXPECT_EQ(ann.cannotTouch(apart("left", "end", 2)).look_again(), 2);
+  EXPECT_EQ(ann.cannotTouch(apart("left", "floor")).before(), 0) << "they touch";
+  const v1::CannotTouchReply later = ann.cannotTouch(apart("ann", "left", 3000));
+  EXPECT_EQ(later.look_again(), 3000);
+  EXPECT_FALSE(later.proved());
+  v1::CannotTouchQuery any = apart("ann", "left");
+  any.set_assume(v1::CannotTouchQuery::ASSUME_ANY_COMMAND);
+  EXPECT_LT(ann.cannotTouch(any).before(), said.before());
+  EXPECT_GT(ann.cannotTouch(any).before(), 0);
+  any = apart("crate", "floor");
+  any.set_assume(v1::CannotTouchQuery::ASSUME_ANY_COMMAND);
+  EXPECT_EQ(ann.cannotTouch(any).before(), 0) << "of free bodies nothing is known";
+}
+
+TEST_F(Pairs, WhatCannotBeAskedIsRefusedByItsField) {
+  ServerLimits limits;
+  limits.pairs = 2;
+  serve(limits, bodyRoom());
+  protocol::Client ann = inTheRoom();
+  const auto distance = [&](const v1::DistanceQuery& query) {
+    return refusalOf([&] { ann.distances(query); });
+  };
+  const auto expect = [](const protocol::ProtocolError& error, v1::ErrorCode code,
+                         const std::string& field) {
+    EXPECT_EQ(error.code, code) << error.what();
+    EXPECT_EQ(error.field, field) << error.what();
+  };
+  expect(distance({}), v1::ERROR_BAD_MESSAGE, "distances.pairs");
+  expect(distance(between("window", "floor")), v1::ERROR_UNKNOWN_ENTITY, "distances.pairs[0].a");
+  expect(distance(between("floor", 0u)), v1::ERROR_UNKNOWN_ENTITY, "distances.pairs[0].b");
+  expect(distance(between("floor", kRoomFloor)), v1::ERROR_BAD_MESSAGE, "distances.pairs[0].b");
+  v1::DistanceQuery query = between("floor", "left");
+  query.mutable_pairs(0)->clear_b();
+  expect(distance(query), v1::ERROR_BAD_MESSAGE, "distances.pairs[0].b");
+  query = between("floor", "left");
+  for (int i = 0; i < 2; ++i) *query.add_pairs() = query.pairs(0);
+  expect(distance(query), v1::ERROR_TOO_LARGE, "distances.pairs");
+  query = between("floor", "left");
+  query.set_tick(7);
+  expect(distance(query), v1::ERROR_TICK_GONE, "distances.tick");
+  for (const double within : {-1.0, std::nan(""), 1001.0, std::numeric_limits<double>::infinity()})
+    expect(refusalOf([&] { ann.touching(near("ann", within)); }), v1::ERROR_BAD_MESSAGE,
+           "touching.within");
+  for (const double least : {-1.0, std::nan(""), 3601.0})
+    expect(refusalOf([&] { ann.cannotTouch(apart("ann", "left", least)); }), v1::ERROR_BAD_MESSAGE,
+           "cannot_touch.least");
+  EXPECT_EQ(ann.distances(between("left", "end")).pairs_size(), 1) << "it goes on";
+}
+
+TEST_F(Pairs, AnAvatarThatLeftIsNotThere) {
+  protocol::Client ann = inTheRoom();
+  const std::uint32_t id = ann.distances(between("ann", "floor")).pairs(0).a();
+  v1::Command leave;
+  leave.set_avatar("ann");
+  leave.mutable_leave();
+  ASSERT_FALSE(ann.command(leave));
+  ann.step(2);
+  for (const v1::DistanceQuery& query : {between("ann", "floor"), between(id, "floor")}) {
+    const auto refusal = refusalOf([&] { ann.distances(query); });
+    EXPECT_EQ(refusal.code, v1::ERROR_UNKNOWN_ENTITY);
+  }
+}
+
+TEST_F(Pairs, TheWelcomeTellsTheLimits) {
+  ServerLimits limits;
+  limits.pairs = 7;
+  limits.requestsUnderWay = 8;
+  limits.waitingBytes = 9000;
+  limits.requestsPerSecond = 10'000;
+  serve(limits);
+  const v1::Limits told = client("ann").welcome().limits();
+  EXPECT_EQ(told.max_pairs(), 7u);
+  EXPECT_EQ(told.max_requests_under_way(), 8u);
+  EXPECT_EQ(told.max_bytes_under_way(), 9000u);
+  EXPECT_EQ(told.requests_per_second(), 10'000u);
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing

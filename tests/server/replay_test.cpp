@@ -1,0 +1,555 @@
+// A recording that clients play over the socket: every tick is the recorded one, wherever they
+// seek, contacts pair for whoever listens, and what branches off it is a recording of its own.
+#include <filesystem>
+#include <map>
+#include <random>
+
+#include "server/playback/playback.hpp"
+#include "server/recorded_world.hpp"
+#include "tests/server/becomes_true.hpp"
+#include "tests/server/body_room.hpp"
+#include "tests/server/served_room.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+using Pair = std::pair<std::uint32_t, std::uint32_t>;
+/// The contacts that live, and the tick at which each began.
+using Live = std::map<Pair, std::uint64_t>;
+
+/// Follows events; contacts that begin twice or end without a beginning are faults.
+void follow(Live& live, const v1::TickEvents& events) {
+  for (const v1::ContactEvent& event : events.contacts()) {
+    const Pair pair{event.a(), event.b()};
+    if (event.kind() == v1::ContactEvent::KIND_BEGIN) {
+      EXPECT_TRUE(live.emplace(pair, event.tick()).second) << event.ShortDebugString();
+    } else if (event.kind() == v1::ContactEvent::KIND_END) {
+      EXPECT_EQ(live.erase(pair), 1u) << event.ShortDebugString();
+    }
+  }
+}
+
+/// What was recorded, by tick; 0 is before the first.
+struct Walked {
+  std::vector<std::uint64_t> hashes;
+  std::vector<Live> live;
+  std::uint64_t last() const { return hashes.size() - 1; }
+};
+
+constexpr std::uint64_t kTicks = 1600, kCyComes = 300, kCyLeaves = 900;
+
+void tellWalkers(RecordedWorld& world, std::uint64_t tick) {
+  v1::Command leave;
+  leave.set_avatar("cy");
+  leave.mutable_leave();
+  if (tick == kCyComes) world.submit(spawn("cy", 2, 0, 2));
+  if (tick == kCyComes)
+    for (int i = 0; i < 9; ++i) world.submit(walkTo("cy", i % 2 ? 4.5 : -4.5, 0, 2));
+  if (tick == kCyLeaves) world.submit(leave);
+}
+
+/// Ann and bob walk to and fro and into wall and column; cy comes and goes.
+Walked recordWalk(const std::filesystem::path& file) {
+  RecordedWorld world{scene::World(smallRoom())};
+  RecordingOptions options;
+  options.choice.file = file;
+  options.model.file = "room.obj";
+  world.record(options);
+  world.submit(spawn("ann", 0, 0, 0));
+  world.submit(spawn("bob", 0, 0, 3));
+  for (int i = 0; i < 4; ++i) {
+    world.submit(walkTo("ann", 8, 0, 0));  // the wall is in the way
+    world.submit(walkTo("ann", -3, 0, -2));
+    world.submit(walkTo("bob", 0, 0, 8));  // the column is in the way
+    world.submit(walkTo("bob", -4, 0, 1));
+  }
+  Walked walked{{world.snapshot()->stateHash}, {{}}};
+  while (walked.last() < kTicks) {
+    tellWalkers(world, walked.last());
+    const auto ticked = world.tick();
+    walked.hashes.push_back(world.snapshot()->stateHash);
+    walked.live.push_back(walked.live.back());
+    follow(walked.live.back(), ticked.events);
+  }
+  world.end(v1::ContactEvent::REASON_SHUTDOWN);
+  EXPECT_FALSE(world.recorder()->close());
+  return walked;
+}
+
+/// Who listens to a world, and what lives for it.
+struct Listener {
+  protocol::Client client;
+  Live live = {};
+  v1::Replay replay = {};
+
+  explicit Listener(protocol::Client who) : client(std::move(who)) {
+    v1::Subscribe contacts;
+    contacts.set_contacts(true);
+    const v1::SubscribeReply subscribed = client.subscribe(contacts);
+    for (const v1::ContactEvent& event : subscribed.live())
+      live[{event.a(), event.b()}] = event.tick();
+    replay = client.welcome().replay();
+  }
+  /// All that was told before now.
+  void hear() {
+    client.metrics();
+    for (const v1::ServerMessage& message : client.takeEvents()) {
+      if (message.has_events()) follow(live, message.events());
+      if (message.has_replay()) replay = message.replay();
+    }
+  }
+};
+
+class Replays : public ServedRoom {
+ protected:
+  void SetUp() override {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ =
+        std::filesystem::path(::testing::TempDir()) / (std::string("replays_") + test->name());
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    walked_ = recordWalk(file("walk"));
+  }
+  void TearDown() override {
+    server_.reset();
+    std::filesystem::remove_all(folder_);
+  }
+  std::filesystem::path file(const std::string& name) const { return folder_ / (name + ".mcap"); }
+
+  void play(const std::string& name = "walk", std::uint64_t from = 0,
+            const std::string& branch = {}, Access access = {}) {
+    ServerOptions options;
+    options.world.replay = {file(name), from};
+    options.access = std::move(access);
+    if (!branch.empty()) {
+      options.world.record.emplace();
+      options.world.record->choice.file = file(branch);
+      options.world.record->model.file = "room.obj";
+      options.world.record->replace = false;
+    }
+    server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
+  }
+
+  std::filesystem::path folder_;
+  Walked walked_;
+};
+
+/// The error of a request; ERROR_UNSPECIFIED: it got none.
+v1::Error errorOfRequest(const std::function<void()>& request) {
+  v1::Error error;
+  try {
+    request();
+  } catch (const protocol::ProtocolError& problem) {
+    error.set_code(problem.code);
+    error.set_message(problem.what());
+  }
+  return error;
+}
+
+/// Plays all of a recording and judges it; its last hash.
+std::uint64_t verified(const std::filesystem::path& file) {
+  server::Playback playback(file);
+  scene::World world = playback.worldAfter(playback.firstTick(), smallRoom());
+  try {
+    while (playback.step(world)) {
+    }
+  } catch (const Diverged& diverged) {
+    ADD_FAILURE() << textOf(diverged);
+  }
+  EXPECT_TRUE(playback.closed());
+  return world.snapshot()->stateHash;
+}
+
+TEST_F(Replays, EveryTickIsTheRecordedOneAndTheEndIsTold) {
+  play();
+  Listener ann{client("ann")};
+  EXPECT_EQ(ann.replay.file(), "walk.mcap");
+  EXPECT_EQ(ann.replay.last_tick(), walked_.last());
+  for (std::uint64_t tick = 1; tick <= 1000; ++tick)
+    ASSERT_EQ(ann.client.step().state_hash(), walked_.hashes[tick]) << tick;
+  const v1::StepReply rest = ann.client.step(10'000);
+  EXPECT_EQ(rest.tick(), walked_.last()) << "a Step ends where the recording does";
+  EXPECT_EQ(rest.state_hash(), walked_.hashes.back());
+  ann.hear();
+  EXPECT_TRUE(ann.replay.at_end());
+  EXPECT_EQ(ann.live, walked_.live.back());
+  const v1::Error ended = errorOfRequest([&] { ann.client.step(); });
+  EXPECT_EQ(ended.code(), v1::ERROR_REPLAY_ENDED);
+  EXPECT_NE(ended.message().find("TakeOver"), std::string::npos) << ended.message();
+}
+
+TEST_F(Replays, AFreeRunPausesAtTheEnd) {
+  play("walk", walked_.last() - 60);
+  Listener ann{client("ann")};
+  v1::SetClock clock;
+  clock.mutable_free_run()->set_speed(100);
+  EXPECT_EQ(ann.client.setClock(clock).tick(), walked_.last() - 60);
+  ASSERT_TRUE(becomesTrue([&] {
+    ann.hear();
+    return ann.replay.at_end();
+  }));
+  EXPECT_EQ(ann.replay.clock().mode(), v1::Clock::MODE_PAUSED);
+  EXPECT_EQ(ann.replay.tick(), walked_.last());
+}
+
+TEST_F(Replays, AnyTickIsSoughtInAnyOrderAndContactsPairForAll) {
+  server::Playback playback(file("walk"));
+  playback.worldAfter(1500, smallRoom());
+  ASSERT_GT(playback.beganAt(), 0u) << "without a checkpoint this tests less than it says";
+  play();
+  Listener driver{client("driver")}, other{client("other")};
+  std::mt19937 random(7);
+  for (int i = 0; i < 20; ++i) {
+    const std::uint64_t tick = random() % walked_.hashes.size();
+    ASSERT_EQ(driver.client.seek(tick).state_hash(), walked_.hashes[tick]) << tick;
+    for (Listener* one : {&driver, &other}) {
+      one->hear();
+      EXPECT_EQ(one->live, walked_.live[tick]) << tick;
+      EXPECT_EQ(one->replay.tick(), tick);
+    }
+    if (i % 4 == 1) {  // out of a branch
+      driver.client.takeOver();
+      EXPECT_FALSE(driver.client.command(spawn("dee", -6, 0.01, -6)));
+      EXPECT_NE(driver.client.step(20).state_hash(),
+                walked_.hashes[std::min(tick + 20, walked_.last())]);
+    } else if (tick + 30 <= walked_.last()) {
+      ASSERT_EQ(driver.client.step(30).state_hash(), walked_.hashes[tick + 30]) << tick;
+    }
+  }
+  const v1::Error beyond = errorOfRequest([&] { driver.client.seek(walked_.last() + 1); });
+  EXPECT_EQ(beyond.code(), v1::ERROR_BAD_MESSAGE);
+}
+
+TEST_F(Replays, ASeekIsDoneInEveryModeOfTheClockAndByTheDriverAlone) {
+  play();
+  Listener driver{client("driver")}, other{client("other")};
+  v1::SetClock clock;
+  clock.mutable_pause();
+  driver.client.setClock(clock);
+  EXPECT_EQ(driver.client.seek(700).tick(), 700u);
+  EXPECT_EQ(errorOfRequest([&] { other.client.seek(10); }).code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(errorOfRequest([&] { other.client.takeOver("ann"); }).code(), v1::ERROR_NOT_ALLOWED);
+  clock.mutable_free_run()->set_speed(1000);
+  driver.client.setClock(clock);
+  for (const std::uint64_t tick : {1200u, 100u})
+    EXPECT_EQ(driver.client.seek(tick).state_hash(), walked_.hashes[tick]);
+}
+
+TEST_F(Replays, WhoWatchesGetsTheStateOfThePlaceThatIsSought) {
+  play();
+  protocol::Client driver = client("driver");
+  v1::Subscribe states;
+  states.set_state(true);
+  driver.subscribe(states);
+  driver.seek(800);
+  bool seen = false;
+  while (const auto event = driver.nextEvent(std::chrono::seconds(seen ? 0 : 20)))
+    if (event->has_state() && event->state().tick() == 800) {
+      EXPECT_EQ(event->state().hash(), walked_.hashes[800]);
+      EXPECT_EQ(event->state().avatars_size(), 3);
+      seen = true;
+    }
+  EXPECT_TRUE(seen);
+}
+
+TEST_F(Replays, AWatchGoesOnWithAPictureOfThePlaceThatIsSought) {
+  play("walk", 1000);
+  ENFILADE_NEED_PICTURES(*server_);
+  protocol::Client driver = client("driver");
+  v1::ClientMessage message;
+  v1::WatchFrames& watch = *message.mutable_watch_frames();
+  watch.set_watch(1);
+  watch.set_rate(1);
+  watch.mutable_frame()->mutable_eyes()->set_avatar("ann");
+  watch.mutable_frame()->set_width(16);
+  watch.mutable_frame()->set_height(16);
+  driver.request(message);
+  const auto pictureOf = [&](std::uint64_t tick) {
+    while (const auto event = driver.nextEvent(std::chrono::seconds(20)))
+      if (event->has_frame() && event->frame().tick() == tick) return true;
+    return false;
+  };
+  EXPECT_TRUE(pictureOf(1000));
+  driver.seek(400);
+  EXPECT_TRUE(pictureOf(400)) << "also back, where less than a second has gone by";
+  driver.step(60);
+  EXPECT_TRUE(pictureOf(460));
+}
+
+TEST_F(Replays, WhoJoinsInTheMiddleIsToldWhereItStands) {
+  play("walk", 500);
+  Listener driver{client("driver")};
+  EXPECT_EQ(driver.live, walked_.live[500]);
+  driver.client.step(150);
+  Listener late{client("late")};
+  EXPECT_EQ(late.client.welcome().tick(), 650u);
+  EXPECT_EQ(late.replay.tick(), 650u);
+  EXPECT_FALSE(late.replay.branched());
+  EXPECT_EQ(late.live, walked_.live[650]);
+  EXPECT_FALSE(late.live.empty());
+  const auto& offers = late.client.welcome().capabilities();
+  EXPECT_NE(std::find(offers.begin(), offers.end(), "replay"), offers.end());
+  driver.client.step(400);
+  late.hear();
+  EXPECT_EQ(late.live, walked_.live[1050]);
+  driver.client.seek(1200);
+  EXPECT_EQ(Listener{client("later")}.live, walked_.live[1200]);
+}
+
+TEST_F(Replays, CommandsAreRefusedUntilSomebodyTakesOver) {
+  play("walk", 400);
+  protocol::Client driver = client("driver"), other = client("other");
+  v1::BodyCommand door;
+  door.set_body("door");
+  v1::ClientMessage restart;
+  restart.mutable_restart();
+  for (const auto& refused : {driver.command(spawn("dee", -6, 0.01, -6)), driver.bodyCommand(door),
+                              std::optional(errorOfRequest([&] { driver.request(restart); }))}) {
+    ASSERT_TRUE(refused);
+    EXPECT_EQ(refused->code(), v1::ERROR_NOT_ALLOWED);
+    EXPECT_NE(refused->message().find("TakeOver"), std::string::npos);
+  }
+  driver.step();
+  EXPECT_EQ(errorOfRequest([&] { driver.takeOver("nobody"); }).code(), v1::ERROR_UNKNOWN_AVATAR);
+  EXPECT_EQ(driver.takeOver("ann").tick(), 401u);
+  EXPECT_FALSE(driver.command(walkTo("ann", -9, 0, -9)));
+  EXPECT_TRUE(other.command(walkTo("ann", 0, 0, 0))) << "she is the driver's";
+  EXPECT_TRUE(other.command(walkTo("bob", 0, 0, 0))) << "nobody has bob";
+  EXPECT_TRUE(other.command(spawn("bob", -9, 0.01, 9))) << "nor can he be had by a spawn";
+  EXPECT_EQ(errorOfRequest([&] { other.takeOver("ann"); }).code(), v1::ERROR_NOT_ALLOWED);
+  other.takeOver("bob");
+  EXPECT_FALSE(other.command(walkTo("bob", 0, 0, 0)));
+  EXPECT_FALSE(other.command(spawn("dee", -6, 0.01, -6)));
+  const v1::StepReply reply = driver.step(1200, true);
+  ASSERT_EQ(reply.avatars_size(), 4);
+  EXPECT_NEAR(reply.avatars(0).feet().x(), -9, 0.01) << "ann went where the driver told her to";
+  EXPECT_NEAR(reply.avatars(1).feet().x(), 0, 0.01);
+}
+
+TEST_F(Replays, WhoIsNotTakenOverGoesOnAsItWasTold) {
+  play("walk", 400);
+  protocol::Client driver = client("driver");
+  driver.takeOver();
+  // No more is recorded for ann and bob; cy would have been told to leave.
+  EXPECT_EQ(driver.step(kCyLeaves - 400).state_hash(), walked_.hashes[kCyLeaves]);
+  EXPECT_NE(driver.step(1).state_hash(), walked_.hashes[kCyLeaves + 1]);
+}
+
+/// Reads a branch: its contacts pair, and those that lived where it begins have their first tick.
+Live beginningOf(const std::filesystem::path& file) {
+  protocol::RecordingReader reader(file);
+  Live live, beginning;
+  std::uint64_t first = 0;
+  while (const auto item = reader.next()) {
+    if (const auto* start = std::get_if<v1::RecordingStart>(&*item)) first = start->parent().tick();
+    if (const auto* events = std::get_if<v1::TickEvents>(&*item)) {
+      follow(live, *events);
+      if (events->tick() == first) beginning = live;
+    }
+  }
+  EXPECT_EQ(live, Live()) << "each has its end";
+  return beginning;
+}
+
+TEST_F(Replays, BranchesAreRecordingsOfTheirOwn) {
+  play("walk", 0, "branch");
+  std::uint64_t first = 0, second = 0;
+  {
+    protocol::Client driver = client("driver");
+    driver.seek(1000);
+    EXPECT_FALSE(std::filesystem::exists(file("branch"))) << "nothing has branched yet";
+    driver.takeOver("ann");
+    EXPECT_FALSE(driver.command(walkTo("ann", -9, 0, -9)));
+    first = driver.step(300).state_hash();
+    driver.seek(630);
+    driver.step(10);  // belongs to no branch
+    EXPECT_FALSE(driver.metrics().has_recording());
+    driver.takeOver("cy");
+    EXPECT_FALSE(driver.command(walkTo("cy", 0, 0, -8)));
+    second = driver.step(200).state_hash();
+  }
+  server_->stop();
+  EXPECT_EQ(verified(file("branch")), first);
+  EXPECT_EQ(verified(file("branch-2")), second);
+  EXPECT_EQ(beginningOf(file("branch")), walked_.live[1000]);
+  EXPECT_EQ(beginningOf(file("branch-2")), walked_.live[640]);
+  EXPECT_TRUE(server_->recordedAll());
+  const server::Playback branch(file("branch"));
+  EXPECT_EQ(branch.start().parent().file(), std::filesystem::absolute(file("walk")));
+  EXPECT_EQ(branch.firstTick(), 1000u);
+}
+
+TEST_F(Replays, ABranchIsPlayedAndLeftInItsTurn) {
+  play("walk", 1000, "branch");
+  {
+    protocol::Client driver = client("driver");
+    driver.takeOver("ann");
+    EXPECT_FALSE(driver.command(walkTo("ann", -9, 0, -9)));
+    driver.step(300);
+  }
+  server_.reset();
+  play("branch", 1000, "again");
+  std::uint64_t last = 0;
+  {
+    Listener driver{client("driver")};
+    EXPECT_EQ(driver.replay.first_tick(), 1000u);
+    EXPECT_EQ(driver.live, walked_.live[1000]);
+    EXPECT_EQ(errorOfRequest([&] { driver.client.seek(999); }).code(), v1::ERROR_BAD_MESSAGE);
+    driver.client.seek(driver.replay.last_tick());
+    driver.client.takeOver("bob");
+    last = driver.client.step(50).state_hash();
+  }
+  server_->stop();
+  EXPECT_EQ(verified(file("again")), last);
+}
+
+/// A recording whose state of `tick` is another one.
+void falsify(const std::filesystem::path& from, const std::filesystem::path& to,
+             std::uint64_t falseTick) {
+  protocol::RecordingReader reader(from);
+  protocol::RecordingWriter writer(to, "test");
+  const double second = scene::Lengths{}.tick;
+  while (auto item = reader.next()) {
+    if (auto* start = std::get_if<v1::RecordingStart>(&*item)) writer.write(*start);
+    if (auto* names = std::get_if<v1::RecordedNames>(&*item)) writer.write(*names);
+    if (auto* told = std::get_if<v1::RecordedCommands>(&*item))
+      writer.write(*told, static_cast<double>(told->tick()) * second);
+    if (auto* events = std::get_if<v1::TickEvents>(&*item)) writer.write(*events);
+    if (auto* state = std::get_if<v1::State>(&*item)) {
+      if (state->tick() == falseTick) state->mutable_avatars(0)->mutable_feet()->set_x(1);
+      if (state->tick() == falseTick) state->set_hash(1);
+      writer.write(*state);
+    }
+  }
+  writer.close();
+}
+
+TEST_F(Replays, AReplayThatDivergesStopsBeforeIt) {
+  falsify(file("walk"), file("false"), 40);
+  play("false");
+  Listener driver{client("driver")};
+  const v1::StepReply reply = driver.client.step(100);
+  EXPECT_EQ(reply.tick(), 39u);
+  EXPECT_EQ(reply.state_hash(), walked_.hashes[39]);
+  driver.hear();
+  EXPECT_EQ(driver.replay.diverged().rfind("tick 40: ann: feet.x: recorded 1, replayed ", 0), 0u)
+      << driver.replay.diverged();
+  EXPECT_EQ(driver.live, walked_.live[39]);
+  EXPECT_EQ(errorOfRequest([&] { driver.client.step(); }).code(), v1::ERROR_REPLAY_ENDED);
+  EXPECT_EQ(errorOfRequest([&] { driver.client.seek(41); }).code(), v1::ERROR_REPLAY_ENDED);
+  EXPECT_EQ(driver.client.metrics().ticks(), 39u) << "what is wrong is not told";
+  EXPECT_EQ(driver.client.seek(10).state_hash(), walked_.hashes[10]);
+  driver.hear();
+  EXPECT_EQ(driver.replay.diverged(), "");
+  EXPECT_EQ(errorOfRequest([&] { driver.client.seek(41); }).code(), v1::ERROR_REPLAY_ENDED);
+  EXPECT_EQ(driver.client.step(29).state_hash(), walked_.hashes[39]) << "it stands where it stood";
+  EXPECT_EQ(errorOfRequest([&] { driver.client.step(); }).code(), v1::ERROR_REPLAY_ENDED);
+  driver.client.takeOver();
+  EXPECT_EQ(driver.client.step().tick(), 40u);
+  driver.hear();
+  EXPECT_EQ(driver.live, walked_.live[40]);
+}
+
+TEST_F(Replays, AnotherSceneIsNotPlayed) {
+  ServerOptions options;
+  options.world.replay = {file("walk"), 0};
+  scene::Model empty = smallRoom()->model();
+  empty.objects.pop_back();
+  EXPECT_THROW(Server(std::make_shared<const scene::Scene>(std::move(empty)),
+                      Endpoint{"127.0.0.1", 0}, std::move(options)),
+               Diverged);
+}
+
+TEST_F(Replays, ACutOffRecordingIsPlayedToItsLastTick) {
+  std::filesystem::resize_file(file("walk"), std::filesystem::file_size(file("walk")) * 6 / 10);
+  play();
+  Listener driver{client("driver")};
+  const std::uint64_t last = driver.replay.last_tick();
+  EXPECT_GT(last, 100u);
+  EXPECT_LT(last, walked_.last());
+  EXPECT_EQ(driver.client.step(10'000).state_hash(), walked_.hashes[last]);
+  driver.hear();
+  EXPECT_EQ(driver.live, walked_.live[last]);
+  EXPECT_TRUE(driver.replay.at_end());
+}
+
+/// Through the zone, while the door is opened; the tick at which the zone is entered.
+std::uint64_t recordVisit(const std::filesystem::path& file, std::vector<std::uint64_t>& hashes) {
+  RecordedWorld world{scene::World(bodyRoom())};
+  RecordingOptions options;
+  options.choice.file = file;
+  options.model.file = "room.obj";
+  world.record(options);
+  v1::BodyCommand open;
+  open.set_body("door");
+  open.mutable_open();
+  world.submit(spawn("ann", -6, 0, 0));
+  world.submit(walkTo("ann", 0, 0, 0));
+  world.submit(open);
+  std::uint64_t entered = 0;
+  hashes = {world.snapshot()->stateHash};
+  while (hashes.size() <= 240) {
+    const auto ticked = world.tick();
+    hashes.push_back(world.snapshot()->stateHash);
+    for (const v1::ContactEvent& event : ticked.events.contacts())
+      if (event.kind() == v1::ContactEvent::KIND_ENTER) entered = event.tick();
+  }
+  EXPECT_FALSE(world.recorder()->close());
+  return entered;
+}
+
+/// The events of triggers among what came: kind, reason, tick.
+std::vector<std::tuple<v1::ContactEvent::Kind, v1::ContactEvent::Reason, std::uint64_t>> visits(
+    protocol::Client& client) {
+  std::vector<std::tuple<v1::ContactEvent::Kind, v1::ContactEvent::Reason, std::uint64_t>> found;
+  for (const v1::ServerMessage& message : client.takeEvents())
+    for (const v1::ContactEvent& event : message.events().contacts())
+      if (event.b() == kZone) found.emplace_back(event.kind(), event.reason(), event.tick());
+  return found;
+}
+
+TEST_F(Replays, DoorsAreOpenedAgainAndTriggersPairLikeContacts) {
+  using Event = v1::ContactEvent;
+  std::vector<std::uint64_t> hashes;
+  const std::uint64_t entered = recordVisit(file("visit"), hashes);
+  ASSERT_GT(entered, 10u);
+  ServerOptions options;
+  options.world.replay = {file("visit"), entered + 5};
+  server_ = std::make_unique<Server>(bodyRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
+  protocol::Client driver = client("driver");
+  driver.subscribe(everything());
+  driver.seek(entered - 5);
+  using Visits = decltype(visits(driver));
+  EXPECT_EQ(visits(driver), (Visits{{Event::KIND_LEAVE, Event::REASON_SEEK, entered + 5}}));
+  driver.seek(entered + 3);
+  EXPECT_EQ(visits(driver), (Visits{{Event::KIND_ENTER, Event::REASON_UNSPECIFIED, entered}}));
+  driver.seek(2);
+  EXPECT_EQ(driver.step(238).state_hash(), hashes[240]);
+}
+
+TEST_F(Replays, WhoMayOnlyObserveNeitherSeeksNorTakesOver) {
+  Access access;
+  access.tokens = {{Role::observe, "observer-0123456789"}, {Role::drive, "driver-0123456789"}};
+  play("walk", 0, "", access);
+  protocol::Client observer = client("observer", "observer-0123456789");
+  EXPECT_EQ(errorOfRequest([&] { observer.seek(10); }).code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(errorOfRequest([&] { observer.takeOver("ann"); }).code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(client("driver", "driver-0123456789").seek(10).tick(), 10u);
+}
+
+TEST_F(Replays, OtherWorldsOfTheServerAreLive) {
+  play();
+  protocol::Client main = client("main");
+  v1::ClientMessage create;
+  create.mutable_create_world()->set_name("live");
+  main.request(create);
+  protocol::Client live = client("ann", "", "live");
+  EXPECT_FALSE(live.welcome().has_replay());
+  EXPECT_FALSE(live.command(spawn("ann", 0, 0.01, 0)));
+  EXPECT_EQ(live.step(1, true).avatars_size(), 1);
+  EXPECT_EQ(errorOfRequest([&] { live.seek(1); }).code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(errorOfRequest([&] { live.takeOver(); }).code(), v1::ERROR_NOT_ALLOWED);
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing
