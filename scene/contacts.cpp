@@ -227,9 +227,14 @@ void tellBlocked(const WorldState& world, Avatar& avatar, TickReport& report, Qu
 void endContactsOf(WorldState& world, Avatar& avatar, ContactEvent::Reason reason,
                    std::vector<ContactEvent>& events) {
   const auto tell = [&](const Avatar& a, const Contact& contact) {
-    if (!contact.touching) return;
-    events.push_back(eventOf(world, ContactEvent::Kind::end, a.id, contact));
-    events.back().reason = reason;
+    if (contact.touching) {
+      events.push_back(eventOf(world, ContactEvent::Kind::end, a.id, contact));
+      events.back().reason = reason;
+    } else if (contact.nearTold) {
+      events.push_back(nearEvent(world, a.id, contact, ContactEvent::Phase::min));
+      events.push_back(nearEvent(world, a.id, contact, ContactEvent::Phase::end));
+      events.back().reason = reason;
+    }
   };
   for (const Contact& contact : avatar.contacts) tell(avatar, contact);
   avatar.contacts.clear();

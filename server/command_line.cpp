@@ -17,6 +17,7 @@ namespace {
 /// Where CLI11 leaves what it read; every verb has its own.
 struct ModelArguments {
   std::string file, unit, up, ifcReader = "auto", ifcDoors = "move";
+  std::vector<double> offset;
   bool noCache = false;
 };
 struct Arguments {
@@ -71,6 +72,12 @@ std::string secondsProblem(const std::string& text) {
   const auto seconds = numberFrom<double>(text);
   if (seconds && *seconds >= 0 && *seconds <= 1e6) return {};
   return text + ": give seconds from 0 to 1000000";
+}
+
+std::string toleranceProblem(const std::string& text) {
+  const auto metres = numberFrom<double>(text);
+  if (metres && *metres >= 0 && *metres <= 1000) return {};
+  return text + ": give metres from 0 to 1000";
 }
 
 std::string auditProblem(const std::string& text) {
@@ -159,6 +166,11 @@ void addModel(CLI::App& verb, ModelArguments& into) {
   verb.add_option("--unit", into.unit, "Length of the file's unit: m, mm, cm, ft, in or metres")
       ->check(CLI::Validator(unitProblem, "UNIT"));
   verb.add_option("--up", into.up, "The file's up axis")->check(CLI::IsMember({"x", "y", "z"}));
+  verb.add_option("--offset", into.offset,
+                  "Metres, Y up, that are taken off the file's coordinates, so that versions of a "
+                  "model stand alike; left out: none near the origin, else what brings it there")
+      ->delimiter(',')
+      ->expected(3);
   verb.add_flag("--no-cache", into.noCache,
                 "Import the model even if an earlier start kept what it made of it");
   verb.add_option(
@@ -250,7 +262,7 @@ void addTolerance(CLI::App& verb, Arguments& into) {
   verb.add_option("--tolerance", into.tolerance,
                   "Metres by which places and clearances may differ untold")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 1000.0));
+      ->check(CLI::Validator(toleranceProblem, "METRES"));
 }
 
 void addDiff(CLI::App& verb, Arguments& into) {
@@ -296,6 +308,7 @@ ModelOptions modelFrom(const ModelArguments& read) {
   options.cache = !read.noCache;
   if (!read.unit.empty()) options.metresPerUnit = scene::metresPerUnitFrom(read.unit);
   if (!read.up.empty()) options.up = read.up.front();
+  if (!read.offset.empty()) options.offset = {read.offset[0], read.offset[1], read.offset[2]};
   options.ifcReader = scene::ifcReaderFrom(read.ifcReader).value_or(scene::IfcReader::automatic);
   options.doors = read.ifcDoors == "still" ? scene::IfcDoors::still : scene::IfcDoors::move;
   return options;

@@ -28,6 +28,7 @@ LoadedScene loadSceneTimed(const ModelOptions& options) {
   scene::ImportOptions import;
   import.metresPerUnit = options.metresPerUnit;
   import.up = options.up;
+  import.offset = options.offset;
   import.ifcReader = options.ifcReader;
   Progress bar;
   scene::LoadedModel model = scene::loadModel(

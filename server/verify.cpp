@@ -128,6 +128,10 @@ ExitCode tell(const Diverged& diverged) {
                       {"recorded", what.recorded},
                       {"replayed", what.replayed}};
   std::fprintf(stderr, "enfilade: %s\n", textOf(diverged).c_str());
+  if (what.who == kTheScene)
+    std::fprintf(stderr,
+                 "  what became of the walk in another model: replay SCENE RECORDING "
+                 "--out DIR, without --verify\n");
   std::printf("%s\n", told.dump().c_str());
   return ExitCode::diverged;
 }

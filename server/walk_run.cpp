@@ -209,7 +209,10 @@ ExitCode replay(const ReplayCommand& command) {
         const protocol::Script script = protocol::readScript(command.script);
         WalkReport report(command.out);
         std::optional<Playback> playback;
-        if (!command.recording.empty()) playback.emplace(command.recording);
+        if (!command.recording.empty()) {
+          requireAnotherFile(command.record.file, command.recording);
+          playback.emplace(command.recording);
+        }
         const ModelOptions model =
             playback ? recordedModel(playback->start(), command.model.file, command.model.cache)
                      : command.model;

@@ -73,6 +73,14 @@ void WorldRecorder::writeCheckpoint(const scene::World& world) {
   last_ = {snapshot.tick, took, file_.bytesWritten()};
 }
 
+/// Its GlobalId; of a piece that of what it is a piece of, with the piece's name behind it.
+std::string lastingIdOf(const scene::Model& model, const scene::Object& object) {
+  if (!object.globalId.empty() || !object.pieceOf) return object.globalId;
+  const scene::Object& whole = model.objects[*object.pieceOf];
+  if (whole.globalId.empty() || !object.path.starts_with(whole.path)) return {};
+  return whole.globalId + object.path.substr(whole.path.size());
+}
+
 /// In messages of a size that readers can be asked to hold.
 void WorldRecorder::writeNames(const scene::Model& model) {
   const auto& objects = model.objects;
@@ -82,7 +90,7 @@ void WorldRecorder::writeNames(const scene::Model& model) {
   for (std::size_t i = 0; i < objects.size(); ++i) {
     if (names.paths().empty()) names.set_first_id(static_cast<std::uint32_t>(i + 1));
     names.add_paths(objects[i].path);
-    if (global) names.add_global_ids(objects[i].globalId);
+    if (global) names.add_global_ids(lastingIdOf(model, objects[i]));
     if (names.paths_size() < kNamesAMessage && i + 1 < objects.size()) continue;
     file_.write(names);
     names.Clear();
@@ -146,6 +154,8 @@ void WorldRecorder::told(const v1::TickEvents& events) {
 void WorldRecorder::beganAnew(const scene::World& world) {
   commands_.clear_commands();
   nextPictures_ = 0;
+  if (ticks_ == ticksBefore_) return;  // it has not left its beginning
+  ticksBefore_ = ticks_;
   unlessBroken([&] {
     file_.write(startOf(world, model_));
     last_ = {0, 0, file_.bytesWritten()};
@@ -226,6 +236,7 @@ v1::ModelChoices messageOf(const ModelOptions& model) {
   v1::ModelChoices message;
   if (model.metresPerUnit) message.set_metres_per_unit(*model.metresPerUnit);
   if (model.up) message.set_up(std::string(1, *model.up));
+  if (model.offset) *message.mutable_offset() = messageOf(*model.offset);
   for (const auto& [reader, name] : kReaders)
     if (reader == model.ifcReader) message.set_ifc_reader(name);
   message.set_ifc_doors(model.doors == scene::IfcDoors::still ? "still" : "move");
@@ -236,6 +247,7 @@ ModelOptions modelOptionsFrom(const v1::ModelChoices& message) {
   ModelOptions model;
   if (message.has_metres_per_unit()) model.metresPerUnit = message.metres_per_unit();
   if (!message.up().empty()) model.up = message.up().front();
+  if (message.has_offset()) model.offset = vectorFrom(message.offset());
   model.ifcReader =
       scene::ifcReaderFrom(message.ifc_reader()).value_or(scene::IfcReader::automatic);
   model.doors = message.ifc_doors() == "still" ? scene::IfcDoors::still : scene::IfcDoors::move;

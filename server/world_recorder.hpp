@@ -76,6 +76,7 @@ class WorldRecorder {
   std::optional<double> picturesEvery_;  ///< seconds; 0: only those that are taken anyway
   double nextPictures_ = 0;              ///< seconds of the world's time
   std::uint64_t ticks_ = 0;
+  std::uint64_t ticksBefore_ = 0;  ///< those of earlier runs
   std::optional<std::string> broken_;
 };
 

@@ -221,6 +221,7 @@ Model modelByAssimp(const ImportRequest& request) {
   input.format = modelFormatOf(request.file).value();  // the parent has looked
   input.metresPerUnit = request.metresPerUnit;
   input.up = request.up;
+  input.offset = request.offset;
   std::string text;
   if (request.task == ImportTask::assimp) {
     text = readDescriptor(kIfcFile);

@@ -271,7 +271,7 @@ Model convertScene(const aiScene& scene, const ConvertInput& input,
       collectObjects(scene, input.format, worldFromRoot, exact, meshes, problems, places);
   if (progress) progress("convert", 0.5);
 
-  finishModel(std::move(drafts), std::move(meshes), input.file, model, problems);
+  finishModel(std::move(drafts), std::move(meshes), input.file, input.offset, model, problems);
   model.problems = problems.problems();
   std::set<std::uint32_t> still;
   if (gltf) still = addGltfBodies(input.file, input.format, places, model);
@@ -280,7 +280,8 @@ Model convertScene(const aiScene& scene, const ConvertInput& input,
 }
 
 void finishModel(std::vector<ObjectDraft> drafts, std::vector<Mesh> meshes,
-                 const std::filesystem::path& file, Model& model, ProblemLog& problems) {
+                 const std::filesystem::path& file, const std::optional<Vec3>& offset, Model& model,
+                 ProblemLog& problems) {
   std::vector<Box> meshBoxes, objectBoxes;
   for (const Mesh& mesh : meshes) meshBoxes.push_back(boxOf(mesh));
   recentreMeshes(drafts, meshes, meshBoxes, problems);
@@ -290,7 +291,7 @@ void finishModel(std::vector<ObjectDraft> drafts, std::vector<Mesh> meshes,
     throw ImportError(file.string() + ": holds no triangles that can be used; export it with " +
                       "meshes (convert)");
   }
-  model.offset = sceneOffset(objectBoxes);
+  model.offset = offset.value_or(sceneOffset(objectBoxes));
   countOddPlacements(drafts, problems);
   MeshTable table(meshes, model);
   for (const ObjectDraft& draft : drafts) {

@@ -32,7 +32,8 @@ struct ConvertInput {
   FileFacts facts;
   std::optional<double> metresPerUnit;  ///< the user's, which replaces the file's
   std::optional<char> up;
-  Vec3 shift = Vec3::Zero();  ///< in the file's units and axes: taken off before assimp read it
+  std::optional<Vec3> offset;  ///< the user's, in the place of one that brings it near the origin
+  Vec3 shift = Vec3::Zero();   ///< in the file's units and axes: taken off before assimp read it
 };
 
 /// A file's text with `shift` taken off its coordinates; empty: it may stay as it is.
@@ -70,11 +71,12 @@ struct ObjectDraft {
   std::vector<Placement> placements;
 };
 
-/// From drafts to the model's objects and meshes: the offset removed, what lies too far away
-/// dropped, one transform an object. Materials are there before. Throws ImportError, naming `file`,
-/// when nothing is left.
+/// From drafts to the model's objects and meshes: `offset`, or one near the objects' middle, taken
+/// off, what lies too far away dropped, one transform an object. Materials are there before. Throws
+/// ImportError, naming `file`, when nothing is left.
 void finishModel(std::vector<ObjectDraft> drafts, std::vector<Mesh> meshes,
-                 const std::filesystem::path& file, Model& model, ProblemLog& problems);
+                 const std::filesystem::path& file, const std::optional<Vec3>& offset, Model& model,
+                 ProblemLog& problems);
 
 /// Y up from `up`, by a quarter turn about the axis that is neither.
 Eigen::Matrix3d yUpFrom(char up);

@@ -67,6 +67,8 @@ void requireSaneOptions(const ImportOptions& options) {
       !(*options.metresPerUnit > 0 && std::isfinite(*options.metresPerUnit))) {
     throw ImportError("metres per unit: must be a positive number");
   }
+  if (options.offset && !options.offset->allFinite())
+    throw ImportError("offset: must be three finite numbers");
   if (options.up && (*options.up < 'x' || *options.up > 'z')) {
     throw ImportError(std::string("up axis: '") + *options.up + "' is neither x, y nor z");
   }
@@ -151,6 +153,7 @@ Model importModel(const fs::path& file, const ImportOptions& options,
   request.file = file.string();
   request.metresPerUnit = options.metresPerUnit;
   request.up = options.up;
+  request.offset = options.offset;
   request.ifcReader = options.ifcReader;
   request.memoryLimit = options.memoryLimit;
   request.timeLimit = options.timeLimit;

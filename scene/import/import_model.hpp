@@ -22,6 +22,9 @@ struct ImportOptions {
   /// Overrides what the file says (nullopt: as the file says, else one unit is one metre).
   std::optional<double> metresPerUnit;
   std::optional<char> up;  ///< 'x', 'y' or 'z'
+  /// Metres, Y up: taken off the file's coordinates (nullopt: what brings the scene near its
+  /// origin).
+  std::optional<Vec3> offset;
   IfcReader ifcReader = IfcReader::automatic;
   double timeLimit = 120;                          ///< seconds of wall-clock time
   std::size_t memoryLimit = std::size_t{8} << 30;  ///< bytes, of each process that reads

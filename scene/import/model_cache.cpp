@@ -50,6 +50,11 @@ std::string optionText(const ImportOptions& options) {
               : "-";
   text += " up ";
   text += options.up ? std::string(1, *options.up) : "-";
+  text += " offset ";
+  for (int i = 0; i < 3; ++i)
+    text += options.offset
+                ? std::to_string(std::bit_cast<std::uint64_t>((*options.offset)[i])) + ","
+                : "-";
   text += " ifc reader " + std::to_string(static_cast<int>(options.ifcReader));
   return text;
 }

@@ -108,7 +108,12 @@ struct SpawnSettings {
 
 // ---- starting -----------------------------------------------------------------------------------
 
-constexpr std::size_t kArguments = 13;
+constexpr std::size_t kArguments = 14;
+
+/// "x,y,z".
+std::string textOf(const Vec3& v) {
+  return shortest(v.x()) + ',' + shortest(v.y()) + ',' + shortest(v.z());
+}
 
 std::array<std::string, kArguments> argumentsFor(const ImportRequest& request) {
   return {"enfilade",
@@ -119,6 +124,7 @@ std::array<std::string, kArguments> argumentsFor(const ImportRequest& request) {
           shortest(request.timeLimit),
           request.metresPerUnit ? shortest(*request.metresPerUnit) : "-",
           request.up ? std::string(1, *request.up) : "-",
+          request.offset ? textOf(*request.offset) : "-",
           std::to_string(static_cast<int>(request.ifcReader)),
           std::to_string(request.firstProduct),
           request.program,
@@ -131,6 +137,15 @@ T numberFrom(std::string_view text) {
   T value{};
   std::from_chars(text.data(), text.data() + text.size(), value);
   return value;
+}
+
+Vec3 vectorFrom(std::string_view text) {
+  Vec3 v;
+  for (double& coordinate : v) {
+    coordinate = numberFrom<double>(text);
+    text.remove_prefix(std::min(text.find(',') + 1, text.size()));
+  }
+  return v;
 }
 
 /// stdout and stderr carry the parent's data and log; what libraries print there is dropped.
@@ -260,11 +275,12 @@ std::optional<ImportRequest> importRequestFrom(int argc, char** argv, int& paren
   request.timeLimit = numberFrom<double>(argv[5]);
   if (std::string_view(argv[6]) != "-") request.metresPerUnit = numberFrom<double>(argv[6]);
   if (std::string_view(argv[7]) != "-") request.up = argv[7][0];
-  request.ifcReader = static_cast<IfcReader>(numberFrom<int>(argv[8]));
-  request.firstProduct = numberFrom<std::uint32_t>(argv[9]);
-  request.program = argv[10];
-  request.script = argv[11];
-  request.file = argv[12];
+  if (std::string_view(argv[8]) != "-") request.offset = vectorFrom(argv[8]);
+  request.ifcReader = static_cast<IfcReader>(numberFrom<int>(argv[9]));
+  request.firstProduct = numberFrom<std::uint32_t>(argv[10]);
+  request.program = argv[11];
+  request.script = argv[12];
+  request.file = argv[13];
   return request;
 }
 

@@ -28,6 +28,7 @@ struct ImportRequest {
   std::string file;
   std::optional<double> metresPerUnit;
   std::optional<char> up;
+  std::optional<Vec3> offset;
   IfcReader ifcReader = IfcReader::automatic;
   std::size_t memoryLimit = 0;       ///< bytes; 0: none
   double timeLimit = 0;              ///< seconds

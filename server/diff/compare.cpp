@@ -2,6 +2,8 @@
 #include <cmath>
 #include <set>
 #include <tuple>
+#include <unordered_map>
+#include <unordered_set>
 
 #include "protocol/recording.hpp"
 #include "server/diff/walk_difference.hpp"
@@ -13,58 +15,58 @@ namespace {
 using PairKey = std::pair<std::string, std::string>;
 using OrderKey = std::tuple<std::string, std::uint64_t, bool, std::uint32_t>;
 
-/// The names of the later walk as the earlier one has them, and what is in which model.
+using NameMap = std::unordered_map<std::string, std::string>;
+
+std::string lookedUp(const NameMap& map, const std::string& key) {
+  const auto found = map.find(key);
+  return found == map.end() ? key : found->second;
+}
+
+/// What names mean, and what is in which model. A thing is an object, by its path in the earlier
+/// model, or an avatar, by its name; a body is its first object.
 class Names {
  public:
-  Names(const RecordedWalk& before, const RecordedWalk& after)
-      : before_(before.objects), after_(after.objects) {
-    addBodies(before, bodiesBefore_);
-    addBodies(after, bodiesAfter_);
-    if (!before_ || !after_) return;
-    std::unordered_map<std::string, std::string> pathOf;
-    for (const auto& [path, globalId] : *before_)
+  Names(const RecordedWalk& before, const RecordedWalk& after) : before_(before), after_(after) {
+    if (!before.objects || !after.objects) return;
+    NameMap pathOf;
+    for (const auto& [path, globalId] : *before.objects)
       if (!globalId.empty()) pathOf.emplace(globalId, path);
-    for (const auto& [path, globalId] : *after_) {
+    for (const auto& [path, globalId] : *after.objects) {
       const auto found = globalId.empty() ? pathOf.end() : pathOf.find(globalId);
       if (found != pathOf.end() && found->second != path) renamed_[path] = found->second;
     }
     for (const auto& [path, earlier] : renamed_) taken_.insert(earlier);
+    for (const auto& [path, globalId] : *after.objects) later_.insert(thingOfPath(path));
   }
 
-  /// The same for the same thing in both walks.
-  std::string keyOfLater(const std::string& name) const {
-    const auto found = renamed_.find(name);
-    if (found != renamed_.end()) return found->second;
-    // The earlier object of this path goes by another one now.
-    return taken_.contains(name) ? name + "\n" : name;
+  std::string thingOfEarlier(const std::string& name) const {
+    return lookedUp(before_.bodies, name);
+  }
+  std::string thingOfLater(const std::string& name) const {
+    const std::string path = lookedUp(after_.bodies, name);
+    return after_.objects && after_.objects->contains(path) ? thingOfPath(path) : path;
   }
 
-  /// `name` as a walk has it where it occurs.
-  Model modelOf(const std::string& name, bool later) const {
-    if (!before_ || !after_) return Model::unknown;
-    const auto inBefore = [&](const std::string& n) {
-      return before_->contains(n) || bodiesBefore_.contains(n);
-    };
-    const auto inAfter = [&](const std::string& n) {
-      return after_->contains(n) || bodiesAfter_.contains(n);
-    };
-    if (later) {
-      if (!inAfter(name)) return Model::unknown;  // an avatar
-      return inBefore(keyOfLater(name)) ? Model::both : Model::after;
-    }
-    if (!inBefore(name)) return Model::unknown;
-    return taken_.contains(name) || inAfter(name) ? Model::both : Model::before;
+  /// `thing` of a walk that has it.
+  Model modelOf(const std::string& thing) const {
+    if (!before_.objects || !after_.objects) return Model::unknown;
+    const bool inBefore = before_.objects->contains(thing), inAfter = later_.contains(thing);
+    if (inBefore && inAfter) return Model::both;
+    return inBefore ? Model::before : inAfter ? Model::after : Model::unknown;  // an avatar
   }
 
  private:
-  static void addBodies(const RecordedWalk& walk, std::set<std::string>& names) {
-    for (const v1::Body& body : walk.runs.front().start.scene().bodies()) names.insert(body.name());
+  std::string thingOfPath(const std::string& later) const {
+    const auto found = renamed_.find(later);
+    if (found != renamed_.end()) return found->second;
+    // The earlier object of this path goes by another one now.
+    return taken_.contains(later) ? later + "\n" : later;
   }
 
-  const std::optional<std::unordered_map<std::string, std::string>>&before_, &after_;
-  std::set<std::string> bodiesBefore_, bodiesAfter_;
-  std::unordered_map<std::string, std::string> renamed_;  ///< later path to earlier path
-  std::set<std::string> taken_;                           ///< earlier paths of those
+  const RecordedWalk &before_, &after_;
+  NameMap renamed_;                        ///< later path to earlier path, where they differ
+  std::unordered_set<std::string> taken_;  ///< earlier paths of those
+  std::unordered_set<std::string> later_;  ///< things of the later model
 };
 
 std::vector<Happening> PairRecord::*listOf(HappeningKind kind) {
@@ -98,60 +100,79 @@ class RunComparison {
       : before_(before), after_(after), names_(names), run_(run), into_(into) {}
 
   void compare() {
-    std::map<PairKey, std::pair<const PairRecord*, const PairRecord*>> pairs;
-    for (const auto& [names, pair] : before_.pairs) pairs[names].first = &pair;
-    for (const auto& [names, pair] : after_.pairs)
-      pairs[{names_.keyOfLater(names.first), names_.keyOfLater(names.second)}].second = &pair;
     static const PairRecord kNothing;
-    for (const auto& [key, both] : pairs)
-      comparePair(both.first ? *both.first : kNothing, both.second ? *both.second : kNothing, key);
+    std::map<PairKey, Pair> pairs;
+    for (const auto& [names, record] : before_.pairs) {
+      Pair& pair = pairs[{names_.thingOfEarlier(names.first), names_.thingOfEarlier(names.second)}];
+      pair = {&record, &kNothing, names, {}};
+    }
+    for (const auto& [names, record] : after_.pairs) {
+      Pair& pair = pairs[{names_.thingOfLater(names.first), names_.thingOfLater(names.second)}];
+      if (!pair.before) pair.before = &kNothing;
+      pair.after = &record;
+      pair.names = names;
+    }
+    for (auto& [things, pair] : pairs) {
+      pair.inModel = names_.modelOf(things.second);
+      comparePair(pair);
+    }
     compareOrders();
   }
 
  private:
-  void comparePair(const PairRecord& before, const PairRecord& after, const PairKey& key) {
+  struct Pair {
+    const PairRecord *before = nullptr, *after = nullptr;
+    PairKey names;  ///< as the later walk has them, or the earlier where only that does
+    Model inModel = Model::unknown;
+  };
+
+  void comparePair(const Pair& pair) {
     const std::size_t told = into_.happenings.size();
     for (std::size_t i = 0; i < kHappeningKinds; ++i)
-      compareHappenings(before, after, static_cast<HappeningKind>(i));
+      compareHappenings(pair, static_cast<HappeningKind>(i));
     const bool oneSided = std::any_of(into_.happenings.begin() + static_cast<std::ptrdiff_t>(told),
                                       into_.happenings.end(), [](const HappeningChange& change) {
                                         return change.kind == HappeningKind::contact &&
                                                !(change.before && change.after);
                                       });
     // A contact that is new or gone says it already.
-    if (!oneSided) compareClearance(before, after, key);
+    if (!oneSided) compareClearance(pair);
   }
 
-  void compareHappenings(const PairRecord& before, const PairRecord& after, HappeningKind kind) {
+  void compareHappenings(const Pair& pair, HappeningKind kind) {
+    const PairRecord &before = *pair.before, &after = *pair.after;
     const auto& was = before.*listOf(kind);
     const auto& is = after.*listOf(kind);
+    const auto changeOf = [&](std::optional<Happening> one, std::optional<Happening> other) {
+      return this->changeOf(kind, pair.inModel, std::move(one), std::move(other));
+    };
     std::vector<bool> wasFound(was.size()), isFound(is.size());
     for (const auto& [i, j] : matchedHappenings(was, is)) {
       wasFound[i] = isFound[j] = true;
-      HappeningChange change = changeOf(kind, was[i], is[j]);
+      HappeningChange change = changeOf(was[i], is[j]);
       if (change.shift > into_.tolerance || was[i].tick != is[j].tick) add(std::move(change));
     }
     for (std::size_t i = 0; i < was.size(); ++i) {
       if (wasFound[i]) continue;
-      HappeningChange change = changeOf(kind, was[i], std::nullopt);
+      HappeningChange change = changeOf(was[i], std::nullopt);
       if (after.nearest) change.otherwise = after.nearest->distance;
       add(std::move(change));
     }
     for (std::size_t j = 0; j < is.size(); ++j) {
       if (isFound[j]) continue;
-      HappeningChange change = changeOf(kind, std::nullopt, is[j]);
+      HappeningChange change = changeOf(std::nullopt, is[j]);
       if (before.nearest) change.otherwise = before.nearest->distance;
       change.worse = countsAsWorse(kind);
       add(std::move(change));
     }
   }
 
-  HappeningChange changeOf(HappeningKind kind, std::optional<Happening> before,
+  HappeningChange changeOf(HappeningKind kind, Model inModel, std::optional<Happening> before,
                            std::optional<Happening> after) const {
     HappeningChange change;
     change.kind = kind;
     change.run = run_;
-    change.inModel = after ? names_.modelOf(after->b, true) : names_.modelOf(before->b, false);
+    change.inModel = inModel;
     if (before && after) {
       change.shift = (after->point - before->point).norm();
       change.delay = after->time - before->time;
@@ -165,22 +186,27 @@ class RunComparison {
 
   static double nearMiss(const RecordedRun& run) { return run.start.lengths().near_miss(); }
 
+  /// What one walk would not have told is not compared.
+  static std::optional<Nearest> within(const std::optional<Nearest>& nearest, double radius) {
+    return nearest && nearest->distance <= radius ? nearest : std::nullopt;
+  }
+
   /// Where one walk told nothing of the pair, it was farther than what that one tells.
-  void compareClearance(const PairRecord& before, const PairRecord& after, const PairKey& key) {
-    if (!before.nearest && !after.nearest) return;
-    const double was = before.nearest ? before.nearest->distance : nearMiss(before_);
-    const double is = after.nearest ? after.nearest->distance : nearMiss(after_);
-    double least = is - was;
-    if (!before.nearest) least = std::min(least, 0.0);
-    if (!after.nearest) least = std::max(least, 0.0);
+  void compareClearance(const Pair& pair) {
+    const double contact = 2 * before_.start.lengths().epsilon();
+    const double radius = std::max(contact, std::min(nearMiss(before_), nearMiss(after_)));
+    const auto was = within(pair.before->nearest, radius), is = within(pair.after->nearest, radius);
+    if (!was && !is) return;
+    double least = (is ? is->distance : radius) - (was ? was->distance : radius);
+    if (!was) least = std::min(least, 0.0);
+    if (!is) least = std::max(least, 0.0);
     if (!(std::abs(least) > into_.tolerance)) return;
     ClearanceChange change;
-    change.a = key.first;
-    change.b = key.second.substr(0, key.second.find('\n'));
-    change.before = before.nearest;
-    change.after = after.nearest;
+    std::tie(change.a, change.b) = pair.names;
+    change.before = was;
+    change.after = is;
     change.least = least;
-    change.inModel = names_.modelOf(change.b, !before.nearest);
+    change.inModel = pair.inModel;
     change.run = run_;
     change.worse = least < 0;
     into_.clearances.push_back(std::move(change));
@@ -350,15 +376,21 @@ bool WalkDifference::none() const {
   return happenings.empty() && orders.empty() && clearances.empty() && ways.empty();
 }
 
-/// Of a recording that was cut off nobody knows how it went on: neither is the other one's rest
-/// compared.
+/// Compared is what both tell. A branch tells nothing of what was before it, and of a recording
+/// that was cut off nobody knows how it went on.
 void readBoth(const std::filesystem::path& before, const std::filesystem::path& after,
               WalkDifference& into) {
   into.before = readWalk(before);
   into.after = readWalk(after);
-  const WalkMoment endBefore = endOf(into.before), endAfter = endOf(into.after);
-  if (!into.after.closed && endAfter < endBefore) into.before = readWalk(before, endAfter);
-  if (!into.before.closed && endBefore < endAfter) into.after = readWalk(after, endBefore);
+  const auto leftAt = [](const RecordedWalk& walk) {
+    return walk.runs.front().start.parent().tick();
+  };
+  WalkPart part{std::max(leftAt(into.before), leftAt(into.after)), {}};
+  for (const RecordedWalk* walk : {&into.before, &into.after})
+    if (!walk->closed && (!part.until || endOf(*walk) < *part.until)) part.until = endOf(*walk);
+  if (part.since == 0 && !part.until) return;
+  into.before = readWalk(before, part);
+  into.after = readWalk(after, part);
 }
 
 WalkDifference compareWalks(const std::filesystem::path& before, const std::filesystem::path& after,

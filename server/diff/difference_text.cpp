@@ -150,7 +150,7 @@ std::string lineOf(const HappeningChange& change) {
 std::string lineOf(const OrderChange& change) {
   const OrderEnd& told = change.after ? *change.after : *change.before;
   std::string line = told.avatar;
-  if (told.tag != 0) line += ", line " + std::to_string(told.tag);
+  if (told.tag != 0) line += ", order " + std::to_string(told.tag);  // of a script: its line
   line += ": " + (change.before ? outcomeOf(*change.before) : std::string("nothing")) + " -> " +
           (change.after ? outcomeOf(*change.after) : std::string("never ended"));
   if (change.before && change.after && change.before->kind == change.after->kind &&

@@ -41,8 +41,9 @@ void turnRound(Event& event) {
 /// Gathers a run, message by message.
 class RunGatherer {
  public:
-  explicit RunGatherer(const v1::RecordingStart& start) {
+  RunGatherer(const v1::RecordingStart& start, std::uint64_t since) {
     run_.start = start;
+    run_.since = since;
     run_.hash = start.state_hash();
     for (const v1::Body& body : start.scene().bodies())
       if (body.kind() == "rigid") rigid_.insert(body.name());
@@ -50,6 +51,7 @@ class RunGatherer {
 
   void add(const v1::TickEvents& events) {
     for (const Event& event : events.contacts()) {
+      if (event.tick() <= run_.since) continue;  // of what a branch found alive, too
       Event ordered = event;
       // Of two free bodies the ids tell who comes first, and in another model they may be others.
       if (rigid_.contains(event.a_name()) && rigid_.contains(event.b_name()) &&
@@ -57,6 +59,7 @@ class RunGatherer {
         turnRound(ordered);
       add(ordered);
     }
+    if (events.tick() <= run_.since) return;
     for (const v1::Notice& notice : events.notices()) add(notice, events.time());
   }
 
@@ -64,6 +67,7 @@ class RunGatherer {
     run_.ticks = state.tick();
     run_.time = state.time();
     run_.hash = state.hash();
+    if (state.tick() <= run_.since) return;
     for (const v1::AvatarState& avatar : state.avatars()) {
       const Vec3 feet = vectorFrom(avatar.feet());
       const auto [at, isNew] = run_.avatars.try_emplace(avatar.name());
@@ -96,7 +100,9 @@ class RunGatherer {
         end(event);
         break;
       case Event::KIND_NEAR:
-        noteDistance(pair, event);
+        // Where it begins it is as near as the walk's step left it; who comes to touch has no
+        // least.
+        if (event.phase() == Event::PHASE_MIN) noteDistance(pair, event);
         break;
       case Event::KIND_BLOCKED:
         pair.blocked.push_back(happeningOf(event));
@@ -167,8 +173,15 @@ class RunGatherer {
   std::map<std::tuple<std::string, std::uint64_t, bool>, std::uint32_t> ended_;
 };
 
-void addNames(RecordedWalk& walk, const v1::RecordedNames& names) {
+/// After the first start.
+void addNames(RecordedWalk& walk, const v1::Scene& scene, const v1::RecordedNames& names) {
   if (!walk.objects) walk.objects.emplace();
+  for (const v1::Body& body : scene.bodies()) {
+    if (body.objects().empty() || body.objects(0) < names.first_id()) continue;
+    const std::uint32_t at = body.objects(0) - names.first_id();
+    if (at < static_cast<std::uint32_t>(names.paths_size()))
+      walk.bodies.emplace(body.name(), names.paths(static_cast<int>(at)));
+  }
   for (int i = 0; i < names.paths_size(); ++i)
     walk.objects->emplace(names.paths(i), i < names.global_ids_size() ? names.global_ids(i) : "");
 }
@@ -179,21 +192,23 @@ WalkMoment endOf(const RecordedWalk& walk) {
   return {walk.runs.size() - 1, walk.runs.back().ticks};
 }
 
-RecordedWalk readWalk(const std::filesystem::path& file, std::optional<WalkMoment> until) {
+RecordedWalk readWalk(const std::filesystem::path& file, const WalkPart& part) {
   protocol::RecordingReader reader(file);
   RecordedWalk walk;
   walk.file = file;
   std::optional<RunGatherer> run;
+  v1::Scene scene;
   while (const auto item = reader.next()) {
     if (const auto* start = std::get_if<v1::RecordingStart>(&*item)) {
       if (run) walk.runs.push_back(run->finish());
-      run.emplace(*start);
+      run.emplace(*start, walk.runs.empty() ? part.since : 0);
+      scene = start->scene();
       continue;
     }
     if (!run) throw RecordingError(file.string() + ": does not begin with its scene");
-    if (const auto* names = std::get_if<v1::RecordedNames>(&*item)) addNames(walk, *names);
+    if (const auto* names = std::get_if<v1::RecordedNames>(&*item)) addNames(walk, scene, *names);
     const auto wanted = [&](const auto& told) {
-      return !until || WalkMoment{walk.runs.size(), told.tick()} <= *until;
+      return !part.until || WalkMoment{walk.runs.size(), told.tick()} <= *part.until;
     };
     const auto* events = std::get_if<v1::TickEvents>(&*item);
     if (events && wanted(*events)) run->add(*events);
@@ -202,7 +217,7 @@ RecordedWalk readWalk(const std::filesystem::path& file, std::optional<WalkMomen
   }
   if (!run) throw RecordingError(file.string() + ": no recording of Enfilade begins in it");
   walk.runs.push_back(run->finish());
-  while (until && walk.runs.size() > until->run + 1) walk.runs.pop_back();
+  while (part.until && walk.runs.size() > part.until->run + 1) walk.runs.pop_back();
   walk.closed = reader.closed();
   walk.wholeBytes = reader.wholeBytes();
   return walk;

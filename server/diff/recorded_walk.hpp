@@ -68,6 +68,7 @@ struct RecordedRun {
   std::map<std::pair<std::string, std::string>, PairRecord> pairs;  ///< by the names of a and b
   std::vector<OrderEnd> orders;
   std::map<std::string, AvatarRecord> avatars;
+  std::uint64_t since = 0;  ///< the tick after which it is told
 };
 
 struct RecordedWalk {
@@ -78,6 +79,7 @@ struct RecordedWalk {
   /// GlobalId ("" where there is none) by the path of each object; nullopt: the recording does not
   /// list its objects, as those of earlier versions.
   std::optional<std::unordered_map<std::string, std::string>> objects;
+  std::unordered_map<std::string, std::string> bodies;  ///< path of the first object, by its name
 };
 
 /// A moment of a recording; orders by run, then by tick.
@@ -88,8 +90,13 @@ struct WalkMoment {
 };
 WalkMoment endOf(const RecordedWalk& walk);
 
-/// `until`: what comes after is left out. Throws protocol::mcap::RecordingError.
-RecordedWalk readWalk(const std::filesystem::path& file,
-                      std::optional<WalkMoment> until = std::nullopt);
+/// What is told of a walk: of its first run nothing up to `since`, and nothing after `until`.
+struct WalkPart {
+  std::uint64_t since = 0;
+  std::optional<WalkMoment> until = std::nullopt;
+};
+
+/// Throws protocol::mcap::RecordingError.
+RecordedWalk readWalk(const std::filesystem::path& file, const WalkPart& part = {});
 
 }  // namespace enfilade::server

@@ -14,6 +14,7 @@
 #include "server/in_process_driver.hpp"
 #include "server/interrupt.hpp"
 #include "server/load_scene.hpp"
+#include "server/playback/replayed_world.hpp"
 #include "server/progress.hpp"
 #include "server/walk_report.hpp"
 #include "server/walk_run.hpp"
@@ -30,11 +31,13 @@ constexpr std::uint64_t kTicksPerBar = 64;
 
 /// What the command line leaves open the recording says: the new model is most likely of the same
 /// kind as the old one.
-ModelOptions modelLike(const ModelOptions& asked, const v1::ModelChoices& recorded) {
-  const ModelOptions was = modelOptionsFrom(recorded);
+ModelOptions modelLike(const ModelOptions& asked, const v1::RecordingStart& start) {
+  const ModelOptions was = modelOptionsFrom(start.choices());
   ModelOptions model = asked;
   if (!model.metresPerUnit) model.metresPerUnit = was.metresPerUnit;
   if (!model.up) model.up = was.up;
+  // The importer's own depends on all objects: commands and places would be those of another spot.
+  if (!model.offset) model.offset = vectorFrom(start.scene().offset());
   if (model.ifcReader == scene::IfcReader::automatic) model.ifcReader = was.ifcReader;
   if (model.doors == scene::IfcDoors::move) model.doors = was.doors;
   return model;
@@ -231,18 +234,16 @@ ExitCode rewalk(const RewalkCommand& asked) {
         RewalkCommand command = asked;
         protocol::RecordingReader recording(command.recording);
         const v1::RecordingStart start = startOf(recording, command.recording);
-        command.model = modelLike(asked.model, start.choices());
+        command.model = modelLike(asked.model, start);
         const auto scene = loadScene(command.model);
         const auto renderer = rendererOf(scene, command.drawing);
         const auto record = command.record.empty() ? command.out / "new.mcap" : command.record;
         std::filesystem::create_directories(command.out);
-        if (std::filesystem::exists(record) &&
-            std::filesystem::equivalent(record, command.recording))
-          throw std::runtime_error(record.string() +
-                                   ": is the recording that is read; give another --record");
+        requireAnotherFile(record, command.recording);
         auto refused = walkAgain(command, recording, start, scene, renderer.get(), record);
         WalkDifference difference = compareWalks(command.recording, record, command.tolerance);
         difference.refused = std::move(refused);
+        difference.worse += difference.refused.size();
         if (renderer && command.pictures > 0 && !difference.none()) {
           const auto before = recordedScene(start, command.model.cache);
           drawChanges(difference, {before, scene, renderer.get(), command.drawing},

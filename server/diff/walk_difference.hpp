@@ -81,7 +81,7 @@ struct WalkDifference {
   std::vector<OrderChange> orders;          ///< worst first
   std::vector<ClearanceChange> clearances;  ///< what came nearest by most first
   std::vector<WayChange> ways;              ///< in order of run and name
-  std::size_t worse = 0;                    ///< changes for the worse
+  std::size_t worse = 0;                    ///< changes for the worse, refused commands among them
   std::vector<RefusedCommand> refused;      ///< of a walk that was made again in another model
 
   /// Nothing to tell, though hashes of scenes and files may differ.

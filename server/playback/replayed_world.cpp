@@ -13,7 +13,7 @@ using protocol::mcap::RecordingError;
 [[noreturn]] void hashDiffers(std::uint64_t tick, const char* who, std::uint64_t recorded,
                               std::uint64_t replayed) {
   throw Diverged{tick,
-                 {who, std::string(who) == "the scene" ? "hash" : "state hash",
+                 {who, std::string(who) == kTheScene ? "hash" : "state hash",
                   protocol::hexadecimal(recorded), protocol::hexadecimal(replayed)}};
 }
 
@@ -45,7 +45,7 @@ scene::World worldAtStart(std::shared_ptr<const scene::Scene> scene,
   const auto lengths = lengthsFrom(start.lengths());
   if (!lengths) throw RecordingError("the recording has lengths that no world can have");
   const std::uint64_t hash = messageOf(*scene).hash();
-  if (hash != start.scene().hash()) hashDiffers(0, "the scene", start.scene().hash(), hash);
+  if (hash != start.scene().hash()) hashDiffers(0, kTheScene, start.scene().hash(), hash);
   scene::World world(std::move(scene), *lengths);
   const std::uint64_t state = world.snapshot()->stateHash;
   if (state != start.state_hash()) hashDiffers(0, "the world", start.state_hash(), state);
@@ -90,6 +90,13 @@ std::optional<protocol::StateDifference> differenceFrom(const scene::World& worl
   auto found = protocol::firstDifference(recorded, made);
   if (!found) found = {"the world", "tick", std::to_string(recorded.tick()), ""};
   return found;
+}
+
+void requireAnotherFile(const std::filesystem::path& written, const std::filesystem::path& read) {
+  std::error_code none;
+  if (std::filesystem::equivalent(written, read, none))
+    throw RecordingError(written.string() +
+                         ": is the recording that is read; give another --record");
 }
 
 std::string textOf(const Diverged& diverged) {

@@ -12,6 +12,9 @@
 
 namespace enfilade::server {
 
+/// StateDifference::who where it is the scene that is another one.
+inline constexpr const char* kTheScene = "the scene";
+
 /// Thrown at the first tick that ends otherwise than it was recorded.
 struct Diverged {
   std::uint64_t tick = 0;
@@ -43,6 +46,9 @@ void take(scene::World& world, const v1::RecordedCommands& commands);
 /// How the last tick's state differs from the recorded one; nullopt: not.
 std::optional<protocol::StateDifference> differenceFrom(const scene::World& world,
                                                         const v1::State& recorded);
+
+/// Throws RecordingError where `written` is the recording that is `read`: it would be gone.
+void requireAnotherFile(const std::filesystem::path& written, const std::filesystem::path& read);
 
 /// For people: "tick 17: ann: feet.x: recorded 1, replayed 2".
 std::string textOf(const Diverged& diverged);

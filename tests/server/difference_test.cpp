@@ -104,20 +104,46 @@ std::filesystem::path fileFor(const std::string& name) {
 
 constexpr double kTick = 1.0 / 60;
 
-/// A walk of so many ticks. Ann arrives at tick 90, and a contact of two crates begins at tick 10.
+/// What is otherwise about a recorded walk.
+struct Otherwise {
+  double nearMiss = 0.3;      ///< metres
+  std::uint64_t parent = 0;   ///< the tick at which a branch left
+  std::string doorName = {};  ///< of the body that the object "house/door" is; empty: it is still
+  std::string doorPath = "house/door";
+};
+
+/// A walk of so many ticks. Ann arrives at tick 90, and a contact is told at tick 10.
 class Recorded {
  public:
-  Recorded(const std::string& name, const v1::ContactEvent& contact)
-      : file_(fileFor(name)), writer_(file_, "test") {
+  Recorded(const std::string& name, const v1::ContactEvent& contact,
+           const Otherwise& otherwise = {})
+      : file_(fileFor(name)), writer_(file_, "test"), contact_(contact), tick_(otherwise.parent) {
     v1::RecordingStart start;
     start.mutable_lengths()->set_walkable_normal_y(0.6);
+    start.mutable_lengths()->set_epsilon(5e-4);
+    start.mutable_lengths()->set_near_miss(otherwise.nearMiss);
+    start.mutable_lengths()->set_tick(kTick);
     for (const char* body : {"barrel", "crate"}) {
       v1::Body& free = *start.mutable_scene()->add_bodies();
       free.set_name(body);
       free.set_kind("rigid");
+      free.add_objects(free.name() == "barrel" ? 2 : 3);
     }
-    writer_.write(start);
-    contact_ = contact;
+    if (!otherwise.doorName.empty()) {
+      v1::Body& door = *start.mutable_scene()->add_bodies();
+      door.set_name(otherwise.doorName);
+      door.set_kind("hinged");
+      door.add_objects(1);
+    }
+    if (otherwise.parent > 0) start.mutable_parent()->set_tick(otherwise.parent);
+    writer_.write(start, static_cast<double>(tick_) * kTick);
+    v1::RecordedNames names;
+    names.set_first_id(1);
+    for (const auto& path : {otherwise.doorPath, std::string("barrel"), std::string("crate")}) {
+      names.add_paths(path);
+      names.add_global_ids(path == otherwise.doorPath ? "2O2Fr$t4X7Zf8NOew3FL7j" : "");
+    }
+    writer_.write(names);
   }
 
   Recorded& go(std::uint64_t ticks) {
@@ -200,6 +226,63 @@ TEST(ComparedWalks, WhichOfTwoFreeBodiesIsToldFirstIsNoDifference) {
   const auto before = Recorded("barrel_first", touch("barrel", "crate", 1)).go(20).close();
   const auto after = Recorded("crate_first", touch("crate", "barrel", -1)).go(20).close();
   EXPECT_TRUE(compareWalks(before, after, 1e-3).none());
+}
+
+v1::ContactEvent near(double distance, v1::ContactEvent::Phase phase) {
+  v1::ContactEvent event = touch("ann", "house/door", 1);
+  event.set_kind(v1::ContactEvent::KIND_NEAR);
+  event.set_phase(phase);
+  event.set_distance(distance);
+  return event;
+}
+
+TEST(ComparedWalks, AClearanceIsTheLeastAndNotWhereItWasFirstTold) {
+  const auto recorded = [](const char* name, double distance, v1::ContactEvent::Phase phase,
+                           double radius = 0.3) {
+    return Recorded(name, near(distance, phase), {.nearMiss = radius}).go(20).close();
+  };
+  using Event = v1::ContactEvent;
+  const auto least = recorded("near", 0.2, Event::PHASE_MIN);
+  const auto nearer = compareWalks(least, recorded("nearer", 0.1, Event::PHASE_MIN), 1e-3);
+  EXPECT_EQ(nearer.worse, 1u);
+  ASSERT_EQ(nearer.clearances.size(), 1u);
+  EXPECT_NEAR(nearer.clearances[0].least, -0.1, 1e-12);
+  EXPECT_TRUE(compareWalks(recorded("first", 0.29, Event::PHASE_BEGIN),
+                           recorded("later", 0.28, Event::PHASE_BEGIN), 1e-3)
+                  .none());
+  // A walk that tells only what is nearer than 0.15 m would not have told it.
+  const auto blind = recorded("blind", 0.14, Event::PHASE_BEGIN, 0.15);
+  EXPECT_TRUE(compareWalks(blind, least, 1e-3).none());
+  EXPECT_TRUE(compareWalks(least, blind, 1e-3).none());
+}
+
+TEST(ComparedWalks, ABranchIsComparedFromWhereItLeft) {
+  const v1::ContactEvent contact = touch("barrel", "crate", 1);
+  const auto parent = Recorded("parent", contact).go(120).close();
+  const auto branch = Recorded("branch", contact, {.parent = 50}).go(120).close();
+  EXPECT_TRUE(compareWalks(parent, branch, 1e-3).none());
+  EXPECT_TRUE(compareWalks(branch, parent, 1e-3).none());
+  const auto late = Recorded("late", contact, {.parent = 100}).go(120).close();
+  EXPECT_TRUE(compareWalks(parent, late, 1e-3).none());
+}
+
+TEST(ComparedWalks, ADoorIsTheSameWhateverItIsCalledAndWhetherItMoves) {
+  const auto still = Recorded("still", touch("ann", "house/door", 1)).go(20).close();
+  const auto body =
+      Recorded("body", touch("ann", "front", 1), {.doorName = "front"}).go(20).close();
+  const auto renamed = Recorded("renamed", touch("ann", "entrance", 1),
+                                {.doorName = "entrance", .doorPath = "villa/door 1"})
+                           .go(20)
+                           .close();
+  const auto none = [](const auto& before, const auto& after) {
+    return compareWalks(before, after, 1e-3).none();
+  };
+  EXPECT_TRUE(none(still, body));
+  EXPECT_TRUE(none(body, still));
+  EXPECT_TRUE(none(body, renamed));
+  EXPECT_TRUE(none(renamed, still));
+  const auto other = Recorded("other", touch("ann", "crate", 1)).go(20).close();
+  EXPECT_EQ(compareWalks(body, other, 1e-3).worse, 1u);
 }
 
 TEST(ComparedWalks, TimesThatDescendAreRefused) {

@@ -316,8 +316,8 @@ class IfcImport {
       if (source == sources.end() || source->second == Source::none) continue;
       builder.add(product, source->second == Source::first ? first : second->shapes);
     }
-    finishModel(std::move(builder.drafts), std::move(builder.meshes), request_.file, model,
-                problems);
+    finishModel(std::move(builder.drafts), std::move(builder.meshes), request_.file,
+                request_.offset, model, problems);
     model.problems = problems.problems();
     return model;
   }
