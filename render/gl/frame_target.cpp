@@ -3,7 +3,6 @@
 #include <epoxy/gl.h>
 
 #include <array>
-#include <cstring>
 #include <limits>
 
 #include "render/render_error.hpp"
@@ -27,12 +26,12 @@ void checkComplete(GLuint framebuffer, int width, int height) {
   }
 }
 
-/// Four bytes are copied to where three belong; the next pixel overwrites the fourth.
-void dropAlpha(const std::vector<std::uint8_t>& rgba, std::vector<std::uint8_t>& rgb) {
-  const std::size_t pixels = rgba.size() / 4;
-  rgb.resize(3 * pixels);
-  for (std::size_t i = 0; i + 1 < pixels; ++i) std::memcpy(&rgb[3 * i], &rgba[4 * i], 4);
-  if (pixels > 0) std::memcpy(&rgb[3 * pixels - 3], &rgba[4 * pixels - 4], 3);
+void readPlane(GLuint framebuffer, GLenum attachment, int width, int height, GLenum format,
+               GLenum type, void* data) {
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glNamedFramebufferReadBuffer(framebuffer, attachment);
+  glReadPixels(0, 0, width, height, format, type, data);
 }
 
 }  // namespace
@@ -43,15 +42,11 @@ FrameTarget::FrameTarget(int width, int height)
       colour_(plane(GL_SRGB8_ALPHA8, width, height)),
       ids_(plane(GL_R32UI, width, height)),
       depth_(plane(GL_DEPTH_COMPONENT32F, width, height)),
-      framebuffer_(GlFramebuffer::create()),
-      overlay_(GlFramebuffer::create()) {
+      framebuffer_(GlFramebuffer::create()) {
   const GLuint fbo = framebuffer_.name();
   glNamedFramebufferTexture(fbo, GL_COLOR_ATTACHMENT0, colour_.name(), 0);
   glNamedFramebufferTexture(fbo, GL_COLOR_ATTACHMENT1, ids_.name(), 0);
   glNamedFramebufferTexture(fbo, GL_DEPTH_ATTACHMENT, depth_.name(), 0);
-  glNamedFramebufferTexture(overlay_.name(), GL_COLOR_ATTACHMENT0, colour_.name(), 0);
-  glTextureParameteri(depth_.name(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  glTextureParameteri(depth_.name(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
   checkComplete(fbo, width, height);
 }
 
@@ -85,36 +80,35 @@ void FrameTarget::drawInto(const Channels& channels) const {
   glNamedFramebufferDrawBuffers(framebuffer_.name(), 3, targets.data());
 }
 
-void FrameTarget::beginOverlay() const {
-  glBindFramebuffer(GL_FRAMEBUFFER, overlay_.name());
-  glBindTextureUnit(0, depth_.name());
-}
-
-void FrameTarget::endOverlay() const {
-  glBindTextureUnit(0, 0);
-  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
-}
-
-void FrameTarget::read(Frame& frame, const Channels& channels) {
-  const std::size_t pixels = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
-  const auto readPlane = [&](GLenum attachment, GLenum format, GLenum type, void* data) {
-    glNamedFramebufferReadBuffer(framebuffer_.name(), attachment);
-    glReadPixels(0, 0, width_, height_, format, type, data);
-  };
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.name());
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  if (channels.rgb) {
-    rgba_.resize(4 * pixels);
-    readPlane(GL_COLOR_ATTACHMENT0, GL_RGBA, GL_UNSIGNED_BYTE, rgba_.data());
-    dropAlpha(rgba_, frame.rgb);
+void FrameTarget::readColour(Frame& frame, const Hollows& hollows) {
+  const auto width = static_cast<std::size_t>(width_), height = static_cast<std::size_t>(height_);
+  rgba_.resize(4 * width * height);
+  readPlane(framebuffer_.name(), GL_COLOR_ATTACHMENT0, width_, height_, GL_RGBA, GL_UNSIGNED_BYTE,
+            rgba_.data());
+  frame.rgb.resize(3 * width * height);
+  std::vector<std::uint8_t> left(width);
+  const std::uint8_t* from = rgba_.data();
+  std::uint8_t* to = frame.rgb.data();
+  for (int y = 0; y < height_; ++y) {
+    hollows.row(y, left);
+    for (std::size_t x = 0; x < width; ++x, from += 4, to += 3) {
+      darken(from, left[x], from[3], to);
+    }
   }
+}
+
+void FrameTarget::read(Frame& frame, const Channels& channels) const {
+  const std::size_t pixels = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
+  const auto readInto = [&](GLenum attachment, GLenum format, GLenum type, void* data) {
+    readPlane(framebuffer_.name(), attachment, width_, height_, format, type, data);
+  };
   if (channels.ids) {
     frame.ids.resize(pixels);
-    readPlane(GL_COLOR_ATTACHMENT1, GL_RED_INTEGER, GL_UNSIGNED_INT, frame.ids.data());
+    readInto(GL_COLOR_ATTACHMENT1, GL_RED_INTEGER, GL_UNSIGNED_INT, frame.ids.data());
   }
   if (channels.normals) {
     frame.normals.resize(3 * pixels);
-    readPlane(GL_COLOR_ATTACHMENT2, GL_RGB, GL_FLOAT, frame.normals.data());
+    readInto(GL_COLOR_ATTACHMENT2, GL_RGB, GL_FLOAT, frame.normals.data());
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include "render/frame.hpp"
 #include "render/gl/gl_objects.hpp"
+#include "render/hollows.hpp"
 
 namespace enfilade::render {
 
@@ -19,11 +20,10 @@ class FrameTarget {
   void begin(const Channels& channels);
   /// Draw into these channels; depth is written as the depth mask says.
   void drawInto(const Channels& channels) const;
-  /// Draw over the colour only, with no depth test, with depth as the texture of unit 0.
-  void beginOverlay() const;
-  void endOverlay() const;
-  /// The channels but depth into `frame`.
-  void read(Frame& frame, const Channels& channels);
+  /// The channels but depth and colour into `frame`.
+  void read(Frame& frame, const Channels& channels) const;
+  /// The colour, darkened by `hollows` as far as its alpha lets them be seen.
+  void readColour(Frame& frame, const Hollows& hollows);
   /// As it is in the buffer: 1 near, 0 far and nothing.
   void readDepth(std::vector<float>& depth) const;
 
@@ -34,7 +34,6 @@ class FrameTarget {
   GlTexture colour_, ids_, depth_, normals_;
   std::vector<std::uint8_t> rgba_;  ///< kept for reading back
   GlFramebuffer framebuffer_;
-  GlFramebuffer overlay_;  ///< colour alone, so that depth can be read while it is drawn to
 };
 
 /// From the buffer's depth to metres along forward; NaN where nothing is.

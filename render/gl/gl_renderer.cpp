@@ -1,6 +1,7 @@
 // A picture, step by step: the depth of what the camera may see of the model, of bodies where they
 // are, and of avatars; then colour, id and normal of what has that depth, once a pixel; then the
-// sky where nothing was drawn, shade in hollows, then glass over it all (colour only).
+// sky where nothing was drawn and glass over it all (colour only); shade in hollows is put on what
+// was read back.
 //
 // Which parts are drawn:
 //
@@ -141,9 +142,6 @@ DrawList GlRenderer::State::drawSurfaces(const Job& job, const Choice& choice) {
 void GlRenderer::State::drawAir(const DrawList& glass) {
   target.drawInto({true, false, false, false});
   pass->drawSky();
-  target.beginOverlay();
-  pass->darkenHollows();
-  target.endOverlay();
   pass->blendGlass();
   pass->draw(glass, {buffers.vertices.name(), buffers.indices.name(), buffers.textures});
 }
@@ -282,7 +280,10 @@ DrawList GlRenderer::State::drawSeen(Job& job) {
                                            [&](std::uint32_t p) { return isGlass(job, p); });
     if (!glassOnly) {
       drawSurfaces(job, more);
-      depthIsOfPicture = false;
+      // Now, and not when all is shaded: what needs the depth is worked out while the device
+      // shades. The pyramid stays as it is, farther in places than the picture, which hides too
+      // little.
+      readDepth(job.camera);
       ++job.statistics.passes;
     }
     add(drawn.parts, more.parts);
@@ -326,11 +327,14 @@ Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
   frame.renderer = deviceName();
   frame.software = software();
   frame.statistics = job.statistics;
-  s.target.read(frame, options.channels);
-  if (options.channels.depth) {
+  if (options.channels.depth || options.channels.rgb) {
+    glFlush();  // where the depth was read before, the device draws while this thread goes on
     if (!s.depthIsOfPicture) s.readDepth(camera);
     frame.depth = metresOf(s.depth.base(camera.width, camera.height), camera);
   }
+  if (options.channels.rgb) s.target.readColour(frame, Hollows(frame.depth, camera));
+  s.target.read(frame, options.channels);
+  if (!options.channels.depth) frame.depth = {};
   checkGl("drawing a frame");
   return frame;
 }

@@ -12,7 +12,6 @@ layout(std140, binding = 0) uniform Frame {
   vec4 middle;
   vec4 rightByX;
   vec4 upByY;
-  vec4 range;
 };
 )";
 
@@ -145,41 +144,6 @@ void main() {
 }
 )";
 
-// Multiplied into the colour; see light.inc.
-constexpr const char* kHollowFragment = R"(
-layout(binding = 0) uniform sampler2D depthPlane;
-layout(location = 0) out vec4 factor;
-
-float depthAt(ivec2 pixel) { return texelFetch(depthPlane, pixel, 0).r; }
-
-// `slopePerDepth` is for one pixel's step.
-float hollowAlong(vec2 direction, float reach, float d, float slopePerDepth) {
-  ivec2 here = ivec2(gl_FragCoord.xy);
-  vec2 room = vec2(min(here, textureSize(depthPlane, 0) - 1 - here));
-  float way = hollowReachWithin(reach, room.x, room.y, direction.x, direction.y);
-  ivec2 step_ = ivec2(round(direction * way));
-  float nearer = 0.5 * (depthAt(here + step_) + depthAt(here - step_)) - d;
-  // Metres by the mean of the depths: in a perspective near * far / (near + depth * (far - near)).
-  float bend = forward.w > 0.5 ? 1.0 : range.x + (d + nearer) * (range.y - range.x);
-  return hollowOf(nearer, slopePerDepth / (bend * max(way * length(direction), 1.0)));
-}
-
-void main() {
-  float d = depthAt(ivec2(gl_FragCoord.xy));
-  if (d <= 0.0) discard;
-  float deep = range.y - range.x;
-  float pixelsPerMetre =
-      forward.w > 0.5 ? range.z : range.z * (range.x + d * deep) / (range.x * range.y);
-  float reach = hollowReach(pixelsPerMetre);
-  float slope = deep * range.z;
-  float hollow = hollowAlong(vec2(kHollowLong, kHollowShort), reach, d, slope) +
-                 hollowAlong(vec2(-kHollowShort, kHollowLong), reach, d, slope) +
-                 hollowAlong(vec2(kHollowDiagonal, kHollowDiagonal), reach, d, slope) +
-                 hollowAlong(vec2(-kHollowDiagonal, kHollowDiagonal), reach, d, slope);
-  factor = vec4(vec3(1.0 - 0.25 * kHollowStrength * hollow), 1.0);
-}
-)";
-
 }  // namespace
 
 std::string surfaceVertexSource() {
@@ -198,10 +162,6 @@ std::string surfaceFragmentSource(const SurfaceVariant& variant) {
 
 std::string skyVertexSource() {
   return std::string(kVersion) + kFrameBlock + kSkyVertex;
-}
-
-std::string hollowFragmentSource() {
-  return std::string(kVersion) + kFrameBlock + kLight + kHollowFragment;
 }
 
 std::string skyFragmentSource() {

@@ -19,9 +19,6 @@ std::string surfaceVertexSource();
 std::string surfaceFragmentSource(const SurfaceVariant& variant);
 std::string skyVertexSource();
 std::string skyFragmentSource();
-/// Darkens corners and the feet of things; drawn with the sky's vertex shader over the whole
-/// picture.
-std::string hollowFragmentSource();
 
 /// Twin of the GLSL block `Frame` (std140), at uniform binding 0. Positions are relative to the
 /// eye, with the world's axes.
@@ -31,7 +28,6 @@ struct FrameUniforms {
   float middle[4];             ///< world direction of the picture's middle; z along forward is 1
   float rightByX[4];           ///< world right, divided by View::scaleX
   float upByY[4];              ///< world up, divided by View::scaleY
-  float range[4];              ///< near, far, pixels a metre (perspective: at distance 1)
 };
 
 /// Attribute places shared by the shaders and the vertex array.

@@ -52,7 +52,6 @@ FrameUniforms uniformsOf(const Camera& camera) {
       0);
   put(uniforms.rightByX, view.right / view.scaleX, 0);
   put(uniforms.upByY, view.up / view.scaleY, 0);
-  put(uniforms.range, Vec3(camera.near, camera.far, view.scaleY * camera.height / 2), 0);
   return uniforms;
 }
 
@@ -109,8 +108,7 @@ void StreamBuffer::fill(const void* data, std::size_t bytes) {
 SurfacePass::SurfacePass()
     : vertexArray_(makeVertexArray()),
       uniforms_(GlBuffer::create()),
-      sky_(buildProgram("sky", skyVertexSource(), skyFragmentSource())),
-      hollows_(buildProgram("hollows", skyVertexSource(), hollowFragmentSource())) {
+      sky_(buildProgram("sky", skyVertexSource(), skyFragmentSource())) {
   glNamedBufferStorage(uniforms_.name(), sizeof(FrameUniforms), nullptr, GL_DYNAMIC_STORAGE_BIT);
   checkGl("setting up the renderer");
 }
@@ -195,19 +193,10 @@ void SurfacePass::drawSky() const {
   glDepthFunc(GL_GREATER);
 }
 
-void SurfacePass::darkenHollows() const {
-  glDisable(GL_DEPTH_TEST);
-  glEnable(GL_BLEND);
-  glBlendFunc(GL_ZERO, GL_SRC_COLOR);
-  glUseProgram(hollows_.name());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
-  glEnable(GL_DEPTH_TEST);
-}
-
 void SurfacePass::blendGlass() {
   normals_ = false;
   glEnable(GL_BLEND);
-  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE);
+  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE_MINUS_SRC_ALPHA);
 }
 
 }  // namespace enfilade::render

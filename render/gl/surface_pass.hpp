@@ -1,4 +1,4 @@
-// Draws lists of surfaces, the sky and the shade in hollows: programs, uniforms, streams.
+// Draws lists of surfaces and the sky: programs, uniforms, streams.
 #pragma once
 
 #include <array>
@@ -43,8 +43,7 @@ class SurfacePass {
   void shadeAll(bool normals);
   void draw(const DrawList& list, const Geometry& geometry);
   void drawSky() const;
-  /// Over the colour, with depth as the texture of unit 0.
-  void darkenHollows() const;
+  /// What is drawn after it lies over the colour, whose alpha is left with what shines through.
   void blendGlass();
 
  private:
@@ -52,7 +51,7 @@ class SurfacePass {
 
   GlVertexArray vertexArray_;
   GlBuffer uniforms_;
-  GlProgram sky_, hollows_;
+  GlProgram sky_;
   std::array<std::optional<GlProgram>, 32> surfaces_;  ///< see program()
   bool shaded_ = true, normals_ = false;
   StreamBuffer instances_, commands_;

@@ -1,6 +1,6 @@
 // A picture, step by step: rays in packets find each pixel's triangle; depth, id and normal follow
 // from that triangle's corners in doubles, run by run along the rows; then its colour. Over the
-// whole picture then come the hollows, and glass from back to front. Rows are shared among threads;
+// whole picture then come glass from back to front, and hollows. Rows are shared among threads;
 // no pixel's result depends on another's thread.
 #include "render/rays/ray_renderer.hpp"
 
@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 
+#include "render/hollows.hpp"
 #include "render/rays/cast.hpp"
 #include "render/rays/ray_scene.hpp"
 #include "scene/rigid/workers.hpp"
@@ -80,6 +81,7 @@ class Picture {
     if (options.channels.ids) frame.ids.assign(pixels, 0);
     if (options.channels.normals) frame.normals.assign(3 * pixels, 0.0f);
     if (options.channels.rgb) linear_.resize(pixels), frame.rgb.resize(3 * pixels);
+    if (!glass_.empty()) clear_.assign(pixels, 1.0f);
   }
 
   Frame frame;
@@ -89,6 +91,7 @@ class Picture {
     constexpr std::size_t kBlock = 4;  // rows of tiles that a thread takes at a time
     workers.share(tiles, kBlock, [&](std::size_t from, std::size_t to) { drawSolid(from, to); });
     if (!options_.channels.rgb) return;
+    hollows_.emplace(frame.depth, frame.camera);
     workers.share(tiles, kBlock, [&](std::size_t from, std::size_t to) { finish(from, to); });
     if (!options_.channels.depth) frame.depth = {};
   }
@@ -112,7 +115,7 @@ class Picture {
                 Recent<ShadedTriangle>& recent);
   void finish(std::size_t fromTile, std::size_t toTile);
   void blendGlass(const Casting& with, int y, Recent<ShadedTriangle>& recent);
-  void encodeRow(int y);
+  void encodeRow(int y, std::span<std::uint8_t> left);
 
   const FrameOptions& options_;
   PixelRays rays_;
@@ -120,6 +123,8 @@ class Picture {
   std::vector<const RayTree*> solid_, glass_;
   Vec3 origin_;
   std::vector<glsl::vec3> linear_;
+  std::vector<float> clear_;  ///< how much of what glass lies before is seen; empty: no glass
+  std::optional<Hollows> hollows_;
 };
 
 void Picture::drawSolid(std::size_t fromTile, std::size_t toTile) {
@@ -186,11 +191,11 @@ void Picture::paintRow(const Casting& with, int y, std::span<const HitKey> keys,
 void Picture::finish(std::size_t fromTile, std::size_t toTile) {
   const Casting with = casting(glass_);
   Recent<ShadedTriangle> triangles;
+  std::vector<std::uint8_t> left(static_cast<std::size_t>(rays_.width));
   for (std::size_t tile = fromTile; tile < toTile; ++tile) {
     const int top = static_cast<int>(tile) * kTile;
-    darkenHollows(linear_, frame.depth, frame.camera, top, endRow(tile));
     if (!glass_.empty()) blendGlass(with, top, triangles);
-    for (int y = top; y < endRow(tile); ++y) encodeRow(y);
+    for (int y = top; y < endRow(tile); ++y) encodeRow(y, left);
   }
 }
 
@@ -230,15 +235,20 @@ void Picture::blendGlass(const Casting& with, int y, Recent<ShadedTriangle>& rec
     const SurfaceColour glass =
         shading_.colour(triangle(pane.key), column(pane.pixel), row(pane.pixel), pane.z);
     linear_[pane.pixel] = glsl::mix(linear_[pane.pixel], glass.rgb, glass.alpha);
+    clear_[pane.pixel] *= 1 - glass.alpha;
   }
 }
 
-void Picture::encodeRow(int y) {
+/// `left` has room for a row.
+void Picture::encodeRow(int y, std::span<std::uint8_t> left) {
+  hollows_->row(y, left);
   for (int x = 0; x < rays_.width; ++x) {
     const std::size_t pixel = index(x, y);
-    frame.rgb[3 * pixel] = srgbOfLinear(linear_[pixel].x);
-    frame.rgb[3 * pixel + 1] = srgbOfLinear(linear_[pixel].y);
-    frame.rgb[3 * pixel + 2] = srgbOfLinear(linear_[pixel].z);
+    const glsl::vec3& linear = linear_[pixel];
+    const auto clear =
+        static_cast<std::uint8_t>(clear_.empty() ? 255.0f : 255 * clear_[pixel] + 0.5f);
+    const std::array rgb{srgbOfLinear(linear.x), srgbOfLinear(linear.y), srgbOfLinear(linear.z)};
+    darken(rgb.data(), left[static_cast<std::size_t>(x)], clear, &frame.rgb[3 * pixel]);
   }
 }
 

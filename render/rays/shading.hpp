@@ -46,9 +46,4 @@ class Shading {
   const MipTextures& textures_;
 };
 
-/// Darkens hollows: multiplies `rgb` (exposed linear) by what the depths around each pixel say, as
-/// the GL renderer's shader does. `depth` is Frame::depth.
-void darkenHollows(std::vector<glsl::vec3>& rgb, const std::vector<float>& depth,
-                   const Camera& camera, int firstRow, int endRow);
-
 }  // namespace enfilade::render

@@ -6,6 +6,7 @@
 
 #include "scene/avatars/follower.hpp"
 #include "scene/rotation.hpp"
+#include "scene/solid_around.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -17,17 +18,6 @@ constexpr double kDropTold = 2;       // metres: a drop that is worth telling
 // Triangles and narrow-phase queries that the search for room near a refused place may cost: some
 // milliseconds, since it is made inside a tick.
 constexpr std::uint64_t kMostSearched = 300'000;
-
-bool isInsideHull(const ObjectParts& parts, const Vec3& point) {
-  const std::array<Vec3, 1> vertex{Vec3::Zero()};
-  for (std::uint32_t i = 0; i < parts.hullCount(); ++i) {
-    if (!overlaps(parts.hullBoxes[i], {point, point})) continue;
-    collision::FeatureCache cache;
-    const auto decision = collision::decide({vertex, point}, parts.body(i), cache);
-    if (decision.verdict != collision::Verdict::separated) return true;
-  }
-  return false;
-}
 
 /// A search for a place, and what it costs.
 struct Search {
@@ -44,7 +34,7 @@ EntityId solidAround(Search& search, const Vec3& point) {
     const std::uint32_t object = world.scene->solidObjects()[still];
     const ObjectParts& parts = world.scene->parts(object);
     search.triangles += parts.localTriangles.triangles().size();
-    if (isInsideHull(parts, point) || surrounds(parts, point)) return object + 1;
+    if (holds(parts, point)) return object + 1;
   }
   return 0;
 }

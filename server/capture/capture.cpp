@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "render/renderer.hpp"
+#include "scene/solid_around.hpp"
 #include "server/capture/capture_folder.hpp"
 #include "server/capture/capture_progress.hpp"
 #include "server/capture/depth_reports.hpp"
@@ -39,6 +40,8 @@ struct CaptureCounts {
   std::atomic<std::size_t> written{0};
   std::atomic<std::size_t> clamped{0};  ///< pixels
   std::vector<std::size_t> blind;       ///< of the drawn frames, those that show no object
+  std::vector<std::size_t> within;      ///< and those whose camera stands in a still solid ...
+  std::string firstAround;              ///< ... the first of them in this one: its path
   double seconds = 0;                   ///< of drawing and writing
 };
 
@@ -93,8 +96,18 @@ bool showsNothing(const render::Frame& frame) {
   return !frame.depth.empty() && std::all_of(frame.depth.begin(), frame.depth.end(), noDepth);
 }
 
+/// From within a solid its back faces are seen, and what lies behind them: a picture like others.
+void notice(const scene::Scene& scene, const Shot& shot, std::size_t index,
+            const render::Frame& frame, CaptureCounts& counts) {
+  if (showsNothing(frame)) counts.blind.push_back(index);
+  const scene::EntityId around = solidAround(scene, shot.camera.eye);
+  if (around == 0) return;
+  if (counts.within.empty()) counts.firstAround = scene.model().objects[around - 1].path;
+  counts.within.push_back(index);
+}
+
 /// Draws on this thread; others encode and write meanwhile.
-void takePictures(const CaptureCommand& command, const scene::Model& model, const ShotList& list,
+void takePictures(const CaptureCommand& command, const scene::Scene& scene, const ShotList& list,
                   const std::vector<std::size_t>& missing, render::Renderer& renderer,
                   DepthReports* reports, CaptureCounts& counts) {
   CaptureMeter meter(command.run.progress, missing.size());
@@ -107,10 +120,10 @@ void takePictures(const CaptureCommand& command, const scene::Model& model, cons
     auto frame = std::make_shared<const render::Frame>(
         renderer.render(*shot.snapshot, shot.camera, options));
     if (reports) reports->measure(index, *frame, *shot.snapshot, options);
-    if (showsNothing(*frame)) counts.blind.push_back(index);
+    notice(scene, shot, index, *frame, counts);
     queue.post([&, index, frame = std::move(frame)] {
       const auto overlay = [&](const render::Frame& drawn) {
-        return drawOverlay(drawn, command.pictures.overlay, model, list, list.shots[index]);
+        return drawOverlay(drawn, command.pictures.overlay, scene.model(), list, list.shots[index]);
       };
       counts.clamped += writeFrame(command.out, command.pictures, index, *frame, overlay).clamped;
       ++counts.written;
@@ -153,6 +166,7 @@ void tellSummary(const CaptureCommand& command, const CaptureCounts& counts, std
   summary["already_there"] = counts.already;
   summary["clamped_pixels"] = counts.clamped.load();
   summary["blind_frames"] = counts.blind;
+  summary["frames_within_solids"] = counts.within;
   summary["went_wrong"] = wentWrong;
   summary["seconds"] = counts.seconds;
   summary["frames_per_s"] =
@@ -203,8 +217,7 @@ ExitCode run(const CaptureCommand& command) {
   std::optional<DepthReports> reports;
   if (command.run.reportDepth && !missing.empty()) reports.emplace(command.out, scene);
   try {
-    takePictures(command, scene->model(), list, missing, renderer, reports ? &*reports : nullptr,
-                 counts);
+    takePictures(command, *scene, list, missing, renderer, reports ? &*reports : nullptr, counts);
   } catch (...) {
     disclaimFolder(command.out);
     throw;
@@ -218,8 +231,13 @@ ExitCode run(const CaptureCommand& command) {
         "{} frames show nothing at all, the first of them frame {}: does the camera stand "
         "in a wall, below the floor or beside the scene?",
         counts.blind.size(), counts.blind.front());
+  if (!counts.within.empty())
+    spdlog::warn(
+        "{} frames are seen from within a solid, the first of them frame {}: its camera stands in "
+        "\"{}\"",
+        counts.within.size(), counts.within.front(), counts.firstAround);
   tellSummary(command, counts, list.wentWrong, drawnBy, videoOf(command, list));
-  const bool asTold = counts.blind.empty() && list.wentWrong == 0;
+  const bool asTold = counts.blind.empty() && counts.within.empty() && list.wentWrong == 0;
   return asTold || !command.run.strict ? ExitCode::done : ExitCode::violations;
 }
 

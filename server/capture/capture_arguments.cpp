@@ -174,6 +174,9 @@ void addPath(CLI::App& verb, CaptureArguments& into) {
       ->capture_default_str()
       ->check(wholeBetween(0, 1'000'000'000, "TICKS"));
   verb.add_option("--avatar", into.avatar, "With --every: whose eyes (the first one's)");
+  verb.add_flag("--still", into.still,
+                "Along a camera path the scene stands as at its beginning, though the path's times "
+                "pass");
   verb.add_option("--limit", into.limit, "Only the first N frames; 0: all")
       ->capture_default_str()
       ->check(wholeBetween(0, 1'000'000'000, "N"));
@@ -253,7 +256,7 @@ void addRun(CLI::App& verb, CaptureArguments& into) {
                 "one a frame; a second or so a frame");
   verb.add_flag("--strict", into.strict,
                 "End with 3 when a walk script's order was refused or a walk blocked, or when a "
-                "frame shows nothing");
+                "frame shows nothing or is seen from within a solid");
   verb.add_flag("--dry-run", into.dryRun, "Tell how many frames there are and write nothing");
 }
 
@@ -281,6 +284,7 @@ PictureOptions picturesFrom(const CaptureArguments& read) {
   options.every = static_cast<std::uint32_t>(*numberFrom<std::uint64_t>(read.every));
   options.avatar = read.avatar;
   options.camera = read.camera;
+  options.still = read.still;
   options.limit = *numberFrom<std::uint64_t>(read.limit);
   options.channels = *channelsFrom(read.channels);
   options.rgb = read.rgb == "jpeg" ? RgbFile::jpeg : RgbFile::png;

@@ -51,6 +51,7 @@ struct PictureOptions {
   std::uint32_t every = 0;                 ///< walk: ticks; 0: the script's captures
   std::string avatar;                      ///< walk with `every`: whose eyes; "": the first one's
   std::string camera;                      ///< glTF: the camera's name; "": the first one
+  bool still = false;                      ///< camera paths: the world stands as it begins
   std::uint64_t limit = 0;                 ///< frames from the beginning; 0: all
   CaptureChannels channels;
   RgbFile rgb = RgbFile::png;

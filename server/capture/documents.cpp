@@ -207,6 +207,7 @@ std::string manifestJson(const scene::Scene& scene, const std::filesystem::path&
   all["every"] = options.every;
   all["avatar"] = options.avatar;
   all["camera"] = options.camera;
+  all["still"] = options.still;
   all["channels"] = channelNames(options.channels);
   all["rgb"] =
       options.rgb == RgbFile::png ? Json("png") : Json("jpeg " + std::to_string(options.quality));

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "render/gl/avatar_mesh.hpp"
+#include "render/pictures/font.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -13,6 +15,8 @@ using render::Image;
 
 constexpr double kLeastShare = 0.0005, kMostShare = 0.4;  // of the picture, for a box
 constexpr std::size_t kMostNames = 16;                    // the largest ones
+constexpr int kLabelHeight = render::kLetterHeight + 2;   // pixels
+constexpr int kMostLines = 4;                             // that a name may be away from its object
 constexpr double kInFront = 0.02;                         // metres that a mark may lie behind
 constexpr double kOverFloor = 0.03;                       // metres that paths are drawn above it
 constexpr Colour kContact{214, 40, 40}, kNear{240, 150, 20}, kPaper{250, 249, 246},
@@ -23,6 +27,10 @@ struct Extent {
   scene::EntityId id = 0;
   int left = 0, top = 0, right = 0, bottom = 0;  ///< pixels, the last ones included
   std::size_t pixels = 0;
+  std::int64_t sumX = 0, sumY = 0;  ///< of the pixels
+
+  int middleX() const { return static_cast<int>(sumX / static_cast<std::int64_t>(pixels)); }
+  int middleY() const { return static_cast<int>(sumY / static_cast<std::int64_t>(pixels)); }
 };
 
 std::vector<Extent> extentsOf(const render::Frame& frame) {
@@ -32,12 +40,14 @@ std::vector<Extent> extentsOf(const render::Frame& frame) {
     const scene::EntityId id = frame.ids[i];
     if (id == 0) continue;
     const int x = static_cast<int>(i) % width, y = static_cast<int>(i) / width;
-    const auto [at, isNew] = found.try_emplace(id, Extent{id, x, y, x, y, 0});
+    const auto [at, isNew] = found.try_emplace(id, Extent{id, x, y, x, y});
     Extent& extent = at->second;
     extent.left = std::min(extent.left, x);
     extent.right = std::max(extent.right, x);
     extent.bottom = y;
     ++extent.pixels;
+    extent.sumX += x;
+    extent.sumY += y;
   }
   std::vector<Extent> extents;
   const auto all = static_cast<double>(frame.ids.size());
@@ -81,8 +91,49 @@ std::string nameOf(const scene::Model& model, const ShotList& list, scene::Entit
   return "";
 }
 
-void drawName(Image& image, const Extent& extent, const std::string& name) {
-  const int x = extent.left + 3, y = extent.top + 3;
+/// Where a name is written.
+struct Label {
+  int left, top, width;  ///< pixels
+};
+
+bool overlap(const Label& a, const Label& b) {
+  return a.left < b.left + b.width && b.left < a.left + a.width &&
+         std::abs(a.top - b.top) < kLabelHeight;
+}
+
+/// In the row of the object's middle that of its pixels which is next to the middle: an object may
+/// have a hole there.
+int columnOn(const render::Frame& frame, const Extent& extent) {
+  const int width = frame.camera.width;
+  const auto row = frame.ids.begin() + static_cast<std::ptrdiff_t>(extent.middleY()) * width;
+  for (int away = 0; away < width; ++away) {
+    for (const int x : {extent.middleX() - away, extent.middleX() + away})
+      if (x >= 0 && x < width && row[x] == extent.id) return x;
+  }
+  return extent.middleX();
+}
+
+/// On the object, or as few lines above or below as others leave free; nullopt: nowhere near.
+std::optional<Label> placeFor(const render::Frame& frame, const Extent& extent,
+                              const std::string& name, const std::vector<Label>& others) {
+  const int width = static_cast<int>(name.size()) * render::kLetterAdvance + 2;
+  if (name.empty() || width > frame.camera.width) return std::nullopt;
+  const int left = std::clamp(columnOn(frame, extent) - width / 2, 1, frame.camera.width - width);
+  for (int lines = 0; lines <= kMostLines; ++lines) {
+    for (const int shift : {-lines, lines}) {
+      const Label label{left, extent.middleY() - render::kLetterHeight / 2 + shift * kLabelHeight,
+                        width};
+      const bool inside = label.top >= 1 && label.top + kLabelHeight <= frame.camera.height;
+      if (inside && std::none_of(others.begin(), others.end(),
+                                 [&](const Label& other) { return overlap(label, other); }))
+        return label;
+    }
+  }
+  return std::nullopt;
+}
+
+void drawName(Image& image, const Label& label, const std::string& name) {
+  const int x = label.left, y = label.top;
   for (const auto& [dx, dy] : {std::pair(-1, 0), {1, 0}, {0, -1}, {0, 1}})
     render::drawText(image, x + dx, y + dy, name, 1, kPaper);
   render::drawText(image, x, y, name, 1, kInk);
@@ -133,8 +184,14 @@ Image drawOverlay(const render::Frame& frame, const OverlayChoice& choice,
     for (const Extent& extent : extents) drawBox(image, extent);
   }
   if (choice.names) {
-    for (std::size_t i = 0; i < std::min(extents.size(), kMostNames); ++i)
-      drawName(image, extents[i], nameOf(model, list, extents[i].id));
+    std::vector<Label> labels;
+    for (std::size_t i = 0; i < std::min(extents.size(), kMostNames); ++i) {
+      const std::string name = nameOf(model, list, extents[i].id);
+      const auto label = placeFor(frame, extents[i], name, labels);
+      if (!label) continue;
+      drawName(image, *label, name);
+      labels.push_back(*label);
+    }
   }
   if (choice.contacts) drawContacts(image, frame, shot);
   return image;

@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "scene/import/gltf_cameras.hpp"
-#include "scene/world.hpp"
+#include "server/capture/moments.hpp"
 #include "server/capture/walk_shots.hpp"
 
 namespace enfilade::server {
@@ -148,6 +148,7 @@ void tellUnused(const PictureOptions& options, bool script, bool gltf,
   tell(!script && options.overlay.contacts, "--overlay contacts", kScript);
   tell(!script && options.overlay.paths, "--overlay paths", kScript);
   tell(script && !options.avatar.empty() && options.every == 0, "--avatar", "--every");
+  tell(script && options.still, "--still", "camera paths");
   tell(!gltf && !options.camera.empty(), "--camera", "glTF paths");
 }
 
@@ -167,12 +168,10 @@ ShotList planShots(const std::shared_ptr<const scene::Scene>& scene,
     list = walkShots(scene, file, options, shard);
   } else {
     list = kind == PathKind::gltf ? gltfShots(*scene, file, options) : shotsOf(path);
-    const auto still = scene::World(scene).snapshot();
-    for (std::size_t i = 0; i < list.shots.size(); ++i)
-      if (takes(shard, i)) list.shots[i].snapshot = still;
   }
   tellUnused(options, kind == PathKind::script, kind == PathKind::gltf, list.notes);
   if (options.limit > 0 && list.shots.size() > options.limit) list.shots.resize(options.limit);
+  if (kind != PathKind::script) showMoments(scene, options.still, shard, list.shots);
   fitLenses(list.shots, options, path, source);
   return list;
 }

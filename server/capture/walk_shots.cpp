@@ -4,23 +4,15 @@
 #include <tuple>
 
 #include "protocol/script.hpp"
+#include "server/capture/moments.hpp"
 #include "server/in_process_driver.hpp"
 #include "server/world_messages.hpp"
 
 namespace enfilade::server {
 namespace {
 
-constexpr std::size_t kMostSnapshotBytes = std::size_t{2} << 30;
 constexpr double kStride = 0.05;  // metres between two points of a trail
 constexpr std::size_t kMostShots = 10'000'000;
-
-/// What a snapshot holds that the one before does not, about.
-std::size_t bytesOf(const scene::Snapshot& snapshot, const scene::Snapshot* before) {
-  std::size_t bytes = sizeof snapshot + snapshot.avatars.size() * sizeof(scene::AvatarView);
-  if (snapshot.bodies && (!before || before->bodies != snapshot.bodies))
-    bytes += snapshot.bodies->size() * sizeof(scene::BodyView);
-  return bytes;
-}
 
 class Recorder {
  public:
@@ -83,22 +75,10 @@ class Recorder {
     if (!seer) return;  // not in the world now
     Shot shot{snapshot->time, render::firstPerson(*seer, 1, 1), seer->id, nullptr, name, {}};
     for (const auto& [key, mark] : live_) shot.contacts.push_back(mark);
-    if (takes(shard_, list_.shots.size())) keep(snapshot, shot);
+    if (takes(shard_, list_.shots.size())) kept_.keep(snapshot, shot);
     if (list_.shots.size() == kMostShots)
       throw CameraPathError("the walk makes more than 10,000,000 frames; give a larger --every");
     list_.shots.push_back(std::move(shot));
-  }
-
-  void keep(const std::shared_ptr<const scene::Snapshot>& snapshot, Shot& shot) {
-    shot.snapshot = snapshot;
-    if (snapshot == last_) return;
-    bytes_ += bytesOf(*snapshot, last_.get());
-    last_ = snapshot;
-    if (bytes_ > kMostSnapshotBytes)
-      throw CameraPathError(
-          "what moves in this walk takes more than 2 GiB over all frames; give a larger --every, "
-          "or "
-          "--shard i/n one after the other");
   }
 
   const scene::World& world_;
@@ -108,8 +88,7 @@ class Recorder {
   std::map<scene::EntityId, std::string> names_;
   std::map<std::tuple<bool, std::uint32_t, std::uint32_t>, ContactMark> live_;
   std::string first_;
-  std::shared_ptr<const scene::Snapshot> last_;
-  std::size_t bytes_ = 0;
+  KeptSnapshots kept_;
 };
 
 /// Without a renderer every capture would count as one that failed.

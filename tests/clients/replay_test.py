@@ -98,6 +98,34 @@ class Replay(unittest.TestCase):
                       [self.walk, self.walk]):
             self.assertEqual(self.run_program("serve", *wrong).returncode, 2, wrong)
 
+    def test_a_spoilt_recording_is_not_played(self):
+        spoilt = self.folder / "spoilt.mcap"
+        data = bytearray(self.walk.read_bytes())
+        data[len(data) // 2] ^= 4
+        spoilt.write_bytes(data)
+        ended = self.run_program("serve", spoilt, "--listen", "127.0.0.1:0")
+        self.assertEqual(ended.returncode, 1)
+        self.assertIn("byte", ended.stderr)
+
+    def test_of_several_walks_the_first_is_played(self):
+        several = self.folder / "several.mcap"
+        with enfilade.serve(self.scene, "--record", str(several)) as server, \
+                server.connect() as client:
+            client.spawn("ann", at=(0, 0, 0))
+            hash_ = client.step(50).state_hash
+            client.restart()
+            client.spawn("bob", at=(1, 0, 1))
+            client.step(80)
+        server = enfilade.serve(several)
+        self.addCleanup(server.stop)
+        with server.connect() as client:
+            self.assertEqual(client.replay.last_tick, 50)
+            self.assertEqual(client.step(60).state_hash, hash_)
+        self.assertIn("begins anew", server.log())
+        beyond = self.run_program("serve", several, "--from", 60, "--listen", "127.0.0.1:0")
+        self.assertEqual(beyond.returncode, 1)
+        self.assertIn("only the first walk is played", beyond.stderr)
+
     def test_it_is_played_in_the_scene_that_is_named(self):
         moved = self.folder / "moved.obj"
         moved.write_text(obj())

@@ -70,6 +70,7 @@ server::ServerLimits smallLimits() {
   limits.waypoints = 16;
   limits.rays = 32;
   limits.scanRays = 256;
+  limits.pairs = 8;
   limits.watches = 2;
   return limits;
 }

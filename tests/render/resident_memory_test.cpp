@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "render/rays/ray_renderer.hpp"
 #include "tests/render/hand_made_scene.hpp"
 
 namespace enfilade::render {
@@ -26,10 +27,11 @@ std::vector<PlacedBox> manyBoxes() {
   return boxes;
 }
 
-/// Reloads the scene `reloads` times and takes 20 pictures with each.
+/// Reloads the scene `reloads` times and takes 20 pictures with each. frame_soak does more of it.
+template <class OneRenderer>
 void work(int reloads) {
   for (int reload = 0; reload < reloads; ++reload) {
-    GlRenderer renderer(sceneOf(manyBoxes()));
+    OneRenderer renderer(sceneOf(manyBoxes()));
     for (int i = 0; i < 20; ++i) {
       Camera camera = squareCamera(96);
       camera.forward = {std::cos(0.3 * i), -0.1, std::sin(0.3 * i)};
@@ -38,11 +40,20 @@ void work(int reloads) {
   }
 }
 
-TEST(ResidentMemory, IsFlatOverReloadsAndPictures) {
-  work(6);  // what is kept for good, as compiled shaders
+template <class OneRenderer>
+void expectFlat() {
+  work<OneRenderer>(6);  // what is kept for good, as compiled shaders
   const double before = residentMegabytes();
-  work(24);
+  work<OneRenderer>(24);
   EXPECT_LT(residentMegabytes() - before, 12) << "megabytes more after 24 reloads";
+}
+
+TEST(ResidentMemory, IsFlatOverReloadsAndPicturesOfGl) {
+  expectFlat<GlRenderer>();
+}
+
+TEST(ResidentMemory, IsFlatOverReloadsAndPicturesOfRays) {
+  expectFlat<RayRenderer>();
 }
 
 }  // namespace

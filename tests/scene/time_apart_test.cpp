@@ -99,6 +99,41 @@ TEST(TimeApart, WhoFallsFallsFasterThanInTheLastTick) {
   EXPECT_NEAR(said.contact, landed, 0.02) << "and not much before";
 }
 
+TEST(TimeApart, WhoIsPushedComesNearerAsFastAsWhatPushes) {
+  Model model =
+      boxModel({floorBox(), {"ram", {-2, 0.01, -1}, {-1, 2, 1}}, {"post", {3, 0, -1}, {4, 3, 1}}});
+  BodySpec ram = bodySpec("ram", BodyKind::sliding, {1});
+  ram.axis = {1, 0, 0};
+  ram.high = 6;
+  ram.speed = 1;
+  model.bodies = {ram};
+  BodyTrial t(std::move(model));
+  SceneIndex index(sharedScene(t.world));
+  t.order("ann", Spawn{{0, 0.001, 0}, 0});
+  t.ticks(10);
+  t.tell({"ram", Action::to, 6, 0, {}});
+  t.ticks(60);
+  const EntityId ann = t.world.snapshot()->avatars[0].id, post = 3;
+  const double before = t.feet("ann").x();
+  const TimeApart said = apartAt(t.world, index, ann, post, Assume::presentMotion);
+  t.ticks(30);
+  EXPECT_NEAR(t.feet("ann").x() - before, 0.5, 0.01) << "it is pushed";
+  EXPECT_GE(said.closing.speed, 1);
+  EXPECT_LE(said.contact, said.now.decision.distance / 1);
+  EXPECT_GT(said.contact, 0.3 * said.now.decision.distance);
+}
+
+TEST(TimeApart, TheTipsOfWhatSpinsCount) {
+  BodyTrial t(busyRoom());
+  SceneIndex index(sharedScene(t.world));
+  t.ticks(1);
+  const EntityId plank = 9, post = 4;
+  const TimeApart said = apartAt(t.world, index, plank, post, Assume::presentMotion);
+  const double radius = t.world.scene().shapeOfBody(4)->radius;
+  EXPECT_GE(said.closing.speed, t.body("plank").spin.norm() * radius);
+  EXPECT_LT(said.contact, said.now.decision.distance / 5 / radius);
+}
+
 TEST(TimeApart, OfFreeBodiesNothingIsKnownUnderAnyCommand) {
   BodyTrial t(busyRoom());
   SceneIndex index(sharedScene(t.world));

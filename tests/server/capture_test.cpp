@@ -8,6 +8,7 @@
 
 #include "render/gl/gl_renderer.hpp"
 #include "render/pictures/image.hpp"
+#include "server/capture/overlay.hpp"
 #include "tests/server/program_trial.hpp"
 
 namespace enfilade::server::testing {
@@ -248,6 +249,56 @@ TEST_F(Capture, AFrameThatShowsNothingIsToldAndIsAViolationWithStrict) {
   EXPECT_EQ(captured("path.json", "strict", {"--strict"}).code, 3);
 }
 
+TEST_F(Capture, AFrameFromWithinAWallIsToldWithItsNameAndIsAViolationWithStrict) {
+  write(folder_ / "path.txt",
+        ahead(1) + "1 5.1 1.6 0 0 -0.7071067811865476 0 0.7071067811865476\n");
+  const Ended told = captured("path.txt", "out");
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_EQ(json::parse(told.out).at("frames_within_solids"), json::array({1}));
+  EXPECT_NE(told.err.find("frame 1: its camera stands in \"room_wall\""), std::string::npos)
+      << told.err;
+  EXPECT_EQ(captured("path.txt", "strict", {"--strict"}).code, 3);
+}
+
+TEST_F(Capture, PicturesAreTheSameForAnyNumberOfThreadsOfGl) {
+  write(folder_ / "path.txt", ahead(3));
+  std::map<std::string, std::string> first;
+  for (const char* threads : {"0", "1", "2"}) {
+    ::setenv("LP_NUM_THREADS", threads, 1);  // of Mesa's llvmpipe; others do not look at it
+    const std::string out = std::string("out") + threads;
+    const Ended ended = captured("path.txt", out,
+                                 {"--size", "320x240", "--renderer", "gl", "--overlay", "boxes",
+                                  "--channels", "rgb,depth,ids,normals"});
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    const auto tree = treeOf(folder_ / out);
+    EXPECT_GE(tree.size(), 3 * 5U);
+    if (first.empty()) first = tree;
+    EXPECT_EQ(tree, first) << threads << " threads";
+  }
+  ::unsetenv("LP_NUM_THREADS");
+}
+
+TEST_F(Capture, TimeOfThePathPassesInTheWorldAndShardsShowTheSame) {
+  write(folder_ / "room.walk.json",
+        R"({"walk":1,"bodies":[{"name":"wall","kind":"path","objects":["room_wall"],
+            "keys":[{"time":0},{"time":2,"offset":[2,0,0]}]}]})");
+  const std::string pose = " 0 1.6 0 0 -0.7071067811865476 0 0.7071067811865476\n";
+  write(folder_ / "path.txt", "100" + pose + "100.5" + pose + "101" + pose);
+  ASSERT_EQ(captured("path.txt", "whole").code, 0);
+  ASSERT_EQ(captured("path.txt", "still", {"--still"}).code, 0);
+  const auto ahead = [&](const std::string& out, int frame) {
+    const std::string file = out + "/depth/00000" + std::to_string(frame) + ".npy";
+    return readNpy<float>(folder_ / file).at(32, 24);
+  };
+  for (int frame = 0; frame < 3; ++frame) {
+    EXPECT_NEAR(ahead("whole", frame), 5 + 0.5 * frame, 0.02) << frame;  // a tick is 1/60 s
+    EXPECT_NEAR(ahead("still", frame), 5, 1e-3) << frame;
+  }
+  for (const char* shard : {"0/2", "1/2"})
+    ASSERT_EQ(captured("path.txt", "shards", {"--shard", shard}).code, 0);
+  EXPECT_EQ(treeOf(folder_ / "shards"), treeOf(folder_ / "whole"));
+}
+
 TEST_F(Capture, AScriptThatGoesWrongIsCountedAndIsAViolationWithStrict) {
   write(folder_ / "path.jsonl", R"({"spawn":"ann","at":[0,0,0],"facing":0}
 {"walk":"bob","to":[1,0,0]}
@@ -444,6 +495,35 @@ TEST_F(Capture, AnOverlayMarksACopyAndLeavesTheColourAlone) {
   EXPECT_TRUE(changed(left, top));
   EXPECT_GT(floorMarked, 20);
   EXPECT_EQ(captured("walk.jsonl", "wrong", {"--overlay", "boxen"}).code, 2);
+}
+
+TEST(Overlay, NamesOfThingsWithOneMiddleStandApartAndInThePicture) {
+  // A ring around a square, both in the picture's lower right corner.
+  render::Frame frame;
+  frame.camera.width = frame.camera.height = 100;
+  frame.rgb.assign(3 * 100 * 100, 200);
+  frame.ids.assign(100 * 100, 0);
+  for (int y = 70; y < 100; ++y) {
+    for (int x = 70; x < 100; ++x)
+      frame.ids[static_cast<std::size_t>(100 * y + x)] =
+          std::max(std::abs(x - 85), std::abs(y - 85)) < 8 ? 2 : 1;
+  }
+  const auto inked = [&](const char* outer, const char* inner) {
+    scene::Model model;
+    model.objects.resize(2);
+    model.objects[0].path = outer;
+    model.objects[1].path = inner;
+    OverlayChoice names;
+    names.names = true;
+    const render::Image image = drawOverlay(frame, names, model, {}, {});
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < image.rgb.size(); i += 3) count += image.rgb[i] < 100;
+    return count;
+  };
+  const std::size_t outer = inked("a/ring", "b/"), inner = inked("a/", "b/square");
+  EXPECT_GT(outer, 20U);
+  EXPECT_GT(inner, 20U);
+  EXPECT_EQ(inked("a/ring", "b/square"), outer + inner);
 }
 
 TEST_F(Capture, DepthReportsLieBesideTheFramesAndAreMadeUpForWhereTheyAreMissing) {
