@@ -33,6 +33,19 @@ class Walking(RoomCase):
         self.assertEqual(touched[0].verdict, "separated")
         self.assertGreater(touched[0].normal[0], 0.9)
 
+    def test_who_cannot_enter_is_not_taken_for_who_has_its_name(self):
+        self.client.subscribe(notices=True)
+        self.client.spawn("ann", at=(0, 0, 0)).enter()
+        with self.assertRaisesRegex(enfilade.OrderFailed, "already"):
+            self.client.spawn("ann", at=(1, 0, 1)).enter()
+
+    def test_points_that_are_none_are_told_before_anything_is_sent(self):
+        for point in ("abc", (1, 2), (1, 2, 3, 4), None, (1, "x", 2)):
+            with self.assertRaisesRegex(ValueError, "three numbers"):
+                self.client.spawn("ann", at=point)
+        with self.assertRaises(TypeError):
+            self.client.step(1.5)
+
     def test_the_same_orders_after_a_restart_give_the_same_hash(self):
         hashes = []
         for _ in range(2):

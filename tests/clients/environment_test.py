@@ -133,6 +133,12 @@ class Environments(RoomCase):
             time.sleep(0.01)
         self.fail(f"worlds were left: {self.client.worlds()}")
 
+    def test_arguments_that_are_none_are_named(self):
+        for name, value in (("size", (10,)), ("size", (12.5, 5)), ("size", (0, 0)),
+                            ("goal_radius", math.nan), ("max_steps", 0), ("ticks_per_step", 0)):
+            with self.assertRaisesRegex(ValueError, name):
+                enfilade.WalkEnv(address=self.server.address, starts=_STARTS, **{name: value})
+
     def test_a_vector_larger_than_the_server_takes_is_refused(self):
         with self.assertRaisesRegex(ValueError, "num_envs"):
             enfilade.VectorWalkEnv(address=self.server.address, num_envs=1000, starts=_STARTS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import operator
 import time
 from collections import deque
 from typing import Any, Deque, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple, Union
@@ -201,7 +202,7 @@ class Client:
 
     def step(self, ticks: int = 1, *, avatars: bool = False) -> Step:
         """Makes ticks, in lockstep. `avatars` asks where everyone is after the last."""
-        reply, _ = self.request(step=messages.Step(ticks=ticks, avatars=avatars))
+        reply, _ = self.request(step=messages.Step(ticks=operator.index(ticks), avatars=avatars))
         return results.step(reply.step)
 
     def run_until_idle(self, most: int = LONGEST_RUN, *, at_a_time: int = 60) -> Step:
@@ -425,7 +426,8 @@ class Client:
         return results.hits(replies)
 
     def sees(self, origin: Point, target: Point, *, through_avatar: str = "") -> bool:
-        """Whether nothing stands between two points."""
+        """Whether nothing stands between two points: neither an avatar, also one's own that is not
+        `through_avatar`."""
         direction = [t - o for o, t in zip(origin, target)]
         reach = sum(d * d for d in direction) ** 0.5
         ray = messages.Ray(origin=vec(origin), direction=vec(direction), reach=reach)
@@ -546,12 +548,13 @@ class Avatar:
         is about to leave. Raises OrderFailed where it cannot enter."""
         for _ in range(ENTRY_TICKS):
             state = self._client.step(1, avatars=True).avatars.get(self.name)
-            if state is not None:
-                return state
+            # Before the state: it may be another avatar's, of the same name.
             why = [one.text for one in self._client._notices
                    if one.tag == self.entry and one.avatar == self.name and one.kind == "refused"]
             if why:
                 raise OrderFailed(f"avatar {self.name!r} did not enter: {why[-1]}")
+            if state is not None:
+                return state
         raise OrderFailed(f"avatar {self.name!r} did not enter within {ENTRY_TICKS} ticks; "
                           "subscribe(notices=True) first to be told why")
 

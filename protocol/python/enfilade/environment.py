@@ -79,8 +79,13 @@ class WalkEnv(spaces.EnvBase):
             raise ValueError(f"channels: give some of {_CHANNELS}, not {channels!r}")
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"render_mode: give None or 'rgb_array', not {render_mode!r}")
-        if operator.index(ticks_per_step) < 1:
-            raise ValueError(f"ticks_per_step: give at least 1, not {ticks_per_step}")
+        for name, count in (("ticks_per_step", ticks_per_step), ("max_steps", max_steps)):
+            if operator.index(count) < 1:
+                raise ValueError(f"{name}: give at least 1, not {count}")
+        if any(side < 1 or side != int(side) for side in _numbers(size, "size", (2,))):
+            raise ValueError(f"size: give pixels, whole and at least 1, not {size!r}")
+        if not 0 < goal_radius < math.inf:
+            raise ValueError(f"goal_radius: give metres above 0, not {goal_radius}")
         if not 0 < fov_y < math.pi:
             raise ValueError(f"fov_y: give radians between 0 and pi, not {fov_y}")
         if not (0 < speed < math.inf and 0 <= turn_speed < math.inf):
@@ -89,7 +94,8 @@ class WalkEnv(spaces.EnvBase):
             raise ValueError("server_arguments: give a list of strings")
         if sum(one is not None for one in (scene, address or None, client)) != 1:
             raise ValueError("give one of scene, address and client")
-        self.goal_radius, self.size, self.channels = goal_radius, size, tuple(channels)
+        self.goal_radius, self.channels = goal_radius, tuple(channels)
+        self.size = (int(size[0]), int(size[1]))
         self.ticks_per_step, self.speed, self.turn_speed = ticks_per_step, speed, turn_speed
         self.max_steps, self.fov_y, self.discrete = max_steps, fov_y, discrete
         self.render_mode = render_mode

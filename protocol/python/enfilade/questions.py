@@ -12,7 +12,10 @@ Point = Sequence[float]
 
 
 def vec(point: Point) -> Any:
-    x, y, z = point
+    try:
+        x, y, z = map(float, point)
+    except (TypeError, ValueError):
+        raise ValueError(f"a point: give three numbers (x, y, z), not {point!r}") from None
     return messages.Vec3(x=x, y=y, z=z)
 
 
