@@ -23,7 +23,7 @@ struct ModelOptions {
   std::optional<char> up;  ///< 'x', 'y' or 'z'
   /// Metres, Y up: taken off the file's coordinates; nullopt: what brings it near the origin.
   std::optional<scene::Vec3> offset;
-  bool cache = true;       ///< whether what an earlier start kept of the file may serve
+  bool cache = true;  ///< whether what an earlier start kept of the file may serve
   scene::IfcReader ifcReader = scene::IfcReader::automatic;
   scene::IfcDoors doors = scene::IfcDoors::move;
 };

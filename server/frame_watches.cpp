@@ -1,9 +1,14 @@
 #include "server/frame_watches.hpp"
 
+#include <utility>
+
 #include "server/world_messages.hpp"
 
 namespace enfilade::server {
 namespace {
+
+void drawNext(ServedWorld& served, ClientId id, Client& client, std::uint32_t number,
+              FrameWatch& watch);
 
 /// Lets the next picture begin before this one is handed over: who saw it and then steps gets the
 /// next. So two may be unsent for a moment. An error, as of a device that was lost, is handed over
@@ -14,8 +19,10 @@ void deliver(ServedWorld& served, ClientId id, std::uint32_t number, std::uint64
     const auto client = then.clients.find(id);
     if (client == then.clients.end()) return;
     const auto watch = client->second.watches.find(number);
-    if (watch != client->second.watches.end() && watch->second.generation == generation)
-      watch->second.underWay = false;
+    if (watch == client->second.watches.end() || watch->second.generation != generation) return;
+    watch->second.underWay = false;
+    if (std::exchange(watch->second.elsewhere, false))
+      drawNext(then, id, client->second, number, watch->second);
   };
   served.frames.draw(std::move(job), [out, number, drawn, post = served.post](Buffer picture) {
     post(drawn);
@@ -43,6 +50,13 @@ void draw(ServedWorld& served, ClientId id, Client& client, std::uint32_t number
   watch.dropped = 0;
   job.seen = toRecording(served, watch.request);
   deliver(served, id, number, watch.generation, client.out, std::move(job));
+}
+
+void drawNext(ServedWorld& served, ClientId id, Client& client, std::uint32_t number,
+              FrameWatch& watch) {
+  const double now = served.world.snapshot()->time;
+  watch.nextTime = now + (watch.rate > 0 ? 1 / watch.rate : 0);
+  draw(served, id, client, number, watch);
 }
 
 }  // namespace
@@ -124,8 +138,7 @@ void drawWatched(ServedWorld& served, ClientId id, Client& client) {
       ++watch.dropped;
       continue;
     }
-    watch.nextTime = now + (watch.rate > 0 ? 1 / watch.rate : 0);
-    draw(served, id, client, number, watch);
+    drawNext(served, id, client, number, watch);
   }
 }
 

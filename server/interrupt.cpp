@@ -18,7 +18,7 @@ bool interrupted() {
 ExitCode interruptible(const std::function<ExitCode()>& work, const char* told) {
   struct sigaction action {};
   action.sa_handler = [](int) { came = 1; };
-  sigaction(SIGINT, &action, nullptr);
+  for (const int signal : {SIGINT, SIGTERM}) sigaction(signal, &action, nullptr);
   try {
     return work();
   } catch (const std::exception&) {

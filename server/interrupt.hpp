@@ -1,4 +1,5 @@
-// Ctrl-C of a run that ends by itself: it stops at the next good place and leaves whole files.
+// Ctrl-C of a run that ends by itself, or a time limit (SIGTERM): it stops at the next good place
+// and leaves whole files.
 #pragma once
 
 #include <functional>
@@ -7,7 +8,7 @@
 
 namespace enfilade::server {
 
-/// Whether SIGINT came since interruptible() began.
+/// Whether SIGINT or SIGTERM came since interruptible() began.
 bool interrupted();
 
 /// Thrown by work that stops because of it.

@@ -3,6 +3,8 @@
 #include <array>
 #include <cstddef>
 
+#include "server/plan_picture.hpp"
+
 namespace enfilade::server {
 namespace {
 
@@ -29,18 +31,32 @@ void addCuts(const scene::Model& model, std::uint32_t object, double height,
 
 }  // namespace
 
-std::vector<CutLine> cutAt(const scene::Scene& scene, double height) {
+std::vector<CutLine> cutOfStill(const scene::Scene& scene, double height) {
   std::vector<CutLine> lines;
   for (std::size_t i = 0; i < scene.solidObjects().size(); ++i) {
     const scene::Box& box = scene.stillBoxes()[i];
     if (box.min.y() < height && box.max.y() >= height)
       addCuts(scene.model(), scene.solidObjects()[i], height, lines);
   }
+  return lines;
+}
+
+std::vector<CutLine> cutAt(const scene::Scene& scene, double height) {
+  std::vector<CutLine> lines = cutOfStill(scene, height);
   for (const scene::BodySpec& body : scene.model().bodies) {
     if (body.kind == scene::BodyKind::trigger) continue;
     for (const std::uint32_t object : body.objects) addCuts(scene.model(), object, height, lines);
   }
   return lines;
+}
+
+void drawCut(render::Image& image, const render::Camera& camera, const std::vector<CutLine>& cut,
+             double left, double top) {
+  for (const CutLine& line : cut) {
+    const Vec3 from = render::project(camera, line.from), to = render::project(camera, line.to);
+    render::drawLine(image, left + from.x(), top + from.y(), left + to.x(), top + to.y(), 2,
+                     kPlanInk);
+  }
 }
 
 }  // namespace enfilade::server

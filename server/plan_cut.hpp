@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include "render/camera.hpp"
+#include "render/pictures/image.hpp"
 #include "scene/scene.hpp"
 
 namespace enfilade::server {
@@ -13,8 +15,14 @@ struct CutLine {
   collision::Vec3 from, to;
 };
 
-/// Where triangles of solid objects, and of bodies as the model has them, pass through `height`
-/// (y). Those that lie in it have no line.
+/// Where triangles of solid still objects pass through `height` (y). Those that lie in it have no
+/// line.
+std::vector<CutLine> cutOfStill(const scene::Scene& scene, double height);
+/// The same with bodies, as the model has them.
 std::vector<CutLine> cutAt(const scene::Scene& scene, double height);
+
+/// On a picture that `camera` took, and whose top left corner stands at (left, top) of `image`.
+void drawCut(render::Image& image, const render::Camera& camera, const std::vector<CutLine>& cut,
+             double left = 0, double top = 0);
 
 }  // namespace enfilade::server

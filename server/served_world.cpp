@@ -279,6 +279,7 @@ void goTo(ServedWorld& served, scene::World world, const v1::TickEvents& living)
   for (auto& [id, client] : served.clients) {
     sendEvents(client, shared);
     forgetSubscribedTimes(client);
+    for (auto& [number, watch] : client.watches) watch.elsewhere = watch.underWay;
     sendState(served, client, *served.world.snapshot(), shared);
     drawWatched(served, id, client);
   }

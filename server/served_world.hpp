@@ -54,6 +54,7 @@ struct FrameWatch {
   double rate = 0;               ///< a second of simulated time; 0: every tick
   double nextTime = 0;           ///< seconds of simulated time
   bool underWay = false;         ///< one is being drawn
+  bool elsewhere = false;        ///< and the world has gone elsewhere since: another one follows
   std::uint64_t dropped = 0;     ///< since the last one that was begun
   std::uint64_t generation = 0;  ///< tells it from one that it replaced
 };

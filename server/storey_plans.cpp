@@ -130,12 +130,6 @@ void drawDown(Sheet& sheet, double metres, double step) {
                    static_cast<int>(y) - 8, text, 2, kPlanInk);
 }
 
-void drawCut(Sheet& sheet, const std::vector<CutLine>& lines) {
-  for (const CutLine& line : lines)
-    render::drawLine(sheet.image, sheet.x(line.from.x()), sheet.y(line.from.z()),
-                     sheet.x(line.to.x()), sheet.y(line.to.z()), 2, kPlanInk);
-}
-
 /// Lawns and roofs are not what a plan is read for: it shows what is cut, or all where nothing is.
 Box drawnArea(const scene::Scene& scene, const std::vector<CutLine>& cut) {
   Box area;
@@ -222,7 +216,7 @@ std::optional<Image> drawStoreyPlan(const scene::Scene& scene, const StoreyFloor
                            kTop + sheet.camera.height + kBottom);
   paste(sheet.image, planGround(*plan), kLeft, kTop);
   drawGrid(sheet);
-  drawCut(sheet, cut);
+  drawCut(sheet.image, sheet.camera, cut, kLeft, kTop);
   drawFrame(sheet);
   drawScale(sheet);
   drawTitle(sheet, scene, storey);

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "render/gl/avatar_mesh.hpp"
+#include "server/plan_cut.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -194,13 +195,15 @@ std::vector<double> walkedStoreys(const std::vector<WalkedPath>& paths) {
   return storeyHeights(heights, kLeastShare, kMostStoreys);
 }
 
-std::optional<Image> drawMap(const WalkTrace& trace, const TakePicture& picture) {
+std::optional<Image> drawMap(const WalkTrace& trace, const MapGround& ground) {
   std::vector<Storey> storeys;
   for (const double floor : walkedStoreys(trace.paths)) {
     Storey storey{floor, planCamera(walkedBounds(trace.paths), floor, kWidest, kHighest), {}};
-    const std::optional<PlanPicture> plan = picture(storey.camera);
+    const std::optional<PlanPicture> plan = ground.picture(storey.camera);
     if (!plan) return std::nullopt;
     storey.image = planGround(*plan);
+    if (ground.scene)
+      drawCut(storey.image, storey.camera, cutOfStill(*ground.scene, floor + kPlanCut));
     storeys.push_back(std::move(storey));
   }
   if (storeys.empty()) return std::nullopt;

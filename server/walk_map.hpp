@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "scene/scene.hpp"
 #include "server/plan_picture.hpp"
 
 namespace enfilade::server {
@@ -36,7 +37,13 @@ struct WalkTrace {
 /// Heights of the floors that were walked on for long, ascending; empty when nobody walked.
 std::vector<double> walkedStoreys(const std::vector<WalkedPath>& paths);
 
+/// What a map is drawn on.
+struct MapGround {
+  TakePicture picture;
+  const scene::Scene* scene = nullptr;  ///< whose walls get their lines; null: it is elsewhere
+};
+
 /// nullopt when there is nothing to draw or no picture to draw on.
-std::optional<render::Image> drawMap(const WalkTrace& trace, const TakePicture& picture);
+std::optional<render::Image> drawMap(const WalkTrace& trace, const MapGround& ground);
 
 }  // namespace enfilade::server

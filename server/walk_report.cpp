@@ -199,7 +199,7 @@ void WalkReport::writeContacts(const std::vector<v1::ContactEvent>& ended) {
   writeText(folder_ / "contacts.jsonl", contactLines_);
 }
 
-void WalkReport::writePictures(const WalkFacts& facts, const TakePicture& picture) {
+void WalkReport::writePictures(const WalkFacts& facts, const MapGround& ground) {
   const std::string title = facts.script + " in " + facts.scene.source();
   if (!pictures_.empty()) {
     std::vector<render::Captioned> captioned;
@@ -214,7 +214,7 @@ void WalkReport::writePictures(const WalkFacts& facts, const TakePicture& pictur
     render::writePng(folder_ / "sheet.png", render::contactSheet(captioned, title, kSheetColumns));
   }
   trace_.title = title;
-  if (const auto map = drawMap(trace_, picture)) {
+  if (const auto map = drawMap(trace_, ground)) {
     render::writePng(folder_ / "map.png", *map);
   } else {
     spdlog::warn("no map.png: nobody walked, or there is no renderer");

@@ -43,7 +43,7 @@ class WalkReport {
   const std::set<std::string>& present() const { return present_; }
 
   /// Draws sheet.png and map.png; what cannot be had is told and left out.
-  void writePictures(const WalkFacts& facts, const TakePicture& picture);
+  void writePictures(const WalkFacts& facts, const MapGround& ground);
   /// Writes summary.json and returns it as one line of JSON.
   std::string writeSummary(const WalkFacts& facts, const protocol::ScriptResult& result);
   const std::filesystem::path& folder() const { return folder_; }

@@ -132,7 +132,7 @@ ExitCode run(const protocol::Script& script, WalkReport& report, bool strict, Wa
   bar.clear();
   facts.metrics = world.metrics();
   facts.mostPairs = std::max(facts.mostPairs, facts.metrics.pairs());
-  report.writePictures(facts, pictureOf(world));
+  report.writePictures(facts, {pictureOf(world)});
   report.writeContacts(world.endContacts());
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   facts.wallSeconds = took.count();

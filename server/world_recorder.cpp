@@ -254,4 +254,11 @@ ModelOptions modelOptionsFrom(const v1::ModelChoices& message) {
   return model;
 }
 
+void requireAnotherFile(const std::filesystem::path& written, const std::filesystem::path& read) {
+  std::error_code none;
+  if (std::filesystem::equivalent(written, read, none))
+    throw RecordingError(written.string() +
+                         ": is the recording that is read; give another --record");
+}
+
 }  // namespace enfilade::server

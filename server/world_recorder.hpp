@@ -91,4 +91,8 @@ std::optional<scene::Lengths> lengthsFrom(const v1::Lengths& message);
 v1::ModelChoices messageOf(const ModelOptions& model);
 ModelOptions modelOptionsFrom(const v1::ModelChoices& message);
 
+/// Throws protocol::mcap::RecordingError where `written` is the recording that is `read`: it would
+/// be gone.
+void requireAnotherFile(const std::filesystem::path& written, const std::filesystem::path& read);
+
 }  // namespace enfilade::server

@@ -275,7 +275,12 @@ void removeLost(WorldState& world, TickReport& report) {
     if (std::string why = whyOut(world, avatar); !why.empty()) lost[name] = std::move(why);
   for (const auto& [name, why] : lost) {
     const Avatar& avatar = world.avatars.at(name);
-    const Notice left{Notice::Kind::left, name, avatar.id, 0, avatar.feet, 0,
+    const Notice left{Notice::Kind::left,
+                      name,
+                      avatar.id,
+                      0,
+                      avatar.feet,
+                      0,
                       why + "; its queued orders are dropped"};
     report.notices.push_back(left);
     dropQueued(world.queues[name], 0, left, "as the avatar left the scene", report);

@@ -329,10 +329,11 @@ void drawChangeMap(const WalkDifference& difference, const ComparedModels& model
     if (change.worse && change.after && change.run == 0)
       trace.stops.push_back({change.after->position, Vec3::UnitX()});
   const scene::Snapshot still = *scene::World(models.after).snapshot();
-  const auto map = drawMap(trace, [&](const render::Camera& camera) -> std::optional<PlanPicture> {
+  const auto picture = [&](const render::Camera& camera) -> std::optional<PlanPicture> {
     const render::Frame frame = models.afterRenderer->render(still, camera);
     return PlanPicture{render::colourOf(frame), frame.ids};
-  });
+  };
+  const auto map = drawMap(trace, {picture, models.after.get()});
   if (map) render::writePng(folder / "changes" / "map.png", *map);
 }
 

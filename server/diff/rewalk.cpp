@@ -14,7 +14,6 @@
 #include "server/in_process_driver.hpp"
 #include "server/interrupt.hpp"
 #include "server/load_scene.hpp"
-#include "server/playback/replayed_world.hpp"
 #include "server/progress.hpp"
 #include "server/walk_report.hpp"
 #include "server/walk_run.hpp"
@@ -217,7 +216,7 @@ std::vector<RefusedCommand> walkAgain(const RewalkCommand& command,
                   walk.mostPairs,
                   0};
   facts.mostPairs = std::max(facts.mostPairs, facts.metrics.pairs());
-  report.writePictures(facts, pictureOf(renderer, world));
+  report.writePictures(facts, {pictureOf(renderer, world), scene.get()});
   report.writeContacts(driver.endContacts());
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
   facts.wallSeconds = took.count();

@@ -92,13 +92,6 @@ std::optional<protocol::StateDifference> differenceFrom(const scene::World& worl
   return found;
 }
 
-void requireAnotherFile(const std::filesystem::path& written, const std::filesystem::path& read) {
-  std::error_code none;
-  if (std::filesystem::equivalent(written, read, none))
-    throw RecordingError(written.string() +
-                         ": is the recording that is read; give another --record");
-}
-
 std::string textOf(const Diverged& diverged) {
   const protocol::StateDifference& what = diverged.difference;
   return "tick " + std::to_string(diverged.tick) + ": " + what.who + ": " + what.field +

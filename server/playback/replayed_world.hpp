@@ -47,9 +47,6 @@ void take(scene::World& world, const v1::RecordedCommands& commands);
 std::optional<protocol::StateDifference> differenceFrom(const scene::World& world,
                                                         const v1::State& recorded);
 
-/// Throws RecordingError where `written` is the recording that is `read`: it would be gone.
-void requireAnotherFile(const std::filesystem::path& written, const std::filesystem::path& read);
-
 /// For people: "tick 17: ann: feet.x: recorded 1, replayed 2".
 std::string textOf(const Diverged& diverged);
 

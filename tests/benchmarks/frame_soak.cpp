@@ -5,6 +5,9 @@
 //
 // Memory is sampled after each scene is gone; after the first tenth it may grow no more. Exit code
 // 3: it did.
+//
+// On 2026-11-22, with Mesa's llvmpipe: gl had 137 MB after 20 scenes and 142 after 200, rays 79 and
+// 93; at most 4.3 and 4.2 MB more than at most in the first tenth.
 #include <unistd.h>
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 """The environments: Gymnasium's API, and the same seed for the same observations."""
 
+import math
 import time
 import unittest
 from pathlib import Path

@@ -78,7 +78,7 @@ server::ServerLimits smallLimits() {
 class SmallServer {
  public:
   SmallServer()
-      : served_(house().scene, house().frames, house().questions, {smallLimits(), {}, 0, {}}) {
+      : served_(house().scene, house().frames, house().questions, {smallLimits(), {}, 0, {}, {}}) {
     served_.post = post_;
     for (const ClientId id : {1, 2}) {
       Client& client = served_.clients[id];

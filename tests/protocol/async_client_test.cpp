@@ -211,7 +211,7 @@ TEST(AsyncClient, TellsThatTheConnectionIsLostBeforeItCountsWhatWasNotSent) {
   AsyncHandlers handlers;
   handlers.closed = [&](const v1::Error& error) { why = error; };
   AsyncOptions options;
-  options.unsentBytes = 0;
+  options.unsentBytes = protocol::kMagic.size();  // so the hello alone is more
   AsyncClient client("127.0.0.1", gone, handlers, options);
   ASSERT_TRUE(runUntil(client, [&] { return why.has_value(); }));
   bool lost = false;

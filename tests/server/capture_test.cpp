@@ -336,19 +336,22 @@ TEST_F(Capture, AFullDiskLeavesWholeFilesOnlyAndIsTold) {
 
 TEST_F(Capture, AnInterruptEndsItWith130AndWholeFiles) {
   write(folder_ / "path.txt", ahead(4000));
-  const pid_t child = start({"capture", path("room.obj"), path("path.txt"), "--out", path("out"),
-                             "--size", "64x48", "--progress", "json"});
-  for (int i = 0; i < 3000 && !fs::exists(folder_ / "out/ids/000003.npy"); ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  kill(child, SIGINT);
-  EXPECT_EQ(codeOf(child), 130);
-  const auto tree = treeOf(folder_ / "out");
-  EXPECT_GT(tree.size(), 3 + 3 * 3U);
-  EXPECT_LT(tree.size(), 3 + 3 * 4000U);
-  for (const auto& [name, text] : tree) EXPECT_EQ(name.find(".part"), std::string::npos) << name;
-  EXPECT_EQ(textOf(path("stdout")), "");
-  EXPECT_NE(textOf(path("stderr")).find("goes on from there"), std::string::npos);
-  EXPECT_NE(textOf(path("stderr")).find("{\"frames\":"), std::string::npos);
+  for (const int signal : {SIGINT, SIGTERM}) {
+    fs::remove_all(folder_ / "out");
+    const pid_t child = start({"capture", path("room.obj"), path("path.txt"), "--out", path("out"),
+                               "--size", "64x48", "--progress", "json"});
+    for (int i = 0; i < 3000 && !fs::exists(folder_ / "out/ids/000003.npy"); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    kill(child, signal);
+    EXPECT_EQ(codeOf(child), 130);
+    const auto tree = treeOf(folder_ / "out");
+    EXPECT_GT(tree.size(), 3 + 3 * 3U);
+    EXPECT_LT(tree.size(), 3 + 3 * 4000U);
+    for (const auto& [name, text] : tree) EXPECT_EQ(name.find(".part"), std::string::npos) << name;
+    EXPECT_EQ(textOf(path("stdout")), "");
+    EXPECT_NE(textOf(path("stderr")).find("goes on from there"), std::string::npos);
+    EXPECT_NE(textOf(path("stderr")).find("{\"frames\":"), std::string::npos);
+  }
 }
 
 TEST_F(Capture, AWalkIsSeenThroughItsAvatarsEyes) {

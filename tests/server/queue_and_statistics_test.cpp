@@ -7,6 +7,7 @@
 #include "server/outgoing_queue.hpp"
 #include "server/tick_statistics.hpp"
 #include "server/walk_map.hpp"
+#include "tests/server/small_room.hpp"
 
 namespace enfilade::server::testing {
 namespace {
@@ -130,7 +131,7 @@ TEST(WalkMap, PathsAreDrawnInTheirOwnColourOnThePlan) {
     plan.colour.rgb.assign(3 * pixels, 200);
     return plan;
   };
-  const auto map = drawMap(trace, blank);
+  const auto map = drawMap(trace, {blank});
   ASSERT_TRUE(map);
   EXPECT_EQ(plans, 1);
   std::size_t blue = 0;
@@ -138,7 +139,17 @@ TEST(WalkMap, PathsAreDrawnInTheirOwnColourOnThePlan) {
     blue += map->rgb[i + 2] > 200 && map->rgb[i] < 60;
   }
   EXPECT_GT(blue, 1000u);
-  EXPECT_FALSE(drawMap(trace, [](const auto&) { return std::optional<PlanPicture>(); }));
+  EXPECT_FALSE(drawMap(trace, {[](const auto&) { return std::optional<PlanPicture>(); }}));
+  // The room's walls are not on the blank picture; their lines are on the map.
+  const auto inkOf = [](const render::Image& image) {
+    std::size_t ink = 0;
+    for (std::size_t i = 0; i < image.rgb.size(); i += 3)
+      ink += std::equal(kPlanInk.begin(), kPlanInk.end(),
+                        image.rgb.begin() + static_cast<std::ptrdiff_t>(i));
+    return ink;
+  };
+  const auto room = smallRoom();
+  EXPECT_GT(inkOf(drawMap(trace, {blank, room.get()}).value()), inkOf(*map) + 500);
 }
 
 }  // namespace

@@ -261,15 +261,16 @@ TEST_F(Replays, AWatchGoesOnWithAPictureOfThePlaceThatIsSought) {
   watch.set_watch(1);
   watch.set_rate(1);
   watch.mutable_frame()->mutable_eyes()->set_avatar("ann");
-  watch.mutable_frame()->set_width(16);
-  watch.mutable_frame()->set_height(16);
+  watch.mutable_frame()->set_width(800);
+  watch.mutable_frame()->set_height(800);
   driver.request(message);
   const auto pictureOf = [&](std::uint64_t tick) {
     while (const auto event = driver.nextEvent(std::chrono::seconds(20)))
       if (event->has_frame() && event->frame().tick() == tick) return true;
     return false;
   };
-  EXPECT_TRUE(pictureOf(1000));
+  driver.seek(700);  // while the first one is drawn
+  EXPECT_TRUE(pictureOf(700));
   driver.seek(400);
   EXPECT_TRUE(pictureOf(400)) << "also back, where less than a second has gone by";
   driver.step(60);
