@@ -367,15 +367,6 @@ std::size_t worseOf(const Changes& changes) {
                                                 [](const auto& change) { return change.worse; }));
 }
 
-}  // namespace
-
-bool WalkDifference::none() const {
-  if (before.runs.size() != after.runs.size()) return false;
-  for (std::size_t i = 0; i < before.runs.size(); ++i)
-    if (before.runs[i].ticks != after.runs[i].ticks) return false;
-  return happenings.empty() && orders.empty() && clearances.empty() && ways.empty();
-}
-
 /// Compared is what both tell. A branch tells nothing of what was before it, and of a recording
 /// that was cut off nobody knows how it went on.
 void readBoth(const std::filesystem::path& before, const std::filesystem::path& after,
@@ -391,6 +382,15 @@ void readBoth(const std::filesystem::path& before, const std::filesystem::path& 
   if (part.since == 0 && !part.until) return;
   into.before = readWalk(before, part);
   into.after = readWalk(after, part);
+}
+
+}  // namespace
+
+bool WalkDifference::none() const {
+  if (before.runs.size() != after.runs.size()) return false;
+  for (std::size_t i = 0; i < before.runs.size(); ++i)
+    if (before.runs[i].ticks != after.runs[i].ticks) return false;
+  return happenings.empty() && orders.empty() && clearances.empty() && ways.empty();
 }
 
 WalkDifference compareWalks(const std::filesystem::path& before, const std::filesystem::path& after,

@@ -26,7 +26,7 @@ Happening happeningOf(const Event& event) {
 }
 
 /// As seen from `b`.
-void turnRound(Event& event) {
+Event turnedRound(Event event) {
   std::swap(*event.mutable_a_name(), *event.mutable_b_name());
   std::swap(*event.mutable_point_a(), *event.mutable_point_b());
   v1::Vec3& normal = *event.mutable_normal();
@@ -36,14 +36,15 @@ void turnRound(Event& event) {
   const std::uint32_t a = event.a();
   event.set_a(event.b());
   event.set_b(a);
+  return event;
 }
 
 /// Gathers a run, message by message.
 class RunGatherer {
  public:
-  RunGatherer(const v1::RecordingStart& start, std::uint64_t since) {
+  /// `since`: what is told up to this tick is left out.
+  RunGatherer(const v1::RecordingStart& start, std::uint64_t since) : since_(since) {
     run_.start = start;
-    run_.since = since;
     run_.hash = start.state_hash();
     for (const v1::Body& body : start.scene().bodies())
       if (body.kind() == "rigid") rigid_.insert(body.name());
@@ -51,15 +52,10 @@ class RunGatherer {
 
   void add(const v1::TickEvents& events) {
     for (const Event& event : events.contacts()) {
-      if (event.tick() <= run_.since) continue;  // of what a branch found alive, too
-      Event ordered = event;
-      // Of two free bodies the ids tell who comes first, and in another model they may be others.
-      if (rigid_.contains(event.a_name()) && rigid_.contains(event.b_name()) &&
-          event.b_name() < event.a_name())
-        turnRound(ordered);
-      add(ordered);
+      if (event.tick() <= since_) continue;  // of what a branch found alive, too
+      isTurned(event) ? add(turnedRound(event)) : add(event);
     }
-    if (events.tick() <= run_.since) return;
+    if (events.tick() <= since_) return;
     for (const v1::Notice& notice : events.notices()) add(notice, events.time());
   }
 
@@ -67,7 +63,7 @@ class RunGatherer {
     run_.ticks = state.tick();
     run_.time = state.time();
     run_.hash = state.hash();
-    if (state.tick() <= run_.since) return;
+    if (state.tick() <= since_) return;
     for (const v1::AvatarState& avatar : state.avatars()) {
       const Vec3 feet = vectorFrom(avatar.feet());
       const auto [at, isNew] = run_.avatars.try_emplace(avatar.name());
@@ -79,9 +75,17 @@ class RunGatherer {
     }
   }
 
+  const v1::Scene& scene() const { return run_.start.scene(); }
   RecordedRun finish() { return std::move(run_); }
 
  private:
+  /// Of two free bodies the ids tell who comes first, and in another model they may be others: here
+  /// it is the names.
+  bool isTurned(const Event& event) const {
+    return event.b_name() < event.a_name() && rigid_.contains(event.a_name()) &&
+           rigid_.contains(event.b_name());
+  }
+
   /// One stands on the other: b lies below, no steeper than ground may be; of two free bodies
   /// either.
   bool isGround(const Event& event) const {
@@ -165,6 +169,7 @@ class RunGatherer {
   static bool isLeaving(const v1::Notice& notice) { return notice.kind() == v1::Notice::KIND_LEFT; }
 
   RecordedRun run_;
+  const std::uint64_t since_;
   std::set<std::string> rigid_;         ///< names of the free bodies
   std::map<std::uint32_t, Vec3> feet_;  ///< by entity, as of the last tick
   /// Where a contact that lasts stands, by the entities; lists of a std::map's values stay.
@@ -197,16 +202,15 @@ RecordedWalk readWalk(const std::filesystem::path& file, const WalkPart& part) {
   RecordedWalk walk;
   walk.file = file;
   std::optional<RunGatherer> run;
-  v1::Scene scene;
   while (const auto item = reader.next()) {
     if (const auto* start = std::get_if<v1::RecordingStart>(&*item)) {
       if (run) walk.runs.push_back(run->finish());
       run.emplace(*start, walk.runs.empty() ? part.since : 0);
-      scene = start->scene();
       continue;
     }
     if (!run) throw RecordingError(file.string() + ": does not begin with its scene");
-    if (const auto* names = std::get_if<v1::RecordedNames>(&*item)) addNames(walk, scene, *names);
+    if (const auto* names = std::get_if<v1::RecordedNames>(&*item))
+      addNames(walk, run->scene(), *names);
     const auto wanted = [&](const auto& told) {
       return !part.until || WalkMoment{walk.runs.size(), told.tick()} <= *part.until;
     };

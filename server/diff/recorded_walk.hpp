@@ -68,7 +68,6 @@ struct RecordedRun {
   std::map<std::pair<std::string, std::string>, PairRecord> pairs;  ///< by the names of a and b
   std::vector<OrderEnd> orders;
   std::map<std::string, AvatarRecord> avatars;
-  std::uint64_t since = 0;  ///< the tick after which it is told
 };
 
 struct RecordedWalk {
