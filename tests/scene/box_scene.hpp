@@ -14,13 +14,18 @@ struct NamedBox {
   Vec3 min, max;
 };
 
+inline std::vector<Vec3> boxPoints(const Vec3& min, const Vec3& max) {
+  std::vector<Vec3> points;
+  for (int i = 0; i < 8; ++i)
+    points.emplace_back(i & 1 ? max.x() : min.x(), i & 2 ? max.y() : min.y(),
+                        i & 4 ? max.z() : min.z());
+  return points;
+}
+
 /// Twelve triangles, outward.
 inline Mesh boxMesh(const Vec3& min, const Vec3& max) {
   Mesh mesh;
-  for (int i = 0; i < 8; ++i)
-    mesh.positions.push_back(
-        Vec3(i & 1 ? max.x() : min.x(), i & 2 ? max.y() : min.y(), i & 4 ? max.z() : min.z())
-            .cast<float>());
+  for (const Vec3& corner : boxPoints(min, max)) mesh.positions.push_back(corner.cast<float>());
   mesh.indices = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
                   2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
   return mesh;

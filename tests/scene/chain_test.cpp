@@ -11,14 +11,6 @@ namespace {
 using namespace testing;
 using Kind = Notice::Kind;
 
-std::vector<Vec3> boxPoints(const Vec3& min, const Vec3& max) {
-  std::vector<Vec3> points;
-  for (int i = 0; i < 8; ++i)
-    points.emplace_back(i & 1 ? max.x() : min.x(), i & 2 ? max.y() : min.y(),
-                        i & 4 ? max.z() : min.z());
-  return points;
-}
-
 /// A turntable on a low base, an upper and a lower arm of 0.8 m, and a hand that slides out.
 Spawn armAt(const Vec3& at) {
   Spawn spawn;

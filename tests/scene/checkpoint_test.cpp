@@ -9,14 +9,6 @@ namespace {
 
 using namespace testing;
 
-std::vector<Vec3> boxPoints(const Vec3& min, const Vec3& max) {
-  std::vector<Vec3> points;
-  for (int i = 0; i < 8; ++i)
-    points.emplace_back(i & 1 ? max.x() : min.x(), i & 2 ? max.y() : min.y(),
-                        i & 4 ? max.z() : min.z());
-  return points;
-}
-
 /// A room with all that moves: doors that are walked into and close again, a lift, a tray that
 /// shakes boxes, a tower of boxes, a step, a trigger.
 std::shared_ptr<const Scene> busyRoom() {

@@ -147,14 +147,6 @@ TEST(TimeApart, OfFreeBodiesNothingIsKnownUnderAnyCommand) {
   EXPECT_GT(apartAt(t.world, index, crate, floor, Assume::presentMotion).contact, 0.3);
 }
 
-std::vector<Vec3> boxPoints(const Vec3& min, const Vec3& max) {
-  std::vector<Vec3> points;
-  for (int i = 0; i < 8; ++i)
-    points.emplace_back(i & 1 ? max.x() : min.x(), i & 2 ? max.y() : min.y(),
-                        i & 4 ? max.z() : min.z());
-  return points;
-}
-
 /// Three arms, folded on one another: stretched out they are three times as long.
 Spawn foldedArm(const Vec3& at) {
   Spawn spawn;

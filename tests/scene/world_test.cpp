@@ -476,5 +476,26 @@ TEST(World, NearMissesAreToldOnceAnApproach) {
   EXPECT_FALSE(run.touched("post"));
 }
 
+TEST(World, ANearMissOfWhoLeavesIsToldAsOverWithHowNearItCame) {
+  Lengths lengths;
+  lengths.nearMiss = 0.05;
+  Trial run({floorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, lengths);
+  run.order("ann", Spawn{{-2, 0, 0}});
+  run.order("ann", to(0, 0));
+  run.untilIdle();
+  run.order("ann", Leave{});
+  run.ticks(2);
+  std::vector<ContactEvent> nears;
+  for (const ContactEvent& e : run.events)
+    if (e.kind == ContactEvent::Kind::near && e.b == 2) nears.push_back(e);
+  ASSERT_EQ(nears.size(), 3u);
+  using Phase = ContactEvent::Phase;
+  EXPECT_EQ(nears[0].phase, Phase::begin);
+  EXPECT_EQ(nears[1].phase, Phase::min);
+  EXPECT_LE(nears[1].decision.distance, nears[0].decision.distance);
+  EXPECT_EQ(nears[2].phase, Phase::end);
+  EXPECT_EQ(nears[2].reason, ContactEvent::Reason::left);
+}
+
 }  // namespace
 }  // namespace enfilade::scene
