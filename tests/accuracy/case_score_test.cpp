@@ -6,6 +6,8 @@
 #include <fstream>
 #include <functional>
 
+#include "tests/support/temporary_folder.hpp"
+
 namespace enfilade::accuracy {
 namespace {
 
@@ -114,13 +116,12 @@ TEST(Score, ATimeOfImpactMustHoldTheTruthAndBeNarrow) {
 }
 
 TEST(CaseFile, ALineIsReadAndAnsweredInTheFormatAskedFor) {
-  const auto file = std::filesystem::path(::testing::TempDir()) / "enfilade_one_case.jsonl";
+  const auto file = tests::ownFile("one_case.jsonl");
   std::ofstream(file) << R"({"id":"x-1","family":"f","a":[[0,0,0],[1,0,0]],"b":[[0,0,2]],)"
                       << R"("pose_a":[1,0,0,0,0,1,0,0,0,0,1,0],"pose_b":[1,0,0,0,0,1,0,0,0,0,1,0],)"
                       << R"("verdict":"separated","distance":"2","penetration":null,"seq":4})"
                       << "\n\n";
   const std::vector<Case> cases = readCases(file);
-  std::filesystem::remove(file);
   ASSERT_EQ(cases.size(), 1u);
   EXPECT_EQ(cases[0].sequence, 4);
   Answer answer = answerTo(cases[0], Level::refine);
@@ -134,16 +135,15 @@ TEST(CaseFile, ALineIsReadAndAnsweredInTheFormatAskedFor) {
 }
 
 TEST(CaseFile, ABrokenLineIsNamed) {
-  const auto file = std::filesystem::path(::testing::TempDir()) / "enfilade_broken_case.jsonl";
+  const auto file = tests::ownFile("broken_case.jsonl");
   std::ofstream(file) << "\n{\"id\":\"x\"}\n";
   try {
     readCases(file);
     ADD_FAILURE() << "nothing thrown";
   } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find("enfilade_broken_case.jsonl:2"), std::string::npos)
+    EXPECT_NE(std::string(error.what()).find("broken_case.jsonl:2"), std::string::npos)
         << error.what();
   }
-  std::filesystem::remove(file);
 }
 
 }  // namespace

@@ -314,6 +314,21 @@ Faults problemsWithoutMeaning(const Sources& sources) {
   return faults;
 }
 
+Faults sharedTemporaryFiles(const Sources& sources) {
+  static const std::string keeper = "tests/support/temporary_folder.hpp";
+  static const std::regex shared(R"(\b(temp_directory_path|TempDir)\()");
+  Faults faults;
+  for (const auto& [path, text] : sources) {
+    if (path.rfind("tests/", 0) != 0 || path == keeper || path.rfind("tests/house/", 0) == 0)
+      continue;
+    for (std::sregex_iterator it(text.begin(), text.end(), shared), end; it != end; ++it) {
+      const auto line = 1 + std::count(text.begin(), text.begin() + it->position(), '\n');
+      faults.push_back(at(path, static_cast<int>(line)) + ": files of a test come from " + keeper);
+    }
+  }
+  return faults;
+}
+
 Faults brokenLinks(const Sources& sources) {
   static const std::regex link(R"(\]\(([A-Za-z0-9_./-]+)(#[^)]*)?\))");
   Faults faults;

@@ -38,6 +38,10 @@ Faults unfinishedWork(const Sources& sources);
 /// Each kind of problem that scene/ tells stands in scene/problem_kinds.cpp.
 Faults problemsWithoutMeaning(const Sources& sources);
 
+/// Tests run side by side: a file in the system's temporary folder under a name of its author's
+/// choice is overwritten by the next test that chose it.
+Faults sharedTemporaryFiles(const Sources& sources);
+
 /// Links of the Markdown pages to files of the repository that are not there.
 Faults brokenLinks(const Sources& sources);
 

@@ -62,6 +62,11 @@ TEST(House, EveryProblemHasAMeaning) {
   EXPECT_EQ(faults, Faults{}) << listed(faults);
 }
 
+TEST(House, TestsKeepTheirFilesApart) {
+  const Faults faults = sharedTemporaryFiles(repository());
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+}
+
 TEST(House, LinksLeadSomewhere) {
   const Faults faults = brokenLinks(repository());
   EXPECT_EQ(faults, Faults{}) << listed(faults);
@@ -96,6 +101,15 @@ TEST(HouseRules, AProblemThatIsNotExplainedIsAFault) {
   EXPECT_EQ(problemsWithoutMeaning(sources),
             (Faults{"scene/import/three.cpp:1: \"no_sense\" is not in scene/problem_kinds.cpp",
                     "scene/import/two.cpp:1: \"no_words\" is not in scene/problem_kinds.cpp"}));
+}
+
+TEST(HouseRules, ATestsFileUnderASharedNameIsAFault) {
+  const Sources sources{
+      {"tests/support/temporary_folder.hpp", "std::filesystem::temp_directory_path() / own\n"},
+      {"tests/server/one_test.cpp", "\nconst auto file = testing::TempDir() + \"one\";\n"}};
+  EXPECT_EQ(sharedTemporaryFiles(sources),
+            Faults{"tests/server/one_test.cpp:2: files of a test come from "
+                   "tests/support/temporary_folder.hpp"});
 }
 
 TEST(HouseRules, ProtocolKnowsNobody) {

@@ -9,6 +9,7 @@
 
 #include "protocol/mcap/reader.hpp"
 #include "protocol/mcap/writer.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::protocol::mcap {
 namespace {
@@ -16,7 +17,7 @@ namespace {
 using Item = std::pair<std::uint64_t, std::string>;  // time and data
 
 std::filesystem::path fileFor(const std::string& name) {
-  return std::filesystem::path(testing::TempDir()) / ("enfilade_" + name + ".mcap");
+  return tests::ownFile(name + ".mcap");
 }
 
 std::vector<Item> itemsOf(std::size_t count) {

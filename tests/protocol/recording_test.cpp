@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/temporary_folder.hpp"
+
 namespace enfilade::protocol {
 namespace {
 
@@ -21,7 +23,7 @@ v1::State stateOf(std::uint64_t tick) {
 }
 
 TEST(Recording, GivesBackItsMessagesInOrder) {
-  const auto file = std::filesystem::path(testing::TempDir()) / "enfilade_messages.mcap";
+  const auto file = tests::ownFile("messages.mcap");
   v1::RecordingStart start;
   start.set_scene_file("/models/house.glb");
   v1::RecordedCommands commands;

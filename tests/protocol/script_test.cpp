@@ -4,6 +4,8 @@
 
 #include <fstream>
 
+#include "tests/support/temporary_folder.hpp"
+
 namespace enfilade::protocol {
 namespace {
 
@@ -303,12 +305,11 @@ TEST(Script, AFileThatCannotBeReadIsNamed) {
 }
 
 TEST(Script, AFileIsReadAsItsText) {
-  const auto file = std::filesystem::path(testing::TempDir()) / "enfilade_script_test.jsonl";
+  const auto file = tests::ownFile("script.jsonl");
   std::ofstream(file, std::ios::binary) << "{\"wait\":1}\r\n{\"leave\":\"ann\"}";
   const Script script = readScript(file);
   EXPECT_EQ(script.source, file.string());
   EXPECT_EQ(script.lines.size(), 2u);
-  std::filesystem::remove(file);
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 
 #include <fstream>
 
+#include "tests/support/temporary_folder.hpp"
+
 namespace enfilade::protocol {
 namespace {
 
@@ -44,8 +46,7 @@ void writeTick(RecordingWriter& writer, std::uint64_t tick, bool checkpoint) {
 
 /// `first`: where a branch begins; 0: no branch.
 Written written(const std::string& name, std::uint64_t first, std::uint64_t last, bool close) {
-  Written made{std::filesystem::path(testing::TempDir()) / ("enfilade_sought_" + name + ".mcap"),
-               {}};
+  Written made{tests::ownFile(name + ".mcap"), {}};
   RecordingWriter writer(made.file, "test");
   v1::RecordingStart start;
   start.mutable_lengths()->set_tick(kTick);

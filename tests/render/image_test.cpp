@@ -7,6 +7,7 @@
 #include <random>
 
 #include "render/pictures/font.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -23,25 +24,9 @@ int red(const Image& image, int x, int y) {
   return image.rgb[3 * static_cast<std::size_t>(y * image.width + x)];
 }
 
-/// A folder of this test's own, gone with it.
-class Folder {
- public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "enfilade-XXXXXX").string();
-    path_ = mkdtemp(name.data());
-  }
-  ~Folder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  const fs::path& path() const { return path_; }
-  long entries() const { return std::distance(fs::directory_iterator(path_), {}); }
-
- private:
-  fs::path path_;
-};
+long entriesIn(const tests::TemporaryFolder& folder) {
+  return std::distance(fs::directory_iterator(folder.path()), {});
+}
 
 TEST(Png, RoundTripKeepsEveryByte) {
   std::mt19937 random(3);
@@ -66,17 +51,17 @@ TEST(Png, BrokenBytesAndWrongSizesAreErrors) {
 }
 
 TEST(WriteFileWhole, ReplacesAFileAndLeavesNothingElse) {
-  const Folder folder;
+  const tests::TemporaryFolder folder;
   const fs::path file = folder.path() / "a.bin";
   writeFileWhole(file, "first", 5);
   writeFileWhole(file, "second!", 7);
   std::ifstream in(file);
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "second!");
-  EXPECT_EQ(folder.entries(), 1);
+  EXPECT_EQ(entriesIn(folder), 1);
 }
 
 TEST(WriteFileWhole, AFailureNamesTheFileAndLeavesNoPart) {
-  const Folder folder;
+  const tests::TemporaryFolder folder;
   const fs::path taken = folder.path() / "taken";
   fs::create_directories(taken / "inside");
   for (const fs::path& file : {taken, folder.path() / "missing" / "a.png"}) {
@@ -87,7 +72,7 @@ TEST(WriteFileWhole, AFailureNamesTheFileAndLeavesNoPart) {
       EXPECT_NE(std::string(error.what()).find(file.string()), std::string::npos);
     }
   }
-  EXPECT_EQ(folder.entries(), 1);
+  EXPECT_EQ(entriesIn(folder), 1);
 }
 
 TEST(Drawing, TextDrawsItsLettersWhereTheyBelong) {

@@ -2,7 +2,6 @@
 #include "scene/import/gltf_cameras.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <cstring>
@@ -10,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "scene/import/import_model.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -68,20 +68,12 @@ class GltfFile {
   }
 
   GltfCameraPath sample(double fps, const std::string& name = "") const {
-    const auto file = std::filesystem::temp_directory_path() /
-                      ("enfilade_camera_" + std::to_string(::getpid()) + ".gltf");
+    const auto file = tests::ownFile("camera.gltf");
     Json whole = json_;
     whole["buffers"] = {{{"byteLength", bytes_.size()},
                          {"uri", "data:application/octet-stream;base64," + base64(bytes_)}}};
     std::ofstream(file) << whole.dump();
-    try {
-      GltfCameraPath path = sampleGltfCamera(file, name, fps);
-      std::filesystem::remove(file);
-      return path;
-    } catch (...) {
-      std::filesystem::remove(file);
-      throw;
-    }
+    return sampleGltfCamera(file, name, fps);
   }
 
  private:

@@ -6,6 +6,7 @@
 
 #include "tests/server/raw_connection.hpp"
 #include "tests/server/served_room.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::server::testing {
 namespace {
@@ -58,8 +59,7 @@ TEST(Access, BrowsersMayComeOnlyFromPagesThatAreKnown) {
 }
 
 TEST(Access, ATokenFileIsReadOrItsLineNamed) {
-  const auto file =
-      std::filesystem::temp_directory_path() / ("enfilade_tokens_" + std::to_string(::getpid()));
+  const auto file = tests::ownFile("tokens");
   const auto write = [&](const std::string& text) { std::ofstream(file) << text; };
   write("# who looks\nobserve " + kLooker + "\n\nadmin " + kAdmin + "\n");
   EXPECT_EQ(readTokens(file).size(), 2u);

@@ -5,6 +5,7 @@
 
 #include "protocol/recording.hpp"
 #include "server/diff/walk_difference.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -99,7 +100,7 @@ TEST(MatchedHappenings, LongListsAreCutIntoPieces) {
 }
 
 std::filesystem::path fileFor(const std::string& name) {
-  return std::filesystem::path(::testing::TempDir()) / ("enfilade_difference_" + name + ".mcap");
+  return tests::ownFile(name + ".mcap");
 }
 
 constexpr double kTick = 1.0 / 60;

@@ -1,17 +1,14 @@
 // The doctor: the proof picture and EGL's vendor files.
 #include <gtest/gtest.h>
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
 
 #include "render/gl/gl_renderer.hpp"
 #include "render/rays/ray_renderer.hpp"
 #include "server/egl_vendors.hpp"
 #include "server/proof_picture.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -44,16 +41,13 @@ TEST(Doctor, AWrongPictureIsFound) {
 }
 
 TEST(Doctor, VendorFilesAreReadAndWhatTheyLackIsTold) {
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("enfilade_icd_" + std::to_string(::getpid()));
-  std::filesystem::create_directories(folder);
-  std::ofstream(folder / "a.json") << R"({"ICD":{"library_path":"libc.so.6"}})";
-  std::ofstream(folder / "b.json") << R"({"ICD":{"library_path":"libEGL_of_nobody.so.0"}})";
-  std::ofstream(folder / "c.json") << "{";
-  ::setenv("__EGL_VENDOR_LIBRARY_DIRS", folder.c_str(), 1);
+  const tests::TemporaryFolder folder;
+  folder.write("a.json", R"({"ICD":{"library_path":"libc.so.6"}})");
+  folder.write("b.json", R"({"ICD":{"library_path":"libEGL_of_nobody.so.0"}})");
+  folder.write("c.json", "{");
+  ::setenv("__EGL_VENDOR_LIBRARY_DIRS", folder.path().c_str(), 1);
   const std::vector<EglVendor> vendors = eglVendors();
   ::unsetenv("__EGL_VENDOR_LIBRARY_DIRS");
-  std::filesystem::remove_all(folder);
   ASSERT_EQ(vendors.size(), 3u);
   EXPECT_EQ(vendors[0].failure, "");
   EXPECT_NE(vendors[1].failure.find("libEGL_of_nobody"), std::string::npos);

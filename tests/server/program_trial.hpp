@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "tests/server/small_room.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 extern char** environ;
 
@@ -40,14 +41,7 @@ class ProgramTrial : public ::testing::Test {
     std::string out, err;
   };
 
-  void SetUp() override {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::temp_directory_path() /
-              (std::string("enfilade_") + test->name() + "_" + std::to_string(::getpid()));
-    std::filesystem::create_directories(folder_);
-    write(folder_ / "room.obj", smallRoomObj());
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
+  void SetUp() override { write(folder_ / "room.obj", smallRoomObj()); }
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
@@ -88,7 +82,8 @@ class ProgramTrial : public ::testing::Test {
     return 0;
   }
 
-  std::filesystem::path folder_;
+  const tests::TemporaryFolder own_;
+  const std::filesystem::path folder_ = own_.path();
 };
 
 }  // namespace enfilade::server::testing

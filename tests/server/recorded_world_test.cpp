@@ -9,12 +9,13 @@
 #include <random>
 
 #include "tests/server/served_room.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::server::testing {
 namespace {
 
 std::filesystem::path fileFor(const std::string& name) {
-  return std::filesystem::path(::testing::TempDir()) / ("enfilade_recorded_" + name + ".mcap");
+  return tests::ownFile(name + ".mcap");
 }
 
 RecordingOptions optionsFor(const std::filesystem::path& file) {

@@ -9,6 +9,7 @@
 #include "tests/server/becomes_true.hpp"
 #include "tests/server/body_room.hpp"
 #include "tests/server/served_room.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::server::testing {
 namespace {
@@ -102,19 +103,11 @@ struct Listener {
 
 class Replays : public ServedRoom {
  protected:
-  void SetUp() override {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ =
-        std::filesystem::path(::testing::TempDir()) / (std::string("replays_") + test->name());
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-    walked_ = recordWalk(file("walk"));
+  void SetUp() override { walked_ = recordWalk(file("walk")); }
+  void TearDown() override { server_.reset(); }
+  std::filesystem::path file(const std::string& name) const {
+    return folder_.path() / (name + ".mcap");
   }
-  void TearDown() override {
-    server_.reset();
-    std::filesystem::remove_all(folder_);
-  }
-  std::filesystem::path file(const std::string& name) const { return folder_ / (name + ".mcap"); }
 
   void play(const std::string& name = "walk", std::uint64_t from = 0,
             const std::string& branch = {}, Access access = {}) {
@@ -130,7 +123,7 @@ class Replays : public ServedRoom {
     server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
   }
 
-  std::filesystem::path folder_;
+  tests::TemporaryFolder folder_;
   Walked walked_;
 };
 

@@ -1,0 +1,46 @@
+// Where a test keeps its files: never under a name that another test, or another run, uses too.
+#pragma once
+
+#include <unistd.h>
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+namespace enfilade::tests {
+
+/// A folder of its own, gone at the end.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    static std::atomic<int> counter = 0;
+    path_ = std::filesystem::temp_directory_path() /
+            ("enfilade-" + std::to_string(::getpid()) + "-" + std::to_string(++counter));
+    std::filesystem::create_directories(path_);
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    if (::getpid() == owner_) std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path write(const std::string& name, const std::string& content) const {
+    std::ofstream(path_ / name, std::ios::binary) << content;
+    return path_ / name;
+  }
+
+ private:
+  pid_t owner_ = ::getpid();  // a child that forked off must not take it away
+  std::filesystem::path path_;
+};
+
+/// A file of this process alone, gone at its end.
+inline std::filesystem::path ownFile(const std::string& name) {
+  static const TemporaryFolder folder;
+  return folder.path() / name;
+}
+
+}  // namespace enfilade::tests
