@@ -189,7 +189,9 @@ std::uint64_t RecordingWriter::write(const v1::RecordedCheckpoint& checkpoint, d
   return bytesWritten() - before;
 }
 
-RecordingReader::RecordingReader(const std::filesystem::path& file) : path_(file), file_(file) {}
+RecordingReader::RecordingReader(const std::filesystem::path& file,
+                                 std::optional<std::uint32_t> run)
+    : path_(file), file_(file), run_(run) {}
 
 std::optional<RecordedItem> itemFrom(const mcap::Message& message,
                                      const std::filesystem::path& file) {
@@ -203,10 +205,26 @@ std::optional<RecordedItem> itemFrom(const mcap::Message& message,
   return std::nullopt;
 }
 
+bool RecordingReader::isWanted(const mcap::Message& message) {
+  if (!run_) return true;
+  begun_ += message.channel->topic == kStartTopic ? 1 : 0;
+  return begun_ == *run_;
+}
+
 std::optional<RecordedItem> RecordingReader::next() {
-  while (const auto message = file_.next())
+  while (const auto message = file_.next()) {
+    if (!isWanted(*message)) continue;
     if (auto item = itemFrom(*message, path_)) return item;
+  }
+  if (run_ && begun_ < *run_) failWithoutRun(path_, *run_, begun_);
   return std::nullopt;
+}
+
+void failWithoutRun(const std::filesystem::path& file, std::uint32_t asked, std::size_t runs) {
+  throw mcap::RecordingError(file.string() + ": there is no run " + std::to_string(asked) +
+                             " in it" +
+                             (runs > 0 ? "; give one from 1 to " + std::to_string(runs)
+                                       : ": no recording of Enfilade begins in it"));
 }
 
 std::optional<StateDifference> firstDifference(const v1::State& recorded,

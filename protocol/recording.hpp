@@ -62,9 +62,16 @@ inline constexpr const char* kCheckpointTopic = "/enfilade/checkpoint";
 /// Nanoseconds, as recordings have them.
 std::uint64_t nanosecondsOf(double seconds);
 
+/// A run is what was recorded from one beginning of the world to the next; they count from 1. There
+/// is no run `asked` of `runs`: says so, and throws.
+[[noreturn]] void failWithoutRun(const std::filesystem::path& file, std::uint32_t asked,
+                                 std::size_t runs);
+
 class RecordingReader {
  public:
-  explicit RecordingReader(const std::filesystem::path& file);
+  /// `run`: that one alone; left out: all of them.
+  explicit RecordingReader(const std::filesystem::path& file,
+                           std::optional<std::uint32_t> run = std::nullopt);
 
   /// In the order in which it happened; what other programs may have added is left out.
   std::optional<RecordedItem> next();
@@ -73,8 +80,12 @@ class RecordingReader {
   std::uint64_t wholeBytes() const { return file_.wholeBytes(); }
 
  private:
+  bool isWanted(const mcap::Message& message);
+
   std::filesystem::path path_;
   mcap::Reader file_;
+  std::optional<std::uint32_t> run_;
+  std::uint32_t begun_ = 0;  ///< runs, up to here
 };
 
 /// 16 digits, as hashes are written everywhere.

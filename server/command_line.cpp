@@ -24,7 +24,7 @@ struct Arguments {
   DoctorCommand doctor;
   ModelArguments model;
   std::string script, out, plan, listen = "127.0.0.1:7878", connect;
-  std::string from, then;
+  std::string from, then, run;
   RecordingChoice record;
   std::string recordChannels = "walk", recordFrames;
   bool strict = false, verify = false, json = false, objects = false, stopAtEndOfInput = false;
@@ -213,6 +213,18 @@ std::string tickProblem(const std::string& text) {
   return numberFrom<std::uint64_t>(text) ? "" : text + ": give the number of a tick, as 600";
 }
 
+std::string runProblem(const std::string& text) {
+  const auto run = numberFrom<std::uint32_t>(text);
+  return run && *run > 0 ? "" : text + ": give the number of a run, from 1";
+}
+
+void addRun(CLI::App& verb, Arguments& into) {
+  verb.add_option("--run", into.run,
+                  "Of a RECORDING in which the world begins anew that run, as `enfilade inspect` "
+                  "counts them (the first; --verify without --from: all)")
+      ->check(CLI::Validator(runProblem, "N"));
+}
+
 void addBranch(CLI::App& verb, Arguments& into) {
   verb.add_option("--from", into.from,
                   "[SCENE] RECORDING: begin after this tick, at the nearest checkpoint")
@@ -220,11 +232,13 @@ void addBranch(CLI::App& verb, Arguments& into) {
   verb.add_option("--then", into.then,
                   "A script that takes over there: what was recorded after it is not done")
       ->check(CLI::Validator(fileProblem, "SCRIPT"));
+  addRun(verb, into);
 }
 
 void addPlayed(CLI::App& serve, Arguments& into) {
   serve.add_option("--from", into.from, "RECORDING in the place of SCENE: begin after this tick")
       ->check(CLI::Validator(tickProblem, "TICK"));
+  addRun(serve, into);
   serve.footer(
       "RECORDING (MCAP) in the place of SCENE, or after the one scene that it is played in: "
       "clients "
@@ -320,6 +334,7 @@ VerifyCommand verifyFrom(const Arguments& read) {
   VerifyCommand command{
       named ? read.model.file : "", named ? read.script : read.model.file, !read.model.noCache, {}};
   if (!read.from.empty()) command.from = numberFrom<std::uint64_t>(read.from);
+  if (!read.run.empty()) command.run = numberFrom<std::uint32_t>(read.run);
   return command;
 }
 
@@ -330,6 +345,7 @@ void branchFrom(const Arguments& read, ReplayCommand& command) {
   command.recording = recorded.recording;
   command.script = read.then;
   command.from = recorded.from.value_or(0);
+  command.run = recorded.run.value_or(1);
 }
 
 /// What a recording says itself; empty: nothing of it was given.
@@ -345,8 +361,14 @@ ExitCode misused(const char* verb, const std::string& problem) {
   return ExitCode::usage;
 }
 
+bool isRewalk(const Arguments& read) {
+  return !read.verify && read.then.empty() && protocol::mcap::isMcap(read.script);
+}
+
 /// What of a replay of a recording does not go with what; empty: all does.
 std::string branchProblem(const CLI::App& replay, const Arguments& read) {
+  if (!read.run.empty() && !read.verify && read.then.empty() && !isRewalk(read))
+    return "--run is of a recording: --verify, --then SCRIPT, or SCENE RECORDING";
   if (read.from.empty()) return read.then.empty() ? "" : "--then needs --from TICK";
   if (read.then.empty() && !read.verify)
     return "--from needs --verify, or --then SCRIPT that goes on from there";
@@ -357,7 +379,9 @@ std::string branchProblem(const CLI::App& replay, const Arguments& read) {
 /// What `serve` does not take beside a recording that it plays, or without one; empty: all does.
 std::string playedProblem(const CLI::App& serve, const ServeCommand& command) {
   if (command.recording.empty())
-    return command.from ? "--from needs a recording in the place of SCENE" : "";
+    return command.from || serve.count("--run") > 0
+               ? "--from and --run need a recording in the place of SCENE"
+               : "";
   for (const std::filesystem::path& further : command.furtherScenes)
     if (protocol::mcap::isMcap(further))
       return further.string() +
@@ -370,6 +394,7 @@ std::string playedProblem(const CLI::App& serve, const ServeCommand& command) {
 void playedFrom(const Arguments& read, ServeCommand& command) {
   using protocol::mcap::isMcap;
   if (!read.from.empty()) command.from = numberFrom<std::uint64_t>(read.from);
+  command.run = numberFrom<std::uint32_t>(read.run).value_or(1);
   if (isMcap(command.model.file)) {
     command.recording = std::exchange(command.model.file, {});
   } else if (!command.furtherScenes.empty() && isMcap(command.furtherScenes.front())) {
@@ -396,10 +421,6 @@ std::variant<ProgramCommand, ExitCode> serveFrom(const CLI::App& serve, const Ar
   return command;
 }
 
-bool isRewalk(const Arguments& read) {
-  return !read.verify && read.then.empty() && protocol::mcap::isMcap(read.script);
-}
-
 /// What a walk that is made again in another model does not take; empty: nothing of it is there.
 std::string rewalkProblem(const CLI::App& replay) {
   for (const char* option : {"--strict", "--audit", "--step-height", "--epsilon", "--slope",
@@ -410,8 +431,10 @@ std::string rewalkProblem(const CLI::App& replay) {
 }
 
 RewalkCommand rewalkFrom(const Arguments& read) {
-  return {modelFrom(read.model), read.script, read.out,      read.record.file,
-          read.tolerance,        read.json,   read.pictures, drawingFrom(read)};
+  return {
+      modelFrom(read.model), read.script,       read.out,
+      read.record.file,      read.tolerance,    read.json,
+      read.pictures,         drawingFrom(read), numberFrom<std::uint32_t>(read.run).value_or(1)};
 }
 
 /// What a replay that verifies nothing cannot do without.

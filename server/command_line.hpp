@@ -69,6 +69,7 @@ struct ServeCommand {
   /// world. The lengths are then the recording's.
   std::filesystem::path recording = {};
   std::optional<std::uint64_t> from = {};
+  std::uint32_t run = 1;  ///< of those in the recording
 };
 struct ReplayCommand {
   ModelOptions model;
@@ -82,12 +83,14 @@ struct ReplayCommand {
   /// is then empty where the recording says which, and the lengths are the recording's.
   std::filesystem::path recording = {};
   std::uint64_t from = 0;
+  std::uint32_t run = 1;  ///< of those in the recording
 };
 struct VerifyCommand {
   std::filesystem::path scene;  ///< empty: where the recording says
   std::filesystem::path recording;
   bool cache = true;
   std::optional<std::uint64_t> from = {};  ///< a tick to begin after; none: all of it
+  std::optional<std::uint32_t> run = {};   ///< none: all of them, or the first with `from`
 };
 /// What changed between two recorded walks.
 struct DiffCommand {
@@ -104,6 +107,7 @@ struct RewalkCommand {
   bool json = false;
   std::uint32_t pictures = 12;  ///< of changes, the most
   DrawingOptions drawing;
+  std::uint32_t run = 1;  ///< of those in the recording
 };
 /// A recording's contacts and ways as files that other programs read.
 struct ExportCommand {

@@ -81,7 +81,7 @@ std::vector<std::shared_ptr<const scene::Scene>> loadFurther(const ServeCommand&
 ServeCommand asRecorded(const ServeCommand& asked) {
   ServeCommand command = asked;
   if (asked.recording.empty()) return command;
-  const protocol::SeekableRecording recording(asked.recording);
+  const protocol::SeekableRecording recording(asked.recording, asked.run);
   command.model = recordedModel(recording.start(), asked.model.file, asked.model.cache);
   const auto lengths = lengthsFrom(recording.start().lengths());
   if (!lengths)
@@ -96,7 +96,7 @@ WorldOptions worldOf(const ServeCommand& command) {
   WorldOptions world;
   world.lengths = command.lengths;
   world.auditEvery = command.auditEvery;
-  if (!command.recording.empty()) world.replay = {command.recording, *command.from};
+  if (!command.recording.empty()) world.replay = {command.recording, *command.from, command.run};
   if (command.record.file.empty()) return world;
   world.record = {command.record, command.model};
   world.record->replace = false;  // what clients did cannot be had again

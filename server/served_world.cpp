@@ -213,7 +213,8 @@ ServedWorld::ServedWorld(std::shared_ptr<const scene::Scene> served, FrameServic
     : place(std::move(where)),
       scene(std::move(served)),
       auditEvery(options.auditEvery),
-      replay(options.replay ? std::make_unique<Replay>(options.replay->file, scene, auditEvery)
+      replay(options.replay ? std::make_unique<Replay>(options.replay->file, options.replay->run,
+                                                       scene, auditEvery)
                             : nullptr),
       world(replay ? replay->seek(options.replay->from)
                    : atItsBeginning(scene, options.lengths, auditEvery)),

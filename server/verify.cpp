@@ -20,7 +20,7 @@ using protocol::mcap::RecordingError;
 class Replayed {
  public:
   explicit Replayed(const VerifyCommand& command)
-      : command_(command), recording_(command.recording) {}
+      : command_(command), recording_(command.recording, command.run) {}
 
   /// Throws Diverged.
   void all() {
@@ -101,7 +101,7 @@ nlohmann::ordered_json verifyAll(const VerifyCommand& command) {
 
 /// From a tick on; what was recorded before is not read.
 nlohmann::ordered_json verifyFrom(const VerifyCommand& command, std::uint64_t from) {
-  Playback playback(command.recording);
+  Playback playback(command.recording, command.run.value_or(1));
   const auto scene = loadScene(recordedModel(playback.start(), command.scene, command.cache));
   Progress bar;
   const auto tell = [&](std::uint64_t tick) {

@@ -180,7 +180,8 @@ BranchPoint branchOf(const ReplayCommand& command, const scene::World& world) {
   BranchPoint branch;
   branch.parent.set_file(std::filesystem::absolute(command.recording).string());
   branch.parent.set_tick(command.from);
-  branch.living = ContactHistory(command.recording, command.from).livingIn(world);
+  branch.parent.set_run(command.run);
+  branch.living = ContactHistory(command.recording, command.run, command.from).livingIn(world);
   return branch;
 }
 
@@ -211,7 +212,7 @@ ExitCode replay(const ReplayCommand& command) {
         std::optional<Playback> playback;
         if (!command.recording.empty()) {
           requireAnotherFile(command.record.file, command.recording);
-          playback.emplace(command.recording);
+          playback.emplace(command.recording, command.run);
         }
         const ModelOptions model =
             playback ? recordedModel(playback->start(), command.model.file, command.model.cache)

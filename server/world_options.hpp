@@ -15,6 +15,7 @@ namespace enfilade::server {
 struct PlayedRecording {
   std::filesystem::path file;
   std::uint64_t from = 0;  ///< the tick after which it stands at first
+  std::uint32_t run = 1;   ///< of those in the file
 };
 
 struct WorldOptions {

@@ -108,12 +108,11 @@ std::vector<Moment> momentsOf(WalkDifference& difference, std::uint32_t most) {
 }
 
 /// Who stood where at these ticks; where a walk is shorter, at its end.
-Snapshots snapshotsAt(const std::shared_ptr<const scene::Scene>& scene,
-                      const std::filesystem::path& recording,
+Snapshots snapshotsAt(const std::shared_ptr<const scene::Scene>& scene, const RecordedWalk& walk,
                       const std::set<std::uint64_t>& ticks) {
   Snapshots found;
   if (!scene || ticks.empty()) return found;
-  protocol::RecordingReader reader(recording);
+  protocol::RecordingReader reader(walk.file, walk.run);
   std::optional<RecordedWorld> world;
   std::optional<InProcessDriver> driver;
   while (const auto item = reader.next()) {
@@ -260,8 +259,8 @@ void drawMoments(std::vector<Moment>& moments, const WalkDifference& difference,
                  const ComparedModels& models, const std::filesystem::path& folder) {
   std::set<std::uint64_t> ticks;
   for (const Moment& moment : moments) ticks.insert(moment.tick);
-  const Snapshots before = snapshotsAt(models.before, difference.before.file, ticks);
-  const Snapshots after = snapshotsAt(models.after, difference.after.file, ticks);
+  const Snapshots before = snapshotsAt(models.before, difference.before, ticks);
+  const Snapshots after = snapshotsAt(models.after, difference.after, ticks);
   std::optional<render::Renderer> beforeRenderer;
   std::optional<Standpoints> beforeStandpoints, afterStandpoints;
   if (models.before) {
@@ -286,11 +285,11 @@ void drawMoments(std::vector<Moment>& moments, const WalkDifference& difference,
   }
 }
 
-/// The ways of a recording's first run, thinned out.
-std::vector<WalkedPath> waysOf(const std::filesystem::path& recording, const std::string& suffix,
+/// The ways of a walk's first run, thinned out.
+std::vector<WalkedPath> waysOf(const RecordedWalk& walk, const std::string& suffix,
                                scene::EntityId aside) {
   std::map<std::string, WalkedPath> ways;
-  protocol::RecordingReader reader(recording);
+  protocol::RecordingReader reader(walk.file, walk.run);
   std::uint64_t last = 0;
   while (const auto item = reader.next()) {
     const auto* state = std::get_if<v1::State>(&*item);
@@ -317,8 +316,8 @@ void drawChangeMap(const WalkDifference& difference, const ComparedModels& model
   WalkTrace trace;
   trace.title = "what got worse, in " + difference.after.runs.front().start.scene().source();
   // The later ways are drawn over the earlier ones and take the colours that pictures have.
-  trace.paths = waysOf(difference.before.file, ", before", 7);
-  for (WalkedPath& way : waysOf(difference.after.file, ", after", 0))
+  trace.paths = waysOf(difference.before, ", before", 7);
+  for (WalkedPath& way : waysOf(difference.after, ", after", 0))
     trace.paths.push_back(std::move(way));
   for (const HappeningChange& change : difference.happenings) {
     if (!change.worse || change.run != 0) continue;

@@ -257,7 +257,7 @@ class RunComparison {
 /// The states of a recording, one after the other.
 class States {
  public:
-  explicit States(const std::filesystem::path& file) : reader_(file) { next(); }
+  explicit States(const RecordedWalk& walk) : reader_(walk.file, walk.run) { next(); }
 
   bool ended() const { return !state_; }
   std::pair<std::size_t, std::uint64_t> place() const { return {run_, state_->tick()}; }
@@ -281,8 +281,8 @@ class States {
 };
 
 /// Who is where otherwise, tick by tick, of the ticks that both have.
-std::map<std::pair<std::size_t, std::string>, WayChange> partedWays(
-    const std::filesystem::path& before, const std::filesystem::path& after) {
+std::map<std::pair<std::size_t, std::string>, WayChange> partedWays(const RecordedWalk& before,
+                                                                    const RecordedWalk& after) {
   std::map<std::pair<std::size_t, std::string>, WayChange> parted;
   States a(before), b(after);
   while (!a.ended() && !b.ended()) {
@@ -315,7 +315,7 @@ std::map<std::pair<std::size_t, std::string>, WayChange> partedWays(
 }
 
 void compareWays(WalkDifference& into) {
-  auto parted = partedWays(into.before.file, into.after.file);
+  auto parted = partedWays(into.before, into.after);
   for (std::size_t run = 0; run < std::min(into.before.runs.size(), into.after.runs.size());
        ++run) {
     const auto &before = into.before.runs[run].avatars, &after = into.after.runs[run].avatars;
@@ -367,21 +367,33 @@ std::size_t worseOf(const Changes& changes) {
                                                 [](const auto& change) { return change.worse; }));
 }
 
+const v1::RecordingParent& parentOf(const RecordedWalk& walk) {
+  return walk.runs.front().start.parent();
+}
+
+/// Beside a branch: which run of a file with several it left.
+std::optional<std::uint32_t> runLeftBy(const RecordedWalk& branch, const RecordedWalk& walk) {
+  if (!branch.runs.front().start.has_parent() || walk.runs.size() < 2) return walk.run;
+  return std::clamp<std::uint32_t>(parentOf(branch).run(), 1,
+                                   static_cast<std::uint32_t>(walk.runs.size()));
+}
+
 /// Compared is what both tell. A branch tells nothing of what was before it, and of a recording
 /// that was cut off nobody knows how it went on.
 void readBoth(const std::filesystem::path& before, const std::filesystem::path& after,
-              WalkDifference& into) {
-  into.before = readWalk(before);
+              std::optional<std::uint32_t> run, WalkDifference& into) {
+  into.before = readWalk(before, {run});
   into.after = readWalk(after);
-  const auto leftAt = [](const RecordedWalk& walk) {
-    return walk.runs.front().start.parent().tick();
-  };
-  WalkPart part{std::max(leftAt(into.before), leftAt(into.after)), {}};
+  WalkPart was{runLeftBy(into.after, into.before)}, is{runLeftBy(into.before, into.after)};
+  if (was.run != into.before.run) into.before = readWalk(before, was);
+  if (is.run != into.after.run) into.after = readWalk(after, is);
+  was.since = is.since = std::max(parentOf(into.before).tick(), parentOf(into.after).tick());
   for (const RecordedWalk* walk : {&into.before, &into.after})
-    if (!walk->closed && (!part.until || endOf(*walk) < *part.until)) part.until = endOf(*walk);
-  if (part.since == 0 && !part.until) return;
-  into.before = readWalk(before, part);
-  into.after = readWalk(after, part);
+    if (!walk->closed && (!was.until || endOf(*walk) < *was.until)) was.until = endOf(*walk);
+  is.until = was.until;
+  if (was.since == 0 && !was.until) return;
+  into.before = readWalk(before, was);
+  into.after = readWalk(after, is);
 }
 
 }  // namespace
@@ -394,10 +406,10 @@ bool WalkDifference::none() const {
 }
 
 WalkDifference compareWalks(const std::filesystem::path& before, const std::filesystem::path& after,
-                            double tolerance) {
+                            double tolerance, std::optional<std::uint32_t> runBefore) {
   WalkDifference difference;
   difference.tolerance = tolerance;
-  readBoth(before, after, difference);
+  readBoth(before, after, runBefore, difference);
   auto &was = difference.before.runs, &is = difference.after.runs;
   const Names names(difference.before, difference.after);
   for (std::size_t run = 0; run < std::min(was.size(), is.size()); ++run)

@@ -93,7 +93,7 @@ void section(std::string& text, const char* heading, const Changes& changes, con
   std::size_t count = 0;
   for (const auto& change : changes) count += wanted(change) ? 1 : 0;
   if (count == 0) return;
-  text += std::string("\n") + heading + ": " + std::to_string(count) + "\n";
+  text.append("\n").append(heading).append(": ").append(std::to_string(count)).append("\n");
   std::size_t told = 0;
   for (const auto& change : changes) {
     if (!wanted(change)) continue;

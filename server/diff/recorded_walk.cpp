@@ -198,9 +198,10 @@ WalkMoment endOf(const RecordedWalk& walk) {
 }
 
 RecordedWalk readWalk(const std::filesystem::path& file, const WalkPart& part) {
-  protocol::RecordingReader reader(file);
+  protocol::RecordingReader reader(file, part.run);
   RecordedWalk walk;
   walk.file = file;
+  walk.run = part.run;
   std::optional<RunGatherer> run;
   while (const auto item = reader.next()) {
     if (const auto* start = std::get_if<v1::RecordingStart>(&*item)) {

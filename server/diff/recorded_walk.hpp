@@ -72,8 +72,9 @@ struct RecordedRun {
 
 struct RecordedWalk {
   std::filesystem::path file;
-  std::vector<RecordedRun> runs;  ///< at least one; more where the world began anew
-  bool closed = false;            ///< else the file ends in the middle
+  std::optional<std::uint32_t> run;  ///< of the file that one alone was read, which counts from 1
+  std::vector<RecordedRun> runs;     ///< at least one; more where the world began anew
+  bool closed = false;               ///< else the file ends in the middle
   std::uint64_t wholeBytes = 0;
   /// GlobalId ("" where there is none) by the path of each object; nullopt: the recording does not
   /// list its objects, as those of earlier versions.
@@ -89,8 +90,10 @@ struct WalkMoment {
 };
 WalkMoment endOf(const RecordedWalk& walk);
 
-/// What is told of a walk: of its first run nothing up to `since`, and nothing after `until`.
+/// What is told of a walk: of its first run nothing up to `since`, and nothing after `until`; of a
+/// file with several runs `run` alone, if one is given.
 struct WalkPart {
+  std::optional<std::uint32_t> run = std::nullopt;
   std::uint64_t since = 0;
   std::optional<WalkMoment> until = std::nullopt;
 };

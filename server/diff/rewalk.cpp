@@ -83,11 +83,6 @@ class Walk {
   /// `bytes`: of the recording, for the bar.
   void follow(protocol::RecordingReader& recording, double bytes) {
     while (const auto item = recording.next()) {
-      if (std::holds_alternative<v1::RecordingStart>(*item)) {
-        spdlog::warn("the recorded world begins anew after tick {}; what follows is left out",
-                     result.ticks);
-        break;
-      }
       if (const auto* commands = std::get_if<v1::RecordedCommands>(&*item)) take(*commands);
       if (const auto* events = std::get_if<v1::TickEvents>(&*item))
         for (const v1::Notice& notice : events->notices()) ends_.add(notice, 1);
@@ -231,7 +226,7 @@ ExitCode rewalk(const RewalkCommand& asked) {
   return interruptible(
       [&] {
         RewalkCommand command = asked;
-        protocol::RecordingReader recording(command.recording);
+        protocol::RecordingReader recording(command.recording, command.run);
         const v1::RecordingStart start = startOf(recording, command.recording);
         command.model = modelLike(asked.model, start);
         const auto scene = loadScene(command.model);
@@ -240,7 +235,8 @@ ExitCode rewalk(const RewalkCommand& asked) {
         std::filesystem::create_directories(command.out);
         requireAnotherFile(record, command.recording);
         auto refused = walkAgain(command, recording, start, scene, renderer.get(), record);
-        WalkDifference difference = compareWalks(command.recording, record, command.tolerance);
+        WalkDifference difference =
+            compareWalks(command.recording, record, command.tolerance, command.run);
         difference.refused = std::move(refused);
         difference.worse += difference.refused.size();
         if (renderer && command.pictures > 0 && !difference.none()) {

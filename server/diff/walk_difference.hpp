@@ -88,10 +88,12 @@ struct WalkDifference {
   bool none() const;
 };
 
-/// `tolerance`: metres by which places and clearances may differ. Reads both files. Throws
+/// `tolerance`: metres by which places and clearances may differ; `runBefore`: of `before` that one
+/// alone (left out: all, and beside a branch the one that it left). Reads both files. Throws
 /// protocol::mcap::RecordingError.
 WalkDifference compareWalks(const std::filesystem::path& before, const std::filesystem::path& after,
-                            double tolerance);
+                            double tolerance,
+                            std::optional<std::uint32_t> runBefore = std::nullopt);
 
 /// Pairs two ascending lists of happenings: indexes into both, each used once at most, both
 /// ascending. What is kSamePlace or farther apart is not paired.

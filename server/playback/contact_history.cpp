@@ -9,17 +9,18 @@
 namespace enfilade::server {
 
 /// States are the most of a recording, and not looked at: only the events are parsed.
-ContactHistory::ContactHistory(const std::filesystem::path& recording, std::uint64_t lastTick) {
+ContactHistory::ContactHistory(const std::filesystem::path& recording, std::uint32_t run,
+                               std::uint64_t lastTick) {
   protocol::mcap::Reader file(recording);
-  int starts = 0;
+  std::uint32_t begun = 0;
   while (const auto message = file.next()) {
     const std::string& topic = message->channel->topic;
-    if (topic != protocol::kStartTopic && topic != protocol::kEventsTopic) continue;
+    if (topic == protocol::kStartTopic && ++begun > run) return;
+    if (begun != run || (topic != protocol::kStartTopic && topic != protocol::kEventsTopic))
+      continue;
     const auto item = protocol::itemFrom(*message, recording);
-    if (const auto* start = std::get_if<v1::RecordingStart>(&*item)) {
-      if (++starts > 1) return;
+    if (const auto* start = std::get_if<v1::RecordingStart>(&*item))
       firstTick_ = start->parent().tick();
-    }
     if (const auto* events = std::get_if<v1::TickEvents>(&*item)) {
       if (events->tick() > lastTick) return;
       add(*events);

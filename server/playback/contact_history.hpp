@@ -16,10 +16,9 @@ namespace enfilade::server {
 
 class ContactHistory {
  public:
-  /// Reads the recording, from its beginning up to `lastTick`, or to where it was cut off: of a
-  /// recording in which the world begins anew the first walk. Checks all bytes that it reads.
-  /// Throws protocol::mcap::RecordingError.
-  explicit ContactHistory(const std::filesystem::path& recording,
+  /// Reads the run of the recording, up to `lastTick`, or to where it was cut off. Checks all bytes
+  /// that it reads. Throws protocol::mcap::RecordingError.
+  explicit ContactHistory(const std::filesystem::path& recording, std::uint32_t run = 1,
                           std::uint64_t lastTick = std::numeric_limits<std::uint64_t>::max());
 
   /// What lives in `world`, which is that of a recorded tick: each contact as KIND_BEGIN, with the

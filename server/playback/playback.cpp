@@ -8,11 +8,11 @@ namespace enfilade::server {
 
 using protocol::mcap::RecordingError;
 
-Playback::Playback(const std::filesystem::path& recording)
-    : file_(recording), recording_(recording), beganAt_(recording_.firstTick()) {
-  if (recording_.beginsAnew())
-    spdlog::warn("{}: the world begins anew in it; only what comes before is played",
-                 recording.string());
+Playback::Playback(const std::filesystem::path& recording, std::uint32_t run)
+    : file_(recording), run_(run), recording_(recording, run), beganAt_(recording_.firstTick()) {
+  if (recording_.runs() > 1)
+    spdlog::info("{}: of the {} runs in it run {} is played", recording.string(), recording_.runs(),
+                 run);
 }
 
 /// From the nearest checkpoint that can be read; else from the beginning.
@@ -43,9 +43,9 @@ scene::World Playback::worldAfter(std::uint64_t tick, std::shared_ptr<const scen
     throw RecordingError(file_.string() + ": tick " + std::to_string(tick) +
                          " is not in it; give one from " + std::to_string(firstTick()) + " to " +
                          std::to_string(lastTick()) +
-                         (recording_.beginsAnew() ? "; the world begins anew after that, and only "
-                                                    "the first walk is played"
-                                                  : ""));
+                         (recording_.runs() > 1 ? ", or another run than " + std::to_string(run_) +
+                                                      " of " + std::to_string(recording_.runs())
+                                                : ""));
   beganAt_ = firstTick();
   scene::World world = nearestWorld(tick, scene);
   recording_.seek(beganAt_);

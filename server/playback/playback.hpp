@@ -1,4 +1,4 @@
-// A recording that is played from any tick on.
+// A run of a recording, played from any tick on.
 #pragma once
 
 #include <vector>
@@ -11,10 +11,11 @@ namespace enfilade::server {
 class Playback {
  public:
   /// Throws protocol::mcap::RecordingError.
-  explicit Playback(const std::filesystem::path& recording);
+  explicit Playback(const std::filesystem::path& recording, std::uint32_t run = 1);
 
   const v1::RecordingStart& start() const { return recording_.start(); }
   const std::filesystem::path& file() const { return file_; }
+  std::uint32_t run() const { return run_; }
   std::uint64_t firstTick() const { return recording_.firstTick(); }
   std::uint64_t lastTick() const { return recording_.lastTick(); }
   bool closed() const { return recording_.closed(); }
@@ -44,6 +45,7 @@ class Playback {
   bool readTick();
 
   std::filesystem::path file_;
+  std::uint32_t run_;
   protocol::SeekableRecording recording_;
   std::uint64_t beganAt_ = 0;
   std::vector<v1::RecordedCommands> commands_;  ///< before the tick that is fed

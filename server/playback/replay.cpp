@@ -4,10 +4,10 @@ namespace enfilade::server {
 
 using protocol::mcap::RecordingError;
 
-Replay::Replay(const std::filesystem::path& recording, std::shared_ptr<const scene::Scene> scene,
-               std::uint32_t auditEvery)
-    : playback_(recording),
-      contacts_(recording),
+Replay::Replay(const std::filesystem::path& recording, std::uint32_t run,
+               std::shared_ptr<const scene::Scene> scene, std::uint32_t auditEvery)
+    : playback_(recording, run),
+      contacts_(recording, run),
       scene_(std::move(scene)),
       auditEvery_(auditEvery),
       at_(playback_.firstTick()) {}
@@ -35,6 +35,7 @@ v1::RecordingParent Replay::parent() const {
   v1::RecordingParent parent;
   parent.set_file(std::filesystem::absolute(file()).string());
   parent.set_tick(at_);
+  parent.set_run(playback_.run());
   return parent;
 }
 

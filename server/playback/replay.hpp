@@ -9,9 +9,10 @@ namespace enfilade::server {
 
 class Replay {
  public:
-  /// Reads all of the recording once, for its contacts. Throws protocol::mcap::RecordingError.
-  Replay(const std::filesystem::path& recording, std::shared_ptr<const scene::Scene> scene,
-         std::uint32_t auditEvery);
+  /// Reads all of the recording's run once, for its contacts. Throws
+  /// protocol::mcap::RecordingError.
+  Replay(const std::filesystem::path& recording, std::uint32_t run,
+         std::shared_ptr<const scene::Scene> scene, std::uint32_t auditEvery);
 
   const std::filesystem::path& file() const { return playback_.file(); }
   std::uint64_t firstTick() const { return playback_.firstTick(); }

@@ -1,5 +1,6 @@
 #include "server/recordings/inspect_recording.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -166,6 +167,10 @@ Json jsonOf(const v1::Lengths& lengths) {
           {"patience", lengths.patience()},   {"sliding", lengths.sliding()}};
 }
 
+Json jsonOf(const v1::RecordingParent& parent) {
+  return {{"file", parent.file()}, {"run", std::max(parent.run(), 1U)}, {"tick", parent.tick()}};
+}
+
 Json jsonOf(const RunUse& run) {
   Json avatars = Json::array();
   for (const auto& [name, use] : run.avatars)
@@ -174,22 +179,24 @@ Json jsonOf(const RunUse& run) {
                        {"last", use.last},
                        {"visits", use.visits},
                        {"way_length", use.wayLength}});
-  return {{"scene", run.start.scene().source()},
-          {"scene_file", run.start.scene_file()},
-          {"scene_hash", protocol::hexadecimal(run.start.scene().hash())},
-          {"objects", run.start.scene().objects()},
-          {"bodies", run.start.scene().bodies_size()},
-          {"server_version", run.start.server_version()},
-          {"choices", jsonOf(run.start.choices())},
-          {"lengths", jsonOf(run.start.lengths())},
-          {"ticks", run.ticks},
-          {"time", run.time},
-          {"state_hash", protocol::hexadecimal(run.hash)},
-          {"avatars", avatars},
-          {"moved_bodies", run.movedBodies},
-          {"commands", run.commands},
-          {"events", run.events},
-          {"notices", run.notices}};
+  Json json{{"scene", run.start.scene().source()},
+            {"scene_file", run.start.scene_file()},
+            {"scene_hash", protocol::hexadecimal(run.start.scene().hash())},
+            {"objects", run.start.scene().objects()},
+            {"bodies", run.start.scene().bodies_size()},
+            {"server_version", run.start.server_version()},
+            {"choices", jsonOf(run.start.choices())},
+            {"lengths", jsonOf(run.start.lengths())},
+            {"ticks", run.ticks},
+            {"time", run.time},
+            {"state_hash", protocol::hexadecimal(run.hash)},
+            {"avatars", avatars},
+            {"moved_bodies", run.movedBodies},
+            {"commands", run.commands},
+            {"events", run.events},
+            {"notices", run.notices}};
+  if (run.start.has_parent()) json["parent"] = jsonOf(run.start.parent());
+  return json;
 }
 
 std::string jsonText(const std::filesystem::path& file, const Contents& contents) {
@@ -226,12 +233,20 @@ void addCounts(std::string& text, const char* title,
   text += "\n";
 }
 
-void addRun(std::string& text, const RunUse& run) {
+/// `number`: from 1; 0: there is only this one.
+void addRun(std::string& text, std::size_t number, const RunUse& run) {
   constexpr std::size_t kMostNames = 20;
-  line(text, "\n%s: scene %s, %u objects, %d bodies", run.start.scene().source().c_str(),
+  text += "\n";
+  if (number > 0) text += "run " + std::to_string(number) + ", ";
+  line(text, "%s: scene %s, %u objects, %d bodies", run.start.scene().source().c_str(),
        protocol::hexadecimal(run.start.scene().hash()).c_str(), run.start.scene().objects(),
        run.start.scene().bodies_size());
   text += "  " + run.start.scene_file() + "\n";
+  const v1::RecordingParent& parent = run.start.parent();
+  if (run.start.has_parent())
+    text += "  a branch of " + parent.file() + ", run " +
+            std::to_string(std::max(parent.run(), 1U)) + ", after tick " +
+            std::to_string(parent.tick()) + "\n";
   line(text, "  %llu ticks of %.6g s = %.3f s; ends in state %s", static_cast<Count>(run.ticks),
        run.start.lengths().tick(), run.time, protocol::hexadecimal(run.hash).c_str());
   std::size_t told = 0;
@@ -259,7 +274,9 @@ std::string tableText(const std::filesystem::path& file, const Contents& content
   for (const auto& [topic, use] : contents.channels)
     line(text, "  %-28s %10llu messages %12llu bytes  %s", topic.c_str(),
          static_cast<Count>(use.messages), static_cast<Count>(use.bytes), use.schema.c_str());
-  for (const RunUse& run : contents.runs) addRun(text, run);
+  const bool several = contents.runs.size() > 1;
+  for (std::size_t i = 0; i < contents.runs.size(); ++i)
+    addRun(text, several ? i + 1 : 0, contents.runs[i]);
   return text;
 }
 

@@ -1,5 +1,6 @@
 """`serve RECORDING`: the program plays it to clients, who seek in it and branch off."""
 
+import json
 import subprocess
 import tempfile
 import unittest
@@ -107,24 +108,51 @@ class Replay(unittest.TestCase):
         self.assertEqual(ended.returncode, 1)
         self.assertIn("byte", ended.stderr)
 
-    def test_of_several_walks_the_first_is_played(self):
+    def test_of_several_runs_any_is_played_left_and_compared(self):
         several = self.folder / "several.mcap"
+        hashes = []
         with enfilade.serve(self.scene, "--record", str(several)) as server, \
                 server.connect() as client:
-            client.spawn("ann", at=(0, 0, 0))
-            hash_ = client.step(50).state_hash
-            client.restart()
-            client.spawn("bob", at=(1, 0, 1))
-            client.step(80)
-        server = enfilade.serve(several)
-        self.addCleanup(server.stop)
-        with server.connect() as client:
-            self.assertEqual(client.replay.last_tick, 50)
-            self.assertEqual(client.step(60).state_hash, hash_)
-        self.assertIn("begins anew", server.log())
-        beyond = self.run_program("serve", several, "--from", 60, "--listen", "127.0.0.1:0")
-        self.assertEqual(beyond.returncode, 1)
-        self.assertIn("only the first walk is played", beyond.stderr)
+            for name, ticks in (("ann", 50), ("bob", 80)):
+                client.restart()
+                client.spawn(name, at=(0, 0, 0)).drive((1, 0, 0))
+                hashes.append(client.step(ticks).state_hash)
+        for run, ticks in ((1, 50), (2, 80)):
+            with enfilade.serve(several, "--run", str(run)) as server, server.connect() as client:
+                self.assertEqual(client.replay.last_tick, ticks)
+                self.assertEqual(client.step(ticks + 10).state_hash, hashes[run - 1])
+        for wrong, words in ((["--from", 60], "or another run than 1 of 2"),
+                             (["--run", 3], "no run 3 in it; give one from 1 to 2")):
+            ended = self.run_program("serve", several, *wrong, "--listen", "127.0.0.1:0")
+            self.assertEqual(ended.returncode, 1, wrong)
+            self.assertIn(words, ended.stderr)
+        for wrong in ([self.scene, "--run", "2"], [several, "--run", "0"]):
+            self.assertEqual(self.run_program("serve", *wrong).returncode, 2, wrong)
+        self.runs_in_process(several)
+
+    def runs_in_process(self, several):
+        whole = self.run_program("replay", several, "--verify", "--run", 2)
+        late = self.run_program("replay", several, "--verify", "--run", 2, "--from", 70)
+        self.assertEqual((whole.returncode, late.returncode), (0, 0), whole.stderr + late.stderr)
+        told, after = json.loads(whole.stdout), json.loads(late.stdout)
+        self.assertEqual((told["ticks"], told["closed"]), (80, True))
+        self.assertEqual(told["state_hash"], after["state_hash"])
+
+        script, branch = self.folder / "wait.jsonl", self.folder / "branch.mcap"
+        script.write_text('{"wait":1,"for":"bob"}\n')
+        made = self.run_program("replay", several, "--run", 2, "--from", 40, "--then", script,
+                                "--out", self.folder / "b", "--record", branch)
+        self.assertEqual(made.returncode, 0, made.stderr)
+        inspected = self.run_program("inspect", branch).stdout
+        self.assertIn("a branch of %s, run 2, after tick 40" % several.resolve(), inspected)
+        # Beside the run that it left: bob is in both.
+        compared = json.loads(self.run_program("diff", several, branch, "--json").stdout)
+        self.assertEqual([run["ticks"] for run in compared["before"]["runs"]], [80])
+
+        again = self.run_program("replay", self.scene, several, "--run", 2, "--json",
+                                 "--out", self.folder / "again")
+        self.assertEqual(again.returncode, 0, again.stderr + again.stdout)
+        self.assertEqual([run["ticks"] for run in json.loads(again.stdout)["after"]["runs"]], [80])
 
     def test_it_is_played_in_the_scene_that_is_named(self):
         moved = self.folder / "moved.obj"

@@ -44,10 +44,10 @@ void writeTick(RecordingWriter& writer, std::uint64_t tick, bool checkpoint) {
   writer.write(made, static_cast<double>(tick) * kTick);
 }
 
-/// `first`: where a branch begins; 0: no branch.
-Written written(const std::string& name, std::uint64_t first, std::uint64_t last, bool close) {
-  Written made{tests::ownFile(name + ".mcap"), {}};
-  RecordingWriter writer(made.file, "test");
+/// `first`: where a branch begins; 0: no branch. Returns the ticks of its checkpoints.
+std::vector<std::uint64_t> writeRun(RecordingWriter& writer, std::uint64_t first,
+                                    std::uint64_t last) {
+  std::vector<std::uint64_t> checkpoints;
   v1::RecordingStart start;
   start.mutable_lengths()->set_tick(kTick);
   if (first > 0) start.mutable_parent()->set_tick(first);
@@ -56,13 +56,20 @@ Written written(const std::string& name, std::uint64_t first, std::uint64_t last
     v1::RecordedCheckpoint begins;
     begins.set_tick(first);
     writer.write(begins, static_cast<double>(first) * kTick);
-    made.checkpoints.push_back(first);
+    checkpoints.push_back(first);
   }
   for (std::uint64_t tick = first + 1; tick <= last; ++tick) {
     const bool checkpoint = tick % 500 == 0;
     writeTick(writer, tick, checkpoint);
-    if (checkpoint) made.checkpoints.push_back(tick);
+    if (checkpoint) checkpoints.push_back(tick);
   }
+  return checkpoints;
+}
+
+Written written(const std::string& name, std::uint64_t first, std::uint64_t last, bool close) {
+  Written made{tests::ownFile(name + ".mcap"), {}};
+  RecordingWriter writer(made.file, "test");
+  made.checkpoints = writeRun(writer, first, last);
   if (close) {
     writer.close();
     return made;
@@ -74,8 +81,9 @@ Written written(const std::string& name, std::uint64_t first, std::uint64_t last
   return made;
 }
 
-void expectSeeks(const Written& made, std::uint64_t first, std::uint64_t last) {
-  SeekableRecording recording(made.file);
+void expectSeeks(const Written& made, std::uint64_t first, std::uint64_t last,
+                 std::uint32_t run = 1) {
+  SeekableRecording recording(made.file, run);
   EXPECT_EQ(recording.firstTick(), first);
   ASSERT_EQ(recording.lastTick(), last);
   for (std::uint64_t tick = last; tick >= first && tick <= last; tick -= 137) {
@@ -110,6 +118,44 @@ TEST(SeekableRecording, GoesOnAfterAnyTickWithTheCheckpointBeforeIt) {
 
 TEST(SeekableRecording, ABranchBeginsWhereItLeftItsParent) {
   expectSeeks(written("seek_branch", 777, 2000, true), 777, 2000);
+}
+
+/// As tests of agents make them: one short run after the other.
+TEST(SeekableRecording, EachRunOfAFileIsReadAloneFromAnyTickOn) {
+  const std::vector<std::uint64_t> lasts{1700, 3, 1, 2, 1200};
+  const auto file = tests::ownFile("runs.mcap");
+  std::vector<Written> runs;
+  {
+    RecordingWriter writer(file, "test");
+    for (const std::uint64_t last : lasts) runs.push_back({file, writeRun(writer, 0, last)});
+    writer.close();
+  }
+  for (std::uint32_t run = 1; run <= lasts.size(); ++run) {
+    SCOPED_TRACE(run);
+    const std::uint64_t last = lasts[run - 1];
+    expectSeeks(runs[run - 1], 0, last, run);
+    RecordingReader reader(file, run);
+    std::uint64_t starts = 0, states = 0;
+    while (const auto item = reader.next()) {
+      starts += std::holds_alternative<v1::RecordingStart>(*item);
+      if (const auto* state = std::get_if<v1::State>(&*item)) {
+        EXPECT_EQ(state->tick(), ++states);
+      }
+    }
+    EXPECT_EQ(starts, 1u);
+    EXPECT_EQ(states, last);
+    EXPECT_TRUE(reader.closed());
+  }
+  try {
+    SeekableRecording(file, 6);
+    ADD_FAILURE() << "there are five";
+  } catch (const mcap::RecordingError& error) {
+    EXPECT_NE(std::string(error.what()).find("no run 6 in it; give one from 1 to 5"),
+              std::string::npos)
+        << error.what();
+  }
+  RecordingReader beyond(file, 6);
+  EXPECT_THROW(while (beyond.next());, mcap::RecordingError);
 }
 
 TEST(SeekableRecording, WithoutASummaryTheChunksAreFoundByTheirHeads) {
