@@ -203,6 +203,8 @@ CameraPath parseJsonPath(std::string_view text, const std::string& source, Camer
   Json file;
   try {
     file = Json::parse(text);
+  } catch (const Json::out_of_range&) {
+    throw CameraPathError(source + ": a number is beyond what a double holds");
   } catch (const Json::parse_error& error) {
     throw CameraPathError(source + ": byte " + std::to_string(error.byte) +
                           ": is not JSON; a walk script's name ends in .jsonl");

@@ -134,6 +134,8 @@ TEST(JsonPath, BlendersAngleIsTheOpeningFromSideToSide) {
 
 TEST(JsonPath, WhatIsWrongIsToldWithItsPlace) {
   EXPECT_TRUE(holds(saidOfJson("{"), "path.json: byte"));
+  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,1e999],"look_at":[1,0,0]}])"),
+                    "path.json: a number is beyond what a double holds"));
   EXPECT_TRUE(holds(saidOfJson("{}"), "list of poses"));
   EXPECT_TRUE(holds(saidOfJson("[]"), "0 poses"));
   EXPECT_TRUE(holds(saidOfJson("[7]"), "pose[0]: must be an object"));
