@@ -98,7 +98,7 @@ class Refusals(RoomCase):
             self.client.spawn("ann", at=(0, 0, 6)).enter()
 
     def test_a_server_with_tokens_wants_one(self):
-        tokens = Path(self.folder.name) / "tokens"
+        tokens = self.folder / "tokens"
         tokens.write_text("observe looker-0123456789\n")
         with enfilade.serve(self.scene, "--token-file", str(tokens)) as server:
             with self.assertRaises(enfilade.ServerError) as caught:

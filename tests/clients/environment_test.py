@@ -3,7 +3,6 @@
 import math
 import time
 import unittest
-from pathlib import Path
 
 import numpy as np
 
@@ -100,7 +99,7 @@ class Environments(RoomCase):
         np.testing.assert_array_equal(infos["tick"], [1, 1])
 
     def test_a_server_with_tokens_takes_them_from_environments(self):
-        tokens = Path(self.folder.name) / "tokens"
+        tokens = self.folder / "tokens"
         tokens.write_text("admin keeper-0123456789\n")
         with enfilade.serve(self.scene, "--token-file", str(tokens)) as server:
             options = {"address": server.address, "starts": _STARTS, "channels": ()}

@@ -372,7 +372,7 @@ class Servers(RoomCase):
         named, path, here = os.environ.pop("ENFILADE", None), os.environ["PATH"], os.getcwd()
         try:
             os.environ["PATH"] = "/nowhere"
-            checkout = Path(self.folder.name) / "checkout"
+            checkout = self.folder / "checkout"
             (checkout / "build").mkdir(parents=True)
             (checkout / "protocol").mkdir()
             (checkout / "protocol" / "enfilade.proto").touch()

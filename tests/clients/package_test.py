@@ -32,10 +32,10 @@ class Package(RoomCase):
             self.assertEqual(embedded, made.read(), "build, and commit messages.desc")
 
     def test_pip_installs_it_without_a_network(self):
-        env = Path(self.folder.name) / "env"
+        env = self.folder / "env"
         self.run_python("-m", "venv", "--system-site-packages", env)
         python = env / "bin" / "python"
-        source = Path(self.folder.name) / "source"  # pip builds beside what it installs
+        source = self.folder / "source"  # pip builds beside what it installs
         subprocess.run(["cp", "-r", str(PACKAGE), str(source)], check=True)
         self.run_python("-m", "pip", "install", "--no-build-isolation", "--no-index", "--no-deps",
                         "--disable-pip-version-check", source, python=python)
@@ -44,7 +44,7 @@ class Package(RoomCase):
                 "with enfilade.connect(sys.argv[1]) as client:\n"
                 "    print(enfilade.__file__, client.welcome.scene.source)\n")
         told = self.run_python("-c", code, self.server.address, python=python, env=plain,
-                               cwd=self.folder.name)
+                               cwd=self.folder)
         self.assertIn(str(env), told)
         self.assertIn("room.obj", told)
 
@@ -56,7 +56,7 @@ class Package(RoomCase):
 
     def test_the_data_set_is_recorded(self):
         self.need_pictures()
-        out = Path(self.folder.name) / "set"
+        out = self.folder / "set"
         told = self.run_python(PACKAGE / "examples" / "record_data_set.py", self.scene, out,
                                "--start", 0, 0.01, 0, "--to", 1, 0, 0, "--size", 20, 10)
         self.assertIn("arrived", told)
@@ -72,7 +72,7 @@ class Package(RoomCase):
         self.assertIn(("begin", "wall"), [(one["kind"], one["b_name"]) for one in events])
 
     def test_a_recording_is_played_and_taken_over(self):
-        walk, branch = (Path(self.folder.name) / name for name in ("walk.mcap", "branch.mcap"))
+        walk, branch = (self.folder / name for name in ("walk.mcap", "branch.mcap"))
         with enfilade.serve(self.scene, "--record", str(walk)) as server, server.connect() as client:
             client.spawn("ann", at=(0, 0.01, 0)).walk((3, 0, 0))
             client.run_until_idle()

@@ -2,14 +2,12 @@
 
 import json
 import subprocess
-import tempfile
 import unittest
-from pathlib import Path
 
 import enfilade
 import enfilade.process
 from recorded import verify
-from room import obj
+from room import obj, room_file
 
 TICKS = 900
 
@@ -17,11 +15,8 @@ TICKS = 900
 class Replay(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(folder.cleanup)
-        cls.folder = Path(folder.name)
-        cls.scene = cls.folder / "room.obj"
-        cls.scene.write_text(obj())
+        cls.scene = room_file(cls.addClassCleanup)
+        cls.folder = cls.scene.parent
         cls.walk = cls.folder / "walk.mcap"
         with enfilade.serve(cls.scene, "--record", str(cls.walk)) as server, \
                 server.connect() as client:

@@ -28,15 +28,22 @@ def obj() -> str:
     return "\n".join(lines) + "\n"
 
 
+def room_file(clean_up) -> Path:
+    """room.obj in a folder of its own, which `clean_up` (addCleanup or addClassCleanup) takes away."""
+    folder = tempfile.TemporaryDirectory()
+    clean_up(folder.cleanup)
+    scene = Path(folder.name) / "room.obj"
+    scene.write_text(obj())
+    return scene
+
+
 class RoomCase(unittest.TestCase):
     """One server of the room for all tests of a class; a fresh world and client for each."""
 
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.scene = Path(cls.folder.name) / "room.obj"
-        cls.scene.write_text(obj())
+        cls.scene = room_file(cls.addClassCleanup)
+        cls.folder = cls.scene.parent
         cls.server = enfilade.serve(cls.scene)
         cls.addClassCleanup(cls.server.stop)
 

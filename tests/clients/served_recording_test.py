@@ -3,17 +3,15 @@
 import json
 import signal
 import subprocess
-import tempfile
 import time
 import unittest
 import urllib.request
-from pathlib import Path
 
 import enfilade
 import enfilade.process
 from kill_recorders import KilledRecorders
 from recorded import messages, other_reader, verify
-from room import obj
+from room import room_file
 
 # The column is a lift, so that bodies are commanded too.
 SIDECAR = {"walk": 1, "bodies": [{"kind": "lift", "name": "lift", "objects": ["column"], "speed": 1,
@@ -22,11 +20,8 @@ SIDECAR = {"walk": 1, "bodies": [{"kind": "lift", "name": "lift", "objects": ["c
 
 class ServedRecording(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = Path(folder.name)
-        self.scene = self.folder / "room.obj"
-        self.scene.write_text(obj())
+        self.scene = room_file(self.addCleanup)
+        self.folder = self.scene.parent
         (self.folder / "room.walk.json").write_text(json.dumps(SIDECAR))
         self.file = self.folder / "served.mcap"
 
