@@ -2,6 +2,7 @@
 // boxes in it, sorted on three axes (seed 5.2.2).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -35,6 +36,15 @@ struct MoverCell {
   /// `met` becomes the ids of those that meet `reach`, in the order of `rows`.
   void lay(const StillCells& still, std::span<const StillCells::Row> rows, const HalfAxes& reach,
            std::vector<std::uint32_t>& met);
+
+  /// Asks for what is read when ends are passed, of a cell that is not full.
+  void prefetch() const {
+    constexpr std::size_t kEndsPerLine = 4, kMost = 32;
+    for (std::size_t k = 0; k < std::min(kMost, ends.size()); k += kEndsPerLine) {
+      __builtin_prefetch(&ends[k]);
+    }
+    __builtin_prefetch(boxes.data());
+  }
 
   /// The ends beside the reach on half-axis `k`.
   double endBefore(std::size_t k) const { return ends[next[k] - 1].at; }

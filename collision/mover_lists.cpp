@@ -15,6 +15,7 @@ void MoverLists::makeRoomFor(std::uint32_t mover) {
   settled_.resize(mover + std::size_t{1});
   positions_.resize(mover + std::size_t{1});
   marked_.resize(mover + std::size_t{1}, 0);
+  passed_.resize(2 * (mover + std::size_t{1}));
 }
 
 void MoverLists::settle(std::span<const std::uint32_t> movers) {
@@ -44,49 +45,59 @@ void MoverLists::confirm(std::uint32_t a, std::uint32_t b, std::vector<MoverChan
   if (overlapping(reach_[a], reach_[b])) changes.push_back({std::min(a, b), std::max(a, b), true});
 }
 
-/// `lower` and `upper` have passed one another: they opened an overlap, or closed one.
-void MoverLists::exchanged(const End& lower, const End& upper, bool opens,
+/// An end of `mover` and the other end of each of the first `count` movers in `passed_` have passed
+/// one another: they opened an overlap, or closed one.
+void MoverLists::exchanged(std::uint32_t mover, std::size_t count, bool opens,
                            std::vector<MoverChange>& changes) {
-  ++boxTests;
-  const std::uint32_t a = lower.mover(), b = upper.mover();
+  boxTests += count;
   // First the condition that seldom holds: most boxes that pass on one axis are far apart.
   const std::vector<HalfAxes>&with = opens ? reach_ : settled_,
         &without = opens ? settled_ : reach_;
-  if (overlapping(with[a], with[b]) && !overlapping(without[a], without[b])) {
-    changes.push_back({std::min(a, b), std::max(a, b), opens});
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::uint32_t other = passed_[k];
+    if (overlapping(with[mover], with[other]) && !overlapping(without[mover], without[other])) {
+      changes.push_back({std::min(mover, other), std::max(mover, other), opens});
+    }
   }
 }
+
+// Which of the ends that are passed are of the other kind is past guessing: all are written, and
+// counted if they are.
 
 void MoverLists::bubbleUp(std::size_t axis, End end, std::vector<MoverChange>& changes) {
   End* const ends = ends_[axis].data();
   const std::uint32_t from = positionOf(axis, end.tag);
   std::uint32_t at = from;
+  std::size_t count = 0;
   for (; before(ends[at + 1], end); ++at) {
     const End other = ends[at + 1];
-    if (end.upper() && !other.upper()) exchanged(other, end, true, changes);
-    if (!end.upper() && other.upper()) exchanged(end, other, false, changes);
+    passed_[count] = other.mover();
+    count += other.upper() != end.upper() ? 1 : 0;
     ends[at] = other;
     positionOf(axis, other.tag) = at;
   }
   exchanges += at - from;
   ends[at] = end;
   positionOf(axis, end.tag) = at;
+  exchanged(end.mover(), count, end.upper(), changes);
 }
 
 void MoverLists::bubbleDown(std::size_t axis, End end, std::vector<MoverChange>& changes) {
   End* const ends = ends_[axis].data();
   const std::uint32_t from = positionOf(axis, end.tag);
   std::uint32_t at = from;
+  std::size_t count = 0;
   for (; before(end, ends[at - 1]); --at) {
     const End other = ends[at - 1];
-    if (!end.upper() && other.upper()) exchanged(end, other, true, changes);
-    if (end.upper() && !other.upper()) exchanged(other, end, false, changes);
+    passed_[count] = other.mover();
+    count += other.upper() != end.upper() ? 1 : 0;
     ends[at] = other;
     positionOf(axis, other.tag) = at;
   }
   exchanges += from - at;
   ends[at] = end;
   positionOf(axis, end.tag) = at;
+  exchanged(end.mover(), count, !end.upper(), changes);
 }
 
 /// An end that has not moved is where it belongs, and one that has can only go its way. The end

@@ -65,7 +65,8 @@ class MoverLists {
   void repair(std::size_t axis, End lower, End upper, std::vector<MoverChange>& changes);
   void bubbleUp(std::size_t axis, End end, std::vector<MoverChange>& changes);
   void bubbleDown(std::size_t axis, End end, std::vector<MoverChange>& changes);
-  void exchanged(const End& lower, const End& upper, bool opens, std::vector<MoverChange>& changes);
+  void exchanged(std::uint32_t mover, std::size_t count, bool opens,
+                 std::vector<MoverChange>& changes);
   void renumber(std::size_t axis);
   void sweep(std::span<const std::uint32_t> fresh, std::vector<MoverChange>& changes);
   void confirm(std::uint32_t a, std::uint32_t b, std::vector<MoverChange>& changes);
@@ -78,7 +79,8 @@ class MoverLists {
   std::array<Ends, 3> ends_{noEnds(), noEnds(), noEnds()};
   std::vector<std::array<std::uint32_t, 6>> positions_;  ///< by mover: of its ends in the lists
   std::vector<std::uint8_t> marked_;                     ///< by mover: removed, or fresh
-  std::array<std::vector<std::uint32_t>, 2> open_;       ///< sweep: open movers, old and fresh
+  std::vector<std::uint32_t> passed_;  ///< scratch: movers of whom an end was exchanged
+  std::array<std::vector<std::uint32_t>, 2> open_;  ///< sweep: open movers, old and fresh
 };
 
 }  // namespace enfilade::collision

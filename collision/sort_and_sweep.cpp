@@ -133,12 +133,13 @@ MoverId SortAndSweep::insert(const Box& box) {
   if (id >= MoverLists::kMostMovers) throw std::length_error("more than 2^31 - 1 movers");
   if (s.freeIds.empty()) {
     s.movers.emplace_back();
+    s.reaches.emplace_back();
     s.isStirred.push_back(0);
   } else {
     s.freeIds.pop_back();
   }
   Mover& mover = s.movers[id];
-  mover.reach = mover.laidReach = reachOf(box);
+  s.reaches[id] = mover.laidReach = reachOf(box);
   mover.rate.fill(0);
   mover.low.fill(std::numeric_limits<double>::infinity());  // move() is not to let it pass
   mover.presence = Presence::fresh;
@@ -154,7 +155,7 @@ void SortAndSweep::move(MoverId id, const Box& box) {
     // Guards are finite: a reach between them is as well.
     if (moved.within(mover.low, mover.high) && moved.full) {
       if (!mover.neighbours.empty()) s.stir(id, moved.reach.data());
-      std::memcpy(&mover.reach, &moved.reach, sizeof(mover.reach));
+      std::memcpy(&s.reaches[id], &moved.reach, sizeof(HalfAxes));
       return;
     }
   }
@@ -163,8 +164,7 @@ void SortAndSweep::move(MoverId id, const Box& box) {
 
 /// Before a mover that has neighbours takes its new reach.
 void SortAndSweep::State::stir(MoverId id, const void* reach) {
-  Mover& mover = movers[id];
-  if (isStirred[id] != 0 || std::memcmp(reach, &mover.reach, sizeof(mover.reach)) == 0) return;
+  if (isStirred[id] != 0 || std::memcmp(reach, &reaches[id], sizeof(HalfAxes)) == 0) return;
   isStirred[id] = 1;
   stirred.push_back(id);
 }
@@ -175,7 +175,7 @@ void SortAndSweep::State::moveFarther(MoverId id, const Box& box) {
   requireBox(box, "mover", id);
   const HalfAxes reach = reachOf(box);
   if (!mover.neighbours.empty()) stir(id, &reach);
-  mover.reach = reach;
+  reaches[id] = reach;
   if (mover.moved || mover.presence == Presence::fresh) return;
   mover.moved = true;
   moved.push_back(id);
@@ -229,9 +229,7 @@ void SortAndSweep::update() {
   for (const MoverId id : s.leaving) s.dropAll(id);
   s.lists.remove(s.leaving);
   s.applyEdits();
-  for (const MoverId id : s.moved) {
-    if (s.movers[id].presence == Presence::live) s.updateStill(id);
-  }
+  s.updateStill();
   for (const MoverId id : s.fresh) s.layCell(id);
   s.visitMovers();
   s.updateMoving();

@@ -27,7 +27,7 @@ void requireRoll(std::span<const std::pair<MoverId, Box>> there, const SortAndSw
 SortAndSweep::Roll SortAndSweep::roll() const {
   const State& s = *state_;
   Roll roll{s.freeIds, {}, s.tick > 0};
-  for (const MoverId id : s.leaving) roll.leaving.emplace_back(id, boxOfReach(s.movers[id].reach));
+  for (const MoverId id : s.leaving) roll.leaving.emplace_back(id, boxOfReach(s.reaches[id]));
   return roll;
 }
 
@@ -42,6 +42,7 @@ void SortAndSweep::restore(std::span<const std::pair<MoverId, Box>> there, const
   const std::size_t count = all.size() + roll.free.size();
   s.movers.clear();
   s.movers.resize(count);
+  s.reaches.assign(count, {});
   s.isStirred.assign(count, 0);
   s.fresh.clear();
   s.freeIds.clear();

@@ -18,15 +18,21 @@ namespace enfilade::collision {
 
 enum class Presence : std::uint8_t { free, fresh, live, leaving };
 
+/// What is read of a mover is asked for so many movers before: those of a crowd fill no near cache.
+constexpr std::size_t kAskedAhead = 6;
+
 /// Another mover whose cell meets one's own.
 struct Neighbour {
+  static constexpr std::uint8_t kMet = 6;
+
   MoverId id;
-  bool met;  ///< their boxes overlap, as of the last update
+  std::uint8_t apart;  ///< kMet: their boxes overlap, as of the last update. Else they do not, and
+                       ///< this is one's own half-axis on which they were found apart
+  bool met() const { return apart == kMet; }
 };
 
 struct alignas(64) Mover {
-  // What a steady tick reads comes first: three lines of a cache.
-  HalfAxes reach{};
+  // What a steady tick reads comes first: with the reach three lines of a cache.
   HalfAxes low{}, high{};  ///< guards: while low <= reach < high nothing was passed
   std::vector<SortAndSweep::Partner> partners;  ///< sorted
   std::vector<Neighbour> neighbours;            ///< sorted by id
@@ -54,10 +60,12 @@ struct SortAndSweep::State {
 
   MoverLists lists;  ///< of the cells of the movers
   std::vector<Mover> movers;
+  // What neighbours read of a mover stands side by side.
+  std::vector<HalfAxes> reaches;
+  std::vector<std::uint8_t> isStirred;  ///< has moved since the last update, and has neighbours
   std::vector<MoverId> freeIds;
   std::vector<MoverId> moved, stirred, fresh, leaving;  ///< since the last update
   std::vector<MoverId> relaid;                          ///< in this update
-  std::vector<std::uint8_t> isStirred;  ///< by mover: side by side, for its neighbours
   std::uint64_t tick = 0;
   std::size_t nextVisited = 0;
 
@@ -81,10 +89,11 @@ struct SortAndSweep::State {
   void dropAll(MoverId id);
 
   // Movers against still boxes: sort_and_sweep_still.cpp.
-  void updateStill(MoverId id);
+  void updateStill();
   bool passInward(MoverId id);
   bool passOutward(MoverId id);
-  void setBorders(Mover& mover) const;
+  void setBorders(MoverId id);
+  HalfAxes rateOf(MoverId id) const;
   void layCell(MoverId id);
   void visitMovers();
 

@@ -40,14 +40,6 @@ void guard(Mover& mover, std::size_t k) {
   mover.high[k] = mover.cell.endBeyond(k);
 }
 
-HalfAxes rateOf(const Mover& mover, std::uint64_t tick) {
-  HalfAxes rate = mover.rate;
-  if (tick == mover.laidAt) return rate;
-  const double share = 1 / static_cast<double>(tick - mover.laidAt);
-  for (std::size_t k = 0; k < 6; ++k) rate[k] = (mover.reach[k] - mover.laidReach[k]) * share;
-  return rate;
-}
-
 HalfAxes after(const HalfAxes& reach, const HalfAxes& rate, double ticks) {
   HalfAxes later = reach;
   for (std::size_t k = 0; k < 6; ++k) later[k] += ticks * rate[k];
@@ -58,35 +50,47 @@ HalfAxes after(const HalfAxes& reach, const HalfAxes& rate, double ticks) {
 
 // ---- laying a cell -----------------------------------------------------------------------------
 
-void SortAndSweep::State::setBorders(Mover& mover) const {
-  mover.rate = rateOf(mover, tick);
-  mover.laidReach = mover.reach;
+HalfAxes SortAndSweep::State::rateOf(MoverId id) const {
+  const Mover& mover = movers[id];
+  const HalfAxes& reach = reaches[id];
+  HalfAxes rate = mover.rate;
+  if (tick == mover.laidAt) return rate;
+  const double share = 1 / static_cast<double>(tick - mover.laidAt);
+  for (std::size_t k = 0; k < 6; ++k) rate[k] = (reach[k] - mover.laidReach[k]) * share;
+  return rate;
+}
+
+void SortAndSweep::State::setBorders(MoverId id) {
+  Mover& mover = movers[id];
+  const HalfAxes& reach = reaches[id];
+  mover.rate = rateOf(id);
+  mover.laidReach = reach;
   mover.laidAt = tick;
   double fastest = 0, widest = 0;
   for (const double rate : mover.rate) fastest = std::max(fastest, std::abs(rate));
   for (std::size_t axis = 0; axis < 3; ++axis)
-    widest = std::max(widest, mover.reach[axis] + mover.reach[axis + 3]);
+    widest = std::max(widest, reach[axis] + reach[axis + 3]);
   const bool unknown = mover.presence == Presence::fresh || (widest > 0 && fastest > widest);
   if (unknown) mover.rate.fill(0);
   const double slack = unknown ? widest : kSlackTicks * fastest + kSlackOfSize * widest;
   const double least = kMostOfEdge * still.grid().edge();
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double size = mover.reach[axis] + mover.reach[axis + 3];
+    const double size = reach[axis] + reach[axis + 3];
     const double most = std::max(kMostOfSize * size, least);
     for (const std::size_t k : {axis, axis + 3}) {
       const double course = kHorizon * mover.rate[k];
       const double ahead = std::min(slack + std::max(course, 0.0), most);
       const double behind = std::min(slack - std::min(course, 0.0), most);
-      const double beyondReach = std::nextafter(mover.reach[k], kLargest);  // lest ahead is lost
-      mover.cell.farthest[k] = std::min(std::max(mover.reach[k] + ahead, beyondReach), kLargest);
-      mover.cell.nearest[k] = std::max(mover.reach[k] - behind, -kLargest);
+      const double beyondReach = std::nextafter(reach[k], kLargest);  // lest ahead is lost
+      mover.cell.farthest[k] = std::min(std::max(reach[k] + ahead, beyondReach), kLargest);
+      mover.cell.nearest[k] = std::max(reach[k] - behind, -kLargest);
     }
   }
 }
 
 void SortAndSweep::State::layCell(MoverId id) {
   Mover& mover = movers[id];
-  setBorders(mover);
+  setBorders(id);
   rows.count = 0;
   still.gather(mover.cell.farthest, rows);
   for (const Row row : rows.all()) __builtin_prefetch(&still.onset(row));
@@ -97,7 +101,7 @@ void SortAndSweep::State::layCell(MoverId id) {
     rows.rows[kept] = row;
     kept += meets(still.onset(row), mover.cell.farthest) ? 1 : 0;
   }
-  mover.cell.lay(still, std::span(rows.rows).first(kept), mover.reach, inReach);
+  mover.cell.lay(still, std::span(rows.rows).first(kept), reaches[id], inReach);
   for (std::size_t k = 0; k < 6; ++k) guard(mover, k);
   replaceStill(id);
   if (mover.relaid) return;
@@ -114,7 +118,7 @@ void SortAndSweep::State::visitMovers() {
     const auto id = static_cast<MoverId>(nextVisited++ % movers.size());
     const Mover& mover = movers[id];
     if (mover.presence != Presence::live || mover.relaid) continue;
-    const HalfAxes later = after(mover.reach, rateOf(mover, tick), ticks);
+    const HalfAxes later = after(reaches[id], rateOf(id), ticks);
     if (!within(mover.cell.nearest, later, mover.cell.farthest)) layCell(id);
   }
 }
@@ -124,10 +128,11 @@ void SortAndSweep::State::visitMovers() {
 /// Moves on where the reach has shrunk; false if it has left its cell.
 bool SortAndSweep::State::passInward(MoverId id) {
   Mover& mover = movers[id];
+  const HalfAxes& reach = reaches[id];
   MoverCell& cell = mover.cell;
-  for (unsigned bits = beyond(mover.low, mover.reach); bits != 0; bits &= bits - 1) {
+  for (unsigned bits = beyond(mover.low, reach); bits != 0; bits &= bits - 1) {
     const auto k = static_cast<std::size_t>(std::countr_zero(bits));
-    for (; cell.endBefore(k) > mover.reach[k]; --cell.next[k]) {
+    for (; cell.endBefore(k) > reach[k]; --cell.next[k]) {
       const std::uint32_t passed = cell.ends[cell.next[k] - 1].box;
       if (passed == MoverCell::kBorder) return false;
       ++counters.exchanges;
@@ -143,10 +148,11 @@ bool SortAndSweep::State::passInward(MoverId id) {
 /// Moves on where the reach has grown; false if it has left its cell.
 bool SortAndSweep::State::passOutward(MoverId id) {
   Mover& mover = movers[id];
+  const HalfAxes& reach = reaches[id];
   MoverCell& cell = mover.cell;
-  for (unsigned bits = 0x3f & ~beyond(mover.high, mover.reach); bits != 0; bits &= bits - 1) {
+  for (unsigned bits = 0x3f & ~beyond(mover.high, reach); bits != 0; bits &= bits - 1) {
     const auto k = static_cast<std::size_t>(std::countr_zero(bits));
-    for (; cell.endBeyond(k) <= mover.reach[k]; ++cell.next[k]) {
+    for (; cell.endBeyond(k) <= reach[k]; ++cell.next[k]) {
       const std::uint32_t passed = cell.ends[cell.next[k]].box;
       if (passed == MoverCell::kBorder) return false;
       ++counters.exchanges;
@@ -159,9 +165,15 @@ bool SortAndSweep::State::passOutward(MoverId id) {
   return true;
 }
 
-/// All that ends is ended before anything begins, so that a pair is told once at most.
-void SortAndSweep::State::updateStill(MoverId id) {
-  if (!passInward(id) || !passOutward(id)) layCell(id);
+/// Of each mover all that ends is ended before anything begins, so that a pair is told once at
+/// most.
+void SortAndSweep::State::updateStill() {
+  for (std::size_t k = 0; k < moved.size(); ++k) {
+    if (k + kAskedAhead < moved.size()) movers[moved[k + kAskedAhead]].cell.prefetch();
+    const MoverId id = moved[k];
+    if (movers[id].presence != Presence::live) continue;
+    if (!passInward(id) || !passOutward(id)) layCell(id);
+  }
 }
 
 // ---- still boxes that come and go --------------------------------------------------------------
