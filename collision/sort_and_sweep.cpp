@@ -233,7 +233,6 @@ void SortAndSweep::update() {
   for (const MoverId id : s.fresh) s.layCell(id);
   s.visitMovers();
   s.updateMoving();
-  for (const MoverId id : s.moved) s.movers[id].moved = false;
   for (const MoverId id : s.stirred) s.isStirred[id] = 0;
   for (const MoverId id : s.relaid) s.movers[id].relaid = false;
   for (const MoverId id : s.fresh) s.movers[id].presence = Presence::live;

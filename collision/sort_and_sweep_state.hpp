@@ -90,8 +90,9 @@ struct SortAndSweep::State {
 
   // Movers against still boxes: sort_and_sweep_still.cpp.
   void updateStill();
-  bool passInward(MoverId id);
-  bool passOutward(MoverId id);
+  void passEnds(MoverId id);
+  bool passInward(MoverId id, std::size_t k);
+  bool passOutward(MoverId id, std::size_t k);
   void setBorders(MoverId id);
   HalfAxes rateOf(MoverId id) const;
   void layCell(MoverId id);

@@ -125,54 +125,62 @@ void SortAndSweep::State::visitMovers() {
 
 // ---- from tick to tick -------------------------------------------------------------------------
 
-/// Moves on where the reach has shrunk; false if it has left its cell.
-bool SortAndSweep::State::passInward(MoverId id) {
+/// Moves on where the reach has shrunk, past an end at least; false if it has left its cell.
+bool SortAndSweep::State::passInward(MoverId id, std::size_t k) {
   Mover& mover = movers[id];
-  const HalfAxes& reach = reaches[id];
   MoverCell& cell = mover.cell;
-  for (unsigned bits = beyond(mover.low, reach); bits != 0; bits &= bits - 1) {
-    const auto k = static_cast<std::size_t>(std::countr_zero(bits));
-    for (; cell.endBefore(k) > reach[k]; --cell.next[k]) {
-      const std::uint32_t passed = cell.ends[cell.next[k] - 1].box;
-      if (passed == MoverCell::kBorder) return false;
-      ++counters.exchanges;
-      MoverCell::StillBox& box = cell.boxes[passed];
-      if (box.apart == 0) endStill(id, box.id);
-      box.apart = static_cast<std::uint8_t>(box.apart | 1u << k);
-    }
-    guard(mover, k);
-  }
+  const double reach = reaches[id][k];
+  do {
+    const std::uint32_t passed = cell.ends[cell.next[k] - 1].box;
+    if (passed == MoverCell::kBorder) return false;
+    ++counters.exchanges;
+    MoverCell::StillBox& box = cell.boxes[passed];
+    if (box.apart == 0) endStill(id, box.id);
+    box.apart = static_cast<std::uint8_t>(box.apart | 1u << k);
+    --cell.next[k];
+  } while (cell.endBefore(k) > reach);
+  guard(mover, k);
   return true;
 }
 
-/// Moves on where the reach has grown; false if it has left its cell.
-bool SortAndSweep::State::passOutward(MoverId id) {
+/// Moves on where the reach has grown, past an end at least; false if it has left its cell.
+bool SortAndSweep::State::passOutward(MoverId id, std::size_t k) {
   Mover& mover = movers[id];
-  const HalfAxes& reach = reaches[id];
   MoverCell& cell = mover.cell;
-  for (unsigned bits = 0x3f & ~beyond(mover.high, reach); bits != 0; bits &= bits - 1) {
-    const auto k = static_cast<std::size_t>(std::countr_zero(bits));
-    for (; cell.endBeyond(k) <= reach[k]; ++cell.next[k]) {
-      const std::uint32_t passed = cell.ends[cell.next[k]].box;
-      if (passed == MoverCell::kBorder) return false;
-      ++counters.exchanges;
-      MoverCell::StillBox& box = cell.boxes[passed];
-      box.apart = static_cast<std::uint8_t>(box.apart & ~(1u << k));
-      if (box.apart == 0) beginStill(id, box.id);
-    }
-    guard(mover, k);
-  }
+  const double reach = reaches[id][k];
+  do {
+    const std::uint32_t passed = cell.ends[cell.next[k]].box;
+    if (passed == MoverCell::kBorder) return false;
+    ++counters.exchanges;
+    MoverCell::StillBox& box = cell.boxes[passed];
+    box.apart = static_cast<std::uint8_t>(box.apart & ~(1u << k));
+    if (box.apart == 0) beginStill(id, box.id);
+    ++cell.next[k];
+  } while (cell.endBeyond(k) <= reach);
+  guard(mover, k);
   return true;
 }
 
-/// Of each mover all that ends is ended before anything begins, so that a pair is told once at
-/// most.
+/// All that ends is ended before anything begins, so that a pair is told once at most.
+void SortAndSweep::State::passEnds(MoverId id) {
+  const Mover& mover = movers[id];
+  const unsigned inward = beyond(mover.low, reaches[id]);
+  const unsigned outward = 0x3f & ~beyond(mover.high, reaches[id]);
+  for (unsigned bits = inward | outward << 6; bits != 0; bits &= bits - 1) {
+    const auto k = static_cast<std::size_t>(std::countr_zero(bits));
+    if (!(k < 6 ? passInward(id, k) : passOutward(id, k - 6))) {
+      layCell(id);
+      return;
+    }
+  }
+}
+
 void SortAndSweep::State::updateStill() {
   for (std::size_t k = 0; k < moved.size(); ++k) {
     if (k + kAskedAhead < moved.size()) movers[moved[k + kAskedAhead]].cell.prefetch();
-    const MoverId id = moved[k];
-    if (movers[id].presence != Presence::live) continue;
-    if (!passInward(id) || !passOutward(id)) layCell(id);
+    Mover& mover = movers[moved[k]];
+    mover.moved = false;
+    if (mover.presence == Presence::live) passEnds(moved[k]);
   }
 }
 
