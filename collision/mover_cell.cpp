@@ -4,7 +4,6 @@
 #include "collision/mover_cell.hpp"
 
 #include <algorithm>
-#include <bit>
 
 namespace enfilade::collision {
 namespace {
@@ -58,7 +57,7 @@ void MoverCell::lay(const StillCells& still, std::span<const StillCells::Row> ro
   fit(boxes, rows.size());
   if (met.size() < rows.size()) met.resize(rows.size());
   std::size_t metCount = 0;
-  std::size_t endCount = 12 + rows.size();  // borders, and what pickEnds() writes past its list
+  const std::size_t endCount = 12 + 7 * rows.size();  // borders, and what pickEnds() writes past them
   unsigned endingOnes = 0;
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const HalfAxes& onset = still.onset(rows[r]);
@@ -68,7 +67,6 @@ void MoverCell::lay(const StillCells& still, std::span<const StillCells::Row> ro
     met[metCount] = id;
     metCount += apart == 0 ? 1 : 0;
     endingOnes |= ending;
-    endCount += static_cast<std::size_t>(std::popcount(ending));
   }
   fit(ends, endCount);
   met.resize(metCount);

@@ -81,8 +81,9 @@ void SortAndSweep::State::setBorders(MoverId id) {
       const double course = kHorizon * mover.rate[k];
       const double ahead = std::min(slack + std::max(course, 0.0), most);
       const double behind = std::min(slack - std::min(course, 0.0), most);
-      const double beyondReach = std::nextafter(reach[k], kLargest);  // lest ahead is lost
-      mover.cell.farthest[k] = std::min(std::max(reach[k] + ahead, beyondReach), kLargest);
+      double farthest = reach[k] + ahead;
+      if (!(farthest > reach[k])) farthest = std::nextafter(reach[k], kLargest);
+      mover.cell.farthest[k] = std::min(farthest, kLargest);
       mover.cell.nearest[k] = std::max(reach[k] - behind, -kLargest);
     }
   }
