@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -84,6 +85,38 @@ TEST(SortAndSweep, EqualsBruteForceForBodiesThatGrowAndShrink) {
   }
   EXPECT_GT(scene.begins, 2500u);
   EXPECT_GT(scene.movingBegins, 200u);
+}
+
+TEST(SortAndSweep, AMoverThatGoesRoundAnotherMeetsItOnEachSideAndIsTestedAtTheCornersAlone) {
+  // Unit boxes; one goes round the other on squares that miss it by a step, touch it, and cut it.
+  constexpr double kStep = 1.0 / 16;  // exact in doubles: what touches touches
+  const Vec3 middle(3, 7, -5);
+  Watched scene({});
+  std::array<MoverId, 2> ids;
+  for (MoverId& id : ids) id = scene.insert(boxAt(middle, Vec3::Ones()));
+  std::size_t quiet = 0, tested = 0;
+  for (const MoverId goes : ids) {
+    for (int around = 0; around < 3; ++around) {
+      for (const int radius : {17, 16, 17, 15, 17}) {
+        for (int k = 0; k < 8 * radius; ++k) {
+          const int side = k / (2 * radius), along = k % (2 * radius) - radius;
+          const double u = kStep * (side % 2 == 0 ? along : radius) * (side < 2 ? 1 : -1);
+          const double v = kStep * (side % 2 == 0 ? -radius : along) * (side < 2 ? 1 : -1);
+          Vec3 corner = middle;
+          corner[around] += u;
+          corner[(around + 1) % 3] += v;
+          scene.move(goes, boxAt(corner, Vec3::Ones()));
+          ASSERT_NO_FATAL_FAILURE(scene.updateAndCheck()) << "radius " << radius << ", step " << k;
+          if (radius < 17 || scene.sweep().counters().cellsLaid > 0) continue;
+          (scene.sweep().counters().boxTests == 0 ? quiet : tested) += 1;
+        }
+      }
+      scene.move(goes, boxAt(middle, Vec3::Ones()));
+    }
+  }
+  EXPECT_EQ(scene.movingBegins, 12u);
+  EXPECT_GT(quiet, 20 * tested);
+  EXPECT_GT(tested, 12u);
 }
 
 TEST(SortAndSweep, EqualsBruteForceWhenMoversComeGoAndJump) {
