@@ -308,6 +308,7 @@ ReceivedFrame Client::frame(const v1::FrameRequest& frameRequest) {
 v1::RayReply Client::rays(const v1::RayQuery& query, ReceivedScan* scan) {
   v1::ClientMessage message;
   *message.mutable_rays() = query;
+  message.mutable_rays()->clear_packed();  // hits are what the caller gets
   std::vector<std::uint8_t> bytes;
   v1::ServerMessage reply = request(std::move(message), &bytes);
   expectBody(reply, v1::ServerMessage::kRays, "RayReply");

@@ -58,7 +58,8 @@ void Connection::connect(const std::string& host, std::uint16_t port) {
   addrinfo* list = nullptr;
   const int unknown = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &list);
   if (unknown != 0) {
-    return breakOff("cannot connect to " + peer_ + ": " + ::gai_strerror(unknown) + kRemedy);
+    return breakOff("cannot connect to " + peer_ + ": " + ::gai_strerror(unknown) +
+                    "; give a name that this machine can look up, or an address in numbers");
   }
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses(list, &::freeaddrinfo);
   for (const addrinfo* one = list; one; one = one->ai_next) {
@@ -161,9 +162,10 @@ void Connection::endOfStream() {
                     " closed the connection before it answered; is that an Enfilade server?");
   }
   breakOff(peer_ + (decoder_.betweenMessages()
-                        ? " closed the connection; its log says why"
+                        ? " closed the connection without a word: it was ended, or cut this client "
+                          "off; its log may say why"
                         : " closed the connection in the middle of a message (byte " +
-                              std::to_string(decoder_.offset()) + "); its log says why"));
+                              std::to_string(decoder_.offset()) + "); was it killed?"));
 }
 
 void Connection::advance() {

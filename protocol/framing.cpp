@@ -147,8 +147,15 @@ bool parse(std::span<const std::uint8_t> header, google::protobuf::MessageLite& 
 
 std::vector<std::uint8_t> encode(const google::protobuf::MessageLite& header,
                                  std::span<const std::uint8_t> attachment) {
+  std::vector<std::uint8_t> bytes = encodeHead(header, attachment.size());
+  bytes.insert(bytes.end(), attachment.begin(), attachment.end());
+  return bytes;
+}
+
+std::vector<std::uint8_t> encodeHead(const google::protobuf::MessageLite& header,
+                                     std::size_t attachmentLength) {
   const std::size_t headerLength = header.ByteSizeLong();
-  const std::size_t total = kLengthBytes + headerLength + attachment.size();
+  const std::size_t total = kLengthBytes + headerLength + attachmentLength;
   // Protobuf itself ends at 2 GiB.
   if (headerLength > std::numeric_limits<std::int32_t>::max() ||
       total > std::numeric_limits<std::uint32_t>::max()) {
@@ -156,12 +163,11 @@ std::vector<std::uint8_t> encode(const google::protobuf::MessageLite& header,
                             " bytes does not fit into its length field");
   }
   std::vector<std::uint8_t> bytes;
-  bytes.reserve(kLengthBytes + total);
+  bytes.reserve(2 * kLengthBytes + headerLength);
   appendLittleEndian(bytes, static_cast<std::uint32_t>(total));
   appendLittleEndian(bytes, static_cast<std::uint32_t>(headerLength));
   bytes.resize(2 * kLengthBytes + headerLength);
   header.SerializeWithCachedSizesToArray(bytes.data() + 2 * kLengthBytes);
-  bytes.insert(bytes.end(), attachment.begin(), attachment.end());
   return bytes;
 }
 

@@ -94,6 +94,9 @@ class Decoder {
 /// fit into `total`.
 std::vector<std::uint8_t> encode(const google::protobuf::MessageLite& header,
                                  std::span<const std::uint8_t> attachment = {});
+/// The same without the attachment, whose bytes go out behind it.
+std::vector<std::uint8_t> encodeHead(const google::protobuf::MessageLite& header,
+                                     std::size_t attachmentLength);
 
 /// Reads a message's header; false when it is none. Unlike ParseFromArray() it writes nothing to
 /// stderr, which a hostile peer could fill.

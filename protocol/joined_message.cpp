@@ -20,27 +20,26 @@ void appendLittleEndian(std::vector<std::uint8_t>& bytes, std::uint64_t value) {
 
 }  // namespace
 
-std::vector<std::uint8_t> encodeJoined(std::uint32_t field, std::string_view first,
-                                       std::string_view second) {
+std::vector<std::uint8_t> encodeHeadOfJoined(std::uint32_t field, std::string_view first,
+                                             std::size_t secondLength) {
   constexpr std::size_t kLength = 4;             // bytes of framing, twice: see framing.hpp
   constexpr std::uint32_t kLengthDelimited = 2;  // protobuf's wire type of messages
   constexpr std::size_t kMostOfHead = 20;        // bytes: tag and length
   std::vector<std::uint8_t> head;
   head.reserve(kMostOfHead);
   appendVarint(head, field << 3 | kLengthDelimited);
-  appendVarint(head, first.size() + second.size());
-  const std::size_t headerLength = head.size() + first.size() + second.size();
+  appendVarint(head, first.size() + secondLength);
+  const std::size_t headerLength = head.size() + first.size() + secondLength;
   if (headerLength > std::numeric_limits<std::int32_t>::max()) {
     throw std::length_error("a message of " + std::to_string(headerLength) +
                             " bytes is more than protobuf takes");
   }
   std::vector<std::uint8_t> bytes;
-  bytes.reserve(2 * kLength + headerLength);
+  bytes.reserve(2 * kLength + head.size() + first.size());
   appendLittleEndian(bytes, static_cast<std::uint32_t>(kLength + headerLength));
   appendLittleEndian(bytes, static_cast<std::uint32_t>(headerLength));
   bytes.insert(bytes.end(), head.begin(), head.end());
   bytes.insert(bytes.end(), first.begin(), first.end());
-  bytes.insert(bytes.end(), second.begin(), second.end());
   return bytes;
 }
 

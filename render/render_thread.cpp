@@ -14,7 +14,8 @@ struct RenderThread::State {
     Camera camera;
     FrameOptions options;
     RendererKind kind;
-    std::promise<Frame> done;
+    std::promise<Frame> frame;
+    std::function<void(std::future<Frame>)> done;  ///< may be empty
   };
 
   std::mutex mutex;
@@ -35,6 +36,14 @@ struct RenderThread::State {
     return job;
   }
 
+  void post(Job job) {
+    {
+      const std::lock_guard lock(mutex);
+      jobs.push_back(std::move(job));
+    }
+    changed.notify_one();
+  }
+
   void run(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device, RendererKind kind,
            std::promise<void> started) {
     std::unique_ptr<Renderer> renderer;
@@ -51,10 +60,12 @@ struct RenderThread::State {
     while (auto job = nextJob()) {
       try {
         if (!job->snapshot) throw RenderError("RenderThread::render: there is no snapshot");
-        job->done.set_value(renderer->render(*job->snapshot, job->camera, job->options, job->kind));
+        job->frame.set_value(
+            renderer->render(*job->snapshot, job->camera, job->options, job->kind));
       } catch (...) {
-        job->done.set_exception(std::current_exception());
+        job->frame.set_exception(std::current_exception());
       }
+      if (job->done) job->done(job->frame.get_future());
     }
   }
 };
@@ -85,14 +96,16 @@ RenderThread::~RenderThread() {
 
 std::future<Frame> RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot,
                                         Camera camera, FrameOptions options, RendererKind kind) {
-  State::Job job{std::move(snapshot), std::move(camera), options, kind, {}};
-  std::future<Frame> frame = job.done.get_future();
-  {
-    const std::lock_guard lock(state_->mutex);
-    state_->jobs.push_back(std::move(job));
-  }
-  state_->changed.notify_one();
+  State::Job job{std::move(snapshot), std::move(camera), options, kind, {}, {}};
+  std::future<Frame> frame = job.frame.get_future();
+  state_->post(std::move(job));
   return frame;
+}
+
+void RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera,
+                          FrameOptions options, RendererKind kind,
+                          std::function<void(std::future<Frame>)> done) {
+  state_->post({std::move(snapshot), std::move(camera), options, kind, {}, std::move(done)});
 }
 
 const std::string& RenderThread::deviceName() const {

@@ -1,6 +1,7 @@
 // One thread that owns the renderers and draws what is asked, in order.
 #pragma once
 
+#include <functional>
 #include <future>
 #include <memory>
 
@@ -20,6 +21,10 @@ class RenderThread {
   /// The frame, or the RenderError, comes through the future. Callable from any thread.
   std::future<Frame> render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera,
                             FrameOptions options = {}, RendererKind kind = RendererKind::automatic);
+  /// As render(), but the future is given when it is ready, on this object's thread, so that nobody
+  /// has to be woken. `done` must not throw.
+  void render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera, FrameOptions options,
+              RendererKind kind, std::function<void(std::future<Frame>)> done);
   const std::string& deviceName() const;
   bool software() const;
   const std::string& deviceNote() const;  ///< these three as Renderer's

@@ -52,8 +52,9 @@ struct RangeScan {
 std::optional<std::string> refusal(const Ray& ray);
 std::optional<std::string> refusal(const RangeScan& scan);
 
-/// Row by row from above, each from left to right. Angles are measured about `up` and from the
-/// plane square to it, so a row is a cone; directions have unit length.
+/// Row by row from above, each from left to right. Angles are measured about what of `up` is square
+/// to `forward`, and from the plane square to that, so a row is a cone; directions have unit
+/// length.
 std::vector<Ray> raysOf(const RangeScan& scan);
 
 /// The still scene, built at construction (meshes stored once), and what moves, as of a snapshot.

@@ -166,18 +166,23 @@ std::optional<v1::Error> encodingProblem(const v1::FrameRequest& request) {
       "rgb_encoding");
 }
 
+/// Of raw pixels.
+std::uint64_t bytesPerPixel(const v1::FrameRequest& request) {
+  std::uint64_t bytes = request.channels().empty() ? 3 : 0;
+  for (const int channel : request.channels()) {
+    if (channel == v1::CHANNEL_NORMALS)
+      bytes += 12;
+    else
+      bytes += channel == v1::CHANNEL_RGB ? 3 : 4;
+  }
+  return bytes;
+}
+
 /// Pixels that no client of ours takes in one message are refused before they are drawn.
 std::optional<v1::Error> sizeProblem(const v1::FrameRequest& request) {
   constexpr std::uint64_t kRoomForTheMessage = 65536;
-  std::uint64_t bytesPerPixel = request.channels().empty() ? 3 : 0;
-  for (const int channel : request.channels()) {
-    if (channel == v1::CHANNEL_NORMALS)
-      bytesPerPixel += 12;
-    else
-      bytesPerPixel += channel == v1::CHANNEL_RGB ? 3 : 4;
-  }
   const std::uint64_t most = protocol::kClientTakes.total - kRoomForTheMessage;
-  const std::uint64_t bytes = bytesPerPixel * request.width() * request.height();
+  const std::uint64_t bytes = bytesPerPixel(request) * request.width() * request.height();
   if (bytes <= most) return std::nullopt;
   return errorOf(v1::ERROR_TOO_LARGE,
                  "channels: these take " + std::to_string(bytes) + " bytes of pixels, at most " +
@@ -240,6 +245,8 @@ v1::Frame messageOf(const render::Frame& frame, double time, const v1::FrameRequ
     intrinsics.set_cy(pinhole.cy);
   }
   message.set_glass(request.glass() == v1::GLASS_SOLID ? v1::GLASS_SOLID : v1::GLASS_CLEAR);
+  attachment.reserve(attachment.size() +
+                     bytesPerPixel(request) * message.width() * message.height());
   for (const int channel : request.channels()) {
     addPlane(message, attachment, frame, static_cast<v1::Channel>(channel), request.rgb_encoding());
   }

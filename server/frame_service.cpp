@@ -13,10 +13,10 @@ namespace {
 struct Drawing {
   FrameJob job;
   std::future<render::Frame> frame;
-  std::function<void(Buffer)> done;
+  std::function<void(Encoded)> done;
 };
 
-Buffer frameReply(Drawing& drawing) {
+Encoded frameReply(Drawing& drawing) {
   const render::Frame frame = drawing.frame.get();
   std::vector<std::uint8_t> attachment;
   v1::ServerMessage reply;
@@ -26,25 +26,24 @@ Buffer frameReply(Drawing& drawing) {
   reply.mutable_frame()->set_watch(drawing.job.watch);
   reply.mutable_frame()->set_dropped(drawing.job.dropped);
   if (drawing.job.seen) drawing.job.seen(reply.frame(), attachment);
-  return encodeShared(reply, attachment);
+  return encodeShared(reply, std::move(attachment));
 }
 
 }  // namespace
 
 struct FrameService::State {
-  std::unique_ptr<render::RenderThread> renderer;
   std::string deviceName, whyNone;
   bool software = false;
+  std::atomic<int> toEncode = 0;  ///< pictures whose reply is made, or will be, by `thread`
   WorkThread thread;
-
-  Buffer reply(Drawing& drawing);
+  std::unique_ptr<render::RenderThread> renderer;  // first to go: it may still call back
 };
 
-Buffer FrameService::State::reply(Drawing& drawing) {
+namespace {
+
+Encoded replyTo(Drawing& drawing) {
   try {
-    if (!renderer)
-      return errorReply(drawing.job.requestId, errorOf(v1::ERROR_NO_RENDERER, whyNone));
-    Buffer whole = frameReply(drawing);
+    Encoded whole = frameReply(drawing);
     if (drawing.job.drawn) ++*drawing.job.drawn;
     return whole;
   } catch (const render::NoRenderer& error) {
@@ -55,6 +54,17 @@ Buffer FrameService::State::reply(Drawing& drawing) {
     return errorReply(drawing.job.requestId, errorOf(v1::ERROR_INTERNAL, error.what()));
   }
 }
+
+/// The reply is no more work than copying a few pixels.
+bool isReadyAsDrawn(const FrameJob& job) {
+  constexpr std::uint64_t kFewPixels = 512 * 512;
+  if (std::uint64_t{job.request.width()} * job.request.height() > kFewPixels) return false;
+  const bool raw = job.request.rgb_encoding() != v1::ENCODING_PNG &&
+                   job.request.rgb_encoding() != v1::ENCODING_JPEG;
+  return raw && !job.seen;
+}
+
+}  // namespace
 
 FrameService::FrameService(std::shared_ptr<const scene::Scene> scene, const DrawingOptions& drawing)
     : state_(std::make_unique<State>()) {
@@ -79,6 +89,7 @@ FrameService::~FrameService() {
 
 void FrameService::finish() {
   state_->thread.finish();
+  state_->renderer.reset();
 }
 
 const std::string& FrameService::deviceName() const {
@@ -91,14 +102,33 @@ const std::string& FrameService::whyNone() const {
   return state_->whyNone;
 }
 
-void FrameService::draw(FrameJob job, std::function<void(Buffer)> done) {
+/// What is ready as it is drawn is handed over by the thread that drew it, and the next picture
+/// waits for the copy; what has to be encoded goes to another thread. What waits there is not
+/// overtaken.
+void FrameService::draw(FrameJob job, std::function<void(Encoded)> done) {
+  State& state = *state_;
   const auto drawing = std::make_shared<Drawing>(Drawing{std::move(job), {}, std::move(done)});
-  if (state_->renderer) {
-    const View& view = drawing->job.view;
-    drawing->frame =
-        state_->renderer->render(drawing->job.snapshot, view.camera, view.options, view.renderer);
+  if (!state.renderer) {
+    return state.thread.post([&state, drawing] {
+      drawing->done(
+          errorReply(drawing->job.requestId, errorOf(v1::ERROR_NO_RENDERER, state.whyNone)));
+    });
   }
-  state_->thread.post([state = state_.get(), drawing] { drawing->done(state->reply(*drawing)); });
+  const View& view = drawing->job.view;
+  if (isReadyAsDrawn(drawing->job) && state.toEncode == 0) {
+    return state.renderer->render(drawing->job.snapshot, view.camera, view.options, view.renderer,
+                                  [drawing](std::future<render::Frame> frame) {
+                                    drawing->frame = std::move(frame);
+                                    drawing->done(replyTo(*drawing));
+                                  });
+  }
+  ++state.toEncode;
+  drawing->frame =
+      state.renderer->render(drawing->job.snapshot, view.camera, view.options, view.renderer);
+  state.thread.post([&state, drawing] {
+    drawing->done(replyTo(*drawing));
+    --state.toEncode;
+  });
 }
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// Pictures for clients: the render thread draws, a second thread turns frames into replies, so that
+// Pictures for clients: the render thread draws, a second thread encodes what has to be, so that
 // neither the tick nor a socket ever waits for a picture.
 #pragma once
 
@@ -39,9 +39,9 @@ class FrameService {
   bool software() const;
   const std::string& whyNone() const;  ///< "" with a renderer
 
-  /// `done` gets the whole reply (a Frame or an Error) on the service's thread, in the order of the
-  /// calls.
-  void draw(FrameJob job, std::function<void(Buffer)> done);
+  /// `done` gets the whole reply (a Frame or an Error), in the order of the calls of one thread, on
+  /// a thread of the service's. It must not throw.
+  void draw(FrameJob job, std::function<void(Encoded)> done);
   /// Waits for what was asked; nothing may be asked afterwards.
   void finish();
 

@@ -24,7 +24,7 @@ void deliver(ServedWorld& served, ClientId id, std::uint32_t number, std::uint64
     if (std::exchange(watch->second.elsewhere, false))
       drawNext(then, id, client->second, number, watch->second);
   };
-  served.frames.draw(std::move(job), [out, number, drawn, post = served.post](Buffer picture) {
+  served.frames.draw(std::move(job), [out, number, drawn, post = served.post](Encoded picture) {
     post(drawn);
     out->pushLatest(std::move(picture), number);
   });
@@ -124,7 +124,7 @@ void drawRecorded(ServedWorld& served) {
     job.request = request;
     job.drawn = served.drawn;
     job.seen = toRecording(served, request);
-    served.frames.draw(std::move(job), [name = avatar.name, post = served.post](Buffer) {
+    served.frames.draw(std::move(job), [name = avatar.name, post = served.post](const Encoded&) {
       post([name](ServedWorld& then) { then.recordedViews.erase(name); });
     });
   }

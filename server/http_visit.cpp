@@ -182,8 +182,12 @@ void HttpVisit::hear(Ear& ear) {
     if (!next.message) return;
     ear.ended = next.last;
     protocol::Decoder decoder(protocol::kClientTakes, protocol::Decoder::Expect::messages);
-    std::span<const std::uint8_t> bytes(*next.message);
+    std::span<const std::uint8_t> bytes(*next.message.head);
     auto framed = decoder.next(bytes);
+    if (!framed && next.message.rest) {
+      bytes = *next.message.rest;
+      framed = decoder.next(bytes);
+    }
     v1::ServerMessage message;
     if (framed && protocol::parse(framed->header, message))
       take(ear, std::move(message), std::move(framed->attachment));

@@ -89,7 +89,8 @@ void Listener::take(tcp::socket socket) {
   arrival->start();
   enlist(reception_, arrival);
   if (reception_.connections.size() > reception_.limits.connections && !makeRoom(*arrival))
-    arrival->end(v1::ERROR_NOT_ALLOWED, "the server has all the clients it takes");
+    arrival->end(v1::ERROR_NOT_ALLOWED,
+                 "the server has all the clients it takes: come again when one has left");
 }
 
 /// The one who came first of those who have not said who they are gives way: silence must not keep

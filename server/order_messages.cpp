@@ -7,8 +7,8 @@ namespace {
 
 using OrderOrError = std::variant<scene::Order, v1::Error>;
 
-OrderOrError missing(const std::string& field) {
-  return errorOf(v1::ERROR_BAD_MESSAGE, field + " is missing: give a point", field);
+OrderOrError missing(const std::string& field, const char* what = "a point") {
+  return errorOf(v1::ERROR_BAD_MESSAGE, field + " is missing: give " + what, field);
 }
 
 /// The corners of a box that is inside out, or has a NaN, are the world's to refuse.
@@ -54,7 +54,8 @@ OrderOrError orderFrom(const v1::Spawn& message) {
   for (const v1::ConvexPart& part : message.parts()) spawn.parts.push_back(pointsFrom(part));
   for (const v1::Link& link : message.links()) {
     const std::string field = "spawn.links[" + std::to_string(spawn.links.size()) + "]";
-    if (!link.has_joint() || !link.joint().has_axis()) return missing(field + ".joint.axis");
+    if (!link.has_joint() || !link.joint().has_axis())
+      return missing(field + ".joint.axis", "a direction");
     if (!v1::Joint::Kind_IsValid(link.joint().kind())) {
       return errorOf(v1::ERROR_BAD_MESSAGE,
                      "kind: give revolute or prismatic, not " + std::to_string(link.joint().kind()),
@@ -116,7 +117,8 @@ OrderOrError orderFrom(const v1::Command& message) {
     case v1::Command::kLeave:
       return scene::Order(scene::Leave{});
     case v1::Command::kDrive:
-      if (!message.drive().has_velocity()) return missing("drive.velocity");
+      if (!message.drive().has_velocity())
+        return missing("drive.velocity", "metres per second along x, y and z");
       return scene::Order(scene::Drive{vectorFrom(message.drive().velocity())});
     case v1::Command::kJump:
       return orderFrom(message.jump());

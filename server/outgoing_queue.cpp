@@ -4,28 +4,34 @@
 
 namespace enfilade::server {
 
-Buffer encodeShared(const google::protobuf::MessageLite& message,
-                    std::span<const std::uint8_t> attachment) {
-  return std::make_shared<const std::vector<std::uint8_t>>(protocol::encode(message, attachment));
+Buffer encodeShared(const google::protobuf::MessageLite& message) {
+  return std::make_shared<const std::vector<std::uint8_t>>(protocol::encode(message));
 }
 
-OutgoingQueue::OutgoingQueue(const OutgoingBounds& bounds, Buffer tooSlow,
+Encoded encodeShared(const google::protobuf::MessageLite& message,
+                     std::vector<std::uint8_t> attachment) {
+  using Bytes = const std::vector<std::uint8_t>;
+  auto head = std::make_shared<Bytes>(protocol::encodeHead(message, attachment.size()));
+  return {std::move(head), std::make_shared<Bytes>(std::move(attachment))};
+}
+
+OutgoingQueue::OutgoingQueue(const OutgoingBounds& bounds, Encoded tooSlow,
                              std::function<void()> wake)
     : bounds_(bounds), tooSlow_(std::move(tooSlow)), wake_(std::move(wake)) {}
 
-void OutgoingQueue::push(Buffer message) {
+void OutgoingQueue::push(Encoded message) {
   append({Kind::kept, std::move(message)});
 }
 
-void OutgoingQueue::pushFrame(Buffer message) {
+void OutgoingQueue::pushFrame(Encoded message) {
   append({Kind::frame, std::move(message)});
 }
 
-void OutgoingQueue::pushLatest(Buffer message, std::uint32_t which) {
+void OutgoingQueue::pushLatest(Encoded message, std::uint32_t which) {
   append({Kind::latest, std::move(message), which});
 }
 
-void OutgoingQueue::finish(Buffer last) {
+void OutgoingQueue::finish(Encoded last) {
   append({Kind::last, std::move(last)});
 }
 
@@ -33,10 +39,10 @@ void OutgoingQueue::append(Item item) {
   {
     const std::lock_guard lock(mutex_);
     if (finished_) return;
-    if (item.kind == Kind::kept) bytes_ += item.message->size();
+    if (item.kind == Kind::kept) bytes_ += item.message.size();
     if (item.kind == Kind::frame) {
       ++frames_;
-      frameBytes_ += item.message->size();
+      frameBytes_ += item.message.size();
     }
     finished_ = item.kind == Kind::last;
     items_.push_back(std::move(item));
@@ -62,10 +68,10 @@ OutgoingQueue::Next OutgoingQueue::pop() {
   if (items_.empty()) return {};
   Item item = std::move(items_.front());
   items_.pop_front();
-  if (item.kind == Kind::kept) bytes_ -= item.message->size();
+  if (item.kind == Kind::kept) bytes_ -= item.message.size();
   if (item.kind == Kind::frame) {
     --frames_;
-    frameBytes_ -= item.message->size();
+    frameBytes_ -= item.message.size();
   }
   return {std::move(item.message), item.kind == Kind::last};
 }

@@ -9,7 +9,7 @@
 #include <limits>
 #include <memory>
 #include <mutex>
-#include <span>
+#include <utility>
 #include <vector>
 
 namespace google::protobuf {
@@ -18,11 +18,24 @@ class MessageLite;
 
 namespace enfilade::server {
 
-/// One encoded message, shared by all who receive it.
 using Buffer = std::shared_ptr<const std::vector<std::uint8_t>>;
 
-Buffer encodeShared(const google::protobuf::MessageLite& message,
-                    std::span<const std::uint8_t> attachment = {});
+/// One encoded message in two pieces, so that neither pixels nor what hundreds receive are copied
+/// for each of them. Both are shared by all who receive them.
+struct Encoded {
+  Encoded() = default;
+  Encoded(Buffer whole) : head(std::move(whole)) {}
+  Encoded(Buffer first, Buffer second) : head(std::move(first)), rest(std::move(second)) {}
+
+  Buffer head;  ///< null: no message
+  Buffer rest;  ///< may be null
+  std::size_t size() const { return (head ? head->size() : 0) + (rest ? rest->size() : 0); }
+  explicit operator bool() const { return head != nullptr; }
+};
+
+Buffer encodeShared(const google::protobuf::MessageLite& message);
+Encoded encodeShared(const google::protobuf::MessageLite& message,
+                     std::vector<std::uint8_t> attachment);
 
 struct OutgoingBounds {
   std::size_t bytes = 0;   ///< of unsent replies and events, pictures not counted
@@ -34,19 +47,19 @@ class OutgoingQueue {
  public:
   /// `tooSlow` are the last words above the bounds. `wake` is called, without the lock, whenever
   /// there is something to send.
-  OutgoingQueue(const OutgoingBounds& bounds, Buffer tooSlow, std::function<void()> wake);
+  OutgoingQueue(const OutgoingBounds& bounds, Encoded tooSlow, std::function<void()> wake);
 
-  void push(Buffer message);
-  void pushFrame(Buffer message);
+  void push(Encoded message);
+  void pushFrame(Encoded message);
   /// What is latest-only has a number that tells which of them it is.
-  void pushLatest(Buffer message, std::uint32_t which = 0);
+  void pushLatest(Encoded message, std::uint32_t which = 0);
   /// Drops the unsent latest-only message of this number; true when there was one.
   bool dropLatest(std::uint32_t which = 0);
   /// Sends what is queued, then `last`, then the connection closes. Later pushes are dropped.
-  void finish(Buffer last);
+  void finish(Encoded last);
 
   struct Next {
-    Buffer message;     ///< null: nothing to send
+    Encoded message;    ///< none: nothing to send
     bool last = false;  ///< close after this one
   };
   Next pop();
@@ -58,13 +71,13 @@ class OutgoingQueue {
   enum class Kind : std::uint8_t { kept, frame, latest, last };
   struct Item {
     Kind kind;
-    Buffer message;
+    Encoded message;
     std::uint32_t which = 0;  ///< of what is latest-only
   };
   void append(Item item);
 
   const OutgoingBounds bounds_;
-  const Buffer tooSlow_;
+  const Encoded tooSlow_;
   const std::function<void()> wake_;
   mutable std::mutex mutex_;
   std::deque<Item> items_;

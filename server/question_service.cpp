@@ -25,8 +25,8 @@ struct QuestionService::State {
   scene::SceneThen then(const Question& question);
   std::variant<v1::RayReply, v1::Error> rays(const Question& question,
                                              std::vector<std::uint8_t>& attachment);
-  Buffer answer(const Question& question);
-  Buffer answerOrSayWhyNot(const Question& question);
+  Encoded answer(const Question& question);
+  Encoded answerOrSayWhyNot(const Question& question);
 };
 
 const scene::RayCaster& QuestionService::State::casterAt(
@@ -72,7 +72,7 @@ void put(v1::ServerMessage& message, std::variant<Answer, v1::Error> answer,
 
 }  // namespace
 
-Buffer QuestionService::State::answer(const Question& question) {
+Encoded QuestionService::State::answer(const Question& question) {
   const v1::ClientMessage& asked = question.message;
   std::vector<std::uint8_t> attachment;
   v1::ServerMessage reply;
@@ -88,10 +88,10 @@ Buffer QuestionService::State::answer(const Question& question) {
   else
     put(reply, answerOf(asked.cannot_touch(), then(question), question.lengths),
         &v1::ServerMessage::mutable_cannot_touch);
-  return encodeShared(reply, attachment);
+  return encodeShared(reply, std::move(attachment));
 }
 
-Buffer QuestionService::State::answerOrSayWhyNot(const Question& question) {
+Encoded QuestionService::State::answerOrSayWhyNot(const Question& question) {
   try {
     return answer(question);
   } catch (const std::exception& error) {
@@ -107,7 +107,7 @@ QuestionService::~QuestionService() {
   finish();
 }
 
-void QuestionService::ask(Question question, std::function<void(Buffer)> done) {
+void QuestionService::ask(Question question, std::function<void(Encoded)> done) {
   const auto shared = std::make_shared<const Question>(std::move(question));
   state_->thread.post([state = state_.get(), shared, done = std::move(done)] {
     done(state->answerOrSayWhyNot(*shared));

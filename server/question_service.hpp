@@ -30,7 +30,7 @@ class QuestionService {
   QuestionService& operator=(const QuestionService&) = delete;
 
   /// `done` gets the whole reply (or an Error) on the service's thread, in the order of the calls.
-  void ask(Question question, std::function<void(Buffer)> done);
+  void ask(Question question, std::function<void(Encoded)> done);
   /// Waits for what was asked; nothing may be asked afterwards.
   void finish();
 

@@ -1,8 +1,10 @@
 #include "server/ray_messages.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <set>
 
 #include "server/world_messages.hpp"
 
@@ -133,6 +135,43 @@ void castScan(const AskedRays& asked, const scene::RayCaster& caster,
   std::memcpy(attachment.data() + 4 * count, entities.data(), 4 * count);
 }
 
+/// What is met, with its name.
+v1::Entity entityMet(const scene::Scene& scene, const scene::Snapshot& snapshot, std::uint32_t id) {
+  v1::Entity entity;
+  entity.set_id(id);
+  entity.set_kind(id <= scene.model().objects.size() ? v1::Entity::KIND_OBJECT
+                                                     : v1::Entity::KIND_AVATAR);
+  entity.set_name(nameOf(scene, snapshot, id));
+  return entity;
+}
+
+/// Seven numbers a ray, then entities.
+void castPacked(const AskedRays& asked, const scene::RayCaster& caster, const scene::Scene& scene,
+                const scene::Snapshot& snapshot, v1::RayReply& reply,
+                std::vector<std::uint8_t>& attachment) {
+  constexpr std::size_t kNumbers = 7;  // a ray
+  const std::size_t count = asked.rays.size();
+  std::vector<double> numbers(kNumbers * count, std::numeric_limits<double>::quiet_NaN());
+  std::vector<std::uint32_t> entities(count, 0);
+  std::set<std::uint32_t> met;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto hit = caster.firstHit(asked.rays[i], asked.filter);
+    if (!hit) continue;
+    double* const of = numbers.data() + kNumbers * i;
+    of[0] = hit->distance;
+    std::copy_n(hit->point.data(), 3, of + 1);
+    std::copy_n(hit->normal.data(), 3, of + 4);
+    entities[i] = hit->entity;
+    met.insert(hit->entity);
+  }
+  const std::size_t ofNumbers = sizeof(double) * numbers.size();
+  const std::size_t ofEntities = sizeof(std::uint32_t) * count;
+  attachment.resize(ofNumbers + ofEntities);
+  std::memcpy(attachment.data(), numbers.data(), ofNumbers);
+  std::memcpy(attachment.data() + ofNumbers, entities.data(), ofEntities);
+  for (const std::uint32_t id : met) *reply.add_met() = entityMet(scene, snapshot, id);
+}
+
 }  // namespace
 
 AskedOrError raysFrom(const v1::RayQuery& query, const scene::Snapshot& snapshot,
@@ -149,6 +188,7 @@ AskedOrError raysFrom(const v1::RayQuery& query, const scene::Snapshot& snapshot
   if (!rays) return asked;
   rays->filter.throughGlass = query.through_glass();
   rays->onlyBlocked = query.only_blocked();
+  rays->packed = query.packed() && !query.only_blocked();
   if (!query.through_avatar().empty()) {
     const scene::AvatarView* avatar = avatarNamed(snapshot, query.through_avatar());
     if (!avatar) return unknownAvatar(query.through_avatar(), "rays.through_avatar");
@@ -167,6 +207,10 @@ v1::RayReply answerOf(const AskedRays& asked, const scene::RayCaster& caster,
   reply.set_rows(asked.rows);
   if (asked.columns > 0) {
     castScan(asked, caster, attachment);
+    return reply;
+  }
+  if (asked.packed) {
+    castPacked(asked, caster, scene, snapshot, reply, attachment);
     return reply;
   }
   for (const scene::Ray& ray : asked.rays) {

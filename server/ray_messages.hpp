@@ -15,6 +15,7 @@ struct AskedRays {
   std::vector<scene::Ray> rays;
   scene::RayFilter filter;
   bool onlyBlocked = false;
+  bool packed = false;
   std::uint32_t columns = 0, rows = 0;  ///< of a scan; 0: rays one by one
 };
 
@@ -23,7 +24,8 @@ std::variant<AskedRays, v1::Error> raysFrom(const v1::RayQuery& query,
                                             const scene::Snapshot& snapshot,
                                             const ServerLimits& limits);
 
-/// Casts them, `caster` being where the snapshot is. `attachment` gets what a scan met.
+/// Casts them, `caster` being where the snapshot is. `attachment` gets what a scan or a packed
+/// query met.
 v1::RayReply answerOf(const AskedRays& asked, const scene::RayCaster& caster,
                       const scene::Scene& scene, const scene::Snapshot& snapshot,
                       std::vector<std::uint8_t>& attachment);

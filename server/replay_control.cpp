@@ -128,7 +128,8 @@ std::optional<v1::Error> takeOverProblem(const ServedWorld& served, ClientId id,
                    "no avatar '" + name + "' is in the world after this tick", "take_over.avatar");
   const auto owner = served.owners.find(name);
   if (owner == served.owners.end() || owner->second == id) return std::nullopt;
-  return errorOf(v1::ERROR_NOT_ALLOWED, "avatar '" + name + "' belongs to another client",
+  return errorOf(v1::ERROR_NOT_ALLOWED,
+                 "avatar '" + name + "' belongs to another client: take another one over",
                  "take_over.avatar");
 }
 

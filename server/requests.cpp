@@ -238,11 +238,11 @@ std::optional<v1::Error> tickGone(const Asked& asked, std::uint64_t wanted, cons
 
 /// A service works on the request: the client's later ones wait until what is returned is called,
 /// on the service's thread, with the reply, which `deliver` hands to the client's queue.
-std::function<void(Buffer)> untilAnswered(const Asked& asked, const PostToTickThread& post,
-                                          void (OutgoingQueue::*deliver)(Buffer)) {
+std::function<void(Encoded)> untilAnswered(const Asked& asked, const PostToTickThread& post,
+                                           void (OutgoingQueue::*deliver)(Encoded)) {
   const AnswerUnderWay answer{asked.message.request_id()};
   asked.client.answerUnderWay = answer;
-  return [out = asked.client.out, id = asked.id, post, deliver, answer](Buffer whole) {
+  return [out = asked.client.out, id = asked.id, post, deliver, answer](Encoded whole) {
     if (!answer.claim()) return;  // the world ended, and said so
     ((*out).*deliver)(std::move(whole));
     post([id, post](ServedWorld& then) {
@@ -460,7 +460,8 @@ void answer(const Asked& asked, const PostToTickThread& post) {
     return replyError(
         asked, errorOf(v1::ERROR_NOT_ALLOWED, std::string("this needs a token with the role ") +
                                                   nameOf(needed) + ", and yours is " +
-                                                  nameOf(asked.client.role)));
+                                                  nameOf(asked.client.role) +
+                                                  ": ask whoever runs the server for one"));
   }
   switch (message.body_case()) {
     case v1::ClientMessage::kCommand:
@@ -502,7 +503,8 @@ void answer(const Asked& asked, const PostToTickThread& post) {
     case v1::ClientMessage::kListWorlds:
       return answerList(asked);
     case v1::ClientMessage::kHello:
-      return replyError(asked, errorOf(v1::ERROR_NOT_ALLOWED, "hello was said already"));
+      return replyError(asked, errorOf(v1::ERROR_NOT_ALLOWED,
+                                       "hello was said already: connect anew to say another"));
     case v1::ClientMessage::kBye:
       return answerBye(asked);
     case v1::ClientMessage::BODY_NOT_SET:
@@ -532,6 +534,7 @@ v1::Welcome welcomeOf(const ServedWorld& served) {
   welcome.set_server_version(kServerVersion);
   welcome.add_capabilities("free_run");
   welcome.add_capabilities("rays");
+  welcome.add_capabilities("packed_rays");
   welcome.add_capabilities("pairs");
   welcome.add_capabilities("restart");
   if (!served.frames.deviceName().empty()) welcome.add_capabilities("frames");

@@ -16,14 +16,21 @@ namespace {
 /// What one tick tells. All who subscribed to the same get the same bytes, which are made when the
 /// first of them wants them: with hundreds of clients this is most of what a tick sends.
 struct TickTold {
-  const v1::TickEvents& told;                             ///< of everyone
-  std::array<std::optional<std::string>, 8> events = {};  ///< serialized; by what is subscribed
-  std::optional<std::string> state = {};                  ///< serialized
+  const v1::TickEvents& told;         ///< of everyone
+  std::array<Buffer, 8> events = {};  ///< serialized; by what is subscribed
+  Buffer state = {};                  ///< serialized
 };
 
-Buffer joined(int field, const std::string& own, const std::string& shared) {
-  return std::make_shared<const std::vector<std::uint8_t>>(
-      protocol::encodeJoined(static_cast<std::uint32_t>(field), own, shared));
+Buffer serialized(const google::protobuf::MessageLite& message) {
+  std::vector<std::uint8_t> bytes(message.ByteSizeLong());
+  message.SerializeWithCachedSizesToArray(bytes.data());
+  return std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes));
+}
+
+Encoded joined(int field, const std::string& own, const Buffer& shared) {
+  return {std::make_shared<const std::vector<std::uint8_t>>(
+              protocol::encodeHeadOfJoined(static_cast<std::uint32_t>(field), own, shared->size())),
+          shared};
 }
 
 bool wants(const v1::Subscribe& subscription, const v1::ContactEvent& event) {
@@ -32,12 +39,12 @@ bool wants(const v1::Subscribe& subscription, const v1::ContactEvent& event) {
 }
 
 /// TickEvents without its sequence; empty when nothing of what is subscribed happened.
-const std::string& eventsFor(TickTold& tick, const v1::Subscribe& subscription) {
+const Buffer& eventsFor(TickTold& tick, const v1::Subscribe& subscription) {
   const std::size_t subscribed = (subscription.contacts() ? 1u : 0u) |
                                  (subscription.near_misses() ? 2u : 0u) |
                                  (subscription.notices() ? 4u : 0u);
-  std::optional<std::string>& bytes = tick.events[subscribed];
-  if (bytes) return *bytes;
+  Buffer& bytes = tick.events[subscribed];
+  if (bytes) return bytes;
   v1::TickEvents events;
   for (const v1::ContactEvent& event : tick.told.contacts()) {
     if (wants(subscription, event)) *events.add_contacts() = event;
@@ -47,19 +54,19 @@ const std::string& eventsFor(TickTold& tick, const v1::Subscribe& subscription) 
     events.set_tick(tick.told.tick());
     events.set_time(tick.told.time());
   }
-  return bytes.emplace(events.SerializeAsString());
+  return bytes = serialized(events);
 }
 
 void sendEvents(Client& client, TickTold& told) {
-  const std::string& shared = eventsFor(told, client.subscription);
-  if (shared.empty()) return;
+  const Buffer& shared = eventsFor(told, client.subscription);
+  if (shared->empty()) return;
   v1::TickEvents own;
   own.set_sequence(++client.sequence);
   client.out->push(joined(v1::ServerMessage::kEventsFieldNumber, own.SerializeAsString(), shared));
 }
 
 /// State without what was dropped.
-std::string stateOf(const scene::World& world, const scene::Snapshot& snapshot) {
+Buffer stateOf(const scene::World& world, const scene::Snapshot& snapshot) {
   v1::State state;
   state.set_tick(snapshot.tick);
   state.set_time(snapshot.time);
@@ -69,7 +76,7 @@ std::string stateOf(const scene::World& world, const scene::Snapshot& snapshot) 
   }
   for (const scene::BodyView& body : *snapshot.bodies)
     if (body.displaced || body.moving) *state.add_bodies() = messageOf(world, body);
-  return state.SerializeAsString();
+  return serialized(state);
 }
 
 void sendState(ServedWorld& served, Client& client, const scene::Snapshot& snapshot,
@@ -88,7 +95,7 @@ void sendState(ServedWorld& served, Client& client, const scene::Snapshot& snaps
   v1::State own;
   own.set_dropped(client.droppedStates);
   client.out->pushLatest(
-      joined(v1::ServerMessage::kStateFieldNumber, own.SerializeAsString(), *told.state));
+      joined(v1::ServerMessage::kStateFieldNumber, own.SerializeAsString(), told.state));
 }
 
 void answerStep(ServedWorld& served, Client& client, const scene::Snapshot& snapshot) {

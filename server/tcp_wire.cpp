@@ -18,6 +18,11 @@ std::string told(const error_code& problem) {
 
 }  // namespace
 
+std::array<asio::const_buffer, 2> piecesOf(const Encoded& message) {
+  return {asio::buffer(*message.head),
+          message.rest ? asio::buffer(*message.rest) : asio::const_buffer()};
+}
+
 std::string addressOf(const tcp::socket& socket) {
   error_code problem;
   const tcp::endpoint endpoint = socket.remote_endpoint(problem);
@@ -46,10 +51,10 @@ void TcpWire::read(Heard done) {
                           });
 }
 
-void TcpWire::write(Buffer bytes, Written done) {
-  const auto view = asio::buffer(*bytes);
-  asio::async_write(socket_, view,
-                    [bytes = std::move(bytes), done = std::move(done)](
+void TcpWire::write(Encoded message, Written done) {
+  const auto pieces = piecesOf(message);
+  asio::async_write(socket_, pieces,
+                    [message = std::move(message), done = std::move(done)](
                         error_code problem, std::size_t) { done(told(problem)); });
 }
 

@@ -9,6 +9,8 @@
 
 namespace enfilade::server {
 
+/// The pieces of a message, for one write.
+std::array<boost::asio::const_buffer, 2> piecesOf(const Encoded& message);
 std::string addressOf(const boost::asio::ip::tcp::socket& socket);
 /// As Wire::peerEnded().
 bool peerEnded(boost::asio::ip::tcp::socket& socket);
@@ -18,7 +20,7 @@ class TcpWire : public Wire {
   /// `first` was read already, and comes first.
   TcpWire(boost::asio::ip::tcp::socket socket, std::vector<std::uint8_t> first);
   void read(Heard done) override;
-  void write(Buffer bytes, Written done) override;
+  void write(Encoded message, Written done) override;
   void endSending(std::function<void()> done) override;
   void close() override;
   bool peerEnded() override;

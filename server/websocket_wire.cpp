@@ -62,11 +62,11 @@ void WebSocketWire::readMessage(Heard done) {
                           });
 }
 
-void WebSocketWire::write(Buffer bytes, Written done) {
+void WebSocketWire::write(Encoded message, Written done) {
   if (!accepted_) return done("the upgrade was not answered yet");
-  const auto view = asio::buffer(*bytes);
-  stream_.async_write(view, [bytes = std::move(bytes), done = std::move(done)](
-                                error_code problem, std::size_t) { done(told(problem)); });
+  const auto pieces = piecesOf(message);
+  stream_.async_write(pieces, [message = std::move(message), done = std::move(done)](
+                                  error_code problem, std::size_t) { done(told(problem)); });
 }
 
 void WebSocketWire::endSending(std::function<void()> done) {

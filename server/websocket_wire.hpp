@@ -19,7 +19,7 @@ class WebSocketWire : public Wire {
 
   WebSocketWire(boost::asio::ip::tcp::socket socket, Request request);
   void read(Heard done) override;
-  void write(Buffer bytes, Written done) override;
+  void write(Encoded message, Written done) override;
   void endSending(std::function<void()> done) override;
   void close() override;
   bool peerEnded() override;

@@ -20,7 +20,7 @@ class Wire {
   /// Some bytes, once; one read at a time. The callbacks keep the wire's owner alive.
   virtual void read(Heard done) = 0;
   /// All of it, once; one write at a time.
-  virtual void write(Buffer bytes, Written done) = 0;
+  virtual void write(Encoded message, Written done) = 0;
   /// Nothing more will be written; the peer may still send. Once, after the last write.
   virtual void endSending(std::function<void()> done) = 0;
   virtual void close() = 0;

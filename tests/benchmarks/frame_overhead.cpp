@@ -61,8 +61,8 @@ v1::FrameRequest smallPicture() {
   return request;
 }
 
-/// The Python client, in a process of its own: told by a line to take a picture, it answers how long
-/// that took.
+/// The Python client, in a process of its own: told by a line what to do, it answers how long that
+/// took.
 class ByPython {
  public:
   explicit ByPython(std::uint16_t port) {
@@ -78,8 +78,8 @@ class ByPython {
     std::filesystem::remove(fifo);
   }
   /// Nothing where there is no Python.
-  std::optional<double> picture() {
-    if (!times_ || !orders_ || std::fputs("\n", orders_.get()) < 0) return std::nullopt;
+  std::optional<double> time(const char* what) {
+    if (!times_ || !orders_ || std::fprintf(orders_.get(), "%s\n", what) < 0) return std::nullopt;
     std::fflush(orders_.get());
     char line[64];
     if (!std::fgets(line, sizeof line, times_.get())) return std::nullopt;
@@ -118,7 +118,7 @@ int main(int argc, char** argv) {
   const scene::World world(scene);
   const v1::FrameRequest request = smallPicture();
   const auto view = std::get<server::View>(server::viewFrom(request, *world.snapshot()));
-  std::vector<double> inProcess, overSocket, python;
+  std::vector<double> inProcess, overSocket, python, steps, stepsAndPictures;
   ByPython script(server.port());
   const auto draw = [&] {
     renderer.render(world.snapshot(), view.camera, view.options, view.renderer).get();
@@ -131,9 +131,12 @@ int main(int argc, char** argv) {
   for (int i = 0; i < pictures; i += kBlock) {
     repeat([&] { inProcess.push_back(microseconds(draw)); });
     repeat([&] { overSocket.push_back(microseconds([&] { client.frame(request); })); });
-    repeat([&] {
-      if (const auto took = script.picture()) python.push_back(*took);
-    });
+    for (const auto& [what, times] : {std::pair{"picture", &python}, std::pair{"step", &steps},
+                                      std::pair{"both", &stepsAndPictures}}) {
+      repeat([&] {
+        if (const auto took = script.time(what)) times->push_back(*took);
+      });
+    }
   }
   std::printf(
       "%s, %d pictures\n| microseconds             |      p10 |   median |      p90 |\n"
@@ -141,11 +144,18 @@ int main(int argc, char** argv) {
       server.rendererName().c_str(), pictures);
   row("in process", inProcess);
   row("over the socket, C++", overSocket);
-  if (!python.empty()) row("over the socket, Python", python);
+  if (!python.empty()) {
+    row("over the socket, Python", python);
+    row("a step, Python", steps);
+    row("both, Python", stepsAndPictures);
+  }
   const auto added = [&](const std::vector<double>& times, double q) {
     return quantile(times, q) - quantile(inProcess, q);
   };
   std::printf("the way over the socket adds %.1f us in C++", added(overSocket, 0.5));
-  if (!python.empty()) std::printf(", %.1f us in Python", added(python, 0.5));
+  if (!python.empty()) {
+    std::printf(", %.1f us in Python, or %.1f us where it goes with a step", added(python, 0.5),
+                added(stepsAndPictures, 0.5) - quantile(steps, 0.5));
+  }
   std::printf(" (medians)\n");
 }

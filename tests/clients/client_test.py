@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 import unittest
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,18 @@ class Walking(RoomCase):
         self.client.spawn("ann", at=(0, 0, 0)).enter()
         with self.assertRaisesRegex(enfilade.OrderFailed, "already"):
             self.client.spawn("ann", at=(1, 0, 1)).enter()
+
+    def test_who_cannot_enter_is_told_why_also_without_notices(self):
+        self.client.subscribe(contacts=True)
+        self.client.spawn("ann", at=(0, 0.01, 0)).enter()
+        with self.assertRaisesRegex(enfilade.OrderFailed, "already"):
+            self.client.spawn("ann", at=(1, 0, 1)).enter()
+        with self.assertRaisesRegex(enfilade.OrderFailed, "column"):
+            self.client.spawn("bob", at=(0, 0, 6)).enter()
+        self.client.spawn("cat", at=(2, 0.01, 0)).enter()
+        self.client.step(30)  # she falls a little
+        self.assertEqual(list(self.client.notices()), [], "nobody subscribed to them")
+        self.assertEqual({one.a_name for one in self.client.contacts()}, {"ann", "cat"})
 
     def test_points_that_are_none_are_told_before_anything_is_sent(self):
         for point in ("abc", (1, 2), (1, 2, 3, 4), None, (1, "x", 2)):
@@ -104,9 +117,34 @@ class Refusals(RoomCase):
             with self.assertRaises(enfilade.ServerError) as caught:
                 server.connect()
             self.assertEqual(caught.exception.code, "ERROR_UNAUTHENTICATED")
-            with enfilade.connect(server.address, token="looker-0123456789") as looker:
-                with self.assertRaisesRegex(enfilade.ServerError, "role drive"):
-                    looker.step()
+            for connect in (server.connect, lambda **token: enfilade.connect(server.address, **token)):
+                with connect(token="looker-0123456789") as looker:
+                    self.assertGreaterEqual(looker.metrics().clients, 1)
+                    with self.assertRaisesRegex(enfilade.ServerError, "role drive"):
+                        looker.step()
+                with self.assertRaisesRegex(enfilade.ServerError, "none of this server's"):
+                    connect(token="looker-0123456780")
+
+    def test_a_remedy_is_told_where_it_fits_the_fault(self):
+        with self.assertRaises(enfilade.ServerError) as caught:
+            self.client.create_world("main")
+        self.assertIn("another name", caught.exception.message)
+        self.assertEqual(str(caught.exception).count("clock"), 0)
+        with self.server.connect() as other:
+            with self.assertRaisesRegex(enfilade.ServerError, "wait until it leaves"):
+                other.step()
+        no_field = enfilade.ServerError(messages.ERROR_BAD_MESSAGE, "it is no message")
+        self.assertEqual(no_field.remedy, "")
+
+    def test_near_misses_of_a_server_that_tells_none_are_warned_of(self):
+        with self.assertWarnsRegex(UserWarning, "--near-miss"):
+            self.client.subscribe(near_misses=True)
+        with enfilade.serve(self.scene, "--near-miss", "0.5") as server, server.connect() as client:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                client.subscribe(near_misses=True)
+            client.spawn("ann", at=(4.4, 0.01, 0)).enter()
+            self.assertIn("wall", [one.b_name for one in client.contacts() if one.kind == "near"])
 
     def test_a_second_driver_is_refused(self):
         with self.server.connect() as other, self.assertRaises(enfilade.ServerError) as caught:
@@ -165,6 +203,28 @@ class Seeing(RoomCase):
         scan = self.client.scan(at=(0, 1, 0), columns=4)
         self.assertEqual(scan.distance.shape, (1, 4))
         self.assertIn(WALL, scan.entity)
+
+    def test_packed_rays_meet_what_the_others_meet(self):
+        self.client.spawn("ann", at=(3, 0.01, 0)).enter()
+        angles = np.linspace(0, 2 * np.pi, 20_001)
+        directions = np.stack([np.cos(angles), 0.16 * np.sin(3 * angles), np.sin(angles)], 1)
+        origins = np.tile((0.0, 1.0, 0.0), (len(angles), 1))
+        packed = self.client.rays(origins, directions, reach=7)
+        self.client.welcome.capabilities.remove("packed_rays")
+        plain = self.client.rays(origins, directions, reach=7)
+        for name in ("entity", "distance", "point", "normal"):
+            np.testing.assert_array_equal(getattr(packed, name), getattr(plain, name), name)
+        self.assertEqual(packed.names, plain.names)
+        self.assertEqual(set(packed.names), {"", "ann", "wall", "floor", "column"})
+
+    def test_a_scan_has_its_angles_where_they_are_said_to_be(self):
+        full = self.client.scan(at=(0, 1, 0), columns=8)
+        self.assertEqual(full.entity[0].tolist(), [0, 0, 0, 0, WALL, 0, COLUMN, 0])
+        self.assertAlmostEqual(full.distance[0, 4], 5, places=5)
+        part = self.client.scan(at=(0, 1, 0), width=np.pi, height=2.0, columns=3, rows=3)
+        self.assertEqual(part.entity[1].tolist(), [0, WALL, COLUMN], "+Z is to the right")
+        down = self.client.scan(at=(0, 1, 0), forward=(1, -1, 0), columns=1, rows=1)
+        self.assertAlmostEqual(down.distance[0, 0], 2 ** 0.5, places=5)
 
     def test_pairs_are_told_by_id_name_and_avatar(self):
         ann = self.client.spawn("ann", at=(0, 0, 0))
@@ -253,6 +313,22 @@ class Connections(RoomCase):
     def test_half_a_message_and_then_the_end_is_told(self):
         with self.assertRaises(enfilade.ConnectionFailed):
             enfilade.connect(self._fake(b"ENF1\x20\0\0\0\x16\0\0\0\x08"))
+
+    def test_a_server_that_dies_is_told_with_how_it_ended(self):
+        with enfilade.serve(self.scene) as server:
+            client, stranger = server.connect(), enfilade.connect(server.address)
+            server.process.kill()
+            with self.assertRaisesRegex(enfilade.ConnectionFailed, "ended by signal 9"):
+                client.step()
+            with self.assertRaisesRegex(enfilade.ConnectionFailed, "the server ended, was killed, or"):
+                stranger.step()
+        with enfilade.serve(self.scene) as server:
+            client = server.connect()
+            server.process.terminate()
+            with self.assertRaises(enfilade.ServerError) as caught:
+                for _ in range(10_000):
+                    client.step()
+            self.assertEqual(caught.exception.code, "ERROR_SHUTTING_DOWN")
 
     def test_a_silent_server_is_given_up_in_time(self):
         with socket.create_server(("127.0.0.1", 0)) as listener:

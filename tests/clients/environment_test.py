@@ -112,6 +112,15 @@ class Environments(RoomCase):
             env.reset(seed=1)
             env.close()
 
+    def test_who_cannot_begin_is_told_with_its_number_and_place(self):
+        vector = enfilade.VectorWalkEnv(
+            address=self.server.address, num_envs=3,
+            make=lambda number, client: enfilade.WalkEnv(
+                client=client, channels=(), starts=[(0, 0, 6) if number == 1 else _STARTS[0]]))
+        self.addCleanup(vector.close)
+        with self.assertRaisesRegex(enfilade.OrderFailed, r"environment 1: .*\(0, 0, 6\).*column"):
+            vector.reset(seed=1)
+
     def test_a_vector_has_worlds_of_one_server_and_leaves_none(self):
         vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=3, starts=_STARTS,
                                         size=(16, 12), channels=())

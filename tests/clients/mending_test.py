@@ -253,11 +253,14 @@ class Questions(RoomCase):
     def test_rays_of_numpy_are_those_of_messages(self):
         random = np.random.default_rng(3)
         origins, directions = random.normal(size=(5, 3)), random.normal(size=(5, 3))
-        query = enfilade.results.ray_query(origins, directions, 7.5)
+        options = messages.RayQuery(through_avatar="ann", packed=True)
+        request = enfilade.results.RayRequest(300, origins, directions, 7.5, options)
         ray, vec = messages.Ray, messages.Vec3
-        self.assertEqual(query, messages.RayQuery(rays=[
+        query = messages.RayQuery(through_avatar="ann", packed=True, rays=[
             ray(origin=vec(x=o[0], y=o[1], z=o[2]), direction=vec(x=d[0], y=d[1], z=d[2]), reach=7.5)
-            for o, d in zip(origins, directions)]))
+            for o, d in zip(origins, directions)])
+        self.assertEqual(messages.ClientMessage.FromString(request.SerializeToString()),
+                         messages.ClientMessage(request_id=300, rays=query))
 
     def test_a_request_that_is_too_long_is_not_sent(self):
         with self.assertRaisesRegex(ValueError, "max_message"):

@@ -44,6 +44,32 @@ Bytes hexBytes(const std::string& block) {
   return bytes;
 }
 
+/// Of a message's fields those that PROTOCOL.md does not name in the given form.
+std::vector<std::string> notNamed(const google::protobuf::Descriptor* message, bool byType) {
+  const std::string page = document("PROTOCOL.md");
+  std::vector<std::string> missing;
+  for (int i = 0; i < message->field_count(); ++i) {
+    const google::protobuf::FieldDescriptor& field = *message->field(i);
+    if (byType && !field.message_type()) continue;
+    const std::string name = "`" + (byType ? field.message_type()->name() : field.name()) + "`";
+    if (page.find(name) == std::string::npos) missing.push_back(name);
+  }
+  return missing;
+}
+
+TEST(Documents, ProtocolMdNamesEveryMessageLimitAndError) {
+  const std::vector<std::string> none;
+  EXPECT_EQ(notNamed(v1::ClientMessage::descriptor(), true), none);
+  EXPECT_EQ(notNamed(v1::ServerMessage::descriptor(), true), none);
+  EXPECT_EQ(notNamed(v1::Command::descriptor(), true), none);
+  EXPECT_EQ(notNamed(v1::Limits::descriptor(), false), none);
+  const std::string page = document("PROTOCOL.md");
+  for (int i = 1; i < v1::ErrorCode_descriptor()->value_count(); ++i) {
+    const std::string name = "`" + v1::ErrorCode_descriptor()->value(i)->name() + "`";
+    EXPECT_NE(page.find(name), std::string::npos) << name;
+  }
+}
+
 TEST(Documents, TheScriptOfScriptMdParses) {
   const Script script = parseScript(fenced(document("SCRIPT.md"), "jsonl"), "SCRIPT.md");
   EXPECT_EQ(script.lines.size(), 12u);

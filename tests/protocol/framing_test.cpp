@@ -292,8 +292,10 @@ TEST(Framing, AMessageJoinedOfTwoPartsIsTheMessageOfBoth) {
   own.set_sequence(300);
   shared.set_tick(7);
   for (int i = 0; i < 20; ++i) shared.add_notices()->set_text("the shared part is longer than 127");
-  const auto bytes = encodeJoined(v1::ServerMessage::kEventsFieldNumber, own.SerializeAsString(),
-                                  shared.SerializeAsString());
+  const std::string second = shared.SerializeAsString();
+  auto bytes = encodeHeadOfJoined(v1::ServerMessage::kEventsFieldNumber, own.SerializeAsString(),
+                                  second.size());
+  bytes.insert(bytes.end(), second.begin(), second.end());
   v1::ServerMessage whole;
   *whole.mutable_events() = shared;
   whole.mutable_events()->set_sequence(300);

@@ -1,7 +1,11 @@
 // Pictures through a connection: what is seen is what stands there.
+#include <cstdlib>
 #include <cstring>
+#include <mutex>
 
 #include "render/pictures/image.hpp"
+#include "scene/world.hpp"
+#include "server/frame_service.hpp"
 #include "tests/server/served_room.hpp"
 
 namespace enfilade::server::testing {
@@ -205,6 +209,35 @@ TEST_F(Frames, WhatCannotBePicturedIsRefusedByName) {
   }
   request.mutable_free()->clear_fov_y();
   EXPECT_EQ(codeOf(ann, request), v1::ERROR_UNSPECIFIED);
+}
+
+TEST(PicturesInTurn, WhatIsReadyAsDrawnDoesNotOvertakeWhatIsEncoded) {
+  FrameService service(smallRoom());
+  if (service.deviceName().empty()) {
+    EXPECT_EQ(std::getenv("CI"), nullptr) << "no EGL device: install libegl-mesa0";
+    GTEST_SKIP();
+  }
+  const scene::World world(smallRoom());
+  std::mutex mutex;
+  std::vector<std::uint64_t> order;
+  std::uint64_t id = 0;
+  for (const v1::Encoding encoding :
+       {v1::ENCODING_PNG, v1::ENCODING_RAW, v1::ENCODING_PNG, v1::ENCODING_RAW}) {
+    FrameJob job;
+    job.snapshot = world.snapshot();
+    job.request.mutable_free()->mutable_eye()->set_y(1);
+    job.request.set_rgb_encoding(encoding);
+    job.request.set_width(encoding == v1::ENCODING_PNG ? 1024 : 2);
+    job.request.set_height(job.request.width());
+    job.view = std::get<View>(viewFrom(job.request, *job.snapshot));
+    service.draw(std::move(job), [&, number = ++id](const Encoded& reply) {
+      const std::lock_guard lock(mutex);
+      EXPECT_TRUE(reply);
+      order.push_back(number);
+    });
+  }
+  service.finish();
+  EXPECT_EQ(order, (std::vector<std::uint64_t>{1, 2, 3, 4}));
 }
 
 }  // namespace

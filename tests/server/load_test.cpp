@@ -59,6 +59,8 @@ TEST_F(Load, VisitorsLeaveNothingBehind) {
   }
   EXPECT_EQ(tests::footprint().descriptors, before.descriptors);
   EXPECT_EQ(other.step().tick(), 1u);
+  other.step(3);
+  EXPECT_EQ(other.metrics().avatars(), 0u) << "who entered left with its client";
 }
 
 TEST_F(Load, TheExampleClientWalksUntilTheWallStopsIt) {

@@ -25,9 +25,9 @@ TEST(OutgoingQueue, KeepsRepliesInOrderAndOnlyTheLatestState) {
   EXPECT_FALSE(queue.dropLatest());
   queue.pushLatest(bytes(21));
   queue.push(bytes(11));
-  EXPECT_EQ(queue.pop().message->size(), 10u);
-  EXPECT_EQ(queue.pop().message->size(), 21u);
-  EXPECT_EQ(queue.pop().message->size(), 11u);
+  EXPECT_EQ(queue.pop().message.size(), 10u);
+  EXPECT_EQ(queue.pop().message.size(), 21u);
+  EXPECT_EQ(queue.pop().message.size(), 11u);
   EXPECT_FALSE(queue.pop().message);
   EXPECT_EQ(woken, 4);
 }
@@ -37,11 +37,11 @@ TEST(OutgoingQueue, AboveItsBoundOnlyTheLastWordsAreLeft) {
   queue.push(bytes(60));
   queue.push(bytes(40));
   EXPECT_FALSE(queue.overflowed());
-  EXPECT_EQ(queue.pop().message->size(), 60u);
+  EXPECT_EQ(queue.pop().message.size(), 60u);
   queue.push(bytes(61));
   EXPECT_TRUE(queue.overflowed());
   const OutgoingQueue::Next next = queue.pop();
-  EXPECT_EQ(next.message->size(), 7u);
+  EXPECT_EQ(next.message.size(), 7u);
   EXPECT_TRUE(next.last);
   queue.push(bytes(1));
   EXPECT_FALSE(queue.pop().message) << "nothing is said after the last words";
@@ -66,7 +66,7 @@ TEST(OutgoingQueue, FinishingSendsWhatWaitsFirst) {
   queue.finish(bytes(3));
   EXPECT_FALSE(queue.pop().last);
   const OutgoingQueue::Next next = queue.pop();
-  EXPECT_EQ(next.message->size(), 2u);
+  EXPECT_EQ(next.message.size(), 2u);
   EXPECT_TRUE(next.last);
   EXPECT_FALSE(queue.pop().message);
 }

@@ -1,5 +1,8 @@
 // Rays through a connection: what is met is what stands there.
+#include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <map>
 #include <numbers>
 
 #include "tests/server/served_room.hpp"
@@ -87,6 +90,50 @@ TEST_F(Rays, AScanFromTheEyesGivesDistancesAndEntitiesRowByRow) {
   EXPECT_GT(seen.distances[3], 5) << "to the left the wall is farther";
   EXPECT_NEAR(seen.distances[7], 1.6, 0.01) << "the floor below the eyes";
   EXPECT_EQ(seen.entities[7], kFloor);
+}
+
+TEST_F(Rays, PackedOnesMeetWhatTheOthersMeet) {
+  protocol::Client ann = client("ann");
+  ASSERT_FALSE(ann.command(spawn("ann", 2, 0.001, 0)));
+  ann.step(1);
+  const auto capabilities = ann.welcome().capabilities();
+  EXPECT_EQ(std::count(capabilities.begin(), capabilities.end(), "packed_rays"), 1);
+  v1::RayQuery query = oneRay(vec(0, 1, 0), vec(2, 0, 0));
+  *query.add_rays() = oneRay(vec(0, 1, 0), vec(0, 1, 0)).rays(0);
+  *query.add_rays() = oneRay(vec(0, 1, 2), vec(1, -0.25, 0.125)).rays(0);
+  *query.add_rays() = oneRay(vec(0, 1, 2), vec(1, -0.25, 0.25)).rays(0);
+  const v1::RayReply plain = ann.rays(query);
+  query.set_packed(true);
+  v1::ClientMessage asked;
+  *asked.mutable_rays() = query;
+  std::vector<std::uint8_t> attachment;
+  const v1::RayReply packed = ann.request(asked, &attachment).rays();
+  const int count = plain.hits_size();
+  ASSERT_EQ(attachment.size(), 60 * static_cast<std::size_t>(count));
+  EXPECT_EQ(packed.hits_size(), 0);
+  EXPECT_EQ(packed.tick(), plain.tick());
+  std::map<std::uint32_t, std::string> names;
+  for (const v1::Entity& entity : packed.met()) names[entity.id()] = entity.name();
+  EXPECT_EQ(names.size(), 2u) << "ann, and the floor twice";
+  std::vector<double> numbers(7 * static_cast<std::size_t>(count));
+  std::vector<std::uint32_t> entities(static_cast<std::size_t>(count));
+  std::memcpy(numbers.data(), attachment.data(), 8 * numbers.size());
+  std::memcpy(entities.data(), attachment.data() + 8 * numbers.size(), 4 * entities.size());
+  for (std::size_t i = 0; i < entities.size(); ++i) {
+    const v1::RayHit& hit = plain.hits(static_cast<int>(i));
+    EXPECT_EQ(entities[i], hit.entity());
+    EXPECT_EQ(names[entities[i]], hit.name());
+    const double* of = &numbers[7 * i];
+    if (!hit.met()) {
+      EXPECT_TRUE(std::all_of(of, of + 7, [](double number) { return std::isnan(number); }));
+      continue;
+    }
+    const std::vector<double> told{hit.distance(),  hit.point().x(),  hit.point().y(),
+                                   hit.point().z(), hit.normal().x(), hit.normal().y(),
+                                   hit.normal().z()};
+    EXPECT_EQ(std::vector<double>(of, of + 7), told) << "to the last bit";
+  }
+  EXPECT_FALSE(plain.hits(1).met()) << "straight up is nothing";
 }
 
 TEST_F(Rays, WhatCannotBeCastIsRefusedByItsField) {

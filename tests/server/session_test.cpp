@@ -271,6 +271,78 @@ TEST_F(Sessions, EntitiesAreDescribedInPagesOfBoundedSize) {
   EXPECT_EQ(refusal({kFloor, kWall}), v1::ERROR_UNSPECIFIED);
 }
 
+TEST_F(Sessions, OrdersThatADriveDropsAreToldWithTheirTagsAndWhy) {
+  serve();
+  protocol::Client ann = client("ann");
+  ann.subscribe(everything());
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
+  ann.step(1);
+  v1::Command walk = walkTo("ann", 3, 0, 0), wait, drive;
+  walk.set_tag(7);
+  wait.set_avatar("ann");
+  wait.set_tag(8);
+  wait.mutable_wait()->set_seconds(1);
+  drive.set_avatar("ann");
+  drive.set_tag(9);
+  drive.mutable_drive()->mutable_velocity()->set_z(1);
+  for (const v1::Command& command : {walk, wait, drive}) ASSERT_FALSE(ann.command(command));
+  ann.takeEvents();
+  ann.step(1);
+  Heard heard;
+  heard.add(ann.takeEvents());
+  std::vector<std::uint64_t> dropped;
+  for (const v1::Notice& notice : heard.notices) {
+    ASSERT_EQ(notice.kind(), v1::Notice::KIND_DROPPED) << notice.text();
+    EXPECT_NE(notice.text().find("Drive"), std::string::npos) << notice.text();
+    dropped.push_back(notice.tag());
+  }
+  EXPECT_EQ(dropped, (std::vector<std::uint64_t>{7, 8}));
+}
+
+TEST_F(Sessions, WhatIsMissingIsToldByWhatItIs) {
+  serve();
+  protocol::Client ann = client("ann");
+  v1::Command command;
+  command.set_avatar("ann");
+  command.mutable_drive();
+  EXPECT_EQ(ann.command(command)->message(),
+            "drive.velocity is missing: give metres per second along x, y and z");
+  command.mutable_look();
+  EXPECT_EQ(ann.command(command)->message(), "look.at is missing: give a point");
+}
+
+TEST_F(Sessions, WelcomeTellsEachLimitThatTheServerKeeps) {
+  ServerLimits limits;
+  limits.avatars = 11;
+  limits.pictureSide = 12;
+  limits.ticksPerStep = 13;
+  limits.waypoints = 14;
+  limits.rays = 15;
+  limits.scanRays = 16;
+  limits.watches = 17;
+  limits.worlds = 18;
+  limits.pairs = 19;
+  limits.requestsUnderWay = 20;
+  limits.waitingBytes = 21;
+  limits.requestsPerSecond = 2200;
+  serve(limits);
+  const v1::Limits told = client("ann").welcome().limits();
+  EXPECT_EQ(told.max_message(), protocol::kServerTakes.total);
+  EXPECT_EQ(told.max_avatars(), 11u);
+  EXPECT_EQ(told.max_picture_width(), 12u);
+  EXPECT_EQ(told.max_picture_height(), 12u);
+  EXPECT_EQ(told.max_ticks_per_step(), 13u);
+  EXPECT_EQ(told.max_waypoints(), 14u);
+  EXPECT_EQ(told.max_rays(), 15u);
+  EXPECT_EQ(told.max_scan_rays(), 16u);
+  EXPECT_EQ(told.max_watches(), 17u);
+  EXPECT_EQ(told.max_worlds(), 18u);
+  EXPECT_EQ(told.max_pairs(), 19u);
+  EXPECT_EQ(told.max_requests_under_way(), 20u);
+  EXPECT_EQ(told.max_bytes_under_way(), 21u);
+  EXPECT_EQ(told.requests_per_second(), 2200u);
+}
+
 TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
   FrameService frames(smallRoom());
   QuestionService questions(smallRoom());
@@ -290,7 +362,7 @@ TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
   loop.receive(ann, request, 0);
   std::optional<v1::Metrics> metrics;
   ASSERT_TRUE(becomesTrue([&] {
-    while (const Buffer bytes = out->pop().message) {
+    while (const Buffer bytes = out->pop().message.head) {
       protocol::Decoder decoder(protocol::kClientTakes, protocol::Decoder::Expect::messages);
       std::span<const std::uint8_t> rest(*bytes);
       v1::ServerMessage message;
@@ -320,7 +392,7 @@ TEST(Requests, OneThatFailsForAFaultOfOursIsToldAndTheNextIsAnswered) {
   }
   answerWaiting(served, 1, [](const auto&) {});
   std::vector<v1::ServerMessage> said;
-  while (const Buffer bytes = ann.out->pop().message) {
+  while (const Buffer bytes = ann.out->pop().message.head) {
     protocol::Decoder decoder(protocol::kClientTakes, protocol::Decoder::Expect::messages);
     std::span<const std::uint8_t> rest(*bytes);
     ASSERT_TRUE(protocol::parse(decoder.next(rest)->header, said.emplace_back()));

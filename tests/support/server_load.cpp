@@ -336,7 +336,7 @@ void visitRudely(std::uint16_t port, int count, unsigned seed) {
   std::mt19937_64 random(seed);
   for (int i = 0; i < count; ++i) {
     RawConnection raw(port);
-    const auto manner = random() % 6;
+    const auto manner = random() % 7;
     if (manner == 0) continue;  // closes at once
     raw.sendHello();
     if (manner == 1) continue;  // does not wait for the welcome
@@ -348,6 +348,15 @@ void visitRudely(std::uint16_t port, int count, unsigned seed) {
     raw.receive();
     if (manner == 4) {
       raw.closeSending();
+      raw.receive();
+      continue;
+    }
+    if (manner == 6) {  // its avatar is left to itself
+      v1::ClientMessage spawn;
+      spawn.set_request_id(2);
+      spawn.mutable_command()->set_avatar("visitor" + std::to_string(i));
+      spawn.mutable_command()->mutable_spawn()->mutable_at()->set_y(0.01);
+      raw.send(spawn);
       raw.receive();
       continue;
     }

@@ -46,7 +46,7 @@ LoadResult runLoad(const LoadOptions& options, const std::function<void()>& befo
                    const std::function<void()>& stop);
 
 /// `count` visits: some say hello and goodbye, some leave in the middle of a message, some close
-/// one direction only, some close at once.
+/// one direction only, some close at once, some have an avatar and vanish.
 void visitRudely(std::uint16_t port, int count, unsigned seed);
 
 /// Of this process.

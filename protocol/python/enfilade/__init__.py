@@ -15,7 +15,8 @@ Metres, seconds, radians; right-handed, Y up. PROTOCOL.md tells what happens on 
 """
 
 from . import messages
-from .client import Avatar, Client, connect
+from .avatar import Avatar
+from .client import Client, connect
 from .environment import WalkEnv
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError, StartFailed
 from .process import Server, serve

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import operator
 import time
+import warnings
 from collections import deque
 from typing import Any, Deque, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from . import messages, results
+from .avatar import Avatar
 from .connection import Connection, Received, raise_refusal, server_error
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError
 from .questions import Point, cannot_touch_query, entity, frame_request, points, vec
-from .results import (Apart, AvatarState, Contact, Frame, Hits, Notice, Pair, Replay, Scan, State,
+from .results import (Apart, Contact, Frame, Hits, Notice, Pair, Replay, Scan, State,
                       Step, Touching, World)
 
 PROTOCOL_VERSION = "1.0.0"
 KEPT_FRAMES = 16  # of watches, until frames() takes them; older ones go first
 LONGEST_RUN = 36_000  # ticks that run_until_idle() makes before it gives up
-ENTRY_TICKS = 3  # that enter() makes: whoever had the name before leaves in the first
 MOST_AT_ONCE = 10_000  # messages that are taken without waiting, before what they told is given
 
-Entity = Union[int, str, "Avatar"]  # an id, a name or a path
+Entity = Union[int, str, Avatar]  # an id, a name or a path
 Reply = Tuple[Any, memoryview]  # a message and its attachment
 
 
@@ -57,6 +59,7 @@ class Client:
         self._states: Deque[State] = deque(maxlen=1)
         self._frames: Deque[Frame] = deque(maxlen=KEPT_FRAMES)
         self._replay: Optional[Replay] = None  # as the server told it last
+        self._subscribed: Any = messages.Subscribe()
         self._sequence = 0  # of the events that came last
         self._answered = 0  # the request whose reply was taken last
         hello = messages.Hello(protocol_version=PROTOCOL_VERSION, client_name=name, token=token,
@@ -104,12 +107,15 @@ class Client:
     def post(self, requests: Iterable[Dict[str, Any]]) -> List[int]:
         """The first half of pipeline(): sends, and does not wait."""
         asked = [messages.ClientMessage(request_id=next(self._ids), **body) for body in requests]
+        self._send(asked)
+        return [one.request_id for one in asked]
+
+    def _send(self, asked: List[Any]) -> None:
         try:
             self._connection.send(asked)
         except ConnectionFailed:
             self._raise_last_words()
             raise
-        return [one.request_id for one in asked]
 
     def take(self, posted: List[int]) -> List[Reply]:
         """The second half: the replies to what was posted, in the order in which it was. The first
@@ -251,7 +257,7 @@ class Client:
         reply, _ = self.request(seek=messages.Seek(tick=tick))
         return Step(reply.seek.tick, reply.seek.time, reply.seek.state_hash, False)
 
-    def take_over(self, avatar: str = "") -> Optional["Avatar"]:
+    def take_over(self, avatar: str = "") -> Optional[Avatar]:
         """Leaves the recording and goes on from here: from now on orders are taken. `avatar` becomes
         this client's and forgets what it was told; without one the world alone leaves."""
         self.request(take_over=messages.TakeOver(avatar=avatar))
@@ -297,7 +303,7 @@ class Client:
         self.request(command=messages.Command(avatar=avatar, tag=tag, **order))
         return tag
 
-    def spawn(self, name: str, at: Point, facing: float = 0.0, **options: Any) -> "Avatar":
+    def spawn(self, name: str, at: Point, facing: float = 0.0, **options: Any) -> Avatar:
         """Queues an avatar's entry, feet at `at`, looking `facing` DEGREES about +Y from +X.
         `options` are other fields of Spawn: radius, height, flying, parts, links. It is in the world
         after the next tick; Avatar.enter() makes it, and raises when there is no room."""
@@ -328,10 +334,34 @@ class Client:
         """Says what the server sends unasked, in the place of what it sent before. Returns the
         contacts that live now, as they began. Contacts and notices are kept until they are taken,
         however many they become."""
-        reply, _ = self.request(subscribe=messages.Subscribe(
-            contacts=contacts, near_misses=near_misses, notices=notices, state=state,
-            state_rate=state_rate))
+        if near_misses and self.welcome.policies.near_miss <= 0:
+            warnings.warn("subscribe: this server tells no near misses; start it with --near-miss "
+                          "METRES", stacklevel=2)
+        wanted = messages.Subscribe(contacts=contacts, near_misses=near_misses, notices=notices,
+                                    state=state, state_rate=state_rate)
+        reply, _ = self.request(subscribe=wanted)
+        self._subscribed = wanted
         return [results.contact(one) for one in reply.subscribe.live]
+
+    @contextlib.contextmanager
+    def _hearing_notices(self) -> Iterator[None]:
+        """As if notices were subscribed; those that come meanwhile are forgotten where they were not."""
+        before = self._subscribed
+        if before.notices:
+            yield
+            return
+        kept = len(self._notices)
+        for_now = messages.Subscribe()
+        for_now.CopyFrom(before)
+        for_now.notices = True
+        try:
+            self.request(subscribe=for_now)
+            yield
+        finally:
+            if not self._connection.broken:
+                self.request(subscribe=before)
+            while len(self._notices) > kept:
+                self._notices.pop()
 
     def contacts(self, seconds: float = 0.0) -> Iterator[Contact]:
         """The contact events that have come, in order. With `seconds` it waits so long for each next
@@ -414,20 +444,26 @@ class Client:
         if len(origins) != len(directions):
             raise ValueError(f"rays: {len(origins)} origins and {len(directions)} directions")
         page = min(self.limits.max_rays, (self.limits.max_message - 512) // results.RAY_BYTES)
-        replies = []
+        packed = "packed_rays" in self.welcome.capabilities
+        replies: List[Hits] = []
         for start in range(0, max(1, len(origins)), page):
-            query = results.ray_query(origins[start:start + page], directions[start:start + page],
-                                      reach)
-            query.through_avatar, query.through_glass = through_avatar, through_glass
-            replies.append(self.request(rays=query)[0].rays)
+            options = messages.RayQuery(through_avatar=through_avatar, through_glass=through_glass,
+                                        packed=packed)
+            asked = results.RayRequest(next(self._ids), origins[start:start + page],
+                                       directions[start:start + page], reach, options)
+            self._send([asked])
+            reply, attachment = self.take([asked.request_id])[0]
+            replies.append(results.packed_hits(reply.rays, attachment) if packed else
+                           results.hits(reply.rays))
         if replies[0].tick != replies[-1].tick:
             raise EnfiladeError(f"rays: the clock went on between them, from tick {replies[0].tick} "
                                 f"to {replies[-1].tick}: pause() first, or ask at most {page}")
-        return results.hits(replies)
+        return results.joined(replies)
 
     def sees(self, origin: Point, target: Point, *, through_avatar: str = "") -> bool:
-        """Whether nothing stands between two points: neither an avatar, also one's own that is not
-        `through_avatar`."""
+        """Whether nothing stands between two points (x, y, z), in metres of the scene's frame: neither
+        an avatar, also one's own that is not `through_avatar`. From an avatar's eyes: origin =
+        AvatarState.eyes. It has no angle of view: it may lie behind who looks."""
         direction = [t - o for o, t in zip(origin, target)]
         reach = sum(d * d for d in direction) ** 0.5
         ray = messages.Ray(origin=vec(origin), direction=vec(direction), reach=reach)
@@ -439,7 +475,12 @@ class Client:
              up: Optional[Point] = None, width: float = 6.283185307179586, height: float = 0.0,
              columns: int = 360, rows: int = 1, reach: float = 0.0, through_avatar: str = "",
              through_glass: bool = False) -> Scan:
-        """A range scan over `width` x `height` radians, from an avatar's eyes or from `at`."""
+        """A range scan over `width` x `height` radians, from an avatar's eyes along its gaze or from
+        `at` along +X, or along `forward`, which is the angle 0 of both. Column c has the angle
+        -width/2 + c * width / (columns - 1), from left to right; in a full turn, the default, -pi +
+        c * 2 pi / columns, so that column 0 looks backwards and column columns/2 ahead. Row r has
+        height/2 - r * height / (rows - 1), from above. Angles are about `up` (default +Y), of which
+        only what is square to forward counts: from (1, 0, 0), +Z is to the right."""
         if (at is None) == (not avatar):
             raise ValueError("scan: give either an avatar or at")
         scan = messages.RangeScan(width=width, height=height, columns=columns, rows=rows,
@@ -533,67 +574,3 @@ class Client:
 
     def __exit__(self, *_: Any) -> None:
         self.close()
-
-
-class Avatar:
-    """An avatar of this client. Orders queue, and are carried out as ticks are made."""
-
-    def __init__(self, client: Client, name: str) -> None:
-        self._client = client
-        self.name = name
-        self.entry = 0  # the tag of its spawn
-
-    def enter(self) -> AvatarState:
-        """Makes ticks, in lockstep, until it is in the world: one, or two where somebody of this name
-        is about to leave. Raises OrderFailed where it cannot enter."""
-        for _ in range(ENTRY_TICKS):
-            state = self._client.step(1, avatars=True).avatars.get(self.name)
-            # Before the state: it may be another avatar's, of the same name.
-            why = [one.text for one in self._client._notices
-                   if one.tag == self.entry and one.avatar == self.name and one.kind == "refused"]
-            if why:
-                raise OrderFailed(f"avatar {self.name!r} did not enter: {why[-1]}")
-            if state is not None:
-                return state
-        raise OrderFailed(f"avatar {self.name!r} did not enter within {ENTRY_TICKS} ticks; "
-                          "subscribe(notices=True) first to be told why")
-
-    def walk(self, *along: Point, speed: Optional[float] = None) -> int:
-        """To each of the points in turn."""
-        order = messages.Walk(along=[vec(point) for point in along])
-        if speed is not None:
-            order.speed = speed
-        return self._client.command(self.name, walk=order)
-
-    def look(self, at: Point) -> int:
-        return self._client.command(self.name, look=messages.Look(at=vec(at)))
-
-    def wait(self, seconds: float) -> int:
-        return self._client.command(self.name, wait=messages.Wait(seconds=seconds))
-
-    def drive(self, velocity: Point) -> int:
-        """From now on; drops what is queued. Zero stops."""
-        return self._client.command(self.name, drive=messages.Drive(velocity=vec(velocity)))
-
-    def jump(self, height: Optional[float] = None) -> int:
-        return self._client.command(self.name, jump=messages.Jump(height=height))
-
-    def fly(self, on: bool = True) -> int:
-        return self._client.command(self.name, fly=messages.Fly(on=on))
-
-    def crouch(self, height: Optional[float] = None) -> int:
-        return self._client.command(self.name, crouch=messages.Crouch(height=height))
-
-    def drive_joints(self, values: Sequence[Optional[float]], *, speed: Optional[float] = None,
-                     at_once: bool = False) -> int:
-        """To these values, one a link; None leaves a joint as it is."""
-        target = messages.DriveJoints.Target
-        return self._client.command(self.name, drive_joints=messages.DriveJoints(
-            to=[target(value=value) for value in values], speed=speed, at_once=at_once))
-
-    def leave(self) -> int:
-        return self._client.command(self.name, leave=messages.Leave())
-
-    def frame(self, **options: Any) -> Frame:
-        """What it sees; options as of Client.frame()."""
-        return self._client.frame(self.name, **options)

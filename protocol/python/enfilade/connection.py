@@ -12,7 +12,7 @@ import select
 import socket
 import struct
 import time
-from typing import Any, Iterable, List, Optional
+from typing import Any, Callable, Iterable, List, Optional
 
 import numpy
 
@@ -23,7 +23,7 @@ MAGIC = b"ENF1"
 LARGEST_MESSAGE = 1 << 28  # bytes, of what a server may send; the C++ client takes as much
 LARGEST_HEADER = 1 << 24
 _LENGTHS = struct.Struct("<II")
-_BUFFER = 1 << 16  # bytes; what is longer goes right into memory of its own
+_BUFFER = 1 << 14  # bytes; what is longer goes right into memory of its own
 _ALIGNMENT = 64  # bytes, of attachments
 
 
@@ -65,6 +65,7 @@ class Connection:
         self.peer = f"{host}:{port}"
         self.timeout = timeout
         self.broken = ""
+        self.fate: Callable[[], str] = lambda: ""  # what became of the server, where that is known
         self.max_message = 0  # bytes that the server takes; 0: not known yet
         try:
             self._socket = socket.create_connection((host, port), timeout)
@@ -113,7 +114,7 @@ class Connection:
                     raise socket.timeout(f"it took nothing for {self.timeout:g} s")
         except OSError as error:
             # Not closed yet: what it said last may still be read.
-            self.broken = f"the connection broke: {error}"
+            self.broken = f"the connection broke: {error}{self._fate()}"
             raise ConnectionFailed(f"{self.peer}: {self.broken}") from error
 
     def next(self, seconds: Optional[float] = None) -> Optional[Received]:
@@ -144,6 +145,10 @@ class Connection:
         self._next = None
 
     # ---- bytes ------------------------------------------------------------------------------
+
+    def _fate(self) -> str:
+        return "; " + (self.fate() or "the server ended, was killed, or cut this client off: its log "
+                                      "may say why")
 
     def _failed(self, why: str) -> ConnectionFailed:
         self.broken = self.broken or why
@@ -198,9 +203,9 @@ class Connection:
             except socket.timeout:
                 count = -1
             except OSError as error:
-                raise self._failed(f"the connection broke: {error}") from error
+                raise self._failed(f"the connection broke: {error}{self._fate()}") from error
             if count == 0:
-                raise self._failed("it closed the connection; its log says why")
+                raise self._failed("the connection ended without a goodbye" + self._fate())
             if count < 0 or time.monotonic() > deadline:
                 raise self._failed(f"no answer within {self.timeout:g} s; is the server "
                                    "overloaded? A longer timeout may help")

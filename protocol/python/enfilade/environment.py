@@ -107,6 +107,7 @@ class WalkEnv(spaces.EnvBase):
         self._name = "walker"
         self._heading = 0.0
         self._steps = 0
+        self._start: Sequence[float] = ()  # of the episode
         self._tag = 0  # of the spawn that the last reset() sent
         self._state: Optional[results.AvatarState] = None
         self._rgb: Optional[np.ndarray] = None
@@ -213,6 +214,7 @@ class WalkEnv(spaces.EnvBase):
         self._heading = math.radians(facing)
         self._steps = 0
         self._tag += 1
+        self._start = start
         spawn = messages.Spawn(at=messages.Vec3(x=start[0], y=start[1], z=start[2]), facing=facing)
         return self.client.post([
             {"restart": messages.Restart()},
@@ -249,7 +251,8 @@ class WalkEnv(spaces.EnvBase):
         contacts = [one for one in self.client._kept_contacts() if one.reason != "restart"]
         why = self._refusals()
         if self._name not in entered.avatars:
-            raise OrderFailed(f"the avatar could not begin there: {' '.join(why)}")
+            where = ", ".join(f"{metres:g}" for metres in self._start[:3])
+            raise OrderFailed(f"the avatar could not begin at ({where}): {' '.join(why)}")
         for reply, _ in replies[3:]:
             raise_refusal(reply)
         self._state = entered.avatars[self._name]

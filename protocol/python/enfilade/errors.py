@@ -6,28 +6,29 @@ from typing import Any
 
 from . import messages
 
-# What helps, by the code. The server's own sentence is more exact where it names a remedy, too.
+# What helps, by the code, where it helps whatever was wrong: of other codes only the server's own
+# sentence can know.
 _REMEDIES = {
-    "ERROR_BAD_MESSAGE": "give the field that is named a value that can be used",
-    "ERROR_TOO_LARGE": "ask for less at a time; Client.limits tells what the server takes",
     "ERROR_VERSION": "use the client of the server's release",
-    "ERROR_NOT_ALLOWED": "another client may have to leave, or the clock must be set first",
     "ERROR_UNKNOWN_AVATAR": "spawn the avatar, and step until it has entered",
-    "ERROR_REFUSED_COMMAND": "change the field that is named",
-    "ERROR_BAD_CAMERA": "change the field that is named",
-    "ERROR_NO_RENDERER": "install libegl-mesa0 and libgl1-mesa-dri where the server runs",
     "ERROR_INTERNAL": "look into the server's log, and report it",
-    "ERROR_SHUTTING_DOWN": "start the server again",
     "ERROR_TOO_SLOW": "read events as they come, or subscribe to less",
     "ERROR_TICK_GONE": "ask before the next step, or without a tick",
     "ERROR_TIMEOUT": "send whole messages without long pauses",
     "ERROR_UNSUPPORTED": "use a server that offers it; see Client.capabilities",
-    "ERROR_UNAUTHENTICATED": "connect with token=",
-    "ERROR_BAD_RAYS": "change the field that is named",
+    "ERROR_UNAUTHENTICATED": "in Python the token is connect()'s token=",
     "ERROR_REPLAY_ENDED": "seek() goes elsewhere, take_over() goes on from here",
     "ERROR_UNKNOWN_ENTITY": "give an id, a name or a path of what is in the world now",
     "ERROR_TOO_COMPLEX": "ask for fewer pairs, or for smaller pieces",
 }
+# Of these, where the error names a field.
+_BY_FIELD = ("ERROR_BAD_MESSAGE", "ERROR_REFUSED_COMMAND", "ERROR_BAD_CAMERA", "ERROR_BAD_RAYS")
+
+
+def _remedy(code: str, field: str) -> str:
+    if code in _BY_FIELD and field:
+        return "change the field that is named"
+    return _REMEDIES.get(code, "")
 
 
 class EnfiladeError(Exception):
@@ -48,7 +49,7 @@ class ServerError(EnfiladeError):
         self.message = message
         self.field = field
         self.fatal = fatal
-        self.remedy: str = _REMEDIES.get(self.code, "")
+        self.remedy: str = _remedy(self.code, field)
         text = f"{self.code}: {message}"
         if field:
             text += f" (field: {field})"

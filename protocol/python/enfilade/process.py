@@ -7,6 +7,7 @@ import json
 import os
 import select
 import shutil
+import signal
 import subprocess
 import tempfile
 import time
@@ -19,6 +20,7 @@ from .errors import StartFailed
 
 _STOPPING_SECONDS = 10.0  # from SIGTERM to SIGKILL
 _CHECK_SECONDS = 0.02
+_DYING_SECONDS = 0.5  # between the end of a connection and that of its process
 
 
 def find_program() -> str:
@@ -86,6 +88,19 @@ class _Running:
                 stream.close()
         _running.discard(self)
         return code
+
+    def fate(self) -> str:
+        """How it ended, for a client whose connection did."""
+        try:
+            code = self.process.wait(_DYING_SECONDS)
+        except subprocess.TimeoutExpired:
+            return ""
+        if code >= 0:
+            how = f"with exit code {code}"
+        else:
+            how = f"by signal {-code} ({signal.strsignal(-code)})"
+        last = self.read_log().strip().splitlines()[-1:]
+        return f"the server ended {how}" + (f"; its last words: {last[0]}" if last else "")
 
     def read_log(self) -> str:
         if self.log.closed:
@@ -162,6 +177,7 @@ class Server:
                 world: str = "main") -> Client:
         client = connect(self.address, name=name, token=token, timeout=timeout, world=world)
         self._running.clients.add(client)
+        client._connection.fate = self._running.fate
         return client
 
     def stop(self) -> int:

@@ -29,7 +29,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
     whose reward is 0 (Gymnasium's "next step" mode).
 
     A wrong number of actions or seeds, or an action that is none, is a ValueError before anything is
-    sent. Where one environment fails later, all are waited for, its error is raised, and reset() comes
+    sent. Where one environment fails later, all are waited for, its error, with its number, is raised, and reset() comes
     next; when the server died, all have to be made anew.
     """
 
@@ -137,7 +137,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
 
     def _each(self, post: Callable[[int], List[int]], take: Callable[[int, List[int]], Any]) -> Any:
         """Posts all and takes all, also where some fail; the first failure is raised then."""
-        failures: List[Exception] = []
+        failures: List[Tuple[int, Exception]] = []
         posted: List[Optional[List[int]]] = []
         taken: List[Any] = []
         for i in range(self.num_envs):
@@ -145,15 +145,18 @@ class VectorWalkEnv(spaces.VectorEnvBase):
                 posted.append(post(i))
             except Exception as error:
                 posted.append(None)
-                failures.append(error)
+                failures.append((i, error))
         for i, ids in enumerate(posted):
             try:
                 if ids is not None:
                     taken.append(take(i, ids))
             except Exception as error:
-                failures.append(error)
+                failures.append((i, error))
         if failures:
-            raise failures[0]
+            number, failure = failures[0]
+            if failure.args and isinstance(failure.args[0], str):
+                failure.args = (f"environment {number}: {failure.args[0]}", *failure.args[1:])
+            raise failure
         return taken
 
     def render(self) -> List[Optional[np.ndarray]]:

@@ -1,0 +1,81 @@
+"""An avatar, as its client tells it what to do."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Optional, Sequence
+
+from . import messages
+from .errors import OrderFailed
+from .questions import Point, vec
+from .results import AvatarState, Frame
+
+if TYPE_CHECKING:
+    from .client import Client
+
+ENTRY_TICKS = 3  # that enter() makes: whoever had the name before leaves in the first
+
+
+class Avatar:
+    """An avatar of this client. Orders queue, and are carried out as ticks are made."""
+
+    def __init__(self, client: Client, name: str) -> None:
+        self._client = client
+        self.name = name
+        self.entry = 0  # the tag of its spawn
+
+    def enter(self) -> AvatarState:
+        """Makes ticks, in lockstep, until it is in the world: one, or two where somebody of this name
+        is about to leave. Raises OrderFailed where it cannot enter."""
+        with self._client._hearing_notices():
+            for _ in range(ENTRY_TICKS):
+                state = self._client.step(1, avatars=True).avatars.get(self.name)
+                # Before the state: it may be another avatar's, of the same name.
+                why = [one.text for one in self._client._notices
+                       if one.tag == self.entry and one.avatar == self.name and
+                       one.kind == "refused"]
+                if why:
+                    raise OrderFailed(f"avatar {self.name!r} did not enter: {why[-1]}")
+                if state is not None:
+                    return state
+        raise OrderFailed(f"avatar {self.name!r} did not enter within {ENTRY_TICKS} ticks: was the "
+                          "clock set, or its spawn dropped, meanwhile?")
+
+    def walk(self, *along: Point, speed: Optional[float] = None) -> int:
+        """To each of the points in turn."""
+        order = messages.Walk(along=[vec(point) for point in along])
+        if speed is not None:
+            order.speed = speed
+        return self._client.command(self.name, walk=order)
+
+    def look(self, at: Point) -> int:
+        return self._client.command(self.name, look=messages.Look(at=vec(at)))
+
+    def wait(self, seconds: float) -> int:
+        return self._client.command(self.name, wait=messages.Wait(seconds=seconds))
+
+    def drive(self, velocity: Point) -> int:
+        """From now on; drops what is queued. Zero stops."""
+        return self._client.command(self.name, drive=messages.Drive(velocity=vec(velocity)))
+
+    def jump(self, height: Optional[float] = None) -> int:
+        return self._client.command(self.name, jump=messages.Jump(height=height))
+
+    def fly(self, on: bool = True) -> int:
+        return self._client.command(self.name, fly=messages.Fly(on=on))
+
+    def crouch(self, height: Optional[float] = None) -> int:
+        return self._client.command(self.name, crouch=messages.Crouch(height=height))
+
+    def drive_joints(self, values: Sequence[Optional[float]], *, speed: Optional[float] = None,
+                     at_once: bool = False) -> int:
+        """To these values, one a link; None leaves a joint as it is."""
+        target = messages.DriveJoints.Target
+        return self._client.command(self.name, drive_joints=messages.DriveJoints(
+            to=[target(value=value) for value in values], speed=speed, at_once=at_once))
+
+    def leave(self) -> int:
+        return self._client.command(self.name, leave=messages.Leave())
+
+    def frame(self, **options: Any) -> Frame:
+        """What it sees; options as of Client.frame()."""
+        return self._client.frame(self.name, **options)
