@@ -6,17 +6,6 @@
 namespace enfilade::collision {
 namespace {
 
-double greatestRadius(const ConvexBody& body) {
-  if (body.vertices.empty()) throw std::invalid_argument("a body has no vertices");
-  if (body.hull) return body.hull->radius;
-  double greatest = 0, zero = 0;
-  for (const Vec3& p : body.vertices) {
-    greatest = std::max(greatest, p.cwiseAbs().maxCoeff());
-    zero += 0 * p.x() + 0 * p.y() + 0 * p.z();  // none, if a coordinate is none
-  }
-  return greatest * 1.7320508075688774 + zero;  // sqrt(3); a norm might overflow
-}
-
 void requireFinite(const ConvexBody& body, const char* name) {
   const auto refuse = [&](const char* what) {
     throw std::invalid_argument(std::string("body ") + name + ": " + what + " is not finite");
@@ -61,20 +50,13 @@ Least leastFrom(const MinkowskiDifference& difference, const WideVec& direction,
     const Support ofB = farthest(b, b.bodyFromWorld<Wide>(-direction),
                                  b.bodyFromWorld<double>(-rounded), length, summits.b);
     least.pair = {ofA.vertex, ofB.vertex};
-    least.along = direction.dot(difference.shift) - ofB.along - ofA.along;
+    least.along = direction.dot(difference.shift()) - ofB.along - ofA.along;
   }
   // The point is off by 6 eta reach a coordinate, so by 6 sqrt(3) eta reach along the direction;
   // the product of two vectors rounds by 3 eta |d| |w|, |w| <= sqrt(3) reach. Turning the direction
   // instead of the vertices loses less.
   least.bound = least.along - 16 * kWideUnit * Wide{length} * difference.reach;
   return least;
-}
-
-/// Of the Frobenius norm: sqrt(x) <= (x / c + c) / 2 for any c, and equal at x = c^2, which is 3
-/// for a rotation.
-double normBound(const Mat3& rotation) {
-  constexpr double c = 1.7320508075688774;
-  return rotation.squaredNorm() * (0.5 / c) + 0.5 * c;
 }
 
 /// Into the range of doubles, where products neither over- nor underflow.
@@ -84,42 +66,27 @@ bool needsScaling(Wide length) {
 
 }  // namespace
 
-PlacedBody::PlacedBody(const ConvexBody& placed)
-    : body(&placed),
-      size(greatestRadius(placed) * (placed.rotation ? normBound(*placed.rotation) : 1) *
-           (1 + 32 * kUnit)) {}
-
-MinkowskiDifference::MinkowskiDifference(const ConvexBody& bodyA, const ConvexBody& bodyB)
-    : a(bodyA),
-      b(bodyB),
-      shift(bodyB.translation.cast<Wide>() - bodyA.translation.cast<Wide>()),
-      roundedShift(bodyB.translation - bodyA.translation),
-      reach((a.size + b.size + roundedShift.cwiseAbs().maxCoeff()) * (1 + 8 * kUnit)) {
-  if (reach < std::numeric_limits<double>::infinity() && !roundedShift.hasNaN()) [[likely]]
-    return;
-  requireFinite(bodyA, "A");  // coordinates beyond 1e308 alone are no fault
-  requireFinite(bodyB, "B");
+double greatestRadius(const ConvexBody& body) {
+  if (body.vertices.empty()) throw std::invalid_argument("a body has no vertices");
+  double greatest = 0, zero = 0;
+  for (const Vec3& p : body.vertices) {
+    greatest = std::max(greatest, p.cwiseAbs().maxCoeff());
+    zero += 0 * p.x() + 0 * p.y() + 0 * p.z();  // none, if a coordinate is none
+  }
+  return greatest * 1.7320508075688774 + zero;  // sqrt(3); a norm might overflow
 }
 
-Summits climb(const MinkowskiDifference& difference, const Vec3& direction, double length,
-              VertexPair hint) {
+void requireFinite(const ConvexBody& a, const ConvexBody& b) {
+  requireFinite(a, "A");  // coordinates beyond 1e308 alone are no fault
+  requireFinite(b, "B");
+}
+
+void climb(const MinkowskiDifference& difference, const Vec3& direction, double length,
+           VertexPair hint, double enough, Summits& summits) {
   const PlacedBody &a = difference.a, &b = difference.b;
-  return {climb(a, a.bodyFromWorld<double>(direction), supportSlack(a, length), hint.a),
-          climb(b, b.bodyFromWorld<double>(-direction), supportSlack(b, length), hint.b)};
-}
-
-Along alongOf(const MinkowskiDifference& difference, const Vec3& direction, double length,
-              const Summits& summits) {
-  Along along{direction.dot(difference.roundedShift) - summits.b.along - summits.a.along};
-  // Each product is off by half a slack, 8u length (S_A + S_B) together; the shift's own rounding,
-  // its product and the two differences by less than three times as much again.
-  if (summits.alone()) along.bound = along.value - 40 * kUnit * length * difference.reach;
-  return along;
-}
-
-Least leastAlong(const MinkowskiDifference& difference, const Vec3& direction, double length,
-                 const Summits& summits) {
-  return leastFrom(difference, direction.cast<Wide>(), direction, length, summits);
+  summits.a = climb(a, a.bodyFromWorld<double>(direction), supportSlack(a, length), hint.a, enough);
+  summits.b =
+      climb(b, b.bodyFromWorld<double>(-direction), supportSlack(b, length), hint.b, enough);
 }
 
 Least leastAlong(const MinkowskiDifference& difference, const WideVec& direction, Wide length,

@@ -35,12 +35,39 @@ constexpr Real unitOf() {
   return std::numeric_limits<Real>::epsilon() / 2;
 }
 
+/// By single coordinates: pairs of them, as Eigen loads them, would wait for the stores of single
+/// ones just made.
+template <class Real>
+Real dot(const Eigen::Matrix<Real, 3, 1>& a, const Eigen::Matrix<Real, 3, 1>& b) {
+  return a.x() * b.x() + a.y() * b.y() + a.z() * b.z();
+}
+template <class Real>
+Real lengthOf(const Eigen::Matrix<Real, 3, 1>& a) {
+  return std::sqrt(dot(a, a));
+}
+
+/// Of the vertices, from the body's origin, in metres; none where a coordinate is none.
+double greatestRadius(const ConvexBody& body);
+inline double radiusOf(const ConvexBody& body) {
+  return body.hull && !body.vertices.empty() ? body.hull->radius : greatestRadius(body);
+}
+
+/// Of the Frobenius norm: sqrt(x) <= (x / c + c) / 2 for any c, and equal at x = c^2, which is 3
+/// for a rotation.
+inline double normBound(const Mat3& rotation) {
+  constexpr double c = 1.7320508075688774;
+  return rotation.squaredNorm() * (0.5 / c) + 0.5 * c;
+}
+
 /// One body, ready to be asked: the bounds that the proofs need.
 struct PlacedBody {
   const ConvexBody* body;
   double size;  ///< S of the file's head, metres
 
-  explicit PlacedBody(const ConvexBody& placed);
+  explicit PlacedBody(const ConvexBody& placed)
+      : body(&placed),
+        size(radiusOf(placed) * (placed.rotation ? normBound(*placed.rotation) : 1) *
+             (1 + 32 * kUnit)) {}
   std::uint32_t vertexCount() const { return static_cast<std::uint32_t>(body->vertices.size()); }
   /// A point of the body's frame turned to world axes, not moved.
   template <class Real>
@@ -50,6 +77,7 @@ struct PlacedBody {
     return {r(0, 0) * x + r(0, 1) * y + r(0, 2) * z, r(1, 0) * x + r(1, 1) * y + r(1, 2) * z,
             r(2, 0) * x + r(2, 1) * y + r(2, 2) * z};
   }
+  WideVec turned(const WideVec& p) const { return turned<Wide>(p.x(), p.y(), p.z()); }
   template <class Real>
   Eigen::Matrix<Real, 3, 1> turned(std::uint32_t i) const {
     const Vec3& p = body->vertices[i];
@@ -66,22 +94,34 @@ struct PlacedBody {
   }
 };
 
+/// Throws std::invalid_argument naming what is not.
+void requireFinite(const ConvexBody& a, const ConvexBody& b);
+
 struct MinkowskiDifference {
   PlacedBody a, b;
-  WideVec shift;      ///< t_B - t_A
-  Vec3 roundedShift;  ///< the same, in doubles
+  Vec3 roundedShift;  ///< t_B - t_A in doubles
   double reach;       ///< bounds every |coordinate| of a point of B - A, with room
 
-  MinkowskiDifference(const ConvexBody& bodyA, const ConvexBody& bodyB);
+  MinkowskiDifference(const ConvexBody& bodyA, const ConvexBody& bodyB)
+      : a(bodyA),
+        b(bodyB),
+        roundedShift(bodyB.translation - bodyA.translation),
+        reach((a.size + b.size + roundedShift.cwiseAbs().maxCoeff()) * (1 + 8 * kUnit)) {
+    if (!(reach + 0 * roundedShift.sum() < std::numeric_limits<double>::infinity())) [[unlikely]]
+      requireFinite(bodyA, bodyB);
+  }
 
-  WideVec pointA(std::uint32_t i) const { return a.turned<Wide>(i); }
-  WideVec pointB(std::uint32_t i) const { return b.turned<Wide>(i) + shift; }
+  /// t_B - t_A.
+  WideVec shift() const {
+    const Vec3 &from = a.body->translation, &to = b.body->translation;
+    return {Wide{to.x()} - from.x(), Wide{to.y()} - from.y(), Wide{to.z()} - from.z()};
+  }
   template <class Real>
   Eigen::Matrix<Real, 3, 1> point(VertexPair pair) const {
     if constexpr (std::is_same_v<Real, double>) {
       return b.turned<double>(pair.b) + roundedShift - a.turned<double>(pair.a);
     } else {
-      return b.turned<Real>(pair.b) + shift - a.turned<Real>(pair.a);
+      return b.turned<Real>(pair.b) + shift() - a.turned<Real>(pair.a);
     }
   }
   WideVec operator()(VertexPair pair) const { return point<Wide>(pair); }
@@ -95,7 +135,7 @@ inline bool fitsDoubles(const MinkowskiDifference& difference) {
   return difference.reach > 0x1p-160 && difference.reach < 0x1p160;
 }
 
-/// Where a climb in doubles ends: a vertex that no neighbour exceeds.
+/// Where a climb in doubles ends: a vertex that no neighbour exceeds, or one that is far enough up.
 struct Summit {
   std::uint32_t vertex = 0;
   double along = 0;
@@ -109,8 +149,15 @@ struct Summits {
   VertexPair pair() const { return {a.vertex, b.vertex}; }
   bool alone() const { return a.alone && b.alone; }
 };
-Summits climb(const MinkowskiDifference& difference, const Vec3& direction, double length,
-              VertexPair hint);
+/// `enough` as for climb() below.
+void climb(const MinkowskiDifference& difference, const Vec3& direction, double length,
+           VertexPair hint, double enough, Summits& summits);
+inline Summits climb(const MinkowskiDifference& difference, const Vec3& direction, double length,
+                     VertexPair hint) {
+  Summits summits;
+  climb(difference, direction, length, hint, std::numeric_limits<double>::infinity(), summits);
+  return summits;
+}
 
 /// direction . w of the summits in doubles, and what every w of B - A has at least: nothing where a
 /// summit is not alone.
@@ -118,8 +165,14 @@ struct Along {
   double value = 0;
   double bound = -std::numeric_limits<double>::infinity();
 };
-Along alongOf(const MinkowskiDifference& difference, const Vec3& direction, double length,
-              const Summits& summits);
+inline Along alongOf(const MinkowskiDifference& difference, const Vec3& direction, double length,
+                     const Summits& summits) {
+  Along along{dot(direction, difference.roundedShift) - summits.b.along - summits.a.along};
+  // Each product is off by half a slack, 8u length (S_A + S_B) together; the shift's own rounding,
+  // its product and the two differences by less than three times as much again.
+  if (summits.alone()) along.bound = along.value - 40 * kUnit * length * difference.reach;
+  return along;
+}
 
 /// The point of B - A least along a direction, and the proof.
 struct Least {
@@ -133,16 +186,12 @@ struct Least {
 Least leastAlong(const MinkowskiDifference& difference, const WideVec& direction, Wide length,
                  VertexPair& hint);
 
-/// The same for a direction of doubles whose summits are known, both as in climb() and in the range
-/// where products neither over- nor underflow.
-Least leastAlong(const MinkowskiDifference& difference, const Vec3& direction, double length,
-                 const Summits& summits);
-
 /// Climbs over the hull's edges from `start`, or looks at every vertex where there is no hull.
 /// `slack` as for forEachFarthest(): a vertex whose neighbours are all less by it is the farthest,
-/// since an exact ascent would go on from any other.
+/// since an exact ascent would go on from any other. With a hull, ends at the first vertex that is
+/// farther than the first one by `enough` (along the direction, times its length).
 inline Summit climb(const PlacedBody& placed, const Vec3& direction, double slack,
-                    std::uint32_t start) {
+                    std::uint32_t start, double enough = std::numeric_limits<double>::infinity()) {
   const std::span<const Vec3> vertices = placed.body->vertices;
   const Hull* hull = placed.body->hull;
   double second = -std::numeric_limits<double>::infinity();
@@ -156,16 +205,18 @@ inline Summit climb(const PlacedBody& placed, const Vec3& direction, double slac
     summit.alone = second < summit.along - slack;
     return summit;
   }
-  Summit summit{start, direction.dot(vertices[start])};
+  Summit summit{start, dot(direction, vertices[start])};
+  const double goal = summit.along + enough;
   while (true) {  // ends: `along` grows, and there are finitely many vertices
     second = -std::numeric_limits<double>::infinity();
     for (const std::uint32_t neighbour : hull->neighboursOf(summit.vertex)) {
-      const double along = direction.dot(vertices[neighbour]);
+      const double along = dot(direction, vertices[neighbour]);
       start = along > second ? neighbour : start;  // no branch: no guess of it to miss
       second = std::max(second, along);
     }
     if (!(second > summit.along)) break;
     summit.vertex = start, summit.along = second;
+    if (second > goal) return summit;
   }
   summit.alone = second < summit.along - slack;
   return summit;
@@ -173,7 +224,7 @@ inline Summit climb(const PlacedBody& placed, const Vec3& direction, double slac
 
 /// Calls visit(i) for vertices of `placed` among which is, exactly, one that is farthest along a
 /// direction; `direction` is that one in the body's frame, rounded to double, `summit` that of a
-/// climb along it.
+/// climb along it, wherever that ended.
 ///
 /// Each product `direction . vertex` is off by less than `slack`/2 (supportSlack). From the summit
 /// an exact ascent over the edges leads to the exact maximum (convexity); all its vertices have, in

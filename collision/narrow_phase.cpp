@@ -31,10 +31,11 @@
 namespace enfilade::collision {
 namespace {
 
-constexpr Wide kMostError = 15;   // units of rounding of the largest coordinate; one to spare
-constexpr Wide kFine = 0x1p-32L;  // of the distance: see describeSeparation
+constexpr double kMostError = 15;  // units of rounding of the largest coordinate; one to spare
+constexpr double kFine = 0x1p-32;  // of the distance: see describeSeparation
 constexpr double kLeastInDoubles = 1e-140;  // metres: below, a squared length loses bits
 constexpr int kMostEqualSteps = 4;          // of a walk, that come no nearer
+constexpr int kLocalSteps = 12;             // of a walk: see findSupport
 constexpr int kIterationBound = 96;  // about 10 are usual, from nothing; reaching it: the next step
 
 bool valid(const FeatureCache& cache, const ConvexBody& a, const ConvexBody& b) {
@@ -45,13 +46,6 @@ bool valid(const FeatureCache& cache, const ConvexBody& a, const ConvexBody& b) 
   return true;
 }
 
-/// A proved bound along a direction as one in metres: bound / |direction|, a little less. Since
-/// |d|^2 = 1 + e with |e| small, 1 / |d| >= 1 - e / 2.
-Wide metresAlong(Wide bound, const WideVec& direction) {
-  const Wide excess = direction.squaredNorm() - 1;
-  return bound * (1 - excess / 2) - std::abs(bound) * (8 * kWideUnit + excess * excess);
-}
-
 /// What the walk over features found.
 template <class Real>
 struct Search {
@@ -59,11 +53,13 @@ struct Search {
 
   Simplex<Real> simplex;
   Real distance = 0;            ///< of simplex.nearest
-  Vec direction = Vec::Zero();  ///< of simplex.nearest, unit up to rounding; of the last support
-  VertexPair hint;              ///< where the next support may be found
+  Vec direction = Vec::Zero();  ///< of the last support: the simplex.nearest of then
+  Real length = 0;              ///< of `direction`, at least
   Summits summits;              ///< of the last support, when the walk is in doubles
   Wide lower = -std::numeric_limits<Wide>::infinity();  ///< of the true distance, proved
 
+  /// `direction`, unit up to rounding.
+  Vec3 axis() const { return (direction * (1 / length)).template cast<double>(); }
   /// False: the simplex holds the origin, or all but touches it.
   bool hasDirection() const {
     constexpr bool isDouble = std::is_same_v<Real, double>;
@@ -77,58 +73,69 @@ template <class Real>
 void start(const MinkowskiDifference& difference, const FeatureCache& cache, Search<Real>& search) {
   if (valid(cache, *difference.a.body, *difference.b.body)) {
     for (int i = 0; i < cache.size; ++i) search.simplex.add(difference, cache.pairs[i]);
-    search.hint = cache.pairs[0];
   } else {
     search.simplex.add(difference, {});
   }
   search.simplex.reduce(difference);
-  search.distance = search.simplex.nearest.norm();
+  search.distance = lengthOf(search.simplex.nearest);
 }
 
-/// A point of B - A that is the least along search.direction, up to rounding.
+/// A point of B - A: the least along search.direction, up to rounding, or one that is beyond the
+/// origin.
 struct Support {
   VertexPair pair;
-  Wide along;  ///< metres
+  Wide along;  ///< times search.length
 };
 
-/// Raises search.lower if the support proves more.
-Support findSupport(const MinkowskiDifference& difference, Search<double>& search) {
-  search.summits = climb(difference, search.direction, kUnitLength, search.hint);
-  search.hint = search.summits.pair();
-  const Along along = alongOf(difference, search.direction, kUnitLength, search.summits);
-  if (along.bound > 0) search.lower = std::max(search.lower, Wide{along.bound / kUnitLength});
-  return {search.hint, along.value};
+/// Raises search.lower if the support proves more than `limit`. `local`: a body whose vertex alone
+/// takes the support to the origin and beyond is climbed no farther. That there is no plane between
+/// is known then, and what is near is rather of use to the simplex than what is far behind.
+Support findSupport(const MinkowskiDifference& difference, bool local, double limit,
+                    Search<double>& search) {
+  const double enough =
+      local ? search.length * search.length : std::numeric_limits<double>::infinity();
+  climb(difference, search.direction, search.length, search.simplex.newest(), enough,
+        search.summits);
+  const Along along = alongOf(difference, search.direction, search.length, search.summits);
+  if (along.bound > limit * search.length * kUnitLength)
+    search.lower = Wide{along.bound} / search.length;
+  return {search.summits.pair(), along.value};
 }
-Support findSupport(const MinkowskiDifference& difference, Search<Wide>& search) {
-  const Least least = leastAlong(difference, search.direction, kUnitLength, search.hint);
+Support findSupport(const MinkowskiDifference& difference, bool, double, Search<Wide>& search) {
+  VertexPair hint = search.simplex.newest();
+  const Least least = leastAlong(difference, search.direction, search.length, hint);
   if (least.bound > 0)
-    search.lower = std::max(search.lower, metresAlong(least.bound, search.direction));
+    search.lower = std::max(search.lower, least.bound / search.length * (1 - 4 * kWideUnit));
   return {least.pair, least.along};
 }
 
 /// Ends at the closest features, at a tetrahedron that holds the origin, where the distance is
 /// proved above `limit`, or where Real makes no more progress.
 template <class Real>
-void walk(const MinkowskiDifference& difference, Wide limit, Search<Real>& search) {
+void walk(const MinkowskiDifference& difference, double limit, Search<Real>& search) {
   const Real enough = 24 * unitOf<Real>() * static_cast<Real>(difference.reach);
   Simplex<Real>& simplex = search.simplex;
   int equalSteps = 0;
   for (int i = 0; i < kIterationBound && search.hasDirection(); ++i) {
-    search.direction = simplex.nearest * (1 / search.distance);
-    const Support support = findSupport(difference, search);
-    if (search.lower > limit || search.distance - support.along <= enough ||
+    search.direction = simplex.nearest;
+    search.length = search.distance * (1 + 16 * unitOf<Real>());
+    const Support support = findSupport(difference, i < kLocalSteps, limit, search);
+    if (search.lower > limit ||
+        search.distance * search.distance - support.along <= enough * search.length ||
         simplex.holds(support.pair))
       return;
-    Simplex<Real> next = simplex;
-    next.add(difference, support.pair);
-    next.reduce(difference);
-    const Real distance = next.nearest.norm();
-    if (!next.holdsOrigin && !(distance < search.distance)) {
+    const Simplex<Real> last = simplex;
+    simplex.add(difference, support.pair);
+    simplex.reduce(difference);
+    const Real distance = lengthOf(simplex.nearest);
+    if (!simplex.holdsOrigin && !(distance < search.distance)) {
       // As near may be good, too: the feature whose direction proves it.
-      if (!(distance <= search.distance) || !next.holds(support.pair)) return;
-      if (++equalSteps > kMostEqualSteps) return;
+      const bool asNear = distance <= search.distance && simplex.holds(support.pair);
+      if (!asNear || ++equalSteps > kMostEqualSteps) {
+        simplex = last;
+        return;
+      }
     }
-    simplex = next;
     search.distance = distance;
   }
 }
@@ -138,42 +145,137 @@ void remember(const Search<Real>& search, FeatureCache& cache) {
   cache.size = search.simplex.size;
   std::copy_n(search.simplex.pairs.begin(), search.simplex.size, cache.pairs.begin());
   // A nearest point that proves nothing may point anywhere: then the last axis is the better one.
-  if (search.lower > 0) cache.axis = search.direction.template cast<double>();
+  if (search.lower > 0) cache.axis = search.axis();
+}
+
+/// Where doubles would over- or underflow, by way of Wide.
+double rootOf(Wide squared) {
+  const auto rounded = static_cast<double>(squared);
+  const bool fits = rounded > 0x1p-900 && rounded < 0x1p1000;
+  return fits ? std::sqrt(rounded) : static_cast<double>(std::sqrt(squared));
 }
 
 double largestOf(const Vec3& v) {
   return v.cwiseAbs().maxCoeff();
 }
 
-/// The points of A and B that the simplex' weights name: world axes, from t_A.
+/// The points of A and B that the simplex' weights name.
+/// Weights round by at most 8.1 eta S a body, turning by 3 eta S, shift and sums by eta (S_A +
+/// 2 S_B + 3 sqrt(3) D), the length by 2.5 sqrt(3) eta reach: below 17.5 eta reach; `error` is 24.
 struct Combination {
-  WideVec aToB;
-  Vec3 onA, onB;   ///< rounded
-  double largest;  ///< of the |coordinates| of both bodies, from below
+  PointOn ofA, ofB;
+  Vec3 pointA, pointB, aToB;  ///< world axes, from t_A; rounded
+  struct {
+    double head = 0, tail = 0;
+  } length;        ///< of aToB before that: an unevaluated sum
+  double error;    ///< of the length, metres
+  double largest;  ///< of the |coordinates| of both bodies from t_A, from below
 
   template <class Real>
-  Combination(const MinkowskiDifference& difference, const Simplex<Real>& simplex) {
-    const WideVec a = pointOn(simplex, difference.a, &VertexPair::a);
-    const WideVec b = pointOn(simplex, difference.b, &VertexPair::b) + difference.shift;
-    aToB = b - a;
-    onA = a.cast<double>();
-    onB = b.cast<double>();
-    largest = std::max(largestOf(onA), largestOf(onB));
+  Combination(const MinkowskiDifference& difference, const Simplex<Real>& simplex)
+      : ofA(pointOn(simplex, difference.a, &VertexPair::a)),
+        ofB(pointOn(simplex, difference.b, &VertexPair::b)),
+        error(static_cast<double>(4 * difference.pointError())) {
+    const Wide squared = set(difference, 0) + set(difference, 1) + set(difference, 2);
+    const double head = rootOf(squared);
+    const auto left = static_cast<double>(squared - Wide{head} * head);
+    length = {head, head > 0 ? left * (0.5 / head) : 0};  // a step of Newton's
+    largest = std::max(largestOf(pointA), largestOf(pointB));
     for (int i = 0; i < simplex.size; ++i)  // a vertex of A or one of B has half of it
       largest = std::max(largest, largestOf(simplex.points[i].template cast<double>()) / 2);
     largest *= 1 - 8 * kUnit;
   }
+  /// For both bodies, as closely as doubles tell, from t_A and in the world.
+  bool isCommonPoint(const Vec3& tA) const {
+    const double inWorld = std::max(largestOf(pointA + tA), largest - largestOf(tA));
+    return length.head <= 2 * kUnit * std::min(largest, 4 * inWorld);
+  }
+
+ private:
+  /// A coordinate of the points; returns what it adds to the squared length.
+  Wide set(const MinkowskiDifference& difference, int k) {
+    const ConvexBody &a = *difference.a.body, &b = *difference.b.body;
+    const Wide onA = turned(a, k, ofA);
+    const Wide onB = turned(b, k, ofB) + (Wide{b.translation[k]} - a.translation[k]);
+    const Wide apart = onB - onA;
+    pointA[k] = static_cast<double>(onA);
+    pointB[k] = static_cast<double>(onB);
+    aToB[k] = static_cast<double>(apart);
+    return apart * apart;
+  }
+  static Wide turned(const ConvexBody& body, int k, const PointOn& p) {
+    if (!body.rotation) return Wide{p.head[k]} + p.tail[k];
+    const Mat3& r = *body.rotation;
+    const Wide head =
+        Wide{r(k, 0)} * p.head[0] + Wide{r(k, 1)} * p.head[1] + Wide{r(k, 2)} * p.head[2];
+    if (p.vertex != PointOn::kNone) return head;
+    return head + (r(k, 0) * p.tail[0] + r(k, 1) * p.tail[1] + r(k, 2) * p.tail[2]);
+  }
 };
 
-/// Raises search.lower by a proof in extended precision, along the direction that the walk ended
-/// with.
-void proveLower(const MinkowskiDifference& difference, Search<double>& search) {
-  if (!search.hasDirection()) return;
-  const Least least = leastAlong(difference, search.direction, kUnitLength, search.summits);
-  search.lower = std::max(search.lower, metresAlong(least.bound, search.direction.cast<Wide>()));
+/// Newton's step for a tetrahedron that holds the origin: its weights as rounded led to `at.aToB`
+/// instead.
+void sharpen(const MinkowskiDifference& difference, const Simplex<double>& simplex,
+             Combination& at) {
+  if (at.isCommonPoint(difference.a.body->translation)) return;
+  Simplex<Wide> sharp;
+  sharp.pairs = simplex.pairs;
+  sharp.size = simplex.size;
+  const auto& p = simplex.points;
+  const Vec3 x = p[1] - p[0], y = p[2] - p[0], z = p[3] - p[0];
+  const Vec3 step = at.aToB / x.dot(y.cross(z));
+  const Vec3 less(step.dot(y.cross(z)), step.dot(z.cross(x)), step.dot(x.cross(y)));
+  const std::array<double, 4> change{less.sum(), -less.x(), -less.y(), -less.z()};
+  for (std::size_t i = 0; i < 4; ++i) {
+    sharp.points[i] = p[i].cast<Wide>();
+    sharp.weight[i] = Wide{simplex.weight[i]} + change[i];
+    if (!(sharp.weight[i] >= 0)) return;
+  }
+  at = Combination(difference, sharp);
+}
+void sharpen(const MinkowskiDifference&, const Simplex<Wide>&, Combination&) {}
+
+/// How much farther along a direction, times `length`, a body reaches than its point. `summit` is
+/// that of a climb along it.
+Wide beyond(const PlacedBody& placed, const Vec3& direction, double length, const Summit& summit,
+            const PointOn& point) {
+  const WideVec turned = placed.bodyFromWorld<Wide>(direction.cast<Wide>());
+  Wide most = 0;
+  forEachFarthest(placed, placed.bodyFromWorld<double>(direction), supportSlack(placed, length),
+                  summit, [&](std::uint32_t i) {
+                    const WideVec p = placed.body->vertices[i].cast<Wide>();
+                    most = std::max(most, turned.dot(p - point.wide()));
+                  });
+  return most;
+}
+
+/// Raises search.lower to what the walk's last direction d proves of w, the vector from point to
+/// point: along d no point of B - A is less than w by more than the bodies reach beyond their
+/// points, and w . d / |d| = |w| cos(w, d) >= |w| - |w - d|^2 / |w| where that is positive, as
+/// cos >= cos^2.
+/// Rounding: w is off by 24 eta reach (Combination), and by 2u |w| as rounded. A turned
+/// direction is off by 3 eta |d| S beside vertices, its product with the difference of two, at most
+/// 2 S, by 8 eta |d| S more, and by 8.1 eta |d| S for the point: together below 24 eta |d| S.
+void proveLower(const MinkowskiDifference& difference, const Combination& at,
+                Search<double>& search) {
+  const double error = 2 * at.error;
+  const auto [head, tail] = at.length;
+  if (!search.hasDirection() || !(head > 0x1p10 * error)) return;
+  const Vec3& d = search.direction;
+  Wide far = 0;
+  const auto& [ofA, ofB] = search.summits;
+  if (!ofA.alone || ofA.vertex != at.ofA.vertex)
+    far += beyond(difference.a, d, search.length, ofA, at.ofA);
+  if (!ofB.alone || ofB.vertex != at.ofB.vertex)
+    far += beyond(difference.b, -d, search.length, ofB, at.ofB);
+  const double blur = error + 2 * kUnit * head;
+  const Vec3 off = at.aToB - d;
+  const double slip = 2 * (dot(off, off) + blur * blur) / head;
+  const double lost = (slip + static_cast<double>(far) / search.length + error) * (1 + 0x1p-8);
+  search.lower = std::max(search.lower, Wide{head} + (tail - lost));
 }
 /// The walk has done that.
-void proveLower(const MinkowskiDifference&, Search<Wide>&) {}
+void proveLower(const MinkowskiDifference&, const Combination&, Search<Wide>&) {}
 
 enum class Outcome : std::uint8_t {
   open,    ///< not proved, or not to the bound that Decision promises
@@ -181,23 +283,22 @@ enum class Outcome : std::uint8_t {
   decided
 };
 
-/// Fills in what holds of separated bodies that are proved to be `lower` apart.
-/// `direction`: unit, along which that was proved.
-Outcome describeSeparation(const MinkowskiDifference& difference, const Combination& at, Wide lower,
-                           const Vec3& direction, Decision& decision) {
-  // Weights round by at most 8.1 eta S a body, turning by 3 eta S, shift and sums by eta (S_A +
-  // 2 S_B + 3 sqrt(3) D), the norm by 2.5 sqrt(3) eta reach: below 17.5 eta reach; this is 24.
-  const Wide length = at.aToB.norm();
-  const Wide upper = length + 4 * difference.pointError();
+/// Fills in what holds of separated bodies that are proved to be search.lower apart.
+template <class Real>
+Outcome describeSeparation(const Combination& at, const Search<Real>& search, Decision& decision) {
+  const auto [head, tail] = at.length;
+  const auto low = static_cast<double>(search.lower - head);
+  const double more = std::max(tail, low);
+  const double distance = head + more;
+  const double rest = (head - distance) + more;  // exact (Dekker's fast two-sum)
+  const double bound = std::max(tail - more + rest + at.error, more - low - rest);
   decision.verdict = Verdict::separated;
-  decision.distance = static_cast<double>(std::max(length, lower));
-  const Wide distance = decision.distance;
-  const Wide bound = std::max(upper - distance, distance - lower);
-  decision.errorBound = static_cast<double>(bound) * (1 + 4 * kUnit);
+  decision.distance = distance;
+  decision.errorBound = bound * (1 + 8 * kUnit);
   // Where the bound is no small part of the distance, the vector from point to point may lead
   // anywhere, and only the last unit will do.
   const bool fine = bound <= kFine * distance;
-  decision.normal = fine ? Vec3(at.aToB.cast<double>() / decision.distance) : direction;
+  decision.normal = fine ? Vec3(at.aToB / distance) : search.axis();
   return bound <= (fine ? kMostError : 1) * kUnit * at.largest ? Outcome::decided : Outcome::open;
 }
 
@@ -223,7 +324,7 @@ bool findTouching(const MinkowskiDifference& difference, const Search<Real>& sea
   }
   for (const Vec3& direction : std::span(directions).first(count)) {
     if (!(direction.squaredNorm() > 0)) continue;
-    if (!provedTouching(difference, direction, search.hint)) continue;
+    if (!provedTouching(difference, direction, simplex.newest())) continue;
     axis = direction;  // as it is: made unit, its sums would not come out exact
     return true;
   }
@@ -247,16 +348,14 @@ Outcome conclude(const MinkowskiDifference& difference, Search<Real>& search, do
                  Vec3& axis, Decision& decision) {
   if (search.lower > limit) return Outcome::beyond;
   const bool inside = search.simplex.holdsOrigin;
-  proveLower(difference, search);
+  Combination at(difference, search.simplex);
+  if (inside) sharpen(difference, search.simplex, at);
+  proveLower(difference, at, search);
   if (search.lower > limit) return Outcome::beyond;
-  const Combination at(difference, search.simplex);
-  decision.pointA = at.onA + difference.a.body->translation;
-  decision.pointB = at.onB + difference.a.body->translation;
-  if (search.lower > 0)
-    return describeSeparation(difference, at, search.lower,
-                              search.direction.template cast<double>(), decision);
-  const bool haveCommonPoint = at.aToB.norm() <= 2 * kUnit * at.largest;
-  if (!haveCommonPoint) return Outcome::open;
+  decision.pointA = at.pointA + difference.a.body->translation;
+  decision.pointB = at.pointB + difference.a.body->translation;
+  if (search.lower > 0) return describeSeparation(at, search, decision);
+  if (!at.isCommonPoint(difference.a.body->translation)) return Outcome::open;
   const bool again = std::is_same_v<Real, Wide> && fitsDoubles(difference);
   if (!inside && findTouching(difference, search, again, axis)) {
     decision.verdict = Verdict::touching;
@@ -295,21 +394,30 @@ Outcome search(const MinkowskiDifference& difference, double limit, FeatureCache
   return outcome;
 }
 
+/// False: proved farther apart than `limit`.
+bool decideWithin(const ConvexBody& a, const ConvexBody& b, double limit, FeatureCache& cache,
+                  Decision& decision) {
+  const MinkowskiDifference difference(a, b);
+  Outcome outcome = Outcome::open;
+  if (fitsDoubles(difference)) outcome = search<double>(difference, limit, cache, decision);
+  if (outcome == Outcome::open) outcome = search<Wide>(difference, limit, cache, decision);
+  if (outcome == Outcome::open) decision = decideExactly(difference, cache);
+  return outcome != Outcome::beyond;
+}
+
 }  // namespace
 
 std::optional<Decision> decideWithin(const ConvexBody& a, const ConvexBody& b, double limit,
                                      FeatureCache& cache) {
-  const MinkowskiDifference difference(a, b);
-  Decision decision;
-  Outcome outcome = Outcome::open;
-  if (fitsDoubles(difference)) outcome = search<double>(difference, limit, cache, decision);
-  if (outcome == Outcome::open) outcome = search<Wide>(difference, limit, cache, decision);
-  if (outcome == Outcome::beyond) return std::nullopt;
-  return outcome == Outcome::decided ? decision : decideExactly(difference, cache);
+  std::optional<Decision> decision(std::in_place);
+  if (!decideWithin(a, b, limit, cache, *decision)) decision.reset();
+  return decision;
 }
 
 Decision decide(const ConvexBody& a, const ConvexBody& b, FeatureCache& cache) {
-  return *decideWithin(a, b, std::numeric_limits<double>::infinity(), cache);
+  Decision decision;
+  decideWithin(a, b, std::numeric_limits<double>::infinity(), cache, decision);
+  return decision;
 }
 
 double provedSeparation(const ConvexBody& a, const ConvexBody& b, const FeatureCache& cache) {

@@ -21,7 +21,7 @@ struct Face {
 
 template <class Real>
 const Face<Real>& closer(const Face<Real>& first, const Face<Real>& second) {
-  return second.nearest.squaredNorm() < first.nearest.squaredNorm() ? second : first;
+  return dot(second.nearest, second.nearest) < dot(first.nearest, first.nearest) ? second : first;
 }
 
 template <class Real>
@@ -39,8 +39,8 @@ Face<Real> segment(const Simplex<Real>& s, int i, int j) {
   using Vec = typename Simplex<Real>::Vec;
   const Vec& from = s.points[i];
   const Vec edge = s.points[j] - from;
-  const Real squared = edge.squaredNorm();
-  const Real t = -from.dot(edge);
+  const Real squared = dot(edge, edge);
+  const Real t = -dot(from, edge);
   if (!(t > 0)) return corner(s, i);
   if (t >= squared) return corner(s, j);
   if (!(squared > std::numeric_limits<Real>::min()))  // 1 / squared might be infinite
@@ -48,7 +48,7 @@ Face<Real> segment(const Simplex<Real>& s, int i, int j) {
   const Real inverse = 1 / squared;
   const Real w = t * inverse;
   const Vec near = from + w * edge;
-  return {{i, j}, {1 - w, w}, 2, near - (near.dot(edge) * inverse) * edge};
+  return {{i, j}, {1 - w, w}, 2, near - (dot(near, edge) * inverse) * edge};
 }
 
 template <class Real>
@@ -57,11 +57,11 @@ Face<Real> triangle(const Simplex<Real>& s, int i, int j, int k) {
   const Vec& a = s.points[i];
   const Vec ab = s.points[j] - a, ac = s.points[k] - a;
   const Vec normal = ab.cross(ac);
-  const Real squared = normal.squaredNorm();
+  const Real squared = dot(normal, normal);
   // Twice the signed areas that the origin's projection spans with each edge, times |normal|.
   const Vec an = a.cross(normal);
-  const Real wk = -ab.dot(an);
-  const Real wj = ac.dot(an);
+  const Real wk = -dot(ab, an);
+  const Real wj = dot(ac, an);
   const Real wi = squared - wj - wk;
   const bool flat = !(squared > std::numeric_limits<Real>::min());  // or 1 / squared is infinite
   const bool beyondIJ = flat || !(wk > 0), beyondIK = flat || !(wj > 0),
@@ -71,7 +71,7 @@ Face<Real> triangle(const Simplex<Real>& s, int i, int j, int k) {
     return {{i, j, k},
             {wi * inverse, wj * inverse, wk * inverse},
             3,
-            (a.dot(normal) * inverse) * normal};
+            (dot(a, normal) * inverse) * normal};
   }
   Face<Real> best{};
   if (beyondIJ) keepCloser(segment(s, i, j), best);
@@ -88,7 +88,7 @@ Face<Real> tetrahedron(const Simplex<Real>& s, double reach, bool& inside) {
   using Vec = typename Simplex<Real>::Vec;
   const Vec &a = s.points[0], &b = s.points[1], &c = s.points[2], &d = s.points[3];
   const Vec ab = a.cross(b), cd = c.cross(d);
-  const Real d0 = b.dot(cd), d1 = -a.dot(cd), d2 = d.dot(ab), d3 = -c.dot(ab);
+  const Real d0 = dot(b, cd), d1 = -dot(a, cd), d2 = dot(d, ab), d3 = -dot(c, ab);
   const Real sum = d0 + d1 + d2 + d3;
   const Real sign = sum < 0 ? -1 : 1;
   const Real size = reach;
@@ -109,25 +109,11 @@ Face<Real> tetrahedron(const Simplex<Real>& s, double reach, bool& inside) {
 }  // namespace
 
 template <class Real>
-bool Simplex<Real>::holds(VertexPair pair) const {
-  for (int i = 0; i < size; ++i)
-    if (pairs[i] == pair) return true;
-  return false;
-}
-
-template <class Real>
-void Simplex<Real>::add(const MinkowskiDifference& difference, VertexPair pair) {
-  pairs[size] = pair;
-  points[size++] = difference.point<Real>(pair);
-}
-
-template <class Real>
-void Simplex<Real>::reduce(const MinkowskiDifference& difference) {
+void Simplex<Real>::keepNearestFace(double reach) {
   holdsOrigin = false;
-  const Face<Real> face = size == 1   ? corner(*this, 0)
-                          : size == 2 ? segment(*this, 0, 1)
+  const Face<Real> face = size == 2   ? segment(*this, 0, 1)
                           : size == 3 ? triangle(*this, 0, 1, 2)
-                                      : tetrahedron(*this, difference.reach, holdsOrigin);
+                                      : tetrahedron(*this, reach, holdsOrigin);
   for (int i = 0; i < face.size; ++i) {  // corners ascend, so none is overwritten before it is read
     pairs[i] = pairs[face.corner[i]];
     points[i] = points[face.corner[i]];
@@ -138,8 +124,8 @@ void Simplex<Real>::reduce(const MinkowskiDifference& difference) {
 }
 
 template <class Real>
-WideVec pointOn(const Simplex<Real>& simplex, const PlacedBody& placed,
-                std::uint32_t VertexPair::*vertex) {
+PointOn combinedPointOn(const Simplex<Real>& simplex, const PlacedBody& placed,
+                        std::uint32_t VertexPair::*vertex) {
   int greatest = 0;
   for (int i = 1; i < simplex.size; ++i)
     if (simplex.weight[i] > simplex.weight[greatest]) greatest = i;
@@ -147,19 +133,24 @@ WideVec pointOn(const Simplex<Real>& simplex, const PlacedBody& placed,
   const Vec3& p = vertices[simplex.pairs[greatest].*vertex];
   Wide x = p.x(), y = p.y(), z = p.z();
   for (int i = 0; i < simplex.size; ++i) {
+    if (i == greatest) continue;
     const Vec3& q = vertices[simplex.pairs[i].*vertex];
-    if (&q == &p) continue;
     const Wide weight = simplex.weight[i];
     x += weight * (Wide{q.x()} - p.x());
     y += weight * (Wide{q.y()} - p.y());
     z += weight * (Wide{q.z()} - p.z());
   }
-  return placed.turned<Wide>(x, y, z);
+  const Vec3 head(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z));
+  const Vec3 tail(static_cast<double>(x - head.x()), static_cast<double>(y - head.y()),
+                  static_cast<double>(z - head.z()));
+  return {head, tail, PointOn::kNone};
 }
 
 template struct Simplex<double>;
 template struct Simplex<Wide>;
-template WideVec pointOn(const Simplex<double>&, const PlacedBody&, std::uint32_t VertexPair::*);
-template WideVec pointOn(const Simplex<Wide>&, const PlacedBody&, std::uint32_t VertexPair::*);
+template PointOn combinedPointOn(const Simplex<double>&, const PlacedBody&,
+                                 std::uint32_t VertexPair::*);
+template PointOn combinedPointOn(const Simplex<Wide>&, const PlacedBody&,
+                                 std::uint32_t VertexPair::*);
 
 }  // namespace enfilade::collision

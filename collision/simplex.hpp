@@ -18,17 +18,58 @@ struct Simplex {
   bool holdsOrigin = false;  ///< proved: strictly inside; only with four points
 
   bool holds(VertexPair pair) const;
+  VertexPair newest() const { return pairs[size - 1]; }  ///< faces keep the order of their corners
   void add(const MinkowskiDifference& difference, VertexPair pair);
   /// Keeps the corners of the face that holds the nearest point, and sets `nearest`.
   void reduce(const MinkowskiDifference& difference);
+
+ private:
+  void keepNearestFace(double reach);
 };
 
-/// The point of one body that the weights name, turned: world axes, from the body's translation. It
-/// is a point of the body up to the error of a vertex: weights are >= 0, and the greatest (at least
-/// 1/4) is made to fill their sum up to 1.
+/// A point of one body, in its frame: the unevaluated sum of `head` and `tail`.
+struct PointOn {
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  Vec3 head, tail;
+  std::uint32_t vertex;  ///< that it is, exactly; else kNone
+
+  WideVec wide() const { return head.cast<Wide>() + tail.cast<Wide>(); }
+};
+
+/// The point of one body that the weights name. It is a point of the body up to the error of a
+/// vertex: weights are >= 0, and the greatest (at least 1/4) is made to fill their sum up to 1.
 template <class Real>
-WideVec pointOn(const Simplex<Real>& simplex, const PlacedBody& placed,
-                std::uint32_t VertexPair::*vertex);
+PointOn combinedPointOn(const Simplex<Real>& simplex, const PlacedBody& placed,
+                        std::uint32_t VertexPair::*vertex);
+template <class Real>
+PointOn pointOn(const Simplex<Real>& simplex, const PlacedBody& placed,
+                std::uint32_t VertexPair::*vertex) {
+  const std::uint32_t first = simplex.pairs[0].*vertex;
+  for (int i = 1; i < simplex.size; ++i)
+    if (simplex.pairs[i].*vertex != first) return combinedPointOn(simplex, placed, vertex);
+  return {placed.body->vertices[first], Vec3::Zero(), first};
+}
+
+template <class Real>
+bool Simplex<Real>::holds(VertexPair pair) const {
+  for (int i = 0; i < size; ++i)
+    if (pairs[i] == pair) return true;
+  return false;
+}
+
+template <class Real>
+void Simplex<Real>::add(const MinkowskiDifference& difference, VertexPair pair) {
+  pairs[size] = pair;
+  points[size++] = difference.point<Real>(pair);
+}
+
+template <class Real>
+void Simplex<Real>::reduce(const MinkowskiDifference& difference) {
+  if (size > 1) return keepNearestFace(difference.reach);
+  holdsOrigin = false;
+  weight[0] = 1;
+  nearest = points[0];
+}
 
 extern template struct Simplex<double>;
 extern template struct Simplex<Wide>;
