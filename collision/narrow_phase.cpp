@@ -56,7 +56,8 @@ struct Search {
   Vec direction = Vec::Zero();  ///< of the last support: the simplex.nearest of then
   Real length = 0;              ///< of `direction`, at least
   Summits summits;              ///< of the last support, when the walk is in doubles
-  Wide lower = -std::numeric_limits<Wide>::infinity();  ///< of the true distance, proved
+  Wide lower = 0;               ///< of the true distance, proved by supports in extended precision
+  bool beyond = false;          ///< proved: the distance is greater than the limit
 
   /// `direction`, unit up to rounding.
   Vec3 axis() const { return (direction * (1 / length)).template cast<double>(); }
@@ -82,30 +83,31 @@ void start(const MinkowskiDifference& difference, const FeatureCache& cache, Sea
 
 /// A point of B - A: the least along search.direction, up to rounding, or one that is beyond the
 /// origin.
+template <class Real>
 struct Support {
   VertexPair pair;
-  Wide along;  ///< times search.length
+  Real along;  ///< times search.length
 };
 
-/// Raises search.lower if the support proves more than `limit`. `local`: a body whose vertex alone
+/// `local`: a body whose vertex alone
 /// takes the support to the origin and beyond is climbed no farther. That there is no plane between
 /// is known then, and what is near is rather of use to the simplex than what is far behind.
-Support findSupport(const MinkowskiDifference& difference, bool local, double limit,
-                    Search<double>& search) {
+Support<double> findSupport(const MinkowskiDifference& difference, bool local, double limit,
+                            Search<double>& search) {
   const double enough =
       local ? search.length * search.length : std::numeric_limits<double>::infinity();
   climb(difference, search.direction, search.length, search.simplex.newest(), enough,
         search.summits);
   const Along along = alongOf(difference, search.direction, search.length, search.summits);
-  if (along.bound > limit * search.length * kUnitLength)
-    search.lower = Wide{along.bound} / search.length;
+  search.beyond = along.bound > limit * search.length * kUnitLength;
   return {search.summits.pair(), along.value};
 }
-Support findSupport(const MinkowskiDifference& difference, bool, double, Search<Wide>& search) {
+Support<Wide> findSupport(const MinkowskiDifference& difference, bool, double limit,
+                          Search<Wide>& search) {
   VertexPair hint = search.simplex.newest();
   const Least least = leastAlong(difference, search.direction, search.length, hint);
-  if (least.bound > 0)
-    search.lower = std::max(search.lower, least.bound / search.length * (1 - 4 * kWideUnit));
+  search.lower = std::max(search.lower, least.bound / search.length * (1 - 4 * kWideUnit));
+  search.beyond = search.lower > limit;
   return {least.pair, least.along};
 }
 
@@ -119,8 +121,8 @@ void walk(const MinkowskiDifference& difference, double limit, Search<Real>& sea
   for (int i = 0; i < kIterationBound && search.hasDirection(); ++i) {
     search.direction = simplex.nearest;
     search.length = search.distance * (1 + 16 * unitOf<Real>());
-    const Support support = findSupport(difference, i < kLocalSteps, limit, search);
-    if (search.lower > limit ||
+    const Support<Real> support = findSupport(difference, i < kLocalSteps, limit, search);
+    if (search.beyond ||
         search.distance * search.distance - support.along <= enough * search.length ||
         simplex.holds(support.pair))
       return;
@@ -143,9 +145,7 @@ void walk(const MinkowskiDifference& difference, double limit, Search<Real>& sea
 template <class Real>
 void remember(const Search<Real>& search, FeatureCache& cache) {
   cache.size = search.simplex.size;
-  std::copy_n(search.simplex.pairs.begin(), search.simplex.size, cache.pairs.begin());
-  // A nearest point that proves nothing may point anywhere: then the last axis is the better one.
-  if (search.lower > 0) cache.axis = search.axis();
+  for (int i = 0; i < search.simplex.size; ++i) cache.pairs[i] = search.simplex.pairs[i];
 }
 
 /// Where doubles would over- or underflow, by way of Wide.
@@ -171,15 +171,14 @@ struct Combination {
   double error;    ///< of the length, metres
   double largest;  ///< of the |coordinates| of both bodies from t_A, from below
 
+  /// `about`: what the length may be.
   template <class Real>
-  Combination(const MinkowskiDifference& difference, const Simplex<Real>& simplex)
+  Combination(const MinkowskiDifference& difference, const Simplex<Real>& simplex, Real about)
       : ofA(pointOn(simplex, difference.a, &VertexPair::a)),
         ofB(pointOn(simplex, difference.b, &VertexPair::b)),
         error(static_cast<double>(4 * difference.pointError())) {
-    const Wide squared = set(difference, 0) + set(difference, 1) + set(difference, 2);
-    const double head = rootOf(squared);
-    const auto left = static_cast<double>(squared - Wide{head} * head);
-    length = {head, head > 0 ? left * (0.5 / head) : 0};  // a step of Newton's
+    const Wide squared = set<0>(difference) + set<1>(difference) + set<2>(difference);
+    setLength(squared, static_cast<double>(about));
     largest = std::max(largestOf(pointA), largestOf(pointB));
     for (int i = 0; i < simplex.size; ++i)  // a vertex of A or one of B has half of it
       largest = std::max(largest, largestOf(simplex.points[i].template cast<double>()) / 2);
@@ -192,18 +191,32 @@ struct Combination {
   }
 
  private:
+  /// A step of Newton's is off by less than the square of itself / length.
+  void setLength(Wide squared, double about) {
+    const auto step = [&](double head) {
+      return static_cast<double>(squared - Wide{head} * head) * (0.5 / head);
+    };
+    if (about > 0) {
+      length = {about, step(about)};
+      if (std::abs(length.tail) <= 0x1p-36 * about) return;
+    }
+    const double root = rootOf(squared);
+    length = {root, root > 0 ? step(root) : 0};
+  }
   /// A coordinate of the points; returns what it adds to the squared length.
-  Wide set(const MinkowskiDifference& difference, int k) {
+  template <int k>
+  Wide set(const MinkowskiDifference& difference) {
     const ConvexBody &a = *difference.a.body, &b = *difference.b.body;
-    const Wide onA = turned(a, k, ofA);
-    const Wide onB = turned(b, k, ofB) + (Wide{b.translation[k]} - a.translation[k]);
+    const Wide onA = turned<k>(a, ofA);
+    const Wide onB = turned<k>(b, ofB) + (Wide{b.translation[k]} - a.translation[k]);
     const Wide apart = onB - onA;
     pointA[k] = static_cast<double>(onA);
     pointB[k] = static_cast<double>(onB);
     aToB[k] = static_cast<double>(apart);
     return apart * apart;
   }
-  static Wide turned(const ConvexBody& body, int k, const PointOn& p) {
+  template <int k>
+  static Wide turned(const ConvexBody& body, const PointOn& p) {
     if (!body.rotation) return Wide{p.head[k]} + p.tail[k];
     const Mat3& r = *body.rotation;
     const Wide head =
@@ -231,14 +244,14 @@ void sharpen(const MinkowskiDifference& difference, const Simplex<double>& simpl
     sharp.weight[i] = Wide{simplex.weight[i]} + change[i];
     if (!(sharp.weight[i] >= 0)) return;
   }
-  at = Combination(difference, sharp);
+  at = Combination(difference, sharp, Wide{0});
 }
 void sharpen(const MinkowskiDifference&, const Simplex<Wide>&, Combination&) {}
 
 /// How much farther along a direction, times `length`, a body reaches than its point. `summit` is
 /// that of a climb along it.
-Wide beyond(const PlacedBody& placed, const Vec3& direction, double length, const Summit& summit,
-            const PointOn& point) {
+double beyond(const PlacedBody& placed, const Vec3& direction, double length, const Summit& summit,
+              const PointOn& point) {
   const WideVec turned = placed.bodyFromWorld<Wide>(direction.cast<Wide>());
   Wide most = 0;
   forEachFarthest(placed, placed.bodyFromWorld<double>(direction), supportSlack(placed, length),
@@ -246,23 +259,24 @@ Wide beyond(const PlacedBody& placed, const Vec3& direction, double length, cons
                     const WideVec p = placed.body->vertices[i].cast<Wide>();
                     most = std::max(most, turned.dot(p - point.wide()));
                   });
-  return most;
+  return static_cast<double>(most);
 }
 
-/// Raises search.lower to what the walk's last direction d proves of w, the vector from point to
-/// point: along d no point of B - A is less than w by more than the bodies reach beyond their
-/// points, and w . d / |d| = |w| cos(w, d) >= |w| - |w - d|^2 / |w| where that is positive, as
-/// cos >= cos^2.
-/// Rounding: w is off by 24 eta reach (Combination), and by 2u |w| as rounded. A turned
-/// direction is off by 3 eta |d| S beside vertices, its product with the difference of two, at most
-/// 2 S, by 8 eta |d| S more, and by 8.1 eta |d| S for the point: together below 24 eta |d| S.
-void proveLower(const MinkowskiDifference& difference, const Combination& at,
-                Search<double>& search) {
+/// What the walk's last direction d proves of the length of w, the vector from point to point, as
+/// far as it is more than at.length.head; minus infinity: nothing. Along d no point of B - A is
+/// less than w by more than the bodies reach beyond their points, and w . d / |d| = |w| cos(w, d)
+/// >= |w| - |w - d|^2 / |w| where that is positive, as cos >= cos^2. Rounding: w is off by 24 eta
+/// reach (Combination), and by 2u |w| as rounded. A turned direction is off by 3 eta |d| S beside
+/// vertices, its product with the difference of two, at most 2 S, by 8 eta |d| S more, and by 8.1
+/// eta |d| S for the point: together below 24 eta |d| S.
+double provedMore(const MinkowskiDifference& difference, const Combination& at,
+                  const Search<double>& search) {
   const double error = 2 * at.error;
   const auto [head, tail] = at.length;
-  if (!search.hasDirection() || !(head > 0x1p10 * error)) return;
+  if (!search.hasDirection() || !(head > 0x1p10 * error))
+    return -std::numeric_limits<double>::infinity();
   const Vec3& d = search.direction;
-  Wide far = 0;
+  double far = 0;
   const auto& [ofA, ofB] = search.summits;
   if (!ofA.alone || ofA.vertex != at.ofA.vertex)
     far += beyond(difference.a, d, search.length, ofA, at.ofA);
@@ -271,11 +285,13 @@ void proveLower(const MinkowskiDifference& difference, const Combination& at,
   const double blur = error + 2 * kUnit * head;
   const Vec3 off = at.aToB - d;
   const double slip = 2 * (dot(off, off) + blur * blur) / head;
-  const double lost = (slip + static_cast<double>(far) / search.length + error) * (1 + 0x1p-8);
-  search.lower = std::max(search.lower, Wide{head} + (tail - lost));
+  const double lost = (slip + far / search.length + error) * (1 + 0x1p-8);
+  return tail - lost;
 }
-/// The walk has done that.
-void proveLower(const MinkowskiDifference&, const Combination&, Search<Wide>&) {}
+/// Its supports have proved it.
+double provedMore(const MinkowskiDifference&, const Combination& at, const Search<Wide>& search) {
+  return static_cast<double>(search.lower - at.length.head);
+}
 
 enum class Outcome : std::uint8_t {
   open,    ///< not proved, or not to the bound that Decision promises
@@ -283,11 +299,11 @@ enum class Outcome : std::uint8_t {
   decided
 };
 
-/// Fills in what holds of separated bodies that are proved to be search.lower apart.
-template <class Real>
-Outcome describeSeparation(const Combination& at, const Search<Real>& search, Decision& decision) {
+/// Fills in what holds of separated bodies that are proved to be at.length.head + low apart, along
+/// `axis`.
+Outcome describeSeparation(const Combination& at, double low, const Vec3& axis,
+                           Decision& decision) {
   const auto [head, tail] = at.length;
-  const auto low = static_cast<double>(search.lower - head);
   const double more = std::max(tail, low);
   const double distance = head + more;
   const double rest = (head - distance) + more;  // exact (Dekker's fast two-sum)
@@ -298,7 +314,7 @@ Outcome describeSeparation(const Combination& at, const Search<Real>& search, De
   // Where the bound is no small part of the distance, the vector from point to point may lead
   // anywhere, and only the last unit will do.
   const bool fine = bound <= kFine * distance;
-  decision.normal = fine ? Vec3(at.aToB / distance) : search.axis();
+  decision.normal = fine ? Vec3(at.aToB / distance) : axis;
   return bound <= (fine ? kMostError : 1) * kUnit * at.largest ? Outcome::decided : Outcome::open;
 }
 
@@ -342,19 +358,24 @@ bool findInside(const MinkowskiDifference& difference, const Simplex<Real>& simp
 }
 
 /// Fills in what the features that the walk ended at prove. `axis` is the last one known to part
-/// the bodies.
+/// the bodies; a nearest point that proves nothing may point anywhere.
 template <class Real>
 Outcome conclude(const MinkowskiDifference& difference, Search<Real>& search, double limit,
                  Vec3& axis, Decision& decision) {
-  if (search.lower > limit) return Outcome::beyond;
+  if (search.beyond) {
+    axis = search.axis();
+    return Outcome::beyond;
+  }
   const bool inside = search.simplex.holdsOrigin;
-  Combination at(difference, search.simplex);
+  Combination at(difference, search.simplex, search.distance);
   if (inside) sharpen(difference, search.simplex, at);
-  proveLower(difference, at, search);
-  if (search.lower > limit) return Outcome::beyond;
+  const double low = provedMore(difference, at, search);
+  const double head = at.length.head;
+  if (low > -head) axis = search.axis();
+  if ((head - limit) + low > 0) return Outcome::beyond;
   decision.pointA = at.pointA + difference.a.body->translation;
   decision.pointB = at.pointB + difference.a.body->translation;
-  if (search.lower > 0) return describeSeparation(at, search, decision);
+  if (low > -head) return describeSeparation(at, low, axis, decision);
   if (!at.isCommonPoint(difference.a.body->translation)) return Outcome::open;
   const bool again = std::is_same_v<Real, Wide> && fitsDoubles(difference);
   if (!inside && findTouching(difference, search, again, axis)) {
