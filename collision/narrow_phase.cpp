@@ -179,15 +179,23 @@ struct Combination {
         error(static_cast<double>(4 * difference.pointError())) {
     const Wide squared = set<0>(difference) + set<1>(difference) + set<2>(difference);
     setLength(squared, static_cast<double>(about));
-    largest = std::max(largestOf(pointA), largestOf(pointB));
+    largest = std::max(largestOf(pointA), largestOf(pointB)) * (1 - 8 * kUnit);
+  }
+  /// Whether `metres` are at most so many units of rounding of the largest coordinate.
+  template <class Real>
+  bool isWithin(double metres, double units, const Simplex<Real>& simplex) {
+    if (metres <= units * kUnit * largest) return true;
     for (int i = 0; i < simplex.size; ++i)  // a vertex of A or one of B has half of it
-      largest = std::max(largest, largestOf(simplex.points[i].template cast<double>()) / 2);
-    largest *= 1 - 8 * kUnit;
+      largest = std::max(largest,
+                         largestOf(simplex.points[i].template cast<double>()) * (0.5 - 4 * kUnit));
+    return metres <= units * kUnit * largest;
   }
   /// For both bodies, as closely as doubles tell, from t_A and in the world.
-  bool isCommonPoint(const Vec3& tA) const {
+  template <class Real>
+  bool isCommonPoint(const Vec3& tA, const Simplex<Real>& simplex) {
+    if (!isWithin(length.head, 2, simplex)) return false;
     const double inWorld = std::max(largestOf(pointA + tA), largest - largestOf(tA));
-    return length.head <= 2 * kUnit * std::min(largest, 4 * inWorld);
+    return length.head <= 8 * kUnit * inWorld;
   }
 
  private:
@@ -230,7 +238,6 @@ struct Combination {
 /// instead.
 void sharpen(const MinkowskiDifference& difference, const Simplex<double>& simplex,
              Combination& at) {
-  if (at.isCommonPoint(difference.a.body->translation)) return;
   Simplex<Wide> sharp;
   sharp.pairs = simplex.pairs;
   sharp.size = simplex.size;
@@ -301,8 +308,9 @@ enum class Outcome : std::uint8_t {
 
 /// Fills in what holds of separated bodies that are proved to be at.length.head + low apart, along
 /// `axis`.
-Outcome describeSeparation(const Combination& at, double low, const Vec3& axis,
-                           Decision& decision) {
+template <class Real>
+Outcome describeSeparation(const Simplex<Real>& simplex, double low, const Vec3& axis,
+                           Combination& at, Decision& decision) {
   const auto [head, tail] = at.length;
   const double more = std::max(tail, low);
   const double distance = head + more;
@@ -315,7 +323,7 @@ Outcome describeSeparation(const Combination& at, double low, const Vec3& axis,
   // anywhere, and only the last unit will do.
   const bool fine = bound <= kFine * distance;
   decision.normal = fine ? Vec3(at.aToB / distance) : axis;
-  return bound <= (fine ? kMostError : 1) * kUnit * at.largest ? Outcome::decided : Outcome::open;
+  return at.isWithin(bound, fine ? kMostError : 1, simplex) ? Outcome::decided : Outcome::open;
 }
 
 /// Whether the bodies are proved to touch along `axis`, the last one known, or along another that
@@ -366,17 +374,26 @@ Outcome conclude(const MinkowskiDifference& difference, Search<Real>& search, do
     axis = search.axis();
     return Outcome::beyond;
   }
-  const bool inside = search.simplex.holdsOrigin;
-  Combination at(difference, search.simplex, search.distance);
-  if (inside) sharpen(difference, search.simplex, at);
-  const double low = provedMore(difference, at, search);
-  const double head = at.length.head;
-  if (low > -head) axis = search.axis();
-  if ((head - limit) + low > 0) return Outcome::beyond;
-  decision.pointA = at.pointA + difference.a.body->translation;
-  decision.pointB = at.pointB + difference.a.body->translation;
-  if (low > -head) return describeSeparation(at, low, axis, decision);
-  if (!at.isCommonPoint(difference.a.body->translation)) return Outcome::open;
+  const Simplex<Real>& simplex = search.simplex;
+  const Vec3& tA = difference.a.body->translation;
+  const bool inside = simplex.holdsOrigin;
+  Combination at(difference, simplex, search.distance);
+  bool common = inside && at.isCommonPoint(tA, simplex);
+  if (inside && !common) {
+    sharpen(difference, simplex, at);
+    common = at.isCommonPoint(tA, simplex);
+  }
+  decision.pointA = at.pointA + tA;
+  decision.pointB = at.pointB + tA;
+  if (!inside) {
+    const double low = provedMore(difference, at, search);
+    const bool apart = low > -at.length.head;
+    if (apart) axis = search.axis();
+    if ((at.length.head - limit) + low > 0) return Outcome::beyond;
+    if (apart) return describeSeparation(simplex, low, axis, at, decision);
+    common = at.isCommonPoint(tA, simplex);
+  }
+  if (!common) return Outcome::open;
   const bool again = std::is_same_v<Real, Wide> && fitsDoubles(difference);
   if (!inside && findTouching(difference, search, again, axis)) {
     decision.verdict = Verdict::touching;
@@ -384,7 +401,7 @@ Outcome conclude(const MinkowskiDifference& difference, Search<Real>& search, do
     decision.normal = axis.stableNormalized();
     return Outcome::decided;
   }
-  if (!inside && !findInside(difference, search.simplex)) return Outcome::open;
+  if (!inside && !findInside(difference, simplex)) return Outcome::open;
   decision.verdict = Verdict::penetrating;
   return Outcome::decided;
 }
