@@ -16,47 +16,18 @@ void requireFinite(const ConvexBody& body, const char* name) {
     if (!p.allFinite()) refuse("a vertex");
 }
 
-/// The greatest coordinate of a body along a direction of its own frame.
-struct Support {
-  std::uint32_t vertex = 0;
-  Wide along = 0;
-};
-
-Support farthest(const PlacedBody& placed, const WideVec& direction, const Vec3& rounded,
-                 double length, const Summit& summit) {
-  Support support;
-  bool first = true;
+/// The vertex that is farthest along a direction of the body's own frame.
+std::uint32_t farthest(const PlacedBody& placed, const WideVec& direction, const Vec3& rounded,
+                       double length, const Summit& summit) {
+  std::uint32_t vertex = summit.vertex;
+  Wide most = -std::numeric_limits<Wide>::infinity();
   forEachFarthest(placed, rounded, supportSlack(placed, length), summit, [&](std::uint32_t i) {
     const Vec3& p = placed.body->vertices[i];
     const Wide along = direction.x() * p.x() + direction.y() * p.y() + direction.z() * p.z();
-    if (!first && along <= support.along) return;
-    support = {i, along};
-    first = false;
+    if (!(along > most)) return;
+    vertex = i, most = along;
   });
-  return support;
-}
-
-/// `rounded`: `direction` in doubles, `length` at least that of both.
-Least leastFrom(const MinkowskiDifference& difference, const WideVec& direction,
-                const Vec3& rounded, double length, const Summits& summits) {
-  const PlacedBody &a = difference.a, &b = difference.b;
-  Least least;
-  if (summits.alone()) {
-    least.pair = summits.pair();
-    least.along = direction.dot(difference(least.pair));
-  } else {
-    const Support ofA = farthest(a, a.bodyFromWorld<Wide>(direction),
-                                 a.bodyFromWorld<double>(rounded), length, summits.a);
-    const Support ofB = farthest(b, b.bodyFromWorld<Wide>(-direction),
-                                 b.bodyFromWorld<double>(-rounded), length, summits.b);
-    least.pair = {ofA.vertex, ofB.vertex};
-    least.along = direction.dot(difference.shift()) - ofB.along - ofA.along;
-  }
-  // The point is off by 6 eta reach a coordinate, so by 6 sqrt(3) eta reach along the direction;
-  // the product of two vectors rounds by 3 eta |d| |w|, |w| <= sqrt(3) reach. Turning the direction
-  // instead of the vertices loses less.
-  least.bound = least.along - 16 * kWideUnit * Wide{length} * difference.reach;
-  return least;
+  return vertex;
 }
 
 /// Into the range of doubles, where products neither over- nor underflow.
@@ -89,6 +60,19 @@ void climb(const MinkowskiDifference& difference, const Vec3& direction, double 
       climb(b, b.bodyFromWorld<double>(-direction), supportSlack(b, length), hint.b, enough);
 }
 
+Least TurnedDirection::least(const Summits& summits) const {
+  Least least{summits.pair()};
+  if (!summits.a.alone)
+    least.pair.a =
+        farthest(difference.a, inA, difference.a.bodyFromWorld<double>(rounded), length, summits.a);
+  if (!summits.b.alone)
+    least.pair.b = farthest(difference.b, -inB, difference.b.bodyFromWorld<double>(-rounded),
+                            length, summits.b);
+  least.along = along(least.pair);
+  least.bound = least.along - error();
+  return least;
+}
+
 Least leastAlong(const MinkowskiDifference& difference, const WideVec& direction, Wide length,
                  VertexPair& hint) {
   if (needsScaling(length)) {
@@ -100,8 +84,8 @@ Least leastAlong(const MinkowskiDifference& difference, const WideVec& direction
   }
   const Vec3 rounded = direction.cast<double>();
   const double longer = static_cast<double>(length) * (1 + 8 * kUnit);
-  const Least least =
-      leastFrom(difference, direction, rounded, longer, climb(difference, rounded, longer, hint));
+  const TurnedDirection turned(difference, direction, rounded, longer);
+  const Least least = turned.least(climb(difference, rounded, longer, hint));
   hint = least.pair;
   return least;
 }

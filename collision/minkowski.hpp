@@ -181,6 +181,36 @@ struct Least {
   Wide bound = 0;  ///< direction . w >= bound for every w of B - A, exactly
 };
 
+/// A direction in both bodies' frames, which costs less than to turn more than two vertices.
+struct TurnedDirection {
+  const MinkowskiDifference& difference;
+  Vec3 rounded;   ///< the direction
+  double length;  ///< at least that of both
+  WideVec inA, inB;
+  Wide alongShift;
+
+  TurnedDirection(const MinkowskiDifference& of, const WideVec& direction, const Vec3& inDoubles,
+                  double atLeast)
+      : difference(of),
+        rounded(inDoubles),
+        length(atLeast),
+        inA(of.a.bodyFromWorld<Wide>(direction)),
+        inB(of.b.bodyFromWorld<Wide>(direction)),
+        alongShift(direction.dot(of.shift())) {}
+  /// direction . w(pair), off by less than error().
+  Wide along(VertexPair pair) const {
+    const Vec3 &a = difference.a.body->vertices[pair.a], &b = difference.b.body->vertices[pair.b];
+    return alongShift + (inB.x() * b.x() + inB.y() * b.y() + inB.z() * b.z()) -
+           (inA.x() * a.x() + inA.y() * a.y() + inA.z() * a.z());
+  }
+  /// A point of B - A is off by 6 eta reach a coordinate, so by 6 sqrt(3) eta reach along the
+  /// direction; the product of two vectors rounds by 3 eta |d| |w|, |w| <= sqrt(3) reach. Turning
+  /// the direction instead of the vertices loses less.
+  Wide error() const { return 16 * kWideUnit * Wide{length} * difference.reach; }
+  /// `summits`: of a climb along `rounded`.
+  Least least(const Summits& summits) const;
+};
+
 /// `direction`: not zero, `length` its length. `hint`: vertices to climb from; the best ones
 /// afterwards.
 Least leastAlong(const MinkowskiDifference& difference, const WideVec& direction, Wide length,

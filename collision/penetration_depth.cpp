@@ -34,7 +34,7 @@ constexpr double kBoundsMeet = 1e-12;        // relative: upper and lower bound 
 template <class Real>
 bool restore(const DepthCache& cache, Polytope<Real>& polytope) {
   const MinkowskiDifference& difference = polytope.difference;
-  if (cache.facets.empty() || cache.vertices.size() > kMostRemembered) return false;
+  if (cache.facets.empty() || cache.vertices.size() > kMostCorners) return false;
   for (const VertexPair& pair : cache.vertices) {
     if (pair.a >= difference.a.vertexCount() || pair.b >= difference.b.vertexCount()) return false;
     polytope.addCorner(pair);
@@ -70,50 +70,96 @@ Facet<Wide> sharpened(const Facet<Real>& facet, const Polytope<Real>& polytope) 
   const auto& c = facet.corners;
   const auto& pairs = polytope.pairs;
   const MinkowskiDifference& difference = polytope.difference;
-  return facetOf<Wide>(c, difference(pairs[c[0]]), difference(pairs[c[1]]),
-                       difference(pairs[c[2]]));
+  Facet<Wide> sharp;
+  setFacet<Wide>(c, difference(pairs[c[0]]), difference(pairs[c[1]]), difference(pairs[c[2]]),
+                 sharp);
+  return sharp;
 }
 
-/// What the polytope and a support along its nearest facet prove.
+/// `least`, the distance of the nearest facet, or less where others are nearer.
 template <class Real>
-Bounds prove(const Facet<Real>& nearest, Polytope<Real>& polytope) {
+Wide leastDistance(Wide least, const Facet<Real>& nearest, Polytope<Real>& polytope) {
   const double reach = polytope.difference.reach;
-  const Facet<Wide> sharp = sharpened(nearest, polytope);
-  Bounds bounds;
-  boundAlong(polytope.difference, sharp.normal, polytope.pairs[nearest.corners[0]], bounds);
-  for (int k = 0; k < 3; ++k) bounds.facet[k] = polytope.pairs[nearest.corners[k]];
-  Wide least = std::sqrt(sharp.nearness);
   for (const Facet<Real>& facet : polytope.all()) {
     const Wide clear = least + facetError<Real>(reach);
     if (&facet == &nearest || facet.nearness * (1 - 8 * unitOf<Real>()) > clear * clear) continue;
     least = std::min(least, std::sqrt(sharpened(facet, polytope).nearness));
   }
-  bounds.lower = std::max(Wide{0}, least * (1 - 8 * kWideUnit) - facetError<Wide>(reach));
+  return least * (1 - 8 * kWideUnit) - facetError<Wide>(reach);
+}
+
+/// What the polytope and a support along its nearest facet prove.
+template <class Real>
+Bounds prove(const Facet<Real>& nearest, Polytope<Real>& polytope) {
+  const Facet<Wide> sharp = sharpened(nearest, polytope);
+  Bounds bounds;
+  boundAlong(polytope.difference, sharp.normal, polytope.pairs[nearest.corners[0]], bounds);
+  for (int k = 0; k < 3; ++k) bounds.facet[k] = polytope.pairs[nearest.corners[k]];
+  bounds.lower = std::max(Wide{0}, leastDistance(std::sqrt(sharp.nearness), nearest, polytope));
   return bounds;
 }
 
-/// How far beyond the facet the farthest point of M lies, up to rounding, and which it is.
+/// The farthest point of M along a facet's normal.
+template <class Real>
 struct Beyond {
   VertexPair pair;
-  Wide metres;
+  Real metres;  ///< beyond the facet, up to rounding
+  Vec3 inward;  ///< in doubles alone: the direction, unit up to rounding, and its summits
+  Summits summits;
 };
-Beyond beyond(const Facet<double>& facet, const Polytope<double>& polytope) {
-  const double length = facet.normal.norm();
-  const Vec3 inward = facet.normal * (-1 / length);
+Beyond<double> beyond(const Facet<double>& facet, const Polytope<double>& polytope) {
+  const Vec3 inward = facet.normal * (-1 / lengthOf(facet.normal));
   const Summits summits =
       climb(polytope.difference, inward, kUnitLength, polytope.pairs[facet.corners[0]]);
   const Along along = alongOf(polytope.difference, inward, 1, summits);
-  return {summits.pair(), -along.value - std::sqrt(facet.nearness)};
+  return {summits.pair(), -along.value - std::sqrt(facet.nearness), inward, summits};
 }
-Beyond beyond(const Facet<Wide>& facet, const Polytope<Wide>& polytope) {
+Beyond<Wide> beyond(const Facet<Wide>& facet, const Polytope<Wide>& polytope) {
   VertexPair hint = polytope.pairs[facet.corners[0]];
   const Wide length = facet.normal.norm();
   const Least least = leastAlong(polytope.difference, -facet.normal, length, hint);
-  return {least.pair, -least.along / length - std::sqrt(facet.nearness)};
+  return {least.pair, -least.along / length - std::sqrt(facet.nearness), {}, {}};
+}
+
+/// What prove() does, by the nearest facet's normal as rounded to doubles: along any direction, no
+/// point of the facet is nearer than the nearest of its corners. That is worth less where the depth
+/// is small.
+Bounds proveByRounded(const Facet<double>& nearest, const Beyond<double>& farthest,
+                      Polytope<double>& polytope) {
+  const WideVec inward = farthest.inward.cast<Wide>();
+  const Wide length = lengthOf(inward);
+  const TurnedDirection turned(polytope.difference, inward, farthest.inward, kUnitLength);
+  const Least least = turned.least(farthest.summits);
+  Bounds bounds;
+  bounds.upper = -least.bound / length * (1 + 8 * kWideUnit);
+  bounds.direction = -inward;
+  bounds.support = least.pair;
+  Wide lower = std::numeric_limits<Wide>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    bounds.facet[k] = polytope.pairs[nearest.corners[k]];
+    lower = std::min(lower, -turned.along(bounds.facet[k]));
+  }
+  lower = std::max(Wide{0}, lower / length);
+  bounds.lower = std::max(Wide{0}, leastDistance(lower, nearest, polytope));
+  return bounds;
 }
 
 bool meet(const Bounds& bounds, const MinkowskiDifference& difference) {
   return bounds.upper - bounds.lower <= kBoundsMeet * bounds.lower + 16 * difference.pointError();
+}
+
+/// First those that are not proved to face away, as where the origin lies in their plane.
+template <class Real>
+const Facet<Real>& nearestOf(const Polytope<Real>& polytope) {
+  const Facet<Real>* nearest = polytope.facets.data();
+  bool away = polytope.facesAway(*nearest);
+  for (std::size_t k = 1; k < polytope.facetCount; ++k) {
+    const Facet<Real>& facet = polytope.facets[k];
+    const bool itIs = polytope.facesAway(facet);
+    if (itIs == away ? !(facet.nearness < nearest->nearness) : itIs) continue;
+    nearest = &facet, away = itIs;
+  }
+  return *nearest;
 }
 
 /// True: the bounds meet.
@@ -121,17 +167,16 @@ template <class Real>
 bool expandUntilBoundsMeet(Polytope<Real>& polytope, Bounds& bounds) {
   const Real little = 64 * unitOf<Real>() * static_cast<Real>(polytope.difference.reach);
   while (true) {  // ends: each turn adds a corner
-    // First those that are not proved to face away, as where the origin lies in their plane.
-    const Facet<Real>& nearest = *std::min_element(
-        polytope.all().begin(), polytope.all().end(), [&](const auto& a, const auto& b) {
-          const bool awayA = polytope.facesAway(a), awayB = polytope.facesAway(b);
-          return awayA != awayB ? awayB : a.nearness < b.nearness;
-        });
+    const Facet<Real>& nearest = nearestOf(polytope);
     const bool away = polytope.facesAway(nearest);
-    const Beyond farthest = beyond(nearest, polytope);
+    const Beyond<Real> farthest = beyond(nearest, polytope);
     VertexPair next = farthest.pair;
     if ((away && farthest.metres <= little) || polytope.holds(next)) {
       if (!away) return false;
+      if constexpr (std::is_same_v<Real, double>) {
+        bounds = proveByRounded(nearest, farthest, polytope);
+        if (meet(bounds, polytope.difference)) return true;
+      }
       bounds = prove(nearest, polytope);
       if (meet(bounds, polytope.difference)) return true;
       if (polytope.holds(bounds.support)) return false;
@@ -159,12 +204,25 @@ void boundBySomeAxes(const MinkowskiDifference& difference, const FeatureCache& 
   }
 }
 
+/// Without the corners that no facet has any more. False: it is too large to be worth it.
 template <class Real>
-void remember(const Polytope<Real>& polytope, DepthCache& cache) {
-  cache.vertices.assign(polytope.pairs.begin(), polytope.pairs.begin() + polytope.corners);
-  cache.facets.clear();
-  for (std::size_t k = 0; k < polytope.facetCount; ++k)
-    cache.facets.push_back(polytope.facets[k].corners);
+bool remember(const Polytope<Real>& polytope, DepthCache& cache) {
+  constexpr std::uint16_t kNone = kMostCorners;
+  std::array<std::uint16_t, kMostCorners> place;
+  std::fill_n(place.begin(), polytope.corners, kNone);
+  cache.vertices.clear();
+  cache.facets.resize(polytope.facetCount);
+  for (std::size_t k = 0; k < polytope.facetCount; ++k) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint16_t corner = polytope.facets[k].corners[i];
+      if (place[corner] == kNone) {
+        place[corner] = static_cast<std::uint16_t>(cache.vertices.size());
+        cache.vertices.push_back(polytope.pairs[corner]);
+      }
+      cache.facets[k][i] = place[corner];
+    }
+  }
+  return cache.vertices.size() <= kMostRemembered;
 }
 
 /// From the first start that proves the depth, if any does.
@@ -172,15 +230,19 @@ template <class Real>
 bool findDepth(const MinkowskiDifference& difference, const FeatureCache& decided,
                DepthCache& cache, Bounds& bounds) {
   Polytope<Real> polytope(difference);
+  if (restore(cache, polytope) && expandUntilBoundsMeet(polytope, bounds)) {
+    const bool asItWas = polytope.corners == cache.vertices.size();
+    if (!asItWas && !remember(polytope, cache)) cache = {};
+    return true;
+  }
   const auto proves = [&](auto&& start) {
     polytope.clear();
     return start() && expandUntilBoundsMeet(polytope, bounds);
   };
   const std::span simplex(decided.pairs.data(), static_cast<std::size_t>(decided.size));
-  const bool proved = proves([&] { return restore(cache, polytope); }) ||
-                      proves([&] { return surround<Real>(simplex, polytope); }) ||
+  const bool proved = proves([&] { return surround<Real>(simplex, polytope); }) ||
                       proves([&] { return surroundBySearch<Real>(polytope); });
-  if (proved && polytope.corners <= kMostRemembered) remember(polytope, cache);
+  if (proved && !remember(polytope, cache)) cache = {};
   return proved;
 }
 

@@ -21,11 +21,14 @@ struct Facet {
 };
 
 template <class Real>
-Facet<Real> facetOf(const Corners& corners, const Eigen::Matrix<Real, 3, 1>& a,
-                    const Eigen::Matrix<Real, 3, 1>& b, const Eigen::Matrix<Real, 3, 1>& c) {
+void setFacet(const Corners& corners, const Eigen::Matrix<Real, 3, 1>& a,
+              const Eigen::Matrix<Real, 3, 1>& b, const Eigen::Matrix<Real, 3, 1>& c,
+              Facet<Real>& facet) {
   const Eigen::Matrix<Real, 3, 1> normal = (b - a).cross(c - a);
-  const Real offset = std::min(std::min(normal.dot(a), normal.dot(b)), normal.dot(c));
-  return {corners, normal, offset, offset * offset / normal.squaredNorm()};
+  facet.corners = corners;
+  facet.normal = normal;
+  facet.offset = std::min(std::min(dot(normal, a), dot(normal, b)), dot(normal, c));
+  facet.nearness = facet.offset * facet.offset / dot(normal, normal);
 }
 
 /// How much nearer than sqrt(nearness) a facet may be, in metres. Whatever its normal n was rounded
@@ -44,7 +47,11 @@ struct Polytope {
 
   const MinkowskiDifference& difference;
   Real leastDeterminant;  ///< proves that three points are turned as their determinant says
-  std::array<VertexPair, kMostCorners> pairs;
+  struct Pair {           // a VertexPair that nobody sets to zero first
+    std::uint32_t a, b;
+    operator VertexPair() const { return {a, b}; }
+  };
+  std::array<Pair, kMostCorners> pairs;
   std::array<Vec, kMostCorners> points;
   std::array<Facet<Real>, 2 * kMostCorners> facets;
   std::size_t corners = 0, facetCount = 0;
@@ -60,19 +67,22 @@ struct Polytope {
   bool facesAway(const Facet<Real>& facet) const { return facet.offset > leastDeterminant; }
   std::span<Facet<Real>> all() { return {facets.data(), facetCount}; }
   bool holds(VertexPair pair) const {
-    return std::find(pairs.begin(), pairs.begin() + corners, pair) != pairs.begin() + corners;
+    const auto isIt = [&](const Pair& held) { return VertexPair(held) == pair; };
+    return std::any_of(pairs.begin(), pairs.begin() + corners, isIt);
   }
   std::uint16_t addCorner(VertexPair pair) {
-    pairs[corners] = pair;
+    pairs[corners] = {pair.a, pair.b};
     points[corners] = difference.point<Real>(pair);
     return static_cast<std::uint16_t>(corners++);
   }
   /// False, and nothing added, when the facet is not proved to face away from the origin (and
   /// `anyTurn` is not set), or when there is no room.
   bool addFacet(const Corners& of, bool anyTurn = false) {
-    const Facet<Real> facet = facetOf<Real>(of, points[of[0]], points[of[1]], points[of[2]]);
-    if (!(anyTurn || facesAway(facet)) || facetCount == facets.size()) return false;
-    facets[facetCount++] = facet;
+    if (facetCount == facets.size()) return false;
+    Facet<Real>& facet = facets[facetCount];
+    setFacet<Real>(of, points[of[0]], points[of[1]], points[of[2]], facet);
+    if (!(anyTurn || facesAway(facet))) return false;
+    ++facetCount;
     return true;
   }
 };
