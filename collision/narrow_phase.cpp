@@ -159,26 +159,26 @@ double largestOf(const Vec3& v) {
   return v.cwiseAbs().maxCoeff();
 }
 
+struct Length {
+  double head = 0, tail = 0;
+};
+
 /// The points of A and B that the simplex' weights name.
 /// Weights round by at most 8.1 eta S a body, turning by 3 eta S, shift and sums by eta (S_A +
 /// 2 S_B + 3 sqrt(3) D), the length by 2.5 sqrt(3) eta reach: below 17.5 eta reach; `error` is 24.
 struct Combination {
   PointOn ofA, ofB;
   Vec3 pointA, pointB, aToB;  ///< world axes, from t_A; rounded
-  struct {
-    double head = 0, tail = 0;
-  } length;        ///< of aToB before that: an unevaluated sum
-  double error;    ///< of the length, metres
-  double largest;  ///< of the |coordinates| of both bodies from t_A, from below
+  Wide squared;               ///< length of aToB before that
+  double error;               ///< of that length, metres
+  double largest;             ///< of the |coordinates| of both bodies from t_A, from below
 
-  /// `about`: what the length may be.
   template <class Real>
-  Combination(const MinkowskiDifference& difference, const Simplex<Real>& simplex, Real about)
+  Combination(const MinkowskiDifference& difference, const Simplex<Real>& simplex)
       : ofA(pointOn(simplex, difference.a, &VertexPair::a)),
         ofB(pointOn(simplex, difference.b, &VertexPair::b)),
         error(static_cast<double>(4 * difference.pointError())) {
-    const Wide squared = set<0>(difference) + set<1>(difference) + set<2>(difference);
-    setLength(squared, static_cast<double>(about));
+    squared = set<0>(difference) + set<1>(difference) + set<2>(difference);
     largest = std::max(largestOf(pointA), largestOf(pointB)) * (1 - 8 * kUnit);
   }
   /// Whether `metres` are at most so many units of rounding of the largest coordinate.
@@ -190,27 +190,27 @@ struct Combination {
                          largestOf(simplex.points[i].template cast<double>()) * (0.5 - 4 * kUnit));
     return metres <= units * kUnit * largest;
   }
+  /// As an unevaluated sum; `about`: what it may be. A step of Newton's is off by less than the
+  /// square of itself / length.
+  Length length(double about) const {
+    const auto step = [&](double head) {
+      return Length{head, static_cast<double>(squared - Wide{head} * head) * (0.5 / head)};
+    };
+    const Length length = step(about);
+    if (std::abs(length.tail) <= 0x1p-36 * about) return length;
+    const double root = rootOf(squared);
+    return root > 0 ? step(root) : Length{};
+  }
   /// For both bodies, as closely as doubles tell, from t_A and in the world.
   template <class Real>
   bool isCommonPoint(const Vec3& tA, const Simplex<Real>& simplex) {
-    if (!isWithin(length.head, 2, simplex)) return false;
+    const double length = rootOf(squared);
+    if (!isWithin(length, 2, simplex)) return false;
     const double inWorld = std::max(largestOf(pointA + tA), largest - largestOf(tA));
-    return length.head <= 8 * kUnit * inWorld;
+    return length <= 8 * kUnit * inWorld;
   }
 
  private:
-  /// A step of Newton's is off by less than the square of itself / length.
-  void setLength(Wide squared, double about) {
-    const auto step = [&](double head) {
-      return static_cast<double>(squared - Wide{head} * head) * (0.5 / head);
-    };
-    if (about > 0) {
-      length = {about, step(about)};
-      if (std::abs(length.tail) <= 0x1p-36 * about) return;
-    }
-    const double root = rootOf(squared);
-    length = {root, root > 0 ? step(root) : 0};
-  }
   /// A coordinate of the points; returns what it adds to the squared length.
   template <int k>
   Wide set(const MinkowskiDifference& difference) {
@@ -225,12 +225,14 @@ struct Combination {
   }
   template <int k>
   static Wide turned(const ConvexBody& body, const PointOn& p) {
-    if (!body.rotation) return Wide{p.head[k]} + p.tail[k];
+    if (p.vertex != PointOn::kNone) return turnedRow<k>(body, body.vertices[p.vertex]);
+    return turnedRow<k>(body, p.combined);
+  }
+  template <int k, class Point>
+  static Wide turnedRow(const ConvexBody& body, const Point& p) {
+    if (!body.rotation) return p[k];
     const Mat3& r = *body.rotation;
-    const Wide head =
-        Wide{r(k, 0)} * p.head[0] + Wide{r(k, 1)} * p.head[1] + Wide{r(k, 2)} * p.head[2];
-    if (p.vertex != PointOn::kNone) return head;
-    return head + (r(k, 0) * p.tail[0] + r(k, 1) * p.tail[1] + r(k, 2) * p.tail[2]);
+    return Wide{r(k, 0)} * p[0] + Wide{r(k, 1)} * p[1] + Wide{r(k, 2)} * p[2];
   }
 };
 
@@ -251,7 +253,7 @@ void sharpen(const MinkowskiDifference& difference, const Simplex<double>& simpl
     sharp.weight[i] = Wide{simplex.weight[i]} + change[i];
     if (!(sharp.weight[i] >= 0)) return;
   }
-  at = Combination(difference, sharp, Wide{0});
+  at = Combination(difference, sharp);
 }
 void sharpen(const MinkowskiDifference&, const Simplex<Wide>&, Combination&) {}
 
@@ -260,26 +262,29 @@ void sharpen(const MinkowskiDifference&, const Simplex<Wide>&, Combination&) {}
 double beyond(const PlacedBody& placed, const Vec3& direction, double length, const Summit& summit,
               const PointOn& point) {
   const WideVec turned = placed.bodyFromWorld<Wide>(direction.cast<Wide>());
-  Wide most = 0;
+  const auto along = [&](const auto& p) {
+    return turned.x() * p.x() + turned.y() * p.y() + turned.z() * p.z();
+  };
+  const Wide least = along(point.in(*placed.body));
+  Wide most = least;
   forEachFarthest(placed, placed.bodyFromWorld<double>(direction), supportSlack(placed, length),
-                  summit, [&](std::uint32_t i) {
-                    const WideVec p = placed.body->vertices[i].cast<Wide>();
-                    most = std::max(most, turned.dot(p - point.wide()));
-                  });
-  return static_cast<double>(most);
+                  summit,
+                  [&](std::uint32_t i) { most = std::max(most, along(placed.body->vertices[i])); });
+  return static_cast<double>(most - least);
 }
 
 /// What the walk's last direction d proves of the length of w, the vector from point to point, as
-/// far as it is more than at.length.head; minus infinity: nothing. Along d no point of B - A is
-/// less than w by more than the bodies reach beyond their points, and w . d / |d| = |w| cos(w, d)
-/// >= |w| - |w - d|^2 / |w| where that is positive, as cos >= cos^2. Rounding: w is off by 24 eta
-/// reach (Combination), and by 2u |w| as rounded. A turned direction is off by 3 eta |d| S beside
-/// vertices, its product with the difference of two, at most 2 S, by 8 eta |d| S more, and by 8.1
-/// eta |d| S for the point: together below 24 eta |d| S.
+/// far as it is more than length.head; minus infinity: nothing. Along d no point of B - A is less
+/// than w by more than the bodies reach beyond their points, and w . d / |d| = |w| cos(w, d)
+/// >= |w| - |w - d|^2 / |w| where that is positive, as cos >= cos^2.
+/// Rounding: w is off by 24 eta reach (Combination), and by 2u |w| as rounded. The turned direction
+/// is off by 3 eta |d| S beside a vertex, so by twice that beside the way from a body's point to
+/// its vertex; both products round by 3 eta |d| S, their difference by one, and the point by
+/// 8.1 eta S: together below 24 eta |d| S.
 double provedMore(const MinkowskiDifference& difference, const Combination& at,
-                  const Search<double>& search) {
+                  const Length& length, const Search<double>& search) {
   const double error = 2 * at.error;
-  const auto [head, tail] = at.length;
+  const auto [head, tail] = length;
   if (!search.hasDirection() || !(head > 0x1p10 * error))
     return -std::numeric_limits<double>::infinity();
   const Vec3& d = search.direction;
@@ -296,8 +301,9 @@ double provedMore(const MinkowskiDifference& difference, const Combination& at,
   return tail - lost;
 }
 /// Its supports have proved it.
-double provedMore(const MinkowskiDifference&, const Combination& at, const Search<Wide>& search) {
-  return static_cast<double>(search.lower - at.length.head);
+double provedMore(const MinkowskiDifference&, const Combination&, const Length& length,
+                  const Search<Wide>& search) {
+  return static_cast<double>(search.lower - length.head);
 }
 
 enum class Outcome : std::uint8_t {
@@ -306,12 +312,12 @@ enum class Outcome : std::uint8_t {
   decided
 };
 
-/// Fills in what holds of separated bodies that are proved to be at.length.head + low apart, along
+/// Fills in what holds of separated bodies that are proved to be length.head + low apart, along
 /// `axis`.
 template <class Real>
-Outcome describeSeparation(const Simplex<Real>& simplex, double low, const Vec3& axis,
-                           Combination& at, Decision& decision) {
-  const auto [head, tail] = at.length;
+Outcome describeSeparation(const Simplex<Real>& simplex, const Length& length, double low,
+                           const Vec3& axis, Combination& at, Decision& decision) {
+  const auto [head, tail] = length;
   const double more = std::max(tail, low);
   const double distance = head + more;
   const double rest = (head - distance) + more;  // exact (Dekker's fast two-sum)
@@ -377,7 +383,7 @@ Outcome conclude(const MinkowskiDifference& difference, Search<Real>& search, do
   const Simplex<Real>& simplex = search.simplex;
   const Vec3& tA = difference.a.body->translation;
   const bool inside = simplex.holdsOrigin;
-  Combination at(difference, simplex, search.distance);
+  Combination at(difference, simplex);
   bool common = inside && at.isCommonPoint(tA, simplex);
   if (inside && !common) {
     sharpen(difference, simplex, at);
@@ -386,11 +392,12 @@ Outcome conclude(const MinkowskiDifference& difference, Search<Real>& search, do
   decision.pointA = at.pointA + tA;
   decision.pointB = at.pointB + tA;
   if (!inside) {
-    const double low = provedMore(difference, at, search);
-    const bool apart = low > -at.length.head;
+    const Length length = at.length(static_cast<double>(search.distance));
+    const double low = provedMore(difference, at, length, search);
+    const bool apart = low > -length.head;
     if (apart) axis = search.axis();
-    if ((at.length.head - limit) + low > 0) return Outcome::beyond;
-    if (apart) return describeSeparation(simplex, low, axis, at, decision);
+    if ((length.head - limit) + low > 0) return Outcome::beyond;
+    if (apart) return describeSeparation(simplex, length, low, axis, at, decision);
     common = at.isCommonPoint(tA, simplex);
   }
   if (!common) return Outcome::open;

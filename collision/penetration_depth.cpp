@@ -260,7 +260,8 @@ void describe(const MinkowskiDifference& difference, const Bounds& bounds, Depth
     deepest.add(difference, bounds.support);
   }
   deepest.reduce(difference);
-  const WideVec onA = difference.a.turned(pointOn(deepest, difference.a, &VertexPair::a).wide());
+  const PointOn ofA = pointOn(deepest, difference.a, &VertexPair::a);
+  const WideVec onA = difference.a.turned(ofA.in(*difference.a.body));
   depth.pointA = (onA + difference.a.body->translation.cast<Wide>()).cast<double>();
   depth.pointB = depth.pointA - depth.depth * depth.normal;
 }

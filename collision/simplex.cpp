@@ -140,10 +140,7 @@ PointOn combinedPointOn(const Simplex<Real>& simplex, const PlacedBody& placed,
     y += weight * (Wide{q.y()} - p.y());
     z += weight * (Wide{q.z()} - p.z());
   }
-  const Vec3 head(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z));
-  const Vec3 tail(static_cast<double>(x - head.x()), static_cast<double>(y - head.y()),
-                  static_cast<double>(z - head.z()));
-  return {head, tail, PointOn::kNone};
+  return {PointOn::kNone, {x, y, z}};
 }
 
 template struct Simplex<double>;

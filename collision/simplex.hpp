@@ -27,13 +27,15 @@ struct Simplex {
   void keepNearestFace(double reach);
 };
 
-/// A point of one body, in its frame: the unevaluated sum of `head` and `tail`.
+/// A point of one body: one of its vertices, or where it lies in the body's frame.
 struct PointOn {
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-  Vec3 head, tail;
-  std::uint32_t vertex;  ///< that it is, exactly; else kNone
+  std::uint32_t vertex;  ///< else kNone
+  WideVec combined;      ///< where it is no vertex
 
-  WideVec wide() const { return head.cast<Wide>() + tail.cast<Wide>(); }
+  WideVec in(const ConvexBody& body) const {
+    return vertex == kNone ? combined : WideVec(body.vertices[vertex].cast<Wide>());
+  }
 };
 
 /// The point of one body that the weights name. It is a point of the body up to the error of a
@@ -47,7 +49,7 @@ PointOn pointOn(const Simplex<Real>& simplex, const PlacedBody& placed,
   const std::uint32_t first = simplex.pairs[0].*vertex;
   for (int i = 1; i < simplex.size; ++i)
     if (simplex.pairs[i].*vertex != first) return combinedPointOn(simplex, placed, vertex);
-  return {placed.body->vertices[first], Vec3::Zero(), first};
+  return {first, {}};
 }
 
 template <class Real>
