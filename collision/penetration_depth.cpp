@@ -80,9 +80,10 @@ Facet<Wide> sharpened(const Facet<Real>& facet, const Polytope<Real>& polytope) 
 template <class Real>
 Wide leastDistance(Wide least, const Facet<Real>& nearest, Polytope<Real>& polytope) {
   const double reach = polytope.difference.reach;
+  const Wide clear = least + facetError<Real>(reach);
+  const Real squared = static_cast<Real>(clear * clear) * (1 + 16 * unitOf<Real>());
   for (const Facet<Real>& facet : polytope.all()) {
-    const Wide clear = least + facetError<Real>(reach);
-    if (&facet == &nearest || facet.nearness * (1 - 8 * unitOf<Real>()) > clear * clear) continue;
+    if (facet.nearness > squared || &facet == &nearest) continue;
     least = std::min(least, std::sqrt(sharpened(facet, polytope).nearness));
   }
   return least * (1 - 8 * kWideUnit) - facetError<Wide>(reach);
