@@ -1,18 +1,18 @@
 // Steps
 //  1. Both bodies go into one frame, axes as the world's, origin at t_A: translations are
-//  subtracted
-//     before anything is rounded, so a scene far from the origin loses nothing.
+//     subtracted before anything is rounded, so a scene far from the origin loses nothing.
 //  2. The walk over closest features. The pair of features is kept as a simplex of the Minkowski
 //     difference B - A: one point is vertex-vertex, two span vertex-edge (or a diagonal), three
 //     vertex-face or edge-edge. It starts at last tick's features; a support along the nearest
-//     point, climbed to over the hulls' edges from last tick's vertices, proves them closest or
+//     point, climbed to over the hulls' edges from the simplex' vertices, proves them closest or
 //     names the feature to go on with. That is GJK (Gilbert, Johnson, Keerthi 1988) with the
-//     coherence of Lin and Canny (1991) as in Cameron, "Enhancing GJK" (1997). The walk is in
+//     coherence of Lin and Canny (1991) as in Cameron, "Enhancing GJK" (1997). A climb ends where
+//     the origin is passed (findSupport): among near features the walk stays near them. It is in
 //     doubles; it ends, since |nearest| falls at every step but a bounded number of equal ones.
-//  3. The filter. One support in extended precision proves that all of B - A lies beyond a plane;
-//     where that plane stands clear of the origin by more than the rounding bound, the bodies are
-//     `separated`, at least by that. A tetrahedron that holds the origin by more than the bound
-//     proves `penetrating`.
+//  3. The filter. The vector between the closest points, in extended precision, and how far it
+//     slips from the walk's last direction prove a plane (provedMore) that all of B - A lies
+//     beyond; where it stands clear of the origin, the bodies are `separated`, at least by that. A
+//     tetrahedron that holds the origin by more than the rounding bound proves `penetrating`.
 //  4. An origin that lies on the simplex: exact sums of doubles may prove `touching`
 //     (touching_proof.hpp), a polytope grown from the simplex `penetrating` (polytope.hpp).
 //  5. Where that is not enough, as among slivers, steps 2 to 4 in extended precision.
