@@ -46,6 +46,10 @@ bool valid(const FeatureCache& cache, const ConvexBody& a, const ConvexBody& b) 
   return true;
 }
 
+/// At least one and a few roundings: makes a rounded length one that is not less.
+template <class Real>
+constexpr Real kLonger = 1 + 16 * unitOf<Real>();
+
 /// What the walk over features found.
 template <class Real>
 struct Search {
@@ -60,7 +64,7 @@ struct Search {
   bool beyond = false;          ///< proved: the distance is greater than the limit
 
   /// `direction`, unit up to rounding.
-  Vec3 axis() const { return (direction * (1 / length)).template cast<double>(); }
+  Vec3 axis() const { return (direction * (kLonger<Real> / length)).template cast<double>(); }
   /// False: the simplex holds the origin, or all but touches it.
   bool hasDirection() const {
     constexpr bool isDouble = std::is_same_v<Real, double>;
@@ -120,7 +124,7 @@ void walk(const MinkowskiDifference& difference, double limit, Search<Real>& sea
   int equalSteps = 0;
   for (int i = 0; i < kIterationBound && search.hasDirection(); ++i) {
     search.direction = simplex.nearest;
-    search.length = search.distance * (1 + 16 * unitOf<Real>());
+    search.length = search.distance * kLonger<Real>;
     const Support<Real> support = findSupport(difference, i < kLocalSteps, limit, search);
     if (search.beyond ||
         search.distance * search.distance - support.along <= enough * search.length ||
