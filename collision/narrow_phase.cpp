@@ -6,9 +6,10 @@
 //     vertex-face or edge-edge. It starts at last tick's features; a support along the nearest
 //     point, climbed to over the hulls' edges from the simplex' vertices, proves them closest or
 //     names the feature to go on with. That is GJK (Gilbert, Johnson, Keerthi 1988) with the
-//     coherence of Lin and Canny (1991) as in Cameron, "Enhancing GJK" (1997). A climb ends where
-//     the origin is passed (findSupport): among near features the walk stays near them. It is in
-//     doubles; it ends, since |nearest| falls at every step but a bounded number of equal ones.
+//     coherence of Lin and Canny (1991) as in Cameron, "Enhancing GJK" (1997). From last tick's
+//     features, climbs end where the origin is passed (findSupport), so that the walk stays near
+//     them. It is in doubles; it ends, since |nearest| falls at every step but a bounded number of
+//     equal ones.
 //  3. The filter. The vector between the closest points, in extended precision, and how far it
 //     slips from the walk's last direction prove a plane (provedMore) that all of B - A lies
 //     beyond; where it stands clear of the origin, the bodies are `separated`, at least by that. A
@@ -35,7 +36,7 @@ constexpr double kMostError = 15;  // units of rounding of the largest coordinat
 constexpr double kFine = 0x1p-32;  // of the distance: see describeSeparation
 constexpr double kLeastInDoubles = 1e-140;  // metres: below, a squared length loses bits
 constexpr int kMostEqualSteps = 4;          // of a walk, that come no nearer
-constexpr int kLocalSteps = 12;             // of a walk: see findSupport
+constexpr int kLocalSteps = 12;             // of a warm walk: see findSupport
 constexpr int kIterationBound = 96;  // about 10 are usual, from nothing; reaching it: the next step
 
 bool valid(const FeatureCache& cache, const ConvexBody& a, const ConvexBody& b) {
@@ -73,16 +74,18 @@ struct Search {
   }
 };
 
-/// The features of last time, or any point.
+/// The features of last time, or any point. True: those of last time.
 template <class Real>
-void start(const MinkowskiDifference& difference, const FeatureCache& cache, Search<Real>& search) {
-  if (valid(cache, *difference.a.body, *difference.b.body)) {
+bool start(const MinkowskiDifference& difference, const FeatureCache& cache, Search<Real>& search) {
+  const bool warm = valid(cache, *difference.a.body, *difference.b.body);
+  if (warm) {
     for (int i = 0; i < cache.size; ++i) search.simplex.add(difference, cache.pairs[i]);
   } else {
     search.simplex.add(difference, {});
   }
   search.simplex.reduce(difference);
   search.distance = lengthOf(search.simplex.nearest);
+  return warm;
 }
 
 /// A point of B - A: the least along search.direction, up to rounding, or one that is beyond the
@@ -118,14 +121,15 @@ Support<Wide> findSupport(const MinkowskiDifference& difference, bool, double li
 /// Ends at the closest features, at a tetrahedron that holds the origin, where the distance is
 /// proved above `limit`, or where Real makes no more progress.
 template <class Real>
-void walk(const MinkowskiDifference& difference, double limit, Search<Real>& search) {
+void walk(const MinkowskiDifference& difference, double limit, int localSteps,
+          Search<Real>& search) {
   const Real enough = 24 * unitOf<Real>() * static_cast<Real>(difference.reach);
   Simplex<Real>& simplex = search.simplex;
   int equalSteps = 0;
   for (int i = 0; i < kIterationBound && search.hasDirection(); ++i) {
     search.direction = simplex.nearest;
     search.length = search.distance * kLonger<Real>;
-    const Support<Real> support = findSupport(difference, i < kLocalSteps, limit, search);
+    const Support<Real> support = findSupport(difference, i < localSteps, limit, search);
     if (search.beyond ||
         search.distance * search.distance - support.along <= enough * search.length ||
         simplex.holds(support.pair))
@@ -436,8 +440,8 @@ template <class Real>
 Outcome search(const MinkowskiDifference& difference, double limit, FeatureCache& cache,
                Decision& decision) {
   Search<Real> search;
-  start(difference, cache, search);
-  walk(difference, limit, search);
+  const bool warm = start(difference, cache, search);
+  walk(difference, limit, warm ? kLocalSteps : 0, search);
   const Outcome outcome = conclude(difference, search, limit, cache.axis, decision);
   remember(search, cache);
   return outcome;
