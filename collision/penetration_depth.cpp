@@ -30,6 +30,7 @@ namespace {
 
 constexpr std::size_t kMostRemembered = 40;  // corners; a polytope grown larger is begun anew
 constexpr double kBoundsMeet = 1e-12;        // relative: upper and lower bound of the depth
+constexpr double kMeetWell = 1e-13;          // the same along a rounded normal
 
 template <class Real>
 bool restore(const DepthCache& cache, Polytope<Real>& polytope) {
@@ -145,8 +146,8 @@ Bounds proveByRounded(const Facet<double>& nearest, const Beyond<double>& farthe
   return bounds;
 }
 
-bool meet(const Bounds& bounds, const MinkowskiDifference& difference) {
-  return bounds.upper - bounds.lower <= kBoundsMeet * bounds.lower + 16 * difference.pointError();
+bool meet(const Bounds& bounds, double within, const MinkowskiDifference& difference) {
+  return bounds.upper - bounds.lower <= within * bounds.lower + 16 * difference.pointError();
 }
 
 /// First those that are not proved to face away, as where the origin lies in their plane.
@@ -176,10 +177,10 @@ bool expandUntilBoundsMeet(Polytope<Real>& polytope, Bounds& bounds) {
       if (!away) return false;
       if constexpr (std::is_same_v<Real, double>) {
         bounds = proveByRounded(nearest, farthest, polytope);
-        if (meet(bounds, polytope.difference)) return true;
+        if (meet(bounds, kMeetWell, polytope.difference)) return true;
       }
       bounds = prove(nearest, polytope);
-      if (meet(bounds, polytope.difference)) return true;
+      if (meet(bounds, kBoundsMeet, polytope.difference)) return true;
       if (polytope.holds(bounds.support)) return false;
       next = bounds.support;
     }
