@@ -79,36 +79,81 @@ struct Grid {
   bool parallel;
   float scale;                  ///< points a metre, in a perspective at a distance of 1 m
   std::vector<float> nearness;  ///< affine on planes, ascending towards the eye
-
-  float shadeAt(std::size_t i, std::size_t j) const;
 };
 
-float Grid::shadeAt(std::size_t i, std::size_t j) const {
-  const float* here = &nearness[j * columns + i];
-  const float near = *here;
-  const float radius =
-      std::clamp(kRadius * scale * (parallel ? 1.0f : near), kFewestPixels / 2, kMostPixels / 2);
-  // Both neighbours lie in the picture.
-  const auto roomX = static_cast<float>(std::min(i, columns - 1 - i)),
-             roomY = static_cast<float>(std::min(j, rows - 1 - j));
-  const Ways& ways = pattern()[j % kPattern * kPattern + i % kPattern];
+/// The shades of points, row by row.
+class Slopes {
+ public:
+  explicit Slopes(const Grid& grid);
+
+  void shadeRow(std::size_t j, std::span<float> shades);
+
+ private:
+  /// Of a pair of neighbours, for each point of a row.
+  struct PairRow {
+    std::vector<float> x, y, length;
+  };
+
+  void stepRow(const PairRow& ways, float roomY);
+
+  const Grid& grid_;
+  std::array<std::array<PairRow, kPairs>, kPattern> ways_;  ///< of the rows of the pattern
+  std::vector<float> roomX_;                                ///< points to the nearer side
+  std::vector<float> radius_, mean_;
+  std::vector<int> step_;  ///< from a point to the one neighbour; to the other it is the opposite
+};
+
+Slopes::Slopes(const Grid& grid)
+    : grid_(grid), radius_(grid.columns), mean_(grid.columns), step_(grid.columns) {
+  for (std::size_t i = 0; i < grid.columns; ++i)
+    roomX_.push_back(static_cast<float>(std::min(i, grid.columns - 1 - i)));
+  for (std::size_t j = 0; j < kPattern; ++j) {
+    for (std::size_t k = 0; k < kPairs; ++k) {
+      PairRow& row = ways_[j][k];
+      for (std::size_t i = 0; i < grid.columns; ++i) {
+        const Ways& ways = pattern()[j * kPattern + i % kPattern];
+        row.x.push_back(ways.x[k]);
+        row.y.push_back(ways.y[k]);
+        row.length.push_back(ways.length[k]);
+      }
+    }
+  }
+}
+
+/// Both neighbours lie in the picture.
+void Slopes::stepRow(const PairRow& ways, float roomY) {
   constexpr float kAbove = 4096.5f;  // more than any picture has points; truncating then rounds
-  std::array<int, kPairs> x, y;
-  for (std::size_t k = 0; k < kPairs; ++k) {
-    x[k] = static_cast<int>(std::min(std::max(ways.x[k] * radius, -roomX), roomX) + kAbove) - 4096;
-    y[k] = static_cast<int>(std::min(std::max(ways.y[k] * radius, -roomY), roomY) + kAbove) - 4096;
+  const int columns = static_cast<int>(grid_.columns);
+  const auto rounded = [](float way, float room) {
+    return static_cast<int>(std::min(std::max(way, -room), room) + kAbove) - 4096;
+  };
+  for (std::size_t i = 0; i < step_.size(); ++i) {
+    const int x = rounded(ways.x[i] * radius_[i], roomX_[i]);
+    step_[i] = columns * rounded(ways.y[i] * radius_[i], roomY) + x;
   }
-  Pairs mean;
-  for (std::size_t k = 0; k < kPairs; ++k) {
-    const std::ptrdiff_t step = static_cast<std::ptrdiff_t>(columns) * y[k] + x[k];
-    mean[k] = 0.5f * (here[step] + here[-step]);
+}
+
+void Slopes::shadeRow(std::size_t j, std::span<float> shades) {
+  const float* near = &grid_.nearness[j * grid_.columns];
+  const bool parallel = grid_.parallel;
+  const float scale = grid_.scale;
+  for (std::size_t i = 0; i < shades.size(); ++i) {
+    radius_[i] = std::clamp(kRadius * scale * (parallel ? 1.0f : near[i]), kFewestPixels / 2,
+                            kMostPixels / 2);
+    shades[i] = 0;
   }
-  float sum = 0;
-  for (std::size_t k = 0; k < kPairs; ++k) {
-    const float rise = (mean[k] - near) / (parallel ? 1.0f : std::max(mean[k], 1e-30f));
-    sum += shadeOfSlope(rise * scale / std::max(ways.length[k] * radius, 1.0f));
+  const auto roomY = static_cast<float>(std::min(j, grid_.rows - 1 - j));
+  for (const PairRow& ways : ways_[j % kPattern]) {
+    stepRow(ways, roomY);
+    for (std::size_t i = 0; i < shades.size(); ++i)
+      mean_[i] =
+          0.5f * (near[static_cast<int>(i) + step_[i]] + near[static_cast<int>(i) - step_[i]]);
+    for (std::size_t i = 0; i < shades.size(); ++i) {
+      const float rise = (mean_[i] - near[i]) / (parallel ? 1.0f : std::max(mean_[i], 1e-30f));
+      const float way = std::max(ways.length[i] * radius_[i], 1.0f);
+      shades[i] += shadeOfSlope(rise * scale / way) / kPairs;
+    }
   }
-  return sum / kPairs;
 }
 
 /// Values of points and their sums while they are averaged.
@@ -192,10 +237,11 @@ Hollows::Hollows(const std::vector<float>& depth, const Camera& camera)
     grid.nearness[i] = parallel_ ? -std::min(places_[i], far) : 1 / places_[i];
   Averages shades{places_, parallel_, std::vector<float>(points), std::vector<float>(points),
                   std::vector<float>(points)};
-  for (std::size_t j = 0, point = 0; j < rows; ++j) {
-    for (std::size_t i = 0; i < columns_; ++i, ++point)
-      if (places_[point] < kNothing) shades.shades[point] = grid.shadeAt(i, j);
-  }
+  Slopes slopes(grid);
+  for (std::size_t j = 0; j < rows; ++j)
+    slopes.shadeRow(j, std::span(shades.shades).subspan(j * columns_, columns_));
+  for (std::size_t i = 0; i < points; ++i)
+    shades.shades[i] = places_[i] < kNothing ? shades.shades[i] : 0.0f;
   average(shades, columns_, rows);
   shadows_ = std::move(shades.shades);
   for (float& shadow : shadows_) shadow *= 255 * kStrength;
@@ -203,30 +249,36 @@ Hollows::Hollows(const std::vector<float>& depth, const Camera& camera)
 
 void Hollows::row(int y, std::span<std::uint8_t> left) const {
   const auto row = static_cast<std::size_t>(y);
-  // The points of the row; of an odd one what the rows above and below say of them.
-  std::vector<float> places(width_ + 1), shadows(columns_ + 1);
-  for (std::size_t x = 0; x < width_; ++x) {
-    const float z = depth_[row * width_ + x];
-    places[x] = std::isnan(z) ? kNothing : z;
-  }
+  // The points of the row; of an odd one what the rows above and below say of them. And the pixels
+  // between them, after each point one.
+  const std::size_t count = width_ / 2;
+  std::vector<float> points(columns_ + 1), shadows(columns_ + 1), others(count),
+      otherShadows(count);
+  const float* depth = &depth_[row * width_];
+  const auto placeAt = [&](std::size_t x) { return std::isnan(depth[x]) ? kNothing : depth[x]; };
+  for (std::size_t i = 0; i < columns_; ++i) points[i] = placeAt(2 * i);
+  for (std::size_t i = 0; i < count; ++i) others[i] = placeAt(2 * i + 1);
   const std::size_t above = row / 2 * columns_;
   const std::size_t last = places_.size() - columns_;
   const std::size_t below = std::min((row + 1) / 2 * columns_, last);
   for (std::size_t i = 0; i < columns_; ++i) {
-    const float place = places[2 * i];
-    shadows[i] = between(place, sameWithin(place, parallel_), places_[above + i],
+    shadows[i] = between(points[i], sameWithin(points[i], parallel_), places_[above + i],
                          shadows_[above + i], places_[below + i], shadows_[below + i]);
   }
-  places[width_] = kNothing;
+  points[columns_] = kNothing;
   shadows[columns_] = 0;
-  for (std::size_t x = 0; x < width_; x += 2)
-    left[x] = static_cast<std::uint8_t>(255.5f - shadows[x / 2]);
-  for (std::size_t x = 1; x < width_; x += 2) {
-    const float place = places[x];
-    const float shadow = between(place, sameWithin(place, parallel_), places[x - 1], shadows[x / 2],
-                                 places[x + 1], shadows[x / 2 + 1]);
-    left[x] = static_cast<std::uint8_t>(255.5f - shadow);
+  for (std::size_t i = 0; i < count; ++i) {
+    otherShadows[i] = between(others[i], sameWithin(others[i], parallel_), points[i], shadows[i],
+                              points[i + 1], shadows[i + 1]);
   }
+  const auto byte = [](float shadow) {
+    return static_cast<std::uint8_t>(static_cast<int>(255.5f - shadow));
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    left[2 * i] = byte(shadows[i]);
+    left[2 * i + 1] = byte(otherShadows[i]);
+  }
+  if (count < columns_) left[2 * count] = byte(shadows[count]);
 }
 
 }  // namespace enfilade::render

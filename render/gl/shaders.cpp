@@ -93,9 +93,15 @@ vec3 facingNormal(vec3 toEye) {
 
 void main() {
 #ifdef SHADED
-  bool plan = forward.w > 0.5;
-  float distance = plan ? 0.0 : length(point);
-  vec3 toEye = plan ? -forward.xyz : -point / max(distance, 1e-6);
+#ifdef PLAN
+  float distance = 0.0;
+  vec3 toEye = -forward.xyz;
+#else
+  float square = max(dot(point, point), 1e-12);
+  float inverse = inversesqrt(square);
+  float distance = square * inverse;
+  vec3 toEye = -inverse * point;
+#endif
   vec3 n = facingNormal(toEye);  // before any discard: derivatives are undefined after it
 #endif
   vec4 albedo = base;
@@ -107,10 +113,13 @@ void main() {
 #endif
 #ifdef SHADED
   vec3 radiance = lit(albedo.rgb, n, toEye, distance, finish.y, finish.z) + kGlow * glow.rgb;
+#ifdef PLAN
   // A plan cuts things open; their insides are darker, so that cut walls stand out.
   bool inside = gl_FrontFacing == (glow.w > 0.5);
-  if (plan && inside && finish.w < 0.5) radiance *= kCutOpen;
-  if (!plan) radiance = inAir(radiance, distance);
+  if (inside && finish.w < 0.5) radiance *= kCutOpen;
+#else
+  radiance = inAir(radiance, distance);
+#endif
 #ifdef BLEND
   colour = vec4(exposed(radiance), glassAlpha(albedo.a, n, toEye));
 #else
@@ -126,21 +135,23 @@ void main() {
 
 constexpr const char* kSkyVertex = R"(
 out vec3 direction;
+flat out float plan;
 
 void main() {
   vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
   direction = middle.xyz + corner.x * rightByX.xyz + corner.y * upByY.xyz;
+  plan = forward.w;
   gl_Position = vec4(corner, 0.0, 1.0);  // depth 0 is the farthest
 }
 )";
 
 constexpr const char* kSkyFragment = R"(
 in vec3 direction;
+flat in float plan;
 layout(location = 0) out vec4 colour;
 
 void main() {
-  bool plan = forward.w > 0.5;
-  colour = vec4(plan ? planPaper() : exposed(skyFor(normalize(direction))), 1.0);
+  colour = vec4(plan > 0.5 ? planPaper() : exposed(skyFor(normalize(direction))), 1.0);
 }
 )";
 
@@ -157,6 +168,7 @@ std::string surfaceFragmentSource(const SurfaceVariant& variant) {
   if (variant.blend) source += "#define BLEND\n";
   if (variant.normals) source += "#define NORMALS\n";
   if (variant.shaded) source += "#define SHADED\n";
+  if (variant.plan) source += "#define PLAN\n";
   return source + kFrameBlock + kLight + kSurfaceFragment;
 }
 

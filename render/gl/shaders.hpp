@@ -12,6 +12,7 @@ struct SurfaceVariant {
   bool mask = false;     ///< cuts holes: costs the early depth test
   bool blend = false;    ///< colour only, with alpha
   bool normals = false;  ///< writes them to colour attachment 2
+  bool plan = false;     ///< orthographic; else a perspective
   bool shaded = true;    ///< else its depth alone, to the last bit that of the shaded one
 };
 

@@ -120,9 +120,10 @@ unsigned SurfacePass::program(const Batch& batch) {
   variant.textured = batch.texture >= 0 && (shaded_ || variant.mask);
   variant.blend = shaded_ && batch.pass == Pass::blend;
   variant.normals = shaded_ && normals_;
+  variant.plan = shaded_ && plan_;
   std::size_t index = 0;
-  for (const bool has :
-       {variant.mask, variant.shaded, variant.textured, variant.blend, variant.normals})
+  for (const bool has : {variant.mask, variant.shaded, variant.textured, variant.blend,
+                         variant.normals, variant.plan})
     index = 2 * index + (has ? 1 : 0);
   std::optional<GlProgram>& program = surfaces_[index];
   if (!program) {
@@ -132,6 +133,7 @@ unsigned SurfacePass::program(const Batch& batch) {
 }
 
 void SurfacePass::begin(const Camera& camera) {
+  plan_ = camera.projection == Camera::Projection::orthographic;
   const FrameUniforms frame = uniformsOf(camera);
   glNamedBufferSubData(uniforms_.name(), 0, sizeof(frame), &frame);
   glBindBufferBase(GL_UNIFORM_BUFFER, kFrameUniforms, uniforms_.name());

@@ -52,8 +52,8 @@ class SurfacePass {
   GlVertexArray vertexArray_;
   GlBuffer uniforms_;
   GlProgram sky_;
-  std::array<std::optional<GlProgram>, 32> surfaces_;  ///< see program()
-  bool shaded_ = true, normals_ = false;
+  std::array<std::optional<GlProgram>, 64> surfaces_;  ///< see program()
+  bool shaded_ = true, normals_ = false, plan_ = false;
   StreamBuffer instances_, commands_;
 };
 
