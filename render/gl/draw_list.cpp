@@ -192,9 +192,10 @@ DrawLists drawLists(const Drawable& drawable, const std::vector<BodyPlacement>& 
     list.instances.push_back(placed(worldFromMesh, range.centre, camera.eye,
                                     drawable.materials[part.mesh], part.object + 1));
     append(list, part, solid && part.pass == Pass::blend ? Pass::opaque : part.pass, range,
-           options.culling == Culling::singly);
+           list.singly);
   };
   DrawLists lists;
+  lists.surfaces.singly = lists.glass.singly = options.culling == Culling::singly;
   std::vector<std::uint32_t> glass;
   for (const std::uint32_t index : parts) {
     const Part& part = drawable.parts[index];

@@ -70,6 +70,7 @@ struct DrawList {
   std::vector<Instance> instances;
   std::vector<DrawCommand> commands;
   std::vector<Batch> batches;
+  bool singly = false;  ///< each command is a call of its own: Culling::singly
 };
 
 MaterialData materialData(const scene::Material& material);

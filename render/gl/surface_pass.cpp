@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <span>
 
 #include "render/gl/shaders.hpp"
 #include "render/view.hpp"
@@ -90,6 +91,17 @@ GlVertexArray makeVertexArray() {
   glVertexArrayAttribBinding(array, id, kInstanceBinding);
   glVertexArrayBindingDivisor(array, kInstanceBinding, 1);
   return result;
+}
+
+/// As others draw, a call for each object.
+void drawSingly(std::span<const DrawCommand> commands) {
+  for (const DrawCommand& command : commands) {
+    const std::size_t offset = sizeof(std::uint32_t) * command.firstIndex;
+    glDrawElementsInstancedBaseVertexBaseInstance(
+        GL_TRIANGLES, static_cast<GLsizei>(command.count), GL_UNSIGNED_INT,
+        reinterpret_cast<const void*>(offset), static_cast<GLsizei>(command.instanceCount),
+        command.baseVertex, command.baseInstance);
+  }
 }
 
 }  // namespace
@@ -179,6 +191,10 @@ void SurfacePass::draw(const DrawList& list, const Geometry& geometry) {
     glUseProgram(program(batch));
     if (batch.texture >= 0) {
       glBindTextureUnit(0, geometry.textures[static_cast<std::size_t>(batch.texture)].name());
+    }
+    if (list.singly) {
+      drawSingly(std::span(list.commands).subspan(batch.firstCommand, batch.commandCount));
+      continue;
     }
     const std::size_t offset = sizeof(DrawCommand) * batch.firstCommand;
     glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT,

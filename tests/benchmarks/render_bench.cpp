@@ -27,6 +27,8 @@ using namespace enfilade;
 using Clock = std::chrono::steady_clock;
 using collision::Vec3;
 
+constexpr std::size_t kCompared = 15;  // stops of a walk
+
 struct Size {
   int width, height;
 };
@@ -84,7 +86,8 @@ render::Frame draw(render::GlRenderer& renderer, const tests::WalkStop& stop, Si
   return frame;
 }
 
-/// Walks once with culling alone, as it is used; then frames of both are compared.
+/// Walks once with culling alone, as it is used; then again over some stops, where frames of both
+/// are compared. Only those stops are timed, of the first walk and of drawing singly.
 void measure(const std::shared_ptr<const scene::Scene>& scene, const std::string& name,
              bool textured, Size size, int frames) {
   const std::vector<tests::WalkStop> stops = walkIn(scene, name, frames);
@@ -95,10 +98,11 @@ void measure(const std::shared_ptr<const scene::Scene>& scene, const std::string
   render::GlRenderer renderer(scene);
   Result warm, culled, single, ignored;
   for (int i = 0; i < 3; ++i) draw(renderer, stops[0], size, render::Culling::hidden, warm);
-  for (const auto& stop : stops) draw(renderer, stop, size, render::Culling::hidden, culled);
+  const std::size_t every = std::max<std::size_t>(1, stops.size() / kCompared);
+  for (std::size_t i = 0; i < stops.size(); ++i)
+    draw(renderer, stops[i], size, render::Culling::hidden, i % every == 0 ? culled : warm);
   std::size_t different = 0, compared = 0;
   draw(renderer, stops[0], size, render::Culling::singly, warm);
-  const std::size_t every = std::max<std::size_t>(1, stops.size() / 6);
   for (std::size_t i = 0; i < stops.size(); i += every, ++compared) {
     const render::Frame all = draw(renderer, stops[i], size, render::Culling::singly, single);
     const render::Frame seen = draw(renderer, stops[i], size, render::Culling::hidden, ignored);
