@@ -142,6 +142,7 @@ DrawList GlRenderer::State::drawSurfaces(const Job& job, const Choice& choice) {
 void GlRenderer::State::drawAir(const DrawList& glass) {
   target.drawInto({true, false, false, false});
   pass->drawSky();
+  if (glass.commands.empty()) return;
   pass->blendGlass();
   pass->draw(glass, {buffers.vertices.name(), buffers.indices.name(), buffers.textures});
 }

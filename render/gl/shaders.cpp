@@ -81,6 +81,15 @@ layout(location = 2) out vec4 facing;
 layout(binding = 0) uniform sampler2D baseColourTexture;
 #endif
 
+// exposed() and the encoding of sRGB in one: a rational function of the root, fitted to both, never
+// farther off than a quarter of a byte's step. Encoding in the frame buffer costs processors that
+// play GPU three times as much, since they read, decode, select and encode what is there.
+vec3 encoded(vec3 radiance) {
+  vec3 t = sqrt(clamp(radiance, 0.0, 9.0));  // all beyond is white
+  return t * (-0.101668 + t * (16.2093 + t * (251.839 + t * 13.5556))) /
+         (1.0 + t * (2.352 + t * (240.678 + t * (-25.9677 + t * (127.038 + t * -15.3394)))));
+}
+
 // Always towards the eye: real models are wound both ways, mirrored, or have no normals at all.
 vec3 facingNormal(vec3 toEye) {
   vec3 flat_ = cross(dFdx(point), dFdy(point));
@@ -123,7 +132,7 @@ void main() {
 #ifdef BLEND
   colour = vec4(exposed(radiance), glassAlpha(albedo.a, n, toEye));
 #else
-  colour = vec4(exposed(radiance), 1.0);
+  colour = vec4(encoded(radiance), 1.0);
   seen = entity;
 #endif
 #ifdef NORMALS
@@ -151,7 +160,9 @@ flat in float plan;
 layout(location = 0) out vec4 colour;
 
 void main() {
-  colour = vec4(plan > 0.5 ? planPaper() : exposed(skyFor(normalize(direction))), 1.0);
+  vec3 linear = plan > 0.5 ? planPaper() : exposed(skyFor(normalize(direction)));
+  // As sRGB: nothing in the sky is so dark that its encoding is a straight line.
+  colour = vec4(1.055 * pow(linear, vec3(1.0 / 2.4)) - 0.055, 1.0);
 }
 )";
 

@@ -153,7 +153,7 @@ void SurfacePass::begin(const Camera& camera) {
   glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);  // row 0 on top, reversed depth
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_GREATER);
-  glEnable(GL_FRAMEBUFFER_SRGB);
+  glDisable(GL_FRAMEBUFFER_SRGB);  // shaders encode what hides all
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);  // real models are wound both ways
 }
@@ -214,6 +214,7 @@ void SurfacePass::drawSky() const {
 void SurfacePass::blendGlass() {
   normals_ = false;
   glEnable(GL_BLEND);
+  glEnable(GL_FRAMEBUFFER_SRGB);  // light is mixed, not bytes
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE_MINUS_SRC_ALPHA);
 }
 
