@@ -332,6 +332,35 @@ TEST(RayRenderer, IdsAreThoseOfThePictureThatGlDrawsBesidesEdges) {
   EXPECT_LT(meanColour / static_cast<double>(pixels), 0.6);                    // of 255
 }
 
+TEST(RayRenderer, EveryShadeFromBlackToWhiteIsWithinAStepOfGl) {
+  // Boxes side by side, black but for what they give off: from nothing to far more than white.
+  constexpr int kBoxes = 100;
+  std::vector<PlacedBox> boxes;
+  for (int i = 0; i < kBoxes; ++i) {
+    const float t = static_cast<float>(i) / kBoxes;
+    scene::Material material = coloured(0, 0, 0);
+    material.emissive = {4 * t * t * t, t * t, 0.02f * t};
+    material.roughness = 1;
+    boxes.push_back({{-4.95 + 0.1 * i, 0, -5}, {0.1, 1, 0.1}, material});
+  }
+  const auto scene = sceneOf(boxes);
+  RayRenderer rays(scene);
+  GlRenderer gl(scene);
+  const Frame a = rays.render({}, squareCamera(400)), b = gl.render({}, squareCamera(400));
+  std::set<int> shades;
+  for (int x = 2; x < 398; ++x) {
+    const std::size_t i = 3 * at(a, x, 200);
+    if (nearAnEdge(a, x, 200)) continue;
+    for (std::size_t c = 0; c < 3; ++c) {
+      shades.insert(a.rgb[i + c]);
+      EXPECT_NEAR(a.rgb[i + c], b.rgb[i + c], 1) << x << ' ' << c;
+    }
+  }
+  EXPECT_GT(shades.size(), 120u);
+  EXPECT_LT(*shades.begin(), 30);
+  EXPECT_EQ(*shades.rbegin(), 255);
+}
+
 TEST(RayRenderer, ColoursOfTexturesAndPlansAreThoseOfGl) {
   const auto scene = texturedRoom();
   RayRenderer rays(scene);
