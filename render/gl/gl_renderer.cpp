@@ -10,7 +10,9 @@
 //    Mostly that is nothing, or little, which is drawn into the depth, too. Where much was found
 //    (nothing was known of this view), it is searched among: the nearest are drawn first, which
 //    hides most of the others, then twice as many, and so on.
-// 3. What may be seen by the last depth that was read is shaded.
+// 3. What may be seen by the last depth that was read is shaded. Where only ids are wanted, they
+// are
+//    drawn with the depth, and that is all unless something was missing.
 //
 // Why the picture is that of drawing everything: in a pixel the nearest fragment wins, among equals
 // the one drawn last. What is left out lies, wherever it has a fragment, behind something that is
@@ -267,19 +269,23 @@ Choice GlRenderer::State::notHidden(const Job& job, const Choice& drawn) const {
 DrawList GlRenderer::State::drawSeen(Job& job) {
   Seen& seen = memory.recall(job.camera, ++picture);
   Choice drawn = foreseen(job, seen);
-  target.drawInto({false, false, false, false});
+  const Channels& channels = job.options.channels;
+  bool done = !channels.rgb && !channels.normals;
+  target.drawInto({false, done && channels.ids, false, false});
   pass->toDepth();
   drawSurfaces(job, drawn);
   readDepth(job.camera);
   depth.build();
   Choice more = missing(job, drawn);
   if (more.parts.size() > kFewMissing) {
+    done = false;
     drawn = searchAmong(job, std::move(drawn), std::move(more));
   } else {
     const bool glassOnly =
         more.pieces.empty() && std::all_of(more.parts.begin(), more.parts.end(),
                                            [&](std::uint32_t p) { return isGlass(job, p); });
     if (!glassOnly) {
+      done = false;  // what was missing may come before what was drawn in the order
       drawSurfaces(job, more);
       // Now, and not when all is shaded: what needs the depth is worked out while the device
       // shades. The pyramid stays as it is, farther in places than the picture, which hides too
@@ -290,10 +296,13 @@ DrawList GlRenderer::State::drawSeen(Job& job) {
     add(drawn.parts, more.parts);
     add(drawn.pieces, more.pieces);
   }
-  target.drawInto(job.options.channels);
-  pass->shadeNearest(job.options.channels.normals);
   const Choice shaded = notHidden(job, drawn);
-  DrawList glass = drawSurfaces(job, shaded);
+  DrawList glass;
+  if (!done) {
+    target.drawInto(channels);
+    pass->shadeNearest(channels.normals);
+    glass = drawSurfaces(job, shaded);
+  }
   remember(job, drawn, seen);
   job.statistics.drawn = static_cast<std::uint32_t>(shaded.parts.size());
   job.statistics.occluded =

@@ -120,6 +120,9 @@ void main() {
 #ifdef MASK
   if (albedo.a < finish.x) discard;
 #endif
+#ifndef BLEND
+  seen = entity;
+#endif
 #ifdef SHADED
   vec3 radiance = lit(albedo.rgb, n, toEye, distance, finish.y, finish.z) + kGlow * glow.rgb;
 #ifdef PLAN
@@ -133,7 +136,6 @@ void main() {
   colour = vec4(exposed(radiance), glassAlpha(albedo.a, n, toEye));
 #else
   colour = vec4(encoded(radiance), 1.0);
-  seen = entity;
 #endif
 #ifdef NORMALS
   facing = vec4(n, 0.0);

@@ -13,7 +13,7 @@ struct SurfaceVariant {
   bool blend = false;    ///< colour only, with alpha
   bool normals = false;  ///< writes them to colour attachment 2
   bool plan = false;     ///< orthographic; else a perspective
-  bool shaded = true;    ///< else its depth alone, to the last bit that of the shaded one
+  bool shaded = true;    ///< else depth and id alone, to the last bit those of the shaded one
 };
 
 std::string surfaceVertexSource();

@@ -161,7 +161,7 @@ void SurfacePass::begin(const Camera& camera) {
 void SurfacePass::toDepth() {
   shaded_ = false;
   glDepthMask(GL_TRUE);
-  glDepthFunc(GL_GREATER);
+  glDepthFunc(GL_GEQUAL);
 }
 
 void SurfacePass::shadeNearest(bool normals) {

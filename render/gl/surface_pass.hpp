@@ -35,7 +35,7 @@ class SurfacePass {
 
   /// The state that all drawing shares, and the camera.
   void begin(const Camera& camera);
-  /// What is drawn after it has only a depth.
+  /// What is drawn after it has only a depth and an id, of several equally near ones the last.
   void toDepth();
   /// What is drawn after it is shaded where it is as near as the depth that is there.
   void shadeNearest(bool normals);

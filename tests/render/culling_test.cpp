@@ -105,13 +105,14 @@ TEST(Culling, PicturesFromAnywhereAreThoseOfDrawingEverything) {
   std::uint64_t occluded = 0;
   for (int i = 0; i < 60; ++i) {
     const Camera camera = cameraAt(random, i % 4);
-    FrameOptions options{.channels = {true, true, true, true},
+    const bool all = i % 5 != 0;  // else ids and depth alone, which take another way
+    FrameOptions options{.channels = {all, true, true, all},
                          .glass = i % 3 == 0 ? Glass::solid : Glass::clear};
     const Frame culled = renderer.render({}, camera, options);
     options.culling = Culling::outside;
-    const Frame all = renderer.render({}, camera, options);
-    expectSame(culled, all, "picture " + std::to_string(i));
-    EXPECT_LE(culled.statistics.drawn, all.statistics.drawn);
+    const Frame drawn = renderer.render({}, camera, options);
+    expectSame(culled, drawn, "picture " + std::to_string(i));
+    EXPECT_LE(culled.statistics.drawn, drawn.statistics.drawn);
     occluded += culled.statistics.occluded;
   }
   EXPECT_GT(occluded, 60u * 50u);
@@ -148,11 +149,32 @@ TEST(Culling, WhatIsInTheSamePlaceAndComesIntoViewLaterWinsOrLosesAsInDrawingEve
     Camera camera = squareCamera(64);
     for (int i = -40; i <= 40; ++i) {
       camera.eye.x() = 0.1 * i;
-      expectSame(renderer.render({}, camera),
-                 renderer.render({}, camera, {.culling = Culling::outside}),
-                 "step " + std::to_string(i));
+      for (const bool colours : {true, false}) {
+        FrameOptions options{.channels = {.rgb = colours}};
+        const Frame culled = renderer.render({}, camera, options);
+        options.culling = Culling::outside;
+        expectSame(culled, renderer.render({}, camera, options), "step " + std::to_string(i));
+      }
     }
   }
+}
+
+TEST(Culling, AWalkThatShowsIdsAloneKeepsThem) {
+  GlRenderer renderer(sceneOf(rooms(7)));
+  Camera camera;
+  camera.width = camera.height = 80;
+  int once = 0, again = 0;
+  for (int i = 0; i < 120; ++i) {
+    camera.eye = {-11 + 0.15 * (i / 2), 0.1, 1.7};  // every second picture stands
+    camera.forward = {std::cos(0.02 * (i / 2)), 0, std::sin(0.02 * (i / 2))};
+    FrameOptions options{.channels = {.rgb = false}};
+    const Frame culled = renderer.render({}, camera, options);
+    options.culling = Culling::outside;
+    expectSame(culled, renderer.render({}, camera, options), "step " + std::to_string(i));
+    ++(culled.statistics.passes == 1 ? once : again);
+  }
+  EXPECT_GT(once, 30);
+  EXPECT_GT(again, 5);
 }
 
 TEST(Culling, SeveralCamerasInTurnEachKeepTheirPictures) {
