@@ -111,6 +111,12 @@ without textures, masks and glass. Every pixel is compared with a ray in doubles
 or leaves the pixel's plane by a thousandth of the depth. *GL D24 standard* to *D32F reversed* draw all
 triangles at once into that depth buffer and read it back. *GL renderer* and *rays robust* are what
 `enfilade` draws with; rays use two threads.
+
+Time on the clock above the processors' own is time in which threads waited for a core that others had: in
+12 s of frames of the district, measured once by `/proc/PID/task/*/schedstat`, each of Mesa's two threads ran
+3.0 s and waited 6.1 s for a core, the thread that draws ran 2.5 s and waited 2.1 s. An idle machine
+needs no more than the processors' time. Each camera takes three pictures after one that is not timed, so the
+GL renderer knows what is seen there; along walks `render_bench` measures it.
 """, about, "## Speed\n", speed_table(rows, sizes), "## Error of depth\n"]
     for scene in names(rows, "scene"):
         parts += [f"### {scene}\n", error_table(rows, scene, sizes[-1]),
