@@ -89,7 +89,7 @@ void findPatches(Dynamics& dynamics, const NearPairStep& step, StepWork& work) {
   std::vector<std::uint8_t> isNew(pairs.size(), 1);
   // Each round but the last wakes a solid.
   for (std::size_t round = 0; round <= dynamics.solids.size(); ++round) {
-    work.workers.share(pairs.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+    work.workers->share(pairs.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
       for (std::size_t i = from; i < to; ++i)
         if (isNew[i]) work.looks[i] = lookAt(dynamics, pairs[i], step);
     });
@@ -136,15 +136,17 @@ void gatherBodies(const Dynamics& dynamics, StepWork& work) {
 }
 
 void gatherPatches(const Dynamics& dynamics, double epsilon, StepWork& work) {
-  work.patches.reserve(work.patched.size());
-
-  for (const std::uint32_t i : work.patched) {
-    const NearPair& pair = dynamics.pairs[i];
-    work.patches.push_back(*pair.patch());
-    work.patches.back().a = work.local[pair.key.a];
-    work.patches.back().b = work.local[pair.key.b];
-    if (leans(pair, epsilon)) ++work.report.leaning;
-  }
+  work.patches.resize(work.patched.size());
+  work.workers->share(work.patched.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; k < to; ++k) {
+      const NearPair& pair = dynamics.pairs[work.patched[k]];
+      work.patches[k] = *pair.patch();
+      work.patches[k].a = work.local[pair.key.a];
+      work.patches[k].b = work.local[pair.key.b];
+    }
+  });
+  for (const std::uint32_t i : work.patched)
+    if (leans(dynamics.pairs[i], epsilon)) ++work.report.leaning;
   work.report.patches = static_cast<std::uint32_t>(work.patches.size());
 }
 
@@ -163,16 +165,18 @@ void gatherJoints(const Dynamics& dynamics, StepWork& work) {
 }
 
 void keepImpulses(Dynamics& dynamics, const StepWork& work) {
-  for (std::size_t k = 0; k < work.patches.size(); ++k) {
-    ContactPatch& patch = *dynamics.pairs[work.patched[k]].patch();
-    const ContactPatch& solved = work.patches[k];
-    for (std::size_t i = 0; i < patch.size; ++i) {
-      patch.points[i].impulse = solved.points[i].impulse;
-      patch.points[i].push = solved.points[i].push;
+  work.workers->share(work.patches.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; k < to; ++k) {
+      ContactPatch& patch = *dynamics.pairs[work.patched[k]].patch();
+      const ContactPatch& solved = work.patches[k];
+      for (std::size_t i = 0; i < patch.size; ++i) {
+        patch.points[i].impulse = solved.points[i].impulse;
+        patch.points[i].push = solved.points[i].push;
+      }
+      patch.rub = solved.rub;
+      patch.twist = solved.twist;
     }
-    patch.rub = solved.rub;
-    patch.twist = solved.twist;
-  }
+  });
   for (std::size_t k = 0; k < work.joints.size(); ++k)
     dynamics.joints[work.jointOf[k]].impulses = work.joints[k].impulses;
 }
@@ -261,7 +265,8 @@ bool mayMeet(const Solid& a, const Solid& b, double lookout) {
 }
 
 void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates) {
-  std::vector<NearPair> pairs(candidates.size());
+  std::vector<NearPair>& pairs = dynamics.spare;
+  pairs.resize(candidates.size());
   auto old = dynamics.pairs.begin();
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     while (old != dynamics.pairs.end() && old->key < candidates[i]) ++old;
@@ -271,17 +276,24 @@ void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates) {
       pairs[i].key = candidates[i];
     }
   }
-  dynamics.pairs = std::move(pairs);
+  std::swap(dynamics.pairs, dynamics.spare);
+  dynamics.spare.clear();
 }
+
+StepMemory::StepMemory() : work_(std::make_unique<StepWork>()) {}
+StepMemory::~StepMemory() = default;
 
 DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings) {
   Workers alone(1);
-  StepWork work(settings.workers ? *settings.workers : alone);
+  StepWork own, &work = settings.memory ? settings.memory->work() : own;
+  work.clear();
+  work.workers = settings.workers ? settings.workers : &alone;
   findPatches(dynamics, nearStep(settings), work);
   gatherBodies(dynamics, work);
   gatherPatches(dynamics, settings.solver.epsilon, work);
   gatherJoints(dynamics, work);
-  solve(work.bodies, work.patches, work.joints, work.driven, settings.solver, work.workers);
+  solve(work.bodies, work.patches, work.joints, work.driven, settings.solver, *work.workers,
+        work.system);
   keepImpulses(dynamics, work);
   proveWays(dynamics, settings.solver.seconds, work);
   setOut(dynamics, work);

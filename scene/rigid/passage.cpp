@@ -224,8 +224,10 @@ double clearAlong(const PartShape& partA, const Passage& a, const PartShape& par
 
 bool separatedAtEnd(const PartShape& partA, const Passage& a, const PartShape& partB,
                     const Passage& b, FeatureCache cache) {
-  return collision::decide(placed(partA, a, true), placed(partB, b, true), cache).verdict ==
-         Verdict::separated;
+  // Not how far: that they are apart at all ends it.
+  const auto decision =
+      collision::decideWithin(placed(partA, a, true), placed(partB, b, true), 0, cache);
+  return !decision || decision->verdict == Verdict::separated;
 }
 
 Clearance clearance(const PartShape& partA, const Passage& a, const PartShape& partB,

@@ -32,7 +32,7 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kPatchBlock = 16;  // patches, and bodies, that a thread takes at a time
+constexpr std::size_t kPatchBlock = 8;  // blocks, and bodies, that a thread takes at a time
 constexpr std::size_t kBodyBlock = 32;
 constexpr double kPushBack = 0.25;  // of what is too near, a substep
 /// Of epsilon: what is nearer is too near. Between it and epsilon bodies rest: were each of a
@@ -48,18 +48,49 @@ constexpr int kPartings = 2;  // iterations of step 4
 
 // ---- one substep -------------------------------------------------------------------------------
 
-/// Calls each(patch) for all patches: a colour at a time, the last one by one thread.
+/// Calls each(block) for all patches: a colour at a time, the last one by one thread.
 template <class Each>
-void forPatches(System& system, Workers& workers, const Each& each) {
+void forBlocks(System& system, Workers& workers, const Each& each) {
   std::uint32_t from = 0;
   for (std::size_t colour = 0; colour < system.colours.size(); ++colour) {
-    const std::uint32_t end = system.colours[colour];
-    const std::size_t size = end - from;
-    const std::size_t block = colour + 1 == system.colours.size() ? size : kPatchBlock;
-    workers.share(size, block, [&](std::size_t first, std::size_t last) {
-      for (std::size_t k = first; k < last; ++k) each(system.patches[from + k]);
+    const std::span blocks(system.blocks.data() + from, system.colours[colour] - from);
+    const std::size_t share = colour + 1 == system.colours.size() ? blocks.size() : kPatchBlock;
+    workers.share(blocks.size(), share, [&](std::size_t first, std::size_t last) {
+      forEach(blocks.subspan(first, last - first), system.byAvx, each);
     });
-    from = end;
+    from = system.colours[colour];
+  }
+}
+
+[[gnu::always_inline]] inline std::span<PointBlock> pointsOf(const PatchBlock& block,
+                                                             System& system) {
+  return {system.points.data() + block.firstPoint, block.size};
+}
+
+/// The velocities, or those of step 4.
+template <Vec3 Mover::*velocity = &Mover::velocity, Vec3 Mover::*spin = &Mover::spin>
+[[gnu::always_inline]] inline Motions gathered(const PatchBlock& block, const System& system) {
+  const Mover* movers = system.movers.data();
+  const auto &a = block.a.movers, &b = block.b.movers;
+  const Mover &a0 = movers[a[0]], &a1 = movers[a[1]], &a2 = movers[a[2]], &a3 = movers[a[3]];
+  const Mover &b0 = movers[b[0]], &b1 = movers[b[1]], &b2 = movers[b[2]], &b3 = movers[b[3]];
+  return {sideBySide(a0.*velocity, a1.*velocity, a2.*velocity, a3.*velocity),
+          sideBySide(a0.*spin, a1.*spin, a2.*spin, a3.*spin),
+          sideBySide(b0.*velocity, b1.*velocity, b2.*velocity, b3.*velocity),
+          sideBySide(b0.*spin, b1.*spin, b2.*spin, b3.*spin)};
+}
+[[gnu::always_inline]] inline Motions gatheredPartings(const PatchBlock& block,
+                                                       const System& system) {
+  return gathered<&Mover::partingVelocity, &Mover::partingSpin>(block, system);
+}
+
+template <Vec3 Mover::*velocity = &Mover::velocity, Vec3 Mover::*spin = &Mover::spin>
+[[gnu::always_inline]] inline void putBack(const Motions& m, const PatchBlock& block,
+                                           System& system) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    Mover &a = system.movers[block.a.movers[lane]], &b = system.movers[block.b.movers[lane]];
+    if (block.a.yields[lane]) a.*velocity = m.velocityA.at(lane), a.*spin = m.spinA.at(lane);
+    if (block.b.yields[lane]) b.*velocity = m.velocityB.at(lane), b.*spin = m.spinB.at(lane);
   }
 }
 
@@ -68,38 +99,41 @@ void warmStart(System& system, std::span<const Joint> joints, Workers& workers) 
     const Joint& joint = joints[row.row.joint];
     row.direction.push(system.movers[joint.a], system.movers[joint.b], row.impulse);
   }
-  forPatches(system, workers, [&](const PatchRow& patch) {
-    Mover &a = system.movers[patch.a], &b = system.movers[patch.b];
-    patch.rub.first.push(a, b, patch.rub.rub1);
-    patch.rub.second.push(a, b, patch.rub.rub2);
-    patch.rub.turn(a, b, patch.rub.twist);
-    for (std::uint32_t i = 0; i < patch.size; ++i) {
-      const PointRow& point = system.points[patch.firstPoint + i];
-      point.normal.push(a, b, point.impulse + point.push);
-    }
-  });
+  forBlocks(
+      system, workers, [&](const PatchBlock& block) __attribute__((always_inline)) {
+        Motions m = gathered(block, system);
+        const RubBlock& rub = block.rub;
+        block.push(rub.alongFirst, rub.first, rub.rub1, m);
+        block.push(rub.alongSecond, rub.second, rub.rub2, m);
+        block.turn(rub.twist, m);
+        for (const PointBlock& point : pointsOf(block, system))
+          block.push(block.normal, point.normal, point.impulse + point.push, m);
+        putBack(m, block, system);
+      });
 }
 
 /// The rub within Coulomb's cone.
-void solveRub(PatchRow& patch, double normalImpulse, Mover& a, Mover& b) {
-  RubRow& row = patch.rub;
-  const double most = patch.friction * normalImpulse;
-  const double speed1 = row.first.speed(a, b), speed2 = row.second.speed(a, b);
-  double rub1 = row.rub1 - (row.m11 * speed1 + row.m12 * speed2);
-  double rub2 = row.rub2 - (row.m12 * speed1 + row.m22 * speed2);
-  const double squared = rub1 * rub1 + rub2 * rub2;
-  if (squared > most * most) {
-    const double part = most / std::sqrt(squared);
-    rub1 *= part, rub2 *= part;
+[[gnu::always_inline]] inline void solveRub(PatchBlock& block, const Lanes& normalImpulse,
+                                            Motions& m) {
+  RubBlock& row = block.rub;
+  const Lanes most = block.friction * normalImpulse;
+  const Lanes speed1 = row.first.speed(row.alongFirst, m);
+  const Lanes speed2 = row.second.speed(row.alongSecond, m);
+  Lanes rub1 = row.rub1 - (row.m11 * speed1 + row.m12 * speed2);
+  Lanes rub2 = row.rub2 - (row.m12 * speed1 + row.m22 * speed2);
+  const Lanes squared = rub1 * rub1 + rub2 * rub2;
+  const LaneMask slides = most * most < squared;
+  if (any(slides)) {
+    const Lanes part = choose(slides, most / squareRoot(squared), everywhere(1));
+    rub1 = rub1 * part, rub2 = rub2 * part;
   }
-  row.first.push(a, b, rub1 - row.rub1);
-  row.second.push(a, b, rub2 - row.rub2);
+  block.push(row.alongFirst, row.first, rub1 - row.rub1, m);
+  block.push(row.alongSecond, row.second, rub2 - row.rub2, m);
   row.rub1 = rub1, row.rub2 = rub2;
-  if (row.arm == 0) return;
-  const double turning = patch.normal.dot(b.spin - a.spin);
-  const double twist =
-      std::clamp(row.twist - row.twistMass * turning, -most * row.arm, most * row.arm);
-  row.turn(a, b, twist - row.twist);
+  const Lanes turning = dot(block.normal, m.spinB - m.spinA);
+  const Lanes widest = most * row.arm;
+  const Lanes twist = clamped(row.twist - row.twistMass * turning, -widest, widest);
+  block.turn(twist - row.twist, m);
   row.twist = twist;
 }
 
@@ -107,54 +141,61 @@ void solveRub(PatchRow& patch, double normalImpulse, Mover& a, Mover& b) {
 /// not positive, it may close in. A point that leans and has less than epsilon to close in is held
 /// as it is: let down to epsilon, each of a stack's points would answer the last correction of the
 /// others, with the delay that warm starting has, and the stack would never come to rest.
-double lackingSpeed(const PointRow& point, const System& system, double speed) {
-  const double room = point.separation - system.epsilon;
-  const double least = std::min(0.0, -room / system.seconds);
-  const double most = room < system.epsilon ? 0 : least;
-  return speed < least ? least - speed : std::min(0.0, most - speed);
+[[gnu::always_inline]] inline Lanes lackingSpeed(const PointBlock& point, const System& system,
+                                                 const Lanes& speed) {
+  const Lanes none = everywhere(0), epsilon = everywhere(system.epsilon);
+  const Lanes room = point.separation - epsilon;
+  const Lanes least = lesser(none, -room / everywhere(system.seconds));
+  const Lanes most = choose(room < epsilon, none, least);
+  return choose(speed < least, least - speed, lesser(none, most - speed));
 }
 
-void solvePatch(PatchRow& patch, System& system) {
-  Mover &a = system.movers[patch.a], &b = system.movers[patch.b];
-  const std::span points(system.points.data() + patch.firstPoint, patch.size);
-  if (patch.friction > 0) {
-    double normalImpulse = 0;
-    for (const PointRow& point : points) normalImpulse += point.impulse + point.push;
-    solveRub(patch, normalImpulse, a, b);
+[[gnu::always_inline]] inline void solveBlock(PatchBlock& block, System& system) {
+  Motions m = gathered(block, system);
+  const std::span points = pointsOf(block, system);
+  if (block.rubs) {
+    Lanes normalImpulse;
+    for (const PointBlock& point : points)
+      normalImpulse = normalImpulse + (point.impulse + point.push);
+    solveRub(block, normalImpulse, m);
   }
-  for (PointRow& point : points) {
-    const double lacking = lackingSpeed(point, system, point.normal.speed(a, b));
-    const double impulse = std::max(0.0, point.impulse + point.mass * lacking);
-    point.normal.push(a, b, impulse - point.impulse);
+  for (PointBlock& point : points) {
+    const Lanes lacking = lackingSpeed(point, system, point.normal.speed(block.normal, m));
+    const Lanes impulse = greater(everywhere(0), point.impulse + point.mass * lacking);
+    block.push(block.normal, point.normal, impulse - point.impulse, m);
     point.impulse = impulse;
-    if (patch.mostPush == 0) continue;
-    const double slow = patch.pushSpeed - point.normal.speed(a, b);
-    const double push = std::clamp(point.push + point.mass * slow, 0.0, patch.mostPush);
-    point.normal.push(a, b, push - point.push);
+    if (!block.pushes) continue;
+    const Lanes slow = block.pushSpeed - point.normal.speed(block.normal, m);
+    const Lanes more = clamped(point.push + point.mass * slow, everywhere(0), block.mostPush);
+    const Lanes push = choose(everywhere(0) < block.mostPush, more, point.push);
+    block.push(block.normal, point.normal, push - point.push, m);
     point.push = push;
   }
+  putBack(m, block, system);
 }
 
 /// How fast a point has to part so that a part of what it is too near is gone after the substep.
-double partingSpeed(const PointRow& point, const System& system) {
-  const double room = point.separation - system.epsilon;
-  if (room > 0) return -room / system.seconds;
-  const double lacking = kEnough * system.epsilon - point.separation;
-  if (lacking <= 0) return 0;
-  return std::min(kPushBack * lacking / system.seconds, kMostPushBack);
+[[gnu::always_inline]] inline Lanes partingSpeed(const PointBlock& point, const System& system) {
+  const Lanes none = everywhere(0), seconds = everywhere(system.seconds);
+  const Lanes room = point.separation - everywhere(system.epsilon);
+  const Lanes lacking = everywhere(kEnough * system.epsilon) - point.separation;
+  const Lanes back = lesser(everywhere(kPushBack) * lacking / seconds, everywhere(kMostPushBack));
+  return choose(none < room, -room / seconds, choose(none < lacking, back, none));
 }
 
-void partPatch(PatchRow& patch, System& system) {
-  Mover &a = system.movers[patch.a], &b = system.movers[patch.b];
-  for (std::uint32_t i = 0; i < patch.size; ++i) {
-    PointRow& point = system.points[patch.firstPoint + i];
-    const double speed = point.normal.partingSpeed(a, b) +
-                         (point.separation > system.epsilon ? point.normal.speed(a, b) : 0);
-    const double lacking = partingSpeed(point, system) - speed;
-    const double impulse = std::max(0.0, point.parting + point.mass * lacking);
-    point.normal.part(a, b, impulse - point.parting);
+[[gnu::always_inline]] inline void partBlock(const PatchBlock& block, System& system) {
+  const Motions going = gathered(block, system);
+  Motions m = gatheredPartings(block, system);
+  for (PointBlock& point : pointsOf(block, system)) {
+    const LaneMask roomy = everywhere(system.epsilon) < point.separation;
+    const Lanes also = choose(roomy, point.normal.speed(block.normal, going), everywhere(0));
+    const Lanes speed = point.normal.speed(block.normal, m) + also;
+    const Lanes lacking = partingSpeed(point, system) - speed;
+    const Lanes impulse = greater(everywhere(0), point.parting + point.mass * lacking);
+    block.push(block.normal, point.normal, impulse - point.parting, m);
     point.parting = impulse;
   }
+  putBack<&Mover::partingVelocity, &Mover::partingSpin>(m, block, system);
 }
 
 void partJoints(System& system, std::span<const Joint> joints) {
@@ -174,11 +215,14 @@ void partJoints(System& system, std::span<const Joint> joints) {
 /// Step 4.
 void part(System& system, std::span<const Joint> joints, Workers& workers) {
   for (Mover& mover : system.movers) mover.partingVelocity = mover.partingSpin = Vec3::Zero();
-  for (PointRow& point : system.points) point.parting = 0;
+  for (PointBlock& point : system.points) point.parting = Lanes{};
   for (AngularRow& row : system.joints) row.parting = 0;
   for (int i = 0; i < kPartings; ++i) {
     partJoints(system, joints);
-    forPatches(system, workers, [&](PatchRow& patch) { partPatch(patch, system); });
+    forBlocks(
+        system, workers, [&](PatchBlock & block) __attribute__((always_inline)) {
+          partBlock(block, system);
+        });
   }
 }
 
@@ -208,15 +252,16 @@ void goOn(System& system, std::span<RigidBody> bodies, Workers& workers) {
       advance(bodies[i], system.seconds);
     }
   });
-  forPatches(system, workers, [&](const PatchRow& patch) {
-    const Mover &a = system.movers[patch.a], &b = system.movers[patch.b];
-    for (std::uint32_t i = 0; i < patch.size; ++i) {
-      PointRow& point = system.points[patch.firstPoint + i];
-      const double speed = point.normal.speed(a, b) + point.normal.partingSpeed(a, b);
-      point.separation += system.seconds * speed;
-      point.sum += point.impulse;
-    }
-  });
+  forBlocks(
+      system, workers, [&](const PatchBlock& block) __attribute__((always_inline)) {
+        const Motions m = gathered(block, system), parting = gatheredPartings(block, system);
+        for (PointBlock& point : pointsOf(block, system)) {
+          const Lanes speed =
+              point.normal.speed(block.normal, m) + point.normal.speed(block.normal, parting);
+          point.separation = point.separation + everywhere(system.seconds) * speed;
+          point.sum = point.sum + point.impulse;
+        }
+      });
 }
 
 void applyForces(System& system, std::span<RigidBody> bodies, const Vec3& gravity,
@@ -245,7 +290,10 @@ void substep(System& system, std::span<RigidBody> bodies, std::span<Joint> joint
   warmStart(system, joints, workers);
   for (int i = 0; i < step.iterations; ++i) {
     solveJoints(system, joints);
-    forPatches(system, workers, [&](PatchRow& patch) { solvePatch(patch, system); });
+    forBlocks(
+        system, workers, [&](PatchBlock & block) __attribute__((always_inline)) {
+          solveBlock(block, system);
+        });
   }
   part(system, joints, workers);
   goOn(system, bodies, workers);
@@ -259,17 +307,34 @@ void substep(System& system, std::span<RigidBody> bodies, std::span<Joint> joint
 /// add energy where several points arrive together.
 void bounce(System& system, const SolverStep& step) {
   const double least = kLeastBounce * step.gravity.norm() * step.seconds;
-  for (PatchRow& patch : system.patches) {
-    if (patch.restitution == 0) continue;
-    Mover &a = system.movers[patch.a], &b = system.movers[patch.b];
-    for (std::uint32_t i = 0; i < patch.size; ++i) {
-      PointRow& point = system.points[patch.firstPoint + i];
-      if (point.arrival > -least || point.sum == 0) continue;
-      const double lacking = -patch.restitution * point.arrival - point.normal.speed(a, b);
-      const double most = patch.restitution * point.sum;
-      point.normal.push(a, b, std::clamp(point.mass * lacking, 0.0, most));
+  for (const PatchBlock& block : system.blocks) {
+    if (!block.bounces) continue;
+    Motions m = gathered(block, system);
+    for (const PointBlock& point : pointsOf(block, system)) {
+      const Lanes speed = point.normal.speed(block.normal, m);
+      const Lanes lacking = -block.restitution * point.arrival - speed;
+      const Lanes most = block.restitution * point.sum;
+      const Lanes back = clamped(point.mass * lacking, everywhere(0), most);
+      const LaneMask slow = everywhere(-least) < point.arrival;
+      const LaneMask pushed = everywhere(0) < point.sum;
+      const Lanes none = everywhere(0);
+      block.push(block.normal, point.normal, choose(pushed, choose(slow, none, back), none), m);
     }
+    putBack(m, block, system);
   }
+}
+
+void keepLane(const System& system, const PatchBlock& block, std::size_t lane,
+              ContactPatch& patch) {
+  for (std::uint32_t i = 0; i < patch.size; ++i) {
+    const PointBlock& point = system.points[block.firstPoint + i];
+    patch.points[i].separation = point.separation[lane];
+    patch.points[i].impulse = point.impulse[lane];
+    patch.points[i].push = point.push[lane];
+  }
+  const RubBlock& rub = block.rub;
+  patch.rub = rub.rub1[lane] * rub.alongFirst.at(lane) + rub.rub2[lane] * rub.alongSecond.at(lane);
+  patch.twist = rub.twist[lane];
 }
 
 void keep(const System& system, std::span<RigidBody> bodies, std::span<ContactPatch> patches) {
@@ -277,26 +342,20 @@ void keep(const System& system, std::span<RigidBody> bodies, std::span<ContactPa
     bodies[i].velocity = system.movers[i].velocity;
     bodies[i].spin = system.movers[i].spin;
   }
-  for (const PatchRow& row : system.patches) {
-    ContactPatch& patch = patches[row.patch];
-    for (std::uint32_t i = 0; i < row.size; ++i) {
-      const PointRow& point = system.points[row.firstPoint + i];
-      patch.points[i].separation = point.separation;
-      patch.points[i].impulse = point.impulse;
-      patch.points[i].push = point.push;
-    }
-    patch.rub = row.rub.rub1 * row.rub.first.along + row.rub.rub2 * row.rub.second.along;
-    patch.twist = row.rub.twist;
-  }
+  for (const PatchBlock& block : system.blocks)
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if (block.patches[lane] != kNoPatch)
+        keepLane(system, block, lane, patches[block.patches[lane]]);
 }
 
 }  // namespace
 
 void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::span<Joint> joints,
-           std::span<const DrivenBody> driven, const SolverStep& step, Workers& workers) {
-  System system;
+           std::span<const DrivenBody> driven, const SolverStep& step, Workers& workers,
+           System& system) {
   system.seconds = step.seconds / step.substeps;
   system.epsilon = step.epsilon;
+  system.byAvx = step.byAvx && hasAvx();
   setUp(bodies, patches, system, workers);
   for (std::size_t i = 0; i < static_cast<std::size_t>(step.substeps); ++i) {
     for (const DrivenBody& body : driven) {
@@ -307,6 +366,12 @@ void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::sp
   }
   bounce(system, step);
   keep(system, bodies, patches);
+}
+
+void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::span<Joint> joints,
+           std::span<const DrivenBody> driven, const SolverStep& step, Workers& workers) {
+  System system;
+  solve(bodies, patches, joints, driven, step, workers, system);
 }
 
 }  // namespace enfilade::scene

@@ -19,6 +19,7 @@ struct SolverStep {
   int iterations = 4;            ///< of the velocities in a substep, >= 1
   Vec3 gravity{0, -9.80665, 0};  ///< m/s^2
   double epsilon = 0.5e-3;  ///< metres: bodies come to rest between half of it and all of it apart
+  bool byAvx = true;        ///< where the processor has it; the result is the same
 };
 
 /// A body of inverse mass 0 that changes its motion from substep to substep.

@@ -13,18 +13,16 @@ Mover moverOf(const RigidBody& body) {
           body.inverseMass, body.inverseMass == 0 ? Mat3(Mat3::Zero()) : worldInverseInertia(body)};
 }
 
-PointRow pointRow(const ContactPatch& patch, const PatchPoint& point, const Mover& a,
-                  const Mover& b) {
-  PointRow row;
-  row.normal =
-      Direction(patch.normal, point.armA.cross(patch.normal), point.armB.cross(patch.normal), a, b);
-  row.mass = inverted(response(row.normal, row.normal, a.inverseMass + b.inverseMass));
-  row.separation = point.separation;
-  row.arrival = row.normal.speed(a, b);
-  row.impulse = point.impulse;
-  row.sum = row.parting = 0;
-  row.push = point.push;
-  return row;
+void fillPoint(const ContactPatch& patch, const PatchPoint& point, const Mover& a, const Mover& b,
+               std::size_t lane, PointBlock& block) {
+  const Direction normal(patch.normal, point.armA.cross(patch.normal),
+                         point.armB.cross(patch.normal), a, b);
+  block.normal.put(lane, normal);
+  block.mass.put(lane, inverted(response(normal, normal, a.inverseMass + b.inverseMass)));
+  block.separation.put(lane, point.separation);
+  block.arrival.put(lane, normal.speed(a, b));
+  block.impulse.put(lane, point.impulse);
+  block.push.put(lane, point.push);
 }
 
 /// Two tangents that depend on the normal alone.
@@ -35,73 +33,117 @@ std::array<Vec3, 2> tangents(const Vec3& normal) {
   return {first, normal.cross(first)};
 }
 
-RubRow rubRow(const ContactPatch& patch, const Mover& a, const Mover& b) {
-  RubRow row;
+void fillRub(const ContactPatch& patch, const Mover& a, const Mover& b, std::size_t lane,
+             RubBlock& block) {
   Vec3 armA = Vec3::Zero(), armB = Vec3::Zero();
   for (const PatchPoint& point : patch.list()) armA += point.armA, armB += point.armB;
   armA /= static_cast<double>(patch.size), armB /= static_cast<double>(patch.size);
-  const auto [first, second] = tangents(patch.normal);
-  row.first = Direction(first, armA.cross(first), armB.cross(first), a, b);
-  row.second = Direction(second, armA.cross(second), armB.cross(second), a, b);
+  const auto [alongFirst, alongSecond] = tangents(patch.normal);
+  const Direction first(alongFirst, armA.cross(alongFirst), armB.cross(alongFirst), a, b);
+  const Direction second(alongSecond, armA.cross(alongSecond), armB.cross(alongSecond), a, b);
+  block.alongFirst.put(lane, alongFirst), block.alongSecond.put(lane, alongSecond);
+  block.first.put(lane, first), block.second.put(lane, second);
   const double masses = a.inverseMass + b.inverseMass;
-  const double k11 = response(row.first, row.first, masses);
-  const double k12 = response(row.first, row.second, masses);
-  const double k22 = response(row.second, row.second, masses);
+  const double k11 = response(first, first, masses);
+  const double k12 = response(first, second, masses);
+  const double k22 = response(second, second, masses);
   const double over = inverted(k11 * k22 - k12 * k12);
-  row.m11 = k22 * over, row.m12 = -k12 * over, row.m22 = k11 * over;
-  row.rub1 = patch.rub.dot(first), row.rub2 = patch.rub.dot(second);
-  row.arm = 0;
-  for (const PatchPoint& point : patch.list()) row.arm += (point.armB - armB).norm();
-  row.arm /= static_cast<double>(patch.size);
-  row.turnA = a.inverseInertia * patch.normal, row.turnB = b.inverseInertia * patch.normal;
-  row.twistMass = inverted(patch.normal.dot(row.turnA) + patch.normal.dot(row.turnB));
-  row.twist = patch.twist;
-  return row;
+  block.m11.put(lane, k22 * over), block.m12.put(lane, -k12 * over),
+      block.m22.put(lane, k11 * over);
+  block.rub1.put(lane, patch.rub.dot(alongFirst)), block.rub2.put(lane, patch.rub.dot(alongSecond));
+  double arm = 0;
+  for (const PatchPoint& point : patch.list()) arm += (point.armB - armB).norm();
+  block.arm.put(lane, arm / static_cast<double>(patch.size));
+  const Vec3 turnA = a.inverseInertia * patch.normal, turnB = b.inverseInertia * patch.normal;
+  block.turnA.put(lane, turnA), block.turnB.put(lane, turnB);
+  block.twistMass.put(lane, inverted(patch.normal.dot(turnA) + patch.normal.dot(turnB)));
+  block.twist.put(lane, patch.twist);
 }
 
-void fillPatch(const ContactPatch& patch, PatchRow& row, System& system) {
+void fillSide(std::uint32_t mover, std::size_t lane, const System& system, BlockSide& side) {
+  side.movers[lane] = mover;
+  side.yields[lane] = system.movers[mover].yields();
+  side.inverseMass.put(lane, system.movers[mover].inverseMass);
+}
+
+void fillLane(const ContactPatch& patch, std::size_t lane, PatchBlock& block, System& system) {
   const Mover &a = system.movers[patch.a], &b = system.movers[patch.b];
-  row.friction = patch.friction, row.restitution = patch.restitution;
-  row.pushSpeed = patch.pushSpeed;
-  row.mostPush = patch.mostPush * system.seconds / static_cast<double>(patch.size);
-  row.normal = patch.normal;
-  row.rub = rubRow(patch, a, b);
-  for (std::uint32_t i = 0; i < row.size; ++i)
-    system.points[row.firstPoint + i] = pointRow(patch, patch.points[i], a, b);
+  fillSide(patch.a, lane, system, block.a);
+  fillSide(patch.b, lane, system, block.b);
+  block.friction.put(lane, patch.friction), block.restitution.put(lane, patch.restitution);
+  block.rubs |= patch.friction > 0, block.bounces |= patch.restitution != 0;
+  block.pushSpeed.put(lane, patch.pushSpeed);
+  block.mostPush.put(lane, patch.mostPush * system.seconds / static_cast<double>(patch.size));
+  block.pushes |= patch.mostPush != 0;
+  block.normal.put(lane, patch.normal);
+  fillRub(patch, a, b, lane, block.rub);
+  for (std::uint32_t i = 0; i < patch.size; ++i)
+    fillPoint(patch, patch.points[i], a, b, lane, system.points[block.firstPoint + i]);
 }
 
-/// Which rows stand where.
+void fillBlock(std::span<const ContactPatch> patches, PatchBlock& block, System& system) {
+  const auto nobody = static_cast<std::uint32_t>(system.movers.size()) - 1;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    block.a.movers[lane] = block.b.movers[lane] = nobody;
+    if (block.patches[lane] != kNoPatch)
+      fillLane(patches[block.patches[lane]], lane, block, system);
+  }
+}
+
+/// Blocks of `most` patches of one colour. Those with as many points come together.
+void layOutColour(std::span<const ContactPatch> patches, std::span<const std::uint32_t> colour,
+                  std::size_t most, System& system) {
+  std::size_t lane = most;
+  const auto add = [&](std::uint32_t patch) {
+    if (lane == most) {
+      PatchBlock block;
+      block.patches.fill(kNoPatch);
+      block.firstPoint = static_cast<std::uint32_t>(system.points.size());
+      block.size = static_cast<std::uint32_t>(patches[patch].size);
+      system.points.resize(system.points.size() + block.size);
+      system.blocks.push_back(block);
+      lane = 0;
+    }
+    system.blocks.back().patches[lane++] = patch;
+  };
+  if (most == 1) {
+    for (const std::uint32_t patch : colour) add(patch);
+    return;
+  }
+  for (std::size_t size = ContactPatch::kMostPoints; size > 0; --size)
+    for (const std::uint32_t patch : colour)
+      if (patches[patch].size == size) add(patch);
+}
+
+/// Which blocks stand where.
 void layOut(std::span<const ContactPatch> patches, System& system) {
+  system.blocks.clear(), system.points.clear(), system.colours.clear();
   std::vector<std::uint8_t> moves(system.movers.size());
   for (std::size_t i = 0; i < moves.size(); ++i) moves[i] = system.movers[i].yields();
   const Colouring colouring = colourPatches(patches, moves);
-  system.colours = colouring.ends;
-  system.patches.resize(patches.size());
-  std::uint32_t points = 0;
-  for (std::size_t k = 0; k < patches.size(); ++k) {
-    PatchRow& row = system.patches[k];
-    row.patch = colouring.order[k];
-    const ContactPatch& patch = patches[row.patch];
-    row.a = patch.a, row.b = patch.b;
-    row.firstPoint = points;
-    row.size = static_cast<std::uint32_t>(patch.size);
-    points += row.size;
+  std::uint32_t from = 0;
+  for (std::size_t i = 0; i < colouring.ends.size(); ++i) {
+    const std::uint32_t end = colouring.ends[i];
+    const bool isLast = i + 1 == colouring.ends.size();
+    const std::span colour(colouring.order.data() + from, end - from);
+    layOutColour(patches, colour, isLast ? 1 : kLanes, system);
+    system.colours.push_back(static_cast<std::uint32_t>(system.blocks.size()));
+    from = end;
   }
-  system.points.resize(points);
 }
 
 }  // namespace
 
 void setUp(std::span<const RigidBody> bodies, std::span<const ContactPatch> patches, System& system,
            Workers& workers) {
-  system.movers.resize(bodies.size());
+  system.movers.resize(bodies.size() + 1);
+  system.movers.back() = moverOf({});
   workers.share(bodies.size(), kBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i) system.movers[i] = moverOf(bodies[i]);
   });
   layOut(patches, system);
-  workers.share(patches.size(), kBlock, [&](std::size_t from, std::size_t to) {
-    for (std::size_t k = from; k < to; ++k)
-      fillPatch(patches[system.patches[k].patch], system.patches[k], system);
+  workers.share(system.blocks.size(), kBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; k < to; ++k) fillBlock(patches, system.blocks[k], system);
   });
 }
 

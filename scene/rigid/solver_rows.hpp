@@ -7,6 +7,8 @@
 
 #include "scene/rigid/contact_patch.hpp"
 #include "scene/rigid/joint.hpp"
+#include "scene/rigid/lanes.hpp"
+#include "scene/rigid/solver.hpp"
 #include "scene/rigid/workers.hpp"
 
 namespace enfilade::scene {
@@ -73,38 +75,78 @@ inline double inverted(double value) {
   return value > 0 ? 1 / value : 0;
 }
 
-struct PointRow {
-  Direction normal;
-  double mass;        ///< of the two bodies here, kg
-  double separation;  ///< metres, now
-  double arrival;     ///< speed along the normal at the start of the step; < 0 closing
-  double impulse, push;
-  double parting;  ///< impulse of step 4
-  double sum;      ///< of the impulses of all substeps of this step
+/// The patches that are solved side by side share no body that moves; a lane that no patch has is
+/// all zeroes, between two bodies that are none.
+inline constexpr std::uint32_t kNoPatch = ~0u;
+
+/// How the bodies of a block move: gathered, worked on, put back.
+struct Motions {
+  Lanes3 velocityA, spinA, velocityB, spinB;
 };
 
-/// Friction at the middle of a patch.
-struct RubRow {
-  Direction first, second;
-  double m11, m12, m22;  ///< inverse of the response of the two
-  double rub1, rub2;
-  Vec3 turnA, turnB;  ///< of a moment of 1 about the normal
-  double twistMass, arm, twist;
+/// Directions, without what is along them; see Direction.
+struct Turns {
+  Lanes3 angularA, angularB, turnA, turnB;
 
-  /// A moment about the normal.
-  void turn(Mover& a, Mover& b, double moment) const {
-    if (a.yields()) a.spin -= moment * turnA;
-    if (b.yields()) b.spin += moment * turnB;
+  void put(std::size_t lane, const Direction& direction) {
+    angularA.put(lane, direction.angularA), angularB.put(lane, direction.angularB);
+    turnA.put(lane, direction.turnA), turnB.put(lane, direction.turnB);
+  }
+  [[gnu::always_inline]] Lanes speed(const Lanes3& along, const Motions& m) const {
+    return dot(along, m.velocityB - m.velocityA) + dot(angularB, m.spinB) - dot(angularA, m.spinA);
   }
 };
 
-struct PatchRow {
-  std::uint32_t a, b;
-  std::uint32_t patch;  ///< index of the patch that it is of
-  std::uint32_t firstPoint, size;
-  double friction, restitution, pushSpeed, mostPush;  ///< the push of one point and substep, N s
-  Vec3 normal;
-  RubRow rub;
+struct PointBlock {
+  Turns normal;
+  Lanes mass;        ///< of the two bodies here, kg
+  Lanes separation;  ///< metres, now
+  Lanes arrival;     ///< speed along the normal at the start of the step; < 0 closing
+  Lanes impulse, push;
+  Lanes parting;  ///< impulse of step 4
+  Lanes sum;      ///< of the impulses of all substeps of this step
+};
+
+/// Friction at the middle of a patch.
+struct RubBlock {
+  Lanes3 alongFirst, alongSecond;
+  Turns first, second;
+  Lanes m11, m12, m22;  ///< inverse of the response of the two
+  Lanes rub1, rub2;
+  Lanes3 turnA, turnB;  ///< of a moment of 1 about the normal
+  Lanes twistMass, arm, twist;
+};
+
+/// One of the two bodies of each patch.
+struct BlockSide {
+  std::array<std::uint32_t, kLanes> movers{};
+  std::array<bool, kLanes> yields{};
+  Lanes inverseMass;
+};
+
+struct PatchBlock {
+  BlockSide a, b;
+  std::array<std::uint32_t, kLanes> patches{};         ///< indices; kNoPatch: none
+  std::uint32_t firstPoint = 0, size = 0;              ///< of the patch that has most
+  bool rubs = false, pushes = false, bounces = false;  ///< any of them
+  Lanes friction, restitution;
+  Lanes pushSpeed, mostPush;  ///< the push of one point and substep, N s
+  Lanes3 normal;
+  RubBlock rub;
+
+  /// An impulse along `along`, `turns`, on B, and against it on A.
+  [[gnu::always_inline]] void push(const Lanes3& along, const Turns& turns, const Lanes& impulse,
+                                   Motions& m) const {
+    m.velocityA = m.velocityA - (impulse * a.inverseMass) * along;
+    m.spinA = m.spinA - impulse * turns.turnA;
+    m.velocityB = m.velocityB + (impulse * b.inverseMass) * along;
+    m.spinB = m.spinB + impulse * turns.turnB;
+  }
+  /// A moment about the normal.
+  [[gnu::always_inline]] void turn(const Lanes& moment, Motions& m) const {
+    m.spinA = m.spinA - moment * rub.turnA;
+    m.spinB = m.spinB + moment * rub.turnB;
+  }
 };
 
 struct AngularRow {
@@ -115,14 +157,20 @@ struct AngularRow {
 
 /// All that is solved: joints in the order of the array, then patches colour by colour.
 struct System {
-  std::vector<Mover> movers;
-  std::vector<PatchRow> patches;       ///< by colour
-  std::vector<std::uint32_t> colours;  ///< where each colour ends in `patches`; see colours.hpp
-  std::vector<PointRow> points;        ///< in the order of their patches
+  std::vector<Mover> movers;           ///< of the bodies, and one of nobody
+  std::vector<PatchBlock> blocks;      ///< by colour
+  std::vector<std::uint32_t> colours;  ///< where each colour ends in `blocks`; see colours.hpp
+  std::vector<PointBlock> points;      ///< in the order of their blocks
   std::vector<AngularRow> joints;
   double seconds = 0;  ///< of a substep
   double epsilon = 0;
+  bool byAvx = false;
 };
+
+/// solve() of solver.hpp, in memory that was used before.
+void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::span<Joint> joints,
+           std::span<const DrivenBody> driven, const SolverStep& step, Workers& workers,
+           System& system);
 
 /// Movers and patches; seconds and epsilon are set.
 void setUp(std::span<const RigidBody> bodies, std::span<const ContactPatch> patches, System& system,

@@ -7,7 +7,8 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr int kPartialRounds = 4;  // then who is in the way does not move at all
+constexpr std::size_t kBodyBlock = 32;  // bodies that a thread takes at a time
+constexpr int kPartialRounds = 4;       // then who is in the way does not move at all
 
 Passage passageOf(const Solid& solid, const RigidBody& goal) {
   Passage passage = standing(solid);
@@ -92,13 +93,16 @@ void findCarried(const Dynamics& dynamics, double seconds, StepWork& work) {
 
 /// Ways of all that go; the others stand.
 void findPassages(const Dynamics& dynamics, StepWork& work) {
-  for (std::size_t i = 0; i < work.bodies.size(); ++i) {
-    const Solid& solid = dynamics.solids[work.solids[i]];
-    const bool goes =
-        solid.isAwake() || (!solid.isFree() && solid.isMoved() && solid.mostPush == 0);
-    work.passages.push_back(goes ? passageOf(solid, work.bodies[i]) : standing(solid));
-    if (solid.isAwake()) leash(solid, work.passages.back());
-  }
+  work.passages.resize(work.bodies.size());
+  work.workers->share(work.bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      const Solid& solid = dynamics.solids[work.solids[i]];
+      const bool goes =
+          solid.isAwake() || (!solid.isFree() && solid.isMoved() && solid.mostPush == 0);
+      work.passages[i] = goes ? passageOf(solid, work.bodies[i]) : standing(solid);
+      if (solid.isAwake()) leash(solid, work.passages[i]);
+    }
+  });
 }
 
 /// What one round of proofs finds.
@@ -114,7 +118,7 @@ struct Round {
 void proveRound(const Dynamics& dynamics, StepWork& work, Round& round) {
   round.parts.assign(work.active.size(), 1);
   round.proofs.assign(work.active.size(), 0);
-  work.workers.share(work.active.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+  work.workers->share(work.active.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t k = from; k < to; ++k) {
       const NearPair& pair = dynamics.pairs[work.active[k]];
       const std::uint32_t a = work.local[pair.key.a], b = work.local[pair.key.b];

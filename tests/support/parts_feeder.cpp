@@ -17,7 +17,8 @@ constexpr double kGravity = 9.80665;
 constexpr double kWallThickness = 0.1;
 /// Metres that a part may go in a tick beyond what its own speed has it.
 constexpr double kSpareReach = 5e-3;
-constexpr double kSpareBox = 2e-3;  // metres: a box that is asked for may come to lie so far out
+constexpr std::size_t kBoxBlock = 32;  // parts that a thread takes at a time
+constexpr double kSpareBox = 2e-3;     // metres: a box that is asked for may come to lie so far out
 
 std::vector<Vec3> boxCorners(const Vec3& half) {
   std::vector<Vec3> corners;
@@ -140,6 +141,7 @@ FeederJudgement FeederJudge::judge(const std::vector<PlacedPart>& parts, const V
 Feeder::Feeder(const FeederPlan& plan, int threads)
     : plan_(plan), workers_(threads), broadPhase_({}) {
   settings_.workers = &workers_;
+  settings_.memory = &memory_;
   settings_.solver.substeps = plan.substeps / plan.looks;
   settings_.solver.seconds = kTick / plan.looks;
   settings_.solver.iterations = 4;
@@ -173,15 +175,20 @@ Feeder::Feeder(const FeederPlan& plan, int threads)
 /// Once a tick: each part by what it can reach until the next. Its box is moved when it left the
 /// one that it had, which is larger.
 void Feeder::moveBoxes(double lookout) {
+  needed_.resize(dynamics_.solids.size());
+  workers_.share(dynamics_.solids.size(), kBoxBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = std::max(from, std::size_t{1}); i < to; ++i) {
+      scene::Solid& solid = dynamics_.solids[i];
+      solid.leash =
+          solid.asleep ? lookout : solid.fastest() * kTick + kGravity * kTick * kTick + kSpareReach;
+      const Pose pose{solid.motion.rotation, solid.position};
+      needed_[i] =
+          collision::tightBox(*solid.parts[0].hull, pose, extremes_[i], solid.leash + lookout);
+    }
+  });
   for (std::size_t i = 1; i < dynamics_.solids.size(); ++i) {
-    scene::Solid& solid = dynamics_.solids[i];
-    solid.leash =
-        solid.asleep ? lookout : solid.fastest() * kTick + kGravity * kTick * kTick + kSpareReach;
-    const Pose pose{solid.motion.rotation, solid.position};
-    const Box box =
-        collision::tightBox(*solid.parts[0].hull, pose, extremes_[i], solid.leash + lookout);
-    if (contains(boxes_[i], box)) continue;
-    boxes_[i] = grown(box, kSpareBox);
+    if (contains(boxes_[i], needed_[i])) continue;
+    boxes_[i] = grown(needed_[i], kSpareBox);
     broadPhase_.move(movers_[i - 1], boxes_[i]);
   }
   broadPhase_.update();
@@ -190,19 +197,19 @@ void Feeder::moveBoxes(double lookout) {
 void Feeder::findPairs() {
   const double lookout = 2 * settings_.solver.epsilon;
   moveBoxes(lookout);
-  std::vector<scene::PartPairKey> keys;
+  keys_.clear();
   const std::uint32_t size = static_cast<std::uint32_t>(dynamics_.solids.size());
   for (std::uint32_t i = 1; i < size; ++i)
     for (const auto& partner : broadPhase_.partners(movers_[i - 1]))
-      if (solidOfMover_[partner.id] == 0) keys.push_back({0, i, partOfMover_[partner.id], 0});
+      if (solidOfMover_[partner.id] == 0) keys_.push_back({0, i, partOfMover_[partner.id], 0});
   for (std::uint32_t i = 1; i < size; ++i)
     for (const auto& partner : broadPhase_.partners(movers_[i - 1])) {
       const std::uint32_t other = solidOfMover_[partner.id];
       if (other > i && scene::mayMeet(dynamics_.solids[i], dynamics_.solids[other], lookout))
-        keys.push_back({i, other, 0, 0});
+        keys_.push_back({i, other, 0, 0});
     }
-  if (!std::is_sorted(keys.begin(), keys.end())) std::sort(keys.begin(), keys.end());
-  scene::setPairs(dynamics_, keys);
+  if (!std::is_sorted(keys_.begin(), keys_.end())) std::sort(keys_.begin(), keys_.end());
+  scene::setPairs(dynamics_, keys_);
 }
 
 void Feeder::tick(bool driven) {
