@@ -107,13 +107,13 @@ void archiveSolid(A& a, Held<A, WorldState>& world, EntityId entity, std::uint32
 }
 
 /// What is not written follows from the scene and from what is: `bodies`, `bodyAt`, `entities`,
-/// `bodyOf`, `solidOf`; who works, and in what memory, is no part of the state; `seeds` are found
-/// before they are asked for, and `last` is only told in the tick that made it.
+/// `bodyOf`, `solidOf`; who works is no part of the state; `seeds` are found before they are asked
+/// for, and `last` is only told in the tick that made it.
 template <class A>
 void archiveRigids(A& a, Held<A, WorldState>& world) {
   auto& [dynamics, bodies, solidOfEntity, entities, vacant, bodyOf, solidOf, bodyAt, workers,
-         memory, workersAsked, threads, seeds, last] = world.rigids;
-  auto& [solids, joints, pairs, spare] = dynamics;
+         workersAsked, threads, seeds, last] = world.rigids;
+  auto& [solids, joints, pairs] = dynamics;
   if (!joints.empty()) throw std::logic_error("a world has joints, which no checkpoint tells");
   a(solidOfEntity, vacant);
   if constexpr (!A::kWrites) makeSolids(a, world);

@@ -1,6 +1,8 @@
-// Greedily, in the order of the patches: the first colour that neither body has yet.
+// Greedily, in the order of the patches: the first colour that neither body has yet; or, where the
+// order counts, the first after all that they have.
 #include "scene/rigid/colours.hpp"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <numeric>
@@ -10,11 +12,25 @@ namespace {
 
 constexpr std::uint32_t kColours = 32;
 
-Colouring uncoloured(std::size_t size) {
+/// The colour of a patch is the first after those of all patches before it that share a body with
+/// it.
+Colouring ranked(std::span<const ContactPatch> patches, std::span<const std::uint8_t> moves) {
+  std::vector<std::uint32_t> after(moves.size(), 0), ranks(patches.size());
+  std::uint32_t count = 0;
+  for (std::size_t k = 0; k < patches.size(); ++k) {
+    const std::uint32_t a = patches[k].a, b = patches[k].b;
+    ranks[k] = std::max(moves[a] ? after[a] : 0, moves[b] ? after[b] : 0);
+    after[a] = after[b] = ranks[k] + 1;
+    count = std::max(count, ranks[k] + 1);
+  }
   Colouring colouring;
-  colouring.order.resize(size);
+  colouring.order.resize(patches.size());
   std::iota(colouring.order.begin(), colouring.order.end(), 0u);
-  colouring.ends = {static_cast<std::uint32_t>(size)};
+  std::stable_sort(colouring.order.begin(), colouring.order.end(),
+                   [&](std::uint32_t k, std::uint32_t l) { return ranks[k] < ranks[l]; });
+  colouring.ends.assign(count + 1, 0);
+  for (const std::uint32_t rank : ranks) ++colouring.ends[rank];
+  std::partial_sum(colouring.ends.begin(), colouring.ends.end(), colouring.ends.begin());
   return colouring;
 }
 
@@ -22,7 +38,7 @@ Colouring uncoloured(std::size_t size) {
 
 Colouring colourPatches(std::span<const ContactPatch> patches,
                         std::span<const std::uint8_t> moves) {
-  if (patches.size() < kFewPatches) return uncoloured(patches.size());
+  if (patches.size() < kFewPatches) return ranked(patches, moves);
   std::vector<std::uint32_t> taken(moves.size(), 0), colours(patches.size());
   std::array<std::uint32_t, kColours + 1> counts{};
   for (std::size_t k = 0; k < patches.size(); ++k) {

@@ -17,8 +17,8 @@ struct Colouring {
   std::vector<std::uint32_t> ends;
 };
 
-/// Fewer patches stay in the order that they have, all in the last colour: it is the better one for
-/// stacks, whose patches come from the ground up.
+/// Of fewer patches, those that share a body that moves come in the order that they have: it is the
+/// better one for stacks, whose patches come from the ground up.
 inline constexpr std::size_t kFewPatches = 192;
 
 /// `moves`: of each body, whether impulses move it.

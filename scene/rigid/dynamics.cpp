@@ -89,7 +89,7 @@ void findPatches(Dynamics& dynamics, const NearPairStep& step, StepWork& work) {
   std::vector<std::uint8_t> isNew(pairs.size(), 1);
   // Each round but the last wakes a solid.
   for (std::size_t round = 0; round <= dynamics.solids.size(); ++round) {
-    work.workers->share(pairs.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+    work.workers.share(pairs.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
       for (std::size_t i = from; i < to; ++i)
         if (isNew[i]) work.looks[i] = lookAt(dynamics, pairs[i], step);
     });
@@ -137,7 +137,7 @@ void gatherBodies(const Dynamics& dynamics, StepWork& work) {
 
 void gatherPatches(const Dynamics& dynamics, double epsilon, StepWork& work) {
   work.patches.resize(work.patched.size());
-  work.workers->share(work.patched.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+  work.workers.share(work.patched.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t k = from; k < to; ++k) {
       const NearPair& pair = dynamics.pairs[work.patched[k]];
       work.patches[k] = *pair.patch();
@@ -165,7 +165,7 @@ void gatherJoints(const Dynamics& dynamics, StepWork& work) {
 }
 
 void keepImpulses(Dynamics& dynamics, const StepWork& work) {
-  work.workers->share(work.patches.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+  work.workers.share(work.patches.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t k = from; k < to; ++k) {
       ContactPatch& patch = *dynamics.pairs[work.patched[k]].patch();
       const ContactPatch& solved = work.patches[k];
@@ -265,8 +265,7 @@ bool mayMeet(const Solid& a, const Solid& b, double lookout) {
 }
 
 void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates) {
-  std::vector<NearPair>& pairs = dynamics.spare;
-  pairs.resize(candidates.size());
+  std::vector<NearPair> pairs(candidates.size());
   auto old = dynamics.pairs.begin();
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     while (old != dynamics.pairs.end() && old->key < candidates[i]) ++old;
@@ -276,24 +275,17 @@ void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates) {
       pairs[i].key = candidates[i];
     }
   }
-  std::swap(dynamics.pairs, dynamics.spare);
-  dynamics.spare.clear();
+  dynamics.pairs = std::move(pairs);
 }
-
-StepMemory::StepMemory() : work_(std::make_unique<StepWork>()) {}
-StepMemory::~StepMemory() = default;
 
 DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings) {
   Workers alone(1);
-  StepWork own, &work = settings.memory ? settings.memory->work() : own;
-  work.clear();
-  work.workers = settings.workers ? settings.workers : &alone;
+  StepWork work(settings.workers ? *settings.workers : alone);
   findPatches(dynamics, nearStep(settings), work);
   gatherBodies(dynamics, work);
   gatherPatches(dynamics, settings.solver.epsilon, work);
   gatherJoints(dynamics, work);
-  solve(work.bodies, work.patches, work.joints, work.driven, settings.solver, *work.workers,
-        work.system);
+  solve(work.bodies, work.patches, work.joints, work.driven, settings.solver, work.workers);
   keepImpulses(dynamics, work);
   proveWays(dynamics, settings.solver.seconds, work);
   setOut(dynamics, work);

@@ -2,7 +2,6 @@
 // pairs may meet is told from outside (a broad phase); nothing here knows a world.
 #pragma once
 
-#include <memory>
 #include <vector>
 
 #include "scene/rigid/joint.hpp"
@@ -15,7 +14,6 @@ struct Dynamics {
   std::vector<Solid> solids;
   std::vector<Joint> joints;    ///< of solids
   std::vector<NearPair> pairs;  ///< ascending by key: set by setPairs()
-  std::vector<NearPair> spare;  ///< empty: memory for the next ones
 };
 
 /// When a body sleeps, and when not.
@@ -24,24 +22,10 @@ struct RestLimits {
   double calmFor = 0.5;     ///< seconds
 };
 
-struct StepWork;
-/// What a step works with, kept for the next one so that it need not ask the system for memory
-/// again: page by page, that costs a large heap a tenth of its time. No part of the state.
-class StepMemory {
- public:
-  StepMemory();
-  ~StepMemory();
-  StepWork& work() { return *work_; }
-
- private:
-  std::unique_ptr<StepWork> work_;
-};
-
 struct DynamicsStep {
   SolverStep solver;
   RestLimits rest;
-  Workers* workers = nullptr;    ///< who do it; the result is the same. null: the caller alone
-  StepMemory* memory = nullptr;  ///< null: none is kept
+  Workers* workers = nullptr;  ///< who do it; the result is the same. null: the caller alone
 };
 
 struct DynamicsReport {

@@ -444,8 +444,6 @@ void moveRigids(WorldState& world, const Wish& wish, TickReport& report, QueryCo
   driveSolids(world);
   DynamicsStep settings = settingsOf(world.lengths);
   settings.workers = workersFor(stage, stage.seeds.size());
-  if (!stage.memory) stage.memory = std::make_unique<StepMemory>();
-  settings.memory = stage.memory.get();
   stage.last = step(stage.dynamics, settings);
   settleDriven(world);
   count.narrow += stage.last.looks + stage.last.proofs;

@@ -27,7 +27,6 @@ struct RigidStage {
   std::vector<std::uint32_t> solidOf;  ///< of each body, once it is met; kNoRigid
   std::vector<std::uint32_t> bodyAt;   ///< of each mover up to the last body's; kNoRigid
   std::unique_ptr<Workers> workers;    ///< once there are many bodies; no part of the state
-  std::unique_ptr<StepMemory> memory;  ///< once a body was awake; no part of the state
   int workersAsked = 0;                ///< with so many threads
   int threads = 0;                     ///< that may be used; 0: kThreads, or the processors
   std::vector<std::uint32_t> seeds;    ///< bodies whose surroundings matter in this tick, ascending

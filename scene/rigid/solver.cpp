@@ -351,8 +351,8 @@ void keep(const System& system, std::span<RigidBody> bodies, std::span<ContactPa
 }  // namespace
 
 void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::span<Joint> joints,
-           std::span<const DrivenBody> driven, const SolverStep& step, Workers& workers,
-           System& system) {
+           std::span<const DrivenBody> driven, const SolverStep& step, Workers& workers) {
+  System system;
   system.seconds = step.seconds / step.substeps;
   system.epsilon = step.epsilon;
   system.byAvx = step.byAvx && hasAvx();
@@ -366,12 +366,6 @@ void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::sp
   }
   bounce(system, step);
   keep(system, bodies, patches);
-}
-
-void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::span<Joint> joints,
-           std::span<const DrivenBody> driven, const SolverStep& step, Workers& workers) {
-  System system;
-  solve(bodies, patches, joints, driven, step, workers, system);
 }
 
 }  // namespace enfilade::scene

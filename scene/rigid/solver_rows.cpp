@@ -117,7 +117,6 @@ void layOutColour(std::span<const ContactPatch> patches, std::span<const std::ui
 
 /// Which blocks stand where.
 void layOut(std::span<const ContactPatch> patches, System& system) {
-  system.blocks.clear(), system.points.clear(), system.colours.clear();
   std::vector<std::uint8_t> moves(system.movers.size());
   for (std::size_t i = 0; i < moves.size(); ++i) moves[i] = system.movers[i].yields();
   const Colouring colouring = colourPatches(patches, moves);

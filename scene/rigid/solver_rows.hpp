@@ -8,7 +8,6 @@
 #include "scene/rigid/contact_patch.hpp"
 #include "scene/rigid/joint.hpp"
 #include "scene/rigid/lanes.hpp"
-#include "scene/rigid/solver.hpp"
 #include "scene/rigid/workers.hpp"
 
 namespace enfilade::scene {
@@ -166,11 +165,6 @@ struct System {
   double epsilon = 0;
   bool byAvx = false;
 };
-
-/// solve() of solver.hpp, in memory that was used before.
-void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::span<Joint> joints,
-           std::span<const DrivenBody> driven, const SolverStep& step, Workers& workers,
-           System& system);
 
 /// Movers and patches; seconds and epsilon are set.
 void setUp(std::span<const RigidBody> bodies, std::span<const ContactPatch> patches, System& system,

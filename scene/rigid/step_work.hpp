@@ -3,7 +3,6 @@
 
 #include "scene/rigid/dynamics.hpp"
 #include "scene/rigid/passage.hpp"
-#include "scene/rigid/solver_rows.hpp"
 #include "scene/rigid/workers.hpp"
 
 namespace enfilade::scene {
@@ -23,9 +22,10 @@ struct Carry {
   Vec3 velocityAt(const Vec3& point) const { return velocity + spin.cross(point - pivot); }
 };
 
-/// Its arrays keep their memory from step to step; what is in them does not outlive one.
 struct StepWork {
-  Workers* workers = nullptr;
+  explicit StepWork(Workers& all) : workers(all) {}
+
+  Workers& workers;
   DynamicsReport report;
   static constexpr std::uint8_t kActive = 1, kAsked = 2, kWakes = 4;
   std::vector<std::uint8_t> looks;     ///< of each pair, these flags
@@ -42,14 +42,6 @@ struct StepWork {
   std::vector<Passage> passages;
   std::vector<double> closing;  ///< of each of `active`: metres, by the ways as they are now
   std::vector<Carry> carried;   ///< of each of `bodies`: the way that it goes in any case
-  System system;
-
-  /// All that is appended to; the others are assigned.
-  void clear() {
-    report = {};
-    active.clear(), patched.clear(), solids.clear(), bodies.clear(), driven.clear();
-    patches.clear(), joints.clear(), jointOf.clear(), passages.clear();
-  }
 };
 
 /// Step 3: the ways to where the solver has the bodies, as far as they are proved (ways.cpp).

@@ -94,7 +94,7 @@ void findCarried(const Dynamics& dynamics, double seconds, StepWork& work) {
 /// Ways of all that go; the others stand.
 void findPassages(const Dynamics& dynamics, StepWork& work) {
   work.passages.resize(work.bodies.size());
-  work.workers->share(work.bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
+  work.workers.share(work.bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i) {
       const Solid& solid = dynamics.solids[work.solids[i]];
       const bool goes =
@@ -118,7 +118,7 @@ struct Round {
 void proveRound(const Dynamics& dynamics, StepWork& work, Round& round) {
   round.parts.assign(work.active.size(), 1);
   round.proofs.assign(work.active.size(), 0);
-  work.workers->share(work.active.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+  work.workers.share(work.active.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t k = from; k < to; ++k) {
       const NearPair& pair = dynamics.pairs[work.active[k]];
       const std::uint32_t a = work.local[pair.key.a], b = work.local[pair.key.b];

@@ -79,12 +79,14 @@ TEST(Colours, PatchesOfOneColourShareNothingThatMoves) {
   EXPECT_TRUE(std::all_of(seen.begin(), seen.end(), [](int n) { return n == 1; }));
 }
 
-TEST(Colours, AFewPatchesKeepTheirOrder) {
+TEST(Colours, AFewPatchesThatShareABodyKeepTheirOrder) {
   std::vector<ContactPatch> patches(5);
-  const std::vector<std::uint8_t> moves(2, 1);
+  for (ContactPatch& patch : patches) patch.b = 1;
+  patches[2].a = 2, patches[2].b = 3;  // apart from all others
+  const std::vector<std::uint8_t> moves(4, 1);
   const Colouring colouring = colourPatches(patches, moves);
-  EXPECT_EQ(colouring.order, (std::vector<std::uint32_t>{0, 1, 2, 3, 4}));
-  EXPECT_EQ(colouring.ends, std::vector<std::uint32_t>{5});
+  EXPECT_EQ(colouring.order, (std::vector<std::uint32_t>{0, 2, 1, 3, 4}));
+  EXPECT_EQ(colouring.ends, (std::vector<std::uint32_t>{2, 3, 4, 5, 5}));
 }
 
 }  // namespace

@@ -141,7 +141,6 @@ FeederJudgement FeederJudge::judge(const std::vector<PlacedPart>& parts, const V
 Feeder::Feeder(const FeederPlan& plan, int threads)
     : plan_(plan), workers_(threads), broadPhase_({}) {
   settings_.workers = &workers_;
-  settings_.memory = &memory_;
   settings_.solver.substeps = plan.substeps / plan.looks;
   settings_.solver.seconds = kTick / plan.looks;
   settings_.solver.iterations = 4;
@@ -197,19 +196,19 @@ void Feeder::moveBoxes(double lookout) {
 void Feeder::findPairs() {
   const double lookout = 2 * settings_.solver.epsilon;
   moveBoxes(lookout);
-  keys_.clear();
+  std::vector<scene::PartPairKey> keys;
   const std::uint32_t size = static_cast<std::uint32_t>(dynamics_.solids.size());
   for (std::uint32_t i = 1; i < size; ++i)
     for (const auto& partner : broadPhase_.partners(movers_[i - 1]))
-      if (solidOfMover_[partner.id] == 0) keys_.push_back({0, i, partOfMover_[partner.id], 0});
+      if (solidOfMover_[partner.id] == 0) keys.push_back({0, i, partOfMover_[partner.id], 0});
   for (std::uint32_t i = 1; i < size; ++i)
     for (const auto& partner : broadPhase_.partners(movers_[i - 1])) {
       const std::uint32_t other = solidOfMover_[partner.id];
       if (other > i && scene::mayMeet(dynamics_.solids[i], dynamics_.solids[other], lookout))
-        keys_.push_back({i, other, 0, 0});
+        keys.push_back({i, other, 0, 0});
     }
-  if (!std::is_sorted(keys_.begin(), keys_.end())) std::sort(keys_.begin(), keys_.end());
-  scene::setPairs(dynamics_, keys_);
+  if (!std::is_sorted(keys.begin(), keys.end())) std::sort(keys.begin(), keys.end());
+  scene::setPairs(dynamics_, keys);
 }
 
 void Feeder::tick(bool driven) {

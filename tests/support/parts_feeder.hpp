@@ -85,7 +85,6 @@ class Feeder {
   std::deque<Hull> hulls_;
   scene::Dynamics dynamics_;
   scene::Workers workers_;
-  scene::StepMemory memory_;
   scene::DynamicsStep settings_;
   scene::DynamicsReport report_;
   collision::SortAndSweep broadPhase_;
@@ -93,7 +92,6 @@ class Feeder {
   std::vector<collision::ExtremalVertices> extremes_;
   std::vector<collision::Box> boxes_;   ///< of the parts, as the broad phase has them
   std::vector<collision::Box> needed_;  ///< of the parts, in this tick
-  std::vector<scene::PartPairKey> keys_;
   std::vector<std::uint32_t> solidOfMover_, partOfMover_;
   double time_ = 0;
 };
