@@ -78,9 +78,8 @@ std::size_t StillCells::slotOf(std::size_t level, const CellPlace& at) const {
 std::size_t StillCells::probe(std::size_t slot, std::size_t level, const CellPlace& at) const {
   while (slots_[slot] != kNoCell) {
     const CellData& cell = cells_[slots_[slot]];
-    const bool here = (cell.level == level) & (cell.at[0] == at[0]) & (cell.at[1] == at[1]) &
-                      (cell.at[2] == at[2]);
-    if (here) break;
+    if (cell.level == level && cell.at[0] == at[0] && cell.at[1] == at[1] && cell.at[2] == at[2])
+      break;
     slot = (slot + 1) & (slots_.size() - 1);
   }
   return slot;

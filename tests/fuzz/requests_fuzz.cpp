@@ -8,6 +8,7 @@
 #include <condition_variable>
 #include <deque>
 #include <mutex>
+#include <vector>
 
 #include "protocol/framing.hpp"
 #include "server/requests.hpp"
@@ -84,8 +85,8 @@ class SmallServer {
       Client& client = served_.clients[id];
       client.role = server::Role::admin;
       client.out = std::make_shared<server::OutgoingQueue>(
-          server::OutgoingBounds{1u << 24, 64}, std::make_shared<std::vector<std::uint8_t>>(),
-          [] {});
+          server::OutgoingBounds{1u << 24, 64},
+          server::Encoded(std::make_shared<std::vector<std::uint8_t>>()), [] {});
     }
   }
 
@@ -119,7 +120,9 @@ class SmallServer {
     bool found = false;
     for (auto next = client.out->pop(); next.message; next = client.out->pop()) {
       protocol::Decoder decoder(protocol::kClientTakes, protocol::Decoder::Expect::messages);
-      Bytes bytes(*next.message);
+      std::vector<std::uint8_t> whole = *next.message.head;
+      if (const auto& rest = next.message.rest) whole.insert(whole.end(), rest->begin(), rest->end());
+      Bytes bytes(whole);
       const auto framed = decoder.next(bytes);
       v1::ServerMessage reply;
       require(framed && bytes.empty() && protocol::parse(framed->header, reply), "replies parse");
