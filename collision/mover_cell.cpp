@@ -57,7 +57,8 @@ void MoverCell::lay(const StillCells& still, std::span<const StillCells::Row> ro
   fit(boxes, rows.size());
   if (met.size() < rows.size()) met.resize(rows.size());
   std::size_t metCount = 0;
-  const std::size_t endCount = 12 + 7 * rows.size();  // borders, and what pickEnds() writes past them
+  const std::size_t endCount =
+      12 + 7 * rows.size();  // borders, and what pickEnds() writes past them
   unsigned endingOnes = 0;
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const HalfAxes& onset = still.onset(rows[r]);

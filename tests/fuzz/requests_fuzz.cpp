@@ -121,7 +121,8 @@ class SmallServer {
     for (auto next = client.out->pop(); next.message; next = client.out->pop()) {
       protocol::Decoder decoder(protocol::kClientTakes, protocol::Decoder::Expect::messages);
       std::vector<std::uint8_t> whole = *next.message.head;
-      if (const auto& rest = next.message.rest) whole.insert(whole.end(), rest->begin(), rest->end());
+      if (const auto& rest = next.message.rest)
+        whole.insert(whole.end(), rest->begin(), rest->end());
       Bytes bytes(whole);
       const auto framed = decoder.next(bytes);
       v1::ServerMessage reply;
