@@ -143,7 +143,7 @@ struct Summit {
 };
 
 /// The summits of A along a direction and of B against it: the point of B - A least along it, up to
-/// rounding.
+/// rounding, or one that is enough.
 struct Summits {
   Summit a, b;
   VertexPair pair() const { return {a.vertex, b.vertex}; }

@@ -57,8 +57,9 @@ void MoverCell::lay(const StillCells& still, std::span<const StillCells::Row> ro
   fit(boxes, rows.size());
   if (met.size() < rows.size()) met.resize(rows.size());
   std::size_t metCount = 0;
-  const std::size_t endCount =
-      12 + 7 * rows.size();  // borders, and what pickEnds() writes past them
+  // The borders, and room for an end of each box between those of each half-axis: pickEnds() writes
+  // past its list.
+  const std::size_t endCount = 12 + 6 * rows.size();
   unsigned endingOnes = 0;
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const HalfAxes& onset = still.onset(rows[r]);

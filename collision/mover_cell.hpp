@@ -37,7 +37,7 @@ struct MoverCell {
   void lay(const StillCells& still, std::span<const StillCells::Row> rows, const HalfAxes& reach,
            std::vector<std::uint32_t>& met);
 
-  /// Asks for what is read when ends are passed, of a cell that is not full.
+  /// Asks for what is read when ends are passed: the first ends, of most cells all, and boxes.
   void prefetch() const {
     constexpr std::size_t kEndsPerLine = 4, kMost = 32;
     for (std::size_t k = 0; k < std::min(kMost, ends.size()); k += kEndsPerLine) {

@@ -96,9 +96,9 @@ struct Support {
   Real along;  ///< times search.length
 };
 
-/// `local`: a body whose vertex alone
-/// takes the support to the origin and beyond is climbed no farther. That there is no plane between
-/// is known then, and what is near is rather of use to the simplex than what is far behind.
+/// `local`: a body whose vertex alone takes the support to the origin and beyond is climbed no
+/// farther. That there is no plane between is known then, and what is near is rather of use to the
+/// simplex than what is far behind.
 Support<double> findSupport(const MinkowskiDifference& difference, bool local, double limit,
                             Search<double>& search) {
   const double enough =
@@ -202,7 +202,11 @@ struct Combination {
   /// square of itself / length.
   Length length(double about) const {
     const auto step = [&](double head) {
-      return Length{head, static_cast<double>(squared - Wide{head} * head) * (0.5 / head)};
+      const Wide rest = squared - Wide{head} * head;
+      // Where a double could not hold it, it is divided before it is rounded.
+      const bool tiny = head < 0x1p-450;
+      return Length{head, tiny ? static_cast<double>(rest / (2 * Wide{head}))
+                               : static_cast<double>(rest) * (0.5 / head)};
     };
     const Length length = step(about);
     if (std::abs(length.tail) <= 0x1p-36 * about) return length;
@@ -311,7 +315,8 @@ double provedMore(const MinkowskiDifference& difference, const Combination& at,
 /// Its supports have proved it.
 double provedMore(const MinkowskiDifference&, const Combination&, const Length& length,
                   const Search<Wide>& search) {
-  return static_cast<double>(search.lower - length.head);
+  const auto more = static_cast<double>(search.lower - length.head);
+  return more - 2 * kUnit * std::abs(more);
 }
 
 enum class Outcome : std::uint8_t {

@@ -32,10 +32,10 @@ struct Neighbour {
 };
 
 struct alignas(64) Mover {
-  // What a steady tick reads comes first: with the reach three lines of a cache.
-  HalfAxes low{}, high{};  ///< guards: while low <= reach < high nothing was passed
+  // What a steady tick reads comes first: two lines of a cache.
+  HalfAxes low{}, high{};             ///< guards: while low <= reach < high nothing was passed
+  std::vector<Neighbour> neighbours;  ///< sorted by id
   std::vector<SortAndSweep::Partner> partners;  ///< sorted
-  std::vector<Neighbour> neighbours;            ///< sorted by id
 
   MoverCell cell;
   Presence presence = Presence::free;

@@ -205,16 +205,22 @@ std::optional<RecordedItem> itemFrom(const mcap::Message& message,
   return std::nullopt;
 }
 
-bool RecordingReader::isWanted(const mcap::Message& message) {
+bool RecordingReader::isWanted(const RecordedItem& item) {
   if (!run_) return true;
-  begun_ += message.channel->topic == kStartTopic ? 1 : 0;
+  begun_ += std::holds_alternative<v1::RecordingStart>(item) ? 1 : 0;
+  if (begun_ < *run_ && std::holds_alternative<v1::RecordedNames>(item)) names_.push_back(item);
   return begun_ == *run_;
 }
 
 std::optional<RecordedItem> RecordingReader::next() {
+  if (run_ && begun_ == *run_ && !names_.empty()) {
+    RecordedItem names = std::move(names_.front());
+    names_.pop_front();
+    return names;
+  }
   while (const auto message = file_.next()) {
-    if (!isWanted(*message)) continue;
-    if (auto item = itemFrom(*message, path_)) return item;
+    auto item = itemFrom(*message, path_);
+    if (item && isWanted(*item)) return item;
   }
   if (run_ && begun_ < *run_) failWithoutRun(path_, *run_, begun_);
   return std::nullopt;

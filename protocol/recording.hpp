@@ -1,6 +1,7 @@
 // A recording: what a world was told and what became of it, tick by tick, as MCAP (RECORDING.md).
 #pragma once
 
+#include <deque>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -69,7 +70,8 @@ std::uint64_t nanosecondsOf(double seconds);
 
 class RecordingReader {
  public:
-  /// `run`: that one alone; left out: all of them.
+  /// `run`: that one alone, and the names, which are told after the first start only, after its
+  /// own; left out: all of them.
   explicit RecordingReader(const std::filesystem::path& file,
                            std::optional<std::uint32_t> run = std::nullopt);
 
@@ -77,15 +79,19 @@ class RecordingReader {
   std::optional<RecordedItem> next();
   /// As mcap::Reader has them.
   bool closed() const { return file_.closed(); }
+  /// At the end: what was asked for is all there. Of a run that another follows it is, even where
+  /// the file ends in the middle of that one.
+  bool complete() const { return closed() || (run_ && begun_ > *run_); }
   std::uint64_t wholeBytes() const { return file_.wholeBytes(); }
 
  private:
-  bool isWanted(const mcap::Message& message);
+  bool isWanted(const RecordedItem& item);
 
   std::filesystem::path path_;
   mcap::Reader file_;
   std::optional<std::uint32_t> run_;
-  std::uint32_t begun_ = 0;  ///< runs, up to here
+  std::uint32_t begun_ = 0;         ///< runs, up to here
+  std::deque<RecordedItem> names_;  ///< told before the run that is wanted
 };
 
 /// 16 digits, as hashes are written everywhere.

@@ -36,6 +36,10 @@ void SeekableRecording::readStart() {
   if (!found)
     throw RecordingError(file_.file().string() + ": a chunk lacks the start that it should have");
   start_ = std::get<v1::RecordingStart>(*itemFrom(message, file_.file()));
+  if (mcap::Message more; file_.next(more))
+    throw RecordingError(file_.file().string() +
+                         ": other chunks than those it was recorded in, as some tools make them: "
+                         "it can be read from its beginning, and not from the middle");
   const std::uint64_t before =
       nanosecondsOf(static_cast<double>(firstTick()) * start_.lengths().tick());
   if (message.time < before)

@@ -218,10 +218,11 @@ std::string runProblem(const std::string& text) {
   return run && *run > 0 ? "" : text + ": give the number of a run, from 1";
 }
 
-void addRun(CLI::App& verb, Arguments& into) {
+void addRun(CLI::App& verb, Arguments& into, const std::string& leftOut) {
   verb.add_option("--run", into.run,
                   "Of a RECORDING in which the world begins anew that run, as `enfilade inspect` "
-                  "counts them (the first; --verify without --from: all)")
+                  "counts them (" +
+                      leftOut + ")")
       ->check(CLI::Validator(runProblem, "N"));
 }
 
@@ -232,13 +233,13 @@ void addBranch(CLI::App& verb, Arguments& into) {
   verb.add_option("--then", into.then,
                   "A script that takes over there: what was recorded after it is not done")
       ->check(CLI::Validator(fileProblem, "SCRIPT"));
-  addRun(verb, into);
+  addRun(verb, into, "the first; --verify without --from: all");
 }
 
 void addPlayed(CLI::App& serve, Arguments& into) {
   serve.add_option("--from", into.from, "RECORDING in the place of SCENE: begin after this tick")
       ->check(CLI::Validator(tickProblem, "TICK"));
-  addRun(serve, into);
+  addRun(serve, into, "the first");
   serve.footer(
       "RECORDING (MCAP) in the place of SCENE, or after the one scene that it is played in: "
       "clients "

@@ -91,7 +91,7 @@ nlohmann::ordered_json verifyAll(const VerifyCommand& command) {
   nlohmann::ordered_json told{{"ticks", replayed.ticks()},
                               {"state_hash", protocol::hexadecimal(replayed.hash())},
                               {"closed", recording.closed()}};
-  if (!recording.closed()) {
+  if (!recording.complete()) {
     told["whole_bytes"] = recording.wholeBytes();
     spdlog::warn("{}: it was cut off after byte {}; what comes before was verified",
                  command.recording.string(), recording.wholeBytes());

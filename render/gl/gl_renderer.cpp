@@ -10,8 +10,9 @@
 //    Mostly that is nothing, or little, which is drawn into the depth, too. Where much was found
 //    (nothing was known of this view), it is searched among: the nearest are drawn first, which
 //    hides most of the others, then twice as many, and so on.
-// 3. What may be seen by the last depth that was read is shaded. Where only ids are wanted, they
-//    are drawn with the depth, and that is all unless something was missing.
+// 3. What may be seen by the last depth that was read is shaded. Where neither colours nor
+//    normals are wanted, ids are drawn with the depth, and that is all unless something was
+//    missing.
 //
 // Why the picture is that of drawing everything: in a pixel the nearest fragment wins, among equals
 // the one drawn last. What is left out lies, wherever it has a fragment, behind something that is

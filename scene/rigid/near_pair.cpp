@@ -26,10 +26,6 @@ using collision::ConvexBody;
 using collision::Decision;
 using collision::Verdict;
 
-/// Of the way that two free bodies could come nearer in a step, by their speeds of now: patches of
-/// what is farther hardly ever matter. What is missed stops them (step 3 of dynamics.cpp), and is
-/// there in the next step; from what is driven there may be no way out, so there it is all of it.
-constexpr double kSpeculative = 0.5;
 /// Of the way that they could come nearer in a step: looking so much farther saves looking again.
 constexpr double kForesight = 1;
 /// Of the distance: a face's plane that parts resting bodies by so much is taken.
@@ -335,8 +331,7 @@ void ask(NearPair& pair, const ConvexBody& bodyA, const ConvexBody& bodyB, const
 }  // namespace
 
 bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step) {
-  const double reach = (a.isFree() && b.isFree() ? kSpeculative : 1) * reachOf(a, b, step);
-  const double limit = 2 * step.epsilon + reach;
+  const double reach = reachOf(a, b, step), limit = 2 * step.epsilon + reach;
   const double farthest = limit + kForesight * (reach + step.epsilon);
   if (apartNow(pair, a, b) > limit || farBySpheres(pair, a, b, farthest)) {
     pair.hasPatch = false;

@@ -1,6 +1,6 @@
 // How bodies that touch or are jointed go on: sequential impulses in small steps. Free functions on
 // plain arrays; nothing is kept but the impulses in the patches and joints. Only + - * / and sqrt,
-// in the order of the arrays.
+// in an order that the patches alone decide.
 #pragma once
 
 #include <span>

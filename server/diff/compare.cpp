@@ -371,11 +371,13 @@ const v1::RecordingParent& parentOf(const RecordedWalk& walk) {
   return walk.runs.front().start.parent();
 }
 
-/// Beside a branch: which run of a file with several it left.
+/// Beside a branch: which of several runs it left, of the file that it says it left.
 std::optional<std::uint32_t> runLeftBy(const RecordedWalk& branch, const RecordedWalk& walk) {
-  if (!branch.runs.front().start.has_parent() || walk.runs.size() < 2) return walk.run;
-  return std::clamp<std::uint32_t>(parentOf(branch).run(), 1,
-                                   static_cast<std::uint32_t>(walk.runs.size()));
+  const v1::RecordingParent& parent = parentOf(branch);
+  const std::uint32_t run = std::max(parent.run(), 1U);
+  const bool left = branch.runs.front().start.has_parent() &&
+                    std::filesystem::path(parent.file()).filename() == walk.file.filename();
+  return left && walk.runs.size() > 1 && run <= walk.runs.size() ? run : walk.run;
 }
 
 /// Compared is what both tell. A branch tells nothing of what was before it, and of a recording

@@ -223,7 +223,7 @@ RecordedWalk readWalk(const std::filesystem::path& file, const WalkPart& part) {
   if (!run) throw RecordingError(file.string() + ": no recording of Enfilade begins in it");
   walk.runs.push_back(run->finish());
   while (part.until && walk.runs.size() > part.until->run + 1) walk.runs.pop_back();
-  walk.closed = reader.closed();
+  walk.closed = reader.complete();
   walk.wholeBytes = reader.wholeBytes();
   return walk;
 }

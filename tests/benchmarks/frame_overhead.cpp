@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -24,6 +25,7 @@
 #include "server/frame_messages.hpp"
 #include "server/load_scene.hpp"
 #include "server/server.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace {
 
@@ -66,8 +68,7 @@ v1::FrameRequest smallPicture() {
 class ByPython {
  public:
   explicit ByPython(std::uint16_t port) {
-    const std::string fifo =
-        std::filesystem::temp_directory_path() / ("frame_overhead_" + std::to_string(port));
+    const std::string fifo = tests::ownFile("orders");
     if (::mkfifo(fifo.c_str(), 0600) != 0) return;
     const std::string command =
         "PYTHONPATH=protocol/python /usr/bin/python3 "
@@ -75,6 +76,7 @@ class ByPython {
         std::to_string(port) + " < " + fifo;
     times_.reset(::popen(command.c_str(), "r"));
     orders_.reset(std::fopen(fifo.c_str(), "w"));  // when Python has opened the other end
+    std::signal(SIGPIPE, SIG_IGN);                 // which may be gone again
     std::filesystem::remove(fifo);
   }
   /// Nothing where there is no Python.

@@ -105,12 +105,17 @@ class Replay(unittest.TestCase):
 
     def test_of_several_runs_any_is_played_left_and_compared(self):
         several = self.folder / "several.mcap"
+        scene = self.folder / "lift.obj"
+        scene.write_text(obj())
+        scene.with_suffix(".walk.json").write_text(json.dumps(
+            {"walk": 1, "bodies": [{"kind": "lift", "name": "lift", "objects": ["column"],
+                                    "stops": [0, 1.5]}]}))
         hashes = []
-        with enfilade.serve(self.scene, "--record", str(several)) as server, \
+        with enfilade.serve(scene, "--record", str(several)) as server, \
                 server.connect() as client:
             for name, ticks in (("ann", 50), ("bob", 80)):
                 client.restart()
-                client.spawn(name, at=(0, 0, 0)).drive((1, 0, 0))
+                client.spawn(name, at=(0, 0, 5)).drive((0, 0, 1))  # to the lift
                 hashes.append(client.step(ticks).state_hash)
         for run, ticks in ((1, 50), (2, 80)):
             with enfilade.serve(several, "--run", str(run)) as server, server.connect() as client:
@@ -123,9 +128,9 @@ class Replay(unittest.TestCase):
             self.assertIn(words, ended.stderr)
         for wrong in ([self.scene, "--run", "2"], [several, "--run", "0"]):
             self.assertEqual(self.run_program("serve", *wrong).returncode, 2, wrong)
-        self.runs_in_process(several)
+        self.runs_in_process(scene, several)
 
-    def runs_in_process(self, several):
+    def runs_in_process(self, scene, several):
         whole = self.run_program("replay", several, "--verify", "--run", 2)
         late = self.run_program("replay", several, "--verify", "--run", 2, "--from", 70)
         self.assertEqual((whole.returncode, late.returncode), (0, 0), whole.stderr + late.stderr)
@@ -143,11 +148,14 @@ class Replay(unittest.TestCase):
         # Beside the run that it left: bob is in both.
         compared = json.loads(self.run_program("diff", several, branch, "--json").stdout)
         self.assertEqual([run["ticks"] for run in compared["before"]["runs"]], [80])
+        self.assertFalse([one for one in compared["happenings"] if one["before"]])
 
-        again = self.run_program("replay", self.scene, several, "--run", 2, "--json",
+        again = self.run_program("replay", scene, several, "--run", 2, "--json",
                                  "--out", self.folder / "again")
         self.assertEqual(again.returncode, 0, again.stderr + again.stdout)
-        self.assertEqual([run["ticks"] for run in json.loads(again.stdout)["after"]["runs"]], [80])
+        told = json.loads(again.stdout)
+        self.assertEqual([run["ticks"] for run in told["after"]["runs"]], [80])
+        self.assertTrue(told["same"], "the lift is found by its object in each run")
 
     def test_it_is_played_in_the_scene_that_is_named(self):
         moved = self.folder / "moved.obj"

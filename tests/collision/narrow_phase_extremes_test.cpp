@@ -58,6 +58,14 @@ TEST(NarrowPhaseExtremes, DistancesOfAnySizeLieWithinTheirBound) {
     const Decision d = decide({a, Vec3::Zero()}, {b, Vec3::Zero()}, cache);
     EXPECT_EQ(d.verdict, Verdict::separated) << exponent;
     EXPECT_LE(std::abs(d.distance - distance), d.errorBound) << exponent;
+    // One that no double is.
+    const std::vector<Vec3> slanted{{distance, distance, 0}};
+    FeatureCache other;
+    const Decision s = decide({a, Vec3::Zero()}, {slanted, Vec3::Zero()}, other);
+    const long double truth = std::sqrt(2.0L) * static_cast<long double>(distance);
+    EXPECT_LE(std::abs(static_cast<long double>(s.distance) - truth),
+              static_cast<long double>(s.errorBound))
+        << exponent;
     FeatureCache none;
     EXPECT_TRUE(
         decideWithin({a, Vec3::Zero()}, {b, Vec3::Zero()}, distance * 1.01, none).has_value())

@@ -129,6 +129,25 @@ TEST(Dynamics, EnergyOfWhatBouncesAndTumblesNeverGrows) {
   }
 }
 
+TEST(Dynamics, WhoeverIsMetInTheMiddleOfAStepTakesTheMomentumOver) {
+  constexpr int kPhases = 16;
+  for (int phase = 0; phase < kPhases; ++phase) {
+    RigidScene scene;
+    scene.settings.solver.gravity = Vec3::Zero();
+    const auto cube = boxHull({0.2, 0.2, 0.2});
+    const double way = 6 * scene.settings.solver.seconds;  // of a step
+    const double gap = 2 * way + way * phase / kPhases;
+    const auto moving = scene.addFree(cube, {0, 0, 0});
+    const auto standing = scene.addFree(cube, {0.4 + gap, 0, 0});
+    scene.body(moving).velocity = {6, 0, 0};
+    scene.pairAll();
+    scene.run(20);
+    const double a = scene.body(moving).velocity.x(), b = scene.body(standing).velocity.x();
+    EXPECT_NEAR(a + b, 6, 0.06) << phase;
+    EXPECT_GT(b, 2.9) << phase << ": nothing was met";
+  }
+}
+
 TEST(Dynamics, AFastBodyIsStoppedByAThinSheet) {
   RigidScene scene;
   const std::vector<Vec3> sheet{{-20, 0, -20}, {20, 0, -20}, {20, 0, 20}, {-20, 0, 20}};

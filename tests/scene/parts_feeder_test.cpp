@@ -12,7 +12,7 @@ TEST(PartsFeeder, WithTheDriveOffNoEnergyIsMadeAndMostFallAsleep) {
   const double start = feeder.energy();
   double most = start;
   // A heap comes to rest when it does: of a dozen seeds half within 300 ticks, the slowest in 840.
-  for (int i = 0; i < 720 && (i < 120 || feeder.report().awake >= 25); ++i) {
+  for (int i = 0; i < 1200 && (i < 120 || feeder.report().awake >= 25); ++i) {
     feeder.tick(false);
     most = std::max(most, feeder.energy());
     if (i % 20 != 0) continue;

@@ -34,7 +34,7 @@ TEST(OutgoingQueue, KeepsRepliesInOrderAndOnlyTheLatestState) {
 
 TEST(OutgoingQueue, AboveItsBoundOnlyTheLastWordsAreLeft) {
   OutgoingQueue queue({100, 2}, bytes(7), [] {});
-  queue.push(bytes(60));
+  queue.push({bytes(10), bytes(50)});
   queue.push(bytes(40));
   EXPECT_FALSE(queue.overflowed());
   EXPECT_EQ(queue.pop().message.size(), 60u);
@@ -45,6 +45,14 @@ TEST(OutgoingQueue, AboveItsBoundOnlyTheLastWordsAreLeft) {
   EXPECT_TRUE(next.last);
   queue.push(bytes(1));
   EXPECT_FALSE(queue.pop().message) << "nothing is said after the last words";
+}
+
+TEST(OutgoingQueue, CountsBothPiecesOfPictures) {
+  OutgoingQueue queue({100, 9, 150}, bytes(7), [] {});
+  queue.pushFrame({bytes(1), bytes(100)});
+  EXPECT_FALSE(queue.overflowed());
+  queue.pushFrame({bytes(1), bytes(100)});
+  EXPECT_TRUE(queue.overflowed());
 }
 
 TEST(OutgoingQueue, CountsPicturesAndNotTheirBytes) {

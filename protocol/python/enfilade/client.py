@@ -108,6 +108,9 @@ class Client:
         """The first half of pipeline(): sends, and does not wait."""
         asked = [messages.ClientMessage(request_id=next(self._ids), **body) for body in requests]
         self._send(asked)
+        for one in asked:
+            if one.HasField("subscribe"):
+                self._subscribed = one.subscribe
         return [one.request_id for one in asked]
 
     def _send(self, asked: List[Any]) -> None:
@@ -340,7 +343,6 @@ class Client:
         wanted = messages.Subscribe(contacts=contacts, near_misses=near_misses, notices=notices,
                                     state=state, state_rate=state_rate)
         reply, _ = self.request(subscribe=wanted)
-        self._subscribed = wanted
         return [results.contact(one) for one in reply.subscribe.live]
 
     @contextlib.contextmanager

@@ -111,7 +111,10 @@ class Connection:
             while sum(went.counts) < len(went.view):
                 went.move(self._socket.send)
                 if time.monotonic() > deadline:
-                    raise socket.timeout(f"it took nothing for {self.timeout:g} s")
+                    raise socket.timeout()
+        except socket.timeout as error:
+            self.broken = f"the server took nothing for {self.timeout:g} s"
+            raise ConnectionFailed(f"{self.peer}: {self.broken}") from error
         except OSError as error:
             # Not closed yet: what it said last may still be read.
             self.broken = f"the connection broke: {error}{self._fate()}"

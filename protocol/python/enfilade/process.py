@@ -99,13 +99,16 @@ class _Running:
             how = f"with exit code {code}"
         else:
             how = f"by signal {-code} ({signal.strsignal(-code)})"
-        last = self.read_log().strip().splitlines()[-1:]
+        last = self.read_log(end=True).strip().splitlines()[-1:]
         return f"the server ended {how}" + (f"; its last words: {last[0]}" if last else "")
 
-    def read_log(self) -> str:
+    def read_log(self, *, end: bool = False) -> str:
+        """Its first megabyte, or its last 4 kB."""
         if self.log.closed:
             return self.said
-        return os.pread(self.log.fileno(), 1 << 20, 0).decode(errors="replace")
+        size = os.fstat(self.log.fileno()).st_size
+        return os.pread(self.log.fileno(), 1 << 20,
+                        max(size - 4096, 0) if end else 0).decode(errors="replace")
 
 
 _running: Set[_Running] = set()

@@ -29,8 +29,8 @@ class VectorWalkEnv(spaces.VectorEnvBase):
     whose reward is 0 (Gymnasium's "next step" mode).
 
     A wrong number of actions or seeds, or an action that is none, is a ValueError before anything is
-    sent. Where one environment fails later, all are waited for, its error, with its number, is raised, and reset() comes
-    next; when the server died, all have to be made anew.
+    sent. Where one environment fails later, all are waited for, its error, with its number, is
+    raised, and reset() comes next; when the server died, all have to be made anew.
     """
 
     metadata: Dict[str, Any] = {"render_modes": ["rgb_array"], "autoreset_mode": spaces.NEXT_STEP}
