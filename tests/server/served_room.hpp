@@ -35,11 +35,14 @@ class ServedRoom : public ::testing::Test {
 };
 
 /// Whether the server can draw. In CI it must: Mesa's software is enough.
-inline bool drawsPictures(const Server& server) {
-  const bool draws = !server.rendererName().empty();
+inline bool drawsPictures(const std::string& renderer) {
+  const bool draws = !renderer.empty();
   if (!draws && std::getenv("CI") != nullptr)
     ADD_FAILURE() << "no EGL device: install libegl-mesa0 and libgl1-mesa-dri";
   return draws;
+}
+inline bool drawsPictures(const Server& server) {
+  return drawsPictures(server.rendererName());
 }
 
 /// Ends the test where nothing can be drawn: as skipped, or in CI as failed.
