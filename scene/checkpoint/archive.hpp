@@ -179,6 +179,9 @@ struct Layout<collision::Quat> {
   template <class A>
   static void archive(A& a, Held<A, collision::Quat>& q) {
     Coefficients<Eigen::Vector4d>::archive(a, q.coeffs());
+    constexpr double kRounding = 1e-6;  // far more than a world's rotations are off
+    if constexpr (!A::kWrites)
+      if (!(std::abs(q.squaredNorm() - 1) <= kRounding)) a.refuse("a rotation is not of length 1");
   }
 };
 
