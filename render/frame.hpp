@@ -32,12 +32,13 @@ struct FrameOptions {
   Culling culling = Culling::hidden;
 };
 
-/// Meshes of objects, each counted once.
+/// How it was made: meshes of objects, each counted once.
 struct FrameStatistics {
   std::uint32_t drawn = 0;
   std::uint32_t outside = 0;   ///< beside the picture
   std::uint32_t occluded = 0;  ///< in the picture, behind what was drawn
   std::uint32_t passes = 1;    ///< drawings that it took to find what is seen and to draw it
+  double seconds = 0;          ///< of wall-clock time, until its pixels were read back
 };
 
 /// Row 0 is the top row; pixel (x, y) is at index y * width + x.

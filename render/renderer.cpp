@@ -1,6 +1,7 @@
 #include "render/renderer.hpp"
 
 #include <array>
+#include <chrono>
 
 #include "render/gl/gl_renderer.hpp"
 #include "render/rays/ray_renderer.hpp"
@@ -121,10 +122,13 @@ Renderer::~Renderer() = default;
 
 Frame Renderer::render(const scene::Snapshot& snapshot, const Camera& camera,
                        const FrameOptions& options, RendererKind kind) {
-  if (state_->chosen(options, kind) == RendererKind::gl) {
-    return state_->glRenderer().render(snapshot, camera, options);
-  }
-  return state_->rayRenderer().render(snapshot, camera, options);
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start = Clock::now();
+  Frame frame = state_->chosen(options, kind) == RendererKind::gl
+                    ? state_->glRenderer().render(snapshot, camera, options)
+                    : state_->rayRenderer().render(snapshot, camera, options);
+  frame.statistics.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  return frame;
 }
 
 const std::string& Renderer::deviceName() const {

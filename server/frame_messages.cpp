@@ -233,6 +233,7 @@ v1::Frame messageOf(const render::Frame& frame, double time, const v1::FrameRequ
   message.set_time(time);
   message.set_renderer(frame.renderer);
   message.set_software(frame.software);
+  message.set_drawing_seconds(frame.statistics.seconds);
   *message.mutable_camera() = messageOf(frame.camera);
   message.set_width(static_cast<std::uint32_t>(frame.camera.width));
   message.set_height(static_cast<std::uint32_t>(frame.camera.height));

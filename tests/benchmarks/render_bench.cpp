@@ -64,7 +64,7 @@ double processorSeconds() {
 struct Result {
   double seconds = 0, processor = 0;
   std::size_t frames = 0;
-  render::FrameStatistics statistics{0, 0, 0, 0};
+  render::FrameStatistics statistics{0, 0, 0, 0, 0};
 };
 
 render::Frame draw(render::GlRenderer& renderer, const tests::WalkStop& stop, Size size,
