@@ -68,6 +68,7 @@ constexpr std::array kKinds{
                 "read by the second reader, which may leave openings closed"},
     ProblemKind{"uncut_opening", kWrong,
                 "a door or window whose wall is closed behind it: nobody gets through"},
+    ProblemKind{"map_place", kNote, "where the file's own coordinates lie on a map"},
     ProblemKind{"skipped_openings", kNote, "openings are air"},
     ProblemKind{"skipped_spaces", kNote, "spaces are air"},
     // of what moves

@@ -262,6 +262,23 @@ TEST(IfcDoors, AnAvatarWalksThroughAGuessedDoorFromEitherSide) {
   }
 }
 
+TEST(IfcDoors, AnAvatarWalksThroughADoorThatOpensOneWayFromEitherSide) {
+  for (const char* operation : {"SINGLE_SWING_LEFT", "SINGLE_SWING_RIGHT"}) {
+    const Model model = found(
+        doorModel(operation, withLeaf(1.2, {{{0.06, 0.02, 0.01}, {1.14, 0.06, 2.04}}}), 1.2));
+    ASSERT_EQ(model.bodies.size(), 1u) << toldOf(model, "still_doors");
+    for (const double side : {1.0, -1.0}) {
+      SCOPED_TRACE(std::string(operation) + (side > 0 ? ", pushed open" : ", pulled open"));
+      BodyTrial trial{Model(model)};
+      trial.order("ann", Spawn{{2.6, 0.001, 2.95 + 1.5 * side}, 0, 0.3, 1.75});
+      trial.order("ann", Walk{{{2.6, 0, 2.95 - 1.5 * side}}, 1});
+      trial.ticks(900);
+      EXPECT_LT(side * (trial.feet("ann").z() - 2.95), -1.4) << trial.feet("ann").transpose();
+      EXPECT_EQ(whoPenetrates(trial.world), "");
+    }
+  }
+}
+
 // ---- files --------------------------------------------------------------------------------------
 
 std::vector<IfcReader> readersHere() {

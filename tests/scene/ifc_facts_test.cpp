@@ -109,6 +109,32 @@ TEST(IfcFacts, FeetAreAConversion) {
   EXPECT_TRUE(factsOf(house).unitGuessed);
 }
 
+TEST(IfcFacts, APlaceOnAMapIsToldInMetres) {
+  IfcHouse house;  // in millimetres
+  EXPECT_FALSE(factsOf(house).mapPlace);
+  house.more =
+      "#600=IFCMAPCONVERSION(#20,#601,456789.125,5428000.5,110.25,0.5,0.8660254037844386,0.9996);\n"
+      "#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,#602);\n"
+      "#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
+  const std::optional<IfcMapPlace> place = factsOf(house).mapPlace;
+  ASSERT_TRUE(place);
+  EXPECT_EQ(place->crs, "EPSG:25832");
+  EXPECT_EQ(place->east, 456789.125);
+  EXPECT_EQ(place->north, 5428000.5);
+  EXPECT_EQ(place->height, 110.25);
+  EXPECT_NEAR(place->turn, 1.0471975511965976, 1e-12);
+  EXPECT_EQ(place->scale, 0.9996);
+  // Without a unit of its own the map has the project's; what is missing is the default.
+  house.more = "#600=IFCMAPCONVERSION(#20,#999,4000.,5000.,$);\n";
+  const std::optional<IfcMapPlace> bare = factsOf(house).mapPlace;
+  ASSERT_TRUE(bare);
+  EXPECT_NEAR(bare->east, 4, 1e-12);
+  EXPECT_NEAR(bare->north, 5, 1e-12);
+  EXPECT_EQ(bare->height, 0);
+  EXPECT_EQ(bare->turn, 0);
+  EXPECT_EQ(bare->scale, 1);
+}
+
 TEST(IfcFacts, DrawingsAreNoBodies) {
   IfcHouse house;
   house.more =

@@ -113,6 +113,30 @@ TEST(ImportIfc, ADoorInAWallWithoutAHoleIsReportedByItsGlobalId) {
   }
 }
 
+TEST(ImportIfc, AWallThatNobodySaysToCutIsReportedWithItsDoorAndWindow) {
+  const TemporaryFolder folder;
+  IfcHouse house;
+  house.voids = false;
+  // Without IfcRelFillsElement there is not even an opening: a window in the wall, another in a
+  // gap beside it.
+  house.more = house.placement(500, "#102", 3, 0.1, 1) + house.box(510, 0.5, 0.05, 1) +
+               "#520=IFCWINDOW('0000000000000000Window',$,'Window',$,$,#502,#515,$," +
+               house.length(1) + "," + house.length(0.5) + ",.WINDOW.,.SINGLE_PANEL.,$);\n" +
+               house.placement(530, "#102", 5, 0.1, 1) + house.box(540, 0.5, 0.05, 1) +
+               "#550=IFCWINDOW('0000000000000000Beside',$,'Beside',$,$,#532,#545,$," +
+               house.length(1) + "," + house.length(0.5) + ",.WINDOW.,.SINGLE_PANEL.,$);\n";
+  const auto file = folder.write("house.ifc", house.text());
+  for (const IfcReader reader : readersHere()) {
+    const Model model = importModel(file, by(reader));
+    SCOPED_TRACE(model.reader);
+    const Problem* uncut = problemOf(model, "uncut_opening");
+    ASSERT_NE(uncut, nullptr);
+    EXPECT_EQ(uncut->count, 2u) << uncut->example;
+    EXPECT_NE(uncut->example.find("000000000000000000Door"), std::string::npos) << uncut->example;
+    EXPECT_NE(uncut->example.find("0000000000000000Window"), std::string::npos) << uncut->example;
+  }
+}
+
 TEST(ImportIfc, UnitAndUpAxisOfTheUserWin) {
   const TemporaryFolder folder;
   const auto file = folder.write("house.ifc", IfcHouse().text());
@@ -123,6 +147,30 @@ TEST(ImportIfc, UnitAndUpAxisOfTheUserWin) {
   expectSize(model, {8, 0.6, 6});
   EXPECT_NEAR(objectOf(model, "IfcDoor").overallWidth, 1.8, 1e-9);
   EXPECT_EQ(problemOf(model, "uncut_opening"), nullptr);
+}
+
+TEST(ImportIfc, APlaceOnAMapIsToldAndMovesNothing) {
+  const TemporaryFolder folder;
+  IfcHouse house;
+  house.more =
+      "#600=IFCMAPCONVERSION(#20,#601,456789.125,5428000.5,110.25,1.,0.,$);\n"
+      "#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,#602);\n"
+      "#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
+  const auto file = folder.write("house.ifc", house.text());
+  for (const IfcReader reader : readersHere()) {
+    const Model model = importModel(file, by(reader));
+    SCOPED_TRACE(model.reader);
+    const Problem* place = problemOf(model, "map_place");
+    ASSERT_NE(place, nullptr);
+    EXPECT_NE(
+        place->example.find("EPSG:25832: the file's origin is at E 456789.125, N 5428000.500"),
+        std::string::npos)
+        << place->example;
+    EXPECT_TRUE(model.offset.isZero(0));
+    EXPECT_LT(
+        (objectOf(model, "IfcDoor").worldFromPlacement->translation() - Vec3(1.5, 0, -0.1)).norm(),
+        1e-9);
+  }
 }
 
 TEST(ImportIfc, AHouseFarFromTheOriginKeepsItsMillimetres) {

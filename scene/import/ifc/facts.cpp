@@ -199,6 +199,7 @@ class FactReader {
     } else {
       facts_.unitGuessed = "no length unit in IFCUNITASSIGNMENT: taken for metres";
     }
+    facts_.mapPlace = ifcMapPlace(file_, facts_.metresPerUnit);
   }
 
   void readStatement(const StepStatement& statement) {

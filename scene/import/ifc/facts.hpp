@@ -33,10 +33,20 @@ struct IfcProduct {
   std::optional<Eigen::Affine3d> fileFromPlacement;  ///< metres, the file's axes, no scale
 };
 
+/// Where the file's coordinates lie on a map (IfcMapConversion). Told, not heeded: a model stays in
+/// its own coordinates, in which nothing is large.
+struct IfcMapPlace {
+  std::string crs;                         ///< the map's name, as "EPSG:25832"; may be empty
+  double east = 0, north = 0, height = 0;  ///< of the file's origin, metres
+  double turn = 0;                         ///< of the file's x axis from east to north, radians
+  double scale = 1;                        ///< from the file's lengths to the map's
+};
+
 struct IfcFacts {
   double metresPerUnit = 1;
   std::optional<std::string> unitGuessed;  ///< why the unit is a guess
   bool siUnit = true;                      ///< false: feet and the like
+  std::optional<IfcMapPlace> mapPlace;
   std::string schema;
   bool whole = true;                              ///< END-ISO-10303-21 is there
   std::vector<IfcProduct> products;               ///< in file order; one an express id
@@ -52,6 +62,10 @@ IfcFacts readIfcFacts(const StepFile& file);
 
 /// Metres in the length unit of the project; nullopt: none is told.
 std::optional<double> ifcMetresPerUnit(const StepFile& file, bool& siUnit);
+
+/// nullopt: the file does not tell. Metres come of the map's unit, or of `metresPerUnit` where the
+/// map has none.
+std::optional<IfcMapPlace> ifcMapPlace(const StepFile& file, double metresPerUnit);
 
 /// "IFCWALLSTANDARDCASE" as "IfcWallStandardCase".
 std::string ifcClassName(std::string_view type);

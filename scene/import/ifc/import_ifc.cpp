@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstdio>
 #include <set>
 
 #include "scene/import/ifc/file.hpp"
@@ -155,6 +156,16 @@ bool isCoarse(const IfcShapes& shapes, std::uint32_t product) {
   });
 }
 
+std::string textOf(const IfcMapPlace& place) {
+  constexpr double kDegrees = 57.29577951308232;
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "the file's origin is at E %.3f, N %.3f, H %.3f m, its x axis %.6f degrees from "
+                "east to north, scale %.9g",
+                place.east, place.north, place.height, place.turn * kDegrees, place.scale);
+  return (place.crs.empty() ? "a map without a name" : place.crs) + ": " + text;
+}
+
 class IfcImport {
  public:
   IfcImport(const ImportRequest& request, const ImportProgress& progress)
@@ -203,6 +214,7 @@ class IfcImport {
     if (facts_.unitGuessed && !request_.metresPerUnit) {
       problems_.add("no_unit", *facts_.unitGuessed);
     }
+    if (facts_.mapPlace) problems_.add("map_place", textOf(*facts_.mapPlace));
     for (const IfcProduct& product : facts_.products) {
       if (!product.hasBody) continue;
       if (product.role == IfcProduct::Role::space) problems_.add("skipped_spaces", nameOf(product));

@@ -17,7 +17,7 @@ std::map<std::uint32_t, std::string> ifcPaths(const IfcFacts& facts);
 /// A door or window that stands in a wall without a hole.
 struct UncutOpening {
   const Object* object;
-  std::uint32_t host;  ///< the wall's express id
+  std::uint32_t host;  ///< the wall's express id; 0: the file does not say whose opening it is
   int raysPassed;
 };
 
@@ -27,8 +27,7 @@ struct OpeningCheck {
   std::vector<const Object*> unchecked;  ///< they have no placement
 };
 
-/// Sends rays through each door and window of `model` that fills an opening. The answer points into
-/// the model.
+/// Sends rays through each door and window of `model`. The answer points into the model.
 OpeningCheck checkOpenings(const Model& model, const IfcFacts& facts);
 
 void reportOpenings(const OpeningCheck& check, ProblemLog& problems);

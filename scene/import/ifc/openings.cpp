@@ -3,7 +3,8 @@
 //
 // Through each door and window a grid of rays is sent, square to its host, and met with the host's
 // triangles alone. The opening is taken for cut where nearly all pass: a bar or a sill may stand in
-// the way of a few.
+// the way of a few. Files that do not say whose opening a door or window fills leave out
+// IfcRelVoidsElement or IfcRelFillsElement: its hosts are then the walls that it stands in.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -27,6 +28,18 @@ struct Frame {
   int through;  // 0 or 1: the level axis that goes through the wall
 };
 
+Eigen::Affine3d frameFromMeshOf(const Frame& frame, const Object& object) {
+  return frame.worldFromFrame.inverse(Eigen::Isometry) * object.worldFromMesh;
+}
+
+Box boxOf(const Model& model, const Object& object, const Eigen::Affine3d& toFrame) {
+  Box box;
+  for (const std::uint32_t mesh : object.meshes)
+    for (const std::uint32_t i : model.meshes[mesh].indices)
+      box.include(toFrame * model.meshes[mesh].positions[i].cast<double>());
+  return box;
+}
+
 /// The axis that is not the door's width.
 int throughAxis(const Object& object, const Vec3& size) {
   const auto like = [&](double extent) {
@@ -41,13 +54,7 @@ int throughAxis(const Object& object, const Vec3& size) {
 std::optional<Frame> frameOf(const Model& model, const Object& object) {
   if (!object.worldFromPlacement) return std::nullopt;
   Frame frame{*object.worldFromPlacement, {}, 1};
-  const Eigen::Affine3d frameFromMesh =
-      frame.worldFromFrame.inverse(Eigen::Isometry) * object.worldFromMesh;
-  for (const std::uint32_t mesh : object.meshes) {
-    for (const std::uint32_t i : model.meshes[mesh].indices) {
-      frame.box.include(frameFromMesh * model.meshes[mesh].positions[i].cast<double>());
-    }
-  }
+  frame.box = boxOf(model, object, frameFromMeshOf(frame, object));
   if (frame.box.empty()) return std::nullopt;
   frame.through = throughAxis(object, frame.box.size());
   return frame;
@@ -76,8 +83,7 @@ std::vector<Corners> trianglesNear(const Model& model, const std::vector<const O
   const Box reach = grown(frame.box, kBeyond);
   std::vector<Corners> near;
   for (const Object* host : hosts) {
-    const Eigen::Affine3d frameFromMesh =
-        frame.worldFromFrame.inverse(Eigen::Isometry) * host->worldFromMesh;
+    const Eigen::Affine3d frameFromMesh = frameFromMeshOf(frame, *host);
     for (const std::uint32_t index : host->meshes) {
       const Mesh& mesh = model.meshes[index];
       for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
@@ -126,29 +132,74 @@ std::multimap<std::uint32_t, const Object*> objectsByProduct(
   return objects;
 }
 
+struct Wall {
+  const Object* object;
+  Box box;  ///< scene frame
+};
+
+/// Walls and the parts of walls.
+std::vector<Wall> wallsOf(const Model& model, const IfcFacts& facts,
+                          const std::map<std::string, const IfcProduct*>& products) {
+  const auto isWall = [](const IfcProduct* product) {
+    return product != nullptr && product->ifcClass.starts_with("IfcWall");
+  };
+  std::vector<Wall> walls;
+  for (const Object& object : model.objects) {
+    const auto product = products.find(object.globalId);
+    if (product == products.end()) continue;
+    if (isWall(product->second) || isWall(facts.find(product->second->parent)))
+      walls.push_back({&object, boxOf(model, object, object.worldFromMesh)});
+  }
+  return walls;
+}
+
+/// The walls in whose box the door's middle lies, both in the door's frame: there the box of the
+/// wall that it stands in is tight.
+std::vector<const Object*> wallsAround(const Model& model, const std::vector<Wall>& walls,
+                                       const Frame& frame) {
+  const auto holds = [](const Box& box, const Vec3& point) {
+    return !box.empty() && collision::overlaps(box, Box{point, point});
+  };
+  const Vec3 middle = frame.box.centre(), inWorld = frame.worldFromFrame * middle;
+  std::vector<const Object*> around;
+  for (const Wall& wall : walls)
+    if (holds(wall.box, inWorld) &&
+        holds(boxOf(model, *wall.object, frameFromMeshOf(frame, *wall.object)), middle))
+      around.push_back(wall.object);
+  return around;
+}
+
+/// Doors and windows, and whatever else is said to fill an opening.
+bool fillsOpenings(const IfcProduct& product) {
+  return product.host != 0 || product.ifcClass.starts_with("IfcDoor") ||
+         product.ifcClass.starts_with("IfcWindow");
+}
+
 }  // namespace
 
 OpeningCheck checkOpenings(const Model& model, const IfcFacts& facts) {
   std::map<std::string, const IfcProduct*> products;
   for (const IfcProduct& product : facts.products) products.emplace(product.globalId, &product);
   const auto objects = objectsByProduct(products, model);
+  const std::vector<Wall> walls = wallsOf(model, facts, products);
   OpeningCheck check;
   for (const Object& object : model.objects) {
     const auto product = products.find(object.globalId);
-    if (product == products.end() || product->second->host == 0) continue;
-    std::vector<const Object*> hosts;
-    const auto [begin, end] = objects.equal_range(product->second->host);
-    for (auto host = begin; host != end; ++host) {
-      if (host->second != &object) hosts.push_back(host->second);
-    }
+    if (product == products.end() || !fillsOpenings(*product->second)) continue;
     const std::optional<Frame> frame = frameOf(model, object);
     if (!frame) {
       check.unchecked.push_back(&object);
       continue;
     }
+    const std::uint32_t host = product->second->host;
+    std::vector<const Object*> hosts;
+    const auto [begin, end] = objects.equal_range(host);
+    for (auto one = begin; one != end; ++one)
+      if (one->second != &object) hosts.push_back(one->second);
+    if (host == 0) hosts = wallsAround(model, walls, *frame);
     const int passed = raysThatPass(*frame, trianglesNear(model, hosts, *frame));
     ++check.looked;
-    if (passed < kEnough) check.uncut.push_back({&object, product->second->host, passed});
+    if (passed < kEnough) check.uncut.push_back({&object, host, passed});
   }
   return check;
 }

@@ -1,4 +1,5 @@
-// The length unit of an IFC file.
+// The length unit of an IFC file, and where it lies on a map.
+#include <cmath>
 #include <map>
 
 #include "scene/import/ifc/facts.hpp"
@@ -56,6 +57,34 @@ std::optional<double> ifcMetresPerUnit(const StepFile& file, bool& siUnit) {
       const auto metres = metresIn(file, id);
       if (metres && *metres > 0) return metres;
     }
+  }
+  return std::nullopt;
+}
+
+/// IfcMapConversion (source, target, eastings, northings, height, x axis' abscissa and ordinate,
+/// scale); its target is an IfcProjectedCRS (name, ..., the unit as seventh).
+std::optional<IfcMapPlace> ifcMapPlace(const StepFile& file, double metresPerUnit) {
+  for (const StepStatement& statement : file.statements()) {
+    if (!statement.type.starts_with("IFCMAPCONVERSION")) continue;
+    const std::vector<std::string_view> arguments = stepArguments(statement.arguments);
+    const auto number = [&](std::size_t index, double otherwise) {
+      if (index >= arguments.size()) return otherwise;
+      return stepNumber(arguments[index]).value_or(otherwise);
+    };
+    IfcMapPlace place;
+    double unit = metresPerUnit;
+    const auto crs = arguments.size() > 1 ? stepReference(arguments[1]) : std::nullopt;
+    if (const StepStatement* map = crs ? file.find(*crs) : nullptr) {
+      const std::vector<std::string_view> told = stepArguments(map->arguments);
+      if (!told.empty()) place.crs = stepText(told[0]).value_or("");
+      const auto mapUnit = told.size() > 6 ? stepReference(told[6]) : std::nullopt;
+      if (mapUnit) unit = metresIn(file, *mapUnit).value_or(unit);
+    }
+    place.east = unit * number(2, 0), place.north = unit * number(3, 0);
+    place.height = unit * number(4, 0);
+    place.turn = std::atan2(number(6, 0), number(5, 1));
+    place.scale = number(7, 1);
+    return place;
   }
   return std::nullopt;
 }
