@@ -2,12 +2,14 @@
 // ours with one thread and with two, the peers as they come, with one. Prints speed against
 // penetration, judged alike for all by the exact narrow phase, and the checks of ours; ends with 1
 // when one of ours fails.
-//   parts_feeder [PARTS [TICKS]]        1000 parts and 240 ticks when left out; 10000 for the full
-//   run, of which one thread and the peers do the first 240
+//   parts_feeder [PARTS [TICKS [ours]]]  1000 parts and 240 ticks when left out; 10000 for the full
+//   run, of which one thread and the peers do the first 240; `ours`: without peers
+// The last tenth of the ticks, when all have settled, is told once more by itself.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
+#include <string_view>
 
 #include "tests/benchmarks/feeder_engine.hpp"
 
@@ -40,8 +42,12 @@ struct Row {
   double seconds = 0;  ///< of the ticks
   double cpu = 0;      ///< of the ticks, of all threads together
   FeederJudgement worst;
-  std::size_t judged = 0;
 };
+
+FeederJudgement worse(const FeederJudgement& a, const FeederJudgement& b) {
+  return {std::max(a.deepest, b.deepest), std::max(a.penetrating, b.penetrating),
+          std::max(a.outside, b.outside)};
+}
 
 double cpuSeconds() {
   timespec now{};
@@ -60,13 +66,14 @@ Row run(FeederEngine& engine, const FeederJudge& judge, int ticks, bool driven,
     row.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (afterTick) afterTick();
     if (i % kJudgeEvery != 0) continue;
-    const FeederJudgement now = judge.judge(engine.parts(), engine.tray());
-    row.worst.deepest = std::max(row.worst.deepest, now.deepest);
-    row.worst.penetrating = std::max(row.worst.penetrating, now.penetrating);
-    row.worst.outside = std::max(row.worst.outside, now.outside);
-    ++row.judged;
+    row.worst = worse(row.worst, judge.judge(engine.parts(), engine.tray()));
   }
   return row;
+}
+
+/// One after the other.
+Row both(const Row& first, const Row& second) {
+  return {first.seconds + second.seconds, first.cpu + second.cpu, worse(first.worst, second.worst)};
 }
 
 void print(const char* name, const Row& row, int ticks) {
@@ -87,14 +94,19 @@ bool checkOurs(const FeederPlan& plan, const FeederJudge& judge, int ticks) {
   const Row off = run(still, judge, ticks, false, [&] { most = std::max(most, still.energy()); });
   OurFeeder driven(plan, kThreads), alone(plan, 1);
   std::uint64_t shortened = 0, squeezed = 0, solids = 0;
-  const Row on = run(driven, judge, ticks, true, [&] {
+  const auto count = [&] {
     shortened += driven.report().shortened;
     squeezed += driven.report().squeezed;
     solids += plan.parts.size() * static_cast<std::uint64_t>(plan.looks);
-  });
+  };
+  const int last = std::max(kJudgeEvery, ticks / 10);
+  const Row begun = run(driven, judge, ticks - last, true, count);
+  const Row ended = run(driven, judge, last, true, count);
+  const Row on = both(begun, ended);
   const Row one = run(alone, judge, std::min(ticks, kMostAlone), true);
   print("ours, drive off", off, ticks);
   print("ours", on, ticks);
+  print("ours, last tenth", ended, last);
   print("ours, one thread", one, std::min(ticks, kMostAlone));
   std::printf(
       "  energy with the drive off: at most %.6f of its start; stopped on their way: %.2f %%"
@@ -111,8 +123,10 @@ bool checkOurs(const FeederPlan& plan, const FeederJudge& judge, int ticks) {
 int main(int count, char** words) {
   const std::size_t parts = count > 1 ? std::strtoul(words[1], nullptr, 10) : 1000;
   const int ticks = count > 2 ? std::atoi(words[2]) : 240;
-  if (parts < 1 || parts > 100'000 || ticks < kJudgeEvery) {
-    std::fprintf(stderr, "parts_feeder [PARTS 1..100000 [TICKS, at least %d]]\n", kJudgeEvery);
+  const bool alone = count > 3 && std::string_view(words[3]) == "ours";
+  if (parts < 1 || parts > 100'000 || ticks < 2 * kJudgeEvery || (count > 3 && !alone)) {
+    std::fprintf(stderr, "parts_feeder [PARTS 1..100000 [TICKS, at least %d [ours]]]\n",
+                 2 * kJudgeEvery);
     return 2;
   }
   const FeederPlan plan = testing::planFeeder(parts, 1);
@@ -122,6 +136,7 @@ int main(int count, char** words) {
   std::printf("%-16s %10s %10s %10s %14s %12s %9s\n", "", "ms a tick", "cpu ms", "real time",
               "deepest mm", "penetrating", "outside");
   const bool good = checkOurs(plan, judge, ticks);
+  if (alone) return good ? 0 : 1;
 #ifdef BENCH_BULLET
   const int few = std::min(ticks, kMostAlone);
   print("Bullet", run(*makeBulletFeeder(plan), judge, few, true), few);
