@@ -264,8 +264,8 @@ TEST(IfcDoors, AnAvatarWalksThroughAGuessedDoorFromEitherSide) {
 
 TEST(IfcDoors, AnAvatarWalksThroughADoorThatOpensOneWayFromEitherSide) {
   for (const char* operation : {"SINGLE_SWING_LEFT", "SINGLE_SWING_RIGHT"}) {
-    const Model model = found(
-        doorModel(operation, withLeaf(1.2, {{{0.06, 0.02, 0.01}, {1.14, 0.06, 2.04}}}), 1.2));
+    const Model model =
+        found(doorModel(operation, withLeaf(1.2, {{{0.06, 0.02, 0.01}, {1.14, 0.06, 2.04}}}), 1.2));
     ASSERT_EQ(model.bodies.size(), 1u) << toldOf(model, "still_doors");
     for (const double side : {1.0, -1.0}) {
       SCOPED_TRACE(std::string(operation) + (side > 0 ? ", pushed open" : ", pulled open"));
