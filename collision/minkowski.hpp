@@ -35,8 +35,26 @@ constexpr Real unitOf() {
   return std::numeric_limits<Real>::epsilon() / 2;
 }
 
-/// By single coordinates: pairs of them, as Eigen loads them, would wait for the stores of single
-/// ones just made.
+// By single coordinates: pairs of them, as Eigen loads them, would wait for the stores of single
+// ones just made.
+template <class Real>
+Eigen::Matrix<Real, 3, 1> plus(const Eigen::Matrix<Real, 3, 1>& a,
+                               const Eigen::Matrix<Real, 3, 1>& b) {
+  return {a.x() + b.x(), a.y() + b.y(), a.z() + b.z()};
+}
+template <class Real>
+Eigen::Matrix<Real, 3, 1> minus(const Eigen::Matrix<Real, 3, 1>& a,
+                                const Eigen::Matrix<Real, 3, 1>& b) {
+  return {a.x() - b.x(), a.y() - b.y(), a.z() - b.z()};
+}
+template <class Real>
+Eigen::Matrix<Real, 3, 1> times(const Eigen::Matrix<Real, 3, 1>& a, Real factor) {
+  return {a.x() * factor, a.y() * factor, a.z() * factor};
+}
+/// The greatest |coordinate|.
+inline double largestOf(const Vec3& v) {
+  return std::max(std::max(std::abs(v.x()), std::abs(v.y())), std::abs(v.z()));
+}
 template <class Real>
 Real dot(const Eigen::Matrix<Real, 3, 1>& a, const Eigen::Matrix<Real, 3, 1>& b) {
   return a.x() * b.x() + a.y() * b.y() + a.z() * b.z();
@@ -105,9 +123,10 @@ struct MinkowskiDifference {
   MinkowskiDifference(const ConvexBody& bodyA, const ConvexBody& bodyB)
       : a(bodyA),
         b(bodyB),
-        roundedShift(bodyB.translation - bodyA.translation),
-        reach((a.size + b.size + roundedShift.cwiseAbs().maxCoeff()) * (1 + 8 * kUnit)) {
-    if (!(reach + 0 * roundedShift.sum() < std::numeric_limits<double>::infinity())) [[unlikely]]
+        roundedShift(minus(bodyB.translation, bodyA.translation)),
+        reach((a.size + b.size + largestOf(roundedShift)) * (1 + 8 * kUnit)) {
+    if (!(reach + 0 * (roundedShift.x() + roundedShift.y() + roundedShift.z()) <
+          std::numeric_limits<double>::infinity())) [[unlikely]]
       requireFinite(bodyA, bodyB);
   }
 
@@ -119,7 +138,7 @@ struct MinkowskiDifference {
   template <class Real>
   Eigen::Matrix<Real, 3, 1> point(VertexPair pair) const {
     if constexpr (std::is_same_v<Real, double>) {
-      return b.turned<double>(pair.b) + roundedShift - a.turned<double>(pair.a);
+      return minus(plus(b.turned<double>(pair.b), roundedShift), a.turned<double>(pair.a));
     } else {
       return b.turned<Real>(pair.b) + shift() - a.turned<Real>(pair.a);
     }
@@ -269,7 +288,7 @@ void forEachFarthest(const PlacedBody& placed, const Vec3& direction, double sla
   const double least = summit.along - slack;
   const auto visitAllAbove = [&] {
     for (std::uint32_t i = 0; i < vertices.size(); ++i)
-      if (!(direction.dot(vertices[i]) < least)) visit(i);
+      if (!(dot(direction, vertices[i]) < least)) visit(i);
   };
   const Hull* hull = placed.body->hull;
   if (!hull) return visitAllAbove();
@@ -277,12 +296,16 @@ void forEachFarthest(const PlacedBody& placed, const Vec3& direction, double sla
   reached[0] = summit.vertex;
   std::size_t count = 1;
   for (std::size_t k = 0; k < count; ++k) {
+    std::size_t end = count;  // behind it those that are high enough, picked without a branch
     for (const std::uint32_t neighbour : hull->neighboursOf(reached[k])) {
-      if (direction.dot(vertices[neighbour]) < least) continue;
-      if (std::find(reached.begin(), reached.begin() + count, neighbour) != reached.begin() + count)
-        continue;
-      if (count == reached.size()) return visitAllAbove();
-      reached[count++] = neighbour;
+      if (end == reached.size()) return visitAllAbove();
+      reached[end] = neighbour;
+      end += dot(direction, vertices[neighbour]) < least ? 0 : 1;
+    }
+    for (std::size_t picked = count; picked < end; ++picked) {
+      const auto known = reached.begin() + count;
+      if (std::find(reached.begin(), known, reached[picked]) == known)
+        reached[count++] = reached[picked];
     }
   }
   for (std::size_t k = 0; k < count; ++k) visit(reached[k]);

@@ -65,7 +65,7 @@ struct Search {
   bool beyond = false;          ///< proved: the distance is greater than the limit
 
   /// `direction`, unit up to rounding.
-  Vec3 axis() const { return (direction * (kLonger<Real> / length)).template cast<double>(); }
+  Vec3 axis() const { return times(direction, kLonger<Real> / length).template cast<double>(); }
   /// False: the simplex holds the origin, or all but touches it.
   bool hasDirection() const {
     constexpr bool isDouble = std::is_same_v<Real, double>;
@@ -79,11 +79,11 @@ template <class Real>
 bool start(const MinkowskiDifference& difference, const FeatureCache& cache, Search<Real>& search) {
   const bool warm = valid(cache, *difference.a.body, *difference.b.body);
   if (warm) {
-    for (int i = 0; i < cache.size; ++i) search.simplex.add(difference, cache.pairs[i]);
+    const std::span pairs(cache.pairs);
+    search.simplex.set(difference, pairs.first(static_cast<std::size_t>(cache.size)));
   } else {
-    search.simplex.add(difference, {});
+    search.simplex.set(difference, std::array{VertexPair{}});
   }
-  search.simplex.reduce(difference);
   search.distance = lengthOf(search.simplex.nearest);
   return warm;
 }
@@ -134,7 +134,8 @@ void walk(const MinkowskiDifference& difference, double limit, int localSteps,
         search.distance * search.distance - support.along <= enough * search.length ||
         simplex.holds(support.pair))
       return;
-    const Simplex<Real> last = simplex;
+    const std::array<VertexPair, 4> lastPairs = simplex.pairs;
+    const int lastSize = simplex.size;
     simplex.add(difference, support.pair);
     simplex.reduce(difference);
     const Real distance = lengthOf(simplex.nearest);
@@ -142,7 +143,7 @@ void walk(const MinkowskiDifference& difference, double limit, int localSteps,
       // As near may be good, too: the feature whose direction proves it.
       const bool asNear = distance <= search.distance && simplex.holds(support.pair);
       if (!asNear || ++equalSteps > kMostEqualSteps) {
-        simplex = last;
+        simplex.set(difference, std::span(lastPairs).first(static_cast<std::size_t>(lastSize)));
         return;
       }
     }
@@ -161,10 +162,6 @@ double rootOf(Wide squared) {
   const auto rounded = static_cast<double>(squared);
   const bool fits = rounded > 0x1p-900 && rounded < 0x1p1000;
   return fits ? std::sqrt(rounded) : static_cast<double>(std::sqrt(squared));
-}
-
-double largestOf(const Vec3& v) {
-  return v.cwiseAbs().maxCoeff();
 }
 
 struct Length {
@@ -218,7 +215,7 @@ struct Combination {
   bool isCommonPoint(const Vec3& tA, const Simplex<Real>& simplex) {
     const double length = rootOf(squared);
     if (!isWithin(length, 2, simplex)) return false;
-    const double inWorld = std::max(largestOf(pointA + tA), largest - largestOf(tA));
+    const double inWorld = std::max(largestOf(plus(pointA, tA)), largest - largestOf(tA));
     return length <= 8 * kUnit * inWorld;
   }
 
@@ -307,7 +304,7 @@ double provedMore(const MinkowskiDifference& difference, const Combination& at,
   if (!ofB.alone || ofB.vertex != at.ofB.vertex)
     far += beyond(difference.b, -d, search.length, ofB, at.ofB);
   const double blur = error + 2 * kUnit * head;
-  const Vec3 off = at.aToB - d;
+  const Vec3 off = minus(at.aToB, d);
   const double slip = 2 * (dot(off, off) + blur * blur) / head;
   const double lost = (slip + far / search.length + error) * (1 + 0x1p-8);
   return tail - lost;
@@ -341,7 +338,8 @@ Outcome describeSeparation(const Simplex<Real>& simplex, const Length& length, d
   // Where the bound is no small part of the distance, the vector from point to point may lead
   // anywhere, and only the last unit will do.
   const bool fine = bound <= kFine * distance;
-  decision.normal = fine ? Vec3(at.aToB / distance) : axis;
+  const Vec3& w = at.aToB;
+  decision.normal = fine ? Vec3(w.x() / distance, w.y() / distance, w.z() / distance) : axis;
   return at.isWithin(bound, fine ? kMostError : 1, simplex) ? Outcome::decided : Outcome::open;
 }
 
@@ -402,8 +400,8 @@ Outcome conclude(const MinkowskiDifference& difference, Search<Real>& search, do
     sharpen(difference, simplex, at);
     common = at.isCommonPoint(tA, simplex);
   }
-  decision.pointA = at.pointA + tA;
-  decision.pointB = at.pointB + tA;
+  decision.pointA = plus(at.pointA, tA);
+  decision.pointB = plus(at.pointB, tA);
   if (!inside) {
     const Length length = at.length(static_cast<double>(search.distance));
     const double low = provedMore(difference, at, length, search);

@@ -110,7 +110,7 @@ struct Beyond {
   Summits summits;
 };
 Beyond<double> beyond(const Facet<double>& facet, const Polytope<double>& polytope) {
-  const Vec3 inward = facet.normal * (-1 / lengthOf(facet.normal));
+  const Vec3 inward = times(facet.normal, -1 / lengthOf(facet.normal));
   const Summits summits =
       climb(polytope.difference, inward, kUnitLength, polytope.pairs[facet.corners[0]]);
   const Along along = alongOf(polytope.difference, inward, 1, summits);

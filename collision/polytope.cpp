@@ -60,7 +60,10 @@ bool findTetrahedron(Polytope<Real>& polytope) {
   return false;
 }
 
-using Edge = std::array<std::uint16_t, 2>;
+struct Edge {
+  std::uint16_t from, to;
+  bool operator==(const Edge&) const = default;
+};
 
 /// The rim of a hole, each edge as the facet that went had it.
 struct Rim {
@@ -113,16 +116,16 @@ bool expand(VertexPair pair, Polytope<Real>& polytope) {
   std::size_t kept = 0;
   for (const Facet<Real>& facet : polytope.all()) {
     const auto& corner = polytope.points[facet.corners[0]];
-    if (facet.normal.dot(polytope.points[added] - corner) > 0) {
+    if (dot(facet.normal, minus(polytope.points[added], corner)) > 0) {
       for (int k = 0; k < 3; ++k) rim.toggle(facet.corners[k], facet.corners[(k + 1) % 3]);
-    } else {
-      polytope.facets[kept++] = facet;
+    } else if (Facet<Real>& to = polytope.facets[kept++]; &to != &facet) {
+      to = facet;
     }
   }
   polytope.facetCount = kept;
   if (rim.count == 0) return false;
   for (std::size_t k = 0; k < rim.count; ++k)
-    if (!polytope.addFacet({rim.edges[k][0], rim.edges[k][1], added}, true)) return false;
+    if (!polytope.addFacet({rim.edges[k].from, rim.edges[k].to, added}, true)) return false;
   return true;
 }
 

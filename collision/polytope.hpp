@@ -24,7 +24,7 @@ template <class Real>
 void setFacet(const Corners& corners, const Eigen::Matrix<Real, 3, 1>& a,
               const Eigen::Matrix<Real, 3, 1>& b, const Eigen::Matrix<Real, 3, 1>& c,
               Facet<Real>& facet) {
-  const Eigen::Matrix<Real, 3, 1> normal = (b - a).cross(c - a);
+  const Eigen::Matrix<Real, 3, 1> normal = minus(b, a).cross(minus(c, a));
   facet.corners = corners;
   facet.normal = normal;
   facet.offset = std::min(std::min(dot(normal, a), dot(normal, b)), dot(normal, c));

@@ -26,7 +26,8 @@ const Face<Real>& closer(const Face<Real>& first, const Face<Real>& second) {
 
 template <class Real>
 void keepCloser(const Face<Real>& face, Face<Real>& best) {
-  best = best.size == 0 ? face : closer(best, face);
+  if (best.size == 0 || dot(face.nearest, face.nearest) < dot(best.nearest, best.nearest))
+    best = face;
 }
 
 template <class Real>
@@ -38,7 +39,7 @@ template <class Real>
 Face<Real> segment(const Simplex<Real>& s, int i, int j) {
   using Vec = typename Simplex<Real>::Vec;
   const Vec& from = s.points[i];
-  const Vec edge = s.points[j] - from;
+  const Vec edge = minus(s.points[j], from);
   const Real squared = dot(edge, edge);
   const Real t = -dot(from, edge);
   if (!(t > 0)) return corner(s, i);
@@ -47,15 +48,15 @@ Face<Real> segment(const Simplex<Real>& s, int i, int j) {
     return closer(corner(s, i), corner(s, j));
   const Real inverse = 1 / squared;
   const Real w = t * inverse;
-  const Vec near = from + w * edge;
-  return {{i, j}, {1 - w, w}, 2, near - (dot(near, edge) * inverse) * edge};
+  const Vec near = plus(from, times(edge, w));
+  return {{i, j}, {1 - w, w}, 2, minus(near, times(edge, dot(near, edge) * inverse))};
 }
 
 template <class Real>
 Face<Real> triangle(const Simplex<Real>& s, int i, int j, int k) {
   using Vec = typename Simplex<Real>::Vec;
   const Vec& a = s.points[i];
-  const Vec ab = s.points[j] - a, ac = s.points[k] - a;
+  const Vec ab = minus(s.points[j], a), ac = minus(s.points[k], a);
   const Vec normal = ab.cross(ac);
   const Real squared = dot(normal, normal);
   // Twice the signed areas that the origin's projection spans with each edge, times |normal|.
@@ -71,9 +72,10 @@ Face<Real> triangle(const Simplex<Real>& s, int i, int j, int k) {
     return {{i, j, k},
             {wi * inverse, wj * inverse, wk * inverse},
             3,
-            (dot(a, normal) * inverse) * normal};
+            times(normal, dot(a, normal) * inverse)};
   }
-  Face<Real> best{};
+  Face<Real> best;
+  best.size = 0;
   if (beyondIJ) keepCloser(segment(s, i, j), best);
   if (beyondIK) keepCloser(segment(s, i, k), best);
   if (beyondJK) keepCloser(segment(s, j, k), best);
@@ -98,7 +100,8 @@ Face<Real> tetrahedron(const Simplex<Real>& s, double reach, bool& inside) {
   const bool sees2 = flat || !(sign * d2 > bound), sees3 = flat || !(sign * d3 > bound);
   inside = !sees0 && !sees1 && !sees2 && !sees3;
   if (inside) return {{0, 1, 2, 3}, {d0 / sum, d1 / sum, d2 / sum, d3 / sum}, 4, Vec::Zero()};
-  Face<Real> best{};
+  Face<Real> best;
+  best.size = 0;
   if (sees3) keepCloser(triangle(s, 0, 1, 2), best);
   if (sees2) keepCloser(triangle(s, 0, 1, 3), best);
   if (sees1) keepCloser(triangle(s, 0, 2, 3), best);

@@ -20,6 +20,8 @@ struct Simplex {
   bool holds(VertexPair pair) const;
   VertexPair newest() const { return pairs[size - 1]; }  ///< faces keep the order of their corners
   void add(const MinkowskiDifference& difference, VertexPair pair);
+  /// Exactly these, reduced.
+  void set(const MinkowskiDifference& difference, std::span<const VertexPair> to);
   /// Keeps the corners of the face that holds the nearest point, and sets `nearest`.
   void reduce(const MinkowskiDifference& difference);
 
@@ -63,6 +65,13 @@ template <class Real>
 void Simplex<Real>::add(const MinkowskiDifference& difference, VertexPair pair) {
   pairs[size] = pair;
   points[size++] = difference.point<Real>(pair);
+}
+
+template <class Real>
+void Simplex<Real>::set(const MinkowskiDifference& difference, std::span<const VertexPair> to) {
+  size = 0;
+  for (const VertexPair pair : to) add(difference, pair);
+  reduce(difference);
 }
 
 template <class Real>
