@@ -62,7 +62,7 @@ struct Search {
   Real length = 0;              ///< of `direction`, at least
   Summits summits;              ///< of the last support, when the walk is in doubles
   Wide lower = 0;               ///< of the true distance, proved by supports in extended precision
-  bool beyond = false;          ///< proved: the distance is greater than the limit
+  bool beyondLimit = false;     ///< proved: the distance is greater than the limit
 
   /// `direction`, unit up to rounding.
   Vec3 axis() const { return times(direction, kLonger<Real> / length).template cast<double>(); }
@@ -106,7 +106,7 @@ Support<double> findSupport(const MinkowskiDifference& difference, bool local, d
   climb(difference, search.direction, search.length, search.simplex.newest(), enough,
         search.summits);
   const Along along = alongOf(difference, search.direction, search.length, search.summits);
-  search.beyond = along.bound > limit * search.length * kUnitLength;
+  search.beyondLimit = along.bound > limit * search.length * kUnitLength;
   return {search.summits.pair(), along.value};
 }
 Support<Wide> findSupport(const MinkowskiDifference& difference, bool, double limit,
@@ -114,7 +114,7 @@ Support<Wide> findSupport(const MinkowskiDifference& difference, bool, double li
   VertexPair hint = search.simplex.newest();
   const Least least = leastAlong(difference, search.direction, search.length, hint);
   search.lower = std::max(search.lower, least.bound / search.length * (1 - 4 * kWideUnit));
-  search.beyond = search.lower > limit;
+  search.beyondLimit = search.lower > limit;
   return {least.pair, least.along};
 }
 
@@ -130,7 +130,7 @@ void walk(const MinkowskiDifference& difference, double limit, int localSteps,
     search.direction = simplex.nearest;
     search.length = search.distance * kLonger<Real>;
     const Support<Real> support = findSupport(difference, i < localSteps, limit, search);
-    if (search.beyond ||
+    if (search.beyondLimit ||
         search.distance * search.distance - support.along <= enough * search.length ||
         simplex.holds(support.pair))
       return;
@@ -172,7 +172,7 @@ struct Length {
 /// Weights round by at most 8.1 eta S a body, turning by 3 eta S, shift and sums by eta (S_A +
 /// 2 S_B + 3 sqrt(3) D), the length by 2.5 sqrt(3) eta reach: below 17.5 eta reach; `error` is 24.
 struct Combination {
-  PointOn ofA, ofB;
+  PointOn onBodyA, onBodyB;
   Vec3 pointA, pointB, aToB;  ///< world axes, from t_A; rounded
   Wide squared;               ///< length of aToB before that
   double error;               ///< of that length, metres
@@ -180,19 +180,18 @@ struct Combination {
 
   template <class Real>
   Combination(const MinkowskiDifference& difference, const Simplex<Real>& simplex)
-      : ofA(pointOn(simplex, difference.a, &VertexPair::a)),
-        ofB(pointOn(simplex, difference.b, &VertexPair::b)),
+      : onBodyA(pointOn(simplex, difference.a, &VertexPair::a)),
+        onBodyB(pointOn(simplex, difference.b, &VertexPair::b)),
         error(static_cast<double>(4 * difference.pointError())) {
     squared = set<0>(difference) + set<1>(difference) + set<2>(difference);
     largest = std::max(largestOf(pointA), largestOf(pointB)) * (1 - 8 * kUnit);
   }
-  /// Whether `metres` are at most so many units of rounding of the largest coordinate.
+  /// Whether `metres` are at most so many units of rounding of the largest coordinate; looks for a
+  /// larger one where the points' own do not do.
   template <class Real>
   bool isWithin(double metres, double units, const Simplex<Real>& simplex) {
     if (metres <= units * kUnit * largest) return true;
-    for (int i = 0; i < simplex.size; ++i)  // a vertex of A or one of B has half of it
-      largest = std::max(largest,
-                         largestOf(simplex.points[i].template cast<double>()) * (0.5 - 4 * kUnit));
+    raiseLargest(simplex);
     return metres <= units * kUnit * largest;
   }
   /// As an unevaluated sum; `about`: what it may be. A step of Newton's is off by less than the
@@ -220,12 +219,19 @@ struct Combination {
   }
 
  private:
+  /// Of a coordinate of B - A, a vertex of A or one of B has half.
+  template <class Real>
+  void raiseLargest(const Simplex<Real>& simplex) {
+    for (int i = 0; i < simplex.size; ++i)
+      largest = std::max(largest,
+                         largestOf(simplex.points[i].template cast<double>()) * (0.5 - 4 * kUnit));
+  }
   /// A coordinate of the points; returns what it adds to the squared length.
   template <int k>
   Wide set(const MinkowskiDifference& difference) {
     const ConvexBody &a = *difference.a.body, &b = *difference.b.body;
-    const Wide onA = turned<k>(a, ofA);
-    const Wide onB = turned<k>(b, ofB) + (Wide{b.translation[k]} - a.translation[k]);
+    const Wide onA = turned<k>(a, onBodyA);
+    const Wide onB = turned<k>(b, onBodyB) + (Wide{b.translation[k]} - a.translation[k]);
     const Wide apart = onB - onA;
     pointA[k] = static_cast<double>(onA);
     pointB[k] = static_cast<double>(onB);
@@ -266,10 +272,10 @@ void sharpen(const MinkowskiDifference& difference, const Simplex<double>& simpl
 }
 void sharpen(const MinkowskiDifference&, const Simplex<Wide>&, Combination&) {}
 
-/// How much farther along a direction, times `length`, a body reaches than its point. `summit` is
-/// that of a climb along it.
-double beyond(const PlacedBody& placed, const Vec3& direction, double length, const Summit& summit,
-              const PointOn& point) {
+/// How much farther along a direction, times `length`, a body reaches than one of its points.
+/// `summit` is that of a climb along it.
+double reachPast(const PointOn& point, const PlacedBody& placed, const Vec3& direction,
+                 double length, const Summit& summit) {
   const WideVec turned = placed.bodyFromWorld<Wide>(direction.cast<Wide>());
   const auto along = [&](const auto& p) {
     return turned.x() * p.x() + turned.y() * p.y() + turned.z() * p.z();
@@ -298,11 +304,11 @@ double provedMore(const MinkowskiDifference& difference, const Combination& at,
     return -std::numeric_limits<double>::infinity();
   const Vec3& d = search.direction;
   double far = 0;
-  const auto& [ofA, ofB] = search.summits;
-  if (!ofA.alone || ofA.vertex != at.ofA.vertex)
-    far += beyond(difference.a, d, search.length, ofA, at.ofA);
-  if (!ofB.alone || ofB.vertex != at.ofB.vertex)
-    far += beyond(difference.b, -d, search.length, ofB, at.ofB);
+  const auto& [summitA, summitB] = search.summits;
+  if (!summitA.alone || summitA.vertex != at.onBodyA.vertex)
+    far += reachPast(at.onBodyA, difference.a, d, search.length, summitA);
+  if (!summitB.alone || summitB.vertex != at.onBodyB.vertex)
+    far += reachPast(at.onBodyB, difference.b, -d, search.length, summitB);
   const double blur = error + 2 * kUnit * head;
   const Vec3 off = minus(at.aToB, d);
   const double slip = 2 * (dot(off, off) + blur * blur) / head;
@@ -317,8 +323,8 @@ double provedMore(const MinkowskiDifference&, const Combination&, const Length& 
 }
 
 enum class Outcome : std::uint8_t {
-  open,    ///< not proved, or not to the bound that Decision promises
-  beyond,  ///< proved: farther apart than the limit
+  open,         ///< not proved, or not to the bound that Decision promises
+  beyondLimit,  ///< proved: farther apart than the limit
   decided
 };
 
@@ -387,9 +393,9 @@ bool findInside(const MinkowskiDifference& difference, const Simplex<Real>& simp
 template <class Real>
 Outcome conclude(const MinkowskiDifference& difference, Search<Real>& search, double limit,
                  Vec3& axis, Decision& decision) {
-  if (search.beyond) {
+  if (search.beyondLimit) {
     axis = search.axis();
-    return Outcome::beyond;
+    return Outcome::beyondLimit;
   }
   const Simplex<Real>& simplex = search.simplex;
   const Vec3& tA = difference.a.body->translation;
@@ -407,7 +413,7 @@ Outcome conclude(const MinkowskiDifference& difference, Search<Real>& search, do
     const double low = provedMore(difference, at, length, search);
     const bool apart = low > -length.head;
     if (apart) axis = search.axis();
-    if ((length.head - limit) + low > 0) return Outcome::beyond;
+    if ((length.head - limit) + low > 0) return Outcome::beyondLimit;
     if (apart) return describeSeparation(simplex, length, low, axis, at, decision);
     common = at.isCommonPoint(tA, simplex);
   }
@@ -458,7 +464,7 @@ bool decideWithin(const ConvexBody& a, const ConvexBody& b, double limit, Featur
   if (fitsDoubles(difference)) outcome = search<double>(difference, limit, cache, decision);
   if (outcome == Outcome::open) outcome = search<Wide>(difference, limit, cache, decision);
   if (outcome == Outcome::open) decision = decideExactly(difference, cache);
-  return outcome != Outcome::beyond;
+  return outcome != Outcome::beyondLimit;
 }
 
 }  // namespace
