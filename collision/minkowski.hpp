@@ -35,6 +35,11 @@ constexpr Real unitOf() {
   return std::numeric_limits<Real>::epsilon() / 2;
 }
 
+/// The greatest |coordinate|.
+inline double largestOf(const Vec3& v) {
+  return std::max(std::max(std::abs(v.x()), std::abs(v.y())), std::abs(v.z()));
+}
+
 // By single coordinates: pairs of them, as Eigen loads them, would wait for the stores of single
 // ones just made.
 template <class Real>
@@ -50,10 +55,6 @@ Eigen::Matrix<Real, 3, 1> minus(const Eigen::Matrix<Real, 3, 1>& a,
 template <class Real>
 Eigen::Matrix<Real, 3, 1> times(const Eigen::Matrix<Real, 3, 1>& a, Real factor) {
   return {a.x() * factor, a.y() * factor, a.z() * factor};
-}
-/// The greatest |coordinate|.
-inline double largestOf(const Vec3& v) {
-  return std::max(std::max(std::abs(v.x()), std::abs(v.y())), std::abs(v.z()));
 }
 template <class Real>
 Real dot(const Eigen::Matrix<Real, 3, 1>& a, const Eigen::Matrix<Real, 3, 1>& b) {
@@ -245,9 +246,9 @@ inline Summit climb(const PlacedBody& placed, const Vec3& direction, double slac
   const Hull* hull = placed.body->hull;
   double second = -std::numeric_limits<double>::infinity();
   if (!hull) {
-    Summit summit{0, direction.dot(vertices[0])};
+    Summit summit{0, dot(direction, vertices[0])};
     for (std::uint32_t i = 1; i < vertices.size(); ++i) {
-      const double along = direction.dot(vertices[i]);
+      const double along = dot(direction, vertices[i]);
       second = std::max(second, std::min(along, summit.along));
       if (along > summit.along) summit = {i, along};
     }
@@ -292,7 +293,7 @@ void forEachFarthest(const PlacedBody& placed, const Vec3& direction, double sla
   };
   const Hull* hull = placed.body->hull;
   if (!hull) return visitAllAbove();
-  std::array<std::uint32_t, 48> reached;  // enough, except on nearly flat caps
+  std::array<std::uint32_t, 64> reached;  // enough, except on nearly flat caps
   reached[0] = summit.vertex;
   std::size_t count = 1;
   for (std::size_t k = 0; k < count; ++k) {

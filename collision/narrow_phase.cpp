@@ -143,6 +143,7 @@ void walk(const MinkowskiDifference& difference, double limit, int localSteps,
       // As near may be good, too: the feature whose direction proves it.
       const bool asNear = distance <= search.distance && simplex.holds(support.pair);
       if (!asNear || ++equalSteps > kMostEqualSteps) {
+        // The last simplex to the last bit: a face that is reduced stays as it is.
         simplex.set(difference, std::span(lastPairs).first(static_cast<std::size_t>(lastSize)));
         return;
       }

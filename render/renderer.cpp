@@ -16,6 +16,17 @@ struct Word {
 constexpr std::array<Word, 3> kWords{
     {{RendererKind::automatic, "auto"}, {RendererKind::gl, "gl"}, {RendererKind::rays, "rays"}}};
 
+/// Drawn by one that is there already: what it took to make it is not the picture's.
+template <class AnyRenderer>
+Frame timed(AnyRenderer& renderer, const scene::Snapshot& snapshot, const Camera& camera,
+            const FrameOptions& options) {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start = Clock::now();
+  Frame frame = renderer.render(snapshot, camera, options);
+  frame.statistics.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  return frame;
+}
+
 }  // namespace
 
 const char* wordOf(RendererKind kind) {
@@ -122,13 +133,10 @@ Renderer::~Renderer() = default;
 
 Frame Renderer::render(const scene::Snapshot& snapshot, const Camera& camera,
                        const FrameOptions& options, RendererKind kind) {
-  using Clock = std::chrono::steady_clock;
-  const Clock::time_point start = Clock::now();
-  Frame frame = state_->chosen(options, kind) == RendererKind::gl
-                    ? state_->glRenderer().render(snapshot, camera, options)
-                    : state_->rayRenderer().render(snapshot, camera, options);
-  frame.statistics.seconds = std::chrono::duration<double>(Clock::now() - start).count();
-  return frame;
+  if (state_->chosen(options, kind) == RendererKind::gl) {
+    return timed(state_->glRenderer(), snapshot, camera, options);
+  }
+  return timed(state_->rayRenderer(), snapshot, camera, options);
 }
 
 const std::string& Renderer::deviceName() const {

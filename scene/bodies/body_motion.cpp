@@ -94,12 +94,9 @@ std::vector<Avatar*> avatarsNear(WorldState& world, const Body& body) {
   return avatars;
 }
 
-/// Carried by what the body does at the rider's feet: the middle of who stands, wherever the
-/// closest points of two level faces were found. Who does not turn so stays where he stands on a
-/// turntable.
 struct Rider {
   Avatar* avatar;
-  Vec3 feet;  ///< scene frame, before the body moves
+  Vec3 contact;  ///< on the body, scene frame, before it moves
 };
 
 /// Who stands on the body.
@@ -111,7 +108,7 @@ std::vector<Rider> ridersOf(const WorldState& world, const Body& body,
     for (const Contact& contact : avatar->contacts) {
       const bool below = -contact.decision.normal.y() >= world.lengths.walkableNormalY;
       if (contact.other == body.id && contact.touching && below)
-        riders.push_back({avatar, avatar->feet});
+        riders.push_back({avatar, contact.decision.pointB});
     }
   }
   return riders;
@@ -194,13 +191,13 @@ void moveBody(WorldState& world, Body& body, TickReport& report, QueryCount& cou
   const std::vector<Rider> riders = ridersOf(world, body, near);
   std::vector<Vec3> local;
   for (const Rider& rider : riders) {
-    local.push_back(body.rotation.transpose() * (rider.feet - position));
-    const Vec3 way = carried(body, body.plan.place, rider.feet) - rider.feet;
+    local.push_back(body.rotation.transpose() * (rider.contact - position));
+    const Vec3 way = carried(body, body.plan.place, rider.contact) - rider.contact;
     if (way.y() > 0) shove(world, *rider.avatar, way, count);
   }
   arrive(body, advance(world, body, near, report, count));
   for (std::size_t i = 0; i < riders.size(); ++i) {
-    const Vec3 way = body.rotation * local[i] + body.position - riders[i].feet;
+    const Vec3 way = body.rotation * local[i] + body.position - riders[i].contact;
     if (way.y() <= 0) shove(world, *riders[i].avatar, way, count);
   }
   const double tick = world.lengths.tick;

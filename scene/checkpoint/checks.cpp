@@ -127,6 +127,11 @@ struct Check {
   }
 };
 
+bool isRotation(const collision::Mat3& m) {
+  constexpr double kRounding = 1e-6;
+  return ((m * m.transpose() - collision::Mat3::Identity()).array().abs() <= kRounding).all();
+}
+
 std::size_t partsOf(const Solid& solid) {
   return solid.parts.size() + (solid.mesh ? solid.mesh->triangles().size() : 0);
 }
@@ -171,8 +176,9 @@ void checkRigids(const WorldState& world) {
   for (const std::uint32_t body : stage.bodies)
     require(stage.solidOf[body] != kNoRigid, "a free body is no solid");
   for (const Solid& solid : solids)
-    require((solid.gaits.empty() || solid.gaits.size() == kSolverSubsteps) && !(solid.leash < 0),
-            "a solid goes as none can");
+    require((solid.gaits.empty() || solid.gaits.size() == kSolverSubsteps) && !(solid.leash < 0) &&
+                isRotation(solid.rotation),
+            "a solid goes or stands as none can");
   const std::set<std::uint32_t> vacant(stage.vacant.begin(), stage.vacant.end());
   const NearPair* last = nullptr;
   for (const NearPair& pair : stage.dynamics.pairs) {

@@ -137,6 +137,35 @@ TEST(ImportIfc, AWallThatNobodySaysToCutIsReportedWithItsDoorAndWindow) {
   }
 }
 
+TEST(ImportIfc, ADoorOfItsWallDoesNotCloseItsOwnHoleAndOneDrawnOpenHidesNone) {
+  const TemporaryFolder folder;
+  IfcHouse house;
+  house.door = false;
+  const auto door = [&](const std::string& id, const std::string& name,
+                        const std::string& placement, const std::string& shape) {
+    return "#" + id + "=IFCDOOR('000000000000000000" + name + "',$,'" + name + "',$,$," +
+           placement + "," + shape + ",$," + house.length(2.1) + "," + house.length(0.9) +
+           ",.DOOR.,.SINGLE_SWING_LEFT.,$);\n";
+  };
+  // One in the hole, by the wall's parts; another, drawn open, where the wall is whole.
+  house.more = house.placement(500, "#202", 0, 0.1, 0) + house.box(510, 0.9, 0.05, 2.1) +
+               door("520", "Part", "#502", "#515") +
+               "#521=IFCRELAGGREGATES('0000000000000000000009',$,$,$,#120,(#520));\n" +
+               house.placement(530, "#102", 2.8, 0.1, 0) + house.box(540, 0.9, 0.9, 2.1) +
+               door("550", "Open", "#532", "#545") +
+               "#551=IFCRELCONTAINEDINSPATIALSTRUCTURE('0000000000000000000010',$,$,$,(#550),"
+               "#41);\n";
+  const auto file = folder.write("house.ifc", house.text());
+  for (const IfcReader reader : readersHere()) {
+    const Model model = importModel(file, by(reader));
+    SCOPED_TRACE(model.reader);
+    const Problem* uncut = problemOf(model, "uncut_opening");
+    ASSERT_NE(uncut, nullptr);
+    EXPECT_EQ(uncut->count, 1u) << uncut->example;
+    EXPECT_NE(uncut->example.find("000000000000000000Open"), std::string::npos) << uncut->example;
+  }
+}
+
 TEST(ImportIfc, UnitAndUpAxisOfTheUserWin) {
   const TemporaryFolder folder;
   const auto file = folder.write("house.ifc", IfcHouse().text());
@@ -170,6 +199,18 @@ TEST(ImportIfc, APlaceOnAMapIsToldAndMovesNothing) {
     EXPECT_LT(
         (objectOf(model, "IfcDoor").worldFromPlacement->translation() - Vec3(1.5, 0, -0.1)).norm(),
         1e-9);
+  }
+}
+
+TEST(ImportIfc, APlaceOnNoMapIsNotTold) {
+  const TemporaryFolder folder;
+  for (const char* numbers : {"1.,2.,3.,1.,0.,0.", "1.,2.,3.,0.,0.,1.", "1.E30,2.,3.,1.,0.,1."}) {
+    SCOPED_TRACE(numbers);
+    IfcHouse house;
+    house.more = "#600=IFCMAPCONVERSION(#20,#601," + std::string(numbers) +
+                 ");\n#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,$);\n";
+    const Model model = importModel(folder.write("house.ifc", house.text()), by(readersHere()[0]));
+    EXPECT_EQ(problemOf(model, "map_place"), nullptr);
   }
 }
 

@@ -148,6 +148,7 @@ TEST_F(Frames, TheRendererAskedForDrawsAndSeesTheSame) {
   const protocol::ReceivedFrame cast = ann.frame(request);
   EXPECT_EQ(cast.description.renderer().rfind("Embree ", 0), 0u);
   EXPECT_NE(drawn.description.renderer(), cast.description.renderer());
+  for (const auto* frame : {&drawn, &cast}) EXPECT_GT(frame->description.drawing_seconds(), 0);
   constexpr std::size_t middle = 24 * 64 + 32;
   EXPECT_EQ(valuesOf<std::uint32_t>(cast, v1::CHANNEL_IDS)[middle], kWall);
   EXPECT_NEAR(valuesOf<float>(cast, v1::CHANNEL_DEPTH)[middle],

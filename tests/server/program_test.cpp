@@ -203,26 +203,6 @@ void expectBalanced(const fs::path& out) {
   EXPECT_GE(begun, 3) << "two floors and a wall";
 }
 
-TEST_F(Program, WhoeverListensToNearMissesTheWalkIsTheSameToTheLastBit) {
-  const Ended replayed = run({"replay", path("room.obj"), path("walk.jsonl"), "--out",
-                              path("replayed"), "--near-miss", "0.5"});
-  ASSERT_EQ(replayed.code, 0) << replayed.err;
-  fs::remove(path("stdout"));
-  const pid_t server =
-      start({"serve", path("room.obj"), "--listen", "127.0.0.1:0", "--near-miss", "0.5"});
-  const std::string port = std::to_string(awaitReady());
-  const Ended walked =
-      run({"walk", path("walk.jsonl"), "--connect", "127.0.0.1:" + port, "--out", path("walked")});
-  kill(server, SIGTERM);
-  EXPECT_EQ(codeOf(server), 0);
-  ASSERT_EQ(walked.code, 0) << walked.err;
-  const auto summary = nlohmann::json::parse(replayed.out);
-  EXPECT_EQ(summary["state_hash"], nlohmann::json::parse(walked.out)["state_hash"]);
-  const auto contacts = contactsOf(path("walked"), summary["ticks"]);
-  EXPECT_TRUE(std::any_of(contacts.begin(), contacts.end(),
-                          [](const auto& contact) { return contact["event"] == "near"; }));
-}
-
 TEST_F(Program, AWalkOverTheSocketIsTheReplayToTheLastBit) {
   const Ended replayed = run(
       {"replay", path("room.obj"), path("walk.jsonl"), "--out", path("replayed"), "--audit", "10"});

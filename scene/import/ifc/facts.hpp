@@ -34,7 +34,7 @@ struct IfcProduct {
 };
 
 /// Where the file's coordinates lie on a map (IfcMapConversion). Told, not heeded: a model stays in
-/// its own coordinates, in which nothing is large.
+/// its own coordinates.
 struct IfcMapPlace {
   std::string crs;                         ///< the map's name, as "EPSG:25832"; may be empty
   double east = 0, north = 0, height = 0;  ///< of the file's origin, metres
@@ -63,8 +63,8 @@ IfcFacts readIfcFacts(const StepFile& file);
 /// Metres in the length unit of the project; nullopt: none is told.
 std::optional<double> ifcMetresPerUnit(const StepFile& file, bool& siUnit);
 
-/// nullopt: the file does not tell. Metres come of the map's unit, or of `metresPerUnit` where the
-/// map has none.
+/// nullopt: the file tells of no place on a map, or of none that can be. Metres come of the map's
+/// unit, or of `metresPerUnit` where the map has none.
 std::optional<IfcMapPlace> ifcMapPlace(const StepFile& file, double metresPerUnit);
 
 /// "IFCWALLSTANDARDCASE" as "IfcWallStandardCase".

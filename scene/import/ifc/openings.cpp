@@ -19,6 +19,7 @@ constexpr int kEnough = 7;              // of kGrid * kGrid that have to pass
 constexpr double kBeyond = 0.5;         // metres that a ray goes on before and behind the door
 constexpr double kOblong = 1.5;         // a door's leaf drawn open makes its box square
 constexpr double kAlike = 0.2;          // OverallWidth and the box' width, relative
+constexpr double kAbuts = 0.05;         // metres that a wall beside a door may reach into its box
 constexpr std::size_t kMostNamed = 10;  // openings in one problem
 
 /// The door's or window's box in its own placement: x and y level, z up.
@@ -132,6 +133,12 @@ std::multimap<std::uint32_t, const Object*> objectsByProduct(
   return objects;
 }
 
+/// Doors and windows, and whatever else is said to fill an opening.
+bool fillsOpenings(const IfcProduct& product) {
+  return product.host != 0 || product.ifcClass.starts_with("IfcDoor") ||
+         product.ifcClass.starts_with("IfcWindow");
+}
+
 struct Wall {
   const Object* object;
   Box box;  ///< scene frame
@@ -143,36 +150,37 @@ std::vector<Wall> wallsOf(const Model& model, const IfcFacts& facts,
   const auto isWall = [](const IfcProduct* product) {
     return product != nullptr && product->ifcClass.starts_with("IfcWall");
   };
+  const auto isPartOfWall = [&](const IfcProduct& product) {
+    return isWall(facts.find(product.parent)) && !fillsOpenings(product);
+  };
   std::vector<Wall> walls;
   for (const Object& object : model.objects) {
     const auto product = products.find(object.globalId);
     if (product == products.end()) continue;
-    if (isWall(product->second) || isWall(facts.find(product->second->parent)))
+    if (isWall(product->second) || isPartOfWall(*product->second))
       walls.push_back({&object, boxOf(model, object, object.worldFromMesh)});
   }
   return walls;
 }
 
-/// The walls in whose box the door's middle lies, both in the door's frame: there the box of the
-/// wall that it stands in is tight.
+/// The walls that reach into the door's box, both in the door's frame: there the box of the wall
+/// that it stands in is tight. A leaf drawn open or a window before the facade has its middle
+/// beside it.
 std::vector<const Object*> wallsAround(const Model& model, const std::vector<Wall>& walls,
                                        const Frame& frame) {
-  const auto holds = [](const Box& box, const Vec3& point) {
-    return !box.empty() && collision::overlaps(box, Box{point, point});
+  const Vec3 margin = (0.25 * frame.box.size()).cwiseMin(kAbuts);
+  const Box inner{frame.box.min + margin, frame.box.max - margin};
+  const Vec3 middle = frame.worldFromFrame * inner.centre();
+  const Box inWorld = grown(Box{middle, middle}, 0.5 * inner.size().norm());
+  const auto meets = [](const Box& box, const Box& other) {
+    return !box.empty() && collision::overlaps(box, other);
   };
-  const Vec3 middle = frame.box.centre(), inWorld = frame.worldFromFrame * middle;
   std::vector<const Object*> around;
   for (const Wall& wall : walls)
-    if (holds(wall.box, inWorld) &&
-        holds(boxOf(model, *wall.object, frameFromMeshOf(frame, *wall.object)), middle))
+    if (meets(wall.box, inWorld) &&
+        meets(boxOf(model, *wall.object, frameFromMeshOf(frame, *wall.object)), inner))
       around.push_back(wall.object);
   return around;
-}
-
-/// Doors and windows, and whatever else is said to fill an opening.
-bool fillsOpenings(const IfcProduct& product) {
-  return product.host != 0 || product.ifcClass.starts_with("IfcDoor") ||
-         product.ifcClass.starts_with("IfcWindow");
 }
 
 }  // namespace
@@ -181,22 +189,25 @@ OpeningCheck checkOpenings(const Model& model, const IfcFacts& facts) {
   std::map<std::string, const IfcProduct*> products;
   for (const IfcProduct& product : facts.products) products.emplace(product.globalId, &product);
   const auto objects = objectsByProduct(products, model);
-  const std::vector<Wall> walls = wallsOf(model, facts, products);
+  std::optional<std::vector<Wall>> walls;  // few files ask for them
   OpeningCheck check;
   for (const Object& object : model.objects) {
     const auto product = products.find(object.globalId);
     if (product == products.end() || !fillsOpenings(*product->second)) continue;
+    const std::uint32_t host = product->second->host;
     const std::optional<Frame> frame = frameOf(model, object);
     if (!frame) {
-      check.unchecked.push_back(&object);
+      if (host != 0) check.unchecked.push_back(&object);
       continue;
     }
-    const std::uint32_t host = product->second->host;
     std::vector<const Object*> hosts;
     const auto [begin, end] = objects.equal_range(host);
     for (auto one = begin; one != end; ++one)
       if (one->second != &object) hosts.push_back(one->second);
-    if (host == 0) hosts = wallsAround(model, walls, *frame);
+    if (host == 0) {
+      if (!walls) walls = wallsOf(model, facts, products);
+      hosts = wallsAround(model, *walls, *frame);
+    }
     const int passed = raysThatPass(*frame, trianglesNear(model, hosts, *frame));
     ++check.looked;
     if (passed < kEnough) check.uncut.push_back({&object, host, passed});

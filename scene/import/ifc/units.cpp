@@ -1,4 +1,5 @@
 // The length unit of an IFC file, and where it lies on a map.
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -64,8 +65,9 @@ std::optional<double> ifcMetresPerUnit(const StepFile& file, bool& siUnit) {
 /// IfcMapConversion (source, target, eastings, northings, height, x axis' abscissa and ordinate,
 /// scale); its target is an IfcProjectedCRS (name, ..., the unit as seventh).
 std::optional<IfcMapPlace> ifcMapPlace(const StepFile& file, double metresPerUnit) {
+  constexpr double kFarthest = 1e9;  // metres: beyond any map
   for (const StepStatement& statement : file.statements()) {
-    if (!statement.type.starts_with("IFCMAPCONVERSION")) continue;
+    if (statement.type != "IFCMAPCONVERSION") continue;
     const std::vector<std::string_view> arguments = stepArguments(statement.arguments);
     const auto number = [&](std::size_t index, double otherwise) {
       if (index >= arguments.size()) return otherwise;
@@ -82,9 +84,14 @@ std::optional<IfcMapPlace> ifcMapPlace(const StepFile& file, double metresPerUni
     }
     place.east = unit * number(2, 0), place.north = unit * number(3, 0);
     place.height = unit * number(4, 0);
-    place.turn = std::atan2(number(6, 0), number(5, 1));
+    const double alongEast = number(5, 1), alongNorth = number(6, 0);
+    place.turn = std::atan2(alongNorth, alongEast);
     place.scale = number(7, 1);
-    return place;
+    const double farthest =
+        std::max({std::abs(place.east), std::abs(place.north), std::abs(place.height)});
+    const bool onAMap = unit > 0 && farthest <= kFarthest && place.scale > 0 &&
+                        place.scale <= kFarthest && (alongEast != 0 || alongNorth != 0);
+    return onAMap ? std::optional(place) : std::nullopt;
   }
   return std::nullopt;
 }
