@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <random>
 
@@ -378,32 +377,20 @@ std::vector<std::uint32_t> asTheyCome(const Heap& heap) {
   return order;
 }
 
-bool same(double a, double b) {
-  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
-}
-template <class Numbers>
-bool same(const Numbers& a, const Numbers& b) {
-  return std::equal(a.data(), a.data() + a.size(), b.data(),
-                    [](double x, double y) { return same(x, y); });
-}
-
-/// "" or the first number that differs, the sign of a zero included.
+/// "" or the first number that differs; the sign of a zero is none.
 std::string difference(const Heap& a, const Heap& b) {
   for (std::size_t i = 0; i < a.bodies.size(); ++i) {
     const RigidBody &x = a.bodies[i], &y = b.bodies[i];
-    if (!same(x.velocity, y.velocity) || !same(x.spin, y.spin))
-      return "motion of body " + std::to_string(i);
-    if (!same(x.centre, y.centre) || !same(x.rotation.coeffs(), y.rotation.coeffs()))
+    if (x.velocity != y.velocity || x.spin != y.spin) return "motion of body " + std::to_string(i);
+    if (x.centre != y.centre || x.rotation.coeffs() != y.rotation.coeffs())
       return "place of body " + std::to_string(i);
   }
   for (std::size_t i = 0; i < a.patches.size(); ++i) {
     const ContactPatch &x = a.patches[i], &y = b.patches[i];
-    if (!same(x.rub, y.rub) || !same(x.twist, y.twist))
-      return "friction of patch " + std::to_string(i);
+    if (x.rub != y.rub || x.twist != y.twist) return "friction of patch " + std::to_string(i);
     for (std::size_t k = 0; k < x.size; ++k)
-      if (!same(x.points[k].impulse, y.points[k].impulse) ||
-          !same(x.points[k].push, y.points[k].push) ||
-          !same(x.points[k].separation, y.points[k].separation))
+      if (x.points[k].impulse != y.points[k].impulse || x.points[k].push != y.points[k].push ||
+          x.points[k].separation != y.points[k].separation)
         return "point " + std::to_string(k) + " of patch " + std::to_string(i);
   }
   return "";
