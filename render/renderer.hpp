@@ -18,13 +18,10 @@ enum class RendererKind : std::uint8_t { automatic, gl, rays };
 const char* wordOf(RendererKind kind);
 std::optional<RendererKind> rendererKindFrom(const std::string& word);
 
-/// The rule for `automatic`. It never looks at a clock: the same scene, device and channels are
+/// The rule for `automatic`. It never looks at a clock: the same device, size and channels are
 /// always drawn by the same renderer, so that a picture's bytes do not change from run to run, nor
-/// its style in the middle of a capture.
-RendererKind automaticKind(bool softwareGl, std::size_t triangles, const Channels& channels);
-
-/// All triangles of a scene's drawn objects, each as often as it is placed.
-std::size_t drawnTriangles(const scene::Model& model);
+/// its style in the middle of a capture; and colours are GL's at every size.
+RendererKind automaticKind(bool softwareGl, const Camera& camera, const Channels& channels);
 
 /// Owns a GlRenderer, a RayRenderer or both, each made when first needed; one thread makes, uses
 /// and destroys it. RenderThread does that for you.

@@ -14,6 +14,9 @@
 //    normals are wanted, ids are drawn with the depth, and that is all unless something was
 //    missing.
 //
+// In a small scene where hardly anything is hidden, all that lies in the picture is drawn and
+// shaded at once instead.
+//
 // Why the picture is that of drawing everything: in a pixel the nearest fragment wins, among equals
 // the one drawn last. What is left out lies, wherever it has a fragment, behind something that is
 // drawn; so each pixel's winner is among what is drawn, and what is shaded keeps its order.
@@ -44,6 +47,9 @@ constexpr int kMostChunks = 24;           // ... as many each time: more than th
 // What is drawn is looked at again every so many pictures: whether it is still seen, or in the
 // picture at all.
 constexpr std::uint64_t kLookAgain = 8, kForgetOutside = 64;
+
+// Of so few it is quick to say how much lies in the picture.
+constexpr std::size_t kFewParts = 256;
 
 /// What is drawn of the model and of the avatars.
 struct Choice {
@@ -90,7 +96,10 @@ struct GlRenderer::State {
   DrawList drawSurfaces(const Job& job, const Choice& choice);
   void drawAir(const DrawList& glass);
   void readDepth(const Camera& camera);
-  DrawList drawInside(Job& job);
+  std::size_t trianglesOf(const std::vector<std::uint32_t>& some) const;
+  Choice inside(const Job& job) const;
+  bool hardlyHidden(const Job& job, const Choice& all) const;
+  DrawList drawInside(Job& job, const Choice& all);
   DrawList drawSeen(Job& job);
   Choice foreseen(const Job& job, const Seen& seen) const;
   Choice missing(Job& job, const Choice& drawn);
@@ -154,8 +163,15 @@ void GlRenderer::State::readDepth(const Camera& camera) {
   depthIsOfPicture = true;
 }
 
+std::size_t GlRenderer::State::trianglesOf(const std::vector<std::uint32_t>& some) const {
+  std::size_t triangles = 0;
+  for (const std::uint32_t part : some)
+    triangles += buffers.ranges[parts[part].mesh].indexCount / 3;
+  return triangles;
+}
+
 /// All that lies in the picture.
-DrawList GlRenderer::State::drawInside(Job& job) {
+Choice GlRenderer::State::inside(const Job& job) const {
   Choice all;
   all.parts = partsInPicture(parts, moving.bodies(), job.camera, job.options.hidden);
   const std::vector<AvatarMeshes::Piece>& pieces = moving.avatars().pieces;
@@ -163,6 +179,17 @@ DrawList GlRenderer::State::drawInside(Job& job) {
     if (pieces[i].id == job.options.hidden) continue;
     if (!job.sight.outside(job.sight.relative(pieces[i].box))) all.pieces.push_back(i);
   }
+  return all;
+}
+
+/// Whether a picture from nearby showed at least half of the triangles: to draw what is seen twice,
+/// into the depth and shaded, takes longer then than to draw all once.
+bool GlRenderer::State::hardlyHidden(const Job& job, const Choice& all) const {
+  const Seen* seen = memory.find(job.camera);
+  return seen && trianglesOf(all.parts) <= 2 * trianglesOf(foreseen(job, *seen).parts);
+}
+
+DrawList GlRenderer::State::drawInside(Job& job, const Choice& all) {
   job.statistics.drawn = static_cast<std::uint32_t>(all.parts.size());
   job.statistics.outside = static_cast<std::uint32_t>(parts.size() - all.parts.size());
   pass->shadeAll(job.options.channels.normals);
@@ -238,7 +265,7 @@ Choice GlRenderer::State::searchAmong(Job& job, Choice drawn, Choice missing) {
 void GlRenderer::State::remember(const Job& job, const Choice& drawn, Seen& seen) const {
   std::vector<std::uint32_t> kept;
   for (const std::uint32_t part : drawn.parts) {
-    const bool due = (part + picture) % kLookAgain == 0;
+    const bool due = seen.parts.empty() || (part + picture) % kLookAgain == 0;
     if (due && job.sight.look(job.sight.relative(boxOf(part)), depth) == Sight::hidden) continue;
     kept.push_back(part);
   }
@@ -267,6 +294,10 @@ Choice GlRenderer::State::notHidden(const Job& job, const Choice& drawn) const {
 
 /// What may be seen.
 DrawList GlRenderer::State::drawSeen(Job& job) {
+  if (parts.size() <= kFewParts) {
+    const Choice all = inside(job);
+    if (hardlyHidden(job, all)) return drawInside(job, all);
+  }
   Seen& seen = memory.recall(job.camera, ++picture);
   Choice drawn = foreseen(job, seen);
   const Channels& channels = job.options.channels;
@@ -289,8 +320,9 @@ DrawList GlRenderer::State::drawSeen(Job& job) {
       drawSurfaces(job, more);
       // Now, and not when all is shaded: what needs the depth is worked out while the device
       // shades. The pyramid stays as it is, farther in places than the picture, which hides too
-      // little.
+      // little; where nothing had been drawn it hides nothing.
       readDepth(job.camera);
+      if (drawn.parts.empty()) depth.build();
       ++job.statistics.passes;
     }
     add(drawn.parts, more.parts);
@@ -329,7 +361,8 @@ Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
   s.target.begin(options.channels);
   s.depthIsOfPicture = false;
   Job job{camera, options, BoxSight(camera), {}};
-  const DrawList glass = options.culling == Culling::hidden ? s.drawSeen(job) : s.drawInside(job);
+  const DrawList glass =
+      options.culling == Culling::hidden ? s.drawSeen(job) : s.drawInside(job, s.inside(job));
   if (options.channels.rgb) s.drawAir(glass);
   Frame frame;
   frame.camera = camera;

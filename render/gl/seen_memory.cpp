@@ -25,16 +25,21 @@ double unlikeness(const Camera& a, const Camera& b) {
 
 }  // namespace
 
-Seen& SeenMemory::recall(const Camera& camera, std::uint64_t picture) {
-  Seen* best = nullptr;
+const Seen* SeenMemory::find(const Camera& camera) const {
+  const Seen* best = nullptr;
   double least = std::numeric_limits<double>::infinity();
-  for (Seen& entry : entries_) {
+  for (const Seen& entry : entries_) {
     const double d = unlikeness(entry.camera, camera);
     if (d < least) {
       least = d;
       best = &entry;
     }
   }
+  return best;
+}
+
+Seen& SeenMemory::recall(const Camera& camera, std::uint64_t picture) {
+  Seen* best = const_cast<Seen*>(find(camera));  // of this, which is not const
   if (!best) {
     if (entries_.size() < kMostEntries) {
       best = &entries_.emplace_back();

@@ -22,6 +22,8 @@ class SeenMemory {
   /// What was seen from nearest by, to be updated for `camera`; empty (used = 0) when that lies too
   /// far off to be of use. Valid until the next call.
   Seen& recall(const Camera& camera, std::uint64_t picture);
+  /// The same, to look at; null when there is none.
+  const Seen* find(const Camera& camera) const;
 
  private:
   std::vector<Seen> entries_;

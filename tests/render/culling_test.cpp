@@ -145,7 +145,10 @@ TEST(Culling, WhatIsInTheSamePlaceAndComesIntoViewLaterWinsOrLosesAsInDrawingEve
     PlacedBox red{{0, 0, -6}, {2, 2, 2}, coloured(1, 0, 0)};
     PlacedBox blue{{0, 0, -5.5}, {2, 2, 1}, coloured(0, 0, 1)};
     if (swapped) std::swap(red, blue);
-    GlRenderer renderer(sceneOf({red, blue, {{0, 0, -2}, {1, 6, 0.1}, coloured(0, 1, 0)}}));
+    std::vector<PlacedBox> boxes{red, blue, {{0, 0, -2}, {1, 6, 0.1}, coloured(0, 1, 0)}};
+    // Behind the eye: so many that what is hidden is searched for, however little it is.
+    for (int i = 0; i < 300; ++i) boxes.push_back({{0, 0, 10.0 + i}, {0.5, 0.5, 0.5}, {}});
+    GlRenderer renderer(sceneOf(boxes));
     Camera camera = squareCamera(64);
     for (int i = -40; i <= 40; ++i) {
       camera.eye.x() = 0.1 * i;
@@ -197,6 +200,25 @@ TEST(Culling, NothingIsLostWhereNothingHides) {
   EXPECT_EQ(frame.statistics.drawn, 2u);
   EXPECT_EQ(frame.statistics.occluded, 0u);
   EXPECT_EQ(frame.statistics.outside, 0u);
+}
+
+TEST(Culling, InASmallSceneWhatHardlyHidesIsDrawnAtOnce) {
+  std::vector<PlacedBox> boxes{{{0, 0, -4}, {3, 3, 0.1}, {}}};
+  for (int i = 0; i < 3; ++i) boxes.push_back({{-1.0 + i, 0, -2}, {0.3, 0.3, 0.3}, {}});
+  for (int i = 0; i < 3; ++i) boxes.push_back({{-1.0 + i, 0, -6}, {0.3, 0.3, 0.3}, {}});
+  const auto secondOf = [](const std::vector<PlacedBox>& some) {
+    GlRenderer renderer(sceneOf(some));
+    const Camera camera = squareCamera(64);
+    const Frame first = renderer.render({}, camera);
+    EXPECT_EQ(first.statistics.drawn, 4u);  // nothing was known
+    const Frame second = renderer.render({}, camera);
+    expectSame(first, second, "with " + std::to_string(some.size()) + " boxes");
+    return second.statistics;
+  };
+  EXPECT_EQ(secondOf(boxes).drawn, 7u);
+  EXPECT_EQ(secondOf(boxes).passes, 1u);
+  for (int i = 0; i < 9; ++i) boxes.push_back({{-0.4 + 0.1 * i, 1, -6}, {0.1, 0.1, 0.1}, {}});
+  EXPECT_EQ(secondOf(boxes).drawn, 4u);  // more is hidden than seen
 }
 
 }  // namespace

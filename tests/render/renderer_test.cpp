@@ -17,9 +17,9 @@ TEST(Renderer, TheWordsOfTheKindsAreReadAsTheyAreWritten) {
 }
 
 TEST(Renderer, AGpuIsAlwaysPreferred) {
-  for (const std::size_t triangles : {std::size_t{0}, std::size_t{100'000'000}})
+  for (const int size : {1, 256, 4096})
     for (const Channels& channels : {kColour, kMeasured})
-      EXPECT_EQ(automaticKind(false, triangles, channels), RendererKind::gl);
+      EXPECT_EQ(automaticKind(false, squareCamera(size), channels), RendererKind::gl);
 }
 
 TEST(Renderer, EachKindDrawsWithItsOwnAndARequestGoesBeforeIt) {
@@ -37,26 +37,27 @@ TEST(Renderer, EachKindDrawsWithItsOwnAndARequestGoesBeforeIt) {
   EXPECT_EQ(rays.render({}, camera).renderer, raysName);
 }
 
-TEST(Renderer, OnACpuRaysMeasureLargeScenesAndGlDrawsAllColours) {
-  for (const std::size_t triangles : {std::size_t{1'000'000}, std::size_t{100'000'000}}) {
-    EXPECT_EQ(automaticKind(true, triangles, kMeasured), RendererKind::rays) << triangles;
-    EXPECT_EQ(automaticKind(true, triangles, kColour), RendererKind::gl) << triangles;
+TEST(Renderer, OnACpuRaysMeasureSmallPicturesAndGlDrawsAllColours) {
+  for (const int size : {1, 128, 256}) {
+    EXPECT_EQ(automaticKind(true, squareCamera(size), kMeasured), RendererKind::rays) << size;
+    EXPECT_EQ(automaticKind(true, squareCamera(size), kColour), RendererKind::gl) << size;
   }
-  for (const std::size_t triangles : {std::size_t{0}, std::size_t{10'000}})
-    EXPECT_EQ(automaticKind(true, triangles, kMeasured), RendererKind::gl) << triangles;
+  for (const int size : {257, 640, 4096})
+    EXPECT_EQ(automaticKind(true, squareCamera(size), kMeasured), RendererKind::gl) << size;
 }
 
 TEST(Renderer, AutomaticFollowsItsRule) {
   const auto scene = sceneOf(crowd(50));
   Renderer renderer(scene);
   for (const Channels& channels : {kColour, kMeasured}) {
-    FrameOptions options;
-    options.channels = channels;
-    const bool rays =
-        renderer.render({}, squareCamera(20), options).renderer.rfind("Embree", 0) == 0;
-    const RendererKind expected =
-        automaticKind(renderer.software(), drawnTriangles(scene->model()), channels);
-    EXPECT_EQ(rays, expected == RendererKind::rays);
+    for (const int size : {20, 300}) {
+      FrameOptions options;
+      options.channels = channels;
+      const Camera camera = squareCamera(size);
+      const bool rays = renderer.render({}, camera, options).renderer.rfind("Embree", 0) == 0;
+      const RendererKind expected = automaticKind(renderer.software(), camera, channels);
+      EXPECT_EQ(rays, expected == RendererKind::rays);
+    }
   }
 }
 
