@@ -6,17 +6,15 @@
 
 #include <cmath>
 
+#include "tests/support/sanitized.hpp"
+
 namespace enfilade::scene {
 namespace {
 
 using namespace testing;
 
 // How many moves each of the sixteen runs below makes: 1e5 in all. Sanitizers take their time.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr int kMovesOfOne = 600;
-#else
-constexpr int kMovesOfOne = 6400;
-#endif
+constexpr int kMovesOfOne = tests::kSanitized ? 600 : 6400;
 
 /// What somebody is shut up with, and the seed of it all.
 struct Shut {
