@@ -92,7 +92,7 @@ TEST(Dynamics, ABallRollsDownASlopeAtFiveSeventhsOfSliding) {
   const double half = 0.1, sine = 2 * half / (1 + half * half);
   const Quat tilt = turnBy(Vec3::UnitZ(), half);
   scene.addStill(boxHull({20, 0.5, 20}), tilt * Vec3(0, -0.5, 0), tilt);
-  const auto ball = scene.addFree(ballHull(0.2, 24), tilt * Vec3(0, 0.2 + kEpsilon, 0), tilt);
+  const auto ball = scene.addFree(ballHull(0.2, 20), tilt * Vec3(0, 0.2 + kEpsilon, 0), tilt);
   for (Solid& solid : scene.dynamics.solids) solid.motion.friction = 0.8;
   scene.pairAll();
   const Vec3 start = scene.body(ball).centre;

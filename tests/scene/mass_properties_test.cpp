@@ -27,7 +27,7 @@ TEST(MassProperties, OfATetrahedronAreTheTextbooks) {
 }
 
 TEST(MassProperties, OfABallComeNearTheSpheresFromBelow) {
-  const MassProperties ball = massOfHull(ballHull(0.5, 24), 1);
+  const MassProperties ball = massOfHull(ballHull(0.5, 12), 1);
   const double sphere = 4.0 / 3 * 3.14159265358979 * 0.125;
   EXPECT_LT(ball.mass, sphere);
   EXPECT_GT(ball.mass, 0.98 * sphere);
