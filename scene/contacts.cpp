@@ -160,7 +160,7 @@ bool nearer(const Decision& a, const Decision& b) {
 }
 
 Nearness nearnessOf(const Lengths& lengths) {
-  const double contact = 2 * lengths.epsilon;
+  const double contact = contactLimit(lengths);
   return {contact, std::max(contact, lengths.nearMiss)};
 }
 

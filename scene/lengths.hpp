@@ -42,6 +42,11 @@ struct Lengths {
   Sliding sliding = Sliding::slide;
 };
 
+/// metres. Two that are nearer are in contact.
+inline double contactLimit(const Lengths& lengths) {
+  return 2 * lengths.epsilon;
+}
+
 /// Why a world cannot have these lengths, naming the one that is wrong; nullopt when it can.
 std::optional<std::string> lengthsProblem(const Lengths& lengths);
 

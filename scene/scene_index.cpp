@@ -32,32 +32,17 @@ Placed placedAvatar(const AvatarView& avatar) {
 }
 
 Placed placedBody(const SceneThen& then, const BodyView& body) {
-  const auto& parts = then.scene().shapeOfBody(body.index)->parts;
-  const collision::BoxTree& tree = then.index.treeOfBody(body.index);
-  const auto rotation = std::make_shared<const Mat3>(body.pose.rotation.toRotationMatrix());
-  const Vec3 translation = body.pose.translation;
+  const BodyShape& shape = *then.scene().shapeOfBody(body.index);
   Placed placed;
-  placed.parts = parts.size();
-  placed.trees.push_back(
-      {&tree, *rotation, translation, [&parts, &tree, rotation, translation](std::uint32_t item) {
-         const collision::Hull& hull = parts[tree.order[item]];
-         return collision::ConvexBody{hull.vertices, translation, rotation.get(), &hull};
-       }});
+  placed.parts = shape.parts.size();
+  placed.trees.push_back(treeAt(shape, body.pose));
   return placed;
 }
 
 Placed placedObject(const ObjectParts& parts) {
   Placed placed;
   placed.parts = parts.size();
-  const auto& triangles = parts.localTriangles.boxes();
-  if (!parts.hullTree.empty())
-    placed.trees.push_back(
-        {&parts.hullTree, Mat3::Identity(), Vec3::Zero(),
-         [&parts](std::uint32_t item) { return parts.body(parts.hullTree.order[item]); }});
-  if (!triangles.empty())
-    placed.trees.push_back(
-        {&triangles, Mat3::Identity(), parts.origin,
-         [&parts](std::uint32_t item) { return parts.body(parts.hullCount() + item); }});
+  placed.trees = treesOf(parts);
   return placed;
 }
 
@@ -91,15 +76,6 @@ const std::uint32_t* SceneIndex::bodyNamed(const std::string& name) const {
 
 const std::uint32_t* SceneIndex::bodyOfObject(EntityId id) const {
   return found(bodyOfObject_, id);
-}
-
-const collision::BoxTree& SceneIndex::treeOfBody(std::uint32_t body) {
-  const auto at = trees_.find(body);
-  if (at != trees_.end()) return at->second;
-  std::vector<Box> boxes;
-  for (const collision::Hull& hull : scene_->shapeOfBody(body)->parts)
-    for (Box& box = boxes.emplace_back(); const Vec3& vertex : hull.vertices) box.include(vertex);
-  return trees_.emplace(body, collision::buildBoxTree(boxes, 1)).first->second;
 }
 
 const AvatarView* avatarOf(const SceneThen& then, EntityId id) {

@@ -2,7 +2,6 @@
 // parts stand then: for questions that somebody asks beside the tick.
 #pragma once
 
-#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -15,7 +14,7 @@
 
 namespace enfilade::scene {
 
-/// Worked out once a scene; for one thread at a time.
+/// Worked out once a scene.
 class SceneIndex {
  public:
   explicit SceneIndex(std::shared_ptr<const Scene> scene);
@@ -27,15 +26,12 @@ class SceneIndex {
   const std::uint32_t* bodyNamed(const std::string& name) const;
   /// The body that the object `id` is part of, as bodyNamed().
   const std::uint32_t* bodyOfObject(EntityId id) const;
-  /// Over the parts of a body, its frame. Built when it is first asked for.
-  const collision::BoxTree& treeOfBody(std::uint32_t body);
 
  private:
   std::shared_ptr<const Scene> scene_;
   std::unordered_map<std::string_view, EntityId> objects_;
   std::unordered_map<std::string_view, std::uint32_t> bodies_;
   std::unordered_map<EntityId, std::uint32_t> bodyOfObject_;
-  std::map<std::uint32_t, collision::BoxTree> trees_;
 };
 
 /// A scene as it is at a tick.

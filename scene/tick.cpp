@@ -105,7 +105,7 @@ void hashState(WorldState& world) {
     hash.add(std::uint64_t{queue.size()});
   }
   hashBodies(world, hash);
-  if (!world.rigids.seeds.empty())
+  if (!world.rigids.seeds.empty() || !world.goingBodies.empty())
     for (const auto& [key, contact] : world.bodyContacts)
       hash.add((std::uint64_t{key.first} << 32) | std::uint64_t{key.second});
   world.hash = hash.value();

@@ -55,8 +55,9 @@ struct ContactEvent {
   /// An avatar or a rigid body; for `blocked` the one that was stopped, which may be any body.
   EntityId a = 0;
   /// What it met. A pair is told once: by the avatar of lesser id, by an avatar before a body, by a
-  /// rigid body before others, by the rigid body of lesser id. For `enter` and `leave` the trigger;
-  /// for `leftWorld`, told of a free body that fell or flew far beyond the scene, nothing.
+  /// rigid body before others, by a driven body before what stands, by the one of lesser id. For
+  /// `enter` and `leave` the trigger; for `leftWorld`, told of a free body that fell or flew far
+  /// beyond the scene, nothing.
   EntityId b = 0;
   collision::Decision decision;  ///< points and normal (from a to b) in the scene's frame
 };
@@ -107,8 +108,9 @@ struct TickReport {
   std::uint32_t boundedSweeps = 0;    ///< stopped by their iteration bound, before anything near
   std::uint32_t liveContacts = 0;
   std::uint32_t squeezedBodies = 0;  ///< pairs of a kinematic body and a free one without way out
-  double worstPenetration = 0;       ///< metres, by the exact verdict; 0 when nothing penetrates
-  std::optional<TickAudit> audit;    ///< when the tick was audited
+  /// Metres, by the exact verdict, of avatars and free bodies; 0 when none penetrates.
+  double worstPenetration = 0;
+  std::optional<TickAudit> audit;  ///< when the tick was audited
   /// Every queue is empty, nobody is falling or driven, and no body is on its way, but for paths.
   bool idle = true;
 };

@@ -98,6 +98,9 @@ struct WorldState {
   std::vector<Body> bodies;                    ///< as Model::bodies; never grows or shrinks
   std::map<EntityId, std::uint32_t> bodyOfId;  ///< index into `bodies`
   std::map<std::pair<EntityId, EntityId>, Contact> bodyContacts;  ///< as told: a, b
+  /// Pairs of driven bodies that were asked for so far, and whether they are mounted on one another
+  /// (mounting.hpp): it follows from the scene.
+  std::map<std::pair<EntityId, EntityId>, bool> mounted;
   std::vector<std::uint32_t> kinematics, triggers;  ///< indices into `bodies`, ascending
   std::vector<std::uint32_t> goingBodies;           ///< kinematic, in this tick; ascending
   RigidStage rigids;                                ///< free bodies
@@ -218,6 +221,13 @@ void tellBegin(const WorldState& world, EntityId a, const Contact* before, Conta
 /// another when `now` is null.
 void tellEnd(const WorldState& world, EntityId a, const Contact& before, const Contact* now,
              const std::function<collision::Decision()>& parted, std::vector<ContactEvent>& events);
+/// Of driven bodies that moved, but for what they are mounted on (driven_contacts.cpp).
+struct DrivenContacts {
+  std::map<std::pair<EntityId, EntityId>, Contact> now;  ///< near, or near until now
+  /// What they touched on their way only, clear of it before and after the tick.
+  std::map<std::pair<EntityId, EntityId>, Contact> onTheWay;
+};
+DrivenContacts drivenContacts(WorldState& world, const Nearness& nearness, QueryCount& count);
 /// Contacts of bodies with what is no avatar (body_contacts.cpp).
 void findBodyContacts(WorldState& world, TickReport& report, QueryCount& count);
 void endBodyContacts(WorldState& world, ContactEvent::Reason reason,

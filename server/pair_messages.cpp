@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scene/bodies/mounting.hpp"
 #include "server/printable.hpp"
 #include "server/world_messages.hpp"
 
@@ -114,6 +115,7 @@ std::variant<v1::DistanceReply, v1::Error> answerOf(const v1::DistanceQuery& que
 
 std::variant<v1::TouchingReply, v1::Error> answerOf(const v1::TouchingQuery& query,
                                                     const scene::SceneThen& then,
+                                                    const scene::Lengths& lengths,
                                                     const ServerLimits& limits) {
   auto entity = entityOf(query.has_entity(), query.entity(), then, "touching.entity");
   if (auto* error = std::get_if<v1::Error>(&entity)) return std::move(*error);
@@ -124,6 +126,11 @@ std::variant<v1::TouchingReply, v1::Error> answerOf(const v1::TouchingQuery& que
   if (const auto* none = std::get_if<scene::NoAnswer>(&found)) return whyNot(*none, "touching.");
   const auto& near = std::get<scene::Near>(found);
   auto reply = replyAt<v1::TouchingReply>(then);
+  const scene::BodyView* body = scene::bodyOf(then, std::get<scene::EntityId>(entity));
+  if (body)
+    for (const scene::EntityId id :
+         scene::mountingOf(then.scene(), body->index, scene::contactLimit(lengths)))
+      reply.add_mounting(id);
   constexpr std::size_t kFieldBytes = 8;  // a pair's tag and length in the message, at most
   std::size_t bytes = 0;
   for (const scene::PairState& state : near.found) {

@@ -16,6 +16,7 @@ std::variant<v1::DistanceReply, v1::Error> answerOf(const v1::DistanceQuery& que
                                                     const ServerLimits& limits);
 std::variant<v1::TouchingReply, v1::Error> answerOf(const v1::TouchingQuery& query,
                                                     const scene::SceneThen& then,
+                                                    const scene::Lengths& lengths,
                                                     const ServerLimits& limits);
 std::variant<v1::CannotTouchReply, v1::Error> answerOf(const v1::CannotTouchQuery& query,
                                                        const scene::SceneThen& then,

@@ -83,7 +83,7 @@ Encoded QuestionService::State::answer(const Question& question) {
     put(reply, answerOf(asked.distances(), then(question), question.limits),
         &v1::ServerMessage::mutable_distances);
   else if (asked.has_touching())
-    put(reply, answerOf(asked.touching(), then(question), question.limits),
+    put(reply, answerOf(asked.touching(), then(question), question.lengths, question.limits),
         &v1::ServerMessage::mutable_touching);
   else
     put(reply, answerOf(asked.cannot_touch(), then(question), question.lengths),

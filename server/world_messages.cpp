@@ -249,7 +249,7 @@ v1::Policies messageOf(const scene::Lengths& lengths) {
   message.set_jump_limit(lengths.jumpLimit);
   message.set_joint_speed_limit(lengths.jointSpeedLimit);
   message.set_push_force(lengths.pushForce);
-  message.set_bodies("push");
+  message.set_bodies("push_and_tell");
   return message;
 }
 

@@ -1,5 +1,6 @@
 // Who touches what among bodies: free ones with still objects, with driven ones and with one
-// another. (What avatars touch, avatars tell.) The solver's pairs are asked, and of those only the
+// another, and driven ones among themselves and with still objects (driven_contacts.cpp). (What
+// avatars touch, avatars tell.) Of free ones the solver's pairs are asked, and of those only the
 // ones that are not proved to be farther apart, of bodies that moved: a contact of two that stand
 // lasts.
 #include <algorithm>
@@ -96,12 +97,27 @@ std::map<Key, Contact> nearBodies(WorldState& world, const Nearness& nearness, Q
   return now;
 }
 
+/// They begin here, and end as all that is not so any more.
+void tellOnTheWay(WorldState& world, std::map<Key, Contact>& touched,
+                  std::vector<ContactEvent>& events) {
+  for (auto& [key, contact] : touched) {
+    const auto near = world.bodyContacts.find(key);
+    const Contact* before = near == world.bodyContacts.end() ? nullptr : &near->second;
+    tellBegin(world, key.first, before, contact, events);
+    if (before) tellEnd(world, key.first, *before, &contact, {}, events);
+    world.bodyContacts[key] = contact;
+  }
+}
+
 }  // namespace
 
 void findBodyContacts(WorldState& world, TickReport& report, QueryCount& count) {
   const Nearness nearness = nearnessOf(world.lengths);
   std::map<Key, Contact> now, parted;
   if (!world.rigids.seeds.empty()) now = nearBodies(world, nearness, count);
+  DrivenContacts driven = drivenContacts(world, nearness, count);
+  now.merge(driven.now);
+  tellOnTheWay(world, driven.onTheWay, report.contacts);
   for (auto at = now.begin(); at != now.end();) {
     const auto next = std::next(at);
     const bool near = at->second.touching || at->second.decision.distance < nearness.limit;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scene/bodies/mounting.hpp"
 #include "scene/world_state.hpp"
 
 namespace enfilade::scene {
@@ -169,13 +170,17 @@ void plan(Body& body, double tick) {
 
 }  // namespace
 
+collision::Pose startPoseOf(const BodySpec& spec) {
+  return poseAt(spec, placeOf(spec, 0));
+}
+
 void startDrive(Body& body) {
   BodyDrive& drive = body.drive;
   drive.speed = body.spec->speed;
   drive.place = placeOf(*body.spec, 0);
   drive.going = body.spec->kind == BodyKind::path && body.spec->runs;
   drive.target = drive.going ? openEnd(*body.spec) : 0;
-  const collision::Pose pose = poseAt(*body.spec, drive.place);
+  const collision::Pose pose = startPoseOf(*body.spec);
   placeBody(body, pose.translation, pose.rotation);
 }
 
@@ -189,6 +194,7 @@ void followBodyCommands(WorldState& world) {
 }
 
 void planBodies(WorldState& world) {
+  const double lookout = lookoutOf(world.lengths);
   world.goingBodies.clear();
   for (const std::uint32_t i : world.kinematics) {
     Body& body = world.bodies[i];
@@ -201,7 +207,8 @@ void planBodies(WorldState& world) {
     plan(body, world.lengths.tick);
     if (body.drive.going) world.goingBodies.push_back(i);
     if (body.plan.farthest == 0 && !reachedOut) continue;
-    body.reach = grown(boxOf(body), body.plan.farthest);
+    body.reach = boxOf(body);
+    if (body.plan.farthest > 0) body.reach = grown(body.reach, body.plan.farthest + lookout);
     world.broadPhase.move(body.mover, body.reach);
   }
 }

@@ -210,7 +210,21 @@ BodyShape shapeOf(const Model& model, const BodySpec& spec) {
     weigh(spec, shape);
     measure(shape);
   }
+  std::vector<Box> boxes;
+  for (const Hull& hull : shape.parts)
+    for (Box& box = boxes.emplace_back(); const Vec3& vertex : hull.vertices) box.include(vertex);
+  shape.tree = collision::buildBoxTree(boxes, 1);
   return shape;
+}
+
+collision::TreeOfParts treeAt(const BodyShape& shape, const collision::Pose& worldFromBody) {
+  const auto rotation =
+      std::make_shared<const collision::Mat3>(worldFromBody.rotation.toRotationMatrix());
+  const Vec3 translation = worldFromBody.translation;
+  return {&shape.tree, *rotation, translation, [&shape, rotation, translation](std::uint32_t item) {
+            const Hull& hull = shape.parts[shape.tree.order[item]];
+            return collision::ConvexBody{hull.vertices, translation, rotation.get(), &hull};
+          }};
 }
 
 }  // namespace enfilade::scene

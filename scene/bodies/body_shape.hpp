@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "collision/hull.hpp"
+#include "collision/nearest_parts.hpp"
 #include "scene/model.hpp"
 
 namespace enfilade::scene {
@@ -14,6 +15,7 @@ struct BodyShape {
   /// triggers take the hull of each connected piece.
   std::vector<collision::Hull> parts;
   Vec3 origin = Vec3::Zero();  ///< of the body's frame, in the scene's, where it was authored
+  collision::BoxTree tree;     ///< over the parts, body's frame
   Box box;                     ///< of all parts, body's frame
   double radius = 0;           ///< greatest distance of a vertex from the origin; not below it
   std::uint32_t hulls = 0;     ///< of the parts, those that are solids or flat polygons
@@ -30,5 +32,8 @@ struct BodyShape {
 /// Of a body that refusalOfBodies() has nothing against. Throws std::invalid_argument, naming the
 /// body, when its objects have no triangle with an area.
 BodyShape shapeOf(const Model& model, const BodySpec& spec);
+
+/// Its parts where a body of this shape stands at a pose. Points into the shape.
+collision::TreeOfParts treeAt(const BodyShape& shape, const collision::Pose& worldFromBody);
 
 }  // namespace enfilade::scene

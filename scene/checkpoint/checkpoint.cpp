@@ -176,13 +176,13 @@ void archiveBodies(Reader& a, std::vector<Body>& bodies) {
 }
 
 /// Not written: `scene` and `lengths` make the world that is read into; `bodyOfId`, `kinematics`,
-/// `triggers`, `bodyOfMover` come with it; `goingBodies` are found before they are asked for;
-/// `avatarOfMover` and `snapshot` follow from the rest; `audit` is no part of the state.
+/// `triggers`, `bodyOfMover` come with it; `mounted` and `goingBodies` are found before they are
+/// asked for; `avatarOfMover` and `snapshot` follow from the rest; `audit` is no part of the state.
 template <class A>
 void archiveWorld(A& a, Held<A, WorldState>& world) {
   auto& [scene, lengths, ticks, hash, incoming, waiting, queues, avatars, avatarNames,
-         incomingForBodies, bodies, bodyOfId, bodyContacts, kinematics, triggers, goingBodies,
-         rigids, broadPhase, avatarOfMover, bodyOfMover, snapshot, audit] = world;
+         incomingForBodies, bodies, bodyOfId, bodyContacts, mounted, kinematics, triggers,
+         goingBodies, rigids, broadPhase, avatarOfMover, bodyOfMover, snapshot, audit] = world;
   a(ticks, hash, waiting, avatarNames, queues, incoming, incomingForBodies);
   archiveBodies(a, bodies);
   a(avatars, bodyContacts);

@@ -181,6 +181,20 @@ std::size_t ObjectParts::bytes() const {
   return sum;
 }
 
+std::vector<collision::TreeOfParts> treesOf(const ObjectParts& parts) {
+  std::vector<collision::TreeOfParts> trees;
+  const collision::BoxTree& triangles = parts.localTriangles.boxes();
+  if (!parts.hullTree.empty())
+    trees.push_back(
+        {&parts.hullTree, collision::Mat3::Identity(), Vec3::Zero(),
+         [&parts](std::uint32_t item) { return parts.body(parts.hullTree.order[item]); }});
+  if (!triangles.empty())
+    trees.push_back(
+        {&triangles, collision::Mat3::Identity(), parts.origin,
+         [&parts](std::uint32_t item) { return parts.body(parts.hullCount() + item); }});
+  return trees;
+}
+
 bool surrounds(const ObjectParts& parts, const Vec3& point) {
   int winding = 0;
   const auto& triangles = parts.localTriangles.triangles();

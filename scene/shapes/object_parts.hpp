@@ -7,6 +7,7 @@
 #include "collision/box_tree.hpp"
 #include "collision/hull.hpp"
 #include "collision/narrow_phase.hpp"
+#include "collision/nearest_parts.hpp"
 #include "collision/triangle_tree.hpp"
 #include "scene/shapes/shape.hpp"
 
@@ -52,6 +53,9 @@ inline constexpr double kRoomRadius = 0.3;
 
 /// `placed` must keep its values finite; it may mirror, and flatten.
 ObjectParts partsOf(const Shape& shape, const Eigen::Affine3d& placed);
+
+/// For questions about the nearest of them. Points into `parts`.
+std::vector<collision::TreeOfParts> treesOf(const ObjectParts& parts);
 
 /// Whether a placed triangle has an area, as far as doubles tell.
 bool hasArea(const collision::Triangle& t);

@@ -365,10 +365,12 @@ class Touching:
     tick: int
     found: List[Pair]  # `a` is the entity that was asked about
     left_out: int  # that were near, but took more work or room than one answer is given
+    mounting: List[int]  # of a driven body: what it touches where it begins, which events leave out
 
 
 def touching(reply: Any) -> Touching:
-    return Touching(reply.tick, [pair(one, reply.tick) for one in reply.found], reply.left_out)
+    return Touching(reply.tick, [pair(one, reply.tick) for one in reply.found], reply.left_out,
+                    list(reply.mounting))
 
 
 @dataclass(frozen=True)
