@@ -149,9 +149,10 @@ void findBodyContacts(WorldState& world, TickReport& report, QueryCount& count) 
 void endBodyContacts(WorldState& world, ContactEvent::Reason reason,
                      std::vector<ContactEvent>& events) {
   for (const auto& [key, contact] : world.bodyContacts) {
-    if (!contact.touching) continue;
-    events.push_back(eventOf(world, ContactEvent::Kind::end, key.first, contact));
-    events.back().reason = reason;
+    const std::size_t told = events.size();
+    tellEnd(
+        world, key.first, contact, nullptr, [&last = contact] { return last.decision; }, events);
+    if (events.size() > told) events.back().reason = reason;
   }
   world.bodyContacts.clear();
 }

@@ -214,13 +214,12 @@ void planBodies(WorldState& world) {
 }
 
 double pushRoom(const WorldState& world, const Box& reach) {
-  const double lookout = lookoutOf(world.lengths);
   std::vector<std::uint32_t> rest = world.goingBodies;
   double room = 0;
   // What one pushes may come into the way of another: at most as many rounds as bodies.
   for (bool more = !rest.empty(); more;) {
     more = false;
-    const Box within = grown(reach, room + lookout);
+    const Box within = grown(reach, room);
     std::erase_if(rest, [&](std::uint32_t i) {
       const Body& body = world.bodies[i];
       if (!overlaps(within, body.reach)) return false;

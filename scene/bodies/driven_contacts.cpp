@@ -57,6 +57,31 @@ double wayOf(const WorldState& world, EntityId entity) {
   return ((body->position - body->positionBefore).norm() + turn) * (1 + kRounding);
 }
 
+/// All that it went through in this tick.
+Box wayBoxOf(const WorldState& world, const Body& body) {
+  Box box = boxOf(body);
+  if (!body.moved) return box;
+  const double turn = std::abs(turnOf(world, body)) * body.shape->radius;
+  for (int axis = 0; axis < 3; ++axis) {  // a point turns across the axis alone
+    const double along = body.spec->axis[axis];
+    const double across = std::sqrt(std::max(0.0, 1 - along * along)) + kRounding;
+    const double moved = std::abs(body.position[axis] - body.positionBefore[axis]);
+    const double way = (moved + across * turn) * (1 + kRounding);
+    box.min[axis] -= way, box.max[axis] += way;
+  }
+  return box;
+}
+
+/// Whether they may have been nearer than `within` in this tick, by boxes.
+bool mayMeet(const WorldState& world, const Key& key, double within) {
+  const Box way = grown(wayBoxOf(world, *drivenBody(world, key.first)), within);
+  if (const Body* other = drivenBody(world, key.second))
+    return overlaps(way, wayBoxOf(world, *other));
+  std::vector<std::uint32_t> parts;
+  world.scene->parts(key.second - 1).query(way, parts);
+  return !parts.empty();
+}
+
 /// Where it is at `part` of the tick; 1: now.
 collision::Pose poseAt(const WorldState& world, const Body& body, double part) {
   if (!body.moved || part == 1) return {body.orientation, body.position};
@@ -142,9 +167,10 @@ std::optional<Contact> touchOnTheWay(const WorldState& world, const Key& key, do
 DrivenContacts drivenContacts(WorldState& world, const Nearness& nearness, QueryCount& count) {
   DrivenContacts driven;
   for (const Key& key : pairsOfMoved(world)) {
-    if (isMounted(world, key, nearness.contact)) continue;
     const auto before = world.bodyContacts.find(key);
     const bool lasted = before != world.bodyContacts.end();
+    if (!lasted && !mayMeet(world, key, nearness.limit)) continue;
+    if (isMounted(world, key, nearness.contact)) continue;
     const double way = wayOf(world, key.first) + wayOf(world, key.second);
     const double within = std::max(nearness.limit, nearness.contact + way);
     const auto found = look(world, key, 1, lasted ? kAnyDistance : within, count);

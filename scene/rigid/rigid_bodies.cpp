@@ -329,9 +329,9 @@ void catchBody(WorldState& world, Body& body, Solid& solid, TickReport& report) 
 }
 
 /// How far it may have to go in this tick out of the way of driven bodies, or with them, metres.
-double drivenAway(const WorldState& world, const Body& body, double lookout) {
+double drivenAway(const WorldState& world, const Body& body) {
   if (world.goingBodies.empty()) return 0;
-  const Box box = grown(boxOf(body), lookout);
+  const Box box = boxOf(body);
   double farthest = 0;
   for (const std::uint32_t i : world.goingBodies)
     if (overlaps(world.bodies[i].reach, box))
@@ -371,7 +371,7 @@ void planRigids(WorldState& world) {
   for (const std::uint32_t i : world.rigids.bodies) {
     Body& body = world.bodies[i];
     Solid& solid = solidOfRigid(world.rigids, i);
-    const double driven = drivenAway(world, body, lookout);
+    const double driven = drivenAway(world, body);
     const bool wasAwake = solid.leash > lookout;
     if (body.asleep && !wasAwake && driven == 0) continue;
     body.moved = false;

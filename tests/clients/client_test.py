@@ -245,6 +245,7 @@ class Seeing(RoomCase):
         near = self.client.touching(ann, within=5)
         self.assertEqual([one.b_name for one in near.found], ["floor", "wall"])
         self.assertEqual(near.left_out, 0)
+        self.assertEqual(near.mounting, [])  # of driven bodies alone
         self.assertEqual([one.b_name for one in self.client.touching(COLUMN).found], ["floor"])
 
     def test_two_do_not_touch_before_the_time_that_is_told(self):

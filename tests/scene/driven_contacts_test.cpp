@@ -160,6 +160,25 @@ TEST(DrivenContacts, ANearMissBeginsIsClosestAndEnds) {
   EXPECT_GE(near[2].decision.distance, 0.3);
 }
 
+TEST(DrivenContacts, ANearMissThatLivesWhenTheWorldEndsIsToldAsOver) {
+  Model model = boxModel({{"tray", {0, 0, 0}, {1, 0.1, 1}}, {"post", {1.5, 0, 0}, {1.6, 2, 1}}});
+  BodySpec tray = bodySpec("tray", BodyKind::sliding, {0});
+  tray.axis = Vec3::UnitX();
+  tray.high = 0.4;
+  model.bodies = {tray};
+  Lengths lengths;
+  lengths.nearMiss = 0.3;
+  BodyTrial t(std::move(model), lengths);
+  t.tell({"tray", Action::open, 0, 0, {}});
+  t.untilIdle();
+  ASSERT_EQ(t.events.size(), 1u);
+  const auto ends = endContacts(t.world, ContactEvent::Reason::shutdown);
+  ASSERT_EQ(ends.size(), 2u);
+  EXPECT_EQ(ends[0].phase, Phase::min);
+  EXPECT_EQ(ends[1].phase, Phase::end);
+  EXPECT_EQ(ends[1].reason, ContactEvent::Reason::shutdown);
+}
+
 TEST(DrivenContacts, WhatABodyIsMountedOnIsListedAndFollowsFromTheScene) {
   Model model = liftUnderABeam();
   model.meshes.push_back(boxMesh({1, 0, -1}, {1.2, 2.5, 1}));  // beside the car: touches it

@@ -116,6 +116,25 @@ TEST_F(Pairs, WhatTouchesOrIsNearComesNearestFirst) {
   EXPECT_EQ(around.left_out(), 0u);
 }
 
+TEST_F(Pairs, WhatALiftIsMountedOnIsListed) {
+  scene::Model model = scene::testing::boxModel({{"floor", {-5, -0.2, -5}, {5, 0, 5}},
+                                                 {"car", {-1, 0, -1}, {1, 0.2, 1}},
+                                                 {"beam", {0.5, 2, -1}, {3, 2.2, 1}}});
+  scene::BodySpec lift;
+  lift.name = "lift";
+  lift.kind = scene::BodyKind::lift;
+  lift.objects = {1};
+  lift.high = 3, lift.stops = {0, 3};
+  model.bodies = {lift};
+  serve({}, std::make_shared<const scene::Scene>(std::move(model)));
+  protocol::Client ann = client("ann");
+  const v1::TouchingReply ofLift = ann.touching(near("lift", 0));
+  ASSERT_EQ(ofLift.mounting_size(), 1);
+  EXPECT_EQ(ofLift.mounting(0), 1u);
+  EXPECT_EQ(ofLift.found_size(), 1) << "asked for, it is told as all else";
+  EXPECT_EQ(ann.touching(near("beam", 0)).mounting_size(), 0);
+}
+
 TEST_F(Pairs, WhatDoesNotFitIntoOneAnswerIsCounted) {
   ServerLimits limits;
   limits.replyBytes = 400;  // two pairs

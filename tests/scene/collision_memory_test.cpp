@@ -1,0 +1,176 @@
+// What a scene and its world hold for collision, by everything that this program allocates: each
+// byte that operator new gives and delete takes back is counted as the allocator counts it.
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <new>
+#include <utility>
+
+#include "assets/building.hpp"
+#include "scene/world.hpp"
+
+namespace {
+
+std::atomic<std::size_t> held{0};
+
+void* take(std::size_t size) {
+  void* const place = std::malloc(size == 0 ? 1 : size);
+  if (!place) throw std::bad_alloc();
+  held += malloc_usable_size(place);
+  return place;
+}
+
+void giveBack(void* place) noexcept {
+  if (place) held -= malloc_usable_size(place);
+  std::free(place);
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+  return take(size);
+}
+void* operator new[](std::size_t size) {
+  return take(size);
+}
+void operator delete(void* place) noexcept {
+  giveBack(place);
+}
+void operator delete[](void* place) noexcept {
+  giveBack(place);
+}
+void operator delete(void* place, std::size_t) noexcept {
+  giveBack(place);
+}
+void operator delete[](void* place, std::size_t) noexcept {
+  giveBack(place);
+}
+
+namespace enfilade::scene {
+namespace {
+
+/// Of each mesh once, however many objects have it.
+std::size_t uniqueBytes(const Model& model) {
+  std::size_t bytes = 0;
+  for (const Mesh& mesh : model.meshes)
+    bytes += mesh.positions.size() * sizeof(mesh.positions[0]) +
+             mesh.indices.size() * sizeof(mesh.indices[0]);
+  return bytes;
+}
+
+/// A bumpy globe of about 2 * rings^2 triangles.
+Mesh globe(std::uint32_t rings) {
+  Mesh mesh;
+  for (std::uint32_t i = 0; i <= rings; ++i)
+    for (std::uint32_t k = 0; k <= rings; ++k) {
+      const double up = 3.14159 * i / rings, round = 6.28318 * k / rings;
+      const double r = 1 + 0.1 * std::sin(9 * up) * std::cos(7 * round);
+      mesh.positions.emplace_back(static_cast<float>(r * std::sin(up) * std::cos(round)),
+                                  static_cast<float>(r * std::cos(up)),
+                                  static_cast<float>(r * std::sin(up) * std::sin(round)));
+    }
+  for (std::uint32_t i = 0; i < rings; ++i)
+    for (std::uint32_t k = 0; k < rings; ++k) {
+      const std::uint32_t a = i * (rings + 1) + k, b = a + rings + 1;
+      mesh.indices.insert(mesh.indices.end(), {a, b, a + 1, a + 1, b, b + 1});
+    }
+  return mesh;
+}
+
+/// Each globe stands `copies` times.
+Model globes(int meshes, std::uint32_t rings, int copies) {
+  Model model;
+  model.source = "globes";
+  model.materials.emplace_back();
+  for (int m = 0; m < meshes; ++m) {
+    model.meshes.push_back(globe(rings + static_cast<std::uint32_t>(m)));
+    for (int c = 0; c < copies; ++c) {
+      Object object;
+      object.path = "globe" + std::to_string(m) + "/" + std::to_string(c);
+      object.meshes = {static_cast<std::uint32_t>(m)};
+      object.worldFromMesh.translation() = Vec3(3.0 * m, 0, 3.0 * c);
+      model.objects.push_back(std::move(object));
+    }
+  }
+  return model;
+}
+
+/// The bundled building with its doors and lift as bodies.
+Model buildingWithBodies() {
+  std::vector<assets::MovingPart> parts;
+  Model model = assets::makeBuilding({}, &parts);
+  for (const assets::MovingPart& part : parts) {
+    const Eigen::Affine3d& placed = model.objects[part.object].worldFromMesh;
+    BodySpec spec;
+    spec.name = "body" + std::to_string(part.object);
+    spec.kind = part.kind == assets::MovingPart::Kind::hinge ? BodyKind::hinged : BodyKind::sliding;
+    spec.objects = {part.object};
+    spec.anchor = placed.translation();
+    spec.axis = (placed.linear() * part.axis).normalized();
+    spec.low = part.low, spec.high = part.high;
+    model.bodies.push_back(spec);
+  }
+  return model;
+}
+
+/// Bytes that a scene and a world of it take beside the model.
+struct Cost {
+  std::size_t scene = 0;   ///< before anything comes near
+  std::size_t world = 0;   ///< the same
+  std::size_t shapes = 0;  ///< once those of all objects were asked for
+  std::size_t parts = 0;   ///< once those of all objects were asked for
+  std::size_t beforeParts() const { return scene + world + shapes; }
+};
+Cost costOf(Model model, bool withParts = false) {
+  const auto objects = static_cast<std::uint32_t>(model.objects.size());
+  std::size_t last = held;
+  const auto more = [&last] {
+    const std::size_t now = held;
+    return now - std::exchange(last, now);
+  };
+  Cost cost;
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  cost.scene = more();
+  World world(scene);
+  tick(world);
+  cost.world = more();
+  for (std::uint32_t i = 0; i < objects; ++i) scene->shape(i);
+  cost.shapes = more();
+  for (std::uint32_t i = 0; withParts && i < objects; ++i) scene->parts(i);
+  cost.parts = more();
+  return cost;
+}
+
+TEST(CollisionMemory, OfTheBundledBuildingIsAtMostTwiceItsMeshesBeforePartsAreAskedFor) {
+  Model model = buildingWithBodies();
+  EXPECT_GT(model.bodies.size(), 10u);
+  const std::size_t unique = uniqueBytes(model);
+  const Cost cost = costOf(std::move(model));
+  EXPECT_GT(cost.beforeParts(), unique / 4) << "it is counted";
+  EXPECT_LE(cost.beforeParts(), 2 * unique);
+}
+
+TEST(CollisionMemory, OfLargeMeshesIsAtMostTwiceTheseBeforePartsAreAskedForAndMoreAfterwards) {
+  Model model = globes(6, 60, 1);
+  const std::size_t unique = uniqueBytes(model);
+  const Cost cost = costOf(std::move(model), true);
+  EXPECT_LE(cost.scene + cost.world, unique / 100) << "nothing is copied before it is asked for";
+  EXPECT_LE(cost.beforeParts(), 2 * unique);
+  EXPECT_GT(cost.beforeParts() + cost.parts, 2 * unique) << "what is too much is seen as such";
+}
+
+TEST(CollisionMemory, OfAMeshThatStandsFourHundredTimesIsThatOfOneAndAFewNumbersEach) {
+  Model once = globes(6, 60, 1), often = globes(6, 60, 400);
+  const std::size_t unique = uniqueBytes(often);
+  const std::size_t more = often.objects.size() - once.objects.size();
+  const Cost one = costOf(std::move(once)), many = costOf(std::move(often));
+  EXPECT_LE(many.beforeParts(), 2 * unique);
+  EXPECT_LE(many.beforeParts() - one.beforeParts(), 256 * more);
+  EXPECT_LE(many.shapes, one.shapes + 4096);
+}
+
+}  // namespace
+}  // namespace enfilade::scene
