@@ -32,18 +32,6 @@ const Body* drivenBody(const WorldState& world, EntityId id) {
   return isKinematic(body.spec->kind) ? &body : nullptr;
 }
 
-/// A driven body and what stands, or two driven ones.
-bool isOfDriven(const WorldState& world, const Key& key) {
-  if (!drivenBody(world, key.first)) return false;
-  if (world.bodyOfId.contains(key.second)) return drivenBody(world, key.second) != nullptr;
-  return key.second < world.firstAvatarId();
-}
-
-bool hasMoved(const WorldState& world, EntityId id) {
-  const Body* body = drivenBody(world, id);
-  return body && body->moved;
-}
-
 /// About the body's axis, in this tick.
 double turnOf(const WorldState& world, const Body& body) {
   return body.spin.dot(body.spec->axis) * world.lengths.tick;
@@ -103,7 +91,7 @@ bool isMounted(WorldState& world, const Key& key, double contact) {
   return at->second;
 }
 
-/// The pairs to be looked at: of those that moved with what may be near, and with what was.
+/// Those that moved with what they may be near to, or were: their reach began where they were.
 std::set<Key> pairsOfMoved(const WorldState& world) {
   std::set<Key> pairs;
   for (const std::uint32_t i : world.goingBodies) {
@@ -119,9 +107,6 @@ std::set<Key> pairsOfMoved(const WorldState& world) {
       }
     }
   }
-  for (const auto& [key, contact] : world.bodyContacts)
-    if (isOfDriven(world, key) && (hasMoved(world, key.first) || hasMoved(world, key.second)))
-      pairs.insert(key);
   return pairs;
 }
 
@@ -130,8 +115,8 @@ std::set<Key> pairsOfMoved(const WorldState& world) {
 std::optional<Contact> look(const WorldState& world, const Key& key, double part, double within,
                             QueryCount& count) {
   std::size_t work = std::numeric_limits<std::size_t>::max();
-  const collision::NearestParts nearest = collision::nearestParts(
-      treesAt(world, key.first, part), treesAt(world, key.second, part), within, work);
+  const auto first = treesAt(world, key.first, part), second = treesAt(world, key.second, part);
+  const collision::NearestParts nearest = collision::nearestParts(first, second, within, work);
   ++count.narrow;
   if (nearest.found != collision::NearestParts::Found::nearest) return std::nullopt;
   if (nearest.decision.decidedBy == collision::DecidedBy::rational) ++count.rational;

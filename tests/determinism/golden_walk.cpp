@@ -1,8 +1,8 @@
 // Prints the state hash at the end of some worlds in which everything that moves moves: walkers on
-// stairs, a crowd, flyers among slivers, a driven arm, doors and a lift, a heap of free bodies, a
-// vibrating tray (by one thread and by two: these two lines must agree). The scenes and commands
-// are made without libm, so that every build on every processor is given the same ones and must
-// print the same lines.
+// stairs, a crowd, flyers among slivers, a driven arm, doors and a lift, leaves that hit one
+// another, a heap of free bodies, a vibrating tray (by one thread and by two: these two lines must
+// agree). The scenes and commands are made without libm, so that every build on every processor is
+// given the same ones and must print the same lines.
 #include <cstdio>
 #include <memory>
 
@@ -165,6 +165,49 @@ void doors() {
   print("doors", world);
 }
 
+/// Leaves that turn into one another and a cart through a shelf, fast enough to pass between ticks.
+void clashes() {
+  Builder b;
+  b.box("floor", {-5, -0.2, -5}, {5, 0, 5});
+  b.box("shelf", {1, 0, 1}, {1.05, 2, 3});
+  Seeded random(31);
+  for (std::uint32_t i = 0; i < 6; ++i) {
+    const Vec3 at(0.7 * i - 2, 0.01, random.uniform(-0.4, 0.4));
+    b.box("leaf", at, at + Vec3(random.uniform(0.8, 1.2), 2, 0.04));
+    BodySpec leaf;
+    leaf.name = "leaf" + std::to_string(i);
+    leaf.kind = BodyKind::hinged;
+    leaf.objects = {i + 2};
+    leaf.anchor = at;
+    leaf.axis = Vec3::UnitY();
+    leaf.low = -3, leaf.high = 3;
+    leaf.speed = random.uniform(1, 40);
+    b.model.bodies.push_back(leaf);
+  }
+  b.box("cart", {-3, 0.1, 1.5}, {-2.9, 1, 2});
+  BodySpec cart;
+  cart.name = "cart";
+  cart.kind = BodyKind::path;
+  cart.objects = {8};
+  cart.anchor = {-3, 0, 1.5};
+  cart.axis = Vec3::UnitY();
+  cart.keys = {{0, Vec3::Zero(), 0}, {0.2, {6, 0, 0}, 2}, {0.5, Vec3::Zero(), 0}};
+  cart.loops = true;
+  b.model.bodies.push_back(cart);
+  Lengths lengths;
+  lengths.nearMiss = 0.1;
+  World world(std::make_shared<const Scene>(b.model), lengths);
+  for (int k = 0; k < 40; ++k) {
+    BodyCommand swing;
+    swing.body = "leaf" + std::to_string(k % 6);
+    swing.action = BodyCommand::Action::to;
+    swing.to = random.uniform(-3, 3);
+    if (submit(world, swing)) ++refusedCommands;
+    ticks(world, 6);
+  }
+  print("clashes", world);
+}
+
 /// Boxes, slabs and wedges thrown on a heap that somebody walks into.
 void heap() {
   Builder b;
@@ -227,6 +270,7 @@ int main() {
   flyers();
   arm();
   doors();
+  clashes();
   heap();
   tray(1, "tray/1");
   tray(2, "tray/2");

@@ -138,6 +138,24 @@ TEST(DrivenContacts, WhatIsPassedBetweenTwoTicksIsToldAsBegunAndEnded) {
   EXPECT_EQ(t.events[0].tick, t.events[1].tick);
 }
 
+TEST(DrivenContacts, ALeafThatTurnsPastAPostBetweenTwoTicksTouchesIt) {
+  // 1.5 rad in one tick; the post stands half way on, out of the boxes before and after.
+  Model model = boxModel({{"leaf", {0, 0, -0.01}, {1, 2, 0}},
+                          {"post", {0.6, 0, -0.61}, {0.61, 2, -0.6}},
+                          {"low", {0.6, -1, -0.61}, {0.61, -0.002, -0.6}}});
+  BodySpec leaf = leafSpec("door", 0, 0);
+  leaf.speed = 90;
+  model.bodies = {leaf};
+  BodyTrial t(std::move(model));
+  t.tell({"door", Action::to, 1.5, 0, {}});
+  t.step();
+  ASSERT_EQ(t.events.size(), 2u);
+  EXPECT_EQ(t.told(Event::begin, "door", "post"), 1);
+  EXPECT_EQ(t.told(Event::end, "door", "post"), 1);
+  t.untilIdle();
+  EXPECT_EQ(t.events.size(), 2u);
+}
+
 TEST(DrivenContacts, ANearMissBeginsIsClosestAndEnds) {
   Model model =
       boxModel({{"tray", {-2, 0, -0.5}, {-1, 0.1, 0.5}}, {"post", {-0.1, 0, 0.6}, {0.1, 2, 0.8}}});
