@@ -31,7 +31,7 @@ struct alignas(kLaneAlignment) LaneMask {
 
 struct alignas(kLaneAlignment) Lanes {
   using Pack = double __attribute__((vector_size(kLaneAlignment)));
-  Pack pack{};
+  Pack pack;  // not set: rows of them are filled by who needs them
 
   double operator[](std::size_t lane) const { return pack[lane]; }
   void put(std::size_t lane, double value) { pack[lane] = value; }

@@ -44,6 +44,15 @@ double turnOf(const Passage& p) {
   return 4 * s * (1 + s * s) * kUp;
 }
 
+PassagePose middleOf(const PassagePose& from, const PassagePose& to) {
+  PassagePose middle;
+  middle.centre = 0.5 * (from.centre + to.centre);
+  middle.rotation.coeffs() = from.rotation.coeffs() + nearer(from.rotation, to.rotation).coeffs();
+  const double length = std::sqrt(middle.rotation.squaredNorm());
+  middle.rotation.coeffs() /= length;
+  return middle;
+}
+
 double bulgeOf(const Passage& p) {
   return p.radius * p.turn * p.turn / 2 * kUp;
 }
@@ -147,13 +156,7 @@ double closingOf(const Passage& a, const Passage& b) {
 }
 
 PassagePose middleOf(const Passage& p) {
-  PassagePose middle;
-  middle.centre = 0.5 * (p.fromCentre + p.toCentre);
-  middle.rotation.coeffs() =
-      p.fromRotation.coeffs() + nearer(p.fromRotation, p.toRotation).coeffs();
-  const double length = std::sqrt(middle.rotation.squaredNorm());
-  middle.rotation.coeffs() /= length;
-  return middle;
+  return middleOf({p.fromCentre, p.fromRotation}, {p.toCentre, p.toRotation});
 }
 
 Passage firstHalf(const Passage& p, const PassagePose& middle) {
@@ -170,21 +173,23 @@ Passage secondHalf(const Passage& p, const PassagePose& middle) {
   return half;
 }
 
-Passage firstPart(Passage passage, double fraction) {
+Passage firstPart(const Passage& passage, double fraction) {
   if (fraction == 1 || passage.stands) return passage;
-  Passage done = passage;
-  done.toCentre = passage.fromCentre, done.toRotation = passage.fromRotation;
+  // What is left of the way, from the end of what is done; only the result is measured.
+  PassagePose from{passage.fromCentre, passage.fromRotation};
+  PassagePose to{passage.toCentre, passage.toRotation};
   for (int i = 0; i < kMostHalvings && fraction > 0; ++i) {
-    const PassagePose middle = middleOf(passage);
+    const PassagePose middle = middleOf(from, to);
     fraction *= 2;
     if (fraction >= 1) {
-      done.toCentre = middle.centre, done.toRotation = middle.rotation;
-      passage = secondHalf(passage, middle);
+      from = middle;
       fraction -= 1;
     } else {
-      passage = firstHalf(passage, middle);
+      to = middle;
     }
   }
+  Passage done = passage;
+  done.toCentre = from.centre, done.toRotation = from.rotation;
   measure(done);
   return done;
 }

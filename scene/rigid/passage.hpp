@@ -45,7 +45,7 @@ Passage firstHalf(const Passage& passage, const PassagePose& middle);
 Passage secondHalf(const Passage& passage, const PassagePose& middle);
 
 /// The first `fraction` of a passage: a multiple of 2^-kMostHalvings.
-Passage firstPart(Passage passage, double fraction);
+Passage firstPart(const Passage& passage, double fraction);
 
 /// Up to which part of the way the plane at right angles to `axis` (unit, from A to B) parts the
 /// two: a cheap proof, which where it gives 0 says nothing.

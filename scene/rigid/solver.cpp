@@ -101,6 +101,7 @@ void warmStart(System& system, std::span<const Joint> joints, Workers& workers) 
   }
   forBlocks(
       system, workers, [&](const PatchBlock& block) __attribute__((always_inline)) {
+        if (block.idle) return;
         Motions m = gathered(block, system);
         const RubBlock& rub = block.rub;
         block.push(rub.alongFirst, rub.first, rub.rub1, m);
@@ -150,11 +151,23 @@ void warmStart(System& system, std::span<const Joint> joints, Workers& workers) 
   return choose(speed < least, least - speed, lesser(none, most - speed));
 }
 
+/// Whether a point closes in too fast. Where none does and nothing has pushed yet, nothing will.
+[[gnu::always_inline]] inline bool anyLacks(const PatchBlock& block, const Motions& m,
+                                            System& system) {
+  for (const PointBlock& point : pointsOf(block, system)) {
+    const Lanes lacking = lackingSpeed(point, system, point.normal.speed(block.normal, m));
+    if (any(everywhere(0) < lacking)) return true;
+  }
+  return false;
+}
+
 [[gnu::always_inline]] inline void solveBlock(PatchBlock& block, System& system) {
   Motions m = gathered(block, system);
+  if (block.idle && !anyLacks(block, m, system)) return;
+  block.idle = false;
   const std::span points = pointsOf(block, system);
   if (block.rubs) {
-    Lanes normalImpulse;
+    Lanes normalImpulse = everywhere(0);
     for (const PointBlock& point : points)
       normalImpulse = normalImpulse + (point.impulse + point.push);
     solveRub(block, normalImpulse, m);
@@ -183,7 +196,8 @@ void warmStart(System& system, std::span<const Joint> joints, Workers& workers) 
   return choose(none < room, -room / seconds, choose(none < lacking, back, none));
 }
 
-[[gnu::always_inline]] inline void partBlock(const PatchBlock& block, System& system) {
+[[gnu::always_inline]] inline void partBlock(const PatchBlock& block, bool begins,
+                                             System& system) {
   const Motions going = gathered(block, system);
   Motions m = gatheredPartings(block, system);
   for (PointBlock& point : pointsOf(block, system)) {
@@ -191,8 +205,9 @@ void warmStart(System& system, std::span<const Joint> joints, Workers& workers) 
     const Lanes also = choose(roomy, point.normal.speed(block.normal, going), everywhere(0));
     const Lanes speed = point.normal.speed(block.normal, m) + also;
     const Lanes lacking = partingSpeed(point, system) - speed;
-    const Lanes impulse = greater(everywhere(0), point.parting + point.mass * lacking);
-    block.push(block.normal, point.normal, impulse - point.parting, m);
+    const Lanes before = begins ? everywhere(0) : point.parting;
+    const Lanes impulse = greater(everywhere(0), before + point.mass * lacking);
+    block.push(block.normal, point.normal, impulse - before, m);
     point.parting = impulse;
   }
   putBack<&Mover::partingVelocity, &Mover::partingSpin>(m, block, system);
@@ -215,13 +230,12 @@ void partJoints(System& system, std::span<const Joint> joints) {
 /// Step 4.
 void part(System& system, std::span<const Joint> joints, Workers& workers) {
   for (Mover& mover : system.movers) mover.partingVelocity = mover.partingSpin = Vec3::Zero();
-  for (PointBlock& point : system.points) point.parting = Lanes{};
   for (AngularRow& row : system.joints) row.parting = 0;
   for (int i = 0; i < kPartings; ++i) {
     partJoints(system, joints);
     forBlocks(
         system, workers, [&](PatchBlock & block) __attribute__((always_inline)) {
-          partBlock(block, system);
+          partBlock(block, i == 0, system);
         });
   }
 }

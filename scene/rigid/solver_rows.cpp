@@ -1,11 +1,14 @@
 #include "scene/rigid/solver_rows.hpp"
 
+#include <algorithm>
+
 #include "scene/rigid/colours.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kBlock = 16;  // rows that a thread takes at a time
+constexpr std::size_t kBlock = 16;     // rows that a thread takes at a time
+constexpr std::size_t kPatches = 256;  // and patches
 
 Mover moverOf(const RigidBody& body) {
   return {body.velocity,    body.spin,
@@ -81,54 +84,94 @@ void fillLane(const ContactPatch& patch, std::size_t lane, PatchBlock& block, Sy
     fillPoint(patch, patch.points[i], a, b, lane, system.points[block.firstPoint + i]);
 }
 
+/// Nothing pushed in the last step, and nobody pushes.
+bool isIdle(const ContactPatch& patch) {
+  const auto pushes = [](const PatchPoint& point) { return point.impulse != 0 || point.push != 0; };
+  return patch.mostPush == 0 && patch.twist == 0 && patch.rub.isZero(0) &&
+         std::ranges::none_of(patch.list(), pushes);
+}
+
 void fillBlock(std::span<const ContactPatch> patches, PatchBlock& block, System& system) {
   const auto nobody = static_cast<std::uint32_t>(system.movers.size()) - 1;
+  PatchBlock filled{};
+  filled.patches = block.patches, filled.firstPoint = block.firstPoint, filled.size = block.size;
+  filled.idle = true;
+  block = filled;
+  std::ranges::fill(system.points.subspan(block.firstPoint, block.size), PointBlock{});
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     block.a.movers[lane] = block.b.movers[lane] = nobody;
-    if (block.patches[lane] != kNoPatch)
-      fillLane(patches[block.patches[lane]], lane, block, system);
+    if (block.patches[lane] == kNoPatch) continue;
+    const ContactPatch& patch = patches[block.patches[lane]];
+    fillLane(patch, lane, block, system);
+    block.idle &= isIdle(patch);
   }
 }
 
-/// Blocks of `most` patches of one colour. Those with as many points come together.
-void layOutColour(std::span<const ContactPatch> patches, std::span<const std::uint32_t> colour,
-                  std::size_t most, System& system) {
-  std::size_t lane = most;
+/// Which patches go side by side: those that push, then those that do not yet, and of each those
+/// with most points first.
+constexpr std::uint8_t kKinds = 2 * ContactPatch::kMostPoints;
+std::uint8_t kindOf(const ContactPatch& patch) {
+  return static_cast<std::uint8_t>((isIdle(patch) ? 2 : 1) * ContactPatch::kMostPoints -
+                                   patch.size);
+}
+
+/// Fills `blocks` with the patches of one colour, `most` to each.
+void layOutColour(std::span<const ContactPatch> patches, std::span<const std::uint8_t> kinds,
+                  std::span<const std::uint32_t> colour, std::size_t most,
+                  std::span<PatchBlock> blocks) {
+  std::size_t count = 0;
   const auto add = [&](std::uint32_t patch) {
-    if (lane == most) {
-      PatchBlock block;
-      block.patches.fill(kNoPatch);
-      block.firstPoint = static_cast<std::uint32_t>(system.points.size());
-      block.size = static_cast<std::uint32_t>(patches[patch].size);
-      system.points.resize(system.points.size() + block.size);
-      system.blocks.push_back(block);
-      lane = 0;
-    }
-    system.blocks.back().patches[lane++] = patch;
+    PatchBlock& block = blocks[count / most];
+    if (count % most == 0) block.patches.fill(kNoPatch), block.size = 0;
+    block.patches[count++ % most] = patch;
+    block.size = std::max(block.size, static_cast<std::uint32_t>(patches[patch].size));
   };
   if (most == 1) {
     for (const std::uint32_t patch : colour) add(patch);
     return;
   }
-  for (std::size_t size = ContactPatch::kMostPoints; size > 0; --size)
+  for (std::uint8_t kind = 0; kind < kKinds; ++kind)
     for (const std::uint32_t patch : colour)
-      if (patches[patch].size == size) add(patch);
+      if (kinds[patch] == kind) add(patch);
 }
 
-/// Which blocks stand where.
-void layOut(std::span<const ContactPatch> patches, System& system) {
-  std::vector<std::uint8_t> moves(system.movers.size());
+/// Which blocks stand where, and which points are theirs. The rest is left as it is.
+void layOut(std::span<const ContactPatch> patches, System& system, Workers& workers) {
+  std::vector<std::uint8_t> moves(system.movers.size()), kinds(patches.size());
   for (std::size_t i = 0; i < moves.size(); ++i) moves[i] = system.movers[i].yields();
+  workers.share(patches.size(), kPatches, [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; k < to; ++k) kinds[k] = kindOf(patches[k]);
+  });
   const Colouring colouring = colourPatches(patches, moves);
-  std::uint32_t from = 0;
+  std::uint32_t from = 0, size = 0;
+  // The last colour's may share bodies: each is alone.
+  const auto mostOf = [&](std::size_t colour) {
+    return colour + 1 == colouring.ends.size() ? std::size_t{1} : kLanes;
+  };
   for (std::size_t i = 0; i < colouring.ends.size(); ++i) {
-    const std::uint32_t end = colouring.ends[i];
-    const bool isLast = i + 1 == colouring.ends.size();
-    const std::span colour(colouring.order.data() + from, end - from);
-    layOutColour(patches, colour, isLast ? 1 : kLanes, system);
-    system.colours.push_back(static_cast<std::uint32_t>(system.blocks.size()));
-    from = end;
+    const std::size_t most = mostOf(i);
+    size += static_cast<std::uint32_t>((colouring.ends[i] - from + most - 1) / most);
+    system.colours.push_back(size);
+    from = colouring.ends[i];
   }
+  system.blockStore = std::make_unique_for_overwrite<PatchBlock[]>(size);
+  system.blocks = {system.blockStore.get(), size};
+  std::uint32_t block = 0;
+  from = 0;
+  for (std::size_t i = 0; i < colouring.ends.size(); ++i) {
+    layOutColour(patches, kinds,
+                 std::span(colouring.order).subspan(from, colouring.ends[i] - from), mostOf(i),
+                 system.blocks.subspan(block, system.colours[i] - block));
+    block = system.colours[i];
+    from = colouring.ends[i];
+  }
+  std::uint32_t points = 0;
+  for (PatchBlock& laid : system.blocks) {
+    laid.firstPoint = points;
+    points += laid.size;
+  }
+  system.pointStore = std::make_unique_for_overwrite<PointBlock[]>(points);
+  system.points = {system.pointStore.get(), points};
 }
 
 }  // namespace
@@ -140,7 +183,7 @@ void setUp(std::span<const RigidBody> bodies, std::span<const ContactPatch> patc
   workers.share(bodies.size(), kBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i) system.movers[i] = moverOf(bodies[i]);
   });
-  layOut(patches, system);
+  layOut(patches, system, workers);
   workers.share(system.blocks.size(), kBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t k = from; k < to; ++k) fillBlock(patches, system.blocks[k], system);
   });

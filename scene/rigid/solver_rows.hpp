@@ -2,6 +2,7 @@
 // solver_rows.cpp.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -128,6 +129,7 @@ struct PatchBlock {
   std::array<std::uint32_t, kLanes> patches{};         ///< indices; kNoPatch: none
   std::uint32_t firstPoint = 0, size = 0;              ///< of the patch that has most
   bool rubs = false, pushes = false, bounces = false;  ///< any of them
+  bool idle = false;  ///< nothing has pushed yet: all impulses are 0
   Lanes friction, restitution;
   Lanes pushSpeed, mostPush;  ///< the push of one point and substep, N s
   Lanes3 normal;
@@ -157,13 +159,16 @@ struct AngularRow {
 /// All that is solved: joints in the order of the array, then patches colour by colour.
 struct System {
   std::vector<Mover> movers;           ///< of the bodies, and one of nobody
-  std::vector<PatchBlock> blocks;      ///< by colour
+  std::span<PatchBlock> blocks;        ///< by colour
   std::vector<std::uint32_t> colours;  ///< where each colour ends in `blocks`; see colours.hpp
-  std::vector<PointBlock> points;      ///< in the order of their blocks
+  std::span<PointBlock> points;        ///< in the order of their blocks
   std::vector<AngularRow> joints;
   double seconds = 0;  ///< of a substep
   double epsilon = 0;
   bool byAvx = false;
+
+  std::unique_ptr<PatchBlock[]> blockStore;  ///< of `blocks`
+  std::unique_ptr<PointBlock[]> pointStore;  ///< of `points`
 };
 
 /// Movers and patches; seconds and epsilon are set.
