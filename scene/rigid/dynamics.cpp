@@ -24,8 +24,11 @@ NearPairStep nearStep(const DynamicsStep& settings) {
   return {settings.solver.seconds, settings.solver.gravity, settings.solver.epsilon};
 }
 
+bool mayMatter(const Pace& a, const Pace& b) {
+  return a.isAwake || b.isAwake || (a.isMoved && b.isFree) || (b.isMoved && a.isFree);
+}
 bool mayMatter(const Solid& a, const Solid& b) {
-  return a.isAwake() || b.isAwake() || (a.isMoved() && b.isFree()) || (b.isMoved() && a.isFree());
+  return mayMatter(paceOf(a, Vec3::Zero()), paceOf(b, Vec3::Zero()));
 }
 
 void wake(Solid& solid) {
@@ -51,11 +54,28 @@ bool comesToLean(const NearPair& pair, const Solid& a, const Solid& b, const Nea
   return false;
 }
 
+/// Of all solids, beside the mean velocity of those that are awake.
+void findPaces(const Dynamics& dynamics, StepWork& work) {
+  Vec3 sum = Vec3::Zero();
+  double awake = 0;
+  for (const Solid& solid : dynamics.solids)
+    if (solid.isAwake()) sum += solid.motion.velocity, ++awake;
+  const Vec3 mean = awake > 0 ? Vec3(sum / awake) : sum;
+  work.paces.clear();
+  for (const Solid& solid : dynamics.solids) work.paces.push_back(paceOf(solid, mean));
+}
+
 /// Looks at a pair, and changes nothing else; flags.
-std::uint8_t lookAt(const Dynamics& dynamics, NearPair& pair, const NearPairStep& step) {
-  const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
-  if (!mayMatter(a, b)) return 0;
+std::uint8_t lookAt(const Dynamics& dynamics, const StepWork& work, NearPair& pair,
+                    const NearPairStep& step) {
+  const Pace &paceA = work.paces[pair.key.a], &paceB = work.paces[pair.key.b];
+  if (!mayMatter(paceA, paceB)) return 0;
   std::uint8_t flags = StepWork::kActive;
+  if (areFar(pair, paceA, paceB, step)) {
+    pair.hasPatch = false;
+    return flags;
+  }
+  const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
   if (look(pair, a, b, step)) flags |= StepWork::kAsked;
   const bool sleeper = (a.isFree() && a.asleep) || (b.isFree() && b.asleep);
   if (sleeper && comesToLean(pair, a, b, step)) flags |= StepWork::kWakes;
@@ -89,9 +109,10 @@ void findPatches(Dynamics& dynamics, const NearPairStep& step, StepWork& work) {
   std::vector<std::uint8_t> isNew(pairs.size(), 1);
   // Each round but the last wakes a solid.
   for (std::size_t round = 0; round <= dynamics.solids.size(); ++round) {
+    findPaces(dynamics, work);
     work.workers.share(pairs.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
       for (std::size_t i = from; i < to; ++i)
-        if (isNew[i]) work.looks[i] = lookAt(dynamics, pairs[i], step);
+        if (isNew[i]) work.looks[i] = lookAt(dynamics, work, pairs[i], step);
     });
     bool woken = false;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -129,9 +150,12 @@ void gatherBodies(const Dynamics& dynamics, StepWork& work) {
   for (std::uint32_t i = 0; i < dynamics.solids.size(); ++i)
     if (dynamics.solids[i].isAwake()) addBody(dynamics, i, work);
   work.report.awake = static_cast<std::uint32_t>(work.bodies.size());
+  work.bodiesOf.reserve(work.active.size());
   for (const std::uint32_t i : work.active) {
-    addBody(dynamics, dynamics.pairs[i].key.a, work);
-    addBody(dynamics, dynamics.pairs[i].key.b, work);
+    const PartPairKey& key = dynamics.pairs[i].key;
+    addBody(dynamics, key.a, work);
+    addBody(dynamics, key.b, work);
+    work.bodiesOf.push_back({work.local[key.a], work.local[key.b]});
   }
 }
 

@@ -34,6 +34,7 @@ constexpr double kFaceAtRest = 0.8;
 constexpr double kSamePoint = 0.25;
 /// Of the coordinates: more than what spheres lose by rounding, here and where solids are placed.
 constexpr double kOfSpheres = 0x1p-44;
+constexpr double kMore = 1 + 0x1p-40;  // above what a few roundings lose
 
 struct Axis {
   Vec3 normal = Vec3::UnitY();  ///< from A to B
@@ -110,12 +111,16 @@ Axis axisFor(const Axis& closest, const NearPair& pair, const Solid& a, const So
   return best;
 }
 
+Vec3 velocityOf(const Solid& solid) {
+  return solid.asleep ? Vec3(Vec3::Zero()) : solid.motion.velocity;
+}
+/// m/s, by turning.
+double tipOf(const Solid& solid) {
+  return solid.asleep ? 0 : solid.motion.spin.norm() * solid.radius;
+}
+
 /// Metres by which the pair can close in within the step, by the speeds of now.
 double reachOf(const Solid& a, const Solid& b, const NearPairStep& step) {
-  const auto velocityOf = [](const Solid& s) {
-    return s.asleep ? Vec3(Vec3::Zero()) : s.motion.velocity;
-  };
-  const auto tipOf = [](const Solid& s) { return s.asleep ? 0 : s.motion.spin.norm() * s.radius; };
   const double speed = (velocityOf(a) - velocityOf(b)).norm() + tipOf(a) + tipOf(b);
   const bool falls = a.isAwake() || b.isAwake();
   const double pushed =
@@ -329,6 +334,18 @@ void ask(NearPair& pair, const ConvexBody& bodyA, const ConvexBody& bodyB, const
 }
 
 }  // namespace
+
+Pace paceOf(const Solid& solid, const Vec3& beside) {
+  const double speed = (velocityOf(solid) - beside).norm() + tipOf(solid) + solid.swing();
+  return {(speed + solid.pushVelocity.norm()) * kMore, solid.jumped, solid.isFree(),
+          solid.isAwake(), solid.isMoved()};
+}
+
+bool areFar(const NearPair& pair, const Pace& a, const Pace& b, const NearPairStep& step) {
+  const double gained = step.gravity.norm() * step.seconds;
+  const double reach = step.seconds * (a.speed + b.speed + gained);
+  return apartNow(pair, a.jumped + b.jumped) > (2 * step.epsilon + reach) * kMore;
+}
 
 bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step) {
   const double reach = reachOf(a, b, step), limit = 2 * step.epsilon + reach;

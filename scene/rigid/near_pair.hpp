@@ -66,12 +66,26 @@ struct NearPairStep {
 /// Returns whether the narrow phase was asked.
 bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step);
 
-/// A lower bound of the distance by what was known; may be negative.
-inline double apartNow(const NearPair& pair, const Solid& a, const Solid& b) {
-  const double moved = a.jumped + b.jumped;
+/// A lower bound of the distance by what was known; may be negative. `moved`: Solid::jumped of both.
+inline double apartNow(const NearPair& pair, double moved) {
   const double rounding = 0x1p-51 * (moved + pair.since + std::abs(pair.apart));
   return pair.apart - (moved - pair.since) - rounding;
 }
+inline double apartNow(const NearPair& pair, const Solid& a, const Solid& b) {
+  return apartNow(pair, a.jumped + b.jumped);
+}
+
+/// What most pairs need to know of a solid, since they are far from one another: little, and side by
+/// side.
+struct Pace {
+  double speed = 0;   ///< m/s beside a velocity that is the same for all: no point goes faster
+  double jumped = 0;  ///< Solid's
+  bool isFree = false, isAwake = false, isMoved = false;  ///< Solid's
+};
+Pace paceOf(const Solid& solid, const Vec3& beside);
+
+/// look() would do nothing but to find them far: proved by their paces.
+bool areFar(const NearPair& pair, const Pace& a, const Pace& b, const NearPairStep& step);
 
 /// Whether the points lean on one another: nearer than 2 epsilon.
 bool leans(const NearPair& pair, double epsilon);

@@ -22,6 +22,11 @@ struct Carry {
   Vec3 velocityAt(const Vec3& point) const { return velocity + spin.cross(point - pivot); }
 };
 
+/// The bodies of a pair, by their places in `bodies`.
+struct PairBodies {
+  std::uint32_t a = 0, b = 0;
+};
+
 struct StepWork {
   explicit StepWork(Workers& all) : workers(all) {}
 
@@ -30,7 +35,9 @@ struct StepWork {
   static constexpr std::uint8_t kActive = 1, kAsked = 2, kWakes = 4;
   std::vector<std::uint8_t> looks;     ///< of each pair, these flags
   std::vector<std::uint32_t> active;   ///< indices of pairs that were looked at or may matter
+  std::vector<PairBodies> bodiesOf;    ///< of each of `active`
   std::vector<std::uint32_t> patched;  ///< of those, with a patch
+  std::vector<Pace> paces;             ///< of each solid, when pairs are looked at
   std::vector<std::uint32_t> local;    ///< of each solid: its place in `bodies`; kNoPlace: none
   std::vector<std::uint32_t> solids;   ///< of each of `bodies`
   std::vector<RigidBody> bodies;

@@ -8,6 +8,10 @@ namespace enfilade::scene {
 namespace {
 
 constexpr std::size_t kBodyBlock = 32;  // bodies that a thread takes at a time
+constexpr double kMore = 1 + 0x1p-40;   // above what a few roundings lose
+/// Of their distance: pairs that close in by less, by a crude bound, are not looked at. The cruder,
+/// the sooner they have to be looked at again.
+constexpr double kFar = 0.5;
 constexpr int kPartialRounds = 4;       // then who is in the way does not move at all
 
 Passage passageOf(const Solid& solid, const RigidBody& goal) {
@@ -16,6 +20,13 @@ Passage passageOf(const Solid& solid, const RigidBody& goal) {
   passage.stands = nullptr;
   measure(passage);
   return passage;
+}
+
+/// Metres that no point of it goes farther beside `shift`: on its way, and however it is shortened.
+double widthOf(const Passage& way, const Carry& carry, const Vec3& shift) {
+  const double goes = (way.toCentre - way.fromCentre - shift).norm();
+  const double stays = (carry.shift - shift).norm();
+  return (std::max(goes, stays) + way.turn * way.radius) * kMore;
 }
 
 /// How far the pair is proved clear; 1 for one that was not separated when it set out.
@@ -105,26 +116,71 @@ void findPassages(const Dynamics& dynamics, StepWork& work) {
   });
 }
 
-/// What one round of proofs finds.
+/// What the rounds of proofs find.
 struct Round {
-  std::vector<std::uint8_t> open;    ///< of each of `bodies`: its way is new
-  std::vector<double> parts;         ///< of each of `active`: of the ways as they are, proved
-  std::vector<double> least;         ///< of each of `bodies`, of the parts of its pairs
-  std::vector<std::uint8_t> proofs;  ///< of each of `active`: the narrow phase was asked
+  std::vector<std::uint8_t> open;   ///< of each of `bodies`: its way is new
+  std::vector<double> least;        ///< of each of `bodies`, of the parts of its pairs
+  Vec3 shift = Vec3::Zero();        ///< about how all go
+  std::vector<double> widths;       ///< of each of `bodies`: bounds of widthOf()
+  std::vector<double> jumped;       ///< of each of `bodies`: Solid's
+  std::vector<std::uint32_t> near;  ///< of `active`: those whose bodies' widths do not clear them
+  std::vector<double> parts;        ///< of each of `near`: of the ways as they are, proved
+  std::vector<std::uint8_t> proofs;  ///< of each of `near`: the narrow phase was asked
   /// Solids of which neither could be kept from the other.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> squeezed;
 };
 
+Round firstRound(const Dynamics& dynamics, const StepWork& work) {
+  Round round;
+  round.open.assign(work.bodies.size(), 1);
+  for (std::uint32_t i = 0; i < work.report.awake; ++i)  // they are the first
+    round.shift += work.passages[i].toCentre - work.passages[i].fromCentre;
+  if (work.report.awake > 0) round.shift /= work.report.awake;
+  round.widths.assign(work.bodies.size(), 0);
+  for (const std::uint32_t solid : work.solids)
+    round.jumped.push_back(dynamics.solids[solid].jumped);
+  return round;
+}
+
+/// Takes new ways into account. Returns whether any body's is wider than it ever was.
+bool widen(const StepWork& work, Round& round) {
+  bool any = false;
+  for (std::size_t i = 0; i < work.bodies.size(); ++i) {
+    if (!round.open[i]) continue;
+    const double width = widthOf(work.passages[i], work.carried[i], round.shift);
+    if (width > round.widths[i]) round.widths[i] = width, any = true;
+  }
+  return any;
+}
+
+/// Most pairs are far apart: they need no look at their bodies' ways, in no round.
+void findNear(const Dynamics& dynamics, StepWork& work, Round& round) {
+  round.near.clear();
+  for (std::uint32_t k = 0; k < work.active.size(); ++k) {
+    const NearPair& pair = dynamics.pairs[work.active[k]];
+    const auto [a, b] = work.bodiesOf[k];
+    const double closing = (round.widths[a] + round.widths[b]) * kMore;
+    const double apart = apartNow(pair, round.jumped[a] + round.jumped[b]);
+    if (closing < kFar * apart) {
+      work.closing[k] = closing;
+    } else {
+      round.near.push_back(k);
+    }
+  }
+}
+
 void proveRound(const Dynamics& dynamics, StepWork& work, Round& round) {
-  round.parts.assign(work.active.size(), 1);
-  round.proofs.assign(work.active.size(), 0);
-  work.workers.share(work.active.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
-    for (std::size_t k = from; k < to; ++k) {
-      const NearPair& pair = dynamics.pairs[work.active[k]];
-      const std::uint32_t a = work.local[pair.key.a], b = work.local[pair.key.b];
+  if (widen(work, round)) findNear(dynamics, work, round);
+  round.parts.assign(round.near.size(), 1);
+  round.proofs.assign(round.near.size(), 0);
+  work.workers.share(round.near.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t n = from; n < to; ++n) {
+      const std::uint32_t k = round.near[n];
+      const auto [a, b] = work.bodiesOf[k];
       if (!round.open[a] && !round.open[b]) continue;
+      const NearPair& pair = dynamics.pairs[work.active[k]];
       work.closing[k] = closingOf(work.passages[a], work.passages[b]);
-      round.parts[k] = clearFraction(dynamics, pair, work.closing[k], work, round.proofs[k]);
+      round.parts[n] = clearFraction(dynamics, pair, work.closing[k], work, round.proofs[n]);
     }
   });
   for (const std::uint8_t proof : round.proofs) work.report.proofs += proof;
@@ -173,19 +229,19 @@ bool isTakenInto(std::uint32_t body, std::uint32_t other, const StepWork& work) 
 /// Shortens the ways of all whose pairs are not proved clear. Returns whether any was.
 bool shortenAll(const Dynamics& dynamics, bool toNothing, StepWork& work, Round& round) {
   round.least.assign(work.bodies.size(), 1);
-  for (std::size_t k = 0; k < work.active.size(); ++k) {
-    if (round.parts[k] == 1) continue;
-    const NearPair& pair = dynamics.pairs[work.active[k]];
-    const std::uint32_t a = work.local[pair.key.a], b = work.local[pair.key.b];
+  for (std::size_t n = 0; n < round.near.size(); ++n) {
+    if (round.parts[n] == 1) continue;
+    const std::uint32_t k = round.near[n];
+    const auto [a, b] = work.bodiesOf[k];
     bool yieldsA = canYield(dynamics, a, work), yieldsB = canYield(dynamics, b, work);
     if (!yieldsA && !yieldsB) {
       yieldsA = isTakenInto(a, b, work);
       yieldsB = isTakenInto(b, a, work);
     }
-    const double part = toNothing ? 0 : round.parts[k];
+    const double part = toNothing ? 0 : round.parts[n];
     if (yieldsA) round.least[a] = std::min(round.least[a], part);
     if (yieldsB) round.least[b] = std::min(round.least[b], part);
-    if (!yieldsA && !yieldsB) round.squeezed.emplace_back(pair.key.a, pair.key.b);
+    if (!yieldsA && !yieldsB) round.squeezed.emplace_back(work.solids[a], work.solids[b]);
   }
   bool any = false;
   for (std::uint32_t i = 0; i < work.bodies.size(); ++i) {
@@ -207,8 +263,7 @@ void proveWays(const Dynamics& dynamics, double seconds, StepWork& work) {
   work.closing.assign(work.active.size(), 0);
   findPassages(dynamics, work);
   findCarried(dynamics, seconds, work);
-  Round round;
-  round.open.assign(work.bodies.size(), 1);
+  Round round = firstRound(dynamics, work);
   // Each round but the last shortens a way, after kPartialRounds to nothing, or drops one.
   const std::size_t bound = 2 * work.bodies.size() + kPartialRounds + 1;
   bool any = true;
