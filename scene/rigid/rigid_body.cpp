@@ -12,10 +12,21 @@ namespace {
 
 constexpr int kNewtonSteps = 3;
 
-Mat3 crossMatrix(const Vec3& v) {
-  Mat3 m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
+/// x for which x0 c0 + x1 c1 + x2 c2 = f, by Cramer's rule.
+Vec3 solved(const Vec3& c0, const Vec3& c1, const Vec3& c2, const Vec3& f) {
+  const Vec3 across = c1.cross(c2);
+  return Vec3(f.dot(across), f.dot(c2.cross(c0)), f.dot(c0.cross(c1))) / c0.dot(across);
+}
+
+/// Newton's step: f(spin), by the inverse of its slope.
+Vec3 newtonStep(const Mat3& inertia, const Vec3& before, const Vec3& spin, double seconds) {
+  const Vec3 momentum = inertia * spin;
+  const Vec3 f = inertia * (spin - before) + seconds * spin.cross(momentum);
+  const auto slope = [&](int k) {
+    const Vec3 column = inertia.col(k);
+    return Vec3(column + seconds * (spin.cross(column) - momentum.cross(Vec3::Unit(k))));
+  };
+  return solved(slope(0), slope(1), slope(2), f);
 }
 
 }  // namespace
@@ -45,13 +56,7 @@ void bendSpin(RigidBody& body, double seconds) {
   const Mat3 rotation = body.rotation.toRotationMatrix();
   const Vec3 before = rotation.transpose() * body.spin;
   Vec3 spin = before;
-  for (int i = 0; i < kNewtonSteps; ++i) {
-    const Vec3 momentum = body.inertia * spin;
-    const Vec3 f = body.inertia * (spin - before) + seconds * spin.cross(momentum);
-    const Mat3 slope =
-        body.inertia + seconds * (crossMatrix(spin) * body.inertia - crossMatrix(momentum));
-    spin -= slope.inverse() * f;
-  }
+  for (int i = 0; i < kNewtonSteps; ++i) spin -= newtonStep(body.inertia, before, spin, seconds);
   const double energy = before.dot(body.inertia * before), after = spin.dot(body.inertia * spin);
   if (!(after <= energy))
     spin = std::isfinite(after) ? Vec3(std::sqrt(energy / after) * spin) : before;

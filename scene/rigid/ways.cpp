@@ -11,7 +11,7 @@ constexpr std::size_t kBodyBlock = 32;  // bodies that a thread takes at a time
 constexpr double kMore = 1 + 0x1p-40;   // above what a few roundings lose
 /// Of their distance: pairs that close in by less, by a crude bound, are not looked at. The cruder,
 /// the sooner they have to be looked at again.
-constexpr double kFar = 0.5;
+constexpr double kFar = 0.1;
 constexpr int kPartialRounds = 4;       // then who is in the way does not move at all
 
 Passage passageOf(const Solid& solid, const RigidBody& goal) {

@@ -18,7 +18,7 @@ constexpr double kWallThickness = 0.1;
 /// Metres that a part may go in a tick beyond what its own speed has it.
 constexpr double kSpareReach = 5e-3;
 constexpr std::size_t kBoxBlock = 32;  // parts that a thread takes at a time
-constexpr double kSpareBox = 2e-3;     // metres: a box that is asked for may come to lie so far out
+constexpr double kSpareBox = 8e-3;     // metres: a box that is asked for may come to lie so far out
 
 std::vector<Vec3> boxCorners(const Vec3& half) {
   std::vector<Vec3> corners;
@@ -193,20 +193,30 @@ void Feeder::moveBoxes(double lookout) {
   broadPhase_.update();
 }
 
+/// Parts after part `i` that it may meet.
+void Feeder::findMet(std::size_t i, double lookout) {
+  met_[i].clear();
+  for (const auto& partner : broadPhase_.partners(movers_[i - 1])) {
+    const std::uint32_t other = solidOfMover_[partner.id];
+    if (other > i && scene::mayMeet(dynamics_.solids[i], dynamics_.solids[other], lookout))
+      met_[i].push_back(other);
+  }
+}
+
 void Feeder::findPairs() {
   const double lookout = 2 * settings_.solver.epsilon;
   moveBoxes(lookout);
-  std::vector<scene::PartPairKey> keys;
   const std::uint32_t size = static_cast<std::uint32_t>(dynamics_.solids.size());
+  std::vector<scene::PartPairKey> keys;
   for (std::uint32_t i = 1; i < size; ++i)
     for (const auto& partner : broadPhase_.partners(movers_[i - 1]))
       if (solidOfMover_[partner.id] == 0) keys.push_back({0, i, partOfMover_[partner.id], 0});
+  met_.resize(size);
+  workers_.share(size, kBoxBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = std::max(from, std::size_t{1}); i < to; ++i) findMet(i, lookout);
+  });
   for (std::uint32_t i = 1; i < size; ++i)
-    for (const auto& partner : broadPhase_.partners(movers_[i - 1])) {
-      const std::uint32_t other = solidOfMover_[partner.id];
-      if (other > i && scene::mayMeet(dynamics_.solids[i], dynamics_.solids[other], lookout))
-        keys.push_back({i, other, 0, 0});
-    }
+    for (const std::uint32_t other : met_[i]) keys.push_back({i, other, 0, 0});
   if (!std::is_sorted(keys.begin(), keys.end())) std::sort(keys.begin(), keys.end());
   scene::setPairs(dynamics_, keys);
 }
