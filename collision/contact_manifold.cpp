@@ -77,17 +77,25 @@ Vec3 worldVertex(const ConvexBody& body, std::uint32_t i) {
 /// A body, seen along the contact's normal.
 struct Seen {
   const ConvexBody& body;
-  const ContactFrame& frame;
   std::span<const Vec3> normals;  ///< of its faces, unit, body's frame; or none
+  Vec3 x, y, z;                   ///< the contact's axes in the body's frame
+  Vec3 at;                        ///< the body's origin in the contact's frame
   Vec3 outwards;                  ///< towards the other body, body's frame
 
   /// `sense` 1: along the normal (A), -1: against it (B).
-  Seen(const ConvexBody& b, const ContactFrame& f, std::span<const Vec3> n, double sense)
-      : body(b), frame(f), normals(n) {
-    outwards = sense * f.normal;
-    if (b.rotation) outwards = b.rotation->transpose() * outwards;
+  Seen(const ConvexBody& b, const ContactFrame& frame, std::span<const Vec3> n, double sense)
+      : body(b), normals(n), x(frame.x), y(frame.y), z(frame.normal) {
+    if (b.rotation) {
+      const auto bodyFromWorld = b.rotation->transpose();
+      x = bodyFromWorld * x, y = bodyFromWorld * y, z = bodyFromWorld * z;
+    }
+    at = frame.inFrame(b.translation);
+    outwards = sense * z;
   }
-  Vec3 corner(std::uint32_t i) const { return frame.inFrame(worldVertex(body, i)); }
+  Vec3 corner(std::uint32_t i) const {
+    const Vec3& v = body.vertices[i];
+    return {v.dot(x) + at.x(), v.dot(y) + at.y(), v.dot(z) + at.z()};
+  }
 };
 
 std::uint32_t supportVertex(const Seen& seen) {
@@ -170,12 +178,15 @@ Feature clippedByEdge(const Feature& subject, const Vec3& from, const Vec3& to, 
   const Vec3 edge = to - from;
   const double slack = rounding * std::sqrt(dot(edge, edge));
   const auto left = [&](const Vec3& p) { return cross(edge, p - from) + slack; };
+  double at = subject.size > 0 ? left(subject.corners[0]) : 0;
+  const double first = at;
   for (std::size_t i = 0; i < subject.size; ++i) {
     const Vec3 &here = subject.corners[i], &next = subject.next(i);
-    const double at = left(here), after = left(next);
+    const double after = i + 1 == subject.size ? first : left(next);
     if (at >= 0) kept.add(here);
     const bool last = subject.size == 2 && i == 1;  // a segment goes there, but not back
     if (!last && (at >= 0) != (after >= 0)) kept.add(here + at / (at - after) * (next - here));
+    at = after;
   }
   return kept;
 }
@@ -222,60 +233,61 @@ Feature clipped(const Feature& subject, Feature other, double rounding) {
 
 // ---- step 3 ------------------------------------------------------------------------------------
 
-/// The depth of a feature above or below a point of the projection.
-double depthAt(const Feature& feature, const Vec3& at) {
-  const auto begin = feature.corners.begin(), end = begin + feature.size;
-  const auto byDepth = [](const Vec3& a, const Vec3& b) { return a.z() < b.z(); };
-  const auto [least, most] = std::minmax_element(begin, end, byDepth);
-  double depth = feature.corners[0].z();
-  if (feature.size == 2) {
-    const Vec3 along = feature.corners[1] - feature.corners[0];
-    const double squared = dot(along, along);
-    if (squared > 0) depth += dot(at - feature.corners[0], along) / squared * along.z();
-  } else if (feature.size > 2) {
-    Vec3 normal = Vec3::Zero();
-    for (std::size_t i = 1; i + 1 < feature.size; ++i)
-      normal += (feature.corners[i] - feature.corners[0])
-                    .cross(feature.corners[i + 1] - feature.corners[0]);
-    const Vec3 away = at - feature.corners[0];
-    if (normal.z() != 0) depth -= dot(away, normal) / normal.z();
+/// The depth of a feature above or below points of the projection.
+class Depths {
+ public:
+  explicit Depths(const Feature& feature) : size_(feature.size), first_(feature.corners[0]) {
+    for (std::size_t i = 0; i < size_; ++i) {
+      least_ = std::min(least_, feature.corners[i].z());
+      most_ = std::max(most_, feature.corners[i].z());
+    }
+    if (size_ == 2) normal_ = feature.corners[1] - first_;
+    for (std::size_t i = 1; i + 1 < size_; ++i)
+      normal_ += (feature.corners[i] - first_).cross(feature.corners[i + 1] - first_);
   }
-  return std::clamp(depth, least->z(), most->z());  // no plane is trusted beyond its corners
-}
+  double at(const Vec3& point) const {
+    const Vec3 away = point - first_;
+    double depth = first_.z();
+    if (size_ == 2) {
+      const double squared = dot(normal_, normal_);
+      if (squared > 0) depth += dot(away, normal_) / squared * normal_.z();
+    } else if (size_ > 2 && normal_.z() != 0) {
+      depth -= dot(away, normal_) / normal_.z();
+    }
+    return std::clamp(depth, least_, most_);  // no plane is trusted beyond its corners
+  }
+
+ private:
+  std::size_t size_;
+  Vec3 first_;
+  Vec3 normal_ = Vec3::Zero();  ///< of the plane, any length; of an edge: along it
+  double least_ = std::numeric_limits<double>::infinity();
+  double most_ = -std::numeric_limits<double>::infinity();
+};
 
 // ---- step 4 ------------------------------------------------------------------------------------
+
+constexpr double kApart = std::numeric_limits<double>::infinity();
 
 /// A point that may stay. (No initial values: most are never written.)
 struct Candidate {
   Vec3 pointA, pointB;
   double separation;
+  double spread;  ///< squared distance from the nearest that stays
 };
 
-double spread(const ContactManifold& manifold, const Candidate& point) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const ContactPoint& kept : manifold.list())
-    least = std::min(least, (kept.pointA - point.pointA).squaredNorm());
-  return least;
-}
-
-void keepMostSpread(std::span<const Candidate> points, std::size_t most,
-                    ContactManifold& manifold) {
+void keepMostSpread(std::span<Candidate> points, std::size_t most, ContactManifold& manifold) {
   if (points.empty()) return;
-  const auto keep = [&](const Candidate& point) {
-    manifold.points[manifold.size++] = {point.pointA, point.pointB, point.separation};
+  const auto keep = [&](const Candidate& kept) {
+    manifold.points[manifold.size++] = {kept.pointA, kept.pointB, kept.separation};
+    for (Candidate& point : points)
+      point.spread = std::min(point.spread, (kept.pointA - point.pointA).squaredNorm());
   };
-  keep(*std::min_element(points.begin(), points.end(), [](const Candidate& a, const Candidate& b) {
-    return a.separation < b.separation;
-  }));
+  keep(*std::ranges::min_element(points, {}, &Candidate::separation));
   while (manifold.size < std::min(most, ContactManifold::kMostPoints)) {
-    const Candidate* farthest = nullptr;
-    double distance = 0;
-    for (const Candidate& point : points) {
-      const double d = spread(manifold, point);
-      if (d > distance) distance = d, farthest = &point;
-    }
-    if (!farthest) return;
-    keep(*farthest);
+    const Candidate& farthest = *std::ranges::max_element(points, {}, &Candidate::spread);
+    if (!(farthest.spread > 0)) return;
+    keep(farthest);
   }
 }
 
@@ -306,17 +318,18 @@ ContactManifold contactManifold(const ConvexBody& a, const ConvexBody& b, const 
   const bool fromA = onA.size == 1 || (onB.size > 1 && (onA.size == 2 || onB.size > 2));
   const Feature overlap = fromA ? clipped(onA, onB, rounding) : clipped(onB, onA, rounding);
 
+  const Depths depths(fromA ? onB : onA);
   std::array<Candidate, kMostCorners> points;
   std::size_t count = 0;
   for (std::size_t i = 0; i < overlap.size; ++i) {
     Vec3 pointA = overlap.corners[i], pointB = pointA;
-    (fromA ? pointB : pointA).z() = fromA ? depthAt(onB, pointA) : depthAt(onA, pointB);
+    (fromA ? pointB : pointA).z() = depths.at(overlap.corners[i]);
     const double separation = pointB.z() - pointA.z();
     if (separation <= seed.limit + 2 * rounding)
-      points[count++] = {frame.inWorld(pointA), frame.inWorld(pointB), separation};
+      points[count++] = {frame.inWorld(pointA), frame.inWorld(pointB), separation, kApart};
   }
   manifold.overlap = count > 0;
-  if (count == 0) points[count++] = {seed.pointA, seed.pointB, nearest};
+  if (count == 0) points[count++] = {seed.pointA, seed.pointB, nearest, kApart};
   keepMostSpread({points.data(), count}, seed.most, manifold);
   return manifold;
 }
