@@ -77,6 +77,7 @@ std::uint8_t lookAt(const Dynamics& dynamics, const StepWork& work, NearPair& pa
   }
   const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
   if (look(pair, a, b, step)) flags |= StepWork::kAsked;
+  if (leans(pair, step.epsilon)) flags |= StepWork::kLeans;
   const bool sleeper = (a.isFree() && a.asleep) || (b.isFree() && b.asleep);
   if (sleeper && comesToLean(pair, a, b, step)) flags |= StepWork::kWakes;
   return flags;
@@ -87,7 +88,7 @@ bool takeLook(Dynamics& dynamics, const NearPair& pair, std::uint8_t& flags, Ste
   if ((flags & StepWork::kAsked) != 0) ++work.report.looks;
   work.report.deepest = std::max(work.report.deepest, pair.penetration());
   const bool wakes = (flags & StepWork::kWakes) != 0;
-  flags = StepWork::kActive;
+  flags &= StepWork::kActive | StepWork::kLeans;
   if (!wakes) return false;
   Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
   wake(a.isFree() && a.asleep ? a : b);
@@ -159,7 +160,7 @@ void gatherBodies(const Dynamics& dynamics, StepWork& work) {
   }
 }
 
-void gatherPatches(const Dynamics& dynamics, double epsilon, StepWork& work) {
+void gatherPatches(const Dynamics& dynamics, StepWork& work) {
   work.patches.resize(work.patched.size());
   work.workers.share(work.patched.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t k = from; k < to; ++k) {
@@ -170,7 +171,7 @@ void gatherPatches(const Dynamics& dynamics, double epsilon, StepWork& work) {
     }
   });
   for (const std::uint32_t i : work.patched)
-    if (leans(dynamics.pairs[i], epsilon)) ++work.report.leaning;
+    if (work.leans(i)) ++work.report.leaning;
   work.report.patches = static_cast<std::uint32_t>(work.patches.size());
 }
 
@@ -232,12 +233,12 @@ void setOut(Dynamics& dynamics, StepWork& work) {
 
 // ---- step 4 ------------------------------------------------------------------------------------
 
-Islands findIslands(const Dynamics& dynamics, double epsilon, const StepWork& work) {
+Islands findIslands(const Dynamics& dynamics, const StepWork& work) {
   Islands islands(dynamics.solids.size());
   for (const std::uint32_t i : work.patched) {
     const NearPair& pair = dynamics.pairs[i];
     if (!dynamics.solids[pair.key.a].isAwake() || !dynamics.solids[pair.key.b].isAwake()) continue;
-    if (leans(pair, epsilon)) islands.join(pair.key.a, pair.key.b);
+    if (work.leans(i)) islands.join(pair.key.a, pair.key.b);
   }
   for (const Joint& joint : dynamics.joints)
     if (dynamics.solids[joint.a].isAwake() && dynamics.solids[joint.b].isAwake())
@@ -245,21 +246,20 @@ Islands findIslands(const Dynamics& dynamics, double epsilon, const StepWork& wo
   return islands;
 }
 
-std::vector<std::uint8_t> whoLeansOnRestless(const Dynamics& dynamics, const DynamicsStep& settings,
-                                             const StepWork& work) {
+std::vector<std::uint8_t> whoLeansOnRestless(const Dynamics& dynamics, const StepWork& work) {
   std::vector<std::uint8_t> restless(dynamics.solids.size(), 0);
   for (const std::uint32_t i : work.patched) {
     const NearPair& pair = dynamics.pairs[i];
     const bool a = dynamics.solids[pair.key.a].restless, b = dynamics.solids[pair.key.b].restless;
-    if ((!a && !b) || !leans(pair, settings.solver.epsilon)) continue;
+    if ((!a && !b) || !work.leans(i)) continue;
     restless[a ? pair.key.b : pair.key.a] = 1;
   }
   return restless;
 }
 
 void rest(Dynamics& dynamics, const DynamicsStep& settings, StepWork& work) {
-  Islands islands = findIslands(dynamics, settings.solver.epsilon, work);
-  const std::vector<std::uint8_t> restless = whoLeansOnRestless(dynamics, settings, work);
+  Islands islands = findIslands(dynamics, work);
+  const std::vector<std::uint8_t> restless = whoLeansOnRestless(dynamics, work);
   std::vector<double> calm(dynamics.solids.size(), settings.rest.calmFor);
   for (std::uint32_t i = 0; i < dynamics.solids.size(); ++i) {
     Solid& solid = dynamics.solids[i];
@@ -307,7 +307,7 @@ DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings) {
   StepWork work(settings.workers ? *settings.workers : alone);
   findPatches(dynamics, nearStep(settings), work);
   gatherBodies(dynamics, work);
-  gatherPatches(dynamics, settings.solver.epsilon, work);
+  gatherPatches(dynamics, work);
   gatherJoints(dynamics, work);
   solve(work.bodies, work.patches, work.joints, work.driven, settings.solver, work.workers);
   keepImpulses(dynamics, work);

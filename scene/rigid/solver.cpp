@@ -351,15 +351,18 @@ void keepLane(const System& system, const PatchBlock& block, std::size_t lane,
   patch.twist = rub.twist[lane];
 }
 
-void keep(const System& system, std::span<RigidBody> bodies, std::span<ContactPatch> patches) {
+void keep(const System& system, std::span<RigidBody> bodies, std::span<ContactPatch> patches,
+          Workers& workers) {
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     bodies[i].velocity = system.movers[i].velocity;
     bodies[i].spin = system.movers[i].spin;
   }
-  for (const PatchBlock& block : system.blocks)
-    for (std::size_t lane = 0; lane < kLanes; ++lane)
-      if (block.patches[lane] != kNoPatch)
-        keepLane(system, block, lane, patches[block.patches[lane]]);
+  workers.share(system.blocks.size(), kPatchBlock, [&](std::size_t from, std::size_t to) {
+    for (const PatchBlock& block : system.blocks.subspan(from, to - from))
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        if (block.patches[lane] != kNoPatch)
+          keepLane(system, block, lane, patches[block.patches[lane]]);
+  });
 }
 
 }  // namespace
@@ -379,7 +382,7 @@ void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::sp
     substep(system, bodies, joints, step, workers);
   }
   bounce(system, step);
-  keep(system, bodies, patches);
+  keep(system, bodies, patches, workers);
 }
 
 }  // namespace enfilade::scene

@@ -226,6 +226,14 @@ bool isTakenInto(std::uint32_t body, std::uint32_t other, const StepWork& work) 
   return carrier != kNoPlace && carrier != other && work.carried[other].by != carrier;
 }
 
+/// Its way becomes a part of what it was; one that had none left loses its carrier.
+void giveWay(const Dynamics& dynamics, std::uint32_t body, double part, StepWork& work) {
+  const bool goesOn = work.fractions[body] > 0;
+  if (goesOn) shorten(body, part, work);
+  const double leash = dynamics.solids[work.solids[body]].leash;
+  if (!goesOn || lengthOf(work.passages[body]) > leash) drop(dynamics, body, work);
+}
+
 /// Shortens the ways of all whose pairs are not proved clear. Returns whether any was.
 bool shortenAll(const Dynamics& dynamics, bool toNothing, StepWork& work, Round& round) {
   round.least.assign(work.bodies.size(), 1);
@@ -243,17 +251,13 @@ bool shortenAll(const Dynamics& dynamics, bool toNothing, StepWork& work, Round&
     if (yieldsB) round.least[b] = std::min(round.least[b], part);
     if (!yieldsA && !yieldsB) round.squeezed.emplace_back(work.solids[a], work.solids[b]);
   }
-  bool any = false;
-  for (std::uint32_t i = 0; i < work.bodies.size(); ++i) {
-    round.open[i] = round.least[i] < 1;
-    if (!round.open[i]) continue;
-    const bool goesOn = work.fractions[i] > 0;
-    if (goesOn) shorten(i, round.least[i], work);
-    const double leash = dynamics.solids[work.solids[i]].leash;
-    if (!goesOn || lengthOf(work.passages[i]) > leash) drop(dynamics, i, work);
-    any = true;
-  }
-  return any;
+  work.workers.share(work.bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      round.open[i] = round.least[i] < 1;
+      if (round.open[i]) giveWay(dynamics, static_cast<std::uint32_t>(i), round.least[i], work);
+    }
+  });
+  return std::ranges::find(round.open, 1) != round.open.end();
 }
 
 }  // namespace
