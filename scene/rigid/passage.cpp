@@ -67,6 +67,7 @@ ConvexBody placed(const PartShape& part, const Passage& p, bool atEnd) {
 struct Known {
   FeatureCache cache;
   double apart = 0;  ///< metres, proved; 0: not separated
+  double along = 0;  ///< the same, along the axis of `cache`
 };
 
 struct Search {
@@ -76,18 +77,20 @@ struct Search {
 
   /// Separated at the end, and by how much?
   Known ask(const Passage& a, const Passage& b, bool atEnd, const FeatureCache& hint) {
-    Known known{hint, 0};
+    Known known{hint, 0, 0};
     const collision::Decision decision =
         collision::decide(placed(partA, a, atEnd), placed(partB, b, atEnd), known.cache);
     ++queries;
     if (decision.verdict == Verdict::separated)
-      known.apart = decision.distance - decision.errorBound;
+      known.apart = known.along = decision.distance - decision.errorBound;
     return known;
   }
-  /// The gap along the axis of `known`, at the end or the start.
-  double along(const Passage& a, const Passage& b, bool atEnd, const Known& known) const {
-    return collision::provedSeparation(placed(partA, a, atEnd), placed(partB, b, atEnd),
-                                       known.cache);
+  /// The gap along the axis of `cache`, at the end or the start.
+  double along(const Passage& a, const Passage& b, bool atEnd, const FeatureCache& cache) const {
+    if (cache.axis.isZero(0)) return 0;
+    return collision::gapAlong(placed(partA, a, atEnd), placed(partB, b, atEnd),
+                               cache.axis.stableNormalized())
+        .proved;
   }
 };
 
@@ -104,8 +107,8 @@ bool provedClear(const Search& search, const Passage& a, const Passage& b, const
   const double moves = closingOf(a, b);
   if (moves < start.apart || moves < end.apart) return true;
   const double bulge = bulgeOf(a) + bulgeOf(b);
-  return planeParts(start.apart, search.along(a, b, true, start), bulge) ||
-         planeParts(search.along(a, b, false, end), end.apart, bulge);
+  return planeParts(start.along, search.along(a, b, true, start.cache), bulge) ||
+         planeParts(search.along(a, b, false, end.cache), end.along, bulge);
 }
 
 /// The part of the way that is proved clear. The end's answer is not known to be separated.
@@ -236,9 +239,10 @@ bool separatedAtEnd(const PartShape& partA, const Passage& a, const PartShape& p
 }
 
 Clearance clearance(const PartShape& partA, const Passage& a, const PartShape& partB,
-                    const Passage& b, const FeatureCache& cache) {
+                    const Passage& b, const FeatureCache& cache, double apart) {
   Search search{partA, partB};
-  const Known start = search.ask(a, b, false, cache);
+  Known start{cache, apart, search.along(a, b, false, cache)};
+  if (!(apart > 0)) start = search.ask(a, b, false, cache);
   if (!(start.apart > 0)) return {0, search.queries};
   const Known end = search.ask(a, b, true, start.cache);
   const double fraction = clearPart(search, a, b, start, end, kMostHalvings);

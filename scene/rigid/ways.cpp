@@ -35,7 +35,8 @@ double clearFraction(const Dynamics& dynamics, const NearPair& pair, double clos
                      const StepWork& work, std::uint8_t& proof) {
   if (pair.verdict != collision::Verdict::separated) return 1;
   const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
-  if (closing < apartNow(pair, a, b)) return 1;
+  const double apart = apartNow(pair, a, b);
+  if (closing < apart) return 1;
   const Passage& wayA = work.passages[work.local[pair.key.a]];
   const Passage& wayB = work.passages[work.local[pair.key.b]];
   const PartShape partA = shapeOf(a, pair.key.partA), partB = shapeOf(b, pair.key.partB);
@@ -44,7 +45,7 @@ double clearFraction(const Dynamics& dynamics, const NearPair& pair, double clos
   proof = 1;
   // Where they end in one another, the plane that the solver kept them on is as good as any.
   if (along > 0 && !separatedAtEnd(partA, wayA, partB, wayB, pair.features())) return along;
-  return clearance(partA, wayA, partB, wayB, pair.features()).fraction;
+  return clearance(partA, wayA, partB, wayB, pair.features(), apart).fraction;
 }
 
 /// Who would go farther than its leash goes less far; its speed is its own.
