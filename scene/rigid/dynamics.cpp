@@ -20,6 +20,8 @@
 namespace enfilade::scene {
 namespace {
 
+constexpr std::size_t kAskedAhead = 4;  // pairs
+
 NearPairStep nearStep(const DynamicsStep& settings) {
   return {settings.solver.seconds, settings.solver.gravity, settings.solver.epsilon};
 }
@@ -103,6 +105,13 @@ void wakeJointed(Dynamics& dynamics) {
   }
 }
 
+/// Asks the memory for what is known of a pair that may lean: such lie all over it.
+void askFor(const NearPair& pair) {
+  if (!pair.hasPatch) return;
+  const auto* bytes = reinterpret_cast<const char*>(pair.close.get());
+  for (std::size_t i = 0; i < sizeof(CloseUp); i += 64) __builtin_prefetch(bytes + i);
+}
+
 void findPatches(Dynamics& dynamics, const NearPairStep& step, StepWork& work) {
   wakeJointed(dynamics);
   std::vector<NearPair>& pairs = dynamics.pairs;
@@ -112,8 +121,10 @@ void findPatches(Dynamics& dynamics, const NearPairStep& step, StepWork& work) {
   for (std::size_t round = 0; round <= dynamics.solids.size(); ++round) {
     findPaces(dynamics, work);
     work.workers.share(pairs.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
-      for (std::size_t i = from; i < to; ++i)
+      for (std::size_t i = from; i < to; ++i) {
+        if (i + kAskedAhead < to) askFor(pairs[i + kAskedAhead]);
         if (isNew[i]) work.looks[i] = lookAt(dynamics, work, pairs[i], step);
+      }
     });
     bool woken = false;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -225,10 +236,12 @@ void setOut(Dynamics& dynamics, StepWork& work) {
     solid.odometer += lengthOf(way);
     placeSolid(solid);
   }
-  for (std::size_t k = 0; k < work.active.size(); ++k) {
-    double& apart = dynamics.pairs[work.active[k]].apart;
-    apart -= work.closing[k] + 0x1p-51 * (std::abs(apart) + work.closing[k]);
-  }
+  work.workers.share(work.active.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; k < to; ++k) {
+      double& apart = dynamics.pairs[work.active[k]].apart;
+      apart -= work.closing[k] + 0x1p-51 * (std::abs(apart) + work.closing[k]);
+    }
+  });
 }
 
 // ---- step 4 ------------------------------------------------------------------------------------

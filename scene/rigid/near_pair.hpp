@@ -66,7 +66,8 @@ struct NearPairStep {
 /// Returns whether the narrow phase was asked.
 bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step);
 
-/// A lower bound of the distance by what was known; may be negative. `moved`: Solid::jumped of both.
+/// A lower bound of the distance by what was known; may be negative. `moved`: Solid::jumped of
+/// both.
 inline double apartNow(const NearPair& pair, double moved) {
   const double rounding = 0x1p-51 * (moved + pair.since + std::abs(pair.apart));
   return pair.apart - (moved - pair.since) - rounding;
@@ -75,8 +76,8 @@ inline double apartNow(const NearPair& pair, const Solid& a, const Solid& b) {
   return apartNow(pair, a.jumped + b.jumped);
 }
 
-/// What most pairs need to know of a solid, since they are far from one another: little, and side by
-/// side.
+/// What most pairs need to know of a solid, since they are far from one another: little, and side
+/// by side.
 struct Pace {
   double speed = 0;   ///< m/s beside a velocity that is the same for all: no point goes faster
   double jumped = 0;  ///< Solid's

@@ -63,8 +63,8 @@ struct Clearance {
 inline constexpr int kMostHalvings = 6;
 
 /// How far both parts can go, both at the same part of their ways, with the bodies separated all
-/// the way. `cache`: of decide() at the start or before. `apart`: metres by which they are proved to
-/// be apart at the start; 0 where that has to be found out.
+/// the way. `cache`: of decide() at the start or before. `apart`: metres by which they are proved
+/// to be apart at the start; 0 where that has to be found out.
 Clearance clearance(const PartShape& partA, const Passage& a, const PartShape& partB,
                     const Passage& b, const collision::FeatureCache& cache, double apart = 0);
 

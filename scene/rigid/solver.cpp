@@ -196,8 +196,7 @@ void warmStart(System& system, std::span<const Joint> joints, Workers& workers) 
   return choose(none < room, -room / seconds, choose(none < lacking, back, none));
 }
 
-[[gnu::always_inline]] inline void partBlock(const PatchBlock& block, bool begins,
-                                             System& system) {
+[[gnu::always_inline]] inline void partBlock(const PatchBlock& block, bool begins, System& system) {
   const Motions going = gathered(block, system);
   Motions m = gatheredPartings(block, system);
   for (PointBlock& point : pointsOf(block, system)) {

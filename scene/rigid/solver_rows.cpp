@@ -159,9 +159,8 @@ void layOut(std::span<const ContactPatch> patches, System& system, Workers& work
   std::uint32_t block = 0;
   from = 0;
   for (std::size_t i = 0; i < colouring.ends.size(); ++i) {
-    layOutColour(patches, kinds,
-                 std::span(colouring.order).subspan(from, colouring.ends[i] - from), mostOf(i),
-                 system.blocks.subspan(block, system.colours[i] - block));
+    layOutColour(patches, kinds, std::span(colouring.order).subspan(from, colouring.ends[i] - from),
+                 mostOf(i), system.blocks.subspan(block, system.colours[i] - block));
     block = system.colours[i];
     from = colouring.ends[i];
   }

@@ -33,7 +33,7 @@ struct StepWork {
   Workers& workers;
   DynamicsReport report;
   static constexpr std::uint8_t kActive = 1, kAsked = 2, kWakes = 4, kLeans = 8;
-  std::vector<std::uint8_t> looks;     ///< of each pair, these flags
+  std::vector<std::uint8_t> looks;  ///< of each pair, these flags
   bool leans(std::uint32_t pair) const { return (looks[pair] & kLeans) != 0; }
   std::vector<std::uint32_t> active;   ///< indices of pairs that were looked at or may matter
   std::vector<PairBodies> bodiesOf;    ///< of each of `active`

@@ -12,7 +12,7 @@ constexpr double kMore = 1 + 0x1p-40;   // above what a few roundings lose
 /// Of their distance: pairs that close in by less, by a crude bound, are not looked at. The cruder,
 /// the sooner they have to be looked at again.
 constexpr double kFar = 0.1;
-constexpr int kPartialRounds = 4;       // then who is in the way does not move at all
+constexpr int kPartialRounds = 4;  // then who is in the way does not move at all
 
 Passage passageOf(const Solid& solid, const RigidBody& goal) {
   Passage passage = standing(solid);
@@ -22,7 +22,8 @@ Passage passageOf(const Solid& solid, const RigidBody& goal) {
   return passage;
 }
 
-/// Metres that no point of it goes farther beside `shift`: on its way, and however it is shortened.
+/// Metres that no point of it goes farther beside `shift`: on its way, or shortened beside its
+/// carrier's.
 double widthOf(const Passage& way, const Carry& carry, const Vec3& shift) {
   const double goes = (way.toCentre - way.fromCentre - shift).norm();
   const double stays = (carry.shift - shift).norm();
@@ -119,13 +120,13 @@ void findPassages(const Dynamics& dynamics, StepWork& work) {
 
 /// What the rounds of proofs find.
 struct Round {
-  std::vector<std::uint8_t> open;   ///< of each of `bodies`: its way is new
-  std::vector<double> least;        ///< of each of `bodies`, of the parts of its pairs
-  Vec3 shift = Vec3::Zero();        ///< about how all go
-  std::vector<double> widths;       ///< of each of `bodies`: bounds of widthOf()
-  std::vector<double> jumped;       ///< of each of `bodies`: Solid's
-  std::vector<std::uint32_t> near;  ///< of `active`: those whose bodies' widths do not clear them
-  std::vector<double> parts;        ///< of each of `near`: of the ways as they are, proved
+  std::vector<std::uint8_t> open;    ///< of each of `bodies`: its way is new
+  std::vector<double> least;         ///< of each of `bodies`, of the parts of its pairs
+  Vec3 shift = Vec3::Zero();         ///< about how all go
+  std::vector<double> widths;        ///< of each of `bodies`: bounds of widthOf()
+  std::vector<double> jumped;        ///< of each of `bodies`: Solid's
+  std::vector<std::uint32_t> near;   ///< of `active`: those whose bodies' widths do not clear them
+  std::vector<double> parts;         ///< of each of `near`: of the ways as they are, proved
   std::vector<std::uint8_t> proofs;  ///< of each of `near`: the narrow phase was asked
   /// Solids of which neither could be kept from the other.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> squeezed;
@@ -149,7 +150,9 @@ bool widen(const StepWork& work, Round& round) {
   for (std::size_t i = 0; i < work.bodies.size(); ++i) {
     if (!round.open[i]) continue;
     const double width = widthOf(work.passages[i], work.carried[i], round.shift);
-    if (width > round.widths[i]) round.widths[i] = width, any = true;
+    if (width <= round.widths[i]) continue;
+    round.widths[i] = width;  // also one that is no number: nothing is clear of it
+    any = true;
   }
   return any;
 }

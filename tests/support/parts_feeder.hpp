@@ -91,8 +91,8 @@ class Feeder {
   collision::SortAndSweep broadPhase_;
   std::vector<collision::MoverId> movers_;  ///< of the parts
   std::vector<collision::ExtremalVertices> extremes_;
-  std::vector<collision::Box> boxes_;   ///< of the parts, as the broad phase has them
-  std::vector<collision::Box> needed_;  ///< of the parts, in this tick
+  std::vector<collision::Box> boxes_;            ///< of the parts, as the broad phase has them
+  std::vector<collision::Box> needed_;           ///< of the parts, in this tick
   std::vector<std::vector<std::uint32_t>> met_;  ///< of each part: those after it that it may meet
   std::vector<std::uint32_t> solidOfMover_, partOfMover_;
   double time_ = 0;
