@@ -102,6 +102,7 @@ void fillBlock(std::span<const ContactPatch> patches, PatchBlock& block, System&
     block.a.movers[lane] = block.b.movers[lane] = nobody;
     if (block.patches[lane] == kNoPatch) continue;
     const ContactPatch& patch = patches[block.patches[lane]];
+    if (patch.size == 0) continue;
     fillLane(patch, lane, block, system);
     block.idle &= isIdle(patch);
   }
@@ -109,7 +110,7 @@ void fillBlock(std::span<const ContactPatch> patches, PatchBlock& block, System&
 
 /// Which patches go side by side: those that push, then those that do not yet, and of each those
 /// with most points first.
-constexpr std::uint8_t kKinds = 2 * ContactPatch::kMostPoints;
+constexpr std::uint8_t kLastKind = 2 * ContactPatch::kMostPoints;
 std::uint8_t kindOf(const ContactPatch& patch) {
   return static_cast<std::uint8_t>((isIdle(patch) ? 2 : 1) * ContactPatch::kMostPoints -
                                    patch.size);
@@ -130,7 +131,7 @@ void layOutColour(std::span<const ContactPatch> patches, std::span<const std::ui
     for (const std::uint32_t patch : colour) add(patch);
     return;
   }
-  for (std::uint8_t kind = 0; kind < kKinds; ++kind)
+  for (std::uint8_t kind = 0; kind <= kLastKind; ++kind)
     for (const std::uint32_t patch : colour)
       if (kinds[patch] == kind) add(patch);
 }

@@ -443,5 +443,20 @@ TEST(SolverTwin, FourPatchesInWideRegistersEndAsOneAfterAnother) {
   compareWithTwin(true);
 }
 
+TEST(SolverTwin, APatchWithoutPointsDoesNothing) {
+  SolverStep step;
+  Heap heap = HeapMaker(1).make(40, 150, 6, step), more = heap;
+  for (std::uint32_t i = 2; i < 30; ++i) {
+    ContactPatch none;
+    none.a = i, none.b = i + 1, none.friction = 0.5;
+    more.patches.push_back(none);
+  }
+  for (Heap* each : {&heap, &more}) {
+    Workers workers(2);
+    solve(each->bodies, each->patches, {}, each->driven(), step, workers);
+  }
+  EXPECT_EQ(difference(heap, more), "");
+}
+
 }  // namespace
 }  // namespace enfilade::scene
