@@ -14,18 +14,17 @@
 namespace enfilade {
 namespace {
 
+/// Of every twelfth picture; counts what was left out of these.
 void expectSamePictures(const std::shared_ptr<const scene::Scene>& scene,
-                        const std::vector<tests::WalkStop>& stops) {
+                        const std::vector<tests::WalkStop>& stops, std::uint64_t& left) {
   ASSERT_FALSE(stops.empty());
   render::GlRenderer renderer(scene);
-  std::uint64_t drawn = 0, inside = 0;
   for (std::size_t i = 0; i < stops.size(); ++i) {
     render::Camera camera = stops[i].camera;
     camera.width = 160;
     camera.height = 120;
     render::FrameOptions options{.hidden = stops[i].walker};
     const render::Frame culled = renderer.render(*stops[i].snapshot, camera, options);
-    drawn += culled.statistics.drawn;
     if (i % 12 != 0) continue;
     options.culling = render::Culling::outside;
     const render::Frame all = renderer.render(*stops[i].snapshot, camera, options);
@@ -33,16 +32,18 @@ void expectSamePictures(const std::shared_ptr<const scene::Scene>& scene,
     EXPECT_TRUE(culled.ids == all.ids) << "ids, step " << i;
     EXPECT_EQ(std::memcmp(culled.depth.data(), all.depth.data(), 4 * all.depth.size()), 0)
         << "depth, step " << i;
-    inside += 12 * all.statistics.drawn;
+    EXPECT_LE(culled.statistics.drawn, all.statistics.drawn);
+    left += all.statistics.drawn - culled.statistics.drawn;
   }
-  EXPECT_LT(drawn, inside);
 }
 
 TEST(SamePictures, InTheBundledBuildingAmongOthers) {
   const auto scene = std::make_shared<const scene::Scene>(assets::makeBuilding());
   tests::SeededWalk walk(scene, 7);
   ASSERT_TRUE(walk.beginAt(assets::landmarks::kRooms[1], 0));
-  expectSamePictures(scene, walk.walk(240));
+  std::uint64_t left = 0;
+  expectSamePictures(scene, walk.walk(240), left);
+  EXPECT_GT(left, 20u * 100u);  // of twenty pictures
 }
 
 class SamePicturesIn : public ::testing::TestWithParam<const char*> {};
@@ -55,7 +56,11 @@ TEST_P(SamePicturesIn, ASharedScene) {
       scene::importModel(*shared / "scenes" / GetParam(), options));
   tests::SeededWalk walk(scene, 11);
   ASSERT_TRUE(walk.begin(2));
-  expectSamePictures(scene, walk.walk(180));
+  std::uint64_t left = 0;
+  expectSamePictures(scene, walk.walk(180), left);
+  // Small scenes that hide little are drawn whole.
+  const bool small = scene->model().objects.size() <= 256;
+  EXPECT_TRUE(small || left > 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Shared, SamePicturesIn,
