@@ -48,6 +48,8 @@ function(enfilade_precompile_headers root)
     get_target_property(type ${target} TYPE)
     if(type STREQUAL "UTILITY" OR target STREQUAL "enfilade_messages")
       continue()  # nothing to compile, or nothing that would read these headers
+    elseif(ENFILADE_UNHURRIED AND NOT ENFILADE_TESTS AND target STREQUAL "enfilade_server")
+      continue()  # its flags are those of tests
     elseif(target MATCHES "_tests$" OR (ENFILADE_UNHURRIED AND target STREQUAL "enfilade_server"))
       target_precompile_headers(${target} REUSE_FROM enfilade_precompiled_tests)
     else()

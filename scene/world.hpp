@@ -52,7 +52,7 @@ struct ContactEvent {
   Kind kind = Kind::begin;
   Reason reason = Reason::parted;  ///< for `end` and `leave`
   Phase phase = Phase::none;
-  /// An avatar or a rigid body; for `blocked` the one that was stopped, which may be any body.
+  /// An avatar or a body; for `blocked` the one that was stopped, which may be any body.
   EntityId a = 0;
   /// What it met. A pair is told once: by the avatar of lesser id, by an avatar before a body, by a
   /// rigid body before others, by a driven body before what stands, by the one of lesser id. For
@@ -105,7 +105,7 @@ struct TickReport {
   std::uint32_t pairs = 0;            ///< that the broad phase holds
   std::uint32_t narrowQueries = 0;    ///< made by sweeps and contacts
   std::uint32_t rationalQueries = 0;  ///< of those, decided by exact arithmetic
-  std::uint32_t boundedSweeps = 0;    ///< stopped by their iteration bound, before anything near
+  std::uint32_t boundedSweeps = 0;    ///< and looks back on ways, that their iteration bound ended
   std::uint32_t liveContacts = 0;
   std::uint32_t squeezedBodies = 0;  ///< pairs of a kinematic body and a free one without way out
   /// Metres, by the exact verdict, of avatars and free bodies; 0 when none penetrates.

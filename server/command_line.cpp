@@ -194,8 +194,9 @@ void addDevice(CLI::App& verb, Arguments& into) {
 }
 
 void addRenderer(CLI::App& verb, Arguments& into) {
-  verb.add_option("--renderer", into.renderer,
-                  "gl: OpenGL; rays: cast with Embree; auto: the faster one, by channels and scene")
+  verb.add_option(
+          "--renderer", into.renderer,
+          "gl: OpenGL; rays: cast with Embree; auto: the faster one, by device, size and channels")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "gl", "rays"}));
 }

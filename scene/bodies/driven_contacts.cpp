@@ -7,7 +7,8 @@
 // both go and turn evenly, and no point of either farther than it is told here; so from where they
 // are d apart they stay clear for as much of the way as brings them d nearer (conservative
 // advancement, from the end back to the beginning). A step is worth half a contact's distance at
-// least: who came nearer than 3/4 of it is not missed.
+// least: who came nearer than 3/4 of it is not missed, unless kMostLooks end the search, which is
+// counted. Of a path that turns back within the tick only the ends are known here.
 #include <limits>
 #include <set>
 

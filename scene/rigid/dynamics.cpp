@@ -40,17 +40,16 @@ void wake(Solid& solid) {
 
 // ---- step 1 ------------------------------------------------------------------------------------
 
-/// Whether the points lean on one another, or will at the end of the step by the motion of now.
+/// Whether the points of its patch lean on one another, or will at the end of the step by the
+/// motion of now.
 bool comesToLean(const NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step) {
   const auto velocityAt = [](const Solid& s, const Vec3& arm) {
     if (s.asleep) return Vec3(Vec3::Zero());
     return Vec3(s.motion.velocity + s.motion.spin.cross(arm) + s.pushVelocity);
   };
-  const ContactPatch* patch = pair.patch();
-  if (!patch) return false;
-  for (const PatchPoint& point : patch->list()) {
+  for (const PatchPoint& point : pair.patch()->list()) {
     const Vec3 opening = velocityAt(b, point.armB) - velocityAt(a, point.armA);
-    const double closing = std::max(0.0, -patch->normal.dot(opening));
+    const double closing = std::max(0.0, -pair.patch()->normal.dot(opening));
     if (point.separation < 2 * step.epsilon + step.seconds * closing) return true;
   }
   return false;
@@ -73,12 +72,15 @@ std::uint8_t lookAt(const Dynamics& dynamics, const StepWork& work, NearPair& pa
   const Pace &paceA = work.paces[pair.key.a], &paceB = work.paces[pair.key.b];
   if (!mayMatter(paceA, paceB)) return 0;
   std::uint8_t flags = StepWork::kActive;
+  const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
   if (areFar(pair, paceA, paceB, step)) {
     pair.hasPatch = false;
-    return flags;
+  } else if (look(pair, a, b, step)) {
+    flags |= StepWork::kAsked;
   }
-  const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
-  if (look(pair, a, b, step)) flags |= StepWork::kAsked;
+  if (pair.penetration() > 0) flags |= StepWork::kPenetrates;
+  if (!pair.hasPatch) return flags;
+  flags |= StepWork::kPatched;
   if (leans(pair, step.epsilon)) flags |= StepWork::kLeans;
   const bool sleeper = (a.isFree() && a.asleep) || (b.isFree() && b.asleep);
   if (sleeper && comesToLean(pair, a, b, step)) flags |= StepWork::kWakes;
@@ -88,9 +90,10 @@ std::uint8_t lookAt(const Dynamics& dynamics, const StepWork& work, NearPair& pa
 /// Takes over what a round of looks found. Returns whether somebody woke.
 bool takeLook(Dynamics& dynamics, const NearPair& pair, std::uint8_t& flags, StepWork& work) {
   if ((flags & StepWork::kAsked) != 0) ++work.report.looks;
-  work.report.deepest = std::max(work.report.deepest, pair.penetration());
+  if ((flags & StepWork::kPenetrates) != 0)
+    work.report.deepest = std::max(work.report.deepest, pair.penetration());
   const bool wakes = (flags & StepWork::kWakes) != 0;
-  flags &= StepWork::kActive | StepWork::kLeans;
+  flags &= StepWork::kActive | StepWork::kLeans | StepWork::kPatched;
   if (!wakes) return false;
   Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
   wake(a.isFree() && a.asleep ? a : b);
@@ -120,7 +123,7 @@ void findPatches(Dynamics& dynamics, const NearPairStep& step, StepWork& work) {
   // Each round but the last wakes a solid.
   for (std::size_t round = 0; round <= dynamics.solids.size(); ++round) {
     findPaces(dynamics, work);
-    work.workers.share(pairs.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+    work.workers->share(pairs.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
       for (std::size_t i = from; i < to; ++i) {
         if (i + kAskedAhead < to) askFor(pairs[i + kAskedAhead]);
         if (isNew[i]) work.looks[i] = lookAt(dynamics, work, pairs[i], step);
@@ -137,7 +140,7 @@ void findPatches(Dynamics& dynamics, const NearPairStep& step, StepWork& work) {
   for (std::uint32_t i = 0; i < pairs.size(); ++i) {
     if (work.looks[i] == 0) continue;
     work.active.push_back(i);
-    if (pairs[i].patch()) work.patched.push_back(i);
+    if ((work.looks[i] & StepWork::kPatched) != 0) work.patched.push_back(i);
   }
 }
 
@@ -173,7 +176,7 @@ void gatherBodies(const Dynamics& dynamics, StepWork& work) {
 
 void gatherPatches(const Dynamics& dynamics, StepWork& work) {
   work.patches.resize(work.patched.size());
-  work.workers.share(work.patched.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+  work.workers->share(work.patched.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t k = from; k < to; ++k) {
       const NearPair& pair = dynamics.pairs[work.patched[k]];
       work.patches[k] = *pair.patch();
@@ -201,7 +204,7 @@ void gatherJoints(const Dynamics& dynamics, StepWork& work) {
 }
 
 void keepImpulses(Dynamics& dynamics, const StepWork& work) {
-  work.workers.share(work.patches.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+  work.workers->share(work.patches.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t k = from; k < to; ++k) {
       ContactPatch& patch = *dynamics.pairs[work.patched[k]].patch();
       const ContactPatch& solved = work.patches[k];
@@ -236,7 +239,7 @@ void setOut(Dynamics& dynamics, StepWork& work) {
     solid.odometer += lengthOf(way);
     placeSolid(solid);
   }
-  work.workers.share(work.active.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+  work.workers->share(work.active.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t k = from; k < to; ++k) {
       double& apart = dynamics.pairs[work.active[k]].apart;
       apart -= work.closing[k] + 0x1p-51 * (std::abs(apart) + work.closing[k]);
@@ -317,12 +320,14 @@ void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates) {
 
 DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings) {
   Workers alone(1);
-  StepWork work(settings.workers ? *settings.workers : alone);
+  thread_local StepWork kept;
+  StepWork& work = kept;  // which threads that help can see
+  work.begin(settings.workers ? *settings.workers : alone);
   findPatches(dynamics, nearStep(settings), work);
   gatherBodies(dynamics, work);
   gatherPatches(dynamics, work);
   gatherJoints(dynamics, work);
-  solve(work.bodies, work.patches, work.joints, work.driven, settings.solver, work.workers);
+  solve(work.bodies, work.patches, work.joints, work.driven, settings.solver, *work.workers);
   keepImpulses(dynamics, work);
   proveWays(dynamics, settings.solver.seconds, work);
   setOut(dynamics, work);

@@ -368,7 +368,8 @@ void keep(const System& system, std::span<RigidBody> bodies, std::span<ContactPa
 
 void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::span<Joint> joints,
            std::span<const DrivenBody> driven, const SolverStep& step, Workers& workers) {
-  System system;
+  thread_local System kept;
+  System& system = kept;  // which threads that help can see
   system.seconds = step.seconds / step.substeps;
   system.epsilon = step.epsilon;
   system.byAvx = step.byAvx && hasAvx();

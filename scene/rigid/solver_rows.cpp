@@ -145,6 +145,7 @@ void layOut(std::span<const ContactPatch> patches, System& system, Workers& work
   });
   const Colouring colouring = colourPatches(patches, moves);
   std::uint32_t from = 0, size = 0;
+  system.colours.clear();
   // The last colour's may share bodies: each is alone.
   const auto mostOf = [&](std::size_t colour) {
     return colour + 1 == colouring.ends.size() ? std::size_t{1} : kLanes;
@@ -155,8 +156,7 @@ void layOut(std::span<const ContactPatch> patches, System& system, Workers& work
     system.colours.push_back(size);
     from = colouring.ends[i];
   }
-  system.blockStore = std::make_unique_for_overwrite<PatchBlock[]>(size);
-  system.blocks = {system.blockStore.get(), size};
+  system.blocks = system.blockRoom.take(size);
   std::uint32_t block = 0;
   from = 0;
   for (std::size_t i = 0; i < colouring.ends.size(); ++i) {
@@ -170,8 +170,7 @@ void layOut(std::span<const ContactPatch> patches, System& system, Workers& work
     laid.firstPoint = points;
     points += laid.size;
   }
-  system.pointStore = std::make_unique_for_overwrite<PointBlock[]>(points);
-  system.points = {system.pointStore.get(), points};
+  system.points = system.pointRoom.take(points);
 }
 
 }  // namespace

@@ -157,6 +157,21 @@ struct AngularRow {
 };
 
 /// All that is solved: joints in the order of the array, then patches colour by colour.
+/// Room for so many that are written before they are read. It only grows.
+template <class T>
+class Room {
+ public:
+  std::span<T> take(std::size_t count) {
+    if (count > size_) store_ = std::make_unique_for_overwrite<T[]>(size_ = 2 * count);
+    return {store_.get(), count};
+  }
+
+ private:
+  std::unique_ptr<T[]> store_;
+  std::size_t size_ = 0;
+};
+
+/// Kept by each thread from step to step, for its room alone.
 struct System {
   std::vector<Mover> movers;           ///< of the bodies, and one of nobody
   std::span<PatchBlock> blocks;        ///< by colour
@@ -167,8 +182,8 @@ struct System {
   double epsilon = 0;
   bool byAvx = false;
 
-  std::unique_ptr<PatchBlock[]> blockStore;  ///< of `blocks`
-  std::unique_ptr<PointBlock[]> pointStore;  ///< of `points`
+  Room<PatchBlock> blockRoom;  ///< of `blocks`
+  Room<PointBlock> pointRoom;  ///< of `points`
 };
 
 /// Movers and patches; seconds and epsilon are set.

@@ -107,7 +107,7 @@ void findCarried(const Dynamics& dynamics, double seconds, StepWork& work) {
 /// Ways of all that go; the others stand.
 void findPassages(const Dynamics& dynamics, StepWork& work) {
   work.passages.resize(work.bodies.size());
-  work.workers.share(work.bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
+  work.workers->share(work.bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i) {
       const Solid& solid = dynamics.solids[work.solids[i]];
       const bool goes =
@@ -177,7 +177,7 @@ void proveRound(const Dynamics& dynamics, StepWork& work, Round& round) {
   if (widen(work, round)) findNear(dynamics, work, round);
   round.parts.assign(round.near.size(), 1);
   round.proofs.assign(round.near.size(), 0);
-  work.workers.share(round.near.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+  work.workers->share(round.near.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t n = from; n < to; ++n) {
       const std::uint32_t k = round.near[n];
       const auto [a, b] = work.bodiesOf[k];
@@ -255,7 +255,7 @@ bool shortenAll(const Dynamics& dynamics, bool toNothing, StepWork& work, Round&
     if (yieldsB) round.least[b] = std::min(round.least[b], part);
     if (!yieldsA && !yieldsB) round.squeezed.emplace_back(work.solids[a], work.solids[b]);
   }
-  work.workers.share(work.bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
+  work.workers->share(work.bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i) {
       round.open[i] = round.least[i] < 1;
       if (round.open[i]) giveWay(dynamics, static_cast<std::uint32_t>(i), round.least[i], work);

@@ -7,7 +7,7 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr int kSpins = 1000;  // some 10 us
+constexpr int kSpins = 5000;  // some 50 us
 constexpr std::uint32_t kOpen = 1u << 31;
 
 void pause() {

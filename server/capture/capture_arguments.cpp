@@ -239,7 +239,7 @@ void addFiles(CLI::App& verb, CaptureArguments& into) {
 
 void addRun(CLI::App& verb, CaptureArguments& into) {
   verb.add_option("--renderer", into.renderer,
-                  "gl: OpenGL; rays: cast with Embree; auto: the faster one for scene, device and "
+                  "gl: OpenGL; rays: cast with Embree; auto: the faster one for device, size and "
                   "channels, always the same")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "gl", "rays"}));

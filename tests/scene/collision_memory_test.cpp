@@ -1,5 +1,6 @@
-// What a scene and its world hold for collision, by everything that this program allocates: each
-// byte that operator new gives and delete takes back is counted as the allocator counts it.
+// What a scene and its world hold for collision, by what this program allocates: each byte that
+// operator new gives and delete takes back is counted as the allocator counts it, but for those of
+// types that are aligned more strictly (the cells' lists of the sort and sweep).
 #include <gtest/gtest.h>
 #include <malloc.h>
 
