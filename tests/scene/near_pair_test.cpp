@@ -119,5 +119,61 @@ TEST_F(NearPairs, AWayThatIsClearedByWhatWasKnownIsClear) {
   EXPECT_GT(cut, 100);
 }
 
+/// Boxes that fall on one another, on the floor, and on a turntable that goes along.
+RigidScene boxesOnATurntable() {
+  RigidScene scene;
+  scene.addFloor();
+  const auto table = scene.addStill(boxHull({0.6, 0.05, 0.6}), {0, 0.3, 0});
+  scene.body(table).velocity = {0.3, 0, 0.1};
+  scene.body(table).spin = {0, 0.8, 0};
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> number(-1, 1);
+  for (int i = 0; i < 24; ++i) {
+    const double x = 0.9 * number(random), z = 0.9 * number(random);
+    const Quat turned = turnBy(Vec3::UnitX(), number(random));
+    const auto box = scene.addFree(boxHull({0.05, 0.08, 0.06}), {x, 0.6 + 0.2 * i, z}, turned);
+    scene.body(box).spin = {number(random), 2, number(random)};
+  }
+  scene.pairAll();
+  return scene;
+}
+
+/// Rods that turn where they are, and come near with their ends alone.
+RigidScene rodsThatTurn() {
+  RigidScene scene;
+  scene.settings.solver.gravity = Vec3::Zero();
+  for (int i = 0; i < 6; ++i) {
+    const auto rod = scene.addFree(boxHull({1, 0.02, 0.02}), {0.3 * i, 2.1 * (i % 2), 0.06 * i});
+    scene.body(rod).spin = {0, 0.1 * i, i % 2 == 0 ? 0.9 : -1.1};
+  }
+  scene.pairAll();
+  return scene;
+}
+
+void expectKnownDistances(RigidScene scene) {
+  const std::vector<NearPair>& pairs = scene.dynamics.pairs;
+  std::size_t looks = 0, told = 0;
+  constexpr std::size_t kSteps = 120;
+  for (std::size_t i = 0; i < kSteps; ++i) {
+    looks += scene.run(1).looks;
+    for (const NearPair& pair : pairs) {
+      const Solid &a = scene.dynamics.solids[pair.key.a], &b = scene.dynamics.solids[pair.key.b];
+      const double known = apartNow(pair, a, b);
+      if (known <= 0) continue;
+      ++told;
+      collision::FeatureCache cache;
+      const auto truth = collision::decide(partOf(a, 0), partOf(b, 0), cache);
+      ASSERT_LE(known, truth.distance + 1e-12) << pair.key.a << ", " << pair.key.b << " at " << i;
+    }
+  }
+  EXPECT_GT(told, kSteps * pairs.size() / 2);
+  EXPECT_LT(looks, kSteps * pairs.size() / 4);
+}
+
+TEST(KnownDistances, AreNeverMoreThanTheDistancesThoughFewPairsAreLookedAt) {
+  expectKnownDistances(boxesOnATurntable());
+  expectKnownDistances(rodsThatTurn());
+}
+
 }  // namespace
 }  // namespace enfilade::scene
