@@ -1,7 +1,6 @@
 #include "scene/bodies/mounting.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include "collision/refine.hpp"
 
@@ -9,6 +8,10 @@ namespace enfilade::scene {
 namespace {
 
 using Trees = std::vector<collision::TreeOfParts>;
+
+/// Of one pair, as nearestParts() counts it: what is not decided by then is not mounted, whoever
+/// asks. Pairs that touch are decided sooner by far.
+constexpr std::size_t kMostWork = 1'000'000;
 
 Trees bodyAtStart(const Scene& scene, std::uint32_t body) {
   return {treeAt(*scene.shapeOfBody(body), startPoseOf(scene.model().bodies[body]))};
@@ -22,7 +25,7 @@ Trees atStart(const Scene& scene, EntityId entity) {
 }
 
 bool areNearer(const Trees& a, const Trees& b, double contact) {
-  std::size_t work = std::numeric_limits<std::size_t>::max();
+  std::size_t work = kMostWork;
   const collision::NearestParts nearest = collision::nearestParts(a, b, contact, work);
   if (nearest.found != collision::NearestParts::Found::nearest) return false;
   collision::FeatureCache cache;
@@ -46,9 +49,12 @@ std::vector<EntityId> mountingOf(const Scene& scene, std::uint32_t body, double 
     if (overlaps(lookout, scene.stillBoxes()[i]) &&
         areNearer(own, treesOf(scene.parts(solids[i])), contact))
       mounting.push_back(solids[i] + 1);
-  for (std::uint32_t i = 0; i < bodies.size(); ++i)
-    if (i != body && isKinematic(bodies[i].kind) && areNearer(own, bodyAtStart(scene, i), contact))
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (i == body || !isKinematic(bodies[i].kind)) continue;
+    const Trees other = bodyAtStart(scene, i);
+    if (overlaps(lookout, collision::boxOf(other[0])) && areNearer(own, other, contact))
       mounting.push_back(bodies[i].objects[0] + 1);
+  }
   std::sort(mounting.begin(), mounting.end());
   return mounting;
 }
