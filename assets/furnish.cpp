@@ -141,8 +141,8 @@ void placeMiddle(Sketch& sketch, int i, Random& random) {
 
 void furnishVestibule(Sketch& sketch, Random& random) {
   const std::string path = "building/ground/vestibule/";
-  sketch.place(path + "runner", rugShape(3.4, 1.6, Paint::rugRed, Paint::rugGold),
-               moved({2.3, 0, 0}));
+  sketch.place(path + "runner", rugShape(3.0, 1.6, Paint::rugRed, Paint::rugGold),
+               moved({2.6, 0, 0}));
   sketch.place(path + "plant1", pottedPlantShape(random), moved({0.5, 0, 2.5}));
   sketch.place(path + "plant2", pottedPlantShape(random), moved({4.0, 0, -2.5}));
   placeBench(sketch, path + "bench1", {{2.2, 0, 2.3}, 1}, 1.6, Paint::leather);

@@ -44,7 +44,7 @@ void furnishCloakroom(Sketch& sketch, Random& random) {
   addBox(locker, {0.458, 0.95, 0.11}, {0.475, 1.05, 0.14}, Paint::chrome);
   for (int i = 0; i < 6; ++i)
     sketch.place(numbered(path + "locker", i + 1), locker, turned(2, {6.0, 0, -7.9 + 0.41 * i}));
-  placeBench(sketch, path + "bench1", {{0.6, 0, -4.7}, 0}, 1.2, Paint::leather);
+  placeBench(sketch, path + "bench1", {{0.6, 0, -5.9}, 0}, 1.2, Paint::leather);
   sketch.place(path + "pendant", pendantShape(0.6, Paint::lampShade), moved({3.0, kCeiling, -5.6}));
 }
 

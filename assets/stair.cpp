@@ -156,9 +156,9 @@ void addLift(Sketch& sketch) {
   const std::string path = "building/lift/";
   const Paint wall = Paint::wallIvory, inner = Paint::concrete;
   sketch.box(path + "shaft/west", {kLiftWest, -0.06, kLiftNorth}, {kLiftWest + t, top, kLiftSouth},
-             {wall, inner, inner, inner, inner, inner});
+             {wall, inner, inner, inner, inner, wall});
   sketch.box(path + "shaft/east", {kLiftEast - t, -0.06, kLiftNorth}, {kLiftEast, top, kLiftSouth},
-             {inner, wall, inner, inner, inner, inner});
+             {inner, wall, inner, inner, inner, wall});
   const Wall front{
       Wall::Along::x, kLiftWest + t, kLiftEast - t, kLiftSouth - t, kLiftSouth, -0.06, top,
       inner,          wall};
@@ -171,14 +171,14 @@ void addLift(Sketch& sketch) {
   int storey = 0;
   for (const Opening& o : doors) {
     const std::string level = path + (storey++ ? "upper" : "ground");
-    addDoorFrame(sketch, level + "/frame", front, o, Paint::steel);
+    addCasing(sketch, level + "/frame", front, o, true, Paint::steel);  // the cabin needs the other
     // Two leaves that slide apart inside the shaft's front wall.
     for (const double side : {-1.0, 1.0}) {
       const double a = side < 0 ? mid - 0.5 : mid + 0.0015;
       const double z = kLiftSouth - t / 2;
       sketch.box(level + (side < 0 ? "/door_west" : "/door_east"), {a, o.bottom + 0.01, z - 0.02},
                  {a + 0.4985, o.top - 0.005, z + 0.02}, Paint::chrome);
-      sketch.moves(MovingPart::Kind::slide, {side, 0, 0}, 0, 0.48);
+      sketch.moves(MovingPart::Kind::slide, {side, 0, 0}, 0, 0.44);  // up to the shaft's wall
     }
     sketch.box(level + "/sill", {mid - 0.5, o.bottom - 0.02, kLiftSouth - t - 0.005},
                {mid + 0.5, o.bottom + 0.002, kLiftSouth + 0.005}, Paint::steel);

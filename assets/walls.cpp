@@ -158,23 +158,26 @@ void addCornice(Sketch& sketch, const std::string& path, const Face& face, doubl
               ceiling, Paint::cornice);
 }
 
+void addCasing(Sketch& sketch, const std::string& path, const Wall& w, const Opening& o, bool high,
+               Paint paint) {
+  constexpr double kWidth = 0.12, kProud = 0.025, kLap = 0.012;
+  const std::string side = path + (high ? "/casing_b" : "/casing_a");
+  const double inner = high ? w.high - 0.003 : w.low - kProud;
+  const double outer = high ? w.high + kProud : w.low + 0.003;
+  wallBox(sketch, side + "_left", w.along, {o.from - kWidth, o.bottom, inner},
+          {o.from - kLap, o.top, outer}, paint);
+  wallBox(sketch, side + "_right", w.along, {o.to + kLap, o.bottom, inner},
+          {o.to + kWidth, o.top, outer}, paint);
+  wallBox(sketch, side + "_head", w.along, {o.from - kWidth - 0.01, o.top, inner},
+          {o.to + kWidth + 0.01, o.top + 0.14, outer}, paint);
+  Face face{w.along, o.from - 0.2, o.to + 0.2, high ? w.high : w.low, high ? 1.0 : -1.0};
+  addRail(sketch, path + (high ? "/architrave_b" : "/architrave_a"), face, o.top + 0.141, 0.07,
+          0.08, paint);
+}
+
 void addDoorFrame(Sketch& sketch, const std::string& path, const Wall& w, const Opening& o,
                   Paint paint) {
-  constexpr double kWidth = 0.12, kProud = 0.025, kLap = 0.012;
-  for (const bool high : {false, true}) {
-    const std::string side = path + (high ? "/casing_b" : "/casing_a");
-    const double inner = high ? w.high - 0.003 : w.low - kProud;
-    const double outer = high ? w.high + kProud : w.low + 0.003;
-    wallBox(sketch, side + "_left", w.along, {o.from - kWidth, o.bottom, inner},
-            {o.from - kLap, o.top, outer}, paint);
-    wallBox(sketch, side + "_right", w.along, {o.to + kLap, o.bottom, inner},
-            {o.to + kWidth, o.top, outer}, paint);
-    wallBox(sketch, side + "_head", w.along, {o.from - kWidth - 0.01, o.top, inner},
-            {o.to + kWidth + 0.01, o.top + 0.14, outer}, paint);
-    Face face{w.along, o.from - 0.2, o.to + 0.2, high ? w.high : w.low, high ? 1.0 : -1.0};
-    addRail(sketch, path + (high ? "/architrave_b" : "/architrave_a"), face, o.top + 0.141, 0.07,
-            0.08, paint);
-  }
+  for (const bool high : {false, true}) addCasing(sketch, path, w, o, high, paint);
 }
 
 void addThreshold(Sketch& sketch, const std::string& path, const Wall& w, const Opening& o,

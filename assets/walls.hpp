@@ -50,7 +50,10 @@ void addCornice(Sketch& sketch, const std::string& path, const Face& face, doubl
 void addRail(Sketch& sketch, const std::string& path, const Face& face, double y, double height,
              double depth, Paint paint);
 
-/// Casings on both faces and an architrave over the lintel.
+/// The casing on the low or the high face, and an architrave over the lintel.
+void addCasing(Sketch& sketch, const std::string& path, const Wall& wall, const Opening& hole,
+               bool high, Paint paint);
+/// Casings on both faces.
 void addDoorFrame(Sketch& sketch, const std::string& path, const Wall& wall, const Opening& hole,
                   Paint paint);
 void addThreshold(Sketch& sketch, const std::string& path, const Wall& wall, const Opening& hole,

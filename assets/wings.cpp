@@ -160,6 +160,18 @@ void addCoffers(Sketch& sketch, const Room& room) {
   }
 }
 
+bool isLobby(const Room& room) {
+  return std::string(room.path).ends_with("lobby");
+}
+
+/// What the lift's shaft leaves of the lobbies' north wall; of other walls all.
+std::vector<Face> besideTheLift(const Room& room, const Face& face) {
+  if (!isLobby(room) || face.along != Along::x || face.face != room.box.north) return {face};
+  Face west = face, east = face;
+  west.to = kLiftWest, east.from = kLiftEast;
+  return {west, east};
+}
+
 void addMouldings(Sketch& sketch, const Room& room,
                   const std::array<std::vector<Opening>, 4>& holes) {
   const RoomBox& b = room.box;
@@ -170,8 +182,12 @@ void addMouldings(Sketch& sketch, const Room& room,
   const std::array<const char*, 4> names{"north", "south", "west", "east"};
   const std::string path = room.path;
   for (std::size_t i = 0; i < 4; ++i) {
-    addSkirting(sketch, path + "/skirting_" + names[i], faces[i], b.floor, holes[i]);
-    addCornice(sketch, path + "/cornice_" + names[i], faces[i], b.ceiling);
+    int piece = 0;
+    for (const Face& face : besideTheLift(room, faces[i])) {
+      const std::string name = names[i] + (piece++ ? std::string("_beside_lift") : "");
+      addSkirting(sketch, path + "/skirting_" + name, face, b.floor, holes[i]);
+      addCornice(sketch, path + "/cornice_" + name, face, b.ceiling);
+    }
   }
 }
 
@@ -197,10 +213,6 @@ void addSlab(Sketch& sketch, const Room& room) {
   sketch.box(path + "_west", {b.west, y0, b.north}, {kLiftWest, y1, kLiftSouth}, Paint::concrete);
   sketch.box(path + "_east", {kLiftEast, y0, b.north}, {b.east, y1, kLiftSouth}, Paint::concrete);
   sketch.box(path + "_south", {b.west, y0, kLiftSouth}, {b.east, y1, b.south}, Paint::concrete);
-}
-
-bool isLobby(const Room& room) {
-  return std::string(room.path).ends_with("lobby");
 }
 
 /// The lobbies have the lift's shaft in them: floor and ceiling are laid round it.
