@@ -1,9 +1,9 @@
 // What a scene and its world hold for collision, by what this program allocates: each byte that
-// operator new gives and delete takes back is counted as the allocator counts it, but for those of
-// types that are aligned more strictly (the cells' lists of the sort and sweep).
+// operator new gives and delete takes back is counted as the allocator counts it.
 #include <gtest/gtest.h>
 #include <malloc.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
@@ -17,10 +17,20 @@ namespace {
 
 std::atomic<std::size_t> held{0};
 
-void* take(std::size_t size) {
-  void* const place = std::malloc(size == 0 ? 1 : size);
+/// Null: there is none.
+void* tryToTake(std::size_t size, std::align_val_t alignment) noexcept {
+  const auto align = static_cast<std::size_t>(alignment);
+  const std::size_t whole = (std::max<std::size_t>(size, 1) + align - 1) / align * align;
+  void* const place = std::aligned_alloc(align, whole);
+  if (place) held += malloc_usable_size(place);
+  return place;
+}
+
+constexpr std::align_val_t kPlain{__STDCPP_DEFAULT_NEW_ALIGNMENT__};
+
+void* take(std::size_t size, std::align_val_t alignment = kPlain) {
+  void* const place = tryToTake(size, alignment);
   if (!place) throw std::bad_alloc();
-  held += malloc_usable_size(place);
   return place;
 }
 
@@ -36,6 +46,30 @@ void* operator new(std::size_t size) {
 }
 void* operator new[](std::size_t size) {
   return take(size);
+}
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  return tryToTake(size, kPlain);
+}
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return take(size, alignment);
+}
+void* operator new[](std::size_t size, std::align_val_t alignment) {
+  return take(size, alignment);
+}
+void operator delete(void* place, const std::nothrow_t&) noexcept {
+  giveBack(place);
+}
+void operator delete(void* place, std::align_val_t) noexcept {
+  giveBack(place);
+}
+void operator delete[](void* place, std::align_val_t) noexcept {
+  giveBack(place);
+}
+void operator delete(void* place, std::size_t, std::align_val_t) noexcept {
+  giveBack(place);
+}
+void operator delete[](void* place, std::size_t, std::align_val_t) noexcept {
+  giveBack(place);
 }
 void operator delete(void* place) noexcept {
   giveBack(place);
