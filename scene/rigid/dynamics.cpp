@@ -47,9 +47,10 @@ bool comesToLean(const NearPair& pair, const Solid& a, const Solid& b, const Nea
     if (s.asleep) return Vec3(Vec3::Zero());
     return Vec3(s.motion.velocity + s.motion.spin.cross(arm) + s.pushVelocity);
   };
-  for (const PatchPoint& point : pair.patch()->list()) {
+  const ContactPatch& patch = *pair.patch();
+  for (const PatchPoint& point : patch.list()) {
     const Vec3 opening = velocityAt(b, point.armB) - velocityAt(a, point.armA);
-    const double closing = std::max(0.0, -pair.patch()->normal.dot(opening));
+    const double closing = std::max(0.0, -patch.normal.dot(opening));
     if (point.separation < 2 * step.epsilon + step.seconds * closing) return true;
   }
   return false;

@@ -156,18 +156,24 @@ TEST(DrivenContacts, ALeafThatTurnsPastAPostBetweenTwoTicksTouchesIt) {
   EXPECT_EQ(t.events.size(), 2u);
 }
 
-TEST(DrivenContacts, ANearMissBeginsIsClosestAndEnds) {
-  Model model =
-      boxModel({{"tray", {-2, 0, -0.5}, {-1, 0.1, 0.5}}, {"post", {-0.1, 0, 0.6}, {0.1, 2, 0.8}}});
+/// The first object slides along x by `high` metres; near misses begin at 0.3 m.
+BodyTrial trayThatSlid(Model model, double high) {
   BodySpec tray = bodySpec("tray", BodyKind::sliding, {0});
   tray.axis = Vec3::UnitX();
-  tray.high = 4;
+  tray.high = high;
   model.bodies = {tray};
   Lengths lengths;
   lengths.nearMiss = 0.3;
   BodyTrial t(std::move(model), lengths);
   t.tell({"tray", Action::open, 0, 0, {}});
   t.untilIdle();
+  return t;
+}
+
+TEST(DrivenContacts, ANearMissBeginsIsClosestAndEnds) {
+  const BodyTrial t = trayThatSlid(
+      boxModel({{"tray", {-2, 0, -0.5}, {-1, 0.1, 0.5}}, {"post", {-0.1, 0, 0.6}, {0.1, 2, 0.8}}}),
+      4);
   const auto near = between(t, "tray", "post");
   ASSERT_EQ(near.size(), 3u);
   EXPECT_EQ(near[0].phase, Phase::begin);
@@ -179,16 +185,8 @@ TEST(DrivenContacts, ANearMissBeginsIsClosestAndEnds) {
 }
 
 TEST(DrivenContacts, ANearMissThatLivesWhenTheWorldEndsIsToldAsOver) {
-  Model model = boxModel({{"tray", {0, 0, 0}, {1, 0.1, 1}}, {"post", {1.5, 0, 0}, {1.6, 2, 1}}});
-  BodySpec tray = bodySpec("tray", BodyKind::sliding, {0});
-  tray.axis = Vec3::UnitX();
-  tray.high = 0.4;
-  model.bodies = {tray};
-  Lengths lengths;
-  lengths.nearMiss = 0.3;
-  BodyTrial t(std::move(model), lengths);
-  t.tell({"tray", Action::open, 0, 0, {}});
-  t.untilIdle();
+  BodyTrial t = trayThatSlid(
+      boxModel({{"tray", {0, 0, 0}, {1, 0.1, 1}}, {"post", {1.5, 0, 0}, {1.6, 2, 1}}}), 0.4);
   ASSERT_EQ(t.events.size(), 1u);
   const auto ends = endContacts(t.world, ContactEvent::Reason::shutdown);
   ASSERT_EQ(ends.size(), 2u);

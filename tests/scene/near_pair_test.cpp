@@ -138,12 +138,12 @@ RigidScene boxesOnATurntable() {
   return scene;
 }
 
-/// Rods that turn where they are, and come near with their ends alone.
+/// Rods that turn where they are, within reach of one another, and come near with their ends alone.
 RigidScene rodsThatTurn() {
   RigidScene scene;
   scene.settings.solver.gravity = Vec3::Zero();
   for (int i = 0; i < 6; ++i) {
-    const auto rod = scene.addFree(boxHull({1, 0.02, 0.02}), {0.3 * i, 2.1 * (i % 2), 0.06 * i});
+    const auto rod = scene.addFree(boxHull({1, 0.02, 0.02}), {0.3 * i, 0.9 * i, 0.06 * i});
     scene.body(rod).spin = {0, 0.1 * i, i % 2 == 0 ? 0.9 : -1.1};
   }
   scene.pairAll();
