@@ -1,5 +1,7 @@
 #include "scene/bodies/body.hpp"
 
+#include <cmath>
+
 #include "scene/rotation.hpp"
 
 namespace enfilade::scene {
@@ -42,6 +44,14 @@ Box boxOf(const Body& body) {
 
 collision::Pose poseAt(const BodySpec& spec, const BodyPlace& place) {
   return {rotationAbout(spec.axis, place.turn).normalized(), spec.anchor + place.offset};
+}
+
+BodyPlace placeBetween(const BodyPlace& from, const BodyPlace& to, double s) {
+  return {from.offset + s * (to.offset - from.offset), from.turn + s * (to.turn - from.turn)};
+}
+
+double farthestWay(const BodyShape& shape, const BodyPlace& from, const BodyPlace& to) {
+  return (to.offset - from.offset).norm() + std::abs(to.turn - from.turn) * shape.radius;
 }
 
 }  // namespace enfilade::scene

@@ -42,19 +42,16 @@ struct BodyDrive {
   double closesIn = -1;   ///< seconds; negative: it stays as it is
 };
 
-/// Of a tick: a path is seen as often by what leans on the body.
+/// Of a tick.
 inline constexpr int kSolverSubsteps = 4;
 
-/// Where a kinematic body wants to be at the end of the tick; it gets there unless it is blocked.
+/// Where a kinematic body wants to go in this tick: from place to place, in equal times. It gets to
+/// the last one unless it is blocked; what it did not reach is then where it stays.
 struct BodyPlan {
-  BodyPlace place;
-  double coordinate = 0;
-  double farthest = 0;  ///< metres: no point of the body moves farther; 0: it does not move
-  /// Of a path: where it is between, at the end of each of the solver's substeps, and where it
-  /// began. What meets it is swept along the straight way all the same.
-  bool winds = false;
-  BodyPlace from;
-  std::array<BodyPlace, kSolverSubsteps> between;
+  std::size_t stretches = 1;  ///< of a path kSolverSubsteps: it may turn back within the tick
+  std::array<BodyPlace, kSolverSubsteps + 1> places;  ///< [0]: before; [stretches]: after the tick
+  double coordinate = 0;                              ///< after the tick
+  double farthest = 0;  ///< metres: no point is farther off at any time; 0: it does not move
 };
 
 struct Body {
@@ -100,5 +97,11 @@ Box boxOf(const Body& body);
 
 /// The pose that a kinematic body has at a place.
 collision::Pose poseAt(const BodySpec& spec, const BodyPlace& place);
+
+/// A part `s` of the way from one place to the next.
+BodyPlace placeBetween(const BodyPlace& from, const BodyPlace& to, double s);
+
+/// Metres: no point of the body goes farther from one place to the other.
+double farthestWay(const BodyShape& shape, const BodyPlace& from, const BodyPlace& to);
 
 }  // namespace enfilade::scene

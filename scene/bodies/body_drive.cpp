@@ -2,6 +2,7 @@
 // where each wants to be at the end of the tick.
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "scene/bodies/mounting.hpp"
 #include "scene/world_state.hpp"
@@ -11,17 +12,12 @@ namespace {
 
 constexpr double kTimeRounding = 1e-9;  // seconds: sums of ticks against whole delays
 
-bool goesRound(const BodySpec& spec) {
-  return spec.kind == BodyKind::path && spec.loops;
-}
-
 /// Where a path is at a time between its first key and its last.
 BodyPlace placeOnPath(const std::vector<PathKey>& keys, double time) {
   const auto after = std::upper_bound(keys.begin() + 1, keys.end() - 1, time,
                                       [](double t, const PathKey& key) { return t < key.time; });
   const PathKey &a = *(after - 1), &b = *after;
-  const double s = (time - a.time) / (b.time - a.time);
-  return {a.offset + s * (b.offset - a.offset), a.turn + s * (b.turn - a.turn)};
+  return placeBetween({a.offset, a.turn}, {b.offset, b.turn}, (time - a.time) / (b.time - a.time));
 }
 
 BodyPlace placeOf(const BodySpec& spec, double coordinate) {
@@ -130,42 +126,42 @@ double onBranchOf(double turn, double wound, const BodySpec& spec) {
   return round == 0 ? wound : wound - std::round((wound - turn) / round) * round;
 }
 
-/// Where a path is between; `coordinate`: at the end of the tick.
-void planBetween(Body& body, double coordinate, double tick) {
+/// Where a path comes through, at the end of each of the solver's substeps; the last is the goal.
+void planPath(Body& body, double tick) {
   BodyPlan& plan = body.plan;
-  plan.from = body.drive.place;
+  const BodySpec& spec = *body.spec;
+  plan.stretches = kSolverSubsteps;
   const double now = body.drive.coordinate;
-  for (int i = 1; i < kSolverSubsteps; ++i) {
+  for (std::size_t i = 1; i < kSolverSubsteps; ++i) {
     const double part = static_cast<double>(i) / kSolverSubsteps;
-    const double at = goesRound(*body.spec) ? std::fmod(now + part * body.drive.speed * tick,
-                                                        body.spec->keys.back().time)
-                                            : now + part * (coordinate - now);
-    BodyPlace& between = plan.between[static_cast<std::size_t>(i) - 1];
-    between = placeOf(*body.spec, at);
-    if (body.spec->loops) between.turn = onBranchOf(plan.from.turn, between.turn, *body.spec);
+    const double at = goesRound(spec)
+                          ? std::fmod(now + part * body.drive.speed * tick, spec.keys.back().time)
+                          : now + part * (plan.coordinate - now);
+    plan.places[i] = placeOf(spec, at);
   }
-  plan.between.back() = plan.place;
-  plan.winds = std::any_of(plan.between.begin(), plan.between.end(), [&](const BodyPlace& at) {
-    return at.offset != plan.from.offset || at.turn != plan.from.turn;
-  });
+  plan.places[kSolverSubsteps] = placeOf(spec, plan.coordinate);
+  if (!goesRound(spec)) return;
+  for (std::size_t i = kSolverSubsteps; i > 0; --i) {
+    double& turn = plan.places[i - 1].turn;
+    turn = onBranchOf(plan.places[i].turn, turn, spec);
+  }
+  body.drive.place.turn = plan.places[0].turn;
 }
 
 void plan(Body& body, double tick) {
-  body.plan = {};
-  body.plan.place = body.drive.place;
-  body.plan.coordinate = body.drive.coordinate;
+  BodyPlan& plan = body.plan;
+  plan = {};
+  plan.places[0] = body.drive.place;
+  plan.coordinate = body.drive.coordinate;
   if (!body.drive.going) return;
-  const auto [coordinate, rate] = nextCoordinate(body, tick);
-  body.drive.rate = rate;
-  body.plan.coordinate = coordinate;
-  body.plan.place = placeOf(*body.spec, coordinate);
-  if (goesRound(*body.spec)) {
-    double& turn = body.drive.place.turn;
-    turn = onBranchOf(body.plan.place.turn, turn, *body.spec);
-  }
-  body.plan.farthest = (body.plan.place.offset - body.drive.place.offset).norm() +
-                       std::abs(body.plan.place.turn - body.drive.place.turn) * body.shape->radius;
-  if (body.spec->kind == BodyKind::path) planBetween(body, coordinate, tick);
+  std::tie(plan.coordinate, body.drive.rate) = nextCoordinate(body, tick);
+  if (body.spec->kind == BodyKind::path)
+    planPath(body, tick);
+  else
+    plan.places[1] = placeOf(*body.spec, plan.coordinate);
+  for (std::size_t i = 1; i <= plan.stretches; ++i)
+    plan.farthest =
+        std::max(plan.farthest, farthestWay(*body.shape, plan.places[0], plan.places[i]));
 }
 
 }  // namespace

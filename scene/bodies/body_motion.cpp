@@ -1,6 +1,7 @@
 // How doors, lifts and things on paths move: each in turn, in the order of the model, swept against
 // the avatars where these stand now. (Free bodies give way in the solver, or are pushed there;
 // driven ones are not asked for by one another.)
+//  0. Of a path each stretch between two of its places is gone by itself, straight and evenly.
 //  1. Riders that the body would lift go first; what it leaves behind follows it afterwards.
 //  2. The body goes until it comes near something. That is pushed along the normal by as much as
 //     the body still needs, by a sweep of its own, so that a push crosses nothing.
@@ -27,11 +28,15 @@ BodyWay wayOf(const Body& body, const BodyPlace& to) {
           to.turn - from.turn};
 }
 
+/// A point of the scene's frame in the body's.
+Vec3 inBody(const Body& body, const Vec3& point) {
+  return body.rotation.transpose() * (point - body.position);
+}
+
 /// Where a point that moves with the body would come to.
 Vec3 carried(const Body& body, const BodyPlace& to, const Vec3& point) {
   const collision::Pose pose = poseAt(*body.spec, to);
-  const Vec3 local = body.rotation.transpose() * (point - body.position);
-  return pose.rotation.toRotationMatrix() * local + pose.translation;
+  return pose.rotation.toRotationMatrix() * inBody(body, point) + pose.translation;
 }
 
 /// Moves the avatar by `wish` as far as it can, sliding along what is met.
@@ -73,7 +78,7 @@ void meet(const Body& body, const BodyWay& way, double farthest, Avatar& avatar,
     for (std::size_t part = 0; part < body.partBoxes.size(); ++part) {
       if (!overlaps(box, body.partBoxes[part])) continue;
       const BodySweep sweep =
-          sweepTurning(body.shape->parts[part], way, bodyAt(limb, avatar.feet), band, count);
+          sweepTurning({body.shape->parts[part], way}, bodyAt(limb, avatar.feet), band, count);
       if (sweep.stopped && (!first.avatar || sweep.fraction < first.sweep.fraction))
         first = {&avatar, sweep};
     }
@@ -96,7 +101,7 @@ std::vector<Avatar*> avatarsNear(WorldState& world, const Body& body) {
 
 struct Rider {
   Avatar* avatar;
-  Vec3 contact;  ///< on the body, scene frame, before it moves
+  Vec3 contact;  ///< on the body, in its frame
 };
 
 /// Who stands on the body.
@@ -108,7 +113,7 @@ std::vector<Rider> ridersOf(const WorldState& world, const Body& body,
     for (const Contact& contact : avatar->contacts) {
       const bool below = -contact.decision.normal.y() >= world.lengths.walkableNormalY;
       if (contact.other == body.id && contact.touching && below)
-        riders.push_back({avatar, contact.decision.pointB});
+        riders.push_back({avatar, inBody(body, contact.decision.pointB)});
     }
   }
   return riders;
@@ -150,16 +155,16 @@ void tellBlocked(const WorldState& world, Body& body, const Encounter& met, Tick
   report.contacts.push_back(eventOf(world, ContactEvent::Kind::blocked, body.id, contact));
 }
 
-/// Goes on, pushing, until the body is there or blocked; what part of the coordinate was made.
-double advance(WorldState& world, Body& body, const std::vector<Avatar*>& near, TickReport& report,
-               QueryCount& count) {
-  const BodyPlace to = body.plan.place;
+/// Goes on, pushing, until the body is at `to` or blocked; what part of the way was made.
+double advance(WorldState& world, Body& body, const BodyPlace& to, const std::vector<Avatar*>& near,
+               TickReport& report, QueryCount& count) {
   double left = 1;
   Encounter met;
   for (int i = 0; i < kPushes; ++i) {
     met = {};
     const BodyWay way = wayOf(body, to);
-    for (Avatar* avatar : near) meet(body, way, body.plan.farthest, *avatar, world, met, count);
+    const double farthest = farthestWay(*body.shape, body.drive.place, to);
+    for (Avatar* avatar : near) meet(body, way, farthest, *avatar, world, met, count);
     commit(body, to, met.sweep.fraction);
     left *= 1 - met.sweep.fraction;
     if (!met.avatar) {
@@ -173,36 +178,59 @@ double advance(WorldState& world, Body& body, const std::vector<Avatar*>& near, 
   return 1 - left;
 }
 
-void arrive(Body& body, double made) {
-  BodyDrive& drive = body.drive;
-  if (made == 1) {
-    drive.coordinate = body.plan.coordinate;
-    const bool goesRound = body.spec->kind == BodyKind::path && body.spec->loops;
-    if (!goesRound && drive.coordinate == drive.target) drive.going = false;
-  } else if (body.plan.coordinate > drive.coordinate || !body.spec->loops) {
-    drive.coordinate += made * (body.plan.coordinate - drive.coordinate);
+/// The same, and who stands on the body goes along.
+double advanceWithRiders(WorldState& world, Body& body, const BodyPlace& to,
+                         const std::vector<Avatar*>& near, const std::vector<Rider>& riders,
+                         TickReport& report, QueryCount& count) {
+  std::vector<Vec3> before;
+  for (const Rider& rider : riders) {
+    before.push_back(body.rotation * rider.contact + body.position);
+    const Vec3 way = carried(body, to, before.back()) - before.back();
+    if (way.y() > 0) shove(world, *rider.avatar, way, count);
   }
+  const double made = advance(world, body, to, near, report, count);
+  for (std::size_t i = 0; i < riders.size(); ++i) {
+    const Vec3 way = body.rotation * riders[i].contact + body.position - before[i];
+    if (way.y() <= 0) shove(world, *riders[i].avatar, way, count);
+  }
+  return made;
+}
+
+/// Goes the plan's stretches until one is blocked; what part of the plan was made. What it did not
+/// reach is where it stays.
+double followPlan(WorldState& world, Body& body, TickReport& report, QueryCount& count) {
+  const std::vector<Avatar*> near = avatarsNear(world, body);
+  const std::vector<Rider> riders = ridersOf(world, body, near);
+  BodyPlan& plan = body.plan;
+  for (std::size_t i = 0; i < plan.stretches; ++i) {
+    const double made =
+        advanceWithRiders(world, body, plan.places[i + 1], near, riders, report, count);
+    if (made == 1) continue;
+    std::fill(&plan.places[i + 1], plan.places.end(), body.drive.place);
+    return (static_cast<double>(i) + made) / static_cast<double>(plan.stretches);
+  }
+  return 1;
+}
+
+void arrive(Body& body, double made, double tick) {
+  BodyDrive& drive = body.drive;
+  const double coordinate = body.plan.coordinate;
+  if (made == 1)
+    drive.coordinate = coordinate;
+  else if (goesRound(*body.spec))
+    drive.coordinate =
+        std::fmod(drive.coordinate + made * drive.speed * tick, body.spec->keys.back().time);
+  else
+    drive.coordinate += made * (coordinate - drive.coordinate);
+  drive.going = goesRound(*body.spec) || drive.coordinate != drive.target;
 }
 
 void moveBody(WorldState& world, Body& body, TickReport& report, QueryCount& count) {
-  const std::vector<Avatar*> near = avatarsNear(world, body);
-  const Vec3 position = body.position;
-  const double turn = body.drive.place.turn;
-  const std::vector<Rider> riders = ridersOf(world, body, near);
-  std::vector<Vec3> local;
-  for (const Rider& rider : riders) {
-    local.push_back(body.rotation.transpose() * (rider.contact - position));
-    const Vec3 way = carried(body, body.plan.place, rider.contact) - rider.contact;
-    if (way.y() > 0) shove(world, *rider.avatar, way, count);
-  }
-  arrive(body, advance(world, body, near, report, count));
-  for (std::size_t i = 0; i < riders.size(); ++i) {
-    const Vec3 way = body.rotation * local[i] + body.position - riders[i].contact;
-    if (way.y() <= 0) shove(world, *riders[i].avatar, way, count);
-  }
+  const Vec3 before = body.position;
   const double tick = world.lengths.tick;
-  body.velocity = (body.position - position) / tick;
-  body.spin = (body.drive.place.turn - turn) / tick * body.spec->axis;
+  arrive(body, followPlan(world, body, report, count), tick);
+  body.velocity = (body.position - before) / tick;
+  body.spin = (body.drive.place.turn - body.plan.places[0].turn) / tick * body.spec->axis;
 }
 
 }  // namespace

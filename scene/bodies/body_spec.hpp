@@ -85,6 +85,11 @@ constexpr bool isKinematic(BodyKind kind) {
   return kind != BodyKind::rigid && kind != BodyKind::trigger;
 }
 
+/// A path that begins again, whenever it goes.
+inline bool goesRound(const BodySpec& body) {
+  return body.kind == BodyKind::path && body.loops;
+}
+
 /// Of the coordinate of a kinematic body: low, high.
 std::pair<double, double> limitsOf(const BodySpec& spec);
 

@@ -1,4 +1,4 @@
-// How far a body that moves and turns may go towards something that stands.
+// How far a body that moves and turns may go towards something else.
 #pragma once
 
 #include "collision/time_of_impact.hpp"
@@ -18,18 +18,27 @@ struct BodyWay {
   Vec3 positionAt(double s) const { return position + s * move; }
 };
 
-struct BodySweep {
-  double fraction = 1;         ///< 0..1 of the way that may be made
-  bool stopped = false;        ///< by what stands; else `fraction` is 1
-  collision::Decision atStop;  ///< at `fraction`, from the body to what stands; only when stopped
+/// A part of a body (its vertices in the body's frame) that goes a way.
+struct MovingPart {
+  const collision::Hull& hull;
+  const BodyWay& way;
 };
 
-/// Moves a part (`radius` about the body's origin) along the way towards `other`, which stands. As
-/// for collision::sweep(): over what is granted the two stay at least min(band.low, their distance
-/// at the start) apart, up to the rounding of a turned pose, and a stop is at about band.high.
-/// Where they start nearer than band.low, only what does not close in is granted.
-BodySweep sweepTurning(const collision::Hull& part, const BodyWay& way,
-                       const collision::ConvexBody& other, const collision::StoppingBand& band,
-                       QueryCount& count);
+struct BodySweep {
+  double fraction = 1;         ///< 0..1 of the way that may be made
+  bool stopped = false;        ///< by the other; else `fraction` is 1
+  collision::Decision atStop;  ///< at `fraction`, from the body to the other; only when stopped
+};
+
+/// Moves a part along its way towards `other`, which stands. As for collision::sweep(): over what
+/// is granted the two stay at least min(band.low, their distance at the start) apart, up to the
+/// rounding of a turned pose, and a stop is at about band.high. Where they start nearer than
+/// band.low, only what does not close in is granted.
+BodySweep sweepTurning(const MovingPart& part, const collision::ConvexBody& other,
+                       const collision::StoppingBand& band, QueryCount& count);
+
+/// The same of two that go their ways at the same time.
+BodySweep sweepTurning(const MovingPart& part, const MovingPart& other,
+                       const collision::StoppingBand& band, QueryCount& count);
 
 }  // namespace enfilade::scene

@@ -3,18 +3,17 @@
 // are mounted on is left out (mounting.hpp). Their nearest parts decide, found without a memory of
 // the last tick, so that nothing but where they stand shows in the numbers.
 //
-// Two that are clear of one another before and after the tick may have met in it. Between the ticks
-// both go and turn evenly, and no point of either farther than it is told here; so from where they
-// are d apart they stay clear for as much of the way as brings them d nearer (conservative
-// advancement, from the end back to the beginning). A step is worth half a contact's distance at
-// least: who came nearer than 3/4 of it is not missed, unless kMostLooks end the search, which is
-// counted. Of a path that turns back within the tick only the ends are known here.
+// Two that are clear of one another before and after the tick may have met in it. Where their ways
+// are longer than the room between them, their parts are swept (body_sweep.hpp), stretch by
+// stretch, as far as they do not come nearer than 3/4 of a contact's distance.
+#include <cmath>
 #include <limits>
 #include <set>
+#include <utility>
 
 #include "collision/refine.hpp"
+#include "scene/bodies/body_sweep.hpp"
 #include "scene/bodies/mounting.hpp"
-#include "scene/rotation.hpp"
 #include "scene/world_state.hpp"
 
 namespace enfilade::scene {
@@ -23,7 +22,6 @@ namespace {
 using Key = std::pair<EntityId, EntityId>;
 
 constexpr double kAnyDistance = std::numeric_limits<double>::infinity();
-constexpr int kMostLooks = 256;  // back on the way of one pair in one tick; usual are none or few
 constexpr double kRounding = 1e-9;  // relative, of a way: more than turning and summing may err
 
 const Body* drivenBody(const WorldState& world, EntityId id) {
@@ -33,55 +31,64 @@ const Body* drivenBody(const WorldState& world, EntityId id) {
   return isKinematic(body.spec->kind) ? &body : nullptr;
 }
 
-/// About the body's axis, in this tick.
-double turnOf(const WorldState& world, const Body& body) {
-  return body.spin.dot(body.spec->axis) * world.lengths.tick;
-}
-
-/// Metres: no point of the entity goes farther in this tick.
+/// Metres: no point of the entity went farther in this tick.
 double wayOf(const WorldState& world, EntityId entity) {
   const Body* body = drivenBody(world, entity);
   if (!body || !body->moved) return 0;
-  const double turn = std::abs(turnOf(world, *body)) * body->shape->radius;
-  return ((body->position - body->positionBefore).norm() + turn) * (1 + kRounding);
+  const BodyPlan& plan = body->plan;
+  double way = 0;
+  for (std::size_t i = 0; i < plan.stretches; ++i)
+    way += farthestWay(*body->shape, plan.places[i], plan.places[i + 1]);
+  return way * (1 + kRounding);
 }
 
-/// All that it went through in this tick.
-Box wayBoxOf(const WorldState& world, const Body& body) {
-  Box box = boxOf(body);
-  if (!body.moved) return box;
-  const double turn = std::abs(turnOf(world, body)) * body.shape->radius;
-  for (int axis = 0; axis < 3; ++axis) {  // a point turns across the axis alone
-    const double along = body.spec->axis[axis];
-    const double across = std::sqrt(std::max(0.0, 1 - along * along)) + kRounding;
-    const double moved = std::abs(body.position[axis] - body.positionBefore[axis]);
-    const double way = (moved + across * turn) * (1 + kRounding);
-    box.min[axis] -= way, box.max[axis] += way;
+/// Along each axis: no point of the body was farther in this tick from where it is now.
+Vec3 strayOf(const Body& body) {
+  Vec3 stray = Vec3::Zero();
+  if (!body.moved) return stray;
+  const BodyPlace& now = body.drive.place;
+  for (std::size_t i = 0; i < body.plan.stretches; ++i) {
+    const BodyPlace& place = body.plan.places[i];
+    const double turn = std::abs(place.turn - now.turn) * body.shape->radius;
+    for (int axis = 0; axis < 3; ++axis) {  // a point turns across the axis alone
+      const double along = body.spec->axis[axis];
+      const double across = std::sqrt(std::max(0.0, 1 - along * along)) + kRounding;
+      const double moved = std::abs(place.offset[axis] - now.offset[axis]);
+      stray[axis] = std::max(stray[axis], (moved + across * turn) * (1 + kRounding));
+    }
   }
-  return box;
+  return stray;
 }
 
-/// Whether they may have been nearer than `within` in this tick, by boxes.
-bool mayMeet(const WorldState& world, const Key& key, double within) {
-  const Box way = grown(wayBoxOf(world, *drivenBody(world, key.first)), within);
-  if (const Body* other = drivenBody(world, key.second))
-    return overlaps(way, wayBoxOf(world, *other));
+Box widened(const Box& box, const Vec3& by) {
+  return {box.min - by, box.max + by};
+}
+
+/// Parts of the entity that may have been within `way` in this tick, by boxes.
+std::vector<std::uint32_t> partsWithin(const WorldState& world, EntityId entity, const Box& way) {
   std::vector<std::uint32_t> parts;
-  world.scene->parts(key.second - 1).query(way, parts);
-  return !parts.empty();
+  const Body* body = drivenBody(world, entity);
+  if (!body) {
+    world.scene->parts(entity - 1).query(way, parts);
+    return parts;
+  }
+  const Vec3 stray = strayOf(*body);
+  if (!overlaps(way, widened(boxOf(*body), stray))) return parts;
+  for (std::uint32_t i = 0; i < body->partBoxes.size(); ++i)
+    if (overlaps(way, widened(body->partBoxes[i], stray))) parts.push_back(i);
+  return parts;
 }
 
-/// Where it is at `part` of the tick; 1: now.
-collision::Pose poseAt(const WorldState& world, const Body& body, double part) {
-  if (!body.moved || part == 1) return {body.orientation, body.position};
-  const Vec3 way = body.position - body.positionBefore;
-  const collision::Quat turned = rotationAbout(body.spec->axis, part * turnOf(world, body));
-  return {(turned * body.orientationBefore).normalized(), body.positionBefore + part * way};
+/// Whether they may have been nearer than `within` in this tick.
+bool mayMeet(const WorldState& world, const Key& key, double within) {
+  const Body& body = *drivenBody(world, key.first);
+  const Vec3 stray = strayOf(body) + Vec3::Constant(within);
+  return !partsWithin(world, key.second, widened(boxOf(body), stray)).empty();
 }
 
-std::vector<collision::TreeOfParts> treesAt(const WorldState& world, EntityId entity, double part) {
+std::vector<collision::TreeOfParts> treesNow(const WorldState& world, EntityId entity) {
   if (const Body* body = drivenBody(world, entity))
-    return {treeAt(*body->shape, poseAt(world, *body, part))};
+    return {treeAt(*body->shape, {body->orientation, body->position})};
   return treesOf(world.scene->parts(entity - 1));
 }
 
@@ -111,12 +118,11 @@ std::set<Key> pairsOfMoved(const WorldState& world) {
   return pairs;
 }
 
-/// How they stand to one another at `part` of the tick; nullopt if they are farther apart than
-/// `within`.
-std::optional<Contact> look(const WorldState& world, const Key& key, double part, double within,
+/// How they stand to one another; nullopt if they are farther apart than `within`.
+std::optional<Contact> look(const WorldState& world, const Key& key, double within,
                             QueryCount& count) {
   std::size_t work = std::numeric_limits<std::size_t>::max();
-  const auto first = treesAt(world, key.first, part), second = treesAt(world, key.second, part);
+  const auto first = treesNow(world, key.first), second = treesNow(world, key.second);
   const collision::NearestParts nearest = collision::nearestParts(first, second, within, work);
   ++count.narrow;
   if (nearest.found != collision::NearestParts::Found::nearest) return std::nullopt;
@@ -130,21 +136,51 @@ std::optional<Contact> look(const WorldState& world, const Key& key, double part
   return found;
 }
 
-/// How they touched on their ways in this tick, after which they are `apart` metres apart.
-std::optional<Contact> touchOnTheWay(const WorldState& world, const Key& key, double apart,
-                                     QueryCount& count) {
+/// The i-th of n equal parts of the body's tick: of its stretches, or of the one that it has.
+BodyWay wayIn(const Body& body, std::size_t i, std::size_t n) {
+  const auto place = [&](std::size_t at) {
+    const BodyPlan& plan = body.plan;
+    if (!body.moved) return body.drive.place;
+    if (plan.stretches == n) return plan.places[at];
+    return placeBetween(plan.places[0], plan.places[1],
+                        static_cast<double>(at) / static_cast<double>(n));
+  };
+  const BodyPlace from = place(i), to = place(i + 1);
+  const collision::Pose pose = poseAt(*body.spec, from);
+  return {pose.rotation.toRotationMatrix(), pose.translation, to.offset - from.offset,
+          body.spec->axis, to.turn - from.turn};
+}
+
+/// How they touched first on their ways in this tick.
+std::optional<Contact> touchOnTheWay(const WorldState& world, const Key& key, QueryCount& count) {
   const double contact = contactLimit(world.lengths);
-  const double way = wayOf(world, key.first) + wayOf(world, key.second);
-  double part = 1;
-  for (int i = 0; i < kMostLooks; ++i) {
-    part -= std::max(apart - contact, contact / 2) / way;
-    if (part <= 0) return std::nullopt;
-    const auto found = look(world, key, part, contact + part * way, count);
-    if (!found) return std::nullopt;
-    if (found->touching) return found;
-    apart = found->decision.distance * (1 - kRounding);
+  const collision::StoppingBand band{0.75 * contact, (1 - kRounding) * contact};
+  const Body& body = *drivenBody(world, key.first);
+  const Body* other = drivenBody(world, key.second);
+  const Vec3 stray = strayOf(body) + Vec3::Constant(contact);
+  const std::size_t n = std::max(body.plan.stretches, other ? other->plan.stretches : 1);
+  for (std::size_t i = 0; i < n; ++i) {
+    const BodyWay way = wayIn(body, i, n);
+    const BodyWay otherWay = other ? wayIn(*other, i, n) : BodyWay();
+    BodySweep first;
+    for (std::size_t k = 0; k < body.partBoxes.size(); ++k) {
+      const MovingPart part{body.shape->parts[k], way};
+      for (const std::uint32_t met :
+           partsWithin(world, key.second, widened(body.partBoxes[k], stray))) {
+        const BodySweep sweep =
+            other ? sweepTurning(part, MovingPart{other->shape->parts[met], otherWay}, band, count)
+                  : sweepTurning(part, world.scene->parts(key.second - 1).body(met), band, count);
+        if (sweep.fraction < first.fraction) first = sweep;
+      }
+    }
+    if (first.stopped && first.atStop.distance < contact) {
+      Contact touch;
+      touch.other = key.second;
+      touch.touching = true;
+      touch.decision = first.atStop;
+      return touch;
+    }
   }
-  ++count.bounded;
   return std::nullopt;
 }
 
@@ -159,12 +195,12 @@ DrivenContacts drivenContacts(WorldState& world, const Nearness& nearness, Query
     if (isMounted(world, key, nearness.contact)) continue;
     const double way = wayOf(world, key.first) + wayOf(world, key.second);
     const double within = std::max(nearness.limit, nearness.contact + way);
-    const auto found = look(world, key, 1, lasted ? kAnyDistance : within, count);
+    const auto found = look(world, key, lasted ? kAnyDistance : within, count);
     if (!found) continue;
     const double apart = found->decision.distance;
     std::optional<Contact> met;
     if (!found->touching && !(lasted && before->second.touching) && apart < nearness.contact + way)
-      met = touchOnTheWay(world, key, apart, count);
+      met = touchOnTheWay(world, key, count);
     if (met) driven.onTheWay[key] = *met;
     if (lasted || met || found->touching || apart < nearness.limit) driven.now[key] = *found;
   }

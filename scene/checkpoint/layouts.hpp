@@ -321,7 +321,7 @@ template <>
 struct Layout<BodyPlan> {
   template <class A>
   static void archive(A& a, Held<A, BodyPlan>& plan) {
-    auto& [place, coordinate, farthest, winds, from, between] = plan;
+    auto& [stretches, places, coordinate, farthest] = plan;
     a(farthest);
   }
 };

@@ -264,17 +264,16 @@ void placeDriven(Solid& solid, const Vec3& position, const collision::Quat& orie
                                    (solid.rotation - turned).norm() * solid.radius);
 }
 
-/// The motion in each substep of a path that was gone all the way.
+/// The motion in each substep of what goes on a path.
 std::vector<Gait> gaitsOf(const Body& body, double tick) {
   std::vector<Gait> gaits;
   const BodyPlan& plan = body.plan;
-  if (!plan.winds || !body.drive.going || body.blockedBy != 0) return gaits;
+  if (plan.stretches != kSolverSubsteps || plan.farthest == 0) return gaits;
   const double seconds = tick / kSolverSubsteps;
-  BodyPlace last = plan.from;
-  for (const BodyPlace& place : plan.between) {
-    gaits.push_back({(place.offset - last.offset) / seconds,
-                     (place.turn - last.turn) / seconds * body.spec->axis});
-    last = place;
+  for (std::size_t i = 0; i < kSolverSubsteps; ++i) {
+    const BodyPlace &from = plan.places[i], &to = plan.places[i + 1];
+    gaits.push_back(
+        {(to.offset - from.offset) / seconds, (to.turn - from.turn) / seconds * body.spec->axis});
   }
   return gaits;
 }

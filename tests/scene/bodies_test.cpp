@@ -248,6 +248,60 @@ TEST(Bodies, ATurntableThatLoopsTurnsOnEvenlyAndCarriesWhoStandsOnIt) {
   EXPECT_TRUE(t.told(ContactEvent::Kind::blocked, "plate", "ann") == 0);
 }
 
+/// A block of 1 m that goes to `offset` and back in each tick; it stands where it began after all.
+Model shaker(const Vec3& offset) {
+  Model model = boxModel({floorBox(), {"block", {-0.5, 0.1, -0.5}, {0.5, 1.1, 0.5}}});
+  BodySpec spec = bodySpec("block", BodyKind::path, {1});
+  spec.keys = {{0, Vec3::Zero(), 0}, {1.0 / 120, offset, 0}, {1.0 / 60, Vec3::Zero(), 0}};
+  spec.loops = true;
+  spec.runs = false;
+  model.bodies.push_back(spec);
+  return model;
+}
+
+TEST(Bodies, WhoStandsInTheWayOfAPathThatTurnsBackWithinATickIsPushed) {
+  BodyTrial t(shaker({0.2, 0, 0}));
+  t.order("ann", Spawn{.at = {0.9, 0.01, 0}});  // 0.3 m in radius: 0.1 m from the block
+  t.ticks(10);
+  EXPECT_NEAR(t.feet("ann").x(), 0.9, 1e-6);
+  t.tell({"block", Action::run, 0, 0, {}});
+  t.ticks(10);
+  EXPECT_NEAR(t.feet("ann").x(), 1, 2e-3);
+  EXPECT_NEAR(t.body("block").position.x(), 0, 1e-9);
+  EXPECT_EQ(whoPenetrates(t.world), "");
+}
+
+TEST(Bodies, WhoCannotYieldStopsAPathThatTurnsBackWithinATickOnItsWay) {
+  Model model = shaker({0.2, 0, 0});
+  model.meshes.push_back(boxMesh({1.21, 0, -2}, {1.3, 3, 2}));
+  model.objects.push_back({"wall", "", {2}, Eigen::Affine3d::Identity()});
+  BodyTrial t(std::move(model));
+  t.order("ann", Spawn{.at = {0.9, 0.01, 0}});
+  t.tell({"block", Action::run, 0, 0, {}});
+  t.ticks(20);
+  EXPECT_EQ(t.told(Event::blocked, "block", "ann"), 1);
+  EXPECT_NEAR(t.body("block").position.x(), 0.11, 5e-3) << "where she leaves it no more room";
+  EXPECT_EQ(whoPenetrates(t.world), "");
+  t.order("ann", Leave{});
+  for (int i = 0; i < 10; ++i) {
+    t.step();
+    EXPECT_EQ(t.body("block").blockedBy, 0u);
+  }
+}
+
+TEST(Bodies, WhoStandsOnAPathThatTurnsBackWithinATickIsLiftedAndLetDown) {
+  BodyTrial t(shaker({0, 0.01, 0}));
+  t.order("ann", Spawn{.at = {0, 1.11, 0}});
+  t.ticks(10);
+  t.tell({"block", Action::run, 0, 0, {}});
+  for (int i = 0; i < 60; ++i) {
+    t.step();
+    EXPECT_NEAR(t.feet("ann").y(), 1.1, 2e-3) << i;
+    EXPECT_EQ(t.body("block").blockedBy, 0u) << i;
+  }
+  EXPECT_EQ(whoPenetrates(t.world), "");
+}
+
 TEST(Bodies, APathThatLoopsEndsTurnedAsItBegan) {
   Model model = boxModel({floorBox(), {"plate", {0, 1, 0}, {1, 2, 1}}});
   BodySpec spec = bodySpec("plate", BodyKind::path, {1});

@@ -156,6 +156,61 @@ TEST(DrivenContacts, ALeafThatTurnsPastAPostBetweenTwoTicksTouchesIt) {
   EXPECT_EQ(t.events.size(), 2u);
 }
 
+TEST(DrivenContacts, APathThatTurnsBackWithinATickTouchesWhatItReaches) {
+  // Out to 0.2 m and back in each tick, turning by as much as that: at rest before and after.
+  Model model = boxModel({{"arm", {0, 0, -0.05}, {1, 0.1, 0.05}},
+                          {"post", {1.15, 0, -0.05}, {1.16, 2, 0.05}},
+                          {"far post", {1.203, 0, -0.05}, {1.21, 2, 0.05}},
+                          {"side post", {0.5, 0, 0.2}, {0.51, 2, 0.25}}});
+  BodySpec arm = bodySpec("arm", BodyKind::path, {0});
+  arm.keys = {{0, Vec3::Zero(), 0}, {1.0 / 120, {0.2, 0, 0}, 0}, {1.0 / 60, Vec3::Zero(), 0}};
+  arm.loops = true;
+  model.bodies = {arm};
+  BodyTrial t(model);
+  for (int i = 1; i <= 5; ++i) {
+    t.step();
+    EXPECT_EQ(t.told(Event::begin, "arm", "post"), i);
+    EXPECT_EQ(t.told(Event::end, "arm", "post"), i);
+    EXPECT_EQ(t.events.size(), 2u * static_cast<std::size_t>(i));
+  }
+  model.bodies[0].keys[1] = {1.0 / 120, Vec3::Zero(), -1};
+  BodyTrial turning(std::move(model));
+  turning.step();
+  EXPECT_EQ(turning.told(Event::begin, "arm", "side post"), 1);
+  EXPECT_EQ(turning.events.size(), 2u);
+}
+
+/// Two blocks of 0.1 m. In one tick one goes 1 m along x from `x` on, and the other one from
+/// `z` on as `kind` has it: a slide of 1 m along z, or a path that comes back after half a metre.
+BodyTrial crossing(double x, BodyKind kind, double z) {
+  Model model = boxModel({{"a", {x - 0.05, 0, -0.05}, {x + 0.05, 0.1, 0.05}},
+                          {"b", {-0.05, 0, z - 0.05}, {0.05, 0.1, z + 0.05}}});
+  BodySpec a = bodySpec("a", BodyKind::sliding, {0}), b = bodySpec("b", kind, {1});
+  a.axis = Vec3::UnitX(), b.axis = Vec3::UnitZ();
+  a.high = b.high = 1, a.speed = b.speed = 60;
+  if (kind == BodyKind::path) {
+    b.keys = {{0, Vec3::Zero(), 0}, {1.0 / 120, {0, 0, 0.5}, 0}, {1.0 / 60, Vec3::Zero(), 0}};
+    b.loops = true, b.speed = 1;
+  }
+  model.bodies = {a, b};
+  BodyTrial t(std::move(model));
+  t.tell({"a", Action::to, 1, 0, {}});
+  if (kind == BodyKind::sliding) t.tell({"b", Action::to, 1, 0, {}});
+  t.step();
+  return t;
+}
+
+TEST(DrivenContacts, TwoWhoseWaysCrossTouchIfTheyAreThereAtTheSameTime) {
+  for (const BodyKind kind : {BodyKind::sliding, BodyKind::path}) {
+    const BodyTrial meet = crossing(-0.5, kind, -0.5);
+    EXPECT_EQ(meet.told(Event::begin, "a", "b"), 1);
+    EXPECT_EQ(meet.told(Event::end, "a", "b"), 1);
+    EXPECT_EQ(meet.events.size(), 2u);
+    EXPECT_EQ(crossing(-0.75, kind, -0.5).events.size(), 0u) << "the second is through already";
+    EXPECT_EQ(crossing(-0.25, kind, -0.5).events.size(), 0u) << "the first is through already";
+  }
+}
+
 /// The first object slides along x by `high` metres; near misses begin at 0.3 m.
 BodyTrial trayThatSlid(Model model, double high) {
   BodySpec tray = bodySpec("tray", BodyKind::sliding, {0});
@@ -234,6 +289,23 @@ TEST(DrivenContacts, BodiesThatStandAreNotLookedAt) {
   EXPECT_LE(ofOne, 12u) << "the floor and its neighbours; the wall is what it is mounted on";
 }
 
+TEST(DrivenContacts, ALeafThatGlidesAlongItsFrameIsLookedAtAFewTimes) {
+  // 2 mm from jamb, head and floor; its edge goes 26 mm a tick.
+  Model model = boxModel({floorBox(),
+                          {"leaf", {0, 0.002, 0}, {1, 2, 0.04}},
+                          {"jamb", {-0.1, 0, 0}, {-0.002, 2.2, 0.04}},
+                          {"head", {-0.1, 2.002, -2}, {1.2, 2.2, 2}}});
+  BodySpec leaf = leafSpec("door", 1, 0);
+  model.bodies = {leaf};
+  BodyTrial t(std::move(model));
+  t.tell({"door", Action::to, kQuarter, 0, {}});
+  int looks = 0;
+  for (int i = 0; i < 55; ++i) looks += static_cast<int>(t.step().narrowQueries);
+  EXPECT_TRUE(t.events.empty());
+  EXPECT_GE(looks, 2 * 55);
+  EXPECT_LT(looks, 4 * 55);
+}
+
 // ---- the slow twin ------------------------------------------------------------------------------
 
 class Chance {
@@ -276,6 +348,10 @@ Model busyYard(Chance& chance) {
     spec.speed = i % 4 == 1 ? chance.in(0.3, 3) : chance.in(10, 60);
     if (spec.kind == BodyKind::path) {
       spec.keys = {{0, Vec3::Zero(), 0}, {2, {chance.in(-3, 3), -0.3, 1}, 2}, {5, Vec3::Zero(), 0}};
+      if (chance.below(2) == 0)  // turns back within a tick, at times of its own
+        spec.keys = {{0, Vec3::Zero(), 0},
+                     {0.006, {chance.in(-1.5, 1.5), chance.in(-0.5, 0.5), 0.3}, 1},
+                     {chance.in(0.012, 0.03), Vec3::Zero(), 0}};
       spec.loops = true, spec.speed = 1;
     }
     model.bodies.push_back(spec);
@@ -292,6 +368,36 @@ ToldOnce someCommand(Chance& chance, const Model& model) {
   else
     told.bodies.push_back({spec.name, chance.below(3) == 0 ? Action::stop : Action::run, 0, 0, {}});
   return told;
+}
+
+BodyPlace between(const BodyPlace& a, const BodyPlace& b, double s) {
+  return {a.offset + s * (b.offset - a.offset), a.turn + s * (b.turn - a.turn)};
+}
+
+/// Where a path that loops is, by its keys one after another.
+BodyPlace onPath(const BodySpec& spec, double time) {
+  while (time < 0) time += spec.keys.back().time;
+  while (time >= spec.keys.back().time) time -= spec.keys.back().time;
+  std::size_t i = 1;
+  while (spec.keys[i].time < time) ++i;
+  const PathKey &a = spec.keys[i - 1], &b = spec.keys[i];
+  return between({a.offset, a.turn}, {b.offset, b.turn}, (time - a.time) / (b.time - a.time));
+}
+
+/// Where a body that nobody blocked was at `part` of the tick. A path is followed in four
+/// stretches.
+BodyPlace placeAt(const Body& body, double part, double tick) {
+  const BodyPlace now = body.drive.place;
+  if (part == 1 || !body.moved) return now;
+  if (body.spec->kind != BodyKind::path) {
+    const double back = (part - 1) * tick;
+    return {now.offset + back * body.velocity, now.turn + back * body.spin.dot(body.spec->axis)};
+  }
+  const auto station = [&](double quarter) {
+    return onPath(*body.spec, body.drive.coordinate - (1 - quarter / 4) * tick * body.drive.speed);
+  };
+  const double quarter = std::floor(4 * part);
+  return between(station(quarter), station(quarter + 1), 4 * part - quarter);
 }
 
 /// All pairs of which one is driven, part by part by the exact verdict at every tick.
@@ -313,12 +419,12 @@ struct SlowTwin {
     std::vector<collision::ConvexBody> parts;
     if (const auto body = state.bodyOfId.find(id); body != state.bodyOfId.end()) {
       const Body& b = state.bodies[body->second];
-      const double back = (part - 1) * world.lengths().tick;
-      turned = Eigen::AngleAxisd(back * b.spin.dot(b.spec->axis), b.spec->axis) * b.rotation;
+      const BodyPlace place = placeAt(b, part, world.lengths().tick);
+      turned = Eigen::AngleAxisd(place.turn, b.spec->axis);
       for (std::uint32_t i = 0; i < b.shape->parts.size(); ++i) {
         parts.push_back(partOf(b, i));
         if (part == 1) continue;
-        parts.back().translation += back * b.velocity;
+        parts.back().translation = b.spec->anchor + place.offset;
         parts.back().rotation = &turned;
       }
     } else {
@@ -354,12 +460,20 @@ struct SlowTwin {
     state.near = !state.touching && state.distance < world.lengths().nearMiss;
     return state;
   }
-  /// Metres: no point of it went farther.
+  /// Metres: no point of it went farther, and in each part of the tick that part at most.
   double wayOf(EntityId id) const {
     const auto at = world.state().bodyOfId.find(id);
     if (at == world.state().bodyOfId.end()) return 0;
     const Body& body = world.state().bodies[at->second];
-    return world.lengths().tick * (body.velocity.norm() + body.spin.norm() * body.shape->radius);
+    if (!body.moved) return 0;
+    double fastest = 0;
+    for (int i = 0; i < 4; ++i) {
+      const BodyPlace a = placeAt(body, i / 4.0, world.lengths().tick),
+                      b = placeAt(body, (i + 1) / 4.0, world.lengths().tick);
+      fastest = std::max(
+          fastest, (a.offset - b.offset).norm() + std::abs(a.turn - b.turn) * body.shape->radius);
+    }
+    return 4 * fastest;
   }
   /// How near they came in the tick after which they are `apart`, as samples tell.
   double nearestOnTheWay(const Key& key, double apart) const {
@@ -379,7 +493,8 @@ struct SlowTwin {
     const double nearest = nearestOnTheWay(key, apart);
     const double contact = 2 * world.lengths().epsilon;
     if (!met) {
-      EXPECT_GE(nearest, 0.75 * contact);
+      EXPECT_GE(nearest, 0.75 * contact)
+          << nameOf(world, key.first) << ", " << nameOf(world, key.second);
       return false;
     }
     EXPECT_LT(nearest, contact + (wayOf(key.first) + wayOf(key.second)) / kSamples);
@@ -444,7 +559,7 @@ struct SlowTwin {
   std::map<Key, bool> mounted, parting;
   std::map<Key, Pair> now;
   int begun = 0, begunNear = 0, onTheWay = 0;
-  static constexpr int kSamples = 24;
+  static constexpr int kSamples = 12;
 };
 
 TEST(DrivenContacts, AreThoseThatBruteForceFindsInBusyYards) {
@@ -455,7 +570,7 @@ TEST(DrivenContacts, AreThoseThatBruteForceFindsInBusyYards) {
     lengths.nearMiss = seed % 2 == 0 ? 0.15 : 0;
     World world(std::make_shared<const Scene>(busyYard(chance)), lengths);
     SlowTwin twin(world);
-    for (int i = 0; i < 300 && !::testing::Test::HasFailure(); ++i) {
+    for (int i = 0; i < 200 && !::testing::Test::HasFailure(); ++i) {
       if (i % 10 == 0) give(world, someCommand(chance, world.scene().model()));
       twin.follow(tick(world));
     }
@@ -470,7 +585,7 @@ TEST(DrivenContacts, AreThoseThatBruteForceFindsInBusyYards) {
 }
 
 TEST(DrivenContacts, ARestoredWorldGoesOnAlike) {
-  Chance chance(21);
+  Chance chance(22);
   Lengths lengths;
   lengths.nearMiss = 0.15;
   const auto scene = std::make_shared<const Scene>(busyYard(chance));
