@@ -120,32 +120,46 @@ std::pair<double, double> nextCoordinate(const Body& body, double tick) {
   return {std::clamp(drive.coordinate + rate * tick, low, high), rate};
 }
 
-/// A path that loops may have turned: the same pose, counted so that it is nearest to `turn`.
-double onBranchOf(double turn, double wound, const BodySpec& spec) {
-  const double round = spec.keys.back().turn - spec.keys.front().turn;
-  return round == 0 ? wound : wound - std::round((wound - turn) / round) * round;
+/// Radians that a path that loops turns by in each lap: 0, or whole turns.
+double turnOfLap(const BodySpec& spec) {
+  return spec.keys.back().turn - spec.keys.front().turn;
+}
+
+/// Where a path that loops is `time` seconds after a lap began; turns count on from lap to lap, and
+/// those of lap number `counted` are the keys'.
+BodyPlace placeOnLoop(const BodySpec& spec, double time, double counted) {
+  const double lap = spec.keys.back().time, at = std::fmod(time, lap);
+  BodyPlace place = placeOf(spec, at);
+  place.turn += (std::round((time - at) / lap) - counted) * turnOfLap(spec);
+  return place;
+}
+
+/// By as many laps more or less that it is nearest to `place`.
+double sameTurnNear(const BodyPlace& place, double turn, const BodySpec& spec) {
+  const double lap = turnOfLap(spec);
+  return lap == 0 ? turn : turn - std::round((turn - place.turn) / lap) * lap;
 }
 
 /// Where a path comes through, at the end of each of the solver's substeps; the last is the goal.
 void planPath(Body& body, double tick) {
   BodyPlan& plan = body.plan;
   const BodySpec& spec = *body.spec;
-  plan.stretches = kSolverSubsteps;
   const double now = body.drive.coordinate;
+  const bool loops = goesRound(spec);
+  const double way =
+      loops ? body.drive.speed * tick : plan.coordinate - now;  // seconds of the path
+  const double counted =
+      loops ? std::round((now + way - plan.coordinate) / spec.keys.back().time) : 0;
+  plan.stretches = kSolverSubsteps;
   for (std::size_t i = 1; i < kSolverSubsteps; ++i) {
-    const double part = static_cast<double>(i) / kSolverSubsteps;
-    const double at = goesRound(spec)
-                          ? std::fmod(now + part * body.drive.speed * tick, spec.keys.back().time)
-                          : now + part * (plan.coordinate - now);
-    plan.places[i] = placeOf(spec, at);
+    const double at = now + static_cast<double>(i) / kSolverSubsteps * way;
+    plan.places[i] = loops ? placeOnLoop(spec, at, counted) : placeOf(spec, at);
   }
   plan.places[kSolverSubsteps] = placeOf(spec, plan.coordinate);
-  if (!goesRound(spec)) return;
-  for (std::size_t i = kSolverSubsteps; i > 0; --i) {
-    double& turn = plan.places[i - 1].turn;
-    turn = onBranchOf(plan.places[i].turn, turn, spec);
-  }
-  body.drive.place.turn = plan.places[0].turn;
+  if (!loops) return;
+  double& turn = body.drive.place.turn;
+  turn = sameTurnNear(placeOnLoop(spec, now, counted), turn, spec);
+  plan.places[0].turn = turn;
 }
 
 void plan(Body& body, double tick) {

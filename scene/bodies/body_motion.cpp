@@ -17,7 +17,7 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr int kPushes = 64;         // in one tick of one body
+constexpr int kPushes = 64;         // on one stretch of one body
 constexpr int kPushSlides = 3;      // planes along which one push goes on
 constexpr double kYield = 1e-3;     // of epsilon: a push that gains less is none
 constexpr double kSidewards = 0.7;  // |normal.y| below which a push stays level
@@ -124,8 +124,7 @@ void commit(Body& body, const BodyPlace& to, double fraction) {
   if (fraction == 1) {
     place = to;
   } else {
-    place.offset += fraction * (to.offset - place.offset);
-    place.turn += fraction * (to.turn - place.turn);
+    place = placeBetween(place, to, fraction);
   }
   const collision::Pose pose = poseAt(*body.spec, place);
   placeBody(body, pose.translation, pose.rotation);
@@ -167,10 +166,7 @@ double advance(WorldState& world, Body& body, const BodyPlace& to, const std::ve
     for (Avatar* avatar : near) meet(body, way, farthest, *avatar, world, met, count);
     commit(body, to, met.sweep.fraction);
     left *= 1 - met.sweep.fraction;
-    if (!met.avatar) {
-      body.blockedBy = 0;
-      return 1;
-    }
+    if (!met.avatar) return 1;
     if (!push(world, body, to, met, count)) break;
     if (i + 1 == kPushes) ++count.bounded;
   }
@@ -206,9 +202,11 @@ double followPlan(WorldState& world, Body& body, TickReport& report, QueryCount&
     const double made =
         advanceWithRiders(world, body, plan.places[i + 1], near, riders, report, count);
     if (made == 1) continue;
-    std::fill(&plan.places[i + 1], plan.places.end(), body.drive.place);
+    std::fill(plan.places.begin() + static_cast<std::ptrdiff_t>(i) + 1, plan.places.end(),
+              body.drive.place);
     return (static_cast<double>(i) + made) / static_cast<double>(plan.stretches);
   }
+  body.blockedBy = 0;
   return 1;
 }
 

@@ -6,7 +6,8 @@
 //       d - low + g - c s - b s^2
 //     over all vertices, the plane parts the two by `low` at least.
 //  3. Go there, and look again. A stop is where `high` is reached first.
-// Of two that move each may use up half of d - low.
+// Of two that move, the plane goes along with the second one; if both turn, each may use up half of
+// d - low.
 // Departure: collision::timeOfImpact() finds the time of touching; a body must stop before it, at a
 // distance, and is near its goal most of the time, where the plane of the nearest face is a good
 // one.
@@ -70,8 +71,9 @@ BodySweep advance(const collision::StoppingBand& band, QueryCount& count, Look l
     result.atStop = decision;
     result.fraction = s;
     result.stopped = true;
-    if (decision.verdict != collision::Verdict::separated) return result;
     const double apart = decision.distance - decision.errorBound;
+    result.reached = decision.verdict != collision::Verdict::separated || apart <= band.high;
+    if (decision.verdict != collision::Verdict::separated) return result;
     const double proved = step(decision.normal, std::max(0.0, apart - band.low));
     if (s + proved >= 1) return {};
     if (proved < (apart <= band.high ? kWorthAStep : kLeastStep)) return result;
@@ -105,6 +107,10 @@ BodySweep sweepTurning(const MovingPart& part, const MovingPart& other,
                        const collision::StoppingBand& band, QueryCount& count) {
   collision::FeatureCache cache;
   collision::Mat3 rotation, otherRotation;
+  BodyWay relative = part.way, turning = other.way;
+  relative.move -= other.way.move;
+  turning.move = Vec3::Zero();
+  const double share = turning.turn == 0 ? 1 : 0.5;
   return advance(
       band, count,
       [&](double s) {
@@ -113,8 +119,9 @@ BodySweep sweepTurning(const MovingPart& part, const MovingPart& other,
         return collision::decide(bodyAt(part, s, rotation), bodyAt(other, s, otherRotation), cache);
       },
       [&](const Vec3& normal, double gap) {
-        return std::min(provedStep(part, rotation, normal, gap / 2),
-                        provedStep(other, otherRotation, -normal, gap / 2));
+        const double step = provedStep({part.hull, relative}, rotation, normal, share * gap);
+        if (turning.turn == 0) return step;
+        return std::min(step, provedStep({other.hull, turning}, otherRotation, -normal, gap / 2));
       });
 }
 

@@ -27,6 +27,7 @@ struct MovingPart {
 struct BodySweep {
   double fraction = 1;         ///< 0..1 of the way that may be made
   bool stopped = false;        ///< by the other; else `fraction` is 1
+  bool reached = false;        ///< stopped where it came to band.high; else the search was given up
   collision::Decision atStop;  ///< at `fraction`, from the body to the other; only when stopped
 };
 

@@ -42,14 +42,15 @@ double wayOf(const WorldState& world, EntityId entity) {
   return way * (1 + kRounding);
 }
 
-/// Along each axis: no point of the body was farther in this tick from where it is now.
-Vec3 strayOf(const Body& body) {
+/// The box of what is there now, no farther than `radius` from the body's origin, widened to all
+/// that it went through in this tick.
+Box wayBoxOf(const Body& body, const Box& box, double radius) {
+  if (!body.moved) return box;
   Vec3 stray = Vec3::Zero();
-  if (!body.moved) return stray;
   const BodyPlace& now = body.drive.place;
   for (std::size_t i = 0; i < body.plan.stretches; ++i) {
     const BodyPlace& place = body.plan.places[i];
-    const double turn = std::abs(place.turn - now.turn) * body.shape->radius;
+    const double turn = std::abs(place.turn - now.turn) * radius;
     for (int axis = 0; axis < 3; ++axis) {  // a point turns across the axis alone
       const double along = body.spec->axis[axis];
       const double across = std::sqrt(std::max(0.0, 1 - along * along)) + kRounding;
@@ -57,33 +58,50 @@ Vec3 strayOf(const Body& body) {
       stray[axis] = std::max(stray[axis], (moved + across * turn) * (1 + kRounding));
     }
   }
-  return stray;
+  return {box.min - stray, box.max + stray};
 }
 
-Box widened(const Box& box, const Vec3& by) {
-  return {box.min - by, box.max + by};
+Box wayBoxOf(const Body& body) {
+  return wayBoxOf(body, boxOf(body), body.shape->radius);
 }
 
-/// Parts of the entity that may have been within `way` in this tick, by boxes.
-std::vector<std::uint32_t> partsWithin(const WorldState& world, EntityId entity, const Box& way) {
-  std::vector<std::uint32_t> parts;
-  const Body* body = drivenBody(world, entity);
-  if (!body) {
-    world.scene->parts(entity - 1).query(way, parts);
-    return parts;
-  }
-  const Vec3 stray = strayOf(*body);
-  if (!overlaps(way, widened(boxOf(*body), stray))) return parts;
-  for (std::uint32_t i = 0; i < body->partBoxes.size(); ++i)
-    if (overlaps(way, widened(body->partBoxes[i], stray))) parts.push_back(i);
-  return parts;
+std::vector<Box> wayBoxesOfParts(const Body& body) {
+  std::vector<Box> boxes;
+  for (std::size_t i = 0; i < body.partBoxes.size(); ++i)
+    boxes.push_back(wayBoxOf(body, body.partBoxes[i], body.shape->parts[i].radius));
+  return boxes;
 }
 
-/// Whether they may have been nearer than `within` in this tick.
+/// Whether they may have been nearer than `within` in this tick, by boxes.
 bool mayMeet(const WorldState& world, const Key& key, double within) {
-  const Body& body = *drivenBody(world, key.first);
-  const Vec3 stray = strayOf(body) + Vec3::Constant(within);
-  return !partsWithin(world, key.second, widened(boxOf(body), stray)).empty();
+  const Box way = grown(wayBoxOf(*drivenBody(world, key.first)), within);
+  if (const Body* other = drivenBody(world, key.second)) return overlaps(way, wayBoxOf(*other));
+  std::vector<std::uint32_t> parts;
+  world.scene->parts(key.second - 1).query(way, parts);
+  return !parts.empty();
+}
+
+/// Parts of both that may have been nearer than `within` in this tick, by boxes.
+using PartPairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+PartPairs partsThatMayMeet(const WorldState& world, const Key& key, double within) {
+  const std::vector<Box> ways = wayBoxesOfParts(*drivenBody(world, key.first));
+  const Body* other = drivenBody(world, key.second);
+  const Box all = other ? wayBoxOf(*other) : Box{};
+  const std::vector<Box> otherWays = other ? wayBoxesOfParts(*other) : std::vector<Box>{};
+  PartPairs pairs;
+  std::vector<std::uint32_t> met;
+  for (std::uint32_t part = 0; part < ways.size(); ++part) {
+    const Box way = grown(ways[part], within);
+    met.clear();
+    if (!other) {
+      world.scene->parts(key.second - 1).query(way, met);
+    } else if (overlaps(way, all)) {
+      for (std::uint32_t i = 0; i < otherWays.size(); ++i)
+        if (overlaps(way, otherWays[i])) met.push_back(i);
+    }
+    for (const std::uint32_t otherPart : met) pairs.emplace_back(part, otherPart);
+  }
+  return pairs;
 }
 
 std::vector<collision::TreeOfParts> treesNow(const WorldState& world, EntityId entity) {
@@ -157,23 +175,20 @@ std::optional<Contact> touchOnTheWay(const WorldState& world, const Key& key, Qu
   const collision::StoppingBand band{0.75 * contact, (1 - kRounding) * contact};
   const Body& body = *drivenBody(world, key.first);
   const Body* other = drivenBody(world, key.second);
-  const Vec3 stray = strayOf(body) + Vec3::Constant(contact);
+  const PartPairs pairs = partsThatMayMeet(world, key, contact);
   const std::size_t n = std::max(body.plan.stretches, other ? other->plan.stretches : 1);
   for (std::size_t i = 0; i < n; ++i) {
     const BodyWay way = wayIn(body, i, n);
     const BodyWay otherWay = other ? wayIn(*other, i, n) : BodyWay();
     BodySweep first;
-    for (std::size_t k = 0; k < body.partBoxes.size(); ++k) {
-      const MovingPart part{body.shape->parts[k], way};
-      for (const std::uint32_t met :
-           partsWithin(world, key.second, widened(body.partBoxes[k], stray))) {
-        const BodySweep sweep =
-            other ? sweepTurning(part, MovingPart{other->shape->parts[met], otherWay}, band, count)
-                  : sweepTurning(part, world.scene->parts(key.second - 1).body(met), band, count);
-        if (sweep.fraction < first.fraction) first = sweep;
-      }
+    for (const auto& [a, b] : pairs) {
+      const MovingPart part{body.shape->parts[a], way};
+      const BodySweep sweep =
+          other ? sweepTurning(part, MovingPart{other->shape->parts[b], otherWay}, band, count)
+                : sweepTurning(part, world.scene->parts(key.second - 1).body(b), band, count);
+      if (sweep.reached && sweep.fraction < first.fraction) first = sweep;
     }
-    if (first.stopped && first.atStop.distance < contact) {
+    if (first.reached) {
       Contact touch;
       touch.other = key.second;
       touch.touching = true;

@@ -40,18 +40,28 @@ void wake(Solid& solid) {
 
 // ---- step 1 ------------------------------------------------------------------------------------
 
-/// Whether the points of its patch lean on one another, or will at the end of the step by the
-/// motion of now.
+/// Metres that a point of the solid gets `towards` (unit) in the step by the motion of now, at
+/// most.
+double advanceOf(const Solid& solid, const Vec3& arm, const Vec3& towards, double seconds) {
+  if (solid.asleep) return 0;
+  const auto& mean = solid.motion;
+  const Vec3 velocity = mean.velocity + mean.spin.cross(arm) + solid.pushVelocity;
+  double most = std::max(0.0, towards.dot(velocity)) * seconds, way = 0;
+  for (const Gait& gait : solid.gaits) {
+    way += towards.dot(gait.velocity + gait.spin.cross(arm)) * seconds /
+           static_cast<double>(solid.gaits.size());
+    most = std::max(most, way);
+  }
+  return most;
+}
+
+/// Whether the points of its patch lean on one another, or will in the step. One of both sleeps.
 bool comesToLean(const NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step) {
-  const auto velocityAt = [](const Solid& s, const Vec3& arm) {
-    if (s.asleep) return Vec3(Vec3::Zero());
-    return Vec3(s.motion.velocity + s.motion.spin.cross(arm) + s.pushVelocity);
-  };
   const ContactPatch& patch = *pair.patch();
   for (const PatchPoint& point : patch.list()) {
-    const Vec3 opening = velocityAt(b, point.armB) - velocityAt(a, point.armA);
-    const double closing = std::max(0.0, -patch.normal.dot(opening));
-    if (point.separation < 2 * step.epsilon + step.seconds * closing) return true;
+    const double advance = advanceOf(a, point.armA, patch.normal, step.seconds) +
+                           advanceOf(b, point.armB, -patch.normal, step.seconds);
+    if (point.separation < 2 * step.epsilon + advance) return true;
   }
   return false;
 }

@@ -185,7 +185,8 @@ struct PairWriter {
   /// Where a part of a body comes in this tick.
   Box reachOfPart(const Body& body, std::uint32_t part) const {
     double spare = margin;
-    if (isKinematic(body.spec->kind)) spare += body.plan.farthest;
+    // From where it is after the tick: twice as far as from where it was before, if it came back.
+    if (isKinematic(body.spec->kind)) spare += 2 * body.plan.farthest;
     if (body.spec->kind == BodyKind::rigid)
       spare += solidOfRigid(world.rigids, bodyAt(world.rigids, body.mover)).leash;
     return grown(body.partBoxes[part], spare);
@@ -268,7 +269,7 @@ void placeDriven(Solid& solid, const Vec3& position, const collision::Quat& orie
 std::vector<Gait> gaitsOf(const Body& body, double tick) {
   std::vector<Gait> gaits;
   const BodyPlan& plan = body.plan;
-  if (plan.stretches != kSolverSubsteps || plan.farthest == 0) return gaits;
+  if (plan.stretches != kSolverSubsteps || !body.moved) return gaits;
   const double seconds = tick / kSolverSubsteps;
   for (std::size_t i = 0; i < kSolverSubsteps; ++i) {
     const BodyPlace &from = plan.places[i], &to = plan.places[i + 1];

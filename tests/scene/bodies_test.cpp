@@ -284,8 +284,55 @@ TEST(Bodies, WhoCannotYieldStopsAPathThatTurnsBackWithinATickOnItsWay) {
   EXPECT_EQ(whoPenetrates(t.world), "");
   t.order("ann", Leave{});
   for (int i = 0; i < 10; ++i) {
+    const double before = t.body("block").drive.coordinate;
     t.step();
     EXPECT_EQ(t.body("block").blockedBy, 0u);
+    EXPECT_TRUE(t.body("block").moved);
+    EXPECT_NEAR(std::remainder(t.body("block").drive.coordinate - before, 1.0 / 60), 0, 1e-9);
+  }
+}
+
+TEST(Bodies, APathThatLoopsWaitsWhereItIsBlockedAndGoesOnFromThere) {
+  // A lap of 0.5 s with the seam in the middle of its way; ann stands there, between two walls.
+  Model model = boxModel({floorBox(),
+                          {"cart", {-0.2, 0.1, -0.2}, {0.2, 1, 0.2}},
+                          {"wall", {1.21, 0, -2}, {1.3, 3, 2}}});
+  BodySpec spec = bodySpec("cart", BodyKind::path, {1});
+  spec.keys = {{0, Vec3::Zero(), 0}, {0.25, {0.7, 0, 0}, 0}, {0.5, Vec3::Zero(), 0}};
+  spec.loops = true;
+  model.bodies.push_back(spec);
+  BodyTrial t(std::move(model));
+  t.ticks(4);  // on its way out
+  t.order("ann", Spawn{.at = {0.9, 0.01, 0}});
+  t.ticks(30);
+  EXPECT_EQ(t.told(Event::blocked, "cart", "ann"), 1);
+  const double held = t.body("cart").position.x();
+  EXPECT_NEAR(held, 0.41, 5e-3);
+  EXPECT_NEAR(t.body("cart").drive.coordinate, held / 0.7 * 0.25, 1e-3);
+  t.order("ann", Leave{});
+  for (int i = 0; i < 90; ++i) {
+    const Vec3 before = t.body("cart").position;
+    t.step();
+    EXPECT_NEAR((t.body("cart").position - before).norm(), 0.7 / 0.25 / 60, 0.7 / 0.25 / 60) << i;
+    EXPECT_EQ(t.body("cart").blockedBy, 0u) << i;
+  }
+}
+
+TEST(Bodies, APathThatTurnsFastTurnsTheWayThatItsKeysSay) {
+  // 4 radians in the first 4 ms: the nearest turn would be the other way round.
+  Model model = boxModel({floorBox(), {"arm", {0, 0.1, -0.05}, {1, 0.2, 0.05}}});
+  BodySpec spec = bodySpec("arm", BodyKind::path, {1});
+  spec.anchor = {0, 0.1, 0};
+  spec.keys = {{0, Vec3::Zero(), 0}, {1.0 / 240, Vec3::Zero(), 4}, {1, Vec3::Zero(), 4 * kQuarter}};
+  spec.loops = true;
+  model.bodies.push_back(spec);
+  BodyTrial t(std::move(model));
+  for (int lap = 0; lap < 3; ++lap) {
+    t.step();
+    const auto& places = t.body("arm").plan.places;
+    EXPECT_NEAR(places[1].turn - places[0].turn, 4, 1e-9) << lap;
+    EXPECT_NEAR(places[0].turn, 0, 1e-9) << lap;
+    t.ticks(59);
   }
 }
 

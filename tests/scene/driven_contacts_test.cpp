@@ -212,6 +212,25 @@ TEST(DrivenContacts, TwoWhoseWaysCrossTouchIfTheyAreThereAtTheSameTime) {
   }
 }
 
+TEST(DrivenContacts, TwoThatGoSideBySideCostAFewLooks) {
+  // Two carts 1.3 mm apart, end to end, at 5 m/s.
+  Model model = boxModel({{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {1.0013, 0, 0}, {2, 1, 1}}});
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    BodySpec cart = bodySpec(i == 0 ? "a" : "b", BodyKind::sliding, {i});
+    cart.axis = Vec3::UnitX();
+    cart.high = 10, cart.speed = 5;
+    model.bodies.push_back(cart);
+  }
+  BodyTrial t(std::move(model));
+  for (const char* name : {"a", "b"}) t.tell({name, Action::open, 0, 0, {}});
+  for (int i = 0; i < 60; ++i) {
+    const TickReport report = t.step();
+    EXPECT_LE(report.narrowQueries, 3u) << i;
+    EXPECT_EQ(report.boundedSweeps, 0u) << i;
+  }
+  EXPECT_TRUE(t.events.empty());
+}
+
 /// The first object slides along x by `high` metres; near misses begin at 0.3 m.
 BodyTrial trayThatSlid(Model model, double high) {
   BodySpec tray = bodySpec("tray", BodyKind::sliding, {0});

@@ -254,6 +254,44 @@ TEST(RigidBodies, ATrayThatShakesWithinATickThrowsWhatLiesOnIt) {
   EXPECT_GT(highest, still.body("box").position.y() + 0.5e-3);
 }
 
+/// A block of 1 m that goes 0.2 m along x and back in each tick, and something free.
+Model ram(const NamedBox& box) {
+  Model model = boxModel({floorBox(), {"ram", {-1, 0.1, -0.5}, {0, 1.1, 0.5}}, box});
+  BodySpec spec = bodySpec("ram", BodyKind::path, {1});
+  spec.keys = {{0, Vec3::Zero(), 0}, {1.0 / 120, {0.2, 0, 0}, 0}, {1.0 / 60, Vec3::Zero(), 0}};
+  spec.loops = true;
+  spec.runs = false;
+  model.bodies = {spec, bodySpec(box.path, BodyKind::rigid, {2})};
+  return model;
+}
+
+TEST(RigidBodies, ASleepingBoxIsWokenByWhatReachesItAndIsBackWithinATick) {
+  BodyTrial t(ram({"box", {0.1, 0, -0.2}, {0.5, 0.4, 0.2}}));
+  t.ticks(120);
+  ASSERT_TRUE(t.body("box").asleep);
+  t.tell({"ram", BodyCommand::Action::run, 0, 0, {}});
+  t.ticks(30);
+  EXPECT_GT(t.body("box").position.x(), 0.4) << "0.1 m farther than it was at least";
+  EXPECT_FALSE(anyBodyPenetrates(t.world));
+}
+
+TEST(RigidBodies, ABoxSleepsOnAThingWhosePathIsBlocked) {
+  Model model = ram({"box", {-0.7, 1.1, -0.2}, {-0.3, 1.5, 0.2}});
+  model.bodies[0].keys[1].offset = {0.2, 0, 0};
+  model.bodies[0].keys[1].time = 1, model.bodies[0].keys[2].time = 2;
+  model.meshes.push_back(boxMesh({0.7, 0, -2}, {0.8, 3, 2}));
+  model.objects.push_back({"wall", "", {3}, Eigen::Affine3d::Identity()});
+  BodyTrial t(std::move(model));
+  t.order("ann", Spawn{.at = {0.35, 0.01, 0}});
+  t.ticks(60);
+  t.tell({"ram", BodyCommand::Action::run, 0, 0, {}});
+  t.ticks(240);
+  EXPECT_NE(t.body("ram").blockedBy, 0u);
+  EXPECT_TRUE(t.body("box").asleep);
+  t.ticks(60);
+  EXPECT_TRUE(t.body("box").asleep);
+}
+
 TEST(RigidBodies, TwoRunsHaveOneHash) {
   const auto run = [] {
     BodyTrial t(loose({{"a", {0, 1, 0}, {0.4, 1.4, 0.4}}, {"b", {0.1, 2, 0.1}, {0.5, 2.3, 0.6}}}));
