@@ -55,8 +55,9 @@ struct BodyView {
   bool displaced = false;  ///< not where it was authored
   double coordinate = 0;   ///< as BodySpec says; 0 for rigid bodies and triggers
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< m/s, rad/s, scene frame
-  bool moving = false;                                ///< in this tick, or rigid and awake
-  EntityId blockedBy = 0;                             ///< what it cannot push aside; 0: nothing
+  double swing = 0;        ///< m/s: no point departs faster from that motion within the tick
+  bool moving = false;     ///< in this tick, or rigid and awake
+  EntityId blockedBy = 0;  ///< what it cannot push aside; 0: nothing
 };
 
 struct Snapshot {

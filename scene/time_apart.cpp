@@ -53,7 +53,7 @@ Moving movingOf(const SceneThen& then, const BodyView& body) {
 // ---- present motion -----------------------------------------------------------------------------
 
 double fastestPoint(const Moving& body) {
-  return body.view.velocity.norm() + body.view.spin.norm() * body.radius;
+  return body.view.velocity.norm() + body.view.spin.norm() * body.radius + body.view.swing;
 }
 
 bool isTouched(const SceneThen& then, const AvatarView& avatar, const BodyView& body,
@@ -76,6 +76,7 @@ void addCarriers(const SceneThen& then, const AvatarView& avatar, const Lengths&
     if (!overlaps(boxOf(then, view), box) || !isTouched(then, avatar, view, within)) continue;
     if (avatar.standsOn == view.id && view.spin.isZero(0)) {
       motion.bounds.velocity += view.velocity;
+      motion.anyway += kMostPush * view.swing;
     } else {
       motion.anyway += kMostPush * fastestPoint(body);
     }
@@ -109,6 +110,7 @@ Motion presentMotion(const SceneThen& then, const BodyView& view, const Lengths&
   motion.bounds.velocity = view.velocity;
   motion.bounds.angularVelocity = view.spin;
   motion.bounds.radius = body.radius;
+  motion.anyway = view.swing;
   if (body.spec.kind != BodyKind::rigid) return motion;
   motion.bounds.angularVelocity =
       fastestSpin(then, view) * Vec3::UnitX();  // only its length counts
@@ -121,28 +123,9 @@ Motion presentMotion(const SceneThen& then, const BodyView& view, const Lengths&
 
 /// Metres a second: no point of the body is ever faster, whatever it is told.
 double fastestEver(const Moving& body, const Lengths& lengths) {
-  const BodySpec& spec = body.spec;
-  switch (spec.kind) {
-    case BodyKind::rigid:
-      return kNever;
-    case BodyKind::trigger:
-      return 0;
-    case BodyKind::hinged:
-      return std::max(lengths.speedLimit, spec.speed * body.radius);
-    case BodyKind::sliding:
-    case BodyKind::lift:
-      return std::max(lengths.speedLimit, spec.speed);
-    case BodyKind::path:
-      break;
-  }
-  double alongPath = 0;  // metres a second of the path
-  for (std::size_t i = 1; i < spec.keys.size(); ++i) {
-    const PathKey &from = spec.keys[i - 1], &to = spec.keys[i];
-    const double way =
-        (to.offset - from.offset).norm() + std::abs(to.turn - from.turn) * body.radius;
-    alongPath = std::max(alongPath, way / (to.time - from.time));
-  }
-  return std::max(lengths.speedLimit, spec.speed) * alongPath;
+  if (body.spec.kind == BodyKind::rigid) return kNever;
+  if (body.spec.kind == BodyKind::trigger) return 0;
+  return std::max(lengths.speedLimit, body.spec.speed * fastestPointOf(body.spec, body.radius));
 }
 
 /// What an avatar does by itself: it walks, steps up or falls, and keeps epsilon away.

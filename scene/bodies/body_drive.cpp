@@ -249,7 +249,24 @@ bool isBusy(const Body& body) {
 
 namespace {
 
-BodyView viewOf(const Body& body, std::uint32_t index) {
+/// Of a path that does not go evenly: see BodyView::swing.
+double swingOf(const Body& body, double tick) {
+  const BodyPlan& plan = body.plan;
+  if (!body.moved || plan.stretches == 1) return 0;
+  const BodyPlace &start = plan.places[0], &end = plan.places[plan.stretches];
+  const auto n = static_cast<double>(plan.stretches);
+  const Vec3 evenMove = (end.offset - start.offset) / n;
+  const double evenTurn = (end.turn - start.turn) / n;
+  double most = 0;
+  for (std::size_t i = 0; i < plan.stretches; ++i) {
+    const BodyPlace &from = plan.places[i], &to = plan.places[i + 1];
+    most = std::max(most, (to.offset - from.offset - evenMove).norm() +
+                              std::abs(to.turn - from.turn - evenTurn) * body.shape->radius);
+  }
+  return n * most / tick;
+}
+
+BodyView viewOf(const Body& body, std::uint32_t index, double tick) {
   BodyView view;
   view.id = body.id;
   view.index = index;
@@ -258,6 +275,7 @@ BodyView viewOf(const Body& body, std::uint32_t index) {
   view.coordinate = body.drive.coordinate;
   view.velocity = body.velocity;
   view.spin = body.spin;
+  view.swing = isKinematic(body.spec->kind) ? swingOf(body, tick) : 0;
   view.moving = body.moved || (body.spec->kind == BodyKind::rigid && !body.asleep);
   view.blockedBy = body.blockedBy;
   return view;
@@ -280,9 +298,19 @@ std::shared_ptr<const std::vector<BodyView>> viewsOfBodies(const WorldState& wor
   }
   auto views = std::make_shared<std::vector<BodyView>>();
   for (const Body& body : world.bodies)
-    views->push_back(viewOf(body, static_cast<std::uint32_t>(views->size())));
+    views->push_back(viewOf(body, static_cast<std::uint32_t>(views->size()), world.lengths.tick));
   return views;
 }
+
+namespace {
+
+std::string commandsOf(const BodySpec& spec) {
+  if (spec.kind == BodyKind::lift) return "give to, level or stop";
+  if (spec.kind != BodyKind::path) return "give open, close, to or stop";
+  return spec.loops ? "give run or stop" : "give to, run or stop";
+}
+
+}  // namespace
 
 std::optional<std::string> refusalOf(const Body& body, const BodyCommand& command,
                                      const Lengths& lengths) {
@@ -294,22 +322,23 @@ std::optional<std::string> refusalOf(const Body& body, const BodyCommand& comman
   const bool door = spec.kind == BodyKind::hinged || spec.kind == BodyKind::sliding;
   const auto [low, high] = limitsOf(spec);
   if ((command.action == Action::open || command.action == Action::close) && !door)
-    return "body '" + spec.name + "' is no door but " + kind + ": give to, level, run or stop";
+    return "body '" + spec.name + "' is no door but " + kind + ": " + commandsOf(spec);
   if (command.action == Action::run && spec.kind != BodyKind::path)
-    return "run is for paths; body '" + spec.name + "' is " + kind;
+    return "run is for paths; body '" + spec.name + "' is " + kind + ": " + commandsOf(spec);
   if (command.action == Action::to && goesRound(spec))
-    return "to: body '" + spec.name + "' goes round; give run or stop";
+    return "to: body '" + spec.name + "' goes round; " + commandsOf(spec);
   if (command.action == Action::to && !(command.to >= low && command.to <= high))
     return "to is " + std::to_string(command.to) + "; it must lie in " + std::to_string(low) +
-           ".." + std::to_string(high);
+           ".." + std::to_string(high) + (spec.kind == BodyKind::hinged ? " radians" : "");
   if (command.action == Action::level && command.level >= spec.stops.size())
     return "level is " + std::to_string(command.level) + "; body '" + spec.name + "' has " +
            std::to_string(spec.stops.size()) + " stops, counted from 0";
   if (!command.speed) return std::nullopt;
-  const double radius = spec.kind == BodyKind::hinged ? body.shape->radius : 1;
-  if (*command.speed > 0 && *command.speed * radius <= lengths.speedLimit) return std::nullopt;
-  return "speed is " + std::to_string(*command.speed) +
-         "; it must be above 0, and no point may be faster than " +
+  if (auto why = refusalOfSpeed(*command.speed)) return why;
+  const double fastest = *command.speed * fastestPointOf(spec, body.shape->radius);
+  if (fastest <= lengths.speedLimit) return std::nullopt;
+  return "speed is " + std::to_string(*command.speed) + ", by which a point goes " +
+         std::to_string(fastest) + " m/s; none may be faster than " +
          std::to_string(lengths.speedLimit) + " m/s";
 }
 

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/contact_manifold.hpp"
 #include "scene/bodies/body_sweep.hpp"
 #include "scene/world_state.hpp"
 
@@ -104,6 +105,30 @@ struct Rider {
   Vec3 contact;  ///< on the body, in its frame
 };
 
+/// Where the avatar leans on the body, as near to its feet as that comes: carried by that point,
+/// who stands on what turns goes round with its feet, and who has a finger on it with the finger.
+Vec3 leaningPoint(const WorldState& world, const Body& body, const Avatar& avatar,
+                  const Contact& contact) {
+  const double near = contactLimit(world.lengths);
+  Box patch{contact.decision.pointB, contact.decision.pointB};
+  for (const AvatarPart& limb : avatar.shape->parts) {
+    const Box box = grown(boxAt(limb.box, avatar.feet), near);
+    for (std::uint32_t i = 0; i < body.partBoxes.size(); ++i) {
+      if (!overlaps(box, body.partBoxes[i])) continue;
+      const collision::ConvexBody own = bodyAt(limb, avatar.feet), under = partOf(body, i);
+      collision::FeatureCache cache;
+      const collision::Decision at = collision::decide(own, under, cache);
+      if (at.verdict != collision::Verdict::separated || at.distance >= near) continue;
+      if (-at.normal.y() < world.lengths.walkableNormalY) continue;
+      const collision::ContactManifold manifold = collision::contactManifold(
+          own, under,
+          {at.normal, at.pointA, at.pointB, near, collision::ContactManifold::kMostPoints});
+      for (const collision::ContactPoint& point : manifold.list()) patch.include(point.pointB);
+    }
+  }
+  return avatar.feet.cwiseMax(patch.min).cwiseMin(patch.max);
+}
+
 /// Who stands on the body.
 std::vector<Rider> ridersOf(const WorldState& world, const Body& body,
                             const std::vector<Avatar*>& near) {
@@ -113,7 +138,7 @@ std::vector<Rider> ridersOf(const WorldState& world, const Body& body,
     for (const Contact& contact : avatar->contacts) {
       const bool below = -contact.decision.normal.y() >= world.lengths.walkableNormalY;
       if (contact.other == body.id && contact.touching && below)
-        riders.push_back({avatar, inBody(body, contact.decision.pointB)});
+        riders.push_back({avatar, inBody(body, leaningPoint(world, body, *avatar, contact))});
     }
   }
   return riders;

@@ -1,5 +1,6 @@
 #include "scene/bodies/body_spec.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <set>
@@ -32,16 +33,17 @@ Refusal outside(const char* field, const Vec3& value) {
 }
 
 Refusal refusalOfLimits(const BodySpec& body) {
-  if (auto why = outside("low", body.low, -kFarthest, 0)) return why;
-  if (auto why = outside("high", body.high, 0, kFarthest)) return why;
-  if (!(body.low < body.high)) return "low and high are both 0: it could not move";
+  const bool lift = body.kind == BodyKind::lift;
+  const std::string field = lift ? "stops" : "limits";
+  if (lift && body.stops.size() < 2) return "stops: a lift has two at least";
+  if (!std::is_sorted(body.stops.begin(), body.stops.end())) return "stops must ascend";
+  if (!(body.low <= 0 && body.high >= 0))
+    return field + ": 0, where it was drawn, must lie between the least and the greatest";
+  if (!(body.low < body.high)) return field + ": both are 0: it could not move";
+  if (!(body.low >= -kFarthest && body.high <= kFarthest)) return field + ": farther than 1000 km";
+  for (const double stop : body.stops)
+    if (auto why = outside("stops", stop, body.low, body.high)) return why;
   if (auto why = outside("closed", body.closed, body.low, body.high)) return why;
-  double last = body.low;
-  for (const double stop : body.stops) {
-    if (auto why = outside("stops", stop, last, body.high)) return *why + ", ascending";
-    last = stop;
-  }
-  if (body.kind == BodyKind::lift && body.stops.size() < 2) return "stops: a lift has two at least";
   if (body.closesAfter) return outside("closes_after", *body.closesAfter, 0, kLongest);
   return std::nullopt;
 }
@@ -84,8 +86,7 @@ Refusal refusalOf(const BodySpec& body) {
   if (auto why = outside("anchor", body.anchor)) return why;
   if (!isKinematic(body.kind)) return refusalOfMatter(body);
   if (!(std::abs(body.axis.norm() - 1) <= kUnitLength)) return "axis must have unit length";
-  if (!(body.speed > 0)) return "speed must be above 0";
-  if (auto why = outside("speed", body.speed, 0, kFastest)) return why;
+  if (auto why = refusalOfSpeed(body.speed)) return why;
   if (auto why = outside("acceleration", body.acceleration, 0, kFarthest)) return why;
   return body.kind == BodyKind::path ? refusalOfPath(body) : refusalOfLimits(body);
 }
@@ -107,6 +108,18 @@ Refusal refusalOfObjects(const BodySpec& body, const Model& model, std::vector<b
 std::pair<double, double> limitsOf(const BodySpec& spec) {
   if (spec.kind == BodyKind::path) return {0, spec.keys.back().time};
   return {spec.low, spec.high};
+}
+
+double fastestPointOf(const BodySpec& spec, double radius) {
+  if (spec.kind == BodyKind::hinged) return radius;
+  if (spec.kind != BodyKind::path) return 1;
+  double fastest = 0;
+  for (std::size_t i = 1; i < spec.keys.size(); ++i) {
+    const PathKey &from = spec.keys[i - 1], &to = spec.keys[i];
+    const double way = (to.offset - from.offset).norm() + std::abs(to.turn - from.turn) * radius;
+    fastest = std::max(fastest, way / (to.time - from.time));
+  }
+  return fastest;
 }
 
 const char* wordOf(BodyKind kind) {
@@ -141,6 +154,11 @@ const char* wordOf(BodySource source) {
       return "ifc";
   }
   return "unknown";
+}
+
+std::optional<std::string> refusalOfSpeed(double speed) {
+  if (!(speed > 0)) return "speed must be above 0";
+  return outside("speed", speed, 0, kFastest);
 }
 
 std::optional<std::string> refusalOfBody(const BodySpec& body) {

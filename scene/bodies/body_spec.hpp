@@ -93,11 +93,18 @@ inline bool goesRound(const BodySpec& body) {
 /// Of the coordinate of a kinematic body: low, high.
 std::pair<double, double> limitsOf(const BodySpec& spec);
 
+/// Metres a second of the fastest point of a kinematic body whose coordinate goes by 1 a second.
+/// `radius`: of its shape, metres.
+double fastestPointOf(const BodySpec& spec, double radius);
+
 const char* wordOf(BodyKind kind);
 const char* wordOf(BodySource source);
 
 /// What is wrong with one body's numbers, naming the field; nullopt when nothing is.
 std::optional<std::string> refusalOfBody(const BodySpec& body);
+
+/// What is wrong with a speed of the coordinate, of anything that may go.
+std::optional<std::string> refusalOfSpeed(double speed);
 
 /// What is wrong with the model's bodies, naming body and field; nullopt when nothing is.
 std::optional<std::string> refusalOfBodies(const Model& model);

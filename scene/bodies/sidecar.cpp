@@ -128,7 +128,13 @@ void readBody(const JsonPlace& place, Model& model) {
 void readBodies(const JsonPlace& bodies, Model& model) {
   if (!bodies.value.is_array()) bodies.fail("must be a list, not " + excerpt(bodies.value));
   if (bodies.value.size() > kMostBodies) bodies.fail("has too many entries");
-  for (std::size_t i = 0; i < bodies.value.size(); ++i) readBody(bodies.at(i), model);
+  for (std::size_t i = 0; i < bodies.value.size(); ++i) {
+    const std::size_t before = model.bodies.size();
+    readBody(bodies.at(i), model);
+    for (std::size_t k = before; k < model.bodies.size(); ++k)
+      if (const auto why = refusalOfBody(model.bodies[k]))
+        bodies.at(i).fail("body '" + model.bodies[k].name + "': " + *why);
+  }
 }
 
 /// What a sidecar may add to.

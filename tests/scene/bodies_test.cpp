@@ -1,3 +1,4 @@
+#include <map>
 #include <random>
 
 #include "tests/scene/body_trial.hpp"
@@ -349,6 +350,44 @@ TEST(Bodies, WhoStandsOnAPathThatTurnsBackWithinATickIsLiftedAndLetDown) {
   EXPECT_EQ(whoPenetrates(t.world), "");
 }
 
+TEST(Bodies, WhoStandsOnWhatTurnsKeepsTheirPlaceOnIt) {
+  Model model =
+      boxModel({{"plate", {-2, 0, -2}, {2, 0.1, 2}}, {"ground", {-9, -1, -9}, {9, -0.9, 9}}});
+  BodySpec spec = bodySpec("plate", BodyKind::path, {0});
+  spec.keys = {{0, Vec3::Zero(), 0}, {8, Vec3::Zero(), 4 * kQuarter}};
+  spec.loops = true;
+  model.bodies.push_back(spec);
+  BodyTrial t(std::move(model));
+  const std::map<std::string, Vec3> at{{"mid", {0, 0.1, 0}},
+                                       {"inner", {0.5, 0.1, 0.5}},
+                                       {"outer", {1.2, 0.1, 0}},
+                                       {"edge", {0, 0.1, -1.9}}};  // half beside the plate
+  for (const auto& [name, place] : at) t.order(name, Spawn{.at = place});
+  t.ticks(10);
+  std::map<std::string, Vec3> start;
+  const auto onPlate = [&](const std::string& name) {
+    const Body& plate = t.body("plate");
+    return Vec3(plate.rotation.transpose() * (t.feet(name) - plate.position));
+  };
+  for (const auto& [name, place] : at) start[name] = onPlate(name);
+  t.ticks(480);
+  for (const auto& [name, place] : at)
+    EXPECT_LT((onPlate(name) - start[name]).norm(), name == "edge" ? 0.05 : 2e-3) << name;
+}
+
+TEST(Bodies, ASpeedIsRefusedByHowFastItMakesAPoint) {
+  Model model = shaker({0.2, 0, 0});  // 24 m/s at a speed of 1
+  BodyTrial t(std::move(model));
+  const auto told = [&](double speed) {
+    return submit(t.world, {"block", Action::run, 0, 0, speed}).value_or("");
+  };
+  EXPECT_EQ(told(41), "");
+  EXPECT_NE(told(42).find("1008"), std::string::npos) << told(42);
+  EXPECT_NE(told(0).find("above 0"), std::string::npos);
+  EXPECT_NE(told(1e300), "");
+  EXPECT_NE(told(std::nan("")), "");
+}
+
 TEST(Bodies, APathThatLoopsEndsTurnedAsItBegan) {
   Model model = boxModel({floorBox(), {"plate", {0, 1, 0}, {1, 2, 1}}});
   BodySpec spec = bodySpec("plate", BodyKind::path, {1});
@@ -478,7 +517,7 @@ TEST(Bodies, WhatIsWrongWithASpecIsNamed) {
   EXPECT_NE(refusalOfBodies(model).value_or("").find("two bodies"), std::string::npos);
   model = hingedDoor();
   model.bodies[0].low = std::nan("");
-  EXPECT_NE(refusalOfBodies(model).value_or("").find("low"), std::string::npos);
+  EXPECT_NE(refusalOfBodies(model).value_or("").find("limits"), std::string::npos);
   EXPECT_THROW(Scene{model}, std::invalid_argument);
 }
 

@@ -615,7 +615,7 @@ TEST(DrivenContacts, ARestoredWorldGoesOnAlike) {
   std::size_t told = 0;
   for (int i = 0; i < 240; ++i) {
     if (i % 30 == 0) copy.emplace(worldFrom(scene, checkpointOf(world)));
-    const ToldOnce commands = i % 10 == 0 ? someCommand(chance, scene->model()) : ToldOnce{};
+    const ToldOnce commands = i % 3 == 0 ? someCommand(chance, scene->model()) : ToldOnce{};
     give(world, commands), give(*copy, commands);
     const TickReport one = tick(world), other = tick(*copy);
     ASSERT_TRUE(sameLists(one.contacts, other.contacts)) << "tick " << i;

@@ -70,6 +70,14 @@ TEST(Sidecar, MistakesAreNamedWithTheirPlace) {
   has(complaint(R"({"name":"d","kind":"spinning","objects":["hall/leaf"]})"), "bodies[0].kind");
   has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"]})"), "anchor is missing");
   has(complaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[3,1]})"), "stops");
+  has(complaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[0,3,1]})"),
+      "s.walk.json.bodies[0]: body 'd': stops must ascend");
+  has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"],"anchor":[0,0,0],
+                    "limits":[10,90]})"),
+      "bodies[0]: body 'd': limits: 0, where it was drawn");
+  has(complaint(R"({"name":"d","kind":"path","objects":["hall/leaf"],
+                    "keys":[{"time":0},{"time":2},{"time":1}]})"),
+      "bodies[0]: body 'd': keys: times must ascend");
   has(complaint(R"({"name":"d","kind":"trigger","box":[[0,0,0],[1,1,0]]})"), "no volume");
   has(complaint(R"({"name":"d","kind":"trigger","box":[[0,0,0],[1,1,1]]},
                    {"name":"d","kind":"rigid","objects":["hall/leaf"]})"),

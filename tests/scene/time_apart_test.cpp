@@ -85,6 +85,26 @@ TEST(TimeApart, ARiderGoesWithTheLift) {
   EXPECT_NEAR(said.closing.speed, 1, 1e-6);
 }
 
+TEST(TimeApart, WhatSwingsOutAndBackWithinATickReachesAsFarAsItSwings) {
+  // 0.2 m out and back in each tick; the post is 0.1 m away, the wall ten times as far as that.
+  Model model = boxModel({floorBox(),
+                          {"ram", {-1, 0.1, -0.5}, {0, 1.1, 0.5}},
+                          {"post", {0.1, 0.05, 0}, {0.2, 1, 0.2}},
+                          {"wall", {2, 0.05, -1}, {2.1, 1, 1}}});
+  BodySpec ram = bodySpec("ram", BodyKind::path, {1});
+  ram.keys = {{0, Vec3::Zero(), 0}, {1.0 / 120, {0.2, 0, 0}, 0}, {1.0 / 60, Vec3::Zero(), 0}};
+  ram.loops = true;
+  model.bodies = {ram};
+  BodyTrial t(std::move(model));
+  SceneIndex index(sharedScene(t.world));
+  t.ticks(3);
+  EXPECT_EQ(t.told(ContactEvent::Kind::begin, "ram", "post"), 3);
+  const TimeApart said = apartAt(t.world, index, 2, 3, Assume::presentMotion);
+  EXPECT_LE(said.contact, 1.0 / 120) << "it is there in the next tick, half way to its end";
+  EXPECT_NEAR(said.closing.speed, 24, 1e-6);
+  EXPECT_NEAR(apartAt(t.world, index, 2, 4, Assume::presentMotion).contact, 2.0 / 24, 1e-3);
+}
+
 TEST(TimeApart, WhoFallsFallsFasterThanInTheLastTick) {
   Trial trial({floorBox()});
   SceneIndex index(sharedScene(trial.world));
@@ -202,7 +222,7 @@ struct BusyRoom {
     const auto tell = [this](BodyCommand command) { EXPECT_FALSE(submit(world, command)); };
     tell({"lift", Action::level, 0, static_cast<std::uint32_t>(number(0, 2.999)), {}});
     tell({"door", Action::to, number(-1.5, 1.5), 0, number(0.5, 1.5)});
-    tell({"ferry", Action::run, 0, 0, number(0.5, 2)});
+    tell({"ferry", Action::run, 0, 0, number(0.2, 0.8)});
   }
 
   std::mt19937 random;
