@@ -91,7 +91,13 @@ json jsonOf(const scene::Model& model, const scene::BodySpec& body) {
     entry["speed"] = body.speed;
   }
   if (body.kind == BodyKind::lift) entry["stops"] = body.stops;
-  if (body.kind == BodyKind::path) entry["seconds"] = body.keys.back().time;
+  if (body.kind == BodyKind::path) {
+    entry["seconds"] = body.keys.back().time;
+    entry["loops"] = body.loops;
+    for (const scene::PathKey& key : body.keys)
+      entry["keys"].push_back(
+          {{"time", key.time}, {"offset", jsonOf(key.offset)}, {"turn", key.turn}});
+  }
   if (body.kind == BodyKind::rigid) {
     if (body.mass) entry["mass"] = *body.mass;
     entry["density"] = body.density;

@@ -90,6 +90,8 @@ void readPath(const JsonPlace& place, BodySpec& body) {
 }
 
 void readRigid(const JsonPlace& place, BodySpec& body) {
+  if (place.has("density") && place.has("mass"))
+    place.fail("has a density and a mass: one follows from the other");
   if (place.has("density")) body.density = numberOf(place.at("density"));
   if (place.has("mass")) body.mass = numberOf(place.at("mass"));
   if (place.has("friction")) body.friction = numberOf(place.at("friction"));

@@ -214,11 +214,34 @@ void gatherJoints(const Dynamics& dynamics, StepWork& work) {
   }
 }
 
+void forgetImpulses(ContactPatch& patch) {
+  for (PatchPoint& point : patch.points) point.impulse = point.push = 0;
+  patch.rub = Vec3::Zero();
+  patch.twist = 0;
+}
+
+/// Of each of `bodies`: it is inside a driven one. What presses it from the other side cannot yield
+/// either, so that their impulses grow without bound: kept, they would fling it once it is free.
+std::vector<std::uint8_t> whoIsPressed(const Dynamics& dynamics, const StepWork& work) {
+  std::vector<std::uint8_t> pressed(work.bodies.size(), 0);
+  for (const std::uint32_t i : work.patched) {
+    const NearPair& pair = dynamics.pairs[i];
+    const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
+    if (isInDriven(pair, a, b)) pressed[work.local[a.isFree() ? pair.key.a : pair.key.b]] = 1;
+  }
+  return pressed;
+}
+
 void keepImpulses(Dynamics& dynamics, const StepWork& work) {
+  const std::vector<std::uint8_t> pressed = whoIsPressed(dynamics, work);
   work.workers->share(work.patches.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t k = from; k < to; ++k) {
       ContactPatch& patch = *dynamics.pairs[work.patched[k]].patch();
       const ContactPatch& solved = work.patches[k];
+      if (pressed[solved.a] != 0 || pressed[solved.b] != 0) {
+        forgetImpulses(patch);
+        continue;
+      }
       for (std::size_t i = 0; i < patch.size; ++i) {
         patch.points[i].impulse = solved.points[i].impulse;
         patch.points[i].push = solved.points[i].push;

@@ -221,7 +221,7 @@ void makePatch(NearPair& pair, const collision::ContactManifold& manifold, const
   ContactPatch& patch = close.patch;
   patch = ContactPatch{};
   patch.normal = manifold.normal;
-  patch.friction = std::sqrt(a.motion.friction * b.motion.friction);
+  patch.friction = isInDriven(pair, a, b) ? 0 : std::sqrt(a.motion.friction * b.motion.friction);
   patch.restitution = std::max(a.motion.restitution, b.motion.restitution);
   const Solid& carrier = anchorBody(a, b);
   for (const collision::ContactPoint& point : manifold.list()) {
@@ -359,6 +359,11 @@ bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& st
   if (!restsAsBefore(pair, bodyA, bodyB, a, b, limit, step.epsilon))
     ask(pair, bodyA, bodyB, a, b, limit, farthest, step);
   return true;
+}
+
+bool isInDriven(const NearPair& pair, const Solid& a, const Solid& b) {
+  const auto isDriven = [](const Solid& solid) { return !solid.isFree() && solid.isMoved(); };
+  return pair.penetration() > 0 && (isDriven(a) || isDriven(b));
 }
 
 bool leans(const NearPair& pair, double epsilon) {

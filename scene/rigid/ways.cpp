@@ -68,7 +68,10 @@ std::vector<std::uint32_t> findCarriers(const Dynamics& dynamics, const StepWork
   for (const ContactPatch& patch : work.patches)
     if (solidOf(patch.a).isAwake() && solidOf(patch.b).isAwake()) islands.join(patch.a, patch.b);
   std::vector<std::uint32_t> carriers(work.bodies.size(), kNoPlace);
-  for (const ContactPatch& patch : work.patches) {
+  for (std::size_t k = 0; k < work.patches.size(); ++k) {
+    if (dynamics.pairs[work.patched[k]].penetration() > 0)
+      continue;  // nobody is carried from within
+    const ContactPatch& patch = work.patches[k];
     const bool firstIsFree = solidOf(patch.a).isAwake();
     if (firstIsFree == solidOf(patch.b).isAwake()) continue;
     const std::uint32_t held = firstIsFree ? patch.b : patch.a;

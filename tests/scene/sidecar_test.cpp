@@ -83,6 +83,13 @@ TEST(Sidecar, MistakesAreNamedWithTheirPlace) {
                    {"name":"d","kind":"rigid","objects":["hall/leaf"]})"),
       "another body has it");
   has(complaint(R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":"6"})"), "number");
+  has(complaint(R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":6,"density":500})"),
+      "bodies[0]: has a density and a mass");
+  has(complaint(R"({"name":"d","kind":"trigger","objects":["hall/leaf"],
+                    "box":[[0,0,0],[1,1,1]]})"),
+      "bodies[0]: has objects and a box");
+  has(complaint(R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":6,"mass":7})"),
+      "s.walk.json: the key \"mass\" is there twice in one object");
 }
 
 TEST(Sidecar, WhatIsNoSidecarIsSaidSo) {

@@ -31,6 +31,19 @@ TEST_F(Inspect, TellsAsJsonWhatIsInTheScene) {
   EXPECT_EQ(all.at("object_list").at(1).at("box").at("min").at(0), 5);
 }
 
+TEST_F(Inspect, TellsWhereAThingOnAPathGoes) {
+  write(folder_ / "room.walk.json",
+        R"({"walk":1,"bodies":[{"name":"sign","kind":"path","objects":["room_wall"],
+            "keys":[{"time":0},{"time":2,"offset":[0,1,0],"turn":180}]}]})");
+  const Ended told = run({"inspect", path("room.obj"), "--json", "--unit", "m"});
+  ASSERT_EQ(told.code, 0) << told.err;
+  const auto body = nlohmann::json::parse(told.out).at("bodies").at(0);
+  EXPECT_EQ(body.at("seconds"), 2);
+  EXPECT_EQ(body.at("loops"), false);
+  EXPECT_EQ(body.at("keys").at(1).at("offset"), nlohmann::json({0, 1, 0}));
+  EXPECT_NEAR(body.at("keys").at(1).at("turn"), 3.14159265358979, 1e-12) << "radians";
+}
+
 TEST_F(Inspect, StrictEndsWithThreeWhenThereAreProblems) {
   EXPECT_EQ(run({"inspect", path("room.obj"), "--strict", "--unit", "m"}).code, 0);
   write(folder_ / "room.obj", smallRoomObj() + "o again\nf 1 2 3\nf 1 2 3\n");

@@ -42,7 +42,8 @@ std::vector<Vec3> prism(int sides, double radius, double halfHeight, double top)
 
 Quat anyRotation(std::mt19937& random) {
   std::normal_distribution<double> number;
-  Quat q(number(random), number(random), number(random), number(random));
+  Quat q;  // drawn one by one: a list of arguments has no order
+  for (double* part : {&q.z(), &q.y(), &q.x(), &q.w()}) *part = number(random);
   q.normalize();
   return q;
 }
