@@ -10,6 +10,8 @@
 #include <span>
 #include <utility>
 
+#include "protocol/json_depth.hpp"
+
 namespace enfilade::protocol {
 
 void refuse(std::string_view field, const std::string& text) {
@@ -37,6 +39,7 @@ constexpr double kFastestJoint = 20;  // radians or metres per second
 
 /// A value as the script has it, cut to fit a message.
 std::string excerpt(const json& value) {
+  if (isDeeper(value, kDeepestNest)) return "so deep a nest of lists";
   std::string text = value.dump();
   if (text.size() > kLongestQuote) {
     std::size_t cut = kLongestQuote;

@@ -93,14 +93,18 @@ json jsonOf(const scene::Model& model, const scene::BodySpec& body) {
   if (body.kind == BodyKind::lift) entry["stops"] = body.stops;
   if (body.kind == BodyKind::path) {
     entry["seconds"] = body.keys.back().time;
+    entry["speed"] = body.speed;
     entry["loops"] = body.loops;
+    entry["runs"] = body.runs;
     for (const scene::PathKey& key : body.keys)
       entry["keys"].push_back(
           {{"time", key.time}, {"offset", jsonOf(key.offset)}, {"turn", key.turn}});
   }
   if (body.kind == BodyKind::rigid) {
-    if (body.mass) entry["mass"] = *body.mass;
-    entry["density"] = body.density;
+    if (body.mass)
+      entry["mass"] = *body.mass;
+    else
+      entry["density"] = body.density;
   }
   return entry;
 }

@@ -52,6 +52,7 @@ struct BodyPlan {
   std::array<BodyPlace, kSolverSubsteps + 1> places;  ///< [0]: before; [stretches]: after the tick
   double coordinate = 0;                              ///< after the tick
   double farthest = 0;  ///< metres: no point is farther off at any time; 0: it does not move
+  double swing = 0;     ///< m/s: no point departs faster from going evenly; BodyView::swing
 };
 
 struct Body {
@@ -74,6 +75,7 @@ struct Body {
   Vec3 spin = Vec3::Zero();      ///< rad/s, scene frame
   bool asleep = true;            ///< rigid: stands until something wakes it; others: false
   bool moved = false;            ///< in this tick
+  bool driven = false;           ///< rigid: may be pushed or carried by a driven one in this tick
   bool left = false;             ///< rigid: it left the world, and stays where it was caught
   EntityId blockedBy = 0;        ///< what a kinematic body cannot push aside; 0: nothing
 

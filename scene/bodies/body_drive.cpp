@@ -162,6 +162,22 @@ void planPath(Body& body, double tick) {
   plan.places[0].turn = turn;
 }
 
+/// Of a path that does not go evenly.
+double swingOf(const BodyPlan& plan, double radius, double tick) {
+  if (plan.stretches == 1) return 0;
+  const BodyPlace &start = plan.places[0], &end = plan.places[plan.stretches];
+  const auto n = static_cast<double>(plan.stretches);
+  const Vec3 evenMove = (end.offset - start.offset) / n;
+  const double evenTurn = (end.turn - start.turn) / n;
+  double most = 0;
+  for (std::size_t i = 0; i < plan.stretches; ++i) {
+    const BodyPlace &from = plan.places[i], &to = plan.places[i + 1];
+    most = std::max(most, (to.offset - from.offset - evenMove).norm() +
+                              std::abs(to.turn - from.turn - evenTurn) * radius);
+  }
+  return n * most / tick;
+}
+
 void plan(Body& body, double tick) {
   BodyPlan& plan = body.plan;
   plan = {};
@@ -176,6 +192,7 @@ void plan(Body& body, double tick) {
   for (std::size_t i = 1; i <= plan.stretches; ++i)
     plan.farthest =
         std::max(plan.farthest, farthestWay(*body.shape, plan.places[0], plan.places[i]));
+  plan.swing = swingOf(plan, body.shape->radius, tick);
 }
 
 }  // namespace
@@ -242,31 +259,15 @@ double pushRoom(const WorldState& world, const Box& reach) {
 
 bool isBusy(const Body& body) {
   const BodyDrive& drive = body.drive;
-  if (!isKinematic(body.spec->kind)) return !body.asleep;
+  // What a path that goes round shakes never rests, as little as the path itself.
+  if (!isKinematic(body.spec->kind)) return !body.asleep && !body.driven;
   if (goesRound(*body.spec)) return false;
   return (drive.going && body.blockedBy == 0) || drive.closesIn >= 0;
 }
 
 namespace {
 
-/// Of a path that does not go evenly: see BodyView::swing.
-double swingOf(const Body& body, double tick) {
-  const BodyPlan& plan = body.plan;
-  if (!body.moved || plan.stretches == 1) return 0;
-  const BodyPlace &start = plan.places[0], &end = plan.places[plan.stretches];
-  const auto n = static_cast<double>(plan.stretches);
-  const Vec3 evenMove = (end.offset - start.offset) / n;
-  const double evenTurn = (end.turn - start.turn) / n;
-  double most = 0;
-  for (std::size_t i = 0; i < plan.stretches; ++i) {
-    const BodyPlace &from = plan.places[i], &to = plan.places[i + 1];
-    most = std::max(most, (to.offset - from.offset - evenMove).norm() +
-                              std::abs(to.turn - from.turn - evenTurn) * body.shape->radius);
-  }
-  return n * most / tick;
-}
-
-BodyView viewOf(const Body& body, std::uint32_t index, double tick) {
+BodyView viewOf(const Body& body, std::uint32_t index) {
   BodyView view;
   view.id = body.id;
   view.index = index;
@@ -275,7 +276,7 @@ BodyView viewOf(const Body& body, std::uint32_t index, double tick) {
   view.coordinate = body.drive.coordinate;
   view.velocity = body.velocity;
   view.spin = body.spin;
-  view.swing = isKinematic(body.spec->kind) ? swingOf(body, tick) : 0;
+  view.swing = body.moved ? body.plan.swing : 0;
   view.moving = body.moved || (body.spec->kind == BodyKind::rigid && !body.asleep);
   view.blockedBy = body.blockedBy;
   return view;
@@ -298,7 +299,7 @@ std::shared_ptr<const std::vector<BodyView>> viewsOfBodies(const WorldState& wor
   }
   auto views = std::make_shared<std::vector<BodyView>>();
   for (const Body& body : world.bodies)
-    views->push_back(viewOf(body, static_cast<std::uint32_t>(views->size()), world.lengths.tick));
+    views->push_back(viewOf(body, static_cast<std::uint32_t>(views->size())));
   return views;
 }
 

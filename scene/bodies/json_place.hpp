@@ -5,6 +5,7 @@
 #include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "collision/types.hpp"
@@ -24,6 +25,9 @@ struct JsonPlace {
   }
   JsonPlace at(std::size_t i) const { return {value.at(i), name + "[" + std::to_string(i) + "]"}; }
 };
+
+/// Throws SidecarError where it is no JSON, or says a key twice in one object.
+nlohmann::json parsed(std::string_view text, const std::string& source);
 
 /// At most 40 characters of it.
 std::string excerpt(const nlohmann::json& value);

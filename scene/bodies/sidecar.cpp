@@ -1,7 +1,6 @@
 #include "scene/bodies/sidecar.hpp"
 
 #include <algorithm>
-#include <set>
 
 #include "scene/bodies/body_fields.hpp"
 #include "scene/scene.hpp"
@@ -117,11 +116,11 @@ void readBody(const JsonPlace& place, Model& model) {
   body.name = textOf(place.at("name"));
   body.kind = kindOf(place);
   if (place.has("objects")) body.objects = listOfObjects(place.at("objects"), model);
-  if (place.has("objects") && place.has("box"))
-    place.fail("has objects and a box: a trigger is either");
   if (!place.has("objects") && !place.has("box"))
     place.fail("objects is missing: a list of paths or GlobalIds");
   const BodyFields fields = readBodyFields(place, ownKeys(body.kind), body);
+  if (place.has("objects") && place.has("box"))
+    place.fail("has objects and a box: a trigger is either");
   placeAnchor(place, fields, model, body);
   if (place.has("box")) readBox(place.at("box"), body, model);
   if (place.has("each") && truthOf(place.at("each"))) return addEach(model, body);
@@ -156,23 +155,6 @@ void cutBack(Model& model, const Extent& extent) {
   model.bodies.resize(extent.bodies);
 }
 
-/// A key that is there twice is a mistake whose other half would be lost.
-json parse(std::string_view text, const std::string& source) {
-  std::vector<std::set<std::string>> keys;  // of the objects that are open
-  const auto watch = [&](int, json::parse_event_t event, json& value) {
-    if (event == json::parse_event_t::object_start) keys.emplace_back();
-    if (event == json::parse_event_t::object_end) keys.pop_back();
-    if (event == json::parse_event_t::key && !keys.back().insert(value.get<std::string>()).second)
-      throw SidecarError(source + ": the key " + excerpt(value) + " is there twice in one object");
-    return true;
-  };
-  try {
-    return json::parse(text, watch);
-  } catch (const json::exception& problem) {
-    throw SidecarError(source + ": is not JSON: " + problem.what());
-  }
-}
-
 }  // namespace
 
 std::filesystem::path sidecarOf(const std::filesystem::path& model) {
@@ -181,7 +163,7 @@ std::filesystem::path sidecarOf(const std::filesystem::path& model) {
 }
 
 Sidecar applySidecar(Model& model, std::string_view text, const std::string& source) {
-  const json whole = parse(text, source);
+  const json whole = parsed(text, source);
   const JsonPlace place{whole, source};
   allowOnly(place, {"walk", "bodies", "still"});
   if (!place.has("walk") || whole["walk"] != 1)

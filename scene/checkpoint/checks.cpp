@@ -112,7 +112,7 @@ struct Check {
     for (const Body& b : world.bodies) {
       require(isKnown(b.blockedBy), b.spec->name + " is blocked by nobody");
       require(!isKinematic(b.spec->kind) || b.drive.speed > 0, b.spec->name + " goes at no speed");
-      require(b.plan.farthest >= 0, b.spec->name + " goes less than nothing");
+      require(b.plan.farthest >= 0 && b.plan.swing >= 0, b.spec->name + " goes less than nothing");
       require(std::is_sorted(b.inside.begin(), b.inside.end()), b.spec->name + "'s visitors");
       for (const EntityId who : b.inside) {
         const Body* visitor = body(who);

@@ -316,13 +316,13 @@ struct Layout<BodyDrive> {
     a(place, coordinate, rate, target, speed, going, closesIn);
   }
 };
-/// All else is planned anew before it is asked for.
+/// The places are planned anew before they are asked for; what the snapshot tells is not.
 template <>
 struct Layout<BodyPlan> {
   template <class A>
   static void archive(A& a, Held<A, BodyPlan>& plan) {
-    auto& [stretches, places, coordinate, farthest] = plan;
-    a(farthest);
+    auto& [stretches, places, coordinate, farthest, swing] = plan;
+    a(farthest, swing);
   }
 };
 /// `id`, `spec`, `shape` and `mover` are as in any world of the scene; `rotation`, `turned` and
@@ -332,8 +332,8 @@ struct Layout<Body> {
   template <class A>
   static void archive(A& a, Held<A, Body>& body) {
     auto& [id, spec, shape, position, orientation, rotation, turned, partBoxes, positionBefore,
-           orientationBefore, velocity, spin, asleep, moved, left, blockedBy, drive, plan, mover,
-           reach, inside] = body;
+           orientationBefore, velocity, spin, asleep, moved, driven, left, blockedBy, drive, plan,
+           mover, reach, inside] = body;
     a(position, orientation);
     if constexpr (!A::kWrites) placeBody(body, position, orientation);
     a(velocity, spin, asleep, moved, left, blockedBy, drive, plan, reach, inside);
@@ -420,7 +420,7 @@ struct Layout<Solid> {
   template <class A>
   static void archive(A& a, Held<A, Solid>& solid) {
     auto& [hull, motion, centreInFrame, parts, mesh, radius, asleep, calmFor, pushVelocity,
-           mostPush, leash, gaits, restless, rotation, position, odometer, jumped] = solid;
+           mostPush, leash, gaits, pushed, restless, rotation, position, odometer, jumped] = solid;
     bool isFree = solid.isFree();  // one that left the world no longer is
     a(motion, isFree, asleep, calmFor, pushVelocity, mostPush);
     if constexpr (!A::kWrites)

@@ -3,11 +3,10 @@
 //     wakes it, whose pairs are then looked at, too.
 //  2. The solver moves the awake bodies and all that they may meet (solver.hpp).
 //  3. Every pair that could have met on the way is proved clear (passage.hpp); where that fails,
-//  the
-//     free bodies go only as far as is proved, and less fast; then their other pairs are looked at
-//     again, until nobody needs to stop. It ends, since a body goes less far each time, and after a
-//     few times not at all. A group that leans on one driven body and nothing else that stands or
-//     is driven, such as parts in a tray, goes with it at least.
+//     the free bodies go only as far as is proved, and less fast; then their other pairs are looked
+//     at again, until nobody needs to stop. It ends, since a body goes less far each time, and
+//     after a few times not at all. A group that leans on one driven body and nothing else that
+//     stands or is driven, such as parts in a tray, goes with it at least.
 //  4. Groups of bodies that lean on one another and were calm for a while fall asleep.
 #include "scene/rigid/dynamics.hpp"
 
@@ -46,7 +45,7 @@ double advanceOf(const Solid& solid, const Vec3& arm, const Vec3& towards, doubl
   if (solid.asleep) return 0;
   const auto& mean = solid.motion;
   const Vec3 velocity = mean.velocity + mean.spin.cross(arm) + solid.pushVelocity;
-  double most = std::max(0.0, towards.dot(velocity)) * seconds, way = 0;
+  double most = std::max(solid.pushed, towards.dot(velocity)) * seconds, way = 0;
   for (const Gait& gait : solid.gaits) {
     way += towards.dot(gait.velocity + gait.spin.cross(arm)) * seconds /
            static_cast<double>(solid.gaits.size());
@@ -200,6 +199,15 @@ void gatherPatches(const Dynamics& dynamics, StepWork& work) {
   work.report.patches = static_cast<std::uint32_t>(work.patches.size());
 }
 
+void findLetOut(const Dynamics& dynamics, StepWork& work) {
+  work.letOut.assign(work.bodies.size(), 0);
+  for (const std::uint32_t i : work.patched) {
+    const NearPair& pair = dynamics.pairs[i];
+    const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
+    if (isLetOut(pair, a, b)) work.letOut[work.local[a.isFree() ? pair.key.a : pair.key.b]] = 1;
+  }
+}
+
 void gatherJoints(const Dynamics& dynamics, StepWork& work) {
   for (std::uint32_t i = 0; i < dynamics.joints.size(); ++i) {
     const Joint& joint = dynamics.joints[i];
@@ -214,34 +222,54 @@ void gatherJoints(const Dynamics& dynamics, StepWork& work) {
   }
 }
 
-void forgetImpulses(ContactPatch& patch) {
-  for (PatchPoint& point : patch.points) point.impulse = point.push = 0;
-  patch.rub = Vec3::Zero();
-  patch.twist = 0;
+/// Metres that a patch's points come nearer on the ways of its bodies; < 0: they part.
+double comesNearer(const ContactPatch& patch, const StepWork& work) {
+  const auto wayOf = [&](std::uint32_t body, const Vec3& arm) -> Vec3 {
+    const Passage& way = work.passages[body];
+    const Vec3 inFrame = way.fromTurned.transpose() * arm;
+    return way.toCentre - way.fromCentre + (way.toTurned - way.fromTurned) * inFrame;
+  };
+  double most = -std::numeric_limits<double>::infinity();
+  for (const PatchPoint& point : patch.list()) {
+    const Vec3 way = wayOf(patch.a, point.armA) - wayOf(patch.b, point.armB);
+    most = std::max(most, patch.normal.dot(way));
+  }
+  return most;
 }
 
-/// Of each of `bodies`: it is inside a driven one. What presses it from the other side cannot yield
-/// either, so that their impulses grow without bound: kept, they would fling it once it is free.
-std::vector<std::uint8_t> whoIsPressed(const Dynamics& dynamics, const StepWork& work) {
-  std::vector<std::uint8_t> pressed(work.bodies.size(), 0);
-  for (const std::uint32_t i : work.patched) {
-    const NearPair& pair = dynamics.pairs[i];
-    const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
-    if (isInDriven(pair, a, b)) pressed[work.local[a.isFree() ? pair.key.a : pair.key.b]] = 1;
+/// Of each of `bodies`: a driven one goes deeper into it, or into what it leans on. Between two
+/// that cannot yield impulses grow without bound: kept, they would fling whoever comes free.
+std::vector<std::uint8_t> whoStartsCold(const Dynamics& dynamics, const StepWork& work) {
+  std::vector<std::uint8_t> cold(work.bodies.size(), 0);
+  for (std::size_t k = 0; k < work.patches.size(); ++k) {
+    const NearPair& pair = dynamics.pairs[work.patched[k]];
+    const ContactPatch& patch = work.patches[k];
+    if (!isInDriven(pair, dynamics.solids[pair.key.a], dynamics.solids[pair.key.b])) continue;
+    if (comesNearer(patch, work) > 0) cold[patch.a] = cold[patch.b] = 1;
   }
-  return pressed;
+  if (std::ranges::find(cold, 1) == cold.end()) return cold;
+  Islands islands(work.bodies.size());
+  const auto join = [&](const auto& link) {
+    if (dynamics.solids[work.solids[link.a]].isAwake() &&
+        dynamics.solids[work.solids[link.b]].isAwake())
+      islands.join(link.a, link.b);
+  };
+  for (const ContactPatch& patch : work.patches) join(patch);
+  for (const Joint& joint : work.joints) join(joint);
+  for (std::uint32_t i = 0; i < cold.size(); ++i)
+    if (cold[i] != 0) cold[islands.leaderOf(i)] = 1;
+  for (std::uint32_t i = 0; i < cold.size(); ++i) cold[i] = cold[islands.leaderOf(i)];
+  return cold;
 }
 
 void keepImpulses(Dynamics& dynamics, const StepWork& work) {
-  const std::vector<std::uint8_t> pressed = whoIsPressed(dynamics, work);
+  const std::vector<std::uint8_t> cold = whoStartsCold(dynamics, work);
+  const auto isKept = [&](const auto& link) { return cold[link.a] == 0 && cold[link.b] == 0; };
+  const ContactPatch nothing;
   work.workers->share(work.patches.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t k = from; k < to; ++k) {
       ContactPatch& patch = *dynamics.pairs[work.patched[k]].patch();
-      const ContactPatch& solved = work.patches[k];
-      if (pressed[solved.a] != 0 || pressed[solved.b] != 0) {
-        forgetImpulses(patch);
-        continue;
-      }
+      const ContactPatch& solved = isKept(work.patches[k]) ? work.patches[k] : nothing;
       for (std::size_t i = 0; i < patch.size; ++i) {
         patch.points[i].impulse = solved.points[i].impulse;
         patch.points[i].push = solved.points[i].push;
@@ -250,8 +278,10 @@ void keepImpulses(Dynamics& dynamics, const StepWork& work) {
       patch.twist = solved.twist;
     }
   });
-  for (std::size_t k = 0; k < work.joints.size(); ++k)
-    dynamics.joints[work.jointOf[k]].impulses = work.joints[k].impulses;
+  for (std::size_t k = 0; k < work.joints.size(); ++k) {
+    const Joint& joint = work.joints[k];
+    dynamics.joints[work.jointOf[k]].impulses = isKept(joint) ? joint.impulses : Joint{}.impulses;
+  }
 }
 
 // ---- after step 3 ------------------------------------------------------------------------------
@@ -260,7 +290,7 @@ void setOut(Dynamics& dynamics, StepWork& work) {
   for (std::size_t i = 0; i < work.bodies.size(); ++i) {
     Solid& solid = dynamics.solids[work.solids[i]];
     const bool isAwake = solid.isAwake();
-    if (!isAwake && (solid.isFree() || !solid.isMoved() || solid.mostPush > 0)) continue;
+    if (!isAwake && !solid.isDriven()) continue;
     const Passage& way = work.passages[i];
     solid.motion.centre = way.toCentre, solid.motion.rotation = way.toRotation;
     if (isAwake) {
@@ -361,9 +391,10 @@ DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings) {
   gatherBodies(dynamics, work);
   gatherPatches(dynamics, work);
   gatherJoints(dynamics, work);
+  findLetOut(dynamics, work);
   solve(work.bodies, work.patches, work.joints, work.driven, settings.solver, *work.workers);
-  keepImpulses(dynamics, work);
   proveWays(dynamics, settings.solver.seconds, work);
+  keepImpulses(dynamics, work);
   setOut(dynamics, work);
   rest(dynamics, settings, work);
   return work.report;

@@ -1,8 +1,7 @@
 // Which plane parts two bodies? The closest points' is one; of the faces that look along it, that
 // of either body may be another. A contact along any of them keeps the bodies apart.
 //  - At rest a face's is better: where edges of equal boxes lie above one another the closest
-//  points
-//    are those of rounded corners, and their normal leans with every hair's breadth.
+//    points are those of rounded corners, and their normal leans with every hair's breadth.
 //  - On the way the one is best under which the motion of now needs to change least. A box that
 //    slides over a floor of triangles comes near the edges of those ahead, and the closest points'
 //    plane would stop it there; one that falls beside a table's top would be stopped by the top's.
@@ -35,6 +34,7 @@ constexpr double kSamePoint = 0.25;
 /// Of the coordinates: more than what spheres lose by rounding, here and where solids are placed.
 constexpr double kOfSpheres = 0x1p-44;
 constexpr double kMore = 1 + 0x1p-40;  // above what a few roundings lose
+constexpr double kAhead = 0.5;         // cosine: what is pushed within 60 degrees of the way
 
 struct Axis {
   Vec3 normal = Vec3::UnitY();  ///< from A to B
@@ -185,6 +185,7 @@ void inherit(const ContactPatch& before, const PatchAnchors& anchorsBefore, doub
       std::swap(patch.points[k], patch.points[k - 1]);
       std::swap(pair.anchors[k], pair.anchors[k - 1]);
     }
+  if (!(patch.friction > 0)) return;
   patch.rub = tangential(before.rub, patch.normal);
   patch.twist = before.twist;
 }
@@ -221,7 +222,6 @@ void makePatch(NearPair& pair, const collision::ContactManifold& manifold, const
   ContactPatch& patch = close.patch;
   patch = ContactPatch{};
   patch.normal = manifold.normal;
-  patch.friction = isInDriven(pair, a, b) ? 0 : std::sqrt(a.motion.friction * b.motion.friction);
   patch.restitution = std::max(a.motion.restitution, b.motion.restitution);
   const Solid& carrier = anchorBody(a, b);
   for (const collision::ContactPoint& point : manifold.list()) {
@@ -230,6 +230,8 @@ void makePatch(NearPair& pair, const collision::ContactManifold& manifold, const
     patch.points[patch.size++] = {point.pointA - a.motion.centre, point.pointB - b.motion.centre,
                                   point.separation, 0, 0};
   }
+  const bool rubs = !isLetOut(pair, a, b);
+  patch.friction = rubs ? std::sqrt(a.motion.friction * b.motion.friction) : 0;
   setPush(a, b, patch);
   inherit(before, anchorsBefore, kSamePoint * std::min(a.radius, b.radius), close);
 }
@@ -362,8 +364,17 @@ bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& st
 }
 
 bool isInDriven(const NearPair& pair, const Solid& a, const Solid& b) {
-  const auto isDriven = [](const Solid& solid) { return !solid.isFree() && solid.isMoved(); };
-  return pair.penetration() > 0 && (isDriven(a) || isDriven(b));
+  return pair.penetration() > 0 && pair.hasPatch && (a.isDriven() || b.isDriven());
+}
+
+bool isLetOut(const NearPair& pair, const Solid& a, const Solid& b) {
+  if (!isInDriven(pair, a, b)) return false;
+  const ContactPatch& patch = *pair.patch();
+  const Solid& driven = a.isDriven() ? a : b;
+  const Vec3& arm = a.isDriven() ? patch.points[0].armA : patch.points[0].armB;
+  const Vec3 velocity = driven.motion.velocity + driven.motion.spin.cross(arm);
+  const double ahead = (a.isDriven() ? 1 : -1) * patch.normal.dot(velocity);
+  return !(ahead > kAhead * velocity.norm());
 }
 
 bool leans(const NearPair& pair, double epsilon) {

@@ -88,9 +88,12 @@ Pace paceOf(const Solid& solid, const Vec3& beside);
 /// look() would do nothing but to find them far: proved by their paces.
 bool areFar(const NearPair& pair, const Pace& a, const Pace& b, const NearPairStep& step);
 
-/// Whether a free body is inside a driven one, which pressed it against something. It is let out
-/// and not taken along: there is no friction between the two.
+/// Whether a free body is inside a driven one, which pressed it against something.
 bool isInDriven(const NearPair& pair, const Solid& a, const Solid& b);
+
+/// Whether its shortest way out is not ahead of the driven one: that goes on through it, without
+/// friction, and does not take it along.
+bool isLetOut(const NearPair& pair, const Solid& a, const Solid& b);
 
 /// Whether the points lean on one another: nearer than 2 epsilon.
 bool leans(const NearPair& pair, double epsilon);

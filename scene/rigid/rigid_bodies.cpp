@@ -4,7 +4,7 @@
 //  - other free bodies, also those that sleep and may be woken, and what of them these lean on;
 //  - kinematic bodies, which have moved already, as driven from where they were before;
 //  - avatars, which have moved already too: they stand, and push by what they want and could not
-//  do.
+//    do.
 // A body goes no farther in a tick than it said it can reach: what stands beyond was not asked for.
 #include <algorithm>
 #include <thread>
@@ -328,15 +328,33 @@ void catchBody(WorldState& world, Body& body, Solid& solid, TickReport& report) 
   report.contacts.push_back(eventOf(world, ContactEvent::Kind::leftWorld, body.id, nowhere));
 }
 
-/// How far it may have to go in this tick out of the way of driven bodies, or with them, metres.
-double drivenAway(const WorldState& world, const Body& body) {
-  if (world.goingBodies.empty()) return 0;
-  const Box box = boxOf(body);
-  double farthest = 0;
-  for (const std::uint32_t i : world.goingBodies)
-    if (overlaps(world.bodies[i].reach, box))
-      farthest = std::max(farthest, world.bodies[i].plan.farthest);
-  return farthest;
+/// How far each of the free bodies may have to go in this tick out of the way of driven bodies, or
+/// with them, metres; also one that is pushed by another.
+std::vector<double> drivenAway(const WorldState& world) {
+  const std::vector<std::uint32_t>& free = world.rigids.bodies;
+  std::vector<double> away(free.size(), 0);
+  if (world.goingBodies.empty()) return away;
+  std::vector<Box> boxes;
+  std::vector<std::size_t> rest, open;
+  for (std::size_t k = 0; k < free.size(); ++k) {
+    boxes.push_back(boxOf(world.bodies[free[k]]));
+    for (const std::uint32_t i : world.goingBodies)
+      if (overlaps(world.bodies[i].reach, boxes[k]))
+        away[k] = std::max(away[k], world.bodies[i].plan.farthest);
+    (away[k] > 0 ? open : rest).push_back(k);
+  }
+  while (!open.empty() && !rest.empty()) {
+    const std::size_t pusher = open.back();
+    open.pop_back();
+    const Box within = grown(boxes[pusher], away[pusher] + lookoutOf(world.lengths));
+    std::erase_if(rest, [&](std::size_t k) {
+      if (!overlaps(within, boxes[k])) return false;
+      away[k] = away[pusher];
+      open.push_back(k);
+      return true;
+    });
+  }
+  return away;
 }
 
 }  // namespace
@@ -368,10 +386,15 @@ Solid unmetSolid(const WorldState& world, EntityId entity, std::uint32_t part) {
 
 void planRigids(WorldState& world) {
   const double lookout = lookoutOf(world.lengths), tick = world.lengths.tick;
-  for (const std::uint32_t i : world.rigids.bodies) {
+  const std::vector<double> away = drivenAway(world);
+  for (std::size_t k = 0; k < away.size(); ++k) {
+    const std::uint32_t i = world.rigids.bodies[k];
     Body& body = world.bodies[i];
     Solid& solid = solidOfRigid(world.rigids, i);
-    const double driven = drivenAway(world, body);
+    const double driven = away[k];
+    body.driven = driven > 0;
+    // What is nearer than 2 epsilon is looked at in any case.
+    solid.pushed = std::max(0.0, (driven - 2 * world.lengths.epsilon) / tick - solid.fastest());
     const bool wasAwake = solid.leash > lookout;
     if (body.asleep && !wasAwake && driven == 0) continue;
     body.moved = false;

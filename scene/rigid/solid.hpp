@@ -53,6 +53,8 @@ struct Solid {
   /// Of what is driven back and forth within a step: one for each of the solver's substeps, else
   /// none. `motion` has the mean of them, and its way is taken to be straight.
   std::vector<Gait> gaits;
+  /// m/s: so much faster than it goes it may be pushed within the step.
+  double pushed = 0;
   bool restless = false;  ///< who leans on it does not sleep: it goes without being driven
 
   // Set by placeSolid() from the motion.
@@ -68,9 +70,11 @@ struct Solid {
     return !isFree() && (!gaits.empty() || !motion.velocity.isZero(0) || !motion.spin.isZero(0) ||
                          (mostPush > 0 && !pushVelocity.isZero(0)));
   }
-  /// m/s: no point of it, driven as it is, departs faster from its mean motion.
+  /// Goes its way before the solver.
+  bool isDriven() const { return isMoved() && mostPush == 0; }
+  /// m/s: no point of it, driven or pushed as it is, departs faster from its mean motion.
   double swing() const {
-    double most = 0;
+    double most = pushed;
     for (const Gait& gait : gaits)
       most = std::max(most, (gait.velocity - motion.velocity).norm() +
                                 (gait.spin - motion.spin).norm() * radius);

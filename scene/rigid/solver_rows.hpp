@@ -156,7 +156,6 @@ struct AngularRow {
   double mass, impulse, parting;
 };
 
-/// All that is solved: joints in the order of the array, then patches colour by colour.
 /// Room for so many that are written before they are read. It only grows.
 template <class T>
 class Room {
@@ -171,7 +170,8 @@ class Room {
   std::size_t size_ = 0;
 };
 
-/// Kept by each thread from step to step, for its room alone.
+/// All that is solved: joints in the order of the array, then patches colour by colour. Kept by
+/// each thread from step to step, for its room alone.
 struct System {
   std::vector<Mover> movers;           ///< of the bodies, and one of nobody
   std::span<PatchBlock> blocks;        ///< by colour

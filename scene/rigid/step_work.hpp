@@ -51,6 +51,7 @@ struct StepWork {
   std::vector<std::uint32_t> solids;   ///< of each of `bodies`
   std::vector<RigidBody> bodies;
   std::vector<DrivenBody> driven;
+  std::vector<std::uint8_t> letOut;  ///< of each of `bodies`: see isLetOut()
   std::vector<ContactPatch> patches;
   std::vector<Joint> joints;
   std::vector<std::uint32_t> jointOf;

@@ -65,15 +65,16 @@ std::vector<std::uint32_t> findCarriers(const Dynamics& dynamics, const StepWork
   const auto solidOf = [&](std::uint32_t body) -> const Solid& {
     return dynamics.solids[work.solids[body]];
   };
+  const auto holds = [&](const ContactPatch& patch) {
+    return work.letOut[patch.a] == 0 && work.letOut[patch.b] == 0;
+  };
   for (const ContactPatch& patch : work.patches)
-    if (solidOf(patch.a).isAwake() && solidOf(patch.b).isAwake()) islands.join(patch.a, patch.b);
+    if (holds(patch) && solidOf(patch.a).isAwake() && solidOf(patch.b).isAwake())
+      islands.join(patch.a, patch.b);
   std::vector<std::uint32_t> carriers(work.bodies.size(), kNoPlace);
-  for (std::size_t k = 0; k < work.patches.size(); ++k) {
-    if (dynamics.pairs[work.patched[k]].penetration() > 0)
-      continue;  // nobody is carried from within
-    const ContactPatch& patch = work.patches[k];
+  for (const ContactPatch& patch : work.patches) {
     const bool firstIsFree = solidOf(patch.a).isAwake();
-    if (firstIsFree == solidOf(patch.b).isAwake()) continue;
+    if (!holds(patch) || firstIsFree == solidOf(patch.b).isAwake()) continue;
     const std::uint32_t held = firstIsFree ? patch.b : patch.a;
     if (work.passages[held].stands) continue;
     std::uint32_t& carrier = carriers[islands.leaderOf(firstIsFree ? patch.a : patch.b)];
@@ -113,8 +114,7 @@ void findPassages(const Dynamics& dynamics, StepWork& work) {
   work.workers->share(work.bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i) {
       const Solid& solid = dynamics.solids[work.solids[i]];
-      const bool goes =
-          solid.isAwake() || (!solid.isFree() && solid.isMoved() && solid.mostPush == 0);
+      const bool goes = solid.isAwake() || solid.isDriven();
       work.passages[i] = goes ? passageOf(solid, work.bodies[i]) : standing(solid);
       if (solid.isAwake()) leash(solid, work.passages[i]);
     }

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "protocol/json_depth.hpp"
 #include "server/capture/camera_path.hpp"
 
 namespace enfilade::server {
@@ -30,6 +31,7 @@ struct Place {
 };
 
 std::string excerpt(const Json& value) {
+  if (protocol::isDeeper(value, protocol::kDeepestNest)) return "so deep a nest of lists";
   std::string text = value.dump(-1, ' ', true, Json::error_handler_t::replace);
   if (text.size() > kLongestQuote) text = text.substr(0, kLongestQuote) + "...";
   return text;

@@ -1,6 +1,7 @@
 // What the documents show must be so.
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -145,6 +146,17 @@ TEST(Documents, ProtocolMdNamesEachRequestAndReply) {
       EXPECT_NE(text.find("`" + body->name() + "`"), std::string::npos) << body->name();
     }
   }
+}
+
+TEST(Documents, BundledScriptsCanBeRead) {
+  int scripts = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(
+           std::filesystem::path(ENFILADE_PROTOCOL_FOLDER) / ".." / "assets")) {
+    if (entry.path().extension() != ".jsonl") continue;
+    ++scripts;
+    EXPECT_NO_THROW(readScript(entry.path())) << entry.path();
+  }
+  EXPECT_GE(scripts, 3);
 }
 
 }  // namespace

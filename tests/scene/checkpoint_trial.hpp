@@ -54,7 +54,7 @@ inline bool same(const BodyView& a, const BodyView& b) {
   return a.id == b.id && a.index == b.index && same(a.pose.translation, b.pose.translation) &&
          a.pose.rotation.coeffs() == b.pose.rotation.coeffs() && a.displaced == b.displaced &&
          a.coordinate == b.coordinate && same(a.velocity, b.velocity) && same(a.spin, b.spin) &&
-         a.moving == b.moving && a.blockedBy == b.blockedBy;
+         a.swing == b.swing && a.moving == b.moving && a.blockedBy == b.blockedBy;
 }
 template <class List>
 bool sameLists(const List& a, const List& b) {
@@ -101,6 +101,7 @@ inline void goOnAlike(const std::shared_ptr<const Scene>& scene, const Lengths& 
       copies.push_back({t, worldFrom(scene, bytes)});
       ASSERT_EQ(checkpointOf(copies.back().world), bytes) << "tick " << t;
       ASSERT_EQ(copies.back().world.snapshot()->stateHash, world.snapshot()->stateHash);
+      ASSERT_TRUE(sameLists(*copies.back().world.snapshot()->bodies, *world.snapshot()->bodies));
       for (Copy& copy : copies)
         if (now != told.end() && &copy != &copies.back()) give(copy.world, now->second);
       if (!waiting && now != told.end())

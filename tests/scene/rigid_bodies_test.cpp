@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "scene/checkpoint/checkpoint.hpp"
 #include "tests/scene/body_trial.hpp"
 
 namespace enfilade::scene {
@@ -152,31 +153,132 @@ TEST(RigidBodies, ASleepingBoxIsWokenByADoorOfAnySpeedThatPushesIt) {
   }
 }
 
+/// A shuttle that goes back and forth along `way`, and presses boxes against a post.
+Model pressing(const std::vector<NamedBox>& boxes, const Vec3& way, double seconds) {
+  Model model =
+      loose(boxes, {{"post", {2, 0, -1}, {2.2, 2, 2}}, {"shuttle", {-1, 0.01, 0}, {0, 0.6, 1}}});
+  BodySpec shuttle = bodySpec("shuttle", BodyKind::path, {2});
+  shuttle.keys = {{0, Vec3::Zero(), 0}, {seconds, way, 0}, {2 * seconds, Vec3::Zero(), 0}};
+  shuttle.loops = true;
+  model.bodies.push_back(shuttle);
+  return model;
+}
+
+/// Six laps: nobody comes into the post or is flung; after the first lap none goes farther than
+/// `astray` metres. Returns how many pairs were squeezed.
+std::uint32_t pressSixTimes(BodyTrial& t, double seconds, double astray) {
+  std::uint32_t squeezed = 0;
+  std::vector<Vec3> held;
+  const int lap = static_cast<int>(120 * seconds);
+  for (int i = 0; i < 6 * lap; ++i) {
+    squeezed += tick(t.world).squeezedBodies;
+    for (std::size_t k = 0; k + 1 < t.world.state().bodies.size(); ++k) {
+      const Body& box = t.world.state().bodies[k];
+      EXPECT_FALSE(isIn(t.world, box, 1)) << box.spec->name << " in the post, tick " << i;
+      EXPECT_LT(box.velocity.norm(), 1.5) << box.spec->name << " flung, tick " << i;
+      if (i == lap) held.push_back(box.position);
+      if (i > lap) {
+        EXPECT_LT((box.position - held[k]).norm(), astray) << box.spec->name << ", " << i;
+      }
+      if (::testing::Test::HasFailure()) return squeezed;
+    }
+  }
+  return squeezed;
+}
+
 TEST(RigidBodies, AShuttleThatPressesABoxAgainstAPostGoesThroughItAndLeavesItThere) {
   // How far the shuttle comes, metres: a little into the box, past its middle, past the post.
-  for (const double far : {1.6, 2.0, 2.5}) {
-    Model model =
-        loose({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}},
-              {{"post", {2, 0, 0}, {2.2, 2, 1}}, {"shuttle", {-1, 0.01, 0}, {0, 0.6, 1}}});
-    BodySpec shuttle = bodySpec("shuttle", BodyKind::path, {2});
-    shuttle.keys = {{0, Vec3::Zero(), 0}, {far, {far, 0, 0}, 0}, {2 * far, Vec3::Zero(), 0}};
-    shuttle.loops = true;
-    model.bodies.push_back(shuttle);
-    BodyTrial t(std::move(model));
-    std::uint32_t squeezed = 0;
-    for (int i = 0; i < 6 * 60 * far; ++i) {
-      squeezed += tick(t.world).squeezedBodies;
-      const Body& box = t.body("box");
-      ASSERT_FALSE(isIn(t.world, box, 1)) << far << ": in the post, tick " << i;
-      ASSERT_LT(box.velocity.norm(), 1.5) << far << ": flung, tick " << i;
-      if (i < 120 * far) continue;
-      // Once pressed it stays between the shuttle and the post, in all further laps.
-      ASSERT_NEAR(box.position.x(), 1.75, 0.02) << far << " tick " << i;
-      ASSERT_NEAR(box.position.z(), 0.45, 0.02) << far << " tick " << i;
-    }
-    EXPECT_GT(squeezed, 0u) << far;
-    EXPECT_GT(t.body("box").position.x(), 1.7) << far;
+  for (const double far : {1.6, 2.0, 2.3}) {
+    BodyTrial t(pressing({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {far, 0, 0}, far));
+    EXPECT_GT(pressSixTimes(t, far, 0.02), 0u) << far;
+    EXPECT_NEAR(t.body("box").position.x(), 1.75, 0.02) << far;
   }
+}
+
+TEST(RigidBodies, AShuttleThatPressesBoxesInARowFlingsNoneOfThem) {
+  for (const double far : {1.2, 1.6, 2.5}) {
+    BodyTrial t(pressing({{"first", {0.3, 0.0005, 0.2}, {0.7, 0.5, 0.7}},
+                          {"second", {0.9, 0.0005, 0.25}, {1.3, 0.4, 0.75}}},
+                         {far, 0, 0}, far));
+    EXPECT_GT(pressSixTimes(t, far, 0.1), 0u) << far;
+  }
+}
+
+TEST(RigidBodies, AShuttleThatGoesAslantTakesNoneAlongThatItWentInto) {
+  for (const double aside : {-0.4, 0.1, 0.4}) {
+    BodyTrial t(pressing({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {2.2, 0, aside}, 2.2));
+    EXPECT_GT(pressSixTimes(t, 2.2, 0.1), 0u) << aside;
+  }
+}
+
+TEST(RigidBodies, AWorldTakenUpAgainWhileABoxIsPressedGoesOnAsItWould) {
+  BodyTrial t(pressing({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {2, 0, 0}, 2));
+  while (t.world.snapshot()->tick < 115) tick(t.world);
+  World again = worldFrom(t.world.state().scene, checkpointOf(t.world));
+  for (int i = 0; i < 60; ++i)
+    ASSERT_EQ(tick(again).snapshot->stateHash, tick(t.world).snapshot->stateHash) << i;
+}
+
+TEST(RigidBodies, AStackThatSleepsOnALiftIsLiftedAsOne) {
+  for (const int boxes : {1, 2, 5}) {
+    std::vector<NamedBox> stack;
+    for (int i = 0; i < boxes; ++i) {
+      const double low = 0.101 + 0.501 * i;
+      stack.push_back({"b" + std::to_string(i), {0, low, 0}, {0.5, low + 0.5, 0.5}});
+    }
+    Model model = loose(stack, {{"lift", {-1, 0, -1}, {1, 0.1, 1}}});
+    BodySpec lift = bodySpec("lift", BodyKind::lift, {1});
+    lift.stops = {0, 2}, lift.high = 2;
+    model.bodies.push_back(lift);
+    BodyTrial t(std::move(model));
+    t.ticks(240);
+    ASSERT_TRUE(t.body("b0").asleep);
+    t.tell({"lift", BodyCommand::Action::to, 2, 0, {}});
+    t.ticks(240);  // each asks for no penetration
+    for (int i = 0; i < boxes; ++i)
+      EXPECT_NEAR(t.body("b" + std::to_string(i)).position.y(), 2.35 + 0.5 * i, 0.01) << boxes;
+  }
+}
+
+TEST(RigidBodies, ARowOfBoxesAtRestIsPushedAsOneByAShuttle) {
+  for (const double gap : {0.0004, 0.001, 0.01, 0.1})
+    for (const double speed : {0.5, 2.0, 5.0}) {
+      std::vector<NamedBox> row;
+      for (int i = 0; i < 3; ++i) {
+        const double x = i * (0.5 + gap);
+        row.push_back({"b" + std::to_string(i), {x, 0.001, -0.25}, {x + 0.5, 0.5, 0.25}});
+      }
+      Model model = loose(row, {{"shuttle", {-3, 0.05, -1}, {-2, 1, 1}}});
+      BodySpec shuttle = bodySpec("shuttle", BodyKind::path, {1});
+      const double begins = 1.5;
+      shuttle.keys = {
+          {0, Vec3::Zero(), 0}, {begins, Vec3::Zero(), 0}, {begins + 5 / speed, {5, 0, 0}, 0}};
+      model.bodies.push_back(shuttle);
+      BodyTrial t(std::move(model));
+      t.ticks(static_cast<int>(60 * (begins + 5 / speed)) + 2);
+      for (int i = 0; i < 3; ++i)
+        EXPECT_GT(t.body("b" + std::to_string(i)).position.x(), 3.25 + 0.5 * i)
+            << gap << " m, " << speed << " m/s";
+    }
+}
+
+TEST(RigidBodies, WhatAPathThatGoesRoundShakesIsNotWaitedFor) {
+  Model model =
+      loose({{"box", {-0.2, 0.5006, -0.2}, {0.2, 0.9, 0.2}}, {"far", {5, 1, 5}, {5.4, 1.4, 5.4}}},
+            {{"tray", {-1, 0.4, -1}, {1, 0.5, 1}}});
+  BodySpec tray = bodySpec("tray", BodyKind::path, {1});
+  tray.keys = {{0, Vec3::Zero(), 0}, {0.05, {0, 0.01, 0}, 0}, {0.1, Vec3::Zero(), 0}};
+  tray.loops = true;
+  model.bodies.push_back(tray);
+  BodyTrial t(std::move(model));
+  EXPECT_FALSE(t.step().idle) << "one box falls";
+  t.ticks(200);
+  EXPECT_TRUE(t.step().idle);
+  EXPECT_FALSE(t.body("box").asleep);
+  t.tell({"tray", BodyCommand::Action::stop, 0, 0, {}});
+  EXPECT_FALSE(t.step().idle);
+  t.untilIdle();
+  EXPECT_TRUE(t.body("box").asleep);
 }
 
 TEST(RigidBodies, AFastPlateTakesASleepingBoxAlong) {
