@@ -240,19 +240,18 @@ double comesNearer(const ContactPatch& patch, const StepWork& work) {
 /// Of each of `bodies`: a driven one goes deeper into it, or into what it leans on. Between two
 /// that cannot yield impulses grow without bound: kept, they would fling whoever comes free.
 std::vector<std::uint8_t> whoStartsCold(const Dynamics& dynamics, const StepWork& work) {
+  const auto isAwake = [&](std::uint32_t i) { return dynamics.solids[work.solids[i]].isAwake(); };
   std::vector<std::uint8_t> cold(work.bodies.size(), 0);
   for (std::size_t k = 0; k < work.patches.size(); ++k) {
     const NearPair& pair = dynamics.pairs[work.patched[k]];
     const ContactPatch& patch = work.patches[k];
     if (!isInDriven(pair, dynamics.solids[pair.key.a], dynamics.solids[pair.key.b])) continue;
-    if (comesNearer(patch, work) > 0) cold[patch.a] = cold[patch.b] = 1;
+    if (comesNearer(patch, work) > 0) cold[isAwake(patch.a) ? patch.a : patch.b] = 1;
   }
   if (std::ranges::find(cold, 1) == cold.end()) return cold;
   Islands islands(work.bodies.size());
   const auto join = [&](const auto& link) {
-    if (dynamics.solids[work.solids[link.a]].isAwake() &&
-        dynamics.solids[work.solids[link.b]].isAwake())
-      islands.join(link.a, link.b);
+    if (isAwake(link.a) && isAwake(link.b)) islands.join(link.a, link.b);
   };
   for (const ContactPatch& patch : work.patches) join(patch);
   for (const Joint& joint : work.joints) join(joint);
