@@ -74,6 +74,32 @@ TEST_F(NearPairs, WhatIsNoNumberIsNeverFar) {
   EXPECT_FALSE(areFar(pair, paceOf(a, Vec3::Zero()), paceOf(b, Vec3::Zero()), step));
 }
 
+TEST_F(NearPairs, WhoIsInsideADrivenOneRubsOnItOnlyAheadOfIt) {
+  const NearPairStep step{1.0 / 60, {0, -9.8, 0}, 0.5e-3};
+  const collision::Hull* hull = &hull_;
+  Solid driven = heldSolid({&hull, 1}, {});
+  Solid inside = freeSolid({&hull, 1}, 1000, {Quat::Identity(), {0.19, 0, 0}});
+  struct Case {
+    Vec3 velocity;
+    double friction;  // of the two; 0: it is let out
+  };
+  for (const auto& [velocity, friction] :
+       {Case{{2, 0, 0}, 0.5}, Case{{2, 0, 1}, 0.5}, Case{{0, 2, 0}, 0}, Case{{1, 0, 3}, 0},
+        Case{{-2, 0, 0}, 0}, Case{{0, 0, 0}, 0.5}}) {  // the last one stands
+    for (const bool swapped : {false, true}) {
+      driven.motion.velocity = velocity;
+      NearPair pair;
+      pair.key = {0, 1, 0, 0};
+      const Solid &a = swapped ? inside : driven, &b = swapped ? driven : inside;
+      look(pair, a, b, step);
+      ASSERT_NEAR(pair.penetration(), 0.01, 1e-12);
+      ASSERT_TRUE(pair.patch());
+      EXPECT_EQ(pair.patch()->friction, friction) << velocity.transpose();
+      EXPECT_EQ(isLetOut(pair, a, b), friction == 0) << velocity.transpose();
+    }
+  }
+}
+
 TEST_F(NearPairs, APartOfAWayIsWhatHalvingItLeaves) {
   constexpr int kParts = 1 << kMostHalvings;
   const Passage way = wayOf(box(vector(1)), 0.5);
