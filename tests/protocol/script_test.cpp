@@ -31,6 +31,12 @@ v1::Command onlyCommand(std::string_view text) {
   return std::get<v1::Command>(script.lines.at(0).what);
 }
 
+TEST(Script, ANestOfBracketsIsAMistakeAndEndsNothing) {
+  const std::string nest = std::string(200'000, '[') + std::string(200'000, ']');
+  for (const std::string& line : {nest, R"({"walk":"ann","to":)" + nest + "}"})
+    EXPECT_TRUE(errorOf(line).ends_with("so deep a nest of lists"));
+}
+
 TEST(Script, ASpawnHasItsPlaceAndWhatElseIsGiven) {
   const v1::Command plain = onlyCommand(R"({"spawn":"ann","at":[1,-2.5,3e2]})");
   EXPECT_EQ(plain.avatar(), "ann");

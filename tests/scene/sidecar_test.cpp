@@ -92,6 +92,13 @@ TEST(Sidecar, MistakesAreNamedWithTheirPlace) {
       "s.walk.json: the key \"mass\" is there twice in one object");
 }
 
+TEST(Sidecar, ANestOfBracketsIsAMistakeAndEndsNothing) {
+  const std::string nest = std::string(200'000, '[') + std::string(200'000, ']');
+  for (const std::string& body :
+       {nest, R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":)" + nest + "}"})
+    EXPECT_NE(complaint(body).find("so deep a nest"), std::string::npos);
+}
+
 TEST(Sidecar, WhatIsNoSidecarIsSaidSo) {
   Model model = rooms();
   EXPECT_THROW(applySidecar(model, "{", "s"), SidecarError);

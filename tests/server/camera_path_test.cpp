@@ -32,6 +32,11 @@ bool holds(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
+TEST(JsonPath, ANestOfBracketsIsAMistakeAndEndsNothing) {
+  const std::string nest = std::string(200'000, '[') + std::string(200'000, ']');
+  EXPECT_TRUE(holds(saidOfJson(R"({"frames":[)" + nest + "]}"), "so deep a nest"));
+}
+
 TEST(TumPath, LinesAreTimePlaceAndRotation) {
   const CameraPath path = parseTumPath(
       "# ground truth\n\n0.5 1 2 3 0 0 0 1 # here\r\n\t0.75  4 5 6  0 0.70710678 0 0.70710678\n",
