@@ -199,12 +199,15 @@ void gatherPatches(const Dynamics& dynamics, StepWork& work) {
   work.report.patches = static_cast<std::uint32_t>(work.patches.size());
 }
 
-void findLetOut(const Dynamics& dynamics, StepWork& work) {
+void findInside(const Dynamics& dynamics, StepWork& work) {
   work.letOut.assign(work.bodies.size(), 0);
-  for (const std::uint32_t i : work.patched) {
-    const NearPair& pair = dynamics.pairs[i];
+  for (std::uint32_t k = 0; k < work.patched.size(); ++k) {
+    const NearPair& pair = dynamics.pairs[work.patched[k]];
     const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
-    if (isLetOut(pair, a, b)) work.letOut[work.local[a.isFree() ? pair.key.a : pair.key.b]] = 1;
+    if (!isInDriven(pair, a, b)) continue;
+    work.inside.push_back(k);
+    const ContactPatch& patch = work.patches[k];
+    if (isLetOut(pair, a, b)) work.letOut[a.isFree() ? patch.a : patch.b] = 1;
   }
 }
 
@@ -242,10 +245,8 @@ double comesNearer(const ContactPatch& patch, const StepWork& work) {
 std::vector<std::uint8_t> whoStartsCold(const Dynamics& dynamics, const StepWork& work) {
   const auto isAwake = [&](std::uint32_t i) { return dynamics.solids[work.solids[i]].isAwake(); };
   std::vector<std::uint8_t> cold(work.bodies.size(), 0);
-  for (std::size_t k = 0; k < work.patches.size(); ++k) {
-    const NearPair& pair = dynamics.pairs[work.patched[k]];
+  for (const std::uint32_t k : work.inside) {
     const ContactPatch& patch = work.patches[k];
-    if (!isInDriven(pair, dynamics.solids[pair.key.a], dynamics.solids[pair.key.b])) continue;
     if (comesNearer(patch, work) > 0) cold[isAwake(patch.a) ? patch.a : patch.b] = 1;
   }
   if (std::ranges::find(cold, 1) == cold.end()) return cold;
@@ -390,7 +391,7 @@ DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings) {
   gatherBodies(dynamics, work);
   gatherPatches(dynamics, work);
   gatherJoints(dynamics, work);
-  findLetOut(dynamics, work);
+  findInside(dynamics, work);
   solve(work.bodies, work.patches, work.joints, work.driven, settings.solver, *work.workers);
   proveWays(dynamics, settings.solver.seconds, work);
   keepImpulses(dynamics, work);

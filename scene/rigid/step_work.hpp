@@ -33,7 +33,8 @@ struct StepWork {
   void begin(Workers& all) {
     workers = &all;
     report = {};
-    for (std::vector<std::uint32_t>* list : {&active, &patched, &solids, &jointOf}) list->clear();
+    for (std::vector<std::uint32_t>* list : {&active, &patched, &solids, &jointOf, &inside})
+      list->clear();
     bodiesOf.clear(), bodies.clear(), driven.clear(), joints.clear();
   }
 
@@ -51,7 +52,8 @@ struct StepWork {
   std::vector<std::uint32_t> solids;   ///< of each of `bodies`
   std::vector<RigidBody> bodies;
   std::vector<DrivenBody> driven;
-  std::vector<std::uint8_t> letOut;  ///< of each of `bodies`: see isLetOut()
+  std::vector<std::uint32_t> inside;  ///< of `patches`: of a free body in a driven one
+  std::vector<std::uint8_t> letOut;   ///< of each of `bodies`: see isLetOut()
   std::vector<ContactPatch> patches;
   std::vector<Joint> joints;
   std::vector<std::uint32_t> jointOf;
