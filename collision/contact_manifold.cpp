@@ -118,18 +118,37 @@ Vec3 normalOfFace(const ConvexBody& body, const std::vector<std::uint32_t>& face
   return normal / normal.norm();
 }
 
+bool hasVertex(const std::vector<std::uint32_t>& face, std::uint32_t vertex) {
+  return std::find(face.begin(), face.end(), vertex) != face.end();
+}
+
+/// Of all faces, by their known normals, the one that faces the other body most.
+std::size_t mostFacing(const Seen& seen) {
+  std::size_t best = 0;
+  double most = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < seen.normals.size(); ++i) {
+    const double along = seen.outwards.dot(seen.normals[i]);
+    best = along > most ? i : best;  // no branch: no guess of it to miss
+    most = std::max(most, along);
+  }
+  return best;
+}
+
 /// The face at `vertex` that faces the other body most.
 const std::vector<std::uint32_t>* supportFace(const Seen& seen, std::uint32_t vertex) {
-  const std::vector<std::uint32_t>* best = nullptr;
-  double most = -std::numeric_limits<double>::infinity();
   const auto& faces = seen.body.hull->faces;
   const bool known = seen.normals.size() == faces.size();
+  if (known) {  // nearly always it is that of all faces
+    const auto& face = faces[mostFacing(seen)];
+    if (hasVertex(face, vertex)) return &face;
+  }
+  const std::vector<std::uint32_t>* best = nullptr;
+  double most = -std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < faces.size(); ++i) {
-    const auto has = [&] { return std::find(faces[i].begin(), faces[i].end(), vertex); };
-    if (!known && has() == faces[i].end()) continue;
+    if (!hasVertex(faces[i], vertex)) continue;
     const Vec3 normal = known ? seen.normals[i] : normalOfFace(seen.body, faces[i]);
     const double along = seen.outwards.dot(normal);
-    if (along > most && has() != faces[i].end()) most = along, best = &faces[i];
+    if (along > most) most = along, best = &faces[i];
   }
   return best;
 }
