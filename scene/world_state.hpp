@@ -80,6 +80,10 @@ struct AuditTurn {
   collision::MoverId next = 0;   ///< the first mover that has its turn, if it is still there
 };
 
+/// Two that meet: who tells it, and the other.
+using EntityPair = std::pair<EntityId, EntityId>;
+using BodyContacts = std::vector<std::pair<EntityPair, Contact>>;  ///< ascending by their pairs
+
 struct WorldState {
   WorldState(std::shared_ptr<const Scene> still, const Lengths& l);
 
@@ -97,10 +101,10 @@ struct WorldState {
   std::vector<BodyCommand> incomingForBodies;  ///< since the last tick
   std::vector<Body> bodies;                    ///< as Model::bodies; never grows or shrinks
   std::map<EntityId, std::uint32_t> bodyOfId;  ///< index into `bodies`
-  std::map<std::pair<EntityId, EntityId>, Contact> bodyContacts;  ///< as told: a, b
+  BodyContacts bodyContacts;                   ///< as told: a, b
   /// Pairs of driven bodies that were asked for so far, and whether they are mounted on one another
   /// (mounting.hpp): it follows from the scene.
-  std::map<std::pair<EntityId, EntityId>, bool> mounted;
+  std::map<EntityPair, bool> mounted;
   std::vector<std::uint32_t> kinematics, triggers;  ///< indices into `bodies`, ascending
   std::vector<std::uint32_t> goingBodies;           ///< kinematic, in this tick; ascending
   RigidStage rigids;                                ///< free bodies
@@ -153,6 +157,8 @@ void moveBodies(WorldState& world, TickReport& report, QueryCount& count);
 bool isBusy(const Body& body);
 
 // Free bodies (rigid_bodies.cpp).
+/// Who helps in this tick; null where there are too few seeds to be worth it.
+Workers* workersFor(RigidStage& stage);
 /// All are awake in the beginning, so that what was authored in the air falls.
 void startRigids(WorldState& world);
 /// What each awake one can reach in this tick.
@@ -223,11 +229,15 @@ void tellEnd(const WorldState& world, EntityId a, const Contact& before, const C
              const std::function<collision::Decision()>& parted, std::vector<ContactEvent>& events);
 /// Of driven bodies that moved, but for what they are mounted on (driven_contacts.cpp).
 struct DrivenContacts {
-  std::map<std::pair<EntityId, EntityId>, Contact> now;  ///< near, or near until now
+  BodyContacts now;  ///< near, or near until now
   /// What they touched on their way only, clear of it before and after the tick.
-  std::map<std::pair<EntityId, EntityId>, Contact> onTheWay;
+  BodyContacts onTheWay;
 };
 DrivenContacts drivenContacts(WorldState& world, const Nearness& nearness, QueryCount& count);
+/// Where the pair is, or would be.
+BodyContacts::iterator placeOf(BodyContacts& contacts, const EntityPair& pair);
+/// Null: there is none.
+const Contact* contactOf(const WorldState& world, const EntityPair& pair);
 /// Contacts of bodies with what is no avatar (body_contacts.cpp).
 void findBodyContacts(WorldState& world, TickReport& report, QueryCount& count);
 void endBodyContacts(WorldState& world, ContactEvent::Reason reason,

@@ -14,25 +14,38 @@ namespace {
 
 using collision::Decision;
 using collision::Verdict;
-using Key = std::pair<EntityId, EntityId>;
+using Key = EntityPair;
+
+constexpr std::size_t kScanBlock = 512, kAskBlock = 32;  // pairs that a thread takes at a time
 
 bool hasMoved(const WorldState& world, EntityId id) {
   const auto found = world.bodyOfId.find(id);
   return found != world.bodyOfId.end() && world.bodies[found->second].moved;
 }
-bool solidHasMoved(const WorldState& world, std::uint32_t solid) {
-  const std::uint32_t body = world.rigids.bodyOf[solid];
-  return body != kNoRigid && world.bodies[body].moved;
-}
 
-/// Free before driven before still, and among free ones in the order of their ids.
-bool tellsFirst(const WorldState& world, std::uint32_t solidA, std::uint32_t solidB) {
-  const auto rank = [&](std::uint32_t solid) {
-    const std::uint32_t body = world.rigids.bodyOf[solid];
-    const bool isFree = body != kNoRigid && world.bodies[body].spec->kind == BodyKind::rigid;
-    return std::pair(isFree ? 0 : 1, world.rigids.entities[solid]);
-  };
-  return rank(solidA) < rank(solidB);
+/// What most pairs need to know of a solid, side by side.
+struct Standing {
+  double jumped = 0;  ///< Solid's
+  EntityId entity = 0;
+  bool isFree = false, isAvatar = false, hasMoved = false;
+
+  /// Free before driven before still, and among free ones in the order of their ids.
+  bool tellsBefore(const Standing& other) const {
+    return std::pair(!isFree, entity) < std::pair(!other.isFree, other.entity);
+  }
+};
+
+std::vector<Standing> standingsOf(const WorldState& world) {
+  const RigidStage& stage = world.rigids;
+  std::vector<Standing> standings;
+  standings.reserve(stage.entities.size());
+  for (std::size_t i = 0; i < stage.entities.size(); ++i) {
+    const Body* body = stage.bodyOf[i] == kNoRigid ? nullptr : &world.bodies[stage.bodyOf[i]];
+    standings.push_back({stage.dynamics.solids[i].jumped, stage.entities[i],
+                         body && body->spec->kind == BodyKind::rigid,
+                         stage.entities[i] >= world.firstAvatarId(), body && body->moved});
+  }
+  return standings;
 }
 
 double depthOf(const Solid& a, const Solid& b, const NearPair& pair, const Decision& decision,
@@ -44,102 +57,167 @@ double depthOf(const Solid& a, const Solid& b, const NearPair& pair, const Decis
       .depth;
 }
 
-/// What two parts are to one another.
+/// What two parts of two bodies are to one another.
 struct PartContact {
-  Decision decision;
+  Key key;
+  std::optional<Decision> decision;  ///< nullopt: they are far apart, and were
   bool touching = false;
   double depth = 0;
 };
 
-/// Takes it into what their bodies are.
-void take(std::map<Key, Contact>& now, const Key& key, const PartContact& parts) {
-  const auto [at, isNew] = now.try_emplace(key);
-  Contact& contact = at->second;
-  contact.other = key.second;
-  if (isNew || nearer(parts.decision, contact.decision)) contact.decision = parts.decision;
-  contact.touching = contact.touching || parts.touching;
-  contact.penetration = std::max(contact.penetration, parts.depth);
+/// Of each pair that moved: whether it may be nearer than the limit, or was in the last tick.
+std::vector<std::uint32_t> pairsToAsk(const WorldState& world, const Nearness& nearness,
+                                      std::span<const Standing> standings, Workers* workers) {
+  const std::vector<NearPair>& pairs = world.rigids.dynamics.pairs;
+  std::vector<std::uint8_t> isAsked(pairs.size(), 0);
+  shareAmong(workers, pairs.size(), kScanBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      const Standing &a = standings[pairs[i].key.a], &b = standings[pairs[i].key.b];
+      if (a.isAvatar || b.isAvatar || !(a.hasMoved || b.hasMoved)) continue;
+      isAsked[i] = pairs[i].told || apartNow(pairs[i], a.jumped + b.jumped) <= nearness.limit;
+    }
+  });
+  std::vector<std::uint32_t> asked;
+  for (std::uint32_t i = 0; i < pairs.size(); ++i)
+    if (isAsked[i] != 0) asked.push_back(i);
+  return asked;
 }
 
-/// All pairs of which one moved and that are nearer than the limit, or were in the last tick.
-std::map<Key, Contact> nearBodies(WorldState& world, const Nearness& nearness, QueryCount& count) {
+PartContact ask(NearPair& pair, const Solid& a, const Solid& b, const Nearness& nearness) {
+  PartContact found;
+  const double within = pair.told ? std::numeric_limits<double>::infinity() : nearness.limit;
+  const collision::ConvexBody partA = partOf(a, pair.key.partA), partB = partOf(b, pair.key.partB);
+  pair.told = false;
+  collision::FeatureCache features = pair.features();
+  found.decision = collision::decideWithin(partA, partB, within, features);
+  if (pair.close) pair.close->features = features;  // the next step starts where this tick ends
+  if (!found.decision) return found;
+  found.depth = depthOf(a, b, pair, *found.decision, features);
+  found.touching =
+      collision::isNearerThan(*found.decision, partA, partB, nearness.contact, features);
+  pair.told = found.touching || found.decision->distance < nearness.limit;
+  return found;
+}
+
+/// Of all pairs of parts of which one moved and that may be nearer than the limit, or were in the
+/// last tick.
+std::vector<PartContact> nearParts(WorldState& world, const Nearness& nearness, QueryCount& count) {
   RigidStage& stage = world.rigids;
-  std::map<Key, Contact> now;
-  for (NearPair& pair : stage.dynamics.pairs) {
-    const Solid& solidA = stage.dynamics.solids[pair.key.a];
-    const Solid& solidB = stage.dynamics.solids[pair.key.b];
-    const bool lasted = pair.told;
-    if (!lasted && apartNow(pair, solidA, solidB) > nearness.limit) continue;
-    EntityId a = stage.entities[pair.key.a], b = stage.entities[pair.key.b];
-    if (std::max(a, b) >= world.firstAvatarId()) continue;
-    if (!solidHasMoved(world, pair.key.a) && !solidHasMoved(world, pair.key.b)) continue;
-    pair.told = false;
-    const bool swapped = !tellsFirst(world, pair.key.a, pair.key.b);
-    if (swapped) std::swap(a, b);
-    const double within = lasted ? std::numeric_limits<double>::infinity() : nearness.limit;
-    collision::FeatureCache features = pair.features();
-    ++count.narrow;
-    const collision::ConvexBody partA = partOf(solidA, pair.key.partA);
-    const collision::ConvexBody partB = partOf(solidB, pair.key.partB);
-    auto decision = collision::decideWithin(partA, partB, within, features);
-    if (!decision) continue;
-    if (decision->decidedBy == collision::DecidedBy::rational) ++count.rational;
-    const double depth = depthOf(solidA, solidB, pair, *decision, features);
-    const bool touching =
-        collision::isNearerThan(*decision, partA, partB, nearness.contact, features);
-    pair.told = touching || decision->distance < nearness.limit;
-    if (swapped) {
-      std::swap(decision->pointA, decision->pointB);
-      decision->normal = -decision->normal;
+  Workers* workers = workersFor(stage);
+  const std::vector<Standing> standings = standingsOf(world);
+  const std::vector<std::uint32_t> asked = pairsToAsk(world, nearness, standings, workers);
+  std::vector<PartContact> found(asked.size());
+  shareAmong(workers, asked.size(), kAskBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      NearPair& pair = stage.dynamics.pairs[asked[i]];
+      const Standing &a = standings[pair.key.a], &b = standings[pair.key.b];
+      found[i] =
+          ask(pair, stage.dynamics.solids[pair.key.a], stage.dynamics.solids[pair.key.b], nearness);
+      found[i].key = {a.entity, b.entity};
+      if (a.tellsBefore(b)) continue;
+      std::swap(found[i].key.first, found[i].key.second);
+      if (!found[i].decision) continue;
+      std::swap(found[i].decision->pointA, found[i].decision->pointB);
+      found[i].decision->normal = -found[i].decision->normal;
     }
-    take(now, {a, b}, {*decision, touching, depth});
+  });
+  count.narrow += static_cast<std::uint32_t>(asked.size());
+  return found;
+}
+
+/// What bodies are to one another by all of their parts.
+BodyContacts together(const std::vector<PartContact>& parts, QueryCount& count) {
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t i = 0; i < parts.size(); ++i)
+    if (parts[i].decision) order.push_back(i);
+  std::ranges::stable_sort(order, {}, [&](std::uint32_t i) { return parts[i].key; });
+  BodyContacts contacts;
+  contacts.reserve(order.size());
+  for (const std::uint32_t i : order) {
+    const PartContact& found = parts[i];
+    if (found.decision->decidedBy == collision::DecidedBy::rational) ++count.rational;
+    const bool isNew = contacts.empty() || contacts.back().first != found.key;
+    if (isNew) contacts.emplace_back(found.key, Contact{});
+    Contact& contact = contacts.back().second;
+    contact.other = found.key.second;
+    if (isNew || nearer(*found.decision, contact.decision)) contact.decision = *found.decision;
+    contact.touching = contact.touching || found.touching;
+    contact.penetration = std::max(contact.penetration, found.depth);
   }
-  return now;
+  return contacts;
 }
 
 /// They begin here, and end as all that is not so any more.
-void tellOnTheWay(WorldState& world, std::map<Key, Contact>& touched,
-                  std::vector<ContactEvent>& events) {
+void tellOnTheWay(WorldState& world, BodyContacts& touched, std::vector<ContactEvent>& events) {
   for (auto& [key, contact] : touched) {
-    const auto near = world.bodyContacts.find(key);
-    const Contact* before = near == world.bodyContacts.end() ? nullptr : &near->second;
+    const Contact* before = contactOf(world, key);
     tellBegin(world, key.first, before, contact, events);
     if (before) tellEnd(world, key.first, *before, &contact, {}, events);
-    world.bodyContacts[key] = contact;
+    const auto at = placeOf(world.bodyContacts, key);
+    if (before) {
+      at->second = contact;
+    } else {
+      world.bodyContacts.insert(at, {key, contact});
+    }
   }
+}
+
+/// Tells what began and ended, and leaves in the world what lasts. `now`: also those that were near
+/// and are so no more.
+void takeOver(WorldState& world, BodyContacts& now, const Nearness& nearness,
+              std::vector<ContactEvent>& events) {
+  BodyContacts lasting;
+  lasting.reserve(world.bodyContacts.size() + now.size());
+  auto told = world.bodyContacts.begin();
+  const auto end = world.bodyContacts.end();
+  const auto passOver = [&] {
+    const auto& [key, contact] = *told++;
+    if (!hasMoved(world, key.first) && !hasMoved(world, key.second)) {
+      lasting.emplace_back(key, contact);  // a contact of two that stand lasts
+    } else {
+      tellEnd(
+          world, key.first, contact, nullptr, [&last = contact] { return last.decision; }, events);
+    }
+  };
+  for (auto& [key, contact] : now) {
+    while (told != end && told->first < key) passOver();
+    const Contact* before = told != end && told->first == key ? &(told++)->second : nullptr;
+    const bool near = contact.touching || contact.decision.distance < nearness.limit;
+    if (near) tellBegin(world, key.first, before, contact, events);
+    if (before)
+      tellEnd(
+          world, key.first, *before, near ? &contact : nullptr,
+          [&last = contact] { return last.decision; }, events);
+    if (near) lasting.emplace_back(key, contact);
+  }
+  while (told != end) passOver();
+  world.bodyContacts = std::move(lasting);
 }
 
 }  // namespace
 
+BodyContacts::iterator placeOf(BodyContacts& contacts, const EntityPair& pair) {
+  return std::ranges::lower_bound(contacts, pair, {}, &BodyContacts::value_type::first);
+}
+
+const Contact* contactOf(const WorldState& world, const EntityPair& pair) {
+  const BodyContacts& all = world.bodyContacts;
+  const auto at = std::ranges::lower_bound(all, pair, {}, &BodyContacts::value_type::first);
+  return at != all.end() && at->first == pair ? &at->second : nullptr;
+}
+
 void findBodyContacts(WorldState& world, TickReport& report, QueryCount& count) {
   const Nearness nearness = nearnessOf(world.lengths);
-  std::map<Key, Contact> now, parted;
-  if (!world.rigids.seeds.empty()) now = nearBodies(world, nearness, count);
+  BodyContacts now;
+  if (!world.rigids.seeds.empty()) now = together(nearParts(world, nearness, count), count);
   DrivenContacts driven = drivenContacts(world, nearness, count);
-  now.merge(driven.now);
+  if (!driven.now.empty()) {
+    const auto free = static_cast<std::ptrdiff_t>(now.size());
+    now.insert(now.end(), driven.now.begin(), driven.now.end());
+    std::ranges::inplace_merge(now, now.begin() + free, {}, &BodyContacts::value_type::first);
+  }
   tellOnTheWay(world, driven.onTheWay, report.contacts);
-  for (auto at = now.begin(); at != now.end();) {
-    const auto next = std::next(at);
-    const bool near = at->second.touching || at->second.decision.distance < nearness.limit;
-    if (!near) parted.insert(now.extract(at));
-    at = next;
-  }
-  for (const auto& [key, before] : world.bodyContacts)  // a contact of two that stand lasts
-    if (!hasMoved(world, key.first) && !hasMoved(world, key.second)) now.try_emplace(key, before);
-  for (auto& [key, contact] : now) {
-    const auto before = world.bodyContacts.find(key);
-    tellBegin(world, key.first, before == world.bodyContacts.end() ? nullptr : &before->second,
-              contact, report.contacts);
-  }
-  for (const auto& [key, before] : world.bodyContacts) {
-    const auto after = now.find(key);
-    const auto gone = parted.find(key);
-    const Contact& last = gone == parted.end() ? before : gone->second;
-    tellEnd(
-        world, key.first, before, after == now.end() ? nullptr : &after->second,
-        [&last] { return last.decision; }, report.contacts);
-  }
-  world.bodyContacts = std::move(now);
+  takeOver(world, now, nearness, report.contacts);
   for (const auto& [key, contact] : world.bodyContacts) {
     if (contact.touching) ++report.liveContacts;
     report.worstPenetration = std::max(report.worstPenetration, contact.penetration);

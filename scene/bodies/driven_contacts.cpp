@@ -19,7 +19,7 @@
 namespace enfilade::scene {
 namespace {
 
-using Key = std::pair<EntityId, EntityId>;
+using Key = EntityPair;
 
 constexpr double kAnyDistance = std::numeric_limits<double>::infinity();
 constexpr double kRounding = 1e-9;  // relative, of a way: more than turning and summing may err
@@ -204,8 +204,8 @@ std::optional<Contact> touchOnTheWay(const WorldState& world, const Key& key, Qu
 DrivenContacts drivenContacts(WorldState& world, const Nearness& nearness, QueryCount& count) {
   DrivenContacts driven;
   for (const Key& key : pairsOfMoved(world)) {
-    const auto before = world.bodyContacts.find(key);
-    const bool lasted = before != world.bodyContacts.end();
+    const Contact* before = contactOf(world, key);
+    const bool lasted = before != nullptr;
     if (!lasted && !mayMeet(world, key, nearness.limit)) continue;
     if (isMounted(world, key, nearness.contact)) continue;
     const double way = wayOf(world, key.first) + wayOf(world, key.second);
@@ -214,10 +214,11 @@ DrivenContacts drivenContacts(WorldState& world, const Nearness& nearness, Query
     if (!found) continue;
     const double apart = found->decision.distance;
     std::optional<Contact> met;
-    if (!found->touching && !(lasted && before->second.touching) && apart < nearness.contact + way)
+    if (!found->touching && !(lasted && before->touching) && apart < nearness.contact + way)
       met = touchOnTheWay(world, key, count);
-    if (met) driven.onTheWay[key] = *met;
-    if (lasted || met || found->touching || apart < nearness.limit) driven.now[key] = *found;
+    if (met) driven.onTheWay.emplace_back(key, *met);
+    if (lasted || met || found->touching || apart < nearness.limit)
+      driven.now.emplace_back(key, *found);
   }
   return driven;
 }

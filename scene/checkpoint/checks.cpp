@@ -120,10 +120,14 @@ struct Check {
                 b.spec->name + " is visited by nobody");
       }
     }
-    for (const auto& [key, contact] : world.bodyContacts)
+    const EntityPair* last = nullptr;
+    for (const auto& [key, contact] : world.bodyContacts) {
       require(
           body(key.first) && key.second != 0 && isKnown(key.second) && contact.other == key.second,
           "a body touches what is not there");
+      require(!last || *last < key, "contacts of bodies do not ascend");
+      last = &key;
+    }
   }
 };
 
@@ -173,8 +177,8 @@ void checkRead(const WorldState& world) {
 void checkRigids(const WorldState& world) {
   const RigidStage& stage = world.rigids;
   const std::vector<Solid>& solids = stage.dynamics.solids;
-  for (const std::uint32_t body : stage.bodies)
-    require(stage.solidOf[body] != kNoRigid, "a free body is no solid");
+  for (std::uint32_t i = 0; i < stage.bodies.size(); ++i)
+    require(stage.solidOf[stage.bodies[i]] == i, "the free bodies are not the first solids");
   for (const Solid& solid : solids)
     require((solid.gaits.empty() || solid.gaits.size() == kSolverSubsteps) && !(solid.leash < 0) &&
                 isRotation(solid.rotation),

@@ -5,8 +5,9 @@
 //  3. Every pair that could have met on the way is proved clear (passage.hpp); where that fails,
 //     the free bodies go only as far as is proved, and less fast; then their other pairs are looked
 //     at again, until nobody needs to stop. It ends, since a body goes less far each time, and
-//     after a few times not at all. A group that leans on one driven body and nothing else that
-//     stands or is driven, such as parts in a tray, goes with it at least.
+//     after a few times not at all; then it is parted, once, from what it is too near to. A group
+//     that leans on one driven body and nothing else that stands or is driven, such as parts in a
+//     tray, goes with it at least.
 //  4. Groups of bodies that lean on one another and were calm for a while fall asleep.
 #include "scene/rigid/dynamics.hpp"
 
@@ -19,7 +20,8 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kAskedAhead = 4;  // pairs
+constexpr std::size_t kAskedAhead = 4;   // pairs
+constexpr std::size_t kKeyBlock = 1024;  // pairs that a thread takes at a time to find them again
 
 NearPairStep nearStep(const DynamicsStep& settings) {
   return {settings.solver.seconds, settings.solver.gravity, settings.solver.epsilon};
@@ -306,7 +308,9 @@ void setOut(Dynamics& dynamics, StepWork& work) {
   work.workers->share(work.active.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t k = from; k < to; ++k) {
       double& apart = dynamics.pairs[work.active[k]].apart;
-      apart -= work.closing[k] + 0x1p-51 * (std::abs(apart) + work.closing[k]);
+      const auto [a, b] = work.bodiesOf[k];
+      const double closing = closingOf(work.strides[a], work.strides[b]);
+      apart -= closing + 0x1p-51 * (std::abs(apart) + closing);
     }
   });
 }
@@ -362,24 +366,27 @@ void rest(Dynamics& dynamics, const DynamicsStep& settings, StepWork& work) {
 
 }  // namespace
 
-bool mayMeet(const Solid& a, const Solid& b, double lookout) {
-  if (!a.isFree() || !b.isFree()) return true;
-  const double reach = (a.radius + b.radius + a.leash + b.leash + lookout) * (1 + 0x1p-40);
-  return !((a.motion.centre - b.motion.centre).squaredNorm() > reach * reach);
+ReachSphere reachSphere(const Solid& solid) {
+  return {solid.motion.centre, solid.radius + solid.leash};
 }
 
-void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates) {
-  std::vector<NearPair> pairs(candidates.size());
-  auto old = dynamics.pairs.begin();
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    while (old != dynamics.pairs.end() && old->key < candidates[i]) ++old;
-    if (old != dynamics.pairs.end() && old->key == candidates[i]) {
-      pairs[i] = std::move(*old);
-    } else {
-      pairs[i].key = candidates[i];
+void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates, Workers* workers) {
+  thread_local std::vector<NearPair> kept;  // as StepWork
+  std::vector<NearPair>& pairs = kept;      // which threads that help can see
+  pairs.resize(candidates.size());
+  shareAmong(workers, candidates.size(), kKeyBlock, [&](std::size_t from, std::size_t to) {
+    auto old = std::ranges::lower_bound(dynamics.pairs, candidates[from], {}, &NearPair::key);
+    for (std::size_t i = from; i < to; ++i) {
+      while (old != dynamics.pairs.end() && old->key < candidates[i]) ++old;
+      if (old != dynamics.pairs.end() && old->key == candidates[i]) {
+        pairs[i] = std::move(*old);
+      } else {
+        pairs[i].key = candidates[i];
+      }
     }
-  }
-  dynamics.pairs = std::move(pairs);
+  });
+  std::swap(dynamics.pairs, pairs);
+  pairs.clear();
 }
 
 DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings) {
@@ -393,7 +400,7 @@ DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings) {
   gatherJoints(dynamics, work);
   findInside(dynamics, work);
   solve(work.bodies, work.patches, work.joints, work.driven, settings.solver, *work.workers);
-  proveWays(dynamics, settings.solver.seconds, work);
+  proveWays(dynamics, settings.solver.seconds, settings.solver.epsilon, work);
   keepImpulses(dynamics, work);
   setOut(dynamics, work);
   rest(dynamics, settings, work);

@@ -41,13 +41,23 @@ struct DynamicsReport {
   double deepest = 0;           ///< metres: penetration at the start of the step
 };
 
-/// Whether two free solids can come within `lookout` metres while neither uses up its leash, by the
-/// spheres about their centres. True where one is not free.
-bool mayMeet(const Solid& a, const Solid& b, double lookout);
+/// A sphere that no point of a free solid leaves in a step; metres.
+struct ReachSphere {
+  Vec3 centre = Vec3::Zero();
+  double radius = 0;
+};
+ReachSphere reachSphere(const Solid& solid);
+
+/// Whether what stays in these spheres can come within `lookout` metres of one another.
+inline bool mayMeet(const ReachSphere& a, const ReachSphere& b, double lookout) {
+  const double reach = (a.radius + b.radius + lookout) * (1 + 0x1p-40);
+  return !((a.centre - b.centre).squaredNorm() > reach * reach);
+}
 
 /// The pairs that may meet in the next steps; ascending, a < b, at least one of them free. What is
-/// known of a pair that was there before is kept.
-void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates);
+/// known of a pair that was there before is kept. `workers`: who do it; null: the caller alone.
+void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates,
+              Workers* workers = nullptr);
 
 /// Goes on by one step. Free bodies that were separated from all that stands or is free stay so, by
 /// the exact verdict and all the way: a body that the solver would bring through another is stopped

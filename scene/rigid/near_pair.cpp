@@ -27,6 +27,8 @@ using collision::Verdict;
 
 /// Of the way that they could come nearer in a step: looking so much farther saves looking again.
 constexpr double kForesight = 1;
+/// Of how fast two free bodies pass one another and turn: so much is taken to bring them nearer.
+constexpr double kOfPassing = 0.3;
 /// Of the distance: a face's plane that parts resting bodies by so much is taken.
 constexpr double kFaceAtRest = 0.8;
 /// Of the lesser radius: a point that wandered less is last step's point.
@@ -119,14 +121,32 @@ double tipOf(const Solid& solid) {
   return solid.asleep ? 0 : solid.motion.spin.norm() * solid.radius;
 }
 
-/// Metres by which the pair can close in within the step, by the speeds of now.
-double reachOf(const Solid& a, const Solid& b, const NearPairStep& step) {
-  const double speed = (velocityOf(a) - velocityOf(b)).norm() + tipOf(a) + tipOf(b);
+/// Of two free bodies: how fast `motion`, of one beside the other, may bring them nearer along the
+/// axis that parted them last. What goes past it counts in part, either way along it.
+double approach(const Vec3& motion, double along, const Vec3& axis) {
+  return along + kOfPassing * (motion - motion.dot(axis) * axis).norm();
+}
+
+/// Metres by which the pair closes in within the step, by the speeds of now.
+struct ReachOfPair {
+  double most;    ///< were it that of the points that get farthest
+  double likely;  ///< of two free bodies less: see kOfPassing
+};
+ReachOfPair reachOf(const NearPair& pair, const Solid& a, const Solid& b,
+                    const NearPairStep& step) {
+  const Vec3 velocity = velocityOf(a) - velocityOf(b);
   const bool falls = a.isAwake() || b.isAwake();
+  const Vec3 gained = falls ? Vec3(step.seconds * step.gravity) : Vec3(Vec3::Zero());
+  const double tips = tipOf(a) + tipOf(b);
   const double pushed =
       a.mostPush > 0 || b.mostPush > 0 ? (a.pushVelocity - b.pushVelocity).norm() : 0;
-  return step.seconds * (speed + pushed + a.swing() + b.swing() +
-                         (falls ? step.gravity.norm() * step.seconds : 0));
+  const double driven = pushed + a.swing() + b.swing();
+  const double most = step.seconds * (velocity.norm() + gained.norm() + tips + driven);
+  if (!a.isFree() || !b.isFree() || pair.axis.isZero(0)) return {most, most};
+  const Vec3& axis = pair.axis;
+  const double nearer = approach(velocity, std::max(0.0, velocity.dot(axis)), axis) +
+                        approach(gained, std::abs(gained.dot(axis)), axis) + kOfPassing * tips;
+  return {most, step.seconds * (nearer + driven)};
 }
 
 /// The closest or deepest points, and what is known of the distance.
@@ -350,8 +370,9 @@ bool areFar(const NearPair& pair, const Pace& a, const Pace& b, const NearPairSt
 }
 
 bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step) {
-  const double reach = reachOf(a, b, step), limit = 2 * step.epsilon + reach;
-  const double farthest = limit + kForesight * (reach + step.epsilon);
+  const ReachOfPair reach = reachOf(pair, a, b, step);
+  const double limit = 2 * step.epsilon + reach.likely;
+  const double farthest = limit + kForesight * (reach.most + step.epsilon);
   if (apartNow(pair, a, b) > limit || farBySpheres(pair, a, b, farthest)) {
     pair.hasPatch = false;
     return false;

@@ -29,7 +29,7 @@ using collision::Verdict;
 constexpr double kUp = 1 + 0x1p-40;  // above what a few roundings lose
 constexpr double kParts = 1 << kMostHalvings;
 constexpr int kTries = 3;         // to cut a way where its plane is used up
-constexpr double kShorter = 0.1;  // of a way, at each try
+constexpr double kShorter = 0.5;  // of a way, at each try
 
 /// q1 or -q1, whichever is nearer to q0.
 Quat nearer(const Quat& q0, const Quat& q1) {
@@ -153,9 +153,12 @@ double lengthOf(const Passage& p) {
   return (way.norm() + p.turn * p.radius) * kUp;
 }
 
-double closingOf(const Passage& a, const Passage& b) {
-  const Vec3 way = (a.toCentre - a.fromCentre) - (b.toCentre - b.fromCentre);
-  return (way.norm() + a.turn * a.radius + b.turn * b.radius) * kUp;
+Stride strideOf(const Passage& p) {
+  return {p.toCentre - p.fromCentre, p.turn * p.radius};
+}
+
+double closingOf(const Stride& a, const Stride& b) {
+  return ((a.way - b.way).norm() + a.tip + b.tip) * kUp;
 }
 
 PassagePose middleOf(const Passage& p) {

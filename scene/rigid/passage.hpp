@@ -30,8 +30,18 @@ void measure(Passage& passage);
 /// Metres: no point goes farther on this way.
 double lengthOf(const Passage& passage);
 
+/// What of a way decides how far it takes two from or to one another.
+struct Stride {
+  Vec3 way = Vec3::Zero();  ///< of the centre, metres
+  double tip = 0;           ///< metres: no point goes farther by the turn
+};
+Stride strideOf(const Passage& passage);
+
 /// Metres: the distance of the two changes by no more.
-double closingOf(const Passage& a, const Passage& b);
+double closingOf(const Stride& a, const Stride& b);
+inline double closingOf(const Passage& a, const Passage& b) {
+  return closingOf(strideOf(a), strideOf(b));
+}
 
 /// Where the passage is at its middle, exactly half way in both place and turn.
 struct PassagePose {

@@ -16,10 +16,11 @@ namespace {
 
 /// Metres, or of the radius, whichever is less, that a body may go in a tick beyond its own speed
 /// when something sets it in motion.
-constexpr double kSpareReach = 0.1, kSpareOfRadius = 0.5;
+constexpr double kSpareReach = 0.1, kSpareOfRadius = 0.3;
 /// The same by which the broad phase's box is larger than it needs to be, so as to move less often.
-constexpr double kSpareBox = 0.02, kSpareBoxOfRadius = 0.2;
+constexpr double kSpareBox = 0.02, kSpareBoxOfRadius = 0.4;
 constexpr std::size_t kWorthThreads = 64;  // bodies: fewer are done before a thread is woken
+constexpr std::size_t kBodyBlock = 32;     // bodies that a thread takes at a time
 constexpr int kThreads = 2;
 constexpr double kBelowScene = 50;     // metres: who falls so far has left the world
 constexpr double kBesideScene = 1000;  // metres: or flew so far
@@ -136,19 +137,129 @@ std::uint32_t solidForPart(WorldState& world, const Avatar& avatar, std::uint32_
 
 // ---- who may meet whom -------------------------------------------------------------------------
 
-/// Collects the pairs of parts of one free body.
+using PairKeys = std::vector<PartPairKey>;
+
+void addPair(std::uint32_t solid, std::uint32_t part, std::uint32_t other, std::uint32_t otherPart,
+             PairKeys& keys) {
+  if (solid < other) {
+    keys.push_back({solid, other, part, otherPart});
+  } else {
+    keys.push_back({other, solid, otherPart, part});
+  }
+}
+
+/// Where a part of a body comes in this tick.
+Box reachOfPart(const WorldState& world, const Body& body, std::uint32_t part) {
+  double spare = lookoutOf(world.lengths);
+  // From where it is after the tick: twice as far as from where it was before, if it came back.
+  if (isKinematic(body.spec->kind)) spare += 2 * body.plan.farthest;
+  if (body.spec->kind == BodyKind::rigid)
+    spare +=
+        world.rigids.dynamics.solids[world.rigids.solidOf[bodyAt(world.rigids, body.mover)]].leash;
+  return grown(body.partBoxes[part], spare);
+}
+
+/// Where the free bodies come in this tick, side by side.
+struct Reaches {
+  /// Of each solid that is a free body's: its sphere, and where its parts' boxes begin.
+  std::vector<ReachSphere> spheres;
+  std::vector<std::uint32_t> firstBox;
+  std::vector<Box> boxes;  ///< of parts, wider than what they reach by the lookout
+
+  std::span<const Box> boxesOf(std::uint32_t solid) const {
+    return std::span(boxes).subspan(firstBox[solid], firstBox[solid + 1] - firstBox[solid]);
+  }
+};
+
+Reaches reachesOf(const WorldState& world, Workers* workers) {
+  const RigidStage& stage = world.rigids;
+  Reaches reaches;
+  reaches.firstBox.push_back(0);
+  for (const std::uint32_t body : stage.bodies)
+    reaches.firstBox.push_back(reaches.firstBox.back() +
+                               static_cast<std::uint32_t>(world.bodies[body].partBoxes.size()));
+  reaches.spheres.resize(stage.bodies.size());
+  reaches.boxes.resize(reaches.firstBox.back());
+  shareAmong(workers, stage.bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      const Body& body = world.bodies[stage.bodies[i]];
+      reaches.spheres[i] = reachSphere(stage.dynamics.solids[i]);
+      for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
+        reaches.boxes[reaches.firstBox[i] + part] = reachOfPart(world, body, part);
+    }
+  });
+  return reaches;
+}
+
+/// Whether a body is a free one, by its solid. Others have theirs once they are met.
+bool isFree(const RigidStage& stage, std::uint32_t body) {
+  return stage.solidOf[body] < stage.bodies.size();
+}
+
+/// What the broad phase says of some seeds.
+struct PartnersOfFree {
+  PairKeys pairs;  ///< of parts of free bodies
+  /// A seed, and something that is no free body.
+  std::vector<std::pair<std::uint32_t, collision::SortAndSweep::Partner>> others;
+};
+
+/// Appends the pairs of parts of two free bodies.
+void addFreePair(const RigidStage& stage, std::uint32_t body, std::uint32_t met,
+                 const Reaches& reaches, double lookout, PairKeys& keys) {
+  const std::uint32_t solid = stage.solidOf[body], other = stage.solidOf[met];
+  if (!mayMeet(reaches.spheres[solid], reaches.spheres[other], lookout)) return;
+  const std::span<const Box> parts = reaches.boxesOf(solid), others = reaches.boxesOf(other);
+  for (std::uint32_t part = 0; part < parts.size(); ++part)
+    for (std::uint32_t otherPart = 0; otherPart < others.size(); ++otherPart)
+      if (overlaps(parts[part], others[otherPart])) addPair(solid, part, other, otherPart, keys);
+}
+
+void addPartners(const WorldState& world, std::uint32_t seed, const Reaches& reaches,
+                 std::span<const std::uint8_t> isSeed, PartnersOfFree& found) {
+  const RigidStage& stage = world.rigids;
+  const double lookout = lookoutOf(world.lengths);
+  for (const auto& partner : world.broadPhase.partners(world.bodies[seed].mover)) {
+    const std::uint32_t met = partner.moves ? bodyAt(stage, partner.id) : kNoRigid;
+    if (met == kNoRigid || !isFree(stage, met)) {
+      found.others.emplace_back(seed, partner);
+    } else if (met > seed || isSeed[met] == 0) {  // of two seeds the first adds the pair
+      addFreePair(stage, seed, met, reaches, lookout, found.pairs);
+    }
+  }
+}
+
+PartnersOfFree partnersOfSeeds(const WorldState& world, const Reaches& reaches, Workers* workers) {
+  const RigidStage& stage = world.rigids;
+  std::vector<std::uint8_t> isSeed(world.bodies.size(), 0);
+  for (const std::uint32_t i : stage.seeds) isSeed[i] = 1;
+  std::vector<PartnersOfFree> blocks(stage.seeds.size() / kBodyBlock + 1);
+  shareAmong(workers, stage.seeds.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i)
+      addPartners(world, stage.seeds[i], reaches, isSeed, blocks[from / kBodyBlock]);
+  });
+  PartnersOfFree all = std::move(blocks.front());
+  for (std::size_t i = 1; i < blocks.size(); ++i) {
+    all.pairs.insert(all.pairs.end(), blocks[i].pairs.begin(), blocks[i].pairs.end());
+    all.others.insert(all.others.end(), blocks[i].others.begin(), blocks[i].others.end());
+  }
+  return all;
+}
+
+/// Collects the pairs of free bodies with what is none.
 struct PairWriter {
   WorldState& world;
   const Wish& wish;
-  std::vector<PartPairKey>& keys;
-  double margin;
-  std::vector<std::uint8_t> isSeed = {};  ///< of each body
+  const Reaches& reaches;
+  PairKeys keys = {};
 
-  void add(std::uint32_t solid, std::uint32_t part, std::uint32_t other, std::uint32_t otherPart) {
-    if (solid < other) {
-      keys.push_back({solid, other, part, otherPart});
-    } else {
-      keys.push_back({other, solid, otherPart, part});
+  void add(std::uint32_t seed, const collision::SortAndSweep::Partner& partner) {
+    const std::uint32_t solid = world.rigids.solidOf[seed];
+    if (!partner.moves) {
+      addStill(world.bodies[seed], solid, world.scene->solidObjects()[partner.id]);
+    } else if (const std::uint32_t met = bodyAt(world.rigids, partner.id); met == kNoRigid) {
+      addAvatar(solid, world.avatars.at(world.avatarOfMover.at(partner.id)));
+    } else if (isSolid(world.bodies[met])) {
+      addDriven(solid, met);
     }
   }
   void addStill(const Body& body, std::uint32_t solid, std::uint32_t object) {
@@ -157,44 +268,45 @@ struct PairWriter {
     parts.query(body.reach, found);
     if (found.empty()) return;
     const std::uint32_t other = solidForStill(world, object);
-    for (const std::uint32_t met : found) {
-      const Box box = parts.box(met);
-      for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
-        if (overlaps(reachOfPart(body, part), box)) add(solid, part, other, met);
-    }
+    for (const std::uint32_t met : found) addMet(solid, parts.box(met), other, met);
   }
-  void addBody(std::uint32_t index, std::uint32_t solid, std::uint32_t otherIndex) {
-    if (isSeed[otherIndex] && otherIndex < index) return;  // it has added the pair
-    const Body &body = world.bodies[index], &met = world.bodies[otherIndex];
-    const std::uint32_t other = solidForBody(world, otherIndex);
-    const std::vector<Solid>& solids = world.rigids.dynamics.solids;
-    if (!mayMeet(solids[solid], solids[other], margin)) return;
-    for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
-      for (std::uint32_t otherPart = 0; otherPart < met.partBoxes.size(); ++otherPart)
-        if (overlaps(reachOfPart(body, part), reachOfPart(met, otherPart)))
-          add(solid, part, other, otherPart);
+  void addDriven(std::uint32_t solid, std::uint32_t index) {
+    const Body& met = world.bodies[index];
+    const std::uint32_t other = solidForBody(world, index);
+    for (std::uint32_t part = 0; part < met.partBoxes.size(); ++part)
+      addMet(solid, reachOfPart(world, met, part), other, part);
   }
-  void addAvatar(const Body& body, std::uint32_t solid, const Avatar& avatar) {
+  void addAvatar(std::uint32_t solid, const Avatar& avatar) {
     for (std::uint32_t i = 0; i < avatar.shape->parts.size(); ++i) {
       const std::uint32_t other = solidForPart(world, avatar, i, wish);
-      const Box box = boxAt(avatar.shape->parts[i].box, avatar.feet);
-      for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
-        if (overlaps(reachOfPart(body, part), box)) add(solid, part, other, 0);
+      addMet(solid, boxAt(avatar.shape->parts[i].box, avatar.feet), other, 0);
     }
   }
-  /// Where a part of a body comes in this tick.
-  Box reachOfPart(const Body& body, std::uint32_t part) const {
-    double spare = margin;
-    // From where it is after the tick: twice as far as from where it was before, if it came back.
-    if (isKinematic(body.spec->kind)) spare += 2 * body.plan.farthest;
-    if (body.spec->kind == BodyKind::rigid)
-      spare += solidOfRigid(world.rigids, bodyAt(world.rigids, body.mover)).leash;
-    return grown(body.partBoxes[part], spare);
+  void addMet(std::uint32_t solid, const Box& box, std::uint32_t other, std::uint32_t otherPart) {
+    const std::span<const Box> parts = reaches.boxesOf(solid);
+    for (std::uint32_t part = 0; part < parts.size(); ++part)
+      if (overlaps(parts[part], box)) addPair(solid, part, other, otherPart, keys);
   }
 };
 
+void gatherPairs(WorldState& world, const Wish& wish, Workers* workers) {
+  const Reaches reaches = reachesOf(world, workers);
+  PartnersOfFree found = partnersOfSeeds(world, reaches, workers);
+  PairWriter writer{world, wish, reaches};
+  for (const auto& [seed, partner] : found.others) writer.add(seed, partner);
+  // Ascending already, but where somebody is woken.
+  if (!std::ranges::is_sorted(found.pairs)) std::ranges::sort(found.pairs);
+  std::ranges::sort(writer.keys);
+  PairKeys keys(found.pairs.size() + writer.keys.size());
+  std::ranges::merge(found.pairs, writer.keys, keys.begin());
+  setPairs(world.rigids.dynamics, keys, workers);
+}
+
 /// Bodies that are awake, and those that may be woken.
 std::vector<std::uint32_t> findSeeds(const WorldState& world) {
+  const std::vector<std::uint32_t>& all = world.rigids.bodies;
+  const auto isAwake = [&](std::uint32_t i) { return !world.bodies[i].asleep; };
+  if (std::ranges::all_of(all, isAwake)) return all;
   std::vector<std::uint8_t> isSeed(world.bodies.size(), 0);
   std::vector<std::uint32_t> open;
   const auto add = [&](std::uint32_t body) {
@@ -209,8 +321,8 @@ std::vector<std::uint32_t> findSeeds(const WorldState& world) {
       if (body != kNoRigid) add(body);
     }
   };
-  for (const std::uint32_t i : world.rigids.bodies)
-    if (!world.bodies[i].asleep) add(i);
+  for (const std::uint32_t i : all)
+    if (isAwake(i)) add(i);
   for (const std::uint32_t i : world.goingBodies) addPartners(world.bodies[i].mover);
   for (const auto& [name, avatar] : world.avatars)
     if (world.bodyOfId.contains(avatar.stoppedBy)) add(world.bodyOfId.at(avatar.stoppedBy));
@@ -221,33 +333,9 @@ std::vector<std::uint32_t> findSeeds(const WorldState& world) {
     addPartners(world.bodies[body].mover);
   }
   std::vector<std::uint32_t> seeds;
-  for (const std::uint32_t i : world.rigids.bodies)
+  for (const std::uint32_t i : all)
     if (isSeed[i]) seeds.push_back(i);
   return seeds;
-}
-
-void gatherPairs(WorldState& world, const Wish& wish) {
-  RigidStage& stage = world.rigids;
-  std::vector<PartPairKey> keys;
-  PairWriter writer{world, wish, keys, lookoutOf(world.lengths)};
-  writer.isSeed.assign(world.bodies.size(), 0);
-  for (const std::uint32_t i : stage.seeds) writer.isSeed[i] = 1;
-  for (const std::uint32_t i : stage.seeds) {
-    const Body& body = world.bodies[i];
-    const std::uint32_t solid = solidForBody(world, i);
-    for (const auto& partner : world.broadPhase.partners(body.mover)) {
-      if (!partner.moves) {
-        writer.addStill(body, solid, world.scene->solidObjects()[partner.id]);
-      } else if (const std::uint32_t met = bodyAt(stage, partner.id); met != kNoRigid) {
-        if (isSolid(world.bodies[met])) writer.addBody(i, solid, met);
-      } else {
-        writer.addAvatar(body, solid, world.avatars.at(world.avatarOfMover.at(partner.id)));
-      }
-    }
-  }
-  std::sort(keys.begin(), keys.end());
-  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
-  setPairs(stage.dynamics, keys);
 }
 
 // ---- before and after the solver ---------------------------------------------------------------
@@ -401,7 +489,7 @@ void planRigids(WorldState& world) {
     const bool stands = body.asleep && driven == 0;
     const double falls = world.lengths.gravity * tick * tick;
     const double spare = std::min(kSpareReach, kSpareOfRadius * solid.radius);
-    solid.leash = stands ? lookout : solid.fastest() * tick + driven + falls + spare;
+    solid.leash = stands ? lookout : solid.fastest() * tick + falls + std::max(driven, spare);
     const Box needed = grown(boxOf(body), solid.leash + lookout);
     if (!stands && contains(body.reach, needed)) continue;
     body.reach = grown(needed, std::min(kSpareBox, kSpareBoxOfRadius * solid.radius));
@@ -435,11 +523,8 @@ void forgetAvatar(WorldState& world, const Avatar& avatar) {
   stage.solids.erase(first, end);
 }
 
-namespace {
-
-/// Who solves for so many bodies; null: the caller alone.
-Workers* workersFor(RigidStage& stage, std::size_t bodies) {
-  if (bodies < kWorthThreads) return nullptr;
+Workers* workersFor(RigidStage& stage) {
+  if (stage.seeds.size() < kWorthThreads) return nullptr;
   const int processors = static_cast<int>(std::thread::hardware_concurrency());
   const int threads = std::min(stage.threads > 0 ? stage.threads : kThreads, processors);
   if (threads < 2) return nullptr;
@@ -449,8 +534,6 @@ Workers* workersFor(RigidStage& stage, std::size_t bodies) {
   }
   return stage.workers.get();
 }
-
-}  // namespace
 
 void setThreads(World& world, int threads) {
   world.state().rigids.threads = threads;
@@ -463,20 +546,24 @@ void moveRigids(WorldState& world, const Wish& wish, TickReport& report, QueryCo
     if (!avatar.lastMove.isZero(0) || avatar.chain.speed > 0) wakeLeaning(world, avatar);
   stage.seeds = findSeeds(world);
   if (stage.seeds.empty()) return;
-  gatherPairs(world, wish);
+  Workers* workers = workersFor(stage);
+  gatherPairs(world, wish, workers);
   driveSolids(world);
   DynamicsStep settings = settingsOf(world.lengths);
-  settings.workers = workersFor(stage, stage.seeds.size());
+  settings.workers = workers;
   stage.last = step(stage.dynamics, settings);
   settleDriven(world);
   count.narrow += stage.last.looks + stage.last.proofs;
   report.squeezedBodies = stage.last.squeezed;
+  shareAmong(workers, stage.seeds.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; k < to; ++k) {
+      const std::uint32_t i = stage.seeds[k];
+      if (!world.bodies[i].left) takeOver(world.bodies[i], solidOfRigid(stage, i));
+    }
+  });
   for (const std::uint32_t i : stage.seeds) {
     Body& body = world.bodies[i];
-    Solid& solid = solidOfRigid(stage, i);
-    if (body.left) continue;
-    takeOver(body, solid);
-    if (hasLeft(world, body)) catchBody(world, body, solid, report);
+    if (!body.left && hasLeft(world, body)) catchBody(world, body, solidOfRigid(stage, i), report);
   }
 }
 

@@ -19,7 +19,8 @@ inline constexpr std::uint32_t kNoRigid = ~0u;
 struct RigidStage {
   Dynamics dynamics;
   std::vector<std::uint32_t> bodies;  ///< indices of the rigid ones into WorldState::bodies
-  /// Solids by entity; an avatar has one for each of its parts.
+  /// Solids by entity; an avatar has one for each of its parts. Those of `bodies` are the first, in
+  /// their order; others are made as they are met.
   std::map<std::pair<EntityId, std::uint32_t>, std::uint32_t> solids;
   std::vector<EntityId> entities;      ///< of each solid; 0: nobody's
   std::vector<std::uint32_t> vacant;   ///< solids of avatars that left, to be used again

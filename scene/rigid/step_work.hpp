@@ -57,13 +57,15 @@ struct StepWork {
   std::vector<ContactPatch> patches;
   std::vector<Joint> joints;
   std::vector<std::uint32_t> jointOf;
-  std::vector<double> fractions;  ///< of each of `bodies`, of its way
+  std::vector<double> fractions;     ///< of each of `bodies`, of its way
+  std::vector<std::uint8_t> yields;  ///< of each of `bodies`: it has some way of its own left
+  std::vector<Vec3> partings;        ///< of each of `bodies`: metres, out of what is too near
   std::vector<Passage> passages;
-  std::vector<double> closing;  ///< of each of `active`: metres, by the ways as they are now
+  std::vector<Stride> strides;  ///< of these
   std::vector<Carry> carried;   ///< of each of `bodies`: the way that it goes in any case
 };
 
 /// Step 3: the ways to where the solver has the bodies, as far as they are proved (ways.cpp).
-void proveWays(const Dynamics& dynamics, double seconds, StepWork& work);
+void proveWays(const Dynamics& dynamics, double seconds, double epsilon, StepWork& work);
 
 }  // namespace enfilade::scene

@@ -1,5 +1,6 @@
 // How far each body goes towards where the solver has it: step 3 at the head of dynamics.cpp.
 #include <algorithm>
+#include <utility>
 
 #include "scene/rigid/islands.hpp"
 #include "scene/rigid/step_work.hpp"
@@ -7,12 +8,11 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kBodyBlock = 32;  // bodies that a thread takes at a time
-constexpr double kMore = 1 + 0x1p-40;   // above what a few roundings lose
-/// Of their distance: pairs that close in by less, by a crude bound, are not looked at. The cruder,
-/// the sooner they have to be looked at again.
-constexpr double kFar = 0.1;
-constexpr int kPartialRounds = 4;  // then who is in the way does not move at all
+constexpr std::size_t kBodyBlock = 32;   // bodies that a thread takes at a time
+constexpr std::size_t kScanBlock = 512;  // pairs, where each costs next to nothing
+constexpr double kMore = 1 + 0x1p-40;    // above what a few roundings lose
+constexpr double kAtRest = 0.5;          // of epsilon: nearer than that nothing comes to rest
+constexpr int kPartialRounds = 4;        // then who is in the way does not go its way at all
 
 Passage passageOf(const Solid& solid, const RigidBody& goal) {
   Passage passage = standing(solid);
@@ -22,22 +22,12 @@ Passage passageOf(const Solid& solid, const RigidBody& goal) {
   return passage;
 }
 
-/// Metres that no point of it goes farther beside `shift`: on its way, or shortened beside its
-/// carrier's.
-double widthOf(const Passage& way, const Carry& carry, const Vec3& shift) {
-  const double goes = (way.toCentre - way.fromCentre - shift).norm();
-  const double stays = (carry.shift - shift).norm();
-  return (std::max(goes, stays) + way.turn * way.radius) * kMore;
-}
-
-/// How far the pair is proved clear; 1 for one that was not separated when it set out.
-/// `proof`: set where the narrow phase had to be asked.
-double clearFraction(const Dynamics& dynamics, const NearPair& pair, double closing,
+/// How far the pair, which was `apart` when it set out, is proved clear; 1 for one that was not
+/// separated. `proof`: set where the narrow phase had to be asked.
+double clearFraction(const Dynamics& dynamics, const NearPair& pair, double apart,
                      const StepWork& work, std::uint8_t& proof) {
   if (pair.verdict != collision::Verdict::separated) return 1;
   const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
-  const double apart = apartNow(pair, a, b);
-  if (closing < apart) return 1;
   const Passage& wayA = work.passages[work.local[pair.key.a]];
   const Passage& wayB = work.passages[work.local[pair.key.b]];
   const PartShape partA = shapeOf(a, pair.key.partA), partB = shapeOf(b, pair.key.partB);
@@ -45,7 +35,7 @@ double clearFraction(const Dynamics& dynamics, const NearPair& pair, double clos
   if (along == 1) return 1;
   proof = 1;
   // Where they end in one another, the plane that the solver kept them on is as good as any.
-  if (along > 0 && !separatedAtEnd(partA, wayA, partB, wayB, pair.features())) return along;
+  if (!separatedAtEnd(partA, wayA, partB, wayB, pair.features())) return along;
   return clearance(partA, wayA, partB, wayB, pair.features(), apart).fraction;
 }
 
@@ -121,58 +111,89 @@ void findPassages(const Dynamics& dynamics, StepWork& work) {
   });
 }
 
-/// What the rounds of proofs find.
+/// Where each body would go that can go nothing of its way: out of what it is too near to, half of
+/// what lacks, since the other gives way too. Without it a heap that is shaken comes to stand: the
+/// nearer two are, the less of any way of theirs is proved, and each that stands holds up all that
+/// are near to it.
+void findPartings(const Dynamics& dynamics, double epsilon, StepWork& work) {
+  const double rests = kAtRest * epsilon;
+  work.partings.assign(work.bodies.size(), Vec3::Zero());
+  for (const std::uint32_t i : work.patched) {
+    const NearPair& pair = dynamics.pairs[i];
+    if (pair.verdict != collision::Verdict::separated) continue;
+    const double apart = apartNow(pair, dynamics.solids[pair.key.a], dynamics.solids[pair.key.b]);
+    if (!(apart < rests)) continue;
+    const Vec3 parting = 0.5 * (rests - std::max(0.0, apart)) * pair.patch()->normal;
+    work.partings[work.local[pair.key.a]] -= parting;
+    work.partings[work.local[pair.key.b]] += parting;
+  }
+  for (Vec3& parting : work.partings)
+    if (const double length = parting.norm(); length > rests) parting *= rests / length;
+}
+
+/// What the rounds of proofs find. Most pairs are far from one another, and there are many: they
+/// are passed over by how far their bodies go beside a motion that is the same for all.
 struct Round {
-  std::vector<std::uint8_t> open;    ///< of each of `bodies`: its way is new
-  std::vector<double> least;         ///< of each of `bodies`, of the parts of its pairs
-  Vec3 shift = Vec3::Zero();         ///< about how all go
-  std::vector<double> widths;        ///< of each of `bodies`: bounds of widthOf()
-  std::vector<double> jumped;        ///< of each of `bodies`: Solid's
-  std::vector<std::uint32_t> near;   ///< of `active`: those whose bodies' widths do not clear them
+  std::vector<std::uint8_t> open;  ///< of each of `bodies`: its way is new
+  std::vector<double> least;       ///< of each of `bodies`, of the parts of its pairs
+  Vec3 shift = Vec3::Zero();       ///< about how all go
+  std::vector<double> widths;      ///< of each of `bodies`: metres, no way so far goes farther
+  std::vector<double> jumped;      ///< of each of `bodies`: Solid's
+  /// Those of `active` that may meet, and how far they are apart at the start.
+  std::vector<std::uint32_t> near;
+  std::vector<double> apart;
+  std::vector<std::uint8_t> isNear;  ///< of each of `active`
   std::vector<double> parts;         ///< of each of `near`: of the ways as they are, proved
   std::vector<std::uint8_t> proofs;  ///< of each of `near`: the narrow phase was asked
   /// Solids of which neither could be kept from the other.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> squeezed;
 };
 
-Round firstRound(const Dynamics& dynamics, const StepWork& work) {
-  Round round;
+void startRounds(const Dynamics& dynamics, const StepWork& work, Round& round) {
   round.open.assign(work.bodies.size(), 1);
+  round.widths.assign(work.bodies.size(), -1);
+  round.jumped.clear(), round.squeezed.clear();
+  for (const std::uint32_t solid : work.solids)
+    round.jumped.push_back(dynamics.solids[solid].jumped);
+  round.shift = Vec3::Zero();
   for (std::uint32_t i = 0; i < work.report.awake; ++i)  // they are the first
     round.shift += work.passages[i].toCentre - work.passages[i].fromCentre;
   if (work.report.awake > 0) round.shift /= work.report.awake;
-  round.widths.assign(work.bodies.size(), 0);
-  for (const std::uint32_t solid : work.solids)
-    round.jumped.push_back(dynamics.solids[solid].jumped);
-  return round;
 }
 
 /// Takes new ways into account. Returns whether any body's is wider than it ever was.
-bool widen(const StepWork& work, Round& round) {
+bool widen(StepWork& work, Round& round) {
   bool any = false;
   for (std::size_t i = 0; i < work.bodies.size(); ++i) {
-    if (!round.open[i]) continue;
-    const double width = widthOf(work.passages[i], work.carried[i], round.shift);
+    if (round.open[i] == 0) continue;
+    const Stride& stride = work.strides[i] = strideOf(work.passages[i]);
+    const double width = (stride.way - round.shift).norm() + stride.tip;
     if (width <= round.widths[i]) continue;
-    round.widths[i] = width;  // also one that is no number: nothing is clear of it
+    // Shortened, it goes on more and more as its carrier does.
+    const double carried = (work.carried[i].shift - round.shift).norm() + stride.tip;
+    round.widths[i] = std::max(width, carried) * kMore;  // no number: nothing is clear of it
     any = true;
   }
   return any;
 }
 
-/// Most pairs are far apart: they need no look at their bodies' ways, in no round.
 void findNear(const Dynamics& dynamics, StepWork& work, Round& round) {
-  round.near.clear();
-  for (std::uint32_t k = 0; k < work.active.size(); ++k) {
-    const NearPair& pair = dynamics.pairs[work.active[k]];
+  round.isNear.resize(work.active.size());
+  const auto apartOf = [&](std::size_t k) {
     const auto [a, b] = work.bodiesOf[k];
-    const double closing = (round.widths[a] + round.widths[b]) * kMore;
-    const double apart = apartNow(pair, round.jumped[a] + round.jumped[b]);
-    if (closing < kFar * apart) {
-      work.closing[k] = closing;
-    } else {
-      round.near.push_back(k);
+    return apartNow(dynamics.pairs[work.active[k]], round.jumped[a] + round.jumped[b]);
+  };
+  work.workers->share(work.active.size(), kScanBlock, [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; k < to; ++k) {
+      const auto [a, b] = work.bodiesOf[k];
+      round.isNear[k] = !((round.widths[a] + round.widths[b]) * kMore < apartOf(k));
     }
+  });
+  round.near.clear(), round.apart.clear();
+  for (std::uint32_t k = 0; k < work.active.size(); ++k) {
+    if (round.isNear[k] == 0) continue;
+    round.near.push_back(k);
+    round.apart.push_back(apartOf(k));
   }
 }
 
@@ -184,10 +205,10 @@ void proveRound(const Dynamics& dynamics, StepWork& work, Round& round) {
     for (std::size_t n = from; n < to; ++n) {
       const std::uint32_t k = round.near[n];
       const auto [a, b] = work.bodiesOf[k];
-      if (!round.open[a] && !round.open[b]) continue;
+      if (round.open[a] == 0 && round.open[b] == 0) continue;
+      if (closingOf(work.strides[a], work.strides[b]) < round.apart[n]) continue;
       const NearPair& pair = dynamics.pairs[work.active[k]];
-      work.closing[k] = closingOf(work.passages[a], work.passages[b]);
-      round.parts[n] = clearFraction(dynamics, pair, work.closing[k], work, round.proofs[n]);
+      round.parts[n] = clearFraction(dynamics, pair, round.apart[n], work, round.proofs[n]);
     }
   });
   for (const std::uint8_t proof : round.proofs) work.report.proofs += proof;
@@ -217,14 +238,14 @@ void shorten(std::uint32_t body, double part, StepWork& work) {
 /// What its carrier would take it through stops it: nothing is penetrated that stands, rather the
 /// driven body penetrates what it drives.
 void drop(const Dynamics& dynamics, std::uint32_t body, StepWork& work) {
-  work.fractions[body] = 0;
+  work.fractions[body] = 0, work.yields[body] = 0;
   work.carried[body] = {};
   work.passages[body] = standing(dynamics.solids[work.solids[body]]);
 }
 
 /// Whether one of `bodies` has any way of its own left.
 bool canYield(const Dynamics& dynamics, std::uint32_t body, const StepWork& work) {
-  return dynamics.solids[work.solids[body]].isAwake() && work.fractions[body] > 0;
+  return dynamics.solids[work.solids[body]].isAwake() && work.yields[body] != 0;
 }
 
 /// Whether it only goes where its carrier takes it, and `other` neither carries it nor goes along.
@@ -233,10 +254,22 @@ bool isTakenInto(std::uint32_t body, std::uint32_t other, const StepWork& work) 
   return carrier != kNoPlace && carrier != other && work.carried[other].by != carrier;
 }
 
+/// Who can go nothing of its way goes out of what is too near, once. Returns whether it does.
+bool parts(std::uint32_t body, StepWork& work) {
+  const Vec3 parting = std::exchange(work.partings[body], Vec3::Zero());
+  if (parting.isZero(0)) return false;
+  Passage& way = work.passages[body];
+  way.toCentre += parting;
+  way.stands = nullptr;
+  measure(way);
+  return true;
+}
+
 /// Its way becomes a part of what it was; one that had none left loses its carrier.
 void giveWay(const Dynamics& dynamics, std::uint32_t body, double part, StepWork& work) {
-  const bool goesOn = work.fractions[body] > 0;
+  const bool goesOn = work.yields[body] != 0;
   if (goesOn) shorten(body, part, work);
+  if (goesOn && part == 0) work.yields[body] = parts(body, work);
   const double leash = dynamics.solids[work.solids[body]].leash;
   if (!goesOn || lengthOf(work.passages[body]) > leash) drop(dynamics, body, work);
 }
@@ -246,8 +279,7 @@ bool shortenAll(const Dynamics& dynamics, bool toNothing, StepWork& work, Round&
   round.least.assign(work.bodies.size(), 1);
   for (std::size_t n = 0; n < round.near.size(); ++n) {
     if (round.parts[n] == 1) continue;
-    const std::uint32_t k = round.near[n];
-    const auto [a, b] = work.bodiesOf[k];
+    const auto [a, b] = work.bodiesOf[round.near[n]];
     bool yieldsA = canYield(dynamics, a, work), yieldsB = canYield(dynamics, b, work);
     if (!yieldsA && !yieldsB) {
       yieldsA = isTakenInto(a, b, work);
@@ -269,14 +301,19 @@ bool shortenAll(const Dynamics& dynamics, bool toNothing, StepWork& work, Round&
 
 }  // namespace
 
-void proveWays(const Dynamics& dynamics, double seconds, StepWork& work) {
+void proveWays(const Dynamics& dynamics, double seconds, double epsilon, StepWork& work) {
   work.fractions.assign(work.bodies.size(), 1);
-  work.closing.assign(work.active.size(), 0);
+  work.yields.assign(work.bodies.size(), 1);
+  work.strides.resize(work.bodies.size());
   findPassages(dynamics, work);
   findCarried(dynamics, seconds, work);
-  Round round = firstRound(dynamics, work);
-  // Each round but the last shortens a way, after kPartialRounds to nothing, or drops one.
-  const std::size_t bound = 2 * work.bodies.size() + kPartialRounds + 1;
+  thread_local Round kept;  // as StepWork
+  Round& round = kept;
+  findPartings(dynamics, epsilon, work);
+  startRounds(dynamics, work, round);
+  // Each round but the last shortens a way, after kPartialRounds to nothing, parts a body that has
+  // none left, or drops one.
+  const std::size_t bound = 3 * work.bodies.size() + kPartialRounds + 1;
   bool any = true;
   for (std::size_t i = 0; i < bound && any; ++i) {
     proveRound(dynamics, work, round);

@@ -18,9 +18,9 @@ void pause() {
 
 }  // namespace
 
-Workers::Workers(int threads) {
-  const int count = std::clamp(threads, 1, kMost);
-  failures_.resize(static_cast<std::size_t>(count));
+Workers::Workers(int threads)
+    : shares_(static_cast<std::size_t>(std::clamp(threads, 1, kMost))), failures_(shares_.size()) {
+  const int count = static_cast<int>(shares_.size());
   helpers_.reserve(static_cast<std::size_t>(count) - 1);
   try {
     for (int i = 1; i < count; ++i)
@@ -36,25 +36,36 @@ Workers::~Workers() {
   round_.notify_all();
 }
 
-void Workers::takeBlocks(std::exception_ptr& failure) noexcept {
+void Workers::takeShare(std::size_t share) {
+  Share& own = shares_[share];
+  while (true) {  // ends: each turn takes a block
+    const std::size_t block = own.next.fetch_add(1, std::memory_order_relaxed);
+    if (block >= own.end) return;
+    const std::size_t from = block * job_.block;
+    job_.call(job_.what, from, std::min(from + job_.block, job_.size));
+  }
+}
+
+/// Those of its own share first.
+void Workers::takeBlocks(std::size_t thread) noexcept {
   try {
-    while (true) {  // ends: each turn takes a block
-      const std::size_t from = next_.fetch_add(job_.block, std::memory_order_relaxed);
-      if (from >= job_.size) return;
-      job_.call(job_.what, from, std::min(from + job_.block, job_.size));
-    }
+    for (std::size_t i = 0; i < shares_.size(); ++i) takeShare((thread + i) % shares_.size());
   } catch (...) {
-    failure = std::current_exception();
+    failures_[thread] = std::current_exception();
   }
 }
 
 void Workers::runOnAll(const Job& job) {
   job_ = job;
-  next_.store(0, std::memory_order_relaxed);
+  const std::size_t blocks = (job.size + job.block - 1) / job.block;
+  for (std::size_t i = 0; i < shares_.size(); ++i) {
+    shares_[i].next.store(i * blocks / shares_.size(), std::memory_order_relaxed);
+    shares_[i].end = (i + 1) * blocks / shares_.size();
+  }
   gate_.store(kOpen, std::memory_order_release);
   round_.fetch_add(1, std::memory_order_release);
   round_.notify_all();
-  takeBlocks(failures_[0]);
+  takeBlocks(0);
   gate_.fetch_and(~kOpen, std::memory_order_acq_rel);
   // Each has a block in hand at most.
   for (int i = 0; gate_.load(std::memory_order_acquire) != 0; ++i)
@@ -79,7 +90,7 @@ void Workers::help(std::size_t helper) {
            !gate_.compare_exchange_weak(gate, gate + 1, std::memory_order_acq_rel)) {
     }
     if ((gate & kOpen) == 0) continue;
-    takeBlocks(failures_[helper]);
+    takeBlocks(helper);
     gate_.fetch_sub(1, std::memory_order_release);
   }
 }

@@ -1,7 +1,8 @@
 // A few threads that share loops. What a loop computes must not depend on who computes it: each
-// index writes to places of its own. The blocks of indices are fixed; who comes first takes the
-// next one, and the caller waits for nobody who has not begun. So a thread that the machine has no
-// processor for costs nothing.
+// index writes to places of its own. The blocks of indices are fixed. Each thread begins with the
+// same share of them in every loop, since what it wrote there in the last one is near to it, and
+// then helps with what the others have not taken; the caller waits for nobody who has not begun. So
+// a thread that the machine has no processor for costs nothing.
 #pragma once
 
 #include <algorithm>
@@ -47,15 +48,31 @@ class Workers {
   };
   void runOnAll(const Job& job);
   void help(std::size_t helper);
-  void takeBlocks(std::exception_ptr& failure) noexcept;
+  void takeShare(std::size_t share);
+  void takeBlocks(std::size_t thread) noexcept;
 
-  Job job_;                              ///< changes only while nobody is inside
-  std::atomic<std::size_t> next_{0};     ///< the first index that nobody took
+  /// Of the blocks of a job, beside one another; each on a cache line of its own.
+  struct alignas(64) Share {
+    std::atomic<std::size_t> next{0};  ///< the first block that nobody took
+    std::size_t end = 0;
+  };
+  Job job_;                              ///< changes only while nobody is inside, as the shares do
+  std::vector<Share> shares_;            ///< one for each thread
   std::atomic<std::uint32_t> gate_{0};   ///< kOpen, and how many helpers are inside
   std::atomic<std::uint32_t> round_{0};  ///< counts jobs; who waits for one waits here
   std::atomic<bool> ending_{false};
   std::vector<std::exception_ptr> failures_;
   std::vector<std::jthread> helpers_;
 };
+
+/// The same by the caller alone where there are no workers.
+template <class Each>
+void shareAmong(Workers* workers, std::size_t size, std::size_t block, const Each& each) {
+  if (workers) {
+    workers->share(size, block, each);
+  } else if (size > 0) {
+    each(std::size_t{0}, size);
+  }
+}
 
 }  // namespace enfilade::scene

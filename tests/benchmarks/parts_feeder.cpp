@@ -4,13 +4,17 @@
 // when one of ours fails.
 //   parts_feeder [PARTS [TICKS [ours]]]  1000 parts and 240 ticks when left out; 10000 for the full
 //   run, of which one thread and the peers do the first 240; `ours`: without peers
-// The last tenth of the ticks, when all have settled, is told once more by itself.
+// The last tenth of the ticks, when all have settled, is told once more by itself. `a scene's`: the
+// bundled scene in its world, contacts told, as the server has it; judged by what the world tells.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
 #include <string_view>
 
+#include "assets/feeder.hpp"
+#include "scene/bodies/sidecar.hpp"
+#include "scene/world.hpp"
 #include "tests/benchmarks/feeder_engine.hpp"
 
 namespace enfilade::benchmarks {
@@ -120,6 +124,39 @@ bool checkOurs(const FeederPlan& plan, const FeederJudge& judge, int ticks) {
   return all;
 }
 
+/// Whether nothing left the tray and nothing penetrated by more than epsilon.
+bool checkScene(const FeederPlan& plan, int ticks) {
+  scene::Model model = assets::makeFeeder({plan.parts.size(), 1});
+  scene::applySidecar(model, assets::feederSidecar(), "feeder.walk.json");
+  scene::World world(std::make_shared<const scene::Scene>(std::move(model)));
+  scene::setThreads(world, kThreads);
+  const auto isInside = [&](const scene::BodyView& body) {
+    const testing::Vec3& at = body.pose.translation;
+    return std::abs(at.x()) < plan.inner && std::abs(at.z()) < plan.inner && at.y() > 0.8;
+  };
+  const auto go = [&](int most) {
+    Row row;
+    for (int i = 0; i < most; ++i) {
+      const double cpu = cpuSeconds();
+      const auto start = std::chrono::steady_clock::now();
+      const scene::TickReport report = tick(world);
+      const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+      row.seconds += took.count(), row.cpu += cpuSeconds() - cpu;
+      FeederJudgement now{report.worstPenetration, report.squeezedBodies, 0};
+      for (const scene::BodyView& body : *report.snapshot->bodies)
+        if (!isInside(body)) ++now.outside;
+      row.worst = worse(row.worst, now);
+    }
+    return row;
+  };
+  const int last = std::max(kJudgeEvery, ticks / 10);
+  const Row begun = go(ticks - last), ended = go(last), all = both(begun, ended);
+  print("a scene's", all, ticks);
+  print("  last tenth", ended, last);
+  const bool inside = check(all.worst.outside == 0, "the scene's parts all inside");
+  return check(all.worst.deepest <= world.lengths().epsilon, "penetration <= epsilon") && inside;
+}
+
 int main(int count, char** words) {
   const std::size_t parts = count > 1 ? std::strtoul(words[1], nullptr, 10) : 1000;
   const int ticks = count > 2 ? std::atoi(words[2]) : 240;
@@ -135,7 +172,8 @@ int main(int count, char** words) {
               parts, ticks, plan.substeps, plan.frequency, kJudgeEvery);
   std::printf("%-16s %10s %10s %10s %14s %12s %9s\n", "", "ms a tick", "cpu ms", "real time",
               "deepest mm", "penetrating", "outside");
-  const bool good = checkOurs(plan, judge, ticks);
+  bool good = checkOurs(plan, judge, ticks);
+  good &= checkScene(plan, ticks);
   if (alone) return good ? 0 : 1;
 #ifdef BENCH_BULLET
   const int few = std::min(ticks, kMostAlone);

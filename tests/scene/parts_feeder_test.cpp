@@ -42,6 +42,27 @@ TEST(PartsFeeder, WithTheDriveOnAllStayInsideAndNonePenetratesByMoreThanEpsilon)
   EXPECT_EQ(feeder.report().awake, 50u) << "a vibrating tray lets nobody sleep";
 }
 
+// The nearer two parts are, the less of their ways is proved: were they not parted, more and more
+// would stand, each held by others that stand, and the heap would go with the tray as one block.
+TEST(PartsFeeder, PartsThatLeanOnOneAnotherArePartedAndDoNotGrowTogether) {
+  const FeederPlan plan = planFeeder(120, 4);
+  Feeder feeder(plan, 2);
+  for (int i = 0; i < 500; ++i) feeder.tick(true);
+  const scene::Dynamics& dynamics = feeder.dynamics();
+  int leaning = 0, close = 0;
+  for (const scene::NearPair& pair : dynamics.pairs) {
+    if (!scene::leans(pair, feeder.settings().solver.epsilon)) continue;
+    collision::FeatureCache cache;
+    const scene::Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
+    const double apart =
+        collision::decide(partOf(a, pair.key.partA), partOf(b, pair.key.partB), cache).distance;
+    ++leaning;
+    close += apart < 0.02 * feeder.settings().solver.epsilon;
+  }
+  EXPECT_GT(leaning, 200);
+  EXPECT_LT(close, leaning / 40) << "of " << leaning;
+}
+
 TEST(PartsFeeder, EndsAtTheSameBitsWithAnyNumberOfThreadsAndWithoutWideRegisters) {
   const FeederPlan plan = planFeeder(120, 3);
   const auto run = [&](int threads, bool byAvx = true) {

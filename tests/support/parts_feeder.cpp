@@ -199,7 +199,7 @@ void Feeder::findMet(std::size_t i, double lookout) {
   met_[i].clear();
   for (const auto& partner : broadPhase_.partners(movers_[i - 1])) {
     const std::uint32_t other = solidOfMover_[partner.id];
-    if (other > i && scene::mayMeet(dynamics_.solids[i], dynamics_.solids[other], lookout))
+    if (other > i && scene::mayMeet(spheres_[i], spheres_[other], lookout))
       met_[i].push_back(other);
   }
 }
@@ -212,14 +212,15 @@ void Feeder::findPairs() {
   for (std::uint32_t i = 1; i < size; ++i)
     for (const auto& partner : broadPhase_.partners(movers_[i - 1]))
       if (solidOfMover_[partner.id] == 0) keys.push_back({0, i, partOfMover_[partner.id], 0});
-  met_.resize(size);
+  met_.resize(size), spheres_.clear();
+  for (const scene::Solid& solid : dynamics_.solids) spheres_.push_back(scene::reachSphere(solid));
   workers_.share(size, kBoxBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = std::max(from, std::size_t{1}); i < to; ++i) findMet(i, lookout);
   });
   for (std::uint32_t i = 1; i < size; ++i)
     for (const std::uint32_t other : met_[i]) keys.push_back({i, other, 0, 0});
   if (!std::is_sorted(keys.begin(), keys.end())) std::sort(keys.begin(), keys.end());
-  scene::setPairs(dynamics_, keys);
+  scene::setPairs(dynamics_, keys, &workers_);
 }
 
 void Feeder::tick(bool driven) {

@@ -93,6 +93,7 @@ class Feeder {
   std::vector<collision::ExtremalVertices> extremes_;
   std::vector<collision::Box> boxes_;            ///< of the parts, as the broad phase has them
   std::vector<collision::Box> needed_;           ///< of the parts, in this tick
+  std::vector<scene::ReachSphere> spheres_;      ///< of all solids
   std::vector<std::vector<std::uint32_t>> met_;  ///< of each part: those after it that it may meet
   std::vector<std::uint32_t> solidOfMover_, partOfMover_;
   double time_ = 0;
