@@ -65,7 +65,8 @@ struct PartContact {
   double depth = 0;
 };
 
-/// Of each pair that moved: whether it may be nearer than the limit, or was in the last tick.
+/// Indices of the pairs of which one moved and that may be nearer than the limit, or were in the
+/// last tick.
 std::vector<std::uint32_t> pairsToAsk(const WorldState& world, const Nearness& nearness,
                                       std::span<const Standing> standings, Workers* workers) {
   const std::vector<NearPair>& pairs = world.rigids.dynamics.pairs;

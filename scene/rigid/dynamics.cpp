@@ -5,9 +5,9 @@
 //  3. Every pair that could have met on the way is proved clear (passage.hpp); where that fails,
 //     the free bodies go only as far as is proved, and less fast; then their other pairs are looked
 //     at again, until nobody needs to stop. It ends, since a body goes less far each time, and
-//     after a few times not at all; then it is parted, once, from what it is too near to. A group
-//     that leans on one driven body and nothing else that stands or is driven, such as parts in a
-//     tray, goes with it at least.
+//     after a few times not at all. Who goes not at all is parted, once, from what is too near. A
+//     group that leans on one driven body and nothing else that stands or is driven, such as parts
+//     in a tray, goes with it at least.
 //  4. Groups of bodies that lean on one another and were calm for a while fall asleep.
 #include "scene/rigid/dynamics.hpp"
 

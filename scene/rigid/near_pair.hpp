@@ -63,8 +63,7 @@ struct NearPairStep {
 
 /// Looks at the pair where its solids are now: verdict, distance, patch. Does nothing where they
 /// were so far apart that they are not taken to come to epsilon within the step, by their speeds of
-/// now.
-/// Returns whether the narrow phase was asked.
+/// now. Returns whether the narrow phase was asked.
 bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step);
 
 /// A lower bound of the distance by what was known; may be negative. `moved`: Solid::jumped of

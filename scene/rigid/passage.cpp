@@ -28,8 +28,9 @@ using collision::Verdict;
 
 constexpr double kUp = 1 + 0x1p-40;  // above what a few roundings lose
 constexpr double kParts = 1 << kMostHalvings;
-constexpr int kTries = 3;         // to cut a way where its plane is used up
-constexpr double kShorter = 0.5;  // of a way, at each try
+constexpr int kTries = 3;  // to cut a way where its plane is used up
+constexpr double kShorter =
+    0.25;  // of a way, at each try: lest the gap be used up, from step to step
 
 /// q1 or -q1, whichever is nearer to q0.
 Quat nearer(const Quat& q0, const Quat& q1) {
@@ -222,7 +223,7 @@ double clearAlong(const PartShape& partA, const Passage& a, const PartShape& par
   const double atStart = gap(false), atEnd = gap(true);
   const double bulge = bulgeOf(a) + bulgeOf(b);
   if (planeParts(atStart, atEnd, bulge)) return 1;
-  if (!(atStart > 0 && atStart < std::numeric_limits<double>::infinity())) return 0;
+  if (!(atStart > 0 && atStart < std::numeric_limits<double>::infinity())) return -1;
   // Were it linear in time, the gap would be gone at this part.
   double part = std::min(1.0, atStart / (atStart - std::min(0.0, atEnd) + bulge));
   for (int i = 0; i < kTries; ++i) {
@@ -230,7 +231,7 @@ double clearAlong(const PartShape& partA, const Passage& a, const PartShape& par
     if (!(part > 0)) return 0;
     if (partsAllTheWay(partA, firstPart(a, part), partB, firstPart(b, part), axis)) return part;
   }
-  return 0;
+  return -1;
 }
 
 bool separatedAtEnd(const PartShape& partA, const Passage& a, const PartShape& partB,

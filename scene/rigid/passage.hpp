@@ -58,7 +58,7 @@ Passage secondHalf(const Passage& passage, const PassagePose& middle);
 Passage firstPart(const Passage& passage, double fraction);
 
 /// Up to which part of the way the plane at right angles to `axis` (unit, from A to B) parts the
-/// two: a cheap proof, which where it gives 0 says nothing.
+/// two: a cheap proof. 0: the plane is used up at once; negative: it says nothing.
 double clearAlong(const PartShape& partA, const Passage& a, const PartShape& partB,
                   const Passage& b, const Vec3& axis);
 

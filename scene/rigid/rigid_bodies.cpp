@@ -314,7 +314,7 @@ std::vector<std::uint32_t> findSeeds(const WorldState& world) {
     isSeed[body] = 1;
     open.push_back(body);
   };
-  const auto addPartners = [&](collision::MoverId mover) {
+  const auto addAround = [&](collision::MoverId mover) {
     for (const auto& partner : world.broadPhase.partners(mover)) {
       if (!partner.moves) continue;
       const std::uint32_t body = bodyAt(world.rigids, partner.id);
@@ -323,14 +323,14 @@ std::vector<std::uint32_t> findSeeds(const WorldState& world) {
   };
   for (const std::uint32_t i : all)
     if (isAwake(i)) add(i);
-  for (const std::uint32_t i : world.goingBodies) addPartners(world.bodies[i].mover);
+  for (const std::uint32_t i : world.goingBodies) addAround(world.bodies[i].mover);
   for (const auto& [name, avatar] : world.avatars)
     if (world.bodyOfId.contains(avatar.stoppedBy)) add(world.bodyOfId.at(avatar.stoppedBy));
   // What one that wakes leans on wakes too. Each body is added once.
   while (!open.empty()) {
     const std::uint32_t body = open.back();
     open.pop_back();
-    addPartners(world.bodies[body].mover);
+    addAround(world.bodies[body].mover);
   }
   std::vector<std::uint32_t> seeds;
   for (const std::uint32_t i : all)

@@ -12,6 +12,7 @@ constexpr std::size_t kBodyBlock = 32;   // bodies that a thread takes at a time
 constexpr std::size_t kScanBlock = 512;  // pairs, where each costs next to nothing
 constexpr double kMore = 1 + 0x1p-40;    // above what a few roundings lose
 constexpr double kAtRest = 0.5;          // of epsilon: nearer than that nothing comes to rest
+constexpr double kPart = 0.25;           // of epsilon, a step: who is parted is calm (RestLimits)
 constexpr int kPartialRounds = 4;        // then who is in the way does not go its way at all
 
 Passage passageOf(const Solid& solid, const RigidBody& goal) {
@@ -31,11 +32,11 @@ double clearFraction(const Dynamics& dynamics, const NearPair& pair, double apar
   const Passage& wayA = work.passages[work.local[pair.key.a]];
   const Passage& wayB = work.passages[work.local[pair.key.b]];
   const PartShape partA = shapeOf(a, pair.key.partA), partB = shapeOf(b, pair.key.partB);
-  const double along = pair.axis.isZero(0) ? 0 : clearAlong(partA, wayA, partB, wayB, pair.axis);
+  const double along = pair.axis.isZero(0) ? -1 : clearAlong(partA, wayA, partB, wayB, pair.axis);
   if (along == 1) return 1;
   proof = 1;
-  // Where they end in one another, the plane that the solver kept them on is as good as any.
-  if (!separatedAtEnd(partA, wayA, partB, wayB, pair.features())) return along;
+  // Where they end in one another, the plane that parted them is as good as any.
+  if (along >= 0 && !separatedAtEnd(partA, wayA, partB, wayB, pair.features())) return along;
   return clearance(partA, wayA, partB, wayB, pair.features(), apart).fraction;
 }
 
@@ -112,23 +113,25 @@ void findPassages(const Dynamics& dynamics, StepWork& work) {
 }
 
 /// Where each body would go that can go nothing of its way: out of what it is too near to, half of
-/// what lacks, since the other gives way too. Without it a heap that is shaken comes to stand: the
-/// nearer two are, the less of any way of theirs is proved, and each that stands holds up all that
-/// are near to it.
+/// what lacks where the other gives way as well. Without it a heap that is shaken comes to stand:
+/// the nearer two are, the less of any way of theirs is proved, and each that stands holds up all
+/// that are near to it.
 void findPartings(const Dynamics& dynamics, double epsilon, StepWork& work) {
   const double rests = kAtRest * epsilon;
   work.partings.assign(work.bodies.size(), Vec3::Zero());
   for (const std::uint32_t i : work.patched) {
     const NearPair& pair = dynamics.pairs[i];
-    if (pair.verdict != collision::Verdict::separated) continue;
-    const double apart = apartNow(pair, dynamics.solids[pair.key.a], dynamics.solids[pair.key.b]);
-    if (!(apart < rests)) continue;
-    const Vec3 parting = 0.5 * (rests - std::max(0.0, apart)) * pair.patch()->normal;
+    const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
+    const double apart = apartNow(pair, a, b);
+    if (pair.verdict != collision::Verdict::separated || !(apart < rests)) continue;
+    const double share = a.isAwake() && b.isAwake() ? 0.5 : 1;
+    const Vec3 parting = share * (rests - std::max(0.0, apart)) * pair.patch()->normal;
     work.partings[work.local[pair.key.a]] -= parting;
     work.partings[work.local[pair.key.b]] += parting;
   }
   for (Vec3& parting : work.partings)
-    if (const double length = parting.norm(); length > rests) parting *= rests / length;
+    if (const double length = parting.norm(); length > kPart * epsilon)
+      parting *= kPart * epsilon / length;
 }
 
 /// What the rounds of proofs find. Most pairs are far from one another, and there are many: they
@@ -137,8 +140,9 @@ struct Round {
   std::vector<std::uint8_t> open;  ///< of each of `bodies`: its way is new
   std::vector<double> least;       ///< of each of `bodies`, of the parts of its pairs
   Vec3 shift = Vec3::Zero();       ///< about how all go
-  std::vector<double> widths;      ///< of each of `bodies`: metres, no way so far goes farther
-  std::vector<double> jumped;      ///< of each of `bodies`: Solid's
+  std::vector<double>
+      widths;  ///< of each of `bodies`: metres beside `shift`, no way so far is longer
+  std::vector<double> jumped;  ///< of each of `bodies`: Solid's
   /// Those of `active` that may meet, and how far they are apart at the start.
   std::vector<std::uint32_t> near;
   std::vector<double> apart;
@@ -152,7 +156,7 @@ struct Round {
 void startRounds(const Dynamics& dynamics, const StepWork& work, Round& round) {
   round.open.assign(work.bodies.size(), 1);
   round.widths.assign(work.bodies.size(), -1);
-  round.jumped.clear(), round.squeezed.clear();
+  round.jumped.clear(), round.near.clear(), round.apart.clear(), round.squeezed.clear();
   for (const std::uint32_t solid : work.solids)
     round.jumped.push_back(dynamics.solids[solid].jumped);
   round.shift = Vec3::Zero();
@@ -255,22 +259,23 @@ bool isTakenInto(std::uint32_t body, std::uint32_t other, const StepWork& work) 
 }
 
 /// Who can go nothing of its way goes out of what is too near, once. Returns whether it does.
-bool parts(std::uint32_t body, StepWork& work) {
+bool goOut(std::uint32_t body, double leash, StepWork& work) {
   const Vec3 parting = std::exchange(work.partings[body], Vec3::Zero());
-  if (parting.isZero(0)) return false;
-  Passage& way = work.passages[body];
+  Passage way = work.passages[body];
   way.toCentre += parting;
   way.stands = nullptr;
   measure(way);
+  if (parting.isZero(0) || lengthOf(way) > leash) return false;
+  work.passages[body] = way;
   return true;
 }
 
 /// Its way becomes a part of what it was; one that had none left loses its carrier.
 void giveWay(const Dynamics& dynamics, std::uint32_t body, double part, StepWork& work) {
   const bool goesOn = work.yields[body] != 0;
-  if (goesOn) shorten(body, part, work);
-  if (goesOn && part == 0) work.yields[body] = parts(body, work);
   const double leash = dynamics.solids[work.solids[body]].leash;
+  if (goesOn) shorten(body, part, work);
+  if (goesOn && part == 0) work.yields[body] = goOut(body, leash, work);
   if (!goesOn || lengthOf(work.passages[body]) > leash) drop(dynamics, body, work);
 }
 

@@ -229,16 +229,33 @@ TEST(Checkpoint, BytesThatWereForgedMakeAWorldThatTicksOrNone) {
   EXPECT_GT(ticked, 30);
 }
 
+/// Why the checkpoint is not taken; "": it is.
+std::string refusal(const std::shared_ptr<const Scene>& scene,
+                    const std::vector<std::uint8_t>& from) {
+  try {
+    worldFrom(scene, from);
+  } catch (const CheckpointError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Checkpoint, WhatIsOutOfOrderIsRefused) {
+  const auto scene = busyRoom();
+  World contacts = livelyWorld();
+  ASSERT_GT(contacts.state().bodyContacts.size(), 2u);
+  EXPECT_EQ(refusal(scene, checkpointOf(contacts)), "");
+  std::swap(contacts.state().bodyContacts[0], contacts.state().bodyContacts[1]);
+  EXPECT_NE(refusal(scene, checkpointOf(contacts)).find("do not ascend"), std::string::npos);
+  World solids = livelyWorld();
+  RigidStage& stage = solids.state().rigids;
+  const auto entity = [&](std::size_t i) { return stage.entities[stage.solidOf[stage.bodies[i]]]; };
+  std::swap(stage.solids.at({entity(0), 0}), stage.solids.at({entity(1), 0}));
+  EXPECT_NE(refusal(scene, checkpointOf(solids)).find("the first solids"), std::string::npos);
+}
+
 TEST(Checkpoint, OfAnotherSceneOrVersionIsRefusedWithBothNamed) {
   const auto bytes = checkpointOf(livelyWorld(10));
-  const auto refusal = [](const std::shared_ptr<const Scene>& scene, const auto& from) {
-    try {
-      worldFrom(scene, from);
-    } catch (const CheckpointError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
   EXPECT_NE(refusal(boxScene({floorBox()}), bytes).find("another scene"), std::string::npos);
   auto later = bytes;
   ++later[8];

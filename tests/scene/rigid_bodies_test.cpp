@@ -440,5 +440,33 @@ TEST(RigidBodies, TwoRunsHaveOneHash) {
   EXPECT_EQ(run(), run());
 }
 
+TEST(RigidBodies, ManyTellTheSameWithAnyNumberOfThreads) {
+  std::vector<NamedBox> boxes;
+  for (int i = 0; i < 90; ++i) {
+    const double x = 0.35 * (i % 5) + 0.02 * (i / 25), y = 0.1 + 0.4 * (i / 25);
+    const double z = 0.35 * (i / 5 % 5) + 0.01 * (i % 7);
+    boxes.push_back({"box" + std::to_string(i), {x, y, z}, {x + 0.3, y + 0.3, z + 0.3}});
+  }
+  struct Told {
+    std::vector<std::tuple<std::uint64_t, Event, EntityId, EntityId, double>> events;
+    std::vector<std::uint8_t> state;
+    bool operator==(const Told&) const = default;
+  };
+  const auto run = [&](int threads) {
+    BodyTrial t(loose(boxes));
+    setThreads(t.world, threads);
+    Told told;
+    for (int i = 0; i < 90; ++i)
+      for (const ContactEvent& e : tick(t.world).contacts)
+        told.events.emplace_back(e.tick, e.kind, e.a, e.b, e.decision.distance);
+    told.state = checkpointOf(t.world);
+    return told;
+  };
+  const Told alone = run(1);
+  EXPECT_GT(alone.events.size(), 150u);
+  EXPECT_EQ(alone, run(2));
+  EXPECT_EQ(alone, run(3));
+}
+
 }  // namespace
 }  // namespace enfilade::scene
