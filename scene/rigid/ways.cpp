@@ -140,9 +140,8 @@ struct Round {
   std::vector<std::uint8_t> open;  ///< of each of `bodies`: its way is new
   std::vector<double> least;       ///< of each of `bodies`, of the parts of its pairs
   Vec3 shift = Vec3::Zero();       ///< about how all go
-  std::vector<double>
-      widths;  ///< of each of `bodies`: metres beside `shift`, no way so far is longer
-  std::vector<double> jumped;  ///< of each of `bodies`: Solid's
+  std::vector<double> widths;      ///< of each of `bodies`: metres, of its longest beside `shift`
+  std::vector<double> jumped;      ///< of each of `bodies`: Solid's
   /// Those of `active` that may meet, and how far they are apart at the start.
   std::vector<std::uint32_t> near;
   std::vector<double> apart;

@@ -193,7 +193,7 @@ void expectKnownDistances(RigidScene scene) {
     }
   }
   EXPECT_GT(told, kSteps * pairs.size() / 2);
-  EXPECT_LT(looks, kSteps * pairs.size() / 3);
+  EXPECT_LT(looks, kSteps * pairs.size() / 4);
 }
 
 TEST(KnownDistances, AreNeverMoreThanTheDistancesThoughFewPairsAreLookedAt) {
