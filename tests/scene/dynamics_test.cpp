@@ -208,20 +208,6 @@ TEST(Dynamics, APileIsTheSameInTwoRunsAndBesideSleepers) {
   EXPECT_EQ(once, pile(3));
 }
 
-TEST(Dynamics, AStepWithoutAnybodyAwakeFollowsOneWithMany) {
-  RigidScene scene;
-  scene.addFloor();
-  for (int i = 0; i < 12; ++i) scene.addFree(boxHull({0.1, 0.1, 0.1}), {0, 0.15 + 0.25 * i, 0});
-  scene.pairAll();
-  EXPECT_EQ(scene.run(5).awake, 12u);
-  RigidScene empty;
-  EXPECT_EQ(empty.run(2).awake, 0u);
-  for (Solid& solid : scene.dynamics.solids) solid.asleep = solid.isFree();
-  const DynamicsReport report = scene.run(2);
-  EXPECT_EQ(report.awake, 0u);
-  EXPECT_EQ(report.shortened, 0u);
-}
-
 // What a turn does is foreseen in part only where it is little: a tip that flies at a ball reaches
 // it with the speed that it had.
 TEST(Dynamics, ARodThatSwingsAtABallLosesNothingBeforeItHits) {
