@@ -266,7 +266,7 @@ std::vector<Obstacle> obstaclesIn(const WorldState& world, const Box& box, Entit
 std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& order, Avatar& avatar,
                                        std::string& told, QueryCount& count);
 /// Gives an avatar the shape, chain and height of its spawn order (spawn.cpp).
-void shapeAvatar(const Spawn& order, Avatar& avatar);
+void shapeAvatar(const Spawn& order, const Lengths& lengths, Avatar& avatar);
 
 // ---- for checkpoints, which tell a copy of a world what cannot be worked out -------------------
 

@@ -1,5 +1,6 @@
 #include "scene/avatars/avatar_shape.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -7,8 +8,13 @@ namespace enfilade::scene {
 namespace {
 
 constexpr double kInset = 0.25;            // of the radius: how far the bevel goes in
-constexpr double kBevelOfInset = 2.0 / 3;  // height of the bevel: 34 degrees, which is walkable
+constexpr double kBevelOfInset = 2.0 / 3;  // height of the bevel: 34 degrees
 constexpr double kBevelOfHeight = 0.1;     // at most, so that flat avatars keep a side
+constexpr double kBevelOfSlope = 0.98;     // at most, so that it is walkable whatever rounds
+
+double tangentOf(double normalY) {
+  return std::sqrt(std::max(0.0, 1 - normalY * normalY)) / normalY;
+}
 
 }  // namespace
 
@@ -29,13 +35,20 @@ std::shared_ptr<const AvatarShape> shapeOf(std::vector<AvatarPart> parts) {
   return shape;
 }
 
-std::shared_ptr<const AvatarShape> prismShape(double radius, double height, double standing) {
-  return shapeOf(
-      {placedPart(std::make_shared<const collision::Hull>(avatarHull(radius, height, standing)),
-                  Vec3::Zero(), Mat3::Identity())});
+double bevelOf(double radius, double standing, const Lengths& lengths) {
+  const double slope = std::min(kBevelOfInset, kBevelOfSlope * tangentOf(lengths.walkableNormalY));
+  const double bevel = std::min(slope * kInset * radius, kBevelOfHeight * standing);
+  return std::min(bevel, lengths.stepHeight);
 }
 
-collision::Hull avatarHull(double radius, double height, double standing) {
+std::shared_ptr<const AvatarShape> prismShape(double radius, double height, double standing,
+                                              const Lengths& lengths) {
+  collision::Hull hull = avatarHull(radius, height, bevelOf(radius, standing, lengths));
+  return shapeOf({placedPart(std::make_shared<const collision::Hull>(std::move(hull)), Vec3::Zero(),
+                             Mat3::Identity())});
+}
+
+collision::Hull avatarHull(double radius, double height, double bevel) {
   // cos and sin of multiples of 30 degrees, exact up to the rounding of sqrt.
   const double s = std::sqrt(3.0) / 2;
   const std::array<std::array<double, 2>, 12> ring{{{1, 0},
@@ -51,7 +64,6 @@ collision::Hull avatarHull(double radius, double height, double standing) {
                                                     {0.5, -s},
                                                     {s, -0.5}}};
   const double inset = kInset * radius;
-  const double bevel = std::min(kBevelOfInset * inset, kBevelOfHeight * standing);
   const std::array<std::array<double, 2>, 4> levels{
       {{0, radius - inset}, {bevel, radius}, {height - bevel, radius}, {height, radius - inset}}};
   std::vector<collision::Vec3> points;

@@ -7,6 +7,7 @@
 
 #include "collision/hull.hpp"
 #include "collision/narrow_phase.hpp"
+#include "scene/lengths.hpp"
 
 namespace enfilade::scene {
 
@@ -34,14 +35,18 @@ AvatarPart placedPart(std::shared_ptr<const collision::Hull> hull, const Vec3& o
 
 std::shared_ptr<const AvatarShape> shapeOf(std::vector<AvatarPart> parts);
 
+/// Metres: the height of a prism's bevels. They face up, or down, enough to be stood on, and are no
+/// higher than a step: over the lower one an avatar glides up a ledge. They are those of an avatar
+/// of `standing` metres, so that the prism of one who crouches lies inside the one who stands.
+double bevelOf(double radius, double standing, const Lengths& lengths);
+
 /// A bevelled prism on twelve sides: origin in the middle of the bottom, +Y up, metres; the widest
-/// ring has the given radius. The bevels at bottom and top let it glide over seams and small
-/// ledges. Their height is that of an avatar of `standing` metres, so that the prism of one who
-/// crouches lies inside the one who stands; height >= standing / 4.
-collision::Hull avatarHull(double radius, double height, double standing);
+/// ring has the given radius. height >= standing / 4.
+collision::Hull avatarHull(double radius, double height, double bevel);
 
 /// One part: the prism.
-std::shared_ptr<const AvatarShape> prismShape(double radius, double height, double standing);
+std::shared_ptr<const AvatarShape> prismShape(double radius, double height, double standing,
+                                              const Lengths& lengths);
 
 /// The box of `box` in the avatar's frame when the feet are at `feet`.
 inline Box boxAt(const Box& box, const Vec3& feet) {

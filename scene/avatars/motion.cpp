@@ -152,11 +152,18 @@ bool hasTread(Mover& m, const Vec3& direction, double gained) {
   return room > gained + 0.5 * kTread;
 }
 
+/// How high the feet go for a step: the rest of it a prism glides up its bevel.
+double liftOf(const Mover& m) {
+  const Avatar& avatar = m.avatar;
+  const bool isPrism = avatar.standing > 0;
+  return m.lengths.stepHeight - (isPrism ? bevelOf(avatar.radius, avatar.standing, m.lengths) : 0);
+}
+
 /// Tries the wish one step higher; true if that wins ground and ends on something walkable.
 bool stepUp(Mover& m, const Vec3& start, const Vec3& wish, double toBeat) {
   const Vec3 low = m.feet;
   m.feet = start;
-  sweepFrom(m, {0, m.lengths.stepHeight, 0});
+  sweepFrom(m, {0, liftOf(m), 0});
   const double raised = m.feet.y() - start.y();
   const double length = wish.norm();
   if (hasTread(m, wish / length, toBeat)) {

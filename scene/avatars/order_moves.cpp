@@ -159,7 +159,7 @@ Outcome follow(const Crouch& crouch, Follower& f) {
                                       shortNumber(avatar.standing));
     return Outcome::ended;
   }
-  auto shape = prismShape(avatar.radius, height, avatar.standing);
+  auto shape = prismShape(avatar.radius, height, avatar.standing, f.world.lengths);
   // The lower prism lies inside the higher one: only who grows sweeps over something new.
   const EntityId obstacle = height > avatar.height ? inTheWayOf(f, *shape) : 0;
   if (obstacle != 0) {

@@ -157,12 +157,12 @@ std::vector<Obstacle> obstaclesIn(const WorldState& world, const Box& box, Entit
   return obstacles;
 }
 
-void shapeAvatar(const Spawn& order, Avatar& avatar) {
+void shapeAvatar(const Spawn& order, const Lengths& lengths, Avatar& avatar) {
   const Mat3 turn = turnedTo(headingFromDegrees(order.facing));
   avatar.radius = order.radius;
   avatar.flying = order.flying;
   avatar.height = avatar.standing = order.parts.empty() ? order.height : 0;
-  avatar.shape = prismShape(order.radius, order.height, order.height);
+  avatar.shape = prismShape(order.radius, order.height, order.height, lengths);
   if (!order.parts.empty()) {
     std::vector<AvatarPart> parts;
     for (const std::vector<Vec3>& points : order.parts) {
@@ -182,7 +182,7 @@ void shapeAvatar(const Spawn& order, Avatar& avatar) {
 
 std::optional<std::string> placeAvatar(const WorldState& world, const Spawn& order, Avatar& avatar,
                                        std::string& told, QueryCount& count) {
-  shapeAvatar(order, avatar);
+  shapeAvatar(order, world.lengths, avatar);
   Search search{world, count, 0};
   if (const auto why = tryPlace(search, order.at, avatar)) {
     const std::string room = nearestRoom(search, order.at, avatar);

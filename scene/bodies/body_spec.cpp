@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <set>
 
@@ -36,7 +37,9 @@ Refusal refusalOfLimits(const BodySpec& body) {
   const bool lift = body.kind == BodyKind::lift;
   const std::string field = lift ? "stops" : "limits";
   if (lift && body.stops.size() < 2) return "stops: a lift has two at least";
-  if (!std::is_sorted(body.stops.begin(), body.stops.end())) return "stops must ascend";
+  if (std::adjacent_find(body.stops.begin(), body.stops.end(), std::greater_equal<>()) !=
+      body.stops.end())
+    return "stops must ascend, each once";
   if (!(body.low <= 0 && body.high >= 0))
     return field + ": 0, where it was drawn, must lie between the least and the greatest";
   if (!(body.low < body.high)) return field + ": both are 0: it could not move";
@@ -58,7 +61,7 @@ Refusal refusalOfPath(const BodySpec& body) {
     last = key.time;
     if (auto why = outside("time", key.time, 0, kLongest)) return why;
     if (auto why = outside("offset", key.offset)) return why;
-    if (auto why = outside("turn", key.turn, -kFarthest, kFarthest)) return why;
+    if (auto why = outside("turn (in radians)", key.turn, -kFarthest, kFarthest)) return why;
   }
   const PathKey &first = body.keys.front(), &end = body.keys.back();
   const bool closed = (first.offset - end.offset).cwiseAbs().maxCoeff() <= kSameEnd;

@@ -139,6 +139,18 @@ void readBodies(const JsonPlace& bodies, Model& model) {
   }
 }
 
+/// The objects of `still`, none of which may be in a body of the same sidecar.
+std::set<std::uint32_t> stillObjects(const JsonPlace& place, const Model& model) {
+  const std::vector<std::uint32_t> objects = listOfObjects(place, model);
+  const std::set<std::uint32_t> still(objects.begin(), objects.end());
+  for (const BodySpec& body : model.bodies)
+    for (const std::uint32_t object : body.objects)
+      if (still.contains(object))
+        place.fail("'" + model.objects[object].path + "' is in the body '" + body.name +
+                   "': it is either");
+  return still;
+}
+
 /// What a sidecar may add to.
 struct Extent {
   std::size_t materials, meshes, objects, bodies;
@@ -172,9 +184,7 @@ Sidecar applySidecar(Model& model, std::string_view text, const std::string& sou
   const Extent before = extentOf(model);
   try {
     if (place.has("bodies")) readBodies(place.at("bodies"), model);
-    if (place.has("still"))
-      for (const std::uint32_t object : listOfObjects(place.at("still"), model))
-        sidecar.still.insert(object);
+    if (place.has("still")) sidecar.still = stillObjects(place.at("still"), model);
     if (const auto why = refusalOfBodies(model)) throw SidecarError(source + ": " + *why);
   } catch (...) {
     cutBack(model, before);

@@ -25,6 +25,7 @@
 
 #include "collision/types.hpp"
 #include "scene/checkpoint/checkpoint.hpp"
+#include "scene/lengths.hpp"
 
 namespace enfilade::scene {
 
@@ -61,6 +62,8 @@ class Reader {
  public:
   static constexpr bool kWrites = false;
   explicit Reader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
+
+  Lengths lengths;  ///< of the world that is read, once they are
 
   template <class... T>
   void operator()(T&... values) {

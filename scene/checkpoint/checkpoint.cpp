@@ -243,10 +243,9 @@ World worldFrom(std::shared_ptr<const Scene> scene, std::span<const std::uint8_t
                           hexadecimal(word(kMagic.size() + kWord)) + ", this one " +
                           hexadecimal(scene->hash()));
   Reader content(checked.subspan(kHead));
-  Lengths lengths;
-  content(lengths);
-  if (const auto why = lengthsProblem(lengths)) content.refuse(*why);
-  World world(std::move(scene), lengths);
+  content(content.lengths);
+  if (const auto why = lengthsProblem(content.lengths)) content.refuse(*why);
+  World world(std::move(scene), content.lengths);
   archiveWorld(content, world.state());
   if (content.left() > 0) content.refuse("something follows the world");
   relateObstacles(world.state());

@@ -155,7 +155,7 @@ void shapeAsRead(const Reader& a, Avatar& avatar) {
   if (const auto why = refusalOf(Command{"avatar", order, 0}, {})) a.refuse(*why);
   const double standing = avatar.standing, height = avatar.height, radius = avatar.radius;
   try {
-    shapeAvatar(order, avatar);
+    shapeAvatar(order, a.lengths, avatar);
   } catch (const std::invalid_argument& why) {
     a.refuse(why.what());
   }
@@ -163,7 +163,7 @@ void shapeAsRead(const Reader& a, Avatar& avatar) {
   const bool crouches = !avatar.madeOf && height < standing;
   if (!same || (height != standing && !crouches) || height < (kLowestCrouch - kRounding) * standing)
     a.refuse("an avatar is as high as it cannot be");
-  if (crouches) avatar.shape = prismShape(radius, height, standing);
+  if (crouches) avatar.shape = prismShape(radius, height, standing, a.lengths);
   avatar.height = height;
 }
 

@@ -28,7 +28,7 @@ Snapshot someoneAt(const Vec3& feet) {
   ann.id = 100;
   ann.name = "ann";
   ann.feet = feet;
-  ann.shape = prismShape(0.3, 1.75, 1.75);
+  ann.shape = prismShape(0.3, 1.75, 1.75, Lengths{});
   snapshot.avatars.push_back(ann);
   return snapshot;
 }

@@ -72,6 +72,8 @@ TEST(Sidecar, MistakesAreNamedWithTheirPlace) {
   has(complaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[3,1]})"), "stops");
   has(complaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[0,3,1]})"),
       "s.walk.json.bodies[0]: body 'd': stops must ascend");
+  has(complaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[0,3,3]})"),
+      "stops must ascend, each once");
   has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"],"anchor":[0,0,0],
                     "limits":[10,90]})"),
       "bodies[0]: body 'd': limits: 0, where it was drawn");
@@ -105,6 +107,10 @@ TEST(Sidecar, WhatIsNoSidecarIsSaidSo) {
   EXPECT_THROW(applySidecar(model, "[]", "s"), SidecarError);
   EXPECT_THROW(applySidecar(model, R"({"bodies":[]})", "s"), SidecarError);
   EXPECT_THROW(applySidecar(model, R"({"walk":1,"still":["nothing"]})", "s"), SidecarError);
+  EXPECT_THROW(applySidecar(model, R"({"walk":1,"still":["hall/ch*"],"bodies":[
+                 {"name":"c","kind":"rigid","objects":["hall/chair2"]}]})",
+                            "s"),
+               SidecarError);
 }
 
 TEST(Sidecar, LiesBesideItsModel) {

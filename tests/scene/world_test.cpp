@@ -103,6 +103,50 @@ TEST(World, StepsUpToTheStepHeightAreClimbedAndHigherOnesBlock) {
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
+/// The highest of some ledges that somebody walks up.
+double highestClimbed(const Lengths& lengths, const std::vector<double>& ledges) {
+  constexpr double kApart = 2;
+  std::vector<NamedBox> boxes{{"ground", {-1, -1, -1}, {4, 0, 20}}};
+  double z = 0;
+  for (const double height : ledges) {
+    boxes.push_back({"ledge" + std::to_string(height), {1, 0, z - 0.95}, {3, height, z + 0.95}});
+    z += kApart;
+  }
+  Trial run(boxes, lengths);
+  z = 0;
+  for (const double height : ledges) {
+    run.order("of" + std::to_string(height), Spawn{{0, 0, z}});
+    run.order("of" + std::to_string(height), Walk{{{2, height, z}}, 1.5});
+    z += kApart;
+  }
+  run.untilIdle();
+  EXPECT_EQ(run.worstPenetration, 0);
+  double highest = 0;
+  for (const double height : ledges) {
+    const double feet = run.feet("of" + std::to_string(height)).y();
+    if (feet < 0.5 * height) continue;
+    EXPECT_NEAR(feet, height, 2 * lengths.epsilon);
+    highest = std::max(highest, height);
+  }
+  return highest;
+}
+
+TEST(World, NoLedgeHigherThanAStepIsClimbed) {
+  EXPECT_EQ(highestClimbed({}, {0.05, 0.25, 0.295, 0.3, 0.305, 0.33, 0.35}), 0.3);
+  Lengths low;
+  low.stepHeight = 0.1;
+  EXPECT_EQ(highestClimbed(low, {0.01, 0.06, 0.095, 0.1, 0.105, 0.13, 0.15}), 0.1);
+}
+
+TEST(World, StepsAreClimbedWhateverSlopeIs) {
+  for (const double degrees : {1.0, 5.0, 20.0, 33.0, 34.0}) {
+    Lengths lengths;
+    lengths.walkableNormalY = std::cos(degrees * 0.017453292519943295);
+    EXPECT_EQ(highestClimbed(lengths, {0.01, 0.05, 0.17, 0.25, 0.295, 0.305, 0.33}), 0.295)
+        << degrees;
+  }
+}
+
 TEST(World, ASkirtingBoardIsNoStep) {
   Trial run(
       {floorBox(), {"skirting", {1.98, 0, -3}, {2, 0.1, 3}}, {"wall", {2, 0, -3}, {2.2, 3, 3}}});
