@@ -2,6 +2,7 @@
 // convex piece decides. A contact is d < 2 epsilon (seed 5.1.1). Begin and end are differences to
 // the last tick.
 #include <algorithm>
+#include <iterator>
 #include <limits>
 
 #include "collision/penetration_depth.hpp"
@@ -112,20 +113,49 @@ Contact stopped(EntityId by, const Decision& decision) {
   return contact;
 }
 
-/// Who stopped the avatar in this tick touched it, even if it has given way since.
-void addWhatGaveWay(const WorldState& world, const Avatar& avatar, std::vector<Contact>& now) {
-  if (!world.bodyOfId.contains(avatar.stoppedBy)) return;
-  const auto at = std::lower_bound(now.begin(), now.end(), avatar.stoppedBy,
-                                   [](const Contact& c, EntityId id) { return c.other < id; });
-  const bool listed = at != now.end() && at->other == avatar.stoppedBy;
+/// A contact with a body that the avatar touched in this tick and is apart from again; nothing
+/// where it still touches it.
+void addTouched(EntityId body, const std::function<std::optional<Decision>()>& touch,
+                std::vector<Contact>& now) {
+  const auto at = std::ranges::lower_bound(now, body, {}, &Contact::other);
+  const bool listed = at != now.end() && at->other == body;
   if (listed && at->touching) return;
-  Contact contact = stopped(avatar.stoppedBy, avatar.atStop);
+  const std::optional<Decision> decision = touch();
+  if (!decision) return;
+  Contact contact = stopped(body, *decision);
   contact.touching = true;
   if (listed) {
     *at = contact;
   } else {
     now.insert(at, contact);
   }
+}
+
+/// How the avatar and a body touch that are brought together the shortest way.
+std::optional<Decision> touchWith(const WorldState& world, Avatar& avatar, EntityId body,
+                                  QueryCount& count) {
+  const std::optional<Decision> apart = decisionWith(avatar, body, count);
+  if (!apart) return std::nullopt;
+  std::vector<Obstacle> parts;
+  std::ranges::copy_if(avatar.obstacles, std::back_inserter(parts),
+                       [&](const Obstacle& obstacle) { return obstacle.entity == body; });
+  const Stop stop = sweepShape(*avatar.shape, avatar.feet, apart->distance * apart->normal, parts,
+                               bandOf(world.lengths), count);
+  return stop.entity == body ? std::optional(stop.atStop) : std::nullopt;
+}
+
+/// Who stopped the avatar in this tick touched it, even if it has given way since; so did free
+/// bodies that it pushed before it, and those that came and bounced.
+void addWhatGaveWay(const WorldState& world, Avatar& avatar, std::vector<Contact>& now,
+                    QueryCount& count) {
+  if (world.bodyOfId.contains(avatar.stoppedBy))
+    addTouched(
+        avatar.stoppedBy, [&] { return avatar.atStop; }, now);
+  const auto& met = world.rigids.metByAvatars;
+  for (auto at = std::ranges::lower_bound(met, EntityPair(avatar.id, 0));
+       at != met.end() && at->first == avatar.id; ++at)
+    addTouched(
+        at->second, [&] { return touchWith(world, avatar, at->second, count); }, now);
 }
 
 void updateContacts(WorldState& world, Avatar& avatar, TickReport& report, QueryCount& count) {
@@ -135,7 +165,7 @@ void updateContacts(WorldState& world, Avatar& avatar, TickReport& report, Query
   std::erase_if(now, [&](const Contact& c) {
     return c.other >= world.firstAvatarId() && c.other < avatar.id;
   });
-  addWhatGaveWay(world, avatar, now);
+  addWhatGaveWay(world, avatar, now, count);
   tellBegins(world, avatar, now, report.contacts);
   tellEnds(world, avatar, now, report.contacts, count);
   avatar.contacts = std::move(now);

@@ -48,8 +48,7 @@ std::vector<collision::MoverId> changedMovers(const collision::SortAndSweep& bro
 void updateBroadPhase(WorldState& world, const Wish& wish) {
   for (auto& [name, avatar] : world.avatars) {
     avatar.reach = reachOf(world, avatar, wishOf(wish, name));
-    if (!world.goingBodies.empty())
-      avatar.reach = grown(avatar.reach, pushRoom(world, avatar.reach));
+    if (!world.goingBodies.empty()) avatar.reach = grown(avatar.reach, pushRoom(world, avatar));
     world.broadPhase.move(avatar.mover, avatar.reach);
   }
   world.broadPhase.update();

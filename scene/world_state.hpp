@@ -53,6 +53,8 @@ struct Avatar {
   Vec3 asked = Vec3::Zero();  ///< metres
   bool resting = false;       ///< stands, wants nothing, and nobody is near: nothing to work out
   bool stirred = false;       ///< its shape or place was changed since: it does not rest this tick
+  double liftedBy = 0;        ///< metres, in this tick, before the free body that it stands on; 0
+                              ///< between ticks
   EntityId stoppedBy = 0;
   bool pairsChanged =
       true;  ///< the broad phase gave it or took from it a partner since it gathered
@@ -149,8 +151,8 @@ void followBodyCommands(WorldState& world);
 void planBodies(WorldState& world);
 /// For the snapshot: as Model::bodies; what the last one had when no body moved.
 std::shared_ptr<const std::vector<BodyView>> viewsOfBodies(const WorldState& world);
-/// How much farther an avatar with this reach may be pushed or carried in this tick, metres.
-double pushRoom(const WorldState& world, const Box& reach);
+/// How much farther the avatar may be pushed or carried in this tick than its reach, metres.
+double pushRoom(const WorldState& world, const Avatar& avatar);
 /// Moves them as far as what is in the way yields; riders are carried.
 void moveBodies(WorldState& world, TickReport& report, QueryCount& count);
 /// A kinematic body is still on its way, and not blocked.

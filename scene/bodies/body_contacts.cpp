@@ -2,11 +2,13 @@
 // another, and driven ones among themselves and with still objects (driven_contacts.cpp). (What
 // avatars touch, avatars tell.) Of free ones the solver's pairs are asked, and of those only the
 // ones that are not proved to be farther apart, of bodies that moved: a contact of two that stand
-// lasts.
+// lasts. What met in the solver and is apart after the tick, as what bounced, begins and ends in
+// it.
 #include <algorithm>
 
 #include "collision/penetration_depth.hpp"
 #include "collision/refine.hpp"
+#include "collision/time_of_impact.hpp"
 #include "scene/world_state.hpp"
 
 namespace enfilade::scene {
@@ -61,9 +63,25 @@ double depthOf(const Solid& a, const Solid& b, const NearPair& pair, const Decis
 struct PartContact {
   Key key;
   std::optional<Decision> decision;  ///< nullopt: they are far apart, and were
+  std::optional<Decision> touch;     ///< of parts that met in this tick and do not touch any more
   bool touching = false;
   double depth = 0;
 };
+
+/// How two parts touch that are brought together the shortest way, as they are turned now.
+std::optional<Decision> touchOf(const collision::ConvexBody& a, const collision::ConvexBody& b,
+                                const Decision& apart, const Lengths& lengths) {
+  collision::FeatureCache cache;
+  const collision::SweepResult met =
+      collision::sweep(a, apart.distance * apart.normal, b, bandOf(lengths), cache);
+  return met.stopped ? std::optional(met.atStop) : std::nullopt;
+}
+
+void swapSides(std::optional<Decision>& decision) {
+  if (!decision) return;
+  std::swap(decision->pointA, decision->pointB);
+  decision->normal = -decision->normal;
+}
 
 /// Indices of the pairs of which one moved and that may be nearer than the limit, or were in the
 /// last tick.
@@ -75,7 +93,8 @@ std::vector<std::uint32_t> pairsToAsk(const WorldState& world, const Nearness& n
     for (std::size_t i = from; i < to; ++i) {
       const Standing &a = standings[pairs[i].key.a], &b = standings[pairs[i].key.b];
       if (a.isAvatar || b.isAvatar || !(a.hasMoved || b.hasMoved)) continue;
-      isAsked[i] = pairs[i].told || apartNow(pairs[i], a.jumped + b.jumped) <= nearness.limit;
+      isAsked[i] = pairs[i].told || pairs[i].met ||
+                   apartNow(pairs[i], a.jumped + b.jumped) <= nearness.limit;
     }
   });
   std::vector<std::uint32_t> asked;
@@ -84,9 +103,11 @@ std::vector<std::uint32_t> pairsToAsk(const WorldState& world, const Nearness& n
   return asked;
 }
 
-PartContact ask(NearPair& pair, const Solid& a, const Solid& b, const Nearness& nearness) {
+PartContact ask(NearPair& pair, const Solid& a, const Solid& b, const Nearness& nearness,
+                const Lengths& lengths) {
   PartContact found;
-  const double within = pair.told ? std::numeric_limits<double>::infinity() : nearness.limit;
+  const bool inAnyCase = pair.told || pair.met;
+  const double within = inAnyCase ? std::numeric_limits<double>::infinity() : nearness.limit;
   const collision::ConvexBody partA = partOf(a, pair.key.partA), partB = partOf(b, pair.key.partB);
   pair.told = false;
   collision::FeatureCache features = pair.features();
@@ -97,6 +118,7 @@ PartContact ask(NearPair& pair, const Solid& a, const Solid& b, const Nearness& 
   found.touching =
       collision::isNearerThan(*found.decision, partA, partB, nearness.contact, features);
   pair.told = found.touching || found.decision->distance < nearness.limit;
+  if (pair.met && !found.touching) found.touch = touchOf(partA, partB, *found.decision, lengths);
   return found;
 }
 
@@ -112,14 +134,13 @@ std::vector<PartContact> nearParts(WorldState& world, const Nearness& nearness, 
     for (std::size_t i = from; i < to; ++i) {
       NearPair& pair = stage.dynamics.pairs[asked[i]];
       const Standing &a = standings[pair.key.a], &b = standings[pair.key.b];
-      found[i] =
-          ask(pair, stage.dynamics.solids[pair.key.a], stage.dynamics.solids[pair.key.b], nearness);
+      found[i] = ask(pair, stage.dynamics.solids[pair.key.a], stage.dynamics.solids[pair.key.b],
+                     nearness, world.lengths);
       found[i].key = {a.entity, b.entity};
       if (a.tellsBefore(b)) continue;
       std::swap(found[i].key.first, found[i].key.second);
-      if (!found[i].decision) continue;
-      std::swap(found[i].decision->pointA, found[i].decision->pointB);
-      found[i].decision->normal = -found[i].decision->normal;
+      swapSides(found[i].decision);
+      swapSides(found[i].touch);
     }
   });
   count.narrow += static_cast<std::uint32_t>(asked.size());
@@ -148,19 +169,47 @@ BodyContacts together(const std::vector<PartContact>& parts, QueryCount& count) 
   return contacts;
 }
 
+/// Who met on their way and does not touch after it: the first of their parts that did.
+BodyContacts metOnTheWay(const std::vector<PartContact>& parts, const BodyContacts& now) {
+  BodyContacts met;
+  for (const PartContact& found : parts) {
+    if (!found.touch) continue;
+    const auto at = std::ranges::lower_bound(now, found.key, {}, &BodyContacts::value_type::first);
+    if (at != now.end() && at->first == found.key && at->second.touching) continue;
+    Contact contact;
+    contact.other = found.key.second;
+    contact.decision = *found.touch;
+    contact.touching = true;
+    met.emplace_back(found.key, contact);
+  }
+  std::ranges::stable_sort(met, {}, &BodyContacts::value_type::first);
+  const auto rest = std::ranges::unique(met, {}, &BodyContacts::value_type::first);
+  met.erase(rest.begin(), rest.end());
+  return met;
+}
+
+/// Adds contacts of other pairs.
+void merge(const BodyContacts& more, BodyContacts& contacts) {
+  const auto middle = static_cast<std::ptrdiff_t>(contacts.size());
+  contacts.insert(contacts.end(), more.begin(), more.end());
+  std::ranges::inplace_merge(contacts, contacts.begin() + middle, {},
+                             &BodyContacts::value_type::first);
+}
+
 /// They begin here, and end as all that is not so any more.
 void tellOnTheWay(WorldState& world, BodyContacts& touched, std::vector<ContactEvent>& events) {
+  BodyContacts begun;
   for (auto& [key, contact] : touched) {
     const Contact* before = contactOf(world, key);
     tellBegin(world, key.first, before, contact, events);
-    if (before) tellEnd(world, key.first, *before, &contact, {}, events);
-    const auto at = placeOf(world.bodyContacts, key);
     if (before) {
-      at->second = contact;
+      tellEnd(world, key.first, *before, &contact, {}, events);
+      placeOf(world.bodyContacts, key)->second = contact;
     } else {
-      world.bodyContacts.insert(at, {key, contact});
+      begun.emplace_back(key, contact);
     }
   }
+  if (!begun.empty()) merge(begun, world.bodyContacts);
 }
 
 /// Tells what began and ended, and leaves in the world what lasts. `now`: also those that were near
@@ -209,14 +258,15 @@ const Contact* contactOf(const WorldState& world, const EntityPair& pair) {
 
 void findBodyContacts(WorldState& world, TickReport& report, QueryCount& count) {
   const Nearness nearness = nearnessOf(world.lengths);
-  BodyContacts now;
-  if (!world.rigids.seeds.empty()) now = together(nearParts(world, nearness, count), count);
-  DrivenContacts driven = drivenContacts(world, nearness, count);
-  if (!driven.now.empty()) {
-    const auto free = static_cast<std::ptrdiff_t>(now.size());
-    now.insert(now.end(), driven.now.begin(), driven.now.end());
-    std::ranges::inplace_merge(now, now.begin() + free, {}, &BodyContacts::value_type::first);
+  BodyContacts now, met;
+  if (!world.rigids.seeds.empty()) {
+    const std::vector<PartContact> parts = nearParts(world, nearness, count);
+    now = together(parts, count);
+    met = metOnTheWay(parts, now);
   }
+  DrivenContacts driven = drivenContacts(world, nearness, count);
+  if (!driven.now.empty()) merge(driven.now, now);
+  tellOnTheWay(world, met, report.contacts);
   tellOnTheWay(world, driven.onTheWay, report.contacts);
   takeOver(world, now, nearness, report.contacts);
   for (const auto& [key, contact] : world.bodyContacts) {

@@ -240,13 +240,13 @@ void planBodies(WorldState& world) {
   }
 }
 
-double pushRoom(const WorldState& world, const Box& reach) {
+double pushRoom(const WorldState& world, const Avatar& avatar) {
   std::vector<std::uint32_t> rest = world.goingBodies;
   double room = 0;
   // What one pushes may come into the way of another: at most as many rounds as bodies.
   for (bool more = !rest.empty(); more;) {
     more = false;
-    const Box within = grown(reach, room);
+    const Box within = grown(avatar.reach, room);
     std::erase_if(rest, [&](std::uint32_t i) {
       const Body& body = world.bodies[i];
       if (!overlaps(within, body.reach)) return false;
@@ -254,6 +254,10 @@ double pushRoom(const WorldState& world, const Box& reach) {
       return more = true;
     });
   }
+  const auto ground = world.bodyOfId.find(avatar.standsOn);
+  if (ground == world.bodyOfId.end() || !world.bodies[ground->second].driven) return room;
+  for (const std::uint32_t i : rest)  // one of these may carry what it stands on
+    room += world.bodies[i].plan.farthest + 4 * world.lengths.epsilon;
   return room;
 }
 

@@ -2,7 +2,8 @@
 // the avatars where these stand now. (Free bodies give way in the solver, or are pushed there;
 // driven ones are not asked for by one another.)
 //  0. Of a path each stretch between two of its places is gone by itself, straight and evenly.
-//  1. Riders that the body would lift go first; what it leaves behind follows it afterwards.
+//  1. Riders that the body would lift go first, also those that stand on a free body upon it; what
+//     it leaves behind follows it afterwards.
 //  2. The body goes until it comes near something. That is pushed along the normal by as much as
 //     the body still needs, by a sweep of its own, so that a push crosses nothing.
 //  3. Where that gains nothing, the body stops and says so; it tries again in the next tick.
@@ -10,6 +11,8 @@
 // frames as drawn.
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <set>
 
 #include "collision/contact_manifold.hpp"
 #include "scene/bodies/body_sweep.hpp"
@@ -102,7 +105,9 @@ std::vector<Avatar*> avatarsNear(WorldState& world, const Body& body) {
 
 struct Rider {
   Avatar* avatar;
-  Vec3 contact;  ///< on the body, in its frame
+  Vec3 contact;       ///< on the body, in its frame
+  bool onFree;        ///< stands on a free body that the body carries
+  double height = 0;  ///< of the contact in the beginning
 };
 
 /// Where the avatar leans on the body, as near to its feet as that comes: carried by that point,
@@ -129,18 +134,55 @@ Vec3 leaningPoint(const WorldState& world, const Body& body, const Avatar& avata
   return avatar.feet.cwiseMax(patch.min).cwiseMin(patch.max);
 }
 
-/// Who stands on the body.
-std::vector<Rider> ridersOf(const WorldState& world, const Body& body,
-                            const std::vector<Avatar*>& near) {
+/// The free bodies that the body carries: those that rest on it, or on such a one.
+std::set<EntityId> carriedBy(const WorldState& world, const Body& body) {
+  std::set<EntityId> carried{body.id};
+  for (std::size_t before = 0; before < carried.size();) {
+    before = carried.size();
+    for (const auto& [pair, contact] : world.bodyContacts) {
+      const double upwards = contact.decision.normal.y();  // from the first to the second
+      if (!contact.touching || std::abs(upwards) < world.lengths.walkableNormalY) continue;
+      const EntityId below = upwards > 0 ? pair.first : pair.second;
+      const EntityId above = upwards > 0 ? pair.second : pair.first;
+      const auto found = world.bodyOfId.find(above);
+      if (found == world.bodyOfId.end()) continue;
+      const bool isFree = world.bodies[found->second].spec->kind == BodyKind::rigid;
+      if (isFree && carried.contains(below)) carried.insert(above);
+    }
+  }
+  return carried;
+}
+
+/// Who stands on a free body that the body may carry or push.
+std::vector<Avatar*> avatarsOnFree(WorldState& world) {
+  std::vector<Avatar*> avatars;
+  for (auto& [name, avatar] : world.avatars) {
+    const auto ground = world.bodyOfId.find(avatar.standsOn);
+    if (ground != world.bodyOfId.end() && world.bodies[ground->second].driven)
+      avatars.push_back(&avatar);
+  }
+  return avatars;
+}
+
+/// Who stands on the body, and on what it carries.
+std::vector<Rider> ridersOf(WorldState& world, const Body& body, const std::vector<Avatar*>& near) {
   std::vector<Rider> riders;
   for (Avatar* avatar : near) {
     if (!avatar->grounded) continue;
     for (const Contact& contact : avatar->contacts) {
       const bool below = -contact.decision.normal.y() >= world.lengths.walkableNormalY;
       if (contact.other == body.id && contact.touching && below)
-        riders.push_back({avatar, inBody(body, leaningPoint(world, body, *avatar, contact))});
+        riders.push_back(
+            {avatar, inBody(body, leaningPoint(world, body, *avatar, contact)), false});
     }
   }
+  const std::vector<Avatar*> onFree = avatarsOnFree(world);
+  if (onFree.empty()) return riders;
+  const std::set<EntityId> carried = carriedBy(world, body);
+  for (Avatar* avatar : onFree)
+    if (carried.contains(avatar->standsOn) &&
+        std::ranges::find(riders, avatar, &Rider::avatar) == riders.end())
+      riders.push_back({avatar, inBody(body, avatar->feet), true, avatar->feet.y()});
   return riders;
 }
 
@@ -199,17 +241,47 @@ double advance(WorldState& world, Body& body, const BodyPlace& to, const std::ve
   return 1 - left;
 }
 
-/// The same, and who stands on the body goes along.
+/// How the avatar and the body stand to one another.
+collision::Decision decisionOf(const Body& body, const Avatar& avatar) {
+  collision::Decision nearest;
+  nearest.distance = std::numeric_limits<double>::infinity();
+  for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part) {
+    for (const AvatarPart& limb : avatar.shape->parts) {
+      collision::FeatureCache cache;
+      const collision::Decision found =
+          collision::decide(partOf(body, part), bodyAt(limb, avatar.feet), cache);
+      if (nearer(found, nearest)) nearest = found;
+    }
+  }
+  return nearest;
+}
+
+/// The same, and who stands on the body goes along. Who stands on what it carries and cannot be
+/// lifted stops it.
 double advanceWithRiders(WorldState& world, Body& body, const BodyPlace& to,
                          const std::vector<Avatar*>& near, const std::vector<Rider>& riders,
                          TickReport& report, QueryCount& count) {
   std::vector<Vec3> before;
+  double part = 1;
+  Encounter held;
   for (const Rider& rider : riders) {
     before.push_back(body.rotation * rider.contact + body.position);
     const Vec3 way = carried(body, to, before.back()) - before.back();
-    if (way.y() > 0) shove(world, *rider.avatar, way, count);
+    if (!(way.y() > 0)) continue;
+    const double low = rider.avatar->feet.y();
+    shove(world, *rider.avatar, way, count);
+    const double risen = rider.avatar->feet.y() - low;
+    if (!rider.onFree || risen >= way.y() - kYield * world.lengths.epsilon) continue;
+    part = std::min(part, std::max(0.0, risen / way.y()));
+    held.avatar = rider.avatar;
   }
-  const double made = advance(world, body, to, near, report, count);
+  const BodyPlace target = part < 1 ? placeBetween(body.drive.place, to, part) : to;
+  double made = advance(world, body, target, near, report, count);
+  if (held.avatar && made == 1) {
+    held.sweep.atStop = decisionOf(body, *held.avatar);
+    tellBlocked(world, body, held, report);
+  }
+  made *= part;
   for (std::size_t i = 0; i < riders.size(); ++i) {
     const Vec3 way = body.rotation * riders[i].contact + body.position - before[i];
     if (way.y() <= 0) shove(world, *riders[i].avatar, way, count);
@@ -223,16 +295,23 @@ double followPlan(WorldState& world, Body& body, TickReport& report, QueryCount&
   const std::vector<Avatar*> near = avatarsNear(world, body);
   const std::vector<Rider> riders = ridersOf(world, body, near);
   BodyPlan& plan = body.plan;
-  for (std::size_t i = 0; i < plan.stretches; ++i) {
+  double part = 1;
+  for (std::size_t i = 0; i < plan.stretches && part == 1; ++i) {
     const double made =
         advanceWithRiders(world, body, plan.places[i + 1], near, riders, report, count);
     if (made == 1) continue;
     std::fill(plan.places.begin() + static_cast<std::ptrdiff_t>(i) + 1, plan.places.end(),
               body.drive.place);
-    return (static_cast<double>(i) + made) / static_cast<double>(plan.stretches);
+    part = (static_cast<double>(i) + made) / static_cast<double>(plan.stretches);
   }
-  body.blockedBy = 0;
-  return 1;
+  for (const Rider& rider : riders) {
+    if (!rider.onFree) continue;
+    const double risen = (body.rotation * rider.contact + body.position).y() - rider.height;
+    rider.avatar->liftedBy =
+        std::clamp(risen, 0.0, std::max(0.0, rider.avatar->feet.y() - rider.height));
+  }
+  if (part == 1) body.blockedBy = 0;
+  return part;
 }
 
 void arrive(Body& body, double made, double tick) {

@@ -112,7 +112,7 @@ void archiveSolid(A& a, Held<A, WorldState>& world, EntityId entity, std::uint32
 template <class A>
 void archiveRigids(A& a, Held<A, WorldState>& world) {
   auto& [dynamics, bodies, solidOfEntity, entities, vacant, bodyOf, solidOf, bodyAt, workers,
-         workersAsked, threads, seeds, last] = world.rigids;
+         workersAsked, threads, seeds, last, metByAvatars] = world.rigids;
   auto& [solids, joints, pairs] = dynamics;
   if (!joints.empty()) throw std::logic_error("a world has joints, which no checkpoint tells");
   a(solidOfEntity, vacant);

@@ -285,8 +285,8 @@ struct Layout<Avatar> {
   static void archive(A& a, Held<A, Avatar>& avatar) {
     auto& [id, shape, madeOf, feet, gaze, eyeHeight, fallSpeed, grounded, standsOn, flying, jumping,
            standing, height, radius, base, chain, drive, walk, waitLeft, hangsFor, lastMove, asked,
-           resting, stirred, stoppedBy, pairsChanged, atStop, blockedTold, mover, reach, gathered,
-           obstacles, meetsBodies, contacts] = avatar;
+           resting, stirred, liftedBy, stoppedBy, pairsChanged, atStop, blockedTold, mover, reach,
+           gathered, obstacles, meetsBodies, contacts] = avatar;
     a(madeOf, standing, height, radius);
     if constexpr (!A::kWrites) shapeAsRead(a, avatar);  // `shape`, `base`
     a(chain);
@@ -364,7 +364,7 @@ struct Layout<ContactPatch> {
   template <class A>
   static void archive(A& a, Held<A, ContactPatch>& patch) {
     auto& [first, second, normal, friction, restitution, points, size, rub, twist, pushSpeed,
-           mostPush] = patch;
+           mostPush, pushed] = patch;
     a(normal, friction, restitution, size, rub, twist, pushSpeed, mostPush);
     if constexpr (!A::kWrites)
       if (size > points.size()) a.refuse("a patch of " + std::to_string(size) + " points");
@@ -384,7 +384,7 @@ template <>
 struct Layout<NearPair> {
   template <class A>
   static void archive(A& a, Held<A, NearPair>& pair) {
-    auto& [key, apart, since, axis, verdict, close, hasPatch, told] = pair;
+    auto& [key, apart, since, axis, verdict, close, hasPatch, told, met] = pair;
     a(key, apart, since, axis, verdict, close, hasPatch, told);
     if constexpr (!A::kWrites)
       if (!close && (hasPatch || verdict == collision::Verdict::penetrating))

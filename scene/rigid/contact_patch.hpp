@@ -31,6 +31,7 @@ struct ContactPatch {
   /// Who walks against a body pushes it: besides holding firm, the patch gives its points up to
   /// `mostPush` newtons in all, until they part at `pushSpeed` m/s. 0: no push.
   double pushSpeed = 0, mostPush = 0;
+  bool pushed = false;  ///< a point gave an impulse in the last step: they met in it
 
   std::span<const PatchPoint> list() const { return {points.data(), size}; }
 };

@@ -270,7 +270,9 @@ void keepImpulses(Dynamics& dynamics, const StepWork& work) {
   const ContactPatch nothing;
   work.workers->share(work.patches.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t k = from; k < to; ++k) {
-      ContactPatch& patch = *dynamics.pairs[work.patched[k]].patch();
+      NearPair& pair = dynamics.pairs[work.patched[k]];
+      pair.met = work.patches[k].pushed;
+      ContactPatch& patch = *pair.patch();
       const ContactPatch& solved = isKept(work.patches[k]) ? work.patches[k] : nothing;
       for (std::size_t i = 0; i < patch.size; ++i) {
         patch.points[i].impulse = solved.points[i].impulse;
@@ -383,6 +385,7 @@ void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates, Worke
       } else {
         pairs[i].key = candidates[i];
       }
+      pairs[i].met = false;
     }
   });
   std::swap(dynamics.pairs, pairs);

@@ -398,6 +398,19 @@ void takeOver(Body& body, const Solid& solid) {
   body.asleep = solid.asleep;
 }
 
+std::vector<std::pair<EntityId, EntityId>> meetingsOfAvatars(const WorldState& world) {
+  std::vector<std::pair<EntityId, EntityId>> met;
+  if (world.avatars.empty()) return met;
+  const RigidStage& stage = world.rigids;
+  for (const NearPair& pair : stage.dynamics.pairs)  // a free one is before an avatar
+    if (pair.met && stage.entities[pair.key.b] >= world.firstAvatarId())
+      met.emplace_back(stage.entities[pair.key.b], stage.entities[pair.key.a]);
+  std::ranges::sort(met);
+  const auto rest = std::ranges::unique(met);
+  met.erase(rest.begin(), rest.end());
+  return met;
+}
+
 bool hasLeft(const WorldState& world, const Body& body) {
   const Box& bounds = world.scene->bounds();
   const Box within{bounds.min - Vec3(kBesideScene, kBelowScene, kBesideScene),
@@ -541,6 +554,7 @@ void setThreads(World& world, int threads) {
 
 void moveRigids(WorldState& world, const Wish& wish, TickReport& report, QueryCount& count) {
   RigidStage& stage = world.rigids;
+  stage.metByAvatars.clear();
   if (stage.bodies.empty()) return;
   for (const auto& [name, avatar] : world.avatars)
     if (!avatar.lastMove.isZero(0) || avatar.chain.speed > 0) wakeLeaning(world, avatar);
@@ -553,6 +567,7 @@ void moveRigids(WorldState& world, const Wish& wish, TickReport& report, QueryCo
   settings.workers = workers;
   stage.last = step(stage.dynamics, settings);
   settleDriven(world);
+  stage.metByAvatars = meetingsOfAvatars(world);
   count.narrow += stage.last.looks + stage.last.proofs;
   report.squeezedBodies = stage.last.squeezed;
   shareAmong(workers, stage.seeds.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {

@@ -32,6 +32,8 @@ struct RigidStage {
   int threads = 0;                     ///< that may be used; 0: kThreads, or the processors
   std::vector<std::uint32_t> seeds;    ///< bodies whose surroundings matter in this tick, ascending
   DynamicsReport last;                 ///< of the last tick in which a body was awake
+  /// Avatars, and free bodies that met them in this tick, be they apart again; ascending.
+  std::vector<std::pair<EntityId, EntityId>> metByAvatars;
 };
 
 }  // namespace enfilade::scene

@@ -273,6 +273,7 @@ void goOn(System& system, std::span<RigidBody> bodies, Workers& workers) {
               point.normal.speed(block.normal, m) + point.normal.speed(block.normal, parting);
           point.separation = point.separation + everywhere(system.seconds) * speed;
           point.sum = point.sum + point.impulse;
+          point.most = greater(point.most, point.impulse + point.push);
         }
       });
 }
@@ -339,8 +340,10 @@ void bounce(System& system, const SolverStep& step) {
 
 void keepLane(const System& system, const PatchBlock& block, std::size_t lane,
               ContactPatch& patch) {
+  patch.pushed = false;
   for (std::uint32_t i = 0; i < patch.size; ++i) {
     const PointBlock& point = system.points[block.firstPoint + i];
+    patch.pushed = patch.pushed || point.most[lane] > 0;
     patch.points[i].separation = point.separation[lane];
     patch.points[i].impulse = point.impulse[lane];
     patch.points[i].push = point.push[lane];

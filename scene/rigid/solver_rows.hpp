@@ -105,6 +105,7 @@ struct PointBlock {
   Lanes impulse, push;
   Lanes parting;  ///< impulse of step 4
   Lanes sum;      ///< of the impulses of all substeps of this step
+  Lanes most;     ///< of impulse and push in a substep of this step
 };
 
 /// Friction at the middle of a patch.

@@ -122,7 +122,45 @@ TEST(RigidBodies, AnAvatarPushesALightBoxAlongAndNotAHeavyOne) {
       EXPECT_GT(moved, 1.5);
       EXPECT_LT(moved, 3);
     }
+    EXPECT_EQ(t.told(Event::begin, "ann", "box"), 1) << heavy;
+    EXPECT_EQ(t.told(Event::end, "ann", "box"), 0) << "it is pushed all the time; " << heavy;
   }
+}
+
+TEST(RigidBodies, WhatBouncesIsToldWhereverItDoes) {
+  std::vector<NamedBox> boxes{{"onto ann", {-0.15, 4, -0.15}, {0.15, 4.3, 0.15}}};
+  for (int i = 1; i < 6; ++i)
+    boxes.push_back(
+        {"b" + std::to_string(i), {2.0 * i, 0.7 * i, 0}, {2.0 * i + 0.3, 0.7 * i + 0.3, 0.3}});
+  Model model = loose(boxes);
+  for (BodySpec& body : model.bodies) body.restitution = 0.9, body.friction = 0;
+  BodyTrial t(std::move(model));
+  t.order("ann", Spawn{.at = {0, 0.001, 0}});
+  std::map<std::string, double> speeds;
+  std::map<std::string, int> open;  // contacts
+  int bounces = 0;
+  for (int i = 0; i < 300; ++i) {
+    const TickReport report = t.step();
+    std::set<std::string> touched;
+    for (const auto& [name, contacts] : open)
+      if (contacts > 0) touched.insert(name);
+    for (const ContactEvent& event : report.contacts) {
+      const bool begins = event.kind == Event::begin;
+      if (!begins && event.kind != Event::end) continue;
+      for (const EntityId id : {event.a, event.b}) {
+        open[nameOf(t.world, id)] += begins ? 1 : -1;
+        if (begins) touched.insert(nameOf(t.world, id));
+      }
+    }
+    for (const NamedBox& box : boxes) {
+      const double speed = t.body(box.path).velocity.y();
+      const bool bounced = std::exchange(speeds[box.path], speed) < -0.5 && speed > 0.5;
+      if (!bounced) continue;
+      ++bounces;
+      EXPECT_TRUE(touched.contains(box.path)) << box.path << " in tick " << i;
+    }
+  }
+  EXPECT_GT(bounces, 10);
 }
 
 TEST(RigidBodies, ASleepingBoxIsWokenByADoorOfAnySpeedThatPushesIt) {
@@ -238,6 +276,59 @@ TEST(RigidBodies, AStackThatSleepsOnALiftIsLiftedAsOne) {
     for (int i = 0; i < boxes; ++i)
       EXPECT_NEAR(t.body("b" + std::to_string(i)).position.y(), 2.35 + 0.5 * i, 0.01) << boxes;
   }
+}
+
+/// Somebody on a stack of crates on a lift that goes up by two metres.
+BodyTrial onCratesOnALift(int crates, const std::vector<NamedBox>& still = {}) {
+  std::vector<NamedBox> stack;
+  for (int i = 0; i < crates; ++i) {
+    const double low = 0.101 + 0.501 * i;
+    stack.push_back({"b" + std::to_string(i), {-0.5, low, -0.5}, {0.5, low + 0.5, 0.5}});
+  }
+  std::vector<NamedBox> others{{"lift", {-1, 0, -1}, {1, 0.1, 1}}};
+  others.insert(others.end(), still.begin(), still.end());
+  Model model = loose(stack, others);
+  BodySpec lift = bodySpec("lift", BodyKind::lift, {1});
+  lift.stops = {0, 2}, lift.high = 2, lift.speed = 1.5;
+  model.bodies.push_back(lift);
+  BodyTrial t(std::move(model));
+  t.order("ann", Spawn{.at = {0, 0.102 + 0.501 * crates, 0}});
+  t.ticks(200);
+  t.tell({"lift", BodyCommand::Action::to, 2, 0, {}});
+  return t;
+}
+
+TEST(RigidBodies, WhoStandsOnCratesOnALiftIsLiftedWithThem) {
+  for (const int crates : {1, 3}) {
+    BodyTrial t = onCratesOnALift(crates);
+    const double above = t.feet("ann").y() - t.body("b0").position.y();
+    for (int i = 0; i < 240; ++i) {
+      t.step();
+      ASSERT_EQ(whoPenetrates(t.world), "") << crates << " in tick " << i;
+      ASSERT_FALSE(anyBodyPenetrates(t.world)) << crates << " in tick " << i;
+      ASSERT_NEAR(t.feet("ann").y() - t.body("b0").position.y(), above, 0.01) << i;
+    }
+    EXPECT_NEAR(t.body("lift").position.y(), 2, 0.1);
+    EXPECT_NEAR(t.body("b0").position.y(), 2.35, 0.01) << crates;
+    t.tell({"lift", BodyCommand::Action::to, 0, 0, {}});
+    t.ticks(240);
+    EXPECT_NEAR(t.body("b0").position.y(), 0.35, 0.01) << crates;
+    EXPECT_EQ(t.world.state().avatars.at("ann").standsOn,
+              t.body("b" + std::to_string(crates - 1)).id);
+    EXPECT_EQ(whoPenetrates(t.world), "");
+  }
+}
+
+TEST(RigidBodies, ALiftStopsWhereWhoStandsOnACrateUponItHasNoRoom) {
+  BodyTrial t = onCratesOnALift(1, {{"ceiling", {-1, 2.9, -1}, {1, 3, 1}}});
+  for (int i = 0; i < 240; ++i) {
+    t.step();
+    ASSERT_EQ(whoPenetrates(t.world), "") << i;
+    ASSERT_FALSE(anyBodyPenetrates(t.world)) << i;
+  }
+  const double room = 2.9 - 1.75 - 0.601;  // over the crate
+  EXPECT_NEAR(t.body("b0").position.y(), 0.351 + room, 0.02);
+  EXPECT_EQ(t.told(Event::blocked, "lift", "ann"), 1);
 }
 
 TEST(RigidBodies, ARowOfBoxesAtRestIsPushedAsOneByAShuttle) {
