@@ -1,5 +1,6 @@
 #include "assets/sidecar_writer.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -53,6 +54,16 @@ Json liftOf(const scene::Object& object, const MovingPart& part) {
           {"acceleration", 1}};
 }
 
+/// What a model has of this path is a body.
+void addBodyOf(const scene::Model& model, const std::string& path, Json body, Json& bodies) {
+  const bool isThere =
+      std::ranges::find(model.objects, path, &scene::Object::path) != model.objects.end();
+  if (!isThere) return;  // as in a district
+  body["name"] = nameOf(path);
+  body["objects"] = {path};
+  bodies.push_back(std::move(body));
+}
+
 }  // namespace
 
 std::string sidecarText(const scene::Model& model, const std::vector<MovingPart>& movingParts) {
@@ -62,6 +73,14 @@ std::string sidecarText(const scene::Model& model, const std::vector<MovingPart>
     const bool upwards = part.axis.y() > 0 && part.kind == MovingPart::Kind::slide;
     bodies.push_back(upwards ? liftOf(object, part) : doorOf(object, part));
   }
+  const std::string study = std::string(kPrefix) + "ground/study/";
+  addBodyOf(model, study + "armchair", {{"kind", "rigid"}, {"mass", 18}}, bodies);
+  addBodyOf(model, study + "globe",
+            {{"kind", "path"},
+             {"keys", {{{"time", 0}}, {{"time", 12}, {"turn", 360}}}},
+             {"loops", true},
+             {"runs", false}},
+            bodies);
   bodies.push_back({{"name", "hall/entrance"},
                     {"kind", "trigger"},
                     {"box",

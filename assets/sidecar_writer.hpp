@@ -1,4 +1,5 @@
-// The sidecar that says how the bundled building's doors and lift move (SIDECAR.md).
+// The sidecar that says how the bundled building's doors and lift move, and what else does
+// (SIDECAR.md): the study's armchair can be pushed, its globe turns when it is told to.
 #pragma once
 
 #include <filesystem>
