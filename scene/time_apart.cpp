@@ -65,15 +65,24 @@ bool isTouched(const SceneThen& then, const AvatarView& avatar, const BodyView& 
          collision::NearestParts::Found::none;
 }
 
+/// Whether the avatar stands on a free body: that may be carried, and the avatar with it, by what
+/// is far from both.
+bool standsOnFree(const SceneThen& then, const AvatarView& avatar) {
+  const BodyView* ground = bodyOf(then, avatar.standsOn);
+  return ground && movingOf(then, *ground).spec.kind == BodyKind::rigid;
+}
+
 /// Adds what the bodies that the avatar touches do to it: a lift that it stands on carries it.
 void addCarriers(const SceneThen& then, const AvatarView& avatar, const Lengths& lengths,
                  Motion& motion) {
   const double within = 4 * lengths.epsilon;
   const Box box = collision::grown(boxAt(avatar.shape->box, avatar.feet), 2 * within);
+  const bool onFree = standsOnFree(then, avatar);
   for (const BodyView& view : *then.snapshot.bodies) {
     const Moving body = movingOf(then, view);
     if (!isKinematic(body.spec.kind) || !view.moving) continue;
-    if (!overlaps(boxOf(then, view), box) || !isTouched(then, avatar, view, within)) continue;
+    const bool touched = overlaps(boxOf(then, view), box) && isTouched(then, avatar, view, within);
+    if (!touched && !onFree) continue;
     if (avatar.standsOn == view.id && view.spin.isZero(0)) {
       motion.bounds.velocity += view.velocity;
       motion.anyway += kMostPush * view.swing;
@@ -143,12 +152,13 @@ Motion anyMotion(const SceneThen& then, const AvatarView& avatar, const Lengths&
   const double alone = fastestAlone(avatar, lengths);
   motion.anyway = alone;
   const Box box = boxAt(avatar.shape->box, avatar.feet);
+  const bool onFree = standsOnFree(then, avatar);
   for (const BodyView& view : *then.snapshot.bodies) {
     const Moving body = movingOf(then, view);
     if (!isKinematic(body.spec.kind)) continue;
     const double fastest = fastestEver(body, lengths);
     const double comes = distance * (1 + fastest / alone) + motion.atOnce;
-    if (gapOf(box, boxOf(then, view)) <= comes) motion.anyway += kMostPush * fastest;
+    if (onFree || gapOf(box, boxOf(then, view)) <= comes) motion.anyway += kMostPush * fastest;
   }
   return motion;
 }

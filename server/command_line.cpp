@@ -268,7 +268,8 @@ void addRecording(CLI::App& verb, Arguments& into, const char* what) {
 
 void addInspect(CLI::App& verb, Arguments& into) {
   verb.add_flag("--json", into.json, "Tell it as one JSON object");
-  verb.add_flag("--objects", into.objects, "List every object too: id, path, box, class");
+  verb.add_flag("--objects", into.objects,
+                "List every object too: id, path, box, class, operation");
   verb.add_flag("--strict", into.strict, "End with 3 when there are problems");
   verb.add_option("--plan", into.plan, "Folder for a picture of the plan of each storey")
       ->check(CLI::Validator(folderProblem, "DIR"));

@@ -18,6 +18,8 @@ const char* wordOf(v1::ContactEvent::Kind kind) {
       return "leave";
     case v1::ContactEvent::KIND_LEFT_WORLD:
       return "left_world";
+    case v1::ContactEvent::KIND_PERSIST:
+      return "persist";
     default:
       return "unknown";
   }

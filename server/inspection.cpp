@@ -64,6 +64,7 @@ json objectsOf(const scene::Scene& scene) {
     json entry{{"id", i + 1}, {"path", object.path}, {"box", jsonOf(boxOf(scene, i))}};
     if (!object.globalId.empty()) entry["global_id"] = object.globalId;
     if (!object.ifcClass.empty()) entry["class"] = object.ifcClass;
+    if (!object.operation.empty()) entry["operation"] = object.operation;
     if (object.pieceOf) entry["piece_of"] = *object.pieceOf + 1;
     if (object.use != scene::Object::Use::whole)
       entry["only"] = object.use == scene::Object::Use::drawn ? "drawn" : "solid";

@@ -19,7 +19,8 @@ struct Inspection {
 /// Reports on the scene, by the cache where it can, and asks the system for the peak.
 Inspection inspected(LoadedScene loaded, const std::optional<scene::ModelCache>& cache);
 
-/// One JSON object, indented; with `objects` also the list "object_list".
+/// One JSON object, indented; with `objects` also the list "object_list": of each its id, path and
+/// box, and where there are such global_id, class, operation (IFC), piece_of and only.
 std::string inspectionJson(const Inspection& inspection, bool objects);
 
 /// Lines for a terminal, some dozens; with `objects` one more for each object.

@@ -142,8 +142,10 @@ v1::Entity entityMet(const scene::Scene& scene, const scene::Snapshot& snapshot,
   entity.set_kind(id <= scene.model().objects.size() ? v1::Entity::KIND_OBJECT
                                                      : v1::Entity::KIND_AVATAR);
   entity.set_name(nameOf(scene, snapshot, id));
-  if (entity.kind() == v1::Entity::KIND_OBJECT)
+  if (entity.kind() == v1::Entity::KIND_OBJECT) {
     entity.set_global_id(scene.model().objects[id - 1].globalId);
+    entity.set_operation(scene.model().objects[id - 1].operation);
+  }
   return entity;
 }
 

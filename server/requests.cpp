@@ -304,6 +304,7 @@ v1::Entity entityOf(const scene::World& world, std::uint32_t id) {
   if (id >= 1 && id <= objects.size()) {
     entity.set_kind(v1::Entity::KIND_OBJECT);
     entity.set_global_id(objects[id - 1].globalId);
+    entity.set_operation(objects[id - 1].operation);
   } else if (!entity.name().empty()) {
     entity.set_kind(v1::Entity::KIND_AVATAR);
   }
@@ -536,6 +537,7 @@ v1::Welcome welcomeOf(const ServedWorld& served) {
   welcome.add_capabilities("rays");
   welcome.add_capabilities("packed_rays");
   welcome.add_capabilities("pairs");
+  welcome.add_capabilities("persists");
   welcome.add_capabilities("restart");
   if (!served.frames.deviceName().empty()) welcome.add_capabilities("frames");
   *welcome.mutable_scene() = messageOf(served.world.scene());

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "protocol/joined_message.hpp"
+#include "scene/living_contacts.hpp"
 #include "server/body_messages.hpp"
 #include "server/frame_watches.hpp"
 #include "server/replay_control.hpp"
@@ -16,9 +17,10 @@ namespace {
 /// What one tick tells. All who subscribed to the same get the same bytes, which are made when the
 /// first of them wants them: with hundreds of clients this is most of what a tick sends.
 struct TickTold {
-  const v1::TickEvents& told;         ///< of everyone
-  std::array<Buffer, 8> events = {};  ///< serialized; by what is subscribed
-  Buffer state = {};                  ///< serialized
+  const v1::TickEvents& told;                   ///< of everyone
+  std::vector<v1::ContactEvent> persists = {};  ///< to be told after those
+  std::array<Buffer, 16> events = {};           ///< serialized; by what is subscribed
+  Buffer state = {};                            ///< serialized
 };
 
 Buffer serialized(const google::protobuf::MessageLite& message) {
@@ -40,15 +42,17 @@ bool wants(const v1::Subscribe& subscription, const v1::ContactEvent& event) {
 
 /// TickEvents without its sequence; empty when nothing of what is subscribed happened.
 const Buffer& eventsFor(TickTold& tick, const v1::Subscribe& subscription) {
-  const std::size_t subscribed = (subscription.contacts() ? 1u : 0u) |
-                                 (subscription.near_misses() ? 2u : 0u) |
-                                 (subscription.notices() ? 4u : 0u);
+  const std::size_t subscribed =
+      (subscription.contacts() ? 1u : 0u) | (subscription.near_misses() ? 2u : 0u) |
+      (subscription.notices() ? 4u : 0u) | (subscription.persists() ? 8u : 0u);
   Buffer& bytes = tick.events[subscribed];
   if (bytes) return bytes;
   v1::TickEvents events;
   for (const v1::ContactEvent& event : tick.told.contacts()) {
     if (wants(subscription, event)) *events.add_contacts() = event;
   }
+  if (subscription.persists())
+    for (const v1::ContactEvent& event : tick.persists) *events.add_contacts() = event;
   if (subscription.notices()) *events.mutable_notices() = tick.told.notices();
   if (!events.contacts().empty() || !events.notices().empty()) {
     events.set_tick(tick.told.tick());
@@ -132,6 +136,30 @@ void keepLive(ServedWorld& served, const v1::TickEvents& told) {
   }
 }
 
+bool anyoneWantsPersists(const ServedWorld& served) {
+  return std::any_of(served.clients.begin(), served.clients.end(),
+                     [](const auto& one) { return one.second.subscription.persists(); });
+}
+
+bool beganInLastTick(const ServedWorld& served, const scene::ContactEvent& contact) {
+  const auto begun = served.live.find({contact.a, contact.b});
+  return begun != served.live.end() && begun->second.tick() == contact.tick;
+}
+
+/// Contacts that live after the last tick and began before it, as they are now. Nothing is looked
+/// for when nobody wants them. Call it after keepLive(), which knows when they began.
+std::vector<v1::ContactEvent> persistsOf(const ServedWorld& served) {
+  std::vector<v1::ContactEvent> persists;
+  if (!anyoneWantsPersists(served)) return persists;
+  for (const scene::ContactEvent& contact : scene::livingContacts(served.world)) {
+    const bool inTrigger = contact.kind == scene::ContactEvent::Kind::enter;
+    if (inTrigger || beganInLastTick(served, contact)) continue;
+    persists.push_back(messageOf(served.world, contact));
+    persists.back().set_kind(v1::ContactEvent::KIND_PERSIST);
+  }
+  return persists;
+}
+
 bool isPresent(const scene::Snapshot& snapshot, const std::string& name) {
   return std::any_of(snapshot.avatars.begin(), snapshot.avatars.end(),
                      [&](const scene::AvatarView& avatar) { return avatar.name == name; });
@@ -181,9 +209,9 @@ void tellTick(ServedWorld& served, const RecordedWorld::Ticked& ticked) {
   logFindings(served.world, report);
   served.idle = report.idle;
   publish(served);
-  TickTold shared{told};
   settleOwners(served, report.notices);
   keepLive(served, told);
+  TickTold shared{told, persistsOf(served)};
   for (auto& [id, client] : served.clients) {
     sendEvents(client, shared);
     sendState(served, client, *report.snapshot, shared);

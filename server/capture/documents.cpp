@@ -121,6 +121,7 @@ std::string instancesJson(const scene::Model& model, const std::vector<WalkerNam
     Json one{{"path", object.path}};
     if (!object.globalId.empty()) one["global_id"] = object.globalId;
     if (!object.ifcClass.empty()) one["class"] = object.ifcClass;
+    if (!object.operation.empty()) one["operation"] = object.operation;
     if (!bodies[i].empty()) one["body"] = bodies[i];
     all[std::to_string(i + 1)] = std::move(one);
   }

@@ -9,7 +9,7 @@
 
 namespace enfilade::server {
 
-/// id -> path, global_id, class, body; of avatars their names.
+/// id -> path, global_id, class, operation, body; of avatars their names.
 std::string instancesJson(const scene::Model& model, const std::vector<WalkerName>& walkers);
 
 /// nerfstudio's form; axes, depth and what else a reader must know stand under "enfilade".

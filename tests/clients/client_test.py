@@ -34,6 +34,26 @@ class Walking(RoomCase):
         self.assertEqual(touched[0].verdict, "separated")
         self.assertGreater(touched[0].normal[0], 0.9)
 
+    def test_a_contact_persists_in_each_tick_between_its_begin_and_its_end(self):
+        self.client.subscribe(contacts=True, persists=True)
+        ann = self.client.spawn("ann", at=(4, 0.01, 0))
+        ann.enter()
+        ann.walk((8, 0, 0))
+        ann.walk((3, 0, 0))
+        self.client.run_until_idle()
+        told = [one for one in self.client.contacts() if one.b == WALL and one.kind != "blocked"]
+        self.assertGreater(len(told), 100)  # she tries for two seconds
+        kinds = ["begin"] + ["persist"] * (len(told) - 2) + ["end"]
+        self.assertEqual([one.kind for one in told], kinds)
+        first = told[0].tick
+        self.assertEqual([one.tick for one in told], list(range(first, first + len(told))))
+        self.assertEqual({one.verdict for one in told}, {"separated"})
+
+    def test_who_wants_persists_of_a_server_that_tells_none_is_warned(self):
+        self.client.welcome.capabilities.remove("persists")
+        with self.assertWarnsRegex(UserWarning, "persist"):
+            self.client.subscribe(persists=True)
+
     def test_who_cannot_enter_is_not_taken_for_who_has_its_name(self):
         self.client.subscribe(notices=True)
         self.client.spawn("ann", at=(0, 0, 0)).enter()

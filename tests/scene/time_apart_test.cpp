@@ -85,6 +85,29 @@ TEST(TimeApart, ARiderGoesWithTheLift) {
   EXPECT_NEAR(said.closing.speed, 1, 1e-6);
 }
 
+TEST(TimeApart, WhoStandsOnACrateGoesWithTheLiftBelowIt) {
+  Model model = boxModel({floorBox(),
+                          {"ceiling", {-3, 5, -3}, {3, 5.2, 3}},
+                          {"car", {-2, 0.05, -2}, {2, 0.1, 2}},
+                          {"crate", {-0.5, 0.101, -0.5}, {0.5, 1.5, 0.5}}});
+  BodySpec lift = bodySpec("lift", BodyKind::lift, {2});
+  lift.high = 3, lift.stops = {0, 3}, lift.speed = 1;
+  BodySpec crate = bodySpec("crate", BodyKind::rigid, {3});
+  model.bodies = {lift, crate};
+  BodyTrial t(std::move(model));
+  SceneIndex index(sharedScene(t.world));
+  t.order("ann", Spawn{Vec3(0, 1.51, 0), 0});
+  t.ticks(120);
+  t.tell({"lift", Action::level, 0, 1, {}});
+  t.ticks(30);
+  const EntityId ann = t.world.state().avatars.at("ann").id, ceiling = 2;
+  const double gap = 5 - 1.75 - t.feet("ann").y();
+  for (const Assume assume : {Assume::presentMotion, Assume::anyCommand}) {
+    const TimeApart now = apartAt(t.world, index, ann, ceiling, assume);
+    EXPECT_LE(now.contact, gap / lift.speed + 0.01);  // the lift goes on
+  }
+}
+
 TEST(TimeApart, WhatSwingsOutAndBackWithinATickReachesAsFarAsItSwings) {
   // 0.2 m out and back in each tick; the post is 0.1 m away, the wall ten times as far as that.
   Model model = boxModel({floorBox(),

@@ -8,7 +8,9 @@
 
 #include "render/gl/gl_renderer.hpp"
 #include "render/pictures/image.hpp"
+#include "server/capture/documents.hpp"
 #include "server/capture/overlay.hpp"
+#include "tests/server/body_room.hpp"
 #include "tests/server/program_trial.hpp"
 
 namespace enfilade::server::testing {
@@ -123,6 +125,21 @@ TEST_F(Capture, FilesLieWhereTheLayoutSaysAndHoldWhatIsSeen) {
   EXPECT_TRUE(std::isnan(depth.at(0, 0)));
   const auto instances = json::parse(textOf(folder_ / "out/instances.json"));
   EXPECT_EQ(instances.at("2").at("path"), "room_wall");
+}
+
+TEST(Instances, TellOfAnIfcProductWhatItIsAndHowItOpens) {
+  scene::Model model = bodyRoomModel();
+  scene::Object& leaf = model.objects[kLeaf - 1];
+  leaf.globalId = "2O2Fr$t4X7Zf8NOew3FNtn";
+  leaf.ifcClass = "IfcDoor";
+  leaf.operation = "SINGLE_SWING_LEFT";
+  const auto instances = json::parse(instancesJson(model, {}));
+  EXPECT_EQ(instances.at(std::to_string(kLeaf)), json({{"path", "leaf"},
+                                                       {"global_id", "2O2Fr$t4X7Zf8NOew3FNtn"},
+                                                       {"class", "IfcDoor"},
+                                                       {"operation", "SINGLE_SWING_LEFT"},
+                                                       {"body", "door"}}));
+  EXPECT_EQ(instances.at(std::to_string(kEnd)), json({{"path", "end"}}));
 }
 
 TEST_F(Capture, TransformsSayWhereAPixelLies) {

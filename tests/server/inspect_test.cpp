@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "server/version.hpp"
+#include "tests/scene/hand_made_ifc.hpp"
 #include "tests/server/program_trial.hpp"
 
 namespace enfilade::server::testing {
@@ -29,6 +30,20 @@ TEST_F(Inspect, TellsAsJsonWhatIsInTheScene) {
   ASSERT_EQ(all.at("object_list").size(), 3u);
   EXPECT_EQ(all.at("object_list").at(1).at("path"), "room_wall");
   EXPECT_EQ(all.at("object_list").at(1).at("box").at("min").at(0), 5);
+}
+
+TEST_F(Inspect, TellsHowADoorOpens) {
+  write(folder_ / "house.ifc", tests::IfcHouse().text());
+  const Ended told = run({"inspect", path("house.ifc"), "--json", "--objects"});
+  ASSERT_EQ(told.code, 0) << told.err;
+  const auto all = nlohmann::json::parse(told.out);
+  int doors = 0;
+  for (const auto& object : all.at("object_list")) {
+    const bool isDoor = object.value("class", "") == "IfcDoor";
+    doors += isDoor ? 1 : 0;
+    EXPECT_EQ(object.value("operation", "none"), isDoor ? "SINGLE_SWING_LEFT" : "none") << object;
+  }
+  EXPECT_GE(doors, 1);
 }
 
 TEST_F(Inspect, TellsWhereAThingOnAPathGoes) {

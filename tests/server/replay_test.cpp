@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <map>
 #include <random>
+#include <set>
 
 #include "server/playback/playback.hpp"
 #include "server/recorded_world.hpp"
@@ -288,6 +289,50 @@ TEST_F(Replays, WhoJoinsInTheMiddleIsToldWhereItStands) {
   EXPECT_EQ(late.live, walked_.live[1050]);
   driver.client.seek(1200);
   EXPECT_EQ(Listener{client("later")}.live, walked_.live[1200]);
+}
+
+/// Those that were told to persist among what came, all of them of `tick`.
+std::set<Pair> persisting(protocol::Client& client, std::uint64_t tick) {
+  std::set<Pair> persists;
+  for (const v1::ServerMessage& message : client.takeEvents()) {
+    for (const v1::ContactEvent& event : message.events().contacts()) {
+      EXPECT_EQ(event.kind(), v1::ContactEvent::KIND_PERSIST);
+      EXPECT_EQ(event.tick(), tick);
+      EXPECT_TRUE(persists.insert({event.a(), event.b()}).second) << event.ShortDebugString();
+    }
+  }
+  return persists;
+}
+
+/// Those that live after the tick and began before it.
+std::set<Pair> lasting(const Live& live, std::uint64_t tick) {
+  std::set<Pair> pairs;
+  for (const auto& [pair, begun] : live)
+    if (begun < tick) pairs.insert(pair);
+  return pairs;
+}
+
+TEST_F(Replays, ContactsPersistInTheTicksInWhichTheyDidWhenTheyWereRecorded) {
+  play("walk", 200);
+  protocol::Client driver = client("driver");
+  v1::Subscribe persists;
+  persists.set_persists(true);
+  driver.subscribe(persists);
+  std::size_t told = 0;
+  for (const std::uint64_t from : {200u, 1000u, 100u}) {
+    driver.seek(from);
+    EXPECT_EQ(persisting(driver, from), std::set<Pair>()) << "a seek is no tick";
+    for (std::uint64_t tick = from + 1; tick <= from + 300; ++tick) {
+      driver.step();
+      const std::set<Pair> pairs = persisting(driver, tick);
+      EXPECT_EQ(pairs, lasting(walked_.live[tick], tick)) << tick;
+      told += pairs.size();
+    }
+  }
+  EXPECT_GT(told, 900u);
+  driver.takeOver();
+  driver.step();
+  EXPECT_FALSE(persisting(driver, 401).empty()) << "in a branch, too";
 }
 
 TEST_F(Replays, CommandsAreRefusedUntilSomebodyTakesOver) {

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <set>
 #include <thread>
 
 #include "scene/world.hpp"
@@ -171,6 +172,119 @@ TEST_F(Sessions, WhoSubscribesLateIsToldTheContactsThatLive) {
   EXPECT_EQ(reply.tick(), 60u);
 }
 
+using Pair = std::pair<std::uint32_t, std::uint32_t>;
+
+/// The contacts that live for who follows begins and ends. In each tick exactly those that lived
+/// before and go on must be told to persist, once each and behind all else.
+struct Followed {
+  std::set<Pair> live = {};
+
+  void add(const std::deque<v1::ServerMessage>& messages, std::uint64_t tick) {
+    std::set<Pair> persists, begun;
+    for (const v1::ServerMessage& message : messages) {
+      for (const v1::ContactEvent& event : message.events().contacts()) {
+        EXPECT_EQ(event.tick(), tick);
+        const Pair pair{event.a(), event.b()};
+        const bool isPersist = event.kind() == v1::ContactEvent::KIND_PERSIST;
+        EXPECT_TRUE(isPersist || persists.empty()) << event.ShortDebugString();
+        if (isPersist) {
+          EXPECT_TRUE(persists.insert(pair).second) << event.ShortDebugString();
+        }
+        if (event.kind() == v1::ContactEvent::KIND_BEGIN) begun.insert(pair);
+        if (event.kind() == v1::ContactEvent::KIND_END) live.erase(pair);
+      }
+    }
+    EXPECT_EQ(persists, live) << tick;
+    live.merge(begun);
+  }
+};
+
+v1::Subscribe withPersists(v1::Subscribe subscription) {
+  subscription.set_persists(true);
+  return subscription;
+}
+
+/// Asks for the pair, which must stand as the event of the last tick says.
+void expectAsItIsNow(protocol::Client& client, const v1::ContactEvent& event) {
+  v1::DistanceQuery query;
+  query.add_pairs()->mutable_a()->set_id(event.a());
+  query.mutable_pairs(0)->mutable_b()->set_id(event.b());
+  const v1::PairState now = client.distances(query).pairs(0);
+  EXPECT_EQ(event.verdict(), now.verdict());
+  EXPECT_NEAR(event.distance(), now.distance(), event.error_bound() + now.error_bound());
+  const v1::Vec3 &told = event.normal(), &asked = now.normal();
+  EXPECT_NEAR(told.x() * asked.x() + told.y() * asked.y() + told.z() * asked.z(), 1, 1e-6);
+  EXPECT_EQ(event.a_name(), now.a_name());
+  EXPECT_EQ(event.b_name(), now.b_name());
+}
+
+TEST_F(Sessions, AContactIsToldToPersistInEachTickBetweenItsBeginAndItsEnd) {
+  serve();
+  protocol::Client ann = client("ann");
+  const auto& offers = ann.welcome().capabilities();
+  EXPECT_NE(std::find(offers.begin(), offers.end(), "persists"), offers.end());
+  ann.subscribe(withPersists(everything()));
+  ASSERT_FALSE(ann.command(spawn("ann", 4, 0.01, 0)));
+  ASSERT_FALSE(ann.command(walkTo("ann", 8, 0, 0)));
+  ASSERT_FALSE(ann.command(walkTo("ann", 3, 0, 0)));
+  Followed followed;
+  std::vector<v1::ContactEvent> wall;
+  for (int i = 0; i < 300; ++i) {
+    const std::uint64_t tick = ann.step().tick();
+    const auto messages = ann.takeEvents();
+    followed.add(messages, tick);
+    Heard heard;
+    heard.add(messages);
+    for (const v1::ContactEvent& event : heard.contacts) {
+      if (event.kind() == v1::ContactEvent::KIND_PERSIST) expectAsItIsNow(ann, event);
+      if (event.b() == kWall && event.kind() != v1::ContactEvent::KIND_BLOCKED)
+        wall.push_back(event);
+    }
+  }
+  EXPECT_EQ(followed.live.size(), 1u) << "the floor";
+  ASSERT_GT(wall.size(), 100u) << "she tries for two seconds";
+  EXPECT_EQ(wall.front().kind(), v1::ContactEvent::KIND_BEGIN);
+  EXPECT_EQ(wall.back().kind(), v1::ContactEvent::KIND_END);
+  for (std::size_t i = 1; i + 1 < wall.size(); ++i)
+    EXPECT_EQ(wall[i].kind(), v1::ContactEvent::KIND_PERSIST);
+  EXPECT_EQ(wall.back().tick() - wall.front().tick(), wall.size() - 1);
+}
+
+TEST_F(Sessions, PersistsComeToThoseWhoAskForThemAndAsLongAsTheyDo) {
+  serve();
+  protocol::Client ann = client("ann"), bob = client("bob"), cy = client("cy");
+  ann.subscribe(withPersists(everything()));
+  bob.subscribe(everything());
+  EXPECT_EQ(cy.subscribe(withPersists({})).live_size(), 0);
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
+  ann.step(60);
+  Heard annHeard, bobHeard, cyHeard;
+  annHeard.add(ann.takeEvents());
+  bob.metrics();
+  bobHeard.add(bob.takeEvents());
+  cy.metrics();
+  const auto messages = cy.takeEvents();
+  cyHeard.add(messages);
+  const std::size_t persists = annHeard.count(v1::ContactEvent::KIND_PERSIST);
+  EXPECT_GT(persists, 30u) << "the floor";
+  EXPECT_EQ(bobHeard.count(v1::ContactEvent::KIND_PERSIST), 0u);
+  EXPECT_EQ(bobHeard.contacts.size() + persists, annHeard.contacts.size());
+  EXPECT_EQ(cyHeard.contacts.size(), persists) << "and nothing else";
+  EXPECT_EQ(cyHeard.count(v1::ContactEvent::KIND_PERSIST), persists);
+  EXPECT_EQ(messages.size(), persists) << "no tick without one";
+  for (std::size_t i = 0; i < messages.size(); ++i)
+    EXPECT_EQ(messages[i].events().sequence(), i + 1);
+  EXPECT_EQ(bob.subscribe(withPersists(everything())).live_size(), 1);
+  ann.subscribe(everything());
+  ann.step(3);
+  Heard annThen, bobThen;
+  annThen.add(ann.takeEvents());
+  bob.metrics();
+  bobThen.add(bob.takeEvents());
+  EXPECT_EQ(annThen.count(v1::ContactEvent::KIND_PERSIST), 0u);
+  EXPECT_EQ(bobThen.count(v1::ContactEvent::KIND_PERSIST), 3u) << "from the next tick on";
+}
+
 TEST_F(Sessions, ANumberThatIsNoneIsRefusedNamingItsField) {
   serve();
   protocol::Client ann = client("ann");
@@ -246,6 +360,18 @@ TEST_F(Sessions, EntitiesAreDescribedByNameAndKind) {
   EXPECT_EQ(entities[1].kind(), v1::Entity::KIND_AVATAR);
   EXPECT_EQ(entities[2].kind(), v1::Entity::KIND_UNSPECIFIED);
   EXPECT_EQ(ann.describe({}).size(), 4u);
+}
+
+TEST_F(Sessions, AnIfcProductIsDescribedWithItsGlobalIdAndItsOperation) {
+  scene::Model model = smallRoom()->model();
+  model.objects[kWall - 1].globalId = "2O2Fr$t4X7Zf8NOew3FNtn";
+  model.objects[kWall - 1].operation = "SINGLE_SWING_LEFT";
+  serve({}, std::make_shared<const scene::Scene>(std::move(model)));
+  const auto entities = client("ann").describe({});
+  ASSERT_EQ(entities.size(), 3u);
+  EXPECT_EQ(entities[kWall - 1].global_id(), "2O2Fr$t4X7Zf8NOew3FNtn");
+  EXPECT_EQ(entities[kWall - 1].operation(), "SINGLE_SWING_LEFT");
+  EXPECT_EQ(entities[kFloor - 1].operation(), "");
 }
 
 TEST_F(Sessions, EntitiesAreDescribedInPagesOfBoundedSize) {

@@ -333,15 +333,20 @@ class Client:
     # ---- what happens -----------------------------------------------------------------------
 
     def subscribe(self, *, contacts: bool = False, near_misses: bool = False, notices: bool = False,
-                  state: bool = False, state_rate: float = 0.0) -> List[Contact]:
+                  state: bool = False, state_rate: float = 0.0,
+                  persists: bool = False) -> List[Contact]:
         """Says what the server sends unasked, in the place of what it sent before. Returns the
-        contacts that live now, as they began. Contacts and notices are kept until they are taken,
-        however many they become."""
+        contacts that live now, as they began (with contacts=True). Contacts and notices are kept until
+        they are taken, however many they become. With `persists` each contact that goes on is among
+        contacts() in every tick between its beginning and its end, as it is then."""
         if near_misses and self.welcome.policies.near_miss <= 0:
             warnings.warn("subscribe: this server tells no near misses; start it with --near-miss "
                           "METRES", stacklevel=2)
+        if persists and "persists" not in self.welcome.capabilities:
+            warnings.warn("subscribe: this server does not tell that contacts persist; start a newer "
+                          "one", stacklevel=2)
         wanted = messages.Subscribe(contacts=contacts, near_misses=near_misses, notices=notices,
-                                    state=state, state_rate=state_rate)
+                                    state=state, state_rate=state_rate, persists=persists)
         reply, _ = self.request(subscribe=wanted)
         return [results.contact(one) for one in reply.subscribe.live]
 

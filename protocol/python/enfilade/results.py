@@ -26,7 +26,7 @@ class Contact:
 
     tick: int
     time: float
-    kind: str  # "begin", "end", "near", "blocked", "enter", "leave", "left_world"
+    kind: str  # "begin", "persist", "end", "near", "blocked", "enter", "leave", "left_world"
     reason: str  # of an end: "parted", "left", "shutdown", "restart", "seek"
     phase: str  # of "near": "begin", "min", "end"
     a: int
