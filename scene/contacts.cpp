@@ -115,8 +115,8 @@ Contact stopped(EntityId by, const Decision& decision) {
 
 /// A contact with a body that the avatar touched in this tick and is apart from again; nothing
 /// where it still touches it.
-void addTouched(EntityId body, const std::function<std::optional<Decision>()>& touch,
-                std::vector<Contact>& now) {
+template <class Touch>
+void addTouched(EntityId body, const Touch& touch, std::vector<Contact>& now) {
   const auto at = std::ranges::lower_bound(now, body, {}, &Contact::other);
   const bool listed = at != now.end() && at->other == body;
   if (listed && at->touching) return;
@@ -150,7 +150,7 @@ void addWhatGaveWay(const WorldState& world, Avatar& avatar, std::vector<Contact
                     QueryCount& count) {
   if (world.bodyOfId.contains(avatar.stoppedBy))
     addTouched(
-        avatar.stoppedBy, [&] { return avatar.atStop; }, now);
+        avatar.stoppedBy, [&] { return std::optional(avatar.atStop); }, now);
   const auto& met = world.rigids.metByAvatars;
   for (auto at = std::ranges::lower_bound(met, EntityPair(avatar.id, 0));
        at != met.end() && at->first == avatar.id; ++at)

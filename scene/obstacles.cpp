@@ -75,6 +75,9 @@ void placeObstacle(const WorldState& world, Obstacle& obstacle) {
     const Body& body = world.bodies[obstacle.ofBody];
     obstacle.box = body.partBoxes[obstacle.part];
     obstacle.body = partOf(body, obstacle.part);
+    // Where it will stand: the solver moves it when avatars have moved.
+    obstacle.box.min.y() += body.risesBy, obstacle.box.max.y() += body.risesBy;
+    obstacle.body.translation.y() += body.risesBy;
   } else if (obstacle.entity >= world.firstAvatarId()) {
     const auto& name = world.avatarNames[obstacle.entity - world.firstAvatarId()];
     const Avatar& other = world.avatars.at(name);

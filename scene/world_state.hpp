@@ -53,8 +53,6 @@ struct Avatar {
   Vec3 asked = Vec3::Zero();  ///< metres
   bool resting = false;       ///< stands, wants nothing, and nobody is near: nothing to work out
   bool stirred = false;       ///< its shape or place was changed since: it does not rest this tick
-  double liftedBy = 0;        ///< metres, in this tick, before the free body that it stands on; 0
-                              ///< between ticks
   EntityId stoppedBy = 0;
   bool pairsChanged =
       true;  ///< the broad phase gave it or took from it a partner since it gathered

@@ -139,17 +139,6 @@ EntityId settle(Mover& m, double depth) {
   return ground;
 }
 
-/// The same by a step. Who stands on a free body that a lift takes up was lifted before it, which
-/// the solver moves last: there it waits for it, on the way that it came down.
-EntityId settleOnGround(Mover& m) {
-  const Vec3 before = m.feet;
-  const EntityId ground = settle(m, m.lengths.stepHeight);
-  const bool straight = m.feet.x() == before.x() && m.feet.z() == before.z();
-  if (ground == m.avatar.standsOn && straight)
-    m.feet.y() = std::min(before.y(), m.feet.y() + m.avatar.liftedBy);
-  return ground;
-}
-
 double progress(const Vec3& from, const Vec3& to, const Vec3& direction) {
   return (to - from).dot(direction);
 }
@@ -206,7 +195,7 @@ void walkOnGround(Mover& m, const Vec3& wish) {
     const double gained = progress(start, m.feet, wish / length);
     if (steep.entity != 0 && stepUp(m, start, wish, gained)) steep = {};
   }
-  standOn(m.avatar, settleOnGround(m));
+  standOn(m.avatar, settle(m, m.lengths.stepHeight));
   m.avatar.fallSpeed = 0;
   stoppedBy(m.avatar, steep);
 }
@@ -273,7 +262,6 @@ void moveAvatar(WorldState& world, Avatar& avatar, const Vec3& velocity, QueryCo
   avatar.lastMove = m.feet - avatar.feet;
   avatar.feet = m.feet;
   avatar.stirred = false;
-  avatar.liftedBy = 0;
   if (avatar.chain.speed > 0) moveJoints(world, avatar, count);
 }
 

@@ -75,7 +75,9 @@ struct Body {
   Vec3 spin = Vec3::Zero();      ///< rad/s, scene frame
   bool asleep = true;            ///< rigid: stands until something wakes it; others: false
   bool moved = false;            ///< in this tick
-  bool driven = false;           ///< rigid: may be pushed or carried by a driven one in this tick
+  double driven = 0;             ///< rigid, metres: so far a driven one may push or carry it now
+  double risesBy = 0;            ///< rigid, metres: so far what it rests on rose in this tick, and
+                                 ///< the solver will lift it; 0 between ticks
   bool left = false;             ///< rigid: it left the world, and stays where it was caught
   EntityId blockedBy = 0;        ///< what a kinematic body cannot push aside; 0: nothing
 

@@ -254,17 +254,20 @@ double pushRoom(const WorldState& world, const Avatar& avatar) {
       return more = true;
     });
   }
-  const auto ground = world.bodyOfId.find(avatar.standsOn);
-  if (ground == world.bodyOfId.end() || !world.bodies[ground->second].driven) return room;
-  for (const std::uint32_t i : rest)  // one of these may carry what it stands on
-    room += world.bodies[i].plan.farthest + 4 * world.lengths.epsilon;
-  return room;
+  // Free bodies push and carry, too, as far as they are driven themselves.
+  double carried = 0;
+  for (const auto& partner : world.broadPhase.partners(avatar.mover)) {
+    const auto found = partner.moves ? world.bodyOfMover.find(partner.id) : world.bodyOfMover.end();
+    if (found != world.bodyOfMover.end())
+      carried = std::max(carried, world.bodies[found->second].driven);
+  }
+  return carried > 0 ? room + carried + 4 * world.lengths.epsilon : room;
 }
 
 bool isBusy(const Body& body) {
   const BodyDrive& drive = body.drive;
   // What a path that goes round shakes never rests, as little as the path itself.
-  if (!isKinematic(body.spec->kind)) return !body.asleep && !body.driven;
+  if (!isKinematic(body.spec->kind)) return !body.asleep && body.driven == 0;
   if (goesRound(*body.spec)) return false;
   return (drive.going && body.blockedBy == 0) || drive.closesIn >= 0;
 }

@@ -2,16 +2,16 @@
 // the avatars where these stand now. (Free bodies give way in the solver, or are pushed there;
 // driven ones are not asked for by one another.)
 //  0. Of a path each stretch between two of its places is gone by itself, straight and evenly.
-//  1. Riders that the body would lift go first, also those that stand on a free body upon it; what
-//     it leaves behind follows it afterwards.
-//  2. The body goes until it comes near something. That is pushed along the normal by as much as
-//     the body still needs, by a sweep of its own, so that a push crosses nothing.
+//  1. Riders that the body would lift go first; what it leaves behind follows it afterwards.
+//  2. The body goes until it comes near something, or until a free body does that rests on it and
+//     rises with it (the solver will lift that when avatars have moved). What is met is pushed
+//     along the normal by as much as the body still needs, by a sweep of its own, so that a push
+//     crosses nothing.
 //  3. Where that gains nothing, the body stops and says so; it tries again in the next tick.
 // Still objects stop no kinematic body: its limits say where it may go, and doors touch their
 // frames as drawn.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
 
 #include "collision/contact_manifold.hpp"
@@ -68,9 +68,19 @@ Vec3 yieldingWay(const Vec3& normal, double distance) {
   return distance / (length * length) * level;
 }
 
+/// A free body that rests on the body, or on such a one: it rises as its middle is carried.
+struct Load {
+  Body* body;
+  Vec3 middle;        ///< in the carrier's frame
+  double height;      ///< of the middle, when the tick began
+  double rise = 0;    ///< metres, since then
+  double toRise = 0;  ///< metres, on the way at hand
+};
+
 /// Who stops the body, and where.
 struct Encounter {
   Avatar* avatar = nullptr;
+  const Load* load = nullptr;  ///< that met the avatar; null: the body itself
   BodySweep sweep;
 };
 
@@ -84,20 +94,88 @@ void meet(const Body& body, const BodyWay& way, double farthest, Avatar& avatar,
       const BodySweep sweep =
           sweepTurning({body.shape->parts[part], way}, bodyAt(limb, avatar.feet), band, count);
       if (sweep.stopped && (!first.avatar || sweep.fraction < first.sweep.fraction))
-        first = {&avatar, sweep};
+        first = {&avatar, nullptr, sweep};
     }
   }
 }
 
-/// Avatars that the broad phase has near the body, in order of name.
-std::vector<Avatar*> avatarsNear(WorldState& world, const Body& body) {
-  std::vector<std::string> names;
-  for (const auto& partner : world.broadPhase.partners(body.mover)) {
-    if (!partner.moves) continue;
-    const auto found = world.avatarOfMover.find(partner.id);
-    if (found != world.avatarOfMover.end()) names.push_back(found->second);
+/// The same of a load that rises.
+void meet(const Load& load, Avatar& avatar, const WorldState& world, Encounter& first,
+          QueryCount& count) {
+  const collision::StoppingBand band = bandOf(world.lengths);
+  const Body& body = *load.body;
+  const Vec3 risen(0, load.rise, 0);
+  const BodyWay way{body.rotation, body.position + risen, {0, load.toRise, 0}, Vec3::UnitY(), 0};
+  for (const AvatarPart& limb : avatar.shape->parts) {
+    Box box = grown(boxAt(limb.box, avatar.feet), band.high + load.toRise);
+    box.min -= risen, box.max -= risen;
+    for (std::size_t part = 0; part < body.partBoxes.size(); ++part) {
+      if (!overlaps(box, body.partBoxes[part])) continue;
+      const BodySweep sweep =
+          sweepTurning({body.shape->parts[part], way}, bodyAt(limb, avatar.feet), band, count);
+      if (sweep.stopped && (!first.avatar || sweep.fraction < first.sweep.fraction))
+        first = {&avatar, &load, sweep};
+    }
   }
-  std::sort(names.begin(), names.end());
+}
+
+/// Which free body stands on which body: the lower one first; ascending.
+using Supports = std::vector<std::pair<EntityId, EntityId>>;
+
+/// Of the last tick. None where there is nobody whom they could lift.
+Supports supportsOf(const WorldState& world) {
+  Supports supports;
+  if (world.avatars.empty() || world.goingBodies.empty()) return supports;
+  const auto bodyOf = [&](EntityId id) -> const Body* {
+    const auto found = world.bodyOfId.find(id);
+    return found == world.bodyOfId.end() ? nullptr : &world.bodies[found->second];
+  };
+  for (const auto& [pair, contact] : world.bodyContacts) {
+    const Body *first = bodyOf(pair.first), *second = bodyOf(pair.second);
+    if (!contact.touching || !first || !second) continue;
+    // A penetration has no normal.
+    const bool isIn = contact.decision.verdict == collision::Verdict::penetrating;
+    const double up =
+        isIn ? second->position.y() - first->position.y() : contact.decision.normal.y();
+    if (!isIn && std::abs(up) < world.lengths.walkableNormalY) continue;
+    const Body &below = up > 0 ? *first : *second, &above = up > 0 ? *second : *first;
+    if (above.spec->kind == BodyKind::rigid) supports.emplace_back(below.id, above.id);
+  }
+  std::ranges::sort(supports);
+  return supports;
+}
+
+std::vector<Load> loadsOf(WorldState& world, const Body& body, const Supports& supports) {
+  std::vector<Load> loads;
+  std::vector<EntityId> open{body.id};
+  std::set<EntityId> known{body.id};
+  while (!open.empty()) {
+    const EntityId below = open.back();
+    open.pop_back();
+    for (auto at = std::ranges::lower_bound(supports, std::pair(below, EntityId{0}));
+         at != supports.end() && at->first == below; ++at) {
+      if (!known.insert(at->second).second) continue;
+      open.push_back(at->second);
+      Body& above = world.bodies[world.bodyOfId.at(at->second)];
+      loads.push_back({&above, inBody(body, above.position), above.position.y()});
+    }
+  }
+  return loads;
+}
+
+/// Avatars that the broad phase has near the body or its loads, in order of name.
+std::vector<Avatar*> avatarsNear(WorldState& world, const Body& body,
+                                 const std::vector<Load>& loads) {
+  std::set<std::string> names;
+  const auto add = [&](const Body& near) {
+    for (const auto& partner : world.broadPhase.partners(near.mover)) {
+      if (!partner.moves) continue;
+      const auto found = world.avatarOfMover.find(partner.id);
+      if (found != world.avatarOfMover.end()) names.insert(found->second);
+    }
+  };
+  add(body);
+  for (const Load& load : loads) add(*load.body);
   std::vector<Avatar*> avatars;
   for (const std::string& name : names) avatars.push_back(&world.avatars.at(name));
   return avatars;
@@ -105,9 +183,15 @@ std::vector<Avatar*> avatarsNear(WorldState& world, const Body& body) {
 
 struct Rider {
   Avatar* avatar;
-  Vec3 contact;       ///< on the body, in its frame
-  bool onFree;        ///< stands on a free body that the body carries
-  double height = 0;  ///< of the contact in the beginning
+  Vec3 contact;  ///< on the body, in its frame
+  bool onLoad;   ///< stands on a load, not on the body itself
+};
+
+/// What the driven body and those near it are in this tick.
+struct Company {
+  std::vector<Load> loads;
+  std::vector<Avatar*> near;
+  std::vector<Rider> riders;
 };
 
 /// Where the avatar leans on the body, as near to its feet as that comes: carried by that point,
@@ -134,55 +218,23 @@ Vec3 leaningPoint(const WorldState& world, const Body& body, const Avatar& avata
   return avatar.feet.cwiseMax(patch.min).cwiseMin(patch.max);
 }
 
-/// The free bodies that the body carries: those that rest on it, or on such a one.
-std::set<EntityId> carriedBy(const WorldState& world, const Body& body) {
-  std::set<EntityId> carried{body.id};
-  for (std::size_t before = 0; before < carried.size();) {
-    before = carried.size();
-    for (const auto& [pair, contact] : world.bodyContacts) {
-      const double upwards = contact.decision.normal.y();  // from the first to the second
-      if (!contact.touching || std::abs(upwards) < world.lengths.walkableNormalY) continue;
-      const EntityId below = upwards > 0 ? pair.first : pair.second;
-      const EntityId above = upwards > 0 ? pair.second : pair.first;
-      const auto found = world.bodyOfId.find(above);
-      if (found == world.bodyOfId.end()) continue;
-      const bool isFree = world.bodies[found->second].spec->kind == BodyKind::rigid;
-      if (isFree && carried.contains(below)) carried.insert(above);
-    }
-  }
-  return carried;
-}
-
-/// Who stands on a free body that the body may carry or push.
-std::vector<Avatar*> avatarsOnFree(WorldState& world) {
-  std::vector<Avatar*> avatars;
-  for (auto& [name, avatar] : world.avatars) {
-    const auto ground = world.bodyOfId.find(avatar.standsOn);
-    if (ground != world.bodyOfId.end() && world.bodies[ground->second].driven)
-      avatars.push_back(&avatar);
-  }
-  return avatars;
-}
-
-/// Who stands on the body, and on what it carries.
-std::vector<Rider> ridersOf(WorldState& world, const Body& body, const std::vector<Avatar*>& near) {
+/// Who stands on the body, or on its loads.
+std::vector<Rider> ridersOf(const WorldState& world, const Body& body,
+                            const std::vector<Load>& loads, const std::vector<Avatar*>& near) {
   std::vector<Rider> riders;
   for (Avatar* avatar : near) {
     if (!avatar->grounded) continue;
+    bool rides = false;
     for (const Contact& contact : avatar->contacts) {
       const bool below = -contact.decision.normal.y() >= world.lengths.walkableNormalY;
-      if (contact.other == body.id && contact.touching && below)
-        riders.push_back(
-            {avatar, inBody(body, leaningPoint(world, body, *avatar, contact)), false});
+      if (contact.other != body.id || !contact.touching || !below) continue;
+      riders.push_back({avatar, inBody(body, leaningPoint(world, body, *avatar, contact)), false});
+      rides = true;
     }
+    const bool onLoad = std::ranges::any_of(
+        loads, [&](const Load& load) { return load.body->id == avatar->standsOn; });
+    if (onLoad && !rides) riders.push_back({avatar, inBody(body, avatar->feet), true});
   }
-  const std::vector<Avatar*> onFree = avatarsOnFree(world);
-  if (onFree.empty()) return riders;
-  const std::set<EntityId> carried = carriedBy(world, body);
-  for (Avatar* avatar : onFree)
-    if (carried.contains(avatar->standsOn) &&
-        std::ranges::find(riders, avatar, &Rider::avatar) == riders.end())
-      riders.push_back({avatar, inBody(body, avatar->feet), true, avatar->feet.y()});
   return riders;
 }
 
@@ -203,7 +255,9 @@ bool push(WorldState& world, const Body& body, const BodyPlace& to, const Encoun
           QueryCount& count) {
   const collision::Decision& at = met.sweep.atStop;
   if (at.verdict != collision::Verdict::separated) return false;
-  const double needed = at.normal.dot(carried(body, to, at.pointA) - at.pointA);
+  const Vec3 way =
+      met.load ? Vec3(0, met.load->toRise, 0) : Vec3(carried(body, to, at.pointA) - at.pointA);
+  const double needed = at.normal.dot(way);
   const double apart = std::max(0.0, bandOf(world.lengths).high - at.distance);
   const Vec3 before = met.avatar->feet;
   shove(world, *met.avatar, yieldingWay(at.normal, std::max(0.0, needed) + apart), count);
@@ -221,8 +275,17 @@ void tellBlocked(const WorldState& world, Body& body, const Encounter& met, Tick
   report.contacts.push_back(eventOf(world, ContactEvent::Kind::blocked, body.id, contact));
 }
 
+/// How far the loads have risen, and will on the way to `to`.
+void follow(const Body& body, const BodyPlace& to, std::vector<Load>& loads) {
+  for (Load& load : loads) {
+    const Vec3 middle = body.rotation * load.middle + body.position;
+    load.rise = middle.y() - load.height;
+    load.toRise = carried(body, to, middle).y() - middle.y();
+  }
+}
+
 /// Goes on, pushing, until the body is at `to` or blocked; what part of the way was made.
-double advance(WorldState& world, Body& body, const BodyPlace& to, const std::vector<Avatar*>& near,
+double advance(WorldState& world, Body& body, const BodyPlace& to, Company& company,
                TickReport& report, QueryCount& count) {
   double left = 1;
   Encounter met;
@@ -230,7 +293,12 @@ double advance(WorldState& world, Body& body, const BodyPlace& to, const std::ve
     met = {};
     const BodyWay way = wayOf(body, to);
     const double farthest = farthestWay(*body.shape, body.drive.place, to);
-    for (Avatar* avatar : near) meet(body, way, farthest, *avatar, world, met, count);
+    follow(body, to, company.loads);
+    for (Avatar* avatar : company.near) {
+      meet(body, way, farthest, *avatar, world, met, count);
+      for (const Load& load : company.loads)
+        if (load.toRise > 0) meet(load, *avatar, world, met, count);
+    }
     commit(body, to, met.sweep.fraction);
     left *= 1 - met.sweep.fraction;
     if (!met.avatar) return 1;
@@ -241,77 +309,41 @@ double advance(WorldState& world, Body& body, const BodyPlace& to, const std::ve
   return 1 - left;
 }
 
-/// How the avatar and the body stand to one another.
-collision::Decision decisionOf(const Body& body, const Avatar& avatar) {
-  collision::Decision nearest;
-  nearest.distance = std::numeric_limits<double>::infinity();
-  for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part) {
-    for (const AvatarPart& limb : avatar.shape->parts) {
-      collision::FeatureCache cache;
-      const collision::Decision found =
-          collision::decide(partOf(body, part), bodyAt(limb, avatar.feet), cache);
-      if (nearer(found, nearest)) nearest = found;
-    }
-  }
-  return nearest;
-}
-
-/// The same, and who stands on the body goes along. Who stands on what it carries and cannot be
-/// lifted stops it.
-double advanceWithRiders(WorldState& world, Body& body, const BodyPlace& to,
-                         const std::vector<Avatar*>& near, const std::vector<Rider>& riders,
+/// Goes as advance(), and who stands on the body, or on its loads, goes along. A load settles by
+/// itself, and who stands on it after it.
+double advanceWithRiders(WorldState& world, Body& body, const BodyPlace& to, Company& company,
                          TickReport& report, QueryCount& count) {
   std::vector<Vec3> before;
-  double part = 1;
-  Encounter held;
-  for (const Rider& rider : riders) {
+  for (const Rider& rider : company.riders) {
     before.push_back(body.rotation * rider.contact + body.position);
     const Vec3 way = carried(body, to, before.back()) - before.back();
-    if (!(way.y() > 0)) continue;
-    const double low = rider.avatar->feet.y();
+    if (way.y() > 0) shove(world, *rider.avatar, way, count);
+  }
+  const double made = advance(world, body, to, company, report, count);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const Rider& rider = company.riders[i];
+    Vec3 way = body.rotation * rider.contact + body.position - before[i];
+    if (way.y() > 0) continue;
+    if (rider.onLoad) way.y() = 0;
     shove(world, *rider.avatar, way, count);
-    const double risen = rider.avatar->feet.y() - low;
-    if (!rider.onFree || risen >= way.y() - kYield * world.lengths.epsilon) continue;
-    part = std::min(part, std::max(0.0, risen / way.y()));
-    held.avatar = rider.avatar;
-  }
-  const BodyPlace target = part < 1 ? placeBetween(body.drive.place, to, part) : to;
-  double made = advance(world, body, target, near, report, count);
-  if (held.avatar && made == 1) {
-    held.sweep.atStop = decisionOf(body, *held.avatar);
-    tellBlocked(world, body, held, report);
-  }
-  made *= part;
-  for (std::size_t i = 0; i < riders.size(); ++i) {
-    const Vec3 way = body.rotation * riders[i].contact + body.position - before[i];
-    if (way.y() <= 0) shove(world, *riders[i].avatar, way, count);
   }
   return made;
 }
 
 /// Goes the plan's stretches until one is blocked; what part of the plan was made. What it did not
 /// reach is where it stays.
-double followPlan(WorldState& world, Body& body, TickReport& report, QueryCount& count) {
-  const std::vector<Avatar*> near = avatarsNear(world, body);
-  const std::vector<Rider> riders = ridersOf(world, body, near);
+double followPlan(WorldState& world, Body& body, Company& company, TickReport& report,
+                  QueryCount& count) {
   BodyPlan& plan = body.plan;
-  double part = 1;
-  for (std::size_t i = 0; i < plan.stretches && part == 1; ++i) {
-    const double made =
-        advanceWithRiders(world, body, plan.places[i + 1], near, riders, report, count);
+  for (std::size_t i = 0; i < plan.stretches; ++i) {
+    const double made = advanceWithRiders(world, body, plan.places[i + 1], company, report, count);
     if (made == 1) continue;
     std::fill(plan.places.begin() + static_cast<std::ptrdiff_t>(i) + 1, plan.places.end(),
               body.drive.place);
-    part = (static_cast<double>(i) + made) / static_cast<double>(plan.stretches);
+    return (static_cast<double>(i) + made) / static_cast<double>(plan.stretches);
   }
-  for (const Rider& rider : riders) {
-    if (!rider.onFree) continue;
-    const double risen = (body.rotation * rider.contact + body.position).y() - rider.height;
-    rider.avatar->liftedBy =
-        std::clamp(risen, 0.0, std::max(0.0, rider.avatar->feet.y() - rider.height));
-  }
-  if (part == 1) body.blockedBy = 0;
-  return part;
+  body.blockedBy = 0;
+  return 1;
 }
 
 void arrive(Body& body, double made, double tick) {
@@ -327,10 +359,17 @@ void arrive(Body& body, double made, double tick) {
   drive.going = goesRound(*body.spec) || drive.coordinate != drive.target;
 }
 
-void moveBody(WorldState& world, Body& body, TickReport& report, QueryCount& count) {
+void moveBody(WorldState& world, Body& body, const Supports& supports, TickReport& report,
+              QueryCount& count) {
   const Vec3 before = body.position;
   const double tick = world.lengths.tick;
-  arrive(body, followPlan(world, body, report, count), tick);
+  Company company{loadsOf(world, body, supports), {}, {}};
+  company.near = avatarsNear(world, body, company.loads);
+  company.riders = ridersOf(world, body, company.loads, company.near);
+  arrive(body, followPlan(world, body, company, report, count), tick);
+  follow(body, body.drive.place, company.loads);
+  for (const Load& load : company.loads)
+    load.body->risesBy = std::max(load.body->risesBy, load.rise);
   body.velocity = (body.position - before) / tick;
   body.spin = (body.drive.place.turn - body.plan.places[0].turn) / tick * body.spec->axis;
 }
@@ -338,8 +377,9 @@ void moveBody(WorldState& world, Body& body, TickReport& report, QueryCount& cou
 }  // namespace
 
 void moveBodies(WorldState& world, TickReport& report, QueryCount& count) {
+  const Supports supports = supportsOf(world);
   for (const std::uint32_t index : world.goingBodies)
-    moveBody(world, world.bodies[index], report, count);
+    moveBody(world, world.bodies[index], supports, report, count);
 }
 
 }  // namespace enfilade::scene

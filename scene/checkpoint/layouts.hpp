@@ -285,8 +285,8 @@ struct Layout<Avatar> {
   static void archive(A& a, Held<A, Avatar>& avatar) {
     auto& [id, shape, madeOf, feet, gaze, eyeHeight, fallSpeed, grounded, standsOn, flying, jumping,
            standing, height, radius, base, chain, drive, walk, waitLeft, hangsFor, lastMove, asked,
-           resting, stirred, liftedBy, stoppedBy, pairsChanged, atStop, blockedTold, mover, reach,
-           gathered, obstacles, meetsBodies, contacts] = avatar;
+           resting, stirred, stoppedBy, pairsChanged, atStop, blockedTold, mover, reach, gathered,
+           obstacles, meetsBodies, contacts] = avatar;
     a(madeOf, standing, height, radius);
     if constexpr (!A::kWrites) shapeAsRead(a, avatar);  // `shape`, `base`
     a(chain);
@@ -332,8 +332,8 @@ struct Layout<Body> {
   template <class A>
   static void archive(A& a, Held<A, Body>& body) {
     auto& [id, spec, shape, position, orientation, rotation, turned, partBoxes, positionBefore,
-           orientationBefore, velocity, spin, asleep, moved, driven, left, blockedBy, drive, plan,
-           mover, reach, inside] = body;
+           orientationBefore, velocity, spin, asleep, moved, driven, risesBy, left, blockedBy,
+           drive, plan, mover, reach, inside] = body;
     a(position, orientation);
     if constexpr (!A::kWrites) placeBody(body, position, orientation);
     a(velocity, spin, asleep, moved, left, blockedBy, drive, plan, reach, inside);

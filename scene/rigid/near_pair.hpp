@@ -43,7 +43,7 @@ struct NearPair {
 
   bool hasPatch = false;
   bool told = false;  ///< it was near when contacts were last told
-  bool met = false;   ///< in the last step, be they apart again
+  bool met = false;   ///< the solver had them meet in the last step, be they apart again
 
   /// Null: they are far.
   ContactPatch* patch() { return hasPatch ? &close->patch : nullptr; }

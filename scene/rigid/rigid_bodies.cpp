@@ -493,7 +493,7 @@ void planRigids(WorldState& world) {
     Body& body = world.bodies[i];
     Solid& solid = solidOfRigid(world.rigids, i);
     const double driven = away[k];
-    body.driven = driven > 0;
+    body.driven = driven;
     // What is nearer than 2 epsilon is looked at in any case.
     solid.pushed = std::max(0.0, (driven - 2 * world.lengths.epsilon) / tick - solid.fastest());
     const bool wasAwake = solid.leash > lookout;
@@ -555,6 +555,7 @@ void setThreads(World& world, int threads) {
 void moveRigids(WorldState& world, const Wish& wish, TickReport& report, QueryCount& count) {
   RigidStage& stage = world.rigids;
   stage.metByAvatars.clear();
+  for (const std::uint32_t i : stage.bodies) world.bodies[i].risesBy = 0;
   if (stage.bodies.empty()) return;
   for (const auto& [name, avatar] : world.avatars)
     if (!avatar.lastMove.isZero(0) || avatar.chain.speed > 0) wakeLeaning(world, avatar);

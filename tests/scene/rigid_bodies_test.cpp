@@ -319,6 +319,44 @@ TEST(RigidBodies, WhoStandsOnCratesOnALiftIsLiftedWithThem) {
   }
 }
 
+TEST(RigidBodies, WhoWalksAndJumpsOnCratesThatRiseEndsInNone) {
+  // From the lift onto low crates and a higher one, and over the gap between two lifts.
+  const std::vector<NamedBox> crates{{"c0", {-1.5, 0.101, -1.2}, {-0.5, 0.35, 1.2}},
+                                     {"c1", {-0.49, 0.101, -1.2}, {0.5, 0.35, 1.2}},
+                                     {"c2", {0.51, 0.101, -1.2}, {1.5, 0.6, 1.2}},
+                                     {"bridge", {2, 0.101, -0.5}, {4, 0.3, 0.5}}};
+  Model model =
+      loose(crates, {{"lift", {-4, 0, -1.5}, {2.5, 0.1, 1.5}}, {"cart", {3, 0, -1}, {5, 0.1, 1}}});
+  for (std::uint32_t object = 1; object <= 2; ++object) {
+    BodySpec lift = bodySpec(object == 1 ? "lift" : "cart", BodyKind::lift, {object});
+    lift.stops = {0, 6}, lift.high = 6, lift.speed = object == 1 ? 1.5 : 1.4;
+    model.bodies.push_back(lift);
+  }
+  BodyTrial t(std::move(model));
+  t.order("ann", Spawn{.at = {-3, 0.102, -0.5}});
+  t.order("bob", Spawn{.at = {0, 0.352, 0.7}});
+  t.order("cid", Spawn{.at = {3, 0.302, 0}});
+  t.ticks(60);
+  t.order("ann", Drive{{1.4, 0, 0}});
+  for (int i = 0; i < 5; ++i) t.order("bob", Jump{0.3, Vec3(0, 0, 0)});
+  for (const char* lift : {"lift", "cart"}) t.tell({lift, BodyCommand::Action::to, 6, 0, {}});
+  double highest = 0;
+  std::optional<World> again;
+  for (int i = 0; i < 200; ++i) {
+    const TickReport report = t.step();
+    ASSERT_EQ(report.squeezedBodies, 0u) << i;
+    ASSERT_EQ(whoPenetrates(t.world), "") << i;
+    ASSERT_FALSE(anyBodyPenetrates(t.world)) << i;
+    if (again) {
+      ASSERT_EQ(tick(*again).snapshot->stateHash, report.snapshot->stateHash) << i;
+    }
+    if (i == 50) again.emplace(worldFrom(t.world.state().scene, checkpointOf(t.world)));
+    highest = std::max(highest, t.feet("ann").y() - t.body("lift").position.y());
+  }
+  EXPECT_GT(highest, 0.5) << "ann came onto the higher crate";
+  EXPECT_GT(t.body("lift").position.y(), 4);
+}
+
 TEST(RigidBodies, ALiftStopsWhereWhoStandsOnACrateUponItHasNoRoom) {
   BodyTrial t = onCratesOnALift(1, {{"ceiling", {-1, 2.9, -1}, {1, 3, 1}}});
   for (int i = 0; i < 240; ++i) {

@@ -105,6 +105,7 @@ TEST(TimeApart, WhoStandsOnACrateGoesWithTheLiftBelowIt) {
   for (const Assume assume : {Assume::presentMotion, Assume::anyCommand}) {
     const TimeApart now = apartAt(t.world, index, ann, ceiling, assume);
     EXPECT_LE(now.contact, gap / lift.speed + 0.01);  // the lift goes on
+    EXPECT_GT(now.contact, assume == Assume::presentMotion ? 0.4 * gap / lift.speed : 0);
   }
 }
 
