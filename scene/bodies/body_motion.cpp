@@ -43,9 +43,40 @@ Vec3 carried(const Body& body, const BodyPlace& to, const Vec3& point) {
   return pose.rotation.toRotationMatrix() * inBody(body, point) + pose.translation;
 }
 
-/// Moves the avatar by `wish` as far as it can, sliding along what is met.
-void shove(WorldState& world, Avatar& avatar, Vec3 wish, QueryCount& count) {
+/// Where an avatar goes that must give way by `distance` along `normal`: across the ground, unless
+/// it is pushed up or down.
+Vec3 yieldingWay(const Vec3& normal, double distance) {
+  if (std::abs(normal.y()) >= kSidewards) return distance * normal;
+  const Vec3 level{normal.x(), 0, normal.z()};
+  const double length = level.norm();
+  return distance / (length * length) * level;
+}
+
+/// A free body that rests on the body, or on such a one. It is taken to rise as its middle is
+/// carried, straight up: what tilts, or is held, is left to the solver.
+struct Load {
+  std::uint32_t index;             ///< into WorldState::bodies
+  Vec3 middle;                     ///< in the carrier's frame
+  double height;                   ///< of the middle, when the tick began
+  double risen;                    ///< metres, by other driven bodies in this tick
+  double rise = 0;                 ///< metres, with the carrier so far
+  double toRise = 0;               ///< metres, on the way at hand
+  std::vector<Avatar*> near = {};  ///< whom it may meet
+
+  /// Where it is already; the way at hand may end below.
+  double from() const { return std::max(rise, risen); }
+  bool isLifted() const { return rise + toRise > from(); }
+};
+
+/// Moves the avatar by `wish` as far as it can, sliding along what is met. What rises with the body
+/// is in nobody's way upwards.
+void shove(WorldState& world, Avatar& avatar, Vec3 wish, const std::vector<Load>& loads,
+           QueryCount& count) {
   gatherObstacles(world, avatar);
+  if (wish.y() > 0)
+    for (Obstacle& obstacle : avatar.obstacles)
+      if (std::ranges::find(loads, obstacle.ofBody, &Load::index) != loads.end())
+        obstacle.box = Box();
   const Box room = feetRoomOf(world.lengths, avatar);
   avatar.stirred = true;  // who was moved looks where it stands now, even if the body then stays
   for (int i = 0; i < kPushSlides && !wish.isZero(0); ++i) {
@@ -58,24 +89,6 @@ void shove(WorldState& world, Avatar& avatar, Vec3 wish, QueryCount& count) {
     wish = rest - std::min(0.0, rest.dot(stop.normal)) * stop.normal;
   }
 }
-
-/// Where an avatar goes that must give way by `distance` along `normal`: across the ground, unless
-/// it is pushed up or down.
-Vec3 yieldingWay(const Vec3& normal, double distance) {
-  if (std::abs(normal.y()) >= kSidewards) return distance * normal;
-  const Vec3 level{normal.x(), 0, normal.z()};
-  const double length = level.norm();
-  return distance / (length * length) * level;
-}
-
-/// A free body that rests on the body, or on such a one: it rises as its middle is carried.
-struct Load {
-  Body* body;
-  Vec3 middle;        ///< in the carrier's frame
-  double height;      ///< of the middle, when the tick began
-  double rise = 0;    ///< metres, since then
-  double toRise = 0;  ///< metres, on the way at hand
-};
 
 /// Who stops the body, and where.
 struct Encounter {
@@ -99,22 +112,24 @@ void meet(const Body& body, const BodyWay& way, double farthest, Avatar& avatar,
   }
 }
 
-/// The same of a load that rises.
+/// The same of a load that is lifted.
 void meet(const Load& load, Avatar& avatar, const WorldState& world, Encounter& first,
           QueryCount& count) {
   const collision::StoppingBand band = bandOf(world.lengths);
-  const Body& body = *load.body;
-  const Vec3 risen(0, load.rise, 0);
-  const BodyWay way{body.rotation, body.position + risen, {0, load.toRise, 0}, Vec3::UnitY(), 0};
+  const Body& body = world.bodies[load.index];
+  const double from = load.from(), rise = load.rise + load.toRise - from;
+  const Vec3 risen(0, from, 0);
+  const BodyWay way{body.rotation, Vec3(body.position + risen), {0, rise, 0}, Vec3::UnitY(), 0};
   for (const AvatarPart& limb : avatar.shape->parts) {
-    Box box = grown(boxAt(limb.box, avatar.feet), band.high + load.toRise);
+    Box box = grown(boxAt(limb.box, avatar.feet), band.high + rise);
     box.min -= risen, box.max -= risen;
     for (std::size_t part = 0; part < body.partBoxes.size(); ++part) {
       if (!overlaps(box, body.partBoxes[part])) continue;
-      const BodySweep sweep =
+      BodySweep sweep =
           sweepTurning({body.shape->parts[part], way}, bodyAt(limb, avatar.feet), band, count);
-      if (sweep.stopped && (!first.avatar || sweep.fraction < first.sweep.fraction))
-        first = {&avatar, &load, sweep};
+      if (!sweep.stopped) continue;
+      sweep.fraction = (from + sweep.fraction * rise - load.rise) / load.toRise;
+      if (!first.avatar || sweep.fraction < first.sweep.fraction) first = {&avatar, &load, sweep};
     }
   }
 }
@@ -122,30 +137,56 @@ void meet(const Load& load, Avatar& avatar, const WorldState& world, Encounter& 
 /// Which free body stands on which body: the lower one first; ascending.
 using Supports = std::vector<std::pair<EntityId, EntityId>>;
 
+/// The steepest normal of parts that touch, from `a` to `b`: of a crate in a corner the nearest
+/// part may be the wall.
+double steepestTouch(const WorldState& world, const Body& a, const Body& b) {
+  double steepest = 0;
+  const double near = contactLimit(world.lengths);
+  for (std::uint32_t i = 0; i < a.partBoxes.size(); ++i) {
+    const Box box = grown(a.partBoxes[i], near);
+    for (std::uint32_t k = 0; k < b.partBoxes.size(); ++k) {
+      if (!overlaps(box, b.partBoxes[k])) continue;
+      collision::FeatureCache cache;
+      const auto at = collision::decideWithin(partOf(a, i), partOf(b, k), near, cache);
+      const bool touches = at && at->verdict != collision::Verdict::penetrating;
+      if (touches && std::abs(at->normal.y()) > std::abs(steepest)) steepest = at->normal.y();
+    }
+  }
+  return steepest;
+}
+
+/// Whether the second stands on the first, > 0, or the first on the second, < 0; by the contact of
+/// the last tick.
+double standing(const WorldState& world, const Contact& contact, const Body& first,
+                const Body& second) {
+  const double least = world.lengths.walkableNormalY;
+  if (contact.decision.verdict == collision::Verdict::penetrating)  // there is no normal
+    return second.position.y() - first.position.y();
+  double up = contact.decision.normal.y();
+  const bool isOne = first.partBoxes.size() == 1 && second.partBoxes.size() == 1;
+  if (std::abs(up) < least && !isOne) up = steepestTouch(world, first, second);
+  return std::abs(up) < least ? 0 : up;
+}
+
 /// Of the last tick. None where there is nobody whom they could lift.
 Supports supportsOf(const WorldState& world) {
   Supports supports;
   if (world.avatars.empty() || world.goingBodies.empty()) return supports;
-  const auto bodyOf = [&](EntityId id) -> const Body* {
-    const auto found = world.bodyOfId.find(id);
-    return found == world.bodyOfId.end() ? nullptr : &world.bodies[found->second];
-  };
   for (const auto& [pair, contact] : world.bodyContacts) {
-    const Body *first = bodyOf(pair.first), *second = bodyOf(pair.second);
-    if (!contact.touching || !first || !second) continue;
-    // A penetration has no normal.
-    const bool isIn = contact.decision.verdict == collision::Verdict::penetrating;
-    const double up =
-        isIn ? second->position.y() - first->position.y() : contact.decision.normal.y();
-    if (!isIn && std::abs(up) < world.lengths.walkableNormalY) continue;
-    const Body &below = up > 0 ? *first : *second, &above = up > 0 ? *second : *first;
-    if (above.spec->kind == BodyKind::rigid) supports.emplace_back(below.id, above.id);
+    if (!contact.touching || pair.second >= world.firstAvatarId()) continue;
+    const auto first = world.bodyOfId.find(pair.first), second = world.bodyOfId.find(pair.second);
+    if (first == world.bodyOfId.end() || second == world.bodyOfId.end()) continue;
+    const Body &a = world.bodies[first->second], &b = world.bodies[second->second];
+    const double up = standing(world, contact, a, b);
+    const Body &below = up > 0 ? a : b, &above = up > 0 ? b : a;
+    const bool carries = up != 0 && above.spec->kind == BodyKind::rigid && !above.left;
+    if (carries) supports.emplace_back(below.id, above.id);
   }
   std::ranges::sort(supports);
   return supports;
 }
 
-std::vector<Load> loadsOf(WorldState& world, const Body& body, const Supports& supports) {
+std::vector<Load> loadsOf(const WorldState& world, const Body& body, const Supports& supports) {
   std::vector<Load> loads;
   std::vector<EntityId> open{body.id};
   std::set<EntityId> known{body.id};
@@ -156,26 +197,23 @@ std::vector<Load> loadsOf(WorldState& world, const Body& body, const Supports& s
          at != supports.end() && at->first == below; ++at) {
       if (!known.insert(at->second).second) continue;
       open.push_back(at->second);
-      Body& above = world.bodies[world.bodyOfId.at(at->second)];
-      loads.push_back({&above, inBody(body, above.position), above.position.y()});
+      const std::uint32_t index = world.bodyOfId.at(at->second);
+      const Body& above = world.bodies[index];
+      loads.push_back({index, inBody(body, above.position), above.position.y(), above.risesBy});
     }
   }
   return loads;
 }
 
-/// Avatars that the broad phase has near the body or its loads, in order of name.
-std::vector<Avatar*> avatarsNear(WorldState& world, const Body& body,
-                                 const std::vector<Load>& loads) {
-  std::set<std::string> names;
-  const auto add = [&](const Body& near) {
-    for (const auto& partner : world.broadPhase.partners(near.mover)) {
-      if (!partner.moves) continue;
-      const auto found = world.avatarOfMover.find(partner.id);
-      if (found != world.avatarOfMover.end()) names.insert(found->second);
-    }
-  };
-  add(body);
-  for (const Load& load : loads) add(*load.body);
+/// Avatars that the broad phase has near the body, in order of name.
+std::vector<Avatar*> avatarsNear(WorldState& world, const Body& body) {
+  std::vector<std::string> names;
+  for (const auto& partner : world.broadPhase.partners(body.mover)) {
+    if (!partner.moves) continue;
+    const auto found = world.avatarOfMover.find(partner.id);
+    if (found != world.avatarOfMover.end()) names.push_back(found->second);
+  }
+  std::sort(names.begin(), names.end());
   std::vector<Avatar*> avatars;
   for (const std::string& name : names) avatars.push_back(&world.avatars.at(name));
   return avatars;
@@ -183,13 +221,14 @@ std::vector<Avatar*> avatarsNear(WorldState& world, const Body& body,
 
 struct Rider {
   Avatar* avatar;
-  Vec3 contact;  ///< on the body, in its frame
-  bool onLoad;   ///< stands on a load, not on the body itself
+  Vec3 contact;         ///< on the body, in its frame
+  bool onLoad;          ///< stands on a load, not on the body itself
+  bool lifted = false;  ///< all of the way at hand: no load comes nearer
 };
 
-/// What the driven body and those near it are in this tick.
+/// Who goes with the driven body in this tick, or may be in its way.
 struct Company {
-  std::vector<Load> loads;
+  std::vector<Load> loads;  ///< near somebody
   std::vector<Avatar*> near;
   std::vector<Rider> riders;
 };
@@ -218,24 +257,36 @@ Vec3 leaningPoint(const WorldState& world, const Body& body, const Avatar& avata
   return avatar.feet.cwiseMax(patch.min).cwiseMin(patch.max);
 }
 
-/// Who stands on the body, or on its loads.
-std::vector<Rider> ridersOf(const WorldState& world, const Body& body,
-                            const std::vector<Load>& loads, const std::vector<Avatar*>& near) {
-  std::vector<Rider> riders;
-  for (Avatar* avatar : near) {
-    if (!avatar->grounded) continue;
-    bool rides = false;
-    for (const Contact& contact : avatar->contacts) {
-      const bool below = -contact.decision.normal.y() >= world.lengths.walkableNormalY;
-      if (contact.other != body.id || !contact.touching || !below) continue;
-      riders.push_back({avatar, inBody(body, leaningPoint(world, body, *avatar, contact)), false});
-      rides = true;
-    }
-    const bool onLoad = std::ranges::any_of(
-        loads, [&](const Load& load) { return load.body->id == avatar->standsOn; });
-    if (onLoad && !rides) riders.push_back({avatar, inBody(body, avatar->feet), true});
+bool standsOn(const WorldState& world, const Body& body, const Avatar& avatar, Vec3& at) {
+  for (const Contact& contact : avatar.contacts) {
+    const bool below = -contact.decision.normal.y() >= world.lengths.walkableNormalY;
+    if (contact.other != body.id || !contact.touching || !below) continue;
+    at = leaningPoint(world, body, avatar, contact);
+    return true;
   }
-  return riders;
+  return false;
+}
+
+Company companyOf(WorldState& world, const Body& body, const Supports& supports) {
+  Company company{loadsOf(world, body, supports), avatarsNear(world, body), {}};
+  Vec3 at;
+  for (Avatar* avatar : company.near)
+    if (avatar->grounded && standsOn(world, body, *avatar, at))
+      company.riders.push_back({avatar, inBody(body, at), false});
+  const std::size_t direct = company.riders.size();
+  for (Load& load : company.loads) {
+    const Body& loaded = world.bodies[load.index];
+    load.near = avatarsNear(world, loaded);
+    for (Avatar* avatar : load.near) {
+      if (!avatar->grounded || avatar->standsOn != loaded.id) continue;
+      const auto end = company.riders.begin() + static_cast<std::ptrdiff_t>(direct);
+      if (std::find_if(company.riders.begin(), end,
+                       [&](const Rider& rider) { return rider.avatar == avatar; }) == end)
+        company.riders.push_back({avatar, inBody(body, avatar->feet), true});
+    }
+  }
+  std::erase_if(company.loads, [](const Load& load) { return load.near.empty(); });
+  return company;
 }
 
 void commit(Body& body, const BodyPlace& to, double fraction) {
@@ -252,7 +303,7 @@ void commit(Body& body, const BodyPlace& to, double fraction) {
 
 /// Pushes who is in the way; false when that gains the body nothing.
 bool push(WorldState& world, const Body& body, const BodyPlace& to, const Encounter& met,
-          QueryCount& count) {
+          const std::vector<Load>& loads, QueryCount& count) {
   const collision::Decision& at = met.sweep.atStop;
   if (at.verdict != collision::Verdict::separated) return false;
   const Vec3 way =
@@ -260,7 +311,7 @@ bool push(WorldState& world, const Body& body, const BodyPlace& to, const Encoun
   const double needed = at.normal.dot(way);
   const double apart = std::max(0.0, bandOf(world.lengths).high - at.distance);
   const Vec3 before = met.avatar->feet;
-  shove(world, *met.avatar, yieldingWay(at.normal, std::max(0.0, needed) + apart), count);
+  shove(world, *met.avatar, yieldingWay(at.normal, std::max(0.0, needed) + apart), loads, count);
   return (met.avatar->feet - before).dot(at.normal) > kYield * world.lengths.epsilon;
 }
 
@@ -275,13 +326,23 @@ void tellBlocked(const WorldState& world, Body& body, const Encounter& met, Tick
   report.contacts.push_back(eventOf(world, ContactEvent::Kind::blocked, body.id, contact));
 }
 
-/// How far the loads have risen, and will on the way to `to`.
-void follow(const Body& body, const BodyPlace& to, std::vector<Load>& loads) {
+/// How far the loads have risen, which is where they stand from now on, and will on the way to
+/// `to`.
+void follow(WorldState& world, const Body& body, const BodyPlace& to, std::vector<Load>& loads) {
+  if (loads.empty()) return;
+  const collision::Pose pose = poseAt(*body.spec, to);
+  const Mat3 rotation = pose.rotation.toRotationMatrix();
   for (Load& load : loads) {
-    const Vec3 middle = body.rotation * load.middle + body.position;
-    load.rise = middle.y() - load.height;
-    load.toRise = carried(body, to, middle).y() - middle.y();
+    const double height = (body.rotation * load.middle + body.position).y();
+    load.rise = height - load.height;
+    load.toRise = (rotation * load.middle + pose.translation).y() - height;
+    world.bodies[load.index].risesBy = std::max(load.from(), 0.0);
   }
+}
+
+bool isLifted(const Company& company, const Avatar& avatar) {
+  return std::ranges::any_of(
+      company.riders, [&](const Rider& rider) { return rider.avatar == &avatar && rider.lifted; });
 }
 
 /// Goes on, pushing, until the body is at `to` or blocked; what part of the way was made.
@@ -293,16 +354,15 @@ double advance(WorldState& world, Body& body, const BodyPlace& to, Company& comp
     met = {};
     const BodyWay way = wayOf(body, to);
     const double farthest = farthestWay(*body.shape, body.drive.place, to);
-    follow(body, to, company.loads);
-    for (Avatar* avatar : company.near) {
-      meet(body, way, farthest, *avatar, world, met, count);
-      for (const Load& load : company.loads)
-        if (load.toRise > 0) meet(load, *avatar, world, met, count);
-    }
+    follow(world, body, to, company.loads);
+    for (Avatar* avatar : company.near) meet(body, way, farthest, *avatar, world, met, count);
+    for (const Load& load : company.loads)
+      for (Avatar* avatar : load.near)
+        if (load.isLifted() && !isLifted(company, *avatar)) meet(load, *avatar, world, met, count);
     commit(body, to, met.sweep.fraction);
     left *= 1 - met.sweep.fraction;
     if (!met.avatar) return 1;
-    if (!push(world, body, to, met, count)) break;
+    if (!push(world, body, to, met, company.loads, count)) break;
     if (i + 1 == kPushes) ++count.bounded;
   }
   tellBlocked(world, body, met, report);
@@ -314,10 +374,13 @@ double advance(WorldState& world, Body& body, const BodyPlace& to, Company& comp
 double advanceWithRiders(WorldState& world, Body& body, const BodyPlace& to, Company& company,
                          TickReport& report, QueryCount& count) {
   std::vector<Vec3> before;
-  for (const Rider& rider : company.riders) {
+  for (Rider& rider : company.riders) {
     before.push_back(body.rotation * rider.contact + body.position);
     const Vec3 way = carried(body, to, before.back()) - before.back();
-    if (way.y() > 0) shove(world, *rider.avatar, way, count);
+    const double low = rider.avatar->feet.y();
+    if (way.y() > 0) shove(world, *rider.avatar, way, company.loads, count);
+    const double risen = rider.avatar->feet.y() - low;
+    rider.lifted = way.y() > 0 && risen >= way.y() - kYield * world.lengths.epsilon;
   }
   const double made = advance(world, body, to, company, report, count);
   for (std::size_t i = 0; i < before.size(); ++i) {
@@ -325,7 +388,7 @@ double advanceWithRiders(WorldState& world, Body& body, const BodyPlace& to, Com
     Vec3 way = body.rotation * rider.contact + body.position - before[i];
     if (way.y() > 0) continue;
     if (rider.onLoad) way.y() = 0;
-    shove(world, *rider.avatar, way, count);
+    shove(world, *rider.avatar, way, company.loads, count);
   }
   return made;
 }
@@ -363,13 +426,9 @@ void moveBody(WorldState& world, Body& body, const Supports& supports, TickRepor
               QueryCount& count) {
   const Vec3 before = body.position;
   const double tick = world.lengths.tick;
-  Company company{loadsOf(world, body, supports), {}, {}};
-  company.near = avatarsNear(world, body, company.loads);
-  company.riders = ridersOf(world, body, company.loads, company.near);
+  Company company = companyOf(world, body, supports);
   arrive(body, followPlan(world, body, company, report, count), tick);
-  follow(body, body.drive.place, company.loads);
-  for (const Load& load : company.loads)
-    load.body->risesBy = std::max(load.body->risesBy, load.rise);
+  follow(world, body, body.drive.place, company.loads);
   body.velocity = (body.position - before) / tick;
   body.spin = (body.drive.place.turn - body.plan.places[0].turn) / tick * body.spec->axis;
 }
