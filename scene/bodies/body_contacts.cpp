@@ -183,8 +183,8 @@ BodyContacts metOnTheWay(const std::vector<PartContact>& parts, const BodyContac
     met.emplace_back(found.key, contact);
   }
   std::ranges::stable_sort(met, {}, &BodyContacts::value_type::first);
-  const auto rest = std::ranges::unique(met, {}, &BodyContacts::value_type::first);
-  met.erase(rest.begin(), rest.end());
+  const auto samePair = [](const auto& a, const auto& b) { return a.first == b.first; };
+  met.erase(std::unique(met.begin(), met.end(), samePair), met.end());
   return met;
 }
 

@@ -406,8 +406,7 @@ std::vector<std::pair<EntityId, EntityId>> meetingsOfAvatars(const WorldState& w
     if (pair.met && stage.entities[pair.key.b] >= world.firstAvatarId())
       met.emplace_back(stage.entities[pair.key.b], stage.entities[pair.key.a]);
   std::ranges::sort(met);
-  const auto rest = std::ranges::unique(met);
-  met.erase(rest.begin(), rest.end());
+  met.erase(std::unique(met.begin(), met.end()), met.end());
   return met;
 }
 
