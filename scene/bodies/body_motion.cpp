@@ -306,8 +306,9 @@ bool push(WorldState& world, const Body& body, const BodyPlace& to, const Encoun
           const std::vector<Load>& loads, QueryCount& count) {
   const collision::Decision& at = met.sweep.atStop;
   if (at.verdict != collision::Verdict::separated) return false;
-  const Vec3 way =
-      met.load ? Vec3(0, met.load->toRise, 0) : Vec3(carried(body, to, at.pointA) - at.pointA);
+  const double left = 1 - met.sweep.fraction;  // of a load's way; the body itself has gone its part
+  const Vec3 way = met.load ? Vec3(0, left * met.load->toRise, 0)
+                            : Vec3(carried(body, to, at.pointA) - at.pointA);
   const double needed = at.normal.dot(way);
   const double apart = std::max(0.0, bandOf(world.lengths).high - at.distance);
   const Vec3 before = met.avatar->feet;
