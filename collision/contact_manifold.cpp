@@ -48,15 +48,15 @@ struct ContactFrame {
 };
 
 /// Corners in the contact's frame, in order around.
-struct Feature {
+struct Outline {
   std::array<Vec3, kMostCorners> corners;
   std::size_t size = 0;
 
-  Feature() = default;
-  Feature(const Feature& other) : size(other.size) {
+  Outline() = default;
+  Outline(const Outline& other) : size(other.size) {
     std::copy_n(other.corners.begin(), size, corners.begin());
   }
-  Feature& operator=(const Feature& other) {
+  Outline& operator=(const Outline& other) {
     size = other.size;
     std::copy_n(other.corners.begin(), size, corners.begin());
     return *this;
@@ -154,11 +154,11 @@ const std::vector<std::uint32_t>* supportFace(const Seen& seen, std::uint32_t ve
 }
 
 /// `slack`: metres below the support plane.
-Feature supportFeature(const Seen& seen, double sense, double slack) {
+Outline supportOutline(const Seen& seen, double sense, double slack) {
   const ConvexBody& body = seen.body;
   const std::uint32_t vertex = supportVertex(seen);
   const Vec3 summit = seen.corner(vertex);
-  Feature feature;
+  Outline feature;
   const auto take = [&](std::uint32_t i) {
     const Vec3 corner = i == vertex ? summit : seen.corner(i);
     if (sense * corner.z() >= sense * summit.z() - slack) feature.add(corner);
@@ -183,7 +183,7 @@ double dot(const Vec3& a, const Vec3& b) {
   return a.x() * b.x() + a.y() * b.y();
 }
 
-double area(const Feature& polygon) {
+double area(const Outline& polygon) {
   double twice = 0;
   for (std::size_t i = 1; i + 1 < polygon.size; ++i)
     twice +=
@@ -192,8 +192,8 @@ double area(const Feature& polygon) {
 }
 
 /// What of `subject` lies left of the edge from `from` to `to`, or on it.
-Feature clippedByEdge(const Feature& subject, const Vec3& from, const Vec3& to, double rounding) {
-  Feature kept;
+Outline clippedByEdge(const Outline& subject, const Vec3& from, const Vec3& to, double rounding) {
+  Outline kept;
   const Vec3 edge = to - from;
   const double slack = rounding * std::sqrt(dot(edge, edge));
   const auto left = [&](const Vec3& p) { return cross(edge, p - from) + slack; };
@@ -211,19 +211,19 @@ Feature clippedByEdge(const Feature& subject, const Vec3& from, const Vec3& to, 
 }
 
 /// `polygon` has three corners or more, anticlockwise.
-Feature clippedByPolygon(Feature subject, const Feature& polygon, double rounding) {
+Outline clippedByPolygon(Outline subject, const Outline& polygon, double rounding) {
   for (std::size_t i = 0; i < polygon.size && subject.size > 0; ++i)
     subject = clippedByEdge(subject, polygon.corners[i], polygon.next(i), rounding);
   return subject;
 }
 
 /// What of edge `a` lies above edge `b`: nothing, a point, or where they run side by side.
-Feature edgesMeeting(const Feature& a, const Feature& b, double rounding) {
+Outline edgesMeeting(const Outline& a, const Outline& b, double rounding) {
   const Vec3 alongA = a.corners[1] - a.corners[0], alongB = b.corners[1] - b.corners[0];
   const Vec3 between = b.corners[0] - a.corners[0];
   const double spanned = cross(alongA, alongB);
   const double lengthA = std::sqrt(dot(alongA, alongA)), lengthB = std::sqrt(dot(alongB, alongB));
-  Feature kept;
+  Outline kept;
   if (std::abs(spanned) > rounding * (lengthA + lengthB)) {
     const double s = cross(between, alongB) / spanned, t = cross(between, alongA) / spanned;
     if (s >= 0 && s <= 1 && t >= 0 && t <= 1) kept.add(a.corners[0] + s * alongA);
@@ -242,10 +242,10 @@ Feature edgesMeeting(const Feature& a, const Feature& b, double rounding) {
 }
 
 /// The points of `subject` that lie above `other`, both seen along the normal.
-Feature clipped(const Feature& subject, Feature other, double rounding) {
-  if (subject.size == 1 || other.size == 1) return subject.size == 1 ? subject : Feature{};
+Outline clipped(const Outline& subject, Outline other, double rounding) {
+  if (subject.size == 1 || other.size == 1) return subject.size == 1 ? subject : Outline{};
   if (other.size == 2)
-    return subject.size == 2 ? edgesMeeting(subject, other, rounding) : Feature{};
+    return subject.size == 2 ? edgesMeeting(subject, other, rounding) : Outline{};
   if (area(other) < 0) std::reverse(other.corners.begin(), other.corners.begin() + other.size);
   return clippedByPolygon(subject, other, rounding);
 }
@@ -255,7 +255,7 @@ Feature clipped(const Feature& subject, Feature other, double rounding) {
 /// The depth of a feature above or below points of the projection.
 class Depths {
  public:
-  explicit Depths(const Feature& feature) : size_(feature.size), first_(feature.corners[0]) {
+  explicit Depths(const Outline& feature) : size_(feature.size), first_(feature.corners[0]) {
     for (std::size_t i = 0; i < size_; ++i) {
       least_ = std::min(least_, feature.corners[i].z());
       most_ = std::max(most_, feature.corners[i].z());
@@ -332,10 +332,10 @@ ContactManifold contactManifold(const ConvexBody& a, const ConvexBody& b, const 
   if (nearest > seed.limit + rounding) return manifold;
 
   const double slack = seed.limit - nearest + 2 * rounding;
-  const Feature onA = supportFeature({a, frame, seed.normalsA, 1}, 1, slack);
-  const Feature onB = supportFeature({b, frame, seed.normalsB, -1}, -1, slack);
+  const Outline onA = supportOutline({a, frame, seed.normalsA, 1}, 1, slack);
+  const Outline onB = supportOutline({b, frame, seed.normalsB, -1}, -1, slack);
   const bool fromA = onA.size == 1 || (onB.size > 1 && (onA.size == 2 || onB.size > 2));
-  const Feature overlap = fromA ? clipped(onA, onB, rounding) : clipped(onB, onA, rounding);
+  const Outline overlap = fromA ? clipped(onA, onB, rounding) : clipped(onB, onA, rounding);
 
   const Depths depths(fromA ? onB : onA);
   std::array<Candidate, kMostCorners> points;

@@ -21,6 +21,8 @@ enum class DecidedBy : std::uint8_t {
   expansion,  ///< exact sums of doubles
   rational    ///< exact integers of any length
 };
+/// Part of the surface of a convex body: what a closest point lies within.
+enum class Feature : std::uint8_t { none, vertex, edge, face };
 
 /// A convex body for one query: the hull of `vertices` (body's frame, metres; at least one, all
 /// finite), placed at rotation * vertex + translation, finite as well: every query throws
@@ -51,7 +53,10 @@ struct FeatureCache {
 struct Decision {
   Verdict verdict = Verdict::separated;
   DecidedBy decidedBy = DecidedBy::filter;
-  double distance = 0;          ///< metres, >= 0; 0 unless separated
+  Feature featureA = Feature::none;  ///< of A and B: the least that pointA and pointB lie within,
+  Feature featureB = Feature::none;  ///< up to rounding. Of a body without a hull, two vertices are
+                                     ///< taken for an edge. Penetrating: none
+  double distance = 0;               ///< metres, >= 0; 0 unless separated
   double errorBound = 0;        ///< metres: the true distance lies within distance +- errorBound;
                                 ///< at most 16 units of rounding (2^-53) of the largest coordinate
                                 ///< after the translations are subtracted

@@ -53,6 +53,19 @@ const char* wordOf(v1::Verdict verdict) {
   }
 }
 
+const char* wordOf(v1::Feature feature) {
+  switch (feature) {
+    case v1::FEATURE_VERTEX:
+      return "vertex";
+    case v1::FEATURE_EDGE:
+      return "edge";
+    case v1::FEATURE_FACE:
+      return "face";
+    default:
+      return "unknown";
+  }
+}
+
 const char* wordOf(v1::Notice::Kind kind) {
   switch (kind) {
     case v1::Notice::KIND_ARRIVED:

@@ -102,6 +102,10 @@ std::string contactLine(const v1::ContactEvent& event) {
   if (event.kind() == v1::ContactEvent::KIND_END || event.kind() == v1::ContactEvent::KIND_LEAVE)
     line["reason"] = wordOf(event.reason());
   if (event.kind() == v1::ContactEvent::KIND_NEAR) line["phase"] = wordOf(event.phase());
+  if (event.feature_a() != v1::FEATURE_UNSPECIFIED) {
+    line["feature_a"] = wordOf(event.feature_a());
+    line["feature_b"] = wordOf(event.feature_b());
+  }
   // Names come from files: what is not UTF-8 in them is replaced, not thrown at the walker.
   return line.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -85,6 +85,20 @@ v1::DecidedBy messageOf(collision::DecidedBy decidedBy) {
                                                    : v1::DECIDED_BY_RATIONAL;
 }
 
+v1::Feature messageOf(collision::Feature feature) {
+  switch (feature) {
+    case collision::Feature::vertex:
+      return v1::FEATURE_VERTEX;
+    case collision::Feature::edge:
+      return v1::FEATURE_EDGE;
+    case collision::Feature::face:
+      return v1::FEATURE_FACE;
+    case collision::Feature::none:
+      break;
+  }
+  return v1::FEATURE_UNSPECIFIED;
+}
+
 v1::Error errorOf(v1::ErrorCode code, std::string message, std::string field) {
   v1::Error error;
   error.set_code(code);

@@ -23,6 +23,7 @@ v1::Vec3 messageOf(const scene::Vec3& v);
 scene::Vec3 vectorFrom(const v1::Vec3& message);
 v1::Verdict messageOf(collision::Verdict verdict);
 v1::DecidedBy messageOf(collision::DecidedBy decidedBy);
+v1::Feature messageOf(collision::Feature feature);
 
 /// Into a message that tells of two entities.
 template <class Message>
@@ -34,6 +35,8 @@ void putDecision(const collision::Decision& decision, Message& message) {
   *message.mutable_point_b() = messageOf(decision.pointB);
   *message.mutable_normal() = messageOf(decision.normal);
   message.set_decided_by(messageOf(decision.decidedBy));
+  message.set_feature_a(messageOf(decision.featureA));
+  message.set_feature_b(messageOf(decision.featureB));
 }
 
 v1::Error errorOf(v1::ErrorCode code, std::string message, std::string field = {});

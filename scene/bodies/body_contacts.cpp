@@ -80,6 +80,7 @@ std::optional<Decision> touchOf(const collision::ConvexBody& a, const collision:
 void swapSides(std::optional<Decision>& decision) {
   if (!decision) return;
   std::swap(decision->pointA, decision->pointB);
+  std::swap(decision->featureA, decision->featureB);
   decision->normal = -decision->normal;
 }
 

@@ -18,7 +18,7 @@
 namespace enfilade::scene {
 
 /// Goes up whenever the bytes of the same world would be others.
-inline constexpr std::uint32_t kCheckpointVersion = 2;
+inline constexpr std::uint32_t kCheckpointVersion = 3;
 
 /// Why bytes make no world: what is wrong, and where.
 struct CheckpointError : std::runtime_error {

@@ -17,6 +17,10 @@ struct MostOf<collision::DecidedBy> {
   static constexpr auto value = collision::DecidedBy::rational;
 };
 template <>
+struct MostOf<collision::Feature> {
+  static constexpr auto value = collision::Feature::face;
+};
+template <>
 struct MostOf<CloseUp::Plane> {
   static constexpr auto value = CloseUp::Plane::faceOfB;
 };
@@ -65,8 +69,9 @@ template <>
 struct Layout<collision::Decision> {
   template <class A>
   static void archive(A& a, Held<A, collision::Decision>& decision) {
-    auto& [verdict, decidedBy, distance, errorBound, pointA, pointB, normal] = decision;
-    a(verdict, decidedBy, distance, errorBound, pointA, pointB, normal);
+    auto& [verdict, decidedBy, featureA, featureB, distance, errorBound, pointA, pointB, normal] =
+        decision;
+    a(verdict, decidedBy, featureA, featureB, distance, errorBound, pointA, pointB, normal);
   }
 };
 

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <map>
+
 #include "collision/penetration_depth.hpp"
 #include "tests/collision/random_shapes.hpp"
 #include "tests/collision/rational_verdict.hpp"
@@ -205,6 +208,64 @@ TEST(NarrowPhase, SwappingTheBodiesSwapsTheAnswer) {
     if (ab.verdict != Verdict::separated) continue;
     EXPECT_NEAR(ab.distance, ba.distance, 1e-13);
     EXPECT_TRUE(ab.normal.isApprox(-ba.normal, 1e-7));
+  }
+}
+
+/// The feature of a hull in general position that is farthest along a direction.
+Feature farthestFeature(const Hull& hull, const Vec3& along) {
+  double most = -std::numeric_limits<double>::infinity();
+  for (const Vec3& v : hull.vertices) most = std::max(most, along.dot(v));
+  const auto isFarthest = [&](const Vec3& v) { return along.dot(v) > most - 1e-9; };
+  switch (std::ranges::count_if(hull.vertices, isFarthest)) {
+    case 1:
+      return Feature::vertex;
+    case 2:
+      return Feature::edge;
+    default:
+      return Feature::face;
+  }
+}
+
+TEST(NarrowPhase, NamesTheClosestFeatures) {
+  Random random(14);
+  std::map<std::pair<Feature, Feature>, int> seen;
+  for (int i = 0; i < 400; ++i) {
+    const Hull a = buildHull(randomPoints(random, 8, 1)), b = buildHull(randomPoints(random, 8, 1));
+    const ConvexBody bodyA{.vertices = a.vertices, .hull = &a};
+    const ConvexBody bodyB{
+        .vertices = b.vertices, .translation = randomPoint(random, 3), .hull = &b};
+    const Decision d = decideCold(bodyA, bodyB);
+    if (d.verdict == Verdict::penetrating) {
+      EXPECT_EQ(d.featureA, Feature::none);
+      EXPECT_EQ(d.featureB, Feature::none);
+      continue;
+    }
+    EXPECT_EQ(d.featureA, farthestFeature(a, d.normal)) << i;
+    EXPECT_EQ(d.featureB, farthestFeature(b, -d.normal)) << i;
+    ++seen[{d.featureA, d.featureB}];
+  }
+  for (const auto& [first, second] :
+       {std::pair(Feature::vertex, Feature::vertex), std::pair(Feature::vertex, Feature::edge),
+        std::pair(Feature::vertex, Feature::face), std::pair(Feature::edge, Feature::edge)}) {
+    EXPECT_GT((seen[{first, second}]), 5);
+    EXPECT_GT((seen[{second, first}]), 5);
+  }
+}
+
+TEST(NarrowPhase, APointOverAFacesDiagonalIsOverAFace) {
+  const Hull cube = buildHull(kUnitCube);
+  const std::vector<Vec3> point{Vec3::Zero()};
+  const ConvexBody body{.vertices = cube.vertices, .hull = &cube};
+  for (const double height : {1.0, 1.5}) {  // touching, separated
+    for (const double at : {0.25, 0.5, 0.75}) {
+      const Decision d = decideCold(body, {point, {at, at, height}});
+      EXPECT_EQ(d.featureA, Feature::face) << at << " " << height;
+      EXPECT_EQ(d.featureB, Feature::vertex);
+      const Decision other = decideCold(body, {point, {at, 1 - at, height}});
+      EXPECT_EQ(other.featureA, Feature::face) << at << " " << height;
+    }
+    EXPECT_EQ(decideCold(body, {point, {0, 0.5, height}}).featureA, Feature::edge) << height;
+    EXPECT_EQ(decideCold(body, {point, {1, 1, height}}).featureA, Feature::vertex) << height;
   }
 }
 

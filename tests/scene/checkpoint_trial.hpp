@@ -29,7 +29,7 @@ inline bool same(const Vec3& a, const Vec3& b) {
 inline bool same(const collision::Decision& a, const collision::Decision& b) {
   return a.verdict == b.verdict && a.decidedBy == b.decidedBy && a.distance == b.distance &&
          a.errorBound == b.errorBound && same(a.pointA, b.pointA) && same(a.pointB, b.pointB) &&
-         same(a.normal, b.normal);
+         same(a.normal, b.normal) && a.featureA == b.featureA && a.featureB == b.featureB;
 }
 inline bool same(const ContactEvent& a, const ContactEvent& b) {
   return a.tick == b.tick && a.kind == b.kind && a.reason == b.reason && a.phase == b.phase &&

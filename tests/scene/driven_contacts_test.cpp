@@ -255,6 +255,10 @@ TEST(DrivenContacts, ANearMissBeginsIsClosestAndEnds) {
   EXPECT_EQ(near[1].phase, Phase::min);
   EXPECT_EQ(near[2].phase, Phase::end);
   EXPECT_NEAR(near[1].decision.distance, 0.1, 1e-7);
+  for (const ContactEvent& event : near) {
+    EXPECT_NE(event.decision.featureA, collision::Feature::none);
+    EXPECT_NE(event.decision.featureB, collision::Feature::none);
+  }
   EXPECT_LT(near[0].tick, near[1].tick);
   EXPECT_GE(near[2].decision.distance, 0.3);
 }

@@ -163,6 +163,31 @@ TEST(RigidBodies, WhatBouncesIsToldWhereverItDoes) {
   EXPECT_GT(bounces, 10);
 }
 
+TEST(RigidBodies, ACubeThatFallsOnItsCornerTellsTheCornerAndTheFacesUnderIt) {
+  for (const bool onDriven : {false, true}) {
+    // The cube before what it falls onto and behind it: who tells of the two is the same.
+    for (const std::uint32_t cube : {1u, 2u}) {
+      const NamedBox plate{"plate", {-1, 0.1, -2}, {2, 0.2, 1}};
+      const NamedBox fallen{"cube", {-0.1, -0.1, -0.1}, {0.1, 0.1, 0.1}};
+      Model model = boxModel(cube == 1 ? std::vector{floorBox(), fallen, plate}
+                                       : std::vector{floorBox(), plate, fallen});
+      const Quat turn = Quat::FromTwoVectors(Vec3(1, 1, 1), Vec3::UnitY());
+      model.objects[cube].worldFromMesh = Eigen::Translation3d(0, 0.4, 0) * turn;
+      model.bodies = {bodySpec("cube", BodyKind::rigid, {cube})};
+      if (onDriven) {
+        model.bodies.push_back(bodySpec("plate", BodyKind::sliding, {3 - cube}));
+        model.bodies.back().axis = Vec3::UnitX();
+        model.bodies.back().high = 0.1;
+      }
+      BodyTrial t(std::move(model));
+      while (t.told(Event::begin, "cube", "plate") == 0 && t.world.state().tick < 30) t.step();
+      ASSERT_EQ(t.events.size(), 1u);
+      EXPECT_EQ(t.events[0].decision.featureA, collision::Feature::vertex);
+      EXPECT_EQ(t.events[0].decision.featureB, collision::Feature::face);
+    }
+  }
+}
+
 TEST(RigidBodies, ASleepingBoxIsWokenByADoorOfAnySpeedThatPushesIt) {
   for (const double speed : {0.5, 1.0, 1.05, 5.0}) {
     Model model = loose({{"box", {0.5, 0.0005, 0.1}, {0.8, 0.3, 0.4}}},

@@ -198,6 +198,9 @@ void expectBalanced(const fs::path& out) {
     EXPECT_EQ(contact["event"] == "end", contact.contains("reason"));
     EXPECT_TRUE(live == 0 || live == 1);
     EXPECT_NE(contact["verdict"], "penetrating");
+    for (const char* key : {"feature_a", "feature_b"})
+      EXPECT_TRUE((std::set<std::string>{"vertex", "edge", "face"}.contains(contact.at(key))))
+          << key;
   }
   for (const auto& [pair, live] : open) EXPECT_EQ(live, 0) << pair.first << " " << pair.second;
   EXPECT_GE(begun, 3) << "two floors and a wall";

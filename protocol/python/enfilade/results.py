@@ -20,6 +20,10 @@ def _verdict(number: int) -> str:
     return messages.word(messages.Verdict, number, "VERDICT_")
 
 
+def _feature(number: int) -> str:
+    return messages.word(messages.Feature, number, "FEATURE_") if number else ""
+
+
 @dataclass(frozen=True)
 class Contact:
     """A contact event: ContactEvent of the .proto."""
@@ -40,6 +44,8 @@ class Contact:
     point_b: Vector
     normal: Vector  # unit, from a to b
     decided_by: str  # "filter" or "rational"
+    feature_a: str  # of the nearest parts, where point_a and point_b are: "vertex", "edge", "face";
+    feature_b: str  # "" when they penetrate
 
 
 def contact(event: Any) -> Contact:
@@ -52,7 +58,8 @@ def contact(event: Any) -> Contact:
         a=event.a, b=event.b, a_name=event.a_name, b_name=event.b_name,
         verdict=_verdict(event.verdict), distance=event.distance, error_bound=event.error_bound,
         point_a=vector(event.point_a), point_b=vector(event.point_b), normal=vector(event.normal),
-        decided_by=messages.word(messages.DecidedBy, event.decided_by, "DECIDED_BY_"))
+        decided_by=messages.word(messages.DecidedBy, event.decided_by, "DECIDED_BY_"),
+        feature_a=_feature(event.feature_a), feature_b=_feature(event.feature_b))
 
 
 @dataclass(frozen=True)
@@ -346,6 +353,8 @@ class Pair:
     normal: Vector  # unit, from a to b
     decided_by: str  # "filter" or "rational"
     penetration: float  # metres, of the nearest parts; only when it was refined
+    feature_a: str  # as Contact's
+    feature_b: str
 
 
 def pair(message: Any, tick: int) -> Pair:
@@ -355,7 +364,8 @@ def pair(message: Any, tick: int) -> Pair:
         error_bound=message.error_bound, point_a=vector(message.point_a),
         point_b=vector(message.point_b), normal=vector(message.normal),
         decided_by=messages.word(messages.DecidedBy, message.decided_by, "DECIDED_BY_"),
-        penetration=message.penetration)
+        penetration=message.penetration,
+        feature_a=_feature(message.feature_a), feature_b=_feature(message.feature_b))
 
 
 @dataclass(frozen=True)
