@@ -22,7 +22,9 @@ struct RenderThread::State {
   std::condition_variable changed;
   std::deque<Job> jobs;
   bool closing = false;
-  std::string deviceName, deviceNote;
+  std::promise<void> made;
+  std::shared_future<void> isMade = made.get_future().share();
+  std::string deviceName, deviceNote, whyNone;  ///< once isMade, as the next
   bool software = false;
   std::thread thread;
 
@@ -44,21 +46,28 @@ struct RenderThread::State {
     changed.notify_one();
   }
 
-  void run(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device, RendererKind kind,
-           std::promise<void> started) {
+  /// Null when there can be none.
+  std::unique_ptr<Renderer> make(std::shared_ptr<const scene::Scene> scene,
+                                 const DeviceChoice& device, RendererKind kind) {
     std::unique_ptr<Renderer> renderer;
     try {
       renderer = std::make_unique<Renderer>(std::move(scene), kind, device);
       deviceName = renderer->deviceName();
       deviceNote = renderer->deviceNote();
       software = renderer->software();
-    } catch (...) {
-      started.set_exception(std::current_exception());
-      return;
+    } catch (const std::exception& error) {
+      whyNone = error.what();
     }
-    started.set_value();
+    made.set_value();
+    return renderer;
+  }
+
+  void run(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device,
+           RendererKind kind) {
+    const std::unique_ptr<Renderer> renderer = make(std::move(scene), device, kind);
     while (auto job = nextJob()) {
       try {
+        if (!renderer) throw NoRenderer(whyNone);
         if (!job->snapshot) throw RenderError("RenderThread::render: there is no snapshot");
         job->frame.set_value(
             renderer->render(*job->snapshot, job->camera, job->options, job->kind));
@@ -73,16 +82,9 @@ struct RenderThread::State {
 RenderThread::RenderThread(std::shared_ptr<const scene::Scene> scene, DeviceChoice device,
                            RendererKind kind)
     : state_(std::make_unique<State>()) {
-  std::promise<void> started;
-  std::future<void> ready = started.get_future();
-  state_->thread = std::thread(&State::run, state_.get(), std::move(scene), std::move(device), kind,
-                               std::move(started));
-  try {
-    ready.get();
-  } catch (...) {
-    state_->thread.join();
-    throw;
-  }
+  if (!scene) throw RenderError("RenderThread: there is no scene");
+  state_->thread =
+      std::thread(&State::run, state_.get(), std::move(scene), std::move(device), kind);
 }
 
 RenderThread::~RenderThread() {
@@ -109,12 +111,19 @@ void RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot, Camer
 }
 
 const std::string& RenderThread::deviceName() const {
+  state_->isMade.wait();
   return state_->deviceName;
 }
 const std::string& RenderThread::deviceNote() const {
+  state_->isMade.wait();
   return state_->deviceNote;
 }
+const std::string& RenderThread::whyNone() const {
+  state_->isMade.wait();
+  return state_->whyNone;
+}
 bool RenderThread::software() const {
+  state_->isMade.wait();
   return state_->software;
 }
 

@@ -11,23 +11,27 @@ namespace enfilade::render {
 
 class RenderThread {
  public:
-  /// Starts the thread and its Renderer; throws RenderError when there can be none.
+  /// Starts the thread, which makes its Renderer while its owner goes on: loading a device's
+  /// driver takes longer than loading many a scene. Throws RenderError without a scene.
   explicit RenderThread(std::shared_ptr<const scene::Scene> scene, DeviceChoice device = {},
                         RendererKind kind = RendererKind::automatic);
   ~RenderThread();  ///< finishes what is queued
   RenderThread(const RenderThread&) = delete;
   RenderThread& operator=(const RenderThread&) = delete;
 
-  /// The frame, or the RenderError, comes through the future. Callable from any thread.
+  /// The frame, or the RenderError, comes through the future; NoRenderer when there can be none.
+  /// Callable from any thread.
   std::future<Frame> render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera,
                             FrameOptions options = {}, RendererKind kind = RendererKind::automatic);
   /// As render(), but the future is given when it is ready, on this object's thread, so that nobody
   /// has to be woken. `done` must not throw.
   void render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera, FrameOptions options,
               RendererKind kind, std::function<void(std::future<Frame>)> done);
-  const std::string& deviceName() const;
+  // As Renderer's. They wait until it is made.
+  const std::string& deviceName() const;  ///< "" when there can be none
   bool software() const;
-  const std::string& deviceNote() const;  ///< these three as Renderer's
+  const std::string& deviceNote() const;
+  const std::string& whyNone() const;  ///< "" with a renderer
 
  private:
   struct State;

@@ -32,8 +32,6 @@ Encoded frameReply(Drawing& drawing) {
 }  // namespace
 
 struct FrameService::State {
-  std::string deviceName, whyNone;
-  bool software = false;
   std::atomic<int> toEncode = 0;  ///< pictures whose reply is made, or will be, by `thread`
   WorkThread thread;
   std::unique_ptr<render::RenderThread> renderer;  // first to go: it may still call back
@@ -68,19 +66,14 @@ bool isReadyAsDrawn(const FrameJob& job) {
 
 FrameService::FrameService(std::shared_ptr<const scene::Scene> scene, const DrawingOptions& drawing)
     : state_(std::make_unique<State>()) {
-  try {
-    state_->renderer =
-        std::make_unique<render::RenderThread>(std::move(scene), drawing.device, drawing.renderer);
-    state_->deviceName = state_->renderer->deviceName();
-    state_->software = state_->renderer->software();
-    if (const std::string& note = state_->renderer->deviceNote(); !note.empty()) {
-      spdlog::warn(note);
-    }
-  } catch (const render::RenderError& error) {
-    if (drawing.asked()) throw;
-    state_->whyNone = error.what();
-    spdlog::warn("no pictures: {}", error.what());
-  }
+  state_->renderer =
+      std::make_unique<render::RenderThread>(std::move(scene), drawing.device, drawing.renderer);
+  const render::RenderThread& renderer = *state_->renderer;
+  if (drawing.asked() && !renderer.whyNone().empty()) throw render::RenderError(renderer.whyNone());
+  state_->thread.post([&renderer] {
+    if (!renderer.whyNone().empty()) return spdlog::warn("no pictures: {}", renderer.whyNone());
+    if (!renderer.deviceNote().empty()) spdlog::warn(renderer.deviceNote());
+  });
 }
 
 FrameService::~FrameService() {
@@ -93,13 +86,13 @@ void FrameService::finish() {
 }
 
 const std::string& FrameService::deviceName() const {
-  return state_->deviceName;
+  return state_->renderer->deviceName();
 }
 bool FrameService::software() const {
-  return state_->software;
+  return state_->renderer->software();
 }
 const std::string& FrameService::whyNone() const {
-  return state_->whyNone;
+  return state_->renderer->whyNone();
 }
 
 /// What is ready as it is drawn is handed over by the thread that drew it, and the next picture
@@ -108,12 +101,6 @@ const std::string& FrameService::whyNone() const {
 void FrameService::draw(FrameJob job, std::function<void(Encoded)> done) {
   State& state = *state_;
   const auto drawing = std::make_shared<Drawing>(Drawing{std::move(job), {}, std::move(done)});
-  if (!state.renderer) {
-    return state.thread.post([&state, drawing] {
-      drawing->done(
-          errorReply(drawing->job.requestId, errorOf(v1::ERROR_NO_RENDERER, state.whyNone)));
-    });
-  }
   const View& view = drawing->job.view;
   if (isReadyAsDrawn(drawing->job) && state.toEncode == 0) {
     return state.renderer->render(drawing->job.snapshot, view.camera, view.options, view.renderer,

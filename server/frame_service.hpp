@@ -27,17 +27,19 @@ struct FrameJob {
 
 class FrameService {
  public:
-  /// Without a device it stays without a renderer and says why; that is no failure, unless
-  /// `drawing` asked for something: then RenderError is thrown.
+  /// The renderer is made while the caller goes on. Without a device there is none, which is told
+  /// and is no failure, unless `drawing` asked for something: that is waited for, and RenderError
+  /// thrown.
   explicit FrameService(std::shared_ptr<const scene::Scene> scene,
                         const DrawingOptions& drawing = {});
   ~FrameService();
   FrameService(const FrameService&) = delete;
   FrameService& operator=(const FrameService&) = delete;
 
-  const std::string& deviceName() const;  ///< "" without a renderer
+  // As RenderThread's: they wait until it is made. Not after finish().
+  const std::string& deviceName() const;
   bool software() const;
-  const std::string& whyNone() const;  ///< "" with a renderer
+  const std::string& whyNone() const;
 
   /// `done` gets the whole reply (a Frame or an Error), in the order of the calls of one thread, on
   /// a thread of the service's. It must not throw.

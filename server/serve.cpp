@@ -28,7 +28,6 @@ void tellReady(const Server& server, const scene::Scene& scene, const ServeComma
                                {"scene", messageOf(scene).source()},
                                {"scene_hash", hash},
                                {"objects", scene.model().objects.size()},
-                               {"renderer", server.rendererName()},
                                {"worlds", server.worldNames()}};
   if (!command.recording.empty()) ready["recording"] = command.recording.filename().string();
   const auto replace = nlohmann::ordered_json::error_handler_t::replace;

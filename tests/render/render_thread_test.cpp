@@ -61,6 +61,16 @@ TEST(RenderThread, WhatIsQueuedIsFinishedBeforeItEnds) {
   }
 }
 
+TEST(RenderThread, WithoutADeviceEachPictureIsRefusedAndTheReasonTold) {
+  RenderThread renders(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}), {.device = "no such device"});
+  auto first = renders.render(snapshotOf(1), squareCamera(32));  // while the device is looked for
+  EXPECT_TRUE(renders.deviceName().empty());
+  EXPECT_NE(renders.whyNone().find("no such device"), std::string::npos) << renders.whyNone();
+  auto second = renders.render(snapshotOf(2), squareCamera(32));
+  EXPECT_THROW(first.get(), NoRenderer);
+  EXPECT_THROW(second.get(), NoRenderer);
+}
+
 TEST(RenderThread, WithoutASceneThereIsAnErrorAndNoThread) {
   EXPECT_THROW(RenderThread{nullptr}, RenderError);
 }
