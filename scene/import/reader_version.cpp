@@ -3,6 +3,7 @@
 #include <assimp/version.h>
 #include <elf.h>
 #include <link.h>
+#include <sys/stat.h>
 
 #include <cstdint>
 #include <cstring>
@@ -10,6 +11,7 @@
 #include <string_view>
 
 #include "scene/import/content_hash.hpp"
+#include "scene/import/ifc/ifc_plus_plus.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -52,13 +54,21 @@ std::string programVersion() {
   return hexOf(contentHashOfFile("/proc/self/exe").value_or(ContentHash{}));
 }
 
+/// The module that is opened for ifcplusplus; "" without one.
+std::string moduleVersion() {
+  struct stat module {};
+  if (::stat(ifcPlusPlusModule().c_str(), &module) != 0) return "";
+  return std::to_string(module.st_size) + "." + std::to_string(module.st_mtim.tv_sec) + "." +
+         std::to_string(module.st_mtim.tv_nsec);
+}
+
 }  // namespace
 
 const std::string& readerVersions() {
   static const std::string text =
       "assimp " + std::to_string(aiGetVersionMajor()) + "." + std::to_string(aiGetVersionMinor()) +
       "." + std::to_string(aiGetVersionPatch()) + "." + std::to_string(aiGetVersionRevision()) +
-      " program " + programVersion();
+      " program " + programVersion() + " module " + moduleVersion();
   return text;
 }
 
