@@ -495,10 +495,9 @@ void planRigids(WorldState& world) {
     body.driven = driven;
     // What is nearer than 2 epsilon is looked at in any case.
     solid.pushed = std::max(0.0, (driven - 2 * world.lengths.epsilon) / tick - solid.fastest());
-    const bool wasAwake = solid.leash > lookout;
-    if (body.asleep && !wasAwake && driven == 0) continue;
-    body.moved = false;
     const bool stands = body.asleep && driven == 0;
+    if (stands && !body.moved && solid.leash == lookout) continue;  // as the tick before
+    body.moved = false;
     const double falls = world.lengths.gravity * tick * tick;
     const double spare = std::min(kSpareReach, kSpareOfRadius * solid.radius);
     solid.leash = stands ? lookout : solid.fastest() * tick + falls + std::max(driven, spare);

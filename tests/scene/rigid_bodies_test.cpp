@@ -65,6 +65,20 @@ TEST(RigidBodies, ABoxFallsOntoTheFloorRestsThereAndCostsNothingAsleep) {
   EXPECT_EQ(t.body("box").position, rest);
 }
 
+TEST(RigidBodies, ABoxThatRestsKeepsItsContactHoweverFarNearMissesAreLookedFor) {
+  for (const double nearMiss : {0.0, 0.05, 0.3, 3.0}) {
+    Lengths lengths;
+    lengths.nearMiss = nearMiss;
+    BodyTrial t(loose({{"box", {-0.2, 0.7, -0.2}, {0.2, 1.1, 0.2}}}), lengths);
+    t.untilIdle();
+    t.ticks(10);
+    EXPECT_TRUE(t.body("box").asleep);
+    EXPECT_FALSE(t.body("box").moved) << nearMiss;
+    EXPECT_EQ(t.told(Event::begin, "box", "floor"), 1) << nearMiss;
+    EXPECT_EQ(t.told(Event::end, "box", "floor"), 0) << nearMiss;
+  }
+}
+
 TEST(RigidBodies, ATowerStaysAndSleepsWithoutPenetration) {
   std::vector<NamedBox> tower;
   for (int i = 0; i < 5; ++i) {
@@ -163,27 +177,45 @@ TEST(RigidBodies, WhatBouncesIsToldWhereverItDoes) {
   EXPECT_GT(bounces, 10);
 }
 
-TEST(RigidBodies, ACubeThatFallsOnItsCornerTellsTheCornerAndTheFacesUnderIt) {
-  for (const bool onDriven : {false, true}) {
-    // The cube before what it falls onto and behind it: who tells of the two is the same.
-    for (const std::uint32_t cube : {1u, 2u}) {
-      const NamedBox plate{"plate", {-1, 0.1, -2}, {2, 0.2, 1}};
-      const NamedBox fallen{"cube", {-0.1, -0.1, -0.1}, {0.1, 0.1, 0.1}};
-      Model model = boxModel(cube == 1 ? std::vector{floorBox(), fallen, plate}
-                                       : std::vector{floorBox(), plate, fallen});
-      const Quat turn = Quat::FromTwoVectors(Vec3(1, 1, 1), Vec3::UnitY());
-      model.objects[cube].worldFromMesh = Eigen::Translation3d(0, 0.4, 0) * turn;
-      model.bodies = {bodySpec("cube", BodyKind::rigid, {cube})};
-      if (onDriven) {
-        model.bodies.push_back(bodySpec("plate", BodyKind::sliding, {3 - cube}));
-        model.bodies.back().axis = Vec3::UnitX();
-        model.bodies.back().high = 0.1;
-      }
-      BodyTrial t(std::move(model));
-      while (t.told(Event::begin, "cube", "plate") == 0 && t.world.state().tick < 30) t.step();
-      ASSERT_EQ(t.events.size(), 1u);
-      EXPECT_EQ(t.events[0].decision.featureA, collision::Feature::vertex);
-      EXPECT_EQ(t.events[0].decision.featureB, collision::Feature::face);
+/// What is told first of a cube that falls onto a plate with a corner ahead: which of the two is
+/// `a`, and the features of both.
+ContactEvent cornerOnPlate(std::optional<BodyKind> plateIs, std::uint32_t cube) {
+  const NamedBox plate{"plate", {-1, 0.1, -2}, {2, 0.2, 1}};
+  const NamedBox fallen{"cube", {-0.1, -0.1, -0.1}, {0.1, 0.1, 0.1}};
+  Model model = boxModel(cube == 1 ? std::vector{floorBox(), fallen, plate}
+                                   : std::vector{floorBox(), plate, fallen});
+  const Quat turn = Quat::FromTwoVectors(Vec3(1, 1, 1), Vec3::UnitY());
+  model.objects[cube].worldFromMesh = Eigen::Translation3d(0, 0.6, 0) * turn;
+  model.bodies = {bodySpec("cube", BodyKind::rigid, {cube})};
+  if (plateIs) {
+    model.bodies.push_back(bodySpec("plate", *plateIs, {3 - cube}));
+    model.bodies.back().axis = Vec3::UnitX();
+    if (*plateIs == BodyKind::sliding) model.bodies.back().high = 0.1;
+  }
+  BodyTrial t(std::move(model));
+  const auto isOfBoth = [&](const ContactEvent& event) {
+    return nameOf(t.world, event.a) != "floor" && nameOf(t.world, event.b) != "floor";
+  };
+  while (t.world.state().tick < 60) {
+    t.step();
+    const auto met = std::ranges::find_if(t.events, isOfBoth);
+    if (met != t.events.end()) return *met;
+  }
+  ADD_FAILURE() << "they do not meet";
+  return {};
+}
+
+TEST(RigidBodies, ACubeThatFallsOnItsCornerTellsTheCornerAndTheFaceUnderIt) {
+  using collision::Feature;
+  for (const std::uint32_t cube : {1u, 2u}) {
+    for (const auto plateIs : {std::optional<BodyKind>(), std::optional(BodyKind::sliding),
+                               std::optional(BodyKind::rigid)}) {
+      const ContactEvent met = cornerOnPlate(plateIs, cube);
+      // Of two free ones the one of lesser id tells; else the free one.
+      const bool cubeTells = plateIs != BodyKind::rigid || cube == 1;
+      EXPECT_EQ(met.a, cubeTells ? cube + 1 : 4 - cube);
+      EXPECT_EQ(met.decision.featureA, cubeTells ? Feature::vertex : Feature::face);
+      EXPECT_EQ(met.decision.featureB, cubeTells ? Feature::face : Feature::vertex);
     }
   }
 }
