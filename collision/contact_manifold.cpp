@@ -1,18 +1,18 @@
 // Steps (E. Catto, "Contact Manifolds", Game Developers Conference 2007)
-//  1. The supporting feature of a body: of the faces at its vertex farthest along the normal the
+//  1. The outline that supports a body: of the faces at its vertex farthest along the normal the
 //  one
 //     that faces along it most; of that face the corners that lie within `limit` of the support
 //     plane: a polygon, an edge, or a vertex. (Of a body of three vertices at most: of them.)
-//  2. Both features are projected along the normal and clipped against one another: polygons by
+//  2. Both outlines are projected along the normal and clipped against one another: polygons by
 //     Sutherland and Hodgman, an edge by a polygon (Cyrus and Beck), two edges by where they cross
 //     or overlap. A vertex stays a vertex.
-//  3. Where a corner of the clipped feature meets the other one along the normal, that is the other
+//  3. Where a corner of the clipped outline meets the other one along the normal, that is the other
 //     point, and the way between them the separation. Points farther than `limit` go.
 //  4. Of too many points, the deepest stays, and then again and again the one that is farthest from
 //     all that stay.
-// Departures: the features are cut by depth first, so that a leaning box has two points, and not
+// Departures: the outlines are cut by depth first, so that a leaning box has two points, and not
 // four of which two hang in the air; where the projections miss one another (they may, by rounding,
-// or where the feature is not a face), the seed's own points are the manifold.
+// or where the outline is no face), the seed's own points are the manifold.
 //
 // Tolerance: depths along the normal are known to kRounding u S, S the greatest coordinate; corners
 // within that and `limit` of the support plane lie in it. It is the rounding of the sums here, not
@@ -28,7 +28,7 @@ namespace enfilade::collision {
 namespace {
 
 constexpr double kRounding = 64 * 0x1p-53;  // see the file's head
-constexpr std::size_t kMostCorners = 128;   // of a feature, and of a clipped one; more are left out
+constexpr std::size_t kMostCorners = 128;  // of an outline, and of a clipped one; more are left out
 
 /// A frame whose third axis is the normal; x and y are the projection, z the depth.
 struct ContactFrame {
@@ -158,10 +158,10 @@ Outline supportOutline(const Seen& seen, double sense, double slack) {
   const ConvexBody& body = seen.body;
   const std::uint32_t vertex = supportVertex(seen);
   const Vec3 summit = seen.corner(vertex);
-  Outline feature;
+  Outline outline;
   const auto take = [&](std::uint32_t i) {
     const Vec3 corner = i == vertex ? summit : seen.corner(i);
-    if (sense * corner.z() >= sense * summit.z() - slack) feature.add(corner);
+    if (sense * corner.z() >= sense * summit.z() - slack) outline.add(corner);
   };
   const auto* face = body.hull && !body.hull->faces.empty() ? supportFace(seen, vertex) : nullptr;
   if (face) {
@@ -169,8 +169,8 @@ Outline supportOutline(const Seen& seen, double sense, double slack) {
   } else if (body.vertices.size() <= 3) {
     for (std::uint32_t i = 0; i < body.vertices.size(); ++i) take(i);
   }
-  if (feature.size == 0) feature.add(summit);
-  return feature;
+  if (outline.size == 0) outline.add(summit);
+  return outline;
 }
 
 // ---- step 2, in the projection -----------------------------------------------------------------
@@ -252,17 +252,17 @@ Outline clipped(const Outline& subject, Outline other, double rounding) {
 
 // ---- step 3 ------------------------------------------------------------------------------------
 
-/// The depth of a feature above or below points of the projection.
+/// The depth of an outline above or below points of the projection.
 class Depths {
  public:
-  explicit Depths(const Outline& feature) : size_(feature.size), first_(feature.corners[0]) {
+  explicit Depths(const Outline& outline) : size_(outline.size), first_(outline.corners[0]) {
     for (std::size_t i = 0; i < size_; ++i) {
-      least_ = std::min(least_, feature.corners[i].z());
-      most_ = std::max(most_, feature.corners[i].z());
+      least_ = std::min(least_, outline.corners[i].z());
+      most_ = std::max(most_, outline.corners[i].z());
     }
-    if (size_ == 2) normal_ = feature.corners[1] - first_;
+    if (size_ == 2) normal_ = outline.corners[1] - first_;
     for (std::size_t i = 1; i + 1 < size_; ++i)
-      normal_ += (feature.corners[i] - first_).cross(feature.corners[i + 1] - first_);
+      normal_ += (outline.corners[i] - first_).cross(outline.corners[i + 1] - first_);
   }
   double at(const Vec3& point) const {
     const Vec3 away = point - first_;

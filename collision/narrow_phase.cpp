@@ -22,11 +22,10 @@
 // faces need no cases of their own, and one support proves what V-Clip proves region by region.
 #include "collision/narrow_phase.hpp"
 
-#include <algorithm>
 #include <cmath>
 
+#include "collision/closest_features.hpp"
 #include "collision/exact_answer.hpp"
-#include "collision/hull.hpp"
 #include "collision/polytope.hpp"
 #include "collision/simplex.hpp"
 #include "collision/touching_proof.hpp"
@@ -447,25 +446,6 @@ Decision decideExactly(const MinkowskiDifference& difference, FeatureCache& cach
   return decision;
 }
 
-/// What the vertices that a closest point was combined of span. Those of one body that two pairs
-/// name lie on one face, since the point is on the surface.
-Feature featureOf(const ConvexBody& body, const FeatureCache& cache,
-                  std::uint32_t VertexPair::*vertex) {
-  const std::uint32_t first = cache.pairs[0].*vertex;
-  std::uint32_t second = first;
-  for (int i = 1; i < cache.size; ++i) {
-    const std::uint32_t next = cache.pairs[i].*vertex;
-    if (next == first || next == second) continue;
-    if (second != first) return Feature::face;
-    second = next;
-  }
-  if (second == first) return Feature::vertex;
-  if (!body.hull) return Feature::edge;
-  for (const std::uint32_t joined : body.hull->neighboursOf(first))
-    if (joined == second) return Feature::edge;
-  return Feature::face;  // they are its diagonal
-}
-
 /// The walk in Real from the cached features, and what it proves.
 template <class Real>
 Outcome search(const MinkowskiDifference& difference, double limit, FeatureCache& cache,
@@ -487,10 +467,7 @@ bool decideWithin(const ConvexBody& a, const ConvexBody& b, double limit, Featur
   if (outcome == Outcome::open) outcome = search<Wide>(difference, limit, cache, decision);
   if (outcome == Outcome::open) decision = decideExactly(difference, cache);
   if (outcome == Outcome::beyondLimit) return false;
-  if (decision.verdict != Verdict::penetrating) {
-    decision.featureA = featureOf(a, cache, &VertexPair::a);
-    decision.featureB = featureOf(b, cache, &VertexPair::b);
-  }
+  tellFeatures(a, b, cache, decision);
   return true;
 }
 

@@ -53,10 +53,10 @@ struct FeatureCache {
 struct Decision {
   Verdict verdict = Verdict::separated;
   DecidedBy decidedBy = DecidedBy::filter;
-  Feature featureA = Feature::none;  ///< of A and B: the least that pointA and pointB lie within,
-  Feature featureB = Feature::none;  ///< up to rounding. Of a body without a hull, two vertices are
-                                     ///< taken for an edge. Penetrating: none
-  double distance = 0;               ///< metres, >= 0; 0 unless separated
+  // The least that pointA and pointB lie within, up to rounding; penetrating: none. Of a body
+  // without a hull, two vertices are taken for an edge.
+  Feature featureA = Feature::none, featureB = Feature::none;
+  double distance = 0;          ///< metres, >= 0; 0 unless separated
   double errorBound = 0;        ///< metres: the true distance lies within distance +- errorBound;
                                 ///< at most 16 units of rounding (2^-53) of the largest coordinate
                                 ///< after the translations are subtracted

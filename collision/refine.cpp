@@ -3,6 +3,7 @@
 // nearest facet of the Minkowski difference.
 #include "collision/refine.hpp"
 
+#include "collision/closest_features.hpp"
 #include "collision/exact_answer.hpp"
 #include "collision/exact_depth.hpp"
 #include "collision/penetration_depth.hpp"
@@ -55,6 +56,7 @@ Refinement refine(const ConvexBody& a, const ConvexBody& b, FeatureCache& cache)
   refinement.closestTail = exact.closestTail;
   refinement.pointA = exact.pointA;
   refinement.pointB = exact.pointB;
+  tellFeatures(a, b, cache, refinement);
   if (exact.verdict == Verdict::penetrating) describePenetration(a, b, decided, refinement);
   return refinement;
 }

@@ -8,8 +8,9 @@ namespace enfilade::collision {
 
 struct Refinement {
   Verdict verdict = Verdict::separated;
-  DecidedBy decidedBy = DecidedBy::filter;  ///< the verdict
-  double distance = 0;                      ///< metres, within 1e-15 relative; 0 unless separated
+  DecidedBy decidedBy = DecidedBy::filter;                     ///< the verdict
+  Feature featureA = Feature::none, featureB = Feature::none;  ///< as Decision's, of these points
+  double distance = 0;     ///< metres, within 1e-15 relative; 0 unless separated
   double penetration = 0;  ///< metres, the global depth within 1e-12 relative; 0 unless penetrating
   Vec3 closest = Vec3::Zero();      ///< separated: from A to B; penetrating: moving B by this parts
   Vec3 closestTail = Vec3::Zero();  ///< them. closest + closestTail, unevaluated, is the vector.

@@ -31,6 +31,8 @@ void refineInto(PairState& state, const NearestParts& parts) {
   const collision::Refinement exact = collision::refine(parts.a, parts.b, cache);
   state.decision.verdict = exact.verdict;
   state.decision.decidedBy = exact.decidedBy;
+  state.decision.featureA = exact.featureA;
+  state.decision.featureB = exact.featureB;
   state.decision.distance = exact.distance;
   state.decision.errorBound = kRelative * exact.distance;
   state.decision.pointA = exact.pointA;

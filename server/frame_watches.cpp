@@ -111,7 +111,8 @@ decltype(FrameJob::seen) toRecording(const ServedWorld& served, const v1::FrameR
 
 void drawRecorded(ServedWorld& served) {
   WorldRecorder* recorder = served.world.recorder();
-  if (!recorder || served.frames.deviceName().empty() || !recorder->picturesDue(served.world))
+  // Only who records pictures waits for what draws them.
+  if (!recorder || !recorder->picturesDue(served.world) || served.frames.deviceName().empty())
     return;
   const auto snapshot = served.world.snapshot();
   for (const scene::AvatarView& avatar : snapshot->avatars) {

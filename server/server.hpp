@@ -39,7 +39,8 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   std::uint16_t port() const;
-  const std::string& rendererName() const;  ///< "" without a renderer; waits until it is made
+  const std::string& rendererName()
+      const;  ///< "" without a renderer; waits until it is made. Not after stop()
   /// Of all worlds, "main" first.
   std::vector<std::string> worldNames() const;
   /// Throws what ended the main world, if anything did: a fault of ours. Others end alone.

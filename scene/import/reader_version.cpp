@@ -3,7 +3,6 @@
 #include <assimp/version.h>
 #include <elf.h>
 #include <link.h>
-#include <sys/stat.h>
 
 #include <cstdint>
 #include <cstring>
@@ -54,12 +53,9 @@ std::string programVersion() {
   return hexOf(contentHashOfFile("/proc/self/exe").value_or(ContentHash{}));
 }
 
-/// The module that is opened for ifcplusplus; "" without one.
+/// Of what is opened for ifcplusplus.
 std::string moduleVersion() {
-  struct stat module {};
-  if (::stat(ifcPlusPlusModule().c_str(), &module) != 0) return "";
-  return std::to_string(module.st_size) + "." + std::to_string(module.st_mtim.tv_sec) + "." +
-         std::to_string(module.st_mtim.tv_nsec);
+  return hexOf(contentHashOfFile(ifcPlusPlusModule()).value_or(ContentHash{}));
 }
 
 }  // namespace

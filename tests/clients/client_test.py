@@ -33,6 +33,7 @@ class Walking(RoomCase):
         self.assertEqual(len(touched), 1)
         self.assertEqual(touched[0].verdict, "separated")
         self.assertGreater(touched[0].normal[0], 0.9)
+        self.assertEqual(touched[0].feature_b, "face")  # of the wall
 
     def test_a_contact_persists_in_each_tick_between_its_begin_and_its_end(self):
         self.client.subscribe(contacts=True, persists=True)
@@ -252,6 +253,8 @@ class Seeing(RoomCase):
         wall = self.client.distance("wall", COLUMN)
         self.assertAlmostEqual(wall.distance, (4.75 ** 2 + 1.75 ** 2) ** 0.5, places=6)
         self.assertEqual((wall.a, wall.a_name, wall.b_name), (WALL, "wall", "column"))
+        self.assertIn(wall.feature_a, ("vertex", "edge"))  # upright edges of both, side by side
+        self.assertIn(wall.feature_b, ("vertex", "edge"))
         first, second = self.client.distances([(ann, WALL), ("ann", "floor")], refined=True)
         self.assertAlmostEqual(first.distance, 4.7, delta=0.02)
         self.assertEqual(second.verdict, "separated")

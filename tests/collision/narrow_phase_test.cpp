@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <map>
+#include <numbers>
 
 #include "collision/penetration_depth.hpp"
+#include "collision/refine.hpp"
 #include "tests/collision/random_shapes.hpp"
 #include "tests/collision/rational_verdict.hpp"
 
@@ -208,6 +210,8 @@ TEST(NarrowPhase, SwappingTheBodiesSwapsTheAnswer) {
     if (ab.verdict != Verdict::separated) continue;
     EXPECT_NEAR(ab.distance, ba.distance, 1e-13);
     EXPECT_TRUE(ab.normal.isApprox(-ba.normal, 1e-7));
+    EXPECT_EQ(ab.featureA, ba.featureB);
+    EXPECT_EQ(ab.featureB, ba.featureA);
   }
 }
 
@@ -267,6 +271,49 @@ TEST(NarrowPhase, APointOverAFacesDiagonalIsOverAFace) {
     EXPECT_EQ(decideCold(body, {point, {0, 0.5, height}}).featureA, Feature::edge) << height;
     EXPECT_EQ(decideCold(body, {point, {1, 1, height}}).featureA, Feature::vertex) << height;
   }
+}
+
+/// What a point of a cube about the origin lies within, by its coordinates.
+Feature featureAt(const Vec3& p, double half) {
+  switch (std::ranges::count_if(p, [&](double x) { return std::abs(std::abs(x) - half) < 1e-9; })) {
+    case 1:
+      return Feature::face;
+    case 2:
+      return Feature::edge;
+    default:
+      return Feature::vertex;
+  }
+}
+
+TEST(NarrowPhase, PointsLieWithinTheFeaturesThatAreTold) {
+  constexpr double kHalf = 0.185;
+  std::vector<Vec3> corners;
+  for (const Vec3& corner : kUnitCube)
+    corners.push_back(2 * kHalf * (corner - Vec3(0.5, 0.5, 0.5)));
+  const Hull cube = buildHull(corners);
+  const ConvexBody below{.vertices = cube.vertices, .hull = &cube};
+  Random random(15);
+  int others = 0;  // the exact search ended at other features than the one in doubles
+  for (int i = 0; i < 400; ++i) {
+    // Parallel faces, or such that only exact numbers tell from them.
+    const Vec3 axis = i % 2 == 0 ? Vec3::UnitX() : Vec3::UnitY();
+    const double turn = i % 4 < 2 ? 1e-13 : 0.5 * std::numbers::pi;
+    const Mat3 rotation = Eigen::AngleAxisd(turn, axis).toRotationMatrix();
+    const Vec3 at(uniform(random, -0.2, 0.2), uniform(random, 0.4, 2), uniform(random, -0.2, 0.2));
+    const ConvexBody above{
+        .vertices = cube.vertices, .translation = at, .rotation = &rotation, .hull = &cube};
+    const auto expectTold = [&](const auto& told) {
+      EXPECT_EQ(told.featureA, featureAt(told.pointA, kHalf)) << i;
+      EXPECT_EQ(told.featureB, featureAt(rotation.transpose() * (told.pointB - at), kHalf)) << i;
+    };
+    const Decision decided = decideCold(below, above);
+    FeatureCache cache;
+    const Refinement refined = refine(below, above, cache);
+    expectTold(decided);
+    expectTold(refined);
+    others += refined.featureA != decided.featureA || refined.featureB != decided.featureB ? 1 : 0;
+  }
+  EXPECT_GT(others, 10);
 }
 
 TEST(NarrowPhase, MovingByTheDistanceMakesContactAndNotEarlier) {

@@ -251,6 +251,18 @@ TEST(ImportIfc, AReaderThatFailsIsFollowedByTheNext) {
   EXPECT_EQ(objectOf(model, "IfcDoor").path, "Test house/House/Ground%2Ffloor/Front door");
 }
 
+TEST(ImportIfc, AReaderWhoseModuleIsMissingOrNoneIsTold) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("house.ifc", IfcHouse().text());
+  for (const auto& module : {folder.path() / "missing.so", folder.write("none.so", "text")}) {
+    const Environment named("ENFILADE_IFC_PLUS_PLUS", module);
+    const std::string failure = failureOf(file, by(IfcReader::ifcPlusPlus));
+    for (const std::string& part :
+         {module.filename().string(), std::string("ifcplusplus: "), std::string("install it")})
+      EXPECT_NE(failure.find(part), std::string::npos) << failure;
+  }
+}
+
 TEST(ImportIfc, AReaderThatHangsLeavesTimeForTheNext) {
   ENFILADE_NEED_WEB_IFC();
   const TemporaryFolder folder;

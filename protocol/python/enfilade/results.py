@@ -45,7 +45,7 @@ class Contact:
     normal: Vector  # unit, from a to b
     decided_by: str  # "filter" or "rational"
     feature_a: str  # of the nearest parts, where point_a and point_b are: "vertex", "edge", "face";
-    feature_b: str  # "" when they penetrate
+    feature_b: str  # "" when they penetrate, and of "left_world"
 
 
 def contact(event: Any) -> Contact:

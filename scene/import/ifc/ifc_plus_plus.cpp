@@ -2,15 +2,19 @@
 
 #include <dlfcn.h>
 
+#include <cstdlib>
+
 #include "scene/import/import_model.hpp"
 
 namespace enfilade::scene {
 
 std::filesystem::path ifcPlusPlusModule() {
+  if (const char* named = std::getenv("ENFILADE_IFC_PLUS_PLUS"); named != nullptr) return named;
   std::error_code error;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-  const auto installed = program.parent_path().parent_path() / "lib/enfilade/ifc_plus_plus.so";
-  return std::filesystem::is_regular_file(installed, error) ? installed : ENFILADE_IFC_PLUS_PLUS;
+  const auto folder = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
+  for (const char* place : {"ifc_plus_plus.so", "../lib/enfilade/ifc_plus_plus.so"})
+    if (std::filesystem::is_regular_file(folder / place, error)) return folder / place;
+  return ENFILADE_IFC_PLUS_PLUS;
 }
 
 void sendShapesByIfcPlusPlus(std::string text) {
@@ -20,7 +24,7 @@ void sendShapesByIfcPlusPlus(std::string text) {
   if (!found) {
     const char* why = dlerror();
     throw ImportError("the reader " + module + " cannot be opened (" + (why ? why : "?") +
-                      "): build or install the program again");
+                      "): install it with the program, or raise the memory limit");
   }
   reinterpret_cast<SendShapes*>(found)(text);
 }

@@ -8,15 +8,17 @@
 
 namespace enfilade::scene {
 
-/// Where the module is: installed beside the program, or where it was built.
+/// Where the module is: named by ENFILADE_IFC_PLUS_PLUS, beside the program, where it is installed,
+/// or where it was built.
 std::filesystem::path ifcPlusPlusModule();
 
 /// Sends the shapes of all products of `text`. Throws std::exception when the file cannot be read,
 /// or the module not opened.
 void sendShapesByIfcPlusPlus(std::string text);
 
-/// What the module exports, by the name kSendShapes.
+/// What the module exports, by the name kSendShapes. Whoever changes this or how shapes pass
+/// through the pipe gives it another number, so that no program opens a module that is not its own.
 using SendShapes = void(std::string& text);
-inline constexpr const char* kSendShapes = "enfiladeSendShapesByIfcPlusPlus";
+inline constexpr const char* kSendShapes = "enfiladeSendShapes1";
 
 }  // namespace enfilade::scene

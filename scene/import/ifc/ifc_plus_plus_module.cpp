@@ -196,8 +196,7 @@ void sendShapes(std::string text) {
 }  // namespace
 }  // namespace enfilade::scene
 
-extern "C" [[gnu::visibility("default")]] void enfiladeSendShapesByIfcPlusPlus(std::string& text) {
+extern "C" [[gnu::visibility("default")]] void enfiladeSendShapes1(std::string& text) {
   enfilade::scene::sendShapes(std::move(text));
 }
-static_assert(
-    std::is_same_v<decltype(enfiladeSendShapesByIfcPlusPlus), enfilade::scene::SendShapes>);
+static_assert(std::is_same_v<decltype(enfiladeSendShapes1), enfilade::scene::SendShapes>);
