@@ -2,9 +2,10 @@
 // Robust Geometric Predicates" (1997): a determinant of differences is off by at most a small
 // multiple of its permanent. His bounds hold while nothing under- or overflows; the filters below
 // therefore trust only determinants of differences below kLargeDifference that exceed kUnderflow
-// besides. What they cannot decide is decided with the coordinates scaled to common integers: of
-// 128 bits where that suffices, as for most coordinates that were floats, else of any length.
-
+// besides. What they cannot decide is decided with the coordinates scaled to common integers of 62
+// bits where their differences are exact, as in faces along an axis; else by the filter once more
+// in extended precision, which tells the corners of flat faces that were turned; else with integers
+// of any length.
 #include "collision/exact_orientation.hpp"
 
 #include <gmpxx.h>
@@ -16,12 +17,15 @@
 #include <limits>
 #include <optional>
 
+#include "collision/minkowski.hpp"
+
 namespace enfilade::collision {
 namespace {
 
-constexpr double kEpsilon = 0x1p-53;
-constexpr double kBound3 = (7.0 + 56.0 * kEpsilon) * kEpsilon;  // Shewchuk's o3derrboundA
-constexpr double kBound2 = (3.0 + 16.0 * kEpsilon) * kEpsilon;  // Shewchuk's ccwerrboundA
+template <class Real>  // Shewchuk's o3derrboundA
+constexpr Real kBound3 = (7 + 56 * unitOf<Real>()) * unitOf<Real>();
+template <class Real>  // and ccwerrboundA
+constexpr Real kBound2 = (3 + 16 * unitOf<Real>()) * unitOf<Real>();
 // Six products of two factors below 1e90 lose less than 6 * 2^-1074 to underflow; times a third
 // factor that stays below 1e-230.
 constexpr double kLargeDifference = 1e90;
@@ -35,13 +39,13 @@ bool toInteger(double value, double scale, std::int64_t& integer) {
 }
 
 /// The sign of u . (v x w) when the nine numbers are multiples of one power of two by less than
-/// 2^40, so that 128 bits hold all sums of triple products; nullopt when they are not.
+/// 2^62, so that 192 bits hold all sums of triple products; nullopt when they are not.
 std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w, double largest) {
   __extension__ typedef __int128 Wide;
   int exponent = 0;
   std::frexp(largest, &exponent);  // largest < 2^exponent
   if (exponent < -900 || exponent > 900) return std::nullopt;
-  const double scale = std::ldexp(1.0, 40 - exponent);
+  const double scale = std::ldexp(1.0, 62 - exponent);
   std::array<std::array<std::int64_t, 3>, 3> n{};
   const std::array<const Vec3*, 3> rows{&u, &v, &w};
   for (std::size_t row = 0; row < 3; ++row) {
@@ -50,12 +54,17 @@ std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w,
         return std::nullopt;
     }
   }
-  Wide sum = 0;
+  Wide high = 0;  // the sum is high * 2^64 + low
+  std::uint64_t low = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const std::size_t i = (k + 1) % 3, j = (k + 2) % 3;
-    sum += n[0][k] * (Wide{n[1][i]} * n[2][j] - Wide{n[1][j]} * n[2][i]);
+    const Wide minor = Wide{n[1][i]} * n[2][j] - Wide{n[1][j]} * n[2][i];
+    const Wide rest = Wide{static_cast<std::uint64_t>(minor)} * n[0][k];
+    high += (minor >> 64) * n[0][k] + (rest >> 64);
+    low += static_cast<std::uint64_t>(rest);
+    if (low < static_cast<std::uint64_t>(rest)) ++high;
   }
-  return sum > 0 ? 1 : sum < 0 ? -1 : 0;
+  return high > 0 || (high == 0 && low > 0) ? 1 : high < 0 ? -1 : 0;
 }
 
 /// The sign of ux vy - uy vx when the four numbers are multiples of one power of two by less than
@@ -122,28 +131,51 @@ int exactTurn(double ax, double ay, double bx, double by, double cx, double cy) 
   return sgn(determinant);
 }
 
+/// The sign that a determinant has, off by at most `bound`; nullopt where that may be either.
+template <class Real>
+std::optional<int> signBeyond(Real determinant, Real bound) {
+  if (determinant > bound) return 1;
+  if (determinant < -bound) return -1;
+  return std::nullopt;
+}
+
+/// The filter; of differences below kLargeDifference.
+template <class Real>
+std::optional<int> filteredOrientation(const Eigen::Matrix<Real, 3, 1>& u,
+                                       const Eigen::Matrix<Real, 3, 1>& v,
+                                       const Eigen::Matrix<Real, 3, 1>& w) {
+  const Real yz = u.y() * v.z(), zy = u.z() * v.y();
+  const Real zx = u.z() * v.x(), xz = u.x() * v.z();
+  const Real xy = u.x() * v.y(), yx = u.y() * v.x();
+  const Real determinant = w.x() * (yz - zy) + w.y() * (zx - xz) + w.z() * (xy - yx);
+  const Real permanent = std::abs(w.x()) * (std::abs(yz) + std::abs(zy)) +
+                         std::abs(w.y()) * (std::abs(zx) + std::abs(xz)) +
+                         std::abs(w.z()) * (std::abs(xy) + std::abs(yx));
+  return signBeyond<Real>(determinant, kBound3<Real> * permanent + kUnderflow);
+}
+
+template <class Real>
+std::optional<int> filteredTurn(Real ux, Real uy, Real vx, Real vy) {
+  const Real left = ux * vy, right = uy * vx;
+  return signBeyond<Real>(left - right,
+                          kBound2<Real> * (std::abs(left) + std::abs(right)) + kUnderflow);
+}
+
 }  // namespace
 
 int orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
-  const Vec3 u = b - a;
-  const Vec3 v = c - a;
-  const Vec3 w = d - a;
-  const double yz = u.y() * v.z(), zy = u.z() * v.y();
-  const double zx = u.z() * v.x(), xz = u.x() * v.z();
-  const double xy = u.x() * v.y(), yx = u.y() * v.x();
-  const double determinant = w.x() * (yz - zy) + w.y() * (zx - xz) + w.z() * (xy - yx);
-  const double permanent = std::abs(w.x()) * (std::abs(yz) + std::abs(zy)) +
-                           std::abs(w.y()) * (std::abs(zx) + std::abs(xz)) +
-                           std::abs(w.z()) * (std::abs(xy) + std::abs(yx));
+  const Vec3 u = b - a, v = c - a, w = d - a;
   const double largest =
       std::max({u.cwiseAbs().maxCoeff(), v.cwiseAbs().maxCoeff(), w.cwiseAbs().maxCoeff()});
   if (largest < kLargeDifference) {
-    const double bound = kBound3 * permanent + kUnderflow;
-    if (determinant > bound) return 1;
-    if (determinant < -bound) return -1;
+    if (const auto sign = filteredOrientation<double>(u, v, w)) return *sign;
     if (isExact(u, a, b) && isExact(v, a, c) && isExact(w, a, d)) {
       if (const auto sign = signInFixedPoint(w, u, v, largest)) return *sign;
     }
+    const WideVec wideA = a.cast<Wide>();
+    const auto sign = filteredOrientation<Wide>(b.cast<Wide>() - wideA, c.cast<Wide>() - wideA,
+                                                d.cast<Wide>() - wideA);
+    if (sign) return *sign;
   }
   return exactOrientation(a, b, c, d);
 }
@@ -153,17 +185,16 @@ int turn(const Vec3& a, const Vec3& b, const Vec3& c, int dropped) {
   const int j = (dropped + 2) % 3;
   const double ux = b[i] - a[i], uy = b[j] - a[j];
   const double vx = c[i] - a[i], vy = c[j] - a[j];
-  const double left = ux * vy;
-  const double right = uy * vx;
   const double largest = std::max({std::abs(ux), std::abs(uy), std::abs(vx), std::abs(vy)});
   if (largest < kLargeDifference) {
-    const double bound = kBound2 * (std::abs(left) + std::abs(right)) + kUnderflow;
-    if (left - right > bound) return 1;
-    if (left - right < -bound) return -1;
+    if (const auto sign = filteredTurn<double>(ux, uy, vx, vy)) return *sign;
     if (isExact(ux, a[i], b[i]) && isExact(uy, a[j], b[j]) && isExact(vx, a[i], c[i]) &&
         isExact(vy, a[j], c[j])) {
       if (const auto sign = signInFixedPoint(ux, uy, vx, vy, largest)) return *sign;
     }
+    const auto sign = filteredTurn<Wide>(Wide{b[i]} - a[i], Wide{b[j]} - a[j], Wide{c[i]} - a[i],
+                                         Wide{c[j]} - a[j]);
+    if (sign) return *sign;
   }
   return exactTurn(a[i], a[j], b[i], b[j], c[i], c[j]);
 }

@@ -76,5 +76,28 @@ TEST(ExactOrientation, SignsAreThoseOfRationals) {
   for (const int count : orientations) EXPECT_GT(count, 2000);
 }
 
+TEST(ExactOrientation, CornersOfATurnedFlatFaceLieWhereRationalsHaveThem) {
+  Coordinates coordinates;
+  std::array<int, 3> orientations{};
+  for (int i = 0; i < 5000; ++i) {
+    const Mat3 rotation =
+        Eigen::AngleAxisd(coordinates.next(2), Vec3(1, 2, 3).normalized()).toRotationMatrix();
+    const Vec3 middle = coordinates.point(2);
+    const auto corner = [&]() -> Vec3 {
+      return rotation * Vec3(coordinates.next(2), coordinates.next(2), 0) + middle;
+    };
+    const Vec3 a = corner(), b = corner(), c = corner(), d = corner();
+    const int sign = orientation(a, b, c, d);
+    ASSERT_EQ(sign, rationalOrientation(a, b, c, d)) << i;
+    ++orientations.at(static_cast<std::size_t>(sign + 1));
+    for (int dropped = 0; dropped < 3; ++dropped) {
+      const Vec3 along = a + coordinates.next(0) * (b - a);
+      ASSERT_EQ(turn(a, b, along, dropped), rationalTurn(a, b, along, dropped)) << i;
+    }
+  }
+  EXPECT_GT(orientations[0], 1000);
+  EXPECT_GT(orientations[2], 1000);
+}
+
 }  // namespace
 }  // namespace enfilade::collision
