@@ -163,9 +163,10 @@ Scene::Scene(Model model) : model_(std::move(model)) {
   requireValidIndices(model_);
   if (const auto why = refusalOfBodies(model_)) throw std::invalid_argument(*why);
   std::vector<bool> moves(model_.objects.size());
+  ShapesOfMeshes shapesOfMeshes;
   for (const BodySpec& body : model_.bodies) {
     for (const std::uint32_t object : body.objects) moves[object] = true;
-    bodyShapes_.push_back(std::make_shared<const BodyShape>(shapeOf(model_, body)));
+    bodyShapes_.push_back(std::make_shared<const BodyShape>(shapeOf(model_, body, shapesOfMeshes)));
   }
   numberShapes();
   boxObjects(moves);

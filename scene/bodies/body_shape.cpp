@@ -1,11 +1,10 @@
 // Steps
-//  1. Each object of the body is split into surfaces (shapes/shape.hpp). A closed convex one
-//  becomes
-//     its hull, by the rule that still objects have.
+//  1. Each object of the body is split into surfaces (shapes/shape.hpp), once for all objects of
+//  the
+//     same meshes. A closed convex one becomes its hull, by the rule that still objects have.
 //  2. The rest stays triangles in kinematic bodies. In rigid bodies and triggers, surfaces that
-//  hang
-//     together by shared corners become one hull, which is counted where it is larger than they
-//     are.
+//     hang together by shared corners become one hull, which is counted where it is larger than
+//     they are.
 //  3. Mass: that of the hulls (shapes/mass_properties.hpp).
 #include "scene/bodies/body_shape.hpp"
 
@@ -28,7 +27,7 @@ constexpr double kLeastThick = 1e-3;  // metres: sheets have mass as if they wer
 
 /// One object of the body: what it is made of, and where.
 struct PlacedShape {
-  Shape shape;
+  const Shape& shape;
   Eigen::Affine3d worldFromMesh;
 
   /// A corner where the body was authored, by the expression of worldPosition().
@@ -41,14 +40,21 @@ struct PlacedShape {
   }
 };
 
-std::vector<PlacedShape> shapesOf(const Model& model, const BodySpec& spec) {
+const Shape& shapeOf(const Model& model, const std::vector<std::uint32_t>& meshes,
+                     ShapesOfMeshes& known) {
+  const auto found = known.find(meshes);
+  if (found != known.end()) return found->second;
+  std::vector<const Mesh*> pointers;
+  for (const std::uint32_t mesh : meshes) pointers.push_back(&model.meshes[mesh]);
+  return known.emplace(meshes, shapeOf(std::span<const Mesh* const>(pointers))).first->second;
+}
+
+std::vector<PlacedShape> shapesOf(const Model& model, const BodySpec& spec, ShapesOfMeshes& known) {
   std::vector<PlacedShape> shapes;
   for (const std::uint32_t index : spec.objects) {
     const Object& object = model.objects[index];
     if (object.use == Object::Use::drawn) continue;
-    std::vector<const Mesh*> meshes;
-    for (const std::uint32_t mesh : object.meshes) meshes.push_back(&model.meshes[mesh]);
-    shapes.push_back({shapeOf(std::span<const Mesh* const>(meshes)), object.worldFromMesh});
+    shapes.push_back({shapeOf(model, object.meshes, known), object.worldFromMesh});
   }
   return shapes;
 }
@@ -190,8 +196,8 @@ void measure(BodyShape& shape) {
 
 }  // namespace
 
-BodyShape shapeOf(const Model& model, const BodySpec& spec) {
-  const std::vector<PlacedShape> shapes = shapesOf(model, spec);
+BodyShape shapeOf(const Model& model, const BodySpec& spec, ShapesOfMeshes& known) {
+  const std::vector<PlacedShape> shapes = shapesOf(model, spec, known);
   BodyShape shape;
   shape.origin = spec.anchor;
   if (spec.kind == BodyKind::rigid) {

@@ -2,11 +2,14 @@
 // scene; worlds and bodies share it.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <vector>
 
 #include "collision/hull.hpp"
 #include "collision/nearest_parts.hpp"
 #include "scene/model.hpp"
+#include "scene/shapes/shape.hpp"
 
 namespace enfilade::scene {
 
@@ -29,9 +32,13 @@ struct BodyShape {
   collision::Mat3 inertia = collision::Mat3::Identity();
 };
 
-/// Of a body that refusalOfBodies() has nothing against. Throws std::invalid_argument, naming the
-/// body, when its objects have no triangle with an area.
-BodyShape shapeOf(const Model& model, const BodySpec& spec);
+/// What lists of meshes are made of (indices into Model::meshes).
+using ShapesOfMeshes = std::map<std::vector<std::uint32_t>, Shape>;
+
+/// Of a body that refusalOfBodies() has nothing against. `known`: of the same model; what is not
+/// there is added. Throws std::invalid_argument, naming the body, when its objects have no triangle
+/// with an area.
+BodyShape shapeOf(const Model& model, const BodySpec& spec, ShapesOfMeshes& known);
 
 /// Its parts where a body of this shape stands at a pose. Points into the shape.
 collision::TreeOfParts treeAt(const BodyShape& shape, const collision::Pose& worldFromBody);
