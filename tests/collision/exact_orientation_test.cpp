@@ -99,5 +99,22 @@ TEST(ExactOrientation, CornersOfATurnedFlatFaceLieWhereRationalsHaveThem) {
   EXPECT_GT(orientations[2], 1000);
 }
 
+TEST(ExactOrientation, LargeWholeNumbersWhoseDeterminantIsOneOrNoneAreTold) {
+  std::mt19937_64 random{12};
+  for (int i = 0; i < 3000; ++i) {
+    const int determinant = i % 3 - 1;
+    Mat3 rows = Vec3(1, 1, determinant).asDiagonal();
+    for (int k = 0; k < 6; ++k) {  // adding a multiple of one row to another does not change it
+      const auto from = static_cast<Eigen::Index>(random() % 3);
+      const auto to = (from + 1 + static_cast<Eigen::Index>(random() % 2)) % 3;
+      const auto times = static_cast<double>(static_cast<int>(random() % 512) - 256);
+      rows.row(to) += times * rows.row(from);
+    }
+    ASSERT_LT(rows.cwiseAbs().maxCoeff(), 0x1p53) << "they are whole";
+    ASSERT_EQ(orientation(Vec3::Zero(), rows.row(0), rows.row(1), rows.row(2)), determinant)
+        << rows;
+  }
+}
+
 }  // namespace
 }  // namespace enfilade::collision
