@@ -8,6 +8,7 @@
 #include <array>
 #include <cctype>
 #include <cstdio>
+#include <mutex>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -151,8 +152,12 @@ void destroy(EGLDisplay display, EGLContext context) noexcept {
   eglDestroyContext(display, context);
 }
 
-/// A current context and what it says of itself; EGL_NO_CONTEXT when there is a failure.
+/// A current context and what it says of itself; EGL_NO_CONTEXT when there is a failure. One thread
+/// at a time: displays are the process's, and Mesa's eglInitialize writes anew what another thread
+/// may be reading of one.
 EGLContext tryDevice(const Candidate& candidate, DeviceTrial& trial) {
+  static std::mutex trying;
+  const std::lock_guard lock(trying);
   trial.place = candidate.place;
   trial.name = candidate.name;
   trial.software = candidate.onCpu;
