@@ -41,7 +41,7 @@ bool toInteger(double value, double scale, std::int64_t& integer) {
 /// The sign of u . (v x w) when the nine numbers are multiples of one power of two by less than
 /// 2^62, so that 192 bits hold all sums of triple products; nullopt when they are not.
 std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w, double largest) {
-  __extension__ typedef __int128 Wide;
+  __extension__ typedef __int128 Int128;
   int exponent = 0;
   std::frexp(largest, &exponent);  // largest < 2^exponent
   if (exponent < -900 || exponent > 900) return std::nullopt;
@@ -54,12 +54,12 @@ std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w,
         return std::nullopt;
     }
   }
-  Wide high = 0;  // the sum is high * 2^64 + low
+  Int128 high = 0;  // the sum is high * 2^64 + low
   std::uint64_t low = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const std::size_t i = (k + 1) % 3, j = (k + 2) % 3;
-    const Wide minor = Wide{n[1][i]} * n[2][j] - Wide{n[1][j]} * n[2][i];
-    const Wide rest = Wide{static_cast<std::uint64_t>(minor)} * n[0][k];
+    const Int128 minor = Int128{n[1][i]} * n[2][j] - Int128{n[1][j]} * n[2][i];
+    const Int128 rest = Int128{static_cast<std::uint64_t>(minor)} * n[0][k];
     high += (minor >> 64) * n[0][k] + (rest >> 64);
     low += static_cast<std::uint64_t>(rest);
     if (low < static_cast<std::uint64_t>(rest)) ++high;
@@ -70,7 +70,7 @@ std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w,
 /// The sign of ux vy - uy vx when the four numbers are multiples of one power of two by less than
 /// 2^62; nullopt when they are not.
 std::optional<int> signInFixedPoint(double ux, double uy, double vx, double vy, double largest) {
-  __extension__ typedef __int128 Wide;
+  __extension__ typedef __int128 Int128;
   int exponent = 0;
   std::frexp(largest, &exponent);
   if (exponent < -900 || exponent > 900) return std::nullopt;
@@ -79,7 +79,7 @@ std::optional<int> signInFixedPoint(double ux, double uy, double vx, double vy, 
   const std::array<double, 4> values{ux, uy, vx, vy};
   for (std::size_t i = 0; i < 4; ++i)
     if (!toInteger(values[i], scale, n[i])) return std::nullopt;
-  const Wide left = Wide{n[0]} * n[3], right = Wide{n[1]} * n[2];
+  const Int128 left = Int128{n[0]} * n[3], right = Int128{n[1]} * n[2];
   return left > right ? 1 : left < right ? -1 : 0;
 }
 
