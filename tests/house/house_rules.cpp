@@ -55,16 +55,15 @@ struct ThirdParty {
   Names folders;        ///< where it may be used
 };
 
-const std::array<ThirdParty, 18> kThirdParties{{
+const std::array<ThirdParty, 17> kThirdParties{{
     {"GMP", "gmp.*", {"collision"}},
     {"assimp", "assimp/.*", {"scene"}},
     {"ifcplusplus", "(ifcpp|carve)/.*", {"scene"}},
-    {"libzip", "zip\\.h", {"scene"}},
     {"Embree", "embree.*", {"scene", "render"}},
     {"EGL and OpenGL", "(epoxy|EGL|GL|GLES.*)/.*", {"render"}},
     {"libpng", "png.*", {"scene", "render"}},
     {"libjpeg", "(jpeglib|turbojpeg).*", {"scene", "render"}},
-    {"libzip", "zip.*", {"scene"}},
+    {"minizip", "minizip/.*", {"scene"}},
     {"xxHash", "xxh.*", {"scene"}},
     {"zlib", "zlib.*", {"protocol"}},
     {"zstd", "zstd.*", {"protocol", "render", "server"}},

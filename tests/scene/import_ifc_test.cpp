@@ -335,6 +335,15 @@ TEST(ImportIfc, AnArchiveWithNoneOrSeveralOrTooMuchIsRefused) {
   EXPECT_NE(failureOf(two).find("holds 2 .ifc files (a.ifc, b.ifc)"), std::string::npos);
   const auto noise = folder.write("noise.ifczip", "PK\3\4 and then nothing");
   EXPECT_NE(failureOf(noise).find("noise.ifczip: cannot be unzipped"), std::string::npos);
+  std::string locked = tests::storedZip({{"a.ifc", "x"}});
+  locked[locked.find("PK\1\2") + 8] = 1;  // the directory says: encrypted
+  EXPECT_NE(
+      failureOf(folder.write("locked.ifczip", locked)).find("is encrypted; unzip it with its"),
+      std::string::npos);
+  std::string other = tests::storedZip({{"a.ifc", "what the checksum is of"}});
+  other[other.find("what")] = 'W';
+  EXPECT_NE(failureOf(folder.write("other.ifczip", other)).find("its .ifc file is damaged"),
+            std::string::npos);
   const auto large =
       folder.write("large.ifczip", tests::storedZip({{"a.ifc", std::string(40 << 20, ' ')}}));
   ImportOptions options;

@@ -1,10 +1,11 @@
 #include "scene/import/ifc/file.hpp"
 
-#include <zip.h>
+#include <minizip/unzip.h>
 
 #include <algorithm>
 #include <fstream>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 #include "scene/import/import_model.hpp"
@@ -14,16 +15,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kReadSize = 1 << 20;  // bytes unpacked at once
+constexpr unsigned kReadSize = 1 << 20;  // bytes unpacked at once
+constexpr const char* kDamagedDirectory = "its directory is damaged";
 
 struct CloseArchive {
-  void operator()(zip_t* archive) const { zip_discard(archive); }
+  void operator()(unzFile archive) const { unzClose(archive); }
 };
-struct CloseMember {
-  void operator()(zip_file_t* member) const { zip_fclose(member); }
-};
-using Archive = std::unique_ptr<zip_t, CloseArchive>;
-using Member = std::unique_ptr<zip_file_t, CloseMember>;
+using Archive = std::unique_ptr<std::remove_pointer_t<unzFile>, CloseArchive>;
 
 bool beginsWith(const fs::path& file, const std::string& magic) {
   std::ifstream in(file, std::ios::binary);
@@ -53,18 +51,47 @@ bool isIfcName(std::string name) {
   return name.ends_with(".ifc") && name.find("__macosx/") == std::string::npos;
 }
 
-/// The index of the only .ifc file in the archive.
-zip_uint64_t onlyIfcMember(zip_t& archive, const fs::path& file) {
-  std::vector<zip_uint64_t> found;
+[[noreturn]] void throwDamaged(const fs::path& file, const std::string& why) {
+  throw ImportError(file.string() + ": cannot be unzipped: " + why +
+                    "; copy or export it again (unzip)");
+}
+
+struct Member {
+  std::string name;
+  bool encrypted = false;
+};
+
+/// The one that the archive stands at.
+Member currentMember(unzFile archive, const fs::path& file) {
+  unz_file_info64 info{};
+  Member member;
+  const auto read = [&] {
+    return unzGetCurrentFileInfo64(archive, &info, member.name.data(), member.name.size(), nullptr,
+                                   0, nullptr, 0) == UNZ_OK;
+  };
+  bool known = read();
+  member.name.resize(info.size_filename);
+  known = known && read();
+  if (!known) throwDamaged(file, kDamagedDirectory);
+  member.encrypted = (info.flag & 1) != 0;  // PKWARE's APPNOTE.TXT, 4.4.4
+  return member;
+}
+
+/// Leaves the archive standing at the only .ifc file in it.
+void goToOnlyIfcMember(unzFile archive, const fs::path& file) {
+  std::vector<Member> found;
   std::string names;
-  const zip_int64_t count = zip_get_num_entries(&archive, 0);
-  for (zip_int64_t i = 0; i < count; ++i) {
-    const auto index = static_cast<zip_uint64_t>(i);
-    const char* name = zip_get_name(&archive, index, 0);
-    if (name == nullptr || !isIfcName(name)) continue;
-    found.push_back(index);
-    if (found.size() <= 5) names += (names.empty() ? "" : ", ") + std::string(name);
+  std::size_t count = 0;
+  unz64_file_pos place{};
+  int code = unzGoToFirstFile(archive);
+  for (; code == UNZ_OK; code = unzGoToNextFile(archive), ++count) {
+    Member member = currentMember(archive, file);
+    if (!isIfcName(member.name)) continue;
+    if (found.size() < 5) names += (names.empty() ? "" : ", ") + member.name;
+    found.push_back(std::move(member));
+    if (unzGetFilePos64(archive, &place) != UNZ_OK) throwDamaged(file, kDamagedDirectory);
   }
+  if (code != UNZ_END_OF_LIST_OF_FILE) throwDamaged(file, kDamagedDirectory);
   if (found.empty()) {
     throw ImportError(file.string() + ": holds no .ifc file (" + std::to_string(count) +
                       " others); zip the .ifc file itself (unzip)");
@@ -73,23 +100,22 @@ zip_uint64_t onlyIfcMember(zip_t& archive, const fs::path& file) {
     throw ImportError(file.string() + ": holds " + std::to_string(found.size()) + " .ifc files (" +
                       names + "); unzip it and name one of them (unzip)");
   }
-  return found.front();
+  if (found.front().encrypted) {
+    throw ImportError(file.string() + ": is encrypted; unzip it with its password (unzip)");
+  }
+  if (unzGoToFilePos64(archive, &place) != UNZ_OK) throwDamaged(file, kDamagedDirectory);
 }
 
-[[noreturn]] void throwDamaged(const fs::path& file, const std::string& why) {
-  throw ImportError(file.string() + ": cannot be unzipped: " + why +
-                    "; copy or export it again (unzip)");
-}
-
-std::string unpack(zip_t& archive, zip_uint64_t index, const fs::path& file, std::size_t largest) {
-  const Member member(zip_fopen_index(&archive, index, 0));
-  if (!member) throwDamaged(file, zip_strerror(&archive));
+std::string unpack(unzFile archive, const fs::path& file, std::size_t largest) {
+  if (unzOpenCurrentFile(archive) != UNZ_OK) {
+    throwDamaged(file, "its .ifc file is damaged or compressed in a way that is not known here");
+  }
   std::string text;
   std::vector<char> chunk(kReadSize);
   for (;;) {  // ends at the limit at the latest
-    const zip_int64_t size = zip_fread(member.get(), chunk.data(), chunk.size());
-    if (size < 0) throwDamaged(file, zip_file_strerror(member.get()));
-    if (size == 0) return text;
+    const int size = unzReadCurrentFile(archive, chunk.data(), kReadSize);
+    if (size < 0) throwDamaged(file, "its .ifc file is damaged");
+    if (size == 0) break;
     text.append(chunk.data(), static_cast<std::size_t>(size));
     if (text.size() > largest) {
       throw ImportError(file.string() + ": unpacks to more than the " +
@@ -98,6 +124,8 @@ std::string unpack(zip_t& archive, zip_uint64_t index, const fs::path& file, std
                         "memory limit (unzip)");
     }
   }
+  if (unzCloseCurrentFile(archive) != UNZ_OK) throwDamaged(file, "its .ifc file is damaged");
+  return text;
 }
 
 }  // namespace
@@ -106,16 +134,10 @@ std::string readIfcFile(const fs::path& file, std::size_t largest) {
   if (beginsWith(file, "ISO-10303-21")) return readWhole(file, largest);
   const bool named = file.extension() == ".ifczip" || file.extension() == ".IFCZIP";
   if (!named && !beginsWith(file, "PK\3\4")) return readWhole(file, largest);
-  int code = 0;
-  const Archive archive(zip_open(file.c_str(), ZIP_RDONLY, &code));
-  if (!archive) {
-    zip_error_t error;
-    zip_error_init_with_code(&error, code);
-    const std::string why = zip_error_strerror(&error);
-    zip_error_fini(&error);
-    throwDamaged(file, why);
-  }
-  return unpack(*archive, onlyIfcMember(*archive, file), file, largest);
+  const Archive archive(unzOpen64(file.c_str()));
+  if (!archive) throwDamaged(file, "it is no zip archive, or its end is missing");
+  goToOnlyIfcMember(archive.get(), file);
+  return unpack(archive.get(), file, largest);
 }
 
 }  // namespace enfilade::scene
