@@ -21,12 +21,30 @@ struct RenderThread::State {
   std::mutex mutex;
   std::condition_variable changed;
   std::deque<Job> jobs;
-  bool closing = false;
-  std::promise<void> made;
-  std::shared_future<void> isMade = made.get_future().share();
+  bool asked = false, closing = false;
+  std::promise<void> making;
+  std::shared_future<void> isMade = making.get_future().share();
   std::string deviceName, deviceNote, whyNone;  ///< once isMade, as the next
   bool software = false;
   std::thread thread;
+
+  /// False when nothing was asked before the end.
+  bool awaitFirstQuestion() {
+    std::unique_lock lock(mutex);
+    changed.wait(lock, [&] { return closing || asked || !jobs.empty(); });
+    return asked || !jobs.empty();
+  }
+
+  /// Has the renderer made, and waits for it.
+  const State& made() {
+    {
+      const std::lock_guard lock(mutex);
+      asked = true;
+    }
+    changed.notify_one();
+    isMade.wait();
+    return *this;
+  }
 
   /// nullopt when the queue is empty and no more will come.
   std::optional<Job> nextJob() {
@@ -58,12 +76,13 @@ struct RenderThread::State {
     } catch (const std::exception& error) {
       whyNone = error.what();
     }
-    made.set_value();
+    making.set_value();
     return renderer;
   }
 
   void run(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device,
            RendererKind kind) {
+    if (!awaitFirstQuestion()) return;
     const std::unique_ptr<Renderer> renderer = make(std::move(scene), device, kind);
     while (auto job = nextJob()) {
       try {
@@ -111,20 +130,16 @@ void RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot, Camer
 }
 
 const std::string& RenderThread::deviceName() const {
-  state_->isMade.wait();
-  return state_->deviceName;
+  return state_->made().deviceName;
 }
 const std::string& RenderThread::deviceNote() const {
-  state_->isMade.wait();
-  return state_->deviceNote;
+  return state_->made().deviceNote;
 }
 const std::string& RenderThread::whyNone() const {
-  state_->isMade.wait();
-  return state_->whyNone;
+  return state_->made().whyNone;
 }
 bool RenderThread::software() const {
-  state_->isMade.wait();
-  return state_->software;
+  return state_->made().software;
 }
 
 }  // namespace enfilade::render

@@ -11,8 +11,8 @@ namespace enfilade::render {
 
 class RenderThread {
  public:
-  /// Starts the thread, which makes its Renderer while its owner goes on: loading a device's
-  /// driver takes longer than loading many a scene. Throws RenderError without a scene.
+  /// Starts the thread, which makes its Renderer when it is first asked for anything. Throws
+  /// RenderError without a scene.
   explicit RenderThread(std::shared_ptr<const scene::Scene> scene, DeviceChoice device = {},
                         RendererKind kind = RendererKind::automatic);
   ~RenderThread();  ///< finishes what is queued
@@ -27,7 +27,7 @@ class RenderThread {
   /// has to be woken. `done` must not throw.
   void render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera, FrameOptions options,
               RendererKind kind, std::function<void(std::future<Frame>)> done);
-  // As Renderer's. They wait until it is made.
+  // As Renderer's. They have it made, and wait for it.
   const std::string& deviceName() const;  ///< "" when there can be none
   bool software() const;
   const std::string& deviceNote() const;

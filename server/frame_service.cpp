@@ -68,12 +68,7 @@ FrameService::FrameService(std::shared_ptr<const scene::Scene> scene, const Draw
     : state_(std::make_unique<State>()) {
   state_->renderer =
       std::make_unique<render::RenderThread>(std::move(scene), drawing.device, drawing.renderer);
-  const render::RenderThread& renderer = *state_->renderer;
-  if (drawing.asked() && !renderer.whyNone().empty()) throw render::RenderError(renderer.whyNone());
-  state_->thread.post([&renderer] {
-    if (!renderer.whyNone().empty()) return spdlog::warn("no pictures: {}", renderer.whyNone());
-    if (!renderer.deviceNote().empty()) spdlog::warn(renderer.deviceNote());
-  });
+  if (drawing.asked() && !whyNone().empty()) throw render::RenderError(whyNone());
 }
 
 FrameService::~FrameService() {
@@ -83,6 +78,13 @@ FrameService::~FrameService() {
 void FrameService::finish() {
   state_->thread.finish();
   state_->renderer.reset();
+}
+
+void FrameService::prepare() {
+  state_->thread.post([&renderer = *state_->renderer] {
+    if (!renderer.whyNone().empty()) return spdlog::warn("no pictures: {}", renderer.whyNone());
+    if (!renderer.deviceNote().empty()) spdlog::warn(renderer.deviceNote());
+  });
 }
 
 const std::string& FrameService::deviceName() const {

@@ -27,15 +27,18 @@ struct FrameJob {
 
 class FrameService {
  public:
-  /// The renderer is made while the caller goes on. Without a device there is none, which is told
-  /// and is no failure, unless `drawing` asked for something: that is waited for, and RenderError
-  /// thrown.
+  /// The renderer is made when it is first needed. Without a device there is none, which is no
+  /// failure, unless `drawing` asked for something: then it is made now, and RenderError thrown.
   explicit FrameService(std::shared_ptr<const scene::Scene> scene,
                         const DrawingOptions& drawing = {});
   ~FrameService();
   FrameService(const FrameService&) = delete;
   FrameService& operator=(const FrameService&) = delete;
 
+  /// Has the renderer made while the caller goes on, and logs what is wrong with it. Opening a
+  /// device's driver takes longer than loading many a scene, and keeps whoever starts a thread
+  /// waiting (glibc 2.36 locks the list of libraries for both): best when all threads run.
+  void prepare();
   // As RenderThread's: they wait until it is made. Not after finish().
   const std::string& deviceName() const;
   bool software() const;

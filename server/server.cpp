@@ -36,6 +36,7 @@ Server::Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen
     : state_(std::make_unique<State>(std::move(scene), listen, std::move(options))) {
   state_->listener.start();
   state_->network = std::thread([state = state_.get()] { state->context.run(); });
+  state_->worlds.prepareFrames();
 }
 
 Server::~Server() {

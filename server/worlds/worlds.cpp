@@ -100,6 +100,10 @@ std::vector<std::string> Worlds::sceneNames() const {
   return names;
 }
 
+void Worlds::prepareFrames() {
+  for (const auto& scene : scenes_) scene->frames.prepare();
+}
+
 // ---- made and dropped ---------------------------------------------------------------------------
 
 /// Work for the thread; false when there is none any more.

@@ -59,6 +59,8 @@ class Worlds {
   std::vector<std::string> sceneNames() const;
   /// The server ends, and all worlds with it.
   bool stopping() const;
+  /// Of all scenes: FrameService::prepare().
+  void prepareFrames();
   /// Of the first scene; "" without a renderer.
   const std::string& rendererName() const { return scenes_.front()->frames.deviceName(); }
 
