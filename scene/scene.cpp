@@ -215,11 +215,7 @@ void Scene::boxObjects(const std::vector<bool>& moves) {
 const Shape& Scene::shape(std::uint32_t object) const {
   requireObject(model_, object);
   const std::uint32_t number = shapeOfObject_[object];
-  return shapes_->get(number, [&] {
-    std::vector<const Mesh*> meshes;
-    for (const std::uint32_t mesh : meshesOfShape_[number]) meshes.push_back(&model_.meshes[mesh]);
-    return shapeOf(meshes);
-  });
+  return shapes_->get(number, [&] { return shapeOf(model_.meshes, meshesOfShape_[number]); });
 }
 
 const ObjectParts& Scene::parts(std::uint32_t object) const {

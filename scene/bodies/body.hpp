@@ -93,6 +93,11 @@ struct Body {
 /// Puts a body somewhere: pose and boxes.
 void placeBody(Body& body, const Vec3& position, const collision::Quat& orientation);
 
+/// A point of the scene's frame in the body's.
+inline Vec3 inBody(const Body& body, const Vec3& point) {
+  return body.rotation.transpose() * (point - body.position);
+}
+
 /// Part `part` as the narrow phase takes it. Points into the body.
 collision::ConvexBody partOf(const Body& body, std::uint32_t part);
 

@@ -44,9 +44,7 @@ const Shape& shapeOf(const Model& model, const std::vector<std::uint32_t>& meshe
                      ShapesOfMeshes& known) {
   const auto found = known.find(meshes);
   if (found != known.end()) return found->second;
-  std::vector<const Mesh*> pointers;
-  for (const std::uint32_t mesh : meshes) pointers.push_back(&model.meshes[mesh]);
-  return known.emplace(meshes, shapeOf(std::span<const Mesh* const>(pointers))).first->second;
+  return known.emplace(meshes, shapeOf(model.meshes, meshes)).first->second;
 }
 
 std::vector<PlacedShape> shapesOf(const Model& model, const BodySpec& spec, ShapesOfMeshes& known) {

@@ -80,9 +80,7 @@ Eigen::Affine3d exchanged(const Eigen::Affine3d& doorFromMesh) {
 }
 
 DoorShape shapeOfDoor(const Model& model, const Object& door) {
-  std::vector<const Mesh*> meshes;
-  for (const std::uint32_t mesh : door.meshes) meshes.push_back(&model.meshes[mesh]);
-  const Shape shape = shapeOf(std::span<const Mesh* const>(meshes));
+  const Shape shape = shapeOf(model.meshes, door.meshes);
   Eigen::Affine3d doorFromMesh =
       door.worldFromPlacement->inverse(Eigen::Isometry) * door.worldFromMesh;
   DoorShape result;

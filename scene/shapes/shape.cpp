@@ -29,14 +29,13 @@ bool before(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
   return std::tie(a.x(), a.y(), a.z()) < std::tie(b.x(), b.y(), b.z());
 }
 
-/// All corners of all meshes as indices into positions that are each stored once, in the order of
+/// All corners of these meshes as indices into positions that are each stored once, in the order of
 /// their first use; 0 and -0 are one position.
-std::vector<Index> weld(std::span<const Mesh* const> meshes,
+std::vector<Index> weld(std::span<const Mesh> meshes, std::span<const Index> which,
                         std::vector<Eigen::Vector3f>& vertices) {
   std::vector<Eigen::Vector3f> corners;
-  for (const Mesh* mesh : meshes) {
-    for (const Index i : mesh->indices) corners.push_back(mesh->positions[i]);
-  }
+  for (const Index mesh : which)
+    for (const Index i : meshes[mesh].indices) corners.push_back(meshes[mesh].positions[i]);
   std::vector<Index> order(corners.size());
   std::iota(order.begin(), order.end(), 0u);
   std::sort(order.begin(), order.end(), [&](Index a, Index b) {
@@ -252,9 +251,9 @@ bool hasArea(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Ve
   return !collision::collinear(a.cast<double>(), b.cast<double>(), c.cast<double>());
 }
 
-Shape shapeOf(std::span<const Mesh* const> meshes) {
+Shape shapeOf(std::span<const Mesh> meshes, std::span<const Index> which) {
   Shape shape;
-  const std::vector<Index> corners = weld(meshes, shape.vertices);
+  const std::vector<Index> corners = weld(meshes, which, shape.vertices);
   std::vector<Corners> triangles = cleanTriangles(corners, shape);
   const std::vector<Neighbours> links = link(triangles, shape);
   shape.triangles.reserve(triangles.size());

@@ -51,8 +51,9 @@ struct Shape {
   }
 };
 
-/// The shape of meshes that share a frame. Indices are valid, coordinates finite.
-Shape shapeOf(std::span<const Mesh* const> meshes);
+/// The shape of those of the meshes that `which` lists, which share a frame. Indices are valid,
+/// coordinates finite.
+Shape shapeOf(std::span<const Mesh> meshes, std::span<const std::uint32_t> which);
 
 /// Whether a triangle has an area: its corners lie on no line, exactly.
 bool hasArea(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c);

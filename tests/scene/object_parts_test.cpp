@@ -26,8 +26,8 @@ Eigen::Affine3d randomPlacement(std::mt19937& random, bool mirror) {
 }
 
 Shape shapeOfOne(const Mesh& mesh) {
-  const Mesh* meshes[] = {&mesh};
-  return shapeOf(meshes);
+  const std::uint32_t first = 0;
+  return shapeOf({&mesh, 1}, {&first, 1});
 }
 
 Mesh insideOut(Mesh mesh) {

@@ -17,8 +17,8 @@ namespace {
 using testing::boxMesh;
 
 Shape shapeOfOne(const Mesh& mesh) {
-  const Mesh* meshes[] = {&mesh};
-  return shapeOf(meshes);
+  const std::uint32_t first = 0;
+  return shapeOf({&mesh, 1}, {&first, 1});
 }
 
 void append(Mesh& to, const Mesh& from) {
@@ -97,8 +97,9 @@ TEST(Shape, ABoxOfSeveralMeshesIsStillOneSolid) {
   Mesh sides = box, lid = box;
   lid.indices.assign(box.indices.begin(), box.indices.begin() + 6);
   sides.indices.assign(box.indices.begin() + 6, box.indices.end());
-  const Mesh* both[] = {&sides, &lid};
-  const Shape shape = shapeOf(both);
+  const std::vector<Mesh> meshes{lid, boxMesh({5, 5, 5}, {6, 6, 6}), sides};
+  const std::vector<std::uint32_t> both{2, 0};
+  const Shape shape = shapeOf(meshes, both);
   ASSERT_EQ(shape.shells.size(), 1u);
   EXPECT_TRUE(shape.shells[0].isConvex());
   EXPECT_EQ(shapeOfOne(sides).shells[0].kind, Shell::Kind::open);
