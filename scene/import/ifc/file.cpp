@@ -79,28 +79,28 @@ Member currentMember(unzFile archive, const fs::path& file) {
 
 /// Leaves the archive standing at the only .ifc file in it.
 void goToOnlyIfcMember(unzFile archive, const fs::path& file) {
-  std::vector<Member> found;
   std::string names;
-  std::size_t count = 0;
+  std::size_t count = 0, found = 0;
+  bool encrypted = false;
   unz64_file_pos place{};
   int code = unzGoToFirstFile(archive);
   for (; code == UNZ_OK; code = unzGoToNextFile(archive), ++count) {
-    Member member = currentMember(archive, file);
+    const Member member = currentMember(archive, file);
     if (!isIfcName(member.name)) continue;
-    if (found.size() < 5) names += (names.empty() ? "" : ", ") + member.name;
-    found.push_back(std::move(member));
+    if (++found <= 5) names += (names.empty() ? "" : ", ") + member.name;
+    encrypted = member.encrypted;
     if (unzGetFilePos64(archive, &place) != UNZ_OK) throwDamaged(file, kDamagedDirectory);
   }
   if (code != UNZ_END_OF_LIST_OF_FILE) throwDamaged(file, kDamagedDirectory);
-  if (found.empty()) {
+  if (found == 0) {
     throw ImportError(file.string() + ": holds no .ifc file (" + std::to_string(count) +
                       " others); zip the .ifc file itself (unzip)");
   }
-  if (found.size() > 1) {
-    throw ImportError(file.string() + ": holds " + std::to_string(found.size()) + " .ifc files (" +
-                      names + "); unzip it and name one of them (unzip)");
+  if (found > 1) {
+    throw ImportError(file.string() + ": holds " + std::to_string(found) + " .ifc files (" + names +
+                      "); unzip it and name one of them (unzip)");
   }
-  if (found.front().encrypted) {
+  if (encrypted) {
     throw ImportError(file.string() + ": is encrypted; unzip it with its password (unzip)");
   }
   if (unzGoToFilePos64(archive, &place) != UNZ_OK) throwDamaged(file, kDamagedDirectory);
