@@ -152,12 +152,16 @@ void destroy(EGLDisplay display, EGLContext context) noexcept {
   eglDestroyContext(display, context);
 }
 
-/// A current context and what it says of itself; EGL_NO_CONTEXT when there is a failure. One thread
-/// at a time: displays are the process's, and Mesa's eglInitialize writes anew what another thread
-/// may be reading of one.
+/// One thread at a time looks for a device: displays are the process's, Mesa's eglInitialize writes
+/// anew what another thread may be reading of one, and its own locks, of futexes, are unknown to
+/// ThreadSanitizer.
+std::mutex& lookingForDevice() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+/// A current context and what it says of itself; EGL_NO_CONTEXT when there is a failure.
 EGLContext tryDevice(const Candidate& candidate, DeviceTrial& trial) {
-  static std::mutex trying;
-  const std::lock_guard lock(trying);
   trial.place = candidate.place;
   trial.name = candidate.name;
   trial.software = candidate.onCpu;
@@ -218,6 +222,7 @@ constexpr const char* kNoPlatform =
 
 EglContext::EglContext(const DeviceChoice& choice) {
   if (const std::string missing = missingLibrary(); !missing.empty()) throw RenderError(missing);
+  const std::lock_guard lock(lookingForDevice());
   std::string tried, hardwareFailures;
   const std::vector<Candidate> all = candidates(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS));
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -285,6 +290,7 @@ DeviceReport tryDevices() {
   DeviceReport report;
   report.failure = missingLibrary();
   if (!report.failure.empty()) return report;
+  const std::lock_guard lock(lookingForDevice());
   const char* extensions = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
   report.clientExtensions = textOf(extensions);
   for (const Candidate& candidate : candidates(extensions)) {
