@@ -244,7 +244,7 @@ EglContext::EglContext(const DeviceChoice& choice) {
     tried += line(i, trial, why);
     if (!trial.software && !trial.failure.empty()) hardwareFailures += line(i, trial, why);
   }
-  if (tried.empty()) tried = std::string("\n  ") + kNoPlatform;
+  if (tried.empty()) tried.append("\n  ").append(kNoPlatform);
   std::string wanted = choice.device.empty() ? "" : " \"" + choice.device + "\"";
   if (choice.requireGpu) wanted += " that is a GPU";
   throw RenderError("no EGL device" + wanted + " gives an OpenGL 4.5 core context:" + tried +

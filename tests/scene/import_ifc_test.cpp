@@ -331,6 +331,9 @@ TEST(ImportIfc, AnArchiveWithNoneOrSeveralOrTooMuchIsRefused) {
   const TemporaryFolder folder;
   const auto none = folder.write("none.ifczip", tests::storedZip({{"readme.txt", "x"}}));
   EXPECT_NE(failureOf(none).find("none.ifczip: holds no .ifc file"), std::string::npos);
+  EXPECT_NE(failureOf(folder.write("empty.ifczip", tests::storedZip({})))
+                .find("empty.ifczip: holds no .ifc file (0 others)"),
+            std::string::npos);
   const auto two = folder.write("two.ifczip", tests::storedZip({{"a.ifc", "x"}, {"b.ifc", "x"}}));
   EXPECT_NE(failureOf(two).find("holds 2 .ifc files (a.ifc, b.ifc)"), std::string::npos);
   const auto noise = folder.write("noise.ifczip", "PK\3\4 and then nothing");

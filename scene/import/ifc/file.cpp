@@ -56,6 +56,11 @@ bool isIfcName(std::string name) {
                     "; copy or export it again (unzip)");
 }
 
+[[noreturn]] void throwNoIfc(const fs::path& file, std::size_t others) {
+  throw ImportError(file.string() + ": holds no .ifc file (" + std::to_string(others) +
+                    " others); zip the .ifc file itself (unzip)");
+}
+
 struct Member {
   std::string name;
   bool encrypted = false;
@@ -92,10 +97,7 @@ void goToOnlyIfcMember(unzFile archive, const fs::path& file) {
     if (unzGetFilePos64(archive, &place) != UNZ_OK) throwDamaged(file, kDamagedDirectory);
   }
   if (code != UNZ_END_OF_LIST_OF_FILE) throwDamaged(file, kDamagedDirectory);
-  if (found == 0) {
-    throw ImportError(file.string() + ": holds no .ifc file (" + std::to_string(count) +
-                      " others); zip the .ifc file itself (unzip)");
-  }
+  if (found == 0) throwNoIfc(file, count);
   if (found > 1) {
     throw ImportError(file.string() + ": holds " + std::to_string(found) + " .ifc files (" + names +
                       "); unzip it and name one of them (unzip)");
@@ -134,6 +136,8 @@ std::string readIfcFile(const fs::path& file, std::size_t largest) {
   if (beginsWith(file, "ISO-10303-21")) return readWhole(file, largest);
   const bool named = file.extension() == ".ifczip" || file.extension() == ".IFCZIP";
   if (!named && !beginsWith(file, "PK\3\4")) return readWhole(file, largest);
+  // The end of an archive where its first file would be: minizip takes it for damaged.
+  if (beginsWith(file, "PK\5\6")) throwNoIfc(file, 0);
   const Archive archive(unzOpen64(file.c_str()));
   if (!archive) throwDamaged(file, "it is no zip archive, or its end is missing");
   goToOnlyIfcMember(archive.get(), file);
