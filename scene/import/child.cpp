@@ -1,8 +1,5 @@
 // The hidden verb: what copies of our own executable do for an import. Each runs in a process of
 // its own, so nothing that a reader does can hurt the program that asked.
-#include <assimp/config.h>
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
 #include <signal.h>
 #include <sys/personality.h>
 #include <sys/prctl.h>
@@ -10,13 +7,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <assimp/DefaultIOSystem.h>
-#include <assimp/MemoryIOWrapper.h>
 #include <algorithm>
-#include <assimp/Importer.hpp>
-#include <assimp/ProgressHandler.hpp>
 #include <cerrno>
-#include <charconv>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -24,6 +16,7 @@
 #include <set>
 #include <string_view>
 
+#include "scene/import/assimp_reader.hpp"
 #include "scene/import/convert.hpp"
 #include "scene/import/ifc/ifc_plus_plus.hpp"
 #include "scene/import/ifc/import_ifc.hpp"
@@ -44,20 +37,6 @@ constexpr bool kSanitized = false;
 #else
 constexpr bool kSanitized = false;
 #endif
-
-/// Passes assimp's progress on, at most a hundred times.
-class ForwardProgress : public Assimp::ProgressHandler {
- public:
-  bool Update(float fraction) override {
-    const int percent = static_cast<int>(100 * fraction);
-    if (percent > last_ && percent <= 100) sendProgress("parse", fraction);
-    if (percent > last_) last_ = percent;
-    return true;
-  }
-
- private:
-  int last_ = 0;
-};
 
 // ---- the work -----------------------------------------------------------------------------------
 
@@ -114,20 +93,6 @@ void misbehaveIfAsked(ImportTask task) {
   }
 }
 
-/// With each %XY replaced by the byte of these two hexadecimal digits.
-std::string withoutPercents(const std::string& uri) {
-  std::string plain;
-  for (std::size_t i = 0; i < uri.size(); ++i) {
-    unsigned char byte = 0;
-    const char* digits = uri.data() + i + 1;
-    const bool coded = uri[i] == '%' && i + 2 < uri.size() &&
-                       std::from_chars(digits, digits + 2, byte, 16).ptr == digits + 2;
-    plain += coded ? static_cast<char>(byte) : uri[i];
-    if (coded) i += 2;
-  }
-  return plain;
-}
-
 /// Materials of OBJ files stand in files of their own, which go missing when models are passed on.
 void tellMissingMaterials(const std::vector<std::string>& files, std::vector<Problem>& problems) {
   std::set<std::string> missing;
@@ -139,43 +104,6 @@ void tellMissingMaterials(const std::vector<std::string>& files, std::vector<Pro
     problems.push_back({"missing_material_file", missing.size(),
                         std::filesystem::path(*missing.begin()).filename().string()});
 }
-
-/// Takes down which files assimp opens and looks for, and gives it a mended text for one of them.
-class WatchedFiles : public Assimp::DefaultIOSystem {
- public:
-  WatchedFiles(std::vector<std::string>& names, std::string mendedFile, const std::string& text)
-      : names_(names), mendedFile_(std::move(mendedFile)), text_(text) {}
-
-  bool Exists(const char* file) const override {
-    names_.emplace_back(file);
-    return DefaultIOSystem::Exists(file) || !decoded(file).empty();
-  }
-  Assimp::IOStream* Open(const char* file, const char* mode) override {
-    names_.emplace_back(file);
-    if (text_.empty() || file != mendedFile_) {
-      const std::string other = decoded(file);
-      return DefaultIOSystem::Open(other.empty() ? file : other.c_str(), mode);
-    }
-    // assimp only reads from it, and the text lives longer.
-    return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(text_.data()),
-                                      text_.size());
-  }
-
- private:
-  /// URIs say %20 for a blank (RFC 3986), which assimp 5.2.5 leaves as it is. The name without
-  /// such, if only that is there; else empty.
-  std::string decoded(const std::string& file) const {
-    if (DefaultIOSystem::Exists(file.c_str())) return "";
-    std::string name = withoutPercents(file);
-    if (name == file) return "";
-    names_.push_back(name);
-    return DefaultIOSystem::Exists(name.c_str()) ? name : "";
-  }
-
-  std::vector<std::string>& names_;
-  std::string mendedFile_;
-  const std::string& text_;
-};
 
 std::string readDescriptor(int descriptor) {
   struct stat status {};
@@ -191,28 +119,12 @@ std::string readDescriptor(int descriptor) {
   return text;
 }
 
-/// `text`: the file in memory, where it was unzipped or mended; else assimp opens it. `files` takes
-/// down which others it opened or looked for.
-const aiScene& parse(Assimp::Importer& importer, const ConvertInput& input, const std::string& text,
-                     std::vector<std::string>& files) {
-  // The importer deletes both.
-  importer.SetIOHandler(new WatchedFiles(files, input.file.string(), text));
-  importer.SetProgressHandler(new ForwardProgress);
-  importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, false);
-  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, true);
-  constexpr unsigned kSteps = aiProcess_Triangulate | aiProcess_JoinIdenticalVertices;
-  const bool ifc = input.format == ModelFormat::ifc;  // it may come out of an archive
-  const aiScene* scene = ifc ? importer.ReadFileFromMemory(text.data(), text.size(), kSteps, "ifc")
-                             : importer.ReadFile(input.file.string(), kSteps);
-  if (scene == nullptr || scene->mRootNode == nullptr) {
-    const std::string why = importer.GetErrorString();
-    if (why.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
-    if (input.format == ModelFormat::ifc) throw ImportError(why);  // others may have tried too
-    throw ImportError(input.file.string() + ": cannot be read: " + why +
-                      "; check the file in the program that wrote it, or re-export it as glTF "
-                      "(parse)");
-  }
-  return *scene;
+[[noreturn]] void throwUnread(const ConvertInput& input, const std::string& why) {
+  if (why.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
+  if (input.format == ModelFormat::ifc) throw ImportError(why);  // others may have tried too
+  throw ImportError(input.file.string() + ": cannot be read: " + why +
+                    "; check the file in the program that wrote it, or re-export it as glTF "
+                    "(parse)");
 }
 
 Model modelByAssimp(const ImportRequest& request) {
@@ -222,26 +134,27 @@ Model modelByAssimp(const ImportRequest& request) {
   input.metresPerUnit = request.metresPerUnit;
   input.up = request.up;
   input.offset = request.offset;
-  std::string text;
-  if (request.task == ImportTask::assimp) {
-    text = readDescriptor(kIfcFile);
-    input.facts = ifcFileFacts(text);
+  FileToRead file{request.file, "", request.task == ImportTask::assimp};
+  if (file.isIfc) {
+    file.text = readDescriptor(kIfcFile);
+    input.facts = ifcFileFacts(file.text);
   } else {
     input.facts = readFileFacts(request.file, input.format);
-    if (input.format == ModelFormat::collada) text = mendedCollada(request.file, input.facts);
+    if (input.format == ModelFormat::collada) file.text = mendedCollada(request.file, input.facts);
     if (input.format == ModelFormat::obj) {
       const double unit = request.metresPerUnit.value_or(input.facts.metresPerUnit);
       ShiftedText shifted = shiftedObj(request.file, kFarAway / unit);
-      text = std::move(shifted.text);
+      file.text = std::move(shifted.text);
       input.shift = shifted.shift;
     }
   }
   sendProgress("parse", 0);
-  auto* importer = new Assimp::Importer;  // left to _exit: tearing a large scene down takes time
-  std::vector<std::string> files;
-  Model model = convertScene(parse(*importer, input, text, files), input, sendProgress);
-  tellMissingMaterials(files, model.problems);
-  model.filesBeside.insert(model.filesBeside.end(), files.begin(), files.end());
+  const FileRead read = readByAssimp(file);
+  if (read.scene == nullptr) throwUnread(input, read.failure);
+  Model model = convertScene(*read.scene, read.materials, input, sendProgress);
+  tellMissingMaterials(read.files, model.problems);
+  model.filesBeside.insert(model.filesBeside.end(), read.files.begin(), read.files.end());
+  model.filesBeside.push_back(read.library);
   return model;
 }
 

@@ -242,8 +242,8 @@ void tellLostTriangles(const aiScene& scene, const FileFacts& facts, ProblemLog&
                  *facts.triangles - read);
 }
 
-Model convertScene(const aiScene& scene, const ConvertInput& input,
-                   const ImportProgress& progress) {
+Model convertScene(const aiScene& scene, const std::vector<FileMaterial>& materials,
+                   const ConvertInput& input, const ImportProgress& progress) {
   Model model;
   model.reader = "assimp";
   ProblemLog problems;
@@ -255,7 +255,7 @@ Model convertScene(const aiScene& scene, const ConvertInput& input,
   }
   model.metresPerUnit = input.metresPerUnit.value_or(input.facts.metresPerUnit);
   model.up = input.up.value_or(input.facts.up);
-  convertMaterials(scene, input, model, problems, progress);
+  convertMaterials(scene, materials, input, model, problems, progress);
 
   if (progress) progress("convert", 0);
   std::vector<Mesh> meshes = convertMeshes(scene, problems);

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "scene/import/assimp_reader.hpp"
 #include "scene/import/file_facts.hpp"
 #include "scene/import/import_model.hpp"
 
@@ -49,11 +50,13 @@ constexpr double kFarAway = 1000;  ///< metres: farther from the origin, floats 
 constexpr double kCoarse = 1e-4;   ///< metres between neighbouring floats that deserve a word
 
 /// Throws ImportError when nothing solid is left. `input.facts` must be of the same file.
-Model convertScene(const aiScene& scene, const ConvertInput& input, const ImportProgress& progress);
+Model convertScene(const aiScene& scene, const std::vector<FileMaterial>& materials,
+                   const ConvertInput& input, const ImportProgress& progress);
 
-/// Materials in assimp's order and the textures that they use, decoded.
-void convertMaterials(const aiScene& scene, const ConvertInput& input, Model& model,
-                      ProblemLog& problems, const ImportProgress& progress);
+/// The materials, in their order, and the textures that they use, decoded; `scene` may hold some.
+void convertMaterials(const aiScene& scene, const std::vector<FileMaterial>& materials,
+                      const ConvertInput& input, Model& model, ProblemLog& problems,
+                      const ImportProgress& progress);
 
 /// One mesh for each of assimp's, some of them without triangles.
 std::vector<Mesh> convertMeshes(const aiScene& scene, ProblemLog& problems);

@@ -1,5 +1,4 @@
 // Materials and textures of assimp's scene.
-#include <assimp/GltfMaterial.h>
 #include <assimp/scene.h>
 
 #include <algorithm>
@@ -23,14 +22,10 @@ float unitInterval(float value, float otherwise) {
   return std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : otherwise;
 }
 
-Eigen::Vector3f colourOf(const aiColor4D& c, bool linear) {
-  const Eigen::Vector3f colour{unitInterval(c.r, 0.8f), unitInterval(c.g, 0.8f),
-                               unitInterval(c.b, 0.8f)};
+Eigen::Vector3f colourOf(const Eigen::Vector3f& c, bool linear) {
+  const Eigen::Vector3f colour =
+      c.unaryExpr([](float channel) { return unitInterval(channel, 0.8f); });
   return linear ? colour : colour.unaryExpr(&linearFromSrgb).eval();
-}
-
-std::string textOf(const aiString& text) {
-  return {text.C_Str(), text.length};
 }
 
 // ---- textures -----------------------------------------------------------------------------------
@@ -156,10 +151,9 @@ void fitTextures(Model& model, ProblemLog& problems) {
 
 // ---- materials ----------------------------------------------------------------------------------
 
-void setAlpha(const aiMaterial& from, bool gltf, Material& to, ProblemLog& problems) {
-  ai_real opacity = 1;
-  from.Get(AI_MATKEY_OPACITY, opacity);
+void setAlpha(const FileMaterial& from, bool gltf, Material& to, ProblemLog& problems) {
   if (!gltf) {
+    float opacity = from.opacity.value_or(1);
     if (opacity == 0) {
       // Exporters disagree on what 0 means; nobody models walls that cannot be seen at all.
       problems.add("opacity_zero", to.name + ": taken for opaque");
@@ -169,51 +163,33 @@ void setAlpha(const aiMaterial& from, bool gltf, Material& to, ProblemLog& probl
     if (to.baseColour.w() < 1) to.alpha = Material::Alpha::blend;
     return;
   }
-  aiString mode;
-  from.Get(AI_MATKEY_GLTF_ALPHAMODE, mode);
-  from.Get(AI_MATKEY_GLTF_ALPHACUTOFF, to.alphaCutoff);
-  if (textOf(mode) == "MASK") to.alpha = Material::Alpha::mask;
-  if (textOf(mode) == "BLEND") to.alpha = Material::Alpha::blend;
+  to.alphaCutoff = from.alphaCutoff.value_or(to.alphaCutoff);
+  if (from.alphaMode == "MASK") to.alpha = Material::Alpha::mask;
+  if (from.alphaMode == "BLEND") to.alpha = Material::Alpha::blend;
 }
 
-void setTexture(const aiMaterial& from, Textures& textures, Material& to) {
-  for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
-    aiString name;
-    if (from.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) continue;
-    to.baseColourTexture = textures.index(textOf(name));
-    return;
-  }
-}
-
-Material convertMaterial(const aiMaterial& from, bool gltf, Textures& textures,
+Material convertMaterial(const FileMaterial& from, bool gltf, Textures& textures,
                          ProblemLog& problems) {
   Material to;
-  to.name = textOf(const_cast<aiMaterial&>(from).GetName());
-  aiColor4D colour;
-  if (from.Get(AI_MATKEY_BASE_COLOR, colour) == AI_SUCCESS ||
-      from.Get(AI_MATKEY_COLOR_DIFFUSE, colour) == AI_SUCCESS) {
-    to.baseColour.head<3>() = colourOf(colour, gltf);
-    if (gltf) to.baseColour.w() = unitInterval(colour.a, 1);
+  to.name = from.name;
+  if (from.baseColour) {
+    to.baseColour.head<3>() = colourOf(from.baseColour->head<3>(), gltf);
+    if (gltf) to.baseColour.w() = unitInterval(from.baseColour->w(), 1);
   }
-  aiColor4D emissive(0, 0, 0, 1);
-  from.Get(AI_MATKEY_COLOR_EMISSIVE, emissive);
-  to.emissive = colourOf(emissive, gltf);
-  if (from.GetTextureCount(aiTextureType_EMISSIVE) > 0 && !to.emissive.isZero(0)) {
+  to.emissive = colourOf(from.emissive, gltf);
+  if (from.emissiveTexture && !to.emissive.isZero(0)) {
     // The factor alone would make all of it glow.
     problems.add("emissive_texture_ignored", to.name);
     to.emissive.setZero();
   }
-  from.Get(AI_MATKEY_METALLIC_FACTOR, to.metallic);
-  from.Get(AI_MATKEY_ROUGHNESS_FACTOR, to.roughness);
-  to.metallic = unitInterval(to.metallic, 0);
-  to.roughness = unitInterval(to.roughness, 1);
+  to.metallic = unitInterval(from.metallic.value_or(to.metallic), 0);
+  to.roughness = unitInterval(from.roughness.value_or(to.roughness), 1);
   // Only glTF's exporters mean it when they say one side: elsewhere a wall would vanish.
-  bool doubleSided = !gltf;
-  if (gltf) from.Get(AI_MATKEY_TWOSIDED, doubleSided);
-  to.doubleSided = doubleSided;
+  to.doubleSided = !gltf || from.doubleSided.value_or(false);
   setAlpha(from, gltf, to, problems);
   to.alphaCutoff = unitInterval(to.alphaCutoff, 0.5f);
-  setTexture(from, textures, to);
+  if (!from.baseColourTexture.empty())
+    to.baseColourTexture = textures.index(from.baseColourTexture);
   return to;
 }
 
@@ -224,13 +200,15 @@ float linearFromSrgb(float c) {
   return static_cast<float>(s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4));
 }
 
-void convertMaterials(const aiScene& scene, const ConvertInput& input, Model& model,
-                      ProblemLog& problems, const ImportProgress& progress) {
+void convertMaterials(const aiScene& scene, const std::vector<FileMaterial>& materials,
+                      const ConvertInput& input, Model& model, ProblemLog& problems,
+                      const ImportProgress& progress) {
   const bool gltf = input.format == ModelFormat::gltf || input.format == ModelFormat::glb;
   Textures textures(scene, input, model, problems);
-  for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
-    if (progress) progress("textures", static_cast<double>(i) / scene.mNumMaterials);
-    model.materials.push_back(convertMaterial(*scene.mMaterials[i], gltf, textures, problems));
+  for (std::size_t i = 0; i < materials.size(); ++i) {
+    if (progress)
+      progress("textures", static_cast<double>(i) / static_cast<double>(materials.size()));
+    model.materials.push_back(convertMaterial(materials[i], gltf, textures, problems));
   }
   if (model.materials.empty()) model.materials.emplace_back();
   fitTextures(model, problems);

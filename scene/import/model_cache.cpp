@@ -91,7 +91,7 @@ std::optional<ContentHash> keyOf(const fs::path& file, const ImportOptions& opti
 
 /// As it is now; the path is taken relative to the model's folder where the entry says so.
 FileBeside lookAt(const fs::path& file, const std::string& path) {
-  const auto content = contentHashOfFile(file.parent_path() / path);
+  const auto content = versionOf(file.parent_path() / path);
   return {path, content.has_value(), content.value_or(ContentHash{})};
 }
 

@@ -1,22 +1,25 @@
 #include "scene/import/reader_version.hpp"
 
-#include <assimp/version.h>
 #include <elf.h>
 #include <link.h>
 
 #include <cstdint>
 #include <cstring>
+#include <fstream>
 #include <span>
 #include <string_view>
+#include <vector>
 
-#include "scene/import/content_hash.hpp"
+#include "scene/import/assimp_reader.hpp"
 #include "scene/import/ifc/ifc_plus_plus.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-/// The linker's build id in the notes of a program segment, or "".
-std::string buildIdIn(std::span<const std::byte> notes) {
+constexpr std::size_t kMostNotes = 1 << 16;  // bytes; linkers write some hundreds
+
+/// The linker's build id in the notes of a program segment.
+std::optional<ContentHash> buildIdIn(std::span<const std::byte> notes) {
   ElfW(Nhdr) note{};
   while (notes.size() >= sizeof note) {  // each note takes some of the bytes
     std::memcpy(&note, notes.data(), sizeof note);
@@ -26,45 +29,54 @@ std::string buildIdIn(std::span<const std::byte> notes) {
     const auto* text = reinterpret_cast<const char*>(notes.data() + sizeof note);
     if (note.n_type == NT_GNU_BUILD_ID &&
         std::string_view(text, note.n_namesz) == std::string_view("GNU\0", 4)) {
-      return hexOf(contentHash(notes.subspan(sizeof note + name, note.n_descsz)));
+      return contentHash(notes.subspan(sizeof note + name, note.n_descsz));
     }
     notes = notes.subspan(sizeof note + name + content);
   }
-  return "";
+  return std::nullopt;
 }
 
-/// Called for the program itself first, then for its libraries.
-int takeBuildId(dl_phdr_info* info, std::size_t, void* into) {
-  for (const ElfW(Phdr) & part : std::span(info->dlpi_phdr, info->dlpi_phnum)) {
-    if (part.p_type != PT_NOTE) continue;
-    // The loader tells addresses as numbers.
-    const auto* begin = reinterpret_cast<const std::byte*>(info->dlpi_addr + part.p_vaddr);
-    const std::string id = buildIdIn({begin, part.p_memsz});
-    if (!id.empty()) *static_cast<std::string*>(into) = id;
+/// Fills `to` from `offset` on; false where the file ends before.
+bool readAt(std::ifstream& file, std::uint64_t offset, std::span<std::byte> to) {
+  file.seekg(static_cast<std::streamoff>(offset));
+  file.read(reinterpret_cast<char*>(to.data()), static_cast<std::streamsize>(to.size()));
+  return file.good();
+}
+
+/// nullopt where the file is no program and no library, or its linker wrote none.
+std::optional<ContentHash> buildIdOf(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  ElfW(Ehdr) header{};
+  if (!readAt(file, 0, std::as_writable_bytes(std::span(&header, 1))) ||
+      std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0 ||
+      header.e_phentsize != sizeof(ElfW(Phdr))) {
+    return std::nullopt;
   }
-  return 1;
-}
-
-/// The build id; where the linker writes none, the hash of the program's file.
-std::string programVersion() {
-  std::string id;
-  dl_iterate_phdr(&takeBuildId, &id);
-  if (!id.empty()) return id;
-  return hexOf(contentHashOfFile("/proc/self/exe").value_or(ContentHash{}));
-}
-
-/// Of what is opened for ifcplusplus.
-std::string moduleVersion() {
-  return hexOf(contentHashOfFile(ifcPlusPlusModule()).value_or(ContentHash{}));
+  std::vector<ElfW(Phdr)> parts(header.e_phnum);
+  if (!readAt(file, header.e_phoff, std::as_writable_bytes(std::span(parts)))) return std::nullopt;
+  for (const ElfW(Phdr) & part : parts) {
+    if (part.p_type != PT_NOTE || part.p_filesz > kMostNotes) continue;
+    std::vector<std::byte> notes(part.p_filesz);
+    if (!readAt(file, part.p_offset, notes)) return std::nullopt;
+    if (const auto id = buildIdIn(notes)) return id;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
 
+std::optional<ContentHash> versionOf(const std::filesystem::path& file) {
+  const auto id = buildIdOf(file);
+  return id ? id : contentHashOfFile(file);
+}
+
 const std::string& readerVersions() {
-  static const std::string text =
-      "assimp " + std::to_string(aiGetVersionMajor()) + "." + std::to_string(aiGetVersionMinor()) +
-      "." + std::to_string(aiGetVersionPatch()) + "." + std::to_string(aiGetVersionRevision()) +
-      " program " + programVersion() + " module " + moduleVersion();
+  const auto version = [](const std::filesystem::path& file) {
+    return hexOf(versionOf(file).value_or(ContentHash{}));
+  };
+  static const std::string text = "program " + version("/proc/self/exe") + " assimp " +
+                                  version(assimpModule()) + " ifcplusplus " +
+                                  version(ifcPlusPlusModule());
   return text;
 }
 

@@ -49,6 +49,18 @@ TEST(ImportFailures, MissingFileFolderAndEmptyFileAreTold) {
   EXPECT_TRUE(contains(failureOf(folder.write("empty.obj", "")), "empty.obj: is empty"));
 }
 
+TEST(ImportFailures, AReaderWhoseModuleIsMissingIsTold) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("box.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const auto missing = folder.path() / "missing.so";
+  setenv("ENFILADE_ASSIMP", missing.c_str(), 1);
+  const std::string text = failureOf(file);
+  unsetenv("ENFILADE_ASSIMP");
+  for (const std::string& part : {file.string(), missing.string(), std::string("install it")})
+    EXPECT_TRUE(contains(text, part)) << text;
+  EXPECT_EQ(failureOf(file), "");
+}
+
 TEST(ImportFailures, AnUnknownExtensionListsTheKnownOnes) {
   const TemporaryFolder folder;
   const std::string text = failureOf(folder.write("house.skp", "x"));

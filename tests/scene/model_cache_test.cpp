@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <random>
@@ -101,6 +102,13 @@ TEST_F(ModelCacheTest, AChangeOfAFileBesideIsSeen) {
   EXPECT_FALSE(changed.fromCache);
   EXPECT_EQ(changed.model.meshes[0].positions[1].x(), 4);
   EXPECT_TRUE(load().fromCache);
+}
+
+TEST_F(ModelCacheTest, TheLibraryThatReadItIsAmongTheFilesThatMatter) {
+  const Model model = load().model;
+  EXPECT_TRUE(std::any_of(model.filesBeside.begin(), model.filesBeside.end(), [](const auto& file) {
+    return file.find("/libassimp.so") != std::string::npos && fs::is_regular_file(file);
+  }));
 }
 
 TEST_F(ModelCacheTest, APictureThatWasMissingAndCameIsSeen) {
