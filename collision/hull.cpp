@@ -135,6 +135,7 @@ class TriangleHull {
 
   void collectSeen(Index point);
   void coneAtBorder(Index point);
+  static Index cornerAway(const Triangle& t, Index beyond);
   std::vector<Index> planeOfTriangles() const;
 
   std::span<const Vec3> points_;
@@ -192,6 +193,12 @@ void TriangleHull::coneAtBorder(Index point) {
   }
 }
 
+/// The corner of `t` that is none of its neighbour `beyond`.
+Index TriangleHull::cornerAway(const Triangle& t, Index beyond) {
+  const std::size_t edge = t.beyond[0] == beyond ? 0 : t.beyond[1] == beyond ? 1 : 2;
+  return t.corner[(edge + 2) % 3];
+}
+
 /// For each triangle the first triangle of its plane; its own index for the first.
 std::vector<Index> TriangleHull::planeOfTriangles() const {
   constexpr Index kNone = static_cast<Index>(-1);
@@ -202,16 +209,15 @@ std::vector<Index> TriangleHull::planeOfTriangles() const {
     plane[first] = first;
     open.assign(1, first);
     while (!open.empty()) {
-      const Triangle& t = triangles_[open.back()];
+      const Index inPlane = open.back();
+      const Triangle& t = triangles_[inPlane];
       open.pop_back();
       for (const Index other : t.beyond) {
         if (plane[other] != kNone) continue;
-        const auto& corner = triangles_[other].corner;
-        const bool flat = std::all_of(corner.begin(), corner.end(), [&](Index p) {
-          return orientation(points_[t.corner[0]], points_[t.corner[1]], points_[t.corner[2]],
-                             points_[p]) == 0;
-        });
-        if (!flat) continue;
+        const Index apex = cornerAway(triangles_[other], inPlane);
+        if (orientation(points_[t.corner[0]], points_[t.corner[1]], points_[t.corner[2]],
+                        points_[apex]) != 0)
+          continue;
         plane[other] = first;
         open.push_back(other);
       }
@@ -276,25 +282,25 @@ std::vector<Polygon> facesAround(std::span<const Vec3> points) {
   return hull.mergedFaces();
 }
 
+/// Closed faces run along each of their edges once in each direction.
 void linkNeighbours(Hull& hull) {
-  std::vector<std::pair<Index, Index>> edges;
-  for (const Polygon& face : hull.faces) {
-    for (std::size_t k = 0; k < face.size(); ++k) {
-      edges.emplace_back(face[k], face[(k + 1) % face.size()]);
-      edges.emplace_back(face[(k + 1) % face.size()], face[k]);
+  const auto eachEdge = [&](const auto& visit) {
+    for (const Polygon& face : hull.faces)
+      for (std::size_t k = 0; k < face.size(); ++k) visit(face[k], face[(k + 1) % face.size()]);
+    if (hull.faces.empty() && hull.vertices.size() == 2) {
+      visit(0, 1);
+      visit(1, 0);
     }
-  }
-  if (hull.faces.empty() && hull.vertices.size() == 2) edges = {{0, 1}, {1, 0}};
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-  hull.neighbourStart.assign(hull.vertices.size() + 1, 0);
-  for (const auto& [from, to] : edges) {
-    ++hull.neighbourStart[from + 1];
-    hull.neighbours.push_back(to);
-  }
-  for (std::size_t v = 1; v < hull.neighbourStart.size(); ++v) {
-    hull.neighbourStart[v] += hull.neighbourStart[v - 1];
-  }
+  };
+  std::vector<Index>& start = hull.neighbourStart;
+  start.assign(hull.vertices.size() + 1, 0);
+  eachEdge([&](Index from, Index) { ++start[from + 1]; });
+  for (std::size_t v = 1; v < start.size(); ++v) start[v] += start[v - 1];
+  hull.neighbours.resize(start.back());
+  std::vector<Index> next(start.begin(), start.end() - 1);
+  eachEdge([&](Index from, Index to) { hull.neighbours[next[from]++] = to; });
+  for (std::size_t v = 0; v + 1 < start.size(); ++v)
+    std::sort(hull.neighbours.begin() + start[v], hull.neighbours.begin() + start[v + 1]);
 }
 
 /// Keeps the points that are corners of faces, in their order, and renumbers the faces.

@@ -22,13 +22,14 @@ namespace {
 void tellReady(const Server& server, const scene::Scene& scene, const ServeCommand& command) {
   char hash[17];
   std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(scene.hash()));
-  nlohmann::ordered_json ready{{"ready", true},
-                               {"port", server.port()},
-                               {"address", command.listen.host},
-                               {"scene", messageOf(scene).source()},
-                               {"scene_hash", hash},
-                               {"objects", scene.model().objects.size()},
-                               {"worlds", server.worldNames()}};
+  nlohmann::ordered_json ready{
+      {"ready", true},
+      {"port", server.port()},
+      {"address", command.listen.host},
+      {"scene", std::filesystem::path(scene.model().source).filename().string()},
+      {"scene_hash", hash},
+      {"objects", scene.model().objects.size()},
+      {"worlds", server.worldNames()}};
   if (!command.recording.empty()) ready["recording"] = command.recording.filename().string();
   const auto replace = nlohmann::ordered_json::error_handler_t::replace;
   std::printf("%s\n", ready.dump(-1, ' ', false, replace).c_str());

@@ -122,9 +122,8 @@ class ShapeBuilder {
 
   void addHull(const PlacedShape& placed, std::span<const Shell> shells) {
     std::vector<Vec3> points;
-    for (const Shell& shell : shells)
-      for (std::size_t t = shell.first; t < shell.first + shell.count; ++t)
-        for (const Vec3& corner : relative(placed.triangle(t))) points.push_back(corner);
+    for (const std::uint32_t v : verticesOf(placed.shape, shells))
+      points.emplace_back(placed.at(v) - origin_);
     ++into_.hulls;
     into_.parts.push_back(collision::buildHull(points));
   }

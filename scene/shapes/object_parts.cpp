@@ -62,10 +62,8 @@ collision::Triangle relative(collision::Triangle triangle, const Vec3& origin) {
 collision::Hull hullOf(const Shape& shape, const Shell& shell, const Eigen::Affine3d& placed,
                        const Vec3& origin) {
   std::vector<Vec3> points;
-  points.reserve(3 * std::size_t{shell.count});
-  for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
-    for (const Vec3& corner : triangleAt(shape, t, placed)) points.emplace_back(corner - origin);
-  }
+  for (const std::uint32_t v : verticesOf(shape, {&shell, 1}))
+    points.emplace_back(at(shape, v, placed) - origin);
   return collision::buildHull(points);
 }
 

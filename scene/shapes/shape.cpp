@@ -251,6 +251,16 @@ bool hasArea(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Ve
   return !collision::collinear(a.cast<double>(), b.cast<double>(), c.cast<double>());
 }
 
+std::vector<Index> verticesOf(const Shape& shape, std::span<const Shell> shells) {
+  std::vector<Index> vertices;
+  for (const Shell& shell : shells)
+    for (Index t = shell.first; t < shell.first + shell.count; ++t)
+      vertices.insert(vertices.end(), shape.triangles[t].begin(), shape.triangles[t].end());
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  return vertices;
+}
+
 Shape shapeOf(std::span<const Mesh> meshes, std::span<const Index> which) {
   Shape shape;
   const std::vector<Index> corners = weld(meshes, which, shape.vertices);

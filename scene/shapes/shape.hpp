@@ -55,6 +55,9 @@ struct Shape {
 /// coordinates finite.
 Shape shapeOf(std::span<const Mesh> meshes, std::span<const std::uint32_t> which);
 
+/// The vertices of these surfaces of the shape, each once, ascending.
+std::vector<std::uint32_t> verticesOf(const Shape& shape, std::span<const Shell> shells);
+
 /// Whether a triangle has an area: its corners lie on no line, exactly.
 bool hasArea(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c);
 

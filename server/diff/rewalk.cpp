@@ -162,7 +162,7 @@ std::shared_ptr<const scene::Scene> recordedScene(const v1::RecordingStart& star
   try {
     if (!std::filesystem::exists(model.file)) throw std::runtime_error("it is not there");
     auto scene = loadScene(model);
-    if (messageOf(*scene).hash() != start.scene().hash())
+    if (scene->hash() != start.scene().hash())
       throw std::runtime_error("it is not as it was recorded");
     return scene;
   } catch (const std::exception& error) {
