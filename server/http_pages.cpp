@@ -1,38 +1,19 @@
 #include "server/http_pages.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <charconv>
 #include <optional>
 #include <sstream>
 
+#include "scene/import/uri.hpp"
 #include "server/version.hpp"
 
 namespace enfilade::server {
 namespace {
 
 constexpr const char* kBoundary = "enfilade-picture";
-
-int hexDigit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
-}
-
-std::string unescaped(std::string_view text) {
-  std::string plain;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const int high = i + 2 < text.size() && text[i] == '%' ? hexDigit(text[i + 1]) : -1;
-    const int low = high >= 0 ? hexDigit(text[i + 2]) : -1;
-    if (low >= 0) {
-      plain += static_cast<char>(high * 16 + low);
-      i += 2;
-    } else {
-      plain += text[i];
-    }
-  }
-  return plain;
-}
 
 std::optional<double> numberFrom(std::string_view text) {
   double number = 0;
@@ -195,14 +176,14 @@ std::string recordingPart(std::span<const WorldMetrics> worlds) {
 Target targetOf(std::string_view text) {
   Target target;
   const std::size_t mark = text.find('?');
-  target.path = unescaped(text.substr(0, mark));
+  target.path = scene::percentDecoded(text.substr(0, mark));
   if (mark == std::string_view::npos) return target;
   std::istringstream fields{std::string(text.substr(mark + 1))};
   std::string field;
   while (std::getline(fields, field, '&')) {
     const std::size_t equals = field.find('=');
     const std::string value = equals == std::string::npos ? "" : field.substr(equals + 1);
-    target.query[unescaped(field.substr(0, equals))] = unescaped(value);
+    target.query[scene::percentDecoded(field.substr(0, equals))] = scene::percentDecoded(value);
   }
   return target;
 }
@@ -272,17 +253,18 @@ std::string response(unsigned status, const std::string& type, const std::string
 }
 
 std::string mjpegHead() {
-  return std::string("HTTP/1.1 200 OK\r\nServer: enfilade ") + kServerVersion +
-         "\r\nContent-Type: multipart/x-mixed-replace; boundary=" + kBoundary +
-         "\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n";
+  return fmt::format(
+      "HTTP/1.1 200 OK\r\nServer: enfilade {}\r\n"
+      "Content-Type: multipart/x-mixed-replace; boundary={}\r\n"
+      "Cache-Control: no-store\r\nConnection: close\r\n\r\n",
+      kServerVersion, kBoundary);
 }
 
 std::vector<std::uint8_t> mjpegPart(const v1::Frame& frame, std::span<const std::uint8_t> jpeg) {
-  const std::string head =
-      std::string("--") + kBoundary +
-      "\r\nContent-Type: image/jpeg\r\nContent-Length: " + std::to_string(jpeg.size()) +
-      "\r\nX-Tick: " + std::to_string(frame.tick()) +
-      "\r\nX-Dropped: " + std::to_string(frame.dropped()) + "\r\n\r\n";
+  const std::string head = fmt::format(
+      "--{}\r\nContent-Type: image/jpeg\r\nContent-Length: {}\r\n"
+      "X-Tick: {}\r\nX-Dropped: {}\r\n\r\n",
+      kBoundary, jpeg.size(), frame.tick(), frame.dropped());
   std::vector<std::uint8_t> part(head.begin(), head.end());
   part.insert(part.end(), jpeg.begin(), jpeg.end());
   part.push_back('\r');

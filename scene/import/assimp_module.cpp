@@ -10,13 +10,13 @@
 
 #include <assimp/Importer.hpp>
 #include <assimp/ProgressHandler.hpp>
-#include <charconv>
 #include <cstdint>
 #include <type_traits>
 #include <utility>
 
 #include "scene/import/assimp_reader.hpp"
 #include "scene/import/frames.hpp"
+#include "scene/import/uri.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -34,20 +34,6 @@ class ForwardProgress : public Assimp::ProgressHandler {
  private:
   int last_ = 0;
 };
-
-/// With each %XY replaced by the byte of these two hexadecimal digits.
-std::string withoutPercents(const std::string& uri) {
-  std::string plain;
-  for (std::size_t i = 0; i < uri.size(); ++i) {
-    unsigned char byte = 0;
-    const char* digits = uri.data() + i + 1;
-    const bool coded = uri[i] == '%' && i + 2 < uri.size() &&
-                       std::from_chars(digits, digits + 2, byte, 16).ptr == digits + 2;
-    plain += coded ? static_cast<char>(byte) : uri[i];
-    if (coded) i += 2;
-  }
-  return plain;
-}
 
 /// Takes down which files assimp opens and looks for, and gives it a mended text for one of them.
 class WatchedFiles : public Assimp::DefaultIOSystem {
@@ -75,7 +61,7 @@ class WatchedFiles : public Assimp::DefaultIOSystem {
   /// such, if only that is there; else empty.
   std::string decoded(const std::string& file) const {
     if (DefaultIOSystem::Exists(file.c_str())) return "";
-    std::string name = withoutPercents(file);
+    std::string name = percentDecoded(file);
     if (name == file) return "";
     names_.push_back(name);
     return DefaultIOSystem::Exists(name.c_str()) ? name : "";

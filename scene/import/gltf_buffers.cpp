@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "scene/import/import_model.hpp"
+#include "scene/import/uri.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -82,23 +83,6 @@ std::string decodedBase64(std::string_view text) {
     bytes += static_cast<char>(held >> static_cast<unsigned>(bits) & 255U);
   }
   return bytes;
-}
-
-int hexDigit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
-}
-
-std::string percentDecoded(const std::string& text) {
-  std::string result;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const int high = text[i] == '%' && i + 2 < text.size() ? hexDigit(text[i + 1]) : -1;
-    const int low = high >= 0 ? hexDigit(text[i + 2]) : -1;
-    result += low >= 0 ? static_cast<char>(16 * high + low) : text[i];
-    if (low >= 0) i += 2;
-  }
-  return result;
 }
 
 std::string wholeFile(const std::filesystem::path& file, std::size_t from) {

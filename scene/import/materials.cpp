@@ -8,6 +8,7 @@
 
 #include "scene/import/convert.hpp"
 #include "scene/import/decode_image.hpp"
+#include "scene/import/uri.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -29,23 +30,6 @@ Eigen::Vector3f colourOf(const Eigen::Vector3f& c, bool linear) {
 }
 
 // ---- textures -----------------------------------------------------------------------------------
-
-std::string percentDecoded(const std::string& text) {
-  const auto digit = [](char c) {
-    if (c >= '0' && c <= '9') return c - '0';
-    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-    if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-    return -1;
-  };
-  std::string result;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const int high = i + 2 < text.size() && text[i] == '%' ? digit(text[i + 1]) : -1;
-    const int low = high >= 0 ? digit(text[i + 2]) : -1;
-    result += low >= 0 ? static_cast<char>(high * 16 + low) : text[i];
-    if (low >= 0) i += 2;
-  }
-  return result;
-}
 
 /// As the file says it, then with %20 and the like read, then beside the model. `looked` takes down
 /// where it was looked for.
