@@ -297,6 +297,16 @@ double fewBits(double time, double fineness) {
   return (time + shift) - shift;
 }
 
+/// The time of fewest bits after `time`, at most `ahead` later; `time` >= 0, `ahead` > 0.
+double simplestAfter(double time, double ahead) {
+  double unit = std::exp2(std::floor(std::log2(time + ahead)));
+  for (; unit > 0; unit /= 2) {
+    const double simple = (std::floor(time / unit) + 1) * unit;
+    if (simple > time && simple <= time + ahead) return simple;
+  }
+  return time + ahead;
+}
+
 /// The advance along the time axis.
 class Advance {
  public:
@@ -372,11 +382,17 @@ class Advance {
     ++probes_;
     for (double width = 0x1p-46; width <= widest; width *= 4) {
       const double hi = std::min(horizon_, fewBits(time_ + width * (1 + time_), width / 32));
-      if (!meetAt(hi)) continue;
-      finish(Impact::contact, time_, hi);
-      return true;
+      if (meetsBy(hi)) return true;
     }
-    return false;
+    // Bodies that graze meet at one instant, which is seen where it is a double; then it is likely
+    // to be one of few bits.
+    return meetsBy(std::min(horizon_, simplestAfter(time_, kNarrow * (1 + time_))));
+  }
+
+  bool meetsBy(double hi) {
+    const bool meet = meetAt(hi);
+    if (meet) finish(Impact::contact, time_, hi);
+    return meet;
   }
 
   const MovingBody& a_;

@@ -29,12 +29,15 @@ struct Edge {
 
 struct BodyFeatures {
   const Hull* hull;
+  bool turns;  ///< the pose is a rotation, up to rounding, and mirrors nothing
   std::vector<WideVec> points;
   std::vector<Edge> edges;
 };
 
 BodyFeatures featuresOf(const PlacedBody& placed) {
-  BodyFeatures features{placed.body->hull, {}, {}};
+  const Mat3* rotation = placed.body->rotation;
+  BodyFeatures features{
+      placed.body->hull, rotation == nullptr || rotation->determinant() > 0.5, {}, {}};
   for (std::uint32_t i = 0; i < placed.vertexCount(); ++i)
     features.points.push_back(placed.turned<Wide>(i));
   for (std::uint32_t i = 0; i < placed.vertexCount(); ++i) {
@@ -60,17 +63,18 @@ class Sieve {
     // is off by less than 2^-20, and the plane's distance by less than four times that.
     const double off = 64 * kUnit * difference_.reach * (first.norm() + second.norm());
     if (!(off < 0x1p-20 * length)) return true;
-    return std::abs(normal.dot(w)) <= (atMost_ + 0x1p-17 * difference_.reach) * length;
+    const bool farther = std::abs(normal.dot(w)) > (atMost_ + 0x1p-17 * difference_.reach) * length;
+    return !farther;  // true where doubles overflow, too
   }
 
-  void consider(Candidate candidate, const WideVec& first, const WideVec& second) {
+  /// `bothWays`: the opposite direction may be a facet's as well.
+  void consider(Candidate candidate, const WideVec& first, const WideVec& second, bool bothWays) {
     const WideVec normal = first.cross(second);
     // An edge is off by 2 sqrt(3) pointError, and the product's own rounding is of that order too.
     const Wide off = 8 * difference_.pointError() * (first.norm() + second.norm());
     const Wide length = normal.norm();
     const bool known = off < 0x1p-20L * length;
-    const int ways = candidate.of == Candidate::Of::edges ? 2 : 1;
-    for (int way = 0; way < ways; ++way) {
+    for (int way = 0; way < (bothWays ? 2 : 1); ++way) {
       candidate.reversed = way == 1;
       Wide extent = 0, error = std::numeric_limits<Wide>::infinity();
       if (known) {
@@ -98,14 +102,15 @@ class Sieve {
   std::vector<std::pair<Wide, Candidate>> kept_;
 };
 
-/// Outward normals of M: a face of B as it is, a face of A turned around.
+/// Outward normals of M: a face of B as it is, a face of A turned around. A matrix that is no
+/// rotation may turn faces inside out.
 void considerFaces(const BodyFeatures& features, Candidate::Of of, Sieve& sieve) {
   const auto& p = features.points;
   for (const std::vector<std::uint32_t>& face : features.hull->faces) {
     Candidate candidate{of, {face[0], face[1]}, {face[0], face[2]}};
     if (of == Candidate::Of::faceOfA) std::swap(candidate.first, candidate.second);
     sieve.consider(candidate, p[candidate.first[1]] - p[face[0]],
-                   p[candidate.second[1]] - p[face[0]]);
+                   p[candidate.second[1]] - p[face[0]], !features.turns);
   }
 }
 
@@ -118,7 +123,7 @@ std::vector<Candidate> candidates(const MinkowskiDifference& difference, double 
     for (const Edge& ofB : b.edges) {
       const Vec3 w = difference.point<double>({ofA.ends[0], ofB.ends[0]});
       if (!sieve.mayMatter(ofA.rounded, ofB.rounded, w)) continue;
-      sieve.consider({Candidate::Of::edges, ofA.ends, ofB.ends}, ofA.along, ofB.along);
+      sieve.consider({Candidate::Of::edges, ofA.ends, ofB.ends}, ofA.along, ofB.along, true);
     }
   }
   return sieve.survivors();

@@ -9,6 +9,7 @@
 #include "collision/exact_minkowski.hpp"
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace enfilade::collision {
@@ -352,6 +353,9 @@ void roundInTwo(const mpf_class& value, int scale, double& head, double& tail) {
   head = truncated + rest.get_d();
   rest = metres - head;
   tail = rest.get_d();
+  // What is no double any more was cut off: by then the unit of `head` is the least double.
+  constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+  if (tail == 0 && 2 * abs(rest) > kLeast) head += std::copysign(kLeast, sgn(rest));
 }
 
 double toDouble(const mpf_class& value, int scale) {

@@ -23,6 +23,7 @@
 #include "collision/narrow_phase.hpp"
 
 #include <cmath>
+#include <limits>
 
 #include "collision/closest_features.hpp"
 #include "collision/exact_answer.hpp"
@@ -439,7 +440,8 @@ Decision decideExactly(const MinkowskiDifference& difference, FeatureCache& cach
   decision.verdict = exact.verdict;
   decision.decidedBy = DecidedBy::rational;
   decision.distance = exact.distance;
-  decision.errorBound = 2 * kUnit * exact.distance;
+  if (exact.verdict == Verdict::separated)
+    decision.errorBound = 2 * kUnit * exact.distance + std::numeric_limits<double>::denorm_min();
   decision.pointA = exact.pointA;
   decision.pointB = exact.pointB;
   if (exact.verdict != Verdict::penetrating) decision.normal = cache.axis = exact.normal;

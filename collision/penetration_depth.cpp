@@ -21,6 +21,7 @@
 #include "collision/penetration_depth.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "collision/polytope.hpp"
 #include "collision/simplex.hpp"
@@ -253,7 +254,8 @@ void describe(const MinkowskiDifference& difference, const Bounds& bounds, Depth
   const Wide upper = std::max(Wide{0}, bounds.upper);
   depth.depth = static_cast<double>(upper);
   const Wide error = upper - std::min(bounds.lower, upper);
-  depth.errorBound = static_cast<double>(error) * (1 + 4 * kUnit) + kUnit * depth.depth;
+  depth.errorBound = static_cast<double>(error) * (1 + 4 * kUnit) + kUnit * depth.depth +
+                     std::numeric_limits<double>::denorm_min();
   depth.normal = -(bounds.direction / bounds.direction.norm()).cast<double>();
   Simplex<double> deepest;
   if (depth.global && bounds.lower > 0) {

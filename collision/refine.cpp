@@ -15,7 +15,8 @@ void describePenetration(const ConvexBody& a, const ConvexBody& b, const Feature
                          Refinement& refinement) {
   DepthCache none;
   const Depth depth = penetrationDepth(a, b, decided, none);
-  const ExactFacet facet = nearestFacetExactly(a, b, depth.depth + depth.errorBound);
+  const double atMost = (depth.depth + depth.errorBound) * (1 + 4 * kUnit);
+  const ExactFacet facet = nearestFacetExactly(a, b, atMost);
   const mpf_class squared = precise(dot(facet.normal, facet.normal));
   const mpf_class offset = precise(facet.offset);
   refinement.penetration = toDouble(mpf_class(offset / sqrt(squared)), facet.scale);

@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "collision/hull.hpp"
 #include "collision/penetration_depth.hpp"
 #include "collision/refine.hpp"
+#include "tests/collision/random_shapes.hpp"
 
 namespace enfilade::collision {
 namespace {
@@ -85,6 +88,86 @@ TEST(NarrowPhaseExtremes, ADepthThatIsCalledGlobalIsTheDepthAtAnyScale) {
     EXPECT_TRUE(depth.global) << exponent;
     EXPECT_NEAR(depth.depth / unit, 0.25, 1e-14) << exponent;
   }
+}
+
+Refinement refineCold(const ConvexBody& a, const ConvexBody& b) {
+  FeatureCache cache;
+  return refine(a, b, cache);
+}
+
+std::vector<Vec3> scaled(std::vector<Vec3> points, double unit) {
+  for (Vec3& p : points) p *= unit;
+  return points;
+}
+
+/// Where numbers are so large that squares of areas overflow, a depth is what it is at the origin.
+TEST(NarrowPhaseExtremes, RefinedDepthsScaleExactlyUpToTheLargestNumbers) {
+  testing::Random random(11);
+  int penetrating = 0;
+  for (int i = 0; i < 200; ++i) {
+    const std::vector<Vec3> a = testing::latticePoints(random, 6, 3);
+    const std::vector<Vec3> b = testing::latticePoints(random, 6, 3);
+    const Refinement here = refineCold({a}, {b});
+    for (const int exponent : {-300, 260, 465}) {
+      const double unit = std::ldexp(1.0, exponent);
+      const Refinement there = refineCold({scaled(a, unit)}, {scaled(b, unit)});
+      ASSERT_EQ(there.verdict, here.verdict) << i << " at 2^" << exponent;
+      EXPECT_EQ(there.penetration, here.penetration * unit) << i << " at 2^" << exponent;
+    }
+    penetrating += here.verdict == Verdict::penetrating;
+  }
+  EXPECT_GT(penetrating, 50);
+}
+
+/// In units of the least double, to which they are rounded; the bound knows.
+TEST(NarrowPhaseExtremes, AmongTheLeastNumbersDistancesAndDepthsAreRounded) {
+  constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+  testing::Random random(12);
+  std::array<int, 3> seen{};
+  for (int i = 0; i < 300; ++i) {
+    const Vec3 at = testing::latticePoints(random, 1, 4)[0];
+    const std::vector<Vec3> a = testing::latticePoints(random, 5, 3);
+    const std::vector<Vec3> b = testing::latticePoints(random, 5, 3);
+    const Refinement large = refineCold({a, at}, {b});
+    const std::vector<Vec3> leastA = scaled(a, kLeast), leastB = scaled(b, kLeast);
+    const Refinement small = refineCold({leastA, kLeast * at}, {leastB});
+    ASSERT_EQ(small.verdict, large.verdict) << i;
+    EXPECT_EQ(small.distance, std::nearbyint(large.distance) * kLeast) << i;
+    EXPECT_EQ(small.penetration, std::nearbyint(large.penetration) * kLeast) << i;
+    FeatureCache cache;
+    const Decision decided = decide({leastA, kLeast * at}, {leastB}, cache);
+    EXPECT_LE(std::abs(decided.distance / kLeast - large.distance),
+              decided.errorBound / kLeast + 1e-14)
+        << i;
+    ++seen[static_cast<std::size_t>(large.verdict)];
+  }
+  for (const int count : seen) EXPECT_GT(count, 3);
+}
+
+/// Matrices are taken as they are: one that mirrors makes the mirrored body.
+TEST(NarrowPhaseExtremes, AMirroredBodyIsAsDeepAsItsMirrorImage) {
+  Mat3 mirror;
+  mirror << 0, 0, -1, -1, 0, 0, 0, -1, 0;
+  ASSERT_EQ(mirror.determinant(), -1);
+  testing::Random random(13);
+  int penetrating = 0;
+  for (int i = 0; i < 200; ++i) {
+    const Hull a = buildHull(testing::latticePoints(random, 3 + i % 5, 2));
+    const Hull b = buildHull(testing::latticePoints(random, 7, 2));
+    const Vec3 at = testing::latticePoints(random, 1, 2)[0];
+    std::vector<Vec3> image = b.vertices;
+    for (Vec3& p : image) p = mirror * p;
+    const ConvexBody first{a.vertices, at, nullptr, &a};
+    const Refinement mirrored = refineCold(first, {b.vertices, Vec3::Zero(), &mirror, &b});
+    const Refinement plain = refineCold(first, {image});
+    ASSERT_EQ(mirrored.verdict, plain.verdict) << i;
+    EXPECT_EQ(mirrored.penetration, plain.penetration) << i;
+    EXPECT_EQ(refineCold({b.vertices, Vec3::Zero(), &mirror, &b}, first).penetration,
+              plain.penetration)
+        << i;
+    penetrating += plain.verdict == Verdict::penetrating;
+  }
+  EXPECT_GT(penetrating, 50);
 }
 
 /// The origin lies in a plane of symmetry: on a face, an edge or a corner of every simplex.

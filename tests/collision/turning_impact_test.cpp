@@ -146,6 +146,17 @@ TEST(GrazingImpact, PolygonsInOnePlaneMeet) {
   expectContactAt(impactCold(a, {{square, {3, 0.5, 0}}, {}}, 60), 2 / 0.7);
 }
 
+/// A moment before and a moment after they are apart.
+TEST(GrazingImpact, WhatMeetsAtOneInstantMeetsThereIfItIsADouble) {
+  const std::vector<Vec3> point{{0, 0, 0}}, rod{{0, 0, -1}, {0, 0, 1}};
+  for (const double time : {0.5, 0.4375, 3.0, 40.125}) {
+    const MovingBody a{{point, {-2 * time, 0, 0}}, {{2, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
+    const TimeOfImpact impact = impactCold(a, {{rod}, {}}, 64);
+    expectContactAt(impact, time);
+    EXPECT_EQ(impact.hi, time);
+  }
+}
+
 TEST(GrazingImpact, AThrownCubeThatJustFailsToReachTheCeilingMisses) {
   // It rises by 1/2 m: v^2 / 2g with v = g = 1.
   const auto ceiling = boxOf({-5, 0, -5}, {5, 1, 5});
