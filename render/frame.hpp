@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -30,7 +31,13 @@ struct FrameOptions {
   Channels channels = {};
   Glass glass = Glass::clear;
   Culling culling = Culling::hidden;
+  /// Whether things keep the sun from one another. They are cast by what the picture shows, not by
+  /// clear glass, nor by what an orthographic camera cuts away; glass itself stands in the sun.
+  bool shadows = false;
 };
+
+/// Which pixels of a picture the sun may reach, by its Frame::depth: 255, or 0 in shadow.
+using Sunlit = std::function<std::vector<std::uint8_t>(const std::vector<float>& depth)>;
 
 /// How it was made: meshes of objects, each counted once.
 struct FrameStatistics {

@@ -17,12 +17,11 @@ constexpr std::array<Word, 3> kWords{
     {{RendererKind::automatic, "auto"}, {RendererKind::gl, "gl"}, {RendererKind::rays, "rays"}}};
 
 /// Drawn by one that is there already: what it took to make it is not the picture's.
-template <class AnyRenderer>
-Frame timed(AnyRenderer& renderer, const scene::Snapshot& snapshot, const Camera& camera,
-            const FrameOptions& options) {
+template <class Draw>
+Frame timed(const Draw& draw) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point start = Clock::now();
-  Frame frame = renderer.render(snapshot, camera, options);
+  Frame frame = draw();
   frame.statistics.seconds = std::chrono::duration<double>(Clock::now() - start).count();
   return frame;
 }
@@ -75,6 +74,11 @@ struct Renderer::State {
     if (device.requireGpu) {
       throw NoRenderer("rays are cast on processors, and a GPU is required: ask for gl");
     }
+    return caster();
+  }
+
+  /// Shadows are cast by it whoever draws.
+  RayRenderer& caster() {
     if (!rays) rays = std::make_unique<RayRenderer>(scene);
     return *rays;
   }
@@ -123,10 +127,16 @@ Renderer::~Renderer() = default;
 
 Frame Renderer::render(const scene::Snapshot& snapshot, const Camera& camera,
                        const FrameOptions& options, RendererKind kind) {
-  if (state_->chosen(camera, options, kind) == RendererKind::gl) {
-    return timed(state_->glRenderer(), snapshot, camera, options);
+  State& s = *state_;
+  if (s.chosen(camera, options, kind) == RendererKind::rays) {
+    RayRenderer& rays = s.rayRenderer();
+    return timed([&] { return rays.render(snapshot, camera, options); });
   }
-  return timed(state_->rayRenderer(), snapshot, camera, options);
+  GlRenderer& gl = s.glRenderer();
+  const Sunlit sunlit = [&](const std::vector<float>& depth) {
+    return s.caster().sunlit(snapshot, camera, options, depth);
+  };
+  return timed([&] { return gl.render(snapshot, camera, options, sunlit); });
 }
 
 const std::string& Renderer::deviceName() const {

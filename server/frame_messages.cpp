@@ -217,6 +217,7 @@ CameraOrError viewFrom(const v1::FrameRequest& request, const scene::Snapshot& s
   if (View* usable = std::get_if<View>(&view)) {
     usable->options.channels = channelsOf(request);
     if (request.glass() == v1::GLASS_SOLID) usable->options.glass = render::Glass::solid;
+    usable->options.shadows = request.shadows();
     usable->renderer = rendererOf(request);
     if (auto problem = addIntrinsics(usable->camera, request)) return *problem;
     if (const auto why = render::refusal(usable->camera)) {
@@ -246,6 +247,7 @@ v1::Frame messageOf(const render::Frame& frame, double time, const v1::FrameRequ
     intrinsics.set_cy(pinhole.cy);
   }
   message.set_glass(request.glass() == v1::GLASS_SOLID ? v1::GLASS_SOLID : v1::GLASS_CLEAR);
+  message.set_shadows(request.shadows());
   attachment.reserve(attachment.size() +
                      bytesPerPixel(request) * message.width() * message.height());
   for (const int channel : request.channels()) {

@@ -539,7 +539,10 @@ v1::Welcome welcomeOf(const ServedWorld& served) {
   welcome.add_capabilities("pairs");
   welcome.add_capabilities("persists");
   welcome.add_capabilities("restart");
-  if (!served.frames.deviceName().empty()) welcome.add_capabilities("frames");
+  if (!served.frames.deviceName().empty()) {
+    welcome.add_capabilities("frames");
+    welcome.add_capabilities("shadows");
+  }
   *welcome.mutable_scene() = messageOf(served.world.scene());
   *welcome.mutable_policies() = messageOf(served.world.lengths());
   v1::Limits& limits = *welcome.mutable_limits();

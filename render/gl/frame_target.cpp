@@ -72,6 +72,15 @@ void FrameTarget::begin(const Channels& channels) {
   glClearNamedFramebufferfv(fbo, GL_DEPTH, 0, &kFarthest);
 }
 
+void FrameTarget::lightBy(const std::vector<std::uint8_t>& sunlit) {
+  constexpr GLuint kUnit = 1;  // of `sunlitPixels` in the shaders
+  if (sunlit_.name() == 0) sunlit_ = plane(GL_R8, width_, height_);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glTextureSubImage2D(sunlit_.name(), 0, 0, 0, width_, height_, GL_RED, GL_UNSIGNED_BYTE,
+                      sunlit.data());
+  glBindTextureUnit(kUnit, sunlit_.name());
+}
+
 void FrameTarget::drawInto(const Channels& channels) const {
   const auto target = [](bool on, GLenum attachment) { return on ? attachment : GLenum{GL_NONE}; };
   const std::array<GLenum, 3> targets{target(channels.rgb, GL_COLOR_ATTACHMENT0),

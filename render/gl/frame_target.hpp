@@ -20,6 +20,8 @@ class FrameTarget {
   void begin(const Channels& channels);
   /// Draw into these channels; depth is written as the depth mask says.
   void drawInto(const Channels& channels) const;
+  /// Which pixels surfaces are lit by the sun in from now on: 255, or 0 in shadow.
+  void lightBy(const std::vector<std::uint8_t>& sunlit);
   /// The channels but depth and colour into `frame`.
   void read(Frame& frame, const Channels& channels) const;
   /// The colour, darkened by `hollows` as far as its alpha lets them be seen.
@@ -31,7 +33,7 @@ class FrameTarget {
   void addNormals();
 
   int width_ = 0, height_ = 0;
-  GlTexture colour_, ids_, depth_, normals_;
+  GlTexture colour_, ids_, depth_, normals_, sunlit_;
   std::vector<std::uint8_t> rgba_;  ///< kept for reading back
   GlFramebuffer framebuffer_;
 };

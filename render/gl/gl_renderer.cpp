@@ -17,6 +17,9 @@
 // In a small scene where hardly anything is hidden, all that lies in the picture is drawn and
 // shaded at once instead.
 //
+// Where shadows are wanted, which pixels the sun reaches is asked between depth and colour; all
+// that is in the picture is then drawn into the depth first, too.
+//
 // Why the picture is that of drawing everything: in a pixel the nearest fragment wins, among equals
 // the one drawn last. What is left out lies, wherever it has a fragment, behind something that is
 // drawn; so each pixel's winner is among what is drawn, and what is shaded keeps its order.
@@ -68,8 +71,12 @@ void add(std::vector<std::uint32_t>& all, const std::vector<std::uint32_t>& more
 struct Job {
   const Camera& camera;
   const FrameOptions& options;
+  const Sunlit& sunlit;
   BoxSight sight;
   FrameStatistics statistics;
+  std::vector<float> metres;  ///< Frame::depth; empty: nobody needed it yet
+
+  bool shadows() const { return options.shadows && options.channels.rgb; }
 };
 
 }  // namespace
@@ -96,6 +103,8 @@ struct GlRenderer::State {
   DrawList drawSurfaces(const Job& job, const Choice& choice);
   void drawAir(const DrawList& glass);
   void readDepth(const Camera& camera);
+  const std::vector<float>& metresIn(Job& job);
+  void shadeNearest(Job& job);
   std::size_t trianglesOf(const std::vector<std::uint32_t>& some) const;
   Choice inside(const Job& job) const;
   bool hardlyHidden(const Job& job, const Choice& all) const;
@@ -163,6 +172,22 @@ void GlRenderer::State::readDepth(const Camera& camera) {
   depthIsOfPicture = true;
 }
 
+/// Of the picture as it is drawn now.
+const std::vector<float>& GlRenderer::State::metresIn(Job& job) {
+  if (!depthIsOfPicture) readDepth(job.camera);
+  if (job.metres.empty())
+    job.metres = metresOf(depth.base(job.camera.width, job.camera.height), job.camera);
+  return job.metres;
+}
+
+/// When all depth is drawn.
+void GlRenderer::State::shadeNearest(Job& job) {
+  const Channels& channels = job.options.channels;
+  target.drawInto(channels);
+  if (job.shadows()) target.lightBy(job.sunlit(metresIn(job)));
+  pass->shadeNearest(channels.normals, job.shadows());
+}
+
 std::size_t GlRenderer::State::trianglesOf(const std::vector<std::uint32_t>& some) const {
   std::size_t triangles = 0;
   for (const std::uint32_t part : some)
@@ -192,7 +217,14 @@ bool GlRenderer::State::hardlyHidden(const Job& job, const Choice& all) const {
 DrawList GlRenderer::State::drawInside(Job& job, const Choice& all) {
   job.statistics.drawn = static_cast<std::uint32_t>(all.parts.size());
   job.statistics.outside = static_cast<std::uint32_t>(parts.size() - all.parts.size());
-  pass->shadeAll(job.options.channels.normals);
+  if (job.shadows()) {
+    target.drawInto({false, false, false, false});
+    pass->toDepth();
+    drawSurfaces(job, all);
+    shadeNearest(job);
+  } else {
+    pass->shadeAll(job.options.channels.normals);
+  }
   return drawSurfaces(job, all);
 }
 
@@ -331,8 +363,7 @@ DrawList GlRenderer::State::drawSeen(Job& job) {
   const Choice shaded = notHidden(job, drawn);
   DrawList glass;
   if (!done) {
-    target.drawInto(channels);
-    pass->shadeNearest(channels.normals);
+    shadeNearest(job);
     glass = drawSurfaces(job, shaded);
   }
   remember(job, drawn, seen);
@@ -348,7 +379,7 @@ GlRenderer::GlRenderer(std::shared_ptr<const scene::Scene> scene, const DeviceCh
 GlRenderer::~GlRenderer() = default;
 
 Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
-                         const FrameOptions& options) {
+                         const FrameOptions& options, const Sunlit& sunlit) {
   if (const auto why = refusal(camera)) throw RenderError(*why);
   State& s = *state_;
   s.context.makeCurrent();
@@ -360,7 +391,8 @@ Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
   s.pass->begin(camera);
   s.target.begin(options.channels);
   s.depthIsOfPicture = false;
-  Job job{camera, options, BoxSight(camera), {}};
+  Job job{camera, options, sunlit, BoxSight(camera), {}, {}};
+  if (job.shadows() && !sunlit) throw RenderError("GlRenderer: nobody finds what is in shadow");
   const DrawList glass =
       options.culling == Culling::hidden ? s.drawSeen(job) : s.drawInside(job, s.inside(job));
   if (options.channels.rgb) s.drawAir(glass);
@@ -372,8 +404,8 @@ Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
   frame.statistics = job.statistics;
   if (options.channels.depth || options.channels.rgb) {
     glFlush();  // where the depth was read before, the device draws while this thread goes on
-    if (!s.depthIsOfPicture) s.readDepth(camera);
-    frame.depth = metresOf(s.depth.base(camera.width, camera.height), camera);
+    s.metresIn(job);
+    frame.depth = std::move(job.metres);
   }
   if (options.channels.rgb) s.target.readColour(frame, Hollows(frame.depth, camera));
   s.target.read(frame, options.channels);

@@ -21,8 +21,9 @@ class GlRenderer {
   GlRenderer& operator=(const GlRenderer&) = delete;
 
   /// Throws RenderError for a camera that refusal() refuses, and for a scene too large to draw.
+  /// `sunlit` is asked where options.shadows wants shadows in a colour; it may not be empty then.
   Frame render(const scene::Snapshot& snapshot, const Camera& camera,
-               const FrameOptions& options = {});
+               const FrameOptions& options = {}, const Sunlit& sunlit = {});
 
   const std::string& deviceName() const;  ///< GL_RENDERER
   bool software() const;

@@ -80,6 +80,9 @@ layout(location = 2) out vec4 facing;
 #ifdef TEXTURED
 layout(binding = 0) uniform sampler2D baseColourTexture;
 #endif
+#ifdef SHADOWS
+layout(binding = 1) uniform sampler2D sunlitPixels;
+#endif
 
 // exposed() and the encoding of sRGB in one: a rational function of the root, fitted to both, never
 // farther off than a quarter of a byte's step. Encoding in the frame buffer costs processors that
@@ -124,7 +127,12 @@ void main() {
   seen = entity;
 #endif
 #ifdef SHADED
-  vec3 radiance = lit(albedo.rgb, n, toEye, distance, finish.y, finish.z) + kGlow * glow.rgb;
+#ifdef SHADOWS
+  float sunlit = texelFetch(sunlitPixels, ivec2(gl_FragCoord.xy), 0).r;
+#else
+  float sunlit = 1.0;
+#endif
+  vec3 radiance = lit(albedo.rgb, n, toEye, distance, finish.y, finish.z, sunlit) + kGlow * glow.rgb;
 #ifdef PLAN
   // A plan cuts things open; their insides are darker, so that cut walls stand out.
   bool inside = gl_FrontFacing == (glow.w > 0.5);
@@ -181,6 +189,7 @@ std::string surfaceFragmentSource(const SurfaceVariant& variant) {
   if (variant.blend) source += "#define BLEND\n";
   if (variant.normals) source += "#define NORMALS\n";
   if (variant.shaded) source += "#define SHADED\n";
+  if (variant.shadows) source += "#define SHADOWS\n";
   if (variant.plan) source += "#define PLAN\n";
   return source + kFrameBlock + kLight + kSurfaceFragment;
 }

@@ -12,6 +12,7 @@ struct SurfaceVariant {
   bool mask = false;     ///< cuts holes: costs the early depth test
   bool blend = false;    ///< colour only, with alpha
   bool normals = false;  ///< writes them to colour attachment 2
+  bool shadows = false;  ///< the sun shines where the texture at binding 1 says
   bool plan = false;     ///< orthographic; else a perspective
   bool shaded = true;    ///< else depth and id alone, to the last bit those of the shaded one
 };

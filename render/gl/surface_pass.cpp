@@ -133,9 +133,10 @@ unsigned SurfacePass::program(const Batch& batch) {
   variant.blend = shaded_ && batch.pass == Pass::blend;
   variant.normals = shaded_ && normals_;
   variant.plan = shaded_ && plan_;
+  variant.shadows = shaded_ && shadows_ && !variant.blend;
   std::size_t index = 0;
   for (const bool has : {variant.mask, variant.shaded, variant.textured, variant.blend,
-                         variant.normals, variant.plan})
+                         variant.normals, variant.plan, variant.shadows})
     index = 2 * index + (has ? 1 : 0);
   std::optional<GlProgram>& program = surfaces_[index];
   if (!program) {
@@ -164,9 +165,10 @@ void SurfacePass::toDepth() {
   glDepthFunc(GL_GEQUAL);
 }
 
-void SurfacePass::shadeNearest(bool normals) {
+void SurfacePass::shadeNearest(bool normals, bool shadows) {
   shaded_ = true;
   normals_ = normals;
+  shadows_ = shadows;
   glDepthMask(GL_FALSE);
   glDepthFunc(GL_EQUAL);
 }
@@ -174,6 +176,7 @@ void SurfacePass::shadeNearest(bool normals) {
 void SurfacePass::shadeAll(bool normals) {
   shaded_ = true;
   normals_ = normals;
+  shadows_ = false;
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_GEQUAL);  // as in shadeNearest(), the last of several equally near ones stays
 }

@@ -38,7 +38,8 @@ class SurfacePass {
   /// What is drawn after it has only a depth and an id, of several equally near ones the last.
   void toDepth();
   /// What is drawn after it is shaded where it is as near as the depth that is there.
-  void shadeNearest(bool normals);
+  /// With shadows, in the light of FrameTarget::lightBy().
+  void shadeNearest(bool normals, bool shadows);
   /// Both at once: what is drawn after it is shaded where nothing nearer was drawn before.
   void shadeAll(bool normals);
   void draw(const DrawList& list, const Geometry& geometry);
@@ -52,8 +53,8 @@ class SurfacePass {
   GlVertexArray vertexArray_;
   GlBuffer uniforms_;
   GlProgram sky_;
-  std::array<std::optional<GlProgram>, 64> surfaces_;  ///< see program()
-  bool shaded_ = true, normals_ = false, plan_ = false;
+  std::array<std::optional<GlProgram>, 128> surfaces_;  ///< see program()
+  bool shaded_ = true, normals_ = false, plan_ = false, shadows_ = false;
   StreamBuffer instances_, commands_;
 };
 

@@ -46,6 +46,11 @@ void castBetween(const Casting& casting, int x, int y, double from, double to,
 /// The depth, in floats, of the first triangle of one pixel's ray behind `from`; NaN: none.
 double castBehind(const Casting& casting, int x, int y, double from);
 
+/// Makes 0 in `sunlit` which pixels of the same rows the trees keep the sun from, by `depth`; both
+/// are of the whole picture, and where depth is NaN nothing is to be lit.
+void castSunRows(const Casting& casting, int y, const std::vector<float>& depth,
+                 std::vector<std::uint8_t>& sunlit);
+
 /// The filter to give to RayScene: cuts holes into Pass::mask where its texture is transparent.
 EmbreeFilter maskFilter();
 

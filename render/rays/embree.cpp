@@ -65,7 +65,10 @@ OpenTriangles openTriangles(RTCDeviceTy* device, std::size_t positions, std::siz
 
 void closeTriangles(const OpenTriangles& open, RTCSceneTy* scene, unsigned number,
                     EmbreeFilter filter) {
-  if (filter) rtcSetGeometryIntersectFilterFunction(open.geometry, filter);
+  if (filter) {
+    rtcSetGeometryIntersectFilterFunction(open.geometry, filter);
+    rtcSetGeometryOccludedFilterFunction(open.geometry, filter);
+  }
   rtcCommitGeometry(open.geometry);
   rtcAttachGeometryByID(scene, open.geometry, number);
   rtcReleaseGeometry(open.geometry);

@@ -1,5 +1,6 @@
 // A picture, step by step: rays in packets find each pixel's triangle; depth, id and normal follow
-// from that triangle's corners in doubles, run by run along the rows; then its colour. Over the
+// from that triangle's corners in doubles, run by run along the rows; then, where shadows are asked
+// for, a ray from there towards the sun; then its colour. Over the
 // whole picture then come glass from back to front, and hollows. Rows are shared among threads;
 // no pixel's result depends on another's thread.
 #include "render/rays/ray_renderer.hpp"
@@ -57,6 +58,22 @@ void fillDepth(const DepthOfPlane& plane, int x, int y, std::span<float> out) {
   }
 }
 
+/// What depth and ids show; with solid glass, it too.
+std::vector<const RayTree*> firstHitsOf(RayScene& scene, Glass glass) {
+  std::vector<const RayTree*> trees = scene.solid();
+  if (glass == Glass::clear) return trees;
+  const std::vector<const RayTree*> panes = scene.glass();
+  trees.insert(trees.end(), panes.begin(), panes.end());
+  return trees;
+}
+
+/// Calls `work(from, to)` for tiles of rows that reach over a picture, on several threads.
+template <class Work>
+void shareTiles(scene::Workers& workers, int height, const Work& work) {
+  constexpr std::size_t kBlock = 4;  // rows of tiles that a thread takes at a time
+  workers.share(static_cast<std::size_t>((height + kTile - 1) / kTile), kBlock, work);
+}
+
 /// One picture in the making.
 class Picture {
  public:
@@ -65,14 +82,9 @@ class Picture {
       : options_(options),
         rays_(pixelRaysOf(camera)),
         shading_(rays_, textures),
-        solid_(scene.solid()),
+        solid_(firstHitsOf(scene, options.glass)),
         origin_(scene.origin()) {
-    const bool seeGlass = options.glass == Glass::solid;
-    if (seeGlass || options.channels.rgb) {
-      const std::vector<const RayTree*> glass = scene.glass();
-      std::vector<const RayTree*>& where = seeGlass ? solid_ : glass_;
-      where.insert(where.end(), glass.begin(), glass.end());
-    }
+    if (options.channels.rgb && options.glass == Glass::clear) glass_ = scene.glass();
     const auto pixels =
         static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
     frame.camera = camera;
@@ -82,17 +94,17 @@ class Picture {
     if (options.channels.normals) frame.normals.assign(3 * pixels, 0.0f);
     if (options.channels.rgb) linear_.resize(pixels), frame.rgb.resize(3 * pixels);
     if (!glass_.empty()) clear_.assign(pixels, 1.0f);
+    if (options.channels.rgb && options.shadows) sunlit_.assign(pixels, 255);
   }
 
   Frame frame;
 
   void draw(scene::Workers& workers) {
-    const auto tiles = static_cast<std::size_t>((rays_.height + kTile - 1) / kTile);
-    constexpr std::size_t kBlock = 4;  // rows of tiles that a thread takes at a time
-    workers.share(tiles, kBlock, [&](std::size_t from, std::size_t to) { drawSolid(from, to); });
+    const int height = rays_.height;
+    shareTiles(workers, height, [&](std::size_t from, std::size_t to) { drawSolid(from, to); });
     if (!options_.channels.rgb) return;
     hollows_.emplace(frame.depth, frame.camera);
-    workers.share(tiles, kBlock, [&](std::size_t from, std::size_t to) { finish(from, to); });
+    shareTiles(workers, height, [&](std::size_t from, std::size_t to) { finish(from, to); });
     if (!options_.channels.depth) frame.depth = {};
   }
 
@@ -124,6 +136,7 @@ class Picture {
   Vec3 origin_;
   std::vector<glsl::vec3> linear_;
   std::vector<float> clear_;  ///< how much of what glass lies before is seen; empty: no glass
+  std::vector<std::uint8_t> sunlit_;  ///< empty: all is
   std::optional<Hollows> hollows_;
 };
 
@@ -136,13 +149,14 @@ void Picture::drawSolid(std::size_t fromTile, std::size_t toTile) {
   for (std::size_t tile = fromTile; tile < toTile; ++tile) {
     const int top = static_cast<int>(tile) * kTile;
     castRows(with, top, keys);
-    for (int y = top; y < endRow(tile); ++y) {
+    const auto row = [&](int y) {
       const auto width = static_cast<std::size_t>(rays_.width);
-      const std::span<const HitKey> row =
-          std::span(keys).subspan(static_cast<std::size_t>(y - top) * width, width);
-      measureRow(with, y, row, planes);
-      if (painted) paintRow(with, y, row, triangles);
-    }
+      return std::span<const HitKey>(keys).subspan(static_cast<std::size_t>(y - top) * width,
+                                                   width);
+    };
+    for (int y = top; y < endRow(tile); ++y) measureRow(with, y, row(y), planes);
+    if (!sunlit_.empty()) castSunRows(with, top, frame.depth, sunlit_);
+    for (int y = top; painted && y < endRow(tile); ++y) paintRow(with, y, row(y), triangles);
   }
 }
 
@@ -178,8 +192,10 @@ void Picture::paintRow(const Casting& with, int y, std::span<const HitKey> keys,
     }
     const ShadedTriangle& triangle =
         recent.of(key, [&] { return ShadedTriangle(triangleOf(with, key), rays_); });
-    if (options_.channels.rgb)
-      linear_[pixel] = shading_.colour(triangle, x, y, triangle.depth.at(x, y)).rgb;
+    if (options_.channels.rgb) {
+      const float sunlit = sunlit_.empty() || sunlit_[pixel] != 0 ? 1.0f : 0.0f;
+      linear_[pixel] = shading_.colour(triangle, x, y, triangle.depth.at(x, y), sunlit).rgb;
+    }
     if (options_.channels.normals) {
       const Vec3 normal = shading_.normal(triangle, x, y);
       for (int i = 0; i < 3; ++i)
@@ -233,7 +249,7 @@ void Picture::blendGlass(const Casting& with, int y, Recent<ShadedTriangle>& rec
     before = &pane;
     if (again) continue;
     const SurfaceColour glass =
-        shading_.colour(triangle(pane.key), column(pane.pixel), row(pane.pixel), pane.z);
+        shading_.colour(triangle(pane.key), column(pane.pixel), row(pane.pixel), pane.z, 1.0f);
     linear_[pane.pixel] = glsl::mix(linear_[pane.pixel], glass.rgb, glass.alpha);
     clear_[pane.pixel] *= 1 - glass.alpha;
   }
@@ -281,6 +297,24 @@ Frame RayRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
   picture.frame.renderer = state_->name;
   picture.frame.software = true;
   return std::move(picture.frame);
+}
+
+std::vector<std::uint8_t> RayRenderer::sunlit(const scene::Snapshot& snapshot, const Camera& camera,
+                                              const FrameOptions& options,
+                                              const std::vector<float>& depth) {
+  if (const auto why = refusal(camera)) throw RenderError(*why);
+  State& s = *state_;
+  s.scene.follow(snapshot);
+  const std::vector<const RayTree*> trees = firstHitsOf(s.scene, options.glass);
+  const PixelRays rays = pixelRaysOf(camera);
+  const Shading shading(rays, s.textures);
+  const Casting casting{trees, rays, shading, s.scene.origin(), options.hidden};
+  std::vector<std::uint8_t> sunlit(depth.size(), 255);
+  shareTiles(s.workers, rays.height, [&](std::size_t from, std::size_t to) {
+    for (std::size_t tile = from; tile < to; ++tile)
+      castSunRows(casting, static_cast<int>(tile) * kTile, depth, sunlit);
+  });
+  return sunlit;
 }
 
 const std::string& RayRenderer::deviceName() const {

@@ -33,6 +33,11 @@ class RayRenderer {
   Frame render(const scene::Snapshot& snapshot, const Camera& camera,
                const FrameOptions& options = {});
 
+  /// Which pixels the sun reaches in a picture whose depth is given, whoever drew it: 255, or 0 in
+  /// shadow (FrameOptions::shadows). `depth` is Frame::depth of a picture with this camera.
+  std::vector<std::uint8_t> sunlit(const scene::Snapshot& snapshot, const Camera& camera,
+                                   const FrameOptions& options, const std::vector<float>& depth);
+
   const std::string& deviceName() const;  ///< "Embree 3..."
 
  private:

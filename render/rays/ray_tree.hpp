@@ -44,9 +44,6 @@ struct PieceTriangle {
 bool shareEdge(const PieceTriangle& a, const PieceTriangle& b);
 
 /// Trees of single meshes; kept by whoever places them again and again.
-/// Whether they are neighbours in one piece: two corners stand in the same places.
-bool shareEdge(const PieceTriangle& a, const PieceTriangle& b);
-
 class MeshTrees {
  public:
   MeshTrees(RTCDeviceTy* device, bool robust) : device_(device), robust_(robust) {}

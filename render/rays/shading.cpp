@@ -50,6 +50,12 @@ Value blended(const std::array<double, 3>& shares, const std::array<Value, 3>& c
 
 }  // namespace
 
+Vec3 towardsSun() {
+  const vec3& sun = glsl::kSunDirection;
+  return Vec3(static_cast<double>(sun.x), static_cast<double>(sun.y), static_cast<double>(sun.z))
+      .normalized();
+}
+
 ShadedTriangle::ShadedTriangle(const PieceTriangle& which, const PixelRays& rays)
     : piece(which.piece) {
   const SeenCorners corners = which.corners(rays.eye);
@@ -90,6 +96,19 @@ Texel Shading::albedo(const ShadedTriangle& triangle, int x, int y) const {
   return albedo;
 }
 
+float Shading::alphaAt(const PieceTriangle& triangle, float u, float v) const {
+  const RayPiece& piece = *triangle.piece;
+  const float alpha = piece.material->baseColour[3];
+  const scene::Mesh& mesh = *piece.mesh;
+  if (piece.texture < 0 || mesh.uvs.size() != mesh.positions.size()) return alpha;
+  const auto corner = [&](std::size_t i) {
+    return mesh.uvs[mesh.indices[3 * std::size_t{triangle.triangle} + i]];
+  };
+  const Eigen::Vector2f place = (1 - u - v) * corner(0) + u * corner(1) + v * corner(2);
+  const MipTexture& texture = textures_[static_cast<std::size_t>(piece.texture)];
+  return alpha * texture.at(place.x(), place.y(), 0)[3];
+}
+
 Vec3 Shading::facing(const ShadedTriangle& triangle, const std::array<double, 3>& shares,
                      const Vec3& toEye) const {
   const Vec3 flat =
@@ -108,7 +127,8 @@ Vec3 Shading::normal(const ShadedTriangle& triangle, int x, int y) const {
   return facing(triangle, sharesAt(triangle.weights, x, y).here, toEye);
 }
 
-SurfaceColour Shading::colour(const ShadedTriangle& triangle, int x, int y, double z) const {
+SurfaceColour Shading::colour(const ShadedTriangle& triangle, int x, int y, double z,
+                              float sunlit) const {
   const bool plan = rays_.parallel;
   const Vec3 way = rays_.directionAt(x, y);
   const double length = way.norm();
@@ -119,7 +139,7 @@ SurfaceColour Shading::colour(const ShadedTriangle& triangle, int x, int y, doub
   const MaterialData& material = *triangle.piece->material;
   vec3 radiance =
       glsl::lit({albedo[0], albedo[1], albedo[2]}, floats(n), floats(toEye), distance,
-                material.surface[1], material.surface[2]) +
+                material.surface[1], material.surface[2], sunlit) +
       glsl::kGlow * vec3(material.emissive[0], material.emissive[1], material.emissive[2]);
   if (plan && material.surface[3] < 0.5f) {
     // A plan cuts things open; their insides are darker, so that cut walls stand out.

@@ -8,6 +8,9 @@
 
 namespace enfilade::render {
 
+/// Where the sun stands: unit length, world.
+Vec3 towardsSun();
+
 /// A triangle with all that its colour needs; made once for neighbouring pixels.
 struct ShadedTriangle {
   ShadedTriangle(const PieceTriangle& which, const PixelRays& rays);
@@ -33,9 +36,12 @@ class Shading {
 
   /// Base colour times texture, linear.
   Texel albedo(const ShadedTriangle& triangle, int x, int y) const;
+  /// Of a point of the triangle by its shares of corners 1 and 2, without filtering.
+  float alphaAt(const PieceTriangle& triangle, float u, float v) const;
   /// Unit length, facing the eye, world.
   Vec3 normal(const ShadedTriangle& triangle, int x, int y) const;
-  SurfaceColour colour(const ShadedTriangle& triangle, int x, int y, double z) const;
+  /// `sunlit`: 1, or 0 in shadow.
+  SurfaceColour colour(const ShadedTriangle& triangle, int x, int y, double z, float sunlit) const;
   glsl::vec3 sky(int x, int y) const;
 
  private:

@@ -76,6 +76,7 @@ render::FrameOptions frameOptions(const Shot& shot, const PictureOptions& option
   frame.channels = {wanted.rgb || marked, wanted.ids || marked,
                     wanted.depth || wanted.range || marked, wanted.normals};
   frame.glass = options.glass;
+  frame.shadows = options.shadows;
   return frame;
 }
 

@@ -235,6 +235,7 @@ void addFiles(CLI::App& verb, CaptureArguments& into) {
                   "solid: of the glass, which hides it in the colour too")
       ->capture_default_str()
       ->check(CLI::IsMember({"clear", "solid"}));
+  verb.add_flag("--shadows", into.shadows, "The sun's, in the colour; clear glass casts none");
 }
 
 void addRun(CLI::App& verb, CaptureArguments& into) {
@@ -301,6 +302,7 @@ PictureOptions picturesFrom(const CaptureArguments& read) {
   options.overlay = *overlayFrom(read.overlay);
   options.renderer =
       render::rendererKindFrom(read.renderer).value_or(render::RendererKind::automatic);
+  options.shadows = read.shadows;
   options.glass = read.glass == "solid" ? render::Glass::solid : render::Glass::clear;
   return options;
 }

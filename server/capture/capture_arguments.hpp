@@ -18,7 +18,8 @@ struct CaptureArguments {
   std::string ids = "npy", layout = "plain", axes = "opengl", fps = "30", every = "0", avatar;
   std::string camera, shard = "0/1", limit = "0", progress = "bar", glass = "clear",
                       renderer = "auto", overlay;
-  bool still = false, strict = false, noMp4 = false, dryRun = false, reportDepth = false;
+  bool still = false, strict = false, noMp4 = false, dryRun = false, reportDepth = false,
+       shadows = false;
 };
 
 /// PATH and the options, each checked as it is read. `into` lives as long as `verb`.

@@ -64,6 +64,7 @@ struct PictureOptions {
   OverlayChoice overlay;
   render::RendererKind renderer = render::RendererKind::automatic;
   render::Glass glass = render::Glass::clear;
+  bool shadows = false;
 };
 
 /// How the work is done; pictures do not depend on it.

@@ -223,6 +223,7 @@ std::string manifestJson(const scene::Scene& scene, const std::filesystem::path&
                         {"names", marks.names},
                         {"paths", marks.paths}};
   all["glass"] = options.glass == render::Glass::solid ? "solid" : "clear";
+  all["shadows"] = options.shadows;
   return all.dump(1) + "\n";
 }
 

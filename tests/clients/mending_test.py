@@ -277,6 +277,8 @@ class Questions(RoomCase):
         self.assertAlmostEqual(down.depth[16, 16], 1.5, places=4)
         self.assertEqual((down.message.camera.near, down.message.camera.far), (0.1, 30))
         self.assertEqual(down.message.glass, messages.GLASS_SOLID)
+        self.assertFalse(down.message.shadows)
+        self.assertTrue(self.client.frame(eye=(0, 1, 0), forward=(1, 0, 0), shadows=True).message.shadows)
         lens = self.client.frame(forward=(1, 0, 0), intrinsics=(40, 41, 16, 17), **look)
         self.assertEqual(lens.message.intrinsics,
                          messages.Intrinsics(fx=40, fy=41, cx=16, cy=17))

@@ -107,6 +107,7 @@ TEST_F(Frames, IntrinsicsRangeAndNormalsTravel) {
   request.add_channels(v1::CHANNEL_RANGE);
   request.add_channels(v1::CHANNEL_NORMALS);
   request.set_glass(v1::GLASS_SOLID);
+  request.set_shadows(true);
   v1::Intrinsics& intrinsics = *request.mutable_intrinsics();
   intrinsics.set_fx(40);
   intrinsics.set_fy(40);
@@ -115,6 +116,7 @@ TEST_F(Frames, IntrinsicsRangeAndNormalsTravel) {
   const protocol::ReceivedFrame frame = ann.frame(request);
   EXPECT_EQ(frame.description.intrinsics().cx(), 12.5);
   EXPECT_EQ(frame.description.glass(), v1::GLASS_SOLID);
+  EXPECT_TRUE(frame.description.shadows());
   EXPECT_FALSE(frame.description.camera().has_fov_y());
   const auto depth = valuesOf<float>(frame, v1::CHANNEL_DEPTH);
   const auto range = valuesOf<float>(frame, v1::CHANNEL_RANGE);

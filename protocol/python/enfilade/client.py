@@ -415,17 +415,21 @@ class Client:
               fov_y: Optional[float] = None, intrinsics: Optional[Sequence[float]] = None,
               height_y: Optional[float] = None, near: Optional[float] = None,
               far: Optional[float] = None, channels: Sequence[str] = ("rgb",), glass: str = "",
-              renderer: str = "", tick: Optional[int] = None) -> Frame:
+              renderer: str = "", shadows: bool = False,
+              tick: Optional[int] = None) -> Frame:
         """A picture of the last tick: from the eyes of `avatar` (looking along `forward` where that is
         given), or from `eye` towards `target` or along `forward`, and then without `avatar` in it.
         `up` (with an eye) must not lie along the gaze: straight down needs one. The lens: `fov_y`
         radians, or `intrinsics` (fx, fy, cx, cy) in pixels from the top left corner, or, with an eye,
         `height_y` metres of an orthographic picture. `channels` are of "rgb", "depth", "ids",
-        "normals", "range"; `glass` is "clear" or "solid", `renderer` "gl" or "rays"."""
+        "normals", "range"; `glass` is "clear" or "solid", `renderer` "gl" or "rays"; `shadows`
+        are the sun's, in the colour."""
         asked = frame_request(avatar, eye=eye, target=target, forward=forward, up=up, width=width,
                               height=height, fov_y=fov_y, intrinsics=intrinsics, height_y=height_y,
                               near=near, far=far, channels=channels, glass=glass,
-                              renderer=renderer, tick=tick)
+                              renderer=renderer, shadows=shadows, tick=tick)
+        if shadows and "shadows" not in self.welcome.capabilities:
+            warnings.warn("frame: this server draws no shadows; start a newer one", stacklevel=2)
         reply, attachment = self.request(frame=asked)
         return results.frame(reply.frame, attachment)
 

@@ -59,7 +59,7 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
                   intrinsics: Optional[Sequence[float]] = None, height_y: Optional[float] = None,
                   near: Optional[float] = None, far: Optional[float] = None,
                   channels: Sequence[str] = ("rgb",), glass: str = "", renderer: str = "",
-                  tick: Optional[int] = None) -> Any:
+                  shadows: bool = False, tick: Optional[int] = None) -> Any:
     """The FrameRequest that Client.frame() sends."""
     if sum(one is not None for one in (fov_y, intrinsics, height_y)) > 1:
         raise ValueError("frame: give one of fov_y, intrinsics and height_y")
@@ -70,7 +70,7 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
     if eye is None and not (target is None and up is None and height_y is None):
         raise ValueError("frame: target, up and height_y need an eye; eyes of an avatar take forward")
     asked = messages.FrameRequest(width=width, height=height, channels=results.channels(channels),
-                                  tick=tick)
+                                  shadows=shadows, tick=tick)
     if eye is None:
         view = asked.eyes
         view.avatar = avatar

@@ -1,0 +1,225 @@
+// The sun's shadows, against boxes cut by lines worked out in doubles.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "render/rays/pixel_rays.hpp"
+#include "render/rays/ray_renderer.hpp"
+#include "render/rays/shading.hpp"
+#include "render/renderer.hpp"
+#include "tests/render/things_to_see.hpp"
+
+namespace enfilade::render {
+namespace {
+
+enum class Sun : std::uint8_t { reaches, kept, undecided };
+
+/// Whether a line from `start` towards the sun passes the box, which is smaller by `inwards`.
+bool passes(const PlacedBox& box, const Vec3& start, double inwards, double end) {
+  const Vec3 sun = towardsSun();
+  const Vec3 half = box.size.cwiseAbs() / 2 - Vec3::Constant(inwards);
+  double from = 0, to = end;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double a = (box.centre[axis] - half[axis] - start[axis]) / sun[axis];
+    const double b = (box.centre[axis] + half[axis] - start[axis]) / sun[axis];
+    from = std::max(from, std::min(a, b));
+    to = std::min(to, std::max(a, b));
+  }
+  return from < to && (half.array() > 0).all();
+}
+
+/// On a face of box `own` that is turned to the sun; no box keeps the sun from its own such faces.
+Sun sunAt(const std::vector<PlacedBox>& boxes, std::size_t own, const Vec3& start, double end) {
+  Sun sun = Sun::reaches;
+  for (const PlacedBox& box : boxes) {
+    if (&box == &boxes[own]) continue;
+    if (passes(box, start, 0.02, end)) return Sun::kept;
+    if (passes(box, start, -0.02, end)) sun = Sun::undecided;
+  }
+  return sun;
+}
+
+Camera slantedCamera() {
+  Camera camera;
+  camera.eye = {-7, 9, 8};
+  camera.forward = Vec3(0, -1, 0) - camera.eye;
+  camera.width = 150;
+  camera.height = 110;
+  return camera;
+}
+
+std::vector<PlacedBox> boxesOnAFloor() {
+  std::vector<PlacedBox> boxes = opaque(crowd(30));
+  boxes.push_back({{0, -11, 0}, {60, 1, 60}, coloured(0.6f, 0.6f, 0.6f)});
+  return boxes;
+}
+
+FrameOptions withShadows(bool shadows = true) {
+  FrameOptions options;
+  options.shadows = shadows;
+  return options;
+}
+
+/// Where faces turn away from the sun it is of no matter who else keeps it from them.
+bool turnedToTheSun(const Frame& frame, std::size_t pixel) {
+  const float* n = &frame.normals[3 * pixel];
+  return Eigen::Vector3f(n[0], n[1], n[2]).cast<double>().dot(towardsSun()) > 0.05;
+}
+
+class Shadows : public testing::TestWithParam<RendererKind> {};
+
+TEST_P(Shadows, AreWhereLinesTowardsTheSunPassBoxes) {
+  const std::vector<PlacedBox> boxes = boxesOnAFloor();
+  Renderer renderer(sceneOf(boxes), GetParam());
+  for (const bool parallel : {false, true}) {
+    Camera camera = slantedCamera();
+    if (parallel) camera.projection = Camera::Projection::orthographic, camera.heightY = 16;
+    FrameOptions options = withShadows();
+    options.channels.normals = true;
+    const Frame shaded = renderer.render({}, camera, options);
+    options.shadows = false;
+    const Frame sunny = renderer.render({}, camera, options);
+    EXPECT_EQ(shaded.ids, sunny.ids);
+    const PixelRays rays = pixelRaysOf(camera);
+    int kept = 0, reached = 0;
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        const std::size_t pixel = at(shaded, x, y);
+        const auto z = static_cast<double>(shaded.depth[pixel]);
+        if (std::isnan(z) || !turnedToTheSun(shaded, pixel)) continue;
+        const double up = towardsSun().dot(rays.forward);
+        const double end = parallel ? ((up < 0 ? camera.near : camera.far) - z) / up
+                                    : std::numeric_limits<double>::infinity();
+        const Vec3 point = rays.eye + rays.originAt(x, y) + z * rays.directionAt(x, y);
+        const Sun sun = sunAt(boxes, shaded.ids[pixel] - 1, point, end);
+        const int less = sunny.rgb[3 * pixel] - shaded.rgb[3 * pixel];
+        if (sun == Sun::kept) {
+          ASSERT_GT(less, 0) << x << ", " << y;
+          ++kept;
+        } else if (sun == Sun::reaches) {
+          ASSERT_EQ(less, 0) << x << ", " << y;
+          ++reached;
+        }
+      }
+    }
+    EXPECT_GT(kept, 300);
+    EXPECT_GT(reached, 3000);
+  }
+}
+
+TEST_P(Shadows, ClearGlassCastsNoneAndSolidGlassDoes) {
+  const PlacedBox floor{{0, -1, 0}, {20, 1, 20}, {}};
+  const PlacedBox pane{{0, 2, 0}, {6, 0.1, 6}, coloured(0.2f, 0.2f, 0.9f, 0.3f)};
+  Renderer renderer(sceneOf({floor, pane}), GetParam());
+  Camera camera = squareCamera(40);  // beneath the pane, towards its shadow
+  camera.eye = {-2, 1, -2};
+  camera.forward = {0, -1, 0};
+  camera.up = Vec3::UnitX();
+  FrameOptions options = withShadows();
+  EXPECT_EQ(renderer.render({}, camera, options).rgb,
+            renderer.render({}, camera, withShadows(false)).rgb);
+  options.glass = Glass::solid;
+  const Frame shaded = renderer.render({}, camera, options);
+  options.shadows = false;
+  const Frame sunny = renderer.render({}, camera, options);
+  const std::size_t middle = 3 * at(shaded, 20, 20);
+  EXPECT_LT(shaded.rgb[middle] + 5, sunny.rgb[middle]);
+}
+
+TEST_P(Shadows, HolesOfTexturesLetTheSunThrough) {
+  // Its left half (x < 0) is a leaf, its right half a hole; a floor lies behind, square to the sun.
+  scene::Model model = maskedSquare()->model();
+  scene::Mesh floor;
+  floor.material = 1;
+  model.materials.push_back(coloured(0.7f, 0.7f, 0.7f));
+  for (const auto& [x, z] : {std::pair{-9, -9}, {9, -9}, {9, 9}, {-9, 9}})
+    floor.positions.emplace_back(static_cast<float>(x), -1.5f, static_cast<float>(z) - 2);
+  floor.indices = {0, 1, 2, 0, 2, 3};
+  model.meshes.push_back(floor);
+  model.objects.resize(2);
+  model.objects[1].meshes = {1};
+  Renderer renderer(std::make_shared<const scene::Scene>(std::move(model)), GetParam());
+  // From a point of the square down along the sun's ray to the floor.
+  const auto darker = [&](double x) {
+    const Vec3 below = Vec3(x, 0, -2) - 1.5 / towardsSun().y() * towardsSun();
+    Camera camera;
+    camera.eye = below + Vec3(0, 0.5, -0.5);
+    camera.forward = below - camera.eye;
+    camera.width = camera.height = 1;
+    return renderer.render({}, camera, withShadows(false)).rgb[0] -
+           renderer.render({}, camera, withShadows()).rgb[0];
+  };
+  EXPECT_GT(darker(-0.5), 5);
+  EXPECT_EQ(darker(0.5), 0);
+  EXPECT_EQ(darker(1.5), 0) << "beside the square";
+}
+
+TEST_P(Shadows, WhatAPlanCutsAwayCastsNone) {
+  const PlacedBox floor{{0, -0.5, 0}, {20, 1, 20}, {}}, roof{{0, 3, 0}, {20, 0.2, 20}, {}};
+  const PlacedBox wall{{0, 1.25, 0}, {0.2, 2.5, 8}, {}};
+  Renderer renderer(sceneOf({floor, roof, wall}), GetParam());
+  Camera camera = plan({Vec3(-4, 0, -4), Vec3(4, 0, 4)}, -0.1, 2, 80, 80);
+  const Frame shaded = renderer.render({}, camera, withShadows());
+  const Frame sunny = renderer.render({}, camera, withShadows(false));
+  const auto less = [&](double x, double z) {
+    const std::size_t pixel =
+        3 * at(shaded, static_cast<int>(40 + 10 * x * 0.9), static_cast<int>(40 + 10 * z * 0.9));
+    return sunny.rgb[pixel] - shaded.rgb[pixel];
+  };
+  EXPECT_GT(less(-0.5, 0), 5) << "behind the wall, up to where it is cut";
+  EXPECT_EQ(less(-2.5, 0), 0) << "the roof is cut away";
+  EXPECT_EQ(less(2.5, 0), 0);
+}
+
+TEST_P(Shadows, APersonCastsOneButForTheirOwnEyes) {
+  Renderer renderer(sceneOf({{{0, -0.5, 0}, {20, 1, 20}, {}}}), GetParam());
+  scene::Snapshot snapshot;
+  snapshot.avatars = {avatarAt(7, Vec3::Zero())};
+  Camera camera = slantedCamera();
+  FrameOptions options = withShadows();
+  const Frame seen = renderer.render(snapshot, camera, options);
+  EXPECT_GT(std::count(seen.ids.begin(), seen.ids.end(), 7u), 20);
+  camera.eye = {-0.6, 3, -0.8};  // over the shadow
+  camera.forward = {0, -1, 0};
+  camera.up = Vec3::UnitX();
+  const auto floorOf = [&](const Frame& frame) { return frame.rgb[3 * at(frame, 75, 55)]; };
+  const int shaded = floorOf(renderer.render(snapshot, camera, options));
+  options.hidden = 7;
+  EXPECT_GT(floorOf(renderer.render(snapshot, camera, options)), shaded + 5);
+}
+
+INSTANTIATE_TEST_SUITE_P(OfBothRenderers, Shadows,
+                         testing::Values(RendererKind::gl, RendererKind::rays),
+                         [](const auto& kind) { return std::string(wordOf(kind.param)); });
+
+TEST(ShadowsOfGl, NeedSomebodyWhoFindsThem) {
+  GlRenderer renderer(sceneOf(boxesOnAFloor()));
+  EXPECT_THROW(renderer.render({}, squareCamera(20), withShadows()), RenderError);
+  EXPECT_EQ(renderer.render({}, squareCamera(20)).rgb.size(), 1200u);
+}
+
+TEST(ShadowsOfGl, AreTheSameWhateverIsLeftOutOfTheDrawing) {
+  const auto scene = sceneOf(crowd(600));
+  GlRenderer gl(scene);
+  RayRenderer rays(scene);
+  for (int i = 0; i < 12; ++i) {
+    Camera camera = slantedCamera();
+    camera.eye = Vec3(12 * std::cos(0.5 * i), 3, 12 * std::sin(0.5 * i));
+    camera.forward = -camera.eye;
+    FrameOptions options = withShadows();
+    options.glass = i % 3 == 0 ? Glass::solid : Glass::clear;
+    const auto drawn = [&](Culling culling) {
+      options.culling = culling;
+      return gl.render({}, camera, options, [&](const std::vector<float>& depth) {
+        return rays.sunlit({}, camera, options, depth);
+      });
+    };
+    const Frame culled = drawn(Culling::hidden);
+    EXPECT_TRUE(culled.rgb == drawn(Culling::outside).rgb) << i;
+    EXPECT_TRUE(culled.rgb == drawn(Culling::singly).rgb) << i;
+  }
+}
+
+}  // namespace
+}  // namespace enfilade::render
