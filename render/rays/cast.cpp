@@ -268,8 +268,8 @@ void castSunRows(const Casting& casting, int y, const std::vector<float>& depth,
     for (std::size_t t = 0; t < casting.trees.size(); ++t) {
       Context context = contextOf(casting, t);
       context.towardsSun = true;
-      // They begin far apart at edges; and Embree 3.13 did not come back from such packets where it
-      // was told that they are coherent.
+      // They begin far apart at edges. And told that they are coherent, Embree 3.13 does not come
+      // back from rtcOccluded16 with some packets that meet instances.
       context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
       if (casting.through != 0) context.embree.filter = rejectThrough;
       rtcOccluded16(packet.valid, casting.trees[t]->embree(), &context.embree, &packet.ray);
