@@ -10,10 +10,10 @@
 
 namespace enfilade::assets {
 
-/// Moving parts become extras of their nodes (scene/bodies/SIDECAR.md): doors that turn or slide,
-/// in the node's own frame and from where it stands; a sidecar beside the file says more. Textures
-/// and texture coordinates are not written. Throws std::length_error beyond GLB's 4 GiB, and
-/// std::invalid_argument naming an object that cannot be written.
+/// Moving parts become extras of their nodes (scene/import/bodies/SIDECAR.md): doors that turn or
+/// slide, in the node's own frame and from where it stands; a sidecar beside the file says more.
+/// Textures and texture coordinates are not written. Throws std::length_error beyond GLB's 4 GiB,
+/// and std::invalid_argument naming an object that cannot be written.
 std::string glbBytes(const scene::Model& model, const std::vector<MovingPart>& movingParts = {});
 
 /// Throws std::runtime_error naming the file.

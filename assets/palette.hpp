@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "scene/model.hpp"
+#include "scene/model/model.hpp"
 
 namespace enfilade::assets {
 

@@ -5,11 +5,11 @@ include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 set(public_headers
-  bounding_box.hpp box_tree.hpp broad_phase_audit.hpp contact_manifold.hpp continuous.hpp
-  continuous_pose.hpp hull.hpp hull_planes.hpp mesh_probe.hpp mesh_query.hpp narrow_phase.hpp
-  nearest_parts.hpp
-  part_tree.hpp penetration_depth.hpp refine.hpp sort_and_sweep.hpp time_of_impact.hpp turning_sweep.hpp
-  triangle_tree.hpp types.hpp wake_up_heap.hpp)
+  bounds/bounding_box.hpp shapes/box_tree.hpp broad_phase/broad_phase_audit.hpp narrow_phase/contact_manifold.hpp motion/time_to_contact.hpp
+  motion/moving_pose.hpp shapes/hull.hpp compound/hull_planes.hpp compound/query_bounds.hpp compound/mesh_query.hpp narrow_phase/narrow_phase.hpp
+  compound/compound_distance.hpp
+  compound/compound_shape.hpp narrow_phase/penetration_depth.hpp narrow_phase/refine.hpp broad_phase/sort_and_sweep.hpp motion/shape_cast.hpp motion/rotational_shape_cast.hpp
+  shapes/triangle_tree.hpp types.hpp motion/pair_schedule.hpp)
 target_sources(enfilade_collision PUBLIC
   FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${public_headers})
 target_compile_features(enfilade_collision PUBLIC cxx_std_20)

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <sstream>
 
-#include "render/view.hpp"
+#include "render/camera_basis.hpp"
 
 namespace enfilade::render {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "scene/snapshot.hpp"
+#include "scene/world/data/snapshot.hpp"
 
 namespace enfilade::render {
 

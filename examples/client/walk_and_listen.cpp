@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "protocol/async_client.hpp"
+#include "protocol/clients/cpp/async_client.hpp"
 
 using namespace enfilade;
 using namespace enfilade::protocol;

@@ -2,8 +2,8 @@
 #include <iostream>
 #include <vector>
 
-#include "collision/hull.hpp"
-#include "collision/narrow_phase.hpp"
+#include "collision/narrow_phase/narrow_phase.hpp"
+#include "collision/shapes/hull.hpp"
 
 using namespace enfilade::collision;
 

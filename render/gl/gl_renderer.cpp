@@ -32,13 +32,13 @@
 #include <optional>
 #include <utility>
 
+#include "render/gl/dynamic_instances.hpp"
 #include "render/gl/egl_context.hpp"
-#include "render/gl/frame_target.hpp"
-#include "render/gl/model_buffers.hpp"
-#include "render/gl/moving_things.hpp"
-#include "render/gl/part_search.hpp"
-#include "render/gl/seen_memory.hpp"
+#include "render/gl/occlusion_culler.hpp"
+#include "render/gl/render_target.hpp"
+#include "render/gl/scene_buffers.hpp"
 #include "render/gl/surface_pass.hpp"
+#include "render/gl/visibility_cache.hpp"
 
 namespace enfilade::render {
 namespace {

@@ -6,7 +6,7 @@
 #include "render/device.hpp"
 #include "render/frame.hpp"
 #include "render/render_error.hpp"
-#include "scene/scene.hpp"
+#include "scene/world/data/scene.hpp"
 
 namespace enfilade::render {
 

@@ -57,7 +57,7 @@ void main() {
 // As text of GLSL what the ray renderer compiles as C++.
 constexpr const char* kLight =
 #define LIGHT_TEXT(...) #__VA_ARGS__
-#include "render/light.inc"
+#include "render/shading.glsl.inc"
 #undef LIGHT_TEXT
     ;
 

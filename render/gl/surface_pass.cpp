@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <span>
 
+#include "render/camera_basis.hpp"
 #include "render/gl/shaders.hpp"
-#include "render/view.hpp"
 
 namespace enfilade::render {
 namespace {

@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
-#include "render/gl/draw_list.hpp"
+#include "render/draw_list.hpp"
 #include "render/gl/gl_objects.hpp"
-#include "render/gl/vertex.hpp"
+#include "render/vertex.hpp"
 
 namespace enfilade::render {
 

@@ -12,9 +12,9 @@
 #include <limits>
 #include <map>
 
-#include "scene/import/file_facts.hpp"
-#include "scene/import/model_stream.hpp"
-#include "scene/import/process.hpp"
+#include "scene/import/file_metadata.hpp"
+#include "scene/import/worker/model_stream.hpp"
+#include "scene/import/worker/process.hpp"
 
 namespace enfilade::scene {
 namespace {

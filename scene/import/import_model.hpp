@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 
-#include "scene/model.hpp"
+#include "scene/model/model.hpp"
 
 namespace enfilade::scene {
 

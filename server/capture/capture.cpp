@@ -10,18 +10,19 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "render/renderer.hpp"
-#include "scene/solid_around.hpp"
+#include "render/service/renderer.hpp"
+#include "scene/world/queries/point_in_solid.hpp"
+#include "server/base/load_scene.hpp"
+#include "server/base/signal_handling.hpp"
+#include "server/base/standard_output.hpp"
 #include "server/capture/capture_folder.hpp"
 #include "server/capture/capture_progress.hpp"
 #include "server/capture/depth_reports.hpp"
-#include "server/capture/documents.hpp"
 #include "server/capture/encode_queue.hpp"
 #include "server/capture/frame_files.hpp"
+#include "server/capture/metadata_files.hpp"
 #include "server/capture/overlay.hpp"
 #include "server/capture/video.hpp"
-#include "server/interrupt.hpp"
-#include "server/load_scene.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -174,8 +175,7 @@ void tellSummary(const CaptureCommand& command, const CaptureCounts& counts, std
       counts.seconds > 0 ? static_cast<double>(counts.written) / counts.seconds : 0.0;
   summary["renderer"] = renderer;
   summary["video"] = video;
-  if (std::printf("%s\n", summary.dump().c_str()) < 0 || std::fflush(stdout) != 0)
-    throw std::runtime_error("stdout cannot be written; the capture itself is whole");
+  writeToStdout(summary.dump() + "\n", "the pictures are whole");
 }
 
 void tellPlan(const CaptureCommand& command, const ShotList& list, const CaptureCounts& counts) {
@@ -188,8 +188,7 @@ void tellPlan(const CaptureCommand& command, const ShotList& list, const Capture
   plan["height"] = camera.height;
   plan["seconds_of_path"] = list.shots.back().time - list.shots.front().time;
   plan["files_a_frame"] = filesOfFrame(command.pictures, 0).size();
-  if (std::printf("%s\n", plan.dump().c_str()) < 0 || std::fflush(stdout) != 0)
-    throw std::runtime_error("stdout cannot be written");
+  writeToStdout(plan.dump() + "\n");
 }
 
 ExitCode run(const CaptureCommand& command) {

@@ -1,7 +1,7 @@
 // `enfilade capture`: pictures along a camera path, for makers of data sets.
 #pragma once
 
-#include "server/command_line.hpp"
+#include "server/app/command_line.hpp"
 
 namespace enfilade::server {
 

@@ -11,9 +11,9 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "render/pictures/image.hpp"
-#include "server/capture/documents.hpp"
+#include "render/image/image.hpp"
 #include "server/capture/frame_files.hpp"
+#include "server/capture/metadata_files.hpp"
 
 namespace enfilade::server {
 namespace {

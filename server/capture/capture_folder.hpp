@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "server/capture/shots.hpp"
+#include "server/capture/capture_plan.hpp"
 
 namespace enfilade::server {
 

@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
-#include "render/renderer.hpp"
-#include "server/capture/camera_path.hpp"
+#include "render/service/renderer.hpp"
+#include "server/capture/path/camera_path.hpp"
 
 namespace enfilade::server {
 

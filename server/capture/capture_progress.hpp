@@ -3,8 +3,8 @@
 
 #include <chrono>
 
+#include "server/base/progress.hpp"
 #include "server/capture/capture_options.hpp"
-#include "server/progress.hpp"
 
 namespace enfilade::server {
 

@@ -4,7 +4,7 @@
 
 #include <cstdio>
 
-#include "render/pictures/image.hpp"
+#include "render/image/image.hpp"
 
 namespace enfilade::server {
 namespace {

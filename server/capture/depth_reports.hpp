@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "render/depth_report.hpp"
+#include "render/reference/depth_report.hpp"
 #include "server/capture/capture_options.hpp"
 
 namespace enfilade::server {

@@ -8,7 +8,7 @@
 #include <mutex>
 #include <vector>
 
-#include "server/work_thread.hpp"
+#include "server/base/work_thread.hpp"
 
 namespace enfilade::server {
 

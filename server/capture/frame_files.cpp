@@ -4,8 +4,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "render/pictures/encode.hpp"
-#include "render/pictures/image.hpp"
+#include "render/image/encode.hpp"
+#include "render/image/image.hpp"
 
 namespace enfilade::server {
 namespace {

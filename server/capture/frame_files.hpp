@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "render/pictures/image.hpp"
+#include "render/image/image.hpp"
 #include "server/capture/capture_options.hpp"
 
 namespace enfilade::server {

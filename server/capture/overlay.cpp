@@ -4,8 +4,8 @@
 #include <cmath>
 #include <optional>
 
-#include "render/gl/avatar_mesh.hpp"
-#include "render/pictures/font.hpp"
+#include "render/avatar_mesh.hpp"
+#include "render/image/font.hpp"
 
 namespace enfilade::server {
 namespace {

@@ -1,8 +1,8 @@
 // What a person wants to see in a frame: contacts, ways walked, and whose pixels are whose.
 #pragma once
 
-#include "render/pictures/image.hpp"
-#include "server/capture/shots.hpp"
+#include "render/image/image.hpp"
+#include "server/capture/capture_plan.hpp"
 
 namespace enfilade::server {
 

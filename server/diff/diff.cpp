@@ -1,8 +1,6 @@
 #include "server/diff/diff.hpp"
 
-#include <cstdio>
-#include <stdexcept>
-
+#include "server/base/standard_output.hpp"
 #include "server/diff/difference_report.hpp"
 
 namespace enfilade::server {
@@ -11,8 +9,7 @@ ExitCode diff(const DiffCommand& command) {
   const WalkDifference difference = compareWalks(command.before, command.after, command.tolerance);
   const std::string text =
       command.json ? differenceJson(difference) + "\n" : differenceText(difference);
-  if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
-    throw std::runtime_error("stdout cannot be written");
+  writeToStdout(text);
   return difference.worse > 0 ? ExitCode::violations : ExitCode::done;
 }
 

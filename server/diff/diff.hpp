@@ -1,7 +1,7 @@
 // `enfilade diff`: what changed between two recorded walks.
 #pragma once
 
-#include "server/command_line.hpp"
+#include "server/app/command_line.hpp"
 
 namespace enfilade::server {
 

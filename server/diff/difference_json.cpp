@@ -1,8 +1,8 @@
 #include <nlohmann/json.hpp>
 
-#include "protocol/recording.hpp"
+#include "protocol/recording/recording.hpp"
 #include "server/diff/difference_report.hpp"
-#include "server/event_words.hpp"
+#include "server/messages/event_names.hpp"
 
 namespace enfilade::server {
 namespace {

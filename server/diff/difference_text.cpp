@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "protocol/recording.hpp"
+#include "protocol/recording/recording.hpp"
 #include "server/diff/difference_report.hpp"
 
 namespace enfilade::server {

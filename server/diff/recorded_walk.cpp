@@ -4,8 +4,8 @@
 #include <tuple>
 #include <utility>
 
-#include "protocol/recording.hpp"
-#include "server/world_messages.hpp"
+#include "protocol/recording/recording.hpp"
+#include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
 namespace {

@@ -6,10 +6,10 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "collision/continuous.hpp"
-#include "collision/hull.hpp"
-#include "collision/mesh_query.hpp"
-#include "collision/time_of_impact.hpp"
+#include "collision/compound/mesh_query.hpp"
+#include "collision/motion/shape_cast.hpp"
+#include "collision/motion/time_to_contact.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/accuracy/mesh_brute_force.hpp"
 
 namespace enfilade::accuracy {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "collision/penetration_depth.hpp"
-#include "collision/refine.hpp"
+#include "collision/narrow_phase/penetration_depth.hpp"
+#include "collision/narrow_phase/refine.hpp"
 #include "tests/accuracy/case_file.hpp"
 
 namespace enfilade::accuracy {

@@ -6,8 +6,8 @@
 
 #include <cmath>
 
-#include "collision/hull.hpp"
-#include "collision/narrow_phase.hpp"
+#include "collision/narrow_phase/narrow_phase.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/accuracy/exact_geometry.hpp"
 #include "tests/collision/random_shapes.hpp"
 

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <iostream>
 
-#include "collision/hull.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/accuracy/case_score.hpp"
 #include "tests/accuracy/families.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "collision/refine.hpp"
+#include "collision/narrow_phase/refine.hpp"
 
 namespace enfilade::accuracy {
 namespace {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "collision/narrow_phase.hpp"
+#include "collision/narrow_phase/narrow_phase.hpp"
 #include "tests/accuracy/case_file.hpp"
 
 namespace enfilade::accuracy {

@@ -1,7 +1,7 @@
 // All of the shared cases, at both levels: what must hold, holds.
 #include <gtest/gtest.h>
 
-#include "collision/hull.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/accuracy/case_score.hpp"
 #include "tests/accuracy/mesh_brute_force.hpp"
 #include "tests/support/shared_folder.hpp"

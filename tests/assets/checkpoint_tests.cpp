@@ -2,8 +2,8 @@
 #include "assets/building.hpp"
 #include "assets/feeder.hpp"
 #include "assets/landmarks.hpp"
-#include "scene/bodies/sidecar.hpp"
-#include "tests/scene/checkpoint_trial.hpp"
+#include "scene/import/bodies/sidecar.hpp"
+#include "tests/scene/checkpoint_fixture.hpp"
 
 namespace enfilade::assets {
 namespace {

@@ -1,8 +1,8 @@
 // The bundled house is right: nothing that is driven in it runs into anything else.
 #include "assets/building.hpp"
 #include "assets/sidecar_writer.hpp"
-#include "scene/bodies/sidecar.hpp"
-#include "tests/scene/body_trial.hpp"
+#include "scene/import/bodies/sidecar.hpp"
+#include "tests/scene/body_fixture.hpp"
 
 namespace enfilade::assets {
 namespace {

@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "collision/bounding_box.hpp"
+#include "collision/bounds/bounding_box.hpp"
 
 namespace {
 

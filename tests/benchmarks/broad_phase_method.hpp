@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "collision/sort_and_sweep.hpp"
+#include "collision/broad_phase/sort_and_sweep.hpp"
 
 namespace enfilade::benchmarks {
 

@@ -98,7 +98,7 @@ add_custom_target(collision_benchmarks DEPENDS ${programs})
 find_library(BENCH_BULLET_DYNAMICS BulletDynamics-float64)
 enfilade_benchmark(parts_feeder
   SOURCES parts_feeder.cpp ../support/parts_feeder.cpp
-  LIBRARIES enfilade_assets enfilade_scene)
+  LIBRARIES enfilade_assets enfilade_import)
 set_target_properties(parts_feeder PROPERTIES EXCLUDE_FROM_ALL ON)
 foreach(peer bullet ode)
   if(NOT TARGET bench_${peer} OR (peer STREQUAL bullet AND NOT BENCH_BULLET_DYNAMICS))

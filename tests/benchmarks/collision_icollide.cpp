@@ -11,8 +11,8 @@
 
 #include <unordered_map>
 
-#include "collision/bounding_box.hpp"
-#include "collision/narrow_phase.hpp"
+#include "collision/bounds/bounding_box.hpp"
+#include "collision/narrow_phase/narrow_phase.hpp"
 #include "tests/benchmarks/broad_phase_method.hpp"
 #include "tests/benchmarks/building_workload.hpp"
 #include "tests/benchmarks/measurement.hpp"

@@ -9,8 +9,8 @@
 #include <algorithm>
 #include <numbers>
 
-#include "collision/hull.hpp"
-#include "collision/narrow_phase.hpp"
+#include "collision/narrow_phase/narrow_phase.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/benchmarks/building_workload.hpp"
 #include "tests/benchmarks/measurement.hpp"
 #include "tests/benchmarks/mesh_method.hpp"

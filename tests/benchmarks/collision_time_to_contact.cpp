@@ -9,9 +9,9 @@
 
 #include <functional>
 
-#include "collision/continuous.hpp"
-#include "collision/hull.hpp"
-#include "collision/time_of_impact.hpp"
+#include "collision/motion/shape_cast.hpp"
+#include "collision/motion/time_to_contact.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/benchmarks/building_workload.hpp"
 #include "tests/benchmarks/measurement.hpp"
 

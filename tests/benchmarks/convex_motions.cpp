@@ -1,7 +1,7 @@
 #include "tests/benchmarks/convex_motions.hpp"
 
-#include "collision/hull.hpp"
-#include "collision/narrow_phase.hpp"
+#include "collision/narrow_phase/narrow_phase.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/benchmarks/random.hpp"
 
 namespace enfilade::benchmarks {

@@ -4,9 +4,9 @@
 
 #include <limits>
 
+#include "render/camera_basis.hpp"
 #include "render/gl/egl_context.hpp"
 #include "render/gl/gl_objects.hpp"
-#include "render/view.hpp"
 
 namespace enfilade::benchmarks {
 namespace {

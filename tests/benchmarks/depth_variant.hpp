@@ -6,7 +6,7 @@
 #include <string>
 
 #include "render/frame.hpp"
-#include "scene/scene.hpp"
+#include "scene/world/data/scene.hpp"
 
 namespace enfilade::benchmarks {
 

@@ -18,13 +18,13 @@
 #include <string>
 #include <vector>
 
-#include "protocol/client.hpp"
-#include "render/render_thread.hpp"
-#include "scene/import/model_cache.hpp"
-#include "scene/world.hpp"
-#include "server/frame_messages.hpp"
-#include "server/load_scene.hpp"
-#include "server/server.hpp"
+#include "protocol/clients/cpp/client.hpp"
+#include "render/service/render_thread.hpp"
+#include "scene/import/cache/model_cache.hpp"
+#include "scene/world/world.hpp"
+#include "server/base/load_scene.hpp"
+#include "server/messages/frame_messages.hpp"
+#include "server/net/server.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace {
@@ -80,7 +80,7 @@ class ByPython {
     const std::string fifo = tests::ownFile("orders");
     if (::mkfifo(fifo.c_str(), 0600) != 0) return;
     const std::string command =
-        "PYTHONPATH=protocol/python /usr/bin/python3 "
+        "PYTHONPATH=protocol/clients/python /usr/bin/python3 "
         "tests/benchmarks/frame_overhead.py " +
         std::to_string(port) + " < " + fifo;
     times_.reset(::popen(command.c_str(), "r"));

@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "assets/building.hpp"
-#include "render/renderer.hpp"
+#include "render/service/renderer.hpp"
 
 namespace {
 

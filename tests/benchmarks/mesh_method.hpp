@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "collision/triangle_tree.hpp"
+#include "collision/shapes/triangle_tree.hpp"
 #include "tests/benchmarks/narrow_phase_method.hpp"
 
 namespace enfilade::benchmarks {

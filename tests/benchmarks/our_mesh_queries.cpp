@@ -1,7 +1,7 @@
 // Ours: nearestTriangle() and findContacts(), which decide exactly (level decide) and keep the
 // triangles that may matter from query to query.
-#include "collision/hull.hpp"
-#include "collision/mesh_query.hpp"
+#include "collision/compound/mesh_query.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/benchmarks/mesh_method.hpp"
 
 namespace enfilade::benchmarks {

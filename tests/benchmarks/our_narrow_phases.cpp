@@ -1,8 +1,8 @@
 // Ours at its two levels, and decide() with the depth that the solver uses.
-#include "collision/hull.hpp"
-#include "collision/narrow_phase.hpp"
-#include "collision/penetration_depth.hpp"
-#include "collision/refine.hpp"
+#include "collision/narrow_phase/narrow_phase.hpp"
+#include "collision/narrow_phase/penetration_depth.hpp"
+#include "collision/narrow_phase/refine.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/benchmarks/narrow_phase_method.hpp"
 
 namespace enfilade::benchmarks {

@@ -13,8 +13,8 @@
 #include <string_view>
 
 #include "assets/feeder.hpp"
-#include "scene/bodies/sidecar.hpp"
-#include "scene/world.hpp"
+#include "scene/import/bodies/sidecar.hpp"
+#include "scene/world/world.hpp"
 #include "tests/benchmarks/feeder_engine.hpp"
 
 namespace enfilade::benchmarks {

@@ -15,11 +15,11 @@
 #include <random>
 
 #include "assets/building.hpp"
-#include "render/depth_report.hpp"
 #include "render/gl/gl_renderer.hpp"
-#include "render/rays/ray_renderer.hpp"
+#include "render/raytrace/ray_renderer.hpp"
+#include "render/reference/depth_report.hpp"
 #include "scene/import/import_model.hpp"
-#include "scene/ray_caster.hpp"
+#include "scene/world/queries/ray_caster.hpp"
 #include "tests/benchmarks/depth_variant.hpp"
 #include "tests/benchmarks/measurement.hpp"
 #include "tests/support/shared_folder.hpp"

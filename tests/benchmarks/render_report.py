@@ -107,7 +107,7 @@ each camera, times are medians.
 
 Depth and ids of the same seeded cameras, 1.6 m above a floor and under a roof, near 0.1 m, far 500 m;
 without textures, masks and glass. Every pixel is compared with a ray in doubles
-(`render/rays/true_rays.hpp`); edge pixels, which are apart, have a neighbour that shows another object
+(`render/reference/reference_tracer.hpp`); edge pixels, which are apart, have a neighbour that shows another object
 or leaves the pixel's plane by a thousandth of the depth. *GL D24 standard* to *D32F reversed* draw all
 triangles at once into that depth buffer and read it back. *GL renderer* and *rays robust* are what
 `enfilade` draws with; rays use two threads.

@@ -18,10 +18,10 @@
 #include <filesystem>
 #include <thread>
 
-#include "protocol/client.hpp"
-#include "scene/import/model_cache.hpp"
-#include "server/load_scene.hpp"
-#include "server/server.hpp"
+#include "protocol/clients/cpp/client.hpp"
+#include "scene/import/cache/model_cache.hpp"
+#include "server/base/load_scene.hpp"
+#include "server/net/server.hpp"
 #include "tests/support/server_load.hpp"
 
 namespace {

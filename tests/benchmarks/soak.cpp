@@ -15,10 +15,10 @@
 #include <filesystem>
 #include <random>
 
-#include "scene/import/model_cache.hpp"
-#include "scene/world.hpp"
-#include "server/audit_log.hpp"
-#include "server/load_scene.hpp"
+#include "scene/import/cache/model_cache.hpp"
+#include "scene/world/world.hpp"
+#include "server/base/audit_log.hpp"
+#include "server/base/load_scene.hpp"
 #include "tests/support/server_load.hpp"
 
 namespace {

@@ -18,9 +18,9 @@
 #include <random>
 
 #include "assets/building.hpp"
-#include "scene/import/model_cache.hpp"
-#include "scene/world.hpp"
-#include "tests/scene/thin_things.hpp"
+#include "scene/import/cache/model_cache.hpp"
+#include "scene/world/world.hpp"
+#include "tests/scene/thin_geometry.hpp"
 #include "tests/support/shared_folder.hpp"
 
 namespace {

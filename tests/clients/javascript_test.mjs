@@ -7,7 +7,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 
-import { connect, ConnectionFailed, pixels, ServerError } from "../../protocol/javascript/enfilade.js";
+import { connect, ConnectionFailed, pixels, ServerError } from "../../protocol/clients/javascript/enfilade.js";
 
 // A floor, and a wall at x = 5.
 function box(name, [x0, y0, z0], [x1, y1, z1], first) {

@@ -14,7 +14,7 @@ import enfilade
 from room import RoomCase
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGE = ROOT / "protocol" / "python"
+PACKAGE = ROOT / "protocol" / "clients" / "python"
 
 
 class Package(RoomCase):

@@ -1,4 +1,4 @@
-#include "collision/bounding_box.hpp"
+#include "collision/bounds/bounding_box.hpp"
 
 #include <gmpxx.h>
 #include <gtest/gtest.h>

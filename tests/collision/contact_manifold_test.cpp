@@ -1,10 +1,10 @@
-#include "collision/contact_manifold.hpp"
+#include "collision/narrow_phase/contact_manifold.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "collision/penetration_depth.hpp"
+#include "collision/narrow_phase/penetration_depth.hpp"
 #include "tests/collision/moving_shapes.hpp"
 #include "tests/collision/random_shapes.hpp"
 

@@ -1,5 +1,5 @@
 // Signs of determinants against rationals, where they are near zero, zero, huge, tiny and mixed.
-#include "collision/exact_orientation.hpp"
+#include "collision/shapes/exact_orientation.hpp"
 
 #include <gmpxx.h>
 #include <gtest/gtest.h>

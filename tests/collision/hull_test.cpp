@@ -1,4 +1,4 @@
-#include "collision/hull.hpp"
+#include "collision/shapes/hull.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "collision/exact_orientation.hpp"
+#include "collision/shapes/exact_orientation.hpp"
 
 namespace enfilade::collision {
 namespace {

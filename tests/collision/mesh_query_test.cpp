@@ -1,8 +1,8 @@
-#include "collision/mesh_query.hpp"
+#include "collision/compound/mesh_query.hpp"
 
 #include <gtest/gtest.h>
 
-#include "collision/refine.hpp"
+#include "collision/narrow_phase/refine.hpp"
 #include "tests/collision/moving_shapes.hpp"
 #include "tests/collision/random_shapes.hpp"
 

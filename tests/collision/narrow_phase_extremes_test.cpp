@@ -7,9 +7,9 @@
 #include <limits>
 #include <stdexcept>
 
-#include "collision/hull.hpp"
-#include "collision/penetration_depth.hpp"
-#include "collision/refine.hpp"
+#include "collision/narrow_phase/penetration_depth.hpp"
+#include "collision/narrow_phase/refine.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/collision/random_shapes.hpp"
 
 namespace enfilade::collision {

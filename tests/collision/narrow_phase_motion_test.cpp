@@ -2,8 +2,8 @@
 // penetrationDepth() promise of their numbers, held against refine().
 #include <gtest/gtest.h>
 
-#include "collision/penetration_depth.hpp"
-#include "collision/refine.hpp"
+#include "collision/narrow_phase/penetration_depth.hpp"
+#include "collision/narrow_phase/refine.hpp"
 #include "tests/collision/random_shapes.hpp"
 
 namespace enfilade::collision {

@@ -1,4 +1,4 @@
-#include "collision/narrow_phase.hpp"
+#include "collision/narrow_phase/narrow_phase.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <map>
 #include <numbers>
 
-#include "collision/penetration_depth.hpp"
-#include "collision/refine.hpp"
+#include "collision/narrow_phase/penetration_depth.hpp"
+#include "collision/narrow_phase/refine.hpp"
 #include "tests/collision/random_shapes.hpp"
 #include "tests/collision/rational_verdict.hpp"
 

@@ -4,8 +4,8 @@
 #include <random>
 #include <vector>
 
-#include "collision/hull.hpp"
-#include "collision/triangle_tree.hpp"
+#include "collision/shapes/hull.hpp"
+#include "collision/shapes/triangle_tree.hpp"
 
 namespace enfilade::collision::testing {
 

@@ -1,7 +1,7 @@
 // The slow twin of the verdict: the textbook's definitions in rationals, no filter, no features.
 #pragma once
 
-#include "collision/narrow_phase.hpp"
+#include "collision/narrow_phase/narrow_phase.hpp"
 
 namespace enfilade::collision::testing {
 

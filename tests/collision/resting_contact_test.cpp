@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "collision/hull.hpp"
-#include "collision/penetration_depth.hpp"
+#include "collision/narrow_phase/penetration_depth.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/collision/random_shapes.hpp"
 #include "tests/collision/rational_verdict.hpp"
 

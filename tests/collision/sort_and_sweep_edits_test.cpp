@@ -8,9 +8,9 @@
 #include <stdexcept>
 #include <vector>
 
-#include "collision/broad_phase_audit.hpp"
-#include "collision/sort_and_sweep.hpp"
-#include "tests/collision/watched_sweep.hpp"
+#include "collision/broad_phase/broad_phase_audit.hpp"
+#include "collision/broad_phase/sort_and_sweep.hpp"
+#include "tests/collision/checked_sweep.hpp"
 
 namespace enfilade::collision {
 namespace {

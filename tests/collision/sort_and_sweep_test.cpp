@@ -1,4 +1,4 @@
-#include "collision/sort_and_sweep.hpp"
+#include "collision/broad_phase/sort_and_sweep.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "tests/collision/watched_sweep.hpp"
+#include "tests/collision/checked_sweep.hpp"
 
 namespace enfilade::collision {
 namespace {

@@ -1,4 +1,4 @@
-#include "collision/triangle_tree.hpp"
+#include "collision/shapes/triangle_tree.hpp"
 
 #include <gtest/gtest.h>
 

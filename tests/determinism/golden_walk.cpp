@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <memory>
 
-#include "scene/world.hpp"
-#include "tests/scene/thin_things.hpp"
+#include "scene/world/world.hpp"
+#include "tests/scene/thin_geometry.hpp"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // Camera paths: the first byte tells the format and the axes, the rest is the text.
-#include "server/capture/camera_path.hpp"
+#include "server/capture/path/camera_path.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
 namespace enfilade::fuzz {

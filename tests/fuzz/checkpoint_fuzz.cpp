@@ -3,7 +3,7 @@
 // checkpoint (odd: a place, two bytes, and what stands there, again and again).
 #include <vector>
 
-#include "scene/checkpoint/checkpoint.hpp"
+#include "scene/world/checkpoint/checkpoint.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 #include "tests/server/body_room.hpp"
 

@@ -3,8 +3,8 @@
 #include <array>
 #include <string_view>
 
-#include "server/access.hpp"
-#include "server/http_pages.hpp"
+#include "server/base/access.hpp"
+#include "server/net/http_pages.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
 namespace enfilade::fuzz {

@@ -4,10 +4,10 @@
 #include <spdlog/spdlog.h>
 
 #include "protocol/framing.hpp"
-#include "scene/checkpoint/checkpoint.hpp"
+#include "scene/world/checkpoint/checkpoint.hpp"
 #include "server/diff/recorded_walk.hpp"
-#include "server/playback/playback.hpp"
-#include "server/recorded_world.hpp"
+#include "server/recording/playback.hpp"
+#include "server/recording/recordable_world.hpp"
 #include "tests/fuzz/memory_file.hpp"
 #include "tests/server/body_room.hpp"
 

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "protocol/framing.hpp"
-#include "server/requests.hpp"
-#include "server/world_messages.hpp"
+#include "server/hosting/requests.hpp"
+#include "server/messages/world_messages.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 #include "tests/server/body_room.hpp"
 

@@ -1,5 +1,5 @@
 // A walk script's text.
-#include "protocol/script.hpp"
+#include "protocol/script/script.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
 namespace enfilade::fuzz {

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Writes the seeds of the fuzz targets whose inputs nobody can write by hand:
 
-    PYTHONPATH=protocol/python /usr/bin/python3 tests/fuzz/write_seeds.py
+    PYTHONPATH=protocol/clients/python /usr/bin/python3 tests/fuzz/write_seeds.py
 
 Scripts and HTTP requests are text, and seeds of their own in corpus/. What a fuzzer finds is added to
 corpus/NAME/ as found-WHAT.

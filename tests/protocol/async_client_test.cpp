@@ -1,4 +1,4 @@
-#include "protocol/async_client.hpp"
+#include "protocol/clients/cpp/async_client.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "protocol/client.hpp"
+#include "protocol/clients/cpp/client.hpp"
 
 #include <gtest/gtest.h>
 

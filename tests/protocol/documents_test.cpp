@@ -7,7 +7,7 @@
 
 #include "protocol/enfilade.pb.h"
 #include "protocol/framing.hpp"
-#include "protocol/script.hpp"
+#include "protocol/script/script.hpp"
 
 namespace enfilade::protocol {
 namespace {

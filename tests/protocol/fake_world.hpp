@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "protocol/script.hpp"
+#include "protocol/script/script.hpp"
 
 namespace enfilade::protocol {
 

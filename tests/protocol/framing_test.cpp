@@ -6,7 +6,7 @@
 #include <random>
 
 #include "protocol/enfilade.pb.h"
-#include "protocol/joined_message.hpp"
+#include "protocol/spliced_message.hpp"
 
 namespace enfilade::protocol {
 namespace {

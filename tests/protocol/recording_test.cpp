@@ -1,5 +1,5 @@
 // Recordings of a world: the messages, and where two states differ.
-#include "protocol/recording.hpp"
+#include "protocol/recording/recording.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "protocol/script.hpp"
+#include "protocol/script/script.hpp"
 
 #include <gtest/gtest.h>
 

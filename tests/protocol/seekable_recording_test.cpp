@@ -1,6 +1,6 @@
 // Recordings that are read here and there: what a reader from front to back finds, without reading
 // it all.
-#include "protocol/seekable_recording.hpp"
+#include "protocol/recording/seekable_recording.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "protocol/socket_driver.hpp"
+#include "protocol/clients/cpp/socket_driver.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,8 +6,8 @@
 #include <limits>
 #include <vector>
 
-#include "render/view.hpp"
-#include "scene/scene.hpp"
+#include "render/camera_basis.hpp"
+#include "scene/world/data/scene.hpp"
 
 namespace enfilade::render {
 

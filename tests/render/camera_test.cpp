@@ -9,8 +9,8 @@
 #include <limits>
 #include <random>
 
-#include "render/pictures/image.hpp"
-#include "render/view.hpp"
+#include "render/camera_basis.hpp"
+#include "render/image/image.hpp"
 
 namespace enfilade::render {
 namespace {

@@ -1,4 +1,4 @@
-#include "render/depth_report.hpp"
+#include "render/reference/depth_report.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "render/gl/gl_renderer.hpp"
-#include "render/rays/ray_renderer.hpp"
+#include "render/raytrace/ray_renderer.hpp"
 #include "tests/render/brute_force_rays.hpp"
-#include "tests/render/things_to_see.hpp"
+#include "tests/render/render_fixtures.hpp"
 
 namespace enfilade::render {
 namespace {

@@ -1,4 +1,4 @@
-#include "render/pictures/encode.hpp"
+#include "render/image/encode.hpp"
 
 #include <gtest/gtest.h>
 #include <png.h>
@@ -9,7 +9,7 @@
 #include <limits>
 #include <random>
 
-#include "render/pictures/image.hpp"
+#include "render/image/image.hpp"
 
 namespace enfilade::render {
 namespace {

@@ -7,8 +7,8 @@
 #include <cstring>
 #include <set>
 
-#include "render/pictures/image.hpp"
-#include "tests/render/things_to_see.hpp"
+#include "render/image/image.hpp"
+#include "tests/render/render_fixtures.hpp"
 
 namespace enfilade::render {
 namespace {

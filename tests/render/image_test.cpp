@@ -1,12 +1,15 @@
-#include "render/pictures/image.hpp"
+#include "render/image/image.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <fstream>
 #include <random>
 
-#include "render/pictures/font.hpp"
+#include "render/image/font.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::render {
@@ -58,6 +61,30 @@ TEST(WriteFileWhole, ReplacesAFileAndLeavesNothingElse) {
   std::ifstream in(file);
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "second!");
   EXPECT_EQ(entriesIn(folder), 1);
+}
+
+TEST(WriteFileWhole, APipeIsWrittenAndALinkFollowed) {
+  const tests::TemporaryFolder folder;
+  const fs::path pipe = folder.path() / "pipe", link = folder.path() / "link";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  ASSERT_GE(reader, 0);
+  writeFileWhole(pipe, "whole", 5);
+  char read[8] = {};
+  EXPECT_EQ(::read(reader, read, sizeof read), 5);
+  ::close(reader);
+  EXPECT_STREQ(read, "whole");
+  EXPECT_TRUE(fs::is_fifo(pipe));
+
+  fs::create_symlink("file", link);
+  writeFileWhole(link, "first", 5);
+  writeFileWhole(link, "second", 6);
+  EXPECT_TRUE(fs::is_symlink(link));
+  EXPECT_EQ(fs::file_size(folder.path() / "file"), 6U);
+  EXPECT_EQ(entriesIn(folder), 3);
+
+  fs::create_symlink("circle", folder.path() / "circle");
+  EXPECT_THROW(writeFileWhole(folder.path() / "circle", "x", 1), std::runtime_error);
 }
 
 TEST(WriteFileWhole, AFailureNamesTheFileAndLeavesNoPart) {

@@ -1,4 +1,4 @@
-#include "render/rays/ray_renderer.hpp"
+#include "render/raytrace/ray_renderer.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 
 #include "render/gl/gl_renderer.hpp"
 #include "tests/render/brute_force_rays.hpp"
-#include "tests/render/things_to_see.hpp"
+#include "tests/render/render_fixtures.hpp"
 
 namespace enfilade::render {
 namespace {

@@ -1,4 +1,4 @@
-#include "render/render_thread.hpp"
+#include "render/service/render_thread.hpp"
 
 #include <gtest/gtest.h>
 

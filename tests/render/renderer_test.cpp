@@ -1,8 +1,8 @@
-#include "render/renderer.hpp"
+#include "render/service/renderer.hpp"
 
 #include <gtest/gtest.h>
 
-#include "tests/render/things_to_see.hpp"
+#include "tests/render/render_fixtures.hpp"
 
 namespace enfilade::render {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "render/rays/ray_renderer.hpp"
+#include "render/raytrace/ray_renderer.hpp"
 #include "tests/render/hand_made_scene.hpp"
 
 namespace enfilade::render {

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <limits>
 
-#include "render/rays/pixel_rays.hpp"
-#include "render/rays/ray_renderer.hpp"
-#include "render/rays/shading.hpp"
-#include "render/renderer.hpp"
-#include "tests/render/things_to_see.hpp"
+#include "render/raytrace/primary_rays.hpp"
+#include "render/raytrace/ray_renderer.hpp"
+#include "render/raytrace/shading.hpp"
+#include "render/service/renderer.hpp"
+#include "tests/render/render_fixtures.hpp"
 
 namespace enfilade::render {
 namespace {

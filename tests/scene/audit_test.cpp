@@ -1,13 +1,13 @@
 // The audit of a live world: nothing to find while the broad phase is right, everything once it is
 // spoilt.
-#include "scene/audit.hpp"
+#include "scene/world/audit.hpp"
 
 #include <gtest/gtest.h>
 
 #include <random>
 #include <set>
 
-#include "scene/world_state.hpp"
+#include "scene/world/data/world_data.hpp"
 #include "tests/scene/box_scene.hpp"
 
 namespace enfilade::scene {

@@ -1,7 +1,7 @@
 // Jumping, flying, crouching, and what a move tells of itself.
 #include <cmath>
 
-#include "tests/scene/trial.hpp"
+#include "tests/scene/world_fixture.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "scene/scene.hpp"
+#include "scene/world/data/scene.hpp"
 
 namespace enfilade::scene::testing {
 

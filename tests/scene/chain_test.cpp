@@ -2,8 +2,8 @@
 #include <cmath>
 #include <random>
 
-#include "scene/avatars/avatar_shape.hpp"
-#include "tests/scene/trial.hpp"
+#include "scene/world/avatars/avatar_shape.hpp"
+#include "tests/scene/world_fixture.hpp"
 
 namespace enfilade::scene {
 namespace {

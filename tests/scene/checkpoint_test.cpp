@@ -1,8 +1,8 @@
-#include "scene/checkpoint/checkpoint.hpp"
+#include "scene/world/checkpoint/checkpoint.hpp"
 
-#include "tests/scene/body_trial.hpp"
-#include "tests/scene/checkpoint_trial.hpp"
-#include "tests/scene/trial.hpp"
+#include "tests/scene/body_fixture.hpp"
+#include "tests/scene/checkpoint_fixture.hpp"
+#include "tests/scene/world_fixture.hpp"
 #include "tests/support/sanitized.hpp"
 
 namespace enfilade::scene {

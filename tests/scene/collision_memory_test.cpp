@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "assets/building.hpp"
-#include "scene/world.hpp"
+#include "scene/world/world.hpp"
 
 namespace {
 

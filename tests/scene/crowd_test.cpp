@@ -2,7 +2,7 @@
 // corridor.
 #include <random>
 
-#include "tests/scene/trial.hpp"
+#include "tests/scene/world_fixture.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -1,12 +1,12 @@
 // What a glTF file tells of bodies: extras of nodes, and the physics extension.
 #include <gtest/gtest.h>
 
-#include "scene/bodies/find_bodies.hpp"
-#include "scene/bodies/sidecar.hpp"
+#include "scene/import/bodies/collect_bodies.hpp"
+#include "scene/import/bodies/sidecar.hpp"
 #include "scene/import/import_model.hpp"
-#include "scene/import/model_stream.hpp"
-#include "scene/scene.hpp"
-#include "tests/scene/body_trial.hpp"
+#include "scene/import/worker/model_stream.hpp"
+#include "scene/world/data/scene.hpp"
+#include "tests/scene/body_fixture.hpp"
 #include "tests/scene/hand_made_files.hpp"
 
 namespace enfilade::scene {

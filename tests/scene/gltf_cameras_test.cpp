@@ -1,5 +1,5 @@
 // Cameras of files written here, whose places at each time are known.
-#include "scene/import/gltf_cameras.hpp"
+#include "scene/import/gltf/gltf_cameras.hpp"
 
 #include <gtest/gtest.h>
 

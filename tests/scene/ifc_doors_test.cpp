@@ -2,10 +2,10 @@
 // what becomes of the doors of real buildings.
 #include <gtest/gtest.h>
 
-#include "scene/bodies/find_bodies.hpp"
-#include "scene/bodies/ifc_doors.hpp"
+#include "scene/import/bodies/collect_bodies.hpp"
+#include "scene/import/bodies/ifc_doors.hpp"
 #include "scene/import/import_model.hpp"
-#include "tests/scene/body_trial.hpp"
+#include "tests/scene/body_fixture.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
 #include "tests/support/shared_folder.hpp"

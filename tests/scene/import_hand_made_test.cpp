@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "scene/import/import_model.hpp"
-#include "scene/scene.hpp"
+#include "scene/world/data/scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
 
 namespace enfilade::scene {

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "scene/import/import_model.hpp"
-#include "scene/scene.hpp"
+#include "scene/world/data/scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
 #include "tests/scene/stored_zip.hpp"

@@ -9,7 +9,7 @@
 #include <set>
 
 #include "scene/import/import_model.hpp"
-#include "scene/scene.hpp"
+#include "scene/world/data/scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/support/shared_folder.hpp"
 #include "tests/support/web_ifc_here.hpp"

@@ -1,10 +1,10 @@
-#include "scene/rigid/joint.hpp"
+#include "scene/physics/joint.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "tests/scene/rigid_scene.hpp"
+#include "tests/scene/physics_scene.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -1,8 +1,8 @@
-#include "scene/shapes/mass_properties.hpp"
+#include "scene/model/shapes/mass_properties.hpp"
 
 #include <gtest/gtest.h>
 
-#include "tests/scene/rigid_scene.hpp"
+#include "tests/scene/physics_scene.hpp"
 
 namespace enfilade::scene {
 namespace {

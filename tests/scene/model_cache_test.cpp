@@ -1,5 +1,5 @@
 // A second start reads what the first one kept; whatever is not as it was is imported again.
-#include "scene/import/model_cache.hpp"
+#include "scene/import/cache/model_cache.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <fstream>
 #include <random>
 
-#include "scene/import/model_stream.hpp"
-#include "scene/import/share_meshes.hpp"
+#include "scene/import/cache/deduplicate_meshes.hpp"
+#include "scene/import/worker/model_stream.hpp"
 #include "tests/scene/box_scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
 

@@ -1,4 +1,4 @@
-#include "scene/import/model_stream.hpp"
+#include "scene/import/worker/model_stream.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
-#include "scene/ray_caster.hpp"
+#include "scene/world/queries/ray_caster.hpp"
 
 #include <gtest/gtest.h>
 
 #include <numbers>
 #include <random>
 
-#include "scene/avatars/avatar_shape.hpp"
-#include "tests/scene/body_trial.hpp"
+#include "scene/world/avatars/avatar_shape.hpp"
+#include "tests/scene/body_fixture.hpp"
 
 namespace enfilade::scene::testing {
 namespace {

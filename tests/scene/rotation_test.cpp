@@ -1,4 +1,4 @@
-#include "scene/rotation.hpp"
+#include "scene/model/rotation.hpp"
 
 #include <gtest/gtest.h>
 

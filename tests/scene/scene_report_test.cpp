@@ -1,8 +1,8 @@
-#include "scene/scene_report.hpp"
+#include "scene/world/queries/scene_report.hpp"
 
 #include <gtest/gtest.h>
 
-#include "scene/problem_kinds.hpp"
+#include "scene/model/diagnostic_catalog.hpp"
 #include "tests/scene/box_scene.hpp"
 
 namespace enfilade::scene {

@@ -1,4 +1,4 @@
-#include "scene/scene.hpp"
+#include "scene/world/data/scene.hpp"
 
 #include <gtest/gtest.h>
 

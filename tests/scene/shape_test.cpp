@@ -1,5 +1,5 @@
 // Shapes with known answers: what is closed, what is convex, which way it looks.
-#include "scene/shapes/shape.hpp"
+#include "scene/model/shapes/shape.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "collision/exact_orientation.hpp"
+#include "collision/shapes/exact_orientation.hpp"
 #include "tests/scene/box_scene.hpp"
 
 namespace enfilade::scene {

@@ -1,4 +1,4 @@
-#include "scene/bodies/sidecar.hpp"
+#include "scene/import/bodies/sidecar.hpp"
 
 #include <gtest/gtest.h>
 

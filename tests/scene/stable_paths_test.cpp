@@ -5,8 +5,8 @@
 #include <map>
 
 #include "scene/import/import_model.hpp"
-#include "scene/scene.hpp"
-#include "scene/scene_report.hpp"
+#include "scene/world/data/scene.hpp"
+#include "scene/world/queries/scene_report.hpp"
 #include "tests/scene/hand_made_files.hpp"
 
 namespace enfilade::scene {

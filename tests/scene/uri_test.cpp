@@ -1,4 +1,4 @@
-#include "scene/import/uri.hpp"
+#include "scene/import/worker/uri.hpp"
 
 #include <gtest/gtest.h>
 

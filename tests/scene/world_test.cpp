@@ -1,4 +1,4 @@
-#include "scene/world.hpp"
+#include "scene/world/world.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <map>
 #include <random>
 
-#include "tests/scene/trial.hpp"
+#include "tests/scene/world_fixture.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -1,5 +1,5 @@
 // Who may do what, and what a server on an address that strangers reach wants first.
-#include "server/access.hpp"
+#include "server/base/access.hpp"
 
 #include <filesystem>
 #include <fstream>

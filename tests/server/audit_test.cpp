@@ -5,9 +5,9 @@
 
 #include <sstream>
 
-#include "scene/world_state.hpp"
-#include "server/in_process_driver.hpp"
-#include "server/walk_run.hpp"
+#include "scene/world/data/world_data.hpp"
+#include "server/runs/in_process_driver.hpp"
+#include "server/runs/script_run.hpp"
 #include "tests/server/served_room.hpp"
 
 namespace enfilade::server::testing {

@@ -4,8 +4,8 @@
 
 #include <memory>
 
-#include "scene/scene.hpp"
-#include "scene/snapshot.hpp"
+#include "scene/world/data/scene.hpp"
+#include "scene/world/data/snapshot.hpp"
 #include "tests/scene/box_scene.hpp"
 
 namespace enfilade::server::testing {

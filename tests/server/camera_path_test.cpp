@@ -1,4 +1,4 @@
-#include "server/capture/camera_path.hpp"
+#include "server/capture/path/camera_path.hpp"
 
 #include <gtest/gtest.h>
 

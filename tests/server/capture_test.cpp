@@ -7,11 +7,11 @@
 #include <map>
 
 #include "render/gl/gl_renderer.hpp"
-#include "render/pictures/image.hpp"
-#include "server/capture/documents.hpp"
+#include "render/image/image.hpp"
+#include "server/capture/metadata_files.hpp"
 #include "server/capture/overlay.hpp"
 #include "tests/server/body_room.hpp"
-#include "tests/server/program_trial.hpp"
+#include "tests/server/program_fixture.hpp"
 
 namespace enfilade::server::testing {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "protocol/recording.hpp"
+#include "protocol/recording/recording.hpp"
 #include "server/diff/walk_difference.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -5,9 +5,9 @@
 #include <cstdlib>
 
 #include "render/gl/gl_renderer.hpp"
-#include "render/rays/ray_renderer.hpp"
-#include "server/egl_vendors.hpp"
-#include "server/proof_picture.hpp"
+#include "render/raytrace/ray_renderer.hpp"
+#include "server/commands/egl_vendors.hpp"
+#include "server/commands/self_test_scene.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::server {

@@ -3,9 +3,9 @@
 #include <cstring>
 #include <mutex>
 
-#include "render/pictures/image.hpp"
-#include "scene/world.hpp"
-#include "server/frame_service.hpp"
+#include "render/image/image.hpp"
+#include "scene/world/world.hpp"
+#include "server/hosting/frame_service.hpp"
 #include "tests/server/served_room.hpp"
 
 namespace enfilade::server::testing {

@@ -1,5 +1,5 @@
 // HTTP and WebSocket on the same port, and what is neither.
-#include "server/http_pages.hpp"
+#include "server/net/http_pages.hpp"
 #include "tests/server/raw_connection.hpp"
 #include "tests/server/served_room.hpp"
 

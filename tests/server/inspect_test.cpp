@@ -1,9 +1,9 @@
 // `enfilade inspect`: what it tells, and how it ends when it is used wrongly.
 #include <algorithm>
 
-#include "server/version.hpp"
+#include "server/base/version.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
-#include "tests/server/program_trial.hpp"
+#include "tests/server/program_fixture.hpp"
 
 namespace enfilade::server::testing {
 namespace {

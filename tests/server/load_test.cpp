@@ -2,7 +2,7 @@
 #include <array>
 #include <cstdio>
 
-#include "tests/server/becomes_true.hpp"
+#include "tests/server/eventually.hpp"
 #include "tests/server/served_room.hpp"
 #include "tests/support/server_load.hpp"
 

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "server/command_line.hpp"
-#include "server/in_process_driver.hpp"
-#include "server/world_messages.hpp"
+#include "server/app/command_line.hpp"
+#include "server/messages/world_messages.hpp"
+#include "server/runs/in_process_driver.hpp"
 #include "tests/server/small_room.hpp"
 
 namespace enfilade::server::testing {

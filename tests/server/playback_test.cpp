@@ -1,8 +1,8 @@
 // Recordings that are begun in the middle: verified from there, and gone on with.
 #include <set>
 
-#include "protocol/recording.hpp"
-#include "tests/server/program_trial.hpp"
+#include "protocol/recording/recording.hpp"
+#include "tests/server/program_fixture.hpp"
 
 namespace enfilade::server {
 namespace {

@@ -1,5 +1,7 @@
 // The program as its users start it: exit codes, what it says, what it writes.
-#include "tests/server/program_trial.hpp"
+#include "tests/server/program_fixture.hpp"
+
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <map>
@@ -124,12 +126,41 @@ TEST_F(Program, ASecondWalkIntoAFolderRemovesWhatTheFirstWroteAndNothingElse) {
   EXPECT_TRUE(fs::exists(path("out/frames/mine.png")));
 }
 
-TEST_F(Program, ASummaryThatStdoutDoesNotTakeEndsWithOne) {
+TEST_F(Program, WhatStdoutDoesNotTakeEndsWithOne) {
+  write(folder_ / "path.txt", "0 0 1 0 0 0 0 1\n");
   fs::create_symlink("/dev/full", path("stdout"));
-  const int code =
-      codeOf(start({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out")}));
-  EXPECT_EQ(code, 1);
-  EXPECT_NE(textOf(path("stderr")).find("stdout"), std::string::npos) << textOf(path("stderr"));
+  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+           {"--help"},
+           {"--version"},
+           {"serve", path("room.obj"), "--listen", "127.0.0.1:0"},
+           {"inspect", path("room.obj")},
+           {"doctor"},
+           {"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out"), "--record",
+            path("walk.mcap")},
+           {"replay", path("room.obj"), path("walk.mcap"), "--verify"},
+           {"replay", path("room.obj"), path("walk.mcap"), "--out", path("again")},
+           {"inspect", path("walk.mcap")},
+           {"diff", path("walk.mcap"), path("walk.mcap")},
+           {"export", path("walk.mcap"), "--out", path("export")},
+           {"capture", path("room.obj"), path("path.txt"), "--out", path("frames"), "--dry-run"},
+           {"capture", path("room.obj"), path("path.txt"), "--out", path("frames"), "--size",
+            "16x16", "--renderer", "rays"}}) {
+    EXPECT_EQ(codeOf(start(arguments)), 1) << ::testing::PrintToString(arguments);
+    EXPECT_NE(textOf(path("stderr")).find("stdout"), std::string::npos) << textOf(path("stderr"));
+  }
+}
+
+TEST_F(Program, AFileBeyondTheLimitIsAnErrorNotADeath) {
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit few{2048, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &few), 0);  // the program inherits it
+  const pid_t child = start({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out"),
+                             "--record", path("walk.mcap")});
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  EXPECT_EQ(codeOf(child), 1);
+  EXPECT_NE(textOf(path("stderr")).find("File too large"), std::string::npos)
+      << textOf(path("stderr"));
 }
 
 TEST_F(Program, ServingAStrangersAddressEndsWithOne) {

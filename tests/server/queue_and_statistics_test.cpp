@@ -3,10 +3,10 @@
 
 #include <random>
 
-#include "server/command_line.hpp"
-#include "server/outgoing_queue.hpp"
-#include "server/tick_statistics.hpp"
-#include "server/walk_map.hpp"
+#include "server/app/command_line.hpp"
+#include "server/messages/outgoing_queue.hpp"
+#include "server/messages/tick_statistics.hpp"
+#include "server/plans/path_map.hpp"
 #include "tests/server/small_room.hpp"
 
 namespace enfilade::server::testing {

@@ -5,10 +5,10 @@
 #include <random>
 #include <set>
 
-#include "server/playback/playback.hpp"
-#include "server/recorded_world.hpp"
-#include "tests/server/becomes_true.hpp"
+#include "server/recording/playback.hpp"
+#include "server/recording/recordable_world.hpp"
 #include "tests/server/body_room.hpp"
+#include "tests/server/eventually.hpp"
 #include "tests/server/served_room.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "protocol/client.hpp"
-#include "server/server.hpp"
+#include "protocol/clients/cpp/client.hpp"
+#include "server/net/server.hpp"
 #include "tests/server/small_room.hpp"
 
 namespace enfilade::server::testing {

@@ -5,10 +5,10 @@
 #include <set>
 #include <thread>
 
-#include "scene/world.hpp"
-#include "server/requests.hpp"
-#include "server/tick_loop.hpp"
-#include "tests/server/becomes_true.hpp"
+#include "scene/world/world.hpp"
+#include "server/hosting/requests.hpp"
+#include "server/hosting/tick_loop.hpp"
+#include "tests/server/eventually.hpp"
 #include "tests/server/served_room.hpp"
 
 namespace enfilade::server::testing {

@@ -3,8 +3,8 @@
 
 #include <memory>
 
-#include "scene/scene.hpp"
-#include "scene/snapshot.hpp"
+#include "scene/world/data/scene.hpp"
+#include "scene/world/data/snapshot.hpp"
 
 namespace enfilade::server::testing {
 

@@ -1,7 +1,7 @@
 // A walk among bodies, by the program: what a script tells them, and what contacts.jsonl tells.
 #include <map>
 
-#include "tests/server/program_trial.hpp"
+#include "tests/server/program_fixture.hpp"
 
 namespace enfilade::server::testing {
 namespace {

@@ -1,5 +1,5 @@
 // Several worlds in one server: made, entered, told apart, dropped.
-#include "server/worlds/worlds.hpp"
+#include "server/hosting/world_registry.hpp"
 
 #include <unistd.h>
 
@@ -10,8 +10,8 @@
 #include <numbers>
 #include <thread>
 
-#include "server/listener.hpp"
-#include "tests/server/becomes_true.hpp"
+#include "server/net/listener.hpp"
+#include "tests/server/eventually.hpp"
 #include "tests/server/raw_connection.hpp"
 #include "tests/server/served_room.hpp"
 #include "tests/support/sanitized.hpp"

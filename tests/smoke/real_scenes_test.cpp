@@ -7,7 +7,7 @@
 
 #include "render/gl/gl_renderer.hpp"
 #include "scene/import/import_model.hpp"
-#include "scene/world.hpp"
+#include "scene/world/world.hpp"
 #include "tests/support/shared_folder.hpp"
 
 namespace enfilade {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "collision/penetration_depth.hpp"
+#include "collision/narrow_phase/penetration_depth.hpp"
 
 namespace enfilade::testing {
 namespace {

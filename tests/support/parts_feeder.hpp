@@ -5,11 +5,11 @@
 #include <deque>
 #include <vector>
 
-#include "collision/bounding_box.hpp"
-#include "collision/hull.hpp"
-#include "collision/sort_and_sweep.hpp"
-#include "scene/rigid/dynamics.hpp"
-#include "scene/rigid/workers.hpp"
+#include "collision/bounds/bounding_box.hpp"
+#include "collision/broad_phase/sort_and_sweep.hpp"
+#include "collision/shapes/hull.hpp"
+#include "scene/physics/physics_world.hpp"
+#include "scene/physics/thread_pool.hpp"
 
 namespace enfilade::testing {
 

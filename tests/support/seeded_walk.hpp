@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "render/camera.hpp"
-#include "scene/world.hpp"
+#include "scene/world/world.hpp"
 
 namespace enfilade::tests {
 

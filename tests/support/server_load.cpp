@@ -15,8 +15,8 @@
 #include <set>
 #include <thread>
 
-#include "protocol/async_client.hpp"
-#include "scene/world.hpp"
+#include "protocol/clients/cpp/async_client.hpp"
+#include "scene/world/world.hpp"
 #include "tests/server/raw_connection.hpp"
 
 namespace enfilade::tests {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "collision/types.hpp"
-#include "scene/scene.hpp"
+#include "scene/world/data/scene.hpp"
 
 namespace enfilade::tests {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "scene/import/ifc/facts.hpp"
+#include "scene/import/ifc/ifc_metadata.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -1,6 +1,6 @@
 #include "scene/import/ifc/ifc_plus_plus.hpp"
 
-#include "scene/import/reader_module.hpp"
+#include "scene/import/worker/reader_module.hpp"
 
 namespace enfilade::scene {
 

@@ -11,7 +11,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "scene/import/ifc/shapes.hpp"
+#include "scene/import/ifc/ifc_meshes.hpp"
 
 namespace enfilade::scene {
 namespace {

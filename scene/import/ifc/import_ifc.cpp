@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <set>
 
-#include "scene/import/ifc/file.hpp"
-#include "scene/import/ifc/readers.hpp"
+#include "scene/import/ifc/ifc_file.hpp"
+#include "scene/import/ifc/ifc_readers.hpp"
 
 namespace enfilade::scene {
 namespace {

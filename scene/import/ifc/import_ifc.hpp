@@ -2,9 +2,9 @@
 // of it. Runs in the import process, which starts one more for each reader.
 #pragma once
 
-#include "scene/import/convert.hpp"
-#include "scene/import/ifc/facts.hpp"
-#include "scene/import/process.hpp"
+#include "scene/import/assimp/convert_scene.hpp"
+#include "scene/import/ifc/ifc_metadata.hpp"
+#include "scene/import/worker/process.hpp"
 
 namespace enfilade::scene {
 

@@ -3,7 +3,7 @@
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/NarrowPhaseCollision/btGjkEpa2.h>
 
-#include "collision/hull.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/benchmarks/narrow_phase_method.hpp"
 
 namespace enfilade::benchmarks {

@@ -2,7 +2,7 @@
 #include <ccd/ccd.h>
 #include <ccd/quat.h>
 
-#include "collision/hull.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/benchmarks/narrow_phase_method.hpp"
 
 namespace enfilade::benchmarks {

@@ -5,7 +5,7 @@
 #include <fcl/narrowphase/detail/gjk_solver_indep.h>
 #include <fcl/narrowphase/detail/gjk_solver_libccd.h>
 
-#include "collision/hull.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/benchmarks/narrow_phase_method.hpp"
 
 namespace enfilade::benchmarks {

@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "collision/hull.hpp"
+#include "collision/shapes/hull.hpp"
 #include "tests/benchmarks/narrow_phase_method.hpp"
 
 namespace enfilade::benchmarks {

@@ -5,7 +5,7 @@
 // File descriptor 3 takes the answer, 4 is the IFC file, 5 the products that are wanted: their
 // express ids as 32-bit numbers, of which those before index FIRST are done. The answer is frames of
 // a kind (one byte), a length (64 bits) and that many bytes, all little-endian; what they hold is
-// written at the head of scene/import/ifc/shapes.hpp.
+// written at the head of scene/import/ifc/ifc_meshes.hpp.
 import fs from 'node:fs';
 import { createRequire } from 'node:module';
 

@@ -1,0 +1,31 @@
+#include "collision/shapes/triangle_tree.hpp"
+
+namespace enfilade::collision {
+namespace {
+
+// Measured on 50,880 triangles with mesh queries: 2 and 8 are slower.
+constexpr std::uint32_t kLeafSize = 4;
+
+BoxTree treeOver(const std::vector<Triangle>& triangles) {
+  std::vector<Box> boxes;
+  boxes.reserve(triangles.size());
+  for (const Triangle& t : triangles) boxes.push_back(boxOf(t));
+  return buildBoxTree(boxes, kLeafSize);
+}
+
+}  // namespace
+
+TriangleTree::TriangleTree(const std::vector<Triangle>& triangles) : tree_(treeOver(triangles)) {
+  triangles_.reserve(triangles.size());
+  for (const std::uint32_t i : tree_.order) triangles_.push_back(triangles[i]);
+}
+
+void TriangleTree::query(const Box& box, std::vector<std::uint32_t>& indices) const {
+  forEachLeafMeeting(tree_, narrowed(box, tree_.origin),
+                     [&](std::uint32_t first, std::uint32_t count) {
+                       for (std::uint32_t i = first; i < first + count; ++i)
+                         if (overlaps(boxOf(triangles_[i]), box)) indices.push_back(i);
+                     });
+}
+
+}  // namespace enfilade::collision

@@ -1,0 +1,122 @@
+#include "render/gl/scene_buffers.hpp"
+
+#include <epoxy/gl.h>
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+#include <string>
+
+#include "render/render_error.hpp"
+#include "render/vertex.hpp"
+
+namespace enfilade::render {
+namespace {
+
+struct Totals {
+  std::uint64_t vertices = 0, indices = 0;
+};
+
+/// Lays the meshes one behind the other.
+Totals layOut(const scene::Model& model, std::vector<MeshRange>& ranges) {
+  Totals totals;
+  for (const scene::Mesh& mesh : model.meshes) {
+    scene::Box box;
+    for (const Eigen::Vector3f& position : mesh.positions) box.include(position.cast<double>());
+    ranges.push_back({static_cast<std::uint32_t>(totals.indices),
+                      static_cast<std::uint32_t>(mesh.indices.size()),
+                      static_cast<std::int32_t>(totals.vertices),
+                      box.empty() ? Vec3(Vec3::Zero()) : box.centre()});
+    totals.vertices += mesh.positions.size();
+    totals.indices += mesh.indices.size();
+  }
+  if (totals.vertices > std::numeric_limits<std::int32_t>::max() ||
+      totals.indices > std::numeric_limits<std::uint32_t>::max()) {
+    throw RenderError("the model " + model.source + " has " + std::to_string(totals.vertices) +
+                      " vertices and " + std::to_string(totals.indices) +
+                      " indices, more than one buffer holds; load a part of it");
+  }
+  return totals;
+}
+
+std::vector<Vertex> verticesOf(const scene::Mesh& mesh, const Vec3& centre) {
+  std::vector<Vertex> vertices(mesh.positions.size());
+  const bool normals = mesh.normals.size() == mesh.positions.size();
+  const bool uvs = mesh.uvs.size() == mesh.positions.size();
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const Vec3 p = mesh.positions[i].cast<double>() - centre;
+    vertices[i] = {
+        {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())},
+        normals ? packedNormal(mesh.normals[i]) : 0u,
+        {uvs ? mesh.uvs[i].x() : 0.0f, uvs ? mesh.uvs[i].y() : 0.0f}};
+  }
+  return vertices;
+}
+
+/// A texture that the device cannot hold is drawn white: the importer has told of what is missing.
+GlTexture uploadTexture(const scene::Texture& texture, GLint largest) {
+  const auto width = static_cast<GLsizei>(texture.width);
+  const auto height = static_cast<GLsizei>(texture.height);
+  const bool usable = width > 0 && height > 0 && width <= largest && height <= largest &&
+                      texture.rgba.size() == std::size_t{4} * texture.width * texture.height;
+  constexpr std::uint32_t kWhite = 0xFFFFFFFFu;
+  const void* pixels = usable ? static_cast<const void*>(texture.rgba.data()) : &kWhite;
+  const GLsizei w = usable ? width : 1;
+  const GLsizei h = usable ? height : 1;
+  const auto levels = static_cast<GLsizei>(std::bit_width(static_cast<unsigned>(std::max(w, h))));
+
+  GlTexture result = GlTexture::create();
+  const GLuint name = result.name();
+  glTextureStorage2D(name, levels, GL_SRGB8_ALPHA8, w, h);
+  glTextureSubImage2D(name, 0, 0, 0, w, h, GL_RGBA, GL_UNSIGNED_BYTE, pixels);
+  glGenerateTextureMipmap(name);
+  glTextureParameteri(name, GL_TEXTURE_WRAP_S, GL_REPEAT);
+  glTextureParameteri(name, GL_TEXTURE_WRAP_T, GL_REPEAT);
+  glTextureParameteri(name, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+  glTextureParameteri(name, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  return result;
+}
+
+GlBuffer emptyBuffer(std::uint64_t bytes) {
+  GlBuffer buffer = GlBuffer::create();
+  glNamedBufferStorage(buffer.name(), static_cast<GLsizeiptr>(std::max<std::uint64_t>(bytes, 4)),
+                       nullptr, GL_DYNAMIC_STORAGE_BIT);
+  return buffer;
+}
+
+void fill(const GlBuffer& buffer, std::uint64_t offset, const void* data, std::uint64_t bytes) {
+  if (bytes == 0) return;
+  glNamedBufferSubData(buffer.name(), static_cast<GLintptr>(offset), static_cast<GLsizeiptr>(bytes),
+                       data);
+}
+
+}  // namespace
+
+ModelBuffers uploadModel(const scene::Model& model) {
+  ModelBuffers buffers;
+  const Totals totals = layOut(model, buffers.ranges);
+  buffers.vertices = emptyBuffer(totals.vertices * sizeof(Vertex));
+  buffers.indices = emptyBuffer(totals.indices * sizeof(std::uint32_t));
+  checkGl("making the model's buffers");
+  for (std::size_t m = 0; m < model.meshes.size(); ++m) {
+    const scene::Mesh& mesh = model.meshes[m];
+    const MeshRange& range = buffers.ranges[m];
+    const std::vector<Vertex> vertices = verticesOf(mesh, range.centre);
+    fill(buffers.vertices, std::uint64_t{sizeof(Vertex)} * static_cast<unsigned>(range.baseVertex),
+         vertices.data(), vertices.size() * sizeof(Vertex));
+    fill(buffers.indices, std::uint64_t{sizeof(std::uint32_t)} * range.firstIndex,
+         mesh.indices.data(), mesh.indices.size() * sizeof(std::uint32_t));
+    buffers.materials.push_back(materialData(model, mesh));
+  }
+  checkGl("uploading the model's meshes");
+  GLint largest = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  for (const scene::Texture& texture : model.textures) {
+    buffers.textures.push_back(uploadTexture(texture, largest));
+  }
+  checkGl("uploading the model's textures");
+  return buffers;
+}
+
+}  // namespace enfilade::render

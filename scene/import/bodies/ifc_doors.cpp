@@ -1,0 +1,249 @@
+#include "scene/import/bodies/ifc_doors.hpp"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
+#include <string_view>
+
+#include "scene/import/bodies/body_precedence.hpp"
+#include "scene/import/bodies/door_leaf.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr double kRightAngle = 1.5707963267948966;  // radians
+constexpr double kUpright = 0.999;                  // of a door's z axis along the scene's up
+constexpr double kSlideSpeed = 1;                   // m/s
+
+/// How one leaf moves, in the door's frame.
+struct LeafMotion {
+  bool slides = false;
+  int side = -1;          ///< hinges at x's low (-1) or high (1) end; or the way that it slides
+  bool bothWays = false;  ///< hinged: swings to either side of the wall
+};
+
+/// What an operation makes of the leaves.
+struct DoorMotion {
+  std::vector<LeafMotion> leaves;
+  bool guessed = false;
+};
+
+DoorMotion guessedMotion(const DoorPieces& pieces) {
+  DoorMotion motion{{}, true};
+  const bool two = pieces.leaves.size() == 2;
+  for (std::size_t i = 0; i < pieces.leaves.size(); ++i) {
+    const int latch = pieces.leaves[i].latch;
+    const int alone = latch == 0 ? -1 : -latch;
+    motion.leaves.push_back({false, two ? (i == 0 ? -1 : 1) : alone, true});
+  }
+  return motion;
+}
+
+/// nullopt: the file names a way of opening that is not modelled, or one that does not fit what is
+/// drawn. Left is x's low end, seen along y with z up.
+std::optional<DoorMotion> motionOf(std::string_view operation, const DoorPieces& pieces) {
+  static const std::map<std::string_view, std::vector<LeafMotion>> kMotions{
+      {"SINGLE_SWING_LEFT", {{false, -1, false}}},
+      {"SINGLE_SWING_RIGHT", {{false, 1, false}}},
+      {"DOUBLE_SWING_LEFT", {{false, -1, true}}},
+      {"DOUBLE_SWING_RIGHT", {{false, 1, true}}},
+      {"DOUBLE_DOOR_SINGLE_SWING", {{false, -1, false}, {false, 1, false}}},
+      {"DOUBLE_DOOR_DOUBLE_SWING", {{false, -1, true}, {false, 1, true}}},
+      {"SLIDING_TO_LEFT", {{true, -1, false}}},
+      {"SLIDING_TO_RIGHT", {{true, 1, false}}},
+      {"DOUBLE_DOOR_SLIDING", {{true, -1, false}, {true, 1, false}}}};
+  // Which leaf of these opens to which side is not said in words that two readers agree on.
+  static const std::set<std::string_view> kOpen{"", "NOTDEFINED", "USERDEFINED",
+                                                "DOUBLE_DOOR_SINGLE_SWING_OPPOSITE_LEFT",
+                                                "DOUBLE_DOOR_SINGLE_SWING_OPPOSITE_RIGHT"};
+  if (kOpen.contains(operation)) return guessedMotion(pieces);
+  const auto known = kMotions.find(operation);
+  if (known == kMotions.end() || known->second.size() != pieces.leaves.size()) return std::nullopt;
+  if (pieces.turned && !known->second[0].slides) return guessedMotion(pieces);
+  return DoorMotion{known->second, false};
+}
+
+BodySpec specOf(const Object& door, const DoorPieces& pieces, const DoorLeaf& leaf,
+                const LeafMotion& motion) {
+  Eigen::Matrix3d worldFromDoor = door.worldFromPlacement->linear();
+  if (pieces.turned) worldFromDoor.col(0).swap(worldFromDoor.col(1));
+  const auto inWorld = [&](const Vec3& p) -> Vec3 {
+    return worldFromDoor * p + door.worldFromPlacement->translation();
+  };
+  const Box& panel = leaf.panel;
+  BodySpec body;
+  body.source = BodySource::ifc;
+  body.openedBy = OpenedBy::touch;
+  if (motion.slides) {
+    body.kind = BodyKind::sliding;
+    body.axis = (motion.side * worldFromDoor.col(0)).normalized();
+    body.anchor = inWorld(panel.centre());
+    body.high = panel.size().x();
+    body.speed = kSlideSpeed;
+    return body;
+  }
+  body.kind = BodyKind::hinged;
+  body.axis = Vec3::UnitY();
+  body.speed = kRightAngle;
+  // It opens towards y: about +z with the hinges at its low end, about -z with them at the other.
+  body.low = motion.bothWays || motion.side > 0 ? -kRightAngle : 0;
+  body.high = motion.bothWays || motion.side < 0 ? kRightAngle : 0;
+  body.anchor = inWorld({motion.side < 0 ? panel.min.x() : panel.max.x(),
+                         motion.bothWays ? panel.centre().y() : panel.max.y(), panel.min.z()});
+  return body;
+}
+
+/// Makes meshes of some of an object's triangles, each set once.
+class MeshSplitter {
+ public:
+  explicit MeshSplitter(Model& model) : model_(model) {}
+
+  /// The meshes that hold what `pieces` calls `piece`; empty when nothing does.
+  std::vector<std::uint32_t> meshesOf(const std::vector<std::uint32_t>& meshes,
+                                      const std::vector<std::uint8_t>& pieces, std::uint8_t piece) {
+    std::vector<std::uint32_t> result;
+    std::size_t begin = 0;
+    for (const std::uint32_t mesh : meshes) {
+      const std::size_t count = model_.meshes[mesh].indices.size() / 3;
+      std::vector<bool> wanted;
+      for (std::size_t i = begin; i < begin + count; ++i) wanted.push_back(pieces[i] == piece);
+      begin += count;
+      if (const auto made = meshOf(mesh, wanted)) result.push_back(*made);
+    }
+    return result;
+  }
+
+ private:
+  std::optional<std::uint32_t> meshOf(std::uint32_t mesh, const std::vector<bool>& wanted) {
+    const auto kept = std::count(wanted.begin(), wanted.end(), true);
+    if (kept == 0) return std::nullopt;
+    if (static_cast<std::size_t>(kept) == wanted.size()) return mesh;
+    const auto next = static_cast<std::uint32_t>(model_.meshes.size());
+    const auto [known, isNew] = made_.try_emplace({mesh, wanted}, next);
+    if (isNew) model_.meshes.push_back(cut(model_.meshes[mesh], wanted));
+    return known->second;
+  }
+
+  static Mesh cut(const Mesh& mesh, const std::vector<bool>& wanted) {
+    Mesh result;
+    result.name = mesh.name;
+    result.material = mesh.material;
+    std::map<std::uint32_t, std::uint32_t> numbers;
+    for (std::size_t i = 0; i < 3 * wanted.size(); ++i) {
+      if (!wanted[i / 3]) continue;
+      const std::uint32_t from = mesh.indices[i];
+      const auto [at, isNew] =
+          numbers.try_emplace(from, static_cast<std::uint32_t>(result.positions.size()));
+      result.indices.push_back(at->second);
+      if (!isNew) continue;
+      result.positions.push_back(mesh.positions[from]);
+      if (!mesh.normals.empty()) result.normals.push_back(mesh.normals[from]);
+      if (!mesh.uvs.empty()) result.uvs.push_back(mesh.uvs[from]);
+    }
+    return result;
+  }
+
+  Model& model_;
+  std::map<std::pair<std::uint32_t, std::vector<bool>>, std::uint32_t> made_;
+};
+
+/// Meshes that no object uses any more go; they were cut.
+void dropUnusedMeshes(Model& model, std::size_t before) {
+  std::vector<bool> used(model.meshes.size());
+  for (const Object& object : model.objects)
+    for (const std::uint32_t mesh : object.meshes) used[mesh] = true;
+  std::vector<std::uint32_t> number(model.meshes.size());
+  std::uint32_t kept = 0;
+  for (std::uint32_t i = 0; i < number.size(); ++i) {
+    number[i] = kept;
+    if (!used[i] && i < before) continue;
+    if (kept != i) model.meshes[kept] = std::move(model.meshes[i]);
+    ++kept;
+  }
+  model.meshes.resize(kept);
+  for (Object& object : model.objects)
+    for (std::uint32_t& mesh : object.meshes) mesh = number[mesh];
+}
+
+class DoorSplitter {
+ public:
+  explicit DoorSplitter(Model& model) : model_(model), meshes_(model) {
+    for (const Object& object : model.objects) paths_.insert(object.path);
+  }
+
+  void split(std::uint32_t index) {
+    const Object door = model_.objects[index];
+    if (!door.worldFromPlacement) return stay(door, "its placement is not known");
+    if (!(door.worldFromPlacement->linear().col(2).y() > kUpright))
+      return stay(door, "it does not stand upright");
+    const DoorPieces pieces = piecesOfDoor(model_, door);
+    if (pieces.leaves.empty()) return stay(door, pieces.why);
+    const std::optional<DoorMotion> motion = motionOf(door.operation, pieces);
+    if (!motion)
+      return stay(door, door.operation + " does not go with " +
+                            std::to_string(pieces.leaves.size()) + " leaves, or is not modelled");
+    if (motion->guessed) tellGuess(door, *motion);
+    for (std::uint8_t leaf = 0; leaf < pieces.leaves.size(); ++leaf) {
+      BodySpec body = specOf(door, pieces, pieces.leaves[leaf], motion->leaves[leaf]);
+      body.objects = {leaf == 0 ? index : addPiece(door, index, pieces, leaf, "/leaf2")};
+      body.name = model_.objects[body.objects[0]].path;
+      bodies.push_back(std::move(body));
+    }
+    addPiece(door, index, pieces, DoorPieces::kFrame, "/frame");
+    model_.objects[index].meshes = meshes_.meshesOf(door.meshes, pieces.pieceOfTriangle, 0);
+  }
+
+  std::vector<BodySpec> bodies;
+
+ private:
+  void stay(const Object& door, const std::string& why) {
+    addProblem(model_, "still_doors", door.path + ": " + why);
+  }
+
+  void tellGuess(const Object& door, const DoorMotion& motion) {
+    const std::string operation = door.operation.empty() ? "no OperationType" : door.operation;
+    const std::string how = motion.leaves.size() == 2   ? "two leaves that swing both ways"
+                            : motion.leaves[0].side < 0 ? "hinged at the left, swings both ways"
+                                                        : "hinged at the right, swings both ways";
+    addProblem(model_, "guessed_doors",
+               door.path + ": " + operation + "; " + how + "; a sidecar may say better");
+  }
+
+  /// Returns the new object's index; the door's own where there is nothing of the piece.
+  std::uint32_t addPiece(const Object& door, std::uint32_t index, const DoorPieces& pieces,
+                         std::uint8_t piece, const char* name) {
+    Object object = door;
+    object.meshes = meshes_.meshesOf(door.meshes, pieces.pieceOfTriangle, piece);
+    if (object.meshes.empty()) return index;
+    object.path = door.path + name;
+    for (int number = 2; !paths_.insert(object.path).second; ++number)
+      object.path = door.path + name + "#" + std::to_string(number);
+    object.globalId.clear();
+    object.pieceOf = index;
+    model_.objects.push_back(std::move(object));
+    return static_cast<std::uint32_t>(model_.objects.size() - 1);
+  }
+
+  Model& model_;
+  MeshSplitter meshes_;
+  std::set<std::string> paths_;
+};
+
+}  // namespace
+
+std::vector<BodySpec> splitDoors(Model& model) {
+  std::vector<std::uint32_t> doors;
+  for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
+    const std::string& word = model.objects[i].ifcClass;
+    if (word == "IfcDoor" || word == "IfcDoorStandardCase") doors.push_back(i);
+  }
+  if (doors.empty()) return {};
+  const std::size_t before = model.meshes.size();
+  DoorSplitter splitter(model);
+  for (const std::uint32_t door : doors) splitter.split(door);
+  dropUnusedMeshes(model, before);
+  return std::move(splitter.bodies);
+}
+
+}  // namespace enfilade::scene

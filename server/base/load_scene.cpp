@@ -1,0 +1,59 @@
+#include "server/base/load_scene.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+
+#include "scene/import/bodies/collect_bodies.hpp"
+#include "scene/import/cache/model_cache.hpp"
+#include "server/base/progress.hpp"
+
+namespace enfilade::server {
+namespace {
+
+void tell(const scene::Scene& scene, const std::string& name, const LoadedScene& loaded) {
+  const scene::Model& model = scene.model();
+  const scene::Vec3 size =
+      scene.bounds().empty() ? scene::Vec3::Zero().eval() : scene.bounds().size();
+  spdlog::info(
+      "{}: {} objects, {:.1f} x {:.1f} x {:.1f} m, unit {} m, up {}, read by {}, {} in {:.2f} s",
+      name, model.objects.size(), size.x(), size.y(), size.z(), model.metresPerUnit, model.up,
+      model.reader, loaded.fromCache ? "from the cache" : "imported", loaded.loadSeconds);
+}
+
+}  // namespace
+
+LoadedScene loadSceneTimed(const ModelOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  scene::ImportOptions import;
+  import.metresPerUnit = options.metresPerUnit;
+  import.up = options.up;
+  import.offset = options.offset;
+  import.ifcReader = options.ifcReader;
+  Progress bar;
+  scene::LoadedModel model = scene::loadModel(
+      options.file, import, options.cache ? scene::modelCacheOfEnvironment() : std::nullopt,
+      [&](const std::string& stage, double fraction) { bar.show(fraction, stage); });
+  bar.clear();
+  for (const std::string& note : model.notes) spdlog::warn("cache: {}", note);
+  scene::findBodies(model.model, options.file, options.doors);
+  if (!model.model.bodies.empty())
+    spdlog::info("{}: {} bodies: {}", options.file.filename().string(), model.model.bodies.size(),
+                 scene::sourcesOf(model.model));
+  LoadedScene loaded{nullptr, model.fromCache, model.importSeconds, 0};
+  loaded.scene = std::make_shared<const scene::Scene>(std::move(model.model));
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  loaded.loadSeconds = took.count();
+  tell(*loaded.scene, options.file.filename().string(), loaded);
+  return loaded;
+}
+
+std::shared_ptr<const scene::Scene> loadScene(const ModelOptions& options) {
+  std::shared_ptr<const scene::Scene> scene = loadSceneTimed(options).scene;
+  for (const scene::Problem& problem : scene->model().problems)
+    spdlog::info("{}: {} x {}, as {}", options.file.filename().string(), problem.count,
+                 problem.kind, problem.example);
+  return scene;
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,270 @@
+#include "server/messages/world_messages.hpp"
+
+#include "server/messages/body_messages.hpp"
+
+#include <cmath>
+#include <filesystem>
+
+namespace enfilade::server {
+
+namespace {
+
+v1::ContactEvent::Kind kindOf(scene::ContactEvent::Kind kind) {
+  using Kind = scene::ContactEvent::Kind;
+  switch (kind) {
+    case Kind::begin:
+      return v1::ContactEvent::KIND_BEGIN;
+    case Kind::end:
+      return v1::ContactEvent::KIND_END;
+    case Kind::near:
+      return v1::ContactEvent::KIND_NEAR;
+    case Kind::blocked:
+      return v1::ContactEvent::KIND_BLOCKED;
+    case Kind::enter:
+      return v1::ContactEvent::KIND_ENTER;
+    case Kind::leave:
+      return v1::ContactEvent::KIND_LEAVE;
+    case Kind::leftWorld:
+      return v1::ContactEvent::KIND_LEFT_WORLD;
+  }
+  return v1::ContactEvent::KIND_UNSPECIFIED;
+}
+
+v1::ContactEvent::Reason reasonOf(scene::ContactEvent::Reason reason) {
+  using Reason = scene::ContactEvent::Reason;
+  switch (reason) {
+    case Reason::parted:
+      return v1::ContactEvent::REASON_PARTED;
+    case Reason::left:
+      return v1::ContactEvent::REASON_LEFT;
+    case Reason::shutdown:
+      return v1::ContactEvent::REASON_SHUTDOWN;
+  }
+  return v1::ContactEvent::REASON_UNSPECIFIED;
+}
+
+v1::Notice::Kind kindOf(scene::Notice::Kind kind) {
+  using Kind = scene::Notice::Kind;
+  switch (kind) {
+    case Kind::spawned:
+      return v1::Notice::KIND_SPAWNED;
+    case Kind::refused:
+      return v1::Notice::KIND_REFUSED;
+    case Kind::arrived:
+      return v1::Notice::KIND_ARRIVED;
+    case Kind::blocked:
+      return v1::Notice::KIND_BLOCKED;
+    case Kind::done:
+      return v1::Notice::KIND_DONE;
+    case Kind::capture:
+      return v1::Notice::KIND_CAPTURE;
+    case Kind::left:
+      return v1::Notice::KIND_LEFT;
+    case Kind::dropped:
+      return v1::Notice::KIND_DROPPED;
+  }
+  return v1::Notice::KIND_UNSPECIFIED;
+}
+
+}  // namespace
+
+v1::Verdict messageOf(collision::Verdict verdict) {
+  switch (verdict) {
+    case collision::Verdict::separated:
+      return v1::VERDICT_SEPARATED;
+    case collision::Verdict::touching:
+      return v1::VERDICT_TOUCHING;
+    case collision::Verdict::penetrating:
+      return v1::VERDICT_PENETRATING;
+  }
+  return v1::VERDICT_UNSPECIFIED;
+}
+
+v1::DecidedBy messageOf(collision::DecidedBy decidedBy) {
+  return decidedBy == collision::DecidedBy::filter ? v1::DECIDED_BY_FILTER
+                                                   : v1::DECIDED_BY_RATIONAL;
+}
+
+v1::Feature messageOf(collision::Feature feature) {
+  switch (feature) {
+    case collision::Feature::vertex:
+      return v1::FEATURE_VERTEX;
+    case collision::Feature::edge:
+      return v1::FEATURE_EDGE;
+    case collision::Feature::face:
+      return v1::FEATURE_FACE;
+    case collision::Feature::none:
+      break;
+  }
+  return v1::FEATURE_UNSPECIFIED;
+}
+
+v1::Error errorOf(v1::ErrorCode code, std::string message, std::string field) {
+  v1::Error error;
+  error.set_code(code);
+  error.set_message(std::move(message));
+  error.set_field(std::move(field));
+  return error;
+}
+
+const scene::AvatarView* avatarNamed(const scene::Snapshot& snapshot, const std::string& name) {
+  for (const scene::AvatarView& avatar : snapshot.avatars) {
+    if (avatar.name == name) return &avatar;
+  }
+  return nullptr;
+}
+
+v1::Error unknownAvatar(const std::string& name, const std::string& field) {
+  return errorOf(v1::ERROR_UNKNOWN_AVATAR,
+                 "no avatar '" + name + "' is in the world: spawn it and make a tick first", field);
+}
+
+Buffer errorReply(std::uint64_t requestId, v1::Error error) {
+  v1::ServerMessage reply;
+  reply.set_reply_to(requestId);
+  *reply.mutable_error() = std::move(error);
+  return encodeShared(reply);
+}
+
+v1::Error refusalOf(const v1::Command& command, const std::string& why) {
+  const auto* order = v1::Command::descriptor()->FindFieldByNumber(command.order_case());
+  std::string field = why.substr(0, why.find_first_of(" '"));
+  if (order && field != "avatar") field = order->name() + "." + field;
+  return errorOf(v1::ERROR_REFUSED_COMMAND, why, field);
+}
+
+v1::Vec3 messageOf(const scene::Vec3& v) {
+  v1::Vec3 message;
+  message.set_x(v.x());
+  message.set_y(v.y());
+  message.set_z(v.z());
+  return message;
+}
+
+scene::Vec3 vectorFrom(const v1::Vec3& message) {
+  return {message.x(), message.y(), message.z()};
+}
+
+namespace {
+
+v1::ContactEvent::Phase phaseOf(scene::ContactEvent::Phase phase) {
+  using Phase = scene::ContactEvent::Phase;
+  switch (phase) {
+    case Phase::begin:
+      return v1::ContactEvent::PHASE_BEGIN;
+    case Phase::min:
+      return v1::ContactEvent::PHASE_MIN;
+    case Phase::end:
+      return v1::ContactEvent::PHASE_END;
+    case Phase::none:
+      break;
+  }
+  return v1::ContactEvent::PHASE_UNSPECIFIED;
+}
+
+}  // namespace
+
+v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent& event) {
+  v1::ContactEvent message;
+  message.set_tick(event.tick);
+  message.set_time(event.time);
+  message.set_kind(kindOf(event.kind));
+  if (event.kind == scene::ContactEvent::Kind::end ||
+      event.kind == scene::ContactEvent::Kind::leave)
+    message.set_reason(reasonOf(event.reason));
+  message.set_phase(phaseOf(event.phase));
+  message.set_a(event.a);
+  message.set_b(event.b);
+  message.set_a_name(scene::nameOf(world, event.a));
+  message.set_b_name(scene::nameOf(world, event.b));
+  putDecision(event.decision, message);
+  return message;
+}
+
+v1::Notice messageOf(const scene::World& world, const scene::Notice& notice, std::uint64_t tick) {
+  v1::Notice message;
+  message.set_tick(tick);
+  message.set_kind(kindOf(notice.kind));
+  message.set_avatar(notice.avatar);
+  message.set_id(notice.id);
+  message.set_tag(notice.tag);
+  *message.mutable_position() = messageOf(notice.position);
+  message.set_obstacle(notice.obstacle);
+  message.set_obstacle_name(scene::nameOf(world, notice.obstacle));
+  message.set_text(notice.text);
+  return message;
+}
+
+namespace {
+
+v1::MoveResult moveMessageOf(const scene::World& world, const scene::MoveResult& move) {
+  v1::MoveResult message;
+  *message.mutable_asked() = messageOf(move.asked);
+  *message.mutable_made() = messageOf(move.made);
+  if (move.stoppedBy == 0) return message;
+  message.set_stopped_by(move.stoppedBy);
+  message.set_stopped_by_name(scene::nameOf(world, move.stoppedBy));
+  message.set_verdict(messageOf(move.decision.verdict));
+  message.set_distance(move.decision.distance);
+  *message.mutable_normal() = messageOf(move.decision.normal);
+  message.set_decided_by(messageOf(move.decision.decidedBy));
+  return message;
+}
+
+}  // namespace
+
+v1::AvatarState messageOf(const scene::World& world, const scene::AvatarView& avatar) {
+  v1::AvatarState message;
+  message.set_id(avatar.id);
+  message.set_name(avatar.name);
+  *message.mutable_feet() = messageOf(avatar.feet);
+  *message.mutable_gaze() = messageOf(avatar.gaze);
+  message.set_eye_height(avatar.eyeHeight);
+  message.set_grounded(avatar.grounded);
+  *message.mutable_move() = moveMessageOf(world, avatar.move);
+  message.set_flying(avatar.flying);
+  message.set_stands_on(avatar.standsOn);
+  message.set_height(avatar.height);
+  for (const scene::JointView& joint : avatar.joints) {
+    v1::JointState& state = *message.add_joints();
+    state.set_value(joint.value);
+    state.set_stopped_by(joint.stoppedBy);
+  }
+  return message;
+}
+
+v1::Scene messageOf(const scene::Scene& scene) {
+  const scene::Model& model = scene.model();
+  v1::Scene message;
+  message.set_source(std::filesystem::path(model.source).filename().string());
+  message.set_hash(scene.hash());
+  message.set_objects(static_cast<std::uint32_t>(model.objects.size()));
+  *message.mutable_bounds()->mutable_min() = messageOf(scene.bounds().min);
+  *message.mutable_bounds()->mutable_max() = messageOf(scene.bounds().max);
+  message.set_metres_per_unit(model.metresPerUnit);
+  message.set_up(std::string(1, model.up));
+  *message.mutable_offset() = messageOf(model.offset);
+  for (std::size_t i = 0; i < model.bodies.size(); ++i)
+    *message.add_bodies() = bodyMessageOf(scene, i);
+  return message;
+}
+
+v1::Policies messageOf(const scene::Lengths& lengths) {
+  v1::Policies message;
+  message.set_epsilon(lengths.epsilon);
+  message.set_step_height(lengths.stepHeight);
+  message.set_near_miss(lengths.nearMiss);
+  message.set_tick(lengths.tick);
+  message.set_speed_limit(lengths.speedLimit);
+  message.set_walkable_slope(std::acos(lengths.walkableNormalY));
+  message.set_gravity(lengths.gravity);
+  message.set_patience(lengths.patience);
+  message.set_sliding(lengths.sliding == scene::Sliding::slide ? "slide" : "stop");
+  message.set_jump_limit(lengths.jumpLimit);
+  message.set_joint_speed_limit(lengths.jointSpeedLimit);
+  message.set_push_force(lengths.pushForce);
+  message.set_bodies("push_and_tell");
+  return message;
+}
+
+}  // namespace enfilade::server

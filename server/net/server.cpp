@@ -1,0 +1,80 @@
+#include "server/net/server.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <thread>
+
+#include "server/net/listener.hpp"
+
+namespace enfilade::server {
+
+namespace {
+
+std::vector<std::shared_ptr<const scene::Scene>> joined(
+    std::shared_ptr<const scene::Scene> first,
+    std::vector<std::shared_ptr<const scene::Scene>> further) {
+  further.insert(further.begin(), std::move(first));
+  return further;
+}
+
+}  // namespace
+
+struct Server::State {
+  State(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen, ServerOptions options)
+      : listener(context, listen, worlds, options.world.limits, std::move(options.access)),
+        worlds(joined(std::move(scene), std::move(options.furtherScenes)), options.world,
+               options.drawing) {}
+
+  boost::asio::io_context context{1};  ///< one thread: its handlers need no lock
+  Listener listener;                   ///< first: where its address is taken, no recording is begun
+  Worlds worlds;
+  std::thread network;
+};
+
+Server::Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
+               ServerOptions options)
+    : state_(std::make_unique<State>(std::move(scene), listen, std::move(options))) {
+  state_->listener.start();
+  state_->network = std::thread([state = state_.get()] { state->context.run(); });
+  state_->worlds.prepareFrames();
+}
+
+Server::~Server() {
+  stop();
+}
+
+std::uint16_t Server::port() const {
+  return state_->listener.port();
+}
+
+const std::string& Server::rendererName() const {
+  return state_->worlds.rendererName();
+}
+
+std::vector<std::string> Server::worldNames() const {
+  std::vector<std::string> names;
+  for (const auto& world : state_->worlds.all()) names.push_back(world->place().name);
+  return names;
+}
+
+void Server::rethrowFailure() const {
+  if (const auto failure = state_->worlds.mainWorld().failure()) std::rethrow_exception(failure);
+}
+
+AuditTotals Server::auditTotals() const {
+  return state_->worlds.auditTotals();
+}
+
+bool Server::recordedAll() const {
+  return state_->worlds.mainWorld().recordedAll();
+}
+
+void Server::stop() {
+  if (!state_->network.joinable()) return;
+  state_->worlds.stop();
+  boost::asio::post(state_->context, [state = state_.get()] { state->listener.stop(); });
+  state_->network.join();  // when the last session is closed
+  state_->worlds.finishServices();
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,415 @@
+#include "tests/architecture/architecture_rules.hpp"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <optional>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+#include <vector>
+
+namespace enfilade::architecture {
+namespace {
+
+using Names = std::set<std::string>;
+
+/// Which folders a folder may include besides itself.
+const std::map<std::string, Names> kMayInclude{
+    {"collision", {}},
+    {"scene", {"collision"}},
+    {"render", {"collision", "scene"}},
+    {"protocol", {}},
+    {"server", {"collision", "scene", "render", "protocol"}},
+    {"assets", {"collision", "scene"}},
+    {"examples", {"collision", "protocol"}},
+};
+
+/// The rooms, bottom up: a file includes its own room and rooms above it in this list, never one
+/// below it.
+const std::vector<std::string> kRooms{
+    "collision",
+    "collision/shapes",
+    "collision/bounds",
+    "collision/broad_phase",
+    "collision/minkowski",
+    "collision/exact",
+    "collision/narrow_phase",
+    "collision/compound",
+    "collision/motion",
+    "scene/model",
+    "scene/model/shapes",
+    "scene/import/worker",
+    "scene/import/bodies",
+    "scene/import/gltf",
+    "scene/import/assimp",
+    "scene/import/ifc",
+    "scene/import/cache",
+    "scene/import",
+    "scene/physics",
+    "scene/world/data",
+    "scene/world/queries",
+    "scene/world/contacts",
+    "scene/world/bodies",
+    "scene/world/avatars",
+    "scene/world",
+    "scene/world/checkpoint",
+    "render",
+    "render/image",
+    "render/gl",
+    "render/raytrace",
+    "render/reference",
+    "render/service",
+    "protocol",
+    "protocol/mcap",
+    "protocol/recording",
+    "protocol/script",
+    "protocol/clients/cpp",
+    "server/base",
+    "server/messages",
+    "server/recording/foxglove",
+    "server/recording",
+    "server/hosting",
+    "server/net",
+    "server/plans",
+    "server/runs",
+    "server/capture/path",
+    "server/capture",
+    "server/commands",
+    "server/diff",
+    "server/app",
+};
+
+/// Includes that still go up; each is to be cut.
+const std::set<std::pair<std::string, std::string>> kStillUpward{
+    {"collision/minkowski", "collision/narrow_phase"},
+    {"collision/shapes", "collision/minkowski"},
+    {"scene/import/assimp", "scene/import"},
+    {"scene/import/bodies", "scene/import/assimp"},
+    {"scene/import/bodies", "scene/world/data"},
+    {"scene/import/cache", "scene/import"},
+    {"scene/import/gltf", "scene/import"},
+    {"scene/import/gltf", "scene/import/assimp"},
+    {"scene/import/ifc", "scene/import"},
+    {"scene/import/worker", "scene/import"},
+    {"scene/world/contacts", "scene/world"},
+    {"scene/world/contacts", "scene/world/avatars"},
+    {"scene/world/contacts", "scene/world/bodies"},
+    {"scene/world/data", "scene/world"},
+    {"scene/world/data", "scene/world/avatars"},
+    {"scene/world/data", "scene/world/bodies"},
+    {"scene/world/data", "scene/world/contacts"},
+    {"server/base", "server/app"},
+    {"server/capture", "server/app"},
+    {"server/commands", "server/app"},
+    {"server/diff", "server/app"},
+    {"server/hosting", "server/app"},
+    {"server/net", "server/app"},
+    {"server/recording", "server/app"},
+    {"server/runs", "server/app"},
+};
+
+/// Folders without rooms: nothing includes them but themselves and the tests.
+const Names kWithoutRooms{"assets", "examples", "tests"};
+
+struct ThirdParty {
+  const char* name;
+  const char* pattern;  ///< of what stands between the brackets of the include
+  Names folders;        ///< where it may be used
+};
+
+const std::array<ThirdParty, 17> kThirdParties{{
+    {"GMP", "gmp.*", {"collision"}},
+    {"assimp", "assimp/.*", {"scene"}},
+    {"ifcplusplus", "(ifcpp|carve)/.*", {"scene"}},
+    {"Embree", "embree.*", {"scene", "render"}},
+    {"EGL and OpenGL", "(epoxy|EGL|GL|GLES.*)/.*", {"render"}},
+    {"libpng", "png.*", {"scene", "render"}},
+    {"libjpeg", "(jpeglib|turbojpeg).*", {"scene", "render"}},
+    {"minizip", "minizip/.*", {"scene"}},
+    {"xxHash", "xxh.*", {"scene"}},
+    {"zlib", "zlib.*", {"protocol"}},
+    {"zstd", "zstd.*", {"protocol", "render", "server"}},
+    {"Boost.Asio and Beast", "boost/(asio|beast|system).*", {"server"}},
+    {"other Boost", "boost/(?!asio|beast|system).*", {}},
+    {"protobuf", "google/protobuf/.*", {"protocol"}},
+    {"nlohmann-json", "nlohmann/.*", {"scene", "render", "protocol", "server", "assets"}},
+    {"CLI11", "CLI/.*", {"server", "assets"}},
+    {"spdlog", "(spdlog|fmt)/.*", {"server"}},
+}};
+
+struct Include {
+  int line = 0;
+  bool quoted = false;
+  std::string path;
+};
+
+std::string folderOf(const std::string& path) {
+  const auto slash = path.find('/');
+  return slash == std::string::npos ? std::string() : path.substr(0, slash);
+}
+
+/// "scene/import/ifc" of "scene/import/ifc/units.hpp".
+std::string roomOf(const std::string& path) {
+  const auto slash = path.rfind('/');
+  return slash == std::string::npos ? std::string() : path.substr(0, slash);
+}
+
+bool endsWith(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+bool isHeader(const std::string& path) {
+  return endsWith(path, ".hpp");
+}
+bool isCode(const std::string& path) {
+  return isHeader(path) || endsWith(path, ".cpp");
+}
+bool isGeneratedMessage(const std::string& path) {
+  return endsWith(path, ".pb.h");
+}
+
+std::string at(const std::string& path, int line) {
+  return path + ":" + std::to_string(line);
+}
+
+/// Calls `see(line number, line)` for each line of `text`.
+template <typename See>
+void forEachLine(const std::string& text, const See& see) {
+  std::istringstream lines(text);
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) see(number, line);
+}
+
+std::vector<Include> includesOf(const std::string& text) {
+  static const std::regex include(R"(^\s*#\s*include\s*([<"])([^>"]+)[>"])");
+  std::vector<Include> found;
+  forEachLine(text, [&](int number, const std::string& line) {
+    std::smatch match;
+    if (std::regex_search(line, match, include))
+      found.push_back({number, match[1] == "\"", match[2]});
+  });
+  return found;
+}
+
+/// Headers of a folder that code of another one includes, and all that these include in turn.
+Names publicHeaders(const Sources& sources) {
+  Names reached;
+  std::vector<std::string> open;
+  const auto reach = [&](const std::string& path) {
+    if (sources.count(path) != 0 && reached.insert(path).second) open.push_back(path);
+  };
+  for (const auto& [path, text] : sources) {
+    if (!isCode(path) || kMayInclude.count(folderOf(path)) == 0) continue;
+    for (const Include& include : includesOf(text))
+      if (include.quoted && folderOf(include.path) != folderOf(path)) reach(include.path);
+  }
+  while (!open.empty()) {
+    const std::string path = open.back();
+    open.pop_back();
+    for (const Include& include : includesOf(sources.at(path)))
+      if (include.quoted) reach(include.path);
+  }
+  return reached;
+}
+
+bool allowedInPublicHeader(const std::string& path) {
+  const bool standard = path.find_first_of("/.") == std::string::npos;
+  return standard || path.rfind("Eigen/", 0) == 0 || isGeneratedMessage(path);
+}
+
+std::optional<std::string> faultOfInclude(const Sources& sources, const std::string& from,
+                                          const Include& include) {
+  const std::string folder = folderOf(from);
+  const std::string target = folderOf(include.path);
+  if (target.empty()) return "\"" + include.path + "\" is not a path from the root";
+  if (sources.count(include.path) == 0 && !isGeneratedMessage(include.path))
+    return "\"" + include.path + "\" is not in the repository";
+  if (folder == "tests") return std::nullopt;
+  if (folder == target) return std::nullopt;
+  const auto allowed = kMayInclude.find(folder);
+  if (allowed == kMayInclude.end())
+    return folder + "/ is no folder that the include rules know; add it to kMayInclude";
+  if (allowed->second.count(target) == 0) return folder + "/ may not include " + target + "/";
+  return std::nullopt;
+}
+
+std::optional<std::string> faultBetweenRooms(const std::string& from, const Include& include) {
+  const std::string room = roomOf(from), wanted = roomOf(include.path);
+  if (room == wanted || kStillUpward.count({room, wanted}) != 0 ||
+      kWithoutRooms.count(folderOf(from)) != 0 || isGeneratedMessage(include.path))
+    return std::nullopt;
+  const auto here = std::find(kRooms.begin(), kRooms.end(), room);
+  if (here == kRooms.end()) return room + "/ is not a known room; add it to kRooms";
+  if (std::find(kRooms.begin(), here, wanted) == here)
+    return room + "/ may not include " + wanted + "/, which is above it";
+  return std::nullopt;
+}
+
+bool skippedFolder(const std::string& name) {
+  return name == ".git" || name == "out" || name == "node_modules" || name == ".cache" ||
+         name.rfind("build", 0) == 0;
+}
+
+bool writtenByPeople(const std::filesystem::path& file) {
+  static const Names endings{".cpp", ".hpp",  ".inc",   ".proto", ".txt", ".cmake",
+                             ".md",  ".json", ".jsonl", ".py",    ".js"};
+  static const Names names{"dev", "run", ".gitignore", ".clang-format"};
+  return endings.count(file.extension().string()) != 0 ||
+         names.count(file.filename().string()) != 0;
+}
+
+bool onlyLinkedTo(const std::filesystem::path& file) {
+  const std::string extension = file.extension().string();
+  return extension == ".png" || extension == ".svg" || file.filename() == "LICENSE";
+}
+
+}  // namespace
+
+Sources readSources(const std::filesystem::path& root) {
+  Sources sources;
+  for (auto entry = std::filesystem::recursive_directory_iterator(root);
+       entry != std::filesystem::recursive_directory_iterator(); ++entry) {
+    if (entry->is_directory() && skippedFolder(entry->path().filename().string())) {
+      entry.disable_recursion_pending();
+      continue;
+    }
+    if (!entry->is_regular_file()) continue;
+    const std::string path = entry->path().lexically_relative(root).generic_string();
+    if (onlyLinkedTo(entry->path())) sources[path] = "";
+    if (!writtenByPeople(entry->path())) continue;
+    std::ifstream file(entry->path(), std::ios::binary);
+    std::ostringstream text;
+    text << file.rdbuf();
+    if (!file) throw std::runtime_error(entry->path().string() + ": cannot be read");
+    sources[path] = text.str();
+  }
+  return sources;
+}
+
+Faults includeDirections(const Sources& sources) {
+  Faults faults;
+  for (const auto& [path, text] : sources) {
+    if (!isCode(path)) continue;
+    for (const Include& include : includesOf(text)) {
+      if (!include.quoted) continue;
+      auto fault = faultOfInclude(sources, path, include);
+      if (!fault) fault = faultBetweenRooms(path, include);
+      if (fault) faults.push_back(at(path, include.line) + ": " + *fault);
+    }
+  }
+  return faults;
+}
+
+Faults thirdPartiesInPublicHeaders(const Sources& sources) {
+  Faults faults;
+  for (const std::string& path : publicHeaders(sources)) {
+    if (!isHeader(path)) continue;
+    for (const Include& include : includesOf(sources.at(path)))
+      if (!include.quoted && !allowedInPublicHeader(include.path))
+        faults.push_back(at(path, include.line) + ": <" + include.path +
+                         "> in a header that other folders reach; move it into a .cpp file");
+  }
+  return faults;
+}
+
+Faults thirdPartiesOutOfPlace(const Sources& sources) {
+  Faults faults;
+  for (const auto& [path, text] : sources) {
+    if (!isCode(path) || kMayInclude.count(folderOf(path)) == 0) continue;
+    for (const Include& include : includesOf(text)) {
+      for (const ThirdParty& party : kThirdParties) {
+        if (include.quoted || party.folders.count(folderOf(path)) != 0) continue;
+        if (std::regex_match(include.path, std::regex(party.pattern)))
+          faults.push_back(at(path, include.line) + ": " + party.name + " has no place in " +
+                           folderOf(path) + "/");
+      }
+    }
+  }
+  return faults;
+}
+
+Faults headersWithoutPragmaOnce(const Sources& sources) {
+  Faults faults;
+  for (const auto& [path, text] : sources)
+    if (isHeader(path) && text.find("#pragma once\n") == std::string::npos)
+      faults.push_back(path + ": no #pragma once");
+  return faults;
+}
+
+Faults longFiles(const Sources& sources, int maxLines) {
+  Faults faults;
+  for (const auto& [path, text] : sources) {
+    const auto lines = std::count(text.begin(), text.end(), '\n');
+    const bool schema = endsWith(path, ".proto");  // one document, compiled as a whole
+    if (lines > (schema ? 2 * maxLines : maxLines))
+      faults.push_back(path + ": " + std::to_string(lines) + " lines");
+  }
+  return faults;
+}
+
+Faults unfinishedWork(const Sources& sources) {
+  // Put together here, so that this file does not accuse itself.
+  static const std::regex words(std::string("\\b(TO") + "DO|FIX" + "ME|X" + "XX)\\b");
+  Faults faults;
+  for (const auto& [path, text] : sources)
+    forEachLine(text, [&, &name = path](int number, const std::string& line) {
+      if (std::regex_search(line, words)) faults.push_back(at(name, number) + ": " + line);
+    });
+  return faults;
+}
+
+Faults problemsWithoutMeaning(const Sources& sources) {
+  static const std::string table = "scene/model/diagnostic_catalog.cpp";
+  static const std::regex told(
+      R"re((?:problems_?\.add|findings\.add|addProblem|problems\.push_back)\([^";]*"([a-z_]+)")re");
+  const auto meanings = sources.find(table);
+  if (meanings == sources.end()) return {};
+  Faults faults;
+  for (const auto& [path, text] : sources) {
+    if (path.rfind("scene/", 0) != 0) continue;
+    for (std::sregex_iterator it(text.begin(), text.end(), told), end; it != end; ++it) {
+      const std::string word = '"' + (*it)[1].str() + '"';
+      if (meanings->second.find(word) != std::string::npos) continue;
+      const auto line = 1 + std::count(text.begin(), text.begin() + it->position(), '\n');
+      faults.push_back(at(path, static_cast<int>(line)) + ": " + word + " is not in " + table);
+    }
+  }
+  return faults;
+}
+
+Faults sharedTemporaryFiles(const Sources& sources) {
+  static const std::string keeper = "tests/support/temporary_folder.hpp";
+  static const std::regex shared(R"(\b(temp_directory_path|TempDir)\()");
+  Faults faults;
+  for (const auto& [path, text] : sources) {
+    if (path.rfind("tests/", 0) != 0 || path == keeper || path.rfind("tests/architecture/", 0) == 0)
+      continue;
+    for (std::sregex_iterator it(text.begin(), text.end(), shared), end; it != end; ++it) {
+      const auto line = 1 + std::count(text.begin(), text.begin() + it->position(), '\n');
+      faults.push_back(at(path, static_cast<int>(line)) + ": files of a test come from " + keeper);
+    }
+  }
+  return faults;
+}
+
+Faults brokenLinks(const Sources& sources) {
+  static const std::regex link(R"(\]\(([A-Za-z0-9_./-]+)(#[^)]*)?\))");
+  Faults faults;
+  for (const auto& [path, text] : sources) {
+    if (!endsWith(path, ".md")) continue;
+    const auto folder = std::filesystem::path(path).parent_path();
+    forEachLine(text, [&, &name = path](int number, const std::string& line) {
+      for (std::sregex_iterator it(line.begin(), line.end(), link), end; it != end; ++it) {
+        const std::string target = (*it)[1];
+        const auto file = (folder / target).lexically_normal().generic_string();
+        if (sources.count(file) == 0)
+          faults.push_back(at(name, number) + ": links to " + target + ", which is not there");
+      }
+    });
+  }
+  return faults;
+}
+
+}  // namespace enfilade::architecture

@@ -1,0 +1,188 @@
+// Each rule twice: on made-up sources that break it, and on the repository itself.
+#include <gtest/gtest.h>
+
+#include <iostream>
+#include <numeric>
+
+#include "tests/architecture/architecture_rules.hpp"
+
+namespace enfilade::architecture {
+namespace {
+
+const Sources& repository() {
+  static const Sources sources = readSources(ENFILADE_SOURCE_DIR);
+  return sources;
+}
+
+std::string listed(const Faults& faults) {
+  return std::accumulate(faults.begin(), faults.end(), std::string("\n"),
+                         [](std::string all, const std::string& one) { return all + one + "\n"; });
+}
+
+TEST(Architecture, TheRepositoryIsRead) {
+  EXPECT_EQ(repository().count("CMakeLists.txt"), 1U);
+  EXPECT_EQ(repository().count("collision/types.hpp"), 1U);
+  EXPECT_EQ(repository().count("tests/architecture/architecture_test.cpp"), 1U);
+  for (const auto& [path, text] : repository())
+    EXPECT_EQ(path.rfind("build", 0), std::string::npos);
+}
+
+TEST(Architecture, IncludesGoDownwardsOnly) {
+  EXPECT_EQ(includeDirections(repository()), Faults{}) << listed(includeDirections(repository()));
+}
+
+TEST(Architecture, NoThirdPartyShowsInAPublicHeader) {
+  const Faults faults = thirdPartiesInPublicHeaders(repository());
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+}
+
+TEST(Architecture, EachThirdPartyStaysInItsFolders) {
+  const Faults faults = thirdPartiesOutOfPlace(repository());
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+}
+
+TEST(Architecture, EveryHeaderIsIncludedOnce) {
+  EXPECT_EQ(headersWithoutPragmaOnce(repository()), Faults{});
+}
+
+TEST(Architecture, FilesAreShort) {
+  const Faults faults = longFiles(repository(), 700);
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+  const Faults warnings = longFiles(repository(), 500);
+  if (!warnings.empty()) std::cout << "over 500 lines:" << listed(warnings);
+}
+
+TEST(Architecture, NothingIsLeftUnfinished) {
+  const Faults faults = unfinishedWork(repository());
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+}
+
+TEST(Architecture, EveryProblemHasAMeaning) {
+  const Faults faults = problemsWithoutMeaning(repository());
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+}
+
+TEST(Architecture, TestsKeepTheirFilesApart) {
+  const Faults faults = sharedTemporaryFiles(repository());
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+}
+
+TEST(Architecture, LinksLeadSomewhere) {
+  const Faults faults = brokenLinks(repository());
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+}
+
+TEST(ArchitectureRules, AnUpwardIncludeIsAFault) {
+  const Sources sources{
+      {"scene/world/world.hpp", ""},
+      {"collision/shapes/hull.cpp", "#include <vector>\n#include \"scene/world/world.hpp\"\n"},
+      {"server/app/main.cpp", "#include \"scene/world/world.hpp\"\n"}};
+  EXPECT_EQ(includeDirections(sources),
+            Faults{"collision/shapes/hull.cpp:2: collision/ may not include scene/"});
+}
+
+TEST(ArchitectureRules, ARoomIncludesOnlyRoomsBelowIt) {
+  const Sources sources{
+      {"scene/model/model.hpp", ""},
+      {"scene/world/world.hpp", ""},
+      {"scene/model/shapes/shape.hpp", "#include \"scene/model/model.hpp\"\n"},
+      {"scene/physics/solver.cpp", "#include \"scene/model/shapes/shape.hpp\"\n"},
+      {"scene/world/world.cpp", "#include \"scene/model/shapes/shape.hpp\"\n"},
+      {"scene/import/ifc/ifc_metadata.cpp",
+       "#include \"scene/model/model.hpp\"\n#include \"scene/world/world.hpp\"\n"}};
+  EXPECT_EQ(includeDirections(sources), Faults{"scene/import/ifc/ifc_metadata.cpp:2: "
+                                               "scene/import/ifc/ may not include scene/world/, "
+                                               "which is above it"});
+}
+
+TEST(ArchitectureRules, ANewRoomMustBeListed) {
+  const Sources sources{{"scene/model/model.hpp", ""},
+                        {"scene/attic/box.cpp", "#include \"scene/model/model.hpp\"\n"}};
+  EXPECT_EQ(includeDirections(sources),
+            Faults{"scene/attic/box.cpp:1: scene/attic/ is not a known room; add it to kRooms"});
+}
+
+TEST(ArchitectureRules, AProblemThatIsNotExplainedIsAFault) {
+  const Sources sources{
+      {"scene/model/diagnostic_catalog.cpp", "ProblemKind{\"far_object\", true, \"far\"}\n"},
+      {"scene/import/one.cpp", "problems.add(\"far_object\", name);\nx({\n\"un_told\", 1});\n"},
+      {"scene/import/two.cpp", "addProblem(model_,\n  \"no_words\", name);\n"},
+      {"scene/import/three.cpp", "facts.problems.push_back(\n  {\"no_sense\", 1, name});\n"}};
+  EXPECT_EQ(
+      problemsWithoutMeaning(sources),
+      (Faults{
+          "scene/import/three.cpp:1: \"no_sense\" is not in scene/model/diagnostic_catalog.cpp",
+          "scene/import/two.cpp:1: \"no_words\" is not in scene/model/diagnostic_catalog.cpp"}));
+}
+
+TEST(ArchitectureRules, ATestsFileUnderASharedNameIsAFault) {
+  const Sources sources{
+      {"tests/support/temporary_folder.hpp", "std::filesystem::temp_directory_path() / own\n"},
+      {"tests/server/one_test.cpp", "\nconst auto file = testing::TempDir() + \"one\";\n"}};
+  EXPECT_EQ(sharedTemporaryFiles(sources),
+            Faults{"tests/server/one_test.cpp:2: files of a test come from "
+                   "tests/support/temporary_folder.hpp"});
+}
+
+TEST(ArchitectureRules, ProtocolKnowsNobody) {
+  const Sources sources{
+      {"collision/shapes/hull.hpp", ""},
+      {"protocol/clients/cpp/client.cpp", "#include \"collision/shapes/hull.hpp\"\n"}};
+  EXPECT_EQ(includeDirections(sources).size(), 1U);
+}
+
+TEST(ArchitectureRules, NoFolderMayIncludeTheTests) {
+  const Sources sources{{"tests/support/still.hpp", ""},
+                        {"server/app/main.cpp", "#include \"tests/support/still.hpp\"\n"}};
+  EXPECT_EQ(includeDirections(sources).size(), 1U);
+}
+
+TEST(ArchitectureRules, AnIncludeNotFromTheRootIsAFault) {
+  const Sources sources{{"scene/world/world.hpp", ""},
+                        {"scene/world/world.cpp", "#include \"world.hpp\"\n"}};
+  EXPECT_EQ(includeDirections(sources).size(), 1U);
+}
+
+TEST(ArchitectureRules, AFolderWithoutRulesIsAFault) {
+  const Sources sources{{"scene/world/world.hpp", ""},
+                        {"extra/a.cpp", "#include \"scene/world/world.hpp\"\n"}};
+  EXPECT_EQ(includeDirections(sources).size(), 1U);
+}
+
+TEST(ArchitectureRules, AThirdPartyBehindAPublicHeaderIsFound) {
+  const Sources sources{
+      {"scene/world/world.hpp", "#include <Eigen/Core>\n#include \"scene/inner.hpp\"\n"},
+      {"scene/inner.hpp", "#include <memory>\n#include <assimp/scene.h>\n"},
+      {"render/draw.cpp", "#include \"scene/world/world.hpp\"\n#include <epoxy/gl.h>\n"}};
+  EXPECT_EQ(thirdPartiesInPublicHeaders(sources),
+            Faults{"scene/inner.hpp:2: <assimp/scene.h> in a header that other folders reach; "
+                   "move it into a .cpp file"});
+}
+
+TEST(ArchitectureRules, AHeaderOfOneFolderAloneMayShowItsThirdParty) {
+  const Sources sources{{"server/net/session.hpp", "#include <boost/asio/ip/tcp.hpp>\n"},
+                        {"server/net/session.cpp", "#include \"server/net/session.hpp\"\n"}};
+  EXPECT_EQ(thirdPartiesInPublicHeaders(sources), Faults{});
+}
+
+TEST(ArchitectureRules, AThirdPartyInAForeignFolderIsFound) {
+  const Sources sources{{"collision/shapes/hull.cpp", "#include <gmpxx.h>\n"},
+                        {"scene/import.cpp", "#include <gmpxx.h>\n"},
+                        {"scene/log.cpp", "#include <spdlog/spdlog.h>\n"},
+                        {"collision/tree.cpp", "#include <boost/geometry.hpp>\n"},
+                        {"server/listen.cpp", "#include <boost/asio.hpp>\n"}};
+  EXPECT_EQ(thirdPartiesOutOfPlace(sources).size(), 3U);
+}
+
+TEST(ArchitectureRules, SmallFaultsAreFound) {
+  const std::string word = std::string("TO") + "DO";
+  const Sources sources{{"a.hpp", "int a;\n// " + word + ": more\nint b;\n"},
+                        {"b.md", "see [the code](a.hpp) and [nothing](c.hpp#top)\n"}};
+  EXPECT_EQ(headersWithoutPragmaOnce(sources), Faults{"a.hpp: no #pragma once"});
+  EXPECT_EQ(longFiles(sources, 2), Faults{"a.hpp: 3 lines"});
+  EXPECT_EQ(unfinishedWork(sources), Faults{"a.hpp:2: // " + word + ": more"});
+  EXPECT_EQ(brokenLinks(sources), Faults{"b.md:1: links to c.hpp, which is not there"});
+}
+
+}  // namespace
+}  // namespace enfilade::architecture

@@ -1,0 +1,68 @@
+#include "scene/world/contacts/active_contacts.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <tuple>
+
+#include "tests/scene/body_fixture.hpp"
+#include "tests/scene/box_scene.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using namespace testing;
+using Kind = ContactEvent::Kind;
+using Living = std::set<std::tuple<EntityId, EntityId, Kind>>;
+
+/// A wall, a volume, and a tower of boxes that is walked into.
+std::shared_ptr<const Scene> towerRoom() {
+  std::vector<NamedBox> boxes{
+      floorBox(), {"wall", {5, 0, -10}, {5.2, 3, 10}}, {"zone", {-1, 0, -1}, {1, 2, 1}}};
+  for (int i = 0; i < 3; ++i)
+    boxes.push_back({"box" + std::to_string(i), {3, 0.301 * i, -0.2}, {3.4, 0.301 * i + 0.3, 0.2}});
+  Model model = boxModel(boxes);
+  model.bodies = {bodySpec("zone", BodyKind::trigger, {2})};
+  for (std::uint32_t i = 3; i < 6; ++i)
+    model.bodies.push_back(bodySpec(boxes[i].path, BodyKind::rigid, {i}));
+  return std::make_shared<const Scene>(std::move(model));
+}
+
+/// What was told to begin and not to end.
+void follow(Living& living, const std::vector<ContactEvent>& events) {
+  for (const ContactEvent& event : events) {
+    if (event.kind == Kind::begin || event.kind == Kind::enter)
+      living.insert({event.a, event.b, event.kind});
+    if (event.kind == Kind::end) living.erase({event.a, event.b, Kind::begin});
+    if (event.kind == Kind::leave) living.erase({event.a, event.b, Kind::enter});
+  }
+}
+
+TEST(LivingContacts, AreThoseThatWereToldToBeginAndNotToEnd) {
+  World world(towerRoom());
+  submit(world, {"ann", Spawn{{-4, 0, 0}}});
+  submit(world, {"ann", Walk{{Vec3(8, 0, 0)}}});
+  submit(world, {"bob", Spawn{{4, 0, 4}}});
+  submit(world, {"bob", Walk{{Vec3(4.6, 0, 0), Vec3(-4, 0, 0)}}});
+  Living told;
+  std::size_t entered = 0, ended = 0, betweenBodies = 0;
+  for (int tick = 0; tick < 600; ++tick) {
+    if (tick == 500) submit(world, {"bob", Leave{}});
+    const std::size_t before = told.size();
+    follow(told, enfilade::scene::tick(world).contacts);
+    Living living;
+    for (const ContactEvent& event : livingContacts(world)) {
+      EXPECT_TRUE(living.insert({event.a, event.b, event.kind}).second);
+      entered += event.kind == Kind::enter ? 1 : 0;
+      betweenBodies += event.kind == Kind::begin && event.a <= 6 ? 1 : 0;
+    }
+    ended += told.size() < before ? 1 : 0;
+    ASSERT_EQ(living, told) << "tick " << tick;
+  }
+  EXPECT_GT(entered, 0u);
+  EXPECT_GT(ended, 0u);
+  EXPECT_GT(betweenBodies, 0u);
+}
+
+}  // namespace
+}  // namespace enfilade::scene

@@ -1,0 +1,167 @@
+// What stands in an avatar's way: hulls hold their triangles, and solids are solid.
+#include "scene/model/shapes/collision_geometry.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "collision/shapes/exact_orientation.hpp"
+#include "scene/world/world.hpp"
+#include "tests/scene/box_scene.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using testing::boxMesh;
+
+Eigen::Affine3d randomPlacement(std::mt19937& random, bool mirror) {
+  std::uniform_real_distribution<double> number(-1, 1);
+  Eigen::Affine3d placed = Eigen::Affine3d::Identity();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) placed(row, column) = 10 * number(random);
+  }
+  if ((placed.linear().determinant() < 0) != mirror) placed.linear().col(0) *= -1;
+  return placed;
+}
+
+Shape shapeOfOne(const Mesh& mesh) {
+  const std::uint32_t first = 0;
+  return shapeOf({&mesh, 1}, {&first, 1});
+}
+
+Mesh insideOut(Mesh mesh) {
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3)
+    std::swap(mesh.indices[i + 1], mesh.indices[i + 2]);
+  return mesh;
+}
+
+TEST(ObjectParts, AHullHoldsEveryCornerOfItsSurfaceHoweverItIsPlaced) {
+  std::mt19937 random(5);
+  const Shape shape = shapeOfOne(boxMesh({0, 0, 0}, {0.3, 2, 5}));
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Affine3d placed = randomPlacement(random, i % 2 == 1);
+    const ObjectParts parts = partsOf(shape, placed);
+    ASSERT_EQ(parts.localHulls.size(), 1u);
+    EXPECT_TRUE(parts.localTriangles.triangles().empty());
+    for (const auto& face : parts.localHulls[0].faces) {
+      const auto& v = parts.localHulls[0].vertices;
+      for (const Eigen::Vector3f& p : shape.vertices) {
+        EXPECT_LE(collision::orientation(v[face[0]], v[face[1]], v[face[2]],
+                                         placed * p.cast<double>() - parts.origin),
+                  0);
+      }
+    }
+  }
+}
+
+TEST(ObjectParts, QueriesFindWhatBruteForceFinds) {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> number(0, 20);
+  Mesh mesh;
+  for (int i = 0; i < 40; ++i) {  // every fourth without its last triangle, and so open
+    const double x = number(random), y = number(random), z = number(random);
+    Mesh box = boxMesh({x, y, z}, {x + 1, y + 2, z + 1});
+    if (i % 4 == 0) box.indices.resize(33);
+    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+    mesh.positions.insert(mesh.positions.end(), box.positions.begin(), box.positions.end());
+    for (const std::uint32_t index : box.indices) mesh.indices.push_back(first + index);
+  }
+  const ObjectParts parts = partsOf(shapeOfOne(mesh), Eigen::Affine3d::Identity());
+  EXPECT_EQ(parts.localHulls.size(), 30u);
+  EXPECT_EQ(parts.localTriangles.triangles().size(), 110u);
+  std::size_t hits = 0;
+  for (int i = 0; i < 200; ++i) {
+    const double x = number(random), y = number(random), z = number(random);
+    const Box box{{x, y, z}, {x + 2, y + 1, z + 3}};
+    std::vector<std::uint32_t> found, expected;
+    parts.query(box, found);
+    for (std::uint32_t part = 0; part < parts.size(); ++part) {
+      Box own;
+      const collision::ConvexBody body = parts.body(part);
+      for (const Vec3& v : body.vertices) own.include(v + body.translation);
+      EXPECT_EQ(own.min, parts.box(part).min);
+      if (overlaps(own, box)) expected.push_back(part);
+    }
+    EXPECT_EQ(found, expected);
+    hits += expected.size();
+  }
+  EXPECT_GT(hits, 80u);
+}
+
+TEST(ObjectParts, FarPartsAreStoredNearTheirOriginAndAreWhereTheyWere) {
+  std::mt19937 random(7);
+  const Mesh mesh = boxMesh({0, 0, 0}, {0.3, 2, 5});
+  Mesh open = mesh;
+  open.indices.resize(33);
+  const Shape shape = shapeOfOne(mesh), sheets = shapeOfOne(open);
+  for (int i = 0; i < 100; ++i) {
+    Eigen::Affine3d placed = randomPlacement(random, false);
+    placed.linear() *= 0.1;
+    placed.translation() *= i % 4 ? 1000 : 1;
+    std::vector<Vec3> expected, found;
+    for (const Eigen::Vector3f& p : shape.vertices) expected.push_back(placed * p.cast<double>());
+    const ObjectParts parts = partsOf(shape, placed);
+    for (const Vec3& v : parts.localHulls.at(0).vertices) found.push_back(v + parts.origin);
+    for (const Vec3& v : expected)
+      EXPECT_EQ(std::count(found.begin(), found.end(), v), 1) << v.transpose();
+    const ObjectParts rest = partsOf(sheets, placed);
+    for (const collision::Triangle& t : rest.localTriangles.triangles()) {
+      for (const Vec3& corner : t)
+        EXPECT_EQ(std::count(expected.begin(), expected.end(), corner + rest.origin), 1);
+    }
+    if (placed.translation().cwiseAbs().minCoeff() > 100) {
+      EXPECT_LT(parts.localHulls[0].radius, 12);
+    }
+  }
+}
+
+TEST(ObjectParts, InsideOutWallsAreSolidAndInsideOutRoomsAreRooms) {
+  const Eigen::Affine3d as = Eigen::Affine3d::Identity();
+  const Shape wall = shapeOfOne(insideOut(boxMesh({0, 0, 0}, {5, 3, 0.2})));
+  EXPECT_EQ(partsOf(wall, as).localHulls.size(), 1u);
+  const Shape room = shapeOfOne(insideOut(boxMesh({0, 0, 0}, {5, 3, 4})));
+  EXPECT_EQ(partsOf(room, as).localHulls.size(), 0u);
+  EXPECT_EQ(partsOf(room, as).localTriangles.triangles().size(), 12u);
+  EXPECT_EQ(partsOf(room, Eigen::Affine3d(Eigen::Scaling(0.05))).localHulls.size(), 1u);
+}
+
+/// Whether an avatar may come into the world at `at`.
+std::string refusalAt(const std::shared_ptr<const Scene>& scene, const Vec3& at) {
+  World world(scene);
+  submit(world, {"ann", Spawn{at}, 0});
+  const TickReport report = tick(world);
+  for (const Notice& notice : report.notices) {
+    if (notice.kind == Notice::Kind::refused) return notice.text;
+  }
+  return "";
+}
+
+TEST(ObjectParts, NobodyComesIntoTheInsideOfSolids) {
+  // A convex block, one with a dent, one mirrored, and a vault with a room in it.
+  Model model = testing::boxModel({testing::floorBox(), {"block", {2, 0, 2}, {6, 4, 6}}});
+  Mesh dented = boxMesh({-6, 0, 2}, {-2, 4, 6});
+  dented.indices.erase(dented.indices.begin() + 18, dented.indices.begin() + 24);
+  dented.positions.emplace_back(-4.0f, 3.5f, 4.0f);
+  for (const auto& [a, b] : {std::pair{2, 6}, {6, 7}, {7, 3}, {3, 2}})
+    dented.indices.insert(dented.indices.end(), {8u, std::uint32_t(a), std::uint32_t(b)});
+  model.meshes.push_back(dented);
+  model.objects.push_back({"dented", "", {2}, Eigen::Affine3d::Identity()});
+  model.objects.push_back({"mirrored", "", {2}, Eigen::Affine3d(Eigen::Scaling(1.0, 1.0, -1.0))});
+  Mesh vault = boxMesh({2, 0, -8}, {8, 4, -2});
+  const Mesh room = insideOut(boxMesh({2.5, 0.5, -7.5}, {7.5, 3.5, -2.5}));
+  for (const std::uint32_t i : room.indices) vault.indices.push_back(8 + i);
+  vault.positions.insert(vault.positions.end(), room.positions.begin(), room.positions.end());
+  model.meshes.push_back(vault);
+  model.objects.push_back({"vault", "", {3}, Eigen::Affine3d::Identity()});
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+
+  EXPECT_EQ(refusalAt(scene, {0, 0, 0}), "");
+  EXPECT_NE(refusalAt(scene, {4, 0.5, 4}).find("inside block"), std::string::npos);
+  EXPECT_NE(refusalAt(scene, {-4, 0.5, 4}).find("inside dented"), std::string::npos);
+  EXPECT_NE(refusalAt(scene, {-4, 0.5, -4}).find("inside mirrored"), std::string::npos);
+  EXPECT_EQ(refusalAt(scene, {5, 0.5, -5}), "");
+}
+
+}  // namespace
+}  // namespace enfilade::scene

@@ -1,0 +1,225 @@
+// Avatars between something that comes at them and something that does not give way: whatever their
+// shape and however fast it comes, they end outside, by the exact verdict on every part.
+#include <gtest/gtest.h>
+
+#include "tests/scene/body_fixture.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using namespace testing;
+using Action = BodyCommand::Action;
+using Event = ContactEvent::Kind;
+
+std::vector<Vec3> corners(const Vec3& min, const Vec3& max) {
+  std::vector<Vec3> points;
+  for (int i = 0; i < 8; ++i)
+    points.emplace_back(i & 1 ? max.x() : min.x(), i & 2 ? max.y() : min.y(),
+                        i & 4 ? max.z() : min.z());
+  return points;
+}
+
+/// Who is squeezed: how it enters, and what it is told before anything comes.
+struct Victim {
+  const char* name;
+  Spawn spawn;
+  std::vector<Order> then;
+  double height;     ///< metres, of the highest point
+  double halfWidth;  ///< metres, across z
+};
+
+void PrintTo(const Victim& victim, std::ostream* to) {
+  *to << victim.name;
+}
+
+/// A trolley: a plate with a post at its end.
+Spawn trolley() {
+  Spawn spawn;
+  spawn.parts = {corners({-0.25, 0.02, -0.2}, {0.25, 0.25, 0.2}),
+                 corners({-0.25, 0.25, -0.05}, {-0.15, 1.1, 0.05})};
+  return spawn;
+}
+
+/// A base with an arm that is stretched out ahead and turned up.
+Spawn arm() {
+  Spawn spawn;
+  spawn.parts = {corners({-0.2, 0, -0.2}, {0.2, 0.5, 0.2})};
+  spawn.links = {{-1,
+                  {LinkJoint::Kind::revolute, {0, 0.6, 0}, {0, 0, 1}, -0.4, 1.8},
+                  corners({-0.05, -0.05, -0.05}, {0.4, 0.05, 0.05}),
+                  0.9},
+                 {0,
+                  {LinkJoint::Kind::revolute, {0.45, 0, 0}, {0, 0, 1}, -2, 2},
+                  corners({0, -0.04, -0.04}, {0.35, 0.04, 0.04}),
+                  -0.9}};
+  return spawn;
+}
+
+const std::vector<Victim>& victims() {
+  static const std::vector<Victim> all{{"prism", {}, {}, 1.75, 0.3},
+                                       {"crouched", {}, {Crouch{0.7}}, 0.7, 0.3},
+                                       {"trolley", trolley(), {}, 1.1, 0.2},
+                                       {"arm", arm(), {}, 1.05, 0.2}};
+  return all;
+}
+
+class Squeezed : public ::testing::TestWithParam<Victim> {
+ protected:
+  void enter(BodyTrial& t, const Vec3& at) {
+    Spawn spawn = GetParam().spawn;
+    spawn.at = at;
+    t.order("ann", spawn);
+    for (const Order& order : GetParam().then) t.order("ann", order);
+    t.ticks(20);
+    ASSERT_EQ(t.world.state().avatars.count("ann"), 1u);
+  }
+  /// Ticks, and after each the verdict of all on all.
+  void watch(BodyTrial& t, int ticks) {
+    for (int i = 0; i < ticks; ++i) {
+      t.step();
+      ASSERT_EQ(whoPenetrates(t.world), "") << "tick " << i;
+    }
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Shapes, Squeezed, ::testing::ValuesIn(victims()),
+                         [](const auto& shape) { return std::string(shape.param.name); });
+
+TEST_P(Squeezed, AFallingBoxLeavesWhoLeansOnAWallOutside) {
+  for (const double speed : {0.0, 20.0, 400.0}) {
+    SCOPED_TRACE(speed);
+    Model model = boxModel({floorBox(),
+                            {"wall", {0.9, 0, -3}, {1.0, 2.2, 3}},
+                            {"crate", {-0.2, 5.5, -0.5}, {0.85, 6.4, 0.45}}});
+    model.bodies.push_back(bodySpec("crate", BodyKind::rigid, {2}));
+    model.bodies[0].mass = 3000;
+    BodyTrial t(std::move(model));
+    enter(t, {0, 0.001, 0});
+    t.order("ann", Drive{{1.5, 0, 0}});  // leans on the wall, and goes on leaning
+    watch(t, 20);
+    auto& stage = t.world.state().rigids;
+    auto& crate = stage.dynamics.solids[stage.solids.at({t.body("crate").id, 0})].motion;
+    ASSERT_GT(crate.centre.y(), 3) << "it is still on its way";
+    crate.velocity.y() -= speed;
+    double lowest = 6;
+    for (int i = 0; i < 90; ++i) {
+      watch(t, 1);
+      lowest = std::min(lowest, t.body("crate").position.y());
+    }
+    EXPECT_LT(lowest, 2.6) << "it came down on nothing";
+    const Body& body = t.body("crate");
+    EXPECT_GT(std::abs(body.position.x() - 0.325) + body.orientation.vec().norm(), 0.01)
+        << "it fell past everybody";
+  }
+}
+
+TEST_P(Squeezed, ADoorThatClosesOnSomeoneInItsFrameStaysOpenAsFarAsItMust) {
+  for (const double speed : {0.5, 8.0, 200.0}) {
+    SCOPED_TRACE(speed);
+    // The leaf slides along z to the post, with the victim in between.
+    Model model = boxModel({floorBox(),
+                            {"post", {-0.6, 0, 1.0}, {0.9, 3, 1.2}},
+                            {"leaf", {-0.05, 0.01, -2.6}, {0.05, 2.4, -0.6}}});
+    BodySpec door = bodySpec("door", BodyKind::sliding, {2});
+    door.axis = Vec3::UnitZ();
+    door.high = 1.6;
+    door.speed = speed;
+    model.bodies.push_back(door);
+    BodyTrial t(std::move(model));
+    enter(t, {0, 0.001, 0.2});
+    t.tell({"door", Action::to, 1.6, 0, {}});
+    watch(t, 240);
+    EXPECT_EQ(t.told(Event::blocked, "door", "ann"), 1);
+    EXPECT_NEAR(t.body("door").drive.coordinate, 1.6 - 2 * GetParam().halfWidth, 0.02);
+  }
+}
+
+TEST_P(Squeezed, ALiftThatComesDownOnSomeoneStopsAtTheirHighestPoint) {
+  for (const double speed : {0.5, 30.0, 300.0}) {
+    SCOPED_TRACE(speed);
+    Model model = boxModel({floorBox(), {"car", {-1.5, 3, -1.5}, {1.5, 3.1, 1.5}}});
+    BodySpec lift = bodySpec("lift", BodyKind::lift, {1});
+    lift.low = -2.9;
+    lift.stops = {-2.9, 0};
+    lift.speed = speed;
+    model.bodies.push_back(lift);
+    BodyTrial t(std::move(model));
+    enter(t, {0, 0.001, 0});
+    t.tell({"lift", Action::level, 0, 0, {}});
+    watch(t, speed < 1 ? 360 : 60);
+    EXPECT_EQ(t.told(Event::blocked, "lift", "ann"), 1);
+    EXPECT_NEAR(3 + t.body("lift").drive.coordinate, GetParam().height, 0.08);
+  }
+}
+
+/// The hand of an arm that stands beside a lift, over its platform.
+TEST(ArmAndLift, ALiftThatComesUpUnderAnArmMeetsNothingButItsUnderside) {
+  for (const double speed : {0.4, 3.0, 60.0}) {
+    SCOPED_TRACE(speed);
+    Model model = boxModel({{"floor", {-10, -0.2, -10}, {0.25, 0, 10}},
+                            {"ceiling", {-3, 2, -3}, {3, 2.1, 3}},
+                            {"car", {0.3, -1.2, -1}, {2.3, -1.1, 1}}});
+    BodySpec lift = bodySpec("lift", BodyKind::lift, {2});
+    lift.high = 3;
+    lift.stops = {0, 3};
+    lift.speed = speed;
+    model.bodies.push_back(lift);
+    BodyTrial t(std::move(model));
+    Spawn spawn = arm();
+    spawn.at = {0, 0.001, 0};
+    spawn.links[0].value = 0;  // straight out, over the platform
+    spawn.links[1].value = 0;
+    t.order("ann", spawn);
+    t.ticks(10);
+    t.tell({"lift", Action::level, 0, 1, {}});
+    for (int i = 0; i < (speed < 1 ? 500 : 200); ++i) {
+      t.step();
+      ASSERT_EQ(whoPenetrates(t.world), "") << "tick " << i;
+    }
+    EXPECT_GE(t.told(Event::begin, "ann", "lift"), 1);
+    EXPECT_EQ(t.told(Event::blocked, "lift", "ann"), 1) << "the ceiling holds the arm down";
+    // The platform's top lies at -1.1 + coordinate; the arm is between it and the ceiling.
+    EXPECT_LT(t.body("lift").drive.coordinate, 3.1);
+    EXPECT_GT(t.body("lift").drive.coordinate, 1.5);
+  }
+}
+
+/// An arm that rides: what sticks out beside the platform meets the next storey's edge.
+TEST(ArmAndLift, AnArmThatRidesALiftAndReachesOutIsHeldByTheEdgeOfTheNextFloor) {
+  Model model = boxModel({{"ground", {-10, -1, -10}, {10, -0.8, 10}},
+                          {"car", {-0.6, -0.1, -0.6}, {0.6, 0, 0.6}},
+                          {"storey", {0.65, 2.5, -3}, {5, 2.7, 3}}});
+  BodySpec lift = bodySpec("lift", BodyKind::lift, {1});
+  lift.high = 3;
+  lift.stops = {0, 3};
+  lift.speed = 2;
+  model.bodies.push_back(lift);
+  BodyTrial t(std::move(model));
+  Spawn spawn = arm();
+  spawn.at = {0.2, 0.001, 0};
+  spawn.links[0].value = 0;
+  spawn.links[1].value = 0;
+  t.order("ann", spawn);
+  t.ticks(20);
+  ASSERT_EQ(t.told(Event::begin, "ann", "lift"), 1);
+  t.tell({"lift", Action::level, 0, 1, {}});
+  for (int i = 0; i < 200; ++i) {
+    t.step();
+    ASSERT_EQ(whoPenetrates(t.world), "") << "tick " << i;
+  }
+  EXPECT_EQ(t.told(Event::blocked, "lift", "ann"), 1);
+  EXPECT_NEAR(t.body("lift").drive.coordinate, 2.5 - 0.65, 0.02);
+  // When it has stepped back, the lift goes on and carries it up.
+  t.order("ann", Drive{{-0.5, 0, 0}});
+  t.ticks(66);
+  t.order("ann", Drive{});
+  for (int i = 0; i < 240; ++i) {
+    t.step();
+    ASSERT_EQ(whoPenetrates(t.world), "") << "tick " << i;
+  }
+  EXPECT_EQ(t.body("lift").drive.coordinate, 3);
+  EXPECT_NEAR(t.feet("ann").y(), 3, 2e-3);
+}
+
+}  // namespace
+}  // namespace enfilade::scene

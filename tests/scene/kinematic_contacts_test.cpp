@@ -1,0 +1,633 @@
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+
+#include "collision/narrow_phase/refine.hpp"
+#include "scene/world/checkpoint/checkpoint.hpp"
+#include "scene/world/contacts/excluded_pairs.hpp"
+#include "tests/scene/body_fixture.hpp"
+#include "tests/scene/checkpoint_fixture.hpp"
+#include "tests/support/sanitized.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using namespace testing;
+using Action = BodyCommand::Action;
+using Event = ContactEvent::Kind;
+using Phase = ContactEvent::Phase;
+
+constexpr double kQuarter = 1.5707963267948966;
+
+/// A leaf in the plane z = 0 whose tip is at `tip`, and which turns about `hinge`.
+BodySpec leafSpec(const std::string& name, std::uint32_t object, double hinge) {
+  BodySpec spec = bodySpec(name, BodyKind::hinged, {object});
+  spec.anchor = {hinge, 0, 0};
+  spec.low = -kQuarter, spec.high = kQuarter, spec.speed = kQuarter;
+  return spec;
+}
+
+/// A lift of 2 x 2 m that rises past a beam, whose underside is at y = 2, from a floor that it
+/// stands on.
+Model liftUnderABeam() {
+  Model model = boxModel(
+      {floorBox(), {"car", {-1, 0, -1}, {1, 0.5, 1}}, {"beam", {0.9, 2, -1}, {3, 2.2, 1}}});
+  BodySpec spec = bodySpec("lift", BodyKind::lift, {1});
+  spec.high = 4, spec.stops = {0, 4}, spec.speed = 1;
+  model.bodies.push_back(spec);
+  return model;
+}
+
+std::vector<ContactEvent> between(const BodyTrial& t, const std::string& a, const std::string& b) {
+  std::vector<ContactEvent> told;
+  for (const ContactEvent& e : t.events)
+    if (nameOf(t.world, e.a) == a && nameOf(t.world, e.b) == b) told.push_back(e);
+  return told;
+}
+
+TEST(DrivenContacts, ALiftTellsTheBeamThatItGrazesAndNotTheFloorThatItBeganOn) {
+  BodyTrial t(liftUnderABeam());
+  t.tell({"lift", Action::level, 0, 1, {}});
+  t.untilIdle();
+  const auto up = between(t, "lift", "beam");
+  ASSERT_EQ(up.size(), 2u);
+  EXPECT_EQ(up[0].kind, Event::begin);
+  EXPECT_EQ(up[0].tick, 90u);  // 1.5 m at 1 m/s
+  EXPECT_EQ(up[1].kind, Event::end);
+  EXPECT_GE(up[1].decision.distance, 2 * t.world.lengths().epsilon);
+  EXPECT_EQ(up[1].decision.verdict, collision::Verdict::separated);
+  EXPECT_LT(up[1].decision.normal.y(), -0.9) << "the lift is above";
+  t.tell({"lift", Action::level, 0, 0, {}});
+  t.untilIdle();
+  EXPECT_EQ(between(t, "lift", "beam").size(), 4u);
+  EXPECT_EQ(t.events.size(), 4u) << "neither leaving its floor nor coming back is told";
+}
+
+TEST(DrivenContacts, AContactLastsWhileTheTwoStandAndIsToldOnce) {
+  BodyTrial t(liftUnderABeam());
+  t.tell({"lift", Action::to, 1.6, 0, {}});
+  t.untilIdle();
+  EXPECT_EQ(t.step().liveContacts, 1u);
+  t.ticks(60);
+  EXPECT_EQ(between(t, "lift", "beam").size(), 1u);
+  const auto ends = endContacts(t.world, ContactEvent::Reason::shutdown);
+  ASSERT_EQ(ends.size(), 1u);
+  EXPECT_EQ(nameOf(t.world, ends[0].b), "beam");
+}
+
+TEST(DrivenContacts, DoorsThatHitEachOtherAreToldByTheOneOfLesserId) {
+  // Their leaves are 1.1 m long, and the hinges 2 m apart: half open they meet. Drawn open.
+  Model model =
+      boxModel({{"right", {1, 0, -1.1}, {1.04, 2, 0}}, {"left", {-1.04, 0, -1.1}, {-1, 2, 0}}});
+  model.bodies = {leafSpec("right door", 0, 1.04), leafSpec("left door", 1, -1.04)};
+  BodyTrial t(std::move(model));
+  t.tell({"left door", Action::to, -kQuarter, 0, {}});
+  t.untilIdle();
+  EXPECT_TRUE(t.events.empty());
+  t.tell({"right door", Action::to, kQuarter, 0, {}});
+  t.untilIdle();
+  EXPECT_EQ(t.told(Event::begin, "right door", "left door"), 1);
+  EXPECT_EQ(t.told(Event::end, "right door", "left door"), 0);
+  t.tell({"left door", Action::to, 0, 0, {}});
+  t.untilIdle();
+  EXPECT_EQ(t.told(Event::end, "right door", "left door"), 1);
+  EXPECT_EQ(t.events.size(), 2u);
+}
+
+TEST(DrivenContacts, AThingOnAPathTellsTheShelfThatItDrivesThrough) {
+  Model model = boxModel({floorBox(),
+                          {"cart", {-4, 0, -0.5}, {-3, 1, 0.5}},
+                          {"shelf", {-0.1, 0, -2}, {0.1, 2, 2}},
+                          {"far", {-0.1, 0, 3}, {0.1, 2, 5}}});
+  BodySpec cart = bodySpec("cart", BodyKind::path, {1});
+  cart.keys = {{0, Vec3::Zero(), 0}, {4, {8, 0, 0}, 0}};
+  model.bodies = {cart};
+  Lengths lengths;
+  lengths.nearMiss = 0.2;
+  BodyTrial t(std::move(model), lengths);
+  t.untilIdle();
+  std::vector<std::pair<Event, Phase>> told;
+  for (const ContactEvent& e : between(t, "cart", "shelf")) told.emplace_back(e.kind, e.phase);
+  const std::vector<std::pair<Event, Phase>> expected{{Event::near, Phase::begin},
+                                                      {Event::begin, Phase::none},
+                                                      {Event::near, Phase::end},
+                                                      {Event::end, Phase::none}};
+  EXPECT_EQ(told, expected);
+  EXPECT_EQ(t.events.size(), 4u);
+}
+
+TEST(DrivenContacts, WhatIsPassedBetweenTwoTicksIsToldAsBegunAndEnded) {
+  // 1 m a tick, and a sheet of 1 mm; beside the way, 3 mm off, a post that is not met.
+  Model model = boxModel({{"cart", {-4.5, 0, -0.5}, {-4.4, 1, 0.5}},
+                          {"sheet", {0.2, 0, -2}, {0.201, 2, 2}},
+                          {"post", {-2, 0, 0.503}, {-1.9, 1, 0.6}}});
+  BodySpec cart = bodySpec("cart", BodyKind::sliding, {0});
+  cart.axis = Vec3::UnitX();
+  cart.high = 8, cart.speed = 60;
+  model.bodies = {cart};
+  Lengths lengths;
+  lengths.nearMiss = 0.05;
+  BodyTrial t(std::move(model), lengths);
+  t.tell({"cart", Action::open, 0, 0, {}});
+  t.untilIdle();
+  ASSERT_EQ(t.events.size(), 2u);
+  EXPECT_EQ(nameOf(t.world, t.events[0].b), "sheet");
+  EXPECT_EQ(t.events[0].kind, Event::begin);
+  EXPECT_LT(t.events[0].decision.distance, 2 * lengths.epsilon);
+  EXPECT_EQ(t.events[1].kind, Event::end);
+  EXPECT_EQ(t.events[0].tick, t.events[1].tick);
+}
+
+TEST(DrivenContacts, ALeafThatTurnsPastAPostBetweenTwoTicksTouchesIt) {
+  // 1.5 rad in one tick; the post stands half way on, out of the boxes before and after.
+  Model model = boxModel({{"leaf", {0, 0, -0.01}, {1, 2, 0}},
+                          {"post", {0.6, 0, -0.61}, {0.61, 2, -0.6}},
+                          {"low", {0.6, -1, -0.61}, {0.61, -0.002, -0.6}}});
+  BodySpec leaf = leafSpec("door", 0, 0);
+  leaf.speed = 90;
+  model.bodies = {leaf};
+  BodyTrial t(std::move(model));
+  t.tell({"door", Action::to, 1.5, 0, {}});
+  t.step();
+  ASSERT_EQ(t.events.size(), 2u);
+  EXPECT_EQ(t.told(Event::begin, "door", "post"), 1);
+  EXPECT_EQ(t.told(Event::end, "door", "post"), 1);
+  t.untilIdle();
+  EXPECT_EQ(t.events.size(), 2u);
+}
+
+TEST(DrivenContacts, APathThatTurnsBackWithinATickTouchesWhatItReaches) {
+  // Out to 0.2 m and back in each tick, turning by as much as that: at rest before and after.
+  Model model = boxModel({{"arm", {0, 0, -0.05}, {1, 0.1, 0.05}},
+                          {"post", {1.15, 0, -0.05}, {1.16, 2, 0.05}},
+                          {"far post", {1.203, 0, -0.05}, {1.21, 2, 0.05}},
+                          {"side post", {0.5, 0, 0.2}, {0.51, 2, 0.25}}});
+  BodySpec arm = bodySpec("arm", BodyKind::path, {0});
+  arm.keys = {{0, Vec3::Zero(), 0}, {1.0 / 120, {0.2, 0, 0}, 0}, {1.0 / 60, Vec3::Zero(), 0}};
+  arm.loops = true;
+  model.bodies = {arm};
+  BodyTrial t(model);
+  for (int i = 1; i <= 5; ++i) {
+    t.step();
+    EXPECT_EQ(t.told(Event::begin, "arm", "post"), i);
+    EXPECT_EQ(t.told(Event::end, "arm", "post"), i);
+    EXPECT_EQ(t.events.size(), 2u * static_cast<std::size_t>(i));
+  }
+  model.bodies[0].keys[1] = {1.0 / 120, Vec3::Zero(), -1};
+  BodyTrial turning(std::move(model));
+  turning.step();
+  EXPECT_EQ(turning.told(Event::begin, "arm", "side post"), 1);
+  EXPECT_EQ(turning.events.size(), 2u);
+}
+
+/// Two blocks of 0.1 m. In one tick one goes 1 m along x from `x` on, and the other one from
+/// `z` on as `kind` has it: a slide of 1 m along z, or a path that comes back after half a metre.
+BodyTrial crossing(double x, BodyKind kind, double z) {
+  Model model = boxModel({{"a", {x - 0.05, 0, -0.05}, {x + 0.05, 0.1, 0.05}},
+                          {"b", {-0.05, 0, z - 0.05}, {0.05, 0.1, z + 0.05}}});
+  BodySpec a = bodySpec("a", BodyKind::sliding, {0}), b = bodySpec("b", kind, {1});
+  a.axis = Vec3::UnitX(), b.axis = Vec3::UnitZ();
+  a.high = b.high = 1, a.speed = b.speed = 60;
+  if (kind == BodyKind::path) {
+    b.keys = {{0, Vec3::Zero(), 0}, {1.0 / 120, {0, 0, 0.5}, 0}, {1.0 / 60, Vec3::Zero(), 0}};
+    b.loops = true, b.speed = 1;
+  }
+  model.bodies = {a, b};
+  BodyTrial t(std::move(model));
+  t.tell({"a", Action::to, 1, 0, {}});
+  if (kind == BodyKind::sliding) t.tell({"b", Action::to, 1, 0, {}});
+  t.step();
+  return t;
+}
+
+TEST(DrivenContacts, TwoWhoseWaysCrossTouchIfTheyAreThereAtTheSameTime) {
+  for (const BodyKind kind : {BodyKind::sliding, BodyKind::path}) {
+    const BodyTrial meet = crossing(-0.5, kind, -0.5);
+    EXPECT_EQ(meet.told(Event::begin, "a", "b"), 1);
+    EXPECT_EQ(meet.told(Event::end, "a", "b"), 1);
+    EXPECT_EQ(meet.events.size(), 2u);
+    EXPECT_EQ(crossing(-0.75, kind, -0.5).events.size(), 0u) << "the second is through already";
+    EXPECT_EQ(crossing(-0.25, kind, -0.5).events.size(), 0u) << "the first is through already";
+  }
+}
+
+TEST(DrivenContacts, TwoThatGoSideBySideCostAFewLooks) {
+  // Two carts 1.3 mm apart, end to end, at 5 m/s.
+  Model model = boxModel({{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {1.0013, 0, 0}, {2, 1, 1}}});
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    BodySpec cart = bodySpec(i == 0 ? "a" : "b", BodyKind::sliding, {i});
+    cart.axis = Vec3::UnitX();
+    cart.high = 10, cart.speed = 5;
+    model.bodies.push_back(cart);
+  }
+  BodyTrial t(std::move(model));
+  for (const char* name : {"a", "b"}) t.tell({name, Action::open, 0, 0, {}});
+  for (int i = 0; i < 60; ++i) {
+    const TickReport report = t.step();
+    EXPECT_LE(report.narrowQueries, 3u) << i;
+    EXPECT_EQ(report.boundedSweeps, 0u) << i;
+  }
+  EXPECT_TRUE(t.events.empty());
+}
+
+/// The first object slides along x by `high` metres; near misses begin at 0.3 m.
+BodyTrial trayThatSlid(Model model, double high) {
+  BodySpec tray = bodySpec("tray", BodyKind::sliding, {0});
+  tray.axis = Vec3::UnitX();
+  tray.high = high;
+  model.bodies = {tray};
+  Lengths lengths;
+  lengths.nearMiss = 0.3;
+  BodyTrial t(std::move(model), lengths);
+  t.tell({"tray", Action::open, 0, 0, {}});
+  t.untilIdle();
+  return t;
+}
+
+TEST(DrivenContacts, ANearMissBeginsIsClosestAndEnds) {
+  const BodyTrial t = trayThatSlid(
+      boxModel({{"tray", {-2, 0, -0.5}, {-1, 0.1, 0.5}}, {"post", {-0.1, 0, 0.6}, {0.1, 2, 0.8}}}),
+      4);
+  const auto near = between(t, "tray", "post");
+  ASSERT_EQ(near.size(), 3u);
+  EXPECT_EQ(near[0].phase, Phase::begin);
+  EXPECT_EQ(near[1].phase, Phase::min);
+  EXPECT_EQ(near[2].phase, Phase::end);
+  EXPECT_NEAR(near[1].decision.distance, 0.1, 1e-7);
+  for (const ContactEvent& event : near) {
+    EXPECT_NE(event.decision.featureA, collision::Feature::none);
+    EXPECT_NE(event.decision.featureB, collision::Feature::none);
+  }
+  EXPECT_LT(near[0].tick, near[1].tick);
+  EXPECT_GE(near[2].decision.distance, 0.3);
+}
+
+TEST(DrivenContacts, ANearMissThatLivesWhenTheWorldEndsIsToldAsOver) {
+  BodyTrial t = trayThatSlid(
+      boxModel({{"tray", {0, 0, 0}, {1, 0.1, 1}}, {"post", {1.5, 0, 0}, {1.6, 2, 1}}}), 0.4);
+  ASSERT_EQ(t.events.size(), 1u);
+  const auto ends = endContacts(t.world, ContactEvent::Reason::shutdown);
+  ASSERT_EQ(ends.size(), 2u);
+  EXPECT_EQ(ends[0].phase, Phase::min);
+  EXPECT_EQ(ends[1].phase, Phase::end);
+  EXPECT_EQ(ends[1].reason, ContactEvent::Reason::shutdown);
+}
+
+TEST(DrivenContacts, WhatABodyIsMountedOnIsListedAndFollowsFromTheScene) {
+  Model model = liftUnderABeam();
+  model.meshes.push_back(boxMesh({1, 0, -1}, {1.2, 2.5, 1}));  // beside the car: touches it
+  model.objects.push_back({"gate", "", {3}, Eigen::Affine3d::Identity()});
+  BodySpec gate = bodySpec("gate", BodyKind::sliding, {3});
+  gate.high = 1;
+  model.bodies.push_back(gate);
+  const Scene scene(std::move(model));
+  const double contact = 2 * Lengths{}.epsilon;
+  EXPECT_EQ(mountingOf(scene, 0, contact), (std::vector<EntityId>{1, 4}));
+  EXPECT_EQ(mountingOf(scene, 1, contact), (std::vector<EntityId>{1, 2, 3}));
+  EXPECT_TRUE(isMountedOn(scene, 0, 4, contact));
+  EXPECT_FALSE(isMountedOn(scene, 0, 3, contact));
+}
+
+TEST(DrivenContacts, BodiesThatStandAreNotLookedAt) {
+  Model model = boxModel({floorBox(), {"wall", {-9, 0, 0.5}, {9, 3, 0.6}}});
+  for (int i = 0; i < 16; ++i) {
+    const double x = -8 + i;
+    model.meshes.push_back(boxMesh({x, 0.01, 0.55}, {x + 0.9, 2, 0.58}));
+    model.objects.push_back({"leaf" + std::to_string(i),
+                             "",
+                             {static_cast<std::uint32_t>(i + 2)},
+                             Eigen::Affine3d::Identity()});
+    BodySpec leaf = leafSpec("door" + std::to_string(i), static_cast<std::uint32_t>(i + 2), x);
+    leaf.anchor.z() = 0.55;
+    model.bodies.push_back(leaf);
+  }
+  Lengths lengths;
+  lengths.nearMiss = 0.5;
+  BodyTrial t(std::move(model), lengths);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(t.step().narrowQueries, 0u);
+  EXPECT_TRUE(t.world.state().mounted.empty());
+  t.tell({"door3", Action::open, 0, 0, {}});
+  const std::uint32_t ofOne = t.step().narrowQueries;
+  EXPECT_GT(ofOne, 0u);
+  EXPECT_LE(ofOne, 12u) << "the floor and its neighbours; the wall is what it is mounted on";
+}
+
+TEST(DrivenContacts, ALeafThatGlidesAlongItsFrameIsLookedAtAFewTimes) {
+  // 2 mm from jamb, head and floor; its edge goes 26 mm a tick.
+  Model model = boxModel({floorBox(),
+                          {"leaf", {0, 0.002, 0}, {1, 2, 0.04}},
+                          {"jamb", {-0.1, 0, 0}, {-0.002, 2.2, 0.04}},
+                          {"head", {-0.1, 2.002, -2}, {1.2, 2.2, 2}}});
+  BodySpec leaf = leafSpec("door", 1, 0);
+  model.bodies = {leaf};
+  BodyTrial t(std::move(model));
+  t.tell({"door", Action::to, kQuarter, 0, {}});
+  int looks = 0;
+  for (int i = 0; i < 55; ++i) looks += static_cast<int>(t.step().narrowQueries);
+  EXPECT_TRUE(t.events.empty());
+  EXPECT_GE(looks, 2 * 55);
+  EXPECT_LT(looks, 4 * 55);
+}
+
+// ---- the slow twin ------------------------------------------------------------------------------
+
+class Chance {
+ public:
+  explicit Chance(unsigned seed) : random_(seed) {}
+  double in(double low, double high) {
+    return low + (high - low) * (static_cast<double>(random_()) / 4294967296.0);
+  }
+  std::uint32_t below(std::uint32_t count) { return static_cast<std::uint32_t>(random_() % count); }
+
+ private:
+  std::mt19937 random_;
+};
+
+Mesh shards(Chance& chance, const Vec3& at, int count) {
+  Mesh mesh;
+  for (int i = 0; i < 3 * count; ++i) {
+    mesh.positions.emplace_back(
+        (at + Vec3(chance.in(-0.7, 0.7), chance.in(-0.7, 0.7), chance.in(-0.7, 0.7)))
+            .cast<float>());
+    mesh.indices.push_back(static_cast<std::uint32_t>(i));
+  }
+  return mesh;
+}
+
+/// Boxes and heaps of triangles, of which every other one is driven.
+Model busyYard(Chance& chance) {
+  Model model = boxModel({{"floor", {-5, -0.2, -5}, {5, 0, 5}}});
+  for (std::uint32_t i = 1; i <= 14; ++i) {
+    const Vec3 at(chance.in(-2.5, 2.5), chance.in(0.8, 1.8), chance.in(-2.5, 2.5));
+    const Vec3 half(chance.in(0.05, 0.6), chance.in(0.05, 0.6), chance.in(0.05, 0.6));
+    model.meshes.push_back(i % 4 < 2 ? boxMesh(at - half, at + half) : shards(chance, at, 12));
+    model.objects.push_back({"thing" + std::to_string(i), "", {i}, Eigen::Affine3d::Identity()});
+    if (i % 2 == 0) continue;
+    const std::array kinds{BodyKind::hinged, BodyKind::sliding, BodyKind::lift, BodyKind::path};
+    BodySpec spec = bodySpec("body" + std::to_string(i), kinds[i / 2 % 4], {i});
+    spec.anchor = at + Vec3(chance.in(-0.5, 0.5), 0, 0);
+    if (spec.kind == BodyKind::sliding) spec.axis = Vec3::UnitX();
+    spec.low = -1.5, spec.high = 2.5, spec.stops = {-1.5, 0, 2.5};
+    spec.speed = i % 4 == 1 ? chance.in(0.3, 3) : chance.in(10, 60);
+    if (spec.kind == BodyKind::path) {
+      spec.keys = {{0, Vec3::Zero(), 0}, {2, {chance.in(-3, 3), -0.3, 1}, 2}, {5, Vec3::Zero(), 0}};
+      if (chance.below(2) == 0)  // turns back within a tick, at times of its own
+        spec.keys = {{0, Vec3::Zero(), 0},
+                     {0.006, {chance.in(-1.5, 1.5), chance.in(-0.5, 0.5), 0.3}, 1},
+                     {chance.in(0.012, 0.03), Vec3::Zero(), 0}};
+      spec.loops = true, spec.speed = 1;
+    }
+    model.bodies.push_back(spec);
+  }
+  return model;
+}
+
+ToldOnce someCommand(Chance& chance, const Model& model) {
+  ToldOnce told;
+  const BodySpec& spec =
+      model.bodies[chance.below(static_cast<std::uint32_t>(model.bodies.size()))];
+  if (spec.kind != BodyKind::path)
+    told.bodies.push_back({spec.name, Action::to, chance.in(-1.5, 2.5), 0, {}});
+  else
+    told.bodies.push_back({spec.name, chance.below(3) == 0 ? Action::stop : Action::run, 0, 0, {}});
+  return told;
+}
+
+BodyPlace between(const BodyPlace& a, const BodyPlace& b, double s) {
+  return {a.offset + s * (b.offset - a.offset), a.turn + s * (b.turn - a.turn)};
+}
+
+/// Where a path that loops is, by its keys one after another.
+BodyPlace onPath(const BodySpec& spec, double time) {
+  while (time < 0) time += spec.keys.back().time;
+  while (time >= spec.keys.back().time) time -= spec.keys.back().time;
+  std::size_t i = 1;
+  while (spec.keys[i].time < time) ++i;
+  const PathKey &a = spec.keys[i - 1], &b = spec.keys[i];
+  return between({a.offset, a.turn}, {b.offset, b.turn}, (time - a.time) / (b.time - a.time));
+}
+
+/// Where a body that nobody blocked was at `part` of the tick. A path is followed in four
+/// stretches.
+BodyPlace placeAt(const Body& body, double part, double tick) {
+  const BodyPlace now = body.drive.place;
+  if (part == 1 || !body.moved) return now;
+  if (body.spec->kind != BodyKind::path) {
+    const double back = (part - 1) * tick;
+    return {now.offset + back * body.velocity, now.turn + back * body.spin.dot(body.spec->axis)};
+  }
+  const auto station = [&](double quarter) {
+    return onPath(*body.spec, body.drive.coordinate - (1 - quarter / 4) * tick * body.drive.speed);
+  };
+  const double quarter = std::floor(4 * part);
+  return between(station(quarter), station(quarter + 1), 4 * part - quarter);
+}
+
+/// All pairs of which one is driven, part by part by the exact verdict at every tick.
+struct SlowTwin {
+  struct Pair {
+    bool touching = false, near = false;
+    double distance = 0;
+  };
+  using Key = std::pair<EntityId, EntityId>;
+
+  explicit SlowTwin(const World& w) : world(w) {
+    for (const Key& key : pairs()) mounted[key] = stateOf(key).touching;
+  }
+
+  /// Where they are at `part` of the tick; `turned` keeps what they point at.
+  std::vector<collision::ConvexBody> partsAt(EntityId id, double part,
+                                             collision::Mat3& turned) const {
+    const WorldState& state = world.state();
+    std::vector<collision::ConvexBody> parts;
+    if (const auto body = state.bodyOfId.find(id); body != state.bodyOfId.end()) {
+      const Body& b = state.bodies[body->second];
+      const BodyPlace place = placeAt(b, part, world.lengths().tick);
+      turned = Eigen::AngleAxisd(place.turn, b.spec->axis);
+      for (std::uint32_t i = 0; i < b.shape->parts.size(); ++i) {
+        parts.push_back(partOf(b, i));
+        if (part == 1) continue;
+        parts.back().translation = b.spec->anchor + place.offset;
+        parts.back().rotation = &turned;
+      }
+    } else {
+      const ObjectParts& still = state.scene->parts(id - 1);
+      for (std::uint32_t i = 0; i < still.size(); ++i) parts.push_back(still.body(i));
+    }
+    return parts;
+  }
+  std::vector<Key> pairs() const {
+    std::vector<Key> all;
+    const WorldState& state = world.state();
+    for (const Body& a : state.bodies) {
+      for (const std::uint32_t still : state.scene->solidObjects())
+        all.emplace_back(a.id, still + 1);
+      for (const Body& b : state.bodies)
+        if (a.id < b.id) all.emplace_back(a.id, b.id);
+    }
+    return all;
+  }
+  Pair stateOf(const Key& key, double part = 1) const {
+    const double contact = 2 * world.lengths().epsilon;
+    Pair state;
+    state.distance = std::numeric_limits<double>::infinity();
+    collision::Mat3 turnedA, turnedB;
+    for (const auto& a : partsAt(key.first, part, turnedA)) {
+      for (const auto& b : partsAt(key.second, part, turnedB)) {
+        collision::FeatureCache cache;
+        const collision::Decision decision = collision::decide(a, b, cache);
+        state.distance = std::min(state.distance, decision.distance);
+        state.touching = state.touching || collision::isNearerThan(a, b, contact, cache);
+      }
+    }
+    state.near = !state.touching && state.distance < world.lengths().nearMiss;
+    return state;
+  }
+  /// Metres: no point of it went farther, and in each part of the tick that part at most.
+  double wayOf(EntityId id) const {
+    const auto at = world.state().bodyOfId.find(id);
+    if (at == world.state().bodyOfId.end()) return 0;
+    const Body& body = world.state().bodies[at->second];
+    if (!body.moved) return 0;
+    double fastest = 0;
+    for (int i = 0; i < 4; ++i) {
+      const BodyPlace a = placeAt(body, i / 4.0, world.lengths().tick),
+                      b = placeAt(body, (i + 1) / 4.0, world.lengths().tick);
+      fastest = std::max(
+          fastest, (a.offset - b.offset).norm() + std::abs(a.turn - b.turn) * body.shape->radius);
+    }
+    return 4 * fastest;
+  }
+  /// How near they came in the tick after which they are `apart`, as samples tell.
+  double nearestOnTheWay(const Key& key, double apart) const {
+    const double contact = 2 * world.lengths().epsilon;
+    if (apart > contact + wayOf(key.first) + wayOf(key.second)) return apart;
+    for (int i = 0; i < kSamples; ++i)
+      apart = std::min(apart, stateOf(key, static_cast<double>(i) / kSamples).distance);
+    return apart;
+  }
+  /// Takes the events of a contact on the way only, which must be there if somebody came so near,
+  /// and may if somebody could have.
+  template <class Told>
+  bool metOnTheWay(const Key& key, double apart, Told& told) {
+    const auto begin = told.find({key.first, key.second, Event::begin, Phase::none});
+    const auto end = told.find({key.first, key.second, Event::end, Phase::none});
+    const bool met = begin != told.end() && end != told.end();
+    const double nearest = nearestOnTheWay(key, apart);
+    const double contact = 2 * world.lengths().epsilon;
+    if (!met) {
+      EXPECT_GE(nearest, 0.75 * contact)
+          << nameOf(world, key.first) << ", " << nameOf(world, key.second);
+      return false;
+    }
+    EXPECT_LT(nearest, contact + (wayOf(key.first) + wayOf(key.second)) / kSamples);
+    told.erase(begin), told.erase(end);
+    ++onTheWay;
+    return true;
+  }
+  bool moved(EntityId id) const {
+    const auto body = world.state().bodyOfId.find(id);
+    return body != world.state().bodyOfId.end() && world.state().bodies[body->second].moved;
+  }
+
+  /// Compares what a tick told with what is so now.
+  void follow(const TickReport& report) {
+    std::map<std::tuple<EntityId, EntityId, Event, Phase>, double> told;
+    for (const ContactEvent& e : report.contacts)
+      EXPECT_TRUE(told.try_emplace({e.a, e.b, e.kind, e.phase}, e.decision.distance).second);
+    std::uint32_t live = 0;
+    for (const Key& key : pairs()) {
+      Pair& last = now[key];
+      if (mounted[key]) continue;
+      if (moved(key.first) || moved(key.second)) {
+        Pair before = last;
+        last = stateOf(key);
+        if (!before.touching && !last.touching && metOnTheWay(key, last.distance, told)) {
+          if (before.near) {
+            EXPECT_EQ(told.erase({key.first, key.second, Event::near, Phase::end}), 1u);
+          }
+          parting[key] = true, before.near = false;
+        }
+        const auto take = [&](Event kind, Phase phase, bool expected) {
+          const auto at = told.find({key.first, key.second, kind, phase});
+          EXPECT_EQ(at != told.end(), expected)
+              << nameOf(world, key.first) << ", " << nameOf(world, key.second) << ", tick "
+              << report.snapshot->tick << ": " << static_cast<int>(kind);
+          if (at == told.end()) return;
+          if (phase != Phase::min) {
+            EXPECT_NEAR(at->second, last.distance, 1e-12);
+          }
+          told.erase(at);
+        };
+        const bool wasAway = !before.touching && !before.near;
+        // Who parts from a contact is near no more, until it was away.
+        last.near = last.near && !before.touching && (wasAway ? !parting[key] : true);
+        parting[key] = !last.touching && (before.touching || parting[key]) &&
+                       last.distance < world.lengths().nearMiss;
+        take(Event::begin, Phase::none, last.touching && !before.touching);
+        take(Event::end, Phase::none, !last.touching && before.touching);
+        take(Event::near, Phase::begin, last.near && wasAway);
+        take(Event::near, Phase::min, before.near && !last.near && !last.touching);
+        take(Event::near, Phase::end, before.near && !last.near);
+        begun += last.touching && !before.touching ? 1 : 0;
+        begunNear += last.near && wasAway ? 1 : 0;
+      }
+      live += last.touching ? 1 : 0;
+    }
+    EXPECT_TRUE(told.empty()) << "told of nothing that is so: " << told.size();
+    EXPECT_EQ(report.liveContacts, live);
+  }
+
+  const World& world;
+  std::map<Key, bool> mounted, parting;
+  std::map<Key, Pair> now;
+  int begun = 0, begunNear = 0, onTheWay = 0;
+  static constexpr int kSamples = 24;
+};
+
+TEST(DrivenContacts, AreThoseThatBruteForceFindsInBusyYards) {
+  int begun = 0, begunNear = 0, onTheWay = 0, mounted = 0;
+  constexpr int kYards = tests::kSanitized ? 3 : 12;
+  for (unsigned seed = 1; seed <= kYards; ++seed) {
+    Chance chance(seed);
+    Lengths lengths;
+    lengths.nearMiss = seed % 2 == 0 ? 0.15 : 0;
+    World world(std::make_shared<const Scene>(busyYard(chance)), lengths);
+    SlowTwin twin(world);
+    for (int i = 0; i < 200 && !::testing::Test::HasFailure(); ++i) {
+      if (i % 3 == 0) give(world, someCommand(chance, world.scene().model()));
+      twin.follow(tick(world));
+    }
+    begun += twin.begun, begunNear += twin.begunNear, onTheWay += twin.onTheWay;
+    for (const auto& [key, is] : twin.mounted) mounted += is ? 1 : 0;
+    for (const auto& [key, is] : world.state().mounted) EXPECT_EQ(twin.mounted.at(key), is);
+  }
+  EXPECT_GT(begun, 5 * kYards);
+  EXPECT_GT(begunNear, 2 * kYards);
+  EXPECT_GT(onTheWay, kYards);
+  EXPECT_GT(mounted, kYards);
+}
+
+TEST(DrivenContacts, ARestoredWorldGoesOnAlike) {
+  Chance chance(22);
+  Lengths lengths;
+  lengths.nearMiss = 0.15;
+  const auto scene = std::make_shared<const Scene>(busyYard(chance));
+  World world(scene, lengths);
+  std::optional<World> copy;
+  std::size_t told = 0;
+  for (int i = 0; i < 240; ++i) {
+    if (i % 30 == 0) copy.emplace(worldFrom(scene, checkpointOf(world)));
+    const ToldOnce commands = i % 3 == 0 ? someCommand(chance, scene->model()) : ToldOnce{};
+    give(world, commands), give(*copy, commands);
+    const TickReport one = tick(world), other = tick(*copy);
+    ASSERT_TRUE(sameLists(one.contacts, other.contacts)) << "tick " << i;
+    ASSERT_EQ(one.snapshot->stateHash, other.snapshot->stateHash) << "tick " << i;
+    told += one.contacts.size();
+  }
+  EXPECT_GT(told, 20u);
+}
+
+}  // namespace
+}  // namespace enfilade::scene

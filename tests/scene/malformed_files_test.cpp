@@ -1,0 +1,338 @@
+// Files as modellers and enemies make them: each loads as what it shows, or fails with an error
+// that names the file, the stage and what to do.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
+
+#include "scene/import/import_model.hpp"
+#include "scene/world/data/scene.hpp"
+#include "tests/scene/hand_made_files.hpp"
+#include "tests/scene/hand_made_ifc.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+namespace fs = std::filesystem;
+using tests::BoxMesh;
+using tests::TemporaryFolder;
+
+constexpr char kOneNode[] = R"({"mesh":0,"name":"box"})";
+
+std::string replaced(std::string text, const std::string& what, const std::string& with) {
+  const std::size_t at = text.find(what);
+  EXPECT_NE(at, std::string::npos) << what << " is not in the file to spoil";
+  return at == std::string::npos ? text : text.replace(at, what.size(), with);
+}
+
+std::string boxGltf() {
+  return tests::gltf(BoxMesh({1, 2, 3}), "0", kOneNode);
+}
+
+std::size_t countOf(const Model& model, const std::string& kind) {
+  for (const Problem& problem : model.problems)
+    if (problem.kind == kind) return problem.count;
+  return 0;
+}
+
+void expectSize(const Model& model, const Vec3& size, double tolerance = 1e-6) {
+  const Scene scene{Model(model)};
+  EXPECT_LT((scene.bounds().size() - size).norm(), tolerance) << scene.bounds().size().transpose();
+}
+
+std::string failureOf(const fs::path& file) {
+  try {
+    importModel(file);
+  } catch (const ImportError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// ---- files that fail ----------------------------------------------------------------------------
+
+struct Spoilt {
+  const char* name;
+  const char* file;
+  std::string content;
+  std::vector<const char*> words;  ///< all in the error, beside the file's name
+};
+
+void PrintTo(const Spoilt& spoilt, std::ostream* to) {
+  *to << spoilt.name;
+}
+
+std::vector<Spoilt> spoiltFiles() {
+  const std::string box = boxGltf();
+  const std::string glb = tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode);
+  std::string deep = R"({"name":"0","children":[1]})";
+  for (int i = 1; i < 3000; ++i) deep += R"(,{"children":[)" + std::to_string(i + 1) + "]}";
+  deep += R"(,{"mesh":0})";
+  return {
+      {"BufferViewBeyondItsBuffer",
+       "a.gltf",
+       replaced(box, R"("byteOffset":0,"byteLength":96)", R"("byteOffset":0,"byteLength":96000)"),
+       {"view"}},
+      {"BufferViewThatIsNotThere",
+       "a.gltf",
+       replaced(box, R"("bufferView":0)", R"("bufferView":17)"),
+       {"bufferView"}},
+      {"HugeCount", "a.gltf", replaced(box, R"("count":8)", R"("count":4000000000)"), {}},
+      {"NegativeCount", "a.gltf", replaced(box, R"("count":8)", R"("count":-8)"), {}},
+      {"MissingBuffer",
+       "a.gltf",
+       replaced(box, R"("uri":"data)", R"("uri":"nowhere.bin","x":"data)"),
+       {"nowhere.bin"}},
+      {"NoTriangles",
+       "a.gltf",
+       replaced(box, R"("material":0})", R"("material":0,"mode":1})"),
+       {"triangle"}},
+      {"UnsupportedExtension",
+       "a.gltf",
+       replaced(box, R"({"asset")",
+                R"({"extensionsRequired":["EXT_meshopt_compression"],)"
+                R"("extensionsUsed":["EXT_meshopt_compression"],"asset")"),
+       {"EXT_meshopt_compression"}},
+      {"NodesInACircle",
+       "a.gltf",
+       tests::gltf(BoxMesh({1, 1, 1}), "0",
+                   R"({"children":[1],"mesh":0},{"children":[0],"mesh":0})"),
+       {}},
+      {"NodeThatIsItsOwnChild",
+       "a.gltf",
+       tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"children":[0],"mesh":0})"),
+       {}},
+      {"ChildThatIsNotThere",
+       "a.gltf",
+       tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"children":[5],"mesh":0})"),
+       {}},
+      {"MeshThatIsNotThere", "a.gltf", tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"mesh":3})"), {}},
+      {"TooDeep",
+       "a.gltf",
+       tests::gltf(BoxMesh({1, 1, 1}), "0", deep),
+       {"2000 levels", "(convert)"}},
+      {"GlbCalledGltf", "a.gltf", glb, {"rename it to .glb"}},
+      {"GltfCalledGlb", "a.glb", box, {"rename", ".gltf"}},
+      {"NoJsonAtAll", "a.gltf", std::string(4000, '['), {}},
+      {"BinaryCalledText", "a.obj", glb, {}},
+      {"LengthOfAGlbThatLies",
+       "a.glb",
+       replaced(glb, std::string("glTF\2\0\0\0", 8),
+                std::string("glTF\2\0\0\0\xff\xff\xff\x7f", 12)),
+       {}},
+      {"PointsOnly", "a.obj", "v 0 0 0\nv 1 0 0\np 1 2\n", {"triangle"}},
+      {"FacesOfNothing", "a.obj", "o a\nf 1 2 3\n", {}},
+      {"NegativeIndexTooFar", "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -9 -2 -1\n", {}},
+      {"HtmlInsteadOfAModel", "a.dae", "<html><body>404 not found</body></html>", {}},
+      {"IfcWithoutData", "a.ifc", "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\n", {}},
+      {"EmptyZip", "a.ifczip", std::string("PK\5\6", 4) + std::string(18, '\0'), {".ifc"}},
+      {"BinaryFbxCutOff", "a.fbx", std::string("Kaydara FBX Binary  \0\x1a\0\xe8\x1c\0\0", 27), {}},
+  };
+}
+
+class SpoiltFile : public ::testing::TestWithParam<Spoilt> {};
+
+TEST_P(SpoiltFile, FailsWithItsNameTheStageAndARemedy) {
+  const TemporaryFolder folder;
+  const fs::path file = folder.write(GetParam().file, GetParam().content);
+  const std::string error = failureOf(file);
+  EXPECT_TRUE(error.starts_with(file.string())) << error;
+  for (const char* word : GetParam().words)
+    EXPECT_NE(error.find(word), std::string::npos) << word << " is not in: " << error;
+  bool remedy = false;
+  for (const char* word : {"export", "check", "copy", "rename", "zip the"})
+    remedy = remedy || error.find(word) != std::string::npos;
+  EXPECT_TRUE(remedy) << error;
+  EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+  EXPECT_LT(error.size(), 600u) << error;
+}
+
+INSTANTIATE_TEST_SUITE_P(Table, SpoiltFile, ::testing::ValuesIn(spoiltFiles()),
+                         [](const auto& row) { return std::string(row.param.name); });
+
+// ---- files that load ----------------------------------------------------------------------------
+
+TEST(OddFiles, AnObjWithCrlfNegativeIndicesPolygonsAndNoMaterialsLoads) {
+  const TemporaryFolder folder;
+  const auto file = folder.write(
+      "house plan.obj",
+      "\xEF\xBB\xBF# made by hand\r\nmtllib gone.mtl\r\no Haus\r\nusemtl brick\r\n"
+      "v 0 0 0\r\nv 4 0 0\r\nv 4 0 5\r\nv 0 0 5\r\nv 2 3 2.5\r\nvt 0 0\r\nvn 0 1 0\r\n"
+      "f -5/1/1 -4/1/1 -3/1/1 -2/1/1\r\nf 1//1 2//1 5//1\r\nf 2 3 5\r\nf 3 4 5\r\nf 4 1 5\r\n");
+  const Model model = importModel(file);
+  ASSERT_EQ(model.objects.size(), 1u);
+  EXPECT_EQ(model.objects[0].path, "Haus");
+  std::size_t triangles = 0;
+  for (const std::uint32_t mesh : model.objects[0].meshes)
+    triangles += model.meshes[mesh].indices.size() / 3;
+  EXPECT_EQ(triangles, 6u);
+  expectSize(model, {4, 3, 5});
+  EXPECT_GT(countOf(model, "missing_material_file"), 0u);
+}
+
+TEST(OddFiles, APathWithSpacesUmlautsAndAQuoteIsAPathAsAnyOther) {
+  const TemporaryFolder folder;
+  const std::string inner = "Häuser & 'Räume' 世界 #1";
+  fs::create_directories(folder.path() / inner);
+  const BoxMesh mesh({1, 2, 3});
+  const std::string text = tests::gltfJson(mesh, "0", R"({"mesh":0,"name":"Tür"})", R"("name":"p")",
+                                           R"(,"uri":"daten%20und%20mehr.bin")");
+  folder.write(inner + "/daten und mehr.bin", mesh.bytes());
+  const auto file = folder.write(inner + "/Stück 1.gltf", text);
+  const Model model = importModel(file);
+  EXPECT_EQ(model.objects.at(0).path, "Tür");
+  EXPECT_EQ(model.source, file.string());
+  expectSize(model, {1, 2, 3});
+  const auto ifc = folder.write(inner + "/Plan.ifc", tests::IfcHouse().text());
+  EXPECT_EQ(importModel(ifc).objects.size(), 2u);
+  EXPECT_NE(failureOf(folder.write(inner + "/leer.glb", "")).find(inner), std::string::npos);
+}
+
+TEST(OddFiles, ASymbolicLinkIsWhatItPointsTo) {
+  const TemporaryFolder folder;
+  folder.write("box.glb", tests::glb(BoxMesh({1, 2, 3}), "0", kOneNode));
+  fs::create_symlink("box.glb", folder.path() / "link.glb");
+  fs::create_symlink("nothing.glb", folder.path() / "dangling.glb");
+  fs::create_symlink("circle.glb", folder.path() / "circle.glb");
+  fs::create_symlink(".", folder.path() / "folder.glb");
+  expectSize(importModel(folder.path() / "link.glb"), {1, 2, 3});
+  EXPECT_NE(failureOf(folder.path() / "dangling.glb").find("no such file"), std::string::npos);
+  EXPECT_NE(failureOf(folder.path() / "circle.glb").find("circle.glb: "), std::string::npos);
+  EXPECT_NE(failureOf(folder.path() / "folder.glb").find("is a folder"), std::string::npos);
+}
+
+TEST(OddFiles, WhatMayNotBeReadIsToldAsThat) {
+  const TemporaryFolder folder;
+  const auto locked = folder.write("locked.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
+  fs::permissions(locked, fs::perms::none);
+  fs::create_directories(folder.path() / "closed");
+  const auto below = folder.write("closed/box.glb", "x");
+  fs::permissions(below.parent_path(), fs::perms::none);
+  const auto pipe = folder.path() / "pipe.glb";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_NE(failureOf(pipe).find("pipe.glb: is not a regular file"), std::string::npos);
+  // Root may read all: as somebody else, in a process of its own.
+  const auto asNobody = [&] {
+    if (geteuid() == 0 && (setgid(65534) != 0 || setuid(65534) != 0)) _exit(9);
+    for (const fs::path& file : {locked, below}) {
+      const std::string error = failureOf(file);
+      std::fprintf(stderr, "%s\n", error.c_str());
+      if (!error.starts_with(file.string() + ": cannot be read: Permission denied")) _exit(1);
+    }
+    _exit(0);
+  };
+  EXPECT_EXIT(asNobody(), ::testing::ExitedWithCode(0), "Permission denied");
+  fs::permissions(below.parent_path(), fs::perms::owner_all);
+}
+
+TEST(OddFiles, AnExtensionInCapitalsIsOne) {
+  const TemporaryFolder folder;
+  const std::string glb = tests::glb(BoxMesh({1, 2, 3}), "0", kOneNode);
+  expectSize(importModel(folder.write("BOX.GLB", glb)), {1, 2, 3});
+  expectSize(importModel(folder.write("box.GlTf", boxGltf())), {1, 2, 3});
+}
+
+TEST(OddFiles, FifteenHundredNodesUnderOneAnotherAreOneObject) {
+  const TemporaryFolder folder;
+  std::string nodes = R"({"name":"n","children":[1]})";
+  for (int i = 1; i < 1500; ++i)
+    nodes += R"(,{"translation":[0,0.001,0],"children":[)" + std::to_string(i + 1) + "]}";
+  nodes += R"(,{"mesh":0})";
+  const Model model =
+      importModel(folder.write("deep.gltf", tests::gltf(BoxMesh({1, 1, 1}), "0", nodes)));
+  ASSERT_EQ(model.objects.size(), 1u);
+  EXPECT_NEAR(model.objects[0].worldFromMesh.translation().y(), 1.499, 1e-6);
+}
+
+TEST(OddFiles, ANodeWithoutSizeOrWithNumbersThatAreNoneLeavesTheOthers) {
+  const TemporaryFolder folder;
+  const Model flat = importModel(folder.write(
+      "flat.gltf", tests::gltf(BoxMesh({1, 2, 3}), "0,1",
+                               R"({"mesh":0},{"mesh":0,"name":"nothing","scale":[0,0,0]})")));
+  expectSize(flat, {1, 2, 3});
+  const std::string text =
+      tests::gltf(BoxMesh({1, 2, 3}), "0,1",
+                  R"({"mesh":0},{"mesh":0,"name":"wild","translation":[1e300,0,0]})");
+  const Model wild = importModel(folder.write("wild.gltf", text));
+  EXPECT_EQ(wild.objects.size(), 1u);
+  expectSize(wild, {1, 2, 3});
+}
+
+TEST(OddFiles, IndicesOfVerticesThatAreNotThereLeaveTheirTrianglesOut) {
+  const TemporaryFolder folder;
+  BoxMesh mesh({1, 2, 3});
+  mesh.indices.insert(mesh.indices.end(), {0, 1, 60000, 7, 65535, 2});
+  const Model model = importModel(folder.write("a.gltf", tests::gltf(mesh, "0", kOneNode)));
+  expectSize(model, {1, 2, 3});
+  EXPECT_EQ(model.meshes.at(0).indices.size(), 36u);
+  std::size_t told = 0;
+  for (const Problem& problem : model.problems) told += problem.count;
+  EXPECT_GE(told, 1u) << "it is left out in silence";
+}
+
+TEST(OddFiles, RequiredExtensionsOfLooksAloneAreNoHindrance) {
+  const TemporaryFolder folder;
+  const auto requiring = [&](const std::string& extension) {
+    return folder.write("a.gltf",
+                        replaced(boxGltf(), R"({"asset")",
+                                 R"({"extensionsRequired":[")" + extension + R"("],"asset")"));
+  };
+  expectSize(importModel(requiring("KHR_materials_unlit")), {1, 2, 3});
+  EXPECT_NE(failureOf(requiring("KHR_draco_mesh_compression")).find("uncompressed"),
+            std::string::npos);
+}
+
+TEST(OddFiles, IfcInFeetFarFromTheOriginIsInMetresAndNearIt) {
+  const TemporaryFolder folder;
+  tests::IfcHouse house;
+  house.unit = "IFCCONVERSIONBASEDUNIT(#33,.LENGTHUNIT.,'FOOT',#32)";
+  house.unitsPerMetre = 1 / 0.3048;
+  house.more =
+      "#32=IFCMEASUREWITHUNIT(IFCRATIOMEASURE(0.3048),#34);\n"
+      "#33=IFCDIMENSIONALEXPONENTS(1,0,0,0,0,0,0);\n#34=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
+  house.offset = "1506310.,17809418.,369.";
+  const Model model = importModel(folder.write("feet.ifc", house.text()));
+  EXPECT_NEAR(model.metresPerUnit, 0.3048, 1e-9);
+  EXPECT_NEAR(model.offset.x(), 1506310 * 0.3048, 10);
+  EXPECT_NEAR(model.offset.z(), -17809418 * 0.3048, 10);
+  expectSize(model, {4, 3, 0.3}, 1e-4);
+}
+
+TEST(OddFiles, AnFbxInCentimetresIsInMetres) {
+  const TemporaryFolder folder;
+  const auto text = [](const char* factor) {
+    return std::string(
+               "; FBX 7.4.0 project file\nFBXHeaderExtension:  {\n\tFBXVersion: 7400\n}\n"
+               "GlobalSettings:  {\n\tVersion: 1000\n\tProperties70:  {\n"
+               "\t\tP: \"UpAxis\", \"int\", \"Integer\", \"\",2\n"
+               "\t\tP: \"UpAxisSign\", \"int\", \"Integer\", \"\",1\n"
+               "\t\tP: \"FrontAxis\", \"int\", \"Integer\", \"\",1\n"
+               "\t\tP: \"FrontAxisSign\", \"int\", \"Integer\", \"\",-1\n"
+               "\t\tP: \"CoordAxis\", \"int\", \"Integer\", \"\",0\n"
+               "\t\tP: \"CoordAxisSign\", \"int\", \"Integer\", \"\",1\n"
+               "\t\tP: \"UnitScaleFactor\", \"double\", \"Number\", \"\",") +
+           factor +
+           "\n\t}\n}\nDefinitions:  {\n\tVersion: 100\n\tCount: 2\n"
+           "\tObjectType: \"Geometry\" {\n\t\tCount: 1\n\t}\n"
+           "\tObjectType: \"Model\" {\n\t\tCount: 1\n\t}\n}\n"
+           "Objects:  {\n\tGeometry: 1001, \"Geometry::tip\", \"Mesh\" {\n"
+           "\t\tVertices: *12 {\n\t\t\ta: 0,0,0,100,0,0,0,200,0,0,0,300\n\t\t}\n"
+           "\t\tPolygonVertexIndex: *12 {\n\t\t\ta: 0,2,-2,0,1,-4,0,3,-3,1,2,-4\n\t\t}\n"
+           "\t\tGeometryVersion: 124\n\t}\n"
+           "\tModel: 2001, \"Model::tip\", \"Mesh\" {\n\t\tVersion: 232\n\t\tProperties70:  {\n"
+           "\t\t\tP: \"Lcl Translation\", \"Lcl Translation\", \"\", \"A\",50,0,0\n\t\t}\n"
+           "\t\tShading: T\n\t\tCulling: \"CullingOff\"\n\t}\n}\n"
+           "Connections:  {\n\tC: \"OO\",2001,0\n\tC: \"OO\",1001,2001\n}\n";
+  };
+  const Model centimetres = importModel(folder.write("cm.fbx", text("1")));
+  EXPECT_NEAR(centimetres.metresPerUnit, 0.01, 1e-12);
+  EXPECT_EQ(centimetres.up, 'z');
+  expectSize(centimetres, {1, 3, 2}, 1e-5);
+  const Model inches = importModel(folder.write("inch.fbx", text("2.54")));
+  EXPECT_NEAR(inches.metresPerUnit, 0.0254, 1e-12);
+  expectSize(inches, {2.54, 7.62, 5.08}, 1e-4);
+}
+
+}  // namespace
+}  // namespace enfilade::scene

@@ -1,0 +1,160 @@
+// A world behind its recorder: the file has what the world took and told, and no spoilt bit of it
+// passes.
+#include "server/recording/recordable_world.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <random>
+
+#include "tests/server/served_room.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+std::filesystem::path fileFor(const std::string& name) {
+  return tests::ownFile(name + ".mcap");
+}
+
+RecordingOptions optionsFor(const std::filesystem::path& file) {
+  RecordingOptions options;
+  options.choice.file = file;
+  options.model.file = "room.obj";
+  return options;
+}
+
+std::string bytesOf(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Each item: its kind and its bytes.
+struct Items {
+  std::vector<std::string> items;
+  bool closed = false;
+  std::string error;
+};
+
+Items itemsOf(const std::filesystem::path& file) {
+  Items read;
+  try {
+    protocol::RecordingReader reader(file);
+    while (const auto item = reader.next())
+      read.items.push_back(
+          std::to_string(item->index()) +
+          std::visit([](const auto& message) { return message.SerializeAsString(); }, *item));
+    read.closed = reader.closed();
+  } catch (const protocol::mcap::RecordingError& error) {
+    read.error = error.what();
+  }
+  return read;
+}
+
+/// Walks about in the small room, restarts, and closes.
+void recordWalk(const std::filesystem::path& file) {
+  RecordedWorld world{scene::World(smallRoom())};
+  world.record(optionsFor(file));
+  world.submit(spawn("ann", 0, 0, 0));
+  world.submit(walkTo("ann", 8, 0, 0));
+  for (int i = 0; i < 60; ++i) world.tick();
+  world.end(v1::ContactEvent::REASON_RESTART, "again");
+  world.beginAnew(scene::World(smallRoom()));
+  world.submit(spawn("bob", 4, 0, 0));
+  world.submit(walkTo("bob", 9, 0, 0));
+  for (int i = 0; i < 60; ++i) world.tick();
+  world.end(v1::ContactEvent::REASON_SHUTDOWN);
+  ASSERT_FALSE(world.recorder()->close());
+}
+
+TEST(RecordedWorld, WhatIsRefusedIsNotInTheFileAndWhatIsTakenIs) {
+  const auto file = fileFor("taken");
+  RecordedWorld world{scene::World(smallRoom())};
+  world.record(optionsFor(file));
+  EXPECT_TRUE(world.submit(spawn("ann", std::nan(""), 0, 0)));
+  EXPECT_FALSE(world.submit(spawn("ann", 0, 0, 0)));
+  world.tick();
+  ASSERT_FALSE(world.recorder()->close());
+  protocol::RecordingReader reader(file);
+  int commands = 0;
+  while (const auto item = reader.next())
+    if (const auto* taken = std::get_if<v1::RecordedCommands>(&*item)) {
+      commands += taken->commands_size();
+      EXPECT_EQ(taken->tick(), 1u);
+      EXPECT_EQ(taken->commands(0).avatar().spawn().at().x(), 0);
+    }
+  EXPECT_EQ(commands, 1);
+}
+
+TEST(RecordedWorld, WhatATickThatFailedWasToldIsInTheFile) {
+  const auto file = fileFor("failed");
+  RecordedWorld world{scene::World(smallRoom())};
+  world.record(optionsFor(file));
+  world.tick();
+  EXPECT_FALSE(world.submit(spawn("ann", 0, 0, 0)));
+  world.recorder()->tickFailed(world);
+  protocol::RecordingReader reader(file);
+  std::uint64_t tick = 0;
+  while (const auto item = reader.next())
+    if (const auto* told = std::get_if<v1::RecordedCommands>(&*item)) tick = told->tick();
+  EXPECT_EQ(tick, 2u);
+}
+
+TEST(RecordedWorld, WhatWasToldBeforeAWorldBeganAnewIsVoid) {
+  const auto file = fileFor("void");
+  RecordedWorld world{scene::World(smallRoom())};
+  world.record(optionsFor(file));
+  world.tick();
+  EXPECT_FALSE(world.submit(spawn("ann", 0, 0, 0)));
+  world.beginAnew(scene::World(smallRoom()));
+  world.tick();
+  ASSERT_FALSE(world.recorder()->close());
+  protocol::RecordingReader reader(file);
+  while (const auto item = reader.next())
+    EXPECT_FALSE(std::holds_alternative<v1::RecordedCommands>(*item));
+}
+
+/// ENFILADE_FLIPS asks for more of them.
+TEST(RecordedWorld, OneSpoiltBitIsReportedOrHarmlessAndNeverAnotherWalk) {
+  const auto file = fileFor("whole"), spoilt = fileFor("spoilt");
+  recordWalk(file);
+  const std::string bytes = bytesOf(file);
+  const Items whole = itemsOf(file);
+  ASSERT_TRUE(whole.closed);
+  ASSERT_GT(whole.items.size(), 120u);
+  const char* asked = std::getenv("ENFILADE_FLIPS");
+  const int flips = asked ? std::atoi(asked) : 600;
+  std::mt19937 random(23);
+  int reported = 0;
+  for (int i = 0; i < flips; ++i) {
+    std::string other = bytes;
+    const std::size_t at = random() % bytes.size();
+    other[at] = static_cast<char>(other[at] ^ (1 << (random() % 8)));
+    std::ofstream(spoilt, std::ios::binary) << other;
+    const Items read = itemsOf(spoilt);
+    const bool told = !read.error.empty() || !read.closed;
+    reported += told;
+    ASSERT_LE(read.items.size(), whole.items.size()) << "byte " << at;
+    ASSERT_TRUE(std::equal(read.items.begin(), read.items.end(), whole.items.begin()))
+        << "byte " << at;
+    ASSERT_TRUE(told || read.items.size() == whole.items.size()) << "byte " << at;
+  }
+  EXPECT_GE(reported, flips * 99 / 100);
+  RecordProperty("reported", reported);
+  RecordProperty("flips", flips);
+}
+
+TEST(RecordedWorld, WithoutARecorderItIsTheSameWorld) {
+  RecordedWorld bare{scene::World(smallRoom())}, recorded{scene::World(smallRoom())};
+  recorded.record(optionsFor(fileFor("same")));
+  for (RecordedWorld* world : {&bare, &recorded}) {
+    world->submit(spawn("ann", 0, 0, 0));
+    world->submit(walkTo("ann", 8, 0, 0));
+    for (int i = 0; i < 100; ++i) world->tick();
+  }
+  EXPECT_EQ(bare.snapshot()->stateHash, recorded.snapshot()->stateHash);
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing

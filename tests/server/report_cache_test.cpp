@@ -1,0 +1,80 @@
+// A scene's report, kept by the cache.
+#include "server/commands/report_cache.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/scene/hand_made_files.hpp"
+#include "tests/server/small_room.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+class KeptReport : public ::testing::Test {
+ protected:
+  std::vector<fs::path> kept() const {
+    std::vector<fs::path> files;
+    if (!fs::exists(cache_->folder)) return files;
+    for (const auto& entry : fs::directory_iterator(cache_->folder)) files.push_back(entry);
+    return files;
+  }
+  static scene::Model modelWithProblem() {
+    scene::Model model = smallRoom()->model();
+    model.problems.push_back({"missing_texture", 3, "a \"quoted\" name, with a line\nbreak"});
+    return model;
+  }
+
+  tests::TemporaryFolder folder_;
+  std::optional<scene::ModelCache> cache_{{folder_.path() / "cache"}};
+};
+
+TEST_F(KeptReport, IsTheReportThatIsWorkedOut) {
+  const scene::Scene scene(modelWithProblem());
+  const std::string worked = textOf(scene::reportOn(scene));
+  EXPECT_EQ(textOf(reportFor(scene, std::nullopt)), worked);
+  EXPECT_TRUE(kept().empty());
+  EXPECT_EQ(textOf(reportFor(scene, cache_)), worked);
+  ASSERT_EQ(kept().size(), 1u);
+  const scene::SceneReport again = reportFor(scene, cache_);
+  EXPECT_EQ(textOf(again), worked);
+  EXPECT_EQ(again.shells.exact, 3u);
+  EXPECT_EQ(again.problems.at(0).example, modelWithProblem().problems[0].example);
+}
+
+TEST_F(KeptReport, IsNotTakenForAnotherSceneOrOtherProblems) {
+  reportFor(scene::Scene(modelWithProblem()), cache_);
+  scene::Model other = modelWithProblem();
+  other.problems[0].count = 4;
+  EXPECT_EQ(reportFor(scene::Scene(other), cache_).problems.at(0).count, 4u);
+  other.meshes[0].positions[0].x() += 1;
+  EXPECT_EQ(reportFor(scene::Scene(other), cache_).shells.exact, 2u);
+  EXPECT_EQ(kept().size(), 3u);
+}
+
+TEST_F(KeptReport, WhoseTextIsDamagedIsWorkedOutAgain) {
+  const scene::Scene scene(modelWithProblem());
+  const std::string worked = textOf(reportFor(scene, cache_));
+  const fs::path file = kept().at(0);
+  std::ifstream in(file, std::ios::binary);
+  const std::string whole((std::istreambuf_iterator<char>(in)), {});
+  for (std::size_t at = 0; at < whole.size(); at += 7) {
+    std::string damaged = whole;
+    damaged[at] ^= 1;
+    if (at % 2) damaged.resize(at);
+    std::ofstream(file, std::ios::binary) << damaged;
+    EXPECT_EQ(textOf(reportFor(scene, cache_)), worked) << at;
+    EXPECT_EQ(fs::file_size(file), whole.size()) << "it was not written anew";
+  }
+}
+
+TEST_F(KeptReport, ATextThatIsNoneIsNoReport) {
+  for (const char* text : {"", "{}", "[1]", "{\"objects\":-1}", "null"})
+    EXPECT_FALSE(reportFrom(text)) << text;
+  EXPECT_TRUE(reportFrom(textOf({})));
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing
