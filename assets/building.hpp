@@ -9,30 +9,34 @@
 
 namespace enfilade::assets {
 
-/// How a door, a lift's cabin or the like could move. It stands still until someone moves it.
+/// Joint of a door, a lift's cabin or the like. It is at rest until it is moved.
 struct MovingPart {
   enum class Kind : std::uint8_t { hinge, slide };
 
-  std::uint32_t object = 0;  ///< index into Model::objects; its origin lies on the hinge's axis
+  std::uint32_t object = 0;  ///< index into Model::objects; the object's origin lies on the hinge's
+                             ///< axis
   Kind kind = Kind::hinge;
   collision::Vec3 axis;      ///< unit length, in the object's own frame
-  double low = 0, high = 0;  ///< from where it stands: radians about, or metres along, the axis
+  double low = 0, high = 0;  ///< relative to the modelled pose: radians about, or metres along, the
+                             ///< axis
 };
 
 struct BuildingOptions {
   std::uint64_t seed = 1;
-  /// 0: the gallery alone (a few thousand objects). Else a district of exactly so many.
+  /// 0: the gallery alone (a few thousand objects). Otherwise a district of exactly so many.
   std::size_t objects = 0;
 };
 
-/// A two-storey gallery round an enfilade along +X at z = 0; see assets/landmarks.hpp. Throws
-/// std::invalid_argument for a district of fewer than kSmallestDistrict objects.
+/// Makes a two-storey gallery along an enfilade of rooms on the X axis (z = 0); see
+/// assets/landmarks.hpp. Throws std::invalid_argument for a district of fewer than
+/// kSmallestDistrict objects.
 scene::Model makeBuilding(const BuildingOptions& options = {},
                           std::vector<MovingPart>* movingParts = nullptr);
 
 inline constexpr std::size_t kSmallestDistrict = 5000;
 
-/// The gallery and varied town houses on streets: exactly `objects` objects, meshes shared.
+/// Makes the gallery and varied town houses on streets: exactly `objects` objects, with shared
+/// meshes.
 scene::Model makeDistrict(std::size_t objects, std::uint64_t seed);
 
 }  // namespace enfilade::assets

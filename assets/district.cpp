@@ -1,4 +1,5 @@
-// A district: a few prototypes built once, placed again and again on the blocks of a street grid.
+// District generator: a few prototypes, built once, are placed repeatedly on the blocks of a street
+// grid.
 #include <cmath>
 #include <stdexcept>
 
@@ -14,12 +15,12 @@ constexpr double kBlockX = 96, kBlockZ = 60;       ///< of a block with half of 
 constexpr int kHouses = 12, kHousesPerBlock = 12;  ///< prototypes; lots in a block
 constexpr int kGalleryEvery = 7;                   ///< one block in so many is a gallery
 
-/// A building whose meshes lie in the district's model already.
+/// A building whose meshes are already in the district's model.
 struct Prototype {
   std::vector<scene::Object> objects;
 };
 
-/// The meshes of `from` go to `model`, once; its objects are kept as a prototype.
+/// Moves the meshes of `from` to `model`, once, and keeps its objects as a prototype.
 Prototype adopt(scene::Model& model, scene::Model from, const std::string& leaveOut) {
   const auto first = static_cast<std::uint32_t>(model.meshes.size());
   for (scene::Mesh& mesh : from.meshes) model.meshes.push_back(std::move(mesh));
@@ -41,7 +42,7 @@ struct District {
   std::size_t left() const { return wanted - model.objects.size(); }
 };
 
-/// Places a whole prototype, or nothing when it would be too many.
+/// Places a whole prototype; places nothing if it would exceed the number of objects.
 bool place(District& d, const Prototype& prototype, const std::string& path,
            const Eigen::Affine3d& worldFromLocal) {
   if (prototype.objects.size() > d.left()) return false;
@@ -62,7 +63,7 @@ void addLampPost(Sketch& sketch) {
   sketch.place("lamp_post", s, moved(Vec3::Zero()));
 }
 
-/// What lies flat in a block: its pavement, the streets west and north of it, their stripes.
+/// Adds the flat surfaces of a block: pavement, the streets west and north of it, their stripes.
 void addStreet(Sketch& sketch) {
   const double x = kBlockX / 2, z = kBlockZ / 2, half = kStreet / 2;
   sketch.box("pavement", {-x + half, -0.3, -z + half}, {x - half, -0.0, z - half}, Paint::paving);
@@ -101,7 +102,8 @@ District prepared(std::size_t objects, std::uint64_t seed) {
   return d;
 }
 
-/// Two rows of houses, back to back. False when the next house would be too many.
+/// Places two rows of houses, back to back. False if the next house would exceed the number of
+/// objects.
 bool fillWithHouses(District& d, const std::string& block, const Vec3& middle, Random& random) {
   constexpr int kRow = kHousesPerBlock / 2;
   for (int i = 0; i < kHousesPerBlock; ++i) {
@@ -115,7 +117,7 @@ bool fillWithHouses(District& d, const std::string& block, const Vec3& middle, R
   return true;
 }
 
-/// Trees and lamps along the kerbs.
+/// Places trees and lamps along the kerbs.
 void plantStreet(District& d, const std::string& block, const Vec3& middle) {
   const double z = (kBlockZ - kStreet) / 2 - 1.2;
   for (int i = 0; i < 8; ++i) {
@@ -126,7 +128,7 @@ void plantStreet(District& d, const std::string& block, const Vec3& middle) {
   }
 }
 
-/// Bollards along the edge of the last block, until the count is exact.
+/// Places bollards along the edge of the last block, until the number of objects is exact.
 void fillUp(District& d, const Vec3& middle) {
   for (int i = 0; d.left() > 0; ++i) {
     const int row = i / 160;
@@ -144,7 +146,7 @@ scene::Model makeDistrict(std::size_t objects, std::uint64_t seed) {
   if (objects < kSmallestDistrict)
     throw std::invalid_argument("a district has at least " + std::to_string(kSmallestDistrict) +
                                 " objects, not " + std::to_string(objects) +
-                                "; without a number you get the gallery alone");
+                                "; omit the number for the gallery alone");
   District d = prepared(objects, seed);
   Random random(seed + 1);
   const double blocks = static_cast<double>(objects) / 4000.0 + 1;

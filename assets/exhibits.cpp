@@ -73,7 +73,7 @@ void fillShelf(Sketch& sketch, const std::string& path, const Eigen::Affine3d& p
   double z = from;
   const int gapAfter = 6 + random.below(14);
   for (int number = 1;; ++number) {
-    // Few sizes, so that books share their meshes.
+    // A few sizes only, so that books share meshes.
     const double thickness = 0.03 + 0.008 * random.below(4);
     const double height = std::min(clear - 0.03, 0.21 + 0.03 * random.below(4));
     const double depth = 0.18 + 0.02 * random.below(3);

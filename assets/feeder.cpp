@@ -13,18 +13,18 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kTop = 0.9;        // metres: of the tray's floor
+constexpr double kTop = 0.9;        // metres: height of the tray's floor
 constexpr double kPlate = 0.02;     // thickness of the tray's plates
 constexpr double kWall = 0.25;      // height of its walls
-constexpr double kGap = 0.01;       // between the tray at its lowest, nearly, and its stand
-constexpr double kSpacing = 0.026;  // of the parts as they are strewn: more than any is long
-constexpr std::size_t kMostParts = 20000;
+constexpr double kGap = 0.01;       // between the tray, nearly at its lowest point, and its stand
+constexpr double kSpacing = 0.026;  // initial distance of parts: more than the length of any
+constexpr std::size_t kMaxParts = 20000;
 
-constexpr int kKeys = 16;                     // of a period; 240 a second, one a substep
+constexpr int kKeys = 16;                     // per period; 240 a second, one a substep
 constexpr double kPeriod = 16.0 / 240;        // seconds
-constexpr double kUp = 2e-3, kSide = 0.5e-3;  // metres: 1.8 times the weight at 15 Hz
+constexpr double kUp = 2e-3, kSide = 0.5e-3;  // metres: 1.8 times gravity at 15 Hz
 
-/// Half the tray's inner width: about two layers.
+/// Half the tray's inner width, for about two layers.
 double innerOf(std::size_t parts) {
   const double across = std::ceil(std::sqrt(static_cast<double>(parts) / 4));
   return 0.5 * kSpacing * across;
@@ -47,9 +47,10 @@ std::array<Shape, 5> kindsOfParts() {
   return kinds;
 }
 
-/// Uniform over all rotations, without a sine: four numbers in the unit ball, made unit.
+/// Uniform over all rotations, without a sine: a random point in the unit ball of quaternions,
+/// normalised.
 Eigen::Quaterniond anyRotation(Random& random) {
-  while (true) {  // ends: three of ten are taken
+  while (true) {  // ends: three of ten points are accepted
     Eigen::Vector4d q;
     for (int i = 0; i < 4; ++i) q[i] = random.between(-1, 1);
     const double squared = q.squaredNorm();
@@ -98,8 +99,8 @@ Json keysOfDrive() {
 }  // namespace
 
 scene::Model makeFeeder(const FeederOptions& options) {
-  if (options.parts < 1 || options.parts > kMostParts)
-    throw std::invalid_argument("a feeder has 1 to " + std::to_string(kMostParts) + " parts");
+  if (options.parts < 1 || options.parts > kMaxParts)
+    throw std::invalid_argument("a feeder has 1 to " + std::to_string(kMaxParts) + " parts");
   const double in = innerOf(options.parts), out = in + kPlate;
   Sketch sketch;
   sketch.box("room/floor", {-out - 3, -0.2, -out - 3}, {out + 3, 0, out + 3}, Paint::concrete);

@@ -1,5 +1,5 @@
-// The bundled parts feeder: small convex parts in a tray that vibrates, on a stand that one can
-// walk round. Our own work; the same seed gives the same model everywhere.
+// The bundled parts feeder: small convex parts in a vibrating tray, on a stand that avatars can
+// walk around. Our own work; the same seed gives the same model everywhere.
 #pragma once
 
 #include <string>
@@ -16,7 +16,8 @@ struct FeederOptions {
 /// Throws std::invalid_argument for a number of parts out of range.
 scene::Model makeFeeder(const FeederOptions& options = {});
 
-/// The tray as a path of 15 Hz, 2 mm up and 0.5 mm sidewards, and the parts as free bodies.
+/// Sidecar with the tray as a path of 15 Hz, 2 mm up and 0.5 mm sideways, and the parts as dynamic
+/// bodies.
 std::string feederSidecar();
 
 }  // namespace enfilade::assets

@@ -1,4 +1,4 @@
-// What stands and hangs in the rooms of the enfilade. The axis (|z| < 0.7 m) stays free.
+// Furnishes the rooms of the enfilade. The axis (|z| < 0.7 m) stays free.
 #include "assets/parts.hpp"
 
 namespace enfilade::assets {
@@ -16,7 +16,7 @@ Paint clothOf(int i) {
   return kCloths[i % 6];
 }
 
-/// Pictures left and right of the doors on the cross walls, and beside the north door.
+/// Hangs pictures left and right of the doors on the cross walls, and next to the north door.
 void hangPictures(Sketch& sketch, int i, Random& random) {
   const double west = roomWest(i), east = roomEast(i);
   const std::string path = roomPath(i) + "/picture";
@@ -30,7 +30,7 @@ void hangPictures(Sketch& sketch, int i, Random& random) {
   const double north = i == 0 ? 9.0 : 0.5 * (west + east);
   for (const double x : {0.5 * (west + north - 0.6), 0.5 * (north + 0.6 + east)}) {
     const double width = i == 0 && x > 9 ? 0.7 : random.between(1.1, 1.5);
-    if (i == 5) continue;  // its north wall has no door: three large ones follow
+    if (i == 5) continue;  // its north wall has no door: three large pictures follow
     placePicture(sketch, numbered(path, ++number), {{x, 1.75, kMidSouth}, 3}, width,
                  random.between(0.9, 1.3), random);
   }

@@ -89,7 +89,7 @@ Shape vaseShape(int kind, Paint glaze) {
 
 namespace {
 
-/// Slabs on top of one another, each turned a little more.
+/// A column of slabs, each rotated a little further than the one below.
 void addTwistedColumn(Shape& s, Paint stone) {
   constexpr int kSlabs = 16;
   Eigen::Affine3d turn = Eigen::Affine3d::Identity();
@@ -192,7 +192,8 @@ Shape pottedPlantShape(Random& random) {
     const Vec3 across{-0.06 * out.y(), 0, 0.06 * out.x()};
     const Vec3 down{0, -0.012, 0};
     const Paint leaf = kLeaves[random.below(3)];
-    // Two closed blades. They lap at the bend: if they met, the face there would stand twice.
+    // Two closed blades. They overlap at the bend: if they only met, the face there would exist
+    // twice.
     const Vec3 lap = 0.002 * (bend - root).normalized();
     for (const Vec3& end : {root, tip}) {
       const double side = end == root ? -1 : 1;

@@ -1,5 +1,5 @@
-// Things to sit on, eat at, look at. Shapes stand on y = 0 round the origin and face +X; the
-// functions that place several objects say so.
+// Furniture and exhibits. Shapes stand on y = 0 around the origin and face +X; the comments name
+// the functions that place several objects.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace enfilade::assets {
 
-/// Where a piece stands: its origin on the floor and where it faces (quarter turns about +Y).
+/// Position of a piece: its origin on the floor, and its direction (quarter turns about +Y).
 struct Spot {
   Vec3 at;
   int quarters = 0;
@@ -31,10 +31,10 @@ Shape pendantShape(double cord, Paint shade);
 Shape spotShape();
 Shape radiatorShape(double width);
 Shape stanchionShape();
-/// Flat on the floor: `low`, `high` are its corners in x and z.
+/// A rug flat on the floor; `low`, `high` are its corners in x and z.
 Shape rugShape(double sizeX, double sizeZ, Paint ground, Paint border);
 
-/// An upholstered bench with its legs as objects of their own.
+/// An upholstered bench whose legs are separate objects.
 void placeBench(Sketch& sketch, const std::string& path, const Spot& spot, double width,
                 Paint cloth);
 /// A glass case on a base with an exhibit in it.
@@ -43,12 +43,12 @@ void placeDisplayCase(Sketch& sketch, const std::string& path, const Spot& spot,
 /// A plinth with a sculpture or a vase on it.
 void placePlinth(Sketch& sketch, const std::string& path, const Spot& spot, double height,
                  const Shape& exhibit);
-/// A bookcase whose boards and books are objects of their own; its back is at x = 0.
+/// A bookcase whose boards and books are separate objects; its back is at x = 0.
 void placeBookcase(Sketch& sketch, const std::string& path, const Spot& spot, double width,
                    double height, Random& random);
-/// A table with things to eat and chairs round it.
+/// A table with food, and chairs around it.
 void placeCafeTable(Sketch& sketch, const std::string& path, const Spot& spot, int chairs);
-/// A framed picture on a wall: `at` is its middle, on the wall's face.
+/// A framed picture on a wall; `at` is its centre, on the wall's face.
 void placePicture(Sketch& sketch, const std::string& path, const Spot& spot, double width,
                   double height, Random& random);
 

@@ -46,7 +46,7 @@ Json materialJson(const scene::Material& m) {
   return json;
 }
 
-/// The binary chunk and the JSON that describes what lies in it.
+/// The binary chunk and the JSON that describes its content.
 struct Buffer {
   std::string bytes;
   Json views = Json::array();
@@ -105,7 +105,7 @@ std::vector<Json> primitivesOf(const scene::Model& model, Buffer& buffer) {
   return primitives;
 }
 
-/// glTF's meshes are sets of ours (its primitives): one for each set that some object has.
+/// A glTF mesh is a set of our meshes (as its primitives): one for each set that an object uses.
 struct MeshTable {
   Json meshes = Json::array();
   std::map<std::vector<std::uint32_t>, std::size_t> index;
@@ -159,7 +159,7 @@ PathTree pathTree(const scene::Model& model) {
   return tree;
 }
 
-/// Each node's frame is its nearest ancestor object's, or the scene's.
+/// The frame of each node is that of its nearest ancestor object, or the scene's.
 std::vector<std::int64_t> ancestorObjects(const PathTree& tree) {
   std::vector<std::int64_t> ancestors(tree.nodes.size(), -1);
   for (std::size_t i = 0; i < tree.nodes.size(); ++i)  // parents come before their children
@@ -188,7 +188,7 @@ Json motionJson(const MovingPart& part) {
           {"walk_limits", {scale * part.low, scale * part.high}}};
 }
 
-/// The nodes one by one as text: a district's would not fit in memory as JSON values.
+/// Writes the nodes as text one by one: a district's would not fit in memory as JSON values.
 std::string nodesText(const scene::Model& model, const std::vector<MovingPart>& movingParts,
                       const PathTree& tree, const MeshTable& meshes) {
   std::map<std::int64_t, Json> extras;
@@ -242,7 +242,7 @@ void appendWord(std::string& bytes, std::size_t value) {
 }  // namespace
 
 std::string glbBytes(const scene::Model& model, const std::vector<MovingPart>& movingParts) {
-  if (model.objects.empty()) throw std::invalid_argument("a model without objects makes no GLB");
+  if (model.objects.empty()) throw std::invalid_argument("a GLB needs at least one object");
   Buffer buffer;
   std::string json = jsonText(model, movingParts, buffer);
   while (json.size() % 4) json.push_back(' ');
@@ -250,7 +250,7 @@ std::string glbBytes(const scene::Model& model, const std::vector<MovingPart>& m
   const std::size_t total = 12 + 8 + json.size() + 8 + buffer.bytes.size();
   if (total > std::numeric_limits<std::uint32_t>::max())
     throw std::length_error("GLB holds at most 4 GiB, this model needs " + std::to_string(total) +
-                            " bytes: ask for fewer objects");
+                            " bytes: use fewer objects");
   std::string glb;
   glb.reserve(total);
   appendWord(glb, kMagic);
@@ -268,14 +268,14 @@ std::string glbBytes(const scene::Model& model, const std::vector<MovingPart>& m
 void writeGlb(const std::filesystem::path& file, const scene::Model& model,
               const std::vector<MovingPart>& movingParts) {
   const std::string bytes = glbBytes(model, movingParts);
-  // Written beside and renamed, so that a file with this name is whole.
+  // Written to a temporary name and renamed, so that a file with the final name is complete.
   const std::filesystem::path part = file.string() + ".part";
   std::ofstream out(part, std::ios::binary);
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   out.close();
   if (!out)
     throw std::runtime_error("cannot write " + part.string() + ": " + std::strerror(errno) +
-                             " (does the folder exist, is there room?)");
+                             ": check that the folder exists and the disk has space");
   std::filesystem::rename(part, file);
 }
 

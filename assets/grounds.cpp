@@ -1,4 +1,4 @@
-// Outside: roofs, plinths, steps, paving, trees and hedges.
+// The outside of the building: roofs, plinths, steps, paving, trees and hedges.
 #include "assets/parts.hpp"
 
 namespace enfilade::assets {

@@ -1,4 +1,4 @@
-// The hall: two storeys high, with a gallery round it on columns and a skylight over it.
+// The hall: two storeys high, with a gallery around it on columns and a skylight above.
 #include <algorithm>
 
 #include "assets/parts.hpp"
@@ -53,7 +53,7 @@ void addWalls(Sketch& sketch) {
       sketch, "east_wall",
       {Along::z, -h, h, kHallEast, kHallEast + o, -0.06, kTop, Paint::wallIvory, Paint::facade},
       tiers({-5.6, 5.6}), -1);
-  // West: towards the wings the far side is painted like their last rooms.
+  // West: the far side of the wall has the paint of the wings' last rooms.
   const Wall west{Along::z, -h,   kSouth + kOuter, kHallWest - o,   kHallWest,
                   -0.06,    kTop, Paint::wallTeal, Paint::wallIvory};
   const std::vector<Opening> doors = westDoors();
@@ -88,7 +88,7 @@ void addFloors(Sketch& sketch, Random& random) {
   deck("east", kVoidEast, kHallEast, -kVoidHalf, kVoidHalf);
 }
 
-/// A moulded band along the edge of the void, in front of the slab.
+/// Adds a moulding along the edge of the void, in front of the slab.
 void addEdgeBands(Sketch& sketch) {
   const double y = kUpper - kSlab - 0.02;
   const auto band = [&](const char* name, const Face& face) {
@@ -98,7 +98,7 @@ void addEdgeBands(Sketch& sketch) {
   band("north", {Along::x, kVoidWest, kVoidEast, -kVoidHalf, 1});
   band("south", {Along::x, kVoidWest, kVoidEast, kVoidHalf, -1});
   band("west", {Along::z, -kVoidHalf, kVoidHalf, kVoidWest, 1});
-  // The stair arrives between the two halves of the east band.
+  // The head of the stair is between the two halves of the east band.
   band("east_a", {Along::z, -kVoidHalf, kStairLow, kVoidEast, -1});
   band("east_b", {Along::z, kStairHigh, kVoidHalf, kVoidEast, -1});
 }
@@ -142,7 +142,7 @@ void addColumns(Sketch& sketch) {
   }
 }
 
-/// The ceiling leaves the middle open; a lantern of glass stands over it.
+/// Adds a glass lantern above the opening in the ceiling.
 void addSkylight(Sketch& sketch) {
   const double h = kHallHalf, y0 = kHallCeiling, y1 = kTop;
   const double west = kVoidWest + 1.5, east = kVoidEast - 1.5, half = kVoidHalf - 1.5;

@@ -71,7 +71,7 @@ double stairEast(const Plan& p) {
   return -p.halfX + 0.4 + kTread * kRisers;
 }
 
-/// The slab of a storey; upper ones are open over the stair along the back.
+/// Adds the slab of a storey; upper slabs are open over the stair along the back.
 void addSlab(Sketch& sketch, const Plan& p, int storey) {
   const double y1 = kStorey * storey + (storey == 0 ? 0.01 : 0.0), y0 = y1 - kFloorThick;
   const std::string path = floorPath(storey) + "/slab";

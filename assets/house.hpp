@@ -1,4 +1,4 @@
-// A town house: one of the buildings that a district repeats.
+// A town house: one of the prototypes that a district repeats.
 #pragma once
 
 #include "assets/random.hpp"
@@ -6,10 +6,11 @@
 
 namespace enfilade::assets {
 
-/// Stands round the origin with its door towards +Z, on ground at y = 0; paths are relative.
+/// The house is centred on the origin with its door towards +Z, on ground at y = 0; paths are
+/// relative.
 void addHouse(Sketch& sketch, Random& random);
 
-/// Widest house along X, metres.
+/// Width of the widest house along X, metres.
 inline constexpr double kHouseWidth = 12;
 
 }  // namespace enfilade::assets

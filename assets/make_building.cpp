@@ -13,8 +13,8 @@ int main(int argc, char** argv) {
   std::string file;
   CLI::App app{"Writes the bundled building as GLB"};
   app.add_option("--objects", options.objects,
-                 "a district of exactly so many objects (at least 5000); without it, one building");
-  app.add_option("--seed", options.seed, "another seed, another building")->capture_default_str();
+                 "a district of exactly N objects (at least 5000); default: one building");
+  app.add_option("--seed", options.seed, "seed of the building")->capture_default_str();
   app.add_option("OUT", file, "the GLB file to write")->required();
   try {
     app.parse(argc, argv);

@@ -11,9 +11,9 @@ int main(int argc, char** argv) {
   using namespace enfilade;
   assets::FeederOptions options;
   std::filesystem::path file;
-  CLI::App app{"Writes the bundled parts feeder as GLB, and its sidecar beside it"};
-  app.add_option("--parts", options.parts, "how many")->capture_default_str();
-  app.add_option("--seed", options.seed, "another seed, other rotations")->capture_default_str();
+  CLI::App app{"Writes the bundled parts feeder as GLB, and its sidecar next to it"};
+  app.add_option("--parts", options.parts, "number of parts")->capture_default_str();
+  app.add_option("--seed", options.seed, "seed of the parts' rotations")->capture_default_str();
   app.add_option("OUT", file, "the GLB file to write")->required();
   try {
     app.parse(argc, argv);

@@ -1,4 +1,4 @@
-// Every material of the building, by name.
+// All materials of the bundled building, by name.
 #pragma once
 
 #include <cstdint>

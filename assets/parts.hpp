@@ -1,4 +1,4 @@
-// The parts that makeBuilding() puts together.
+// Declares the parts that makeBuilding() assembles.
 #pragma once
 
 #include "assets/furniture.hpp"

@@ -1,5 +1,5 @@
-// Pictures: a gilt or dark frame, a canvas, and paint laid on it in flat layers, each a millimetre
-// before the last, so that no two lie in one plane.
+// Pictures: a gilt or dark frame, a canvas, and layers of paint. Each layer is a millimetre in
+// front of the previous one, so that no two are coplanar.
 #include <algorithm>
 
 #include "assets/furniture.hpp"
@@ -7,11 +7,11 @@
 namespace enfilade::assets {
 namespace {
 
-/// The picture's own plane: origin in the middle, x to the right and y up as one looks at it.
+/// The picture's plane: origin in the centre, x to the right and y up as seen by a viewer.
 struct Easel {
   Shape& shape;
   double halfWidth, halfHeight;
-  double depth = 0.021;  ///< of the next layer, off the wall
+  double depth = 0.021;  ///< of the next layer, from the wall
 
   void lay(const std::vector<Vec2>& outline, Paint paint) {
     addPolygon(shape, outline, {{depth, 0, 0}, {0, 0, -1}, {0, 1, 0}, {1, 0, 0}}, paint);
@@ -27,7 +27,7 @@ struct Easel {
   }
 };
 
-/// A band of land whose upper edge wanders about `y`.
+/// A band of land whose upper edge varies around `y`.
 void layHill(Easel& e, double y, double swing, Paint paint, Random& random) {
   constexpr int kSteps = 10;
   std::vector<Vec2> outline{{-e.halfWidth, -e.halfHeight}, {e.halfWidth, -e.halfHeight}};
@@ -172,7 +172,7 @@ Shape frameShape(double w, double h, Paint paint) {
   Shape s;
   addBox(s, {-0.003, -h, -w}, {out, -h + bar, w}, paint);
   addBox(s, {-0.003, h - bar, -w}, {out, h, w}, paint);
-  // A millimetre shallower: boxes that shared an edge would bound no solid each.
+  // A millimetre shallower: boxes with a shared edge would not be separate closed solids.
   const double shallower = out - 0.001;
   addBox(s, {-0.002, -h + bar, -w + 0.001}, {shallower, h - bar, -w + bar}, paint);
   addBox(s, {-0.002, -h + bar, w - bar}, {shallower, h - bar, w - 0.001}, paint);

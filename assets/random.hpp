@@ -1,5 +1,5 @@
-// Seeded numbers that are the same on every machine (splitmix64; the standard's distributions are
-// not).
+// Seeded random numbers, equal on every machine (splitmix64; the standard distributions are not
+// portable).
 #pragma once
 
 #include <cstdint>

@@ -28,7 +28,7 @@ bool insideOrOn(const Vec2& p, const Vec2& a, const Vec2& b, const Vec2& c) {
   return cross(a, b, p) >= 0 && cross(b, c, p) >= 0 && cross(c, a, p) >= 0;
 }
 
-/// Whether the corner at `i` can be cut off the polygon of the indices left.
+/// Whether the corner at `i` is an ear of the polygon of the remaining indices.
 bool isEar(const std::vector<Vec2>& polygon, const std::vector<std::uint32_t>& left,
            std::size_t i) {
   const std::size_t n = left.size();
@@ -40,7 +40,7 @@ bool isEar(const std::vector<Vec2>& polygon, const std::vector<std::uint32_t>& l
   });
 }
 
-/// Ear clipping; three indices a triangle.
+/// Triangulates by ear clipping; three indices a triangle.
 std::vector<std::uint32_t> triangulated(const std::vector<Vec2>& polygon) {
   std::vector<std::uint32_t> left(polygon.size()), triangles;
   for (std::uint32_t i = 0; i < left.size(); ++i) left[i] = i;

@@ -1,7 +1,7 @@
-// Solids made of triangles: boxes, prisms, turned bodies. Every add...() of a solid adds a closed
+// Solids of triangles: boxes, prisms, solids of revolution. Every add...() of a solid adds a closed
 // surface, wound counter-clockwise as seen from outside. Lengths in metres, Y up.
 //
-// Only + - * / and sqrt make coordinates, so that the same bytes come out everywhere.
+// Coordinates use only + - * / and sqrt, so that the bytes are equal everywhere.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -14,7 +14,7 @@ namespace enfilade::assets {
 using collision::Vec3;
 using Vec2 = Eigen::Vector2d;
 
-/// Triangles by paint, with one normal a vertex.
+/// Triangles grouped by paint, with one normal a vertex.
 struct Shape {
   struct Part {
     Paint paint;
@@ -33,23 +33,23 @@ inline BoxPaints allFaces(Paint paint) {
   return {paint, paint, paint, paint, paint, paint};
 }
 
-/// Where a profile is swept: u x v = w, all of unit length.
+/// Frame of a swept profile: u x v = w, all of unit length.
 struct SweepFrame {
   Vec3 origin, u, v, w;
 };
 
-/// A point of a turned body's outline.
+/// A point of the outline of a solid of revolution.
 struct Ring {
   double radius, y;
 };
 
 Eigen::Affine3d moved(const Vec3& by);
-/// Turned about +Y by quarter turns: 1 takes +X to -Z. Then moved.
+/// A rotation about +Y by quarter turns (1 takes +X to -Z), then a translation.
 Eigen::Affine3d turned(int quarters, const Vec3& by = Vec3::Zero());
-/// Turned about +Y by the angle whose half has this tangent, then moved.
+/// A rotation about +Y by the angle whose half has this tangent, then a translation.
 Eigen::Affine3d turnedByHalfTangent(double tangent, const Vec3& by = Vec3::Zero());
 
-/// Corners of the regular polygon in the unit circle, counter-clockwise from (1, 0). `sides` is 4
+/// Vertices of the regular polygon in the unit circle, counter-clockwise from (1, 0). `sides` is 4
 /// or 6 times a power of two.
 std::vector<Vec2> unitCircle(int sides);
 
@@ -58,7 +58,7 @@ void addQuad(Shape& shape, const Vec3& a, const Vec3& b, const Vec3& c, const Ve
 
 void addBox(Shape& shape, const Vec3& low, const Vec3& high, const BoxPaints& paints);
 void addBox(Shape& shape, const Vec3& low, const Vec3& high, Paint paint);
-/// A box whose top is cut into cells at the given inner coordinates; `tone` paints a cell.
+/// A box whose top is a grid of cells; `tone` gives the paint of a cell.
 void addTiledSlab(Shape& shape, const Vec3& low, const Vec3& high, int cellsX, int cellsZ,
                   Paint side, const std::vector<Paint>& cellTones);
 /// A simple polygon in (u, v), counter-clockwise, swept along w.
@@ -67,19 +67,19 @@ void addPrism(Shape& shape, const std::vector<Vec2>& profile, const SweepFrame& 
 /// The face of a simple polygon alone, seen from +w.
 void addPolygon(Shape& shape, const std::vector<Vec2>& profile, const SweepFrame& frame,
                 Paint paint);
-/// An outline from bottom to top, turned about the vertical through `base`. Closed at both ends.
+/// Revolves an outline from bottom to top about the vertical through `base`. Closed at both ends.
 void addTurned(Shape& shape, const Vec3& base, const std::vector<Ring>& outline, int sides,
                Paint paint);
 void addCylinder(Shape& shape, const Vec3& base, double radius, double height, int sides,
                  Paint paint);
-/// A round bar from a to b.
+/// A round rod from a to b.
 void addRod(Shape& shape, const Vec3& a, const Vec3& b, double radius, int sides, Paint paint);
 void addBall(Shape& shape, const Vec3& centre, const Vec3& radii, int sides, Paint paint);
-/// A ring about the vertical.
+/// A torus about the vertical.
 void addTorus(Shape& shape, const Vec3& centre, double ringRadius, double tubeRadius, int sides,
               int tubeSides, Paint paint);
-/// A straight bar of constant section whose ends are upright: a, b are the middles of its ends,
-/// which differ along one horizontal axis and in height (handrails, stringers).
+/// A straight bar of constant section with vertical ends. a, b are the centres of its ends, which
+/// differ along one horizontal axis and in height (handrails, stringers).
 void addSlopedBar(Shape& shape, const Vec3& a, const Vec3& b, double width, double height,
                   Paint paint);
 

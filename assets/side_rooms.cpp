@@ -107,7 +107,7 @@ void furnishStudy(Sketch& sketch, Random& random) {
   sketch.place(path + "desk_chair", chairShape(Paint::mahogany, Paint::leather),
                turned(3, {20.4, 0, -7.5}));
   sketch.place(path + "globe", globeShape(), moved({22.6, 0, -7.7}));
-  // A free body: it begins clear of the floor, and settles.
+  // A dynamic body: it starts clear of the floor, and settles.
   sketch.place(path + "armchair", armchairShape(Paint::leather), turned(0, {18.1, 0.001, -5.2}));
   sketch.place(path + "floor_lamp", floorLampShape(), moved({17.8, 0, -4.2}));
   placeBookcase(sketch, path + "bookcase1", {{23.4, 0, -5.4}, 2}, 1.2, 2.2, random);
@@ -139,7 +139,7 @@ void furnishLibrary(Sketch& sketch, Random& random) {
         sketch.place(table + "/chair" + std::to_string(++chair),
                      chairShape(Paint::mahogany, Paint::leatherGreen),
                      turned(side, {x + dx, 0, -6.6 + (side == 1 ? 0.75 : -0.75)}));
-    Shape open;  // a book left open
+    Shape open;  // an open book
     addBox(open, {-0.14, 0, -0.19}, {0.14, 0.012, 0.19}, Paint::bookRed);
     addBox(open, {-0.13, 0.011, -0.18}, {0.13, 0.03, 0.18}, Paint::paper);
     sketch.place(table + "/open_book", open, moved({x + 0.5, 0.749, -6.4}));

@@ -38,7 +38,7 @@ Json doorOf(const scene::Object& object, const MovingPart& part) {
             {"objects", {object.path}},
             {"axis", listOf(object.worldFromMesh.linear() * part.axis)},
             {"limits", {low, high}}};
-  if (!turns) return body;  // the lift's doors stand closed
+  if (!turns) return body;  // the lift's doors are closed
   body["anchor"] = listOf(object.worldFromMesh.translation());
   body["closed"] = high > -low ? high : low;
   body["opened_by"] = "touch";
@@ -54,11 +54,11 @@ Json liftOf(const scene::Object& object, const MovingPart& part) {
           {"acceleration", 1}};
 }
 
-/// What a model has of this path is a body.
+/// Adds a body for the object of this path, if the model has it.
 void addBodyOf(const scene::Model& model, const std::string& path, Json body, Json& bodies) {
   const bool isThere =
       std::ranges::find(model.objects, path, &scene::Object::path) != model.objects.end();
-  if (!isThere) return;  // as in a district
+  if (!isThere) return;  // for example in a district
   body["name"] = nameOf(path);
   body["objects"] = {path};
   bodies.push_back(std::move(body));

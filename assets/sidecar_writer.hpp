@@ -1,5 +1,5 @@
-// The sidecar that says how the bundled building's doors and lift move, and what else does
-// (SIDECAR.md): the study's armchair can be pushed, its globe turns when it is told to.
+// Writes the sidecar (SIDECAR.md) that describes the moving bodies of the bundled building: doors,
+// lift, the study's movable armchair and its driven globe.
 #pragma once
 
 #include <filesystem>
@@ -10,11 +10,11 @@
 
 namespace enfilade::assets {
 
-/// Bodies are named as their objects, without "building/". Doors stand open in the model; those
-/// that turn are opened by whoever walks into them.
+/// Bodies are named as their objects, without "building/". Doors are open in the model; avatars
+/// push rotating doors open by walking into them.
 std::string sidecarText(const scene::Model& model, const std::vector<MovingPart>& movingParts);
 
-/// Writes the sidecar of a GLB file beside it. Throws std::runtime_error with its name.
+/// Writes the sidecar next to the GLB file. Throws std::runtime_error with the sidecar's name.
 void writeSidecarOf(std::filesystem::path glb, const std::string& text);
 
 }  // namespace enfilade::assets

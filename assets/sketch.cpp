@@ -11,7 +11,7 @@ void appendBytes(std::string& bytes, const std::vector<T>& values) {
   bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
 }
 
-/// To the micrometre: sizes computed from different coordinates become equal.
+/// Rounds to the micrometre, so that equal sizes from different coordinates become equal.
 double rounded(double metres) {
   return std::floor(metres * 1e6 + 0.5) / 1e6;
 }

@@ -1,4 +1,4 @@
-// A model in the making: shapes are placed under a path; equal meshes are stored once.
+// A model under construction: shapes are placed under a path; equal meshes are stored once.
 #pragma once
 
 #include <map>
@@ -14,12 +14,12 @@ class Sketch {
  public:
   Sketch();
 
-  /// Throws std::logic_error when the path is taken: it is a mistake of ours.
+  /// Throws std::logic_error if the path is in use, which is a programming error.
   void place(const std::string& path, const Shape& shape, const Eigen::Affine3d& worldFromShape);
   /// The mesh is centred, so that equal boxes share it.
   void box(const std::string& path, const Vec3& low, const Vec3& high, const BoxPaints& paints);
   void box(const std::string& path, const Vec3& low, const Vec3& high, Paint paint);
-  /// The object placed last moves like this.
+  /// Sets the joint of the object placed last.
   void moves(MovingPart::Kind kind, const Vec3& axis, double low, double high);
 
   std::size_t size() const { return model_.objects.size(); }
@@ -31,11 +31,11 @@ class Sketch {
 
   scene::Model model_;
   std::vector<MovingPart> movingParts_;
-  std::map<std::string, std::uint32_t> meshes_;  ///< by their bytes
+  std::map<std::string, std::uint32_t> meshes_;  ///< keyed by their bytes
   std::set<std::string> paths_;
 };
 
-/// "name07": numbers of two digits sort as they count.
+/// "name07": two digits, so that names sort by number.
 std::string numbered(const std::string& name, int number);
 
 }  // namespace enfilade::assets

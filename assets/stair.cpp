@@ -9,7 +9,7 @@ using namespace plan;
 constexpr double kRailHeight = 0.95;  ///< above the line of the nosings
 constexpr Paint kStone = Paint::limestone;
 
-/// x where step k = 1.. begins: its riser.
+/// x of the riser of step k = 1, 2, ...
 double stepWest(int k) {
   return kStairFoot + kTread * (k - 1) + (k > kLandingRiser ? kLanding - kTread : 0);
 }
@@ -29,7 +29,7 @@ void addSteps(Sketch& sketch) {
 }
 
 struct Flight {
-  Vec3 from, to;  ///< on the line of the nosings, at the stair's middle
+  Vec3 from, to;  ///< on the line of the nosings, in the middle of the stair
 };
 
 std::vector<Flight> flights() {
@@ -83,7 +83,7 @@ Shape newelShape(double height) {
   return s;
 }
 
-/// Balusters stand on the stringers, two a tread.
+/// Adds balusters on the stringers, two a tread.
 void addStairBalusters(Sketch& sketch) {
   const Shape baluster = balusterShape(kRailHeight - 0.04);
   int number = 0;
@@ -109,7 +109,7 @@ void addStairBalusters(Sketch& sketch) {
   }
 }
 
-/// One straight run of railing on the upper floor.
+/// Adds one straight run of railing on the upper floor.
 void addRailing(Sketch& sketch, const std::string& path, Wall::Along along, double from, double to,
                 double across) {
   const double y = kUpper;
@@ -132,7 +132,7 @@ void addStair(Sketch& sketch) {
   addSteps(sketch);
   addStringersAndHandrails(sketch);
   addStairBalusters(sketch);
-  // A carpet runs up the middle of the stair.
+  // A carpet along the middle of the stair.
   for (int k = 1; k < kRisers; ++k) {
     const double y = kRiser * k;
     sketch.box(numbered("building/hall/stair/carpet", k), {stepWest(k) + 0.012, y - 0.001, -4.75},
@@ -172,13 +172,14 @@ void addLift(Sketch& sketch) {
   for (const Opening& o : doors) {
     const std::string level = path + (storey++ ? "upper" : "ground");
     addCasing(sketch, level + "/frame", front, o, true, Paint::steel);  // the cabin needs the other
+                                                                        // side
     // Two leaves that slide apart inside the shaft's front wall.
     for (const double side : {-1.0, 1.0}) {
       const double a = side < 0 ? mid - 0.5 : mid + 0.0015;
       const double z = kLiftSouth - t / 2;
       sketch.box(level + (side < 0 ? "/door_west" : "/door_east"), {a, o.bottom + 0.01, z - 0.02},
                  {a + 0.4985, o.top - 0.005, z + 0.02}, Paint::chrome);
-      sketch.moves(MovingPart::Kind::slide, {side, 0, 0}, 0, 0.44);  // up to the shaft's wall
+      sketch.moves(MovingPart::Kind::slide, {side, 0, 0}, 0, 0.44);  // as far as the shaft's wall
     }
     sketch.box(level + "/sill", {mid - 0.5, o.bottom - 0.02, kLiftSouth - t - 0.005},
                {mid + 0.5, o.bottom + 0.002, kLiftSouth + 0.005}, Paint::steel);
@@ -200,7 +201,7 @@ void addLift(Sketch& sketch) {
          Paint::chrome);
   sketch.place(path + "cabin", cabin, moved(at));
   sketch.moves(MovingPart::Kind::slide, {0, 1, 0}, 0, kUpper);
-  // It stands still: only what the cabin leaves free at its upper stop.
+  // A static roof: only the space above the cabin at its upper stop.
   const double roof = kUpper + 2.4;
   Shape cable;
   addRod(cable, {0, 0, 0}, {0, top - roof - 0.045, 0}, 0.012, 8, Paint::darkIron);

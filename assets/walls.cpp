@@ -15,7 +15,7 @@ std::vector<double> cutsOf(const Wall& wall, const std::vector<Opening>& opening
   return cuts;
 }
 
-/// The openings that a strip between two cuts meets, from the lowest up.
+/// The openings that overlap a strip between two cuts, from bottom to top.
 std::vector<Opening> holesIn(const std::vector<Opening>& openings, double from, double to) {
   std::vector<Opening> holes;
   for (const Opening& o : openings)
@@ -30,7 +30,7 @@ BoxPaints paintsOf(const Wall& w) {
   return {w.lowFace, w.highFace, w.ends, w.ends, w.ends, w.ends};
 }
 
-/// A profile in (out of the wall, up), swept along a face; its ends reach into the cross walls.
+/// A profile in (out of the wall, up), swept along a face; its ends extend into the cross walls.
 void addMoulding(Sketch& sketch, const std::string& path, const Face& f, std::vector<Vec2> profile,
                  double y, Paint paint) {
   constexpr double kInto = 0.004;
@@ -43,7 +43,7 @@ void addMoulding(Sketch& sketch, const std::string& path, const Face& f, std::ve
   sketch.place(path, shape, moved(wallPoint(f.along, start, y, f.face)));
 }
 
-/// Wavy cloth hanging from a rod, `width` wide along +X, closed solid.
+/// Wavy cloth on a rod, `width` wide along +X, a closed solid.
 Shape curtainShape(double width, double height, Paint paint) {
   constexpr int kFolds = 7;
   std::vector<Vec2> outline;
@@ -194,7 +194,7 @@ void addLeaf(Sketch& sketch, const std::string& path, const Leaf& leaf) {
     const double stile = 0.10;
     addBox(s, {0.004, y0, -kHalf}, {stile, h, kHalf}, Paint::doorWood);
     addBox(s, {w - stile, y0, -kHalf}, {w, h, kHalf}, Paint::doorWood);
-    const double rail = kHalf - 0.001;  // shallower than the stiles, so that no edge is shared
+    const double rail = kHalf - 0.001;  // shallower than the stiles, so that they share no edge
     addBox(s, {stile, y0, -rail}, {w - stile, 0.35, rail}, Paint::doorWood);
     addBox(s, {stile, h - stile, -rail}, {w - stile, h, rail}, Paint::doorWood);
     addBox(s, {stile - 0.005, 0.345, -0.004}, {w - stile + 0.005, h - stile + 0.005, 0.004},

@@ -1,4 +1,4 @@
-// Walls with openings, and what belongs to a wall: skirting, cornice, frames, windows, doors.
+// Walls with openings, and their skirting, cornices, frames, windows and doors.
 #pragma once
 
 #include <string>
@@ -8,12 +8,12 @@
 
 namespace enfilade::assets {
 
-/// An upright wall along X (its thickness along Z) or along Z (its thickness along X).
+/// A vertical wall along X (its thickness along Z) or along Z (its thickness along X).
 struct Wall {
   enum class Along : std::uint8_t { x, z };
   Along along;
   double from, to;     ///< along its length
-  double low, high;    ///< of its thickness: the coordinates of its two faces
+  double low, high;    ///< across its thickness: the coordinates of its two faces
   double bottom, top;  ///< y
   Paint lowFace, highFace;
   Paint ends = Paint::reveal;
@@ -31,12 +31,12 @@ Vec3 wallPoint(Wall::Along along, double a, double y, double across);
 void wallBox(Sketch& sketch, const std::string& path, Wall::Along along, const Vec3& low,
              const Vec3& high, Paint paint);
 
-/// The wall in upright strips between the openings, with pieces above and below them.
+/// Builds the wall of vertical strips between the openings, with pieces above and below them.
 void addWall(Sketch& sketch, const std::string& path, const Wall& wall,
              const std::vector<Opening>& openings);
 
-/// One face of a wall, seen from a room: `face` is its coordinate across, `inward` is +1 when the
-/// room lies at greater coordinates.
+/// One face of a wall, seen from a room. `face` is its coordinate across the wall; `inward` is +1
+/// if the room lies at greater coordinates.
 struct Face {
   Wall::Along along;
   double from, to;
@@ -50,7 +50,7 @@ void addCornice(Sketch& sketch, const std::string& path, const Face& face, doubl
 void addRail(Sketch& sketch, const std::string& path, const Face& face, double y, double height,
              double depth, Paint paint);
 
-/// The casing on the low or the high face, and an architrave over the lintel.
+/// Adds the casing on the low or the high face, and an architrave over the lintel.
 void addCasing(Sketch& sketch, const std::string& path, const Wall& wall, const Opening& hole,
                bool high, Paint paint);
 /// Casings on both faces.
@@ -59,22 +59,23 @@ void addDoorFrame(Sketch& sketch, const std::string& path, const Wall& wall, con
 void addThreshold(Sketch& sketch, const std::string& path, const Wall& wall, const Opening& hole,
                   Paint paint);
 
-/// One leaf, hinged at `hinge` (on the floor), which extends from there to `tip`, `width` away.
-/// `closes` counts quarter turns about +Y from where it stands to closed.
+/// One door leaf from its `hinge` (on the floor) to its `tip` at the distance `width`. `closes` is
+/// the number of quarter turns about +Y from the modelled to the closed state.
 struct Leaf {
   Vec3 hinge;
-  int quarters;  ///< where it points: 0 is +X, 1 is -Z, ...
+  int quarters;  ///< direction of the leaf: 0 is +X, 1 is -Z, ...
   double width, height;
   double closes;
   bool glazed = false;
 };
 void addLeaf(Sketch& sketch, const std::string& path, const Leaf& leaf);
 
-/// Casement with mullions, panes, sill; curtains on the inner side when `curtain` is not glass.
+/// A casement with mullions, panes and sill. Curtains hang on the inner side unless `curtain` is
+/// glass.
 struct WindowStyle {
   int columns = 2, rows = 3;
   Paint curtain = Paint::glass;
-  double inward = 1;  ///< +1 when the room lies at greater coordinates across
+  double inward = 1;  ///< +1 if the room lies at greater coordinates across the wall
   bool sill = true;
 };
 void addWindow(Sketch& sketch, const std::string& path, const Wall& wall, const Opening& hole,

@@ -10,7 +10,7 @@ namespace {
 using namespace plan;
 using Along = Wall::Along;
 
-/// One room of a wing, with what its surfaces are made of.
+/// One room of a wing and the paints of its surfaces.
 struct Room {
   const char* path;
   RoomBox box;
@@ -77,7 +77,7 @@ std::vector<Room> northRooms() {
                     kStoneTones)};
 }
 
-/// The three upper salons lie over the vestibule and two rooms each.
+/// The three upper salons are above the vestibule and two rooms each.
 std::vector<Room> upperSouthRooms() {
   const auto salon = [](const char* path, double west, double east, Paint wall) {
     return Room{path, {west, east, kMidSouth, kSouth, kUpper, kUpperCeiling},
@@ -164,7 +164,8 @@ bool isLobby(const Room& room) {
   return std::string(room.path).ends_with("lobby");
 }
 
-/// What the lift's shaft leaves of the lobbies' north wall; of other walls all.
+/// The parts of a face that the lift's shaft leaves free in the lobbies' north wall; other walls
+/// stay whole.
 std::vector<Face> besideTheLift(const Room& room, const Face& face) {
   if (!isLobby(room) || face.along != Along::x || face.face != room.box.north) return {face};
   Face west = face, east = face;
@@ -201,7 +202,7 @@ void addSurfaces(Sketch& sketch, const Room& room, Random& random) {
              {b.east + 0.002, top, b.south + 0.002}, Paint::ceiling);
 }
 
-/// The slab under an upper floor; the lobby's leaves the lift's shaft open.
+/// Adds the slab under an upper floor; the lobby's slab is open at the lift's shaft.
 void addSlab(Sketch& sketch, const Room& room) {
   const RoomBox& b = room.box;
   const double y0 = kUpper - kSlab, y1 = kUpper - 0.06;
@@ -215,7 +216,7 @@ void addSlab(Sketch& sketch, const Room& room) {
   sketch.box(path + "_south", {b.west, y0, kLiftSouth}, {b.east, y1, b.south}, Paint::concrete);
 }
 
-/// The lobbies have the lift's shaft in them: floor and ceiling are laid round it.
+/// Adds floor and ceiling of the lobbies around the lift's shaft.
 void addLobbySurfaces(Sketch& sketch, const Room& room, Random& random) {
   const RoomBox& b = room.box;
   const std::string path = room.path;
@@ -246,7 +247,7 @@ struct Storey {
   std::string path;
 };
 
-/// The wall between the bands, cut where the paint changes on either side.
+/// Adds the wall between the bands, split where the paint changes on either side.
 void addMiddleWall(Sketch& sketch, const Storey& s) {
   std::vector<double> cuts{-kOuter};
   for (const auto* rooms : {&s.south, &s.north})
@@ -307,7 +308,7 @@ void addOuterWall(Sketch& sketch, const Storey& s, const std::vector<Room>& room
   }
 }
 
-/// Walls across a band, each with its doors at the given z (nothing: no door).
+/// Adds walls across a band, each with its doors at the given z (empty: no door).
 void addCrossWalls(Sketch& sketch, const Storey& s, const std::vector<Room>& rooms, bool south,
                    double doorZ, bool doors, bool leaves) {
   for (std::size_t i = 0; i + 1 < rooms.size(); ++i) {

@@ -1,24 +1,29 @@
-# Half of a file's compile time goes into headers that hardly ever change. Two sets of them are
-# compiled once: for what computes, and for tests, which also read GoogleTest. Only the standard
-# library and third parties stand in here; every file still includes all that it needs, and the
-# build by clang, which goes without, proves it.
+# Precompiles the headers of the standard library and of third parties, which take half of a file's
+# compile time. There are four sets: computation; code with messages (protobuf, JSON); and both with
+# GoogleTest. Each file still includes all its headers: the clang build does not precompile them.
 
 set(ENFILADE_PRECOMPILED_HEADERS
   <Eigen/Core> <Eigen/Geometry>
   <algorithm> <array> <chrono> <cmath> <cstdint> <cstdio> <cstring> <deque> <filesystem> <fstream>
   <functional> <limits> <map> <memory> <mutex> <optional> <random> <set> <span> <sstream>
   <stdexcept> <string> <string_view> <thread> <tuple> <utility> <variant> <vector>)
+set(ENFILADE_PRECOMPILED_MESSAGES
+  <google/protobuf/generated_enum_reflection.h> <google/protobuf/generated_message_reflection.h>
+  <google/protobuf/generated_message_util.h> <google/protobuf/message.h>
+  <google/protobuf/repeated_field.h> <google/protobuf/unknown_field_set.h>
+  <nlohmann/json.hpp>)
 
-# enfilade_precompiled(NAME HEADERS...): a target that does nothing but compile the headers.
+# enfilade_precompiled(NAME HEADERS... [LIBRARIES...]): a target that only compiles the headers.
 function(enfilade_precompiled name)
+  cmake_parse_arguments(P "" "" "HEADERS;LIBRARIES" ${ARGN})
   set(empty ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp)
   file(CONFIGURE OUTPUT ${empty} CONTENT "")
   add_library(${name} OBJECT EXCLUDE_FROM_ALL ${empty})
-  target_link_libraries(${name} PRIVATE Eigen3::Eigen)
-  target_precompile_headers(${name} PRIVATE ${ARGN})
+  target_link_libraries(${name} PRIVATE Eigen3::Eigen ${P_LIBRARIES})
+  target_precompile_headers(${name} PRIVATE ${ENFILADE_PRECOMPILED_HEADERS} ${P_HEADERS})
 endfunction()
 
-# All targets below `folder`, without benchmarks/: what the peers ask of the compiler is their own.
+# All targets below `folder` except those of benchmarks/, whose flags depend on the peers.
 function(enfilade_targets_below folder into)
   get_directory_property(targets DIRECTORY ${folder} BUILDSYSTEM_TARGETS)
   get_directory_property(subfolders DIRECTORY ${folder} SUBDIRECTORIES)
@@ -37,27 +42,42 @@ function(enfilade_precompile_headers root)
   endif()
   enfilade_targets_below(${root} targets)
   find_package(Eigen3 3.4 REQUIRED NO_MODULE)
-  enfilade_precompiled(enfilade_precompiled_code ${ENFILADE_PRECOMPILED_HEADERS})
+  find_package(nlohmann_json REQUIRED)
+  find_package(Protobuf REQUIRED)
+  set(messages HEADERS ${ENFILADE_PRECOMPILED_MESSAGES}
+               LIBRARIES protobuf::libprotobuf nlohmann_json::nlohmann_json)
+  enfilade_precompiled(enfilade_precompiled_code)
+  enfilade_precompiled(enfilade_precompiled_messages ${messages})
   if(ENFILADE_TESTS)
     find_package(GTest REQUIRED)
-    enfilade_precompiled(enfilade_precompiled_tests ${ENFILADE_PRECOMPILED_HEADERS} <gtest/gtest.h>)
-    target_link_libraries(enfilade_precompiled_tests PRIVATE GTest::gtest)
-    target_compile_options(enfilade_precompiled_tests PRIVATE ${ENFILADE_UNHURRIED})
+    enfilade_precompiled(enfilade_precompiled_tests HEADERS <gtest/gtest.h> LIBRARIES GTest::gtest)
+    enfilade_precompiled(enfilade_precompiled_message_tests
+      HEADERS ${ENFILADE_PRECOMPILED_MESSAGES} <gtest/gtest.h>
+      LIBRARIES protobuf::libprotobuf nlohmann_json::nlohmann_json GTest::gtest)
+    target_compile_options(enfilade_precompiled_tests PRIVATE ${ENFILADE_TEST_OPTIONS})
+    target_compile_options(enfilade_precompiled_message_tests PRIVATE ${ENFILADE_TEST_OPTIONS})
   endif()
+  set(with_messages enfilade_server enfilade_protocol protocol_tests server_tests replay_tests
+                    difference_tests)
   set(unhurried "")
   if(ENFILADE_UNHURRIED)
-    set(unhurried enfilade_import enfilade_server)  # their flags are those of tests
+    set(unhurried enfilade_import enfilade_server)  # compiled with the flags of tests
   endif()
   foreach(target ${targets})
     get_target_property(type ${target} TYPE)
     if(type STREQUAL "UTILITY" OR target STREQUAL "enfilade_messages")
-      continue()  # nothing to compile, or nothing that would read these headers
+      continue()  # nothing to compile, or none of these headers
     elseif(NOT ENFILADE_TESTS AND target IN_LIST unhurried)
       continue()
-    elseif(target MATCHES "_tests$" OR target IN_LIST unhurried)
-      target_precompile_headers(${target} REUSE_FROM enfilade_precompiled_tests)
-    else()
-      target_precompile_headers(${target} REUSE_FROM enfilade_precompiled_code)
     endif()
+    set(kind code)
+    if(target IN_LIST with_messages)
+      set(kind messages)
+    endif()
+    if(target MATCHES "_tests$" OR target IN_LIST unhurried)
+      string(REPLACE code tests kind ${kind})
+      string(REPLACE messages message_tests kind ${kind})
+    endif()
+    target_precompile_headers(${target} REUSE_FROM enfilade_precompiled_${kind})
   endforeach()
 endfunction()

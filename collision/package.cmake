@@ -1,15 +1,35 @@
-# The library alone: `cmake --install BUILD --prefix P --component collision` installs it with these
-# headers and a package, so that find_package(enfilade_collision) gives enfilade::collision.
-# Headers that are not listed are internal; a listed one may include listed ones only.
+# Installs the collision library alone: `cmake --install BUILD --prefix P --component collision`.
+# find_package(enfilade_collision) then provides the target enfilade::collision.
+# Headers that are not listed are internal. A listed header may include listed headers only.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 set(public_headers
-  bounds/bounding_box.hpp shapes/box_tree.hpp broad_phase/broad_phase_audit.hpp narrow_phase/contact_manifold.hpp motion/time_to_contact.hpp
-  motion/moving_pose.hpp shapes/hull.hpp compound/hull_planes.hpp compound/query_bounds.hpp compound/mesh_query.hpp narrow_phase/narrow_phase.hpp
+  bounds/bounding_box.hpp
+  broad_phase/broad_phase_audit.hpp
+  broad_phase/sort_and_sweep.hpp
   compound/compound_distance.hpp
-  compound/compound_shape.hpp narrow_phase/penetration_depth.hpp narrow_phase/refine.hpp broad_phase/sort_and_sweep.hpp motion/shape_cast.hpp motion/rotational_shape_cast.hpp
-  shapes/triangle_tree.hpp types.hpp motion/pair_schedule.hpp)
+  compound/compound_shape.hpp
+  compound/hull_planes.hpp
+  compound/mesh_query.hpp
+  compound/query_bounds.hpp
+  minkowski/feature_cache.hpp
+  minkowski/verdict.hpp
+  motion/moving_pose.hpp
+  motion/pair_schedule.hpp
+  motion/rotational_shape_cast.hpp
+  motion/shape_cast.hpp
+  motion/time_of_impact.hpp
+  motion/time_to_contact.hpp
+  narrow_phase/contact_manifold.hpp
+  narrow_phase/narrow_phase.hpp
+  narrow_phase/penetration_depth.hpp
+  narrow_phase/refine.hpp
+  shapes/box_tree.hpp
+  shapes/hull.hpp
+  shapes/placed_convex.hpp
+  shapes/triangle_tree.hpp
+  types.hpp)
 target_sources(enfilade_collision PUBLIC
   FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${public_headers})
 target_compile_features(enfilade_collision PUBLIC cxx_std_20)

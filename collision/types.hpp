@@ -1,7 +1,7 @@
-// The plain data that all of Enfilade's geometry speaks in.
+// Basic geometric types of Enfilade: vectors, poses and axis-aligned boxes.
 //
-// Metres, seconds, radians; right-handed, Y up; doubles. A transform's name tells its direction:
-// `worldFromBody` takes a point of the body's frame to the world's frame.
+// Metres, seconds, radians; right-handed, Y up; doubles. The name of a transform states its
+// direction: `worldFromBody` maps a point of the body frame to the world frame.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,14 +15,14 @@ using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 using Quat = Eigen::Quaterniond;
 
-/// A rigid placement: `rotation` is a unit quaternion, `translation` is in metres.
+/// Rigid transform: `rotation` is a unit quaternion, `translation` is in metres.
 struct Pose {
   Quat rotation = Quat::Identity();
   Vec3 translation = Vec3::Zero();
 };
 
-/// A closed axis-aligned box. `min` > `max` on any axis means empty.
-struct Box {
+/// Closed axis-aligned bounding box. It is empty if `min` > `max` on any axis.
+struct Aabb {
   Vec3 min = Vec3::Constant(std::numeric_limits<double>::infinity());
   Vec3 max = Vec3::Constant(-std::numeric_limits<double>::infinity());
 
@@ -30,7 +30,7 @@ struct Box {
     min = min.cwiseMin(point);
     max = max.cwiseMax(point);
   }
-  void include(const Box& other) {
+  void include(const Aabb& other) {
     min = min.cwiseMin(other.min);
     max = max.cwiseMax(other.max);
   }
@@ -39,27 +39,27 @@ struct Box {
   Vec3 size() const { return max - min; }
 };
 
-/// Closed boxes that share a boundary point overlap.
-inline bool overlaps(const Box& a, const Box& b) {
+/// True if the closed boxes share a point. Boxes that only touch overlap.
+inline bool overlaps(const Aabb& a, const Aabb& b) {
   return a.min.x() <= b.max.x() && b.min.x() <= a.max.x() && a.min.y() <= b.max.y() &&
          b.min.y() <= a.max.y() && a.min.z() <= b.max.z() && b.min.z() <= a.max.z();
 }
 
-/// Whether `inner` lies wholly in `outer`; an empty `outer` holds nothing.
-inline bool contains(const Box& outer, const Box& inner) {
+/// True if `inner` lies entirely in `outer`. An empty `outer` contains no box.
+inline bool contains(const Aabb& outer, const Aabb& inner) {
   return (outer.min.array() <= inner.min.array()).all() &&
          (inner.max.array() <= outer.max.array()).all();
 }
 
-/// The box of all points within `margin` metres of `box` along each axis.
-inline Box grown(const Box& box, double margin) {
+/// `box` extended by `margin` metres in both directions of each axis.
+inline Aabb inflated(const Aabb& box, double margin) {
   return {box.min - Vec3::Constant(margin), box.max + Vec3::Constant(margin)};
 }
 
-/// The box swept by `box` when it moves by `displacement`.
-inline Box swept(const Box& box, const Vec3& displacement) {
-  Box result = box;
-  result.include(Box{box.min + displacement, box.max + displacement});
+/// Bounding box of the motion of `box` by `displacement` (metres).
+inline Aabb sweptAabb(const Aabb& box, const Vec3& displacement) {
+  Aabb result = box;
+  result.include(Aabb{box.min + displacement, box.max + displacement});
   return result;
 }
 

@@ -26,8 +26,8 @@ void appendLittleEndian(std::vector<std::uint8_t>& bytes, std::uint32_t value) {
   }
 }
 
-/// The bytes as hexadecimal digits and, where they are all printable, as text.
-std::string shown(std::span<const std::uint8_t> bytes) {
+/// Formats bytes as hexadecimal digits and, if all are printable, also as text.
+std::string formatBytes(std::span<const std::uint8_t> bytes) {
   static constexpr char digits[] = "0123456789abcdef";
   std::string hex, text;
   for (const std::uint8_t byte : bytes) {
@@ -40,7 +40,7 @@ std::string shown(std::span<const std::uint8_t> bytes) {
 
 }  // namespace
 
-int majorOf(std::string_view version) {
+int parseMajorVersion(std::string_view version) {
   int major = -1;
   const char* end = version.data() + version.size();
   const auto [dot, problem] = std::from_chars(version.data(), end, major);
@@ -52,10 +52,10 @@ Decoder::Decoder(const FramingLimits& limits, Expect expect)
 
 std::optional<Message> Decoder::next(std::span<const std::uint8_t>& bytes) {
   if (error_) return std::nullopt;
-  if (!magicSeen_ && !takeMagic(bytes)) return std::nullopt;
-  if (!takeLengths(bytes)) return std::nullopt;
-  if (!takePart(bytes, message_.header, headerLength_)) return std::nullopt;
-  if (!takePart(bytes, message_.attachment, attachmentLength_)) return std::nullopt;
+  if (!magicSeen_ && !readMagic(bytes)) return std::nullopt;
+  if (!readLengths(bytes)) return std::nullopt;
+  if (!readPart(bytes, message_.header, headerLength_)) return std::nullopt;
+  if (!readPart(bytes, message_.attachment, attachmentLength_)) return std::nullopt;
   prefixLength_ = 0;
   return std::exchange(message_, Message{});
 }
@@ -64,8 +64,8 @@ std::size_t Decoder::bytesHeld() const {
   return message_.header.capacity() + message_.attachment.capacity();
 }
 
-/// Fills prefix_ up to `wanted` bytes; false when more must come.
-bool Decoder::takePrefix(std::span<const std::uint8_t>& bytes, std::size_t wanted) {
+/// Fills prefix_ up to `wanted` bytes. Returns false if more bytes are needed.
+bool Decoder::readPrefix(std::span<const std::uint8_t>& bytes, std::size_t wanted) {
   const std::size_t count = std::min(wanted - prefixLength_, bytes.size());
   if (count > 0) std::memcpy(prefix_.data() + prefixLength_, bytes.data(), count);
   prefixLength_ += count;
@@ -74,16 +74,16 @@ bool Decoder::takePrefix(std::span<const std::uint8_t>& bytes, std::size_t wante
   return prefixLength_ == wanted;
 }
 
-bool Decoder::takeMagic(std::span<const std::uint8_t>& bytes) {
-  const bool whole = takePrefix(bytes, kMagic.size());
-  // The first wrong byte is enough: a silent sender of garbage is not waited for.
+bool Decoder::readMagic(std::span<const std::uint8_t>& bytes) {
+  const bool whole = readPrefix(bytes, kMagic.size());
+  // One wrong byte is enough, so that a sender of garbage fails without further bytes.
   if (!std::equal(prefix_.begin(), prefix_.begin() + static_cast<std::ptrdiff_t>(prefixLength_),
                   kMagic.begin())) {
     constexpr std::uint8_t kTlsHandshake = 0x16;
     fail(FramingError::Code::badMagic, 0,
-         "the stream begins with " + shown({prefix_.data(), prefixLength_}) + " instead of " +
-             shown(kMagic) +
-             (prefix_[0] == kTlsHandshake ? "; is that TLS? A proxy in front has to take that off"
+         "the stream begins with " + formatBytes({prefix_.data(), prefixLength_}) + " instead of " +
+             formatBytes(kMagic) +
+             (prefix_[0] == kTlsHandshake ? "; is that TLS? A proxy in front has to remove it"
                                           : ""));
     return false;
   }
@@ -93,20 +93,20 @@ bool Decoder::takeMagic(std::span<const std::uint8_t>& bytes) {
   return true;
 }
 
-bool Decoder::takeLengths(std::span<const std::uint8_t>& bytes) {
+bool Decoder::readLengths(std::span<const std::uint8_t>& bytes) {
   constexpr std::size_t both = 2 * kLengthBytes;
   if (prefixLength_ == both) return true;
-  if (!takePrefix(bytes, both)) return false;
+  if (!readPrefix(bytes, both)) return false;
   const std::uint64_t start = offset_ - both;
   const std::uint32_t total = littleEndian(prefix_.data());
   headerLength_ = littleEndian(prefix_.data() + kLengthBytes);
   if (total > limits_.total) {
     fail(FramingError::Code::tooLarge, start,
-         "a message of " + std::to_string(total) + " bytes is above the limit of " +
+         "a message of " + std::to_string(total) + " bytes exceeds the limit of " +
              std::to_string(limits_.total));
   } else if (headerLength_ > limits_.header) {
     fail(FramingError::Code::tooLarge, start + kLengthBytes,
-         "a header of " + std::to_string(headerLength_) + " bytes is above the limit of " +
+         "a header of " + std::to_string(headerLength_) + " bytes exceeds the limit of " +
              std::to_string(limits_.header));
   } else if (total < kLengthBytes || headerLength_ > total - kLengthBytes) {
     fail(FramingError::Code::badLength, start,
@@ -118,9 +118,9 @@ bool Decoder::takeLengths(std::span<const std::uint8_t>& bytes) {
   return !error_;
 }
 
-/// Appends to `part` until it has `wanted` bytes; false when more must come. Room follows the bytes
-/// that came, not the length that was claimed.
-bool Decoder::takePart(std::span<const std::uint8_t>& bytes, std::vector<std::uint8_t>& part,
+/// Appends to `part` until it has `wanted` bytes. Returns false if more bytes are needed. Memory
+/// grows with the received bytes, not with the claimed length.
+bool Decoder::readPart(std::span<const std::uint8_t>& bytes, std::vector<std::uint8_t>& part,
                        std::size_t wanted) {
   const std::size_t count = std::min(wanted - part.size(), bytes.size());
   if (part.size() + count > part.capacity()) {
@@ -138,8 +138,8 @@ void Decoder::fail(FramingError::Code code, std::uint64_t offset, std::string re
   message_ = Message{};
 }
 
-bool parse(std::span<const std::uint8_t> header, google::protobuf::MessageLite& into) {
-  // For the whole process: libprotobuf has no other switch.
+bool parseHeader(std::span<const std::uint8_t> header, google::protobuf::MessageLite& into) {
+  // Applies to the whole process, because libprotobuf has no other switch.
   [[maybe_unused]] static const auto silenced = google::protobuf::SetLogHandler(nullptr);
   return header.size() <= std::numeric_limits<std::int32_t>::max() &&
          into.ParseFromArray(header.data(), static_cast<int>(header.size()));
@@ -156,7 +156,7 @@ std::vector<std::uint8_t> encodeHead(const google::protobuf::MessageLite& header
                                      std::size_t attachmentLength) {
   const std::size_t headerLength = header.ByteSizeLong();
   const std::size_t total = kLengthBytes + headerLength + attachmentLength;
-  // Protobuf itself ends at 2 GiB.
+  // Protobuf's own limit is 2 GiB.
   if (headerLength > std::numeric_limits<std::int32_t>::max() ||
       total > std::numeric_limits<std::uint32_t>::max()) {
     throw std::length_error("a message of " + std::to_string(total) +

@@ -1,4 +1,4 @@
-// How messages lie on a byte stream. Each side first sends four bytes of magic, then messages:
+// Framing of messages on a byte stream. Each side first sends four magic bytes, then messages:
 //
 //   u32 total | u32 headerLength | header (protobuf) | attachment (raw bytes, may be empty)
 //
@@ -26,16 +26,17 @@ inline constexpr std::array<std::uint8_t, 4> kMagic{'E', 'N', 'F', '1'};
 inline constexpr const char* kVersion = "1.0.0";
 inline constexpr int kMajorVersion = 1;
 
-/// The number before the first dot of a semantic version; -1 when there is none.
-int majorOf(std::string_view version);
+/// Parses the major number of a semantic version; -1 if invalid.
+int parseMajorVersion(std::string_view version);
 
-/// What a receiver takes. A message above it is refused before memory is spent on it.
+/// Size limits of a receiver. A larger message is refused before memory is allocated for it.
 struct FramingLimits {
   std::uint32_t total = 0;   ///< bytes, the value of the field `total`
   std::uint32_t header = 0;  ///< bytes
 };
-inline constexpr FramingLimits kServerTakes{1u << 20, 1u << 20};  ///< from a client
-inline constexpr FramingLimits kClientTakes{1u << 28, 1u << 24};  ///< from a server: pictures
+inline constexpr FramingLimits kServerLimits{1u << 20, 1u << 20};  ///< from a client
+inline constexpr FramingLimits kClientLimits{1u << 28, 1u << 24};  ///< from a server: includes
+                                                                   ///< pictures
 
 struct Message {
   std::vector<std::uint8_t> header;
@@ -45,37 +46,37 @@ struct Message {
 struct FramingError {
   enum class Code : std::uint8_t {
     badMagic,
-    tooLarge,  ///< above FramingLimits
+    tooLarge,  ///< exceeds FramingLimits
     badLength  ///< the two lengths contradict each other
   };
   Code code = Code::badMagic;
-  std::string reason;        ///< one sentence: what was met and what was expected
-  std::uint64_t offset = 0;  ///< bytes from the start of the stream to what is wrong
+  std::string reason;        ///< one sentence: received and expected bytes
+  std::uint64_t offset = 0;  ///< position of the error in the stream, bytes
 };
 
-/// Takes a stream in pieces of any size and gives its messages. Holds at most one unfinished
-/// message, and no more memory than the bytes of it that came, doubled at most.
+/// Decodes messages from a stream in pieces of any size. Holds at most one incomplete message, and
+/// at most twice the memory of its received bytes.
 class Decoder {
  public:
   enum class Expect : std::uint8_t { magicFirst, messages };
   explicit Decoder(const FramingLimits& limits, Expect expect = Expect::magicFirst);
 
-  /// Takes bytes from the front of `bytes` until a message is whole, and returns it. nullopt: all
-  /// bytes were taken and more are needed, or error() holds. After an error nothing is taken.
+  /// Consumes bytes from the front of `bytes` until a message is complete, and returns it.
+  /// nullopt: all bytes were consumed, or error() is set. After an error no bytes are consumed.
   std::optional<Message> next(std::span<const std::uint8_t>& bytes);
 
   const std::optional<FramingError>& error() const { return error_; }
   bool magicSeen() const { return magicSeen_; }
-  /// The stream may end here: no message is half-way.
+  /// True if the stream may end here, between two messages.
   bool betweenMessages() const { return magicSeen_ && !error_ && prefixLength_ == 0; }
-  std::uint64_t offset() const { return offset_; }  ///< bytes taken so far
-  std::size_t bytesHeld() const;                    ///< capacity held for the message
+  std::uint64_t offset() const { return offset_; }  ///< bytes consumed so far
+  std::size_t bytesHeld() const;                    ///< capacity allocated for the message
 
  private:
-  bool takePrefix(std::span<const std::uint8_t>& bytes, std::size_t wanted);
-  bool takeMagic(std::span<const std::uint8_t>& bytes);
-  bool takeLengths(std::span<const std::uint8_t>& bytes);
-  bool takePart(std::span<const std::uint8_t>& bytes, std::vector<std::uint8_t>& part,
+  bool readPrefix(std::span<const std::uint8_t>& bytes, std::size_t wanted);
+  bool readMagic(std::span<const std::uint8_t>& bytes);
+  bool readLengths(std::span<const std::uint8_t>& bytes);
+  bool readPart(std::span<const std::uint8_t>& bytes, std::vector<std::uint8_t>& part,
                 std::size_t wanted);
   void fail(FramingError::Code code, std::uint64_t offset, std::string reason);
 
@@ -90,16 +91,16 @@ class Decoder {
   std::optional<FramingError> error_;
 };
 
-/// One message as it goes over the wire, without magic. Throws std::length_error when it does not
-/// fit into `total`.
+/// Encodes one message, without magic bytes. Throws std::length_error if it does not fit into
+/// `total`.
 std::vector<std::uint8_t> encode(const google::protobuf::MessageLite& header,
                                  std::span<const std::uint8_t> attachment = {});
-/// The same without the attachment, whose bytes go out behind it.
+/// The same without the attachment, whose bytes the caller sends after it.
 std::vector<std::uint8_t> encodeHead(const google::protobuf::MessageLite& header,
                                      std::size_t attachmentLength);
 
-/// Reads a message's header; false when it is none. Unlike ParseFromArray() it writes nothing to
-/// stderr, which a hostile peer could fill.
-bool parse(std::span<const std::uint8_t> header, google::protobuf::MessageLite& into);
+/// Parses a message header; false if invalid. Unlike ParseFromArray() it does not write to stderr,
+/// which a hostile peer could flood.
+bool parseHeader(std::span<const std::uint8_t> header, google::protobuf::MessageLite& into);
 
 }  // namespace enfilade::protocol

@@ -1,21 +1,21 @@
-// How deep a JSON value is nested: nlohmann writes values by recursion, and a file of brackets
-// alone would end the program.
+// Nesting depth of JSON values. nlohmann serialises by recursion, so that a file of brackets would
+// overflow the stack.
 #pragma once
 
 #include <algorithm>
 
 namespace enfilade::protocol {
 
-/// Lists and objects in one another: more than any file of ours has.
-inline constexpr int kDeepestNest = 16;
+/// Maximum nesting of lists and objects; Enfilade's own files have less.
+inline constexpr int kMaxJsonDepth = 16;
 
-/// Whether more than `depth` lists and objects lie in one another.
+/// True if lists and objects are nested deeper than `depth`.
 template <class Json>
-bool isDeeper(const Json& value, int depth) {
+bool isDeeperThan(const Json& value, int depth) {
   if (!value.is_structured()) return false;
   if (depth == 0) return true;
   return std::any_of(value.begin(), value.end(),
-                     [&](const Json& inner) { return isDeeper(inner, depth - 1); });
+                     [&](const Json& inner) { return isDeeperThan(inner, depth - 1); });
 }
 
 }  // namespace enfilade::protocol

@@ -20,19 +20,19 @@ void appendLittleEndian(std::vector<std::uint8_t>& bytes, std::uint64_t value) {
 
 }  // namespace
 
-std::vector<std::uint8_t> encodeHeadOfJoined(std::uint32_t field, std::string_view first,
-                                             std::size_t secondLength) {
-  constexpr std::size_t kLength = 4;             // bytes of framing, twice: see framing.hpp
+std::vector<std::uint8_t> encodeSplicedHead(std::uint32_t field, std::string_view first,
+                                            std::size_t secondLength) {
+  constexpr std::size_t kLength = 4;             // bytes of each of the two lengths in framing.hpp
   constexpr std::uint32_t kLengthDelimited = 2;  // protobuf's wire type of messages
-  constexpr std::size_t kMostOfHead = 20;        // bytes: tag and length
+  constexpr std::size_t kMaxHeadBytes = 20;      // bytes: tag and length
   std::vector<std::uint8_t> head;
-  head.reserve(kMostOfHead);
+  head.reserve(kMaxHeadBytes);
   appendVarint(head, field << 3 | kLengthDelimited);
   appendVarint(head, first.size() + secondLength);
   const std::size_t headerLength = head.size() + first.size() + secondLength;
   if (headerLength > std::numeric_limits<std::int32_t>::max()) {
     throw std::length_error("a message of " + std::to_string(headerLength) +
-                            " bytes is more than protobuf takes");
+                            " bytes exceeds the limit of protobuf");
   }
   std::vector<std::uint8_t> bytes;
   bytes.reserve(2 * kLength + head.size() + first.size());

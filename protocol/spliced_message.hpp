@@ -1,4 +1,4 @@
-// One message for many: what they share is serialized once, what differs is joined to it.
+// Messages for many clients: the shared part is serialised once, the part per client is appended.
 #pragma once
 
 #include <cstddef>
@@ -8,10 +8,10 @@
 
 namespace enfilade::protocol {
 
-/// As encode(), of a header whose only field is the message number `field`, given as two serialized
-/// parts: protobuf joins messages by joining their bytes. The second part goes out behind what is
-/// returned. Throws std::length_error, as encode().
-std::vector<std::uint8_t> encodeHeadOfJoined(std::uint32_t field, std::string_view first,
-                                             std::size_t secondLength);
+/// Encodes a header whose only field, number `field`, is a message in two serialised parts.
+/// Protobuf merges messages by concatenating their bytes. The caller sends the second part after
+/// the returned bytes. Throws std::length_error, as encode().
+std::vector<std::uint8_t> encodeSplicedHead(std::uint32_t field, std::string_view first,
+                                            std::size_t secondLength);
 
 }  // namespace enfilade::protocol

@@ -1,4 +1,4 @@
-// Shade in hollows: corners, joints and what stands on something look joined to it.
+// Screen-space ambient occlusion from the depth buffer.
 #pragma once
 
 #include <cstdint>
@@ -9,40 +9,41 @@
 
 namespace enfilade::render {
 
-/// Works on a picture's depth alone, so that both renderers shade alike.
-class Hollows {
+/// Ambient occlusion of one frame. Uses only its depth, so that both renderers shade equally.
+class AmbientOcclusion {
  public:
-  /// `depth` is Frame::depth of a picture taken with `camera`; kept by reference.
-  Hollows(const std::vector<float>& depth, const Camera& camera);
+  /// `depth` is Frame::depth of a frame of `camera`; kept by reference.
+  AmbientOcclusion(const std::vector<float>& depth, const Camera& camera);
 
-  /// Of each pixel of row `y`, how much of its colour is left: 255 all of it. Rows may be asked for
-  /// by several threads.
-  void row(int y, std::span<std::uint8_t> left) const;
+  /// Writes the visibility of each pixel of row `y`: 255 means unoccluded. Thread-safe.
+  void computeRow(int y, std::span<std::uint8_t> visibility) const;
 
  private:
   const std::vector<float>& depth_;
   std::size_t width_;
   bool parallel_;
-  std::size_t columns_;         ///< of the points
-  std::vector<float> places_;   ///< z-distance of each point, metres; nothing: very far
-  std::vector<float> shadows_;  ///< of each point, what it takes from a byte of 255
+  std::size_t columns_;           ///< of the sample grid
+  std::vector<float> distances_;  ///< z-distance of each sample, metres; very large without surface
+  std::vector<float> occlusion_;  ///< occlusion of each sample, subtracted from 255
 };
 
-/// Darkens sRGB bytes. `clear`: 255 where nothing hides the hollow from the eye, 0 where all does.
-inline void darken(const std::uint8_t* from, std::uint8_t left, std::uint8_t clear,
-                   std::uint8_t* to) {
+/// Applies ambient occlusion to sRGB bytes. `visibility`: see computeRow(). `transmittance`: of the
+/// transparent surfaces before the pixel; 255: none covers it, 0: the occlusion is invisible.
+inline void applyAo(const std::uint8_t* from, std::uint8_t visibility, std::uint8_t transmittance,
+                    std::uint8_t* to) {
   constexpr unsigned kAll = 255 * 255;
-  if (clear == 255) {  // mostly; a division by 255, rounded, without one
-    const auto shaded = [left](unsigned value) {
-      const unsigned product = value * left + 128;
+  if (transmittance == 255) {  // common case; rounded division by 255 without a division
+    const auto shaded = [visibility](unsigned value) {
+      const unsigned product = value * visibility + 128;
       return static_cast<std::uint8_t>((product + (product >> 8)) >> 8);
     };
     const std::uint8_t r = shaded(from[0]), g = shaded(from[1]), b = shaded(from[2]);
     to[0] = r, to[1] = g, to[2] = b;
     return;
   }
-  const unsigned kept = kAll - unsigned{clear} * (255u - left);
-  for (int i = 0; i < 3; ++i) to[i] = static_cast<std::uint8_t>((from[i] * kept + kAll / 2) / kAll);
+  const unsigned retained = kAll - unsigned{transmittance} * (255u - visibility);
+  for (int i = 0; i < 3; ++i)
+    to[i] = static_cast<std::uint8_t>((from[i] * retained + kAll / 2) / kAll);
 }
 
 }  // namespace enfilade::render

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::render {
 namespace {
 
@@ -20,8 +22,8 @@ void addPolygon(AvatarMeshes& meshes, const MeshRange& range, const std::vector<
   }
 }
 
-AvatarMeshes::Piece beginPiece(const AvatarMeshes& meshes, const scene::AvatarView& avatar,
-                               const Eigen::Vector3f& colour, float glow) {
+AvatarMeshes::Item beginItem(const AvatarMeshes& meshes, const scene::AvatarSnapshot& avatar,
+                             const Eigen::Vector3f& colour, float glow) {
   scene::Material material;
   material.baseColour.head<3>() = colour;
   material.emissive = glow * colour;
@@ -29,56 +31,56 @@ AvatarMeshes::Piece beginPiece(const AvatarMeshes& meshes, const scene::AvatarVi
   MeshRange range;
   range.firstIndex = static_cast<std::uint32_t>(meshes.indices.size());
   range.baseVertex = static_cast<std::int32_t>(meshes.vertices.size());
-  return {range, avatar.feet, {}, materialData(material), avatar.id};
+  return {range, avatar.footPosition, {}, makeMaterialData(material), avatar.id};
 }
 
-void endPiece(AvatarMeshes& meshes, AvatarMeshes::Piece piece) {
-  piece.range.indexCount =
-      static_cast<std::uint32_t>(meshes.indices.size()) - piece.range.firstIndex;
-  for (auto v = static_cast<std::size_t>(piece.range.baseVertex); v < meshes.vertices.size(); ++v) {
+void endItem(AvatarMeshes& meshes, AvatarMeshes::Item item) {
+  item.range.indexCount = static_cast<std::uint32_t>(meshes.indices.size()) - item.range.firstIndex;
+  for (auto v = static_cast<std::size_t>(item.range.baseVertex); v < meshes.vertices.size(); ++v) {
     const float* p = meshes.vertices[v].position;
-    piece.box.include(piece.feet + Vec3(p[0], p[1], p[2]));
+    item.box.include(item.footPosition + Vec3(p[0], p[1], p[2]));
   }
-  if (piece.range.indexCount > 0) meshes.pieces.push_back(piece);
+  if (item.range.indexCount > 0) meshes.items.push_back(item);
 }
 
-void addBody(AvatarMeshes& meshes, const scene::AvatarView& avatar) {
-  const AvatarMeshes::Piece piece = beginPiece(meshes, avatar, avatarColour(avatar.id), 0.10f);
+void addBody(AvatarMeshes& meshes, const scene::AvatarSnapshot& avatar) {
+  const AvatarMeshes::Item item = beginItem(meshes, avatar, avatarColour(avatar.id), 0.10f);
   for (const scene::AvatarPart& part : avatar.shape->parts) {
     for (const auto& face : part.hull->faces) {
       std::vector<Vec3> corners;
       for (const std::uint32_t vertex : face)
         corners.push_back(part.rotation * part.hull->vertices[vertex] + part.offset);
-      addPolygon(meshes, piece.range, corners);
+      addPolygon(meshes, item.range, corners);
     }
   }
-  endPiece(meshes, piece);
+  endItem(meshes, item);
 }
 
-/// A pale wedge at the height of the eyes: its tip points where the avatar looks.
-void addVisor(AvatarMeshes& meshes, const scene::AvatarView& avatar) {
-  double reach = 0;  // metres from the axis to the rim of the hull
+/// A pale wedge at eye height whose tip points in the view direction.
+void addVisor(AvatarMeshes& meshes, const scene::AvatarSnapshot& avatar) {
+  ENFILADE_ASSERT(!avatar.shape->parts.empty());
+  double radius = 0;  // metres from the axis to the rim of the hull
   for (const Vec3& v : avatar.shape->parts.front().hull->vertices)
-    reach = std::max(reach, std::hypot(v.x(), v.z()));
-  Vec3 ahead(avatar.gaze.x(), 0, avatar.gaze.z());
+    radius = std::max(radius, std::hypot(v.x(), v.z()));
+  Vec3 ahead(avatar.viewDirection.x(), 0, avatar.viewDirection.z());
   ahead = ahead.norm() > 1e-6 ? ahead.normalized() : Vec3(Vec3::UnitX());
   const Vec3 aside = ahead.cross(Vec3::UnitY());
   const Vec3 eyes(0, avatar.eyeHeight, 0);
-  const double half = 0.35 * reach;  // of the wedge's height
-  const double lift = std::clamp(avatar.gaze.y(), -0.7, 0.7) * reach;
-  const Vec3 tip = eyes + 1.6 * reach * ahead + Vec3(0, lift, 0);
-  const Vec3 root = eyes + 0.5 * reach * ahead;
+  const double half = 0.35 * radius;  // of the wedge's height
+  const double lift = std::clamp(avatar.viewDirection.y(), -0.7, 0.7) * radius;
+  const Vec3 tip = eyes + 1.6 * radius * ahead + Vec3(0, lift, 0);
+  const Vec3 root = eyes + 0.5 * radius * ahead;
   const Vec3 thick(0, half, 0);
   const std::array<Vec3, 4> base{
-      root - 0.8 * reach * aside - thick, root + 0.8 * reach * aside - thick,
-      root + 0.8 * reach * aside + thick, root - 0.8 * reach * aside + thick};
-  const AvatarMeshes::Piece piece =
-      beginPiece(meshes, avatar, Eigen::Vector3f(0.9f, 0.88f, 0.8f), 0.15f);
+      root - 0.8 * radius * aside - thick, root + 0.8 * radius * aside - thick,
+      root + 0.8 * radius * aside + thick, root - 0.8 * radius * aside + thick};
+  const AvatarMeshes::Item item =
+      beginItem(meshes, avatar, Eigen::Vector3f(0.9f, 0.88f, 0.8f), 0.15f);
   for (std::size_t i = 0; i < base.size(); ++i) {
-    addPolygon(meshes, piece.range, {base[i], base[(i + 1) % base.size()], tip});
+    addPolygon(meshes, item.range, {base[i], base[(i + 1) % base.size()], tip});
   }
-  addPolygon(meshes, piece.range, {base[3], base[2], base[1], base[0]});
-  endPiece(meshes, piece);
+  addPolygon(meshes, item.range, {base[3], base[2], base[1], base[0]});
+  endItem(meshes, item);
 }
 
 }  // namespace
@@ -92,29 +94,35 @@ Eigen::Vector3f avatarColour(scene::EntityId id) {
   return kColours[id % kColours.size()];
 }
 
-AvatarMeshes avatarMeshes(const scene::Snapshot& snapshot, scene::EntityId hidden) {
+bool hasSameAppearance(const scene::AvatarSnapshot& a, const scene::AvatarSnapshot& b) {
+  return a.id == b.id && a.shape == b.shape && a.footPosition == b.footPosition &&
+         a.viewDirection == b.viewDirection && a.eyeHeight == b.eyeHeight;
+}
+
+AvatarMeshes buildAvatarMeshes(const scene::Snapshot& snapshot, scene::EntityId hiddenEntity) {
   AvatarMeshes meshes;
-  for (const scene::AvatarView& avatar : snapshot.avatars) {
-    if (avatar.id == hidden || !avatar.shape) continue;
+  for (const scene::AvatarSnapshot& avatar : snapshot.avatars) {
+    if (avatar.id == hiddenEntity || !avatar.shape) continue;
     addBody(meshes, avatar);
     addVisor(meshes, avatar);
   }
   return meshes;
 }
 
-DrawList drawList(const AvatarMeshes& avatars, const Camera& camera,
-                  const std::vector<std::uint32_t>& pieces) {
+DrawList buildAvatarDrawList(const AvatarMeshes& avatars, const Camera& camera,
+                             const std::vector<std::uint32_t>& items) {
   DrawList list;
-  if (!pieces.empty()) list.batches.push_back({});
-  for (const std::uint32_t index : pieces) {
-    const AvatarMeshes::Piece& piece = avatars.pieces[index];
+  if (!items.empty()) list.batches.push_back({});
+  for (const std::uint32_t index : items) {
+    ENFILADE_ASSERT(index < avatars.items.size());
+    const AvatarMeshes::Item& item = avatars.items[index];
     Eigen::Affine3d worldFromBody = Eigen::Affine3d::Identity();
-    worldFromBody.translation() = piece.feet;
+    worldFromBody.translation() = item.footPosition;
     const auto instance = static_cast<std::uint32_t>(list.instances.size());
     list.instances.push_back(
-        placed(worldFromBody, Vec3::Zero(), camera.eye, piece.material, piece.id));
+        makeInstance(worldFromBody, Vec3::Zero(), camera.eye, item.material, item.id));
     list.commands.push_back(
-        {piece.range.indexCount, 1, piece.range.firstIndex, piece.range.baseVertex, instance});
+        {item.range.indexCount, 1, item.range.firstIndex, item.range.baseVertex, instance});
     ++list.batches.back().commandCount;
   }
   return list;

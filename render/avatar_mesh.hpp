@@ -1,4 +1,4 @@
-// What people look like to one another: their hull, with a visor that shows where they look.
+// Meshes of avatars: the collision hull with a visor that shows the view direction.
 #pragma once
 
 #include <vector>
@@ -10,25 +10,30 @@ namespace enfilade::render {
 
 /// Flat-shaded triangles of all avatars, in the order of the snapshot.
 struct AvatarMeshes {
-  struct Piece {
-    MeshRange range;  ///< relative to the feet
-    Vec3 feet;
-    scene::Box box;  ///< world
+  /// One draw item: a hull or a visor.
+  struct Item {
+    MeshRange range;  ///< positions relative to footPosition
+    Vec3 footPosition;
+    scene::Aabb box;  ///< world
     MaterialData material;
     scene::EntityId id;
   };
   std::vector<Vertex> vertices;
   std::vector<std::uint32_t> indices;
-  std::vector<Piece> pieces;
+  std::vector<Item> items;
 };
 
-AvatarMeshes avatarMeshes(const scene::Snapshot& snapshot, scene::EntityId hidden);
+/// Whether both avatars have the same meshes.
+bool hasSameAppearance(const scene::AvatarSnapshot& a, const scene::AvatarSnapshot& b);
 
-/// Linear RGB; neighbours in number differ most.
+/// Meshes of all avatars except `hiddenEntity`.
+AvatarMeshes buildAvatarMeshes(const scene::Snapshot& snapshot, scene::EntityId hiddenEntity);
+
+/// Linear RGB; consecutive ids have very different colours.
 Eigen::Vector3f avatarColour(scene::EntityId id);
 
-/// The pieces given, in this order.
-DrawList drawList(const AvatarMeshes& avatars, const Camera& camera,
-                  const std::vector<std::uint32_t>& pieces);
+/// Draw list of the given items, in this order.
+DrawList buildAvatarDrawList(const AvatarMeshes& avatars, const Camera& camera,
+                             const std::vector<std::uint32_t>& items);
 
 }  // namespace enfilade::render

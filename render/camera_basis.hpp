@@ -1,4 +1,4 @@
-// What a camera's numbers mean, worked out once in doubles: its axes, and how metres become pixels.
+// Derived camera data in doubles: axes, projection scale and frustum planes.
 #pragma once
 
 #include <array>
@@ -7,27 +7,28 @@
 
 namespace enfilade::render {
 
-/// A plane a*x + b*y + c*z + d >= 0 that keeps what is seen.
+/// A plane; points p with normal.dot(p) + offset >= 0 are inside.
 struct Plane {
   Vec3 normal;
   double offset;
 };
 
-struct View {
-  Vec3 right, up, forward;  ///< unit length, square to one another, world frame
-  /// From metres to the picture's -1..1: perspective at distance 1, orthographic anywhere.
+/// A camera's axes and its mapping from metres to normalised device coordinates (NDC, -1..1).
+struct CameraBasis {
+  Vec3 right, up, forward;  ///< orthonormal, world frame
+  /// From metres to NDC; perspective: at distance 1.
   double scaleX, scaleY;
-  /// Where in the picture's -1..1 (to the right, upwards) the axis lies; 0 but for pinholes.
+  /// NDC (right, up) of the principal point; 0 except for pinholes.
   double shiftX, shiftY;
 };
 
-/// Of a camera that refusal() lets pass.
-View viewOf(const Camera& camera);
+/// `camera` must satisfy validateCamera().
+CameraBasis computeCameraBasis(const Camera& camera);
 
-/// The four sides, near and far; a point on the inner side of all six may be in the picture.
-std::array<Plane, 6> frustumOf(const Camera& camera);
+/// The four sides, near and far. A point inside all six planes may be in the image.
+std::array<Plane, 6> computeFrustum(const Camera& camera);
 
-/// False only when the whole box lies outside of one of the planes.
-bool mayBeSeen(const std::array<Plane, 6>& frustum, const scene::Box& box);
+/// False only if the whole box is outside one of the planes.
+bool intersectsFrustum(const std::array<Plane, 6>& frustum, const scene::Aabb& box);
 
 }  // namespace enfilade::render

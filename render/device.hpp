@@ -1,4 +1,4 @@
-// Which device draws.
+// Selection and probing of rendering devices.
 #pragma once
 
 #include <string>
@@ -6,28 +6,30 @@
 
 namespace enfilade::render {
 
+/// The requested device.
 struct DeviceChoice {
-  /// "": the best that gives a context, hardware before software. Else an index of the list that
-  /// `enfilade doctor` prints, a part of a device's name (any case), or a UUID.
+  /// "": the first device with a context, hardware before software. Otherwise an index into the
+  /// list of `enfilade doctor`, a part of a device name (case-insensitive), or a UUID.
   std::string device;
-  bool requireGpu = false;  ///< a device that draws on the CPU is refused
+  bool requireGpu = false;  ///< rejects devices that draw on the CPU
 };
 
-/// What came of trying one EGL device or platform.
-struct DeviceTrial {
-  std::string place;      ///< "EGL device 0", "EGL surfaceless platform"
-  std::string name;       ///< GL_RENDERER, or what EGL calls it; may be empty
+/// The result of probing one EGL device or platform.
+struct DeviceProbe {
+  std::string platform;   ///< "EGL device 0", "EGL surfaceless platform"
+  std::string name;       ///< GL_RENDERER, otherwise EGL's name; may be empty
   std::string vendor;     ///< EGL_VENDOR; may be empty
-  std::string glVersion;  ///< empty when there is no context
-  std::string uuid;       ///< as 8-4-4-4-12 hexadecimal digits; empty where the driver tells none
+  std::string glVersion;  ///< empty without a context
+  std::string uuid;       ///< 8-4-4-4-12 hexadecimal digits; empty if the driver reports none
   bool software = false;  ///< draws on the CPU
-  std::string failure;    ///< why it gives no OpenGL 4.5 core context; empty: it does
+  std::string failure;    ///< reason for no OpenGL 4.5 core context; empty: usable
 };
 
+/// The results of all devices.
 struct DeviceReport {
   std::string clientExtensions;  ///< of EGL itself
-  std::string failure;           ///< why there is no EGL to ask; empty: there is
-  std::vector<DeviceTrial> devices;
+  std::string failure;           ///< reason why EGL is unavailable; empty: available
+  std::vector<DeviceProbe> devices;
 };
 
 }  // namespace enfilade::render

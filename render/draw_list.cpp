@@ -4,72 +4,76 @@
 #include <tuple>
 #include <utility>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::render {
 namespace {
 
-/// A mesh may come without a material of its own (hand-made models do).
-const scene::Material& materialOf(const scene::Model& model, std::uint32_t index) {
+/// The material, or a default one: meshes of hand-made models may have none.
+const scene::Material& findMaterial(const scene::Model& model, std::uint32_t index) {
   static const scene::Material plain;
   return index < model.materials.size() ? model.materials[index] : plain;
 }
 
-std::int32_t textureOf(const scene::Model& model, const scene::Material& material) {
+std::int32_t findTexture(const scene::Model& model, const scene::Material& material) {
   const auto index = material.baseColourTexture;
   return index >= 0 && static_cast<std::size_t>(index) < model.textures.size() ? index : -1;
 }
 
-Pass passOf(const scene::Material& material) {
+AlphaMode toAlphaMode(const scene::Material& material) {
   switch (material.alpha) {
     case scene::Material::Alpha::mask:
-      return Pass::mask;
+      return AlphaMode::mask;
     case scene::Material::Alpha::blend:
-      return Pass::blend;
+      return AlphaMode::blend;
     case scene::Material::Alpha::opaque:
       break;
   }
-  return Pass::opaque;
+  return AlphaMode::opaque;
 }
 
-scene::Box boxOf(const scene::Mesh& mesh) {
-  scene::Box box;
+scene::Aabb computeMeshAabb(const scene::Mesh& mesh) {
+  scene::Aabb box;
   for (const Eigen::Vector3f& position : mesh.positions) box.include(position.cast<double>());
   return box;
 }
 
-scene::Box placedBox(const Eigen::Affine3d& worldFromMesh, const scene::Box& box) {
+scene::Aabb transformItemAabb(const Eigen::Affine3d& worldFromMesh, const scene::Aabb& box) {
   const Vec3 centre = worldFromMesh * box.centre();
   const Vec3 half = worldFromMesh.linear().cwiseAbs() * (0.5 * box.size());
   return {centre - half, centre + half};
 }
 
 /// Farthest first; equal distances keep their order.
-void sortBackToFront(std::vector<std::uint32_t>& glass, const std::vector<Part>& parts,
+void sortBackToFront(std::vector<std::uint32_t>& transparent, const std::vector<DrawItem>& items,
                      const std::vector<BodyPlacement>& bodies, const Camera& camera) {
   const bool perspective = camera.projection == Camera::Projection::perspective;
-  const Vec3 forward = viewOf(camera).forward;
+  const Vec3 forward = computeCameraBasis(camera).forward;
   std::vector<std::pair<double, std::uint32_t>> sorted;
-  sorted.reserve(glass.size());
-  for (const std::uint32_t part : glass) {
-    const Vec3 toPart = placedBox(parts[part], bodies).centre() - camera.eye;
-    sorted.emplace_back(perspective ? toPart.squaredNorm() : forward.dot(toPart), part);
+  sorted.reserve(transparent.size());
+  for (const std::uint32_t item : transparent) {
+    const Vec3 toItem = computeItemAabb(items[item], bodies).centre() - camera.eye;
+    sorted.emplace_back(perspective ? toItem.squaredNorm() : forward.dot(toItem), item);
   }
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
-  std::transform(sorted.begin(), sorted.end(), glass.begin(),
+  std::transform(sorted.begin(), sorted.end(), transparent.begin(),
                  [](const auto& entry) { return entry.second; });
 }
 
-void append(DrawList& list, const Part& part, Pass pass, const MeshRange& range, bool singly) {
+void appendCommand(DrawList& list, const DrawItem& item, AlphaMode alphaMode,
+                   const MeshRange& range, bool unbatched) {
+  ENFILADE_ASSERT(!list.instances.empty());
   const auto instance = static_cast<std::uint32_t>(list.instances.size() - 1);
-  const bool sameBatch = !list.batches.empty() && list.batches.back().pass == pass &&
-                         list.batches.back().texture == part.texture;
+  const bool sameBatch = !list.batches.empty() && list.batches.back().alphaMode == alphaMode &&
+                         list.batches.back().texture == item.texture;
   if (!sameBatch) {
     list.batches.push_back(
-        {pass, part.texture, static_cast<std::uint32_t>(list.commands.size()), 0});
+        {alphaMode, item.texture, static_cast<std::uint32_t>(list.commands.size()), 0});
   }
   Batch& batch = list.batches.back();
-  // Neighbours in the order that share a mesh become one instanced draw.
-  if (!singly && batch.commandCount > 0 && list.commands.back().firstIndex == range.firstIndex &&
+  // Consecutive items with the same mesh become one instanced draw.
+  if (!unbatched && batch.commandCount > 0 && list.commands.back().firstIndex == range.firstIndex &&
       list.commands.back().count == range.indexCount) {
     ++list.commands.back().instanceCount;
     return;
@@ -78,9 +82,9 @@ void append(DrawList& list, const Part& part, Pass pass, const MeshRange& range,
   ++batch.commandCount;
 }
 
-/// Of each object, the body that it belongs to, or kStill.
-std::vector<std::uint32_t> bodiesOfObjects(const scene::Model& model) {
-  std::vector<std::uint32_t> bodies(model.objects.size(), kStill);
+/// For each object, its body, or kNoBody.
+std::vector<std::uint32_t> mapObjectsToBodies(const scene::Model& model) {
+  std::vector<std::uint32_t> bodies(model.objects.size(), kNoBody);
   for (std::uint32_t b = 0; b < model.bodies.size(); ++b)
     for (const std::uint32_t object : model.bodies[b].objects) bodies[object] = b;
   return bodies;
@@ -88,25 +92,26 @@ std::vector<std::uint32_t> bodiesOfObjects(const scene::Model& model) {
 
 }  // namespace
 
-std::vector<BodyPlacement> placementsOf(const scene::Scene& scene,
-                                        const scene::Snapshot& snapshot) {
+std::vector<BodyPlacement> computeBodyPlacements(const scene::Scene& scene,
+                                                 const scene::Snapshot& snapshot) {
   std::vector<BodyPlacement> placements(scene.model().bodies.size());
   if (!snapshot.bodies) return placements;
-  for (const scene::BodyView& view : *snapshot.bodies) {
-    if (!view.displaced) continue;
-    BodyPlacement& placement = placements[view.index];
+  for (const scene::BodySnapshot& body : *snapshot.bodies) {
+    if (!body.displaced) continue;
+    ENFILADE_ASSERT(body.index < placements.size());
+    BodyPlacement& placement = placements[body.index];
     placement.displaced = true;
-    placement.sceneFromAuthored = Eigen::Translation3d(view.pose.translation) * view.pose.rotation *
-                                  Eigen::Translation3d(-scene.shapeOfBody(view.index)->origin);
+    placement.sceneFromAuthored = Eigen::Translation3d(body.pose.translation) * body.pose.rotation *
+                                  Eigen::Translation3d(-scene.bodyShape(body.index)->origin);
   }
   return placements;
 }
 
-MaterialData materialData(const scene::Model& model, const scene::Mesh& mesh) {
-  return materialData(materialOf(model, mesh.material));
+MaterialData makeMaterialData(const scene::Model& model, const scene::Mesh& mesh) {
+  return makeMaterialData(findMaterial(model, mesh.material));
 }
 
-MaterialData materialData(const scene::Material& material) {
+MaterialData makeMaterialData(const scene::Material& material) {
   MaterialData data{};
   for (int i = 0; i < 4; ++i) data.baseColour[i] = material.baseColour[i];
   for (int i = 0; i < 3; ++i) data.emissive[i] = material.emissive[i];
@@ -117,37 +122,37 @@ MaterialData materialData(const scene::Material& material) {
   return data;
 }
 
-std::vector<Part> partsOf(const scene::Model& model) {
-  std::vector<scene::Box> meshBoxes;
+std::vector<DrawItem> buildDrawItems(const scene::Model& model) {
+  std::vector<scene::Aabb> meshBoxes;
   meshBoxes.reserve(model.meshes.size());
-  for (const scene::Mesh& mesh : model.meshes) meshBoxes.push_back(boxOf(mesh));
+  for (const scene::Mesh& mesh : model.meshes) meshBoxes.push_back(computeMeshAabb(mesh));
 
-  const std::vector<std::uint32_t> bodyOf = bodiesOfObjects(model);
-  std::vector<Part> parts;
+  const std::vector<std::uint32_t> bodyOfObject = mapObjectsToBodies(model);
+  std::vector<DrawItem> items;
   for (std::uint32_t o = 0; o < model.objects.size(); ++o) {
     const scene::Object& object = model.objects[o];
-    const std::uint32_t body = bodyOf[o];
-    if (body != kStill && model.bodies[body].kind == scene::BodyKind::trigger) continue;
-    if (object.use == scene::Object::Use::solid) continue;
+    const std::uint32_t body = bodyOfObject[o];
+    if (body != kNoBody && isTrigger(model.bodies[body].kind)) continue;
+    if (object.usage == scene::Object::Usage::collisionOnly) continue;
     for (const std::uint32_t m : object.meshes) {
       if (model.meshes[m].indices.empty()) continue;
       const std::uint32_t materialIndex = model.meshes[m].material;
-      const scene::Material& material = materialOf(model, materialIndex);
-      parts.push_back({placedBox(object.worldFromMesh, meshBoxes[m]), o, m,
-                       textureOf(model, material), passOf(material), body});
+      const scene::Material& material = findMaterial(model, materialIndex);
+      items.push_back({transformItemAabb(object.worldFromMesh, meshBoxes[m]), o, m,
+                       findTexture(model, material), toAlphaMode(material), body});
     }
   }
-  const auto key = [](const Part& part) {
-    // Glass is sorted again in every picture; until then only its object counts.
-    return std::tuple(part.pass, part.pass == Pass::blend ? -1 : part.texture);
+  const auto key = [](const DrawItem& item) {
+    // Transparent items are sorted again in every frame; here only the object counts.
+    return std::tuple(item.alphaMode, item.alphaMode == AlphaMode::blend ? -1 : item.texture);
   };
-  std::stable_sort(parts.begin(), parts.end(),
-                   [&](const Part& a, const Part& b) { return key(a) < key(b); });
-  return parts;
+  std::stable_sort(items.begin(), items.end(),
+                   [&](const DrawItem& a, const DrawItem& b) { return key(a) < key(b); });
+  return items;
 }
 
-Instance placed(const Eigen::Affine3d& worldFromMesh, const Vec3& meshCentre, const Vec3& eye,
-                const MaterialData& material, scene::EntityId id) {
+Instance makeInstance(const Eigen::Affine3d& worldFromMesh, const Vec3& meshCentre, const Vec3& eye,
+                      const MaterialData& material, scene::EntityId id) {
   Instance instance{};
   const Vec3 origin = worldFromMesh * meshCentre - eye;
   for (int row = 0; row < 3; ++row) {
@@ -163,50 +168,56 @@ Instance placed(const Eigen::Affine3d& worldFromMesh, const Vec3& meshCentre, co
   return instance;
 }
 
-scene::Box placedBox(const Part& part, const std::vector<BodyPlacement>& bodies) {
-  if (part.body == kStill || !bodies[part.body].displaced) return part.box;
-  return placedBox(bodies[part.body].sceneFromAuthored, part.box);
+scene::Aabb computeItemAabb(const DrawItem& item, const std::vector<BodyPlacement>& bodies) {
+  ENFILADE_ASSERT(item.body == kNoBody || item.body < bodies.size());
+  if (item.body == kNoBody || !bodies[item.body].displaced) return item.box;
+  return transformItemAabb(bodies[item.body].sceneFromAuthored, item.box);
 }
 
-std::vector<std::uint32_t> partsInPicture(const std::vector<Part>& parts,
-                                          const std::vector<BodyPlacement>& bodies,
-                                          const Camera& camera, scene::EntityId hidden) {
-  const auto frustum = frustumOf(camera);
+std::vector<std::uint32_t> findItemsInFrustum(const std::vector<DrawItem>& items,
+                                              const std::vector<BodyPlacement>& bodies,
+                                              const Camera& camera, scene::EntityId hiddenEntity) {
+  const auto frustum = computeFrustum(camera);
   std::vector<std::uint32_t> inside;
-  for (std::uint32_t i = 0; i < parts.size(); ++i) {
-    if (parts[i].object + 1 == hidden) continue;
-    if (mayBeSeen(frustum, placedBox(parts[i], bodies))) inside.push_back(i);
+  for (std::uint32_t i = 0; i < items.size(); ++i) {
+    if (items[i].object + 1 == hiddenEntity) continue;
+    if (intersectsFrustum(frustum, computeItemAabb(items[i], bodies))) inside.push_back(i);
   }
   return inside;
 }
 
-DrawLists drawLists(const Drawable& drawable, const std::vector<BodyPlacement>& bodies,
-                    const Camera& camera, const FrameOptions& options,
-                    const std::vector<std::uint32_t>& parts) {
-  const bool solid = options.glass == Glass::solid;
-  const auto draw = [&](DrawList& list, const Part& part) {
-    const MeshRange& range = drawable.ranges[part.mesh];
-    Eigen::Affine3d worldFromMesh = drawable.model.objects[part.object].worldFromMesh;
-    if (part.body != kStill && bodies[part.body].displaced)
-      worldFromMesh = bodies[part.body].sceneFromAuthored * worldFromMesh;
-    list.instances.push_back(placed(worldFromMesh, range.centre, camera.eye,
-                                    drawable.materials[part.mesh], part.object + 1));
-    append(list, part, solid && part.pass == Pass::blend ? Pass::opaque : part.pass, range,
-           list.singly);
+DrawLists buildDrawLists(const Drawable& drawable, const std::vector<BodyPlacement>& bodies,
+                         const Camera& camera, const FrameOptions& options,
+                         const std::vector<std::uint32_t>& items) {
+  ENFILADE_ASSERT(std::is_sorted(items.begin(), items.end()));
+  ENFILADE_ASSERT(drawable.ranges.size() == drawable.model.meshes.size());
+  ENFILADE_ASSERT(drawable.materials.size() == drawable.model.meshes.size());
+  const bool drawAsOpaque = options.transparency == TransparencyMode::opaque;
+  const auto draw = [&](DrawList& list, const DrawItem& item) {
+    const MeshRange& range = drawable.ranges[item.mesh];
+    Eigen::Affine3d worldFromMesh = drawable.model.objects[item.object].worldFromMesh;
+    if (item.body != kNoBody && bodies[item.body].displaced)
+      worldFromMesh = bodies[item.body].sceneFromAuthored * worldFromMesh;
+    list.instances.push_back(makeInstance(worldFromMesh, range.centre, camera.eye,
+                                          drawable.materials[item.mesh], item.object + 1));
+    appendCommand(
+        list, item,
+        drawAsOpaque && item.alphaMode == AlphaMode::blend ? AlphaMode::opaque : item.alphaMode,
+        range, list.unbatched);
   };
   DrawLists lists;
-  lists.surfaces.singly = lists.glass.singly = options.culling == Culling::singly;
-  std::vector<std::uint32_t> glass;
-  for (const std::uint32_t index : parts) {
-    const Part& part = drawable.parts[index];
-    if (part.pass == Pass::blend && !solid) {
-      glass.push_back(index);
+  lists.surfaces.unbatched = lists.transparent.unbatched = options.culling == Culling::none;
+  std::vector<std::uint32_t> transparent;
+  for (const std::uint32_t index : items) {
+    const DrawItem& item = drawable.items[index];
+    if (item.alphaMode == AlphaMode::blend && !drawAsOpaque) {
+      transparent.push_back(index);
     } else {
-      draw(lists.surfaces, part);
+      draw(lists.surfaces, item);
     }
   }
-  sortBackToFront(glass, drawable.parts, bodies, camera);
-  for (const std::uint32_t index : glass) draw(lists.glass, drawable.parts[index]);
+  sortBackToFront(transparent, drawable.items, bodies, camera);
+  for (const std::uint32_t index : transparent) draw(lists.transparent, drawable.items[index]);
   return lists;
 }
 

@@ -4,10 +4,10 @@
 
 namespace enfilade::render {
 
-std::vector<float> rangeOf(const Frame& frame) {
+std::vector<float> computeRange(const Frame& frame) {
   std::vector<float> range = frame.depth;
   if (frame.camera.projection == Camera::Projection::orthographic) return range;
-  const Pinhole pinhole = intrinsicsOf(frame.camera);
+  const Pinhole pinhole = computeIntrinsics(frame.camera);
   std::size_t pixel = 0;
   for (int y = 0; y < frame.camera.height && pixel < range.size(); ++y) {
     const double v = (y + 0.5 - pinhole.cy) / pinhole.fy;

@@ -1,17 +1,17 @@
-// What goes wrong in drawing.
+// Errors of the renderers.
 #pragma once
 
 #include <stdexcept>
 
 namespace enfilade::render {
 
-/// Names the call or the thing refused, its error code and what to try.
+/// Its text names the failed call or invalid value, the error code and a remedy.
 struct RenderError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The renderer that was asked for cannot be had here; another may.
-struct NoRenderer : RenderError {
+/// The requested renderer is unavailable on this machine; another one may work.
+struct RendererUnavailable : RenderError {
   using RenderError::RenderError;
 };
 

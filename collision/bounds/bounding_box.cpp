@@ -1,59 +1,62 @@
-// Seed 5.2.1: the cube of a body's sphere, and the tight box from last tick's extremal vertices.
+// Bounding cube and tight box from the last tick's extremal vertices (Lin 1993, section 5.2.1).
 //
-// tightBox(), an axis and sense at a time: from last tick's vertex go to a neighbour that is more
-// extreme until none is: one dot product of the matrix' row with each vertex looked at, since the
-// other two coordinates do not matter. The thesis stops there. In rounded arithmetic that is not
-// enough: along a face that is nearly square to the axis every step may be below the rounding error
-// and the walk may stop far from the extremal vertex. So vertices that cannot be told from the
-// highest are looked around as well (firstHigher), which is the whole of a level top.
+// tightAabb() handles one side of one axis at a time. It starts at the last tick's vertex and moves
+// to a more extreme neighbour while there is one. Each test is one dot product with a row of the
+// rotation matrix. Lin stops there. In rounded arithmetic that is not enough: along a face that is
+// nearly perpendicular to the axis, every step may be below the rounding error, and the climb may
+// stop far from the extremal vertex. findHigherVertex() therefore also searches the neighbours of
+// all vertices that rounding cannot distinguish from the highest one (the plateau).
 //
-// tightBoxByWalls() is the thesis' other method: a wall square to the axis beyond the body, its
-// point nearest to last tick's vertex, and that point against the planes of the vertex' Voronoi
-// region. The vertex always lies in the wall's region, so that the other half of the vertex-face
-// test of chapter 3 is left out. It ends in the same look around.
+// tightAabbVoronoi() is Lin's other method. It places a plane perpendicular to the axis outside the
+// body and takes the plane's point nearest to the last tick's vertex. It tests that point against
+// the bounding planes of the vertex' Voronoi region. The vertex always lies in the region of the
+// plane, so the other half of the vertex-face test (Lin 1993, chapter 3) is omitted. It ends with
+// the same plateau search.
 //
-// Which box? Instructions a box, bodies of 8 / 20 / 60 vertices turning by 2 degrees a tick
-// (tests/benchmarks/bounding_box_bench.cpp under callgrind):
-//   cube 136   climbing 1663 / 1814 / 1900   walls 2099 / 2364 / 2489   all 1648 / 3592 / 10072
-// so climbing is the tight box's method. A larger box asks the narrow phase about more pairs, at
-// some 2000 instructions a pair that it finds clear (decideWithin(), warm). Boxes met in a
-// furnished storey, cube and tight box, by half-axes in metres, 20 vertices:
+// Choice of the box. Instructions per box, bodies of 8 / 20 / 60 vertices that rotate by 2 degrees
+// per tick, measured with callgrind:
+//   cube 136   climbing 1663 / 1814 / 1900   Voronoi 2099 / 2364 / 2489   all 1648 / 3592 / 10072
+// Hill climbing is therefore the method of the tight box. A larger box causes more narrow-phase
+// queries, each about 2000 instructions for a pair that is clear (computeSeparationWithin(), warm).
+// Overlapping boxes in a furnished storey, cube and tight box, by half extents in metres, 20
+// vertices:
 //   0.25 round 0.53 0.46    0.5 round 1.98 1.60    0.2 x 0.1 x 0.1  0.38 0.20
 //   0.5 x 0.25 x 0.25  1.88 0.76     1 x 0.25 x 0.25  7.68 1.41     2 x 0.5 x 0.5  60.8 9.5
-// boxMethodFor() estimates that difference from the radius and the mean width, the density of
-// objects and their size, and takes the tight box where it saves more than it costs. As I-COLLIDE
-// found (1995, section 4), cubes win but for oblong bodies; what it could not show in its sparse
-// scenes is that large bodies among many things count as well.
+// chooseAabbMethod() estimates this difference from the radius, the mean width, and the density and
+// size of the objects. It takes the tight box if that saves more than it costs. Cubes win except
+// for oblong bodies (Cohen et al. 1995, section 4) and for large bodies among many objects.
 //
-// Rounding. Let e = 2^-53 and r the greatest norm of a vertex. The matrix comes from a quaternion
-// whose squared norm is within 16e of 1; an entry is off by at most 5e on the diagonal and 2e
-// elsewhere, so a row by less than 6e, and the rotation that normalising would give is within 39e
-// of it. The dot product of a computed row adds at most 3.1e r. Together: less than 49e r, and
-// kRotationError = 64e takes in the rounding of r. Adding the translation and the bound itself
-// costs 2e of the sum; kSumError = 4e. Comparing two vertices uses one computed matrix, which is an
-// exact linear map of its own: two dots are ordered surely when they differ by more than 6.2e r.
+// Rounding. Let e = 2^-53 and r the maximum norm of a vertex. The matrix comes from a quaternion
+// whose squared norm is within 16e of 1. An entry has an error of at most 5e on the diagonal and 2e
+// elsewhere, so a row has less than 6e. The normalised rotation is within 39e of it. The dot
+// product of a computed row adds at most 3.1e r. The sum is less than 49e r, and kRotationError =
+// 64e covers the rounding of r. Adding the translation and the bound itself costs 2e of the sum;
+// kSumError = 4e. The comparison of two vertices uses one computed matrix, which is an exact linear
+// map: the order of two dot products is certain if they differ by more than 6.2e r.
 
 #include "collision/bounds/bounding_box.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "collision/assert.hpp"
+#include "collision/floating_point.hpp"
+
 namespace enfilade::collision {
 namespace {
 
-constexpr double kEpsilon = 0x1p-53;
-constexpr double kRotationError = 64 * kEpsilon;
-constexpr double kSumError = 4 * kEpsilon;
-constexpr double kDotError = 8 * kEpsilon;
-constexpr double kUnderflow = 0x1p-1000;  // above what a few products can lose to underflow
+constexpr double kRotationError = 64 * kRoundoff;
+constexpr double kSumError = 4 * kRoundoff;
+constexpr double kDotError = 8 * kRoundoff;
+constexpr double kUnderflow = 0x1p-1000;  // above the loss of a few products to underflow
 
-// Instructions, measured as the head of this file says.
+// Instructions; measurements at the head of this file.
 constexpr double kCubeCost = 136;
 constexpr double kTightCost = 1800;
 constexpr double kPairCost = 2000;
 
-/// A linear function of the vertices: the coordinate along one half-axis.
-struct Height {
+/// Projection of the vertices on one signed axis.
+struct Projection {
   const Hull& hull;
   Vec3 direction;
   double operator()(std::uint32_t vertex) const {
@@ -62,62 +65,63 @@ struct Height {
   }
 };
 
-/// Outward of height + translation + clearance by what computing it may have lost.
-double outward(double height, double translation, double radius, double clearance) {
-  const double sum = height + translation;
+/// projection + translation + clearance, increased by the bound of its rounding error.
+double roundOutward(double projection, double translation, double radius, double clearance) {
+  const double sum = projection + translation;
   const double lost =
       kRotationError * radius + kSumError * (std::abs(sum) + clearance) + kUnderflow;
   return sum + (lost + clearance);
 }
 
-std::uint32_t bruteForceHighest(const Height& height) {
+std::uint32_t findExtremalBruteForce(const Projection& projection) {
   std::uint32_t highest = 0;
-  for (std::uint32_t v = 1; v < height.hull.vertices.size(); ++v) {
-    if (height(v) > height(highest)) highest = v;
+  for (std::uint32_t v = 1; v < projection.hull.vertices.size(); ++v) {
+    if (projection(v) > projection(highest)) highest = v;
   }
   return highest;
 }
 
-/// Looks at all vertices joined to `top` by vertices that cannot be told to be lower; mostly these
-/// are its neighbours. Returns the first higher one when there is one; else `top`, which is then
-/// the highest within the error of a dot: heights rise along some path of edges from `top` to the
-/// true highest vertex.
-std::uint32_t firstHigher(const Height& height, std::uint32_t top, double slack) {
-  constexpr std::size_t kMost = 64;  // vertices of a plateau; beyond, brute force is as good
-  std::array<std::uint32_t, kMost> plateau;
+/// Searches all vertices connected to `top` through vertices that are not provably lower; usually
+/// these are its neighbours. Returns the first higher vertex, or `top` if no vertex is higher.
+/// `top` is then extremal within the error of a dot product, because projections rise along some
+/// path of edges from `top` to the true extremal vertex.
+std::uint32_t findHigherVertex(const Projection& projection, std::uint32_t top, double slack) {
+  constexpr std::size_t kMaxPlateau = 64;  // plateau size above which brute force is as good
+  ENFILADE_ASSERT(top < projection.hull.vertices.size());
+  std::array<std::uint32_t, kMaxPlateau> plateau;
   std::size_t size = 0;
   plateau[size++] = top;
-  const double best = height(top);
+  const double best = projection(top);
   for (std::size_t k = 0; k < size; ++k) {
-    for (const std::uint32_t next : height.hull.neighboursOf(plateau[k])) {
-      const double candidate = height(next);
+    for (const std::uint32_t next : projection.hull.neighboursOf(plateau[k])) {
+      const double candidate = projection(next);
       if (candidate < best - slack) continue;
       if (candidate > best) return next;
       if (std::find(plateau.begin(), plateau.begin() + size, next) != plateau.begin() + size) {
         continue;
       }
-      if (size == kMost) return bruteForceHighest(height);
+      if (size == kMaxPlateau) return findExtremalBruteForce(projection);
       plateau[size++] = next;
     }
   }
   return top;
 }
 
-std::uint32_t highest(const Height& height, std::uint32_t start) {
-  const double slack = kDotError * height.hull.radius + kUnderflow;
-  std::uint32_t vertex = start < height.hull.vertices.size() ? start : 0;
-  for (;;) {  // heights rise strictly: at most one visit a vertex
-    const std::uint32_t higher = firstHigher(height, vertex, slack);
-    if (!(height(higher) > height(vertex))) return vertex;
+std::uint32_t hillClimb(const Projection& projection, std::uint32_t start) {
+  const double slack = kDotError * projection.hull.radius + kUnderflow;
+  std::uint32_t vertex = start < projection.hull.vertices.size() ? start : 0;
+  for (;;) {  // projections rise strictly: at most one visit per vertex
+    const std::uint32_t higher = findHigherVertex(projection, vertex, slack);
+    if (!(projection(higher) > projection(vertex))) return vertex;
     vertex = higher;
   }
 }
 
-/// From vertex to vertex towards an imaginary wall square to `direction`, as long as the point of
-/// the wall that is nearest to the vertex lies outside one of the planes that bound the vertex'
-/// Voronoi region (one an edge). The wall may stand anywhere beyond the body; this one stands at
-/// twice its radius. Rounding may send the walk round, so it is bounded by the number of vertices.
-std::uint32_t walkToWall(const Hull& hull, const Vec3& direction, std::uint32_t vertex) {
+/// Walks from vertex to vertex towards a plane perpendicular to `direction`. Continues while the
+/// plane's point nearest to the vertex violates a bounding plane of the vertex' Voronoi region (one
+/// per edge). The plane may lie anywhere outside the body; here at twice its radius. Rounding can
+/// cause a cycle, so the number of vertices limits the steps.
+std::uint32_t walkVoronoiRegions(const Hull& hull, const Vec3& direction, std::uint32_t vertex) {
   for (std::size_t steps = 0; steps < hull.vertices.size(); ++steps) {
     const Vec3& from = hull.vertices[vertex];
     const Vec3 toNearest = (2 * hull.radius - direction.dot(from)) * direction;
@@ -132,44 +136,44 @@ std::uint32_t walkToWall(const Hull& hull, const Vec3& direction, std::uint32_t 
   return vertex;
 }
 
-/// Where the walk ends the same look around as in highest() makes it sure.
-std::uint32_t highestByWall(const Height& height, std::uint32_t start) {
-  const std::uint32_t vertex =
-      walkToWall(height.hull, height.direction, start < height.hull.vertices.size() ? start : 0);
-  const double slack = kDotError * height.hull.radius + kUnderflow;
-  const std::uint32_t beyond = firstHigher(height, vertex, slack);
-  return beyond == vertex ? vertex : highest(height, beyond);
+/// Voronoi walk, then the same plateau search as in hillClimb().
+std::uint32_t findExtremalVoronoi(const Projection& projection, std::uint32_t start) {
+  const std::uint32_t vertex = walkVoronoiRegions(
+      projection.hull, projection.direction, start < projection.hull.vertices.size() ? start : 0);
+  const double slack = kDotError * projection.hull.radius + kUnderflow;
+  const std::uint32_t higher = findHigherVertex(projection, vertex, slack);
+  return higher == vertex ? vertex : hillClimb(projection, higher);
 }
 
 template <typename FindHighest>
-Box boxOf(const Hull& hull, const Pose& worldFromBody, double clearance, FindHighest&& find) {
+Aabb computeTightAabb(const Hull& hull, const Pose& worldFromBody, double clearance,
+                      FindHighest&& find) {
   const Mat3 rotation = worldFromBody.rotation.toRotationMatrix();
-  Box box;
+  Aabb box;
   for (int axis = 0; axis < 3; ++axis) {
     const Vec3 row = rotation.row(axis).transpose();
     const double translation = worldFromBody.translation[axis];
     for (const int upper : {0, 1}) {
-      const Height height{hull, upper == 1 ? row : Vec3(-row)};
-      const double extent = height(find(height, 2 * axis + upper));
+      const Projection projection{hull, upper == 1 ? row : Vec3(-row)};
+      const double extent = projection(find(projection, 2 * axis + upper));
       if (upper == 1) {
-        box.max[axis] = outward(extent, translation, hull.radius, clearance);
+        box.max[axis] = roundOutward(extent, translation, hull.radius, clearance);
       } else {
-        box.min[axis] = -outward(extent, -translation, hull.radius, clearance);
+        box.min[axis] = -roundOutward(extent, -translation, hull.radius, clearance);
       }
     }
   }
   return box;
 }
 
-/// The width of the hull, on average over 13 directions: a cube's axes, face diagonals and space
-/// diagonals.
-double meanWidth(const Hull& hull) {
+/// Mean width of the hull over 13 directions: axes, face diagonals and space diagonals of a cube.
+double computeMeanWidth(const Hull& hull) {
   double sum = 0;
   int directions = 0;
-  for (int code = 14; code < 27; ++code) {  // the half of {-1, 0, 1}^3 that follows 0 0 0
+  for (int code = 14; code < 27; ++code) {  // the half of {-1, 0, 1}^3 after 0 0 0
     const Vec3 direction(code / 9 - 1, code / 3 % 3 - 1, code % 3 - 1);
-    const Height up{hull, direction}, down{hull, -direction};
-    sum += (up(bruteForceHighest(up)) + down(bruteForceHighest(down))) / direction.norm();
+    const Projection up{hull, direction}, down{hull, -direction};
+    sum += (up(findExtremalBruteForce(up)) + down(findExtremalBruteForce(down))) / direction.norm();
     ++directions;
   }
   return sum / directions;
@@ -177,47 +181,50 @@ double meanWidth(const Hull& hull) {
 
 }  // namespace
 
-Box fixedCube(const Hull& hull, const Pose& worldFromBody, double clearance) {
-  Box box;
+Aabb boundingSphereCube(const Hull& hull, const Pose& worldFromBody, double clearance) {
+  Aabb box;
   for (int axis = 0; axis < 3; ++axis) {
     const double at = worldFromBody.translation[axis];
-    box.max[axis] = outward(hull.radius, at, hull.radius, clearance);
-    box.min[axis] = -outward(hull.radius, -at, hull.radius, clearance);
+    box.max[axis] = roundOutward(hull.radius, at, hull.radius, clearance);
+    box.min[axis] = -roundOutward(hull.radius, -at, hull.radius, clearance);
   }
   return box;
 }
 
-Box tightBox(const Hull& hull, const Pose& worldFromBody, ExtremalVertices& last,
-             double clearance) {
-  return boxOf(hull, worldFromBody, clearance, [&last](const Height& height, int side) {
-    std::uint32_t& vertex = last.vertex[static_cast<std::size_t>(side)];
-    vertex = highest(height, vertex);
-    return vertex;
+Aabb tightAabb(const Hull& hull, const Pose& worldFromBody, ExtremalVertices& last,
+               double clearance) {
+  return computeTightAabb(hull, worldFromBody, clearance,
+                          [&last](const Projection& projection, int side) {
+                            std::uint32_t& vertex = last.vertex[static_cast<std::size_t>(side)];
+                            vertex = hillClimb(projection, vertex);
+                            return vertex;
+                          });
+}
+
+Aabb tightAabbVoronoi(const Hull& hull, const Pose& worldFromBody, ExtremalVertices& last,
+                      double clearance) {
+  return computeTightAabb(hull, worldFromBody, clearance,
+                          [&last](const Projection& projection, int side) {
+                            std::uint32_t& vertex = last.vertex[static_cast<std::size_t>(side)];
+                            vertex = findExtremalVoronoi(projection, vertex);
+                            return vertex;
+                          });
+}
+
+Aabb tightAabbBruteForce(const Hull& hull, const Pose& worldFromBody, double clearance) {
+  return computeTightAabb(hull, worldFromBody, clearance, [](const Projection& projection, int) {
+    return findExtremalBruteForce(projection);
   });
 }
 
-Box tightBoxByWalls(const Hull& hull, const Pose& worldFromBody, ExtremalVertices& last,
-                    double clearance) {
-  return boxOf(hull, worldFromBody, clearance, [&last](const Height& height, int side) {
-    std::uint32_t& vertex = last.vertex[static_cast<std::size_t>(side)];
-    vertex = highestByWall(height, vertex);
-    return vertex;
-  });
-}
-
-Box tightBoxBruteForce(const Hull& hull, const Pose& worldFromBody, double clearance) {
-  return boxOf(hull, worldFromBody, clearance,
-               [](const Height& height, int) { return bruteForceHighest(height); });
-}
-
-BoxMethod boxMethodFor(const Hull& hull, const Surroundings& surroundings) {
-  const auto boxesMet = [&](double edge) {
-    const double reach = edge + surroundings.meanEdge;
-    return surroundings.objectsPerCubicMetre * reach * reach * reach;
+AabbMethod chooseAabbMethod(const Hull& hull, const SceneDensity& density) {
+  const auto countOverlaps = [&](double edge) {
+    const double combinedEdge = edge + density.meanObjectSize;
+    return density.objectsPerCubicMetre * combinedEdge * combinedEdge * combinedEdge;
   };
-  const double falsePairs = boxesMet(2 * hull.radius) - boxesMet(meanWidth(hull));
-  return falsePairs * kPairCost > kTightCost - kCubeCost ? BoxMethod::tightBox
-                                                         : BoxMethod::fixedCube;
+  const double falsePairs = countOverlaps(2 * hull.radius) - countOverlaps(computeMeanWidth(hull));
+  return falsePairs * kPairCost > kTightCost - kCubeCost ? AabbMethod::tightAabb
+                                                         : AabbMethod::boundingSphereCube;
 }
 
 }  // namespace enfilade::collision

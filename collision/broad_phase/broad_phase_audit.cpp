@@ -1,4 +1,4 @@
-// Brute force shares nothing with the sweep but overlaps().
+// Brute force shares no code with the sweep except overlaps().
 
 #include "collision/broad_phase/broad_phase_audit.hpp"
 
@@ -8,40 +8,43 @@
 namespace enfilade::collision {
 namespace {
 
-/// Each pair once, whichever of its movers was asked about.
-void sortEachOnce(std::vector<BoxPair>& pairs) {
+/// Sorts and removes duplicates: a pair of two selected proxies is found twice.
+void sortUniquePairs(std::vector<ProxyPair>& pairs) {
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
 }
 
-BoxPair movingPair(MoverId a, MoverId b) {
+ProxyPair makeDynamicPair(ProxyId a, ProxyId b) {
   return {std::min(a, b), std::max(a, b), true};
 }
 
-std::vector<BoxPair> heldBy(const SortAndSweep& sweep, std::span<const MoverId> asked) {
-  std::vector<BoxPair> pairs;
-  for (const MoverId id : asked) {
-    for (const SortAndSweep::Partner& partner : sweep.partners(id)) {
-      pairs.push_back(partner.moves ? movingPair(id, partner.id) : BoxPair{id, partner.id, false});
+std::vector<ProxyPair> collectSweepPairs(const SortAndSweep& sweep,
+                                         std::span<const ProxyId> selected) {
+  std::vector<ProxyPair> pairs;
+  for (const ProxyId id : selected) {
+    for (const SortAndSweep::Overlap& overlap : sweep.overlapsOf(id)) {
+      pairs.push_back(overlap.isDynamic ? makeDynamicPair(id, overlap.id)
+                                        : ProxyPair{id, overlap.id, false});
     }
   }
-  sortEachOnce(pairs);
+  sortUniquePairs(pairs);
   return pairs;
 }
 
-std::vector<BoxPair> overlapsOf(const std::pair<MoverId, Box>& mover,
-                                std::span<const Box> stillBoxes,
-                                std::span<const std::pair<MoverId, Box>> moverBoxes) {
-  std::vector<BoxPair> pairs = bruteForcePairs(stillBoxes, std::span(&mover, 1));
-  for (const auto& [id, box] : moverBoxes) {
-    if (id != mover.first && overlaps(box, mover.second)) {
-      pairs.push_back(movingPair(id, mover.first));
+std::vector<ProxyPair> findOverlaps(const std::pair<ProxyId, Aabb>& proxy,
+                                    std::span<const Aabb> staticBoxes,
+                                    std::span<const std::pair<ProxyId, Aabb>> dynamicBoxes) {
+  std::vector<ProxyPair> pairs = findPairsBruteForce(staticBoxes, std::span(&proxy, 1));
+  for (const auto& [id, box] : dynamicBoxes) {
+    if (id != proxy.first && overlaps(box, proxy.second)) {
+      pairs.push_back(makeDynamicPair(id, proxy.first));
     }
   }
   return pairs;
 }
 
-BroadPhaseAudit compared(const std::vector<BoxPair>& expected, const std::vector<BoxPair>& held) {
+BroadPhaseAudit comparePairs(const std::vector<ProxyPair>& expected,
+                             const std::vector<ProxyPair>& held) {
   BroadPhaseAudit audit;
   audit.pairs = expected.size();
   std::set_difference(expected.begin(), expected.end(), held.begin(), held.end(),
@@ -53,24 +56,41 @@ BroadPhaseAudit compared(const std::vector<BoxPair>& expected, const std::vector
 
 }  // namespace
 
-BroadPhaseAudit compareWithBruteForce(const SortAndSweep& sweep, std::span<const Box> stillBoxes,
-                                      std::span<const std::pair<MoverId, Box>> moverBoxes,
-                                      std::span<const MoverId> asked) {
-  std::vector<BoxPair> expected;
-  for (const auto& mover : moverBoxes) {
-    if (std::find(asked.begin(), asked.end(), mover.first) == asked.end()) continue;
-    const std::vector<BoxPair> pairs = overlapsOf(mover, stillBoxes, moverBoxes);
-    expected.insert(expected.end(), pairs.begin(), pairs.end());
+std::vector<ProxyPair> findPairsBruteForce(std::span<const Aabb> staticBoxes,
+                                           std::span<const std::pair<ProxyId, Aabb>> dynamicBoxes) {
+  std::vector<ProxyPair> pairs;
+  for (const auto& [id, box] : dynamicBoxes) {
+    for (std::size_t other = 0; other < staticBoxes.size(); ++other) {
+      if (overlaps(box, staticBoxes[other])) {
+        pairs.push_back({id, static_cast<std::uint32_t>(other), false});
+      }
+    }
+    for (const auto& [otherId, otherBox] : dynamicBoxes) {
+      if (id < otherId && overlaps(box, otherBox)) pairs.push_back({id, otherId, true});
+    }
   }
-  sortEachOnce(expected);
-  return compared(expected, heldBy(sweep, asked));
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
 }
 
-BroadPhaseAudit compareWithBruteForce(const SortAndSweep& sweep, std::span<const Box> stillBoxes,
-                                      std::span<const std::pair<MoverId, Box>> moverBoxes) {
-  std::vector<MoverId> all;
-  for (const auto& [id, box] : moverBoxes) all.push_back(id);
-  return compareWithBruteForce(sweep, stillBoxes, moverBoxes, all);
+BroadPhaseAudit compareWithBruteForce(const SortAndSweep& sweep, std::span<const Aabb> staticBoxes,
+                                      std::span<const std::pair<ProxyId, Aabb>> dynamicBoxes,
+                                      std::span<const ProxyId> selected) {
+  std::vector<ProxyPair> expected;
+  for (const auto& proxy : dynamicBoxes) {
+    if (std::find(selected.begin(), selected.end(), proxy.first) == selected.end()) continue;
+    const std::vector<ProxyPair> pairs = findOverlaps(proxy, staticBoxes, dynamicBoxes);
+    expected.insert(expected.end(), pairs.begin(), pairs.end());
+  }
+  sortUniquePairs(expected);
+  return comparePairs(expected, collectSweepPairs(sweep, selected));
+}
+
+BroadPhaseAudit compareWithBruteForce(const SortAndSweep& sweep, std::span<const Aabb> staticBoxes,
+                                      std::span<const std::pair<ProxyId, Aabb>> dynamicBoxes) {
+  std::vector<ProxyId> all;
+  for (const auto& [id, box] : dynamicBoxes) all.push_back(id);
+  return compareWithBruteForce(sweep, staticBoxes, dynamicBoxes, all);
 }
 
 }  // namespace enfilade::collision

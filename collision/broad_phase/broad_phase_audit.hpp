@@ -1,5 +1,4 @@
-// Whether a live broad phase is right: its pairs against brute force, on ticks of the caller's
-// choice.
+// Run-time check of the broad phase: compares its pairs with brute force, on request.
 #pragma once
 
 #include <span>
@@ -10,23 +9,29 @@
 
 namespace enfilade::collision {
 
+/// Reference implementation: all overlapping pairs by brute force, sorted. `dynamicBoxes` holds the
+/// active dynamic proxies with their ids.
+std::vector<ProxyPair> findPairsBruteForce(std::span<const Aabb> staticBoxes,
+                                           std::span<const std::pair<ProxyId, Aabb>> dynamicBoxes);
+
+/// The result of compareWithBruteForce().
 struct BroadPhaseAudit {
-  std::size_t pairs = 0;        ///< that brute force found among those asked about
-  std::vector<BoxPair> missed;  ///< overlap, but the sweep does not hold them; sorted
-  std::vector<BoxPair> extra;   ///< the sweep holds them, but they do not overlap; sorted
-  bool right() const { return missed.empty() && extra.empty(); }
+  std::size_t pairs = 0;          ///< number of overlapping pairs by brute force
+  std::vector<ProxyPair> missed;  ///< overlapping pairs that the sweep lacks; sorted
+  std::vector<ProxyPair> extra;   ///< pairs of the sweep that do not overlap; sorted
+  bool isCorrect() const { return missed.empty() && extra.empty(); }
 };
 
-/// Compares the pairs that `sweep` holds after an update() with brute force over the boxes that it
-/// was given: `stillBoxes` by StillId (an empty Box where there is none), all live movers with
-/// their ids. Costs movers * (still + movers) box tests of some 5 ns.
-BroadPhaseAudit compareWithBruteForce(const SortAndSweep& sweep, std::span<const Box> stillBoxes,
-                                      std::span<const std::pair<MoverId, Box>> moverBoxes);
+/// Compares the pairs of `sweep` after an update() with brute force over its boxes: `staticBoxes`
+/// by StaticId (an empty Aabb for an unused id), and all active dynamic proxies with their ids.
+/// Costs dynamic * (static + dynamic) box tests of about 5 ns.
+BroadPhaseAudit compareWithBruteForce(const SortAndSweep& sweep, std::span<const Aabb> staticBoxes,
+                                      std::span<const std::pair<ProxyId, Aabb>> dynamicBoxes);
 
-/// The same for the pairs in which a mover of `asked` takes part, so that a large scene can be
-/// audited some movers at a time.
-BroadPhaseAudit compareWithBruteForce(const SortAndSweep& sweep, std::span<const Box> stillBoxes,
-                                      std::span<const std::pair<MoverId, Box>> moverBoxes,
-                                      std::span<const MoverId> asked);
+/// The same for pairs that contain a proxy of `selected`. A large scene can thus be audited a few
+/// proxies at a time.
+BroadPhaseAudit compareWithBruteForce(const SortAndSweep& sweep, std::span<const Aabb> staticBoxes,
+                                      std::span<const std::pair<ProxyId, Aabb>> dynamicBoxes,
+                                      std::span<const ProxyId> selected);
 
 }  // namespace enfilade::collision

@@ -1,171 +1,195 @@
-// Each mover's ends bubble to their place, one mover after the other. While the first ones are
-// repaired the ends of the others still stand where they stood, so an exchange may be undone later
-// in the same update. What an exchange means is therefore decided by the boxes before and after the
-// update: if a pair's overlap differs, then on some axis a lower and an upper end of the two are in
-// another order than before, so that they exchanged in the telling sense at least once.
+// Insertion sort, one proxy after the other. While the first proxies are sorted, the endpoints of
+// the others still have their old positions, so a later step of the same update may undo a swap.
+// The boxes before and after the update therefore decide whether a swap changes an overlap. No
+// change is missed: if the overlap of a pair changed, a lower and an upper endpoint of the two
+// changed their order on some axis, so they were swapped in that direction at least once.
 
 #include "collision/broad_phase/endpoint_lists.hpp"
 
 #include <algorithm>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::collision {
 
-void MoverLists::makeRoomFor(std::uint32_t mover) {
-  reach_.resize(mover + std::size_t{1});
-  settled_.resize(mover + std::size_t{1});
-  positions_.resize(mover + std::size_t{1});
-  marked_.resize(mover + std::size_t{1}, 0);
-  passed_.resize(2 * (mover + std::size_t{1}));
+void EndpointLists::growTo(std::uint32_t proxy) {
+  maxEndpoints_.resize(proxy + std::size_t{1});
+  committedMaxEndpoints_.resize(proxy + std::size_t{1});
+  endpointIndices_.resize(proxy + std::size_t{1});
+  marked_.resize(proxy + std::size_t{1}, 0);
+  swapped_.resize(2 * (proxy + std::size_t{1}));
 }
 
-void MoverLists::settle(std::span<const std::uint32_t> movers) {
-  for (const std::uint32_t mover : movers) settled_[mover] = reach_[mover];
+void EndpointLists::commit(std::span<const std::uint32_t> proxies) {
+  for (const std::uint32_t proxy : proxies) committedMaxEndpoints_[proxy] = maxEndpoints_[proxy];
 }
 
-void MoverLists::renumber(std::size_t axis) {
-  const Ends& ends = ends_[axis];
-  for (std::uint32_t k = 1; k + 1 < ends.size(); ++k) positionOf(axis, ends[k].tag) = k;
+void EndpointLists::renumber(std::size_t axis) {
+  const EndpointList& endpoints = endpoints_[axis];
+  for (std::uint32_t k = 1; k + 1 < endpoints.size(); ++k)
+    endpointIndex(axis, endpoints[k].tag) = k;
 }
 
-void MoverLists::remove(std::span<const std::uint32_t> movers) {
-  if (movers.empty()) return;
-  for (const std::uint32_t mover : movers) marked_[mover] = 1;
+void EndpointLists::remove(std::span<const std::uint32_t> proxies) {
+  if (proxies.empty()) return;
+  for (const std::uint32_t proxy : proxies) {
+    ENFILADE_ASSERT(proxy < marked_.size());
+    marked_[proxy] = 1;
+  }
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    Ends& ends = ends_[axis];
-    ends.erase(std::remove_if(ends.begin() + 1, ends.end() - 1,
-                              [this](const End& end) { return marked_[end.mover()] != 0; }),
-               ends.end() - 1);
+    EndpointList& endpoints = endpoints_[axis];
+    endpoints.erase(
+        std::remove_if(endpoints.begin() + 1, endpoints.end() - 1,
+                       [this](const Endpoint& endpoint) { return marked_[endpoint.proxy()] != 0; }),
+        endpoints.end() - 1);
     renumber(axis);
   }
-  for (const std::uint32_t mover : movers) marked_[mover] = 0;
+  for (const std::uint32_t proxy : proxies) marked_[proxy] = 0;
 }
 
-void MoverLists::confirm(std::uint32_t a, std::uint32_t b, std::vector<MoverChange>& changes) {
-  ++boxTests;
-  if (overlapping(reach_[a], reach_[b])) changes.push_back({std::min(a, b), std::max(a, b), true});
+void EndpointLists::confirmOverlap(std::uint32_t a, std::uint32_t b,
+                                   std::vector<PairChange>& changes) {
+  ENFILADE_ASSERT(a != b);
+  ++aabbTests;
+  if (overlapsByMaxEndpoints(maxEndpoints_[a], maxEndpoints_[b]))
+    changes.push_back({std::min(a, b), std::max(a, b), true});
 }
 
-/// An end of `mover` and the other end of each of the first `count` movers in `passed_` have passed
-/// one another: they opened an overlap, or closed one.
-void MoverLists::exchanged(std::uint32_t mover, std::size_t count, bool opens,
-                           std::vector<MoverChange>& changes) {
-  boxTests += count;
-  // First the condition that seldom holds: most boxes that pass on one axis are far apart.
-  const std::vector<HalfAxes>&with = opens ? reach_ : settled_,
-        &without = opens ? settled_ : reach_;
+/// An endpoint of `proxy` was swapped with the opposite endpoint of each of the first `count`
+/// proxies in `swapped_`. Appends the pairs whose overlap began (`added`) or ended.
+void EndpointLists::recordSwaps(std::uint32_t proxy, std::size_t count, bool added,
+                                std::vector<PairChange>& changes) {
+  aabbTests += count;
+  // Test the rarer condition first: most boxes whose endpoints swap on one axis are far apart.
+  const std::vector<SignedBounds>&with = added ? maxEndpoints_ : committedMaxEndpoints_,
+        &without = added ? committedMaxEndpoints_ : maxEndpoints_;
   for (std::size_t k = 0; k < count; ++k) {
-    const std::uint32_t other = passed_[k];
-    if (overlapping(with[mover], with[other]) && !overlapping(without[mover], without[other])) {
-      changes.push_back({std::min(mover, other), std::max(mover, other), opens});
+    const std::uint32_t other = swapped_[k];
+    ENFILADE_ASSERT(other != proxy);  // the two endpoints of a proxy are never swapped
+    if (overlapsByMaxEndpoints(with[proxy], with[other]) &&
+        !overlapsByMaxEndpoints(without[proxy], without[other])) {
+      changes.push_back({std::min(proxy, other), std::max(proxy, other), added});
     }
   }
 }
 
-// Which of the ends that are passed are of the other kind is past guessing: all are written, and
-// counted if they are.
+// The kind (lower or upper) of the swapped endpoints is unpredictable, so the loops have no branch:
+// each proxy is written, and counted only if its endpoint is of the opposite kind.
 
-void MoverLists::bubbleUp(std::size_t axis, End end, std::vector<MoverChange>& changes) {
-  End* const ends = ends_[axis].data();
-  const std::uint32_t from = positionOf(axis, end.tag);
+void EndpointLists::bubbleUp(std::size_t axis, Endpoint endpoint,
+                             std::vector<PairChange>& changes) {
+  Endpoint* const endpoints = endpoints_[axis].data();
+  const std::uint32_t from = endpointIndex(axis, endpoint.tag);
   std::uint32_t at = from;
   std::size_t count = 0;
-  for (; before(ends[at + 1], end); ++at) {
-    const End other = ends[at + 1];
-    passed_[count] = other.mover();
-    count += other.upper() != end.upper() ? 1 : 0;
-    ends[at] = other;
-    positionOf(axis, other.tag) = at;
+  for (; isBefore(endpoints[at + 1], endpoint); ++at) {
+    const Endpoint other = endpoints[at + 1];
+    swapped_[count] = other.proxy();
+    count += other.isUpper() != endpoint.isUpper() ? 1 : 0;
+    endpoints[at] = other;
+    endpointIndex(axis, other.tag) = at;
   }
-  exchanges += at - from;
-  ends[at] = end;
-  positionOf(axis, end.tag) = at;
-  exchanged(end.mover(), count, end.upper(), changes);
+  swaps += at - from;
+  endpoints[at] = endpoint;
+  endpointIndex(axis, endpoint.tag) = at;
+  recordSwaps(endpoint.proxy(), count, endpoint.isUpper(), changes);
 }
 
-void MoverLists::bubbleDown(std::size_t axis, End end, std::vector<MoverChange>& changes) {
-  End* const ends = ends_[axis].data();
-  const std::uint32_t from = positionOf(axis, end.tag);
+void EndpointLists::bubbleDown(std::size_t axis, Endpoint endpoint,
+                               std::vector<PairChange>& changes) {
+  Endpoint* const endpoints = endpoints_[axis].data();
+  const std::uint32_t from = endpointIndex(axis, endpoint.tag);
   std::uint32_t at = from;
   std::size_t count = 0;
-  for (; before(end, ends[at - 1]); --at) {
-    const End other = ends[at - 1];
-    passed_[count] = other.mover();
-    count += other.upper() != end.upper() ? 1 : 0;
-    ends[at] = other;
-    positionOf(axis, other.tag) = at;
+  for (; isBefore(endpoint, endpoints[at - 1]); --at) {
+    const Endpoint other = endpoints[at - 1];
+    swapped_[count] = other.proxy();
+    count += other.isUpper() != endpoint.isUpper() ? 1 : 0;
+    endpoints[at] = other;
+    endpointIndex(axis, other.tag) = at;
   }
-  exchanges += from - at;
-  ends[at] = end;
-  positionOf(axis, end.tag) = at;
-  exchanged(end.mover(), count, !end.upper(), changes);
+  swaps += from - at;
+  endpoints[at] = endpoint;
+  endpointIndex(axis, endpoint.tag) = at;
+  recordSwaps(endpoint.proxy(), count, !endpoint.isUpper(), changes);
 }
 
-/// An end that has not moved is where it belongs, and one that has can only go its way. The end
-/// that leads goes first, so that a mover's two ends never pass one another.
-void MoverLists::repair(std::size_t axis, End lower, End upper, std::vector<MoverChange>& changes) {
-  const double wasLower = ends_[axis][positionOf(axis, lower.tag)].at;
-  const double wasUpper = ends_[axis][positionOf(axis, upper.tag)].at;
-  if (upper.at > wasUpper) bubbleUp(axis, upper, changes);
-  if (lower.at > wasLower) bubbleUp(axis, lower, changes);
-  if (lower.at < wasLower) bubbleDown(axis, lower, changes);
-  if (upper.at < wasUpper) bubbleDown(axis, upper, changes);
+/// Moves the two endpoints of a proxy to their new positions. The leading endpoint moves first, so
+/// that the two endpoints of a proxy are never swapped.
+void EndpointLists::repair(std::size_t axis, Endpoint lower, Endpoint upper,
+                           std::vector<PairChange>& changes) {
+  const double wasLower = endpoints_[axis][endpointIndex(axis, lower.tag)].value;
+  const double wasUpper = endpoints_[axis][endpointIndex(axis, upper.tag)].value;
+  if (upper.value > wasUpper) bubbleUp(axis, upper, changes);
+  if (lower.value > wasLower) bubbleUp(axis, lower, changes);
+  if (lower.value < wasLower) bubbleDown(axis, lower, changes);
+  if (upper.value < wasUpper) bubbleDown(axis, upper, changes);
 }
 
-void MoverLists::move(std::uint32_t mover, std::vector<MoverChange>& changes) {
-  const HalfAxes& reach = reach_[mover];
-  const std::array<std::uint32_t, 6> position = positions_[mover];
+void EndpointLists::move(std::uint32_t proxy, std::vector<PairChange>& changes) {
+  const SignedBounds& maxEndpoints = maxEndpoints_[proxy];
+  const std::array<std::uint32_t, 6> position = endpointIndices_[proxy];
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double low = -reach[axis], high = reach[axis + 3];
-    End* const lower = &ends_[axis][position[2 * axis]];
-    End* const upper = &ends_[axis][position[2 * axis + 1]];
-    if (lower->at == low && upper->at == high) continue;
-    // Mostly neither end meets another; ties are left to repair().
-    if (lower[-1].at < low && low < lower[1].at && upper[-1].at < high && high < upper[1].at) {
-      lower->at = low;
-      upper->at = high;
+    const double low = -maxEndpoints[axis], high = maxEndpoints[axis + 3];
+    Endpoint* const lower = &endpoints_[axis][position[2 * axis]];
+    Endpoint* const upper = &endpoints_[axis][position[2 * axis + 1]];
+    ENFILADE_ASSERT(low <= high);
+    ENFILADE_ASSERT(lower->tag == 2 * proxy && upper->tag == 2 * proxy + 1);
+    if (lower->value == low && upper->value == high) continue;
+    // Usually neither endpoint is swapped. repair() handles ties.
+    if (lower[-1].value < low && low < lower[1].value && upper[-1].value < high &&
+        high < upper[1].value) {
+      lower->value = low;
+      upper->value = high;
     } else {
-      repair(axis, {low, 2 * mover}, {high, 2 * mover + 1}, changes);
+      repair(axis, {low, 2 * proxy}, {high, 2 * proxy + 1}, changes);
     }
   }
 }
 
-void MoverLists::insert(std::span<const std::uint32_t> movers, std::vector<MoverChange>& changes) {
-  if (movers.empty()) return;
+void EndpointLists::insert(std::span<const std::uint32_t> proxies,
+                           std::vector<PairChange>& changes) {
+  if (proxies.empty()) return;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    Ends& ends = ends_[axis];
-    const End last = ends.back();
-    ends.pop_back();
-    const auto old = static_cast<std::ptrdiff_t>(ends.size());
-    for (const std::uint32_t mover : movers) {
-      ends.push_back({-reach_[mover][axis], 2 * mover});
-      ends.push_back({reach_[mover][axis + 3], 2 * mover + 1});
+    EndpointList& endpoints = endpoints_[axis];
+    const Endpoint last = endpoints.back();
+    endpoints.pop_back();
+    const auto old = static_cast<std::ptrdiff_t>(endpoints.size());
+    for (const std::uint32_t proxy : proxies) {
+      endpoints.push_back({-maxEndpoints_[proxy][axis], 2 * proxy});
+      endpoints.push_back({maxEndpoints_[proxy][axis + 3], 2 * proxy + 1});
     }
-    std::stable_sort(ends.begin() + old, ends.end(), before);
-    std::inplace_merge(ends.begin(), ends.begin() + old, ends.end(), before);
-    ends.push_back(last);
+    std::stable_sort(endpoints.begin() + old, endpoints.end(), isBefore);
+    std::inplace_merge(endpoints.begin(), endpoints.begin() + old, endpoints.end(), isBefore);
+    endpoints.push_back(last);
+    ENFILADE_ASSERT(std::is_sorted(endpoints.begin(), endpoints.end(), isBefore));
     renumber(axis);
   }
-  sweep(movers, changes);
+  sweep(proxies, changes);
 }
 
-/// One sweep over the x list; pairs of two old movers are known already.
-void MoverLists::sweep(std::span<const std::uint32_t> fresh, std::vector<MoverChange>& changes) {
-  for (const std::uint32_t mover : fresh) marked_[mover] = 1;
-  for (std::size_t k = 1; k + 1 < ends_[0].size(); ++k) {
-    const End& end = ends_[0][k];
-    const std::uint32_t mover = end.mover();
-    std::vector<std::uint32_t>& own = open_[marked_[mover]];
-    if (end.upper()) {
-      own.erase(std::find(own.begin(), own.end(), mover));
+/// Sweeps the x list once. Pairs of two old proxies are already known and skipped.
+void EndpointLists::sweep(std::span<const std::uint32_t> newProxies,
+                          std::vector<PairChange>& changes) {
+  for (const std::uint32_t proxy : newProxies) marked_[proxy] = 1;
+  for (std::size_t k = 1; k + 1 < endpoints_[0].size(); ++k) {
+    const Endpoint& endpoint = endpoints_[0][k];
+    const std::uint32_t proxy = endpoint.proxy();
+    std::vector<std::uint32_t>& own = open_[marked_[proxy]];
+    if (endpoint.isUpper()) {
+      const auto opened = std::find(own.begin(), own.end(), proxy);
+      ENFILADE_ASSERT(opened != own.end());
+      own.erase(opened);
       continue;
     }
-    for (const std::uint32_t other : open_[1]) confirm(mover, other, changes);
-    if (marked_[mover] != 0) {
-      for (const std::uint32_t other : open_[0]) confirm(mover, other, changes);
+    for (const std::uint32_t other : open_[1]) confirmOverlap(proxy, other, changes);
+    if (marked_[proxy] != 0) {
+      for (const std::uint32_t other : open_[0]) confirmOverlap(proxy, other, changes);
     }
-    own.push_back(mover);
+    own.push_back(proxy);
   }
-  for (const std::uint32_t mover : fresh) marked_[mover] = 0;
+  ENFILADE_ASSERT(open_[0].empty() && open_[1].empty());
+  for (const std::uint32_t proxy : newProxies) marked_[proxy] = 0;
 }
 
 }  // namespace enfilade::collision

@@ -1,4 +1,5 @@
-// The end points of the movers, sorted on three axes and repaired by insertion (seed 5.2.2).
+// Sorted endpoint lists of the dynamic proxies on three axes, updated by insertion sort (Lin 1993,
+// section 5.2.2; Cohen et al. 1995).
 #pragma once
 
 #include <array>
@@ -11,76 +12,77 @@
 
 namespace enfilade::collision {
 
-/// What a repair found: two movers whose overlap has changed. `a` < `b`.
-struct MoverChange {
+/// Two proxies whose overlap began (`added`) or ended. `a` < `b`.
+struct PairChange {
   std::uint32_t a, b;
-  bool begins;
+  bool added;
 };
 
-/// Keeps one list of end points an axis, ascending; at equal coordinates lower ends come first, so
-/// that closed intervals which touch are in the order of intervals which overlap.
-class MoverLists {
+/// One ascending list of interval endpoints per axis. At equal coordinates lower endpoints come
+/// first, so that touching closed intervals have the same order as overlapping ones.
+class EndpointLists {
  public:
-  static constexpr std::uint32_t kMostMovers = 0x7fffffff;  ///< ids are below
+  static constexpr std::uint32_t kMaxProxies = 0x7fffffff;  ///< all ids are smaller
 
-  /// Boxes of all movers of an update are set first; then the lists are changed.
-  void setReach(std::uint32_t mover, const HalfAxes& reach) {
-    if (mover >= reach_.size()) makeRoomFor(mover);
-    reach_[mover] = reach;
+  /// Sets the box of a proxy. In an update, set all boxes first; then change the lists.
+  void setMaxEndpoints(std::uint32_t proxy, const SignedBounds& maxEndpoints) {
+    if (proxy >= maxEndpoints_.size()) growTo(proxy);
+    maxEndpoints_[proxy] = maxEndpoints;
   }
 
-  /// Takes movers out of the lists; tells nothing.
-  void remove(std::span<const std::uint32_t> movers);
-  /// Repairs the lists after the mover's box changed. Appends to `changes` each exchange of a lower
-  /// and an upper end whose status is confirmed by the boxes; one change may be told twice.
-  void move(std::uint32_t mover, std::vector<MoverChange>& changes);
-  /// Takes movers into the lists and appends their overlaps with all movers in the lists.
-  void insert(std::span<const std::uint32_t> movers, std::vector<MoverChange>& changes);
+  /// Removes proxies from the lists without reporting changes.
+  void remove(std::span<const std::uint32_t> proxies);
+  /// Restores the order after the box of a proxy changed. Appends to `changes` each swap of a lower
+  /// and an upper endpoint that the boxes confirm as a change; a change may occur twice.
+  void move(std::uint32_t proxy, std::vector<PairChange>& changes);
+  /// Inserts proxies into the lists and appends their overlaps with all proxies in the lists.
+  void insert(std::span<const std::uint32_t> proxies, std::vector<PairChange>& changes);
 
-  /// After an update, of each mover that was moved or inserted: its box is what it was from now on.
-  void settle(std::span<const std::uint32_t> movers);
+  /// Ends an update for all moved and inserted proxies: their current box becomes the previous one.
+  void commit(std::span<const std::uint32_t> proxies);
 
-  std::uint64_t exchanges = 0;  ///< counted up; the caller resets them
-  std::uint64_t boxTests = 0;
+  std::uint64_t swaps = 0;  ///< counter, reset by the caller
+  std::uint64_t aabbTests = 0;
 
  private:
-  struct End {
-    double at;
-    std::uint32_t tag;  ///< 2 * mover + (1 for the upper end)
-    bool upper() const { return (tag & 1) != 0; }
-    std::uint32_t mover() const { return tag >> 1; }
+  struct Endpoint {
+    double value;
+    std::uint32_t tag;  ///< 2 * proxy + (1 for the upper endpoint)
+    bool isUpper() const { return (tag & 1) != 0; }
+    std::uint32_t proxy() const { return tag >> 1; }
   };
-  static bool before(const End& a, const End& b) {
-    return a.at != b.at ? a.at < b.at : a.upper() < b.upper();
+  static bool isBefore(const Endpoint& a, const Endpoint& b) {
+    return a.value != b.value ? a.value < b.value : a.isUpper() < b.isUpper();
   }
-  /// Before and after the ends of movers stand one at -infinity and one at +infinity, so that no
-  /// end has to ask whether it has a neighbour.
-  using Ends = std::vector<End>;
-  static Ends noEnds() {
+  /// Each list starts with a sentinel at -infinity and ends with one at +infinity, so that every
+  /// endpoint has two neighbours.
+  using EndpointList = std::vector<Endpoint>;
+  static EndpointList makeSentinels() {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     return {{-kInfinity, 0}, {kInfinity, 1}};
   }
 
-  void makeRoomFor(std::uint32_t mover);
-  void repair(std::size_t axis, End lower, End upper, std::vector<MoverChange>& changes);
-  void bubbleUp(std::size_t axis, End end, std::vector<MoverChange>& changes);
-  void bubbleDown(std::size_t axis, End end, std::vector<MoverChange>& changes);
-  void exchanged(std::uint32_t mover, std::size_t count, bool opens,
-                 std::vector<MoverChange>& changes);
+  void growTo(std::uint32_t proxy);
+  void repair(std::size_t axis, Endpoint lower, Endpoint upper, std::vector<PairChange>& changes);
+  void bubbleUp(std::size_t axis, Endpoint endpoint, std::vector<PairChange>& changes);
+  void bubbleDown(std::size_t axis, Endpoint endpoint, std::vector<PairChange>& changes);
+  void recordSwaps(std::uint32_t proxy, std::size_t count, bool added,
+                   std::vector<PairChange>& changes);
   void renumber(std::size_t axis);
-  void sweep(std::span<const std::uint32_t> fresh, std::vector<MoverChange>& changes);
-  void confirm(std::uint32_t a, std::uint32_t b, std::vector<MoverChange>& changes);
-  std::uint32_t& positionOf(std::size_t axis, std::uint32_t tag) {
-    return positions_[tag >> 1][2 * axis + (tag & 1)];
+  void sweep(std::span<const std::uint32_t> newProxies, std::vector<PairChange>& changes);
+  void confirmOverlap(std::uint32_t a, std::uint32_t b, std::vector<PairChange>& changes);
+  std::uint32_t& endpointIndex(std::size_t axis, std::uint32_t tag) {
+    return endpointIndices_[tag >> 1][2 * axis + (tag & 1)];
   }
 
-  std::vector<HalfAxes> reach_;    ///< by mover
-  std::vector<HalfAxes> settled_;  ///< by mover: as of the last update
-  std::array<Ends, 3> ends_{noEnds(), noEnds(), noEnds()};
-  std::vector<std::array<std::uint32_t, 6>> positions_;  ///< by mover: of its ends in the lists
-  std::vector<std::uint8_t> marked_;                     ///< by mover: removed, or fresh
-  std::vector<std::uint32_t> passed_;  ///< scratch: movers of whom an end was exchanged
-  std::array<std::vector<std::uint32_t>, 2> open_;  ///< sweep: open movers, old and fresh
+  std::vector<SignedBounds> maxEndpoints_;           ///< by proxy
+  std::vector<SignedBounds> committedMaxEndpoints_;  ///< by proxy: as of the last update
+  std::array<EndpointList, 3> endpoints_{makeSentinels(), makeSentinels(), makeSentinels()};
+  std::vector<std::array<std::uint32_t, 6>>
+      endpointIndices_;                             ///< by proxy: its endpoints in the lists
+  std::vector<std::uint8_t> marked_;                ///< by proxy: removed or new
+  std::vector<std::uint32_t> swapped_;              ///< scratch: proxies of swapped endpoints
+  std::array<std::vector<std::uint32_t>, 2> open_;  ///< sweep: open intervals, old and new proxies
 };
 
 }  // namespace enfilade::collision

@@ -1,88 +1,95 @@
-// One pass a half-axis picks the ends that lie between the borders, without a branch: which do is
-// past guessing. A list mostly has a handful, which insertion sorts.
+// One branch-free pass per signed axis collects the endpoints inside the window, because branches
+// would be unpredictable. Most lists are short and are sorted by insertion.
 
 #include "collision/broad_phase/proxy_window.hpp"
 
 #include <algorithm>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::collision {
 namespace {
 
-using End = MoverCell::End;
+using Endpoint = ProxyWindow::Endpoint;
 
-constexpr std::size_t kFewEnds = 24;  // of a list, that are sorted by insertion
+constexpr std::size_t kSmallListThreshold = 24;  // list length up to which insertion sort is used
 
-bool before(const End& a, const End& b) {
-  return a.at < b.at;
+bool isBefore(const Endpoint& a, const Endpoint& b) {
+  return a.value < b.value;
 }
 
-void sortEnds(End* first, End* last) {
-  if (static_cast<std::size_t>(last - first) > kFewEnds) {
-    std::sort(first, last, before);
+void sortEndpoints(Endpoint* first, Endpoint* last) {
+  if (static_cast<std::size_t>(last - first) > kSmallListThreshold) {
+    std::sort(first, last, isBefore);
     return;
   }
-  for (End* end = first; end != last; ++end) {
-    const End moving = *end;
-    End* to = end;
-    for (; to != first && moving.at < to[-1].at; --to) *to = to[-1];
+  for (Endpoint* end = first; end != last; ++end) {
+    const Endpoint moving = *end;
+    Endpoint* to = end;
+    for (; to != first && moving.value < to[-1].value; --to) *to = to[-1];
     *to = moving;
   }
 }
 
-/// Picks the rows that end on half-axis `k`; returns the end of `ends`.
-End* pickEnds(const StillCells& still, std::span<const StillCells::Row> rows, std::size_t k,
-              std::span<const MoverCell::StillBox> boxes, End* ends) {
-  End* picked = ends;
+/// Writes the endpoints inside the window on signed axis `k`, sorted. Returns the end of the list.
+Endpoint* collectEndpoints(const StaticGrid& staticGrid, std::span<const StaticGrid::Row> rows,
+                           std::size_t k, std::span<const ProxyWindow::StaticProxy> boxes,
+                           Endpoint* endpoints) {
+  Endpoint* picked = endpoints;
   for (std::uint32_t r = 0; r < rows.size(); ++r) {
-    picked->box = r;
-    picked += boxes[r].ending >> k & 1;
+    picked->staticIndex = r;
+    picked += boxes[r].listedMask >> k & 1;
   }
-  for (End* end = ends; end != picked; ++end) end->at = still.onset(rows[end->box])[k];
-  sortEnds(ends, picked);
+  for (Endpoint* end = endpoints; end != picked; ++end)
+    end->value = staticGrid.minEndpoints(rows[end->staticIndex])[k];
+  sortEndpoints(endpoints, picked);
   return picked;
 }
 
-/// Room for `size` entries, without keeping that of a place much fuller.
+/// Grows the storage to `size` entries. Frees it first if it is far larger than needed.
 template <class T>
-void fit(std::vector<T>& room, std::size_t size) {
-  constexpr std::size_t kMuch = 8, kLittle = 1024;
-  if (room.size() > kMuch * size + kLittle) room = std::vector<T>();
+void resizeStorage(std::vector<T>& room, std::size_t size) {
+  constexpr std::size_t kShrinkFactor = 8, kShrinkSlack = 1024;
+  if (room.size() > kShrinkFactor * size + kShrinkSlack) room = std::vector<T>();
   if (room.size() < size) room.resize(size);
 }
 
 }  // namespace
 
-void MoverCell::lay(const StillCells& still, std::span<const StillCells::Row> rows,
-                    const HalfAxes& reach, std::vector<std::uint32_t>& met) {
-  fit(boxes, rows.size());
-  if (met.size() < rows.size()) met.resize(rows.size());
-  std::size_t metCount = 0;
-  // The borders, and room for an end of each box between those of each half-axis: pickEnds() writes
-  // past its list.
-  const std::size_t endCount = 12 + 6 * rows.size();
-  unsigned endingOnes = 0;
+void ProxyWindow::build(const StaticGrid& staticGrid, std::span<const StaticGrid::Row> rows,
+                        const SignedBounds& maxEndpoints, std::vector<std::uint32_t>& overlapping) {
+  resizeStorage(statics, rows.size());
+  if (overlapping.size() < rows.size()) overlapping.resize(rows.size());
+  std::size_t overlapCount = 0;
+  // Two sentinels and room for one endpoint of each box per signed axis: collectEndpoints() writes
+  // past the end of its list.
+  const std::size_t endpointCount = 12 + 6 * rows.size();
+  unsigned anyListed = 0;
   for (std::size_t r = 0; r < rows.size(); ++r) {
-    const HalfAxes& onset = still.onset(rows[r]);
-    const unsigned apart = beyond(onset, reach), ending = beyond(onset, nearest);
-    const std::uint32_t id = still.idOf(rows[r]);
-    boxes[r] = {id, static_cast<std::uint8_t>(apart), static_cast<std::uint8_t>(ending)};
-    met[metCount] = id;
-    metCount += apart == 0 ? 1 : 0;
-    endingOnes |= ending;
+    const SignedBounds& minEndpoints = staticGrid.minEndpoints(rows[r]);
+    const unsigned separated = greaterMask(minEndpoints, maxEndpoints),
+                   listed = greaterMask(minEndpoints, minBounds);
+    const std::uint32_t id = staticGrid.idOf(rows[r]);
+    statics[r] = {id, static_cast<std::uint8_t>(separated), static_cast<std::uint8_t>(listed)};
+    overlapping[overlapCount] = id;
+    overlapCount += separated == 0 ? 1 : 0;
+    anyListed |= listed;
   }
-  fit(ends, endCount);
-  met.resize(metCount);
-  End* end = ends.data();
+  resizeStorage(endpoints, endpointCount);
+  overlapping.resize(overlapCount);
+  Endpoint* end = endpoints.data();
   for (std::size_t k = 0; k < 6; ++k) {
-    *end++ = {nearest[k], kBorder};
-    End* beyondReach = end;
-    if ((endingOnes >> k & 1) != 0) {
-      end = pickEnds(still, rows, k, boxes, end);
-      while (beyondReach != end && beyondReach->at <= reach[k]) ++beyondReach;
+    ENFILADE_ASSERT(minBounds[k] <= maxEndpoints[k] && maxEndpoints[k] <= maxBounds[k]);
+    *end++ = {minBounds[k], kSentinel};
+    Endpoint* firstGreater = end;
+    if ((anyListed >> k & 1) != 0) {
+      end = collectEndpoints(staticGrid, rows, k, statics, end);
+      while (firstGreater != end && firstGreater->value <= maxEndpoints[k]) ++firstGreater;
     }
-    next[k] = static_cast<std::uint32_t>(beyondReach - ends.data());
-    *end++ = {farthest[k], kBorder};
+    next[k] = static_cast<std::uint32_t>(firstGreater - endpoints.data());
+    *end++ = {maxBounds[k], kSentinel};
   }
+  ENFILADE_ASSERT(end <= endpoints.data() + endpoints.size());
 }
 
 }  // namespace enfilade::collision

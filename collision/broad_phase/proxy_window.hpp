@@ -1,5 +1,5 @@
-// A mover's own cell: the space that it roams in for some ticks, and the end points of the still
-// boxes in it, sorted on three axes (seed 5.2.2).
+// Proxy window: the space in which a dynamic proxy stays for some ticks, with the sorted endpoints
+// of the static boxes in it. A local form of sort and sweep (Lin 1993, section 5.2.2).
 #pragma once
 
 #include <algorithm>
@@ -13,42 +13,45 @@
 
 namespace enfilade::collision {
 
-/// On each half-axis the mover's reach is somewhere in nearest <= reach < farthest; what ends there
-/// stands in a list between these borders.
-struct MoverCell {
-  static constexpr std::uint32_t kBorder = static_cast<std::uint32_t>(-1);
-  struct End {
-    double at;
-    std::uint32_t box;  ///< index into `boxes`, or kBorder
+/// On each signed axis the proxy's maximum endpoint lies in [minBounds, maxBounds). The sorted list
+/// of that axis holds the minimum endpoints of static boxes in this range, between two sentinels.
+struct ProxyWindow {
+  static constexpr std::uint32_t kSentinel = static_cast<std::uint32_t>(-1);
+  struct Endpoint {
+    double value;
+    std::uint32_t staticIndex;  ///< into `statics`, or kSentinel
   };
-  struct StillBox {
+  struct StaticProxy {
     std::uint32_t id;
-    std::uint8_t apart;   ///< bit k: its onset on half-axis k is beyond the reach
-    std::uint8_t ending;  ///< bit k: beyond the nearest border, as of when the cell was laid
+    std::uint8_t separatedMask;  ///< bit k: separated on signed axis k; 0: the boxes overlap
+    std::uint8_t listedMask;     ///< bit k: its endpoint is in list k, as of the build
   };
 
-  HalfAxes nearest{}, farthest{};       ///< borders
-  std::array<std::uint32_t, 6> next{};  ///< by half-axis: the first end beyond the reach
-  std::vector<End> ends;        ///< six lists, each ascending, a border at either side; room beyond
-  std::vector<StillBox> boxes;  ///< all that meet the cell; room beyond
+  SignedBounds minBounds{}, maxBounds{};  ///< range of the maximum endpoints
+  std::array<std::uint32_t, 6> next{};    ///< by signed axis: first endpoint above the proxy's
+  std::vector<Endpoint>
+      endpoints;  ///< six ascending lists, each with two sentinels; spare room behind
+  std::vector<StaticProxy> statics;  ///< all static boxes in the window; spare room behind
 
-  /// Takes in the boxes of `rows`, all of which meet `farthest`, with the borders that are set.
-  /// `met` becomes the ids of those that meet `reach`, in the order of `rows`.
-  void lay(const StillCells& still, std::span<const StillCells::Row> rows, const HalfAxes& reach,
-           std::vector<std::uint32_t>& met);
+  /// Builds the lists from the boxes of `rows`, all of which overlap `maxBounds`. Set the bounds
+  /// first. Sets `overlapping` to the ids of the boxes that overlap `maxEndpoints`, in row order.
+  void build(const StaticGrid& staticGrid, std::span<const StaticGrid::Row> rows,
+             const SignedBounds& maxEndpoints, std::vector<std::uint32_t>& overlapping);
 
-  /// Asks for what is read when ends are passed: the first ends, of most cells all, and boxes.
+  /// Prefetches the data read when endpoints are crossed: the first endpoints (for most windows
+  /// all of them) and the static boxes.
   void prefetch() const {
-    constexpr std::size_t kEndsPerLine = 4, kMost = 32;
-    for (std::size_t k = 0; k < std::min(kMost, ends.size()); k += kEndsPerLine) {
-      __builtin_prefetch(&ends[k]);
+    constexpr std::size_t kEndpointsPerLine = 4, kMaxPrefetched = 32;
+    for (std::size_t k = 0; k < std::min(kMaxPrefetched, endpoints.size());
+         k += kEndpointsPerLine) {
+      __builtin_prefetch(&endpoints[k]);
     }
-    __builtin_prefetch(boxes.data());
+    __builtin_prefetch(statics.data());
   }
 
-  /// The ends beside the reach on half-axis `k`.
-  double endBefore(std::size_t k) const { return ends[next[k] - 1].at; }
-  double endBeyond(std::size_t k) const { return ends[next[k]].at; }
+  /// Endpoints directly below and above the proxy's own on signed axis `k`.
+  double endpointBefore(std::size_t k) const { return endpoints[next[k] - 1].value; }
+  double endpointAfter(std::size_t k) const { return endpoints[next[k]].value; }
 };
 
 }  // namespace enfilade::collision

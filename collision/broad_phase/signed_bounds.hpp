@@ -1,4 +1,4 @@
-// Boxes by half-axes, on which every question about overlap is one comparison.
+// Boxes as bounds on six signed axes, on which every overlap test is a single comparison.
 #pragma once
 
 #include <array>
@@ -8,56 +8,57 @@
 
 namespace enfilade::collision {
 
-/// A closed interval has two ends and space three axes: six half-axes, -x -y -z +x +y +z. On each a
-/// mover has a reach (how far its box goes: -min, or max) and a still box has an onset (from which
-/// reach on it is met: -max, or min). Boxes overlap exactly if every onset <= the reach beside it.
-using HalfAxes = std::array<double, 6>;
+/// Bounds on the six signed axes -x -y -z +x +y +z. A dynamic box is given by its maximum endpoints
+/// (-min or max), a static box by its minimum endpoints (-max or min). Two boxes overlap if and
+/// only if every minimum endpoint <= the corresponding maximum endpoint.
+using SignedBounds = std::array<double, 6>;
 
-inline HalfAxes reachOf(const Box& box) {
+inline SignedBounds toMaxEndpoints(const Aabb& box) {
   return {-box.min.x(), -box.min.y(), -box.min.z(), box.max.x(), box.max.y(), box.max.z()};
 }
-inline HalfAxes onsetOf(const Box& box) {
+inline SignedBounds toMinEndpoints(const Aabb& box) {
   return {-box.max.x(), -box.max.y(), -box.max.z(), box.min.x(), box.min.y(), box.min.z()};
 }
-inline Box boxOfOnset(const HalfAxes& o) {
+inline Aabb aabbFromMinEndpoints(const SignedBounds& o) {
   return {Vec3(o[3], o[4], o[5]), Vec3(-o[0], -o[1], -o[2])};
 }
 
-// Two half-axes at once, in a form that gcc and clang know on every processor. A comparison gives
-// -1 where it holds and 0 elsewhere.
-using Lanes = double __attribute__((vector_size(16)));
-using LaneMask = long long __attribute__((vector_size(16)));
+// Two signed axes at a time, as gcc and clang vector types, which exist on every processor. A
+// comparison gives -1 for true and 0 for false.
+using Double2 = double __attribute__((vector_size(16)));
+using Mask2 = long long __attribute__((vector_size(16)));
 
-inline Lanes lanesAt(const double* from) {
-  Lanes lanes;
+inline Double2 loadDouble2(const double* from) {
+  Double2 lanes;
   std::memcpy(&lanes, from, sizeof(lanes));
   return lanes;
 }
 
-/// One bit a lane. Of one comparison: gcc 12 takes masks that are combined apart, lane by lane.
-inline unsigned bitsOf(LaneMask mask) {
+/// One bit per lane, for the mask of a single comparison: gcc 12 splits combined masks into lanes.
+inline unsigned toBits(Mask2 mask) {
 #ifdef __SSE2__
-  return static_cast<unsigned>(__builtin_ia32_movmskpd(reinterpret_cast<Lanes>(mask)));
+  return static_cast<unsigned>(__builtin_ia32_movmskpd(reinterpret_cast<Double2>(mask)));
 #else
   return static_cast<unsigned>((mask[0] & 1) | (mask[1] & 2));
 #endif
 }
 
 /// Bit k: a[k] > b[k].
-inline unsigned beyond(const HalfAxes& a, const HalfAxes& b) {
-  return bitsOf(lanesAt(&a[0]) > lanesAt(&b[0])) | bitsOf(lanesAt(&a[2]) > lanesAt(&b[2])) << 2 |
-         bitsOf(lanesAt(&a[4]) > lanesAt(&b[4])) << 4;
+inline unsigned greaterMask(const SignedBounds& a, const SignedBounds& b) {
+  return toBits(loadDouble2(&a[0]) > loadDouble2(&b[0])) |
+         toBits(loadDouble2(&a[2]) > loadDouble2(&b[2])) << 2 |
+         toBits(loadDouble2(&a[4]) > loadDouble2(&b[4])) << 4;
 }
 
-inline bool meets(const HalfAxes& onset, const HalfAxes& reach) {
-  return beyond(onset, reach) == 0;
+inline bool overlaps(const SignedBounds& minEndpoints, const SignedBounds& maxEndpoints) {
+  return greaterMask(minEndpoints, maxEndpoints) == 0;
 }
 
-/// The same of two boxes by their reach: a sum has the sign of the difference of the coordinates,
-/// exactly.
-inline bool overlapping(const HalfAxes& a, const HalfAxes& b) {
-  const unsigned inXY =
-      bitsOf(lanesAt(&a[0]) + lanesAt(&b[3]) >= 0) & bitsOf(lanesAt(&b[0]) + lanesAt(&a[3]) >= 0);
+/// Overlap test of two boxes, both given by their maximum endpoints. Exact: a rounded sum has the
+/// sign of the exact one.
+inline bool overlapsByMaxEndpoints(const SignedBounds& a, const SignedBounds& b) {
+  const unsigned inXY = toBits(loadDouble2(&a[0]) + loadDouble2(&b[3]) >= 0) &
+                        toBits(loadDouble2(&b[0]) + loadDouble2(&a[3]) >= 0);
   const unsigned inZ = unsigned{a[2] + b[5] >= 0} & unsigned{b[2] + a[5] >= 0};  // no branch
   return (unsigned{inXY == 3} & inZ) != 0;
 }

@@ -1,4 +1,5 @@
-// Broad phase: which boxes overlap, told as changes from tick to tick (seed 5.2.2, I-COLLIDE).
+// Broad phase: sort and sweep with temporal coherence (Lin 1993, section 5.2.2; Cohen et al. 1995).
+// Reports overlapping boxes as changes from tick to tick.
 #pragma once
 
 #include <compare>
@@ -13,100 +14,99 @@
 
 namespace enfilade::collision {
 
-using StillId = std::uint32_t;  ///< index into the boxes given at construction, or by insertStill()
-using MoverId = std::uint32_t;  ///< by insert(); reused after remove() and update()
+using StaticId = std::uint32_t;  ///< index into the constructor's boxes, or from insertStatic()
+using ProxyId = std::uint32_t;   ///< from insert(); reused after remove() and update()
 
-/// A moving box and a still one, or two moving ones (then `mover` < `other`).
-struct BoxPair {
-  MoverId mover;
-  std::uint32_t other;  ///< a StillId, or a MoverId when `otherMoves`
-  bool otherMoves;
+/// A dynamic and a static proxy, or two dynamic ones (then `proxy` < `other`).
+struct ProxyPair {
+  ProxyId proxy;
+  std::uint32_t other;  ///< a StaticId, or a ProxyId if `otherIsDynamic`
+  bool otherIsDynamic;
 
-  auto operator<=>(const BoxPair&) const = default;
+  auto operator<=>(const ProxyPair&) const = default;
 };
 
-/// Counters of the last update(), for metrics and for tests of the complexity claim.
+/// Counters of the last update(), for metrics and complexity tests.
 struct SweepCounters {
-  std::uint64_t exchanges = 0;   ///< end points that passed one another, on all axes
-  std::uint64_t cellsLaid = 0;   ///< times that a mover's surroundings were gathered and sorted
-  std::uint64_t stillEdits = 0;  ///< still boxes that came or went
-  std::uint64_t rebuilds = 0;    ///< 1 if the cells of all still boxes were built anew
-  std::uint64_t boxTests = 0;    ///< full box tests: to lay cells, and of movers that are near
+  std::uint64_t swaps = 0;         ///< endpoint swaps on all axes
+  std::uint64_t windowsBuilt = 0;  ///< proxy windows that were built
+  std::uint64_t staticEdits = 0;   ///< static boxes inserted or removed
+  std::uint64_t rebuilds = 0;      ///< 1 if the whole static grid was rebuilt
+  std::uint64_t aabbTests = 0;  ///< full box tests: of window builds and of nearby dynamic proxies
 };
 
-/// Keeps the set of overlapping pairs of closed boxes, exactly: after update() it equals what brute
-/// force over all boxes finds. Still-still pairs never exist.
+struct SweepState;  // internal
+
+/// Maintains the exact set of overlapping pairs of closed boxes: after update() it equals the
+/// result of brute force. Pairs of two static boxes are never reported.
 class SortAndSweep {
  public:
-  /// `stillBoxes` are finite and not empty; throws std::invalid_argument naming the index if not.
-  explicit SortAndSweep(std::span<const Box> stillBoxes);
+  /// `staticBoxes` must be finite and not empty, else throws std::invalid_argument with the index.
+  explicit SortAndSweep(std::span<const Aabb> staticBoxes);
   ~SortAndSweep();
   SortAndSweep(SortAndSweep&&) noexcept;
   SortAndSweep& operator=(SortAndSweep&&) noexcept;
 
-  /// Movers are inserted, moved and removed between updates; the pairs follow at the next update().
-  /// Boxes are finite and not empty, movers are there (std::invalid_argument otherwise; nothing is
-  /// changed). insert() throws std::length_error above 2^31 - 1 movers.
-  MoverId insert(const Box& box);
-  void move(MoverId mover, const Box& box);
-  void remove(MoverId mover);
+  /// Insert, move and remove dynamic proxies between updates; the next update() changes the pairs.
+  /// Boxes must be finite and not empty and ids must exist. Otherwise these functions throw
+  /// std::invalid_argument and change nothing. insert() throws std::length_error above 2^31 - 1
+  /// proxies.
+  ProxyId insert(const Aabb& box);
+  void move(ProxyId proxy, const Aabb& box);
+  void remove(ProxyId proxy);
 
-  /// What besides the boxes decides how movers go on: a copy needs it to give the same ids and to
-  /// tell the same changes.
-  struct Roll {
-    std::vector<MoverId> free;                     ///< given again, the last one first
-    std::vector<std::pair<MoverId, Box>> leaving;  ///< removed since the last update, in order
-    bool updated = false;                          ///< there was an update
+  /// State of the proxies apart from the active boxes. A copy needs it to assign the same ids and
+  /// to report the same changes.
+  struct ProxyTable {
+    std::vector<ProxyId> freeIds;                   ///< reused from the back
+    std::vector<std::pair<ProxyId, Aabb>> removed;  ///< removed since the last update, in order
+    bool updated = false;                           ///< update() was called
   };
-  Roll roll() const;
-  /// Takes these movers in the place of all that are there (`there`: ascending ids, without those
-  /// of the roll) as they were after an update. Only before the first update; ids are those of a
-  /// broad phase that gave them: throws std::invalid_argument where they cannot be.
-  void restore(std::span<const std::pair<MoverId, Box>> there, const Roll& roll);
+  ProxyTable saveProxies() const;
+  /// Replaces all proxies by `active` (ascending ids, without those of `table`), in their state
+  /// after an update. Allowed only before the first update. The ids must come from saveProxies() of
+  /// a broad phase. Throws std::invalid_argument if the ids are inconsistent.
+  void restoreProxies(std::span<const std::pair<ProxyId, Aabb>> active, const ProxyTable& table);
 
-  /// Still boxes come and go between updates as well, and the pairs follow at the next update(). An
-  /// id is free for the next box only after the update that tells the end of its pairs. Cheap while
-  /// there are few at a time: after as many edits as half of the boxes all cells are built anew.
-  /// removeStill() throws std::invalid_argument if there is no such box, insertStill()
-  /// std::length_error above 2^32 - 2 of them. The first edit costs O(n).
-  StillId insertStill(const Box& box);
-  void removeStill(StillId still);
+  /// Insert and remove static boxes between updates; the next update() changes the pairs. An id can
+  /// be reused only after the update that reports the end of its pairs. A few edits per tick are
+  /// cheap; after edits of half of the boxes the whole grid is rebuilt. The first edit costs O(n).
+  /// insertStatic() throws std::length_error above 2^32 - 2 boxes, removeStatic()
+  /// std::invalid_argument for an unknown id.
+  StaticId insertStatic(const Aabb& box);
+  void removeStatic(StaticId id);
 
-  /// Repairs the sorted lists and applies the status changes.
+  /// Updates the sorted lists and the pairs.
   void update();
 
-  /// Status changes of the last update(), sorted; deterministic. Valid until the next one.
-  std::span<const BoxPair> begun() const;
-  std::span<const BoxPair> ended() const;
-  /// All pairs that overlap now in which `mover` takes part as `mover` or (mover-mover pairs) as
-  /// `other`, sorted by the partner: still partners first. None for a mover that is not there.
-  /// Valid until the next update().
-  struct Partner {
+  /// Pairs that the last update() added and removed, sorted; deterministic. Valid until the next
+  /// update().
+  std::span<const ProxyPair> addedPairs() const;
+  std::span<const ProxyPair> removedPairs() const;
+  /// A box that overlaps a given dynamic proxy.
+  struct Overlap {
     std::uint32_t id;
-    bool moves;
-    auto operator<=>(const Partner& o) const {
-      return moves != o.moves ? moves <=> o.moves : id <=> o.id;
+    bool isDynamic;
+    auto operator<=>(const Overlap& o) const {
+      return isDynamic != o.isDynamic ? isDynamic <=> o.isDynamic : id <=> o.id;
     }
-    bool operator==(const Partner&) const = default;
+    bool operator==(const Overlap&) const = default;
   };
-  std::span<const Partner> partners(MoverId mover) const;
-  /// The still boxes that overlap a box which is no mover, ascending: for questions asked once, as
-  /// whether there is room. Costs what stands in the cells of the box. As of the last update().
+  /// All current overlaps of a dynamic proxy, sorted: static boxes first. Empty for an unknown id.
+  /// Valid until the next update().
+  std::span<const Overlap> overlapsOf(ProxyId proxy) const;
+  /// Static boxes that overlap an arbitrary box, ascending, as of the last update(). For single
+  /// queries, such as a free-space test. The cost is linear in the boxes of the cells it covers.
   /// Throws std::invalid_argument for a box that is empty or not finite.
-  std::vector<StillId> stillOverlapping(const Box& box) const;
+  std::vector<StaticId> overlapStatic(const Aabb& box) const;
 
   std::size_t pairCount() const;
-  std::size_t stillCount() const;              ///< as of the last update()
-  std::size_t bytesBesidesStillBoxes() const;  ///< memory of the still side, less 48 bytes a box
+  std::size_t staticCount() const;          ///< as of the last update()
+  std::size_t staticOverheadBytes() const;  ///< static-side memory without 48 bytes per box
   const SweepCounters& counters() const;
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  std::unique_ptr<SweepState> state_;
 };
-
-/// The slow twin: every pair by brute force, sorted. `moverBoxes` holds live movers with their ids.
-std::vector<BoxPair> bruteForcePairs(std::span<const Box> stillBoxes,
-                                     std::span<const std::pair<MoverId, Box>> moverBoxes);
 
 }  // namespace enfilade::collision

@@ -1,113 +1,126 @@
-// Movers against movers.
+// Dynamic proxies against each other.
 //
-// The cells of the movers are boxes as well, and change once in a while. Their ends stand in three
-// sorted lists that are repaired by insertion (mover_lists.hpp); an exchange tells that two cells
-// have met or parted. Movers whose cells do not meet cannot, and cost nothing. Of two whose cells
-// do, neighbours, end points are compared when one of them has moved: the two on the half-axis on
-// which they were found apart last, and all twelve if these overlap by now.
+// Proxy windows are boxes that change rarely. Three sorted endpoint lists (endpoint_lists.hpp)
+// report windows that begin or cease to overlap. Proxies with separate windows cannot overlap and
+// cost nothing. Proxies with overlapping windows are neighbours: their boxes are compared when one
+// of them has moved, first on the last separating axis, then on all six signed axes.
+#include "collision/broad_phase/sort_and_sweep_dynamic.hpp"
 
 #include <algorithm>
 #include <array>
 
-#include "collision/broad_phase/sort_and_sweep_state.hpp"
+#include "collision/assert.hpp"
+#include "collision/broad_phase/sort_and_sweep_pairs.hpp"
 
 namespace enfilade::collision {
 namespace {
 
-std::uint8_t opposite(std::uint8_t k) {
-  constexpr std::array<std::uint8_t, 7> kOpposite{3, 4, 5, 0, 1, 2, Neighbour::kMet};
+std::uint8_t oppositeAxis(std::uint8_t k) {
+  constexpr std::array<std::uint8_t, 7> kOpposite{3, 4, 5, 0, 1, 2, Neighbour::kOverlapping};
+  ENFILADE_ASSERT(k < kOpposite.size());
   return kOpposite[k];
 }
 
-/// Whether the box of `a` ends on half-axis `k` before that of `b` begins: the sum is exact in
-/// sign.
-bool isApart(const HalfAxes& a, const HalfAxes& b, std::uint8_t k) {
-  return a[k] + b[opposite(k)] < 0;
+/// True if signed axis `k` separates `a` from `b`. The sign of the rounded sum is exact.
+bool isSeparatedOn(const SignedBounds& a, const SignedBounds& b, std::uint8_t k) {
+  return a[k] + b[oppositeAxis(k)] < 0;
 }
 
-/// A half-axis of `a` on which they are apart, the one on which they are farthest; kMet if none.
-std::uint8_t apartOn(const HalfAxes& a, const HalfAxes& b) {
-  std::uint8_t apart = Neighbour::kMet;
-  double least = 0;
+/// Signed axis of `a` with the largest separation from `b`; kOverlapping if the boxes overlap.
+std::uint8_t findSeparatingAxis(const SignedBounds& a, const SignedBounds& b) {
+  std::uint8_t separatingAxis = Neighbour::kOverlapping;
+  double minSum = 0;
   for (std::uint8_t k = 0; k < 6; ++k) {
-    const double sum = a[k] + b[opposite(k)];
-    apart = sum < least ? k : apart;
-    least = std::min(sum, least);
+    const double sum = a[k] + b[oppositeAxis(k)];
+    separatingAxis = sum < minSum ? k : separatingAxis;
+    minSum = std::min(sum, minSum);
   }
-  return apart;
+  return separatingAxis;
 }
 
-/// The place of a mover among neighbours, or where it belongs.
-auto find(std::vector<Neighbour>& neighbours, MoverId id) {
+/// Position of a proxy in the sorted neighbours, or its insertion point.
+auto findNeighbour(std::vector<Neighbour>& neighbours, ProxyId id) {
   return std::lower_bound(neighbours.begin(), neighbours.end(), id,
-                          [](const Neighbour& n, MoverId sought) { return n.id < sought; });
+                          [](const Neighbour& n, ProxyId sought) { return n.id < sought; });
+}
+
+void addNeighbours(SweepState& sweep, ProxyId a, ProxyId b) {
+  ENFILADE_ASSERT(a != b);
+  std::vector<Neighbour>&ofA = sweep.proxies[a].neighbours, &ofB = sweep.proxies[b].neighbours;
+  const auto at = findNeighbour(ofA, b);
+  if (at != ofA.end() && at->id == b) return;
+  const std::uint8_t separatingAxis =
+      findSeparatingAxis(sweep.proxyMaxEndpoints[a], sweep.proxyMaxEndpoints[b]);
+  ++sweep.counters.aabbTests;
+  ofA.insert(at, {b, separatingAxis});
+  const auto other = findNeighbour(ofB, a);
+  ENFILADE_ASSERT(other == ofB.end() || other->id != a);  // neighbours are symmetric
+  ofB.insert(other, {a, oppositeAxis(separatingAxis)});
+  if (separatingAxis == Neighbour::kOverlapping) addDynamicOverlap(sweep, a, b);
+}
+
+void testNeighbours(SweepState& sweep, ProxyId id) {
+  const SignedBounds& maxEndpoints = sweep.proxyMaxEndpoints[id];
+  for (Neighbour& neighbour : sweep.proxies[id].neighbours) {
+    if (neighbour.id < id && sweep.hasMoved[neighbour.id] != 0)
+      continue;  // the other tests this pair
+    const SignedBounds& other = sweep.proxyMaxEndpoints[neighbour.id];
+    if (!neighbour.isOverlapping() && isSeparatedOn(maxEndpoints, other, neighbour.separatingAxis))
+      continue;
+    ++sweep.counters.aabbTests;
+    const bool wasOverlapping = neighbour.isOverlapping();
+    neighbour.separatingAxis = findSeparatingAxis(maxEndpoints, other);
+    if (neighbour.isOverlapping() == wasOverlapping) continue;
+    std::vector<Neighbour>& theirs = sweep.proxies[neighbour.id].neighbours;
+    const auto own = findNeighbour(theirs, id);
+    ENFILADE_ASSERT(own != theirs.end() && own->id == id);
+    own->separatingAxis = oppositeAxis(neighbour.separatingAxis);
+    if (!wasOverlapping) {
+      addDynamicOverlap(sweep, id, neighbour.id);
+    } else {
+      removeDynamicOverlap(sweep, id, neighbour.id);
+    }
+  }
 }
 
 }  // namespace
 
-void SortAndSweep::State::beginNeighbours(MoverId a, MoverId b) {
-  std::vector<Neighbour>&ofA = movers[a].neighbours, &ofB = movers[b].neighbours;
-  const auto at = find(ofA, b);
-  if (at != ofA.end() && at->id == b) return;
-  const std::uint8_t apart = apartOn(reaches[a], reaches[b]);
-  ++counters.boxTests;
-  ofA.insert(at, {b, apart});
-  ofB.insert(find(ofB, a), {a, opposite(apart)});
-  if (apart == Neighbour::kMet) beginMoving(a, b);
-}
-
-void SortAndSweep::State::endNeighbours(MoverId a, MoverId b) {
-  std::vector<Neighbour>&ofA = movers[a].neighbours, &ofB = movers[b].neighbours;
-  const auto at = find(ofA, b);
+void removeNeighbours(SweepState& sweep, ProxyId a, ProxyId b) {
+  std::vector<Neighbour>&ofA = sweep.proxies[a].neighbours, &ofB = sweep.proxies[b].neighbours;
+  const auto at = findNeighbour(ofA, b);
   if (at == ofA.end() || at->id != b) return;
-  if (at->met()) endMoving(a, b);
+  if (at->isOverlapping()) removeDynamicOverlap(sweep, a, b);
   ofA.erase(at);
-  ofB.erase(find(ofB, a));
+  const auto other = findNeighbour(ofB, a);
+  ENFILADE_ASSERT(other != ofB.end() && other->id == a);
+  ofB.erase(other);
 }
 
-void SortAndSweep::State::testNeighbours(MoverId id) {
-  const HalfAxes& reach = reaches[id];
-  for (Neighbour& neighbour : movers[id].neighbours) {
-    if (neighbour.id < id && isStirred[neighbour.id] != 0) continue;  // it tests the two
-    const HalfAxes& other = reaches[neighbour.id];
-    if (!neighbour.met() && isApart(reach, other, neighbour.apart)) continue;
-    ++counters.boxTests;
-    const bool wasMet = neighbour.met();
-    neighbour.apart = apartOn(reach, other);
-    if (neighbour.met() == wasMet) continue;
-    find(movers[neighbour.id].neighbours, id)->apart = opposite(neighbour.apart);
-    if (!wasMet) {
-      beginMoving(id, neighbour.id);
+void updateDynamicOverlaps(SweepState& sweep) {
+  sweep.windowLists.swaps = sweep.windowLists.aabbTests = 0;
+  sweep.changes.clear();
+  for (const ProxyId id : sweep.rebuilt)
+    sweep.windowLists.setMaxEndpoints(id, sweep.proxies[id].window.maxBounds);
+  for (const ProxyId id : sweep.rebuilt) {
+    if (sweep.proxies[id].state == ProxyState::active) sweep.windowLists.move(id, sweep.changes);
+  }
+  sweep.windowLists.insert(sweep.added, sweep.changes);
+  sweep.windowLists.commit(sweep.rebuilt);
+  for (const PairChange& change : sweep.changes) {
+    if (change.added) {
+      addNeighbours(sweep, change.a, change.b);
     } else {
-      endMoving(id, neighbour.id);
+      removeNeighbours(sweep, change.a, change.b);
     }
   }
-}
-
-void SortAndSweep::State::updateMoving() {
-  lists.exchanges = lists.boxTests = 0;
-  changes.clear();
-  for (const MoverId id : relaid) lists.setReach(id, movers[id].cell.farthest);
-  for (const MoverId id : relaid) {
-    if (movers[id].presence == Presence::live) lists.move(id, changes);
-  }
-  lists.insert(fresh, changes);
-  lists.settle(relaid);
-  for (const MoverChange& change : changes) {
-    if (change.begins) {
-      beginNeighbours(change.a, change.b);
-    } else {
-      endNeighbours(change.a, change.b);
+  for (std::size_t k = 0; k < sweep.moved.size(); ++k) {
+    if (k + kPrefetchDistance < sweep.moved.size()) {
+      __builtin_prefetch(sweep.proxies[sweep.moved[k + kPrefetchDistance]].neighbours.data());
     }
+    testNeighbours(sweep, sweep.moved[k]);
   }
-  for (std::size_t k = 0; k < stirred.size(); ++k) {
-    if (k + kAskedAhead < stirred.size()) {
-      __builtin_prefetch(movers[stirred[k + kAskedAhead]].neighbours.data());
-    }
-    testNeighbours(stirred[k]);
-  }
-  counters.exchanges += lists.exchanges;
-  counters.boxTests += lists.boxTests;
+  sweep.counters.swaps += sweep.windowLists.swaps;
+  sweep.counters.aabbTests += sweep.windowLists.aabbTests;
 }
 
 }  // namespace enfilade::collision

@@ -1,89 +1,86 @@
-// The pairs that a sweep holds: how they begin and end, and that each is told once.
+#include "collision/broad_phase/sort_and_sweep_pairs.hpp"
 
 #include <algorithm>
-#include <limits>
 
-#include "collision/broad_phase/sort_and_sweep_state.hpp"
+#include "collision/assert.hpp"
 
 namespace enfilade::collision {
 namespace {
 
-using Partner = SortAndSweep::Partner;
+using Overlap = SortAndSweep::Overlap;
 
-bool addPartner(std::vector<Partner>& partners, const Partner& partner) {
-  const auto at = std::lower_bound(partners.begin(), partners.end(), partner);
-  if (at != partners.end() && *at == partner) return false;
-  partners.insert(at, partner);
+bool insertOverlap(std::vector<Overlap>& overlapList, const Overlap& overlap) {
+  const auto at = std::lower_bound(overlapList.begin(), overlapList.end(), overlap);
+  if (at != overlapList.end() && *at == overlap) return false;
+  overlapList.insert(at, overlap);
   return true;
 }
 
-bool erasePartner(std::vector<Partner>& partners, const Partner& partner) {
-  const auto at = std::lower_bound(partners.begin(), partners.end(), partner);
-  if (at == partners.end() || *at != partner) return false;
-  partners.erase(at);
+bool eraseOverlap(std::vector<Overlap>& overlapList, const Overlap& overlap) {
+  const auto at = std::lower_bound(overlapList.begin(), overlapList.end(), overlap);
+  if (at == overlapList.end() || *at != overlap) return false;
+  overlapList.erase(at);
   return true;
 }
 
 }  // namespace
 
-void SortAndSweep::State::beginStill(MoverId id, StillId other) {
-  if (!addPartner(movers[id].partners, {other, false})) return;
-  begun.push_back({id, other, false});
-  ++pairs;
+void addStaticOverlap(SweepState& sweep, ProxyId id, StaticId other) {
+  if (!insertOverlap(sweep.proxies[id].overlaps, {other, false})) return;
+  sweep.addedPairs.push_back({id, other, false});
+  ++sweep.pairCount;
 }
 
-void SortAndSweep::State::endStill(MoverId id, StillId other) {
-  if (!erasePartner(movers[id].partners, {other, false})) return;
-  ended.push_back({id, other, false});
-  --pairs;
+void removeStaticOverlap(SweepState& sweep, ProxyId id, StaticId other) {
+  if (!eraseOverlap(sweep.proxies[id].overlaps, {other, false})) return;
+  sweep.removedPairs.push_back({id, other, false});
+  --sweep.pairCount;
 }
 
-/// The still partners of the mover are those in `inReach` now, whatever they were.
-void SortAndSweep::State::replaceStill(MoverId id) {
-  std::vector<Partner>& partners = movers[id].partners;
-  std::sort(inReach.begin(), inReach.end());
-  merged.clear();
-  auto held = partners.begin();
-  const auto endHeldBefore = [&](StillId limit) {
-    for (; held != partners.end() && !held->moves && held->id < limit; ++held) {
-      ended.push_back({id, held->id, false});
-      --pairs;
+void replaceStaticOverlaps(SweepState& sweep, ProxyId id) {
+  std::vector<Overlap>& overlapList = sweep.proxies[id].overlaps;
+  std::sort(sweep.overlappingStatics.begin(), sweep.overlappingStatics.end());
+  ENFILADE_ASSERT(std::adjacent_find(sweep.overlappingStatics.begin(),
+                                     sweep.overlappingStatics.end()) ==
+                  sweep.overlappingStatics.end());  // the grid reports each box once
+  sweep.merged.clear();
+  auto held = overlapList.begin();
+  const auto endHeldBefore = [&](StaticId limit) {
+    for (; held != overlapList.end() && !held->isDynamic && held->id < limit; ++held) {
+      sweep.removedPairs.push_back({id, held->id, false});
+      --sweep.pairCount;
     }
   };
-  for (const StillId other : inReach) {
+  for (const StaticId other : sweep.overlappingStatics) {
     endHeldBefore(other);
-    if (held != partners.end() && !held->moves && held->id == other) {
+    if (held != overlapList.end() && !held->isDynamic && held->id == other) {
       ++held;
     } else {
-      begun.push_back({id, other, false});
-      ++pairs;
+      sweep.addedPairs.push_back({id, other, false});
+      ++sweep.pairCount;
     }
-    merged.push_back({other, false});
+    sweep.merged.push_back({other, false});
   }
-  endHeldBefore(static_cast<StillId>(-1));
-  merged.insert(merged.end(), held, partners.end());
-  partners.assign(merged.begin(), merged.end());
+  endHeldBefore(static_cast<StaticId>(-1));
+  sweep.merged.insert(sweep.merged.end(), held, overlapList.end());
+  ENFILADE_ASSERT(std::is_sorted(sweep.merged.begin(), sweep.merged.end()));
+  overlapList.assign(sweep.merged.begin(), sweep.merged.end());
 }
 
-void SortAndSweep::State::beginMoving(MoverId a, MoverId b) {
-  addPartner(movers[a].partners, {b, true});
-  addPartner(movers[b].partners, {a, true});
-  begun.push_back({std::min(a, b), std::max(a, b), true});
-  ++pairs;
+void addDynamicOverlap(SweepState& sweep, ProxyId a, ProxyId b) {
+  [[maybe_unused]] const bool isNewForA = insertOverlap(sweep.proxies[a].overlaps, {b, true});
+  [[maybe_unused]] const bool isNewForB = insertOverlap(sweep.proxies[b].overlaps, {a, true});
+  ENFILADE_ASSERT(isNewForA && isNewForB);
+  sweep.addedPairs.push_back({std::min(a, b), std::max(a, b), true});
+  ++sweep.pairCount;
 }
 
-void SortAndSweep::State::endMoving(MoverId a, MoverId b) {
-  erasePartner(movers[a].partners, {b, true});
-  erasePartner(movers[b].partners, {a, true});
-  ended.push_back({std::min(a, b), std::max(a, b), true});
-  --pairs;
-}
-
-void SortAndSweep::State::dropAll(MoverId id) {
-  Mover& mover = movers[id];
-  while (!mover.neighbours.empty()) endNeighbours(id, mover.neighbours.back().id);
-  inReach.clear();
-  replaceStill(id);
+void removeDynamicOverlap(SweepState& sweep, ProxyId a, ProxyId b) {
+  [[maybe_unused]] const bool existedForA = eraseOverlap(sweep.proxies[a].overlaps, {b, true});
+  [[maybe_unused]] const bool existedForB = eraseOverlap(sweep.proxies[b].overlaps, {a, true});
+  ENFILADE_ASSERT(existedForA && existedForB && sweep.pairCount > 0);
+  sweep.removedPairs.push_back({std::min(a, b), std::max(a, b), true});
+  --sweep.pairCount;
 }
 
 }  // namespace enfilade::collision

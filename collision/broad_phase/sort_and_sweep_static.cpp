@@ -1,233 +1,257 @@
-// Movers against still boxes: guards, exchanges, cells that are laid; and still boxes that come and
-// go.
+// Dynamic proxies against static boxes: brackets, endpoint crossings and window builds. Also the
+// insertion and removal of static boxes. The steps are at the head of sort_and_sweep.cpp.
+#include "collision/broad_phase/sort_and_sweep_static.hpp"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
 
-#include "collision/broad_phase/sort_and_sweep_state.hpp"
+#include "collision/assert.hpp"
+#include "collision/broad_phase/sort_and_sweep_pairs.hpp"
 
 namespace enfilade::collision {
 namespace {
 
-// A cell is laid for so many ticks at the rate of the last ones.
-constexpr double kHorizon = 40;
-// One mover in so many is looked at in a tick, and its cell laid anew if it will have left it when
-// it is looked at next.
-constexpr std::size_t kVisitEvery = 32;
-// Room for a change of course: so many ticks at the greatest rate of all half-axes, and a share of
-// the mover's greatest size; all of that while nothing is known of its course: when it is new, and
-// when it went farther than its own size in a tick, which is taken for a jump.
+using Row = StaticGrid::Row;
+
+// Ticks of predicted motion that a window covers, at the current velocity.
+constexpr double kWindowTicks = 40;
+// One proxy in this many is checked per tick. Its window is rebuilt if the proxy is predicted to
+// leave it before the next check.
+constexpr std::size_t kRefreshInterval = 32;
+// Slack for a change of direction: this many ticks at the maximum speed of all signed axes, plus a
+// fraction of the proxy's largest size. If the motion is unknown, the slack is the whole size. It
+// is unknown for new proxies and after a motion of more than the size per tick (a jump).
 constexpr double kSlackTicks = 3;
-constexpr double kSlackOfSize = 1.0 / 64;
-// A cell exceeds the mover by no more than this share of its size, or of an edge of the finest
-// cells, so that what jumps does not gather half of the scene.
-constexpr double kMostOfSize = 1.5;
-constexpr double kMostOfEdge = 0.5;
-// More still boxes that come and go at once disturb all movers.
-constexpr std::size_t kFewEdits = 256;
+constexpr double kSlackSizeRatio = 1.0 / 64;
+// Maximum margin of a window, relative to the proxy's size or to the edge of the finest cells. It
+// prevents fast proxies from gathering half of the scene.
+constexpr double kMaxMarginSizeRatio = 1.5;
+constexpr double kMaxMarginEdgeRatio = 0.5;
+// Above this number of edits in one update all windows are rebuilt.
+constexpr std::size_t kSmallEditThreshold = 256;
 
-constexpr double kLargest = std::numeric_limits<double>::max();
+constexpr double kMaxDouble = std::numeric_limits<double>::max();
 
-bool within(const HalfAxes& low, const HalfAxes& reach, const HalfAxes& high) {
-  return (beyond(low, reach) | (0x3f & ~beyond(high, reach))) == 0;
+bool isWithin(const SignedBounds& low, const SignedBounds& maxEndpoints, const SignedBounds& high) {
+  return (greaterMask(low, maxEndpoints) | (0x3f & ~greaterMask(high, maxEndpoints))) == 0;
 }
 
-/// Sets the guards of half-axis `k` to the ends beside the reach.
-void guard(Mover& mover, std::size_t k) {
-  mover.low[k] = mover.cell.endBefore(k);
-  mover.high[k] = mover.cell.endBeyond(k);
+/// Sets the bracket of signed axis `k` to the endpoints adjacent to the proxy's own.
+void setBracket(DynamicProxy& proxy, std::size_t k) {
+  proxy.bracketLow[k] = proxy.window.endpointBefore(k);
+  proxy.bracketHigh[k] = proxy.window.endpointAfter(k);
 }
 
-HalfAxes after(const HalfAxes& reach, const HalfAxes& rate, double ticks) {
-  HalfAxes later = reach;
-  for (std::size_t k = 0; k < 6; ++k) later[k] += ticks * rate[k];
+SignedBounds extrapolate(const SignedBounds& maxEndpoints, const SignedBounds& velocity,
+                         double ticks) {
+  SignedBounds later = maxEndpoints;
+  for (std::size_t k = 0; k < 6; ++k) later[k] += ticks * velocity[k];
   return later;
 }
 
-}  // namespace
+// ---- building a window -------------------------------------------------------------------------
 
-// ---- laying a cell -----------------------------------------------------------------------------
-
-HalfAxes SortAndSweep::State::rateOf(MoverId id) const {
-  const Mover& mover = movers[id];
-  const HalfAxes& reach = reaches[id];
-  HalfAxes rate = mover.rate;
-  if (tick == mover.laidAt) return rate;
-  const double share = 1 / static_cast<double>(tick - mover.laidAt);
-  for (std::size_t k = 0; k < 6; ++k) rate[k] = (reach[k] - mover.laidReach[k]) * share;
-  return rate;
+SignedBounds estimateVelocity(const SweepState& sweep, ProxyId id) {
+  const DynamicProxy& proxy = sweep.proxies[id];
+  const SignedBounds& maxEndpoints = sweep.proxyMaxEndpoints[id];
+  SignedBounds velocity = proxy.velocity;
+  if (sweep.tick == proxy.builtAt) return velocity;
+  const double share = 1 / static_cast<double>(sweep.tick - proxy.builtAt);
+  for (std::size_t k = 0; k < 6; ++k)
+    velocity[k] = (maxEndpoints[k] - proxy.builtMaxEndpoints[k]) * share;
+  return velocity;
 }
 
-void SortAndSweep::State::setBorders(MoverId id) {
-  Mover& mover = movers[id];
-  const HalfAxes& reach = reaches[id];
-  mover.rate = rateOf(id);
-  mover.laidReach = reach;
-  mover.laidAt = tick;
-  double fastest = 0, widest = 0;
-  for (const double rate : mover.rate) fastest = std::max(fastest, std::abs(rate));
+void setWindowBounds(SweepState& sweep, ProxyId id) {
+  DynamicProxy& proxy = sweep.proxies[id];
+  const SignedBounds& maxEndpoints = sweep.proxyMaxEndpoints[id];
+  proxy.velocity = estimateVelocity(sweep, id);
+  proxy.builtMaxEndpoints = maxEndpoints;
+  proxy.builtAt = sweep.tick;
+  double maxSpeed = 0, maxSize = 0;
+  for (const double velocity : proxy.velocity) maxSpeed = std::max(maxSpeed, std::abs(velocity));
   for (std::size_t axis = 0; axis < 3; ++axis)
-    widest = std::max(widest, reach[axis] + reach[axis + 3]);
-  const bool unknown = mover.presence == Presence::fresh || (widest > 0 && fastest > widest);
-  if (unknown) mover.rate.fill(0);
-  const double slack = unknown ? widest : kSlackTicks * fastest + kSlackOfSize * widest;
-  const double least = kMostOfEdge * still.grid().edge();
+    maxSize = std::max(maxSize, maxEndpoints[axis] + maxEndpoints[axis + 3]);
+  const bool unknown = proxy.state == ProxyState::added || (maxSize > 0 && maxSpeed > maxSize);
+  if (unknown) proxy.velocity.fill(0);
+  const double slack = unknown ? maxSize : kSlackTicks * maxSpeed + kSlackSizeRatio * maxSize;
+  const double minMargin = kMaxMarginEdgeRatio * sweep.staticGrid.grid().edge();
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double size = reach[axis] + reach[axis + 3];
-    const double most = std::max(kMostOfSize * size, least);
+    const double size = maxEndpoints[axis] + maxEndpoints[axis + 3];
+    const double maxMargin = std::max(kMaxMarginSizeRatio * size, minMargin);
     for (const std::size_t k : {axis, axis + 3}) {
-      const double course = kHorizon * mover.rate[k];
-      const double ahead = std::min(slack + std::max(course, 0.0), most);
-      const double behind = std::min(slack - std::min(course, 0.0), most);
-      double farthest = reach[k] + ahead;
-      if (!(farthest > reach[k])) farthest = std::nextafter(reach[k], kLargest);
-      mover.cell.farthest[k] = std::min(farthest, kLargest);
-      mover.cell.nearest[k] = std::max(reach[k] - behind, -kLargest);
+      const double drift = kWindowTicks * proxy.velocity[k];
+      const double ahead = std::min(slack + std::max(drift, 0.0), maxMargin);
+      const double behind = std::min(slack - std::min(drift, 0.0), maxMargin);
+      double upperBound = maxEndpoints[k] + ahead;
+      if (!(upperBound > maxEndpoints[k])) upperBound = std::nextafter(maxEndpoints[k], kMaxDouble);
+      proxy.window.maxBounds[k] = std::min(upperBound, kMaxDouble);
+      proxy.window.minBounds[k] = std::max(maxEndpoints[k] - behind, -kMaxDouble);
     }
-  }
-}
-
-void SortAndSweep::State::layCell(MoverId id) {
-  Mover& mover = movers[id];
-  setBorders(id);
-  rows.count = 0;
-  still.gather(mover.cell.farthest, rows);
-  for (const Row row : rows.all()) __builtin_prefetch(&still.onset(row));
-  counters.boxTests += rows.count;
-  ++counters.cellsLaid;
-  std::size_t kept = 0;
-  for (const Row row : rows.all()) {
-    rows.rows[kept] = row;
-    kept += meets(still.onset(row), mover.cell.farthest) ? 1 : 0;
-  }
-  mover.cell.lay(still, std::span(rows.rows).first(kept), reaches[id], inReach);
-  for (std::size_t k = 0; k < 6; ++k) guard(mover, k);
-  replaceStill(id);
-  if (mover.relaid) return;
-  mover.relaid = true;
-  relaid.push_back(id);
-}
-
-void SortAndSweep::State::visitMovers() {
-  if (movers.empty()) return;
-  std::size_t visits = (movers.size() + kVisitEvery - 1) / kVisitEvery;
-  const double ticks = static_cast<double>(movers.size()) / static_cast<double>(visits);
-  visits -= std::min(visits, relaid.size());  // those that could not wait take their turn
-  for (std::size_t k = 0; k < visits; ++k) {
-    const auto id = static_cast<MoverId>(nextVisited++ % movers.size());
-    const Mover& mover = movers[id];
-    if (mover.presence != Presence::live || mover.relaid) continue;
-    const HalfAxes later = after(reaches[id], rateOf(id), ticks);
-    if (!within(mover.cell.nearest, later, mover.cell.farthest)) layCell(id);
   }
 }
 
 // ---- from tick to tick -------------------------------------------------------------------------
 
-/// Moves on where the reach has shrunk, past an end at least; false if it has left its cell.
-bool SortAndSweep::State::passInward(MoverId id, std::size_t k) {
-  Mover& mover = movers[id];
-  MoverCell& cell = mover.cell;
-  const double reach = reaches[id][k];
+/// Crosses at least one endpoint inward; false if the proxy has left its window.
+bool crossInward(SweepState& sweep, ProxyId id, std::size_t k) {
+  DynamicProxy& proxy = sweep.proxies[id];
+  ProxyWindow& window = proxy.window;
+  const double maxEndpoint = sweep.proxyMaxEndpoints[id][k];
   do {
-    const std::uint32_t passed = cell.ends[cell.next[k] - 1].box;
-    if (passed == MoverCell::kBorder) return false;
-    ++counters.exchanges;
-    MoverCell::StillBox& box = cell.boxes[passed];
-    if (box.apart == 0) endStill(id, box.id);
-    box.apart = static_cast<std::uint8_t>(box.apart | 1u << k);
-    --cell.next[k];
-  } while (cell.endBefore(k) > reach);
-  guard(mover, k);
+    ENFILADE_ASSERT(window.next[k] > 0);
+    const std::uint32_t passed = window.endpoints[window.next[k] - 1].staticIndex;
+    if (passed == ProxyWindow::kSentinel) return false;
+    ++sweep.counters.swaps;
+    ProxyWindow::StaticProxy& box = window.statics[passed];
+    ENFILADE_ASSERT((box.separatedMask >> k & 1) == 0);
+    if (box.separatedMask == 0) removeStaticOverlap(sweep, id, box.id);
+    box.separatedMask = static_cast<std::uint8_t>(box.separatedMask | 1u << k);
+    --window.next[k];
+  } while (window.endpointBefore(k) > maxEndpoint);
+  setBracket(proxy, k);
   return true;
 }
 
-/// Moves on where the reach has grown, past an end at least; false if it has left its cell.
-bool SortAndSweep::State::passOutward(MoverId id, std::size_t k) {
-  Mover& mover = movers[id];
-  MoverCell& cell = mover.cell;
-  const double reach = reaches[id][k];
+/// Crosses at least one endpoint outward; false if the proxy has left its window.
+bool crossOutward(SweepState& sweep, ProxyId id, std::size_t k) {
+  DynamicProxy& proxy = sweep.proxies[id];
+  ProxyWindow& window = proxy.window;
+  const double maxEndpoint = sweep.proxyMaxEndpoints[id][k];
   do {
-    const std::uint32_t passed = cell.ends[cell.next[k]].box;
-    if (passed == MoverCell::kBorder) return false;
-    ++counters.exchanges;
-    MoverCell::StillBox& box = cell.boxes[passed];
-    box.apart = static_cast<std::uint8_t>(box.apart & ~(1u << k));
-    if (box.apart == 0) beginStill(id, box.id);
-    ++cell.next[k];
-  } while (cell.endBeyond(k) <= reach);
-  guard(mover, k);
+    const std::uint32_t passed = window.endpoints[window.next[k]].staticIndex;
+    if (passed == ProxyWindow::kSentinel) return false;
+    ++sweep.counters.swaps;
+    ProxyWindow::StaticProxy& box = window.statics[passed];
+    ENFILADE_ASSERT((box.separatedMask >> k & 1) == 1);
+    box.separatedMask = static_cast<std::uint8_t>(box.separatedMask & ~(1u << k));
+    if (box.separatedMask == 0) addStaticOverlap(sweep, id, box.id);
+    ++window.next[k];
+  } while (window.endpointAfter(k) <= maxEndpoint);
+  setBracket(proxy, k);
   return true;
 }
 
-/// All that ends is ended before anything begins, so that a pair is told once at most.
-void SortAndSweep::State::passEnds(MoverId id) {
-  const Mover& mover = movers[id];
-  const unsigned inward = beyond(mover.low, reaches[id]);
-  const unsigned outward = 0x3f & ~beyond(mover.high, reaches[id]);
+/// Crosses inward before outward, so that each pair is reported at most once.
+void crossEndpoints(SweepState& sweep, ProxyId id) {
+  const DynamicProxy& proxy = sweep.proxies[id];
+  const unsigned inward = greaterMask(proxy.bracketLow, sweep.proxyMaxEndpoints[id]);
+  const unsigned outward = 0x3f & ~greaterMask(proxy.bracketHigh, sweep.proxyMaxEndpoints[id]);
   for (unsigned bits = inward | outward << 6; bits != 0; bits &= bits - 1) {
     const auto k = static_cast<std::size_t>(std::countr_zero(bits));
-    if (!(k < 6 ? passInward(id, k) : passOutward(id, k - 6))) {
-      layCell(id);
+    if (!(k < 6 ? crossInward(sweep, id, k) : crossOutward(sweep, id, k - 6))) {
+      rebuildWindow(sweep, id);
       return;
     }
   }
 }
 
-void SortAndSweep::State::updateStill() {
-  for (std::size_t k = 0; k < moved.size(); ++k) {
-    if (k + kAskedAhead < moved.size()) movers[moved[k + kAskedAhead]].cell.prefetch();
-    Mover& mover = movers[moved[k]];
-    mover.moved = false;
-    if (mover.presence == Presence::live) passEnds(moved[k]);
-  }
-}
+// ---- insertion and removal of static boxes -----------------------------------------------------
 
-// ---- still boxes that come and go --------------------------------------------------------------
-
-void SortAndSweep::State::rebuildStill() {
-  ++counters.rebuilds;
-  std::vector<Box> boxes;
-  std::vector<StillId> ids;
-  for (StillId id = 0; id < stillIds; ++id) {
-    const Row row = stagedOut.contains(id) ? StillCells::kNoRow : still.rowOf(id);
-    if (row == StillCells::kNoRow) continue;
-    boxes.push_back(boxOfOnset(still.onset(row)));
+void rebuildStaticGrid(SweepState& sweep) {
+  ++sweep.counters.rebuilds;
+  std::vector<Aabb> boxes;
+  std::vector<StaticId> ids;
+  for (StaticId id = 0; id < sweep.staticIdCount; ++id) {
+    const Row row =
+        sweep.pendingRemovals.contains(id) ? StaticGrid::kNoRow : sweep.staticGrid.findRow(id);
+    if (row == StaticGrid::kNoRow) continue;
+    boxes.push_back(aabbFromMinEndpoints(sweep.staticGrid.minEndpoints(row)));
     ids.push_back(id);
   }
-  for (const auto& [id, box] : stagedIn) {
+  for (const auto& [id, box] : sweep.pendingInserts) {
     boxes.push_back(box);
     ids.push_back(id);
   }
-  still = StillCells(boxes, ids);
+  sweep.staticGrid = StaticGrid(boxes, ids);
 }
 
-void SortAndSweep::State::applyEdits() {
-  const std::size_t edits = stagedIn.size() + stagedOut.size();
+}  // namespace
+
+void rebuildWindow(SweepState& sweep, ProxyId id) {
+  DynamicProxy& proxy = sweep.proxies[id];
+  ENFILADE_ASSERT(proxy.state == ProxyState::added || proxy.state == ProxyState::active);
+  setWindowBounds(sweep, id);
+  sweep.rows.count = 0;
+  sweep.staticGrid.gather(proxy.window.maxBounds, sweep.rows);
+  for (const Row row : sweep.rows.all()) __builtin_prefetch(&sweep.staticGrid.minEndpoints(row));
+  sweep.counters.aabbTests += sweep.rows.count;
+  ++sweep.counters.windowsBuilt;
+  std::size_t kept = 0;
+  for (const Row row : sweep.rows.all()) {
+    sweep.rows.rows[kept] = row;
+    kept += overlaps(sweep.staticGrid.minEndpoints(row), proxy.window.maxBounds) ? 1 : 0;
+  }
+  proxy.window.build(sweep.staticGrid, std::span(sweep.rows.rows).first(kept),
+                     sweep.proxyMaxEndpoints[id], sweep.overlappingStatics);
+  for (std::size_t k = 0; k < 6; ++k) setBracket(proxy, k);
+  replaceStaticOverlaps(sweep, id);
+  if (proxy.rebuilt) return;
+  proxy.rebuilt = true;
+  sweep.rebuilt.push_back(id);
+}
+
+void refreshWindows(SweepState& sweep) {
+  if (sweep.proxies.empty()) return;
+  std::size_t visits = (sweep.proxies.size() + kRefreshInterval - 1) / kRefreshInterval;
+  const double ticks = static_cast<double>(sweep.proxies.size()) / static_cast<double>(visits);
+  visits -= std::min(visits, sweep.rebuilt.size());  // forced rebuilds count as refreshes
+  for (std::size_t k = 0; k < visits; ++k) {
+    const auto id = static_cast<ProxyId>(sweep.nextRefreshed++ % sweep.proxies.size());
+    const DynamicProxy& proxy = sweep.proxies[id];
+    if (proxy.state != ProxyState::active || proxy.rebuilt) continue;
+    const SignedBounds later =
+        extrapolate(sweep.proxyMaxEndpoints[id], estimateVelocity(sweep, id), ticks);
+    if (!isWithin(proxy.window.minBounds, later, proxy.window.maxBounds)) rebuildWindow(sweep, id);
+  }
+}
+
+void updateStaticOverlaps(SweepState& sweep) {
+  for (std::size_t k = 0; k < sweep.outsideBrackets.size(); ++k) {
+    if (k + kPrefetchDistance < sweep.outsideBrackets.size())
+      sweep.proxies[sweep.outsideBrackets[k + kPrefetchDistance]].window.prefetch();
+    DynamicProxy& proxy = sweep.proxies[sweep.outsideBrackets[k]];
+    proxy.leftBrackets = false;
+    if (proxy.state == ProxyState::active) crossEndpoints(sweep, sweep.outsideBrackets[k]);
+  }
+}
+
+void applyStaticEdits(SweepState& sweep) {
+  const std::size_t edits = sweep.pendingInserts.size() + sweep.pendingRemovals.size();
   if (edits == 0) return;
-  counters.stillEdits = edits;
-  std::vector<HalfAxes> edited;
-  for (const StillId id : stagedOut) edited.push_back(still.onset(still.rowOf(id)));
-  for (const auto& [id, box] : stagedIn) edited.push_back(onsetOf(box));
-  if (still.hasRoomFor(edits)) {
-    for (const StillId id : stagedOut) still.remove(still.rowOf(id));
-    for (const auto& [id, box] : stagedIn) still.insert(box, id);
+  sweep.counters.staticEdits = edits;
+  std::vector<SignedBounds> edited;
+  for (const StaticId id : sweep.pendingRemovals) {
+    const Row row = sweep.staticGrid.findRow(id);
+    ENFILADE_ASSERT(row != StaticGrid::kNoRow);
+    edited.push_back(sweep.staticGrid.minEndpoints(row));
+  }
+  for (const auto& [id, box] : sweep.pendingInserts) edited.push_back(toMinEndpoints(box));
+  if (sweep.staticGrid.hasCapacityFor(edits)) {
+    for (const StaticId id : sweep.pendingRemovals)
+      sweep.staticGrid.remove(sweep.staticGrid.findRow(id));
+    for (const auto& [id, box] : sweep.pendingInserts) sweep.staticGrid.insert(box, id);
   } else {
-    rebuildStill();
+    rebuildStaticGrid(sweep);
   }
-  for (MoverId id = 0; id < movers.size(); ++id) {
-    if (movers[id].presence != Presence::live) continue;
-    const HalfAxes& farthest = movers[id].cell.farthest;
-    const auto touches = [&](const HalfAxes& onset) { return meets(onset, farthest); };
-    if (edits > kFewEdits || std::any_of(edited.begin(), edited.end(), touches)) layCell(id);
+  for (ProxyId id = 0; id < sweep.proxies.size(); ++id) {
+    if (sweep.proxies[id].state != ProxyState::active) continue;
+    const SignedBounds& maxBounds = sweep.proxies[id].window.maxBounds;
+    const auto overlapsWindow = [&](const SignedBounds& minEndpoints) {
+      return overlaps(minEndpoints, maxBounds);
+    };
+    if (edits > kSmallEditThreshold || std::any_of(edited.begin(), edited.end(), overlapsWindow))
+      rebuildWindow(sweep, id);
   }
-  stillCount += stagedIn.size();
-  stillCount -= stagedOut.size();
-  freeStillIds.insert(freeStillIds.end(), stagedOut.begin(), stagedOut.end());
-  stagedIn.clear();
-  stagedOut.clear();
+  sweep.staticCount += sweep.pendingInserts.size();
+  ENFILADE_ASSERT(sweep.staticCount >= sweep.pendingRemovals.size());
+  sweep.staticCount -= sweep.pendingRemovals.size();
+  sweep.freeStaticIds.insert(sweep.freeStaticIds.end(), sweep.pendingRemovals.begin(),
+                             sweep.pendingRemovals.end());
+  sweep.pendingInserts.clear();
+  sweep.pendingRemovals.clear();
 }
 
 }  // namespace enfilade::collision

@@ -1,5 +1,5 @@
-// The still boxes, binned into cells. Built at once; then boxes come and go one by one, and only
-// the cells that they lie in are touched.
+// Hierarchical grid of the static boxes. It is built at once. Boxes can then be inserted and
+// removed one by one, which changes only the cells that they lie in.
 #pragma once
 
 #include <array>
@@ -12,91 +12,93 @@
 
 namespace enfilade::collision {
 
-class StillCells {
+class StaticGrid {
  public:
-  /// A still box in our own order: those of the build by cell, so that neighbours are near.
+  /// Internal index of a static box. A build orders rows by cell: neighbours are close in memory.
   using Row = std::uint32_t;
-  using Cell = std::uint32_t;  ///< index of a cell that holds at least one box, or held one once
+  using Cell = std::uint32_t;  ///< index of a cell that holds or once held a box
   static constexpr Cell kNoCell = static_cast<Cell>(-1);
   static constexpr Row kNoRow = static_cast<Row>(-1);
 
-  /// `ids` beside `boxes`; boxes are finite and not empty. Throws std::length_error above 2^32 - 2
-  /// boxes or 2^32 - 2 cells; entries (a box in a cell) are limited by memory alone.
-  StillCells(std::span<const Box> boxes, std::span<const std::uint32_t> ids);
+  /// `ids[i]` is the id of `boxes[i]`; boxes must be finite and not empty. Throws std::length_error
+  /// above 2^32 - 2 boxes or 2^32 - 2 cells. Memory alone limits the entries (a box in a cell).
+  StaticGrid(std::span<const Aabb> boxes, std::span<const std::uint32_t> ids);
 
-  const HalfAxes& onset(Row row) const { return onsets_[row]; }
+  const SignedBounds& minEndpoints(Row row) const { return minEndpoints_[row]; }
   std::uint32_t idOf(Row row) const { return ids_[row]; }
   const CellGrid& grid() const { return grid_; }
 
-  /// Rows at the front of a vector that never shrinks, so that none are written but those asked
-  /// for.
+  /// The first `count` rows of a vector that never shrinks, which avoids its initialisation.
   struct RowList {
     std::vector<Row> rows;
     std::size_t count = 0;
     std::span<Row> all() { return std::span(rows).first(count); }
   };
-  /// Appends the rows of all boxes that meet `reach`, each once, and some that miss it narrowly.
-  void gather(const HalfAxes& reach, RowList& rows) const;
+  /// Appends the rows of all boxes that overlap `maxEndpoints`, each once, and possibly of some
+  /// boxes close to it.
+  void gather(const SignedBounds& maxEndpoints, RowList& rows) const;
 
-  // ---- boxes that come and go ----
+  // ---- insertion and removal ----
 
-  /// Whether `count` more boxes fit; when not, build anew. A build leaves room for half as many
-  /// edits as it took boxes, so that building costs O(log n) an edit in the long run.
-  bool hasRoomFor(std::size_t count) const;
-  void insert(const Box& box, std::uint32_t id);
+  /// True if `count` more edits fit; rebuild otherwise. A build allows half as many edits as it has
+  /// boxes, so rebuilds cost O(log n) per edit, amortised.
+  bool hasCapacityFor(std::size_t count) const;
+  void insert(const Aabb& box, std::uint32_t id);
   void remove(Row row);
-  Row rowOf(std::uint32_t id);  ///< kNoRow if there is none; O(1), but O(n) when first asked
+  Row findRow(std::uint32_t id);  ///< kNoRow for an unknown id; O(1), but O(n) at the first call
 
-  /// Bytes held besides 48 for each box.
-  std::size_t bytesBesidesBoxes() const;
+  /// Memory in bytes without 48 bytes per box.
+  std::size_t overheadBytes() const;
 
  private:
-  /// A box in a cell. In 16 bytes: on each half-axis the fine place of its onset, counted from the
-  /// cell's low corner and clamped to 16 bits; and its row in the last two lanes.
+  /// A box in a cell, in 16 bytes: six fine coordinates of its minimum endpoints relative to the
+  /// cell's low corner, clamped to 16 bits, and its row in the last two lanes.
   using Entry = std::int16_t __attribute__((vector_size(16)));
   struct CellData {
-    CellPlace at;
+    CellCoords coords;
     std::uint32_t level;
     Entry* entries;
-    std::uint32_t count, room;
+    std::uint32_t count, capacity;
   };
-  struct Placed;  // of the build: which cells each box lies in
+  struct CellAssignment;  // of the build: the cells of each box
 
-  static Entry lanesOf(const FinePlaces& places, const CellPlace& cell);
-  static Entry entryOf(const FinePlaces& reach, const CellPlace& cell, Row row);
-  static Row rowOf(const Entry& entry);
-  void gatherFrom(const CellData& cell, const FinePlaces& reach, const CellRange& range,
-                  RowList& rows) const;
+  static Entry toCellOffsets(const FineCoords& fineCoords, const CellCoords& cell);
+  static Entry makeEntry(const FineCoords& maxCoords, const CellCoords& cell, Row row);
+  static Row extractRow(const Entry& entry);
+  void gatherFromCell(const CellData& cell, const FineCoords& maxCoords, const CellRange& range,
+                      RowList& rows) const;
   template <typename Visit>
   void forEachCell(std::size_t level, const CellRange& range, Visit&& visit) const;
 
-  void gatherPlaces(std::size_t level, const FinePlaces& places, const CellRange& range,
-                    RowList& rows) const;
+  void gatherFromSmallRange(std::size_t level, const FineCoords& fineCoords, const CellRange& range,
+                            RowList& rows) const;
 
-  std::size_t slotOf(std::size_t level, const CellPlace& at) const;
-  std::size_t probe(std::size_t slot, std::size_t level, const CellPlace& at) const;
-  Cell findOrAdd(std::size_t level, const CellPlace& at);
+  std::size_t findSlot(std::size_t level, const CellCoords& at) const;
+  std::size_t probeSlots(std::size_t slot, std::size_t level, const CellCoords& at) const;
+  Cell findOrAddCell(std::size_t level, const CellCoords& at);
   void rebuildSlots(std::size_t size);
 
-  Placed placeBoxes(std::span<const Box> boxes);
-  std::vector<Cell> orderCells();
-  void fill(std::span<const Box> boxes, std::span<const std::uint32_t> ids, const Placed& placed);
+  CellAssignment assignCells(std::span<const Aabb> boxes);
+  std::vector<Cell> sortCells();
+  void fillEntries(std::span<const Aabb> boxes, std::span<const std::uint32_t> ids,
+                   const CellAssignment& assignment);
 
-  Cell openCell(std::size_t level, const CellPlace& at);
+  Cell openCell(std::size_t level, const CellCoords& at);
   void growCell(CellData& cell);
 
   CellGrid grid_;
-  std::vector<HalfAxes> onsets_;
+  std::vector<SignedBounds> minEndpoints_;
   std::vector<std::uint32_t> ids_;
   std::vector<CellData> cells_;
-  std::vector<Cell> slots_;              ///< open addressing, a power of two; kNoCell where free
-  std::vector<std::size_t> usedLevels_;  ///< that have a cell, ascending
+  std::vector<Cell> slots_;              ///< hash table: open addressing, size 2^n; kNoCell: free
+  std::vector<std::size_t> usedLevels_;  ///< levels that have a cell, ascending
   std::vector<Entry> entries_;           ///< as built, cell after cell
 
-  std::vector<std::vector<Entry>> grown_;  ///< the entries of cells that outgrew their room
-  std::vector<Row> rowOf_;                 ///< by id; empty until first asked
+  std::vector<std::vector<Entry>>
+      overflowBlocks_;        ///< entries of cells that outgrew their capacity
+  std::vector<Row> rowById_;  ///< by id; empty until first needed
   std::vector<Row> freeRows_;
-  std::size_t editCount_ = 0, mostEdits_ = 0;
+  std::size_t editCount_ = 0, maxEdits_ = 0;
 };
 
 }  // namespace enfilade::collision

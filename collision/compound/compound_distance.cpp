@@ -1,164 +1,162 @@
-// Best-first descent of two trees (Hjaltason and Samet 1998, "Incremental distance join algorithms
-// for spatial databases"): of all pairs of branches that are open, the one whose boxes are nearest
-// goes on, and of its two branches the larger one is replaced by its children. Two leaves are
-// decided exactly. When the nearest boxes are farther apart than the nearest parts so far, nothing
-// nearer is left. So two large meshes that are far apart cost some paths through their trees, and
-// what the search costs is known while it runs.
+// Best-first traversal of two trees (Hjaltason and Samet 1998, "Incremental distance join
+// algorithms for spatial databases"). Of all open pairs of branches, the pair with the nearest
+// boxes is expanded: the larger branch is replaced by its children. Two leaves are tested exactly.
+// The search ends when the nearest open boxes are farther apart than the nearest parts so far. Two
+// large meshes that are far apart thus cost a few paths through their trees, and the cost of the
+// search is known while it runs.
 //
-// Among equals (all boxes that overlap are 0 apart) the last one goes on: down to parts that
-// penetrate, which ends it, with few pairs kept open.
+// Ties (all overlapping boxes have distance 0) are broken in favour of the last pair. This is a
+// depth-first descent to penetrating parts, which end the search, with few open pairs.
 //
-// Rounding. A turned box is off by some units u = 2^-53 of M = |translation| + 3 * (extent of the
-// tree), as part_tree.cpp works out; what is taken from a gap is 128u of both, which is above that,
-// the subtraction and the root.
+// Rounding. The error of a rotated box is a few units u = 2^-53 of M = |translation| + 3 * (extent
+// of the tree); see compound_shape.cpp. The pad deducted from a gap is 128u of both. It also covers
+// the subtraction and the square root.
 #include "collision/compound/compound_distance.hpp"
 
 #include <algorithm>
 #include <queue>
 #include <vector>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::collision {
 namespace {
 
-constexpr double kPad = 128 * 0x1p-53;  // see the file's head
+constexpr double kRoundingPad = 128 * 0x1p-53;  // see the head of this file
 
 using Branch = BoxTree::Branch;
 
 struct OpenBranch {
-  const TreeOfParts* tree;
+  const CompoundView* view;
   const Branch* branch;
 };
 
 struct OpenPair {
-  double gap;  ///< metres: no parts under the two are nearer
+  double gap;  ///< lower bound of the distance of all parts below, metres
   std::uint64_t number;
   OpenBranch a, b;
 
-  bool operator<(const OpenPair& other) const {  // the greatest goes on first
+  bool operator<(const OpenPair& other) const {  // the queue pops the maximum first
     return gap != other.gap ? gap > other.gap : number < other.number;
   }
 };
 
-Box worldBox(const OpenBranch& open) {
-  const NarrowBox& box = open.branch->box;
+Aabb computeWorldAabb(const OpenBranch& open) {
+  const FloatAabb& box = open.branch->box;
   const Vec3 min(box.min[0], box.min[1], box.min[2]), max(box.max[0], box.max[1], box.max[2]);
-  const TreeOfParts& tree = *open.tree;
-  const Vec3 middle = tree.rotation * (0.5 * (min + max) + tree.boxes->origin) + tree.translation;
-  const Vec3 reach = tree.rotation.cwiseAbs() * (0.5 * (max - min));
-  return {middle - reach, middle + reach};
+  const CompoundView& view = *open.view;
+  const Vec3 middle = view.rotation * (0.5 * (min + max) + view.tree->origin) + view.translation;
+  const Vec3 halfExtent = view.rotation.cwiseAbs() * (0.5 * (max - min));
+  return {middle - halfExtent, middle + halfExtent};
 }
 
-double padOf(const TreeOfParts& tree) {
-  const double extent = tree.boxes->origin.cwiseAbs().maxCoeff() + tree.boxes->extent;
-  return kPad * (tree.translation.cwiseAbs().maxCoeff() + 3 * extent);
+double computeRoundingPad(const CompoundView& view) {
+  const double extent = view.tree->origin.cwiseAbs().maxCoeff() + view.tree->extent;
+  return kRoundingPad * (view.translation.cwiseAbs().maxCoeff() + 3 * extent);
 }
 
-/// `pad`: what both are off by.
-double gapOf(const Box& a, const Box& b, double pad) {
+/// Distance of two boxes, at least 0. `pad`: rounding error of both.
+double computeGap(const Aabb& a, const Aabb& b, double pad) {
   const double gap = (a.min - b.max).cwiseMax(b.min - a.max).cwiseMax(0).norm();
   return std::max(0.0, gap - pad);
 }
 
-/// A part that is an item of a leaf, and its box.
+/// A part of a leaf and its world box.
 struct Item {
-  ConvexBody body;
-  Box box;
+  PlacedConvex body;
+  Aabb box;
 };
 
-std::vector<Item> itemsOf(const OpenBranch& leaf) {
+std::vector<Item> collectItems(const OpenBranch& leaf) {
   std::vector<Item> items;
   for (std::uint32_t i = 0; i < leaf.branch->count; ++i) {
-    Item& item = items.emplace_back(Item{leaf.tree->part(leaf.branch->first + i), {}});
-    const ConvexBody& body = item.body;
+    Item& item = items.emplace_back(Item{leaf.view->part(leaf.branch->first + i), {}});
+    const PlacedConvex& body = item.body;
     for (const Vec3& v : body.vertices)
       item.box.include(Vec3((body.rotation ? *body.rotation * v : v) + body.translation));
   }
   return items;
 }
 
-double sizeOf(const Branch& branch) {
-  double size = 0;
-  for (std::size_t i = 0; i < 3; ++i)
-    size += static_cast<double>(branch.box.max[i]) - static_cast<double>(branch.box.min[i]);
-  return size;
-}
-
-bool opensA(const OpenPair& pair) {
+bool shouldOpenA(const OpenPair& pair) {
   if (pair.a.branch->isLeaf()) return false;
-  return pair.b.branch->isLeaf() || sizeOf(*pair.a.branch) >= sizeOf(*pair.b.branch);
+  return pair.b.branch->isLeaf() ||
+         computeBranchSize(*pair.a.branch) >= computeBranchSize(*pair.b.branch);
 }
 
-class Search {
+class BestFirstSearch {
  public:
-  Search(double within, std::size_t& work) : limit_(within), work_(work) {}
+  BestFirstSearch(double within, std::size_t& budget) : limit_(within), budget_(budget) {}
 
-  void open(const OpenBranch& a, const OpenBranch& b) {
-    const double gap = gapOf(worldBox(a), worldBox(b), padOf(*a.tree) + padOf(*b.tree));
+  void pushPair(const OpenBranch& a, const OpenBranch& b) {
+    const double gap = computeGap(computeWorldAabb(a), computeWorldAabb(b),
+                                  computeRoundingPad(*a.view) + computeRoundingPad(*b.view));
     if (gap <= limit_) open_.push({gap, ++count_, a, b});
   }
 
   NearestParts run() {
-    while (!open_.empty() && best_.decision.verdict != Verdict::penetrating) {
+    while (!open_.empty() && best_.separation.verdict != Verdict::penetrating) {
       const OpenPair pair = open_.top();
       open_.pop();
       if (pair.gap > limit_) break;
-      if (!take(1)) return {NearestParts::Found::gaveUp, {}, {}, {}};
+      if (!spendBudget(1)) return {NearestParts::Outcome::budgetExhausted, {}, {}, {}};
       if (pair.a.branch->isLeaf() && pair.b.branch->isLeaf()) {
-        if (!decide(pair)) return {NearestParts::Found::gaveUp, {}, {}, {}};
+        if (!testLeaves(pair)) return {NearestParts::Outcome::budgetExhausted, {}, {}, {}};
       } else {
-        goOn(pair);
+        expand(pair);
       }
     }
     return best_;
   }
 
  private:
-  bool take(std::size_t cost) {
-    const bool enough = work_ >= cost;
-    work_ -= std::min(work_, cost);
+  bool spendBudget(std::size_t cost) {
+    const bool enough = budget_ >= cost;
+    budget_ -= std::min(budget_, cost);
     return enough;
   }
 
-  void goOn(const OpenPair& pair) {
-    const bool first = opensA(pair);
+  void expand(const OpenPair& pair) {
+    const bool first = shouldOpenA(pair);
     const OpenBranch& opened = first ? pair.a : pair.b;
-    for (const Branch& child : opened.tree->boxes->nodes[opened.branch->first].children) {
-      const OpenBranch one{opened.tree, &child};
-      if (first) open(one, pair.b);
-      if (!first) open(pair.a, one);
+    ENFILADE_ASSERT(!opened.branch->isLeaf());
+    for (const Branch& child : opened.view->tree->nodes[opened.branch->first].children) {
+      const OpenBranch one{opened.view, &child};
+      if (first) pushPair(one, pair.b);
+      if (!first) pushPair(pair.a, one);
     }
   }
 
-  /// False when the work is used up.
-  bool decide(const OpenPair& pair) {
-    const double pad = padOf(*pair.a.tree) + padOf(*pair.b.tree);
-    const std::vector<Item> second = itemsOf(pair.b);
-    for (const Item& a : itemsOf(pair.a)) {
+  /// Tests all pairs of parts of two leaves. False if the budget is exhausted.
+  bool testLeaves(const OpenPair& pair) {
+    const double pad = computeRoundingPad(*pair.a.view) + computeRoundingPad(*pair.b.view);
+    const std::vector<Item> second = collectItems(pair.b);
+    for (const Item& a : collectItems(pair.a)) {
       for (const Item& b : second) {
-        if (!take(1)) return false;
-        if (gapOf(a.box, b.box, pad) > limit_) continue;
-        if (!take(kDecisionWork)) return false;
-        consider(a.body, b.body);
+        if (!spendBudget(1)) return false;
+        if (computeGap(a.box, b.box, pad) > limit_) continue;
+        if (!spendBudget(kSeparationCost)) return false;
+        considerParts(a.body, b.body);
       }
     }
     return true;
   }
 
-  void consider(const ConvexBody& a, const ConvexBody& b) {
+  void considerParts(const PlacedConvex& a, const PlacedConvex& b) {
     FeatureCache cache;
-    const auto decision = decideWithin(a, b, limit_, cache);
-    if (!decision) return;
-    const bool first = best_.found == NearestParts::Found::none;
-    const Decision& best = best_.decision;
-    const bool worse = decision->verdict != best.verdict ? decision->verdict > best.verdict
-                                                         : decision->distance < best.distance;
-    if (!first && !worse) return;
-    best_ = {NearestParts::Found::nearest, *decision, a, b};
-    limit_ = std::min(limit_, decision->distance + decision->errorBound);
+    const auto separation = computeSeparationWithin(a, b, limit_, cache);
+    if (!separation) return;
+    const bool first = best_.outcome == NearestParts::Outcome::outOfRange;
+    const SeparationResult& best = best_.separation;
+    const bool closer = separation->verdict != best.verdict ? separation->verdict > best.verdict
+                                                            : separation->distance < best.distance;
+    if (!first && !closer) return;
+    best_ = {NearestParts::Outcome::nearest, *separation, a, b};
+    limit_ = std::min(limit_, separation->distance + separation->errorBound);
   }
 
-  double limit_;  ///< metres: nothing beyond matters
-  std::size_t& work_;
+  double limit_;  ///< current search distance, metres
+  std::size_t& budget_;
   std::uint64_t count_ = 0;
   std::priority_queue<OpenPair> open_;
   NearestParts best_;
@@ -166,17 +164,17 @@ class Search {
 
 }  // namespace
 
-Box boxOf(const TreeOfParts& tree) {
-  return grown(worldBox({&tree, &tree.boxes->root}), padOf(tree));
+Aabb computeAabb(const CompoundView& view) {
+  return inflated(computeWorldAabb({&view, &view.tree->root}), computeRoundingPad(view));
 }
 
-NearestParts nearestParts(std::span<const TreeOfParts> a, std::span<const TreeOfParts> b,
-                          double within, std::size_t& work) {
-  Search search(within, work);
-  for (const TreeOfParts& one : a)
-    for (const TreeOfParts& other : b)
-      if (!one.boxes->empty() && !other.boxes->empty())
-        search.open({&one, &one.boxes->root}, {&other, &other.boxes->root});
+NearestParts findNearestParts(std::span<const CompoundView> a, std::span<const CompoundView> b,
+                              double within, std::size_t& budget) {
+  BestFirstSearch search(within, budget);
+  for (const CompoundView& one : a)
+    for (const CompoundView& other : b)
+      if (!one.tree->empty() && !other.tree->empty())
+        search.pushPair({&one, &one.tree->root}, {&other, &other.tree->root});
   return search.run();
 }
 

@@ -1,4 +1,4 @@
-// How near two concave or articulated objects come, however far apart: the exact verdict, and the
+// Distance query for two concave or articulated objects at any distance: the exact verdict and the
 // two parts that attain it.
 #pragma once
 
@@ -10,35 +10,36 @@
 
 namespace enfilade::collision {
 
-/// Convex parts under a tree of boxes that somebody else holds. An object is some of these.
-struct TreeOfParts {
-  const BoxTree* boxes = nullptr;
+/// Non-owning view of convex parts under a box tree. An object consists of one or more views.
+struct CompoundView {
+  const BoxTree* tree = nullptr;
   Mat3 rotation = Mat3::Identity();  ///< worldFromTree
   Vec3 translation = Vec3::Zero();   ///< metres
-  /// The part that is this item of the tree, in the world.
-  std::function<ConvexBody(std::uint32_t)> part;
+  /// Maps an item of the tree to its part in the world frame.
+  std::function<PlacedConvex(std::uint32_t)> part;
 };
 
-/// Of all its parts, in the world: not smaller than theirs. `boxes` must not be empty.
-Box boxOf(const TreeOfParts& tree);
+/// Conservative world box of all parts. The tree must not be empty.
+Aabb computeAabb(const CompoundView& view);
 
 struct NearestParts {
-  enum class Found : std::uint8_t {
-    nearest,  ///< `decision` of the parts `a` and `b`
-    none,     ///< all are farther apart than was looked
-    gaveUp    ///< the work was used up before anything was known
+  enum class Outcome : std::uint8_t {
+    nearest,         ///< `separation` of the parts `a` and `b`
+    outOfRange,      ///< all parts are farther apart than the search distance
+    budgetExhausted  ///< the budget was exhausted before the result was known
   };
-  Found found = Found::none;
-  Decision decision;  ///< penetrating if any two parts are, else touching, else the least distance
-  ConvexBody a, b;
+  Outcome outcome = Outcome::outOfRange;
+  SeparationResult
+      separation;  ///< penetrating if any two parts are, else touching, else minimum distance
+  PlacedConvex a, b;
 };
 
-/// What a decision on two parts costs, beside 1 for two boxes.
-inline constexpr std::size_t kDecisionWork = 16;
+/// Budget of a separation query on two parts. A test of two boxes costs 1.
+inline constexpr std::size_t kSeparationCost = 16;
 
-/// `within`: metres, >= 0 or infinite; parts beyond are not looked at (those a little beyond may be
-/// found nevertheless). Takes what it does from `work`, and stops when nothing is left.
-NearestParts nearestParts(std::span<const TreeOfParts> a, std::span<const TreeOfParts> b,
-                          double within, std::size_t& work);
+/// Finds the nearest pair of parts up to the distance `within` (metres, >= 0 or infinite). Parts
+/// slightly farther apart may also be returned. Deducts its cost from `budget` and stops at 0.
+NearestParts findNearestParts(std::span<const CompoundView> a, std::span<const CompoundView> b,
+                              double within, std::size_t& budget);
 
 }  // namespace enfilade::collision

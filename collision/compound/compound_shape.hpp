@@ -1,5 +1,5 @@
-// Concave and articulated objects as convex parts and triangles under trees of boxes (seed 5.2.1):
-// which parts of two such objects may meet, and the verdict on the whole.
+// Compound shapes: concave and articulated objects as convex parts or triangles under box trees
+// (Lin 1993, section 5.2.1). Queries find the overlapping parts of two objects, and their verdict.
 #pragma once
 
 #include <memory>
@@ -14,104 +14,104 @@
 
 namespace enfilade::collision {
 
-/// The parts of one rigid piece, in its own frame, metres. The tree over them is built when it is
-/// first opened; safe to share between threads.
-class PartTree {
+/// Parts of one rigid piece, in its own frame, metres. The tree is built at the first call of
+/// bvh(). Const functions are thread-safe.
+class CompoundShape {
  public:
-  /// Convex parts; none may be empty.
-  explicit PartTree(std::vector<Hull> hulls);
-  /// Each triangle is a part: closed, without thickness.
-  explicit PartTree(std::vector<Triangle> triangles);
-  ~PartTree();
-  PartTree(PartTree&&) noexcept;
+  /// Convex parts. No hull may be empty.
+  explicit CompoundShape(std::vector<Hull> hulls);
+  /// Each triangle is a closed part without thickness.
+  explicit CompoundShape(std::vector<Triangle> triangles);
+  ~CompoundShape();
+  CompoundShape(CompoundShape&&) noexcept;
 
   std::uint32_t size() const;
   std::span<const Vec3> vertices(std::uint32_t part) const;
   /// Null for triangles.
   const Hull* hull(std::uint32_t part) const;
-  /// Of all parts.
-  const Box& box() const { return box_; }
-  /// Greatest distance of a vertex from the origin of the frame.
+  /// Bounding box of all parts.
+  const Aabb& box() const { return box_; }
+  /// Maximum distance of a vertex from the origin of the frame, metres.
   double radius() const { return radius_; }
 
-  /// The boxes over the parts. Branch 0 is the root, branches 2k + 1 and 2k + 2 are the children of
-  /// node k.
-  struct Opened {
-    BoxTree boxes;
+  /// Bounding volume hierarchy of the parts. Branch 0 is the root; branches 2k + 1 and 2k + 2 are
+  /// the children of node k.
+  struct Bvh {
+    BoxTree tree;
     std::vector<std::uint32_t> branchOfNode;
     const BoxTree::Branch& branch(std::uint32_t i) const {
-      return i == 0 ? boxes.root : boxes.nodes[(i - 1) / 2].children[(i - 1) % 2];
+      return i == 0 ? tree.root : tree.nodes[(i - 1) / 2].children[(i - 1) % 2];
     }
   };
-  const Opened& opened() const;
-  /// Whether anything has needed the tree yet.
-  bool isOpened() const;
+  const Bvh& bvh() const;
+  /// True if the tree has been built.
+  bool isBvhBuilt() const;
 
  private:
-  struct Lazy;
+  struct LazyBvh;
   std::vector<Hull> hulls_;
   std::vector<Triangle> triangles_;
-  Box box_;
+  Aabb box_;
   double radius_ = 0;
-  std::unique_ptr<Lazy> lazy_;
+  std::unique_ptr<LazyBvh> lazy_;
 };
 
-/// A rigid piece where it stands. A rigid object is one of these; an articulated one is one for
-/// each link. As for ConvexBody, the doubles are taken as they are.
-struct PlacedParts {
-  const PartTree* parts = nullptr;
+/// Compound shape at a pose. A rigid object is one of these, an articulated object one per link.
+/// As for PlacedConvex, the doubles are taken as exact.
+struct PlacedCompound {
+  const CompoundShape* shape = nullptr;
   Mat3 rotation = Mat3::Identity();  ///< worldFromPiece
   Vec3 translation = Vec3::Zero();   ///< metres
 };
 
-/// The box of one placed part in the world: never smaller than the exact one.
-Box boxOf(const PlacedParts& placed, std::uint32_t part);
+/// Conservative world box of one placed part.
+Aabb computeAabb(const PlacedCompound& placed, std::uint32_t part);
 
 struct PartPair {
   std::uint32_t linkA = 0, partA = 0, linkB = 0, partB = 0;
   auto operator<=>(const PartPair&) const = default;
 };
 
-/// What is kept from tick to tick of two objects. Call reset() before it serves other objects (or
-/// other parts); the poses may be any.
-struct PartsCache {
-  /// Two branches at which the last descent ended, in the order of the descent.
-  struct FrontPair {
+/// State of a pair of objects that is kept from tick to tick. Call reset() before use with other
+/// objects or parts. Poses may change arbitrarily.
+struct CompoundCache {
+  /// Two branches at which the last traversal ended, in traversal order.
+  struct BvttFrontEntry {
     std::uint32_t a, b;
-    bool apart;
+    bool separated;
   };
-  /// World boxes of one link's branches, made when first asked for in a tick.
-  struct LinkBoxes {
-    std::vector<Box> boxes;
-    std::vector<std::uint64_t> madeAt;
+  /// World boxes of the branches of one link, computed on demand once per tick.
+  struct LinkAabbs {
+    std::vector<Aabb> boxes;
+    std::vector<std::uint64_t> computedAt;
   };
-  std::vector<std::vector<FrontPair>> fronts;  ///< of each pair of links
-  std::vector<LinkBoxes> boxesA, boxesB;
+  std::vector<std::vector<BvttFrontEntry>> fronts;  ///< one per pair of links
+  std::vector<LinkAabbs> boxesA, boxesB;
   std::vector<PartPair> pairs;         ///< ascending
   std::vector<FeatureCache> features;  ///< of `pairs`
-  PartPair decisive;                   ///< decided the last verdict
+  PartPair witnessPair;                ///< pair of the last verdict
   std::uint64_t tick = 0;
-  std::uint64_t boxTests = 0, boxesMade = 0, decisions = 0;  ///< counters
+  std::uint64_t aabbTests = 0, aabbsComputed = 0, separationQueries = 0;  ///< counters
 
-  void reset() { *this = PartsCache{}; }
+  void reset() { *this = CompoundCache{}; }
 };
 
-/// Exactly the pairs of parts whose boxes, those of A grown by `clearance` (metres, >= 0), overlap;
-/// ascending. The list lives in the cache.
-const std::vector<PartPair>& overlappingParts(std::span<const PlacedParts> a,
-                                              std::span<const PlacedParts> b, double clearance,
-                                              PartsCache& cache);
+/// Finds exactly the pairs of parts whose boxes overlap, those of A inflated by `clearance`
+/// (metres, >= 0). Ascending. The cache owns the list.
+const std::vector<PartPair>& findOverlappingParts(std::span<const PlacedCompound> a,
+                                                  std::span<const PlacedCompound> b,
+                                                  double clearance, CompoundCache& cache);
 
-/// The verdict on two whole objects: penetrating if any two parts penetrate, else touching if any
-/// touch, else separated with the least distance.
-struct PartsDecision {
-  PartPair pair;      ///< that attains it
-  Decision decision;  ///< of that pair
+/// Verdict on two objects: penetrating if any two parts penetrate, else touching if any touch, else
+/// separated with the minimum distance.
+struct CompoundSeparation {
+  PartPair pair;                ///< pair that attains it
+  SeparationResult separation;  ///< of that pair
 };
 
-/// nullopt: all parts are proved farther apart than `clearance`.
-std::optional<PartsDecision> decideParts(std::span<const PlacedParts> a,
-                                         std::span<const PlacedParts> b, double clearance,
-                                         PartsCache& cache);
+/// Computes the verdict. nullopt: all parts are proved farther apart than `clearance` (metres).
+std::optional<CompoundSeparation> computeCompoundSeparation(std::span<const PlacedCompound> a,
+                                                            std::span<const PlacedCompound> b,
+                                                            double clearance, CompoundCache& cache);
 
 }  // namespace enfilade::collision

@@ -1,4 +1,4 @@
-// The face planes of a hull with proved error bounds: how deep inside is a point?
+// Face planes of a hull with proved error bounds, for depth-inside queries.
 #pragma once
 
 #include <vector>
@@ -8,24 +8,25 @@
 
 namespace enfilade::collision {
 
-/// In the body's frame. Empty for a flat hull, which has no inside.
+/// Face planes of a hull in the body frame. Empty for a flat hull, which has no interior.
 struct HullPlanes {
   struct Plane {
     Vec3 normal;    ///< unit up to rounding, outwards
-    double height;  ///< normal . x < height proves that x lies inside of the exact face, for all
-                    ///< |x| <= 2 radius; lowered by all that rounding can do
-    double most;    ///< normal . v <= most for all vertices v, exactly
+    double height;  ///< normal . x < height proves that x lies inside the exact face plane, for all
+                    ///< |x| <= 2 radius; lowered by the rounding error bound
+    double support;  ///< normal . v <= support for all vertices v, exactly
   };
   std::vector<Plane> planes;
-  double radius = 0;  ///< of the hull, about its frame's origin
-  bool made = false;
+  double radius = 0;  ///< of the hull about the origin of its frame, metres
+  bool initialized = false;
 
   HullPlanes() = default;
   explicit HullPlanes(const Hull& hull);
 };
 
-/// A ball around some point of `triangle` lies in the body: its radius in metres. 0 when none is
-/// found (there may be one all the same). `planes` are of body.hull.
-double clearanceInside(const HullPlanes& planes, const ConvexBody& body, const Triangle& triangle);
+/// Radius (metres) of a ball around some point of `triangle` that lies in the body: a lower bound
+/// of the depth. 0 if no ball is found; one may still exist. `planes` must be those of body.hull.
+double computeInteriorClearance(const HullPlanes& planes, const PlacedConvex& body,
+                                const Triangle& triangle);
 
 }  // namespace enfilade::collision

@@ -1,20 +1,19 @@
 // Steps
-//  1. Odometer. What a verdict rests on is a margin: a distance kept by a plane, or a ball inside
-//     of the body around a point of the triangle. No point of the body moves by more than
-//     |dt| + |dR| r between two poses, so the verdict holds, exactly, until the odometer has used
-//     up its margin. The same for the horizon: triangles that were farther than it when the tree
-//     was last descended need not be looked at while it lasts. (The idea is the seed's time to
-//     contact, 5.1, measured in way instead of time, so that nothing is assumed of the motion.)
-//  2. Candidates, the triangles inside of the horizon, go from query to query with their features.
-//     When a margin is used up (contacts), or cannot exclude that the triangle is the nearest, a
-//     new one is looked for: along the last axis, or the normal of the triangle or the way between
-//     the centres where there is no last axis; for what was penetrated, inside of the body
-//     (hull_planes). Where that fails, decide() is asked, started from the last features.
-//  3. Gathering. When the horizon is used up, the tree is descended depth first, nearer child
-//  first,
-//     bounded by the nearest known triangle and a lookahead of some steps of the body. Lower bounds
-//     of the distance to a box: from the body's box, from its ball, and from the plane of the last
-//     closest points (mesh_probe).
+//  1. Accumulated motion. Each verdict has a margin: a distance proved by a plane, or a ball in the
+//     body around a point of the triangle. No point of the body moves by more than |dt| + |dR| r
+//     between two poses, so the verdict holds exactly until the accumulated motion exceeds the
+//     margin. Likewise the candidate radius: triangles that were farther at the last traversal need
+//     no test until the motion exceeds it. (This is time to contact, Lin 1993, section 5.1, in
+//     distance instead of time; it assumes nothing about the motion.)
+//  2. Candidates are the triangles inside the candidate radius. They keep their features between
+//     queries. A new margin is needed when the old one is used up (contacts), or cannot exclude
+//     that the triangle is the nearest. It is sought along the last axis; without one, along the
+//     triangle normal or the line between the centres. For penetrated triangles it is sought inside
+//     the body (hull_planes). If that fails, computeSeparation() runs from the last features.
+//  3. Broad update. When the candidate radius is used up, the tree is traversed depth first, nearer
+//     child first. The nearest known triangle and a lookahead of some steps of the body bound the
+//     traversal. Lower bounds of the distance to a box come from the body's box, from its bounding
+//     sphere, and from the plane of the last closest points (query_bounds).
 // Departure from the usual best-first search with a queue: with the last nearest triangle as the
 // first bound, the queue costs more than the few boxes that it saves.
 #include "collision/compound/mesh_query.hpp"
@@ -22,71 +21,76 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/assert.hpp"
 #include "collision/compound/query_bounds.hpp"
+#include "collision/floating_point.hpp"
 #include "collision/narrow_phase/refine.hpp"
 
 namespace enfilade::collision {
 namespace {
 
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
-constexpr double kUnit = 0x1p-53;
-constexpr double kMostWay = 64;  // horizons on the odometer until it is set back to 0
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kMaxMotionRadii = 64;  // accumulated motion before a reset, in candidate radii
 
-// How far to look ahead: so many steps, but not farther than part of the body's radius. The longer,
-// the rarer is gathering and the longer are the lists; measured on 50,880 triangles.
+// Lookahead: a number of steps, at most a fraction of the body's radius. A longer lookahead makes
+// broad updates rarer and candidate lists longer. Chosen by measurement on 50,880 triangles.
 constexpr double kLookaheadSteps = 8;
 constexpr double kLookaheadRadii = 0.25;
-constexpr std::size_t kMostCandidates = 256;  // beyond, the farthest are left to the next gather
+constexpr std::size_t kMaxCandidates = 256;  // the farthest above this are dropped
 
 using Candidate = MeshCache::Candidate;
 
-// ---- odometer ----------------------------------------------------------------------------------
+// ---- accumulated motion ------------------------------------------------------------------------
 
-double radiusOf(const ConvexBody& body) {
+double computeVertexRadius(const PlacedConvex& body) {
   double squared = 0;
   for (const Vec3& v : body.vertices) squared = std::max(squared, v.squaredNorm());
-  return std::sqrt(squared) * (1 + 4 * kUnit);
+  return std::sqrt(squared) * (1 + 4 * kRoundoff);
 }
 
-/// How far any point of the body went since the last query, rounded up; 0 for the same pose only.
-double stepTo(const MeshCache& cache, const Vec3& translation, const Mat3& rotation) {
+/// Upper bound of the motion of any body point since the last query; 0 for the same pose only.
+double computeStepBound(const MeshCache& cache, const Vec3& translation, const Mat3& rotation) {
   if (translation == cache.translation && rotation == cache.rotation) return 0;
   const double moved = (translation - cache.translation).norm();
-  const double turned = (rotation - cache.rotation).norm() * cache.radius;
-  return (moved + turned) * (1 + 32 * kUnit) + 0x1p-500;  // what squares may lose to underflow
+  const double rotated = (rotation - cache.rotation).norm() * cache.radius;
+  return (moved + rotated) * (1 + 32 * kRoundoff) + 0x1p-500;  // covers underflow of squares
 }
 
-void track(const ConvexBody& body, MeshCache& cache) {
+void trackMotion(const PlacedConvex& body, MeshCache& cache) {
   const Mat3 rotation = body.rotation ? *body.rotation : Mat3(Mat3::Identity());
   if (cache.radius < 0) {
-    cache.radius = radiusOf(body);
+    cache.radius = computeVertexRadius(body);
   } else {
-    const double step = stepTo(cache, body.translation, rotation);
-    if (step > 0) cache.step = step;
-    // Rounded up, so that each difference of two readings is at least the way between them.
-    if (step > 0) cache.odometer = (cache.odometer + step) * (1 + 4 * kUnit);
+    const double step = computeStepBound(cache, body.translation, rotation);
+    ENFILADE_ASSERT(!(step < 0));
+    if (step > 0) cache.lastStep = step;
+    // Rounded up, so that the difference of two values is at least the motion between them.
+    if (step > 0) cache.accumulatedMotion = (cache.accumulatedMotion + step) * (1 + 4 * kRoundoff);
   }
   cache.translation = body.translation;
   cache.rotation = rotation;
 }
 
-double wayLeft(const MeshCache& cache, const Candidate& candidate) {
-  return candidate.margin - (cache.odometer - candidate.since) * (1 + 4 * kUnit);
+double computeRemainingMargin(const MeshCache& cache, const Candidate& candidate) {
+  return candidate.margin - (cache.accumulatedMotion - candidate.decidedAt) * (1 + 4 * kRoundoff);
 }
 
-/// Whether the verdict is still proved.
-bool holds(const MeshCache& cache, const Candidate& candidate) {
-  if (!candidate.decided && candidate.margin == 0) return false;
-  return cache.odometer == candidate.since || wayLeft(cache, candidate) > 0;
+/// True if the motion since the verdict is within its margin.
+bool isVerdictValid(const MeshCache& cache, const Candidate& candidate) {
+  if (!candidate.isDecided && candidate.margin == 0) return false;
+  return cache.accumulatedMotion == candidate.decidedAt ||
+         computeRemainingMargin(cache, candidate) > 0;
 }
 
-/// Whether every triangle that is no candidate is farther than `distance`.
-bool seesAsFarAs(const MeshCache& cache, double distance) {
-  return cache.horizon >= 0 && cache.odometer <= kMostWay * cache.horizon &&
-         cache.horizon - cache.odometer * (1 + 4 * kUnit) > distance;
+/// True if every triangle that is no candidate is farther than `distance`.
+bool coversDistance(const MeshCache& cache, double distance) {
+  return cache.candidateRadius >= 0 &&
+         cache.accumulatedMotion <= kMaxMotionRadii * cache.candidateRadius &&
+         cache.candidateRadius - cache.accumulatedMotion * (1 + 4 * kRoundoff) > distance;
 }
 
-std::optional<std::size_t> indexOf(const std::vector<Candidate>& list, std::uint32_t triangle) {
+std::optional<std::size_t> findCandidate(const std::vector<Candidate>& list,
+                                         std::uint32_t triangle) {
   const auto at = std::lower_bound(
       list.begin(), list.end(), triangle,
       [](const Candidate& candidate, std::uint32_t i) { return candidate.triangle < i; });
@@ -94,71 +98,76 @@ std::optional<std::size_t> indexOf(const std::vector<Candidate>& list, std::uint
   return static_cast<std::size_t>(at - list.begin());
 }
 
-/// Of the last closest points; zero where there are none.
-Vec3 lastAxis(const MeshCache& cache) {
-  const auto at = indexOf(cache.candidates, cache.nearest);
+/// Axis of the last closest points; zero if unknown.
+Vec3 findLastAxis(const MeshCache& cache) {
+  const auto at = findCandidate(cache.candidates, cache.nearest);
   return at ? cache.candidates[*at].features.axis : Vec3(Vec3::Zero());
 }
 
 // ---- one query ---------------------------------------------------------------------------------
 
 struct Query {
-  const ConvexBody& body;
+  const PlacedConvex& body;
   const TriangleTree& mesh;
   MeshCache& cache;
   double lookahead;
-  bool probed = false;
+  bool boundsReady = false;
 
-  Query(const ConvexBody& asked, const TriangleTree& against, MeshCache& kept)
-      : body(asked), mesh(against), cache(kept) {
-    track(body, cache);
-    const double most = kLookaheadRadii * cache.radius;
-    lookahead = 2 * cache.step > most ? 0 : std::min(kLookaheadSteps * cache.step, most);
+  Query(const PlacedConvex& convex, const TriangleTree& against, MeshCache& queryCache)
+      : body(convex), mesh(against), cache(queryCache) {
+    trackMotion(body, cache);
+    const double maxLookahead = kLookaheadRadii * cache.radius;
+    lookahead = 2 * cache.lastStep > maxLookahead
+                    ? 0
+                    : std::min(kLookaheadSteps * cache.lastStep, maxLookahead);
   }
 
   const Triangle& triangle(const Candidate& candidate) const {
     return mesh.triangles()[candidate.triangle];
   }
-  Triangle inTree(std::uint32_t i) const {
+  Triangle toTreeFrame(std::uint32_t i) const {
     const Triangle& t = mesh.triangles()[i];
     const Vec3& origin = mesh.boxes().origin;
     return {t[0] - origin, t[1] - origin, t[2] - origin};
   }
-  /// Placed when first needed: most queries of a body that hardly moves do without.
-  const MeshProbe& probe() {
-    if (!probed) placeProbe(body, cache.radius, mesh.boxes(), lastAxis(cache), cache.probe);
-    probed = true;
-    return cache.probe;
+  /// Computed on demand: most queries of a body that hardly moves do not need it.
+  const QueryBounds& bounds() {
+    if (!boundsReady)
+      computeQueryBounds(body, cache.radius, mesh.boxes(), findLastAxis(cache), cache.bounds);
+    boundsReady = true;
+    return cache.bounds;
   }
 };
 
-// ---- deciding one triangle ---------------------------------------------------------------------
+// ---- verdict on one triangle -------------------------------------------------------------------
 
-void settle(const Query& query, Candidate& candidate, Verdict verdict, double margin) {
-  candidate.decided = true;
+void setVerdict(const Query& query, Candidate& candidate, Verdict verdict, double margin) {
+  candidate.isDecided = true;
   candidate.verdict = verdict;
   candidate.margin = margin;
-  candidate.since = query.cache.odometer;
+  candidate.decidedAt = query.cache.accumulatedMotion;
 }
 
-/// A lower bound of the distance, by what is known.
-double knownDistance(const MeshCache& cache, const Candidate& candidate) {
-  return candidate.verdict == Verdict::separated ? std::max(0.0, wayLeft(cache, candidate)) : 0;
+/// Lower bound of the distance from the last verdict and the motion since.
+double computeKnownDistance(const MeshCache& cache, const Candidate& candidate) {
+  return candidate.verdict == Verdict::separated
+             ? std::max(0.0, computeRemainingMargin(cache, candidate))
+             : 0;
 }
 
-/// Whether a plane proves a distance above `wanted`; then it is known.
-bool provedFarther(Query& query, Candidate& candidate, double wanted) {
-  const Triangle triangle = query.inTree(candidate.triangle);
-  const MeshProbe& probe = query.probe();
+/// Tries to prove a distance above `wanted` with a separating plane. On success records the margin.
+bool proveFarther(Query& query, Candidate& candidate, double wanted) {
+  const Triangle triangle = query.toTreeFrame(candidate.triangle);
+  const QueryBounds& bounds = query.bounds();
   const auto proves = [&](const Vec3& axis) {
-    const double lower = lowerBoundAlong(probe, axis, triangle);
+    const double lower = computeLowerBoundAlong(bounds, axis, triangle);
     if (!(lower > wanted)) return false;
-    settle(query, candidate, Verdict::separated, lower);
+    setVerdict(query, candidate, Verdict::separated, lower);
     return true;
   };
   FeatureCache& features = candidate.features;
   if (!features.axis.isZero(0)) return proves(features.axis);
-  const Vec3 between = (triangle[0] + triangle[1] + triangle[2]) / 3 - probe.centre;
+  const Vec3 between = (triangle[0] + triangle[1] + triangle[2]) / 3 - bounds.centre;
   Vec3 normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
   if (normal.dot(between) < 0) normal = -normal;
   features.axis = normal;
@@ -170,237 +179,246 @@ bool provedFarther(Query& query, Candidate& candidate, double wanted) {
   return false;
 }
 
-double marginInside(Query& query, const Candidate& candidate) {
+double computeInteriorMargin(Query& query, const Candidate& candidate) {
   if (!query.body.hull) return 0;
   HullPlanes& planes = query.cache.planes;
-  if (!planes.made) planes = HullPlanes(*query.body.hull);
-  return clearanceInside(planes, query.body, query.triangle(candidate));
+  if (!planes.initialized) planes = HullPlanes(*query.body.hull);
+  return computeInteriorClearance(planes, query.body, query.triangle(candidate));
 }
 
-/// decideWithin(), and what it tells for later.
-std::optional<Decision> decideCandidate(Query& query, Candidate& candidate, double limit) {
-  const ConvexBody triangle{std::span<const Vec3>(query.triangle(candidate))};
-  const auto decision = decideWithin(query.body, triangle, limit, candidate.features);
-  ++query.cache.decisions;
-  if (!decision) {
-    settle(query, candidate, Verdict::separated, limit);
-  } else if (decision->verdict == Verdict::separated) {
-    settle(query, candidate, Verdict::separated,
-           std::max(0.0, decision->distance - decision->errorBound));
+/// Runs computeSeparationWithin() and records verdict and margin.
+std::optional<SeparationResult> separateCandidate(Query& query, Candidate& candidate,
+                                                  double limit) {
+  const PlacedConvex triangle{std::span<const Vec3>(query.triangle(candidate))};
+  const auto separation = computeSeparationWithin(query.body, triangle, limit, candidate.features);
+  ++query.cache.separationQueries;
+  if (!separation) {
+    setVerdict(query, candidate, Verdict::separated, limit);
+  } else if (separation->verdict == Verdict::separated) {
+    setVerdict(query, candidate, Verdict::separated,
+               std::max(0.0, separation->distance - separation->errorBound));
   } else {
-    const bool inside = decision->verdict == Verdict::penetrating;
-    settle(query, candidate, decision->verdict, inside ? marginInside(query, candidate) : 0);
+    const bool inside = separation->verdict == Verdict::penetrating;
+    setVerdict(query, candidate, separation->verdict,
+               inside ? computeInteriorMargin(query, candidate) : 0);
   }
-  return decision;
+  return separation;
 }
 
-/// Makes the candidate's verdict hold, without its distance.
-void decideVerdict(Query& query, Candidate& candidate) {
-  if (holds(query.cache, candidate)) return;
+/// Makes the verdict of the candidate valid for the current pose, without its distance.
+void updateVerdict(Query& query, Candidate& candidate) {
+  if (isVerdictValid(query.cache, candidate)) return;
   if (candidate.verdict != Verdict::separated) {
-    const double margin = marginInside(query, candidate);
-    if (margin > 0) return settle(query, candidate, Verdict::penetrating, margin);
+    const double margin = computeInteriorMargin(query, candidate);
+    if (margin > 0) return setVerdict(query, candidate, Verdict::penetrating, margin);
   }
-  const bool fresh = candidate.features.axis.isZero(0);
-  if (provedFarther(query, candidate, 0)) return;
-  if (fresh) {
-    const double margin = marginInside(query, candidate);
-    if (margin > 0) return settle(query, candidate, Verdict::penetrating, margin);
+  const bool isNew = candidate.features.axis.isZero(0);
+  if (proveFarther(query, candidate, 0)) return;
+  if (isNew) {
+    const double margin = computeInteriorMargin(query, candidate);
+    if (margin > 0) return setVerdict(query, candidate, Verdict::penetrating, margin);
   }
-  decideCandidate(query, candidate, query.lookahead);
+  separateCandidate(query, candidate, query.lookahead);
 }
 
-/// The nearest triangle so far; `best` bounds the least distance from above.
+/// Nearest triangle so far. `best` is an upper bound of the minimum distance.
 struct Nearest {
   double best;
   std::optional<NearestTriangle> found{};
 
-  bool done() const { return found && found->decision.distance == 0; }
+  bool isDone() const { return found && found->separation.distance == 0; }
 };
 
-/// Decides the candidate if it may be nearer than what was found.
-void decideIfNearer(Query& query, Candidate& candidate, Nearest& nearest) {
+/// Computes the distance of the candidate if it may be closer than the nearest so far.
+void updateNearest(Query& query, Candidate& candidate, Nearest& nearest) {
   auto& found = nearest.found;
-  if (nearest.done() || (found && found->triangle == candidate.triangle)) return;
-  if (knownDistance(query.cache, candidate) > nearest.best) return;
-  if (found && provedFarther(query, candidate, nearest.best)) return;
-  const auto decision = decideCandidate(query, candidate, nearest.best + query.lookahead);
-  if (!decision || decision->distance - decision->errorBound > nearest.best) return;
-  if (found && !(decision->distance < found->decision.distance)) return;
-  found = NearestTriangle{candidate.triangle, *decision};
-  nearest.best = std::min(nearest.best, decision->distance + decision->errorBound);
+  if (nearest.isDone() || (found && found->triangle == candidate.triangle)) return;
+  if (computeKnownDistance(query.cache, candidate) > nearest.best) return;
+  if (found && proveFarther(query, candidate, nearest.best)) return;
+  const auto separation = separateCandidate(query, candidate, nearest.best + query.lookahead);
+  if (!separation || separation->distance - separation->errorBound > nearest.best) return;
+  if (found && !(separation->distance < found->separation.distance)) return;
+  found = NearestTriangle{candidate.triangle, *separation};
+  nearest.best = std::min(nearest.best, separation->distance + separation->errorBound);
 }
 
-// ---- gathering ---------------------------------------------------------------------------------
+// ---- broad update ------------------------------------------------------------------------------
 
-/// Everything not farther than best + lookahead is wanted; in a search for the nearest, `best`
-/// shrinks on the way.
-struct Gather {
+/// Collects all triangles up to the distance best + lookahead. In a search for the nearest
+/// triangle, `best` decreases during the traversal.
+struct CandidateUpdate {
   Query& query;
   Nearest nearest;
   bool wantsNearest;
   std::vector<Candidate> old{};  ///< ascending in `triangle`
 
-  double reach() const { return nearest.best + query.lookahead; }
+  double maxDistance() const { return nearest.best + query.lookahead; }
 };
 
-/// Last query's candidate of this triangle, or a new one.
-Candidate candidateOf(const Gather& gather, std::uint32_t triangle) {
-  if (const auto at = indexOf(gather.old, triangle)) return gather.old[*at];
-  Candidate fresh;
-  fresh.triangle = triangle;
-  return fresh;
+/// Candidate of this triangle from the last query, or a new one.
+Candidate reuseOrMakeCandidate(const CandidateUpdate& update, std::uint32_t triangle) {
+  if (const auto at = findCandidate(update.old, triangle)) return update.old[*at];
+  Candidate candidate;
+  candidate.triangle = triangle;
+  return candidate;
 }
 
-/// Puts the triangle on the list if it is near enough, and in a search for the nearest decides it
-/// where it may be that.
-void consider(Gather& gather, std::uint32_t triangle) {
-  MeshCache& cache = gather.query.cache;
-  const double lower = lowerBound(gather.query.probe(), gather.query.inTree(triangle));
-  if (lower > gather.reach()) {
-    cache.horizon = std::min(cache.horizon, lower);
+/// Adds the triangle to the candidates if it is close enough. In a search for the nearest triangle,
+/// also updates the nearest.
+void considerTriangle(CandidateUpdate& update, std::uint32_t triangle) {
+  MeshCache& cache = update.query.cache;
+  const double lower = computeLowerBound(update.query.bounds(), update.query.toTreeFrame(triangle));
+  if (lower > update.maxDistance()) {
+    cache.candidateRadius = std::min(cache.candidateRadius, lower);
     return;
   }
-  Candidate candidate = candidateOf(gather, triangle);
-  if (lower > knownDistance(cache, candidate))
-    settle(gather.query, candidate, Verdict::separated, lower);
-  if (gather.wantsNearest) decideIfNearer(gather.query, candidate, gather.nearest);
+  Candidate candidate = reuseOrMakeCandidate(update, triangle);
+  if (lower > computeKnownDistance(cache, candidate))
+    setVerdict(update.query, candidate, Verdict::separated, lower);
+  if (update.wantsNearest) updateNearest(update.query, candidate, update.nearest);
   cache.candidates.push_back(candidate);
 }
 
-/// Descends the tree; what is passed over lies beyond the horizon.
-void descend(Gather& gather) {
-  struct Open {
+/// Traverses the tree. Skipped branches reduce the candidate radius to their distance.
+void descendTree(CandidateUpdate& update) {
+  struct OpenBranch {
     const BoxTree::Branch* branch;
     double lower;
   };
-  const BoxTree& tree = gather.query.mesh.boxes();
-  const MeshProbe& probe = gather.query.probe();
-  MeshCache& cache = gather.query.cache;
-  std::array<Open, kTreeDepthBound> stack;
+  const BoxTree& tree = update.query.mesh.boxes();
+  const QueryBounds& bounds = update.query.bounds();
+  MeshCache& cache = update.query.cache;
+  std::array<OpenBranch, kMaxTreeDepth> stack;
   std::size_t depth = 0;
-  stack[depth++] = {&tree.root, lowerBound(probe, tree.root.box)};
+  stack[depth++] = {&tree.root, computeLowerBound(bounds, tree.root.box)};
   while (depth > 0) {  // each branch once
-    const Open open = stack[--depth];
-    if (open.lower > gather.reach()) {
-      cache.horizon = std::min(cache.horizon, open.lower);
+    const OpenBranch open = stack[--depth];
+    ENFILADE_ASSERT(depth + 2 <= stack.size());
+    if (open.lower > update.maxDistance()) {
+      cache.candidateRadius = std::min(cache.candidateRadius, open.lower);
       continue;
     }
     const BoxTree::Branch& branch = *open.branch;
-    for (std::uint32_t i = branch.first; i < branch.first + branch.count; ++i) consider(gather, i);
+    for (std::uint32_t i = branch.first; i < branch.first + branch.count; ++i)
+      considerTriangle(update, i);
     if (branch.isLeaf()) continue;
     const auto& children = tree.nodes[branch.first].children;
-    const Open left{&children[0], lowerBound(probe, children[0].box)};
-    const Open right{&children[1], lowerBound(probe, children[1].box)};
+    const OpenBranch left{&children[0], computeLowerBound(bounds, children[0].box)};
+    const OpenBranch right{&children[1], computeLowerBound(bounds, children[1].box)};
     const bool leftFirst = left.lower <= right.lower;
     stack[depth++] = leftFirst ? right : left;
     stack[depth++] = leftFirst ? left : right;
   }
 }
 
-/// Drops candidates beyond the final reach, and the farthest of too many; the horizon follows.
-void trim(const Gather& gather) {
-  MeshCache& cache = gather.query.cache;
+/// Drops candidates beyond the final distance, and the farthest above kMaxCandidates. Reduces the
+/// candidate radius accordingly.
+void trimCandidates(const CandidateUpdate& update) {
+  MeshCache& cache = update.query.cache;
   auto& list = cache.candidates;
-  double reach = gather.reach();
-  if (list.size() > kMostCandidates) {
+  double maxDistance = update.maxDistance();
+  if (list.size() > kMaxCandidates) {
     std::vector<double> lower;
-    for (const Candidate& candidate : list) lower.push_back(knownDistance(cache, candidate));
-    std::nth_element(lower.begin(), lower.begin() + kMostCandidates, lower.end());
-    reach = std::max(gather.nearest.best, std::min(reach, lower[kMostCandidates]));
+    for (const Candidate& candidate : list) lower.push_back(computeKnownDistance(cache, candidate));
+    std::nth_element(lower.begin(), lower.begin() + kMaxCandidates, lower.end());
+    maxDistance = std::max(update.nearest.best, std::min(maxDistance, lower[kMaxCandidates]));
   }
   std::erase_if(list, [&](const Candidate& candidate) {
-    const double lower = knownDistance(cache, candidate);
-    if (!(lower > reach)) return false;
-    cache.horizon = std::min(cache.horizon, lower);
+    const double lower = computeKnownDistance(cache, candidate);
+    if (!(lower > maxDistance)) return false;
+    cache.candidateRadius = std::min(cache.candidateRadius, lower);
     return true;
   });
   std::sort(list.begin(), list.end(),
             [](const Candidate& a, const Candidate& b) { return a.triangle < b.triangle; });
+  ENFILADE_ASSERT(std::ranges::adjacent_find(list, {}, &Candidate::triangle) == list.end());
 }
 
-/// All margins are measured from now on.
-void resetOdometer(MeshCache& cache) {
+/// Restarts the accumulated motion at 0 and reduces all margins by the motion so far.
+void resetAccumulatedMotion(MeshCache& cache) {
   for (Candidate& candidate : cache.candidates) {
-    candidate.margin = std::max(0.0, wayLeft(cache, candidate));
-    // What was decided at this very pose stays decided; other verdicts without a margin do not.
-    if (candidate.margin == 0 && candidate.since != cache.odometer) candidate.decided = false;
-    candidate.since = 0;
+    candidate.margin = std::max(0.0, computeRemainingMargin(cache, candidate));
+    // Verdicts of exactly this pose stay valid; other verdicts without a margin do not.
+    if (candidate.margin == 0 && candidate.decidedAt != cache.accumulatedMotion)
+      candidate.isDecided = false;
+    candidate.decidedAt = 0;
   }
-  cache.odometer = 0;
-  cache.quietUntil = -1;
+  cache.accumulatedMotion = 0;
+  cache.separatedUntil = -1;
 }
 
-/// Makes a new list of candidates: all triangles not farther than the gather's reach, and some.
-void gatherCandidates(Gather& gather) {
-  MeshCache& cache = gather.query.cache;
-  ++cache.gathers;
-  gather.query.probe();  // with the axis of the old list
-  resetOdometer(cache);
-  cache.horizon = kInfinite;
-  gather.old.swap(cache.candidates);
-  if (!gather.query.mesh.triangles().empty()) descend(gather);
-  trim(gather);
+/// Replaces the candidates by all triangles within maxDistance(), and possibly some more.
+void updateCandidates(CandidateUpdate& update) {
+  MeshCache& cache = update.query.cache;
+  ++cache.broadUpdates;
+  update.query.bounds();  // needs the axis of the old list
+  resetAccumulatedMotion(cache);
+  cache.candidateRadius = kInfinity;
+  update.old.swap(cache.candidates);
+  if (!update.query.mesh.triangles().empty()) descendTree(update);
+  trimCandidates(update);
 }
 
 }  // namespace
 
-std::optional<NearestTriangle> nearestTriangle(const ConvexBody& body, const TriangleTree& mesh,
-                                               MeshCache& cache, double limit) {
+std::optional<NearestTriangle> findNearestTriangle(const PlacedConvex& body,
+                                                   const TriangleTree& mesh, MeshCache& cache,
+                                                   double limit) {
   Query query(body, mesh, cache);
   Nearest nearest{limit};
-  if (seesAsFarAs(cache, 0)) {
-    if (const auto last = indexOf(cache.candidates, cache.nearest))
-      decideIfNearer(query, cache.candidates[*last], nearest);
-    for (Candidate& candidate : cache.candidates) decideIfNearer(query, candidate, nearest);
+  if (coversDistance(cache, 0)) {
+    if (const auto last = findCandidate(cache.candidates, cache.nearest))
+      updateNearest(query, cache.candidates[*last], nearest);
+    for (Candidate& candidate : cache.candidates) updateNearest(query, candidate, nearest);
   }
-  if (!nearest.done() && !seesAsFarAs(cache, nearest.best)) {
-    Gather gather{query, nearest, true};
-    gatherCandidates(gather);
-    nearest = gather.nearest;
+  if (!nearest.isDone() && !coversDistance(cache, nearest.best)) {
+    CandidateUpdate update{query, nearest, true};
+    updateCandidates(update);
+    nearest = update.nearest;
   }
   if (nearest.found) cache.nearest = nearest.found->triangle;
   return nearest.found;
 }
 
-void findContacts(const ConvexBody& body, const TriangleTree& mesh, MeshCache& cache,
-                  MeshContacts& contacts) {
+void findMeshContacts(const PlacedConvex& body, const TriangleTree& mesh, MeshCache& cache,
+                      MeshContacts& contacts) {
   contacts.penetrated.clear();
   contacts.touched.clear();
   Query query(body, mesh, cache);
-  if (cache.odometer < cache.quietUntil) return;
-  if (!seesAsFarAs(cache, 0)) {
-    Gather gather{query, {0}, false};
-    gatherCandidates(gather);
+  if (cache.accumulatedMotion < cache.separatedUntil) return;
+  if (!coversDistance(cache, 0)) {
+    CandidateUpdate update{query, {0}, false};
+    updateCandidates(update);
   }
-  double quiet = cache.horizon;
+  double separatedMotion = cache.candidateRadius;
   for (Candidate& candidate : cache.candidates) {
-    decideVerdict(query, candidate);
+    updateVerdict(query, candidate);
     if (candidate.verdict == Verdict::penetrating)
       contacts.penetrated.push_back(candidate.triangle);
     if (candidate.verdict == Verdict::touching) contacts.touched.push_back(candidate.triangle);
-    quiet = std::min(quiet, candidate.since + candidate.margin);
+    separatedMotion = std::min(separatedMotion, candidate.decidedAt + candidate.margin);
   }
-  cache.quietUntil = contacts.verdict() == Verdict::separated ? quiet * (1 - 16 * kUnit) : -1;
+  cache.separatedUntil =
+      contacts.verdict() == Verdict::separated ? separatedMotion * (1 - 16 * kRoundoff) : -1;
 }
 
-bool isAnythingNearer(const ConvexBody& body, const TriangleTree& mesh, double limit,
-                      MeshCache& cache) {
+bool isAnyTriangleWithin(const PlacedConvex& body, const TriangleTree& mesh, double limit,
+                         MeshCache& cache) {
   Query query(body, mesh, cache);
   if (!(limit > 0)) return false;
-  if (!seesAsFarAs(cache, limit)) {
-    Gather gather{query, {limit}, false};
-    gatherCandidates(gather);
+  if (!coversDistance(cache, limit)) {
+    CandidateUpdate update{query, {limit}, false};
+    updateCandidates(update);
   }
   for (Candidate& candidate : cache.candidates) {
-    if (holds(cache, candidate) && candidate.verdict != Verdict::separated) return true;
-    if (knownDistance(cache, candidate) >= limit || provedFarther(query, candidate, limit))
+    if (isVerdictValid(cache, candidate) && candidate.verdict != Verdict::separated) return true;
+    if (computeKnownDistance(cache, candidate) >= limit || proveFarther(query, candidate, limit))
       continue;
-    const auto decision = decideCandidate(query, candidate, limit + query.lookahead);
-    if (!decision || decision->distance - decision->errorBound >= limit) continue;
-    if (decision->distance + decision->errorBound < limit) return true;
-    const ConvexBody triangle{std::span<const Vec3>(query.triangle(candidate))};
-    if (isNearerThan(body, triangle, limit, candidate.features)) return true;
+    const auto separation = separateCandidate(query, candidate, limit + query.lookahead);
+    if (!separation || separation->distance - separation->errorBound >= limit) continue;
+    if (separation->distance + separation->errorBound < limit) return true;
+    const PlacedConvex triangle{std::span<const Vec3>(query.triangle(candidate))};
+    if (isCloserThan(body, triangle, limit, candidate.features)) return true;
   }
   return false;
 }

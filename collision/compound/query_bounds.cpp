@@ -1,7 +1,7 @@
-// Rounding. The body's vertices are turned and moved by t - origin, those of triangles by -origin.
-// All is smaller than L = extent + |t - origin| + 2r; a vertex is off by less than 8u L, and a gap
-// of boxes, of balls, or along a unit axis by less than 16u L: kPad L = 64u L is subtracted from
-// each bound. That weakens the search by a hair; its answers are decide()'s.
+// Rounding. Body vertices are rotated and translated by t - origin, triangle vertices by -origin.
+// All values are below L = extent + |t - origin| + 2r. The error of a vertex is less than 8u L, the
+// error of a gap between boxes, between spheres or along a unit axis is less than 16u L. Each bound
+// is reduced by kRoundingPad L = 64u L. Results stay exact: computeSeparation() decides them.
 #include "collision/compound/query_bounds.hpp"
 
 #include <algorithm>
@@ -10,66 +10,67 @@
 namespace enfilade::collision {
 namespace {
 
-constexpr double kPad = 64 * 0x1p-53;  // see the file's head
+constexpr double kRoundingPad = 64 * 0x1p-53;  // see the head of this file
 
-double boxesApart(const MeshProbe& probe, const Vec3& min, const Vec3& max) {
-  const Vec3 gap = (min - probe.box.max).cwiseMax(probe.box.min - max).cwiseMax(0.0);
-  const Vec3 out = (min - probe.centre).cwiseMax(probe.centre - max).cwiseMax(0.0);
-  return std::max(std::sqrt(gap.squaredNorm()), std::sqrt(out.squaredNorm()) - probe.radius);
+double computeAabbDistance(const QueryBounds& bounds, const Vec3& min, const Vec3& max) {
+  const Vec3 gap = (min - bounds.box.max).cwiseMax(bounds.box.min - max).cwiseMax(0.0);
+  const Vec3 out = (min - bounds.centre).cwiseMax(bounds.centre - max).cwiseMax(0.0);
+  return std::max(std::sqrt(gap.squaredNorm()), std::sqrt(out.squaredNorm()) - bounds.radius);
 }
 
-double leastAlong(const Vec3& axis, const Triangle& t) {
+double minProjection(const Vec3& axis, const Triangle& t) {
   return std::min({axis.dot(t[0]), axis.dot(t[1]), axis.dot(t[2])});
 }
 
-double mostAlong(const Vec3& axis, const Eigen::ArrayX3d& vertices) {
+double maxProjection(const Vec3& axis, const Eigen::ArrayX3d& vertices) {
   return (axis.x() * vertices.col(0) + axis.y() * vertices.col(1) + axis.z() * vertices.col(2))
       .maxCoeff();
 }
 
 }  // namespace
 
-void placeProbe(const ConvexBody& body, double bodyRadius, const BoxTree& tree, const Vec3& axis,
-                MeshProbe& probe) {
+void computeQueryBounds(const PlacedConvex& body, double bodyRadius, const BoxTree& tree,
+                        const Vec3& axis, QueryBounds& bounds) {
   const Vec3 shift = body.translation - tree.origin;
   const auto count = static_cast<Eigen::Index>(body.vertices.size());
-  probe.vertices.resize(count, 3);
-  probe.box = {};
+  bounds.vertices.resize(count, 3);
+  bounds.box = {};
   for (Eigen::Index i = 0; i < count; ++i) {
     const Vec3& v = body.vertices[static_cast<std::size_t>(i)];
     const Vec3 placed = (body.rotation ? Vec3(*body.rotation * v) : v) + shift;
-    probe.box.include(placed);
-    probe.vertices.row(i) = placed.transpose().array();
+    bounds.box.include(placed);
+    bounds.vertices.row(i) = placed.transpose().array();
   }
-  probe.centre = probe.box.centre();
+  bounds.centre = bounds.box.centre();
   double squared = 0;
   for (Eigen::Index i = 0; i < count; ++i)
     squared = std::max(
-        squared, (probe.vertices.row(i) - probe.centre.transpose().array()).matrix().squaredNorm());
-  probe.radius = std::sqrt(squared);
+        squared,
+        (bounds.vertices.row(i) - bounds.centre.transpose().array()).matrix().squaredNorm());
+  bounds.radius = std::sqrt(squared);
   const double length = axis.norm();
-  probe.axis = length > 0 && std::isfinite(length) ? Vec3(axis / length) : Vec3(Vec3::Zero());
-  probe.support = mostAlong(probe.axis, probe.vertices);
-  probe.pad = kPad * (tree.extent + shift.cwiseAbs().sum() + 2 * bodyRadius);
+  bounds.axis = length > 0 && std::isfinite(length) ? Vec3(axis / length) : Vec3(Vec3::Zero());
+  bounds.support = maxProjection(bounds.axis, bounds.vertices);
+  bounds.pad = kRoundingPad * (tree.extent + shift.cwiseAbs().sum() + 2 * bodyRadius);
 }
 
-double lowerBound(const MeshProbe& probe, const NarrowBox& box) {
+double computeLowerBound(const QueryBounds& bounds, const FloatAabb& box) {
   const Vec3 min(box.min[0], box.min[1], box.min[2]), max(box.max[0], box.max[1], box.max[2]);
-  double along = -probe.support;
-  for (int i = 0; i < 3; ++i) along += probe.axis[i] * (probe.axis[i] > 0 ? min[i] : max[i]);
-  return std::max(boxesApart(probe, min, max), along) - probe.pad;
+  double axisGap = -bounds.support;
+  for (int i = 0; i < 3; ++i) axisGap += bounds.axis[i] * (bounds.axis[i] > 0 ? min[i] : max[i]);
+  return std::max(computeAabbDistance(bounds, min, max), axisGap) - bounds.pad;
 }
 
-double lowerBound(const MeshProbe& probe, const Triangle& inTree) {
-  const Box box = boxOf(inTree);
-  const double along = leastAlong(probe.axis, inTree) - probe.support;
-  return std::max(boxesApart(probe, box.min, box.max), along) - probe.pad;
+double computeLowerBound(const QueryBounds& bounds, const Triangle& inTree) {
+  const Aabb box = computeAabb(inTree);
+  const double axisGap = minProjection(bounds.axis, inTree) - bounds.support;
+  return std::max(computeAabbDistance(bounds, box.min, box.max), axisGap) - bounds.pad;
 }
 
-double lowerBoundAlong(const MeshProbe& probe, const Vec3& axis, const Triangle& inTree) {
-  const double gap = leastAlong(axis, inTree) - mostAlong(axis, probe.vertices);
+double computeLowerBoundAlong(const QueryBounds& bounds, const Vec3& axis, const Triangle& inTree) {
+  const double gap = minProjection(axis, inTree) - maxProjection(axis, bounds.vertices);
   const double length = axis.norm();
-  return length > 0 && std::isfinite(gap) ? gap / length - probe.pad : -1;
+  return length > 0 && std::isfinite(gap) ? gap / length - bounds.pad : -1;
 }
 
 }  // namespace enfilade::collision

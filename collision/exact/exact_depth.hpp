@@ -5,16 +5,16 @@
 
 namespace enfilade::collision {
 
-/// The nearest facet of M = B - A, seen from the origin inside it: the plane normal . w = offset.
+/// The facet of M = B - A nearest to the origin, which is inside M: the plane normal . w = offset.
 struct ExactFacet {
   ExactPoint normal;  ///< outward; not zero
   Integer offset;     ///< > 0; the depth is offset / |normal|, times 2^scale metres
   int scale = 0;
 };
 
-/// For bodies that penetrate, exactly. `atMost`: a proved upper bound of the depth in metres (any
-/// value, infinity too; a close one saves most of the work). Milliseconds for hulls of a hundred
-/// vertices.
-ExactFacet nearestFacetExactly(const ConvexBody& a, const ConvexBody& b, double atMost);
+/// Finds the nearest facet of two penetrating bodies. `depthBound`: a certified upper bound of the
+/// depth in metres; infinity is allowed, a tight bound saves most of the work. Costs milliseconds
+/// for hulls of a hundred vertices.
+ExactFacet findNearestFacetExactly(const PlacedConvex& a, const PlacedConvex& b, double depthBound);
 
 }  // namespace enfilade::collision

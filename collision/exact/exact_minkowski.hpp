@@ -1,5 +1,5 @@
-// The Minkowski difference B - A of two convex bodies in exact integers: slow, and right for every
-// input. Internal to the narrow phase.
+// The Minkowski difference B - A of two convex bodies in exact integers: slow, but correct for
+// every input. Internal to the narrow phase.
 #pragma once
 
 #include <gmpxx.h>
@@ -24,73 +24,78 @@ Integer dot(const ExactPoint& a, const ExactPoint& b);
 ExactPoint cross(const ExactPoint& a, const ExactPoint& b);
 bool isZero(const ExactPoint& a);
 
-/// Both bodies' vertices in the world's frame, in integer multiples of 2^scale metres; made when
-/// first asked for.
-class ExactDifference {
+/// The Minkowski difference B - A in integer multiples of 2^scale metres, world axes. Vertices are
+/// computed on first use.
+class ExactMinkowskiDifference {
  public:
-  ExactDifference(const ConvexBody& a, const ConvexBody& b);
+  ExactMinkowskiDifference(const PlacedConvex& a, const PlacedConvex& b);
 
   const ExactPoint& pointA(std::uint32_t i) { return a_.vertex(i, scale_); }
   const ExactPoint& pointB(std::uint32_t i) { return b_.vertex(i, scale_); }
   ExactPoint operator()(VertexPair pair) { return pointB(pair.b) - pointA(pair.a); }
-  /// The pair least along `direction` (not zero), exactly; `hint` as in minkowski.hpp.
-  VertexPair leastAlong(const ExactPoint& direction, VertexPair& hint);
+  /// Finds the exact support pair of B - A against `direction` (not zero); `hint` as in
+  /// minkowski.hpp.
+  VertexPair findSupport(const ExactPoint& direction, VertexPair& hint);
   int scale() const { return scale_; }
 
  private:
-  struct Body {
-    const ConvexBody* placed;
-    PlacedBody bounds;
+  struct ExactConvex {
+    const PlacedConvex* shape;
+    BoundedConvex bounds;
     int rotationScale = 0, vertexScale = 0, translationScale = 0;
-    std::vector<Integer> rotation;  ///< nine, row by row; empty: none
+    std::vector<Integer> rotation;  ///< nine, row by row; empty: identity
     std::vector<std::optional<ExactPoint>> vertices;
 
-    explicit Body(const ConvexBody& body);
+    explicit ExactConvex(const PlacedConvex& placedConvex);
     int scale() const;
     const ExactPoint& vertex(std::uint32_t i, int scale);
   };
-  Body a_, b_;
+  ExactConvex a_, b_;
   int scale_;
 };
 
-/// A face of a simplex and the point of it nearest the origin: the sum of weight * point / total.
+/// A face of a simplex and its point nearest the origin, the sum of weight * point / total.
 struct ExactFace {
   std::vector<int> corners;
   std::vector<Integer> weights;  ///< all > 0
   Integer total;                 ///< the sum of the weights
-  ExactPoint direction;  ///< along the nearest point, some positive length; zero: it is the origin
+  ExactPoint direction;  ///< along the nearest point, any length; zero: the point is the origin
 };
 
-/// The face of the hull of one to four points that holds the hull's point nearest the origin.
-ExactFace nearestFace(const std::vector<ExactPoint>& points);
+/// Finds the face of the hull of one to four points that contains its point nearest the origin.
+ExactFace findNearestFace(const std::vector<ExactPoint>& points);
 
 /// The features of B - A nearest the origin.
-struct ExactNearest {
+struct ExactNearestFeature {
   std::vector<VertexPair> pairs;
-  ExactFace face;  ///< all of `pairs` are its corners
+  ExactFace face;  ///< its corners are all of `pairs`
 };
 
-/// GJK in integers: the nearest point falls strictly, and there are finitely many faces, so it
-/// ends. `cache` is where to start, and holds the features afterwards.
-ExactNearest nearestExactly(ExactDifference& difference, const FeatureCache& cache);
+/// GJK in integers. It terminates because the nearest point gets strictly nearer and there are
+/// finitely many faces. `cache` is the warm start.
+ExactNearestFeature findNearestExactly(ExactMinkowskiDifference& difference,
+                                       const FeatureCache& cache);
 
-/// For features that hold the origin: a direction along which no point of B - A is negative, if
-/// there is one (the bodies touch); none when the origin is inside (they penetrate).
-std::optional<ExactPoint> partingDirection(ExactDifference& difference,
-                                           const ExactNearest& nearest);
+/// For features that contain the origin: finds a direction on which no point of B - A has a
+/// negative projection (the bodies touch). nullopt if the origin is inside B - A (they penetrate).
+std::optional<ExactPoint> findSeparatingDirection(ExactMinkowskiDifference& difference,
+                                                  const ExactNearestFeature& nearest);
 
-/// The nearest point itself, times face.total.
-ExactPoint weightedSum(ExactDifference& difference, const ExactNearest& nearest);
+/// The nearest point, times face.total.
+ExactPoint computeWeightedSum(ExactMinkowskiDifference& difference,
+                              const ExactNearestFeature& nearest);
 
 /// `value` times 2^scale, rounded to the nearest double.
 double toDouble(const mpf_class& value, int scale);
-/// The same, and what that leaves, rounded: an unevaluated sum.
-void roundInTwo(const mpf_class& value, int scale, double& head, double& tail);
-/// The sum of weight * point / total over one body, in metres: near to 2^-190, relative.
-std::array<mpf_class, 3> weightedPoint(ExactDifference& difference, const ExactNearest& nearest,
-                                       bool ofA);
-mpf_class precise(const Integer& value);
-/// Unit, rounded.
-Vec3 unitVector(const ExactPoint& direction);
+/// The same as an unevaluated sum: `head` rounded, and `tail` the rounded remainder.
+void splitToDoubles(const mpf_class& value, int scale, double& head, double& tail);
+/// The sum of weight * point / total over one body, in units of 2^scale metres; relative error
+/// about 2^-190.
+std::array<mpf_class, 3> computeWeightedPoint(ExactMinkowskiDifference& difference,
+                                              const ExactNearestFeature& nearest, bool ofA);
+/// `value` as a float of 256 bits.
+mpf_class toPreciseFloat(const Integer& value);
+/// The unit vector along `direction`, rounded.
+Vec3 toUnitVector(const ExactPoint& direction);
 
 }  // namespace enfilade::collision

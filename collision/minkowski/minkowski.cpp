@@ -6,88 +6,95 @@
 namespace enfilade::collision {
 namespace {
 
-void requireFinite(const ConvexBody& body, const char* name) {
+void requireFinite(const PlacedConvex& convex, const char* name) {
   const auto refuse = [&](const char* what) {
     throw std::invalid_argument(std::string("body ") + name + ": " + what + " is not finite");
   };
-  if (!body.translation.allFinite()) refuse("the translation");
-  if (body.rotation && !body.rotation->allFinite()) refuse("the rotation");
-  for (const Vec3& p : body.vertices)
+  if (!convex.translation.allFinite()) refuse("the translation");
+  if (convex.rotation && !convex.rotation->allFinite()) refuse("the rotation");
+  for (const Vec3& p : convex.vertices)
     if (!p.allFinite()) refuse("a vertex");
 }
 
-/// The vertex that is farthest along a direction of the body's own frame.
-std::uint32_t farthest(const PlacedBody& placed, const WideVec& direction, const Vec3& rounded,
-                       double length, const Summit& summit) {
-  std::uint32_t vertex = summit.vertex;
-  Wide most = -std::numeric_limits<Wide>::infinity();
-  forEachFarthest(placed, rounded, supportSlack(placed, length), summit, [&](std::uint32_t i) {
-    const Vec3& p = placed.body->vertices[i];
-    const Wide along = direction.x() * p.x() + direction.y() * p.y() + direction.z() * p.z();
-    if (!(along > most)) return;
-    vertex = i, most = along;
-  });
+/// Finds the exact support vertex along a direction in the body's frame.
+std::uint32_t findFarthestVertex(const BoundedConvex& convex, const LongVec3& direction,
+                                 const Vec3& rounded, double length, const SupportVertex& support) {
+  std::uint32_t vertex = support.vertex;
+  LongReal maxProjection = -std::numeric_limits<LongReal>::infinity();
+  forEachSupportCandidate(
+      convex, rounded, computeSupportSlack(convex, length), support, [&](std::uint32_t i) {
+        const Vec3& p = convex.shape->vertices[i];
+        const LongReal projection =
+            direction.x() * p.x() + direction.y() * p.y() + direction.z() * p.z();
+        if (!(projection > maxProjection)) return;
+        vertex = i, maxProjection = projection;
+      });
   return vertex;
 }
 
-/// Into the range of doubles, where products neither over- nor underflow.
-bool needsScaling(Wide length) {
+/// Whether a direction of this length must be scaled, so that products neither over- nor underflow.
+bool needsScaling(LongReal length) {
   return !(length > 1e-150L && length < 1e150L);
 }
 
 }  // namespace
 
-double greatestRadius(const ConvexBody& body) {
-  if (body.vertices.empty()) throw std::invalid_argument("a body has no vertices");
-  double greatest = 0, zero = 0;
-  for (const Vec3& p : body.vertices) {
-    greatest = std::max(greatest, p.cwiseAbs().maxCoeff());
-    zero += 0 * p.x() + 0 * p.y() + 0 * p.z();  // none, if a coordinate is none
+double computeRadiusBound(const PlacedConvex& convex) {
+  if (convex.vertices.empty()) throw std::invalid_argument("a body has no vertices");
+  double maxCoordinate = 0, zero = 0;
+  for (const Vec3& p : convex.vertices) {
+    maxCoordinate = std::max(maxCoordinate, p.cwiseAbs().maxCoeff());
+    zero += 0 * p.x() + 0 * p.y() + 0 * p.z();  // NaN if a coordinate is not finite
   }
-  return greatest * 1.7320508075688774 + zero;  // sqrt(3); a norm might overflow
+  return maxCoordinate * 1.7320508075688774 + zero;  // sqrt(3); a norm might overflow
 }
 
-void requireFinite(const ConvexBody& a, const ConvexBody& b) {
-  requireFinite(a, "A");  // coordinates beyond 1e308 alone are no fault
+void requireFinite(const PlacedConvex& a, const PlacedConvex& b) {
+  requireFinite(a, "A");  // finite coordinates beyond 1e308 are accepted
   requireFinite(b, "B");
 }
 
-void climb(const MinkowskiDifference& difference, const Vec3& direction, double length,
-           VertexPair hint, double enough, Summits& summits) {
-  const PlacedBody &a = difference.a, &b = difference.b;
-  summits.a = climb(a, a.bodyFromWorld<double>(direction), supportSlack(a, length), hint.a, enough);
-  summits.b =
-      climb(b, b.bodyFromWorld<double>(-direction), supportSlack(b, length), hint.b, enough);
+void hillClimbPair(const MinkowskiDifference& difference, const Vec3& direction, double length,
+                   VertexPair hint, double enough, SupportPair& supports) {
+  const BoundedConvex &a = difference.a, &b = difference.b;
+  supports.a = hillClimb(a, a.bodyFromWorld<double>(direction), computeSupportSlack(a, length),
+                         hint.a, enough);
+  supports.b = hillClimb(b, b.bodyFromWorld<double>(-direction), computeSupportSlack(b, length),
+                         hint.b, enough);
 }
 
-Least TurnedDirection::least(const Summits& summits) const {
-  Least least{summits.pair()};
-  if (!summits.a.alone)
-    least.pair.a =
-        farthest(difference.a, inA, difference.a.bodyFromWorld<double>(rounded), length, summits.a);
-  if (!summits.b.alone)
-    least.pair.b = farthest(difference.b, -inB, difference.b.bodyFromWorld<double>(-rounded),
-                            length, summits.b);
-  least.along = along(least.pair);
-  least.bound = least.along - error();
-  return least;
+CertifiedSupport RotatedDirection::certify(const SupportPair& supports) const {
+  CertifiedSupport result{supports.pair()};
+  if (!supports.a.unique)
+    result.pair.a = findFarthestVertex(
+        difference.a, inA, difference.a.bodyFromWorld<double>(rounded), length, supports.a);
+  if (!supports.b.unique)
+    result.pair.b = findFarthestVertex(
+        difference.b, -inB, difference.b.bodyFromWorld<double>(-rounded), length, supports.b);
+  result.projection = project(result.pair);
+  result.lowerBound = result.projection - errorBound();
+  return result;
 }
 
-Least leastAlong(const MinkowskiDifference& difference, const WideVec& direction, Wide length,
-                 VertexPair& hint) {
+CertifiedSupport findCertifiedSupport(const MinkowskiDifference& difference,
+                                      const LongVec3& direction, LongReal length,
+                                      VertexPair& hint) {
   if (needsScaling(length)) {
-    const Wide scale = 1 / length;
-    Least least = leastAlong(difference, WideVec(direction * scale), Wide{1}, hint);
-    least.along *= length;
-    least.bound = (least.bound - std::abs(least.bound) * 8 * kWideUnit) * length;
-    return least;
+    const LongReal scale = 1 / length;
+    CertifiedSupport support =
+        findCertifiedSupport(difference, LongVec3(direction * scale), LongReal{1}, hint);
+    support.projection *= length;
+    support.lowerBound =
+        (support.lowerBound - std::abs(support.lowerBound) * 8 * kLongRoundoff) * length;
+    return support;
   }
   const Vec3 rounded = direction.cast<double>();
-  const double longer = static_cast<double>(length) * (1 + 8 * kUnit);
-  const TurnedDirection turned(difference, direction, rounded, longer);
-  const Least least = turned.least(climb(difference, rounded, longer, hint));
-  hint = least.pair;
-  return least;
+  const double lengthBound = static_cast<double>(length) * (1 + 8 * kRoundoff);
+  const RotatedDirection rotatedDirection(difference, direction, rounded, lengthBound);
+  const CertifiedSupport support =
+      rotatedDirection.certify(hillClimbPair(difference, rounded, lengthBound, hint));
+  hint = support.pair;
+  return support;
 }
 
 }  // namespace enfilade::collision

@@ -1,17 +1,19 @@
 #include "collision/minkowski/polytope.hpp"
 
+#include "collision/assert.hpp"
+
 namespace enfilade::collision {
 namespace {
 
 template <class Real>
 std::uint16_t addSupport(const Eigen::Matrix<Real, 3, 1>& outward, Polytope<Real>& polytope) {
   VertexPair hint{};
-  const WideVec inward = -outward.template cast<Wide>();
-  leastAlong(polytope.difference, inward, inward.norm(), hint);
+  const LongVec3 inward = -outward.template cast<LongReal>();
+  findCertifiedSupport(polytope.difference, inward, inward.norm(), hint);
   return polytope.addCorner(hint);
 }
 
-/// Two tips and a ring between them, counter-clockwise seen from the upper one.
+/// Two apexes and a ring between them, counter-clockwise seen from the upper apex.
 template <class Real>
 bool addBipyramid(std::span<const std::uint16_t> ring, std::uint16_t upper, std::uint16_t lower,
                   Polytope<Real>& polytope) {
@@ -23,38 +25,38 @@ bool addBipyramid(std::span<const std::uint16_t> ring, std::uint16_t upper, std:
   return true;
 }
 
-constexpr int kMostSearchSteps = 64;  // a dozen are usual; reaching it: not proved
+constexpr int kMaxSearchSteps = 64;  // a dozen are typical; at the limit: not certified
 
-/// Outward, by the corner that is not on them.
+/// Orients each facet outward, using the corner that is not on it.
 template <class Real>
-bool addTetrahedron(std::array<std::uint16_t, 4> c, bool anyTurn, Polytope<Real>& polytope) {
+bool addTetrahedron(std::array<std::uint16_t, 4> c, bool allowInward, Polytope<Real>& polytope) {
   const auto& p = polytope.points;
-  const Real turn = (p[c[1]] - p[c[0]]).dot((p[c[2]] - p[c[0]]).cross(p[c[3]] - p[c[0]]));
-  if (turn < 0) std::swap(c[1], c[2]);
-  return polytope.addFacet({c[0], c[2], c[1]}, anyTurn) &&
-         polytope.addFacet({c[0], c[1], c[3]}, anyTurn) &&
-         polytope.addFacet({c[0], c[3], c[2]}, anyTurn) &&
-         polytope.addFacet({c[1], c[2], c[3]}, anyTurn);
+  const Real determinant = (p[c[1]] - p[c[0]]).dot((p[c[2]] - p[c[0]]).cross(p[c[3]] - p[c[0]]));
+  if (determinant < 0) std::swap(c[1], c[2]);
+  return polytope.addFacet({c[0], c[2], c[1]}, allowInward) &&
+         polytope.addFacet({c[0], c[1], c[3]}, allowInward) &&
+         polytope.addFacet({c[0], c[3], c[2]}, allowInward) &&
+         polytope.addFacet({c[1], c[2], c[3]}, allowInward);
 }
 
-/// Four points of M that are not in one plane; false when none were found.
+/// Adds four points of M that are not coplanar; false if none were found.
 template <class Real>
 bool findTetrahedron(Polytope<Real>& polytope) {
   using Vec = Eigen::Matrix<Real, 3, 1>;
   const auto& p = polytope.points;
-  const Vec oblique(1, 2, 3);  // along no edge or face that models often have
+  const Vec oblique(1, 2, 3);  // not parallel to an edge or face that is frequent in models
   const std::uint16_t a = addSupport<Real>(oblique, polytope);
   const std::uint16_t b = addSupport<Real>(-oblique, polytope);
-  const Vec along = p[b] - p[a];
-  if (!(along.squaredNorm() > 0)) return false;
-  const Vec side = along.unitOrthogonal(), other = along.cross(side);
-  for (const Vec& way : {side, Vec(-side), other, Vec(-other)}) {
-    const std::uint16_t c = addSupport<Real>(way, polytope);
-    const Vec normal = along.cross(p[c] - p[a]);
+  const Vec axis = p[b] - p[a];
+  if (!(axis.squaredNorm() > 0)) return false;
+  const Vec side = axis.unitOrthogonal(), other = axis.cross(side);
+  for (const Vec& direction : {side, Vec(-side), other, Vec(-other)}) {
+    const std::uint16_t c = addSupport<Real>(direction, polytope);
+    const Vec normal = axis.cross(p[c] - p[a]);
     if (!(normal.squaredNorm() > 0)) continue;
-    for (const Vec& over : {normal, Vec(-normal)}) {
-      const std::uint16_t d = addSupport<Real>(over, polytope);
-      if (over.dot(p[d] - p[a]) > 0) return addTetrahedron<Real>({a, b, c, d}, true, polytope);
+    for (const Vec& outward : {normal, Vec(-normal)}) {
+      const std::uint16_t d = addSupport<Real>(outward, polytope);
+      if (outward.dot(p[d] - p[a]) > 0) return addTetrahedron<Real>({a, b, c, d}, true, polytope);
     }
   }
   return false;
@@ -65,17 +67,18 @@ struct Edge {
   bool operator==(const Edge&) const = default;
 };
 
-/// The rim of a hole, each edge as the facet that went had it.
-struct Rim {
-  std::array<Edge, 6 * kMostCorners> edges;  // all edges of all facets
+/// The horizon: the boundary of the removed facets, each edge directed as in its removed facet.
+struct Horizon {
+  std::array<Edge, 6 * kMaxCorners> edges;  // at most all edges of all facets
   std::size_t count = 0;
 
   void toggle(std::uint16_t from, std::uint16_t to) {
     const auto end = edges.begin() + count;
-    const auto twin = std::find(edges.begin(), end, Edge{to, from});
-    if (twin != end) {
-      *twin = edges[--count];
+    const auto opposite = std::find(edges.begin(), end, Edge{to, from});
+    if (opposite != end) {
+      *opposite = edges[--count];
     } else {
+      ENFILADE_ASSERT(count < edges.size());
       edges[count++] = {from, to};
     }
   }
@@ -84,7 +87,7 @@ struct Rim {
 }  // namespace
 
 template <class Real>
-bool surround(std::span<const VertexPair> simplex, Polytope<Real>& polytope) {
+bool encloseOrigin(std::span<const VertexPair> simplex, Polytope<Real>& polytope) {
   using Vec = Eigen::Matrix<Real, 3, 1>;
   for (const VertexPair& pair : simplex) polytope.addCorner(pair);
   const auto& p = polytope.points;
@@ -96,9 +99,9 @@ bool surround(std::span<const VertexPair> simplex, Polytope<Real>& polytope) {
     return addBipyramid<Real>(ring, upper, addSupport<Real>(-normal, polytope), polytope);
   }
   if (simplex.size() == 2) {
-    const Vec along = p[1] - p[0];
-    const Vec side = along.unitOrthogonal() * along.norm();
-    const Vec other = along.cross(side) / along.norm() * Real(0.8660254037844386);
+    const Vec axis = p[1] - p[0];
+    const Vec side = axis.unitOrthogonal() * axis.norm();
+    const Vec other = axis.cross(side) / axis.norm() * Real(0.8660254037844386);
     std::array<std::uint16_t, 3> ring{};
     ring[0] = addSupport<Real>(side, polytope);
     ring[1] = addSupport<Real>(other - side / 2, polytope);
@@ -109,30 +112,30 @@ bool surround(std::span<const VertexPair> simplex, Polytope<Real>& polytope) {
 }
 
 template <class Real>
-bool expand(VertexPair pair, Polytope<Real>& polytope) {
-  if (polytope.corners == kMostCorners) return false;
+bool expandPolytope(VertexPair pair, Polytope<Real>& polytope) {
+  if (polytope.corners == kMaxCorners) return false;
   const std::uint16_t added = polytope.addCorner(pair);
-  Rim rim;
+  Horizon horizon;
   std::size_t kept = 0;
   for (const Facet<Real>& facet : polytope.all()) {
     const auto& corner = polytope.points[facet.corners[0]];
     if (dot(facet.normal, minus(polytope.points[added], corner)) > 0) {
-      for (int k = 0; k < 3; ++k) rim.toggle(facet.corners[k], facet.corners[(k + 1) % 3]);
+      for (int k = 0; k < 3; ++k) horizon.toggle(facet.corners[k], facet.corners[(k + 1) % 3]);
     } else if (Facet<Real>& to = polytope.facets[kept++]; &to != &facet) {
       to = facet;
     }
   }
   polytope.facetCount = kept;
-  if (rim.count == 0) return false;
-  for (std::size_t k = 0; k < rim.count; ++k)
-    if (!polytope.addFacet({rim.edges[k].from, rim.edges[k].to, added}, true)) return false;
+  if (horizon.count == 0) return false;
+  for (std::size_t k = 0; k < horizon.count; ++k)
+    if (!polytope.addFacet({horizon.edges[k].from, horizon.edges[k].to, added}, true)) return false;
   return true;
 }
 
 template <class Real>
-bool surroundBySearch(Polytope<Real>& polytope) {
+bool encloseOriginBySearch(Polytope<Real>& polytope) {
   if (!findTetrahedron(polytope)) return false;
-  for (int step = 0; step < kMostSearchSteps; ++step) {
+  for (int step = 0; step < kMaxSearchSteps; ++step) {
     const auto signedNearness = [](const Facet<Real>& facet) {
       return facet.offset < 0 ? -facet.nearness : facet.nearness;
     };
@@ -144,18 +147,18 @@ bool surroundBySearch(Polytope<Real>& polytope) {
                          [&](const auto& facet) { return polytope.facesAway(facet); });
     }
     VertexPair hint = polytope.pairs[worst.corners[0]];
-    const WideVec inward = -worst.normal.template cast<Wide>();
-    leastAlong(polytope.difference, inward, inward.norm(), hint);
-    if (polytope.holds(hint) || !expand(hint, polytope)) return false;
+    const LongVec3 inward = -worst.normal.template cast<LongReal>();
+    findCertifiedSupport(polytope.difference, inward, inward.norm(), hint);
+    if (polytope.contains(hint) || !expandPolytope(hint, polytope)) return false;
   }
   return false;
 }
 
-template bool surround(std::span<const VertexPair>, Polytope<double>&);
-template bool surround(std::span<const VertexPair>, Polytope<Wide>&);
-template bool surroundBySearch(Polytope<double>&);
-template bool surroundBySearch(Polytope<Wide>&);
-template bool expand(VertexPair, Polytope<double>&);
-template bool expand(VertexPair, Polytope<Wide>&);
+template bool encloseOrigin(std::span<const VertexPair>, Polytope<double>&);
+template bool encloseOrigin(std::span<const VertexPair>, Polytope<LongReal>&);
+template bool encloseOriginBySearch(Polytope<double>&);
+template bool encloseOriginBySearch(Polytope<LongReal>&);
+template bool expandPolytope(VertexPair, Polytope<double>&);
+template bool expandPolytope(VertexPair, Polytope<LongReal>&);
 
 }  // namespace enfilade::collision

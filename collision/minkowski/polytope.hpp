@@ -1,14 +1,15 @@
-// A polytope of points of a Minkowski difference around the origin. Internal to the narrow phase.
-// Real is double or Wide.
+// The expanding polytope of EPA: points of a Minkowski difference that enclose the origin. Internal
+// to the narrow phase. Real is double or LongReal.
 #pragma once
 
 #include <span>
 
+#include "collision/assert.hpp"
 #include "collision/minkowski/minkowski.hpp"
 
 namespace enfilade::collision {
 
-inline constexpr std::size_t kMostCorners = 256;  // of a polytope; 10 to 30 are usual
+inline constexpr std::size_t kMaxCorners = 256;  // of a polytope; 10 to 30 are typical
 
 using Corners = std::array<std::uint16_t, 3>;  ///< counter-clockwise seen from outside
 
@@ -16,7 +17,7 @@ template <class Real>
 struct Facet {
   Corners corners;
   Eigen::Matrix<Real, 3, 1> normal;  ///< outward, any length
-  Real offset;                       ///< the least normal . corner
+  Real offset;                       ///< minimum of normal . corner
   Real nearness;                     ///< (offset / |normal|)^2, squared metres
 };
 
@@ -31,84 +32,92 @@ void setFacet(const Corners& corners, const Eigen::Matrix<Real, 3, 1>& a,
   facet.nearness = facet.offset * facet.offset / dot(normal, normal);
 }
 
-/// How much nearer than sqrt(nearness) a facet may be, in metres. Whatever its normal n was rounded
-/// to: each of its points is a combination of its corners, so n . point is at least the least
-/// n . corner; a corner is off by 8u reach a coordinate and the product by 3u |n| reach more.
+/// Error bound (metres) of a facet's distance sqrt(nearness), for any rounding of its normal n.
+/// Each point of the facet is a convex combination of its corners, so n . point is at least the
+/// minimum of n . corner. A corner is off by 8u reach per coordinate, the product by 3u |n| reach.
 template <class Real>
-Real facetError(double reach) {
-  return 24 * unitOf<Real>() * static_cast<Real>(reach);
+Real computeFacetError(double reach) {
+  return 24 * unitRoundoff<Real>() * static_cast<Real>(reach);
 }
 
-/// Facets that form a closed surface. Where each of them faces away from the origin, the surface
-/// winds around it, and the origin is strictly inside.
+/// Facets that form a closed surface. If every facet faces away from the origin, the surface winds
+/// around the origin, which is then strictly inside.
 template <class Real>
 struct Polytope {
   using Vec = Eigen::Matrix<Real, 3, 1>;
 
   const MinkowskiDifference& difference;
-  Real leastDeterminant;  ///< proves that three points are turned as their determinant says
-  struct Pair {           // a VertexPair that nobody sets to zero first
+  Real minDeterminant;        ///< a larger determinant has a certified sign
+  struct UninitializedPair {  // a VertexPair without initialisation
     std::uint32_t a, b;
     operator VertexPair() const { return {a, b}; }
   };
-  std::array<Pair, kMostCorners> pairs;
-  std::array<Vec, kMostCorners> points;
-  std::array<Facet<Real>, 2 * kMostCorners> facets;
+  std::array<UninitializedPair, kMaxCorners> pairs;
+  std::array<Vec, kMaxCorners> points;
+  std::array<Facet<Real>, 2 * kMaxCorners> facets;
   std::size_t corners = 0, facetCount = 0;
 
-  explicit Polytope(const MinkowskiDifference& of) : difference(of) {
-    const Real reach = of.reach;
-    // Nine entries off by at most 8u reach, with cofactors of at most 2 reach^2, and as much again
-    // for rounding the product of edges of up to 2 reach.
-    leastDeterminant =
-        512 * unitOf<Real>() * reach * reach * reach + std::numeric_limits<Real>::min();
+  explicit Polytope(const MinkowskiDifference& minkowskiDifference)
+      : difference(minkowskiDifference) {
+    const Real reach = minkowskiDifference.reach;
+    // Nine entries off by at most 8u reach, with cofactors of at most 2 reach^2; the same again for
+    // rounding the product of edges of up to 2 reach.
+    minDeterminant =
+        512 * unitRoundoff<Real>() * reach * reach * reach + std::numeric_limits<Real>::min();
   }
   void clear() { corners = facetCount = 0; }
-  bool facesAway(const Facet<Real>& facet) const { return facet.offset > leastDeterminant; }
+  bool facesAway(const Facet<Real>& facet) const { return facet.offset > minDeterminant; }
   std::span<Facet<Real>> all() { return {facets.data(), facetCount}; }
-  bool holds(VertexPair pair) const {
-    const auto isIt = [&](const Pair& held) { return VertexPair(held) == pair; };
-    return std::any_of(pairs.begin(), pairs.begin() + corners, isIt);
+  bool contains(VertexPair pair) const {
+    const auto isSame = [&](const UninitializedPair& existing) {
+      return VertexPair(existing) == pair;
+    };
+    return std::any_of(pairs.begin(), pairs.begin() + corners, isSame);
   }
   std::uint16_t addCorner(VertexPair pair) {
+    ENFILADE_ASSERT(corners < kMaxCorners);
     pairs[corners] = {pair.a, pair.b};
     points[corners] = difference.point<Real>(pair);
     return static_cast<std::uint16_t>(corners++);
   }
-  /// False, and nothing added, when the facet is not proved to face away from the origin (and
-  /// `anyTurn` is not set), or when there is no room.
-  bool addFacet(const Corners& of, bool anyTurn = false) {
+  /// Adds a facet that faces away from the origin, or any facet if `allowInward` is set. Returns
+  /// false and adds nothing if that is not certified or there is no room.
+  bool addFacet(const Corners& facetCorners, bool allowInward = false) {
     if (facetCount == facets.size()) return false;
+    ENFILADE_ASSERT(facetCorners[0] < corners && facetCorners[1] < corners &&
+                    facetCorners[2] < corners);
     Facet<Real>& facet = facets[facetCount];
-    setFacet<Real>(of, points[of[0]], points[of[1]], points[of[2]], facet);
-    if (!(anyTurn || facesAway(facet))) return false;
+    setFacet<Real>(facetCorners, points[facetCorners[0]], points[facetCorners[1]],
+                   points[facetCorners[2]], facet);
+    if (!(allowInward || facesAway(facet))) return false;
     ++facetCount;
     return true;
   }
 };
 
-/// Builds a polytope around the origin from a simplex of two to four points that holds it, if only
-/// on a face or an edge (up to rounding): with supports on the sides that the simplex is flat on.
-/// `polytope` is empty before. False: not proved.
+/// Builds a polytope around the origin from a simplex of two to four points that contains it, on a
+/// face or an edge if only up to rounding. A flat simplex is completed with support points.
+/// `polytope` must be empty. Returns false if enclosure is not certified.
 template <class Real>
-bool surround(std::span<const VertexPair> simplex, Polytope<Real>& polytope);
+bool encloseOrigin(std::span<const VertexPair> simplex, Polytope<Real>& polytope);
 
-/// The same from nothing: four points far apart, then supports along the facet that the origin is
-/// most beyond. For an origin that no simplex shows the inside of, as on a plane of symmetry.
+/// The same without a simplex: starts from four distant points and adds support points along the
+/// facet that the origin is farthest outside of. Needed if GJK's simplex does not certify that the
+/// origin is inside, for example on a plane of symmetry.
 template <class Real>
-bool surroundBySearch(Polytope<Real>& polytope);
+bool encloseOriginBySearch(Polytope<Real>& polytope);
 
-/// Puts a point in place of the facets that it sees, whether or not the new ones face away from the
-/// origin. False when there is no room, or it sees none or all; the polytope is then of no more
-/// use.
+/// Replaces the facets that a new point sees by facets to that point, whether or not these face
+/// away from the origin. Returns false, and leaves the polytope unusable, if there is no room or
+/// the point sees no facet or all of them.
 template <class Real>
-bool expand(VertexPair pair, Polytope<Real>& polytope);
+bool expandPolytope(VertexPair pair, Polytope<Real>& polytope);
 
-extern template bool surround(std::span<const VertexPair>, Polytope<double>&);
-extern template bool surround(std::span<const VertexPair>, Polytope<Wide>&);
-extern template bool surroundBySearch(Polytope<double>&);
-extern template bool surroundBySearch(Polytope<Wide>&);
-extern template bool expand(VertexPair, Polytope<double>&);
-extern template bool expand(VertexPair, Polytope<Wide>&);
+extern template bool encloseOrigin(std::span<const VertexPair>, Polytope<double>&);
+extern template bool encloseOrigin(std::span<const VertexPair>, Polytope<LongReal>&);
+extern template bool encloseOriginBySearch(Polytope<double>&);
+extern template bool encloseOriginBySearch(Polytope<LongReal>&);
+extern template bool expandPolytope(VertexPair, Polytope<double>&);
+extern template bool expandPolytope(VertexPair, Polytope<LongReal>&);
 
 }  // namespace enfilade::collision

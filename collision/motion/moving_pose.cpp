@@ -1,34 +1,34 @@
 // Steps
-//  1. Translation: every product is two doubles exactly (Dekker 1971, no fused multiply-add), all
-//  of
-//     them are added to an expansion without loss (Shewchuk 1997, Grow-Expansion), and the two
-//     leading components of it are kept; the others bound what is missing.
-//  2. Rotation: Rodrigues' formula in long double, with sine and cosine of our own (libm's differ
-//     between processors), rounded to doubles once.
+//  1. Translation: every product is exactly two doubles (Dekker 1971, no fused multiply-add). All
+//     of them are added to an expansion without error (Shewchuk 1997, Grow-Expansion). Its two
+//     leading components are kept; the others bound the error.
+//  2. Rotation: Rodrigues' formula in long double, rounded to doubles once. Sine and cosine are
+//     implemented here because those of libm differ between processors.
 //
-// Error of a turned point, eta the unit of rounding of long double (2^-64 on x86-64), u = 2^-53:
-// the axis is off by 4 eta a coordinate, sine and cosine by 8 eta besides the angle, so each of the
-// nine entries is off by less than 32 eta and the matrix (Frobenius) by less than 96 eta; the
-// angle, a length times a time, is off by 4 eta times itself; the product with the first rotation
-// by 6 eta |rotation|; and rounding to doubles by u |rotation|. Together, with |.| of Frobenius,
-// less than (u + (128 + 8 angle) eta) |rotation| radius.
+// Error of a rotated point. Let eta be the unit roundoff of long double (2^-64 on x86-64) and u =
+// 2^-53. The error of the axis is 4 eta per coordinate, that of sine and cosine 8 eta, apart from
+// the angle. Each of the nine entries thus has an error below 32 eta, and the matrix below 96 eta
+// in the Frobenius norm |.|. The error of the angle, a length times a time, is 4 eta relative. The
+// product with the first rotation adds 6 eta |rotation|, and rounding to doubles u |rotation|. The
+// sum is less than (u + (128 + 8 angle) eta) |rotation| radius.
 #include "collision/motion/moving_pose.hpp"
 
 #include <array>
 #include <cmath>
 
+#include "collision/assert.hpp"
+#include "collision/floating_point.hpp"
+
 namespace enfilade::collision {
 namespace {
 
-using Wide = long double;
-using WideMat = Eigen::Matrix<Wide, 3, 3>;
+using LongMat3 = Eigen::Matrix<LongReal, 3, 3>;
 
-constexpr double kUnit = 0x1p-53;
-constexpr double kWideUnit = static_cast<double>(std::numeric_limits<Wide>::epsilon() / 2);
-constexpr double kMostRadians = 1e6;  // q * kHalfPi[0] below stays exact up to 2^31 quarter turns
-constexpr double kTiny = 0x1p-900;    // the error term of a smaller product may underflow
+constexpr auto kLongUnit = static_cast<double>(kLongRoundoff);
+constexpr double kMaxAngle = 1e6;   // quarters * kHalfPi[0] is exact up to 2^31 quarter turns
+constexpr double kTiny = 0x1p-900;  // the error term of a smaller product may underflow
 
-// pi/2 in three parts of 33 bits.
+// pi/2 as a sum of three terms of 33 bits.
 constexpr std::array<double, 3> kHalfPi{0x1.921fb544p+0, 0x1.0b4611a6p-34, 0x1.3198a2ep-69};
 
 /// a + b == sum + error (Knuth).
@@ -39,7 +39,7 @@ double twoSum(double a, double b, double& error) {
   return sum;
 }
 
-/// a * b == product + error (Dekker), short of underflow and overflow.
+/// a * b == product + error (Dekker), barring underflow and overflow.
 double twoProduct(double a, double b, double& error) {
   const auto upper = [](double x) {
     const double big = 0x1.0000002p27 * x;
@@ -52,24 +52,25 @@ double twoProduct(double a, double b, double& error) {
   return product;
 }
 
-/// A sum kept without loss: components that do not overlap, least first.
+/// Exact sum as an expansion: nonoverlapping components in order of increasing magnitude.
 class Expansion {
  public:
   void add(double term) {
-    int kept = 0;
+    int count = 0;
     for (int i = 0; i < size_; ++i) {
       double error = 0;
-      term = twoSum(term, parts_[i], error);
-      if (error != 0) parts_[kept++] = error;
+      term = twoSum(term, components_[i], error);
+      if (error != 0) components_[count++] = error;
     }
-    parts_[kept++] = term;
-    size_ = kept;
+    ENFILADE_ASSERT(static_cast<std::size_t>(count) < components_.size());
+    components_[count++] = term;
+    size_ = count;
   }
 
   void addProduct(double a, double b) {
     double error = 0;
     const double product = twoProduct(a, b, error);
-    if (a != 0 && b != 0 && std::abs(product) < kTiny) lost_ += 2 * kTiny * kUnit * kUnit;
+    if (a != 0 && b != 0 && std::abs(product) < kTiny) lost_ += 2 * kTiny * kRoundoff * kRoundoff;
     add(error);
     add(product);
   }
@@ -78,17 +79,17 @@ class Expansion {
     double error = 0;
     const double product = twoProduct(a, b, error);
     if (a != 0 && b != 0 && std::abs(product) < kTiny)
-      lost_ += 2 * kTiny * kUnit * kUnit * std::abs(c);
+      lost_ += 2 * kTiny * kRoundoff * kRoundoff * std::abs(c);
     addProduct(product, c);
     addProduct(error, c);
   }
 
-  TwoDoubles rounded() const {
-    TwoDoubles result;
+  DoubleDouble rounded() const {
+    DoubleDouble result;
     double rest = lost_;
     for (int i = size_ - 1; i >= 0; --i) {
       double error = 0;
-      result.high = twoSum(result.high, parts_[i], error);
+      result.high = twoSum(result.high, components_[i], error);
       double smaller = 0;
       result.low = twoSum(result.low, error, smaller);
       rest += std::abs(smaller);
@@ -96,35 +97,40 @@ class Expansion {
     double error = 0;
     result.high = twoSum(result.high, result.low, error);
     result.low = error;
-    result.rest = rest * (1 + 32 * kUnit);
+    result.error = rest * (1 + 32 * kRoundoff);
     return result;
   }
 
  private:
-  std::array<double, 32> parts_{};  // travelled() adds 18 terms
+  std::array<double, 32> components_{};  // computeDisplacement() adds 18 terms
   int size_ = 0;
   double lost_ = 0;
 };
 
 struct SineAndCosine {
-  Wide sine, cosine;
+  LongReal sine, cosine;
 };
 
-/// Taylor's polynomials; |x| <= pi/4 leaves less than eta.
-SineAndCosine ofSmallAngle(Wide x) {
-  const Wide q = x * x;
-  Wide sine = 0, cosine = 0;
-  for (int n = 25; n >= 3; n -= 2) sine = (1 + sine) * (-q / static_cast<Wide>(n * (n - 1)));
-  for (int n = 26; n >= 2; n -= 2) cosine = (1 + cosine) * (-q / static_cast<Wide>(n * (n - 1)));
+/// Taylor polynomials; the truncation error is below eta for |x| <= pi/4.
+SineAndCosine computeSmallSineAndCosine(LongReal x) {
+  ENFILADE_ASSERT(std::abs(x) < 0.7854L);
+  const LongReal q = x * x;
+  LongReal sine = 0, cosine = 0;
+  for (int n = 25; n >= 3; n -= 2) sine = (1 + sine) * (-q / static_cast<LongReal>(n * (n - 1)));
+  for (int n = 26; n >= 2; n -= 2)
+    cosine = (1 + cosine) * (-q / static_cast<LongReal>(n * (n - 1)));
   return {x * (1 + sine), 1 + cosine};
 }
 
-/// 0 <= angle <= kMostRadians: reduced by whole quarter turns.
-SineAndCosine sineAndCosine(Wide angle) {
-  const auto quarters = static_cast<long>(angle * Wide{0.63661977236758134308L} + Wide{0.5L});
-  Wide rest = angle;
-  for (const double part : kHalfPi) rest -= static_cast<Wide>(quarters) * static_cast<Wide>(part);
-  const auto [s, c] = ofSmallAngle(rest);
+/// 0 <= angle <= kMaxAngle. Reduces the angle by whole quarter turns.
+SineAndCosine computeSineAndCosine(LongReal angle) {
+  ENFILADE_ASSERT(angle >= 0 && angle <= static_cast<LongReal>(kMaxAngle));
+  const auto quarters =
+      static_cast<long>(angle * LongReal{0.63661977236758134308L} + LongReal{0.5L});
+  LongReal rest = angle;
+  for (const double part : kHalfPi)
+    rest -= static_cast<LongReal>(quarters) * static_cast<LongReal>(part);
+  const auto [s, c] = computeSmallSineAndCosine(rest);
   switch (quarters % 4) {
     case 0:
       return {s, c};
@@ -137,56 +143,58 @@ SineAndCosine sineAndCosine(Wide angle) {
   }
 }
 
-Wide wideNorm(const Eigen::Matrix<Wide, 3, 1>& v) {
+LongReal computeLongNorm(const LongVec3& v) {
   return std::sqrt(v.x() * v.x() + v.y() * v.y() + v.z() * v.z());
 }
 
-Mat3 rotationOf(const ConvexBody& body) {
+Mat3 toRotationMatrix(const PlacedConvex& body) {
   return body.rotation ? *body.rotation : Mat3(Mat3::Identity());
 }
 
 }  // namespace
 
-Mat3 turned(const Mat3& rotation, const Vec3& angularVelocity, double time) {
+Mat3 integrateRotation(const Mat3& rotation, const Vec3& angularVelocity, double time) {
   if (angularVelocity.isZero(0) || time == 0) return rotation;
-  const Eigen::Matrix<Wide, 3, 1> omega = angularVelocity.cast<Wide>();
-  const Wide speed = wideNorm(omega);
-  const Wide angle = speed * static_cast<Wide>(time);
-  if (!(angle <= static_cast<Wide>(kMostRadians))) return rotation;  // turningError() is infinite
-  const Eigen::Matrix<Wide, 3, 1> k = omega / speed;
-  const auto [s, c] = sineAndCosine(angle);
-  WideMat turn = (1 - c) * (k * k.transpose()) + c * WideMat::Identity();
-  turn(0, 1) -= s * k.z(), turn(1, 0) += s * k.z();
-  turn(0, 2) += s * k.y(), turn(2, 0) -= s * k.y();
-  turn(1, 2) -= s * k.x(), turn(2, 1) += s * k.x();
-  const WideMat product = turn * rotation.cast<Wide>();
+  const LongVec3 omega = angularVelocity.cast<LongReal>();
+  const LongReal speed = computeLongNorm(omega);
+  const LongReal angle = speed * static_cast<LongReal>(time);
+  if (!(angle <= static_cast<LongReal>(kMaxAngle))) return rotation;  // infinite error
+  const LongVec3 k = omega / speed;
+  const auto [s, c] = computeSineAndCosine(angle);
+  LongMat3 increment = (1 - c) * (k * k.transpose()) + c * LongMat3::Identity();
+  increment(0, 1) -= s * k.z(), increment(1, 0) += s * k.z();
+  increment(0, 2) += s * k.y(), increment(2, 0) -= s * k.y();
+  increment(1, 2) -= s * k.x(), increment(2, 1) += s * k.x();
+  const LongMat3 product = increment * rotation.cast<LongReal>();
   return product.cast<double>();
 }
 
-double turningError(const Mat3& rotation, const Vec3& angularVelocity, double time, double radius) {
+double computeRotationError(const Mat3& rotation, const Vec3& angularVelocity, double time,
+                            double radius) {
   if (angularVelocity.isZero(0) || time == 0) return 0;
-  const double angle = angularVelocity.norm() * time * (1 + 8 * kUnit);
-  if (!(angle <= kMostRadians * (1 - 64 * kUnit))) return std::numeric_limits<double>::infinity();
-  const double size = rotation.norm() * radius * (1 + 16 * kUnit);
-  return (kUnit + (128 + 8 * angle) * kWideUnit) * size;
+  const double angle = angularVelocity.norm() * time * (1 + 8 * kRoundoff);
+  if (!(angle <= kMaxAngle * (1 - 64 * kRoundoff))) return std::numeric_limits<double>::infinity();
+  const double size = rotation.norm() * radius * (1 + 16 * kRoundoff);
+  return (kRoundoff + (128 + 8 * angle) * kLongUnit) * size;
 }
 
-double radiusOf(const ConvexBody& body, bool placed) {
-  const bool turn = placed && body.rotation;
+double computeRadius(const PlacedConvex& body, bool placed) {
+  const bool rotates = placed && body.rotation;
   const double stretch =
-      turn ? body.rotation->norm() : 0;  // a product is off by 3u of it times |v|
+      rotates ? body.rotation->norm() : 0;  // a product has an error of 3u times this times |v|
   double radius = 0;
   for (const Vec3& v : body.vertices) {
-    const Vec3 r = turn ? Vec3(*body.rotation * v) : v;
-    radius = std::max(radius, r.norm() + 4 * kUnit * stretch * v.norm());
+    const Vec3 r = rotates ? Vec3(*body.rotation * v) : v;
+    radius = std::max(radius, r.norm() + 4 * kRoundoff * stretch * v.norm());
   }
-  return radius * (1 + 16 * kUnit);
+  return radius * (1 + 16 * kRoundoff);
 }
 
-TwoDoubles travelled(Difference place, Difference velocity, Difference acceleration, double time) {
+DoubleDouble computeDisplacement(Difference position, Difference velocity, Difference acceleration,
+                                 double time) {
   Expansion sum;
-  sum.add(place.to);
-  sum.add(-place.from);
+  sum.add(position.to);
+  sum.add(-position.from);
   sum.addProduct(velocity.to, time);
   sum.addProduct(-velocity.from, time);
   sum.addProduct(acceleration.to, time, time / 2);
@@ -195,27 +203,29 @@ TwoDoubles travelled(Difference place, Difference velocity, Difference accelerat
 }
 
 PairAtTime::PairAtTime(const MovingBody& a, const MovingBody& b, double time)
-    : rotationA_(turned(rotationOf(a.body), a.motion.angularVelocity, time)),
-      rotationB_(turned(rotationOf(b.body), b.motion.angularVelocity, time)),
+    : rotationA_(integrateRotation(toRotationMatrix(a.body), a.motion.angularVelocity, time)),
+      rotationB_(integrateRotation(toRotationMatrix(b.body), b.motion.angularVelocity, time)),
       a_(a.body),
       b_(b.body) {
-  if (a.motion.turns() || a.body.rotation) a_.rotation = &rotationA_;
-  if (b.motion.turns() || b.body.rotation) b_.rotation = &rotationB_;
+  if (a.motion.isRotating() || a.body.rotation) a_.rotation = &rotationA_;
+  if (b.motion.isRotating() || b.body.rotation) b_.rotation = &rotationB_;
   for (int k = 0; k < 3; ++k) {
-    const TwoDoubles apart = travelled({b.body.translation[k], a.body.translation[k]},
-                                       {b.motion.velocity[k], a.motion.velocity[k]},
-                                       {b.motion.acceleration[k], a.motion.acceleration[k]}, time);
-    b_.translation[k] = apart.high;
-    a_.translation[k] = -apart.low;
-    error_ += apart.rest;
+    const DoubleDouble offset =
+        computeDisplacement({b.body.translation[k], a.body.translation[k]},
+                            {b.motion.velocity[k], a.motion.velocity[k]},
+                            {b.motion.acceleration[k], a.motion.acceleration[k]}, time);
+    b_.translation[k] = offset.high;
+    a_.translation[k] = -offset.low;
+    error_ += offset.error;
   }
-  const auto turning = [&](const MovingBody& moving) {
-    return turningError(rotationOf(moving.body), moving.motion.angularVelocity, time,
-                        radiusOf(moving.body, false));
+  const auto computeError = [&](const MovingBody& moving) {
+    return computeRotationError(toRotationMatrix(moving.body), moving.motion.angularVelocity, time,
+                                computeRadius(moving.body, false));
   };
-  error_ += turning(a);
-  error_ += turning(b);
-  error_ *= 1 + 8 * kUnit;
+  error_ += computeError(a);
+  error_ += computeError(b);
+  error_ *= 1 + 8 * kRoundoff;
+  ENFILADE_ASSERT(!(error_ < 0));
 }
 
 }  // namespace enfilade::collision

@@ -1,68 +1,71 @@
-// Two bodies that move and turn: where they are at a time, and how well that is known.
+// Poses of two moving and rotating bodies at a given time, with proved error bounds.
 #pragma once
 
 #include "collision/narrow_phase/narrow_phase.hpp"
 
 namespace enfilade::collision {
 
-/// At time s (seconds) the body's reference point, ConvexBody::translation, has moved by
-/// velocity * s + acceleration * s * s / 2, and the body has turned about it by angularVelocity *
-/// s.
+/// Motion at constant acceleration and constant angular velocity. At time s (seconds) the reference
+/// point, PlacedConvex::translation, has moved by velocity * s + acceleration * s * s / 2. The body
+/// has rotated about it by angularVelocity * s.
 struct Motion {
   Vec3 velocity = Vec3::Zero();         ///< m/s, world
   Vec3 acceleration = Vec3::Zero();     ///< m/s^2, world, constant
   Vec3 angularVelocity = Vec3::Zero();  ///< rad/s, world, constant
 
-  bool turns() const { return !angularVelocity.isZero(0); }
+  bool isRotating() const { return !angularVelocity.isZero(0); }
 };
 
 struct MovingBody {
-  ConvexBody body;  ///< at time 0
+  PlacedConvex body;  ///< at time 0
   Motion motion;
 };
 
-/// worldFromBody of a body that has turned by `angularVelocity` * `time` from `rotation`. Each
-/// point is off by at most turningError() of the same arguments.
-Mat3 turned(const Mat3& rotation, const Vec3& angularVelocity, double time);
+/// worldFromBody after a rotation by `angularVelocity` * `time` from `rotation`. The error of each
+/// point is at most computeRotationError() of the same arguments.
+Mat3 integrateRotation(const Mat3& rotation, const Vec3& angularVelocity, double time);
 
-/// Metres, for points whose greatest distance from the reference point is `radius` in the body's
-/// frame; infinite beyond a million radians.
-double turningError(const Mat3& rotation, const Vec3& angularVelocity, double time, double radius);
+/// Error bound in metres, for points within `radius` of the reference point in the body frame.
+/// Infinite beyond a million radians.
+double computeRotationError(const Mat3& rotation, const Vec3& angularVelocity, double time,
+                            double radius);
 
-/// Greatest distance of a vertex from the reference point: at least the exact one. Body's frame
-/// (`placed` false), or as the rotation, which may be off orthonormal, places them.
-double radiusOf(const ConvexBody& body, bool placed);
+/// Maximum distance of a vertex from the reference point, rounded up. `placed` false: in the body
+/// frame. `placed` true: after the rotation, which may be slightly non-orthonormal.
+double computeRadius(const PlacedConvex& body, bool placed);
 
-/// A sum of doubles as two of them and a bound of what is missing.
-struct TwoDoubles {
+/// A sum of doubles as two doubles with an error bound.
+struct DoubleDouble {
   double high = 0, low = 0;
-  double rest = 0;  ///< |exact sum - (high + low)| is at most this; 0 when exact
+  double error = 0;  ///< |exact sum - (high + low)| is at most this; 0 when exact
 };
 
-/// to - from + velocity * time + acceleration * time * time / 2, in one coordinate. `velocity` and
-/// `acceleration` are differences too: {of `to`, of `from`}.
+/// Difference of two values in one coordinate: to - from.
 struct Difference {
   double to = 0, from = 0;
 };
-TwoDoubles travelled(Difference place, Difference velocity, Difference acceleration, double time);
+/// position + velocity * time + acceleration * time * time / 2, in one coordinate. All three are
+/// differences.
+DoubleDouble computeDisplacement(Difference position, Difference velocity, Difference acceleration,
+                                 double time);
 
-/// Both bodies at a time. A's reference point is moved to -low and B's to high, so that their
-/// difference is exact to 106 bits; the bodies point into this object.
+/// Both bodies at a given time. A's reference point is placed at -low and B's at high, so that
+/// their difference is exact to 106 bits. The bodies point into this object.
 class PairAtTime {
  public:
   PairAtTime(const MovingBody& a, const MovingBody& b, double time);
   PairAtTime(const PairAtTime&) = delete;
   PairAtTime& operator=(const PairAtTime&) = delete;
 
-  const ConvexBody& a() const { return a_; }
-  const ConvexBody& b() const { return b_; }
-  /// Metres: the exact motion's distance of the bodies differs from that of a() and b() by at most
-  /// this, and so does the depth. 0 when the poses are exact.
+  const PlacedConvex& a() const { return a_; }
+  const PlacedConvex& b() const { return b_; }
+  /// Pose error in metres: distance and depth of a() and b() differ from those of the exact motion
+  /// by at most this. 0 if the poses are exact.
   double error() const { return error_; }
 
  private:
   Mat3 rotationA_, rotationB_;
-  ConvexBody a_, b_;
+  PlacedConvex a_, b_;
   double error_ = 0;
 };
 

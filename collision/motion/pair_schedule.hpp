@@ -1,4 +1,5 @@
-// Pairs of bodies by the time at which they are to be looked at again (seed 5.1.2).
+// Schedule of pair checks: a heap of body pairs ordered by their next check time (Lin 1993, section
+// 5.1; Mirtich 1996).
 #pragma once
 
 #include <cstdint>
@@ -9,9 +10,9 @@
 
 namespace enfilade::collision {
 
-/// A binary heap whose keys can be changed. The order is that of (time, pair), so it is the same
-/// whatever was inserted first.
-class WakeUpHeap {
+/// Binary heap with changeable keys. The order is by (time, pair), so it does not depend on the
+/// order of insertion.
+class PairSchedule {
  public:
   using BodyPair = std::pair<std::uint32_t, std::uint32_t>;  ///< first < second
   struct Entry {
@@ -19,45 +20,46 @@ class WakeUpHeap {
     BodyPair pair;
   };
 
-  /// Inserts the pair or changes its time. The ids in either order, not equal; throws
-  /// std::invalid_argument on equal ids or a time that is no number.
+  /// Inserts the pair or changes its time (seconds). The ids may be in either order. Throws
+  /// std::invalid_argument if the ids are equal or the time is NaN.
   void set(std::uint32_t a, std::uint32_t b, double time);
-  /// Whether the pair was there.
+  /// Returns true if the pair existed.
   bool remove(std::uint32_t a, std::uint32_t b);
   void removeBody(std::uint32_t body);
 
-  /// A command or an impulse voids what was proved of a body: all its pairs are due at `now`, if
-  /// they were not due before.
-  void wakeBody(std::uint32_t body, double now);
+  /// Makes all pairs of a body due at `now`, except those due earlier. Call it when a command or an
+  /// impulse invalidates the motion bounds of the body.
+  void scheduleBodyNow(std::uint32_t body, double now);
 
-  std::optional<double> timeOf(std::uint32_t a, std::uint32_t b) const;
-  /// The earliest entry; none when empty.
+  std::optional<double> findTime(std::uint32_t a, std::uint32_t b) const;
+  /// Earliest entry; nullopt if the schedule is empty.
   std::optional<Entry> earliest() const;
-  /// Takes the earliest entry out if it is due at `now`.
+  /// Removes and returns the earliest entry if it is due at `now`.
   std::optional<Entry> popDue(double now);
 
   std::size_t size() const { return heap_.size(); }
-  /// Throws std::logic_error naming what is broken; for tests and debug builds.
+  /// Checks all invariants. Throws std::logic_error that names the violated one. For tests and
+  /// debug builds.
   void validate() const;
 
  private:
   struct Slot {
     Entry entry;
-    std::size_t place;  ///< in heap_
+    std::size_t heapIndex;  ///< index into heap_
   };
 
-  bool before(std::uint32_t p, std::uint32_t q) const;
-  void put(std::size_t place, std::uint32_t slot);
-  void rise(std::size_t place);
-  void sink(std::size_t place);
-  void settle(std::uint32_t slot);
-  void take(std::uint32_t slot);
-  std::vector<std::uint32_t> slotsOf(std::uint32_t body) const;
+  bool isBefore(std::uint32_t p, std::uint32_t q) const;
+  void placeSlot(std::size_t index, std::uint32_t slot);
+  void siftUp(std::size_t index);
+  void siftDown(std::size_t index);
+  void restoreHeapOrder(std::uint32_t slot);
+  void removeSlot(std::uint32_t slot);
+  std::vector<std::uint32_t> findSlots(std::uint32_t body) const;
 
   std::vector<Slot> slots_;
-  std::vector<std::uint32_t> unused_;         ///< slots
-  std::vector<std::uint32_t> heap_;           ///< slots; each before its two children
-  std::map<BodyPair, std::uint32_t> slotOf_;  ///< each pair both ways round
+  std::vector<std::uint32_t> freeSlots_;          ///< slot indices
+  std::vector<std::uint32_t> heap_;               ///< slot indices; each before its two children
+  std::map<BodyPair, std::uint32_t> slotByPair_;  ///< each pair in both orders
 };
 
 }  // namespace enfilade::collision

@@ -1,97 +1,103 @@
-// Time to contact. For a gap d that closes at v and accelerates by a at most,
+// Time to contact. For a gap d with maximum closing speed v and maximum acceleration a,
 //   tc = 2 d / (v + sqrt(v^2 + 2 a d)),
-// which is the seed's (sqrt(v^2 + 2 a d) - v) / a without its cancellation and its division by 0.
+// which equals (sqrt(v^2 + 2 a d) - v) / a (Lin 1993, section 5.1) without its cancellation and its
+// division by 0.
 //
-// Departures from seed 5.1. The seed takes for v the speed of the closest points. That is no bound
-// when bodies turn: the centre of a rod along a wall is closest and at rest, while its tip comes
-// down. Here v is the closing speed of the reference points along the parting plane's normal plus
-// |w| rho of each body, which no vertex exceeds; a is the sum of |linear|, |alpha| rho and
-// |w|^2 rho, |w| at its greatest in the interval. And where tw = max(tc, tmin) exceeds tc, the seed
-// calls nothing unproved.
+// Departures from Lin 1993. There v is the speed of the closest points, which is no bound for
+// rotating bodies: the centre of a rod along a wall is closest and at rest while a tip approaches.
+// Here v is the closing speed of the reference points along the normal of the separating plane,
+// plus |w| rho of each body, which bounds the speed of every vertex. a is the sum of |linear|,
+// |alpha| rho and |w|^2 rho, with the maximum |w| in the interval. NextCheck::proved is false if
+// max(tc, tmin) > tc and the gap may close too far; Lin does not make this distinction.
 //
-// Rounding. With u = 2^-53, in tc the terms under the root are off by 3u and 2u, their sum by 4u,
-// its root by 3u, the denominator by 4u and the quotient by 5u, relative: 12u is taken off. No
-// product may have underflowed for that, so the gap, the speed and the acceleration are first
-// scaled by the same power of two, which changes no time.
+// Rounding. With u = 2^-53, the relative errors in tc are 3u and 2u for the terms under the root,
+// 4u for their sum, 3u for the root, 4u for the denominator and 5u for the quotient. The result is
+// reduced by 12u. This holds only without underflow. Gap, speed and acceleration are therefore
+// first scaled by the same power of two, which leaves the time unchanged.
 #include "collision/motion/time_to_contact.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "collision/motion/shape_cast.hpp"
+#include "collision/floating_point.hpp"
+#include "collision/motion/time_of_impact.hpp"
 
 namespace enfilade::collision {
 namespace {
 
-constexpr double kUnit = 0x1p-53;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kScale = 0x1p480;         // at most three of them lift any double's square
-constexpr double kLeastSquare = 0x1p-960;  // a lost product (below 2^-1074) is no part of this
-constexpr double kLeastTime = 0x1p-960;    // a quotient below it may have lost digits
-constexpr int kScalings = 3;
-constexpr double kUp = 1 + 16 * kUnit;  // above the roundings of a sum of a few rounded products
+constexpr double kScale = 0x1p480;       // three factors lift the square of any double
+constexpr double kMinSquare = 0x1p-960;  // underflow (below 2^-1074) is negligible above this
+constexpr double kMinTime = 0x1p-960;    // a smaller quotient may be inexact
+constexpr int kMaxScalings = 3;
+constexpr double kRoundUp =
+    1 + 16 * kRoundoff;  // exceeds the rounding of a sum of a few rounded products
 
-struct Scaled {
+struct ScaledGap {
   double distance, speed, acceleration;
 
   double underRoot() const { return speed * speed + 2 * (acceleration * distance); }
 };
 
-Scaled scaledUp(Scaled s) {
-  for (int i = 0; i < kScalings && s.underRoot() < kLeastSquare; ++i)
+ScaledGap scaleUp(ScaledGap s) {
+  for (int i = 0; i < kMaxScalings && s.underRoot() < kMinSquare; ++i)
     s = {s.distance * kScale, s.speed * kScale, s.acceleration * kScale};
   return s;
 }
 
 }  // namespace
 
-ClosingBounds closingBounds(const MotionBounds& a, const MotionBounds& b, const Vec3& normal,
-                            double interval) {
+ClosingBounds computeClosingBounds(const MotionBounds& a, const MotionBounds& b, const Vec3& normal,
+                                   double interval) {
   const Vec3 relative = a.velocity - b.velocity;
-  // Rounded products along the normal lose up to 6u of the speeds themselves.
-  const double lost = 16 * kUnit * (a.velocity.norm() + b.velocity.norm());
+  // Rounded products along the normal have an error of up to 6u of the speeds.
+  const double lost = 16 * kRoundoff * (a.velocity.norm() + b.velocity.norm());
   double speed = normal.dot(relative) + lost;
   double acceleration = 0;
   for (const MotionBounds* body : {&a, &b}) {
-    const double spin = body->angularVelocity.norm();
-    const double fastest = spin + body->angularAcceleration * interval;
-    speed += spin * body->radius * kUp;
+    const double angularSpeed = body->angularVelocity.norm();
+    const double maxAngularSpeed = angularSpeed + body->angularAcceleration * interval;
+    speed += angularSpeed * body->radius * kRoundUp;
     acceleration += body->acceleration + body->angularAcceleration * body->radius +
-                    fastest * fastest * body->radius;
+                    maxAngularSpeed * maxAngularSpeed * body->radius;
   }
-  return {std::max(0.0, speed) * kUp, acceleration * kUp};
+  return {std::max(0.0, speed) * kRoundUp, acceleration * kRoundUp};
 }
 
-double timeToContact(double distance, const ClosingBounds& closing) {
+double computeTimeToContact(double distance, const ClosingBounds& closing) {
   if (!(distance > 0) || !(closing.speed >= 0) || !(closing.acceleration >= 0)) return 0;
   if (closing.speed == 0 && closing.acceleration == 0) return kInfinity;
-  const Scaled s = scaledUp({distance, closing.speed, closing.acceleration});
+  const ScaledGap s = scaleUp({distance, closing.speed, closing.acceleration});
   const double time = 2 * s.distance / (s.speed + std::sqrt(s.underRoot()));
-  if (!(time >= kLeastTime)) return 0;
-  return std::min(time, std::numeric_limits<double>::max()) * (1 - 12 * kUnit);
+  if (!(time >= kMinTime)) return 0;
+  return std::min(time, std::numeric_limits<double>::max()) * (1 - 12 * kRoundoff);
 }
 
-WakeUp wakeUp(double distance, const ClosingBounds& closing, double least, double clearance) {
-  const double contact = timeToContact(distance, closing);
-  if (contact >= least) return {contact, true};
-  const double closes = (closing.speed * least + 0.5 * closing.acceleration * least * least) * kUp;
-  return {least, closes < 2 * clearance};
+NextCheck scheduleCheck(double distance, const ClosingBounds& closing, double minInterval,
+                        double clearance) {
+  const double contact = computeTimeToContact(distance, closing);
+  if (contact >= minInterval) return {contact, true};
+  const double closes =
+      (closing.speed * minInterval + 0.5 * closing.acceleration * minInterval * minInterval) *
+      kRoundUp;
+  return {minInterval, closes < 2 * clearance};
 }
 
-CannotTouch cannotTouchBefore(const MovingBody& a, const MovingBody& b, double t,
-                              FeatureCache& cache) {
-  const auto boundsOf = [](const MovingBody& moving) {
-    return MotionBounds{moving.motion.velocity, moving.motion.acceleration.norm() * kUp,
-                        moving.motion.angularVelocity, 0, radiusOf(moving.body, true)};
+SeparationForecast separatedUntil(const MovingBody& a, const MovingBody& b, double t,
+                                  FeatureCache& cache) {
+  const auto makeBounds = [](const MovingBody& moving) {
+    return MotionBounds{moving.motion.velocity, moving.motion.acceleration.norm() * kRoundUp,
+                        moving.motion.angularVelocity, 0, computeRadius(moving.body, true)};
   };
-  const Decision now = decide(a.body, b.body, cache);
+  const SeparationResult now = computeSeparation(a.body, b.body, cache);
   if (now.verdict != Verdict::separated) return {};
-  const double apart = now.distance - now.errorBound;
-  // Along the motion itself: whichever plane parts the bodies by `apart`, none closes faster.
-  const Vec3 along = (a.motion.velocity - b.motion.velocity).normalized();
-  const double soonest = timeToContact(apart, closingBounds(boundsOf(a), boundsOf(b), along, t));
+  const double distance = now.distance - now.errorBound;
+  // Use the direction of the relative motion: no separating plane closes faster along its normal.
+  const Vec3 direction = (a.motion.velocity - b.motion.velocity).normalized();
+  const double soonest = computeTimeToContact(
+      distance, computeClosingBounds(makeBounds(a), makeBounds(b), direction, t));
   if (soonest >= t) return {true, t};
-  const TimeOfImpact impact = timeOfImpact(a, b, t, cache);
+  const TimeOfImpact impact = computeTimeOfImpact(a, b, t, cache);
   return {impact.impact == Impact::none, impact.lo};
 }
 

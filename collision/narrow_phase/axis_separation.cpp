@@ -1,60 +1,70 @@
-// Rounding, as in minkowski.hpp: a product of the direction, turned into a body's frame, with a
-// vertex is off by less than 8u |d| S, whichever vertex it is, so the greatest product of all is as
-// near to the greatest true one. Those of both bodies, the shift and its product, and the two
-// differences together are off by less than 40u |d| reach.
+// Rounding, as in minkowski.hpp: the dot product of the direction, rotated into a body's frame,
+// with any vertex is off by less than 8u |d| S. The maximum product is therefore equally close to
+// the true maximum. Both maxima, the shift and its product, and the two differences are together
+// off by less than 40u |d| reach.
 #include "collision/narrow_phase/axis_separation.hpp"
 
+#include "collision/assert.hpp"
 #include "collision/minkowski/minkowski.hpp"
 
 namespace enfilade::collision {
 namespace {
 
-constexpr std::size_t kFew = 32;  // vertices: from there on, climbing over edges costs less
+constexpr std::size_t kSmallHullThreshold =
+    32;  // vertices; above it, hill climbing is cheaper than a scan
 
-struct Farthest {
+struct FarthestVertex {
   std::uint32_t vertex = 0;
-  double along = 0;
+  double projection = 0;
 };
 
-Farthest farthestOfAll(const ConvexBody& body, const Vec3& direction) {
-  Farthest best{0, direction.dot(body.vertices[0])};
-  for (std::uint32_t i = 1; i < body.vertices.size(); ++i) {
-    const double along = direction.dot(body.vertices[i]);
-    best.vertex = along > best.along ? i : best.vertex;  // no branch: no guess of it to miss
-    best.along = std::max(best.along, along);
+FarthestVertex findFarthestVertex(const PlacedConvex& convex, const Vec3& direction) {
+  FarthestVertex best{0, direction.dot(convex.vertices[0])};
+  for (std::uint32_t i = 1; i < convex.vertices.size(); ++i) {
+    const double projection = direction.dot(convex.vertices[i]);
+    best.vertex =
+        projection > best.projection ? i : best.vertex;  // branchless: avoids mispredictions
+    best.projection = std::max(best.projection, projection);
   }
   return best;
 }
 
-bool hasFew(const ConvexBody& body) {
-  return body.vertices.size() <= kFew || !body.hull;
+bool isSmallHull(const PlacedConvex& convex) {
+  return convex.vertices.size() <= kSmallHullThreshold || !convex.hull;
 }
 
-Gap gapByClimbing(const ConvexBody& a, const ConvexBody& b, const Vec3& direction) {
+AxisSeparation computeByHillClimbing(const PlacedConvex& a, const PlacedConvex& b,
+                                     const Vec3& direction) {
   const MinkowskiDifference difference(a, b);
   VertexPair hint;
-  const WideVec axis = direction.cast<Wide>();
-  const Wide length = axis.norm();
-  const Least least = leastAlong(difference, axis, length, hint);
-  const Wide proved = least.bound / length;
-  return {static_cast<double>(least.along / length),
-          static_cast<double>(proved - std::abs(proved) * 2 * kUnit), least.pair};
+  const LongVec3 axis = direction.cast<LongReal>();
+  const LongReal length = axis.norm();
+  const CertifiedSupport support = findCertifiedSupport(difference, axis, length, hint);
+  const LongReal lowerBound = support.lowerBound / length;
+  return {static_cast<double>(support.projection / length),
+          static_cast<double>(lowerBound - std::abs(lowerBound) * 2 * kRoundoff), support.pair};
 }
 
 }  // namespace
 
-Gap gapAlong(const ConvexBody& a, const ConvexBody& b, const Vec3& direction) {
-  if (!hasFew(a) || !hasFew(b)) return gapByClimbing(a, b, direction);
-  const PlacedBody placedA(a), placedB(b);
+AxisSeparation computeAxisSeparation(const PlacedConvex& a, const PlacedConvex& b,
+                                     const Vec3& direction) {
+  ENFILADE_ASSERT(!(std::abs(direction.squaredNorm() - 1) > 1e-6));
+  if (!isSmallHull(a) || !isSmallHull(b)) return computeByHillClimbing(a, b, direction);
+  const BoundedConvex boundedA(a), boundedB(b);
   const Vec3 shift = b.translation - a.translation;
-  const double reach = (placedA.size + placedB.size + shift.cwiseAbs().maxCoeff()) * kUnitLength;
-  const Farthest onA = farthestOfAll(a, placedA.bodyFromWorld<double>(direction));
-  const Farthest onB = farthestOfAll(b, placedB.bodyFromWorld<double>(-direction));
-  Gap gap{direction.dot(shift) - onB.along - onA.along, 0, {onA.vertex, onB.vertex}};
-  gap.proved = gap.value - 40 * kUnit * kUnitLength * reach;
-  gap.proved -= std::abs(gap.proved) * 64 * kUnit;  // the direction's length
-  if (!std::isfinite(gap.proved)) gap.proved = -std::numeric_limits<double>::infinity();
-  return gap;
+  const double reach =
+      (boundedA.radius + boundedB.radius + shift.cwiseAbs().maxCoeff()) * kMaxUnitLength;
+  const FarthestVertex onA = findFarthestVertex(a, boundedA.bodyFromWorld<double>(direction));
+  const FarthestVertex onB = findFarthestVertex(b, boundedB.bodyFromWorld<double>(-direction));
+  AxisSeparation separation{
+      direction.dot(shift) - onB.projection - onA.projection, 0, {onA.vertex, onB.vertex}};
+  separation.lowerBound = separation.value - 40 * kRoundoff * kMaxUnitLength * reach;
+  separation.lowerBound -=
+      std::abs(separation.lowerBound) * 64 * kRoundoff;  // the rounding of the direction's length
+  if (!std::isfinite(separation.lowerBound))
+    separation.lowerBound = -std::numeric_limits<double>::infinity();
+  return separation;
 }
 
 }  // namespace enfilade::collision

@@ -1,37 +1,40 @@
-// Of what features closest points are points. Internal to the narrow phase.
+// Classifies the features (vertex, edge, face) that contain the closest points. Internal to the
+// narrow phase.
 #pragma once
 
+#include "collision/assert.hpp"
 #include "collision/narrow_phase/narrow_phase.hpp"
 #include "collision/shapes/hull.hpp"
 
 namespace enfilade::collision {
 
-/// What the vertices span that a closest point of one body was combined of, each with a positive
-/// weight. They lie on one face, since the point is on the surface.
-inline Feature spannedBy(const ConvexBody& body, const FeatureCache& ended,
-                         std::uint32_t VertexPair::*vertex) {
-  const std::uint32_t first = ended.pairs[0].*vertex;
+/// Finds the feature spanned by the vertices of one body in `finalFeatures`. All of them have a
+/// positive weight in the closest point and lie on one face, since the point is on the surface.
+inline Feature findSpannedFeature(const PlacedConvex& convex, const FeatureCache& finalFeatures,
+                                  std::uint32_t VertexPair::*vertex) {
+  ENFILADE_ASSERT(finalFeatures.size >= 1 && finalFeatures.size <= 4);
+  const std::uint32_t first = finalFeatures.pairs[0].*vertex;
   std::uint32_t second = first;
-  for (int i = 1; i < ended.size; ++i) {
-    const std::uint32_t next = ended.pairs[i].*vertex;
+  for (int i = 1; i < finalFeatures.size; ++i) {
+    const std::uint32_t next = finalFeatures.pairs[i].*vertex;
     if (next == first || next == second) continue;
     if (second != first) return Feature::face;
     second = next;
   }
   if (second == first) return Feature::vertex;
-  if (!body.hull) return Feature::edge;
-  for (const std::uint32_t joined : body.hull->neighboursOf(first))
-    if (joined == second) return Feature::edge;
-  return Feature::face;  // they are its diagonal
+  if (!convex.hull) return Feature::edge;
+  for (const std::uint32_t neighbour : convex.hull->neighboursOf(first))
+    if (neighbour == second) return Feature::edge;
+  return Feature::face;  // the two vertices are a diagonal of a face
 }
 
-/// Into a Decision or a Refinement, by the features that its search ended at.
+/// Sets featureA and featureB of a SeparationResult or a RefinedSeparation from the final features.
 template <class Answer>
-void tellFeatures(const ConvexBody& a, const ConvexBody& b, const FeatureCache& ended,
-                  Answer& answer) {
-  if (answer.verdict == Verdict::penetrating) return;
-  answer.featureA = spannedBy(a, ended, &VertexPair::a);
-  answer.featureB = spannedBy(b, ended, &VertexPair::b);
+void assignFeatures(const PlacedConvex& a, const PlacedConvex& b, const FeatureCache& finalFeatures,
+                    Answer& result) {
+  if (result.verdict == Verdict::penetrating) return;
+  result.featureA = findSpannedFeature(a, finalFeatures, &VertexPair::a);
+  result.featureB = findSpannedFeature(b, finalFeatures, &VertexPair::b);
 }
 
 }  // namespace enfilade::collision

@@ -1,81 +1,54 @@
-// Narrow phase, level `Decide`: the exact verdict on two convex polytopes, their distance in
-// doubles with a proved bound, and witness points. What the tick uses. (Level `Refine`:
-// refine.hpp.)
+// Narrow phase: the exact verdict on two convex polytopes, their distance in doubles with a
+// certified error bound, and witness points. The tick uses it; refine.hpp has exact numbers.
 #pragma once
 
-#include <array>
-#include <limits>
 #include <optional>
-#include <span>
 
-#include "collision/types.hpp"
+#include "collision/minkowski/feature_cache.hpp"
+#include "collision/minkowski/verdict.hpp"
+#include "collision/shapes/placed_convex.hpp"
 
 namespace enfilade::collision {
 
-struct Hull;
-
-/// As closed sets. Touching: they share a point, and an arbitrarily small translation parts them.
-enum class Verdict : std::uint8_t { separated, touching, penetrating };
-enum class DecidedBy : std::uint8_t {
-  filter,     ///< rounded arithmetic with a proved bound
+/// The arithmetic that certified a verdict.
+enum class Certificate : std::uint8_t {
+  filter,     ///< rounded arithmetic with a certified error bound
   expansion,  ///< exact sums of doubles
-  rational    ///< exact integers of any length
+  rational    ///< integers of arbitrary length
 };
-/// Part of the surface of a convex body: what a closest point lies within.
+/// The smallest feature of a convex body's surface that contains a closest point.
 enum class Feature : std::uint8_t { none, vertex, edge, face };
 
-/// A convex body for one query: the hull of `vertices` (body's frame, metres; at least one, all
-/// finite), placed at rotation * vertex + translation, finite as well: every query throws
-/// std::invalid_argument naming what is not. The doubles are taken as they are: where a
-/// rotation is orthonormal only to rounding, the body is the very slightly sheared one.
-struct ConvexBody {
-  std::span<const Vec3> vertices;
-  Vec3 translation = Vec3::Zero();
-  const Mat3* rotation = nullptr;  ///< worldFromBody; null: none
-  const Hull* hull = nullptr;      ///< of exactly these vertices; null: every vertex is looked at
-};
-
-/// A vertex of A and a vertex of B: their difference is a point of the Minkowski difference B - A.
-struct VertexPair {
-  std::uint32_t a = 0, b = 0;
-  bool operator==(const VertexPair&) const = default;
-};
-
-/// The features that decided the same two bodies last time, given back to start from. Any value
-/// is right, a good one makes the query cost O(1).
-struct FeatureCache {
-  std::array<VertexPair, 4> pairs{};  ///< 1: vertices; 2, 3: their combinations up to two edges or
-  int size = 0;                       ///< a vertex and a face; 4: they penetrate; 0: nothing known
-  Vec3 axis = Vec3::Zero();           ///< from A to B, any length; zero: none yet
-};
-
-/// What is known of two closed convex bodies A and B. The verdict is exact.
-struct Decision {
+/// The separation of two closed convex bodies A and B. The verdict is exact.
+struct SeparationResult {
   Verdict verdict = Verdict::separated;
-  DecidedBy decidedBy = DecidedBy::filter;
-  // The least that pointA and pointB lie within, up to rounding; penetrating: none. Of a body
-  // without a hull, two vertices are taken for an edge.
+  Certificate certificate = Certificate::filter;
+  // The smallest features that contain pointA and pointB, up to rounding; `none` if penetrating.
+  // Without a hull, any two vertices count as an edge.
   Feature featureA = Feature::none, featureB = Feature::none;
   double distance = 0;          ///< metres, >= 0; 0 unless separated
-  double errorBound = 0;        ///< metres: the true distance lies within distance +- errorBound;
-                                ///< at most 16 units of rounding (2^-53) of the largest coordinate
-                                ///< after the translations are subtracted
+  double errorBound = 0;        ///< metres: the true distance is within distance +- errorBound; at
+                                ///< most 16 * 2^-53 times the largest coordinate after the
+                                ///< translations are subtracted
   Vec3 pointA = Vec3::Zero();   ///< world, up to rounding. Separated: closest points of A and B.
   Vec3 pointB = Vec3::Zero();   ///< Touching, penetrating: a common point.
   Vec3 normal = Vec3::UnitY();  ///< unit, from A to B. Separated: along the closest points;
-                                ///< touching: of a plane that parts them; penetrating: none (Y)
+                                ///< touching: of a separating plane; penetrating: undefined (+Y)
 };
 
-/// The verdict and, when separated, the closest points.
-Decision decide(const ConvexBody& a, const ConvexBody& b, FeatureCache& cache);
+/// Computes the verdict and, if separated, the distance and the closest points.
+SeparationResult computeSeparation(const PlacedConvex& a, const PlacedConvex& b,
+                                   FeatureCache& cache);
 
-/// As decide(), but gives up as soon as the distance is proved greater than `limit` (metres):
-/// nullopt then.
-std::optional<Decision> decideWithin(const ConvexBody& a, const ConvexBody& b, double limit,
-                                     FeatureCache& cache);
+/// As computeSeparation(), but returns nullopt as soon as the distance is certified to exceed
+/// `limit` (metres).
+std::optional<SeparationResult> computeSeparationWithin(const PlacedConvex& a,
+                                                        const PlacedConvex& b, double limit,
+                                                        FeatureCache& cache);
 
-/// A proved lower bound (metres) of the distance of A and B, by the cached axis alone; negative or
-/// minus infinity when the axis proves nothing. Costs two supports.
-double provedSeparation(const ConvexBody& a, const ConvexBody& b, const FeatureCache& cache);
+/// Computes a certified lower bound (metres) of the distance of A and B from the cached axis alone.
+/// It is negative or minus infinity if the axis does not separate them. Costs two support queries.
+double computeSeparationLowerBound(const PlacedConvex& a, const PlacedConvex& b,
+                                   const FeatureCache& cache);
 
 }  // namespace enfilade::collision

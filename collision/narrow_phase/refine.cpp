@@ -1,6 +1,6 @@
-// The verdict comes from decide(), with how it was found; the numbers come from exact integers,
-// rounded once at the end. Distances are those of the exact closest features, depths those of the
-// nearest facet of the Minkowski difference.
+// The certificate comes from computeSeparation(); the verdict and all numbers come from exact
+// integers, rounded once at the end. Distances are those of the exact closest features, depths
+// those of the nearest facet of the Minkowski difference.
 #include "collision/narrow_phase/refine.hpp"
 
 #include "collision/exact/exact_answer.hpp"
@@ -11,25 +11,26 @@
 namespace enfilade::collision {
 namespace {
 
-void describePenetration(const ConvexBody& a, const ConvexBody& b, const FeatureCache& decided,
-                         Refinement& refinement) {
-  DepthCache none;
-  const Depth depth = penetrationDepth(a, b, decided, none);
-  const double atMost = (depth.depth + depth.errorBound) * (1 + 4 * kUnit);
-  const ExactFacet facet = nearestFacetExactly(a, b, atMost);
-  const mpf_class squared = precise(dot(facet.normal, facet.normal));
-  const mpf_class offset = precise(facet.offset);
+void describePenetration(const PlacedConvex& a, const PlacedConvex& b, const FeatureCache& features,
+                         RefinedSeparation& refinement) {
+  DepthCache emptyCache;
+  const PenetrationResult depth = computePenetrationDepth(a, b, features, emptyCache);
+  const double depthBound = (depth.depth + depth.errorBound) * (1 + 4 * kRoundoff);
+  const ExactFacet facet = findNearestFacetExactly(a, b, depthBound);
+  const mpf_class squared = toPreciseFloat(dot(facet.normal, facet.normal));
+  const mpf_class offset = toPreciseFloat(facet.offset);
   refinement.penetration = toDouble(mpf_class(offset / sqrt(squared)), facet.scale);
   const std::array<const Integer*, 3> normal{&facet.normal.x, &facet.normal.y, &facet.normal.z};
   for (int i = 0; i < 3; ++i) {
-    const mpf_class way = -precise(*normal[i]) * offset / squared;
-    roundInTwo(way, facet.scale, refinement.closest[i], refinement.closestTail[i]);
+    const mpf_class component = -toPreciseFloat(*normal[i]) * offset / squared;
+    splitToDoubles(component, facet.scale, refinement.closest[i], refinement.closestTail[i]);
   }
 }
 
 /// |sum of weight * w / total| * 2^scale < limit, in integers.
-bool isNearerExactly(ExactDifference& difference, const ExactNearest& nearest, double limit) {
-  const ExactPoint sum = weightedSum(difference, nearest);
+bool isCloserExactly(ExactMinkowskiDifference& difference, const ExactNearestFeature& nearest,
+                     double limit) {
+  const ExactPoint sum = computeWeightedSum(difference, nearest);
   int exponent = 0;
   Integer mantissa(std::ldexp(std::frexp(limit, &exponent), 53));
   const int shift = exponent - 53 - difference.scale();
@@ -45,37 +46,39 @@ bool isNearerExactly(ExactDifference& difference, const ExactNearest& nearest, d
 
 }  // namespace
 
-Refinement refine(const ConvexBody& a, const ConvexBody& b, FeatureCache& cache) {
-  Refinement refinement;
-  refinement.decidedBy = decide(a, b, cache).decidedBy;
-  const FeatureCache decided = cache;
-  ExactDifference difference(a, b);
-  const ExactAnswer exact = solveExactly(difference, cache);
+RefinedSeparation refineSeparation(const PlacedConvex& a, const PlacedConvex& b,
+                                   FeatureCache& cache) {
+  RefinedSeparation refinement;
+  refinement.certificate = computeSeparation(a, b, cache).certificate;
+  const FeatureCache features = cache;
+  ExactMinkowskiDifference difference(a, b);
+  const ExactSeparation exact = computeExactSeparation(difference, cache);
   refinement.verdict = exact.verdict;
   refinement.distance = exact.distance;
   refinement.closest = exact.closest;
   refinement.closestTail = exact.closestTail;
   refinement.pointA = exact.pointA;
   refinement.pointB = exact.pointB;
-  tellFeatures(a, b, cache, refinement);
-  if (exact.verdict == Verdict::penetrating) describePenetration(a, b, decided, refinement);
+  assignFeatures(a, b, cache, refinement);
+  if (exact.verdict == Verdict::penetrating) describePenetration(a, b, features, refinement);
   return refinement;
 }
 
-bool isNearerThan(const ConvexBody& a, const ConvexBody& b, double limit, FeatureCache& cache) {
-  return isNearerThan(decide(a, b, cache), a, b, limit, cache);
+bool isCloserThan(const PlacedConvex& a, const PlacedConvex& b, double limit, FeatureCache& cache) {
+  return isCloserThan(computeSeparation(a, b, cache), a, b, limit, cache);
 }
 
-bool isNearerThan(const Decision& decision, const ConvexBody& a, const ConvexBody& b, double limit,
-                  FeatureCache& cache) {
+bool isCloserThan(const SeparationResult& separation, const PlacedConvex& a, const PlacedConvex& b,
+                  double limit, FeatureCache& cache) {
   if (!(limit > 0)) return false;
   if (limit == std::numeric_limits<double>::infinity()) return true;
-  if (decision.verdict != Verdict::separated) return true;
-  // A limit at twice the distance or more is no question; below, the difference rounds by less.
-  const double margin = decision.errorBound * (1 + 4 * kUnit) + 4 * kUnit * limit;
-  if (std::abs(decision.distance - limit) > margin) return decision.distance < limit;
-  ExactDifference difference(a, b);
-  return isNearerExactly(difference, nearestExactly(difference, cache), limit);
+  if (separation.verdict != Verdict::separated) return true;
+  // If the limit is twice the distance or more, the comparison is clear. Otherwise the rounding of
+  // the difference is below the margin.
+  const double margin = separation.errorBound * (1 + 4 * kRoundoff) + 4 * kRoundoff * limit;
+  if (std::abs(separation.distance - limit) > margin) return separation.distance < limit;
+  ExactMinkowskiDifference difference(a, b);
+  return isCloserExactly(difference, findNearestExactly(difference, cache), limit);
 }
 
 }  // namespace enfilade::collision

@@ -1,14 +1,15 @@
-// That two convex bodies touch, proved with exact sums of doubles. Internal to the narrow phase.
+// Certifies with exact sums of doubles that two convex bodies touch. Internal to the narrow phase.
 #pragma once
 
 #include "collision/minkowski/minkowski.hpp"
 
 namespace enfilade::collision {
 
-/// True: proved that no point of B - A is negative along `direction` and that the origin is one of
-/// them, so that the bodies share a point and no more than their surfaces. False says nothing. Can
-/// only succeed where the coordinates that matter come out exact: poses without rotation, or turned
-/// about an axis that the direction lies along, as things stand on floors and against walls.
-bool provedTouching(const MinkowskiDifference& difference, const Vec3& direction, VertexPair hint);
+/// True: certified that no point of B - A has a negative projection on `direction` and that the
+/// origin is in B - A. The bodies then share surface points only. False: nothing is certified.
+/// `hint`: the start vertices of the hill climbs. Succeeds only if the relevant coordinates are
+/// exact: poses without rotation, or rotated about `direction`, as for bodies on floors and against
+/// walls.
+bool certifyTouching(const MinkowskiDifference& difference, const Vec3& direction, VertexPair hint);
 
 }  // namespace enfilade::collision

@@ -1,49 +1,51 @@
-// Built top down by the surface area heuristic over bins (I. Wald 2007, "On fast construction of
+// Top-down build with the binned surface area heuristic (I. Wald 2007, "On fast construction of
 // SAH-based bounding volume hierarchies").
 //
-// 1. The items of a node are sorted into kBins slices of the box of their centres, along each axis.
-// 2. They are parted between the two slices where the sum of area x number is least.
-// 3. Where bins part nothing (equal centres), or below kBinnedDepth, they are halved by number
-//    along the longest axis; the index breaks ties.
-// Departures: no leaf is made before `leafSize`, since a box test is much cheaper than what waits
-// in a leaf; boxes are floats relative to the middle of the root, rounded outwards, and lie two and
-// two with their parent, so that one cache line decides both children.
+// 1. For each axis, the items of a node are binned by their centres into kBins equal slices.
+// 2. The node is split between the two bins with the minimum sum of area x item count.
+// 3. If binning separates nothing (equal centres), or below kMaxBinnedDepth, the items are halved
+//    by count along the longest axis; the index breaks ties.
+// Departures: a node becomes a leaf only at `leafSize` items, because a box test is much cheaper
+// than the work in a leaf. Boxes are floats relative to the centre of the root, rounded outwards.
+// Both children lie in their parent node, so one cache line decides both.
 //
-// Each split is a split of sets, whatever order the library leaves them in, and leaves are sorted:
-// so the tree is the same with every standard library.
+// A split depends on the set of items only, not on the order that the standard library leaves, and
+// leaves are sorted. The tree is therefore the same with every standard library.
 #include "collision/shapes/box_tree.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::collision {
 namespace {
 
 constexpr int kBins = 16;
-constexpr std::uint32_t kBinnedDepth = 56;  // then halving: 2^32 items end after 32 more
+constexpr std::uint32_t kMaxBinnedDepth = 56;  // then halving: 2^32 items need 32 more levels
 
-float roundedDown(double x) {
-  constexpr float kMost = std::numeric_limits<float>::max();
+float roundDown(double x) {
+  constexpr float kMaxFloat = std::numeric_limits<float>::max();
   constexpr float kInfinite = std::numeric_limits<float>::infinity();
-  if (!(x < static_cast<double>(kMost))) return kMost;
-  if (x < -static_cast<double>(kMost)) return -kInfinite;
+  if (!(x < static_cast<double>(kMaxFloat))) return kMaxFloat;
+  if (x < -static_cast<double>(kMaxFloat)) return -kInfinite;
   const float rounded = static_cast<float>(x);
   return static_cast<double>(rounded) > x ? std::nextafterf(rounded, -kInfinite) : rounded;
 }
 
-/// x rounded to the nearest double, and from there outwards by more than that rounding.
-double outward(double difference, double sign) {
+/// Moves `difference` in the direction of `sign` by more than the rounding error of a subtraction.
+double roundOutward(double difference, double sign) {
   return difference + sign * std::abs(difference) * 0x1p-52;
 }
 
-double halfArea(const Box& box) {
+double halfArea(const Aabb& box) {
   const Vec3 size = box.size();
   return size.x() * size.y() + size.y() * size.z() + size.z() * size.x();
 }
 
 struct Bin {
-  Box box;
+  Aabb box;
   std::uint32_t count = 0;
   void include(const Bin& other) {
     box.include(other.box);
@@ -51,43 +53,48 @@ struct Bin {
   }
 };
 
-/// Items left of `bin` along `axis` go left; axis -1: nothing found.
+/// Items in bins below `bin` along `axis` go left. axis -1: no split found.
 struct Split {
   int axis = -1;
   int bin = 0;
   double cost = std::numeric_limits<double>::infinity();
 };
 
-/// Which slice a centre falls in. Monotone in the centre, so that slices are slices.
-struct Slicer {
-  double low, scale;
-  Slicer(const Box& centres, int axis)
-      : low(centres.min[axis]), scale(kBins / (centres.max[axis] - centres.min[axis])) {}
+/// Maps a centre to its bin. Monotone in the centre, so bins are intervals.
+struct BinMapper {
+  double min, scale;
+  BinMapper(const Aabb& centres, int axis)
+      : min(centres.min[axis]), scale(kBins / (centres.max[axis] - centres.min[axis])) {}
   int operator()(double centre) const {
-    return std::min(kBins - 1, static_cast<int>((centre - low) * scale));
+    return std::min(kBins - 1, static_cast<int>((centre - min) * scale));
   }
 };
 
 class Builder {
  public:
-  Builder(std::span<const Box> boxes, std::uint32_t leafSize) : boxes_(boxes), leafSize_(leafSize) {
+  Builder(std::span<const Aabb> boxes, std::uint32_t leafSize)
+      : boxes_(boxes), leafSize_(leafSize) {
+    ENFILADE_ASSERT(leafSize >= 1);
     tree_.order.resize(boxes.size());
     std::iota(tree_.order.begin(), tree_.order.end(), 0u);
     centres_.reserve(boxes.size());
-    for (const Box& box : boxes) centres_.push_back(box.centre());
+    for (const Aabb& box : boxes) {
+      ENFILADE_ASSERT(!box.empty());
+      centres_.push_back(box.centre());
+    }
   }
 
   BoxTree build() {
     if (boxes_.empty()) return std::move(tree_);
     Task all{0, static_cast<std::uint32_t>(boxes_.size()), kNoParent, 0, 0, {}, {}};
-    measure(all);
+    computeBounds(all);
     tree_.origin = all.box.centre();
     tree_.extent = (all.box.max - tree_.origin).cwiseMax(tree_.origin - all.box.min).maxCoeff();
     tasks_.push_back(all);
-    while (!tasks_.empty()) {  // fewer than 2n branches in all
+    while (!tasks_.empty()) {  // fewer than 2n branches in total
       const Task task = tasks_.back();
       tasks_.pop_back();
-      place(task);
+      buildBranch(task);
     }
     return std::move(tree_);
   }
@@ -95,27 +102,29 @@ class Builder {
  private:
   static constexpr std::uint32_t kNoParent = ~0u;
   struct Task {
-    std::uint32_t first, last;  ///< of the order
+    std::uint32_t first, last;  ///< range of tree_.order
     std::uint32_t parent, side, depth;
-    Box box, centres;
+    Aabb box, centres;
   };
 
-  void measure(Task& task) const {
+  void computeBounds(Task& task) const {
     for (std::uint32_t i = task.first; i < task.last; ++i) {
       task.box.include(boxes_[tree_.order[i]]);
       task.centres.include(centres_[tree_.order[i]]);
     }
   }
 
-  void place(const Task& task) {
-    BoxTree::Branch branch{narrowed(task.box, tree_.origin), task.first, task.last - task.first};
+  void buildBranch(const Task& task) {
+    BoxTree::Branch branch{toFloatAabb(task.box, tree_.origin), task.first, task.last - task.first};
     const auto first = tree_.order.begin() + task.first, last = tree_.order.begin() + task.last;
     if (branch.count <= leafSize_) {
       std::sort(first, last);
     } else {
       branch = {branch.box, static_cast<std::uint32_t>(tree_.nodes.size()), 0};
       tree_.nodes.emplace_back();
-      const std::uint32_t middle = parted(task);
+      const std::uint32_t middle = partitionItems(task);
+      ENFILADE_ASSERT(task.first < middle && middle < task.last);
+      ENFILADE_ASSERT(task.depth + 1 < kMaxTreeDepth);
       for (const std::uint32_t side : {1u, 0u}) {
         Task child{side == 0 ? task.first : middle,
                    side == 0 ? middle : task.last,
@@ -124,22 +133,22 @@ class Builder {
                    task.depth + 1,
                    {},
                    {}};
-        measure(child);
+        computeBounds(child);
         tasks_.push_back(child);
       }
     }
     (task.parent == kNoParent ? tree_.root : tree_.nodes[task.parent].children[task.side]) = branch;
   }
 
-  Split bestSplit(const Task& task) const {
+  Split findBestSplit(const Task& task) const {
     Split best;
     for (int axis = 0; axis < 3; ++axis) {
-      const Slicer slice(task.centres, axis);
-      if (!std::isfinite(slice.scale)) continue;
+      const BinMapper toBin(task.centres, axis);
+      if (!std::isfinite(toBin.scale)) continue;
       std::array<Bin, kBins> bins;
       for (std::uint32_t i = task.first; i < task.last; ++i) {
         const std::uint32_t item = tree_.order[i];
-        Bin& bin = bins[static_cast<std::size_t>(slice(centres_[item][axis]))];
+        Bin& bin = bins[static_cast<std::size_t>(toBin(centres_[item][axis]))];
         bin.box.include(boxes_[item]);
         ++bin.count;
       }
@@ -164,14 +173,14 @@ class Builder {
     }
   }
 
-  /// Parts the items of the task; where the right ones begin.
-  std::uint32_t parted(const Task& task) {
+  /// Partitions the items of the task. Returns the first index of the right half.
+  std::uint32_t partitionItems(const Task& task) {
     const auto first = tree_.order.begin() + task.first, last = tree_.order.begin() + task.last;
-    const Split split = task.depth < kBinnedDepth ? bestSplit(task) : Split{};
+    const Split split = task.depth < kMaxBinnedDepth ? findBestSplit(task) : Split{};
     if (split.axis >= 0) {
-      const Slicer slice(task.centres, split.axis);
+      const BinMapper toBin(task.centres, split.axis);
       const auto middle = std::partition(first, last, [&](std::uint32_t item) {
-        return slice(centres_[item][split.axis]) < split.bin;
+        return toBin(centres_[item][split.axis]) < split.bin;
       });
       return static_cast<std::uint32_t>(middle - tree_.order.begin());
     }
@@ -186,7 +195,7 @@ class Builder {
     return middle;
   }
 
-  std::span<const Box> boxes_;
+  std::span<const Aabb> boxes_;
   std::uint32_t leafSize_;
   std::vector<Vec3> centres_;
   std::vector<Task> tasks_;
@@ -195,17 +204,17 @@ class Builder {
 
 }  // namespace
 
-NarrowBox narrowed(const Box& box, const Vec3& origin) {
-  NarrowBox narrow;
+FloatAabb toFloatAabb(const Aabb& box, const Vec3& origin) {
+  FloatAabb result;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    narrow.min[i] = roundedDown(outward(box.min[axis] - origin[axis], -1));
-    narrow.max[i] = -roundedDown(-outward(box.max[axis] - origin[axis], 1));
+    result.min[i] = roundDown(roundOutward(box.min[axis] - origin[axis], -1));
+    result.max[i] = -roundDown(-roundOutward(box.max[axis] - origin[axis], 1));
   }
-  return narrow;
+  return result;
 }
 
-BoxTree buildBoxTree(std::span<const Box> boxes, std::uint32_t leafSize) {
+BoxTree buildBoxTree(std::span<const Aabb> boxes, std::uint32_t leafSize) {
   return Builder(boxes, leafSize).build();
 }
 

@@ -1,4 +1,4 @@
-// A tree of boxes over boxes: what TriangleTree and PartTree descend.
+// Binary bounding volume hierarchy over axis-aligned boxes. TriangleTree and CompoundShape use it.
 #pragma once
 
 #include <array>
@@ -9,58 +9,67 @@
 
 namespace enfilade::collision {
 
-/// A closed box in metres, relative to the origin of its tree, rounded outwards to floats.
-struct NarrowBox {
+/// Closed single-precision box in metres, relative to the origin of its tree, rounded outwards.
+struct FloatAabb {
   std::array<float, 3> min, max;
 };
 
-/// Never smaller than `box - origin`.
-NarrowBox narrowed(const Box& box, const Vec3& origin);
+/// Conservative conversion: the result always contains `box - origin`.
+FloatAabb toFloatAabb(const Aabb& box, const Vec3& origin);
 
-inline bool overlaps(const NarrowBox& a, const NarrowBox& b) {
+inline bool overlaps(const FloatAabb& a, const FloatAabb& b) {
   return a.min[0] <= b.max[0] && b.min[0] <= a.max[0] && a.min[1] <= b.max[1] &&
          b.min[1] <= a.max[1] && a.min[2] <= b.max[2] && b.min[2] <= a.max[2];
 }
 
-/// Binary; items are numbered in the order of the leaves, see `order`.
+/// Binary tree. Items are numbered in the order of the leaves, see `order`.
 struct BoxTree {
-  /// A box and what is in it.
+  /// A subtree and its box.
   struct Branch {
-    NarrowBox box;
-    std::uint32_t first;  ///< leaf: first item; else: a node
-    std::uint32_t count;  ///< leaf: number of items, at least 1; else 0
+    FloatAabb box;
+    std::uint32_t first;  ///< leaf: first item; inner: index into `nodes`
+    std::uint32_t count;  ///< leaf: number of items, at least 1; inner: 0
     bool isLeaf() const { return count > 0; }
   };
   struct Node {
-    std::array<Branch, 2> children;  ///< one line of the processor's cache
+    std::array<Branch, 2> children;  ///< 64 bytes: one cache line
   };
 
   Vec3 origin = Vec3::Zero();        ///< metres; the boxes are relative to it
-  double extent = 0;                 ///< greatest |coordinate| in the tree's frame, metres
-  Branch root{};                     ///< count and first 0 and no nodes: the tree is empty
+  double extent = 0;                 ///< maximum |coordinate| in the tree's frame, metres
+  Branch root{};                     ///< empty tree: first and count are 0, no nodes
   std::vector<Node> nodes;           ///< parents before children
   std::vector<std::uint32_t> order;  ///< item i of the leaves is box order[i] of the input
 
   bool empty() const { return order.empty(); }
 };
 
-/// Paths from the root are never longer than this many branches.
-constexpr std::size_t kTreeDepthBound = 96;
+/// Sum of the box's edges, metres. Within a tree, a child is never larger than its parent.
+inline double computeBranchSize(const BoxTree::Branch& branch) {
+  double size = 0;
+  for (std::size_t i = 0; i < 3; ++i)
+    size += static_cast<double>(branch.box.max[i]) - static_cast<double>(branch.box.min[i]);
+  return size;
+}
 
-/// Boxes must not be empty, and finite. Leaves hold up to `leafSize` items, ascending in the input.
-BoxTree buildBoxTree(std::span<const Box> boxes, std::uint32_t leafSize);
+/// Maximum number of branches on a path from the root.
+constexpr std::size_t kMaxTreeDepth = 96;
 
-/// Calls see(first item, count) for the leaves whose boxes overlap `box`, items ascending.
-template <typename See>
-void forEachLeafMeeting(const BoxTree& tree, const NarrowBox& box, See&& see) {
+/// Builds a tree with at most `leafSize` items per leaf, ascending by input index within a leaf.
+/// Boxes must be finite and not empty.
+BoxTree buildBoxTree(std::span<const Aabb> boxes, std::uint32_t leafSize);
+
+/// Calls visit(first item, count) for each leaf whose box overlaps `box`, in ascending item order.
+template <typename Visit>
+void forEachOverlappingLeaf(const BoxTree& tree, const FloatAabb& box, Visit&& visit) {
   if (tree.empty() || !overlaps(tree.root.box, box)) return;
-  std::array<const BoxTree::Branch*, kTreeDepthBound> stack;
+  std::array<const BoxTree::Branch*, kMaxTreeDepth> stack;
   std::size_t depth = 0;
   stack[depth++] = &tree.root;
   while (depth > 0) {  // each branch once
     const BoxTree::Branch& branch = *stack[--depth];
     if (branch.isLeaf()) {
-      see(branch.first, branch.count);
+      visit(branch.first, branch.count);
       continue;
     }
     const BoxTree::Node& node = tree.nodes[branch.first];

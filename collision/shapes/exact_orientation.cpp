@@ -1,11 +1,11 @@
-// The filters are those of J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast
-// Robust Geometric Predicates" (1997): a determinant of differences is off by at most a small
-// multiple of its permanent. His bounds hold while nothing under- or overflows; the filters below
-// therefore trust only determinants of differences below kLargeDifference that exceed kUnderflow
-// besides. What they cannot decide is decided with the coordinates scaled to common integers of 62
-// bits where their differences are exact, as in faces along an axis; else by the filter once more
-// in extended precision, which tells the corners of flat faces that were turned; else with integers
-// of any length.
+// Filtered predicates after J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast
+// Robust Geometric Predicates" (1997). The error of a determinant of differences is at most a small
+// multiple of its permanent. His bounds hold only without underflow and overflow. The filters
+// therefore accept only determinants of differences below kMaxDifference that also exceed
+// kUnderflow. If a filter cannot decide, three further stages follow in this order:
+// 1. integers of 62 bits at a common scale, if the differences are exact (axis-aligned faces);
+// 2. the same filter in extended precision, which decides the corners of rotated flat faces;
+// 3. integers of arbitrary length (GMP).
 #include "collision/shapes/exact_orientation.hpp"
 
 #include <gmpxx.h>
@@ -17,29 +17,30 @@
 #include <limits>
 #include <optional>
 
-#include "collision/minkowski/minkowski.hpp"
+#include "collision/assert.hpp"
+#include "collision/floating_point.hpp"
 
 namespace enfilade::collision {
 namespace {
 
 template <class Real>  // Shewchuk's o3derrboundA
-constexpr Real kBound3 = (7 + 56 * unitOf<Real>()) * unitOf<Real>();
+constexpr Real kBound3 = (7 + 56 * unitRoundoff<Real>()) * unitRoundoff<Real>();
 template <class Real>  // and ccwerrboundA
-constexpr Real kBound2 = (3 + 16 * unitOf<Real>()) * unitOf<Real>();
-// Six products of two factors below 1e90 lose less than 6 * 2^-1074 to underflow; times a third
-// factor that stays below 1e-230.
-constexpr double kLargeDifference = 1e90;
+constexpr Real kBound2 = (3 + 16 * unitRoundoff<Real>()) * unitRoundoff<Real>();
+// Six products of two factors below 1e90 lose less than 6 * 2^-1074 to underflow. Multiplied by a
+// third factor, the loss stays below 1e-230.
+constexpr double kMaxDifference = 1e90;
 constexpr double kUnderflow = 1e-220;
 
-/// `value` * `scale` where that is a whole number and no part of it was lost to underflow.
+/// Computes `value` * `scale`. True if it is an integer and nothing was lost to underflow.
 bool toInteger(double value, double scale, std::int64_t& integer) {
   const double scaled = value * scale;
   integer = static_cast<std::int64_t>(scaled);
   return static_cast<double>(integer) == scaled && (integer != 0 || value == 0);
 }
 
-/// The sign of u . (v x w) when the nine numbers are multiples of one power of two by less than
-/// 2^62, so that 192 bits hold all sums of triple products; nullopt when they are not.
+/// Sign of u . (v x w) if the nine numbers are multiples of one power of two by less than 2^62, so
+/// that 192 bits hold all sums of triple products; nullopt otherwise.
 std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w, double largest) {
   __extension__ typedef __int128 Int128;
   int exponent = 0;
@@ -67,8 +68,8 @@ std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w,
   return high > 0 || (high == 0 && low > 0) ? 1 : high < 0 ? -1 : 0;
 }
 
-/// The sign of ux vy - uy vx when the four numbers are multiples of one power of two by less than
-/// 2^62; nullopt when they are not.
+/// Sign of ux vy - uy vx if the four numbers are multiples of one power of two by less than 2^62;
+/// nullopt otherwise.
 std::optional<int> signInFixedPoint(double ux, double uy, double vx, double vy, double largest) {
   __extension__ typedef __int128 Int128;
   int exponent = 0;
@@ -83,21 +84,21 @@ std::optional<int> signInFixedPoint(double ux, double uy, double vx, double vy, 
   return left > right ? 1 : left < right ? -1 : 0;
 }
 
-/// Whether `d`, b - a as it was computed, is b - a: added to a (D. E. Knuth's two-sum) it gives b
-/// and loses nothing.
-bool isExact(double d, double a, double b) {
+/// True if `d`, the computed b - a, is exact: d + a (D. E. Knuth's two-sum) gives b without error.
+bool isExactDifference(double d, double a, double b) {
   const double sum = d + a, rest = sum - d;
   return sum == b && (d - (sum - rest)) + (a - rest) == 0;
 }
 
-bool isExact(const Vec3& difference, const Vec3& a, const Vec3& b) {
-  return isExact(difference.x(), a.x(), b.x()) && isExact(difference.y(), a.y(), b.y()) &&
-         isExact(difference.z(), a.z(), b.z());
+bool isExactDifference(const Vec3& difference, const Vec3& a, const Vec3& b) {
+  return isExactDifference(difference.x(), a.x(), b.x()) &&
+         isExactDifference(difference.y(), a.y(), b.y()) &&
+         isExactDifference(difference.z(), a.z(), b.z());
 }
 
-/// Doubles as integers of one common scale, which is a power of two.
+/// Converts doubles to integers at one common scale, a power of two.
 template <std::size_t N>
-std::array<mpz_class, N> commonIntegers(const std::array<double, N>& values) {
+std::array<mpz_class, N> toCommonIntegers(const std::array<double, N>& values) {
   std::array<double, N> mantissa{};
   std::array<int, N> exponent{};
   int lowest = std::numeric_limits<int>::max();
@@ -108,14 +109,15 @@ std::array<mpz_class, N> commonIntegers(const std::array<double, N>& values) {
   std::array<mpz_class, N> result;
   for (std::size_t i = 0; i < N; ++i) {
     if (values[i] == 0) continue;
+    ENFILADE_ASSERT(exponent[i] >= lowest);
     result[i] = mpz_class(mantissa[i]);
     result[i] <<= static_cast<unsigned>(exponent[i] - lowest);
   }
   return result;
 }
 
-int exactOrientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
-  const auto v = commonIntegers<12>(
+int exactOrient3d(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  const auto v = toCommonIntegers<12>(
       {a.x(), a.y(), a.z(), b.x(), b.y(), b.z(), c.x(), c.y(), c.z(), d.x(), d.y(), d.z()});
   const mpz_class bx = v[3] - v[0], by = v[4] - v[1], bz = v[5] - v[2];
   const mpz_class cx = v[6] - v[0], cy = v[7] - v[1], cz = v[8] - v[2];
@@ -125,25 +127,25 @@ int exactOrientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d)
   return sgn(determinant);
 }
 
-int exactTurn(double ax, double ay, double bx, double by, double cx, double cy) {
-  const auto v = commonIntegers<6>({ax, ay, bx, by, cx, cy});
+int exactOrient2d(double ax, double ay, double bx, double by, double cx, double cy) {
+  const auto v = toCommonIntegers<6>({ax, ay, bx, by, cx, cy});
   const mpz_class determinant = (v[2] - v[0]) * (v[5] - v[1]) - (v[3] - v[1]) * (v[4] - v[0]);
   return sgn(determinant);
 }
 
-/// The sign that a determinant has, off by at most `bound`; nullopt where that may be either.
+/// Sign of a determinant whose error is at most `bound`; nullopt if the sign is uncertain.
 template <class Real>
-std::optional<int> signBeyond(Real determinant, Real bound) {
+std::optional<int> certifiedSign(Real determinant, Real bound) {
   if (determinant > bound) return 1;
   if (determinant < -bound) return -1;
   return std::nullopt;
 }
 
-/// The filter; of differences below kLargeDifference.
+/// Shewchuk's filter, for differences below kMaxDifference.
 template <class Real>
-std::optional<int> filteredOrientation(const Eigen::Matrix<Real, 3, 1>& u,
-                                       const Eigen::Matrix<Real, 3, 1>& v,
-                                       const Eigen::Matrix<Real, 3, 1>& w) {
+std::optional<int> filteredOrient3d(const Eigen::Matrix<Real, 3, 1>& u,
+                                    const Eigen::Matrix<Real, 3, 1>& v,
+                                    const Eigen::Matrix<Real, 3, 1>& w) {
   const Real yz = u.y() * v.z(), zy = u.z() * v.y();
   const Real zx = u.z() * v.x(), xz = u.x() * v.z();
   const Real xy = u.x() * v.y(), yx = u.y() * v.x();
@@ -151,56 +153,57 @@ std::optional<int> filteredOrientation(const Eigen::Matrix<Real, 3, 1>& u,
   const Real permanent = std::abs(w.x()) * (std::abs(yz) + std::abs(zy)) +
                          std::abs(w.y()) * (std::abs(zx) + std::abs(xz)) +
                          std::abs(w.z()) * (std::abs(xy) + std::abs(yx));
-  return signBeyond<Real>(determinant, kBound3<Real> * permanent + kUnderflow);
+  return certifiedSign<Real>(determinant, kBound3<Real> * permanent + kUnderflow);
 }
 
 template <class Real>
-std::optional<int> filteredTurn(Real ux, Real uy, Real vx, Real vy) {
+std::optional<int> filteredOrient2d(Real ux, Real uy, Real vx, Real vy) {
   const Real left = ux * vy, right = uy * vx;
-  return signBeyond<Real>(left - right,
-                          kBound2<Real> * (std::abs(left) + std::abs(right)) + kUnderflow);
+  return certifiedSign<Real>(left - right,
+                             kBound2<Real> * (std::abs(left) + std::abs(right)) + kUnderflow);
 }
 
 }  // namespace
 
-int orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+int orient3d(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   const Vec3 u = b - a, v = c - a, w = d - a;
   const double largest =
       std::max({u.cwiseAbs().maxCoeff(), v.cwiseAbs().maxCoeff(), w.cwiseAbs().maxCoeff()});
-  if (largest < kLargeDifference) {
-    if (const auto sign = filteredOrientation<double>(u, v, w)) return *sign;
-    if (isExact(u, a, b) && isExact(v, a, c) && isExact(w, a, d)) {
+  if (largest < kMaxDifference) {
+    if (const auto sign = filteredOrient3d<double>(u, v, w)) return *sign;
+    if (isExactDifference(u, a, b) && isExactDifference(v, a, c) && isExactDifference(w, a, d)) {
       if (const auto sign = signInFixedPoint(w, u, v, largest)) return *sign;
     }
-    const WideVec wideA = a.cast<Wide>();
-    const auto sign = filteredOrientation<Wide>(b.cast<Wide>() - wideA, c.cast<Wide>() - wideA,
-                                                d.cast<Wide>() - wideA);
+    const LongVec3 longA = a.cast<LongReal>();
+    const auto sign = filteredOrient3d<LongReal>(
+        b.cast<LongReal>() - longA, c.cast<LongReal>() - longA, d.cast<LongReal>() - longA);
     if (sign) return *sign;
   }
-  return exactOrientation(a, b, c, d);
+  return exactOrient3d(a, b, c, d);
 }
 
-int turn(const Vec3& a, const Vec3& b, const Vec3& c, int dropped) {
+int orient2d(const Vec3& a, const Vec3& b, const Vec3& c, int dropped) {
+  ENFILADE_ASSERT(dropped >= 0 && dropped < 3);
   const int i = (dropped + 1) % 3;
   const int j = (dropped + 2) % 3;
   const double ux = b[i] - a[i], uy = b[j] - a[j];
   const double vx = c[i] - a[i], vy = c[j] - a[j];
   const double largest = std::max({std::abs(ux), std::abs(uy), std::abs(vx), std::abs(vy)});
-  if (largest < kLargeDifference) {
-    if (const auto sign = filteredTurn<double>(ux, uy, vx, vy)) return *sign;
-    if (isExact(ux, a[i], b[i]) && isExact(uy, a[j], b[j]) && isExact(vx, a[i], c[i]) &&
-        isExact(vy, a[j], c[j])) {
+  if (largest < kMaxDifference) {
+    if (const auto sign = filteredOrient2d<double>(ux, uy, vx, vy)) return *sign;
+    if (isExactDifference(ux, a[i], b[i]) && isExactDifference(uy, a[j], b[j]) &&
+        isExactDifference(vx, a[i], c[i]) && isExactDifference(vy, a[j], c[j])) {
       if (const auto sign = signInFixedPoint(ux, uy, vx, vy, largest)) return *sign;
     }
-    const auto sign = filteredTurn<Wide>(Wide{b[i]} - a[i], Wide{b[j]} - a[j], Wide{c[i]} - a[i],
-                                         Wide{c[j]} - a[j]);
+    const auto sign = filteredOrient2d<LongReal>(LongReal{b[i]} - a[i], LongReal{b[j]} - a[j],
+                                                 LongReal{c[i]} - a[i], LongReal{c[j]} - a[j]);
     if (sign) return *sign;
   }
-  return exactTurn(a[i], a[j], b[i], b[j], c[i], c[j]);
+  return exactOrient2d(a[i], a[j], b[i], b[j], c[i], c[j]);
 }
 
 bool collinear(const Vec3& a, const Vec3& b, const Vec3& c) {
-  return turn(a, b, c, 0) == 0 && turn(a, b, c, 1) == 0 && turn(a, b, c, 2) == 0;
+  return orient2d(a, b, c, 0) == 0 && orient2d(a, b, c, 1) == 0 && orient2d(a, b, c, 2) == 0;
 }
 
 }  // namespace enfilade::collision

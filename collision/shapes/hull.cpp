@@ -1,16 +1,15 @@
-// Convex hulls by lexicographic insertion, with exact orientation tests.
+// Convex hull by lexicographic insertion ("beneath-beyond"), with exact orientation tests.
 //
-// 1. Points are sorted lexicographically and made unique. Each next point then lies outside of the
-//    hull of those before it, and sees a face at the point inserted last.
+// 1. Points are sorted lexicographically and made unique. Each next point then lies outside the
+//    hull of the previous points, and a face at the last inserted point is visible from it.
 // 2. While all points so far lie on one point, line or plane, the hull is a point, a segment or a
 //    polygon (monotone chain, A. M. Andrew 1979). The first point off the plane makes a pyramid.
-// 3. Every further point replaces the triangles that it sees strictly by a cone over their border
-//    ("beneath-beyond", M. Kallay 1981). Triangles whose plane holds the point are left alone: the
-//    point is never on the line of a border edge, so no triangle is ever without area.
-// 4. Coplanar triangles are merged into convex polygons; points inside of faces or edges go.
+// 3. Each further point replaces the strictly visible triangles by a cone over their horizon
+//    ("beneath-beyond", M. Kallay 1981). Triangles whose plane contains the point are kept: the
+//    point is never on the line of a horizon edge, so no triangle is degenerate.
+// 4. Coplanar triangles are merged into convex polygons. Points inside faces or edges are dropped.
 //
-// Faces and vertices are put in an order of their own, so that the result depends on the set of
-// points and not on their order.
+// Faces and vertices are sorted, so the result depends on the set of points and not on their order.
 
 #include "collision/shapes/hull.hpp"
 
@@ -20,6 +19,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "collision/assert.hpp"
 #include "collision/shapes/exact_orientation.hpp"
 
 namespace enfilade::collision {
@@ -34,7 +34,7 @@ bool lexicographicallyLess(const Vec3& a, const Vec3& b) {
   return a.z() < b.z();
 }
 
-std::vector<Vec3> sortedUnique(std::span<const Vec3> points) {
+std::vector<Vec3> sortUnique(std::span<const Vec3> points) {
   if (points.empty()) {
     throw std::invalid_argument("buildHull: no points; give at least one");
   }
@@ -52,9 +52,10 @@ std::vector<Vec3> sortedUnique(std::span<const Vec3> points) {
   return result;
 }
 
-/// The convex polygon around coplanar points that are not all on one line: indices of its corners,
-/// anticlockwise seen along -axis `dropped`, on which the points' plane must not stand edge-on.
-Polygon polygonAround(std::span<const Vec3> points, int dropped) {
+/// Convex polygon around coplanar points that are not all collinear: indices of its corners,
+/// anticlockwise seen along -axis `dropped`. The plane must not be parallel to that axis.
+Polygon buildConvexPolygon(std::span<const Vec3> points, int dropped) {
+  ENFILADE_ASSERT(points.size() >= 3);
   const int i = (dropped + 1) % 3;
   const int j = (dropped + 2) % 3;
   Polygon order(points.size());
@@ -64,8 +65,8 @@ Polygon polygonAround(std::span<const Vec3> points, int dropped) {
   });
   Polygon chain;
   const auto append = [&](Index next, std::size_t keep) {
-    while (chain.size() >= keep + 2 && turn(points[chain[chain.size() - 2]], points[chain.back()],
-                                            points[next], dropped) <= 0) {
+    while (chain.size() >= keep + 2 && orient2d(points[chain[chain.size() - 2]],
+                                                points[chain.back()], points[next], dropped) <= 0) {
       chain.pop_back();
     }
     chain.push_back(next);
@@ -73,25 +74,27 @@ Polygon polygonAround(std::span<const Vec3> points, int dropped) {
   for (const Index next : order) append(next, 0);
   const std::size_t lower = chain.size() - 1;
   for (std::size_t k = order.size() - 1; k-- > 0;) append(order[k], lower);
-  chain.pop_back();  // the first point came again
+  chain.pop_back();  // the first point, repeated
+  ENFILADE_ASSERT(chain.size() >= 3);
   return chain;
 }
 
-/// The coordinate along which the plane of three points off one line is not seen edge-on.
-int facingAxis(const Vec3& a, const Vec3& b, const Vec3& c) {
+/// First axis to which the plane of three non-collinear points is not parallel.
+int findProjectionAxis(const Vec3& a, const Vec3& b, const Vec3& c) {
   for (int axis = 0; axis < 2; ++axis) {
-    if (turn(a, b, c, axis) != 0) return axis;
+    if (orient2d(a, b, c, axis) != 0) return axis;
   }
   return 2;
 }
 
-/// A closed surface of triangles over points, grown by step 3.
+/// Closed triangle mesh of the hull, extended point by point (step 3 of the file head).
 class TriangleHull {
  public:
   explicit TriangleHull(std::span<const Vec3> points) : points_(points) {}
 
-  /// `base` is convex and anticlockwise seen from `apex`'s far side.
+  /// `base` is convex, and anticlockwise seen from the side opposite to `apex`.
   void startPyramid(const Polygon& base, Index apex) {
+    ENFILADE_ASSERT(base.size() >= 3);
     const Index corners = static_cast<Index>(base.size());
     for (Index k = 1; k + 1 < corners; ++k) {
       const Index self = static_cast<Index>(triangles_.size());
@@ -110,97 +113,99 @@ class TriangleHull {
   }
 
   void insert(Index point) {
-    collectSeen(point);
-    coneAtBorder(point);
+    collectVisible(point);
+    buildCone(point);
   }
 
-  std::vector<Polygon> mergedFaces();
+  std::vector<Polygon> mergeFaces();
 
  private:
   struct Triangle {
     std::array<Index, 3> corner;
-    std::array<Index, 3> beyond;  ///< the triangle across the edge corner[i], corner[i + 1]
+    std::array<Index, 3> adjacent;  ///< triangle across the edge corner[i], corner[i + 1]
     bool alive = true;
-    bool seen = false;
+    bool visible = false;
   };
-  struct BorderEdge {
+  struct HorizonEdge {
     Index from, to;
-    Index beyond;  ///< the unseen triangle
+    Index adjacent;  ///< triangle that is not visible
   };
 
-  bool sees(Index point, const Triangle& t) const {
-    return orientation(points_[t.corner[0]], points_[t.corner[1]], points_[t.corner[2]],
-                       points_[point]) > 0;
+  bool isVisibleFrom(Index point, const Triangle& t) const {
+    return orient3d(points_[t.corner[0]], points_[t.corner[1]], points_[t.corner[2]],
+                    points_[point]) > 0;
   }
 
-  void collectSeen(Index point);
-  void coneAtBorder(Index point);
-  static Index cornerAway(const Triangle& t, Index beyond);
-  std::vector<Index> planeOfTriangles() const;
+  void collectVisible(Index point);
+  void buildCone(Index point);
+  static Index oppositeCorner(const Triangle& t, Index neighbour);
+  std::vector<Index> groupCoplanarTriangles() const;
 
   std::span<const Vec3> points_;
   std::vector<Triangle> triangles_;
-  std::vector<Index> lastFan_;  ///< the triangles at the point inserted last
-  std::vector<Index> seen_;
-  std::vector<BorderEdge> border_;
-  std::vector<Index> fanAt_ = std::vector<Index>(points_.size());  ///< by its `from` point
+  std::vector<Index> lastFan_;  ///< triangles at the last inserted point
+  std::vector<Index> visible_;
+  std::vector<HorizonEdge> horizon_;
+  std::vector<Index> fanAt_ = std::vector<Index>(points_.size());  ///< triangle by `from` point
 };
 
-void TriangleHull::collectSeen(Index point) {
-  seen_.clear();
-  border_.clear();
+void TriangleHull::collectVisible(Index point) {
+  visible_.clear();
+  horizon_.clear();
   for (const Index t : lastFan_) {
-    if (!sees(point, triangles_[t])) continue;
-    triangles_[t].seen = true;
-    seen_.push_back(t);
+    if (!isVisibleFrom(point, triangles_[t])) continue;
+    triangles_[t].visible = true;
+    visible_.push_back(t);
     break;
   }
-  if (seen_.empty()) throw std::logic_error("buildHull: a point outside sees no face");
-  for (std::size_t next = 0; next < seen_.size(); ++next) {
-    const Triangle t = triangles_[seen_[next]];
+  if (visible_.empty())
+    throw std::logic_error("buildHull: no face is visible from an outside point");
+  for (std::size_t next = 0; next < visible_.size(); ++next) {
+    const Triangle t = triangles_[visible_[next]];
     for (std::size_t e = 0; e < 3; ++e) {
-      Triangle& other = triangles_[t.beyond[e]];
-      if (other.seen) continue;
-      if (sees(point, other)) {
-        other.seen = true;
-        seen_.push_back(t.beyond[e]);
+      Triangle& other = triangles_[t.adjacent[e]];
+      if (other.visible) continue;
+      if (isVisibleFrom(point, other)) {
+        other.visible = true;
+        visible_.push_back(t.adjacent[e]);
       } else {
-        border_.push_back({t.corner[e], t.corner[(e + 1) % 3], t.beyond[e]});
+        horizon_.push_back({t.corner[e], t.corner[(e + 1) % 3], t.adjacent[e]});
       }
     }
   }
 }
 
-void TriangleHull::coneAtBorder(Index point) {
-  for (const Index t : seen_) triangles_[t].alive = false;
+void TriangleHull::buildCone(Index point) {
+  ENFILADE_ASSERT(horizon_.size() >= 3);
+  for (const Index t : visible_) triangles_[t].alive = false;
   lastFan_.clear();
-  for (const BorderEdge& edge : border_) {
+  for (const HorizonEdge& edge : horizon_) {
     const Index self = static_cast<Index>(triangles_.size());
     fanAt_[edge.from] = self;
-    triangles_.push_back({{edge.from, edge.to, point}, {edge.beyond, 0, 0}});
+    triangles_.push_back({{edge.from, edge.to, point}, {edge.adjacent, 0, 0}});
     lastFan_.push_back(self);
-    Triangle& beyond = triangles_[edge.beyond];
+    Triangle& neighbour = triangles_[edge.adjacent];
     for (std::size_t e = 0; e < 3; ++e) {
-      if (beyond.corner[e] == edge.to && beyond.corner[(e + 1) % 3] == edge.from) {
-        beyond.beyond[e] = self;
+      if (neighbour.corner[e] == edge.to && neighbour.corner[(e + 1) % 3] == edge.from) {
+        neighbour.adjacent[e] = self;
       }
     }
   }
   for (const Index t : lastFan_) {
     const Index next = fanAt_[triangles_[t].corner[1]];
-    triangles_[t].beyond[1] = next;
-    triangles_[next].beyond[2] = t;
+    triangles_[t].adjacent[1] = next;
+    triangles_[next].adjacent[2] = t;
   }
 }
 
-/// The corner of `t` that is none of its neighbour `beyond`.
-Index TriangleHull::cornerAway(const Triangle& t, Index beyond) {
-  const std::size_t edge = t.beyond[0] == beyond ? 0 : t.beyond[1] == beyond ? 1 : 2;
+/// Corner of `t` that its neighbour does not share.
+Index TriangleHull::oppositeCorner(const Triangle& t, Index neighbour) {
+  const std::size_t edge = t.adjacent[0] == neighbour ? 0 : t.adjacent[1] == neighbour ? 1 : 2;
   return t.corner[(edge + 2) % 3];
 }
 
-/// For each triangle the first triangle of its plane; its own index for the first.
-std::vector<Index> TriangleHull::planeOfTriangles() const {
+/// For each triangle, the index of the first triangle in its coplanar group.
+std::vector<Index> TriangleHull::groupCoplanarTriangles() const {
   constexpr Index kNone = static_cast<Index>(-1);
   std::vector<Index> plane(triangles_.size(), kNone);
   std::vector<Index> open;
@@ -212,11 +217,11 @@ std::vector<Index> TriangleHull::planeOfTriangles() const {
       const Index inPlane = open.back();
       const Triangle& t = triangles_[inPlane];
       open.pop_back();
-      for (const Index other : t.beyond) {
+      for (const Index other : t.adjacent) {
         if (plane[other] != kNone) continue;
-        const Index apex = cornerAway(triangles_[other], inPlane);
-        if (orientation(points_[t.corner[0]], points_[t.corner[1]], points_[t.corner[2]],
-                        points_[apex]) != 0)
+        const Index apex = oppositeCorner(triangles_[other], inPlane);
+        if (orient3d(points_[t.corner[0]], points_[t.corner[1]], points_[t.corner[2]],
+                     points_[apex]) != 0)
           continue;
         plane[other] = first;
         open.push_back(other);
@@ -226,18 +231,18 @@ std::vector<Index> TriangleHull::planeOfTriangles() const {
   return plane;
 }
 
-std::vector<Polygon> TriangleHull::mergedFaces() {
-  const std::vector<Index> plane = planeOfTriangles();
+std::vector<Polygon> TriangleHull::mergeFaces() {
+  const std::vector<Index> plane = groupCoplanarTriangles();
   struct HalfEdge {
     Index plane, from, to;
     auto operator<=>(const HalfEdge&) const = default;
   };
   std::vector<HalfEdge> edges;
-  std::vector<Index> planesAt(points_.size(), 0);  // outgoing border edges: one a plane
+  std::vector<Index> planesAt(points_.size(), 0);  // outgoing border edges: one per plane
   for (Index t = 0; t < triangles_.size(); ++t) {
     if (!triangles_[t].alive) continue;
     for (std::size_t e = 0; e < 3; ++e) {
-      if (plane[triangles_[t].beyond[e]] == plane[t]) continue;
+      if (plane[triangles_[t].adjacent[e]] == plane[t]) continue;
       edges.push_back({plane[t], triangles_[t].corner[e], triangles_[t].corner[(e + 1) % 3]});
       ++planesAt[triangles_[t].corner[e]];
     }
@@ -254,35 +259,36 @@ std::vector<Polygon> TriangleHull::mergedFaces() {
       edge = std::lower_bound(first, last, edge->to,
                               [](const HalfEdge& e, Index from) { return e.from < from; });
     } while (edge != first);
+    ENFILADE_ASSERT(face.size() >= 3);
     faces.push_back(std::move(face));
     first = last;
   }
   return faces;
 }
 
-std::vector<Polygon> facesAround(std::span<const Vec3> points) {
+std::vector<Polygon> buildFaces(std::span<const Vec3> points) {
   const std::size_t count = points.size();
   std::size_t offLine = 2;
   while (offLine < count && collinear(points[0], points[1], points[offLine])) ++offLine;
   if (offLine >= count) return {};
   std::size_t offPlane = offLine + 1;
   while (offPlane < count &&
-         orientation(points[0], points[1], points[offLine], points[offPlane]) == 0) {
+         orient3d(points[0], points[1], points[offLine], points[offPlane]) == 0) {
     ++offPlane;
   }
-  Polygon base = polygonAround(points.first(std::min(offPlane, count)),
-                               facingAxis(points[0], points[1], points[offLine]));
+  Polygon base = buildConvexPolygon(points.first(std::min(offPlane, count)),
+                                    findProjectionAxis(points[0], points[1], points[offLine]));
   if (offPlane >= count) return {base, Polygon(base.rbegin(), base.rend())};
-  if (orientation(points[base[0]], points[base[1]], points[base[2]], points[offPlane]) > 0) {
+  if (orient3d(points[base[0]], points[base[1]], points[base[2]], points[offPlane]) > 0) {
     std::reverse(base.begin(), base.end());
   }
   TriangleHull hull(points);
   hull.startPyramid(base, static_cast<Index>(offPlane));
   for (std::size_t p = offPlane + 1; p < count; ++p) hull.insert(static_cast<Index>(p));
-  return hull.mergedFaces();
+  return hull.mergeFaces();
 }
 
-/// Closed faces run along each of their edges once in each direction.
+/// Fills the adjacency lists. Faces of a closed surface use each edge once in each direction.
 void linkNeighbours(Hull& hull) {
   const auto eachEdge = [&](const auto& visit) {
     for (const Polygon& face : hull.faces)
@@ -292,7 +298,7 @@ void linkNeighbours(Hull& hull) {
       visit(1, 0);
     }
   };
-  std::vector<Index>& start = hull.neighbourStart;
+  std::vector<Index>& start = hull.neighbourOffsets;
   start.assign(hull.vertices.size() + 1, 0);
   eachEdge([&](Index from, Index) { ++start[from + 1]; });
   for (std::size_t v = 1; v < start.size(); ++v) start[v] += start[v - 1];
@@ -303,7 +309,7 @@ void linkNeighbours(Hull& hull) {
     std::sort(hull.neighbours.begin() + start[v], hull.neighbours.begin() + start[v + 1]);
 }
 
-/// Keeps the points that are corners of faces, in their order, and renumbers the faces.
+/// Keeps only the points that are corners of faces, in order, and renumbers the faces.
 void keepCorners(Hull& hull, std::span<const Vec3> points, std::vector<Polygon> faces) {
   std::vector<Index> newIndex(points.size(), 0);
   for (const Polygon& face : faces) {
@@ -322,21 +328,21 @@ void keepCorners(Hull& hull, std::span<const Vec3> points, std::vector<Polygon> 
   hull.faces = std::move(faces);
 }
 
-/// Scaled, so that squares neither over- nor underflow.
-double greatestNorm(std::span<const Vec3> points) {
-  double largest = 0, greatest = 0;
+/// Maximum norm, scaled so that squares neither overflow nor underflow.
+double computeMaxNorm(std::span<const Vec3> points) {
+  double largest = 0, maxNorm = 0;
   for (const Vec3& p : points) largest = std::max(largest, p.cwiseAbs().maxCoeff());
   if (largest == 0) return 0;
   for (const Vec3& p : points) {
     const double x = p.x() / largest, y = p.y() / largest, z = p.z() / largest;
-    greatest = std::max(greatest, std::sqrt(x * x + y * y + z * z));
+    maxNorm = std::max(maxNorm, std::sqrt(x * x + y * y + z * z));
   }
-  return greatest * largest;
+  return maxNorm * largest;
 }
 
 // ---- validate ----------------------------------------------------------------------------------
 
-[[noreturn]] void broken(const std::string& what) {
+[[noreturn]] void throwInvalidHull(const std::string& what) {
   throw std::logic_error("hull: " + what);
 }
 
@@ -344,26 +350,29 @@ void validateEdges(const Hull& hull) {
   std::set<std::pair<Index, Index>> edges;
   for (std::size_t f = 0; f < hull.faces.size(); ++f) {
     const Polygon& face = hull.faces[f];
-    if (face.size() < 3) broken("face " + std::to_string(f) + " has fewer than 3 corners");
+    if (face.size() < 3)
+      throwInvalidHull("face " + std::to_string(f) + " has fewer than 3 corners");
     for (std::size_t k = 0; k < face.size(); ++k) {
       if (face[k] >= hull.vertices.size()) {
-        broken("face " + std::to_string(f) + " names a vertex that is not there");
+        throwInvalidHull("face " + std::to_string(f) + " has an invalid vertex index");
       }
       if (!edges.emplace(face[k], face[(k + 1) % face.size()]).second) {
-        broken("face " + std::to_string(f) + " runs along an edge in the sense of another");
+        throwInvalidHull("face " + std::to_string(f) + " repeats an edge of another face");
       }
     }
   }
   for (const auto& [from, to] : edges) {
     if (!edges.contains({to, from})) {
-      broken("edge " + std::to_string(from) + "-" + std::to_string(to) + " has one face only");
+      throwInvalidHull("edge " + std::to_string(from) + "-" + std::to_string(to) +
+                       " has only one face");
     }
   }
   const std::size_t edgeCount = edges.size() / 2;
   const std::size_t euler = hull.faces.empty() ? 0 : 2;
   if (euler == 2 && hull.vertices.size() + hull.faces.size() != edgeCount + euler) {
-    broken("Euler's formula fails: " + std::to_string(hull.vertices.size()) + " vertices, " +
-           std::to_string(edgeCount) + " edges, " + std::to_string(hull.faces.size()) + " faces");
+    throwInvalidHull("Euler's formula fails: " + std::to_string(hull.vertices.size()) +
+                     " vertices, " + std::to_string(edgeCount) + " edges, " +
+                     std::to_string(hull.faces.size()) + " faces");
   }
 }
 
@@ -372,22 +381,23 @@ void validateNeighbours(const Hull& hull) {
   expected.vertices = hull.vertices;
   expected.faces = hull.faces;
   linkNeighbours(expected);
-  if (expected.neighbourStart != hull.neighbourStart || expected.neighbours != hull.neighbours) {
-    broken("the neighbours are not those that the edges of the faces join");
+  if (expected.neighbourOffsets != hull.neighbourOffsets ||
+      expected.neighbours != hull.neighbours) {
+    throwInvalidHull("the neighbour lists do not match the edges of the faces");
   }
 }
 
-/// Corners turn one way, strictly, about the face's plane.
+/// Checks that the face is strictly convex: all its corners have the same orientation.
 void validatePolygon(const Hull& hull, std::size_t f) {
   const Polygon& face = hull.faces[f];
   const auto at = [&](std::size_t k) -> const Vec3& {
     return hull.vertices[face[k % face.size()]];
   };
-  const int axis = facingAxis(at(0), at(1), at(2));
-  const int sense = turn(at(0), at(1), at(2), axis);
+  const int axis = findProjectionAxis(at(0), at(1), at(2));
+  const int sense = orient2d(at(0), at(1), at(2), axis);
   for (std::size_t k = 0; k < face.size(); ++k) {
-    if (sense == 0 || turn(at(k), at(k + 1), at(k + 2), axis) != sense) {
-      broken("face " + std::to_string(f) + " is not strictly convex");
+    if (sense == 0 || orient2d(at(k), at(k + 1), at(k + 2), axis) != sense) {
+      throwInvalidHull("face " + std::to_string(f) + " is not strictly convex");
     }
   }
 }
@@ -395,12 +405,12 @@ void validatePolygon(const Hull& hull, std::size_t f) {
 void validateSide(const Hull& hull, std::size_t f) {
   const Polygon& face = hull.faces[f];
   for (Index v = 0; v < hull.vertices.size(); ++v) {
-    const int side = orientation(hull.vertices[face[0]], hull.vertices[face[1]],
-                                 hull.vertices[face[2]], hull.vertices[v]);
+    const int side = orient3d(hull.vertices[face[0]], hull.vertices[face[1]],
+                              hull.vertices[face[2]], hull.vertices[v]);
     const bool corner = std::find(face.begin(), face.end(), v) != face.end();
     if (side > 0 || (side == 0) != corner) {
-      broken("vertex " + std::to_string(v) + " is " + (side > 0 ? "outside" : "in the plane") +
-             " of face " + std::to_string(f));
+      throwInvalidHull("vertex " + std::to_string(v) + " is " +
+                       (side > 0 ? "outside" : "in the plane") + " of face " + std::to_string(f));
     }
   }
 }
@@ -408,9 +418,9 @@ void validateSide(const Hull& hull, std::size_t f) {
 }  // namespace
 
 Hull buildHull(std::span<const Vec3> points) {
-  const std::vector<Vec3> sorted = sortedUnique(points);
+  const std::vector<Vec3> sorted = sortUnique(points);
   Hull hull;
-  std::vector<Polygon> faces = facesAround(sorted);
+  std::vector<Polygon> faces = buildFaces(sorted);
   if (faces.empty()) {
     hull.vertices.push_back(sorted.front());
     if (sorted.size() > 1) hull.vertices.push_back(sorted.back());
@@ -418,24 +428,27 @@ Hull buildHull(std::span<const Vec3> points) {
     keepCorners(hull, sorted, std::move(faces));
   }
   linkNeighbours(hull);
-  hull.radius = greatestNorm(hull.vertices);
+  hull.radius = computeMaxNorm(hull.vertices);
 #ifndef NDEBUG
-  validate(hull);
+  validateHull(hull);
 #endif
   return hull;
 }
 
-void validate(const Hull& hull) {
-  if (hull.vertices.empty()) broken("no vertices");
-  if (hull.faces.size() == 1 || hull.faces.size() == 3) broken("1 or 3 faces close nothing");
-  if (hull.faces.empty() && hull.vertices.size() > 2) broken("3 or more vertices without faces");
+void validateHull(const Hull& hull) {
+  if (hull.vertices.empty()) throwInvalidHull("no vertices");
+  if (hull.faces.size() == 1 || hull.faces.size() == 3)
+    throwInvalidHull("1 or 3 faces are not closed");
+  if (hull.faces.empty() && hull.vertices.size() > 2)
+    throwInvalidHull("3 or more vertices without faces");
   validateEdges(hull);
   validateNeighbours(hull);
   for (std::size_t f = 0; f < hull.faces.size(); ++f) {
     validatePolygon(hull, f);
     validateSide(hull, f);
   }
-  if (hull.radius != greatestNorm(hull.vertices)) broken("the radius is not that of the vertices");
+  if (hull.radius != computeMaxNorm(hull.vertices))
+    throwInvalidHull("the radius does not match the vertices");
 }
 
 }  // namespace enfilade::collision

@@ -1,4 +1,4 @@
-// Convex polytopes: built once from any list of points, then only read.
+// Convex hulls of point sets: immutable convex polytopes.
 #pragma once
 
 #include <span>
@@ -8,26 +8,27 @@
 
 namespace enfilade::collision {
 
-/// The convex hull of a list of points, in the body's frame, in metres. It may be flat: a polygon,
-/// a segment or one point. Faces are convex polygons, counter-clockwise seen from outside.
+/// Convex polytope in the body frame, in metres. It may be flat: a polygon, a segment or a point.
+/// Faces are convex polygons, counter-clockwise seen from outside.
 struct Hull {
-  std::vector<Vec3> vertices;                     ///< extreme points only, each once
-  std::vector<std::vector<std::uint32_t>> faces;  ///< solids: >= 4; a polygon: 2; otherwise none
-  std::vector<std::uint32_t> neighbourStart;      ///< size vertices+1; offsets into `neighbours`
+  std::vector<Vec3> vertices;                     ///< extreme points only, no duplicates
+  std::vector<std::vector<std::uint32_t>> faces;  ///< solid: >= 4; polygon: 2; otherwise 0
+  std::vector<std::uint32_t> neighbourOffsets;    ///< size vertices+1; offsets into `neighbours`
   std::vector<std::uint32_t> neighbours;          ///< vertices joined by an edge, ascending
-  double radius = 0;                              ///< greatest distance of a vertex from the origin
+  double radius = 0;                              ///< maximum distance of a vertex from the origin
 
   std::span<const std::uint32_t> neighboursOf(std::uint32_t vertex) const {
-    return {neighbours.data() + neighbourStart[vertex],
-            neighbours.data() + neighbourStart[vertex + 1]};
+    return {neighbours.data() + neighbourOffsets[vertex],
+            neighbours.data() + neighbourOffsets[vertex + 1]};
   }
 };
 
-/// The hull of `points` (at least one, all finite; throws std::invalid_argument otherwise).
-/// Orientation tests are exact, so duplicates, coplanar and collinear points do no harm.
+/// Builds the convex hull of `points` (at least one, all finite; throws std::invalid_argument
+/// otherwise). Orientation tests are exact: duplicate, coplanar and collinear points are allowed.
 Hull buildHull(std::span<const Vec3> points);
 
-/// Euler's formula, convexity (exact) and adjacency; throws std::logic_error naming what is broken.
-void validate(const Hull& hull);
+/// Checks Euler's formula, convexity (exact) and adjacency. Throws std::logic_error that names the
+/// violated property.
+void validateHull(const Hull& hull);
 
 }  // namespace enfilade::collision

@@ -3,29 +3,29 @@
 namespace enfilade::collision {
 namespace {
 
-// Measured on 50,880 triangles with mesh queries: 2 and 8 are slower.
+// Chosen by measurement of mesh queries on 50,880 triangles: 2 and 8 are slower.
 constexpr std::uint32_t kLeafSize = 4;
 
-BoxTree treeOver(const std::vector<Triangle>& triangles) {
-  std::vector<Box> boxes;
+BoxTree buildTree(const std::vector<Triangle>& triangles) {
+  std::vector<Aabb> boxes;
   boxes.reserve(triangles.size());
-  for (const Triangle& t : triangles) boxes.push_back(boxOf(t));
+  for (const Triangle& t : triangles) boxes.push_back(computeAabb(t));
   return buildBoxTree(boxes, kLeafSize);
 }
 
 }  // namespace
 
-TriangleTree::TriangleTree(const std::vector<Triangle>& triangles) : tree_(treeOver(triangles)) {
+TriangleTree::TriangleTree(const std::vector<Triangle>& triangles) : tree_(buildTree(triangles)) {
   triangles_.reserve(triangles.size());
   for (const std::uint32_t i : tree_.order) triangles_.push_back(triangles[i]);
 }
 
-void TriangleTree::query(const Box& box, std::vector<std::uint32_t>& indices) const {
-  forEachLeafMeeting(tree_, narrowed(box, tree_.origin),
-                     [&](std::uint32_t first, std::uint32_t count) {
-                       for (std::uint32_t i = first; i < first + count; ++i)
-                         if (overlaps(boxOf(triangles_[i]), box)) indices.push_back(i);
-                     });
+void TriangleTree::query(const Aabb& box, std::vector<std::uint32_t>& indices) const {
+  forEachOverlappingLeaf(tree_, toFloatAabb(box, tree_.origin),
+                         [&](std::uint32_t first, std::uint32_t count) {
+                           for (std::uint32_t i = first; i < first + count; ++i)
+                             if (overlaps(computeAabb(triangles_[i]), box)) indices.push_back(i);
+                         });
 }
 
 }  // namespace enfilade::collision

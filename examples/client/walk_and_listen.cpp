@@ -1,5 +1,4 @@
-// walk_and_listen PORT: drives an avatar until something stops it, and prints contacts as they
-// come.
+// walk_and_listen PORT: drives an avatar until an obstacle blocks it, and prints its contacts.
 #include <cstdio>
 #include <cstdlib>
 
@@ -11,7 +10,7 @@ int main(int, char** arguments) {
   const int port = std::atoi(arguments[1] ? arguments[1] : "7878");
   bool stopped = false;
   AsyncHandlers handlers;
-  handlers.closed = [](const v1::Error& why) { std::puts(why.message().c_str()); };
+  handlers.closed = [](const v1::Error& reason) { std::puts(reason.message().c_str()); };
   handlers.events = [&](const v1::TickEvents& events) {
     for (const v1::ContactEvent& contact : events.contacts()) {
       std::printf("%.3f s: %s %s %s\n", contact.time(),
@@ -33,7 +32,7 @@ int main(int, char** arguments) {
   for (const auto& request : {listen, spawn, step, drive}) client.request(request, [](Reply) {});
   for (int tick = 0; tick < 600 && !stopped; ++tick) {
     client.request(step, [](Reply) {});
-    while (client.underWay() > 0 && client.run(std::chrono::seconds(10))) {
+    while (client.pendingRequests() > 0 && client.run(std::chrono::seconds(10))) {
     }
   }
   return stopped ? 0 : 1;

@@ -1,4 +1,4 @@
-// Two unit boxes, one turned by 45 degrees about the vertical, come nearer until they penetrate.
+// Moves two unit boxes, one rotated by 45 degrees about Y, towards each other until they penetrate.
 #include <iostream>
 #include <vector>
 
@@ -11,20 +11,22 @@ int main() {
   const std::vector<Vec3> corners{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
                                   {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
   const Hull box = buildHull(corners);
-  Mat3 turned;
-  turned << 0.5, 0, 0.5, 0, 1, 0, -0.5, 0, 0.5;
-  turned *= 1.4142135623730951;
+  Mat3 rotation;
+  rotation << 0.5, 0, 0.5, 0, 1, 0, -0.5, 0, 0.5;
+  rotation *= 1.4142135623730951;
 
   const char* const verdicts[] = {"separated", "touching", "penetrating"};
-  const char* const deciders[] = {"rounded arithmetic with a proved bound", "exact sums of doubles",
+  const char* const deciders[] = {"floating point with an error bound",
+                                  "exact floating-point "
+                                  "expansions",
                                   "exact integers"};
-  FeatureCache features;  // kept from query to query: the next one starts where this one ended
+  FeatureCache features;  // warm start: each query starts from the features of the last
   for (const double x : {3.0, 1.5, 1.0, 0.5}) {
-    const ConvexBody a{box.vertices, Vec3::Zero(), nullptr, &box};
-    const ConvexBody b{box.vertices, Vec3(x, 0, 0.5), &turned, &box};
-    const Decision decision = decide(a, b, features);
-    std::cout << "x = " << x << " m: " << verdicts[static_cast<int>(decision.verdict)]
-              << ", distance " << decision.distance << " m (+- " << decision.errorBound << "), by "
-              << deciders[static_cast<int>(decision.decidedBy)] << '\n';
+    const PlacedConvex a{box.vertices, Vec3::Zero(), nullptr, &box};
+    const PlacedConvex b{box.vertices, Vec3(x, 0, 0.5), &rotation, &box};
+    const SeparationResult result = computeSeparation(a, b, features);
+    std::cout << "x = " << x << " m: " << verdicts[static_cast<int>(result.verdict)]
+              << ", distance " << result.distance << " m (+- " << result.errorBound << "), by "
+              << deciders[static_cast<int>(result.certificate)] << '\n';
   }
 }

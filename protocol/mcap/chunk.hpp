@@ -1,4 +1,4 @@
-// What a chunk of an MCAP file holds, believed only as far as its CRC goes.
+// The content of an MCAP chunk, validated by its CRC.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ struct Channel {
   std::string topic, messageEncoding, schemaName;
 };
 
-/// Its data live as long as the chunk that they stand in.
+/// One message. `data` points into the chunk and lives as long as it.
 struct Message {
   const Channel* channel = nullptr;
   std::uint32_t sequence = 0;
@@ -22,39 +22,39 @@ struct Message {
   std::string_view data;
 };
 
-/// Schemas and channels that were met so far. All throw std::out_of_range, saying what is wrong.
+/// Schemas and channels read so far. All functions throw std::out_of_range with the reason.
 struct Definitions {
   std::map<std::uint16_t, std::string> schemas;
   std::map<std::uint16_t, Channel> channels;
 
   void read(Opcode opcode, std::string_view content);
-  Message messageFrom(std::string_view content) const;
+  Message parseMessage(std::string_view content) const;
 };
 
-/// The head of a chunk's content.
+/// The header fields of a chunk.
 struct ChunkHead {
   std::uint64_t firstTime = 0, lastTime = 0;  ///< nanoseconds
-  std::uint64_t unpacked = 0;                 ///< bytes
+  std::uint64_t uncompressedSize = 0;         ///< bytes
   std::uint32_t crc = 0;
 };
-ChunkHead chunkHeadFrom(Fields& fields);
+ChunkHead parseChunkHead(Fields& fields);
 
 struct Chunk {
   ChunkHead head;
   std::string records;
-  /// Of each channel the content of the MessageIndex record that belongs to it.
+  /// Content of the MessageIndex record of each channel.
   std::map<std::uint16_t, std::string> index;
 };
 
-/// Unpacks the content of a chunk's record and checks it against its CRC and its head; definitions
-/// in it are added. Throws std::out_of_range, saying what is wrong.
+/// Decompresses a chunk record and checks it against its CRC and header; adds its definitions.
+/// Throws std::out_of_range with the reason.
 Chunk openChunk(std::string_view content, Definitions& definitions);
 
-/// The next message of `records` from `at` on, which goes behind it; false: there is none.
+/// Reads the next message of `records` from offset `at` and advances `at`; false at the end.
 bool nextMessage(std::string_view records, std::size_t& at, const Definitions& definitions,
                  Message& message);
 
-/// Over what went before and these bytes.
-std::uint32_t crcOf(std::string_view bytes, std::uint32_t before = 0);
+/// CRC of `bytes` appended to data with the CRC `before`.
+std::uint32_t computeCrc(std::string_view bytes, std::uint32_t before = 0);
 
 }  // namespace enfilade::protocol::mcap

@@ -1,7 +1,6 @@
-// Reads an MCAP file here and there: the places of its chunks come from the summary, or, when a
-// writer that was killed left none, from the heads of the records, front to back. A chunk is
-// unpacked when it is asked for, and checked as Reader does: its CRC, its times, and the indexes
-// after it. What is not asked for is not looked at.
+// Random access to MCAP files. Chunk positions come from the summary or, if the writer was killed,
+// from a scan of all record headers. A chunk is decompressed on demand and checked as in Reader:
+// its CRC, its times and its indexes. Other chunks are not read.
 #pragma once
 
 #include <filesystem>
@@ -14,30 +13,31 @@
 
 namespace enfilade::protocol::mcap {
 
-struct ChunkPlace {
-  std::uint64_t start = 0, length = 0;        ///< of its record, bytes of the file
+struct ChunkIndex {
+  std::uint64_t start = 0, length = 0;        ///< position and size of its record, bytes
   std::uint64_t indexLength = 0;              ///< bytes of the index records after it
   std::uint64_t firstTime = 0, lastTime = 0;  ///< nanoseconds
-  std::set<std::uint16_t> channels;           ///< of its messages
+  std::set<std::uint16_t> channels;           ///< channels of its messages
 };
 
-/// All functions throw RecordingError, naming the byte.
+/// Reads chunks by number. All functions throw RecordingError with the byte position.
 class IndexedReader {
  public:
   explicit IndexedReader(std::filesystem::path file);
 
-  const std::vector<ChunkPlace>& chunks() const { return chunks_; }  ///< in the order of the file
-  /// Whether the writer closed the file. If not, all whole chunks were found.
+  const std::vector<ChunkIndex>& chunks() const { return chunks_; }  ///< in file order
+  /// True if the writer closed the file. Otherwise all complete chunks were found.
   bool closed() const { return closed_; }
   const std::filesystem::path& file() const { return file_; }
 
-  /// The number of a channel of this topic; 0: none was met yet. Those that the summary tells, or
-  /// the first chunk, are known from the beginning.
-  std::uint16_t channelOf(const std::string& topic) const;
+  /// Returns the channel number of a topic; 0: unknown so far. Channels of the summary or of the
+  /// first chunk are known after construction.
+  std::uint16_t findChannel(const std::string& topic) const;
 
-  /// Makes `chunk` the open one, at its first message.
+  /// Opens `chunk` at its first message.
   void open(std::size_t chunk);
-  /// The next message of the open chunk; it lives until another one is opened. False: no more.
+  /// Reads the next message of the open chunk, valid until another chunk is opened; false at the
+  /// end.
   bool next(Message& message);
 
  private:
@@ -47,18 +47,18 @@ class IndexedReader {
   void readSummaryRecords(std::string_view records);
   void scan();
   void dropTornChunk();
-  Chunk unpack(const ChunkPlace& place);
-  std::string indexBytes(const ChunkPlace& place);
+  Chunk loadChunk(const ChunkIndex& index);
+  std::string indexBytes(const ChunkIndex& index);
 
   std::filesystem::path file_;
   std::ifstream stream_;
   std::uint64_t size_ = 0;
   bool closed_ = false;
   Definitions definitions_;
-  std::vector<ChunkPlace> chunks_;
+  std::vector<ChunkIndex> chunks_;
   std::string records_;  ///< of the open chunk
-  std::size_t at_ = 0;
-  std::size_t open_ = ~std::size_t{0};
+  std::size_t offset_ = 0;
+  std::size_t openChunk_ = ~std::size_t{0};
 };
 
 }  // namespace enfilade::protocol::mcap

@@ -1,5 +1,5 @@
-// The bytes of MCAP files (https://mcap.dev/spec, version 0): little-endian numbers, strings and
-// arrays with a 32-bit length before them, records with an opcode and a 64-bit length.
+// Encoding of MCAP files (https://mcap.dev/spec, version 0): little-endian numbers, strings and
+// arrays with a 32-bit length prefix, records with an opcode and a 64-bit length.
 #pragma once
 
 #include <cstdint>
@@ -26,13 +26,13 @@ enum class Opcode : std::uint8_t {
   dataEnd = 0x0F
 };
 
-/// A record's opcode and length.
-inline constexpr std::size_t kRecordHead = 9;
+/// Size of a record's opcode and length, bytes.
+inline constexpr std::size_t kRecordHeadBytes = 9;
 
-/// No chunk of ours is larger, packed or not; a file that claims more is not read.
-inline constexpr std::uint64_t kMostChunkBytes = std::uint64_t{64} << 20;
+/// Maximum chunk size, compressed or not. Enfilade writes smaller chunks; larger ones are rejected.
+inline constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{64} << 20;
 
-/// Names the file and what is wrong, with the byte where it was met when there is one.
+/// An invalid recording. The text has the file, the reason and, if known, the byte position.
 struct RecordingError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -48,38 +48,38 @@ inline void putString(std::string& into, std::string_view text) {
   into.append(text);
 }
 
-/// Appends a whole record.
+/// Appends one record.
 inline void putRecord(std::string& into, Opcode opcode, std::string_view content) {
   putNumber(into, static_cast<std::uint8_t>(opcode));
   putNumber(into, static_cast<std::uint64_t>(content.size()));
   into.append(content);
 }
 
-/// Reads numbers and strings one after another; throws std::out_of_range at the end of the bytes.
+/// Reads consecutive numbers and strings. Throws std::out_of_range at the end of the bytes.
 class Fields {
  public:
-  explicit Fields(std::string_view bytes) : left_(bytes) {}
+  explicit Fields(std::string_view bytes) : remaining_(bytes) {}
 
   template <class Number>
   Number number() {
-    const std::string_view bytes = take(sizeof(Number));
+    const std::string_view bytes = takeBytes(sizeof(Number));
     std::uint64_t value = 0;
     for (std::size_t i = 0; i < sizeof(Number); ++i)
       value |= std::uint64_t{static_cast<unsigned char>(bytes[i])} << (8 * i);
     return static_cast<Number>(value);
   }
-  std::string_view string() { return take(number<std::uint32_t>()); }
-  std::string_view take(std::uint64_t bytes) {
-    if (bytes > left_.size()) throw std::out_of_range("a field ends after its record");
-    const std::string_view taken = left_.substr(0, bytes);
-    left_.remove_prefix(bytes);
+  std::string_view string() { return takeBytes(number<std::uint32_t>()); }
+  std::string_view takeBytes(std::uint64_t bytes) {
+    if (bytes > remaining_.size()) throw std::out_of_range("a field extends beyond its record");
+    const std::string_view taken = remaining_.substr(0, bytes);
+    remaining_.remove_prefix(bytes);
     return taken;
   }
-  std::string_view rest() { return take(left_.size()); }
-  bool empty() const { return left_.empty(); }
+  std::string_view rest() { return takeBytes(remaining_.size()); }
+  bool empty() const { return remaining_.empty(); }
 
  private:
-  std::string_view left_;
+  std::string_view remaining_;
 };
 
 }  // namespace enfilade::protocol::mcap

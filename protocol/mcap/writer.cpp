@@ -13,10 +13,10 @@
 namespace enfilade::protocol::mcap {
 namespace {
 
-constexpr int kLevel = 1;  // of zstd: the tick waits for it
+constexpr int kCompressionLevel = 1;  // zstd level: fast, because the tick waits for it
 
 template <class Map, class Put>
-std::string listOf(const Map& entries, const Put& put) {
+std::string encodeMap(const Map& entries, const Put& put) {
   std::string bytes;
   for (const auto& entry : entries) put(bytes, entry);
   std::string list;
@@ -31,12 +31,12 @@ Writer::Writer(std::filesystem::path file, WriterOptions options)
   const int existing = options_.replace ? O_TRUNC : O_EXCL;
   descriptor_ = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | existing, 0644);
   if (descriptor_ < 0 && errno == EEXIST)
-    throw RecordingError(file_.string() + ": is there already: move it away, or name another file");
+    throw RecordingError(file_.string() + ": exists already: move it, or give another file name");
   if (descriptor_ < 0)
     throw RecordingError(file_.string() + ": cannot be written: " + std::strerror(errno));
   open_ = true;
   std::string head(kMagic), header;
-  putString(header, "");  // no profile: every message brings its schema
+  putString(header, "");  // no profile: every channel has its schema
   putString(header, options_.library);
   putRecord(head, Opcode::header, header);
   append(head);
@@ -46,30 +46,30 @@ Writer::~Writer() {
   try {
     close();
   } catch (const RecordingError&) {
-    // Who wants to know calls close().
+    // A destructor cannot throw: call close() to get errors.
   }
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-/// All of it or, when the disk is full, nothing.
+/// Writes all bytes or, if the disk is full, none.
 void Writer::append(std::string_view bytes) {
   std::size_t done = 0;
   while (done < bytes.size()) {
-    const ssize_t wrote = ::write(descriptor_, bytes.data() + done, bytes.size() - done);
-    if (wrote < 0 && errno == EINTR) continue;
-    if (wrote <= 0) {
-      const int why = wrote < 0 ? errno : ENOSPC;
+    const ssize_t written = ::write(descriptor_, bytes.data() + done, bytes.size() - done);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) {
+      const int error = written < 0 ? errno : ENOSPC;
       open_ = false;
-      const bool cut = ::ftruncate(descriptor_, static_cast<off_t>(position_)) == 0;
-      throw RecordingError(file_.string() + ": " + std::strerror(why) + "; it ends at byte " +
+      const bool truncated = ::ftruncate(descriptor_, static_cast<off_t>(position_)) == 0;
+      throw RecordingError(file_.string() + ": " + std::strerror(error) + "; it ends at byte " +
                            std::to_string(position_) +
-                           (cut ? "" : ", with a torn record after it") +
-                           ", and what was written until then can be read");
+                           (truncated ? "" : ", followed by an incomplete record") +
+                           ", and the data before that can be read");
     }
-    done += static_cast<std::size_t>(wrote);
+    done += static_cast<std::size_t>(written);
   }
   position_ += bytes.size();
-  dataCrc_ = crcOf(bytes, dataCrc_);
+  dataCrc_ = computeCrc(bytes, dataCrc_);
 }
 
 std::uint16_t Writer::addChannel(const ChannelSpec& spec) {
@@ -104,7 +104,7 @@ void Writer::write(std::uint16_t channel, std::uint64_t time, std::string_view m
   const auto now = std::chrono::steady_clock::now();
   if (index_.empty()) {
     firstTime_ = lastTime_ = time;
-    chunkBegan_ = now;
+    chunkStart_ = now;
   }
   firstTime_ = std::min(firstTime_, time);
   lastTime_ = std::max(lastTime_, time);
@@ -114,66 +114,66 @@ void Writer::write(std::uint16_t channel, std::uint64_t time, std::string_view m
   putNumber(chunk_, channel);
   putNumber(chunk_, ++sequences_[channel]);
   putNumber(chunk_, time);
-  putNumber(chunk_, time);  // published when it was logged
+  putNumber(chunk_, time);  // publish time = log time
   chunk_.append(message);
   ++counts_[channel];
-  if (chunk_.size() >= options_.chunkBytes || now - chunkBegan_ >= options_.chunkAge) flush();
+  if (chunk_.size() >= options_.chunkBytes || now - chunkStart_ >= options_.chunkAge) flush();
 }
 
-/// The chunk's record; `place` gets its sizes.
-std::string Writer::packedChunk(ChunkPlace& place) const {
+/// Makes the record of the open chunk; `index` receives its sizes.
+std::string Writer::compressChunk(ChunkIndex& index) const {
   std::string packed(ZSTD_compressBound(chunk_.size()), '\0');
   const std::size_t size =
-      ZSTD_compress(packed.data(), packed.size(), chunk_.data(), chunk_.size(), kLevel);
+      ZSTD_compress(packed.data(), packed.size(), chunk_.data(), chunk_.size(), kCompressionLevel);
   if (ZSTD_isError(size)) throw RecordingError(file_.string() + ": " + ZSTD_getErrorName(size));
   packed.resize(size);
   std::string content;
-  putNumber(content, place.firstTime);
-  putNumber(content, place.lastTime);
+  putNumber(content, index.firstTime);
+  putNumber(content, index.lastTime);
   putNumber(content, static_cast<std::uint64_t>(chunk_.size()));
-  putNumber(content, crcOf(chunk_));
+  putNumber(content, computeCrc(chunk_));
   putString(content, "zstd");
   putNumber(content, static_cast<std::uint64_t>(packed.size()));
   content += packed;
-  place.packed = packed.size();
-  place.unpacked = chunk_.size();
+  index.compressedSize = packed.size();
+  index.uncompressedSize = chunk_.size();
   std::string record;
   putRecord(record, Opcode::chunk, content);
-  place.length = record.size();
+  index.length = record.size();
   return record;
 }
 
 void Writer::flush() {
   if (!open_ || chunk_.empty()) return;
-  ChunkPlace place;
-  place.firstTime = firstTime_;
-  place.lastTime = lastTime_;
-  place.start = position_;
-  std::string bytes = packedChunk(place);
+  ChunkIndex index;
+  index.firstTime = firstTime_;
+  index.lastTime = lastTime_;
+  index.start = position_;
+  std::string bytes = compressChunk(index);
   for (const auto& [channel, entries] : index_) {
-    place.indexOffsets[channel] = position_ + bytes.size();
+    index.indexOffsets[channel] = position_ + bytes.size();
     std::string content;
     putNumber(content, channel);
-    content += listOf(entries, [](std::string& into, const Entry& entry) {
+    content += encodeMap(entries, [](std::string& into, const Entry& entry) {
       putNumber(into, entry.time);
       putNumber(into, entry.offset);
     });
     putRecord(bytes, Opcode::messageIndex, content);
   }
-  place.indexLength = bytes.size() - place.length;
+  index.indexLength = bytes.size() - index.length;
   append(bytes);
-  chunks_.push_back(std::move(place));
+  chunks_.push_back(std::move(index));
   chunk_.clear();
   index_.clear();
 }
 
-/// Schemas, channels, statistics and the chunks' places.
+/// Makes the summary: schemas, channels, statistics and chunk indexes.
 std::string Writer::summary() const {
   std::string records = definitions_;
   std::uint64_t messages = 0;
   for (const std::uint64_t count : counts_) messages += count;
   std::uint64_t first = 0, last = 0;
-  for (const ChunkPlace& chunk : chunks_) {
+  for (const ChunkIndex& chunk : chunks_) {
     first = &chunk == &chunks_.front() ? chunk.firstTime : std::min(first, chunk.firstTime);
     last = std::max(last, chunk.lastTime);
   }
@@ -193,18 +193,18 @@ std::string Writer::summary() const {
   }
   putString(content, perChannel);
   putRecord(records, Opcode::statistics, content);
-  for (const ChunkPlace& chunk : chunks_) {
+  for (const ChunkIndex& chunk : chunks_) {
     content.clear();
     for (const std::uint64_t number : {chunk.firstTime, chunk.lastTime, chunk.start, chunk.length})
       putNumber(content, number);
-    content += listOf(chunk.indexOffsets, [](std::string& into, const auto& offset) {
+    content += encodeMap(chunk.indexOffsets, [](std::string& into, const auto& offset) {
       putNumber(into, offset.first);
       putNumber(into, offset.second);
     });
     putNumber(content, chunk.indexLength);
     putString(content, "zstd");
-    putNumber(content, chunk.packed);
-    putNumber(content, chunk.unpacked);
+    putNumber(content, chunk.compressedSize);
+    putNumber(content, chunk.uncompressedSize);
     putRecord(records, Opcode::chunkIndex, content);
   }
   return records;
@@ -219,19 +219,19 @@ void Writer::close() {
   putRecord(bytes, Opcode::dataEnd, content);
   const std::uint64_t summaryStart = position_ + bytes.size();
   std::string checked = summary();
-  // The footer's own head and its two offsets are under the summary's CRC too.
+  // The summary CRC also covers the footer's opcode, length and offsets.
   putNumber(checked, static_cast<std::uint8_t>(Opcode::footer));
   putNumber(checked, std::uint64_t{20});
   putNumber(checked, summaryStart);
-  putNumber(checked, std::uint64_t{0});  // no offsets of groups
+  putNumber(checked, std::uint64_t{0});  // no summary offsets
   bytes += checked;
-  putNumber(bytes, crcOf(checked));
+  putNumber(bytes, computeCrc(checked));
   bytes += kMagic;
   append(bytes);
   open_ = false;
   if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != EROFS)
     throw RecordingError(file_.string() + ": " + std::strerror(errno) +
-                         "; the disk may not have all of it");
+                         "; the file on the disk may be incomplete");
 }
 
 }  // namespace enfilade::protocol::mcap

@@ -13,9 +13,9 @@ namespace {
 
 namespace pb = google::protobuf;
 
-constexpr const char* kCommands = "/enfilade/commands";
-constexpr const char* kState = "/enfilade/state";
-constexpr const char* kNames = "/enfilade/names";
+constexpr const char* kCommandsTopic = "/enfilade/commands";
+constexpr const char* kStateTopic = "/enfilade/state";
+constexpr const char* kNamesTopic = "/enfilade/names";
 
 void addWithImports(const pb::FileDescriptor& file, pb::FileDescriptorSet& set,
                     std::set<std::string>& known) {
@@ -24,56 +24,56 @@ void addWithImports(const pb::FileDescriptor& file, pb::FileDescriptorSet& set,
   file.CopyTo(set.add_file());
 }
 
-mcap::ChannelSpec channelOf(const std::string& topic, const pb::Descriptor& message) {
+mcap::ChannelSpec makeChannelSpec(const std::string& topic, const pb::Descriptor& message) {
   pb::FileDescriptorSet set;
   std::set<std::string> known;
   addWithImports(*message.file(), set, known);
   return {topic, "protobuf", message.full_name(), "protobuf", set.SerializeAsString()};
 }
 
-/// Its tick's time, of the messages that have one.
+/// True if the message's time is valid. Messages without a time are valid.
 template <class Message>
-bool timeIsRight(const Message& message) {
+bool hasValidTime(const Message& message) {
   if constexpr (requires { message.time(); })
     return std::isfinite(message.time()) && message.time() >= 0;
   return true;
 }
 
 template <class Message>
-RecordedItem parsed(const mcap::Message& from, const std::filesystem::path& file) {
+RecordedItem parseItem(const mcap::Message& from, const std::filesystem::path& file) {
   Message message;
   if (!message.ParseFromArray(from.data.data(), static_cast<int>(from.data.size())))
     throw mcap::RecordingError(file.string() + ": a message of " + from.channel->topic +
                                " cannot be read");
-  if (!timeIsRight(message))
+  if (!hasValidTime(message))
     throw mcap::RecordingError(file.string() + ": a message of " + from.channel->topic +
-                               " has a time that is none");
+                               " has an invalid time");
   return message;
 }
 
-/// The first field that differs, and its values.
-class FirstField : public pb::util::MessageDifferencer::Reporter {
+/// Finds the first field that differs, with both values.
+class FirstDifferenceReporter : public pb::util::MessageDifferencer::Reporter {
  public:
   void ReportAdded(const pb::Message& /*recorded*/, const pb::Message& replayed,
                    const std::vector<pb::util::MessageDifferencer::SpecificField>& path) override {
-    tell(path, "nothing", valueOf(replayed, path, true));
+    recordDifference(path, "nothing", formatValue(replayed, path, true));
   }
   void ReportDeleted(
       const pb::Message& recorded, const pb::Message& /*replayed*/,
       const std::vector<pb::util::MessageDifferencer::SpecificField>& path) override {
-    tell(path, valueOf(recorded, path, false), "nothing");
+    recordDifference(path, formatValue(recorded, path, false), "nothing");
   }
   void ReportModified(
       const pb::Message& recorded, const pb::Message& replayed,
       const std::vector<pb::util::MessageDifferencer::SpecificField>& path) override {
-    tell(path, valueOf(recorded, path, false), valueOf(replayed, path, true));
+    recordDifference(path, formatValue(recorded, path, false), formatValue(replayed, path, true));
   }
   std::optional<StateDifference> found;
 
  private:
   using Path = std::vector<pb::util::MessageDifferencer::SpecificField>;
 
-  void tell(const Path& path, std::string recorded, std::string replayed) {
+  void recordDifference(const Path& path, std::string recorded, std::string replayed) {
     if (found) return;
     std::string field;
     for (const auto& step : path) {
@@ -83,8 +83,8 @@ class FirstField : public pb::util::MessageDifferencer::Reporter {
     }
     found = {"", field, std::move(recorded), std::move(replayed)};
   }
-  /// `message` is the one that the path's last step is a field of.
-  static std::string valueOf(const pb::Message& message, const Path& path, bool second) {
+  /// `message` contains the field of the path's last step.
+  static std::string formatValue(const pb::Message& message, const Path& path, bool second) {
     const auto& last = path.back();
     pb::TextFormat::Printer printer;
     printer.SetSingleLineMode(true);
@@ -96,39 +96,40 @@ class FirstField : public pb::util::MessageDifferencer::Reporter {
   }
 };
 
-std::optional<StateDifference> differenceOf(const std::string& who, const pb::Message& recorded,
-                                            const pb::Message& replayed) {
-  FirstField first;
+std::optional<StateDifference> compareMessages(const std::string& entity,
+                                               const pb::Message& recorded,
+                                               const pb::Message& replayed) {
+  FirstDifferenceReporter first;
   pb::util::MessageDifferencer differencer;
   differencer.ReportDifferencesTo(&first);
   differencer.Compare(recorded, replayed);
-  if (first.found) first.found->who = who;
+  if (first.found) first.found->entity = entity;
   return first.found;
 }
 
-/// Of two lists in the same order, the first that is not in both or differs.
+/// Compares two lists in the same order; returns the first element that is missing or differs.
 template <class States>
-std::optional<StateDifference> listDifference(const States& recorded, const States& replayed) {
+std::optional<StateDifference> compareLists(const States& recorded, const States& replayed) {
   for (int i = 0; i < std::max(recorded.size(), replayed.size()); ++i) {
     const bool inFirst = i < recorded.size(), inSecond = i < replayed.size();
     if (inFirst && inSecond && recorded[i].name() == replayed[i].name()) {
-      if (auto found = differenceOf(recorded[i].name(), recorded[i], replayed[i])) return found;
+      if (auto found = compareMessages(recorded[i].name(), recorded[i], replayed[i])) return found;
       continue;
     }
     return StateDifference{inFirst ? recorded[i].name() : replayed[i].name(), "presence",
-                           inFirst ? recorded[i].name() : "nobody",
-                           inSecond ? replayed[i].name() : "nobody"};
+                           inFirst ? recorded[i].name() : "absent",
+                           inSecond ? replayed[i].name() : "absent"};
   }
   return std::nullopt;
 }
 
 }  // namespace
 
-std::uint64_t nanosecondsOf(double seconds) {
+std::uint64_t toNanoseconds(double seconds) {
   return static_cast<std::uint64_t>(std::llround(seconds * 1e9));
 }
 
-std::string hexadecimal(std::uint64_t hash) {
+std::string toHex(std::uint64_t hash) {
   constexpr const char* kDigits = "0123456789abcdef";
   std::string text;
   for (int shift = 60; shift >= 0; shift -= 4) text.push_back(kDigits[(hash >> shift) & 15]);
@@ -138,53 +139,55 @@ std::string hexadecimal(std::uint64_t hash) {
 RecordingWriter::RecordingWriter(const std::filesystem::path& file, const std::string& library,
                                  bool replace)
     : file_(file, {.library = library, .replace = replace}),
-      start_(file_.addChannel(channelOf(kStartTopic, *v1::RecordingStart::descriptor()))),
-      commands_(file_.addChannel(channelOf(kCommands, *v1::RecordedCommands::descriptor()))),
-      events_(file_.addChannel(channelOf(kEventsTopic, *v1::TickEvents::descriptor()))),
-      state_(file_.addChannel(channelOf(kState, *v1::State::descriptor()))),
-      names_(file_.addChannel(channelOf(kNames, *v1::RecordedNames::descriptor()))),
-      checkpoint_(
-          file_.addChannel(channelOf(kCheckpointTopic, *v1::RecordedCheckpoint::descriptor()))) {}
+      start_(file_.addChannel(makeChannelSpec(kStartTopic, *v1::RecordingStart::descriptor()))),
+      commands_(
+          file_.addChannel(makeChannelSpec(kCommandsTopic, *v1::RecordedCommands::descriptor()))),
+      events_(file_.addChannel(makeChannelSpec(kEventsTopic, *v1::TickEvents::descriptor()))),
+      state_(file_.addChannel(makeChannelSpec(kStateTopic, *v1::State::descriptor()))),
+      names_(file_.addChannel(makeChannelSpec(kNamesTopic, *v1::RecordedNames::descriptor()))),
+      checkpoint_(file_.addChannel(
+          makeChannelSpec(kCheckpointTopic, *v1::RecordedCheckpoint::descriptor()))) {}
 
-void RecordingWriter::writeTo(std::uint16_t channel, double time, const pb::MessageLite& message) {
+void RecordingWriter::writeToChannel(std::uint16_t channel, double time,
+                                     const pb::MessageLite& message) {
   message.SerializeToString(&bytes_);
-  last_ = std::max(last_, fileTime(time));
-  file_.write(channel, nanosecondsOf(fileTime(time)), bytes_);
+  lastTime_ = std::max(lastTime_, fileTime(time));
+  file_.write(channel, toNanoseconds(fileTime(time)), bytes_);
 }
 
 void RecordingWriter::write(const std::string& topic, double time, const pb::Message& message) {
-  std::uint16_t& channel = others_[topic];
-  if (channel == 0) channel = file_.addChannel(channelOf(topic, *message.GetDescriptor()));
-  writeTo(channel, time, message);
+  std::uint16_t& channel = extraChannels_[topic];
+  if (channel == 0) channel = file_.addChannel(makeChannelSpec(topic, *message.GetDescriptor()));
+  writeToChannel(channel, time, message);
 }
 
 void RecordingWriter::write(const v1::RecordingStart& start, double time) {
   startTime_ = time;
-  began_ = std::max(0.0, last_ - time);
-  writeTo(start_, time, start);
-  file_.flush();  // a recording that cannot be begun again is worth nothing
+  runStart_ = std::max(0.0, lastTime_ - time);
+  writeToChannel(start_, time, start);
+  file_.flush();  // a recording without its start cannot be replayed
 }
 
 void RecordingWriter::write(const v1::RecordedCommands& commands, double time) {
-  writeTo(commands_, time, commands);
+  writeToChannel(commands_, time, commands);
 }
 
 void RecordingWriter::write(const v1::TickEvents& events) {
-  writeTo(events_, events.time(), events);
+  writeToChannel(events_, events.time(), events);
 }
 
 void RecordingWriter::write(const v1::State& state) {
-  writeTo(state_, state.time(), state);
+  writeToChannel(state_, state.time(), state);
 }
 
 void RecordingWriter::write(const v1::RecordedNames& names) {
-  writeTo(names_, startTime_, names);
+  writeToChannel(names_, startTime_, names);
 }
 
 std::uint64_t RecordingWriter::write(const v1::RecordedCheckpoint& checkpoint, double time) {
   file_.flush();
   const std::uint64_t before = bytesWritten();
-  writeTo(checkpoint_, time, checkpoint);
+  writeToChannel(checkpoint_, time, checkpoint);
   file_.flush();
   return bytesWritten() - before;
 }
@@ -193,53 +196,52 @@ RecordingReader::RecordingReader(const std::filesystem::path& file,
                                  std::optional<std::uint32_t> run)
     : path_(file), file_(file), run_(run) {}
 
-std::optional<RecordedItem> itemFrom(const mcap::Message& message,
-                                     const std::filesystem::path& file) {
+std::optional<RecordedItem> parseRecordedItem(const mcap::Message& message,
+                                              const std::filesystem::path& file) {
   const std::string& topic = message.channel->topic;
-  if (topic == kStartTopic) return parsed<v1::RecordingStart>(message, file);
-  if (topic == kCommands) return parsed<v1::RecordedCommands>(message, file);
-  if (topic == kEventsTopic) return parsed<v1::TickEvents>(message, file);
-  if (topic == kState) return parsed<v1::State>(message, file);
-  if (topic == kNames) return parsed<v1::RecordedNames>(message, file);
-  if (topic == kCheckpointTopic) return parsed<v1::RecordedCheckpoint>(message, file);
+  if (topic == kStartTopic) return parseItem<v1::RecordingStart>(message, file);
+  if (topic == kCommandsTopic) return parseItem<v1::RecordedCommands>(message, file);
+  if (topic == kEventsTopic) return parseItem<v1::TickEvents>(message, file);
+  if (topic == kStateTopic) return parseItem<v1::State>(message, file);
+  if (topic == kNamesTopic) return parseItem<v1::RecordedNames>(message, file);
+  if (topic == kCheckpointTopic) return parseItem<v1::RecordedCheckpoint>(message, file);
   return std::nullopt;
 }
 
 bool RecordingReader::isWanted(const RecordedItem& item) {
   if (!run_) return true;
-  begun_ += std::holds_alternative<v1::RecordingStart>(item) ? 1 : 0;
-  if (begun_ < *run_ && std::holds_alternative<v1::RecordedNames>(item)) names_.push_back(item);
-  return begun_ == *run_;
+  runsBegun_ += std::holds_alternative<v1::RecordingStart>(item) ? 1 : 0;
+  if (runsBegun_ < *run_ && std::holds_alternative<v1::RecordedNames>(item)) names_.push_back(item);
+  return runsBegun_ == *run_;
 }
 
 std::optional<RecordedItem> RecordingReader::next() {
-  if (run_ && begun_ == *run_ && !names_.empty()) {
+  if (run_ && runsBegun_ == *run_ && !names_.empty()) {
     RecordedItem names = std::move(names_.front());
     names_.pop_front();
     return names;
   }
   while (const auto message = file_.next()) {
-    auto item = itemFrom(*message, path_);
+    auto item = parseRecordedItem(*message, path_);
     if (item && isWanted(*item)) return item;
   }
-  if (run_ && begun_ < *run_) failWithoutRun(path_, *run_, begun_);
+  if (run_ && runsBegun_ < *run_) throwMissingRun(path_, *run_, runsBegun_);
   return std::nullopt;
 }
 
-void failWithoutRun(const std::filesystem::path& file, std::uint32_t asked, std::size_t runs) {
-  throw mcap::RecordingError(file.string() + ": there is no run " + std::to_string(asked) +
-                             " in it" +
-                             (runs > 0 ? "; give one from 1 to " + std::to_string(runs)
-                                       : ": no recording of Enfilade begins in it"));
+void throwMissingRun(const std::filesystem::path& file, std::uint32_t requestedRun,
+                     std::size_t runs) {
+  throw mcap::RecordingError(file.string() + ": no run " + std::to_string(requestedRun) + " in it" +
+                             (runs > 0 ? "; give a run from 1 to " + std::to_string(runs)
+                                       : ": not a recording of Enfilade"));
 }
 
-std::optional<StateDifference> firstDifference(const v1::State& recorded,
-                                               const v1::State& replayed) {
-  if (auto found = listDifference(recorded.avatars(), replayed.avatars())) return found;
-  if (auto found = listDifference(recorded.bodies(), replayed.bodies())) return found;
+std::optional<StateDifference> findFirstDifference(const v1::State& recorded,
+                                                   const v1::State& replayed) {
+  if (auto found = compareLists(recorded.avatars(), replayed.avatars())) return found;
+  if (auto found = compareLists(recorded.bodies(), replayed.bodies())) return found;
   if (recorded.hash() == replayed.hash()) return std::nullopt;
-  return StateDifference{"the world", "state hash", hexadecimal(recorded.hash()),
-                         hexadecimal(replayed.hash())};
+  return StateDifference{"the world", "state hash", toHex(recorded.hash()), toHex(replayed.hash())};
 }
 
 }  // namespace enfilade::protocol

@@ -1,4 +1,4 @@
-// A recording: what a world was told and what became of it, tick by tick, as MCAP (RECORDING.md).
+// Recordings: the commands, states and events of a world, tick by tick, as MCAP (RECORDING.md).
 #pragma once
 
 #include <deque>
@@ -14,74 +14,76 @@
 
 namespace enfilade::protocol {
 
-/// All functions throw mcap::RecordingError.
+/// Writes a recording. All functions throw mcap::RecordingError.
 class RecordingWriter {
  public:
-  /// `library`: who writes, name and version. A file that is there is begun anew, or refused.
+  /// `library`: name and version of the writing program. An existing file is overwritten or
+  /// refused.
   RecordingWriter(const std::filesystem::path& file, const std::string& library,
                   bool replace = true);
 
-  /// `time`: seconds of simulated time, above 0 for a branch.
+  /// `time`: simulated time in seconds; above 0 for a branch.
   void write(const v1::RecordingStart& start, double time = 0);
   void write(const v1::RecordedCommands& commands, double time);
   void write(const v1::TickEvents& events);
   void write(const v1::State& state);
   void write(const v1::RecordedNames& names);
-  /// In a chunk of its own, so that who seeks it unpacks nothing else. Returns the bytes that it
-  /// took in the file.
+  /// Writes a checkpoint in its own chunk, so that seeking decompresses nothing else. Returns its
+  /// size in the file, bytes.
   std::uint64_t write(const v1::RecordedCheckpoint& checkpoint, double time);
-  /// To a channel of that name, which is for this kind of message.
+  /// Writes to the channel of this topic. All its messages must have the same type.
   void write(const std::string& topic, double time, const google::protobuf::Message& message);
 
-  /// Seconds of simulated time as the file counts them: where the world began anew, they go on.
-  double fileTime(double time) const { return began_ + time; }
+  /// Converts simulated time to file time, in seconds. File time continues when the world restarts.
+  double fileTime(double time) const { return runStart_ + time; }
   void flush() { file_.flush(); }
   void close() { file_.close(); }
   std::uint64_t bytesWritten() const { return file_.bytesWritten(); }
 
  private:
-  void writeTo(std::uint16_t channel, double time, const google::protobuf::MessageLite& message);
+  void writeToChannel(std::uint16_t channel, double time,
+                      const google::protobuf::MessageLite& message);
 
   mcap::Writer file_;
-  std::string bytes_;  // kept, so that a tick allocates nothing
-  std::map<std::string, std::uint16_t> others_;
-  double startTime_ = 0;         ///< seconds of the world's time
-  double began_ = 0, last_ = 0;  ///< seconds in the file: of the world's beginning, written last
+  std::string bytes_;  // buffer, kept so that a tick does not allocate
+  std::map<std::string, std::uint16_t> extraChannels_;
+  double startTime_ = 0;                ///< simulated time, seconds
+  double runStart_ = 0, lastTime_ = 0;  ///< file time in seconds: start of the run, last message
   std::uint16_t start_, commands_, events_, state_, names_, checkpoint_;
 };
 
 using RecordedItem = std::variant<v1::RecordingStart, v1::RecordedCommands, v1::TickEvents,
                                   v1::State, v1::RecordedNames, v1::RecordedCheckpoint>;
 
-/// nullopt for messages of other programs.
-std::optional<RecordedItem> itemFrom(const mcap::Message& message,
-                                     const std::filesystem::path& file);
+/// Parses a message; nullopt for messages of other programs.
+std::optional<RecordedItem> parseRecordedItem(const mcap::Message& message,
+                                              const std::filesystem::path& file);
 inline constexpr const char* kStartTopic = "/enfilade/start";
 inline constexpr const char* kEventsTopic = "/enfilade/events";
 inline constexpr const char* kCheckpointTopic = "/enfilade/checkpoint";
 
-/// Nanoseconds, as recordings have them.
-std::uint64_t nanosecondsOf(double seconds);
+/// Converts seconds to the nanoseconds of recordings.
+std::uint64_t toNanoseconds(double seconds);
 
-/// A run is what was recorded from one beginning of the world to the next; they count from 1. There
-/// is no run `asked` of `runs`: says so, and throws.
-[[noreturn]] void failWithoutRun(const std::filesystem::path& file, std::uint32_t asked,
-                                 std::size_t runs);
+/// Throws because the file has `runs` runs, and not run `requestedRun`. A run lasts from one start
+/// of the world to the next; runs count from 1.
+[[noreturn]] void throwMissingRun(const std::filesystem::path& file, std::uint32_t requestedRun,
+                                  std::size_t runs);
 
 class RecordingReader {
  public:
-  /// `run`: that one alone, and the names, which are told after the first start only, after its
-  /// own; left out: all of them.
+  /// `run`: reads only this run; nullopt: all runs. The names, which the file has only after the
+  /// first start, follow the start of the requested run.
   explicit RecordingReader(const std::filesystem::path& file,
                            std::optional<std::uint32_t> run = std::nullopt);
 
-  /// In the order in which it happened; what other programs may have added is left out.
+  /// Returns the items in order of time. Messages of other programs are skipped.
   std::optional<RecordedItem> next();
-  /// As mcap::Reader has them.
+  /// As in mcap::Reader.
   bool closed() const { return file_.closed(); }
-  /// At the end: what was asked for is all there. Of a run that another follows it is, even where
-  /// the file ends in the middle of that one.
-  bool complete() const { return closed() || (run_ && begun_ > *run_); }
+  /// Valid at the end. True if the requested runs are complete. A run that another run follows is
+  /// complete, even in a truncated file.
+  bool complete() const { return closed() || (run_ && runsBegun_ > *run_); }
   std::uint64_t wholeBytes() const { return file_.wholeBytes(); }
 
  private:
@@ -90,21 +92,21 @@ class RecordingReader {
   std::filesystem::path path_;
   mcap::Reader file_;
   std::optional<std::uint32_t> run_;
-  std::uint32_t begun_ = 0;         ///< runs, up to here
-  std::deque<RecordedItem> names_;  ///< told before the run that is wanted
+  std::uint32_t runsBegun_ = 0;     ///< number of runs started so far
+  std::deque<RecordedItem> names_;  ///< names from before the requested run
 };
 
-/// 16 digits, as hashes are written everywhere.
-std::string hexadecimal(std::uint64_t hash);
+/// Formats a hash with 16 hexadecimal digits.
+std::string toHex(std::uint64_t hash);
 
-/// Where two states of the same tick differ first.
+/// The first difference of two states of the same tick.
 struct StateDifference {
-  std::string who;    ///< an avatar's or a body's name; "the world"
-  std::string field;  ///< as "feet.x"; "state hash" where only that differs
+  std::string entity;  ///< name of an avatar or body, or "the world"
+  std::string field;   ///< for example "feet.x"; "state hash" if only the hash differs
   std::string recorded, replayed;
 };
-/// nullopt when they are equal to the last bit.
-std::optional<StateDifference> firstDifference(const v1::State& recorded,
-                                               const v1::State& replayed);
+/// Compares two states; nullopt if they are bitwise equal.
+std::optional<StateDifference> findFirstDifference(const v1::State& recorded,
+                                                   const v1::State& replayed);
 
 }  // namespace enfilade::protocol

@@ -9,9 +9,9 @@
 namespace enfilade::protocol {
 namespace {
 
-constexpr std::size_t kLargestScript = std::size_t{64} << 20;  // bytes
-constexpr std::size_t kLongestLine = std::size_t{1} << 20;     // bytes
-constexpr std::size_t kMostErrorsTold = 20;
+constexpr std::size_t kMaxScriptBytes = std::size_t{64} << 20;  // bytes
+constexpr std::size_t kMaxLineBytes = std::size_t{1} << 20;     // bytes
+constexpr std::size_t kMaxReportedErrors = 20;
 
 bool isSkipped(std::string_view text) {
   const std::size_t first = text.find_first_not_of(" \t");
@@ -20,7 +20,7 @@ bool isSkipped(std::string_view text) {
   return text.starts_with('#') || text.starts_with("//");
 }
 
-/// Takes the next line off `text`, without its end.
+/// Removes the next line from `text` and returns it without its line end.
 std::string_view takeLine(std::string_view& text) {
   const std::size_t end = text.find('\n');
   std::string_view line = text.substr(0, end);
@@ -29,27 +29,27 @@ std::string_view takeLine(std::string_view& text) {
   return line;
 }
 
-/// Remembers the captures' names, so that no picture overwrites another.
+/// Rejects duplicate capture names, so that no picture overwrites another.
 class CaptureNames {
  public:
   void add(const ScriptLine& line) {
-    const auto* command = std::get_if<v1::Command>(&line.what);
+    const auto* command = std::get_if<v1::Command>(&line.action);
     if (!command || !command->has_capture()) return;
-    const auto [place, isNew] = lineOf_.try_emplace(command->capture().as(), line.number);
+    const auto [entry, isNew] = lineByName_.try_emplace(command->capture().as(), line.number);
     if (!isNew) {
-      refuse("as", "\"" + place->first + "\" is already the picture of line " +
-                       std::to_string(place->second) + "; give another name");
+      refuse("as", "\"" + entry->first + "\" is already used in line " +
+                       std::to_string(entry->second) + "; give another name");
     }
   }
 
  private:
-  std::map<std::string, std::uint32_t> lineOf_;
+  std::map<std::string, std::uint32_t> lineByName_;
 };
 
 ScriptLine readLine(std::string_view text, std::uint32_t number) {
-  if (text.size() > kLongestLine) {
+  if (text.size() > kMaxLineBytes) {
     refuse("", "has " + std::to_string(text.size()) + " bytes; at most " +
-                   std::to_string(kLongestLine) + " are allowed");
+                   std::to_string(kMaxLineBytes) + " are allowed");
   }
   return {number, parseLine(text, number)};
 }
@@ -85,9 +85,9 @@ Script parseScript(std::string_view text, const std::string& source) {
       ScriptLine read = readLine(line, number);
       captures.add(read);
       script.lines.push_back(std::move(read));
-    } catch (const LineProblem& problem) {
+    } catch (const LineError& problem) {
       if (errorCount++ == 0) firstBadLine = number;
-      if (errors.size() < kMostErrorsTold) {
+      if (errors.size() < kMaxReportedErrors) {
         errors.push_back(source + ":" + std::to_string(number) + ": " + problem.text);
       }
     }
@@ -100,23 +100,23 @@ Script readScript(const std::filesystem::path& file) {
   std::error_code problem;
   const auto status = std::filesystem::status(file, problem);
   if (std::filesystem::is_directory(status)) {
-    throw ScriptError(file.string() + ": is a folder; give the script's file", 0);
+    throw ScriptError(file.string() + ": is a folder; give a script file", 0);
   }
   std::ifstream stream(file, std::ios::binary);
   if (!stream) {
-    throw ScriptError(file.string() + ": cannot be opened; does it exist, and may it be read?", 0);
+    throw ScriptError(file.string() + ": cannot be opened; does it exist, and is it readable?", 0);
   }
   std::string text;
   std::array<char, 1 << 16> piece{};
   while (stream.read(piece.data(), piece.size()) || stream.gcount() > 0) {
     text.append(piece.data(), static_cast<std::size_t>(stream.gcount()));
-    if (text.size() > kLargestScript) {
-      throw ScriptError(file.string() + ": is larger than " + std::to_string(kLargestScript >> 20) +
-                            " MiB; is it a script?",
+    if (text.size() > kMaxScriptBytes) {
+      throw ScriptError(file.string() + ": is larger than " +
+                            std::to_string(kMaxScriptBytes >> 20) + " MiB; is it a script?",
                         0);
     }
   }
-  if (stream.bad()) throw ScriptError(file.string() + ": cannot be read to its end", 0);
+  if (stream.bad()) throw ScriptError(file.string() + ": cannot be read completely", 0);
   return parseScript(text, file.string());
 }
 

@@ -1,15 +1,14 @@
-// A box is hidden when its nearest point lies behind the farthest depth of all pixels that its
-// picture may cover. Nothing of that depends on who drew what, only on the depth that is there:
+// A box is occluded if its nearest point is behind the farthest depth of all pixels that its
+// projection may cover. The test depends only on the depth buffer:
 //
-// - The pixels: the corners' picture, grown by kPixelSlack on each side. A triangle in the box
-//   covers none but those (its picture is in that of the box, and rasterisers move corners by less
-//   than 1/100 of a pixel: by 1/256 to their grid and by the rounding of clipping).
-// - The depth: the nearest corner's, grown by what a rasteriser may add. It interpolates along the
-//   picture from the triangle's corners, in floats: some 2^-24 of the greatest depth of the
-//   triangle for each pixel that it is steep. kRelativeSlack and kTriangleSlack are a thousand
-//   times that. What they do not bound are triangles thinner than 1/256 of a pixel: there the grid
-//   is coarser than the triangle, and what is interpolated may lie anywhere.
-// - A box that comes nearer than the near plane is not looked at as a whole: its pieces are.
+// - Pixels: the projected corners' bounds, extended by kPixelSlack on each side. A triangle in the
+//   box covers no other pixels: rasterisers move corners by less than 1/100 of a pixel (1/256 for
+//   their grid, plus the rounding of clipping).
+// - Depth: the nearest corner's, extended by the rasteriser's error. It interpolates in floats from
+//   the triangle's corners; the error is about 2^-24 of the triangle's maximum depth per pixel of
+//   slope. kRelativeSlack and kTriangleSlack are a thousand times that. They do not bound triangles
+//   thinner than 1/256 of a pixel: the grid is coarser than those, so their depth is arbitrary.
+// - A box that crosses the near plane is not tested as a whole, but subdivided.
 #include "render/gl/box_visibility.hpp"
 
 #include <algorithm>
@@ -19,60 +18,60 @@ namespace enfilade::render {
 namespace {
 
 constexpr double kPixelSlack = 0.5;      // pixels
-constexpr double kRelativeSlack = 1e-4;  // of a piece's depth
-constexpr float kTriangleSlack = 1e-6f;  // of the depth of the whole box, which holds the triangle
-constexpr float kParallelSlack = 1e-5f;  // orthographic: of near..far
-constexpr int kMostHalvings = 6;         // a box is looked at in up to 2^6 pieces
-constexpr int kSmallPicture = 6;         // pixels; what is smaller is not cut any more
+constexpr double kRelativeSlack = 1e-4;  // of a sub-box's depth
+constexpr float kTriangleSlack = 1e-6f;  // of the whole box's depth; the triangle may span the box
+constexpr float kParallelSlack = 1e-5f;  // orthographic: of far - near
+constexpr int kMaxHalvings = 6;          // up to 2^6 sub-boxes
+constexpr int kSmallBoxThreshold = 6;    // pixels; smaller projections are not subdivided
 
 }  // namespace
 
-struct BoxSight::Extent {
+struct BoxVisibility::Extent {
   PixelRect pixels;
   double nearest;  ///< metres along forward
 };
 
-BoxSight::BoxSight(const Camera& camera)
+BoxVisibility::BoxVisibility(const Camera& camera)
     : camera_(camera),
-      view_(viewOf(camera)),
+      basis_(computeCameraBasis(camera)),
       eye_(camera.eye),
-      sides_(frustumOf(camera)),
+      planes_(computeFrustum(camera)),
       perspective_(camera.projection == Camera::Projection::perspective) {
-  for (std::size_t i = 0; i < sides_.size(); ++i) {
-    slacks_[i] = 1e-5 * (1 + std::abs(sides_[i].offset));  // as mayBeSeen
-    sides_[i].offset += sides_[i].normal.dot(eye_);
+  for (std::size_t i = 0; i < planes_.size(); ++i) {
+    slacks_[i] = 1e-5 * (1 + std::abs(planes_[i].offset));  // as in intersectsFrustum()
+    planes_[i].offset += planes_[i].normal.dot(eye_);
   }
 }
 
-bool BoxSight::outside(const EyeBox& box) const {
-  for (std::size_t i = 0; i < sides_.size(); ++i) {
-    const Plane& side = sides_[i];
-    const double reach = side.normal.cwiseAbs().dot(box.half);
-    if (side.normal.dot(box.centre) + side.offset + reach < -slacks_[i]) return true;
+bool BoxVisibility::isOutsideFrustum(const EyeSpaceAabb& box) const {
+  for (std::size_t i = 0; i < planes_.size(); ++i) {
+    const Plane& side = planes_[i];
+    const double projectedRadius = side.normal.cwiseAbs().dot(box.halfExtent);
+    if (side.normal.dot(box.centre) + side.offset + projectedRadius < -slacks_[i]) return true;
   }
   return false;
 }
 
-float BoxSight::depthAt(double z) const {
+float BoxVisibility::computeBufferDepth(double z) const {
   const double range = camera_.far - camera_.near;
   const double depth =
       perspective_ ? camera_.near * (camera_.far - z) / (z * range) : (camera_.far - z) / range;
   return static_cast<float>(std::clamp(depth, 0.0, 1.0));
 }
 
-/// False when the box comes too near for a picture of it. Otherwise its pixels in the picture (none
-/// when it lies beside it: right < left, or bottom < top).
-bool BoxSight::ahead(const EyeBox& box, Extent& extent) const {
-  const double z = view_.forward.dot(box.centre);
-  const double reach = view_.forward.cwiseAbs().dot(box.half);
-  extent.nearest = z - reach;
+/// Projects the box to pixels. False if it crosses the near plane. Outside the image, the rectangle
+/// is empty: right < left, or bottom < top.
+bool BoxVisibility::projectBox(const EyeSpaceAabb& box, Extent& extent) const {
+  const double z = basis_.forward.dot(box.centre);
+  const double projectedRadius = basis_.forward.cwiseAbs().dot(box.halfExtent);
+  extent.nearest = z - projectedRadius;
   if (perspective_ && extent.nearest < camera_.near) return false;
   const double halfWidth = 0.5 * camera_.width, halfHeight = 0.5 * camera_.height;
-  const double x = halfWidth * view_.scaleX * view_.right.dot(box.centre);
-  const double y = -halfHeight * view_.scaleY * view_.up.dot(box.centre);
-  const Vec3 xs = halfWidth * view_.scaleX * view_.right.cwiseProduct(box.half);
-  const Vec3 ys = -halfHeight * view_.scaleY * view_.up.cwiseProduct(box.half);
-  const Vec3 zs = view_.forward.cwiseProduct(box.half);
+  const double x = halfWidth * basis_.scaleX * basis_.right.dot(box.centre);
+  const double y = -halfHeight * basis_.scaleY * basis_.up.dot(box.centre);
+  const Vec3 xs = halfWidth * basis_.scaleX * basis_.right.cwiseProduct(box.halfExtent);
+  const Vec3 ys = -halfHeight * basis_.scaleY * basis_.up.cwiseProduct(box.halfExtent);
+  const Vec3 zs = basis_.forward.cwiseProduct(box.halfExtent);
   double left = 1e300, right = -1e300, top = 1e300, bottom = -1e300;
   for (int corner = 0; corner < 8; ++corner) {
     const double a = (corner & 1) ? 1 : -1, b = (corner & 2) ? 1 : -1, c = (corner & 4) ? 1 : -1;
@@ -84,8 +83,9 @@ bool BoxSight::ahead(const EyeBox& box, Extent& extent) const {
     top = std::min(top, row);
     bottom = std::max(bottom, row);
   }
-  const double middleX = halfWidth * (1 + view_.shiftX), middleY = halfHeight * (1 - view_.shiftY);
-  // Pixel i has its centre at i + 1/2.
+  const double middleX = halfWidth * (1 + basis_.shiftX),
+               middleY = halfHeight * (1 - basis_.shiftY);
+  // The centre of pixel i is at i + 1/2.
   const auto first = [](double low, int count) {
     return static_cast<int>(std::clamp(std::ceil(low - 0.5 - kPixelSlack), 0.0, count + 0.0));
   };
@@ -97,48 +97,50 @@ bool BoxSight::ahead(const EyeBox& box, Extent& extent) const {
   return true;
 }
 
-Sight BoxSight::glance(const EyeBox& box, const DepthPyramid& depth) const {
-  if (outside(box)) return Sight::outside;
+Visibility BoxVisibility::testWhole(const EyeSpaceAabb& box, const DepthPyramid& depth) const {
+  if (isOutsideFrustum(box)) return Visibility::culled;
   Extent extent;
-  if (!ahead(box, extent)) return Sight::maybe;
+  if (!projectBox(box, extent)) return Visibility::visible;
   const PixelRect& pixels = extent.pixels;
-  if (pixels.right < pixels.left || pixels.bottom < pixels.top) return Sight::outside;
-  const float nearest = depthAt(extent.nearest);
+  if (pixels.right < pixels.left || pixels.bottom < pixels.top) return Visibility::culled;
+  const float nearest = computeBufferDepth(extent.nearest);
   const float slack = perspective_ ? kTriangleSlack * nearest : kParallelSlack;
-  const auto grown = static_cast<float>(nearest * (1 + kRelativeSlack)) + slack;
-  return depth.hides(pixels, grown) ? Sight::hidden : Sight::maybe;
+  const auto inflatedDepth = static_cast<float>(nearest * (1 + kRelativeSlack)) + slack;
+  return depth.isOccluded(pixels, inflatedDepth) ? Visibility::occluded : Visibility::visible;
 }
 
-Sight BoxSight::piece(const EyeBox& box, const DepthPyramid& depth, float slack,
-                      int halvings) const {
-  if (outside(box)) return Sight::outside;
+Visibility BoxVisibility::testRecursive(const EyeSpaceAabb& box, const DepthPyramid& depth,
+                                        float slack, int halvings) const {
+  if (isOutsideFrustum(box)) return Visibility::culled;
   Extent extent;
-  if (ahead(box, extent)) {
+  if (projectBox(box, extent)) {
     const PixelRect& pixels = extent.pixels;
     const int width = pixels.right - pixels.left, height = pixels.bottom - pixels.top;
-    if (width < 0 || height < 0) return Sight::outside;
-    const auto grown = static_cast<float>(depthAt(extent.nearest) * (1 + kRelativeSlack)) + slack;
-    if (depth.hides(pixels, grown)) return Sight::hidden;
-    if (width <= kSmallPicture && height <= kSmallPicture) return Sight::maybe;
+    if (width < 0 || height < 0) return Visibility::culled;
+    const auto inflatedDepth =
+        static_cast<float>(computeBufferDepth(extent.nearest) * (1 + kRelativeSlack)) + slack;
+    if (depth.isOccluded(pixels, inflatedDepth)) return Visibility::occluded;
+    if (width <= kSmallBoxThreshold && height <= kSmallBoxThreshold) return Visibility::visible;
   }
-  if (halvings == 0) return Sight::maybe;
+  if (halvings == 0) return Visibility::visible;
   int axis = 0;
-  box.half.maxCoeff(&axis);
-  EyeBox part = box;
-  part.half[axis] *= 0.5;
-  part.centre[axis] = box.centre[axis] - part.half[axis];
-  const Sight one = piece(part, depth, slack, halvings - 1);
-  if (one == Sight::maybe) return one;
-  part.centre[axis] = box.centre[axis] + part.half[axis];
-  const Sight other = piece(part, depth, slack, halvings - 1);
-  return one == Sight::hidden && other == Sight::outside ? one : other;
+  box.halfExtent.maxCoeff(&axis);
+  EyeSpaceAabb halfBox = box;
+  halfBox.halfExtent[axis] *= 0.5;
+  halfBox.centre[axis] = box.centre[axis] - halfBox.halfExtent[axis];
+  const Visibility one = testRecursive(halfBox, depth, slack, halvings - 1);
+  if (one == Visibility::visible) return one;
+  halfBox.centre[axis] = box.centre[axis] + halfBox.halfExtent[axis];
+  const Visibility other = testRecursive(halfBox, depth, slack, halvings - 1);
+  return one == Visibility::occluded && other == Visibility::culled ? one : other;
 }
 
-Sight BoxSight::look(const EyeBox& box, const DepthPyramid& depth) const {
-  const double nearest = view_.forward.dot(box.centre) - view_.forward.cwiseAbs().dot(box.half);
-  const float whole = perspective_ ? depthAt(std::max(nearest, camera_.near)) : 1;
+Visibility BoxVisibility::test(const EyeSpaceAabb& box, const DepthPyramid& depth) const {
+  const double nearest =
+      basis_.forward.dot(box.centre) - basis_.forward.cwiseAbs().dot(box.halfExtent);
+  const float whole = perspective_ ? computeBufferDepth(std::max(nearest, camera_.near)) : 1;
   const float slack = perspective_ ? kTriangleSlack * whole : kParallelSlack;
-  return piece(box, depth, slack, kMostHalvings);
+  return testRecursive(box, depth, slack, kMaxHalvings);
 }
 
 }  // namespace enfilade::render

@@ -1,4 +1,4 @@
-// Whether a camera may see anything of a box, given the depth of what is drawn. Knows no GL.
+// Frustum and occlusion tests of boxes against a depth pyramid. Independent of OpenGL.
 #pragma once
 
 #include "render/camera_basis.hpp"
@@ -6,35 +6,40 @@
 
 namespace enfilade::render {
 
-/// `outside` and `hidden` are proved: no triangle in the box has a pixel of the picture.
-enum class Sight : std::uint8_t { outside, hidden, maybe };
+/// `culled` (outside the frustum) and `occluded` are certain: no triangle in the box affects a
+/// pixel. `visible` means possibly visible.
+enum class Visibility : std::uint8_t { culled, occluded, visible };
 
-/// A box as its centre and half of its size, metres, relative to the eye, world axes.
-struct EyeBox {
-  Vec3 centre, half;
+/// A box as centre and half extent, metres, relative to the eye, world axes.
+struct EyeSpaceAabb {
+  Vec3 centre, halfExtent;
 };
 
-class BoxSight {
+/// Visibility tests for one camera.
+class BoxVisibility {
  public:
-  explicit BoxSight(const Camera& camera);
+  explicit BoxVisibility(const Camera& camera);
 
-  EyeBox relative(const scene::Box& box) const { return {box.centre() - eye_, 0.5 * box.size()}; }
-  bool outside(const EyeBox& box) const;
-  /// One look at the box as a whole.
-  Sight glance(const EyeBox& box, const DepthPyramid& depth) const;
-  /// As glance(), but a box that is not hidden as a whole is looked at in pieces.
-  Sight look(const EyeBox& box, const DepthPyramid& depth) const;
+  EyeSpaceAabb toEyeSpace(const scene::Aabb& box) const {
+    return {box.centre() - eye_, 0.5 * box.size()};
+  }
+  bool isOutsideFrustum(const EyeSpaceAabb& box) const;
+  /// Tests the box as a whole.
+  Visibility testWhole(const EyeSpaceAabb& box, const DepthPyramid& depth) const;
+  /// As testWhole(), but subdivides a box that is not occluded as a whole.
+  Visibility test(const EyeSpaceAabb& box, const DepthPyramid& depth) const;
 
  private:
   struct Extent;
-  bool ahead(const EyeBox& box, Extent& extent) const;
-  Sight piece(const EyeBox& box, const DepthPyramid& depth, float slack, int depthLeft) const;
-  float depthAt(double z) const;
+  bool projectBox(const EyeSpaceAabb& box, Extent& extent) const;
+  Visibility testRecursive(const EyeSpaceAabb& box, const DepthPyramid& depth, float slack,
+                           int halvings) const;
+  float computeBufferDepth(double z) const;
 
   Camera camera_;
-  View view_;
+  CameraBasis basis_;
   Vec3 eye_;
-  std::array<Plane, 6> sides_;    ///< about the eye
+  std::array<Plane, 6> planes_;   ///< frustum planes relative to the eye
   std::array<double, 6> slacks_;  ///< metres
   bool perspective_;
 };

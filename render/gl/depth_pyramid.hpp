@@ -1,25 +1,25 @@
-// What a picture's depth hides. Knows no GL.
+// Hierarchical depth buffer for occlusion tests. Independent of OpenGL.
 #pragma once
 
 #include <vector>
 
 namespace enfilade::render {
 
-/// Pixels first..last of both axes, all inside the picture.
+/// A pixel rectangle inside the image.
 struct PixelRect {
   int left, top, right, bottom;  ///< inclusive
 };
 
-/// A picture's depth as it is in the buffer (reversed: 1 near, 0 far and nothing), and of each
-/// square of 4, 16, 64, ... pixels the farthest depth in it.
+/// A frame's buffer depth (reversed: 1 near; 0 far and background), and the farthest depth of each
+/// square of 4, 16, 64, ... pixels.
 class DepthPyramid {
  public:
-  /// Where to put the depth of a picture of this size, row by row; then call build().
-  std::vector<float>& base(int width, int height);
+  /// The base level, to be filled row by row with a frame's depth; then call build().
+  std::vector<float>& baseLevel(int width, int height);
   void build();
 
-  /// True only when each pixel of the rectangle is nearer than `depth`.
-  bool hides(const PixelRect& rect, float depth) const;
+  /// True only if every pixel of the rectangle is nearer than `depth`.
+  bool isOccluded(const PixelRect& rect, float depth) const;
 
   int width() const { return levels_.front().width; }
   int height() const { return levels_.front().height; }
@@ -27,12 +27,12 @@ class DepthPyramid {
  private:
   struct Level {
     int width = 0, height = 0;
-    std::vector<float> farthest;
+    std::vector<float> farthestDepth;
   };
-  bool hidesAt(std::size_t level, const PixelRect& rect, float depth) const;
+  bool isOccludedAt(std::size_t level, const PixelRect& rect, float depth) const;
 
-  std::vector<Level> levels_ = std::vector<Level>(1);  ///< [0] is the picture
-  std::size_t used_ = 1;                               ///< levels of this picture
+  std::vector<Level> levels_ = std::vector<Level>(1);  ///< [0] is the base level
+  std::size_t levelCount_ = 1;                         ///< levels of the current frame
 };
 
 }  // namespace enfilade::render

@@ -1,5 +1,4 @@
-// What moves, as a snapshot has it: where bodies are drawn, and the meshes of avatars on the
-// device. Worked out and uploaded again only when it changed.
+// Body transforms and avatar meshes of a snapshot on the device, updated only on changes.
 #pragma once
 
 #include <memory>
@@ -10,22 +9,24 @@
 
 namespace enfilade::render {
 
-class MovingThings {
+/// The dynamic part of the scene, as of the last update().
+class DynamicInstances {
  public:
   /// Needs a current context.
-  void follow(const scene::Scene& scene, const scene::Snapshot& snapshot);
+  void update(const scene::Scene& scene, const scene::Snapshot& snapshot);
 
-  const std::vector<BodyPlacement>& bodies() const { return placements_; }
+  const std::vector<BodyPlacement>& bodyPlacements() const { return placements_; }
   const AvatarMeshes& avatars() const { return meshes_; }
   Geometry avatarGeometry(const std::vector<GlTexture>& textures) const {
     return {vertices_.name(), indices_.name(), textures};
   }
 
  private:
-  bool followed_ = false;
-  std::shared_ptr<const std::vector<scene::BodyView>> bodies_;  ///< of `placements_`
+  bool updated_ = false;
+  std::shared_ptr<const std::vector<scene::BodySnapshot>>
+      snapshotBodies_;  ///< source of `placements_`
   std::vector<BodyPlacement> placements_;
-  std::vector<scene::AvatarView> drawn_;  ///< of `meshes_`
+  std::vector<scene::AvatarSnapshot> uploadedAvatars_;  ///< source of `meshes_`
   AvatarMeshes meshes_;
   StreamBuffer vertices_, indices_;
 };

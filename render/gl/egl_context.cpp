@@ -18,23 +18,23 @@
 namespace enfilade::render {
 namespace {
 
-constexpr int kMostDevices = 32;
+constexpr int kMaxDevices = 32;
 constexpr EGLint kEglRenderer = 0x335F;  // EGL_RENDERER_EXT of EGL_EXT_device_query_name
 
-struct Candidate {
+struct DisplayCandidate {
   EGLDisplay display = EGL_NO_DISPLAY;
-  std::string place;
-  std::string name;    // what EGL calls it; may be empty
-  bool onCpu = false;  // EGL says so
+  std::string platform;
+  std::string name;    // EGL's name; may be empty
+  bool onCpu = false;  // according to EGL
 };
 
-std::string eglFailure(const char* call) {
+std::string describeEglError(const char* call) {
   std::array<char, 16> code{};
   std::snprintf(code.data(), code.size(), "0x%04x", static_cast<unsigned>(eglGetError()));
   return std::string(call) + " failed (EGL error " + code.data() + ")";
 }
 
-/// Whole words only: EGL_EXT_device must not be found in EGL_EXT_device_base.
+/// Compares whole words: EGL_EXT_device must not match EGL_EXT_device_base.
 bool hasExtension(const char* list, const std::string& wanted) {
   std::istringstream words(list ? list : "");
   for (std::string word; words >> word;) {
@@ -50,44 +50,44 @@ bool isSoftwareName(const std::string& name) {
   return false;
 }
 
-std::string textOf(const char* text) {
+std::string toStringOrEmpty(const char* text) {
   return text ? text : "";
 }
 
-std::string textOf(const GLubyte* text) {
+std::string toStringOrEmpty(const GLubyte* text) {
   return text ? reinterpret_cast<const char*>(text) : "";
 }
 
-/// What EGL calls a device, or nothing.
-std::string nameOf(EGLDeviceEXT device, const char* extensions) {
+/// EGL's name of a device, or "".
+std::string queryDeviceName(EGLDeviceEXT device, const char* extensions) {
   if (!hasExtension(extensions, "EGL_EXT_device_query_name")) return "";
-  return textOf(eglQueryDeviceStringEXT(device, kEglRenderer));
+  return toStringOrEmpty(eglQueryDeviceStringEXT(device, kEglRenderer));
 }
 
-/// One display a device, devices that draw on the CPU last.
-std::vector<Candidate> deviceDisplays(const char* clientExtensions) {
+/// One display per device, devices that draw on the CPU last.
+std::vector<DisplayCandidate> enumerateDeviceDisplays(const char* clientExtensions) {
   const bool enumerates = hasExtension(clientExtensions, "EGL_EXT_device_base") ||
                           hasExtension(clientExtensions, "EGL_EXT_device_enumeration");
   if (!enumerates || !hasExtension(clientExtensions, "EGL_EXT_platform_device")) return {};
-  std::array<EGLDeviceEXT, kMostDevices> devices{};
+  std::array<EGLDeviceEXT, kMaxDevices> devices{};
   EGLint count = 0;
-  if (!eglQueryDevicesEXT(kMostDevices, devices.data(), &count)) return {};
-  std::vector<Candidate> hardware, software;
+  if (!eglQueryDevicesEXT(kMaxDevices, devices.data(), &count)) return {};
+  std::vector<DisplayCandidate> hardware, software;
   for (EGLint i = 0; i < count; ++i) {
     const auto device = devices[static_cast<std::size_t>(i)];
     const char* extensions = eglQueryDeviceStringEXT(device, EGL_EXTENSIONS);
     const bool onCpu = hasExtension(extensions, "EGL_MESA_device_software");
     (onCpu ? software : hardware)
         .push_back({eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, device, nullptr),
-                    "EGL device " + std::to_string(i), nameOf(device, extensions), onCpu});
+                    "EGL device " + std::to_string(i), queryDeviceName(device, extensions), onCpu});
   }
   hardware.insert(hardware.end(), software.begin(), software.end());
   return hardware;
 }
 
-std::vector<Candidate> candidates(const char* extensions) {
+std::vector<DisplayCandidate> enumerateDisplays(const char* extensions) {
   if (!hasExtension(extensions, "EGL_EXT_platform_base")) return {};
-  std::vector<Candidate> result = deviceDisplays(extensions);
+  std::vector<DisplayCandidate> result = enumerateDeviceDisplays(extensions);
   if (hasExtension(extensions, "EGL_MESA_platform_surfaceless")) {
     result.push_back(
         {eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr),
@@ -96,19 +96,19 @@ std::vector<Candidate> candidates(const char* extensions) {
   return result;
 }
 
-/// A current context on `display`, or EGL_NO_CONTEXT and why in `failure`.
-EGLContext currentContextOn(EGLDisplay display, std::string& failure) {
-  const auto fail = [&](const std::string& why) {
-    failure = why;
+/// Creates a current context on `display`; on failure EGL_NO_CONTEXT, with the reason in `failure`.
+EGLContext createCurrentContext(EGLDisplay display, std::string& failure) {
+  const auto fail = [&](const std::string& reason) {
+    failure = reason;
     return EGLContext{EGL_NO_CONTEXT};
   };
-  if (display == EGL_NO_DISPLAY) return fail(eglFailure("eglGetPlatformDisplayEXT"));
-  if (!eglInitialize(display, nullptr, nullptr)) return fail(eglFailure("eglInitialize"));
+  if (display == EGL_NO_DISPLAY) return fail(describeEglError("eglGetPlatformDisplayEXT"));
+  if (!eglInitialize(display, nullptr, nullptr)) return fail(describeEglError("eglInitialize"));
   const char* extensions = eglQueryString(display, EGL_EXTENSIONS);
   for (const char* needed : {"EGL_KHR_no_config_context", "EGL_KHR_surfaceless_context"}) {
     if (!hasExtension(extensions, needed)) return fail(std::string("has no ") + needed);
   }
-  if (!eglBindAPI(EGL_OPENGL_API)) return fail(eglFailure("eglBindAPI(EGL_OPENGL_API)"));
+  if (!eglBindAPI(EGL_OPENGL_API)) return fail(describeEglError("eglBindAPI(EGL_OPENGL_API)"));
   constexpr std::array<EGLint, 7> kAttributes{EGL_CONTEXT_MAJOR_VERSION,
                                               4,
                                               EGL_CONTEXT_MINOR_VERSION,
@@ -118,17 +118,17 @@ EGLContext currentContextOn(EGLDisplay display, std::string& failure) {
                                               EGL_NONE};
   const EGLContext context =
       eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, kAttributes.data());
-  if (context == EGL_NO_CONTEXT) return fail(eglFailure("eglCreateContext(OpenGL 4.5 core)"));
+  if (context == EGL_NO_CONTEXT) return fail(describeEglError("eglCreateContext(OpenGL 4.5 core)"));
   if (!eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context)) {
-    const std::string why = eglFailure("eglMakeCurrent");
+    const std::string reason = describeEglError("eglMakeCurrent");
     eglDestroyContext(display, context);
-    return fail(why);
+    return fail(reason);
   }
   return context;
 }
 
-/// Of the current context's device; empty where the driver tells none.
-std::string currentUuid() {
+/// UUID of the current context's device; empty if the driver reports none.
+std::string queryCurrentUuid() {
   if (!epoxy_has_gl_extension("GL_EXT_memory_object")) return "";
   GLint count = 0;
   glGetIntegerv(GL_NUM_DEVICE_UUIDS_EXT, &count);
@@ -145,37 +145,37 @@ std::string currentUuid() {
   return text;
 }
 
-void destroy(EGLDisplay display, EGLContext context) noexcept {
+void destroyContext(EGLDisplay display, EGLContext context) noexcept {
   if (eglGetCurrentContext() == context) {
     eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
   }
   eglDestroyContext(display, context);
 }
 
-/// One thread at a time looks for a device: displays are the process's, Mesa's eglInitialize writes
-/// anew what another thread may be reading of one, and its own locks, of futexes, are unknown to
-/// ThreadSanitizer.
-std::mutex& lookingForDevice() {
+/// Serialises device probing. Displays are shared by the process, and Mesa's eglInitialize
+/// overwrites data that another thread may be reading. ThreadSanitizer does not recognise Mesa's
+/// futex locks.
+std::mutex& deviceProbeMutex() {
   static std::mutex mutex;
   return mutex;
 }
 
-/// A current context and what it says of itself; EGL_NO_CONTEXT when there is a failure.
-EGLContext tryDevice(const Candidate& candidate, DeviceTrial& trial) {
-  trial.place = candidate.place;
-  trial.name = candidate.name;
-  trial.software = candidate.onCpu;
-  const EGLContext context = currentContextOn(candidate.display, trial.failure);
+/// Creates a current context and fills `probe`; EGL_NO_CONTEXT on failure.
+EGLContext probeDevice(const DisplayCandidate& candidate, DeviceProbe& probe) {
+  probe.platform = candidate.platform;
+  probe.name = candidate.name;
+  probe.software = candidate.onCpu;
+  const EGLContext context = createCurrentContext(candidate.display, probe.failure);
   if (context == EGL_NO_CONTEXT) return context;
-  trial.vendor = textOf(eglQueryString(candidate.display, EGL_VENDOR));
-  trial.name = textOf(glGetString(GL_RENDERER));
-  trial.glVersion = textOf(glGetString(GL_VERSION));
-  trial.software = isSoftwareName(trial.name);
-  trial.uuid = currentUuid();
+  probe.vendor = toStringOrEmpty(eglQueryString(candidate.display, EGL_VENDOR));
+  probe.name = toStringOrEmpty(glGetString(GL_RENDERER));
+  probe.glVersion = toStringOrEmpty(glGetString(GL_VERSION));
+  probe.software = isSoftwareName(probe.name);
+  probe.uuid = queryCurrentUuid();
   return context;
 }
 
-std::string lowered(std::string text) {
+std::string toLower(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return text;
 }
@@ -185,24 +185,27 @@ bool isNumber(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
-/// Why the device is not the one that was asked for; empty: it is.
-std::string whyNot(const DeviceChoice& choice, std::size_t index, const DeviceTrial& trial) {
-  if (choice.requireGpu && trial.software) return "draws on the CPU, and a GPU is required";
-  const std::string wanted = lowered(choice.device);
+/// The reason why the device does not match `choice`; empty: it matches.
+std::string explainRejection(const DeviceChoice& choice, std::size_t index,
+                             const DeviceProbe& probe) {
+  if (choice.requireGpu && probe.software) return "draws on the CPU, but a GPU is required";
+  const std::string wanted = toLower(choice.device);
   if (wanted.empty()) return "";
   if (isNumber(wanted)) return std::stoul(wanted) == index ? "" : "is not number " + wanted;
-  const std::string uuid = lowered(trial.uuid);
+  const std::string uuid = toLower(probe.uuid);
   const bool byUuid = !uuid.empty() && (wanted == uuid || wanted == "gpu-" + uuid);
-  if (byUuid || lowered(trial.name).find(wanted) != std::string::npos) return "";
-  return "is called \"" + trial.name + "\", not \"" + choice.device + "\"";
+  if (byUuid || toLower(probe.name).find(wanted) != std::string::npos) return "";
+  return "is named \"" + probe.name + "\", not \"" + choice.device + "\"";
 }
 
-std::string line(std::size_t index, const DeviceTrial& trial, const std::string& why) {
-  return "\n  " + std::to_string(index) + ": " + trial.place + ": " + why;
+std::string formatProbeLine(std::size_t index, const DeviceProbe& probe,
+                            const std::string& reason) {
+  return "\n  " + std::to_string(index) + ": " + probe.platform + ": " + reason;
 }
 
-/// libepoxy loads these when they are first needed, and ends the program when they are not there.
-std::string missingLibrary() {
+/// A missing library, or "". libepoxy loads them on first use and aborts the program if one is
+/// missing.
+std::string findMissingLibrary() {
   const auto loads = [](const char* name) {
     return dlopen(name, RTLD_LAZY | RTLD_LOCAL) != nullptr;
   };
@@ -221,34 +224,38 @@ constexpr const char* kNoPlatform =
 }  // namespace
 
 EglContext::EglContext(const DeviceChoice& choice) {
-  if (const std::string missing = missingLibrary(); !missing.empty()) throw RenderError(missing);
-  const std::lock_guard lock(lookingForDevice());
+  if (const std::string missing = findMissingLibrary(); !missing.empty())
+    throw RenderError(missing);
+  const std::lock_guard lock(deviceProbeMutex());
   std::string tried, hardwareFailures;
-  const std::vector<Candidate> all = candidates(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS));
+  const std::vector<DisplayCandidate> all =
+      enumerateDisplays(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS));
   for (std::size_t i = 0; i < all.size(); ++i) {
-    DeviceTrial trial;
-    const EGLContext context = tryDevice(all[i], trial);
-    const std::string why = trial.failure.empty() ? whyNot(choice, i, trial) : trial.failure;
-    if (why.empty()) {
+    DeviceProbe probe;
+    const EGLContext context = probeDevice(all[i], probe);
+    const std::string reason =
+        probe.failure.empty() ? explainRejection(choice, i, probe) : probe.failure;
+    if (reason.empty()) {
       display_ = all[i].display;
       context_ = context;
-      deviceName_ = trial.name;
-      software_ = trial.software;
+      deviceName_ = probe.name;
+      software_ = probe.software;
       if (software_ && !hardwareFailures.empty()) {
-        note_ = "drawing on the CPU with " + deviceName_ +
-                ", since no GPU can be used:" + hardwareFailures;
+        warning_ = "drawing on the CPU with " + deviceName_ +
+                   ", because no GPU is usable:" + hardwareFailures;
       }
       return;
     }
-    if (context != EGL_NO_CONTEXT) destroy(all[i].display, context);
-    tried += line(i, trial, why);
-    if (!trial.software && !trial.failure.empty()) hardwareFailures += line(i, trial, why);
+    if (context != EGL_NO_CONTEXT) destroyContext(all[i].display, context);
+    tried += formatProbeLine(i, probe, reason);
+    if (!probe.software && !probe.failure.empty())
+      hardwareFailures += formatProbeLine(i, probe, reason);
   }
   if (tried.empty()) tried.append("\n  ").append(kNoPlatform);
   std::string wanted = choice.device.empty() ? "" : " \"" + choice.device + "\"";
   if (choice.requireGpu) wanted += " that is a GPU";
   throw RenderError("no EGL device" + wanted + " gives an OpenGL 4.5 core context:" + tried +
-                    "\n`enfilade doctor` tells more; drawing on the CPU needs the packages "
+                    "\nrun `enfilade doctor` for details; drawing on the CPU needs the packages "
                     "libegl-mesa0 and libgl1-mesa-dri");
 }
 
@@ -266,37 +273,37 @@ EglContext& EglContext::operator=(EglContext&& other) noexcept {
   display_ = std::exchange(other.display_, nullptr);
   context_ = std::exchange(other.context_, nullptr);
   deviceName_ = std::move(other.deviceName_);
-  note_ = std::move(other.note_);
+  warning_ = std::move(other.warning_);
   software_ = other.software_;
   return *this;
 }
 
 void EglContext::makeCurrent() const {
-  // The API bound is a matter of each thread.
+  // The bound API is per thread.
   if (!eglBindAPI(EGL_OPENGL_API) ||
       !eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_)) {
-    throw RenderError(eglFailure("eglMakeCurrent") +
-                      "; a GlRenderer must be made, used and destroyed on one thread");
+    throw RenderError(describeEglError("eglMakeCurrent") +
+                      "; create, use and destroy a GlRenderer on the same thread");
   }
 }
 
 void EglContext::release() noexcept {
   // Terminating the display would end the contexts of other renderers too.
-  if (context_) destroy(display_, context_);
+  if (context_) destroyContext(display_, context_);
   context_ = nullptr;
 }
 
-DeviceReport tryDevices() {
+DeviceReport probeDevices() {
   DeviceReport report;
-  report.failure = missingLibrary();
+  report.failure = findMissingLibrary();
   if (!report.failure.empty()) return report;
-  const std::lock_guard lock(lookingForDevice());
+  const std::lock_guard lock(deviceProbeMutex());
   const char* extensions = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
-  report.clientExtensions = textOf(extensions);
-  for (const Candidate& candidate : candidates(extensions)) {
-    DeviceTrial& trial = report.devices.emplace_back();
-    const EGLContext context = tryDevice(candidate, trial);
-    if (context != EGL_NO_CONTEXT) destroy(candidate.display, context);
+  report.clientExtensions = toStringOrEmpty(extensions);
+  for (const DisplayCandidate& candidate : enumerateDisplays(extensions)) {
+    DeviceProbe& probe = report.devices.emplace_back();
+    const EGLContext context = probeDevice(candidate, probe);
+    if (context != EGL_NO_CONTEXT) destroyContext(candidate.display, context);
   }
   if (report.devices.empty()) report.failure = kNoPlatform;
   return report;

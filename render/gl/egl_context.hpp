@@ -1,4 +1,4 @@
-// A GL 4.5 core context without a window. The only place that speaks EGL.
+// A GL 4.5 core context without a window. Only this file uses EGL.
 #pragma once
 
 #include <string>
@@ -11,21 +11,21 @@ namespace enfilade::render {
 /// Move-only owner of one context.
 class EglContext {
  public:
-  /// Makes a context on the device chosen and makes it current: EGL devices with hardware first,
-  /// then those that draw on the CPU, then Mesa's surfaceless platform. Throws RenderError listing
-  /// all that was tried.
+  /// Creates a context on the chosen device and makes it current. Order: EGL hardware devices, EGL
+  /// devices that draw on the CPU, Mesa's surfaceless platform. Throws RenderError with a list of
+  /// all attempts.
   explicit EglContext(const DeviceChoice& choice = {});
   ~EglContext();
   EglContext(EglContext&& other) noexcept;
   EglContext& operator=(EglContext&& other) noexcept;
 
-  /// Throws RenderError when the context is current on another thread.
+  /// Throws RenderError if the context is current on another thread.
   void makeCurrent() const;
 
   const std::string& deviceName() const { return deviceName_; }  ///< GL_RENDERER
   bool software() const { return software_; }
-  /// What was tried before in vain, one sentence; empty when nothing was.
-  const std::string& note() const { return note_; }
+  /// One sentence about hardware devices that failed before this one; may be empty.
+  const std::string& warning() const { return warning_; }
 
  private:
   void release() noexcept;
@@ -33,12 +33,12 @@ class EglContext {
   void* display_ = nullptr;  ///< EGLDisplay; shared with other contexts, never terminated
   void* context_ = nullptr;  ///< EGLContext
   std::string deviceName_;
-  std::string note_;
+  std::string warning_;
   bool software_ = false;
 };
 
-/// Tries each device in the order in which `DeviceChoice::device` counts them. Never throws: a
-/// machine without EGL has none, and why.
-DeviceReport tryDevices();
+/// Probes all devices in the order of the indices of `DeviceChoice::device`. Never throws: without
+/// EGL, the report has no devices and states the reason.
+DeviceReport probeDevices();
 
 }  // namespace enfilade::render

@@ -9,7 +9,7 @@
 namespace enfilade::render {
 namespace {
 
-constexpr int kMostErrors = 16;  // GL keeps a flag an error; a lost context would report forever
+constexpr int kMaxErrors = 16;  // one flag per error; a lost context reports errors forever
 
 const char* errorName(GLenum error) {
   switch (error) {
@@ -30,14 +30,14 @@ const char* errorName(GLenum error) {
   }
 }
 
-const char* remedy(GLenum error) {
+const char* suggestRemedy(GLenum error) {
   switch (error) {
     case GL_OUT_OF_MEMORY:
-      return "ask for a smaller picture or load a smaller scene";
+      return "request a smaller frame or load a smaller scene";
     case GL_CONTEXT_LOST:
-      return "the device was reset: make a new GlRenderer";
+      return "the device was reset: create a new GlRenderer";
     default:
-      return "this is a fault of Enfilade or the driver: please report it";
+      return "this is a bug of Enfilade or the driver: please report it";
   }
 }
 
@@ -67,7 +67,7 @@ class Shader {
 
 }  // namespace
 
-unsigned createGl(GlKind kind) {
+unsigned createGlObject(GlKind kind) {
   GLuint name = 0;
   switch (kind) {
     case GlKind::buffer:
@@ -89,7 +89,7 @@ unsigned createGl(GlKind kind) {
   return name;
 }
 
-void deleteGl(GlKind kind, unsigned name) noexcept {
+void deleteGlObject(GlKind kind, unsigned name) noexcept {
   switch (kind) {
     case GlKind::buffer:
       glDeleteBuffers(1, &name);
@@ -112,9 +112,9 @@ void deleteGl(GlKind kind, unsigned name) noexcept {
 void checkGl(const char* stage) {
   const GLenum first = glGetError();
   if (first == GL_NO_ERROR) return;
-  for (int i = 0; i < kMostErrors && glGetError() != GL_NO_ERROR; ++i) {
+  for (int i = 0; i < kMaxErrors && glGetError() != GL_NO_ERROR; ++i) {
   }
-  throw RenderError(std::string(stage) + ": " + errorName(first) + "; " + remedy(first));
+  throw RenderError(std::string(stage) + ": " + errorName(first) + "; " + suggestRemedy(first));
 }
 
 GlProgram buildProgram(const std::string& name, const std::string& vertexSource,

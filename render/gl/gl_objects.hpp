@@ -1,4 +1,4 @@
-// Move-only owners of GL names, and the check for GL errors. Needs a current context.
+// Move-only owners of GL objects, and the check for GL errors. Needs a current context.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +9,10 @@ namespace enfilade::render {
 
 enum class GlKind : std::uint8_t { buffer, texture, vertexArray, framebuffer, program };
 
-unsigned createGl(GlKind kind);
-void deleteGl(GlKind kind, unsigned name) noexcept;
+unsigned createGlObject(GlKind kind);
+void deleteGlObject(GlKind kind, unsigned name) noexcept;
 
+/// Owner of one GL object; name 0: empty.
 template <GlKind kind>
 class GlObject {
  public:
@@ -26,12 +27,12 @@ class GlObject {
     }
     return *this;
   }
-  static GlObject create() { return GlObject(createGl(kind)); }
+  static GlObject create() { return GlObject(createGlObject(kind)); }
   unsigned name() const { return name_; }
 
  private:
   void reset() noexcept {
-    if (name_ != 0) deleteGl(kind, name_);
+    if (name_ != 0) deleteGlObject(kind, name_);
   }
   unsigned name_ = 0;
 };
@@ -42,10 +43,10 @@ using GlVertexArray = GlObject<GlKind::vertexArray>;
 using GlFramebuffer = GlObject<GlKind::framebuffer>;
 using GlProgram = GlObject<GlKind::program>;
 
-/// Throws RenderError naming `stage` and the error when GL has one.
+/// Throws RenderError naming `stage` and the error if GL reports one.
 void checkGl(const char* stage);
 
-/// Compiles and links; throws RenderError with the compiler's words. `name` is for the message.
+/// Compiles and links; throws RenderError with the compiler's log. `name` is for the message.
 GlProgram buildProgram(const std::string& name, const std::string& vertexSource,
                        const std::string& fragmentSource);
 

@@ -1,28 +1,26 @@
-// A picture, step by step: the depth of what the camera may see of the model, of bodies where they
-// are, and of avatars; then colour, id and normal of what has that depth, once a pixel; then the
-// sky where nothing was drawn and glass over it all (colour only); shade in hollows is put on what
-// was read back.
+// Steps of a frame: depth prepass of the visible items of model, bodies and avatars; shading of
+// colour, id and normal at equal depth, once per pixel; sky and transparent items (colour only);
+// ambient occlusion on the colours read back.
 //
-// Which parts are drawn:
+// Visible items are found by temporal occlusion culling:
 //
-// 1. Those that a picture from nearby showed are drawn into the depth.
-// 2. It is read back, and what else may be seen in front of it is searched for (part_search.hpp).
-//    Mostly that is nothing, or little, which is drawn into the depth, too. Where much was found
-//    (nothing was known of this view), it is searched among: the nearest are drawn first, which
-//    hides most of the others, then twice as many, and so on.
-// 3. What may be seen by the last depth that was read is shaded. Where neither colours nor
-//    normals are wanted, ids are drawn with the depth, and that is all unless something was
-//    missing.
+// 1. Items visible in an earlier frame from a similar camera are drawn into the depth buffer.
+// 2. The depth is read back, and the remaining items are tested against it (occlusion_culler.hpp).
+//    Usually few or none are disoccluded; they are drawn into the depth, too. If there are many (no
+//    similar earlier frame), they are refined front to back: the nearest ones are drawn first and
+//    occlude most of the others, then twice as many, and so on.
+// 3. Items visible against the last depth are shaded. If neither colour nor normals are requested,
+//    ids are drawn in the depth prepass, and shading is skipped if no item was disoccluded.
 //
-// In a small scene where hardly anything is hidden, all that lies in the picture is drawn and
-// shaded at once instead.
+// In a small scene with little occlusion, all items in the frustum are drawn in one forward pass
+// instead.
 //
-// Where shadows are wanted, which pixels the sun reaches is asked between depth and colour; all
-// that is in the picture is then drawn into the depth first, too.
+// With shadows, the shadow mask is computed between depth and colour. The forward pass is then
+// preceded by a depth prepass, too.
 //
-// Why the picture is that of drawing everything: in a pixel the nearest fragment wins, among equals
-// the one drawn last. What is left out lies, wherever it has a fragment, behind something that is
-// drawn; so each pixel's winner is among what is drawn, and what is shaded keeps its order.
+// The frame equals one of drawing everything: in each pixel the nearest fragment wins, among equals
+// the one drawn last. Every fragment of a culled item is behind a drawn one. Each pixel's winner is
+// therefore drawn, and shading keeps the drawing order.
 #include "render/gl/gl_renderer.hpp"
 
 #include <epoxy/gl.h>
@@ -32,6 +30,7 @@
 #include <optional>
 #include <utility>
 
+#include "collision/assert.hpp"
 #include "render/gl/dynamic_instances.hpp"
 #include "render/gl/egl_context.hpp"
 #include "render/gl/occlusion_culler.hpp"
@@ -43,92 +42,97 @@
 namespace enfilade::render {
 namespace {
 
-// So few that were not foreseen are drawn with what was; among more is searched first.
-constexpr std::size_t kFewMissing = 256;
-constexpr std::size_t kFirstChunk = 512;  // parts of the first drawing of a search; then twice ...
-constexpr int kMostChunks = 24;           // ... as many each time: more than there can be
-// What is drawn is looked at again every so many pictures: whether it is still seen, or in the
-// picture at all.
-constexpr std::uint64_t kLookAgain = 8, kForgetOutside = 64;
+// Up to this many disoccluded items are drawn directly; more are refined front to back.
+constexpr std::size_t kSmallDisocclusionThreshold = 256;
+constexpr std::size_t kFirstChunkItems =
+    512;                        // items of the first refinement chunk; the size doubles
+constexpr int kMaxChunks = 24;  // more chunks than any scene needs
+// Frames between retests of a visible item, and until an item outside the frustum is forgotten.
+constexpr std::uint64_t kRetestPeriod = 8, kForgetCulledPeriod = 64;
 
-// Of so few it is quick to say how much lies in the picture.
-constexpr std::size_t kFewParts = 256;
+// Up to this many items, collecting all items in the frustum is fast.
+constexpr std::size_t kSmallSceneThreshold = 256;
 
-/// What is drawn of the model and of the avatars.
-struct Choice {
-  std::vector<std::uint32_t> parts;   ///< ascending
-  std::vector<std::uint32_t> pieces;  ///< of AvatarMeshes, ascending
+/// Model items and avatar items to draw.
+struct VisibleSet {
+  std::vector<std::uint32_t> items;        ///< ascending
+  std::vector<std::uint32_t> avatarItems;  ///< indices into AvatarMeshes::items, ascending
 };
 
-void add(std::vector<std::uint32_t>& all, const std::vector<std::uint32_t>& more) {
+void mergeSorted(std::vector<std::uint32_t>& all, const std::vector<std::uint32_t>& more) {
+  ENFILADE_ASSERT(std::is_sorted(all.begin(), all.end()));
+  ENFILADE_ASSERT(std::is_sorted(more.begin(), more.end()));
   std::vector<std::uint32_t> merged;
   merged.reserve(all.size() + more.size());
   std::set_union(all.begin(), all.end(), more.begin(), more.end(), std::back_inserter(merged));
   all = std::move(merged);
 }
 
-/// One picture that is being made.
-struct Job {
+/// State of the frame being rendered.
+struct FrameJob {
+  const scene::Snapshot& snapshot;
   const Camera& camera;
   const FrameOptions& options;
-  const Sunlit& sunlit;
-  BoxSight sight;
+  BoxVisibility visibility;
   FrameStatistics statistics;
-  std::vector<float> metres;  ///< Frame::depth; empty: nobody needed it yet
+  std::vector<float> metres;  ///< Frame::depth; empty: not computed yet
 
-  bool shadows() const { return options.shadows && options.channels.rgb; }
+  bool needsShadows() const { return options.shadows && options.channels.rgb; }
 };
 
 }  // namespace
 
 struct GlRenderer::State {
   std::shared_ptr<const scene::Scene> scene;
-  EglContext context;  // before all that lives in it
-  ModelBuffers buffers;
-  std::vector<Part> parts;
-  std::optional<PartSearch> search;
-  std::optional<SurfacePass> pass;  // empty: nothing of the above was brought to the device yet
-  MovingThings moving;
-  FrameTarget target;
-  SeenMemory memory;
-  DepthPyramid depth;
-  bool depthIsOfPicture = false;  // `depth` is that of all that is drawn
-  std::uint64_t picture = 0;
+  ShadowMaskFunction shadowMask;  // may be empty
+  EglContext context;             // before all members that own GL objects
+  SceneBuffers buffers;
+  std::vector<DrawItem> items;
+  std::optional<OcclusionCuller> culler;
+  std::optional<SurfacePass> surfacePass;  // empty: the scene is not uploaded yet
+  DynamicInstances dynamicInstances;
+  RenderTarget target;
+  VisibilityCache visibilityCache;
+  DepthPyramid depthPyramid;
+  bool depthIsCurrent = false;  // the pyramid's base level holds the current depth buffer
+  std::uint64_t frameNumber = 0;
 
-  State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device);
+  State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device,
+        ShadowMaskFunction shadows);
   ~State();
-  void prepare();
-  scene::Box boxOf(std::uint32_t part) const;
-  bool isGlass(const Job& job, std::uint32_t part) const;
-  DrawList drawSurfaces(const Job& job, const Choice& choice);
-  void drawAir(const DrawList& glass);
+  void prepareScene();
+  scene::Aabb itemAabb(std::uint32_t item) const;
+  bool isTransparent(const FrameJob& job, std::uint32_t item) const;
+  DrawList drawSurfaces(const FrameJob& job, const VisibleSet& visibleSet);
+  void drawTransparent(const DrawList& transparent);
   void readDepth(const Camera& camera);
-  const std::vector<float>& metresIn(Job& job);
-  void shadeNearest(Job& job);
-  std::size_t trianglesOf(const std::vector<std::uint32_t>& some) const;
-  Choice inside(const Job& job) const;
-  bool hardlyHidden(const Job& job, const Choice& all) const;
-  DrawList drawInside(Job& job, const Choice& all);
-  DrawList drawSeen(Job& job);
-  Choice foreseen(const Job& job, const Seen& seen) const;
-  Choice missing(Job& job, const Choice& drawn);
-  Choice searchAmong(Job& job, Choice drawn, Choice missing);
-  Choice notHidden(const Job& job, const Choice& drawn) const;
-  void remember(const Job& job, const Choice& drawn, Seen& seen) const;
+  const std::vector<float>& getDepthMetres(FrameJob& job);
+  void beginShading(FrameJob& job);
+  std::size_t countTriangles(const std::vector<std::uint32_t>& some) const;
+  VisibleSet collectInFrustum(const FrameJob& job) const;
+  bool isMostlyVisible(const FrameJob& job, const VisibleSet& all) const;
+  DrawList drawAllInFrustum(FrameJob& job, const VisibleSet& all);
+  DrawList drawVisible(FrameJob& job);
+  VisibleSet predictVisible(const FrameJob& job, const CachedView& cached) const;
+  VisibleSet findDisoccluded(FrameJob& job, const VisibleSet& drawn);
+  VisibleSet refineFrontToBack(FrameJob& job, VisibleSet drawn, VisibleSet disoccluded);
+  VisibleSet filterVisible(const FrameJob& job, const VisibleSet& drawn) const;
+  void updateCache(const FrameJob& job, const VisibleSet& drawn, CachedView& cached) const;
 };
 
-GlRenderer::State::State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device)
-    : scene(std::move(shared)), context(device) {
+GlRenderer::State::State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device,
+                         ShadowMaskFunction shadows)
+    : scene(std::move(shared)), shadowMask(std::move(shadows)), context(device) {
   if (!scene) throw RenderError("GlRenderer: there is no scene");
 }
 
-/// A scene that nobody looks at is never brought to the device.
-void GlRenderer::State::prepare() {
-  if (pass) return;
+/// Uploads the scene with the first frame, so that an unused scene is never uploaded.
+void GlRenderer::State::prepareScene() {
+  if (surfacePass) return;
   buffers = uploadModel(scene->model());
-  parts = partsOf(scene->model());
-  search.emplace(parts);
-  pass.emplace();
+  items = buildDrawItems(scene->model());
+  culler.emplace(items);
+  surfacePass.emplace();
 }
 
 GlRenderer::State::~State() {
@@ -136,266 +140,297 @@ GlRenderer::State::~State() {
   try {
     context.makeCurrent();
   } catch (const RenderError&) {
-    // Destroyed on a wrong thread: the names die with the context.
+    // Destroyed on the wrong thread: the objects are freed with the context.
   }
 }
 
-scene::Box GlRenderer::State::boxOf(std::uint32_t part) const {
-  return placedBox(parts[part], moving.bodies());
+scene::Aabb GlRenderer::State::itemAabb(std::uint32_t item) const {
+  return computeItemAabb(items[item], dynamicInstances.bodyPlacements());
 }
 
-bool GlRenderer::State::isGlass(const Job& job, std::uint32_t part) const {
-  return parts[part].pass == Pass::blend && job.options.glass == Glass::clear;
+bool GlRenderer::State::isTransparent(const FrameJob& job, std::uint32_t item) const {
+  return items[item].alphaMode == AlphaMode::blend &&
+         job.options.transparency == TransparencyMode::blend;
 }
 
-/// Returns the glass, which is to be drawn last.
-DrawList GlRenderer::State::drawSurfaces(const Job& job, const Choice& choice) {
-  DrawLists lists = drawLists({scene->model(), parts, buffers.ranges, buffers.materials},
-                              moving.bodies(), job.camera, job.options, choice.parts);
-  pass->draw(lists.surfaces, {buffers.vertices.name(), buffers.indices.name(), buffers.textures});
-  pass->draw(drawList(moving.avatars(), job.camera, choice.pieces),
-             moving.avatarGeometry(buffers.textures));
-  return std::move(lists.glass);
+/// Draws the surfaces; returns the transparent items, which are drawn last.
+DrawList GlRenderer::State::drawSurfaces(const FrameJob& job, const VisibleSet& visibleSet) {
+  DrawLists lists =
+      buildDrawLists({scene->model(), items, buffers.ranges, buffers.materials},
+                     dynamicInstances.bodyPlacements(), job.camera, job.options, visibleSet.items);
+  surfacePass->draw(lists.surfaces,
+                    {buffers.vertices.name(), buffers.indices.name(), buffers.textures});
+  surfacePass->draw(
+      buildAvatarDrawList(dynamicInstances.avatars(), job.camera, visibleSet.avatarItems),
+      dynamicInstances.avatarGeometry(buffers.textures));
+  return std::move(lists.transparent);
 }
 
-/// What has a colour only.
-void GlRenderer::State::drawAir(const DrawList& glass) {
-  target.drawInto({true, false, false, false});
-  pass->drawSky();
-  if (glass.commands.empty()) return;
-  pass->blendGlass();
-  pass->draw(glass, {buffers.vertices.name(), buffers.indices.name(), buffers.textures});
+/// Draws sky and transparent items, which have only colour.
+void GlRenderer::State::drawTransparent(const DrawList& transparent) {
+  target.setDrawChannels({true, false, false, false});
+  surfacePass->drawSky();
+  if (transparent.commands.empty()) return;
+  surfacePass->beginTransparentPass();
+  surfacePass->draw(transparent,
+                    {buffers.vertices.name(), buffers.indices.name(), buffers.textures});
 }
 
 void GlRenderer::State::readDepth(const Camera& camera) {
-  target.readDepth(depth.base(camera.width, camera.height));
-  depthIsOfPicture = true;
+  target.readDepth(depthPyramid.baseLevel(camera.width, camera.height));
+  depthIsCurrent = true;
 }
 
-/// Of the picture as it is drawn now.
-const std::vector<float>& GlRenderer::State::metresIn(Job& job) {
-  if (!depthIsOfPicture) readDepth(job.camera);
+/// Depth of the current depth buffer in metres, computed once per frame.
+const std::vector<float>& GlRenderer::State::getDepthMetres(FrameJob& job) {
+  if (!depthIsCurrent) readDepth(job.camera);
   if (job.metres.empty())
-    job.metres = metresOf(depth.base(job.camera.width, job.camera.height), job.camera);
+    job.metres = convertDepthToMetres(depthPyramid.baseLevel(job.camera.width, job.camera.height),
+                                      job.camera);
+  ENFILADE_ASSERT(job.metres.size() == static_cast<std::size_t>(job.camera.width) *
+                                           static_cast<std::size_t>(job.camera.height));
   return job.metres;
 }
 
-/// When all depth is drawn.
-void GlRenderer::State::shadeNearest(Job& job) {
+/// Prepares shading at equal depth; the depth buffer must be complete.
+void GlRenderer::State::beginShading(FrameJob& job) {
   const Channels& channels = job.options.channels;
-  target.drawInto(channels);
-  if (job.shadows()) target.lightBy(job.sunlit(metresIn(job)));
-  pass->shadeNearest(channels.normals, job.shadows());
+  target.setDrawChannels(channels);
+  if (job.needsShadows())
+    target.setShadowMask(shadowMask(job.snapshot, job.camera, job.options, getDepthMetres(job)));
+  surfacePass->beginEqualDepthPass(channels.normals, job.needsShadows());
 }
 
-std::size_t GlRenderer::State::trianglesOf(const std::vector<std::uint32_t>& some) const {
+std::size_t GlRenderer::State::countTriangles(const std::vector<std::uint32_t>& some) const {
   std::size_t triangles = 0;
-  for (const std::uint32_t part : some)
-    triangles += buffers.ranges[parts[part].mesh].indexCount / 3;
+  for (const std::uint32_t item : some)
+    triangles += buffers.ranges[items[item].mesh].indexCount / 3;
   return triangles;
 }
 
-/// All that lies in the picture.
-Choice GlRenderer::State::inside(const Job& job) const {
-  Choice all;
-  all.parts = partsInPicture(parts, moving.bodies(), job.camera, job.options.hidden);
-  const std::vector<AvatarMeshes::Piece>& pieces = moving.avatars().pieces;
-  for (std::uint32_t i = 0; i < pieces.size(); ++i) {
-    if (pieces[i].id == job.options.hidden) continue;
-    if (!job.sight.outside(job.sight.relative(pieces[i].box))) all.pieces.push_back(i);
+/// All items in the frustum.
+VisibleSet GlRenderer::State::collectInFrustum(const FrameJob& job) const {
+  VisibleSet all;
+  all.items = findItemsInFrustum(items, dynamicInstances.bodyPlacements(), job.camera,
+                                 job.options.hiddenEntity);
+  const std::vector<AvatarMeshes::Item>& avatarItems = dynamicInstances.avatars().items;
+  for (std::uint32_t i = 0; i < avatarItems.size(); ++i) {
+    if (avatarItems[i].id == job.options.hiddenEntity) continue;
+    if (!job.visibility.isOutsideFrustum(job.visibility.toEyeSpace(avatarItems[i].box)))
+      all.avatarItems.push_back(i);
   }
   return all;
 }
 
-/// Whether a picture from nearby showed at least half of the triangles: to draw what is seen twice,
-/// into the depth and shaded, takes longer then than to draw all once.
-bool GlRenderer::State::hardlyHidden(const Job& job, const Choice& all) const {
-  const Seen* seen = memory.find(job.camera);
-  return seen && trianglesOf(all.parts) <= 2 * trianglesOf(foreseen(job, *seen).parts);
+/// Whether an earlier frame from a similar camera showed at least half of the triangles. Drawing
+/// all items once is then faster than drawing the visible ones twice (depth and shading).
+bool GlRenderer::State::isMostlyVisible(const FrameJob& job, const VisibleSet& all) const {
+  const CachedView* cached = visibilityCache.findNearest(job.camera);
+  return cached &&
+         countTriangles(all.items) <= 2 * countTriangles(predictVisible(job, *cached).items);
 }
 
-DrawList GlRenderer::State::drawInside(Job& job, const Choice& all) {
-  job.statistics.drawn = static_cast<std::uint32_t>(all.parts.size());
-  job.statistics.outside = static_cast<std::uint32_t>(parts.size() - all.parts.size());
-  if (job.shadows()) {
-    target.drawInto({false, false, false, false});
-    pass->toDepth();
+DrawList GlRenderer::State::drawAllInFrustum(FrameJob& job, const VisibleSet& all) {
+  job.statistics.drawn = static_cast<std::uint32_t>(all.items.size());
+  job.statistics.frustumCulled = static_cast<std::uint32_t>(items.size() - all.items.size());
+  if (job.needsShadows()) {
+    target.setDrawChannels({false, false, false, false});
+    surfacePass->beginDepthPrepass();
     drawSurfaces(job, all);
-    shadeNearest(job);
+    beginShading(job);
   } else {
-    pass->shadeAll(job.options.channels.normals);
+    surfacePass->beginForwardPass(job.options.channels.normals);
   }
   return drawSurfaces(job, all);
 }
 
-/// What was seen from nearby and lies in this picture.
-Choice GlRenderer::State::foreseen(const Job& job, const Seen& seen) const {
-  Choice choice;
-  for (const std::uint32_t part : seen.parts) {
-    if (parts[part].object + 1 == job.options.hidden) continue;
-    if (!job.sight.outside(job.sight.relative(boxOf(part)))) choice.parts.push_back(part);
+/// Items of the cached view that are in the frustum.
+VisibleSet GlRenderer::State::predictVisible(const FrameJob& job, const CachedView& cached) const {
+  VisibleSet visibleSet;
+  for (const std::uint32_t item : cached.items) {
+    if (items[item].object + 1 == job.options.hiddenEntity) continue;
+    if (!job.visibility.isOutsideFrustum(job.visibility.toEyeSpace(itemAabb(item))))
+      visibleSet.items.push_back(item);
   }
-  const std::vector<AvatarMeshes::Piece>& pieces = moving.avatars().pieces;
-  for (std::uint32_t i = 0; i < pieces.size(); ++i) {
-    if (pieces[i].id == job.options.hidden) continue;
-    if (!std::binary_search(seen.avatars.begin(), seen.avatars.end(), pieces[i].id)) continue;
-    if (!job.sight.outside(job.sight.relative(pieces[i].box))) choice.pieces.push_back(i);
+  const std::vector<AvatarMeshes::Item>& avatarItems = dynamicInstances.avatars().items;
+  for (std::uint32_t i = 0; i < avatarItems.size(); ++i) {
+    if (avatarItems[i].id == job.options.hiddenEntity) continue;
+    if (!std::binary_search(cached.avatars.begin(), cached.avatars.end(), avatarItems[i].id))
+      continue;
+    if (!job.visibility.isOutsideFrustum(job.visibility.toEyeSpace(avatarItems[i].box)))
+      visibleSet.avatarItems.push_back(i);
   }
-  return choice;
+  return visibleSet;
 }
 
-/// What may be seen besides `drawn`, whose depth is in `depth`.
-Choice GlRenderer::State::missing(Job& job, const Choice& drawn) {
-  search->markDrawn(drawn.parts);
-  PartSearch::Found found = search->search(job.sight, depth, moving.bodies(), job.options.hidden);
-  job.statistics.outside = found.outside;
-  Choice choice;
-  choice.parts = std::move(found.parts);
-  const std::vector<AvatarMeshes::Piece>& pieces = moving.avatars().pieces;
-  for (std::uint32_t i = 0; i < pieces.size(); ++i) {
-    if (pieces[i].id == job.options.hidden) continue;
-    if (std::binary_search(drawn.pieces.begin(), drawn.pieces.end(), i)) continue;
-    const EyeBox box = job.sight.relative(pieces[i].box);
-    if (job.sight.look(box, depth) == Sight::maybe) choice.pieces.push_back(i);
+/// Possibly visible items other than `drawn`, whose depth is in the pyramid.
+VisibleSet GlRenderer::State::findDisoccluded(FrameJob& job, const VisibleSet& drawn) {
+  culler->markVisible(drawn.items);
+  OcclusionCuller::CullingResult found = culler->findVisible(
+      job.visibility, depthPyramid, dynamicInstances.bodyPlacements(), job.options.hiddenEntity);
+  job.statistics.frustumCulled = found.culled;
+  VisibleSet visibleSet;
+  visibleSet.items = std::move(found.items);
+  const std::vector<AvatarMeshes::Item>& avatarItems = dynamicInstances.avatars().items;
+  for (std::uint32_t i = 0; i < avatarItems.size(); ++i) {
+    if (avatarItems[i].id == job.options.hiddenEntity) continue;
+    if (std::binary_search(drawn.avatarItems.begin(), drawn.avatarItems.end(), i)) continue;
+    const EyeSpaceAabb box = job.visibility.toEyeSpace(avatarItems[i].box);
+    if (job.visibility.test(box, depthPyramid) == Visibility::visible)
+      visibleSet.avatarItems.push_back(i);
   }
-  return choice;
+  return visibleSet;
 }
 
-/// Draws what is missing into the depth, the nearest first, as long as any of it may be seen.
-/// Returns what may be seen of all that was drawn.
-Choice GlRenderer::State::searchAmong(Job& job, Choice drawn, Choice missing) {
-  const auto maybe = [&](std::uint32_t part) {
-    return job.sight.look(job.sight.relative(boxOf(part)), depth) == Sight::maybe;
+/// Draws the disoccluded items into the depth, nearest first, until the rest is occluded. Returns
+/// the visible items among all drawn ones.
+VisibleSet GlRenderer::State::refineFrontToBack(FrameJob& job, VisibleSet drawn,
+                                                VisibleSet disoccluded) {
+  const auto mayBeVisible = [&](std::uint32_t item) {
+    return job.visibility.test(job.visibility.toEyeSpace(itemAabb(item)), depthPyramid) ==
+           Visibility::visible;
   };
-  std::vector<std::pair<double, std::uint32_t>> left;  // squared metres to the nearest point
-  for (const std::uint32_t part : missing.parts) {
-    const EyeBox box = job.sight.relative(boxOf(part));
-    left.emplace_back((box.centre.cwiseAbs() - box.half).cwiseMax(0.0).squaredNorm(), part);
+  std::vector<std::pair<double, std::uint32_t>> remaining;  // squared distance to the nearest point
+  for (const std::uint32_t item : disoccluded.items) {
+    const EyeSpaceAabb box = job.visibility.toEyeSpace(itemAabb(item));
+    remaining.emplace_back((box.centre.cwiseAbs() - box.halfExtent).cwiseMax(0.0).squaredNorm(),
+                           item);
   }
-  std::sort(left.begin(), left.end());
-  std::size_t most = kFirstChunk;
-  for (int i = 0; i < kMostChunks && !left.empty(); ++i, most *= 2) {
-    const auto end = left.begin() + static_cast<std::ptrdiff_t>(std::min(most, left.size()));
-    Choice chunk;
-    for (auto entry = left.begin(); entry != end; ++entry) chunk.parts.push_back(entry->second);
-    std::sort(chunk.parts.begin(), chunk.parts.end());
-    if (i == 0) chunk.pieces = missing.pieces;
-    left.erase(left.begin(), end);
+  std::sort(remaining.begin(), remaining.end());
+  std::size_t chunkSize = kFirstChunkItems;
+  for (int i = 0; i < kMaxChunks && !remaining.empty(); ++i, chunkSize *= 2) {
+    const auto end =
+        remaining.begin() + static_cast<std::ptrdiff_t>(std::min(chunkSize, remaining.size()));
+    VisibleSet chunk;
+    for (auto entry = remaining.begin(); entry != end; ++entry)
+      chunk.items.push_back(entry->second);
+    std::sort(chunk.items.begin(), chunk.items.end());
+    if (i == 0) chunk.avatarItems = disoccluded.avatarItems;
+    remaining.erase(remaining.begin(), end);
     drawSurfaces(job, chunk);
-    add(drawn.parts, chunk.parts);
+    mergeSorted(drawn.items, chunk.items);
     readDepth(job.camera);
-    depth.build();
+    depthPyramid.build();
     ++job.statistics.passes;
-    std::erase_if(left, [&](const auto& entry) { return !maybe(entry.second); });
+    std::erase_if(remaining, [&](const auto& entry) { return !mayBeVisible(entry.second); });
   }
-  add(drawn.pieces, missing.pieces);
-  return notHidden(job, drawn);
+  mergeSorted(drawn.avatarItems, disoccluded.avatarItems);
+  return filterVisible(job, drawn);
 }
 
-/// For the next picture: what was drawn, less what is no longer seen, and what was seen and lies
-/// beside the picture now.
-void GlRenderer::State::remember(const Job& job, const Choice& drawn, Seen& seen) const {
+/// Updates the cached view for the next frame: the drawn items without those now occluded, and
+/// previously visible items that are outside the frustum now.
+void GlRenderer::State::updateCache(const FrameJob& job, const VisibleSet& drawn,
+                                    CachedView& cached) const {
   std::vector<std::uint32_t> kept;
-  for (const std::uint32_t part : drawn.parts) {
-    const bool due = seen.parts.empty() || (part + picture) % kLookAgain == 0;
-    if (due && job.sight.look(job.sight.relative(boxOf(part)), depth) == Sight::hidden) continue;
-    kept.push_back(part);
+  for (const std::uint32_t item : drawn.items) {
+    const bool due = cached.items.empty() || (item + frameNumber) % kRetestPeriod == 0;
+    if (due && job.visibility.test(job.visibility.toEyeSpace(itemAabb(item)), depthPyramid) ==
+                   Visibility::occluded)
+      continue;
+    kept.push_back(item);
   }
-  for (const std::uint32_t part : seen.parts) {
-    if (std::binary_search(drawn.parts.begin(), drawn.parts.end(), part)) continue;
-    if ((part + picture) % kForgetOutside != 0) kept.push_back(part);
+  for (const std::uint32_t item : cached.items) {
+    if (std::binary_search(drawn.items.begin(), drawn.items.end(), item)) continue;
+    if ((item + frameNumber) % kForgetCulledPeriod != 0) kept.push_back(item);
   }
   std::sort(kept.begin(), kept.end());
-  seen.parts = std::move(kept);
-  seen.avatars.clear();
-  for (const std::uint32_t piece : drawn.pieces)
-    seen.avatars.push_back(moving.avatars().pieces[piece].id);
-  std::sort(seen.avatars.begin(), seen.avatars.end());
+  cached.items = std::move(kept);
+  cached.avatars.clear();
+  for (const std::uint32_t avatarItem : drawn.avatarItems)
+    cached.avatars.push_back(dynamicInstances.avatars().items[avatarItem].id);
+  std::sort(cached.avatars.begin(), cached.avatars.end());
 }
 
-/// What may be seen by the depth that was read last.
-Choice GlRenderer::State::notHidden(const Job& job, const Choice& drawn) const {
-  Choice seen;
-  seen.pieces = drawn.pieces;
-  for (const std::uint32_t part : drawn.parts) {
-    if (job.sight.look(job.sight.relative(boxOf(part)), depth) == Sight::maybe)
-      seen.parts.push_back(part);
+/// The items of `drawn` that are visible against the last depth pyramid.
+VisibleSet GlRenderer::State::filterVisible(const FrameJob& job, const VisibleSet& drawn) const {
+  VisibleSet visible;
+  visible.avatarItems = drawn.avatarItems;
+  for (const std::uint32_t item : drawn.items) {
+    if (job.visibility.test(job.visibility.toEyeSpace(itemAabb(item)), depthPyramid) ==
+        Visibility::visible)
+      visible.items.push_back(item);
   }
-  return seen;
+  return visible;
 }
 
-/// What may be seen.
-DrawList GlRenderer::State::drawSeen(Job& job) {
-  if (parts.size() <= kFewParts) {
-    const Choice all = inside(job);
-    if (hardlyHidden(job, all)) return drawInside(job, all);
+/// Draws the visible items; returns the transparent ones.
+DrawList GlRenderer::State::drawVisible(FrameJob& job) {
+  if (items.size() <= kSmallSceneThreshold) {
+    const VisibleSet all = collectInFrustum(job);
+    if (isMostlyVisible(job, all)) return drawAllInFrustum(job, all);
   }
-  Seen& seen = memory.recall(job.camera, ++picture);
-  Choice drawn = foreseen(job, seen);
+  CachedView& cached = visibilityCache.lookup(job.camera, ++frameNumber);
+  VisibleSet drawn = predictVisible(job, cached);
   const Channels& channels = job.options.channels;
   bool done = !channels.rgb && !channels.normals;
-  target.drawInto({false, done && channels.ids, false, false});
-  pass->toDepth();
+  target.setDrawChannels({false, done && channels.ids, false, false});
+  surfacePass->beginDepthPrepass();
   drawSurfaces(job, drawn);
   readDepth(job.camera);
-  depth.build();
-  Choice more = missing(job, drawn);
-  if (more.parts.size() > kFewMissing) {
+  depthPyramid.build();
+  VisibleSet disoccluded = findDisoccluded(job, drawn);
+  if (disoccluded.items.size() > kSmallDisocclusionThreshold) {
     done = false;
-    drawn = searchAmong(job, std::move(drawn), std::move(more));
+    drawn = refineFrontToBack(job, std::move(drawn), std::move(disoccluded));
   } else {
-    const bool glassOnly =
-        more.pieces.empty() && std::all_of(more.parts.begin(), more.parts.end(),
-                                           [&](std::uint32_t p) { return isGlass(job, p); });
-    if (!glassOnly) {
-      done = false;  // what was missing may come before what was drawn in the order
-      drawSurfaces(job, more);
-      // Now, and not when all is shaded: what needs the depth is worked out while the device
-      // shades. The pyramid stays as it is, farther in places than the picture, which hides too
-      // little; where nothing had been drawn it hides nothing.
+    const bool transparentOnly =
+        disoccluded.avatarItems.empty() &&
+        std::all_of(disoccluded.items.begin(), disoccluded.items.end(),
+                    [&](std::uint32_t item) { return isTransparent(job, item); });
+    if (!transparentOnly) {
+      done = false;  // a disoccluded item may precede a drawn one in the drawing order
+      drawSurfaces(job, disoccluded);
+      // Read the depth now and not after shading, so that CPU work overlaps with shading. The
+      // pyramid is not rebuilt: it is conservative, because its depth is farther in places. Without
+      // drawn items, it is empty and must be rebuilt.
       readDepth(job.camera);
-      if (drawn.parts.empty()) depth.build();
+      if (drawn.items.empty()) depthPyramid.build();
       ++job.statistics.passes;
     }
-    add(drawn.parts, more.parts);
-    add(drawn.pieces, more.pieces);
+    mergeSorted(drawn.items, disoccluded.items);
+    mergeSorted(drawn.avatarItems, disoccluded.avatarItems);
   }
-  const Choice shaded = notHidden(job, drawn);
-  DrawList glass;
+  const VisibleSet shaded = filterVisible(job, drawn);
+  DrawList transparent;
   if (!done) {
-    shadeNearest(job);
-    glass = drawSurfaces(job, shaded);
+    beginShading(job);
+    transparent = drawSurfaces(job, shaded);
   }
-  remember(job, drawn, seen);
-  job.statistics.drawn = static_cast<std::uint32_t>(shaded.parts.size());
-  job.statistics.occluded =
-      static_cast<std::uint32_t>(parts.size()) - job.statistics.drawn - job.statistics.outside;
-  return glass;
+  updateCache(job, drawn, cached);
+  job.statistics.drawn = static_cast<std::uint32_t>(shaded.items.size());
+  ENFILADE_ASSERT(job.statistics.drawn + job.statistics.frustumCulled <= items.size());
+  job.statistics.occluded = static_cast<std::uint32_t>(items.size()) - job.statistics.drawn -
+                            job.statistics.frustumCulled;
+  return transparent;
 }
 
-GlRenderer::GlRenderer(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device)
-    : state_(std::make_unique<State>(std::move(scene), device)) {}
+GlRenderer::GlRenderer(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device,
+                       ShadowMaskFunction shadowMask)
+    : state_(std::make_unique<State>(std::move(scene), device, std::move(shadowMask))) {}
 
 GlRenderer::~GlRenderer() = default;
 
 Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
-                         const FrameOptions& options, const Sunlit& sunlit) {
-  if (const auto why = refusal(camera)) throw RenderError(*why);
+                         const FrameOptions& options) {
+  if (const auto error = validateCamera(camera)) throw RenderError(*error);
   State& s = *state_;
   s.context.makeCurrent();
-  s.prepare();
-  s.moving.follow(*s.scene, snapshot);
-  if (!s.target.fits(camera.width, camera.height)) {
-    s.target = FrameTarget(camera.width, camera.height);
+  s.prepareScene();
+  s.dynamicInstances.update(*s.scene, snapshot);
+  if (!s.target.hasSize(camera.width, camera.height)) {
+    s.target = RenderTarget(camera.width, camera.height);
   }
-  s.pass->begin(camera);
+  s.surfacePass->begin(camera);
   s.target.begin(options.channels);
-  s.depthIsOfPicture = false;
-  Job job{camera, options, sunlit, BoxSight(camera), {}, {}};
-  if (job.shadows() && !sunlit) throw RenderError("GlRenderer: nobody finds what is in shadow");
-  const DrawList glass =
-      options.culling == Culling::hidden ? s.drawSeen(job) : s.drawInside(job, s.inside(job));
-  if (options.channels.rgb) s.drawAir(glass);
+  s.depthIsCurrent = false;
+  FrameJob job{snapshot, camera, options, BoxVisibility(camera), {}, {}};
+  if (job.needsShadows() && !s.shadowMask)
+    throw RenderError("GlRenderer: shadows need a shadow mask");
+  const DrawList transparent = options.culling == Culling::occlusion
+                                   ? s.drawVisible(job)
+                                   : s.drawAllInFrustum(job, s.collectInFrustum(job));
+  if (options.channels.rgb) s.drawTransparent(transparent);
   Frame frame;
   frame.camera = camera;
   frame.tick = snapshot.tick;
@@ -403,19 +438,19 @@ Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
   frame.software = software();
   frame.statistics = job.statistics;
   if (options.channels.depth || options.channels.rgb) {
-    glFlush();  // where the depth was read before, the device draws while this thread goes on
-    s.metresIn(job);
+    glFlush();  // if the depth was already read, the device works while this thread continues
+    s.getDepthMetres(job);
     frame.depth = std::move(job.metres);
   }
-  if (options.channels.rgb) s.target.readColour(frame, Hollows(frame.depth, camera));
-  s.target.read(frame, options.channels);
+  if (options.channels.rgb) s.target.readColour(frame, AmbientOcclusion(frame.depth, camera));
+  s.target.readChannels(frame, options.channels);
   if (!options.channels.depth) frame.depth = {};
   checkGl("drawing a frame");
   return frame;
 }
 
-const std::string& GlRenderer::deviceNote() const {
-  return state_->context.note();
+const std::string& GlRenderer::deviceWarning() const {
+  return state_->context.warning();
 }
 const std::string& GlRenderer::deviceName() const {
   return state_->context.deviceName();

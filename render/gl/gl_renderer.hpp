@@ -1,34 +1,33 @@
-// Draws snapshots of one scene with OpenGL 4.5 core on EGL, without a display.
+// Renders snapshots of one scene with OpenGL 4.5 core on EGL, without a display.
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "render/device.hpp"
-#include "render/frame.hpp"
-#include "render/render_error.hpp"
-#include "scene/world/data/scene.hpp"
+#include "render/renderer.hpp"
 
 namespace enfilade::render {
 
-/// Owns a GL context: make, use and destroy it on one thread. RenderThread does that for you.
-class GlRenderer {
+/// Computes the shadow mask of a frame from its Frame::depth: 255 per sunlit pixel, 0 in shadow.
+using ShadowMaskFunction = std::function<std::vector<std::uint8_t>(
+    const scene::Snapshot& snapshot, const Camera& camera, const FrameOptions& options,
+    const std::vector<float>& depth)>;
+
+/// Owns a GL context.
+class GlRenderer final : public Renderer {
  public:
-  /// Throws RenderError when no device that is chosen gives a context. The scene is brought to the
-  /// device with the first picture.
-  explicit GlRenderer(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device = {});
-  ~GlRenderer();
-  GlRenderer(const GlRenderer&) = delete;
-  GlRenderer& operator=(const GlRenderer&) = delete;
+  /// Throws RenderError if no chosen device provides a context. The scene is uploaded with the
+  /// first frame. Without `shadowMask`, render() throws for colour with shadows.
+  explicit GlRenderer(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device = {},
+                      ShadowMaskFunction shadowMask = {});
+  ~GlRenderer() override;
 
-  /// Throws RenderError for a camera that refusal() refuses, and for a scene too large to draw.
-  /// `sunlit` is asked where options.shadows wants shadows in a colour; it may not be empty then.
   Frame render(const scene::Snapshot& snapshot, const Camera& camera,
-               const FrameOptions& options = {}, const Sunlit& sunlit = {});
-
-  const std::string& deviceName() const;  ///< GL_RENDERER
-  bool software() const;
-  /// Which better devices were tried in vain, one sentence; empty when none was.
-  const std::string& deviceNote() const;
+               const FrameOptions& options = {}) override;
+  const std::string& deviceName() const override;
+  bool software() const override;
+  const std::string& deviceWarning() const override;
 
  private:
   struct State;

@@ -1,5 +1,4 @@
-// Finds the parts of a model that a camera may see beyond those that are drawn already. Knows no
-// GL.
+// Finds the visible items of a model among those not drawn yet. Independent of OpenGL.
 #pragma once
 
 #include <vector>
@@ -10,36 +9,39 @@
 
 namespace enfilade::render {
 
-class PartSearch {
+/// Hierarchical occlusion culling of draw items.
+class OcclusionCuller {
  public:
-  /// `parts` is kept by reference.
-  explicit PartSearch(const std::vector<Part>& parts);
+  /// `items` is kept by reference.
+  explicit OcclusionCuller(const std::vector<DrawItem>& items);
 
-  /// Forgets what was drawn, then marks these parts as drawn.
-  void markDrawn(const std::vector<std::uint32_t>& parts);
+  /// Replaces the set of items known to be visible.
+  void markVisible(const std::vector<std::uint32_t>& items);
 
-  struct Found {
-    std::vector<std::uint32_t> parts;  ///< may be seen and is not drawn; ascending
-    std::uint32_t outside = 0, hidden = 0;
+  struct CullingResult {
+    std::vector<std::uint32_t> items;  ///< possibly visible and not marked; ascending
+    std::uint32_t culled = 0, occluded = 0;
   };
-  /// `depth` is that of what is drawn, or of a part of it.
-  Found search(const BoxSight& sight, const DepthPyramid& depth,
-               const std::vector<BodyPlacement>& bodies, scene::EntityId hidden) const;
+  /// `depth` contains some or all of the marked items.
+  CullingResult findVisible(const BoxVisibility& visibility, const DepthPyramid& depth,
+                            const std::vector<BodyPlacement>& bodies,
+                            scene::EntityId hiddenEntity) const;
 
  private:
-  std::uint32_t link(std::uint32_t node);
+  std::uint32_t linkNodes(std::uint32_t node);
 
-  const std::vector<Part>& parts_;
-  collision::BoxTree tree_;                ///< of what never moves
-  std::vector<std::uint32_t> partOfItem_;  ///< of the tree's items
-  std::vector<std::uint32_t> nodeOfPart_;  ///< whose leaf holds it
-  std::vector<std::uint32_t> parent_;      ///< of each node; the root's is itself
-  std::vector<std::uint32_t> held_;        ///< parts under each node
-  std::vector<std::uint32_t> moving_;      ///< parts of bodies, ascending
+  const std::vector<DrawItem>& items_;
+  collision::BoxTree tree_;                      ///< of static items
+  std::vector<std::uint32_t> itemOfTreeEntry_;   ///< draw item of each tree entry
+  std::vector<std::uint32_t> nodeOfItem_;        ///< parent node of the item's leaf
+  std::vector<std::uint32_t> parent_;            ///< of each node; the root's is itself
+  std::vector<std::uint32_t> subtreeItemCount_;  ///< number of items below each node
+  std::vector<std::uint32_t> dynamicItems_;      ///< items of bodies, ascending
 
-  std::uint32_t turn_ = 0;               ///< of markDrawn
-  std::vector<std::uint32_t> nodeTurn_;  ///< the turn in which something under it was drawn
-  std::vector<std::uint32_t> partTurn_;
+  std::uint32_t generation_ = 0;  ///< counts markVisible() calls
+  std::vector<std::uint32_t>
+      nodeGeneration_;  ///< last generation with a marked item below the node
+  std::vector<std::uint32_t> itemGeneration_;
 };
 
 }  // namespace enfilade::render

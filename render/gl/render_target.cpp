@@ -5,12 +5,13 @@
 #include <array>
 #include <limits>
 
+#include "collision/assert.hpp"
 #include "render/render_error.hpp"
 
 namespace enfilade::render {
 namespace {
 
-GlTexture plane(GLenum format, int width, int height) {
+GlTexture makeTexture(GLenum format, int width, int height) {
   GlTexture texture = GlTexture::create();
   glTextureStorage2D(texture.name(), 1, format, width, height);
   return texture;
@@ -20,14 +21,14 @@ void checkComplete(GLuint framebuffer, int width, int height) {
   checkGl("making the frame's buffers");
   const GLenum status = glCheckNamedFramebufferStatus(framebuffer, GL_FRAMEBUFFER);
   if (status != GL_FRAMEBUFFER_COMPLETE) {
-    throw RenderError("glCheckNamedFramebufferStatus says " + std::to_string(status) + " for " +
+    throw RenderError("glCheckNamedFramebufferStatus gives " + std::to_string(status) + " for " +
                       std::to_string(width) + "x" + std::to_string(height) +
-                      " pixels; try a smaller picture or another driver");
+                      " pixels; try a smaller frame or another driver");
   }
 }
 
-void readPlane(GLuint framebuffer, GLenum attachment, int width, int height, GLenum format,
-               GLenum type, void* data) {
+void readAttachment(GLuint framebuffer, GLenum attachment, int width, int height, GLenum format,
+                    GLenum type, void* data) {
   glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glNamedFramebufferReadBuffer(framebuffer, attachment);
@@ -36,12 +37,12 @@ void readPlane(GLuint framebuffer, GLenum attachment, int width, int height, GLe
 
 }  // namespace
 
-FrameTarget::FrameTarget(int width, int height)
+RenderTarget::RenderTarget(int width, int height)
     : width_(width),
       height_(height),
-      colour_(plane(GL_SRGB8_ALPHA8, width, height)),
-      ids_(plane(GL_R32UI, width, height)),
-      depth_(plane(GL_DEPTH_COMPONENT32F, width, height)),
+      colour_(makeTexture(GL_SRGB8_ALPHA8, width, height)),
+      ids_(makeTexture(GL_R32UI, width, height)),
+      depth_(makeTexture(GL_DEPTH_COMPONENT32F, width, height)),
       framebuffer_(GlFramebuffer::create()) {
   const GLuint fbo = framebuffer_.name();
   glNamedFramebufferTexture(fbo, GL_COLOR_ATTACHMENT0, colour_.name(), 0);
@@ -50,17 +51,17 @@ FrameTarget::FrameTarget(int width, int height)
   checkComplete(fbo, width, height);
 }
 
-void FrameTarget::addNormals() {
-  normals_ = plane(GL_RGBA32F, width_, height_);
+void RenderTarget::addNormals() {
+  normals_ = makeTexture(GL_RGBA32F, width_, height_);
   glNamedFramebufferTexture(framebuffer_.name(), GL_COLOR_ATTACHMENT2, normals_.name(), 0);
   checkComplete(framebuffer_.name(), width_, height_);
 }
 
-void FrameTarget::begin(const Channels& channels) {
+void RenderTarget::begin(const Channels& channels) {
   if (channels.normals && normals_.name() == 0) addNormals();
   const GLuint fbo = framebuffer_.name();
   glBindFramebuffer(GL_FRAMEBUFFER, fbo);
-  drawInto(channels);
+  setDrawChannels(channels);
   glViewport(0, 0, width_, height_);
   constexpr std::array<GLfloat, 4> kBlack{0, 0, 0, 1}, kNone{0, 0, 0, 0};
   constexpr std::array<GLuint, 4> kNothing{0, 0, 0, 0};
@@ -72,16 +73,18 @@ void FrameTarget::begin(const Channels& channels) {
   glClearNamedFramebufferfv(fbo, GL_DEPTH, 0, &kFarthest);
 }
 
-void FrameTarget::lightBy(const std::vector<std::uint8_t>& sunlit) {
-  constexpr GLuint kUnit = 1;  // of `sunlitPixels` in the shaders
-  if (sunlit_.name() == 0) sunlit_ = plane(GL_R8, width_, height_);
+void RenderTarget::setShadowMask(const std::vector<std::uint8_t>& mask) {
+  ENFILADE_ASSERT(mask.size() ==
+                  static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  constexpr GLuint kUnit = 1;  // of `shadowMask` in the shaders
+  if (shadowMask_.name() == 0) shadowMask_ = makeTexture(GL_R8, width_, height_);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  glTextureSubImage2D(sunlit_.name(), 0, 0, 0, width_, height_, GL_RED, GL_UNSIGNED_BYTE,
-                      sunlit.data());
-  glBindTextureUnit(kUnit, sunlit_.name());
+  glTextureSubImage2D(shadowMask_.name(), 0, 0, 0, width_, height_, GL_RED, GL_UNSIGNED_BYTE,
+                      mask.data());
+  glBindTextureUnit(kUnit, shadowMask_.name());
 }
 
-void FrameTarget::drawInto(const Channels& channels) const {
+void RenderTarget::setDrawChannels(const Channels& channels) const {
   const auto target = [](bool on, GLenum attachment) { return on ? attachment : GLenum{GL_NONE}; };
   const std::array<GLenum, 3> targets{target(channels.rgb, GL_COLOR_ATTACHMENT0),
                                       target(channels.ids, GL_COLOR_ATTACHMENT1),
@@ -89,27 +92,27 @@ void FrameTarget::drawInto(const Channels& channels) const {
   glNamedFramebufferDrawBuffers(framebuffer_.name(), 3, targets.data());
 }
 
-void FrameTarget::readColour(Frame& frame, const Hollows& hollows) {
+void RenderTarget::readColour(Frame& frame, const AmbientOcclusion& ambientOcclusion) {
   const auto width = static_cast<std::size_t>(width_), height = static_cast<std::size_t>(height_);
   rgba_.resize(4 * width * height);
-  readPlane(framebuffer_.name(), GL_COLOR_ATTACHMENT0, width_, height_, GL_RGBA, GL_UNSIGNED_BYTE,
-            rgba_.data());
+  readAttachment(framebuffer_.name(), GL_COLOR_ATTACHMENT0, width_, height_, GL_RGBA,
+                 GL_UNSIGNED_BYTE, rgba_.data());
   frame.rgb.resize(3 * width * height);
-  std::vector<std::uint8_t> left(width);
+  std::vector<std::uint8_t> visibility(width);
   const std::uint8_t* from = rgba_.data();
   std::uint8_t* to = frame.rgb.data();
   for (int y = 0; y < height_; ++y) {
-    hollows.row(y, left);
+    ambientOcclusion.computeRow(y, visibility);
     for (std::size_t x = 0; x < width; ++x, from += 4, to += 3) {
-      darken(from, left[x], from[3], to);
+      applyAo(from, visibility[x], from[3], to);
     }
   }
 }
 
-void FrameTarget::read(Frame& frame, const Channels& channels) const {
+void RenderTarget::readChannels(Frame& frame, const Channels& channels) const {
   const std::size_t pixels = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
   const auto readInto = [&](GLenum attachment, GLenum format, GLenum type, void* data) {
-    readPlane(framebuffer_.name(), attachment, width_, height_, format, type, data);
+    readAttachment(framebuffer_.name(), attachment, width_, height_, format, type, data);
   };
   if (channels.ids) {
     frame.ids.resize(pixels);
@@ -121,15 +124,15 @@ void FrameTarget::read(Frame& frame, const Channels& channels) const {
   }
 }
 
-void FrameTarget::readDepth(std::vector<float>& depth) const {
+void RenderTarget::readDepth(std::vector<float>& depth) const {
   depth.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.name());
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glReadPixels(0, 0, width_, height_, GL_DEPTH_COMPONENT, GL_FLOAT, depth.data());
 }
 
-/// In floats: that adds some 2e-7 of the distance to what the buffer rounded.
-std::vector<float> metresOf(const std::vector<float>& depth, const Camera& camera) {
+/// Computes in floats, which adds an error of about 2e-7 of the distance to the buffer's rounding.
+std::vector<float> convertDepthToMetres(const std::vector<float>& depth, const Camera& camera) {
   constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
   const auto near = static_cast<float>(camera.near), far = static_cast<float>(camera.far);
   const auto range = static_cast<float>(camera.far - camera.near);

@@ -1,5 +1,5 @@
-// What is drawn into: sRGB colour, object ids, 32-bit depth and, when somebody wants them, normals,
-// all of one size; and reading them back.
+// The framebuffer: sRGB colour, object ids, 32-bit depth and optional normals of one size, with
+// readback.
 #pragma once
 
 #include "render/ambient_occlusion.hpp"
@@ -8,37 +8,39 @@
 
 namespace enfilade::render {
 
-class FrameTarget {
+/// Framebuffer with its attachments; empty if default-constructed.
+class RenderTarget {
  public:
-  FrameTarget() = default;
-  /// Needs a current context. Throws RenderError when the device refuses the size.
-  FrameTarget(int width, int height);
+  RenderTarget() = default;
+  /// Needs a current context. Throws RenderError if the device rejects the size.
+  RenderTarget(int width, int height);
 
-  bool fits(int width, int height) const { return width == width_ && height == height_; }
-  /// Binds it, all black, id 0, normals 0 and depth 0 (the farthest); draws into `channels`. Throws
-  /// RenderError when the device refuses normals.
+  bool hasSize(int width, int height) const { return width == width_ && height == height_; }
+  /// Binds and clears it: colour black, id 0, normals 0, depth 0 (the farthest); enables
+  /// `channels`. Throws RenderError if the device rejects the normals attachment.
   void begin(const Channels& channels);
-  /// Draw into these channels; depth is written as the depth mask says.
-  void drawInto(const Channels& channels) const;
-  /// Which pixels surfaces are lit by the sun in from now on: 255, or 0 in shadow.
-  void lightBy(const std::vector<std::uint8_t>& sunlit);
-  /// The channels but depth and colour into `frame`.
-  void read(Frame& frame, const Channels& channels) const;
-  /// The colour, darkened by `hollows` as far as its alpha lets them be seen.
-  void readColour(Frame& frame, const Hollows& hollows);
-  /// As it is in the buffer: 1 near, 0 far and nothing.
+  /// Enables drawing into these channels; the depth mask controls depth.
+  void setDrawChannels(const Channels& channels) const;
+  /// Sets the shadow mask of the following draws: 255 per sunlit pixel, 0 in shadow.
+  void setShadowMask(const std::vector<std::uint8_t>& mask);
+  /// Reads ids and normals, if requested, into `frame`.
+  void readChannels(Frame& frame, const Channels& channels) const;
+  /// Reads the colour and applies the ambient occlusion, attenuated by the alpha channel, which
+  /// holds the transmittance.
+  void readColour(Frame& frame, const AmbientOcclusion& ambientOcclusion);
+  /// Reads the buffer depth: 1 near; 0 far and background.
   void readDepth(std::vector<float>& depth) const;
 
  private:
   void addNormals();
 
   int width_ = 0, height_ = 0;
-  GlTexture colour_, ids_, depth_, normals_, sunlit_;
-  std::vector<std::uint8_t> rgba_;  ///< kept for reading back
+  GlTexture colour_, ids_, depth_, normals_, shadowMask_;
+  std::vector<std::uint8_t> rgba_;  ///< readback buffer
   GlFramebuffer framebuffer_;
 };
 
-/// From the buffer's depth to metres along forward; NaN where nothing is.
-std::vector<float> metresOf(const std::vector<float>& depth, const Camera& camera);
+/// Converts buffer depth to metres along forward; NaN for the background.
+std::vector<float> convertDepthToMetres(const std::vector<float>& depth, const Camera& camera);
 
 }  // namespace enfilade::render

@@ -7,21 +7,22 @@
 #include <limits>
 #include <string>
 
+#include "collision/assert.hpp"
 #include "render/render_error.hpp"
 #include "render/vertex.hpp"
 
 namespace enfilade::render {
 namespace {
 
-struct Totals {
+struct BufferSizes {
   std::uint64_t vertices = 0, indices = 0;
 };
 
-/// Lays the meshes one behind the other.
-Totals layOut(const scene::Model& model, std::vector<MeshRange>& ranges) {
-  Totals totals;
+/// Lays out the meshes consecutively; throws RenderError if the indices overflow.
+BufferSizes layOutMeshes(const scene::Model& model, std::vector<MeshRange>& ranges) {
+  BufferSizes totals;
   for (const scene::Mesh& mesh : model.meshes) {
-    scene::Box box;
+    scene::Aabb box;
     for (const Eigen::Vector3f& position : mesh.positions) box.include(position.cast<double>());
     ranges.push_back({static_cast<std::uint32_t>(totals.indices),
                       static_cast<std::uint32_t>(mesh.indices.size()),
@@ -34,12 +35,12 @@ Totals layOut(const scene::Model& model, std::vector<MeshRange>& ranges) {
       totals.indices > std::numeric_limits<std::uint32_t>::max()) {
     throw RenderError("the model " + model.source + " has " + std::to_string(totals.vertices) +
                       " vertices and " + std::to_string(totals.indices) +
-                      " indices, more than one buffer holds; load a part of it");
+                      " indices, more than one buffer can hold; load a part of it");
   }
   return totals;
 }
 
-std::vector<Vertex> verticesOf(const scene::Mesh& mesh, const Vec3& centre) {
+std::vector<Vertex> makeVertices(const scene::Mesh& mesh, const Vec3& centre) {
   std::vector<Vertex> vertices(mesh.positions.size());
   const bool normals = mesh.normals.size() == mesh.positions.size();
   const bool uvs = mesh.uvs.size() == mesh.positions.size();
@@ -47,17 +48,17 @@ std::vector<Vertex> verticesOf(const scene::Mesh& mesh, const Vec3& centre) {
     const Vec3 p = mesh.positions[i].cast<double>() - centre;
     vertices[i] = {
         {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())},
-        normals ? packedNormal(mesh.normals[i]) : 0u,
+        normals ? packNormal(mesh.normals[i]) : 0u,
         {uvs ? mesh.uvs[i].x() : 0.0f, uvs ? mesh.uvs[i].y() : 0.0f}};
   }
   return vertices;
 }
 
-/// A texture that the device cannot hold is drawn white: the importer has told of what is missing.
-GlTexture uploadTexture(const scene::Texture& texture, GLint largest) {
+/// An unusable texture becomes white; the importer has already reported missing textures.
+GlTexture uploadTexture(const scene::Texture& texture, GLint maxSize) {
   const auto width = static_cast<GLsizei>(texture.width);
   const auto height = static_cast<GLsizei>(texture.height);
-  const bool usable = width > 0 && height > 0 && width <= largest && height <= largest &&
+  const bool usable = width > 0 && height > 0 && width <= maxSize && height <= maxSize &&
                       texture.rgba.size() == std::size_t{4} * texture.width * texture.height;
   constexpr std::uint32_t kWhite = 0xFFFFFFFFu;
   const void* pixels = usable ? static_cast<const void*>(texture.rgba.data()) : &kWhite;
@@ -77,14 +78,15 @@ GlTexture uploadTexture(const scene::Texture& texture, GLint largest) {
   return result;
 }
 
-GlBuffer emptyBuffer(std::uint64_t bytes) {
+GlBuffer makeBuffer(std::uint64_t bytes) {
   GlBuffer buffer = GlBuffer::create();
   glNamedBufferStorage(buffer.name(), static_cast<GLsizeiptr>(std::max<std::uint64_t>(bytes, 4)),
                        nullptr, GL_DYNAMIC_STORAGE_BIT);
   return buffer;
 }
 
-void fill(const GlBuffer& buffer, std::uint64_t offset, const void* data, std::uint64_t bytes) {
+void writeBuffer(const GlBuffer& buffer, std::uint64_t offset, const void* data,
+                 std::uint64_t bytes) {
   if (bytes == 0) return;
   glNamedBufferSubData(buffer.name(), static_cast<GLintptr>(offset), static_cast<GLsizeiptr>(bytes),
                        data);
@@ -92,28 +94,30 @@ void fill(const GlBuffer& buffer, std::uint64_t offset, const void* data, std::u
 
 }  // namespace
 
-ModelBuffers uploadModel(const scene::Model& model) {
-  ModelBuffers buffers;
-  const Totals totals = layOut(model, buffers.ranges);
-  buffers.vertices = emptyBuffer(totals.vertices * sizeof(Vertex));
-  buffers.indices = emptyBuffer(totals.indices * sizeof(std::uint32_t));
+SceneBuffers uploadModel(const scene::Model& model) {
+  SceneBuffers buffers;
+  const BufferSizes totals = layOutMeshes(model, buffers.ranges);
+  ENFILADE_ASSERT(buffers.ranges.size() == model.meshes.size());
+  buffers.vertices = makeBuffer(totals.vertices * sizeof(Vertex));
+  buffers.indices = makeBuffer(totals.indices * sizeof(std::uint32_t));
   checkGl("making the model's buffers");
   for (std::size_t m = 0; m < model.meshes.size(); ++m) {
     const scene::Mesh& mesh = model.meshes[m];
     const MeshRange& range = buffers.ranges[m];
-    const std::vector<Vertex> vertices = verticesOf(mesh, range.centre);
-    fill(buffers.vertices, std::uint64_t{sizeof(Vertex)} * static_cast<unsigned>(range.baseVertex),
-         vertices.data(), vertices.size() * sizeof(Vertex));
-    fill(buffers.indices, std::uint64_t{sizeof(std::uint32_t)} * range.firstIndex,
-         mesh.indices.data(), mesh.indices.size() * sizeof(std::uint32_t));
-    buffers.materials.push_back(materialData(model, mesh));
+    const std::vector<Vertex> vertices = makeVertices(mesh, range.centre);
+    writeBuffer(buffers.vertices,
+                std::uint64_t{sizeof(Vertex)} * static_cast<unsigned>(range.baseVertex),
+                vertices.data(), vertices.size() * sizeof(Vertex));
+    writeBuffer(buffers.indices, std::uint64_t{sizeof(std::uint32_t)} * range.firstIndex,
+                mesh.indices.data(), mesh.indices.size() * sizeof(std::uint32_t));
+    buffers.materials.push_back(makeMaterialData(model, mesh));
   }
   checkGl("uploading the model's meshes");
-  GLint largest = 0;
-  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
+  GLint maxSize = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &maxSize);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   for (const scene::Texture& texture : model.textures) {
-    buffers.textures.push_back(uploadTexture(texture, largest));
+    buffers.textures.push_back(uploadTexture(texture, maxSize));
   }
   checkGl("uploading the model's textures");
   return buffers;

@@ -1,4 +1,4 @@
-// A model's meshes and textures in the device's memory, uploaded once.
+// A model's meshes and textures in device memory, uploaded once.
 #pragma once
 
 #include <vector>
@@ -8,15 +8,16 @@
 
 namespace enfilade::render {
 
-struct ModelBuffers {
+/// Device buffers of a model.
+struct SceneBuffers {
   GlBuffer vertices;
   GlBuffer indices;
-  std::vector<MeshRange> ranges;        ///< one a mesh
-  std::vector<MaterialData> materials;  ///< one a mesh
-  std::vector<GlTexture> textures;      ///< one a texture of the model
+  std::vector<MeshRange> ranges;        ///< one per mesh
+  std::vector<MaterialData> materials;  ///< one per mesh
+  std::vector<GlTexture> textures;      ///< one per texture of the model
 };
 
-/// Needs a current context. Throws RenderError when the device refuses.
-ModelBuffers uploadModel(const scene::Model& model);
+/// Needs a current context. Throws RenderError on GL errors and for too large models.
+SceneBuffers uploadModel(const scene::Model& model);
 
 }  // namespace enfilade::render

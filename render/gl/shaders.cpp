@@ -17,7 +17,7 @@ layout(std140, binding = 0) uniform Frame {
 
 constexpr const char* kSurfaceVertex = R"(
 layout(location = 0) in vec3 position;
-layout(location = 1) in vec4 normal;  // w: 0 when the mesh has none
+layout(location = 1) in vec4 normal;  // w: 0 without a normal
 layout(location = 2) in vec2 uv;
 layout(location = 3) in vec4 rowX;
 layout(location = 4) in vec4 rowY;
@@ -27,10 +27,10 @@ layout(location = 7) in vec4 emissive;
 layout(location = 8) in vec4 surface;
 layout(location = 9) in uint id;
 
-invariant gl_Position;  // the depth of both passes is one
+invariant gl_Position;  // prepass and shading must compute equal depth
 out vec3 point;
 out vec3 softNormal;
-out vec2 place;
+out vec2 texCoord;
 flat out vec4 base;
 flat out vec4 glow;
 flat out vec4 finish;
@@ -39,13 +39,13 @@ flat out uint entity;
 void main() {
   vec4 p = vec4(position, 1.0);
   point = vec3(dot(rowX, p), dot(rowY, p), dot(rowZ, p));
-  // The rows of the cofactor matrix: right for unequal scales, and for mirrors up to a sign that
-  // the fragment shader does not trust anyway.
+  // The rows of the cofactor matrix: correct for non-uniform scales, and for mirroring up to the
+  // sign, which the fragment shader determines.
   softNormal = normal.w == 0.0 ? vec3(0.0)
                                : vec3(dot(cross(rowY.xyz, rowZ.xyz), normal.xyz),
                                       dot(cross(rowZ.xyz, rowX.xyz), normal.xyz),
                                       dot(cross(rowX.xyz, rowY.xyz), normal.xyz));
-  place = uv;
+  texCoord = uv;
   base = baseColour;
   glow = emissive;
   finish = surface;
@@ -54,17 +54,17 @@ void main() {
 }
 )";
 
-// As text of GLSL what the ray renderer compiles as C++.
-constexpr const char* kLight =
-#define LIGHT_TEXT(...) #__VA_ARGS__
+// The shading model as GLSL text; the ray renderer compiles the same file as C++.
+constexpr const char* kShadingSource =
+#define SHADING_SOURCE(...) #__VA_ARGS__
 #include "render/shading.glsl.inc"
-#undef LIGHT_TEXT
+#undef SHADING_SOURCE
     ;
 
 constexpr const char* kSurfaceFragment = R"(
 in vec3 point;
 in vec3 softNormal;
-in vec2 place;
+in vec2 texCoord;
 flat in vec4 base;
 flat in vec4 glow;
 flat in vec4 finish;
@@ -72,7 +72,7 @@ flat in uint entity;
 
 layout(location = 0) out vec4 colour;
 #ifndef BLEND
-layout(location = 1) out uint seen;
+layout(location = 1) out uint visibleId;
 #endif
 #ifdef NORMALS
 layout(location = 2) out vec4 facing;
@@ -81,19 +81,19 @@ layout(location = 2) out vec4 facing;
 layout(binding = 0) uniform sampler2D baseColourTexture;
 #endif
 #ifdef SHADOWS
-layout(binding = 1) uniform sampler2D sunlitPixels;
+layout(binding = 1) uniform sampler2D shadowMask;
 #endif
 
-// exposed() and the encoding of sRGB in one: a rational function of the root, fitted to both, never
-// farther off than a quarter of a byte's step. Encoding in the frame buffer costs processors that
-// play GPU three times as much, since they read, decode, select and encode what is there.
+// exposed() and sRGB encoding in one: a rational function of the square root, with an error of at
+// most a quarter of a byte step. Framebuffer encoding takes software renderers three times as long,
+// because they read, decode, select and encode the existing colour.
 vec3 encoded(vec3 radiance) {
-  vec3 t = sqrt(clamp(radiance, 0.0, 9.0));  // all beyond is white
+  vec3 t = sqrt(clamp(radiance, 0.0, 9.0));  // larger values are white
   return t * (-0.101668 + t * (16.2093 + t * (251.839 + t * 13.5556))) /
          (1.0 + t * (2.352 + t * (240.678 + t * (-25.9677 + t * (127.038 + t * -15.3394)))));
 }
 
-// Always towards the eye: real models are wound both ways, mirrored, or have no normals at all.
+// Always towards the eye: models have inconsistent winding, mirrored transforms or no normals.
 vec3 facingNormal(vec3 toEye) {
   vec3 flat_ = cross(dFdx(point), dFdy(point));
   if (dot(flat_, toEye) < 0.0) flat_ = -flat_;
@@ -118,23 +118,23 @@ void main() {
 #endif
   vec4 albedo = base;
 #ifdef TEXTURED
-  albedo *= texture(baseColourTexture, place);
+  albedo *= texture(baseColourTexture, texCoord);
 #endif
 #ifdef MASK
   if (albedo.a < finish.x) discard;
 #endif
 #ifndef BLEND
-  seen = entity;
+  visibleId = entity;
 #endif
 #ifdef SHADED
 #ifdef SHADOWS
-  float sunlit = texelFetch(sunlitPixels, ivec2(gl_FragCoord.xy), 0).r;
+  float sunlit = texelFetch(shadowMask, ivec2(gl_FragCoord.xy), 0).r;
 #else
   float sunlit = 1.0;
 #endif
   vec3 radiance = lit(albedo.rgb, n, toEye, distance, finish.y, finish.z, sunlit) + kGlow * glow.rgb;
 #ifdef PLAN
-  // A plan cuts things open; their insides are darker, so that cut walls stand out.
+  // A plan cuts objects open; their interior is darker to emphasise cut walls.
   bool inside = gl_FrontFacing == (glow.w > 0.5);
   if (inside && finish.w < 0.5) radiance *= kCutOpen;
 #else
@@ -171,7 +171,7 @@ layout(location = 0) out vec4 colour;
 
 void main() {
   vec3 linear = plan > 0.5 ? planPaper() : exposed(skyFor(normalize(direction)));
-  // As sRGB: nothing in the sky is so dark that its encoding is a straight line.
+  // sRGB encoding; the sky is never dark enough for the linear segment.
   colour = vec4(1.055 * pow(linear, vec3(1.0 / 2.4)) - 0.055, 1.0);
 }
 )";
@@ -191,7 +191,7 @@ std::string surfaceFragmentSource(const SurfaceVariant& variant) {
   if (variant.shaded) source += "#define SHADED\n";
   if (variant.shadows) source += "#define SHADOWS\n";
   if (variant.plan) source += "#define PLAN\n";
-  return source + kFrameBlock + kLight + kSurfaceFragment;
+  return source + kFrameBlock + kShadingSource + kSurfaceFragment;
 }
 
 std::string skyVertexSource() {
@@ -199,7 +199,7 @@ std::string skyVertexSource() {
 }
 
 std::string skyFragmentSource() {
-  return std::string(kVersion) + kFrameBlock + kLight + kSkyFragment;
+  return std::string(kVersion) + kFrameBlock + kShadingSource + kSkyFragment;
 }
 
 }  // namespace enfilade::render

@@ -1,20 +1,20 @@
-// The GLSL of both passes: which depth surfaces have, and how what is nearest is lit.
+// GLSL sources of the depth prepass, the shading passes and the sky.
 #pragma once
 
 #include <string>
 
 namespace enfilade::render {
 
-/// What a surface's shader has to do; each combination is a program of its own, so that plain
-/// surfaces pay for nothing else.
+/// Features of a surface shader. Each combination is a separate program, so that plain surfaces do
+/// not pay for unused features.
 struct SurfaceVariant {
   bool textured = false;
-  bool mask = false;     ///< cuts holes: costs the early depth test
+  bool mask = false;     ///< alpha test; disables the early depth test
   bool blend = false;    ///< colour only, with alpha
-  bool normals = false;  ///< writes them to colour attachment 2
-  bool shadows = false;  ///< the sun shines where the texture at binding 1 says
-  bool plan = false;     ///< orthographic; else a perspective
-  bool shaded = true;    ///< else depth and id alone, to the last bit those of the shaded one
+  bool normals = false;  ///< writes normals to colour attachment 2
+  bool shadows = false;  ///< reads the shadow mask at texture binding 1
+  bool plan = false;     ///< orthographic; otherwise perspective
+  bool shaded = true;    ///< false: only depth and id, bit-identical to those of the shaded variant
 };
 
 std::string surfaceVertexSource();
@@ -22,17 +22,17 @@ std::string surfaceFragmentSource(const SurfaceVariant& variant);
 std::string skyVertexSource();
 std::string skyFragmentSource();
 
-/// Twin of the GLSL block `Frame` (std140), at uniform binding 0. Positions are relative to the
-/// eye, with the world's axes.
+/// Layout of the GLSL block `Frame` (std140) at uniform binding 0. Positions are relative to the
+/// eye, in world axes.
 struct FrameUniforms {
   float clipFromRelative[16];  ///< column-major; reversed depth: near 1, far 0
   float forward[4];            ///< w: 1 orthographic, 0 perspective
-  float middle[4];             ///< world direction of the picture's middle; z along forward is 1
-  float rightByX[4];           ///< world right, divided by View::scaleX
-  float upByY[4];              ///< world up, divided by View::scaleY
+  float middle[4];             ///< world direction of the image centre; z along forward is 1
+  float rightByX[4];           ///< world right / CameraBasis::scaleX
+  float upByY[4];              ///< world up / CameraBasis::scaleY
 };
 
-/// Attribute places shared by the shaders and the vertex array.
+/// Attribute locations shared by the shaders and the vertex array.
 enum class Attribute : unsigned {
   position,
   normal,
@@ -41,7 +41,7 @@ enum class Attribute : unsigned {
   rowY,
   rowZ,
   baseColour,
-  emissive,  ///< w: 1 when the transform mirrors
+  emissive,  ///< w: 1 if the transform mirrors
   surface,   ///< alpha cutoff, metallic, roughness, 1 when double-sided
   id
 };

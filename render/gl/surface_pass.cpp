@@ -7,73 +7,75 @@
 #include <cstddef>
 #include <span>
 
+#include "collision/assert.hpp"
 #include "render/camera_basis.hpp"
 #include "render/gl/shaders.hpp"
 
 namespace enfilade::render {
 namespace {
 
-constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1, kFrameUniforms = 0;
+constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1, kFrameUniformBinding = 0;
 
-void put(float (&target)[4], const Vec3& xyz, double w) {
+void setVec4(float (&target)[4], const Vec3& xyz, double w) {
   for (int i = 0; i < 3; ++i) target[i] = static_cast<float>(xyz[i]);
   target[3] = static_cast<float>(w);
 }
 
-Eigen::Matrix4d clipFromRelative(const Camera& camera, const View& view) {
+Eigen::Matrix4d computeClipFromRelative(const Camera& camera, const CameraBasis& basis) {
   const double range = camera.far - camera.near;
   Eigen::Matrix4d clip = Eigen::Matrix4d::Zero();
-  clip.row(0).head<3>() = view.scaleX * view.right.transpose();
-  clip.row(1).head<3>() = view.scaleY * view.up.transpose();
+  clip.row(0).head<3>() = basis.scaleX * basis.right.transpose();
+  clip.row(1).head<3>() = basis.scaleY * basis.up.transpose();
   if (camera.projection == Camera::Projection::perspective) {
-    clip.row(0).head<3>() += view.shiftX * view.forward.transpose();
-    clip.row(1).head<3>() += view.shiftY * view.forward.transpose();
-    clip.row(2).head<3>() = -camera.near / range * view.forward.transpose();
+    clip.row(0).head<3>() += basis.shiftX * basis.forward.transpose();
+    clip.row(1).head<3>() += basis.shiftY * basis.forward.transpose();
+    clip.row(2).head<3>() = -camera.near / range * basis.forward.transpose();
     clip(2, 3) = camera.near * camera.far / range;
-    clip.row(3).head<3>() = view.forward.transpose();
+    clip.row(3).head<3>() = basis.forward.transpose();
   } else {
-    clip.row(2).head<3>() = -1 / range * view.forward.transpose();
+    clip.row(2).head<3>() = -1 / range * basis.forward.transpose();
     clip(2, 3) = camera.far / range;
     clip(3, 3) = 1;
   }
   return clip;
 }
 
-FrameUniforms uniformsOf(const Camera& camera) {
-  const View view = viewOf(camera);
+FrameUniforms makeFrameUniforms(const Camera& camera) {
+  const CameraBasis basis = computeCameraBasis(camera);
   const bool plan = camera.projection == Camera::Projection::orthographic;
-  const Eigen::Matrix4d clip = clipFromRelative(camera, view);
+  const Eigen::Matrix4d clip = computeClipFromRelative(camera, basis);
   FrameUniforms uniforms{};
   for (int i = 0; i < 16; ++i) {
     uniforms.clipFromRelative[i] = static_cast<float>(clip(i % 4, i / 4));
   }
-  put(uniforms.forward, view.forward, plan ? 1 : 0);
-  put(uniforms.middle,
-      view.forward - view.shiftX / view.scaleX * view.right - view.shiftY / view.scaleY * view.up,
-      0);
-  put(uniforms.rightByX, view.right / view.scaleX, 0);
-  put(uniforms.upByY, view.up / view.scaleY, 0);
+  setVec4(uniforms.forward, basis.forward, plan ? 1 : 0);
+  setVec4(uniforms.middle,
+          basis.forward - basis.shiftX / basis.scaleX * basis.right -
+              basis.shiftY / basis.scaleY * basis.up,
+          0);
+  setVec4(uniforms.rightByX, basis.right / basis.scaleX, 0);
+  setVec4(uniforms.upByY, basis.up / basis.scaleY, 0);
   return uniforms;
 }
 
-void attribute(GLuint array, Attribute which, GLuint binding, GLint components, GLenum type,
-               bool normalised, std::size_t offset) {
-  const auto place = static_cast<GLuint>(which);
-  glEnableVertexArrayAttrib(array, place);
-  glVertexArrayAttribFormat(array, place, components, type,
+void bindAttribute(GLuint array, Attribute attribute, GLuint binding, GLint components, GLenum type,
+                   bool normalised, std::size_t offset) {
+  const auto location = static_cast<GLuint>(attribute);
+  glEnableVertexArrayAttrib(array, location);
+  glVertexArrayAttribFormat(array, location, components, type,
                             static_cast<GLboolean>(normalised ? GL_TRUE : GL_FALSE),
                             static_cast<GLuint>(offset));
-  glVertexArrayAttribBinding(array, place, binding);
+  glVertexArrayAttribBinding(array, location, binding);
 }
 
 GlVertexArray makeVertexArray() {
   GlVertexArray result = GlVertexArray::create();
   const GLuint array = result.name();
-  attribute(array, Attribute::position, kVertexBinding, 3, GL_FLOAT, false,
-            offsetof(Vertex, position));
-  attribute(array, Attribute::normal, kVertexBinding, 4, GL_INT_2_10_10_10_REV, true,
-            offsetof(Vertex, normal));
-  attribute(array, Attribute::uv, kVertexBinding, 2, GL_FLOAT, false, offsetof(Vertex, uv));
+  bindAttribute(array, Attribute::position, kVertexBinding, 3, GL_FLOAT, false,
+                offsetof(Vertex, position));
+  bindAttribute(array, Attribute::normal, kVertexBinding, 4, GL_INT_2_10_10_10_REV, true,
+                offsetof(Vertex, normal));
+  bindAttribute(array, Attribute::uv, kVertexBinding, 2, GL_FLOAT, false, offsetof(Vertex, uv));
   const std::array<std::pair<Attribute, std::size_t>, 6> rows{{
       {Attribute::rowX, offsetof(Instance, relativeFromMesh)},
       {Attribute::rowY, offsetof(Instance, relativeFromMesh) + 16},
@@ -83,7 +85,7 @@ GlVertexArray makeVertexArray() {
       {Attribute::surface, offsetof(Instance, material.surface)},
   }};
   for (const auto& [which, offset] : rows) {
-    attribute(array, which, kInstanceBinding, 4, GL_FLOAT, false, offset);
+    bindAttribute(array, which, kInstanceBinding, 4, GL_FLOAT, false, offset);
   }
   const auto id = static_cast<GLuint>(Attribute::id);
   glEnableVertexArrayAttrib(array, id);
@@ -93,8 +95,8 @@ GlVertexArray makeVertexArray() {
   return result;
 }
 
-/// As others draw, a call for each object.
-void drawSingly(std::span<const DrawCommand> commands) {
+/// One draw call per command.
+void drawUnbatched(std::span<const DrawCommand> commands) {
   for (const DrawCommand& command : commands) {
     const std::size_t offset = sizeof(std::uint32_t) * command.firstIndex;
     glDrawElementsInstancedBaseVertexBaseInstance(
@@ -108,10 +110,10 @@ void drawSingly(std::span<const DrawCommand> commands) {
 
 void StreamBuffer::fill(const void* data, std::size_t bytes) {
   if (bytes == 0) return;
-  if (bytes > room_) {
-    room_ = 2 * bytes;
+  if (bytes > capacity_) {
+    capacity_ = 2 * bytes;
     buffer_ = GlBuffer::create();
-    glNamedBufferStorage(buffer_.name(), static_cast<GLsizeiptr>(room_), nullptr,
+    glNamedBufferStorage(buffer_.name(), static_cast<GLsizeiptr>(capacity_), nullptr,
                          GL_DYNAMIC_STORAGE_BIT);
   }
   glNamedBufferSubData(buffer_.name(), 0, static_cast<GLsizeiptr>(bytes), data);
@@ -125,12 +127,12 @@ SurfacePass::SurfacePass()
   checkGl("setting up the renderer");
 }
 
-unsigned SurfacePass::program(const Batch& batch) {
+unsigned SurfacePass::findProgram(const Batch& batch) {
   SurfaceVariant variant;
-  variant.mask = batch.pass == Pass::mask;
+  variant.mask = batch.alphaMode == AlphaMode::mask;
   variant.shaded = shaded_;
   variant.textured = batch.texture >= 0 && (shaded_ || variant.mask);
-  variant.blend = shaded_ && batch.pass == Pass::blend;
+  variant.blend = shaded_ && batch.alphaMode == AlphaMode::blend;
   variant.normals = shaded_ && normals_;
   variant.plan = shaded_ && plan_;
   variant.shadows = shaded_ && shadows_ && !variant.blend;
@@ -147,25 +149,25 @@ unsigned SurfacePass::program(const Batch& batch) {
 
 void SurfacePass::begin(const Camera& camera) {
   plan_ = camera.projection == Camera::Projection::orthographic;
-  const FrameUniforms frame = uniformsOf(camera);
+  const FrameUniforms frame = makeFrameUniforms(camera);
   glNamedBufferSubData(uniforms_.name(), 0, sizeof(frame), &frame);
-  glBindBufferBase(GL_UNIFORM_BUFFER, kFrameUniforms, uniforms_.name());
+  glBindBufferBase(GL_UNIFORM_BUFFER, kFrameUniformBinding, uniforms_.name());
   glBindVertexArray(vertexArray_.name());
   glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);  // row 0 on top, reversed depth
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_GREATER);
-  glDisable(GL_FRAMEBUFFER_SRGB);  // shaders encode what hides all
+  glDisable(GL_FRAMEBUFFER_SRGB);  // shaders encode opaque colours
   glDisable(GL_BLEND);
-  glDisable(GL_CULL_FACE);  // real models are wound both ways
+  glDisable(GL_CULL_FACE);  // models have inconsistent winding
 }
 
-void SurfacePass::toDepth() {
+void SurfacePass::beginDepthPrepass() {
   shaded_ = false;
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_GEQUAL);
 }
 
-void SurfacePass::shadeNearest(bool normals, bool shadows) {
+void SurfacePass::beginEqualDepthPass(bool normals, bool shadows) {
   shaded_ = true;
   normals_ = normals;
   shadows_ = shadows;
@@ -173,12 +175,12 @@ void SurfacePass::shadeNearest(bool normals, bool shadows) {
   glDepthFunc(GL_EQUAL);
 }
 
-void SurfacePass::shadeAll(bool normals) {
+void SurfacePass::beginForwardPass(bool normals) {
   shaded_ = true;
   normals_ = normals;
   shadows_ = false;
   glDepthMask(GL_TRUE);
-  glDepthFunc(GL_GEQUAL);  // as in shadeNearest(), the last of several equally near ones stays
+  glDepthFunc(GL_GEQUAL);  // at equal depth the last draw wins, as in beginEqualDepthPass()
 }
 
 void SurfacePass::draw(const DrawList& list, const Geometry& geometry) {
@@ -191,12 +193,13 @@ void SurfacePass::draw(const DrawList& list, const Geometry& geometry) {
   glVertexArrayElementBuffer(array, geometry.indices);
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_.name());
   for (const Batch& batch : list.batches) {
-    glUseProgram(program(batch));
+    glUseProgram(findProgram(batch));
     if (batch.texture >= 0) {
+      ENFILADE_ASSERT(static_cast<std::size_t>(batch.texture) < geometry.textures.size());
       glBindTextureUnit(0, geometry.textures[static_cast<std::size_t>(batch.texture)].name());
     }
-    if (list.singly) {
-      drawSingly(std::span(list.commands).subspan(batch.firstCommand, batch.commandCount));
+    if (list.unbatched) {
+      drawUnbatched(std::span(list.commands).subspan(batch.firstCommand, batch.commandCount));
       continue;
     }
     const std::size_t offset = sizeof(DrawCommand) * batch.firstCommand;
@@ -214,10 +217,10 @@ void SurfacePass::drawSky() const {
   glDepthFunc(GL_GREATER);
 }
 
-void SurfacePass::blendGlass() {
+void SurfacePass::beginTransparentPass() {
   normals_ = false;
   glEnable(GL_BLEND);
-  glEnable(GL_FRAMEBUFFER_SRGB);  // light is mixed, not bytes
+  glEnable(GL_FRAMEBUFFER_SRGB);  // blend linear light
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE_MINUS_SRC_ALPHA);
 }
 

@@ -1,4 +1,4 @@
-// Draws lists of surfaces and the sky: programs, uniforms, streams.
+// Draws draw lists and the sky: programs, uniforms and stream buffers.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace enfilade::render {
 
-/// A buffer that is filled anew again and again; it only grows.
+/// A buffer for data that changes per draw; it only grows.
 class StreamBuffer {
  public:
   void fill(const void* data, std::size_t bytes);
@@ -19,41 +19,41 @@ class StreamBuffer {
 
  private:
   GlBuffer buffer_;
-  std::size_t room_ = 0;
+  std::size_t capacity_ = 0;
 };
 
-/// Where a list's vertices come from.
+/// The buffers and textures of a draw list.
 struct Geometry {
-  unsigned vertices, indices;              ///< names of buffers
-  const std::vector<GlTexture>& textures;  ///< by Batch::texture
+  unsigned vertices, indices;              ///< buffer names
+  const std::vector<GlTexture>& textures;  ///< indexed by Batch::texture
 };
 
-/// Needs a current context, always the same.
+/// Programs and state of all passes. Needs a current context, always the same.
 class SurfacePass {
  public:
   SurfacePass();
 
-  /// The state that all drawing shares, and the camera.
+  /// Sets the common state and the camera.
   void begin(const Camera& camera);
-  /// What is drawn after it has only a depth and an id, of several equally near ones the last.
-  void toDepth();
-  /// What is drawn after it is shaded where it is as near as the depth that is there.
-  /// With shadows, in the light of FrameTarget::lightBy().
-  void shadeNearest(bool normals, bool shadows);
-  /// Both at once: what is drawn after it is shaded where nothing nearer was drawn before.
-  void shadeAll(bool normals);
+  /// The following draws write only depth and id; at equal depth, the last draw wins.
+  void beginDepthPrepass();
+  /// The following draws shade pixels of equal depth. `shadows`: uses
+  /// RenderTarget::setShadowMask().
+  void beginEqualDepthPass(bool normals, bool shadows);
+  /// The following draws write depth and shade; at equal depth, the last draw wins.
+  void beginForwardPass(bool normals);
   void draw(const DrawList& list, const Geometry& geometry);
   void drawSky() const;
-  /// What is drawn after it lies over the colour, whose alpha is left with what shines through.
-  void blendGlass();
+  /// The following draws blend over the colour; its alpha channel accumulates the transmittance.
+  void beginTransparentPass();
 
  private:
-  unsigned program(const Batch& batch);
+  unsigned findProgram(const Batch& batch);
 
   GlVertexArray vertexArray_;
   GlBuffer uniforms_;
   GlProgram sky_;
-  std::array<std::optional<GlProgram>, 128> surfaces_;  ///< see program()
+  std::array<std::optional<GlProgram>, 128> surfaces_;  ///< see findProgram()
   bool shaded_ = true, normals_ = false, plan_ = false, shadows_ = false;
   StreamBuffer instances_, commands_;
 };

@@ -3,57 +3,62 @@
 #include <algorithm>
 #include <limits>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::render {
 namespace {
 
-constexpr std::size_t kMostEntries = 256;
-// Beyond these another view shows other things, and searching anew is quicker.
-constexpr double kFarthest = 3.0;  // metres between the eyes
-constexpr double kTurned = 0.5;    // cosine between the gazes
-// A turn by one radian counts as much as a way of so many metres.
-constexpr double kMetresPerTurn = 2.0;
+constexpr std::size_t kMaxEntries = 256;
+// Beyond these limits, views share too little, and a new search is faster.
+constexpr double kMaxEyeDistance = 3.0;  // metres between the eyes
+constexpr double kMinViewCosine = 0.5;   // cosine between the view directions
+// Weight of 1 - cosine between the view directions, in metres.
+constexpr double kCosineWeight = 2.0;
 
-/// Infinite where the one says nothing about the other.
-double unlikeness(const Camera& a, const Camera& b) {
-  constexpr double kUnlike = std::numeric_limits<double>::infinity();
-  if (a.projection != b.projection) return kUnlike;
-  const double way = (a.eye - b.eye).norm();
+/// Dissimilarity of two views in metres; infinite if they are unrelated.
+double computeViewDistance(const Camera& a, const Camera& b) {
+  constexpr double kIncomparable = std::numeric_limits<double>::infinity();
+  if (a.projection != b.projection) return kIncomparable;
+  const double distance = (a.eye - b.eye).norm();
   const double cosine = a.forward.stableNormalized().dot(b.forward.stableNormalized());
-  if (way > kFarthest || cosine < kTurned) return kUnlike;
-  return way + kMetresPerTurn * (1 - cosine);
+  if (distance > kMaxEyeDistance || cosine < kMinViewCosine) return kIncomparable;
+  return distance + kCosineWeight * (1 - cosine);
 }
 
 }  // namespace
 
-const Seen* SeenMemory::find(const Camera& camera) const {
-  const Seen* best = nullptr;
-  double least = std::numeric_limits<double>::infinity();
-  for (const Seen& entry : entries_) {
-    const double d = unlikeness(entry.camera, camera);
-    if (d < least) {
-      least = d;
+const CachedView* VisibilityCache::findNearest(const Camera& camera) const {
+  const CachedView* best = nullptr;
+  double minDistance = std::numeric_limits<double>::infinity();
+  for (const CachedView& entry : entries_) {
+    const double d = computeViewDistance(entry.camera, camera);
+    if (d < minDistance) {
+      minDistance = d;
       best = &entry;
     }
   }
   return best;
 }
 
-Seen& SeenMemory::recall(const Camera& camera, std::uint64_t picture) {
-  Seen* best = const_cast<Seen*>(find(camera));  // of this, which is not const
+CachedView& VisibilityCache::lookup(const Camera& camera, std::uint64_t frameNumber) {
+  ENFILADE_ASSERT(frameNumber > 0);
+  // findNearest() is const; this object is not.
+  CachedView* best = const_cast<CachedView*>(findNearest(camera));
   if (!best) {
-    if (entries_.size() < kMostEntries) {
+    if (entries_.size() < kMaxEntries) {
       best = &entries_.emplace_back();
     } else {
-      best = &*std::min_element(entries_.begin(), entries_.end(),
-                                [](const Seen& a, const Seen& b) { return a.used < b.used; });
+      best = &*std::min_element(
+          entries_.begin(), entries_.end(),
+          [](const CachedView& a, const CachedView& b) { return a.lastUsed < b.lastUsed; });
       *best = {};
     }
   }
   best->camera = camera;
-  const std::uint64_t before = best->used;
-  best->used = picture;
+  const std::uint64_t before = best->lastUsed;
+  best->lastUsed = frameNumber;
   if (before == 0) {
-    best->parts.clear();
+    best->items.clear();
     best->avatars.clear();
   }
   return *best;

@@ -1,4 +1,4 @@
-// What earlier pictures showed, by where they were taken from: the first guess for the next one.
+// Visible items of earlier frames by camera: the first guess for the next frame.
 #pragma once
 
 #include <cstdint>
@@ -8,25 +8,26 @@
 
 namespace enfilade::render {
 
-struct Seen {
+/// The visible items of one earlier camera.
+struct CachedView {
   Camera camera;
-  std::vector<std::uint32_t> parts;      ///< may have been seen; ascending
-  std::vector<scene::EntityId> avatars;  ///< likewise
-  std::uint64_t used = 0;                ///< picture number of the last use; 0: never
+  std::vector<std::uint32_t> items;      ///< possibly visible; ascending
+  std::vector<scene::EntityId> avatars;  ///< possibly visible; ascending
+  std::uint64_t lastUsed = 0;            ///< frame number of the last use; 0: never
 };
 
-/// Nothing in a picture depends on it, only how long it takes. Many cameras in one tick each find
-/// their own entry, or that of a neighbour.
-class SeenMemory {
+/// Affects only rendering time, never the frame. With many cameras per tick, each finds its own
+/// entry or that of a similar camera.
+class VisibilityCache {
  public:
-  /// What was seen from nearest by, to be updated for `camera`; empty (used = 0) when that lies too
-  /// far off to be of use. Valid until the next call.
-  Seen& recall(const Camera& camera, std::uint64_t picture);
-  /// The same, to look at; null when there is none.
-  const Seen* find(const Camera& camera) const;
+  /// The most similar view, to be updated for `camera`; empty if no view is similar enough. Valid
+  /// until the next call.
+  CachedView& lookup(const Camera& camera, std::uint64_t frameNumber);
+  /// The most similar view; null if no view is similar enough.
+  const CachedView* findNearest(const Camera& camera) const;
 
  private:
-  std::vector<Seen> entries_;
+  std::vector<CachedView> entries_;
 };
 
 }  // namespace enfilade::render

@@ -15,16 +15,16 @@
 namespace enfilade::render {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "NPY headers and depth say so");
+static_assert(std::endian::native == std::endian::little, "NPY and depth are little-endian");
 
-constexpr int kPngLevel = 3;   // zlib's; higher ones take twice the time for some percent
-constexpr int kZstdLevel = 3;  // the library's own default
-constexpr int kFullColour = 90;
-constexpr double kMostSteps = 65535;
+constexpr int kPngLevel = 3;   // of zlib; higher levels take twice the time and save a few percent
+constexpr int kZstdLevel = 3;  // the library's default
+constexpr int kFullColourQuality = 90;
+constexpr double kMaxDepthSteps = 65535;
 constexpr std::size_t kNpyAlignment = 64;  // bytes, of the first value
 
 template <class Value>
-void requireWhole(const char* what, const Raster<Value>& pixels) {
+void validateRaster(const char* what, const Raster<Value>& pixels) {
   const bool shaped =
       pixels.width > 0 && pixels.height > 0 && (pixels.channels == 1 || pixels.channels == 3);
   const std::size_t wanted = shaped ? static_cast<std::size_t>(pixels.width) *
@@ -33,14 +33,14 @@ void requireWhole(const char* what, const Raster<Value>& pixels) {
                                     : 0;
   if (shaped && wanted == pixels.values.size()) return;
   throw std::runtime_error(std::string(what) + ": " + std::to_string(pixels.values.size()) +
-                           " values are not a picture of " + std::to_string(pixels.width) + "x" +
+                           " values are not an image of " + std::to_string(pixels.width) + "x" +
                            std::to_string(pixels.height) + " pixels with " +
                            std::to_string(pixels.channels) + " channels");
 }
 
 // ---- PNG ----------------------------------------------------------------------------------------
 
-/// What libpng's callbacks need. They may not throw through libpng, which is C.
+/// State of libpng's callbacks, which must not throw through C code.
 struct PngSink {
   Bytes bytes;
   std::string failure;
@@ -64,13 +64,12 @@ void appendPng(png_structp png, png_bytep data, std::size_t count) {
 
 void ignorePngWarning(png_structp, png_const_charp) {}
 
-/// All that libpng does between a failure and setjmp: nothing here has a destructor.
+/// Contains all code between setjmp and longjmp; no object here has a destructor.
 bool writePngRows(png_structp png, png_infop info, int width, int height, int bits, int channels,
                   const std::uint8_t* rows, std::size_t stride) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_set_compression_level(png, kPngLevel);
-  // Colour and depth are smooth from row to row; 8-bit colour without filters is what viewers and
-  // the walk's own pictures have had, and is the quickest.
+  // 16-bit depth is smooth from row to row. For 8-bit colour, no filter is the fastest.
   png_set_filter(png, PNG_FILTER_TYPE_BASE, bits == 16 ? PNG_FILTER_UP : PNG_FILTER_NONE);
   png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), bits,
                channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
@@ -83,14 +82,14 @@ bool writePngRows(png_structp png, png_infop info, int width, int height, int bi
   return true;
 }
 
-Bytes encodedPng(int width, int height, int bits, int channels, const void* values) {
+Bytes encodePngBytes(int width, int height, int bits, int channels, const void* values) {
   PngSink sink;
   png_structp png =
       png_create_write_struct(PNG_LIBPNG_VER_STRING, &sink, failPng, ignorePngWarning);
   png_infop info = png ? png_create_info_struct(png) : nullptr;
   if (!info) {
     png_destroy_write_struct(&png, nullptr);
-    throw std::runtime_error("encodePng: libpng does not start: out of memory or another version");
+    throw std::runtime_error("encodePng: libpng failed: out of memory or version mismatch");
   }
   png_set_write_fn(png, &sink, appendPng, nullptr);
   const std::size_t stride = static_cast<std::size_t>(width) * static_cast<std::size_t>(channels) *
@@ -106,8 +105,8 @@ Bytes encodedPng(int width, int height, int bits, int channels, const void* valu
 
 /// https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html, version 1.0.
 template <class Value>
-Bytes encodedNpy(const Raster<Value>& pixels, const char* type) {
-  requireWhole("encodeNpy", pixels);
+Bytes encodeNpyBytes(const Raster<Value>& pixels, const char* type) {
+  validateRaster("encodeNpy", pixels);
   std::string header = "{'descr': '";
   header += type;
   header += "', 'fortran_order': False, 'shape': (" + std::to_string(pixels.height) + ", ";
@@ -136,23 +135,23 @@ Bytes encodedNpy(const Raster<Value>& pixels, const char* type) {
 }  // namespace
 
 Bytes encodePng(const Raster<std::uint8_t>& pixels) {
-  requireWhole("encodePng", pixels);
-  return encodedPng(pixels.width, pixels.height, 8, pixels.channels, pixels.values.data());
+  validateRaster("encodePng", pixels);
+  return encodePngBytes(pixels.width, pixels.height, 8, pixels.channels, pixels.values.data());
 }
 
 Bytes encodePng(const Raster<std::uint16_t>& pixels) {
-  requireWhole("encodePng", pixels);
-  return encodedPng(pixels.width, pixels.height, 16, pixels.channels, pixels.values.data());
+  validateRaster("encodePng", pixels);
+  return encodePngBytes(pixels.width, pixels.height, 16, pixels.channels, pixels.values.data());
 }
 
 Bytes encodeJpeg(const Raster<std::uint8_t>& pixels, int quality) {
-  requireWhole("encodeJpeg", pixels);
+  validateRaster("encodeJpeg", pixels);
   if (quality < 1 || quality > 100)
     throw std::runtime_error("encodeJpeg: quality " + std::to_string(quality) + " is not 1..100");
   const std::unique_ptr<void, int (*)(tjhandle)> compressor(tjInitCompress(), tjDestroy);
   if (!compressor) throw std::runtime_error(std::string("encodeJpeg: ") + tjGetErrorStr2(nullptr));
   const bool grey = pixels.channels == 1;
-  const int sampling = grey ? TJSAMP_GRAY : quality >= kFullColour ? TJSAMP_444 : TJSAMP_420;
+  const int sampling = grey ? TJSAMP_GRAY : quality >= kFullColourQuality ? TJSAMP_444 : TJSAMP_420;
   unsigned long bytes = tjBufSize(pixels.width, pixels.height, sampling);
   Bytes file(bytes);
   std::uint8_t* into = file.data();
@@ -165,37 +164,37 @@ Bytes encodeJpeg(const Raster<std::uint8_t>& pixels, int quality) {
 }
 
 Bytes encodeNpy(const Raster<float>& pixels) {
-  return encodedNpy(pixels, "<f4");
+  return encodeNpyBytes(pixels, "<f4");
 }
 Bytes encodeNpy(const Raster<std::uint32_t>& pixels) {
-  return encodedNpy(pixels, "<u4");
+  return encodeNpyBytes(pixels, "<u4");
 }
 Bytes encodeNpy(const Raster<std::uint16_t>& pixels) {
-  return encodedNpy(pixels, "<u2");
+  return encodeNpyBytes(pixels, "<u2");
 }
 Bytes encodeNpy(const Raster<std::uint8_t>& pixels) {
-  return encodedNpy(pixels, "|u1");
+  return encodeNpyBytes(pixels, "|u1");
 }
 
 // ---- depth --------------------------------------------------------------------------------------
 
-Depth16 depth16(std::span<const float> metres, double stepsPerMetre) {
+Depth16 quantizeDepth(std::span<const float> metres, double stepsPerMetre) {
   if (!(stepsPerMetre > 0) || !std::isfinite(stepsPerMetre))
-    throw std::runtime_error("depth16: " + std::to_string(stepsPerMetre) + " steps a metre");
+    throw std::runtime_error("invalid depth scale: " + std::to_string(stepsPerMetre) + " steps/m");
   Depth16 depth;
   depth.steps.reserve(metres.size());
   for (const float z : metres) {
     const double steps = std::round(static_cast<double>(z) * stepsPerMetre);
-    if (steps > kMostSteps) ++depth.tooFar;
+    if (steps > kMaxDepthSteps) ++depth.clampedPixels;
     const bool nothing = std::isnan(z);
-    const double fitting = std::fmin(std::fmax(steps, 1), kMostSteps);
+    const double fitting = std::fmin(std::fmax(steps, 1), kMaxDepthSteps);
     depth.steps.push_back(nothing ? std::uint16_t{0} : static_cast<std::uint16_t>(fitting));
   }
   return depth;
 }
 
 Bytes packDepth(const Raster<std::uint16_t>& steps) {
-  requireWhole("packDepth", steps);
+  validateRaster("packDepth", steps);
   const auto width = static_cast<std::size_t>(steps.width);
   const std::size_t count = steps.values.size();
   if (steps.channels != 1) throw std::runtime_error("packDepth: depth has one channel, not 3");
@@ -218,7 +217,7 @@ Bytes packDepth(const Raster<std::uint16_t>& steps) {
 
 std::vector<std::uint16_t> unpackDepth(std::span<const std::uint8_t> packed, int width,
                                        int height) {
-  if (width < 1 || height < 1) throw std::runtime_error("unpackDepth: the picture has no pixels");
+  if (width < 1 || height < 1) throw std::runtime_error("unpackDepth: the image has no pixels");
   const auto across = static_cast<std::size_t>(width);
   const std::size_t count = across * static_cast<std::size_t>(height);
   Bytes planes(2 * count);

@@ -1,5 +1,5 @@
-// Pictures and channels as files in memory: PNG, JPEG, NPY, packed 16-bit depth. Callable from any
-// thread, several at once; the bytes depend on the pixels alone.
+// Encodes images and channels in memory: PNG, JPEG, NPY, packed 16-bit depth. Thread-safe; the
+// bytes depend only on the pixels.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace enfilade::render {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// Pixels that somebody else owns, rows from the top: value c of pixel (x, y) is at index
+/// Non-owning view of pixels, rows from the top: value c of pixel (x, y) is at index
 /// (y * width + x) * channels + c.
 template <class Value>
 struct Raster {
@@ -19,34 +19,34 @@ struct Raster {
   std::span<const Value> values;
 };
 
-// All throw std::runtime_error: for values that do not fill the picture, and where a library fails.
+// All throw std::runtime_error if the number of values is wrong or a library fails.
 
 Bytes encodePng(const Raster<std::uint8_t>& pixels);
 Bytes encodePng(const Raster<std::uint16_t>& pixels);
 
-/// `quality` is 1..100; from 90 on colour is kept at full resolution. Never for depth or ids.
+/// `quality` is 1..100; from 90 on, chroma has full resolution. Not suitable for depth or ids.
 Bytes encodeJpeg(const Raster<std::uint8_t>& pixels, int quality);
 
-/// NumPy's format, version 1.0, in C order and little-endian: shape (height, width), or (height,
-/// width, 3) where there are three channels.
+/// NumPy's format, version 1.0, in C order and little-endian. Shape: (height, width), or (height,
+/// width, 3) for three channels.
 Bytes encodeNpy(const Raster<float>& pixels);
 Bytes encodeNpy(const Raster<std::uint32_t>& pixels);
 Bytes encodeNpy(const Raster<std::uint16_t>& pixels);
 Bytes encodeNpy(const Raster<std::uint8_t>& pixels);
 
-/// Metres in whole steps, as files of 16-bit depth have them.
+/// Depth quantised to 16-bit steps.
 struct Depth16 {
-  std::vector<std::uint16_t> steps;  ///< 0: nothing is seen there (not a number); never a surface
-  std::size_t tooFar = 0;            ///< pixels beyond 65535 steps; they are 65535
+  std::vector<std::uint16_t> steps;  ///< 0: background (NaN); never a surface
+  std::size_t clampedPixels = 0;     ///< pixels beyond 65535 steps, clamped to 65535
 };
-/// Rounded to the nearest step; a surface nearer than half a step is 1. `stepsPerMetre` > 0.
-Depth16 depth16(std::span<const float> metres, double stepsPerMetre);
+/// Rounds to the nearest step; a surface nearer than half a step becomes 1. `stepsPerMetre` > 0.
+Depth16 quantizeDepth(std::span<const float> metres, double stepsPerMetre);
 
-/// A Zstandard frame of 2 * width * height bytes: each value less its left neighbour's (of the
-/// first column, the one's above; of the first pixel, 0) modulo 65536; first the low bytes of all,
-/// then the high bytes. One channel.
+/// A Zstandard frame of 2 * width * height bytes: the difference of each value to its left
+/// neighbour (first column: the value above; first pixel: 0) modulo 65536. All low bytes come
+/// first, then all high bytes. One channel.
 Bytes packDepth(const Raster<std::uint16_t>& steps);
-/// The values again. Throws for bytes that packDepth() did not make for that size.
+/// Inverse of packDepth(). Throws for bytes that packDepth() did not produce for this size.
 std::vector<std::uint16_t> unpackDepth(std::span<const std::uint8_t> packed, int width, int height);
 
 }  // namespace enfilade::render

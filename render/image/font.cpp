@@ -2,15 +2,17 @@
 
 #include <array>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::render {
 namespace {
 
-constexpr int kBand = 12;  // letters beside one another in the drawing below
-constexpr char kFirst = ' ', kLast = '~';
+constexpr int kLettersPerBand = 12;  // letters per row of the drawing below
+constexpr char kFirstLetter = ' ', kLastLetter = '~';
 
-// Drawn for this project: bands of twelve letters in the order of ASCII, a blank column between.
+// Drawn for this project: bands of twelve letters in ASCII order, separated by a blank column.
 // clang-format off
-constexpr std::array<const char*, 64> kDrawing{
+constexpr std::array<const char*, 64> kGlyphs{
     "..... ..#.. .#.#. .#.#. ..#.. ##..# .##.. ..#.. ...#. .#... ..... .....",
     "..... ..#.. .#.#. .#.#. .#### ##..# #..#. ..#.. ..#.. ..#.. ..#.. ..#..",
     "..... ..#.. .#.#. ##### #.#.. ...#. #..#. ..#.. .#... ...#. #.#.# ..#..",
@@ -87,11 +89,13 @@ constexpr std::array<const char*, 64> kDrawing{
 
 }  // namespace
 
-bool inked(char letter, int column, int row) {
-  if (letter < kFirst || letter > kLast) letter = '?';
-  const int index = letter - kFirst;
-  const char* line = kDrawing[static_cast<std::size_t>(index / kBand * kLetterHeight + row)];
-  return line[(index % kBand) * (kLetterWidth + 1) + column] == '#';
+bool isLetterPixel(char letter, int column, int row) {
+  ENFILADE_ASSERT(0 <= column && column < kLetterWidth && 0 <= row && row < kLetterHeight);
+  if (letter < kFirstLetter || letter > kLastLetter) letter = '?';
+  const int index = letter - kFirstLetter;
+  const char* line =
+      kGlyphs[static_cast<std::size_t>(index / kLettersPerBand * kLetterHeight + row)];
+  return line[(index % kLettersPerBand) * (kLetterWidth + 1) + column] == '#';
 }
 
 }  // namespace enfilade::render

@@ -1,4 +1,4 @@
-// What render/shading.glsl.inc needs of GLSL, for C++.
+// The subset of GLSL that render/shading.glsl.inc uses, for C++.
 #pragma once
 
 #include <algorithm>

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::render {
 namespace {
 
 constexpr std::uint8_t kWhite[4] = {255, 255, 255, 255};
 
-std::array<float, 256> decoded() {
+std::array<float, 256> makeDecodeTable() {
   std::array<float, 256> table{};
   for (std::size_t i = 0; i < table.size(); ++i) {
     const double c = static_cast<double>(i) / 255;
@@ -17,9 +19,9 @@ std::array<float, 256> decoded() {
   return table;
 }
 
-/// sRGB bytes of evenly spaced linear values; fine enough to be within one byte step of exact.
+/// sRGB bytes of evenly spaced linear values; the error is at most one byte step.
 constexpr std::size_t kEncodedSteps = 1 << 14;
-std::vector<std::uint8_t> encoded() {
+std::vector<std::uint8_t> makeEncodeTable() {
   std::vector<std::uint8_t> table(kEncodedSteps + 1);
   for (std::size_t i = 0; i <= kEncodedSteps; ++i) {
     const double c = static_cast<double>(i) / kEncodedSteps;
@@ -29,24 +31,24 @@ std::vector<std::uint8_t> encoded() {
   return table;
 }
 
-Texel decode(const std::uint8_t* rgba) {
-  return {linearOfSrgb(rgba[0]), linearOfSrgb(rgba[1]), linearOfSrgb(rgba[2]),
+Texel decodeTexel(const std::uint8_t* rgba) {
+  return {srgbToLinear(rgba[0]), srgbToLinear(rgba[1]), srgbToLinear(rgba[2]),
           static_cast<float>(rgba[3]) / 255.0f};
 }
 
-Texel mixed(const Texel& a, const Texel& b, float t) {
+Texel lerpTexel(const Texel& a, const Texel& b, float t) {
   Texel result;
   for (std::size_t c = 0; c < 4; ++c) result[c] = a[c] + t * (b[c] - a[c]);
   return result;
 }
 
-/// A texel before `x` and the one after it, repeated, and how far between them `x` lies.
+/// The two texels around a coordinate, with repeat, and the fraction between them.
 struct Neighbours {
   std::size_t before, after;
-  float part;
+  float fraction;
 };
 
-Neighbours neighbours(float u, std::uint32_t size) {
+Neighbours findNeighbours(float u, std::uint32_t size) {
   const float x = (u - std::floor(u)) * static_cast<float>(size) - 0.5f;
   const float floor = std::floor(x);
   // From -1, at a texture's left border, to `size`, where u rounds up to 1.
@@ -57,13 +59,13 @@ Neighbours neighbours(float u, std::uint32_t size) {
 
 }  // namespace
 
-float linearOfSrgb(std::uint8_t value) {
-  static const std::array<float, 256> kTable = decoded();
+float srgbToLinear(std::uint8_t value) {
+  static const std::array<float, 256> kTable = makeDecodeTable();
   return kTable[value];
 }
 
-std::uint8_t srgbOfLinear(float value) {
-  static const std::vector<std::uint8_t> kTable = encoded();
+std::uint8_t linearToSrgb(float value) {
+  static const std::vector<std::uint8_t> kTable = makeEncodeTable();
   const float bounded = value > 0 ? std::min(value, 1.0f) : 0.0f;  // a NaN is black
   return kTable[static_cast<std::size_t>(bounded * static_cast<float>(kEncodedSteps) + 0.5f)];
 }
@@ -82,43 +84,45 @@ void MipTexture::addCoarser() {
   std::vector<std::uint8_t> pixels(std::size_t{4} * coarse.width * coarse.height);
   for (std::uint32_t y = 0; y < coarse.height; ++y) {
     for (std::uint32_t x = 0; x < coarse.width; ++x) {
-      // The middle of a coarse texel, where four fine ones meet if their number is even.
+      // The centre of a coarse texel: the common corner of four fine ones if the size is even.
       const Texel mean =
           bilinear(fine, (static_cast<float>(x) + 0.5f) / static_cast<float>(coarse.width),
                    (static_cast<float>(y) + 0.5f) / static_cast<float>(coarse.height));
       std::uint8_t* out = &pixels[4 * (std::size_t{y} * coarse.width + x)];
-      for (std::size_t c = 0; c < 3; ++c) out[c] = srgbOfLinear(mean[c]);
+      for (std::size_t c = 0; c < 3; ++c) out[c] = linearToSrgb(mean[c]);
       out[3] = static_cast<std::uint8_t>(std::lround(255.0f * mean[3]));
     }
   }
-  kept_.push_back(std::move(pixels));
-  levels_.push_back({coarse.width, coarse.height, kept_.back().data()});
+  coarserPixels_.push_back(std::move(pixels));
+  levels_.push_back({coarse.width, coarse.height, coarserPixels_.back().data()});
 }
 
 Texel MipTexture::bilinear(const Level& level, float u, float v) {
-  const Neighbours x = neighbours(u, level.width), y = neighbours(v, level.height);
+  const Neighbours x = findNeighbours(u, level.width), y = findNeighbours(v, level.height);
   const auto texel = [&](std::size_t column, std::size_t row) {
-    return decode(level.rgba + 4 * (row * level.width + column));
+    return decodeTexel(level.rgba + 4 * (row * level.width + column));
   };
-  return mixed(mixed(texel(x.before, y.before), texel(x.after, y.before), x.part),
-               mixed(texel(x.before, y.after), texel(x.after, y.after), x.part), y.part);
+  return lerpTexel(lerpTexel(texel(x.before, y.before), texel(x.after, y.before), x.fraction),
+                   lerpTexel(texel(x.before, y.after), texel(x.after, y.after), x.fraction),
+                   y.fraction);
 }
 
-Texel MipTexture::at(float u, float v, float level) const {
-  if (!std::isfinite(u) || !std::isfinite(v)) return decode(levels_.front().rgba);
+Texel MipTexture::sample(float u, float v, float level) const {
+  if (!std::isfinite(u) || !std::isfinite(v)) return decodeTexel(levels_.front().rgba);
   const float last = static_cast<float>(levels_.size() - 1);
   const float wanted = level > 0 ? std::min(level, last) : 0.0f;  // a NaN becomes 0
   const auto fine = static_cast<std::size_t>(wanted);
-  const float part = wanted - static_cast<float>(fine);
-  const Texel near = bilinear(levels_[fine], u, v);
-  if (part <= 0) return near;
-  return mixed(near, bilinear(levels_[fine + 1], u, v), part);
+  const float fraction = wanted - static_cast<float>(fine);
+  const Texel fineSample = bilinear(levels_[fine], u, v);
+  if (fraction <= 0) return fineSample;
+  return lerpTexel(fineSample, bilinear(levels_[fine + 1], u, v), fraction);
 }
 
 MipTextures::MipTextures(const scene::Model& model)
     : model_(model), slots_(std::make_unique<Slot[]>(model.textures.size())) {}
 
 const MipTexture& MipTextures::operator[](std::size_t index) const {
+  ENFILADE_ASSERT(index < model_.textures.size());
   Slot& slot = slots_[index];
   std::call_once(slot.once,
                  [&] { slot.texture = std::make_unique<MipTexture>(model_.textures[index]); });

@@ -1,4 +1,4 @@
-// Textures as GL's trilinear filter reads them: repeated, decoded from sRGB to linear.
+// Mipmapped textures with GL's trilinear filtering: repeated, decoded from sRGB to linear.
 #pragma once
 
 #include <array>
@@ -13,15 +13,16 @@ namespace enfilade::render {
 /// Linear RGBA, 0..1.
 using Texel = std::array<float, 4>;
 
+/// A texture and its mipmap levels.
 class MipTexture {
  public:
-  /// A texture without pixels is white: the importer has told of what is missing. Refers to
-  /// `texture`, whose pixels are the finest level.
+  /// Refers to `texture`, whose pixels are the finest level. A texture without pixels is white; the
+  /// importer has already reported missing textures.
   explicit MipTexture(const scene::Texture& texture);
 
-  /// (0, 0) is the top left; `level` in halvings of the size, clamped to what there is.
-  Texel at(float u, float v, float level) const;
-  /// Pixels, of the finest level.
+  /// Trilinear sample. (0, 0) is the top left; `level` counts halvings, clamped to the levels.
+  Texel sample(float u, float v, float level) const;
+  /// Size of the finest level in pixels.
   std::uint32_t width() const { return levels_.front().width; }
   std::uint32_t height() const { return levels_.front().height; }
 
@@ -33,11 +34,11 @@ class MipTexture {
   static Texel bilinear(const Level& level, float u, float v);
   void addCoarser();
 
-  std::vector<std::vector<std::uint8_t>> kept_;
+  std::vector<std::vector<std::uint8_t>> coarserPixels_;
   std::vector<Level> levels_;
 };
 
-/// The textures of a model, each made when somebody first asks, from any thread.
+/// The textures of a model, created on first use. Thread-safe.
 class MipTextures {
  public:
   explicit MipTextures(const scene::Model& model);
@@ -53,7 +54,7 @@ class MipTextures {
 };
 
 /// 0..1 to 0..1.
-float linearOfSrgb(std::uint8_t value);
-std::uint8_t srgbOfLinear(float value);
+float srgbToLinear(std::uint8_t value);
+std::uint8_t linearToSrgb(float value);
 
 }  // namespace enfilade::render

@@ -4,19 +4,19 @@
 
 namespace enfilade::render {
 
-PixelRays pixelRaysOf(const Camera& camera) {
-  const View view = viewOf(camera);
-  // The picture's -1..1 at the middle of the first pixel, and the step to the next.
+PrimaryRays computePrimaryRays(const Camera& camera) {
+  const CameraBasis basis = computeCameraBasis(camera);
+  // NDC at the centre of the first pixel, and the step to the next pixel.
   const double stepX = 2.0 / camera.width, stepY = -2.0 / camera.height;
-  const Vec3 aside = view.right / view.scaleX, above = view.up / view.scaleY;
+  const Vec3 aside = basis.right / basis.scaleX, above = basis.up / basis.scaleY;
   const Vec3 corner =
-      (-1 + 0.5 * stepX - view.shiftX) * aside + (1 + 0.5 * stepY - view.shiftY) * above;
+      (-1 + 0.5 * stepX - basis.shiftX) * aside + (1 + 0.5 * stepY - basis.shiftY) * above;
   const bool perspective = camera.projection == Camera::Projection::perspective;
-  PixelRays rays{!perspective, camera.eye,    view.forward,
-                 camera.near,  camera.far,    perspective ? 0 : camera.near,
-                 camera.width, camera.height, Vec3::Zero(),
-                 Vec3::Zero(), Vec3::Zero(),  view.forward,
-                 Vec3::Zero(), Vec3::Zero()};
+  PrimaryRays rays{!perspective, camera.eye,    basis.forward,
+                   camera.near,  camera.far,    perspective ? 0 : camera.near,
+                   camera.width, camera.height, Vec3::Zero(),
+                   Vec3::Zero(), Vec3::Zero(),  basis.forward,
+                   Vec3::Zero(), Vec3::Zero()};
   (perspective ? rays.direction : rays.origin) += corner;
   (perspective ? rays.directionX : rays.originX) = stepX * aside;
   (perspective ? rays.directionY : rays.originY) = stepY * above;

@@ -1,31 +1,31 @@
-// The rays of a camera, one through the centre of each pixel, in doubles.
+// The primary rays of a camera, one through the centre of each pixel, in doubles.
 #pragma once
 
 #include "render/camera.hpp"
 
 namespace enfilade::render {
 
-/// Pixel (x, y), row 0 on top, sees the points originAt(x, y) + z * directionAt(x, y), where z is
-/// its depth: directions have length 1 along `forward`. Metres, world axes, relative to the eye.
-struct PixelRays {
-  bool parallel;  ///< of an orthographic camera
+/// The ray of pixel (x, y), row 0 on top, is originAt(x, y) + z * directionAt(x, y). z is the
+/// depth, because directions have length 1 along `forward`. Metres, world axes, relative to the
+/// eye.
+struct PrimaryRays {
+  bool parallel;  ///< orthographic camera
   Vec3 eye;       ///< world
   Vec3 forward;
   double near, far;
-  /// Depth at which Embree's rays begin, which must not be behind them: 0, or of parallel rays
-  /// near.
+  /// Depth at which Embree's rays start: 0; parallel rays: near, because their tnear must be >= 0.
   double start;
   int width, height;
-  Vec3 origin, originX, originY;  ///< of pixel (0, 0), and what a pixel to the right or down adds
+  Vec3 origin, originX, originY;  ///< of pixel (0, 0), and steps to the right and down
   Vec3 direction, directionX, directionY;
 
   Vec3 originAt(double x, double y) const { return origin + x * originX + y * originY; }
-  /// Where Embree's ray begins: relative to the eye as well.
+  /// Start of Embree's ray, relative to the eye.
   Vec3 startAt(double x, double y) const { return originAt(x, y) + start * forward; }
   Vec3 directionAt(double x, double y) const { return direction + x * directionX + y * directionY; }
 };
 
-/// Of a camera that refusal() lets pass.
-PixelRays pixelRaysOf(const Camera& camera);
+/// `camera` must satisfy validateCamera().
+PrimaryRays computePrimaryRays(const Camera& camera);
 
 }  // namespace enfilade::render

@@ -3,8 +3,8 @@
 namespace enfilade::render {
 namespace {
 
-/// The weight of the corner across the edge from `a` to `b`.
-Affine weightAcross(const Vec3& a, const Vec3& b, const PixelRays& rays) {
+/// The weight of the corner opposite to the edge from `a` to `b`.
+Affine computeEdgeWeight(const Vec3& a, const Vec3& b, const PrimaryRays& rays) {
   if (rays.parallel) {
     // d.((a - o) x (b - o)) = d.(a x b) + d.((b - a) x o)
     const Vec3 edge = b - a;
@@ -18,23 +18,24 @@ Affine weightAcross(const Vec3& a, const Vec3& b, const PixelRays& rays) {
 
 }  // namespace
 
-DepthOfPlane depthOf(const SeenCorners& corners, const PixelRays& rays) {
+PlaneDepth computePlaneDepth(const EyeSpaceCorners& corners, const PrimaryRays& rays) {
   const Vec3 normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-  DepthOfPlane depth;
-  depth.over = {normal.dot(corners[0] - rays.origin), -normal.dot(rays.originX),
-                -normal.dot(rays.originY)};
-  depth.under = {normal.dot(rays.direction), normal.dot(rays.directionX),
-                 normal.dot(rays.directionY)};
+  PlaneDepth depth;
+  depth.numerator = {normal.dot(corners[0] - rays.origin), -normal.dot(rays.originX),
+                     -normal.dot(rays.originY)};
+  depth.denominator = {normal.dot(rays.direction), normal.dot(rays.directionX),
+                       normal.dot(rays.directionY)};
   const std::array<double, 3> z{rays.forward.dot(corners[0]), rays.forward.dot(corners[1]),
                                 rays.forward.dot(corners[2])};
-  depth.nearest = std::clamp(std::min({z[0], z[1], z[2]}), rays.near, rays.far);
-  depth.farthest = std::clamp(std::max({z[0], z[1], z[2]}), rays.near, rays.far);
+  depth.minDepth = std::clamp(std::min({z[0], z[1], z[2]}), rays.near, rays.far);
+  depth.maxDepth = std::clamp(std::max({z[0], z[1], z[2]}), rays.near, rays.far);
   return depth;
 }
 
-Weights weightsOf(const SeenCorners& corners, const PixelRays& rays) {
-  return {{weightAcross(corners[1], corners[2], rays), weightAcross(corners[2], corners[0], rays),
-           weightAcross(corners[0], corners[1], rays)}};
+BarycentricWeights computeWeights(const EyeSpaceCorners& corners, const PrimaryRays& rays) {
+  return {{computeEdgeWeight(corners[1], corners[2], rays),
+           computeEdgeWeight(corners[2], corners[0], rays),
+           computeEdgeWeight(corners[0], corners[1], rays)}};
 }
 
 }  // namespace enfilade::render

@@ -1,44 +1,40 @@
-// Draws snapshots of one scene with rays, on processors alone: the same cameras, channels and ids
-// as GlRenderer, with a depth that is exact to doubles, in a time that hardly depends on how large
-// the scene is.
+// Renders snapshots of one scene by ray tracing on the CPU: the same cameras, channels and ids as
+// GlRenderer, with depth computed in doubles. The time depends little on the scene's size.
 #pragma once
 
 #include <memory>
 
-#include "render/frame.hpp"
-#include "render/render_error.hpp"
-#include "scene/world/data/scene.hpp"
+#include "render/renderer.hpp"
 
 namespace enfilade::render {
 
+/// Options of a RayRenderer.
 struct RayOptions {
-  int threads = 2;     ///< 1..64; pictures do not depend on it
-  bool robust = true;  ///< false: a fifth faster, and some rays slip through between triangles
+  int threads = 2;     ///< 1..64; frames do not depend on it
+  bool robust = true;  ///< false: a fifth faster, but some rays pass between adjacent triangles
 };
 
-/// Use it on one thread at a time.
-class RayRenderer {
+/// Depth is exact for the ray through the pixel's centre. Transparent surfaces are sorted per
+/// pixel, not per object. Textures are filtered by GL's standard, from which devices deviate
+/// slightly.
+class RayRenderer final : public Renderer {
  public:
-  /// Throws RenderError when Embree cannot be had. Trees are built with the first picture that
-  /// needs them.
+  /// Throws RenderError if Embree is unavailable. Trees are built with the first frame that needs
+  /// them.
   explicit RayRenderer(std::shared_ptr<const scene::Scene> scene, const RayOptions& options = {});
-  ~RayRenderer();
-  RayRenderer(const RayRenderer&) = delete;
-  RayRenderer& operator=(const RayRenderer&) = delete;
+  ~RayRenderer() override;
 
-  /// What GlRenderer::render gives, but: depth is that of the exact ray through the pixel's centre;
-  /// glass is blended from back to front pixel by pixel, not object by object; textures are
-  /// filtered by GL's standard, from which devices differ a little. Throws RenderError for a camera
-  /// that refusal() refuses, and for a scene too large for Embree.
   Frame render(const scene::Snapshot& snapshot, const Camera& camera,
-               const FrameOptions& options = {});
+               const FrameOptions& options = {}) override;
+  const std::string& deviceName() const override;
+  bool software() const override { return true; }
+  const std::string& deviceWarning() const override;  ///< empty
 
-  /// Which pixels the sun reaches in a picture whose depth is given, whoever drew it: 255, or 0 in
-  /// shadow (FrameOptions::shadows). `depth` is Frame::depth of a picture with this camera.
-  std::vector<std::uint8_t> sunlit(const scene::Snapshot& snapshot, const Camera& camera,
-                                   const FrameOptions& options, const std::vector<float>& depth);
-
-  const std::string& deviceName() const;  ///< "Embree 3..."
+  /// Shadow mask of a frame with this camera: 255 per sunlit pixel, 0 in shadow (see
+  /// FrameOptions::shadows). `depth` is the Frame::depth of any renderer.
+  std::vector<std::uint8_t> computeShadowMask(const scene::Snapshot& snapshot, const Camera& camera,
+                                              const FrameOptions& options,
+                                              const std::vector<float>& depth);
 
  private:
   struct State;

@@ -8,21 +8,22 @@
 namespace enfilade::render {
 namespace {
 
-// Copied into the tree of the still scene, at some 100 bytes each; in a scene that has more, meshes
-// that are placed again and again are stored once, which costs rays about a half more time.
-constexpr std::size_t kMostCopied = 4'000'000;
+// Triangles copied into the static tree, at about 100 bytes each. In larger scenes, repeated meshes
+// are instanced, which makes tracing about a half slower.
+constexpr std::size_t kMaxCopiedTriangles = 4'000'000;
 
-std::size_t trianglesOf(const scene::Mesh& mesh) {
-  return mesh.indices.size() / 3;
+/// The result of `make`; turns an EmbreeError into a RenderError.
+template <class Make>
+auto orRenderError(const Make& make) {
+  try {
+    return make();
+  } catch (const scene::EmbreeError& error) {
+    throw RenderError(error.what());
+  }
 }
 
-bool alike(const scene::AvatarView& a, const scene::AvatarView& b) {
-  return a.id == b.id && a.shape == b.shape && a.feet == b.feet && a.gaze == b.gaze &&
-         a.eyeHeight == b.eyeHeight;
-}
-
-/// What of `all` is drawn as one piece, as a mesh of its own.
-scene::Mesh meshOf(const AvatarMeshes& all, const MeshRange& range) {
+/// Extracts one item's mesh.
+scene::Mesh extractMesh(const AvatarMeshes& all, const MeshRange& range) {
   scene::Mesh mesh;
   for (std::uint32_t i = 0; i < range.indexCount; ++i) {
     const std::uint32_t corner = all.indices[range.firstIndex + i];
@@ -38,118 +39,121 @@ scene::Mesh meshOf(const AvatarMeshes& all, const MeshRange& range) {
 
 }  // namespace
 
-RayScene::RayScene(std::shared_ptr<const scene::Scene> scene, bool robust, EmbreeFilter maskFilter)
+RayScene::RayScene(std::shared_ptr<const scene::Scene> scene, bool robust,
+                   scene::EmbreeFilter maskFilter)
     : scene_(std::move(scene)),
       robust_(robust),
       maskFilter_(maskFilter),
-      device_(newEmbreeDevice()),
+      device_(orRenderError(scene::makeEmbreeDevice)),
       meshes_(device_.get(), robust) {
   if (!scene_) throw RenderError("RayRenderer: there is no scene");
   const scene::Model& model = scene_->model();
   if (!scene_->bounds().empty()) origin_ = scene_->bounds().centre().array().round().matrix();
-  parts_ = partsOf(model);
-  for (const scene::Mesh& mesh : model.meshes) materials_.push_back(materialData(model, mesh));
-  for (const Part& part : parts_) textured_ |= part.pass == Pass::mask && part.texture >= 0;
-  worldFromPart_.resize(model.bodies.empty() ? 0 : parts_.size());
-  keepMemoryInBounds();
+  items_ = buildDrawItems(model);
+  for (const scene::Mesh& mesh : model.meshes) materials_.push_back(makeMaterialData(model, mesh));
+  for (const DrawItem& item : items_)
+    hasMaskTextures_ |= item.alphaMode == AlphaMode::mask && item.texture >= 0;
+  worldFromItem_.resize(model.bodies.empty() ? 0 : items_.size());
+  chooseInstancing();
 }
 
-void RayScene::keepMemoryInBounds() {
+void RayScene::chooseInstancing() {
   std::vector<std::uint32_t> uses(model().meshes.size());
   std::size_t triangles = 0;
-  for (const Part& part : parts_) {
-    ++uses[part.mesh];
-    triangles += trianglesOf(model().meshes[part.mesh]);
+  for (const DrawItem& item : items_) {
+    ++uses[item.mesh];
+    triangles += model().meshes[item.mesh].triangleCount();
   }
-  for (const Part& part : parts_) {
-    const bool repeated = triangles > kMostCopied && uses[part.mesh] > 1;
-    instanced_.push_back(repeated || part.body != kStill);
+  for (const DrawItem& item : items_) {
+    const bool repeated = triangles > kMaxCopiedTriangles && uses[item.mesh] > 1;
+    instanced_.push_back(repeated || item.body != kNoBody);
   }
 }
 
-std::vector<RayPiece> RayScene::piecesOf(bool moving, bool glass) const {
-  std::vector<RayPiece> pieces;
-  for (std::size_t p = 0; p < parts_.size(); ++p) {
-    const Part& part = parts_[p];
-    if ((part.body != kStill) != moving || (part.pass == Pass::blend) != glass) continue;
-    pieces.push_back({&model().meshes[part.mesh],
-                      moving ? &worldFromPart_[p] : &model().objects[part.object].worldFromMesh,
-                      &materials_[part.mesh], part.object + 1, part.texture, part.pass,
-                      instanced_[p]});
+std::vector<TriangleBatch> RayScene::collectBatches(bool isDynamic, bool transparent) const {
+  std::vector<TriangleBatch> batches;
+  for (std::size_t i = 0; i < items_.size(); ++i) {
+    const DrawItem& item = items_[i];
+    if ((item.body != kNoBody) != isDynamic || (item.alphaMode == AlphaMode::blend) != transparent)
+      continue;
+    batches.push_back({&model().meshes[item.mesh],
+                       isDynamic ? &worldFromItem_[i] : &model().objects[item.object].worldFromMesh,
+                       &materials_[item.mesh], item.object + 1, item.texture, item.alphaMode,
+                       instanced_[i]});
   }
-  return pieces;
+  return batches;
 }
 
-std::optional<RayTree> RayScene::treeOf(bool moving, bool glass) {
-  std::vector<RayPiece> pieces = piecesOf(moving, glass);
-  if (pieces.empty()) return std::nullopt;
-  return RayTree(device_.get(), robust_, std::move(pieces), origin_, maskFilter_, meshes_);
+std::optional<RayTree> RayScene::buildTree(std::vector<TriangleBatch> batches) {
+  if (batches.empty()) return std::nullopt;
+  return orRenderError([&] {
+    return RayTree(device_.get(), robust_, std::move(batches), origin_, maskFilter_, meshes_);
+  });
 }
 
-void RayScene::follow(const scene::Snapshot& snapshot) {
-  placeBodies(snapshot);
-  placePeople(snapshot);
+void RayScene::update(const scene::Snapshot& snapshot) {
+  updateBodies(snapshot);
+  updateAvatars(snapshot);
 }
 
-void RayScene::placeBodies(const scene::Snapshot& snapshot) {
-  if (worldFromPart_.empty()) return;
-  const bool fresh = !followedBodies_ || followedBodies_ != snapshot.bodies;
-  if (!fresh) return;
-  const std::vector<BodyPlacement> bodies = placementsOf(*scene_, snapshot);
-  for (std::size_t p = 0; p < parts_.size(); ++p) {
-    const Part& part = parts_[p];
-    if (part.body == kStill) continue;
-    worldFromPart_[p] = model().objects[part.object].worldFromMesh;
-    if (!bodies[part.body].displaced) continue;
-    worldFromPart_[p] = bodies[part.body].sceneFromAuthored * worldFromPart_[p];
+void RayScene::updateBodies(const scene::Snapshot& snapshot) {
+  if (worldFromItem_.empty()) return;
+  const bool changed = !currentBodies_ || currentBodies_ != snapshot.bodies;
+  if (!changed) return;
+  const std::vector<BodyPlacement> bodies = computeBodyPlacements(*scene_, snapshot);
+  for (std::size_t i = 0; i < items_.size(); ++i) {
+    const DrawItem& item = items_[i];
+    if (item.body == kNoBody) continue;
+    worldFromItem_[i] = model().objects[item.object].worldFromMesh;
+    if (!bodies[item.body].displaced) continue;
+    worldFromItem_[i] = bodies[item.body].sceneFromAuthored * worldFromItem_[i];
   }
-  for (Trees& trees : bodies_) trees = {};
-  followedBodies_ = snapshot.bodies;
+  for (LazyTree& trees : bodyTrees_) trees = {};
+  currentBodies_ = snapshot.bodies;
 }
 
-void RayScene::placePeople(const scene::Snapshot& snapshot) {
-  if (std::equal(snapshot.avatars.begin(), snapshot.avatars.end(), followedPeople_.begin(),
-                 followedPeople_.end(), alike)) {
+void RayScene::updateAvatars(const scene::Snapshot& snapshot) {
+  if (std::equal(snapshot.avatars.begin(), snapshot.avatars.end(), currentAvatars_.begin(),
+                 currentAvatars_.end(), hasSameAppearance)) {
     return;
   }
-  people_.reset();
-  followedPeople_.clear();  // until they are all placed
-  peopleMeshes_.clear();
-  worldFromPeople_.clear();
-  peopleMaterials_.clear();
-  const AvatarMeshes all = avatarMeshes(snapshot, 0);
-  for (const AvatarMeshes::Piece& piece : all.pieces) {
-    peopleMeshes_.push_back(meshOf(all, piece.range));
-    worldFromPeople_.emplace_back(Eigen::Translation3d(piece.feet));
-    peopleMaterials_.push_back(piece.material);
+  avatarTree_.reset();
+  currentAvatars_.clear();  // until the update is complete
+  avatarMeshes_.clear();
+  worldFromAvatars_.clear();
+  avatarMaterials_.clear();
+  const AvatarMeshes all = buildAvatarMeshes(snapshot, 0);
+  for (const AvatarMeshes::Item& avatarItem : all.items) {
+    avatarMeshes_.push_back(extractMesh(all, avatarItem.range));
+    worldFromAvatars_.emplace_back(Eigen::Translation3d(avatarItem.footPosition));
+    avatarMaterials_.push_back(avatarItem.material);
   }
-  std::vector<RayPiece> pieces;
-  for (std::size_t i = 0; i < all.pieces.size(); ++i) {
-    pieces.push_back(
-        {&peopleMeshes_[i], &worldFromPeople_[i], &peopleMaterials_[i], all.pieces[i].id});
+  std::vector<TriangleBatch> batches;
+  for (std::size_t i = 0; i < all.items.size(); ++i) {
+    batches.push_back(
+        {&avatarMeshes_[i], &worldFromAvatars_[i], &avatarMaterials_[i], all.items[i].id});
   }
-  if (!pieces.empty())
-    people_.emplace(device_.get(), robust_, std::move(pieces), origin_, nullptr, meshes_);
-  followedPeople_ = snapshot.avatars;
+  avatarTree_ = buildTree(std::move(batches));
+  currentAvatars_ = snapshot.avatars;
 }
 
-std::vector<const RayTree*> RayScene::solid() {
+std::vector<const RayTree*> RayScene::opaqueTrees() {
   std::vector<const RayTree*> trees;
-  for (const bool moving : {false, true}) {
-    Trees& kept = (moving ? bodies_ : still_)[0];
-    if (!kept.built) kept = {true, treeOf(moving, false)};
-    if (kept.tree) trees.push_back(&*kept.tree);
+  for (const bool isDynamic : {false, true}) {
+    LazyTree& lazyTree = (isDynamic ? bodyTrees_ : staticTrees_)[0];
+    if (!lazyTree.built) lazyTree = {true, buildTree(collectBatches(isDynamic, false))};
+    if (lazyTree.tree) trees.push_back(&*lazyTree.tree);
   }
-  if (people_) trees.push_back(&*people_);
+  if (avatarTree_) trees.push_back(&*avatarTree_);
   return trees;
 }
 
-std::vector<const RayTree*> RayScene::glass() {
+std::vector<const RayTree*> RayScene::transparentTrees() {
   std::vector<const RayTree*> trees;
-  for (const bool moving : {false, true}) {
-    Trees& kept = (moving ? bodies_ : still_)[1];
-    if (!kept.built) kept = {true, treeOf(moving, true)};
-    if (kept.tree) trees.push_back(&*kept.tree);
+  for (const bool isDynamic : {false, true}) {
+    LazyTree& lazyTree = (isDynamic ? bodyTrees_ : staticTrees_)[1];
+    if (!lazyTree.built) lazyTree = {true, buildTree(collectBatches(isDynamic, true))};
+    if (lazyTree.tree) trees.push_back(&*lazyTree.tree);
   }
   return trees;
 }

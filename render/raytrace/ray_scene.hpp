@@ -1,5 +1,5 @@
-// All that rays can meet, as of a snapshot: what is still, bodies, and people, each with the solid
-// apart from the glass. What a picture does not need is not built.
+// The ray tracing trees of a snapshot: static items, bodies and avatars, opaque and transparent
+// surfaces separately. Trees are built on demand.
 #pragma once
 
 #include <memory>
@@ -11,56 +11,57 @@
 
 namespace enfilade::render {
 
+/// The traceable scene, as of the last update().
 class RayScene {
  public:
-  RayScene(std::shared_ptr<const scene::Scene> scene, bool robust, EmbreeFilter maskFilter);
+  RayScene(std::shared_ptr<const scene::Scene> scene, bool robust, scene::EmbreeFilter maskFilter);
 
-  /// Takes bodies and avatars where `snapshot` has them.
-  void follow(const scene::Snapshot& snapshot);
+  /// Moves bodies and avatars to their poses in `snapshot`.
+  void update(const scene::Snapshot& snapshot);
 
-  /// Those that hold anything; built at the first call. Pointers last until the next follow().
-  std::vector<const RayTree*> solid();
-  std::vector<const RayTree*> glass();
+  /// Non-empty trees, built on the first call. Pointers are valid until the next update().
+  std::vector<const RayTree*> opaqueTrees();
+  std::vector<const RayTree*> transparentTrees();
 
-  /// World, metres: rays are to be given relative to it, so that floats lose less far out.
+  /// Origin of the trees, world, metres. Rays must be relative to it, to reduce float rounding.
   const Vec3& origin() const { return origin_; }
   const scene::Model& model() const { return scene_->model(); }
-  /// Whether any surface is cut out by a texture.
-  bool textured() const { return textured_; }
+  /// Whether any surface has an alpha-tested texture.
+  bool hasMaskTextures() const { return hasMaskTextures_; }
 
  private:
-  /// Of Part::body, which of them: still or not; and of Part::pass.
-  std::vector<RayPiece> piecesOf(bool moving, bool glass) const;
-  std::optional<RayTree> treeOf(bool moving, bool glass);
-  void placeBodies(const scene::Snapshot& snapshot);
-  void placePeople(const scene::Snapshot& snapshot);
-  void keepMemoryInBounds();
+  /// The batches of dynamic or static, transparent or opaque items.
+  std::vector<TriangleBatch> collectBatches(bool isDynamic, bool transparent) const;
+  std::optional<RayTree> buildTree(std::vector<TriangleBatch> batches);  ///< nullopt: no batches
+  void updateBodies(const scene::Snapshot& snapshot);
+  void updateAvatars(const scene::Snapshot& snapshot);
+  void chooseInstancing();
 
   std::shared_ptr<const scene::Scene> scene_;
   bool robust_;
-  EmbreeFilter maskFilter_;
+  scene::EmbreeFilter maskFilter_;
   Vec3 origin_ = Vec3::Zero();
-  EmbreeDevice device_;
-  MeshTrees meshes_;
-  std::vector<Part> parts_;
-  std::vector<MaterialData> materials_;  ///< one a mesh
-  std::vector<bool> instanced_;          ///< of each part
-  bool textured_ = false;
+  scene::EmbreeDevice device_;
+  MeshTreeCache meshes_;
+  std::vector<DrawItem> items_;
+  std::vector<MaterialData> materials_;  ///< one per mesh
+  std::vector<bool> instanced_;          ///< one per item
+  bool hasMaskTextures_ = false;
 
-  /// Of each part that belongs to a body; others are where the model has them.
-  std::vector<Eigen::Affine3d> worldFromPart_;
-  std::shared_ptr<const std::vector<scene::BodyView>> followedBodies_;
-  std::vector<scene::AvatarView> followedPeople_;
-  std::vector<scene::Mesh> peopleMeshes_;
-  std::vector<Eigen::Affine3d> worldFromPeople_;
-  std::vector<MaterialData> peopleMaterials_;
+  /// Valid for items of bodies; empty if the model has no bodies.
+  std::vector<Eigen::Affine3d> worldFromItem_;
+  std::shared_ptr<const std::vector<scene::BodySnapshot>> currentBodies_;
+  std::vector<scene::AvatarSnapshot> currentAvatars_;
+  std::vector<scene::Mesh> avatarMeshes_;
+  std::vector<Eigen::Affine3d> worldFromAvatars_;
+  std::vector<MaterialData> avatarMaterials_;
 
-  struct Trees {
+  struct LazyTree {
     bool built = false;
-    std::optional<RayTree> tree;  ///< nullopt: there is nothing of the kind
+    std::optional<RayTree> tree;  ///< nullopt: no such items
   };
-  Trees still_[2], bodies_[2];  ///< solid, glass
-  std::optional<RayTree> people_;
+  LazyTree staticTrees_[2], bodyTrees_[2];  ///< opaque, transparent
+  std::optional<RayTree> avatarTree_;
 };
 
 }  // namespace enfilade::render

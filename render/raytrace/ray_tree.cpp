@@ -4,36 +4,32 @@
 #include <limits>
 #include <string>
 
+#include "collision/assert.hpp"
 #include "render/render_error.hpp"
-#include "scene/world/queries/ray_caster.hpp"
 
 namespace enfilade::render {
 namespace {
 
 constexpr unsigned kOpaqueGeometry = 0, kMaskGeometry = 1, kFirstInstance = 2;
 constexpr unsigned kNone = 0xFFFF'FFFFu;  // Embree's RTC_INVALID_GEOMETRY_ID
-// Of one geometry; Embree counts primitives and the bytes of its buffers in 32 bits at places.
-constexpr std::size_t kMostTriangles = std::size_t{1} << 28;
+// Per geometry; Embree uses 32 bits for some primitive and byte counts.
+constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;
 
-std::size_t trianglesOf(const scene::Mesh& mesh) {
-  return mesh.indices.size() / 3;
-}
-
-/// Writes the meshes of pieces behind one another.
-class Copier {
+/// Writes the meshes of batches consecutively.
+class TriangleCopier {
  public:
-  explicit Copier(const OpenTriangles& open) : open_(open) {}
+  explicit TriangleCopier(const scene::TriangleBuffers& buffers) : buffers_(buffers) {}
 
-  void copy(const RayPiece& piece, const Vec3& origin) {
-    const scene::Mesh& mesh = *piece.mesh;
-    const Eigen::Affine3d originFromMesh = Eigen::Translation3d(-origin) * *piece.worldFromMesh;
+  void copy(const TriangleBatch& batch, const Vec3& origin) {
+    const scene::Mesh& mesh = *batch.mesh;
+    const Eigen::Affine3d originFromMesh = Eigen::Translation3d(-origin) * *batch.worldFromMesh;
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-      open_.positions[firstPosition_ + i] =
+      buffers_.positions[firstPosition_ + i] =
           (originFromMesh * mesh.positions[i].cast<double>()).cast<float>();
     }
-    const std::size_t corners = 3 * trianglesOf(mesh);
+    const std::size_t corners = 3 * mesh.triangleCount();
     for (std::size_t i = 0; i < corners; ++i) {
-      open_.corners[firstCorner_ + i] =
+      buffers_.corners[firstCorner_ + i] =
           static_cast<std::uint32_t>(firstPosition_) + mesh.indices[i];
     }
     firstPosition_ += mesh.positions.size();
@@ -41,17 +37,17 @@ class Copier {
   }
 
  private:
-  OpenTriangles open_;
+  scene::TriangleBuffers buffers_;
   std::size_t firstPosition_ = 0, firstCorner_ = 0;
 };
 
 }  // namespace
 
-bool shareEdge(const PieceTriangle& a, const PieceTriangle& b) {
-  if (a.piece != b.piece) return false;
-  const scene::Mesh& mesh = *a.piece->mesh;
-  const auto corner = [&](const PieceTriangle& of, std::size_t i) -> const Eigen::Vector3f& {
-    return mesh.positions[mesh.indices[3 * std::size_t{of.triangle} + i]];
+bool haveCommonEdge(const BatchTriangle& a, const BatchTriangle& b) {
+  if (a.batch != b.batch) return false;
+  const scene::Mesh& mesh = *a.batch->mesh;
+  const auto corner = [&](const BatchTriangle& source, std::size_t i) -> const Eigen::Vector3f& {
+    return mesh.positions[mesh.indices[3 * std::size_t{source.triangle} + i]];
   };
   int common = 0;
   for (std::size_t i = 0; i < 3; ++i)
@@ -59,74 +55,82 @@ bool shareEdge(const PieceTriangle& a, const PieceTriangle& b) {
   return common >= 2;
 }
 
-RTCSceneTy* MeshTrees::treeOf(const scene::Mesh& mesh, EmbreeFilter filter) {
+RTCSceneTy* MeshTreeCache::findOrBuild(const scene::Mesh& mesh, scene::EmbreeFilter filter) {
   if (const auto found = trees_.find(&mesh); found != trees_.end()) return found->second.get();
-  EmbreeScene tree = newEmbreeScene(device_, robust_);
-  const OpenTriangles open = openTriangles(device_, mesh.positions.size(), trianglesOf(mesh));
-  std::copy(mesh.positions.begin(), mesh.positions.end(), open.positions);
-  std::copy_n(mesh.indices.begin(), 3 * trianglesOf(mesh), open.corners);
-  closeTriangles(open, tree.get(), 0, filter);
-  commit(device_, tree.get());
+  scene::EmbreeScene tree = scene::makeEmbreeScene(device_, {.robust = robust_});
+  const scene::TriangleBuffers buffers =
+      scene::makeTriangleBuffers(device_, mesh.positions.size(), mesh.triangleCount());
+  std::copy(mesh.positions.begin(), mesh.positions.end(), buffers.positions);
+  std::copy_n(mesh.indices.begin(), 3 * mesh.triangleCount(), buffers.corners);
+  scene::attachTriangles(buffers, tree.get(), 0, filter);
+  scene::commitScene(device_, tree.get());
   return (trees_[&mesh] = std::move(tree)).get();
 }
 
-RayTree::RayTree(RTCDeviceTy* device, bool robust, std::vector<RayPiece> pieces, const Vec3& origin,
-                 EmbreeFilter maskFilter, MeshTrees& meshes)
-    : pieces_(std::move(pieces)),
-      firstTriangle_(pieces_.size(), 0),
-      scene_(newEmbreeScene(device, robust)) {
-  for (RayPiece& piece : pieces_)
-    piece.instanced = piece.instanced && scene::canBeInstanced(*piece.worldFromMesh);
-  copy(device, false, origin, nullptr);
-  copy(device, true, origin, maskFilter);
-  placeInstances(device, origin, maskFilter, meshes);
-  commit(device, scene_.get());
+RayTree::RayTree(RTCDeviceTy* device, bool robust, std::vector<TriangleBatch> batches,
+                 const Vec3& origin, scene::EmbreeFilter maskFilter, MeshTreeCache& meshes)
+    : batches_(std::move(batches)),
+      firstTriangle_(batches_.size(), 0),
+      scene_(scene::makeEmbreeScene(device, {.robust = robust})) {
+  for (TriangleBatch& batch : batches_)
+    batch.instanced = batch.instanced && scene::canBeInstanced(*batch.worldFromMesh);
+  copyBatches(device, false, origin, nullptr);
+  copyBatches(device, true, origin, maskFilter);
+  addInstances(device, origin, maskFilter, meshes);
+  scene::commitScene(device, scene_.get());
 }
 
-void RayTree::copy(RTCDeviceTy* device, bool mask, const Vec3& origin, EmbreeFilter filter) {
-  const auto copied = [&](const RayPiece& piece) {
-    return !piece.instanced && (piece.pass == Pass::mask) == mask;
+void RayTree::copyBatches(RTCDeviceTy* device, bool mask, const Vec3& origin,
+                          scene::EmbreeFilter filter) {
+  const auto copied = [&](const TriangleBatch& batch) {
+    return !batch.instanced && (batch.alphaMode == AlphaMode::mask) == mask;
   };
   std::size_t positions = 0, triangles = 0;
-  for (const RayPiece& piece : pieces_) {
-    if (!copied(piece)) continue;
-    positions += piece.mesh->positions.size();
-    triangles += trianglesOf(*piece.mesh);
+  for (const TriangleBatch& batch : batches_) {
+    if (!copied(batch)) continue;
+    positions += batch.mesh->positions.size();
+    triangles += batch.mesh->triangleCount();
   }
   if (triangles == 0) return;
-  if (triangles > kMostTriangles || positions > std::numeric_limits<std::uint32_t>::max()) {
+  if (triangles > kMaxTriangles || positions > std::numeric_limits<std::uint32_t>::max()) {
     throw RenderError("the scene has " + std::to_string(triangles) +
-                      " triangles, more than one tree of rays holds; load a part of it");
+                      " triangles, more than one ray tree can hold; load a part of it");
   }
-  std::vector<std::uint32_t>& pieceOf = pieceOfTriangle_[mask ? 1 : 0];
-  pieceOf.reserve(triangles);
-  const OpenTriangles open = openTriangles(device, positions, triangles);
-  Copier copier(open);
-  for (std::uint32_t p = 0; p < pieces_.size(); ++p) {
-    if (!copied(pieces_[p])) continue;
-    firstTriangle_[p] = static_cast<std::uint32_t>(pieceOf.size());
-    pieceOf.insert(pieceOf.end(), trianglesOf(*pieces_[p].mesh), p);
-    copier.copy(pieces_[p], origin);
+  std::vector<std::uint32_t>& batchOf = batchOfTriangle_[mask ? 1 : 0];
+  batchOf.reserve(triangles);
+  const scene::TriangleBuffers buffers = scene::makeTriangleBuffers(device, positions, triangles);
+  TriangleCopier copier(buffers);
+  for (std::uint32_t index = 0; index < batches_.size(); ++index) {
+    if (!copied(batches_[index])) continue;
+    firstTriangle_[index] = static_cast<std::uint32_t>(batchOf.size());
+    batchOf.insert(batchOf.end(), batches_[index].mesh->triangleCount(), index);
+    copier.copy(batches_[index], origin);
   }
-  closeTriangles(open, scene_.get(), mask ? kMaskGeometry : kOpaqueGeometry, filter);
+  scene::attachTriangles(buffers, scene_.get(), mask ? kMaskGeometry : kOpaqueGeometry, filter);
 }
 
-void RayTree::placeInstances(RTCDeviceTy* device, const Vec3& origin, EmbreeFilter filter,
-                             MeshTrees& meshes) {
-  for (std::uint32_t p = 0; p < pieces_.size(); ++p) {
-    const RayPiece& piece = pieces_[p];
-    if (!piece.instanced) continue;
-    RTCSceneTy* tree = meshes.treeOf(*piece.mesh, piece.pass == Pass::mask ? filter : nullptr);
-    Eigen::Affine3d originFromMesh = Eigen::Translation3d(-origin) * *piece.worldFromMesh;
-    addInstance(device, scene_.get(), kFirstInstance + p, tree,
-                originFromMesh.matrix().topRows<3>().cast<float>());
+void RayTree::addInstances(RTCDeviceTy* device, const Vec3& origin, scene::EmbreeFilter filter,
+                           MeshTreeCache& meshes) {
+  for (std::uint32_t index = 0; index < batches_.size(); ++index) {
+    const TriangleBatch& batch = batches_[index];
+    if (!batch.instanced) continue;
+    RTCSceneTy* tree =
+        meshes.findOrBuild(*batch.mesh, batch.alphaMode == AlphaMode::mask ? filter : nullptr);
+    scene::addInstance(device, scene_.get(), kFirstInstance + index, tree,
+                       Eigen::Translation3d(-origin) * *batch.worldFromMesh);
   }
 }
 
-PieceTriangle RayTree::find(unsigned instance, unsigned geometry, unsigned primitive) const {
-  if (instance != kNone) return {&pieces_[instance - kFirstInstance], primitive};
-  const std::uint32_t p = pieceOfTriangle_[geometry == kMaskGeometry ? 1 : 0][primitive];
-  return {&pieces_[p], primitive - firstTriangle_[p]};
+BatchTriangle RayTree::findTriangle(unsigned instance, unsigned geometry,
+                                    unsigned primitive) const {
+  if (instance != kNone) {
+    ENFILADE_ASSERT(instance - kFirstInstance < batches_.size());
+    return {&batches_[instance - kFirstInstance], primitive};
+  }
+  const std::vector<std::uint32_t>& batchOf = batchOfTriangle_[geometry == kMaskGeometry ? 1 : 0];
+  ENFILADE_ASSERT(primitive < batchOf.size());
+  const std::uint32_t index = batchOf[primitive];
+  return {&batches_[index], primitive - firstTriangle_[index]};
 }
 
 }  // namespace enfilade::render

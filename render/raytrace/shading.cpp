@@ -8,9 +8,9 @@ namespace enfilade::render {
 namespace glsl {
 namespace {
 
-#define LIGHT_TEXT(...) __VA_ARGS__
+#define SHADING_SOURCE(...) __VA_ARGS__
 #include "render/shading.glsl.inc"
-#undef LIGHT_TEXT
+#undef SHADING_SOURCE
 
 }  // namespace
 }  // namespace glsl
@@ -19,102 +19,104 @@ namespace {
 
 using glsl::vec3;
 
-vec3 floats(const Vec3& v) {
+vec3 toGlsl(const Vec3& v) {
   return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
 }
 
-/// Barycentric coordinates, and how they change to the next pixel on both axes.
-struct Shares {
-  std::array<double, 3> here, byX, byY;
+/// Barycentric coordinates at a pixel, and their change per pixel on both axes.
+struct Barycentrics {
+  std::array<double, 3> weights, perPixelX, perPixelY;
 };
 
-Shares sharesAt(const Weights& weights, int x, int y) {
+Barycentrics computeBarycentrics(const BarycentricWeights& weights, int x, int y) {
   const std::array<double, 3> w = weights.at(x, y);
   const auto& c = weights.corner;
   const double sum = w[0] + w[1] + w[2];
   const double sumX = c[0].dx + c[1].dx + c[2].dx, sumY = c[0].dy + c[1].dy + c[2].dy;
-  Shares shares;
+  Barycentrics barycentrics;
   for (std::size_t i = 0; i < 3; ++i) {
-    // Within the triangle, though the exact ray may pass beside what Embree's floats met.
-    shares.here[i] = sum != 0 ? std::clamp(w[i] / sum, 0.0, 1.0) : 1.0 / 3;
-    shares.byX[i] = sum != 0 ? (c[i].dx - shares.here[i] * sumX) / sum : 0;
-    shares.byY[i] = sum != 0 ? (c[i].dy - shares.here[i] * sumY) / sum : 0;
+    // Clamped: the exact ray may miss the triangle that Embree hit in floats.
+    barycentrics.weights[i] = sum != 0 ? std::clamp(w[i] / sum, 0.0, 1.0) : 1.0 / 3;
+    barycentrics.perPixelX[i] = sum != 0 ? (c[i].dx - barycentrics.weights[i] * sumX) / sum : 0;
+    barycentrics.perPixelY[i] = sum != 0 ? (c[i].dy - barycentrics.weights[i] * sumY) / sum : 0;
   }
-  return shares;
+  return barycentrics;
 }
 
 template <class Value>
-Value blended(const std::array<double, 3>& shares, const std::array<Value, 3>& corners) {
-  return shares[0] * corners[0] + shares[1] * corners[1] + shares[2] * corners[2];
+Value interpolate(const std::array<double, 3>& weights, const std::array<Value, 3>& corners) {
+  return weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2];
 }
 
 }  // namespace
 
-Vec3 towardsSun() {
+Vec3 sunDirection() {
   const vec3& sun = glsl::kSunDirection;
   return Vec3(static_cast<double>(sun.x), static_cast<double>(sun.y), static_cast<double>(sun.z))
       .normalized();
 }
 
-ShadedTriangle::ShadedTriangle(const PieceTriangle& which, const PixelRays& rays)
-    : piece(which.piece) {
-  const SeenCorners corners = which.corners(rays.eye);
-  depth = depthOf(corners, rays);
-  weights = weightsOf(corners, rays);
-  flatNormal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-  const scene::Mesh& mesh = *piece->mesh;
-  soft = mesh.normals.size() == mesh.positions.size();
+ShadedTriangle::ShadedTriangle(const BatchTriangle& source, const PrimaryRays& rays)
+    : batch(source.batch) {
+  const EyeSpaceCorners corners = source.corners(rays.eye);
+  depth = computePlaneDepth(corners, rays);
+  weights = computeWeights(corners, rays);
+  faceNormal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  const scene::Mesh& mesh = *batch->mesh;
+  hasVertexNormals = mesh.normals.size() == mesh.positions.size();
   const bool uv = mesh.uvs.size() == mesh.positions.size();
   // The rows of the cofactor matrix, as in the vertex shader.
-  const Eigen::Matrix3d& m = piece->worldFromMesh->linear();
+  const Eigen::Matrix3d& m = batch->worldFromMesh->linear();
   const Vec3 x = m.row(0), y = m.row(1), z = m.row(2);
   const Vec3 rowX = y.cross(z), rowY = z.cross(x), rowZ = x.cross(y);
   for (std::size_t i = 0; i < 3; ++i) {
-    const std::uint32_t corner = mesh.indices[3 * std::size_t{which.triangle} + i];
-    if (soft) {
+    const std::uint32_t corner = mesh.indices[3 * std::size_t{source.triangle} + i];
+    if (hasVertexNormals) {
       const Vec3 n = mesh.normals[corner].cast<double>();
-      softNormals[i] = {rowX.dot(n), rowY.dot(n), rowZ.dot(n)};
+      vertexNormals[i] = {rowX.dot(n), rowY.dot(n), rowZ.dot(n)};
     }
     if (uv) uvs[i] = mesh.uvs[corner].cast<double>();
   }
 }
 
-Texel Shading::albedo(const ShadedTriangle& triangle, int x, int y) const {
-  const float* base = triangle.piece->material->baseColour;
+Texel Shading::computeAlbedo(const ShadedTriangle& triangle, int x, int y) const {
+  const float* base = triangle.batch->material->baseColour;
   Texel albedo{base[0], base[1], base[2], base[3]};
-  if (triangle.piece->texture < 0) return albedo;
-  const MipTexture& texture = textures_[static_cast<std::size_t>(triangle.piece->texture)];
-  const Shares shares = sharesAt(triangle.weights, x, y);
-  const Eigen::Vector2d uv = blended(shares.here, triangle.uvs);
+  if (triangle.batch->texture < 0) return albedo;
+  const MipTexture& texture = textures_[static_cast<std::size_t>(triangle.batch->texture)];
+  const Barycentrics barycentrics = computeBarycentrics(triangle.weights, x, y);
+  const Eigen::Vector2d uv = interpolate(barycentrics.weights, triangle.uvs);
   const Eigen::Array2d size(texture.width(), texture.height());
-  const double across = (blended(shares.byX, triangle.uvs).array() * size).matrix().norm();
-  const double down = (blended(shares.byY, triangle.uvs).array() * size).matrix().norm();
+  const double across =
+      (interpolate(barycentrics.perPixelX, triangle.uvs).array() * size).matrix().norm();
+  const double down =
+      (interpolate(barycentrics.perPixelY, triangle.uvs).array() * size).matrix().norm();
   const double level = std::log2(std::max({across, down, 1e-30}));
-  const Texel texel =
-      texture.at(static_cast<float>(uv.x()), static_cast<float>(uv.y()), static_cast<float>(level));
+  const Texel texel = texture.sample(static_cast<float>(uv.x()), static_cast<float>(uv.y()),
+                                     static_cast<float>(level));
   for (std::size_t c = 0; c < 4; ++c) albedo[c] *= texel[c];
   return albedo;
 }
 
-float Shading::alphaAt(const PieceTriangle& triangle, float u, float v) const {
-  const RayPiece& piece = *triangle.piece;
-  const float alpha = piece.material->baseColour[3];
-  const scene::Mesh& mesh = *piece.mesh;
-  if (piece.texture < 0 || mesh.uvs.size() != mesh.positions.size()) return alpha;
+float Shading::sampleAlpha(const BatchTriangle& triangle, float u, float v) const {
+  const TriangleBatch& batch = *triangle.batch;
+  const float alpha = batch.material->baseColour[3];
+  const scene::Mesh& mesh = *batch.mesh;
+  if (batch.texture < 0 || mesh.uvs.size() != mesh.positions.size()) return alpha;
   const auto corner = [&](std::size_t i) {
     return mesh.uvs[mesh.indices[3 * std::size_t{triangle.triangle} + i]];
   };
-  const Eigen::Vector2f place = (1 - u - v) * corner(0) + u * corner(1) + v * corner(2);
-  const MipTexture& texture = textures_[static_cast<std::size_t>(piece.texture)];
-  return alpha * texture.at(place.x(), place.y(), 0)[3];
+  const Eigen::Vector2f uv = (1 - u - v) * corner(0) + u * corner(1) + v * corner(2);
+  const MipTexture& texture = textures_[static_cast<std::size_t>(batch.texture)];
+  return alpha * texture.sample(uv.x(), uv.y(), 0)[3];
 }
 
-Vec3 Shading::facing(const ShadedTriangle& triangle, const std::array<double, 3>& shares,
-                     const Vec3& toEye) const {
+Vec3 Shading::orientNormal(const ShadedTriangle& triangle, const std::array<double, 3>& weights,
+                           const Vec3& toEye) const {
   const Vec3 flat =
-      triangle.flatNormal.dot(toEye) < 0 ? Vec3(-triangle.flatNormal) : triangle.flatNormal;
-  if (triangle.soft) {
-    const Vec3 soft = blended(shares, triangle.softNormals);
+      triangle.faceNormal.dot(toEye) < 0 ? Vec3(-triangle.faceNormal) : triangle.faceNormal;
+  if (triangle.hasVertexNormals) {
+    const Vec3 soft = interpolate(weights, triangle.vertexNormals);
     const double length = soft.norm();
     if (length > 0) return (soft.dot(flat) < 0 ? -1 : 1) / length * soft;
   }
@@ -122,38 +124,38 @@ Vec3 Shading::facing(const ShadedTriangle& triangle, const std::array<double, 3>
   return length > 0 ? Vec3(flat / length) : toEye;
 }
 
-Vec3 Shading::normal(const ShadedTriangle& triangle, int x, int y) const {
+Vec3 Shading::computeNormal(const ShadedTriangle& triangle, int x, int y) const {
   const Vec3 toEye = -rays_.directionAt(x, y).normalized();
-  return facing(triangle, sharesAt(triangle.weights, x, y).here, toEye);
+  return orientNormal(triangle, computeBarycentrics(triangle.weights, x, y).weights, toEye);
 }
 
-SurfaceColour Shading::colour(const ShadedTriangle& triangle, int x, int y, double z,
-                              float sunlit) const {
+SurfaceColour Shading::shadeSurface(const ShadedTriangle& triangle, int x, int y, double z,
+                                    float sunlit) const {
   const bool plan = rays_.parallel;
-  const Vec3 way = rays_.directionAt(x, y);
-  const double length = way.norm();
-  const Vec3 toEye = -way / length;
+  const Vec3 direction = rays_.directionAt(x, y);
+  const double length = direction.norm();
+  const Vec3 toEye = -direction / length;
   const float distance = plan ? 0.0f : static_cast<float>(z * length);
-  const Vec3 n = facing(triangle, sharesAt(triangle.weights, x, y).here, toEye);
-  const Texel albedo = this->albedo(triangle, x, y);
-  const MaterialData& material = *triangle.piece->material;
+  const Vec3 n = orientNormal(triangle, computeBarycentrics(triangle.weights, x, y).weights, toEye);
+  const Texel albedo = this->computeAlbedo(triangle, x, y);
+  const MaterialData& material = *triangle.batch->material;
   vec3 radiance =
-      glsl::lit({albedo[0], albedo[1], albedo[2]}, floats(n), floats(toEye), distance,
+      glsl::lit({albedo[0], albedo[1], albedo[2]}, toGlsl(n), toGlsl(toEye), distance,
                 material.surface[1], material.surface[2], sunlit) +
       glsl::kGlow * vec3(material.emissive[0], material.emissive[1], material.emissive[2]);
   if (plan && material.surface[3] < 0.5f) {
-    // A plan cuts things open; their insides are darker, so that cut walls stand out.
-    const bool mirrored = triangle.piece->worldFromMesh->linear().determinant() < 0;
-    const bool behind = triangle.flatNormal.dot(toEye) < 0;
+    // A plan cuts objects open; their interior is darker to emphasise cut walls.
+    const bool mirrored = triangle.batch->worldFromMesh->linear().determinant() < 0;
+    const bool behind = triangle.faceNormal.dot(toEye) < 0;
     if (behind != mirrored) radiance = radiance * glsl::kCutOpen;
   }
   if (!plan) radiance = glsl::inAir(radiance, distance);
-  return {glsl::exposed(radiance), glsl::glassAlpha(albedo[3], floats(n), floats(toEye))};
+  return {glsl::exposed(radiance), glsl::glassAlpha(albedo[3], toGlsl(n), toGlsl(toEye))};
 }
 
-glsl::vec3 Shading::sky(int x, int y) const {
+glsl::vec3 Shading::shadeSky(int x, int y) const {
   if (rays_.parallel) return glsl::planPaper();
-  return glsl::exposed(glsl::skyFor(floats(rays_.directionAt(x, y).normalized())));
+  return glsl::exposed(glsl::skyFor(toGlsl(rays_.directionAt(x, y).normalized())));
 }
 
 }  // namespace enfilade::render

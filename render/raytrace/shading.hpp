@@ -1,5 +1,5 @@
-// Colours of what rays meet, by the light that the GL renderer has (render/shading.glsl.inc).
-// Textures are filtered as GL's standard says; a device may do it a little differently.
+// Shades ray hits with the shading model of the GL renderer (render/shading.glsl.inc). Textures are
+// filtered by GL's standard; GL devices may deviate slightly.
 #pragma once
 
 #include "render/raytrace/glsl_compat.hpp"
@@ -8,47 +8,50 @@
 
 namespace enfilade::render {
 
-/// Where the sun stands: unit length, world.
-Vec3 towardsSun();
+/// Direction towards the sun: unit length, world.
+Vec3 sunDirection();
 
-/// A triangle with all that its colour needs; made once for neighbouring pixels.
+/// A triangle with its shading data, computed once for neighbouring pixels.
 struct ShadedTriangle {
-  ShadedTriangle(const PieceTriangle& which, const PixelRays& rays);
+  ShadedTriangle(const BatchTriangle& source, const PrimaryRays& rays);
 
-  const RayPiece* piece;
-  DepthOfPlane depth;
-  Weights weights;
-  Vec3 flatNormal;                       ///< any length, world; to the side where corners run ccw
-  bool soft = false;                     ///< has normals at its corners
-  std::array<Vec3, 3> softNormals;       ///< any length, world
-  std::array<Eigen::Vector2d, 3> uvs{};  ///< zero where the mesh has none
+  const TriangleBatch* batch;
+  PlaneDepth depth;
+  BarycentricWeights weights;
+  Vec3 faceNormal;                       ///< any length, world; on the counter-clockwise side
+  bool hasVertexNormals = false;         ///< true: the mesh has vertex normals
+  std::array<Vec3, 3> vertexNormals;     ///< any length, world
+  std::array<Eigen::Vector2d, 3> uvs{};  ///< zero if the mesh has none
 };
 
-/// Exposed linear RGB, 0..1, and the part of what is behind that it hides.
+/// Exposed linear RGB, 0..1, and opacity.
 struct SurfaceColour {
   glsl::vec3 rgb;
   float alpha = 1;
 };
 
+/// Computes colours and normals of hits. Refers to its arguments.
 class Shading {
  public:
-  Shading(const PixelRays& rays, const MipTextures& textures) : rays_(rays), textures_(textures) {}
+  Shading(const PrimaryRays& rays, const MipTextures& textures)
+      : rays_(rays), textures_(textures) {}
 
   /// Base colour times texture, linear.
-  Texel albedo(const ShadedTriangle& triangle, int x, int y) const;
-  /// Of a point of the triangle by its shares of corners 1 and 2, without filtering.
-  float alphaAt(const PieceTriangle& triangle, float u, float v) const;
+  Texel computeAlbedo(const ShadedTriangle& triangle, int x, int y) const;
+  /// Unfiltered alpha at the barycentric coordinates (u, v) of corners 1 and 2.
+  float sampleAlpha(const BatchTriangle& triangle, float u, float v) const;
   /// Unit length, facing the eye, world.
-  Vec3 normal(const ShadedTriangle& triangle, int x, int y) const;
+  Vec3 computeNormal(const ShadedTriangle& triangle, int x, int y) const;
   /// `sunlit`: 1, or 0 in shadow.
-  SurfaceColour colour(const ShadedTriangle& triangle, int x, int y, double z, float sunlit) const;
-  glsl::vec3 sky(int x, int y) const;
+  SurfaceColour shadeSurface(const ShadedTriangle& triangle, int x, int y, double z,
+                             float sunlit) const;
+  glsl::vec3 shadeSky(int x, int y) const;
 
  private:
-  Vec3 facing(const ShadedTriangle& triangle, const std::array<double, 3>& shares,
-              const Vec3& toEye) const;
+  Vec3 orientNormal(const ShadedTriangle& triangle, const std::array<double, 3>& weights,
+                    const Vec3& toEye) const;
 
-  const PixelRays& rays_;
+  const PrimaryRays& rays_;
   const MipTextures& textures_;
 };
 

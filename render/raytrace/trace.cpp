@@ -6,101 +6,105 @@
 #include <cmath>
 #include <limits>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::render {
 namespace {
 
-constexpr int kLanes = kTile * kTile;  // a packet
+constexpr int kPacketSize = kTileSize * kTileSize;  // rays per packet
 
 // A key: 3 bits of tree, 1 of geometry, 28 of instance (all ones: none), 32 of primitive.
 constexpr HitKey kNoInstance = (HitKey{1} << 28) - 1;
 
-HitKey keyOf(std::size_t tree, unsigned instance, unsigned geometry, unsigned primitive) {
+HitKey makeHitKey(std::size_t tree, unsigned instance, unsigned geometry, unsigned primitive) {
   const bool placed = instance != RTC_INVALID_GEOMETRY_ID;
-  const HitKey where = placed ? instance : kNoInstance;
-  return HitKey{tree} << 61 | HitKey{placed ? 0u : geometry} << 60 | where << 32 | primitive;
+  ENFILADE_ASSERT(tree < 8 && (placed ? instance < kNoInstance : geometry < 2));
+  const HitKey instanceBits = placed ? instance : kNoInstance;
+  return HitKey{tree} << 61 | HitKey{placed ? 0u : geometry} << 60 | instanceBits << 32 | primitive;
 }
 
-/// What Embree hands to the filters, its own part first.
-struct Context {
+/// Context that Embree passes to the filters; Embree's own part must be first.
+struct FilterContext {
   RTCIntersectContext embree;
-  const Casting* casting;
-  std::size_t tree;                  ///< of casting->trees
-  std::vector<Crossing>* crossings;  ///< where all is noted and nothing stops a ray; else null
-  bool towardsSun = false;           ///< rays begin at what pixels show
+  const TraceContext* trace;
+  std::size_t tree;             ///< index into trace->trees
+  std::vector<PixelHit>* hits;  ///< collects all hits; null: only first hits are needed
+  bool isShadowRay = false;     ///< shadow rays, which start at visible surfaces
 };
 
-Context contextOf(const Casting& casting, std::size_t tree) {
-  Context context{{}, &casting, tree, nullptr};
+FilterContext makeFilterContext(const TraceContext& trace, std::size_t tree) {
+  FilterContext context{{}, &trace, tree, nullptr};
   rtcInitIntersectContext(&context.embree);
   context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   return context;
 }
 
-/// Calls `see(lane, triangle's numbers)` for the lanes that a filter is asked about.
-template <class See>
-void forEachLane(const RTCFilterFunctionNArguments* arguments, const See& see) {
+/// Calls `visitLane(lane, instance, geometry, primitive)` for the active lanes of a filter call.
+template <class VisitLane>
+void forEachLane(const RTCFilterFunctionNArguments* arguments, const VisitLane& visitLane) {
   RTCHitN* hit = arguments->hit;
   const unsigned n = arguments->N;
   for (unsigned i = 0; i < n; ++i) {
     if (arguments->valid[i] == 0) continue;
-    see(i, RTCHitN_instID(hit, n, i, 0), RTCHitN_geomID(hit, n, i), RTCHitN_primID(hit, n, i));
+    visitLane(i, RTCHitN_instID(hit, n, i, 0), RTCHitN_geomID(hit, n, i),
+              RTCHitN_primID(hit, n, i));
   }
 }
 
-const Context& contextIn(const RTCFilterFunctionNArguments* arguments) {
-  return *reinterpret_cast<const Context*>(arguments->context);
+const FilterContext& getFilterContext(const RTCFilterFunctionNArguments* arguments) {
+  return *reinterpret_cast<const FilterContext*>(arguments->context);
 }
 
-void rejectHoles(const RTCFilterFunctionNArguments* arguments) {
-  const Context& context = contextIn(arguments);
-  const Casting& casting = *context.casting;
-  const RayTree& tree = *casting.trees[context.tree];
+void rejectTransparentTexels(const RTCFilterFunctionNArguments* arguments) {
+  const FilterContext& context = getFilterContext(arguments);
+  const TraceContext& trace = *context.trace;
+  const RayTree& tree = *trace.trees[context.tree];
+  forEachLane(arguments, [&](unsigned lane, unsigned instance, unsigned geometry,
+                             unsigned primitive) {
+    const BatchTriangle batchTriangle = tree.findTriangle(instance, geometry, primitive);
+    if (context.isShadowRay) {
+      const unsigned n = arguments->N;
+      const float alpha = trace.shading.sampleAlpha(
+          batchTriangle, RTCHitN_u(arguments->hit, n, lane), RTCHitN_v(arguments->hit, n, lane));
+      if (alpha < batchTriangle.batch->material->surface[0]) arguments->valid[lane] = 0;
+      return;
+    }
+    const ShadedTriangle triangle(batchTriangle, trace.rays);
+    const auto pixel = static_cast<int>(RTCRayN_id(arguments->ray, arguments->N, lane));
+    const int x = pixel % trace.rays.width, y = pixel / trace.rays.width;
+    const float alpha = trace.shading.computeAlbedo(triangle, x, y)[3];
+    if (alpha < triangle.batch->material->surface[0]) arguments->valid[lane] = 0;
+  });
+}
+
+void rejectIgnoredEntity(const RTCFilterFunctionNArguments* arguments) {
+  const TraceContext& trace = *getFilterContext(arguments).trace;
+  const RayTree& tree = *trace.trees[getFilterContext(arguments).tree];
   forEachLane(
       arguments, [&](unsigned lane, unsigned instance, unsigned geometry, unsigned primitive) {
-        const PieceTriangle which = tree.find(instance, geometry, primitive);
-        if (context.towardsSun) {
-          const unsigned n = arguments->N;
-          const float alpha = casting.shading.alphaAt(which, RTCHitN_u(arguments->hit, n, lane),
-                                                      RTCHitN_v(arguments->hit, n, lane));
-          if (alpha < which.piece->material->surface[0]) arguments->valid[lane] = 0;
-          return;
-        }
-        const ShadedTriangle triangle(which, casting.rays);
-        const auto pixel = static_cast<int>(RTCRayN_id(arguments->ray, arguments->N, lane));
-        const int x = pixel % casting.rays.width, y = pixel / casting.rays.width;
-        const float alpha = casting.shading.albedo(triangle, x, y)[3];
-        if (alpha < triangle.piece->material->surface[0]) arguments->valid[lane] = 0;
+        if (tree.findTriangle(instance, geometry, primitive).batch->id == trace.ignoredEntity)
+          arguments->valid[lane] = 0;
       });
 }
 
-void rejectThrough(const RTCFilterFunctionNArguments* arguments) {
-  const Casting& casting = *contextIn(arguments).casting;
-  const RayTree& tree = *casting.trees[contextIn(arguments).tree];
+void recordAllHits(const RTCFilterFunctionNArguments* arguments) {
+  const FilterContext& context = getFilterContext(arguments);
   forEachLane(arguments,
               [&](unsigned lane, unsigned instance, unsigned geometry, unsigned primitive) {
-                if (tree.find(instance, geometry, primitive).piece->id == casting.through)
-                  arguments->valid[lane] = 0;
-              });
-}
-
-void noteAll(const RTCFilterFunctionNArguments* arguments) {
-  const Context& context = contextIn(arguments);
-  forEachLane(arguments,
-              [&](unsigned lane, unsigned instance, unsigned geometry, unsigned primitive) {
-                context.crossings->push_back({RTCRayN_id(arguments->ray, arguments->N, lane),
-                                              keyOf(context.tree, instance, geometry, primitive)});
+                context.hits->push_back({RTCRayN_id(arguments->ray, arguments->N, lane),
+                                         makeHitKey(context.tree, instance, geometry, primitive)});
                 arguments->valid[lane] = 0;
               });
 }
 
-/// One pixel's ray, from depth to depth.
-RTCRayHit singleRay(const Casting& casting, int x, int y, double from, double to) {
-  const PixelRays& rays = casting.rays;
-  const Eigen::Vector3f start = (rays.eye - casting.origin + rays.startAt(x, y)).cast<float>();
-  const Eigen::Vector3f way = rays.directionAt(x, y).cast<float>();
+/// One pixel's ray between two depths.
+RTCRayHit makePixelRay(const TraceContext& trace, int x, int y, double from, double to) {
+  const PrimaryRays& rays = trace.rays;
+  const Eigen::Vector3f start = (rays.eye - trace.origin + rays.startAt(x, y)).cast<float>();
+  const Eigen::Vector3f direction = rays.directionAt(x, y).cast<float>();
   RTCRayHit query{};
   query.ray.org_x = start.x(), query.ray.org_y = start.y(), query.ray.org_z = start.z();
-  query.ray.dir_x = way.x(), query.ray.dir_y = way.y(), query.ray.dir_z = way.z();
+  query.ray.dir_x = direction.x(), query.ray.dir_y = direction.y(), query.ray.dir_z = direction.z();
   query.ray.tnear = static_cast<float>(std::max(0.0, from - rays.start));
   query.ray.tfar = static_cast<float>(to - rays.start);
   query.ray.mask = 0xFFFF'FFFFu;
@@ -109,32 +113,32 @@ RTCRayHit singleRay(const Casting& casting, int x, int y, double from, double to
   return query;
 }
 
-/// A tile's rays and which of them are in the picture.
-struct Packet {
+/// The primary rays of a tile; `valid` marks those in the image.
+struct RayPacket {
   RTCRayHit16 query;
-  alignas(64) int valid[kLanes];
+  alignas(64) int valid[kPacketSize];
 };
 
-void aim(Packet& packet, const Casting& casting, int x0, int y0) {
-  const PixelRays& rays = casting.rays;
-  const Eigen::Vector3f from = (rays.eye - casting.origin + rays.startAt(x0, y0)).cast<float>();
-  const Eigen::Vector3f way = rays.directionAt(x0, y0).cast<float>();
+void setUpPrimaryRays(RayPacket& packet, const TraceContext& trace, int x0, int y0) {
+  const PrimaryRays& rays = trace.rays;
+  const Eigen::Vector3f from = (rays.eye - trace.origin + rays.startAt(x0, y0)).cast<float>();
+  const Eigen::Vector3f direction = rays.directionAt(x0, y0).cast<float>();
   const Eigen::Vector3f fromX = rays.originX.cast<float>(), fromY = rays.originY.cast<float>();
-  const Eigen::Vector3f wayX = rays.directionX.cast<float>(), wayY = rays.directionY.cast<float>();
+  const Eigen::Vector3f directionX = rays.directionX.cast<float>(),
+                        directionY = rays.directionY.cast<float>();
   RTCRay16& ray = packet.query.ray;
-  for (int lane = 0; lane < kLanes; ++lane) {
-    const int column = lane % kTile, row = lane / kTile;
+  for (int lane = 0; lane < kPacketSize; ++lane) {
+    const int column = lane % kTileSize, row = lane / kTileSize;
     const auto x = static_cast<float>(column), y = static_cast<float>(row);
     ray.org_x[lane] = from.x() + x * fromX.x() + y * fromY.x();
     ray.org_y[lane] = from.y() + x * fromX.y() + y * fromY.y();
     ray.org_z[lane] = from.z() + x * fromX.z() + y * fromY.z();
-    ray.dir_x[lane] = way.x() + x * wayX.x() + y * wayY.x();
-    ray.dir_y[lane] = way.y() + x * wayX.y() + y * wayY.y();
-    ray.dir_z[lane] = way.z() + x * wayX.z() + y * wayY.z();
+    ray.dir_x[lane] = direction.x() + x * directionX.x() + y * directionY.x();
+    ray.dir_y[lane] = direction.y() + x * directionX.y() + y * directionY.y();
+    ray.dir_z[lane] = direction.z() + x * directionX.z() + y * directionY.z();
     const bool inside = x0 + column < rays.width && y0 + row < rays.height;
     packet.valid[lane] = inside ? -1 : 0;
-    // Embree 3.13 casts lanes that are not valid, too, where rays are said to be coherent: such
-    // rays end before they begin.
+    // Embree 3.13 also traces invalid lanes of coherent packets. They get an empty interval.
     ray.tnear[lane] = inside ? static_cast<float>(rays.near - rays.start) : 1.0f;
     ray.tfar[lane] = inside ? static_cast<float>(rays.far - rays.start) : -1.0f;
     ray.time[lane] = 0;
@@ -146,94 +150,96 @@ void aim(Packet& packet, const Casting& casting, int x0, int y0) {
   }
 }
 
-void intersect(Packet& packet, const Casting& casting, Context& context) {
-  rtcIntersect16(packet.valid, casting.trees[context.tree]->embree(), &context.embree,
+void intersectPacket(RayPacket& packet, const TraceContext& trace, FilterContext& context) {
+  rtcIntersect16(packet.valid, trace.trees[context.tree]->embreeScene(), &context.embree,
                  &packet.query);
 }
 
 }  // namespace
 
-EmbreeFilter maskFilter() {
-  return rejectHoles;
+scene::EmbreeFilter alphaMaskFilter() {
+  return rejectTransparentTexels;
 }
 
-PieceTriangle triangleOf(const Casting& casting, HitKey key) {
-  const HitKey where = key >> 32 & kNoInstance;
+BatchTriangle findTriangle(const TraceContext& trace, HitKey key) {
+  ENFILADE_ASSERT(key != kNoHit && key >> 61 < trace.trees.size());
+  const HitKey instanceBits = key >> 32 & kNoInstance;
   const unsigned instance =
-      where == kNoInstance ? RTC_INVALID_GEOMETRY_ID : static_cast<unsigned>(where);
-  return casting.trees[key >> 61]->find(instance, static_cast<unsigned>(key >> 60 & 1),
-                                        static_cast<unsigned>(key & 0xFFFF'FFFFu));
+      instanceBits == kNoInstance ? RTC_INVALID_GEOMETRY_ID : static_cast<unsigned>(instanceBits);
+  return trace.trees[key >> 61]->findTriangle(instance, static_cast<unsigned>(key >> 60 & 1),
+                                              static_cast<unsigned>(key & 0xFFFF'FFFFu));
 }
 
-void castRows(const Casting& casting, int y, std::vector<HitKey>& keys) {
-  const auto width = static_cast<std::size_t>(casting.rays.width);
-  keys.assign(width * kTile, kMissed);
-  Packet packet;
-  for (int x = 0; x < casting.rays.width; x += kTile) {
-    aim(packet, casting, x, y);
-    for (std::size_t t = 0; t < casting.trees.size(); ++t) {
-      Context context = contextOf(casting, t);
-      if (casting.through != 0) context.embree.filter = rejectThrough;
-      intersect(packet, casting, context);
+void traceRows(const TraceContext& trace, int y, std::vector<HitKey>& keys) {
+  const auto width = static_cast<std::size_t>(trace.rays.width);
+  keys.assign(width * kTileSize, kNoHit);
+  RayPacket packet;
+  for (int x = 0; x < trace.rays.width; x += kTileSize) {
+    setUpPrimaryRays(packet, trace, x, y);
+    for (std::size_t t = 0; t < trace.trees.size(); ++t) {
+      FilterContext context = makeFilterContext(trace, t);
+      if (trace.ignoredEntity != 0) context.embree.filter = rejectIgnoredEntity;
+      intersectPacket(packet, trace, context);
       RTCHit16& hit = packet.query.hit;
-      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      for (std::size_t lane = 0; lane < kPacketSize; ++lane) {
         if (hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID) continue;
-        const std::size_t column = static_cast<std::size_t>(x) + lane % kTile;
-        keys[lane / kTile * width + column] =
-            keyOf(t, hit.instID[0][lane], hit.geomID[lane], hit.primID[lane]);
-        // The next tree overwrites this one only where it is nearer.
+        const std::size_t column = static_cast<std::size_t>(x) + lane % kTileSize;
+        keys[lane / kTileSize * width + column] =
+            makeHitKey(t, hit.instID[0][lane], hit.geomID[lane], hit.primID[lane]);
+        // The next tree overwrites this hit only if it is nearer.
         hit.geomID[lane] = hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
       }
     }
   }
 }
 
-void castThroughRows(const Casting& casting, int y, const std::vector<float>& depth,
-                     std::vector<Crossing>& crossings) {
-  Packet packet;
-  for (int x = 0; x < casting.rays.width; x += kTile) {
-    aim(packet, casting, x, y);
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+void traceAllHits(const TraceContext& trace, int y, const std::vector<float>& depth,
+                  std::vector<PixelHit>& hits) {
+  RayPacket packet;
+  for (int x = 0; x < trace.rays.width; x += kTileSize) {
+    setUpPrimaryRays(packet, trace, x, y);
+    for (std::size_t lane = 0; lane < kPacketSize; ++lane) {
       if (packet.valid[lane] == 0) continue;
-      const double z = static_cast<double>(depth[packet.query.ray.id[lane]]) - casting.rays.start;
-      // Embree's own distances are only good to floats.
+      const double z = static_cast<double>(depth[packet.query.ray.id[lane]]) - trace.rays.start;
+      // Margin for the float precision of Embree's distances.
       if (!std::isnan(z)) packet.query.ray.tfar[lane] = static_cast<float>(z * 1.0001 + 1e-4);
     }
-    for (std::size_t t = 0; t < casting.trees.size(); ++t) {
-      Context context = contextOf(casting, t);
-      context.crossings = &crossings;
-      context.embree.filter = noteAll;
-      intersect(packet, casting, context);
+    for (std::size_t t = 0; t < trace.trees.size(); ++t) {
+      FilterContext context = makeFilterContext(trace, t);
+      context.hits = &hits;
+      context.embree.filter = recordAllHits;
+      intersectPacket(packet, trace, context);
     }
   }
 }
 
 namespace {
 
-/// How far a parallel camera lets a ray towards the sun go before it has cut away what is there.
-double endOfSight(const PixelRays& rays, double z, const Vec3& sun) {
+/// Length of a shadow ray up to the clip planes of an orthographic camera; clipped geometry casts
+/// no shadow. Infinite for other cameras.
+double computeMaxSunDistance(const PrimaryRays& rays, double z, const Vec3& sun) {
   constexpr double kEndless = std::numeric_limits<double>::infinity();
-  const double along = sun.dot(rays.forward);
-  if (!rays.parallel || along == 0) return kEndless;
-  return ((along > 0 ? rays.far : rays.near) - z) / along;
+  const double sunForward = sun.dot(rays.forward);
+  if (!rays.parallel || sunForward == 0) return kEndless;
+  return ((sunForward > 0 ? rays.far : rays.near) - z) / sunForward;
 }
 
-/// A tile's rays towards the sun, and which of them there are.
-struct SunPacket {
+/// The shadow rays of a tile; `valid` marks the active ones.
+struct ShadowPacket {
   RTCRay16 ray{};
-  alignas(64) int valid[kLanes];
+  alignas(64) int valid[kPacketSize];
 };
 
-/// Aims a lane from what its pixel shows at the sun; a NaN `z`: at nothing. The way to the eye is
-/// free, so the ray begins a little along it, outside of the surface whatever floats made of
-/// either; and what still grazes the surface itself lies within the ray's first millimetre.
-void aimAtSun(SunPacket& packet, int lane, const Casting& casting, int x, int y, double z,
-              const Vec3& sun) {
-  const PixelRays& rays = casting.rays;
-  const bool lit = !std::isnan(z);
-  const double before = lit ? z - 1e-4 * std::abs(z) : rays.start;
+/// Sets up a lane's shadow ray from the visible surface towards the sun; NaN `z`: inactive. The ray
+/// starts slightly towards the eye, where space is free, so that float rounding cannot place it
+/// behind the surface. Its first millimetre is skipped to avoid grazing self-intersections.
+void setUpShadowRay(ShadowPacket& packet, int lane, const TraceContext& trace, int x, int y,
+                    double z, const Vec3& sun) {
+  const PrimaryRays& rays = trace.rays;
+  const bool active = !std::isnan(z);
+  const double before = active ? z - 1e-4 * std::abs(z) : rays.start;
   const Vec3 start =
-      rays.eye - casting.origin + rays.originAt(x, y) + before * rays.directionAt(x, y);
+      rays.eye - trace.origin + rays.originAt(x, y) + before * rays.directionAt(x, y);
   RTCRay16& ray = packet.ray;
   ray.org_x[lane] = static_cast<float>(start.x());
   ray.org_y[lane] = static_cast<float>(start.y());
@@ -242,74 +248,77 @@ void aimAtSun(SunPacket& packet, int lane, const Casting& casting, int x, int y,
   ray.dir_y[lane] = static_cast<float>(sun.y());
   ray.dir_z[lane] = static_cast<float>(sun.z());
   ray.tnear[lane] = static_cast<float>(1e-3 + 2e-6 * start.cwiseAbs().maxCoeff());
-  // Others end before they begin, as in aim().
-  ray.tfar[lane] = lit ? static_cast<float>(endOfSight(rays, before, sun)) : -1.0f;
+  // Inactive lanes get an empty interval, as in setUpPrimaryRays().
+  ray.tfar[lane] = active ? static_cast<float>(computeMaxSunDistance(rays, before, sun)) : -1.0f;
   ray.mask[lane] = 0xFFFF'FFFFu;
   ray.id[lane] = static_cast<unsigned>(y * rays.width + x);
-  packet.valid[lane] = lit ? -1 : 0;
+  packet.valid[lane] = active ? -1 : 0;
 }
 
 }  // namespace
 
-void castSunRows(const Casting& casting, int y, const std::vector<float>& depth,
-                 std::vector<std::uint8_t>& sunlit) {
-  const PixelRays& rays = casting.rays;
-  const Vec3 sun = towardsSun();
+void traceShadowRows(const TraceContext& trace, int y, const std::vector<float>& depth,
+                     std::vector<std::uint8_t>& mask) {
+  const PrimaryRays& rays = trace.rays;
+  ENFILADE_ASSERT(depth.size() ==
+                  static_cast<std::size_t>(rays.width) * static_cast<std::size_t>(rays.height));
+  ENFILADE_ASSERT(mask.size() == depth.size());
+  const Vec3 sun = sunDirection();
   const auto depthAt = [&](int column, int row) {
     if (column >= rays.width || row >= rays.height) return std::numeric_limits<double>::quiet_NaN();
     return static_cast<double>(depth[static_cast<std::size_t>(row * rays.width + column)]);
   };
-  SunPacket packet;
-  for (int x = 0; x < rays.width; x += kTile) {
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const int column = x + lane % kTile, row = y + lane / kTile;
-      aimAtSun(packet, lane, casting, column, row, depthAt(column, row), sun);
+  ShadowPacket packet;
+  for (int x = 0; x < rays.width; x += kTileSize) {
+    for (int lane = 0; lane < kPacketSize; ++lane) {
+      const int column = x + lane % kTileSize, row = y + lane / kTileSize;
+      setUpShadowRay(packet, lane, trace, column, row, depthAt(column, row), sun);
     }
-    for (std::size_t t = 0; t < casting.trees.size(); ++t) {
-      Context context = contextOf(casting, t);
-      context.towardsSun = true;
-      // They begin far apart at edges. And told that they are coherent, Embree 3.13 does not come
-      // back from rtcOccluded16 with some packets that meet instances.
+    for (std::size_t t = 0; t < trace.trees.size(); ++t) {
+      FilterContext context = makeFilterContext(trace, t);
+      context.isShadowRay = true;
+      // At edges, the origins are far apart. Also, with the coherent flag, rtcOccluded16 of Embree
+      // 3.13 never returns for some packets that hit instances.
       context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-      if (casting.through != 0) context.embree.filter = rejectThrough;
-      rtcOccluded16(packet.valid, casting.trees[t]->embree(), &context.embree, &packet.ray);
-      for (int lane = 0; lane < kLanes; ++lane) {
+      if (trace.ignoredEntity != 0) context.embree.filter = rejectIgnoredEntity;
+      rtcOccluded16(packet.valid, trace.trees[t]->embreeScene(), &context.embree, &packet.ray);
+      for (int lane = 0; lane < kPacketSize; ++lane) {
         if (packet.valid[lane] == 0 || !(packet.ray.tfar[lane] < 0)) continue;
-        sunlit[packet.ray.id[lane]] = 0;
+        mask[packet.ray.id[lane]] = 0;
         packet.valid[lane] = 0;
       }
     }
   }
 }
 
-void castBetween(const Casting& casting, int x, int y, double from, double to,
-                 std::vector<HitKey>& keys) {
-  std::vector<Crossing> crossings;
-  for (std::size_t t = 0; t < casting.trees.size(); ++t) {
-    Context context = contextOf(casting, t);
-    context.crossings = &crossings;
-    context.embree.filter = noteAll;
-    RTCRayHit query = singleRay(casting, x, y, from, to);
-    rtcIntersect1(casting.trees[t]->embree(), &context.embree, &query);
+void traceBetween(const TraceContext& trace, int x, int y, double from, double to,
+                  std::vector<HitKey>& keys) {
+  std::vector<PixelHit> hits;
+  for (std::size_t t = 0; t < trace.trees.size(); ++t) {
+    FilterContext context = makeFilterContext(trace, t);
+    context.hits = &hits;
+    context.embree.filter = recordAllHits;
+    RTCRayHit query = makePixelRay(trace, x, y, from, to);
+    rtcIntersect1(trace.trees[t]->embreeScene(), &context.embree, &query);
   }
-  for (const Crossing& crossing : crossings) {
-    const bool passed =
-        casting.through != 0 && triangleOf(casting, crossing.key).piece->id == casting.through;
-    if (!passed) keys.push_back(crossing.key);
+  for (const PixelHit& hit : hits) {
+    const bool ignored =
+        trace.ignoredEntity != 0 && findTriangle(trace, hit.key).batch->id == trace.ignoredEntity;
+    if (!ignored) keys.push_back(hit.key);
   }
 }
 
-double castBehind(const Casting& casting, int x, int y, double from) {
-  RTCRayHit query = singleRay(casting, x, y, from, casting.rays.far);
+double traceFirstBehind(const TraceContext& trace, int x, int y, double from) {
+  RTCRayHit query = makePixelRay(trace, x, y, from, trace.rays.far);
   if (!(query.ray.tnear <= query.ray.tfar)) return std::numeric_limits<double>::quiet_NaN();
   bool met = false;
-  for (std::size_t t = 0; t < casting.trees.size(); ++t) {
-    Context context = contextOf(casting, t);
-    if (casting.through != 0) context.embree.filter = rejectThrough;
-    rtcIntersect1(casting.trees[t]->embree(), &context.embree, &query);
+  for (std::size_t t = 0; t < trace.trees.size(); ++t) {
+    FilterContext context = makeFilterContext(trace, t);
+    if (trace.ignoredEntity != 0) context.embree.filter = rejectIgnoredEntity;
+    rtcIntersect1(trace.trees[t]->embreeScene(), &context.embree, &query);
     met = met || query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
   }
-  return met ? casting.rays.start + static_cast<double>(query.ray.tfar)
+  return met ? trace.rays.start + static_cast<double>(query.ray.tfar)
              : std::numeric_limits<double>::quiet_NaN();
 }
 

@@ -1,4 +1,4 @@
-// Packets of rays through tiles of a picture.
+// Traces ray packets through the tiles of a frame.
 #pragma once
 
 #include <cstdint>
@@ -8,50 +8,50 @@
 
 namespace enfilade::render {
 
-/// What a pixel's ray met: which tree, and Embree's numbers there. Equal for equal triangles.
+/// A hit triangle: tree index and Embree's ids. Equal keys mean equal triangles.
 using HitKey = std::uint64_t;
-inline constexpr HitKey kMissed = ~HitKey{0};
+inline constexpr HitKey kNoHit = ~HitKey{0};
 
-/// Rays are cast tile by tile: neighbours go the same ways through a tree.
-inline constexpr int kTile = 4;
+/// Pixels per tile and axis. Rays are traced in tiles, because they traverse the tree coherently.
+inline constexpr int kTileSize = 4;
 
-/// What one thread casts with. Refers to all that it is given.
-struct Casting {
+/// Inputs of tracing on one thread. Refers to its members' sources.
+struct TraceContext {
   const std::vector<const RayTree*>& trees;  ///< at most 8
-  const PixelRays& rays;
+  const PrimaryRays& rays;
   const Shading& shading;
-  Vec3 origin;                  ///< of the trees (RayScene::origin)
-  scene::EntityId through = 0;  ///< what is not seen; 0: all is
+  Vec3 origin;                        ///< of the trees (RayScene::origin())
+  scene::EntityId ignoredEntity = 0;  ///< rays pass through this entity; 0: none
 };
 
-PieceTriangle triangleOf(const Casting& casting, HitKey key);
+BatchTriangle findTriangle(const TraceContext& trace, HitKey key);
 
-/// The first hits of the rows y..y + kTile - 1 (those of them that are in the picture), row by row.
-void castRows(const Casting& casting, int y, std::vector<HitKey>& keys);
+/// First hits of the rows y..y + kTileSize - 1 that are in the image, row by row.
+void traceRows(const TraceContext& trace, int y, std::vector<HitKey>& keys);
 
-/// A triangle that a pixel's ray passes.
-struct Crossing {
+/// A triangle hit by a pixel's ray.
+struct PixelHit {
   std::uint32_t pixel;  ///< y * width + x
   HitKey key;
 };
 
-/// Appends all that the rays of the same rows pass before `depth` (a frame's; NaN: before far), in
-/// no order and perhaps a little beyond.
-void castThroughRows(const Casting& casting, int y, const std::vector<float>& depth,
-                     std::vector<Crossing>& crossings);
+/// Appends all hits of the same rows before `depth` (Frame::depth; NaN: far), unordered. May
+/// include hits slightly beyond the depth.
+void traceAllHits(const TraceContext& trace, int y, const std::vector<float>& depth,
+                  std::vector<PixelHit>& hits);
 
-/// Of one pixel's ray, in the order of the trees: the keys of all triangles between two depths.
-void castBetween(const Casting& casting, int x, int y, double from, double to,
-                 std::vector<HitKey>& keys);
-/// The depth, in floats, of the first triangle of one pixel's ray behind `from`; NaN: none.
-double castBehind(const Casting& casting, int x, int y, double from);
+/// Appends the keys of all hits of one pixel's ray between two depths, in the order of the trees.
+void traceBetween(const TraceContext& trace, int x, int y, double from, double to,
+                  std::vector<HitKey>& keys);
+/// Depth, in float precision, of the first hit of one pixel's ray behind `from`; NaN: no hit.
+double traceFirstBehind(const TraceContext& trace, int x, int y, double from);
 
-/// Makes 0 in `sunlit` which pixels of the same rows the trees keep the sun from, by `depth`; both
-/// are of the whole picture, and where depth is NaN nothing is to be lit.
-void castSunRows(const Casting& casting, int y, const std::vector<float>& depth,
-                 std::vector<std::uint8_t>& sunlit);
+/// Sets the shadowed pixels of the same rows to 0 in `mask`, by `depth`. Both cover the whole
+/// frame; pixels with NaN depth are skipped.
+void traceShadowRows(const TraceContext& trace, int y, const std::vector<float>& depth,
+                     std::vector<std::uint8_t>& mask);
 
-/// The filter to give to RayScene: cuts holes into Pass::mask where its texture is transparent.
-EmbreeFilter maskFilter();
+/// The filter for RayScene: rejects hits on AlphaMode::mask where the texture is transparent.
+scene::EmbreeFilter alphaMaskFilter();
 
 }  // namespace enfilade::render

@@ -1,4 +1,4 @@
-// How far a picture's depth and ids are from the truth (render/reference/reference_tracer.hpp).
+// Errors of a frame's depth and ids relative to the reference frame (reference_tracer.hpp).
 #pragma once
 
 #include <array>
@@ -10,51 +10,52 @@
 
 namespace enfilade::render {
 
-/// Absolute differences of depth, metres.
+/// Statistics of absolute depth errors, metres.
 struct DepthErrors {
   std::size_t pixels = 0;
-  double sum = 0, greatest = 0;
-  /// Pixels by size of error: bin b ends at 1e-10 * 10^(b / kBinsPerDecade) m; the last has no end.
+  double sum = 0, max = 0;
+  /// Histogram: bin b ends at 1e-10 * 10^(b / kBinsPerDecade) m; the last bin is unbounded.
   static constexpr int kBinsPerDecade = 40;
   std::array<std::uint64_t, 13 * kBinsPerDecade + 1> bins{};
 
-  void add(double error);
-  void add(const DepthErrors& other);
+  void addError(double error);
+  void mergeErrors(const DepthErrors& other);
   double mean() const { return pixels > 0 ? sum / static_cast<double>(pixels) : 0; }
-  /// The end of the bin below which 99 of 100 pixels lie: up to 6 % too large; <= greatest.
+  /// 99th percentile, rounded up to the end of its bin: up to 6 % too large; <= max.
   double percentile99() const;
 };
 
+/// Errors of one frame, or of several merged ones.
 struct DepthReport {
   std::string renderer;  ///< of the frames
   std::size_t frames = 0, pixels = 0;
 
-  // Depth: where both the picture and the truth see something.
-  DepthErrors away;  ///< away from edges (TrueFrame::edge)
+  // Depth of pixels with a surface in both the frame and the reference.
+  DepthErrors awayFromEdges;  ///< pixels that are not edges (ReferenceFrame::edge)
   DepthErrors edges;
-  /// `away` by true distance: 0-2, 2-5, 5-10, 10-20, 20-50, > 50 m.
+  /// `awayFromEdges` by reference distance: 0-2, 2-5, 5-10, 10-20, 20-50, > 50 m.
   static constexpr std::array<double, 6> kBandEnds{2, 5, 10, 20, 50, 1e300};
   std::array<DepthErrors, kBandEnds.size()> bands;
-  std::size_t missing = 0;  ///< pixels where only the truth sees something
-  std::size_t extra = 0;    ///< where only the picture does
+  std::size_t missing = 0;  ///< pixels with a surface only in the reference
+  std::size_t extra = 0;    ///< pixels with a surface only in the frame
 
-  // Ids; all 0 where the picture has none.
+  // Ids; all 0 if the frame has none.
   std::size_t idsEqual = 0;
-  std::size_t idsTied = 0;  ///< the picture's object is in the same place as the truth's
-  /// Pixels with another object, by how far the nearest edge pixel is, in pixels (the larger of
-  /// both axes): 0 on an edge, 1 beside it, ..., the last: farther.
+  std::size_t idsTied = 0;  ///< the frame's object coincides with the reference's
+  /// Pixels with another object by Chebyshev distance to the nearest edge pixel: 0 on an edge, 1
+  /// next to it, ..., last: farther.
   std::array<std::size_t, 5> idsDiffer{};
 
-  std::size_t undecided = 0;  ///< TrueFrame::undecided
+  std::size_t undecided = 0;  ///< ReferenceFrame::undecided
 };
 
-/// Throws RenderError where the frame has no depth or is of another size.
-DepthReport compareWithTruth(const Frame& frame, const TrueFrame& truth);
+/// Throws RenderError if the frame has no depth or another size.
+DepthReport compareWithReference(const Frame& frame, const ReferenceFrame& reference);
 
-/// Takes `one` into `total`.
-void add(DepthReport& total, const DepthReport& one);
+/// Merges `one` into `total`.
+void mergeReports(DepthReport& total, const DepthReport& one);
 
-/// One JSON object, lengths in millimetres, with a line break at the end.
-std::string jsonOf(const DepthReport& report);
+/// One JSON object with a trailing line break; errors in millimetres.
+std::string formatReportJson(const DepthReport& report);
 
 }  // namespace enfilade::render

@@ -1,7 +1,7 @@
-// What a camera really sees, pixel by pixel, in doubles: the truth that pictures are measured with.
-// Embree, in single rays, only proposes triangles: all within its rounding of the first are tried
-// by exact signs of doubles, and where none holds the search goes on behind them. Some microseconds
-// a pixel.
+// Ground truth for frames: visible surface per pixel, in doubles. Embree, with single rays, only
+// proposes triangles. All candidates within its rounding error of the first hit are tested by the
+// signs of their weights in doubles. If none is hit, the search continues behind them. Takes some
+// microseconds per pixel.
 #pragma once
 
 #include <memory>
@@ -13,35 +13,36 @@
 
 namespace enfilade::render {
 
-/// Pixels as in Frame.
-struct TrueFrame {
+/// A reference frame; pixel order as in Frame.
+struct ReferenceFrame {
   Camera camera;
-  std::vector<scene::EntityId> ids;  ///< 0: nothing
-  std::vector<double> depth;         ///< metres along forward; NaN: nothing
-  /// Whether the pixel lies at an edge: one of its eight neighbours shows another object, or
-  /// nothing, or lies farther than a thousandth of the depth from the plane that the pixel sees.
+  std::vector<scene::EntityId> ids;  ///< 0: background
+  std::vector<double> depth;         ///< metres along forward; NaN: background
+  /// Whether the pixel is at an edge: one of its eight neighbours has another id, or its depth
+  /// deviates from the pixel's plane by more than a thousandth of the depth.
   std::vector<bool> edge;
-  /// Another object in the same place: within 0.02 mm and a millionth of the depth.
+  /// A coincident object: within 0.02 mm plus a millionth of the depth.
   struct Tie {
     std::uint32_t pixel;
     scene::EntityId id;
   };
-  std::vector<Tie> ties;      ///< ascending pixels
-  std::size_t undecided = 0;  ///< pixels whose search was given up after kMostSteps surfaces
-  static constexpr int kMostSteps = 16;
+  std::vector<Tie> ties;      ///< sorted by pixel
+  std::size_t undecided = 0;  ///< pixels whose search was abandoned after kMaxSteps surfaces
+  static constexpr int kMaxSteps = 16;
 };
 
-class TrueRays {
+/// Renders reference frames of one scene.
+class ReferenceTracer {
  public:
-  explicit TrueRays(std::shared_ptr<const scene::Scene> scene, int threads = 2);
-  ~TrueRays();
-  TrueRays(const TrueRays&) = delete;
-  TrueRays& operator=(const TrueRays&) = delete;
+  explicit ReferenceTracer(std::shared_ptr<const scene::Scene> scene, int threads = 2);
+  ~ReferenceTracer();
+  ReferenceTracer(const ReferenceTracer&) = delete;
+  ReferenceTracer& operator=(const ReferenceTracer&) = delete;
 
-  /// `options` as for the picture that is to be measured; its channels do not matter. Throws
-  /// RenderError as RayRenderer does.
-  TrueFrame look(const scene::Snapshot& snapshot, const Camera& camera,
-                 const FrameOptions& options = {});
+  /// `options`: those of the frame to be compared; its channels are ignored. Throws RenderError
+  /// like RayRenderer::render().
+  ReferenceFrame render(const scene::Snapshot& snapshot, const Camera& camera,
+                        const FrameOptions& options = {});
 
  private:
   struct State;

@@ -21,33 +21,33 @@ struct RenderThread::State {
   std::mutex mutex;
   std::condition_variable changed;
   std::deque<Job> jobs;
-  bool asked = false, closing = false;
-  std::promise<void> making;
-  std::shared_future<void> isMade = making.get_future().share();
-  std::string deviceName, deviceNote, whyNone;  ///< once isMade, as the next
+  bool requested = false, closing = false;
+  std::promise<void> creationPromise;
+  std::shared_future<void> creationDone = creationPromise.get_future().share();
+  std::string deviceName, deviceWarning, unavailableReason;  ///< valid after creationDone
   bool software = false;
   std::thread thread;
 
-  /// False when nothing was asked before the end.
-  bool awaitFirstQuestion() {
+  /// False if the thread is closed without any request.
+  bool waitForFirstRequest() {
     std::unique_lock lock(mutex);
-    changed.wait(lock, [&] { return closing || asked || !jobs.empty(); });
-    return asked || !jobs.empty();
+    changed.wait(lock, [&] { return closing || requested || !jobs.empty(); });
+    return requested || !jobs.empty();
   }
 
-  /// Has the renderer made, and waits for it.
-  const State& made() {
+  /// Requests the renderer's creation and waits for it.
+  const State& waitUntilCreated() {
     {
       const std::lock_guard lock(mutex);
-      asked = true;
+      requested = true;
     }
     changed.notify_one();
-    isMade.wait();
+    creationDone.wait();
     return *this;
   }
 
-  /// nullopt when the queue is empty and no more will come.
-  std::optional<Job> nextJob() {
+  /// nullopt if the queue is empty and closed.
+  std::optional<Job> takeJob() {
     std::unique_lock lock(mutex);
     changed.wait(lock, [&] { return closing || !jobs.empty(); });
     if (jobs.empty()) return std::nullopt;
@@ -56,7 +56,7 @@ struct RenderThread::State {
     return job;
   }
 
-  void post(Job job) {
+  void enqueue(Job job) {
     {
       const std::lock_guard lock(mutex);
       jobs.push_back(std::move(job));
@@ -64,30 +64,31 @@ struct RenderThread::State {
     changed.notify_one();
   }
 
-  /// Null when there can be none.
-  std::unique_ptr<Renderer> make(std::shared_ptr<const scene::Scene> scene,
-                                 const DeviceChoice& device, RendererKind kind) {
-    std::unique_ptr<Renderer> renderer;
+  /// Null if no renderer is available.
+  std::unique_ptr<RendererSelector> createRenderer(std::shared_ptr<const scene::Scene> scene,
+                                                   const DeviceChoice& device, RendererKind kind) {
+    std::unique_ptr<RendererSelector> renderer;
     try {
-      renderer = std::make_unique<Renderer>(std::move(scene), kind, device);
+      renderer = std::make_unique<RendererSelector>(std::move(scene), kind, device);
       deviceName = renderer->deviceName();
-      deviceNote = renderer->deviceNote();
+      deviceWarning = renderer->deviceWarning();
       software = renderer->software();
     } catch (const std::exception& error) {
-      whyNone = error.what();
+      unavailableReason = error.what();
     }
-    making.set_value();
+    creationPromise.set_value();
     return renderer;
   }
 
   void run(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device,
            RendererKind kind) {
-    if (!awaitFirstQuestion()) return;
-    const std::unique_ptr<Renderer> renderer = make(std::move(scene), device, kind);
-    while (auto job = nextJob()) {
+    if (!waitForFirstRequest()) return;
+    const std::unique_ptr<RendererSelector> renderer =
+        createRenderer(std::move(scene), device, kind);
+    while (auto job = takeJob()) {
       try {
-        if (!renderer) throw NoRenderer(whyNone);
-        if (!job->snapshot) throw RenderError("RenderThread::render: there is no snapshot");
+        if (!renderer) throw RendererUnavailable(unavailableReason);
+        if (!job->snapshot) throw RenderError("RenderThread::render: no snapshot");
         job->frame.set_value(
             renderer->render(*job->snapshot, job->camera, job->options, job->kind));
       } catch (...) {
@@ -101,7 +102,7 @@ struct RenderThread::State {
 RenderThread::RenderThread(std::shared_ptr<const scene::Scene> scene, DeviceChoice device,
                            RendererKind kind)
     : state_(std::make_unique<State>()) {
-  if (!scene) throw RenderError("RenderThread: there is no scene");
+  if (!scene) throw RenderError("RenderThread: no scene");
   state_->thread =
       std::thread(&State::run, state_.get(), std::move(scene), std::move(device), kind);
 }
@@ -119,27 +120,27 @@ std::future<Frame> RenderThread::render(std::shared_ptr<const scene::Snapshot> s
                                         Camera camera, FrameOptions options, RendererKind kind) {
   State::Job job{std::move(snapshot), std::move(camera), options, kind, {}, {}};
   std::future<Frame> frame = job.frame.get_future();
-  state_->post(std::move(job));
+  state_->enqueue(std::move(job));
   return frame;
 }
 
 void RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera,
                           FrameOptions options, RendererKind kind,
                           std::function<void(std::future<Frame>)> done) {
-  state_->post({std::move(snapshot), std::move(camera), options, kind, {}, std::move(done)});
+  state_->enqueue({std::move(snapshot), std::move(camera), options, kind, {}, std::move(done)});
 }
 
 const std::string& RenderThread::deviceName() const {
-  return state_->made().deviceName;
+  return state_->waitUntilCreated().deviceName;
 }
-const std::string& RenderThread::deviceNote() const {
-  return state_->made().deviceNote;
+const std::string& RenderThread::deviceWarning() const {
+  return state_->waitUntilCreated().deviceWarning;
 }
-const std::string& RenderThread::whyNone() const {
-  return state_->made().whyNone;
+const std::string& RenderThread::unavailableReason() const {
+  return state_->waitUntilCreated().unavailableReason;
 }
 bool RenderThread::software() const {
-  return state_->made().software;
+  return state_->waitUntilCreated().software;
 }
 
 }  // namespace enfilade::render

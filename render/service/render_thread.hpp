@@ -1,37 +1,38 @@
-// One thread that owns the renderers and draws what is asked, in order.
+// A thread that owns the renderers and processes frame requests in order.
 #pragma once
 
 #include <functional>
 #include <future>
 #include <memory>
 
-#include "render/service/renderer.hpp"
+#include "render/service/renderer_selector.hpp"
 
 namespace enfilade::render {
 
+/// Thread-safe front end of a RendererSelector.
 class RenderThread {
  public:
-  /// Starts the thread, which makes its Renderer when it is first asked for anything. Throws
+  /// Starts the thread, which creates its RendererSelector on the first request. Throws
   /// RenderError without a scene.
   explicit RenderThread(std::shared_ptr<const scene::Scene> scene, DeviceChoice device = {},
                         RendererKind kind = RendererKind::automatic);
-  ~RenderThread();  ///< finishes what is queued
+  ~RenderThread();  ///< finishes the queued requests
   RenderThread(const RenderThread&) = delete;
   RenderThread& operator=(const RenderThread&) = delete;
 
-  /// The frame, or the RenderError, comes through the future; NoRenderer when there can be none.
-  /// Callable from any thread.
+  /// The future delivers the frame or a RenderError; RendererUnavailable if no renderer could be
+  /// created. Callable from any thread.
   std::future<Frame> render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera,
                             FrameOptions options = {}, RendererKind kind = RendererKind::automatic);
-  /// As render(), but the future is given when it is ready, on this object's thread, so that nobody
-  /// has to be woken. `done` must not throw.
+  /// As above, but calls `done` with the ready future on this object's thread, so that no thread
+  /// has to wait. `done` must not throw.
   void render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera, FrameOptions options,
               RendererKind kind, std::function<void(std::future<Frame>)> done);
-  // As Renderer's. They have it made, and wait for it.
-  const std::string& deviceName() const;  ///< "" when there can be none
+  // As in Renderer. These functions create the renderer if necessary and wait for it.
+  const std::string& deviceName() const;  ///< "" without a renderer
   bool software() const;
-  const std::string& deviceNote() const;
-  const std::string& whyNone() const;  ///< "" with a renderer
+  const std::string& deviceWarning() const;
+  const std::string& unavailableReason() const;  ///< "" if there is a renderer
 
  private:
   struct State;

@@ -7,20 +7,14 @@
 #include <fstream>
 #include <string_view>
 
+#include "scene/import/file/import_options.hpp"
 #include "scene/import/gltf/gltf_metadata.hpp"
-#include "scene/import/ifc/ifc_metadata.hpp"
-#include "scene/import/import_model.hpp"
+#include "scene/import/ifc/ifc_units.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-std::string lowerCase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  return text;
-}
-
-/// The first `limit` bytes of a file.
+/// Reads the first `limit` bytes of a file.
 std::string readStart(const std::filesystem::path& file, std::size_t limit) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw ImportError(file.string() + ": cannot be opened for reading (open)");
@@ -31,7 +25,7 @@ std::string readStart(const std::filesystem::path& file, std::size_t limit) {
   return text;
 }
 
-std::optional<double> numberIn(std::string_view text) {
+std::optional<double> parseNumber(std::string_view text) {
   while (!text.empty() && std::strchr(" \t\r\n\"'", text.front()) != nullptr) text.remove_prefix(1);
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -41,7 +35,7 @@ std::optional<double> numberIn(std::string_view text) {
 
 // ---- glTF ---------------------------------------------------------------------------------------
 
-std::uint32_t littleEndian32(std::string_view bytes, std::size_t at) {
+std::uint32_t readLittleEndian32(std::string_view bytes, std::size_t at) {
   std::uint32_t value = 0;
   for (std::size_t i = 4; i-- > 0;) value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
   return value;
@@ -53,20 +47,21 @@ void requireWholeGlb(const std::filesystem::path& file) {
     throw ImportError(file.string() + ": not a GLB file (it does not begin with 'glTF'); export " +
                       "it again, or rename a JSON file to .gltf (open)");
   }
-  if (littleEndian32(start, 4) != 2) {
-    throw ImportError(file.string() + ": glTF version " + std::to_string(littleEndian32(start, 4)) +
+  if (readLittleEndian32(start, 4) != 2) {
+    throw ImportError(file.string() + ": glTF version " +
+                      std::to_string(readLittleEndian32(start, 4)) +
                       " cannot be read; export it as glTF 2.0 (open)");
   }
-  const std::uint64_t said = littleEndian32(start, 8);
-  if (said > file_size(file)) {
-    throw ImportError(file.string() + ": cut off: its header says " + std::to_string(said) +
+  const std::uint64_t declaredSize = readLittleEndian32(start, 8);
+  if (declaredSize > file_size(file)) {
+    throw ImportError(file.string() + ": cut off: its header says " + std::to_string(declaredSize) +
                       " bytes, the file has " + std::to_string(file_size(file)) +
                       "; copy or download it again (open)");
   }
 }
 
-/// What is called .gltf, but is a GLB.
-void requireText(const std::filesystem::path& file) {
+/// Throws if a .gltf file is a GLB file.
+void rejectGlb(const std::filesystem::path& file) {
   if (readStart(file, 4) == "glTF")
     throw ImportError(file.string() +
                       ": is a GLB file by its first bytes; check where it comes from and rename " +
@@ -75,7 +70,7 @@ void requireText(const std::filesystem::path& file) {
 
 // ---- COLLADA ------------------------------------------------------------------------------------
 
-FileFacts colladaFacts(const std::filesystem::path& file) {
+FileMetadata readColladaMetadata(const std::filesystem::path& file) {
   // The <asset> of the whole document comes before all libraries.
   const std::string start = readStart(file, 1 << 20);
   const std::size_t begin = start.find("<asset");
@@ -83,29 +78,30 @@ FileFacts colladaFacts(const std::filesystem::path& file) {
   const std::string asset =
       end == std::string::npos ? std::string() : start.substr(begin, end - begin);
 
-  FileFacts facts;
+  FileMetadata metadata;
   const std::size_t unit = asset.find("<unit");
   std::optional<double> metres;
   if (unit != std::string::npos) {
     const std::string tag = asset.substr(unit, asset.find('>', unit) - unit);
     const std::size_t meter = tag.find("meter=");
-    if (meter != std::string::npos) metres = numberIn(std::string_view(tag).substr(meter + 6));
+    if (meter != std::string::npos) metres = parseNumber(std::string_view(tag).substr(meter + 6));
   }
   if (metres && *metres > 0) {
-    facts.metresPerUnit = facts.assimpScale = *metres;
+    metadata.metresPerUnit = metadata.assimpScale = *metres;
   } else {
-    facts.problems.push_back({"no_unit", 1, "<asset> has no <unit meter=...>: taken for metres"});
+    metadata.problems.push_back(
+        {"no_unit", 1, "<asset> has no <unit meter=...>: taken for metres"});
   }
-  if (asset.find("Z_UP") != std::string::npos) facts.up = facts.assimpTurnsUp = 'z';
-  if (asset.find("X_UP") != std::string::npos) facts.up = facts.assimpTurnsUp = 'x';
-  return facts;
+  if (asset.find("Z_UP") != std::string::npos) metadata.up = metadata.assimpUp = 'z';
+  if (asset.find("X_UP") != std::string::npos) metadata.up = metadata.assimpUp = 'x';
+  return metadata;
 }
 
 // ---- FBX ----------------------------------------------------------------------------------------
 
-/// The number after the property `name` in the text or binary settings: ASCII files write it after
+/// Returns the number of property `name` in text or binary settings. ASCII files write it after
 /// three strings; binary files as 'D' or 'I' and its bytes.
-std::optional<double> fbxSetting(const std::string& text, const std::string& name) {
+std::optional<double> findFbxSetting(const std::string& text, const std::string& name) {
   for (std::size_t at = text.find(name); at != std::string::npos; at = text.find(name, at + 1)) {
     const char before = at == 0 ? ' ' : text[at - 1];
     std::size_t next = at + name.size();
@@ -113,12 +109,12 @@ std::optional<double> fbxSetting(const std::string& text, const std::string& nam
       const std::size_t lineEnd = std::min(text.find('\n', next), text.size());
       const std::size_t comma = text.rfind(',', lineEnd);
       if (comma != std::string::npos && comma > next) {
-        return numberIn(std::string_view(text).substr(comma + 1, lineEnd - comma - 1));
+        return parseNumber(std::string_view(text).substr(comma + 1, lineEnd - comma - 1));
       }
     } else if (before == '\0') {  // the last byte of the length of a short string
       for (int strings = 0; strings < 3 && next + 5 <= text.size() && text[next] == 'S';
            ++strings) {
-        next += 5 + littleEndian32(text, next + 1);
+        next += 5 + readLittleEndian32(text, next + 1);
         if (next > text.size()) return std::nullopt;
       }
       if (next + 9 <= text.size() && text[next] == 'D') {
@@ -127,36 +123,38 @@ std::optional<double> fbxSetting(const std::string& text, const std::string& nam
         return std::isfinite(value) ? std::optional(value) : std::nullopt;
       }
       if (next + 5 <= text.size() && text[next] == 'I') {
-        return static_cast<std::int32_t>(littleEndian32(text, next + 1));
+        return static_cast<std::int32_t>(readLittleEndian32(text, next + 1));
       }
     }
   }
   return std::nullopt;
 }
 
-FileFacts fbxFacts(const std::filesystem::path& file) {
+FileMetadata readFbxMetadata(const std::filesystem::path& file) {
   const std::string start = readStart(file, 1 << 20);
-  FileFacts facts;
-  const double centimetres = fbxSetting(start, "UnitScaleFactor").value_or(0);
+  FileMetadata metadata;
+  const double centimetres = findFbxSetting(start, "UnitScaleFactor").value_or(0);
   const bool assimpWroteIt = start.find("Open Asset Import Library") != std::string::npos;
   if (assimpWroteIt && (centimetres == 1 || centimetres == 0)) {
-    // assimp's exporter writes the constant 1 (centimetres) whatever its coordinates mean, and they
-    // mostly come from formats in metres.
-    facts.problems.push_back({"unit_assumed", 1,
-                              "written by assimp, which says centimetres for any unit: taken for "
-                              "metres; say --unit if that is wrong"});
+    // assimp's exporter writes the constant 1 (centimetres) for any unit. Its coordinates mostly
+    // come from formats in metres.
+    metadata.problems.push_back(
+        {"unit_assumed", 1,
+         "written by assimp, which says centimetres for any unit: taken for "
+         "metres; say --unit if that is wrong"});
   } else if (centimetres > 0) {
-    facts.metresPerUnit = centimetres / 100;
+    metadata.metresPerUnit = centimetres / 100;
   } else {
-    facts.metresPerUnit = 0.01;
-    facts.problems.push_back({"no_unit", 1, "no UnitScaleFactor: taken for centimetres"});
+    metadata.metresPerUnit = 0.01;
+    metadata.problems.push_back({"no_unit", 1, "no UnitScaleFactor: taken for centimetres"});
   }
-  const double up = fbxSetting(start, "UpAxis").value_or(1);
-  facts.up = up == 0 ? 'x' : up == 2 ? 'z' : 'y';  // assimp passes the axes on as they are
-  return facts;
+  const double up = findFbxSetting(start, "UpAxis").value_or(1);
+  metadata.up = up == 0 ? 'x' : up == 2 ? 'z' : 'y';  // assimp does not convert the axes
+  return metadata;
 }
 
-/// Whether a blank stands where assimp 5.2.5 wants a number: between '>' and its first character.
+/// Returns whether a blank separates '>' from the first character of a number. assimp 5.2.5 cannot
+/// read that.
 bool isBlankBeforeNumber(std::string_view text, std::size_t i) {
   if (text[i] != '>') return false;
   const std::size_t next = text.find_first_not_of(" \t\r\n", i + 1);
@@ -166,67 +164,56 @@ bool isBlankBeforeNumber(std::string_view text, std::size_t i) {
 
 }  // namespace
 
-std::optional<ModelFormat> modelFormatOf(const std::filesystem::path& file) {
-  const std::string extension = lowerCase(file.extension().string());
-  if (extension == ".gltf") return ModelFormat::gltf;
-  if (extension == ".glb") return ModelFormat::glb;
-  if (extension == ".obj") return ModelFormat::obj;
-  if (extension == ".dae") return ModelFormat::collada;
-  if (extension == ".fbx") return ModelFormat::fbx;
-  if (extension == ".ifc" || extension == ".ifczip") return ModelFormat::ifc;
-  return std::nullopt;
-}
-
-FileFacts readFileFacts(const std::filesystem::path& file, ModelFormat format) {
-  FileFacts facts;
+FileMetadata readFileMetadata(const std::filesystem::path& file, ModelFormat format) {
+  FileMetadata metadata;
   switch (format) {
     case ModelFormat::gltf:
-      requireText(file);
-      facts.triangles = gltfTriangles(file, format);
+      rejectGlb(file);
+      metadata.triangles = countGltfTriangles(file, format);
       break;
     case ModelFormat::glb:
       requireWholeGlb(file);
-      facts.triangles = gltfTriangles(file, format);
+      metadata.triangles = countGltfTriangles(file, format);
       break;
     case ModelFormat::obj:
-      facts.problems.push_back({"no_unit", 1, "OBJ has no unit: taken for metres"});
+      metadata.problems.push_back({"no_unit", 1, "OBJ has no unit: taken for metres"});
       break;
     case ModelFormat::collada:
-      return colladaFacts(file);
+      return readColladaMetadata(file);
     case ModelFormat::fbx:
-      return fbxFacts(file);
+      return readFbxMetadata(file);
     case ModelFormat::ifc:
       break;
   }
-  return facts;
+  return metadata;
 }
 
-FileFacts ifcFileFacts(const std::string& text) {
-  FileFacts facts;
-  facts.up = facts.assimpTurnsUp = 'z';
+FileMetadata readIfcFileMetadata(const std::string& text) {
+  FileMetadata metadata;
+  metadata.up = metadata.assimpUp = 'z';
   bool siUnit = true;
-  facts.metresPerUnit = ifcMetresPerUnit(StepFile(text), siUnit).value_or(1);
-  // assimp knows SI prefixes and takes every other unit for a metre.
-  facts.assimpScale = siUnit ? facts.metresPerUnit : 1;
-  return facts;
+  metadata.metresPerUnit = readIfcMetresPerUnit(StepFile(text), siUnit).value_or(1);
+  // assimp knows SI prefixes and takes every other unit as a metre.
+  metadata.assimpScale = siUnit ? metadata.metresPerUnit : 1;
+  return metadata;
 }
 
-std::string mendedCollada(const std::filesystem::path& file, FileFacts& facts) {
+std::string repairCollada(const std::filesystem::path& file, FileMetadata& metadata) {
   const std::string text = readStart(file, std::string::npos);
-  std::string mended;
+  std::string repaired;
   std::size_t begin = 0, count = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (!isBlankBeforeNumber(text, i)) continue;
-    mended.append(text, begin, i + 1 - begin);
+    repaired.append(text, begin, i + 1 - begin);
     begin = text.find_first_not_of(" \t\r\n", i + 1);
     i = begin - 1;
     ++count;
   }
   if (count == 0) return {};
-  mended.append(text, begin);
-  facts.problems.push_back(
-      {"mended_text", count, "blanks before the first number of an element were taken out"});
-  return mended;
+  repaired.append(text, begin);
+  metadata.problems.push_back(
+      {"mended_text", count, "removed blanks before the first number of an element"});
+  return repaired;
 }
 
 }  // namespace enfilade::scene

@@ -1,18 +1,15 @@
-// The asking side of an import: looks at the file, starts the child, listens to it, and turns every
-// way in which it can fail into an ImportError.
+// The parent's side of an import: checks the file, starts the worker, receives its messages and
+// turns every failure into an ImportError.
 #include "scene/import/import_model.hpp"
 
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <map>
 
-#include "scene/import/file_metadata.hpp"
+#include "scene/import/file/model_format.hpp"
 #include "scene/import/worker/model_stream.hpp"
 #include "scene/import/worker/process.hpp"
 
@@ -21,18 +18,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<std::string_view, 7> kExtensions{".gltf", ".glb", ".obj",   ".dae",
-                                                      ".fbx",  ".ifc", ".ifczip"};
+// ---- before the worker starts -------------------------------------------------------------------
 
-// ---- before anything starts ---------------------------------------------------------------------
-
-std::string knownExtensions() {
+std::string listExtensions() {
   std::string list;
-  for (const std::string_view e : kExtensions) list += (list.empty() ? "" : ", ") + std::string(e);
+  for (const std::string_view e : importableExtensions())
+    list += (list.empty() ? "" : ", ") + std::string(e);
   return list;
 }
 
-void requireReadableModel(const fs::path& file) {
+void validateReadable(const fs::path& file) {
   const std::string name = file.string();
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
@@ -49,9 +44,9 @@ void requireReadableModel(const fs::path& file) {
   }
   if (!fs::is_regular_file(status)) throw ImportError(name + ": is not a regular file (open)");
   const std::string extension = file.extension().string();
-  if (!modelFormatOf(file)) {
-    throw ImportError(name + ": unknown extension '" + extension + "'; known are " +
-                      knownExtensions() + " (open)");
+  if (!detectModelFormat(file)) {
+    throw ImportError(name + ": unknown extension '" + extension +
+                      "'; supported: " + listExtensions() + " (open)");
   }
   if (fs::file_size(file, error) == 0 && !error) {
     throw ImportError(name + ": is empty; export or copy it again (open)");
@@ -62,7 +57,7 @@ void requireReadableModel(const fs::path& file) {
   }
 }
 
-void requireSaneOptions(const ImportOptions& options) {
+void validateOptions(const ImportOptions& options) {
   if (options.metresPerUnit &&
       !(*options.metresPerUnit > 0 && std::isfinite(*options.metresPerUnit))) {
     throw ImportError("metres per unit: must be a positive number");
@@ -74,22 +69,22 @@ void requireSaneOptions(const ImportOptions& options) {
   }
 }
 
-// ---- listening ----------------------------------------------------------------------------------
+// ---- messages -----------------------------------------------------------------------------------
 
-/// What the import process has told so far.
-class Listener {
+/// Receives the messages of the import process.
+class MessageListener {
  public:
-  Listener(const fs::path& file, const ImportProgress& progress)
+  MessageListener(const fs::path& file, const ImportProgress& progress)
       : file_(file), progress_(progress) {}
 
-  bool take(ImportFrame kind, std::span<const std::byte> body) {
+  bool handle(ImportMessage kind, std::span<const std::byte> body) {
     switch (kind) {
-      case ImportFrame::progress:
-        return showProgress(body);
-      case ImportFrame::error:
+      case ImportMessage::progress:
+        return handleProgress(body);
+      case ImportMessage::error:
         throw ImportError({reinterpret_cast<const char*>(body.data()), body.size()});
-      case ImportFrame::model:
-        return readModel(body);
+      case ImportMessage::model:
+        return handleModel(body);
       default:
         return false;
     }
@@ -99,18 +94,18 @@ class Listener {
   std::optional<Model>& model() { return model_; }
 
  private:
-  bool showProgress(std::span<const std::byte> body) {
+  bool handleProgress(std::span<const std::byte> body) {
     double fraction = 0;
     if (!readProgress(body, stage_, fraction)) return false;
     if (progress_) progress_(stage_, fraction);
     return true;
   }
 
-  bool readModel(std::span<const std::byte> body) {
+  bool handleModel(std::span<const std::byte> body) {
     try {
       model_ = deserialiseModel(body);
     } catch (const ModelStreamError& error) {
-      throw ImportError(file_.string() + ": the import process answered with noise during '" +
+      throw ImportError(file_.string() + ": the import process sent invalid data during '" +
                         stage_ + "' (" + error.what() + "); re-export the file as glTF");
     }
     return true;
@@ -123,32 +118,28 @@ class Listener {
 };
 
 [[noreturn]] void throwFailed(const ImportRequest& request, const std::string& stage,
-                              const ImportEnd& end) {
-  if (end.how == ImportEnd::How::timeLimit) {
-    throw ImportError(request.file + ": not read within " + shortest(request.timeLimit) +
+                              const ImportExit& outcome) {
+  if (outcome.reason == ImportExit::Reason::timeLimit) {
+    throw ImportError(request.file + ": not read within " + formatShortest(request.timeLimit) +
                       " s (stage '" + stage +
                       "'); simplify or split the file, re-export it as glTF, or allow more time");
   }
   std::string hint = "re-export it as glTF";
-  if (modelFormatOf(request.file) == ModelFormat::ifc) {
+  if (detectModelFormat(request.file) == ModelFormat::ifc) {
     hint =
         "try another --ifc-reader, re-export it as IFC2x3 or glTF, or check the file with an IFC "
         "validator for references to entities that are missing";
   }
-  throw ImportError(request.file + ": the import process " + end.words() + " during '" + stage +
-                    "'; " + hint);
+  throw ImportError(request.file + ": the import process " + outcome.describe() + " during '" +
+                    stage + "'; " + hint);
 }
 
 }  // namespace
 
-std::span<const std::string_view> importableExtensions() {
-  return kExtensions;
-}
-
 Model importModel(const fs::path& file, const ImportOptions& options,
                   const ImportProgress& progress) {
-  requireSaneOptions(options);
-  requireReadableModel(file);
+  validateOptions(options);
+  validateReadable(file);
   ImportRequest request;
   request.file = file.string();
   request.metresPerUnit = options.metresPerUnit;
@@ -157,35 +148,17 @@ Model importModel(const fs::path& file, const ImportOptions& options,
   request.ifcReader = options.ifcReader;
   request.memoryLimit = options.memoryLimit;
   request.timeLimit = options.timeLimit;
-  Listener listener(file, progress);
-  const ImportEnd end = runImportProcess(
+  MessageListener listener(file, progress);
+  const ImportExit outcome = runImportProcess(
       request,
-      [&](ImportFrame kind, std::span<const std::byte> body) { return listener.take(kind, body); },
+      [&](ImportMessage kind, std::span<const std::byte> body) {
+        return listener.handle(kind, body);
+      },
       [] { return std::numeric_limits<double>::infinity(); });
-  if (!listener.model()) throwFailed(request, listener.stage(), end);
+  if (!listener.model()) throwFailed(request, listener.stage(), outcome);
   Model model = std::move(*listener.model());
   model.source = file.string();
   return model;
-}
-
-std::optional<IfcReader> ifcReaderFrom(const std::string& text) {
-  static const std::map<std::string, IfcReader> kReaders{{"auto", IfcReader::automatic},
-                                                         {"web-ifc", IfcReader::webIfc},
-                                                         {"ifcplusplus", IfcReader::ifcPlusPlus},
-                                                         {"assimp", IfcReader::assimp}};
-  const auto reader = kReaders.find(text);
-  return reader == kReaders.end() ? std::nullopt : std::optional(reader->second);
-}
-
-std::optional<double> metresPerUnitFrom(const std::string& text) {
-  static const std::map<std::string, double> kUnits{
-      {"m", 1}, {"mm", 0.001}, {"cm", 0.01}, {"ft", 0.3048}, {"in", 0.0254}};
-  if (const auto unit = kUnits.find(text); unit != kUnits.end()) return unit->second;
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool whole = error == std::errc() && end == text.data() + text.size();
-  if (!whole || !(value > 0) || !std::isfinite(value)) return std::nullopt;
-  return value;
 }
 
 }  // namespace enfilade::scene

@@ -1,5 +1,5 @@
-// The hidden verb: what copies of our own executable do for an import. Each runs in a process of
-// its own, so nothing that a reader does can hurt the program that asked.
+#include "scene/import/import_worker.hpp"
+
 #include <signal.h>
 #include <sys/personality.h>
 #include <sys/prctl.h>
@@ -16,8 +16,11 @@
 #include <set>
 #include <string_view>
 
+#include "scene/import/assembly/coordinates.hpp"
 #include "scene/import/assimp/assimp_reader.hpp"
 #include "scene/import/assimp/convert_scene.hpp"
+#include "scene/import/assimp/obj_text.hpp"
+#include "scene/import/file_metadata.hpp"
 #include "scene/import/ifc/ifc_plus_plus.hpp"
 #include "scene/import/ifc/import_ifc.hpp"
 #include "scene/import/worker/model_stream.hpp"
@@ -40,14 +43,14 @@ constexpr bool kSanitized = false;
 
 // ---- the work -----------------------------------------------------------------------------------
 
-/// No core files, no more memory than allowed, no life after the parent's.
+/// Limits the process: no core files, bounded memory, and death with the parent.
 void limitThisProcess(const ImportRequest& request, pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != parent) _exit(1);  // it died before the line above
+  if (getppid() != parent) _exit(1);  // it died before the call above
   const rlimit none{0, 0};
   setrlimit(RLIMIT_CORE, &none);
-  // Only the soft limit: Node.js, which may be started from here, reserves address space by the
-  // tens of gigabytes and is limited in what it writes to. So do sanitizers.
+  // Only the soft limit: Node.js may be started from here. It reserves tens of gigabytes of address
+  // space, so its written data is limited instead. Sanitizers reserve as much.
   const bool node = request.task == ImportTask::webIfc;
   rlimit memory{};
   getrlimit(RLIMIT_AS, &memory);
@@ -58,7 +61,7 @@ void limitThisProcess(const ImportRequest& request, pid_t parent) {
   if (node && request.memoryLimit > 0) setrlimit(RLIMIT_DATA, &data);
 }
 
-/// What ENFILADE_IMPORT_FAULT calls a copy with this task, with the colon.
+/// Prefix in ENFILADE_IMPORT_FAULT that selects this task, with the colon.
 std::string_view faultPrefix(ImportTask task) {
   switch (task) {
     case ImportTask::model:
@@ -73,8 +76,8 @@ std::string_view faultPrefix(ImportTask task) {
   return "";
 }
 
-/// Misbehaves as ENFILADE_IMPORT_FAULT says; see import_model.hpp.
-void misbehaveIfAsked(ImportTask task) {
+/// Injects the fault of ENFILADE_IMPORT_FAULT; see import_worker.hpp.
+void injectFault(ImportTask task) {
   const char* wanted = std::getenv("ENFILADE_IMPORT_FAULT");
   std::string_view fault = wanted == nullptr ? "" : wanted;
   if (!fault.starts_with(faultPrefix(task))) return;
@@ -88,13 +91,15 @@ void misbehaveIfAsked(ImportTask task) {
   if (fault == "memory") throw std::bad_alloc();
   if (fault == "garbage") {
     const std::string noise(1000, 'x');
-    sendFrame(ImportFrame::model, noise.data(), noise.size());
+    sendMessage(ImportMessage::model, noise.data(), noise.size());
     _exit(0);
   }
 }
 
-/// Materials of OBJ files stand in files of their own, which go missing when models are passed on.
-void tellMissingMaterials(const std::vector<std::string>& files, std::vector<Problem>& problems) {
+/// Counts missing material files. OBJ keeps materials in separate files, which are often lost when
+/// models are passed on.
+void reportMissingMaterials(const std::vector<std::string>& files,
+                            std::vector<Diagnostic>& problems) {
   std::set<std::string> missing;
   for (const std::string& file : files) {
     std::error_code error;
@@ -119,62 +124,65 @@ std::string readDescriptor(int descriptor) {
   return text;
 }
 
-[[noreturn]] void throwUnread(const ConvertInput& input, const std::string& why) {
-  if (why.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
-  if (input.format == ModelFormat::ifc) throw ImportError(why);  // others may have tried too
-  throw ImportError(input.file.string() + ": cannot be read: " + why +
+[[noreturn]] void throwReadFailure(const ConvertInput& input, const std::string& reason) {
+  if (reason.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
+  if (input.format == ModelFormat::ifc)
+    throw ImportError(reason);  // other readers may have tried too
+  throw ImportError(input.file.string() + ": cannot be read: " + reason +
                     "; check the file in the program that wrote it, or re-export it as glTF "
                     "(parse)");
 }
 
-Model modelByAssimp(const ImportRequest& request) {
+Model importByAssimp(const ImportRequest& request) {
   ConvertInput input;
   input.file = request.file;
-  input.format = modelFormatOf(request.file).value();  // the parent has looked
+  input.format = detectModelFormat(request.file).value();  // checked by the parent
   input.metresPerUnit = request.metresPerUnit;
   input.up = request.up;
   input.offset = request.offset;
-  FileToRead file{request.file, "", request.task == ImportTask::assimp};
+  AssimpInput file{request.file, "", request.task == ImportTask::assimp};
   if (file.isIfc) {
     file.text = readDescriptor(kIfcFile);
-    input.facts = ifcFileFacts(file.text);
+    input.metadata = readIfcFileMetadata(file.text);
   } else {
-    input.facts = readFileFacts(request.file, input.format);
-    if (input.format == ModelFormat::collada) file.text = mendedCollada(request.file, input.facts);
+    input.metadata = readFileMetadata(request.file, input.format);
+    if (input.format == ModelFormat::collada)
+      file.text = repairCollada(request.file, input.metadata);
     if (input.format == ModelFormat::obj) {
-      const double unit = request.metresPerUnit.value_or(input.facts.metresPerUnit);
-      ShiftedText shifted = shiftedObj(request.file, kFarAway / unit);
-      file.text = std::move(shifted.text);
-      input.shift = shifted.shift;
+      const double unit = request.metresPerUnit.value_or(input.metadata.metresPerUnit);
+      RebasedText rebased = rebaseObj(request.file, kMaxPreciseDistance / unit);
+      file.text = std::move(rebased.text);
+      input.shift = rebased.shift;
     }
   }
   sendProgress("parse", 0);
-  const FileRead read = readByAssimp(file);
-  if (read.scene == nullptr) throwUnread(input, read.failure);
+  const AssimpOutput read = readWithAssimp(file);
+  if (read.scene == nullptr) throwReadFailure(input, read.failure);
   Model model = convertScene(*read.scene, read.materials, input, sendProgress);
-  tellMissingMaterials(read.files, model.problems);
-  model.filesBeside.insert(model.filesBeside.end(), read.files.begin(), read.files.end());
-  model.filesBeside.push_back(read.library);
+  reportMissingMaterials(read.dependencies, model.diagnostics);
+  model.dependencies.insert(model.dependencies.end(), read.dependencies.begin(),
+                            read.dependencies.end());
+  model.dependencies.push_back(read.library);
   return model;
 }
 
 void sendModel(const Model& model) {
   sendProgress("send", 0);
   const std::vector<std::byte> stream = serialiseModel(model);
-  sendFrame(ImportFrame::model, stream.data(), stream.size());
+  sendMessage(ImportMessage::model, stream.data(), stream.size());
 }
 
-/// Starts this program once more, in the same process, without randomised addresses: ifcplusplus'
-/// results vary with them. Where that is not allowed, they vary.
-void steadyAddresses(char** argv) {
+/// Restarts this program in the same process without address randomisation, because ifcplusplus'
+/// results depend on it. If that is not allowed, results vary.
+void disableAslr(char** argv) {
   const int now = personality(0xffffffff);
   if (now < 0 || (now & ADDR_NO_RANDOMIZE) != 0) return;
   if (personality(static_cast<unsigned long>(now | ADDR_NO_RANDOMIZE)) < 0) return;
   if ((personality(0xffffffff) & ADDR_NO_RANDOMIZE) != 0) execv("/proc/self/exe", argv);
 }
 
-/// Returns only when it cannot be done.
-void becomeNode(const ImportRequest& request) {
+/// Replaces this process with Node.js. Returns only by an exception.
+void execNode(const ImportRequest& request) {
   const std::size_t megabytes = std::max<std::size_t>(request.memoryLimit >> 21, 256);
   const std::string heap = "--max-old-space-size=" + std::to_string(megabytes);
   const std::string first = std::to_string(request.firstProduct);
@@ -184,43 +192,43 @@ void becomeNode(const ImportRequest& request) {
   throw ImportError(request.program + " cannot be started: " + std::strerror(errno));
 }
 
-void answer(const ImportRequest& request) {
+void runTask(const ImportRequest& request) {
   sendProgress("open", 0);
-  misbehaveIfAsked(request.task);
+  injectFault(request.task);
   switch (request.task) {
     case ImportTask::model:
-      if (modelFormatOf(request.file) == ModelFormat::ifc) {
+      if (detectModelFormat(request.file) == ModelFormat::ifc) {
         return sendModel(importIfc(request, sendProgress));
       }
-      return sendModel(modelByAssimp(request));
+      return sendModel(importByAssimp(request));
     case ImportTask::assimp:
-      return sendModel(modelByAssimp(request));
+      return sendModel(importByAssimp(request));
     case ImportTask::webIfc:
-      return becomeNode(request);
+      return execNode(request);
     case ImportTask::ifcPlusPlus:
-      return sendShapesByIfcPlusPlus(readDescriptor(kIfcFile));
+      return sendMeshesWithIfcPlusPlus(readDescriptor(kIfcFile));
   }
 }
 
 }  // namespace
 
-std::optional<int> runImportChild(int argc, char** argv) {
+std::optional<int> runImportWorker(int argc, char** argv) {
   if (argc < 2 || std::string_view(argv[1]) != kImportVerb) return std::nullopt;
   int parent = 0;
-  const std::optional<ImportRequest> request = importRequestFrom(argc, argv, parent);
+  const std::optional<ImportRequest> request = parseImportRequest(argc, argv, parent);
   if (!request) return 2;
   limitThisProcess(*request, parent);
-  if (request->task == ImportTask::ifcPlusPlus) steadyAddresses(argv);
+  if (request->task == ImportTask::ifcPlusPlus) disableAslr(argv);
   int code = 1;
   try {
-    answer(*request);
+    runTask(*request);
     code = 0;
   } catch (const std::bad_alloc&) {
     sendError(request->file + ": needs more than the " +
               std::to_string(request->memoryLimit >> 20) +
               " MiB of memory that an import may take; split the file or raise the limit");
   } catch (const std::exception& error) {
-    // Readers of IFC leave the name to who asked them.
+    // IFC readers omit the file's name; their parent adds it.
     const std::string text = error.what();
     const bool named = request->task != ImportTask::model || text.starts_with(request->file);
     sendError(named ? text : request->file + ": " + text);

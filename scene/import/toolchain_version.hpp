@@ -1,20 +1,20 @@
-// Who makes a Model of a file, to tell whether an earlier one would be made again today.
+// Versions of the program and its readers, to decide whether a cached Model is still valid.
 #pragma once
 
 #include <filesystem>
 #include <optional>
 #include <string>
 
-#include "scene/import/worker/content_hash.hpp"
+#include "scene/import/file/content_hash.hpp"
 
 namespace enfilade::scene {
 
-/// What tells a file from others: of a program or a library, which may be large, the build id that
-/// its linker wrote; of another its content. nullopt where there is none that can be read.
-std::optional<ContentHash> versionOf(const std::filesystem::path& file);
+/// Returns a fingerprint of a file: the linker's build id of a program or library, which may be
+/// large, else the content hash. nullopt: the file cannot be read.
+std::optional<ContentHash> computeFileVersion(const std::filesystem::path& file);
 
-/// This program and its modules that read models, as they were linked: whoever changes a line of
-/// the importer has others. The libraries behind the modules are told by Model::filesBeside.
-const std::string& readerVersions();
+/// Describes this program and its reader modules by their build ids, which change with every change
+/// of the importer. Model::dependencies lists the libraries behind the modules.
+const std::string& describeReaderVersions();
 
 }  // namespace enfilade::scene

@@ -11,139 +11,132 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kFarthest = 1e6;     // metres or radians; more is a slip of the pen
-constexpr double kFastest = 1e4;      // per second
-constexpr double kLongest = 1e6;      // seconds
-constexpr double kUnitLength = 1e-9;  // how far the length of an axis may be off
-constexpr double kMostDense = 1e5;    // kg / m^3: five times gold
-constexpr double kSameEnd = 1e-9;     // metres, radians: where a loop must close
-constexpr std::size_t kMostKeys = 100000;
+constexpr double kMaxCoordinate = 1e6;          // metres or radians; a larger value is a mistake
+constexpr double kMaxSpeed = 1e4;               // per second
+constexpr double kMaxDuration = 1e6;            // seconds
+constexpr double kAxisLengthTolerance = 1e-9;   // tolerance of an axis' length
+constexpr double kMaxDensity = 1e5;             // kg / m^3: five times gold
+constexpr double kLoopClosureTolerance = 1e-9;  // metres or radians: tolerance of a loop's end
+constexpr std::size_t kMaxPathKeys = 100000;
 
-using Refusal = std::optional<std::string>;
+using OptionalError = std::optional<std::string>;
 
-Refusal outside(const char* field, double value, double least, double most) {
-  if (value >= least && value <= most) return std::nullopt;
+OptionalError validateFieldRange(const char* field, double value, double min, double max) {
+  if (value >= min && value <= max) return std::nullopt;
   return std::string(field) + " is " + std::to_string(value) + "; it must lie in " +
-         std::to_string(least) + ".." + std::to_string(most);
+         std::to_string(min) + ".." + std::to_string(max);
 }
 
-Refusal outside(const char* field, const Vec3& value) {
+OptionalError validateFieldVector(const char* field, const Vec3& value) {
   for (int i = 0; i < 3; ++i)
-    if (auto why = outside(field, value[i], -kFarthest, kFarthest)) return why;
+    if (auto error = validateFieldRange(field, value[i], -kMaxCoordinate, kMaxCoordinate))
+      return error;
   return std::nullopt;
 }
 
-Refusal refusalOfLimits(const BodySpec& body) {
-  const bool lift = body.kind == BodyKind::lift;
+OptionalError validateLimits(const BodySpec& body) {
+  const bool lift = getTraits(body.kind).takesStops;
   const std::string field = lift ? "stops" : "limits";
-  if (lift && body.stops.size() < 2) return "stops: a lift has two at least";
+  if (lift && body.stops.size() < 2) return "stops: a lift needs at least two";
   if (std::adjacent_find(body.stops.begin(), body.stops.end(), std::greater_equal<>()) !=
       body.stops.end())
-    return "stops must ascend, each once";
+    return "stops must ascend strictly";
   if (!(body.low <= 0 && body.high >= 0))
-    return field + ": 0, where it was drawn, must lie between the least and the greatest";
+    return field + ": 0, the authored position, must lie between the smallest and the largest";
   if (!(body.low < body.high)) return field + ": both are 0: it could not move";
-  if (!(body.low >= -kFarthest && body.high <= kFarthest)) return field + ": farther than 1000 km";
+  if (!(body.low >= -kMaxCoordinate && body.high <= kMaxCoordinate))
+    return field + ": farther than 1000 km";
   for (const double stop : body.stops)
-    if (auto why = outside("stops", stop, body.low, body.high)) return why;
-  if (auto why = outside("closed", body.closed, body.low, body.high)) return why;
-  if (body.closesAfter) return outside("closes_after", *body.closesAfter, 0, kLongest);
+    if (auto error = validateFieldRange("stops", stop, body.low, body.high)) return error;
+  if (auto error = validateFieldRange("closed", body.closedPosition, body.low, body.high))
+    return error;
+  if (body.autoCloseDelay)
+    return validateFieldRange("closes_after", *body.autoCloseDelay, 0, kMaxDuration);
   return std::nullopt;
 }
 
-Refusal refusalOfPath(const BodySpec& body) {
-  if (body.keys.size() < 2 || body.keys.size() > kMostKeys)
-    return "keys: a path has 2 to " + std::to_string(kMostKeys) + " of them";
-  if (body.keys.front().time != 0) return "keys: the first one's time must be 0";
+OptionalError validatePath(const BodySpec& body) {
+  if (body.keys.size() < 2 || body.keys.size() > kMaxPathKeys)
+    return "keys: a path needs 2 to " + std::to_string(kMaxPathKeys) + " keys";
+  if (body.keys.front().time != 0) return "keys: the first time must be 0";
   double last = -1;
   for (const PathKey& key : body.keys) {
     if (!(key.time > last)) return "keys: times must ascend";
     last = key.time;
-    if (auto why = outside("time", key.time, 0, kLongest)) return why;
-    if (auto why = outside("offset", key.offset)) return why;
-    if (auto why = outside("turn (in radians)", key.turn, -kFarthest, kFarthest)) return why;
+    if (auto error = validateFieldRange("time", key.time, 0, kMaxDuration)) return error;
+    if (auto error = validateFieldVector("offset", key.offset)) return error;
+    if (auto error =
+            validateFieldRange("turn (in radians)", key.angle, -kMaxCoordinate, kMaxCoordinate))
+      return error;
   }
   const PathKey &first = body.keys.front(), &end = body.keys.back();
-  const bool closed = (first.offset - end.offset).cwiseAbs().maxCoeff() <= kSameEnd;
+  const bool closed = (first.offset - end.offset).cwiseAbs().maxCoeff() <= kLoopClosureTolerance;
   if (body.loops && !closed) return "keys: a path that loops must end where it begins";
-  const double turns = (end.turn - first.turn) / (2 * std::numbers::pi);
-  if (body.loops && std::abs(turns - std::round(turns)) > kSameEnd)
-    return "keys: a path that loops must end turned as it begins, or by whole turns more";
+  const double revolutions = (end.angle - first.angle) / (2 * std::numbers::pi);
+  if (body.loops && std::abs(revolutions - std::round(revolutions)) > kLoopClosureTolerance)
+    return "keys: a path that loops must end with its initial rotation, or whole turns from it";
   return std::nullopt;
 }
 
-Refusal refusalOfMatter(const BodySpec& body) {
-  if (auto why = outside("density", body.density, 1e-3, kMostDense)) return why;
+OptionalError validatePhysicalProperties(const BodySpec& body) {
+  if (auto error = validateFieldRange("density", body.density, 1e-3, kMaxDensity)) return error;
   if (body.mass) {
-    if (auto why = outside("mass", *body.mass, 1e-6, 1e9)) return why;
+    if (auto error = validateFieldRange("mass", *body.mass, 1e-6, 1e9)) return error;
   }
-  if (auto why = outside("friction", body.friction, 0, 100)) return why;
+  if (auto error = validateFieldRange("friction", body.friction, 0, 100)) return error;
   for (int i = 0; i < 3; ++i) {
-    if (auto why = outside("velocity", body.velocity[i], -kFastest, kFastest)) return why;
-    if (auto why = outside("spin", body.spin[i], -kFastest, kFastest)) return why;
+    if (auto error = validateFieldRange("velocity", body.velocity[i], -kMaxSpeed, kMaxSpeed))
+      return error;
+    if (auto error = validateFieldRange("spin", body.angularVelocity[i], -kMaxSpeed, kMaxSpeed))
+      return error;
   }
-  return outside("restitution", body.restitution, 0, 1);
+  return validateFieldRange("restitution", body.restitution, 0, 1);
 }
 
-Refusal refusalOf(const BodySpec& body) {
-  if (auto why = outside("anchor", body.anchor)) return why;
-  if (!isKinematic(body.kind)) return refusalOfMatter(body);
-  if (!(std::abs(body.axis.norm() - 1) <= kUnitLength)) return "axis must have unit length";
-  if (auto why = refusalOfSpeed(body.speed)) return why;
-  if (auto why = outside("acceleration", body.acceleration, 0, kFarthest)) return why;
-  return body.kind == BodyKind::path ? refusalOfPath(body) : refusalOfLimits(body);
+OptionalError validateSpec(const BodySpec& body) {
+  if (auto error = validateFieldVector("anchor", body.anchor)) return error;
+  if (!isKinematic(body.kind)) return validatePhysicalProperties(body);
+  if (!(std::abs(body.axis.norm() - 1) <= kAxisLengthTolerance))
+    return "axis must have unit length";
+  if (auto error = validateSpeed(body.speed)) return error;
+  if (auto error = validateFieldRange("acceleration", body.acceleration, 0, kMaxCoordinate))
+    return error;
+  return getTraits(body.kind).takesKeys ? validatePath(body) : validateLimits(body);
 }
 
-Refusal refusalOfObjects(const BodySpec& body, const Model& model, std::vector<bool>& taken) {
-  if (body.objects.empty()) return "objects: it has none";
+OptionalError validateObjects(const BodySpec& body, const Model& model,
+                              std::vector<bool>& claimed) {
+  if (body.objects.empty()) return "objects: at least one is required";
   for (const std::uint32_t object : body.objects) {
-    if (object >= model.objects.size())
-      return "objects: there is no object " + std::to_string(object);
-    if (taken[object])
+    if (object >= model.objects.size()) return "objects: unknown object " + std::to_string(object);
+    if (claimed[object])
       return "objects: '" + model.objects[object].path + "' is in two bodies, or twice in one";
-    taken[object] = true;
+    claimed[object] = true;
   }
   return std::nullopt;
 }
 
 }  // namespace
 
-std::pair<double, double> limitsOf(const BodySpec& spec) {
-  if (spec.kind == BodyKind::path) return {0, spec.keys.back().time};
+std::pair<double, double> getJointLimits(const BodySpec& spec) {
+  if (getTraits(spec.kind).takesKeys) return {0, spec.keys.back().time};
   return {spec.low, spec.high};
 }
 
-double fastestPointOf(const BodySpec& spec, double radius) {
-  if (spec.kind == BodyKind::hinged) return radius;
-  if (spec.kind != BodyKind::path) return 1;
-  double fastest = 0;
+double computeMaxPointSpeed(const BodySpec& spec, double radius) {
+  if (getTraits(spec.kind).rotates) return radius;
+  if (!getTraits(spec.kind).takesKeys) return 1;
+  double maxSpeed = 0;
   for (std::size_t i = 1; i < spec.keys.size(); ++i) {
     const PathKey &from = spec.keys[i - 1], &to = spec.keys[i];
-    const double way = (to.offset - from.offset).norm() + std::abs(to.turn - from.turn) * radius;
-    fastest = std::max(fastest, way / (to.time - from.time));
+    const double distance =
+        (to.offset - from.offset).norm() + std::abs(to.angle - from.angle) * radius;
+    maxSpeed = std::max(maxSpeed, distance / (to.time - from.time));
   }
-  return fastest;
+  return maxSpeed;
 }
 
-const char* wordOf(BodyKind kind) {
-  switch (kind) {
-    case BodyKind::hinged:
-      return "hinged";
-    case BodyKind::sliding:
-      return "sliding";
-    case BodyKind::lift:
-      return "lift";
-    case BodyKind::path:
-      return "path";
-    case BodyKind::rigid:
-      return "rigid";
-    case BodyKind::trigger:
-      return "trigger";
-  }
-  return "unknown";
-}
-
-const char* wordOf(BodySource source) {
+const char* toString(BodySource source) {
   switch (source) {
     case BodySource::sidecar:
       return "sidecar";
@@ -159,24 +152,24 @@ const char* wordOf(BodySource source) {
   return "unknown";
 }
 
-std::optional<std::string> refusalOfSpeed(double speed) {
+std::optional<std::string> validateSpeed(double speed) {
   if (!(speed > 0)) return "speed must be above 0";
-  return outside("speed", speed, 0, kFastest);
+  return validateFieldRange("speed", speed, 0, kMaxSpeed);
 }
 
-std::optional<std::string> refusalOfBody(const BodySpec& body) {
-  return refusalOf(body);
+std::optional<std::string> validateBody(const BodySpec& body) {
+  return validateSpec(body);
 }
 
-std::optional<std::string> refusalOfBodies(const Model& model) {
-  std::vector<bool> taken(model.objects.size());
+std::optional<std::string> validateBodies(const Model& model) {
+  std::vector<bool> claimed(model.objects.size());
   std::set<std::string> names;
   for (const BodySpec& body : model.bodies) {
-    Refusal why = refusalOfObjects(body, model, taken);
-    if (!why) why = refusalOf(body);
-    if (!why && body.name.empty()) why = "name is empty";
-    if (!why && !names.insert(body.name).second) why = "name: another body has it";
-    if (why) return "body '" + body.name + "': " + *why;
+    OptionalError error = validateObjects(body, model, claimed);
+    if (!error) error = validateSpec(body);
+    if (!error && body.name.empty()) error = "name is empty";
+    if (!error && !names.insert(body.name).second) error = "name: another body already uses it";
+    if (error) return "body '" + body.name + "': " + *error;
   }
   return std::nullopt;
 }

@@ -1,10 +1,9 @@
-// What a body is said to be: doors, lifts, things on paths, free rigid bodies, trigger volumes.
-// Plain data that comes with the model; all that no spec names is still.
-//
-// A body's frame has its origin at `anchor`, and the axes of the scene where the body stands as it
-// was authored. Its one degree of freedom is its coordinate: radians about `axis` (hinged), metres
-// along it (sliding, lift), seconds since the path began (path). 0 is the authored place, for a
-// path if its first key says so.
+// BodySpec: description of a body (door, lift, path, rigid body, trigger volume). Plain data of the
+// model; an object without a spec is static.
+// A body frame has its origin at `anchor` and, in the authored pose, the axes of the scene. The one
+// degree of freedom of a kinematic body is its joint position: radians about `axis` (hinged),
+// metres along it (sliding, lift), seconds since the path began (path). 0 is the authored pose; for
+// a path this holds if its first key is zero.
 #pragma once
 
 #include <cstdint>
@@ -22,91 +21,147 @@ using collision::Vec3;
 struct Model;
 
 enum class BodyKind : std::uint8_t {
-  hinged,   ///< turns about the axis through the anchor, between two limits
+  hinged,   ///< rotates about the axis through the anchor, between two limits
   sliding,  ///< moves along the axis, between two limits
-  lift,     ///< as sliding, with stops to be called to
+  lift,     ///< like sliding, with stops
   path,     ///< follows key frames
-  rigid,    ///< free: falls, is pushed, comes to rest
-  trigger   ///< not solid, not drawn: tells who enters and leaves
+  rigid,    ///< dynamic: falls, is pushed, comes to rest
+  trigger   ///< not solid, not drawn: reports entities that enter and leave
 };
 
-/// Where a spec comes from, highest first.
+/// What moves a body.
+enum class MotionSource : std::uint8_t {
+  none,   ///< nothing
+  joint,  ///< its joint position (kinematic); only an obstacle that cannot yield stops it
+  solver  ///< contacts, gravity and impulses (dynamic)
+};
+
+/// Properties that all bodies of a kind share.
+struct BodyKindTraits {
+  const char* name = nullptr;  ///< in files and messages
+  MotionSource motion = MotionSource::none;
+  bool isSolid = true;       ///< collides and is drawn
+  bool isDoor = false;       ///< opens and closes
+  bool rotates = false;      ///< joint position in radians about the axis; the anchor is required
+  bool takesLimits = false;  ///< low, high, closedPosition
+  bool takesStops = false;   ///< stops
+  bool takesKeys = false;    ///< keys, loops, autoStart
+};
+
+/// The table of kinds, one row each. A kind without a row does not compile (-Werror=switch).
+constexpr BodyKindTraits getTraits(BodyKind kind) {
+  using enum MotionSource;
+  switch (kind) {
+    case BodyKind::hinged:
+      return {
+          .name = "hinged", .motion = joint, .isDoor = true, .rotates = true, .takesLimits = true};
+    case BodyKind::sliding:
+      return {.name = "sliding", .motion = joint, .isDoor = true, .takesLimits = true};
+    case BodyKind::lift:
+      return {.name = "lift", .motion = joint, .takesLimits = true, .takesStops = true};
+    case BodyKind::path:
+      return {.name = "path", .motion = joint, .takesKeys = true};
+    case BodyKind::rigid:
+      return {.name = "rigid", .motion = solver};
+    case BodyKind::trigger:
+      return {.name = "trigger", .isSolid = false};
+  }
+  return {};
+}
+
+/// Number of kinds: their values are 0 .. kBodyKindCount - 1.
+inline constexpr std::uint8_t kBodyKindCount = [] {
+  std::uint8_t count = 0;
+  while (getTraits(static_cast<BodyKind>(count)).name != nullptr) ++count;
+  return count;
+}();
+static_assert(kBodyKindCount == static_cast<int>(BodyKind::trigger) + 1, "a kind has no row");
+
+constexpr bool isKinematic(BodyKind kind) {
+  return getTraits(kind).motion == MotionSource::joint;
+}
+constexpr bool isDynamic(BodyKind kind) {
+  return getTraits(kind).motion == MotionSource::solver;
+}
+constexpr bool isTrigger(BodyKind kind) {
+  return !getTraits(kind).isSolid;
+}
+constexpr const char* toString(BodyKind kind) {
+  return getTraits(kind).name;
+}
+
+/// Source of a spec, by descending precedence.
 enum class BodySource : std::uint8_t { sidecar, khr, extras, suffix, ifc };
 
-/// Who opens a door besides commands.
+/// What opens a door in addition to commands.
 enum class OpenedBy : std::uint8_t {
-  command,  ///< nobody
-  touch     ///< an avatar that walks into it; it opens away from the avatar where it can
+  command,  ///< nothing
+  touch     ///< an avatar that walks into it; it opens away from the avatar if it can
 };
 
-/// A place on a path, relative to the authored one.
+/// A key pose of a path, relative to the authored pose.
 struct PathKey {
   double time = 0;             ///< seconds since the path began
   Vec3 offset = Vec3::Zero();  ///< metres, scene frame
-  double turn = 0;             ///< radians about BodySpec::axis through the anchor
+  double angle = 0;            ///< radians about BodySpec::axis through the anchor
 };
 
 struct BodySpec {
   std::string name;  ///< unique among bodies; events and commands use it
   BodyKind kind = BodyKind::rigid;
   BodySource source = BodySource::sidecar;
-  /// Indices into Model::objects of what moves with it: at least one, each in one body at most. The
-  /// first one's entity id is the body's.
+  /// Indices into Model::objects, at least one; an object belongs to at most one body. The body's
+  /// entity id is that of the first object.
   std::vector<std::uint32_t> objects;
 
   Vec3 anchor = Vec3::Zero();  ///< scene frame, metres; see the file's head
   Vec3 axis = Vec3::UnitY();   ///< scene frame, unit
 
   // hinged, sliding, lift: low <= 0 <= high.
-  double low = 0, high = 0;           ///< of the coordinate
-  double closed = 0;                  ///< doors: coordinate; open: the limit farther from it
-  std::vector<double> stops;          ///< lift: coordinates, ascending
-  double speed = 1;                   ///< of the coordinate per second, > 0
-  double acceleration = 0;            ///< of the coordinate; 0: it has its speed at once
-  std::optional<double> closesAfter;  ///< seconds that it stays open; none: until told
+  double low = 0, high = 0;   ///< limits of the joint position
+  double closedPosition = 0;  ///< doors: closed joint position; open is the limit farther from it
+  std::vector<double> stops;  ///< lift: joint positions, ascending
+  double speed = 1;           ///< of the joint position per second, > 0
+  double acceleration = 0;    ///< of the joint position; 0: full speed at once
+  std::optional<double> autoCloseDelay;  ///< seconds until an open door closes; nullopt: only by
+                                         ///< command
   OpenedBy openedBy = OpenedBy::command;
 
   // path
   std::vector<PathKey> keys;  ///< times ascending from 0; at least two
-  bool loops = false;         ///< begins again; then the last key is where the first one is
-  bool runs = true;           ///< from the first tick on; else when it is told
+  bool loops = false;         ///< repeats; the last key pose must equal the first one
+  bool autoStart = true;      ///< starts with the first tick; false: by command
 
   // rigid
-  double density = 500;          ///< kilograms per cubic metre
-  std::optional<double> mass;    ///< kilograms; none: from the density
-  double friction = 0.5;         ///< Coulomb's, >= 0
-  double restitution = 0;        ///< 0..1
-  Vec3 velocity = Vec3::Zero();  ///< at the start, of the centre of mass, m/s, scene frame
-  Vec3 spin = Vec3::Zero();      ///< at the start, rad/s, scene frame
+  double density = 500;                 ///< kilograms per cubic metre
+  std::optional<double> mass;           ///< kilograms; nullopt: computed from the density
+  double friction = 0.5;                ///< Coulomb friction, >= 0
+  double restitution = 0;               ///< 0..1
+  Vec3 velocity = Vec3::Zero();         ///< at the start, of the centre of mass, m/s, scene frame
+  Vec3 angularVelocity = Vec3::Zero();  ///< at the start, rad/s, scene frame
 };
 
-/// Driven along its coordinate, and nothing but what cannot yield stops it.
-constexpr bool isKinematic(BodyKind kind) {
-  return kind != BodyKind::rigid && kind != BodyKind::trigger;
+/// A path that repeats.
+inline bool isLoopingPath(const BodySpec& body) {
+  return getTraits(body.kind).takesKeys && body.loops;
 }
 
-/// A path that begins again, whenever it goes.
-inline bool goesRound(const BodySpec& body) {
-  return body.kind == BodyKind::path && body.loops;
-}
+/// Limits of a kinematic body's joint position: low, high.
+std::pair<double, double> getJointLimits(const BodySpec& spec);
 
-/// Of the coordinate of a kinematic body: low, high.
-std::pair<double, double> limitsOf(const BodySpec& spec);
-
-/// Metres a second of the fastest point of a kinematic body whose coordinate goes by 1 a second.
+/// Maximum speed of any point, m/s, of a kinematic body at a joint velocity of 1 per second.
 /// `radius`: of its shape, metres.
-double fastestPointOf(const BodySpec& spec, double radius);
+double computeMaxPointSpeed(const BodySpec& spec, double radius);
 
-const char* wordOf(BodyKind kind);
-const char* wordOf(BodySource source);
+const char* toString(BodySource source);
 
-/// What is wrong with one body's numbers, naming the field; nullopt when nothing is.
-std::optional<std::string> refusalOfBody(const BodySpec& body);
+/// Return an error text that names the field; nullopt if the body's values are valid.
+std::optional<std::string> validateBody(const BodySpec& body);
 
-/// What is wrong with a speed of the coordinate, of anything that may go.
-std::optional<std::string> refusalOfSpeed(double speed);
+/// Validates a speed of the joint position, of a spec or a command.
+std::optional<std::string> validateSpeed(double speed);
 
-/// What is wrong with the model's bodies, naming body and field; nullopt when nothing is.
-std::optional<std::string> refusalOfBodies(const Model& model);
+/// Validates all bodies of the model; an error text names body and field.
+std::optional<std::string> validateBodies(const Model& model);
 
 }  // namespace enfilade::scene

@@ -1,4 +1,4 @@
-// What the problems that an import or a report tells mean, and what to do about them.
+// Catalog of diagnostics: the meaning of each kind, and its remedy.
 #pragma once
 
 #include <string_view>
@@ -7,13 +7,13 @@
 
 namespace enfilade::scene {
 
-struct ProblemKind {
-  std::string_view word;     ///< Problem::kind
-  bool note = false;         ///< told so that nobody looks for it: nothing is wrong
-  std::string_view meaning;  ///< what it is and, where something can be done, what; for people
+struct DiagnosticKind {
+  std::string_view name;     ///< Diagnostic::kind
+  bool isNote = false;       ///< information only: nothing is wrong
+  std::string_view meaning;  ///< for people: the finding and, where possible, the remedy
 };
 
-/// That of `problem`; of a kind that nobody knows the meaning is empty.
-ProblemKind kindOf(const Problem& problem);
+/// Looks up the kind of `diagnostic`; for an unknown kind the meaning is empty.
+DiagnosticKind findDiagnosticKind(const Diagnostic& diagnostic);
 
 }  // namespace enfilade::scene

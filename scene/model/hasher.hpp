@@ -1,4 +1,5 @@
-// The 64-bit hash of scenes and states: FNV-1a over words, with a fold so that high bits reach low.
+// Hasher: the 64-bit hash of scenes and states, FNV-1a over words with a fold of high bits into low
+// ones.
 #pragma once
 
 #include <bit>

@@ -1,4 +1,4 @@
-// What an importer delivers and everything else reads: meshes stored once, objects that place them.
+// Model: the result of an import. Meshes are stored once; objects place them.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -12,7 +12,7 @@
 
 namespace enfilade::scene {
 
-using collision::Box;
+using collision::Aabb;
 using collision::Vec3;
 
 /// glTF's metallic-roughness subset. Colours are linear RGBA, 0..1.
@@ -37,72 +37,75 @@ struct Texture {
   std::vector<std::uint8_t> rgba;
 };
 
-/// Triangles of one material, in the mesh's own frame and unit. Counter-clockwise is outside.
+/// Triangles of one material, in the mesh's own frame and unit. Counter-clockwise is the outside.
 struct Mesh {
   std::string name;
   std::vector<Eigen::Vector3f> positions;
-  std::vector<Eigen::Vector3f> normals;  ///< empty, or one a position; unit length
-  std::vector<Eigen::Vector2f> uvs;    ///< empty, or one a position; (0,0) is the image's top left
-  std::vector<std::uint32_t> indices;  ///< three a triangle
+  std::vector<Eigen::Vector3f> normals;  ///< empty, or one per position; unit length
+  std::vector<Eigen::Vector2f> uvs;  ///< empty, or one per position; (0,0) is the image's top left
+  std::vector<std::uint32_t> indices;  ///< three per triangle
   std::uint32_t material = 0;
+
+  std::size_t triangleCount() const { return indices.size() / 3; }
 };
 
-/// One thing a person would name: a node that carries meshes. Its id is its index.
+/// A node that carries meshes, as a person would name it. Its id is its index.
 struct Object {
-  /// What it is there for. Where a file has a simpler shape for collision, the object itself is
-  /// only drawn, and the shape is only solid.
-  enum class Use : std::uint8_t { whole, drawn, solid };
+  /// If a file has a simpler shape for collision, the object itself is visual only, and the shape
+  /// is collision only.
+  enum class Usage : std::uint8_t { both, visualOnly, collisionOnly };
 
   std::string path;  ///< stable and unique: names from the root joined by '/', repeats as name#2
   std::string globalId;               ///< IFC GlobalId, or empty
   std::vector<std::uint32_t> meshes;  ///< indices into Model::meshes
-  /// metres, Y up, offset removed; may mirror and scale unequally. Where its determinant is
+  /// Metres, Y up, offset removed; may mirror and scale non-uniformly. If its determinant is
   /// negative, counter-clockwise in the mesh is clockwise in the world.
   Eigen::Affine3d worldFromMesh = Eigen::Affine3d::Identity();
-  std::string ifcClass = {};   ///< as "IfcDoor", "IfcTransportElement", or empty
-  std::string operation = {};  ///< IFC OperationType or its like: "SINGLE_SWING_LEFT", "ELEVATOR"
-  /// IFC's OverallWidth and OverallHeight of doors and windows in metres; 0: not told.
+  std::string ifcClass = {};  ///< such as "IfcDoor", "IfcTransportElement"; or empty
+  std::string operationType =
+      {};  ///< IFC OperationType or similar: "SINGLE_SWING_LEFT", "ELEVATOR"
+  /// IFC OverallWidth and OverallHeight of doors and windows in metres; 0: unknown.
   double overallWidth = 0, overallHeight = 0;
-  /// Where an IFC product was placed, in metres and without scale; nullopt: not told. Its own axes
-  /// are IFC's: of a door x runs along its width from the lower corner, y is the side to which it
+  /// Placement of an IFC product, in metres and without scale; nullopt: unknown. Its axes are
+  /// IFC's: for a door, x runs along its width from the lower corner, y is the side to which it
   /// opens, z is up.
   std::optional<Eigen::Affine3d> worldFromPlacement = std::nullopt;
-  Use use = Use::whole;
-  /// The object that it is a piece of and that people would name: of a collision shape what is
-  /// drawn in its place, of a door's frame the door.
-  std::optional<std::uint32_t> pieceOf = std::nullopt;
+  Usage usage = Usage::both;
+  /// The object that this one is a part of, by which people name it: for a collision shape the
+  /// drawn object, for a door's frame the door.
+  std::optional<std::uint32_t> partOf = std::nullopt;
 };
 
-/// Something the user should know about the file: degenerate triangles, missing textures, ...
-struct Problem {
-  std::string kind;  ///< a short stable word, as "missing_texture"
+/// A finding about the file for the user: degenerate triangles, missing textures, ...
+struct Diagnostic {
+  std::string kind;  ///< a short stable identifier, such as "missing_texture"
   std::size_t count = 0;
-  std::string example;  ///< the first place it was met
+  std::string example;  ///< the first occurrence
 };
 
 struct Model {
   std::string source;  ///< the file's path as given, or the generator's name
-  std::string reader;  ///< what read the file: "assimp", "web-ifc", "ifcplusplus"; else empty
+  std::string reader;  ///< reader of the file: "assimp", "web-ifc", "ifcplusplus"; otherwise empty
   std::vector<Material> materials;
   std::vector<Texture> textures;
   std::vector<Mesh> meshes;
   std::vector<Object> objects;
-  std::vector<BodySpec> bodies;  ///< what moves; Scene refuses a model whose bodies are wrong
+  std::vector<BodySpec> bodies;  ///< Scene rejects a model with invalid bodies
 
-  double metresPerUnit = 1;  ///< what one unit of the file was taken for
-  char up = 'y';             ///< the file's up axis, already turned to Y
-  /// Subtracted from the file's coordinates (in metres, Y up) so that the scene lies near its
-  /// origin; zero unless the scene lies far from it. file = scene + offset.
+  double metresPerUnit = 1;  ///< assumed unit of the file
+  char upAxis = 'y';         ///< the file's up axis; coordinates are already converted to Y up
+  /// Subtracted from the file's coordinates (metres, Y up) so that the scene lies near its origin;
+  /// zero unless the scene lies far from it. file = scene + offset.
   Vec3 offset = Vec3::Zero();
-  std::vector<Problem> problems;
-  /// Files beside `source` that were read or looked for, some of them twice or in vain: what they
-  /// hold shaped the model as well.
-  std::vector<std::string> filesBeside;
+  std::vector<Diagnostic> diagnostics;
+  /// Other files that were read or looked up, possibly repeated or missing: their content affects
+  /// the model.
+  std::vector<std::string> dependencies;
 };
 
-/// The world position of a vertex, always by this one expression, so that all who ask agree to the
-/// last bit.
-inline Vec3 worldPosition(const Object& object, const Mesh& mesh, std::uint32_t vertex) {
+/// World position of a vertex. Always use this expression, so that all results agree to the last
+/// bit.
+inline Vec3 computeWorldPosition(const Object& object, const Mesh& mesh, std::uint32_t vertex) {
   return object.worldFromMesh * mesh.positions[vertex].cast<double>();
 }
 

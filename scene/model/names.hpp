@@ -1,4 +1,4 @@
-// What avatars, captures and worlds may be called.
+// Rules for the names of avatars, captures and worlds.
 #pragma once
 
 #include <algorithm>
@@ -6,19 +6,19 @@
 
 namespace enfilade::scene {
 
-inline constexpr std::size_t kLongestName = 64;  ///< characters
+inline constexpr std::size_t kMaxNameLength = 64;  ///< characters
 
-inline bool isNameLetter(char c) {
+inline bool isNameCharacter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
          c == '_' || c == '-';
 }
 
-inline bool isName(const std::string& name) {
-  return !name.empty() && name.size() <= kLongestName && name.front() != '.' &&
-         std::all_of(name.begin(), name.end(), isNameLetter);
+inline bool isValidName(const std::string& name) {
+  return !name.empty() && name.size() <= kMaxNameLength && name.front() != '.' &&
+         std::all_of(name.begin(), name.end(), isNameCharacter);
 }
 
-/// For a person: it follows the name of the field.
+/// Error text that follows the field's name.
 inline constexpr const char* kNameRule =
     " must be 1 to 64 letters, digits, '.', '_' or '-', and not begin with '.'";
 

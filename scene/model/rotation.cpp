@@ -1,5 +1,6 @@
-// Reduction to +-45 degrees by whole quarter turns (exact in doubles: fmod is exact), then the
-// Taylor polynomials of sine and cosine about 0, whose remainder at pi/4 is below 1e-17.
+// Reduces an angle to +-45 degrees by quarter turns (exact in doubles, as fmod is exact), then
+// evaluates the Taylor polynomials of sine and cosine about 0. Their remainder at pi/4 is below
+// 1e-17.
 #include "scene/model/rotation.hpp"
 
 #include <cmath>
@@ -27,8 +28,8 @@ struct SineAndCosine {
   double sine, cosine;
 };
 
-/// Of any finite angle; whole quarter turns are taken off in degrees, where they are exact.
-SineAndCosine ofDegrees(double degrees) {
+/// For any finite angle; quarter turns are removed in degrees, where they are exact.
+SineAndCosine computeSineAndCosine(double degrees) {
   double rest = std::fmod(degrees, 360.0);
   int quarters = 0;
   while (rest > 45) rest -= 90, ++quarters;
@@ -49,14 +50,14 @@ SineAndCosine ofDegrees(double degrees) {
 
 }  // namespace
 
-collision::Vec3 headingFromDegrees(double degrees) {
-  const auto [s, c] = ofDegrees(degrees);
+collision::Vec3 makeHeadingFromDegrees(double degrees) {
+  const auto [s, c] = computeSineAndCosine(degrees);
   return {c, 0, -s};
 }
 
-collision::Quat rotationAbout(const collision::Vec3& axis, double radians) {
+collision::Quat makeAxisRotation(const collision::Vec3& axis, double radians) {
   if (radians == 0) return collision::Quat::Identity();
-  const auto [s, c] = ofDegrees(0.5 * radians / kRadiansPerDegree);
+  const auto [s, c] = computeSineAndCosine(0.5 * radians / kRadiansPerDegree);
   return {c, s * axis.x(), s * axis.y(), s * axis.z()};
 }
 

@@ -1,4 +1,5 @@
-// Directions from angles, by arithmetic alone: libm's sin and cos differ between processors.
+// Deterministic rotations from angles, by basic arithmetic: libm's sin and cos differ between
+// processors.
 #pragma once
 
 #include "collision/types.hpp"
@@ -8,10 +9,10 @@ namespace enfilade::scene {
 /// Unit vector in the ground plane: 0 degrees is +X, 90 is -Z (counter-clockwise seen from above).
 /// Finite `degrees` of any size; the result is within 1e-15 of the true direction for |degrees| up
 /// to 1e4 and always of unit length within 4 ulp.
-collision::Vec3 headingFromDegrees(double degrees);
+collision::Vec3 makeHeadingFromDegrees(double degrees);
 
-/// The rotation about `axis` (unit) by `radians`, finite: by whole turns, then as
-/// headingFromDegrees(). A unit quaternion within 4 ulp; the identity to the last bit for 0.
-collision::Quat rotationAbout(const collision::Vec3& axis, double radians);
+/// Rotation by `radians` (finite) about `axis` (unit): whole turns are removed, then as
+/// makeHeadingFromDegrees(). A unit quaternion within 4 ulp; exactly the identity for 0.
+collision::Quat makeAxisRotation(const collision::Vec3& axis, double radians);
 
 }  // namespace enfilade::scene

@@ -1,77 +1,87 @@
-// The gyroscopic term by implicit Euler in the body's axes,
+// Gyroscopic term by implicit Euler in body axes:
 //   f(w') = I (w' - w) + t w' x I w' = 0,
-// by Newton's method (E. Catto, "Numerical Methods", Game Developers Conference 2015, takes one
-// step). Where f is zero, w' . I w' = w' . I w, so by Cauchy and Schwarz the energy cannot grow;
-// what the last step leaves of f is taken off by scaling.
+// solved by Newton's method (E. Catto, "Numerical Methods", Game Developers Conference 2015, takes
+// one iteration). Where f is zero, w' . I w' = w' . I w. By Cauchy-Schwarz the energy then cannot
+// grow. Scaling removes the residual that the last iteration leaves.
 #include "scene/physics/body_motion.hpp"
 
 #include <cmath>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::scene {
 namespace {
 
-constexpr int kNewtonSteps = 3;
+constexpr int kNewtonIterations = 3;
 
-/// x for which x0 c0 + x1 c1 + x2 c2 = f, by Cramer's rule.
-Vec3 solved(const Vec3& c0, const Vec3& c1, const Vec3& c2, const Vec3& f) {
-  const Vec3 across = c1.cross(c2);
-  return Vec3(f.dot(across), f.dot(c2.cross(c0)), f.dot(c0.cross(c1))) / c0.dot(across);
+/// Solves x0 c0 + x1 c1 + x2 c2 = f by Cramer's rule.
+Vec3 solveLinear3(const Vec3& c0, const Vec3& c1, const Vec3& c2, const Vec3& f) {
+  const Vec3 cross12 = c1.cross(c2);
+  return Vec3(f.dot(cross12), f.dot(c2.cross(c0)), f.dot(c0.cross(c1))) / c0.dot(cross12);
 }
 
-/// Newton's step: f(spin), by the inverse of its slope.
-Vec3 newtonStep(const Mat3& inertia, const Vec3& before, const Vec3& spin, double seconds) {
-  const Vec3 momentum = inertia * spin;
-  const Vec3 f = inertia * (spin - before) + seconds * spin.cross(momentum);
-  const auto slope = [&](int k) {
+/// Newton step: the inverse Jacobian of f times f(angularVelocity).
+Vec3 computeNewtonStep(const Mat3& inertia, const Vec3& before, const Vec3& angularVelocity,
+                       double seconds) {
+  const Vec3 momentum = inertia * angularVelocity;
+  const Vec3 f = inertia * (angularVelocity - before) + seconds * angularVelocity.cross(momentum);
+  const auto jacobianColumn = [&](int k) {
     const Vec3 column = inertia.col(k);
-    return Vec3(column + seconds * (spin.cross(column) - momentum.cross(Vec3::Unit(k))));
+    return Vec3(column + seconds * (angularVelocity.cross(column) - momentum.cross(Vec3::Unit(k))));
   };
-  return solved(slope(0), slope(1), slope(2), f);
+  return solveLinear3(jacobianColumn(0), jacobianColumn(1), jacobianColumn(2), f);
 }
 
 }  // namespace
 
-RigidBody freeBody(const MassProperties& properties, const collision::Pose& worldFromBody) {
-  RigidBody body;
-  body.rotation = worldFromBody.rotation;
-  body.centre =
+BodyMotion makeDynamicMotion(const MassProperties& properties,
+                             const collision::Pose& worldFromBody) {
+  BodyMotion motion;
+  motion.rotation = worldFromBody.rotation;
+  motion.centre =
       worldFromBody.rotation.toRotationMatrix() * properties.centre + worldFromBody.translation;
-  body.inverseMass = 1 / properties.mass;
-  body.inertia = properties.inertia;
-  body.inverseInertia = properties.inertia.inverse();
-  return body;
+  ENFILADE_ASSERT(properties.mass > 0);
+  motion.inverseMass = 1 / properties.mass;
+  motion.inertia = properties.inertia;
+  motion.inverseInertia = properties.inertia.inverse();
+  return motion;
 }
 
-void advance(RigidBody& body, double seconds) {
-  body.centre += seconds * body.velocity;
-  const Vec3 half = 0.5 * seconds * body.spin;
-  const Quat turn(1, half.x(), half.y(), half.z());
-  body.rotation = turn * body.rotation;
-  const double length = std::sqrt(body.rotation.squaredNorm());
-  body.rotation.coeffs() /= length;
+void integratePose(BodyMotion& motion, double seconds) {
+  motion.centre += seconds * motion.velocity;
+  const Vec3 half = 0.5 * seconds * motion.angularVelocity;
+  const Quat rotationStep(1, half.x(), half.y(), half.z());
+  motion.rotation = rotationStep * motion.rotation;
+  const double length = std::sqrt(motion.rotation.squaredNorm());
+  motion.rotation.coeffs() /= length;
 }
 
-void bendSpin(RigidBody& body, double seconds) {
-  if (body.inverseMass == 0) return;
-  const Mat3 rotation = body.rotation.toRotationMatrix();
-  const Vec3 before = rotation.transpose() * body.spin;
-  Vec3 spin = before;
-  for (int i = 0; i < kNewtonSteps; ++i) spin -= newtonStep(body.inertia, before, spin, seconds);
-  const double energy = before.dot(body.inertia * before), after = spin.dot(body.inertia * spin);
+void applyGyroscopicTorque(BodyMotion& motion, double seconds) {
+  if (motion.inverseMass == 0) return;
+  const Mat3 rotation = motion.rotation.toRotationMatrix();
+  const Vec3 before = rotation.transpose() * motion.angularVelocity;
+  Vec3 angularVelocity = before;
+  for (int i = 0; i < kNewtonIterations; ++i)
+    angularVelocity -= computeNewtonStep(motion.inertia, before, angularVelocity, seconds);
+  const double energy = before.dot(motion.inertia * before),
+               after = angularVelocity.dot(motion.inertia * angularVelocity);
   if (!(after <= energy))
-    spin = std::isfinite(after) ? Vec3(std::sqrt(energy / after) * spin) : before;
-  body.spin = rotation * spin;
+    angularVelocity =
+        std::isfinite(after) ? Vec3(std::sqrt(energy / after) * angularVelocity) : before;
+  motion.angularVelocity = rotation * angularVelocity;
 }
 
-Mat3 worldInverseInertia(const RigidBody& body) {
-  const Mat3 rotation = body.rotation.toRotationMatrix();
-  return rotation * body.inverseInertia * rotation.transpose();
+Mat3 computeWorldInverseInertia(const BodyMotion& motion) {
+  const Mat3 rotation = motion.rotation.toRotationMatrix();
+  return rotation * motion.inverseInertia * rotation.transpose();
 }
 
-double kineticEnergy(const RigidBody& body) {
-  if (body.inverseMass == 0) return 0;
-  const Vec3 spin = body.rotation.toRotationMatrix().transpose() * body.spin;
-  return 0.5 * (body.velocity.squaredNorm() / body.inverseMass + spin.dot(body.inertia * spin));
+double computeKineticEnergy(const BodyMotion& motion) {
+  if (motion.inverseMass == 0) return 0;
+  const Vec3 angularVelocity =
+      motion.rotation.toRotationMatrix().transpose() * motion.angularVelocity;
+  return 0.5 * (motion.velocity.squaredNorm() / motion.inverseMass +
+                angularVelocity.dot(motion.inertia * angularVelocity));
 }
 
 }  // namespace enfilade::scene

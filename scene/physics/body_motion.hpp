@@ -1,4 +1,4 @@
-// A rigid body that moves: its state, and how it goes on when nothing touches it.
+// Motion state of one rigid body, and its integration without contacts.
 #pragma once
 
 #include "collision/types.hpp"
@@ -8,35 +8,37 @@ namespace enfilade::scene {
 
 using collision::Quat;
 
-/// World frame, metres, seconds, kilograms.
-struct RigidBody {
-  Vec3 centre = Vec3::Zero();          ///< of mass
-  Quat rotation = Quat::Identity();    ///< worldFromBody, unit
-  Vec3 velocity = Vec3::Zero();        ///< of the centre, m/s
-  Vec3 spin = Vec3::Zero();            ///< rad/s
-  double inverseMass = 0;              ///< 1/kg; 0: no impulse changes how it moves
-  Mat3 inertia = Mat3::Zero();         ///< about the centre, body's axes; zero if inverseMass is
-  Mat3 inverseInertia = Mat3::Zero();  ///< the same
-  double friction = 0.5;               ///< Coulomb's coefficient, >= 0; of a pair: sqrt(a b)
-  double restitution = 0;              ///< 0..1; of a pair: the greater one
+inline constexpr double kRoundUpFactor = 1 + 0x1p-40;  ///< exceeds a few rounding errors
+
+/// State and mass properties of a rigid body. World frame; metres, seconds, kilograms.
+struct BodyMotion {
+  Vec3 centre = Vec3::Zero();           ///< centre of mass
+  Quat rotation = Quat::Identity();     ///< worldFromBody, unit
+  Vec3 velocity = Vec3::Zero();         ///< of the centre, m/s
+  Vec3 angularVelocity = Vec3::Zero();  ///< rad/s
+  double inverseMass = 0;               ///< 1/kg; 0: impulses do not move the body
+  Mat3 inertia = Mat3::Zero();  ///< about the centre of mass, body axes; zero if inverseMass is 0
+  Mat3 inverseInertia = Mat3::Zero();  ///< body axes; zero if inverseMass is 0
+  double friction = 0.5;               ///< Coulomb coefficient, >= 0; a pair uses sqrt(a b)
+  double restitution = 0;              ///< 0..1; a pair uses the larger one
 };
 
-/// A free body at rest whose frame's origin is at `worldFromBody`.
-RigidBody freeBody(const MassProperties& properties, const collision::Pose& worldFromBody);
+/// Returns a dynamic body at rest whose frame has its origin at `worldFromBody`.
+BodyMotion makeDynamicMotion(const MassProperties& properties,
+                             const collision::Pose& worldFromBody);
 
-/// Goes on for `seconds` with its velocity and spin. The rotation advances by Cayley's rational
-/// map, (1, spin t / 2) normalised, which turns by 2 atan(|spin| t / 2): less than |spin| t by its
-/// cube.
-void advance(RigidBody& body, double seconds);
+/// Advances the pose by `seconds` with constant velocities. The rotation uses the Cayley map,
+/// (1, w t / 2) normalised. It rotates by 2 atan(|w| t / 2), which is less than |w| t by its cube.
+void integratePose(BodyMotion& motion, double seconds);
 
-/// How the spin changes when nothing acts: spin x (inertia spin) bends it. Implicit, so it is
-/// stable at any spin, and the kinetic energy never grows.
-void bendSpin(RigidBody& body, double seconds);
+/// Applies the gyroscopic torque, w x (I w), to the angular velocity. The integration is implicit:
+/// it is stable at any angular velocity, and the kinetic energy never grows.
+void applyGyroscopicTorque(BodyMotion& motion, double seconds);
 
-/// kg m^2 inverted, in the world's axes.
-Mat3 worldInverseInertia(const RigidBody& body);
+/// Inverse inertia in world axes, 1/(kg m^2).
+Mat3 computeWorldInverseInertia(const BodyMotion& motion);
 
-/// J, of the motion only; 0 for a body that impulses do not change.
-double kineticEnergy(const RigidBody& body);
+/// Kinetic energy in joules; 0 for a body that impulses do not move.
+double computeKineticEnergy(const BodyMotion& motion);
 
 }  // namespace enfilade::scene

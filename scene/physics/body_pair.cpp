@@ -1,19 +1,20 @@
-// Which plane parts two bodies? The closest points' is one; of the faces that look along it, that
-// of either body may be another. A contact along any of them keeps the bodies apart.
-//  - At rest a face's is better: where edges of equal boxes lie above one another the closest
-//    points are those of rounded corners, and their normal leans with every hair's breadth.
-//  - On the way the one is best under which the motion of now needs to change least. A box that
-//    slides over a floor of triangles comes near the edges of those ahead, and the closest points'
-//    plane would stop it there; one that falls beside a table's top would be stopped by the top's.
+// Normal selection. Any plane that separates the bodies keeps them apart: the plane of the closest
+// points, or that of a face of either body that looks along it.
+//   - Near rest a face normal is better. Where edges of equal boxes are aligned, the closest
+//     points lie on rounded corners, and their normal changes with the slightest displacement.
+//   - In motion the plane that opposes the predicted motion least is best. A box that slides over
+//     a triangulated floor comes close to edges ahead; their normals would stop it (ghost
+//     collisions on seams).
 //
-// Most pairs are answered without the narrow phase: their spheres are apart, or the plane that
-// parted them last does still, by a proved gap; and who rested on a face goes on to, while the gap
-// along it is about the distance of the nearest two points that lie above one another.
+// Most pairs need no narrow phase. Either their bounding spheres are apart, or the last separating
+// axis still separates them by a certified distance. A pair that rested on a face keeps that face,
+// as long as the separation along it is about the distance of the nearest facing points.
 #include "scene/physics/body_pair.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "collision/assert.hpp"
 #include "collision/narrow_phase/axis_separation.hpp"
 #include "collision/narrow_phase/contact_manifold.hpp"
 #include "collision/shapes/hull.hpp"
@@ -21,386 +22,428 @@
 namespace enfilade::scene {
 namespace {
 
-using collision::ConvexBody;
-using collision::Decision;
+using collision::PlacedConvex;
+using collision::SeparationResult;
 using collision::Verdict;
 
-/// Of the way that they could come nearer in a step: looking so much farther saves looking again.
-constexpr double kForesight = 1;
-/// What two free bodies go past one another, and turn, brings them nearer by what any point of
-/// theirs could do at most; of so many epsilons of it this part is foreseen. It is little, so that
-/// hardly any momentum is lost where it was more and a proof stops them before they touch.
-constexpr double kOfPassing = 0.3, kPassing = 8;
-/// Of the distance: a face's plane that parts resting bodies by so much is taken.
-constexpr double kFaceAtRest = 0.8;
-/// Of the lesser radius: a point that wandered less is last step's point.
-constexpr double kSamePoint = 0.25;
-/// Of the coordinates: more than what spheres lose by rounding, here and where solids are placed.
-constexpr double kOfSpheres = 0x1p-44;
-constexpr double kMore = 1 + 0x1p-40;  // above what a few roundings lose
-constexpr double kAhead = 0.5;         // cosine: what is pushed within 60 degrees of the way
+/// Fraction of the possible approach in a step that is added to the query distance. It saves
+/// queries in later steps.
+constexpr double kQueryMarginFactor = 1;
+/// Tangential motion and rotation of two dynamic bodies reduce the distance by far less than their
+/// bound. Only this fraction of the bound, up to so many contact offsets, is expected. Where more
+/// occurs, the continuous check stops the bodies before contact, at a small loss of momentum.
+constexpr double kTangentialFraction = 0.3, kMaxTangentialOffsets = 8;
+/// Fraction of the distance: a face plane that separates resting bodies by at least this much is
+/// preferred.
+constexpr double kFacePreference = 0.8;
+/// Fraction of the smaller radius: a contact point that moved less matches the one of the last
+/// step.
+constexpr double kPointMatchFraction = 0.25;
+/// Fraction of the coordinates: exceeds the rounding error of bounding spheres and of placed
+/// bodies.
+constexpr double kSphereRounding = 0x1p-44;
+constexpr double kAheadCosine = 0.5;  // cosine of 60 degrees about the motion
 
-struct Axis {
-  Vec3 normal = Vec3::UnitY();  ///< from A to B
-  double gap = 0;               ///< metres
+struct ContactAxis {
+  Vec3 normal = Vec3::UnitY();  ///< unit, from A to B
+  double separation = 0;        ///< metres
   Vec3 pointA = Vec3::Zero(), pointB = Vec3::Zero();
 };
 
-Vec3 worldVertex(const ConvexBody& body, std::size_t i) {
-  return (body.rotation ? Vec3(*body.rotation * body.vertices[i]) : body.vertices[i]) +
-         body.translation;
+Vec3 computeWorldVertex(const PlacedConvex& shape, std::size_t i) {
+  return (shape.rotation ? Vec3(*shape.rotation * shape.vertices[i]) : shape.vertices[i]) +
+         shape.translation;
 }
 
-bool isTriangle(const ConvexBody& body) {
-  return !body.hull && body.vertices.size() == 3;
+bool isTriangle(const PlacedConvex& shape) {
+  return !shape.hull && shape.vertices.size() == 3;
 }
 
-Vec3 toBody(const ConvexBody& body, const Vec3& world) {
-  return body.rotation ? Vec3(body.rotation->transpose() * world) : world;
+Vec3 rotateToBody(const PlacedConvex& shape, const Vec3& world) {
+  return shape.rotation ? Vec3(shape.rotation->transpose() * world) : world;
 }
 
-/// The normal (world) of the face that looks along `direction` most; zero where there are no faces.
-Vec3 facing(const Solid& solid, std::uint32_t part, const ConvexBody& body, const Vec3& direction) {
-  if (isTriangle(body)) {
-    const auto& v = body.vertices;
+/// Returns the normal (world) of the face that looks along `direction` most; zero without faces.
+Vec3 findFacingNormal(const PhysicsBody& body, std::uint32_t part, const PlacedConvex& shape,
+                      const Vec3& direction) {
+  if (isTriangle(shape)) {
+    const auto& v = shape.vertices;
     const Vec3 normal = (v[1] - v[0]).cross(v[2] - v[0]);
-    const double length = normal.norm(), along = normal.dot(toBody(body, direction));
+    const double length = normal.norm(), projection = normal.dot(rotateToBody(shape, direction));
     if (!(length > 0)) return Vec3::Zero();
-    const Vec3 world = body.rotation ? Vec3(*body.rotation * normal) : normal;
-    return (along < 0 ? -1 : 1) / length * world;
+    const Vec3 world = shape.rotation ? Vec3(*shape.rotation * normal) : normal;
+    return (projection < 0 ? -1 : 1) / length * world;
   }
-  if (part >= solid.parts.size() || solid.parts[part].faceNormals.empty()) return Vec3::Zero();
-  const Vec3 inBody = toBody(body, direction);
+  if (part >= body.parts.size() || body.parts[part].faceNormals.empty()) return Vec3::Zero();
+  const Vec3 directionInBody = rotateToBody(shape, direction);
   const Vec3* best = nullptr;
-  double most = -2;
-  for (const Vec3& normal : solid.parts[part].faceNormals) {
-    const double along = normal.dot(inBody);
-    if (along > most) most = along, best = &normal;
+  double maxProjection = -2;
+  for (const Vec3& normal : body.parts[part].faceNormals) {
+    const double projection = normal.dot(directionInBody);
+    if (projection > maxProjection) maxProjection = projection, best = &normal;
   }
-  return body.rotation ? Vec3(*body.rotation * *best) : *best;
+  ENFILADE_ASSERT(best);
+  return shape.rotation ? Vec3(*shape.rotation * *best) : *best;
 }
 
-/// The gap along a normal from A to B.
-Axis axisAlong(const Vec3& normal, const ConvexBody& a, const collision::Gap& gap) {
-  Axis axis{normal, gap.value, worldVertex(a, gap.vertices.a), Vec3::Zero()};
-  // A manifold starts from two points that face one another.
-  axis.pointB = axis.pointA + axis.gap * normal;
+/// Returns the contact axis along `normal` (from A to B).
+ContactAxis makeContactAxis(const Vec3& normal, const PlacedConvex& a,
+                            const collision::AxisSeparation& separation) {
+  ContactAxis axis{normal, separation.value, computeWorldVertex(a, separation.vertices.a),
+                   Vec3::Zero()};
+  // A manifold starts from two points that face each other.
+  axis.pointB = axis.pointA + axis.separation * normal;
   return axis;
 }
 
-Vec3 velocityToCome(const Solid& solid, const NearPairStep& step) {
-  if (!solid.isAwake()) return solid.isFree() ? Vec3(Vec3::Zero()) : solid.motion.velocity;
-  return solid.motion.velocity + step.seconds * step.gravity;
+Vec3 predictVelocity(const PhysicsBody& body, const PairStepSettings& step) {
+  if (!body.isAwake()) return body.isDynamic() ? Vec3(Vec3::Zero()) : body.motion.velocity;
+  return body.motion.velocity + step.seconds * step.gravity;
 }
 
-/// See the file's head. `closest`: the bodies are apart.
-Axis axisFor(const Axis& closest, const NearPair& pair, const Solid& a, const Solid& b,
-             const NearPairStep& step, CloseUp::Plane& plane) {
-  const ConvexBody bodyA = partOf(a, pair.key.partA), bodyB = partOf(b, pair.key.partB);
-  const Vec3 way = step.seconds * (velocityToCome(b, step) - velocityToCome(a, step));
-  const auto room = [&](const Axis& axis) { return axis.gap + axis.normal.dot(way); };
-  const bool resting = closest.gap < 2 * step.epsilon;
-  Axis best = closest;
-  double most = resting ? kFaceAtRest * closest.gap : room(closest);
-  const auto consider = [&](const Vec3& normal, CloseUp::Plane of) {
-    if (normal.isZero(0)) return;
-    const Axis axis = axisAlong(normal, bodyA, collision::gapAlong(bodyA, bodyB, normal));
-    if (!(axis.gap > 0)) return;
-    const double value = resting ? axis.gap : room(axis);
-    if (value > most) most = value, best = axis, plane = of;
+/// Chooses the contact axis as the head of this file describes. `closest`: the bodies are
+/// separated.
+ContactAxis chooseContactAxis(const ContactAxis& closest, const BodyPair& pair,
+                              const PhysicsBody& a, const PhysicsBody& b,
+                              const PairStepSettings& step, PairCache::NormalSource& source) {
+  const PlacedConvex shapeA = placePart(a, pair.key.partA), shapeB = placePart(b, pair.key.partB);
+  const Vec3 displacement = step.seconds * (predictVelocity(b, step) - predictVelocity(a, step));
+  const auto predictSeparation = [&](const ContactAxis& axis) {
+    return axis.separation + axis.normal.dot(displacement);
   };
-  plane = CloseUp::Plane::closest;
-  consider(facing(a, pair.key.partA, bodyA, closest.normal), CloseUp::Plane::faceOfA);
-  consider(-facing(b, pair.key.partB, bodyB, -closest.normal), CloseUp::Plane::faceOfB);
+  const bool resting = closest.separation < 2 * step.contactOffset;
+  ContactAxis best = closest;
+  double bestValue = resting ? kFacePreference * closest.separation : predictSeparation(closest);
+  const auto consider = [&](const Vec3& normal, PairCache::NormalSource candidateSource) {
+    if (normal.isZero(0)) return;
+    const ContactAxis axis =
+        makeContactAxis(normal, shapeA, collision::computeAxisSeparation(shapeA, shapeB, normal));
+    if (!(axis.separation > 0)) return;
+    const double value = resting ? axis.separation : predictSeparation(axis);
+    if (value > bestValue) bestValue = value, best = axis, source = candidateSource;
+  };
+  source = PairCache::NormalSource::closestPoints;
+  consider(findFacingNormal(a, pair.key.partA, shapeA, closest.normal),
+           PairCache::NormalSource::faceA);
+  consider(-findFacingNormal(b, pair.key.partB, shapeB, -closest.normal),
+           PairCache::NormalSource::faceB);
   return best;
 }
 
-Vec3 velocityOf(const Solid& solid) {
-  return solid.asleep ? Vec3(Vec3::Zero()) : solid.motion.velocity;
+Vec3 computeVelocity(const PhysicsBody& body) {
+  return body.asleep ? Vec3(Vec3::Zero()) : body.motion.velocity;
 }
-/// m/s, by turning.
-double tipOf(const Solid& solid) {
-  return solid.asleep ? 0 : solid.motion.spin.norm() * solid.radius;
+/// Bound of the speed that rotation adds, in m/s.
+double computeRotationalSpeed(const PhysicsBody& body) {
+  return body.asleep ? 0 : body.motion.angularVelocity.norm() * body.radius;
 }
 
-/// Metres by which the pair closes in within the step, by the speeds of now.
-struct ReachOfPair {
-  double most;    ///< were it that of the points that get farthest
-  double likely;  ///< of two free bodies less: see kOfPassing
+/// Metres by which the pair can approach in the step at the present velocities.
+struct ApproachBound {
+  double max;       ///< bound over all points
+  double expected;  ///< smaller for two dynamic bodies; see kTangentialFraction
 };
-ReachOfPair reachOf(const NearPair& pair, const Solid& a, const Solid& b,
-                    const NearPairStep& step) {
-  const Vec3 velocity = velocityOf(a) - velocityOf(b);
-  const bool falls = a.isAwake() || b.isAwake();
-  const Vec3 gained = falls ? Vec3(step.seconds * step.gravity) : Vec3(Vec3::Zero());
-  const double tips = tipOf(a) + tipOf(b);
-  const double pushed =
-      a.mostPush > 0 || b.mostPush > 0 ? (a.pushVelocity - b.pushVelocity).norm() : 0;
-  const double driven = pushed + a.swing() + b.swing();
-  const double most = step.seconds * (velocity.norm() + gained.norm() + tips + driven);
-  if (!a.isFree() || !b.isFree() || pair.axis.isZero(0)) return {most, most};
-  const double nearer = velocity.dot(pair.axis), falling = gained.dot(pair.axis);
-  const double straight = std::max(0.0, nearer) + std::abs(falling) + driven;
-  const double passing = step.seconds * (tips + (velocity - nearer * pair.axis).norm() +
-                                         (gained - falling * pair.axis).norm());
-  const double unlikely = (1 - kOfPassing) * std::min(passing, kPassing * step.epsilon);
-  return {most, step.seconds * straight + passing - unlikely};
+ApproachBound computeApproachBound(const BodyPair& pair, const PhysicsBody& a, const PhysicsBody& b,
+                                   const PairStepSettings& step) {
+  const Vec3 velocity = computeVelocity(a) - computeVelocity(b);
+  const bool isFalling = a.isAwake() || b.isAwake();
+  const Vec3 gainedVelocity = isFalling ? Vec3(step.seconds * step.gravity) : Vec3(Vec3::Zero());
+  const double rotationalSpeed = computeRotationalSpeed(a) + computeRotationalSpeed(b);
+  const double pushSpeed =
+      a.maxPushForce > 0 || b.maxPushForce > 0 ? (a.targetVelocity - b.targetVelocity).norm() : 0;
+  const double drivenSpeed = pushSpeed + a.maxVelocityDeviation() + b.maxVelocityDeviation();
+  const double maxApproach =
+      step.seconds * (velocity.norm() + gainedVelocity.norm() + rotationalSpeed + drivenSpeed);
+  if (!a.isDynamic() || !b.isDynamic() || pair.separatingAxis.isZero(0))
+    return {maxApproach, maxApproach};
+  const double closingSpeed = velocity.dot(pair.separatingAxis),
+               gainedClosingSpeed = gainedVelocity.dot(pair.separatingAxis);
+  const double normalSpeed =
+      std::max(0.0, closingSpeed) + std::abs(gainedClosingSpeed) + drivenSpeed;
+  const double tangentialApproach =
+      step.seconds * (rotationalSpeed + (velocity - closingSpeed * pair.separatingAxis).norm() +
+                      (gainedVelocity - gainedClosingSpeed * pair.separatingAxis).norm());
+  const double ignoredApproach =
+      (1 - kTangentialFraction) *
+      std::min(tangentialApproach, kMaxTangentialOffsets * step.contactOffset);
+  return {maxApproach, step.seconds * normalSpeed + tangentialApproach - ignoredApproach};
 }
 
-/// The closest or deepest points, and what is known of the distance.
-Axis measure(NearPair& pair, const ConvexBody& a, const ConvexBody& b, const Decision& decision) {
-  if (decision.verdict != Verdict::penetrating) {
-    pair.apart = decision.distance - decision.errorBound;
-    return {decision.normal, decision.distance, decision.pointA, decision.pointB};
+/// Stores the distance bound or the penetration, and returns the axis of the closest or deepest
+/// points.
+ContactAxis measureDistance(BodyPair& pair, const PlacedConvex& a, const PlacedConvex& b,
+                            const SeparationResult& result) {
+  if (result.verdict != Verdict::penetrating) {
+    pair.lowerBound = result.distance - result.errorBound;
+    return {result.normal, result.distance, result.pointA, result.pointB};
   }
-  CloseUp& close = *pair.close;
-  if (!close.depth) close.depth = std::make_unique<collision::DepthCache>();
-  const collision::Depth depth = collision::penetrationDepth(a, b, close.features, *close.depth);
-  pair.apart = 0;
-  close.penetration = depth.depth;
+  PairCache& cache = *pair.cache;
+  if (!cache.depth) cache.depth = std::make_unique<collision::DepthCache>();
+  const collision::PenetrationResult depth =
+      collision::computePenetrationDepth(a, b, cache.features, *cache.depth);
+  pair.lowerBound = 0;
+  ENFILADE_ASSERT(depth.depth >= 0);
+  cache.penetration = depth.depth;
   return {depth.normal, -depth.depth, depth.pointA, depth.pointB};
 }
 
-Vec3 tangential(const Vec3& v, const Vec3& normal) {
+Vec3 projectOntoPlane(const Vec3& v, const Vec3& normal) {
   return v - v.dot(normal) * normal;
 }
 
-/// The free body that carries the anchors: B, unless only A is free.
-const Solid& anchorBody(const Solid& a, const Solid& b) {
-  return b.isFree() ? b : a;
+/// Returns the dynamic body whose frame holds the anchors: B, unless only A is dynamic.
+const PhysicsBody& selectAnchorBody(const PhysicsBody& a, const PhysicsBody& b) {
+  return b.isDynamic() ? b : a;
 }
 
-/// Which of last step's points, not taken yet, is nearest to an anchor; before.size: none.
-std::size_t samePoint(const ContactPatch& before, const PatchAnchors& anchorsBefore,
-                      const Vec3& anchor, double same, std::array<bool, 4>& taken) {
-  double nearest = same * same;
-  std::size_t from = before.size;
-  for (std::size_t k = 0; k < before.size; ++k) {
+/// Returns the index of the closest unused point of the last step; before.pointCount: none.
+std::size_t findMatchingPoint(const ContactConstraint& before, const ContactAnchors& anchorsBefore,
+                              const Vec3& anchor, double maxDistance, std::array<bool, 4>& taken) {
+  double nearest = maxDistance * maxDistance;
+  std::size_t match = before.pointCount;
+  for (std::size_t k = 0; k < before.pointCount; ++k) {
     const double squared = (anchorsBefore[k] - anchor).squaredNorm();
-    if (!taken[k] && squared < nearest) nearest = squared, from = k;
+    if (!taken[k] && squared < nearest) nearest = squared, match = k;
   }
-  if (from < before.size) taken[from] = true;
-  return from;
+  if (match < before.pointCount) taken[match] = true;
+  return match;
 }
 
-/// Impulses of last step's points go to the points that took their place, and these stand in the
-/// order of last step: a solver that takes them in turn comes to rest only so.
-void inherit(const ContactPatch& before, const PatchAnchors& anchorsBefore, double same,
-             CloseUp& pair) {
-  if (before.size == 0) return;
-  ContactPatch& patch = pair.patch;
-  std::array<bool, ContactPatch::kMostPoints> taken{};
-  std::array<std::size_t, ContactPatch::kMostPoints> from{};
-  for (std::size_t i = 0; i < patch.size; ++i) {
-    from[i] = samePoint(before, anchorsBefore, pair.anchors[i], same, taken);
-    if (from[i] == before.size) continue;
-    patch.points[i].impulse = before.points[from[i]].impulse;
-    patch.points[i].push = before.points[from[i]].push;
+/// Copies impulses from the matching points of the last step and keeps their order. The sequential
+/// solver comes to rest only in a constant order.
+void inheritImpulses(const ContactConstraint& before, const ContactAnchors& anchorsBefore,
+                     double maxDistance, PairCache& cache) {
+  if (before.pointCount == 0) return;
+  ContactConstraint& constraint = cache.constraint;
+  std::array<bool, ContactConstraint::kMaxPoints> taken{};
+  std::array<std::size_t, ContactConstraint::kMaxPoints> sources{};
+  for (std::size_t i = 0; i < constraint.pointCount; ++i) {
+    sources[i] = findMatchingPoint(before, anchorsBefore, cache.anchors[i], maxDistance, taken);
+    if (sources[i] == before.pointCount) continue;
+    constraint.points[i].impulse = before.points[sources[i]].impulse;
+    constraint.points[i].motorImpulse = before.points[sources[i]].motorImpulse;
   }
-  for (std::size_t i = 1; i < patch.size; ++i)
-    for (std::size_t k = i; k > 0 && from[k] < from[k - 1]; --k) {
-      std::swap(from[k], from[k - 1]);
-      std::swap(patch.points[k], patch.points[k - 1]);
-      std::swap(pair.anchors[k], pair.anchors[k - 1]);
+  for (std::size_t i = 1; i < constraint.pointCount; ++i)
+    for (std::size_t k = i; k > 0 && sources[k] < sources[k - 1]; --k) {
+      std::swap(sources[k], sources[k - 1]);
+      std::swap(constraint.points[k], constraint.points[k - 1]);
+      std::swap(cache.anchors[k], cache.anchors[k - 1]);
     }
-  if (!(patch.friction > 0)) return;
-  patch.rub = tangential(before.rub, patch.normal);
-  patch.twist = before.twist;
+  if (!(constraint.friction > 0)) return;
+  constraint.tangentImpulse = projectOntoPlane(before.tangentImpulse, constraint.normal);
+  constraint.torsionImpulse = before.torsionImpulse;
 }
 
-void setPush(const Solid& a, const Solid& b, ContactPatch& patch) {
-  patch.pushSpeed = patch.mostPush = 0;
-  for (const Solid* pusher : {&a, &b}) {
-    if (pusher->mostPush == 0) continue;
-    const double sense = pusher == &a ? 1 : -1;
-    patch.pushSpeed = std::max(0.0, sense * patch.normal.dot(pusher->pushVelocity));
-    patch.mostPush = patch.pushSpeed > 0 ? pusher->mostPush : 0;
+void setMotor(const PhysicsBody& a, const PhysicsBody& b, ContactConstraint& constraint) {
+  constraint.targetSpeed = constraint.maxPushForce = 0;
+  for (const PhysicsBody* pusher : {&a, &b}) {
+    if (pusher->maxPushForce == 0) continue;
+    const double sign = pusher == &a ? 1 : -1;
+    constraint.targetSpeed = std::max(0.0, sign * constraint.normal.dot(pusher->targetVelocity));
+    constraint.maxPushForce = constraint.targetSpeed > 0 ? pusher->maxPushForce : 0;
   }
 }
 
-collision::ContactManifold manifoldOf(const NearPair& pair, const Axis& axis, double limit,
-                                      const Solid& a, const Solid& b) {
-  const auto normalsOf = [](const Solid& solid, std::uint32_t part) {
-    return part < solid.parts.size() ? std::span<const Vec3>(solid.parts[part].faceNormals)
-                                     : std::span<const Vec3>();
+collision::ContactManifold computeManifold(const BodyPair& pair, const ContactAxis& axis,
+                                           double limit, const PhysicsBody& a,
+                                           const PhysicsBody& b) {
+  const auto faceNormalsOf = [](const PhysicsBody& body, std::uint32_t part) {
+    return part < body.parts.size() ? std::span<const Vec3>(body.parts[part].faceNormals)
+                                    : std::span<const Vec3>();
   };
-  return collision::contactManifold(
-      partOf(a, pair.key.partA), partOf(b, pair.key.partB),
-      {axis.normal, axis.pointA, axis.pointB, limit, ContactPatch::kMostPoints,
-       normalsOf(a, pair.key.partA), normalsOf(b, pair.key.partB)});
+  return collision::computeContactManifold(
+      placePart(a, pair.key.partA), placePart(b, pair.key.partB),
+      {axis.normal, axis.pointA, axis.pointB, limit, ContactConstraint::kMaxPoints,
+       faceNormalsOf(a, pair.key.partA), faceNormalsOf(b, pair.key.partB)});
 }
 
-void makePatch(NearPair& pair, const collision::ContactManifold& manifold, const Solid& a,
-               const Solid& b) {
-  CloseUp& close = *pair.close;
-  const ContactPatch before = pair.hasPatch ? close.patch : ContactPatch{};
-  const auto anchorsBefore = close.anchors;
-  pair.hasPatch = manifold.size > 0;
-  pair.axis = manifold.normal;
-  ContactPatch& patch = close.patch;
-  patch = ContactPatch{};
-  patch.normal = manifold.normal;
-  patch.restitution = std::max(a.motion.restitution, b.motion.restitution);
-  const Solid& carrier = anchorBody(a, b);
-  for (const collision::ContactPoint& point : manifold.list()) {
-    close.anchors[patch.size] =
-        carrier.rotation.transpose() * (point.pointB - carrier.motion.centre);
-    patch.points[patch.size++] = {point.pointA - a.motion.centre, point.pointB - b.motion.centre,
-                                  point.separation, 0, 0};
+void buildConstraint(BodyPair& pair, const collision::ContactManifold& manifold,
+                     const PhysicsBody& a, const PhysicsBody& b) {
+  PairCache& cache = *pair.cache;
+  const ContactConstraint before = pair.hasConstraint ? cache.constraint : ContactConstraint{};
+  const auto anchorsBefore = cache.anchors;
+  ENFILADE_ASSERT(manifold.size <= ContactConstraint::kMaxPoints);
+  pair.hasConstraint = manifold.size > 0;
+  pair.separatingAxis = manifold.normal;
+  ContactConstraint& constraint = cache.constraint;
+  constraint = ContactConstraint{};
+  constraint.normal = manifold.normal;
+  constraint.restitution = std::max(a.motion.restitution, b.motion.restitution);
+  const PhysicsBody& anchorBody = selectAnchorBody(a, b);
+  for (const collision::ContactPoint& point : manifold.activePoints()) {
+    cache.anchors[constraint.pointCount] =
+        anchorBody.rotation.transpose() * (point.pointB - anchorBody.motion.centre);
+    constraint.points[constraint.pointCount++] = {
+        point.pointA - a.motion.centre, point.pointB - b.motion.centre, point.separation, 0, 0};
   }
-  const bool rubs = !isLetOut(pair, a, b);
-  patch.friction = rubs ? std::sqrt(a.motion.friction * b.motion.friction) : 0;
-  setPush(a, b, patch);
-  inherit(before, anchorsBefore, kSamePoint * std::min(a.radius, b.radius), close);
+  const bool hasFriction = !isReleased(pair, a, b);
+  constraint.friction = hasFriction ? std::sqrt(a.motion.friction * b.motion.friction) : 0;
+  setMotor(a, b, constraint);
+  inheritImpulses(before, anchorsBefore, kPointMatchFraction * std::min(a.radius, b.radius), cache);
 }
 
-// ---- what needs no narrow phase ----------------------------------------------------------------
+// ---- without a narrow-phase query --------------------------------------------------------------
 
-void setApart(NearPair& pair, double apart, const Solid& a, const Solid& b) {
-  pair.apart = apart;
-  pair.since = a.jumped + b.jumped;
+void setLowerBound(BodyPair& pair, double lowerBound, const PhysicsBody& a, const PhysicsBody& b) {
+  pair.lowerBound = lowerBound;
+  pair.teleportedAtBound = a.teleportedDistance + b.teleportedDistance;
   pair.verdict = Verdict::separated;
 }
 
-/// The spheres about the solids' centres are farther apart than `limit`.
-bool farBySpheres(NearPair& pair, const Solid& a, const Solid& b, double limit) {
+/// Returns whether the bounding spheres are farther apart than `limit`.
+bool isFarBySpheres(BodyPair& pair, const PhysicsBody& a, const PhysicsBody& b, double limit) {
   const Vec3 between = b.motion.centre - a.motion.centre;
   const double radii = a.radius + b.radius;
-  const double least = (radii + limit) * (1 + kOfSpheres);
-  if (!(between.squaredNorm() > least * least)) return false;
+  const double minDistance = (radii + limit) * (1 + kSphereRounding);
+  if (!(between.squaredNorm() > minDistance * minDistance)) return false;
   const double coordinates =
       a.motion.centre.cwiseAbs().maxCoeff() + b.motion.centre.cwiseAbs().maxCoeff() + radii;
-  const double apart = between.norm() - radii - kOfSpheres * coordinates;
-  if (!(apart > limit)) return false;
-  setApart(pair, apart, a, b);
+  const double distance = between.norm() - radii - kSphereRounding * coordinates;
+  if (!(distance > limit)) return false;
+  setLowerBound(pair, distance, a, b);
   return true;
 }
 
-/// The axis of last time still parts them by more than `limit`.
-bool farAlongAxis(NearPair& pair, const ConvexBody& bodyA, const ConvexBody& bodyB, const Solid& a,
-                  const Solid& b, double limit) {
-  if (pair.axis.isZero(0) || pair.patch()) return false;
-  const collision::Gap gap = collision::gapAlong(bodyA, bodyB, pair.axis);
-  if (!(gap.proved > limit)) return false;
-  setApart(pair, gap.proved, a, b);
+/// Returns whether the last separating axis still separates the pair by more than `limit`.
+bool isFarAlongAxis(BodyPair& pair, const PlacedConvex& shapeA, const PlacedConvex& shapeB,
+                    const PhysicsBody& a, const PhysicsBody& b, double limit) {
+  if (pair.separatingAxis.isZero(0) || pair.constraint()) return false;
+  const collision::AxisSeparation separation =
+      collision::computeAxisSeparation(shapeA, shapeB, pair.separatingAxis);
+  if (!(separation.lowerBound > limit)) return false;
+  setLowerBound(pair, separation.lowerBound, a, b);
   return true;
 }
 
-/// Of the faces that look at the other body, that of A and that of B, the one with the wider gap.
-struct FaceGap {
-  CloseUp::Plane plane = CloseUp::Plane::closest;  ///< closest: there is no face
+/// Of the best-facing faces of A and B, the one with the larger separation.
+struct FaceSeparation {
+  PairCache::NormalSource source =
+      PairCache::NormalSource::closestPoints;  ///< closestPoints: there is no face
   Vec3 normal;
-  collision::Gap gap;
+  collision::AxisSeparation separation;
 };
-FaceGap widestFace(const NearPair& pair, const ConvexBody& bodyA, const ConvexBody& bodyB,
-                   const Solid& a, const Solid& b, const Vec3& along) {
-  FaceGap best;
-  const auto consider = [&](const Vec3& normal, CloseUp::Plane plane) {
+FaceSeparation findWidestFace(const BodyPair& pair, const PlacedConvex& shapeA,
+                              const PlacedConvex& shapeB, const PhysicsBody& a,
+                              const PhysicsBody& b, const Vec3& direction) {
+  FaceSeparation best;
+  const auto consider = [&](const Vec3& normal, PairCache::NormalSource source) {
     if (normal.isZero(0)) return;
-    const collision::Gap gap = collision::gapAlong(bodyA, bodyB, normal);
-    if (best.plane == CloseUp::Plane::closest || gap.value > best.gap.value)
-      best = {plane, normal, gap};
+    const collision::AxisSeparation separation =
+        collision::computeAxisSeparation(shapeA, shapeB, normal);
+    if (best.source == PairCache::NormalSource::closestPoints ||
+        separation.value > best.separation.value)
+      best = {source, normal, separation};
   };
-  consider(facing(a, pair.key.partA, bodyA, along), CloseUp::Plane::faceOfA);
-  consider(-facing(b, pair.key.partB, bodyB, -along), CloseUp::Plane::faceOfB);
+  consider(findFacingNormal(a, pair.key.partA, shapeA, direction), PairCache::NormalSource::faceA);
+  consider(-findFacingNormal(b, pair.key.partB, shapeB, -direction),
+           PairCache::NormalSource::faceB);
   return best;
 }
 
-/// See the file's head.
-bool restsAsBefore(NearPair& pair, const ConvexBody& bodyA, const ConvexBody& bodyB, const Solid& a,
-                   const Solid& b, double limit, double epsilon) {
-  const ContactPatch* patch = pair.patch();
-  if (!patch || pair.close->plane == CloseUp::Plane::closest) return false;
-  const FaceGap face = widestFace(pair, bodyA, bodyB, a, b, patch->normal);
-  if (face.plane == CloseUp::Plane::closest) return false;
-  if (!(face.gap.proved > 0 && face.gap.value < 2 * epsilon)) return false;
+/// Keeps the face contact of the last step where it is still valid; see the head of this file.
+bool reuseFaceContact(BodyPair& pair, const PlacedConvex& shapeA, const PlacedConvex& shapeB,
+                      const PhysicsBody& a, const PhysicsBody& b, double limit,
+                      double contactOffset) {
+  const ContactConstraint* constraint = pair.constraint();
+  if (!constraint || pair.cache->normalSource == PairCache::NormalSource::closestPoints)
+    return false;
+  const FaceSeparation face = findWidestFace(pair, shapeA, shapeB, a, b, constraint->normal);
+  if (face.source == PairCache::NormalSource::closestPoints) return false;
+  if (!(face.separation.lowerBound > 0 && face.separation.value < 2 * contactOffset)) return false;
   const collision::ContactManifold manifold =
-      manifoldOf(pair, axisAlong(face.normal, bodyA, face.gap), limit, a, b);
+      computeManifold(pair, makeContactAxis(face.normal, shapeA, face.separation), limit, a, b);
   double nearest = std::numeric_limits<double>::infinity();
-  for (const collision::ContactPoint& point : manifold.list())
+  for (const collision::ContactPoint& point : manifold.activePoints())
     nearest = std::min(nearest, point.separation);
-  if (!manifold.overlap || !(face.gap.value >= kFaceAtRest * nearest)) return false;
-  pair.close->plane = face.plane;
-  setApart(pair, face.gap.proved, a, b);
-  makePatch(pair, manifold, a, b);
+  if (!manifold.overlap || !(face.separation.value >= kFacePreference * nearest)) return false;
+  pair.cache->normalSource = face.source;
+  setLowerBound(pair, face.separation.lowerBound, a, b);
+  buildConstraint(pair, manifold, a, b);
   return true;
 }
 
-// ---- what does ---------------------------------------------------------------------------------
+// ---- with a narrow-phase query -----------------------------------------------------------------
 
-/// Leaves the pair without a patch where they are farther apart than `limit`.
-void ask(NearPair& pair, const ConvexBody& bodyA, const ConvexBody& bodyB, const Solid& a,
-         const Solid& b, double limit, double farthest, const NearPairStep& step) {
-  if (!pair.close) pair.close = std::make_unique<CloseUp>();
-  CloseUp& close = *pair.close;
-  const auto decision = collision::decideWithin(bodyA, bodyB, farthest, close.features);
-  setApart(pair, farthest, a, b);
-  if (!close.features.axis.isZero(0)) pair.axis = close.features.axis.stableNormalized();
-  if (!decision) {
-    pair.hasPatch = false;
+/// Queries the narrow phase. The pair gets no constraint if its distance exceeds `limit`.
+void runNarrowPhase(BodyPair& pair, const PlacedConvex& shapeA, const PlacedConvex& shapeB,
+                    const PhysicsBody& a, const PhysicsBody& b, double limit, double maxDistance,
+                    const PairStepSettings& step) {
+  if (!pair.cache) pair.cache = std::make_unique<PairCache>();
+  PairCache& cache = *pair.cache;
+  const auto result =
+      collision::computeSeparationWithin(shapeA, shapeB, maxDistance, cache.features);
+  setLowerBound(pair, maxDistance, a, b);
+  if (!cache.features.axis.isZero(0)) pair.separatingAxis = cache.features.axis.stableNormalized();
+  if (!result) {
+    pair.hasConstraint = false;
     return;
   }
-  pair.verdict = decision->verdict;
-  const Axis closest = measure(pair, bodyA, bodyB, *decision);
-  close.plane = CloseUp::Plane::closest;
-  Axis axis = closest;
-  if (closest.gap > 0 && closest.gap <= limit)
-    axis = axisFor(closest, pair, a, b, step, close.plane);
-  if (axis.gap > limit) {
-    pair.hasPatch = false;
+  pair.verdict = result->verdict;
+  const ContactAxis closest = measureDistance(pair, shapeA, shapeB, *result);
+  cache.normalSource = PairCache::NormalSource::closestPoints;
+  ContactAxis axis = closest;
+  if (closest.separation > 0 && closest.separation <= limit)
+    axis = chooseContactAxis(closest, pair, a, b, step, cache.normalSource);
+  if (axis.separation > limit) {
+    pair.hasConstraint = false;
   } else {
-    makePatch(pair, manifoldOf(pair, axis, limit, a, b), a, b);
+    buildConstraint(pair, computeManifold(pair, axis, limit, a, b), a, b);
   }
 }
 
 }  // namespace
 
-Pace paceOf(const Solid& solid, const Vec3& beside) {
-  const double speed = (velocityOf(solid) - beside).norm() + tipOf(solid) + solid.swing();
-  return {(speed + solid.pushVelocity.norm()) * kMore, solid.jumped, solid.isFree(),
-          solid.isAwake(), solid.isMoved()};
+SpeedBound computeSpeedBound(const PhysicsBody& body, const Vec3& referenceVelocity) {
+  const double speed = (computeVelocity(body) - referenceVelocity).norm() +
+                       computeRotationalSpeed(body) + body.maxVelocityDeviation();
+  return {(speed + body.targetVelocity.norm()) * kRoundUpFactor, body.teleportedDistance,
+          body.isDynamic(), body.isAwake(), body.isActuated()};
 }
 
-bool areFar(const NearPair& pair, const Pace& a, const Pace& b, const NearPairStep& step) {
-  const double gained = step.gravity.norm() * step.seconds;
-  const double reach = step.seconds * (a.speed + b.speed + gained);
-  return apartNow(pair, a.jumped + b.jumped) > (2 * step.epsilon + reach) * kMore;
+bool isCertifiedFar(const BodyPair& pair, const SpeedBound& a, const SpeedBound& b,
+                    const PairStepSettings& step) {
+  const double gainedSpeed = step.gravity.norm() * step.seconds;
+  const double approach = step.seconds * (a.speed + b.speed + gainedSpeed);
+  return computeLowerBound(pair, a.teleportedDistance + b.teleportedDistance) >
+         (2 * step.contactOffset + approach) * kRoundUpFactor;
 }
 
-bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step) {
-  const ReachOfPair reach = reachOf(pair, a, b, step);
-  const double limit = 2 * step.epsilon + reach.likely;
-  const double farthest = limit + kForesight * (reach.most + step.epsilon);
-  if (apartNow(pair, a, b) > limit || farBySpheres(pair, a, b, farthest)) {
-    pair.hasPatch = false;
+bool updatePair(BodyPair& pair, const PhysicsBody& a, const PhysicsBody& b,
+                const PairStepSettings& step) {
+  const ApproachBound approach = computeApproachBound(pair, a, b, step);
+  const double limit = 2 * step.contactOffset + approach.expected;
+  const double maxDistance = limit + kQueryMarginFactor * (approach.max + step.contactOffset);
+  if (computeLowerBound(pair, a, b) > limit || isFarBySpheres(pair, a, b, maxDistance)) {
+    pair.hasConstraint = false;
     return false;
   }
-  const ConvexBody bodyA = partOf(a, pair.key.partA), bodyB = partOf(b, pair.key.partB);
-  if (farAlongAxis(pair, bodyA, bodyB, a, b, limit)) return true;
-  if (!restsAsBefore(pair, bodyA, bodyB, a, b, limit, step.epsilon))
-    ask(pair, bodyA, bodyB, a, b, limit, farthest, step);
+  const PlacedConvex shapeA = placePart(a, pair.key.partA), shapeB = placePart(b, pair.key.partB);
+  if (isFarAlongAxis(pair, shapeA, shapeB, a, b, limit)) return true;
+  if (!reuseFaceContact(pair, shapeA, shapeB, a, b, limit, step.contactOffset))
+    runNarrowPhase(pair, shapeA, shapeB, a, b, limit, maxDistance, step);
   return true;
 }
 
-bool isInDriven(const NearPair& pair, const Solid& a, const Solid& b) {
-  return pair.penetration() > 0 && pair.hasPatch && (a.isDriven() || b.isDriven());
+bool penetratesKinematic(const BodyPair& pair, const PhysicsBody& a, const PhysicsBody& b) {
+  return pair.penetration() > 0 && pair.hasConstraint && (a.isKinematic() || b.isKinematic());
 }
 
-bool isLetOut(const NearPair& pair, const Solid& a, const Solid& b) {
-  if (!isInDriven(pair, a, b)) return false;
-  const ContactPatch& patch = *pair.patch();
-  const Solid& driven = a.isDriven() ? a : b;
-  const Vec3& arm = a.isDriven() ? patch.points[0].armA : patch.points[0].armB;
-  const Vec3 velocity = driven.motion.velocity + driven.motion.spin.cross(arm);
-  const double ahead = (a.isDriven() ? 1 : -1) * patch.normal.dot(velocity);
-  return !(ahead > kAhead * velocity.norm());
+bool isReleased(const BodyPair& pair, const PhysicsBody& a, const PhysicsBody& b) {
+  if (!penetratesKinematic(pair, a, b)) return false;
+  const ContactConstraint& constraint = *pair.constraint();
+  ENFILADE_ASSERT(constraint.pointCount > 0);
+  const PhysicsBody& kinematic = a.isKinematic() ? a : b;
+  const Vec3& arm = a.isKinematic() ? constraint.points[0].armA : constraint.points[0].armB;
+  const Vec3 velocity = kinematic.motion.velocity + kinematic.motion.angularVelocity.cross(arm);
+  const double ahead = (a.isKinematic() ? 1 : -1) * constraint.normal.dot(velocity);
+  return !(ahead > kAheadCosine * velocity.norm());
 }
 
-bool leans(const NearPair& pair, double epsilon) {
-  const ContactPatch* patch = pair.patch();
-  if (!patch) return false;
-  for (const PatchPoint& point : patch->list())
-    if (point.separation < 2 * epsilon) return true;
+bool isTouching(const BodyPair& pair, double contactOffset) {
+  const ContactConstraint* constraint = pair.constraint();
+  if (!constraint) return false;
+  for (const ContactConstraintPoint& point : constraint->activePoints())
+    if (point.separation < 2 * contactOffset) return true;
   return false;
 }
 

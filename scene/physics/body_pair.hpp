@@ -1,5 +1,5 @@
-// Two parts of two solids that may meet: what is known of them from step to step, and the patch
-// that the solver is given.
+// A pair of convex parts of two bodies: the state that the narrow phase keeps between steps, and
+// the contact constraint for the solver.
 #pragma once
 
 #include <cmath>
@@ -12,91 +12,102 @@
 
 namespace enfilade::scene {
 
-/// Indices of two solids and of their parts; a < b.
+/// Indices of two bodies and of their parts; a < b.
 struct PartPairKey {
   std::uint32_t a = 0, b = 0, partA = 0, partB = 0;
   auto operator<=>(const PartPairKey&) const = default;
 };
 
-using PatchAnchors = std::array<Vec3, ContactPatch::kMostPoints>;
+using ContactAnchors = std::array<Vec3, ContactConstraint::kMaxPoints>;
 
-/// What is known of a pair that came near enough for the narrow phase.
-struct CloseUp {
+/// Narrow-phase state of a pair. It exists only for pairs that came close enough for a query.
+struct PairCache {
   collision::FeatureCache features;
-  std::unique_ptr<collision::DepthCache> depth;  ///< once they penetrated
-  double penetration = 0;  ///< metres, when they penetrate: the depth, or an upper bound of it
-  ContactPatch patch;      ///< where NearPair::hasPatch; a, b are not set
-  PatchAnchors anchors;    ///< of the points, on the free body
-  enum class Plane : std::uint8_t { closest, faceOfA, faceOfB } plane = Plane::closest;
+  std::unique_ptr<collision::DepthCache> depth;  ///< set after the first penetration
+  /// metres: the penetration depth or an upper bound; set while penetrating
+  double penetration = 0;
+  ContactConstraint constraint;  ///< valid if BodyPair::hasConstraint; a and b are not set
+  ContactAnchors anchors;        ///< contact points in the frame of the anchor body
+  enum class NormalSource : std::uint8_t {
+    closestPoints,
+    faceA,
+    faceB
+  } normalSource = NormalSource::closestPoints;
 };
 
-/// Most pairs are far from one another in every step: they are kept small.
-struct NearPair {
+/// State of a pair of parts. It is small, because most pairs are far apart in every step.
+struct BodyPair {
   PartPairKey key;
-  /// Metres: they are at least this far apart, less what was added to Solid::jumped of both since
-  /// its sum was `since`.
-  double apart = -1;
-  double since = 0;
-  Vec3 axis = Vec3::Zero();  ///< world, from A to B, unit: parted them last; zero: none yet
-  collision::Verdict verdict = collision::Verdict::separated;  ///< when last looked at
-  std::unique_ptr<CloseUp> close;                              ///< null: never asked about
+  /// Metres: certified lower bound of the distance when the bodies' teleportedDistance summed to
+  /// `teleportedAtBound`. Later teleports reduce it; see computeLowerBound().
+  double lowerBound = -1;
+  double teleportedAtBound = 0;
+  Vec3 separatingAxis =
+      Vec3::Zero();  ///< world, from A to B, unit: the last separating axis; zero: none yet
+  collision::Verdict verdict = collision::Verdict::separated;  ///< of the last query
+  std::unique_ptr<PairCache> cache;                            ///< null: never queried
 
-  bool hasPatch = false;
-  bool told = false;  ///< it was near when contacts were last told
-  bool met = false;   ///< the solver had them meet in the last step, be they apart again
+  bool hasConstraint = false;
+  bool reported = false;  ///< the pair was close when contacts were last reported
+  /// the pair had a contact impulse in the last step, even if it is separated now
+  bool gaveImpulse = false;
 
-  /// Null: they are far.
-  ContactPatch* patch() { return hasPatch ? &close->patch : nullptr; }
-  const ContactPatch* patch() const { return hasPatch ? &close->patch : nullptr; }
+  /// Null: the pair has no contact constraint.
+  ContactConstraint* constraint() { return hasConstraint ? &cache->constraint : nullptr; }
+  const ContactConstraint* constraint() const {
+    return hasConstraint ? &cache->constraint : nullptr;
+  }
   double penetration() const {
-    return verdict == collision::Verdict::penetrating ? close->penetration : 0;
+    return verdict == collision::Verdict::penetrating ? cache->penetration : 0;
   }
   collision::FeatureCache features() const {
-    return close ? close->features : collision::FeatureCache{};
+    return cache ? cache->features : collision::FeatureCache{};
   }
 };
 
-struct NearPairStep {
+struct PairStepSettings {
   double seconds = 0;
   Vec3 gravity = Vec3::Zero();
-  double epsilon = 0;
+  double contactOffset = 0;
 };
 
-/// Looks at the pair where its solids are now: verdict, distance, patch. Does nothing where they
-/// were so far apart that they are not taken to come to epsilon within the step, by their speeds of
-/// now. Returns whether the narrow phase was asked.
-bool look(NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step);
+/// Updates verdict, distance and constraint for the present poses. Skips the query if the
+/// velocities cannot bring the pair within contactOffset in this step. Returns whether a query ran.
+bool updatePair(BodyPair& pair, const PhysicsBody& a, const PhysicsBody& b,
+                const PairStepSettings& step);
 
-/// A lower bound of the distance by what was known; may be negative. `moved`: Solid::jumped of
-/// both.
-inline double apartNow(const NearPair& pair, double moved) {
-  const double rounding = 0x1p-51 * (moved + pair.since + std::abs(pair.apart));
-  return pair.apart - (moved - pair.since) - rounding;
+/// Certified lower bound of the present distance, in metres; may be negative. `teleported`: sum of
+/// teleportedDistance of both bodies.
+inline double computeLowerBound(const BodyPair& pair, double teleported) {
+  const double rounding =
+      0x1p-51 * (teleported + pair.teleportedAtBound + std::abs(pair.lowerBound));
+  return pair.lowerBound - (teleported - pair.teleportedAtBound) - rounding;
 }
-inline double apartNow(const NearPair& pair, const Solid& a, const Solid& b) {
-  return apartNow(pair, a.jumped + b.jumped);
+inline double computeLowerBound(const BodyPair& pair, const PhysicsBody& a, const PhysicsBody& b) {
+  return computeLowerBound(pair, a.teleportedDistance + b.teleportedDistance);
 }
 
-/// What most pairs need to know of a solid, since they are far from one another: little, and side
-/// by side.
-struct Pace {
-  double speed = 0;   ///< m/s beside a velocity that is the same for all: no point goes faster
-  double jumped = 0;  ///< Solid's
-  bool isFree = false, isAwake = false, isMoved = false;  ///< Solid's
+/// Compact copy of the body data that the far test needs. Most pairs need only this, so it lies
+/// contiguous in memory.
+struct SpeedBound {
+  double speed = 0;  ///< m/s: bound of the speed of any point relative to the reference velocity
+  double teleportedDistance = 0;                                ///< copy of PhysicsBody's
+  bool isDynamic = false, isAwake = false, isActuated = false;  ///< copies of PhysicsBody's
 };
-Pace paceOf(const Solid& solid, const Vec3& beside);
+SpeedBound computeSpeedBound(const PhysicsBody& body, const Vec3& referenceVelocity);
 
-/// look() would do nothing but to find them far: proved by their paces.
-bool areFar(const NearPair& pair, const Pace& a, const Pace& b, const NearPairStep& step);
+/// Returns whether the speed bounds prove that updatePair() would skip its query.
+bool isCertifiedFar(const BodyPair& pair, const SpeedBound& a, const SpeedBound& b,
+                    const PairStepSettings& step);
 
-/// Whether a free body is inside a driven one, which pressed it against something.
-bool isInDriven(const NearPair& pair, const Solid& a, const Solid& b);
+/// Returns whether a dynamic body penetrates a kinematic one, which pressed it against an obstacle.
+bool penetratesKinematic(const BodyPair& pair, const PhysicsBody& a, const PhysicsBody& b);
 
-/// Whether its shortest way out is not ahead of the driven one: that goes on through it, without
-/// friction, and does not take it along.
-bool isLetOut(const NearPair& pair, const Solid& a, const Solid& b);
+/// Returns whether the shortest way out does not lie ahead of the kinematic body. The kinematic
+/// body then passes through without friction and does not carry the other one.
+bool isReleased(const BodyPair& pair, const PhysicsBody& a, const PhysicsBody& b);
 
-/// Whether the points lean on one another: nearer than 2 epsilon.
-bool leans(const NearPair& pair, double epsilon);
+/// Returns whether a contact point is closer than 2 contactOffset.
+bool isTouching(const BodyPair& pair, double contactOffset);
 
 }  // namespace enfilade::scene

@@ -1,4 +1,4 @@
-// Where two bodies lean on one another, as the solver sees it: some points and one normal.
+// Contact constraint of the solver: up to four points with one normal and one friction pair.
 #pragma once
 
 #include <array>
@@ -10,36 +10,41 @@
 
 namespace enfilade::scene {
 
-/// World axes, metres from the bodies' centres, newton seconds a substep.
-struct PatchPoint {
+/// One contact point. World axes; arms in metres from the centres of mass; impulses in N s per
+/// substep.
+struct ContactConstraintPoint {
   Vec3 armA = Vec3::Zero(), armB = Vec3::Zero();
-  double separation = 0;  ///< along the normal; negative where they penetrate
-  double impulse = 0;     ///< along the normal: what the next solution starts from
-  double push = 0;        ///< the same, of ContactPatch::mostPush
+  double separation = 0;    ///< along the normal, metres; negative: penetration
+  double impulse = 0;       ///< accumulated normal impulse; warm-starts the next solve
+  double motorImpulse = 0;  ///< accumulated impulse of the motor (ContactConstraint::maxPushForce)
 };
 
-struct ContactPatch {
-  static constexpr std::size_t kMostPoints = 4;
+struct ContactConstraint {
+  static constexpr std::size_t kMaxPoints = 4;
 
-  std::uint32_t a = 0, b = 0;   ///< indices of the bodies
+  std::uint32_t a = 0, b = 0;   ///< body indices
   Vec3 normal = Vec3::UnitY();  ///< unit, from A to B
   double friction = 0, restitution = 0;
-  std::array<PatchPoint, kMostPoints> points;
-  std::size_t size = 0;
-  Vec3 rub = Vec3::Zero();  ///< impulse of friction on B, at right angles to the normal
-  double twist = 0;         ///< impulse of friction against turning about the normal, on B
-  /// Who walks against a body pushes it: besides holding firm, the patch gives its points up to
-  /// `mostPush` newtons in all, until they part at `pushSpeed` m/s. 0: no push.
-  double pushSpeed = 0, mostPush = 0;
-  bool pushed = false;  ///< a point gave an impulse in the last step: they met in it
+  std::array<ContactConstraintPoint, kMaxPoints> points;
+  std::size_t pointCount = 0;
+  Vec3 tangentImpulse = Vec3::Zero();  ///< friction impulse on B, perpendicular to the normal
+  double torsionImpulse = 0;           ///< friction impulse on B against rotation about the normal
+  /// Motor of an avatar that pushes a body. In addition to the contact itself, the points give up
+  /// to `maxPushForce` newtons in total, until they separate at `targetSpeed` m/s. 0: no
+  /// motor.
+  double targetSpeed = 0, maxPushForce = 0;
+  bool gaveImpulse = false;  ///< a point gave an impulse in the last step
 
-  std::span<const PatchPoint> list() const { return {points.data(), size}; }
+  std::span<const ContactConstraintPoint> activePoints() const {
+    return {points.data(), pointCount};
+  }
 };
 
-/// Of all points, without pushes; N s.
-inline double normalImpulse(const ContactPatch& patch) {
+/// Sum over all points, motor impulses included, in N s.
+inline double computeNormalImpulse(const ContactConstraint& constraint) {
   double sum = 0;
-  for (const PatchPoint& point : patch.list()) sum += point.impulse + point.push;
+  for (const ContactConstraintPoint& point : constraint.activePoints())
+    sum += point.impulse + point.motorImpulse;
   return sum;
 }
 

@@ -1,331 +1,373 @@
-// How far each body goes towards where the solver has it: step 3 at the head of dynamics.cpp.
+#include "scene/physics/continuous_collision.hpp"
+
 #include <algorithm>
 #include <utility>
 
+#include "collision/assert.hpp"
 #include "scene/physics/disjoint_sets.hpp"
-#include "scene/physics/step_scratch.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kBodyBlock = 32;   // bodies that a thread takes at a time
-constexpr std::size_t kScanBlock = 512;  // pairs, where each costs next to nothing
-constexpr double kMore = 1 + 0x1p-40;    // above what a few roundings lose
-constexpr double kAtRest = 0.5;          // of epsilon: nearer than that nothing comes to rest
-constexpr double kPart = 0.25;           // of epsilon, a step: who is parted is calm (RestLimits)
-constexpr int kPartialRounds = 4;        // then who is in the way does not go its way at all
+constexpr std::size_t kBodiesPerTask = 32;  // bodies in one task
+constexpr std::size_t kScannedPairsPerTask =
+    512;                                  // pairs in one task, where each costs next to nothing
+constexpr double kRestGapFraction = 0.5;  // of contactOffset: bodies rest at no smaller gap
+// of contactOffset per step: slow enough to count as rest (SleepSettings)
+constexpr double kMaxDepenetrationFraction = 0.25;
+constexpr int kPartialPasses = 4;  // after these passes a blocking body does not move at all
 
-Passage passageOf(const Solid& solid, const RigidBody& goal) {
-  Passage passage = standing(solid);
-  passage.toCentre = goal.centre, passage.toRotation = goal.rotation;
-  passage.stands = nullptr;
-  measure(passage);
-  return passage;
+SweptPose makeSweptPose(const PhysicsBody& body, const BodyMotion& goal) {
+  SweptPose sweep = makeStationaryPose(body);
+  sweep.toCentre = goal.centre, sweep.toRotation = goal.rotation;
+  sweep.stationaryBody = nullptr;
+  updateDerived(sweep);
+  return sweep;
 }
 
-/// How far the pair, which was `apart` when it set out, is proved clear; 1 for one that was not
-/// separated. `proof`: set where the narrow phase had to be asked.
-double clearFraction(const Dynamics& dynamics, const NearPair& pair, double apart,
-                     const StepWork& work, std::uint8_t& proof) {
+/// Returns the fraction of the motion that is proved clear; 1 for a pair that was not separated.
+/// `lowerBound`: of the distance at the start. `usedNarrowPhase`: set if a query ran.
+double computePairClearFraction(const PhysicsWorld& world, const BodyPair& pair, double lowerBound,
+                                const StepScratch& scratch, std::uint8_t& usedNarrowPhase) {
   if (pair.verdict != collision::Verdict::separated) return 1;
-  const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
-  const Passage& wayA = work.passages[work.local[pair.key.a]];
-  const Passage& wayB = work.passages[work.local[pair.key.b]];
-  const PartShape partA = shapeOf(a, pair.key.partA), partB = shapeOf(b, pair.key.partB);
-  const double along = pair.axis.isZero(0) ? -1 : clearAlong(partA, wayA, partB, wayB, pair.axis);
-  if (along == 1) return 1;
-  proof = 1;
-  // Where they end in one another, the plane that parted them is as good as any.
-  if (along >= 0 && !separatedAtEnd(partA, wayA, partB, wayB, pair.features())) return along;
-  return clearance(partA, wayA, partB, wayB, pair.features(), apart).fraction;
+  const PhysicsBody &a = world.bodies[pair.key.a], &b = world.bodies[pair.key.b];
+  const SweptPose& sweepA = scratch.sweptPoses[scratch.localIndices[pair.key.a]];
+  const SweptPose& sweepB = scratch.sweptPoses[scratch.localIndices[pair.key.b]];
+  const PartShape partA = getPartShape(a, pair.key.partA), partB = getPartShape(b, pair.key.partB);
+  const double fraction =
+      pair.separatingAxis.isZero(0)
+          ? -1
+          : clearFractionAlong(partA, sweepA, partB, sweepB, pair.separatingAxis);
+  if (fraction == 1) return 1;
+  usedNarrowPhase = 1;
+  // If they overlap at the end, the plane that separated them is as good as any.
+  if (fraction >= 0 && !isSeparatedAtEnd(partA, sweepA, partB, sweepB, pair.features()))
+    return fraction;
+  return computeClearance(partA, sweepA, partB, sweepB, pair.features(), lowerBound).fraction;
 }
 
-/// Who would go farther than its leash goes less far; its speed is its own.
-void leash(const Solid& solid, Passage& passage) {
-  for (int i = 0; i < kMostHalvings && lengthOf(passage) > solid.leash; ++i)
-    passage = firstHalf(passage, middleOf(passage));
-  if (lengthOf(passage) > solid.leash) passage = standing(solid);
+/// Shortens a motion that exceeds maxStepDisplacement. The velocity does not change.
+void limitDisplacement(const PhysicsBody& body, SweptPose& sweep) {
+  for (int i = 0; i < kMaxHalvings && computeMaxDisplacement(sweep) > body.maxStepDisplacement; ++i)
+    sweep = makeFirstHalf(sweep, computeMiddlePose(sweep));
+  if (computeMaxDisplacement(sweep) > body.maxStepDisplacement) sweep = makeStationaryPose(body);
 }
 
-/// Which of `bodies` each group of patches is carried by: the one driven body that it meets.
-/// kNoPlace: none; kSeveral: more than one. What stands besides may stop it (see drop()).
-constexpr std::uint32_t kSeveral = kNoPlace - 1;
+constexpr std::uint32_t kSeveralCarriers = kNoIndex - 1;  // in place of an index
 
-std::vector<std::uint32_t> findCarriers(const Dynamics& dynamics, const StepWork& work,
-                                        Islands& islands) {
-  const auto solidOf = [&](std::uint32_t body) -> const Solid& {
-    return dynamics.solids[work.solids[body]];
+/// Returns the carrier of each island: the one kinematic body that it touches. kNoIndex: none;
+/// kSeveralCarriers: more than one. A static obstacle may detach it; see detachFromCarrier().
+std::vector<std::uint32_t> findCarriers(const PhysicsWorld& world, const StepScratch& scratch,
+                                        DisjointSets& islands) {
+  const auto bodyAt = [&](std::uint32_t body) -> const PhysicsBody& {
+    return world.bodies[scratch.bodyIndices[body]];
   };
-  const auto holds = [&](const ContactPatch& patch) {
-    return work.letOut[patch.a] == 0 && work.letOut[patch.b] == 0;
+  const auto holds = [&](const ContactConstraint& constraint) {
+    return scratch.released[constraint.a] == 0 && scratch.released[constraint.b] == 0;
   };
-  for (const ContactPatch& patch : work.patches)
-    if (holds(patch) && solidOf(patch.a).isAwake() && solidOf(patch.b).isAwake())
-      islands.join(patch.a, patch.b);
-  std::vector<std::uint32_t> carriers(work.bodies.size(), kNoPlace);
-  for (const ContactPatch& patch : work.patches) {
-    const bool firstIsFree = solidOf(patch.a).isAwake();
-    if (!holds(patch) || firstIsFree == solidOf(patch.b).isAwake()) continue;
-    const std::uint32_t held = firstIsFree ? patch.b : patch.a;
-    if (work.passages[held].stands) continue;
-    std::uint32_t& carrier = carriers[islands.leaderOf(firstIsFree ? patch.a : patch.b)];
-    carrier = carrier == kNoPlace || carrier == held ? held : kSeveral;
+  for (const ContactConstraint& constraint : scratch.constraints)
+    if (holds(constraint) && bodyAt(constraint.a).isAwake() && bodyAt(constraint.b).isAwake())
+      islands.unite(constraint.a, constraint.b);
+  std::vector<std::uint32_t> carriers(scratch.motions.size(), kNoIndex);
+  for (const ContactConstraint& constraint : scratch.constraints) {
+    const bool isFirstDynamic = bodyAt(constraint.a).isAwake();
+    if (!holds(constraint) || isFirstDynamic == bodyAt(constraint.b).isAwake()) continue;
+    const std::uint32_t candidate = isFirstDynamic ? constraint.b : constraint.a;
+    if (scratch.sweptPoses[candidate].stationaryBody) continue;
+    ENFILADE_ASSERT(candidate < scratch.sweptPoses.size());
+    std::uint32_t& carrier = carriers[islands.find(isFirstDynamic ? constraint.a : constraint.b)];
+    carrier = carrier == kNoIndex || carrier == candidate ? candidate : kSeveralCarriers;
   }
   return carriers;
 }
 
-Carry carryBy(std::uint32_t carrier, double seconds, const StepWork& work) {
-  const Passage& way = work.passages[carrier];
-  Carry carry;
-  carry.by = carrier;
-  carry.pivot = way.fromCentre;
-  carry.shift = way.toCentre - way.fromCentre;
-  carry.turn = way.toRotation * way.fromRotation.conjugate();
-  carry.turns = way.turn > 0;
-  carry.velocity = carry.shift / seconds;
-  carry.spin = work.bodies[carrier].spin;
-  return carry;
+CarrierMotion makeCarrierMotion(std::uint32_t carrier, double seconds, const StepScratch& scratch) {
+  const SweptPose& sweep = scratch.sweptPoses[carrier];
+  CarrierMotion carrierMotion;
+  carrierMotion.carrier = carrier;
+  carrierMotion.pivot = sweep.fromCentre;
+  carrierMotion.translation = sweep.toCentre - sweep.fromCentre;
+  carrierMotion.rotation = sweep.toRotation * sweep.fromRotation.conjugate();
+  carrierMotion.rotates = sweep.rotationAngle > 0;
+  carrierMotion.velocity = carrierMotion.translation / seconds;
+  carrierMotion.angularVelocity = scratch.motions[carrier].angularVelocity;
+  return carrierMotion;
 }
 
-void findCarried(const Dynamics& dynamics, double seconds, StepWork& work) {
-  Islands islands(work.bodies.size());
-  const std::vector<std::uint32_t> carriers = findCarriers(dynamics, work, islands);
-  work.carried.assign(work.bodies.size(), {});
-  for (std::uint32_t i = 0; i < work.bodies.size(); ++i) {
-    const std::uint32_t carrier = carriers[islands.leaderOf(i)];
-    if (!dynamics.solids[work.solids[i]].isAwake() || carrier >= kSeveral) continue;
-    if (!dynamics.solids[work.solids[carrier]].isFree())
-      work.carried[i] = carryBy(carrier, seconds, work);
+void assignCarriers(const PhysicsWorld& world, double seconds, StepScratch& scratch) {
+  DisjointSets islands(scratch.motions.size());
+  const std::vector<std::uint32_t> carriers = findCarriers(world, scratch, islands);
+  scratch.carrierMotions.assign(scratch.motions.size(), {});
+  for (std::uint32_t i = 0; i < scratch.motions.size(); ++i) {
+    const std::uint32_t carrier = carriers[islands.find(i)];
+    if (!world.bodies[scratch.bodyIndices[i]].isAwake() || carrier >= kSeveralCarriers) continue;
+    if (!world.bodies[scratch.bodyIndices[carrier]].isDynamic())
+      scratch.carrierMotions[i] = makeCarrierMotion(carrier, seconds, scratch);
   }
 }
 
-/// Ways of all that go; the others stand.
-void findPassages(const Dynamics& dynamics, StepWork& work) {
-  work.passages.resize(work.bodies.size());
-  work.workers->share(work.bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
-    for (std::size_t i = from; i < to; ++i) {
-      const Solid& solid = dynamics.solids[work.solids[i]];
-      const bool goes = solid.isAwake() || solid.isDriven();
-      work.passages[i] = goes ? passageOf(solid, work.bodies[i]) : standing(solid);
-      if (solid.isAwake()) leash(solid, work.passages[i]);
-    }
-  });
+/// Sets the motions of all moving bodies; the others are stationary.
+void computeSweptPoses(const PhysicsWorld& world, StepScratch& scratch) {
+  scratch.sweptPoses.resize(scratch.motions.size());
+  scratch.pool->parallelFor(
+      scratch.motions.size(), kBodiesPerTask, [&](std::size_t from, std::size_t to) {
+        for (std::size_t i = from; i < to; ++i) {
+          const PhysicsBody& body = world.bodies[scratch.bodyIndices[i]];
+          const bool isMoving = body.isAwake() || body.isKinematic();
+          scratch.sweptPoses[i] =
+              isMoving ? makeSweptPose(body, scratch.motions[i]) : makeStationaryPose(body);
+          if (body.isAwake()) limitDisplacement(body, scratch.sweptPoses[i]);
+        }
+      });
 }
 
-/// Where each body would go that can go nothing of its way: out of what it is too near to, half of
-/// what lacks where the other gives way as well. Without it a heap that is shaken comes to stand:
-/// the nearer two are, the less of any way of theirs is proved, and each that stands holds up all
-/// that are near to it.
-void findPartings(const Dynamics& dynamics, double epsilon, StepWork& work) {
-  const double rests = kAtRest * epsilon;
-  work.partings.assign(work.bodies.size(), Vec3::Zero());
-  for (const std::uint32_t i : work.patched) {
-    const NearPair& pair = dynamics.pairs[i];
-    const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
-    const double apart = apartNow(pair, a, b);
-    if (pair.verdict != collision::Verdict::separated || !(apart < rests)) continue;
+/// Computes for each body the displacement that restores the rest gap, half of it if the other body
+/// is awake too. It serves bodies without certified motion. Otherwise a shaken heap would lock: the
+/// smaller a gap, the less motion is proved, and each stopped body stops its neighbours.
+void computeDepenetrations(const PhysicsWorld& world, double contactOffset, StepScratch& scratch) {
+  const double restGap = kRestGapFraction * contactOffset;
+  scratch.depenetrations.assign(scratch.motions.size(), Vec3::Zero());
+  for (const std::uint32_t i : scratch.constrainedPairs) {
+    const BodyPair& pair = world.pairs[i];
+    const PhysicsBody &a = world.bodies[pair.key.a], &b = world.bodies[pair.key.b];
+    const double lowerBound = computeLowerBound(pair, a, b);
+    if (pair.verdict != collision::Verdict::separated || !(lowerBound < restGap)) continue;
     const double share = a.isAwake() && b.isAwake() ? 0.5 : 1;
-    const Vec3 parting = share * (rests - std::max(0.0, apart)) * pair.patch()->normal;
-    work.partings[work.local[pair.key.a]] -= parting;
-    work.partings[work.local[pair.key.b]] += parting;
+    const Vec3 depenetration =
+        share * (restGap - std::max(0.0, lowerBound)) * pair.constraint()->normal;
+    scratch.depenetrations[scratch.localIndices[pair.key.a]] -= depenetration;
+    scratch.depenetrations[scratch.localIndices[pair.key.b]] += depenetration;
   }
-  for (Vec3& parting : work.partings)
-    if (const double length = parting.norm(); length > kPart * epsilon)
-      parting *= kPart * epsilon / length;
+  for (Vec3& depenetration : scratch.depenetrations)
+    if (const double length = depenetration.norm();
+        length > kMaxDepenetrationFraction * contactOffset)
+      depenetration *= kMaxDepenetrationFraction * contactOffset / length;
 }
 
-/// What the rounds of proofs find. Most pairs are far from one another, and there are many: they
-/// are passed over by how far their bodies go beside a motion that is the same for all.
-struct Round {
-  std::vector<std::uint8_t> open;  ///< of each of `bodies`: its way is new
-  std::vector<double> least;       ///< of each of `bodies`, of the parts of its pairs
-  Vec3 shift = Vec3::Zero();       ///< about how all go
-  std::vector<double> widths;      ///< of each of `bodies`: metres, of its longest beside `shift`
-  std::vector<double> jumped;      ///< of each of `bodies`: Solid's
-  /// Those of `active` that may meet, and how far they are apart at the start.
-  std::vector<std::uint32_t> near;
-  std::vector<double> apart;
-  std::vector<std::uint8_t> isNear;  ///< of each of `active`
-  std::vector<double> parts;         ///< of each of `near`: of the ways as they are, proved
-  std::vector<std::uint8_t> proofs;  ///< of each of `near`: the narrow phase was asked
-  /// Solids of which neither could be kept from the other.
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> squeezed;
+/// State of the proof passes. Most of the many pairs are far apart. They are skipped by the bounds
+/// of their motion relative to the mean displacement.
+struct Pass {
+  std::vector<std::uint8_t> needsProof;  ///< of each body: its motion changed
+  std::vector<double> minFractions;      ///< of each body: minimum over its pairs
+  Vec3 meanDisplacement = Vec3::Zero();  ///< metres: mean displacement of the awake bodies
+  /// of each body: metres, largest motion relative to `meanDisplacement`
+  std::vector<double> relativeBounds;
+  std::vector<double> teleportedDistances;  ///< of each body: copy of PhysicsBody's
+  /// Indices into `activePairs` of pairs that may meet, and their distance bounds at the start.
+  std::vector<std::uint32_t> nearPairs;
+  std::vector<double> lowerBounds;
+  std::vector<std::uint8_t> isNear;  ///< of each of `activePairs`
+  /// of each of `nearPairs`: the proved fraction of the present motions
+  std::vector<double> clearFractions;
+  std::vector<std::uint8_t>
+      usedNarrowPhase;  ///< of each of `nearPairs`: the narrow phase was queried
+  /// Pairs of bodies of which neither could be reduced.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> crushed;
 };
 
-void startRounds(const Dynamics& dynamics, const StepWork& work, Round& round) {
-  round.open.assign(work.bodies.size(), 1);
-  round.widths.assign(work.bodies.size(), -1);
-  round.jumped.clear(), round.near.clear(), round.apart.clear(), round.squeezed.clear();
-  for (const std::uint32_t solid : work.solids)
-    round.jumped.push_back(dynamics.solids[solid].jumped);
-  round.shift = Vec3::Zero();
-  for (std::uint32_t i = 0; i < work.report.awake; ++i)  // they are the first
-    round.shift += work.passages[i].toCentre - work.passages[i].fromCentre;
-  if (work.report.awake > 0) round.shift /= work.report.awake;
+void startPasses(const PhysicsWorld& world, const StepScratch& scratch, Pass& pass) {
+  pass.needsProof.assign(scratch.motions.size(), 1);
+  pass.relativeBounds.assign(scratch.motions.size(), -1);
+  pass.teleportedDistances.clear(), pass.nearPairs.clear(), pass.lowerBounds.clear(),
+      pass.crushed.clear();
+  for (const std::uint32_t body : scratch.bodyIndices)
+    pass.teleportedDistances.push_back(world.bodies[body].teleportedDistance);
+  pass.meanDisplacement = Vec3::Zero();
+  for (std::uint32_t i = 0; i < scratch.report.awake; ++i)  // awake bodies come first
+    pass.meanDisplacement += scratch.sweptPoses[i].toCentre - scratch.sweptPoses[i].fromCentre;
+  if (scratch.report.awake > 0) pass.meanDisplacement /= scratch.report.awake;
 }
 
-/// Takes new ways into account. Returns whether any body's is wider than it ever was.
-bool widen(StepWork& work, Round& round) {
-  bool any = false;
-  for (std::size_t i = 0; i < work.bodies.size(); ++i) {
-    if (round.open[i] == 0) continue;
-    const Stride& stride = work.strides[i] = strideOf(work.passages[i]);
-    const double width = (stride.way - round.shift).norm() + stride.tip;
-    if (width <= round.widths[i]) continue;
-    // Shortened, it goes on more and more as its carrier does.
-    const double carried = (work.carried[i].shift - round.shift).norm() + stride.tip;
-    round.widths[i] = std::max(width, carried) * kMore;  // no number: nothing is clear of it
-    any = true;
+/// Updates the bounds for changed motions. Returns whether a bound grew.
+bool updateRelativeBounds(StepScratch& scratch, Pass& pass) {
+  bool hasGrown = false;
+  for (std::size_t i = 0; i < scratch.motions.size(); ++i) {
+    if (pass.needsProof[i] == 0) continue;
+    const MotionBound& bound = scratch.motionBounds[i] = computeMotionBound(scratch.sweptPoses[i]);
+    const double relativeBound =
+        (bound.displacement - pass.meanDisplacement).norm() + bound.rotationalBound;
+    if (relativeBound <= pass.relativeBounds[i]) continue;
+    // A reduced motion approaches that of its carrier.
+    const double carriedBound =
+        (scratch.carrierMotions[i].translation - pass.meanDisplacement).norm() +
+        bound.rotationalBound;
+    pass.relativeBounds[i] =
+        std::max(relativeBound, carriedBound) * kRoundUpFactor;  // NaN: nothing is clear of it
+    hasGrown = true;
   }
-  return any;
+  return hasGrown;
 }
 
-void findNear(const Dynamics& dynamics, StepWork& work, Round& round) {
-  round.isNear.resize(work.active.size());
-  const auto apartOf = [&](std::size_t k) {
-    const auto [a, b] = work.bodiesOf[k];
-    return apartNow(dynamics.pairs[work.active[k]], round.jumped[a] + round.jumped[b]);
+void findNearPairs(const PhysicsWorld& world, StepScratch& scratch, Pass& pass) {
+  pass.isNear.resize(scratch.activePairs.size());
+  const auto lowerBoundOf = [&](std::size_t k) {
+    const auto [a, b] = scratch.pairBodies[k];
+    return computeLowerBound(world.pairs[scratch.activePairs[k]],
+                             pass.teleportedDistances[a] + pass.teleportedDistances[b]);
   };
-  work.workers->share(work.active.size(), kScanBlock, [&](std::size_t from, std::size_t to) {
-    for (std::size_t k = from; k < to; ++k) {
-      const auto [a, b] = work.bodiesOf[k];
-      round.isNear[k] = !((round.widths[a] + round.widths[b]) * kMore < apartOf(k));
-    }
-  });
-  round.near.clear(), round.apart.clear();
-  for (std::uint32_t k = 0; k < work.active.size(); ++k) {
-    if (round.isNear[k] == 0) continue;
-    round.near.push_back(k);
-    round.apart.push_back(apartOf(k));
+  scratch.pool->parallelFor(
+      scratch.activePairs.size(), kScannedPairsPerTask, [&](std::size_t from, std::size_t to) {
+        for (std::size_t k = from; k < to; ++k) {
+          const auto [a, b] = scratch.pairBodies[k];
+          pass.isNear[k] = !((pass.relativeBounds[a] + pass.relativeBounds[b]) * kRoundUpFactor <
+                             lowerBoundOf(k));
+        }
+      });
+  pass.nearPairs.clear(), pass.lowerBounds.clear();
+  for (std::uint32_t k = 0; k < scratch.activePairs.size(); ++k) {
+    if (pass.isNear[k] == 0) continue;
+    pass.nearPairs.push_back(k);
+    pass.lowerBounds.push_back(lowerBoundOf(k));
   }
 }
 
-void proveRound(const Dynamics& dynamics, StepWork& work, Round& round) {
-  if (widen(work, round)) findNear(dynamics, work, round);
-  round.parts.assign(round.near.size(), 1);
-  round.proofs.assign(round.near.size(), 0);
-  work.workers->share(round.near.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
-    for (std::size_t n = from; n < to; ++n) {
-      const std::uint32_t k = round.near[n];
-      const auto [a, b] = work.bodiesOf[k];
-      if (round.open[a] == 0 && round.open[b] == 0) continue;
-      if (closingOf(work.strides[a], work.strides[b]) < round.apart[n]) continue;
-      const NearPair& pair = dynamics.pairs[work.active[k]];
-      round.parts[n] = clearFraction(dynamics, pair, round.apart[n], work, round.proofs[n]);
-    }
-  });
-  for (const std::uint8_t proof : round.proofs) work.report.proofs += proof;
+void runProofPass(const PhysicsWorld& world, StepScratch& scratch, Pass& pass) {
+  if (updateRelativeBounds(scratch, pass)) findNearPairs(world, scratch, pass);
+  pass.clearFractions.assign(pass.nearPairs.size(), 1);
+  pass.usedNarrowPhase.assign(pass.nearPairs.size(), 0);
+  scratch.pool->parallelFor(
+      pass.nearPairs.size(), kPairsPerTask, [&](std::size_t from, std::size_t to) {
+        for (std::size_t n = from; n < to; ++n) {
+          const std::uint32_t k = pass.nearPairs[n];
+          const auto [a, b] = scratch.pairBodies[k];
+          if (pass.needsProof[a] == 0 && pass.needsProof[b] == 0) continue;
+          if (computeClosingBound(scratch.motionBounds[a], scratch.motionBounds[b]) <
+              pass.lowerBounds[n])
+            continue;
+          const BodyPair& pair = world.pairs[scratch.activePairs[k]];
+          pass.clearFractions[n] = computePairClearFraction(world, pair, pass.lowerBounds[n],
+                                                            scratch, pass.usedNarrowPhase[n]);
+        }
+      });
+  ENFILADE_ASSERT(std::ranges::all_of(
+      pass.clearFractions, [](double fraction) { return fraction >= 0 && fraction <= 1; }));
+  for (const std::uint8_t proof : pass.usedNarrowPhase) scratch.report.continuousChecks += proof;
 }
 
-/// Shortens the way of one of `bodies` to a part of what it is beside its carrier's.
-void shorten(std::uint32_t body, double part, StepWork& work) {
-  work.fractions[body] *= part;
-  Passage& way = work.passages[body];
-  const Carry& carry = work.carried[body];
-  if (carry.by != kNoPlace) way.stands = nullptr;
-  way.toCentre -= carry.shift;
-  if (carry.turns) {
-    way.toCentre = carry.turn.conjugate() * (way.toCentre - carry.pivot) + carry.pivot;
-    way.toRotation = carry.turn.conjugate() * way.toRotation;
+/// Scales a body's motion relative to its carrier by `fraction`.
+void scaleMotion(std::uint32_t body, double fraction, StepScratch& scratch) {
+  ENFILADE_ASSERT(fraction >= 0 && fraction < 1);
+  scratch.motionFractions[body] *= fraction;
+  SweptPose& sweep = scratch.sweptPoses[body];
+  const CarrierMotion& carrierMotion = scratch.carrierMotions[body];
+  if (carrierMotion.carrier != kNoIndex) sweep.stationaryBody = nullptr;
+  sweep.toCentre -= carrierMotion.translation;
+  if (carrierMotion.rotates) {
+    sweep.toCentre = carrierMotion.rotation.conjugate() * (sweep.toCentre - carrierMotion.pivot) +
+                     carrierMotion.pivot;
+    sweep.toRotation = carrierMotion.rotation.conjugate() * sweep.toRotation;
   }
-  measure(way);
-  way = firstPart(way, part);
-  if (carry.turns) {
-    way.toCentre = carry.turn * (way.toCentre - carry.pivot) + carry.pivot;
-    way.toRotation = (carry.turn * way.toRotation).normalized();
+  updateDerived(sweep);
+  sweep = truncateSweep(sweep, fraction);
+  if (carrierMotion.rotates) {
+    sweep.toCentre =
+        carrierMotion.rotation * (sweep.toCentre - carrierMotion.pivot) + carrierMotion.pivot;
+    sweep.toRotation = (carrierMotion.rotation * sweep.toRotation).normalized();
   }
-  way.toCentre += carry.shift;
-  measure(way);
+  sweep.toCentre += carrierMotion.translation;
+  updateDerived(sweep);
 }
 
-/// What its carrier would take it through stops it: nothing is penetrated that stands, rather the
-/// driven body penetrates what it drives.
-void drop(const Dynamics& dynamics, std::uint32_t body, StepWork& work) {
-  work.fractions[body] = 0, work.yields[body] = 0;
-  work.carried[body] = {};
-  work.passages[body] = standing(dynamics.solids[work.solids[body]]);
+/// Stops a body that its carrier would move through an obstacle. The kinematic body may then
+/// penetrate it; static bodies are never penetrated.
+void detachFromCarrier(const PhysicsWorld& world, std::uint32_t body, StepScratch& scratch) {
+  scratch.motionFractions[body] = 0, scratch.hasOwnMotion[body] = 0;
+  scratch.carrierMotions[body] = {};
+  scratch.sweptPoses[body] = makeStationaryPose(world.bodies[scratch.bodyIndices[body]]);
 }
 
-/// Whether one of `bodies` has any way of its own left.
-bool canYield(const Dynamics& dynamics, std::uint32_t body, const StepWork& work) {
-  return dynamics.solids[work.solids[body]].isAwake() && work.yields[body] != 0;
+/// Returns whether a body has motion of its own left.
+bool canReduceMotion(const PhysicsWorld& world, std::uint32_t body, const StepScratch& scratch) {
+  return world.bodies[scratch.bodyIndices[body]].isAwake() && scratch.hasOwnMotion[body] != 0;
 }
 
-/// Whether it only goes where its carrier takes it, and `other` neither carries it nor goes along.
-bool isTakenInto(std::uint32_t body, std::uint32_t other, const StepWork& work) {
-  const std::uint32_t carrier = work.carried[body].by;
-  return carrier != kNoPlace && carrier != other && work.carried[other].by != carrier;
+/// Returns whether only its carrier moves the body, and `other` is neither that carrier nor carried
+/// by it.
+bool isCarriedInto(std::uint32_t body, std::uint32_t other, const StepScratch& scratch) {
+  const std::uint32_t carrier = scratch.carrierMotions[body].carrier;
+  return carrier != kNoIndex && carrier != other &&
+         scratch.carrierMotions[other].carrier != carrier;
 }
 
-/// Who can go nothing of its way goes out of what is too near, once. Returns whether it does.
-bool goOut(std::uint32_t body, double leash, StepWork& work) {
-  const Vec3 parting = std::exchange(work.partings[body], Vec3::Zero());
-  Passage way = work.passages[body];
-  way.toCentre += parting;
-  way.stands = nullptr;
-  measure(way);
-  if (parting.isZero(0) || lengthOf(way) > leash) return false;
-  work.passages[body] = way;
+/// If no part of the body's motion was certified, depenetrate it once. Returns whether it moves.
+bool depenetrate(std::uint32_t body, double maxDisplacement, StepScratch& scratch) {
+  const Vec3 depenetration = std::exchange(scratch.depenetrations[body], Vec3::Zero());
+  SweptPose sweep = scratch.sweptPoses[body];
+  sweep.toCentre += depenetration;
+  sweep.stationaryBody = nullptr;
+  updateDerived(sweep);
+  if (depenetration.isZero(0) || computeMaxDisplacement(sweep) > maxDisplacement) return false;
+  scratch.sweptPoses[body] = sweep;
   return true;
 }
 
-/// Its way becomes a part of what it was; one that had none left loses its carrier.
-void giveWay(const Dynamics& dynamics, std::uint32_t body, double part, StepWork& work) {
-  const bool goesOn = work.yields[body] != 0;
-  const double leash = dynamics.solids[work.solids[body]].leash;
-  if (goesOn) shorten(body, part, work);
-  if (goesOn && part == 0) work.yields[body] = goOut(body, leash, work);
-  if (!goesOn || lengthOf(work.passages[body]) > leash) drop(dynamics, body, work);
+/// Reduces a body's motion to `fraction`. A body without motion of its own loses its carrier.
+void reduceMotion(const PhysicsWorld& world, std::uint32_t body, double fraction,
+                  StepScratch& scratch) {
+  const bool hasOwnMotion = scratch.hasOwnMotion[body] != 0;
+  const double maxDisplacement = world.bodies[scratch.bodyIndices[body]].maxStepDisplacement;
+  if (hasOwnMotion) scaleMotion(body, fraction, scratch);
+  if (hasOwnMotion && fraction == 0)
+    scratch.hasOwnMotion[body] = depenetrate(body, maxDisplacement, scratch);
+  if (!hasOwnMotion || computeMaxDisplacement(scratch.sweptPoses[body]) > maxDisplacement)
+    detachFromCarrier(world, body, scratch);
 }
 
-/// Shortens the ways of all whose pairs are not proved clear. Returns whether any was.
-bool shortenAll(const Dynamics& dynamics, bool toNothing, StepWork& work, Round& round) {
-  round.least.assign(work.bodies.size(), 1);
-  for (std::size_t n = 0; n < round.near.size(); ++n) {
-    if (round.parts[n] == 1) continue;
-    const auto [a, b] = work.bodiesOf[round.near[n]];
-    bool yieldsA = canYield(dynamics, a, work), yieldsB = canYield(dynamics, b, work);
-    if (!yieldsA && !yieldsB) {
-      yieldsA = isTakenInto(a, b, work);
-      yieldsB = isTakenInto(b, a, work);
+/// Reduces the motions of all pairs that are not proved clear. Returns whether any was reduced.
+bool reduceUnprovenMotions(const PhysicsWorld& world, bool stopEntirely, StepScratch& scratch,
+                           Pass& pass) {
+  pass.minFractions.assign(scratch.motions.size(), 1);
+  for (std::size_t n = 0; n < pass.nearPairs.size(); ++n) {
+    if (pass.clearFractions[n] == 1) continue;
+    const auto [a, b] = scratch.pairBodies[pass.nearPairs[n]];
+    bool reducesA = canReduceMotion(world, a, scratch),
+         reducesB = canReduceMotion(world, b, scratch);
+    if (!reducesA && !reducesB) {
+      reducesA = isCarriedInto(a, b, scratch);
+      reducesB = isCarriedInto(b, a, scratch);
     }
-    const double part = toNothing ? 0 : round.parts[n];
-    if (yieldsA) round.least[a] = std::min(round.least[a], part);
-    if (yieldsB) round.least[b] = std::min(round.least[b], part);
-    if (!yieldsA && !yieldsB) round.squeezed.emplace_back(work.solids[a], work.solids[b]);
+    const double fraction = stopEntirely ? 0 : pass.clearFractions[n];
+    if (reducesA) pass.minFractions[a] = std::min(pass.minFractions[a], fraction);
+    if (reducesB) pass.minFractions[b] = std::min(pass.minFractions[b], fraction);
+    if (!reducesA && !reducesB)
+      pass.crushed.emplace_back(scratch.bodyIndices[a], scratch.bodyIndices[b]);
   }
-  work.workers->share(work.bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
-    for (std::size_t i = from; i < to; ++i) {
-      round.open[i] = round.least[i] < 1;
-      if (round.open[i]) giveWay(dynamics, static_cast<std::uint32_t>(i), round.least[i], work);
-    }
-  });
-  return std::ranges::find(round.open, 1) != round.open.end();
+  scratch.pool->parallelFor(
+      scratch.motions.size(), kBodiesPerTask, [&](std::size_t from, std::size_t to) {
+        for (std::size_t i = from; i < to; ++i) {
+          pass.needsProof[i] = pass.minFractions[i] < 1;
+          if (pass.needsProof[i])
+            reduceMotion(world, static_cast<std::uint32_t>(i), pass.minFractions[i], scratch);
+        }
+      });
+  return std::ranges::find(pass.needsProof, 1) != pass.needsProof.end();
 }
 
 }  // namespace
 
-void proveWays(const Dynamics& dynamics, double seconds, double epsilon, StepWork& work) {
-  work.fractions.assign(work.bodies.size(), 1);
-  work.yields.assign(work.bodies.size(), 1);
-  work.strides.resize(work.bodies.size());
-  findPassages(dynamics, work);
-  findCarried(dynamics, seconds, work);
-  thread_local Round kept;  // as StepWork
-  Round& round = kept;
-  findPartings(dynamics, epsilon, work);
-  startRounds(dynamics, work, round);
-  // Each round but the last shortens a way, after kPartialRounds to nothing, parts a body that has
-  // none left, or drops one.
-  const std::size_t bound = 3 * work.bodies.size() + kPartialRounds + 1;
-  bool any = true;
-  for (std::size_t i = 0; i < bound && any; ++i) {
-    proveRound(dynamics, work, round);
-    any = shortenAll(dynamics, i >= kPartialRounds, work, round);
+void clampToProvenMotion(const PhysicsWorld& world, double seconds, double contactOffset,
+                         StepScratch& scratch) {
+  scratch.motionFractions.assign(scratch.motions.size(), 1);
+  scratch.hasOwnMotion.assign(scratch.motions.size(), 1);
+  scratch.motionBounds.resize(scratch.motions.size());
+  computeSweptPoses(world, scratch);
+  assignCarriers(world, seconds, scratch);
+  thread_local Pass kept;  // reused, as StepScratch is
+  Pass& pass = kept;
+  computeDepenetrations(world, contactOffset, scratch);
+  startPasses(world, scratch, pass);
+  // Each pass but the last reduces a motion (after kPartialPasses to nothing), depenetrates a body
+  // once, or detaches one from its carrier.
+  const std::size_t bound = 3 * scratch.motions.size() + kPartialPasses + 1;
+  bool hasReduced = true;
+  for (std::size_t i = 0; i < bound && hasReduced; ++i) {
+    runProofPass(world, scratch, pass);
+    hasReduced = reduceUnprovenMotions(world, i >= kPartialPasses, scratch, pass);
   }
-  std::sort(round.squeezed.begin(), round.squeezed.end());
-  const auto end = std::unique(round.squeezed.begin(), round.squeezed.end());
-  work.report.squeezed = static_cast<std::uint32_t>(end - round.squeezed.begin());
+  ENFILADE_ASSERT(!hasReduced);
+  std::sort(pass.crushed.begin(), pass.crushed.end());
+  const auto end = std::unique(pass.crushed.begin(), pass.crushed.end());
+  scratch.report.crushed = static_cast<std::uint32_t>(end - pass.crushed.begin());
 }
 
 }  // namespace enfilade::scene

@@ -1,18 +1,36 @@
-// Which bodies hang together, and which of these groups are at rest.
+// Disjoint sets (union-find), for islands of bodies.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <numeric>
 #include <vector>
+
+#include "collision/assert.hpp"
 
 namespace enfilade::scene {
 
-/// Sets of indices that are joined step by step (union-find). The leader of a set is its least one,
-/// whatever the order of joining.
-class Islands {
+/// Sets of indices that unite() merges. The representative of a set is its smallest index, whatever
+/// the order of merging.
+class DisjointSets {
  public:
-  explicit Islands(std::size_t size);
-  std::uint32_t leaderOf(std::uint32_t index);
-  void join(std::uint32_t a, std::uint32_t b);
+  explicit DisjointSets(std::size_t size) : parents_(size) {
+    std::iota(parents_.begin(), parents_.end(), 0u);
+  }
+
+  std::uint32_t find(std::uint32_t index) {
+    ENFILADE_ASSERT(index < parents_.size());
+    while (parents_[index] != index) {  // ends: a parent is smaller than its child
+      parents_[index] = parents_[parents_[index]];
+      index = parents_[index];
+    }
+    return index;
+  }
+
+  void unite(std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t first = find(a), second = find(b);
+    parents_[std::max(first, second)] = std::min(first, second);
+  }
 
  private:
   std::vector<std::uint32_t> parents_;

@@ -1,5 +1,5 @@
-// Greedily, in the order of the patches: the first colour that neither body has yet; or, where the
-// order counts, the first after all that they have.
+// Greedy coloring in the order of the constraints. A constraint gets the first color that neither
+// body has. Where the order counts, it gets the first color after all colors of its bodies.
 #include "scene/physics/graph_coloring.hpp"
 
 #include <algorithm>
@@ -7,60 +7,66 @@
 #include <bit>
 #include <numeric>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::scene {
 namespace {
 
-constexpr std::uint32_t kColours = 32;
+constexpr std::uint32_t kMaxColors = 32;
 
-/// The colour of a patch is the first after those of all patches before it that share a body with
-/// it.
-Colouring ranked(std::span<const ContactPatch> patches, std::span<const std::uint8_t> moves) {
-  std::vector<std::uint32_t> after(moves.size(), 0), ranks(patches.size());
+/// Gives a constraint the first color after those of all earlier constraints that share a body.
+ConstraintColoring colorInOrder(std::span<const ContactConstraint> constraints,
+                                std::span<const std::uint8_t> isDynamic) {
+  std::vector<std::uint32_t> nextRanks(isDynamic.size(), 0), ranks(constraints.size());
   std::uint32_t count = 0;
-  for (std::size_t k = 0; k < patches.size(); ++k) {
-    const std::uint32_t a = patches[k].a, b = patches[k].b;
-    ranks[k] = std::max(moves[a] ? after[a] : 0, moves[b] ? after[b] : 0);
-    after[a] = after[b] = ranks[k] + 1;
+  for (std::size_t k = 0; k < constraints.size(); ++k) {
+    const std::uint32_t a = constraints[k].a, b = constraints[k].b;
+    ranks[k] = std::max(isDynamic[a] ? nextRanks[a] : 0, isDynamic[b] ? nextRanks[b] : 0);
+    nextRanks[a] = nextRanks[b] = ranks[k] + 1;
     count = std::max(count, ranks[k] + 1);
   }
-  Colouring colouring;
-  colouring.order.resize(patches.size());
-  std::iota(colouring.order.begin(), colouring.order.end(), 0u);
-  std::stable_sort(colouring.order.begin(), colouring.order.end(),
+  ConstraintColoring coloring;
+  coloring.order.resize(constraints.size());
+  std::iota(coloring.order.begin(), coloring.order.end(), 0u);
+  std::stable_sort(coloring.order.begin(), coloring.order.end(),
                    [&](std::uint32_t k, std::uint32_t l) { return ranks[k] < ranks[l]; });
-  colouring.ends.assign(count + 1, 0);
-  for (const std::uint32_t rank : ranks) ++colouring.ends[rank];
-  std::partial_sum(colouring.ends.begin(), colouring.ends.end(), colouring.ends.begin());
-  return colouring;
+  coloring.ends.assign(count + 1, 0);
+  for (const std::uint32_t rank : ranks) ++coloring.ends[rank];
+  std::partial_sum(coloring.ends.begin(), coloring.ends.end(), coloring.ends.begin());
+  ENFILADE_ASSERT(coloring.ends.back() == constraints.size());
+  return coloring;
 }
 
 }  // namespace
 
-Colouring colourPatches(std::span<const ContactPatch> patches,
-                        std::span<const std::uint8_t> moves) {
-  if (patches.size() < kFewPatches) return ranked(patches, moves);
-  std::vector<std::uint32_t> taken(moves.size(), 0), colours(patches.size());
-  std::array<std::uint32_t, kColours + 1> counts{};
-  for (std::size_t k = 0; k < patches.size(); ++k) {
-    const std::uint32_t a = patches[k].a, b = patches[k].b;
-    const std::uint32_t used = (moves[a] ? taken[a] : 0) | (moves[b] ? taken[b] : 0);
-    const auto colour = static_cast<std::uint32_t>(std::countr_one(used));  // kColours: none left
-    colours[k] = colour;
-    ++counts[colour];
-    if (colour == kColours) continue;
-    taken[a] |= 1u << colour, taken[b] |= 1u << colour;
+ConstraintColoring colorConstraints(std::span<const ContactConstraint> constraints,
+                                    std::span<const std::uint8_t> isDynamic) {
+  if (constraints.size() < kSmallConstraintThreshold) return colorInOrder(constraints, isDynamic);
+  std::vector<std::uint32_t> usedColors(isDynamic.size(), 0), colors(constraints.size());
+  std::array<std::uint32_t, kMaxColors + 1> counts{};
+  for (std::size_t k = 0; k < constraints.size(); ++k) {
+    const std::uint32_t a = constraints[k].a, b = constraints[k].b;
+    ENFILADE_ASSERT(a < isDynamic.size() && b < isDynamic.size());
+    const std::uint32_t used =
+        (isDynamic[a] ? usedColors[a] : 0) | (isDynamic[b] ? usedColors[b] : 0);
+    const auto color = static_cast<std::uint32_t>(std::countr_one(used));  // kMaxColors: none left
+    colors[k] = color;
+    ++counts[color];
+    if (color == kMaxColors) continue;
+    usedColors[a] |= 1u << color, usedColors[b] |= 1u << color;
   }
-  Colouring colouring;
-  std::array<std::uint32_t, kColours + 1> next{};
+  ConstraintColoring coloring;
+  std::array<std::uint32_t, kMaxColors + 1> next{};
   std::uint32_t end = 0;
-  for (std::uint32_t colour = 0; colour <= kColours; ++colour) {
-    next[colour] = end;
-    end += counts[colour];
-    if (counts[colour] > 0 || colour == kColours) colouring.ends.push_back(end);
+  for (std::uint32_t color = 0; color <= kMaxColors; ++color) {
+    next[color] = end;
+    end += counts[color];
+    if (counts[color] > 0 || color == kMaxColors) coloring.ends.push_back(end);
   }
-  colouring.order.resize(patches.size());
-  for (std::uint32_t k = 0; k < patches.size(); ++k) colouring.order[next[colours[k]]++] = k;
-  return colouring;
+  ENFILADE_ASSERT(end == constraints.size());
+  coloring.order.resize(constraints.size());
+  for (std::uint32_t k = 0; k < constraints.size(); ++k) coloring.order[next[colors[k]]++] = k;
+  return coloring;
 }
 
 }  // namespace enfilade::scene

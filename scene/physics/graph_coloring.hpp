@@ -1,5 +1,5 @@
-// Which patches can be solved at the same time: those that share no body that moves. Patches of one
-// colour share none, so the order among them, and who solves them, changes nothing.
+// Graph coloring of contact constraints. Constraints of one color share no dynamic body, so they
+// can be solved in parallel and in any order with the same result.
 #pragma once
 
 #include <cstdint>
@@ -10,18 +10,19 @@
 
 namespace enfilade::scene {
 
-struct Colouring {
-  std::vector<std::uint32_t> order;  ///< indices of all patches, by colour, ascending in each
-  /// Where each colour ends in `order`. The last one holds what found no colour: those have to be
-  /// solved one after another.
+struct ConstraintColoring {
+  std::vector<std::uint32_t> order;  ///< constraint indices by color, ascending within a color
+  /// End of each color in `order`. The last color holds constraints without a color, which must be
+  /// solved sequentially.
   std::vector<std::uint32_t> ends;
 };
 
-/// Of fewer patches, those that share a body that moves come in the order that they have: it is the
-/// better one for stacks, whose patches come from the ground up.
-inline constexpr std::size_t kFewPatches = 192;
+/// Below this count, constraints that share a dynamic body keep their order. That order converges
+/// better for stacks, whose constraints run from the ground up.
+inline constexpr std::size_t kSmallConstraintThreshold = 192;
 
-/// `moves`: of each body, whether impulses move it.
-Colouring colourPatches(std::span<const ContactPatch> patches, std::span<const std::uint8_t> moves);
+/// `isDynamic`: one flag a body.
+ConstraintColoring colorConstraints(std::span<const ContactConstraint> constraints,
+                                    std::span<const std::uint8_t> isDynamic);
 
 }  // namespace enfilade::scene

@@ -2,15 +2,17 @@
 
 #include <algorithm>
 
+#include "collision/assert.hpp"
 #include "collision/shapes/hull.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr double kUp = 1 + 0x1p-48;  // above what sums of a few rounded products lose
+constexpr double kRadiusRoundUpFactor =
+    1 + 0x1p-48;  // exceeds the rounding error of sums of a few products
 
-/// Newell's: the sum of the fan's, unit.
-Vec3 normalOfFace(const collision::Hull& hull, const std::vector<std::uint32_t>& face) {
+/// Newell's method: the normalised sum over the triangle fan.
+Vec3 computeFaceNormal(const collision::Hull& hull, const std::vector<std::uint32_t>& face) {
   Vec3 normal = Vec3::Zero();
   for (std::size_t i = 1; i + 1 < face.size(); ++i)
     normal += (hull.vertices[face[i]] - hull.vertices[face[0]])
@@ -18,63 +20,65 @@ Vec3 normalOfFace(const collision::Hull& hull, const std::vector<std::uint32_t>&
   return normal.normalized();
 }
 
-/// The parts, and a radius about the centre.
-void addParts(std::span<const collision::Hull* const> hulls, Solid& solid) {
+/// Adds the parts and updates the bounding radius.
+void addParts(std::span<const collision::Hull* const> hulls, PhysicsBody& body) {
   for (const collision::Hull* hull : hulls) {
-    solid.parts.push_back(partOfHull(*hull));
+    body.parts.push_back(makeConvexPart(*hull));
     for (const Vec3& v : hull->vertices)
-      solid.radius = std::max(solid.radius, (v - solid.centreInFrame).norm() * kUp);
+      body.radius = std::max(body.radius, (v - body.centreInFrame).norm() * kRadiusRoundUpFactor);
   }
 }
 
 }  // namespace
 
-SolidPart partOfHull(const collision::Hull& hull) {
-  SolidPart part{{hull.vertices, &hull}, {}};
-  for (const auto& face : hull.faces) part.faceNormals.push_back(normalOfFace(hull, face));
+ConvexPart makeConvexPart(const collision::Hull& hull) {
+  ConvexPart part{{hull.vertices, &hull}, {}};
+  for (const auto& face : hull.faces) part.faceNormals.push_back(computeFaceNormal(hull, face));
   return part;
 }
 
-void placeSolid(Solid& solid) {
-  solid.rotation = solid.motion.rotation.toRotationMatrix();
-  solid.position = solid.motion.centre - solid.rotation * solid.centreInFrame;
+void updateTransform(PhysicsBody& body) {
+  ENFILADE_ASSERT(!(std::abs(body.motion.rotation.squaredNorm() - 1) > 1e-6));
+  body.rotation = body.motion.rotation.toRotationMatrix();
+  body.position = body.motion.centre - body.rotation * body.centreInFrame;
 }
 
-Solid freeSolid(std::span<const collision::Hull* const> hulls, double density,
-                const collision::Pose& worldFromFrame) {
+PhysicsBody makeDynamicBody(std::span<const collision::Hull* const> hulls, double density,
+                            const collision::Pose& worldFromFrame) {
   std::vector<MassProperties> masses;
-  for (const collision::Hull* hull : hulls) masses.push_back(massOfHull(*hull, density));
-  const MassProperties whole = together(masses);
-  Solid solid;
-  solid.motion = freeBody(whole, worldFromFrame);
-  solid.centreInFrame = whole.centre;
-  addParts(hulls, solid);
-  placeSolid(solid);
-  return solid;
+  for (const collision::Hull* hull : hulls) masses.push_back(computeHullMass(*hull, density));
+  const MassProperties whole = combineMassProperties(masses);
+  PhysicsBody body;
+  body.motion = makeDynamicMotion(whole, worldFromFrame);
+  body.centreInFrame = whole.centre;
+  addParts(hulls, body);
+  updateTransform(body);
+  return body;
 }
 
-Solid heldSolid(std::span<const collision::Hull* const> hulls,
-                const collision::Pose& worldFromFrame) {
-  Solid solid;
-  solid.motion.rotation = worldFromFrame.rotation;
-  solid.motion.centre = worldFromFrame.translation;
-  addParts(hulls, solid);
-  placeSolid(solid);
-  return solid;
+PhysicsBody makeKinematicBody(std::span<const collision::Hull* const> hulls,
+                              const collision::Pose& worldFromFrame) {
+  PhysicsBody body;
+  body.motion.rotation = worldFromFrame.rotation;
+  body.motion.centre = worldFromFrame.translation;
+  addParts(hulls, body);
+  updateTransform(body);
+  return body;
 }
 
-Solid stillSolid(const ObjectParts& parts) {
-  Solid solid;
-  solid.motion.centre = parts.origin;
+PhysicsBody makeStaticBody(const CollisionGeometry& parts) {
+  PhysicsBody body;
+  body.motion.centre = parts.origin;
   for (const collision::Hull& hull : parts.localHulls) {
-    solid.parts.push_back(partOfHull(hull));
-    solid.radius = std::max(solid.radius, hull.radius * kUp);
+    body.parts.push_back(makeConvexPart(hull));
+    body.radius = std::max(body.radius, hull.radius * kRadiusRoundUpFactor);
   }
-  solid.mesh = &parts.localTriangles;
+  body.mesh = &parts.localTriangles;
   for (const collision::Triangle& triangle : parts.localTriangles.triangles())
-    for (const Vec3& corner : triangle) solid.radius = std::max(solid.radius, corner.norm() * kUp);
-  placeSolid(solid);
-  return solid;
+    for (const Vec3& corner : triangle)
+      body.radius = std::max(body.radius, corner.norm() * kRadiusRoundUpFactor);
+  updateTransform(body);
+  return body;
 }
 
 }  // namespace enfilade::scene

@@ -1,4 +1,4 @@
-// What free bodies meet and are: rigid things of convex parts, free, driven or still.
+// Rigid bodies of the physics world: convex parts that are dynamic, kinematic or static.
 #pragma once
 
 #include <algorithm>
@@ -14,102 +14,108 @@
 
 namespace enfilade::scene {
 
-/// Its vertices are in the solid's frame, and live elsewhere.
+/// Shape of a part. The vertices are in the body frame and owned elsewhere.
 struct PartShape {
   std::span<const Vec3> vertices;
-  const collision::Hull* hull = nullptr;  ///< of these vertices; null: at most three of them
+  const collision::Hull* hull = nullptr;  ///< hull of these vertices; null: at most three vertices
 };
 
-struct SolidPart : PartShape {
-  std::vector<Vec3> faceNormals;  ///< of the hull's faces, unit, outwards
+struct ConvexPart : PartShape {
+  std::vector<Vec3> faceNormals;  ///< outward unit normals of the hull's faces
 };
 
-/// The part of a hull, which has to outlive it.
-SolidPart partOfHull(const collision::Hull& hull);
+/// Makes a part of a hull, which must outlive the part.
+ConvexPart makeConvexPart(const collision::Hull& hull);
 
-/// How what is driven moves in a substep.
-struct Gait {
-  Vec3 velocity = Vec3::Zero();  ///< of the centre, m/s
-  Vec3 spin = Vec3::Zero();      ///< rad/s
+/// Velocity of a kinematic body in one substep.
+struct SubstepVelocity {
+  Vec3 velocity = Vec3::Zero();         ///< of the centre of mass, m/s
+  Vec3 angularVelocity = Vec3::Zero();  ///< rad/s
 };
 
-struct Solid {
-  /// Keeps the part of an avatar's; what all other parts point at outlives the world.
+/// One body of the physics world.
+struct PhysicsBody {
+  /// Owns the hull of an avatar's part. All other hulls outlive the world.
   std::shared_ptr<const collision::Hull> hull;
-  RigidBody motion;                   ///< inverse mass 0: driven, or still
-  Vec3 centreInFrame = Vec3::Zero();  ///< of mass, in the frame of the parts
-  std::vector<SolidPart> parts;
-  /// Of what is still: its triangles are parts too, numbered after the others.
+  BodyMotion motion;                  ///< inverseMass 0: kinematic or static
+  Vec3 centreInFrame = Vec3::Zero();  ///< centre of mass in the frame of the parts
+  std::vector<ConvexPart> parts;
+  /// Of a static body: its triangles are parts too, numbered after `parts`.
   const collision::TriangleTree* mesh = nullptr;
-  double radius = 0;    ///< metres about the centre: no vertex is farther
-  bool asleep = false;  ///< a free body that stands until something wakes it
-  double calmFor = 0;   ///< seconds
-  /// Who pushes (an avatar) stands as a still thing, and gives what it is held back from by this
-  /// velocity up to `mostPush` newtons. 0: no push.
-  Vec3 pushVelocity = Vec3::Zero();
-  double mostPush = 0;
-  /// Metres: no point may go farther in a step, since what is there was not asked for.
-  double leash = std::numeric_limits<double>::infinity();
-  /// Of what is driven back and forth within a step: one for each of the solver's substeps, else
-  /// none. `motion` has the mean of them, and its way is taken to be straight.
-  std::vector<Gait> gaits;
-  /// m/s: so much faster than it goes it may be pushed within the step.
-  double pushed = 0;
-  bool restless = false;  ///< who leans on it does not sleep: it goes without being driven
+  double radius = 0;      ///< metres about the centre of mass: bound of all vertices
+  bool asleep = false;    ///< a dynamic body that stays at rest until it is woken
+  double sleepTimer = 0;  ///< seconds below the sleep velocity
+  /// Motor of an avatar that pushes. The avatar counts as static and accelerates bodies in its way
+  /// to this velocity, with up to `maxPushForce` newtons. 0: no motor.
+  Vec3 targetVelocity = Vec3::Zero();
+  double maxPushForce = 0;
+  /// Metres: bound of the displacement of any point in a step. The broad phase covers no more.
+  double maxStepDisplacement = std::numeric_limits<double>::infinity();
+  /// One velocity for each solver substep, for a kinematic body that reverses within a step; else
+  /// empty. `motion` holds their mean, and the swept path is taken as straight.
+  std::vector<SubstepVelocity> substepVelocities;
+  /// m/s: bound of the speed that a kinematic body can add by pushing in this step
+  double pushSpeedBound = 0;
+  /// bodies in contact with it do not sleep: it moves without being kinematic
+  bool preventsSleep = false;
 
-  // Set by placeSolid() from the motion.
+  // Set by updateTransform() from `motion`.
   Mat3 rotation = Mat3::Identity();
   Vec3 position = Vec3::Zero();  ///< of the frame's origin
-  double odometer = 0;           ///< metres that no point exceeded in all steps
-  double jumped = 0;             ///< metres that no point exceeded when it was placed from outside
+  double accumulatedMotion =
+      0;  ///< metres: bound of the displacement of any point, summed over all steps
+  double teleportedDistance = 0;  ///< metres: bound of the displacement by teleports, summed
 
-  bool isFree() const { return motion.inverseMass > 0; }
-  bool isAwake() const { return isFree() && !asleep; }
-  /// Driven, or somebody who pushes.
-  bool isMoved() const {
-    return !isFree() && (!gaits.empty() || !motion.velocity.isZero(0) || !motion.spin.isZero(0) ||
-                         (mostPush > 0 && !pushVelocity.isZero(0)));
+  bool isDynamic() const { return motion.inverseMass > 0; }
+  bool isAwake() const { return isDynamic() && !asleep; }
+  /// Kinematic and moving, or an avatar that pushes.
+  bool isActuated() const {
+    return !isDynamic() &&
+           (!substepVelocities.empty() || !motion.velocity.isZero(0) ||
+            !motion.angularVelocity.isZero(0) || (maxPushForce > 0 && !targetVelocity.isZero(0)));
   }
-  /// Goes its way before the solver.
-  bool isDriven() const { return isMoved() && mostPush == 0; }
-  /// m/s: no point of it, driven or pushed as it is, departs faster from its mean motion.
-  double swing() const {
-    double most = pushed;
-    for (const Gait& gait : gaits)
-      most = std::max(most, (gait.velocity - motion.velocity).norm() +
-                                (gait.spin - motion.spin).norm() * radius);
-    return most;
+  /// Moves on a prescribed path before the solver runs.
+  bool isKinematic() const { return isActuated() && maxPushForce == 0; }
+  /// m/s: bound of the difference between a point's speed and its mean motion.
+  double maxVelocityDeviation() const {
+    double deviation = pushSpeedBound;
+    for (const SubstepVelocity& substepVelocity : substepVelocities)
+      deviation =
+          std::max(deviation,
+                   (substepVelocity.velocity - motion.velocity).norm() +
+                       (substepVelocity.angularVelocity - motion.angularVelocity).norm() * radius);
+    return deviation;
   }
-  /// m/s: no point goes faster; in the mean.
-  double fastest() const {
-    return asleep ? 0 : motion.velocity.norm() + motion.spin.norm() * radius;
+  /// m/s: bound of the mean speed of any point.
+  double maxPointSpeed() const {
+    return asleep ? 0 : motion.velocity.norm() + motion.angularVelocity.norm() * radius;
   }
 };
 
-void placeSolid(Solid& solid);
+/// Recomputes the world transform from `motion`.
+void updateTransform(PhysicsBody& body);
 
-inline PartShape shapeOf(const Solid& solid, std::uint32_t part) {
-  if (part >= solid.parts.size())
-    return {solid.mesh->triangles()[part - solid.parts.size()], nullptr};
-  return solid.parts[part];
+inline PartShape getPartShape(const PhysicsBody& body, std::uint32_t part) {
+  if (part >= body.parts.size()) return {body.mesh->triangles()[part - body.parts.size()], nullptr};
+  return body.parts[part];
 }
 
-/// Part `part` where the solid is.
-inline collision::ConvexBody partOf(const Solid& solid, std::uint32_t part) {
-  if (part >= solid.parts.size())
-    return {solid.mesh->triangles()[part - solid.parts.size()], solid.position, nullptr, nullptr};
-  const SolidPart& p = solid.parts[part];
-  return {p.vertices, solid.position, &solid.rotation, p.hull};
+/// Returns part `part` at the body's present pose.
+inline collision::PlacedConvex placePart(const PhysicsBody& body, std::uint32_t part) {
+  if (part >= body.parts.size())
+    return {body.mesh->triangles()[part - body.parts.size()], body.position, nullptr, nullptr};
+  const ConvexPart& p = body.parts[part];
+  return {p.vertices, body.position, &body.rotation, p.hull};
 }
 
-/// A free solid of convex parts (hulls in one frame, uniform `density` in kg / m^3).
-Solid freeSolid(std::span<const collision::Hull* const> hulls, double density,
-                const collision::Pose& worldFromFrame);
-/// The same, standing or driven: its centre is the frame's origin.
-Solid heldSolid(std::span<const collision::Hull* const> hulls,
-                const collision::Pose& worldFromFrame);
-/// What is still: hulls and triangles about the parts' origin, numbered as ObjectParts does.
-/// `parts` has to outlive it.
-Solid stillSolid(const ObjectParts& parts);
+/// Makes a dynamic body of convex parts (hulls in one frame; uniform `density` in kg/m^3).
+PhysicsBody makeDynamicBody(std::span<const collision::Hull* const> hulls, double density,
+                            const collision::Pose& worldFromFrame);
+/// Makes a kinematic or static body of hulls; its centre is the frame's origin.
+PhysicsBody makeKinematicBody(std::span<const collision::Hull* const> hulls,
+                              const collision::Pose& worldFromFrame);
+/// Makes a static body of hulls and triangles about the parts' origin, in the part order of
+/// CollisionGeometry. `parts` must outlive it.
+PhysicsBody makeStaticBody(const CollisionGeometry& parts);
 
 }  // namespace enfilade::scene

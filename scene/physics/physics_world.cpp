@@ -1,418 +1,452 @@
 // Steps
-//  1. Pairs of an awake body are looked at (near_pair.hpp). An awake body that leans on one asleep
-//     wakes it, whose pairs are then looked at, too.
-//  2. The solver moves the awake bodies and all that they may meet (solver.hpp).
-//  3. Every pair that could have met on the way is proved clear (passage.hpp); where that fails,
-//     the free bodies go only as far as is proved, and less fast; then their other pairs are looked
-//     at again, until nobody needs to stop. It ends, since a body goes less far each time, and
-//     after a few times not at all. Who goes not at all is parted, once, from what is too near. A
-//     group that leans on one driven body and nothing else that stands or is driven, such as parts
-//     in a tray, goes with it at least.
-//  4. Groups of bodies that lean on one another and were calm for a while fall asleep.
+//  1. Update the pairs of awake bodies (body_pair.hpp). An awake body in contact wakes a
+//     sleeping one, whose pairs are then updated too.
+//  2. Solve the awake bodies and all that they may touch (solver.hpp).
+//  3. Prove every pair that could touch on its way clear (swept_pose.hpp). Where that fails, the
+//     dynamic bodies move only as far as proved, at reduced velocity. Their other pairs are then
+//     checked again, until no body needs to be reduced. This ends: a body moves less far each time,
+//     and after a few passes not at all. If no part of a body's motion was certified, depenetrate
+//     it once. An island that touches one kinematic body and no other obstacle, such as parts in a
+//     tray, moves at least with it.
+//  4. Islands of touching bodies that were at rest for a while fall asleep.
 #include "scene/physics/physics_world.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "collision/assert.hpp"
+#include "scene/physics/continuous_collision.hpp"
 #include "scene/physics/disjoint_sets.hpp"
-#include "scene/physics/step_scratch.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kAskedAhead = 4;   // pairs
-constexpr std::size_t kKeyBlock = 1024;  // pairs that a thread takes at a time to find them again
+constexpr std::size_t kPrefetchDistance = 4;  // pairs
+constexpr std::size_t kKeysPerTask = 1024;    // pairs that a task matches to old ones
 
-NearPairStep nearStep(const DynamicsStep& settings) {
-  return {settings.solver.seconds, settings.solver.gravity, settings.solver.epsilon};
+PairStepSettings makePairStepSettings(const StepSettings& settings) {
+  return {settings.solver.seconds, settings.solver.gravity, settings.solver.contactOffset};
 }
 
-bool mayMatter(const Pace& a, const Pace& b) {
-  return a.isAwake || b.isAwake || (a.isMoved && b.isFree) || (b.isMoved && a.isFree);
+bool isRelevantPair(const SpeedBound& a, const SpeedBound& b) {
+  return a.isAwake || b.isAwake || (a.isActuated && b.isDynamic) || (b.isActuated && a.isDynamic);
 }
-bool mayMatter(const Solid& a, const Solid& b) {
-  return mayMatter(paceOf(a, Vec3::Zero()), paceOf(b, Vec3::Zero()));
+bool isRelevantPair(const PhysicsBody& a, const PhysicsBody& b) {
+  return isRelevantPair(computeSpeedBound(a, Vec3::Zero()), computeSpeedBound(b, Vec3::Zero()));
 }
 
-void wake(Solid& solid) {
-  solid.asleep = false;
-  solid.calmFor = 0;
+void wakeBody(PhysicsBody& body) {
+  body.asleep = false;
+  body.sleepTimer = 0;
 }
 
 // ---- step 1 ------------------------------------------------------------------------------------
 
-/// Metres that a point of the solid gets `towards` (unit) in the step by the motion of now, at
-/// most.
-double advanceOf(const Solid& solid, const Vec3& arm, const Vec3& towards, double seconds) {
-  if (solid.asleep) return 0;
-  const auto& mean = solid.motion;
-  const Vec3 velocity = mean.velocity + mean.spin.cross(arm) + solid.pushVelocity;
-  double most = std::max(solid.pushed, towards.dot(velocity)) * seconds, way = 0;
-  for (const Gait& gait : solid.gaits) {
-    way += towards.dot(gait.velocity + gait.spin.cross(arm)) * seconds /
-           static_cast<double>(solid.gaits.size());
-    most = std::max(most, way);
+/// Bound of the displacement in metres that a point can reach along `direction` (unit) in the step
+/// at the present velocities.
+double computeMaxAdvance(const PhysicsBody& body, const Vec3& arm, const Vec3& direction,
+                         double seconds) {
+  if (body.asleep) return 0;
+  const auto& mean = body.motion;
+  const Vec3 velocity = mean.velocity + mean.angularVelocity.cross(arm) + body.targetVelocity;
+  double maxAdvance = std::max(body.pushSpeedBound, direction.dot(velocity)) * seconds,
+         displacement = 0;
+  for (const SubstepVelocity& substepVelocity : body.substepVelocities) {
+    displacement +=
+        direction.dot(substepVelocity.velocity + substepVelocity.angularVelocity.cross(arm)) *
+        seconds / static_cast<double>(body.substepVelocities.size());
+    maxAdvance = std::max(maxAdvance, displacement);
   }
-  return most;
+  return maxAdvance;
 }
 
-/// Whether the points of its patch lean on one another, or will in the step. One of both sleeps.
-bool comesToLean(const NearPair& pair, const Solid& a, const Solid& b, const NearPairStep& step) {
-  const ContactPatch& patch = *pair.patch();
-  for (const PatchPoint& point : patch.list()) {
-    const double advance = advanceOf(a, point.armA, patch.normal, step.seconds) +
-                           advanceOf(b, point.armB, -patch.normal, step.seconds);
-    if (point.separation < 2 * step.epsilon + advance) return true;
+/// Returns whether a contact point touches, or can touch within the step. One of the bodies sleeps.
+bool willTouch(const BodyPair& pair, const PhysicsBody& a, const PhysicsBody& b,
+               const PairStepSettings& step) {
+  const ContactConstraint& constraint = *pair.constraint();
+  for (const ContactConstraintPoint& point : constraint.activePoints()) {
+    const double advance = computeMaxAdvance(a, point.armA, constraint.normal, step.seconds) +
+                           computeMaxAdvance(b, point.armB, -constraint.normal, step.seconds);
+    if (point.separation < 2 * step.contactOffset + advance) return true;
   }
   return false;
 }
 
-/// Of all solids, beside the mean velocity of those that are awake.
-void findPaces(const Dynamics& dynamics, StepWork& work) {
+/// Computes speed bounds of all bodies, relative to the mean velocity of the awake ones.
+void computeSpeedBounds(const PhysicsWorld& world, StepScratch& scratch) {
   Vec3 sum = Vec3::Zero();
   double awake = 0;
-  for (const Solid& solid : dynamics.solids)
-    if (solid.isAwake()) sum += solid.motion.velocity, ++awake;
+  for (const PhysicsBody& body : world.bodies)
+    if (body.isAwake()) sum += body.motion.velocity, ++awake;
   const Vec3 mean = awake > 0 ? Vec3(sum / awake) : sum;
-  work.paces.clear();
-  for (const Solid& solid : dynamics.solids) work.paces.push_back(paceOf(solid, mean));
+  scratch.speedBounds.clear();
+  for (const PhysicsBody& body : world.bodies)
+    scratch.speedBounds.push_back(computeSpeedBound(body, mean));
 }
 
-/// Looks at a pair, and changes nothing else; flags.
-std::uint8_t lookAt(const Dynamics& dynamics, const StepWork& work, NearPair& pair,
-                    const NearPairStep& step) {
-  const Pace &paceA = work.paces[pair.key.a], &paceB = work.paces[pair.key.b];
-  if (!mayMatter(paceA, paceB)) return 0;
-  std::uint8_t flags = StepWork::kActive;
-  const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
-  if (areFar(pair, paceA, paceB, step)) {
-    pair.hasPatch = false;
-  } else if (look(pair, a, b, step)) {
-    flags |= StepWork::kAsked;
+/// Updates a pair and changes nothing else. Returns its flags.
+std::uint8_t evaluatePair(const PhysicsWorld& world, const StepScratch& scratch, BodyPair& pair,
+                          const PairStepSettings& step) {
+  const SpeedBound &speedA = scratch.speedBounds[pair.key.a],
+                   &speedB = scratch.speedBounds[pair.key.b];
+  if (!isRelevantPair(speedA, speedB)) return 0;
+  std::uint8_t flags = StepScratch::kActive;
+  const PhysicsBody &a = world.bodies[pair.key.a], &b = world.bodies[pair.key.b];
+  if (isCertifiedFar(pair, speedA, speedB, step)) {
+    pair.hasConstraint = false;
+  } else if (updatePair(pair, a, b, step)) {
+    flags |= StepScratch::kQueried;
   }
-  if (pair.penetration() > 0) flags |= StepWork::kPenetrates;
-  if (!pair.hasPatch) return flags;
-  flags |= StepWork::kPatched;
-  if (leans(pair, step.epsilon)) flags |= StepWork::kLeans;
-  const bool sleeper = (a.isFree() && a.asleep) || (b.isFree() && b.asleep);
-  if (sleeper && comesToLean(pair, a, b, step)) flags |= StepWork::kWakes;
+  if (pair.penetration() > 0) flags |= StepScratch::kPenetrates;
+  if (!pair.hasConstraint) return flags;
+  flags |= StepScratch::kConstrained;
+  if (isTouching(pair, step.contactOffset)) flags |= StepScratch::kTouching;
+  const bool sleeper = (a.isDynamic() && a.asleep) || (b.isDynamic() && b.asleep);
+  if (sleeper && willTouch(pair, a, b, step)) flags |= StepScratch::kWakes;
   return flags;
 }
 
-/// Takes over what a round of looks found. Returns whether somebody woke.
-bool takeLook(Dynamics& dynamics, const NearPair& pair, std::uint8_t& flags, StepWork& work) {
-  if ((flags & StepWork::kAsked) != 0) ++work.report.looks;
-  if ((flags & StepWork::kPenetrates) != 0)
-    work.report.deepest = std::max(work.report.deepest, pair.penetration());
-  const bool wakes = (flags & StepWork::kWakes) != 0;
-  flags &= StepWork::kActive | StepWork::kLeans | StepWork::kPatched;
+/// Accumulates the flags of an update pass. Returns whether a body woke.
+bool applyPairFlags(PhysicsWorld& world, const BodyPair& pair, std::uint8_t& flags,
+                    StepScratch& scratch) {
+  if ((flags & StepScratch::kQueried) != 0) ++scratch.report.narrowPhaseQueries;
+  if ((flags & StepScratch::kPenetrates) != 0)
+    scratch.report.maxPenetration = std::max(scratch.report.maxPenetration, pair.penetration());
+  const bool wakes = (flags & StepScratch::kWakes) != 0;
+  flags &= StepScratch::kActive | StepScratch::kTouching | StepScratch::kConstrained;
   if (!wakes) return false;
-  Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
-  wake(a.isFree() && a.asleep ? a : b);
+  PhysicsBody &a = world.bodies[pair.key.a], &b = world.bodies[pair.key.b];
+  wakeBody(a.isDynamic() && a.asleep ? a : b);
   return true;
 }
 
-void wakeJointed(Dynamics& dynamics) {
-  for (const Joint& joint : dynamics.joints) {
-    Solid &a = dynamics.solids[joint.a], &b = dynamics.solids[joint.b];
-    if (a.isAwake() && b.asleep) wake(b);
-    if (b.isAwake() && a.asleep) wake(a);
+void wakeJointedBodies(PhysicsWorld& world) {
+  for (const Joint& joint : world.joints) {
+    PhysicsBody &a = world.bodies[joint.a], &b = world.bodies[joint.b];
+    if (a.isAwake() && b.asleep) wakeBody(b);
+    if (b.isAwake() && a.asleep) wakeBody(a);
   }
 }
 
-/// Asks the memory for what is known of a pair that may lean: such lie all over it.
-void askFor(const NearPair& pair) {
-  if (!pair.hasPatch) return;
-  const auto* bytes = reinterpret_cast<const char*>(pair.close.get());
-  for (std::size_t i = 0; i < sizeof(CloseUp); i += 64) __builtin_prefetch(bytes + i);
+/// Prefetches the cache of a pair with a constraint. The caches are scattered in memory.
+void prefetchPair(const BodyPair& pair) {
+  if (!pair.hasConstraint) return;
+  const auto* bytes = reinterpret_cast<const char*>(pair.cache.get());
+  for (std::size_t i = 0; i < sizeof(PairCache); i += 64) __builtin_prefetch(bytes + i);
 }
 
-void findPatches(Dynamics& dynamics, const NearPairStep& step, StepWork& work) {
-  wakeJointed(dynamics);
-  std::vector<NearPair>& pairs = dynamics.pairs;
-  work.looks.assign(pairs.size(), 0);
+void findConstraints(PhysicsWorld& world, const PairStepSettings& step, StepScratch& scratch) {
+  wakeJointedBodies(world);
+  std::vector<BodyPair>& pairs = world.pairs;
+  scratch.pairFlags.assign(pairs.size(), 0);
   std::vector<std::uint8_t> isNew(pairs.size(), 1);
-  // Each round but the last wakes a solid.
-  for (std::size_t round = 0; round <= dynamics.solids.size(); ++round) {
-    findPaces(dynamics, work);
-    work.workers->share(pairs.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
+  // Each pass but the last wakes a body.
+  for (std::size_t pass = 0; pass <= world.bodies.size(); ++pass) {
+    computeSpeedBounds(world, scratch);
+    scratch.pool->parallelFor(pairs.size(), kPairsPerTask, [&](std::size_t from, std::size_t to) {
       for (std::size_t i = from; i < to; ++i) {
-        if (i + kAskedAhead < to) askFor(pairs[i + kAskedAhead]);
-        if (isNew[i]) work.looks[i] = lookAt(dynamics, work, pairs[i], step);
+        if (i + kPrefetchDistance < to) prefetchPair(pairs[i + kPrefetchDistance]);
+        if (isNew[i]) scratch.pairFlags[i] = evaluatePair(world, scratch, pairs[i], step);
       }
     });
     bool woken = false;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
-      if (!isNew[i] || work.looks[i] == 0) continue;
+      if (!isNew[i] || scratch.pairFlags[i] == 0) continue;
       isNew[i] = 0;
-      woken = takeLook(dynamics, pairs[i], work.looks[i], work) || woken;
+      woken = applyPairFlags(world, pairs[i], scratch.pairFlags[i], scratch) || woken;
     }
     if (!woken) break;
   }
   for (std::uint32_t i = 0; i < pairs.size(); ++i) {
-    if (work.looks[i] == 0) continue;
-    work.active.push_back(i);
-    if ((work.looks[i] & StepWork::kPatched) != 0) work.patched.push_back(i);
+    if (scratch.pairFlags[i] == 0) continue;
+    scratch.activePairs.push_back(i);
+    if ((scratch.pairFlags[i] & StepScratch::kConstrained) != 0)
+      scratch.constrainedPairs.push_back(i);
   }
 }
 
 // ---- step 2 ------------------------------------------------------------------------------------
 
-void addBody(const Dynamics& dynamics, std::uint32_t solid, StepWork& work) {
-  if (work.local[solid] != kNoPlace) return;
-  work.local[solid] = static_cast<std::uint32_t>(work.bodies.size());
-  work.solids.push_back(solid);
-  work.bodies.push_back(dynamics.solids[solid].motion);
-  const Solid& added = dynamics.solids[solid];
-  if (!added.isFree() && !added.gaits.empty())
-    work.driven.push_back({work.local[solid], added.gaits});
-  RigidBody& body = work.bodies.back();
-  if (!dynamics.solids[solid].asleep) return;
-  body.inverseMass = 0;  // it stands
-  body.velocity = body.spin = Vec3::Zero();
+void addBody(const PhysicsWorld& world, std::uint32_t body, StepScratch& scratch) {
+  ENFILADE_ASSERT(body < world.bodies.size());
+  if (scratch.localIndices[body] != kNoIndex) return;
+  scratch.localIndices[body] = static_cast<std::uint32_t>(scratch.motions.size());
+  scratch.bodyIndices.push_back(body);
+  scratch.motions.push_back(world.bodies[body].motion);
+  const PhysicsBody& source = world.bodies[body];
+  if (!source.isDynamic() && !source.substepVelocities.empty())
+    scratch.kinematicBodies.push_back({scratch.localIndices[body], source.substepVelocities});
+  BodyMotion& motion = scratch.motions.back();
+  if (!world.bodies[body].asleep) return;
+  motion.inverseMass = 0;  // asleep: static for the solver
+  motion.velocity = motion.angularVelocity = Vec3::Zero();
 }
 
-void gatherBodies(const Dynamics& dynamics, StepWork& work) {
-  work.local.assign(dynamics.solids.size(), kNoPlace);
-  for (std::uint32_t i = 0; i < dynamics.solids.size(); ++i)
-    if (dynamics.solids[i].isAwake()) addBody(dynamics, i, work);
-  work.report.awake = static_cast<std::uint32_t>(work.bodies.size());
-  work.bodiesOf.reserve(work.active.size());
-  for (const std::uint32_t i : work.active) {
-    const PartPairKey& key = dynamics.pairs[i].key;
-    addBody(dynamics, key.a, work);
-    addBody(dynamics, key.b, work);
-    work.bodiesOf.push_back({work.local[key.a], work.local[key.b]});
+void gatherBodies(const PhysicsWorld& world, StepScratch& scratch) {
+  scratch.localIndices.assign(world.bodies.size(), kNoIndex);
+  for (std::uint32_t i = 0; i < world.bodies.size(); ++i)
+    if (world.bodies[i].isAwake()) addBody(world, i, scratch);
+  scratch.report.awake = static_cast<std::uint32_t>(scratch.motions.size());
+  scratch.pairBodies.reserve(scratch.activePairs.size());
+  for (const std::uint32_t i : scratch.activePairs) {
+    const PartPairKey& key = world.pairs[i].key;
+    addBody(world, key.a, scratch);
+    addBody(world, key.b, scratch);
+    scratch.pairBodies.push_back({scratch.localIndices[key.a], scratch.localIndices[key.b]});
   }
 }
 
-void gatherPatches(const Dynamics& dynamics, StepWork& work) {
-  work.patches.resize(work.patched.size());
-  work.workers->share(work.patched.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
-    for (std::size_t k = from; k < to; ++k) {
-      const NearPair& pair = dynamics.pairs[work.patched[k]];
-      work.patches[k] = *pair.patch();
-      work.patches[k].a = work.local[pair.key.a];
-      work.patches[k].b = work.local[pair.key.b];
-    }
-  });
-  for (const std::uint32_t i : work.patched)
-    if (work.leans(i)) ++work.report.leaning;
-  work.report.patches = static_cast<std::uint32_t>(work.patches.size());
+void gatherConstraints(const PhysicsWorld& world, StepScratch& scratch) {
+  scratch.constraints.resize(scratch.constrainedPairs.size());
+  scratch.pool->parallelFor(
+      scratch.constrainedPairs.size(), kPairsPerTask, [&](std::size_t from, std::size_t to) {
+        for (std::size_t k = from; k < to; ++k) {
+          const BodyPair& pair = world.pairs[scratch.constrainedPairs[k]];
+          ENFILADE_ASSERT(pair.constraint() && pair.constraint()->pointCount > 0);
+          scratch.constraints[k] = *pair.constraint();
+          scratch.constraints[k].a = scratch.localIndices[pair.key.a];
+          scratch.constraints[k].b = scratch.localIndices[pair.key.b];
+        }
+      });
+  for (const std::uint32_t i : scratch.constrainedPairs)
+    if (scratch.isTouchingPair(i)) ++scratch.report.touching;
+  scratch.report.constraints = static_cast<std::uint32_t>(scratch.constraints.size());
 }
 
-void findInside(const Dynamics& dynamics, StepWork& work) {
-  work.letOut.assign(work.bodies.size(), 0);
-  for (std::uint32_t k = 0; k < work.patched.size(); ++k) {
-    const NearPair& pair = dynamics.pairs[work.patched[k]];
-    const Solid &a = dynamics.solids[pair.key.a], &b = dynamics.solids[pair.key.b];
-    if (!isInDriven(pair, a, b)) continue;
-    work.inside.push_back(k);
-    const ContactPatch& patch = work.patches[k];
-    if (isLetOut(pair, a, b)) work.letOut[a.isFree() ? patch.a : patch.b] = 1;
+void findKinematicPenetrations(const PhysicsWorld& world, StepScratch& scratch) {
+  scratch.released.assign(scratch.motions.size(), 0);
+  for (std::uint32_t k = 0; k < scratch.constrainedPairs.size(); ++k) {
+    const BodyPair& pair = world.pairs[scratch.constrainedPairs[k]];
+    const PhysicsBody &a = world.bodies[pair.key.a], &b = world.bodies[pair.key.b];
+    if (!penetratesKinematic(pair, a, b)) continue;
+    scratch.kinematicPenetrations.push_back(k);
+    const ContactConstraint& constraint = scratch.constraints[k];
+    if (isReleased(pair, a, b)) scratch.released[a.isDynamic() ? constraint.a : constraint.b] = 1;
   }
 }
 
-void gatherJoints(const Dynamics& dynamics, StepWork& work) {
-  for (std::uint32_t i = 0; i < dynamics.joints.size(); ++i) {
-    const Joint& joint = dynamics.joints[i];
-    const Solid &a = dynamics.solids[joint.a], &b = dynamics.solids[joint.b];
-    if (!mayMatter(a, b)) continue;
-    addBody(dynamics, joint.a, work);
-    addBody(dynamics, joint.b, work);
-    work.joints.push_back(joint);
-    work.joints.back().a = work.local[joint.a];
-    work.joints.back().b = work.local[joint.b];
-    work.jointOf.push_back(i);
+void gatherJoints(const PhysicsWorld& world, StepScratch& scratch) {
+  for (std::uint32_t i = 0; i < world.joints.size(); ++i) {
+    const Joint& joint = world.joints[i];
+    const PhysicsBody &a = world.bodies[joint.a], &b = world.bodies[joint.b];
+    if (!isRelevantPair(a, b)) continue;
+    addBody(world, joint.a, scratch);
+    addBody(world, joint.b, scratch);
+    scratch.joints.push_back(joint);
+    scratch.joints.back().a = scratch.localIndices[joint.a];
+    scratch.joints.back().b = scratch.localIndices[joint.b];
+    scratch.jointIndices.push_back(i);
   }
 }
 
-/// Metres that a patch's points come nearer on the ways of its bodies; < 0: they part.
-double comesNearer(const ContactPatch& patch, const StepWork& work) {
-  const auto wayOf = [&](std::uint32_t body, const Vec3& arm) -> Vec3 {
-    const Passage& way = work.passages[body];
-    const Vec3 inFrame = way.fromTurned.transpose() * arm;
-    return way.toCentre - way.fromCentre + (way.toTurned - way.fromTurned) * inFrame;
+/// Metres by which the points of a constraint approach on the swept poses; < 0: they separate.
+double computeApproach(const ContactConstraint& constraint, const StepScratch& scratch) {
+  const auto displacementOf = [&](std::uint32_t body, const Vec3& arm) -> Vec3 {
+    const SweptPose& sweep = scratch.sweptPoses[body];
+    const Vec3 inFrame = sweep.fromMatrix.transpose() * arm;
+    return sweep.toCentre - sweep.fromCentre + (sweep.toMatrix - sweep.fromMatrix) * inFrame;
   };
-  double most = -std::numeric_limits<double>::infinity();
-  for (const PatchPoint& point : patch.list()) {
-    const Vec3 way = wayOf(patch.a, point.armA) - wayOf(patch.b, point.armB);
-    most = std::max(most, patch.normal.dot(way));
+  double maxApproach = -std::numeric_limits<double>::infinity();
+  for (const ContactConstraintPoint& point : constraint.activePoints()) {
+    const Vec3 approach =
+        displacementOf(constraint.a, point.armA) - displacementOf(constraint.b, point.armB);
+    maxApproach = std::max(maxApproach, constraint.normal.dot(approach));
   }
-  return most;
+  return maxApproach;
 }
 
-/// Of each of `bodies`: a driven one goes deeper into it, or into what it leans on. Between two
-/// that cannot yield impulses grow without bound: kept, they would fling whoever comes free.
-std::vector<std::uint8_t> whoStartsCold(const Dynamics& dynamics, const StepWork& work) {
-  const auto isAwake = [&](std::uint32_t i) { return dynamics.solids[work.solids[i]].isAwake(); };
-  std::vector<std::uint8_t> cold(work.bodies.size(), 0);
-  for (const std::uint32_t k : work.inside) {
-    const ContactPatch& patch = work.patches[k];
-    if (comesNearer(patch, work) > 0) cold[isAwake(patch.a) ? patch.a : patch.b] = 1;
+/// Flags bodies whose impulses must not warm-start the next step: a kinematic body moves deeper
+/// into them or their contacts. Between two unyielding bodies impulses grow without bound. Stored,
+/// they would eject a body that comes free.
+std::vector<std::uint8_t> findColdStarts(const PhysicsWorld& world, const StepScratch& scratch) {
+  const auto isAwake = [&](std::uint32_t i) {
+    return world.bodies[scratch.bodyIndices[i]].isAwake();
+  };
+  std::vector<std::uint8_t> cold(scratch.motions.size(), 0);
+  for (const std::uint32_t k : scratch.kinematicPenetrations) {
+    const ContactConstraint& constraint = scratch.constraints[k];
+    if (computeApproach(constraint, scratch) > 0)
+      cold[isAwake(constraint.a) ? constraint.a : constraint.b] = 1;
   }
   if (std::ranges::find(cold, 1) == cold.end()) return cold;
-  Islands islands(work.bodies.size());
-  const auto join = [&](const auto& link) {
-    if (isAwake(link.a) && isAwake(link.b)) islands.join(link.a, link.b);
+  DisjointSets islands(scratch.motions.size());
+  const auto uniteAwake = [&](const auto& link) {
+    if (isAwake(link.a) && isAwake(link.b)) islands.unite(link.a, link.b);
   };
-  for (const ContactPatch& patch : work.patches) join(patch);
-  for (const Joint& joint : work.joints) join(joint);
+  for (const ContactConstraint& constraint : scratch.constraints) uniteAwake(constraint);
+  for (const Joint& joint : scratch.joints) uniteAwake(joint);
   for (std::uint32_t i = 0; i < cold.size(); ++i)
-    if (cold[i] != 0) cold[islands.leaderOf(i)] = 1;
-  for (std::uint32_t i = 0; i < cold.size(); ++i) cold[i] = cold[islands.leaderOf(i)];
+    if (cold[i] != 0) cold[islands.find(i)] = 1;
+  for (std::uint32_t i = 0; i < cold.size(); ++i) cold[i] = cold[islands.find(i)];
   return cold;
 }
 
-void keepImpulses(Dynamics& dynamics, const StepWork& work) {
-  const std::vector<std::uint8_t> cold = whoStartsCold(dynamics, work);
-  const auto isKept = [&](const auto& link) { return cold[link.a] == 0 && cold[link.b] == 0; };
-  const ContactPatch nothing;
-  work.workers->share(work.patches.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
-    for (std::size_t k = from; k < to; ++k) {
-      NearPair& pair = dynamics.pairs[work.patched[k]];
-      pair.met = work.patches[k].pushed;
-      ContactPatch& patch = *pair.patch();
-      const ContactPatch& solved = isKept(work.patches[k]) ? work.patches[k] : nothing;
-      for (std::size_t i = 0; i < patch.size; ++i) {
-        patch.points[i].impulse = solved.points[i].impulse;
-        patch.points[i].push = solved.points[i].push;
-      }
-      patch.rub = solved.rub;
-      patch.twist = solved.twist;
-    }
-  });
-  for (std::size_t k = 0; k < work.joints.size(); ++k) {
-    const Joint& joint = work.joints[k];
-    dynamics.joints[work.jointOf[k]].impulses = isKept(joint) ? joint.impulses : Joint{}.impulses;
+void storePairImpulses(PhysicsWorld& world, const StepScratch& scratch) {
+  const std::vector<std::uint8_t> cold = findColdStarts(world, scratch);
+  const auto isWarm = [&](const auto& link) { return cold[link.a] == 0 && cold[link.b] == 0; };
+  const ContactConstraint nothing;
+  scratch.pool->parallelFor(
+      scratch.constraints.size(), kPairsPerTask, [&](std::size_t from, std::size_t to) {
+        for (std::size_t k = from; k < to; ++k) {
+          BodyPair& pair = world.pairs[scratch.constrainedPairs[k]];
+          pair.gaveImpulse = scratch.constraints[k].gaveImpulse;
+          ContactConstraint& constraint = *pair.constraint();
+          const ContactConstraint& solved =
+              isWarm(scratch.constraints[k]) ? scratch.constraints[k] : nothing;
+          for (std::size_t i = 0; i < constraint.pointCount; ++i) {
+            constraint.points[i].impulse = solved.points[i].impulse;
+            constraint.points[i].motorImpulse = solved.points[i].motorImpulse;
+          }
+          constraint.tangentImpulse = solved.tangentImpulse;
+          constraint.torsionImpulse = solved.torsionImpulse;
+        }
+      });
+  for (std::size_t k = 0; k < scratch.joints.size(); ++k) {
+    const Joint& joint = scratch.joints[k];
+    world.joints[scratch.jointIndices[k]].impulses =
+        isWarm(joint) ? joint.impulses : Joint{}.impulses;
   }
 }
 
 // ---- after step 3 ------------------------------------------------------------------------------
 
-void setOut(Dynamics& dynamics, StepWork& work) {
-  for (std::size_t i = 0; i < work.bodies.size(); ++i) {
-    Solid& solid = dynamics.solids[work.solids[i]];
-    const bool isAwake = solid.isAwake();
-    if (!isAwake && !solid.isDriven()) continue;
-    const Passage& way = work.passages[i];
-    solid.motion.centre = way.toCentre, solid.motion.rotation = way.toRotation;
+void applyMotions(PhysicsWorld& world, StepScratch& scratch) {
+  for (std::size_t i = 0; i < scratch.motions.size(); ++i) {
+    PhysicsBody& body = world.bodies[scratch.bodyIndices[i]];
+    const bool isAwake = body.isAwake();
+    if (!isAwake && !body.isKinematic()) continue;
+    const SweptPose& sweep = scratch.sweptPoses[i];
+    ENFILADE_ASSERT(scratch.motionFractions[i] >= 0 && scratch.motionFractions[i] <= 1);
+    body.motion.centre = sweep.toCentre, body.motion.rotation = sweep.toRotation;
     if (isAwake) {
-      const Carry& carry = work.carried[i];
-      const Vec3 with = carry.velocityAt(way.fromCentre);
-      solid.motion.velocity = with + work.fractions[i] * (work.bodies[i].velocity - with);
-      solid.motion.spin = carry.spin + work.fractions[i] * (work.bodies[i].spin - carry.spin);
-      if (work.fractions[i] < 1) ++work.report.shortened;
+      const CarrierMotion& carrierMotion = scratch.carrierMotions[i];
+      const Vec3 carrierVelocity = carrierMotion.velocityAt(sweep.fromCentre);
+      body.motion.velocity = carrierVelocity + scratch.motionFractions[i] *
+                                                   (scratch.motions[i].velocity - carrierVelocity);
+      body.motion.angularVelocity =
+          carrierMotion.angularVelocity +
+          scratch.motionFractions[i] *
+              (scratch.motions[i].angularVelocity - carrierMotion.angularVelocity);
+      if (scratch.motionFractions[i] < 1) ++scratch.report.reducedMotions;
     }
-    solid.odometer += lengthOf(way);
-    placeSolid(solid);
+    body.accumulatedMotion += computeMaxDisplacement(sweep);
+    updateTransform(body);
   }
-  work.workers->share(work.active.size(), kPairBlock, [&](std::size_t from, std::size_t to) {
-    for (std::size_t k = from; k < to; ++k) {
-      double& apart = dynamics.pairs[work.active[k]].apart;
-      const auto [a, b] = work.bodiesOf[k];
-      const double closing = closingOf(work.strides[a], work.strides[b]);
-      apart -= closing + 0x1p-51 * (std::abs(apart) + closing);
-    }
-  });
+  scratch.pool->parallelFor(
+      scratch.activePairs.size(), kPairsPerTask, [&](std::size_t from, std::size_t to) {
+        for (std::size_t k = from; k < to; ++k) {
+          double& lowerBound = world.pairs[scratch.activePairs[k]].lowerBound;
+          const auto [a, b] = scratch.pairBodies[k];
+          const double closing =
+              computeClosingBound(scratch.motionBounds[a], scratch.motionBounds[b]);
+          lowerBound -= closing + 0x1p-51 * (std::abs(lowerBound) + closing);
+        }
+      });
 }
 
 // ---- step 4 ------------------------------------------------------------------------------------
 
-Islands findIslands(const Dynamics& dynamics, const StepWork& work) {
-  Islands islands(dynamics.solids.size());
-  for (const std::uint32_t i : work.patched) {
-    const NearPair& pair = dynamics.pairs[i];
-    if (!dynamics.solids[pair.key.a].isAwake() || !dynamics.solids[pair.key.b].isAwake()) continue;
-    if (work.leans(i)) islands.join(pair.key.a, pair.key.b);
+DisjointSets findIslands(const PhysicsWorld& world, const StepScratch& scratch) {
+  DisjointSets islands(world.bodies.size());
+  for (const std::uint32_t i : scratch.constrainedPairs) {
+    const BodyPair& pair = world.pairs[i];
+    if (!world.bodies[pair.key.a].isAwake() || !world.bodies[pair.key.b].isAwake()) continue;
+    if (scratch.isTouchingPair(i)) islands.unite(pair.key.a, pair.key.b);
   }
-  for (const Joint& joint : dynamics.joints)
-    if (dynamics.solids[joint.a].isAwake() && dynamics.solids[joint.b].isAwake())
-      islands.join(joint.a, joint.b);
+  for (const Joint& joint : world.joints)
+    if (world.bodies[joint.a].isAwake() && world.bodies[joint.b].isAwake())
+      islands.unite(joint.a, joint.b);
   return islands;
 }
 
-std::vector<std::uint8_t> whoLeansOnRestless(const Dynamics& dynamics, const StepWork& work) {
-  std::vector<std::uint8_t> restless(dynamics.solids.size(), 0);
-  for (const std::uint32_t i : work.patched) {
-    const NearPair& pair = dynamics.pairs[i];
-    const bool a = dynamics.solids[pair.key.a].restless, b = dynamics.solids[pair.key.b].restless;
-    if ((!a && !b) || !work.leans(i)) continue;
-    restless[a ? pair.key.b : pair.key.a] = 1;
+std::vector<std::uint8_t> findBodiesKeptAwake(const PhysicsWorld& world,
+                                              const StepScratch& scratch) {
+  std::vector<std::uint8_t> keptAwake(world.bodies.size(), 0);
+  for (const std::uint32_t i : scratch.constrainedPairs) {
+    const BodyPair& pair = world.pairs[i];
+    const bool a = world.bodies[pair.key.a].preventsSleep,
+               b = world.bodies[pair.key.b].preventsSleep;
+    if ((!a && !b) || !scratch.isTouchingPair(i)) continue;
+    keptAwake[a ? pair.key.b : pair.key.a] = 1;
   }
-  return restless;
+  return keptAwake;
 }
 
-void rest(Dynamics& dynamics, const DynamicsStep& settings, StepWork& work) {
-  Islands islands = findIslands(dynamics, work);
-  const std::vector<std::uint8_t> restless = whoLeansOnRestless(dynamics, work);
-  std::vector<double> calm(dynamics.solids.size(), settings.rest.calmFor);
-  for (std::uint32_t i = 0; i < dynamics.solids.size(); ++i) {
-    Solid& solid = dynamics.solids[i];
-    if (!solid.isAwake()) continue;
-    // By how far it went, not by its speed: who is stopped on every way is at rest, too.
-    const double went = lengthOf(work.passages[work.local[i]]);
-    const bool isCalm = went < settings.rest.calmSpeed * settings.solver.seconds && !restless[i];
-    solid.calmFor = isCalm ? solid.calmFor + settings.solver.seconds : 0;
-    double& least = calm[islands.leaderOf(i)];
-    least = std::min(least, solid.calmFor);
-    if (islands.leaderOf(i) == i) ++work.report.islands;
+void updateSleep(PhysicsWorld& world, const StepSettings& settings, StepScratch& scratch) {
+  DisjointSets islands = findIslands(world, scratch);
+  const std::vector<std::uint8_t> keptAwake = findBodiesKeptAwake(world, scratch);
+  std::vector<double> sleepTimers(world.bodies.size(), settings.sleep.timeToSleep);
+  for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
+    PhysicsBody& body = world.bodies[i];
+    if (!body.isAwake()) continue;
+    ENFILADE_ASSERT(scratch.localIndices[i] != kNoIndex);
+    // Displacement decides, not velocity: a body that every pass stops is at rest, too.
+    const double displacement = computeMaxDisplacement(scratch.sweptPoses[scratch.localIndices[i]]);
+    const bool isResting =
+        displacement < settings.sleep.sleepVelocity * settings.solver.seconds && !keptAwake[i];
+    body.sleepTimer = isResting ? body.sleepTimer + settings.solver.seconds : 0;
+    double& minTimer = sleepTimers[islands.find(i)];
+    minTimer = std::min(minTimer, body.sleepTimer);
+    if (islands.find(i) == i) ++scratch.report.islands;
   }
-  for (std::uint32_t i = 0; i < dynamics.solids.size(); ++i) {
-    Solid& solid = dynamics.solids[i];
-    if (!solid.isAwake() || calm[islands.leaderOf(i)] < settings.rest.calmFor) continue;
-    solid.asleep = true;
-    solid.motion.velocity = solid.motion.spin = Vec3::Zero();
+  for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
+    PhysicsBody& body = world.bodies[i];
+    if (!body.isAwake() || sleepTimers[islands.find(i)] < settings.sleep.timeToSleep) continue;
+    body.asleep = true;
+    body.motion.velocity = body.motion.angularVelocity = Vec3::Zero();
   }
 }
 
 }  // namespace
 
-ReachSphere reachSphere(const Solid& solid) {
-  return {solid.motion.centre, solid.radius + solid.leash};
+MotionSphere computeMotionSphere(const PhysicsBody& body) {
+  return {body.motion.centre, body.radius + body.maxStepDisplacement};
 }
 
-void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates, Workers* workers) {
-  thread_local std::vector<NearPair> kept;  // as StepWork
-  std::vector<NearPair>& pairs = kept;      // which threads that help can see
+void setPairs(PhysicsWorld& world, std::span<const PartPairKey> candidates, ThreadPool* pool) {
+  thread_local std::vector<BodyPair> kept;  // reused, as StepScratch is
+  std::vector<BodyPair>& pairs = kept;      // a reference that worker threads can see
   pairs.resize(candidates.size());
-  shareAmong(workers, candidates.size(), kKeyBlock, [&](std::size_t from, std::size_t to) {
-    auto old = std::ranges::lower_bound(dynamics.pairs, candidates[from], {}, &NearPair::key);
+  parallelForOrSerial(pool, candidates.size(), kKeysPerTask, [&](std::size_t from, std::size_t to) {
+    auto old = std::ranges::lower_bound(world.pairs, candidates[from], {}, &BodyPair::key);
     for (std::size_t i = from; i < to; ++i) {
-      while (old != dynamics.pairs.end() && old->key < candidates[i]) ++old;
-      if (old != dynamics.pairs.end() && old->key == candidates[i]) {
+      ENFILADE_ASSERT(candidates[i].a < candidates[i].b && candidates[i].b < world.bodies.size());
+      ENFILADE_ASSERT(i == 0 || !(candidates[i] < candidates[i - 1]));
+      while (old != world.pairs.end() && old->key < candidates[i]) ++old;
+      if (old != world.pairs.end() && old->key == candidates[i]) {
         pairs[i] = std::move(*old);
       } else {
         pairs[i].key = candidates[i];
       }
-      pairs[i].met = false;
+      pairs[i].gaveImpulse = false;
     }
   });
-  std::swap(dynamics.pairs, pairs);
+  std::swap(world.pairs, pairs);
   pairs.clear();
 }
 
-DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings) {
-  Workers alone(1);
-  thread_local StepWork kept;
-  StepWork& work = kept;  // which threads that help can see
-  work.begin(settings.workers ? *settings.workers : alone);
-  findPatches(dynamics, nearStep(settings), work);
-  gatherBodies(dynamics, work);
-  gatherPatches(dynamics, work);
-  gatherJoints(dynamics, work);
-  findInside(dynamics, work);
-  solve(work.bodies, work.patches, work.joints, work.driven, settings.solver, *work.workers);
-  proveWays(dynamics, settings.solver.seconds, settings.solver.epsilon, work);
-  keepImpulses(dynamics, work);
-  setOut(dynamics, work);
-  rest(dynamics, settings, work);
-  return work.report;
+StepReport stepPhysics(PhysicsWorld& world, const StepSettings& settings) {
+  ThreadPool alone(1);
+  thread_local StepScratch kept;
+  StepScratch& scratch = kept;  // a reference that worker threads can see
+  scratch.reset(settings.pool ? *settings.pool : alone);
+  findConstraints(world, makePairStepSettings(settings), scratch);
+  gatherBodies(world, scratch);
+  gatherConstraints(world, scratch);
+  gatherJoints(world, scratch);
+  findKinematicPenetrations(world, scratch);
+  solveConstraints(scratch.motions, scratch.constraints, scratch.joints, scratch.kinematicBodies,
+                   settings.solver, *scratch.pool);
+  clampToProvenMotion(world, settings.solver.seconds, settings.solver.contactOffset, scratch);
+  storePairImpulses(world, scratch);
+  applyMotions(world, scratch);
+  updateSleep(world, settings, scratch);
+  return scratch.report;
 }
 
-void forgetPairsOf(Dynamics& dynamics, std::uint32_t solid) {
-  std::erase_if(dynamics.pairs,
-                [&](const NearPair& pair) { return pair.key.a == solid || pair.key.b == solid; });
+void erasePairsOf(PhysicsWorld& world, std::uint32_t body) {
+  std::erase_if(world.pairs,
+                [&](const BodyPair& pair) { return pair.key.a == body || pair.key.b == body; });
 }
 
 }  // namespace enfilade::scene

@@ -1,5 +1,5 @@
-// Free bodies among all that they can meet: one step of their motion, from contacts to rest. What
-// pairs may meet is told from outside (a broad phase); nothing here knows a world.
+// One step of rigid-body dynamics: contacts, solver, continuous collision and sleeping. The caller
+// supplies candidate pairs (broad phase). Nothing here depends on the scene's world.
 #pragma once
 
 #include <vector>
@@ -10,61 +10,62 @@
 
 namespace enfilade::scene {
 
-struct Dynamics {
-  std::vector<Solid> solids;
-  std::vector<Joint> joints;    ///< of solids
-  std::vector<NearPair> pairs;  ///< ascending by key: set by setPairs()
+struct PhysicsWorld {
+  std::vector<PhysicsBody> bodies;
+  std::vector<Joint> joints;    ///< indices refer to `bodies`
+  std::vector<BodyPair> pairs;  ///< ascending by key; set by setPairs()
 };
 
-/// When a body sleeps, and when not.
-struct RestLimits {
-  double calmSpeed = 0.01;  ///< m/s: no point is faster
-  double calmFor = 0.5;     ///< seconds
+/// Sleep thresholds.
+struct SleepSettings {
+  double sleepVelocity = 0.01;  ///< m/s: bound of the speed of a resting body
+  double timeToSleep = 0.5;     ///< seconds at rest before a body sleeps
 };
 
-struct DynamicsStep {
-  SolverStep solver;
-  RestLimits rest;
-  Workers* workers = nullptr;  ///< who do it; the result is the same. null: the caller alone
+struct StepSettings {
+  SolverSettings solver;
+  SleepSettings sleep;
+  ThreadPool* pool = nullptr;  ///< null: the caller's thread alone; the result is the same
 };
 
-struct DynamicsReport {
-  std::uint32_t awake = 0;      ///< free solids
-  std::uint32_t looks = 0;      ///< pairs whose shapes were looked at
-  std::uint32_t patches = 0;    ///< given to the solver
-  std::uint32_t leaning = 0;    ///< of those, nearer than 2 epsilon
-  std::uint32_t islands = 0;    ///< awake ones
-  std::uint32_t proofs = 0;     ///< pairs whose way had to be proved clear
-  std::uint32_t shortened = 0;  ///< free solids that went less far than the solver had it
-  std::uint32_t squeezed = 0;   ///< pairs of which a driven solid runs into a free one that has no
-                                ///< way out: they may penetrate
-  double deepest = 0;           ///< metres: penetration at the start of the step
+/// Counters of one step.
+struct StepReport {
+  std::uint32_t awake = 0;               ///< dynamic bodies awake
+  std::uint32_t narrowPhaseQueries = 0;  ///< narrow-phase queries
+  std::uint32_t constraints = 0;         ///< constraints given to the solver
+  std::uint32_t touching = 0;            ///< constraints with a point closer than 2 contactOffset
+  std::uint32_t islands = 0;             ///< awake islands
+  std::uint32_t continuousChecks = 0;    ///< pairs that needed a continuous check
+  std::uint32_t reducedMotions = 0;      ///< bodies that moved less far than the solver result
+  /// pairs of a kinematic body and a dynamic one without a way out: they may penetrate
+  std::uint32_t crushed = 0;
+  double maxPenetration = 0;  ///< metres: maximal penetration at the start of the step
 };
 
-/// A sphere that no point of a free solid leaves in a step; metres.
-struct ReachSphere {
+/// Bounding sphere of a dynamic body's motion in a step, in metres.
+struct MotionSphere {
   Vec3 centre = Vec3::Zero();
   double radius = 0;
 };
-ReachSphere reachSphere(const Solid& solid);
+MotionSphere computeMotionSphere(const PhysicsBody& body);
 
-/// Whether what stays in these spheres can come within `lookout` metres of one another.
-inline bool mayMeet(const ReachSphere& a, const ReachSphere& b, double lookout) {
-  const double reach = (a.radius + b.radius + lookout) * (1 + 0x1p-40);
-  return !((a.centre - b.centre).squaredNorm() > reach * reach);
+/// Returns whether the contents of two spheres can come within `margin` metres of each other.
+inline bool mayMeet(const MotionSphere& a, const MotionSphere& b, double margin) {
+  const double maxDistance = (a.radius + b.radius + margin) * (1 + 0x1p-40);
+  return !((a.centre - b.centre).squaredNorm() > maxDistance * maxDistance);
 }
 
-/// The pairs that may meet in the next steps; ascending, a < b, at least one of them free. What is
-/// known of a pair that was there before is kept. `workers`: who do it; null: the caller alone.
-void setPairs(Dynamics& dynamics, std::span<const PartPairKey> candidates,
-              Workers* workers = nullptr);
+/// Replaces the candidate pairs. They are ascending, with a < b, and at least one body is dynamic.
+/// State of pairs that existed before is kept. `pool` null: the caller's thread alone.
+void setPairs(PhysicsWorld& world, std::span<const PartPairKey> candidates,
+              ThreadPool* pool = nullptr);
 
-/// Goes on by one step. Free bodies that were separated from all that stands or is free stay so, by
-/// the exact verdict and all the way: a body that the solver would bring through another is stopped
-/// on its way.
-DynamicsReport step(Dynamics& dynamics, const DynamicsStep& settings);
+/// Advances the world by one step. Dynamic bodies that were separated from static and dynamic ones
+/// stay separated, by the exact verdict over the whole motion. A body that the solver would move
+/// through another is stopped.
+StepReport stepPhysics(PhysicsWorld& world, const StepSettings& settings);
 
-/// Nothing that was found out about pairs of this solid holds any more: its shape is another one.
-void forgetPairsOf(Dynamics& dynamics, std::uint32_t solid);
+/// Discards all pair state of a body. Call it after its shape changed.
+void erasePairsOf(PhysicsWorld& world, std::uint32_t body);
 
 }  // namespace enfilade::scene

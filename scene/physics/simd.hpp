@@ -1,10 +1,9 @@
-// Doubles side by side, one of each of a few things that do not touch one another: what is done to
-// them is done to all at once, and to each as if it were alone, to the last bit. In a form that gcc
-// and clang know on every processor.
+// Four-wide double SIMD, as vector extensions of gcc and clang. Lanes are independent; results
+// equal scalar code bit for bit.
 //
-// Four doubles fill a register of AVX. The whole program is made for processors without it, so a
-// loop over lanes is compiled twice, and who runs it takes the one that the processor knows: see
-// forEach(). What a loop calls has to be inlined into it, since the other's registers are not its.
+// Four doubles fill an AVX register. The program is compiled for processors without AVX, so each
+// loop is compiled twice and selected at run time; see simdLoop(). Functions that a loop calls must
+// be inlined into it, because the two versions use different registers.
 #pragma once
 
 #include <cmath>
@@ -19,93 +18,92 @@ using collision::Vec3;
 
 inline constexpr std::size_t kLanes = 4;
 
-/// Of a pack; gcc takes half of it where it does not know the register, and all of it where it
-/// does.
+/// Alignment of a pack in bytes. gcc splits a pack in two where it has no AVX registers.
 inline constexpr std::size_t kLaneAlignment = kLanes * sizeof(double);
 
-/// Which of the lanes: -1 where it holds.
-struct alignas(kLaneAlignment) LaneMask {
+/// Lane mask: -1 where the condition holds.
+struct alignas(kLaneAlignment) MaskW {
   using Pack = long long __attribute__((vector_size(kLaneAlignment)));
   Pack pack;
 };
 
-struct alignas(kLaneAlignment) Lanes {
+struct alignas(kLaneAlignment) DoubleW {
   using Pack = double __attribute__((vector_size(kLaneAlignment)));
-  Pack pack;  // not set: rows of them are filled by who needs them
+  Pack pack;  // not initialised: rows are filled by their users
 
   double operator[](std::size_t lane) const { return pack[lane]; }
-  void put(std::size_t lane, double value) { pack[lane] = value; }
+  void set(std::size_t lane, double value) { pack[lane] = value; }
 };
 
-[[gnu::always_inline]] inline Lanes everywhere(double value) {
-  return {Lanes::Pack{value, value, value, value}};
+[[gnu::always_inline]] inline DoubleW splat(double value) {
+  return {DoubleW::Pack{value, value, value, value}};
 }
 
-[[gnu::always_inline]] inline Lanes operator+(const Lanes& a, const Lanes& b) {
+[[gnu::always_inline]] inline DoubleW operator+(const DoubleW& a, const DoubleW& b) {
   return {a.pack + b.pack};
 }
-[[gnu::always_inline]] inline Lanes operator-(const Lanes& a, const Lanes& b) {
+[[gnu::always_inline]] inline DoubleW operator-(const DoubleW& a, const DoubleW& b) {
   return {a.pack - b.pack};
 }
-[[gnu::always_inline]] inline Lanes operator*(const Lanes& a, const Lanes& b) {
+[[gnu::always_inline]] inline DoubleW operator*(const DoubleW& a, const DoubleW& b) {
   return {a.pack * b.pack};
 }
-[[gnu::always_inline]] inline Lanes operator/(const Lanes& a, const Lanes& b) {
+[[gnu::always_inline]] inline DoubleW operator/(const DoubleW& a, const DoubleW& b) {
   return {a.pack / b.pack};
 }
-[[gnu::always_inline]] inline Lanes operator-(const Lanes& a) {
+[[gnu::always_inline]] inline DoubleW operator-(const DoubleW& a) {
   return {-a.pack};
 }
-[[gnu::always_inline]] inline LaneMask operator<(const Lanes& a, const Lanes& b) {
+[[gnu::always_inline]] inline MaskW operator<(const DoubleW& a, const DoubleW& b) {
   return {a.pack < b.pack};
 }
 
-[[gnu::always_inline]] inline Lanes choose(const LaneMask& where, const Lanes& there,
-                                           const Lanes& elsewhere) {
-  return {where.pack ? there.pack : elsewhere.pack};
+[[gnu::always_inline]] inline DoubleW selectW(const MaskW& mask, const DoubleW& ifTrue,
+                                              const DoubleW& ifFalse) {
+  return {mask.pack ? ifTrue.pack : ifFalse.pack};
 }
-[[gnu::always_inline]] inline bool any(const LaneMask& mask) {
+[[gnu::always_inline]] inline bool any(const MaskW& mask) {
   return ((mask.pack[0] | mask.pack[1]) | (mask.pack[2] | mask.pack[3])) != 0;
 }
-[[gnu::always_inline]] inline Lanes lesser(const Lanes& a, const Lanes& b) {
-  return choose(b < a, b, a);
+[[gnu::always_inline]] inline DoubleW minW(const DoubleW& a, const DoubleW& b) {
+  return selectW(b < a, b, a);
 }
-[[gnu::always_inline]] inline Lanes greater(const Lanes& a, const Lanes& b) {
-  return choose(a < b, b, a);
+[[gnu::always_inline]] inline DoubleW maxW(const DoubleW& a, const DoubleW& b) {
+  return selectW(a < b, b, a);
 }
-[[gnu::always_inline]] inline Lanes clamped(const Lanes& value, const Lanes& least,
-                                            const Lanes& most) {
-  return choose(value < least, least, choose(most < value, most, value));
+[[gnu::always_inline]] inline DoubleW clampW(const DoubleW& value, const DoubleW& lower,
+                                             const DoubleW& upper) {
+  return selectW(value < lower, lower, selectW(upper < value, upper, value));
 }
-[[gnu::always_inline]] inline Lanes squareRoot(const Lanes& a) {
-  return {Lanes::Pack{std::sqrt(a[0]), std::sqrt(a[1]), std::sqrt(a[2]), std::sqrt(a[3])}};
+[[gnu::always_inline]] inline DoubleW sqrtW(const DoubleW& a) {
+  return {DoubleW::Pack{std::sqrt(a[0]), std::sqrt(a[1]), std::sqrt(a[2]), std::sqrt(a[3])}};
 }
 
-struct Lanes3 {
-  Lanes x, y, z;
+struct Vec3W {
+  DoubleW x, y, z;
 
   Vec3 at(std::size_t lane) const { return {x[lane], y[lane], z[lane]}; }
-  void put(std::size_t lane, const Vec3& v) {
-    x.put(lane, v.x()), y.put(lane, v.y()), z.put(lane, v.z());
+  void set(std::size_t lane, const Vec3& v) {
+    x.set(lane, v.x()), y.set(lane, v.y()), z.set(lane, v.z());
   }
 };
 
-[[gnu::always_inline]] inline Lanes3 sideBySide(const Vec3& a, const Vec3& b, const Vec3& c,
-                                                const Vec3& d) {
-  return {{Lanes::Pack{a.x(), b.x(), c.x(), d.x()}},
-          {Lanes::Pack{a.y(), b.y(), c.y(), d.y()}},
-          {Lanes::Pack{a.z(), b.z(), c.z(), d.z()}}};
+[[gnu::always_inline]] inline Vec3W gather(const Vec3& a, const Vec3& b, const Vec3& c,
+                                           const Vec3& d) {
+  return {{DoubleW::Pack{a.x(), b.x(), c.x(), d.x()}},
+          {DoubleW::Pack{a.y(), b.y(), c.y(), d.y()}},
+          {DoubleW::Pack{a.z(), b.z(), c.z(), d.z()}}};
 }
-[[gnu::always_inline]] inline Lanes3 operator+(const Lanes3& a, const Lanes3& b) {
+[[gnu::always_inline]] inline Vec3W operator+(const Vec3W& a, const Vec3W& b) {
   return {a.x + b.x, a.y + b.y, a.z + b.z};
 }
-[[gnu::always_inline]] inline Lanes3 operator-(const Lanes3& a, const Lanes3& b) {
+[[gnu::always_inline]] inline Vec3W operator-(const Vec3W& a, const Vec3W& b) {
   return {a.x - b.x, a.y - b.y, a.z - b.z};
 }
-[[gnu::always_inline]] inline Lanes3 operator*(const Lanes& factor, const Lanes3& v) {
+[[gnu::always_inline]] inline Vec3W operator*(const DoubleW& factor, const Vec3W& v) {
   return {factor * v.x, factor * v.y, factor * v.z};
 }
-[[gnu::always_inline]] inline Lanes dot(const Lanes3& a, const Lanes3& b) {
+[[gnu::always_inline]] inline DoubleW dot(const Vec3W& a, const Vec3W& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
@@ -113,7 +111,7 @@ struct Lanes3 {
 
 #if defined(__x86_64__)
 template <class Item, class Each>
-__attribute__((target("avx"))) void forEachByAvx(std::span<Item> items, const Each& each) {
+__attribute__((target("avx"))) void avxLoop(std::span<Item> items, const Each& each) {
   for (Item& item : items) each(item);
 }
 inline bool hasAvx() {
@@ -121,7 +119,7 @@ inline bool hasAvx() {
 }
 #else
 template <class Item, class Each>
-void forEachByAvx(std::span<Item> items, const Each& each) {
+void avxLoop(std::span<Item> items, const Each& each) {
   for (Item& item : items) each(item);
 }
 inline bool hasAvx() {
@@ -129,11 +127,11 @@ inline bool hasAvx() {
 }
 #endif
 
-/// Calls each(item) for all, in their order; `each` and all that it calls is to be always inlined.
-/// `byAvx`: the processor has it; the result is the same.
+/// Calls each(item) for all items in order. `each` and all that it calls must be always_inline.
+/// `useAvx`: the processor has AVX; the result is the same.
 template <class Item, class Each>
-void forEach(std::span<Item> items, bool byAvx, const Each& each) {
-  if (byAvx) return forEachByAvx(items, each);
+void simdLoop(std::span<Item> items, bool useAvx, const Each& each) {
+  if (useAvx) return avxLoop(items, each);
   for (Item& item : items) each(item);
 }
 

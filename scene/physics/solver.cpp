@@ -1,391 +1,432 @@
-// Steps, for each substep (E. Catto, "Iterative Dynamics with Temporal Coherence", 2005; M. Macklin
-// and others, "Small Steps in Physics Simulation", 2019)
-//  1. Gravity and the gyroscopic term change the velocities.
-//  2. The last substep's impulses are given again (warm start).
-//  3. Iterations over all patches and joints: friction first, then the normals, so that not
-//     penetrating has the last word. Impulses are accumulated and the sums clamped.
-//  4. What is too near is parted by velocities of their own, which end with the substep, so that
-//     correcting positions adds no speed (split impulses). One set of velocities for both pumps
-//     energy into a stack until it rocks for ever.
-//  5. Poses go on with the sum of both.
-// After the last substep what bounced gets its speed back.
+// Steps of each substep (E. Catto, "Iterative Dynamics with Temporal Coherence", 2005; M. Macklin
+// et al., "Small Steps in Physics Simulation", 2019)
+//  1. Apply gravity and the gyroscopic term.
+//  2. Warm start with the impulses of the last substep.
+//  3. Iterate over all contacts and joints. Friction comes before the normals, so that
+//     non-penetration takes precedence. Impulses are accumulated, and the sums are clamped.
+//  4. Correct positions by separate velocities that end with the substep (split impulses). They
+//     add no momentum. One set of velocities for both would pump energy into a stack, which then
+//     never rests.
+//  5. Integrate poses with the sum of both velocities.
+// After the last substep, apply restitution.
 //
-// Contacts are speculative (seed 5.1.1): a point at separation s may close in at (s - epsilon) / h,
-// so that bodies come to rest at epsilon, before they touch. Jacobians stand for the whole step;
-// separations go on with the velocity along the normal.
+// Contacts are speculative: a point at separation s may approach at (s - contactOffset) / h. Bodies
+// then rest at contactOffset, before they touch. Jacobians are constant during the step;
+// separations are integrated along the normal.
 //
-// Friction is Coulomb's cone, one for each patch at the middle of its points, its two tangents
-// solved together, and one turning moment about the normal, at most friction * normal force * the
-// mean distance of the points from their middle.
+// Friction is Coulomb's cone, one per constraint at the mean of its points. The two tangents are
+// solved together. Torsional friction about the normal is limited to friction * normal force * the
+// mean distance of the points from their mean.
 //
 // Energy. Without friction each iteration lowers the convex function l A l / 2 + l (v + b) of the
-// impulses l >= 0, with b >= 0: starting from 0 the kinetic energy cannot grow, however early the
-// iterations end. Friction only brakes. What warm starting gives too much is taken off by the
-// iterations, as they may lower what is accumulated.
+// impulses l >= 0, with b >= 0. From 0 the kinetic energy cannot grow, however few iterations run.
+// Friction only dissipates. Iterations remove the excess of a warm start, because they may lower
+// accumulated impulses.
 #include "scene/physics/solver.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "collision/assert.hpp"
 #include "scene/physics/solver_rows.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kPatchBlock = 8;  // blocks, and bodies, that a thread takes at a time
-constexpr std::size_t kBodyBlock = 32;
-constexpr double kPushBack = 0.25;  // of what is too near, a substep
-/// Of epsilon: what is nearer is too near. Between it and epsilon bodies rest: were each of a
-/// stack's points lifted to epsilon itself, the stack would rock on the lifts for ever.
-constexpr double kEnough = 0.5;
-/// m/s: bodies that are too near part no faster. (Of 0.5 mm in 1/240 s that is no limit.)
-constexpr double kMostPushBack = 1;
-/// In falls of one step: what arrives more slowly does not bounce, lest resting bodies hop.
-constexpr double kLeastBounce = 4;
-constexpr double kJointPushBack = 0.2;  // of a joint's error, a substep
+constexpr std::size_t kConstraintsPerTask = 8;  // constraint blocks in one task
+constexpr std::size_t kBodiesPerTask = 32;
+constexpr double kBaumgarte = 0.25;  // fraction of a penetration corrected per substep
+/// Of contactOffset: only closer points are corrected. Bodies rest between it and contactOffset.
+/// Correcting each point up to contactOffset itself would keep a stack rocking.
+constexpr double kPenetrationSlop = 0.5;
+/// m/s: bound of the correction velocity. (It does not limit 0.5 mm in 1/240 s.)
+constexpr double kMaxCorrectionSpeed = 1;
+/// Multiple of the velocity that gravity adds in one step: slower impacts do not bounce; otherwise
+/// resting bodies would hop.
+constexpr double kRestitutionThreshold = 4;
+constexpr double kJointBaumgarte = 0.2;  // fraction of a joint's error corrected per substep
 
-constexpr int kPartings = 2;  // iterations of step 4
+constexpr int kPositionIterations = 2;  // position iterations of step 4
 
 // ---- one substep -------------------------------------------------------------------------------
 
-/// Calls each(block) for all patches: a colour at a time, the last one by one thread.
+/// Calls each(block) for all constraint blocks, color by color. The last color runs on one thread.
 template <class Each>
-void forBlocks(System& system, Workers& workers, const Each& each) {
+void forEachConstraint(SolverContext& context, ThreadPool& pool, const Each& each) {
   std::uint32_t from = 0;
-  for (std::size_t colour = 0; colour < system.colours.size(); ++colour) {
-    const std::span blocks(system.blocks.data() + from, system.colours[colour] - from);
-    const std::size_t share = colour + 1 == system.colours.size() ? blocks.size() : kPatchBlock;
-    workers.share(blocks.size(), share, [&](std::size_t first, std::size_t last) {
-      forEach(blocks.subspan(first, last - first), system.byAvx, each);
+  for (std::size_t color = 0; color < context.colorEnds.size(); ++color) {
+    ENFILADE_ASSERT(from <= context.colorEnds[color] &&
+                    context.colorEnds[color] <= context.constraints.size());
+    const std::span blocks(context.constraints.data() + from, context.colorEnds[color] - from);
+    const std::size_t blocksPerTask =
+        color + 1 == context.colorEnds.size() ? blocks.size() : kConstraintsPerTask;
+    pool.parallelFor(blocks.size(), blocksPerTask, [&](std::size_t first, std::size_t last) {
+      simdLoop(blocks.subspan(first, last - first), context.useAvx, each);
     });
-    from = system.colours[colour];
+    from = context.colorEnds[color];
   }
 }
 
-[[gnu::always_inline]] inline std::span<PointBlock> pointsOf(const PatchBlock& block,
-                                                             System& system) {
-  return {system.points.data() + block.firstPoint, block.size};
+[[gnu::always_inline]] inline std::span<ContactConstraintPointW> constraintPoints(
+    const ContactConstraintW& block, SolverContext& context) {
+  return {context.points.data() + block.firstPoint, block.pointCount};
 }
 
-/// The velocities, or those of step 4.
-template <Vec3 Mover::*velocity = &Mover::velocity, Vec3 Mover::*spin = &Mover::spin>
-[[gnu::always_inline]] inline Motions gathered(const PatchBlock& block, const System& system) {
-  const Mover* movers = system.movers.data();
-  const auto &a = block.a.movers, &b = block.b.movers;
-  const Mover &a0 = movers[a[0]], &a1 = movers[a[1]], &a2 = movers[a[2]], &a3 = movers[a[3]];
-  const Mover &b0 = movers[b[0]], &b1 = movers[b[1]], &b2 = movers[b[2]], &b3 = movers[b[3]];
-  return {sideBySide(a0.*velocity, a1.*velocity, a2.*velocity, a3.*velocity),
-          sideBySide(a0.*spin, a1.*spin, a2.*spin, a3.*spin),
-          sideBySide(b0.*velocity, b1.*velocity, b2.*velocity, b3.*velocity),
-          sideBySide(b0.*spin, b1.*spin, b2.*spin, b3.*spin)};
+/// Gathers the velocities, or the correction velocities of step 4, of a block.
+template <Vec3 SolverBody::*velocity = &SolverBody::velocity,
+          Vec3 SolverBody::*angularVelocity = &SolverBody::angularVelocity>
+[[gnu::always_inline]] inline VelocitiesW gatherVelocities(const ContactConstraintW& block,
+                                                           const SolverContext& context) {
+  const SolverBody* bodies = context.bodies.data();
+  const auto &a = block.a.bodies, &b = block.b.bodies;
+  const SolverBody &a0 = bodies[a[0]], &a1 = bodies[a[1]], &a2 = bodies[a[2]], &a3 = bodies[a[3]];
+  const SolverBody &b0 = bodies[b[0]], &b1 = bodies[b[1]], &b2 = bodies[b[2]], &b3 = bodies[b[3]];
+  return {
+      gather(a0.*velocity, a1.*velocity, a2.*velocity, a3.*velocity),
+      gather(a0.*angularVelocity, a1.*angularVelocity, a2.*angularVelocity, a3.*angularVelocity),
+      gather(b0.*velocity, b1.*velocity, b2.*velocity, b3.*velocity),
+      gather(b0.*angularVelocity, b1.*angularVelocity, b2.*angularVelocity, b3.*angularVelocity)};
 }
-[[gnu::always_inline]] inline Motions gatheredPartings(const PatchBlock& block,
-                                                       const System& system) {
-  return gathered<&Mover::partingVelocity, &Mover::partingSpin>(block, system);
+[[gnu::always_inline]] inline VelocitiesW gatherCorrectionVelocities(
+    const ContactConstraintW& block, const SolverContext& context) {
+  return gatherVelocities<&SolverBody::correctionVelocity, &SolverBody::correctionAngularVelocity>(
+      block, context);
 }
 
-template <Vec3 Mover::*velocity = &Mover::velocity, Vec3 Mover::*spin = &Mover::spin>
-[[gnu::always_inline]] inline void putBack(const Motions& m, const PatchBlock& block,
-                                           System& system) {
+template <Vec3 SolverBody::*velocity = &SolverBody::velocity,
+          Vec3 SolverBody::*angularVelocity = &SolverBody::angularVelocity>
+[[gnu::always_inline]] inline void scatterVelocities(const VelocitiesW& m,
+                                                     const ContactConstraintW& block,
+                                                     SolverContext& context) {
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    Mover &a = system.movers[block.a.movers[lane]], &b = system.movers[block.b.movers[lane]];
-    if (block.a.yields[lane]) a.*velocity = m.velocityA.at(lane), a.*spin = m.spinA.at(lane);
-    if (block.b.yields[lane]) b.*velocity = m.velocityB.at(lane), b.*spin = m.spinB.at(lane);
+    SolverBody &a = context.bodies[block.a.bodies[lane]], &b = context.bodies[block.b.bodies[lane]];
+    if (block.a.isDynamic[lane])
+      a.*velocity = m.velocityA.at(lane), a.*angularVelocity = m.angularVelocityA.at(lane);
+    if (block.b.isDynamic[lane])
+      b.*velocity = m.velocityB.at(lane), b.*angularVelocity = m.angularVelocityB.at(lane);
   }
 }
 
-void warmStart(System& system, std::span<const Joint> joints, Workers& workers) {
-  for (const AngularRow& row : system.joints) {
+void warmStart(SolverContext& context, std::span<const Joint> joints, ThreadPool& pool) {
+  for (const SolverJointRow& row : context.jointRows) {
     const Joint& joint = joints[row.row.joint];
-    row.direction.push(system.movers[joint.a], system.movers[joint.b], row.impulse);
+    row.jacobian.applyImpulse(context.bodies[joint.a], context.bodies[joint.b], row.impulse);
   }
-  forBlocks(
-      system, workers, [&](const PatchBlock& block) __attribute__((always_inline)) {
+  forEachConstraint(
+      context, pool, [&](const ContactConstraintW& block) __attribute__((always_inline)) {
         if (block.idle) return;
-        Motions m = gathered(block, system);
-        const RubBlock& rub = block.rub;
-        block.push(rub.alongFirst, rub.first, rub.rub1, m);
-        block.push(rub.alongSecond, rub.second, rub.rub2, m);
-        block.turn(rub.twist, m);
-        for (const PointBlock& point : pointsOf(block, system))
-          block.push(block.normal, point.normal, point.impulse + point.push, m);
-        putBack(m, block, system);
+        VelocitiesW m = gatherVelocities(block, context);
+        const FrictionW& friction = block.frictionRows;
+        block.applyImpulse(friction.tangent1, friction.angular1, friction.tangentImpulse1, m);
+        block.applyImpulse(friction.tangent2, friction.angular2, friction.tangentImpulse2, m);
+        block.applyTorsion(friction.torsionImpulse, m);
+        for (const ContactConstraintPointW& point : constraintPoints(block, context))
+          block.applyImpulse(block.normal, point.normal, point.impulse + point.motorImpulse, m);
+        scatterVelocities(m, block, context);
       });
 }
 
-/// The rub within Coulomb's cone.
-[[gnu::always_inline]] inline void solveRub(PatchBlock& block, const Lanes& normalImpulse,
-                                            Motions& m) {
-  RubBlock& row = block.rub;
-  const Lanes most = block.friction * normalImpulse;
-  const Lanes speed1 = row.first.speed(row.alongFirst, m);
-  const Lanes speed2 = row.second.speed(row.alongSecond, m);
-  Lanes rub1 = row.rub1 - (row.m11 * speed1 + row.m12 * speed2);
-  Lanes rub2 = row.rub2 - (row.m12 * speed1 + row.m22 * speed2);
-  const Lanes squared = rub1 * rub1 + rub2 * rub2;
-  const LaneMask slides = most * most < squared;
-  if (any(slides)) {
-    const Lanes part = choose(slides, most / squareRoot(squared), everywhere(1));
-    rub1 = rub1 * part, rub2 = rub2 * part;
+/// Solves friction within Coulomb's cone.
+[[gnu::always_inline]] inline void solveFriction(ContactConstraintW& block,
+                                                 const DoubleW& normalImpulse, VelocitiesW& m) {
+  FrictionW& row = block.frictionRows;
+  const DoubleW maxImpulse = block.frictionCoefficient * normalImpulse;
+  const DoubleW speed1 = row.angular1.relativeVelocity(row.tangent1, m);
+  const DoubleW speed2 = row.angular2.relativeVelocity(row.tangent2, m);
+  DoubleW impulse1 =
+      row.tangentImpulse1 - (row.effectiveMass11 * speed1 + row.effectiveMass12 * speed2);
+  DoubleW impulse2 =
+      row.tangentImpulse2 - (row.effectiveMass12 * speed1 + row.effectiveMass22 * speed2);
+  const DoubleW squared = impulse1 * impulse1 + impulse2 * impulse2;
+  const MaskW isSliding = maxImpulse * maxImpulse < squared;
+  if (any(isSliding)) {
+    const DoubleW scale = selectW(isSliding, maxImpulse / sqrtW(squared), splat(1));
+    impulse1 = impulse1 * scale, impulse2 = impulse2 * scale;
   }
-  block.push(row.alongFirst, row.first, rub1 - row.rub1, m);
-  block.push(row.alongSecond, row.second, rub2 - row.rub2, m);
-  row.rub1 = rub1, row.rub2 = rub2;
-  const Lanes turning = dot(block.normal, m.spinB - m.spinA);
-  const Lanes widest = most * row.arm;
-  const Lanes twist = clamped(row.twist - row.twistMass * turning, -widest, widest);
-  block.turn(twist - row.twist, m);
-  row.twist = twist;
+  block.applyImpulse(row.tangent1, row.angular1, impulse1 - row.tangentImpulse1, m);
+  block.applyImpulse(row.tangent2, row.angular2, impulse2 - row.tangentImpulse2, m);
+  row.tangentImpulse1 = impulse1, row.tangentImpulse2 = impulse2;
+  const DoubleW relativeAngularSpeed = dot(block.normal, m.angularVelocityB - m.angularVelocityA);
+  const DoubleW maxTorsion = maxImpulse * row.torsionArm;
+  const DoubleW torsion =
+      clampW(row.torsionImpulse - row.torsionMass * relativeAngularSpeed, -maxTorsion, maxTorsion);
+  block.applyTorsion(torsion - row.torsionImpulse, m);
+  row.torsionImpulse = torsion;
 }
 
-/// What a point lacks of the speed at which it has to part at least, so as to keep epsilon: that is
-/// not positive, it may close in. A point that leans and has less than epsilon to close in is held
-/// as it is: let down to epsilon, each of a stack's points would answer the last correction of the
-/// others, with the delay that warm starting has, and the stack would never come to rest.
-[[gnu::always_inline]] inline Lanes lackingSpeed(const PointBlock& point, const System& system,
-                                                 const Lanes& speed) {
-  const Lanes none = everywhere(0), epsilon = everywhere(system.epsilon);
-  const Lanes room = point.separation - epsilon;
-  const Lanes least = lesser(none, -room / everywhere(system.seconds));
-  const Lanes most = choose(room < epsilon, none, least);
-  return choose(speed < least, least - speed, lesser(none, most - speed));
+/// Difference between a point's velocity and the slowest one that keeps contactOffset; negative
+/// where it may approach. A touching point closer than contactOffset is held at its separation. If
+/// it were lowered to contactOffset, each point of a stack would answer the delayed correction of
+/// the others, and the stack would never rest.
+[[gnu::always_inline]] inline DoubleW computeVelocityError(const ContactConstraintPointW& point,
+                                                           const SolverContext& context,
+                                                           const DoubleW& speed) {
+  const DoubleW zero = splat(0), contactOffset = splat(context.contactOffset);
+  const DoubleW gap = point.separation - contactOffset;
+  const DoubleW minSpeed = minW(zero, -gap / splat(context.seconds));
+  const DoubleW maxSpeed = selectW(gap < contactOffset, zero, minSpeed);
+  return selectW(speed < minSpeed, minSpeed - speed, minW(zero, maxSpeed - speed));
 }
 
-/// Whether a point closes in too fast. Where none does and nothing has pushed yet, nothing will.
-[[gnu::always_inline]] inline bool anyLacks(const PatchBlock& block, const Motions& m,
-                                            System& system) {
-  for (const PointBlock& point : pointsOf(block, system)) {
-    const Lanes lacking = lackingSpeed(point, system, point.normal.speed(block.normal, m));
-    if (any(everywhere(0) < lacking)) return true;
+/// Returns whether a point approaches too fast. If none does and no impulse exists yet, the block
+/// needs no solving.
+[[gnu::always_inline]] inline bool anyVelocityError(const ContactConstraintW& block,
+                                                    const VelocitiesW& m, SolverContext& context) {
+  for (const ContactConstraintPointW& point : constraintPoints(block, context)) {
+    const DoubleW velocityError =
+        computeVelocityError(point, context, point.normal.relativeVelocity(block.normal, m));
+    if (any(splat(0) < velocityError)) return true;
   }
   return false;
 }
 
-[[gnu::always_inline]] inline void solveBlock(PatchBlock& block, System& system) {
-  Motions m = gathered(block, system);
-  if (block.idle && !anyLacks(block, m, system)) return;
+[[gnu::always_inline]] inline void solveContactVelocities(ContactConstraintW& block,
+                                                          SolverContext& context) {
+  VelocitiesW m = gatherVelocities(block, context);
+  if (block.idle && !anyVelocityError(block, m, context)) return;
   block.idle = false;
-  const std::span points = pointsOf(block, system);
-  if (block.rubs) {
-    Lanes normalImpulse = everywhere(0);
-    for (const PointBlock& point : points)
-      normalImpulse = normalImpulse + (point.impulse + point.push);
-    solveRub(block, normalImpulse, m);
+  const std::span points = constraintPoints(block, context);
+  if (block.hasFriction) {
+    DoubleW normalImpulse = splat(0);
+    for (const ContactConstraintPointW& point : points)
+      normalImpulse = normalImpulse + (point.impulse + point.motorImpulse);
+    solveFriction(block, normalImpulse, m);
   }
-  for (PointBlock& point : points) {
-    const Lanes lacking = lackingSpeed(point, system, point.normal.speed(block.normal, m));
-    const Lanes impulse = greater(everywhere(0), point.impulse + point.mass * lacking);
-    block.push(block.normal, point.normal, impulse - point.impulse, m);
+  for (ContactConstraintPointW& point : points) {
+    const DoubleW velocityError =
+        computeVelocityError(point, context, point.normal.relativeVelocity(block.normal, m));
+    const DoubleW impulse = maxW(splat(0), point.impulse + point.effectiveMass * velocityError);
+    block.applyImpulse(block.normal, point.normal, impulse - point.impulse, m);
     point.impulse = impulse;
-    if (!block.pushes) continue;
-    const Lanes slow = block.pushSpeed - point.normal.speed(block.normal, m);
-    const Lanes more = clamped(point.push + point.mass * slow, everywhere(0), block.mostPush);
-    const Lanes push = choose(everywhere(0) < block.mostPush, more, point.push);
-    block.push(block.normal, point.normal, push - point.push, m);
-    point.push = push;
+    if (!block.hasMotor) continue;
+    const DoubleW speedError = block.targetSpeed - point.normal.relativeVelocity(block.normal, m);
+    const DoubleW clamped = clampW(point.motorImpulse + point.effectiveMass * speedError, splat(0),
+                                   block.maxMotorImpulse);
+    const DoubleW motorImpulse =
+        selectW(splat(0) < block.maxMotorImpulse, clamped, point.motorImpulse);
+    block.applyImpulse(block.normal, point.normal, motorImpulse - point.motorImpulse, m);
+    point.motorImpulse = motorImpulse;
   }
-  putBack(m, block, system);
+  scatterVelocities(m, block, context);
 }
 
-/// How fast a point has to part so that a part of what it is too near is gone after the substep.
-[[gnu::always_inline]] inline Lanes partingSpeed(const PointBlock& point, const System& system) {
-  const Lanes none = everywhere(0), seconds = everywhere(system.seconds);
-  const Lanes room = point.separation - everywhere(system.epsilon);
-  const Lanes lacking = everywhere(kEnough * system.epsilon) - point.separation;
-  const Lanes back = lesser(everywhere(kPushBack) * lacking / seconds, everywhere(kMostPushBack));
-  return choose(none < room, -room / seconds, choose(none < lacking, back, none));
+/// Separation velocity that corrects a fraction of the penetration within the substep.
+[[gnu::always_inline]] inline DoubleW computeCorrectionSpeed(const ContactConstraintPointW& point,
+                                                             const SolverContext& context) {
+  const DoubleW zero = splat(0), seconds = splat(context.seconds);
+  const DoubleW gap = point.separation - splat(context.contactOffset);
+  const DoubleW missingGap = splat(kPenetrationSlop * context.contactOffset) - point.separation;
+  const DoubleW correction =
+      minW(splat(kBaumgarte) * missingGap / seconds, splat(kMaxCorrectionSpeed));
+  return selectW(zero < gap, -gap / seconds, selectW(zero < missingGap, correction, zero));
 }
 
-[[gnu::always_inline]] inline void partBlock(const PatchBlock& block, bool begins, System& system) {
-  const Motions going = gathered(block, system);
-  Motions m = gatheredPartings(block, system);
-  for (PointBlock& point : pointsOf(block, system)) {
-    const LaneMask roomy = everywhere(system.epsilon) < point.separation;
-    const Lanes also = choose(roomy, point.normal.speed(block.normal, going), everywhere(0));
-    const Lanes speed = point.normal.speed(block.normal, m) + also;
-    const Lanes lacking = partingSpeed(point, system) - speed;
-    const Lanes before = begins ? everywhere(0) : point.parting;
-    const Lanes impulse = greater(everywhere(0), before + point.mass * lacking);
-    block.push(block.normal, point.normal, impulse - before, m);
-    point.parting = impulse;
+[[gnu::always_inline]] inline void solveContactPositions(const ContactConstraintW& block,
+                                                         bool isFirstIteration,
+                                                         SolverContext& context) {
+  const VelocitiesW velocities = gatherVelocities(block, context);
+  VelocitiesW m = gatherCorrectionVelocities(block, context);
+  for (ContactConstraintPointW& point : constraintPoints(block, context)) {
+    const MaskW hasGap = splat(context.contactOffset) < point.separation;
+    const DoubleW ownSpeed =
+        selectW(hasGap, point.normal.relativeVelocity(block.normal, velocities), splat(0));
+    const DoubleW speed = point.normal.relativeVelocity(block.normal, m) + ownSpeed;
+    const DoubleW velocityError = computeCorrectionSpeed(point, context) - speed;
+    const DoubleW before = isFirstIteration ? splat(0) : point.correctionImpulse;
+    const DoubleW impulse = maxW(splat(0), before + point.effectiveMass * velocityError);
+    block.applyImpulse(block.normal, point.normal, impulse - before, m);
+    point.correctionImpulse = impulse;
   }
-  putBack<&Mover::partingVelocity, &Mover::partingSpin>(m, block, system);
+  scatterVelocities<&SolverBody::correctionVelocity, &SolverBody::correctionAngularVelocity>(
+      m, block, context);
 }
 
-void partJoints(System& system, std::span<const Joint> joints) {
-  for (AngularRow& row : system.joints) {
-    if (row.row.kind == JointRow::Kind::motor || (row.row.error >= 0 && row.row.least == 0))
+void solveJointPositions(SolverContext& context, std::span<const Joint> joints) {
+  for (SolverJointRow& row : context.jointRows) {
+    if (row.row.kind == JointRow::Kind::motor || (row.row.error >= 0 && row.row.minImpulse == 0))
       continue;
     const Joint& joint = joints[row.row.joint];
-    Mover &a = system.movers[joint.a], &b = system.movers[joint.b];
-    const double target = -kJointPushBack * row.row.error / system.seconds;
-    const double lacking = target - row.direction.partingSpeed(a, b);
-    const double impulse = std::max(row.row.least, row.parting + row.mass * lacking);
-    row.direction.part(a, b, impulse - row.parting);
-    row.parting = impulse;
+    SolverBody &a = context.bodies[joint.a], &b = context.bodies[joint.b];
+    const double target = -kJointBaumgarte * row.row.error / context.seconds;
+    const double velocityError = target - row.jacobian.relativeCorrectionVelocity(a, b);
+    const double impulse =
+        std::max(row.row.minImpulse, row.correctionImpulse + row.effectiveMass * velocityError);
+    row.jacobian.applyCorrection(a, b, impulse - row.correctionImpulse);
+    row.correctionImpulse = impulse;
   }
 }
 
-/// Step 4.
-void part(System& system, std::span<const Joint> joints, Workers& workers) {
-  for (Mover& mover : system.movers) mover.partingVelocity = mover.partingSpin = Vec3::Zero();
-  for (AngularRow& row : system.joints) row.parting = 0;
-  for (int i = 0; i < kPartings; ++i) {
-    partJoints(system, joints);
-    forBlocks(
-        system, workers, [&](PatchBlock & block) __attribute__((always_inline)) {
-          partBlock(block, i == 0, system);
+/// Solves step 4 for all joints and contacts.
+void solvePositions(SolverContext& context, std::span<const Joint> joints, ThreadPool& pool) {
+  for (SolverBody& solverBody : context.bodies)
+    solverBody.correctionVelocity = solverBody.correctionAngularVelocity = Vec3::Zero();
+  for (SolverJointRow& row : context.jointRows) row.correctionImpulse = 0;
+  for (int i = 0; i < kPositionIterations; ++i) {
+    solveJointPositions(context, joints);
+    forEachConstraint(
+        context, pool, [&](ContactConstraintW & block) __attribute__((always_inline)) {
+          solveContactPositions(block, i == 0, context);
         });
   }
 }
 
-double targetSpeed(const JointRow& row, double seconds) {
-  if (row.kind == JointRow::Kind::motor) return row.speed;
+double computeTargetSpeed(const JointRow& row, double seconds) {
+  if (row.kind == JointRow::Kind::motor) return row.motorSpeed;
   return row.kind == JointRow::Kind::limit ? std::min(0.0, -row.error / seconds) : 0;
 }
 
-void solveJoints(System& system, std::span<const Joint> joints) {
-  for (AngularRow& row : system.joints) {
+void solveJointVelocities(SolverContext& context, std::span<const Joint> joints) {
+  for (SolverJointRow& row : context.jointRows) {
     const Joint& joint = joints[row.row.joint];
-    Mover &a = system.movers[joint.a], &b = system.movers[joint.b];
-    const double lacking = targetSpeed(row.row, system.seconds) - row.direction.speed(a, b);
-    const double impulse =
-        std::clamp(row.impulse + row.mass * lacking, row.row.least, row.row.most);
-    row.direction.push(a, b, impulse - row.impulse);
+    SolverBody &a = context.bodies[joint.a], &b = context.bodies[joint.b];
+    const double velocityError =
+        computeTargetSpeed(row.row, context.seconds) - row.jacobian.relativeVelocity(a, b);
+    const double impulse = std::clamp(row.impulse + row.effectiveMass * velocityError,
+                                      row.row.minImpulse, row.row.maxImpulse);
+    row.jacobian.applyImpulse(a, b, impulse - row.impulse);
     row.impulse = impulse;
   }
 }
 
-void goOn(System& system, std::span<RigidBody> bodies, Workers& workers) {
-  workers.share(bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
+void integratePoses(SolverContext& context, std::span<BodyMotion> motions, ThreadPool& pool) {
+  pool.parallelFor(motions.size(), kBodiesPerTask, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i) {
-      const Mover& mover = system.movers[i];
-      bodies[i].velocity = mover.velocity + mover.partingVelocity;
-      bodies[i].spin = mover.spin + mover.partingSpin;
-      advance(bodies[i], system.seconds);
+      const SolverBody& solverBody = context.bodies[i];
+      motions[i].velocity = solverBody.velocity + solverBody.correctionVelocity;
+      motions[i].angularVelocity =
+          solverBody.angularVelocity + solverBody.correctionAngularVelocity;
+      integratePose(motions[i], context.seconds);
     }
   });
-  forBlocks(
-      system, workers, [&](const PatchBlock& block) __attribute__((always_inline)) {
-        const Motions m = gathered(block, system), parting = gatheredPartings(block, system);
-        for (PointBlock& point : pointsOf(block, system)) {
-          const Lanes speed =
-              point.normal.speed(block.normal, m) + point.normal.speed(block.normal, parting);
-          point.separation = point.separation + everywhere(system.seconds) * speed;
-          point.sum = point.sum + point.impulse;
-          point.most = greater(point.most, point.impulse + point.push);
+  forEachConstraint(
+      context, pool, [&](const ContactConstraintW& block) __attribute__((always_inline)) {
+        const VelocitiesW m = gatherVelocities(block, context),
+                          correction = gatherCorrectionVelocities(block, context);
+        for (ContactConstraintPointW& point : constraintPoints(block, context)) {
+          const DoubleW speed = point.normal.relativeVelocity(block.normal, m) +
+                                point.normal.relativeVelocity(block.normal, correction);
+          point.separation = point.separation + splat(context.seconds) * speed;
+          point.totalImpulse = point.totalImpulse + point.impulse;
+          point.maxImpulse = maxW(point.maxImpulse, point.impulse + point.motorImpulse);
         }
       });
 }
 
-void applyForces(System& system, std::span<RigidBody> bodies, const Vec3& gravity,
-                 Workers& workers) {
-  workers.share(bodies.size(), kBodyBlock, [&](std::size_t from, std::size_t to) {
+void applyForces(SolverContext& context, std::span<BodyMotion> motions, const Vec3& gravity,
+                 ThreadPool& pool) {
+  pool.parallelFor(motions.size(), kBodiesPerTask, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i) {
-      Mover& mover = system.movers[i];
-      if (!mover.yields()) continue;
-      bodies[i].spin = mover.spin;
-      bendSpin(bodies[i], system.seconds);
-      mover.spin = bodies[i].spin;
-      mover.velocity += system.seconds * gravity;
+      SolverBody& solverBody = context.bodies[i];
+      if (!solverBody.isDynamic()) continue;
+      motions[i].angularVelocity = solverBody.angularVelocity;
+      applyGyroscopicTorque(motions[i], context.seconds);
+      solverBody.angularVelocity = motions[i].angularVelocity;
+      solverBody.velocity += context.seconds * gravity;
     }
   });
 }
 
-void keepImpulses(const System& system, std::span<Joint> joints) {
-  for (const AngularRow& row : system.joints)
+void storeJointImpulses(const SolverContext& context, std::span<Joint> joints) {
+  for (const SolverJointRow& row : context.jointRows)
     joints[row.row.joint].impulses[row.row.slot] = row.impulse;
 }
 
-void substep(System& system, std::span<RigidBody> bodies, std::span<Joint> joints,
-             const SolverStep& step, Workers& workers) {
-  applyForces(system, bodies, step.gravity, workers);
-  placeJoints(bodies, joints, system);
-  warmStart(system, joints, workers);
-  for (int i = 0; i < step.iterations; ++i) {
-    solveJoints(system, joints);
-    forBlocks(
-        system, workers, [&](PatchBlock & block) __attribute__((always_inline)) {
-          solveBlock(block, system);
+void substep(SolverContext& context, std::span<BodyMotion> motions, std::span<Joint> joints,
+             const SolverSettings& settings, ThreadPool& pool) {
+  applyForces(context, motions, settings.gravity, pool);
+  prepareJoints(motions, joints, context);
+  warmStart(context, joints, pool);
+  for (int i = 0; i < settings.iterations; ++i) {
+    solveJointVelocities(context, joints);
+    forEachConstraint(
+        context, pool, [&](ContactConstraintW & block) __attribute__((always_inline)) {
+          solveContactVelocities(block, context);
         });
   }
-  part(system, joints, workers);
-  goOn(system, bodies, workers);
-  keepImpulses(system, joints);
+  solvePositions(context, joints, pool);
+  integratePoses(context, motions, pool);
+  storeJointImpulses(context, joints);
 }
 
 // ---- the end of the step -----------------------------------------------------------------------
 
-/// Points that arrived and were pushed leave at `restitution` of the speed that they came with
-/// (Newton), by at most `restitution` of the impulse that stopped them (Poisson): either alone may
-/// add energy where several points arrive together.
-void bounce(System& system, const SolverStep& step) {
-  const double least = kLeastBounce * step.gravity.norm() * step.seconds;
-  for (const PatchBlock& block : system.blocks) {
-    if (!block.bounces) continue;
-    Motions m = gathered(block, system);
-    for (const PointBlock& point : pointsOf(block, system)) {
-      const Lanes speed = point.normal.speed(block.normal, m);
-      const Lanes lacking = -block.restitution * point.arrival - speed;
-      const Lanes most = block.restitution * point.sum;
-      const Lanes back = clamped(point.mass * lacking, everywhere(0), most);
-      const LaneMask slow = everywhere(-least) < point.arrival;
-      const LaneMask pushed = everywhere(0) < point.sum;
-      const Lanes none = everywhere(0);
-      block.push(block.normal, point.normal, choose(pushed, choose(slow, none, back), none), m);
+/// Applies restitution. Points that hit leave at `restitution` times their approach velocity
+/// (Newton), by at most `restitution` times the impulse that stopped them (Poisson). Either rule
+/// alone may add energy where several points hit together.
+void applyRestitution(SolverContext& context, const SolverSettings& settings) {
+  const double minSpeed = kRestitutionThreshold * settings.gravity.norm() * settings.seconds;
+  for (const ContactConstraintW& block : context.constraints) {
+    if (!block.hasRestitution) continue;
+    VelocitiesW m = gatherVelocities(block, context);
+    for (const ContactConstraintPointW& point : constraintPoints(block, context)) {
+      const DoubleW speed = point.normal.relativeVelocity(block.normal, m);
+      const DoubleW velocityError = -block.restitution * point.approachSpeed - speed;
+      const DoubleW maxImpulse = block.restitution * point.totalImpulse;
+      const DoubleW impulse = clampW(point.effectiveMass * velocityError, splat(0), maxImpulse);
+      const MaskW isSlow = splat(-minSpeed) < point.approachSpeed;
+      const MaskW hadImpulse = splat(0) < point.totalImpulse;
+      const DoubleW zero = splat(0);
+      block.applyImpulse(block.normal, point.normal,
+                         selectW(hadImpulse, selectW(isSlow, zero, impulse), zero), m);
     }
-    putBack(m, block, system);
+    scatterVelocities(m, block, context);
   }
 }
 
-void keepLane(const System& system, const PatchBlock& block, std::size_t lane,
-              ContactPatch& patch) {
-  patch.pushed = false;
-  for (std::uint32_t i = 0; i < patch.size; ++i) {
-    const PointBlock& point = system.points[block.firstPoint + i];
-    patch.pushed = patch.pushed || point.most[lane] > 0;
-    patch.points[i].separation = point.separation[lane];
-    patch.points[i].impulse = point.impulse[lane];
-    patch.points[i].push = point.push[lane];
+void storeLane(const SolverContext& context, const ContactConstraintW& block, std::size_t lane,
+               ContactConstraint& constraint) {
+  ENFILADE_ASSERT(constraint.pointCount <= block.pointCount);
+  constraint.gaveImpulse = false;
+  for (std::uint32_t i = 0; i < constraint.pointCount; ++i) {
+    const ContactConstraintPointW& point = context.points[block.firstPoint + i];
+    constraint.gaveImpulse = constraint.gaveImpulse || point.maxImpulse[lane] > 0;
+    constraint.points[i].separation = point.separation[lane];
+    constraint.points[i].impulse = point.impulse[lane];
+    constraint.points[i].motorImpulse = point.motorImpulse[lane];
   }
-  const RubBlock& rub = block.rub;
-  patch.rub = rub.rub1[lane] * rub.alongFirst.at(lane) + rub.rub2[lane] * rub.alongSecond.at(lane);
-  patch.twist = rub.twist[lane];
+  const FrictionW& friction = block.frictionRows;
+  constraint.tangentImpulse = friction.tangentImpulse1[lane] * friction.tangent1.at(lane) +
+                              friction.tangentImpulse2[lane] * friction.tangent2.at(lane);
+  constraint.torsionImpulse = friction.torsionImpulse[lane];
 }
 
-void keep(const System& system, std::span<RigidBody> bodies, std::span<ContactPatch> patches,
-          Workers& workers) {
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    bodies[i].velocity = system.movers[i].velocity;
-    bodies[i].spin = system.movers[i].spin;
+void storeImpulses(const SolverContext& context, std::span<BodyMotion> motions,
+                   std::span<ContactConstraint> constraints, ThreadPool& pool) {
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    motions[i].velocity = context.bodies[i].velocity;
+    motions[i].angularVelocity = context.bodies[i].angularVelocity;
   }
-  workers.share(system.blocks.size(), kPatchBlock, [&](std::size_t from, std::size_t to) {
-    for (const PatchBlock& block : system.blocks.subspan(from, to - from))
-      for (std::size_t lane = 0; lane < kLanes; ++lane)
-        if (block.patches[lane] != kNoPatch)
-          keepLane(system, block, lane, patches[block.patches[lane]]);
-  });
+  pool.parallelFor(
+      context.constraints.size(), kConstraintsPerTask, [&](std::size_t from, std::size_t to) {
+        for (const ContactConstraintW& block : context.constraints.subspan(from, to - from))
+          for (std::size_t lane = 0; lane < kLanes; ++lane)
+            if (block.constraints[lane] != kNoConstraint)
+              storeLane(context, block, lane, constraints[block.constraints[lane]]);
+      });
 }
 
 }  // namespace
 
-void solve(std::span<RigidBody> bodies, std::span<ContactPatch> patches, std::span<Joint> joints,
-           std::span<const DrivenBody> driven, const SolverStep& step, Workers& workers) {
-  thread_local System kept;
-  System& system = kept;  // which threads that help can see
-  system.seconds = step.seconds / step.substeps;
-  system.epsilon = step.epsilon;
-  system.byAvx = step.byAvx && hasAvx();
-  setUp(bodies, patches, system, workers);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(step.substeps); ++i) {
-    for (const DrivenBody& body : driven) {
-      system.movers[body.body].velocity = body.gaits[i].velocity;
-      system.movers[body.body].spin = body.gaits[i].spin;
+void solveConstraints(std::span<BodyMotion> motions, std::span<ContactConstraint> constraints,
+                      std::span<Joint> joints, std::span<const KinematicBody> kinematicBodies,
+                      const SolverSettings& settings, ThreadPool& pool) {
+  ENFILADE_ASSERT(settings.seconds > 0 && settings.substeps >= 1);
+  thread_local SolverContext threadContext;
+  SolverContext& context = threadContext;  // a reference that worker threads can see
+  context.seconds = settings.seconds / settings.substeps;
+  context.contactOffset = settings.contactOffset;
+  context.useAvx = settings.useAvx && hasAvx();
+  prepareConstraints(motions, constraints, context, pool);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(settings.substeps); ++i) {
+    for (const KinematicBody& body : kinematicBodies) {
+      ENFILADE_ASSERT(body.body < motions.size() && i < body.substepVelocities.size());
+      context.bodies[body.body].velocity = body.substepVelocities[i].velocity;
+      context.bodies[body.body].angularVelocity = body.substepVelocities[i].angularVelocity;
     }
-    substep(system, bodies, joints, step, workers);
+    substep(context, motions, joints, settings, pool);
   }
-  bounce(system, step);
-  keep(system, bodies, patches, workers);
+  applyRestitution(context, settings);
+  storeImpulses(context, motions, constraints, pool);
 }
 
 }  // namespace enfilade::scene

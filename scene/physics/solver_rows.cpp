@@ -2,204 +2,240 @@
 
 #include <algorithm>
 
+#include "collision/assert.hpp"
 #include "scene/physics/graph_coloring.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kBlock = 16;     // rows that a thread takes at a time
-constexpr std::size_t kPatches = 256;  // and patches
+constexpr std::size_t kBlocksPerTask = 16;        // rows in one task
+constexpr std::size_t kConstraintsPerTask = 256;  // constraints in one task
 
-Mover moverOf(const RigidBody& body) {
-  return {body.velocity,    body.spin,
-          Vec3::Zero(),     Vec3::Zero(),
-          body.inverseMass, body.inverseMass == 0 ? Mat3(Mat3::Zero()) : worldInverseInertia(body)};
+SolverBody makeSolverBody(const BodyMotion& motion) {
+  return {motion.velocity,
+          motion.angularVelocity,
+          Vec3::Zero(),
+          Vec3::Zero(),
+          motion.inverseMass,
+          motion.inverseMass == 0 ? Mat3(Mat3::Zero()) : computeWorldInverseInertia(motion)};
 }
 
-void fillPoint(const ContactPatch& patch, const PatchPoint& point, const Mover& a, const Mover& b,
-               std::size_t lane, PointBlock& block) {
-  const Direction normal(patch.normal, point.armA.cross(patch.normal),
-                         point.armB.cross(patch.normal), a, b);
-  block.normal.put(lane, normal);
-  block.mass.put(lane, inverted(response(normal, normal, a.inverseMass + b.inverseMass)));
-  block.separation.put(lane, point.separation);
-  block.arrival.put(lane, normal.speed(a, b));
-  block.impulse.put(lane, point.impulse);
-  block.push.put(lane, point.push);
+void fillContactPoint(const ContactConstraint& constraint, const ContactConstraintPoint& point,
+                      const SolverBody& a, const SolverBody& b, std::size_t lane,
+                      ContactConstraintPointW& block) {
+  const Jacobian normal(constraint.normal, point.armA.cross(constraint.normal),
+                        point.armB.cross(constraint.normal), a, b);
+  block.normal.set(lane, normal);
+  block.effectiveMass.set(
+      lane, invertOrZero(computeResponse(normal, normal, a.inverseMass + b.inverseMass)));
+  block.separation.set(lane, point.separation);
+  block.approachSpeed.set(lane, normal.relativeVelocity(a, b));
+  block.impulse.set(lane, point.impulse);
+  block.motorImpulse.set(lane, point.motorImpulse);
 }
 
-/// Two tangents that depend on the normal alone.
-std::array<Vec3, 2> tangents(const Vec3& normal) {
-  int least = 0;
-  normal.cwiseAbs().minCoeff(&least);
-  const Vec3 first = normal.cross(Vec3::Unit(least)).normalized();
+/// Returns two tangents that depend on the normal alone.
+std::array<Vec3, 2> computeTangents(const Vec3& normal) {
+  int minIndex = 0;
+  normal.cwiseAbs().minCoeff(&minIndex);
+  const Vec3 first = normal.cross(Vec3::Unit(minIndex)).normalized();
   return {first, normal.cross(first)};
 }
 
-void fillRub(const ContactPatch& patch, const Mover& a, const Mover& b, std::size_t lane,
-             RubBlock& block) {
+void fillFriction(const ContactConstraint& constraint, const SolverBody& a, const SolverBody& b,
+                  std::size_t lane, FrictionW& block) {
   Vec3 armA = Vec3::Zero(), armB = Vec3::Zero();
-  for (const PatchPoint& point : patch.list()) armA += point.armA, armB += point.armB;
-  armA /= static_cast<double>(patch.size), armB /= static_cast<double>(patch.size);
-  const auto [alongFirst, alongSecond] = tangents(patch.normal);
-  const Direction first(alongFirst, armA.cross(alongFirst), armB.cross(alongFirst), a, b);
-  const Direction second(alongSecond, armA.cross(alongSecond), armB.cross(alongSecond), a, b);
-  block.alongFirst.put(lane, alongFirst), block.alongSecond.put(lane, alongSecond);
-  block.first.put(lane, first), block.second.put(lane, second);
+  for (const ContactConstraintPoint& point : constraint.activePoints())
+    armA += point.armA, armB += point.armB;
+  armA /= static_cast<double>(constraint.pointCount),
+      armB /= static_cast<double>(constraint.pointCount);
+  const auto [tangent1, tangent2] = computeTangents(constraint.normal);
+  const Jacobian jacobian1(tangent1, armA.cross(tangent1), armB.cross(tangent1), a, b);
+  const Jacobian jacobian2(tangent2, armA.cross(tangent2), armB.cross(tangent2), a, b);
+  block.tangent1.set(lane, tangent1), block.tangent2.set(lane, tangent2);
+  block.angular1.set(lane, jacobian1), block.angular2.set(lane, jacobian2);
   const double masses = a.inverseMass + b.inverseMass;
-  const double k11 = response(first, first, masses);
-  const double k12 = response(first, second, masses);
-  const double k22 = response(second, second, masses);
-  const double over = inverted(k11 * k22 - k12 * k12);
-  block.m11.put(lane, k22 * over), block.m12.put(lane, -k12 * over),
-      block.m22.put(lane, k11 * over);
-  block.rub1.put(lane, patch.rub.dot(alongFirst)), block.rub2.put(lane, patch.rub.dot(alongSecond));
+  const double k11 = computeResponse(jacobian1, jacobian1, masses);
+  const double k12 = computeResponse(jacobian1, jacobian2, masses);
+  const double k22 = computeResponse(jacobian2, jacobian2, masses);
+  const double inverseDeterminant = invertOrZero(k11 * k22 - k12 * k12);
+  block.effectiveMass11.set(lane, k22 * inverseDeterminant),
+      block.effectiveMass12.set(lane, -k12 * inverseDeterminant),
+      block.effectiveMass22.set(lane, k11 * inverseDeterminant);
+  block.tangentImpulse1.set(lane, constraint.tangentImpulse.dot(tangent1)),
+      block.tangentImpulse2.set(lane, constraint.tangentImpulse.dot(tangent2));
   double arm = 0;
-  for (const PatchPoint& point : patch.list()) arm += (point.armB - armB).norm();
-  block.arm.put(lane, arm / static_cast<double>(patch.size));
-  const Vec3 turnA = a.inverseInertia * patch.normal, turnB = b.inverseInertia * patch.normal;
-  block.turnA.put(lane, turnA), block.turnB.put(lane, turnB);
-  block.twistMass.put(lane, inverted(patch.normal.dot(turnA) + patch.normal.dot(turnB)));
-  block.twist.put(lane, patch.twist);
+  for (const ContactConstraintPoint& point : constraint.activePoints())
+    arm += (point.armB - armB).norm();
+  block.torsionArm.set(lane, arm / static_cast<double>(constraint.pointCount));
+  const Vec3 responseA = a.inverseInertia * constraint.normal,
+             responseB = b.inverseInertia * constraint.normal;
+  block.torsionResponseA.set(lane, responseA), block.torsionResponseB.set(lane, responseB);
+  block.torsionMass.set(
+      lane, invertOrZero(constraint.normal.dot(responseA) + constraint.normal.dot(responseB)));
+  block.torsionImpulse.set(lane, constraint.torsionImpulse);
 }
 
-void fillSide(std::uint32_t mover, std::size_t lane, const System& system, BlockSide& side) {
-  side.movers[lane] = mover;
-  side.yields[lane] = system.movers[mover].yields();
-  side.inverseMass.put(lane, system.movers[mover].inverseMass);
+void fillBody(std::uint32_t body, std::size_t lane, const SolverContext& context,
+              ConstraintBodyW& side) {
+  ENFILADE_ASSERT(body + 1 < context.bodies.size());  // not the dummy
+  side.bodies[lane] = body;
+  side.isDynamic[lane] = context.bodies[body].isDynamic();
+  side.inverseMass.set(lane, context.bodies[body].inverseMass);
 }
 
-void fillLane(const ContactPatch& patch, std::size_t lane, PatchBlock& block, System& system) {
-  const Mover &a = system.movers[patch.a], &b = system.movers[patch.b];
-  fillSide(patch.a, lane, system, block.a);
-  fillSide(patch.b, lane, system, block.b);
-  block.friction.put(lane, patch.friction), block.restitution.put(lane, patch.restitution);
-  block.rubs |= patch.friction > 0, block.bounces |= patch.restitution != 0;
-  block.pushSpeed.put(lane, patch.pushSpeed);
-  block.mostPush.put(lane, patch.mostPush * system.seconds / static_cast<double>(patch.size));
-  block.pushes |= patch.mostPush != 0;
-  block.normal.put(lane, patch.normal);
-  fillRub(patch, a, b, lane, block.rub);
-  for (std::uint32_t i = 0; i < patch.size; ++i)
-    fillPoint(patch, patch.points[i], a, b, lane, system.points[block.firstPoint + i]);
+void fillLane(const ContactConstraint& constraint, std::size_t lane, ContactConstraintW& block,
+              SolverContext& context) {
+  ENFILADE_ASSERT(constraint.pointCount > 0 && constraint.pointCount <= block.pointCount);
+  const SolverBody &a = context.bodies[constraint.a], &b = context.bodies[constraint.b];
+  fillBody(constraint.a, lane, context, block.a);
+  fillBody(constraint.b, lane, context, block.b);
+  block.frictionCoefficient.set(lane, constraint.friction),
+      block.restitution.set(lane, constraint.restitution);
+  block.hasFriction |= constraint.friction > 0, block.hasRestitution |= constraint.restitution != 0;
+  block.targetSpeed.set(lane, constraint.targetSpeed);
+  block.maxMotorImpulse.set(
+      lane, constraint.maxPushForce * context.seconds / static_cast<double>(constraint.pointCount));
+  block.hasMotor |= constraint.maxPushForce != 0;
+  block.normal.set(lane, constraint.normal);
+  fillFriction(constraint, a, b, lane, block.frictionRows);
+  for (std::uint32_t i = 0; i < constraint.pointCount; ++i)
+    fillContactPoint(constraint, constraint.points[i], a, b, lane,
+                     context.points[block.firstPoint + i]);
 }
 
-/// Nothing pushed in the last step, and nobody pushes.
-bool isIdle(const ContactPatch& patch) {
-  const auto pushes = [](const PatchPoint& point) { return point.impulse != 0 || point.push != 0; };
-  return patch.mostPush == 0 && patch.twist == 0 && patch.rub.isZero(0) &&
-         std::ranges::none_of(patch.list(), pushes);
+/// Returns whether no impulse exists from the last step and no motor acts.
+bool isIdle(const ContactConstraint& constraint) {
+  const auto hasImpulse = [](const ContactConstraintPoint& point) {
+    return point.impulse != 0 || point.motorImpulse != 0;
+  };
+  return constraint.maxPushForce == 0 && constraint.torsionImpulse == 0 &&
+         constraint.tangentImpulse.isZero(0) &&
+         std::ranges::none_of(constraint.activePoints(), hasImpulse);
 }
 
-void fillBlock(std::span<const ContactPatch> patches, PatchBlock& block, System& system) {
-  const auto nobody = static_cast<std::uint32_t>(system.movers.size()) - 1;
-  PatchBlock filled{};
-  filled.patches = block.patches, filled.firstPoint = block.firstPoint, filled.size = block.size;
+void fillConstraint(std::span<const ContactConstraint> constraints, ContactConstraintW& block,
+                    SolverContext& context) {
+  const auto dummyBody = static_cast<std::uint32_t>(context.bodies.size()) - 1;
+  ContactConstraintW filled{};
+  filled.constraints = block.constraints, filled.firstPoint = block.firstPoint,
+  filled.pointCount = block.pointCount;
   filled.idle = true;
   block = filled;
-  std::ranges::fill(system.points.subspan(block.firstPoint, block.size), PointBlock{});
+  std::ranges::fill(context.points.subspan(block.firstPoint, block.pointCount),
+                    ContactConstraintPointW{});
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    block.a.movers[lane] = block.b.movers[lane] = nobody;
-    if (block.patches[lane] == kNoPatch) continue;
-    const ContactPatch& patch = patches[block.patches[lane]];
-    if (patch.size == 0) continue;
-    fillLane(patch, lane, block, system);
-    block.idle &= isIdle(patch);
+    block.a.bodies[lane] = block.b.bodies[lane] = dummyBody;
+    if (block.constraints[lane] == kNoConstraint) continue;
+    const ContactConstraint& constraint = constraints[block.constraints[lane]];
+    if (constraint.pointCount == 0) continue;
+    fillLane(constraint, lane, block, context);
+    block.idle &= isIdle(constraint);
   }
 }
 
-/// Which patches go side by side: those that push, then those that do not yet, and of each those
+constexpr std::uint8_t kMaxBatchKey = 2 * ContactConstraint::kMaxPoints;
+
+/// Sort key of a constraint within its color: those with impulses first, and among equals those
 /// with most points first.
-constexpr std::uint8_t kLastKind = 2 * ContactPatch::kMostPoints;
-std::uint8_t kindOf(const ContactPatch& patch) {
-  return static_cast<std::uint8_t>((isIdle(patch) ? 2 : 1) * ContactPatch::kMostPoints -
-                                   patch.size);
+std::uint8_t computeBatchKey(const ContactConstraint& constraint) {
+  return static_cast<std::uint8_t>((isIdle(constraint) ? 2 : 1) * ContactConstraint::kMaxPoints -
+                                   constraint.pointCount);
 }
 
-/// Fills `blocks` with the patches of one colour, `most` to each.
-void layOutColour(std::span<const ContactPatch> patches, std::span<const std::uint8_t> kinds,
-                  std::span<const std::uint32_t> colour, std::size_t most,
-                  std::span<PatchBlock> blocks) {
+/// Fills `blocks` with the constraints of one color, `lanesPerBlock` to each.
+void batchColor(std::span<const ContactConstraint> constraints,
+                std::span<const std::uint8_t> batchKeys, std::span<const std::uint32_t> color,
+                std::size_t lanesPerBlock, std::span<ContactConstraintW> blocks) {
   std::size_t count = 0;
-  const auto add = [&](std::uint32_t patch) {
-    PatchBlock& block = blocks[count / most];
-    if (count % most == 0) block.patches.fill(kNoPatch), block.size = 0;
-    block.patches[count++ % most] = patch;
-    block.size = std::max(block.size, static_cast<std::uint32_t>(patches[patch].size));
+  const auto add = [&](std::uint32_t constraint) {
+    ContactConstraintW& block = blocks[count / lanesPerBlock];
+    if (count % lanesPerBlock == 0) block.constraints.fill(kNoConstraint), block.pointCount = 0;
+    block.constraints[count++ % lanesPerBlock] = constraint;
+    block.pointCount =
+        std::max(block.pointCount, static_cast<std::uint32_t>(constraints[constraint].pointCount));
   };
-  if (most == 1) {
-    for (const std::uint32_t patch : colour) add(patch);
+  if (lanesPerBlock == 1) {
+    for (const std::uint32_t constraint : color) add(constraint);
     return;
   }
-  for (std::uint8_t kind = 0; kind <= kLastKind; ++kind)
-    for (const std::uint32_t patch : colour)
-      if (kinds[patch] == kind) add(patch);
+  for (std::uint8_t batchKey = 0; batchKey <= kMaxBatchKey; ++batchKey)
+    for (const std::uint32_t constraint : color)
+      if (batchKeys[constraint] == batchKey) add(constraint);
+  ENFILADE_ASSERT(count == color.size());
 }
 
-/// Which blocks stand where, and which points are theirs. The rest is left as it is.
-void layOut(std::span<const ContactPatch> patches, System& system, Workers& workers) {
-  std::vector<std::uint8_t> moves(system.movers.size()), kinds(patches.size());
-  for (std::size_t i = 0; i < moves.size(); ++i) moves[i] = system.movers[i].yields();
-  workers.share(patches.size(), kPatches, [&](std::size_t from, std::size_t to) {
-    for (std::size_t k = from; k < to; ++k) kinds[k] = kindOf(patches[k]);
+/// Assigns constraints to blocks and points to constraints. The rest of the blocks is not set.
+void buildBatches(std::span<const ContactConstraint> constraints, SolverContext& context,
+                  ThreadPool& pool) {
+  std::vector<std::uint8_t> isDynamic(context.bodies.size()), batchKeys(constraints.size());
+  for (std::size_t i = 0; i < isDynamic.size(); ++i) isDynamic[i] = context.bodies[i].isDynamic();
+  pool.parallelFor(constraints.size(), kConstraintsPerTask, [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; k < to; ++k) batchKeys[k] = computeBatchKey(constraints[k]);
   });
-  const Colouring colouring = colourPatches(patches, moves);
+  const ConstraintColoring coloring = colorConstraints(constraints, isDynamic);
   std::uint32_t from = 0, size = 0;
-  system.colours.clear();
-  // The last colour's may share bodies: each is alone.
-  const auto mostOf = [&](std::size_t colour) {
-    return colour + 1 == colouring.ends.size() ? std::size_t{1} : kLanes;
+  context.colorEnds.clear();
+  // Constraints of the last color may share bodies: one per block.
+  const auto lanesPerBlockOf = [&](std::size_t color) {
+    return color + 1 == coloring.ends.size() ? std::size_t{1} : kLanes;
   };
-  for (std::size_t i = 0; i < colouring.ends.size(); ++i) {
-    const std::size_t most = mostOf(i);
-    size += static_cast<std::uint32_t>((colouring.ends[i] - from + most - 1) / most);
-    system.colours.push_back(size);
-    from = colouring.ends[i];
+  for (std::size_t i = 0; i < coloring.ends.size(); ++i) {
+    const std::size_t lanesPerBlock = lanesPerBlockOf(i);
+    size +=
+        static_cast<std::uint32_t>((coloring.ends[i] - from + lanesPerBlock - 1) / lanesPerBlock);
+    context.colorEnds.push_back(size);
+    from = coloring.ends[i];
   }
-  system.blocks = system.blockRoom.take(size);
+  context.constraints = context.constraintBuffer.allocate(size);
   std::uint32_t block = 0;
   from = 0;
-  for (std::size_t i = 0; i < colouring.ends.size(); ++i) {
-    layOutColour(patches, kinds, std::span(colouring.order).subspan(from, colouring.ends[i] - from),
-                 mostOf(i), system.blocks.subspan(block, system.colours[i] - block));
-    block = system.colours[i];
-    from = colouring.ends[i];
+  for (std::size_t i = 0; i < coloring.ends.size(); ++i) {
+    batchColor(constraints, batchKeys,
+               std::span(coloring.order).subspan(from, coloring.ends[i] - from), lanesPerBlockOf(i),
+               context.constraints.subspan(block, context.colorEnds[i] - block));
+    block = context.colorEnds[i];
+    from = coloring.ends[i];
   }
   std::uint32_t points = 0;
-  for (PatchBlock& laid : system.blocks) {
-    laid.firstPoint = points;
-    points += laid.size;
+  for (ContactConstraintW& constraintBlock : context.constraints) {
+    constraintBlock.firstPoint = points;
+    points += constraintBlock.pointCount;
   }
-  system.points = system.pointRoom.take(points);
+  context.points = context.pointBuffer.allocate(points);
 }
 
 }  // namespace
 
-void setUp(std::span<const RigidBody> bodies, std::span<const ContactPatch> patches, System& system,
-           Workers& workers) {
-  system.movers.resize(bodies.size() + 1);
-  system.movers.back() = moverOf({});
-  workers.share(bodies.size(), kBlock, [&](std::size_t from, std::size_t to) {
-    for (std::size_t i = from; i < to; ++i) system.movers[i] = moverOf(bodies[i]);
+void prepareConstraints(std::span<const BodyMotion> motions,
+                        std::span<const ContactConstraint> constraints, SolverContext& context,
+                        ThreadPool& pool) {
+  context.bodies.resize(motions.size() + 1);
+  context.bodies.back() = makeSolverBody({});
+  pool.parallelFor(motions.size(), kBlocksPerTask, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) context.bodies[i] = makeSolverBody(motions[i]);
   });
-  layOut(patches, system, workers);
-  workers.share(system.blocks.size(), kBlock, [&](std::size_t from, std::size_t to) {
-    for (std::size_t k = from; k < to; ++k) fillBlock(patches, system.blocks[k], system);
-  });
+  buildBatches(constraints, context, pool);
+  pool.parallelFor(context.constraints.size(), kBlocksPerTask,
+                   [&](std::size_t from, std::size_t to) {
+                     for (std::size_t k = from; k < to; ++k)
+                       fillConstraint(constraints, context.constraints[k], context);
+                   });
 }
 
-/// The joints' rows for the poses of now; their impulses are the joints'.
-void placeJoints(std::span<const RigidBody> bodies, std::span<const Joint> joints, System& system) {
+void prepareJoints(std::span<const BodyMotion> motions, std::span<const Joint> joints,
+                   SolverContext& context) {
   std::vector<JointRow> rows;
   for (std::uint32_t i = 0; i < joints.size(); ++i)
-    appendRows(joints[i], i, bodies, system.seconds, rows);
-  system.joints.clear();
+    appendJointRows(joints[i], i, motions, context.seconds, rows);
+  context.jointRows.clear();
   for (const JointRow& row : rows) {
     const Joint& joint = joints[row.joint];
-    const Mover &a = system.movers[joint.a], &b = system.movers[joint.b];
-    const Direction direction(row.linear, row.angularA, row.angularB, a, b);
-    const double mass = inverted(response(direction, direction, a.inverseMass + b.inverseMass));
-    system.joints.push_back({row, direction, mass, joint.impulses[row.slot], 0});
+    const SolverBody &a = context.bodies[joint.a], &b = context.bodies[joint.b];
+    const Jacobian jacobian(row.linear, row.angularA, row.angularB, a, b);
+    const double effectiveMass =
+        invertOrZero(computeResponse(jacobian, jacobian, a.inverseMass + b.inverseMass));
+    context.jointRows.push_back({row, jacobian, effectiveMass, joint.impulses[row.slot], 0});
   }
 }
 

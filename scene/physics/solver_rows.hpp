@@ -1,5 +1,4 @@
-// What the solver iterates over: rows of numbers worked out once a step. Private to solver.cpp and
-// solver_rows.cpp.
+// Constraint rows of the solver, computed once per step. Private to solver.cpp and solver_rows.cpp.
 #pragma once
 
 #include <memory>
@@ -13,155 +12,161 @@
 
 namespace enfilade::scene {
 
-/// How a body moves, and what an impulse does to it. What impulses do not move is never written to:
-/// patches that share it are solved at the same time.
-struct alignas(64) Mover {
-  Vec3 velocity, spin;
-  Vec3 partingVelocity, partingSpin;  ///< of the solver's step 4
+/// Velocity and inverse mass of a body in the solver. Bodies that impulses do not move are never
+/// written to, because constraints that share one are solved in parallel.
+struct alignas(64) SolverBody {
+  Vec3 velocity, angularVelocity;
+  Vec3 correctionVelocity, correctionAngularVelocity;  ///< of the solver's step 4
   double inverseMass;
   Mat3 inverseInertia;  ///< world axes
 
-  bool yields() const { return inverseMass > 0; }
+  bool isDynamic() const { return inverseMass > 0; }
 };
 
-/// A direction in which two bodies meet: B is pushed along it at armB, A against it at armA.
-struct Direction {
-  Vec3 along, angularA, angularB;  ///< arm x along
-  Vec3 turnA, turnB;               ///< what an impulse of 1 turns them by, rad/s
+/// Jacobian of one direction between two bodies: an impulse acts on B along it at armB, and on A
+/// against it at armA.
+struct Jacobian {
+  Vec3 linear, angularA, angularB;  ///< angular: arm x linear
+  Vec3 responseA, responseB;        ///< rad/s of an impulse of 1
 
-  Direction() = default;
-  Direction(const Vec3& direction, const Vec3& crossA, const Vec3& crossB, const Mover& a,
-            const Mover& b)
-      : along(direction),
+  Jacobian() = default;
+  Jacobian(const Vec3& direction, const Vec3& crossA, const Vec3& crossB, const SolverBody& a,
+           const SolverBody& b)
+      : linear(direction),
         angularA(crossA),
         angularB(crossB),
-        turnA(a.inverseInertia * crossA),
-        turnB(b.inverseInertia * crossB) {}
-  double speed(const Mover& a, const Mover& b) const {
-    return along.dot(b.velocity - a.velocity) + angularB.dot(b.spin) - angularA.dot(a.spin);
+        responseA(a.inverseInertia * crossA),
+        responseB(b.inverseInertia * crossB) {}
+  double relativeVelocity(const SolverBody& a, const SolverBody& b) const {
+    return linear.dot(b.velocity - a.velocity) + angularB.dot(b.angularVelocity) -
+           angularA.dot(a.angularVelocity);
   }
-  void push(Mover& a, Mover& b, double impulse) const {
-    if (a.yields()) {
-      a.velocity -= (impulse * a.inverseMass) * along;
-      a.spin -= impulse * turnA;
+  void applyImpulse(SolverBody& a, SolverBody& b, double impulse) const {
+    if (a.isDynamic()) {
+      a.velocity -= (impulse * a.inverseMass) * linear;
+      a.angularVelocity -= impulse * responseA;
     }
-    if (!b.yields()) return;
-    b.velocity += (impulse * b.inverseMass) * along;
-    b.spin += impulse * turnB;
+    if (!b.isDynamic()) return;
+    b.velocity += (impulse * b.inverseMass) * linear;
+    b.angularVelocity += impulse * responseB;
   }
-  /// The same of step 4's velocities.
-  double partingSpeed(const Mover& a, const Mover& b) const {
-    return along.dot(b.partingVelocity - a.partingVelocity) + angularB.dot(b.partingSpin) -
-           angularA.dot(a.partingSpin);
+  /// The same for the correction velocities of step 4.
+  double relativeCorrectionVelocity(const SolverBody& a, const SolverBody& b) const {
+    return linear.dot(b.correctionVelocity - a.correctionVelocity) +
+           angularB.dot(b.correctionAngularVelocity) - angularA.dot(a.correctionAngularVelocity);
   }
-  void part(Mover& a, Mover& b, double impulse) const {
-    if (a.yields()) {
-      a.partingVelocity -= (impulse * a.inverseMass) * along;
-      a.partingSpin -= impulse * turnA;
+  void applyCorrection(SolverBody& a, SolverBody& b, double impulse) const {
+    if (a.isDynamic()) {
+      a.correctionVelocity -= (impulse * a.inverseMass) * linear;
+      a.correctionAngularVelocity -= impulse * responseA;
     }
-    if (!b.yields()) return;
-    b.partingVelocity += (impulse * b.inverseMass) * along;
-    b.partingSpin += impulse * turnB;
+    if (!b.isDynamic()) return;
+    b.correctionVelocity += (impulse * b.inverseMass) * linear;
+    b.correctionAngularVelocity += impulse * responseB;
   }
 };
 
-/// What an impulse along `given` changes of the speed along `felt`.
-inline double response(const Direction& felt, const Direction& given, double inverseMasses) {
-  return inverseMasses * felt.along.dot(given.along) + felt.angularA.dot(given.turnA) +
-         felt.angularB.dot(given.turnB);
+/// Change of the velocity along `felt` per impulse along `given`.
+inline double computeResponse(const Jacobian& felt, const Jacobian& given, double inverseMasses) {
+  return inverseMasses * felt.linear.dot(given.linear) + felt.angularA.dot(given.responseA) +
+         felt.angularB.dot(given.responseB);
 }
 
-inline double inverted(double value) {
+inline double invertOrZero(double value) {
   return value > 0 ? 1 / value : 0;
 }
 
-/// The patches that are solved side by side share no body that moves; a lane that no patch has is
-/// all zeroes, between two bodies that are none.
-inline constexpr std::uint32_t kNoPatch = ~0u;
+/// Index of an empty lane. An empty lane is all zeroes, between two dummy bodies. Constraints in
+/// one block share no dynamic body.
+inline constexpr std::uint32_t kNoConstraint = ~0u;
 
-/// How the bodies of a block move: gathered, worked on, put back.
-struct Motions {
-  Lanes3 velocityA, spinA, velocityB, spinB;
+/// Velocities of the bodies of a block: gathered, solved, then scattered.
+struct VelocitiesW {
+  Vec3W velocityA, angularVelocityA, velocityB, angularVelocityB;
 };
 
-/// Directions, without what is along them; see Direction.
-struct Turns {
-  Lanes3 angularA, angularB, turnA, turnB;
+/// Angular part of a Jacobian, four wide; see Jacobian.
+struct AngularJacobianW {
+  Vec3W angularA, angularB, responseA, responseB;
 
-  void put(std::size_t lane, const Direction& direction) {
-    angularA.put(lane, direction.angularA), angularB.put(lane, direction.angularB);
-    turnA.put(lane, direction.turnA), turnB.put(lane, direction.turnB);
+  void set(std::size_t lane, const Jacobian& direction) {
+    angularA.set(lane, direction.angularA), angularB.set(lane, direction.angularB);
+    responseA.set(lane, direction.responseA), responseB.set(lane, direction.responseB);
   }
-  [[gnu::always_inline]] Lanes speed(const Lanes3& along, const Motions& m) const {
-    return dot(along, m.velocityB - m.velocityA) + dot(angularB, m.spinB) - dot(angularA, m.spinA);
-  }
-};
-
-struct PointBlock {
-  Turns normal;
-  Lanes mass;        ///< of the two bodies here, kg
-  Lanes separation;  ///< metres, now
-  Lanes arrival;     ///< speed along the normal at the start of the step; < 0 closing
-  Lanes impulse, push;
-  Lanes parting;  ///< impulse of step 4
-  Lanes sum;      ///< of the impulses of all substeps of this step
-  Lanes most;     ///< of impulse and push in a substep of this step
-};
-
-/// Friction at the middle of a patch.
-struct RubBlock {
-  Lanes3 alongFirst, alongSecond;
-  Turns first, second;
-  Lanes m11, m12, m22;  ///< inverse of the response of the two
-  Lanes rub1, rub2;
-  Lanes3 turnA, turnB;  ///< of a moment of 1 about the normal
-  Lanes twistMass, arm, twist;
-};
-
-/// One of the two bodies of each patch.
-struct BlockSide {
-  std::array<std::uint32_t, kLanes> movers{};
-  std::array<bool, kLanes> yields{};
-  Lanes inverseMass;
-};
-
-struct PatchBlock {
-  BlockSide a, b;
-  std::array<std::uint32_t, kLanes> patches{};         ///< indices; kNoPatch: none
-  std::uint32_t firstPoint = 0, size = 0;              ///< of the patch that has most
-  bool rubs = false, pushes = false, bounces = false;  ///< any of them
-  bool idle = false;  ///< nothing has pushed yet: all impulses are 0
-  Lanes friction, restitution;
-  Lanes pushSpeed, mostPush;  ///< the push of one point and substep, N s
-  Lanes3 normal;
-  RubBlock rub;
-
-  /// An impulse along `along`, `turns`, on B, and against it on A.
-  [[gnu::always_inline]] void push(const Lanes3& along, const Turns& turns, const Lanes& impulse,
-                                   Motions& m) const {
-    m.velocityA = m.velocityA - (impulse * a.inverseMass) * along;
-    m.spinA = m.spinA - impulse * turns.turnA;
-    m.velocityB = m.velocityB + (impulse * b.inverseMass) * along;
-    m.spinB = m.spinB + impulse * turns.turnB;
-  }
-  /// A moment about the normal.
-  [[gnu::always_inline]] void turn(const Lanes& moment, Motions& m) const {
-    m.spinA = m.spinA - moment * rub.turnA;
-    m.spinB = m.spinB + moment * rub.turnB;
+  [[gnu::always_inline]] DoubleW relativeVelocity(const Vec3W& direction,
+                                                  const VelocitiesW& m) const {
+    return dot(direction, m.velocityB - m.velocityA) + dot(angularB, m.angularVelocityB) -
+           dot(angularA, m.angularVelocityA);
   }
 };
 
-struct AngularRow {
+struct ContactConstraintPointW {
+  AngularJacobianW normal;
+  DoubleW effectiveMass;  ///< of the two bodies at this point, kg
+  DoubleW separation;     ///< present separation, metres
+  DoubleW approachSpeed;  ///< normal velocity at the start of the step; < 0: approaching
+  DoubleW impulse, motorImpulse;
+  DoubleW correctionImpulse;  ///< impulse of step 4
+  DoubleW totalImpulse;       ///< of the impulses of all substeps in this step
+  DoubleW maxImpulse;         ///< maximum over the substeps of impulse plus motor impulse
+};
+
+/// Friction at the mean of a constraint's points, four wide.
+struct FrictionW {
+  Vec3W tangent1, tangent2;
+  AngularJacobianW angular1, angular2;
+  DoubleW effectiveMass11, effectiveMass12,
+      effectiveMass22;  ///< inverse of the response matrix of the tangents
+  DoubleW tangentImpulse1, tangentImpulse2;
+  Vec3W torsionResponseA, torsionResponseB;  ///< response to a unit torque about the normal
+  DoubleW torsionMass, torsionArm, torsionImpulse;
+};
+
+/// One of the two bodies of each constraint in a block.
+struct ConstraintBodyW {
+  std::array<std::uint32_t, kLanes> bodies{};
+  std::array<bool, kLanes> isDynamic{};
+  DoubleW inverseMass;
+};
+
+/// Four contact constraints that are solved together.
+struct ContactConstraintW {
+  ConstraintBodyW a, b;
+  std::array<std::uint32_t, kLanes> constraints{};  ///< indices; kNoConstraint: empty lane
+  std::uint32_t firstPoint = 0, pointCount = 0;     ///< of the constraint with most points
+  bool hasFriction = false, hasMotor = false, hasRestitution = false;  ///< of any lane
+  bool idle = false;  ///< no impulse yet: all impulses are 0
+  DoubleW frictionCoefficient, restitution;
+  DoubleW targetSpeed, maxMotorImpulse;  ///< motor impulse per point and substep, N s
+  Vec3W normal;
+  FrictionW frictionRows;
+
+  /// Applies an impulse along `direction` (with its `angular` part) to B, and the opposite to A.
+  [[gnu::always_inline]] void applyImpulse(const Vec3W& direction, const AngularJacobianW& angular,
+                                           const DoubleW& impulse, VelocitiesW& m) const {
+    m.velocityA = m.velocityA - (impulse * a.inverseMass) * direction;
+    m.angularVelocityA = m.angularVelocityA - impulse * angular.responseA;
+    m.velocityB = m.velocityB + (impulse * b.inverseMass) * direction;
+    m.angularVelocityB = m.angularVelocityB + impulse * angular.responseB;
+  }
+  /// Applies a torque about the normal.
+  [[gnu::always_inline]] void applyTorsion(const DoubleW& moment, VelocitiesW& m) const {
+    m.angularVelocityA = m.angularVelocityA - moment * frictionRows.torsionResponseA;
+    m.angularVelocityB = m.angularVelocityB + moment * frictionRows.torsionResponseB;
+  }
+};
+
+struct SolverJointRow {
   JointRow row;
-  Direction direction;
-  double mass, impulse, parting;
+  Jacobian jacobian;
+  double effectiveMass, impulse, correctionImpulse;
 };
 
-/// Room for so many that are written before they are read. It only grows.
+/// Uninitialised memory that is written before it is read. It only grows.
 template <class T>
-class Room {
+class ScratchBuffer {
  public:
-  std::span<T> take(std::size_t count) {
+  std::span<T> allocate(std::size_t count) {
     if (count > size_) store_ = std::make_unique_for_overwrite<T[]>(size_ = 2 * count);
     return {store_.get(), count};
   }
@@ -171,27 +176,30 @@ class Room {
   std::size_t size_ = 0;
 };
 
-/// All that is solved: joints in the order of the array, then patches colour by colour. Kept by
-/// each thread from step to step, for its room alone.
-struct System {
-  std::vector<Mover> movers;           ///< of the bodies, and one of nobody
-  std::span<PatchBlock> blocks;        ///< by colour
-  std::vector<std::uint32_t> colours;  ///< where each colour ends in `blocks`; see colours.hpp
-  std::span<PointBlock> points;        ///< in the order of their blocks
-  std::vector<AngularRow> joints;
+/// State of one solve: joints in array order, then contacts by color. Each thread keeps it between
+/// steps to reuse its memory.
+struct SolverContext {
+  std::vector<SolverBody> bodies;             ///< one per body, and a dummy
+  std::span<ContactConstraintW> constraints;  ///< by color
+  /// end of each color in `constraints`; see graph_coloring.hpp
+  std::vector<std::uint32_t> colorEnds;
+  std::span<ContactConstraintPointW> points;  ///< in the order of their blocks
+  std::vector<SolverJointRow> jointRows;
   double seconds = 0;  ///< of a substep
-  double epsilon = 0;
-  bool byAvx = false;
+  double contactOffset = 0;
+  bool useAvx = false;
 
-  Room<PatchBlock> blockRoom;  ///< of `blocks`
-  Room<PointBlock> pointRoom;  ///< of `points`
+  ScratchBuffer<ContactConstraintW> constraintBuffer;  ///< memory of `constraints`
+  ScratchBuffer<ContactConstraintPointW> pointBuffer;  ///< memory of `points`
 };
 
-/// Movers and patches; seconds and epsilon are set.
-void setUp(std::span<const RigidBody> bodies, std::span<const ContactPatch> patches, System& system,
-           Workers& workers);
+/// Fills bodies and constraints. `seconds` and `contactOffset` must be set.
+void prepareConstraints(std::span<const BodyMotion> motions,
+                        std::span<const ContactConstraint> constraints, SolverContext& context,
+                        ThreadPool& pool);
 
-/// The joints' rows for the poses of now; their impulses are the joints'.
-void placeJoints(std::span<const RigidBody> bodies, std::span<const Joint> joints, System& system);
+/// Builds the joint rows for the present poses, with the joints' impulses.
+void prepareJoints(std::span<const BodyMotion> motions, std::span<const Joint> joints,
+                   SolverContext& context);
 
 }  // namespace enfilade::scene

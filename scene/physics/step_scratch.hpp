@@ -1,4 +1,4 @@
-// What belongs to one step of dynamics.hpp. Private to its files.
+// Working memory of one step of physics_world.hpp. Private to its files.
 #pragma once
 
 #include "scene/physics/physics_world.hpp"
@@ -7,65 +7,68 @@
 
 namespace enfilade::scene {
 
-inline constexpr std::uint32_t kNoPlace = ~0u;
-inline constexpr std::size_t kPairBlock = 64;  ///< pairs that a thread takes at a time
+inline constexpr std::uint32_t kNoIndex = ~0u;
+inline constexpr std::size_t kPairsPerTask = 64;  ///< pairs in one task
 
-/// The way of a driven body, which takes along what it pushes: x goes to
-/// turn * (x - pivot) + pivot + shift.
-struct Carry {
-  std::uint32_t by = kNoPlace;  ///< which of `bodies`; kNoPlace: nobody carries
-  Vec3 pivot = Vec3::Zero(), shift = Vec3::Zero();
-  collision::Quat turn = collision::Quat::Identity();
-  bool turns = false;
-  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  ///< the carrier's, mean of the step
+/// Motion of a kinematic body, which carries what it touches: x moves to rotation * (x - pivot) +
+/// pivot + translation.
+struct CarrierMotion {
+  std::uint32_t carrier = kNoIndex;  ///< index into `motions`; kNoIndex: none
+  Vec3 pivot = Vec3::Zero(), translation = Vec3::Zero();
+  collision::Quat rotation = collision::Quat::Identity();
+  bool rotates = false;
+  Vec3 velocity = Vec3::Zero(),
+       angularVelocity = Vec3::Zero();  ///< mean of the carrier in the step
 
-  Vec3 velocityAt(const Vec3& point) const { return velocity + spin.cross(point - pivot); }
+  Vec3 velocityAt(const Vec3& point) const {
+    return velocity + angularVelocity.cross(point - pivot);
+  }
 };
 
-/// The bodies of a pair, by their places in `bodies`.
+/// Indices of a pair's bodies in `motions`.
 struct PairBodies {
   std::uint32_t a = 0, b = 0;
 };
 
-/// Kept by each thread from step to step, since a tray of parts needs some megabytes: to ask the
-/// system for them anew, page by page, took 7 % of a step. Nothing in it outlives a step but room.
-struct StepWork {
-  void begin(Workers& all) {
-    workers = &all;
+/// Each thread reuses one between steps. A scene of loose parts needs some megabytes, and
+/// allocating them page by page took 7 % of a step. Only the memory outlives a step.
+struct StepScratch {
+  void reset(ThreadPool& newPool) {
+    pool = &newPool;
     report = {};
-    for (std::vector<std::uint32_t>* list : {&active, &patched, &solids, &jointOf, &inside})
+    for (std::vector<std::uint32_t>* list :
+         {&activePairs, &constrainedPairs, &bodyIndices, &jointIndices, &kinematicPenetrations})
       list->clear();
-    bodiesOf.clear(), bodies.clear(), driven.clear(), joints.clear();
+    pairBodies.clear(), motions.clear(), kinematicBodies.clear(), joints.clear();
   }
 
-  Workers* workers = nullptr;
-  DynamicsReport report;
-  static constexpr std::uint8_t kActive = 1, kAsked = 2, kWakes = 4, kLeans = 8, kPatched = 16,
-                                kPenetrates = 32;
-  std::vector<std::uint8_t> looks;  ///< of each pair, these flags
-  bool leans(std::uint32_t pair) const { return (looks[pair] & kLeans) != 0; }
-  std::vector<std::uint32_t> active;   ///< indices of pairs that were looked at or may matter
-  std::vector<PairBodies> bodiesOf;    ///< of each of `active`
-  std::vector<std::uint32_t> patched;  ///< of those, with a patch
-  std::vector<Pace> paces;             ///< of each solid, when pairs are looked at
-  std::vector<std::uint32_t> local;    ///< of each solid: its place in `bodies`; kNoPlace: none
-  std::vector<std::uint32_t> solids;   ///< of each of `bodies`
-  std::vector<RigidBody> bodies;
-  std::vector<DrivenBody> driven;
-  std::vector<std::uint32_t> inside;  ///< of `patches`: of a free body in a driven one
-  std::vector<std::uint8_t> letOut;   ///< of each of `bodies`: see isLetOut()
-  std::vector<ContactPatch> patches;
+  ThreadPool* pool = nullptr;
+  StepReport report;
+  static constexpr std::uint8_t kActive = 1, kQueried = 2, kWakes = 4, kTouching = 8,
+                                kConstrained = 16, kPenetrates = 32;
+  std::vector<std::uint8_t> pairFlags;  ///< flags of each pair
+  bool isTouchingPair(std::uint32_t pair) const { return (pairFlags[pair] & kTouching) != 0; }
+  std::vector<std::uint32_t> activePairs;  ///< indices of pairs that were updated or may matter
+  std::vector<PairBodies> pairBodies;      ///< of each of `activePairs`
+  std::vector<std::uint32_t> constrainedPairs;  ///< those of them with a constraint
+  std::vector<SpeedBound> speedBounds;          ///< of each body, at the pair update
+  std::vector<std::uint32_t> localIndices;  ///< of each body: its index in `motions`, or kNoIndex
+  std::vector<std::uint32_t> bodyIndices;   ///< of each of `motions`: its body
+  std::vector<BodyMotion> motions;
+  std::vector<KinematicBody> kinematicBodies;
+  /// indices into `constraints`: a dynamic body in a kinematic one
+  std::vector<std::uint32_t> kinematicPenetrations;
+  std::vector<std::uint8_t> released;  ///< of each of `motions`: see isReleased()
+  std::vector<ContactConstraint> constraints;
   std::vector<Joint> joints;
-  std::vector<std::uint32_t> jointOf;
-  std::vector<double> fractions;     ///< of each of `bodies`, of its way
-  std::vector<std::uint8_t> yields;  ///< of each of `bodies`: it has some way of its own left
-  std::vector<Vec3> partings;        ///< of each of `bodies`: metres, out of what is too near
-  std::vector<Passage> passages;
-  std::vector<Stride> strides;  ///< of these
-  std::vector<Carry> carried;   ///< of each of `bodies`: the way that it goes in any case
+  std::vector<std::uint32_t> jointIndices;
+  std::vector<double>
+      motionFractions;  ///< of each of `motions`: the fraction of its motion that is kept
+  std::vector<std::uint8_t> hasOwnMotion;  ///< of each of `motions`
+  std::vector<Vec3> depenetrations;        ///< of each of `motions`: metres
+  std::vector<SweptPose> sweptPoses;
+  std::vector<MotionBound> motionBounds;      ///< of each of `sweptPoses`
+  std::vector<CarrierMotion> carrierMotions;  ///< of each of `motions`: the motion of its carrier
 };
-
-/// Step 3: the ways to where the solver has the bodies, as far as they are proved (ways.cpp).
-void proveWays(const Dynamics& dynamics, double seconds, double epsilon, StepWork& work);
 
 }  // namespace enfilade::scene

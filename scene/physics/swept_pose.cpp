@@ -1,192 +1,205 @@
-// A plane with normal n parts both bodies at the start by g0 and at the end by g1. Were the ways of
-// all vertices straight and even, the gap along n would be concave in time (least of linear ones),
-// so at least (1 - t) g0 + t g1 for t in 0..1. A vertex that turns by theta about the centre at
-// radius rho departs from its chord by at most rho theta^2 t (1 - t) / 2, since |p''| = rho
-// theta^2. With B = (rho_A theta_A^2 + rho_B theta_B^2) / 2 the gap is positive all the way if
-//   g0 / t + g1 / (1 - t) > B, that is, by its least value, (sqrt g0 + sqrt g1)^2 > B.
-// Where neither the plane of the start nor that of the end proves so much, the way is halved: the
-// middle of an even turn from q0 to q1 is q0 + q1, normalised, up to rounding.
+// Proof for one plane. A plane with normal n separates the bodies by g0 at the start and by g1 at
+// the end. If all vertices moved straight and uniformly, the gap along n would be concave in time
+// (a minimum of linear functions), so at least (1 - t) g0 + t g1. A vertex at radius rho that
+// rotates by theta about the centre departs from its chord by at most rho theta^2 t (1 - t) / 2,
+// since abs(p'') = rho theta^2. With B = (rho_A theta_A^2 + rho_B theta_B^2) / 2 the gap stays
+// positive if
+//   g0 / t + g1 / (1 - t) > B; by its minimum: (sqrt g0 + sqrt g1)^2 > B.
+// Where neither the plane of the start nor that of the end suffices, the motion is halved. The
+// middle of a uniform rotation from q0 to q1 is q0 + q1, normalised, up to rounding.
 //
-// Where they move by less than their distance, no plane is needed.
+// Where the bodies move by less than their distance, no plane is needed.
 //
-// theta from the quaternions: |q0 - q1| = 2 sin(theta / 4) for the nearer of +-q1, and sin x >= x -
-// x^3 / 6 gives theta / 4 <= s (1 + s^2) for s = sin(theta / 4) <= sin(pi / 4).
+// Bound of theta from the quaternions: abs(q0 - q1) = 2 sin(theta / 4) for the closer of +-q1.
+// Since sin x >= x - x^3 / 6, theta / 4 <= s (1 + s^2) for s = sin(theta / 4) <= sin(pi / 4).
 #include "scene/physics/swept_pose.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "collision/assert.hpp"
 #include "collision/narrow_phase/axis_separation.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-using collision::ConvexBody;
 using collision::FeatureCache;
+using collision::PlacedConvex;
 using collision::Quat;
 using collision::Verdict;
 
-constexpr double kUp = 1 + 0x1p-40;  // above what a few roundings lose
-constexpr double kParts = 1 << kMostHalvings;
-constexpr int kTries = 3;  // to cut a way where its plane is used up
-constexpr double kShorter =
-    0.25;  // of a way, at each try: lest the gap be used up, from step to step
+constexpr double kFractionSteps = 1 << kMaxHalvings;
+constexpr int kMaxAttempts = 3;  // to shorten a motion whose plane has no margin left
+constexpr double kSafetyFraction =
+    0.25;  // of a motion, at each attempt: keeps part of the gap for the next step
 
-/// q1 or -q1, whichever is nearer to q0.
-Quat nearer(const Quat& q0, const Quat& q1) {
+/// Returns q1 or -q1, whichever is closer to q0.
+Quat nearestRotation(const Quat& q0, const Quat& q1) {
   if (q0.dot(q1) >= 0) return q1;
   return Quat(-q1.w(), -q1.x(), -q1.y(), -q1.z());
 }
 
-/// Radians, at least.
-double turnOf(const Passage& p) {
-  const Quat to = nearer(p.fromRotation, p.toRotation);
-  const double s = 0.5 * (to.coeffs() - p.fromRotation.coeffs()).norm();
-  return 4 * s * (1 + s * s) * kUp;
+/// Upper bound in radians.
+double computeRotationAngle(const SweptPose& sweep) {
+  const Quat to = nearestRotation(sweep.fromRotation, sweep.toRotation);
+  const double s = 0.5 * (to.coeffs() - sweep.fromRotation.coeffs()).norm();
+  return 4 * s * (1 + s * s) * kRoundUpFactor;
 }
 
-PassagePose middleOf(const PassagePose& from, const PassagePose& to) {
-  PassagePose middle;
+CentrePose computeMiddlePose(const CentrePose& from, const CentrePose& to) {
+  CentrePose middle;
   middle.centre = 0.5 * (from.centre + to.centre);
-  middle.rotation.coeffs() = from.rotation.coeffs() + nearer(from.rotation, to.rotation).coeffs();
+  middle.rotation.coeffs() =
+      from.rotation.coeffs() + nearestRotation(from.rotation, to.rotation).coeffs();
   const double length = std::sqrt(middle.rotation.squaredNorm());
+  ENFILADE_ASSERT(!(length < 1));  // the nearer of two unit quaternions: the sum is longer
   middle.rotation.coeffs() /= length;
   return middle;
 }
 
-double bulgeOf(const Passage& p) {
-  return p.radius * p.turn * p.turn / 2 * kUp;
+double computeChordDeviation(const SweptPose& sweep) {
+  return sweep.radius * sweep.rotationAngle * sweep.rotationAngle / 2 * kRoundUpFactor;
 }
 
-/// A part at an end of its way.
-ConvexBody placed(const PartShape& part, const Passage& p, bool atEnd) {
-  return {part.vertices, atEnd ? p.toPosition : p.fromPosition, atEnd ? &p.toTurned : &p.fromTurned,
-          part.hull};
+/// A part at the start or the end of its motion.
+PlacedConvex placePartAt(const PartShape& part, const SweptPose& sweep, bool atEnd) {
+  return {part.vertices, atEnd ? sweep.toPosition : sweep.fromPosition,
+          atEnd ? &sweep.toMatrix : &sweep.fromMatrix, part.hull};
 }
 
-/// The pair at one time: what is known there.
-struct Known {
+/// Certified bounds of the pair at one instant.
+struct SweepSample {
   FeatureCache cache;
-  double apart = 0;  ///< metres, proved; 0: not separated
-  double along = 0;  ///< the same, along the axis of `cache`
+  double lowerBound = 0;      ///< metres, certified distance; 0: not separated
+  double axisLowerBound = 0;  ///< the same along the axis of `cache`
 };
 
-struct Search {
+struct ClearanceSearch {
   const PartShape& partA;
   const PartShape& partB;
   std::uint32_t queries = 0;
 
-  /// Separated at the end, and by how much?
-  Known ask(const Passage& a, const Passage& b, bool atEnd, const FeatureCache& hint) {
-    Known known{hint, 0, 0};
-    const collision::Decision decision =
-        collision::decide(placed(partA, a, atEnd), placed(partB, b, atEnd), known.cache);
+  /// Queries the certified distance at the start or the end.
+  SweepSample query(const SweptPose& a, const SweptPose& b, bool atEnd, const FeatureCache& hint) {
+    SweepSample sample{hint, 0, 0};
+    const collision::SeparationResult result = collision::computeSeparation(
+        placePartAt(partA, a, atEnd), placePartAt(partB, b, atEnd), sample.cache);
     ++queries;
-    if (decision.verdict == Verdict::separated)
-      known.apart = known.along = decision.distance - decision.errorBound;
-    return known;
+    if (result.verdict == Verdict::separated)
+      sample.lowerBound = sample.axisLowerBound = result.distance - result.errorBound;
+    return sample;
   }
-  /// The gap along the axis of `cache`, at the end or the start.
-  double along(const Passage& a, const Passage& b, bool atEnd, const FeatureCache& cache) const {
+  /// Returns the certified separation along the axis of `cache`, at the start or the end.
+  double separationAlong(const SweptPose& a, const SweptPose& b, bool atEnd,
+                         const FeatureCache& cache) const {
     if (cache.axis.isZero(0)) return 0;
-    return collision::gapAlong(placed(partA, a, atEnd), placed(partB, b, atEnd),
-                               cache.axis.stableNormalized())
-        .proved;
+    return collision::computeAxisSeparation(placePartAt(partA, a, atEnd),
+                                            placePartAt(partB, b, atEnd),
+                                            cache.axis.stableNormalized())
+        .lowerBound;
   }
 };
 
-/// Whether a plane with these gaps at the ends parts the bodies all the way.
-bool planeParts(double atStart, double atEnd, double bulge) {
+/// Returns whether a plane with these gaps at the ends separates the bodies throughout.
+bool isSeparatedByPlane(double atStart, double atEnd, double chordDeviation) {
   if (!(atStart > 0) || !(atEnd > 0)) return false;
   const double roots = std::sqrt(atStart) + std::sqrt(atEnd);
-  return roots * roots > bulge * kUp;
+  return roots * roots > chordDeviation * kRoundUpFactor;
 }
 
-/// Proved from the two ends alone.
-bool provedClear(const Search& search, const Passage& a, const Passage& b, const Known& start,
-                 const Known& end) {
-  const double moves = closingOf(a, b);
-  if (moves < start.apart || moves < end.apart) return true;
-  const double bulge = bulgeOf(a) + bulgeOf(b);
-  return planeParts(start.along, search.along(a, b, true, start.cache), bulge) ||
-         planeParts(search.along(a, b, false, end.cache), end.along, bulge);
+/// Returns whether the two ends alone prove the motion clear.
+bool isProvenClear(const ClearanceSearch& search, const SweptPose& a, const SweptPose& b,
+                   const SweepSample& start, const SweepSample& end) {
+  const double closing = computeClosingBound(a, b);
+  if (closing < start.lowerBound || closing < end.lowerBound) return true;
+  const double chordDeviation = computeChordDeviation(a) + computeChordDeviation(b);
+  return isSeparatedByPlane(start.axisLowerBound, search.separationAlong(a, b, true, start.cache),
+                            chordDeviation) ||
+         isSeparatedByPlane(search.separationAlong(a, b, false, end.cache), end.axisLowerBound,
+                            chordDeviation);
 }
 
-/// The part of the way that is proved clear. The end's answer is not known to be separated.
-double clearPart(Search& search, const Passage& a, const Passage& b, const Known& start,
-                 const Known& end, int halvings) {
-  if (end.apart > 0 && provedClear(search, a, b, start, end)) return 1;
+/// Returns the fraction of the motion that is proved clear. The end may be unseparated.
+double searchClearFraction(ClearanceSearch& search, const SweptPose& a, const SweptPose& b,
+                           const SweepSample& start, const SweepSample& end, int halvings) {
+  if (end.lowerBound > 0 && isProvenClear(search, a, b, start, end)) return 1;
   if (halvings == 0) return 0;
-  const PassagePose middleA = middleOf(a), middleB = middleOf(b);
-  const Passage firstA = firstHalf(a, middleA), firstB = firstHalf(b, middleB);
-  const Known middle = search.ask(firstA, firstB, true, start.cache);
-  const double first = clearPart(search, firstA, firstB, start, middle, halvings - 1);
+  const CentrePose middleA = computeMiddlePose(a), middleB = computeMiddlePose(b);
+  const SweptPose firstA = makeFirstHalf(a, middleA), firstB = makeFirstHalf(b, middleB);
+  const SweepSample middle = search.query(firstA, firstB, true, start.cache);
+  const double first = searchClearFraction(search, firstA, firstB, start, middle, halvings - 1);
   if (first < 1) return 0.5 * first;
-  return 0.5 + 0.5 * clearPart(search, secondHalf(a, middleA), secondHalf(b, middleB), middle, end,
-                               halvings - 1);
+  return 0.5 + 0.5 * searchClearFraction(search, makeSecondHalf(a, middleA),
+                                         makeSecondHalf(b, middleB), middle, end, halvings - 1);
 }
 
 }  // namespace
 
-Passage standing(const Solid& solid) {
-  Passage passage;
-  passage.fromCentre = passage.toCentre = solid.motion.centre;
-  passage.fromRotation = passage.toRotation = solid.motion.rotation;
-  passage.radius = solid.radius;
-  passage.centreInFrame = solid.centreInFrame;
-  passage.stands = &solid;
-  passage.fromTurned = passage.toTurned = solid.rotation;
-  passage.fromPosition = passage.toPosition = solid.position;
-  return passage;
+SweptPose makeStationaryPose(const PhysicsBody& body) {
+  SweptPose sweep;
+  sweep.fromCentre = sweep.toCentre = body.motion.centre;
+  sweep.fromRotation = sweep.toRotation = body.motion.rotation;
+  sweep.radius = body.radius;
+  sweep.centreInFrame = body.centreInFrame;
+  sweep.stationaryBody = &body;
+  sweep.fromMatrix = sweep.toMatrix = body.rotation;
+  sweep.fromPosition = sweep.toPosition = body.position;
+  return sweep;
 }
 
-void measure(Passage& passage) {
-  passage.turn = turnOf(passage);
-  // As placeSolid() has it, to the last bit.
-  passage.fromTurned = passage.fromRotation.toRotationMatrix();
-  passage.toTurned = passage.toRotation.toRotationMatrix();
-  passage.fromPosition = passage.fromCentre - passage.fromTurned * passage.centreInFrame;
-  passage.toPosition = passage.toCentre - passage.toTurned * passage.centreInFrame;
+void updateDerived(SweptPose& sweep) {
+  ENFILADE_ASSERT(!(std::abs(sweep.fromRotation.squaredNorm() - 1) > 1e-6) &&
+                  !(std::abs(sweep.toRotation.squaredNorm() - 1) > 1e-6));
+  sweep.rotationAngle = computeRotationAngle(sweep);
+  // The same expressions as in updateTransform(), equal to the last bit.
+  sweep.fromMatrix = sweep.fromRotation.toRotationMatrix();
+  sweep.toMatrix = sweep.toRotation.toRotationMatrix();
+  sweep.fromPosition = sweep.fromCentre - sweep.fromMatrix * sweep.centreInFrame;
+  sweep.toPosition = sweep.toCentre - sweep.toMatrix * sweep.centreInFrame;
 }
 
-double lengthOf(const Passage& p) {
-  const Vec3 way = p.toCentre - p.fromCentre;
-  return (way.norm() + p.turn * p.radius) * kUp;
+double computeMaxDisplacement(const SweptPose& sweep) {
+  const Vec3 displacement = sweep.toCentre - sweep.fromCentre;
+  return (displacement.norm() + sweep.rotationAngle * sweep.radius) * kRoundUpFactor;
 }
 
-Stride strideOf(const Passage& p) {
-  return {p.toCentre - p.fromCentre, p.turn * p.radius};
+MotionBound computeMotionBound(const SweptPose& sweep) {
+  return {sweep.toCentre - sweep.fromCentre, sweep.rotationAngle * sweep.radius};
 }
 
-double closingOf(const Stride& a, const Stride& b) {
-  return ((a.way - b.way).norm() + a.tip + b.tip) * kUp;
+double computeClosingBound(const MotionBound& a, const MotionBound& b) {
+  return ((a.displacement - b.displacement).norm() + a.rotationalBound + b.rotationalBound) *
+         kRoundUpFactor;
 }
 
-PassagePose middleOf(const Passage& p) {
-  return middleOf({p.fromCentre, p.fromRotation}, {p.toCentre, p.toRotation});
+CentrePose computeMiddlePose(const SweptPose& sweep) {
+  return computeMiddlePose({sweep.fromCentre, sweep.fromRotation},
+                           {sweep.toCentre, sweep.toRotation});
 }
 
-Passage firstHalf(const Passage& p, const PassagePose& middle) {
-  Passage half = p;
+SweptPose makeFirstHalf(const SweptPose& sweep, const CentrePose& middle) {
+  SweptPose half = sweep;
   half.toCentre = middle.centre, half.toRotation = middle.rotation;
-  measure(half);
+  updateDerived(half);
   return half;
 }
 
-Passage secondHalf(const Passage& p, const PassagePose& middle) {
-  Passage half = p;
+SweptPose makeSecondHalf(const SweptPose& sweep, const CentrePose& middle) {
+  SweptPose half = sweep;
   half.fromCentre = middle.centre, half.fromRotation = middle.rotation;
-  measure(half);
+  updateDerived(half);
   return half;
 }
 
-Passage firstPart(const Passage& passage, double fraction) {
-  if (fraction == 1 || passage.stands) return passage;
-  // What is left of the way, from the end of what is done; only the result is measured.
-  PassagePose from{passage.fromCentre, passage.fromRotation};
-  PassagePose to{passage.toCentre, passage.toRotation};
-  for (int i = 0; i < kMostHalvings && fraction > 0; ++i) {
-    const PassagePose middle = middleOf(from, to);
+SweptPose truncateSweep(const SweptPose& sweep, double fraction) {
+  if (fraction == 1 || sweep.stationaryBody) return sweep;
+  ENFILADE_ASSERT(fraction >= 0 && fraction < 1);
+  ENFILADE_ASSERT(fraction * kFractionSteps == std::floor(fraction * kFractionSteps));
+  // The interval that remains; only the result gets its derived fields.
+  CentrePose from{sweep.fromCentre, sweep.fromRotation};
+  CentrePose to{sweep.toCentre, sweep.toRotation};
+  for (int i = 0; i < kMaxHalvings && fraction > 0; ++i) {
+    const CentrePose middle = computeMiddlePose(from, to);
     fraction *= 2;
     if (fraction >= 1) {
       from = middle;
@@ -195,61 +208,69 @@ Passage firstPart(const Passage& passage, double fraction) {
       to = middle;
     }
   }
-  Passage done = passage;
+  SweptPose done = sweep;
   done.toCentre = from.centre, done.toRotation = from.rotation;
-  measure(done);
+  updateDerived(done);
   return done;
 }
 
 namespace {
 
-/// Whether the plane at right angles to `axis` parts the two all the way.
-bool partsAllTheWay(const PartShape& partA, const Passage& a, const PartShape& partB,
-                    const Passage& b, const Vec3& axis) {
-  const auto gap = [&](bool atEnd) {
-    return collision::gapAlong(placed(partA, a, atEnd), placed(partB, b, atEnd), axis).proved;
+/// Returns whether the plane normal to `axis` separates the parts throughout.
+bool isSeparatedThroughout(const PartShape& partA, const SweptPose& a, const PartShape& partB,
+                           const SweptPose& b, const Vec3& axis) {
+  const auto separation = [&](bool atEnd) {
+    return collision::computeAxisSeparation(placePartAt(partA, a, atEnd),
+                                            placePartAt(partB, b, atEnd), axis)
+        .lowerBound;
   };
-  const double atEnd = gap(true);
-  return atEnd > 0 && planeParts(gap(false), atEnd, bulgeOf(a) + bulgeOf(b));
+  const double atEnd = separation(true);
+  return atEnd > 0 && isSeparatedByPlane(separation(false), atEnd,
+                                         computeChordDeviation(a) + computeChordDeviation(b));
 }
 
 }  // namespace
 
-double clearAlong(const PartShape& partA, const Passage& a, const PartShape& partB,
-                  const Passage& b, const Vec3& axis) {
-  const auto gap = [&](bool atEnd) {
-    return collision::gapAlong(placed(partA, a, atEnd), placed(partB, b, atEnd), axis).proved;
+double clearFractionAlong(const PartShape& partA, const SweptPose& a, const PartShape& partB,
+                          const SweptPose& b, const Vec3& axis) {
+  const auto separation = [&](bool atEnd) {
+    return collision::computeAxisSeparation(placePartAt(partA, a, atEnd),
+                                            placePartAt(partB, b, atEnd), axis)
+        .lowerBound;
   };
-  const double atStart = gap(false), atEnd = gap(true);
-  const double bulge = bulgeOf(a) + bulgeOf(b);
-  if (planeParts(atStart, atEnd, bulge)) return 1;
+  const double atStart = separation(false), atEnd = separation(true);
+  const double chordDeviation = computeChordDeviation(a) + computeChordDeviation(b);
+  if (isSeparatedByPlane(atStart, atEnd, chordDeviation)) return 1;
   if (!(atStart > 0 && atStart < std::numeric_limits<double>::infinity())) return -1;
-  // Were it linear in time, the gap would be gone at this part.
-  double part = std::min(1.0, atStart / (atStart - std::min(0.0, atEnd) + bulge));
-  for (int i = 0; i < kTries; ++i) {
-    part = std::floor((1 - kShorter) * part * kParts) / kParts;
-    if (!(part > 0)) return 0;
-    if (partsAllTheWay(partA, firstPart(a, part), partB, firstPart(b, part), axis)) return part;
+  // If the gap changed linearly, it would vanish at this fraction.
+  double fraction = std::min(1.0, atStart / (atStart - std::min(0.0, atEnd) + chordDeviation));
+  for (int i = 0; i < kMaxAttempts; ++i) {
+    fraction = std::floor((1 - kSafetyFraction) * fraction * kFractionSteps) / kFractionSteps;
+    if (!(fraction > 0)) return 0;
+    if (isSeparatedThroughout(partA, truncateSweep(a, fraction), partB, truncateSweep(b, fraction),
+                              axis))
+      return fraction;
   }
   return -1;
 }
 
-bool separatedAtEnd(const PartShape& partA, const Passage& a, const PartShape& partB,
-                    const Passage& b, FeatureCache cache) {
-  // Not how far: that they are apart at all ends it.
-  const auto decision =
-      collision::decideWithin(placed(partA, a, true), placed(partB, b, true), 0, cache);
-  return !decision || decision->verdict == Verdict::separated;
+bool isSeparatedAtEnd(const PartShape& partA, const SweptPose& a, const PartShape& partB,
+                      const SweptPose& b, FeatureCache cache) {
+  // The distance is not needed: the query ends when separation is certain.
+  const auto result = collision::computeSeparationWithin(placePartAt(partA, a, true),
+                                                         placePartAt(partB, b, true), 0, cache);
+  return !result || result->verdict == Verdict::separated;
 }
 
-Clearance clearance(const PartShape& partA, const Passage& a, const PartShape& partB,
-                    const Passage& b, const FeatureCache& cache, double apart) {
-  Search search{partA, partB};
-  Known start{cache, apart, search.along(a, b, false, cache)};
-  if (!(apart > 0)) start = search.ask(a, b, false, cache);
-  if (!(start.apart > 0)) return {0, search.queries};
-  const Known end = search.ask(a, b, true, start.cache);
-  const double fraction = clearPart(search, a, b, start, end, kMostHalvings);
+ClearanceResult computeClearance(const PartShape& partA, const SweptPose& a, const PartShape& partB,
+                                 const SweptPose& b, const FeatureCache& cache, double lowerBound) {
+  ClearanceSearch search{partA, partB};
+  SweepSample start{cache, lowerBound, search.separationAlong(a, b, false, cache)};
+  if (!(lowerBound > 0)) start = search.query(a, b, false, cache);
+  if (!(start.lowerBound > 0)) return {0, search.queries};
+  const SweepSample end = search.query(a, b, true, start.cache);
+  const double fraction = searchClearFraction(search, a, b, start, end, kMaxHalvings);
+  ENFILADE_ASSERT(fraction >= 0 && fraction <= 1);
   return {fraction, search.queries};
 }
 

@@ -1,4 +1,4 @@
-// Whether two parts stay clear of one another while both move and turn: proved, not sampled.
+// Continuous collision of two moving, rotating convex parts: proved, not sampled.
 #pragma once
 
 #include "collision/narrow_phase/narrow_phase.hpp"
@@ -6,76 +6,78 @@
 
 namespace enfilade::scene {
 
-/// A solid's way within a step: its centre goes straight and it turns evenly, by the shorter way,
-/// from one rotation to the other.
-struct Passage {
+/// Motion of a body within a step. The centre moves straight, and the rotation is uniform, by the
+/// shorter way.
+struct SweptPose {
   Vec3 fromCentre = Vec3::Zero(), toCentre = Vec3::Zero();
   collision::Quat fromRotation = collision::Quat::Identity();
   collision::Quat toRotation = collision::Quat::Identity();
-  double radius = 0;                  ///< about the centre: no vertex is farther, metres
-  Vec3 centreInFrame = Vec3::Zero();  ///< of the parts' frame
-  const Solid* stands = nullptr;      ///< it does not move: its frame is there to the last bit
-  double turn = 0;                    ///< radians, at least; set by measure()
-  /// Of the frame, at both ends; set by measure().
-  Mat3 fromTurned = Mat3::Identity(), toTurned = Mat3::Identity();
+  double radius = 0;                  ///< metres about the centre: bound of all vertices
+  Vec3 centreInFrame = Vec3::Zero();  ///< centre of mass in the frame of the parts
+  /// set if it does not move: its frame is then exact to the last bit
+  const PhysicsBody* stationaryBody = nullptr;
+  double rotationAngle = 0;  ///< upper bound in radians; set by updateDerived()
+  /// Rotation matrix and origin of the frame at both ends; set by updateDerived().
+  Mat3 fromMatrix = Mat3::Identity(), toMatrix = Mat3::Identity();
   Vec3 fromPosition = Vec3::Zero(), toPosition = Vec3::Zero();
 };
 
-/// The way of a solid that stands.
-Passage standing(const Solid& solid);
+/// Returns the motion of a stationary body.
+SweptPose makeStationaryPose(const PhysicsBody& body);
 
-/// To be called when centres or rotations were set.
-void measure(Passage& passage);
+/// Updates the derived fields. Call it after a change of centres or rotations.
+void updateDerived(SweptPose& sweep);
 
-/// Metres: no point goes farther on this way.
-double lengthOf(const Passage& passage);
+/// Bound of the displacement of any point, in metres.
+double computeMaxDisplacement(const SweptPose& sweep);
 
-/// What of a way decides how far it takes two from or to one another.
-struct Stride {
-  Vec3 way = Vec3::Zero();  ///< of the centre, metres
-  double tip = 0;           ///< metres: no point goes farther by the turn
+/// The part of a motion that bounds the change of a distance.
+struct MotionBound {
+  Vec3 displacement = Vec3::Zero();  ///< of the centre, metres
+  double rotationalBound = 0;        ///< metres: bound of the displacement that rotation adds
 };
-Stride strideOf(const Passage& passage);
+MotionBound computeMotionBound(const SweptPose& sweep);
 
-/// Metres: the distance of the two changes by no more.
-double closingOf(const Stride& a, const Stride& b);
-inline double closingOf(const Passage& a, const Passage& b) {
-  return closingOf(strideOf(a), strideOf(b));
+/// Bound of the change of the distance between two bodies, in metres.
+double computeClosingBound(const MotionBound& a, const MotionBound& b);
+inline double computeClosingBound(const SweptPose& a, const SweptPose& b) {
+  return computeClosingBound(computeMotionBound(a), computeMotionBound(b));
 }
 
-/// Where the passage is at its middle, exactly half way in both place and turn.
-struct PassagePose {
+/// Pose at an instant of a motion, by centre of mass and rotation.
+struct CentrePose {
   Vec3 centre = Vec3::Zero();
   collision::Quat rotation = collision::Quat::Identity();
 };
-PassagePose middleOf(const Passage& passage);
+CentrePose computeMiddlePose(const SweptPose& sweep);
 
-/// The first half, the second half.
-Passage firstHalf(const Passage& passage, const PassagePose& middle);
-Passage secondHalf(const Passage& passage, const PassagePose& middle);
+/// Return the first and the second half of a motion.
+SweptPose makeFirstHalf(const SweptPose& sweep, const CentrePose& middle);
+SweptPose makeSecondHalf(const SweptPose& sweep, const CentrePose& middle);
 
-/// The first `fraction` of a passage: a multiple of 2^-kMostHalvings.
-Passage firstPart(const Passage& passage, double fraction);
+/// Returns the first `fraction` of a motion: a multiple of 2^-kMaxHalvings.
+SweptPose truncateSweep(const SweptPose& sweep, double fraction);
 
-/// Up to which part of the way the plane at right angles to `axis` (unit, from A to B) parts the
-/// two: a cheap proof. 0: the plane is used up at once; negative: it says nothing.
-double clearAlong(const PartShape& partA, const Passage& a, const PartShape& partB,
-                  const Passage& b, const Vec3& axis);
+/// Returns the fraction of the motions during which a plane normal to `axis` (unit, from A to B)
+/// separates the parts. Cheap test. 0: the plane has no margin left; negative: no result.
+double clearFractionAlong(const PartShape& partA, const SweptPose& a, const PartShape& partB,
+                          const SweptPose& b, const Vec3& axis);
 
-/// Whether they are separated where their ways end.
-bool separatedAtEnd(const PartShape& partA, const Passage& a, const PartShape& partB,
-                    const Passage& b, collision::FeatureCache cache);
+/// Returns whether the parts are separated at the end of their motions.
+bool isSeparatedAtEnd(const PartShape& partA, const SweptPose& a, const PartShape& partB,
+                      const SweptPose& b, collision::FeatureCache cache);
 
-struct Clearance {
-  double fraction = 1;        ///< proved clear up to here: a multiple of 2^-kMostHalvings, or 0
+struct ClearanceResult {
+  double fraction = 1;        ///< proved clear up to here: a multiple of 2^-kMaxHalvings, or 0
   std::uint32_t queries = 0;  ///< narrow-phase queries
 };
-inline constexpr int kMostHalvings = 6;
+inline constexpr int kMaxHalvings = 6;
 
-/// How far both parts can go, both at the same part of their ways, with the bodies separated all
-/// the way. `cache`: of decide() at the start or before. `apart`: metres by which they are proved
-/// to be apart at the start; 0 where that has to be found out.
-Clearance clearance(const PartShape& partA, const Passage& a, const PartShape& partB,
-                    const Passage& b, const collision::FeatureCache& cache, double apart = 0);
+/// Returns the common fraction of both motions during which the parts are proved separated.
+/// `cache`: of a query at the start or before. `lowerBound`: metres, certified distance at the
+/// start; 0: unknown.
+ClearanceResult computeClearance(const PartShape& partA, const SweptPose& a, const PartShape& partB,
+                                 const SweptPose& b, const collision::FeatureCache& cache,
+                                 double lowerBound = 0);
 
 }  // namespace enfilade::scene

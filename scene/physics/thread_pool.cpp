@@ -1,16 +1,18 @@
-// A loop of the solver takes microseconds, so who waits first spins for about as long as it would
-// take to be woken, and only then sleeps.
+// A loop of the solver takes microseconds. A waiting worker therefore spins for about the time that
+// a wake-up takes, and only then sleeps.
 #include "scene/physics/thread_pool.hpp"
 
 #include <system_error>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::scene {
 namespace {
 
-constexpr int kSpins = 5000;  // some 50 us
+constexpr int kSpinIterations = 5000;  // about 50 us
 constexpr std::uint32_t kOpen = 1u << 31;
 
-void pause() {
+void spinPause() {
 #if defined(__x86_64__) || defined(__i386__)
   __builtin_ia32_pause();
 #endif
@@ -18,58 +20,60 @@ void pause() {
 
 }  // namespace
 
-Workers::Workers(int threads)
-    : shares_(static_cast<std::size_t>(std::clamp(threads, 1, kMost))), failures_(shares_.size()) {
-  const int count = static_cast<int>(shares_.size());
-  helpers_.reserve(static_cast<std::size_t>(count) - 1);
+ThreadPool::ThreadPool(int threads)
+    : ranges_(static_cast<std::size_t>(std::clamp(threads, 1, kMaxThreads))),
+      failures_(ranges_.size()) {
+  const int count = static_cast<int>(ranges_.size());
+  workers_.reserve(static_cast<std::size_t>(count) - 1);
   try {
     for (int i = 1; i < count; ++i)
-      helpers_.emplace_back([this, i] { help(static_cast<std::size_t>(i)); });
+      workers_.emplace_back([this, i] { workerLoop(static_cast<std::size_t>(i)); });
   } catch (const std::system_error&) {
-    // The system gives no more threads: those that there are do it, with the same result.
+    // The system allows no more threads. The existing ones give the same result.
   }
 }
 
-Workers::~Workers() {
-  ending_.store(true, std::memory_order_relaxed);
-  round_.fetch_add(1, std::memory_order_release);
-  round_.notify_all();
+ThreadPool::~ThreadPool() {
+  stopping_.store(true, std::memory_order_relaxed);
+  jobCounter_.fetch_add(1, std::memory_order_release);
+  jobCounter_.notify_all();
 }
 
-void Workers::takeShare(std::size_t share) {
-  Share& own = shares_[share];
-  while (true) {  // ends: each turn takes a block
+void ThreadPool::runRange(std::size_t index) {
+  BlockRange& own = ranges_[index];
+  while (true) {  // ends: each iteration takes a block
     const std::size_t block = own.next.fetch_add(1, std::memory_order_relaxed);
     if (block >= own.end) return;
     const std::size_t from = block * job_.block;
-    job_.call(job_.what, from, std::min(from + job_.block, job_.size));
+    job_.call(job_.function, from, std::min(from + job_.block, job_.size));
   }
 }
 
-/// Those of its own share first.
-void Workers::takeBlocks(std::size_t thread) noexcept {
+/// Runs the thread's own range first.
+void ThreadPool::runBlocks(std::size_t thread) noexcept {
   try {
-    for (std::size_t i = 0; i < shares_.size(); ++i) takeShare((thread + i) % shares_.size());
+    for (std::size_t i = 0; i < ranges_.size(); ++i) runRange((thread + i) % ranges_.size());
   } catch (...) {
     failures_[thread] = std::current_exception();
   }
 }
 
-void Workers::runOnAll(const Job& job) {
+void ThreadPool::runOnAll(const Job& job) {
+  ENFILADE_ASSERT(job.block > 0 && job.size > job.block);
   job_ = job;
   const std::size_t blocks = (job.size + job.block - 1) / job.block;
-  for (std::size_t i = 0; i < shares_.size(); ++i) {
-    shares_[i].next.store(i * blocks / shares_.size(), std::memory_order_relaxed);
-    shares_[i].end = (i + 1) * blocks / shares_.size();
+  for (std::size_t i = 0; i < ranges_.size(); ++i) {
+    ranges_[i].next.store(i * blocks / ranges_.size(), std::memory_order_relaxed);
+    ranges_[i].end = (i + 1) * blocks / ranges_.size();
   }
   gate_.store(kOpen, std::memory_order_release);
-  round_.fetch_add(1, std::memory_order_release);
-  round_.notify_all();
-  takeBlocks(0);
+  jobCounter_.fetch_add(1, std::memory_order_release);
+  jobCounter_.notify_all();
+  runBlocks(0);
   gate_.fetch_and(~kOpen, std::memory_order_acq_rel);
-  // Each has a block in hand at most.
+  // Each worker has at most one block left.
   for (int i = 0; gate_.load(std::memory_order_acquire) != 0; ++i)
-    i < kSpins ? pause() : std::this_thread::yield();
+    i < kSpinIterations ? spinPause() : std::this_thread::yield();
   std::exception_ptr first;
   for (std::exception_ptr& failure : failures_) {
     if (failure && !first) first = failure;
@@ -78,19 +82,21 @@ void Workers::runOnAll(const Job& job) {
   if (first) std::rethrow_exception(first);
 }
 
-void Workers::help(std::size_t helper) {
-  std::uint32_t seen = 0;
-  while (true) {  // ends with the object
-    for (int i = 0; i < kSpins && round_.load(std::memory_order_acquire) == seen; ++i) pause();
-    round_.wait(seen, std::memory_order_acquire);
-    seen = round_.load(std::memory_order_acquire);
-    if (ending_.load(std::memory_order_relaxed)) return;
+void ThreadPool::workerLoop(std::size_t worker) {
+  std::uint32_t lastJob = 0;
+  while (true) {  // ends with the destructor
+    for (int i = 0; i < kSpinIterations && jobCounter_.load(std::memory_order_acquire) == lastJob;
+         ++i)
+      spinPause();
+    jobCounter_.wait(lastJob, std::memory_order_acquire);
+    lastJob = jobCounter_.load(std::memory_order_acquire);
+    if (stopping_.load(std::memory_order_relaxed)) return;
     std::uint32_t gate = gate_.load(std::memory_order_acquire);
     while ((gate & kOpen) != 0 &&
            !gate_.compare_exchange_weak(gate, gate + 1, std::memory_order_acq_rel)) {
     }
     if ((gate & kOpen) == 0) continue;
-    takeBlocks(helper);
+    runBlocks(worker);
     gate_.fetch_sub(1, std::memory_order_release);
   }
 }

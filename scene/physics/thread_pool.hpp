@@ -1,8 +1,7 @@
-// A few threads that share loops. What a loop computes must not depend on who computes it: each
-// index writes to places of its own. The blocks of indices are fixed. Each thread begins with the
-// same share of them in every loop, since what it wrote there in the last one is near to it, and
-// then helps with what the others have not taken; the caller waits for nobody who has not begun. So
-// a thread that the machine has no processor for costs nothing.
+// Thread pool for parallel loops. Results must not depend on the thread: each index writes only its
+// own data. Blocks of indices are fixed. Each thread starts with the same range in every loop, for
+// cache locality, and then helps with unfinished ranges. The caller waits only for threads that
+// have started, so a thread without a free processor costs nothing.
 #pragma once
 
 #include <algorithm>
@@ -15,27 +14,28 @@
 
 namespace enfilade::scene {
 
-class Workers {
+/// Runs parallel loops on the caller and a fixed number of worker threads.
+class ThreadPool {
  public:
-  /// `threads`: with the caller's, 1 to kMost; less or more than that are taken as these.
-  explicit Workers(int threads);
-  ~Workers();
-  Workers(const Workers&) = delete;
-  Workers& operator=(const Workers&) = delete;
+  /// `threads`: number of threads with the caller, clamped to 1..kMaxThreads.
+  explicit ThreadPool(int threads);
+  ~ThreadPool();
+  ThreadPool(const ThreadPool&) = delete;
+  ThreadPool& operator=(const ThreadPool&) = delete;
 
-  static constexpr int kMost = 64;
-  int count() const { return static_cast<int>(helpers_.size()) + 1; }
+  static constexpr int kMaxThreads = 64;
+  int threadCount() const { return static_cast<int>(workers_.size()) + 1; }
 
   /// Calls each(begin, end) for blocks of `block` indices below `size`, and returns when all are
-  /// done. Where calls threw, one of their exceptions is thrown again.
+  /// done. Rethrows one exception if calls threw.
   template <class Each>
-  void share(std::size_t size, std::size_t block, const Each& each) {
-    if (helpers_.empty() || size <= block) {
+  void parallelFor(std::size_t size, std::size_t block, const Each& each) {
+    if (workers_.empty() || size <= block) {
       if (size > 0) each(std::size_t{0}, size);
       return;
     }
-    const auto call = [](const void* what, std::size_t from, std::size_t to) {
-      (*static_cast<const Each*>(what))(from, to);
+    const auto call = [](const void* function, std::size_t from, std::size_t to) {
+      (*static_cast<const Each*>(function))(from, to);
     };
     runOnAll({call, &each, size, block});
   }
@@ -43,33 +43,33 @@ class Workers {
  private:
   struct Job {
     void (*call)(const void*, std::size_t, std::size_t) = nullptr;
-    const void* what = nullptr;
+    const void* function = nullptr;
     std::size_t size = 0, block = 1;
   };
   void runOnAll(const Job& job);
-  void help(std::size_t helper);
-  void takeShare(std::size_t share);
-  void takeBlocks(std::size_t thread) noexcept;
+  void workerLoop(std::size_t worker);
+  void runRange(std::size_t index);
+  void runBlocks(std::size_t thread) noexcept;
 
-  /// Of the blocks of a job, beside one another; each on a cache line of its own.
-  struct alignas(64) Share {
-    std::atomic<std::size_t> next{0};  ///< the first block that nobody took
+  /// The blocks of a job that a thread takes first. Each range has a cache line of its own.
+  struct alignas(64) BlockRange {
+    std::atomic<std::size_t> next{0};  ///< the first block that is not taken
     std::size_t end = 0;
   };
-  Job job_;                              ///< changes only while nobody is inside, as the shares do
-  std::vector<Share> shares_;            ///< one for each thread
-  std::atomic<std::uint32_t> gate_{0};   ///< kOpen, and how many helpers are inside
-  std::atomic<std::uint32_t> round_{0};  ///< counts jobs; who waits for one waits here
-  std::atomic<bool> ending_{false};
+  Job job_;                             ///< changes only while no worker is inside, like the ranges
+  std::vector<BlockRange> ranges_;      ///< one per thread
+  std::atomic<std::uint32_t> gate_{0};  ///< kOpen, and the number of workers inside
+  std::atomic<std::uint32_t> jobCounter_{0};  ///< counts jobs; workers wait on it
+  std::atomic<bool> stopping_{false};
   std::vector<std::exception_ptr> failures_;
-  std::vector<std::jthread> helpers_;
+  std::vector<std::jthread> workers_;
 };
 
-/// The same by the caller alone where there are no workers.
+/// parallelFor(), or a serial call where `pool` is null.
 template <class Each>
-void shareAmong(Workers* workers, std::size_t size, std::size_t block, const Each& each) {
-  if (workers) {
-    workers->share(size, block, each);
+void parallelForOrSerial(ThreadPool* pool, std::size_t size, std::size_t block, const Each& each) {
+  if (pool) {
+    pool->parallelFor(size, block, each);
   } else if (size > 0) {
     each(std::size_t{0}, size);
   }

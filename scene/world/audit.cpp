@@ -1,91 +1,92 @@
-// The audit of a tick: brute force over the scene's own still boxes and the boxes that avatars and
-// bodies announced. Nothing of what the broad phase keeps is used, but the pairs that it answers
-// with.
+// The audit of a tick: brute force over the scene's static boxes and the motion bounds of avatars
+// and bodies. It uses no data of the broad phase except the pairs that it reports.
 //
-// Where movers * (still + movers) box tests would take too long for one tick, each audit asks about
-// as many movers as the bound allows, but at least one, and the next audit goes on after them in
-// the order of their ids.
+// If proxies * (static boxes + proxies) box tests would take too long for one tick, each audit
+// checks as many proxies as the bound allows, but at least one. The next audit continues with the
+// following proxy ids.
+#include "scene/world/audit.hpp"
+
 #include <algorithm>
 
 #include "collision/broad_phase/broad_phase_audit.hpp"
-#include "scene/world/data/world_data.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-using collision::BoxPair;
-using collision::MoverId;
+using collision::ProxyId;
+using collision::ProxyPair;
 
-struct Named {
+struct EntityBox {
   EntityId id = 0;
-  Box box;
+  Aabb box;
 };
 
-/// Avatars and bodies, with the boxes that they announced.
-std::map<MoverId, Named> moversOf(const WorldState& world) {
-  std::map<MoverId, Named> movers;
-  for (const auto& [name, avatar] : world.avatars) movers[avatar.mover] = {avatar.id, avatar.reach};
-  for (const Body& body : world.bodies) movers[body.mover] = {body.id, body.reach};
-  return movers;
+/// Avatars and bodies with their motion bounds, by proxy.
+std::map<ProxyId, EntityBox> collectDynamicProxies(const WorldData& world) {
+  std::map<ProxyId, EntityBox> proxies;
+  for (const Avatar& avatar : world.avatars)
+    proxies[avatar.proxy] = {avatar.id, avatar.motionBounds};
+  for (const Body& body : world.bodies) proxies[body.proxy] = {body.id, body.motionBounds};
+  return proxies;
 }
 
-/// Movers whose turn it is.
-std::vector<MoverId> nextMovers(WorldState& world, const std::map<MoverId, Named>& movers,
-                                std::size_t mostBoxTests) {
-  std::vector<MoverId> asked;
-  const std::size_t most = mostBoxTests / (world.scene->stillBoxes().size() + movers.size() + 1);
-  auto at = movers.lower_bound(world.audit.next);
-  while (asked.size() < movers.size() && (asked.empty() || asked.size() < most)) {
-    if (at == movers.end()) at = movers.begin();
-    asked.push_back(at->first);
-    ++at;
+/// Proxies to check in this audit; advances the cursor.
+std::vector<ProxyId> selectNextProxies(WorldData& world,
+                                       const std::map<ProxyId, EntityBox>& proxies,
+                                       std::size_t maxBoxTests) {
+  std::vector<ProxyId> selected;
+  const std::size_t maxProxies =
+      maxBoxTests / (world.scene->staticBoxes().size() + proxies.size() + 1);
+  auto next = proxies.lower_bound(world.auditCursor.next);
+  while (selected.size() < proxies.size() && (selected.empty() || selected.size() < maxProxies)) {
+    if (next == proxies.end()) next = proxies.begin();
+    selected.push_back(next->first);
+    ++next;
   }
-  world.audit.next = asked.empty() ? 0 : asked.back() + 1;
-  return asked;
+  world.auditCursor.next = selected.empty() ? 0 : selected.back() + 1;
+  return selected;
 }
 
-Named stillOf(const WorldState& world, collision::StillId still) {
-  if (still >= world.scene->stillBoxes().size()) return {};
-  return {world.scene->solidObjects()[still] + 1, world.scene->stillBoxes()[still]};
+EntityBox findStaticEntity(const WorldData& world, collision::StaticId staticId) {
+  if (staticId >= world.scene->staticBoxes().size()) return {};
+  return {world.scene->solidObjects()[staticId] + 1, world.scene->staticBoxes()[staticId]};
 }
 
-void tell(const WorldState& world, const std::map<MoverId, Named>& movers, AuditFinding::Kind kind,
-          const std::vector<BoxPair>& pairs, TickAudit& audit) {
-  const auto named = [&](MoverId mover) {
-    const auto found = movers.find(mover);
-    return found == movers.end() ? Named{} : found->second;
+void addFindings(const WorldData& world, const std::map<ProxyId, EntityBox>& proxies,
+                 AuditFinding::Kind kind, const std::vector<ProxyPair>& pairs, TickAudit& audit) {
+  const auto findEntity = [&](ProxyId proxy) {
+    const auto found = proxies.find(proxy);
+    return found == proxies.end() ? EntityBox{} : found->second;
   };
-  for (const BoxPair& pair : pairs) {
-    const Named mover = named(pair.mover);
-    const Named other = pair.otherMoves ? named(pair.other) : stillOf(world, pair.other);
-    audit.findings.push_back({kind, mover.id, other.id, mover.box, other.box});
+  for (const ProxyPair& pair : pairs) {
+    const EntityBox entity = findEntity(pair.proxy);
+    const EntityBox other =
+        pair.otherIsDynamic ? findEntity(pair.other) : findStaticEntity(world, pair.other);
+    audit.findings.push_back({kind, entity.id, other.id, entity.box, other.box});
   }
 }
 
 }  // namespace
 
-void auditBroadPhase(World& world, std::uint32_t everyTicks) {
-  world.state().audit = {everyTicks, 0};
+bool isAuditDue(const WorldData& world) {
+  return world.auditCursor.everyTicks != 0 && world.tick % world.auditCursor.everyTicks == 0;
 }
 
-bool auditIsDue(const WorldState& world) {
-  return world.audit.everyTicks != 0 && world.tick % world.audit.everyTicks == 0;
-}
-
-TickAudit auditTick(WorldState& world, std::size_t mostBoxTests) {
-  const std::map<MoverId, Named> movers = moversOf(world);
-  std::vector<std::pair<MoverId, Box>> boxes;
-  for (const auto& [mover, named] : movers) boxes.emplace_back(mover, named.box);
-  const std::vector<MoverId> asked = nextMovers(world, movers, mostBoxTests);
-  const collision::BroadPhaseAudit compared =
-      collision::compareWithBruteForce(world.broadPhase, world.scene->stillBoxes(), boxes, asked);
+TickAudit auditTick(WorldData& world, std::size_t maxBoxTests) {
+  const std::map<ProxyId, EntityBox> proxies = collectDynamicProxies(world);
+  std::vector<std::pair<ProxyId, Aabb>> boxes;
+  for (const auto& [proxy, entity] : proxies) boxes.emplace_back(proxy, entity.box);
+  const std::vector<ProxyId> selected = selectNextProxies(world, proxies, maxBoxTests);
+  const collision::BroadPhaseAudit compared = collision::compareWithBruteForce(
+      world.broadPhase, world.scene->staticBoxes(), boxes, selected);
   TickAudit audit;
-  audit.movers = static_cast<std::uint32_t>(asked.size());
+  audit.proxies = static_cast<std::uint32_t>(selected.size());
   audit.pairs = compared.pairs;
-  tell(world, movers, AuditFinding::Kind::missed, compared.missed, audit);
-  tell(world, movers, AuditFinding::Kind::extra, compared.extra, audit);
-  std::stable_sort(audit.findings.begin(), audit.findings.end(),
-                   [](const AuditFinding& x, const AuditFinding& y) { return x.mover < y.mover; });
+  addFindings(world, proxies, AuditFinding::Kind::missed, compared.missed, audit);
+  addFindings(world, proxies, AuditFinding::Kind::extra, compared.extra, audit);
+  std::stable_sort(
+      audit.findings.begin(), audit.findings.end(),
+      [](const AuditFinding& x, const AuditFinding& y) { return x.entity < y.entity; });
   return audit;
 }
 

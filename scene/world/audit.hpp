@@ -1,35 +1,25 @@
-// Whether the broad phase of a live world is right: the pairs that it holds in a tick beside brute
-// force over the same boxes. Reads the world only: the same commands give the same bits with it.
+// Audit of a live world's broad phase: compares its pairs in a tick with brute force over the same
+// boxes. Only reads the world; results are bit-identical with and without it.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <vector>
 
-#include "scene/world/data/snapshot.hpp"
+#include "scene/world/data/tick_report.hpp"
+#include "scene/world/data/world_data.hpp"
 
 namespace enfilade::scene {
 
-/// How many ticks may lie between two audits.
-inline constexpr std::uint32_t kSparsestAudit = 1'000'000;
+/// Maximum interval between two audits, ticks.
+inline constexpr std::uint32_t kMaxAuditInterval = 1'000'000;
 
-/// A pair that the broad phase should hold and does not, or the other way round.
-struct AuditFinding {
-  enum class Kind : std::uint8_t {
-    missed,  ///< the boxes overlap, and the broad phase does not know: a contact may be lost
-    extra    ///< they do not: work for nothing
-  };
-  Kind kind = Kind::missed;
-  EntityId mover = 0;  ///< an avatar
-  EntityId other = 0;  ///< a still object or an avatar; 0 when there is none (any more)
-  Box moverBox;        ///< what the avatar can reach in the tick; scene frame, metres
-  Box otherBox;        ///< empty when `other` is 0
-};
+/// Maximum box tests of one audit, unless one proxy needs more. About 2 ms: a brute-force test
+/// takes 5 ns, because its branches are unpredictable.
+inline constexpr std::size_t kMaxAuditBoxTests = 400'000;
 
-struct TickAudit {
-  std::uint32_t movers = 0;            ///< avatars whose pairs were compared
-  std::uint64_t pairs = 0;             ///< that brute force found for them
-  std::vector<AuditFinding> findings;  ///< in order of the avatars; none: the tick was right
-  double seconds = 0;                  ///< that it took; in no stage of the tick
-};
+bool isAuditDue(const WorldData& world);  ///< in this tick
+
+/// Call right after the update of the broad phase, before any proxy moves or is removed.
+TickAudit auditTick(WorldData& world, std::size_t maxBoxTests = kMaxAuditBoxTests);
 
 }  // namespace enfilade::scene

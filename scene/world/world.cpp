@@ -1,122 +1,141 @@
 #include "scene/world/world.hpp"
 
 #include "scene/model/hasher.hpp"
+#include "scene/world/avatars/orders.hpp"
+#include "scene/world/bodies/body_state.hpp"
+#include "scene/world/bodies/dynamic_bodies.hpp"
+#include "scene/world/bodies/kinematic_drive.hpp"
+#include "scene/world/contacts/body_contacts.hpp"
+#include "scene/world/contacts/contacts.hpp"
+#include "scene/world/contacts/triggers.hpp"
+#include "scene/world/data/validation.hpp"
 #include "scene/world/data/world_data.hpp"
+#include "scene/world/tick.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-std::uint64_t seedHash(const Scene& scene, const Lengths& l) {
+std::uint64_t computeSeedHash(const Scene& scene, const WorldSettings& settings) {
   Hasher hash(scene.hash());
-  for (const double length :
-       {l.epsilon, l.stepHeight, l.nearMiss, l.walkableNormalY, l.gravity, l.speedLimit, l.tick,
-        l.patience, l.jumpLimit, l.jointSpeedLimit, l.pushForce})
-    hash.add(length);
-  hash.add(static_cast<std::uint64_t>(l.sliding));
+  for (const double value : {settings.contactOffset, settings.stepHeight, settings.nearMissDistance,
+                             settings.walkableNormalY, settings.gravity, settings.maxSpeed,
+                             settings.tickDuration, settings.stuckTimeout, settings.maxJumpHeight,
+                             settings.maxJointSpeed, settings.maxPushForce})
+    hash.add(value);
+  hash.add(static_cast<std::uint64_t>(settings.sliding));
   return hash.value();
 }
 
-void makeBodies(WorldState& world) {
+void makeBodies(WorldData& world) {
   const std::vector<BodySpec>& specs = world.scene->model().bodies;
   world.bodies.resize(specs.size());
   for (std::uint32_t i = 0; i < specs.size(); ++i) {
     Body& body = world.bodies[i];
     body.spec = &specs[i];
     body.id = specs[i].objects[0] + 1;
-    body.shape = world.scene->shapeOfBody(i);
+    body.shape = world.scene->bodyShape(i);
     if (isKinematic(body.spec->kind)) {
       body.asleep = false;
-      startDrive(body);
-      world.kinematics.push_back(i);
+      initKinematicDrive(body);
+      world.kinematicBodies.push_back(i);
     } else {
-      if (body.spec->kind == BodyKind::trigger) world.triggers.push_back(i);
-      placeBody(body, body.shape->origin, collision::Quat::Identity());
+      if (isTrigger(body.spec->kind)) world.triggers.push_back(i);
+      setBodyPose(body, body.shape->origin, collision::Quat::Identity());
     }
-    body.reach = boxOf(body);
-    body.mover = world.broadPhase.insert(body.reach);
-    world.bodyOfMover[body.mover] = i;
-    world.bodyOfId[body.id] = i;
+    body.motionBounds = computeAabb(body);
+    body.proxy = world.broadPhase.insert(body.motionBounds);
+    if (body.proxy >= world.bodyIndexByProxy.size())
+      world.bodyIndexByProxy.resize(body.proxy + 1, kNoBody);
+    world.bodyIndexByProxy[body.proxy] = i;
+    world.bodyIndexById[body.id] = i;
   }
+}
+
+std::unique_ptr<WorldData> makeWorldData(std::shared_ptr<const Scene> scene,
+                                         const WorldSettings& settings) {
+  auto world = std::make_unique<WorldData>(std::move(scene), settings);
+  world->hash = computeSeedHash(*world->scene, settings);
+  makeBodies(*world);
+  initDynamicBodies(*world);
+  auto first = std::make_shared<Snapshot>();
+  first->stateHash = world->hash;
+  first->bodies = makeBodySnapshots(*world);
+  world->snapshot = std::move(first);
+  return world;
 }
 
 }  // namespace
 
-WorldState::WorldState(std::shared_ptr<const Scene> still, const Lengths& l)
-    : scene(std::move(still)),
-      lengths(l),
-      hash(seedHash(*scene, l)),
-      broadPhase(scene->stillBoxes()) {
-  makeBodies(*this);
-  startRigids(*this);
-  auto first = std::make_shared<Snapshot>();
-  first->stateHash = hash;
-  first->bodies = viewsOfBodies(*this);
-  snapshot = std::move(first);
-}
-
-World::World(std::shared_ptr<const Scene> scene, const Lengths& lengths)
-    : state_(std::make_unique<WorldState>(std::move(scene), lengths)) {}
+World::World(std::shared_ptr<const Scene> scene, const WorldSettings& settings)
+    : data_(makeWorldData(std::move(scene), settings)) {}
 World::~World() = default;
 World::World(World&&) noexcept = default;
 World& World::operator=(World&&) noexcept = default;
 
 const Scene& World::scene() const {
-  return *state_->scene;
+  return *data_->scene;
 }
-const Lengths& World::lengths() const {
-  return state_->lengths;
+const WorldSettings& World::settings() const {
+  return data_->settings;
 }
 std::shared_ptr<const Snapshot> World::snapshot() const {
-  return state_->snapshot;
+  return data_->snapshot;
 }
 
-std::optional<std::string> refusal(const World& world, const Command& command) {
-  return refusalOf(command, world.lengths());
+std::optional<std::string> validateAvatarCommand(const World& world, const Command& command) {
+  return validateCommandFields(command, world.settings());
 }
 
-std::optional<std::string> submit(World& world, Command command) {
-  if (auto why = refusal(world, command)) return why;
-  WorldState& state = world.state();
-  if (state.waiting + sizeOf(command.order) > kMostWaiting)
-    return std::to_string(kMostWaiting) +
-           " orders and way points wait already; send more when some have ended";
-  state.waiting += sizeOf(command.order);
-  state.incoming.push_back(std::move(command));
+std::optional<std::string> submitAvatarCommand(World& world, Command command) {
+  if (auto error = validateAvatarCommand(world, command)) return error;
+  WorldData& data = world.data();
+  if (data.queuedOrderCount + computeOrderCost(command.order) > kMaxQueuedOrders)
+    return std::to_string(kMaxQueuedOrders) +
+           " orders and way points are already queued; send more when some have ended";
+  data.queuedOrderCount += computeOrderCost(command.order);
+  data.pendingCommands.push_back(std::move(command));
   return std::nullopt;
 }
 
-std::optional<std::string> refusal(const World& world, const BodyCommand& command) {
-  for (const Body& body : world.state().bodies)
-    if (body.spec->name == command.body) return refusalOf(body, command, world.lengths());
-  return "body: there is none of the name '" + command.body + "'";
+std::optional<std::string> validateBodyCommand(const World& world, const BodyCommand& command) {
+  for (const Body& body : world.data().bodies)
+    if (body.spec->name == command.body)
+      return validateBodyCommandFields(body, command, world.settings());
+  return "body: no body named '" + command.body + "'";
 }
 
-std::optional<std::string> submit(World& world, BodyCommand command) {
-  if (auto why = refusal(world, command)) return why;
-  world.state().incomingForBodies.push_back(std::move(command));
+std::optional<std::string> submitBodyCommand(World& world, BodyCommand command) {
+  if (auto error = validateBodyCommand(world, command)) return error;
+  world.data().pendingBodyCommands.push_back(std::move(command));
   return std::nullopt;
 }
 
-std::vector<ContactEvent> endContacts(World& world, ContactEvent::Reason reason) {
+TickReport tickWorld(World& world) {
+  return runTick(world.data());
+}
+
+void setSolverThreadCount(World& world, int threads) {
+  world.data().dynamicBodies.maxThreads = threads;
+}
+
+void setAuditInterval(World& world, std::uint32_t everyTicks) {
+  world.data().auditCursor = {everyTicks, 0};
+}
+
+std::vector<ContactEvent> endAllContacts(World& world, ContactEvent::Reason reason) {
   std::vector<ContactEvent> events;
-  for (auto& [name, avatar] : world.state().avatars)
-    endContactsOf(world.state(), avatar, reason, events);
-  endBodyContacts(world.state(), reason, events);
-  for (const Body& trigger : world.state().bodies) {
-    const std::vector<EntityId> inside = trigger.inside;  // grows shorter on the way
-    for (const EntityId who : inside) leaveTriggers(world.state(), who, reason, events);
+  for (Avatar& avatar : world.data().avatars)
+    endAvatarContacts(world.data(), avatar, reason, events);
+  endBodyContacts(world.data(), reason, events);
+  for (const Body& trigger : world.data().bodies) {
+    const std::vector<EntityId> inside = trigger.occupants;  // copy: the loop removes from it
+    for (const EntityId entity : inside) removeFromTriggers(world.data(), entity, reason, events);
   }
   return events;
 }
 
-std::string nameOf(const World& world, EntityId id) {
-  const WorldState& state = world.state();
-  const EntityId first = state.firstAvatarId();
-  if (id == 0) return "";
-  if (const auto body = state.bodyOfId.find(id); body != state.bodyOfId.end())
-    return state.bodies[body->second].spec->name;
-  if (id < first) return state.scene->model().objects[id - 1].path;
-  return id - first < state.avatarNames.size() ? state.avatarNames[id - first] : "";
+std::string findEntityName(const World& world, EntityId id) {
+  return world.data().findEntityName(id);
 }
 
 }  // namespace enfilade::scene

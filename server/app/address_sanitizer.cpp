@@ -1,7 +1,7 @@
-// Only in builds with AddressSanitizer. Where Mesa's libraries keep their thread-local storage, its
-// interceptor of __tls_get_addr takes any block that starts 16 bytes into a page for one by
-// glibc 2.19 and reads a bound out of what lies before it, which kills the search for leaks at the
-// program's end. Such blocks come from malloc today: leaks are found without it.
+// Options for builds with AddressSanitizer. Its interceptor of __tls_get_addr assumes the layout of
+// glibc 2.19 for any TLS block that starts 16 bytes into a page. Mesa's libraries have such blocks,
+// and the leak check at exit then crashes. These blocks come from malloc today, so that leaks are
+// found without the interceptor.
 
 extern "C" const char* __asan_default_options();
 

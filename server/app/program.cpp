@@ -7,20 +7,11 @@
 #include <cstdio>
 
 #include "server/app/command_line.hpp"
-#include "server/capture/capture.hpp"
-#include "server/commands/doctor.hpp"
-#include "server/commands/export.hpp"
-#include "server/commands/inspect.hpp"
-#include "server/commands/serve.hpp"
-#include "server/commands/verify.hpp"
-#include "server/diff/diff.hpp"
-#include "server/diff/resimulate.hpp"
-#include "server/runs/script_run.hpp"
 
 namespace enfilade::server {
 namespace {
 
-struct Do {
+struct CommandRunner {
   ExitCode operator()(const DoctorCommand& command) const { return doctor(command); }
   ExitCode operator()(const ServeCommand& command) const { return serve(command); }
   ExitCode operator()(const ReplayCommand& command) const { return replay(command); }
@@ -28,7 +19,7 @@ struct Do {
   ExitCode operator()(const CaptureCommand& command) const { return capture(command); }
   ExitCode operator()(const WalkCommand& command) const { return walk(command); }
   ExitCode operator()(const DiffCommand& command) const { return diff(command); }
-  ExitCode operator()(const RewalkCommand& command) const { return rewalk(command); }
+  ExitCode operator()(const ResimulateCommand& command) const { return resimulate(command); }
   ExitCode operator()(const ExportCommand& command) const { return exportRecording(command); }
   ExitCode operator()(const InspectCommand& command) const { return inspect(command); }
 };
@@ -44,11 +35,11 @@ void logToStderr() {
 
 ExitCode runProgram(int argc, const char* const* argv) {
   logToStderr();
-  std::signal(SIGXFSZ, SIG_IGN);  // a write beyond `ulimit -f` fails instead, and is told
+  std::signal(SIGXFSZ, SIG_IGN);  // a write beyond `ulimit -f` then fails with an error
   const auto command = readCommandLine(argc, argv);
   if (const auto* code = std::get_if<ExitCode>(&command)) return *code;
   try {
-    return std::visit(Do{}, std::get<ProgramCommand>(command));
+    return std::visit(CommandRunner{}, std::get<ProgramCommand>(command));
   } catch (const std::exception& error) {
     std::fprintf(stderr, "enfilade: %s\n", error.what());
     return ExitCode::runtimeError;

@@ -1,11 +1,11 @@
-// The program, without its main: so that it can be tried by tests.
+// The program without its main(), so that tests can call it.
 #pragma once
 
 #include "server/base/exit_code.hpp"
 
 namespace enfilade::server {
 
-/// Reads the command line and does what it says. Errors are told on stderr.
+/// Parses the command line and runs the command. Errors go to stderr.
 ExitCode runProgram(int argc, const char* const* argv);
 
 }  // namespace enfilade::server

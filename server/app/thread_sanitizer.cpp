@@ -1,5 +1,5 @@
-// Only in builds with ThreadSanitizer. Mesa's software rasteriser is not instrumented, so that its
-// own threads look like races to the sanitizer; ours are still watched.
+// Suppressions for builds with ThreadSanitizer. Mesa's software rasteriser is not instrumented, so
+// its threads produce false reports. Our threads stay checked.
 
 extern "C" const char* __tsan_default_suppressions();
 

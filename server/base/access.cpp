@@ -8,10 +8,10 @@
 namespace enfilade::server {
 namespace {
 
-constexpr std::size_t kShortestToken = 16;  // characters; what is shorter can be guessed
+constexpr std::size_t kMinTokenLength = 16;  // characters; shorter tokens are easy to guess
 
-/// Its time depends on the length of `given` alone.
-bool equal(std::string_view given, std::string_view secret) {
+/// Constant-time comparison: the duration depends only on the length of `given`.
+bool equalConstantTime(std::string_view given, std::string_view secret) {
   unsigned differ = given.size() == secret.size() ? 0 : 1;
   for (std::size_t i = 0; i < given.size(); ++i) {
     const auto a = static_cast<unsigned char>(given[i]);
@@ -21,19 +21,19 @@ bool equal(std::string_view given, std::string_view secret) {
   return differ == 0;
 }
 
-std::optional<Role> roleNamed(const std::string& name) {
+std::optional<Role> roleFromString(const std::string& name) {
   for (const Role role : {Role::observe, Role::drive, Role::admin})
-    if (name == nameOf(role)) return role;
+    if (name == toString(role)) return role;
   return std::nullopt;
 }
 
-/// The name of "name:port" or "[::1]:port".
-std::string_view withoutPort(std::string_view host) {
+/// Removes the port from "name:port" or "[::1]:port".
+std::string_view stripPort(std::string_view host) {
   if (host.starts_with('[')) return host.substr(0, host.find(']') + 1);
   return host.substr(0, host.find(':'));
 }
 
-bool isAddress(std::string_view host) {
+bool isIpLiteral(std::string_view host) {
   if (host.starts_with('[') && host.ends_with(']')) return true;
   return !host.empty() && host.find_first_not_of("0123456789.") == std::string_view::npos;
 }
@@ -44,16 +44,16 @@ bool contains(const std::vector<std::string>& names, std::string_view name) {
 
 }  // namespace
 
-const char* nameOf(Role role) {
+const char* toString(Role role) {
   constexpr const char* names[] = {"observe", "drive", "admin"};
   return names[static_cast<int>(role)];
 }
 
-std::optional<Role> roleOf(const Access& access, std::string_view token) {
+std::optional<Role> findRole(const Access& access, std::string_view token) {
   if (access.tokens.empty()) return Role::admin;
   std::optional<Role> role;
-  for (const Access::Token& one : access.tokens)  // all of them, whichever it is
-    if (equal(token, one.secret)) role = one.role;
+  for (const Access::Token& one : access.tokens)  // no early exit: constant time
+    if (equalConstantTime(token, one.secret)) role = one.role;
   return role;
 }
 
@@ -67,23 +67,23 @@ std::vector<Access::Token> readTokens(const std::filesystem::path& file) {
     std::string role, secret, more;
     if (!(words >> role) || role.starts_with('#')) continue;
     words >> secret;
-    const auto known = roleNamed(role);
-    if (!known || secret.size() < kShortestToken || words >> more) {
+    const auto known = roleFromString(role);
+    if (!known || secret.size() < kMinTokenLength || words >> more) {
       throw std::runtime_error(file.string() + ":" + std::to_string(number) +
                                ": give observe, drive or admin and a token of at least " +
-                               std::to_string(kShortestToken) + " characters without blanks");
+                               std::to_string(kMinTokenLength) + " characters without blanks");
     }
     tokens.push_back({*known, secret});
   }
-  if (tokens.empty()) throw std::runtime_error(file.string() + ": there is no token in it");
+  if (tokens.empty()) throw std::runtime_error(file.string() + ": the file contains no token");
   return tokens;
 }
 
-std::optional<std::string> foreignPage(const Access& access, std::string_view host,
-                                       std::string_view origin) {
-  const std::string_view name = withoutPort(host);
-  if (name != "localhost" && !isAddress(name) && !contains(access.hosts, name))
-    return "this server is not called '" + std::string(name) + "': see --allow-host";
+std::optional<std::string> validateOrigin(const Access& access, std::string_view host,
+                                          std::string_view origin) {
+  const std::string_view name = stripPort(host);
+  if (name != "localhost" && !isIpLiteral(name) && !contains(access.hosts, name))
+    return "the host name '" + std::string(name) + "' is not allowed: see --allow-host";
   if (origin.empty() || contains(access.origins, origin)) return std::nullopt;
   const std::size_t start = origin.find("://");
   if (start != std::string_view::npos && origin.substr(start + 3) == host) return std::nullopt;

@@ -1,4 +1,4 @@
-// Who may do what: tokens with roles, and which web pages may connect.
+// Access control: tokens with roles, and the web pages that may connect.
 #pragma once
 
 #include <filesystem>
@@ -9,38 +9,39 @@
 
 namespace enfilade::server {
 
-/// Each may do what those before it may.
+/// Each role includes the permissions of the roles before it.
 enum class Role : std::uint8_t {
-  observe,  ///< look on: subscribe, pictures, rays, names, metrics
-  drive,    ///< own avatars, command bodies, drive the clock
-  admin     ///< begin the world anew
+  observe,  ///< read only: subscriptions, frames, rays, names, metrics
+  drive,    ///< owns avatars, commands bodies, drives the clock
+  admin     ///< resets, creates and drops worlds
 };
 
-const char* nameOf(Role role);
+const char* toString(Role role);
 
 struct Access {
   struct Token {
     Role role = Role::observe;
     std::string secret;
   };
-  std::vector<Token> tokens;  ///< none: everyone is admin
-  /// Names that browsers may call this server by, beside localhost and addresses in numbers: a page
-  /// of a stranger may have its own name resolved to this machine (DNS rebinding).
+  std::vector<Token> tokens;  ///< empty: every client is admin
+  /// Host names that browsers may use for this server, in addition to localhost and IP addresses.
+  /// The list prevents DNS rebinding: a foreign page may resolve its own name to this machine.
   std::vector<std::string> hosts;
-  std::vector<std::string> origins;  ///< pages of other origins that may connect: "https://a.org"
-  bool insecure = false;  ///< addresses that others can reach may be listened on, without TLS
+  std::vector<std::string> origins;  ///< other origins whose pages may connect: "https://a.org"
+  bool insecure = false;             ///< allows listening on non-loopback addresses without TLS
 };
 
-/// What the bearer of `token` may do; nullopt: it is none of ours. Takes as long for a wrong token
-/// as for a right one of its length.
-std::optional<Role> roleOf(const Access& access, std::string_view token);
+/// The role of the bearer of `token`; nullopt: unknown token. A wrong token takes as long as a
+/// valid one of the same length.
+std::optional<Role> findRole(const Access& access, std::string_view token);
 
-/// Lines "ROLE TOKEN"; empty ones and those that begin with # are left out. Throws
-/// std::runtime_error, naming the file and the line but not the token.
+/// Reads lines "ROLE TOKEN"; skips empty lines and lines that start with #. Throws
+/// std::runtime_error, which names the file and the line but not the token.
 std::vector<Access::Token> readTokens(const std::filesystem::path& file);
 
-/// Why a browser's request is refused by its Host and Origin (empty: it has none); nullopt: it may.
-std::optional<std::string> foreignPage(const Access& access, std::string_view host,
-                                       std::string_view origin);
+/// Checks the Host and Origin headers of a browser's request (`origin` empty: no header). Returns
+/// the reason of a refusal; nullopt: allowed.
+std::optional<std::string> validateOrigin(const Access& access, std::string_view host,
+                                          std::string_view origin);
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// What the audits of a world found, for its log and for whoever ends with it.
+// Totals and log output of the broad-phase audits of a world.
 #pragma once
 
 #include <cstdint>
@@ -8,26 +8,26 @@
 
 namespace enfilade::server {
 
-/// Of all audited ticks.
+/// Totals over all audited ticks.
 struct AuditTotals {
   std::uint64_t ticks = 0;
-  std::uint64_t pairs = 0;   ///< that brute force found
-  std::uint64_t missed = 0;  ///< of those, unknown to the broad phase
-  std::uint64_t extra = 0;   ///< held by the broad phase, but not found
+  std::uint64_t pairs = 0;   ///< found by brute force
+  std::uint64_t missed = 0;  ///< of `pairs`, missing in the broad phase
+  std::uint64_t extra = 0;   ///< in the broad phase, but not found by brute force
 
-  void add(const scene::TickAudit& audit);
-  void add(const AuditTotals& others);
-  bool right() const { return missed == 0 && extra == 0; }
+  void addTick(const scene::TickAudit& audit);
+  void addTotals(const AuditTotals& others);
+  bool isClean() const { return missed == 0 && extra == 0; }
 };
 
-/// One finding for a person: the tick, both objects by name, and both boxes.
-std::string textOf(const scene::World& world, std::uint64_t tick,
-                   const scene::AuditFinding& finding);
+/// A finding as readable text: the tick, both entities by name, and both AABBs.
+std::string formatFinding(const scene::World& world, std::uint64_t tick,
+                          const scene::AuditFinding& finding);
 
-/// Logs what the audit of the last tick found as errors, the first few one by one.
+/// Logs the findings of the last tick's audit as errors: the first few individually.
 void logFindings(const scene::World& world, const scene::TickReport& report);
 
-/// Logs what was found in all: as an error unless all was right.
+/// Logs the totals: as an error if a pair was missed or extra.
 void logTotals(const AuditTotals& totals);
 
 }  // namespace enfilade::server

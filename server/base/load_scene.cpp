@@ -11,13 +11,13 @@
 namespace enfilade::server {
 namespace {
 
-void tell(const scene::Scene& scene, const std::string& name, const LoadedScene& loaded) {
+void logLoadedScene(const scene::Scene& scene, const std::string& name, const LoadedScene& loaded) {
   const scene::Model& model = scene.model();
   const scene::Vec3 size =
       scene.bounds().empty() ? scene::Vec3::Zero().eval() : scene.bounds().size();
   spdlog::info(
       "{}: {} objects, {:.1f} x {:.1f} x {:.1f} m, unit {} m, up {}, read by {}, {} in {:.2f} s",
-      name, model.objects.size(), size.x(), size.y(), size.z(), model.metresPerUnit, model.up,
+      name, model.objects.size(), size.x(), size.y(), size.z(), model.metresPerUnit, model.upAxis,
       model.reader, loaded.fromCache ? "from the cache" : "imported", loaded.loadSeconds);
 }
 
@@ -32,25 +32,25 @@ LoadedScene loadSceneTimed(const ModelOptions& options) {
   import.ifcReader = options.ifcReader;
   Progress bar;
   scene::LoadedModel model = scene::loadModel(
-      options.file, import, options.cache ? scene::modelCacheOfEnvironment() : std::nullopt,
+      options.file, import, options.cache ? scene::modelCacheFromEnvironment() : std::nullopt,
       [&](const std::string& stage, double fraction) { bar.show(fraction, stage); });
   bar.clear();
   for (const std::string& note : model.notes) spdlog::warn("cache: {}", note);
-  scene::findBodies(model.model, options.file, options.doors);
+  scene::collectBodies(model.model, options.file, options.doors);
   if (!model.model.bodies.empty())
     spdlog::info("{}: {} bodies: {}", options.file.filename().string(), model.model.bodies.size(),
-                 scene::sourcesOf(model.model));
+                 scene::formatBodySources(model.model));
   LoadedScene loaded{nullptr, model.fromCache, model.importSeconds, 0};
   loaded.scene = std::make_shared<const scene::Scene>(std::move(model.model));
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-  loaded.loadSeconds = took.count();
-  tell(*loaded.scene, options.file.filename().string(), loaded);
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  loaded.loadSeconds = elapsed.count();
+  logLoadedScene(*loaded.scene, options.file.filename().string(), loaded);
   return loaded;
 }
 
 std::shared_ptr<const scene::Scene> loadScene(const ModelOptions& options) {
   std::shared_ptr<const scene::Scene> scene = loadSceneTimed(options).scene;
-  for (const scene::Problem& problem : scene->model().problems)
+  for (const scene::Diagnostic& problem : scene->model().diagnostics)
     spdlog::info("{}: {} x {}, as {}", options.file.filename().string(), problem.count,
                  problem.kind, problem.example);
   return scene;

@@ -1,23 +1,38 @@
-// A model file as a scene, with its progress told.
+// Loads a model file as a scene and shows the progress.
 #pragma once
 
+#include <filesystem>
 #include <memory>
+#include <optional>
 
+#include "scene/import/bodies/collect_bodies.hpp"
+#include "scene/import/import_model.hpp"
 #include "scene/world/data/scene.hpp"
-#include "server/app/command_line.hpp"
 
 namespace enfilade::server {
+
+/// Import options that override the model file; nullopt: the file's value.
+struct ModelOptions {
+  std::filesystem::path file;
+  std::optional<double> metresPerUnit;
+  std::optional<char> up;  ///< 'x', 'y' or 'z'
+  /// Metres, Y up, subtracted from the file's coordinates; nullopt: chosen by the importer.
+  std::optional<scene::Vec3> offset;
+  bool cache = true;  ///< use a cached import
+  scene::IfcReader ifcReader = scene::IfcReader::automatic;
+  scene::IfcDoors doors = scene::IfcDoors::movable;
+};
 
 struct LoadedScene {
   std::shared_ptr<const scene::Scene> scene;
   bool fromCache = false;
-  double importSeconds = 0;  ///< that the import took, now or when the cache's entry was made
-  double loadSeconds = 0;    ///< from the file to the scene, now
+  double importSeconds = 0;  ///< duration of the import, now or when the cache entry was written
+  double loadSeconds = 0;    ///< duration of this load, from file to scene
 };
 
 /// Throws scene::ImportError.
 LoadedScene loadSceneTimed(const ModelOptions& options);
-/// The same, and logs the problems that the import met.
+/// Like loadSceneTimed(), and logs the diagnostics of the import.
 std::shared_ptr<const scene::Scene> loadScene(const ModelOptions& options);
 
 }  // namespace enfilade::server

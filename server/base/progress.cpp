@@ -26,16 +26,16 @@ Progress::~Progress() {
 void Progress::show(double fraction, const std::string& text) {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_) return;
-  const double part = std::clamp(fraction, 0.0, 1.0);
-  const int percent = static_cast<int>(100 * part);
+  const double clampedFraction = std::clamp(fraction, 0.0, 1.0);
+  const int percent = static_cast<int>(100 * clampedFraction);
   if (!terminal_) {
     next_ = now + kLinePeriod;
     std::fprintf(stderr, "%3d %%  %s\n", percent, text.c_str());
     return;
   }
   next_ = now + kBarPeriod;
-  const auto full = static_cast<std::size_t>(kBarWidth * part);
-  const std::string bar = std::string(full, '#') + std::string(kBarWidth - full, '-');
+  const auto filled = static_cast<std::size_t>(kBarWidth * clampedFraction);
+  const std::string bar = std::string(filled, '#') + std::string(kBarWidth - filled, '-');
   std::fprintf(stderr, "\r\033[K[%s] %3d %%  %s", bar.c_str(), percent, text.c_str());
   std::fflush(stderr);
   shown_ = true;

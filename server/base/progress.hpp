@@ -1,4 +1,4 @@
-// Tells on stderr how far a run is: a bar on a terminal, a line now and then elsewhere.
+// Progress display on stderr: a bar on a terminal, otherwise a line every few seconds.
 #pragma once
 
 #include <chrono>
@@ -9,13 +9,13 @@ namespace enfilade::server {
 class Progress {
  public:
   Progress();
-  ~Progress();  ///< leaves the line clean
+  ~Progress();  ///< clears the bar
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `fraction` is 0..1. Cheap: it writes only when the last writing was a while ago.
+  /// `fraction` is 0..1. Cheap: output is limited to one update per period.
   void show(double fraction, const std::string& text);
-  /// Takes the bar away, so that something else can be written.
+  /// Removes the bar, so that other output can be written.
   void clear();
 
  private:

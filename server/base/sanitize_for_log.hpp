@@ -1,14 +1,14 @@
-// What a client wrote, as it may stand in logs and in errors.
+// Makes text from clients safe for logs and error messages.
 #pragma once
 
 #include <string>
 
 namespace enfilade::server {
 
-/// At most `longest` bytes of it, with '?' for all that is not ASCII to print: a cut through a
-/// character would make the message that quotes it unreadable.
-inline std::string printable(std::string text, std::size_t longest) {
-  if (text.size() > longest) text.resize(longest);
+/// Returns at most `maxBytes` bytes, with '?' for each byte that is not printable ASCII. A cut
+/// inside a UTF-8 character would otherwise make the quoting message unreadable.
+inline std::string sanitizeForLog(std::string text, std::size_t maxBytes) {
+  if (text.size() > maxBytes) text.resize(maxBytes);
   for (char& c : text) {
     if (c < ' ' || c > '~') c = '?';
   }

@@ -1,4 +1,4 @@
-// What one server takes from its clients, and how long it waits for them.
+// Limits and timeouts that one server applies to its clients.
 #pragma once
 
 #include <chrono>
@@ -8,30 +8,30 @@
 namespace enfilade::server {
 
 struct ServerLimits {
-  std::uint32_t worlds = 64;                 ///< in the server, "main" among them
-  std::uint32_t avatars = 1000;              ///< in a world
-  std::uint32_t pictureSide = 4096;          ///< pixels; render::refusal() allows no more
-  std::uint32_t ticksPerStep = 36'000;       ///< ten minutes at the default tick
-  std::uint32_t waypoints = 10'000;          ///< of one walk
-  std::uint32_t rays = 10'000;               ///< of one RayQuery
-  std::uint32_t scanRays = 1'000'000;        ///< of one RangeScan
-  std::uint32_t pairs = 1000;                ///< of one DistanceQuery
-  std::uint32_t describedIds = 65'536;       ///< of one DescribeEntities
-  std::size_t replyBytes = 8u << 20;         ///< of EntityNames; protocol::kClientTakes is twice it
-  std::size_t connections = 256;             ///< at one time
-  std::uint32_t requestsUnderWay = 1024;     ///< of one client, before it is not read
-  std::size_t waitingBytes = 4u << 20;       ///< of those
-  std::uint32_t requestsPerSecond = 50'000;  ///< of one client, read over a while
-  std::size_t outgoingBytes = 64u << 20;     ///< of unsent replies and events of one client
-  std::size_t outgoingFrames = 4;            ///< unsent pictures of one client
-  std::size_t outgoingFrameBytes = 512u << 20;  ///< of those, when there are several
-  std::uint32_t watches = 16;                   ///< subscriptions to pictures of one client
-  int sendBuffer = 0;                           ///< bytes in the system's hands; 0: as it likes
-  std::chrono::milliseconds greeting{5'000};    ///< from the connection to the whole Hello
-  /// From the making of a world that is dropped when it is empty to its first client.
-  std::chrono::milliseconds entry{60'000};
-  std::chrono::milliseconds message{10'000};  ///< from a message's first byte to its last
-  std::chrono::milliseconds farewell{2'000};  ///< for the last words to be taken
+  std::uint32_t worlds = 64;                    ///< per server, "main" included
+  std::uint32_t avatars = 1000;                 ///< per world
+  std::uint32_t imageSide = 4096;               ///< pixels; also the limit of the renderer
+  std::uint32_t ticksPerStep = 36'000;          ///< ten minutes at the default tick
+  std::uint32_t waypoints = 10'000;             ///< per walk
+  std::uint32_t rays = 10'000;                  ///< per RayQuery
+  std::uint32_t scanRays = 1'000'000;           ///< per RangeScan
+  std::uint32_t pairs = 1000;                   ///< per DistanceQuery
+  std::uint32_t describedIds = 65'536;          ///< per DescribeEntities
+  std::size_t replyBytes = 8u << 20;            ///< of EntityNames; half of protocol::kClientLimits
+  std::size_t connections = 256;                ///< open at the same time
+  std::uint32_t pendingRequests = 1024;         ///< per client; above, its socket is not read
+  std::size_t pendingRequestBytes = 4u << 20;   ///< of these requests
+  std::uint32_t requestsPerSecond = 50'000;     ///< per client, averaged
+  std::size_t outgoingBytes = 64u << 20;        ///< of unsent replies and events per client
+  std::size_t outgoingFrames = 4;               ///< unsent frames per client
+  std::size_t outgoingFrameBytes = 512u << 20;  ///< of several unsent frames
+  std::uint32_t frameSubscriptions = 16;        ///< frame subscriptions per client
+  int sendBuffer = 0;                           ///< bytes of the socket; 0: system default
+  std::chrono::milliseconds helloTimeout{5'000};  ///< from connect to complete Hello
+  /// From the creation of a world with drop_when_empty to its first client.
+  std::chrono::milliseconds emptyWorldTimeout{60'000};
+  std::chrono::milliseconds messageTimeout{10'000};  ///< from a message's first byte to its last
+  std::chrono::milliseconds closeTimeout{2'000};     ///< for the peer to read the final message
 };
 
 }  // namespace enfilade::server

@@ -7,25 +7,25 @@
 namespace enfilade::server {
 namespace {
 
-volatile std::sig_atomic_t came = 0;
+volatile std::sig_atomic_t signalReceived = 0;
 
 }  // namespace
 
-bool interrupted() {
-  return came != 0;
+bool isInterrupted() {
+  return signalReceived != 0;
 }
 
-ExitCode interruptible(const std::function<ExitCode()>& work, const char* told) {
+ExitCode runInterruptible(const std::function<ExitCode()>& work, const char* message) {
   struct sigaction action {};
-  action.sa_handler = [](int) { came = 1; };
+  action.sa_handler = [](int) { signalReceived = 1; };
   for (const int signal : {SIGINT, SIGTERM}) sigaction(signal, &action, nullptr);
   try {
     return work();
   } catch (const std::exception&) {
-    if (!interrupted()) throw;
+    if (!isInterrupted()) throw;
   } catch (const Interrupted&) {
   }
-  std::fprintf(stderr, "interrupted; %s\n", told);
+  std::fprintf(stderr, "interrupted; %s\n", message);
   return ExitCode::interrupted;
 }
 

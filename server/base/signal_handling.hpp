@@ -1,5 +1,5 @@
-// Ctrl-C of a run that ends by itself, or a time limit (SIGTERM): it stops at the next good place
-// and leaves whole files.
+// Graceful interruption (SIGINT, SIGTERM) of runs that end on their own: a run stops at the next
+// safe point and leaves complete files.
 #pragma once
 
 #include <functional>
@@ -8,15 +8,15 @@
 
 namespace enfilade::server {
 
-/// Whether SIGINT or SIGTERM came since interruptible() began.
-bool interrupted();
+/// Whether SIGINT or SIGTERM arrived since runInterruptible() started.
+bool isInterrupted();
 
-/// Thrown by work that stops because of it.
+/// Thrown by work that stops because of a signal.
 struct Interrupted {};
 
-/// Does `work`, which looks at interrupted() now and then. ExitCode::interrupted when it throws
-/// Interrupted, or anything after the signal: a terminal interrupts the whole group, and the
-/// importer's child fails of it, not of its file. `told` is then said on stderr.
-ExitCode interruptible(const std::function<ExitCode()>& work, const char* told);
+/// Runs `work`, which polls isInterrupted(). Returns ExitCode::interrupted and prints `message` on
+/// stderr if `work` throws Interrupted, or any exception after the signal: a terminal interrupts
+/// the whole process group, so the import worker fails because of the signal.
+ExitCode runInterruptible(const std::function<ExitCode()>& work, const char* message);
 
 }  // namespace enfilade::server

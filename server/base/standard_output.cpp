@@ -7,11 +7,11 @@
 
 namespace enfilade::server {
 
-void writeToStdout(const std::string& text, const std::string& kept) {
+void writeToStdout(const std::string& text, const std::string& fallbackNote) {
   const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
   if (written && std::fflush(stdout) == 0) return;
-  throw std::runtime_error(std::string("stdout cannot be written: ") + std::strerror(errno) +
-                           (kept.empty() ? "" : "; " + kept));
+  throw std::runtime_error(std::string("cannot write to stdout: ") + std::strerror(errno) +
+                           (fallbackNote.empty() ? "" : "; " + fallbackNote));
 }
 
 }  // namespace enfilade::server

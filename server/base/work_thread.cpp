@@ -11,15 +11,15 @@ WorkThread::~WorkThread() {
 void WorkThread::post(std::function<void()> work) {
   {
     const std::lock_guard lock(mutex_);
-    work_.push_back(std::move(work));
+    queue_.push_back(std::move(work));
   }
   changed_.notify_one();
 }
 
-void WorkThread::postAfter(std::chrono::milliseconds time, std::function<void()> work) {
+void WorkThread::postAfter(std::chrono::milliseconds delay, std::function<void()> work) {
   {
     const std::lock_guard lock(mutex_);
-    later_.emplace(std::chrono::steady_clock::now() + time, std::move(work));
+    delayed_.emplace(std::chrono::steady_clock::now() + delay, std::move(work));
   }
   changed_.notify_one();
 }
@@ -33,29 +33,29 @@ void WorkThread::finish() {
   if (thread_.joinable()) thread_.join();
 }
 
-/// With the lock: what is due joins the work.
-void WorkThread::takeDue() {
+/// Moves due delayed work into the queue. The caller holds the lock.
+void WorkThread::queueDueWork() {
   const auto now = std::chrono::steady_clock::now();
-  while (!later_.empty() && later_.begin()->first <= now) {
-    work_.push_back(std::move(later_.begin()->second));
-    later_.erase(later_.begin());
+  while (!delayed_.empty() && delayed_.begin()->first <= now) {
+    queue_.push_back(std::move(delayed_.begin()->second));
+    delayed_.erase(delayed_.begin());
   }
 }
 
 void WorkThread::run() {
   for (;;) {
     std::unique_lock lock(mutex_);
-    takeDue();
-    if (work_.empty() && finishing_) return;
-    if (work_.empty()) {
-      if (later_.empty())
+    queueDueWork();
+    if (queue_.empty() && finishing_) return;
+    if (queue_.empty()) {
+      if (delayed_.empty())
         changed_.wait(lock);
       else
-        changed_.wait_until(lock, later_.begin()->first);
+        changed_.wait_until(lock, delayed_.begin()->first);
       continue;
     }
-    const std::function<void()> work = std::move(work_.front());
-    work_.pop_front();
+    const std::function<void()> work = std::move(queue_.front());
+    queue_.pop_front();
     lock.unlock();
     work();
   }

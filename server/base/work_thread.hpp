@@ -1,4 +1,4 @@
-// A thread that does what it is given, in order.
+// A thread that runs posted work in order.
 #pragma once
 
 #include <chrono>
@@ -14,27 +14,27 @@ namespace enfilade::server {
 class WorkThread {
  public:
   WorkThread();
-  ~WorkThread();  ///< finishes
+  ~WorkThread();  ///< calls finish()
   WorkThread(const WorkThread&) = delete;
   WorkThread& operator=(const WorkThread&) = delete;
 
-  /// `work` must not throw. Nothing may be given after finish().
+  /// Callable from any thread. `work` must not throw. Do not post after finish().
   void post(std::function<void()> work);
-  /// The same, after some time; what is not due when the thread finishes is not done.
-  void postAfter(std::chrono::milliseconds time, std::function<void()> work);
-  /// Waits until all is done.
+  /// Like post(), after a delay. Work that is not due at finish() is discarded.
+  void postAfter(std::chrono::milliseconds delay, std::function<void()> work);
+  /// Waits until all posted work is done.
   void finish();
 
  private:
   void run();
-  void takeDue();
+  void queueDueWork();
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<std::function<void()>> work_;
-  std::multimap<std::chrono::steady_clock::time_point, std::function<void()>> later_;  ///< by due
+  std::deque<std::function<void()>> queue_;
+  std::multimap<std::chrono::steady_clock::time_point, std::function<void()>> delayed_;  ///< by due
   bool finishing_ = false;
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // last member: it uses the others
 };
 
 }  // namespace enfilade::server

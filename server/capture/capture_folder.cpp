@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "render/image/image.hpp"
+#include "render/image/atomic_file.hpp"
 #include "server/capture/frame_files.hpp"
 #include "server/capture/metadata_files.hpp"
 
@@ -20,26 +20,26 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A file being written is younger: another machine's shard may be at it in the same folder.
-constexpr std::chrono::seconds kHalfWritten{60};
+/// Age of an abandoned part file. Younger ones may belong to a shard on another machine.
+constexpr std::chrono::seconds kStalePartFileAge{60};
 
-void write(const fs::path& file, const std::string& text) {
-  render::writeFileWhole(file, text.data(), text.size());
+void writeText(const fs::path& file, const std::string& text) {
+  render::writeFileAtomically(file, text.data(), text.size());
 }
 
-std::optional<std::string> textOf(const fs::path& file) {
+std::optional<std::string> readText(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) return std::nullopt;
   return std::string(std::istreambuf_iterator<char>(in), {});
 }
 
-bool holdsFiles(const fs::path& folder) {
+bool containsFiles(const fs::path& folder) {
   std::error_code error;
   return fs::directory_iterator(folder, error) != fs::directory_iterator();
 }
 
-/// render::writeFileWhole() calls a file that is not whole yet NAME.part-PID-N.
-bool leftHalfWritten(const fs::directory_entry& entry) {
+/// True for an abandoned NAME.part-PID-N, the temporary file of render::writeFileAtomically().
+bool isStalePartFile(const fs::directory_entry& entry) {
   const std::string name = entry.path().filename().string();
   const std::size_t part = name.find(".part-");
   if (part == std::string::npos) return false;
@@ -49,66 +49,66 @@ bool leftHalfWritten(const fs::directory_entry& entry) {
     return false;
   std::error_code error;
   const auto age = fs::file_time_type::clock::now() - entry.last_write_time(error);
-  return !error && age > kHalfWritten && ::kill(writer, 0) != 0 && errno == ESRCH;
+  return !error && age > kStalePartFileAge && ::kill(writer, 0) != 0 && errno == ESRCH;
 }
 
-void removeHalfWritten(const fs::path& folder) {
+void removeStalePartFiles(const fs::path& folder) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
-    if (leftHalfWritten(entry)) fs::remove(entry.path(), error);
+    if (isStalePartFile(entry)) fs::remove(entry.path(), error);
 }
 
 }  // namespace
 
-void prepareFolder(const fs::path& folder) {
+void prepareFolder(const fs::path& folder, const char* option) {
   const fs::path probe = folder / ".writable";
   std::error_code error;
   fs::create_directories(folder, error);
   if (!error && !std::ofstream(probe).put(' ').flush())
     error = std::error_code(errno, std::generic_category());
   if (error)
-    throw std::runtime_error("cannot write into " + folder.string() + ": " + error.message() +
-                             "; give another folder with --out");
+    throw std::runtime_error("cannot write to " + folder.string() + ": " + error.message() +
+                             "; give another folder with " + option);
   fs::remove(probe, error);
 }
 
 void claimFolder(const fs::path& folder, const PictureOptions& options,
                  const std::string& manifest) {
-  const std::string remedy = "; give another folder with --out, or remove what is in this one";
-  const std::optional<std::string> there = textOf(folder / kManifest);
-  const std::string difference = there ? manifestDifference(*there, manifest) : "";
+  const std::string remedy = "; give another folder with --out, or empty this one";
+  const std::optional<std::string> existing = readText(folder / kManifestName);
+  const std::string difference = existing ? compareManifests(*existing, manifest) : "";
   if (!difference.empty())
-    throw std::runtime_error(folder.string() + " holds another capture (" + difference + ")" +
+    throw std::runtime_error(folder.string() + " contains another capture (" + difference + ")" +
                              remedy);
-  for (const fs::path& channel : foldersOf(options)) {
-    if (!there && holdsFiles(folder / channel))
-      throw std::runtime_error((folder / channel).string() + " holds files, but there is no " +
-                               kManifest + " that says whose" + remedy);
+  for (const fs::path& channel : listFrameFolders(options)) {
+    if (!existing && containsFiles(folder / channel))
+      throw std::runtime_error((folder / channel).string() + " contains files, but there is no " +
+                               kManifestName + " that identifies them" + remedy);
     fs::create_directories(folder / channel);
-    removeHalfWritten(folder / channel);
+    removeStalePartFiles(folder / channel);
   }
-  removeHalfWritten(folder);
-  if (!there) write(folder / kManifest, manifest);
+  removeStalePartFiles(folder);
+  if (!existing) writeText(folder / kManifestName, manifest);
 }
 
-void disclaimFolder(const fs::path& folder) {
+void releaseFolder(const fs::path& folder) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
-    if (entry.is_directory(error) && holdsFiles(entry.path())) return;
-  fs::remove(folder / kManifest, error);
+    if (entry.is_directory(error) && containsFiles(entry.path())) return;
+  fs::remove(folder / kManifestName, error);
 }
 
-void writeDocuments(const fs::path& folder, const scene::Scene& scene, const ShotList& list,
-                    const PictureOptions& options) {
-  write(folder / "instances.json", instancesJson(scene.model(), list.walkers));
-  write(folder / "transforms.json", transformsJson(list.shots, options, scene.model()));
+void writeMetadataFiles(const fs::path& folder, const scene::Scene& scene, const CapturePlan& plan,
+                        const PictureOptions& options) {
+  writeText(folder / "instances.json", makeInstancesJson(scene.model(), plan.avatars));
+  writeText(folder / "transforms.json", makeTransformsJson(plan.frames, options, scene.model()));
   if (options.layout != FolderLayout::tum) return;
   std::size_t channel = 0;
   if (options.channels.rgb)
-    write(folder / "rgb.txt", tumFileList(list.shots, options, channel++, "color images"));
+    writeText(folder / "rgb.txt", makeTumFileList(plan.frames, options, channel++, "color images"));
   if (options.channels.depth)
-    write(folder / "depth.txt", tumFileList(list.shots, options, channel, "depth maps"));
-  write(folder / "groundtruth.txt", tumGroundTruth(list.shots));
+    writeText(folder / "depth.txt", makeTumFileList(plan.frames, options, channel, "depth maps"));
+  writeText(folder / "groundtruth.txt", makeTumGroundTruth(plan.frames));
 }
 
 }  // namespace enfilade::server

@@ -1,5 +1,5 @@
-// The folder of a capture: one capture a folder, told by its manifest, so that a run can go on
-// where another one stopped and shards can meet.
+// The folder of one capture, identified by its manifest, so that runs can resume and shards can
+// share the folder.
 #pragma once
 
 #include <filesystem>
@@ -9,22 +9,23 @@
 
 namespace enfilade::server {
 
-inline constexpr const char* kManifest = "capture.json";
+inline constexpr const char* kManifestName = "capture.json";
 
-/// Makes the folder and proves that it can be written; throws std::runtime_error, naming it.
-void prepareFolder(const std::filesystem::path& folder);
+/// Creates the folder and checks that it is writable, before a long import starts. Throws
+/// std::runtime_error with its name; `option` is the option that selects another folder.
+void prepareFolder(const std::filesystem::path& folder, const char* option = "--out");
 
-/// Claims the folder for this manifest: it holds no frames yet, or some of the same capture.
-/// Removes what a killed run left half written. Throws std::runtime_error, with the remedy, for a
-/// folder that holds something else.
+/// Claims the folder for this manifest: it must be empty or contain frames of the same capture.
+/// Removes partial files of killed runs. Throws std::runtime_error with a remedy for a folder with
+/// other files.
 void claimFolder(const std::filesystem::path& folder, const PictureOptions& options,
                  const std::string& manifest);
 
-/// A capture failed: a folder without a single finished frame is free for any other.
-void disclaimFolder(const std::filesystem::path& folder);
+/// Releases the folder of a failed capture if it contains no complete frame.
+void releaseFolder(const std::filesystem::path& folder);
 
-/// instances.json, transforms.json, and the lists of the TUM layout.
-void writeDocuments(const std::filesystem::path& folder, const scene::Scene& scene,
-                    const ShotList& list, const PictureOptions& options);
+/// Writes instances.json, transforms.json, and the lists of the TUM layout.
+void writeMetadataFiles(const std::filesystem::path& folder, const scene::Scene& scene,
+                        const CapturePlan& plan, const PictureOptions& options);
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// The pictures that a capture takes: each with its camera and the moment that it shows.
+// The frames of a capture: their cameras, and the snapshots that they show.
 #pragma once
 
 #include <map>
@@ -11,55 +11,55 @@
 
 namespace enfilade::server {
 
-/// A contact or a near miss that lives in a tick.
+/// A contact or near miss that is active in a tick.
 struct ContactMark {
-  Vec3 point = Vec3::Zero();  ///< scene frame, metres: where it began
-  bool near = false;
+  Vec3 point = Vec3::Zero();  ///< where it began; scene frame, metres
+  bool isNearMiss = false;
 };
 
-struct Shot {
+struct CaptureFrame {
   double time = 0;  ///< seconds
   render::Camera camera;
-  scene::EntityId hidden = 0;  ///< not drawn: whose eyes these are
-  /// Null where another shard takes this picture.
+  scene::EntityId hiddenAvatar = 0;  ///< the viewing avatar, which is not drawn
+  /// Null if the frame belongs to another shard.
   std::shared_ptr<const scene::Snapshot> snapshot;
-  std::string name;                   ///< of the script's capture, else empty
-  std::vector<ContactMark> contacts;  ///< with an overlay of them
+  std::string name;                   ///< name of the script's capture, else empty
+  std::vector<ContactMark> contacts;  ///< for an overlay of contacts
 };
 
-/// Someone who comes in while a script runs; the scene's own things are in its model.
-struct WalkerName {
+/// The name of an avatar that a script spawned.
+struct AvatarName {
   scene::EntityId id = 0;
   std::string name;
 };
 
-/// Where someone's feet came, ascending ticks.
-struct WalkTrail {
+/// The positions of an avatar's feet, ascending ticks.
+struct AvatarTrail {
   struct Step {
     std::uint64_t tick = 0;
-    Vec3 at = Vec3::Zero();  ///< scene frame, metres
+    Vec3 position = Vec3::Zero();  ///< scene frame, metres
   };
   scene::EntityId id = 0;
-  std::vector<Step> feet;
+  std::vector<Step> steps;
 };
 
-struct ShotList {
-  std::vector<Shot> shots;          ///< at least one; shot i is frame i, whatever the shard
-  std::vector<WalkerName> walkers;  ///< ascending ids
-  std::vector<WalkTrail> trails;    ///< of all walkers, with an overlay of paths
-  std::vector<std::string> notes;   ///< what was guessed or left out, for a person
-  std::size_t wentWrong = 0;  ///< orders of a script that were refused, blocked, ...: in notes
+struct CapturePlan {
+  std::vector<CaptureFrame> frames;  ///< at least one; the index is the frame number in all shards
+  std::vector<AvatarName> avatars;   ///< ascending ids
+  std::vector<AvatarTrail> trails;   ///< of all avatars, for an overlay of paths
+  std::vector<std::string> notes;    ///< messages about assumptions and ignored options
+  std::size_t failedOrders = 0;      ///< failed orders of the script, described in notes
 };
 
-/// Reads the path and works out every picture of it: a walk script runs in process for that.
-/// `shard` says which snapshots are kept. Throws CameraPathError, protocol::ScriptError,
-/// scene::ImportError; std::invalid_argument for cameras that render::refusal() refuses.
-ShotList planShots(const std::shared_ptr<const scene::Scene>& scene,
-                   const std::filesystem::path& path, const PictureOptions& options,
-                   const Shard& shard);
+/// Reads the path and plans all frames; a walk script is run in this process. Only the snapshots of
+/// `shard` are kept. Throws CameraPathError, protocol::ScriptError, scene::ImportError, and
+/// std::invalid_argument for invalid cameras.
+CapturePlan planCapture(const std::shared_ptr<const scene::Scene>& scene,
+                        const std::filesystem::path& path, const PictureOptions& options,
+                        const Shard& shard);
 
-/// Whether frame `index` is the shard's.
-inline bool takes(const Shard& shard, std::size_t index) {
+/// True if frame `index` belongs to the shard.
+inline bool isInShard(const Shard& shard, std::size_t index) {
   return index % shard.count == shard.index;
 }
 

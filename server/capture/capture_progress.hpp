@@ -1,4 +1,4 @@
-// How far a capture is, on stderr: a bar with the time left, or lines of JSON.
+// Progress of a capture on stderr: a bar with the remaining time, or JSON lines.
 #pragma once
 
 #include <chrono>
@@ -8,22 +8,22 @@
 
 namespace enfilade::server {
 
-class CaptureMeter {
+class CaptureProgress {
  public:
-  CaptureMeter(CaptureProgress kind, std::size_t frames);
+  CaptureProgress(ProgressFormat kind, std::size_t frames);
 
-  /// `done` of the frames are written. Cheap: it writes now and then only.
-  void show(std::size_t done);
+  /// Reports `done` written frames. Prints at intervals only, so that calls are cheap.
+  void update(std::size_t done);
   void finish(std::size_t done);
 
  private:
   using Clock = std::chrono::steady_clock;
-  void line(std::size_t done, double seconds, double left) const;
+  void printLine(std::size_t done, double seconds, double left) const;
 
-  const CaptureProgress kind_;
+  const ProgressFormat format_;
   const std::size_t frames_;
   const Clock::time_point start_ = Clock::now();
-  Clock::time_point next_ = start_;
+  Clock::time_point nextLine_ = start_;
   Progress bar_;
 };
 

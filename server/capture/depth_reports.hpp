@@ -1,4 +1,4 @@
-// `capture --report-depth`: each frame beside rays in doubles, told in a file beside it.
+// `capture --report-depth`: compares each frame with ray-traced ground truth and writes reports.
 #pragma once
 
 #include <filesystem>
@@ -9,24 +9,24 @@
 
 namespace enfilade::server {
 
-/// depth_report/NNNNNN.json of a frame; render::jsonOf() says what is in it.
-std::filesystem::path depthReportOf(std::size_t index);
+/// Path depth_report/NNNNNN.json of a frame's report, relative to the capture folder.
+std::filesystem::path makeDepthReportPath(std::size_t index);
 
 class DepthReports {
  public:
-  /// Throws std::runtime_error where depth_report/ cannot be made in `folder`.
+  /// Throws std::runtime_error if depth_report/ cannot be created in `folder`.
   DepthReports(std::filesystem::path folder, std::shared_ptr<const scene::Scene> scene);
 
-  /// `frame` has its depth; `options` are those it was drawn with. Writes the frame's report.
+  /// Measures a frame, which needs depth, and writes its report. `options`: those of the rendering.
   void measure(std::size_t index, const render::Frame& frame, const scene::Snapshot& snapshot,
                const render::FrameOptions& options);
-  /// Writes what was measured since the beginning as one report: depth_report.json, or of a shard
-  /// depth_report-I-of-N.json.
+  /// Writes the report over all measured frames: depth_report.json, or depth_report-I-of-N.json
+  /// for a shard.
   void finish(const Shard& shard) const;
 
  private:
   std::filesystem::path folder_;
-  render::TrueRays rays_;
+  render::ReferenceTracer tracer_;
   render::DepthReport total_;
 };
 

@@ -2,7 +2,7 @@
 
 namespace enfilade::server {
 
-EncodeQueue::EncodeQueue(std::size_t threads, std::size_t most) : most_(most) {
+EncodeQueue::EncodeQueue(std::size_t threads, std::size_t maxPending) : maxPending_(maxPending) {
   for (std::size_t i = 0; i < threads; ++i) threads_.push_back(std::make_unique<WorkThread>());
 }
 
@@ -13,9 +13,9 @@ EncodeQueue::~EncodeQueue() {
 void EncodeQueue::post(std::function<void()> work) {
   {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return inHand_ < most_ || failure_; });
+    changed_.wait(lock, [this] { return pending_ < maxPending_ || failure_; });
     if (failure_) std::rethrow_exception(failure_);
-    ++inHand_;
+    ++pending_;
   }
   threads_[next_++ % threads_.size()]->post([this, work = std::move(work)] {
     std::exception_ptr failure;
@@ -24,14 +24,14 @@ void EncodeQueue::post(std::function<void()> work) {
     } catch (...) {
       failure = std::current_exception();
     }
-    done(failure);
+    finishTask(failure);
   });
 }
 
-void EncodeQueue::done(std::exception_ptr failure) {
+void EncodeQueue::finishTask(std::exception_ptr failure) {
   {
     const std::lock_guard lock(mutex_);
-    --inHand_;
+    --pending_;
     if (failure && !failure_) failure_ = std::move(failure);
   }
   changed_.notify_all();

@@ -1,4 +1,4 @@
-// Threads that encode and write while the next pictures are drawn, a bounded number at a time.
+// Worker threads that encode and write frames while the next frames are rendered.
 #pragma once
 
 #include <condition_variable>
@@ -14,26 +14,26 @@ namespace enfilade::server {
 
 class EncodeQueue {
  public:
-  /// At most `most` pieces of work are in hand at once, waiting or being done. Both at least 1.
-  EncodeQueue(std::size_t threads, std::size_t most);
-  ~EncodeQueue();  ///< finishes
+  /// At most `maxPending` tasks are queued or running. Both parameters are at least 1.
+  EncodeQueue(std::size_t threads, std::size_t maxPending);
+  ~EncodeQueue();  ///< waits for all tasks
 
-  /// Waits while too much is in hand. Throws what a piece of work threw; nothing more is begun
-  /// then.
+  /// Adds a task; blocks while the queue is full. Rethrows the exception of a failed task; no
+  /// further task then starts.
   void post(std::function<void()> work);
-  /// Waits until all is done. Throws what a piece of work threw.
+  /// Waits for all tasks. Rethrows the exception of a failed task.
   void finish();
 
  private:
-  void done(std::exception_ptr failure);
+  void finishTask(std::exception_ptr failure);
 
-  const std::size_t most_;
+  const std::size_t maxPending_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::size_t inHand_ = 0;
+  std::size_t pending_ = 0;
   std::size_t next_ = 0;
-  std::exception_ptr failure_;                        ///< the first one
-  std::vector<std::unique_ptr<WorkThread>> threads_;  // last: they use the others
+  std::exception_ptr failure_;                        ///< of the first failed task
+  std::vector<std::unique_ptr<WorkThread>> threads_;  // last member: the threads use the others
 };
 
 }  // namespace enfilade::server

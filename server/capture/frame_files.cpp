@@ -4,8 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "render/image/atomic_file.hpp"
 #include "render/image/encode.hpp"
-#include "render/image/image.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -14,83 +14,86 @@ namespace fs = std::filesystem;
 using render::Bytes;
 using render::Raster;
 
-constexpr std::uint32_t kMostIds16 = 65535;
+constexpr std::uint32_t kMaxId16 = 65535;
 
 struct ChannelFile {
   const char* folder;
   const char* extension;
 };
 
-const char* extensionOf(DepthFile depth) {
+const char* getDepthExtension(DepthFile depth) {
   if (depth == DepthFile::png) return ".png";
   return depth == DepthFile::zst ? ".zst" : ".npy";
 }
 
-std::vector<ChannelFile> channelsOf(const PictureOptions& options) {
+std::vector<ChannelFile> listChannels(const PictureOptions& options) {
   const CaptureChannels& wanted = options.channels;
   std::vector<ChannelFile> files;
   if (wanted.rgb) files.push_back({"rgb", options.rgb == RgbFile::jpeg ? ".jpg" : ".png"});
-  if (wanted.depth) files.push_back({"depth", extensionOf(options.depth)});
+  if (wanted.depth) files.push_back({"depth", getDepthExtension(options.depth)});
   if (wanted.ids) files.push_back({"ids", options.ids == IdsFile::png ? ".png" : ".npy"});
   if (wanted.normals) files.push_back({"normals", ".npy"});
-  if (wanted.range) files.push_back({"range", extensionOf(options.depth)});
+  if (wanted.range) files.push_back({"range", getDepthExtension(options.depth)});
   if (options.overlay.any()) files.push_back({"overlay", ".png"});
   return files;
 }
 
 template <class Value>
-Raster<Value> rasterOf(const render::Frame& frame, int channels, const std::vector<Value>& values) {
+Raster<Value> makeRaster(const render::Frame& frame, int channels,
+                         const std::vector<Value>& values) {
   return {frame.camera.width, frame.camera.height, channels, values};
 }
 
-Bytes rgbBytes(const render::Frame& frame, const PictureOptions& options) {
-  const auto pixels = rasterOf(frame, 3, frame.rgb);
+Bytes encodeRgb(const render::Frame& frame, const PictureOptions& options) {
+  const auto pixels = makeRaster(frame, 3, frame.rgb);
   return options.rgb == RgbFile::jpeg ? render::encodeJpeg(pixels, options.quality)
                                       : render::encodePng(pixels);
 }
 
-/// Of depth, or of range, which is kept in the same way.
-Bytes depthBytes(const render::Frame& frame, const std::vector<float>& metres,
-                 const PictureOptions& options, FrameFaults& faults) {
-  if (options.depth == DepthFile::npy) return render::encodeNpy(rasterOf(frame, 1, metres));
-  const render::Depth16 depth = render::depth16(metres, options.depthSteps);
-  if (depth.tooFar > 0 && options.tooFar == TooFar::refuse) {
+/// Encodes depth, or range, which has the same format.
+Bytes encodeDepth(const render::Frame& frame, const std::vector<float>& metres,
+                  const PictureOptions& options, FrameFaults& faults) {
+  if (options.depth == DepthFile::npy) return render::encodeNpy(makeRaster(frame, 1, metres));
+  const render::Depth16 depth = render::quantizeDepth(metres, options.depthStepsPerMetre);
+  if (depth.clampedPixels > 0 && options.tooFar == TooFar::refuse) {
     char farthest[32];
-    std::snprintf(farthest, sizeof farthest, "%g", kMostIds16 / options.depthSteps);
-    throw std::runtime_error(std::to_string(depth.tooFar) + " pixels are farther than the " +
+    std::snprintf(farthest, sizeof farthest, "%g", kMaxId16 / options.depthStepsPerMetre);
+    throw std::runtime_error(std::to_string(depth.clampedPixels) + " pixels are farther than the " +
                              farthest +
-                             " m that 16 bits hold; give a smaller --depth-scale, --depth npy, or "
+                             " m that fit into 16 bits; give a smaller --depth-scale, --depth "
+                             "npy, or "
                              "--too-far clamp");
   }
-  faults.clamped += depth.tooFar;
-  const auto steps = rasterOf(frame, 1, depth.steps);
+  faults.clamped += depth.clampedPixels;
+  const auto steps = makeRaster(frame, 1, depth.steps);
   return options.depth == DepthFile::png ? render::encodePng(steps) : render::packDepth(steps);
 }
 
-Bytes idBytes(const render::Frame& frame, const PictureOptions& options) {
-  if (options.ids == IdsFile::npy) return render::encodeNpy(rasterOf(frame, 1, frame.ids));
+Bytes encodeIds(const render::Frame& frame, const PictureOptions& options) {
+  if (options.ids == IdsFile::npy) return render::encodeNpy(makeRaster(frame, 1, frame.ids));
   std::vector<std::uint16_t> narrow;
   narrow.reserve(frame.ids.size());
   for (const std::uint32_t id : frame.ids) {
-    if (id > kMostIds16)
+    if (id > kMaxId16)
       throw std::runtime_error("id " + std::to_string(id) +
                                " does not fit into 16 bits; give --ids npy");
     narrow.push_back(static_cast<std::uint16_t>(id));
   }
-  return render::encodePng(rasterOf(frame, 1, narrow));
+  return render::encodePng(makeRaster(frame, 1, narrow));
 }
 
-Bytes bytesOf(const std::string& channel, const render::Frame& frame, const PictureOptions& options,
-              const DrawOverlay& overlay, FrameFaults& faults) {
+Bytes encodeChannel(const std::string& channel, const render::Frame& frame,
+                    const PictureOptions& options, const DrawOverlay& overlay,
+                    FrameFaults& faults) {
   if (channel == "overlay") return render::encodePng(overlay(frame));
-  if (channel == "rgb") return rgbBytes(frame, options);
-  if (channel == "depth") return depthBytes(frame, frame.depth, options, faults);
-  if (channel == "ids") return idBytes(frame, options);
-  if (channel == "normals") return render::encodeNpy(rasterOf(frame, 3, frame.normals));
-  return depthBytes(frame, render::rangeOf(frame), options, faults);
+  if (channel == "rgb") return encodeRgb(frame, options);
+  if (channel == "depth") return encodeDepth(frame, frame.depth, options, faults);
+  if (channel == "ids") return encodeIds(frame, options);
+  if (channel == "normals") return render::encodeNpy(makeRaster(frame, 3, frame.normals));
+  return encodeDepth(frame, render::computeRange(frame), options, faults);
 }
 
-fs::path fileOf(const ChannelFile& channel, std::size_t index) {
+fs::path makeFilePath(const ChannelFile& channel, std::size_t index) {
   char name[32];
   std::snprintf(name, sizeof name, "%06zu", index);
   return fs::path(channel.folder) / (std::string(name) + channel.extension);
@@ -98,20 +101,21 @@ fs::path fileOf(const ChannelFile& channel, std::size_t index) {
 
 }  // namespace
 
-std::vector<fs::path> filesOfFrame(const PictureOptions& options, std::size_t index) {
+std::vector<fs::path> listFrameFiles(const PictureOptions& options, std::size_t index) {
   std::vector<fs::path> files;
-  for (const ChannelFile& channel : channelsOf(options)) files.push_back(fileOf(channel, index));
+  for (const ChannelFile& channel : listChannels(options))
+    files.push_back(makeFilePath(channel, index));
   return files;
 }
 
-std::vector<fs::path> foldersOf(const PictureOptions& options) {
+std::vector<fs::path> listFrameFolders(const PictureOptions& options) {
   std::vector<fs::path> folders;
-  for (const ChannelFile& channel : channelsOf(options)) folders.emplace_back(channel.folder);
+  for (const ChannelFile& channel : listChannels(options)) folders.emplace_back(channel.folder);
   return folders;
 }
 
-bool isThere(const fs::path& folder, const PictureOptions& options, std::size_t index) {
-  for (const fs::path& file : filesOfFrame(options, index)) {
+bool isFrameComplete(const fs::path& folder, const PictureOptions& options, std::size_t index) {
+  for (const fs::path& file : listFrameFiles(options, index)) {
     std::error_code error;
     if (!fs::is_regular_file(folder / file, error)) return false;
   }
@@ -121,15 +125,15 @@ bool isThere(const fs::path& folder, const PictureOptions& options, std::size_t 
 FrameFaults writeFrame(const fs::path& folder, const PictureOptions& options, std::size_t index,
                        const render::Frame& frame, const DrawOverlay& overlay) {
   FrameFaults faults;
-  for (const ChannelFile& channel : channelsOf(options)) {
-    const fs::path file = folder / fileOf(channel, index);
+  for (const ChannelFile& channel : listChannels(options)) {
+    const fs::path file = folder / makeFilePath(channel, index);
     Bytes bytes;
     try {
-      bytes = bytesOf(channel.folder, frame, options, overlay, faults);
+      bytes = encodeChannel(channel.folder, frame, options, overlay, faults);
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(file.string() + ": " + error.what());
     }
-    render::writeFileWhole(file, bytes.data(), bytes.size());
+    render::writeFileAtomically(file, bytes.data(), bytes.size());
   }
   return faults;
 }

@@ -1,4 +1,4 @@
-// The files of one frame of a capture.
+// Names and contents of the files of one captured frame.
 #pragma once
 
 #include <filesystem>
@@ -10,27 +10,28 @@
 
 namespace enfilade::server {
 
-/// One picture's files, relative to the capture's folder, as rgb/000012.png; the order is rgb,
+/// Files of one frame, relative to the capture folder, for example rgb/000012.png. Order: rgb,
 /// depth, ids, normals, range, overlay.
-std::vector<std::filesystem::path> filesOfFrame(const PictureOptions& options, std::size_t index);
+std::vector<std::filesystem::path> listFrameFiles(const PictureOptions& options, std::size_t index);
 
-/// The folders that the files lie in, relative to the capture's.
-std::vector<std::filesystem::path> foldersOf(const PictureOptions& options);
+/// Folders of the files, relative to the capture folder.
+std::vector<std::filesystem::path> listFrameFolders(const PictureOptions& options);
 
-/// Whether every file of the frame is there. They appear whole, so that a file there is a whole
-/// one.
-bool isThere(const std::filesystem::path& folder, const PictureOptions& options, std::size_t index);
+/// True if all files of the frame exist. Files are written atomically, so that existing files are
+/// complete.
+bool isFrameComplete(const std::filesystem::path& folder, const PictureOptions& options,
+                     std::size_t index);
 
-/// What had to be bent to fit into the files.
+/// Values that did not fit into the file formats.
 struct FrameFaults {
-  std::size_t clamped = 0;  ///< pixels of depth or range beyond what 16 bits hold
+  std::size_t clamped = 0;  ///< pixels of depth or range beyond 16 bits
 };
 
-/// The frame's colour with marks on it.
+/// Draws marks on the frame's colour.
 using DrawOverlay = std::function<render::Image(const render::Frame& frame)>;
 
-/// Encodes the frame and writes its files, each whole. Throws std::runtime_error naming the file:
-/// also where depth or ids do not fit into 16 bits.
+/// Encodes the frame and writes its files atomically. Throws std::runtime_error with the file name,
+/// also if depth or ids do not fit into 16 bits.
 FrameFaults writeFrame(const std::filesystem::path& folder, const PictureOptions& options,
                        std::size_t index, const render::Frame& frame, const DrawOverlay& overlay);
 

@@ -8,51 +8,52 @@
 namespace enfilade::server {
 namespace {
 
-constexpr std::size_t kMostBytes = std::size_t{2} << 30;
-constexpr double kMostTicks = 10'000'000;  // of a path: a day and more
+constexpr std::size_t kMaxSnapshotBytes = std::size_t{2} << 30;
+constexpr double kMaxTicks = 10'000'000;  // of a path: more than a day
 
-/// What a snapshot holds that the one before does not, about.
-std::size_t bytesOf(const scene::Snapshot& snapshot, const scene::Snapshot* before) {
-  std::size_t bytes = sizeof snapshot + snapshot.avatars.size() * sizeof(scene::AvatarView);
+/// Estimates the bytes of a snapshot that it does not share with the previous one.
+std::size_t estimateBytes(const scene::Snapshot& snapshot, const scene::Snapshot* before) {
+  std::size_t bytes = sizeof snapshot + snapshot.avatars.size() * sizeof(scene::AvatarSnapshot);
   if (snapshot.bodies && (!before || before->bodies != snapshot.bodies))
-    bytes += snapshot.bodies->size() * sizeof(scene::BodyView);
+    bytes += snapshot.bodies->size() * sizeof(scene::BodySnapshot);
   return bytes;
 }
 
 }  // namespace
 
-void KeptSnapshots::keep(const std::shared_ptr<const scene::Snapshot>& snapshot, Shot& shot) {
-  shot.snapshot = snapshot;
+void SnapshotStore::keep(const std::shared_ptr<const scene::Snapshot>& snapshot,
+                         CaptureFrame& captureFrame) {
+  captureFrame.snapshot = snapshot;
   if (snapshot == last_) return;
-  bytes_ += bytesOf(*snapshot, last_.get());
+  bytes_ += estimateBytes(*snapshot, last_.get());
   last_ = snapshot;
-  if (bytes_ > kMostBytes)
+  if (bytes_ > kMaxSnapshotBytes)
     throw CameraPathError(
-        "what moves takes more than 2 GiB over all frames; take fewer (a walk script: a larger "
-        "--every), or --shard i/n one after the other");
+        "the snapshots of all frames exceed 2 GiB; use fewer frames (walk script: a larger "
+        "--every), or run the parts of --shard i/n one after the other");
 }
 
-void showMoments(const std::shared_ptr<const scene::Scene>& scene, bool still, const Shard& shard,
-                 std::vector<Shot>& shots) {
+void assignSnapshots(const std::shared_ptr<const scene::Scene>& scene, bool freezeScene,
+                     const Shard& shard, std::vector<CaptureFrame>& captureFrames) {
   scene::World world(scene);
-  const double tickSeconds = world.lengths().tick, begin = shots.front().time;
-  const bool moves = !still && !scene->model().bodies.empty();
-  const double last = moves ? (shots.back().time - begin) / tickSeconds : 0;
-  if (!(last <= kMostTicks))
+  const double tickSeconds = world.settings().tickDuration, begin = captureFrames.front().time;
+  const bool moves = !freezeScene && !scene->model().bodies.empty();
+  const double last = moves ? (captureFrames.back().time - begin) / tickSeconds : 0;
+  if (!(last <= kMaxTicks))
     throw CameraPathError("the path takes " + std::to_string(last * tickSeconds) +
-                          " s, which is too long to let the scene's bodies move; give --still, or "
+                          " s, which is too long for a scene with bodies; give --still, or "
                           "a path of less than " +
-                          std::to_string(kMostTicks * tickSeconds) + " s");
-  KeptSnapshots kept;
-  for (std::size_t i = 0; i < shots.size(); ++i) {
-    const auto due =
-        moves ? static_cast<std::uint64_t>(std::llround((shots[i].time - begin) / tickSeconds))
-              : std::uint64_t{0};
+                          std::to_string(kMaxTicks * tickSeconds) + " s");
+  SnapshotStore store;
+  for (std::size_t i = 0; i < captureFrames.size(); ++i) {
+    const auto due = moves ? static_cast<std::uint64_t>(
+                                 std::llround((captureFrames[i].time - begin) / tickSeconds))
+                           : std::uint64_t{0};
     while (world.snapshot()->tick < due) {
-      if (interrupted()) throw Interrupted{};
-      tick(world);
+      if (isInterrupted()) throw Interrupted{};
+      tickWorld(world);
     }
-    if (takes(shard, i)) kept.keep(world.snapshot(), shots[i]);
+    if (isInShard(shard, i)) store.keep(world.snapshot(), captureFrames[i]);
   }
 }
 

@@ -1,27 +1,27 @@
-// Which moments of the world a capture's pictures show, and the snapshots that are kept for them.
+// Assigns snapshots of the world to the frames of a capture, by their times.
 #pragma once
 
 #include "server/capture/capture_plan.hpp"
 
 namespace enfilade::server {
 
-/// Gives shots their snapshots, and bounds what these hold.
-class KeptSnapshots {
+/// Assigns snapshots to frames and limits their memory.
+class SnapshotStore {
  public:
-  /// What nothing moved in is shared with the snapshot before and counts once. Throws
-  /// CameraPathError when all take more than 2 GiB.
-  void keep(const std::shared_ptr<const scene::Snapshot>& snapshot, Shot& shot);
+  /// Assigns a snapshot. Data shared with the previous snapshot counts once. Throws
+  /// CameraPathError if all snapshots exceed 2 GiB.
+  void keep(const std::shared_ptr<const scene::Snapshot>& snapshot, CaptureFrame& captureFrame);
 
  private:
   std::shared_ptr<const scene::Snapshot> last_;
   std::size_t bytes_ = 0;
 };
 
-/// Shots along a camera path, times ascending: the world begins with the first of them and is
-/// ticked to each one's time, rounded to whole ticks; with `still`, or where the scene has nothing
-/// that could move, all show its beginning. Only the shard's get snapshots, the same for any shard.
-/// Throws CameraPathError where the path takes too long, and Interrupted.
-void showMoments(const std::shared_ptr<const scene::Scene>& scene, bool still, const Shard& shard,
-                 std::vector<Shot>& shots);
+/// Assigns snapshots to frames of a camera path with ascending times. The world starts at the first
+/// frame and is ticked to each frame's time, rounded to whole ticks. With `freezeScene`, or without
+/// bodies, all frames show the initial state. Only frames of the shard get snapshots; these do not
+/// depend on the sharding. Throws CameraPathError if the path is too long, and Interrupted.
+void assignSnapshots(const std::shared_ptr<const scene::Scene>& scene, bool freezeScene,
+                     const Shard& shard, std::vector<CaptureFrame>& captureFrames);
 
 }  // namespace enfilade::server

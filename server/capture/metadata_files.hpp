@@ -1,6 +1,5 @@
-// What lies beside a capture's frames: which ids are what, where each frame was taken from, and
-// what the capture was made of. Texts that depend on scene, path and options alone, so that all
-// shards write the same.
+// Metadata files of a capture: instances, camera poses, and the manifest. The texts depend only on
+// scene, path and options, so that all shards write the same files.
 #pragma once
 
 #include <string>
@@ -9,25 +8,25 @@
 
 namespace enfilade::server {
 
-/// id -> path, global_id, class, operation, body; of avatars their names.
-std::string instancesJson(const scene::Model& model, const std::vector<WalkerName>& walkers);
+/// Maps ids to path, global_id, class, operation and body; avatars have their names.
+std::string makeInstancesJson(const scene::Model& model, const std::vector<AvatarName>& avatars);
 
-/// nerfstudio's form; axes, depth and what else a reader must know stand under "enfilade".
-std::string transformsJson(const std::vector<Shot>& shots, const PictureOptions& options,
-                           const scene::Model& model);
+/// nerfstudio's format. The key "enfilade" describes axes, depth and other conventions.
+std::string makeTransformsJson(const std::vector<CaptureFrame>& captureFrames,
+                               const PictureOptions& options, const scene::Model& model);
 
-/// `timestamp file` lines of rgb.txt and depth.txt; `channel` is 0 for the first of
-/// filesOfFrame(), and so on.
-std::string tumFileList(const std::vector<Shot>& shots, const PictureOptions& options,
-                        std::size_t channel, const std::string& what);
-/// `timestamp tx ty tz qx qy qz qw`; the camera's axes are OpenCV's, as TUM's own files have them.
-std::string tumGroundTruth(const std::vector<Shot>& shots);
+/// `timestamp file` lines of rgb.txt and depth.txt. `channel` is the index in listFrameFiles().
+std::string makeTumFileList(const std::vector<CaptureFrame>& captureFrames,
+                            const PictureOptions& options, std::size_t channel,
+                            const std::string& title);
+/// `timestamp tx ty tz qx qy qz qw` lines with OpenCV camera axes, as in TUM's own files.
+std::string makeTumGroundTruth(const std::vector<CaptureFrame>& captureFrames);
 
-/// What the pictures are made of: two captures may share a folder when these are the same.
-std::string manifestJson(const scene::Scene& scene, const std::filesystem::path& path,
+/// The inputs of the pictures. Captures may share a folder if their manifests are equal.
+std::string makeManifest(const scene::Scene& scene, const std::filesystem::path& path,
                          const PictureOptions& options, const std::string& renderer);
 
-/// The keys in which two manifests differ, with both values, for a person; empty: in none.
-std::string manifestDifference(const std::string& one, const std::string& other);
+/// Describes the keys in which two manifests differ, with both values; empty: equal.
+std::string compareManifests(const std::string& one, const std::string& other);
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// What a person wants to see in a frame: contacts, ways walked, and whose pixels are whose.
+// Overlays for people: contacts, trajectories, boxes and names on a frame's colour.
 #pragma once
 
 #include "render/image/image.hpp"
@@ -6,11 +6,11 @@
 
 namespace enfilade::server {
 
-/// The frame's colour with the marks that `choice` asks for drawn on it; the frame has colour, ids
-/// and depth. Boxes and names are those of the pixels that are seen, so nothing hidden has any;
-/// what fills most of the picture (floors, walls) has none either. Contacts and paths that lie
-/// behind something are drawn thin.
+/// Draws the marks of `choice` on the frame's colour; the frame needs colour, ids and depth. Boxes
+/// and names come from visible pixels; objects that fill most of the picture (floors, walls) get
+/// none. Hidden parts of contacts and paths are drawn thin.
 render::Image drawOverlay(const render::Frame& frame, const OverlayChoice& choice,
-                          const scene::Model& model, const ShotList& list, const Shot& shot);
+                          const scene::Model& model, const CapturePlan& plan,
+                          const CaptureFrame& captureFrame);
 
 }  // namespace enfilade::server

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "protocol/script/script.hpp"
+#include "protocol/script/script_run.hpp"
 #include "server/capture/frame_times.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/runs/in_process_driver.hpp"
@@ -11,90 +11,95 @@
 namespace enfilade::server {
 namespace {
 
-constexpr double kStride = 0.05;  // metres between two points of a trail
-constexpr std::size_t kMostShots = 10'000'000;
+constexpr double kTrailStep = 0.05;  // metres between two points of a trail
+constexpr std::size_t kMaxFrames = 10'000'000;
 
-class Recorder {
+class FrameCollector {
  public:
-  Recorder(const scene::World& world, const PictureOptions& options, const Shard& shard)
+  FrameCollector(const scene::World& world, const PictureOptions& options, const Shard& shard)
       : world_(world), options_(options), shard_(shard) {}
 
-  void see(const protocol::StepOutcome& outcome) {
+  void processStep(const protocol::StepOutcome& outcome) {
     const auto snapshot = world_.snapshot();
-    for (const scene::AvatarView& avatar : snapshot->avatars)
+    for (const scene::AvatarSnapshot& avatar : snapshot->avatars)
       names_.emplace(avatar.id, avatar.name);
-    if (options_.overlay.paths) follow(*snapshot);
-    if (options_.overlay.contacts) note(outcome);
+    if (options_.overlay.paths) extendTrails(*snapshot);
+    if (options_.overlay.contacts) updateContacts(outcome);
     if (options_.every == 0) {
       for (const v1::Notice& notice : outcome.notices)
         if (notice.kind() == v1::Notice::KIND_CAPTURE)
-          add(snapshot, notice.avatar(), notice.text());
+          addFrame(snapshot, notice.avatar(), notice.text());
     } else if (snapshot->tick % options_.every == 0) {
-      add(snapshot, eyes(*snapshot), "");
+      addFrame(snapshot, selectAvatar(*snapshot), "");
     }
   }
 
-  ShotList finish() {
-    for (const auto& [id, name] : names_) list_.walkers.push_back({id, name});
-    return std::move(list_);
+  CapturePlan finish() {
+    for (const auto& [id, name] : names_) plan_.avatars.push_back({id, name});
+    return std::move(plan_);
   }
 
  private:
-  void follow(const scene::Snapshot& snapshot) {
-    for (const scene::AvatarView& avatar : snapshot.avatars) {
-      auto trail = std::find_if(list_.trails.begin(), list_.trails.end(),
-                                [&](const WalkTrail& t) { return t.id == avatar.id; });
-      if (trail == list_.trails.end()) trail = list_.trails.insert(trail, WalkTrail{avatar.id, {}});
-      if (trail->feet.empty() || (trail->feet.back().at - avatar.feet).norm() > kStride)
-        trail->feet.push_back({snapshot.tick, avatar.feet});
+  void extendTrails(const scene::Snapshot& snapshot) {
+    for (const scene::AvatarSnapshot& avatar : snapshot.avatars) {
+      auto trail = std::find_if(plan_.trails.begin(), plan_.trails.end(),
+                                [&](const AvatarTrail& t) { return t.id == avatar.id; });
+      if (trail == plan_.trails.end())
+        trail = plan_.trails.insert(trail, AvatarTrail{avatar.id, {}});
+      if (trail->steps.empty() ||
+          (trail->steps.back().position - avatar.footPosition).norm() > kTrailStep)
+        trail->steps.push_back({snapshot.tick, avatar.footPosition});
     }
   }
 
-  void note(const protocol::StepOutcome& outcome) {
+  void updateContacts(const protocol::StepOutcome& outcome) {
     using Event = v1::ContactEvent;
     for (const Event& event : outcome.contacts) {
-      const bool near = event.kind() == Event::KIND_NEAR;
+      const bool isNearMiss = event.kind() == Event::KIND_NEAR;
       const bool begins =
-          near ? event.phase() == Event::PHASE_BEGIN : event.kind() == Event::KIND_BEGIN;
-      const bool ends = near ? event.phase() == Event::PHASE_END : event.kind() == Event::KIND_END;
-      const std::tuple key(near, event.a(), event.b());
-      if (begins) live_[key] = {vectorFrom(event.point_b()), near};
-      if (ends) live_.erase(key);
+          isNearMiss ? event.phase() == Event::PHASE_BEGIN : event.kind() == Event::KIND_BEGIN;
+      const bool ends =
+          isNearMiss ? event.phase() == Event::PHASE_END : event.kind() == Event::KIND_END;
+      const std::tuple key(isNearMiss, event.a(), event.b());
+      if (begins) activeContacts_[key] = {vectorFromProto(event.point_b()), isNearMiss};
+      if (ends) activeContacts_.erase(key);
     }
   }
 
-  std::string eyes(const scene::Snapshot& snapshot) {
-    if (options_.avatar.empty() && first_.empty() && !snapshot.avatars.empty())
-      first_ = snapshot.avatars.front().name;
-    return options_.avatar.empty() ? first_ : options_.avatar;
+  std::string selectAvatar(const scene::Snapshot& snapshot) {
+    if (options_.avatar.empty() && firstAvatar_.empty() && !snapshot.avatars.empty())
+      firstAvatar_ = snapshot.avatars.front().name;
+    return options_.avatar.empty() ? firstAvatar_ : options_.avatar;
   }
 
-  void add(const std::shared_ptr<const scene::Snapshot>& snapshot, const std::string& avatar,
-           const std::string& name) {
-    const scene::AvatarView* seer = avatarNamed(*snapshot, avatar);
-    if (!seer) return;  // not in the world now
-    Shot shot{snapshot->time, render::firstPerson(*seer, 1, 1), seer->id, nullptr, name, {}};
-    for (const auto& [key, mark] : live_) shot.contacts.push_back(mark);
-    if (takes(shard_, list_.shots.size())) kept_.keep(snapshot, shot);
-    if (list_.shots.size() == kMostShots)
-      throw CameraPathError("the walk makes more than 10,000,000 frames; give a larger --every");
-    list_.shots.push_back(std::move(shot));
+  void addFrame(const std::shared_ptr<const scene::Snapshot>& snapshot, const std::string& avatar,
+                const std::string& name) {
+    const scene::AvatarSnapshot* viewer = findAvatar(*snapshot, avatar);
+    if (!viewer) return;  // the avatar is not in the world
+    CaptureFrame captureFrame{snapshot->time, render::makeFirstPersonCamera(*viewer, 1, 1),
+                              viewer->id,     nullptr,
+                              name,           {}};
+    for (const auto& [key, mark] : activeContacts_) captureFrame.contacts.push_back(mark);
+    if (isInShard(shard_, plan_.frames.size())) snapshots_.keep(snapshot, captureFrame);
+    if (plan_.frames.size() == kMaxFrames)
+      throw CameraPathError("the walk has more than 10,000,000 frames; give a larger --every");
+    plan_.frames.push_back(std::move(captureFrame));
   }
 
   const scene::World& world_;
   const PictureOptions& options_;
   const Shard& shard_;
-  ShotList list_;
+  CapturePlan plan_;
   std::map<scene::EntityId, std::string> names_;
-  std::map<std::tuple<bool, std::uint32_t, std::uint32_t>, ContactMark> live_;
-  std::string first_;
-  KeptSnapshots kept_;
+  std::map<std::tuple<bool, std::uint32_t, std::uint32_t>, ContactMark> activeContacts_;
+  std::string firstAvatar_;
+  SnapshotStore snapshots_;
 };
 
-/// Without a renderer every capture would count as one that failed.
-class Unseen : public protocol::ScriptDriver {
+/// A driver that ignores captures. Without a renderer each capture would count as failed.
+class CaptureIgnoringDriver : public protocol::ScriptDriver {
  public:
-  explicit Unseen(RecordedWorld& world) : driver_(world, nullptr) {}
+  explicit CaptureIgnoringDriver(RecordableWorld& world) : driver_(world, nullptr) {}
   double tickSeconds() const override { return driver_.tickSeconds(); }
   std::optional<v1::Error> submit(const v1::Command& command) override {
     return driver_.submit(command);
@@ -114,29 +119,29 @@ class Unseen : public protocol::ScriptDriver {
 
 }  // namespace
 
-ShotList walkShots(const std::shared_ptr<const scene::Scene>& scene,
-                   const std::filesystem::path& script, const PictureOptions& options,
-                   const Shard& shard) {
+CapturePlan planScriptFrames(const std::shared_ptr<const scene::Scene>& scene,
+                             const std::filesystem::path& script, const PictureOptions& options,
+                             const Shard& shard) {
   const protocol::Script lines = protocol::readScript(script);
-  RecordedWorld world{scene::World(scene)};
-  Unseen driver(world);
-  Recorder recorder(world, options, shard);
+  RecordableWorld world{scene::World(scene)};
+  CaptureIgnoringDriver driver(world);
+  FrameCollector collector(world, options, shard);
   const protocol::ScriptResult result = protocol::runScript(
       lines, driver, [&](protocol::StepOutcome& outcome, const protocol::ScriptProgress&) {
-        recorder.see(outcome);
+        collector.processStep(outcome);
       });
-  ShotList list = recorder.finish();
-  for (const protocol::LineOutcome& outcome : result.outcomes) list.notes.push_back(outcome.text);
-  list.wentWrong = result.outcomes.size();
-  if (list.shots.empty())
+  CapturePlan plan = collector.finish();
+  for (const protocol::LineOutcome& outcome : result.outcomes) plan.notes.push_back(outcome.text);
+  plan.failedOrders = result.outcomes.size();
+  if (plan.frames.empty())
     throw CameraPathError(
         script.string() +
         (options.every == 0
-             ? ": the script captures nothing; add {\"capture\":NAME,\"as\":FILE}, or "
+             ? ": the script has no captures; add {\"capture\":NAME,\"as\":FILE}, or "
                "give --every TICKS"
-             : ": nobody called so was in the world at any such tick; mend --avatar, "
+             : ": no avatar of this name was in the world at these ticks; correct --avatar, "
                "or give a smaller --every"));
-  return list;
+  return plan;
 }
 
 }  // namespace enfilade::server

@@ -18,16 +18,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kSlowest = 1, kFastest = 120;  // frames a second
+constexpr double kMinFps = 1, kMaxFps = 120;  // frames per second
 
-double framesPerSecond(const std::vector<Shot>& shots, double otherwise) {
-  const double seconds = shots.back().time - shots.front().time;
-  if (!(seconds > 0)) return otherwise;
-  return std::clamp(static_cast<double>(shots.size() - 1) / seconds, kSlowest, kFastest);
+double computeFps(const std::vector<CaptureFrame>& captureFrames, double fallback) {
+  const double seconds = captureFrames.back().time - captureFrames.front().time;
+  if (!(seconds > 0)) return fallback;
+  return std::clamp(static_cast<double>(captureFrames.size() - 1) / seconds, kMinFps, kMaxFps);
 }
 
-std::vector<std::string> commandOf(const fs::path& folder, const fs::path& into, double fps,
-                                   const PictureOptions& options) {
+std::vector<std::string> makeCommand(const fs::path& folder, const fs::path& into, double fps,
+                                     const PictureOptions& options) {
   std::array<char, 32> rate{};
   std::snprintf(rate.data(), rate.size(), "%.6g", fps);
   const std::string frames = options.rgb == RgbFile::jpeg ? "%06d.jpg" : "%06d.png";
@@ -43,7 +43,7 @@ std::vector<std::string> commandOf(const fs::path& folder, const fs::path& into,
           "-i",
           (folder / "rgb" / frames).string(),
           "-vf",
-          "pad=ceil(iw/2)*2:ceil(ih/2)*2",  // H.264 has no odd sizes in yuv420p
+          "pad=ceil(iw/2)*2:ceil(ih/2)*2",  // H.264 in yuv420p needs even sizes
           "-c:v",
           "libx264",
           "-crf",
@@ -57,7 +57,7 @@ std::vector<std::string> commandOf(const fs::path& folder, const fs::path& into,
           into.string()};
 }
 
-/// The exit status, 127 where there is no such program, -1 where it was killed.
+/// Runs a command without output. Returns its exit status; 127: not found; -1: killed.
 int runQuietly(std::vector<std::string> command) {
   std::vector<char*> argv;
   for (std::string& word : command) argv.push_back(word.data());
@@ -78,19 +78,18 @@ int runQuietly(std::vector<std::string> command) {
 
 }  // namespace
 
-VideoResult makeVideo(const fs::path& folder, const std::vector<Shot>& shots,
+VideoResult makeVideo(const fs::path& folder, const std::vector<CaptureFrame>& captureFrames,
                       const PictureOptions& options) {
   const fs::path file = folder / "video.mp4";
   const fs::path part = folder / ("video.mp4.part-" + std::to_string(::getpid()) + "-0");
   const int status =
-      runQuietly(commandOf(folder, part, framesPerSecond(shots, options.fps), options));
+      runQuietly(makeCommand(folder, part, computeFps(captureFrames, options.fps), options));
   std::error_code error;
   if (status == 0) fs::rename(part, file, error);
   if (status == 0 && !error) return {true, ""};
   std::error_code ignored;
   fs::remove(part, ignored);
-  if (status == 127)
-    return {false, "there is no ffmpeg; install it and run the same command again"};
+  if (status == 127) return {false, "ffmpeg is missing; install it and run the same command again"};
   if (status != 0) return {false, "ffmpeg failed (" + std::to_string(status) + ")"};
   return {false, "cannot write " + file.string() + ": " + error.message()};
 }

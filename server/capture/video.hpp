@@ -1,4 +1,4 @@
-// The frames of a capture as a film, by ffmpeg where there is one.
+// Video of a capture's frames, made by ffmpeg if installed.
 #pragma once
 
 #include <filesystem>
@@ -9,13 +9,14 @@
 namespace enfilade::server {
 
 struct VideoResult {
-  bool made = false;
-  std::string why;  ///< there is none, for a person
+  bool created = false;
+  std::string reason;  ///< reason for a missing video
 };
 
-/// Makes FOLDER/video.mp4 (H.264) of its rgb/ frames at the path's own mean speed; the file appears
-/// whole. Never throws for what ffmpeg cannot: that is told.
-VideoResult makeVideo(const std::filesystem::path& folder, const std::vector<Shot>& shots,
+/// Makes FOLDER/video.mp4 (H.264) from the rgb/ frames at the mean frame rate of the path. The
+/// file is written atomically. Failures of ffmpeg are returned, not thrown.
+VideoResult makeVideo(const std::filesystem::path& folder,
+                      const std::vector<CaptureFrame>& captureFrames,
                       const PictureOptions& options);
 
 }  // namespace enfilade::server

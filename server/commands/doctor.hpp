@@ -1,12 +1,20 @@
-// What can draw on this machine, and what is missing.
+// `enfilade doctor`: tests the graphics devices of this machine.
 #pragma once
 
-#include "server/app/command_line.hpp"
+#include <filesystem>
+
+#include "server/base/exit_code.hpp"
 
 namespace enfilade::server {
 
-/// Tries each EGL device, draws a proof picture, tells what came of it on stdout. `runtimeError`
-/// when no frame can be made that is right.
+struct DoctorCommand {
+  bool json = false;
+  bool requireGpu = false;    ///< fail if only a CPU can draw
+  std::filesystem::path out;  ///< file of the self-test picture; empty: none
+};
+
+/// Renders a self-test picture on each EGL device and reports on stdout. Returns `runtimeError` if
+/// no device renders it correctly.
 ExitCode doctor(const DoctorCommand& command);
 
 }  // namespace enfilade::server

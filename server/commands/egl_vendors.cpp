@@ -1,4 +1,4 @@
-// After libglvnd's documentation of its EGL vendor enumeration (src/EGL/icd_enumeration.md).
+// Follows libglvnd's documentation of its EGL vendor enumeration (src/EGL/icd_enumeration.md).
 #include "server/commands/egl_vendors.hpp"
 
 #include <dlfcn.h>
@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<std::string> parted(const char* list) {
+std::vector<std::string> splitPaths(const char* list) {
   std::vector<std::string> parts;
   std::istringstream text(list ? list : "");
   for (std::string part; std::getline(text, part, ':');)
@@ -23,48 +23,48 @@ std::vector<std::string> parted(const char* list) {
   return parts;
 }
 
-std::vector<std::string> filesOf(const std::vector<std::string>& folders) {
+std::vector<std::string> listFiles(const std::vector<std::string>& folders) {
   std::vector<std::string> files;
   for (const std::string& folder : folders) {
-    std::vector<std::string> here;
-    std::error_code ignored;  // a folder that is not there has no files
+    std::vector<std::string> folderFiles;
+    std::error_code ignored;  // a missing folder has no files
     for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
-      if (entry.path().extension() == ".json") here.push_back(entry.path().string());
-    std::sort(here.begin(), here.end());
-    files.insert(files.end(), here.begin(), here.end());
+      if (entry.path().extension() == ".json") folderFiles.push_back(entry.path().string());
+    std::sort(folderFiles.begin(), folderFiles.end());
+    files.insert(files.end(), folderFiles.begin(), folderFiles.end());
   }
   return files;
 }
 
-EglVendor vendorOf(const std::string& file) {
+EglVendor loadVendor(const std::string& file) {
   EglVendor vendor{file, "", ""};
   std::ifstream in(file);
   const auto json = nlohmann::json::parse(in, nullptr, false);
   const nlohmann::json::json_pointer path("/ICD/library_path");
   if (json.is_discarded() || !json.contains(path) || !json.at(path).is_string()) {
-    vendor.failure = "cannot be read, or names no library";
+    vendor.failure = "cannot be read, or has no library";
     return vendor;
   }
   vendor.library = json.at(path).get<std::string>();
-  // Stays loaded, as it would be when EGL is used.
+  // Stays loaded, as in normal use of EGL.
   if (!dlopen(vendor.library.c_str(), RTLD_LAZY | RTLD_LOCAL)) {
-    const char* why = dlerror();
-    vendor.failure = why ? why : "cannot be loaded";
+    const char* reason = dlerror();
+    vendor.failure = reason ? reason : "cannot be loaded";
   }
   return vendor;
 }
 
 }  // namespace
 
-std::vector<EglVendor> eglVendors() {
-  std::vector<std::string> files = parted(std::getenv("__EGL_VENDOR_LIBRARY_FILENAMES"));
+std::vector<EglVendor> listEglVendors() {
+  std::vector<std::string> files = splitPaths(std::getenv("__EGL_VENDOR_LIBRARY_FILENAMES"));
   if (files.empty()) {
-    std::vector<std::string> folders = parted(std::getenv("__EGL_VENDOR_LIBRARY_DIRS"));
+    std::vector<std::string> folders = splitPaths(std::getenv("__EGL_VENDOR_LIBRARY_DIRS"));
     if (folders.empty()) folders = {"/etc/glvnd/egl_vendor.d", "/usr/share/glvnd/egl_vendor.d"};
-    files = filesOf(folders);
+    files = listFiles(folders);
   }
   std::vector<EglVendor> vendors;
-  std::transform(files.begin(), files.end(), std::back_inserter(vendors), vendorOf);
+  std::transform(files.begin(), files.end(), std::back_inserter(vendors), loadVendor);
   return vendors;
 }
 

@@ -1,4 +1,4 @@
-// The vendor libraries that EGL's loader is told of (libglvnd's ICD files).
+// The vendor libraries that EGL's loader finds (libglvnd's ICD files).
 #pragma once
 
 #include <string>
@@ -8,12 +8,12 @@ namespace enfilade::server {
 
 struct EglVendor {
   std::string file;     ///< the JSON that names the library
-  std::string library;  ///< as it is named there; empty when the file says none
-  std::string failure;  ///< why it cannot be used; empty: it loads
+  std::string library;  ///< library name in the file; empty if missing
+  std::string failure;  ///< reason of the failure; empty: it loads
 };
 
-/// In the order of the loader: $__EGL_VENDOR_LIBRARY_FILENAMES, else the files of
+/// Lists vendors in the loader's order: $__EGL_VENDOR_LIBRARY_FILENAMES, else the files of
 /// $__EGL_VENDOR_LIBRARY_DIRS, else of /etc/glvnd/egl_vendor.d and /usr/share/glvnd/egl_vendor.d.
-std::vector<EglVendor> eglVendors();
+std::vector<EglVendor> listEglVendors();
 
 }  // namespace enfilade::server

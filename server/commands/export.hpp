@@ -1,12 +1,17 @@
-// `enfilade export`: a recording's contacts and ways as files that other programs read.
+// `enfilade export`: writes contacts and trajectories of a recording for other programs.
 #pragma once
 
-#include "server/app/command_line.hpp"
+#include <filesystem>
+
+#include "server/base/exit_code.hpp"
 
 namespace enfilade::server {
 
-/// Throws protocol::mcap::RecordingError, and std::runtime_error for a folder that cannot be
-/// written.
+struct ExportCommand {
+  std::filesystem::path recording, out;
+};
+
+/// Throws protocol::mcap::RecordingError, and std::runtime_error for a folder that is not writable.
 ExitCode exportRecording(const ExportCommand& command);
 
 }  // namespace enfilade::server

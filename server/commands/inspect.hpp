@@ -1,11 +1,22 @@
-// `enfilade inspect`: what is in a scene, what is wrong with it, and plans of its storeys.
+// `enfilade inspect`: reports contents and problems of a scene, and draws plans of its storeys.
 #pragma once
 
-#include "server/app/command_line.hpp"
+#include <filesystem>
+
+#include "server/base/exit_code.hpp"
+#include "server/base/load_scene.hpp"
 
 namespace enfilade::server {
 
-/// Throws scene::ImportError, render::RenderError for plans that cannot be drawn.
+struct InspectCommand {
+  ModelOptions model;
+  bool json = false;
+  bool objects = false;        ///< list all objects
+  bool strict = false;         ///< problems cause the exit code `violations`
+  std::filesystem::path plan;  ///< folder for one plan per storey; empty: no plans
+};
+
+/// Throws scene::ImportError, and render::RenderError if plans cannot be drawn.
 ExitCode inspect(const InspectCommand& command);
 
 }  // namespace enfilade::server

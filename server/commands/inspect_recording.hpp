@@ -1,4 +1,4 @@
-// `enfilade inspect` of a recording: what is in it, and how far it can be read.
+// `enfilade inspect` for recordings: contents, and the readable part of a damaged file.
 #pragma once
 
 #include <filesystem>
@@ -7,9 +7,9 @@
 
 namespace enfilade::server {
 
-/// Tells it on stdout. `runtimeError` when it is spoilt; with `strict`, `violations` when its
-/// writer did not get to its end. Throws protocol::mcap::RecordingError when nothing of it can be
-/// read.
+/// Reports on stdout. Returns `runtimeError` if the file is damaged and, with `strict`,
+/// `violations` if its writer did not close it. Throws protocol::mcap::RecordingError if no part
+/// is readable.
 ExitCode inspectRecording(const std::filesystem::path& file, bool json, bool strict);
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// What `inspect` tells of a scene, as a table for people and as JSON for programs.
+// The report of `inspect` on a scene, as a table and as JSON.
 #pragma once
 
 #include <optional>
@@ -13,17 +13,17 @@ namespace enfilade::server {
 struct Inspection {
   LoadedScene loaded;
   scene::SceneReport report;
-  double peakMegabytes = 0;  ///< of resident memory: the program's or the import's, the greater
+  double peakMegabytes = 0;  ///< peak resident memory: the maximum of program and import
 };
 
-/// Reports on the scene, by the cache where it can, and asks the system for the peak.
-Inspection inspected(LoadedScene loaded, const std::optional<scene::ModelCache>& cache);
+/// Makes the report, from the cache if possible, and measures the peak memory.
+Inspection makeInspection(LoadedScene loaded, const std::optional<scene::ModelCache>& cache);
 
-/// One JSON object, indented; with `objects` also the list "object_list": of each its id, path and
-/// box, and where there are such global_id, class, operation (IFC), piece_of and only.
-std::string inspectionJson(const Inspection& inspection, bool objects);
+/// One indented JSON object. With `objects` it has "object_list": id, path and box of each object
+/// and, if known, global_id, class, operation (IFC), piece_of and only.
+std::string formatInspectionJson(const Inspection& inspection, bool objects);
 
-/// Lines for a terminal, some dozens; with `objects` one more for each object.
-std::string inspectionTable(const Inspection& inspection, bool objects);
+/// A text table for a terminal; with `objects` one more line per object.
+std::string formatInspectionTable(const Inspection& inspection, bool objects);
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// A scene's report, or what an earlier start kept of it: its convexity is costly to work out.
+// Cache of scene reports, because the convexity analysis is expensive.
 #pragma once
 
 #include <optional>
@@ -9,12 +9,12 @@
 
 namespace enfilade::server {
 
-/// reportOn(), which is kept in the cache where there is one. What went wrong with that is logged.
-scene::SceneReport reportFor(const scene::Scene& scene,
-                             const std::optional<scene::ModelCache>& cache);
+/// Loads the report from the cache, or makes and stores it. Cache errors are logged.
+scene::SceneReport loadOrMakeReport(const scene::Scene& scene,
+                                    const std::optional<scene::ModelCache>& cache);
 
-/// For the cache. Reading gives nullopt for a text that writing did not make.
-std::string textOf(const scene::SceneReport& report);
-std::optional<scene::SceneReport> reportFrom(const std::string& text);
+/// Text format of the cache. Parsing returns nullopt for an invalid text.
+std::string serializeReport(const scene::SceneReport& report);
+std::optional<scene::SceneReport> parseReport(const std::string& text);
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// The golden picture stands here as text: 16 x 12 cells, each with the id in its middle (a digit)
+// The golden picture is encoded as text: 16 x 12 cells, each with the id at its centre (a digit)
 // and its mean colour (two hexadecimal digits for red, green and blue).
 #include "server/commands/self_test_scene.hpp"
 
@@ -10,11 +10,11 @@ namespace enfilade::server {
 namespace {
 
 constexpr int kColumns = 16, kRows = 12;
-constexpr std::size_t kLetters = 7;                  // a cell: id and colour
-constexpr int kMostColour = 24;                      // of 255, in one cell
-constexpr double kMostMeanColour = 4;                // of 255
-constexpr int kMostForeignIds = 4;                   // cells whose middle lies on an edge
-constexpr double kDistance = 4, kDepthError = 1e-3;  // metres: of the back wall
+constexpr std::size_t kCellLetters = 7;                     // per cell: id and colour
+constexpr int kMaxColourError = 24;                         // of 255, per cell
+constexpr double kMaxMeanColourError = 4;                   // of 255
+constexpr int kMaxWrongIds = 4;                             // cells whose centre lies on an edge
+constexpr double kWallDistance = 4, kMaxDepthError = 1e-3;  // metres, of the back wall
 
 constexpr const char* kGolden =
     "0afbdcc0aebccb0adbccb0acbbcb0acbbcb0abbacb0abbacb0aabacb0aabacb0abbacb0abbacb0acbbcb"
@@ -34,7 +34,7 @@ constexpr const char* kGolden =
     "1a99b891a89a881a395841a294831a597851a799871a698861a597851a89a881a99b891aa9c891ab9c8a"
     "1ab9d8b1ac9e8b1ac9e8c1ad9e8c1ad9e8c1ac9e8c1ac9e8b1ab9d8b1ab9c8a1aa9c891a99b891a89a88";
 
-scene::Mesh cube() {
+scene::Mesh makeCube() {
   scene::Mesh mesh;
   mesh.name = "cube";
   for (int i = 0; i < 8; ++i) {
@@ -46,12 +46,12 @@ scene::Mesh cube() {
   return mesh;
 }
 
-void add(scene::Model& model, const char* name, const collision::Vec3& centre,
-         const collision::Vec3& size, const Eigen::Vector4f& colour) {
+void addBox(scene::Model& model, const char* name, const collision::Vec3& centre,
+            const collision::Vec3& size, const Eigen::Vector4f& colour) {
   scene::Material material;
   material.baseColour = colour;
   if (colour.w() < 1) material.alpha = scene::Material::Alpha::blend;
-  scene::Mesh mesh = cube();
+  scene::Mesh mesh = makeCube();
   mesh.material = static_cast<std::uint32_t>(model.materials.size());
   scene::Object object;
   object.path = name;
@@ -63,40 +63,42 @@ void add(scene::Model& model, const char* name, const collision::Vec3& centre,
   model.objects.push_back(std::move(object));
 }
 
-int channelOf(const std::string& proof, std::size_t cell, std::size_t channel) {
-  return std::stoi(proof.substr(kLetters * cell + 1 + 2 * channel, 2), nullptr, 16);
+int parseChannel(const std::string& encoded, std::size_t cell, std::size_t channel) {
+  return std::stoi(encoded.substr(kCellLetters * cell + 1 + 2 * channel, 2), nullptr, 16);
 }
 
-std::string coloursProblem(const std::string& proof, const std::string& golden) {
+std::string compareColours(const std::string& encoded, const std::string& golden) {
   double sum = 0;
-  const std::size_t cells = golden.size() / kLetters;
+  const std::size_t cells = golden.size() / kCellLetters;
   for (std::size_t cell = 0; cell < cells; ++cell) {
     for (std::size_t channel = 0; channel < 3; ++channel) {
-      const int off = std::abs(channelOf(proof, cell, channel) - channelOf(golden, cell, channel));
-      if (off > kMostColour) return "a colour is off by " + std::to_string(off) + " of 255";
-      sum += off;
+      const int difference =
+          std::abs(parseChannel(encoded, cell, channel) - parseChannel(golden, cell, channel));
+      if (difference > kMaxColourError)
+        return "a colour is off by " + std::to_string(difference) + " of 255";
+      sum += difference;
     }
   }
   const double mean = sum / (3 * static_cast<double>(cells));
-  return mean > kMostMeanColour
-             ? "colours are off by " + std::to_string(mean) + " of 255 in the mean"
+  return mean > kMaxMeanColourError
+             ? "colours are off by " + std::to_string(mean) + " of 255 on average"
              : "";
 }
 
 }  // namespace
 
-std::shared_ptr<const scene::Scene> proofScene() {
+std::shared_ptr<const scene::Scene> makeSelfTestScene() {
   scene::Model model;
-  model.source = "proof picture";
-  add(model, "floor", {0, -1.1, -3}, {8, 0.2, 6}, {0.5f, 0.4f, 0.3f, 1});
-  add(model, "wall", {0, 0.5, -4.5}, {8, 3, 1}, {0.8f, 0.8f, 0.75f, 1});
-  add(model, "red", {-1, -0.5, -3}, {0.8, 1, 0.8}, {0.8f, 0.1f, 0.1f, 1});
-  add(model, "blue", {0.9, -0.6, -2.6}, {0.6, 0.8, 0.6}, {0.1f, 0.2f, 0.8f, 1});
-  add(model, "pane", {0.6, -0.3, -2}, {0.9, 0.9, 0.02}, {0.1f, 0.8f, 0.3f, 0.4f});
+  model.source = "self-test picture";
+  addBox(model, "floor", {0, -1.1, -3}, {8, 0.2, 6}, {0.5f, 0.4f, 0.3f, 1});
+  addBox(model, "wall", {0, 0.5, -4.5}, {8, 3, 1}, {0.8f, 0.8f, 0.75f, 1});
+  addBox(model, "red", {-1, -0.5, -3}, {0.8, 1, 0.8}, {0.8f, 0.1f, 0.1f, 1});
+  addBox(model, "blue", {0.9, -0.6, -2.6}, {0.6, 0.8, 0.6}, {0.1f, 0.2f, 0.8f, 1});
+  addBox(model, "pane", {0.6, -0.3, -2}, {0.9, 0.9, 0.02}, {0.1f, 0.8f, 0.3f, 0.4f});
   return std::make_shared<const scene::Scene>(std::move(model));
 }
 
-render::Camera proofCamera(int width, int height) {
+render::Camera makeSelfTestCamera(int width, int height) {
   render::Camera camera;
   camera.forward = {0, 0, -1};
   camera.width = width;
@@ -104,9 +106,9 @@ render::Camera proofCamera(int width, int height) {
   return camera;
 }
 
-std::string proofOf(const render::Frame& frame) {
+std::string encodeSelfTestFrame(const render::Frame& frame) {
   const int width = frame.camera.width / kColumns, height = frame.camera.height / kRows;
-  std::string proof;
+  std::string encoded;
   for (int cell = 0; cell < kColumns * kRows; ++cell) {
     const int left = cell % kColumns * width, top = cell / kColumns * height;
     std::array<long, 3> sum{};
@@ -119,25 +121,25 @@ std::string proofOf(const render::Frame& frame) {
     const auto middle =
         static_cast<std::size_t>((top + height / 2) * frame.camera.width + left + width / 2);
     const long pixels = static_cast<long>(width) * height;
-    std::array<char, kLetters + 1> text{};
+    std::array<char, kCellLetters + 1> text{};
     std::snprintf(text.data(), text.size(), "%u%02lx%02lx%02lx", frame.ids[middle] % 10,
                   sum[0] / pixels, sum[1] / pixels, sum[2] / pixels);
-    proof += text.data();
+    encoded += text.data();
   }
-  return proof;
+  return encoded;
 }
 
-std::string proofProblem(const render::Frame& frame) {
-  const std::string proof = proofOf(frame), golden = kGolden;
-  int foreign = 0;
-  for (std::size_t letter = 0; letter < golden.size(); letter += kLetters)
-    foreign += proof[letter] == golden[letter] ? 0 : 1;
-  if (foreign > kMostForeignIds) return std::to_string(foreign) + " of 192 ids are wrong";
+std::string validateSelfTestFrame(const render::Frame& frame) {
+  const std::string encoded = encodeSelfTestFrame(frame), golden = kGolden;
+  int wrongIds = 0;
+  for (std::size_t letter = 0; letter < golden.size(); letter += kCellLetters)
+    wrongIds += encoded[letter] == golden[letter] ? 0 : 1;
+  if (wrongIds > kMaxWrongIds) return std::to_string(wrongIds) + " of 192 ids are wrong";
   const auto wall = static_cast<std::size_t>(frame.camera.height / 6 * frame.camera.width +
                                              frame.camera.width / 2);
-  if (!(std::abs(frame.depth[wall] - kDistance) < kDepthError))
+  if (!(std::abs(frame.depth[wall] - kWallDistance) < kMaxDepthError))
     return "the depth of a wall at 4 m is " + std::to_string(frame.depth[wall]);
-  return coloursProblem(proof, golden);
+  return compareColours(encoded, golden);
 }
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// A small scene made in the program, and what its picture must look like.
+// The self-test of renderers: a small built-in scene and its expected picture.
 #pragma once
 
 #include <memory>
@@ -9,16 +9,15 @@
 
 namespace enfilade::server {
 
-/// A room with a few boxes, one of them of glass.
-std::shared_ptr<const scene::Scene> proofScene();
-render::Camera proofCamera(int width, int height);
+/// Makes a room with a few boxes, one of them of glass.
+std::shared_ptr<const scene::Scene> makeSelfTestScene();
+render::Camera makeSelfTestCamera(int width, int height);
 
-/// Why the picture, taken with a proofCamera() with all of colour, ids and depth, is not what it
-/// must be; empty: it is. Devices round differently: edges may lie a pixel aside, and colours
-/// differ a little.
-std::string proofProblem(const render::Frame& frame);
+/// Validates a frame of makeSelfTestCamera() with colour, ids and depth; empty: valid. Tolerances
+/// allow for rounding of devices: edges may shift by a pixel, and colours may differ slightly.
+std::string validateSelfTestFrame(const render::Frame& frame);
 
-/// The picture as proofProblem() compares it, to be written down as the golden one.
-std::string proofOf(const render::Frame& frame);
+/// Encodes the frame as validateSelfTestFrame() compares it, for the golden picture.
+std::string encodeSelfTestFrame(const render::Frame& frame);
 
 }  // namespace enfilade::server

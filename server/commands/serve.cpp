@@ -20,7 +20,7 @@
 namespace enfilade::server {
 namespace {
 
-void tellReady(const Server& server, const scene::Scene& scene, const ServeCommand& command) {
+void printReady(const Server& server, const scene::Scene& scene, const ServeCommand& command) {
   char hash[17];
   std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(scene.hash()));
   nlohmann::ordered_json ready{
@@ -36,8 +36,8 @@ void tellReady(const Server& server, const scene::Scene& scene, const ServeComma
   writeToStdout(ready.dump(-1, ' ', false, replace) + "\n");
 }
 
-/// Signals that end the program wait until somebody asks for them.
-sigset_t holdEndingSignals() {
+/// Blocks the signals that end the program, until awaitEndingSignal() handles them.
+sigset_t blockEndingSignals() {
   sigset_t ending;
   sigemptyset(&ending);
   sigaddset(&ending, SIGINT);
@@ -46,27 +46,27 @@ sigset_t holdEndingSignals() {
   return ending;
 }
 
-/// Whether standard input is at its end. What comes before it is thrown away.
-bool inputEnded() {
+/// True if standard input is at its end. Input before that is discarded.
+bool isInputClosed() {
   pollfd input{STDIN_FILENO, POLLIN, 0};
   if (::poll(&input, 1, 0) <= 0) return false;
-  char thrownAway[4096];
-  return ::read(STDIN_FILENO, thrownAway, sizeof thrownAway) == 0;
+  char discarded[4096];
+  return ::read(STDIN_FILENO, discarded, sizeof discarded) == 0;
 }
 
-/// The signal that came; SIGTERM also for the end of input, if that ends the server. Throws when
-/// the server failed before.
+/// Waits for a signal and returns it; SIGTERM also for the end of input, if that stops the server.
+/// Throws if the server failed before.
 int awaitEndingSignal(const sigset_t& ending, const Server& server, bool stopAtEndOfInput) {
   for (;;) {
-    const timespec moment{0, 250'000'000};
-    const int signal = sigtimedwait(&ending, nullptr, &moment);
+    const timespec pollInterval{0, 250'000'000};
+    const int signal = sigtimedwait(&ending, nullptr, &pollInterval);
     if (signal > 0) return signal;
-    if (stopAtEndOfInput && inputEnded()) return SIGTERM;
+    if (stopAtEndOfInput && isInputClosed()) return SIGTERM;
     server.rethrowFailure();
   }
 }
 
-std::vector<std::shared_ptr<const scene::Scene>> loadFurther(const ServeCommand& command) {
+std::vector<std::shared_ptr<const scene::Scene>> loadFurtherScenes(const ServeCommand& command) {
   std::vector<std::shared_ptr<const scene::Scene>> scenes;
   ModelOptions model = command.model;
   for (const std::filesystem::path& file : command.furtherScenes) {
@@ -76,34 +76,35 @@ std::vector<std::shared_ptr<const scene::Scene>> loadFurther(const ServeCommand&
   return scenes;
 }
 
-/// The command as the recording that is to be played has it: the scene's file, how it is imported,
-/// and the lengths.
-ServeCommand asRecorded(const ServeCommand& asked) {
-  ServeCommand command = asked;
-  if (asked.recording.empty()) return command;
-  const protocol::SeekableRecording recording(asked.recording, asked.run);
-  command.model = recordedModel(recording.start(), asked.model.file, asked.model.cache);
-  const auto lengths = lengthsFrom(recording.start().lengths());
-  if (!lengths)
-    throw protocol::mcap::RecordingError(asked.recording.string() +
-                                         ": it has lengths that no world can have");
-  command.lengths = *lengths;
+/// Returns the command with the values of the played recording: scene file, import options and
+/// settings.
+ServeCommand applyRecording(const ServeCommand& requested) {
+  ServeCommand command = requested;
+  if (requested.recording.empty()) return command;
+  const protocol::SeekableRecording recording(requested.recording, requested.run);
+  command.model =
+      makeRecordedModelOptions(recording.start(), requested.model.file, requested.model.cache);
+  const auto settings = settingsFromProto(recording.start().lengths());
+  if (!settings)
+    throw protocol::mcap::RecordingError(requested.recording.string() +
+                                         ": it has invalid world settings");
+  command.settings = *settings;
   if (!command.from) command.from = recording.firstTick();
   return command;
 }
 
-WorldOptions worldOf(const ServeCommand& command) {
+WorldOptions makeWorldOptions(const ServeCommand& command) {
   WorldOptions world;
-  world.lengths = command.lengths;
+  world.settings = command.settings;
   world.auditEvery = command.auditEvery;
   if (!command.recording.empty()) world.replay = {command.recording, *command.from, command.run};
   if (command.record.file.empty()) return world;
   world.record = {command.record, command.model};
-  world.record->replace = false;  // what clients did cannot be had again
-  // A branch is not recorded before there is one: that is late to say so.
+  world.record->overwrite = false;  // the actions of clients cannot be reproduced
+  // The file of a branch is created only with the branch, which is too late for this error.
   if (world.replay && std::filesystem::exists(command.record.file))
     throw protocol::mcap::RecordingError(command.record.file.string() +
-                                         ": is there already: move it away, or name another file");
+                                         ": exists already: move it, or give another file name");
   return world;
 }
 
@@ -112,33 +113,33 @@ ExitCode serveUntilSignal(const ServeCommand& command) {
   if (!command.tokenFile.empty()) access.tokens = readTokens(command.tokenFile);
   const auto scene = loadScene(command.model);
   ServerOptions options;
-  options.furtherScenes = loadFurther(command);
-  // From here on: the threads that the server starts inherit the mask.
-  const sigset_t ending = holdEndingSignals();
-  options.world = worldOf(command);
+  options.additionalScenes = loadFurtherScenes(command);
+  // Before the server starts: its threads inherit the signal mask.
+  const sigset_t ending = blockEndingSignals();
+  options.world = makeWorldOptions(command);
   options.access = std::move(access);
   options.drawing = command.drawing;
   Server server(scene, command.listen, std::move(options));
-  tellReady(server, *scene, command);
+  printReady(server, *scene, command);
   const int signal = awaitEndingSignal(ending, server, command.stopAtEndOfInput);
-  spdlog::info("{}: finishing the tick and telling the clients",
-               signal == SIGINT ? "interrupted" : "told to stop");
+  spdlog::info("{}: finishing the tick and notifying the clients",
+               signal == SIGINT ? "interrupted" : "stopped");
   server.stop();
   const AuditTotals audit = server.auditTotals();
   if (command.auditEvery != 0) logTotals(audit);
-  if (!server.recordedAll()) return ExitCode::runtimeError;
+  if (!server.isRecordingComplete()) return ExitCode::runtimeError;
   if (signal == SIGINT) return ExitCode::interrupted;
-  return audit.right() ? ExitCode::done : ExitCode::violations;
+  return audit.isClean() ? ExitCode::success : ExitCode::violations;
 }
 
 }  // namespace
 
 ExitCode serve(const ServeCommand& command) {
   try {
-    return serveUntilSignal(asRecorded(command));
-  } catch (const Diverged& diverged) {
+    return serveUntilSignal(applyRecording(command));
+  } catch (const Divergence& diverged) {
     std::fprintf(stderr, "enfilade: %s: it cannot be played: %s\n",
-                 command.recording.string().c_str(), textOf(diverged).c_str());
+                 command.recording.string().c_str(), formatDivergence(diverged).c_str());
     return ExitCode::diverged;
   }
 }

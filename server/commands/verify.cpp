@@ -17,20 +17,20 @@ namespace {
 
 using protocol::mcap::RecordingError;
 
-/// A recording that is read from front to back: every byte of it.
-class Replayed {
+/// Re-runs a recording, reads all of it, and compares the state after every tick.
+class RecordingVerifier {
  public:
-  explicit Replayed(const VerifyCommand& command)
+  explicit RecordingVerifier(const VerifyCommand& command)
       : command_(command), recording_(command.recording, command.run) {}
 
-  /// Throws Diverged.
-  void all() {
+  /// Throws Divergence.
+  void verifyRuns() {
     while (const auto item = recording_.next()) {
-      if (interrupted()) throw Interrupted{};
-      std::visit([this](const auto& message) { take(message); }, *item);
+      if (isInterrupted()) throw Interrupted{};
+      std::visit([this](const auto& message) { apply(message); }, *item);
     }
     if (!scene_)
-      throw RecordingError(command_.recording.string() + ": no recording of Enfilade begins in it");
+      throw RecordingError(command_.recording.string() + ": not a recording of Enfilade");
   }
 
   std::uint64_t ticks() const { return ticks_; }
@@ -38,43 +38,47 @@ class Replayed {
   const protocol::RecordingReader& recording() const { return recording_; }
 
  private:
-  void take(const v1::RecordingStart& start) {
-    if (!scene_) scene_ = loadScene(recordedModel(start, command_.scene, command_.cache));
+  void apply(const v1::RecordingStart& start) {
+    if (!scene_)
+      scene_ = loadScene(makeRecordedModelOptions(start, command_.scene, command_.cache));
     world_.reset();
-    if (!start.has_parent()) world_.emplace(worldAtStart(scene_, start));
+    if (!start.has_parent()) world_.emplace(makeWorldAtStart(scene_, start));
   }
-  /// A branch begins with one; all others must be what is made again.
-  void take(const v1::RecordedCheckpoint& checkpoint) {
-    if (!scene_) throw RecordingError("the recording does not begin with its scene");
+  /// A branch starts from its first checkpoint. All others must match the replay.
+  void apply(const v1::RecordedCheckpoint& checkpoint) {
+    if (!scene_) throw RecordingError("the recording does not start with its scene");
     if (!world_) {
-      world_.emplace(worldAt(scene_, checkpoint));
+      world_.emplace(makeWorldFromCheckpoint(scene_, checkpoint));
       return;
     }
-    const std::uint32_t version = scene::checkpointVersion(bytesOf(checkpoint));
-    if (version != scene::kCheckpointVersion) return;  // of another program; it is not read here
-    const auto made = scene::checkpointOf(*world_);
-    const auto recorded = bytesOf(checkpoint);
-    if (!std::equal(made.begin(), made.end(), recorded.begin(), recorded.end()))
-      throw Diverged{checkpoint.tick(),
-                     {"the world", "checkpoint", std::to_string(recorded.size()) + " bytes",
-                      std::to_string(made.size()) + " bytes"}};
+    const std::uint32_t version = scene::readCheckpointVersion(getCheckpointBytes(checkpoint));
+    if (version != scene::kCheckpointVersion) return;  // other version: not comparable
+    const auto actual = scene::makeCheckpoint(*world_);
+    const auto recorded = getCheckpointBytes(checkpoint);
+    if (!std::equal(actual.begin(), actual.end(), recorded.begin(), recorded.end()))
+      throw Divergence{checkpoint.tick(),
+                       {"the world", "checkpoint", std::to_string(recorded.size()) + " bytes",
+                        std::to_string(actual.size()) + " bytes"}};
   }
-  void take(const v1::RecordedCommands& commands) { server::take(world(), commands); }
-  void take(const v1::State& recorded) {
-    scene::tick(world());
+  void apply(const v1::RecordedCommands& commands) {
+    server::applyRecordedCommands(world(), commands);
+  }
+  void apply(const v1::State& recorded) {
+    scene::tickWorld(world());
     ++ticks_;
-    if (auto difference = differenceFrom(*world_, recorded))
-      throw Diverged{world_->snapshot()->tick, *difference};
+    if (auto difference = compareState(*world_, recorded))
+      throw Divergence{world_->snapshot()->tick, *difference};
   }
   template <class Other>
-  void take(const Other&) {}
+  void apply(const Other&) {}
 
-  static std::span<const std::uint8_t> bytesOf(const v1::RecordedCheckpoint& checkpoint) {
+  static std::span<const std::uint8_t> getCheckpointBytes(
+      const v1::RecordedCheckpoint& checkpoint) {
     return {reinterpret_cast<const std::uint8_t*>(checkpoint.world().data()),
             checkpoint.world().size()};
   }
   scene::World& world() {
-    if (!world_) throw RecordingError("the recording does not begin with its scene");
+    if (!world_) throw RecordingError("the recording does not start with its scene");
     return *world_;
   }
 
@@ -86,71 +90,72 @@ class Replayed {
 };
 
 nlohmann::ordered_json verifyAll(const VerifyCommand& command) {
-  Replayed replayed(command);
-  replayed.all();
-  const protocol::RecordingReader& recording = replayed.recording();
-  nlohmann::ordered_json told{{"ticks", replayed.ticks()},
-                              {"state_hash", protocol::hexadecimal(replayed.hash())},
-                              {"closed", recording.closed()}};
+  RecordingVerifier verifier(command);
+  verifier.verifyRuns();
+  const protocol::RecordingReader& recording = verifier.recording();
+  nlohmann::ordered_json report{{"ticks", verifier.ticks()},
+                                {"state_hash", protocol::toHex(verifier.hash())},
+                                {"closed", recording.closed()}};
   if (!recording.complete()) {
-    told["whole_bytes"] = recording.wholeBytes();
-    spdlog::warn("{}: it was cut off after byte {}; what comes before was verified",
+    report["whole_bytes"] = recording.wholeBytes();
+    spdlog::warn("{}: truncated after byte {}; the data before that was verified",
                  command.recording.string(), recording.wholeBytes());
   }
-  return told;
+  return report;
 }
 
-/// From a tick on; what was recorded before is not read.
-nlohmann::ordered_json verifyFrom(const VerifyCommand& command, std::uint64_t from) {
+/// Verifies from a tick onwards. Earlier data is not read.
+nlohmann::ordered_json verifyFromTick(const VerifyCommand& command, std::uint64_t from) {
   Playback playback(command.recording, command.run.value_or(1));
-  const auto scene = loadScene(recordedModel(playback.start(), command.scene, command.cache));
+  const auto scene =
+      loadScene(makeRecordedModelOptions(playback.start(), command.scene, command.cache));
   Progress bar;
-  const auto tell = [&](std::uint64_t tick) {
-    if (interrupted()) throw Interrupted{};
+  const auto showProgress = [&](std::uint64_t tick) {
+    if (isInterrupted()) throw Interrupted{};
     bar.show(static_cast<double>(tick) / static_cast<double>(playback.lastTick()),
              "tick " + std::to_string(tick));
   };
-  scene::World world = playback.worldAfter(from, scene, tell);
-  while (playback.step(world)) tell(world.snapshot()->tick);
+  scene::World world = playback.restoreWorldAfter(from, scene, showProgress);
+  while (playback.step(world)) showProgress(world.snapshot()->tick);
   bar.clear();
   return {{"from_tick", from},
-          {"from_checkpoint", playback.beganAt()},
-          {"ticks", world.snapshot()->tick - playback.beganAt()},
-          {"state_hash", protocol::hexadecimal(world.snapshot()->stateHash)},
+          {"from_checkpoint", playback.startTick()},
+          {"ticks", world.snapshot()->tick - playback.startTick()},
+          {"state_hash", protocol::toHex(world.snapshot()->stateHash)},
           {"closed", playback.closed()}};
 }
 
-ExitCode tell(const Diverged& diverged) {
-  const protocol::StateDifference& what = diverged.difference;
-  nlohmann::ordered_json told;
-  told["diverged"] = {{"tick", diverged.tick},
-                      {"who", what.who},
-                      {"field", what.field},
-                      {"recorded", what.recorded},
-                      {"replayed", what.replayed}};
-  std::fprintf(stderr, "enfilade: %s\n", textOf(diverged).c_str());
-  if (what.who == kTheScene)
+ExitCode reportDivergence(const Divergence& diverged) {
+  const protocol::StateDifference& difference = diverged.difference;
+  nlohmann::ordered_json report;
+  report["diverged"] = {{"tick", diverged.tick},
+                        {"who", difference.entity},
+                        {"field", difference.field},
+                        {"recorded", difference.recorded},
+                        {"replayed", difference.replayed}};
+  std::fprintf(stderr, "enfilade: %s\n", formatDivergence(diverged).c_str());
+  if (difference.entity == kSceneSubject)
     std::fprintf(stderr,
-                 "  what became of the walk in another model: replay SCENE RECORDING "
+                 "  to run the walk in another model: replay SCENE RECORDING "
                  "--out DIR, without --verify\n");
-  writeToStdout(told.dump() + "\n");
+  writeToStdout(report.dump() + "\n");
   return ExitCode::diverged;
 }
 
-ExitCode verified(const VerifyCommand& command) {
+ExitCode runVerification(const VerifyCommand& command) {
   try {
-    const auto told = command.from ? verifyFrom(command, *command.from) : verifyAll(command);
-    writeToStdout(told.dump() + "\n");
-    return ExitCode::done;
-  } catch (const Diverged& diverged) {
-    return tell(diverged);
+    const auto report = command.from ? verifyFromTick(command, *command.from) : verifyAll(command);
+    writeToStdout(report.dump() + "\n");
+    return ExitCode::success;
+  } catch (const Divergence& diverged) {
+    return reportDivergence(diverged);
   }
 }
 
 }  // namespace
 
 ExitCode verify(const VerifyCommand& command) {
-  return interruptible([&] { return verified(command); }, "nothing was written");
+  return runInterruptible([&] { return runVerification(command); }, "no file was written");
 }
 
 }  // namespace enfilade::server

@@ -1,26 +1,25 @@
-// Pictures of the places that changed, before and after, and a plan with all of them.
+// Pictures of changed places, before and after, and a plan with all changes.
 #pragma once
 
 #include <filesystem>
 
-#include "render/service/renderer.hpp"
-#include "server/app/command_line.hpp"
+#include "render/service/renderer_selector.hpp"
+#include "server/base/drawing_options.hpp"
 #include "server/diff/walk_difference.hpp"
 
 namespace enfilade::server {
 
 struct ComparedModels {
-  std::shared_ptr<const scene::Scene> before;  ///< null: it cannot be had
+  std::shared_ptr<const scene::Scene> before;  ///< null: not available
   std::shared_ptr<const scene::Scene> after;
-  render::Renderer* afterRenderer = nullptr;
-  DrawingOptions drawing;  ///< of the other renderer
+  render::RendererSelector* afterRenderer = nullptr;
+  DrawingOptions drawing;  ///< options of the second renderer
 };
 
-/// Writes changes/NNN.png below `folder`, at most `most`, the worst changes first, and
-/// changes/map.png; notes each picture's name in its changes. Changes of one pair near one another
-/// share a picture. Makes both walks again for the moments that are drawn. Throws
-/// render::RenderError, std::runtime_error.
-void drawChanges(WalkDifference& difference, const ComparedModels& models, std::uint32_t most,
-                 const std::filesystem::path& folder);
+/// Writes at most `maxPictures` files changes/NNN.png below `folder`, worst changes first, and
+/// changes/map.png. Stores each picture's name in its changes; close changes of one pair share a
+/// picture. Replays both walks for the moments. Throws render::RenderError, std::runtime_error.
+void drawChanges(WalkDifference& difference, const ComparedModels& models,
+                 std::uint32_t maxPictures, const std::filesystem::path& folder);
 
 }  // namespace enfilade::server

@@ -1,11 +1,19 @@
-// `enfilade diff`: what changed between two recorded walks.
+// `enfilade diff`: reports the changes between two recorded walks.
 #pragma once
 
-#include "server/app/command_line.hpp"
+#include <filesystem>
+
+#include "server/base/exit_code.hpp"
 
 namespace enfilade::server {
 
-/// `violations`: something got worse. Throws protocol::mcap::RecordingError.
+struct DiffCommand {
+  std::filesystem::path before, after;
+  double tolerance = 0.001;  ///< metres; smaller differences are ignored
+  bool json = false;
+};
+
+/// Returns `violations` if something got worse. Throws protocol::mcap::RecordingError.
 ExitCode diff(const DiffCommand& command);
 
 }  // namespace enfilade::server

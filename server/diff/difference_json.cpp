@@ -1,7 +1,8 @@
+#include "server/diff/difference_json.hpp"
+
 #include <nlohmann/json.hpp>
 
 #include "protocol/recording/recording.hpp"
-#include "server/diff/difference_report.hpp"
 #include "server/messages/event_names.hpp"
 
 namespace enfilade::server {
@@ -9,73 +10,73 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json jsonOf(const Vec3& v) {
+Json toJson(const Vec3& v) {
   return Json::array({v.x(), v.y(), v.z()});
 }
 
-Json jsonOf(const Happening& happening) {
-  Json json{{"a", happening.a},
-            {"b", happening.b},
-            {"tick", happening.tick},
-            {"time", happening.time},
-            {"point", jsonOf(happening.point)},
-            {"normal", jsonOf(happening.normal)},
-            {"distance", happening.distance}};
-  if (happening.ended) json["ended"] = *happening.ended;
+Json toJson(const WalkEvent& walkEvent) {
+  Json json{{"a", walkEvent.a},
+            {"b", walkEvent.b},
+            {"tick", walkEvent.tick},
+            {"time", walkEvent.time},
+            {"point", toJson(walkEvent.point)},
+            {"normal", toJson(walkEvent.normal)},
+            {"distance", walkEvent.distance}};
+  if (walkEvent.ended) json["ended"] = *walkEvent.ended;
   return json;
 }
 
-Json jsonOf(const Nearest& nearest) {
+Json toJson(const Nearest& nearest) {
   return {{"distance", nearest.distance},
           {"tick", nearest.tick},
           {"time", nearest.time},
-          {"point", jsonOf(nearest.point)}};
+          {"point", toJson(nearest.point)}};
 }
 
-Json jsonOf(const OrderEnd& end) {
-  Json json{{"outcome", wordOf(end.kind)},
+Json toJson(const OrderEnd& end) {
+  Json json{{"outcome", toString(end.kind)},
             {"tick", end.tick},
             {"time", end.time},
-            {"position", jsonOf(end.position)}};
+            {"position", toJson(end.position)}};
   if (!end.obstacle.empty()) json["obstacle"] = end.obstacle;
   if (!end.text.empty()) json["text"] = end.text;
   return json;
 }
 
-Json jsonOf(const AvatarRecord& avatar) {
-  return {{"entered", avatar.entered}, {"last", avatar.last}, {"way_length", avatar.wayLength}};
+Json toJson(const AvatarRecord& avatar) {
+  return {{"entered", avatar.entered}, {"last", avatar.last}, {"way_length", avatar.pathLength}};
 }
 
 template <class Value>
 Json optionalJson(const std::optional<Value>& value) {
-  return value ? jsonOf(*value) : Json(nullptr);
+  return value ? toJson(*value) : Json(nullptr);
 }
 
-const char* wordOf(HappeningKind kind) {
+const char* getKindName(WalkEventKind kind) {
   switch (kind) {
-    case HappeningKind::blocked:
+    case WalkEventKind::blocked:
       return "blocked";
-    case HappeningKind::contact:
+    case WalkEventKind::contact:
       return "contact";
-    case HappeningKind::fall:
+    case WalkEventKind::fall:
       return "fall";
-    case HappeningKind::enter:
+    case WalkEventKind::enter:
       return "enter";
-    case HappeningKind::leave:
+    case WalkEventKind::leave:
       return "leave";
-    case HappeningKind::ground:
+    case WalkEventKind::ground:
       return "ground";
   }
   return "unknown";
 }
 
-const char* wordOf(Model model) {
+const char* getModelName(ModelSide model) {
   switch (model) {
-    case Model::both:
+    case ModelSide::both:
       return "both";
-    case Model::before:
+    case ModelSide::before:
       return "before";
-    case Model::after:
+    case ModelSide::after:
       return "after";
     default:
       return "unknown";
@@ -83,103 +84,103 @@ const char* wordOf(Model model) {
 }
 
 template <class Change>
-const char* changeWord(const Change& change) {
+const char* getChangeName(const Change& change) {
   if (!change.before) return "new";
   return change.after ? "moved" : "gone";
 }
 
 template <class Change>
-void addEnd(Json& json, const Change& change) {
+void addCommonFields(Json& json, const Change& change) {
   json["run"] = change.run + 1;
   json["worse"] = change.worse;
   if (!change.picture.empty()) json["picture"] = change.picture;
 }
 
-Json jsonOf(const HappeningChange& change) {
-  Json json{{"kind", wordOf(change.kind)},
-            {"change", changeWord(change)},
+Json toJson(const WalkEventChange& change) {
+  Json json{{"kind", getKindName(change.kind)},
+            {"change", getChangeName(change)},
             {"before", optionalJson(change.before)},
             {"after", optionalJson(change.after)},
-            {"b_in_model", wordOf(change.inModel)}};
+            {"b_in_model", getModelName(change.inModel)}};
   if (change.before && change.after) {
     json["shift"] = change.shift;
     json["delay"] = change.delay;
   }
-  if (change.otherwise) json["otherwise_nearest"] = *change.otherwise;
-  addEnd(json, change);
+  if (change.otherDistance) json["otherwise_nearest"] = *change.otherDistance;
+  addCommonFields(json, change);
   return json;
 }
 
-Json jsonOf(const OrderChange& change) {
-  const OrderEnd& told = change.after ? *change.after : *change.before;
-  Json json{{"avatar", told.avatar},
-            {"tag", told.tag},
+Json toJson(const OrderChange& change) {
+  const OrderEnd& end = change.after ? *change.after : *change.before;
+  Json json{{"avatar", end.avatar},
+            {"tag", end.tag},
             {"before", optionalJson(change.before)},
             {"after", optionalJson(change.after)}};
-  addEnd(json, change);
+  addCommonFields(json, change);
   return json;
 }
 
-Json jsonOf(const ClearanceChange& change) {
+Json toJson(const ClearanceChange& change) {
   Json json{{"a", change.a},
             {"b", change.b},
             {"before", optionalJson(change.before)},
             {"after", optionalJson(change.after)},
-            {"changed_by_at_least", change.least},
-            {"b_in_model", wordOf(change.inModel)}};
-  addEnd(json, change);
+            {"changed_by_at_least", change.minChange},
+            {"b_in_model", getModelName(change.inModel)}};
+  addCommonFields(json, change);
   return json;
 }
 
-Json jsonOf(const WayChange& way) {
-  return {{"avatar", way.avatar},
-          {"before", optionalJson(way.before)},
-          {"after", optionalJson(way.after)},
-          {"first_tick", way.firstTick},
-          {"farthest", way.farthest},
-          {"farthest_tick", way.farthestTick},
-          {"run", way.run + 1}};
+Json toJson(const PathChange& path) {
+  return {{"avatar", path.avatar},
+          {"before", optionalJson(path.before)},
+          {"after", optionalJson(path.after)},
+          {"first_tick", path.firstTick},
+          {"farthest", path.maxDistance},
+          {"farthest_tick", path.maxDistanceTick},
+          {"run", path.run + 1}};
 }
 
-Json jsonOf(const RefusedCommand& refused) {
-  return {{"tick", refused.tick}, {"who", refused.who}, {"why", refused.why}};
+Json toJson(const RefusedCommand& refused) {
+  return {{"tick", refused.tick}, {"who", refused.name}, {"why", refused.reason}};
 }
 
-Json jsonOf(const RecordedRun& run) {
+Json toJson(const RecordedRun& run) {
   return {{"scene", run.start.scene().source()},
-          {"scene_hash", protocol::hexadecimal(run.start.scene().hash())},
+          {"scene_hash", protocol::toHex(run.start.scene().hash())},
           {"ticks", run.ticks},
           {"time", run.time},
-          {"state_hash", protocol::hexadecimal(run.hash)}};
+          {"state_hash", protocol::toHex(run.hash)}};
 }
 
 template <class Items>
-Json listOf(const Items& items) {
+Json listToJson(const Items& items) {
   Json list = Json::array();
-  for (const auto& item : items) list.push_back(jsonOf(item));
+  for (const auto& item : items) list.push_back(toJson(item));
   return list;
 }
 
-Json jsonOf(const RecordedWalk& walk) {
-  Json json{{"file", walk.file.string()}, {"closed", walk.closed}, {"runs", listOf(walk.runs)}};
+Json toJson(const RecordedWalk& walk) {
+  Json json{{"file", walk.file.string()}, {"closed", walk.closed}, {"runs", listToJson(walk.runs)}};
   if (!walk.closed) json["whole_bytes"] = walk.wholeBytes;
   return json;
 }
 
 }  // namespace
 
-std::string differenceJson(const WalkDifference& difference) {
-  const Json json{{"same", difference.none() && difference.refused.empty()},
+std::string formatDifferenceJson(const WalkDifference& difference) {
+  const Json json{{"same", difference.isEmpty() && difference.refused.empty()},
                   {"worse", difference.worse},
                   {"tolerance", difference.tolerance},
-                  {"before", jsonOf(difference.before)},
-                  {"after", jsonOf(difference.after)},
-                  {"happenings", listOf(difference.happenings)},
-                  {"orders", listOf(difference.orders)},
-                  {"clearances", listOf(difference.clearances)},
-                  {"ways", listOf(difference.ways)},
-                  {"refused_commands", listOf(difference.refused)}};
-  // Names come from files: what is not UTF-8 in them is replaced.
+                  {"before", toJson(difference.before)},
+                  {"after", toJson(difference.after)},
+                  {"happenings", listToJson(difference.events)},
+                  {"orders", listToJson(difference.orders)},
+                  {"clearances", listToJson(difference.clearances)},
+                  {"ways", listToJson(difference.paths)},
+                  {"refused_commands", listToJson(difference.refused)}};
+  // Names come from files: bytes that are not UTF-8 are replaced.
   return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 

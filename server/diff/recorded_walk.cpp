@@ -13,20 +13,20 @@ namespace {
 using protocol::mcap::RecordingError;
 using Event = v1::ContactEvent;
 
-Happening happeningOf(const Event& event) {
-  Happening happening;
-  happening.a = event.a_name();
-  happening.b = event.b_name();
-  happening.tick = event.tick();
-  happening.time = event.time();
-  happening.point = vectorFrom(event.point_b());
-  happening.normal = vectorFrom(event.normal());
-  happening.distance = event.distance();
-  return happening;
+WalkEvent toWalkEvent(const Event& event) {
+  WalkEvent walkEvent;
+  walkEvent.a = event.a_name();
+  walkEvent.b = event.b_name();
+  walkEvent.tick = event.tick();
+  walkEvent.time = event.time();
+  walkEvent.point = vectorFromProto(event.point_b());
+  walkEvent.normal = vectorFromProto(event.normal());
+  walkEvent.distance = event.distance();
+  return walkEvent;
 }
 
-/// As seen from `b`.
-Event turnedRound(Event event) {
+/// Swaps the roles of a and b.
+Event swapSides(Event event) {
   std::swap(*event.mutable_a_name(), *event.mutable_b_name());
   std::swap(*event.mutable_point_a(), *event.mutable_point_b());
   v1::Vec3& normal = *event.mutable_normal();
@@ -39,24 +39,24 @@ Event turnedRound(Event event) {
   return event;
 }
 
-/// Gathers a run, message by message.
-class RunGatherer {
+/// Collects the data of a run from its messages.
+class RunCollector {
  public:
-  /// `since`: what is told up to this tick is left out.
-  RunGatherer(const v1::RecordingStart& start, std::uint64_t since) : since_(since) {
+  /// `since`: events up to this tick are skipped.
+  RunCollector(const v1::RecordingStart& start, std::uint64_t since) : since_(since) {
     run_.start = start;
     run_.hash = start.state_hash();
     for (const v1::Body& body : start.scene().bodies())
-      if (body.kind() == "rigid") rigid_.insert(body.name());
+      if (body.kind() == "rigid") dynamicBodies_.insert(body.name());
   }
 
   void add(const v1::TickEvents& events) {
     for (const Event& event : events.contacts()) {
-      if (event.tick() <= since_) continue;  // of what a branch found alive, too
-      isTurned(event) ? add(turnedRound(event)) : add(event);
+      if (event.tick() <= since_) continue;  // includes contacts active at the start of a branch
+      isSwapped(event) ? addContact(swapSides(event)) : addContact(event);
     }
     if (events.tick() <= since_) return;
-    for (const v1::Notice& notice : events.notices()) add(notice, events.time());
+    for (const v1::Notice& notice : events.notices()) addNotice(notice, events.time());
   }
 
   void add(const v1::State& state) {
@@ -65,13 +65,13 @@ class RunGatherer {
     run_.hash = state.hash();
     if (state.tick() <= since_) return;
     for (const v1::AvatarState& avatar : state.avatars()) {
-      const Vec3 feet = vectorFrom(avatar.feet());
+      const Vec3 feet = vectorFromProto(avatar.feet());
       const auto [at, isNew] = run_.avatars.try_emplace(avatar.name());
-      const auto before = feet_.find(avatar.id());
+      const auto before = footPositions_.find(avatar.id());
       if (isNew) at->second.entered = state.time();
-      if (before != feet_.end()) at->second.wayLength += (feet - before->second).norm();
+      if (before != footPositions_.end()) at->second.pathLength += (feet - before->second).norm();
       at->second.last = state.time();
-      feet_[avatar.id()] = feet;
+      footPositions_[avatar.id()] = feet;
     }
   }
 
@@ -79,106 +79,107 @@ class RunGatherer {
   RecordedRun finish() { return std::move(run_); }
 
  private:
-  /// Of two free bodies the ids tell who comes first, and in another model they may be others: here
-  /// it is the names.
-  bool isTurned(const Event& event) const {
-    return event.b_name() < event.a_name() && rigid_.contains(event.a_name()) &&
-           rigid_.contains(event.b_name());
+  /// True if a and b must be swapped. The recording orders dynamic bodies by ids, which differ
+  /// between models; here the order of names applies.
+  bool isSwapped(const Event& event) const {
+    return event.b_name() < event.a_name() && dynamicBodies_.contains(event.a_name()) &&
+           dynamicBodies_.contains(event.b_name());
   }
 
-  /// One stands on the other: b lies below, no steeper than ground may be; of two free bodies
-  /// either.
-  bool isGround(const Event& event) const {
+  /// True for ground contacts: b lies below at a walkable slope; for two dynamic bodies, either
+  /// lies below.
+  bool isGroundContact(const Event& event) const {
     const double down = -event.normal().y();
-    const double steepest = run_.start.lengths().walkable_normal_y();
-    return down >= steepest || (-down >= steepest && rigid_.contains(event.b_name()));
+    const double walkableNormalY = run_.start.lengths().walkable_normal_y();
+    return down >= walkableNormalY ||
+           (-down >= walkableNormalY && dynamicBodies_.contains(event.b_name()));
   }
 
-  void add(const Event& event) {
+  void addContact(const Event& event) {
     PairRecord& pair = run_.pairs[{event.a_name(), event.b_name()}];
     switch (event.kind()) {
       case Event::KIND_BEGIN:
-        begin(pair, event);
+        beginContact(pair, event);
         break;
       case Event::KIND_END:
-        end(event);
+        endContact(event);
         break;
       case Event::KIND_NEAR:
-        // Where it begins it is as near as the walk's step left it; who comes to touch has no
-        // least.
-        if (event.phase() == Event::PHASE_MIN) noteDistance(pair, event);
+        // Only PHASE_MIN has the minimum: the distance at the beginning depends on the step.
+        if (event.phase() == Event::PHASE_MIN) updateNearest(pair, event);
         break;
       case Event::KIND_BLOCKED:
-        pair.blocked.push_back(happeningOf(event));
+        pair.blocked.push_back(toWalkEvent(event));
         break;
       case Event::KIND_ENTER:
-        pair.enters.push_back(happeningOf(event));
+        pair.enters.push_back(toWalkEvent(event));
         break;
       case Event::KIND_LEAVE:
-        pair.leaves.push_back(happeningOf(event));
+        pair.leaves.push_back(toWalkEvent(event));
         break;
       case Event::KIND_LEFT_WORLD:
-        pair.falls.push_back(happeningOf(event));
+        pair.falls.push_back(toWalkEvent(event));
         break;
       default:
         break;
     }
   }
 
-  void begin(PairRecord& pair, const Event& event) {
-    auto& list = isGround(event) ? pair.ground : pair.contacts;
-    live_[{event.a(), event.b()}] = {&list, list.size()};
-    list.push_back(happeningOf(event));
-    noteDistance(pair, event);
+  void beginContact(PairRecord& pair, const Event& event) {
+    auto& list = isGroundContact(event) ? pair.ground : pair.contacts;
+    activeContacts_[{event.a(), event.b()}] = {&list, list.size()};
+    list.push_back(toWalkEvent(event));
+    updateNearest(pair, event);
   }
 
-  void end(const Event& event) {
-    const auto found = live_.find({event.a(), event.b()});
-    if (found == live_.end()) return;
+  void endContact(const Event& event) {
+    const auto found = activeContacts_.find({event.a(), event.b()});
+    if (found == activeContacts_.end()) return;
     (*found->second.first)[found->second.second].ended = event.time();
-    live_.erase(found);
+    activeContacts_.erase(found);
   }
 
-  void noteDistance(PairRecord& pair, const Event& event) const {
-    if (isGround(event)) return;
+  void updateNearest(PairRecord& pair, const Event& event) const {
+    if (isGroundContact(event)) return;
     if (pair.nearest && pair.nearest->distance <= event.distance()) return;
     pair.nearest =
-        Nearest{event.distance(), event.tick(), event.time(), vectorFrom(event.point_b())};
+        Nearest{event.distance(), event.tick(), event.time(), vectorFromProto(event.point_b())};
   }
 
-  void add(const v1::Notice& notice, double time) {
-    if (!isEnd(notice)) return;
+  void addNotice(const v1::Notice& notice, double time) {
+    if (!endsOrder(notice)) return;
     OrderEnd end;
     end.kind = notice.kind();
     end.avatar = notice.avatar();
     end.tag = notice.tag();
-    end.repeat = ended_[{notice.avatar(), notice.tag(), isLeaving(notice)}]++;
+    end.repeat = endedOrders_[{notice.avatar(), notice.tag(), isLeaving(notice)}]++;
     end.tick = notice.tick();
     end.time = time;
-    end.position = vectorFrom(notice.position());
+    end.position = vectorFromProto(notice.position());
     end.obstacle = notice.obstacle_name();
     end.text = notice.text();
     run_.orders.push_back(std::move(end));
   }
 
-  /// What is dropped was not told in older recordings, and has no outcome to compare.
-  static bool isEnd(const v1::Notice& notice) {
+  /// True if the notice ends an order. Dropped orders have no outcome, and older recordings lack
+  /// them.
+  static bool endsOrder(const v1::Notice& notice) {
     return notice.kind() != v1::Notice::KIND_CAPTURE && notice.kind() != v1::Notice::KIND_DROPPED;
   }
-  /// It ends no order that is counted.
+  /// True if the avatar left. Such a notice ends no counted order.
   static bool isLeaving(const v1::Notice& notice) { return notice.kind() == v1::Notice::KIND_LEFT; }
 
   RecordedRun run_;
   const std::uint64_t since_;
-  std::set<std::string> rigid_;         ///< names of the free bodies
-  std::map<std::uint32_t, Vec3> feet_;  ///< by entity, as of the last tick
-  /// Where a contact that lasts stands, by the entities; lists of a std::map's values stay.
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::pair<std::vector<Happening>*, std::size_t>>
-      live_;
-  std::map<std::tuple<std::string, std::uint64_t, bool>, std::uint32_t> ended_;
+  std::set<std::string> dynamicBodies_;          ///< names of the dynamic bodies
+  std::map<std::uint32_t, Vec3> footPositions_;  ///< positions of the last tick, by entity
+  /// Positions of active contacts, by entities. The list pointers stay valid inside a std::map.
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::pair<std::vector<WalkEvent>*, std::size_t>>
+      activeContacts_;
+  std::map<std::tuple<std::string, std::uint64_t, bool>, std::uint32_t> endedOrders_;
 };
 
-/// After the first start.
+/// Adds the names, which follow the first start.
 void addNames(RecordedWalk& walk, const v1::Scene& scene, const v1::RecordedNames& names) {
   if (!walk.objects) walk.objects.emplace();
   for (const v1::Body& body : scene.bodies()) {
@@ -193,36 +194,36 @@ void addNames(RecordedWalk& walk, const v1::Scene& scene, const v1::RecordedName
 
 }  // namespace
 
-WalkMoment endOf(const RecordedWalk& walk) {
+WalkMoment findEnd(const RecordedWalk& walk) {
   return {walk.runs.size() - 1, walk.runs.back().ticks};
 }
 
-RecordedWalk readWalk(const std::filesystem::path& file, const WalkPart& part) {
-  protocol::RecordingReader reader(file, part.run);
+RecordedWalk readWalk(const std::filesystem::path& file, const WalkRange& range) {
+  protocol::RecordingReader reader(file, range.run);
   RecordedWalk walk;
   walk.file = file;
-  walk.run = part.run;
-  std::optional<RunGatherer> run;
+  walk.run = range.run;
+  std::optional<RunCollector> run;
   while (const auto item = reader.next()) {
     if (const auto* start = std::get_if<v1::RecordingStart>(&*item)) {
       if (run) walk.runs.push_back(run->finish());
-      run.emplace(*start, walk.runs.empty() ? part.since : 0);
+      run.emplace(*start, walk.runs.empty() ? range.since : 0);
       continue;
     }
-    if (!run) throw RecordingError(file.string() + ": does not begin with its scene");
+    if (!run) throw RecordingError(file.string() + ": does not start with its scene");
     if (const auto* names = std::get_if<v1::RecordedNames>(&*item))
       addNames(walk, run->scene(), *names);
-    const auto wanted = [&](const auto& told) {
-      return !part.until || WalkMoment{walk.runs.size(), told.tick()} <= *part.until;
+    const auto wanted = [&](const auto& message) {
+      return !range.until || WalkMoment{walk.runs.size(), message.tick()} <= *range.until;
     };
     const auto* events = std::get_if<v1::TickEvents>(&*item);
     if (events && wanted(*events)) run->add(*events);
     const auto* state = std::get_if<v1::State>(&*item);
     if (state && wanted(*state)) run->add(*state);
   }
-  if (!run) throw RecordingError(file.string() + ": no recording of Enfilade begins in it");
+  if (!run) throw RecordingError(file.string() + ": not a recording of Enfilade");
   walk.runs.push_back(run->finish());
-  while (part.until && walk.runs.size() > part.until->run + 1) walk.runs.pop_back();
+  while (range.until && walk.runs.size() > range.until->run + 1) walk.runs.pop_back();
   walk.closed = reader.complete();
   walk.wholeBytes = reader.wholeBytes();
   return walk;

@@ -1,5 +1,5 @@
-// What a recording tells of a walk, gathered for comparing: who touched what, where and when, how
-// orders ended, how near things came.
+// Data of a recorded walk for comparison: contacts with place and time, ends of orders, and
+// clearances.
 #pragma once
 
 #include <compare>
@@ -18,18 +18,18 @@ namespace enfilade::server {
 
 using collision::Vec3;
 
-/// A contact that begins, a blocked move, someone in or out of a trigger.
-struct Happening {
-  std::string a, b;  ///< as the recording names them
+/// An event of a walk: a contact that begins, a blocked move, or a trigger entered or left.
+struct WalkEvent {
+  std::string a, b;  ///< names in the recording
   std::uint64_t tick = 0;
   double time = 0;              ///< seconds
   Vec3 point = Vec3::Zero();    ///< on b; scene frame, metres
-  Vec3 normal = Vec3::Zero();   ///< unit, from a to b; zero where there is none
+  Vec3 normal = Vec3::Zero();   ///< unit, from a to b; zero if unknown
   double distance = 0;          ///< metres, >= 0
-  std::optional<double> ended;  ///< seconds; contacts alone, nullopt: it lasts to the end
+  std::optional<double> ended;  ///< seconds; only for contacts; nullopt: active until the end
 };
 
-/// The least distance that was told of a pair.
+/// The minimum reported distance of a pair.
 struct Nearest {
   double distance = 0;  ///< metres, >= 0
   std::uint64_t tick = 0;
@@ -37,30 +37,30 @@ struct Nearest {
   Vec3 point = Vec3::Zero();
 };
 
-/// All that two did with one another, in order of time.
+/// All events of a pair, in order of time.
 struct PairRecord {
-  std::vector<Happening> contacts, ground, blocked, enters, leaves, falls;
-  std::optional<Nearest> nearest;  ///< of contacts and near misses, those with the ground left out
+  std::vector<WalkEvent> contacts, ground, blocked, enters, leaves, falls;
+  std::optional<Nearest> nearest;  ///< of contacts and near misses, without ground contacts
 };
 
-/// How an order went, or that someone left.
+/// The end of an order, or an avatar that left.
 struct OrderEnd {
   v1::Notice::Kind kind = v1::Notice::KIND_UNSPECIFIED;
   std::string avatar;
   std::uint64_t tag = 0;
-  std::uint32_t repeat = 0;  ///< how many of this avatar and tag ended before
+  std::uint32_t repeat = 0;  ///< number of earlier ends with this avatar and tag
   std::uint64_t tick = 0;
   double time = 0;
-  Vec3 position = Vec3::Zero();  ///< the feet
+  Vec3 position = Vec3::Zero();  ///< of the feet
   std::string obstacle, text;
 };
 
 struct AvatarRecord {
-  double entered = 0, last = 0;  ///< seconds: the first and the last state that has it
-  double wayLength = 0;          ///< metres that the feet came
+  double entered = 0, last = 0;  ///< seconds: first and last state with the avatar
+  double pathLength = 0;         ///< path length of the feet, metres
 };
 
-/// A world from its first tick on.
+/// One run: a world from its first tick.
 struct RecordedRun {
   v1::RecordingStart start;
   std::uint64_t ticks = 0, hash = 0;
@@ -72,33 +72,33 @@ struct RecordedRun {
 
 struct RecordedWalk {
   std::filesystem::path file;
-  std::optional<std::uint32_t> run;  ///< of the file that one alone was read, which counts from 1
-  std::vector<RecordedRun> runs;     ///< at least one; more where the world began anew
-  bool closed = false;               ///< else the file ends in the middle
+  std::optional<std::uint32_t> run;  ///< if only one run of the file was read: its number, from 1
+  std::vector<RecordedRun> runs;     ///< at least one; more if the world restarted
+  bool closed = false;               ///< false: the file is truncated
   std::uint64_t wholeBytes = 0;
-  /// GlobalId ("" where there is none) by the path of each object; nullopt: the recording does not
-  /// list its objects, as those of earlier versions.
+  /// GlobalId (or "") by object path; nullopt: the recording does not list its objects, as in
+  /// earlier versions.
   std::optional<std::unordered_map<std::string, std::string>> objects;
-  std::unordered_map<std::string, std::string> bodies;  ///< path of the first object, by its name
+  std::unordered_map<std::string, std::string> bodies;  ///< path of the first object, by body name
 };
 
-/// A moment of a recording; orders by run, then by tick.
+/// A moment of a recording, ordered by run, then by tick.
 struct WalkMoment {
   std::size_t run = 0;
   std::uint64_t tick = 0;
   auto operator<=>(const WalkMoment&) const = default;
 };
-WalkMoment endOf(const RecordedWalk& walk);
+WalkMoment findEnd(const RecordedWalk& walk);
 
-/// What is told of a walk: of its first run nothing up to `since`, and nothing after `until`; of a
-/// file with several runs `run` alone, if one is given.
-struct WalkPart {
+/// The range of a walk to read: its first run after tick `since`, up to `until`. If `run` is given,
+/// only this run of the file.
+struct WalkRange {
   std::optional<std::uint32_t> run = std::nullopt;
   std::uint64_t since = 0;
   std::optional<WalkMoment> until = std::nullopt;
 };
 
-/// Throws protocol::mcap::RecordingError.
-RecordedWalk readWalk(const std::filesystem::path& file, const WalkPart& part = {});
+/// Reads a walk. Throws protocol::mcap::RecordingError.
+RecordedWalk readWalk(const std::filesystem::path& file, const WalkRange& range = {});
 
 }  // namespace enfilade::server

@@ -8,13 +8,15 @@
 #include <stdexcept>
 
 #include "protocol/recording/recording.hpp"
+#include "render/image/atomic_file.hpp"
 #include "scene/import/import_model.hpp"
 #include "server/base/load_scene.hpp"
 #include "server/base/progress.hpp"
 #include "server/base/signal_handling.hpp"
 #include "server/base/standard_output.hpp"
 #include "server/diff/change_images.hpp"
-#include "server/diff/difference_report.hpp"
+#include "server/diff/difference_json.hpp"
+#include "server/diff/difference_text.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/runs/in_process_driver.hpp"
 #include "server/runs/run_report.hpp"
@@ -25,26 +27,26 @@ namespace {
 
 using protocol::mcap::RecordingError;
 
-/// Seconds of simulated time that walks get beyond the recorded ones, where some have not ended.
-constexpr double kMostExtra = 60;
-constexpr std::uint64_t kTicksPerBar = 64;
+/// Extra simulated time, in seconds, for orders that have not ended at the end of the recording.
+constexpr double kMaxExtraSeconds = 60;
+constexpr std::uint64_t kTicksPerUpdate = 64;
 
-/// What the command line leaves open the recording says: the new model is most likely of the same
-/// kind as the old one.
-ModelOptions modelLike(const ModelOptions& asked, const v1::RecordingStart& start) {
-  const ModelOptions was = modelOptionsFrom(start.choices());
-  ModelOptions model = asked;
-  if (!model.metresPerUnit) model.metresPerUnit = was.metresPerUnit;
-  if (!model.up) model.up = was.up;
-  // The importer's own depends on all objects: commands and places would be those of another spot.
-  if (!model.offset) model.offset = vectorFrom(start.scene().offset());
-  if (model.ifcReader == scene::IfcReader::automatic) model.ifcReader = was.ifcReader;
-  if (model.doors == scene::IfcDoors::move) model.doors = was.doors;
+/// Completes the import options from the recording, because the new model is probably a version of
+/// the old one.
+ModelOptions makeModelOptions(const ModelOptions& requested, const v1::RecordingStart& start) {
+  const ModelOptions recorded = modelOptionsFromProto(start.choices());
+  ModelOptions model = requested;
+  if (!model.metresPerUnit) model.metresPerUnit = recorded.metresPerUnit;
+  if (!model.up) model.up = recorded.up;
+  // The automatic offset depends on all objects, so that positions of commands would shift.
+  if (!model.offset) model.offset = vectorFromProto(start.scene().offset());
+  if (model.ifcReader == scene::IfcReader::automatic) model.ifcReader = recorded.ifcReader;
+  if (model.doors == scene::IfcDoors::movable) model.doors = recorded.doors;
   return model;
 }
 
-/// How often orders ended, by avatar and tag.
-class OrderEnds {
+/// Counts ends of orders by avatar and tag.
+class OrderEndCounts {
  public:
   void add(const v1::Notice& notice, int count) {
     if (notice.kind() == v1::Notice::KIND_LEFT || notice.kind() == v1::Notice::KIND_CAPTURE ||
@@ -54,7 +56,7 @@ class OrderEnds {
     open_ += (missing + count > 0 ? 1 : 0) - (missing > 0 ? 1 : 0);
     missing += count;
   }
-  /// Some order has not ended yet that ended in the recording.
+  /// True if an order that ended in the recording has not ended yet.
   bool open() const { return open_ > 0; }
 
  private:
@@ -62,7 +64,7 @@ class OrderEnds {
   int open_ = 0;
 };
 
-void count(protocol::ScriptResult& result, const protocol::StepOutcome& outcome) {
+void countOutcome(protocol::ScriptResult& result, const protocol::StepOutcome& outcome) {
   result.ticks = outcome.tick;
   result.time = outcome.time;
   result.stateHash = outcome.stateHash;
@@ -76,183 +78,186 @@ void count(protocol::ScriptResult& result, const protocol::StepOutcome& outcome)
     ++(frame.error.empty() ? result.captured : result.uncaptured);
 }
 
-/// The recorded commands on their way through the new model.
-class Walk {
+/// Submits the recorded commands to the new model.
+class WalkResimulation {
  public:
-  Walk(InProcessDriver& driver, WalkReport& report) : driver_(driver), report_(report) {}
+  WalkResimulation(InProcessDriver& driver, RunReport& report) : driver_(driver), report_(report) {}
 
-  /// `bytes`: of the recording, for the bar.
-  void follow(protocol::RecordingReader& recording, double bytes) {
+  /// `bytes`: size of the recording, for the progress bar.
+  void replayCommands(protocol::RecordingReader& recording, double bytes) {
     while (const auto item = recording.next()) {
-      if (const auto* commands = std::get_if<v1::RecordedCommands>(&*item)) take(*commands);
+      if (const auto* commands = std::get_if<v1::RecordedCommands>(&*item))
+        submitCommands(*commands);
       if (const auto* events = std::get_if<v1::TickEvents>(&*item))
         for (const v1::Notice& notice : events->notices()) ends_.add(notice, 1);
       if (!std::holds_alternative<v1::State>(*item)) continue;
       step();
-      if (result.ticks % kTicksPerBar == 0)
+      if (result.ticks % kTicksPerUpdate == 0)
         bar_.show(static_cast<double>(recording.wholeBytes()) / bytes,
                   "tick " + std::to_string(result.ticks));
     }
     bar_.clear();
   }
 
-  /// Walks that now take longer may come to their end.
+  /// Continues so that orders which now take longer can end.
   void finish() {
-    const auto most = static_cast<std::uint64_t>(kMostExtra / driver_.tickSeconds());
-    std::uint64_t extra = 0;
-    while (ends_.open() && !idle_ && extra < most) {
+    const auto maxTicks = static_cast<std::uint64_t>(kMaxExtraSeconds / driver_.tickSeconds());
+    std::uint64_t extraTicks = 0;
+    while (ends_.open() && !idle_ && extraTicks < maxTicks) {
       step();
-      ++extra;
+      ++extraTicks;
     }
     bar_.clear();
-    if (extra > 0)
-      spdlog::info("{} ticks more than were recorded: some orders take longer{}", extra,
+    if (extraTicks > 0)
+      spdlog::info("{} ticks more than recorded: some orders take longer{}", extraTicks,
                    ends_.open() && !idle_ ? ", and have not ended yet" : "");
   }
 
   protocol::ScriptResult result;
   std::vector<RefusedCommand> refused;
-  std::uint32_t mostPairs = 0;
+  std::uint32_t maxPairs = 0;
 
  private:
-  void take(const v1::RecordedCommands& commands) {
+  void submitCommands(const v1::RecordedCommands& commands) {
     for (const auto& one : commands.commands()) {
-      const auto why = one.has_body() ? driver_.submit(one.body()) : driver_.submit(one.avatar());
-      if (!why) continue;
-      const std::string& who = one.has_body() ? one.body().body() : one.avatar().avatar();
-      refused.push_back({commands.tick(), who, why->message()});
+      const auto error = one.has_body() ? driver_.submit(one.body()) : driver_.submit(one.avatar());
+      if (!error) continue;
+      const std::string& name = one.has_body() ? one.body().body() : one.avatar().avatar();
+      refused.push_back({commands.tick(), name, error->message()});
       ++result.refused;
       result.outcomes.push_back(
           {protocol::LineOutcome::Kind::refused,
            one.has_body() ? 0 : static_cast<std::uint32_t>(one.avatar().tag()), commands.tick(),
-           who, who + ": " + why->message()});
+           name, name + ": " + error->message()});
     }
   }
 
   void step() {
-    if (interrupted()) throw Interrupted{};
+    if (isInterrupted()) throw Interrupted{};
     protocol::StepOutcome outcome = driver_.step();
     idle_ = outcome.idle;
     for (const v1::Notice& notice : outcome.notices) ends_.add(notice, -1);
-    count(result, outcome);
+    countOutcome(result, outcome);
     report_.add(outcome);
-    if (outcome.tick % kTicksPerBar == 0)
-      mostPairs = std::max(mostPairs, driver_.metrics().pairs());
+    if (outcome.tick % kTicksPerUpdate == 0)
+      maxPairs = std::max(maxPairs, driver_.metrics().pairs());
   }
 
   InProcessDriver& driver_;
-  WalkReport& report_;
-  OrderEnds ends_;
+  RunReport& report_;
+  OrderEndCounts ends_;
   bool idle_ = false;
   Progress bar_;
 };
 
-v1::RecordingStart startOf(protocol::RecordingReader& recording,
-                           const std::filesystem::path& file) {
+v1::RecordingStart readStart(protocol::RecordingReader& recording,
+                             const std::filesystem::path& file) {
   const auto first = recording.next();
   if (first && std::holds_alternative<v1::RecordingStart>(*first))
     return std::get<v1::RecordingStart>(*first);
-  throw RecordingError(file.string() + ": no recording of Enfilade begins in it");
+  throw RecordingError(file.string() + ": not a recording of Enfilade");
 }
 
-/// The model that was recorded, if it is still there as it was; else null, and told.
-std::shared_ptr<const scene::Scene> recordedScene(const v1::RecordingStart& start, bool cache) {
-  ModelOptions model = modelOptionsFrom(start.choices());
+/// Loads the recorded model if it is unchanged; otherwise logs the reason and returns null.
+std::shared_ptr<const scene::Scene> loadRecordedScene(const v1::RecordingStart& start, bool cache) {
+  ModelOptions model = modelOptionsFromProto(start.choices());
   model.file = start.scene_file();
   model.cache = cache;
   try {
-    if (!std::filesystem::exists(model.file)) throw std::runtime_error("it is not there");
+    if (!std::filesystem::exists(model.file)) throw std::runtime_error("it does not exist");
     auto scene = loadScene(model);
     if (scene->hash() != start.scene().hash())
-      throw std::runtime_error("it is not as it was recorded");
+      throw std::runtime_error("it changed since the recording");
     return scene;
   } catch (const std::exception& error) {
-    spdlog::info("pictures of the new model alone: {}: {}", model.file.string(), error.what());
+    spdlog::info("pictures show only the new model: {}: {}", model.file.string(), error.what());
     return nullptr;
   }
 }
 
 void writeText(const std::filesystem::path& file, const std::string& text) {
-  render::writeFileWhole(file, text.data(), text.size());
+  render::writeFileAtomically(file, text.data(), text.size());
 }
 
-TakePicture pictureOf(render::Renderer* renderer, const scene::World& world) {
+PlanRenderer makePlanRenderer(render::RendererSelector* renderer, const scene::World& world) {
   return [renderer, &world](const render::Camera& camera) -> std::optional<PlanPicture> {
     if (!renderer) return std::nullopt;
     const render::Frame frame = renderer->render(*world.snapshot(), camera);
-    return PlanPicture{render::colourOf(frame), frame.ids};
+    return PlanPicture{render::toImage(frame), frame.ids};
   };
 }
 
-/// Everything up to the new recording.
-std::vector<RefusedCommand> walkAgain(const RewalkCommand& command,
-                                      protocol::RecordingReader& recording,
-                                      const v1::RecordingStart& start,
-                                      const std::shared_ptr<const scene::Scene>& scene,
-                                      render::Renderer* renderer,
-                                      const std::filesystem::path& record) {
-  const auto began = std::chrono::steady_clock::now();
-  const auto lengths = lengthsFrom(start.lengths());
-  if (!lengths) throw RecordingError("the recording has lengths that no world can have");
-  WalkReport report(command.out);
-  report.removeEarlier();
-  RecordedWorld world(scene::World(scene, *lengths));
+/// Runs the walk and writes its report and recording.
+std::vector<RefusedCommand> resimulateWalk(const ResimulateCommand& command,
+                                           protocol::RecordingReader& recording,
+                                           const v1::RecordingStart& start,
+                                           const std::shared_ptr<const scene::Scene>& scene,
+                                           render::RendererSelector* renderer,
+                                           const std::filesystem::path& record) {
+  const auto startTime = std::chrono::steady_clock::now();
+  const auto settings = settingsFromProto(start.lengths());
+  if (!settings) throw RecordingError("the recording has invalid world settings");
+  RunReport report(command.out);
+  report.removePreviousRun();
+  RecordableWorld world(scene::World(scene, *settings));
   RecordingOptions options;
   options.choice.file = record;
   options.model = command.model;
   world.record(options);
   InProcessDriver driver(world, renderer);
-  Walk walk(driver, report);
-  walk.follow(recording, static_cast<double>(std::filesystem::file_size(command.recording)));
+  WalkResimulation walk(driver, report);
+  walk.replayCommands(recording,
+                      static_cast<double>(std::filesystem::file_size(command.recording)));
   walk.finish();
-  WalkFacts facts{command.recording.filename().string(),
-                  messageOf(*scene),
-                  renderer ? renderer->deviceName() : std::string(),
-                  driver.metrics(),
-                  walk.mostPairs,
-                  0};
-  facts.mostPairs = std::max(facts.mostPairs, facts.metrics.pairs());
-  report.writePictures(facts, {pictureOf(renderer, world), scene.get()});
+  RunSummary summary{command.recording.filename().string(),
+                     toProto(*scene),
+                     renderer ? renderer->deviceName() : std::string(),
+                     driver.metrics(),
+                     walk.maxPairs,
+                     0};
+  summary.maxPairs = std::max(summary.maxPairs, summary.metrics.pairs());
+  report.writePictures(summary, {makePlanRenderer(renderer, world), scene.get()});
   report.writeContacts(driver.endContacts());
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
-  facts.wallSeconds = took.count();
-  report.writeSummary(facts, walk.result);
-  if (const auto broken = world.recorder()->close()) throw RecordingError(*broken);
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - startTime;
+  summary.wallSeconds = elapsed.count();
+  report.writeSummary(summary, walk.result);
+  if (const auto error = world.recorder()->close()) throw RecordingError(*error);
   return std::move(walk.refused);
 }
 
 }  // namespace
 
-ExitCode rewalk(const RewalkCommand& asked) {
-  return interruptible(
+ExitCode resimulate(const ResimulateCommand& requested) {
+  return runInterruptible(
       [&] {
-        RewalkCommand command = asked;
+        ResimulateCommand command = requested;
         protocol::RecordingReader recording(command.recording, command.run);
-        const v1::RecordingStart start = startOf(recording, command.recording);
-        command.model = modelLike(asked.model, start);
+        const v1::RecordingStart start = readStart(recording, command.recording);
+        command.model = makeModelOptions(requested.model, start);
         const auto scene = loadScene(command.model);
-        const auto renderer = rendererOf(scene, command.drawing);
+        const auto renderer = tryMakeRenderer(scene, command.drawing);
         const auto record = command.record.empty() ? command.out / "new.mcap" : command.record;
         std::filesystem::create_directories(command.out);
-        requireAnotherFile(record, command.recording);
-        auto refused = walkAgain(command, recording, start, scene, renderer.get(), record);
+        requireDifferentFiles(record, command.recording);
+        auto refused = resimulateWalk(command, recording, start, scene, renderer.get(), record);
         WalkDifference difference =
             compareWalks(command.recording, record, command.tolerance, command.run);
         difference.refused = std::move(refused);
         difference.worse += difference.refused.size();
-        if (renderer && command.pictures > 0 && !difference.none()) {
-          const auto before = recordedScene(start, command.model.cache);
+        if (renderer && command.pictures > 0 && !difference.isEmpty()) {
+          const auto before = loadRecordedScene(start, command.model.cache);
           drawChanges(difference, {before, scene, renderer.get(), command.drawing},
                       command.pictures, command.out);
         }
-        const std::string text = differenceText(difference), json = differenceJson(difference);
+        const std::string text = formatDifferenceText(difference),
+                          json = formatDifferenceJson(difference);
         writeText(command.out / "diff.txt", text);
         writeText(command.out / "diff.json", json + "\n");
         writeToStdout(command.json ? json + "\n" : text,
-                      "what changed stands in " + (command.out / "diff.txt").string());
-        return difference.worse > 0 ? ExitCode::violations : ExitCode::done;
+                      "the changes are in " + (command.out / "diff.txt").string());
+        return difference.worse > 0 ? ExitCode::violations : ExitCode::success;
       },
-      "nothing more is written");
+      "no more files are written");
 }
 
 }  // namespace enfilade::server

@@ -1,9 +1,8 @@
-// What changed between two walks: plain data, and how it is found.
+// The differences of two walks, as plain data, and their computation.
 //
-// Two things are the same in both walks when their names are the same: an avatar's or a body's
-// name, an object's GlobalId, else its path. The contacts of a pair are put in order of time and
-// matched in this order so that the places differ least in all; what would differ by kSamePlace or
-// more, and what is left over, is new or gone.
+// Entities of both walks match by name: name of an avatar or body, GlobalId of an object, else its
+// path. The events of a pair are aligned in order of time with minimal total distance
+// (align_events.hpp). Events that stay unpaired are new or removed.
 #pragma once
 
 #include <cstdint>
@@ -14,90 +13,81 @@
 
 namespace enfilade::server {
 
-/// Metres: farther apart two contacts of a pair are not the same one.
-inline constexpr double kSamePlace = 2;
+/// Kinds of compared events, in order of importance.
+enum class WalkEventKind : std::uint8_t { blocked, contact, fall, enter, leave, ground };
+inline constexpr std::size_t kWalkEventKinds = 6;
 
-/// What happened between two things that a comparison tells, what weighs most first.
-enum class HappeningKind : std::uint8_t { blocked, contact, fall, enter, leave, ground };
-inline constexpr std::size_t kHappeningKinds = 6;
+enum class ModelSide : std::uint8_t { both, before, after, unknown };
 
-enum class Model : std::uint8_t { both, before, after, unknown };
-
-/// Something that happened in one walk alone, or otherwise in the other. At least one is given.
-struct HappeningChange {
-  HappeningKind kind = HappeningKind::contact;
-  std::optional<Happening> before, after;
-  double shift = 0;  ///< metres from where it was, both given
-  double delay = 0;  ///< seconds later than it was, both given
-  /// Contacts of one walk alone: how near the pair came in the other; nullopt: never so near that
-  /// it was told.
-  std::optional<double> otherwise;
-  Model inModel = Model::unknown;  ///< which model has b
+/// An event of only one walk, or one that differs. At least one of `before` and `after` is set.
+struct WalkEventChange {
+  WalkEventKind kind = WalkEventKind::contact;
+  std::optional<WalkEvent> before, after;
+  double shift = 0;  ///< metres between both events
+  double delay = 0;  ///< seconds from `before` to `after`
+  /// For contacts of only one walk: minimum distance in the other walk, metres; nullopt: never
+  /// reported.
+  std::optional<double> otherDistance;
+  ModelSide inModel = ModelSide::unknown;  ///< models that contain b
   std::size_t run = 0;
   bool worse = false;
-  std::string picture;  ///< its file, where one was made
+  std::string picture;  ///< picture file, or empty
 };
 
-/// An order that ended otherwise or at another time.
+/// An order with another outcome or end time.
 struct OrderChange {
   std::optional<OrderEnd> before, after;  ///< at least one
   std::size_t run = 0;
   bool worse = false;
-  std::string picture;  ///< its file, where one was made
+  std::string picture;  ///< picture file, or empty
 };
 
-/// How near a pair came, where that changed by more than the tolerance and no contact is new or
-/// gone.
+/// A clearance that changed by more than the tolerance, for a pair without new or removed contacts.
 struct ClearanceChange {
-  std::string a, b;  ///< as the later walk names them, or the earlier where only that does
-  std::optional<Nearest> before, after;  ///< nullopt: farther than the near miss distance
-  double least = 0;                      ///< metres by which it changed at least: < 0 is nearer
-  Model inModel = Model::unknown;
+  std::string a, b;                      ///< names in the later walk, else in the earlier
+  std::optional<Nearest> before, after;  ///< nullopt: more than the near miss distance
+  double minChange = 0;                  ///< lower bound of the change, metres; < 0: closer
+  ModelSide inModel = ModelSide::unknown;
   std::size_t run = 0;
   bool worse = false;
-  std::string picture;  ///< its file, where one was made
+  std::string picture;  ///< picture file, or empty
 };
 
-/// An avatar that went otherwise, or is in one walk alone.
-struct WayChange {
+/// An avatar with another path, or of only one walk.
+struct PathChange {
   std::string avatar;
   std::optional<AvatarRecord> before, after;  ///< at least one
-  std::uint64_t firstTick = 0;                ///< at which the feet are not in the same place
-  double farthest = 0;                        ///< metres between the feet, both in the world
-  std::uint64_t farthestTick = 0;
+  std::uint64_t firstTick = 0;                ///< first tick with different positions
+  double maxDistance = 0;                     ///< maximum distance of the feet, metres
+  std::uint64_t maxDistanceTick = 0;
   std::size_t run = 0;
 };
 
-/// A command of the earlier walk that the later model did not take.
+/// A command of the earlier walk that the later model refused.
 struct RefusedCommand {
   std::uint64_t tick = 0;
-  std::string who, why;
+  std::string name, reason;
 };
 
 struct WalkDifference {
   double tolerance = 0;                     ///< metres
-  RecordedWalk before, after;               ///< without their pairs
-  std::vector<HappeningChange> happenings;  ///< by kind, then worst first
+  RecordedWalk before, after;               ///< without pairs
+  std::vector<WalkEventChange> events;      ///< by kind, then worst first
   std::vector<OrderChange> orders;          ///< worst first
-  std::vector<ClearanceChange> clearances;  ///< what came nearest by most first
-  std::vector<WayChange> ways;              ///< in order of run and name
-  std::size_t worse = 0;                    ///< changes for the worse, refused commands among them
-  std::vector<RefusedCommand> refused;      ///< of a walk that was made again in another model
+  std::vector<ClearanceChange> clearances;  ///< largest decrease first
+  std::vector<PathChange> paths;            ///< ordered by run and name
+  std::size_t worse = 0;                    ///< number of regressions, including refused commands
+  std::vector<RefusedCommand> refused;      ///< of a re-simulation
 
-  /// Nothing to tell, though hashes of scenes and files may differ.
-  bool none() const;
+  /// True if there are no changes. Hashes of scenes and files may differ.
+  bool isEmpty() const;
 };
 
-/// `tolerance`: metres by which places and clearances may differ; `runBefore`: of `before` that one
-/// alone (left out: all, and beside a branch the one that it left). Reads both files. Throws
-/// protocol::mcap::RecordingError.
+/// Reads and compares two recordings. `tolerance`: metres; smaller differences are ignored.
+/// `runBefore`: uses only this run of `before` (nullopt: all, or the parent run if `after` is a
+/// branch). Throws protocol::mcap::RecordingError.
 WalkDifference compareWalks(const std::filesystem::path& before, const std::filesystem::path& after,
                             double tolerance,
                             std::optional<std::uint32_t> runBefore = std::nullopt);
-
-/// Pairs two ascending lists of happenings: indexes into both, each used once at most, both
-/// ascending. What is kSamePlace or farther apart is not paired.
-std::vector<std::pair<std::size_t, std::size_t>> matchedHappenings(
-    const std::vector<Happening>& before, const std::vector<Happening>& after);
 
 }  // namespace enfilade::server

@@ -2,53 +2,56 @@
 
 #include <algorithm>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::server {
 namespace {
 
-constexpr std::chrono::milliseconds kBurst{100};  // may be paid for ahead
+constexpr std::chrono::milliseconds kBurst{100};  // of requests above the average rate
 
 }  // namespace
 
-RequestAllowance::RequestAllowance(const ServerLimits& limits, std::function<void()> wake)
-    : mostRequests_(limits.requestsUnderWay),
-      mostBytes_(limits.waitingBytes),
-      price_(std::chrono::nanoseconds(std::chrono::seconds(1)) / limits.requestsPerSecond),
+FlowControl::FlowControl(const ServerLimits& limits, std::function<void()> wake)
+    : maxRequests_(limits.pendingRequests),
+      maxBytes_(limits.pendingRequestBytes),
+      requestPeriod_(std::chrono::nanoseconds(std::chrono::seconds(1)) / limits.requestsPerSecond),
       wake_(std::move(wake)) {}
 
-RequestHold RequestAllowance::hold(std::size_t bytes) {
+RequestPermit FlowControl::acquire(std::size_t bytes) {
   {
     const std::lock_guard lock(mutex_);
     ++requests_;
     bytes_ += bytes;
   }
-  return {nullptr, [self = shared_from_this(), bytes](void*) { self->giveBack(bytes); }};
+  return {nullptr, [self = shared_from_this(), bytes](void*) { self->release(bytes); }};
 }
 
-bool RequestAllowance::hasRoom() {
+bool FlowControl::hasCapacity() {
   const std::lock_guard lock(mutex_);
-  waiting_ = full();
-  return !waiting_;
+  readerWaiting_ = isFull();
+  return !readerWaiting_;
 }
 
-void RequestAllowance::giveBack(std::size_t bytes) {
+void FlowControl::release(std::size_t bytes) {
   {
     const std::lock_guard lock(mutex_);
+    ENFILADE_ASSERT(requests_ > 0 && bytes_ >= bytes);
     --requests_;
     bytes_ -= bytes;
-    // With half of the room, so that reading goes on in draughts and not in drops.
-    if (!waiting_ || requests_ > mostRequests_ / 2 || bytes_ > mostBytes_ / 2) return;
-    waiting_ = false;
+    // Hysteresis: resume at half of the capacity, so that reading happens in batches.
+    if (!readerWaiting_ || requests_ > maxRequests_ / 2 || bytes_ > maxBytes_ / 2) return;
+    readerWaiting_ = false;
   }
   wake_();
 }
 
-bool RequestAllowance::full() const {
-  return requests_ >= mostRequests_ || bytes_ >= mostBytes_;
+bool FlowControl::isFull() const {
+  return requests_ >= maxRequests_ || bytes_ >= maxBytes_;
 }
 
-RequestAllowance::Clock::duration RequestAllowance::pace(Clock::time_point now) {
-  paid_ = std::max(paid_, now) + price_;
-  return std::max<Clock::duration>(paid_ - now - kBurst, {});
+FlowControl::Clock::duration FlowControl::throttle(Clock::time_point now) {
+  paidUntil_ = std::max(paidUntil_, now) + requestPeriod_;
+  return std::max<Clock::duration>(paidUntil_ - now - kBurst, {});
 }
 
 }  // namespace enfilade::server

@@ -1,6 +1,6 @@
-// How much one client may ask before answers come, and how fast. What is above is not refused: its
-// socket is not read until there is room again, so that the client's own sending slows down and
-// what the server holds of it stays bounded.
+// Flow control of one client's requests: pending requests, their bytes, and rate. Excess requests
+// are not refused. The server stops reading the socket, so that TCP slows the client down and the
+// server's memory stays bounded.
 #pragma once
 
 #include <chrono>
@@ -12,37 +12,36 @@
 
 namespace enfilade::server {
 
-/// What requests hold of their client's allowance until they are answered: it is given back when
-/// the last copy is gone, on whichever thread.
-using RequestHold = std::shared_ptr<void>;
+/// The share of the capacity that a request occupies until it is answered. Destroying the last copy
+/// releases it, on any thread.
+using RequestPermit = std::shared_ptr<void>;
 
-class RequestAllowance : public std::enable_shared_from_this<RequestAllowance> {
+class FlowControl : public std::enable_shared_from_this<FlowControl> {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `wake` is called, without the lock and from any thread, when there is room after there was
-  /// none.
-  RequestAllowance(const ServerLimits& limits, std::function<void()> wake);
+  /// `wake` is called when capacity becomes available again: without the lock, from any thread.
+  FlowControl(const ServerLimits& limits, std::function<void()> wake);
 
-  RequestHold hold(std::size_t bytes);
-  /// There is room for one more; if not, `wake` will tell when there is.
-  bool hasRoom();
+  RequestPermit acquire(std::size_t bytes);
+  /// Whether another request fits. If not, `wake` is called later.
+  bool hasCapacity();
 
-  /// Counts a request against the rate; how long to wait before the next one is read (0: not at
-  /// all). Only for the network thread.
-  Clock::duration pace(Clock::time_point now);
+  /// Counts a request against the rate. Returns the delay before the next read; 0: no delay. Only
+  /// for the network thread.
+  Clock::duration throttle(Clock::time_point now);
 
  private:
-  void giveBack(std::size_t bytes);
-  bool full() const;
+  void release(std::size_t bytes);
+  bool isFull() const;
 
-  const std::size_t mostRequests_, mostBytes_;
-  const std::chrono::nanoseconds price_;  ///< of one request, in time
+  const std::size_t maxRequests_, maxBytes_;
+  const std::chrono::nanoseconds requestPeriod_;  ///< time per request at the maximum rate
   const std::function<void()> wake_;
-  std::mutex mutex_;  // guards what follows
+  std::mutex mutex_;  // guards the members below
   std::size_t requests_ = 0, bytes_ = 0;
-  bool waiting_ = false;
-  Clock::time_point paid_;  ///< the network thread's: until when requests are paid for
+  bool readerWaiting_ = false;
+  Clock::time_point paidUntil_;  ///< network thread only: time up to which the rate is used
 };
 
 }  // namespace enfilade::server

@@ -10,56 +10,57 @@ namespace enfilade::server {
 
 namespace {
 
-struct Drawing {
+struct PendingFrame {
   FrameJob job;
   std::future<render::Frame> frame;
-  std::function<void(Encoded)> done;
+  std::function<void(EncodedMessage)> done;
 };
 
-Encoded frameReply(Drawing& drawing) {
-  const render::Frame frame = drawing.frame.get();
+EncodedMessage encodeFrameReply(PendingFrame& pending) {
+  const render::Frame frame = pending.frame.get();
   std::vector<std::uint8_t> attachment;
   v1::ServerMessage reply;
-  reply.set_reply_to(drawing.job.requestId);
+  reply.set_reply_to(pending.job.requestId);
   *reply.mutable_frame() =
-      messageOf(frame, drawing.job.snapshot->time, drawing.job.request, attachment);
-  reply.mutable_frame()->set_watch(drawing.job.watch);
-  reply.mutable_frame()->set_dropped(drawing.job.dropped);
-  if (drawing.job.seen) drawing.job.seen(reply.frame(), attachment);
+      toProto(frame, pending.job.snapshot->time, pending.job.request, attachment);
+  reply.mutable_frame()->set_watch(pending.job.subscription);
+  reply.mutable_frame()->set_dropped(pending.job.dropped);
+  if (pending.job.onRendered) pending.job.onRendered(reply.frame(), attachment);
   return encodeShared(reply, std::move(attachment));
 }
 
 }  // namespace
 
 struct FrameService::State {
-  std::atomic<int> toEncode = 0;  ///< pictures whose reply is made, or will be, by `thread`
+  std::atomic<int> pendingEncodes = 0;  ///< frames queued for encoding on `thread`
   WorkThread thread;
-  std::unique_ptr<render::RenderThread> renderer;  // first to go: it may still call back
+  std::unique_ptr<render::RenderThread> renderer;  // destroyed first: it may still call back
 };
 
 namespace {
 
-Encoded replyTo(Drawing& drawing) {
+EncodedMessage makeReply(PendingFrame& pending) {
   try {
-    Encoded whole = frameReply(drawing);
-    if (drawing.job.drawn) ++*drawing.job.drawn;
-    return whole;
-  } catch (const render::NoRenderer& error) {
-    return errorReply(drawing.job.requestId,
-                      errorOf(v1::ERROR_NO_RENDERER, error.what(), "renderer"));
+    EncodedMessage encoded = encodeFrameReply(pending);
+    if (pending.job.renderedCount) ++*pending.job.renderedCount;
+    return encoded;
+  } catch (const render::RendererUnavailable& error) {
+    return makeErrorReply(pending.job.requestId,
+                          makeError(v1::ERROR_NO_RENDERER, error.what(), "renderer"));
   } catch (const std::exception& error) {
-    spdlog::error("a picture could not be made: {}", error.what());
-    return errorReply(drawing.job.requestId, errorOf(v1::ERROR_INTERNAL, error.what()));
+    spdlog::error("cannot render a frame: {}", error.what());
+    return makeErrorReply(pending.job.requestId, makeError(v1::ERROR_INTERNAL, error.what()));
   }
 }
 
-/// The reply is no more work than copying a few pixels.
-bool isReadyAsDrawn(const FrameJob& job) {
-  constexpr std::uint64_t kFewPixels = 512 * 512;
-  if (std::uint64_t{job.request.width()} * job.request.height() > kFewPixels) return false;
+/// Whether the reply only copies a few raw pixels.
+bool isCheapReply(const FrameJob& job) {
+  constexpr std::uint64_t kSmallFrameThreshold = 512 * 512;
+  if (std::uint64_t{job.request.width()} * job.request.height() > kSmallFrameThreshold)
+    return false;
   const bool raw = job.request.rgb_encoding() != v1::ENCODING_PNG &&
                    job.request.rgb_encoding() != v1::ENCODING_JPEG;
-  return raw && !job.seen;
+  return raw && !job.onRendered;
 }
 
 }  // namespace
@@ -68,7 +69,8 @@ FrameService::FrameService(std::shared_ptr<const scene::Scene> scene, const Draw
     : state_(std::make_unique<State>()) {
   state_->renderer =
       std::make_unique<render::RenderThread>(std::move(scene), drawing.device, drawing.renderer);
-  if (drawing.asked() && !whyNone().empty()) throw render::RenderError(whyNone());
+  if (drawing.isRequested() && !unavailableReason().empty())
+    throw render::RenderError(unavailableReason());
 }
 
 FrameService::~FrameService() {
@@ -82,41 +84,42 @@ void FrameService::finish() {
 
 void FrameService::prepare() {
   state_->thread.post([&renderer = *state_->renderer] {
-    if (!renderer.whyNone().empty()) return spdlog::warn("no pictures: {}", renderer.whyNone());
-    if (!renderer.deviceNote().empty()) spdlog::warn(renderer.deviceNote());
+    if (!renderer.unavailableReason().empty())
+      return spdlog::warn("no frames: {}", renderer.unavailableReason());
+    if (!renderer.deviceWarning().empty()) spdlog::warn(renderer.deviceWarning());
   });
 }
 
 const std::string& FrameService::deviceName() const {
   return state_->renderer->deviceName();
 }
-bool FrameService::software() const {
+bool FrameService::isSoftware() const {
   return state_->renderer->software();
 }
-const std::string& FrameService::whyNone() const {
-  return state_->renderer->whyNone();
+const std::string& FrameService::unavailableReason() const {
+  return state_->renderer->unavailableReason();
 }
 
-/// What is ready as it is drawn is handed over by the thread that drew it, and the next picture
-/// waits for the copy; what has to be encoded goes to another thread. What waits there is not
-/// overtaken.
-void FrameService::draw(FrameJob job, std::function<void(Encoded)> done) {
+/// A cheap reply is built on the render thread, which delays the next frame by one copy. Other
+/// frames are encoded on `thread`. No reply overtakes the frames queued there.
+void FrameService::renderFrame(FrameJob job, std::function<void(EncodedMessage)> done) {
   State& state = *state_;
-  const auto drawing = std::make_shared<Drawing>(Drawing{std::move(job), {}, std::move(done)});
-  const View& view = drawing->job.view;
-  if (isReadyAsDrawn(drawing->job) && state.toEncode == 0) {
-    return state.renderer->render(drawing->job.snapshot, view.camera, view.options, view.renderer,
-                                  [drawing](std::future<render::Frame> frame) {
-                                    drawing->frame = std::move(frame);
-                                    drawing->done(replyTo(*drawing));
+  const auto pending =
+      std::make_shared<PendingFrame>(PendingFrame{std::move(job), {}, std::move(done)});
+  const FrameView& view = pending->job.view;
+  if (isCheapReply(pending->job) && state.pendingEncodes == 0) {
+    return state.renderer->render(pending->job.snapshot, view.camera, view.options, view.renderer,
+                                  [pending](std::future<render::Frame> frame) {
+                                    pending->frame = std::move(frame);
+                                    pending->done(makeReply(*pending));
                                   });
   }
-  ++state.toEncode;
-  drawing->frame =
-      state.renderer->render(drawing->job.snapshot, view.camera, view.options, view.renderer);
-  state.thread.post([&state, drawing] {
-    drawing->done(replyTo(*drawing));
-    --state.toEncode;
+  ++state.pendingEncodes;
+  pending->frame =
+      state.renderer->render(pending->job.snapshot, view.camera, view.options, view.renderer);
+  state.thread.post([&state, pending] {
+    pending->done(makeReply(*pending));
+    --state.pendingEncodes;
   });
 }
 

@@ -1,5 +1,5 @@
-// Pictures for clients: the render thread draws, a second thread encodes what has to be, so that
-// neither the tick nor a socket ever waits for a picture.
+// Renders frames for clients. One thread renders and a second one encodes, so that neither the tick
+// nor the network thread waits for a frame.
 #pragma once
 
 #include <atomic>
@@ -7,47 +7,49 @@
 #include <memory>
 
 #include "scene/world/data/scene.hpp"
-#include "server/app/command_line.hpp"
+#include "server/base/drawing_options.hpp"
 #include "server/messages/frame_messages.hpp"
 #include "server/messages/outgoing_queue.hpp"
 
 namespace enfilade::server {
 
+/// A frame to render, and the destination of its reply.
 struct FrameJob {
   std::shared_ptr<const scene::Snapshot> snapshot;
-  View view;
+  FrameView view;
   v1::FrameRequest request;
-  std::uint64_t requestId = 0;  ///< 0: nobody asked for this one; it is of a watch
-  std::uint32_t watch = 0;      ///< 0: of none
-  std::uint64_t dropped = 0;    ///< Frame.dropped
-  std::shared_ptr<std::atomic<std::uint64_t>> drawn;  ///< counts it; may be null
-  /// Gets the picture before the reply is made of it, on the service's thread; may be empty.
-  std::function<void(const v1::Frame&, std::span<const std::uint8_t> attachment)> seen = {};
+  std::uint64_t requestId = 0;     ///< 0: the frame belongs to a subscription
+  std::uint32_t subscription = 0;  ///< number of the subscription; 0: none
+  std::uint64_t dropped = 0;       ///< Frame.dropped
+  /// Incremented per frame; may be null.
+  std::shared_ptr<std::atomic<std::uint64_t>> renderedCount;
+  /// Receives the frame before its reply is encoded, on a thread of the service; may be empty.
+  std::function<void(const v1::Frame&, std::span<const std::uint8_t> attachment)> onRendered = {};
 };
 
 class FrameService {
  public:
-  /// The renderer is made when it is first needed. Without a device there is none, which is no
-  /// failure, unless `drawing` asked for something: then it is made now, and RenderError thrown.
+  /// The renderer is created at first use. A missing device is no error, unless `drawing` requests
+  /// a device or renderer: then it is created now, and RenderError is thrown.
   explicit FrameService(std::shared_ptr<const scene::Scene> scene,
                         const DrawingOptions& drawing = {});
   ~FrameService();
   FrameService(const FrameService&) = delete;
   FrameService& operator=(const FrameService&) = delete;
 
-  /// Has the renderer made while the caller goes on, and logs what is wrong with it. Opening a
-  /// device's driver takes longer than loading many a scene, and keeps whoever starts a thread
-  /// waiting (glibc 2.36 locks the list of libraries for both): best when all threads run.
+  /// Creates the renderer in the background and logs its problems. Call it after all threads have
+  /// started: opening a driver can take seconds, and in glibc 2.36 it blocks the start of threads
+  /// (both take the lock of the library list).
   void prepare();
-  // As RenderThread's: they wait until it is made. Not after finish().
+  // These wait until the renderer is created. Do not call them after finish().
   const std::string& deviceName() const;
-  bool software() const;
-  const std::string& whyNone() const;
+  bool isSoftware() const;
+  const std::string& unavailableReason() const;
 
-  /// `done` gets the whole reply (a Frame or an Error), in the order of the calls of one thread, on
-  /// a thread of the service's. It must not throw.
-  void draw(FrameJob job, std::function<void(Encoded)> done);
-  /// Waits for what was asked; nothing may be asked afterwards.
+  /// `done` receives the encoded reply (a Frame or an Error) on a thread of the service, in the
+  /// order of the calls of one thread. It must not throw.
+  void renderFrame(FrameJob job, std::function<void(EncodedMessage)> done);
+  /// Waits for all frames. Do not request frames afterwards.
   void finish();
 
  private:

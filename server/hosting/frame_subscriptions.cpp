@@ -2,144 +2,160 @@
 
 #include <utility>
 
+#include "collision/assert.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
 namespace {
 
-void drawNext(ServedWorld& served, ClientId id, Client& client, std::uint32_t number,
-              FrameWatch& watch);
+void renderNext(HostedWorld& hosted, ClientId id, Client& client, std::uint32_t number,
+                FrameSubscription& subscription);
 
-/// Lets the next picture begin before this one is handed over: who saw it and then steps gets the
-/// next. So two may be unsent for a moment. An error, as of a device that was lost, is handed over
-/// too.
-void deliver(ServedWorld& served, ClientId id, std::uint32_t number, std::uint64_t generation,
-             const std::shared_ptr<OutgoingQueue>& out, FrameJob job) {
-  const auto drawn = [id, number, generation](ServedWorld& then) {
-    const auto client = then.clients.find(id);
-    if (client == then.clients.end()) return;
-    const auto watch = client->second.watches.find(number);
-    if (watch == client->second.watches.end() || watch->second.generation != generation) return;
-    watch->second.underWay = false;
-    if (std::exchange(watch->second.elsewhere, false))
-      drawNext(then, id, client->second, number, watch->second);
+/// Renders a frame and sends it, or its error (a lost device). The subscription becomes ready
+/// before the frame is queued: a client that receives the frame and steps then gets the next one.
+/// Two frames may therefore be unsent for a moment.
+void renderAndPush(HostedWorld& hosted, ClientId id, std::uint32_t number, std::uint64_t generation,
+                   const std::shared_ptr<OutgoingQueue>& out, FrameJob job) {
+  const auto onRendered = [id, number, generation](HostedWorld& current) {
+    const auto client = current.clients.find(id);
+    if (client == current.clients.end()) return;
+    const auto subscription = client->second.frameSubscriptions.find(number);
+    if (subscription == client->second.frameSubscriptions.end() ||
+        subscription->second.generation != generation)
+      return;
+    ENFILADE_ASSERT(subscription->second.rendering);
+    subscription->second.rendering = false;
+    if (std::exchange(subscription->second.stale, false))
+      renderNext(current, id, client->second, number, subscription->second);
   };
-  served.frames.draw(std::move(job), [out, number, drawn, post = served.post](Encoded picture) {
-    post(drawn);
-    out->pushLatest(std::move(picture), number);
-  });
+  hosted.frames.renderFrame(std::move(job),
+                            [out, number, onRendered, post = hosted.post](EncodedMessage image) {
+                              post(onRendered);
+                              out->pushLatest(std::move(image), number);
+                            });
 }
 
-/// The error of a view, as one of the whole request.
-v1::Error ofWatch(v1::Error error) {
+/// Prefixes the field of a view's error with the path of the request.
+v1::Error prefixErrorField(v1::Error error) {
   if (!error.field().empty()) error.set_field("watch_frames.frame." + error.field());
   return error;
 }
 
-void draw(ServedWorld& served, ClientId id, Client& client, std::uint32_t number,
-          FrameWatch& watch) {
-  const auto snapshot = served.world.snapshot();
-  auto view = viewFrom(watch.request, *snapshot);
+void renderSubscription(HostedWorld& hosted, ClientId id, Client& client, std::uint32_t number,
+                        FrameSubscription& subscription) {
+  ENFILADE_ASSERT(!subscription.rendering && !subscription.stale);
+  const auto snapshot = hosted.world.snapshot();
+  auto view = viewFromProto(subscription.request, *snapshot);
   if (std::holds_alternative<v1::Error>(view)) return;
-  if (client.out->dropLatest(number)) ++watch.dropped;
-  served.droppedFrames += watch.dropped;
-  watch.underWay = true;
-  FrameJob job{
-      snapshot,    std::get<View>(std::move(view)), watch.request, 0, number, watch.dropped,
-      served.drawn};
-  watch.dropped = 0;
-  job.seen = toRecording(served, watch.request);
-  deliver(served, id, number, watch.generation, client.out, std::move(job));
+  if (client.out->dropLatest(number)) ++subscription.dropped;
+  hosted.droppedFrames += subscription.dropped;
+  subscription.rendering = true;
+  FrameJob job{snapshot,
+               std::get<FrameView>(std::move(view)),
+               subscription.request,
+               0,
+               number,
+               subscription.dropped,
+               hosted.renderedFrames};
+  subscription.dropped = 0;
+  job.onRendered = makeRecordingObserver(hosted, subscription.request);
+  renderAndPush(hosted, id, number, subscription.generation, client.out, std::move(job));
 }
 
-void drawNext(ServedWorld& served, ClientId id, Client& client, std::uint32_t number,
-              FrameWatch& watch) {
-  const double now = served.world.snapshot()->time;
-  watch.nextTime = now + (watch.rate > 0 ? 1 / watch.rate : 0);
-  draw(served, id, client, number, watch);
+void renderNext(HostedWorld& hosted, ClientId id, Client& client, std::uint32_t number,
+                FrameSubscription& subscription) {
+  const double now = hosted.world.snapshot()->time;
+  subscription.nextTime = now + (subscription.rate > 0 ? 1 / subscription.rate : 0);
+  renderSubscription(hosted, id, client, number, subscription);
 }
 
 }  // namespace
 
-std::optional<v1::Error> watchFrames(ServedWorld& served, ClientId id, Client& client,
-                                     const v1::WatchFrames& wanted) {
-  const std::uint32_t most = served.limits.watches;
-  if (wanted.watch() < 1 || wanted.watch() > most) {
-    return errorOf(v1::ERROR_BAD_MESSAGE, "watch: give a number from 1 to " + std::to_string(most),
-                   "watch_frames.watch");
+std::optional<v1::Error> updateFrameSubscription(HostedWorld& hosted, ClientId id, Client& client,
+                                                 const v1::WatchFrames& request) {
+  const std::uint32_t maxSubscriptions = hosted.limits.frameSubscriptions;
+  if (request.watch() < 1 || request.watch() > maxSubscriptions) {
+    return makeError(v1::ERROR_BAD_MESSAGE,
+                     "watch: give a number from 1 to " + std::to_string(maxSubscriptions),
+                     "watch_frames.watch");
   }
-  if (!wanted.has_frame()) {
-    client.watches.erase(wanted.watch());
+  if (!request.has_frame()) {
+    client.frameSubscriptions.erase(request.watch());
     return std::nullopt;
   }
-  if (!(wanted.rate() >= 0 && wanted.rate() <= 1e6)) {
-    return errorOf(v1::ERROR_BAD_MESSAGE, "rate: give 0 to 1000000 a second", "watch_frames.rate");
+  if (!(request.rate() >= 0 && request.rate() <= 1e6)) {
+    return makeError(v1::ERROR_BAD_MESSAGE, "rate: give 0 to 1000000 per second",
+                     "watch_frames.rate");
   }
-  if (wanted.frame().has_tick()) {
-    return errorOf(v1::ERROR_BAD_MESSAGE, "frame.tick: a watch is of all ticks; leave it out",
-                   "watch_frames.frame.tick");
+  if (request.frame().has_tick()) {
+    return makeError(v1::ERROR_BAD_MESSAGE, "frame.tick: a subscription covers all ticks; omit it",
+                     "watch_frames.frame.tick");
   }
-  if (served.frames.deviceName().empty())
-    return errorOf(v1::ERROR_NO_RENDERER, served.frames.whyNone());
-  const auto view = viewFrom(wanted.frame(), *served.world.snapshot());
-  const auto* problem = std::get_if<v1::Error>(&view);
-  // An avatar may come later; all else that is wrong with a view stays wrong.
-  if (problem && problem->code() != v1::ERROR_UNKNOWN_AVATAR) return ofWatch(*problem);
-  FrameWatch watch;
-  watch.request = wanted.frame();
-  watch.rate = wanted.rate();
-  watch.generation = ++served.lastWatch;
-  FrameWatch& kept =
-      client.watches.insert_or_assign(wanted.watch(), std::move(watch)).first->second;
-  if (!problem) draw(served, id, client, wanted.watch(), kept);
+  if (hosted.frames.deviceName().empty())
+    return makeError(v1::ERROR_NO_RENDERER, hosted.frames.unavailableReason());
+  const auto view = viewFromProto(request.frame(), *hosted.world.snapshot());
+  const auto* error = std::get_if<v1::Error>(&view);
+  // An unknown avatar may be spawned later; all other errors are permanent.
+  if (error && error->code() != v1::ERROR_UNKNOWN_AVATAR) return prefixErrorField(*error);
+  FrameSubscription subscription;
+  subscription.request = request.frame();
+  subscription.rate = request.rate();
+  subscription.generation = ++hosted.lastGeneration;
+  FrameSubscription& stored =
+      client.frameSubscriptions.insert_or_assign(request.watch(), std::move(subscription))
+          .first->second;
+  if (!error) renderSubscription(hosted, id, client, request.watch(), stored);
   return std::nullopt;
 }
 
-decltype(FrameJob::seen) toRecording(const ServedWorld& served, const v1::FrameRequest& request) {
-  const WorldRecorder* recorder = served.world.recorder();
-  if (!recorder || !recorder->takesPictures() || !request.has_eyes()) return {};
-  return [avatar = request.eyes().avatar(), branch = served.branches, post = served.post](
+decltype(FrameJob::onRendered) makeRecordingObserver(const HostedWorld& hosted,
+                                                     const v1::FrameRequest& request) {
+  const WorldRecorder* recorder = hosted.world.recorder();
+  if (!recorder || !recorder->recordsImages() || !request.has_eyes()) return {};
+  return [avatar = request.eyes().avatar(), branch = hosted.branchCount, post = hosted.post](
              const v1::Frame& frame, std::span<const std::uint8_t> attachment) {
-    auto picture = encodedPicture(frame, attachment);
-    if (!picture) return;
-    post([avatar, branch, frame, picture = std::move(*picture)](ServedWorld& then) {
-      WorldRecorder* taker = then.world.recorder();
-      if (taker && then.branches == branch) taker->picture(avatar, frame, picture);
+    auto image = extractImage(frame, attachment);
+    if (!image) return;
+    post([avatar, branch, frame, image = std::move(*image)](HostedWorld& current) {
+      WorldRecorder* currentRecorder = current.world.recorder();
+      if (currentRecorder && current.branchCount == branch)
+        currentRecorder->writeImage(avatar, frame, image);
     });
   };
 }
 
-void drawRecorded(ServedWorld& served) {
-  WorldRecorder* recorder = served.world.recorder();
-  // Only who records pictures waits for what draws them.
-  if (!recorder || !recorder->picturesDue(served.world) || served.frames.deviceName().empty())
+void renderRecorded(HostedWorld& hosted) {
+  WorldRecorder* recorder = hosted.world.recorder();
+  // deviceName() waits for the renderer; it is called only if frames are recorded.
+  if (!recorder || !recorder->areImagesDue(hosted.world) || hosted.frames.deviceName().empty())
     return;
-  const auto snapshot = served.world.snapshot();
-  for (const scene::AvatarView& avatar : snapshot->avatars) {
-    // One that is not drawn yet is left out: the tick waits for no picture.
-    if (!served.recordedViews.insert(avatar.name).second) continue;
-    const v1::FrameRequest request = recordedView(avatar.name);
+  const auto snapshot = hosted.world.snapshot();
+  for (const scene::AvatarSnapshot& avatar : snapshot->avatars) {
+    // Skip an avatar whose previous frame is not finished: the tick does not wait.
+    if (!hosted.recordingRenders.insert(avatar.name).second) continue;
+    const v1::FrameRequest request = makeRecordedViewRequest(avatar.name);
     FrameJob job;
     job.snapshot = snapshot;
-    job.view = std::get<View>(viewFrom(request, *snapshot));
+    job.view = std::get<FrameView>(viewFromProto(request, *snapshot));
     job.request = request;
-    job.drawn = served.drawn;
-    job.seen = toRecording(served, request);
-    served.frames.draw(std::move(job), [name = avatar.name, post = served.post](const Encoded&) {
-      post([name](ServedWorld& then) { then.recordedViews.erase(name); });
-    });
+    job.renderedCount = hosted.renderedFrames;
+    job.onRendered = makeRecordingObserver(hosted, request);
+    hosted.frames.renderFrame(
+        std::move(job), [name = avatar.name, post = hosted.post](const EncodedMessage&) {
+          post([name](HostedWorld& current) { current.recordingRenders.erase(name); });
+        });
   }
 }
 
-void drawWatched(ServedWorld& served, ClientId id, Client& client) {
-  const double now = served.world.snapshot()->time;
-  for (auto& [number, watch] : client.watches) {
-    if (now + served.world.lengths().tick / 2 < watch.nextTime) continue;
-    if (watch.underWay) {
-      ++watch.dropped;
+void renderSubscribed(HostedWorld& hosted, ClientId id, Client& client) {
+  const double now = hosted.world.snapshot()->time;
+  for (auto& [number, subscription] : client.frameSubscriptions) {
+    if (now + hosted.world.settings().tickDuration / 2 < subscription.nextTime) continue;
+    if (subscription.rendering) {
+      ++subscription.dropped;
       continue;
     }
-    drawNext(served, id, client, number, watch);
+    renderNext(hosted, id, client, number, subscription);
   }
 }
 

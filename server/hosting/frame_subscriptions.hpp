@@ -1,24 +1,25 @@
-// Subscriptions to pictures: one at a time of each, the latest tick, and what was left out is
-// counted. On the tick thread.
+// Frame subscriptions: at most one frame of each is in progress, always of the latest tick. Skipped
+// frames are counted. Tick thread only.
 #pragma once
 
 #include "server/hosting/hosted_world.hpp"
 
 namespace enfilade::server {
 
-/// Begins, replaces or ends a watch; what is wrong with the request, if anything. The first picture
-/// is of the last tick.
-std::optional<v1::Error> watchFrames(ServedWorld& served, ClientId id, Client& client,
-                                     const v1::WatchFrames& wanted);
+/// Starts, replaces or ends a subscription; returns the error of an invalid request. The first
+/// frame shows the last tick.
+std::optional<v1::Error> updateFrameSubscription(HostedWorld& hosted, ClientId id, Client& client,
+                                                 const v1::WatchFrames& request);
 
-/// Has the pictures drawn that are due with this tick.
-void drawWatched(ServedWorld& served, ClientId id, Client& client);
+/// Renders the client's subscribed frames that are due at this tick.
+void renderSubscribed(HostedWorld& hosted, ClientId id, Client& client);
 
-/// For a picture that is to be drawn: what hands it to the recording too, if that takes it; else
-/// empty.
-decltype(FrameJob::seen) toRecording(const ServedWorld& served, const v1::FrameRequest& request);
+/// Returns a FrameJob::onRendered callback that also records the frame; empty if frames of this
+/// request are not recorded.
+decltype(FrameJob::onRendered) makeRecordingObserver(const HostedWorld& hosted,
+                                                     const v1::FrameRequest& request);
 
-/// What everyone sees, when the recording is to have it.
-void drawRecorded(ServedWorld& served);
+/// Renders all avatars' views for the recording, if they are due.
+void renderRecorded(HostedWorld& hosted);
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// The world and everyone who is connected to it. Only the tick thread reads or changes this.
+// A world and its connected clients. Only the tick thread may access this state.
 #pragma once
 
 #include <atomic>
@@ -27,150 +27,144 @@ namespace enfilade::server {
 
 using ClientId = std::uint64_t;
 
-/// A Step that is being made; the client's later requests wait for it.
-struct StepUnderWay {
+/// A Step in progress; the client's later requests wait for it.
+struct PendingStep {
   std::uint64_t requestId = 0;
   std::uint32_t remaining = 0;  ///< ticks
-  bool avatars = false;
-  std::uint32_t made = 0;  ///< ticks
+  bool includeAvatars = false;
+  std::uint32_t completed = 0;  ///< ticks
 };
 
-/// A request that a service works on. Who claims it first answers it: the service, or the world
-/// that ends meanwhile.
-struct AnswerUnderWay {
+/// A request that a service works on. Either the service or a world that ends meanwhile answers it:
+/// the first to claim it.
+struct PendingReply {
   std::uint64_t requestId = 0;
   std::shared_ptr<std::atomic<bool>> claimed = std::make_shared<std::atomic<bool>>(false);
   bool claim() const { return !claimed->exchange(true); }
 };
 
-struct WaitingRequest {
+/// A request that waits for earlier ones of the same client.
+struct QueuedRequest {
   v1::ClientMessage message;
-  RequestHold hold;
+  RequestPermit permit;
 };
 
-/// Pictures that are sent unasked.
-struct FrameWatch {
+/// A subscription to rendered frames.
+struct FrameSubscription {
   v1::FrameRequest request;
-  double rate = 0;               ///< a second of simulated time; 0: every tick
+  double rate = 0;               ///< frames per simulated second; 0: every tick
   double nextTime = 0;           ///< seconds of simulated time
-  bool underWay = false;         ///< one is being drawn
-  bool elsewhere = false;        ///< and the world has gone elsewhere since: another one follows
-  std::uint64_t dropped = 0;     ///< since the last one that was begun
-  std::uint64_t generation = 0;  ///< tells it from one that it replaced
+  bool rendering = false;        ///< a frame is in progress
+  bool stale = false;            ///< the world was replaced meanwhile: render again
+  std::uint64_t dropped = 0;     ///< since the start of the last frame
+  std::uint64_t generation = 0;  ///< distinguishes it from a replaced subscription
 };
 
+/// A client of the world.
 struct Client {
   std::string name;
   Role role = Role::observe;
   std::shared_ptr<OutgoingQueue> out;
   v1::Subscribe subscription;
-  std::uint64_t sequence = 0;          ///< of the last TickEvents
-  double nextStateTime = 0;            ///< seconds of simulated time
-  std::uint64_t droppedStates = 0;     ///< since the last one that was sent
-  std::deque<WaitingRequest> waiting;  ///< replies keep the order of the requests
-  std::optional<StepUnderWay> step;
-  std::map<std::uint32_t, FrameWatch> watches;
-  std::optional<AnswerUnderWay> answerUnderWay;
+  std::uint64_t sequence = 0;       ///< of the last TickEvents
+  double nextStateTime = 0;         ///< seconds of simulated time
+  std::uint64_t droppedStates = 0;  ///< since the last sent state
+  std::deque<QueuedRequest> queue;  ///< replies keep the order of requests
+  std::optional<PendingStep> pendingStep;
+  std::map<std::uint32_t, FrameSubscription> frameSubscriptions;
+  std::optional<PendingReply> pendingReply;
 };
 
-struct ServedClock {
+/// The clock of a world, and the client that drives it.
+struct WorldClock {
   v1::Clock::Mode mode = v1::Clock::MODE_LOCKSTEP;
   double speed = 1;  ///< simulated seconds per second
   std::chrono::steady_clock::time_point nextTick;
   std::optional<ClientId> driver;
 };
 
-class Worlds;
+class WorldDirectory;
 
-/// Which of the server's worlds one is.
-struct WorldPlace {
+/// Identifies a world among the worlds of a server.
+struct WorldIdentity {
   std::string name = "main";
-  std::string scene;         ///< its name
-  Worlds* worlds = nullptr;  ///< null: it is the only one, and there can be no others
+  std::string scene;                    ///< the scene's name
+  WorldDirectory* directory = nullptr;  ///< null: a single world, not of a server
   bool dropWhenEmpty = false;
-  /// The last client left, on the thread that told so. Only with dropWhenEmpty.
+  /// Called when the last client has left, on the thread of that call. Only with dropWhenEmpty.
   std::function<void()> becameEmpty;
 };
 
-/// What everyone may know of a world without asking its thread.
-struct WorldGlance {
+/// Status of a world that any thread may read.
+struct WorldStatus {
   std::atomic<std::uint64_t> tick{0};
   std::atomic<v1::Clock::Mode> mode{v1::Clock::MODE_LOCKSTEP};
   std::atomic<double> speed{1};
-  std::atomic<bool> driven{false};
+  std::atomic<bool> hasDriver{false};
 };
 
-struct ServedWorld {
-  /// Throws protocol::mcap::RecordingError, and Diverged where a recording cannot be played.
-  ServedWorld(std::shared_ptr<const scene::Scene> scene, FrameService& frameService,
-              QuestionService& questionService, const WorldOptions& options = {},
-              WorldPlace place = {});
+/// A world, its clients, its services and its replay.
+struct HostedWorld {
+  /// Throws protocol::mcap::RecordingError, and Divergence if a recording cannot be replayed.
+  HostedWorld(std::shared_ptr<const scene::Scene> scene, FrameService& frameService,
+              QueryService& queryService, const WorldOptions& options = {},
+              WorldIdentity worldIdentity = {});
 
-  const WorldPlace place;
-  WorldGlance glance;
+  const WorldIdentity identity;
+  WorldStatus status;
   std::shared_ptr<const scene::Scene> scene;
   std::uint32_t auditEvery = 0;    ///< ticks; 0: never
-  std::unique_ptr<Replay> replay;  ///< null: the world plays no recording
-  /// Of a replay: how its branches are recorded; nullopt: they are not.
+  std::unique_ptr<Replay> replay;  ///< null: the world replays no recording
+  /// Recording options for branches of a replay; nullopt: branches are not recorded.
   std::optional<RecordingOptions> branchRecording;
-  std::uint64_t branches = 0;  ///< recordings of branches that were begun
-  RecordedWorld world;
+  std::uint64_t branchCount = 0;  ///< number of started branch recordings
+  RecordableWorld world;
   FrameService& frames;
-  QuestionService& questions;
+  QueryService& queries;
   ServerLimits limits;
-  ServedClock clock;
+  WorldClock clock;
   std::map<ClientId, Client> clients;
-  /// Who may command an avatar, by its name: from its spawn order until it and its orders are gone.
+  /// The client that may command an avatar, by the avatar's name. An entry lasts from the spawn
+  /// order until the avatar and its orders are gone.
   std::map<std::string, ClientId> owners;
-  std::set<std::string> unsettled;  ///< of `owners`: names that may be free
-  std::map<std::pair<scene::EntityId, scene::EntityId>, v1::ContactEvent> live;
+  std::set<std::string> pendingRelease;  ///< names in `owners` that may become free
+  std::map<std::pair<scene::EntityId, scene::EntityId>, v1::ContactEvent> activeContacts;
   TickStatistics statistics;
-  bool idle = true;                 ///< as the last tick told
-  std::uint64_t droppedStates = 0;  ///< of all clients
-  std::uint64_t droppedFrames = 0;  ///< of all watches
-  std::uint64_t lastWatch = 0;      ///< the last FrameWatch::generation
-  /// Pictures that were drawn of this world.
-  std::shared_ptr<std::atomic<std::uint64_t>> drawn =
+  bool idle = true;                  ///< of the last tick
+  std::uint64_t droppedStates = 0;   ///< of all clients
+  std::uint64_t droppedFrames = 0;   ///< of all frame subscriptions
+  std::uint64_t lastGeneration = 0;  ///< last FrameSubscription::generation
+  /// Number of frames rendered for this world.
+  std::shared_ptr<std::atomic<std::uint64_t>> renderedFrames =
       std::make_shared<std::atomic<std::uint64_t>>(0);
-  /// What clients are told at the end; once it is given, no more requests are answered.
-  std::optional<v1::Bye> farewell;
-  std::set<std::string> recordedViews;  ///< avatars whose view is being drawn for the recording
-  /// Hands a job to the tick thread; callable from any thread.
-  std::function<void(std::function<void(ServedWorld&)>)> post;
-  /// Whether the world is to end: long work on the tick thread gives up then.
-  std::function<bool()> ending = [] { return false; };
+  /// The final message to clients. Once it is set, requests are no longer answered.
+  std::optional<v1::Bye> closeNotice;
+  std::set<std::string> recordingRenders;  ///< avatars with a frame in progress for the recording
+  /// Posts a job to the tick thread; callable from any thread.
+  std::function<void(std::function<void(HostedWorld&)>)> post;
+  /// Whether the world is stopping: long work on the tick thread aborts then.
+  std::function<bool()> isEnding = [] { return false; };
 };
 
-/// Makes one tick and tells everyone what they subscribed to. A replay that has no more stops.
-void advance(ServedWorld& served);
+/// A world at tick 0.
+scene::World makeInitialWorld(const std::shared_ptr<const scene::Scene>& scene,
+                              const scene::WorldSettings& settings, std::uint32_t auditEvery);
 
-/// The world as it was at first. Everyone is told that contacts ended and avatars left.
-void restartWorld(ServedWorld& served);
+/// Updates `activeContacts` from the begin and end events.
+void updateActiveContacts(HostedWorld& hosted, const v1::TickEvents& events);
 
-/// Another world of the same scene: contacts that live are told as ended by a seek, `living` as
-/// those that live now, and everyone gets states and pictures of it. Avatars belong to nobody then.
-void goTo(ServedWorld& served, scene::World world, const v1::TickEvents& living);
+/// Updates the status that other threads read.
+void publishStatus(HostedWorld& hosted);
 
-/// Drops what the avatar was told, and stops it.
-void haltAvatar(ServedWorld& served, const std::string& avatar);
+v1::Clock toProto(const WorldClock& clock);
 
-/// Takes a client out; its avatars leave at the next tick.
-void removeClient(ServedWorld& served, ClientId id);
+/// Clears the avatar's orders and stops it.
+void stopAvatar(HostedWorld& hosted, const std::string& avatar);
 
-/// Ends all contacts, answers what is open, and says goodbye to all by `farewell`.
-void closeWorld(ServedWorld& served);
+/// Removes a client; its avatars leave at the next tick.
+void removeClient(HostedWorld& hosted, ClientId id);
 
-/// Says goodbye to all, where the world itself cannot be asked any more.
-void failWorld(ServedWorld& served);
-
-Buffer goodbyeOf(const v1::Bye& farewell);
-
-/// Lets everyone see how the world stands.
-void publish(ServedWorld& served);
-
-v1::Clock messageOf(const ServedClock& clock);
-
-void send(Client& client, const v1::ServerMessage& message);
+void sendMessage(Client& client, const v1::ServerMessage& message);
 void sendError(Client& client, std::uint64_t requestId, v1::Error error);
 
 }  // namespace enfilade::server

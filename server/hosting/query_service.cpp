@@ -5,6 +5,7 @@
 #include <chrono>
 #include <optional>
 
+#include "collision/assert.hpp"
 #include "server/base/work_thread.hpp"
 #include "server/messages/proximity_messages.hpp"
 #include "server/messages/ray_messages.hpp"
@@ -12,58 +13,58 @@
 
 namespace enfilade::server {
 
-struct QuestionService::State {
+struct QueryService::State {
   explicit State(std::shared_ptr<const scene::Scene> s) : scene(std::move(s)) {}
 
   std::shared_ptr<const scene::Scene> scene;
-  std::optional<scene::RayCaster> caster;           ///< once somebody asked for rays
-  std::shared_ptr<const scene::Snapshot> followed;  ///< where the caster has what moves
-  std::optional<scene::SceneIndex> index;           ///< once somebody asked for pairs
-  WorkThread thread;                                // last: it uses the others
+  std::optional<scene::RayCaster> caster;                 ///< built at the first ray query
+  std::shared_ptr<const scene::Snapshot> casterSnapshot;  ///< state of the caster's moving entities
+  std::optional<scene::EntityIndex> index;                ///< built at the first proximity query
+  WorkThread thread;                                      // last member: it uses the others
 
   const scene::RayCaster& casterAt(const std::shared_ptr<const scene::Snapshot>& snapshot);
-  scene::SceneThen then(const Question& question);
-  std::variant<v1::RayReply, v1::Error> rays(const Question& question,
-                                             std::vector<std::uint8_t>& attachment);
-  Encoded answer(const Question& question);
-  Encoded answerOrSayWhyNot(const Question& question);
+  scene::SceneAt makeSceneAt(const SceneQuery& query);
+  std::variant<v1::RayReply, v1::Error> answerRays(const SceneQuery& query,
+                                                   std::vector<std::uint8_t>& attachment);
+  EncodedMessage answerQuery(const SceneQuery& query);
+  EncodedMessage answerSafely(const SceneQuery& query);
 };
 
-const scene::RayCaster& QuestionService::State::casterAt(
+const scene::RayCaster& QueryService::State::casterAt(
     const std::shared_ptr<const scene::Snapshot>& snapshot) {
   if (!caster) {
     const auto start = std::chrono::steady_clock::now();
     caster.emplace(scene);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    spdlog::info("rays: the scene's tree was built in {:.2f} s", seconds.count());
+    spdlog::info("rays: built the scene's BVH in {:.2f} s", seconds.count());
   }
-  if (followed != snapshot) {
-    followed.reset();  // until all is placed
-    caster->follow(*snapshot);
-    followed = snapshot;
+  if (casterSnapshot != snapshot) {
+    casterSnapshot.reset();  // invalid while the caster updates
+    caster->update(*snapshot);
+    casterSnapshot = snapshot;
   }
   return *caster;
 }
 
-scene::SceneThen QuestionService::State::then(const Question& question) {
+scene::SceneAt QueryService::State::makeSceneAt(const SceneQuery& query) {
   if (!index) index.emplace(scene);
-  return {*index, *question.snapshot};
+  return {*index, *query.snapshot};
 }
 
-std::variant<v1::RayReply, v1::Error> QuestionService::State::rays(
-    const Question& question, std::vector<std::uint8_t>& attachment) {
-  auto asked = raysFrom(question.message.rays(), *question.snapshot, question.limits);
-  if (auto* error = std::get_if<v1::Error>(&asked)) return std::move(*error);
-  return answerOf(std::get<AskedRays>(asked), casterAt(question.snapshot), *scene,
-                  *question.snapshot, attachment);
+std::variant<v1::RayReply, v1::Error> QueryService::State::answerRays(
+    const SceneQuery& query, std::vector<std::uint8_t>& attachment) {
+  auto resolved = rayQueryFromProto(query.message.rays(), *query.snapshot, query.limits);
+  if (auto* error = std::get_if<v1::Error>(&resolved)) return std::move(*error);
+  return castRays(std::get<ResolvedRayQuery>(resolved), casterAt(query.snapshot), *scene,
+                  *query.snapshot, attachment);
 }
 
 namespace {
 
-/// Takes the answer for `field` of the message, or the error.
+/// Stores the answer in `field` of the message, or the error.
 template <class Answer>
-void put(v1::ServerMessage& message, std::variant<Answer, v1::Error> answer,
-         Answer* (v1::ServerMessage::*field)()) {
+void setReply(v1::ServerMessage& message, std::variant<Answer, v1::Error> answer,
+              Answer* (v1::ServerMessage::*field)()) {
   if (auto* error = std::get_if<v1::Error>(&answer))
     *message.mutable_error() = std::move(*error);
   else
@@ -72,49 +73,52 @@ void put(v1::ServerMessage& message, std::variant<Answer, v1::Error> answer,
 
 }  // namespace
 
-Encoded QuestionService::State::answer(const Question& question) {
-  const v1::ClientMessage& asked = question.message;
+EncodedMessage QueryService::State::answerQuery(const SceneQuery& query) {
+  const v1::ClientMessage& message = query.message;
   std::vector<std::uint8_t> attachment;
   v1::ServerMessage reply;
-  reply.set_reply_to(asked.request_id());
-  if (asked.has_rays())
-    put(reply, rays(question, attachment), &v1::ServerMessage::mutable_rays);
-  else if (asked.has_distances())
-    put(reply, answerOf(asked.distances(), then(question), question.limits),
-        &v1::ServerMessage::mutable_distances);
-  else if (asked.has_touching())
-    put(reply, answerOf(asked.touching(), then(question), question.lengths, question.limits),
-        &v1::ServerMessage::mutable_touching);
+  reply.set_reply_to(message.request_id());
+  if (message.has_rays())
+    setReply(reply, answerRays(query, attachment), &v1::ServerMessage::mutable_rays);
+  else if (message.has_distances())
+    setReply(reply, answerDistances(message.distances(), makeSceneAt(query), query.limits),
+             &v1::ServerMessage::mutable_distances);
+  else if (message.has_touching())
+    setReply(reply,
+             answerTouching(message.touching(), makeSceneAt(query), query.settings, query.limits),
+             &v1::ServerMessage::mutable_touching);
   else
-    put(reply, answerOf(asked.cannot_touch(), then(question), question.lengths),
-        &v1::ServerMessage::mutable_cannot_touch);
+    setReply(reply, answerCannotTouch(message.cannot_touch(), makeSceneAt(query), query.settings),
+             &v1::ServerMessage::mutable_cannot_touch);
   return encodeShared(reply, std::move(attachment));
 }
 
-Encoded QuestionService::State::answerOrSayWhyNot(const Question& question) {
+EncodedMessage QueryService::State::answerSafely(const SceneQuery& query) {
   try {
-    return answer(question);
+    return answerQuery(query);
   } catch (const std::exception& error) {
-    spdlog::error("a question could not be answered: {}", error.what());
-    return errorReply(question.message.request_id(), errorOf(v1::ERROR_INTERNAL, error.what()));
+    spdlog::error("a query failed: {}", error.what());
+    return makeErrorReply(query.message.request_id(), makeError(v1::ERROR_INTERNAL, error.what()));
   }
 }
 
-QuestionService::QuestionService(std::shared_ptr<const scene::Scene> scene)
+QueryService::QueryService(std::shared_ptr<const scene::Scene> scene)
     : state_(std::make_unique<State>(std::move(scene))) {}
 
-QuestionService::~QuestionService() {
+QueryService::~QueryService() {
   finish();
 }
 
-void QuestionService::ask(Question question, std::function<void(Encoded)> done) {
-  const auto shared = std::make_shared<const Question>(std::move(question));
+void QueryService::submit(SceneQuery query, std::function<void(EncodedMessage)> done) {
+  ENFILADE_ASSERT(query.message.has_rays() || query.message.has_distances() ||
+                  query.message.has_touching() || query.message.has_cannot_touch());
+  const auto shared = std::make_shared<const SceneQuery>(std::move(query));
   state_->thread.post([state = state_.get(), shared, done = std::move(done)] {
-    done(state->answerOrSayWhyNot(*shared));
+    done(state->answerSafely(*shared));
   });
 }
 
-void QuestionService::finish() {
+void QueryService::finish() {
   state_->thread.finish();
 }
 

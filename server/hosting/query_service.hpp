@@ -1,6 +1,5 @@
-// Answers to questions about a scene at a tick (rays, distances, what touches what), on a thread of
-// their own, so that the tick never waits for them. What they are answered with is built when
-// somebody first asks.
+// Answers queries about a snapshot (rays, distances, touching, time to contact) on a thread of its
+// own, so that ticks do not wait. Acceleration structures are built at first use.
 #pragma once
 
 #include <functional>
@@ -15,23 +14,24 @@
 
 namespace enfilade::server {
 
-struct Question {
+/// A query with its snapshot, settings and limits.
+struct SceneQuery {
   std::shared_ptr<const scene::Snapshot> snapshot;
   v1::ClientMessage message;  ///< a RayQuery, DistanceQuery, TouchingQuery or CannotTouchQuery
-  scene::Lengths lengths;
+  scene::WorldSettings settings;
   ServerLimits limits;
 };
 
-class QuestionService {
+class QueryService {
  public:
-  explicit QuestionService(std::shared_ptr<const scene::Scene> scene);
-  ~QuestionService();
-  QuestionService(const QuestionService&) = delete;
-  QuestionService& operator=(const QuestionService&) = delete;
+  explicit QueryService(std::shared_ptr<const scene::Scene> scene);
+  ~QueryService();
+  QueryService(const QueryService&) = delete;
+  QueryService& operator=(const QueryService&) = delete;
 
-  /// `done` gets the whole reply (or an Error) on the service's thread, in the order of the calls.
-  void ask(Question question, std::function<void(Encoded)> done);
-  /// Waits for what was asked; nothing may be asked afterwards.
+  /// `done` receives the encoded reply or Error on the service's thread, in the order of the calls.
+  void submit(SceneQuery query, std::function<void(EncodedMessage)> done);
+  /// Waits for all queries. Do not submit queries afterwards.
   void finish();
 
  private:

@@ -2,6 +2,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include "collision/assert.hpp"
+#include "server/hosting/world_lifecycle.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -9,18 +11,18 @@ namespace {
 
 using protocol::mcap::RecordingError;
 
-/// Thrown by a seek that gives up because the server ends.
-struct Ending {};
+/// Thrown to abort a seek because the server stops.
+struct ServerStopping {};
 
-std::optional<v1::Error> noReplay(const ServedWorld& served) {
-  if (served.replay) return std::nullopt;
-  return errorOf(v1::ERROR_NOT_ALLOWED,
-                 "this world plays no recording: `enfilade serve RECORDING` begins with one that "
-                 "does");
+std::optional<v1::Error> validateHasReplay(const HostedWorld& hosted) {
+  if (hosted.replay) return std::nullopt;
+  return makeError(v1::ERROR_NOT_ALLOWED,
+                   "this world does not replay a recording: start the server with "
+                   "`enfilade serve RECORDING`");
 }
 
-/// "branch.mcap", or "branch-2.mcap" and so on where that is there.
-std::filesystem::path freeFileOf(const std::filesystem::path& first) {
+/// Returns "branch.mcap", or "branch-2.mcap" and so on if the file exists.
+std::filesystem::path findFreeFile(const std::filesystem::path& first) {
   std::filesystem::path file = first;
   for (int number = 2; std::filesystem::exists(file); ++number) {
     file = first;
@@ -30,124 +32,130 @@ std::filesystem::path freeFileOf(const std::filesystem::path& first) {
   return file;
 }
 
-/// The recording of a branch begins, if branches are recorded.
-void recordBranch(ServedWorld& served) {
-  if (!served.branchRecording) return;
-  RecordingOptions options = *served.branchRecording;
-  options.choice.file = freeFileOf(options.choice.file);
-  const BranchPoint branch{served.replay->parent(), served.replay->livingIn(served.world)};
-  served.world.record(options, &branch);
-  ++served.branches;
-  spdlog::info("the branch after tick {} is recorded to {}", branch.parent.tick(),
+/// Starts recording the branch, if branches are recorded.
+void startBranchRecording(HostedWorld& hosted) {
+  ENFILADE_ASSERT(!hosted.world.recorder());
+  if (!hosted.branchRecording) return;
+  RecordingOptions options = *hosted.branchRecording;
+  options.choice.file = findFreeFile(options.choice.file);
+  const BranchPoint branch{hosted.replay->parent(), hosted.replay->activeContactsAt(hosted.world)};
+  hosted.world.record(options, &branch);
+  ++hosted.branchCount;
+  spdlog::info("recording the branch after tick {} to {}", branch.parent.tick(),
                options.choice.file.string());
 }
 
-/// The world after `tick`, what lives in it being told by the replay.
-void goTo(ServedWorld& served, std::uint64_t tick) {
-  scene::World world = served.replay->seek(tick, [&served](std::uint64_t) {
-    if (served.ending()) throw Ending{};
+/// Replaces the world by the one after `tick`, with the active contacts of the replay.
+void seekTo(HostedWorld& hosted, std::uint64_t tick) {
+  scene::World world = hosted.replay->seek(tick, [&hosted](std::uint64_t) {
+    if (hosted.isEnding()) throw ServerStopping{};
   });
-  const v1::TickEvents living = served.replay->livingIn(world);
-  goTo(served, std::move(world), living);
+  const v1::TickEvents activeContacts = hosted.replay->activeContactsAt(world);
+  replaceWorld(hosted, std::move(world), activeContacts);
 }
 
 }  // namespace
 
-v1::Replay replayOf(const ServedWorld& served) {
-  const Replay& replay = *served.replay;
+v1::Replay makeReplayStatus(const HostedWorld& hosted) {
+  ENFILADE_ASSERT(hosted.replay);
+  const Replay& replay = *hosted.replay;
   v1::Replay message;
   message.set_file(replay.file().filename().string());
   message.set_first_tick(replay.firstTick());
   message.set_last_tick(replay.lastTick());
-  message.set_tick(served.world.snapshot()->tick);
+  message.set_tick(hosted.world.snapshot()->tick);
   message.set_at_end(replay.atEnd());
-  message.set_branched(replay.branchedAt().has_value());
-  message.set_branched_at(replay.branchedAt().value_or(0));
-  *message.mutable_clock() = messageOf(served.clock);
-  message.set_diverged(replay.whyStopped());
+  message.set_branched(replay.branchTick().has_value());
+  message.set_branched_at(replay.branchTick().value_or(0));
+  *message.mutable_clock() = toProto(hosted.clock);
+  message.set_diverged(replay.stopReason());
   return message;
 }
 
-void tellReplay(ServedWorld& served) {
-  if (!served.replay) return;
+void broadcastReplay(HostedWorld& hosted) {
+  if (!hosted.replay) return;
   v1::ServerMessage message;
-  *message.mutable_replay() = replayOf(served);
+  *message.mutable_replay() = makeReplayStatus(hosted);
   const Buffer shared = encodeShared(message);
-  for (auto& [id, client] : served.clients) client.out->push(shared);
+  for (auto& [id, client] : hosted.clients) client.out->push(shared);
 }
 
-std::optional<v1::Error> replayEnded(const ServedWorld& served) {
-  const Replay* replay = served.replay.get();
-  if (!replay || (!replay->atEnd() && replay->whyStopped().empty())) return std::nullopt;
-  const std::string tick = std::to_string(served.world.snapshot()->tick);
-  const std::string why =
+std::optional<v1::Error> validateReplayRunning(const HostedWorld& hosted) {
+  const Replay* replay = hosted.replay.get();
+  if (!replay || (!replay->atEnd() && replay->stopReason().empty())) return std::nullopt;
+  const std::string tick = std::to_string(hosted.world.snapshot()->tick);
+  const std::string reason =
       replay->atEnd() ? "the recording ends with tick " + tick
-                      : "the replay stops after tick " + tick + " (" + replay->whyStopped() + ")";
-  return errorOf(v1::ERROR_REPLAY_ENDED, why + ": Seek goes elsewhere, TakeOver goes on from here");
+                      : "the replay stops after tick " + tick + " (" + replay->stopReason() + ")";
+  return makeError(v1::ERROR_REPLAY_ENDED, reason + ": use Seek, or TakeOver to continue here");
 }
 
-std::optional<v1::Error> onlyReplayed(const ServedWorld& served) {
-  if (!served.replay || served.replay->branchedAt()) return std::nullopt;
-  return errorOf(v1::ERROR_NOT_ALLOWED,
-                 "the world plays a recording: TakeOver leaves it and goes on from here");
+std::optional<v1::Error> validateAcceptsCommands(const HostedWorld& hosted) {
+  if (!hosted.replay || hosted.replay->branchTick()) return std::nullopt;
+  return makeError(v1::ERROR_NOT_ALLOWED,
+                   "the world replays a recording: TakeOver to continue from here");
 }
 
-std::optional<v1::Error> seekProblem(const ServedWorld& served, const v1::Seek& wanted) {
-  if (auto problem = noReplay(served)) return problem;
-  const std::uint64_t first = served.replay->firstTick(), last = served.replay->lastTick();
-  if (wanted.tick() >= first && wanted.tick() <= last) return std::nullopt;
-  return errorOf(v1::ERROR_BAD_MESSAGE,
-                 "seek.tick = " + std::to_string(wanted.tick()) + ": the recording has " +
-                     std::to_string(first) + " to " + std::to_string(last),
-                 "seek.tick");
+std::optional<v1::Error> validateSeek(const HostedWorld& hosted, const v1::Seek& request) {
+  if (auto error = validateHasReplay(hosted)) return error;
+  const std::uint64_t first = hosted.replay->firstTick(), last = hosted.replay->lastTick();
+  if (request.tick() >= first && request.tick() <= last) return std::nullopt;
+  return makeError(v1::ERROR_BAD_MESSAGE,
+                   "seek.tick = " + std::to_string(request.tick()) + ": the recording has " +
+                       std::to_string(first) + " to " + std::to_string(last),
+                   "seek.tick");
 }
 
-std::optional<v1::Error> seek(ServedWorld& served, const v1::Seek& wanted) {
-  const std::string where = "the replay cannot go to tick " + std::to_string(wanted.tick()) + ": ";
+std::optional<v1::Error> seekReplay(HostedWorld& hosted, const v1::Seek& request) {
+  ENFILADE_ASSERT(!validateSeek(hosted, request));
+  const std::string prefix = "cannot seek to tick " + std::to_string(request.tick()) + ": ";
   try {
-    goTo(served, wanted.tick());
-  } catch (const Diverged& diverged) {
-    return errorOf(v1::ERROR_REPLAY_ENDED, where + textOf(diverged), "seek.tick");
+    seekTo(hosted, request.tick());
+  } catch (const Divergence& divergence) {
+    return makeError(v1::ERROR_REPLAY_ENDED, prefix + formatDivergence(divergence), "seek.tick");
   } catch (const RecordingError& error) {
-    return errorOf(v1::ERROR_REPLAY_ENDED, where + error.what(), "seek.tick");
-  } catch (const Ending&) {
-    return errorOf(v1::ERROR_SHUTTING_DOWN, "the server ends");
+    return makeError(v1::ERROR_REPLAY_ENDED, prefix + error.what(), "seek.tick");
+  } catch (const ServerStopping&) {
+    return makeError(v1::ERROR_SHUTTING_DOWN, "the server is stopping");
   }
-  served.clock.nextTick = std::chrono::steady_clock::now();
-  tellReplay(served);
+  hosted.clock.nextTick = std::chrono::steady_clock::now();
+  broadcastReplay(hosted);
   return std::nullopt;
 }
 
-std::optional<v1::Error> takeOverProblem(const ServedWorld& served, ClientId id,
-                                         const v1::TakeOver& wanted) {
-  if (auto problem = noReplay(served)) return problem;
-  const std::string& name = wanted.avatar();
+std::optional<v1::Error> validateTakeOver(const HostedWorld& hosted, ClientId id,
+                                          const v1::TakeOver& request) {
+  if (auto error = validateHasReplay(hosted)) return error;
+  const std::string& name = request.avatar();
   if (name.empty()) return std::nullopt;
-  if (!avatarNamed(*served.world.snapshot(), name))
-    return errorOf(v1::ERROR_UNKNOWN_AVATAR,
-                   "no avatar '" + name + "' is in the world after this tick", "take_over.avatar");
-  const auto owner = served.owners.find(name);
-  if (owner == served.owners.end() || owner->second == id) return std::nullopt;
-  return errorOf(v1::ERROR_NOT_ALLOWED,
-                 "avatar '" + name + "' belongs to another client: take another one over",
-                 "take_over.avatar");
+  if (!findAvatar(*hosted.world.snapshot(), name))
+    return makeError(v1::ERROR_UNKNOWN_AVATAR,
+                     "no avatar '" + name + "' is in the world after this tick",
+                     "take_over.avatar");
+  const auto owner = hosted.owners.find(name);
+  if (owner == hosted.owners.end() || owner->second == id) return std::nullopt;
+  return makeError(v1::ERROR_NOT_ALLOWED,
+                   "avatar '" + name + "' belongs to another client: take over another one",
+                   "take_over.avatar");
 }
 
-std::optional<v1::Error> takeOver(ServedWorld& served, ClientId id, const v1::TakeOver& wanted) {
-  if (!served.replay->branchedAt()) {
+std::optional<v1::Error> takeOverReplay(HostedWorld& hosted, ClientId id,
+                                        const v1::TakeOver& request) {
+  ENFILADE_ASSERT(!validateTakeOver(hosted, id, request));
+  if (!hosted.replay->branchTick()) {
     try {
-      recordBranch(served);
+      startBranchRecording(hosted);
     } catch (const RecordingError& error) {
-      spdlog::error("no branch: {}", error.what());
-      return errorOf(v1::ERROR_INTERNAL,
-                     std::string("the branch cannot be recorded: ") + error.what());
+      spdlog::error("cannot record the branch: {}", error.what());
+      return makeError(v1::ERROR_INTERNAL,
+                       std::string("the branch cannot be recorded: ") + error.what());
     }
-    served.replay->branch();
-    tellReplay(served);
+    hosted.replay->branch();
+    broadcastReplay(hosted);
   }
-  if (wanted.avatar().empty()) return std::nullopt;
-  haltAvatar(served, wanted.avatar());
-  served.owners[wanted.avatar()] = id;
+  if (request.avatar().empty()) return std::nullopt;
+  stopAvatar(hosted, request.avatar());
+  hosted.owners[request.avatar()] = id;
   return std::nullopt;
 }
 

@@ -1,30 +1,30 @@
-// What clients do with a world that plays a recording: seek in it, and take it over. On the tick
-// thread.
+// Client requests to a world that replays a recording: seek and take over. Tick thread only.
 #pragma once
 
 #include "server/hosting/hosted_world.hpp"
 
 namespace enfilade::server {
 
-/// How the replay stands. Only of a world that plays a recording.
-v1::Replay replayOf(const ServedWorld& served);
-/// Tells it to all clients; does nothing where no recording is played.
-void tellReplay(ServedWorld& served);
+/// The status of the replay. `hosted` must replay a recording.
+v1::Replay makeReplayStatus(const HostedWorld& hosted);
+/// Sends the status to all clients; no effect without a replay.
+void broadcastReplay(HostedWorld& hosted);
 
-/// Why a replay makes no tick now; nullopt: it does, or no recording is played.
-std::optional<v1::Error> replayEnded(const ServedWorld& served);
-/// Why the world takes no commands: it is a replay that is not branched; nullopt: it does.
-std::optional<v1::Error> onlyReplayed(const ServedWorld& served);
+/// An error if the replay cannot tick; nullopt: it can, or the world is no replay.
+std::optional<v1::Error> validateReplayRunning(const HostedWorld& hosted);
+/// An error if the world is an unbranched replay, which refuses commands; nullopt: accepts them.
+std::optional<v1::Error> validateAcceptsCommands(const HostedWorld& hosted);
 
-// What is wrong with a request; it changes nothing then.
+// These check a request and change nothing; nullopt: valid.
 
-std::optional<v1::Error> seekProblem(const ServedWorld& served, const v1::Seek& wanted);
-std::optional<v1::Error> takeOverProblem(const ServedWorld& served, ClientId id,
-                                         const v1::TakeOver& wanted);
+std::optional<v1::Error> validateSeek(const HostedWorld& hosted, const v1::Seek& request);
+std::optional<v1::Error> validateTakeOver(const HostedWorld& hosted, ClientId id,
+                                          const v1::TakeOver& request);
 
-// Both do it where there is no such problem, and tell what else was wrong.
+// These execute a valid request and return errors that occur during the execution.
 
-std::optional<v1::Error> seek(ServedWorld& served, const v1::Seek& wanted);
-std::optional<v1::Error> takeOver(ServedWorld& served, ClientId id, const v1::TakeOver& wanted);
+std::optional<v1::Error> seekReplay(HostedWorld& hosted, const v1::Seek& request);
+std::optional<v1::Error> takeOverReplay(HostedWorld& hosted, ClientId id,
+                                        const v1::TakeOver& request);
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// What a served world is made with, beside its scene.
+// Options of a hosted world.
 #pragma once
 
 #include <cstdint>
@@ -11,21 +11,22 @@
 
 namespace enfilade::server {
 
-/// A recording that clients play.
-struct PlayedRecording {
+/// The recording that a world replays.
+struct ReplayOptions {
   std::filesystem::path file;
-  std::uint64_t from = 0;  ///< the tick after which it stands at first
-  std::uint32_t run = 1;   ///< of those in the file
+  std::uint64_t startTick = 0;  ///< tick after which the replay starts
+  std::uint32_t run = 1;        ///< number of the run in the file
 };
 
+/// Limits, settings, recording and replay of a world.
 struct WorldOptions {
   ServerLimits limits;
-  scene::Lengths lengths;
-  std::uint32_t auditEvery = 0;            ///< ticks; 0: none is audited
-  std::optional<RecordingOptions> record;  ///< nullopt: nothing is written down
-  /// The world is a recorded one, which has the lengths above, and `record` is for what branches
-  /// off it; nullopt: it is new.
-  std::optional<PlayedRecording> replay;
+  scene::WorldSettings settings;
+  std::uint32_t auditEvery = 0;            ///< ticks; 0: never
+  std::optional<RecordingOptions> record;  ///< nullopt: no recording
+  /// The world replays this recording, with the settings above; `record` applies to its branches.
+  /// nullopt: a new world.
+  std::optional<ReplayOptions> replay;
 };
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// Bodies between the world and the protocol's messages.
+// Conversion of bodies and body commands between the world and the protocol.
 #pragma once
 
 #include <optional>
@@ -9,14 +9,14 @@
 
 namespace enfilade::server {
 
-/// The command, or what is missing in it, naming the field. Values are the world's to judge.
-std::variant<scene::BodyCommand, v1::Error> commandFrom(const v1::BodyCommand& message);
+/// Returns the command, or an error that names a missing field. The world validates the values.
+std::variant<scene::BodyCommand, v1::Error> bodyCommandFromProto(const v1::BodyCommand& message);
 
-/// Hands a command to the next tick. Why the world does not take it; nullopt when it does.
-std::optional<v1::Error> submit(scene::World& world, const v1::BodyCommand& message);
+/// Submits a command for the next tick. Returns the refusal; nullopt: accepted.
+std::optional<v1::Error> submitBodyCommand(scene::World& world, const v1::BodyCommand& message);
 
-/// Of Model::bodies[index].
-v1::Body bodyMessageOf(const scene::Scene& scene, std::size_t index);
-v1::BodyState messageOf(const scene::World& world, const scene::BodyView& view);
+/// Converts Model::bodies[index].
+v1::Body toProto(const scene::Scene& scene, std::size_t index);
+v1::BodyState toProto(const scene::World& world, const scene::BodySnapshot& body);
 
 }  // namespace enfilade::server

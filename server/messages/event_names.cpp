@@ -2,7 +2,7 @@
 
 namespace enfilade::server {
 
-const char* wordOf(v1::ContactEvent::Kind kind) {
+const char* toString(v1::ContactEvent::Kind kind) {
   switch (kind) {
     case v1::ContactEvent::KIND_BEGIN:
       return "begin";
@@ -25,7 +25,7 @@ const char* wordOf(v1::ContactEvent::Kind kind) {
   }
 }
 
-const char* wordOf(v1::ContactEvent::Reason reason) {
+const char* toString(v1::ContactEvent::Reason reason) {
   switch (reason) {
     case v1::ContactEvent::REASON_PARTED:
       return "parted";
@@ -40,7 +40,7 @@ const char* wordOf(v1::ContactEvent::Reason reason) {
   }
 }
 
-const char* wordOf(v1::Verdict verdict) {
+const char* toString(v1::Verdict verdict) {
   switch (verdict) {
     case v1::VERDICT_SEPARATED:
       return "separated";
@@ -53,7 +53,7 @@ const char* wordOf(v1::Verdict verdict) {
   }
 }
 
-const char* wordOf(v1::Feature feature) {
+const char* toString(v1::Feature feature) {
   switch (feature) {
     case v1::FEATURE_VERTEX:
       return "vertex";
@@ -66,7 +66,7 @@ const char* wordOf(v1::Feature feature) {
   }
 }
 
-const char* wordOf(v1::Notice::Kind kind) {
+const char* toString(v1::Notice::Kind kind) {
   switch (kind) {
     case v1::Notice::KIND_ARRIVED:
       return "arrived";
@@ -89,7 +89,7 @@ const char* wordOf(v1::Notice::Kind kind) {
   }
 }
 
-const char* wordOf(v1::ContactEvent::Phase phase) {
+const char* toString(v1::ContactEvent::Phase phase) {
   switch (phase) {
     case v1::ContactEvent::PHASE_BEGIN:
       return "begin";

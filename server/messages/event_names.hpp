@@ -1,15 +1,15 @@
-// The words by which files tell what happened: contacts.jsonl, summary.json, diff.json.
+// Names of events and enums in output files: contacts.jsonl, summary.json, diff.json.
 #pragma once
 
 #include "protocol/enfilade.pb.h"
 
 namespace enfilade::server {
 
-const char* wordOf(v1::ContactEvent::Kind kind);
-const char* wordOf(v1::ContactEvent::Reason reason);
-const char* wordOf(v1::ContactEvent::Phase phase);
-const char* wordOf(v1::Verdict verdict);
-const char* wordOf(v1::Feature feature);
-const char* wordOf(v1::Notice::Kind kind);
+const char* toString(v1::ContactEvent::Kind kind);
+const char* toString(v1::ContactEvent::Reason reason);
+const char* toString(v1::ContactEvent::Phase phase);
+const char* toString(v1::Verdict verdict);
+const char* toString(v1::Feature feature);
+const char* toString(v1::Notice::Kind kind);
 
 }  // namespace enfilade::server

@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "collision/assert.hpp"
 #include "protocol/framing.hpp"
 #include "render/image/encode.hpp"
 #include "render/image/image.hpp"
@@ -13,31 +14,32 @@ namespace {
 
 constexpr int kJpegQuality = 85;
 
-using CameraOrError = std::variant<View, v1::Error>;
+using ViewOrError = std::variant<FrameView, v1::Error>;
 
-CameraOrError eyesOf(const v1::AvatarEyes& eyes, const scene::Snapshot& snapshot, int width,
-                     int height) {
-  const scene::AvatarView* avatar = avatarNamed(snapshot, eyes.avatar());
-  if (!avatar) return unknownAvatar(eyes.avatar(), "eyes.avatar");
-  scene::AvatarView seer = *avatar;
-  if (eyes.has_forward()) seer.gaze = vectorFrom(eyes.forward()).stableNormalized();
-  View view{render::firstPerson(seer, width, height), {.hidden = avatar->id}};
+ViewOrError makeAvatarView(const v1::AvatarEyes& eyes, const scene::Snapshot& snapshot, int width,
+                           int height) {
+  const scene::AvatarSnapshot* avatar = findAvatar(snapshot, eyes.avatar());
+  if (!avatar) return makeUnknownAvatarError(eyes.avatar(), "eyes.avatar");
+  scene::AvatarSnapshot viewer = *avatar;
+  if (eyes.has_forward()) viewer.viewDirection = vectorFromProto(eyes.forward()).stableNormalized();
+  FrameView view{render::makeFirstPersonCamera(viewer, width, height),
+                 {.hiddenEntity = avatar->id}};
   if (eyes.has_fov_y()) view.camera.fovY = eyes.fov_y();
   if (eyes.has_near()) view.camera.near = eyes.near();
   if (eyes.has_far()) view.camera.far = eyes.far();
   return view;
 }
 
-CameraOrError freeView(const v1::FreeCamera& free, const scene::Snapshot& snapshot, int width,
-                       int height) {
-  View view;
+ViewOrError makeFreeView(const v1::FreeCamera& free, const scene::Snapshot& snapshot, int width,
+                         int height) {
+  FrameView view;
   render::Camera& camera = view.camera;
   camera.width = width;
   camera.height = height;
-  camera.eye = vectorFrom(free.eye());
-  if (free.has_forward()) camera.forward = vectorFrom(free.forward());
-  if (free.has_target()) camera.forward = vectorFrom(free.target()) - camera.eye;
-  if (free.has_up()) camera.up = vectorFrom(free.up());
+  camera.eye = vectorFromProto(free.eye());
+  if (free.has_forward()) camera.forward = vectorFromProto(free.forward());
+  if (free.has_target()) camera.forward = vectorFromProto(free.target()) - camera.eye;
+  if (free.has_up()) camera.up = vectorFromProto(free.up());
   if (free.has_fov_y()) camera.fovY = free.fov_y();
   if (free.has_height_y()) {
     camera.projection = render::Camera::Projection::orthographic;
@@ -46,14 +48,14 @@ CameraOrError freeView(const v1::FreeCamera& free, const scene::Snapshot& snapsh
   if (free.has_near()) camera.near = free.near();
   if (free.has_far()) camera.far = free.far();
   if (free.hide_avatar().empty()) return view;
-  const scene::AvatarView* avatar = avatarNamed(snapshot, free.hide_avatar());
-  if (!avatar) return unknownAvatar(free.hide_avatar(), "free.hide_avatar");
-  view.options.hidden = avatar->id;
+  const scene::AvatarSnapshot* avatar = findAvatar(snapshot, free.hide_avatar());
+  if (!avatar) return makeUnknownAvatarError(free.hide_avatar(), "free.hide_avatar");
+  view.options.hiddenEntity = avatar->id;
   return view;
 }
 
 template <typename T>
-void append(std::vector<std::uint8_t>& bytes, const std::vector<T>& values) {
+void appendBytes(std::vector<std::uint8_t>& bytes, const std::vector<T>& values) {
   const std::size_t start = bytes.size();
   bytes.resize(start + values.size() * sizeof(T));
   if (!values.empty()) std::memcpy(bytes.data() + start, values.data(), values.size() * sizeof(T));
@@ -62,30 +64,31 @@ void append(std::vector<std::uint8_t>& bytes, const std::vector<T>& values) {
 void appendChannel(std::vector<std::uint8_t>& bytes, const render::Frame& frame,
                    v1::Channel channel, v1::Encoding encoding) {
   if (channel == v1::CHANNEL_IDS) {
-    append(bytes, frame.ids);
+    appendBytes(bytes, frame.ids);
   } else if (channel == v1::CHANNEL_NORMALS) {
-    append(bytes, frame.normals);
+    appendBytes(bytes, frame.normals);
   } else if (channel == v1::CHANNEL_RANGE) {
-    append(bytes, render::rangeOf(frame));
+    appendBytes(bytes, render::computeRange(frame));
   } else if (channel == v1::CHANNEL_DEPTH) {
-    append(bytes, frame.depth);
+    appendBytes(bytes, frame.depth);
   } else if (encoding == v1::ENCODING_JPEG) {
     const render::Camera& camera = frame.camera;
-    append(bytes, render::encodeJpeg({camera.width, camera.height, 3, frame.rgb}, kJpegQuality));
+    appendBytes(bytes,
+                render::encodeJpeg({camera.width, camera.height, 3, frame.rgb}, kJpegQuality));
   } else if (encoding == v1::ENCODING_PNG) {
-    append(bytes, render::encodePng(render::colourOf(frame)));
+    appendBytes(bytes, render::encodePng(render::toImage(frame)));
   } else {
-    append(bytes, frame.rgb);
+    appendBytes(bytes, frame.rgb);
   }
 }
 
 void addPlane(v1::Frame& message, std::vector<std::uint8_t>& attachment, const render::Frame& frame,
               v1::Channel channel, v1::Encoding rgbEncoding) {
-  const bool coded = channel == v1::CHANNEL_RGB &&
-                     (rgbEncoding == v1::ENCODING_PNG || rgbEncoding == v1::ENCODING_JPEG);
+  const bool compressed = channel == v1::CHANNEL_RGB &&
+                          (rgbEncoding == v1::ENCODING_PNG || rgbEncoding == v1::ENCODING_JPEG);
   v1::Plane& plane = *message.add_planes();
   plane.set_channel(channel);
-  plane.set_encoding(coded ? rgbEncoding : v1::ENCODING_RAW);
+  plane.set_encoding(compressed ? rgbEncoding : v1::ENCODING_RAW);
   plane.set_width(message.width());
   plane.set_height(message.height());
   plane.set_offset(attachment.size());
@@ -93,8 +96,9 @@ void addPlane(v1::Frame& message, std::vector<std::uint8_t>& attachment, const r
   plane.set_length(attachment.size() - plane.offset());
 }
 
-/// The field that a refusal of render:: names: "camera: far is 0; ...".
-std::string fieldOf(const std::string& refusal) {
+/// Extracts the field that a refusal of render:: names: "camera: far is 0; ...".
+std::string fieldFromRefusal(const std::string& refusal) {
+  ENFILADE_ASSERT(refusal.starts_with("camera: "));
   const std::size_t start = refusal.find(": ") + 2;
   const std::string field = refusal.substr(start, refusal.find(' ', start) - start);
   const std::string pinhole = "pinhole";
@@ -103,22 +107,22 @@ std::string fieldOf(const std::string& refusal) {
   return field.starts_with(pinhole) ? "intrinsics" + field.substr(pinhole.size()) : field;
 }
 
-std::optional<v1::Error> channelProblem(const v1::FrameRequest& request) {
-  bool asked[v1::Channel_MAX + 1] = {};
+std::optional<v1::Error> validateChannels(const v1::FrameRequest& request) {
+  bool requested[v1::Channel_MAX + 1] = {};
   for (const int channel : request.channels()) {
     const bool known = v1::Channel_IsValid(channel) && channel != v1::CHANNEL_UNSPECIFIED;
-    if (!known || asked[channel]) {
-      return errorOf(v1::ERROR_BAD_MESSAGE,
-                     "channels: give rgb, ids, depth, normals and range each at most once, not " +
-                         std::to_string(channel),
-                     "channels");
+    if (!known || requested[channel]) {
+      return makeError(v1::ERROR_BAD_MESSAGE,
+                       "channels: give rgb, ids, depth, normals and range each at most once, not " +
+                           std::to_string(channel),
+                       "channels");
     }
-    asked[channel] = true;
+    requested[channel] = true;
   }
   return std::nullopt;
 }
 
-render::Channels channelsOf(const v1::FrameRequest& request) {
+render::Channels channelsFromProto(const v1::FrameRequest& request) {
   if (request.channels().empty()) return {true, false, false, false};
   render::Channels channels{false, false, false, false};
   for (const int channel : request.channels()) {
@@ -130,44 +134,38 @@ render::Channels channelsOf(const v1::FrameRequest& request) {
   return channels;
 }
 
-/// Gives the camera the intrinsics asked for; an error when they contradict what else is asked.
-std::optional<v1::Error> addIntrinsics(render::Camera& camera, const v1::FrameRequest& request) {
+/// Applies the requested intrinsics to the camera. An error if the request also gives fov_y or
+/// height_y.
+std::optional<v1::Error> applyIntrinsics(render::Camera& camera, const v1::FrameRequest& request) {
   if (!request.has_intrinsics()) return std::nullopt;
-  const bool opening = request.has_eyes()
-                           ? request.eyes().has_fov_y()
-                           : request.free().projection_case() != v1::FreeCamera::PROJECTION_NOT_SET;
-  if (opening) {
-    return errorOf(v1::ERROR_BAD_CAMERA,
-                   "intrinsics: give them or fov_y or height_y, one of the three", "intrinsics");
+  const bool hasFieldOfView =
+      request.has_eyes() ? request.eyes().has_fov_y()
+                         : request.free().projection_case() != v1::FreeCamera::PROJECTION_NOT_SET;
+  if (hasFieldOfView) {
+    return makeError(v1::ERROR_BAD_CAMERA,
+                     "intrinsics: give only one of intrinsics, fov_y and height_y", "intrinsics");
   }
   const v1::Intrinsics& given = request.intrinsics();
   camera.pinhole = render::Pinhole{given.fx(), given.fy(), given.cx(), given.cy()};
   return std::nullopt;
 }
 
-std::optional<v1::Error> glassProblem(const v1::FrameRequest& request) {
-  if (v1::Glass_IsValid(request.glass())) return std::nullopt;
-  return errorOf(v1::ERROR_BAD_MESSAGE,
-                 "glass: give clear or solid, not " + std::to_string(request.glass()), "glass");
+std::optional<v1::Error> validateEnums(const v1::FrameRequest& request) {
+  const auto makeEnumError = [](const std::string& field, const char* values, int given) {
+    return makeError(v1::ERROR_BAD_MESSAGE,
+                     field + ": give " + values + ", not " + std::to_string(given), field);
+  };
+  if (!v1::Glass_IsValid(request.glass()))
+    return makeEnumError("glass", "clear or solid", request.glass());
+  if (!v1::Renderer_IsValid(request.renderer()))
+    return makeEnumError("renderer", "gl or rays", request.renderer());
+  if (!v1::Encoding_IsValid(request.rgb_encoding()))
+    return makeEnumError("rgb_encoding", "raw, png or jpeg", request.rgb_encoding());
+  return std::nullopt;
 }
 
-std::optional<v1::Error> rendererProblem(const v1::FrameRequest& request) {
-  if (v1::Renderer_IsValid(request.renderer())) return std::nullopt;
-  return errorOf(v1::ERROR_BAD_MESSAGE,
-                 "renderer: give gl or rays, not " + std::to_string(request.renderer()),
-                 "renderer");
-}
-
-std::optional<v1::Error> encodingProblem(const v1::FrameRequest& request) {
-  if (v1::Encoding_IsValid(request.rgb_encoding())) return std::nullopt;
-  return errorOf(
-      v1::ERROR_BAD_MESSAGE,
-      "rgb_encoding: give raw, png or jpeg, not " + std::to_string(request.rgb_encoding()),
-      "rgb_encoding");
-}
-
-/// Of raw pixels.
-std::uint64_t bytesPerPixel(const v1::FrameRequest& request) {
+/// Size of the requested channels as raw pixels.
+std::uint64_t computeBytesPerPixel(const v1::FrameRequest& request) {
   std::uint64_t bytes = request.channels().empty() ? 3 : 0;
   for (const int channel : request.channels()) {
     if (channel == v1::CHANNEL_NORMALS)
@@ -178,19 +176,19 @@ std::uint64_t bytesPerPixel(const v1::FrameRequest& request) {
   return bytes;
 }
 
-/// Pixels that no client of ours takes in one message are refused before they are drawn.
-std::optional<v1::Error> sizeProblem(const v1::FrameRequest& request) {
-  constexpr std::uint64_t kRoomForTheMessage = 65536;
-  const std::uint64_t most = protocol::kClientTakes.total - kRoomForTheMessage;
-  const std::uint64_t bytes = bytesPerPixel(request) * request.width() * request.height();
-  if (bytes <= most) return std::nullopt;
-  return errorOf(v1::ERROR_TOO_LARGE,
-                 "channels: these take " + std::to_string(bytes) + " bytes of pixels, at most " +
-                     std::to_string(most) + " fit a message; ask for fewer at a time",
-                 "channels");
+/// Rejects frames that exceed the message size of the supplied clients before they are rendered.
+std::optional<v1::Error> validateSize(const v1::FrameRequest& request) {
+  constexpr std::uint64_t kMessageOverhead = 65536;
+  const std::uint64_t maxBytes = protocol::kClientLimits.total - kMessageOverhead;
+  const std::uint64_t bytes = computeBytesPerPixel(request) * request.width() * request.height();
+  if (bytes <= maxBytes) return std::nullopt;
+  return makeError(v1::ERROR_TOO_LARGE,
+                   "channels: these need " + std::to_string(bytes) + " bytes of pixels, at most " +
+                       std::to_string(maxBytes) + " fit a message; request fewer at a time",
+                   "channels");
 }
 
-render::RendererKind rendererOf(const v1::FrameRequest& request) {
+render::RendererKind rendererFromProto(const v1::FrameRequest& request) {
   if (request.renderer() == v1::RENDERER_GL) return render::RendererKind::gl;
   if (request.renderer() == v1::RENDERER_RAYS) return render::RendererKind::rays;
   return render::RendererKind::automatic;
@@ -198,48 +196,47 @@ render::RendererKind rendererOf(const v1::FrameRequest& request) {
 
 }  // namespace
 
-CameraOrError viewFrom(const v1::FrameRequest& request, const scene::Snapshot& snapshot) {
-  if (auto problem = channelProblem(request)) return *problem;
-  if (auto problem = glassProblem(request)) return *problem;
-  if (auto problem = rendererProblem(request)) return *problem;
-  if (auto problem = encodingProblem(request)) return *problem;
-  constexpr std::uint32_t kMost = 4096;
-  if (request.width() < 1 || request.width() > kMost || request.height() < 1 ||
-      request.height() > kMost) {
-    return errorOf(v1::ERROR_BAD_CAMERA, "width and height: give 1 to 4096 pixels", "width");
+ViewOrError viewFromProto(const v1::FrameRequest& request, const scene::Snapshot& snapshot) {
+  if (auto error = validateChannels(request)) return *error;
+  if (auto error = validateEnums(request)) return *error;
+  constexpr std::uint32_t kMaxSide = 4096;
+  if (request.width() < 1 || request.width() > kMaxSide || request.height() < 1 ||
+      request.height() > kMaxSide) {
+    return makeError(v1::ERROR_BAD_CAMERA, "width and height: give 1 to 4096 pixels", "width");
   }
-  if (auto problem = sizeProblem(request)) return *problem;
+  if (auto error = validateSize(request)) return *error;
   const int width = static_cast<int>(request.width());
   const int height = static_cast<int>(request.height());
-  CameraOrError view = errorOf(v1::ERROR_BAD_CAMERA, "view is missing: give eyes or free", "view");
-  if (request.has_eyes()) view = eyesOf(request.eyes(), snapshot, width, height);
-  if (request.has_free()) view = freeView(request.free(), snapshot, width, height);
-  if (View* usable = std::get_if<View>(&view)) {
-    usable->options.channels = channelsOf(request);
-    if (request.glass() == v1::GLASS_SOLID) usable->options.glass = render::Glass::solid;
-    usable->options.shadows = request.shadows();
-    usable->renderer = rendererOf(request);
-    if (auto problem = addIntrinsics(usable->camera, request)) return *problem;
-    if (const auto why = render::refusal(usable->camera)) {
-      return errorOf(v1::ERROR_BAD_CAMERA, *why, fieldOf(*why));
+  ViewOrError view = makeError(v1::ERROR_BAD_CAMERA, "view is missing: give eyes or free", "view");
+  if (request.has_eyes()) view = makeAvatarView(request.eyes(), snapshot, width, height);
+  if (request.has_free()) view = makeFreeView(request.free(), snapshot, width, height);
+  if (FrameView* frameView = std::get_if<FrameView>(&view)) {
+    frameView->options.channels = channelsFromProto(request);
+    if (request.glass() == v1::GLASS_SOLID)
+      frameView->options.transparency = render::TransparencyMode::opaque;
+    frameView->options.shadows = request.shadows();
+    frameView->renderer = rendererFromProto(request);
+    if (auto error = applyIntrinsics(frameView->camera, request)) return *error;
+    if (const auto problem = render::validateCamera(frameView->camera)) {
+      return makeError(v1::ERROR_BAD_CAMERA, *problem, fieldFromRefusal(*problem));
     }
   }
   return view;
 }
 
-v1::Frame messageOf(const render::Frame& frame, double time, const v1::FrameRequest& request,
-                    std::vector<std::uint8_t>& attachment) {
+v1::Frame toProto(const render::Frame& frame, double time, const v1::FrameRequest& request,
+                  std::vector<std::uint8_t>& attachment) {
   v1::Frame message;
   message.set_tick(frame.tick);
   message.set_time(time);
   message.set_renderer(frame.renderer);
   message.set_software(frame.software);
   message.set_drawing_seconds(frame.statistics.seconds);
-  *message.mutable_camera() = messageOf(frame.camera);
+  *message.mutable_camera() = toProto(frame.camera);
   message.set_width(static_cast<std::uint32_t>(frame.camera.width));
   message.set_height(static_cast<std::uint32_t>(frame.camera.height));
   if (frame.camera.projection == render::Camera::Projection::perspective) {
-    const render::Pinhole pinhole = render::intrinsicsOf(frame.camera);
+    const render::Pinhole pinhole = render::computeIntrinsics(frame.camera);
     v1::Intrinsics& intrinsics = *message.mutable_intrinsics();
     intrinsics.set_fx(pinhole.fx);
     intrinsics.set_fy(pinhole.fy);
@@ -249,7 +246,7 @@ v1::Frame messageOf(const render::Frame& frame, double time, const v1::FrameRequ
   message.set_glass(request.glass() == v1::GLASS_SOLID ? v1::GLASS_SOLID : v1::GLASS_CLEAR);
   message.set_shadows(request.shadows());
   attachment.reserve(attachment.size() +
-                     bytesPerPixel(request) * message.width() * message.height());
+                     computeBytesPerPixel(request) * message.width() * message.height());
   for (const int channel : request.channels()) {
     addPlane(message, attachment, frame, static_cast<v1::Channel>(channel), request.rgb_encoding());
   }
@@ -259,7 +256,7 @@ v1::Frame messageOf(const render::Frame& frame, double time, const v1::FrameRequ
   return message;
 }
 
-v1::FrameRequest recordedView(const std::string& avatar) {
+v1::FrameRequest makeRecordedViewRequest(const std::string& avatar) {
   constexpr std::uint32_t kWidth = 640, kHeight = 360;
   v1::FrameRequest request;
   request.mutable_eyes()->set_avatar(avatar);
@@ -270,27 +267,27 @@ v1::FrameRequest recordedView(const std::string& avatar) {
   return request;
 }
 
-std::optional<EncodedPicture> encodedPicture(const v1::Frame& frame,
-                                             std::span<const std::uint8_t> attachment) {
+std::optional<EncodedImage> extractImage(const v1::Frame& frame,
+                                         std::span<const std::uint8_t> attachment) {
   for (const v1::Plane& plane : frame.planes()) {
     if (plane.channel() != v1::CHANNEL_RGB) continue;
     const auto bytes = attachment.subspan(plane.offset(), plane.length());
     if (plane.encoding() == v1::ENCODING_JPEG)
-      return EncodedPicture{"jpeg", {bytes.begin(), bytes.end()}};
+      return EncodedImage{"jpeg", {bytes.begin(), bytes.end()}};
     if (plane.encoding() == v1::ENCODING_PNG)
-      return EncodedPicture{"png", {bytes.begin(), bytes.end()}};
+      return EncodedImage{"png", {bytes.begin(), bytes.end()}};
     const std::vector<std::uint8_t> rgb(bytes.begin(), bytes.end());
     const int width = static_cast<int>(plane.width()), height = static_cast<int>(plane.height());
-    return EncodedPicture{"jpeg", render::encodeJpeg({width, height, 3, rgb}, kJpegQuality)};
+    return EncodedImage{"jpeg", render::encodeJpeg({width, height, 3, rgb}, kJpegQuality)};
   }
   return std::nullopt;
 }
 
-v1::FreeCamera messageOf(const render::Camera& camera) {
+v1::FreeCamera toProto(const render::Camera& camera) {
   v1::FreeCamera message;
-  *message.mutable_eye() = messageOf(camera.eye);
-  *message.mutable_forward() = messageOf(camera.forward);
-  *message.mutable_up() = messageOf(camera.up);
+  *message.mutable_eye() = toProto(camera.eye);
+  *message.mutable_forward() = toProto(camera.forward);
+  *message.mutable_up() = toProto(camera.up);
   if (camera.projection == render::Camera::Projection::orthographic) {
     message.set_height_y(camera.heightY);
   } else if (!camera.pinhole) {

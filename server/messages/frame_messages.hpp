@@ -1,4 +1,4 @@
-// Requests for pictures as cameras, and pictures as messages with an attachment.
+// Conversion of frame requests to cameras, and of rendered frames to messages with attachments.
 #pragma once
 
 #include <cstdint>
@@ -9,38 +9,38 @@
 #include <vector>
 
 #include "protocol/enfilade.pb.h"
-#include "render/service/renderer.hpp"
+#include "render/renderer_kind.hpp"
 
 namespace enfilade::server {
 
-/// What a picture is taken with: a camera that can be used, and what is wanted of the picture.
-struct View {
+/// A validated camera with the options of the frame.
+struct FrameView {
   render::Camera camera;
   render::FrameOptions options;
   render::RendererKind renderer = render::RendererKind::automatic;
 };
 
-/// The view asked for, or why it cannot be had.
-std::variant<View, v1::Error> viewFrom(const v1::FrameRequest& request,
-                                       const scene::Snapshot& snapshot);
+/// Returns the requested view, or an error that names the field.
+std::variant<FrameView, v1::Error> viewFromProto(const v1::FrameRequest& request,
+                                                 const scene::Snapshot& snapshot);
 
-/// The message's attachment is appended to `attachment`. `time` is in seconds.
-v1::Frame messageOf(const render::Frame& frame, double time, const v1::FrameRequest& request,
-                    std::vector<std::uint8_t>& attachment);
+/// Appends the pixels to `attachment`. `time` is the simulated time in seconds.
+v1::Frame toProto(const render::Frame& frame, double time, const v1::FrameRequest& request,
+                  std::vector<std::uint8_t>& attachment);
 
-/// What a recording shows of an avatar's view.
-v1::FrameRequest recordedView(const std::string& avatar);
+/// The frame request for an avatar's view in a recording.
+v1::FrameRequest makeRecordedViewRequest(const std::string& avatar);
 
-/// A picture as a file of its own would hold it.
-struct EncodedPicture {
+/// A compressed image, as in an image file.
+struct EncodedImage {
   std::string format;  ///< "jpeg", "png"
   std::vector<std::uint8_t> bytes;
 };
-/// The colours of a frame, as they are encoded or as JPEG; nullopt when it has none.
-std::optional<EncodedPicture> encodedPicture(const v1::Frame& frame,
-                                             std::span<const std::uint8_t> attachment);
+/// The colour plane of a frame: JPEG or PNG as encoded, raw pixels as JPEG. nullopt: no colours.
+std::optional<EncodedImage> extractImage(const v1::Frame& frame,
+                                         std::span<const std::uint8_t> attachment);
 
-/// The free camera that asks for the same picture.
-v1::FreeCamera messageOf(const render::Camera& camera);
+/// The free camera that reproduces the frame.
+v1::FreeCamera toProto(const render::Camera& camera);
 
 }  // namespace enfilade::server

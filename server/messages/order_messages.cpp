@@ -1,4 +1,5 @@
-// Orders from messages: what is missing in them is told here, what is absurd the world refuses.
+#include "server/messages/order_messages.hpp"
+
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -7,16 +8,17 @@ namespace {
 
 using OrderOrError = std::variant<scene::Order, v1::Error>;
 
-OrderOrError missing(const std::string& field, const char* what = "a point") {
-  return errorOf(v1::ERROR_BAD_MESSAGE, field + " is missing: give " + what, field);
+OrderOrError makeMissingFieldError(const std::string& field, const char* remedy = "a point") {
+  return makeError(v1::ERROR_BAD_MESSAGE, field + " is missing: give " + remedy, field);
 }
 
-/// The corners of a box that is inside out, or has a NaN, are the world's to refuse.
-std::vector<scene::Vec3> pointsFrom(const v1::ConvexPart& part) {
+/// Points of a part, or the corners of its box. The world rejects inverted boxes and NaN.
+std::vector<scene::Vec3> pointsFromProto(const v1::ConvexPart& part) {
   std::vector<scene::Vec3> points;
-  for (const v1::Vec3& point : part.points()) points.push_back(vectorFrom(point));
+  for (const v1::Vec3& point : part.points()) points.push_back(vectorFromProto(point));
   if (!points.empty() || !part.has_box()) return points;
-  const scene::Vec3 min = vectorFrom(part.box().min()), max = vectorFrom(part.box().max());
+  const scene::Vec3 min = vectorFromProto(part.box().min()),
+                    max = vectorFromProto(part.box().max());
   for (int corner = 0; corner < 8; ++corner) {
     points.emplace_back(corner & 1 ? max.x() : min.x(), corner & 2 ? max.y() : min.y(),
                         corner & 4 ? max.z() : min.z());
@@ -24,7 +26,7 @@ std::vector<scene::Vec3> pointsFrom(const v1::ConvexPart& part) {
   return points;
 }
 
-scene::Link linkFrom(const v1::Link& message) {
+scene::Link linkFromProto(const v1::Link& message) {
   scene::Link link;
   if (message.has_parent()) link.parent = message.parent();
   const v1::Joint& joint = message.joint();
@@ -33,83 +35,84 @@ scene::Link linkFrom(const v1::Link& message) {
     link.joint.low = 0;
     link.joint.high = 1;
   }
-  link.joint.anchor = vectorFrom(joint.anchor());
-  link.joint.axis = vectorFrom(joint.axis());
+  link.joint.anchor = vectorFromProto(joint.anchor());
+  link.joint.axis = vectorFromProto(joint.axis());
   if (joint.has_low()) link.joint.low = joint.low();
   if (joint.has_high()) link.joint.high = joint.high();
-  link.points = pointsFrom(message.part());
+  link.points = pointsFromProto(message.part());
   link.value = message.value();
   return link;
 }
 
-OrderOrError orderFrom(const v1::Spawn& message) {
-  if (!message.has_at()) return missing("spawn.at");
+OrderOrError spawnFromProto(const v1::Spawn& message) {
+  if (!message.has_at()) return makeMissingFieldError("spawn.at");
   scene::Spawn spawn;
-  spawn.at = vectorFrom(message.at());
+  spawn.position = vectorFromProto(message.at());
   spawn.facing = message.facing();
   if (message.has_radius()) spawn.radius = message.radius();
   if (message.has_height()) spawn.height = message.height();
   spawn.flying = message.flying();
   spawn.selfContact = message.self_contact();
-  for (const v1::ConvexPart& part : message.parts()) spawn.parts.push_back(pointsFrom(part));
+  for (const v1::ConvexPart& part : message.parts()) spawn.parts.push_back(pointsFromProto(part));
   for (const v1::Link& link : message.links()) {
     const std::string field = "spawn.links[" + std::to_string(spawn.links.size()) + "]";
     if (!link.has_joint() || !link.joint().has_axis())
-      return missing(field + ".joint.axis", "a direction");
+      return makeMissingFieldError(field + ".joint.axis", "a direction");
     if (!v1::Joint::Kind_IsValid(link.joint().kind())) {
-      return errorOf(v1::ERROR_BAD_MESSAGE,
-                     "kind: give revolute or prismatic, not " + std::to_string(link.joint().kind()),
-                     field + ".joint.kind");
+      return makeError(
+          v1::ERROR_BAD_MESSAGE,
+          "kind: give revolute or prismatic, not " + std::to_string(link.joint().kind()),
+          field + ".joint.kind");
     }
-    spawn.links.push_back(linkFrom(link));
+    spawn.links.push_back(linkFromProto(link));
   }
   return scene::Order(std::move(spawn));
 }
 
-OrderOrError orderFrom(const v1::Walk& message) {
-  if (message.along().empty()) return missing("walk.along");
+OrderOrError walkFromProto(const v1::Walk& message) {
+  if (message.along().empty()) return makeMissingFieldError("walk.along");
   scene::Walk walk;
-  for (const v1::Vec3& point : message.along()) walk.along.push_back(vectorFrom(point));
+  for (const v1::Vec3& point : message.along()) walk.waypoints.push_back(vectorFromProto(point));
   if (message.has_speed()) walk.speed = message.speed();
   return scene::Order(std::move(walk));
 }
 
-scene::Order orderFrom(const v1::Jump& message) {
+scene::Order jumpFromProto(const v1::Jump& message) {
   scene::Jump jump;
   if (message.has_height()) jump.height = message.height();
-  if (message.has_velocity()) jump.velocity = vectorFrom(message.velocity());
+  if (message.has_velocity()) jump.velocity = vectorFromProto(message.velocity());
   return jump;
 }
 
-/// Absent is "as spawned", which the scene writes as 0; a 0 that is given is absurd, not absent.
-OrderOrError orderFrom(const v1::Crouch& message) {
+/// An absent height means "as spawned", which the scene encodes as 0. An explicit 0 is an error.
+OrderOrError crouchFromProto(const v1::Crouch& message) {
   if (message.has_height() && !(message.height() > 0)) {
-    return errorOf(v1::ERROR_BAD_MESSAGE, "height must be above 0; leave it out to stand up",
-                   "crouch.height");
+    return makeError(v1::ERROR_BAD_MESSAGE, "height must be above 0; leave it out to stand up",
+                     "crouch.height");
   }
   return scene::Order(scene::Crouch{message.height()});
 }
 
-scene::Order orderFrom(const v1::DriveJoints& message) {
+scene::Order driveJointsFromProto(const v1::DriveJoints& message) {
   scene::DriveJoints drive;
   for (const v1::DriveJoints::Target& target : message.to()) {
-    drive.to.emplace_back();
-    if (target.has_value()) drive.to.back() = target.value();
+    drive.targets.emplace_back();
+    if (target.has_value()) drive.targets.back() = target.value();
   }
   if (message.has_speed()) drive.speed = message.speed();
-  drive.atOnce = message.at_once();
+  drive.immediate = message.at_once();
   return drive;
 }
 
-OrderOrError orderFrom(const v1::Command& message) {
+OrderOrError orderFromProto(const v1::Command& message) {
   switch (message.order_case()) {
     case v1::Command::kSpawn:
-      return orderFrom(message.spawn());
+      return spawnFromProto(message.spawn());
     case v1::Command::kWalk:
-      return orderFrom(message.walk());
+      return walkFromProto(message.walk());
     case v1::Command::kLook:
-      if (!message.look().has_at()) return missing("look.at");
-      return scene::Order(scene::Look{vectorFrom(message.look().at())});
+      if (!message.look().has_at()) return makeMissingFieldError("look.at");
+      return scene::Order(scene::Look{vectorFromProto(message.look().at())});
     case v1::Command::kWait:
       return scene::Order(scene::Wait{message.wait().seconds()});
     case v1::Command::kCapture:
@@ -118,20 +121,20 @@ OrderOrError orderFrom(const v1::Command& message) {
       return scene::Order(scene::Leave{});
     case v1::Command::kDrive:
       if (!message.drive().has_velocity())
-        return missing("drive.velocity", "metres per second along x, y and z");
-      return scene::Order(scene::Drive{vectorFrom(message.drive().velocity())});
+        return makeMissingFieldError("drive.velocity", "metres per second along x, y and z");
+      return scene::Order(scene::Drive{vectorFromProto(message.drive().velocity())});
     case v1::Command::kJump:
-      return orderFrom(message.jump());
+      return jumpFromProto(message.jump());
     case v1::Command::kFly:
       return scene::Order(scene::Fly{!message.fly().has_on() || message.fly().on()});
     case v1::Command::kCrouch:
-      return orderFrom(message.crouch());
+      return crouchFromProto(message.crouch());
     case v1::Command::kDriveJoints:
-      return orderFrom(message.drive_joints());
+      return driveJointsFromProto(message.drive_joints());
     case v1::Command::ORDER_NOT_SET:
       break;
   }
-  return errorOf(
+  return makeError(
       v1::ERROR_BAD_MESSAGE,
       "order is missing: give spawn, walk, look, wait, capture, leave, drive, jump, fly, "
       "crouch or drive_joints",
@@ -140,8 +143,8 @@ OrderOrError orderFrom(const v1::Command& message) {
 
 }  // namespace
 
-std::variant<scene::Command, v1::Error> commandFrom(const v1::Command& message) {
-  OrderOrError order = orderFrom(message);
+std::variant<scene::Command, v1::Error> commandFromProto(const v1::Command& message) {
+  OrderOrError order = orderFromProto(message);
   if (auto* error = std::get_if<v1::Error>(&order)) return std::move(*error);
   return scene::Command{message.avatar(), std::get<scene::Order>(std::move(order)), message.tag()};
 }

@@ -1,5 +1,6 @@
 #include "server/messages/outgoing_queue.hpp"
 
+#include "collision/assert.hpp"
 #include "protocol/framing.hpp"
 
 namespace enfilade::server {
@@ -8,58 +9,59 @@ Buffer encodeShared(const google::protobuf::MessageLite& message) {
   return std::make_shared<const std::vector<std::uint8_t>>(protocol::encode(message));
 }
 
-Encoded encodeShared(const google::protobuf::MessageLite& message,
-                     std::vector<std::uint8_t> attachment) {
+EncodedMessage encodeShared(const google::protobuf::MessageLite& message,
+                            std::vector<std::uint8_t> attachment) {
   using Bytes = const std::vector<std::uint8_t>;
   auto head = std::make_shared<Bytes>(protocol::encodeHead(message, attachment.size()));
   return {std::move(head), std::make_shared<Bytes>(std::move(attachment))};
 }
 
-OutgoingQueue::OutgoingQueue(const OutgoingBounds& bounds, Encoded tooSlow,
+OutgoingQueue::OutgoingQueue(const OutgoingLimits& limits, EncodedMessage overflowMessage,
                              std::function<void()> wake)
-    : bounds_(bounds), tooSlow_(std::move(tooSlow)), wake_(std::move(wake)) {}
+    : limits_(limits), overflowMessage_(std::move(overflowMessage)), wake_(std::move(wake)) {}
 
-void OutgoingQueue::push(Encoded message) {
-  append({Kind::kept, std::move(message)});
+void OutgoingQueue::push(EncodedMessage message) {
+  append({Kind::reliable, std::move(message)});
 }
 
-void OutgoingQueue::pushFrame(Encoded message) {
+void OutgoingQueue::pushFrame(EncodedMessage message) {
   append({Kind::frame, std::move(message)});
 }
 
-void OutgoingQueue::pushLatest(Encoded message, std::uint32_t which) {
-  append({Kind::latest, std::move(message), which});
+void OutgoingQueue::pushLatest(EncodedMessage message, std::uint32_t slot) {
+  append({Kind::latest, std::move(message), slot});
 }
 
-void OutgoingQueue::finish(Encoded last) {
+void OutgoingQueue::finish(EncodedMessage last) {
   append({Kind::last, std::move(last)});
 }
 
 void OutgoingQueue::append(Item item) {
   {
     const std::lock_guard lock(mutex_);
+    ENFILADE_ASSERT(item.message);  // pop() returns an empty message when the queue is empty
     if (finished_) return;
-    if (item.kind == Kind::kept) bytes_ += item.message.size();
+    if (item.kind == Kind::reliable) bytes_ += item.message.size();
     if (item.kind == Kind::frame) {
       ++frames_;
       frameBytes_ += item.message.size();
     }
     finished_ = item.kind == Kind::last;
     items_.push_back(std::move(item));
-    // One picture alone may be as large as it likes: its size has a limit of its own.
-    const bool framesTooLarge = frames_ > 1 && frameBytes_ > bounds_.frameBytes;
-    if (bytes_ > bounds_.bytes || frames_ > bounds_.frames || framesTooLarge) {
+    // A single frame may exceed frameBytes: its size has a limit of its own.
+    const bool framesTooLarge = frames_ > 1 && frameBytes_ > limits_.frameBytes;
+    if (bytes_ > limits_.bytes || frames_ > limits_.frames || framesTooLarge) {
       overflowed_ = finished_ = true;
-      items_.assign(1, {Kind::last, tooSlow_});
+      items_.assign(1, {Kind::last, overflowMessage_});
     }
   }
   wake_();
 }
 
-bool OutgoingQueue::dropLatest(std::uint32_t which) {
+bool OutgoingQueue::dropLatest(std::uint32_t slot) {
   const std::lock_guard lock(mutex_);
   return std::erase_if(items_, [&](const Item& item) {
-           return item.kind == Kind::latest && item.which == which;
+           return item.kind == Kind::latest && item.slot == slot;
          }) > 0;
 }
 
@@ -68,8 +70,11 @@ OutgoingQueue::Next OutgoingQueue::pop() {
   if (items_.empty()) return {};
   Item item = std::move(items_.front());
   items_.pop_front();
-  if (item.kind == Kind::kept) bytes_ -= item.message.size();
+  ENFILADE_ASSERT(item.kind != Kind::last || (finished_ && items_.empty()));
+  ENFILADE_ASSERT(item.kind != Kind::reliable || bytes_ >= item.message.size());
+  if (item.kind == Kind::reliable) bytes_ -= item.message.size();
   if (item.kind == Kind::frame) {
+    ENFILADE_ASSERT(frames_ > 0 && frameBytes_ >= item.message.size());
     --frames_;
     frameBytes_ -= item.message.size();
   }

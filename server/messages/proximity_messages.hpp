@@ -1,4 +1,4 @@
-// Questions about pairs of entities as messages ask them, answered out of a snapshot.
+// Answers proximity queries of clients (distances, touching, cannot_touch) from a snapshot.
 #pragma once
 
 #include <variant>
@@ -9,17 +9,17 @@
 
 namespace enfilade::server {
 
-// The answer, or what is wrong with the question, naming the field.
+// Each function returns the reply, or an error that names the field of the query.
 
-std::variant<v1::DistanceReply, v1::Error> answerOf(const v1::DistanceQuery& query,
-                                                    const scene::SceneThen& then,
-                                                    const ServerLimits& limits);
-std::variant<v1::TouchingReply, v1::Error> answerOf(const v1::TouchingQuery& query,
-                                                    const scene::SceneThen& then,
-                                                    const scene::Lengths& lengths,
-                                                    const ServerLimits& limits);
-std::variant<v1::CannotTouchReply, v1::Error> answerOf(const v1::CannotTouchQuery& query,
-                                                       const scene::SceneThen& then,
-                                                       const scene::Lengths& lengths);
+std::variant<v1::DistanceReply, v1::Error> answerDistances(const v1::DistanceQuery& query,
+                                                           const scene::SceneAt& sceneAt,
+                                                           const ServerLimits& limits);
+std::variant<v1::TouchingReply, v1::Error> answerTouching(const v1::TouchingQuery& query,
+                                                          const scene::SceneAt& sceneAt,
+                                                          const scene::WorldSettings& settings,
+                                                          const ServerLimits& limits);
+std::variant<v1::CannotTouchReply, v1::Error> answerCannotTouch(
+    const v1::CannotTouchQuery& query, const scene::SceneAt& sceneAt,
+    const scene::WorldSettings& settings);
 
 }  // namespace enfilade::server

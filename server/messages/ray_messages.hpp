@@ -1,4 +1,4 @@
-// Rays as messages ask for them, and what they met as messages.
+// Conversion of ray queries from messages, and of ray hits to messages.
 #pragma once
 
 #include <variant>
@@ -10,23 +10,23 @@
 
 namespace enfilade::server {
 
-/// A RayQuery with all its names and defaults worked out.
-struct AskedRays {
+/// A RayQuery with all names and defaults resolved.
+struct ResolvedRayQuery {
   std::vector<scene::Ray> rays;
   scene::RayFilter filter;
   bool onlyBlocked = false;
   bool packed = false;
-  std::uint32_t columns = 0, rows = 0;  ///< of a scan; 0: rays one by one
+  std::uint32_t columns = 0, rows = 0;  ///< of a scan; 0: individual rays
 };
 
-/// Or what is wrong with it, naming the field.
-std::variant<AskedRays, v1::Error> raysFrom(const v1::RayQuery& query,
-                                            const scene::Snapshot& snapshot,
-                                            const ServerLimits& limits);
+/// Returns the resolved query, or an error that names the field.
+std::variant<ResolvedRayQuery, v1::Error> rayQueryFromProto(const v1::RayQuery& query,
+                                                            const scene::Snapshot& snapshot,
+                                                            const ServerLimits& limits);
 
-/// Casts them, `caster` being where the snapshot is. `attachment` gets what a scan or a packed
-/// query met.
-v1::RayReply answerOf(const AskedRays& asked, const scene::RayCaster& caster,
+/// Casts the rays; `caster` must match `snapshot`. The hits of a scan or of a packed query are
+/// written to `attachment`.
+v1::RayReply castRays(const ResolvedRayQuery& resolved, const scene::RayCaster& caster,
                       const scene::Scene& scene, const scene::Snapshot& snapshot,
                       std::vector<std::uint8_t>& attachment);
 

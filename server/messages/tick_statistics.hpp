@@ -1,4 +1,4 @@
-// How long ticks take and what they did, kept in bounded memory however long the server runs.
+// Statistics over all ticks of a world (durations and counters) in bounded memory.
 #pragma once
 
 #include <array>
@@ -11,14 +11,14 @@
 
 namespace enfilade::server {
 
-/// A histogram of durations with buckets 1/64 of an octave wide (1.1 %), from 1 ns to about 18 h.
+/// Histogram of durations. Buckets are 1/64 octave wide (1.1 %), from 1 ns to about 18 h.
 class DurationHistogram {
  public:
-  void add(double seconds);
+  void record(double seconds);
   std::uint64_t count() const { return count_; }
   double sum() const { return sum_; }  ///< seconds
   double max() const { return max_; }  ///< seconds, exact
-  /// Seconds, within a bucket; `fraction` 0.5 is the median. 0 when nothing was added.
+  /// Seconds, accurate to a bucket; `fraction` 0.5 is the median. 0 without samples.
   double quantile(double fraction) const;
 
  private:
@@ -29,20 +29,20 @@ class DurationHistogram {
 
 class TickStatistics {
  public:
-  void add(const scene::TickReport& report);
+  void addTick(const scene::TickReport& report);
   double worstPenetration() const { return worstPenetration_; }
   const AuditTotals& audit() const { return audit_; }
-  /// Fills what ticks know; clients, frames and drops are the server's to fill.
-  v1::Metrics metrics() const;
+  /// Fills the fields that depend on ticks. The caller adds clients, frames and drops.
+  v1::Metrics makeMetrics() const;
 
  private:
-  std::array<DurationHistogram, scene::kStages> stages_;
-  DurationHistogram tick_;
-  std::uint64_t contacts_ = 0, narrowQueries_ = 0, rationalQueries_ = 0, squeezedBodies_ = 0;
-  std::uint32_t pairs_ = 0, liveContacts_ = 0, avatars_ = 0;
+  std::array<DurationHistogram, scene::kStageCount> stageDurations_;
+  DurationHistogram tickDurations_;
+  std::uint64_t contacts_ = 0, narrowQueries_ = 0, rationalQueries_ = 0, crushedBodies_ = 0;
+  std::uint32_t pairs_ = 0, activeContacts_ = 0, avatars_ = 0;
   double worstPenetration_ = 0;  ///< metres
   AuditTotals audit_;
-  DurationHistogram audited_;
+  DurationHistogram auditDurations_;
 };
 
 }  // namespace enfilade::server

@@ -1,22 +1,23 @@
 #include "server/messages/world_messages.hpp"
 
-#include "server/messages/body_messages.hpp"
-
 #include <cmath>
 #include <filesystem>
+
+#include "collision/assert.hpp"
+#include "server/messages/body_messages.hpp"
 
 namespace enfilade::server {
 
 namespace {
 
-v1::ContactEvent::Kind kindOf(scene::ContactEvent::Kind kind) {
+v1::ContactEvent::Kind toProto(scene::ContactEvent::Kind kind) {
   using Kind = scene::ContactEvent::Kind;
   switch (kind) {
     case Kind::begin:
       return v1::ContactEvent::KIND_BEGIN;
     case Kind::end:
       return v1::ContactEvent::KIND_END;
-    case Kind::near:
+    case Kind::nearMiss:
       return v1::ContactEvent::KIND_NEAR;
     case Kind::blocked:
       return v1::ContactEvent::KIND_BLOCKED;
@@ -30,10 +31,10 @@ v1::ContactEvent::Kind kindOf(scene::ContactEvent::Kind kind) {
   return v1::ContactEvent::KIND_UNSPECIFIED;
 }
 
-v1::ContactEvent::Reason reasonOf(scene::ContactEvent::Reason reason) {
+v1::ContactEvent::Reason toProto(scene::ContactEvent::Reason reason) {
   using Reason = scene::ContactEvent::Reason;
   switch (reason) {
-    case Reason::parted:
+    case Reason::separated:
       return v1::ContactEvent::REASON_PARTED;
     case Reason::left:
       return v1::ContactEvent::REASON_LEFT;
@@ -43,7 +44,7 @@ v1::ContactEvent::Reason reasonOf(scene::ContactEvent::Reason reason) {
   return v1::ContactEvent::REASON_UNSPECIFIED;
 }
 
-v1::Notice::Kind kindOf(scene::Notice::Kind kind) {
+v1::Notice::Kind toProto(scene::Notice::Kind kind) {
   using Kind = scene::Notice::Kind;
   switch (kind) {
     case Kind::spawned:
@@ -68,7 +69,7 @@ v1::Notice::Kind kindOf(scene::Notice::Kind kind) {
 
 }  // namespace
 
-v1::Verdict messageOf(collision::Verdict verdict) {
+v1::Verdict toProto(collision::Verdict verdict) {
   switch (verdict) {
     case collision::Verdict::separated:
       return v1::VERDICT_SEPARATED;
@@ -80,12 +81,12 @@ v1::Verdict messageOf(collision::Verdict verdict) {
   return v1::VERDICT_UNSPECIFIED;
 }
 
-v1::DecidedBy messageOf(collision::DecidedBy decidedBy) {
-  return decidedBy == collision::DecidedBy::filter ? v1::DECIDED_BY_FILTER
-                                                   : v1::DECIDED_BY_RATIONAL;
+v1::DecidedBy toProto(collision::Certificate certificate) {
+  return certificate == collision::Certificate::filter ? v1::DECIDED_BY_FILTER
+                                                       : v1::DECIDED_BY_RATIONAL;
 }
 
-v1::Feature messageOf(collision::Feature feature) {
+v1::Feature toProto(collision::Feature feature) {
   switch (feature) {
     case collision::Feature::vertex:
       return v1::FEATURE_VERTEX;
@@ -99,7 +100,7 @@ v1::Feature messageOf(collision::Feature feature) {
   return v1::FEATURE_UNSPECIFIED;
 }
 
-v1::Error errorOf(v1::ErrorCode code, std::string message, std::string field) {
+v1::Error makeError(v1::ErrorCode code, std::string message, std::string field) {
   v1::Error error;
   error.set_code(code);
   error.set_message(std::move(message));
@@ -107,33 +108,35 @@ v1::Error errorOf(v1::ErrorCode code, std::string message, std::string field) {
   return error;
 }
 
-const scene::AvatarView* avatarNamed(const scene::Snapshot& snapshot, const std::string& name) {
-  for (const scene::AvatarView& avatar : snapshot.avatars) {
+const scene::AvatarSnapshot* findAvatar(const scene::Snapshot& snapshot, const std::string& name) {
+  for (const scene::AvatarSnapshot& avatar : snapshot.avatars) {
     if (avatar.name == name) return &avatar;
   }
   return nullptr;
 }
 
-v1::Error unknownAvatar(const std::string& name, const std::string& field) {
-  return errorOf(v1::ERROR_UNKNOWN_AVATAR,
-                 "no avatar '" + name + "' is in the world: spawn it and make a tick first", field);
+v1::Error makeUnknownAvatarError(const std::string& name, const std::string& field) {
+  return makeError(v1::ERROR_UNKNOWN_AVATAR,
+                   "no avatar '" + name + "' is in the world: spawn it and run a tick first",
+                   field);
 }
 
-Buffer errorReply(std::uint64_t requestId, v1::Error error) {
+Buffer makeErrorReply(std::uint64_t requestId, v1::Error error) {
   v1::ServerMessage reply;
   reply.set_reply_to(requestId);
   *reply.mutable_error() = std::move(error);
   return encodeShared(reply);
 }
 
-v1::Error refusalOf(const v1::Command& command, const std::string& why) {
+v1::Error makeRefusalError(const v1::Command& command, const std::string& reason) {
+  ENFILADE_ASSERT(!reason.empty());
   const auto* order = v1::Command::descriptor()->FindFieldByNumber(command.order_case());
-  std::string field = why.substr(0, why.find_first_of(" '"));
+  std::string field = reason.substr(0, reason.find_first_of(" '"));
   if (order && field != "avatar") field = order->name() + "." + field;
-  return errorOf(v1::ERROR_REFUSED_COMMAND, why, field);
+  return makeError(v1::ERROR_REFUSED_COMMAND, reason, field);
 }
 
-v1::Vec3 messageOf(const scene::Vec3& v) {
+v1::Vec3 toProto(const scene::Vec3& v) {
   v1::Vec3 message;
   message.set_x(v.x());
   message.set_y(v.y());
@@ -141,13 +144,13 @@ v1::Vec3 messageOf(const scene::Vec3& v) {
   return message;
 }
 
-scene::Vec3 vectorFrom(const v1::Vec3& message) {
+scene::Vec3 vectorFromProto(const v1::Vec3& message) {
   return {message.x(), message.y(), message.z()};
 }
 
 namespace {
 
-v1::ContactEvent::Phase phaseOf(scene::ContactEvent::Phase phase) {
+v1::ContactEvent::Phase toProto(scene::ContactEvent::Phase phase) {
   using Phase = scene::ContactEvent::Phase;
   switch (phase) {
     case Phase::begin:
@@ -164,105 +167,104 @@ v1::ContactEvent::Phase phaseOf(scene::ContactEvent::Phase phase) {
 
 }  // namespace
 
-v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent& event) {
+v1::ContactEvent toProto(const scene::World& world, const scene::ContactEvent& event) {
   v1::ContactEvent message;
   message.set_tick(event.tick);
   message.set_time(event.time);
-  message.set_kind(kindOf(event.kind));
+  message.set_kind(toProto(event.kind));
   if (event.kind == scene::ContactEvent::Kind::end ||
       event.kind == scene::ContactEvent::Kind::leave)
-    message.set_reason(reasonOf(event.reason));
-  message.set_phase(phaseOf(event.phase));
+    message.set_reason(toProto(event.reason));
+  message.set_phase(toProto(event.phase));
   message.set_a(event.a);
   message.set_b(event.b);
-  message.set_a_name(scene::nameOf(world, event.a));
-  message.set_b_name(scene::nameOf(world, event.b));
-  putDecision(event.decision, message);
+  message.set_a_name(scene::findEntityName(world, event.a));
+  message.set_b_name(scene::findEntityName(world, event.b));
+  setSeparation(event.separation, message);
   return message;
 }
 
-v1::Notice messageOf(const scene::World& world, const scene::Notice& notice, std::uint64_t tick) {
+v1::Notice toProto(const scene::World& world, const scene::Notice& notice, std::uint64_t tick) {
   v1::Notice message;
   message.set_tick(tick);
-  message.set_kind(kindOf(notice.kind));
+  message.set_kind(toProto(notice.kind));
   message.set_avatar(notice.avatar);
   message.set_id(notice.id);
   message.set_tag(notice.tag);
-  *message.mutable_position() = messageOf(notice.position);
+  *message.mutable_position() = toProto(notice.position);
   message.set_obstacle(notice.obstacle);
-  message.set_obstacle_name(scene::nameOf(world, notice.obstacle));
+  message.set_obstacle_name(scene::findEntityName(world, notice.obstacle));
   message.set_text(notice.text);
   return message;
 }
 
 namespace {
 
-v1::MoveResult moveMessageOf(const scene::World& world, const scene::MoveResult& move) {
+v1::MoveResult toProto(const scene::World& world, const scene::MoveResult& move) {
   v1::MoveResult message;
-  *message.mutable_asked() = messageOf(move.asked);
-  *message.mutable_made() = messageOf(move.made);
-  if (move.stoppedBy == 0) return message;
-  message.set_stopped_by(move.stoppedBy);
-  message.set_stopped_by_name(scene::nameOf(world, move.stoppedBy));
-  message.set_verdict(messageOf(move.decision.verdict));
-  message.set_distance(move.decision.distance);
-  *message.mutable_normal() = messageOf(move.decision.normal);
-  message.set_decided_by(messageOf(move.decision.decidedBy));
+  *message.mutable_asked() = server::toProto(move.requestedDisplacement);
+  *message.mutable_made() = server::toProto(move.actualDisplacement);
+  if (move.blockedBy == 0) return message;
+  message.set_stopped_by(move.blockedBy);
+  message.set_stopped_by_name(scene::findEntityName(world, move.blockedBy));
+  message.set_verdict(server::toProto(move.separation.verdict));
+  message.set_distance(move.separation.distance);
+  *message.mutable_normal() = server::toProto(move.separation.normal);
+  message.set_decided_by(server::toProto(move.separation.certificate));
   return message;
 }
 
 }  // namespace
 
-v1::AvatarState messageOf(const scene::World& world, const scene::AvatarView& avatar) {
+v1::AvatarState toProto(const scene::World& world, const scene::AvatarSnapshot& avatar) {
   v1::AvatarState message;
   message.set_id(avatar.id);
   message.set_name(avatar.name);
-  *message.mutable_feet() = messageOf(avatar.feet);
-  *message.mutable_gaze() = messageOf(avatar.gaze);
+  *message.mutable_feet() = toProto(avatar.footPosition);
+  *message.mutable_gaze() = toProto(avatar.viewDirection);
   message.set_eye_height(avatar.eyeHeight);
   message.set_grounded(avatar.grounded);
-  *message.mutable_move() = moveMessageOf(world, avatar.move);
+  *message.mutable_move() = toProto(world, avatar.move);
   message.set_flying(avatar.flying);
-  message.set_stands_on(avatar.standsOn);
+  message.set_stands_on(avatar.groundEntity);
   message.set_height(avatar.height);
-  for (const scene::JointView& joint : avatar.joints) {
+  for (const scene::JointSnapshot& joint : avatar.joints) {
     v1::JointState& state = *message.add_joints();
     state.set_value(joint.value);
-    state.set_stopped_by(joint.stoppedBy);
+    state.set_stopped_by(joint.blockedBy);
   }
   return message;
 }
 
-v1::Scene messageOf(const scene::Scene& scene) {
+v1::Scene toProto(const scene::Scene& scene) {
   const scene::Model& model = scene.model();
   v1::Scene message;
   message.set_source(std::filesystem::path(model.source).filename().string());
   message.set_hash(scene.hash());
   message.set_objects(static_cast<std::uint32_t>(model.objects.size()));
-  *message.mutable_bounds()->mutable_min() = messageOf(scene.bounds().min);
-  *message.mutable_bounds()->mutable_max() = messageOf(scene.bounds().max);
+  *message.mutable_bounds()->mutable_min() = toProto(scene.bounds().min);
+  *message.mutable_bounds()->mutable_max() = toProto(scene.bounds().max);
   message.set_metres_per_unit(model.metresPerUnit);
-  message.set_up(std::string(1, model.up));
-  *message.mutable_offset() = messageOf(model.offset);
-  for (std::size_t i = 0; i < model.bodies.size(); ++i)
-    *message.add_bodies() = bodyMessageOf(scene, i);
+  message.set_up(std::string(1, model.upAxis));
+  *message.mutable_offset() = toProto(model.offset);
+  for (std::size_t i = 0; i < model.bodies.size(); ++i) *message.add_bodies() = toProto(scene, i);
   return message;
 }
 
-v1::Policies messageOf(const scene::Lengths& lengths) {
+v1::Policies toProto(const scene::WorldSettings& settings) {
   v1::Policies message;
-  message.set_epsilon(lengths.epsilon);
-  message.set_step_height(lengths.stepHeight);
-  message.set_near_miss(lengths.nearMiss);
-  message.set_tick(lengths.tick);
-  message.set_speed_limit(lengths.speedLimit);
-  message.set_walkable_slope(std::acos(lengths.walkableNormalY));
-  message.set_gravity(lengths.gravity);
-  message.set_patience(lengths.patience);
-  message.set_sliding(lengths.sliding == scene::Sliding::slide ? "slide" : "stop");
-  message.set_jump_limit(lengths.jumpLimit);
-  message.set_joint_speed_limit(lengths.jointSpeedLimit);
-  message.set_push_force(lengths.pushForce);
+  message.set_epsilon(settings.contactOffset);
+  message.set_step_height(settings.stepHeight);
+  message.set_near_miss(settings.nearMissDistance);
+  message.set_tick(settings.tickDuration);
+  message.set_speed_limit(settings.maxSpeed);
+  message.set_walkable_slope(std::acos(settings.walkableNormalY));
+  message.set_gravity(settings.gravity);
+  message.set_patience(settings.stuckTimeout);
+  message.set_sliding(settings.sliding == scene::Sliding::slide ? "slide" : "stop");
+  message.set_jump_limit(settings.maxJumpHeight);
+  message.set_joint_speed_limit(settings.maxJointSpeed);
+  message.set_push_force(settings.maxPushForce);
   message.set_bodies("push_and_tell");
   return message;
 }

@@ -1,4 +1,4 @@
-// The world's plain data as messages, and messages as the world's commands.
+// Conversion of world data to messages.
 #pragma once
 
 #include <string>
@@ -10,45 +10,42 @@
 
 namespace enfilade::server {
 
-/// The order, or what is missing in it, naming the field. Values are the world's to judge
-/// (order_messages.cpp).
-std::variant<scene::Command, v1::Error> commandFrom(const v1::Command& message);
+v1::ContactEvent toProto(const scene::World& world, const scene::ContactEvent& event);
+v1::Notice toProto(const scene::World& world, const scene::Notice& notice, std::uint64_t tick);
+v1::AvatarState toProto(const scene::World& world, const scene::AvatarSnapshot& avatar);
+v1::Scene toProto(const scene::Scene& scene);
+v1::Policies toProto(const scene::WorldSettings& settings);
+v1::Vec3 toProto(const scene::Vec3& v);
+scene::Vec3 vectorFromProto(const v1::Vec3& message);
+v1::Verdict toProto(collision::Verdict verdict);
+v1::DecidedBy toProto(collision::Certificate certificate);
+v1::Feature toProto(collision::Feature feature);
 
-v1::ContactEvent messageOf(const scene::World& world, const scene::ContactEvent& event);
-v1::Notice messageOf(const scene::World& world, const scene::Notice& notice, std::uint64_t tick);
-v1::AvatarState messageOf(const scene::World& world, const scene::AvatarView& avatar);
-v1::Scene messageOf(const scene::Scene& scene);
-v1::Policies messageOf(const scene::Lengths& lengths);
-v1::Vec3 messageOf(const scene::Vec3& v);
-scene::Vec3 vectorFrom(const v1::Vec3& message);
-v1::Verdict messageOf(collision::Verdict verdict);
-v1::DecidedBy messageOf(collision::DecidedBy decidedBy);
-v1::Feature messageOf(collision::Feature feature);
-
-/// Into a message that tells of two entities.
+/// Writes the result of a pair query into a message about two entities.
 template <class Message>
-void putDecision(const collision::Decision& decision, Message& message) {
-  message.set_verdict(messageOf(decision.verdict));
-  message.set_distance(decision.distance);
-  message.set_error_bound(decision.errorBound);
-  *message.mutable_point_a() = messageOf(decision.pointA);
-  *message.mutable_point_b() = messageOf(decision.pointB);
-  *message.mutable_normal() = messageOf(decision.normal);
-  message.set_decided_by(messageOf(decision.decidedBy));
-  message.set_feature_a(messageOf(decision.featureA));
-  message.set_feature_b(messageOf(decision.featureB));
+void setSeparation(const collision::SeparationResult& separation, Message& message) {
+  message.set_verdict(toProto(separation.verdict));
+  message.set_distance(separation.distance);
+  message.set_error_bound(separation.errorBound);
+  *message.mutable_point_a() = toProto(separation.pointA);
+  *message.mutable_point_b() = toProto(separation.pointB);
+  *message.mutable_normal() = toProto(separation.normal);
+  message.set_decided_by(toProto(separation.certificate));
+  message.set_feature_a(toProto(separation.featureA));
+  message.set_feature_b(toProto(separation.featureB));
 }
 
-v1::Error errorOf(v1::ErrorCode code, std::string message, std::string field = {});
+v1::Error makeError(v1::ErrorCode code, std::string message, std::string field = {});
 
-/// Null when there is none.
-const scene::AvatarView* avatarNamed(const scene::Snapshot& snapshot, const std::string& name);
-v1::Error unknownAvatar(const std::string& name, const std::string& field);
+/// Returns null if no avatar has this name.
+const scene::AvatarSnapshot* findAvatar(const scene::Snapshot& snapshot, const std::string& name);
+v1::Error makeUnknownAvatarError(const std::string& name, const std::string& field);
 
-/// The whole reply to a request that failed.
-Buffer errorReply(std::uint64_t requestId, v1::Error error);
+/// The encoded reply to a failed request.
+Buffer makeErrorReply(std::uint64_t requestId, v1::Error error);
 
-/// A refusal of the world as an error; it begins with the field, whose path is completed.
-v1::Error refusalOf(const v1::Command& command, const std::string& why);
+/// Converts a refusal of the world to an error. `reason` starts with the field's name; the error
+/// gets the field's full path.
+v1::Error makeRefusalError(const v1::Command& command, const std::string& reason);
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// What HTTP asks for, as requests of the protocol, and the answers as pages. Knows no socket.
+// Converts HTTP requests to requests of the protocol, and replies to HTTP responses. No sockets.
 #pragma once
 
 #include <map>
@@ -12,40 +12,42 @@
 
 namespace enfilade::server {
 
+/// The target of a request, decoded.
 struct Target {
   std::string path;
   std::map<std::string, std::string> query;
 };
 
-/// A request's target, with %XX read.
-Target targetOf(std::string_view text);
+/// Parses a target and decodes %XX.
+Target parseTarget(std::string_view text);
 
-/// Of "Authorization: Bearer TOKEN", else the query's `token`; "" where there is none.
-std::string tokenOf(std::string_view authorization, const Target& target);
+/// The token of "Authorization: Bearer TOKEN", otherwise of the query's `token`; "": no token.
+std::string extractToken(std::string_view authorization, const Target& target);
 
-struct PageProblem {
+/// An error response.
+struct HttpError {
   unsigned status = 404;
   std::string text;
 };
 
-/// /healthz, /metrics, /mjpeg/avatar/NAME?width=&height=&rate=&fov_y=,
-/// /mjpeg/camera?eye=X,Y,Z&target=X,Y,Z&...
-std::variant<v1::ClientMessage, PageProblem> requestFor(const Target& target);
+/// Converts a target to a request of the protocol: /healthz, /metrics,
+/// /mjpeg/avatar/NAME?width=&height=&rate=&fov_y=, /mjpeg/camera?eye=X,Y,Z&target=X,Y,Z&...
+std::variant<v1::ClientMessage, HttpError> parseRequest(const Target& target);
 
-inline constexpr const char* kMetricsType = "text/plain; version=0.0.4; charset=utf-8";
+inline constexpr const char* kMetricsContentType = "text/plain; version=0.0.4; charset=utf-8";
 
 struct WorldMetrics {
-  std::string world;  ///< its name
+  std::string world;  ///< the world's name
   v1::Metrics metrics;
 };
 
-/// In Prometheus' text format, version 0.0.4: each metric of each world, labelled with its name.
-std::string metricsPage(std::span<const WorldMetrics> worlds);
+/// Prometheus text format, version 0.0.4: each metric of each world, labelled with its name.
+std::string makeMetricsPage(std::span<const WorldMetrics> worlds);
 
-/// A whole response; the connection closes after it.
-std::string response(unsigned status, const std::string& type, const std::string& body);
+/// A complete response; the connection closes after it.
+std::string makeResponse(unsigned status, const std::string& type, const std::string& body);
 
-std::string mjpegHead();
-std::vector<std::uint8_t> mjpegPart(const v1::Frame& frame, std::span<const std::uint8_t> jpeg);
+std::string makeMjpegHeader();
+std::vector<std::uint8_t> makeMjpegPart(const v1::Frame& frame, std::span<const std::uint8_t> jpeg);
 
 }  // namespace enfilade::server

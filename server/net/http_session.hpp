@@ -1,7 +1,7 @@
-// One request over HTTP/1.1: becomes a WebSocket, or is answered: /healthz, /metrics, /mjpeg/... It
-// asks the worlds as any client does, through their tick loops.
+// One HTTP/1.1 request: /healthz, /metrics, /mjpeg/..., or an upgrade to WebSocket. It queries the
+// worlds like any client, through their tick loops.
 //
-// Asio and Beast appear in this header, which only files of connections include.
+// This header uses Asio and Beast; only connection files include it.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -15,59 +15,60 @@
 
 namespace enfilade::server {
 
-class HttpVisit : public Connection, public std::enable_shared_from_this<HttpVisit> {
+class HttpSession : public ClientConnection, public std::enable_shared_from_this<HttpSession> {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `first` was read already.
-  HttpVisit(boost::asio::ip::tcp::socket socket, const std::vector<std::uint8_t>& first,
-            Reception& reception);
-  ~HttpVisit() override;
-  /// The whole request has to be here by `deadline`.
+  /// `first`: bytes already read from the socket.
+  HttpSession(boost::asio::ip::tcp::socket socket, const std::vector<std::uint8_t>& first,
+              ServerContext& context);
+  ~HttpSession() override;
+  /// The complete request must arrive before `deadline`.
   void start(Clock::time_point deadline);
   void end(v1::ErrorCode code, const std::string& reason) override;
-  bool giveWay() override;
+  bool evictIfAnonymous() override;
 
  private:
   using Request = boost::beast::http::request<boost::beast::http::string_body>;
 
   void route(Request request);
   void upgrade(Request request);
-  void answer(unsigned status, const std::string& type, std::string body);
-  void refuse(unsigned status, const std::string& why);
+  void sendResponse(unsigned status, const std::string& type, std::string body);
+  void refuse(unsigned status, const std::string& reason);
   void write(Buffer bytes, bool last);
-  /// What one world says to us.
-  struct Ear {
+  /// The query to one world, and its reply.
+  struct WorldReply {
     std::shared_ptr<TickLoop> world;
-    std::shared_ptr<OutgoingQueue> heard;
+    std::shared_ptr<OutgoingQueue> queue;
     ClientId client = 0;
     std::optional<v1::Metrics> metrics;
-    bool ended = false;  ///< it says nothing more
+    bool ended = false;  ///< no more messages follow
   };
 
   bool findWorlds(const Target& target);
-  void ask(v1::ClientMessage request, Role role);
-  void join(Ear& ear, Role role);
-  void hear();
-  void hear(Ear& ear);
-  void take(Ear& ear, v1::ServerMessage message, std::vector<std::uint8_t> attachment);
-  void answerMetrics();
-  void armTimer(Clock::time_point deadline, unsigned status, std::string why);
-  void noticeLeaving();
+  void queryWorlds(v1::ClientMessage request, Role role);
+  void joinWorld(WorldReply& reply, Role role);
+  void pollReplies();
+  void pollWorld(WorldReply& reply);
+  void handleReply(WorldReply& reply, v1::ServerMessage message,
+                   std::vector<std::uint8_t> attachment);
+  void sendMetrics();
+  void armTimer(Clock::time_point deadline, unsigned status, std::string reason);
+  void watchDisconnect();
   void close();
 
   boost::asio::ip::tcp::socket socket_;
   boost::asio::steady_timer timer_;
-  Reception& reception_;
+  ServerContext& context_;
   const std::string peer_;
   Clock::time_point deadline_;
   boost::beast::flat_buffer in_;
   boost::beast::http::request_parser<boost::beast::http::string_body> parser_;
-  std::array<char, 256> thrownAway_{};
+  std::array<char, 256> discarded_{};
   std::string path_;
-  std::vector<Ear> ears_;      ///< one, or for metrics as many as there are worlds
-  bool mayHearNames_ = false;  ///< of worlds
-  bool writing_ = false, answered_ = false, noticing_ = false, closed_ = false;
+  std::vector<WorldReply> replies_;  ///< one; for metrics, one per world
+  bool mayShowNames_ = false;        ///< the response may name worlds
+  bool writing_ = false, answered_ = false, watching_ = false, closed_ = false;
 };
 
 }  // namespace enfilade::server

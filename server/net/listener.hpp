@@ -1,6 +1,6 @@
-// Takes connections and keeps count of them. On the network thread alone.
+// Accepts connections and limits their number. Network thread only.
 //
-// Asio appears in this header, which only listener.cpp and server.cpp include.
+// This header uses Asio; only listener.cpp and server.cpp include it.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -8,31 +8,31 @@
 #include <memory>
 #include <vector>
 
-#include "server/app/command_line.hpp"
+#include "server/base/endpoint.hpp"
 #include "server/net/server_context.hpp"
 
 namespace enfilade::server {
 
 class Listener {
  public:
-  /// Throws ServerError.
-  Listener(boost::asio::io_context& context, const Endpoint& where, Worlds& worlds,
+  /// Throws ServerError if it cannot listen on the address.
+  Listener(boost::asio::io_context& context, const Endpoint& where, WorldRegistry& worlds,
            const ServerLimits& limits, Access access);
 
   std::uint16_t port() const { return port_; }
   void start();
-  /// Takes no more connections and ends those that there are.
+  /// Stops accepting and ends all connections.
   void stop();
 
  private:
   void accept();
-  void take(boost::asio::ip::tcp::socket socket);
-  bool makeRoom(const Connection& newcomer);
+  void acceptSocket(boost::asio::ip::tcp::socket socket);
+  bool evictAnonymous(const ClientConnection& newcomer);
 
   boost::asio::ip::tcp::acceptor acceptor_;
-  const std::uint16_t port_;  ///< asked once: other threads want to know it
-  boost::asio::steady_timer pause_;
-  Reception reception_;
+  const std::uint16_t port_;  ///< cached: other threads read it
+  boost::asio::steady_timer retryTimer_;
+  ServerContext context_;
 };
 
 }  // namespace enfilade::server

@@ -1,7 +1,7 @@
-// Who has connected and is not known yet: the first bytes tell whether it speaks this protocol or
-// HTTP. What is neither goes to a Session, which says what is wrong.
+// Detects the protocol of a new connection from its first bytes: Enfilade's protocol or HTTP. Any
+// other data goes to a Session, which reports the error.
 //
-// Asio appears in this header, which only files of connections include.
+// This header uses Asio; only connection files include it.
 #pragma once
 
 #include <array>
@@ -12,28 +12,29 @@
 
 namespace enfilade::server {
 
-class Arrival : public Connection, public std::enable_shared_from_this<Arrival> {
+class ProtocolDetector : public ClientConnection,
+                         public std::enable_shared_from_this<ProtocolDetector> {
  public:
-  Arrival(boost::asio::ip::tcp::socket socket, Reception& reception);
+  ProtocolDetector(boost::asio::ip::tcp::socket socket, ServerContext& context);
   void start();
   void end(v1::ErrorCode code, const std::string& reason) override;
-  bool giveWay() override;
+  bool evictIfAnonymous() override;
 
  private:
-  enum class Language : std::uint8_t { unknownYet, ours, http };
+  enum class Protocol : std::uint8_t { unknown, enfilade, http };
 
   void read();
-  Language language() const;
-  void become(Language language);
+  Protocol detect() const;
+  void handOver(Protocol detected);
 
   boost::asio::ip::tcp::socket socket_;
   boost::asio::steady_timer timer_;
-  Reception& reception_;
+  ServerContext& context_;
   std::array<std::uint8_t, 4096> in_{};
-  std::size_t count_ = 0;  ///< of bytes that came
-  bool gone_ = false;      ///< somebody else has the socket
+  std::size_t receivedBytes_ = 0;  ///< number of received bytes
+  bool finished_ = false;          ///< the socket was handed over or closed
   v1::ErrorCode endCode_ = v1::ERROR_UNSPECIFIED;
-  std::string endReason_;  ///< not empty: it is to be told this
+  std::string endReason_;  ///< if not empty, sent to the client
 };
 
 }  // namespace enfilade::server

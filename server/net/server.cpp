@@ -10,7 +10,7 @@ namespace enfilade::server {
 
 namespace {
 
-std::vector<std::shared_ptr<const scene::Scene>> joined(
+std::vector<std::shared_ptr<const scene::Scene>> prependScene(
     std::shared_ptr<const scene::Scene> first,
     std::vector<std::shared_ptr<const scene::Scene>> further) {
   further.insert(further.begin(), std::move(first));
@@ -22,12 +22,12 @@ std::vector<std::shared_ptr<const scene::Scene>> joined(
 struct Server::State {
   State(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen, ServerOptions options)
       : listener(context, listen, worlds, options.world.limits, std::move(options.access)),
-        worlds(joined(std::move(scene), std::move(options.furtherScenes)), options.world,
+        worlds(prependScene(std::move(scene), std::move(options.additionalScenes)), options.world,
                options.drawing) {}
 
   boost::asio::io_context context{1};  ///< one thread: its handlers need no lock
-  Listener listener;                   ///< first: where its address is taken, no recording is begun
-  Worlds worlds;
+  Listener listener;                   ///< before `worlds`: a bind error must not start a recording
+  WorldRegistry worlds;
   std::thread network;
 };
 
@@ -53,7 +53,7 @@ const std::string& Server::rendererName() const {
 
 std::vector<std::string> Server::worldNames() const {
   std::vector<std::string> names;
-  for (const auto& world : state_->worlds.all()) names.push_back(world->place().name);
+  for (const auto& world : state_->worlds.allWorlds()) names.push_back(world->identity().name);
   return names;
 }
 
@@ -65,15 +65,15 @@ AuditTotals Server::auditTotals() const {
   return state_->worlds.auditTotals();
 }
 
-bool Server::recordedAll() const {
-  return state_->worlds.mainWorld().recordedAll();
+bool Server::isRecordingComplete() const {
+  return state_->worlds.mainWorld().isRecordingComplete();
 }
 
 void Server::stop() {
   if (!state_->network.joinable()) return;
   state_->worlds.stop();
   boost::asio::post(state_->context, [state = state_.get()] { state->listener.stop(); });
-  state_->network.join();  // when the last session is closed
+  state_->network.join();  // returns after the last session has closed
   state_->worlds.finishServices();
 }
 

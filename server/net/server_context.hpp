@@ -1,5 +1,5 @@
-// What all connections share: whom they speak to, what they may do, and who they are. On the
-// network thread alone.
+// State shared by all connections: worlds, limits, access, and the list of connections. Network
+// thread only.
 #pragma once
 
 #include <memory>
@@ -7,33 +7,34 @@
 #include <vector>
 
 #include "server/base/access.hpp"
-#include "server/hosting/world_registry.hpp"
+#include "server/worlds/world_registry.hpp"
 
 namespace enfilade::server {
 
-/// Anything that holds a socket of a client.
-class Connection {
+/// A connection of a client, in any protocol.
+class ClientConnection {
  public:
-  virtual ~Connection() = default;
-  /// Tells the reason, where that is possible, and closes.
+  virtual ~ClientConnection() = default;
+  /// Sends the reason, if the protocol allows it, and closes.
   virtual void end(v1::ErrorCode code, const std::string& reason) = 0;
-  /// Closes at once if nobody knows yet who this is; false when it stays.
-  virtual bool giveWay() = 0;
+  /// Closes immediately if the client has not identified itself; returns whether it closed.
+  virtual bool evictIfAnonymous() = 0;
 };
 
-struct Reception {
-  Worlds& worlds;
+struct ServerContext {
+  WorldRegistry& worlds;
   const ServerLimits limits;
   const Access access;
-  std::vector<std::weak_ptr<Connection>> connections;
-  bool closed = false;  ///< who still comes is sent away
+  std::vector<std::weak_ptr<ClientConnection>> connections;
+  bool closed = false;  ///< new connections are rejected
 };
 
-/// The reception will end the connection when the server ends.
-inline void enlist(Reception& reception, const std::shared_ptr<Connection>& connection) {
-  std::erase_if(reception.connections, [](const auto& one) { return one.expired(); });
-  reception.connections.push_back(connection);
-  if (reception.closed) connection->end(v1::ERROR_SHUTTING_DOWN, "the server ends");
+/// Registers a connection, so that it is ended when the server stops.
+inline void registerConnection(ServerContext& context,
+                               const std::shared_ptr<ClientConnection>& connection) {
+  std::erase_if(context.connections, [](const auto& one) { return one.expired(); });
+  context.connections.push_back(connection);
+  if (context.closed) connection->end(v1::ERROR_SHUTTING_DOWN, "the server is stopping");
 }
 
 }  // namespace enfilade::server

@@ -1,7 +1,7 @@
-// One client: bytes to messages and back. What a message means is the tick loop's to know.
-// Lives on the network thread as long as one of its reads, writes or timers is under way.
+// The connection of one client: converts bytes to messages and back for the tick loop.
+// It lives on the network thread as long as one of its reads, writes or timers is in progress.
 //
-// Asio appears in this header, which only those files include that take connections.
+// This header uses Asio; only connection files include it.
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
@@ -16,53 +16,54 @@
 
 namespace enfilade::server {
 
-class Session : public Connection, public std::enable_shared_from_this<Session> {
+class Session : public ClientConnection, public std::enable_shared_from_this<Session> {
  public:
-  Session(std::unique_ptr<Wire> wire, boost::asio::any_io_executor executor, Reception& reception);
+  Session(std::unique_ptr<Transport> transport, boost::asio::any_io_executor executor,
+          ServerContext& context);
 
-  /// The whole Hello has to be here by `deadline`. `token` is what the wire's own greeting had.
+  /// The complete Hello must arrive before `deadline`. `token`: from the transport's handshake.
   void start(std::chrono::steady_clock::time_point deadline, std::string token = {});
-  /// Says goodbye and closes, within ServerLimits::farewell.
+  /// Sends Bye and closes within ServerLimits::closeTimeout.
   void end(v1::ErrorCode code, const std::string& reason) override;
-  bool giveWay() override;
+  bool evictIfAnonymous() override;
 
  private:
   using ErrorCode = boost::system::error_code;
   using Timer = boost::asio::steady_timer;
 
   void read();
-  void takeBytes(std::span<const std::uint8_t> bytes);
-  void take(const protocol::Message& message);
-  void greet(const v1::ClientMessage& message);
-  void enter(const v1::Hello& hello, Role role, std::uint64_t requestId);
+  void handleBytes(std::span<const std::uint8_t> bytes);
+  void handleMessage(const protocol::Message& message);
+  void handleHello(const v1::ClientMessage& message);
+  void joinWorld(const v1::Hello& hello, Role role, std::uint64_t requestId);
   void fail(v1::ErrorCode code, const std::string& reason, std::uint64_t requestId = 0);
-  void keepReading();
-  void pause(Timer::time_point end);
-  void timeHalfMessage();
+  void continueReading();
+  void pauseReading(Timer::time_point end);
+  void startMessageTimer();
   void sendNext();
-  void written(const std::string& problem, bool last);
+  void onWritten(const std::string& problem, bool last);
   void armTimer(Timer::time_point deadline, v1::ErrorCode code, std::string reason);
-  void sayGoodbye();
-  void close(const std::string& why);
+  void startCloseTimer();
+  void close(const std::string& reason);
 
-  const std::unique_ptr<Wire> wire_;
+  const std::unique_ptr<Transport> transport_;
   const boost::asio::any_io_executor executor_;
   Timer timer_;
-  Reception& reception_;
-  std::string peer_;  ///< for logs: address and port, and the name that it gave itself
+  ServerContext& context_;
+  std::string peer_;  ///< for logs: address, port, and the client's name
   std::string token_;
   protocol::Decoder decoder_;
   std::shared_ptr<OutgoingQueue> out_;
-  std::shared_ptr<RequestAllowance> allowance_;
-  Timer pause_;                                ///< of reading, where requests come too fast
-  RequestAllowance::Clock::duration ahead_{};  ///< by how much they do
+  std::shared_ptr<FlowControl> flowControl_;
+  Timer pauseTimer_;                     ///< delays reading when requests come too fast
+  FlowControl::Clock::duration debt_{};  ///< time by which the requests exceed the rate
   bool reading_ = false;
   bool sending_ = false;
-  std::shared_ptr<TickLoop> world_;  ///< that it entered
-  ClientId client_ = 0;              ///< 0: not greeted
-  bool messageHalfway_ = false;
-  bool listening_ = true;     ///< false: what still comes is thrown away
-  bool saidGoodbye_ = false;  ///< the farewell timer runs
+  std::shared_ptr<TickLoop> world_;  ///< the entered world
+  ClientId client_ = 0;              ///< 0: no Hello yet
+  bool messageIncomplete_ = false;
+  bool listening_ = true;           ///< false: further input is discarded
+  bool closeTimerStarted_ = false;  ///< the close timer is running
   bool closed_ = false;
 };
 

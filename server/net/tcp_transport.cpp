@@ -10,35 +10,31 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-namespace {
-
-std::string told(const error_code& problem) {
+std::string formatProblem(const error_code& problem) {
   return problem ? problem.message() : std::string();
 }
 
-}  // namespace
-
-std::array<asio::const_buffer, 2> piecesOf(const Encoded& message) {
+std::array<asio::const_buffer, 2> makeBuffers(const EncodedMessage& message) {
   return {asio::buffer(*message.head),
-          message.rest ? asio::buffer(*message.rest) : asio::const_buffer()};
+          message.body ? asio::buffer(*message.body) : asio::const_buffer()};
 }
 
-std::string addressOf(const tcp::socket& socket) {
+std::string formatPeerAddress(const tcp::socket& socket) {
   error_code problem;
   const tcp::endpoint endpoint = socket.remote_endpoint(problem);
-  if (problem) return "a client that is gone";
+  if (problem) return "a disconnected client";
   return endpoint.address().to_string() + ":" + std::to_string(endpoint.port());
 }
 
-bool peerEnded(tcp::socket& socket) {
-  pollfd asked{socket.native_handle(), POLLRDHUP, 0};
-  return ::poll(&asked, 1, 0) > 0;  // it, an error or a hang-up
+bool hasPeerClosed(tcp::socket& socket) {
+  pollfd pollRequest{socket.native_handle(), POLLRDHUP, 0};
+  return ::poll(&pollRequest, 1, 0) > 0;  // closed, an error, or a hang-up
 }
 
-TcpWire::TcpWire(tcp::socket socket, std::vector<std::uint8_t> first)
-    : socket_(std::move(socket)), peer_(addressOf(socket_)), first_(std::move(first)) {}
+TcpTransport::TcpTransport(tcp::socket socket, std::vector<std::uint8_t> first)
+    : socket_(std::move(socket)), peer_(formatPeerAddress(socket_)), first_(std::move(first)) {}
 
-void TcpWire::read(Heard done) {
+void TcpTransport::read(ReadHandler done) {
   if (!first_.empty()) {
     return asio::post(socket_.get_executor(), [this, done = std::move(done)] {
       const std::vector<std::uint8_t> first = std::exchange(first_, {});
@@ -47,28 +43,28 @@ void TcpWire::read(Heard done) {
   }
   socket_.async_read_some(asio::buffer(in_),
                           [this, done = std::move(done)](error_code problem, std::size_t bytes) {
-                            done(told(problem), {in_.data(), bytes});
+                            done(formatProblem(problem), {in_.data(), bytes});
                           });
 }
 
-void TcpWire::write(Encoded message, Written done) {
-  const auto pieces = piecesOf(message);
+void TcpTransport::write(EncodedMessage message, WriteHandler done) {
+  const auto pieces = makeBuffers(message);
   asio::async_write(socket_, pieces,
                     [message = std::move(message), done = std::move(done)](
-                        error_code problem, std::size_t) { done(told(problem)); });
+                        error_code problem, std::size_t) { done(formatProblem(problem)); });
 }
 
-void TcpWire::endSending(std::function<void()> done) {
+void TcpTransport::shutdownSend(std::function<void()> done) {
   error_code ignored;
   socket_.shutdown(tcp::socket::shutdown_send, ignored);
   done();
 }
 
-bool TcpWire::peerEnded() {
-  return server::peerEnded(socket_);
+bool TcpTransport::peerClosed() {
+  return server::hasPeerClosed(socket_);
 }
 
-void TcpWire::close() {
+void TcpTransport::close() {
   error_code ignored;
   socket_.close(ignored);
 }

@@ -1,4 +1,6 @@
-// Asio appears in this header, which only those files include that take connections.
+// The protocol's bytes over TCP.
+//
+// This header uses Asio; only connection files include it.
 #pragma once
 
 #include <array>
@@ -9,23 +11,25 @@
 
 namespace enfilade::server {
 
-/// The pieces of a message, for one write.
-std::array<boost::asio::const_buffer, 2> piecesOf(const Encoded& message);
-std::string addressOf(const boost::asio::ip::tcp::socket& socket);
-/// As Wire::peerEnded().
-bool peerEnded(boost::asio::ip::tcp::socket& socket);
+/// The error as text; "" without an error.
+std::string formatProblem(const boost::system::error_code& problem);
+/// The buffers of a message, for one gathered write.
+std::array<boost::asio::const_buffer, 2> makeBuffers(const EncodedMessage& message);
+std::string formatPeerAddress(const boost::asio::ip::tcp::socket& socket);
+/// Like Transport::peerClosed().
+bool hasPeerClosed(boost::asio::ip::tcp::socket& socket);
 
-class TcpWire : public Wire {
+class TcpTransport : public Transport {
  public:
-  /// `first` was read already, and comes first.
-  TcpWire(boost::asio::ip::tcp::socket socket, std::vector<std::uint8_t> first);
-  void read(Heard done) override;
-  void write(Encoded message, Written done) override;
-  void endSending(std::function<void()> done) override;
+  /// `first`: bytes already read; read() returns them first.
+  TcpTransport(boost::asio::ip::tcp::socket socket, std::vector<std::uint8_t> first);
+  void read(ReadHandler done) override;
+  void write(EncodedMessage message, WriteHandler done) override;
+  void shutdownSend(std::function<void()> done) override;
   void close() override;
-  bool peerEnded() override;
+  bool peerClosed() override;
   const std::string& peer() const override { return peer_; }
-  bool beginsWithMagic() const override { return true; }
+  bool usesMagic() const override { return true; }
 
  private:
   boost::asio::ip::tcp::socket socket_;

@@ -1,4 +1,4 @@
-// A connection as bytes, whatever carries them: TCP, or WebSocket. On the network thread alone.
+// Interface of a byte connection: TCP or WebSocket. Network thread only.
 #pragma once
 
 #include <cstdint>
@@ -10,24 +10,25 @@
 
 namespace enfilade::server {
 
-class Wire {
+class Transport {
  public:
-  /// `problem` is "" or tells why the connection is over; the bytes are valid during the call.
-  using Heard = std::function<void(const std::string& problem, std::span<const std::uint8_t>)>;
-  using Written = std::function<void(const std::string& problem)>;
+  /// `problem`: "" or the reason why the connection ended. The bytes are valid during the call.
+  using ReadHandler =
+      std::function<void(const std::string& problem, std::span<const std::uint8_t>)>;
+  using WriteHandler = std::function<void(const std::string& problem)>;
 
-  virtual ~Wire() = default;
-  /// Some bytes, once; one read at a time. The callbacks keep the wire's owner alive.
-  virtual void read(Heard done) = 0;
-  /// All of it, once; one write at a time.
-  virtual void write(Encoded message, Written done) = 0;
-  /// Nothing more will be written; the peer may still send. Once, after the last write.
-  virtual void endSending(std::function<void()> done) = 0;
+  virtual ~Transport() = default;
+  /// Reads some bytes and calls `done` once; one read at a time. Callbacks keep the owner alive.
+  virtual void read(ReadHandler done) = 0;
+  /// Writes the whole message and calls `done` once; one write at a time.
+  virtual void write(EncodedMessage message, WriteHandler done) = 0;
+  /// Shuts down the sending side; the peer may still send. Call it once, after the last write.
+  virtual void shutdownSend(std::function<void()> done) = 0;
   virtual void close() = 0;
-  /// The peer sends nothing any more: what it sent may still have to be read.
-  virtual bool peerEnded() = 0;
+  /// Whether the peer has stopped sending; unread bytes may remain.
+  virtual bool peerClosed() = 0;
   virtual const std::string& peer() const = 0;  ///< for logs: address and port
-  virtual bool beginsWithMagic() const = 0;     ///< in both directions
+  virtual bool usesMagic() const = 0;           ///< both directions start with magic bytes
 };
 
 }  // namespace enfilade::server

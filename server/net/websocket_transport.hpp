@@ -1,6 +1,6 @@
 // The protocol's bytes as the binary messages of a WebSocket (RFC 6455).
 //
-// Asio and Beast appear in this header, which only http_visit.cpp includes.
+// This header uses Asio and Beast; only http_session.cpp includes it.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -13,21 +13,21 @@
 
 namespace enfilade::server {
 
-class WebSocketWire : public Wire {
+class WebSocketTransport : public Transport {
  public:
   using Request = boost::beast::http::request<boost::beast::http::string_body>;
 
-  WebSocketWire(boost::asio::ip::tcp::socket socket, Request request);
-  void read(Heard done) override;
-  void write(Encoded message, Written done) override;
-  void endSending(std::function<void()> done) override;
+  WebSocketTransport(boost::asio::ip::tcp::socket socket, Request request);
+  void read(ReadHandler done) override;
+  void write(EncodedMessage message, WriteHandler done) override;
+  void shutdownSend(std::function<void()> done) override;
   void close() override;
-  bool peerEnded() override;
+  bool peerClosed() override;
   const std::string& peer() const override { return peer_; }
-  bool beginsWithMagic() const override { return false; }
+  bool usesMagic() const override { return false; }
 
  private:
-  void readMessage(Heard done);
+  void readMessage(ReadHandler done);
 
   const std::string peer_;
   boost::beast::websocket::stream<boost::asio::ip::tcp::socket> stream_;

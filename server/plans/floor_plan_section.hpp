@@ -1,5 +1,5 @@
-// What a horizontal cut goes through: the lines of a plan. From above, a wall of single faces is
-// seen on edge, and would not be on the plan at all.
+// Horizontal sections of a scene: the lines of a floor plan. Without them, walls of single faces
+// would be invisible from above.
 #pragma once
 
 #include <vector>
@@ -10,19 +10,18 @@
 
 namespace enfilade::server {
 
-/// Scene frame, metres, at the height of the cut.
-struct CutLine {
+/// A line of a section: scene frame, metres, at the height of the cut.
+struct SectionLine {
   collision::Vec3 from, to;
 };
 
-/// Where triangles of solid still objects pass through `height` (y). Those that lie in it have no
-/// line.
-std::vector<CutLine> cutOfStill(const scene::Scene& scene, double height);
-/// The same with bodies, as the model has them.
-std::vector<CutLine> cutAt(const scene::Scene& scene, double height);
+/// Section of solid static objects at `height` (y). Triangles inside the plane have no line.
+std::vector<SectionLine> cutStatic(const scene::Scene& scene, double height);
+/// The same, including bodies in their initial poses.
+std::vector<SectionLine> cutScene(const scene::Scene& scene, double height);
 
-/// On a picture that `camera` took, and whose top left corner stands at (left, top) of `image`.
-void drawCut(render::Image& image, const render::Camera& camera, const std::vector<CutLine>& cut,
-             double left = 0, double top = 0);
+/// Draws a section onto a picture of `camera` whose top left corner is at (left, top) of `image`.
+void drawSection(render::Image& image, const render::Camera& camera,
+                 const std::vector<SectionLine>& section, double left = 0, double top = 0);
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// A plan of each storey with coordinates on its frame, to read positions for scripts from.
+// Floor plans per storey with coordinates on the frame, for writing scripts.
 #pragma once
 
 #include <string>
@@ -11,16 +11,15 @@ namespace enfilade::server {
 
 struct StoreyFloor {
   double height = 0;  ///< metres, scene frame
-  std::string name;   ///< as the file calls it, or empty
+  std::string name;   ///< name in the file, or empty
 };
 
-/// Heights at which much floor lies that somebody could walk on and something stands on, ascending;
-/// of a scene without any floor, its lowest point.
-std::vector<StoreyFloor> storeysOf(const scene::Scene& scene);
+/// Finds the heights of large walkable floors with walls, ascending. A scene without floors has one
+/// storey at its lowest point.
+std::vector<StoreyFloor> findStoreys(const scene::Scene& scene);
 
-/// The plan of one storey in a frame with the coordinates of the scene; nullopt when no picture is
-/// to be had.
+/// Draws the plan of one storey in a frame with scene coordinates; nullopt if rendering failed.
 std::optional<render::Image> drawStoreyPlan(const scene::Scene& scene, const StoreyFloor& storey,
-                                            const TakePicture& picture);
+                                            const PlanRenderer& renderPlan);
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// A plan of the scene, a picture a storey, with what happened in a walk drawn on it.
+// Map of a walk: floor plans per storey with paths, contacts and captures.
 #pragma once
 
 #include <optional>
@@ -10,11 +10,11 @@
 
 namespace enfilade::server {
 
-/// Where an avatar's feet were, tick by tick; scene frame, metres.
+/// The positions of an avatar's feet, tick by tick; scene frame, metres.
 struct WalkedPath {
   std::string avatar;
-  std::vector<Vec3> feet;
-  scene::EntityId id = 0;  ///< its colour is that of the avatar in the pictures
+  std::vector<Vec3> footPositions;
+  scene::EntityId id = 0;  ///< selects the avatar's colour
 };
 struct MapContact {
   Vec3 point = Vec3::Zero();
@@ -23,27 +23,27 @@ struct MapContact {
 struct MapCapture {
   std::string name;
   Vec3 eye = Vec3::Zero();
-  Vec3 gaze = Vec3::UnitX();
+  Vec3 viewDirection = Vec3::UnitX();
 };
 
 struct WalkTrace {
   std::string title;
   std::vector<WalkedPath> paths;
-  std::vector<MapContact> contacts;  ///< that began
-  std::vector<MapContact> stops;     ///< where a walk ended blocked
+  std::vector<MapContact> contacts;      ///< contacts that began
+  std::vector<MapContact> blockedWalks;  ///< ends of blocked walks
   std::vector<MapCapture> captures;
 };
 
-/// Heights of the floors that were walked on for long, ascending; empty when nobody walked.
-std::vector<double> walkedStoreys(const std::vector<WalkedPath>& paths);
+/// Finds the floor heights with much walking, ascending; empty without walks.
+std::vector<double> findWalkedStoreys(const std::vector<WalkedPath>& paths);
 
-/// What a map is drawn on.
-struct MapGround {
-  TakePicture picture;
-  const scene::Scene* scene = nullptr;  ///< whose walls get their lines; null: it is elsewhere
+/// The background of a map.
+struct MapBackground {
+  PlanRenderer renderPlan;
+  const scene::Scene* scene = nullptr;  ///< scene for section lines; null: not in this process
 };
 
-/// nullopt when there is nothing to draw or no picture to draw on.
-std::optional<render::Image> drawMap(const WalkTrace& trace, const MapGround& ground);
+/// Draws the map; nullopt without paths or without a background.
+std::optional<render::Image> drawMap(const WalkTrace& trace, const MapBackground& background);
 
 }  // namespace enfilade::server

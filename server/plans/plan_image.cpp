@@ -4,14 +4,17 @@
 #include <cmath>
 #include <map>
 
+#include "collision/assert.hpp"
+#include "render/avatar_mesh.hpp"
+
 namespace enfilade::server {
 namespace {
 
 using render::Image;
 
-constexpr double kBelow = 1.0;        // metres below the floor that are still drawn
-constexpr double kBin = 0.25;         // metres of height
-constexpr double kStoreyApart = 2.0;  // metres; nearer heights are one storey
+constexpr double kDepthBelowFloor = 1.0;    // metres drawn below the floor
+constexpr double kBinHeight = 0.25;         // bin height in metres
+constexpr double kMinStoreyDistance = 2.0;  // metres; closer heights are one storey
 
 /// Heights that fall into one bin.
 struct Peak {
@@ -19,9 +22,10 @@ struct Peak {
   double weight = 0;
 };
 
-double medianOf(Peak& peak) {
+double computeMedian(Peak& peak) {
   std::sort(peak.heights.begin(), peak.heights.end(),
             [](const auto& a, const auto& b) { return a.height < b.height; });
+  ENFILADE_ASSERT(!peak.heights.empty());
   double below = 0;
   for (const WeightedHeight& at : peak.heights) {
     below += at.weight;
@@ -32,15 +36,25 @@ double medianOf(Peak& peak) {
 
 }  // namespace
 
-render::Camera planCamera(const scene::Box& bounds, double floor, double widest, double highest) {
-  const Vec3 size = bounds.size();
-  const double scale = std::min(widest / size.x(), highest / size.z());
-  const int width = std::max(64, static_cast<int>(size.x() * scale));
-  const int height = std::max(64, static_cast<int>(size.z() * scale));
-  return render::plan(bounds, floor - kBelow, floor + kPlanCut, width, height);
+render::Colour computeAvatarColour(scene::EntityId id) {
+  const Eigen::Vector3f linear = render::avatarColour(id);
+  const auto byte = [&](int i) {
+    return static_cast<std::uint8_t>(std::lround(255 * std::pow(linear[i], 1 / 2.2f)));
+  };
+  return {byte(0), byte(1), byte(2)};
 }
 
-Image planGround(const PlanPicture& plan) {
+render::Camera makePlanCamera(const scene::Aabb& bounds, double floor, double maxWidth,
+                              double maxHeight) {
+  const Vec3 size = bounds.size();
+  const double scale = std::min(maxWidth / size.x(), maxHeight / size.z());
+  const int width = std::max(64, static_cast<int>(size.x() * scale));
+  const int height = std::max(64, static_cast<int>(size.z() * scale));
+  return render::makePlanCamera(bounds, floor - kDepthBelowFloor, floor + kPlanCutHeight, width,
+                                height);
+}
+
+Image makePlanBackground(const PlanPicture& plan) {
   Image image = plan.colour;
   const auto width = static_cast<std::size_t>(image.width);
   for (std::size_t pixel = 0; pixel < plan.ids.size(); ++pixel) {
@@ -57,28 +71,13 @@ Image planGround(const PlanPicture& plan) {
   return image;
 }
 
-void paste(Image& onto, const Image& image, int left, int top) {
-  for (int y = 0; y < image.height; ++y) {
-    const auto from = image.rgb.begin() + static_cast<std::ptrdiff_t>(y) * image.width * 3;
-    const auto to =
-        onto.rgb.begin() + (static_cast<std::ptrdiff_t>(top + y) * onto.width + left) * 3;
-    std::copy(from, from + static_cast<std::ptrdiff_t>(image.width) * 3, to);
-  }
-}
-
-Image blankImage(int width, int height) {
-  Image image{width, height, {}};
-  image.rgb.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 3);
-  for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = kPlanPaper[i % 3];
-  return image;
-}
-
-std::vector<double> storeyHeights(std::span<const WeightedHeight> heights, double leastShare,
-                                  std::size_t most) {
+std::vector<double> findStoreyHeights(std::span<const WeightedHeight> heights, double minShare,
+                                      std::size_t maxCount) {
   std::map<long, Peak> bins;
   double all = 0;
   for (const WeightedHeight& at : heights) {
-    Peak& peak = bins[std::lround(at.height / kBin)];
+    ENFILADE_ASSERT(at.weight > 0);
+    Peak& peak = bins[std::lround(at.height / kBinHeight)];
     peak.heights.push_back(at);
     peak.weight += at.weight;
     all += at.weight;
@@ -89,10 +88,10 @@ std::vector<double> storeyHeights(std::span<const WeightedHeight> heights, doubl
                    [](const Peak& a, const Peak& b) { return a.weight > b.weight; });
   std::vector<double> storeys;
   for (Peak& peak : peaks) {
-    if (storeys.size() == most || (!storeys.empty() && peak.weight < leastShare * all)) break;
-    const double height = medianOf(peak);
+    if (storeys.size() == maxCount || (!storeys.empty() && peak.weight < minShare * all)) break;
+    const double height = computeMedian(peak);
     const bool isNew = std::none_of(storeys.begin(), storeys.end(), [&](double other) {
-      return std::abs(other - height) < kStoreyApart;
+      return std::abs(other - height) < kMinStoreyDistance;
     });
     if (isNew) storeys.push_back(height);
   }

@@ -1,5 +1,5 @@
-// Plans from above, for maps of walks and for `inspect --plan`: where storeys are, how a plan is
-// taken and made ready to be drawn on.
+// Plan views for walk maps and for `inspect --plan`: storey heights, plan cameras and plan
+// backgrounds.
 #pragma once
 
 #include <functional>
@@ -7,47 +7,47 @@
 #include <span>
 #include <vector>
 
-#include "render/image/image.hpp"
+#include "render/image/drawing.hpp"
 
 namespace enfilade::server {
 
 using collision::Vec3;
 
-/// A plan as it was drawn, with the ids of what is seen, pixel by pixel.
+/// A rendered plan with the object id of each pixel.
 struct PlanPicture {
   render::Image colour;
   std::vector<std::uint32_t> ids;
 };
 
-/// Takes the picture that a camera asks for; nullopt when there is none to be had.
-using TakePicture = std::function<std::optional<PlanPicture>(const render::Camera&)>;
+/// Renders a plan from a camera; nullopt if not available.
+using PlanRenderer = std::function<std::optional<PlanPicture>(const render::Camera&)>;
 
-inline constexpr double kPlanCut = 1.2;  ///< metres above the floor at which storeys are cut, as
-                                         ///< plans are drawn: through the windows
+inline constexpr double kPlanCutHeight = 1.2;  ///< metres above the floor: storeys are cut through
+                                               ///< the windows, as usual for floor plans
 
 inline constexpr render::Colour kPlanInk{40, 40, 46}, kPlanPaper{250, 249, 246};
 
-/// The camera of a plan of `bounds`, as large as fits into so many pixels, cut kPlanCut above
-/// `floor`.
-render::Camera planCamera(const scene::Box& bounds, double floor, double widest, double highest);
+/// An avatar's colour in rendered pictures, in sRGB.
+render::Colour computeAvatarColour(scene::EntityId id);
 
-/// Softened, so that what is drawn on it is read first, and outlined by object: a cut wall is
-/// hollow, and would be hard to tell from the floor by its colour.
-render::Image planGround(const PlanPicture& plan);
+/// Makes the camera of a plan of `bounds`, as large as fits into `maxWidth` x `maxHeight` pixels,
+/// cut kPlanCutHeight above `floor`.
+render::Camera makePlanCamera(const scene::Aabb& bounds, double floor, double maxWidth,
+                              double maxHeight);
 
-/// Copies `image`, which fits, to where its top left corner comes to (left, top).
-void paste(render::Image& onto, const render::Image& image, int left, int top);
-render::Image blankImage(int width, int height);
+/// Makes a background: fades the colours, so that marks stand out, and outlines objects, because
+/// cut walls are hollow and look like the floor.
+render::Image makePlanBackground(const PlanPicture& plan);
 
-/// Something at a height, in metres: where feet were, or a floor; `weight` > 0, of any unit.
+/// A weighted height in metres, of feet or floors. `weight` > 0, in any unit.
 struct WeightedHeight {
   double height = 0;
   double weight = 1;
 };
 
-/// Where most of the weight lies: at most `most` heights, ascending, two metres and more apart. A
-/// height with less than `leastShare` of all weight is none, the first excepted.
-std::vector<double> storeyHeights(std::span<const WeightedHeight> heights, double leastShare,
-                                  std::size_t most);
+/// Finds the heights with most weight: at most `maxCount`, ascending, at least two metres apart.
+/// All but the first need at least `minShare` of the total weight.
+std::vector<double> findStoreyHeights(std::span<const WeightedHeight> heights, double minShare,
+                                      std::size_t maxCount);
 
 }  // namespace enfilade::server

@@ -3,64 +3,65 @@
 #include <algorithm>
 
 #include "protocol/recording/recording.hpp"
-#include "scene/world/contacts/active_contacts.hpp"
+#include "scene/world/active_contacts.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
 
-/// States are the most of a recording, and not looked at: only the events are parsed.
+/// Parses only the start and the events: states are most of a recording and are skipped.
 ContactHistory::ContactHistory(const std::filesystem::path& recording, std::uint32_t run,
                                std::uint64_t lastTick) {
   protocol::mcap::Reader file(recording);
-  std::uint32_t begun = 0;
+  std::uint32_t runIndex = 0;
   while (const auto message = file.next()) {
     const std::string& topic = message->channel->topic;
-    if (topic == protocol::kStartTopic && ++begun > run) return;
-    if (begun != run || (topic != protocol::kStartTopic && topic != protocol::kEventsTopic))
+    if (topic == protocol::kStartTopic && ++runIndex > run) return;
+    if (runIndex != run || (topic != protocol::kStartTopic && topic != protocol::kEventsTopic))
       continue;
-    const auto item = protocol::itemFrom(*message, recording);
+    const auto item = protocol::parseRecordedItem(*message, recording);
     if (const auto* start = std::get_if<v1::RecordingStart>(&*item))
       firstTick_ = start->parent().tick();
     if (const auto* events = std::get_if<v1::TickEvents>(&*item)) {
       if (events->tick() > lastTick) return;
-      add(*events);
+      addBegins(*events);
     }
   }
 }
 
-void ContactHistory::add(const v1::TickEvents& events) {
+void ContactHistory::addBegins(const v1::TickEvents& events) {
   for (const v1::ContactEvent& event : events.contacts())
     if (event.kind() == v1::ContactEvent::KIND_BEGIN ||
         event.kind() == v1::ContactEvent::KIND_ENTER)
-      begun_[{event.kind(), event.a(), event.b()}].push_back(event);
+      begins_[{event.kind(), event.a(), event.b()}].push_back(event);
 }
 
-/// Null where none is known.
-const v1::ContactEvent* ContactHistory::lastBegun(const Key& key, std::uint64_t tick) const {
-  const auto found = begun_.find(key);
-  if (found == begun_.end()) return nullptr;
-  const auto after = std::upper_bound(
+/// The last begin or enter event of a contact up to `tick`; null: unknown.
+const v1::ContactEvent* ContactHistory::findLastBegin(const Key& key, std::uint64_t tick) const {
+  const auto found = begins_.find(key);
+  if (found == begins_.end()) return nullptr;
+  const auto firstAfter = std::upper_bound(
       found->second.begin(), found->second.end(), tick,
       [](std::uint64_t wanted, const v1::ContactEvent& event) { return wanted < event.tick(); });
-  return after == found->second.begin() ? nullptr : &*std::prev(after);
+  return firstAfter == found->second.begin() ? nullptr : &*std::prev(firstAfter);
 }
 
-v1::TickEvents ContactHistory::livingIn(const scene::World& world) const {
+v1::TickEvents ContactHistory::activeContactsAt(const scene::World& world) const {
   const scene::Snapshot& snapshot = *world.snapshot();
-  v1::TickEvents living;
-  living.set_tick(snapshot.tick);
-  living.set_time(snapshot.time);
-  for (const scene::ContactEvent& contact : scene::livingContacts(world)) {
-    v1::ContactEvent event = messageOf(world, contact);
-    if (const auto* begun = lastBegun({event.kind(), event.a(), event.b()}, snapshot.tick)) {
-      *living.add_contacts() = *begun;
+  v1::TickEvents active;
+  active.set_tick(snapshot.tick);
+  active.set_time(snapshot.time);
+  for (const scene::ContactEvent& contact : scene::collectActiveContacts(world)) {
+    v1::ContactEvent event = toProto(world, contact);
+    if (const auto* beginEvent =
+            findLastBegin({event.kind(), event.a(), event.b()}, snapshot.tick)) {
+      *active.add_contacts() = *beginEvent;
     } else if (event.kind() == v1::ContactEvent::KIND_BEGIN) {
       event.set_tick(firstTick_);
-      event.set_time(static_cast<double>(firstTick_) * world.lengths().tick);
-      *living.add_contacts() = std::move(event);
+      event.set_time(static_cast<double>(firstTick_) * world.settings().tickDuration);
+      *active.add_contacts() = std::move(event);
     }
   }
-  return living;
+  return active;
 }
 
 }  // namespace enfilade::server

@@ -1,5 +1,5 @@
-// When the contacts of a recorded walk began. A world knows which contacts live in it, but not
-// since when; who begins in the middle of a recording tells it from here.
+// Start times of the contacts of a recorded run. A world knows its active contacts, but not when
+// they began. Playback from the middle of a recording takes these times from here.
 #pragma once
 
 #include <cstdint>
@@ -16,25 +16,24 @@ namespace enfilade::server {
 
 class ContactHistory {
  public:
-  /// Reads the run of the recording, up to `lastTick`, or to where it was cut off. Checks all bytes
-  /// that it reads. Throws protocol::mcap::RecordingError.
+  /// Reads run `run` of the recording up to `lastTick`, or up to its truncated end. Verifies all
+  /// bytes that it reads. Throws protocol::mcap::RecordingError.
   explicit ContactHistory(const std::filesystem::path& recording, std::uint32_t run = 1,
                           std::uint64_t lastTick = std::numeric_limits<std::uint64_t>::max());
 
-  /// What lives in `world`, which is that of a recorded tick: each contact as KIND_BEGIN, with the
-  /// tick at which it began, and as KIND_ENTER who is in a trigger. Branches that were recorded
-  /// before they told what lived at their beginning have their first tick for it, and no
-  /// KIND_ENTER.
-  v1::TickEvents livingIn(const scene::World& world) const;
+  /// The active contacts of `world`, which must be at a recorded tick. Each contact is a KIND_BEGIN
+  /// with the tick at which it began; each entity inside a trigger is a KIND_ENTER. Old recordings
+  /// of branches lack the initial contacts: these get the branch's first tick, and no KIND_ENTER.
+  v1::TickEvents activeContactsAt(const scene::World& world) const;
 
  private:
   using Key = std::tuple<v1::ContactEvent::Kind, std::uint32_t, std::uint32_t>;  ///< kind, a, b
 
-  void add(const v1::TickEvents& events);
-  const v1::ContactEvent* lastBegun(const Key& key, std::uint64_t tick) const;
+  void addBegins(const v1::TickEvents& events);
+  const v1::ContactEvent* findLastBegin(const Key& key, std::uint64_t tick) const;
 
   std::uint64_t firstTick_ = 0;
-  std::map<Key, std::vector<v1::ContactEvent>> begun_;  ///< ascending ticks
+  std::map<Key, std::vector<v1::ContactEvent>> begins_;  ///< ascending ticks
 };
 
 }  // namespace enfilade::server

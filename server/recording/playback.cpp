@@ -9,36 +9,36 @@ namespace enfilade::server {
 using protocol::mcap::RecordingError;
 
 Playback::Playback(const std::filesystem::path& recording, std::uint32_t run)
-    : file_(recording), run_(run), recording_(recording, run), beganAt_(recording_.firstTick()) {
+    : file_(recording), run_(run), recording_(recording, run), startTick_(recording_.firstTick()) {
   if (recording_.runs() > 1)
-    spdlog::info("{}: of the {} runs in it run {} is played", recording.string(), recording_.runs(),
+    spdlog::info("{}: the file has {} runs; playing run {}", recording.string(), recording_.runs(),
                  run);
 }
 
-/// From the nearest checkpoint that can be read; else from the beginning.
-scene::World Playback::nearestWorld(std::uint64_t tick,
-                                    const std::shared_ptr<const scene::Scene>& scene) {
+/// Restores the last checkpoint before `tick`; if it is unreadable, the start of the recording.
+scene::World Playback::restoreNearest(std::uint64_t tick,
+                                      const std::shared_ptr<const scene::Scene>& scene) {
   const auto checkpoint = recording_.checkpointBefore(tick);
   if (!checkpoint) {
     if (firstTick() > 0)
-      throw RecordingError(file_.string() +
-                           ": a branch without the checkpoint that it begins with");
-    return worldAtStart(scene, start());
+      throw RecordingError(file_.string() + ": the branch lacks its initial checkpoint");
+    return makeWorldAtStart(scene, start());
   }
   try {
-    beganAt_ = checkpoint->tick();
-    return worldAt(scene, *checkpoint);
+    startTick_ = checkpoint->tick();
+    return makeWorldFromCheckpoint(scene, *checkpoint);
   } catch (const scene::CheckpointError& error) {
     if (scene->hash() != start().scene().hash() || firstTick() > 0)
       throw RecordingError(file_.string() + ": " + error.what());
-    spdlog::warn("{}: {}; it is played from its beginning", file_.string(), error.what());
-    beganAt_ = firstTick();
-    return worldAtStart(scene, start());
+    spdlog::warn("{}: {}; playing from the beginning instead", file_.string(), error.what());
+    startTick_ = firstTick();
+    return makeWorldAtStart(scene, start());
   }
 }
 
-scene::World Playback::worldAfter(std::uint64_t tick, std::shared_ptr<const scene::Scene> scene,
-                                  const Tell& tell) {
+scene::World Playback::restoreWorldAfter(std::uint64_t tick,
+                                         std::shared_ptr<const scene::Scene> scene,
+                                         const ProgressHandler& onProgress) {
   if (tick < firstTick() || tick > lastTick())
     throw RecordingError(file_.string() + ": tick " + std::to_string(tick) +
                          " is not in it; give one from " + std::to_string(firstTick()) + " to " +
@@ -46,13 +46,13 @@ scene::World Playback::worldAfter(std::uint64_t tick, std::shared_ptr<const scen
                          (recording_.runs() > 1 ? ", or another run than " + std::to_string(run_) +
                                                       " of " + std::to_string(recording_.runs())
                                                 : ""));
-  beganAt_ = firstTick();
-  scene::World world = nearestWorld(tick, scene);
-  recording_.seek(beganAt_);
+  startTick_ = firstTick();
+  scene::World world = restoreNearest(tick, scene);
+  recording_.seek(startTick_);
   while (world.snapshot()->tick < tick) {
     if (!step(world))
       throw RecordingError(file_.string() + ": it ends before tick " + std::to_string(tick));
-    if (tell) tell(world.snapshot()->tick);
+    if (onProgress) onProgress(world.snapshot()->tick);
   }
   return world;
 }
@@ -63,28 +63,29 @@ bool Playback::readTick() {
     if (auto* commands = std::get_if<v1::RecordedCommands>(&*item))
       commands_.push_back(std::move(*commands));
     if (auto* state = std::get_if<v1::State>(&*item)) {
-      recorded_ = std::move(*state);
+      recordedState_ = std::move(*state);
       return true;
     }
   }
   return false;
 }
 
-bool Playback::feed(std::uint64_t next, const Submit& submit) {
+bool Playback::applyCommands(std::uint64_t next, const SubmitCommand& submit) {
   if (!readTick()) return false;
-  for (const v1::RecordedCommands& commands : commands_) take(next, commands, submit);
+  for (const v1::RecordedCommands& commands : commands_)
+    submitRecordedCommands(next, commands, submit);
   return true;
 }
 
-std::optional<protocol::StateDifference> Playback::judge(const scene::World& world) const {
-  return differenceFrom(world, recorded_);
+std::optional<protocol::StateDifference> Playback::verifyTick(const scene::World& world) const {
+  return compareState(world, recordedState_);
 }
 
 bool Playback::step(scene::World& world) {
   if (!readTick()) return false;
-  for (const v1::RecordedCommands& commands : commands_) take(world, commands);
-  scene::tick(world);
-  if (auto difference = judge(world)) throw Diverged{world.snapshot()->tick, *difference};
+  for (const v1::RecordedCommands& commands : commands_) applyRecordedCommands(world, commands);
+  scene::tickWorld(world);
+  if (auto difference = verifyTick(world)) throw Divergence{world.snapshot()->tick, *difference};
   return true;
 }
 

@@ -1,4 +1,4 @@
-// A run of a recording, played from any tick on.
+// Plays one run of a recording from any tick.
 #pragma once
 
 #include <vector>
@@ -20,36 +20,37 @@ class Playback {
   std::uint64_t lastTick() const { return recording_.lastTick(); }
   bool closed() const { return recording_.closed(); }
 
-  /// Told now and then on a long way: the tick that was made.
-  using Tell = std::function<void(std::uint64_t)>;
-  /// The world after `tick`, made from the nearest checkpoint; feed() goes on from there. Throws
-  /// RecordingError where the recording does not have that tick, and Diverged.
-  scene::World worldAfter(std::uint64_t tick, std::shared_ptr<const scene::Scene> scene,
-                          const Tell& tell = {});
-  /// What worldAfter() began with: the tick of a checkpoint, or firstTick().
-  std::uint64_t beganAt() const { return beganAt_; }
+  /// Receives each tick that a long restore has computed.
+  using ProgressHandler = std::function<void(std::uint64_t)>;
+  /// Restores the world after `tick`, from the nearest checkpoint; applyCommands() continues there.
+  /// Throws RecordingError if the recording lacks that tick, and Divergence.
+  scene::World restoreWorldAfter(std::uint64_t tick, std::shared_ptr<const scene::Scene> scene,
+                                 const ProgressHandler& onProgress = {});
+  /// The tick from which restoreWorldAfter() started: a checkpoint's tick, or firstTick().
+  std::uint64_t startTick() const { return startTick_; }
 
-  /// feed() goes on with what was recorded after `tick`.
+  /// applyCommands() continues with the tick after `tick`.
   void resume(std::uint64_t tick) { recording_.seek(tick); }
-  /// Gives `submit` what the world was told before tick `next`; false, and nothing is given, at the
-  /// recording's end. Throws Diverged where the world does not take it; RecordingError before
-  /// anything is given.
-  bool feed(std::uint64_t next, const Submit& submit);
-  /// After that tick: how it differs from the recorded one; nullopt: not.
-  std::optional<protocol::StateDifference> judge(const scene::World& world) const;
-  /// feed(), the tick, judge(); throws Diverged. False at the end.
+  /// Passes the recorded commands of tick `next` to `submit`. Returns false at the end of the
+  /// recording. Throws Divergence if the world refuses a command. Throws RecordingError before the
+  /// first command is passed.
+  bool applyCommands(std::uint64_t next, const SubmitCommand& submit);
+  /// Compares `world` with the recorded state of that tick; nullopt: equal.
+  std::optional<protocol::StateDifference> verifyTick(const scene::World& world) const;
+  /// Applies the commands, runs the tick and verifies it. Throws Divergence. Returns false at the
+  /// end of the recording.
   bool step(scene::World& world);
 
  private:
-  scene::World nearestWorld(std::uint64_t tick, const std::shared_ptr<const scene::Scene>& scene);
+  scene::World restoreNearest(std::uint64_t tick, const std::shared_ptr<const scene::Scene>& scene);
   bool readTick();
 
   std::filesystem::path file_;
   std::uint32_t run_;
   protocol::SeekableRecording recording_;
-  std::uint64_t beganAt_ = 0;
-  std::vector<v1::RecordedCommands> commands_;  ///< before the tick that is fed
-  v1::State recorded_;                          ///< after it
+  std::uint64_t startTick_ = 0;
+  std::vector<v1::RecordedCommands> commands_;  ///< of the current tick
+  v1::State recordedState_;                     ///< after the current tick
 };
 
 }  // namespace enfilade::server

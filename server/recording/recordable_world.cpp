@@ -1,97 +1,104 @@
 #include "server/recording/recordable_world.hpp"
 
+#include "collision/assert.hpp"
 #include "server/messages/body_messages.hpp"
+#include "server/messages/order_messages.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
 namespace {
 
-v1::TickEvents eventsOf(const scene::World& world, const std::vector<scene::ContactEvent>& contacts,
-                        const std::vector<scene::Notice>& notices) {
+v1::TickEvents makeTickEvents(const scene::World& world,
+                              const std::vector<scene::ContactEvent>& contacts,
+                              const std::vector<scene::Notice>& notices) {
   const scene::Snapshot& snapshot = *world.snapshot();
   v1::TickEvents events;
   events.set_tick(snapshot.tick);
   events.set_time(snapshot.time);
-  for (const scene::ContactEvent& event : contacts)
-    *events.add_contacts() = messageOf(world, event);
+  for (const scene::ContactEvent& event : contacts) *events.add_contacts() = toProto(world, event);
   for (const scene::Notice& notice : notices)
-    *events.add_notices() = messageOf(world, notice, snapshot.tick);
+    *events.add_notices() = toProto(world, notice, snapshot.tick);
   return events;
 }
 
-std::vector<scene::Notice> everyoneLeaves(const scene::Snapshot& snapshot, const std::string& why) {
-  std::vector<scene::Notice> left;
-  for (const scene::AvatarView& avatar : snapshot.avatars) {
+std::vector<scene::Notice> makeLeaveNotices(const scene::Snapshot& snapshot,
+                                            const std::string& reason) {
+  std::vector<scene::Notice> notices;
+  for (const scene::AvatarSnapshot& avatar : snapshot.avatars) {
     scene::Notice notice;
     notice.kind = scene::Notice::Kind::left;
     notice.avatar = avatar.name;
     notice.id = avatar.id;
-    notice.position = avatar.feet;
-    notice.text = why;
-    left.push_back(std::move(notice));
+    notice.position = avatar.footPosition;
+    notice.text = reason;
+    notices.push_back(std::move(notice));
   }
-  return left;
+  return notices;
 }
 
 }  // namespace
 
-RecordedWorld::RecordedWorld(scene::World world) : world_(std::move(world)) {}
+RecordableWorld::RecordableWorld(scene::World world) : world_(std::move(world)) {}
 
-void RecordedWorld::record(const RecordingOptions& options, const BranchPoint* branch) {
+void RecordableWorld::record(const RecordingOptions& options, const BranchPoint* branch) {
+  ENFILADE_ASSERT(!recorder_);
   recorder_ = std::make_unique<WorldRecorder>(options, world_, branch);
 }
 
-std::optional<v1::Error> RecordedWorld::submit(const v1::Command& command) {
-  std::variant<scene::Command, v1::Error> order = commandFrom(command);
+std::optional<v1::Error> RecordableWorld::submit(const v1::Command& command) {
+  std::variant<scene::Command, v1::Error> order = commandFromProto(command);
   if (auto* error = std::get_if<v1::Error>(&order)) return std::move(*error);
-  if (const auto refused = scene::submit(world_, std::get<scene::Command>(std::move(order))))
-    return refusalOf(command, *refused);
-  if (recorder_) recorder_->took(command);
+  if (const auto refusal =
+          scene::submitAvatarCommand(world_, std::get<scene::Command>(std::move(order))))
+    return makeRefusalError(command, *refusal);
+  if (recorder_) recorder_->onCommand(command);
   return std::nullopt;
 }
 
-std::optional<v1::Error> RecordedWorld::submit(const v1::BodyCommand& command) {
-  auto refused = server::submit(world_, command);
-  if (!refused && recorder_) recorder_->took(command);
-  return refused;
+std::optional<v1::Error> RecordableWorld::submit(const v1::BodyCommand& command) {
+  auto refusal = server::submitBodyCommand(world_, command);
+  if (!refusal && recorder_) recorder_->onBodyCommand(command);
+  return refusal;
 }
 
-/// What a tick was told that fails for a fault of ours is the first that is asked for: it is kept.
-scene::TickReport RecordedWorld::tickOrKeepCommands() {
+/// Runs a tick. If it throws (an internal error), its commands are saved for reproduction.
+scene::TickReport RecordableWorld::tickOrSaveCommands() {
   try {
-    return scene::tick(world_);
+    return scene::tickWorld(world_);
   } catch (...) {
-    if (recorder_) recorder_->tickFailed(world_);
+    if (recorder_) recorder_->onTickFailed(world_);
     throw;
   }
 }
 
-RecordedWorld::Ticked RecordedWorld::tick() {
-  Ticked ticked{tickOrKeepCommands(), {}};
-  ticked.events = eventsOf(world_, ticked.report.contacts, ticked.report.notices);
-  if (recorder_) recorder_->ticked(world_, ticked.events);
-  return ticked;
+RecordableWorld::TickResult RecordableWorld::tick() {
+  TickResult result{tickOrSaveCommands(), {}};
+  result.events = makeTickEvents(world_, result.report.contacts, result.report.notices);
+  if (recorder_) recorder_->onTick(world_, result.events);
+  return result;
 }
 
-v1::TickEvents RecordedWorld::end(v1::ContactEvent::Reason reason, const std::string& left) {
-  const auto ended = scene::endContacts(world_, scene::ContactEvent::Reason::shutdown);
-  const auto leaving =
-      left.empty() ? std::vector<scene::Notice>() : everyoneLeaves(*world_.snapshot(), left);
-  v1::TickEvents events = eventsOf(world_, ended, leaving);
+v1::TickEvents RecordableWorld::endContacts(v1::ContactEvent::Reason reason,
+                                            const std::string& leaveReason) {
+  const auto ended = scene::endAllContacts(world_, scene::ContactEvent::Reason::shutdown);
+  const auto leaveNotices = leaveReason.empty() ? std::vector<scene::Notice>()
+                                                : makeLeaveNotices(*world_.snapshot(), leaveReason);
+  v1::TickEvents events = makeTickEvents(world_, ended, leaveNotices);
   for (v1::ContactEvent& event : *events.mutable_contacts())
     if (event.reason() == v1::ContactEvent::REASON_SHUTDOWN) event.set_reason(reason);
-  if (recorder_) recorder_->told(events);
+  if (recorder_) recorder_->onEvents(events);
   return events;
 }
 
-void RecordedWorld::beginAnew(scene::World world) {
+void RecordableWorld::reset(scene::World world) {
+  ENFILADE_ASSERT(world.snapshot()->tick == 0);
   world_ = std::move(world);
-  if (recorder_) recorder_->beganAnew(world_);
+  if (recorder_) recorder_->onReset(world_);
 }
 
-void RecordedWorld::goOnWith(scene::World world) {
+void RecordableWorld::switchTo(scene::World world) {
   world_ = std::move(world);
-  if (recorder_ && recorder_->close()) broke_ = true;
+  if (recorder_ && recorder_->close()) recordingFailed_ = true;
   recorder_.reset();
 }
 

@@ -1,5 +1,5 @@
-// A world behind the one door through which it is told anything: whatever passes is written down if
-// the world is recorded, so that nothing can reach it that its recording does not tell.
+// A world with a single entry point for all commands. If the world is recorded, every command that
+// reaches it is in the recording.
 #pragma once
 
 #include <memory>
@@ -8,50 +8,53 @@
 
 namespace enfilade::server {
 
-class RecordedWorld {
+/// A scene::World with an optional recorder.
+class RecordableWorld {
  public:
-  explicit RecordedWorld(scene::World world);
+  explicit RecordableWorld(scene::World world);
 
-  /// From now on all is written down: from before the first command and tick, or, of a `branch`,
-  /// from where it leaves another recording. Throws protocol::mcap::RecordingError.
+  /// Starts recording. Call it before the first command and tick, or, with `branch`, where the
+  /// world leaves another recording. Throws protocol::mcap::RecordingError.
   void record(const RecordingOptions& options, const BranchPoint* branch = nullptr);
 
-  /// To look at; who tells the world something uses the functions below.
+  /// Read access; changes go through the functions below.
   operator const scene::World&() const { return world_; }
   const scene::Scene& scene() const { return world_.scene(); }
-  const scene::Lengths& lengths() const { return world_.lengths(); }
+  const scene::WorldSettings& settings() const { return world_.settings(); }
   std::shared_ptr<const scene::Snapshot> snapshot() const { return world_.snapshot(); }
 
-  /// Hands an order to the next tick, or says why it cannot be taken.
+  /// Submits a command for the next tick. Returns the refusal; nullopt: accepted.
   std::optional<v1::Error> submit(const v1::Command& command);
   std::optional<v1::Error> submit(const v1::BodyCommand& command);
 
-  struct Ticked {
+  struct TickResult {
     scene::TickReport report;
     v1::TickEvents events;  ///< the report's contacts and notices
   };
-  Ticked tick();
+  TickResult tick();
 
-  /// Ends all contacts, which is told for `reason`, and everyone leaves, if `left` says why. The
-  /// world is not ticked after this.
-  v1::TickEvents end(v1::ContactEvent::Reason reason, const std::string& left = {});
-  /// Another world in its place: the same scene at its beginning.
-  void beginAnew(scene::World world);
-  /// Another world of the same scene in its place, which is not recorded: a recording ends here.
-  void goOnWith(scene::World world);
+  /// Ends all contacts with `reason`. If `leaveReason` is not empty, all avatars leave for that
+  /// reason. Returns these events. Do not tick the world afterwards.
+  v1::TickEvents endContacts(v1::ContactEvent::Reason reason, const std::string& leaveReason = {});
+  /// Replaces the world by one at tick 0 of the same scene; the recording continues with a new run.
+  void reset(scene::World world);
+  /// Replaces the world by another one of the same scene and ends the recording.
+  void switchTo(scene::World world);
 
-  /// Null when it is not recorded.
+  /// Null if the world is not recorded.
   WorldRecorder* recorder() { return recorder_.get(); }
   const WorldRecorder* recorder() const { return recorder_.get(); }
-  /// Whether what was to be recorded is, so far.
-  bool recordedAll() const { return !broke_ && !(recorder_ && recorder_->broken()); }
+  /// Whether no recording has failed so far.
+  bool isRecordingComplete() const {
+    return !recordingFailed_ && !(recorder_ && recorder_->isBroken());
+  }
 
  private:
-  scene::TickReport tickOrKeepCommands();
+  scene::TickReport tickOrSaveCommands();
 
   scene::World world_;
   std::unique_ptr<WorldRecorder> recorder_;
-  bool broke_ = false;  ///< a recording that ended is not whole
+  bool recordingFailed_ = false;  ///< an earlier recording is incomplete
 };
 
 }  // namespace enfilade::server

@@ -1,5 +1,7 @@
 #include "server/recording/replay_check.hpp"
 
+#include "collision/assert.hpp"
+
 namespace enfilade::server {
 
 using protocol::mcap::RecordingError;
@@ -10,71 +12,74 @@ Replay::Replay(const std::filesystem::path& recording, std::uint32_t run,
       contacts_(recording, run),
       scene_(std::move(scene)),
       auditEvery_(auditEvery),
-      at_(playback_.firstTick()) {}
+      tick_(playback_.firstTick()) {}
 
-scene::World Replay::seek(std::uint64_t tick, const Playback::Tell& tell) {
+scene::World Replay::seek(std::uint64_t tick, const Playback::ProgressHandler& onProgress) {
   try {
-    scene::World world = playback_.worldAfter(tick, scene_, tell);
-    scene::auditBroadPhase(world, auditEvery_);
-    at_ = tick;
-    branchedAt_.reset();
-    stopped_.clear();
+    scene::World world = playback_.restoreWorldAfter(tick, scene_, onProgress);
+    scene::setAuditInterval(world, auditEvery_);
+    tick_ = tick;
+    branchTick_.reset();
+    stopReason_.clear();
     return world;
   } catch (...) {
-    playback_.resume(at_);
+    playback_.resume(tick_);
     throw;
   }
 }
 
 void Replay::branch() {
-  branchedAt_ = at_;
-  stopped_.clear();
+  ENFILADE_ASSERT(!branchTick_);
+  branchTick_ = tick_;
+  stopReason_.clear();
 }
 
 v1::RecordingParent Replay::parent() const {
   v1::RecordingParent parent;
   parent.set_file(std::filesystem::absolute(file()).string());
-  parent.set_tick(at_);
+  parent.set_tick(tick_);
   parent.set_run(playback_.run());
   return parent;
 }
 
-std::optional<RecordedWorld::Ticked> Replay::tick(RecordedWorld& world) {
-  if (branchedAt_) return world.tick();
-  if (atEnd() || !stopped_.empty()) return std::nullopt;
-  std::string why;
+std::optional<RecordableWorld::TickResult> Replay::tick(RecordableWorld& world) {
+  if (branchTick_) return world.tick();
+  if (atEnd() || !stopReason_.empty()) return std::nullopt;
+  std::string reason;
   try {
-    if (auto ticked = recordedTick(world)) return ticked;
-    why = "the recording ends before tick " + std::to_string(at_ + 1);
-  } catch (const Diverged& diverged) {
-    why = textOf(diverged);
-    // Whether a tick is as recorded is known when it is made: the world before it is made again.
-    world.goOnWith(madeAgain());
+    if (auto result = replayTick(world)) return result;
+    reason = "the recording ends before tick " + std::to_string(tick_ + 1);
+  } catch (const Divergence& divergence) {
+    reason = formatDivergence(divergence);
+    // A divergence is known only after the tick: restore the world before it.
+    world.switchTo(restoreWorld());
   } catch (const RecordingError& error) {
-    why = error.what();
+    reason = error.what();
   }
-  stopped_ = why;
+  stopReason_ = reason;
   return std::nullopt;
 }
 
-scene::World Replay::madeAgain() {
+scene::World Replay::restoreWorld() {
   try {
-    return seek(at_);
-  } catch (const Diverged& diverged) {
-    throw RecordingError(file().string() + ": " + textOf(diverged));
+    return seek(tick_);
+  } catch (const Divergence& divergence) {
+    throw RecordingError(file().string() + ": " + formatDivergence(divergence));
   }
 }
 
-/// nullopt: none is there to be read. Throws Diverged, the tick being made or not.
-std::optional<RecordedWorld::Ticked> Replay::recordedTick(RecordedWorld& world) {
+/// Runs the next recorded tick; nullopt: no further tick is readable. Throws Divergence, possibly
+/// after the tick.
+std::optional<RecordableWorld::TickResult> Replay::replayTick(RecordableWorld& world) {
   const auto submit = [&world](const v1::RecordedCommands::One& one) {
     return one.has_body() ? world.submit(one.body()) : world.submit(one.avatar());
   };
-  if (!playback_.feed(at_ + 1, submit)) return std::nullopt;
-  RecordedWorld::Ticked ticked = world.tick();
-  if (auto difference = playback_.judge(world)) throw Diverged{at_ + 1, std::move(*difference)};
-  ++at_;
-  return ticked;
+  if (!playback_.applyCommands(tick_ + 1, submit)) return std::nullopt;
+  RecordableWorld::TickResult result = world.tick();
+  if (auto difference = playback_.verifyTick(world))
+    throw Divergence{tick_ + 1, std::move(*difference)};
+  ++tick_;
+  return result;
 }
 
 }  // namespace enfilade::server

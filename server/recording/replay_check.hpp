@@ -1,4 +1,4 @@
-// A recording that clients play tick by tick, seek in, and leave for a branch.
+// A recording that clients replay tick by tick, with seeking and branching. Each tick is verified.
 #pragma once
 
 #include "server/recording/contact_history.hpp"
@@ -9,8 +9,7 @@ namespace enfilade::server {
 
 class Replay {
  public:
-  /// Reads all of the recording's run once, for its contacts. Throws
-  /// protocol::mcap::RecordingError.
+  /// Reads the whole run once to collect its contacts. Throws protocol::mcap::RecordingError.
   Replay(const std::filesystem::path& recording, std::uint32_t run,
          std::shared_ptr<const scene::Scene> scene, std::uint32_t auditEvery);
 
@@ -18,40 +17,41 @@ class Replay {
   std::uint64_t firstTick() const { return playback_.firstTick(); }
   std::uint64_t lastTick() const { return playback_.lastTick(); }
 
-  /// The world after a recorded tick, with which it goes on: no longer branched. Throws Diverged,
-  /// RecordingError, and what `tell` throws: then it stands as before.
-  scene::World seek(std::uint64_t tick, const Playback::Tell& tell = {});
-  /// As ContactHistory's, of a world that is not branched.
-  v1::TickEvents livingIn(const scene::World& world) const { return contacts_.livingIn(world); }
+  /// Returns the world after a recorded tick and continues there, unbranched. Throws Divergence,
+  /// RecordingError, and exceptions of `onProgress`; the replay is unchanged then.
+  scene::World seek(std::uint64_t tick, const Playback::ProgressHandler& onProgress = {});
+  /// Like ContactHistory::activeContactsAt(). `world` must not be branched.
+  v1::TickEvents activeContactsAt(const scene::World& world) const {
+    return contacts_.activeContactsAt(world);
+  }
 
-  /// The next tick of `world`, which seek() gave: the recorded one, or, once it is branched, its
-  /// own. nullopt: there is none; whyStopped() tells, and the world stands after the last that was
-  /// as recorded. Throws RecordingError where it cannot be brought back there.
-  std::optional<RecordedWorld::Ticked> tick(RecordedWorld& world);
-  /// Nothing more is recorded.
-  bool atEnd() const { return !branchedAt_ && at_ == lastTick(); }
-  /// What is wrong with the next tick; empty: nothing.
-  const std::string& whyStopped() const { return stopped_; }
+  /// Runs the next tick of `world`, which seek() returned: the recorded tick, or a free one after
+  /// branch(). nullopt: the replay has stopped (stopReason()), and the world is after the last tick
+  /// that matched. Throws RecordingError if that world cannot be restored.
+  std::optional<RecordableWorld::TickResult> tick(RecordableWorld& world);
+  /// Whether the last recorded tick was replayed.
+  bool atEnd() const { return !branchTick_ && tick_ == lastTick(); }
+  /// The error in the next tick; empty: no error.
+  const std::string& stopReason() const { return stopReason_; }
 
-  /// From now on the world goes its own way.
+  /// Leaves the recording: later ticks are free.
   void branch();
-  std::optional<std::uint64_t> branchedAt() const {
-    return branchedAt_;
-  }  ///< the last recorded tick
-  /// Where a branch left, for its recording.
+  /// The last recorded tick before the branch; nullopt: not branched.
+  std::optional<std::uint64_t> branchTick() const { return branchTick_; }
+  /// The branch point, for the recording of the branch.
   v1::RecordingParent parent() const;
 
  private:
-  std::optional<RecordedWorld::Ticked> recordedTick(RecordedWorld& world);
-  scene::World madeAgain();
+  std::optional<RecordableWorld::TickResult> replayTick(RecordableWorld& world);
+  scene::World restoreWorld();
 
   Playback playback_;
   ContactHistory contacts_;
   std::shared_ptr<const scene::Scene> scene_;
   std::uint32_t auditEvery_;  ///< ticks; 0: never
-  std::uint64_t at_ = 0;      ///< the last recorded tick that was made
-  std::optional<std::uint64_t> branchedAt_;
-  std::string stopped_;
+  std::uint64_t tick_ = 0;    ///< the last recorded tick that was replayed
+  std::optional<std::uint64_t> branchTick_;
+  std::string stopReason_;
 };
 
 }  // namespace enfilade::server

@@ -2,6 +2,7 @@
 
 #include "scene/world/checkpoint/checkpoint.hpp"
 #include "server/messages/body_messages.hpp"
+#include "server/messages/order_messages.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/recording/world_recorder.hpp"
 
@@ -10,92 +11,100 @@ namespace {
 
 using protocol::mcap::RecordingError;
 
-[[noreturn]] void hashDiffers(std::uint64_t tick, const char* who, std::uint64_t recorded,
-                              std::uint64_t replayed) {
-  throw Diverged{tick,
-                 {who, std::string(who) == kTheScene ? "hash" : "state hash",
-                  protocol::hexadecimal(recorded), protocol::hexadecimal(replayed)}};
+[[noreturn]] void throwHashDivergence(std::uint64_t tick, const char* subject,
+                                      std::uint64_t recorded, std::uint64_t replayed) {
+  throw Divergence{tick,
+                   {subject, std::string(subject) == kSceneSubject ? "hash" : "state hash",
+                    protocol::toHex(recorded), protocol::toHex(replayed)}};
 }
 
-std::optional<v1::Error> submit(scene::World& world, const v1::RecordedCommands::One& one) {
-  if (one.has_body()) return server::submit(world, one.body());
-  auto command = commandFrom(one.avatar());
+std::optional<v1::Error> submitRecorded(scene::World& world,
+                                        const v1::RecordedCommands::One& recordedCommand) {
+  if (recordedCommand.has_body()) return server::submitBodyCommand(world, recordedCommand.body());
+  auto command = commandFromProto(recordedCommand.avatar());
   if (auto* error = std::get_if<v1::Error>(&command)) return *error;
-  if (auto why = scene::submit(world, std::get<scene::Command>(std::move(command))))
-    return refusalOf(one.avatar(), *why);
+  if (auto reason = scene::submitAvatarCommand(world, std::get<scene::Command>(std::move(command))))
+    return makeRefusalError(recordedCommand.avatar(), *reason);
   return std::nullopt;
 }
 
 }  // namespace
 
-ModelOptions recordedModel(const v1::RecordingStart& start, const std::filesystem::path& scene,
-                           bool cache) {
-  ModelOptions model = modelOptionsFrom(start.choices());
+ModelOptions makeRecordedModelOptions(const v1::RecordingStart& start,
+                                      const std::filesystem::path& scene, bool cache) {
+  ModelOptions model = modelOptionsFromProto(start.choices());
   model.file = scene.empty() ? std::filesystem::path(start.scene_file()) : scene;
   model.cache = cache;
   if (!std::filesystem::exists(model.file))
     throw RecordingError(model.file.string() +
-                         ": the recorded scene is not there; name it before the recording: "
+                         ": the recorded scene does not exist; give it before the recording: "
                          "SCENE RECORDING");
   return model;
 }
 
-scene::World worldAtStart(std::shared_ptr<const scene::Scene> scene,
-                          const v1::RecordingStart& start) {
-  const auto lengths = lengthsFrom(start.lengths());
-  if (!lengths) throw RecordingError("the recording has lengths that no world can have");
-  const std::uint64_t hash = messageOf(*scene).hash();
-  if (hash != start.scene().hash()) hashDiffers(0, kTheScene, start.scene().hash(), hash);
-  scene::World world(std::move(scene), *lengths);
+scene::World makeWorldAtStart(std::shared_ptr<const scene::Scene> scene,
+                              const v1::RecordingStart& start) {
+  const auto settings = settingsFromProto(start.lengths());
+  if (!settings) throw RecordingError("the recording has invalid world settings");
+  const std::uint64_t hash = toProto(*scene).hash();
+  if (hash != start.scene().hash())
+    throwHashDivergence(0, kSceneSubject, start.scene().hash(), hash);
+  scene::World world(std::move(scene), *settings);
   const std::uint64_t state = world.snapshot()->stateHash;
-  if (state != start.state_hash()) hashDiffers(0, "the world", start.state_hash(), state);
+  if (state != start.state_hash()) throwHashDivergence(0, "the world", start.state_hash(), state);
   return world;
 }
 
-scene::World worldAt(std::shared_ptr<const scene::Scene> scene,
-                     const v1::RecordedCheckpoint& checkpoint) {
+scene::World makeWorldFromCheckpoint(std::shared_ptr<const scene::Scene> scene,
+                                     const v1::RecordedCheckpoint& checkpoint) {
   const std::string& bytes = checkpoint.world();
-  scene::World world = scene::worldFrom(
+  scene::World world = scene::restoreWorld(
       std::move(scene), {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
   const scene::Snapshot& snapshot = *world.snapshot();
   if (snapshot.tick != checkpoint.tick() || snapshot.stateHash != checkpoint.state_hash())
-    hashDiffers(checkpoint.tick(), "the checkpoint", checkpoint.state_hash(), snapshot.stateHash);
+    throwHashDivergence(checkpoint.tick(), "the checkpoint", checkpoint.state_hash(),
+                        snapshot.stateHash);
   return world;
 }
 
-void take(std::uint64_t next, const v1::RecordedCommands& commands, const Submit& submit) {
+void submitRecordedCommands(std::uint64_t next, const v1::RecordedCommands& commands,
+                            const SubmitCommand& submit) {
   if (commands.tick() != next)
     throw RecordingError("commands of tick " + std::to_string(commands.tick()) +
-                         " stand before tick " + std::to_string(next));
-  for (const auto& one : commands.commands())
-    if (const auto refused = submit(one))
-      throw Diverged{next,
-                     {one.has_body() ? one.body().body() : one.avatar().avatar(), "command",
-                      "taken", "refused: " + refused->message()}};
+                         " found before tick " + std::to_string(next));
+  for (const auto& recordedCommand : commands.commands())
+    if (const auto refusal = submit(recordedCommand))
+      throw Divergence{next,
+                       {recordedCommand.has_body() ? recordedCommand.body().body()
+                                                   : recordedCommand.avatar().avatar(),
+                        "command", "accepted", "refused: " + refusal->message()}};
 }
 
-void take(scene::World& world, const v1::RecordedCommands& commands) {
-  take(world.snapshot()->tick + 1, commands,
-       [&](const v1::RecordedCommands::One& one) { return submit(world, one); });
+void applyRecordedCommands(scene::World& world, const v1::RecordedCommands& commands) {
+  submitRecordedCommands(world.snapshot()->tick + 1, commands,
+                         [&](const v1::RecordedCommands::One& recordedCommand) {
+                           return submitRecorded(world, recordedCommand);
+                         });
 }
 
-std::optional<protocol::StateDifference> differenceFrom(const scene::World& world,
-                                                        const v1::State& recorded) {
-  // Only what differs is worth a message.
+std::optional<protocol::StateDifference> compareState(const scene::World& world,
+                                                      const v1::State& recorded) {
+  // Equal hashes: skip building the message.
   const scene::Snapshot& snapshot = *world.snapshot();
   if (snapshot.stateHash == recorded.hash() && snapshot.tick == recorded.tick())
     return std::nullopt;
-  v1::State made;
-  fill(made, world);
-  auto found = protocol::firstDifference(recorded, made);
+  v1::State replayed;
+  fillState(replayed, world);
+  auto found = protocol::findFirstDifference(recorded, replayed);
   if (!found) found = {"the world", "tick", std::to_string(recorded.tick()), ""};
   return found;
 }
 
-std::string textOf(const Diverged& diverged) {
-  const protocol::StateDifference& what = diverged.difference;
-  return "tick " + std::to_string(diverged.tick) + ": " + what.who + ": " + what.field +
-         ": recorded " + what.recorded + ", replayed " + what.replayed;
+std::string formatDivergence(const Divergence& divergence) {
+  const protocol::StateDifference& difference = divergence.difference;
+  return "tick " + std::to_string(divergence.tick) + ": " + difference.entity + ": " +
+         difference.field + ": recorded " + difference.recorded + ", replayed " +
+         difference.replayed;
 }
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// A recorded world that is made again, tick by tick, and compared with what was recorded.
+// Restores worlds from recordings, applies recorded commands, and compares states.
 #pragma once
 
 #include <filesystem>
@@ -8,46 +8,47 @@
 
 #include "protocol/recording/recording.hpp"
 #include "scene/world/world.hpp"
-#include "server/app/command_line.hpp"
+#include "server/base/load_scene.hpp"
 
 namespace enfilade::server {
 
-/// StateDifference::who where it is the scene that is another one.
-inline constexpr const char* kTheScene = "the scene";
+/// StateDifference::entity if the scene differs.
+inline constexpr const char* kSceneSubject = "the scene";
 
-/// Thrown at the first tick that ends otherwise than it was recorded.
-struct Diverged {
+/// Thrown at the first tick whose state differs from the recording.
+struct Divergence {
   std::uint64_t tick = 0;
   protocol::StateDifference difference;
 };
 
-/// How the recorded scene is loaded; `scene`: in the place of the file that the recording names, if
-/// it is not empty. Throws protocol::mcap::RecordingError when there is no such file.
-ModelOptions recordedModel(const v1::RecordingStart& start, const std::filesystem::path& scene,
-                           bool cache);
+/// The options to load the recorded scene. `scene`, if not empty, replaces the file that the
+/// recording names. Throws protocol::mcap::RecordingError if the file does not exist.
+ModelOptions makeRecordedModelOptions(const v1::RecordingStart& start,
+                                      const std::filesystem::path& scene, bool cache);
 
-/// The world before its first tick. Throws Diverged where the scene or the lengths make another
-/// one, RecordingError where no world can be so. Not for the start of a branch.
-scene::World worldAtStart(std::shared_ptr<const scene::Scene> scene,
-                          const v1::RecordingStart& start);
-/// The world of a checkpoint. Throws scene::CheckpointError, or Diverged where it is not of the
-/// recorded tick and hash.
-scene::World worldAt(std::shared_ptr<const scene::Scene> scene,
-                     const v1::RecordedCheckpoint& checkpoint);
+/// The world before its first tick. Throws Divergence if the scene or the settings give another
+/// state, RecordingError if the settings are invalid. Not for the start of a branch.
+scene::World makeWorldAtStart(std::shared_ptr<const scene::Scene> scene,
+                              const v1::RecordingStart& start);
+/// The world of a checkpoint. Throws scene::CheckpointError; throws Divergence if tick or hash
+/// differ from the recorded ones.
+scene::World makeWorldFromCheckpoint(std::shared_ptr<const scene::Scene> scene,
+                                     const v1::RecordedCheckpoint& checkpoint);
 
-/// Hands a recorded command to a world; why that does not take it.
-using Submit = std::function<std::optional<v1::Error>(const v1::RecordedCommands::One&)>;
+/// Submits a recorded command to a world and returns its refusal; nullopt: accepted.
+using SubmitCommand = std::function<std::optional<v1::Error>(const v1::RecordedCommands::One&)>;
 
-/// Gives `submit` what the world was told before tick `next`. Throws Diverged where it is refused.
-void take(std::uint64_t next, const v1::RecordedCommands& commands, const Submit& submit);
-/// The same for the next tick of `world`.
-void take(scene::World& world, const v1::RecordedCommands& commands);
+/// Passes the commands of tick `next` to `submit`. Throws Divergence if one is refused.
+void submitRecordedCommands(std::uint64_t next, const v1::RecordedCommands& commands,
+                            const SubmitCommand& submit);
+/// Submits the commands to `world` for its next tick. Throws Divergence if one is refused.
+void applyRecordedCommands(scene::World& world, const v1::RecordedCommands& commands);
 
-/// How the last tick's state differs from the recorded one; nullopt: not.
-std::optional<protocol::StateDifference> differenceFrom(const scene::World& world,
-                                                        const v1::State& recorded);
+/// Compares the last tick's state with the recorded one; nullopt: equal.
+std::optional<protocol::StateDifference> compareState(const scene::World& world,
+                                                      const v1::State& recorded);
 
-/// For people: "tick 17: ann: feet.x: recorded 1, replayed 2".
-std::string textOf(const Diverged& diverged);
+/// Readable text: "tick 17: ann: feet.x: recorded 1, replayed 2".
+std::string formatDivergence(const Divergence& divergence);
 
 }  // namespace enfilade::server

@@ -4,12 +4,12 @@
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
-InProcessDriver::InProcessDriver(RecordedWorld& world, render::Renderer* renderer,
+InProcessDriver::InProcessDriver(RecordableWorld& world, render::RendererSelector* renderer,
                                  protocol::CaptureFormat format)
     : world_(world), renderer_(renderer), format_(std::move(format)) {}
 
 double InProcessDriver::tickSeconds() const {
-  return world_.lengths().tick;
+  return world_.settings().tickDuration;
 }
 
 std::optional<v1::Error> InProcessDriver::submit(const v1::Command& command) {
@@ -22,7 +22,7 @@ std::optional<v1::Error> InProcessDriver::submit(const v1::BodyCommand& command)
 
 protocol::StepOutcome InProcessDriver::step() {
   auto [report, events] = world_.tick();
-  statistics_.add(report);
+  statistics_.addTick(report);
   logFindings(world_, report);
   const scene::Snapshot& snapshot = *report.snapshot;
   protocol::StepOutcome outcome;
@@ -37,8 +37,8 @@ protocol::StepOutcome InProcessDriver::step() {
     if (outcome.notices.back().kind() == v1::Notice::KIND_CAPTURE)
       outcome.frames.push_back(capture(outcome.notices.back()));
   }
-  recordPictures();
-  for (const auto& avatar : snapshot.avatars) outcome.avatars.push_back(messageOf(world_, avatar));
+  recordImages();
+  for (const auto& avatar : snapshot.avatars) outcome.avatars.push_back(toProto(world_, avatar));
   return outcome;
 }
 
@@ -48,57 +48,57 @@ protocol::CapturedFrame InProcessDriver::capture(const v1::Notice& notice) {
   captured.avatar = notice.avatar();
   captured.tag = notice.tag();
   try {
-    protocol::ReceivedFrame taken = frame(protocol::captureRequest(notice, format_));
-    record(notice.avatar(), taken);
-    captured.description = std::move(taken.description);
-    captured.pixels = std::move(taken.pixels);
+    protocol::ReceivedFrame received = frame(protocol::makeCaptureRequest(notice, format_));
+    record(notice.avatar(), received);
+    captured.description = std::move(received.description);
+    captured.pixels = std::move(received.pixels);
   } catch (const protocol::ProtocolError& problem) {
     captured.error = problem.what();
   }
   return captured;
 }
 
-void InProcessDriver::record(const std::string& avatar, const protocol::ReceivedFrame& taken) {
+void InProcessDriver::record(const std::string& avatar, const protocol::ReceivedFrame& received) {
   WorldRecorder* recorder = world_.recorder();
-  if (!recorder || !recorder->takesPictures()) return;
-  if (const auto picture = encodedPicture(taken.description, taken.pixels))
-    recorder->picture(avatar, taken.description, *picture);
+  if (!recorder || !recorder->recordsImages()) return;
+  if (const auto picture = extractImage(received.description, received.pixels))
+    recorder->writeImage(avatar, received.description, *picture);
 }
 
-void InProcessDriver::recordPictures() {
-  if (!renderer_ || !world_.recorder() || !world_.recorder()->picturesDue(world_)) return;
-  for (const scene::AvatarView& avatar : world_.snapshot()->avatars)
-    record(avatar.name, frame(recordedView(avatar.name)));
+void InProcessDriver::recordImages() {
+  if (!renderer_ || !world_.recorder() || !world_.recorder()->areImagesDue(world_)) return;
+  for (const scene::AvatarSnapshot& avatar : world_.snapshot()->avatars)
+    record(avatar.name, frame(makeRecordedViewRequest(avatar.name)));
 }
 
 protocol::ReceivedFrame InProcessDriver::frame(const v1::FrameRequest& request) {
-  if (!renderer_) throw protocol::ProtocolError(v1::ERROR_NO_RENDERER, "there is no renderer");
+  if (!renderer_) throw protocol::ProtocolError(v1::ERROR_NO_RENDERER, "no renderer is available");
   const auto snapshot = world_.snapshot();
-  const std::variant<View, v1::Error> view = viewFrom(request, *snapshot);
+  const std::variant<FrameView, v1::Error> view = viewFromProto(request, *snapshot);
   if (const auto* error = std::get_if<v1::Error>(&view)) {
     throw protocol::ProtocolError(error->code(), error->message(), error->field());
   }
-  const View& usable = std::get<View>(view);
+  const FrameView& frameView = std::get<FrameView>(view);
   try {
-    const render::Frame drawn =
-        renderer_->render(*snapshot, usable.camera, usable.options, usable.renderer);
+    const render::Frame rendered =
+        renderer_->render(*snapshot, frameView.camera, frameView.options, frameView.renderer);
     ++frames_;
-    protocol::ReceivedFrame taken;
-    taken.description = messageOf(drawn, snapshot->time, request, taken.pixels);
-    return taken;
+    protocol::ReceivedFrame received;
+    received.description = toProto(rendered, snapshot->time, request, received.pixels);
+    return received;
   } catch (const render::RenderError& error) {
     throw protocol::ProtocolError(v1::ERROR_INTERNAL, error.what());
   }
 }
 
 v1::Metrics InProcessDriver::metrics() const {
-  v1::Metrics metrics = statistics_.metrics();
+  v1::Metrics metrics = statistics_.makeMetrics();
   metrics.set_frames(frames_);
   return metrics;
 }
 
 std::vector<v1::ContactEvent> InProcessDriver::endContacts() {
-  const v1::TickEvents ended = world_.end(v1::ContactEvent::REASON_SHUTDOWN);
+  const v1::TickEvents ended = world_.endContacts(v1::ContactEvent::REASON_SHUTDOWN);
   return {ended.contacts().begin(), ended.contacts().end()};
 }
 

@@ -1,8 +1,8 @@
-// Drives a script over a world in this process: as fast as it can, without sockets.
+// Runs a script on a world in this process, as fast as possible and without sockets.
 #pragma once
 
 #include "protocol/clients/cpp/socket_driver.hpp"
-#include "render/service/renderer.hpp"
+#include "render/service/renderer_selector.hpp"
 #include "server/messages/tick_statistics.hpp"
 #include "server/recording/recordable_world.hpp"
 
@@ -10,9 +10,9 @@ namespace enfilade::server {
 
 class InProcessDriver : public protocol::ScriptDriver {
  public:
-  /// `renderer` may be null: captures then have no picture. Both outlive the driver, which is used
-  /// on the renderer's thread.
-  InProcessDriver(RecordedWorld& world, render::Renderer* renderer,
+  /// `renderer` may be null: captures then have no picture. Both outlive the driver. Use it on the
+  /// renderer's thread.
+  InProcessDriver(RecordableWorld& world, render::RendererSelector* renderer,
                   protocol::CaptureFormat format = {});
 
   double tickSeconds() const override;
@@ -20,19 +20,19 @@ class InProcessDriver : public protocol::ScriptDriver {
   std::optional<v1::Error> submit(const v1::BodyCommand& command) override;
   protocol::StepOutcome step() override;
 
-  /// A picture of the last tick. Throws protocol::ProtocolError, as over a connection.
+  /// Renders the last tick. Throws protocol::ProtocolError, as a connection would.
   protocol::ReceivedFrame frame(const v1::FrameRequest& request);
   v1::Metrics metrics() const;
-  /// Ends what contacts live; the world is not ticked after this.
+  /// Ends all active contacts. The world must not be ticked afterwards.
   std::vector<v1::ContactEvent> endContacts();
 
  private:
   protocol::CapturedFrame capture(const v1::Notice& notice);
-  void record(const std::string& avatar, const protocol::ReceivedFrame& taken);
-  void recordPictures();
+  void record(const std::string& avatar, const protocol::ReceivedFrame& received);
+  void recordImages();
 
-  RecordedWorld& world_;
-  render::Renderer* renderer_;
+  RecordableWorld& world_;
+  render::RendererSelector* renderer_;
   protocol::CaptureFormat format_;
   TickStatistics statistics_;
   std::uint64_t frames_ = 0;

@@ -6,7 +6,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "collision/assert.hpp"
 #include "protocol/recording/recording.hpp"
+#include "render/image/atomic_file.hpp"
+#include "render/image/contact_sheet.hpp"
 #include "server/messages/event_names.hpp"
 #include "server/messages/world_messages.hpp"
 
@@ -16,21 +19,21 @@ using Json = nlohmann::ordered_json;
 namespace {
 
 constexpr int kSheetColumns = 4;
-/// Lists the pictures that walks wrote, one name a line: also those of a walk that was interrupted.
-constexpr const char* kWritten = "frames/.written";
+/// List of the written pictures, one name per line, also after an interruption.
+constexpr const char* kFrameListFile = "frames/.written";
 
-Json jsonOf(const v1::Vec3& v) {
+Json toJson(const v1::Vec3& v) {
   return Json::array({v.x(), v.y(), v.z()});
 }
 
-Json jsonOf(const v1::Audit& audit) {
+Json toJson(const v1::Audit& audit) {
   return {{"ticks", audit.ticks()},
           {"pairs", audit.pairs()},
           {"missed", audit.missed()},
           {"extra", audit.extra()}};
 }
 
-const char* outcomeWord(protocol::LineOutcome::Kind kind) {
+const char* getOutcomeName(protocol::LineOutcome::Kind kind) {
   using Kind = protocol::LineOutcome::Kind;
   switch (kind) {
     case Kind::refused:
@@ -48,10 +51,10 @@ const char* outcomeWord(protocol::LineOutcome::Kind kind) {
 }
 
 void writeText(const std::filesystem::path& file, const std::string& text) {
-  render::writeFileWhole(file, text.data(), text.size());
+  render::writeFileAtomically(file, text.data(), text.size());
 }
 
-render::Image imageOf(const v1::Frame& description, const std::vector<std::uint8_t>& pixels) {
+render::Image toImage(const v1::Frame& description, const std::vector<std::uint8_t>& pixels) {
   for (const v1::Plane& plane : description.planes()) {
     if (plane.channel() != v1::CHANNEL_RGB) continue;
     const auto from = pixels.begin() + static_cast<std::ptrdiff_t>(plane.offset());
@@ -62,10 +65,10 @@ render::Image imageOf(const v1::Frame& description, const std::vector<std::uint8
   return {};
 }
 
-Json outcomesOf(const protocol::ScriptResult& result) {
+Json outcomesToJson(const protocol::ScriptResult& result) {
   Json outcomes = Json::array();
   for (const protocol::LineOutcome& outcome : result.outcomes) {
-    outcomes.push_back({{"kind", outcomeWord(outcome.kind)},
+    outcomes.push_back({{"kind", getOutcomeName(outcome.kind)},
                         {"line", outcome.line},
                         {"tick", outcome.tick},
                         {"avatar", outcome.avatar},
@@ -74,12 +77,12 @@ Json outcomesOf(const protocol::ScriptResult& result) {
   return outcomes;
 }
 
-Json walkOf(const v1::Notice& notice) {
+Json walkToJson(const v1::Notice& notice) {
   Json walk{{"tick", notice.tick()},
             {"avatar", notice.avatar()},
             {"line", notice.tag()},
-            {"outcome", wordOf(notice.kind())},
-            {"position", jsonOf(notice.position())}};
+            {"outcome", toString(notice.kind())},
+            {"position", toJson(notice.position())}};
   if (!notice.obstacle_name().empty()) walk["obstacle"] = notice.obstacle_name();
   if (!notice.text().empty()) walk["text"] = notice.text();
   return walk;
@@ -87,89 +90,91 @@ Json walkOf(const v1::Notice& notice) {
 
 }  // namespace
 
-std::string contactLine(const v1::ContactEvent& event) {
+std::string formatContactLine(const v1::ContactEvent& event) {
   Json line{{"tick", event.tick()},
             {"time", event.time()},
-            {"event", wordOf(event.kind())},
+            {"event", toString(event.kind())},
             {"a", event.a_name()},
             {"b", event.b_name()},
-            {"verdict", wordOf(event.verdict())},
+            {"verdict", toString(event.verdict())},
             {"distance", event.distance()},
-            {"point_a", jsonOf(event.point_a())},
-            {"point_b", jsonOf(event.point_b())},
-            {"normal", jsonOf(event.normal())},
+            {"point_a", toJson(event.point_a())},
+            {"point_b", toJson(event.point_b())},
+            {"normal", toJson(event.normal())},
             {"decided_by", event.decided_by() == v1::DECIDED_BY_FILTER ? "filter" : "rational"}};
   if (event.kind() == v1::ContactEvent::KIND_END || event.kind() == v1::ContactEvent::KIND_LEAVE)
-    line["reason"] = wordOf(event.reason());
-  if (event.kind() == v1::ContactEvent::KIND_NEAR) line["phase"] = wordOf(event.phase());
+    line["reason"] = toString(event.reason());
+  if (event.kind() == v1::ContactEvent::KIND_NEAR) line["phase"] = toString(event.phase());
   if (event.feature_a() != v1::FEATURE_UNSPECIFIED) {
-    line["feature_a"] = wordOf(event.feature_a());
-    line["feature_b"] = wordOf(event.feature_b());
+    line["feature_a"] = toString(event.feature_a());
+    line["feature_b"] = toString(event.feature_b());
   }
-  // Names come from files: what is not UTF-8 in them is replaced, not thrown at the walker.
+  // Names come from files: bytes that are not UTF-8 are replaced and do not throw.
   return line.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-WalkReport::WalkReport(std::filesystem::path folder) : folder_(std::move(folder)) {
+RunReport::RunReport(std::filesystem::path folder) : folder_(std::move(folder)) {
   try {
     std::filesystem::create_directories(folder_ / "frames");
     const std::filesystem::path probe = folder_ / ".writable";
     writeText(probe, "");
     std::filesystem::remove(probe);
   } catch (const std::exception& error) {
-    throw ReportError("cannot write into " + folder_.string() + ": " + error.what() +
+    throw ReportError("cannot write to " + folder_.string() + ": " + error.what() +
                       "; give another folder with --out");
   }
 }
 
-void WalkReport::removeEarlier() {
+void RunReport::removePreviousRun() {
   try {
-    std::ifstream written(folder_ / kWritten);
+    std::ifstream written(folder_ / kFrameListFile);
     for (std::string name; std::getline(written, name);) {
       if (name.find('/') == std::string::npos) {
         std::filesystem::remove(folder_ / "frames" / (name + ".png"));
       }
     }
-    for (const char* file : {"contacts.jsonl", "summary.json", "sheet.png", "map.png", kWritten}) {
+    for (const char* file :
+         {"contacts.jsonl", "summary.json", "sheet.png", "map.png", kFrameListFile}) {
       std::filesystem::remove(folder_ / file);
     }
   } catch (const std::exception& error) {
-    throw ReportError("cannot remove an earlier walk from " + folder_.string() + ": " +
+    throw ReportError("cannot remove an earlier run from " + folder_.string() + ": " +
                       error.what() + "; give another folder with --out");
   }
 }
 
-void WalkReport::add(const protocol::StepOutcome& outcome) {
+void RunReport::add(const protocol::StepOutcome& outcome) {
   for (const v1::ContactEvent& event : outcome.contacts) addContact(event);
   for (const v1::Notice& notice : outcome.notices) addNotice(notice);
   for (const v1::AvatarState& avatar : outcome.avatars) {
-    const auto [found, isNew] = pathOf_.try_emplace(avatar.name(), trace_.paths.size());
+    const auto [found, isNew] = pathByAvatar_.try_emplace(avatar.name(), trace_.paths.size());
     if (isNew) trace_.paths.push_back({avatar.name(), {}, avatar.id()});
-    trace_.paths[found->second].feet.push_back(vectorFrom(avatar.feet()));
+    ENFILADE_ASSERT(found->second < trace_.paths.size());
+    trace_.paths[found->second].footPositions.push_back(vectorFromProto(avatar.feet()));
   }
   for (const protocol::CapturedFrame& frame : outcome.frames) addFrame(frame, outcome);
 }
 
-void WalkReport::addContact(const v1::ContactEvent& event) {
-  contactLines_ += contactLine(event) + "\n";
+void RunReport::addContact(const v1::ContactEvent& event) {
+  contactLines_ += formatContactLine(event) + "\n";
   if (event.kind() != v1::ContactEvent::KIND_BEGIN) return;
-  ++begun_;
-  trace_.contacts.push_back({vectorFrom(event.point_b()), vectorFrom(event.normal())});
+  ++contactsBegun_;
+  trace_.contacts.push_back({vectorFromProto(event.point_b()), vectorFromProto(event.normal())});
 }
 
-void WalkReport::addNotice(const v1::Notice& notice) {
+void RunReport::addNotice(const v1::Notice& notice) {
   const bool blocked = notice.kind() == v1::Notice::KIND_BLOCKED;
-  if (blocked) trace_.stops.push_back({vectorFrom(notice.position()), Vec3::UnitX()});
-  if (notice.kind() == v1::Notice::KIND_SPAWNED) present_.insert(notice.avatar());
-  if (notice.kind() == v1::Notice::KIND_LEFT) present_.erase(notice.avatar());
+  if (blocked) trace_.blockedWalks.push_back({vectorFromProto(notice.position()), Vec3::UnitX()});
+  if (notice.kind() == v1::Notice::KIND_SPAWNED) presentAvatars_.insert(notice.avatar());
+  if (notice.kind() == v1::Notice::KIND_LEFT) presentAvatars_.erase(notice.avatar());
   if (blocked || notice.kind() == v1::Notice::KIND_ARRIVED ||
       notice.kind() == v1::Notice::KIND_REFUSED || notice.kind() == v1::Notice::KIND_LEFT) {
     walks_.push_back(notice);
   }
 }
 
-/// A name that is taken a second time gets a number.
-std::string WalkReport::freeFrameName(const std::string& wanted) const {
+/// Makes a unique name: duplicates get a number.
+std::string RunReport::makeUniqueFrameName(const std::string& wanted) const {
   const auto taken = [this](const std::string& name) {
     return std::any_of(pictures_.begin(), pictures_.end(),
                        [&](const Picture& picture) { return picture.name == name; });
@@ -179,82 +184,87 @@ std::string WalkReport::freeFrameName(const std::string& wanted) const {
   return name;
 }
 
-void WalkReport::addFrame(const protocol::CapturedFrame& frame,
-                          const protocol::StepOutcome& outcome) {
-  if (!frame.error.empty()) return;  // told by the script's result
+void RunReport::addFrame(const protocol::CapturedFrame& frame,
+                         const protocol::StepOutcome& outcome) {
+  if (!frame.error.empty()) return;  // reported in the script's result
   Picture picture;
-  picture.name = freeFrameName(frame.name);
+  picture.name = makeUniqueFrameName(frame.name);
   picture.avatar = frame.avatar;
   picture.file = "frames/" + picture.name + ".png";
   picture.tick = outcome.tick;
-  picture.image = imageOf(frame.description, frame.pixels);
+  picture.image = toImage(frame.description, frame.pixels);
   for (const v1::AvatarState& avatar : outcome.avatars) {
-    if (avatar.name() == frame.avatar) picture.feet = vectorFrom(avatar.feet());
+    if (avatar.name() == frame.avatar) picture.footPosition = vectorFromProto(avatar.feet());
   }
-  std::ofstream(folder_ / kWritten, std::ios::app) << picture.name << "\n";
+  std::ofstream(folder_ / kFrameListFile, std::ios::app) << picture.name << "\n";
   render::writePng(folder_ / picture.file, picture.image);
   const v1::FreeCamera& camera = frame.description.camera();
-  trace_.captures.push_back({picture.name, vectorFrom(camera.eye()), vectorFrom(camera.forward())});
+  trace_.captures.push_back(
+      {picture.name, vectorFromProto(camera.eye()), vectorFromProto(camera.forward())});
   pictures_.push_back(std::move(picture));
 }
 
-void WalkReport::writeContacts(const std::vector<v1::ContactEvent>& ended) {
+void RunReport::writeContacts(const std::vector<v1::ContactEvent>& ended) {
   for (const v1::ContactEvent& event : ended) addContact(event);
   writeText(folder_ / "contacts.jsonl", contactLines_);
 }
 
-void WalkReport::writePictures(const WalkFacts& facts, const MapGround& ground) {
-  const std::string title = facts.script + " in " + facts.scene.source();
+void RunReport::writePictures(const RunSummary& runSummary, const MapBackground& background) {
+  const std::string title = runSummary.script + " in " + runSummary.scene.source();
   if (!pictures_.empty()) {
-    std::vector<render::Captioned> captioned;
-    for (const Picture& taken : pictures_) {
+    std::vector<render::CaptionedImage> captioned;
+    for (const Picture& picture : pictures_) {
       char caption[160];
       std::snprintf(caption, sizeof caption, "%s  %s  tick %llu  (%.1f, %.1f, %.1f)",
-                    taken.name.c_str(), taken.avatar.c_str(),
-                    static_cast<unsigned long long>(taken.tick), taken.feet.x(), taken.feet.y(),
-                    taken.feet.z());
-      captioned.push_back({taken.image, caption});
+                    picture.name.c_str(), picture.avatar.c_str(),
+                    static_cast<unsigned long long>(picture.tick), picture.footPosition.x(),
+                    picture.footPosition.y(), picture.footPosition.z());
+      captioned.push_back({picture.image, caption});
     }
-    render::writePng(folder_ / "sheet.png", render::contactSheet(captioned, title, kSheetColumns));
+    render::writePng(folder_ / "sheet.png",
+                     render::makeContactSheet(captioned, title, kSheetColumns));
   }
   trace_.title = title;
-  if (const auto map = drawMap(trace_, ground)) {
+  if (const auto map = drawMap(trace_, background)) {
     render::writePng(folder_ / "map.png", *map);
   } else {
-    spdlog::warn("no map.png: nobody walked, or there is no renderer");
+    spdlog::warn("no map.png: no walks, or no renderer");
   }
 }
 
-std::string WalkReport::writeSummary(const WalkFacts& facts, const protocol::ScriptResult& result) {
-  const v1::Metrics& metrics = facts.metrics;
+std::string RunReport::writeSummary(const RunSummary& runSummary,
+                                    const protocol::ScriptResult& result) {
+  const v1::Metrics& metrics = runSummary.metrics;
   Json stages = Json::object();
   for (const v1::StageTiming& stage : metrics.stages()) stages[stage.name()] = stage.median_us();
   stages["tick"] = metrics.tick().median_us();
   Json frames = Json::array();
   for (const Picture& picture : pictures_) {
-    frames.push_back({{"name", picture.name},
-                      {"avatar", picture.avatar},
-                      {"tick", picture.tick},
-                      {"file", picture.file},
-                      {"position", {picture.feet.x(), picture.feet.y(), picture.feet.z()}}});
+    frames.push_back(
+        {{"name", picture.name},
+         {"avatar", picture.avatar},
+         {"tick", picture.tick},
+         {"file", picture.file},
+         {"position",
+          {picture.footPosition.x(), picture.footPosition.y(), picture.footPosition.z()}}});
   }
   Json walks = Json::array();
-  for (const v1::Notice& notice : walks_) walks.push_back(walkOf(notice));
+  for (const v1::Notice& notice : walks_) walks.push_back(walkToJson(notice));
   Json summary{{"ticks", result.ticks},
                {"ticks_per_s", metrics.ticks_per_second()},
                {"stages_us", stages},
-               {"pairs", facts.mostPairs},
-               {"contacts", begun_},
+               {"pairs", runSummary.maxPairs},
+               {"contacts", contactsBegun_},
                {"worst_penetration", metrics.worst_penetration()},
                {"squeezed_bodies", metrics.squeezed_bodies()},
-               {"state_hash", protocol::hexadecimal(result.stateHash)},
+               {"state_hash", protocol::toHex(result.stateHash)},
                {"time", result.time},
-               {"wall_s", facts.wallSeconds},
-               {"scene", facts.scene.source()},
-               {"scene_hash", protocol::hexadecimal(facts.scene.hash())},
-               {"objects", facts.scene.objects()},
-               {"script", facts.script},
-               {"renderer", facts.renderer},
+               {"wall_s", runSummary.wallSeconds},
+               {"scene", runSummary.scene.source()},
+               {"scene_hash", protocol::toHex(runSummary.scene.hash())},
+               {"objects", runSummary.scene.objects()},
+               {"script", runSummary.script},
+               {"renderer", runSummary.renderer},
                {"spawned", result.spawned},
                {"arrived", result.arrived},
                {"blocked", result.blocked},
@@ -267,8 +277,8 @@ std::string WalkReport::writeSummary(const WalkFacts& facts, const protocol::Scr
                {"rational_queries", metrics.rational_queries()},
                {"frames", frames},
                {"walks", walks},
-               {"outcomes", outcomesOf(result)}};
-  if (metrics.has_audit()) summary["audit"] = jsonOf(metrics.audit());
+               {"outcomes", outcomesToJson(result)}};
+  if (metrics.has_audit()) summary["audit"] = toJson(metrics.audit());
   const auto replace = Json::error_handler_t::replace;
   writeText(folder_ / "summary.json", summary.dump(2, ' ', false, replace) + "\n");
   return summary.dump(-1, ' ', false, replace);

@@ -1,5 +1,5 @@
-// What a walk leaves behind: contacts.jsonl, summary.json, frames/, sheet.png and map.png in one
-// folder, the same whether the world was in this process or behind a socket. Files appear whole.
+// The report of a script run: contacts.jsonl, summary.json, frames/, sheet.png and map.png in one
+// folder, the same for worlds in this process and behind a socket. Files are written atomically.
 #pragma once
 
 #include <filesystem>
@@ -8,71 +8,71 @@
 #include <string>
 #include <vector>
 
-#include "protocol/script/script.hpp"
+#include "protocol/script/script_run.hpp"
 #include "server/plans/path_map.hpp"
 
 namespace enfilade::server {
 
-/// Names the folder or file that cannot be written.
+/// A folder or file is not writable; the text has its name.
 struct ReportError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What the walk does not know itself.
-struct WalkFacts {
+/// Data of a run that its ticks do not contain.
+struct RunSummary {
   std::string script;
   v1::Scene scene;
-  std::string renderer;  ///< "" when there is none
+  std::string renderer;  ///< "": none
   v1::Metrics metrics;
-  std::uint32_t mostPairs = 0;  ///< that the broad phase held
-  double wallSeconds = 0;       ///< of the whole walk
+  std::uint32_t maxPairs = 0;  ///< maximum number of broad phase pairs
+  double wallSeconds = 0;      ///< of the whole run
 };
 
-class WalkReport {
+class RunReport {
  public:
-  /// Makes the folder and proves that it can be written. Throws ReportError.
-  explicit WalkReport(std::filesystem::path folder);
+  /// Creates the folder and checks that it is writable. Throws ReportError.
+  explicit RunReport(std::filesystem::path folder);
 
-  /// Removes what an earlier walk left in the folder, and nothing else.
-  void removeEarlier();
-  /// Takes note of one tick and writes its pictures.
+  /// Removes the files of an earlier run, and no others.
+  void removePreviousRun();
+  /// Adds the data of one tick and writes its pictures.
   void add(const protocol::StepOutcome& outcome);
-  /// Writes contacts.jsonl, with how the contacts ended that the walk left.
+  /// Writes contacts.jsonl. `ended`: ends of the contacts that were active after the last tick.
   void writeContacts(const std::vector<v1::ContactEvent>& ended);
-  /// Who is in the world, of those that the walk moved.
-  const std::set<std::string>& present() const { return present_; }
+  /// Names of the run's avatars that are in the world.
+  const std::set<std::string>& presentAvatars() const { return presentAvatars_; }
 
-  /// Draws sheet.png and map.png; what cannot be had is told and left out.
-  void writePictures(const WalkFacts& facts, const MapGround& ground);
+  /// Writes sheet.png and map.png. A failure is logged, and the file is omitted.
+  void writePictures(const RunSummary& runSummary, const MapBackground& background);
   /// Writes summary.json and returns it as one line of JSON.
-  std::string writeSummary(const WalkFacts& facts, const protocol::ScriptResult& result);
+  std::string writeSummary(const RunSummary& runSummary, const protocol::ScriptResult& result);
   const std::filesystem::path& folder() const { return folder_; }
-  /// How walks ended, in order: arrived, blocked, refused or left.
+  /// Ends of walks in order: arrived, blocked, refused or left.
   const std::vector<v1::Notice>& walks() const { return walks_; }
 
  private:
   struct Picture {
     std::string name, avatar, file;
     std::uint64_t tick = 0;
-    Vec3 feet = Vec3::Zero();
+    Vec3 footPosition = Vec3::Zero();
     render::Image image;
   };
   void addContact(const v1::ContactEvent& event);
   void addNotice(const v1::Notice& notice);
   void addFrame(const protocol::CapturedFrame& frame, const protocol::StepOutcome& outcome);
-  std::string freeFrameName(const std::string& wanted) const;
+  std::string makeUniqueFrameName(const std::string& wanted) const;
 
   std::filesystem::path folder_;
   std::string contactLines_;
-  std::set<std::string> present_;
-  std::uint64_t begun_ = 0;
-  std::map<std::string, std::size_t> pathOf_;  ///< index into trace_.paths by the avatar's name
+  std::set<std::string> presentAvatars_;
+  std::uint64_t contactsBegun_ = 0;
+  std::map<std::string, std::size_t> pathByAvatar_;  ///< index into trace_.paths by avatar name
   WalkTrace trace_;
   std::vector<Picture> pictures_;
   std::vector<v1::Notice> walks_;  ///< arrived, blocked, refused, left
 };
 
-/// One line of contacts.jsonl, without its end.
-std::string contactLine(const v1::ContactEvent& event);
+/// Formats one line of contacts.jsonl, without the line end.
+std::string formatContactLine(const v1::ContactEvent& event);
 
 }  // namespace enfilade::server

@@ -1,4 +1,4 @@
-// Our answer to a case, at one of the two levels.
+// The answer of collision/ to a case, at one of the two levels.
 #pragma once
 
 #include <optional>
@@ -13,18 +13,18 @@ namespace enfilade::accuracy {
 
 enum class Level { decide, refine };
 
-/// Metres, seconds, world; nothing where a number is not defined.
+/// The answer to a case: metres, seconds, world frame; nullopt if a number is not defined.
 struct Answer {
   std::string id;
-  std::string error;  ///< what was thrown; everything else is void then
+  std::string error;  ///< text of the exception; all other fields are then invalid
   collision::Verdict verdict = collision::Verdict::separated;
-  collision::DecidedBy decidedBy = collision::DecidedBy::filter;
+  collision::Certificate certificate = collision::Certificate::filter;
   double distance = 0;
   std::optional<double> penetration;
   bool depthIsGlobal = false;
   std::optional<bool> near;
   Vec3 pointA = Vec3::Zero(), pointB = Vec3::Zero();
-  double errorBound = 0;  ///< of the distance, or of the depth where they penetrate
+  double errorBound = 0;  ///< of the distance, or of the depth if penetrating
   double nanoseconds = 0;
   std::optional<std::uint32_t> nearestTriangle;
   std::vector<std::uint32_t> penetrated, touched;
@@ -32,17 +32,17 @@ struct Answer {
   std::optional<std::array<double, 2>> toi;
 };
 
-/// What one coherent motion carries from step to step.
-struct Warmth {
-  std::vector<Vec3> pointsA, pointsB;  ///< of the last step: other lists start cold
+/// The caches that one coherent motion carries from step to step.
+struct WarmStart {
+  std::vector<Vec3> pointsA, pointsB;  ///< of the last step; different lists cause a cold start
   collision::FeatureCache features;
   collision::DepthCache depth;
 };
 
-/// Never throws: see Answer::error.
-Answer answerCase(const Case& asked, const Meshes& meshes, Level level, Warmth& warmth);
+/// Answers a case. Never throws: see Answer::error.
+Answer answerCase(const Case& testCase, const Meshes& meshes, Level level, WarmStart& warmth);
 
-/// One JSON object without a line end.
-std::string jsonLine(const Case& asked, const Answer& answer);
+/// Formats the answer as one JSON object without a line end.
+std::string jsonLine(const Case& testCase, const Answer& answer);
 
 }  // namespace enfilade::accuracy

@@ -10,7 +10,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-Vec3 vectorOf(const Json& json) {
+Vec3 toVector(const Json& json) {
   return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
 }
 
@@ -34,14 +34,14 @@ bool has(const Json& json, const char* key) {
   return json.contains(key) && !json.at(key).is_null();
 }
 
-std::string textOf(const Json& json, const char* key) {
+std::string getText(const Json& json, const char* key) {
   if (!has(json, key)) return {};
   return json.at(key).is_string() ? json.at(key).get<std::string>() : json.at(key).dump();
 }
 
-Placed placed(const Json& points, const Json& pose) {
+Placed parsePlaced(const Json& points, const Json& pose) {
   Placed body;
-  for (const Json& p : points) body.points.push_back(vectorOf(p));
+  for (const Json& p : points) body.points.push_back(toVector(p));
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column)
       body.rotation(row, column) = pose.at(4 * row + column).get<double>();
@@ -50,40 +50,40 @@ Placed placed(const Json& points, const Json& pose) {
   return body;
 }
 
-std::vector<std::uint32_t> ascending(const Json& json, const char* key) {
+std::vector<std::uint32_t> parseAscending(const Json& json, const char* key) {
   std::vector<std::uint32_t> list;
   if (has(json, key)) list = json.at(key).get<std::vector<std::uint32_t>>();
   std::sort(list.begin(), list.end());
   return list;
 }
 
-Truth truthOf(const Json& json) {
+Truth parseTruth(const Json& json) {
   Truth truth;
-  truth.verdict = textOf(json, "verdict");
-  truth.distance = textOf(json, "distance");
-  truth.penetration = textOf(json, "penetration");
-  truth.tc = textOf(json, "tc");
+  truth.verdict = getText(json, "verdict");
+  truth.distance = getText(json, "distance");
+  truth.penetration = getText(json, "penetration");
+  truth.tc = getText(json, "tc");
   if (has(json, "near")) truth.near = json.at("near").get<bool>();
   if (has(json, "toi")) truth.toi = json.at("toi").get<std::array<double, 2>>();
-  truth.penetrated = ascending(json, "penetrated_triangles");
-  truth.touched = ascending(json, "touched_triangles");
+  truth.penetrated = parseAscending(json, "penetrated_triangles");
+  truth.touched = parseAscending(json, "touched_triangles");
   return truth;
 }
 
-Case caseOf(const Json& json) {
+Case parseCase(const Json& json) {
   Case result;
-  result.id = textOf(json, "id");
-  result.family = textOf(json, "family");
-  result.a = placed(json.at("a"), json.at("pose_a"));
-  result.mesh = textOf(json, "mesh");
-  if (result.mesh.empty()) result.b = placed(json.at("b"), json.at("pose_b"));
+  result.id = getText(json, "id");
+  result.family = getText(json, "family");
+  result.a = parsePlaced(json.at("a"), json.at("pose_a"));
+  result.mesh = getText(json, "mesh");
+  if (result.mesh.empty()) result.b = parsePlaced(json.at("b"), json.at("pose_b"));
   if (has(json, "eps")) result.clearance = json.at("eps").get<double>();
   if (has(json, "seq")) result.sequence = json.at("seq").get<long>();
   if (has(json, "vel")) {
-    result.course = Course{vectorOf(json.at("vel")), Vec3::Zero()};
-    if (has(json, "acc")) result.course->acceleration = vectorOf(json.at("acc"));
+    result.course = Course{toVector(json.at("vel")), Vec3::Zero()};
+    if (has(json, "acc")) result.course->acceleration = toVector(json.at("acc"));
   }
-  result.truth = truthOf(json);
+  result.truth = parseTruth(json);
   return result;
 }
 
@@ -91,7 +91,7 @@ Case caseOf(const Json& json) {
 
 std::vector<Case> readCases(const std::filesystem::path& file) {
   std::vector<Case> cases;
-  forEachObject(file, [&](const Json& json) { cases.push_back(caseOf(json)); });
+  forEachObject(file, [&](const Json& json) { cases.push_back(parseCase(json)); });
   return cases;
 }
 
@@ -101,9 +101,9 @@ Meshes readMeshes(const std::filesystem::path& file) {
     std::vector<Triangle>& triangles = meshes[json.at("mesh").get<std::string>()];
     const Json& vertices = json.at("v");
     for (const Json& f : json.at("f"))
-      triangles.push_back({vectorOf(vertices.at(f.at(0).get<std::size_t>())),
-                           vectorOf(vertices.at(f.at(1).get<std::size_t>())),
-                           vectorOf(vertices.at(f.at(2).get<std::size_t>()))});
+      triangles.push_back({toVector(vertices.at(f.at(0).get<std::size_t>())),
+                           toVector(vertices.at(f.at(1).get<std::size_t>())),
+                           toVector(vertices.at(f.at(2).get<std::size_t>()))});
   });
   return meshes;
 }

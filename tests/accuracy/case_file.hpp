@@ -1,4 +1,4 @@
-// Cases with a known exact answer, one JSON object a line, and the meshes that some refer to.
+// Cases with a known exact answer, one JSON object per line, and the meshes that some refer to.
 #pragma once
 
 #include <array>
@@ -21,28 +21,29 @@ struct Course {
   Vec3 acceleration = Vec3::Zero();
 };
 
-/// What the file says is true. Decimal strings are empty where the file has null or nothing.
+/// The true values in the file. Decimal strings are empty if the file has null or no value.
 struct Truth {
   std::string verdict, distance, penetration;
   std::optional<bool> near;
   std::vector<std::uint32_t> penetrated, touched;  ///< triangles of a mesh, ascending
   std::string tc;
-  std::optional<std::array<double, 2>> toi;  ///< none: no contact before kLastTime
+  std::optional<std::array<double, 2>> toi;  ///< nullopt: no contact before kLastTime
 };
 
-inline constexpr double kLastTime = 64;  ///< seconds; the files look no further
+inline constexpr double kLastTime = 64;  ///< seconds; the end of the time range of the files
 
+/// One case: two bodies, or a body and a mesh, with the true values.
 struct Case {
   std::string id, family;
   Placed a, b;
   std::string mesh;                 ///< instead of b; empty: b
   std::optional<double> clearance;  ///< "eps": near means distance < 2 * clearance
   std::optional<long> sequence;     ///< cases of one sequence are one coherent motion, in order
-  std::optional<Course> course;     ///< asks for the time of impact
+  std::optional<Course> course;     ///< requests the time of impact
   Truth truth;
 };
 
-/// Throws std::runtime_error naming file and line.
+/// Both throw std::runtime_error that names file and line.
 std::vector<Case> readCases(const std::filesystem::path& file);
 Meshes readMeshes(const std::filesystem::path& file);
 

@@ -1,4 +1,4 @@
-// The score must see what is wrong: right answers are spoilt, one number each.
+// The score must detect faults: each test corrupts one number of a correct answer.
 #include "tests/accuracy/case_score.hpp"
 
 #include <gtest/gtest.h>
@@ -16,42 +16,43 @@ using collision::Verdict;
 const std::vector<Vec3> kCube{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
                               {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
 
-Case apart() {
-  Case asked;
-  asked.id = "apart", asked.family = "test";
-  asked.a.points = asked.b.points = kCube;
-  asked.b.translation = {3, 0, 0};
-  asked.clearance = 1.5;
-  asked.truth.verdict = "separated", asked.truth.distance = "2", asked.truth.near = true;
-  return asked;
+Case makeSeparatedCase() {
+  Case testCase;
+  testCase.id = "apart", testCase.family = "test";
+  testCase.a.points = testCase.b.points = kCube;
+  testCase.b.translation = {3, 0, 0};
+  testCase.clearance = 1.5;
+  testCase.truth.verdict = "separated", testCase.truth.distance = "2", testCase.truth.near = true;
+  return testCase;
 }
 
-Case inside() {
-  Case asked = apart();
-  asked.b.translation = {0.75, 0.125, 0};
-  asked.truth.verdict = "penetrating", asked.truth.distance = "0", asked.truth.penetration = "0.25";
-  return asked;
+Case makePenetratingCase() {
+  Case testCase = makeSeparatedCase();
+  testCase.b.translation = {0.75, 0.125, 0};
+  testCase.truth.verdict = "penetrating", testCase.truth.distance = "0",
+  testCase.truth.penetration = "0.25";
+  return testCase;
 }
 
-Answer answerTo(const Case& asked, Level level) {
-  Warmth cold;
-  return answerCase(asked, {}, level, cold);
+Answer computeAnswer(const Case& testCase, Level level) {
+  WarmStart cold;
+  return answerCase(testCase, {}, level, cold);
 }
 
-bool passes(const Case& asked, const Answer& answer, Level level) {
+bool passes(const Case& testCase, const Answer& answer, Level level) {
   Score score;
-  addToScore(asked, answer, level, {}, score);
+  addToScore(testCase, answer, level, {}, score);
   return holds(score);
 }
 
 TEST(Score, RightAnswersPass) {
   for (const Level level : {Level::decide, Level::refine}) {
-    EXPECT_TRUE(passes(apart(), answerTo(apart(), level), level));
-    EXPECT_TRUE(passes(inside(), answerTo(inside(), level), level));
+    EXPECT_TRUE(passes(makeSeparatedCase(), computeAnswer(makeSeparatedCase(), level), level));
+    EXPECT_TRUE(passes(makePenetratingCase(), computeAnswer(makePenetratingCase(), level), level));
   }
 }
 
-TEST(Score, EverySpoiltAnswerFails) {
+TEST(Score, EveryCorruptedAnswerFails) {
   using Spoil = std::function<void(Answer&)>;
   const std::vector<std::pair<const char*, Spoil>> spoils{
       {"verdict", [](Answer& a) { a.verdict = Verdict::touching; }},
@@ -67,55 +68,55 @@ TEST(Score, EverySpoiltAnswerFails) {
        }},
       {"thrown", [](Answer& a) { a.error = "thrown"; }}};
   for (const auto& [name, spoil] : spoils) {
-    Answer answer = answerTo(apart(), Level::refine);
+    Answer answer = computeAnswer(makeSeparatedCase(), Level::refine);
     spoil(answer);
-    EXPECT_FALSE(passes(apart(), answer, Level::refine)) << name;
+    EXPECT_FALSE(passes(makeSeparatedCase(), answer, Level::refine)) << name;
   }
 }
 
-TEST(Score, ASpoiltDepthFails) {
-  Answer refined = answerTo(inside(), Level::refine);
+TEST(Score, ACorruptedDepthFails) {
+  Answer refined = computeAnswer(makePenetratingCase(), Level::refine);
   *refined.penetration *= 1 + 1e-11;
-  EXPECT_FALSE(passes(inside(), refined, Level::refine));
-  Answer decided = answerTo(inside(), Level::decide);
+  EXPECT_FALSE(passes(makePenetratingCase(), refined, Level::refine));
+  Answer decided = computeAnswer(makePenetratingCase(), Level::decide);
   decided.depthIsGlobal = true;
   *decided.penetration += 1.01 * decided.errorBound + 0x1p-50;
-  EXPECT_FALSE(passes(inside(), decided, Level::decide));
+  EXPECT_FALSE(passes(makePenetratingCase(), decided, Level::decide));
 }
 
 TEST(Score, ABoundThatIsTooWideOrTooNarrowFails) {
-  Answer answer = answerTo(apart(), Level::decide);
+  Answer answer = computeAnswer(makeSeparatedCase(), Level::decide);
   answer.errorBound = 17 * 0x1p-53 * 4;
-  EXPECT_FALSE(passes(apart(), answer, Level::decide));
+  EXPECT_FALSE(passes(makeSeparatedCase(), answer, Level::decide));
   answer.errorBound = 0;
   answer.distance = 2 + 0x1p-51;
-  EXPECT_FALSE(passes(apart(), answer, Level::decide));
+  EXPECT_FALSE(passes(makeSeparatedCase(), answer, Level::decide));
 }
 
 TEST(Score, ATimeOfImpactMustHoldTheTruthAndBeNarrow) {
-  Case asked = apart();
-  asked.course = Course{{1, 0, 0}, Vec3::Zero()};
-  asked.truth.tc = "2";
-  asked.truth.toi = {2 - 0x1p-52, 2};
-  const Answer right = answerTo(asked, Level::refine);
-  EXPECT_TRUE(passes(asked, right, Level::refine));
+  Case testCase = makeSeparatedCase();
+  testCase.course = Course{{1, 0, 0}, Vec3::Zero()};
+  testCase.truth.tc = "2";
+  testCase.truth.toi = {2 - 0x1p-52, 2};
+  const Answer right = computeAnswer(testCase, Level::refine);
+  EXPECT_TRUE(passes(testCase, right, Level::refine));
   for (const std::array<double, 2> wrong :
        {std::array{1.9, 2.1}, {2 + 1e-13, 2 + 2e-13}, {2 - 2e-13, 2 - 1e-13}}) {
     Answer answer = right;
     answer.toi = wrong;
-    EXPECT_FALSE(passes(asked, answer, Level::refine));
+    EXPECT_FALSE(passes(testCase, answer, Level::refine));
   }
   for (const double tc : {0.0, 1.9, 2 + 0x1p-51}) {
     Answer answer = right;
     answer.tc = tc;
-    EXPECT_FALSE(passes(asked, answer, Level::refine)) << tc;
+    EXPECT_FALSE(passes(testCase, answer, Level::refine)) << tc;
   }
   Answer missed = right;
   missed.toi.reset();
-  EXPECT_FALSE(passes(asked, missed, Level::refine));
+  EXPECT_FALSE(passes(testCase, missed, Level::refine));
 }
 
-TEST(CaseFile, ALineIsReadAndAnsweredInTheFormatAskedFor) {
+TEST(CaseFile, ALineIsReadAndAnsweredInTheRequestedFormat) {
   const auto file = tests::ownFile("one_case.jsonl");
   std::ofstream(file) << R"({"id":"x-1","family":"f","a":[[0,0,0],[1,0,0]],"b":[[0,0,2]],)"
                       << R"("pose_a":[1,0,0,0,0,1,0,0,0,0,1,0],"pose_b":[1,0,0,0,0,1,0,0,0,0,1,0],)"
@@ -124,7 +125,7 @@ TEST(CaseFile, ALineIsReadAndAnsweredInTheFormatAskedFor) {
   const std::vector<Case> cases = readCases(file);
   ASSERT_EQ(cases.size(), 1u);
   EXPECT_EQ(cases[0].sequence, 4);
-  Answer answer = answerTo(cases[0], Level::refine);
+  Answer answer = computeAnswer(cases[0], Level::refine);
   EXPECT_TRUE(passes(cases[0], answer, Level::refine));
   answer.nanoseconds = 5;
   EXPECT_EQ(

@@ -1,12 +1,12 @@
-// Nearest point of a hull: Gilbert, Johnson and Keerthi's descent in integers. The nearest point of
+// Nearest point of a hull: GJK (Gilbert, Johnson, Keerthi 1988) in integers. The nearest point of
 // at most four points is found by trying every subset (Cramer's rule on the Gram matrix of its
-// edges). Each step goes strictly nearer, and there are finitely many subsets, so it ends; what it
-// ends with is checked by the support it ends on.
+// edges). Each step gets strictly nearer and there are finitely many subsets, so it terminates. The
+// final support checks the result.
 //
-// Depth: along any direction, the overlap of the two bodies' slabs is an upper bound of the depth,
-// and the depth is the overlap along some face of the Minkowski difference. Its normal is that of
-// three vertices of one body or of two vertices of each. So the least overlap over all of these is
-// the depth, without knowing which of them are faces.
+// Depth: the overlap of the two bodies' slabs along any direction is an upper bound of the depth.
+// The depth is the overlap along the normal of some face of the Minkowski difference. Such a normal
+// comes from three vertices of one body or two vertices of each. The depth is therefore the minimum
+// overlap over all these normals; it does not matter which of them are faces.
 #include "tests/accuracy/exact_geometry.hpp"
 
 #include <array>
@@ -45,7 +45,7 @@ RationalPoint worldPoint(const Placed& body, const Vec3& vertex) {
   return world;
 }
 
-/// Denominators are powers of two: the exponent.
+/// The exponent of a denominator, which is a power of two.
 long denominatorBits(const mpq_class& q) {
   return static_cast<long>(mpz_sizeinbase(q.get_den_mpz_t(), 2)) - 1;
 }
@@ -73,8 +73,8 @@ mpz_class determinant(const std::array<std::array<mpz_class, 3>, 3>& m, std::siz
          m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
 }
 
-/// The nearest point of the affine hull of `points`, when it lies strictly inside their hull.
-std::optional<NearestPoint> nearestInside(const std::vector<IntegerPoint>& points) {
+/// Finds the nearest point of the affine hull of `points`, if it lies strictly inside their hull.
+std::optional<NearestPoint> findNearestInside(const std::vector<IntegerPoint>& points) {
   const std::size_t n = points.size() - 1;
   std::array<IntegerPoint, 3> edges;
   std::array<std::array<mpz_class, 3>, 3> gram;
@@ -107,52 +107,52 @@ bool isNearer(const NearestPoint& p, const NearestPoint& q) {
          dot(q.numerator, q.numerator) * p.denominator * p.denominator;
 }
 
-/// Over the subsets of `points` that hold the last one (the others were tried before).
-Descent nearestOfSimplex(const std::vector<IntegerPoint>& points) {
+/// Searches the subsets of `points` with the last point; the others were tried before.
+Descent findNearestOfSimplex(const std::vector<IntegerPoint>& points) {
   Descent best;
   const unsigned last = 1U << (points.size() - 1);
   for (unsigned mask = last; mask < 2 * last; ++mask) {
     std::vector<IntegerPoint> subset;
     for (std::size_t i = 0; i < points.size(); ++i)
       if ((mask >> i & 1U) != 0) subset.push_back(points[i]);
-    auto nearest = nearestInside(subset);
+    auto nearest = findNearestInside(subset);
     if (nearest && (best.simplex.empty() || isNearer(*nearest, best.nearest)))
       best = {std::move(subset), std::move(*nearest)};
   }
   if (best.simplex.empty())
-    throw std::logic_error("no subset of a simplex holds its nearest point");
+    throw std::logic_error("no subset of a simplex contains its nearest point");
   return best;
 }
 
-const IntegerPoint& extreme(const std::vector<IntegerPoint>& points, const IntegerPoint& along,
-                            bool most) {
+const IntegerPoint& findExtreme(const std::vector<IntegerPoint>& points, const IntegerPoint& along,
+                                bool maximize) {
   const IntegerPoint* best = &points.front();
   mpz_class value = dot(along, *best);
   for (const IntegerPoint& p : points) {
     mpz_class candidate = dot(along, p);
-    if (most ? candidate > value : candidate < value) value = std::move(candidate), best = &p;
+    if (maximize ? candidate > value : candidate < value) value = std::move(candidate), best = &p;
   }
   return *best;
 }
 
 struct Slab {
-  mpz_class least, most;
+  mpz_class min, max;
 };
 
-Slab slabOf(const std::vector<IntegerPoint>& points, const IntegerPoint& along) {
+Slab computeSlab(const std::vector<IntegerPoint>& points, const IntegerPoint& along) {
   Slab slab{dot(along, points.front()), dot(along, points.front())};
   for (const IntegerPoint& p : points) {
     mpz_class value = dot(along, p);
-    if (value < slab.least)
-      slab.least = std::move(value);
-    else if (value > slab.most)
-      slab.most = std::move(value);
+    if (value < slab.min)
+      slab.min = std::move(value);
+    else if (value > slab.max)
+      slab.max = std::move(value);
   }
   return slab;
 }
 
-/// The least overlap so far: overlap / |normal|.
-struct LeastOverlap {
+/// The minimum overlap so far: overlap / |normal|.
+struct MinOverlap {
   bool any = false;
   mpz_class overlap, squaredNormal;
 
@@ -160,35 +160,35 @@ struct LeastOverlap {
     if (any && sgn(candidate) >= 0 && sgn(overlap) >= 0 &&
         candidate * candidate * squaredNormal >= overlap * overlap * squared)
       return;
-    if (any && sgn(overlap) < 0) return;  // parted: how far is no matter
+    if (any && sgn(overlap) < 0) return;  // separated: the amount does not matter
     any = true, overlap = candidate, squaredNormal = squared;
   }
 };
 
-void tryNormal(const ExactPair& pair, const IntegerPoint& normal, LeastOverlap& least) {
+void tryNormal(const ExactPair& pair, const IntegerPoint& normal, MinOverlap& minimum) {
   if (isZero(normal)) return;
   const mpz_class squared = dot(normal, normal);
-  const Slab a = slabOf(pair.a, normal);
-  const Slab b = slabOf(pair.b, normal);
-  least.include(a.most - b.least, squared);
-  least.include(b.most - a.least, squared);
+  const Slab a = computeSlab(pair.a, normal);
+  const Slab b = computeSlab(pair.b, normal);
+  minimum.include(a.max - b.min, squared);
+  minimum.include(b.max - a.min, squared);
 }
 
-std::vector<IntegerPoint> edgesOf(const std::vector<IntegerPoint>& points) {
+std::vector<IntegerPoint> computeEdges(const std::vector<IntegerPoint>& points) {
   std::vector<IntegerPoint> edges;
   for (std::size_t i = 0; i < points.size(); ++i)
     for (std::size_t j = i + 1; j < points.size(); ++j) edges.push_back(points[j] - points[i]);
   return edges;
 }
 
-void tryFaces(const ExactPair& pair, const std::vector<IntegerPoint>& body, LeastOverlap& least) {
+void tryFaces(const ExactPair& pair, const std::vector<IntegerPoint>& body, MinOverlap& minimum) {
   for (std::size_t i = 0; i < body.size(); ++i)
     for (std::size_t j = i + 1; j < body.size(); ++j)
       for (std::size_t k = j + 1; k < body.size(); ++k)
-        tryNormal(pair, cross(body[j] - body[i], body[k] - body[i]), least);
+        tryNormal(pair, cross(body[j] - body[i], body[k] - body[i]), minimum);
 }
 
-/// Whether the Minkowski difference has an inside: its edges span space.
+/// Whether the Minkowski difference has an interior: its edges span space.
 bool spansSpace(const ExactPair& pair) {
   std::vector<IntegerPoint> edges;
   for (const auto& p : pair.a) edges.push_back(p - pair.a.front());
@@ -209,7 +209,7 @@ bool spansSpace(const ExactPair& pair) {
   return false;
 }
 
-mpf_class inMetres(const mpz_class& integer, long bits) {
+mpf_class toMetres(const mpz_class& integer, long bits) {
   mpf_class value(integer, kPrecision);
   mpf_div_2exp(value.get_mpf_t(), value.get_mpf_t(), static_cast<mp_bitcnt_t>(bits));
   return value;
@@ -217,7 +217,7 @@ mpf_class inMetres(const mpz_class& integer, long bits) {
 
 }  // namespace
 
-ExactPair exactPair(const Placed& a, const Placed& b, const Vec3& pointA, const Vec3& pointB) {
+ExactPair makeExactPair(const Placed& a, const Placed& b, const Vec3& pointA, const Vec3& pointB) {
   std::vector<RationalPoint> all{exactPoint(pointA), exactPoint(pointB)};
   for (const Vec3& p : a.points) all.push_back(worldPoint(a, p));
   for (const Vec3& p : b.points) all.push_back(worldPoint(b, p));
@@ -231,21 +231,21 @@ ExactPair exactPair(const Placed& a, const Placed& b, const Vec3& pointA, const 
   return pair;
 }
 
-NearestPoint nearestOfDifference(const std::vector<IntegerPoint>& a,
-                                 const std::vector<IntegerPoint>& b) {
+NearestPoint findNearestOfDifference(const std::vector<IntegerPoint>& a,
+                                     const std::vector<IntegerPoint>& b) {
   Descent at{{b.front() - a.front()}, {b.front() - a.front(), 1}};
   for (int step = 0; step < kDescentBound; ++step) {
     const IntegerPoint& x = at.nearest.numerator;
     if (isZero(x)) return at.nearest;
-    IntegerPoint support = extreme(b, x, false) - extreme(a, x, true);
+    IntegerPoint support = findExtreme(b, x, false) - findExtreme(a, x, true);
     if (dot(x, support) * at.nearest.denominator >= dot(x, x)) return at.nearest;
     at.simplex.push_back(std::move(support));
-    at = nearestOfSimplex(at.simplex);
+    at = findNearestOfSimplex(at.simplex);
   }
-  throw std::logic_error("the exact descent did not end");
+  throw std::logic_error("the exact GJK iteration did not terminate");
 }
 
-mpf_class lengthOf(const NearestPoint& nearest, long bits) {
+mpf_class computeLength(const NearestPoint& nearest, long bits) {
   const mpf_class squared(dot(nearest.numerator, nearest.numerator), kPrecision);
   const mpf_class denominator(nearest.denominator, kPrecision);
   mpf_class length(sqrt(squared) / denominator, kPrecision);
@@ -253,9 +253,9 @@ mpf_class lengthOf(const NearestPoint& nearest, long bits) {
   return length;
 }
 
-bool liesWithin(const IntegerPoint& point, const std::vector<IntegerPoint>& body, long bits,
-                double tolerance) {
-  const NearestPoint nearest = nearestOfDifference({point}, body);
+bool isWithinTolerance(const IntegerPoint& point, const std::vector<IntegerPoint>& body, long bits,
+                       double tolerance) {
+  const NearestPoint nearest = findNearestOfDifference({point}, body);
   mpq_class scaledTolerance(tolerance);
   mpq_mul_2exp(scaledTolerance.get_mpq_t(), scaledTolerance.get_mpq_t(),
                static_cast<mp_bitcnt_t>(bits));
@@ -263,42 +263,42 @@ bool liesWithin(const IntegerPoint& point, const std::vector<IntegerPoint>& body
   return dot(nearest.numerator, nearest.numerator) <= reach * reach;
 }
 
-TrueAnswer trueAnswer(const ExactPair& pair) {
-  const NearestPoint nearest = nearestOfDifference(pair.a, pair.b);
-  TrueAnswer answer{TrueVerdict::separated, preciseNumber(0.0), preciseNumber(0.0)};
+ReferenceResult computeReferenceResult(const ExactPair& pair) {
+  const NearestPoint nearest = findNearestOfDifference(pair.a, pair.b);
+  ReferenceResult answer{ReferenceVerdict::separated, toPreciseNumber(0.0), toPreciseNumber(0.0)};
   if (!isZero(nearest.numerator)) {
-    answer.distance = lengthOf(nearest, pair.bits);
+    answer.distance = computeLength(nearest, pair.bits);
     return answer;
   }
-  answer.verdict = TrueVerdict::touching;
+  answer.verdict = ReferenceVerdict::touching;
   if (!spansSpace(pair)) return answer;
-  LeastOverlap least;
-  tryFaces(pair, pair.a, least);
-  tryFaces(pair, pair.b, least);
-  const std::vector<IntegerPoint> edgesB = edgesOf(pair.b);
-  for (const IntegerPoint& e : edgesOf(pair.a))
-    for (const IntegerPoint& f : edgesB) tryNormal(pair, cross(e, f), least);
-  if (!least.any || sgn(least.overlap) < 0)
-    throw std::logic_error("bodies with a common point are parted by a plane");
-  if (sgn(least.overlap) == 0) return answer;
-  answer.verdict = TrueVerdict::penetrating;
-  const mpf_class squaredNormal(least.squaredNormal, kPrecision);
-  answer.depth = mpf_class(inMetres(least.overlap, pair.bits) / sqrt(squaredNormal), kPrecision);
+  MinOverlap minimum;
+  tryFaces(pair, pair.a, minimum);
+  tryFaces(pair, pair.b, minimum);
+  const std::vector<IntegerPoint> edgesB = computeEdges(pair.b);
+  for (const IntegerPoint& e : computeEdges(pair.a))
+    for (const IntegerPoint& f : edgesB) tryNormal(pair, cross(e, f), minimum);
+  if (!minimum.any || sgn(minimum.overlap) < 0)
+    throw std::logic_error("bodies with a common point are separated by a plane");
+  if (sgn(minimum.overlap) == 0) return answer;
+  answer.verdict = ReferenceVerdict::penetrating;
+  const mpf_class squaredNormal(minimum.squaredNormal, kPrecision);
+  answer.depth = mpf_class(toMetres(minimum.overlap, pair.bits) / sqrt(squaredNormal), kPrecision);
   return answer;
 }
 
-mpf_class preciseNumber(const std::string& decimal) {
+mpf_class toPreciseNumber(const std::string& decimal) {
   return mpf_class(decimal, kPrecision, 10);
 }
 
-mpf_class preciseNumber(double value) {
+mpf_class toPreciseNumber(double value) {
   return mpf_class(value, kPrecision);
 }
 
-mpf_class distanceOf(const Vec3& p, const Vec3& q) {
-  mpf_class squared = preciseNumber(0.0);
+mpf_class computeDistance(const Vec3& p, const Vec3& q) {
+  mpf_class squared = toPreciseNumber(0.0);
   for (int k = 0; k < 3; ++k) {
-    const mpf_class difference(preciseNumber(p[k]) - preciseNumber(q[k]), kPrecision);
+    const mpf_class difference(toPreciseNumber(p[k]) - toPreciseNumber(q[k]), kPrecision);
     squared += difference * difference;
   }
   return mpf_class(sqrt(squared), kPrecision);

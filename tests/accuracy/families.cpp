@@ -11,15 +11,15 @@ using collision::testing::randomPoints;
 using collision::testing::uniform;
 using Points = std::vector<Vec3>;
 
-int below(Random& random, int count) {
+int randomBelow(Random& random, int count) {
   return static_cast<int>(random() % static_cast<std::uint64_t>(count));
 }
 
-bool chance(Random& random, double part) {
+bool isChance(Random& random, double part) {
   return uniform(random, 0, 1) < part;
 }
 
-/// 10^low .. 10^high, evenly in the exponent.
+/// A random value from 10^low to 10^high, uniform in the exponent.
 double magnitude(Random& random, double low, double high) {
   const double exponent = uniform(random, low, high);
   return std::exp(exponent * 2.302585092994046);
@@ -36,7 +36,7 @@ Mat3 smallRotation(Random& random, double angle) {
   return Eigen::AngleAxisd(angle, randomPoint(random, 1).normalized()).toRotationMatrix();
 }
 
-/// Orthonormal only to about `steps` ulps: the product of many small turns, never made good.
+/// Orthonormal only to about `steps` ulps: a product of many small rotations, never renormalised.
 Mat3 driftedRotation(Random& random, int steps) {
   Mat3 rotation = randomRotation(random);
   const Mat3 step = smallRotation(random, 0.1);
@@ -49,16 +49,16 @@ void placeTogether(Case& pair, const Mat3& rotation, const Vec3& translation) {
   pair.a.translation = pair.b.translation = translation;
 }
 
-/// Lattice points on one side of a plane z = 0 that some of them lie in.
+/// Lattice points on one side of the plane z = 0, some of them in it.
 Points latticeSide(Random& random, int count, double side) {
   Points points = latticePoints(random, count, 3);
   for (Vec3& p : points) p.z() = side * std::abs(p.z());
-  const int level = 1 + below(random, 4);
+  const int level = 1 + randomBelow(random, 4);
   for (int i = 0; i < level; ++i) points[static_cast<std::size_t>(i)].z() = 0;
   return points;
 }
 
-Points box(const Vec3& low, const Vec3& high) {
+Points makeBox(const Vec3& low, const Vec3& high) {
   Points points;
   for (int i = 0; i < 8; ++i)
     points.emplace_back((i & 1) != 0 ? high.x() : low.x(), (i & 2) != 0 ? high.y() : low.y(),
@@ -92,7 +92,7 @@ Case sliver(Random& random) {
   const double thickness = magnitude(random, -14, -6);
   for (Vec3& p : pair.a.points) p.z() *= thickness;
   pair.b.points = randomPoints(random, 4, 1);
-  if (chance(random, 0.5))
+  if (isChance(random, 0.5))
     for (Vec3& p : pair.b.points) p.z() = 1 + p.z() * thickness;
   pair.b.translation = {0, 0, -1 + thickness * uniform(random, -2, 2)};
   const Mat3 rotation = randomRotation(random);
@@ -105,7 +105,7 @@ Case coincidentVertices(Random& random) {
   Case pair;
   pair.a.points = randomPoints(random, 5, 1);
   pair.b.points = randomPoints(random, 4, 1);
-  const int shared = 1 + below(random, 3);
+  const int shared = 1 + randomBelow(random, 3);
   for (int i = 0; i < shared; ++i)
     pair.b.points.push_back(pair.a.points[static_cast<std::size_t>(i)]);
   pair.a.points.push_back(pair.a.points.front());
@@ -117,8 +117,8 @@ Case polygonsInOnePlane(Random& random) {
   Case pair;
   pair.a.points = inPlane(latticePoints(random, 6, 4));
   pair.b.points = inPlane(latticePoints(random, 5, 2));
-  if (chance(random, 0.5)) {
-    const Vec3 shift(below(random, 13) - 6, below(random, 13) - 6, 0);
+  if (isChance(random, 0.5)) {
+    const Vec3 shift(randomBelow(random, 13) - 6, randomBelow(random, 13) - 6, 0);
     for (Vec3& p : pair.b.points) p += shift;
   }
   placeTogether(pair, driftedRotation(random, 50), randomPoint(random, 5));
@@ -129,10 +129,10 @@ Case collinearSegments(Random& random) {
   Case pair;
   const Vec3 along = latticePoints(random, 1, 5).front() + Vec3(0, 0, 6);
   const Vec3 start = latticePoints(random, 1, 5).front();
-  const auto point = [&] { return Vec3(start + (below(random, 9) - 4) * along); };
+  const auto point = [&] { return Vec3(start + (randomBelow(random, 9) - 4) * along); };
   for (int i = 0; i < 2; ++i) pair.a.points.push_back(point());
   for (int i = 0; i < 2; ++i) pair.b.points.push_back(point());
-  if (chance(random, 0.3)) pair.b.points.push_back(pair.b.points[0] + Vec3(1, 2, 0));
+  if (isChance(random, 0.3)) pair.b.points.push_back(pair.b.points[0] + Vec3(1, 2, 0));
   placeTogether(pair, driftedRotation(random, 30), randomPoint(random, 5));
   return pair;
 }
@@ -155,16 +155,16 @@ Case tinyOrHuge(Random& random) {
   pair.a.rotation = randomRotation(random);
   pair.b.rotation = randomRotation(random);
   pair.b.translation = randomPoint(random, 1.5);
-  scalePair(pair, chance(random, 0.5) ? magnitude(random, -60, -12) : magnitude(random, 8, 60));
+  scalePair(pair, isChance(random, 0.5) ? magnitude(random, -60, -12) : magnitude(random, 8, 60));
   return pair;
 }
 
 Case nearParallelFaces(Random& random) {
   Case pair;
   const Vec3 half(uniform(random, 0.2, 2), uniform(random, 0.2, 2), uniform(random, 0.2, 2));
-  pair.a.points = box(-half, half);
-  pair.b.points = box({-0.5, -0.5, 0}, {0.5, 0.5, 1});
-  const double gap = magnitude(random, -17, -4) * (chance(random, 0.5) ? 1 : -1);
+  pair.a.points = makeBox(-half, half);
+  pair.b.points = makeBox({-0.5, -0.5, 0}, {0.5, 0.5, 1});
+  const double gap = magnitude(random, -17, -4) * (isChance(random, 0.5) ? 1 : -1);
   const Mat3 rotation = randomRotation(random);
   pair.a.rotation = rotation;
   pair.b.rotation = smallRotation(random, magnitude(random, -17, -5)) * rotation;
@@ -175,13 +175,14 @@ Case nearParallelFaces(Random& random) {
 Case deepInside(Random& random) {
   Case pair;
   const double size = magnitude(random, -6, 0);
-  pair.a.points = box({-1, -1, -1}, {1, 1, 1});
-  pair.b.points = chance(random, 0.5) ? randomPoints(random, 5, size)
-                                      : box(Vec3::Constant(-size), Vec3::Constant(size));
-  if (chance(random, 0.3)) pair.b.points.resize(1 + static_cast<std::size_t>(below(random, 4)));
-  if (chance(random, 0.5)) pair.a.rotation = randomRotation(random);
-  if (chance(random, 0.5)) pair.b.rotation = randomRotation(random);
-  if (chance(random, 0.5)) pair.b.translation = randomPoint(random, 0.3);
+  pair.a.points = makeBox({-1, -1, -1}, {1, 1, 1});
+  pair.b.points = isChance(random, 0.5) ? randomPoints(random, 5, size)
+                                        : makeBox(Vec3::Constant(-size), Vec3::Constant(size));
+  if (isChance(random, 0.3))
+    pair.b.points.resize(1 + static_cast<std::size_t>(randomBelow(random, 4)));
+  if (isChance(random, 0.5)) pair.a.rotation = randomRotation(random);
+  if (isChance(random, 0.5)) pair.b.rotation = randomRotation(random);
+  if (isChance(random, 0.5)) pair.b.translation = randomPoint(random, 0.3);
   return pair;
 }
 
@@ -199,14 +200,14 @@ Case pointsOnFeatures(Random& random) {
   Case pair;
   pair.a.points = latticePoints(random, 7, 4);
   // A combination in quarters: on an edge, a face, or inside, exactly.
-  const auto pick = [&] { return pair.a.points[static_cast<std::size_t>(below(random, 7))]; };
+  const auto pick = [&] { return pair.a.points[static_cast<std::size_t>(randomBelow(random, 7))]; };
   const auto on = [&] {
     const Vec3 p = pick(), q = pick(), r = pick();
     return Vec3(0.25 * p + 0.25 * q + 0.5 * r);
   };
-  const int count = 1 + below(random, 3);
+  const int count = 1 + randomBelow(random, 3);
   for (int i = 0; i < count; ++i) pair.b.points.push_back(on());
-  if (chance(random, 0.4)) pair.b.points.push_back(latticePoints(random, 1, 8).front());
+  if (isChance(random, 0.4)) pair.b.points.push_back(latticePoints(random, 1, 8).front());
   placeTogether(pair, driftedRotation(random, 100), randomPoint(random, 3));
   return pair;
 }
@@ -227,10 +228,10 @@ Case skewNeedles(Random& random) {
   pair.a.points = {{-1, 0, 0}, {1, 0, 0}};
   const double angle = magnitude(random, -12, 0);
   pair.b.points = {{-1, -angle, 0}, {1, angle, 0}};
-  const double gap = chance(random, 0.3) ? 0 : magnitude(random, -18, -2);
-  if (chance(random, 0.5)) pair.a.points.push_back({0, magnitude(random, -9, -3), 0});
+  const double gap = isChance(random, 0.3) ? 0 : magnitude(random, -18, -2);
+  if (isChance(random, 0.5)) pair.a.points.push_back({0, magnitude(random, -9, -3), 0});
   pair.b.translation = {uniform(random, -0.5, 0.5), 0, gap};
-  if (chance(random, 0.6)) {
+  if (isChance(random, 0.6)) {
     const Mat3 rotation = randomRotation(random);
     pair.b.translation = rotation * pair.b.translation;
     pair.a.rotation = pair.b.rotation = rotation;
@@ -240,25 +241,25 @@ Case skewNeedles(Random& random) {
 
 Case nearlyEqualBodies(Random& random) {
   Case pair;
-  pair.a.points = chance(random, 0.5) ? latticePoints(random, 7, 2) : randomPoints(random, 7, 1);
+  pair.a.points = isChance(random, 0.5) ? latticePoints(random, 7, 2) : randomPoints(random, 7, 1);
   pair.b.points = pair.a.points;
   placeTogether(pair, driftedRotation(random, 10), randomPoint(random, 2));
-  if (chance(random, 0.5)) pair.b.translation += randomPoint(random, magnitude(random, -17, -13));
-  if (chance(random, 0.3)) pair.b.rotation = smallRotation(random, 1e-16) * pair.b.rotation;
+  if (isChance(random, 0.5)) pair.b.translation += randomPoint(random, magnitude(random, -17, -13));
+  if (isChance(random, 0.3)) pair.b.rotation = smallRotation(random, 1e-16) * pair.b.rotation;
   return pair;
 }
 
 Case lattice(Random& random) {
   Case pair;
-  pair.a.points = latticePoints(random, 1 + below(random, 8), 2);
-  pair.b.points = latticePoints(random, 1 + below(random, 8), 2);
+  pair.a.points = latticePoints(random, 1 + randomBelow(random, 8), 2);
+  pair.b.points = latticePoints(random, 1 + randomBelow(random, 8), 2);
   pair.b.translation = latticePoints(random, 1, 3).front();
   Mat3 quarter;
   quarter << 0, -1, 0, 1, 0, 0, 0, 0, 1;
   Mat3 cycle;
   cycle << 0, 1, 0, 0, 0, 1, 1, 0, 0;
-  if (chance(random, 0.5)) pair.a.rotation = quarter;
-  if (chance(random, 0.5)) pair.b.rotation = cycle * quarter;
+  if (isChance(random, 0.5)) pair.a.rotation = quarter;
+  if (isChance(random, 0.5)) pair.b.rotation = cycle * quarter;
   return pair;
 }
 
@@ -273,13 +274,13 @@ Case stackedGrids(Random& random) {
   pair.a.points.push_back({0.1, 0.1, -1});
   pair.b.points = grid(0);
   pair.b.points.push_back({0.1, 0.1, 1});
-  const int way = below(random, 3);
-  const double ulps = static_cast<double>(below(random, 5) - 2) * 0x1p-53;
-  pair.b.translation = {0.1 * below(random, 3), way == 1 ? 0.2 : 0, way == 2 ? ulps : 0};
-  if (chance(random, 0.5)) {
-    const Vec3 along = pair.b.translation;
+  const int axis = randomBelow(random, 3);
+  const double ulps = static_cast<double>(randomBelow(random, 5) - 2) * 0x1p-53;
+  pair.b.translation = {0.1 * randomBelow(random, 3), axis == 1 ? 0.2 : 0, axis == 2 ? ulps : 0};
+  if (isChance(random, 0.5)) {
+    const Vec3 offset = pair.b.translation;
     placeTogether(pair, driftedRotation(random, 5), Vec3::Zero());
-    pair.b.translation = pair.b.rotation * along;
+    pair.b.translation = pair.b.rotation * offset;
   }
   return pair;
 }
@@ -292,7 +293,7 @@ std::string decimal(const mpf_class& value) {
 
 }  // namespace
 
-const std::vector<Family>& families() {
+const std::vector<Family>& getFamilies() {
   static const std::vector<Family> all{{"drifted_contact", driftedContact},
                                        {"sliver", sliver},
                                        {"coincident_vertices", coincidentVertices},
@@ -312,36 +313,36 @@ const std::vector<Family>& families() {
   return all;
 }
 
-Truth judged(const Case& asked) {
-  const TrueAnswer answer = trueAnswer(exactPair(asked.a, asked.b));
+Truth computeTruth(const Case& testCase) {
+  const ReferenceResult answer = computeReferenceResult(makeExactPair(testCase.a, testCase.b));
   Truth truth;
   truth.distance = decimal(answer.distance);
   switch (answer.verdict) {
-    case TrueVerdict::separated:
+    case ReferenceVerdict::separated:
       truth.verdict = "separated";
       break;
-    case TrueVerdict::touching:
+    case ReferenceVerdict::touching:
       truth.verdict = "touching";
       break;
-    case TrueVerdict::penetrating:
+    case ReferenceVerdict::penetrating:
       truth.verdict = "penetrating";
       truth.penetration = decimal(answer.depth);
       break;
   }
-  if (asked.clearance) truth.near = answer.distance < preciseNumber(2 * *asked.clearance);
+  if (testCase.clearance) truth.near = answer.distance < toPreciseNumber(2 * *testCase.clearance);
   return truth;
 }
 
-Case madeCase(const Family& family, Random& random, int number) {
-  Case made = family.make(random);
-  made.id = std::string(family.name) + '-' + std::to_string(number);
-  made.family = family.name;
-  const ExactPair pair = exactPair(made.a, made.b);
-  const double distance = lengthOf(nearestOfDifference(pair.a, pair.b), pair.bits).get_d();
-  made.clearance = distance * (0.5 + below(random, 5) * 0x1p-53 - 0x1p-52);
-  if (distance == 0) made.clearance = magnitude(random, -20, -3);
-  made.truth = judged(made);
-  return made;
+Case makeCase(const Family& family, Random& random, int number) {
+  Case result = family.make(random);
+  result.id = std::string(family.name) + '-' + std::to_string(number);
+  result.family = family.name;
+  const ExactPair pair = makeExactPair(result.a, result.b);
+  const double distance = computeLength(findNearestOfDifference(pair.a, pair.b), pair.bits).get_d();
+  result.clearance = distance * (0.5 + randomBelow(random, 5) * 0x1p-53 - 0x1p-52);
+  if (distance == 0) result.clearance = magnitude(random, -20, -3);
+  result.truth = computeTruth(result);
+  return result;
 }
 
 }  // namespace enfilade::accuracy

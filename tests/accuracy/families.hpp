@@ -1,5 +1,5 @@
-// Seeded pairs of small bodies, each family hard in its own way, with the exact answer worked out
-// by the judge. The families are not those of the shared cases.
+// Seeded pairs of small bodies. Each family tests one difficulty; the exact reference computes the
+// true values. The families differ from those of the shared cases.
 #pragma once
 
 #include <string>
@@ -14,16 +14,16 @@ using Random = collision::testing::Random;
 
 struct Family {
   const char* name;
-  Case (*make)(Random& random);  ///< without the truth
+  Case (*make)(Random& random);  ///< leaves Case::truth empty
 };
 
-const std::vector<Family>& families();
+const std::vector<Family>& getFamilies();
 
-/// A case of the family, with its truth: verdict, distance, depth, and `near` at a clearance that
-/// lies within a few ulps of half the distance.
-Case madeCase(const Family& family, Random& random, int number);
+/// Makes a case of the family with its true verdict, distance and depth, and with `near` at a
+/// clearance within a few ulps of half the distance.
+Case makeCase(const Family& family, Random& random, int number);
 
-/// The truth of any case about two bodies, by the judge.
-Truth judged(const Case& asked);
+/// Computes the true values of any case of two bodies with the exact reference.
+Truth computeTruth(const Case& testCase);
 
 }  // namespace enfilade::accuracy

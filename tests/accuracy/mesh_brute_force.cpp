@@ -9,24 +9,24 @@ namespace {
 
 using namespace collision;
 
-ConvexBody bodyOf(const Triangle& triangle) {
+PlacedConvex bodyOf(const Triangle& triangle) {
   return {triangle};
 }
 
-std::vector<Decision> decideAll(const ConvexBody& body, std::span<const Triangle> mesh) {
-  std::vector<Decision> decisions;
+std::vector<SeparationResult> decideAll(const PlacedConvex& body, std::span<const Triangle> mesh) {
+  std::vector<SeparationResult> separations;
   for (const Triangle& triangle : mesh) {
     FeatureCache cache;
-    decisions.push_back(decide(body, bodyOf(triangle), cache));
+    separations.push_back(computeSeparation(body, bodyOf(triangle), cache));
   }
-  return decisions;
+  return separations;
 }
 
-void takeContact(const std::vector<Decision>& decisions, MeshContact& contact) {
-  for (std::uint32_t i = 0; i < decisions.size(); ++i) {
-    contact.decidedBy = std::max(contact.decidedBy, decisions[i].decidedBy);
-    if (decisions[i].verdict == Verdict::penetrating) contact.penetrated.push_back(i);
-    if (decisions[i].verdict == Verdict::touching) contact.touched.push_back(i);
+void takeContact(const std::vector<SeparationResult>& separations, MeshContact& contact) {
+  for (std::uint32_t i = 0; i < separations.size(); ++i) {
+    contact.decidedBy = std::max(contact.decidedBy, separations[i].certificate);
+    if (separations[i].verdict == Verdict::penetrating) contact.penetrated.push_back(i);
+    if (separations[i].verdict == Verdict::touching) contact.touched.push_back(i);
   }
   if (!contact.penetrated.empty()) {
     contact.verdict = Verdict::penetrating;
@@ -36,33 +36,33 @@ void takeContact(const std::vector<Decision>& decisions, MeshContact& contact) {
     contact.nearest = contact.touched.front();
   }
   if (!contact.nearest) return;
-  contact.pointA = decisions[*contact.nearest].pointA;
-  contact.pointB = decisions[*contact.nearest].pointB;
+  contact.pointA = separations[*contact.nearest].pointA;
+  contact.pointB = separations[*contact.nearest].pointB;
 }
 
-/// Another triangle may be nearer by its own bound, and the nearest is no further than this one's.
-void takeNearest(const std::vector<Decision>& decisions, MeshContact& contact) {
+/// Takes the nearest triangle, with an error bound that covers all triangles that may be nearer.
+void takeNearest(const std::vector<SeparationResult>& separations, MeshContact& contact) {
   const auto nearest = std::min_element(
-      decisions.begin(), decisions.end(),
-      [](const Decision& p, const Decision& q) { return p.distance < q.distance; });
-  contact.nearest = static_cast<std::uint32_t>(nearest - decisions.begin());
+      separations.begin(), separations.end(),
+      [](const SeparationResult& p, const SeparationResult& q) { return p.distance < q.distance; });
+  contact.nearest = static_cast<std::uint32_t>(nearest - separations.begin());
   contact.distance = nearest->distance;
   contact.pointA = nearest->pointA;
   contact.pointB = nearest->pointB;
-  for (const Decision& d : decisions)
+  for (const SeparationResult& d : separations)
     contact.errorBound = std::max(contact.errorBound, contact.distance - d.distance + d.errorBound);
 }
 
-/// Among the triangles whose bounds let them be the nearest.
-void takeNearestRefined(const ConvexBody& body, std::span<const Triangle> mesh,
-                        const std::vector<Decision>& decisions, MeshContact& contact) {
+/// Refines the triangles that may be the nearest by their error bounds.
+void takeNearestRefined(const PlacedConvex& body, std::span<const Triangle> mesh,
+                        const std::vector<SeparationResult>& separations, MeshContact& contact) {
   double reach = std::numeric_limits<double>::infinity();
-  for (const Decision& d : decisions) reach = std::min(reach, d.distance + d.errorBound);
+  for (const SeparationResult& d : separations) reach = std::min(reach, d.distance + d.errorBound);
   contact.distance = std::numeric_limits<double>::infinity();
-  for (std::uint32_t i = 0; i < decisions.size(); ++i) {
-    if (decisions[i].distance - decisions[i].errorBound > reach) continue;
+  for (std::uint32_t i = 0; i < separations.size(); ++i) {
+    if (separations[i].distance - separations[i].errorBound > reach) continue;
     FeatureCache cache;
-    const Refinement refined = refine(body, bodyOf(mesh[i]), cache);
+    const RefinedSeparation refined = refineSeparation(body, bodyOf(mesh[i]), cache);
     if (refined.distance >= contact.distance) continue;
     contact.nearest = i;
     contact.distance = refined.distance;
@@ -74,20 +74,20 @@ void takeNearestRefined(const ConvexBody& body, std::span<const Triangle> mesh,
 
 }  // namespace
 
-MeshContact bruteForceContact(const ConvexBody& body, std::span<const Triangle> mesh,
+MeshContact bruteForceContact(const PlacedConvex& body, std::span<const Triangle> mesh,
                               bool refined) {
   MeshContact contact;
-  const std::vector<Decision> decisions = decideAll(body, mesh);
-  if (decisions.empty()) {
+  const std::vector<SeparationResult> separations = decideAll(body, mesh);
+  if (separations.empty()) {
     contact.distance = std::numeric_limits<double>::infinity();
     return contact;
   }
-  takeContact(decisions, contact);
+  takeContact(separations, contact);
   if (contact.verdict != Verdict::separated) return contact;
   if (refined)
-    takeNearestRefined(body, mesh, decisions, contact);
+    takeNearestRefined(body, mesh, separations, contact);
   else
-    takeNearest(decisions, contact);
+    takeNearest(separations, contact);
   return contact;
 }
 

@@ -1,5 +1,4 @@
-// A convex body against every triangle of a mesh, one after the other: the slow twin of the mesh
-// queries.
+// Reference implementation of the mesh queries: a convex body against every triangle of a mesh.
 #pragma once
 
 #include <optional>
@@ -11,19 +10,21 @@
 
 namespace enfilade::accuracy {
 
-/// Triangles are closed and have no thickness; the mesh has no inside.
+/// Contact of a body and a mesh. Triangles are closed and have no thickness; the mesh has no
+/// interior.
 struct MeshContact {
   collision::Verdict verdict = collision::Verdict::separated;
-  collision::DecidedBy decidedBy = collision::DecidedBy::filter;  ///< the hardest of all triangles
-  double distance = 0;                                            ///< metres; 0 unless separated
-  double errorBound = 0;                                          ///< metres
+  collision::Certificate decidedBy = collision::Certificate::filter;  ///< the costliest used
+  double distance = 0;                                ///< metres; 0 unless separated
+  double errorBound = 0;                              ///< metres
   Vec3 pointA = Vec3::Zero(), pointB = Vec3::Zero();  ///< world; of A and the nearest triangle
-  std::optional<std::uint32_t> nearest;  ///< a triangle with the least distance; none: no triangles
+  std::optional<std::uint32_t> nearest;  ///< a triangle at minimum distance; nullopt: no triangles
   std::vector<std::uint32_t> penetrated, touched;  ///< all of them, ascending
 };
 
-/// `refined`: the distance by refine(), else by decide().
-MeshContact bruteForceContact(const collision::ConvexBody& body, std::span<const Triangle> mesh,
+/// Computes the contact. `refined`: the distance by refineSeparation(), otherwise by
+/// computeSeparation().
+MeshContact bruteForceContact(const collision::PlacedConvex& body, std::span<const Triangle> mesh,
                               bool refined);
 
 }  // namespace enfilade::accuracy

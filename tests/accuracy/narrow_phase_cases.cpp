@@ -1,7 +1,7 @@
 // narrow_phase_cases [--level decide|refine] [--meshes meshes.jsonl] [--score] FILE.jsonl...
-// Answers each case of the files with one JSON line on stdout; with --score, a table by family
-// against the truth in the files instead, and what is wrong on stderr. Exit codes: 0 done, 1 a file
-// cannot be read, 2 usage, 3 --score found something that must hold and does not.
+// Writes the answer to each case as one JSON line to stdout. With --score, writes a table by family
+// instead and the faults to stderr. Exit codes: 0 done, 1 a file cannot be read, 2 usage, 3 --score
+// found a violated requirement.
 #include <cstring>
 #include <filesystem>
 #include <iostream>
@@ -28,7 +28,7 @@ Options parse(int count, char** arguments) {
   for (int i = 1; i < count; ++i) {
     const std::string argument = arguments[i];
     const auto value = [&]() -> std::string {
-      if (i + 1 >= count) throw std::invalid_argument(argument + " wants a value");
+      if (i + 1 >= count) throw std::invalid_argument(argument + " needs a value");
       return arguments[++i];
     };
     if (argument == "--score") {
@@ -38,7 +38,7 @@ Options parse(int count, char** arguments) {
     } else if (argument == "--level") {
       const std::string level = value();
       if (level != "decide" && level != "refine")
-        throw std::invalid_argument("--level is decide or refine, not " + level);
+        throw std::invalid_argument("--level must be decide or refine, not " + level);
       options.level = level == "decide" ? Level::decide : Level::refine;
     } else if (argument.rfind("--", 0) == 0) {
       throw std::invalid_argument("unknown option " + argument);
@@ -46,7 +46,7 @@ Options parse(int count, char** arguments) {
       options.files.push_back(argument);
     }
   }
-  if (options.files.empty()) throw std::invalid_argument("no file of cases is named");
+  if (options.files.empty()) throw std::invalid_argument("no case file given");
   return options;
 }
 
@@ -56,18 +56,18 @@ int run(const Options& options) {
   std::map<std::string, Score> scores;
   for (const std::string& file : options.files) {
     if (std::filesystem::is_directory(file))
-      throw std::runtime_error(file + ": is a folder; name its files of cases");
-    std::map<long, Warmth> sequences;
+      throw std::runtime_error(file + ": is a folder; name its case files");
+    std::map<long, WarmStart> sequences;
     const auto cases = readCases(file);
-    if (cases.empty()) throw std::runtime_error(file + ": holds no cases");
-    for (const Case& asked : cases) {
-      Warmth cold;
-      Warmth& warmth = asked.sequence ? sequences[*asked.sequence] : cold;
-      const Answer answer = answerCase(asked, meshes, options.level, warmth);
+    if (cases.empty()) throw std::runtime_error(file + ": contains no cases");
+    for (const Case& testCase : cases) {
+      WarmStart cold;
+      WarmStart& warmth = testCase.sequence ? sequences[*testCase.sequence] : cold;
+      const Answer answer = answerCase(testCase, meshes, options.level, warmth);
       if (options.score)
-        addToScore(asked, answer, options.level, meshes, scores[asked.family]);
+        addToScore(testCase, answer, options.level, meshes, scores[testCase.family]);
       else
-        std::cout << jsonLine(asked, answer) << '\n';
+        std::cout << jsonLine(testCase, answer) << '\n';
     }
   }
   if (!options.score) return 0;

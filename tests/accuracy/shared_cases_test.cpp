@@ -1,4 +1,4 @@
-// All of the shared cases, at both levels: what must hold, holds.
+// Tests all shared cases at both levels.
 #include <gtest/gtest.h>
 
 #include "collision/shapes/hull.hpp"
@@ -24,12 +24,12 @@ int scoreAll(const fs::path& folder, Level level, std::map<std::string, Score>& 
   const Meshes meshes = readMeshes(folder / "meshes.jsonl");
   int count = 0;
   for (const fs::path& file : caseFiles(folder)) {
-    std::map<long, Warmth> sequences;
-    for (const Case& asked : readCases(file)) {
-      Warmth cold;
-      Warmth& warmth = asked.sequence ? sequences[*asked.sequence] : cold;
-      addToScore(asked, answerCase(asked, meshes, level, warmth), level, meshes,
-                 scores[asked.family]);
+    std::map<long, WarmStart> sequences;
+    for (const Case& testCase : readCases(file)) {
+      WarmStart cold;
+      WarmStart& warmth = testCase.sequence ? sequences[*testCase.sequence] : cold;
+      addToScore(testCase, answerCase(testCase, meshes, level, warmth), level, meshes,
+                 scores[testCase.family]);
       ++count;
     }
   }
@@ -56,17 +56,18 @@ TEST(SharedCases, MeshQueriesAnswerAsTheTrianglesOneByOne) {
   ENFILADE_NEED_SHARED(shared);
   const Meshes meshes = readMeshes(*shared / "cases" / "meshes.jsonl");
   int contacts = 0;
-  for (const Case& asked : readCases(*shared / "cases" / "mesh_cases.jsonl")) {
-    Warmth cold;
-    const Answer answer = answerCase(asked, meshes, Level::refine, cold);
-    const collision::Hull hull = collision::buildHull(asked.a.points);
-    const collision::ConvexBody body{hull.vertices, asked.a.translation, &asked.a.rotation, &hull};
-    const MeshContact twin = bruteForceContact(body, meshes.at(asked.mesh), true);
-    EXPECT_EQ(answer.verdict, twin.verdict) << asked.id;
-    EXPECT_EQ(answer.penetrated, twin.penetrated) << asked.id;
-    EXPECT_EQ(answer.touched, twin.touched) << asked.id;
-    EXPECT_EQ(answer.distance, twin.distance) << asked.id;
-    contacts += twin.verdict == collision::Verdict::separated ? 0 : 1;
+  for (const Case& testCase : readCases(*shared / "cases" / "mesh_cases.jsonl")) {
+    WarmStart cold;
+    const Answer answer = answerCase(testCase, meshes, Level::refine, cold);
+    const collision::Hull hull = collision::buildHull(testCase.a.points);
+    const collision::PlacedConvex body{hull.vertices, testCase.a.translation, &testCase.a.rotation,
+                                       &hull};
+    const MeshContact reference = bruteForceContact(body, meshes.at(testCase.mesh), true);
+    EXPECT_EQ(answer.verdict, reference.verdict) << testCase.id;
+    EXPECT_EQ(answer.penetrated, reference.penetrated) << testCase.id;
+    EXPECT_EQ(answer.touched, reference.touched) << testCase.id;
+    EXPECT_EQ(answer.distance, reference.distance) << testCase.id;
+    contacts += reference.verdict == collision::Verdict::separated ? 0 : 1;
   }
   EXPECT_GT(contacts, 20);
   EXPECT_LT(contacts, 58);

@@ -1,5 +1,5 @@
-// The rules of the house, as functions on the text of the sources: which folder may include which,
-// where third parties may be seen, how long a file may be.
+// The rules of the architecture, as functions on the text of the sources: include directions,
+// places of third parties, sizes of files and folders, words.
 #pragma once
 
 #include <filesystem>
@@ -35,8 +35,19 @@ Faults headersWithoutPragmaOnce(const Sources& sources);
 Faults longFiles(const Sources& sources, int maxLines);
 Faults unfinishedWork(const Sources& sources);
 
-/// Each kind of problem that scene/ tells stands in scene/model/diagnostic_catalog.cpp.
-Faults problemsWithoutMeaning(const Sources& sources);
+/// A .cpp file in a room has a .hpp file of the same name. Mains, modules and the options of
+/// sanitizers have none.
+Faults sourcesWithoutHeader(const Sources& sources);
+
+/// A folder of the product holds at most `maxFiles` sources directly.
+Faults crowdedFolders(const Sources& sources, int maxFiles);
+
+/// Words of HOUSE.md's list that do not belong in technical English, one fault a place. Comments,
+/// messages and pages count; identifiers that merely contain such a word do not.
+Faults oddWords(const Sources& sources);
+
+/// Each kind of diagnostic that scene/ reports is in scene/model/diagnostic_catalog.cpp.
+Faults diagnosticsWithoutMeaning(const Sources& sources);
 
 /// Tests run side by side: a file in the system's temporary folder under a name of its author's
 /// choice is overwritten by the next test that chose it.

@@ -46,10 +46,27 @@ TEST(Architecture, EveryHeaderIsIncludedOnce) {
 }
 
 TEST(Architecture, FilesAreShort) {
-  const Faults faults = longFiles(repository(), 700);
+  Sources product;
+  for (const auto& [path, text] : repository())
+    if (path.rfind("tests/", 0) != 0 && (path.ends_with(".cpp") || path.ends_with(".hpp")))
+      product[path] = text;
+  EXPECT_EQ(longFiles(product, 500), Faults{}) << listed(longFiles(product, 500));
+  EXPECT_EQ(longFiles(repository(), 700), Faults{}) << listed(longFiles(repository(), 700));
+}
+
+TEST(Architecture, EverySourceHasAHeader) {
+  const Faults faults = sourcesWithoutHeader(repository());
   EXPECT_EQ(faults, Faults{}) << listed(faults);
-  const Faults warnings = longFiles(repository(), 500);
-  if (!warnings.empty()) std::cout << "over 500 lines:" << listed(warnings);
+}
+
+TEST(Architecture, FoldersAreSmall) {
+  const Faults faults = crowdedFolders(repository(), 26);
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+}
+
+TEST(Architecture, NoOddWordsAreUsed) {
+  const Faults faults = oddWords(repository());
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
 }
 
 TEST(Architecture, NothingIsLeftUnfinished) {
@@ -57,8 +74,8 @@ TEST(Architecture, NothingIsLeftUnfinished) {
   EXPECT_EQ(faults, Faults{}) << listed(faults);
 }
 
-TEST(Architecture, EveryProblemHasAMeaning) {
-  const Faults faults = problemsWithoutMeaning(repository());
+TEST(Architecture, EveryDiagnosticHasAMeaning) {
+  const Faults faults = diagnosticsWithoutMeaning(repository());
   EXPECT_EQ(faults, Faults{}) << listed(faults);
 }
 
@@ -102,17 +119,46 @@ TEST(ArchitectureRules, ANewRoomMustBeListed) {
             Faults{"scene/attic/box.cpp:1: scene/attic/ is not a known room; add it to kRooms"});
 }
 
-TEST(ArchitectureRules, AProblemThatIsNotExplainedIsAFault) {
+TEST(ArchitectureRules, ADiagnosticWithoutMeaningIsAFault) {
   const Sources sources{
-      {"scene/model/diagnostic_catalog.cpp", "ProblemKind{\"far_object\", true, \"far\"}\n"},
-      {"scene/import/one.cpp", "problems.add(\"far_object\", name);\nx({\n\"un_told\", 1});\n"},
-      {"scene/import/two.cpp", "addProblem(model_,\n  \"no_words\", name);\n"},
+      {"scene/model/diagnostic_catalog.cpp", "DiagnosticKind{\"far_object\", true, \"far\"}\n"},
+      {"scene/import/one.cpp",
+       "problems.push_back({\"far_object\", name});\nx({\n\"other\", 1});\n"},
+      {"scene/import/two.cpp", "addDiagnostic(model_,\n  \"no_words\", name);\n"},
       {"scene/import/three.cpp", "facts.problems.push_back(\n  {\"no_sense\", 1, name});\n"}};
   EXPECT_EQ(
-      problemsWithoutMeaning(sources),
+      diagnosticsWithoutMeaning(sources),
       (Faults{
           "scene/import/three.cpp:1: \"no_sense\" is not in scene/model/diagnostic_catalog.cpp",
           "scene/import/two.cpp:1: \"no_words\" is not in scene/model/diagnostic_catalog.cpp"}));
+}
+
+TEST(ArchitectureRules, ASourceWithoutHeaderIsAFault) {
+  const Sources sources{{"scene/model/shape.cpp", ""},
+                        {"scene/model/model.cpp", ""},
+                        {"scene/model/model.hpp", ""},
+                        {"server/app/main.cpp", ""},
+                        {"tests/scene/shape_test.cpp", ""}};
+  EXPECT_EQ(sourcesWithoutHeader(sources),
+            Faults{"scene/model/shape.cpp: no header of the same name"});
+}
+
+TEST(ArchitectureRules, ACrowdedFolderIsAFault) {
+  const Sources sources{{"scene/model/a.cpp", ""},
+                        {"scene/model/a.hpp", ""},
+                        {"scene/model/b.hpp", ""},
+                        {"scene/model/shapes/c.hpp", ""},
+                        {"scene/model/README.md", ""}};
+  EXPECT_EQ(crowdedFolders(sources, 2), Faults{"scene/model/: 3 sources"});
+  EXPECT_EQ(crowdedFolders(sources, 3), Faults{});
+}
+
+TEST(ArchitectureRules, AnOddWordIsAFault) {
+  const Sources sources{
+      {"scene/model/a.hpp", "// Whoever was told stands beside it.\nint nearTold, besideIt;\n"},
+      {"docs/page.md", "The server reports each contact.\n"}};
+  EXPECT_EQ(oddWords(sources), (Faults{"scene/model/a.hpp:1: Whoever", "scene/model/a.hpp:1: told",
+                                       "scene/model/a.hpp:1: beside"}));
 }
 
 TEST(ArchitectureRules, ATestsFileUnderASharedNameIsAFault) {

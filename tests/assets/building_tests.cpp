@@ -11,7 +11,7 @@
 namespace enfilade::assets {
 namespace {
 
-using scene::Box;
+using scene::Aabb;
 using scene::Model;
 using scene::Object;
 using scene::Vec3;
@@ -21,15 +21,15 @@ const Model& building() {
   return model;
 }
 
-Box boxOf(const Model& model, const Object& object) {
-  Box box;
+Aabb boxOf(const Model& model, const Object& object) {
+  Aabb box;
   for (std::uint32_t mesh : object.meshes)
     for (std::uint32_t i = 0; i < model.meshes[mesh].positions.size(); ++i)
-      box.include(worldPosition(object, model.meshes[mesh], i));
+      box.include(computeWorldPosition(object, model.meshes[mesh], i));
   return box;
 }
 
-Box boxOf(const std::string& path) {
+Aabb boxOf(const std::string& path) {
   for (const Object& object : building().objects)
     if (object.path == path) return boxOf(building(), object);
   ADD_FAILURE() << "no object " << path;
@@ -41,13 +41,14 @@ void eachTriangle(const Model& model, const Object& object, Visit visit) {
   for (std::uint32_t m : object.meshes) {
     const scene::Mesh& mesh = model.meshes[m];
     for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3)
-      visit(worldPosition(object, mesh, mesh.indices[i]),
-            worldPosition(object, mesh, mesh.indices[i + 1]),
-            worldPosition(object, mesh, mesh.indices[i + 2]));
+      visit(computeWorldPosition(object, mesh, mesh.indices[i]),
+            computeWorldPosition(object, mesh, mesh.indices[i + 1]),
+            computeWorldPosition(object, mesh, mesh.indices[i + 2]));
   }
 }
 
-/// Edges (by position, over all meshes of the object) without as many opposite ones.
+/// Counts edges (by position, over all meshes of the object) without an equal number of opposite
+/// ones.
 std::size_t unmatchedEdges(const Model& model, const Object& object) {
   using Corner = std::array<float, 3>;
   std::map<std::pair<Corner, Corner>, int> balance;
@@ -77,7 +78,7 @@ double volumeOf(const Model& model, const Object& object) {
   return volume;
 }
 
-TEST(Building, HasAsManyObjectsAsWasAskedFor) {
+TEST(Building, HasTheRequestedNumberOfObjects) {
   EXPECT_GE(building().objects.size(), 2000u);
   EXPECT_LE(building().objects.size(), 5000u);
   EXPECT_LT(building().meshes.size(), building().objects.size() * 2 / 3);
@@ -93,7 +94,7 @@ TEST(Building, NamesEveryObjectOnce) {
 TEST(Building, MakesClosedSolidsThatFaceOutwards) {
   std::size_t solids = 0;
   for (const Object& object : building().objects) {
-    if (object.path.ends_with("/canvas")) continue;  // paint is laid on as flat patches
+    if (object.path.ends_with("/canvas")) continue;  // paint is a set of flat patches
     ++solids;
     EXPECT_EQ(unmatchedEdges(building(), object), 0u) << object.path;
     EXPECT_GT(volumeOf(building(), object), 0) << object.path;
@@ -120,12 +121,12 @@ TEST(Building, HasUnitNormalsThatAgreeWithTheWinding) {
 }
 
 TEST(Building, LeavesTheAxisOfTheEnfiladeFree) {
-  const Box corridor{{-0.3, 0.02, -0.35}, {49, 2.0, 0.35}};
+  const Aabb corridor{{-0.3, 0.02, -0.35}, {49, 2.0, 0.35}};
   std::size_t seen = 0;
   for (const Object& object : building().objects) {
     if (!overlaps(boxOf(building(), object), corridor)) continue;
     eachTriangle(building(), object, [&](const Vec3& a, const Vec3& b, const Vec3& c) {
-      Box box;
+      Aabb box;
       for (const Vec3& p : {a, b, c}) box.include(p);
       EXPECT_FALSE(overlaps(box, corridor)) << object.path;
     });
@@ -134,11 +135,12 @@ TEST(Building, LeavesTheAxisOfTheEnfiladeFree) {
   EXPECT_LT(seen, 100u);
 }
 
-/// The highest surface not above `y` + 0.02 straight below a point; -1e9 if there is none.
+/// Height of the highest surface at most 0.02 above `y`, straight below a point; -1e9 if none was
+/// found.
 double floorBelow(double x, double z, double y) {
   double floor = -1e9;
   for (const Object& object : building().objects) {
-    const Box box = boxOf(building(), object);
+    const Aabb box = boxOf(building(), object);
     if (box.min.x() > x || box.max.x() < x || box.min.z() > z || box.max.z() < z) continue;
     eachTriangle(building(), object, [&](const Vec3& a, const Vec3& b, const Vec3& c) {
       const double area = (b.x() - a.x()) * (c.z() - a.z()) - (c.x() - a.x()) * (b.z() - a.z());
@@ -166,7 +168,7 @@ TEST(Building, HasAFloorUnderEveryDoorAndRoomOfTheEnfilade) {
 }
 
 TEST(Building, HasAStairThatCanBeWalked) {
-  std::vector<Box> steps;
+  std::vector<Aabb> steps;
   for (int k = 1; k <= 24; ++k) {
     const std::string number = (k < 10 ? "0" : "") + std::to_string(k);
     steps.push_back(boxOf("building/hall/stair/" + (k == 12 ? "landing" : "tread" + number)));
@@ -183,9 +185,9 @@ TEST(Building, HasAStairThatCanBeWalked) {
     east = steps[i].min.x();
   }
   EXPECT_NEAR(4.2 - below, 0.168, 1e-6);
-  // Headroom over the flights: nothing hangs where heads pass.
-  for (const Box& step : steps) {
-    Box heads{step.min, step.max};
+  // Headroom over the flights: no obstacle at head height.
+  for (const Aabb& step : steps) {
+    Aabb heads{step.min, step.max};
     heads.min += Vec3{0.02, step.size().y() + 0.3, 0.3};
     heads.max += Vec3{-0.05, 2.1, -0.3};
     for (const Object& object : building().objects) {
@@ -206,8 +208,8 @@ TEST(Building, HangsItsDoorsOnTheirHinges) {
     if (part.kind == MovingPart::Kind::slide) continue;
     EXPECT_NE(object.path.find("leaf"), std::string::npos);
     const Vec3 hinge = object.worldFromMesh.translation();
-    const Box box = boxOf(model, object);
-    // The hinge stands at one end of the leaf, in the middle of its thickness.
+    const Aabb box = boxOf(model, object);
+    // The hinge is at one end of the leaf, in the middle of its thickness.
     const double toEdge = std::min({hinge.x() - box.min.x(), box.max.x() - hinge.x(),
                                     hinge.z() - box.min.z(), box.max.z() - hinge.z()});
     EXPECT_LE(std::abs(toEdge), 0.005) << object.path;
@@ -216,7 +218,7 @@ TEST(Building, HangsItsDoorsOnTheirHinges) {
   EXPECT_GE(slides, 5u);
 }
 
-TEST(District, HasExactlyTheObjectsAskedForAndSharesMeshes) {
+TEST(District, HasTheRequestedNumberOfObjectsAndSharesMeshes) {
   for (const std::size_t wanted : {kSmallestDistrict, std::size_t{10000}, std::size_t{100000}}) {
     const Model model = makeDistrict(wanted, 7);
     EXPECT_EQ(model.objects.size(), wanted);

@@ -1,4 +1,4 @@
-// Checkpoints where there is much: the bundled building, and the parts feeder.
+// Tests of checkpoints of large worlds: the bundled building, and the parts feeder.
 #include "assets/building.hpp"
 #include "assets/feeder.hpp"
 #include "assets/landmarks.hpp"
@@ -10,29 +10,29 @@ namespace {
 
 using namespace scene::testing;
 
-TEST(CheckpointOfAssets, AWalkThroughTheBuildingGoesOnToTheLastBit) {
+TEST(CheckpointOfAssets, ARestoredWalkThroughTheBuildingIsBitEqual) {
   const auto building = std::make_shared<const scene::Scene>(makeBuilding());
-  std::map<std::uint64_t, ToldOnce> told;
+  std::map<std::uint64_t, TickCommands> commands;
   for (int i = 0; i < 6; ++i) {
     const std::string name = "w" + std::to_string(i);
     const scene::Vec3 room = landmarks::kRooms.at(static_cast<std::size_t>(i));
     scene::Spawn spawn;
-    spawn.at = room + scene::Vec3(0, 0.05, 0.5);
-    told[1].avatars.push_back({name, spawn, 1});
+    spawn.position = room + scene::Vec3(0, 0.05, 0.5);
+    commands[1].avatars.push_back({name, spawn, 1});
     scene::Walk walk{{landmarks::kDoors.at(static_cast<std::size_t>(i) + 2),
                       landmarks::kBeforeBench, landmarks::kInBench, landmarks::kStart},
                      1.4 + 0.2 * i};
-    told[1].avatars.push_back({name, walk, 2});
-    told[400].avatars.push_back({name, scene::Drive{{2, 0, 0.3 * i - 1}}, 3});
+    commands[1].avatars.push_back({name, walk, 2});
+    commands[400].avatars.push_back({name, scene::Drive{{2, 0, 0.3 * i - 1}}, 3});
   }
-  goOnAlike(building, {}, told, 700, {150, 333, 399}, 300);
+  compareCopies(building, {}, commands, 700, {150, 333, 399}, 300);
 }
 
-TEST(CheckpointOfAssets, APartsFeederGoesOnToTheLastBit) {
+TEST(CheckpointOfAssets, ARestoredPartsFeederIsBitEqual) {
   scene::Model model = makeFeeder({40, 1});
   applySidecar(model, feederSidecar(), "feeder.walk.json");
   const auto feeder = std::make_shared<const scene::Scene>(std::move(model));
-  goOnAlike(feeder, {}, {}, 150, {5, 60}, 90);
+  compareCopies(feeder, {}, {}, 150, {5, 60}, 90);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The bundled house is right: nothing that is driven in it runs into anything else.
+// Tests of the bundled building: no kinematic body hits another object.
 #include "assets/building.hpp"
 #include "assets/sidecar_writer.hpp"
 #include "scene/import/bodies/sidecar.hpp"
@@ -14,10 +14,10 @@ TEST(BuildingClashes, DoorsAndLiftTouchNothingOnTheirWays) {
   scene::Model model = makeBuilding({}, &parts);
   const std::string sidecar = sidecarText(model, parts);
   applySidecar(model, sidecar, "building.walk.json");
-  BodyTrial trial(std::move(model));
+  BodyFixture run(std::move(model));
   std::size_t driven = 0;
   for (const bool high : {true, false}) {
-    for (const scene::Body& body : trial.world.state().bodies) {
+    for (const scene::Body& body : run.world.data().bodies) {
       const scene::BodySpec& spec = *body.spec;
       if (!scene::isKinematic(spec.kind)) continue;
       scene::BodyCommand command;
@@ -25,16 +25,17 @@ TEST(BuildingClashes, DoorsAndLiftTouchNothingOnTheirWays) {
       const bool isPath = spec.kind == scene::BodyKind::path;
       command.action =
           isPath ? (high ? scene::BodyCommand::Action::run : scene::BodyCommand::Action::stop)
-                 : scene::BodyCommand::Action::to;
-      command.to = high ? spec.high : spec.low;
-      trial.tell(command);
+                 : scene::BodyCommand::Action::moveTo;
+      command.target = high ? spec.high : spec.low;
+      run.submit(command);
       ++driven;
     }
-    trial.untilIdle();
+    run.untilIdle();
   }
   EXPECT_GT(driven, 50u);
-  for (const scene::ContactEvent& event : trial.events) {
-    const std::string a = nameOf(trial.world, event.a), b = nameOf(trial.world, event.b);
+  for (const scene::ContactEvent& event : run.events) {
+    const std::string a = findEntityName(run.world, event.a),
+                      b = findEntityName(run.world, event.b);
     const bool settles = a == "ground/study/armchair" && b == "building/ground/study/floor";
     EXPECT_TRUE(settles) << a << " meets " << b << " in tick " << event.tick;
   }

@@ -36,7 +36,7 @@ TEST(Glb, IsTheSameFromRunToRunAndFromCompilerToCompiler) {
   std::vector<MovingPart> parts;
   const scene::Model again = makeBuilding({}, &parts);
   EXPECT_EQ(glbBytes(again, parts), buildingBytes());
-  // Pinned: a change of the building changes this on purpose.
+  // Pinned hash: a deliberate change of the building changes it.
   EXPECT_EQ(fnv1a(buildingBytes()), 0x438eefe85a7899c1u) << std::hex << fnv1a(buildingBytes());
 }
 
@@ -114,18 +114,18 @@ TEST(Glb, KeepsAnObjectThatLiesUnderAnotherInPlace) {
   EXPECT_EQ(handle->mTransformation.b4, 1);
 }
 
-TEST(Glb, RefusesWhatItCannotHold) {
+TEST(Glb, RefusesModelsBeyondTheFormatsLimits) {
   EXPECT_THROW(glbBytes({}), std::invalid_argument);
-  scene::Model twins;
-  twins.meshes.resize(1);
-  twins.meshes[0].positions.resize(3);
-  twins.meshes[0].indices = {0, 1, 2};
-  twins.objects.resize(2);
-  for (scene::Object& object : twins.objects) {
-    object.path = "twin";
+  scene::Model duplicates;
+  duplicates.meshes.resize(1);
+  duplicates.meshes[0].positions.resize(3);
+  duplicates.meshes[0].indices = {0, 1, 2};
+  duplicates.objects.resize(2);
+  for (scene::Object& object : duplicates.objects) {
+    object.path = "same";
     object.meshes = {0};
   }
-  EXPECT_THROW(glbBytes(twins), std::invalid_argument);
+  EXPECT_THROW(glbBytes(duplicates), std::invalid_argument);
   EXPECT_THROW(writeGlb("/nowhere/at/all.glb", makeBuilding()), std::runtime_error);
 }
 

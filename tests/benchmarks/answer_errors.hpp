@@ -1,4 +1,4 @@
-// Answers against the truth: counts, and relative errors.
+// Error statistics of a method's answers against the truth: counts and relative errors.
 #pragma once
 
 #include "tests/benchmarks/measurement.hpp"
@@ -6,19 +6,20 @@
 
 namespace enfilade::benchmarks {
 
-/// Metres; the larger precision of long double (64 bits) is enough to tell errors of a double.
+/// Metres. The 64 bits of precision of long double suffice to measure the error of a double.
 struct TrueAnswer {
   bool collides = false;
-  long double distance = 0, depth = 0;  ///< depth 0: touching, or not known
-  double scale = 1;  ///< verdicts are told apart by whether they miss more than 1e-9 of this
+  long double distance = 0, depth = 0;  ///< depth 0: touching, or unknown
+  /// `wrongBeyond` counts wrong verdicts if the true distance or depth exceeds 1e-9 of this.
+  double scale = 1;
 };
 
 struct Errors {
   std::size_t count = 0, wrong = 0, wrongBeyond = 0, none = 0;
   std::size_t filter = 0, expansion = 0, rational = 0;
-  std::size_t upperBounds = 0;          ///< depths that are not proved to be the least
-  std::vector<double> distance, depth;  ///< relative; depth: upper bounds as well
-  std::vector<double> provedDepth;      ///< relative; without them
+  std::size_t upperBounds = 0;          ///< depths that are not proven minimal
+  std::vector<double> distance, depth;  ///< relative errors; depth includes upper bounds
+  std::vector<double> provedDepth;      ///< relative errors without upper bounds
 
   void add(const Answer& answer, const TrueAnswer& truth) {
     ++count;
@@ -59,10 +60,10 @@ struct Errors {
   }
 
  private:
-  static double relative(double told, long double truth) {
-    return static_cast<double>(std::abs(told - truth) / truth);
+  static double relative(double measured, long double truth) {
+    return static_cast<double>(std::abs(measured - truth) / truth);
   }
-  /// Median, 99 %, greatest; null when nothing was told.
+  /// Median, 99th percentile, maximum; null without values.
   static nlohmann::json quantiles(const std::vector<double>& values) {
     if (values.empty()) return nullptr;
     return {number(quantile(values, 0.5)), number(quantile(values, 0.99)),

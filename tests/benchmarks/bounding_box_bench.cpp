@@ -1,12 +1,14 @@
-// Boxes of turning bodies (seed 5.2.1): what each method costs, and what its box lets through.
+// Bounding boxes of rotating bodies (Lin 1993, section 5.2.1): cost of each method, and pairs that
+// its box admits.
 //
 //   bounding_box_bench [TICKS]
-//   bounding_box_bench --only cube|climb|walls|all VERTICES [TICKS]    for callgrind, with
-//       valgrind --tool=callgrind --collect-atstart=no --toggle-collect='*boxesOf*'
+//   bounding_box_bench --only cube|climb|walls|all VERTICES [TICKS]
+//      for callgrind, with valgrind --tool=callgrind --collect-atstart=no
+//      --toggle-collect='*boxesOf*'
 //
-// Bodies of 8, 20 and 60 vertices in ellipsoids, round to oblong, turn by 2 degrees a tick. Pairs:
-// the boxes of a furnished storey (68 in a room of 6 m x 5 m x 3 m) that the cube and the tight box
-// meet on average, and which of the two boxMethodFor() chooses.
+// Bodies of 8, 20 and 60 vertices in round to oblong ellipsoids rotate by 2 degrees a tick. Pairs:
+// average overlaps of the cube and of the tight box with the boxes of a furnished storey (68 in a
+// room of 6 m x 5 m x 3 m), and the choice of chooseAabbMethod().
 
 #include <chrono>
 #include <cmath>
@@ -53,18 +55,19 @@ std::vector<Pose> turning(Random& random, int ticks) {
   return poses;
 }
 
-using Method = Box (*)(const Hull&, const Pose&, ExtremalVertices&);
+using Method = Aabb (*)(const Hull&, const Pose&, ExtremalVertices&);
 struct Named {
   const char* name;
   Method method;
 };
 const std::vector<Named> kMethods{
-    {"cube", [](const Hull& h, const Pose& p, ExtremalVertices&) { return fixedCube(h, p); }},
-    {"climb", [](const Hull& h, const Pose& p, ExtremalVertices& v) { return tightBox(h, p, v); }},
+    {"cube",
+     [](const Hull& h, const Pose& p, ExtremalVertices&) { return boundingSphereCube(h, p); }},
+    {"climb", [](const Hull& h, const Pose& p, ExtremalVertices& v) { return tightAabb(h, p, v); }},
     {"walls",
-     [](const Hull& h, const Pose& p, ExtremalVertices& v) { return tightBoxByWalls(h, p, v); }},
+     [](const Hull& h, const Pose& p, ExtremalVertices& v) { return tightAabbVoronoi(h, p, v); }},
     {"all",
-     [](const Hull& h, const Pose& p, ExtremalVertices&) { return tightBoxBruteForce(h, p); }}};
+     [](const Hull& h, const Pose& p, ExtremalVertices&) { return tightAabbBruteForce(h, p); }}};
 
 [[gnu::noinline]] double boxesOf(Method method, const Hull& hull, const std::vector<Pose>& poses) {
   ExtremalVertices last;
@@ -84,9 +87,9 @@ double nanoseconds(Method method, const Hull& hull, const std::vector<Pose>& pos
   return least;
 }
 
-/// The still boxes of a room, as seen from the places where a body may stand in it.
-std::vector<Box> furniture(Random& random) {
-  std::vector<Box> boxes;
+/// The static boxes of a room, relative to random body positions in it.
+std::vector<Aabb> furniture(Random& random) {
+  std::vector<Aabb> boxes;
   for (int k = 0; k < 68; ++k) {
     const bool large = k % 8 == 0;
     const double sx = uniform(random, 0.05, large ? 2.0 : 0.5);
@@ -98,17 +101,17 @@ std::vector<Box> furniture(Random& random) {
   return boxes;
 }
 
-/// Boxes met on average while the body stands anywhere in a room that repeats on all sides.
+/// Mean number of overlaps for a body at random positions in a room that repeats on all sides.
 double meanMet(Method method, const Hull& hull, const std::vector<Pose>& poses,
-               const std::vector<Box>& room) {
+               const std::vector<Aabb>& room) {
   Random random(3);
   ExtremalVertices last;
   double met = 0;
   for (Pose pose : poses) {
     const double x = uniform(random, 0, 6), y = uniform(random, 0, 3), z = uniform(random, 0, 5);
     pose.translation = Vec3(x, y, z);
-    const Box box = method(hull, pose, last);
-    for (const Box& other : room) {
+    const Aabb box = method(hull, pose, last);
+    for (const Aabb& other : room) {
       double count = 1;
       for (int axis = 0; axis < 3; ++axis) {
         const double period = axis == 0 ? 6 : axis == 1 ? 3 : 5;
@@ -141,7 +144,7 @@ int main(int argc, char** argv) {
   const int ticks = argc > 1 ? std::max(1, std::atoi(argv[1])) : 2000;
   Random random(1);
   const std::vector<Pose> poses = turning(random, ticks);
-  const std::vector<Box> room = furniture(random);
+  const std::vector<Aabb> room = furniture(random);
   std::printf("%22s %8s | %6s %6s %6s %6s ns | %8s %8s | %s\n", "half axes, m", "vertices", "cube",
               "climb", "walls", "all", "met cube", "tight", "chosen");
   for (const double size : {0.1, 0.25, 0.5}) {
@@ -155,7 +158,7 @@ int main(int argc, char** argv) {
         }
         std::printf("    | %8.2f %8.2f | %s\n", meanMet(kMethods[0].method, hull, poses, room),
                     meanMet(kMethods[1].method, hull, poses, room),
-                    boxMethodFor(hull) == BoxMethod::fixedCube ? "cube" : "tight");
+                    chooseAabbMethod(hull) == AabbMethod::boundingSphereCube ? "cube" : "tight");
       }
     }
   }

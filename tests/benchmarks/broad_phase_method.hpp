@@ -1,5 +1,5 @@
-// One interface for every broad phase that is measured: ours, the other approaches of the seed
-// (5.2.3, 5.3) and the peers.
+// Interface of every benchmarked broad phase: ours, other approaches of Lin (1993, sections 5.2.3
+// and 5.3) and peers.
 #pragma once
 
 #include <cstdint>
@@ -13,72 +13,71 @@
 
 namespace enfilade::benchmarks {
 
-using collision::Box;
-using collision::BoxPair;
+using collision::Aabb;
+using collision::ProxyPair;
 using collision::Vec3;
 
-/// What a method has to tell every tick: all of its pairs, in any order, each once. Keeps a number
-/// and a sum of mixed ids, so that two sets can be compared every tick at a nanosecond a pair;
-/// `kept`, when given, collects the pairs themselves.
+/// The pairs that a method must report each tick, each once and in any order. Stores their number
+/// and a sum of mixed ids, which compares two sets for a nanosecond a pair. `kept`, if given,
+/// collects the pairs themselves.
 struct PairTally {
   std::uint64_t count = 0, sum = 0;
-  std::vector<BoxPair>* kept = nullptr;
+  std::vector<ProxyPair>* kept = nullptr;
 
   void addStill(std::uint32_t mover, std::uint32_t still) { add({mover, still, false}); }
-  /// Two movers, in any order.
+  /// Two dynamic proxies, in any order.
   void addMovers(std::uint32_t a, std::uint32_t b) { add({std::min(a, b), std::max(a, b), true}); }
   bool sameAs(const PairTally& other) const { return count == other.count && sum == other.sum; }
 
  private:
-  /// The finishing step of splitmix64 (Steele, Lea and Flood 2014).
+  /// Finalizer of splitmix64 (Steele, Lea and Flood 2014).
   static std::uint64_t mixed(std::uint64_t x) {
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
     x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
     return x ^ (x >> 31);
   }
-  void add(const BoxPair& pair) {
-    const std::uint64_t other = 2 * std::uint64_t{pair.other} + (pair.otherMoves ? 1 : 0);
-    sum += mixed((std::uint64_t{pair.mover} << 33) + other + 1);
+  void add(const ProxyPair& pair) {
+    const std::uint64_t other = 2 * std::uint64_t{pair.other} + (pair.otherIsDynamic ? 1 : 0);
+    sum += mixed((std::uint64_t{pair.proxy} << 33) + other + 1);
     ++count;
     if (kept != nullptr) kept->push_back(pair);
   }
 };
 
-/// Holds still boxes since its construction and movers since its first tick.
+/// Holds static boxes from its construction and dynamic proxies from its first tick.
 class BroadPhase {
  public:
   virtual ~BroadPhase() = default;
-  /// Takes every mover to its new box (on the first call: inserts them) and tells all pairs of
-  /// closed boxes that overlap, exactly: a mover and a still box, or two movers.
-  virtual void tick(std::span<const Box> movers, PairTally& tally) = 0;
-  /// Bytes that malloc does not know of.
+  /// Moves every proxy to its new box (the first call inserts them) and reports exactly all
+  /// overlapping pairs of closed boxes: a dynamic and a static one, or two dynamic ones.
+  virtual void tick(std::span<const Aabb> movers, PairTally& tally) = 0;
+  /// Bytes allocated without malloc.
   virtual std::size_t hiddenBytes() const { return 0; }
-  /// Whether it goes on reading the still boxes that it was given, so that it needs no copy of
-  /// them.
+  /// Whether the method reads the given static boxes after construction, so that it needs no copy.
   virtual bool readsGivenBoxes() const { return true; }
 };
 
 struct BroadPhaseMethod {
   std::string name;
   enum class Kind { ours, approach, peer } kind;
-  /// Left out above so many still objects, and for this reason.
+  /// The method is skipped above this number of static objects, for `reason`.
   std::size_t mostObjects;
   std::string reason;
   /// `still` outlives the method.
-  std::function<std::unique_ptr<BroadPhase>(std::span<const Box> still)> make;
+  std::function<std::unique_ptr<BroadPhase>(std::span<const Aabb> still)> make;
 };
 
 template <typename Method, typename... Arguments>
 auto maker(Arguments... arguments) {
-  return [arguments...](std::span<const Box> still) -> std::unique_ptr<BroadPhase> {
+  return [arguments...](std::span<const Aabb> still) -> std::unique_ptr<BroadPhase> {
     return std::make_unique<Method>(still, arguments...);
   };
 }
 
-/// All that were there at configure time: ours first, then the approaches, then the peers.
+/// All methods found at configure time: ours first, then other approaches, then peers.
 std::vector<BroadPhaseMethod> broadPhaseMethods();
 
-// One for each source file.
+// Factories, one per source file.
 BroadPhaseMethod ourSortAndSweep();
 BroadPhaseMethod bruteForce();
 BroadPhaseMethod hashGrid();

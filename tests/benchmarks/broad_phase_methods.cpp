@@ -5,9 +5,9 @@ namespace {
 
 class OurSortAndSweep : public BroadPhase {
  public:
-  explicit OurSortAndSweep(std::span<const Box> still) : sweep_(still) {}
+  explicit OurSortAndSweep(std::span<const Aabb> still) : sweep_(still) {}
 
-  void tick(std::span<const Box> movers, PairTally& tally) override {
+  void tick(std::span<const Aabb> movers, PairTally& tally) override {
     for (std::uint32_t id = 0; id < movers.size(); ++id) {
       if (inserted_) {
         sweep_.move(id, movers[id]);
@@ -18,9 +18,9 @@ class OurSortAndSweep : public BroadPhase {
     inserted_ = true;
     sweep_.update();
     for (std::uint32_t id = 0; id < movers.size(); ++id) {
-      for (const auto& partner : sweep_.partners(id)) {
-        if (!partner.moves) tally.addStill(id, partner.id);
-        if (partner.moves && id < partner.id) tally.addMovers(id, partner.id);
+      for (const auto& partner : sweep_.overlapsOf(id)) {
+        if (!partner.isDynamic) tally.addStill(id, partner.id);
+        if (partner.isDynamic && id < partner.id) tally.addMovers(id, partner.id);
       }
     }
   }

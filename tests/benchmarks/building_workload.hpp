@@ -1,7 +1,6 @@
-// The broad-phase workload: a building of storeys and rooms, walkers and turning bodies.
-//
-// 68 still objects a room of 6 m x 5 m, their order shuffled; 80 % of the movers are avatars at
-// 1.5 m/s, the others turn and drift; 60 ticks a second. Seeded: the same numbers every time.
+// The broad-phase workload: a building of storeys and rooms with avatars and rotating bodies.
+// Each room of 6 m x 5 m has 68 static objects in shuffled order. 80 % of the movers are avatars at
+// 1.5 m/s; the others rotate and drift. 60 ticks a second. Equal seeds give equal numbers.
 #pragma once
 
 #include <cstddef>
@@ -12,14 +11,14 @@
 
 namespace enfilade::benchmarks {
 
-using collision::Box;
+using collision::Aabb;
 
 struct Building {
-  std::vector<Box> still;
+  std::vector<Aabb> still;
   Vec3 extent = Vec3::Zero();  ///< metres; the low corner is the origin
 };
 
-/// At least `objects` still boxes, a whole number of rooms.
+/// Makes whole rooms with at least `objects` static boxes.
 Building makeBuilding(std::size_t objects);
 
 struct Body {
@@ -30,20 +29,20 @@ struct Body {
 
 std::vector<Body> makeBodies(Random& random, std::size_t count, const Building& building);
 
-/// Moves a body on by one tick, inside the building's walls, and returns its box.
-Box step(Body& body, const Vec3& extent);
+/// Advances a body by one tick inside the building's walls, and returns its box.
+Aabb step(Body& body, const Vec3& extent);
 
-/// The boxes of all movers, tick after tick.
+/// Generates the boxes of all movers, tick by tick.
 class BuildingMotion {
  public:
   BuildingMotion(const Building& building, std::size_t movers);
-  /// Goes on by one tick.
-  std::span<const Box> next();
+  /// Advances by one tick.
+  std::span<const Aabb> next();
 
  private:
   Vec3 extent_;
   std::vector<Body> bodies_;
-  std::vector<Box> boxes_;
+  std::vector<Aabb> boxes_;
 };
 
 }  // namespace enfilade::benchmarks

@@ -1,5 +1,5 @@
-# The collision core beside its peers: built only by `./dev bench collision`. A peer that is not
-# installed is left out, with a message.
+# Benchmarks of the collision core against its peers: built only by `./dev bench collision`. A peer
+# that is not installed is skipped with a message.
 find_package(PkgConfig QUIET)
 find_package(nlohmann_json 3 REQUIRED)
 
@@ -44,7 +44,8 @@ find_library(BENCH_EMBREE_LIBRARY embree3)
 bench_peer(embree "${BENCH_EMBREE_DIR}" INCLUDES ${BENCH_EMBREE_DIR}
   LIBRARIES ${BENCH_EMBREE_LIBRARY})
 
-# Each peer's part is compiled with that peer's flags only; the table of methods knows who is there.
+# Each peer's source is compiled with that peer's flags only; the table of methods knows the
+# available peers.
 # bench_methods(NAME SUFFIX SOURCES..): a library of peers/PEER_SUFFIX.cpp and SOURCES; the first of
 # these is the table.
 function(bench_methods name suffix table)
@@ -94,7 +95,7 @@ set(programs collision_broad_phase collision_narrow_phase collision_mesh collisi
 set_target_properties(${programs} PROPERTIES EXCLUDE_FROM_ALL ON)
 add_custom_target(collision_benchmarks DEPENDS ${programs})
 
-# The parts feeder beside the two peers that simulate; built by `./dev bench feeder`.
+# The parts feeder and the two peers that simulate it; built by `./dev bench feeder`.
 find_library(BENCH_BULLET_DYNAMICS BulletDynamics-float64)
 enfilade_benchmark(parts_feeder
   SOURCES parts_feeder.cpp ../support/parts_feeder.cpp

@@ -1,26 +1,28 @@
-// All broad phases on one motion: ours, the other approaches of the seed, the peers.
+// Benchmark of all broad phases on one motion: ours, other approaches of Lin (1993), peers.
 //
 //   collision_broad_phase [--quick] [--out FILE] [--only PART_OF_A_NAME]
-//   collision_broad_phase --ours OBJECTS MOVERS [TICKS]    ours alone, unchecked: for callgrind,
-//   with
-//       valgrind --tool=callgrind --collect-atstart=no --toggle-collect='*oursTick*'
+//   collision_broad_phase --ours OBJECTS MOVERS [TICKS]
+//      ours alone, unchecked: for callgrind, with valgrind --tool=callgrind --collect-atstart=no
+//      --toggle-collect='*oursTick*'
 //
-// The workload is building_workload.hpp's. Every method gets the same boxes, in turns of some
-// dozens of ticks, so that a disturbance of the machine meets all of them. A tick is timed from the
-// new boxes to all pairs told; its pairs are compared with those of a method of its own (PairTruth)
-// by number and sum of mixed ids, every tick. A method stops when its time for a size is used up.
+// The workload is that of building_workload.hpp. Methods run in turns of some dozens of ticks on
+// the same boxes, so that a disturbance of the machine affects all of them. A tick is timed from
+// the new boxes to all reported pairs. Number and sum of mixed ids of its pairs are checked against
+// an independent method (PairTruth) every tick. A method stops when its time for a size is used up.
 //
-// The motion is run kRuns times, each time by methods built anew, and a tick counts with the least
-// of its times, since every run does the same work and a busy machine only adds to it. Methods that
-// take long to build run once.
+// The motion is run kRuns times with newly built methods. A tick counts with its minimum time, as
+// all runs do the same work and a busy machine only adds time. Methods with a long build time run
+// once.
 //
-// Bytes are those that a method holds besides the still boxes themselves, before there are movers:
-// its heap, less 48 bytes a box if it has copied them (the others go on reading the ones given).
+// Bytes are the method's heap without the static boxes themselves, before movers are added: 48
+// bytes a box are subtracted if the method copied them.
 
 #include <malloc.h>
 
 #include <cstdlib>
 #include <cstring>
+
+#include "collision/broad_phase/broad_phase_audit.hpp"
 #include "tests/benchmarks/broad_phase_method.hpp"
 #include "tests/benchmarks/building_workload.hpp"
 #include "tests/benchmarks/measurement.hpp"
@@ -37,27 +39,27 @@ constexpr double kLongToBuild = 0.5;  // seconds
 struct Effort {
   std::size_t mostObjects;
   int ticks;
-  double secondsAMethod;  ///< for ticks, per size; at least kLeastTicks are made all the same
-  std::size_t slowShare;  ///< methods with a limit of objects are left out above limit / slowShare
+  double secondsAMethod;  ///< for ticks, per size; at least kMinTicks are always made
+  std::size_t slowShare;  ///< methods with an object limit are skipped above limit / slowShare
 };
-constexpr int kLeastTicks = 4;
+constexpr int kMinTicks = 4;
 
-/// The pairs of a tick by candidates: for each mover all still boxes within a metre of where it was
-/// when they were last gathered. Gathers from a list sorted on x, the one thing it has of a method.
+/// Reference for the pairs of a tick: for each mover all static boxes within a metre of its
+/// position at the last gathering. Gathering scans a list sorted on x.
 class PairTruth {
  public:
-  explicit PairTruth(std::span<const Box> still) : still_(still) {
+  explicit PairTruth(std::span<const Aabb> still) : still_(still) {
     for (std::uint32_t s = 0; s < still.size(); ++s) byX_.emplace_back(still[s].min.x(), s);
-    for (const Box& box : still) widest_ = std::max(widest_, box.size().x());
+    for (const Aabb& box : still) widest_ = std::max(widest_, box.size().x());
     std::sort(byX_.begin(), byX_.end());
   }
 
-  PairTally tick(std::span<const Box> movers) {
+  PairTally tick(std::span<const Aabb> movers) {
     reach_.resize(movers.size());
     candidates_.resize(movers.size());
     PairTally tally;
     for (std::uint32_t a = 0; a < movers.size(); ++a) {
-      if (!collision::contains(reach_[a], movers[a])) gather(a, collision::grown(movers[a], 1));
+      if (!collision::contains(reach_[a], movers[a])) gather(a, collision::inflated(movers[a], 1));
       for (const std::uint32_t s : candidates_[a]) {
         if (collision::overlaps(movers[a], still_[s])) tally.addStill(a, s);
       }
@@ -69,7 +71,7 @@ class PairTruth {
   }
 
  private:
-  void gather(std::uint32_t mover, const Box& reach) {
+  void gather(std::uint32_t mover, const Aabb& reach) {
     reach_[mover] = reach;
     candidates_[mover].clear();
     auto at = std::lower_bound(byX_.begin(), byX_.end(),
@@ -79,28 +81,28 @@ class PairTruth {
     }
   }
 
-  std::span<const Box> still_;
+  std::span<const Aabb> still_;
   std::vector<std::pair<double, std::uint32_t>> byX_;
   double widest_ = 0;
-  std::vector<Box> reach_;
+  std::vector<Aabb> reach_;
   std::vector<std::vector<std::uint32_t>> candidates_;
 };
 
-/// The truth is itself compared with the slow twin of the library, once a size.
-bool truthHolds(const Building& building, std::span<const Box> movers, const PairTally& told) {
-  std::vector<std::pair<collision::MoverId, Box>> live;
+/// The reference itself is compared with the library's brute force, once a size.
+bool truthHolds(const Building& building, std::span<const Aabb> movers, const PairTally& reported) {
+  std::vector<std::pair<collision::ProxyId, Aabb>> live;
   for (std::uint32_t id = 0; id < movers.size(); ++id) live.emplace_back(id, movers[id]);
   PairTally expected;
-  for (const BoxPair& pair : collision::bruteForcePairs(building.still, live)) {
-    if (pair.otherMoves) expected.addMovers(pair.mover, pair.other);
-    if (!pair.otherMoves) expected.addStill(pair.mover, pair.other);
+  for (const ProxyPair& pair : collision::findPairsBruteForce(building.still, live)) {
+    if (pair.otherIsDynamic) expected.addMovers(pair.proxy, pair.other);
+    if (!pair.otherIsDynamic) expected.addStill(pair.proxy, pair.other);
   }
-  return expected.sameAs(told);
+  return expected.sameAs(reported);
 }
 
-/// The boxes of all ticks, and what is to be told about them.
+/// The boxes of all ticks, and their expected pairs.
 struct Motion {
-  std::vector<std::vector<Box>> boxes;
+  std::vector<std::vector<Aabb>> boxes;
   std::vector<PairTally> pairs;
 };
 
@@ -115,7 +117,7 @@ Motion record(const Building& building, std::size_t movers, int ticks) {
   }
   const std::size_t work = movers * building.still.size();
   if (work <= 10000000 && !truthHolds(building, motion.boxes[0], motion.pairs[0])) {
-    std::fprintf(stderr, "the truth differs from brute force\n");
+    std::fprintf(stderr, "the reference differs from brute force\n");
     std::exit(1);
   }
   return motion;
@@ -125,7 +127,7 @@ struct Run {
   const BroadPhaseMethod* method = nullptr;
   std::unique_ptr<BroadPhase> phase;
   double buildSeconds = 0, bytesAnObject = 0, spent = 0;
-  std::vector<double> microseconds;  ///< by tick; 0 where it was not timed
+  std::vector<double> microseconds;  ///< by tick; 0 if not timed
   std::size_t tick = 0, wrong = 0;
 };
 
@@ -143,18 +145,18 @@ Run build(const BroadPhaseMethod& method, const Building& building) {
   run.buildSeconds = secondsSince(start);
   const double bytes = heapBytes() - before + static_cast<double>(run.phase->hiddenBytes());
   run.bytesAnObject = bytes / static_cast<double>(building.still.size());
-  if (!run.phase->readsGivenBoxes()) run.bytesAnObject -= sizeof(Box);
+  if (!run.phase->readsGivenBoxes()) run.bytesAnObject -= sizeof(Aabb);
   return run;
 }
 
-/// Some ticks of one method. The first of them finds the caches full of other methods' data (and
-/// the very first inserts the movers): it is not timed.
+/// Runs some ticks of one method. The first tick finds the caches full of other methods' data (and
+/// the very first inserts the movers), so it is not timed.
 void turn(Run& run, const Motion& motion, const Effort& effort) {
   const std::size_t until =
       std::min(motion.boxes.size(), run.tick + motion.boxes.size() / kTurns + 1);
   const std::size_t first = run.tick;
   for (; run.tick < until; ++run.tick) {
-    if (run.tick > kLeastTicks && run.spent > effort.secondsAMethod) return;
+    if (run.tick > kMinTicks && run.spent > effort.secondsAMethod) return;
     PairTally tally;
     const auto start = Clock::now();
     run.phase->tick(motion.boxes[run.tick], tally);
@@ -165,7 +167,7 @@ void turn(Run& run, const Motion& motion, const Effort& effort) {
   }
 }
 
-/// The better of two runs of a method, tick by tick.
+/// Takes the minimum of two runs of a method, tick by tick.
 void takeLeast(Run& best, const Run& again) {
   best.buildSeconds = std::min(best.buildSeconds, again.buildSeconds);
   best.wrong = std::max(best.wrong, again.wrong);
@@ -263,11 +265,12 @@ std::size_t measure(const Building& building, std::size_t objects, std::size_t m
 
 // ---- ours alone --------------------------------------------------------------------------------
 
-[[gnu::noinline]] std::size_t oursTick(collision::SortAndSweep& sweep, std::span<const Box> boxes) {
-  for (collision::MoverId id = 0; id < boxes.size(); ++id) sweep.move(id, boxes[id]);
+[[gnu::noinline]] std::size_t oursTick(collision::SortAndSweep& sweep,
+                                       std::span<const Aabb> boxes) {
+  for (collision::ProxyId id = 0; id < boxes.size(); ++id) sweep.move(id, boxes[id]);
   sweep.update();
   std::size_t ends = 0;
-  for (collision::MoverId id = 0; id < boxes.size(); ++id) ends += sweep.partners(id).size();
+  for (collision::ProxyId id = 0; id < boxes.size(); ++id) ends += sweep.overlapsOf(id).size();
   return ends;
 }
 
@@ -275,7 +278,7 @@ void oursAlone(std::size_t objects, std::size_t movers, std::size_t ticks) {
   const Building building = makeBuilding(objects);
   collision::SortAndSweep sweep(building.still);
   BuildingMotion motion(building, movers);
-  for (const Box& box : motion.next()) sweep.insert(box);
+  for (const Aabb& box : motion.next()) sweep.insert(box);
   sweep.update();
   std::size_t ends = 0, exchanges = 0, boxTests = 0, laid = 0;
   std::vector<double> microseconds;
@@ -284,15 +287,15 @@ void oursAlone(std::size_t objects, std::size_t movers, std::size_t ticks) {
     const auto start = Clock::now();
     ends += oursTick(sweep, boxes);
     microseconds.push_back(1e6 * secondsSince(start));
-    exchanges += sweep.counters().exchanges;
-    boxTests += sweep.counters().boxTests;
-    laid += sweep.counters().cellsLaid;
+    exchanges += sweep.counters().swaps;
+    boxTests += sweep.counters().aabbTests;
+    laid += sweep.counters().windowsBuilt;
   }
   const double share = 1 / static_cast<double>(movers * ticks);
   std::printf("%zu objects, %zu movers, %zu ticks: median %.2f us, p99 %.2f us\n",
               building.still.size(), movers, ticks, quantile(microseconds, 0.5),
               quantile(microseconds, 0.99));
-  std::printf("a mover and tick: %.2f pairs, %.3f exchanges, %.3f box tests, %.4f cells laid\n",
+  std::printf("a mover and tick: %.2f pairs, %.3f swaps, %.3f box tests, %.4f windows built\n",
               static_cast<double>(ends) * share, static_cast<double>(exchanges) * share,
               static_cast<double>(boxTests) * share, static_cast<double>(laid) * share);
 }

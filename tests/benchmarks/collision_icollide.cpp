@@ -1,13 +1,13 @@
-// I-COLLIDE's five sweeps (Cohen, Lin, Manocha and Ponamgi 1995): number, faces, density, rotation
-// and translation of moving convex polytopes, with missed and false contacts beside the time.
+// Benchmark after the five sweeps of Cohen et al. (1995): number, faces, density, rotation and
+// translation of moving convex polytopes, with time and with missed and false contacts.
 //
 //   collision_icollide [--quick] [--out FILE] [--only PART_OF_A_NAME]
 //
-// The paper's middle: 1000 polytopes of 36 faces, 10 degrees and 10 % of the radius a frame,
-// density 1 % (volume of the bodies to that of the cube they fly in). They pass through one another
-// and are turned back at the walls. A frame is timed from the new poses to all contacts: boxes,
-// broad phase, narrow phase of every pair. The truth is another way through the same exact verdict:
-// all pairs of boxes of every vertex by brute force, each decided cold.
+// Default parameters of the paper: 1000 polytopes of 36 faces; 10 degrees and 10 % of the radius a
+// frame; density 1 % (volume of the bodies relative to the cube that contains them). Bodies pass
+// through one another and are reflected by the walls. A frame is timed from the new poses to all
+// contacts: boxes, broad phase, narrow phase of every pair. The reference uses the same exact
+// verdict another way: brute force over all boxes, each pair computed cold.
 
 #include <unordered_map>
 
@@ -22,14 +22,14 @@ namespace {
 
 using namespace enfilade::benchmarks;
 namespace collision = enfilade::collision;
-using collision::ConvexBody;
 using collision::Hull;
+using collision::PlacedConvex;
 using collision::Pose;
 using Contacts = std::vector<std::pair<std::uint32_t, std::uint32_t>>;  ///< a < b, ascending
 
 struct Setting {
   std::size_t number = 1000, faces = 36;
-  double density = 0.01, degrees = 10, radii = 0.1;  ///< of a frame
+  double density = 0.01, degrees = 10, radii = 0.1;  ///< per frame
 };
 
 // ---- the world ---------------------------------------------------------------------------------
@@ -44,7 +44,7 @@ double volumeOf(const Hull& hull) {
   return six / 6;
 }
 
-/// Vertices on the unit sphere: faces are triangles, twice as many as vertices, less four.
+/// Random vertices on the unit sphere: triangles, 2 V - 4 of them.
 Hull polytope(Random& random, std::size_t faces) {
   Points points;
   for (std::size_t k = 0; k < faces / 2 + 2; ++k) points.push_back(direction(random));
@@ -78,7 +78,7 @@ class Swarm {
       f.rotation = f.pose.rotation.toRotationMatrix();
     }
   }
-  ConvexBody body(std::size_t k) const {
+  PlacedConvex body(std::size_t k) const {
     return {hull.vertices, flyers[k].pose.translation, &flyers[k].rotation, &hull};
   }
 
@@ -106,15 +106,15 @@ class Swarm {
 };
 
 Contacts truthOf(const Swarm& swarm) {
-  std::vector<Box> boxes;
-  for (const Flyer& f : swarm.flyers) boxes.push_back(tightBoxBruteForce(swarm.hull, f.pose));
+  std::vector<Aabb> boxes;
+  for (const Flyer& f : swarm.flyers) boxes.push_back(tightAabbBruteForce(swarm.hull, f.pose));
   Contacts contacts;
   for (std::uint32_t a = 0; a < boxes.size(); ++a) {
     for (std::uint32_t b = a + 1; b < boxes.size(); ++b) {
       if (!collision::overlaps(boxes[a], boxes[b])) continue;
       collision::FeatureCache cold;
-      const auto told = collision::decide(swarm.body(a), swarm.body(b), cold);
-      if (told.verdict != collision::Verdict::separated) contacts.emplace_back(a, b);
+      const auto reported = collision::computeSeparation(swarm.body(a), swarm.body(b), cold);
+      if (reported.verdict != collision::Verdict::separated) contacts.emplace_back(a, b);
     }
   }
   return contacts;
@@ -122,9 +122,9 @@ Contacts truthOf(const Swarm& swarm) {
 
 // ---- ours and the peers ------------------------------------------------------------------------
 
-/// What a frame cost, in milliseconds.
+/// Cost of a frame in milliseconds.
 struct Frame {
-  std::size_t pairs = 0;  ///< decided by the narrow phase
+  std::size_t pairs = 0;  ///< pairs given to the narrow phase
   double boxes = 0, broad = 0, narrow = 0;
   double whole() const { return boxes + broad + narrow; }
 };
@@ -146,7 +146,7 @@ class Stopwatch {
 class Detector {
  public:
   virtual ~Detector() = default;
-  /// Contacts of this frame in any order.
+  /// Reports the contacts of this frame in any order.
   virtual Frame frame(const Swarm& swarm, Contacts& contacts) = 0;
 };
 
@@ -155,15 +155,15 @@ enum class Boxes { fixedCubes, tight, tightByWalls };
 class BoxMaker {
  public:
   explicit BoxMaker(Boxes kind) : kind_(kind) {}
-  std::span<const Box> boxes(const Swarm& swarm) {
+  std::span<const Aabb> boxes(const Swarm& swarm) {
     boxes_.resize(swarm.flyers.size());
     extremal_.resize(swarm.flyers.size());
     for (std::size_t k = 0; k < boxes_.size(); ++k) {
       const Pose& pose = swarm.flyers[k].pose;
-      if (kind_ == Boxes::fixedCubes) boxes_[k] = fixedCube(swarm.hull, pose);
-      if (kind_ == Boxes::tight) boxes_[k] = tightBox(swarm.hull, pose, extremal_[k]);
+      if (kind_ == Boxes::fixedCubes) boxes_[k] = boundingSphereCube(swarm.hull, pose);
+      if (kind_ == Boxes::tight) boxes_[k] = tightAabb(swarm.hull, pose, extremal_[k]);
       if (kind_ == Boxes::tightByWalls) {
-        boxes_[k] = tightBoxByWalls(swarm.hull, pose, extremal_[k]);
+        boxes_[k] = tightAabbVoronoi(swarm.hull, pose, extremal_[k]);
       }
     }
     return boxes_;
@@ -171,11 +171,11 @@ class BoxMaker {
 
  private:
   Boxes kind_;
-  std::vector<Box> boxes_;
+  std::vector<Aabb> boxes_;
   std::vector<collision::ExtremalVertices> extremal_;
 };
 
-/// Sort and sweep, and decide() from the features of the last frame.
+/// Sort and sweep, and the narrow phase warm-started from the last frame's features.
 class OurDetector : public Detector {
  public:
   explicit OurDetector(Boxes kind) : boxes_(kind), sweep_({}) {}
@@ -191,15 +191,16 @@ class OurDetector : public Detector {
     }
     inserted_ = true;
     sweep_.update();
-    for (const BoxPair& pair : sweep_.ended()) features_.erase(keyOf(pair.mover, pair.other));
+    for (const ProxyPair& pair : sweep_.removedPairs())
+      features_.erase(keyOf(pair.proxy, pair.other));
     frame.broad = watch.lap();
     for (std::uint32_t a = 0; a < boxes.size(); ++a) {
-      for (const auto& partner : sweep_.partners(a)) {
+      for (const auto& partner : sweep_.overlapsOf(a)) {
         if (partner.id <= a) continue;
         ++frame.pairs;
-        const auto told = collision::decide(swarm.body(a), swarm.body(partner.id),
-                                            features_[keyOf(a, partner.id)]);
-        if (told.verdict != collision::Verdict::separated) contacts.emplace_back(a, partner.id);
+        const auto reported = collision::computeSeparation(swarm.body(a), swarm.body(partner.id),
+                                                           features_[keyOf(a, partner.id)]);
+        if (reported.verdict != collision::Verdict::separated) contacts.emplace_back(a, partner.id);
       }
     }
     frame.narrow = watch.lap();
@@ -234,11 +235,12 @@ class PeerDetector : public Detector {
     tally.kept = &pairs_;
     broad_->tick(boxes, tally);
     frame.broad = watch.lap();
-    for (const BoxPair& pair : pairs_) {
-      pair_->forget();  // one pair of shapes stands for all
-      const Answer told =
-          pair_->ask(placementOf(swarm, pair.mover), placementOf(swarm, pair.other));
-      if (told.verdict == Answer::Verdict::collides) contacts.emplace_back(pair.mover, pair.other);
+    for (const ProxyPair& pair : pairs_) {
+      pair_->forget();  // one pair object is used for all pairs
+      const Answer reported =
+          pair_->ask(placementOf(swarm, pair.proxy), placementOf(swarm, pair.other));
+      if (reported.verdict == Answer::Verdict::collides)
+        contacts.emplace_back(pair.proxy, pair.other);
     }
     frame.pairs = pairs_.size();
     frame.narrow = watch.lap();
@@ -252,7 +254,7 @@ class PeerDetector : public Detector {
   BoxMaker boxes_;
   std::unique_ptr<BroadPhase> broad_;
   std::unique_ptr<PairOfBodies> pair_;
-  std::vector<BoxPair> pairs_;
+  std::vector<ProxyPair> pairs_;
 };
 
 struct Contestant {
@@ -295,7 +297,7 @@ std::vector<Contestant> contestants(const Swarm& swarm, const Arguments& argumen
 
 // ---- the sweeps --------------------------------------------------------------------------------
 
-/// Contacts of `a` that `b` does not have.
+/// Counts the contacts of `a` that are not in `b`.
 std::size_t notIn(const Contacts& a, const Contacts& b) {
   Contacts rest;
   std::set_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(rest));
@@ -311,13 +313,13 @@ void measure(const char* sweep, double value, const Setting& setting, std::size_
     swarm.step();
     const Contacts truth = truthOf(swarm);
     for (Contestant& one : all) {
-      Contacts told;
-      const Frame cost = one.detector->frame(swarm, told);
+      Contacts reported;
+      const Frame cost = one.detector->frame(swarm, reported);
       if (frame > 0) one.add(cost);  // the first one inserts
-      std::sort(told.begin(), told.end());
+      std::sort(reported.begin(), reported.end());
       one.pairs += cost.pairs;
-      one.missed += notIn(truth, told);
-      one.wrong += notIn(told, truth);
+      one.missed += notIn(truth, reported);
+      one.wrong += notIn(reported, truth);
     }
     trueContacts += truth.size();
   }

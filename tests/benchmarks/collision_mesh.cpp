@@ -1,10 +1,11 @@
-// A hull of 20 vertices against a mesh of 50,880 triangles: distance, and all triangles in contact.
+// Benchmark of a hull of 20 vertices against a mesh of 50,880 triangles: distance, and all
+// triangles in contact.
 //
 //   collision_mesh [--quick] [--out FILE] [--only PART_OF_A_NAME]
 //
-// The mesh is a hilly terrain of 40 m x 40 m, the hull (radius 0.5 m) flies over it at 1.5 m/s and
-// turns by 1 degree a tick: clear at about 0.3 m, or dipping in by up to 0.2 m. Methods in turns;
-// the truth of sampled steps is our exact verdict on every triangle whose box is near.
+// The mesh is a hilly terrain of 40 m x 40 m. The hull (radius 0.5 m) flies over it at 1.5 m/s and
+// rotates by 1 degree a tick: about 0.3 m clear, or up to 0.2 m deep. Methods run in turns. The
+// reference for sampled steps is our exact verdict on every triangle with a nearby box.
 
 #include <algorithm>
 #include <numbers>
@@ -23,7 +24,7 @@ namespace collision = enfilade::collision;
 constexpr int kAlongX = 160, kAlongZ = 159;
 constexpr double kStep = 0.25;  // metres
 constexpr double kRadius = 0.5;
-constexpr int kMostTruths = 40;
+constexpr int kMaxTruths = 40;
 
 double heightAt(double x, double z) {
   return 0.6 * std::sin(0.5 * x) * std::cos(0.4 * z) + 0.15 * std::sin(2.1 * x + 1.3 * z) +
@@ -60,7 +61,7 @@ Points bodyPoints() {
 
 std::vector<Placement> flight(bool dipping, std::size_t steps) {
   const Vec3 axis = Vec3(0.3, 1, 0.2).normalized();
-  const double side = 0.25 * kStep * kAlongX;  // circles about the middle
+  const double side = 0.25 * kStep * kAlongX;  // circles about the centre
   std::vector<Placement> places;
   for (std::size_t k = 0; k < steps; ++k) {
     const double along = 0.025 * static_cast<double>(k) / side;
@@ -75,23 +76,23 @@ std::vector<Placement> flight(bool dipping, std::size_t steps) {
   return places;
 }
 
-/// Least distance and the contacts, by the exact verdict on every triangle that may matter.
+/// Minimum distance and contacts, by the exact verdict on every triangle in range.
 struct Truth {
   double distance = std::numeric_limits<double>::infinity();
   std::vector<std::uint32_t> contacts;
 };
 
 Truth truthOf(const collision::Hull& hull, const Placement& at, const Triangles& mesh) {
-  const collision::ConvexBody body{hull.vertices, at.translation, &at.rotation, &hull};
+  const collision::PlacedConvex body{hull.vertices, at.translation, &at.rotation, &hull};
   const Vec3 reach = Vec3::Constant(3 * kRadius);
-  const collision::Box near{at.translation - reach, at.translation + reach};
+  const collision::Aabb near{at.translation - reach, at.translation + reach};
   Truth truth;
   for (std::uint32_t k = 0; k < mesh.size(); ++k) {
-    if (!collision::overlaps(near, collision::boxOf(mesh[k]))) continue;
+    if (!collision::overlaps(near, collision::computeAabb(mesh[k]))) continue;
     collision::FeatureCache cold;
-    const auto told = collision::decide(body, {mesh[k]}, cold);
-    truth.distance = std::min(truth.distance, told.distance);
-    if (told.verdict != collision::Verdict::separated) truth.contacts.push_back(k);
+    const auto reported = collision::computeSeparation(body, {mesh[k]}, cold);
+    truth.distance = std::min(truth.distance, reported.distance);
+    if (reported.verdict != collision::Verdict::separated) truth.contacts.push_back(k);
   }
   return truth;
 }
@@ -112,34 +113,34 @@ double microsecondsOf(const Ask& ask) {
   return 1e6 * secondsSince(start);
 }
 
-/// Two passes, so that the cache of one query is not warmed by the other: the library's own tick
-/// asks one of them.
+/// Two passes, so that neither query warms the other's cache: a tick of the library makes only one
+/// of them.
 void fly(Row& row, std::span<const Placement> places, std::span<const Truth> truths,
          std::size_t every) {
   row.query->forget();
   for (std::size_t k = 0; k < places.size(); ++k) {
-    double told = 0;
-    const double time = microsecondsOf([&] { told = row.query->distance(places[k]); });
+    double reported = 0;
+    const double time = microsecondsOf([&] { reported = row.query->distance(places[k]); });
     if (k > 0) row.distance.push_back(time);
     if (k % every == 0) {
-      const double error = std::abs(told - truths[k / every].distance);
+      const double error = std::abs(reported - truths[k / every].distance);
       row.worstError = std::max(row.worstError, std::isfinite(error) ? error : 1e300);
     }
   }
   row.query->forget();
   for (std::size_t k = 0; k < places.size(); ++k) {
-    std::vector<std::uint32_t> told;
-    const double time = microsecondsOf([&] { row.query->contacts(places[k], told); });
+    std::vector<std::uint32_t> reported;
+    const double time = microsecondsOf([&] { row.query->contacts(places[k], reported); });
     if (k > 0) row.contacts.push_back(time);
     if (k % every != 0) continue;
-    std::sort(told.begin(), told.end());
+    std::sort(reported.begin(), reported.end());
     const auto& truth = truths[k / every].contacts;
     std::vector<std::uint32_t> rest;
-    std::set_difference(truth.begin(), truth.end(), told.begin(), told.end(),
+    std::set_difference(truth.begin(), truth.end(), reported.begin(), reported.end(),
                         std::back_inserter(rest));
     row.missed += rest.size();
     rest.clear();
-    std::set_difference(told.begin(), told.end(), truth.begin(), truth.end(),
+    std::set_difference(reported.begin(), reported.end(), truth.begin(), truth.end(),
                         std::back_inserter(rest));
     row.wrong += rest.size();
   }
@@ -150,8 +151,8 @@ void askCold(Row& row, std::span<const Placement> places, std::size_t every) {
     row.query->forget();
     row.coldDistance.push_back(microsecondsOf([&] { row.query->distance(places[k]); }));
     row.query->forget();
-    std::vector<std::uint32_t> told;
-    row.coldContacts.push_back(microsecondsOf([&] { row.query->contacts(places[k], told); }));
+    std::vector<std::uint32_t> reported;
+    row.coldContacts.push_back(microsecondsOf([&] { row.query->contacts(places[k], reported); }));
   }
 }
 
@@ -185,7 +186,7 @@ int main(int argc, char** argv) {
   const Arguments arguments(argc, argv);
   Results results(arguments);
   const std::size_t steps = arguments.quick ? 200 : 1000;
-  const std::size_t every = steps / kMostTruths;
+  const std::size_t every = steps / kMaxTruths;
   const int turns = arguments.quick ? 1 : 3;
   const Triangles mesh = terrain();
   const Points points = bodyPoints();

@@ -1,11 +1,11 @@
-// All narrow phases: time of a query beside its error and its wrong verdicts.
+// Benchmark of all narrow phases: time of a query, its error and its wrong verdicts.
 //
 //   collision_narrow_phase [--quick] [--out FILE] [--only PART_OF_A_NAME]
 //
-// First polytopes of 8 to 200 vertices in coherent motion (convex_motions.hpp), cold and warm, the
-// methods in turns; the errors are those against our `refine` level. Then the families of the exact
-// cases, where the shared folder is there; the errors are those against the truth of the files,
-// also for `refine`. Methods run in child processes, because some peers abort.
+// First polytopes of 8 to 200 vertices in coherent motion (convex_motions.hpp), cold and warm,
+// methods in turns; errors are relative to our `refine` level. Then the families of exact cases, if
+// the shared folder exists; errors are relative to the truth in the files, also for `refine`.
+// Methods run in child processes, because some peers abort.
 
 #include <cstdlib>
 
@@ -21,14 +21,14 @@ using namespace enfilade::benchmarks;
 namespace accuracy = enfilade::accuracy;
 using Methods = std::vector<NarrowPhaseMethod>;
 
-constexpr unsigned kMostSeconds = 60;  // a child that takes longer over one turn hangs
+constexpr unsigned kMaxSeconds = 60;  // a child that needs more for one turn is hanging
 
-constexpr unsigned kMostSecondsACase = 5;
+constexpr unsigned kMaxSecondsPerCase = 5;
 
 struct Effort {
   std::size_t pairs, steps, turns;
-  double secondsATurn;    ///< a slow method makes fewer steps, at least kLeastSteps a pair
-  double secondsAnswers;  ///< and tells fewer answers
+  double secondsATurn;    ///< slow methods make fewer steps, at least kMinSteps a pair
+  double secondsAnswers;  ///< and give fewer answers
   int repeats;            ///< of a cold case
 };
 
@@ -39,12 +39,12 @@ nlohmann::json headOf(const NarrowPhaseMethod& method, const char* bench) {
 
 // ---- coherent motion ---------------------------------------------------------------------------
 
-constexpr std::size_t kMostPairs = 16;
-constexpr std::size_t kLeastSteps = 3;
+constexpr std::size_t kMaxPairs = 16;
+constexpr std::size_t kMinSteps = 3;
 
-/// Nanoseconds a query, by pair; a turn of one method.
+/// Nanoseconds a query, by pair, in one turn of a method.
 struct Turn {
-  std::array<double, kMostPairs> cold{}, warm{};
+  std::array<double, kMaxPairs> cold{}, warm{};
 };
 
 double nanosecondsOf(PairOfBodies& pair, const ConvexMotion& motion, std::size_t steps, bool warm) {
@@ -64,14 +64,14 @@ Turn measureTurn(const NarrowPhaseMethod& method, const std::vector<ConvexMotion
   const double secondsAPair = seconds / static_cast<double>(motions.size());
   for (std::size_t k = 0; k < motions.size() && (k == 0 || secondsSince(start) < seconds); ++k) {
     const auto pair = method.make(motions[k].a, motions[k].b);
-    // Fills the caches of the machine, and tells how many steps there is time for.
+    // Warms the machine's caches, and measures how many steps the time allows.
     const double one = 1e-9 * nanosecondsOf(*pair, motions[k], 1, true);
-    if (one > secondsAPair) {  // that was already all the time there is
+    if (one > secondsAPair) {  // one step already used the available time
       turn.cold[k] = turn.warm[k] = 1e9 * one;
       continue;
     }
     const auto steps = static_cast<std::size_t>(
-        std::clamp(secondsAPair / (2 * one), static_cast<double>(kLeastSteps),
+        std::clamp(secondsAPair / (2 * one), static_cast<double>(kMinSteps),
                    static_cast<double>(motions[k].placesA.size())));
     turn.cold[k] = nanosecondsOf(*pair, motions[k], steps, false);
     turn.warm[k] = method.warm ? nanosecondsOf(*pair, motions[k], steps, true) : turn.cold[k];
@@ -79,41 +79,41 @@ Turn measureTurn(const NarrowPhaseMethod& method, const std::vector<ConvexMotion
   return turn;
 }
 
-struct Told {
+struct GuardedAnswer {
   Answer answer;
-  bool asked = true;  ///< false: past the time of a slow method
+  bool asked = true;  ///< false: the method ran out of time
 };
 
-/// One for each step of each motion, warm.
-std::vector<Told> answersOf(const NarrowPhaseMethod& method,
-                            const std::vector<ConvexMotion>& motions, double seconds) {
+/// One answer for each step of each motion, warm.
+std::vector<GuardedAnswer> answersOf(const NarrowPhaseMethod& method,
+                                     const std::vector<ConvexMotion>& motions, double seconds) {
   const std::size_t steps = motions.front().placesA.size();
   const double secondsAPair = seconds / static_cast<double>(motions.size());
   std::unique_ptr<PairOfBodies> pair;
   auto start = Clock::now();
-  return guarded<Told>(steps * motions.size(), kMostSeconds, [&](std::size_t k) {
+  return guarded<GuardedAnswer>(steps * motions.size(), kMaxSeconds, [&](std::size_t k) {
     const ConvexMotion& motion = motions[k / steps];
     if (!pair || k % steps == 0) {
       pair = method.make(motion.a, motion.b);
       start = Clock::now();
     }
-    if (secondsSince(start) > secondsAPair) return Told{{}, false};
-    return Told{pair->ask(motion.placesA[k % steps], motion.placesB[k % steps]), true};
+    if (secondsSince(start) > secondsAPair) return GuardedAnswer{{}, false};
+    return GuardedAnswer{pair->ask(motion.placesA[k % steps], motion.placesB[k % steps]), true};
   });
 }
 
-/// Our levels are the truth here: decide's verdict, which is exact, and refine's numbers. Where
-/// there was no time for refine the depth is not known.
+/// Our two levels are the reference: the exact verdict of decide and the numbers of refine. Without
+/// time for refine the depth is unknown.
 std::vector<std::optional<TrueAnswer>> truthOf(const Methods& methods,
                                                const std::vector<ConvexMotion>& motions,
                                                double seconds) {
   std::vector<std::optional<TrueAnswer>> truth(motions.size() * motions.front().placesA.size());
   for (const NarrowPhaseMethod& method : methods) {
     if (!method.ours) continue;
-    const auto told = answersOf(method, motions, seconds);
-    for (std::size_t k = 0; k < told.size(); ++k) {
-      const Answer& answer = told[k].answer;
-      if (!told[k].asked || answer.verdict == Answer::Verdict::none) continue;
+    const auto answers = answersOf(method, motions, seconds);
+    for (std::size_t k = 0; k < answers.size(); ++k) {
+      const Answer& answer = answers[k].answer;
+      if (!answers[k].asked || answer.verdict == Answer::Verdict::none) continue;
       const bool collides = answer.verdict == Answer::Verdict::collides;
       const bool exactDepth = method.level == "refine" && collides;
       truth[k] =
@@ -147,7 +147,7 @@ void measureMotion(const Methods& methods, std::size_t vertices, Gap gap, const 
                    Results& results) {
   const auto motions = convexMotions(vertices, gap, effort.pairs, effort.steps);
   const auto truth = truthOf(methods, motions, effort.secondsAnswers);
-  const auto turns = guarded<Turn>(effort.turns * methods.size(), kMostSeconds, [&](std::size_t k) {
+  const auto turns = guarded<Turn>(effort.turns * methods.size(), kMaxSeconds, [&](std::size_t k) {
     return measureTurn(methods[k % methods.size()], motions, effort.secondsATurn);
   });
   for (std::size_t m = 0; m < methods.size(); ++m) {
@@ -158,7 +158,7 @@ void measureMotion(const Methods& methods, std::size_t vertices, Gap gap, const 
     }
     std::vector<double> cold, warm;
     for (std::size_t k = m; k < turns.size(); k += methods.size()) {
-      for (std::size_t pair = 0; pair < kMostPairs && turns[k].cold[pair] > 0; ++pair) {
+      for (std::size_t pair = 0; pair < kMaxPairs && turns[k].cold[pair] > 0; ++pair) {
         cold.push_back(turns[k].cold[pair]);
         warm.push_back(turns[k].warm[pair]);
       }
@@ -179,7 +179,7 @@ Placement placementOf(const accuracy::Placed& body) {
 }
 
 double diagonal(const Points& points) {
-  enfilade::collision::Box box;
+  enfilade::collision::Aabb box;
   for (const Vec3& p : points) box.include(p);
   return box.size().norm();
 }
@@ -195,7 +195,7 @@ TrueAnswer truthOf(const accuracy::Case& asked) {
   return truth;
 }
 
-/// Answers cases in order; the steps of one sequence warm, all others cold.
+/// Answers cases in order: steps of one sequence warm, all others cold.
 class CaseAnswerer {
  public:
   CaseAnswerer(const NarrowPhaseMethod& method, int repeats) : method_(method), repeats_(repeats) {}
@@ -259,7 +259,7 @@ void measureCases(const NarrowPhaseMethod& method, const std::vector<accuracy::C
                   const Effort& effort, Results& results) {
   CaseAnswerer answerer(method, effort.repeats);
   const auto answers = guarded<TimedAnswer>(
-      cases.size(), kMostSecondsACase, [&](std::size_t k) { return answerer.answer(cases[k]); });
+      cases.size(), kMaxSecondsPerCase, [&](std::size_t k) { return answerer.answer(cases[k]); });
   std::map<std::string, Errors> errors;
   std::map<std::string, std::vector<double>> times;
   for (std::size_t k = 0; k < cases.size(); ++k) {
@@ -301,7 +301,7 @@ int main(int argc, char** argv) {
   }
   const auto shared = enfilade::tests::sharedFolder();
   if (!shared || !std::filesystem::is_directory(*shared / "cases")) {
-    std::printf("no shared cases: set ENFILADE_SHARED or put the folder beside the sources\n");
+    std::printf("no shared cases: set ENFILADE_SHARED or put the folder next to the sources\n");
     return 0;
   }
   const auto cases = pairCases(*shared / "cases");

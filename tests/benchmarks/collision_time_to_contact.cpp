@@ -1,15 +1,15 @@
-// How long two bodies can be left alone: our bound and the seed's, beside the true time of impact.
+// Benchmark of lower bounds on the time to contact of two bodies: ours and that of Lin (1993),
+// compared with the true time of impact.
 //
 //   collision_time_to_contact [--quick] [--out FILE]
 //
-// Seed 5.1 takes for the closing speed that of the closest points, for the acceleration the
-// greatest of any vertex. A bound is broken when the bodies are proved to meet before it. `rod` is
-// the seed's counter-example: a rod along a wall turns about its middle, which is closest and at
-// rest.
+// Lin (1993, section 5.1) uses the closing speed of the closest points and the maximum acceleration
+// of any vertex. A bound is broken if the bodies provably meet before it. `rod` is a
+// counter-example to it: a rod along a wall rotates about its middle, which is closest and at rest.
 
 #include <functional>
 
-#include "collision/motion/shape_cast.hpp"
+#include "collision/motion/time_of_impact.hpp"
 #include "collision/motion/time_to_contact.hpp"
 #include "collision/shapes/hull.hpp"
 #include "tests/benchmarks/building_workload.hpp"
@@ -72,24 +72,26 @@ Encounter flight(Random& random, bool turning) {
 
 MotionBounds boundsOf(const MovingBody& moving) {
   const Motion& m = moving.motion;
-  return {m.velocity, m.acceleration.norm(), m.angularVelocity, 0, radiusOf(moving.body, false)};
+  return {m.velocity, m.acceleration.norm(), m.angularVelocity, 0,
+          computeRadius(moving.body, false)};
 }
 
-/// Gap, normal and closest points, all that both bounds start from.
-double ourTime(const Encounter& e, const Decision& gap) {
+/// Gap, normal and closest points are the input of both bounds.
+double ourTime(const Encounter& e, const SeparationResult& gap) {
   const ClosingBounds closing =
-      closingBounds(boundsOf(e.a()), boundsOf(e.b()), gap.normal, kHorizon);
-  return timeToContact(gap.distance - gap.errorBound, closing);
+      computeClosingBounds(boundsOf(e.a()), boundsOf(e.b()), gap.normal, kHorizon);
+  return computeTimeToContact(gap.distance - gap.errorBound, closing);
 }
 
-double seedTime(const Encounter& e, const Decision& gap) {
+double seedTime(const Encounter& e, const SeparationResult& gap) {
   const auto velocityAt = [](const MovingBody& moving, const Vec3& point) {
     return Vec3(moving.motion.velocity +
                 moving.motion.angularVelocity.cross(point - moving.body.translation));
   };
   const auto accelerationOf = [](const MovingBody& moving) {
     const Motion& m = moving.motion;
-    return m.acceleration.norm() + m.angularVelocity.squaredNorm() * radiusOf(moving.body, false);
+    return m.acceleration.norm() +
+           m.angularVelocity.squaredNorm() * computeRadius(moving.body, false);
   };
   const double v = (velocityAt(e.a(), gap.pointA) - velocityAt(e.b(), gap.pointB)).dot(gap.normal);
   const double a = accelerationOf(e.a()) + accelerationOf(e.b());
@@ -99,7 +101,7 @@ double seedTime(const Encounter& e, const Decision& gap) {
 
 struct Tally {
   std::size_t broken = 0;
-  std::vector<double> share;  ///< of the true time
+  std::vector<double> share;  ///< fractions of the true time
   double seconds = 0;
 };
 
@@ -108,24 +110,24 @@ void measure(const char* motion, const std::vector<Encounter>& encounters, Resul
   std::size_t met = 0, unproved = 0;
   for (const Encounter& e : encounters) {
     FeatureCache cache;
-    const Decision gap = decide(e.a().body, e.b().body, cache);
+    const SeparationResult gap = computeSeparation(e.a().body, e.b().body, cache);
     auto start = Clock::now();
-    const TimeOfImpact impact = timeOfImpact(e.a(), e.b(), kHorizon, cache);
+    const TimeOfImpact impact = computeTimeOfImpact(e.a(), e.b(), kHorizon, cache);
     impacts.seconds += secondsSince(start);
     unproved += impact.impact == Impact::unproved;
     if (impact.impact != Impact::contact) continue;
     ++met;
-    const auto judge = [&](Tally& tally, auto&& bound) {
+    const auto compare = [&](Tally& tally, auto&& bound) {
       start = Clock::now();
       const double time = bound(e, gap);
       tally.seconds += secondsSince(start);
       tally.broken += time > impact.hi;
       tally.share.push_back(time / impact.hi);
     };
-    judge(ours, ourTime);
-    judge(seeds, seedTime);
+    compare(ours, ourTime);
+    compare(seeds, seedTime);
   }
-  const auto tell = [&](const char* name, const Tally& tally, std::size_t asked) {
+  const auto printRow = [&](const char* name, const Tally& tally, std::size_t asked) {
     const double ns = 1e9 * tally.seconds / static_cast<double>(asked);
     const double median = quantile(tally.share, 0.5);
     std::printf("%-12s %-22s | %5zu of %5zu broken | %8.3g of the true time | %9.0f ns\n", motion,
@@ -139,9 +141,9 @@ void measure(const char* motion, const std::vector<Encounter>& encounters, Resul
                  {"share", number(median)},
                  {"ns", ns}});
   };
-  tell("ours: bound", ours, met);
-  tell("the seed's bound", seeds, met);
-  tell("ours: time of impact", impacts, encounters.size());
+  printRow("ours: bound", ours, met);
+  printRow("bound of Lin (1993)", seeds, met);
+  printRow("ours: time of impact", impacts, encounters.size());
 }
 
 }  // namespace

@@ -8,7 +8,7 @@ namespace enfilade::benchmarks {
 namespace {
 
 constexpr double kRadiansPerDegree = 0.017453292519943295;
-constexpr double kFarApart = 10;  // metres: surely separated, for unit spheres
+constexpr double kFarApart = 10;  // metres: separated for certain, for unit spheres
 
 Points sphericalPoints(Random& random, std::size_t count) {
   Points points;
@@ -16,7 +16,7 @@ Points sphericalPoints(Random& random, std::size_t count) {
   return points;
 }
 
-/// A steady turn about one axis.
+/// A steady rotation about one axis.
 struct Turning {
   Vec3 axis;
   double start, step;  ///< radians
@@ -45,9 +45,10 @@ ConvexMotion makeMotion(Random& random, std::size_t vertices, Gap gap, std::size
     Placement a{turnA.at(k), Vec3(0.25, 0.5, 0.125)};
     Placement b{turnB.at(k), a.translation + kFarApart * (orbit.at(k) * away)};
     collision::FeatureCache none;
-    const auto told = collision::decide({hullA.vertices, a.translation, &a.rotation, &hullA},
-                                        {hullB.vertices, b.translation, &b.rotation, &hullB}, none);
-    b.translation -= (told.distance - gapOf(gap)) * told.normal;
+    const auto separation =
+        collision::computeSeparation({hullA.vertices, a.translation, &a.rotation, &hullA},
+                                     {hullB.vertices, b.translation, &b.rotation, &hullB}, none);
+    b.translation -= (separation.distance - gapOf(gap)) * separation.normal;
     motion.placesA.push_back(a);
     motion.placesB.push_back(b);
   }

@@ -8,7 +8,7 @@
 namespace enfilade::benchmarks {
 
 enum class Gap {
-  separated,   ///< a gap of the order of the bodies' radius (1 m)
+  separated,   ///< a gap of about the bodies' radius (1 m)
   near,        ///< 1 mm
   penetrating  ///< at most 10 cm deep
 };
@@ -20,8 +20,8 @@ struct ConvexMotion {
   std::vector<Placement> placesA, placesB;  ///< one for each step
 };
 
-/// Vertices on unit spheres; both bodies turn by 0.6 to 1.8 degrees a step about axes of their own
-/// while B goes round A. The gap is held at every step by moving B along the closest points.
+/// Polytopes with vertices on unit spheres. Both rotate by 0.6 to 1.8 degrees a step about their
+/// own axes while B orbits A. Each step moves B along the closest points to restore the gap.
 std::vector<ConvexMotion> convexMotions(std::size_t vertices, Gap gap, std::size_t pairs,
                                         std::size_t steps);
 

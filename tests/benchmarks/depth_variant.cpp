@@ -21,7 +21,7 @@ void main() { gl_Position = clipFromRelative * vec4(position, 1.0); }
 constexpr const char* kFragmentSource = "#version 450 core\nvoid main() {}\n";
 
 Eigen::Matrix4f clipFromRelative(const Camera& camera, bool reversed) {
-  const render::View view = render::viewOf(camera);
+  const render::CameraBasis view = render::computeCameraBasis(camera);
   const double near = camera.near, far = camera.far, range = far - near;
   Eigen::Matrix4d clip = Eigen::Matrix4d::Zero();
   clip.row(0).head<3>() = view.scaleX * view.right.transpose();
@@ -32,7 +32,7 @@ Eigen::Matrix4f clipFromRelative(const Camera& camera, bool reversed) {
   return clip.cast<float>();
 }
 
-/// Metres of what the buffer holds; NaN where nothing was drawn.
+/// Converts a stored depth to metres; NaN for the background.
 float metres(float stored, const Camera& camera, bool reversed) {
   const double near = camera.near, far = camera.far, range = far - near;
   const double d = stored;
@@ -90,11 +90,11 @@ void DepthVariant::aim(const Camera& camera) {
   std::vector<Eigen::Vector3f> corners;
   const scene::Model& model = state_->scene->model();
   for (const scene::Object& object : model.objects) {
-    if (object.use == scene::Object::Use::solid) continue;
+    if (object.usage == scene::Object::Usage::collisionOnly) continue;
     for (const std::uint32_t m : object.meshes) {
       const scene::Mesh& mesh = model.meshes[m];
       for (const std::uint32_t corner : mesh.indices) {
-        const scene::Vec3 relative = worldPosition(object, mesh, corner) - camera.eye;
+        const scene::Vec3 relative = computeWorldPosition(object, mesh, corner) - camera.eye;
         corners.push_back(relative.cast<float>());
       }
     }

@@ -1,5 +1,5 @@
-// How other depth buffers would do: all triangles of a scene in one draw, depth alone. For the
-// benchmark of renderers only.
+// Alternative depth buffers for the renderer benchmark: all triangles of a scene in one depth-only
+// draw.
 #pragma once
 
 #include <memory>
@@ -12,19 +12,19 @@ namespace enfilade::benchmarks {
 
 struct DepthBuffer {
   std::string name;
-  bool floats = true;    ///< 32 bits of float; else 24 of fixed point
-  bool reversed = true;  ///< near 1, far 0, clipped to 0..1; else -1..1 as OpenGL began
+  bool floats = true;    ///< 32-bit float; otherwise 24-bit fixed point
+  bool reversed = true;  ///< near 1, far 0, clipped to 0..1; otherwise OpenGL's default of -1..1
 };
 
 class DepthVariant {
  public:
-  /// Of a scene without masks and glass. Throws RenderError.
+  /// The scene must have no masks and no transparency. Throws RenderError.
   DepthVariant(std::shared_ptr<const scene::Scene> scene, DepthBuffer buffer);
   ~DepthVariant();
 
-  /// Brings the triangles to the device, relative to the eye.
+  /// Uploads the triangles to the device, relative to the eye.
   void aim(const render::Camera& camera);
-  /// The depth of a perspective camera aimed at before, as Frame::depth.
+  /// The depth of a perspective camera passed to aim() before, as Frame::depth.
   render::Frame draw(const render::Camera& camera);
 
  private:

@@ -1,4 +1,4 @@
-// An engine that runs the parts feeder, so that ours and the peers do the same.
+// Interface of a physics engine that runs the parts feeder, for ours and the peers.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@ namespace enfilade::benchmarks {
 class FeederEngine {
  public:
   virtual ~FeederEngine() = default;
-  /// One tick of 1/60 s in FeederPlan::substeps.
+  /// Runs one tick of 1/60 s in FeederPlan::substeps.
   virtual void tick(bool driven) = 0;
   virtual std::vector<testing::PlacedPart> parts() const = 0;
   virtual testing::Vec3 tray() const = 0;

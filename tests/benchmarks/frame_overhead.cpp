@@ -1,7 +1,7 @@
-// What the way over the socket adds to a picture of 128 x 128 pixels, colour and depth, for a C++
-// client and the Python client, in two ways: what a client waited beyond what drawing and reading
-// back took for the same picture (Frame.drawing_seconds), which noise of the machine hits least;
-// and how much longer it waited than rendering and reading back in process takes by another thread.
+// Measures the socket's overhead for an image of 128 x 128 pixels, colour and depth, for a C++
+// client and the Python client. First: waiting time minus drawing and read-back time of the same
+// image (Frame.drawing_seconds), which is least sensitive to machine noise. Second: waiting time
+// minus the time of rendering in process on another thread.
 //
 //   frame_overhead [PICTURES [SCENE]]     2000, the building; run from the repository's root
 #include <spdlog/spdlog.h>
@@ -21,6 +21,7 @@
 #include "protocol/clients/cpp/client.hpp"
 #include "render/service/render_thread.hpp"
 #include "scene/import/cache/model_cache.hpp"
+#include "scene/import/import_worker.hpp"
 #include "scene/world/world.hpp"
 #include "server/base/load_scene.hpp"
 #include "server/messages/frame_messages.hpp"
@@ -31,7 +32,7 @@ namespace {
 
 using namespace enfilade;
 
-constexpr int kBlock = 25;  // pictures of one kind before another's turn
+constexpr int kBlock = 25;  // images of one kind before the next kind's turn
 
 template <typename Work>
 double microseconds(const Work& work) {
@@ -63,7 +64,7 @@ v1::FrameRequest smallPicture() {
   return request;
 }
 
-/// Microseconds: until a client had its picture, and of those without drawing and reading back.
+/// Microseconds until a client had its image, and the part without drawing and read-back.
 struct Waited {
   std::vector<double> whole, added;
   void push(double waited, double drawn) {
@@ -72,8 +73,8 @@ struct Waited {
   }
 };
 
-/// The Python client, in a process of its own: told by a line what to do, it answers how long that
-/// took, and how long the drawing.
+/// The Python client in a child process. It reads a command line and answers with the time taken
+/// and the drawing time.
 class ByPython {
  public:
   explicit ByPython(std::uint16_t port) {
@@ -84,11 +85,11 @@ class ByPython {
         "tests/benchmarks/frame_overhead.py " +
         std::to_string(port) + " < " + fifo;
     times_.reset(::popen(command.c_str(), "r"));
-    orders_.reset(std::fopen(fifo.c_str(), "w"));  // when Python has opened the other end
-    std::signal(SIGPIPE, SIG_IGN);                 // which may be gone again
+    orders_.reset(std::fopen(fifo.c_str(), "w"));  // opens once Python has opened the other end
+    std::signal(SIGPIPE, SIG_IGN);                 // Python may exit before us
     std::filesystem::remove(fifo);
   }
-  /// Nothing is added where there is no Python.
+  /// Adds no values without Python.
   void time(const char* what, Waited& to) {
     if (!times_ || !orders_ || std::fprintf(orders_.get(), "%s\n", what) < 0) return;
     std::fflush(orders_.get());
@@ -104,13 +105,13 @@ class ByPython {
     void operator()(FILE* file) const { std::fclose(file); }
   };
   std::unique_ptr<FILE, Ended> times_;
-  std::unique_ptr<FILE, Closed> orders_;  // closed first, which ends the other
+  std::unique_ptr<FILE, Closed> orders_;  // closed first, which ends the child
 };
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (const auto code = scene::runImportChild(argc, argv)) return *code;
+  if (const auto code = scene::runImportWorker(argc, argv)) return *code;
   spdlog::set_level(spdlog::level::warn);
   const int pictures = argc > 1 ? std::atoi(argv[1]) : 2000;
   server::ModelOptions model;
@@ -120,14 +121,14 @@ int main(int argc, char** argv) {
   const auto scene = server::loadScene(model);
   server::Server server(scene, {"127.0.0.1", 0});
   if (server.rendererName().empty()) {
-    std::fprintf(stderr, "nothing draws here\n");
+    std::fprintf(stderr, "no renderer available\n");
     return 1;
   }
   protocol::Client client("127.0.0.1", server.port());
   render::RenderThread renderer(scene);
   const scene::World world(scene);
   const v1::FrameRequest request = smallPicture();
-  const auto view = std::get<server::View>(server::viewFrom(request, *world.snapshot()));
+  const auto view = std::get<server::FrameView>(server::viewFromProto(request, *world.snapshot()));
   constexpr double kMicro = 1e6;
   Waited inProcess, overSocket, python, steps, stepsAndPictures;
   ByPython script(server.port());
@@ -149,8 +150,8 @@ int main(int argc, char** argv) {
   const auto repeat = [&](const auto& once) {
     for (int i = 0; i < kBlock; ++i) once();
   };
-  // In turn, since what else the machine does shall hit all; in blocks, since who takes pictures
-  // takes one after the other, and finds its caches warm.
+  // Kinds alternate, so that other load affects all of them. They run in blocks, because a client
+  // that takes images takes several in a row and finds its caches warm.
   for (int i = 0; i < pictures; i += kBlock) {
     repeat(draw);
     repeat(fetch);
@@ -173,14 +174,14 @@ int main(int argc, char** argv) {
     row("  without drawing it", stepsAndPictures.added);
   }
   const double step = python.whole.empty() ? 0 : quantile(steps.whole, 0.5);
-  const auto tell = [&](const char* who, const Waited& waited, double others) {
+  const auto printRow = [&](const char* who, const Waited& waited, double others) {
     if (waited.whole.empty()) return;
-    std::printf("%s: %.1f us more than drawing the same picture, %.1f us more than in process\n",
-                who, quantile(waited.added, 0.5) - others,
+    std::printf("%s: %.1f us more than drawing the same image, %.1f us more than in process\n", who,
+                quantile(waited.added, 0.5) - others,
                 quantile(waited.whole, 0.5) - quantile(inProcess.whole, 0.5) - others);
   };
-  std::printf("The way over the socket adds (medians)\n");
-  tell("C++", overSocket, 0);
-  tell("Python", python, 0);
-  tell("Python, beyond the step that goes with it", stepsAndPictures, step);
+  std::printf("Overhead of the socket (medians)\n");
+  printRow("C++", overSocket, 0);
+  printRow("Python", python, 0);
+  printRow("Python, beyond its step", stepsAndPictures, step);
 }

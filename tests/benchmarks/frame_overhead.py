@@ -1,5 +1,5 @@
-"""frame_overhead.py PORT: for each line that comes, microseconds of a "picture", of a "step", or of "both" in
-one write, as environments ask for them, and of those what drawing took; see frame_overhead.cpp."""
+"""frame_overhead.py PORT: for each input line ("picture", "step", or "both" in one write, as environments
+do), prints the microseconds it took and those spent on drawing; see frame_overhead.cpp."""
 
 import sys
 import time

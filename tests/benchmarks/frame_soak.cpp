@@ -1,14 +1,14 @@
-// Many pictures and scenes in one process: a district is made and brought to a renderer again and
-// again, pictures are taken of it, and memory may not grow.
+// Soak test of rendering: one process loads a district into a renderer and draws images repeatedly;
+// memory must not grow.
 //
 //   frame_soak [gl|rays [RELOADS [PICTURES]]]     gl 200 10000
 //
-// Memory is sampled after each scene is gone. After the first tenth what is allocated may not grow,
-// nor, from the first half of the scenes to the second, what is usually resident: that wobbles by
-// what allocators keep one time and not another. Exit code 3: it did.
+// Memory is sampled after each scene is destroyed. Allocated memory may not grow after the first
+// tenth. Typical resident memory may not grow from the first half of the scenes to the second;
+// single samples vary with the allocators' caches. Exit code 3: memory grew.
 //
-// On 2026-11-22, with Mesa's llvmpipe: of gl 13.98 MB were allocated after 20 scenes and 13.99
-// after 200, of rays 13.18 and 13.19; resident were 137 to 156 MB, up and down, and 90 to 93.
+// On 2026-11-22 with Mesa's llvmpipe: gl had 13.98 MB allocated after 20 scenes and 13.99 after
+// 200, rays 13.18 and 13.19; resident memory varied in 137 to 156 MB and 90 to 93 MB.
 #include <malloc.h>
 #include <unistd.h>
 
@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "assets/building.hpp"
-#include "render/service/renderer.hpp"
+#include "render/service/renderer_selector.hpp"
 
 namespace {
 
@@ -36,7 +36,7 @@ double residentMegabytes() {
   return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
-/// What was asked for and not given back; without what allocators keep for later.
+/// Memory in use, without the allocators' free lists.
 double allocatedMegabytes() {
   const struct mallinfo2 info = ::mallinfo2();
   return static_cast<double>(info.uordblks + info.hblkhd) / 1e6;
@@ -49,7 +49,7 @@ double median(std::vector<double> values) {
 }
 
 void takePictures(render::RendererKind kind, const scene::Model& model, int pictures, int first) {
-  render::Renderer renderer(std::make_shared<const scene::Scene>(model), kind);
+  render::RendererSelector renderer(std::make_shared<const scene::Scene>(model), kind);
   for (int i = first; i < first + pictures; ++i) {
     render::Camera camera;
     camera.eye = {-26 + 0.01 * i, 1.6, 4 * std::sin(0.01 * i)};
@@ -63,11 +63,11 @@ void takePictures(render::RendererKind kind, const scene::Model& model, int pict
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto kind = render::rendererKindFrom(argc > 1 ? argv[1] : "gl");
+  const auto kind = render::parseRendererKind(argc > 1 ? argv[1] : "gl");
   const int reloads = std::max(argc > 2 ? std::atoi(argv[2]) : 200, 10);
   const int pictures = argc > 3 ? std::atoi(argv[3]) : 10'000;
   if (!kind) {
-    std::fprintf(stderr, "frame_soak: %s is no renderer; give gl or rays\n", argv[1]);
+    std::fprintf(stderr, "frame_soak: unknown renderer %s; use gl or rays\n", argv[1]);
     return 2;
   }
   const scene::Model model = assets::makeDistrict(assets::kSmallestDistrict, 1);
@@ -79,13 +79,14 @@ int main(int argc, char** argv) {
     allocated.push_back(allocatedMegabytes());
     if ((i + 1) % (reloads / 10) == 0)
       std::printf("%-4s %4d scenes %6d pictures  %7.1f MB, allocated %8.3f MB\n",
-                  render::wordOf(*kind), i + 1, (i + 1) * each, resident.back(), allocated.back());
+                  render::toString(*kind), i + 1, (i + 1) * each, resident.back(),
+                  allocated.back());
     std::fflush(stdout);
   }
   const auto begin = resident.begin(), middle = begin + reloads / 2;
   const double grown = median({middle, resident.end()}) - median({begin, middle});
   const double kept = allocated.back() - allocated[static_cast<std::size_t>(reloads / 10)];
   std::printf("%-4s from half to half %+.1f MB, allocated after the first tenth %+.3f MB\n",
-              render::wordOf(*kind), grown, kept);
+              render::toString(*kind), grown, kept);
   return grown > kResidentAllowed || kept > kAllocatedAllowed ? 3 : 0;
 }

@@ -14,7 +14,7 @@
 namespace enfilade::benchmarks {
 namespace {
 
-/// Memory that parent and child both see.
+/// Memory shared by parent and child.
 class SharedBytes {
  public:
   explicit SharedBytes(std::size_t size) : size_(size) {

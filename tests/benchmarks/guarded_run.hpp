@@ -1,4 +1,4 @@
-// Runs what may abort or hang in child processes, so that it takes nothing down with it.
+// Runs code that may abort or hang in child processes, so that the parent survives.
 #pragma once
 
 #include <cstddef>
@@ -10,12 +10,12 @@
 namespace enfilade::benchmarks {
 
 /// Calls `one` with 0, 1, ..., count - 1 in a child, in this order, each with `record` zeroed bytes
-/// that the caller gets back. When the child dies, or takes longer than `seconds` over one number,
-/// a fresh child goes on with the next number. Returns for each number whether it came to an end.
+/// that the caller receives. If the child dies or needs more than `seconds` for one number, a new
+/// child continues with the next number. Returns for each number whether it finished.
 std::vector<bool> runGuarded(std::size_t count, unsigned seconds, std::span<std::byte> records,
                              const std::function<void(std::size_t, std::byte*)>& one);
 
-/// The same with a type for the records; those that did not come to an end are T{}.
+/// The same with a record type; records of unfinished calls are T{}.
 template <typename T>
 std::vector<T> guarded(std::size_t count, unsigned seconds,
                        const std::function<T(std::size_t)>& one) {

@@ -1,4 +1,4 @@
-// What all benchmark programs share: a clock, quantiles, the lines of results, the command line.
+// Shared helpers of all benchmark programs: clock, quantiles, result lines, command line.
 #pragma once
 
 #include <algorithm>
@@ -20,19 +20,19 @@ inline double secondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// The value below which a part `q` (0..1) of the values lies; NaN when there are none.
+/// The `q` quantile (0..1) of the values; NaN without values.
 inline double quantile(std::vector<double> values, double q) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
   std::sort(values.begin(), values.end());
   return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
 }
 
-/// NaN and infinity have no place in JSON.
+/// JSON has no NaN and infinity; they become null.
 inline nlohmann::json number(double x) {
   return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(nullptr);
 }
 
-/// --quick, --out FILE (JSON lines; none: only the table on stdout), --only PART of a name.
+/// --quick, --out FILE (JSON lines; without it only the table on stdout), --only PART of a name.
 struct Arguments {
   bool quick = false;
   std::string out, only;
@@ -53,7 +53,7 @@ struct Arguments {
   bool wants(const std::string& name) const { return name.find(only) != std::string::npos; }
 };
 
-/// One JSON object a line, for report.py.
+/// Writes one JSON object a line, for report.py.
 class Results {
  public:
   explicit Results(const Arguments& arguments) {

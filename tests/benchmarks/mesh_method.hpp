@@ -1,4 +1,4 @@
-// One interface for every query of a convex body against a mesh that is measured.
+// Interface of every benchmarked query of a convex body against a mesh.
 #pragma once
 
 #include <functional>
@@ -14,14 +14,14 @@ namespace enfilade::benchmarks {
 using collision::Triangle;
 using Triangles = std::vector<Triangle>;
 
-/// One body against one mesh that stands, and whatever is kept from query to query.
+/// Queries of one body against one static mesh, with the state cached between queries.
 class MeshQuery {
  public:
   virtual ~MeshQuery() = default;
-  /// Metres; 0 when they meet.
+  /// Metres; 0 if they touch or penetrate.
   virtual double distance(const Placement& body) = 0;
-  /// Appends the indices (into the list that the mesh was made of) of all triangles that the body
-  /// touches or penetrates, in any order.
+  /// Appends the indices (into the mesh's triangle list) of all triangles that the body touches or
+  /// penetrates, in any order.
   virtual void contacts(const Placement& body, std::vector<std::uint32_t>& triangles) = 0;
   virtual void forget() {}
 };
@@ -34,7 +34,7 @@ struct MeshMethod {
 
 std::vector<MeshMethod> meshMethods();
 
-// One for each source file.
+// Factories, one per source file.
 std::vector<MeshMethod> ourMeshQueries();
 std::vector<MeshMethod> bulletMesh();
 std::vector<MeshMethod> fclMesh();

@@ -1,4 +1,4 @@
-// One interface for every narrow phase that is measured.
+// Interface of every benchmarked narrow phase.
 #pragma once
 
 #include <cmath>
@@ -17,7 +17,7 @@ using collision::Mat3;
 using collision::Vec3;
 using Points = std::vector<Vec3>;
 
-/// World = rotation * local + translation, the doubles taken as they are.
+/// World = rotation * local + translation, with the doubles taken as exact.
 struct Placement {
   Mat3 rotation = Mat3::Identity();
   Vec3 translation = Vec3::Zero();
@@ -27,10 +27,10 @@ struct Answer {
   enum class Verdict : std::uint8_t {
     apart,
     collides,  ///< touching counts
-    none       ///< it threw, gave up, returned what is no number, or died
+    none       ///< it threw, gave up, returned NaN, or died
   } verdict = Verdict::none;
-  std::int8_t decidedBy = -1;  ///< ours: collision::DecidedBy; others: -1
-  double distance = std::numeric_limits<double>::quiet_NaN();  ///< metres; NaN: not told
+  std::int8_t decidedBy = -1;  ///< ours: collision::Certificate; others: -1
+  double distance = std::numeric_limits<double>::quiet_NaN();  ///< metres; NaN: not reported
   double depth = std::numeric_limits<double>::quiet_NaN();
   bool depthProved = true;  ///< ours: false for an upper bound
 };
@@ -49,28 +49,28 @@ inline Answer collides(double depth = std::numeric_limits<double>::quiet_NaN()) 
   return answer;
 }
 
-/// Two bodies, and whatever the method keeps of them from question to question.
+/// A pair of bodies, with the method's state cached between queries.
 class PairOfBodies {
  public:
   virtual ~PairOfBodies() = default;
   virtual Answer ask(const Placement& a, const Placement& b) = 0;
-  /// The next question is a cold one.
+  /// Makes the next query a cold one.
   virtual void forget() {}
 };
 
 struct NarrowPhaseMethod {
   std::string name;
   bool ours;
-  std::string level;  ///< ours: "decide" or "refine", peers: what is asked
-  bool warm;          ///< keeps something from question to question
+  std::string level;  ///< ours: "decide" or "refine"; peers: the kind of query
+  bool warm;          ///< keeps state between queries
   bool distance, depth;
   std::function<std::unique_ptr<PairOfBodies>(const Points& a, const Points& b)> make;
 };
 
-/// Ours first.
+/// All methods, ours first.
 std::vector<NarrowPhaseMethod> narrowPhaseMethods();
 
-// One for each source file.
+// Factories, one per source file.
 std::vector<NarrowPhaseMethod> ourNarrowPhases();
 std::vector<NarrowPhaseMethod> bulletConvex();
 std::vector<NarrowPhaseMethod> ccdConvex();

@@ -1,5 +1,5 @@
-// Ours: nearestTriangle() and findContacts(), which decide exactly (level decide) and keep the
-// triangles that may matter from query to query.
+// Our mesh queries, findNearestTriangle() and findMeshContacts(). They are exact (level decide) and
+// cache the candidate triangles between queries.
 #include "collision/compound/mesh_query.hpp"
 #include "collision/shapes/hull.hpp"
 #include "tests/benchmarks/mesh_method.hpp"
@@ -13,19 +13,19 @@ class OurMeshQuery : public MeshQuery {
       : hull_(collision::buildHull(body)), mesh_(mesh) {}
 
   double distance(const Placement& body) override {
-    const auto nearest = collision::nearestTriangle(bodyAt(body), mesh_, cache_);
-    return nearest ? nearest->decision.distance : 0;
+    const auto nearest = collision::findNearestTriangle(bodyAt(body), mesh_, cache_);
+    return nearest ? nearest->separation.distance : 0;
   }
   void contacts(const Placement& body, std::vector<std::uint32_t>& triangles) override {
-    collision::findContacts(bodyAt(body), mesh_, cache_, contacts_);
+    collision::findMeshContacts(bodyAt(body), mesh_, cache_, contacts_);
     for (const auto* list : {&contacts_.penetrated, &contacts_.touched}) {
-      for (const std::uint32_t triangle : *list) triangles.push_back(mesh_.given(triangle));
+      for (const std::uint32_t triangle : *list) triangles.push_back(mesh_.inputIndex(triangle));
     }
   }
   void forget() override { cache_.reset(); }
 
  private:
-  collision::ConvexBody bodyAt(const Placement& at) const {
+  collision::PlacedConvex bodyAt(const Placement& at) const {
     return {hull_.vertices, at.translation, &at.rotation, &hull_};
   }
   collision::Hull hull_;

@@ -1,4 +1,4 @@
-// Ours at its two levels, and decide() with the depth that the solver uses.
+// Our narrow phase at its two levels, and at the exact level with the solver's depth.
 #include "collision/narrow_phase/narrow_phase.hpp"
 #include "collision/narrow_phase/penetration_depth.hpp"
 #include "collision/narrow_phase/refine.hpp"
@@ -8,8 +8,8 @@
 namespace enfilade::benchmarks {
 namespace {
 
-using collision::ConvexBody;
 using collision::Hull;
+using collision::PlacedConvex;
 using collision::Verdict;
 
 class OurPair : public PairOfBodies {
@@ -19,7 +19,7 @@ class OurPair : public PairOfBodies {
   void forget() override { features_ = {}; }
 
  protected:
-  static ConvexBody bodyOf(const Hull& hull, const Placement& at) {
+  static PlacedConvex bodyOf(const Hull& hull, const Placement& at) {
     return {hull.vertices, at.translation, &at.rotation, &hull};
   }
   Hull hullA_, hullB_;
@@ -30,9 +30,10 @@ class Decides : public OurPair {
  public:
   using OurPair::OurPair;
   Answer ask(const Placement& a, const Placement& b) override {
-    const auto told = collision::decide(bodyOf(hullA_, a), bodyOf(hullB_, b), features_);
-    Answer answer = told.verdict == Verdict::separated ? apart(told.distance) : collides();
-    answer.decidedBy = static_cast<std::int8_t>(told.decidedBy);
+    const auto result =
+        collision::computeSeparation(bodyOf(hullA_, a), bodyOf(hullB_, b), features_);
+    Answer answer = result.verdict == Verdict::separated ? apart(result.distance) : collides();
+    answer.decidedBy = static_cast<std::int8_t>(result.certificate);
     return answer;
   }
 };
@@ -41,13 +42,13 @@ class DecidesWithDepth : public OurPair {
  public:
   using OurPair::OurPair;
   Answer ask(const Placement& a, const Placement& b) override {
-    const ConvexBody bodyA = bodyOf(hullA_, a);
-    const ConvexBody bodyB = bodyOf(hullB_, b);
-    const auto told = collision::decide(bodyA, bodyB, features_);
-    Answer answer = told.verdict == Verdict::separated ? apart(told.distance) : collides(0);
-    answer.decidedBy = static_cast<std::int8_t>(told.decidedBy);
-    if (told.verdict == Verdict::penetrating) {
-      const auto depth = collision::penetrationDepth(bodyA, bodyB, features_, depth_);
+    const PlacedConvex bodyA = bodyOf(hullA_, a);
+    const PlacedConvex bodyB = bodyOf(hullB_, b);
+    const auto result = collision::computeSeparation(bodyA, bodyB, features_);
+    Answer answer = result.verdict == Verdict::separated ? apart(result.distance) : collides(0);
+    answer.decidedBy = static_cast<std::int8_t>(result.certificate);
+    if (result.verdict == Verdict::penetrating) {
+      const auto depth = collision::computePenetrationDepth(bodyA, bodyB, features_, depth_);
       answer.depth = depth.depth;
       answer.depthProved = depth.global;
     }
@@ -66,10 +67,11 @@ class Refines : public OurPair {
  public:
   using OurPair::OurPair;
   Answer ask(const Placement& a, const Placement& b) override {
-    const auto told = collision::refine(bodyOf(hullA_, a), bodyOf(hullB_, b), features_);
-    Answer answer =
-        told.verdict == Verdict::separated ? apart(told.distance) : collides(told.penetration);
-    answer.decidedBy = static_cast<std::int8_t>(told.decidedBy);
+    const auto result =
+        collision::refineSeparation(bodyOf(hullA_, a), bodyOf(hullB_, b), features_);
+    Answer answer = result.verdict == Verdict::separated ? apart(result.distance)
+                                                         : collides(result.penetration);
+    answer.decidedBy = static_cast<std::int8_t>(result.certificate);
     return answer;
   }
 };

@@ -1,11 +1,14 @@
-// The parts feeder of the seed's 5.4 beside its peers: a vibrating tray with small convex parts,
-// ours with one thread and with two, the peers as they come, with one. Prints speed against
-// penetration, judged alike for all by the exact narrow phase, and the checks of ours; ends with 1
-// when one of ours fails.
-//   parts_feeder [PARTS [TICKS [ours]]]  1000 parts and 240 ticks when left out; 10000 for the full
-//   run, of which one thread and the peers do the first 240; `ours`: without peers
-// The last tenth of the ticks, when all have settled, is told once more by itself. `a scene's`: the
-// bundled scene in its world, contacts told, as the server has it; judged by what the world tells.
+// Benchmark of the parts feeder (Lin 1993, section 5.4): a vibrating tray with small convex parts.
+// Ours with one and two threads; peers with their default settings and one thread. Prints speed
+// against penetration, measured for all by the exact narrow phase, and the checks of ours; exits
+// with 1 if one of ours fails.
+//
+//   parts_feeder [PARTS [TICKS [ours]]]
+//      default 1000 parts and 240 ticks; 10000 for the full run, of which one thread and the peers
+//      run the first 240; `ours`: without peers
+//
+// The last tenth of the ticks, after settling, is also printed separately. `scene`: the bundled
+// scene in its world with contact events, as in the server; measured by the tick reports.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -20,13 +23,13 @@
 namespace enfilade::benchmarks {
 namespace {
 
-using testing::FeederJudge;
-using testing::FeederJudgement;
+using testing::FeederCheck;
+using testing::FeederFindings;
 using testing::FeederPlan;
 
-constexpr int kJudgeEvery = 20;  // ticks
-constexpr int kThreads = 2;      // of ours
-constexpr int kMostAlone = 240;  // ticks of ours with one thread, and of the peers
+constexpr int kJudgeEvery = 20;          // ticks
+constexpr int kThreads = 2;              // of our engine
+constexpr int kMaxTicksOneThread = 240;  // ticks of ours with one thread, and of the peers
 
 class OurFeeder : public FeederEngine {
  public:
@@ -35,8 +38,8 @@ class OurFeeder : public FeederEngine {
   std::vector<testing::PlacedPart> parts() const override { return feeder_.parts(); }
   testing::Vec3 tray() const override { return feeder_.tray(); }
   double energy() const { return feeder_.energy(); }
-  const scene::DynamicsReport& report() const { return feeder_.report(); }
-  double epsilon() { return feeder_.settings().solver.epsilon; }
+  const scene::StepReport& report() const { return feeder_.report(); }
+  double epsilon() { return feeder_.settings().solver.contactOffset; }
 
  private:
   testing::Feeder feeder_;
@@ -44,11 +47,11 @@ class OurFeeder : public FeederEngine {
 
 struct Row {
   double seconds = 0;  ///< of the ticks
-  double cpu = 0;      ///< of the ticks, of all threads together
-  FeederJudgement worst;
+  double cpu = 0;      ///< of the ticks, all threads together
+  FeederFindings worst;
 };
 
-FeederJudgement worse(const FeederJudgement& a, const FeederJudgement& b) {
+FeederFindings worse(const FeederFindings& a, const FeederFindings& b) {
   return {std::max(a.deepest, b.deepest), std::max(a.penetrating, b.penetrating),
           std::max(a.outside, b.outside)};
 }
@@ -59,7 +62,7 @@ double cpuSeconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-Row run(FeederEngine& engine, const FeederJudge& judge, int ticks, bool driven,
+Row run(FeederEngine& engine, const FeederCheck& feederCheck, int ticks, bool driven,
         const std::function<void()>& afterTick = {}) {
   Row row;
   for (int i = 1; i <= ticks; ++i) {
@@ -70,12 +73,12 @@ Row run(FeederEngine& engine, const FeederJudge& judge, int ticks, bool driven,
     row.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (afterTick) afterTick();
     if (i % kJudgeEvery != 0) continue;
-    row.worst = worse(row.worst, judge.judge(engine.parts(), engine.tray()));
+    row.worst = worse(row.worst, feederCheck.evaluate(engine.parts(), engine.tray()));
   }
   return row;
 }
 
-/// One after the other.
+/// Concatenates two measured intervals.
 Row both(const Row& first, const Row& second) {
   return {first.seconds + second.seconds, first.cpu + second.cpu, worse(first.worst, second.worst)};
 }
@@ -91,30 +94,31 @@ bool check(bool holds, const char* what) {
   return holds;
 }
 
-bool checkOurs(const FeederPlan& plan, const FeederJudge& judge, int ticks) {
+bool checkOurs(const FeederPlan& plan, const FeederCheck& feederCheck, int ticks) {
   OurFeeder still(plan, kThreads);
   const double start = still.energy();
   double most = start;
-  const Row off = run(still, judge, ticks, false, [&] { most = std::max(most, still.energy()); });
+  const Row off =
+      run(still, feederCheck, ticks, false, [&] { most = std::max(most, still.energy()); });
   OurFeeder driven(plan, kThreads), alone(plan, 1);
   std::uint64_t shortened = 0, squeezed = 0, solids = 0;
   const auto count = [&] {
-    shortened += driven.report().shortened;
-    squeezed += driven.report().squeezed;
+    shortened += driven.report().reducedMotions;
+    squeezed += driven.report().crushed;
     solids += plan.parts.size() * static_cast<std::uint64_t>(plan.looks);
   };
   const int last = std::max(kJudgeEvery, ticks / 10);
-  const Row begun = run(driven, judge, ticks - last, true, count);
-  const Row ended = run(driven, judge, last, true, count);
+  const Row begun = run(driven, feederCheck, ticks - last, true, count);
+  const Row ended = run(driven, feederCheck, last, true, count);
   const Row on = both(begun, ended);
-  const Row one = run(alone, judge, std::min(ticks, kMostAlone), true);
+  const Row one = run(alone, feederCheck, std::min(ticks, kMaxTicksOneThread), true);
   print("ours, drive off", off, ticks);
   print("ours", on, ticks);
   print("ours, last tenth", ended, last);
-  print("ours, one thread", one, std::min(ticks, kMostAlone));
+  print("ours, one thread", one, std::min(ticks, kMaxTicksOneThread));
   std::printf(
-      "  energy with the drive off: at most %.6f of its start; stopped on their way: %.2f %%"
-      " of all ways, %llu squeezed pairs\n",
+      "  energy with the drive off: at most %.6f of its start; reduced: %.2f %%"
+      " of all motions, %llu crushed pairs\n",
       most / start, 100.0 * static_cast<double>(shortened) / static_cast<double>(solids),
       static_cast<unsigned long long>(squeezed));
   bool all = check(most <= 1.001 * start, "drive off: energy never above its start + 0.1 %");
@@ -124,13 +128,13 @@ bool checkOurs(const FeederPlan& plan, const FeederJudge& judge, int ticks) {
   return all;
 }
 
-/// Whether nothing left the tray and nothing penetrated by more than epsilon.
+/// Whether no part left the tray and none penetrated by more than the contact offset.
 bool checkScene(const FeederPlan& plan, int ticks) {
   scene::Model model = assets::makeFeeder({plan.parts.size(), 1});
   scene::applySidecar(model, assets::feederSidecar(), "feeder.walk.json");
   scene::World world(std::make_shared<const scene::Scene>(std::move(model)));
-  scene::setThreads(world, kThreads);
-  const auto isInside = [&](const scene::BodyView& body) {
+  scene::setSolverThreadCount(world, kThreads);
+  const auto isInside = [&](const scene::BodySnapshot& body) {
     const testing::Vec3& at = body.pose.translation;
     return std::abs(at.x()) < plan.inner && std::abs(at.z()) < plan.inner && at.y() > 0.8;
   };
@@ -139,11 +143,11 @@ bool checkScene(const FeederPlan& plan, int ticks) {
     for (int i = 0; i < most; ++i) {
       const double cpu = cpuSeconds();
       const auto start = std::chrono::steady_clock::now();
-      const scene::TickReport report = tick(world);
+      const scene::TickReport report = tickWorld(world);
       const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
       row.seconds += took.count(), row.cpu += cpuSeconds() - cpu;
-      FeederJudgement now{report.worstPenetration, report.squeezedBodies, 0};
-      for (const scene::BodyView& body : *report.snapshot->bodies)
+      FeederFindings now{report.maxPenetration, report.crushedBodies, 0};
+      for (const scene::BodySnapshot& body : *report.snapshot->bodies)
         if (!isInside(body)) ++now.outside;
       row.worst = worse(row.worst, now);
     }
@@ -151,10 +155,11 @@ bool checkScene(const FeederPlan& plan, int ticks) {
   };
   const int last = std::max(kJudgeEvery, ticks / 10);
   const Row begun = go(ticks - last), ended = go(last), all = both(begun, ended);
-  print("a scene's", all, ticks);
+  print("scene", all, ticks);
   print("  last tenth", ended, last);
-  const bool inside = check(all.worst.outside == 0, "the scene's parts all inside");
-  return check(all.worst.deepest <= world.lengths().epsilon, "penetration <= epsilon") && inside;
+  const bool inside = check(all.worst.outside == 0, "all parts of the scene inside");
+  return check(all.worst.deepest <= world.settings().contactOffset, "penetration <= epsilon") &&
+         inside;
 }
 
 int main(int count, char** words) {
@@ -167,21 +172,21 @@ int main(int count, char** words) {
     return 2;
   }
   const FeederPlan plan = testing::planFeeder(parts, 1);
-  const FeederJudge judge(plan);
-  std::printf("%zu parts, %d ticks of 1/60 s in %d substeps, drive %g Hz, judged every %d ticks\n",
+  const FeederCheck feederCheck(plan);
+  std::printf("%zu parts, %d ticks of 1/60 s in %d substeps, drive %g Hz, checked every %d ticks\n",
               parts, ticks, plan.substeps, plan.frequency, kJudgeEvery);
   std::printf("%-16s %10s %10s %10s %14s %12s %9s\n", "", "ms a tick", "cpu ms", "real time",
               "deepest mm", "penetrating", "outside");
-  bool good = checkOurs(plan, judge, ticks);
+  bool good = checkOurs(plan, feederCheck, ticks);
   good &= checkScene(plan, ticks);
   if (alone) return good ? 0 : 1;
 #ifdef BENCH_BULLET
-  const int few = std::min(ticks, kMostAlone);
-  print("Bullet", run(*makeBulletFeeder(plan), judge, few, true), few);
+  const int few = std::min(ticks, kMaxTicksOneThread);
+  print("Bullet", run(*makeBulletFeeder(plan), feederCheck, few, true), few);
 #endif
 #ifdef BENCH_ODE
-  const int some = std::min(ticks, kMostAlone);
-  print("ODE", run(*makeOdeFeeder(plan), judge, some, true), some);
+  const int some = std::min(ticks, kMaxTicksOneThread);
+  print("ODE", run(*makeOdeFeeder(plan), feederCheck, some, true), some);
 #endif
   return good ? 0 : 1;
 }

@@ -12,7 +12,7 @@ SHAPES = ["circle", "square", "triangle", "diamond"]
 
 
 class Axis:
-    """From values to pixels; logarithmic, or linear where a value may be 0."""
+    """Maps values to pixels; logarithmic, or linear if a value may be 0."""
 
     def __init__(self, values, low, high, log=True):
         self.low, self.high, self.log = low, high, log
@@ -91,7 +91,7 @@ def looks(names, ours):
 
 
 def spread(wanted, gap=14):
-    """Moves places apart, downwards, in their order; back up where they would leave the plot."""
+    """Spreads positions downwards in their order; moves them up if they would leave the plot."""
     order = sorted(range(len(wanted)), key=lambda k: wanted[k])
     placed, last = dict(), -math.inf
     for k in order:
@@ -107,7 +107,7 @@ def spread(wanted, gap=14):
 
 
 def names_at_right(series, y, style):
-    """Names beside the lines' ends, joined to them by a thin line where they had to move."""
+    """Names next to the lines' ends, joined to them by a thin line if they had to move."""
     ends = [y.at(points[-1][1]) for points in series.values()]
     parts = []
     for (name, points), end, at in zip(series.items(), ends, spread(ends)):
@@ -139,7 +139,7 @@ def lines(path, title, x_name, y_name, series, ours=(), x_log=True):
 
 
 def marks(path, title, x_name, y_name, points, ours=()):
-    """`points`: a list of (name, x, y, words beside the name)."""
+    """`points`: a list of (name, x, y, words next to the name)."""
     if not points:
         return False
     x = Axis([p[1] for p in points], LEFT, WIDTH - RIGHT)

@@ -1,4 +1,4 @@
-// Seeded numbers for the workloads.
+// Seeded random numbers for the workloads.
 #pragma once
 
 #include <random>
@@ -14,7 +14,7 @@ inline double uniform(Random& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
 }
 
-/// Unit, all alike.
+/// A uniformly distributed unit vector.
 inline Vec3 direction(Random& random) {
   while (true) {
     const double x = uniform(random, -1, 1);

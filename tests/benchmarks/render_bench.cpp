@@ -1,12 +1,12 @@
-// How fast pictures are made: one draw an object with frustum culling beside what the renderer
-// does, in one run, over the same walks, with every channel compared byte by byte. Other work on
-// the machine stretches the time on the clock, so the processors' time is told as well: that of all
-// threads, those of a GL in software among them.
+// Benchmark of rendering: one draw an object with frustum culling against the renderer's culling,
+// in one run over the same walks, with every channel compared byte by byte. CPU time of all threads
+// (with those of a software GL) is reported as well, since other load stretches the wall-clock
+// time.
 //
 //   render_bench [SCENE [FRAMES]]
 //
-// SCENE is a file, or district:N for a district of N objects straight from its generator; without
-// one: the district of 1e5 objects, and the small house and the estate where the shared folder is.
+// SCENE is a file, or district:N for a generated district of N objects. Default: the district of
+// 1e5 objects, and the small house and the estate if the shared folder exists.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -18,6 +18,7 @@
 #include "assets/landmarks.hpp"
 #include "render/gl/gl_renderer.hpp"
 #include "scene/import/import_model.hpp"
+#include "scene/import/import_worker.hpp"
 #include "tests/support/seeded_walk.hpp"
 #include "tests/support/shared_folder.hpp"
 
@@ -75,37 +76,37 @@ render::Frame draw(render::GlRenderer& renderer, const tests::WalkStop& stop, Si
   const double busy = processorSeconds();
   const auto begin = Clock::now();
   render::Frame frame =
-      renderer.render(*stop.snapshot, camera, {.hidden = stop.walker, .culling = culling});
+      renderer.render(*stop.snapshot, camera, {.hiddenEntity = stop.walker, .culling = culling});
   result.seconds += std::chrono::duration<double>(Clock::now() - begin).count();
   result.processor += processorSeconds() - busy;
   ++result.frames;
   result.statistics.drawn += frame.statistics.drawn;
   result.statistics.occluded += frame.statistics.occluded;
-  result.statistics.outside += frame.statistics.outside;
+  result.statistics.frustumCulled += frame.statistics.frustumCulled;
   result.statistics.passes += frame.statistics.passes - 1;
   return frame;
 }
 
-/// Walks once with culling alone, as it is used; then again over some stops, where frames of both
-/// are compared. Only those stops are timed, of the first walk and of drawing singly.
+/// Walks once with culling alone, as in use. A second walk compares frames of both methods at some
+/// stops; only these stops of the first walk and of the drawing without culling are timed.
 void measure(const std::shared_ptr<const scene::Scene>& scene, const std::string& name,
              bool textured, Size size, int frames) {
   const std::vector<tests::WalkStop> stops = walkIn(scene, name, frames);
   if (stops.empty()) {
-    std::printf("%s: nowhere to stand\n", name.c_str());
+    std::printf("%s: found no place to stand\n", name.c_str());
     return;
   }
   render::GlRenderer renderer(scene);
   Result warm, culled, single, ignored;
-  for (int i = 0; i < 3; ++i) draw(renderer, stops[0], size, render::Culling::hidden, warm);
+  for (int i = 0; i < 3; ++i) draw(renderer, stops[0], size, render::Culling::occlusion, warm);
   const std::size_t every = std::max<std::size_t>(1, stops.size() / kCompared);
   for (std::size_t i = 0; i < stops.size(); ++i)
-    draw(renderer, stops[i], size, render::Culling::hidden, i % every == 0 ? culled : warm);
+    draw(renderer, stops[i], size, render::Culling::occlusion, i % every == 0 ? culled : warm);
   std::size_t different = 0, compared = 0;
-  draw(renderer, stops[0], size, render::Culling::singly, warm);
+  draw(renderer, stops[0], size, render::Culling::none, warm);
   for (std::size_t i = 0; i < stops.size(); i += every, ++compared) {
-    const render::Frame all = draw(renderer, stops[i], size, render::Culling::singly, single);
-    const render::Frame seen = draw(renderer, stops[i], size, render::Culling::hidden, ignored);
+    const render::Frame all = draw(renderer, stops[i], size, render::Culling::none, single);
+    const render::Frame seen = draw(renderer, stops[i], size, render::Culling::occlusion, ignored);
     different += same(all, seen) ? 0 : 1;
   }
   const double n = static_cast<double>(culled.frames), m = static_cast<double>(single.frames);
@@ -137,7 +138,7 @@ void benchmark(const std::string& name, int frames) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (const auto code = scene::runImportChild(argc, argv)) return *code;
+  if (const auto code = scene::runImportWorker(argc, argv)) return *code;
   std::printf(
       "                                              on the clock              processor ms a "
       "frame\n"

@@ -1,12 +1,13 @@
-// Renderers and depth buffers, speed against error: depth and ids of the same cameras, each frame
-// measured with rays in doubles.
+// Benchmark of renderers and depth buffers: speed against error. Depth and ids of the same cameras
+// are compared with rays in doubles.
 //
 //   render_depth [--quick] [--out FILE] [--only PART_OF_A_SCENE]
 //
 // Scenes: the bundled building, the small house and the estate of the shared folder, and a district
-// of 1e5 objects; without textures, masks and glass, so that all methods see the same triangles.
-// Cameras stand 1.6 m above what is below seeded places and look level. Methods take turns at each
-// camera; the first frame of a method is not timed. CPU time of the process and wall-clock time.
+// of 1e5 objects. They have no textures, masks and transparency, so that all methods see the same
+// triangles. Cameras stand 1.6 m above the floor at seeded places and look level. Methods alternate
+// at each camera; the first frame of a method is not timed. Reports CPU time of the process and
+// wall-clock time.
 #include <time.h>
 
 #include <cmath>
@@ -19,6 +20,7 @@
 #include "render/raytrace/ray_renderer.hpp"
 #include "render/reference/depth_report.hpp"
 #include "scene/import/import_model.hpp"
+#include "scene/import/import_worker.hpp"
 #include "scene/world/queries/ray_caster.hpp"
 #include "tests/benchmarks/depth_variant.hpp"
 #include "tests/benchmarks/measurement.hpp"
@@ -52,12 +54,12 @@ std::vector<NamedScene> scenes() {
     all.push_back({"small house", file("aws-small-house/small_house.gltf")});
     all.push_back({"estate", file("schependomlaan/schependomlaan_estate.glb")});
   } else {
-    std::printf("no shared folder: the small house and the estate are left out\n");
+    std::printf("no shared folder: the small house and the estate are skipped\n");
   }
   return all;
 }
 
-/// What all methods draw alike.
+/// Reduces the scene to what all methods draw alike.
 std::shared_ptr<const scene::Scene> plainScene(scene::Model model) {
   for (scene::Material& material : model.materials) {
     material.alpha = scene::Material::Alpha::opaque;
@@ -67,10 +69,10 @@ std::shared_ptr<const scene::Scene> plainScene(scene::Model model) {
   return std::make_shared<const scene::Scene>(std::move(model));
 }
 
-/// Where a person could stand and see something: a floor below, and something ahead.
+/// Cameras at eye height with a floor below and an object ahead.
 std::vector<Camera> camerasIn(const std::shared_ptr<const scene::Scene>& scene, int count) {
   const scene::RayCaster caster(scene);
-  const scene::Box& bounds = scene->bounds();
+  const scene::Aabb& bounds = scene->bounds();
   std::mt19937_64 random(2026);
   const auto uniform = [&](double low, double high) {
     return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
@@ -127,9 +129,9 @@ std::vector<Method> methodsFor(const std::shared_ptr<const scene::Scene>& scene)
   return methods;
 }
 
-void take(Method& method, const Camera& camera, const render::TrueFrame& truth, int times) {
+void take(Method& method, const Camera& camera, const render::ReferenceFrame& truth, int times) {
   method.aim(camera);
-  render::add(method.report, render::compareWithTruth(method.draw(camera), truth));
+  render::mergeReports(method.report, render::compareWithReference(method.draw(camera), truth));
   for (int i = 0; i < times; ++i) {
     const auto start = Clock::now();
     const double begun = processorSeconds();
@@ -141,7 +143,7 @@ void take(Method& method, const Camera& camera, const render::TrueFrame& truth, 
 
 nlohmann::json lineOf(const std::string& scene, const scene::Model& model, std::size_t triangles,
                       const Camera& size, const Method& method) {
-  nlohmann::json line = nlohmann::json::parse(render::jsonOf(method.report));
+  nlohmann::json line = nlohmann::json::parse(render::formatReportJson(method.report));
   line["bench"] = "depth";
   line["scene"] = scene;
   line["objects"] = model.objects.size();
@@ -166,7 +168,7 @@ void measure(const NamedScene& named, const Arguments& arguments, Results& resul
   const std::vector<Camera> cameras = camerasIn(scene, arguments.quick ? 3 : 5);
   std::printf("%s: %zu objects, %zu cameras\n", named.name.c_str(), scene->model().objects.size(),
               cameras.size());
-  render::TrueRays rays(scene);
+  render::ReferenceTracer rays(scene);
   const std::size_t triangles = trianglesOf(scene->model());
   for (const auto& [width, height] : {std::pair(256, 256), std::pair(640, 480)}) {
     if (arguments.quick && width > 256) break;
@@ -176,15 +178,15 @@ void measure(const NamedScene& named, const Arguments& arguments, Results& resul
       camera.width = width;
       camera.height = height;
       size = camera;
-      const render::TrueFrame truth = rays.look({}, camera);
+      const render::ReferenceFrame truth = rays.render({}, camera);
       for (Method& method : methods) take(method, camera, truth, arguments.quick ? 2 : 3);
     }
     for (const Method& method : methods) {
       results.add(lineOf(named.name, scene->model(), triangles, size, method));
-      const render::DepthErrors& away = method.report.away;
+      const render::DepthErrors& away = method.report.awayFromEdges;
       std::printf("  %4dx%-4d %-24s %8.2f ms %8.2f ms CPU   mean %.5f mm  max %.4f mm\n", width,
                   height, method.name.c_str(), quantile(method.milliseconds, 0.5),
-                  quantile(method.processor, 0.5), 1e3 * away.mean(), 1e3 * away.greatest);
+                  quantile(method.processor, 0.5), 1e3 * away.mean(), 1e3 * away.max);
     }
     std::fflush(stdout);
   }
@@ -195,7 +197,7 @@ void measure(const NamedScene& named, const Arguments& arguments, Results& resul
 
 int main(int argc, char** argv) {
   using namespace enfilade;
-  if (const auto code = scene::runImportChild(argc, argv)) return *code;
+  if (const auto code = scene::runImportWorker(argc, argv)) return *code;
   const benchmarks::Arguments arguments(argc, argv);
   benchmarks::Results results(arguments);
   for (const auto& scene : benchmarks::scenes())

@@ -69,7 +69,7 @@ def ids_table(rows):
                      f"{100 * (known - sum(differ)) / known:.4f} %", ids["tied"], differ[0],
                      differ[1], sum(differ[2:])])
     return table(["scene", "size", "method", "ids right", "of these, tied", "wrong on an edge pixel",
-                  "beside one", "elsewhere"], body)
+                  "next to one", "elsewhere"], body)
 
 
 def speed_error(rows, out, scene, size):
@@ -81,7 +81,7 @@ def speed_error(rows, out, scene, size):
         points.append((row["method"], max(LEAST_ERROR, most), row["ms"], ""))
     name = f"render_{scene.replace(' ', '_')}"
     title = f"Speed against error of depth: {scene}, {size.replace('x', '×')}"
-    plot.marks(out / f"{name}.svg", title, "greatest error away from edges, mm",
+    plot.marks(out / f"{name}.svg", title, "maximum error away from edges, mm",
                "ms a frame (median)", points, OURS)
     return picture(out, name, title)
 
@@ -102,27 +102,26 @@ def main():
 
 Made by `./dev bench render{' --quick' if quick else ''}` on {datetime.date.today()}: {machine().split(', ours')[0]},
 OpenGL by Mesa in software. {'**A quick run: few cameras, one size.** ' if quick else ''}The machine is
-noisy (other work runs beside), so only ratios within a table mean something: methods take turns at
-each camera, times are medians.
+noisy (other load), so only ratios within a table are meaningful: methods take turns at each camera,
+times are medians.
 
 Depth and ids of the same seeded cameras, 1.6 m above a floor and under a roof, near 0.1 m, far 500 m;
-without textures, masks and glass. Every pixel is compared with a ray in doubles
-(`render/reference/reference_tracer.hpp`); edge pixels, which are apart, have a neighbour that shows another object
+without textures, masks and transparency. Every pixel is compared with a ray in doubles
+(`render/reference/reference_tracer.hpp`); edge pixels, listed separately, have a neighbour that shows another object
 or leaves the pixel's plane by a thousandth of the depth. *GL D24 standard* to *D32F reversed* draw all
-triangles at once into that depth buffer and read it back. *GL renderer* and *rays robust* are what
-`enfilade` draws with; rays use two threads.
+triangles at once into that depth buffer and read it back. *GL renderer* and *rays robust* are the renderers
+of `enfilade`; rays use two threads.
 
-Time on the clock above the processors' own is time in which threads waited for a core that others had: in
-12 s of frames of the district, measured once by `/proc/PID/task/*/schedstat`, each of Mesa's two threads ran
-3.0 s and waited 6.1 s for a core, the thread that draws ran 2.5 s and waited 2.1 s. An idle machine
-needs no more than the processors' time. Each camera takes three pictures after one that is not timed, so the
-GL renderer knows what is seen there; along walks `render_bench` measures it.
+Wall-clock time beyond the CPU time is waiting for a busy core: in 12 s of frames of the district, measured
+once by `/proc/PID/task/*/schedstat`, each of Mesa's two threads ran 3.0 s and waited 6.1 s, and the drawing
+thread ran 2.5 s and waited 2.1 s. An idle machine needs no more than the CPU time. Each camera takes three
+images after an untimed one, so the GL renderer's visibility cache is warm; `render_bench` measures walks.
 """, about, "## Speed\n", speed_table(rows, sizes), "## Error of depth\n"]
     for scene in names(rows, "scene"):
         parts += [f"### {scene}\n", error_table(rows, scene, sizes[-1]),
                   speed_error(rows, out, scene, sizes[-1])]
     parts += ["## Ids\n", """\
-*Tied*: the object shown lies within 0.02 mm and a millionth of the depth of the one that is first.
+*Tied*: the drawn object is within 0.02 mm and a millionth of the depth of the nearest one.
 """, ids_table(rows)]
     (out / "render.md").write_text("\n".join(part for part in parts if part))
     print(out / "render.md")

@@ -27,7 +27,7 @@ def read(folder, name):
 
 
 def names(rows, key="method"):
-    """In the order of their first appearance."""
+    """The distinct values in the order of their first appearance."""
     return list(dict.fromkeys(row[key] for row in rows))
 
 
@@ -92,7 +92,7 @@ def broad_cell(row):
 
 
 def ahead(rows, objects, movers):
-    """How many times the best peer's median is ours."""
+    """The best peer's median divided by ours."""
     ours = find(rows, kind="ours", objects=objects, movers=movers)
     peers = [row["median_us"] for row in rows
              if row["kind"] == "peer" and row["objects"] == objects and row["movers"] == movers
@@ -115,8 +115,8 @@ def build_table(rows, sizes):
         cells = []
         for n in sizes:
             row = find(rows, method=method, movers=100, objects=n)
-            told = row and "build_s" in row
-            cells.append(f"{short(row['build_s'])} s, {row['bytes']:.0f} B" if told else "–")
+            known = row and "build_s" in row
+            cells.append(f"{short(row['build_s'])} s, {row['bytes']:.0f} B" if known else "–")
         ticks = [row for row in rows if row["method"] == method and "ticks" in row]
         wrong = f"{sum(r['wrong'] for r in ticks)} of {sum(r['ticks'] for r in ticks)}"
         body.append([method] + cells + [wrong])
@@ -129,11 +129,11 @@ def broad(rows, out):
     sizes = sorted(set(row["objects"] for row in rows))
     ours = {row["method"] for row in rows if row["kind"] == "ours"}
     parts = ["## Broad phase\n", """\
-A building of storeys and rooms, 68 still objects in each room of 30 m², their order shuffled; of the
-movers 80 % are avatars at 1.5 m/s, the others turn; 60 ticks a second. A tick is timed from the new
-boxes to all pairs told. Every method's set of pairs was compared every tick with one truth (number,
-and sum of mixed ids). Methods take turns of some dozens of ticks; the first of a turn, which
-finds cold caches, is not timed. A method stops when its time for a size is used up.
+A building of storeys and rooms with 68 static objects per room of 30 m², in shuffled order. 80 % of the
+movers are avatars at 1.5 m/s, the others rotate; 60 ticks a second. A tick is timed from the new boxes to
+all reported pairs. Every tick, each method's set of pairs was compared with a reference (number, and sum
+of mixed ids). Methods run in turns of some dozens of ticks; the first tick of a turn has cold caches and
+is not timed. A method stops when its time for a size is used up.
 """]
     for movers in sorted(set(row["movers"] for row in rows)):
         series = {}
@@ -144,9 +144,9 @@ finds cold caches, is not timed. A method stops when its time for a size is used
         plot.lines(out / f"broad_{movers}.svg", f"Broad phase, {movers} movers", "still objects",
                    "µs a tick (median)", series, ours)
         parts += [f"### {movers} movers\n", broad_table(rows, movers, sizes),
-                  picture(out, f"broad_{movers}", f"Cost of a tick by still objects, {movers} movers")]
+                  picture(out, f"broad_{movers}", f"Cost of a tick by static objects, {movers} movers")]
     parts += ["### Building, memory, and ticks with a wrong set of pairs\n", build_table(rows, sizes),
-              "Bytes are what malloc handed out (Embree: what it tells), without the boxes given.\n"]
+              "Bytes are what malloc handed out (Embree: its own count), without the given boxes.\n"]
     reasons = {row["method"]: row["left_out"] for row in rows if "left_out" in row}
     if reasons:
         parts.append("Left out at the larger sizes: "
@@ -230,13 +230,13 @@ def narrow(rows, out):
         return ""
     sizes = sorted(set(row["vertices"] for row in rows))
     parts = ["## Narrow phase: speed against error\n", """\
-Two polytopes with vertices on unit spheres turn by about a degree a step while one goes round the
-other: separated by 1 m, near (1 mm), penetrating by at most 10 cm. *Cold* forgets everything before
-each query, *warm* starts from the last step's answer; methods with one number keep nothing. Medians
-over pairs and turns; the methods take turns. Each of our rows names its level, and takes its time
-and its error from that level; errors are those against `refine`, which the next section holds
-against the truth of files. Touching counts as a collision. FCL's solvers are called directly,
-without its dispatch; Bullet in double precision, without margins.
+Two polytopes with vertices on unit spheres rotate by about a degree a step while one orbits the other:
+separated by 1 m, near (1 mm), penetrating by at most 10 cm. *Cold* clears all cached state before each
+query, *warm* starts from the last step's answer; methods with one number cache nothing. Medians over
+pairs and turns; the methods take turns. Each of our rows names its level; time and error are of that
+level. Errors are relative to `refine`, which the next section compares with the truth of files. Touching
+counts as a collision. FCL's solvers are called directly, without its dispatch; Bullet in double precision,
+without margins.
 """]
     for gap in names(rows, "gap"):
         parts += [f"### {gap}\n", narrow_table(rows, gap, sizes)]
@@ -297,13 +297,13 @@ def overall_table(rows):
 
 def families(rows, out):
     if not rows:
-        return "## Exact cases\n\nThe folder of exact cases was not there; nothing was measured.\n"
+        return "## Exact cases\n\nThe folder of exact cases was missing; nothing was measured.\n"
     whole = [row for row in rows if row["family"] == "all"]
     parts = ["## Exact cases\n", f"""\
 {whole[0]['count']} pairs whose truth is known from integer arithmetic: exact contact, gaps down to
-1e-16, slivers, far offsets, architecture. Sequences are asked warm, all others cold. Errors are those
-against the truth of the files. *No answer*: an exception, an abort, a hang, no number, or a body that
-the peer cannot hold (ODE: only solids). Errors count where the verdict is right.
+1e-16, slivers, far offsets, architecture. Sequences are queried warm, all others cold. Errors are relative
+to the truth of the files. *No answer*: an exception, an abort, a hang, NaN, or a body that the peer cannot
+represent (ODE: only solids). Errors are measured only for right verdicts.
 """, overall_table(rows),
              speed_error_plot(whole, out, "speed_error_cases", "Speed against error: all exact cases",
                               "distance_error", 1, "ns"),
@@ -328,7 +328,7 @@ def mesh(rows):
     return "\n".join(["## Hull against mesh\n", """\
 A hull of 20 vertices flies over a terrain of 50,880 triangles, clear of it or dipping in, 25 mm and
 one degree a step. Warm medians (cold in brackets). Contacts are all triangles touched or penetrated.
-Bullet has no distance to a mesh: its tree is asked with a box grown by the last distance.
+Bullet has no distance query to a mesh: its tree is queried with a box inflated by the last distance.
 """, table(["method", "motion", "distance µs", "worst error m", "contacts µs",
             "triangles missed / false", "build s"], body)])
 
@@ -340,11 +340,11 @@ def time_to_contact(rows):
              "–" if row["share"] is None else f"{row['share']:.3g}", short(row["ns"])]
             for row in rows]
     return "\n".join(["## Time to contact\n", """\
-How long two bodies can be left alone. Seed 5.1 takes for the closing speed that of the closest points;
-ours is the closing speed of the reference points plus |w| rho of each body, which no vertex exceeds. A
-bound is broken when the bodies are proved to meet before it. `rod` is the counter-example to the
-seed's: a rod along a wall turns about its middle, which is closest and at rest, while its tip comes
-down. Beside them the time of impact itself, by conservative advancement, which is the truth here.
+Lower bounds on the time to contact of two bodies. Lin (1993, section 5.1) uses the closing speed of the
+closest points; ours is the closing speed of the reference points plus |w| rho of each body, which no
+vertex exceeds. A bound is broken if the bodies provably meet before it. `rod` is a counter-example to the
+former: a rod along a wall rotates about its middle, which is closest and at rest, while its tip approaches.
+The reference is the time of impact itself, by conservative advancement.
 """, table(["bound", "motion", "encounters", "broken", "median share of the true time", "ns"], body)])
 
 
@@ -359,10 +359,10 @@ def icollide(rows, out):
                                        ("boxes_ms", "broad_ms", "narrow_ms", "ms", "pairs")]
                     for row in middle])
     parts = ["## I-COLLIDE's five sweeps\n", """\
-The paper's middle: 1000 polytopes of 36 faces, 10° and 10 % of the radius a frame, density 1 %
-(bodies' volume to that of the cube they fly in). A frame is boxes, broad phase, and the exact verdict
-on every pair; peers get fixed cubes. Missed and false contacts are those of all frames of a
-setting, against all pairs decided cold.
+The five sweeps of Cohen et al. (1995). Default parameters: 1000 polytopes of 36 faces, 10° and 10 % of the
+radius a frame, density 1 % (bodies' volume relative to the cube that contains them). A frame is boxes,
+broad phase, and the exact verdict on every pair; peers get fixed cubes. Missed and false contacts are
+counted over all frames of a setting, against all pairs computed cold.
 """, stages]
     units = {"number": "bodies", "faces": "faces a body", "density": "density",
              "rotation": "degrees a frame", "translation": "radii a frame"}
@@ -394,13 +394,12 @@ def main():
     rows = read(results, "narrow")
     quick = "--quick" in sys.argv
     head = f"""\
-# The collision core beside its peers
+# The collision core compared with its peers
 
 Made by `./dev bench collision{' --quick' if quick else ''}` on {datetime.date.today()}: {machine()},
 single thread. {'**A quick run: few repetitions, smaller sizes.** ' if quick else ''}The machine is
-noisy (other work runs beside, clocks are shared), so seconds wobble by a factor of two: every
-table is from one run in which the methods take turns, times are medians, and only ratios
-within a table mean something. Peers are Debian's packages; one that is not installed is missing here.
+noisy (other load, shared clocks), so times vary by a factor of two: every table is from one run in
+which the methods take turns, times are medians, and only ratios within a table are meaningful. Peers are Debian's packages; one that is not installed is missing here.
 """
     parts = [head, broad(read(results, "broad"), out),
              narrow([row for row in rows if row["bench"] == "narrow"], out),

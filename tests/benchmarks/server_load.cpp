@@ -1,12 +1,12 @@
-// Many clients of one server on loopback, all in this process; then many who come and go.
+// Load test: many clients of one server on loopback, all in this process; then many short visits.
 //
 //   server_load [CLIENTS [SECONDS [VISITS [STATE_RATE [WATCH_EVERY]]]]]     200 10 2000 0 10
 //
-// Each client drives an avatar through the bundled building with 60 commands a second and hears
-// contacts; one of WATCH_EVERY also sees states (STATE_RATE a second; 0: of each tick), by which
-// the way from a command to a state is measured. Were it all of 200, this process would mostly
-// parse 2.4 million avatars a second, and what it measures would be its own lateness. Exit code 3:
-// something was lost, doubled or left behind.
+// Each client drives an avatar through the bundled building with 60 commands a second and receives
+// contacts. One of WATCH_EVERY also receives states (STATE_RATE a second; 0: of each tick) to
+// measure the latency from a command to a state. With states for all 200 clients this process would
+// parse 2.4 million avatars a second and measure its own lateness. Exit code 3: something was lost,
+// duplicated or leaked.
 #include <malloc.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
@@ -20,6 +20,7 @@
 
 #include "protocol/clients/cpp/client.hpp"
 #include "scene/import/cache/model_cache.hpp"
+#include "scene/import/import_worker.hpp"
 #include "server/base/load_scene.hpp"
 #include "server/net/server.hpp"
 #include "tests/support/server_load.hpp"
@@ -41,21 +42,21 @@ double processorSeconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-void tell(const v1::StageTiming& timing) {
+void printRow(const v1::StageTiming& timing) {
   std::printf("| %-8s | %9.0f | %9.0f | %9.0f |\n", timing.name().c_str(), timing.median_us(),
               timing.p99_us(), timing.max_us());
 }
 
-void tell(const v1::Metrics& metrics) {
+void printRow(const v1::Metrics& metrics) {
   std::printf("| stage    | median us |    p99 us |    max us |\n|---|---|---|---|\n");
-  for (const v1::StageTiming& stage : metrics.stages()) tell(stage);
-  tell(metrics.tick());
-  std::printf("worst penetration %g m; %llu State messages and pictures dropped\n",
+  for (const v1::StageTiming& stage : metrics.stages()) printRow(stage);
+  printRow(metrics.tick());
+  std::printf("maximum penetration %g m; %llu State messages and images dropped\n",
               metrics.worst_penetration(), static_cast<unsigned long long>(metrics.dropped()));
 }
 
-void tell(const tests::LoadResult& result, double processor) {
-  std::printf("%llu clients, %llu ticks in %.2f s (%.1f a second), %.2f processors used\n",
+void printRow(const tests::LoadResult& result, double processor) {
+  std::printf("%llu clients, %llu ticks in %.2f s (%.1f a second), %.2f CPU cores used\n",
               static_cast<unsigned long long>(result.clients),
               static_cast<unsigned long long>(result.ticks), result.wallSeconds,
               double(result.ticks) / result.wallSeconds, processor / result.wallSeconds);
@@ -68,11 +69,11 @@ void tell(const tests::LoadResult& result, double processor) {
       static_cast<unsigned long long>(result.refused),
       static_cast<unsigned long long>(result.tickEvents),
       static_cast<unsigned long long>(result.begins), static_cast<unsigned long long>(result.ends));
-  std::printf("%llu states seen, %llu dropped\n", static_cast<unsigned long long>(result.states),
+  std::printf("%llu states read, %llu dropped\n", static_cast<unsigned long long>(result.states),
               static_cast<unsigned long long>(result.droppedStates));
   for (const auto& [name, ticks] :
        {std::pair{"taken", &result.acceptedToShown}, std::pair{"sent", &result.sentToShown}}) {
-    std::printf("ticks from %s to shown: p50 %llu, p99 %llu, most %llu, of %zu commands\n", name,
+    std::printf("ticks from %s to shown: p50 %llu, p99 %llu, maximum %llu, of %zu commands\n", name,
                 static_cast<unsigned long long>(quantile(*ticks, 0.5)),
                 static_cast<unsigned long long>(quantile(*ticks, 0.99)),
                 static_cast<unsigned long long>(quantile(*ticks, 1)), ticks->size());
@@ -103,19 +104,19 @@ bool load(const std::shared_ptr<const scene::Scene>& scene, int clients, double 
     metrics = protocol::Client("127.0.0.1", server.port()).metrics();
   };
   const tests::LoadResult result = tests::runLoad(options, atEnd, [&] { server.stop(); });
-  tell(result, used);
-  tell(metrics);
+  printRow(result, used);
+  printRow(metrics);
   return result.faults.empty() && result.begins == result.ends;
 }
 
-void tell(const char* when, const tests::Footprint& now) {
+void printRow(const char* when, const tests::Footprint& now) {
   std::printf("%-18s %7.1f MB resident, %llu descriptors, %llu threads\n", when,
               1e-6 * static_cast<double>(now.residentBytes),
               static_cast<unsigned long long>(now.descriptors),
               static_cast<unsigned long long>(now.threads));
 }
 
-/// Comes back when the server has forgotten all but the one who asks.
+/// Returns when the server has dropped all clients except the calling one.
 bool settled(protocol::Client& client) {
   constexpr int kTries = 1000;
   const auto alone = [&] {
@@ -126,7 +127,7 @@ bool settled(protocol::Client& client) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
-  ::malloc_trim(0);  // what the allocator keeps for later is no leak
+  ::malloc_trim(0);  // memory cached by the allocator is not a leak
   return alone();
 }
 
@@ -134,7 +135,7 @@ bool visit(const std::shared_ptr<const scene::Scene>& scene, int visits) {
   constexpr double kGrowth = 2e6;  // bytes; 2,000 sessions hold over 100 MB
   server::Server server(scene, {"127.0.0.1", 0}, roomForMany());
   protocol::Client stays("127.0.0.1", server.port());
-  v1::SetClock freely;  // so that avatars enter, and leave with their clients
+  v1::SetClock freely;  // so that avatars spawn, and leave with their clients
   freely.mutable_free_run()->set_speed(10);
   stays.setClock(freely);
   tests::visitRudely(server.port(), visits / 10, 1);
@@ -144,8 +145,8 @@ bool visit(const std::shared_ptr<const scene::Scene>& scene, int visits) {
   const bool alone = settled(stays);
   const tests::Footprint after = tests::footprint();
   std::printf("%d visits:\n", visits);
-  tell("before", before);
-  tell("after", after);
+  printRow("before", before);
+  printRow("after", after);
   return alone && after.descriptors == before.descriptors && after.threads == before.threads &&
          double(after.residentBytes) < double(before.residentBytes) + kGrowth;
 }
@@ -153,7 +154,7 @@ bool visit(const std::shared_ptr<const scene::Scene>& scene, int visits) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (const auto code = scene::runImportChild(argc, argv)) return *code;
+  if (const auto code = scene::runImportWorker(argc, argv)) return *code;
   spdlog::set_level(spdlog::level::warn);
   const int clients = argc > 1 ? std::atoi(argv[1]) : 200;
   const double seconds = argc > 2 ? std::atof(argv[2]) : 10;

@@ -1,10 +1,10 @@
-// A long walk: ten avatars on random seeded ways through the bundled building, doors and the lift
-// in use, every tick audited as far as the audit's budget goes, as fast as it can be made.
+// Soak test: ten avatars walk random seeded paths through the bundled building as fast as possible,
+// with doors and lift in use. Every tick is audited within the audit's budget.
 //
 //   soak [TICKS [SCENE]]     1000000
 //
-// Memory is sampled; after a tenth of the ticks it may grow no more. Exit code 3: it grew, the
-// audit found something, or something penetrated.
+// Memory is sampled and may not grow after a tenth of the ticks. Exit code 3: memory grew, the
+// audit had a finding, or something penetrated.
 #include <malloc.h>
 #include <spdlog/spdlog.h>
 
@@ -16,6 +16,7 @@
 #include <random>
 
 #include "scene/import/cache/model_cache.hpp"
+#include "scene/import/import_worker.hpp"
 #include "scene/world/world.hpp"
 #include "server/base/audit_log.hpp"
 #include "server/base/load_scene.hpp"
@@ -28,34 +29,36 @@ using scene::BodyKind;
 using scene::Vec3;
 
 constexpr int kAvatars = 10;
-constexpr int kTurnEvery = 120;         // ticks: all are told a new way
-constexpr int kBodyEvery = 300;         // ticks: one door or lift is told something
-constexpr int kTripEvery = 20'000;      // ticks: everyone leaves and comes back elsewhere
-constexpr double kGrowthAllowed = 4e6;  // bytes, after a tenth of the ticks: what allocators round
+constexpr int kTurnEvery = 120;         // ticks: all avatars get new directions
+constexpr int kBodyEvery = 300;         // ticks: one door or lift gets a command
+constexpr int kTripEvery = 20'000;      // ticks: all avatars leave and return elsewhere
+constexpr double kGrowthAllowed = 4e6;  // bytes, after a tenth of the ticks: the allocator's
+                                        // rounding
 
 class Soak {
  public:
   explicit Soak(std::shared_ptr<const scene::Scene> scene)
       : places_(tests::standingPlaces(scene, 8 * kAvatars, 1)), world_(std::move(scene)) {
-    // Parts are built when somebody first comes near: all of them now, so that what grows is no
-    // place that nobody had been to.
-    for (const std::uint32_t object : world_.scene().solidObjects()) world_.scene().parts(object);
-    scene::auditBroadPhase(world_, 1);
+    // Parts are built lazily when an avatar first comes near. All are built now, so that a first
+    // visit does not look like growth.
+    for (const std::uint32_t object : world_.scene().solidObjects())
+      world_.scene().collisionGeometry(object);
+    scene::setAuditInterval(world_, 1);
   }
 
   void step(std::uint64_t tick) {
     if (tick % kTripEvery == 0) trip();
     if (tick % kTurnEvery == 0) turn();
     if (tick % kBodyEvery == 0) useBody();
-    const scene::TickReport report = scene::tick(world_);
-    if (report.audit) audit_.add(*report.audit);
-    worst_ = std::max(worst_, report.worstPenetration);
+    const scene::TickReport report = scene::tickWorld(world_);
+    if (report.audit) audit_.addTick(*report.audit);
+    worst_ = std::max(worst_, report.maxPenetration);
     contacts_ += report.contacts.size();
     notices_ += report.notices.size();
   }
 
-  bool right() const { return audit_.right() && worst_ == 0; }
-  void tell() const {
+  bool right() const { return audit_.isClean() && worst_ == 0; }
+  void printRow() const {
     std::printf(
         "%llu ticks audited, %llu pairs, %llu missed, %llu extra; worst penetration %g m; "
         "%llu contact events, %llu notices; state hash %016llx\n",
@@ -69,27 +72,27 @@ class Soak {
 
  private:
   void trip() {
-    for (const scene::AvatarView& avatar : world_.snapshot()->avatars) {
-      scene::submit(world_, {avatar.name, scene::Drive{}, 0});
-      scene::submit(world_, {avatar.name, scene::Leave{}, 0});
+    for (const scene::AvatarSnapshot& avatar : world_.snapshot()->avatars) {
+      scene::submitAvatarCommand(world_, {avatar.name, scene::Drive{}, 0});
+      scene::submitAvatarCommand(world_, {avatar.name, scene::Leave{}, 0});
     }
     for (int i = 0; i < kAvatars; ++i) {
       const Vec3& place = places_[random_() % places_.size()];
-      // The same names come back: each spawn queues behind its leave.
-      scene::submit(world_, {"walker" + std::to_string(i), scene::Spawn{place}, 0});
+      // The names are reused: each spawn is queued behind its leave.
+      scene::submitAvatarCommand(world_, {"walker" + std::to_string(i), scene::Spawn{place}, 0});
     }
   }
   void turn() {
-    for (const scene::AvatarView& avatar : world_.snapshot()->avatars) {
+    for (const scene::AvatarSnapshot& avatar : world_.snapshot()->avatars) {
       const Vec3 goal = places_[random_() % places_.size()];
       if (random_() % 2 == 0) {
-        scene::submit(world_, {avatar.name, scene::Walk{{goal}}, 0});
+        scene::submitAvatarCommand(world_, {avatar.name, scene::Walk{{goal}}, 0});
         continue;
       }
-      Vec3 way = goal - avatar.feet;
+      Vec3 way = goal - avatar.footPosition;
       way.y() = 0;
       if (way.norm() > 0) {
-        scene::submit(world_, {avatar.name, scene::Drive{1.5 * way.normalized()}, 0});
+        scene::submitAvatarCommand(world_, {avatar.name, scene::Drive{1.5 * way.normalized()}, 0});
       }
     }
   }
@@ -101,7 +104,7 @@ class Soak {
     command.body = spec.name;
     using Action = scene::BodyCommand::Action;
     if (spec.kind == BodyKind::lift) {
-      command.action = Action::level;
+      command.action = Action::moveToLevel;
       command.level =
           static_cast<std::uint32_t>(random_() % std::max<std::size_t>(1, spec.stops.size()));
     } else if (spec.kind == BodyKind::path) {
@@ -109,7 +112,7 @@ class Soak {
     } else {
       command.action = random_() % 2 == 0 ? Action::open : Action::close;
     }
-    scene::submit(world_, command);  // a trigger refuses
+    scene::submitBodyCommand(world_, command);  // a trigger refuses the command
   }
 
   std::mt19937_64 random_{7};
@@ -123,7 +126,7 @@ class Soak {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (const auto code = scene::runImportChild(argc, argv)) return *code;
+  if (const auto code = scene::runImportWorker(argc, argv)) return *code;
   spdlog::set_level(spdlog::level::warn);
   const std::uint64_t ticks = argc > 1 ? std::strtoull(argv[1], nullptr, 10) : 1'000'000;
   server::ModelOptions model;
@@ -138,7 +141,7 @@ int main(int argc, char** argv) {
     soak.step(tick);
     if (tick % sampleEvery != 0 && tick + 1 != ticks) continue;
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    ::malloc_trim(0);  // what the allocator keeps for later is no growth
+    ::malloc_trim(0);  // memory cached by the allocator is not growth
     const double resident = static_cast<double>(tests::footprint().residentBytes);
     if (tick < warm) afterWarmUp = resident;
     most = std::max(most, tick >= warm ? resident : 0);
@@ -148,7 +151,7 @@ int main(int argc, char** argv) {
                 static_cast<double>(tick + 1) / took.count());
     std::fflush(stdout);
   }
-  soak.tell();
+  soak.printRow();
   const bool flat = most <= afterWarmUp + kGrowthAllowed;
   std::printf("memory after the warm-up: %+.1f MB\n", 1e-6 * (most - afterWarmUp));
   return soak.right() && flat ? 0 : 3;

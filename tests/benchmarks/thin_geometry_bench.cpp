@@ -1,8 +1,8 @@
-// Random moves at 0.01 to 1000 m/s among sheets without thickness,
-// slivers, panes, gaps and stairs; every tick of
-// every avatar is held to its closed cell, every sixteenth also to the exact verdict on everything.
+// Random moves at 0.01 to 1000 m/s among sheets of zero thickness, slivers, panes, gaps and stairs.
+// Every tick checks each avatar against its closed cell, every sixteenth also against the exact
+// verdict on everything.
 //
-//   thin_things_bench [MOVES [SEED]]
+//   thin_geometry_bench [MOVES [SEED]]
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -23,14 +23,14 @@ void run(const char* name, std::uint64_t seed, int moves, Totals& all,
   Builder b;
   Seeded random(seed);
   const std::vector<Cell> cells = build(b, random);
-  CellTrial trial(b.model, cells);
-  trial.spawn();
-  trial.randomMoves(random, moves / static_cast<int>(cells.size()));
-  std::printf("| %-18s | %7d | %6.1f %% | %7d | %11d |\n", name, trial.moves,
-              100.0 * trial.blocked / trial.moves, trial.outside, trial.penetrating);
-  all.moves += trial.moves;
-  all.outside += trial.outside;
-  all.penetrating += trial.penetrating;
+  CellFixture fixture(b.model, cells);
+  fixture.spawn();
+  fixture.randomMoves(random, moves / static_cast<int>(cells.size()));
+  std::printf("| %-18s | %7d | %6.1f %% | %7d | %11d |\n", name, fixture.moves,
+              100.0 * fixture.blocked / fixture.moves, fixture.outside, fixture.penetrating);
+  all.moves += fixture.moves;
+  all.outside += fixture.outside;
+  all.penetrating += fixture.penetrating;
 }
 
 std::vector<Cell> stairs(Builder& b, Seeded& random) {

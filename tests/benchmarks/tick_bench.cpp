@@ -1,11 +1,12 @@
-// The cost of a tick with walkers in a real or the bundled scene, by stage, in microseconds.
+// Benchmark of a tick with walking avatars in a real or the bundled scene, by stage, in
+// microseconds.
 //
 //   tick_bench [SCENE [AVATARS [TICKS]]]
 //
-// SCENE is a file, or district:N for a district of N objects straight from its generator.
-// Avatars walk at 1.5 m/s towards seeded places and turn to new ones every two seconds, as people
-// who look around a building. Contacts are decided each tick; the worst penetration is printed
-// beside the times, so that no speed is bought with an error.
+// SCENE is a file, or district:N for a generated district of N objects. Avatars walk at 1.5 m/s
+// towards seeded places and change direction every two seconds, like visitors of a building.
+// Contacts are computed each tick. The maximum penetration is printed with the times, so that no
+// speed is bought with an error.
 #include <sys/resource.h>
 #include <time.h>
 
@@ -19,6 +20,7 @@
 
 #include "assets/building.hpp"
 #include "scene/import/cache/model_cache.hpp"
+#include "scene/import/import_worker.hpp"
 #include "scene/world/world.hpp"
 #include "tests/scene/thin_geometry.hpp"
 #include "tests/support/shared_folder.hpp"
@@ -33,28 +35,28 @@ double uniform(std::mt19937_64& random, double low, double high) {
   return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
 }
 
-Vec3 somewhere(std::mt19937_64& random, const scene::Box& b) {
+Vec3 somewhere(std::mt19937_64& random, const scene::Aabb& b) {
   const double x = uniform(random, b.min.x(), b.max.x());
   const double y = uniform(random, b.min.y(), b.min.y() + 0.7 * b.size().y());
   const double z = uniform(random, b.min.z(), b.max.z());
   return {x, y, z};
 }
 
-/// Brings the world to `count` avatars: some walk off a building without a ground around it.
+/// Spawns up to `count` avatars; some walk off a building that has no ground around it.
 void spawnAvatars(scene::World& world, int count, std::mt19937_64& random) {
   for (int tries = 0; tries < 200 * count; ++tries) {
     if (static_cast<int>(world.snapshot()->avatars.size()) >= count) return;
     const std::string name = "walker" + std::to_string(world.snapshot()->tick);
-    submit(world, {name, scene::Spawn{somewhere(random, world.scene().bounds())}, 0});
-    tick(world);
+    submitAvatarCommand(world, {name, scene::Spawn{somewhere(random, world.scene().bounds())}, 0});
+    tickWorld(world);
   }
 }
 
 void turnAll(scene::World& world, std::mt19937_64& random) {
-  for (const scene::AvatarView& avatar : world.snapshot()->avatars) {
-    Vec3 way = somewhere(random, world.scene().bounds()) - avatar.feet;
+  for (const scene::AvatarSnapshot& avatar : world.snapshot()->avatars) {
+    Vec3 way = somewhere(random, world.scene().bounds()) - avatar.footPosition;
     way.y() = 0;
-    submit(world, {avatar.name, scene::Drive{1.5 * way.normalized()}, 0});
+    submitAvatarCommand(world, {avatar.name, scene::Drive{1.5 * way.normalized()}, 0});
   }
 }
 
@@ -68,7 +70,7 @@ void row(const char* name, const std::vector<double>& seconds) {
               1e6 * quantile(seconds, 0.99), 1e6 * quantile(seconds, 1));
 }
 
-/// Of this thread, seconds: what others do on the machine does not count.
+/// CPU time of this thread, seconds; other load does not count.
 double processorTime() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
@@ -84,7 +86,7 @@ double peakMegabytes() {
 scene::Model modelOf(const std::filesystem::path& file) {
   const std::string name = file.string(), district = "district:";
   if (!name.starts_with(district))
-    return scene::loadModel(file, {}, scene::modelCacheOfEnvironment()).model;
+    return scene::loadModel(file, {}, scene::modelCacheFromEnvironment()).model;
   assets::BuildingOptions options;
   options.objects = std::stoul(name.substr(district.size()));
   return assets::makeBuilding(options);
@@ -99,34 +101,34 @@ std::shared_ptr<const scene::Scene> load(const std::filesystem::path& file) {
   return still;
 }
 
-/// Makes the ticks, `before` each of them, and prints what they cost.
+/// Runs the ticks, with `before` called before each, and prints their cost.
 void measure(const std::string& title, scene::World& world, int ticks,
              const std::function<void(int tick)>& before) {
-  std::array<std::vector<double>, scene::kStages> stages;
+  std::array<std::vector<double>, scene::kStageCount> stages;
   std::vector<double> whole, processor;
   double worst = 0;
   std::uint64_t queries = 0, rationals = 0, pairs = 0, bounded = 0;
   for (int i = 0; i < ticks; ++i) {
     before(i);
     const double start = processorTime();
-    const scene::TickReport report = tick(world);
+    const scene::TickReport report = tickWorld(world);
     processor.push_back(processorTime() - start);
     double sum = 0;
-    for (std::size_t s = 0; s < scene::kStages; ++s) {
+    for (std::size_t s = 0; s < scene::kStageCount; ++s) {
       stages[s].push_back(report.stageSeconds[s]);
       sum += report.stageSeconds[s];
     }
     whole.push_back(sum);
-    worst = std::max(worst, report.worstPenetration);
+    worst = std::max(worst, report.maxPenetration);
     queries += report.narrowQueries;
     rationals += report.rationalQueries;
     pairs += report.pairs;
-    bounded += report.boundedSweeps;
+    bounded += report.iterationLimitedCasts;
   }
   std::printf("%s: %zu objects, %zu avatars, %d ticks\n", title.c_str(),
               world.scene().model().objects.size(), world.snapshot()->avatars.size(), ticks);
   std::printf("| stage    | median us |    p99 us |    max us |\n|---|---|---|---|\n");
-  for (std::size_t s = 0; s < scene::kStages; ++s) row(scene::kStageNames[s], stages[s]);
+  for (std::size_t s = 0; s < scene::kStageCount; ++s) row(scene::kStageNames[s], stages[s]);
   row("tick", whole);
   row("on a CPU", processor);
   std::printf(
@@ -149,7 +151,7 @@ void bench(const std::filesystem::path& file, int avatars, int ticks) {
   });
 }
 
-/// 200 walkers who want both ways along a corridor of 4 m: everyone is in somebody's way.
+/// 200 avatars walk in both directions along a corridor of 4 m and block one another.
 void benchCrowd(int ticks) {
   constexpr int kCrowd = 200;
   scene::testing::Builder builder;
@@ -157,18 +159,18 @@ void benchCrowd(int ticks) {
   scene::World world(std::make_shared<const scene::Scene>(builder.model));
   const auto name = [](int i) { return "walker" + std::to_string(i); };
   for (int i = 0; i < kCrowd; ++i)
-    submit(world, {name(i), scene::Spawn{{-24.5 + i / 4, 0, -1.5 + i % 4}}, 0});
-  tick(world);
+    submitAvatarCommand(world, {name(i), scene::Spawn{{-24.5 + i / 4, 0, -1.5 + i % 4}}, 0});
+  tickWorld(world);
   measure("a crowd in a corridor", world, ticks, [&](int i) {
     if (i % 120 != 0) return;
     for (int k = 0; k < kCrowd; ++k) {
       const double along = (k + i / 120) % 2 ? 1.3 : -1.3;
-      submit(world, {name(k), scene::Drive{{along, 0, 0.3 - 0.2 * (k % 4)}}, 0});
+      submitAvatarCommand(world, {name(k), scene::Drive{{along, 0, 0.3 - 0.2 * (k % 4)}}, 0});
     }
   });
 }
 
-/// The bundled building, and the shared estate of 16,395 objects where it is there.
+/// The bundled building, and the shared estate of 16,395 objects if present.
 std::vector<std::filesystem::path> defaultScenes(const char* program) {
   const auto built = std::filesystem::absolute(program).parent_path().parent_path();
   std::vector<std::filesystem::path> scenes{built / "assets/building.glb"};
@@ -180,7 +182,7 @@ std::vector<std::filesystem::path> defaultScenes(const char* program) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (const auto code = scene::runImportChild(argc, argv)) return *code;
+  if (const auto code = scene::runImportWorker(argc, argv)) return *code;
   const int avatars = argc > 2 ? std::atoi(argv[2]) : 10;
   const int ticks = argc > 3 ? std::atoi(argv[3]) : 3000;
   if (argc > 1) {

@@ -62,8 +62,8 @@ class Difference(unittest.TestCase):
 
     def test_the_same_walk_has_no_difference(self):
         again = self.record("again", self.room)
-        code, told = self.diff(again)
-        self.assertEqual((code, told["same"], told["worse"]), (0, True, 0))
+        code, report = self.diff(again)
+        self.assertEqual((code, report["same"], report["worse"]), (0, True, 0))
         code, text, _ = self.run_program("diff", self.before, again)
         self.assertEqual(code, 0)
         self.assertIn("no difference", text)
@@ -71,9 +71,9 @@ class Difference(unittest.TestCase):
     def test_something_in_the_way_is_new_and_worse(self):
         full = self.model("full.obj", obj() + box("table", *TABLE))
         after = self.record("after", full)
-        code, told = self.diff(after)
+        code, report = self.diff(after)
         self.assertEqual(code, 3)
-        new = [c for c in told["happenings"] if c["change"] == "new" and c["kind"] == "contact"]
+        new = [c for c in report["happenings"] if c["change"] == "new" and c["kind"] == "contact"]
         self.assertTrue(new)
         for change in new:
             self.assertEqual((change["after"]["a"], change["b_in_model"]), ("ann", "after"))
@@ -81,22 +81,22 @@ class Difference(unittest.TestCase):
             self.assertTrue(change["worse"])
             self.assertAlmostEqual(change["after"]["point"][0], 1.8, delta=0.01)
         # The other way round it got better.
-        code, told = self.diff(self.before, before=after)
-        self.assertEqual((code, told["worse"]), (0, 0))
-        gone = [c for c in told["happenings"] if c["kind"] == "contact"]
+        code, report = self.diff(self.before, before=after)
+        self.assertEqual((code, report["worse"]), (0, 0))
+        gone = [c for c in report["happenings"] if c["kind"] == "contact"]
         self.assertEqual({c["change"] for c in gone}, {"gone"})
         self.assertEqual({c["b_in_model"] for c in gone}, {"before"})
 
     def test_a_walk_that_no_longer_arrives_is_worse(self):
         fence = ((2, 0, -10), (2.2, 3, 1.8))
         after = self.record("after", self.model("fence.obj", obj() + box("fence", *fence)))
-        code, told = self.diff(after)
+        code, report = self.diff(after)
         self.assertEqual(code, 3)
-        lost = [o for o in told["orders"] if o["worse"]]
+        lost = [o for o in report["orders"] if o["worse"]]
         self.assertEqual([(o["avatar"], o["tag"], o["before"]["outcome"], o["after"]["outcome"])
                           for o in lost], [("ann", 3, "arrived", "blocked")])
         self.assertIn("fence", lost[0]["after"]["obstacle"])
-        self.assertIn("no longer go well: 1", self.run_program("diff", self.before, after)[1])
+        self.assertIn("no longer succeed: 1", self.run_program("diff", self.before, after)[1])
 
     def test_a_clearance_is_judged_by_the_tolerance(self):
         def pillar(z):
@@ -104,21 +104,21 @@ class Difference(unittest.TestCase):
         there, near_miss = WALK[:3], ("--near-miss", "0.1")
         wide = self.record("wide", self.model("wide.obj", pillar(0.34)), there, near_miss)
         narrow = self.record("narrow", self.model("narrow.obj", pillar(0.32)), there, near_miss)
-        code, told = self.diff(narrow, before=wide)
-        near = [c for c in told["clearances"] if "pillar" in c["b"] and c["a"] == "ann"]
-        self.assertEqual(len(near), 1, told["clearances"])
+        code, report = self.diff(narrow, before=wide)
+        near = [c for c in report["clearances"] if "pillar" in c["b"] and c["a"] == "ann"]
+        self.assertEqual(len(near), 1, report["clearances"])
         self.assertEqual((code, near[0]["worse"]), (3, True))
         self.assertAlmostEqual(near[0]["changed_by_at_least"], -0.02, delta=0.002)
-        code, told = self.diff(narrow, "--tolerance", "0.05", before=wide)
-        self.assertEqual((code, told["clearances"]), (0, []))
+        code, report = self.diff(narrow, "--tolerance", "0.05", before=wide)
+        self.assertEqual((code, report["clearances"]), (0, []))
 
-    def test_another_time_is_told_but_not_worse(self):
+    def test_another_time_is_reported_but_not_worse(self):
         slow = [dict(line, speed=0.7) if line.get("walk") == "bob" else line for line in WALK]
-        code, told = self.diff(self.record("slow", self.room, slow))
-        self.assertEqual((code, told["worse"], told["same"]), (0, 0, False))
-        bob = [o for o in told["orders"] if o["avatar"] == "bob" and o["tag"] == 5]
+        code, report = self.diff(self.record("slow", self.room, slow))
+        self.assertEqual((code, report["worse"], report["same"]), (0, 0, False))
+        bob = [o for o in report["orders"] if o["avatar"] == "bob" and o["tag"] == 5]
         self.assertGreater(bob[0]["after"]["time"], bob[0]["before"]["time"])
-        self.assertIn("bob", {w["avatar"] for w in told["ways"]})
+        self.assertIn("bob", {w["avatar"] for w in report["ways"]})
 
     def test_files_that_are_no_recordings_are_errors(self):
         self.assertEqual(self.run_program("diff", self.before, self.room)[0], 1)
@@ -132,17 +132,17 @@ class Difference(unittest.TestCase):
         code, text, errors = self.run_program("replay", self.room, self.before, "--out", out)
         self.assertEqual(code, 0, errors)
         self.assertIn("no difference", text)
-        told = json.loads((out / "diff.json").read_text())
-        runs = [told[which]["runs"][0] for which in ("before", "after")]
+        report = json.loads((out / "diff.json").read_text())
+        runs = [report[which]["runs"][0] for which in ("before", "after")]
         self.assertEqual(runs[0]["state_hash"], runs[1]["state_hash"])
 
-    def test_a_recorded_walk_in_a_changed_model_tells_and_shows_what_changed(self):
+    def test_a_recorded_walk_in_a_changed_model_reports_the_changes(self):
         full = self.model("full.obj", obj() + box("table", *TABLE))
         out = self.folder / "rewalk"
         code, text, errors = self.run_program("replay", full, self.before, "--out", out)
         self.assertEqual(code, 3, errors)
         self.assertEqual((out / "diff.txt").read_text(), text)
-        told = json.loads((out / "diff.json").read_text())
+        report = json.loads((out / "diff.json").read_text())
         # It is the walk that the script makes there, to the last bit, as far as it goes.
         direct = self.record("direct", full)
         contacts = {}
@@ -156,12 +156,12 @@ class Difference(unittest.TestCase):
             if os.environ.get("CI"):
                 self.fail("no EGL device: install libegl-mesa0 and libgl1-mesa-dri")
             self.skipTest("no EGL device")
-        named = {c["picture"] for c in told["happenings"] if "picture" in c}
+        named = {c["picture"] for c in report["happenings"] if "picture" in c}
         self.assertIn("changes/001.png", named)
         for picture in sorted(named) + ["changes/map.png"]:
             self.assertEqual((out / picture).read_bytes()[:4], b"\x89PNG")
 
-    def test_commands_that_a_model_refuses_are_told(self):
+    def test_commands_that_a_model_refuses_are_reported(self):
         scene = self.model("door.obj", obj() + box("leaf", (3, 0, -0.5), (3.05, 2, 0.5)))
         sidecar = {"walk": 1, "bodies": [
             {"name": "gate", "objects": ["leaf"], "kind": "hinged", "anchor": [3, 0, -0.5],
@@ -171,35 +171,35 @@ class Difference(unittest.TestCase):
         code, text, errors = self.run_program("replay", self.room, before, "--out",
                                               self.folder / "rewalk")
         self.assertIn(code, (0, 3), errors)
-        told = json.loads((self.folder / "rewalk" / "diff.json").read_text())
-        self.assertEqual([r["who"] for r in told["refused_commands"]], ["gate"])
+        report = json.loads((self.folder / "rewalk" / "diff.json").read_text())
+        self.assertEqual([r["who"] for r in report["refused_commands"]], ["gate"])
         self.assertIn("Commands that the model refused: 1", text)
 
     # ---- what is in a recording
 
-    def test_inspect_tells_what_is_in_a_recording(self):
+    def test_inspect_describes_a_recording(self):
         code, out, errors = self.run_program("inspect", self.before, "--json")
         self.assertEqual(code, 0, errors)
-        told = json.loads(out)
+        report = json.loads(out)
         summary = json.loads((self.folder / "before" / "summary.json").read_text())
-        run = told["runs"][0]
-        self.assertEqual((run["ticks"], run["state_hash"], told["closed"]),
+        run = report["runs"][0]
+        self.assertEqual((run["ticks"], run["state_hash"], report["closed"]),
                          (summary["ticks"], summary["state_hash"], True))
         self.assertEqual([a["name"] for a in run["avatars"]], ["ann", "bob"])
         self.assertAlmostEqual(run["avatars"][1]["way_length"], 4, delta=0.05)
         self.assertEqual(run["commands"], {"look": 1, "spawn": 2, "walk": 3})
-        channels = {c["topic"]: c["messages"] for c in told["channels"]}
+        channels = {c["topic"]: c["messages"] for c in report["channels"]}
         self.assertEqual(channels["/enfilade/state"], summary["ticks"])
         self.assertIn("ann", self.run_program("inspect", self.before)[1])
 
-    def test_inspect_tells_how_far_a_damaged_recording_reads(self):
+    def test_inspect_reports_how_far_a_damaged_recording_is_readable(self):
         whole = self.before.read_bytes()
         cut = self.folder / "cut.mcap"
         cut.write_bytes(whole[:len(whole) // 2])
         code, out, _ = self.run_program("inspect", cut, "--json")
-        told = json.loads(out)
-        self.assertEqual((code, told["closed"]), (0, False))
-        self.assertLessEqual(told["whole_bytes"], len(whole) // 2)
+        report = json.loads(out)
+        self.assertEqual((code, report["closed"]), (0, False))
+        self.assertLessEqual(report["whole_bytes"], len(whole) // 2)
         self.assertEqual(self.run_program("inspect", cut, "--strict")[0], 3)
         spoilt = bytearray(whole)
         spoilt[len(whole) // 2] ^= 4
@@ -215,8 +215,8 @@ class Difference(unittest.TestCase):
         code, _, errors = self.run_program("export", self.before, "--out", out)
         self.assertEqual(code, 0, errors)
         events = (self.folder / "before" / "contacts.jsonl").read_text().splitlines()
-        told = (out / "contacts.jsonl").read_text().splitlines()
-        self.assertEqual(told, events)
+        contacts = (out / "contacts.jsonl").read_text().splitlines()
+        self.assertEqual(contacts, events)
         script = self.folder / "walk.jsonl"
         options = ("--size", "64x48", "--fov", "60", "--channels", "depth", "--no-mp4")
         done = self.run_program("capture", self.room, script, "--out", self.folder / "a", "--avatar",

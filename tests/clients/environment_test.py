@@ -14,9 +14,9 @@ _STARTS = [(0, 0.01, 0), (-3, 0.01, 2)]
 
 def walk(env, seed, steps):
     """All that is seen on a walk of random actions."""
-    told = [env.reset(seed=seed)]
-    told += [env.step(env.action_space.sample()) for _ in range(steps)]
-    return told
+    results = [env.reset(seed=seed)]
+    results += [env.step(env.action_space.sample()) for _ in range(steps)]
+    return results
 
 
 class Environments(RoomCase):
@@ -43,8 +43,8 @@ class Environments(RoomCase):
     def test_observations_lie_in_their_space(self):
         self.need_pictures()
         env = self.environment(channels=("rgb", "depth", "ids"), goal=(3, 0, 0))
-        for told in walk(env, 1, 5):
-            self.assertTrue(env.observation_space.contains(told[0]))
+        for result in walk(env, 1, 5):
+            self.assertTrue(env.observation_space.contains(result[0]))
         self.assertEqual(env.render().shape, (12, 16, 3))
 
     def test_who_goes_ahead_comes_to_the_goal(self):
@@ -68,7 +68,7 @@ class Environments(RoomCase):
         np.testing.assert_allclose(seen["heading"], (0, 1), atol=1e-12)
         self.assertLess(seen["position"][2], -1)
 
-    def test_the_wall_is_told_and_ends_the_way(self):
+    def test_the_wall_stops_the_avatar_and_max_steps_truncate(self):
         env = self.environment(starts=[(4, 0.01, 0, 0)], channels=(), max_steps=12)
         env.reset(seed=0)
         for _ in range(12):
@@ -112,7 +112,7 @@ class Environments(RoomCase):
             env.reset(seed=1)
             env.close()
 
-    def test_who_cannot_begin_is_told_with_its_number_and_place(self):
+    def test_a_failed_start_is_reported_with_number_and_position(self):
         vector = enfilade.VectorWalkEnv(
             address=self.server.address, num_envs=3,
             make=lambda number, client: enfilade.WalkEnv(
@@ -134,7 +134,7 @@ class Environments(RoomCase):
         np.testing.assert_array_equal(one["position"][0], one["position"][1])
         hashes = vector.step([[1, 0]] * 3)[4]["state_hash"]
         self.assertEqual(hashes[0], hashes[1])
-        self.assertEqual(self.client.step().tick, 1)  # nobody else's step made it
+        self.assertEqual(self.client.step().tick, 1)  # no other client stepped
         vector.close()
         for _ in range(1000):
             if list(self.client.worlds()) == ["main"]:

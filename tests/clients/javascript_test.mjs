@@ -40,7 +40,7 @@ after(() => {
   rmSync(folder, { recursive: true });
 });
 
-test("a walk over a WebSocket meets the wall, and is told so", async () => {
+test("a walk over a WebSocket reports contact with the wall", async () => {
   const heard = [];
   const client = await connect(`ws://127.0.0.1:${port}`,
     { on: { events: (events) => heard.push(...events.contacts) } });
@@ -79,16 +79,16 @@ test("a recording is played, sought and taken over", async () => {
   walker.close();
   await stop(recording.process_);
 
-  const told = [];
+  const replays = [];
   const played = await serve(walk);
-  const client = await connect(played.url, { on: { replay: (replay) => told.push(replay) } });
+  const client = await connect(played.url, { on: { replay: (replay) => replays.push(replay) } });
   assert.equal(client.welcome.replay.lastTick, 150n);
   assert.equal((await client.seek(100)).stateHash, recorded);
   assert.equal((await client.step(1)).tick, 101n);
   await assert.rejects(client.command("ann", "walk", { along: [{ x: 3, y: 0, z: 0 }] }), /TakeOver/);
   assert.equal((await client.takeOver("ann")).tick, 101n);
   await client.command("ann", "walk", { along: [{ x: 3, y: 0, z: 0 }] });
-  assert.deepEqual(told.map((replay) => [replay.tick, replay.branched]), [[100n, false], [101n, true]]);
+  assert.deepEqual(replays.map((replay) => [replay.tick, replay.branched]), [[100n, false], [101n, true]]);
   client.close();
   await stop(played.process_);
 });
@@ -142,6 +142,6 @@ test("a world is made, entered and dropped", async () => {
   main.close();
 });
 
-test("nobody listening is told", async () => {
+test("a refused connection is reported", async () => {
   await assert.rejects(connect("ws://127.0.0.1:1"), ConnectionFailed);
 });

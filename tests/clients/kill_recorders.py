@@ -4,7 +4,7 @@
     kill_recorders.py [KILLS] [SEED]
 
 Servers and replays in turn. Each file must verify to its last tick, and hold the same ticks for the
-reader of MCAP's own authors. $ENFILADE is the program; PYTHONPATH as for the tests beside it."""
+reader of the MCAP project. $ENFILADE is the program; PYTHONPATH as for the tests next to it."""
 
 import json
 import random
@@ -36,16 +36,16 @@ class KilledRecorders:
         (self._server if number % 2 else self._replay)(seconds)
         if not self.file.exists() or self.file.stat().st_size == 0:
             return  # it had not come so far
-        code, told, errors = verify(self.file)
-        if code == 1 and ("no recording of Enfilade begins in it" in errors
-                          or "there is no header" in errors):
+        code, report, errors = verify(self.file)
+        if code == 1 and ("not a recording of Enfilade" in errors
+                          or "the header is missing" in errors):
             return  # killed before its start was in the file
         self.test.assertEqual(code, 0, errors)
-        self.test.assertFalse(told["closed"])
+        self.test.assertFalse(report["closed"])
         read = other_reader(self.test, self.file, "--stream")
         states = read.get("/enfilade/state", {"messages": 0})["messages"]
-        self.test.assertEqual(states, told["ticks"])
-        self.ticks.append(told["ticks"])
+        self.test.assertEqual(states, report["ticks"])
+        self.ticks.append(report["ticks"])
 
     def _replay(self, seconds):
         script = self.folder / "walk.jsonl"

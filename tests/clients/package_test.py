@@ -35,7 +35,7 @@ class Package(RoomCase):
         env = self.folder / "env"
         self.run_python("-m", "venv", "--system-site-packages", env)
         python = env / "bin" / "python"
-        source = self.folder / "source"  # pip builds beside what it installs
+        source = self.folder / "source"  # pip builds next to the sources
         subprocess.run(["cp", "-r", str(PACKAGE), str(source)], check=True)
         self.run_python("-m", "pip", "install", "--no-build-isolation", "--no-index", "--no-deps",
                         "--disable-pip-version-check", source, python=python)
@@ -43,32 +43,32 @@ class Package(RoomCase):
         code = ("import enfilade, sys\n"
                 "with enfilade.connect(sys.argv[1]) as client:\n"
                 "    print(enfilade.__file__, client.welcome.scene.source)\n")
-        told = self.run_python("-c", code, self.server.address, python=python, env=plain,
+        output = self.run_python("-c", code, self.server.address, python=python, env=plain,
                                cwd=self.folder)
-        self.assertIn(str(env), told)
-        self.assertIn("room.obj", told)
+        self.assertIn(str(env), output)
+        self.assertIn("room.obj", output)
 
     def test_the_random_walk_runs(self):
         self.need_pictures()
-        told = self.run_python(PACKAGE / "examples" / "random_walk.py", self.scene, "--start", 0,
+        output = self.run_python(PACKAGE / "examples" / "random_walk.py", self.scene, "--start", 0,
                                0.01, 0, "--steps", 5)
-        self.assertIn("walked", told)
+        self.assertIn("walked", output)
 
     def test_the_data_set_is_recorded(self):
         self.need_pictures()
         out = self.folder / "set"
-        told = self.run_python(PACKAGE / "examples" / "record_data_set.py", self.scene, out,
+        output = self.run_python(PACKAGE / "examples" / "record_data_set.py", self.scene, out,
                                "--start", 0, 0.01, 0, "--to", 1, 0, 0, "--size", 20, 10)
-        self.assertIn("arrived", told)
+        self.assertIn("arrived", output)
         index = json.loads((out / "index.json").read_text())
         picture = np.load(out / index["pictures"][-1]["file"])
         self.assertEqual(picture["depth"].shape, (10, 20))
         self.assertIn("wall", index["names"].values())
 
     def test_the_contact_log_is_json(self):
-        told = self.run_python(PACKAGE / "examples" / "contact_log.py", self.scene, "--start", 0, 0.01,
+        output = self.run_python(PACKAGE / "examples" / "contact_log.py", self.scene, "--start", 0, 0.01,
                                0, "--to", 8, 0, 0)
-        events = [json.loads(line) for line in told.splitlines()]
+        events = [json.loads(line) for line in output.splitlines()]
         self.assertIn(("begin", "wall"), [(one["kind"], one["b_name"]) for one in events])
 
     def test_a_recording_is_played_and_taken_over(self):
@@ -76,9 +76,9 @@ class Package(RoomCase):
         with enfilade.serve(self.scene, "--record", str(walk)) as server, server.connect() as client:
             client.spawn("ann", at=(0, 0.01, 0)).walk((3, 0, 0))
             client.run_until_idle()
-        told = self.run_python(PACKAGE / "examples" / "replay_and_take_over.py", walk, "--tick", 60,
+        output = self.run_python(PACKAGE / "examples" / "replay_and_take_over.py", walk, "--tick", 60,
                                "--avatar", "ann", "--to", 0, 0, 3, "--record", branch)
-        self.assertIn("ann arrived", told)
+        self.assertIn("ann arrived", output)
         self.assertTrue(branch.exists())
 
 

@@ -1,4 +1,4 @@
-"""What goes wrong in the user's hands: interrupts, wrong arguments, servers that nobody holds."""
+"""Misuse: interrupts, wrong arguments, and servers without an owner."""
 
 import gc
 import itertools
@@ -68,7 +68,7 @@ class Interrupts(RoomCase):
         ann = self.client.spawn("ann", at=(0, 0.01, 0))
         ann.enter()
         folder = str(Path(enfilade.__file__).parent)
-        told = []
+        kinds = []
         for number in itertools.count(1):
             left = number
 
@@ -89,17 +89,17 @@ class Interrupts(RoomCase):
             finally:
                 sys.settrace(None)
             self.client.step(1)
-            told += [one.kind for one in self.client.contacts() if one.b == FLOOR]
+            kinds += [one.kind for one in self.client.contacts() if one.b == FLOOR]
             if left > 0:
                 break
         self.assertGreater(number, 30)
-        for one, other in itertools.pairwise(told):
+        for one, other in itertools.pairwise(kinds):
             self.assertNotEqual(one, other)
 
     def test_a_reply_that_was_left_aside_is_not_waited_for(self):
         first = self.client.post([{"step": messages.Step(ticks=1)}])
         self.assertEqual(self.client.step().tick, 2)
-        with self.assertRaisesRegex(enfilade.EnfiladeError, "left aside"):
+        with self.assertRaisesRegex(enfilade.EnfiladeError, "discarded"):
             self.client.take(first)
         self.assertEqual(self.client.step().tick, 3)
 
@@ -144,7 +144,7 @@ class Vectors(RoomCase):
         vector = self.vector()
         vector.reset(seed=1)
         for number in range(2):
-            vector.envs[number].client.restart()  # behind its back: nobody is there now
+            vector.envs[number].client.restart()  # without the environment: the world is empty
             with self.assertRaises(enfilade.EnfiladeError):
                 vector.step(np.zeros((2, 2)))
             with self.assertRaisesRegex(RuntimeError, "reset"):
@@ -212,7 +212,7 @@ class Arguments(RoomCase):
         env.reset(seed=1)
         env.step([0, 0])
 
-    def test_a_body_is_told_one_thing(self):
+    def test_a_body_command_has_one_action(self):
         for wrong in ({"open": False}, {}, {"open": True, "close": True}):
             with self.assertRaisesRegex(ValueError, "give one of"):
                 self.client.body("door", **wrong)
@@ -325,13 +325,13 @@ class Questions(RoomCase):
         self.assertTrue(contacts)
         time.sleep(0.2)
         self.client.pause()
-        told = [one.tick for one in self.client.states()]
-        self.assertEqual(len(told), 1)
-        self.assertGreater(told[0], ticks[-1])
+        delivered = [one.tick for one in self.client.states()]
+        self.assertEqual(len(delivered), 1)
+        self.assertGreater(delivered[0], ticks[-1])
 
 
 class Servers(RoomCase):
-    def test_a_server_that_nobody_holds_is_told_to_end(self):
+    def test_a_server_without_an_owner_is_ended(self):
         pids = [enfilade.serve(self.scene).process.pid for _ in range(2)]
         gc.collect()
         for _ in range(500):
@@ -359,17 +359,17 @@ class Servers(RoomCase):
         server = enfilade.serve(self.scene)
         client, asked = server.connect(), []
         self.addCleanup(client.close)
-        client.say_no_more()  # there is nothing to read: it ends nothing
+        client.shutdown_send()  # there is nothing to read: it ends nothing
         client.metrics()
-        say_no_more = client.say_no_more
-        client.say_no_more = lambda: asked.append(say_no_more())
+        shutdown_send = client.shutdown_send
+        client.shutdown_send = lambda: asked.append(shutdown_send())
         self.assertEqual(server.stop(), 0)
         self.assertTrue(asked)
         with self.assertRaises(enfilade.ServerError) as caught:
             client.step()
         self.assertEqual(caught.exception.code, "ERROR_SHUTTING_DOWN")
 
-    def test_a_program_that_is_no_server_is_told(self):
+    def test_a_program_that_is_no_server_is_reported(self):
         with self.assertRaisesRegex(enfilade.StartFailed, "no Enfilade server"):
             enfilade.serve(self.scene, program="/bin/echo")
 

@@ -15,7 +15,7 @@ _MCAP = Path(__file__).parent / "mcap"
 
 
 def verify(file, *before):
-    """The exit code, what was told on stdout (None: nothing), and stderr."""
+    """The exit code, the report on stdout (None: nothing), and stderr."""
     done = subprocess.run([enfilade.process.find_program(), "replay", *before, file, "--verify"],
                           capture_output=True, text=True, timeout=300)
     return done.returncode, json.loads(done.stdout) if done.stdout else None, done.stderr

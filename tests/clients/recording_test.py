@@ -52,9 +52,9 @@ class Recording(unittest.TestCase):
 
     def test_a_recording_ends_in_the_state_that_the_walk_ended_in(self):
         summary = self.record()
-        code, told, errors = self.verify()
+        code, report, errors = self.verify()
         self.assertEqual(code, 0, errors)
-        self.assertEqual(told, {"ticks": summary["ticks"], "state_hash": summary["state_hash"],
+        self.assertEqual(report, {"ticks": summary["ticks"], "state_hash": summary["state_hash"],
                                 "closed": True})
 
     def test_motion_of_other_lengths_is_verified_with_them(self):
@@ -62,13 +62,13 @@ class Recording(unittest.TestCase):
                        check=True, capture_output=True, timeout=120)
         self.assertEqual(self.verify()[0], 0)
 
-    def test_another_scene_is_told(self):
+    def test_another_scene_is_reported(self):
         self.record()
         other = self.folder / "moved.obj"
         other.write_text(obj().replace("v 5 ", "v 5.01 "))
-        code, told, errors = self.verify(other)
+        code, report, errors = self.verify(other)
         self.assertEqual(code, 4)
-        self.assertEqual(told["diverged"]["who"], "the scene")
+        self.assertEqual(report["diverged"]["who"], "the scene")
         self.assertIn("recorded", errors)
 
     def test_the_scene_may_have_moved_to_another_place(self):
@@ -78,7 +78,7 @@ class Recording(unittest.TestCase):
         self.scene.rename(moved)
         code, _, errors = self.verify()
         self.assertEqual(code, 1)
-        self.assertIn("the recorded scene is not there", errors)
+        self.assertIn("the recorded scene does not exist", errors)
         self.assertEqual(self.verify(moved)[0], 0)
 
     def test_a_recording_whose_writer_was_killed_verifies_to_its_last_tick(self):
@@ -94,16 +94,16 @@ class Recording(unittest.TestCase):
                     time.sleep(0.01)
                 time.sleep(chance.random() * 0.2)
                 walk.kill()
-            code, told, errors = self.verify()
+            code, report, errors = self.verify()
             self.assertEqual(code, 0, errors)
-            self.assertFalse(told["closed"])
-            verified += told["ticks"]
+            self.assertFalse(report["closed"])
+            verified += report["ticks"]
             read = self.other_reader("--stream")
-            self.assertEqual(read["/enfilade/state"]["messages"], told["ticks"])
+            self.assertEqual(read["/enfilade/state"]["messages"], report["ticks"])
             self.file.unlink()
         self.assertGreater(verified, 100)
 
-    def test_a_spoilt_byte_is_told_with_its_place(self):
+    def test_a_flipped_byte_is_reported_with_its_place(self):
         self.record()
         bytes_ = bytearray(self.file.read_bytes())
         bytes_[len(bytes_) // 2] ^= 4
@@ -124,7 +124,7 @@ class Recording(unittest.TestCase):
         self.file.write_bytes(struct.pack("<16d", *range(16)))
         code, _, errors = self.verify()
         self.assertEqual(code, 1)
-        self.assertIn(f"{self.file}: at byte 0: this is no MCAP file", errors)
+        self.assertIn(f"{self.file}: at byte 0: not an MCAP file", errors)
 
 
 if __name__ == "__main__":

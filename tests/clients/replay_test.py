@@ -54,7 +54,7 @@ class Replay(unittest.TestCase):
             self.assertEqual(ended.exception.code, "ERROR_REPLAY_ENDED")
             self.assertIn("take_over()", ended.exception.remedy)
 
-    def test_play_and_pause_are_told_to_everyone(self):
+    def test_play_and_pause_are_reported_to_all_clients(self):
         server = self.play()
         with server.connect() as driver, server.connect() as other:
             driver.free_run(0.5)
@@ -74,12 +74,12 @@ class Replay(unittest.TestCase):
             last = client.run_until_idle()
             self.assertTrue(client.replay.branched)
             self.assertEqual(client.replay.branched_at, 300)
-        code, told, errors = verify(branch)
+        code, report, errors = verify(branch)
         self.assertEqual(code, 0, errors)
-        self.assertEqual(told["state_hash"], f"{last.state_hash:016x}")
+        self.assertEqual(report["state_hash"], f"{last.state_hash:016x}")
         again = self.run_program("serve", self.walk, "--record", branch, "--listen", "127.0.0.1:0")
         self.assertEqual(again.returncode, 1)
-        self.assertIn("move it away, or name another file", again.stderr)
+        self.assertIn("move it, or give another file name", again.stderr)
 
     def test_what_cannot_be_played_is_said(self):
         other = self.folder / "other.obj"
@@ -122,7 +122,7 @@ class Replay(unittest.TestCase):
                 self.assertEqual(client.replay.last_tick, ticks)
                 self.assertEqual(client.step(ticks + 10).state_hash, hashes[run - 1])
         for wrong, words in ((["--from", 60], "or another run than 1 of 2"),
-                             (["--run", 3], "no run 3 in it; give one from 1 to 2")):
+                             (["--run", 3], "no run 3 in it; give a run from 1 to 2")):
             ended = self.run_program("serve", several, *wrong, "--listen", "127.0.0.1:0")
             self.assertEqual(ended.returncode, 1, wrong)
             self.assertIn(words, ended.stderr)
@@ -134,9 +134,9 @@ class Replay(unittest.TestCase):
         whole = self.run_program("replay", several, "--verify", "--run", 2)
         late = self.run_program("replay", several, "--verify", "--run", 2, "--from", 70)
         self.assertEqual((whole.returncode, late.returncode), (0, 0), whole.stderr + late.stderr)
-        told, after = json.loads(whole.stdout), json.loads(late.stdout)
-        self.assertEqual((told["ticks"], told["closed"]), (80, True))
-        self.assertEqual(told["state_hash"], after["state_hash"])
+        report, after = json.loads(whole.stdout), json.loads(late.stdout)
+        self.assertEqual((report["ticks"], report["closed"]), (80, True))
+        self.assertEqual(report["state_hash"], after["state_hash"])
 
         script, branch = self.folder / "wait.jsonl", self.folder / "branch.mcap"
         script.write_text('{"wait":1,"for":"bob"}\n')
@@ -145,7 +145,7 @@ class Replay(unittest.TestCase):
         self.assertEqual(made.returncode, 0, made.stderr)
         inspected = self.run_program("inspect", branch).stdout
         self.assertIn("a branch of %s, run 2, after tick 40" % several.resolve(), inspected)
-        # Beside the run that it left: bob is in both.
+        # Compared with its parent run: bob is in both.
         compared = json.loads(self.run_program("diff", several, branch, "--json").stdout)
         self.assertEqual([run["ticks"] for run in compared["before"]["runs"]], [80])
         self.assertFalse([one for one in compared["happenings"] if one["before"]])
@@ -153,9 +153,9 @@ class Replay(unittest.TestCase):
         again = self.run_program("replay", scene, several, "--run", 2, "--json",
                                  "--out", self.folder / "again")
         self.assertEqual(again.returncode, 0, again.stderr + again.stdout)
-        told = json.loads(again.stdout)
-        self.assertEqual([run["ticks"] for run in told["after"]["runs"]], [80])
-        self.assertTrue(told["same"], "the lift is found by its object in each run")
+        report = json.loads(again.stdout)
+        self.assertEqual([run["ticks"] for run in report["after"]["runs"]], [80])
+        self.assertTrue(report["same"], "the lift is found by its object in each run")
 
     def test_it_is_played_in_the_scene_that_is_named(self):
         moved = self.folder / "moved.obj"

@@ -49,15 +49,15 @@ class ServedRecording(unittest.TestCase):
             driver.spawn("dee", at=(4, 0, 0)).walk((9, 0, 0))
             driver.body("lift", to=0.4)
             last = driver.step(60)
-        code, told, errors = verify(self.file)
+        code, report, errors = verify(self.file)
         self.assertEqual(code, 0, errors)
-        self.assertEqual(told["ticks"], 210)
-        self.assertEqual(told["state_hash"], f"{last.state_hash:016x}")
-        self.assertTrue(told["closed"])
+        self.assertEqual(report["ticks"], 210)
+        self.assertEqual(report["state_hash"], f"{last.state_hash:016x}")
+        self.assertTrue(report["closed"])
         read = messages(self, self.file)
         self.assertEqual(sum(topic == "/enfilade/start" for topic, _, _ in read), 2)
         times = [time for _, time, _ in read]
-        self.assertEqual(times, sorted(times), "time goes on where the world begins anew")
+        self.assertEqual(times, sorted(times), "time continues across a restart of the world")
         live, begun, left = {}, 0, []
         for _, _, events in (one for one in read if one[0] == "/enfilade/events"):
             for event in events.contacts:
@@ -71,7 +71,7 @@ class ServedRecording(unittest.TestCase):
         self.assertEqual(live, {}, "every contact that began has its end")
         self.assertGreater(begun, 3)
         self.assertEqual(left[:1], ["bob"])
-        self.assertIn("ann", left, "the world began anew")
+        self.assertIn("ann", left, "the world restarted")
 
     def test_a_free_running_world_is_made_again(self):
         with self.serve() as server, server.connect() as client:
@@ -80,9 +80,9 @@ class ServedRecording(unittest.TestCase):
             for x in (4, -4, 4):
                 ann.walk((x, 0, 0))
                 time.sleep(0.2)
-        code, told, errors = verify(self.file)
+        code, report, errors = verify(self.file)
         self.assertEqual(code, 0, errors)
-        self.assertGreater(told["ticks"], 60)
+        self.assertGreater(report["ticks"], 60)
 
     def test_a_world_that_stands_still_is_in_its_file(self):
         server = self.serve()
@@ -97,7 +97,7 @@ class ServedRecording(unittest.TestCase):
 
     def test_an_earlier_recording_is_not_overwritten(self):
         self.file.write_bytes(b"precious")
-        with self.assertRaisesRegex(enfilade.StartFailed, "move it away, or name another file"):
+        with self.assertRaisesRegex(enfilade.StartFailed, "move it, or give another file name"):
             self.serve()
         self.assertEqual(self.file.read_bytes(), b"precious")
 
@@ -205,10 +205,10 @@ class ServedRecording(unittest.TestCase):
         self.assertEqual(program.returncode, 1)
         self.assertEqual(said.count("the recording ends"), 1, said)
         self.assertIn("File too large", said)
-        code, told, errors = verify(self.file)
+        code, report, errors = verify(self.file)
         self.assertEqual(code, 0, errors)
-        self.assertFalse(told["closed"])
-        self.assertGreater(told["ticks"], 100)
+        self.assertFalse(report["closed"])
+        self.assertGreater(report["ticks"], 100)
         other_reader(self, self.file, "--stream")
 
 

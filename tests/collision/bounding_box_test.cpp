@@ -30,9 +30,9 @@ Pose randomPose(std::mt19937& random, double reach) {
 
 using Rationals = std::array<mpq_class, 3>;
 
-/// The vertex moved in exact arithmetic by the rotation that the quaternion stands for when it is
-/// normalised, and by the translation.
-Rationals exactly(const Pose& pose, const Vec3& vertex) {
+/// Transforms the vertex in exact arithmetic by the rotation of the normalised quaternion and by
+/// the translation.
+Rationals transformExactly(const Pose& pose, const Vec3& vertex) {
   const mpq_class w(pose.rotation.w()), x(pose.rotation.x()), y(pose.rotation.y()),
       z(pose.rotation.z());
   const mpq_class n = w * w + x * x + y * y + z * z;
@@ -49,9 +49,9 @@ Rationals exactly(const Pose& pose, const Vec3& vertex) {
   return result;
 }
 
-void expectContains(const Box& box, const Hull& hull, const Pose& pose, double clearance = 0) {
+void expectContains(const Aabb& box, const Hull& hull, const Pose& pose, double clearance = 0) {
   for (const Vec3& vertex : hull.vertices) {
-    const Rationals exact = exactly(pose, vertex);
+    const Rationals exact = transformExactly(pose, vertex);
     for (int axis = 0; axis < 3; ++axis) {
       const mpq_class& coordinate = exact[static_cast<std::size_t>(axis)];
       ASSERT_TRUE(box.min[axis] <= coordinate - clearance &&
@@ -61,7 +61,7 @@ void expectContains(const Box& box, const Hull& hull, const Pose& pose, double c
   }
 }
 
-Quat turnedBy(const Quat& rotation, const Vec3& half) {
+Quat rotateBy(const Quat& rotation, const Vec3& half) {
   return (Quat(1, half.x(), half.y(), half.z()) * rotation).normalized();
 }
 
@@ -72,10 +72,10 @@ TEST(TightBox, ContainsTheExactBoxAndIsAsTightAsBruteForce) {
     Pose pose = randomPose(random, body % 2 == 0 ? 10.0 : 1e6);
     ExtremalVertices last;
     for (int tick = 0; tick < 20; ++tick) {
-      pose.rotation = turnedBy(pose.rotation, Vec3(0.02, 0.03, -0.01));
-      const Box tight = tightBox(hull, pose, last);
+      pose.rotation = rotateBy(pose.rotation, Vec3(0.02, 0.03, -0.01));
+      const Aabb tight = tightAabb(hull, pose, last);
       expectContains(tight, hull, pose);
-      const Box brute = tightBoxBruteForce(hull, pose);
+      const Aabb brute = tightAabbBruteForce(hull, pose);
       const double slack = 0x1p-44 * (hull.radius + pose.translation.norm());
       EXPECT_LE((tight.min - brute.min).cwiseAbs().maxCoeff(), slack);
       EXPECT_LE((tight.max - brute.max).cwiseAbs().maxCoeff(), slack);
@@ -87,19 +87,19 @@ TEST(TightBox, ClimbsFromAnyStartAndFromIndicesOfAnotherHull) {
   std::mt19937 random(12);
   const Hull hull = randomHull(random, 200);
   const Pose pose = randomPose(random, 5.0);
-  const Box brute = tightBoxBruteForce(hull, pose);
+  const Aabb brute = tightAabbBruteForce(hull, pose);
   for (std::uint32_t start = 0; start < hull.vertices.size() + 3; ++start) {
     ExtremalVertices last;
     last.vertex.fill(start);
-    const Box tight = tightBox(hull, pose, last);
+    const Aabb tight = tightAabb(hull, pose, last);
     EXPECT_EQ(tight.min, brute.min);
     EXPECT_EQ(tight.max, brute.max);
   }
 }
 
 TEST(TightBox, IsNotFooledByATopThatRisesLessThanRoundingShows) {
-  // A disc of 200 corners seen all but edge-on: from corner to corner it rises less than an ulp,
-  // from end to end many times that.
+  // A disc of 200 corners, almost edge-on: adjacent corners differ by less than an ulp in height,
+  // the ends by many ulps.
   std::vector<Vec3> corners;
   for (int k = 0; k < 100; ++k) {
     const double t = 0.01 * k - 0.5;
@@ -112,7 +112,7 @@ TEST(TightBox, IsNotFooledByATopThatRisesLessThanRoundingShows) {
     for (std::uint32_t start = 0; start < hull.vertices.size(); start += 7) {
       ExtremalVertices last;
       last.vertex.fill(start);
-      expectContains(tightBox(hull, pose, last), hull, pose);
+      expectContains(tightAabb(hull, pose, last), hull, pose);
     }
   }
 }
@@ -122,10 +122,10 @@ TEST(TightBox, KeepsItsVerticesWhileTheBodyOnlyMoves) {
   const Hull hull = randomHull(random, 50);
   Pose pose = randomPose(random, 5.0);
   ExtremalVertices last;
-  tightBox(hull, pose, last);
+  tightAabb(hull, pose, last);
   const ExtremalVertices before = last;
   pose.translation += Vec3(1, 2, 3);
-  tightBox(hull, pose, last);
+  tightAabb(hull, pose, last);
   EXPECT_EQ(before.vertex, last.vertex);
 }
 
@@ -138,7 +138,7 @@ TEST(TightBox, OfFlatHullsIsRight) {
     for (int k = 0; k < 50; ++k) {
       const Pose pose = randomPose(random, 3.0);
       ExtremalVertices last;
-      expectContains(tightBox(hull, pose, last), hull, pose);
+      expectContains(tightAabb(hull, pose, last), hull, pose);
     }
   }
 }
@@ -148,7 +148,7 @@ TEST(FixedCube, ContainsTheBodyInEveryAttitude) {
   const Hull hull = randomHull(random, 30);
   for (int k = 0; k < 100; ++k) {
     const Pose pose = randomPose(random, 100.0);
-    const Box cube = fixedCube(hull, pose);
+    const Aabb cube = boundingSphereCube(hull, pose);
     expectContains(cube, hull, pose);
     EXPECT_NEAR(cube.size().x(), 2 * hull.radius, 1e-12);
   }
@@ -162,20 +162,20 @@ TEST(BoxesWithClearance, HoldTheExactBoxGrownByItWhateverTheSizes) {
     const Pose pose = randomPose(random, std::ldexp(1.0, 5 * (body % 8)));
     const double clearance = std::ldexp(0.7, body % 50 - 40);
     ExtremalVertices climbed, walled;
-    const std::vector<Box> boxes{tightBox(hull, pose, climbed, clearance),
-                                 tightBoxByWalls(hull, pose, walled, clearance),
-                                 fixedCube(hull, pose, clearance)};
-    for (const Box& box : boxes) expectContains(box, hull, pose, clearance);
+    const std::vector<Aabb> boxes{tightAabb(hull, pose, climbed, clearance),
+                                  tightAabbVoronoi(hull, pose, walled, clearance),
+                                  boundingSphereCube(hull, pose, clearance)};
+    for (const Aabb& box : boxes) expectContains(box, hull, pose, clearance);
     const double slack = 0x1p-44 * (hull.radius + pose.translation.norm() + clearance);
-    const Box brute = tightBoxBruteForce(hull, pose);
+    const Aabb brute = tightAabbBruteForce(hull, pose);
     EXPECT_LE((boxes[0].max - brute.max).maxCoeff(), clearance + slack);
-    // Adding the clearance to the tight box with rounding to nearest would not do.
-    rounded += contains(grown(tightBoxBruteForce(hull, pose), clearance), boxes[0]) ? 0 : 1;
+    // Adding the clearance to the tight box with rounding to nearest is not sufficient.
+    rounded += contains(inflated(tightAabbBruteForce(hull, pose), clearance), boxes[0]) ? 0 : 1;
   }
   EXPECT_GT(rounded, 10);
 }
 
-TEST(TightBoxByWalls, IsTheBoxOfClimbingOverATumblingMotion) {
+TEST(TightBoxByVoronoi, IsTheBoxOfClimbingOverATumblingMotion) {
   std::mt19937 random(17);
   std::size_t changes = 0;
   for (int body = 0; body < 20; ++body) {
@@ -183,11 +183,11 @@ TEST(TightBoxByWalls, IsTheBoxOfClimbingOverATumblingMotion) {
     Pose pose = randomPose(random, 10.0);
     ExtremalVertices climbed, walled;
     for (int tick = 0; tick < 40; ++tick) {
-      pose.rotation = turnedBy(pose.rotation, Vec3(0.05, -0.03, 0.02));
+      pose.rotation = rotateBy(pose.rotation, Vec3(0.05, -0.03, 0.02));
       const ExtremalVertices before = walled;
-      const Box box = tightBoxByWalls(hull, pose, walled);
+      const Aabb box = tightAabbVoronoi(hull, pose, walled);
       expectContains(box, hull, pose);
-      const Box brute = tightBox(hull, pose, climbed);
+      const Aabb brute = tightAabb(hull, pose, climbed);
       const double slack = 0x1p-44 * (hull.radius + pose.translation.norm());
       EXPECT_LE((box.min - brute.min).cwiseAbs().maxCoeff(), slack);
       EXPECT_LE((box.max - brute.max).cwiseAbs().maxCoeff(), slack);
@@ -197,8 +197,8 @@ TEST(TightBoxByWalls, IsTheBoxOfClimbingOverATumblingMotion) {
   EXPECT_GT(changes, 200u);
 }
 
-TEST(TightBoxByWalls, IsNotSentAstrayByAStartInAnotherHullOrALevelTop) {
-  std::vector<Vec3> corners;  // a disc that is all but edge-on, as above
+TEST(TightBoxByVoronoi, IsNotSentAstrayByAStartInAnotherHullOrALevelTop) {
+  std::vector<Vec3> corners;  // a disc that is almost edge-on, as above
   for (int k = 0; k < 60; ++k) {
     const double t = 0.02 * k - 0.6;
     corners.emplace_back(t, 1 - t * t, 0);
@@ -210,7 +210,7 @@ TEST(TightBoxByWalls, IsNotSentAstrayByAStartInAnotherHullOrALevelTop) {
     for (std::uint32_t start = 0; start < hull.vertices.size() + 5; start += 3) {
       ExtremalVertices last;
       last.vertex.fill(start);
-      expectContains(tightBoxByWalls(hull, pose, last), hull, pose);
+      expectContains(tightAabbVoronoi(hull, pose, last), hull, pose);
     }
   }
 }
@@ -225,28 +225,28 @@ Hull ellipsoid(std::mt19937& random, const Vec3& halfAxes) {
   return buildHull(points);
 }
 
-TEST(BoxMethod, IsTheCubeForTheSmallAndRoundAndTheTightBoxForTheOblongAmongMany) {
+TEST(AabbMethod, IsTheCubeForTheSmallAndRoundAndTheTightBoxForTheOblongAmongMany) {
   std::mt19937 random(18);
   const Hull ball = ellipsoid(random, Vec3(0.25, 0.25, 0.25));
   const Hull rod = ellipsoid(random, Vec3(1, 0.1, 0.1));
-  EXPECT_EQ(boxMethodFor(ball), BoxMethod::fixedCube);
-  EXPECT_EQ(boxMethodFor(rod), BoxMethod::tightBox);
-  const Surroundings sparse{0.001, 0.45};  // I-COLLIDE's scenes: next to nothing is ever met
-  EXPECT_EQ(boxMethodFor(rod, sparse), BoxMethod::fixedCube);
-  const Surroundings crowded{1000, 0.05};
-  EXPECT_EQ(boxMethodFor(ball, crowded), BoxMethod::tightBox);
+  EXPECT_EQ(chooseAabbMethod(ball), AabbMethod::boundingSphereCube);
+  EXPECT_EQ(chooseAabbMethod(rod), AabbMethod::tightAabb);
+  const SceneDensity sparse{0.001, 0.45};  // Cohen et al. 1995: hardly any contacts
+  EXPECT_EQ(chooseAabbMethod(rod, sparse), AabbMethod::boundingSphereCube);
+  const SceneDensity crowded{1000, 0.05};
+  EXPECT_EQ(chooseAabbMethod(ball, crowded), AabbMethod::tightAabb);
   const Pose pose = randomPose(random, 3);
-  for (const BoxMethod method : {BoxMethod::fixedCube, BoxMethod::tightBox}) {
+  for (const AabbMethod method : {AabbMethod::boundingSphereCube, AabbMethod::tightAabb}) {
     ExtremalVertices last;
-    expectContains(boxBy(method, rod, pose, last, 0.125), rod, pose, 0.125);
+    expectContains(computeAabbWith(method, rod, pose, last, 0.125), rod, pose, 0.125);
   }
 }
 
-TEST(BoxMethod, KnowsABodyThatIsFarFromItsOwnOrigin) {
+TEST(AabbMethod, KnowsABodyThatIsFarFromItsOwnOrigin) {
   std::mt19937 random(19);
   std::vector<Vec3> moved = ellipsoid(random, Vec3(0.2, 0.2, 0.2)).vertices;
   for (Vec3& vertex : moved) vertex += Vec3(1, 0, 0);
-  EXPECT_EQ(boxMethodFor(buildHull(moved)), BoxMethod::tightBox);
+  EXPECT_EQ(chooseAabbMethod(buildHull(moved)), AabbMethod::tightAabb);
 }
 
 }  // namespace

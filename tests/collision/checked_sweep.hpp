@@ -8,17 +8,18 @@
 #include <random>
 #include <vector>
 
+#include "collision/broad_phase/broad_phase_audit.hpp"
 #include "collision/broad_phase/sort_and_sweep.hpp"
 
 namespace enfilade::collision {
 
 using Random = std::mt19937_64;
-using Pairs = std::vector<BoxPair>;
+using Pairs = std::vector<ProxyPair>;
 
 inline double uniform(Random& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
 }
-inline int dice(Random& random, int low, int high) {
+inline int randomInt(Random& random, int low, int high) {
   return std::uniform_int_distribution<int>(low, high)(random);
 }
 inline Vec3 uniform3(Random& random, const Vec3& low, const Vec3& high) {
@@ -27,54 +28,57 @@ inline Vec3 uniform3(Random& random, const Vec3& low, const Vec3& high) {
   const double z = uniform(random, low.z(), high.z());
   return {x, y, z};
 }
-inline Box boxAt(const Vec3& corner, const Vec3& size) {
+inline Aabb boxAt(const Vec3& corner, const Vec3& size) {
   return {corner, corner + size};
 }
 
-/// A broad phase beside the list of its movers; check() compares it with brute force.
-class Watched {
+/// A broad phase with a list of its boxes; updateAndCheck() compares it with brute force.
+class CheckedSweep {
  public:
-  explicit Watched(std::vector<Box> still) : still_(std::move(still)), sweep_(still_) {}
+  explicit CheckedSweep(std::vector<Aabb> boxes)
+      : staticBoxes_(std::move(boxes)), sweep_(staticBoxes_) {}
 
-  MoverId insert(const Box& box) {
-    const MoverId id = sweep_.insert(box);
-    EXPECT_FALSE(movers_.contains(id)) << "an id in use was given again";
-    movers_[id] = box;
+  ProxyId insert(const Aabb& box) {
+    const ProxyId id = sweep_.insert(box);
+    EXPECT_FALSE(dynamicBoxes_.contains(id)) << "an id in use was assigned again";
+    dynamicBoxes_[id] = box;
     return id;
   }
-  void move(MoverId id, const Box& box) {
+  void move(ProxyId id, const Aabb& box) {
     sweep_.move(id, box);
-    movers_[id] = box;
+    dynamicBoxes_[id] = box;
   }
-  void remove(MoverId id) {
+  void remove(ProxyId id) {
     sweep_.remove(id);
-    movers_.erase(id);
+    dynamicBoxes_.erase(id);
   }
-  StillId insertStill(const Box& box) {
-    const StillId id = sweep_.insertStill(box);
-    if (id >= still_.size()) still_.resize(id + std::size_t{1});
-    EXPECT_TRUE(still_[id].empty()) << "an id in use was given again";
-    still_[id] = box;
+  StaticId insertStatic(const Aabb& box) {
+    const StaticId id = sweep_.insertStatic(box);
+    if (id >= staticBoxes_.size()) staticBoxes_.resize(id + std::size_t{1});
+    EXPECT_TRUE(staticBoxes_[id].empty()) << "an id in use was assigned again";
+    staticBoxes_[id] = box;
     return id;
   }
-  void removeStill(StillId id) {
-    sweep_.removeStill(id);
-    still_[id] = Box{};
+  void removeStatic(StaticId id) {
+    sweep_.removeStatic(id);
+    staticBoxes_[id] = Aabb{};
   }
   void updateAndCheck();
 
-  std::map<MoverId, Box>& movers() { return movers_; }
+  std::map<ProxyId, Aabb>& dynamicBoxes() { return dynamicBoxes_; }
   SortAndSweep& sweep() { return sweep_; }
-  const std::vector<Box>& still() const { return still_; }  ///< empty where there is none
-  std::size_t begins = 0, ends = 0, movingBegins = 0;
+  const std::vector<Aabb>& staticBoxes() const {
+    return staticBoxes_;
+  }  ///< an empty box for a removed id
+  std::size_t pairsAdded = 0, pairsRemoved = 0, dynamicPairsAdded = 0;
 
  private:
-  void checkPartners(const Pairs& expected);
+  void checkOverlaps(const Pairs& expected);
 
-  std::vector<Box> still_;
+  std::vector<Aabb> staticBoxes_;
   SortAndSweep sweep_;
-  std::map<MoverId, Box> movers_;
-  Pairs last_;
+  std::map<ProxyId, Aabb> dynamicBoxes_;
+  Pairs lastPairs_;
 };
 
 inline Pairs difference(const Pairs& a, const Pairs& b) {
@@ -83,48 +87,49 @@ inline Pairs difference(const Pairs& a, const Pairs& b) {
   return result;
 }
 
-inline void Watched::updateAndCheck() {
+inline void CheckedSweep::updateAndCheck() {
   sweep_.update();
-  const std::vector<std::pair<MoverId, Box>> live(movers_.begin(), movers_.end());
-  Pairs expected = bruteForcePairs(still_, live);
-  const Pairs begun(sweep_.begun().begin(), sweep_.begun().end());
-  const Pairs ended(sweep_.ended().begin(), sweep_.ended().end());
-  ASSERT_EQ(begun, difference(expected, last_));
-  ASSERT_EQ(ended, difference(last_, expected));
+  const std::vector<std::pair<ProxyId, Aabb>> active(dynamicBoxes_.begin(), dynamicBoxes_.end());
+  Pairs expected = findPairsBruteForce(staticBoxes_, active);
+  const Pairs added(sweep_.addedPairs().begin(), sweep_.addedPairs().end());
+  const Pairs removed(sweep_.removedPairs().begin(), sweep_.removedPairs().end());
+  ASSERT_EQ(added, difference(expected, lastPairs_));
+  ASSERT_EQ(removed, difference(lastPairs_, expected));
   ASSERT_EQ(sweep_.pairCount(), expected.size());
-  ASSERT_EQ(sweep_.stillCount(),
-            static_cast<std::size_t>(std::count_if(still_.begin(), still_.end(),
-                                                   [](const Box& box) { return !box.empty(); })));
-  checkPartners(expected);
-  begins += begun.size();
-  ends += ended.size();
-  movingBegins += static_cast<std::size_t>(
-      std::count_if(begun.begin(), begun.end(), [](const BoxPair& p) { return p.otherMoves; }));
-  last_ = std::move(expected);
+  ASSERT_EQ(sweep_.staticCount(),
+            static_cast<std::size_t>(std::count_if(staticBoxes_.begin(), staticBoxes_.end(),
+                                                   [](const Aabb& box) { return !box.empty(); })));
+  checkOverlaps(expected);
+  pairsAdded += added.size();
+  pairsRemoved += removed.size();
+  dynamicPairsAdded += static_cast<std::size_t>(std::count_if(
+      added.begin(), added.end(), [](const ProxyPair& p) { return p.otherIsDynamic; }));
+  lastPairs_ = std::move(expected);
 }
 
-inline void Watched::checkPartners(const Pairs& expected) {
-  std::map<MoverId, std::vector<SortAndSweep::Partner>> partners;
-  for (const BoxPair& pair : expected) {
-    partners[pair.mover].push_back({pair.other, pair.otherMoves});
-    if (pair.otherMoves) partners[pair.other].push_back({pair.mover, true});
+inline void CheckedSweep::checkOverlaps(const Pairs& expected) {
+  std::map<ProxyId, std::vector<SortAndSweep::Overlap>> expectedOverlaps;
+  for (const ProxyPair& pair : expected) {
+    expectedOverlaps[pair.proxy].push_back({pair.other, pair.otherIsDynamic});
+    if (pair.otherIsDynamic) expectedOverlaps[pair.other].push_back({pair.proxy, true});
   }
-  for (auto& [id, list] : partners) std::sort(list.begin(), list.end());
-  for (const auto& [id, box] : movers_) {
-    const auto told = sweep_.partners(id);
-    ASSERT_TRUE(std::equal(told.begin(), told.end(), partners[id].begin(), partners[id].end()))
-        << "mover " << id;
+  for (auto& [id, list] : expectedOverlaps) std::sort(list.begin(), list.end());
+  for (const auto& [id, box] : dynamicBoxes_) {
+    const auto reported = sweep_.overlapsOf(id);
+    ASSERT_TRUE(std::equal(reported.begin(), reported.end(), expectedOverlaps[id].begin(),
+                           expectedOverlaps[id].end()))
+        << "proxy " << id;
   }
 }
 
-inline std::vector<Box> furnishedHall(Random& random, std::size_t count, const Vec3& extent) {
-  std::vector<Box> still;
+inline std::vector<Aabb> makeFurnishedHall(Random& random, std::size_t count, const Vec3& extent) {
+  std::vector<Aabb> boxes;
   for (std::size_t k = 0; k < count; ++k) {
     const Vec3 corner = uniform3(random, Vec3::Zero(), extent);
     const Vec3 size = uniform3(random, Vec3::Constant(0.05), Vec3(1.5, 1.0, 1.5));
-    still.push_back(boxAt(corner, k % 40 == 0 ? Vec3(12 * size) : size));
+    boxes.push_back(boxAt(corner, k % 40 == 0 ? Vec3(12 * size) : size));
   }
-  return still;
+  return boxes;
 }
 
 }  // namespace enfilade::collision

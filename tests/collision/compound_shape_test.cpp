@@ -10,27 +10,29 @@ namespace {
 
 using namespace testing;
 
-std::vector<PartPair> bruteForcePairs(std::span<const PlacedParts> a,
-                                      std::span<const PlacedParts> b, double clearance) {
+std::vector<PartPair> bruteForcePairs(std::span<const PlacedCompound> a,
+                                      std::span<const PlacedCompound> b, double clearance) {
   std::vector<PartPair> pairs;
   for (std::uint32_t i = 0; i < a.size(); ++i)
-    for (std::uint32_t p = 0; p < a[i].parts->size(); ++p) {
-      const Box box = grown(boxOf(a[i], p), clearance);
+    for (std::uint32_t p = 0; p < a[i].shape->size(); ++p) {
+      const Aabb box = inflated(computeAabb(a[i], p), clearance);
       for (std::uint32_t j = 0; j < b.size(); ++j)
-        for (std::uint32_t q = 0; q < b[j].parts->size(); ++q)
-          if (overlaps(box, boxOf(b[j], q))) pairs.push_back({i, p, j, q});
+        for (std::uint32_t q = 0; q < b[j].shape->size(); ++q)
+          if (overlaps(box, computeAabb(b[j], q))) pairs.push_back({i, p, j, q});
     }
   return pairs;
 }
 
-Decision decideCold(const PlacedParts& a, std::uint32_t p, const PlacedParts& b, std::uint32_t q) {
+SeparationResult computeSeparationCold(const PlacedCompound& a, std::uint32_t p,
+                                       const PlacedCompound& b, std::uint32_t q) {
   FeatureCache cold;
-  return decide({a.parts->vertices(p), a.translation, &a.rotation, a.parts->hull(p)},
-                {b.parts->vertices(q), b.translation, &b.rotation, b.parts->hull(q)}, cold);
+  return computeSeparation({a.shape->vertices(p), a.translation, &a.rotation, a.shape->hull(p)},
+                           {b.shape->vertices(q), b.translation, &b.rotation, b.shape->hull(q)},
+                           cold);
 }
 
 /// A ring of small hulls around the y axis: concave, with a hole.
-PartTree ring(Random& random, int count, double radius) {
+CompoundShape ring(Random& random, int count, double radius) {
   std::vector<Hull> parts;
   for (int i = 0; i < count; ++i) {
     const double t = 4.0 * i / count;
@@ -39,10 +41,10 @@ PartTree ring(Random& random, int count, double radius) {
     for (Vec3& p : points) p += at;
     parts.push_back(buildHull(points));
   }
-  return PartTree(std::move(parts));
+  return CompoundShape(std::move(parts));
 }
 
-PartTree crumpledSheet(Random& random, int n) {
+CompoundShape crumpledSheet(Random& random, int n) {
   std::vector<Triangle> triangles;
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j) {
@@ -50,69 +52,73 @@ PartTree crumpledSheet(Random& random, int n) {
       const double side = 2.0 / n;
       triangles.push_back({at, at + Vec3(side, 0, 0), at + Vec3(0, 0, side)});
     }
-  return PartTree(std::move(triangles));
+  return CompoundShape(std::move(triangles));
 }
 
-TEST(PartTree, PairsAreThoseOfBruteForceOnTheWholeWay) {
+TEST(CompoundShape, PairsAreThoseOfBruteForceOnTheWholeWay) {
   Random random(31);
-  const PartTree hoop = ring(random, 40, 1), sheet = crumpledSheet(random, 16);
-  PartsCache cache;
+  const CompoundShape hoop = ring(random, 40, 1), sheet = crumpledSheet(random, 16);
+  CompoundCache cache;
   std::size_t pairs = 0, empty = 0;
   for (int tick = 0; tick < 250; ++tick) {
     const double t = 0.02 * tick;
-    const std::vector<PlacedParts> a{
-        {&hoop, turnedBy(t, Vec3(1, 0.2, 0.4)), Vec3(0, 2 * wave(t), 0)}};
-    const std::vector<PlacedParts> b{{&sheet, turnedBy(-0.3 * t, Vec3(0, 1, 1)), Vec3::Zero()}};
-    const auto& found = overlappingParts(a, b, 0.01, cache);
+    const std::vector<PlacedCompound> a{
+        {&hoop, rotationAt(t, Vec3(1, 0.2, 0.4)), Vec3(0, 2 * wave(t), 0)}};
+    const std::vector<PlacedCompound> b{
+        {&sheet, rotationAt(-0.3 * t, Vec3(0, 1, 1)), Vec3::Zero()}};
+    const auto& found = findOverlappingParts(a, b, 0.01, cache);
     ASSERT_EQ(found, bruteForcePairs(a, b, 0.01)) << "tick " << tick;
     pairs += found.size();
     empty += found.empty() ? 1 : 0;
   }
   EXPECT_GT(pairs, 1000u);
   EXPECT_GT(empty, 20u);
-  EXPECT_LT(cache.boxTests, 250u * 40 * 256 / 20);
+  EXPECT_LT(cache.aabbTests, 250u * 40 * 256 / 20);
 }
 
-TEST(PartTree, AnArmOfLinksMeetsWhatBruteForceSays) {
+TEST(CompoundShape, AnArmOfLinksEqualsBruteForce) {
   Random random(32);
-  const PartTree link = ring(random, 10, 0.4), other = ring(random, 24, 0.8);
-  PartsCache cache;
+  const CompoundShape link = ring(random, 10, 0.4), other = ring(random, 24, 0.8);
+  CompoundCache cache;
   std::size_t verdicts[3] = {};
   for (int tick = 0; tick < 120; ++tick) {
     const double t = 0.05 * tick;
-    std::vector<PlacedParts> arm;
+    std::vector<PlacedCompound> arm;
     for (int i = 0; i < 3; ++i)
-      arm.push_back({&link, turnedBy(t * (1 + i), Vec3(0, i, 1)), Vec3(0.6 * i - 1.9, wave(t), 0)});
-    const std::vector<PlacedParts> b{{&other, Mat3::Identity(), Vec3(0.5 * wave(0.3 * t), 0, 0)}};
+      arm.push_back(
+          {&link, rotationAt(t * (1 + i), Vec3(0, i, 1)), Vec3(0.6 * i - 1.9, wave(t), 0)});
+    const std::vector<PlacedCompound> b{
+        {&other, Mat3::Identity(), Vec3(0.5 * wave(0.3 * t), 0, 0)}};
     const double clearance = 0.2;
-    const auto decided = decideParts(arm, b, clearance, cache);
+    const auto decided = computeCompoundSeparation(arm, b, clearance, cache);
     ASSERT_EQ(cache.pairs, bruteForcePairs(arm, b, clearance));
     Verdict worst = Verdict::separated;
     double least = std::numeric_limits<double>::infinity();
     for (const PartPair& p : cache.pairs) {
-      const Decision cold = decideCold(arm[p.linkA], p.partA, b[p.linkB], p.partB);
+      const SeparationResult cold =
+          computeSeparationCold(arm[p.linkA], p.partA, b[p.linkB], p.partB);
       worst = std::max(worst, cold.verdict);
       least = std::min(least, cold.distance);
     }
     ASSERT_EQ(decided.has_value(), least <= clearance);
     if (!decided) continue;
-    EXPECT_EQ(decided->decision.verdict, worst);
-    EXPECT_NEAR(decided->decision.distance, least, 1e-12);
+    EXPECT_EQ(decided->separation.verdict, worst);
+    EXPECT_NEAR(decided->separation.distance, least, 1e-12);
     ++verdicts[static_cast<int>(worst)];
   }
   EXPECT_GT(verdicts[0], 10u);
   EXPECT_GT(verdicts[2], 10u);
 }
 
-TEST(PartTree, TheFrontRisesAgainWhenTheObjectsPart) {
+TEST(CompoundShape, TheFrontRisesAgainWhenTheObjectsPart) {
   Random random(33);
-  const PartTree sheet = crumpledSheet(random, 16), other = crumpledSheet(random, 16);
-  PartsCache cache;
+  const CompoundShape sheet = crumpledSheet(random, 16), other = crumpledSheet(random, 16);
+  CompoundCache cache;
   std::size_t deepest = 0;
   for (int tick = 0; tick <= 45; ++tick) {
-    const std::vector<PlacedParts> a{{&sheet, Mat3::Identity(), Vec3(0, 0.3 - 0.01 * tick, 0)}};
-    const std::vector<PlacedParts> b{{&other, turnedBy(0.1, Vec3(0, 0, 1)), Vec3(0, 0, 0)}};
-    ASSERT_EQ(overlappingParts(a, b, 0, cache), bruteForcePairs(a, b, 0));
+    const std::vector<PlacedCompound> a{{&sheet, Mat3::Identity(), Vec3(0, 0.3 - 0.01 * tick, 0)}};
+    const std::vector<PlacedCompound> b{{&other, rotationAt(0.1, Vec3(0, 0, 1)), Vec3(0, 0, 0)}};
+    ASSERT_EQ(findOverlappingParts(a, b, 0, cache), bruteForcePairs(a, b, 0));
     deepest = std::max(deepest, cache.fronts[0].size());
   }
   EXPECT_GT(deepest, 500u);
@@ -120,41 +126,42 @@ TEST(PartTree, TheFrontRisesAgainWhenTheObjectsPart) {
   EXPECT_FALSE(cache.fronts[0].empty());
 }
 
-TEST(PartTree, NothingIsBuiltUntilTheBoxesMeet) {
+TEST(CompoundShape, NothingIsBuiltUntilTheBoxesMeet) {
   Random random(34);
-  const PartTree hoop = ring(random, 12, 1), sheet = crumpledSheet(random, 4);
-  PartsCache cache;
-  const std::vector<PlacedParts> a{{&hoop, Mat3::Identity(), Vec3(0, 3, 0)}};
-  std::vector<PlacedParts> b{{&sheet, Mat3::Identity(), Vec3::Zero()}};
-  EXPECT_TRUE(overlappingParts(a, b, 1, cache).empty());
-  EXPECT_EQ(cache.boxTests, 1u);
-  EXPECT_FALSE(hoop.isOpened());
+  const CompoundShape hoop = ring(random, 12, 1), sheet = crumpledSheet(random, 4);
+  CompoundCache cache;
+  const std::vector<PlacedCompound> a{{&hoop, Mat3::Identity(), Vec3(0, 3, 0)}};
+  std::vector<PlacedCompound> b{{&sheet, Mat3::Identity(), Vec3::Zero()}};
+  EXPECT_TRUE(findOverlappingParts(a, b, 1, cache).empty());
+  EXPECT_EQ(cache.aabbTests, 1u);
+  EXPECT_FALSE(hoop.isBvhBuilt());
   b[0].translation.y() = 2.9;
-  EXPECT_FALSE(overlappingParts(a, b, 1, cache).empty());
-  EXPECT_TRUE(hoop.isOpened());
+  EXPECT_FALSE(findOverlappingParts(a, b, 1, cache).empty());
+  EXPECT_TRUE(hoop.isBvhBuilt());
 }
 
-TEST(PartTree, AnEmptyObjectMeetsNothing) {
-  const PartTree none{std::vector<Hull>{}};
-  PartsCache cache;
-  const std::vector<PlacedParts> a{{&none, Mat3::Identity(), Vec3::Zero()}};
-  EXPECT_TRUE(overlappingParts(a, a, 1, cache).empty());
-  EXPECT_FALSE(decideParts(a, a, 1, cache));
+TEST(CompoundShape, AnEmptyObjectMeetsNothing) {
+  const CompoundShape none{std::vector<Hull>{}};
+  CompoundCache cache;
+  const std::vector<PlacedCompound> a{{&none, Mat3::Identity(), Vec3::Zero()}};
+  EXPECT_TRUE(findOverlappingParts(a, a, 1, cache).empty());
+  EXPECT_FALSE(computeCompoundSeparation(a, a, 1, cache));
 }
 
-TEST(PartTree, SwappingTheObjectsSwapsTheAnswer) {
+TEST(CompoundShape, SwappingTheObjectsSwapsTheAnswer) {
   Random random(35);
-  const PartTree hoop = ring(random, 20, 1), sheet = crumpledSheet(random, 8);
+  const CompoundShape hoop = ring(random, 20, 1), sheet = crumpledSheet(random, 8);
   for (int i = 0; i < 20; ++i) {
-    const std::vector<PlacedParts> a{
-        {&hoop, turnedBy(i, Vec3(1, 1, 0)), Vec3(0, 0.1 * i - 1, 0.3)}};
-    const std::vector<PlacedParts> b{{&sheet, turnedBy(0.1 * i, Vec3(1, 0, 0)), Vec3::Zero()}};
-    PartsCache one, two;
-    const auto there = decideParts(a, b, 0.5, one), back = decideParts(b, a, 0.5, two);
+    const std::vector<PlacedCompound> a{
+        {&hoop, rotationAt(i, Vec3(1, 1, 0)), Vec3(0, 0.1 * i - 1, 0.3)}};
+    const std::vector<PlacedCompound> b{{&sheet, rotationAt(0.1 * i, Vec3(1, 0, 0)), Vec3::Zero()}};
+    CompoundCache one, two;
+    const auto there = computeCompoundSeparation(a, b, 0.5, one),
+               back = computeCompoundSeparation(b, a, 0.5, two);
     ASSERT_EQ(there.has_value(), back.has_value());
     if (!there) continue;
-    EXPECT_EQ(there->decision.verdict, back->decision.verdict);
-    EXPECT_NEAR(there->decision.distance, back->decision.distance, 1e-14);
+    EXPECT_EQ(there->separation.verdict, back->separation.verdict);
+    EXPECT_NEAR(there->separation.distance, back->separation.distance, 1e-14);
   }
 }
 

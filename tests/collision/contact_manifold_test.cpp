@@ -13,7 +13,7 @@ namespace {
 
 using namespace testing;
 
-Hull boxHull(const Vec3& half) {
+Hull makeBoxHull(const Vec3& half) {
   std::vector<Vec3> corners;
   for (int i = 0; i < 8; ++i)
     corners.emplace_back(i & 1 ? half.x() : -half.x(), i & 2 ? half.y() : -half.y(),
@@ -21,71 +21,75 @@ Hull boxHull(const Vec3& half) {
   return buildHull(corners);
 }
 
-ConvexBody bodyOf(const Hull& hull, const Vec3& at, const Mat3* rotation = nullptr) {
+PlacedConvex makeConvex(const Hull& hull, const Vec3& at, const Mat3* rotation = nullptr) {
   return {hull.vertices, at, rotation, &hull};
 }
 
-ContactManifold manifoldOf(const ConvexBody& a, const ConvexBody& b, double limit,
-                           std::size_t most = 4) {
+ContactManifold computeManifold(const PlacedConvex& a, const PlacedConvex& b, double limit,
+                                std::size_t maxPoints = 4) {
   FeatureCache features;
-  const Decision decision = decide(a, b, features);
-  if (decision.verdict != Verdict::penetrating)
-    return contactManifold(a, b, {decision.normal, decision.pointA, decision.pointB, limit, most});
+  const SeparationResult separation = computeSeparation(a, b, features);
+  if (separation.verdict != Verdict::penetrating)
+    return computeContactManifold(
+        a, b, {separation.normal, separation.pointA, separation.pointB, limit, maxPoints});
   DepthCache cache;
-  const Depth depth = penetrationDepth(a, b, features, cache);
-  return contactManifold(a, b, {depth.normal, depth.pointA, depth.pointB, limit, most});
+  const PenetrationResult depth = computePenetrationDepth(a, b, features, cache);
+  return computeContactManifold(a, b, {depth.normal, depth.pointA, depth.pointB, limit, maxPoints});
 }
 
-/// Each point of `expected` (x and z, at height 0) is there once.
+/// Each point of `expected` (x and z, at height 0) occurs exactly once.
 void expectPoints(const ContactManifold& manifold, const std::vector<Vec3>& expected,
                   double separation) {
   ASSERT_EQ(manifold.size, expected.size());
   for (const Vec3& point : expected) {
     const auto near = [&](const ContactPoint& p) { return (p.pointA - point).norm() < 1e-12; };
-    const auto list = manifold.list();
+    const auto list = manifold.activePoints();
     EXPECT_EQ(std::count_if(list.begin(), list.end(), near), 1) << point.transpose();
   }
-  for (const ContactPoint& point : manifold.list()) {
+  for (const ContactPoint& point : manifold.activePoints()) {
     EXPECT_NEAR(point.separation, separation, 1e-12);
     EXPECT_NEAR((point.pointB - point.pointA - point.separation * manifold.normal).norm(), 0,
                 1e-12);
   }
 }
 
-const Hull kFloor = boxHull({10, 1, 10});  // its top is at 0 when it stands at -1
+const Hull kFloor = makeBoxHull({10, 1, 10});  // its top is at 0 when it stands at -1
 const Vec3 kFloorAt(0, -1, 0);
 
 TEST(ContactManifold, ABoxOnABoxHasItsFourCorners) {
-  const Hull box = boxHull({0.5, 0.25, 1});
+  const Hull box = makeBoxHull({0.5, 0.25, 1});
   for (const double gap : {0.0, 1e-4}) {
-    const auto m = manifoldOf(bodyOf(kFloor, kFloorAt), bodyOf(box, {2, 0.25 + gap, 3}), 1e-3);
+    const auto m =
+        computeManifold(makeConvex(kFloor, kFloorAt), makeConvex(box, {2, 0.25 + gap, 3}), 1e-3);
     EXPECT_NEAR((m.normal - Vec3::UnitY()).norm(), 0, 1e-10);  // rounding over the gap
     expectPoints(m, {{1.5, 0, 2}, {2.5, 0, 2}, {1.5, 0, 4}, {2.5, 0, 4}}, gap);
   }
 }
 
 TEST(ContactManifold, APenetratingBoxHasFourCornersAtItsDepth) {
-  const Hull box = boxHull({0.5, 0.25, 1});
-  const auto m = manifoldOf(bodyOf(kFloor, kFloorAt), bodyOf(box, {2, 0.25 - 0.01, 3}), 1e-3);
+  const Hull box = makeBoxHull({0.5, 0.25, 1});
+  const auto m =
+      computeManifold(makeConvex(kFloor, kFloorAt), makeConvex(box, {2, 0.25 - 0.01, 3}), 1e-3);
   EXPECT_NEAR((m.normal - Vec3::UnitY()).norm(), 0, 1e-9);
   expectPoints(m, {{1.5, 0, 2}, {2.5, 0, 2}, {1.5, 0, 4}, {2.5, 0, 4}}, -0.01);
 }
 
 TEST(ContactManifold, ABoxThatHangsOverIsCutAtTheBorder) {
-  const Hull box = boxHull({1, 1, 1});
-  const auto m = manifoldOf(bodyOf(kFloor, kFloorAt), bodyOf(box, {10, 1, 0}), 0);
+  const Hull box = makeBoxHull({1, 1, 1});
+  const auto m = computeManifold(makeConvex(kFloor, kFloorAt), makeConvex(box, {10, 1, 0}), 0);
   expectPoints(m, {{9, 0, -1}, {9, 0, 1}, {10, 0, -1}, {10, 0, 1}}, 0);
 }
 
 TEST(ContactManifold, AVertexOnAFaceIsOnePoint) {
   const Hull tip = buildHull(std::vector<Vec3>{{0, 0, 0}, {1, 1, 0}, {-1, 1, 1}, {-1, 1, -1}});
-  expectPoints(manifoldOf(bodyOf(kFloor, kFloorAt), bodyOf(tip, {3, 0, 4}), 1e-3), {{3, 0, 4}}, 0);
+  expectPoints(computeManifold(makeConvex(kFloor, kFloorAt), makeConvex(tip, {3, 0, 4}), 1e-3),
+               {{3, 0, 4}}, 0);
 }
 
 TEST(ContactManifold, AnEdgeOnAFaceIsTwoPoints) {
   const Hull roof = buildHull(
       std::vector<Vec3>{{0, 0, -1}, {0, 0, 1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, -1}, {-1, 1, 1}});
-  expectPoints(manifoldOf(bodyOf(kFloor, kFloorAt), bodyOf(roof, {3, 0, 4}), 1e-3),
+  expectPoints(computeManifold(makeConvex(kFloor, kFloorAt), makeConvex(roof, {3, 0, 4}), 1e-3),
                {{3, 0, 3}, {3, 0, 5}}, 0);
 }
 
@@ -94,53 +98,55 @@ TEST(ContactManifold, TwoEdgesThatCrossMeetInOnePoint) {
       std::vector<Vec3>{{0, 0, -1}, {0, 0, 1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, -1}, {-1, 1, 1}});
   const Hull ridge = buildHull(
       std::vector<Vec3>{{-1, 0, 0}, {1, 0, 0}, {-1, -1, 1}, {1, -1, 1}, {-1, -1, -1}, {1, -1, -1}});
-  const ConvexBody a = bodyOf(ridge, {0.25, 0, 0.5}), b = bodyOf(roof, {0, 1e-4, 0});
-  expectPoints(manifoldOf(a, b, 1e-3), {{0, 0, 0.5}}, 1e-4);
+  const PlacedConvex a = makeConvex(ridge, {0.25, 0, 0.5}), b = makeConvex(roof, {0, 1e-4, 0});
+  expectPoints(computeManifold(a, b, 1e-3), {{0, 0, 0.5}}, 1e-4);
 }
 
 TEST(ContactManifold, TwoEdgesSideBySideHaveTwoPoints) {
   const std::vector<Vec3> a{{0, 0, 0}, {2, 0, 0}}, b{{1, 1e-4, 0}, {5, 1e-4, 0}};
-  expectPoints(manifoldOf({a}, {b}, 1e-3), {{1, 0, 0}, {2, 0, 0}}, 1e-4);
+  expectPoints(computeManifold({a}, {b}, 1e-3), {{1, 0, 0}, {2, 0, 0}}, 1e-4);
 }
 
 TEST(ContactManifold, FlatBodiesHaveTheirCorners) {
   const std::vector<Vec3> triangle{{-4, 0, -4}, {8, 0, -4}, {-4, 0, 8}};
-  const Hull box = boxHull({0.5, 0.5, 0.5});
-  const auto m = manifoldOf({triangle}, bodyOf(box, {0, 0.5, 0}), 0);
+  const Hull box = makeBoxHull({0.5, 0.5, 0.5});
+  const auto m = computeManifold({triangle}, makeConvex(box, {0, 0.5, 0}), 0);
   expectPoints(m, {{-.5, 0, -.5}, {.5, 0, -.5}, {-.5, 0, .5}, {.5, 0, .5}}, 0);
   const std::vector<Vec3> point{{0, 0, 0}};
-  expectPoints(manifoldOf({triangle}, {point, Vec3(1, 0, 1)}, 0), {{1, 0, 1}}, 0);
+  expectPoints(computeManifold({triangle}, {point, Vec3(1, 0, 1)}, 0), {{1, 0, 1}}, 0);
 }
 
 TEST(ContactManifold, ALeaningBoxStandsOnTwoPointsAndOnFourWithinTheLimit) {
-  const Hull box = boxHull({0.5, 0.5, 0.5});
-  const Mat3 rotation = turnedBy(1e-3, Vec3(0, 0, 1));  // the far edge is 1 mm up
+  const Hull box = makeBoxHull({0.5, 0.5, 0.5});
+  const Mat3 rotation = rotationAt(1e-3, Vec3(0, 0, 1));  // the far edge is 1 mm up
   const Vec3 at(0, 0.5005, 0);
-  const ConvexBody floor = bodyOf(kFloor, kFloorAt), leaning = bodyOf(box, at, &rotation);
-  EXPECT_EQ(manifoldOf(floor, leaning, 1e-4).size, 2u);
-  EXPECT_EQ(manifoldOf(floor, leaning, 5e-3).size, 4u);
+  const PlacedConvex floor = makeConvex(kFloor, kFloorAt), leaning = makeConvex(box, at, &rotation);
+  EXPECT_EQ(computeManifold(floor, leaning, 1e-4).size, 2u);
+  EXPECT_EQ(computeManifold(floor, leaning, 5e-3).size, 4u);
 }
 
-TEST(ContactManifold, FarApartThereIsNone) {
-  const Hull box = boxHull({0.5, 0.5, 0.5});
-  EXPECT_EQ(manifoldOf(bodyOf(kFloor, kFloorAt), bodyOf(box, {0, 1, 0}), 1e-3).size, 0u);
+TEST(ContactManifold, DistantBodiesHaveNoPoints) {
+  const Hull box = makeBoxHull({0.5, 0.5, 0.5});
+  EXPECT_EQ(computeManifold(makeConvex(kFloor, kFloorAt), makeConvex(box, {0, 1, 0}), 1e-3).size,
+            0u);
 }
 
 TEST(ContactManifold, OnlyAsManyPointsAsWantedAndTheDeepestAmongThem) {
   std::vector<Vec3> drum;
   for (int i = 0; i < 16; ++i) {
-    const Vec3 at = turnedBy(1, Vec3(0, 1, 0)) * Vec3(wave(0.25 * i), 0, wave(0.25 * i + 1));
+    const Vec3 at = rotationAt(1, Vec3(0, 1, 0)) * Vec3(wave(0.25 * i), 0, wave(0.25 * i + 1));
     drum.push_back(at);
     drum.push_back(at + Vec3(0, 1, 0));
   }
   const Hull hull = buildHull(drum);
-  const Mat3 rotation = turnedBy(1e-5, Vec3(1, 0, 2));
-  const ConvexBody floor = bodyOf(kFloor, kFloorAt), b = bodyOf(hull, {0, 1e-4, 0}, &rotation);
+  const Mat3 rotation = rotationAt(1e-5, Vec3(1, 0, 2));
+  const PlacedConvex floor = makeConvex(kFloor, kFloorAt),
+                     b = makeConvex(hull, {0, 1e-4, 0}, &rotation);
   for (const std::size_t most : {1u, 3u, 8u}) {
-    const auto m = manifoldOf(floor, b, 1e-3, most);
+    const auto m = computeManifold(floor, b, 1e-3, most);
     ASSERT_EQ(m.size, most);
     FeatureCache cold;
-    EXPECT_NEAR(m.points[0].separation, decide(floor, b, cold).distance, 1e-12);
+    EXPECT_NEAR(m.points[0].separation, computeSeparation(floor, b, cold).distance, 1e-12);
   }
 }
 
@@ -148,25 +154,27 @@ TEST(ContactManifold, SwappingFlipsTheNormalAndKeepsThePoints) {
   Random random(41);
   int points = 0;
   for (int i = 0; i < 60; ++i) {
-    const Hull first = boxHull({1, 0.5, 1}), second = buildHull(randomPoints(random, 12, 0.7));
-    const Mat3 turned = turnedBy(uniform(random, -2, 2), randomPoint(random, 1));
-    ConvexBody a = bodyOf(first, Vec3::Zero()), b = bodyOf(second, {0.1, 3, 0.2}, &turned);
+    const Hull first = makeBoxHull({1, 0.5, 1}), second = buildHull(randomPoints(random, 12, 0.7));
+    const Mat3 turned = rotationAt(uniform(random, -2, 2), randomPoint(random, 1));
+    PlacedConvex a = makeConvex(first, Vec3::Zero()),
+                 b = makeConvex(second, {0.1, 3, 0.2}, &turned);
     FeatureCache cold;
-    b.translation.y() -= 0.9999 * std::max(0.0, decide(a, b, cold).distance);
+    b.translation.y() -= 0.9999 * std::max(0.0, computeSeparation(a, b, cold).distance);
     FeatureCache there, back;
-    const Decision one = decide(a, b, there), two = decide(b, a, back);
+    const SeparationResult one = computeSeparation(a, b, there),
+                           two = computeSeparation(b, a, back);
     ASSERT_EQ(one.verdict, Verdict::separated);
     const double limit = one.distance + 1e-2;
-    const auto m = contactManifold(a, b, {one.normal, one.pointA, one.pointB, limit, 8});
-    const auto n = contactManifold(b, a, {-one.normal, one.pointB, one.pointA, limit, 8});
+    const auto m = computeContactManifold(a, b, {one.normal, one.pointA, one.pointB, limit, 8});
+    const auto n = computeContactManifold(b, a, {-one.normal, one.pointB, one.pointA, limit, 8});
     EXPECT_NEAR((one.normal + two.normal).norm(), 0, 1e-9);
     EXPECT_EQ(m.normal, -n.normal);
     ASSERT_EQ(m.size, n.size);
-    for (const ContactPoint& p : m.list()) {
+    for (const ContactPoint& p : m.activePoints()) {
       const auto same = [&](const ContactPoint& q) {
         return (p.pointA - q.pointB).norm() < 1e-9 && (p.pointB - q.pointA).norm() < 1e-9;
       };
-      EXPECT_TRUE(std::any_of(n.list().begin(), n.list().end(), same));
+      EXPECT_TRUE(std::any_of(n.activePoints().begin(), n.activePoints().end(), same));
       EXPECT_GE(p.separation, one.distance - 1e-12);
     }
     points += static_cast<int>(m.size);

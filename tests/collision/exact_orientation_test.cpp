@@ -1,4 +1,4 @@
-// Signs of determinants against rationals, where they are near zero, zero, huge, tiny and mixed.
+// Compares determinant signs with rationals: near zero, zero, huge, tiny and mixed values.
 #include "collision/shapes/exact_orientation.hpp"
 
 #include <gmpxx.h>
@@ -27,8 +27,8 @@ int rationalOrientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3&
              w[2] * (u[0] * v[1] - u[1] * v[0]));
 }
 
-/// Coordinates as models have them and as nobody has: whole, floats, doubles, of mixed size.
-struct Coordinates {
+/// Realistic and unrealistic coordinates: integers, floats, doubles, of mixed size.
+struct CoordinateGenerator {
   std::mt19937_64 random{11};
   double next(int kind) {
     const auto whole = static_cast<double>(static_cast<int>(random() % 7) - 3);
@@ -53,21 +53,21 @@ struct Coordinates {
 };
 
 TEST(ExactOrientation, SignsAreThoseOfRationals) {
-  Coordinates coordinates;
+  CoordinateGenerator coordinates;
   std::array<int, 3> turns{}, orientations{};
   for (int i = 0; i < 20000; ++i) {
     const int kind = i % 5;
     const Vec3 a = coordinates.point(kind), b = coordinates.point(kind);
-    // Half of the time on the line through the first two, as far as doubles can have it.
+    // Half of the points lie on the line through the first two, up to rounding.
     const Vec3 c = i % 2 ? coordinates.point(kind) : Vec3(a + 2 * (b - a));
     const Vec3 d = coordinates.point(kind);
     for (int dropped = 0; dropped < 3; ++dropped) {
-      const int sign = turn(a, b, c, dropped);
+      const int sign = orient2d(a, b, c, dropped);
       ASSERT_EQ(sign, rationalTurn(a, b, c, dropped))
           << a.transpose() << " | " << b.transpose() << " | " << c.transpose();
       ++turns.at(static_cast<std::size_t>(sign + 1));
     }
-    const int sign = orientation(a, b, c, d);
+    const int sign = orient3d(a, b, c, d);
     ASSERT_EQ(sign, rationalOrientation(a, b, c, d))
         << a.transpose() << " | " << b.transpose() << " | " << c.transpose();
     ++orientations.at(static_cast<std::size_t>(sign + 1));
@@ -77,7 +77,7 @@ TEST(ExactOrientation, SignsAreThoseOfRationals) {
 }
 
 TEST(ExactOrientation, CornersOfATurnedFlatFaceLieWhereRationalsHaveThem) {
-  Coordinates coordinates;
+  CoordinateGenerator coordinates;
   std::array<int, 3> orientations{};
   for (int i = 0; i < 5000; ++i) {
     const Mat3 rotation =
@@ -87,19 +87,19 @@ TEST(ExactOrientation, CornersOfATurnedFlatFaceLieWhereRationalsHaveThem) {
       return rotation * Vec3(coordinates.next(2), coordinates.next(2), 0) + middle;
     };
     const Vec3 a = corner(), b = corner(), c = corner(), d = corner();
-    const int sign = orientation(a, b, c, d);
+    const int sign = orient3d(a, b, c, d);
     ASSERT_EQ(sign, rationalOrientation(a, b, c, d)) << i;
     ++orientations.at(static_cast<std::size_t>(sign + 1));
     for (int dropped = 0; dropped < 3; ++dropped) {
       const Vec3 along = a + coordinates.next(0) * (b - a);
-      ASSERT_EQ(turn(a, b, along, dropped), rationalTurn(a, b, along, dropped)) << i;
+      ASSERT_EQ(orient2d(a, b, along, dropped), rationalTurn(a, b, along, dropped)) << i;
     }
   }
   EXPECT_GT(orientations[0], 1000);
   EXPECT_GT(orientations[2], 1000);
 }
 
-TEST(ExactOrientation, LargeWholeNumbersWhoseDeterminantIsOneOrNoneAreTold) {
+TEST(ExactOrientation, LargeIntegersWithDeterminantOneOrZeroAreDecided) {
   std::mt19937_64 random{12};
   for (int i = 0; i < 3000; ++i) {
     const int determinant = i % 3 - 1;
@@ -110,9 +110,8 @@ TEST(ExactOrientation, LargeWholeNumbersWhoseDeterminantIsOneOrNoneAreTold) {
       const auto times = static_cast<double>(static_cast<int>(random() % 512) - 256);
       rows.row(to) += times * rows.row(from);
     }
-    ASSERT_LT(rows.cwiseAbs().maxCoeff(), 0x1p53) << "they are whole";
-    ASSERT_EQ(orientation(Vec3::Zero(), rows.row(0), rows.row(1), rows.row(2)), determinant)
-        << rows;
+    ASSERT_LT(rows.cwiseAbs().maxCoeff(), 0x1p53) << "not an exact integer";
+    ASSERT_EQ(orient3d(Vec3::Zero(), rows.row(0), rows.row(1), rows.row(2)), determinant) << rows;
   }
 }
 

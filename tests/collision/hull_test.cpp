@@ -23,9 +23,8 @@ void expectSame(const Hull& a, const Hull& b) {
 void expectInside(const Hull& hull, const Points& points) {
   for (const auto& face : hull.faces) {
     for (const Vec3& p : points) {
-      ASSERT_LE(
-          orientation(hull.vertices[face[0]], hull.vertices[face[1]], hull.vertices[face[2]], p),
-          0);
+      ASSERT_LE(orient3d(hull.vertices[face[0]], hull.vertices[face[1]], hull.vertices[face[2]], p),
+                0);
     }
   }
 }
@@ -67,7 +66,7 @@ TEST(Hull, OfABoxHasSixQuadsWhateverElseLiesOnIt) {
     }
   }
   const Hull hull = buildHull(points);
-  validate(hull);
+  validateHull(hull);
   EXPECT_EQ(hull.vertices.size(), 8u);
   ASSERT_EQ(hull.faces.size(), 6u);
   for (const auto& face : hull.faces) EXPECT_EQ(face.size(), 4u);
@@ -86,7 +85,7 @@ TEST(Hull, OfAPrismHasTwoCapsAndAQuadASide) {
     points.emplace_back(x, 2, z);  // within an edge
   }
   const Hull hull = buildHull(points);
-  validate(hull);
+  validateHull(hull);
   EXPECT_EQ(hull.vertices.size(), 16u);
   EXPECT_EQ(hull.faces.size(), 10u);
   EXPECT_EQ(std::count_if(hull.faces.begin(), hull.faces.end(),
@@ -96,13 +95,13 @@ TEST(Hull, OfAPrismHasTwoCapsAndAQuadASide) {
 
 TEST(Hull, OfOnePointOrASegmentOrAPolygonIsFlat) {
   const Hull point = buildHull(Points{{1, 2, 3}, {1, 2, 3}});
-  validate(point);
+  validateHull(point);
   EXPECT_EQ(point.vertices.size(), 1u);
   EXPECT_TRUE(point.faces.empty());
   EXPECT_TRUE(point.neighboursOf(0).empty());
 
   const Hull segment = buildHull(Points{{1, 1, 1}, {0, 0, 0}, {3, 3, 3}, {2, 2, 2}});
-  validate(segment);
+  validateHull(segment);
   EXPECT_EQ(segment.vertices, (Points{{0, 0, 0}, {3, 3, 3}}));
   EXPECT_EQ(segment.neighboursOf(0).size(), 1u);
 
@@ -110,13 +109,13 @@ TEST(Hull, OfOnePointOrASegmentOrAPolygonIsFlat) {
     Points points;
     for (int a = 0; a <= 3; ++a) {
       for (int b = 0; b <= 3; ++b) {
-        Vec3 p(a, b, a + b);  // a plane edge-on to no axis, and two that are
+        Vec3 p(a, b, a + b);  // a plane that is parallel to no axis, and two that are
         if (flat < 2) p[flat] = 7;
         points.push_back(p);
       }
     }
     const Hull polygon = buildHull(points);
-    validate(polygon);
+    validateHull(polygon);
     EXPECT_EQ(polygon.faces.size(), 2u);
     EXPECT_EQ(polygon.vertices.size(), 4u);
   }
@@ -138,7 +137,7 @@ TEST(Hull, OfLatticePointsIsRightWithManyTies) {
     const Points points =
         latticePoints(random, 3 + static_cast<std::size_t>(scene) % 40, 1 + scene % 4);
     const Hull hull = buildHull(points);
-    ASSERT_NO_THROW(validate(hull)) << "scene " << scene;
+    ASSERT_NO_THROW(validateHull(hull)) << "scene " << scene;
     expectInside(hull, points);
     (hull.faces.size() >= 4 ? solids : flats) += 1;
   }
@@ -150,10 +149,10 @@ TEST(Hull, OfPointsNearlyOnAPlaneIsRight) {
   std::mt19937 random(3);
   for (int scene = 0; scene < 60; ++scene) {
     Points points = realPoints(random, 60, 1.0);
-    // z = x + y rounded: coplanar up to a last place, and so a solid a few 1e-17 thick
+    // z = x + y rounded: coplanar up to an ulp, so a solid a few 1e-17 thick
     for (Vec3& p : points) p.z() = p.x() + p.y();
     const Hull hull = buildHull(points);
-    ASSERT_NO_THROW(validate(hull)) << "scene " << scene;
+    ASSERT_NO_THROW(validateHull(hull)) << "scene " << scene;
     expectInside(hull, points);
   }
 }
@@ -163,7 +162,7 @@ TEST(Hull, OfPointsOnASphereKeepsThemAll) {
   Points points = realPoints(random, 300, 1.0);
   for (Vec3& p : points) p.normalize();
   const Hull hull = buildHull(points);
-  ASSERT_NO_THROW(validate(hull));
+  ASSERT_NO_THROW(validateHull(hull));
   EXPECT_EQ(hull.vertices.size(), 300u);
   EXPECT_EQ(hull.faces.size(), 596u);  // 2V - 4 triangles
   EXPECT_NEAR(hull.radius, 1.0, 1e-15);
@@ -188,7 +187,7 @@ TEST(Hull, OfItsOwnVerticesIsItself) {
   }
 }
 
-TEST(Hull, TakesHugeAndTinyCoordinates) {
+TEST(Hull, AcceptsHugeAndTinyCoordinates) {
   for (const double scale : {1e-300, 1e-160, 1e100, 1e300}) {
     Points points = boxCorners({-1, -1, -1}, {1, 1, 1});
     points.emplace_back(0, 0, 0);
@@ -206,34 +205,32 @@ TEST(Hull, RefusesNoPointsAndPointsThatAreNotFinite) {
   EXPECT_THROW(buildHull(Points{{0, 0, 0}, {0, nan, 0}}), std::invalid_argument);
 }
 
-TEST(Hull, ValidateFindsWhatIsBroken) {
+TEST(Hull, ValidateFindsEachDefect) {
   const Hull sound = buildHull(boxCorners({0, 0, 0}, {1, 1, 1}));
   Hull hull = sound;
   hull.faces.pop_back();
-  EXPECT_THROW(validate(hull), std::logic_error);
+  EXPECT_THROW(validateHull(hull), std::logic_error);
   hull = sound;
   hull.vertices[0] = Vec3(0.5, 0.5, 0.5);
-  EXPECT_THROW(validate(hull), std::logic_error);
+  EXPECT_THROW(validateHull(hull), std::logic_error);
   hull = sound;
   std::reverse(hull.faces[0].begin(), hull.faces[0].end());
-  EXPECT_THROW(validate(hull), std::logic_error);
+  EXPECT_THROW(validateHull(hull), std::logic_error);
   hull = sound;
   std::swap(hull.neighbours[0], hull.neighbours[1]);
-  EXPECT_THROW(validate(hull), std::logic_error);
+  EXPECT_THROW(validateHull(hull), std::logic_error);
   hull = sound;
   hull.radius *= 2;
-  EXPECT_THROW(validate(hull), std::logic_error);
+  EXPECT_THROW(validateHull(hull), std::logic_error);
 }
 
 TEST(Orientation, IsExactWhereDoublesAreNot) {
   const Vec3 a(0.5, 0.5, 0.5), b(12, 12, 12), c(24, 25, 24);
   const double step = 0x1p-53;
-  EXPECT_EQ(orientation(a, b, c, Vec3(0.5, 3, 0.5)), 0);
-  EXPECT_EQ(orientation(a, b, c, Vec3(0.5, 3, 0.5 + step)),
-            orientation(a, b, c, Vec3(0.5, 3, 1.5)));
-  EXPECT_EQ(orientation(a, b, c, Vec3(0.5, 3, 0.5 - step)),
-            orientation(a, b, c, Vec3(0.5, 3, -1.5)));
-  EXPECT_NE(orientation(a, b, c, Vec3(0.5, 3, 1.5)), 0);
+  EXPECT_EQ(orient3d(a, b, c, Vec3(0.5, 3, 0.5)), 0);
+  EXPECT_EQ(orient3d(a, b, c, Vec3(0.5, 3, 0.5 + step)), orient3d(a, b, c, Vec3(0.5, 3, 1.5)));
+  EXPECT_EQ(orient3d(a, b, c, Vec3(0.5, 3, 0.5 - step)), orient3d(a, b, c, Vec3(0.5, 3, -1.5)));
+  EXPECT_NE(orient3d(a, b, c, Vec3(0.5, 3, 1.5)), 0);
 }
 
 }  // namespace

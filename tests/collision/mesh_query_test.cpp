@@ -11,28 +11,28 @@ namespace {
 
 using namespace testing;
 
-// ---- slow twins: every triangle, cold ----------------------------------------------------------
+// ---- reference: every triangle, cold start -----------------------------------------------------
 
-Decision decideCold(const ConvexBody& body, const Triangle& triangle) {
+SeparationResult computeSeparationCold(const PlacedConvex& body, const Triangle& triangle) {
   FeatureCache cold;
-  return decide(body, {std::span<const Vec3>(triangle)}, cold);
+  return computeSeparation(body, {std::span<const Vec3>(triangle)}, cold);
 }
 
-MeshContacts bruteForceContacts(const ConvexBody& body, const TriangleTree& mesh) {
+MeshContacts bruteForceContacts(const PlacedConvex& body, const TriangleTree& mesh) {
   MeshContacts contacts;
   for (std::uint32_t i = 0; i < mesh.triangles().size(); ++i) {
-    const Verdict verdict = decideCold(body, mesh.triangles()[i]).verdict;
+    const Verdict verdict = computeSeparationCold(body, mesh.triangles()[i]).verdict;
     if (verdict == Verdict::penetrating) contacts.penetrated.push_back(i);
     if (verdict == Verdict::touching) contacts.touched.push_back(i);
   }
   return contacts;
 }
 
-NearestTriangle bruteForceNearest(const ConvexBody& body, const TriangleTree& mesh) {
-  NearestTriangle nearest{0, decideCold(body, mesh.triangles()[0])};
+NearestTriangle bruteForceNearest(const PlacedConvex& body, const TriangleTree& mesh) {
+  NearestTriangle nearest{0, computeSeparationCold(body, mesh.triangles()[0])};
   for (std::uint32_t i = 1; i < mesh.triangles().size(); ++i) {
-    const Decision decision = decideCold(body, mesh.triangles()[i]);
-    if (decision.distance < nearest.decision.distance) nearest = {i, decision};
+    const SeparationResult separation = computeSeparationCold(body, mesh.triangles()[i]);
+    if (separation.distance < nearest.separation.distance) nearest = {i, separation};
   }
   return nearest;
 }
@@ -64,10 +64,10 @@ struct Flight {
 
   explicit Flight(Random& random) : hull(buildHull(randomPoints(random, 20, 0.5))) {}
   void moveTo(double t, double low, double high) {
-    rotation = turnedBy(t, Vec3(0.3, 1, 0.2));
+    rotation = rotationAt(t, Vec3(0.3, 1, 0.2));
     translation = {wave(0.31 * t), low + (high - low) * (0.5 + 0.5 * wave(t)), wave(0.17 * t)};
   }
-  ConvexBody body() const { return {hull.vertices, translation, &rotation, &hull}; }
+  PlacedConvex body() const { return {hull.vertices, translation, &rotation, &hull}; }
 };
 
 TEST(MeshQuery, ContactsAreThoseOfBruteForceOnTheWholeWay) {
@@ -79,7 +79,7 @@ TEST(MeshQuery, ContactsAreThoseOfBruteForceOnTheWholeWay) {
   int clear = 0, inside = 0;
   for (int tick = 0; tick < 300; ++tick) {
     flight.moveTo(0.02 * tick, -0.1, 1.1);
-    findContacts(flight.body(), mesh, cache, contacts);
+    findMeshContacts(flight.body(), mesh, cache, contacts);
     const MeshContacts expected = bruteForceContacts(flight.body(), mesh);
     ASSERT_EQ(contacts.penetrated, expected.penetrated) << "tick " << tick;
     ASSERT_EQ(contacts.touched, expected.touched) << "tick " << tick;
@@ -87,8 +87,8 @@ TEST(MeshQuery, ContactsAreThoseOfBruteForceOnTheWholeWay) {
   }
   EXPECT_GT(clear, 60);
   EXPECT_GT(inside, 60);
-  EXPECT_LT(cache.gathers, 100u);
-  EXPECT_LT(cache.decisions, 300u * 40u);
+  EXPECT_LT(cache.broadUpdates, 100u);
+  EXPECT_LT(cache.separationQueries, 300u * 40u);
 }
 
 TEST(MeshQuery, NearestIsThatOfBruteForceOnTheWholeWay) {
@@ -99,18 +99,19 @@ TEST(MeshQuery, NearestIsThatOfBruteForceOnTheWholeWay) {
   int apart = 0;
   for (int tick = 0; tick < 300; ++tick) {
     flight.moveTo(0.02 * tick, 0.2, 2);
-    const auto nearest = nearestTriangle(flight.body(), mesh, cache);
+    const auto nearest = findNearestTriangle(flight.body(), mesh, cache);
     const NearestTriangle expected = bruteForceNearest(flight.body(), mesh);
     ASSERT_TRUE(nearest);
-    const double tolerance = nearest->decision.errorBound + expected.decision.errorBound;
-    ASSERT_NEAR(nearest->decision.distance, expected.decision.distance, tolerance);
-    const Decision again = decideCold(flight.body(), mesh.triangles()[nearest->triangle]);
-    ASSERT_NEAR(again.distance, nearest->decision.distance, again.errorBound + tolerance);
-    apart += expected.decision.verdict == Verdict::separated ? 1 : 0;
+    const double tolerance = nearest->separation.errorBound + expected.separation.errorBound;
+    ASSERT_NEAR(nearest->separation.distance, expected.separation.distance, tolerance);
+    const SeparationResult again =
+        computeSeparationCold(flight.body(), mesh.triangles()[nearest->triangle]);
+    ASSERT_NEAR(again.distance, nearest->separation.distance, again.errorBound + tolerance);
+    apart += expected.separation.verdict == Verdict::separated ? 1 : 0;
   }
   EXPECT_GT(apart, 100);
   EXPECT_LT(apart, 300);
-  EXPECT_LT(cache.decisions, 300u * 40u);
+  EXPECT_LT(cache.separationQueries, 300u * 40u);
 }
 
 TEST(MeshQuery, JumpsAndMixedQueriesAgreeWithBruteForce) {
@@ -125,15 +126,15 @@ TEST(MeshQuery, JumpsAndMixedQueriesAgreeWithBruteForce) {
     flight.moveTo(jump, 0, 1.5);
     const NearestTriangle expected = bruteForceNearest(flight.body(), mesh);
     const double limit = uniform(random, 0, 1);
-    const bool isNearer = expected.decision.distance < limit;
-    EXPECT_EQ(isAnythingNearer(flight.body(), mesh, limit, cache), isNearer);
-    findContacts(flight.body(), mesh, cache, contacts);
+    const bool isNearer = expected.separation.distance < limit;
+    EXPECT_EQ(isAnyTriangleWithin(flight.body(), mesh, limit, cache), isNearer);
+    findMeshContacts(flight.body(), mesh, cache, contacts);
     EXPECT_EQ(contacts.penetrated, bruteForceContacts(flight.body(), mesh).penetrated);
-    const auto nearest = nearestTriangle(flight.body(), mesh, cache, limit);
+    const auto nearest = findNearestTriangle(flight.body(), mesh, cache, limit);
     EXPECT_EQ(nearest.has_value(), isNearer);
     if (nearest) {
-      EXPECT_NEAR(nearest->decision.distance, expected.decision.distance,
-                  nearest->decision.errorBound + expected.decision.errorBound);
+      EXPECT_NEAR(nearest->separation.distance, expected.separation.distance,
+                  nearest->separation.errorBound + expected.separation.errorBound);
     }
     nearer += isNearer ? 1 : 0;
   }
@@ -161,17 +162,17 @@ TEST(MeshQuery, ABoxOnAFloorTouchesTheTrianglesUnderItAtEveryTick) {
   MeshCache cache;
   MeshContacts contacts;
   for (int tick = 0; tick < 64; ++tick) {
-    const ConvexBody body{box.vertices, Vec3(tick / 64.0, 0, 0.25), nullptr, &box};
-    findContacts(body, mesh, cache, contacts);
+    const PlacedConvex body{box.vertices, Vec3(tick / 64.0, 0, 0.25), nullptr, &box};
+    findMeshContacts(body, mesh, cache, contacts);
     EXPECT_TRUE(contacts.penetrated.empty());
     EXPECT_EQ(contacts.touched, bruteForceContacts(body, mesh).touched);
     EXPECT_GE(contacts.touched.size(), 4u);
   }
-  const std::uint64_t decisions = cache.decisions;
-  const ConvexBody body{box.vertices, Vec3(63 / 64.0, 0, 0.25), nullptr, &box};
-  findContacts(body, mesh, cache, contacts);
+  const std::uint64_t separations = cache.separationQueries;
+  const PlacedConvex body{box.vertices, Vec3(63 / 64.0, 0, 0.25), nullptr, &box};
+  findMeshContacts(body, mesh, cache, contacts);
   EXPECT_GE(contacts.touched.size(), 4u);
-  EXPECT_EQ(cache.decisions, decisions) << "what does not move costs nothing";
+  EXPECT_EQ(cache.separationQueries, separations) << "a query without motion costs nothing";
 }
 
 TEST(MeshQuery, AnEmptyMeshIsNowhere) {
@@ -179,9 +180,9 @@ TEST(MeshQuery, AnEmptyMeshIsNowhere) {
   const std::vector<Vec3> point{Vec3(1, 2, 3)};
   MeshCache cache;
   MeshContacts contacts;
-  EXPECT_FALSE(nearestTriangle({point}, mesh, cache));
-  EXPECT_FALSE(isAnythingNearer({point}, mesh, 1e9, cache));
-  findContacts({point}, mesh, cache, contacts);
+  EXPECT_FALSE(findNearestTriangle({point}, mesh, cache));
+  EXPECT_FALSE(isAnyTriangleWithin({point}, mesh, 1e9, cache));
+  findMeshContacts({point}, mesh, cache, contacts);
   EXPECT_EQ(contacts.verdict(), Verdict::separated);
 }
 
@@ -198,11 +199,11 @@ TEST(MeshQuery, ABodyInsideOfAClosedMeshIsSeparated) {
   const std::vector<Vec3> segment{Vec3(0, 0, 0), Vec3(1, 0, 0)};
   MeshCache cache;
   MeshContacts contacts;
-  findContacts({segment}, mesh, cache, contacts);
+  findMeshContacts({segment}, mesh, cache, contacts);
   EXPECT_EQ(contacts.verdict(), Verdict::separated);
-  const auto nearest = nearestTriangle({segment}, mesh, cache);
+  const auto nearest = findNearestTriangle({segment}, mesh, cache);
   ASSERT_TRUE(nearest);
-  EXPECT_DOUBLE_EQ(nearest->decision.distance, 1);
+  EXPECT_DOUBLE_EQ(nearest->separation.distance, 1);
 }
 
 TEST(HullPlanes, TheClearanceIsThatOfABallInside) {
@@ -215,15 +216,15 @@ TEST(HullPlanes, TheClearanceIsThatOfABallInside) {
     const Triangle triangle{flight.translation + randomPoint(random, 1),
                             flight.translation + randomPoint(random, 1),
                             flight.translation + randomPoint(random, 1)};
-    const double clearance = clearanceInside(planes, flight.body(), triangle);
+    const double clearance = computeInteriorClearance(planes, flight.body(), triangle);
     if (clearance == 0) continue;
     ++found;
-    EXPECT_EQ(decideCold(flight.body(), triangle).verdict, Verdict::penetrating);
+    EXPECT_EQ(computeSeparationCold(flight.body(), triangle).verdict, Verdict::penetrating);
     // Moved by less, whatever the direction, they still penetrate.
     for (int k = 0; k < 8; ++k) {
-      ConvexBody moved = flight.body();
+      PlacedConvex moved = flight.body();
       moved.translation += 0.999 * clearance * randomPoint(random, 1).normalized();
-      EXPECT_EQ(decideCold(moved, triangle).verdict, Verdict::penetrating);
+      EXPECT_EQ(computeSeparationCold(moved, triangle).verdict, Verdict::penetrating);
     }
   }
   EXPECT_GT(found, 60);

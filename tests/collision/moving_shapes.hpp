@@ -1,4 +1,4 @@
-// Smooth motion for the tests, by + - * / and sqrt only, so that every machine moves alike.
+// Smooth motion for the tests, by + - * / and sqrt only, so that it is identical on every machine.
 #pragma once
 
 #include <cmath>
@@ -14,8 +14,8 @@ inline double wave(double t) {
   return x * (1.5 - 0.5 * x * x);
 }
 
-/// A turn about `axis` that goes on with t; a radian for small t.
-inline Mat3 turnedBy(double t, const Vec3& axis) {
+/// A rotation about `axis` that grows with t; by t radians for small t.
+inline Mat3 rotationAt(double t, const Vec3& axis) {
   const Vec3 half = axis.normalized() * (t / 2);
   return Quat(1, half.x(), half.y(), half.z()).normalized().toRotationMatrix();
 }

@@ -1,4 +1,4 @@
-// Where exponents run out, and where a body's own origin is far from it.
+// Extreme exponents, and bodies far from their own origin.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kRounding = 0x1p-53;
 
-std::vector<Vec3> cubeAround(const Vec3& centre, double half) {
+std::vector<Vec3> makeCubeAround(const Vec3& centre, double half) {
   std::vector<Vec3> corners;
   for (int k = 0; k < 8; ++k)
     corners.emplace_back(centre +
@@ -26,24 +26,24 @@ std::vector<Vec3> cubeAround(const Vec3& centre, double half) {
 }
 
 TEST(NarrowPhaseExtremes, AnOriginFarFromItsBodyKeepsTheBound) {
-  const std::vector<Vec3> a = cubeAround({0, 0, 0}, 1), b = cubeAround({-1e6, 0, 0}, 1);
+  const std::vector<Vec3> a = makeCubeAround({0, 0, 0}, 1), b = makeCubeAround({-1e6, 0, 0}, 1);
   FeatureCache cache;
-  const Decision d = decide({a, Vec3::Zero()}, {b, {1e6 + 4, 0, 0}}, cache);
+  const SeparationResult d = computeSeparation({a, Vec3::Zero()}, {b, {1e6 + 4, 0, 0}}, cache);
   EXPECT_EQ(d.verdict, Verdict::separated);
   EXPECT_LE(std::abs(d.distance - 2), d.errorBound);
   EXPECT_LE(d.errorBound, 16 * kRounding * 5);  // the largest coordinate is B's far side
 }
 
-/// Hulls, so that the climb and its slack are at work.
+/// Uses hulls, so that hill climbing and its slack are tested.
 TEST(NarrowPhaseExtremes, HullsOfAnySizeHaveTheSameVerdicts) {
   for (const int exponent : {-560, -530, -356, -200, 0, 200, 400, 500}) {
     const double unit = std::ldexp(1.0, exponent);
-    const Hull a = buildHull(cubeAround({0, 0, 0}, unit));
-    const Hull b = buildHull(cubeAround({0, 0, 0}, unit / 2));
+    const Hull a = buildHull(makeCubeAround({0, 0, 0}, unit));
+    const Hull b = buildHull(makeCubeAround({0, 0, 0}, unit / 2));
     const auto verdictAt = [&](double x) {
       FeatureCache cache;
-      return decide({a.vertices, Vec3::Zero(), nullptr, &a},
-                    {b.vertices, Vec3(x, 0.25, 0.125) * unit, nullptr, &b}, cache)
+      return computeSeparation({a.vertices, Vec3::Zero(), nullptr, &a},
+                               {b.vertices, Vec3(x, 0.25, 0.125) * unit, nullptr, &b}, cache)
           .verdict;
     };
     EXPECT_EQ(verdictAt(1.75), Verdict::separated) << exponent;
@@ -58,20 +58,20 @@ TEST(NarrowPhaseExtremes, DistancesOfAnySizeLieWithinTheirBound) {
     const double distance = std::ldexp(1.58, exponent);
     const std::vector<Vec3> b{{distance, 0, 0}};
     FeatureCache cache;
-    const Decision d = decide({a, Vec3::Zero()}, {b, Vec3::Zero()}, cache);
+    const SeparationResult d = computeSeparation({a, Vec3::Zero()}, {b, Vec3::Zero()}, cache);
     EXPECT_EQ(d.verdict, Verdict::separated) << exponent;
     EXPECT_LE(std::abs(d.distance - distance), d.errorBound) << exponent;
-    // One that no double is.
+    // A distance that is not a double.
     const std::vector<Vec3> slanted{{distance, distance, 0}};
     FeatureCache other;
-    const Decision s = decide({a, Vec3::Zero()}, {slanted, Vec3::Zero()}, other);
+    const SeparationResult s = computeSeparation({a, Vec3::Zero()}, {slanted, Vec3::Zero()}, other);
     const long double truth = std::sqrt(2.0L) * static_cast<long double>(distance);
     EXPECT_LE(std::abs(static_cast<long double>(s.distance) - truth),
               static_cast<long double>(s.errorBound))
         << exponent;
     FeatureCache none;
-    EXPECT_TRUE(
-        decideWithin({a, Vec3::Zero()}, {b, Vec3::Zero()}, distance * 1.01, none).has_value())
+    EXPECT_TRUE(computeSeparationWithin({a, Vec3::Zero()}, {b, Vec3::Zero()}, distance * 1.01, none)
+                    .has_value())
         << exponent;
   }
 }
@@ -79,20 +79,20 @@ TEST(NarrowPhaseExtremes, DistancesOfAnySizeLieWithinTheirBound) {
 TEST(NarrowPhaseExtremes, ADepthThatIsCalledGlobalIsTheDepthAtAnyScale) {
   for (const int exponent : {-400, -170, -40, 0, 40, 200, 300}) {
     const double unit = std::ldexp(1.0, exponent);
-    const std::vector<Vec3> box = cubeAround({0, 0, 0}, unit);
-    const ConvexBody a{box, Vec3::Zero()}, b{box, Vec3(1.75, 0.5, 0.25) * unit};
+    const std::vector<Vec3> box = makeCubeAround({0, 0, 0}, unit);
+    const PlacedConvex a{box, Vec3::Zero()}, b{box, Vec3(1.75, 0.5, 0.25) * unit};
     FeatureCache cache;
-    ASSERT_EQ(decide(a, b, cache).verdict, Verdict::penetrating) << exponent;
+    ASSERT_EQ(computeSeparation(a, b, cache).verdict, Verdict::penetrating) << exponent;
     DepthCache none;
-    const Depth depth = penetrationDepth(a, b, cache, none);
+    const PenetrationResult depth = computePenetrationDepth(a, b, cache, none);
     EXPECT_TRUE(depth.global) << exponent;
     EXPECT_NEAR(depth.depth / unit, 0.25, 1e-14) << exponent;
   }
 }
 
-Refinement refineCold(const ConvexBody& a, const ConvexBody& b) {
+RefinedSeparation refineSeparationCold(const PlacedConvex& a, const PlacedConvex& b) {
   FeatureCache cache;
-  return refine(a, b, cache);
+  return refineSeparation(a, b, cache);
 }
 
 std::vector<Vec3> scaled(std::vector<Vec3> points, double unit) {
@@ -100,17 +100,17 @@ std::vector<Vec3> scaled(std::vector<Vec3> points, double unit) {
   return points;
 }
 
-/// Where numbers are so large that squares of areas overflow, a depth is what it is at the origin.
+/// The depth is correct even if numbers are so large that squares of areas overflow.
 TEST(NarrowPhaseExtremes, RefinedDepthsScaleExactlyUpToTheLargestNumbers) {
   testing::Random random(11);
   int penetrating = 0;
   for (int i = 0; i < 200; ++i) {
     const std::vector<Vec3> a = testing::latticePoints(random, 6, 3);
     const std::vector<Vec3> b = testing::latticePoints(random, 6, 3);
-    const Refinement here = refineCold({a}, {b});
+    const RefinedSeparation here = refineSeparationCold({a}, {b});
     for (const int exponent : {-300, 260, 465}) {
       const double unit = std::ldexp(1.0, exponent);
-      const Refinement there = refineCold({scaled(a, unit)}, {scaled(b, unit)});
+      const RefinedSeparation there = refineSeparationCold({scaled(a, unit)}, {scaled(b, unit)});
       ASSERT_EQ(there.verdict, here.verdict) << i << " at 2^" << exponent;
       EXPECT_EQ(there.penetration, here.penetration * unit) << i << " at 2^" << exponent;
     }
@@ -119,32 +119,33 @@ TEST(NarrowPhaseExtremes, RefinedDepthsScaleExactlyUpToTheLargestNumbers) {
   EXPECT_GT(penetrating, 50);
 }
 
-/// In units of the least double, to which they are rounded; the bound knows.
+/// Values are in units of the smallest double, their rounding unit; the bound includes it.
 TEST(NarrowPhaseExtremes, AmongTheLeastNumbersDistancesAndDepthsAreRounded) {
-  constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+  constexpr double kMinPositive = std::numeric_limits<double>::denorm_min();
   testing::Random random(12);
   std::array<int, 3> seen{};
   for (int i = 0; i < 300; ++i) {
     const Vec3 at = testing::latticePoints(random, 1, 4)[0];
     const std::vector<Vec3> a = testing::latticePoints(random, 5, 3);
     const std::vector<Vec3> b = testing::latticePoints(random, 5, 3);
-    const Refinement large = refineCold({a, at}, {b});
-    const std::vector<Vec3> leastA = scaled(a, kLeast), leastB = scaled(b, kLeast);
-    const Refinement small = refineCold({leastA, kLeast * at}, {leastB});
+    const RefinedSeparation large = refineSeparationCold({a, at}, {b});
+    const std::vector<Vec3> leastA = scaled(a, kMinPositive), leastB = scaled(b, kMinPositive);
+    const RefinedSeparation small = refineSeparationCold({leastA, kMinPositive * at}, {leastB});
     ASSERT_EQ(small.verdict, large.verdict) << i;
-    EXPECT_EQ(small.distance, std::nearbyint(large.distance) * kLeast) << i;
-    EXPECT_EQ(small.penetration, std::nearbyint(large.penetration) * kLeast) << i;
+    EXPECT_EQ(small.distance, std::nearbyint(large.distance) * kMinPositive) << i;
+    EXPECT_EQ(small.penetration, std::nearbyint(large.penetration) * kMinPositive) << i;
     FeatureCache cache;
-    const Decision decided = decide({leastA, kLeast * at}, {leastB}, cache);
-    EXPECT_LE(std::abs(decided.distance / kLeast - large.distance),
-              decided.errorBound / kLeast + 1e-14)
+    const SeparationResult decided =
+        computeSeparation({leastA, kMinPositive * at}, {leastB}, cache);
+    EXPECT_LE(std::abs(decided.distance / kMinPositive - large.distance),
+              decided.errorBound / kMinPositive + 1e-14)
         << i;
     ++seen[static_cast<std::size_t>(large.verdict)];
   }
   for (const int count : seen) EXPECT_GT(count, 3);
 }
 
-/// Matrices are taken as they are: one that mirrors makes the mirrored body.
+/// Matrices are used exactly: a mirroring matrix gives the mirrored body.
 TEST(NarrowPhaseExtremes, AMirroredBodyIsAsDeepAsItsMirrorImage) {
   Mat3 mirror;
   mirror << 0, 0, -1, -1, 0, 0, 0, -1, 0;
@@ -157,12 +158,13 @@ TEST(NarrowPhaseExtremes, AMirroredBodyIsAsDeepAsItsMirrorImage) {
     const Vec3 at = testing::latticePoints(random, 1, 2)[0];
     std::vector<Vec3> image = b.vertices;
     for (Vec3& p : image) p = mirror * p;
-    const ConvexBody first{a.vertices, at, nullptr, &a};
-    const Refinement mirrored = refineCold(first, {b.vertices, Vec3::Zero(), &mirror, &b});
-    const Refinement plain = refineCold(first, {image});
+    const PlacedConvex first{a.vertices, at, nullptr, &a};
+    const RefinedSeparation mirrored =
+        refineSeparationCold(first, {b.vertices, Vec3::Zero(), &mirror, &b});
+    const RefinedSeparation plain = refineSeparationCold(first, {image});
     ASSERT_EQ(mirrored.verdict, plain.verdict) << i;
     EXPECT_EQ(mirrored.penetration, plain.penetration) << i;
-    EXPECT_EQ(refineCold({b.vertices, Vec3::Zero(), &mirror, &b}, first).penetration,
+    EXPECT_EQ(refineSeparationCold({b.vertices, Vec3::Zero(), &mirror, &b}, first).penetration,
               plain.penetration)
         << i;
     penetrating += plain.verdict == Verdict::penetrating;
@@ -175,38 +177,39 @@ TEST(NarrowPhaseExtremes, ADepthIsGlobalInSymmetricPlacesToo) {
   const double c = std::sqrt(0.5);
   Mat3 turned;
   turned << c, -c, 0, c, c, 0, 0, 0, 1;
-  const Hull box = buildHull(cubeAround({0, 0, 0}, 0.5));
+  const Hull box = buildHull(makeCubeAround({0, 0, 0}, 0.5));
   for (const double x : {0.0, 0.3, 0.7, 1.1, 1.2}) {
-    const ConvexBody a{box.vertices, Vec3::Zero(), nullptr, &box};
-    const ConvexBody b{box.vertices, Vec3(x, 0, 0), &turned, &box};
+    const PlacedConvex a{box.vertices, Vec3::Zero(), nullptr, &box};
+    const PlacedConvex b{box.vertices, Vec3(x, 0, 0), &turned, &box};
     FeatureCache cache;
-    ASSERT_EQ(decide(a, b, cache).verdict, Verdict::penetrating) << x;
+    ASSERT_EQ(computeSeparation(a, b, cache).verdict, Verdict::penetrating) << x;
     DepthCache none;
-    const Depth depth = penetrationDepth(a, b, cache, none);
+    const PenetrationResult depth = computePenetrationDepth(a, b, cache, none);
     EXPECT_TRUE(depth.global) << x;
     EXPECT_NEAR(depth.depth, std::min(1.0, 0.5 + c - x), 1e-14) << x;
   }
 }
 
-TEST(NarrowPhaseExtremes, WhatIsNoNumberIsRefusedByName) {
-  const std::vector<Vec3> cube = cubeAround({0, 0, 0}, 1);
+TEST(NarrowPhaseExtremes, NonFiniteNumbersAreRefusedByName) {
+  const std::vector<Vec3> cube = makeCubeAround({0, 0, 0}, 1);
   const double none = std::nan(""), infinite = std::numeric_limits<double>::infinity();
   const Mat3 noRotation = Mat3::Constant(none);
   const std::vector<Vec3> noCorner{{0, 0, 0}, {none, 0, 0}};
-  const ConvexBody good{cube, Vec3::Zero()};
-  for (const ConvexBody& bad : {ConvexBody{cube, {0, none, 0}}, ConvexBody{cube, {infinite, 0, 0}},
-                                ConvexBody{cube, Vec3::Zero(), &noRotation},
-                                ConvexBody{noCorner, Vec3::Zero()}, ConvexBody{{}, Vec3::Zero()}}) {
+  const PlacedConvex good{cube, Vec3::Zero()};
+  for (const PlacedConvex& bad :
+       {PlacedConvex{cube, {0, none, 0}}, PlacedConvex{cube, {infinite, 0, 0}},
+        PlacedConvex{cube, Vec3::Zero(), &noRotation}, PlacedConvex{noCorner, Vec3::Zero()},
+        PlacedConvex{{}, Vec3::Zero()}}) {
     FeatureCache cache;
-    EXPECT_THROW(decide(good, bad, cache), std::invalid_argument);
-    EXPECT_THROW(refine(bad, good, cache), std::invalid_argument);
+    EXPECT_THROW(computeSeparation(good, bad, cache), std::invalid_argument);
+    EXPECT_THROW(refineSeparation(bad, good, cache), std::invalid_argument);
   }
 }
 
 TEST(NarrowPhaseExtremes, NothingIsFartherThanInfinitelyFar) {
-  const std::vector<Vec3> cube = cubeAround({0, 0, 0}, 1);
+  const std::vector<Vec3> cube = makeCubeAround({0, 0, 0}, 1);
   FeatureCache cache;
-  EXPECT_TRUE(isNearerThan({cube, Vec3::Zero()}, {cube, {5, 0, 0}},
+  EXPECT_TRUE(isCloserThan({cube, Vec3::Zero()}, {cube, {5, 0, 0}},
                            std::numeric_limits<double>::infinity(), cache));
 }
 

@@ -1,5 +1,5 @@
-// Polytopes that turn past one another, asked warm at each step: what decide() and
-// penetrationDepth() promise of their numbers, held against refine().
+// Polytopes that rotate past each other, queried with a warm start at each step. Compares the error
+// bounds of computeSeparation() and computePenetrationDepth() with refineSeparation().
 #include <gtest/gtest.h>
 
 #include "collision/narrow_phase/penetration_depth.hpp"
@@ -11,48 +11,51 @@ namespace {
 
 using namespace testing;
 
-Vec3 direction(Random& random) {
+Vec3 randomDirection(Random& random) {
   return randomPoint(random, 1).normalized();
 }
 
 Hull roundHull(Random& random, int count) {
   std::vector<Vec3> points;
-  for (int i = 0; i < count; ++i) points.push_back(direction(random));
+  for (int i = 0; i < count; ++i) points.push_back(randomDirection(random));
   return buildHull(points);
 }
 
-/// A and B turn by a degree or two a step; B is kept at about `gap` metres from A's surface.
+/// A and B rotate by a degree or two per step; B stays at about `distance` metres from A's surface.
 struct Motion {
   Hull hullA, hullB;
   Vec3 axisA, axisB, away;
-  double gap;
-  Mat3 turnA, turnB;
-  Vec3 at;
+  double distance;
+  Mat3 rotationA, rotationB;
+  Vec3 translationB;
 
-  Motion(Random& random, int vertices, double apart)
+  Motion(Random& random, int vertices, double initialDistance)
       : hullA(roundHull(random, vertices)),
         hullB(roundHull(random, vertices)),
-        axisA(direction(random)),
-        axisB(direction(random)),
-        away(direction(random)),
-        gap(apart) {}
+        axisA(randomDirection(random)),
+        axisB(randomDirection(random)),
+        away(randomDirection(random)),
+        distance(initialDistance) {}
   void step(int k) {
-    turnA = Eigen::AngleAxisd(0.02 * k, axisA).toRotationMatrix();
-    turnB = Eigen::AngleAxisd(0.03 * k, axisB).toRotationMatrix();
-    at = 10 * (Eigen::AngleAxisd(0.02 * k, axisA) * away);
+    rotationA = Eigen::AngleAxisd(0.02 * k, axisA).toRotationMatrix();
+    rotationB = Eigen::AngleAxisd(0.03 * k, axisB).toRotationMatrix();
+    translationB = 10 * (Eigen::AngleAxisd(0.02 * k, axisA) * away);
     FeatureCache none;
-    const Decision far = decide(a(), b(), none);
-    at -= (far.distance - gap) * far.normal;
+    const SeparationResult far = computeSeparation(a(), b(), none);
+    translationB -= (far.distance - distance) * far.normal;
   }
-  ConvexBody a() const { return {hullA.vertices, Vec3(0.25, 0.5, 0.125), &turnA, &hullA}; }
-  ConvexBody b() const { return {hullB.vertices, Vec3(0.25, 0.5, 0.125) + at, &turnB, &hullB}; }
+  PlacedConvex a() const { return {hullA.vertices, Vec3(0.25, 0.5, 0.125), &rotationA, &hullA}; }
+  PlacedConvex b() const {
+    return {hullB.vertices, Vec3(0.25, 0.5, 0.125) + translationB, &rotationB, &hullB};
+  }
   /// The largest |coordinate| of both bodies from A's translation.
-  double largest() const {
-    double most = 0;
-    for (const Vec3& p : hullA.vertices) most = std::max(most, (turnA * p).cwiseAbs().maxCoeff());
+  double maxCoordinate() const {
+    double result = 0;
+    for (const Vec3& p : hullA.vertices)
+      result = std::max(result, (rotationA * p).cwiseAbs().maxCoeff());
     for (const Vec3& p : hullB.vertices)
-      most = std::max(most, (turnB * p + at).cwiseAbs().maxCoeff());
-    return most;
+      result = std::max(result, (rotationB * p + translationB).cwiseAbs().maxCoeff());
+    return result;
   }
 };
 
@@ -66,16 +69,16 @@ TEST(NarrowPhaseMotion, ExactDistancesLieWithinBoundsOfAFewUnitsOfRounding) {
       for (int k = 0; k < 60; ++k) {
         motion.step(k);
         const FeatureCache last = cache;
-        const Decision d = decide(motion.a(), motion.b(), cache);
-        const Refinement exact = refine(motion.a(), motion.b(), exactCache);
+        const SeparationResult d = computeSeparation(motion.a(), motion.b(), cache);
+        const RefinedSeparation exact = refineSeparation(motion.a(), motion.b(), exactCache);
         ASSERT_EQ(d.verdict, Verdict::separated);
         EXPECT_LE(std::abs(d.distance - exact.distance), d.errorBound + 2e-16 * exact.distance);
-        EXPECT_LE(d.errorBound, 16 * 0x1p-53 * motion.largest());
-        EXPECT_NEAR((d.pointB - d.pointA).norm(), d.distance, 1e-15 * motion.largest());
-        EXPECT_NEAR(d.normal.dot(d.pointB - d.pointA), d.distance, 1e-15 * motion.largest());
+        EXPECT_LE(d.errorBound, 16 * 0x1p-53 * motion.maxCoordinate());
+        EXPECT_NEAR((d.pointB - d.pointA).norm(), d.distance, 1e-15 * motion.maxCoordinate());
+        EXPECT_NEAR(d.normal.dot(d.pointB - d.pointA), d.distance, 1e-15 * motion.maxCoordinate());
         EXPECT_NEAR(cache.axis.norm(), 1, 1e-15);
         changes += cache.pairs != last.pairs || cache.size != last.size;
-        byFilter += d.decidedBy == DecidedBy::filter;
+        byFilter += d.certificate == Certificate::filter;
         ++count;
       }
     }
@@ -94,18 +97,19 @@ TEST(NarrowPhaseMotion, PenetratingBodiesHaveACommonPointAndADepthWithinItsBound
       DepthCache depthCache;
       for (int k = 0; k < 40; ++k) {
         motion.step(k);
-        const Decision d = decide(motion.a(), motion.b(), cache);
+        const SeparationResult d = computeSeparation(motion.a(), motion.b(), cache);
         if (d.verdict != Verdict::penetrating) continue;  // two corners slipped past each other
         ++count;
-        EXPECT_LE((d.pointB - d.pointA).norm(), 4 * 0x1p-53 * motion.largest());
-        const Depth told = penetrationDepth(motion.a(), motion.b(), cache, depthCache);
-        EXPECT_TRUE(told.global);
-        EXPECT_LE(told.errorBound, 1e-12 * told.depth + 0x1p-53 * motion.largest());
-        if (k % 8 != 0 || vertices > 8) continue;  // an exact depth costs much
+        EXPECT_LE((d.pointB - d.pointA).norm(), 4 * 0x1p-53 * motion.maxCoordinate());
+        const PenetrationResult reported =
+            computePenetrationDepth(motion.a(), motion.b(), cache, depthCache);
+        EXPECT_TRUE(reported.global);
+        EXPECT_LE(reported.errorBound, 1e-12 * reported.depth + 0x1p-53 * motion.maxCoordinate());
+        if (k % 8 != 0 || vertices > 8) continue;  // an exact depth is expensive
         FeatureCache exactCache;
-        const Refinement exact = refine(motion.a(), motion.b(), exactCache);
-        EXPECT_LE(std::abs(told.depth - exact.penetration),
-                  told.errorBound + 2e-16 * exact.penetration);
+        const RefinedSeparation exact = refineSeparation(motion.a(), motion.b(), exactCache);
+        EXPECT_LE(std::abs(reported.depth - exact.penetration),
+                  reported.errorBound + 2e-16 * exact.penetration);
       }
     }
   }
@@ -119,10 +123,11 @@ TEST(NarrowPhaseMotion, ALimitIsProvedWhereverTheDistanceIsGreaterByMoreThanItsB
   for (int k = 0; k < 60; ++k) {
     motion.step(k);
     FeatureCache none;
-    const Decision d = decide(motion.a(), motion.b(), none);
-    EXPECT_FALSE(
-        decideWithin(motion.a(), motion.b(), d.distance - 3 * d.errorBound - 1e-15, cache));
-    EXPECT_TRUE(decideWithin(motion.a(), motion.b(), d.distance + 3 * d.errorBound, cache));
+    const SeparationResult d = computeSeparation(motion.a(), motion.b(), none);
+    EXPECT_FALSE(computeSeparationWithin(motion.a(), motion.b(),
+                                         d.distance - 3 * d.errorBound - 1e-15, cache));
+    EXPECT_TRUE(
+        computeSeparationWithin(motion.a(), motion.b(), d.distance + 3 * d.errorBound, cache));
   }
 }
 

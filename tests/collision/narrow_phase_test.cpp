@@ -19,21 +19,21 @@ using namespace testing;
 const std::vector<Vec3> kUnitCube{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
                                   {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
 
-Decision decideCold(const ConvexBody& a, const ConvexBody& b) {
+SeparationResult computeSeparationCold(const PlacedConvex& a, const PlacedConvex& b) {
   FeatureCache cache;
-  return decide(a, b, cache);
+  return computeSeparation(a, b, cache);
 }
 
-// ---- slow twins --------------------------------------------------------------------------------
+// ---- reference implementations -----------------------------------------------------------------
 
-double pointSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
+double distancePointSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
   const double t = std::clamp((p - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
   return (p - (a + t * (b - a))).norm();
 }
 
-double segmentSegment(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
-  double best = std::min(std::min(pointSegment(a, c, d), pointSegment(b, c, d)),
-                         std::min(pointSegment(c, a, b), pointSegment(d, a, b)));
+double distanceSegmentSegment(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  double best = std::min(std::min(distancePointSegment(a, c, d), distancePointSegment(b, c, d)),
+                         std::min(distancePointSegment(c, a, b), distancePointSegment(d, a, b)));
   const Vec3 n = (b - a).cross(d - c);
   if (n.squaredNorm() < 1e-24) return best;
   const double s = (c - a).cross(d - c).dot(n) / n.squaredNorm();
@@ -43,9 +43,10 @@ double segmentSegment(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d
   return best;
 }
 
-double pointTriangle(const Vec3& p, const Triangle& t) {
-  double best = std::min(pointSegment(p, t[0], t[1]),
-                         std::min(pointSegment(p, t[1], t[2]), pointSegment(p, t[2], t[0])));
+double distancePointTriangle(const Vec3& p, const Triangle& t) {
+  double best =
+      std::min(distancePointSegment(p, t[0], t[1]),
+               std::min(distancePointSegment(p, t[1], t[2]), distancePointSegment(p, t[2], t[0])));
   const Vec3 n = (t[1] - t[0]).cross(t[2] - t[0]);
   for (int i = 0; i < 3; ++i)
     if ((t[(i + 1) % 3] - t[i]).cross(p - t[i]).dot(n) < 0) return best;
@@ -53,12 +54,12 @@ double pointTriangle(const Vec3& p, const Triangle& t) {
 }
 
 /// Distance of two disjoint triangles: a vertex and a face, or two edges.
-double triangleTriangle(const Triangle& a, const Triangle& b) {
+double distanceTriangleTriangle(const Triangle& a, const Triangle& b) {
   double best = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 3; ++i) {
-    best = std::min({best, pointTriangle(a[i], b), pointTriangle(b[i], a)});
+    best = std::min({best, distancePointTriangle(a[i], b), distancePointTriangle(b[i], a)});
     for (int j = 0; j < 3; ++j)
-      best = std::min(best, segmentSegment(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]));
+      best = std::min(best, distanceSegmentSegment(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]));
   }
   return best;
 }
@@ -66,37 +67,39 @@ double triangleTriangle(const Triangle& a, const Triangle& b) {
 double bruteForceDistance(const std::vector<Triangle>& a, const std::vector<Triangle>& b) {
   double best = std::numeric_limits<double>::infinity();
   for (const Triangle& s : a)
-    for (const Triangle& t : b) best = std::min(best, triangleTriangle(s, t));
+    for (const Triangle& t : b) best = std::min(best, distanceTriangleTriangle(s, t));
   return best;
 }
 
 // ---- known answers -----------------------------------------------------------------------------
 
 TEST(NarrowPhase, CubesTwoMetresApartAreTwoMetresApart) {
-  const Decision d = decideCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}});
+  const SeparationResult d =
+      computeSeparationCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}});
   EXPECT_EQ(d.verdict, Verdict::separated);
-  EXPECT_EQ(d.decidedBy, DecidedBy::filter);
+  EXPECT_EQ(d.certificate, Certificate::filter);
   EXPECT_NEAR(d.distance, 2, 1e-15);
   EXPECT_TRUE(d.normal.isApprox(Vec3::UnitX(), 1e-15));
   EXPECT_NEAR((d.pointB - d.pointA).norm(), 2, 1e-14);
 }
 
 TEST(NarrowPhase, CubesFaceToFaceTouch) {
-  const Decision d = decideCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {1, 0.25, 0.5}});
+  const SeparationResult d =
+      computeSeparationCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {1, 0.25, 0.5}});
   EXPECT_EQ(d.verdict, Verdict::touching);
-  EXPECT_EQ(d.decidedBy, DecidedBy::expansion);
+  EXPECT_EQ(d.certificate, Certificate::expansion);
   EXPECT_EQ(d.distance, 0);
 }
 
 TEST(NarrowPhase, CubesThatShareOneCornerTouch) {
-  EXPECT_EQ(decideCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {1, 1, 1}}).verdict,
+  EXPECT_EQ(computeSeparationCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {1, 1, 1}}).verdict,
             Verdict::touching);
 }
 
 TEST(NarrowPhase, OneUlpDecides) {
   const double next = std::nextafter(1.0, 2.0), before = std::nextafter(1.0, 0.0);
   const auto verdictAt = [](double x) {
-    return decideCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {x, 0.25, 0.5}}).verdict;
+    return computeSeparationCold({kUnitCube, Vec3::Zero()}, {kUnitCube, {x, 0.25, 0.5}}).verdict;
   };
   EXPECT_EQ(verdictAt(next), Verdict::separated);
   EXPECT_EQ(verdictAt(1.0), Verdict::touching);
@@ -104,11 +107,11 @@ TEST(NarrowPhase, OneUlpDecides) {
 }
 
 TEST(NarrowPhase, DeepOverlapIsPenetratingByTheLeastDepth) {
-  const ConvexBody a{kUnitCube, Vec3::Zero()}, b{kUnitCube, {0.75, 0.1, 0.05}};
+  const PlacedConvex a{kUnitCube, Vec3::Zero()}, b{kUnitCube, {0.75, 0.1, 0.05}};
   FeatureCache cache;
-  EXPECT_EQ(decide(a, b, cache).verdict, Verdict::penetrating);
+  EXPECT_EQ(computeSeparation(a, b, cache).verdict, Verdict::penetrating);
   DepthCache none;
-  const Depth depth = penetrationDepth(a, b, cache, none);
+  const PenetrationResult depth = computePenetrationDepth(a, b, cache, none);
   EXPECT_TRUE(depth.global);
   EXPECT_NEAR(depth.depth, 0.25, 1e-15);
   EXPECT_TRUE(depth.normal.isApprox(Vec3::UnitX(), 1e-15));
@@ -116,34 +119,39 @@ TEST(NarrowPhase, DeepOverlapIsPenetratingByTheLeastDepth) {
 
 TEST(NarrowPhase, OverlappingPolygonsInOnePlaneOnlyTouch) {
   const std::vector<Vec3> square{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
-  EXPECT_EQ(decideCold({square, Vec3::Zero()}, {square, {0.5, 0.5, 0}}).verdict, Verdict::touching);
+  EXPECT_EQ(computeSeparationCold({square, Vec3::Zero()}, {square, {0.5, 0.5, 0}}).verdict,
+            Verdict::touching);
 }
 
 TEST(NarrowPhase, ASegmentThroughATriangleTouchesItsEdgeAndPenetratesItsInside) {
   const std::vector<Vec3> triangle{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}};
   const std::vector<Vec3> segment{{0, 0, -1}, {0, 0, 1}};
-  EXPECT_EQ(decideCold({segment, {0.5, 0.5, 0}}, {triangle, Vec3::Zero()}).verdict,
+  EXPECT_EQ(computeSeparationCold({segment, {0.5, 0.5, 0}}, {triangle, Vec3::Zero()}).verdict,
             Verdict::penetrating);
-  EXPECT_EQ(decideCold({segment, {0.5, 0, 0}}, {triangle, Vec3::Zero()}).verdict,
+  EXPECT_EQ(computeSeparationCold({segment, {0.5, 0, 0}}, {triangle, Vec3::Zero()}).verdict,
             Verdict::touching);
 }
 
 TEST(NarrowPhase, FarFromTheOriginNothingIsLost) {
   const Vec3 far{1e7, -3e6, 5e6};
-  const double gap = 0x1p-20;  // about a micrometre, exact beside 1e7
-  const Decision d = decideCold({kUnitCube, far}, {kUnitCube, far + Vec3(1 + gap, 0, 0)});
+  const double gap = 0x1p-20;  // about a micrometre, exact when added to 1e7
+  const SeparationResult d =
+      computeSeparationCold({kUnitCube, far}, {kUnitCube, far + Vec3(1 + gap, 0, 0)});
   EXPECT_EQ(d.verdict, Verdict::separated);
   EXPECT_NEAR(d.distance, gap, 1e-15);
 }
 
 TEST(NarrowPhase, GivesUpAsSoonAsTheLimitIsProved) {
   FeatureCache cache;
-  EXPECT_FALSE(decideWithin({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}}, 1.5, cache));
-  EXPECT_TRUE(decideWithin({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}}, 2.5, cache));
-  EXPECT_GT(provedSeparation({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}}, cache), 1.5);
+  EXPECT_FALSE(
+      computeSeparationWithin({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}}, 1.5, cache));
+  EXPECT_TRUE(
+      computeSeparationWithin({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}}, 2.5, cache));
+  EXPECT_GT(computeSeparationLowerBound({kUnitCube, Vec3::Zero()}, {kUnitCube, {3, 0, 0}}, cache),
+            1.5);
 }
 
-// ---- against the twins -------------------------------------------------------------------------
+// ---- against the references --------------------------------------------------------------------
 
 TEST(NarrowPhase, HullsAndTrianglesAgreeWithBruteForceOverFeatures) {
   Random random(1);
@@ -152,13 +160,13 @@ TEST(NarrowPhase, HullsAndTrianglesAgreeWithBruteForceOverFeatures) {
     const Hull hull = buildHull(randomPoints(random, 14, 1));
     const std::vector<Vec3> triangle = randomPoints(random, 3, 1.5);
     const Vec3 at = randomPoint(random, 1.6);
-    const Decision d = decideCold({hull.vertices, at}, {triangle, Vec3::Zero()});
+    const SeparationResult d = computeSeparationCold({hull.vertices, at}, {triangle, Vec3::Zero()});
     if (d.verdict != Verdict::separated) continue;
     ++separated;
-    const double slow =
+    const double reference =
         bruteForceDistance(boundary(hull, at), {{triangle[0], triangle[1], triangle[2]}});
-    EXPECT_NEAR(d.distance, slow, 1e-13) << "case " << i;
-    EXPECT_LE(std::abs(d.distance - slow), d.errorBound + 1e-14) << "case " << i;
+    EXPECT_NEAR(d.distance, reference, 1e-13) << "case " << i;
+    EXPECT_LE(std::abs(d.distance - reference), d.errorBound + 1e-14) << "case " << i;
     EXPECT_LT(d.errorBound, 1e-12) << "case " << i;
     EXPECT_NEAR((d.pointB - d.pointA).norm(), d.distance, 1e-13) << "case " << i;
   }
@@ -173,9 +181,9 @@ TEST(NarrowPhase, VerdictsOnALatticeEqualExactArithmeticWhicheverWayTheyWereDeci
     const std::vector<Vec3> a = latticePoints(random, 1 + static_cast<int>(random() % 6), 2);
     const std::vector<Vec3> b = latticePoints(random, 1 + static_cast<int>(random() % 6), 2);
     const Vec3 at = latticePoints(random, 1, 2)[0];
-    const Verdict exact = rationalVerdict({a, at}, {b, Vec3::Zero()});
-    EXPECT_EQ(decideCold({a, at}, {b, Vec3::Zero()}).verdict, exact) << "case " << i;
-    EXPECT_EQ(rationalVerdict({b, Vec3::Zero()}, {a, at}), exact) << "case " << i;
+    const Verdict exact = computeRationalVerdict({a, at}, {b, Vec3::Zero()});
+    EXPECT_EQ(computeSeparationCold({a, at}, {b, Vec3::Zero()}).verdict, exact) << "case " << i;
+    EXPECT_EQ(computeRationalVerdict({b, Vec3::Zero()}, {a, at}), exact) << "case " << i;
     ++seen[static_cast<std::size_t>(exact)];
   }
   for (const int count : seen) EXPECT_GT(count, 60);
@@ -190,9 +198,9 @@ TEST(NarrowPhase, TinyAndHugeBodiesAreDecidedExactlyThoughDoublesUnderAndOverflo
     const Vec3 at = latticePoints(random, 1, 2)[0];
     for (Vec3& p : a) p *= scale;
     for (Vec3& p : b) p *= i % 2 == 0 ? scale : scale / 3;
-    const ConvexBody bodyA{a, scale * at}, bodyB{b};
-    const Verdict exact = rationalVerdict(bodyA, bodyB);
-    EXPECT_EQ(decideCold(bodyA, bodyB).verdict, exact) << "case " << i;
+    const PlacedConvex bodyA{a, scale * at}, bodyB{b};
+    const Verdict exact = computeRationalVerdict(bodyA, bodyB);
+    EXPECT_EQ(computeSeparationCold(bodyA, bodyB).verdict, exact) << "case " << i;
     ++seen[static_cast<std::size_t>(exact)];
   }
   for (const int count : seen) EXPECT_GT(count, 10);
@@ -204,8 +212,8 @@ TEST(NarrowPhase, SwappingTheBodiesSwapsTheAnswer) {
     const std::vector<Vec3> a = randomPoints(random, 10, 1);
     const std::vector<Vec3> b = randomPoints(random, 3, 2);
     const Vec3 at = randomPoint(random, 3);
-    const Decision ab = decideCold({a, at}, {b, Vec3::Zero()});
-    const Decision ba = decideCold({b, Vec3::Zero()}, {a, at});
+    const SeparationResult ab = computeSeparationCold({a, at}, {b, Vec3::Zero()});
+    const SeparationResult ba = computeSeparationCold({b, Vec3::Zero()}, {a, at});
     ASSERT_EQ(ab.verdict, ba.verdict);
     if (ab.verdict != Verdict::separated) continue;
     EXPECT_NEAR(ab.distance, ba.distance, 1e-13);
@@ -216,10 +224,10 @@ TEST(NarrowPhase, SwappingTheBodiesSwapsTheAnswer) {
 }
 
 /// The feature of a hull in general position that is farthest along a direction.
-Feature farthestFeature(const Hull& hull, const Vec3& along) {
-  double most = -std::numeric_limits<double>::infinity();
-  for (const Vec3& v : hull.vertices) most = std::max(most, along.dot(v));
-  const auto isFarthest = [&](const Vec3& v) { return along.dot(v) > most - 1e-9; };
+Feature findFarthestFeature(const Hull& hull, const Vec3& direction) {
+  double maxProjection = -std::numeric_limits<double>::infinity();
+  for (const Vec3& v : hull.vertices) maxProjection = std::max(maxProjection, direction.dot(v));
+  const auto isFarthest = [&](const Vec3& v) { return direction.dot(v) > maxProjection - 1e-9; };
   switch (std::ranges::count_if(hull.vertices, isFarthest)) {
     case 1:
       return Feature::vertex;
@@ -235,17 +243,17 @@ TEST(NarrowPhase, NamesTheClosestFeatures) {
   std::map<std::pair<Feature, Feature>, int> seen;
   for (int i = 0; i < 400; ++i) {
     const Hull a = buildHull(randomPoints(random, 8, 1)), b = buildHull(randomPoints(random, 8, 1));
-    const ConvexBody bodyA{.vertices = a.vertices, .hull = &a};
-    const ConvexBody bodyB{
+    const PlacedConvex bodyA{.vertices = a.vertices, .hull = &a};
+    const PlacedConvex bodyB{
         .vertices = b.vertices, .translation = randomPoint(random, 3), .hull = &b};
-    const Decision d = decideCold(bodyA, bodyB);
+    const SeparationResult d = computeSeparationCold(bodyA, bodyB);
     if (d.verdict == Verdict::penetrating) {
       EXPECT_EQ(d.featureA, Feature::none);
       EXPECT_EQ(d.featureB, Feature::none);
       continue;
     }
-    EXPECT_EQ(d.featureA, farthestFeature(a, d.normal)) << i;
-    EXPECT_EQ(d.featureB, farthestFeature(b, -d.normal)) << i;
+    EXPECT_EQ(d.featureA, findFarthestFeature(a, d.normal)) << i;
+    EXPECT_EQ(d.featureB, findFarthestFeature(b, -d.normal)) << i;
     ++seen[{d.featureA, d.featureB}];
   }
   for (const auto& [first, second] :
@@ -259,22 +267,24 @@ TEST(NarrowPhase, NamesTheClosestFeatures) {
 TEST(NarrowPhase, APointOverAFacesDiagonalIsOverAFace) {
   const Hull cube = buildHull(kUnitCube);
   const std::vector<Vec3> point{Vec3::Zero()};
-  const ConvexBody body{.vertices = cube.vertices, .hull = &cube};
+  const PlacedConvex body{.vertices = cube.vertices, .hull = &cube};
   for (const double height : {1.0, 1.5}) {  // touching, separated
     for (const double at : {0.25, 0.5, 0.75}) {
-      const Decision d = decideCold(body, {point, {at, at, height}});
+      const SeparationResult d = computeSeparationCold(body, {point, {at, at, height}});
       EXPECT_EQ(d.featureA, Feature::face) << at << " " << height;
       EXPECT_EQ(d.featureB, Feature::vertex);
-      const Decision other = decideCold(body, {point, {at, 1 - at, height}});
+      const SeparationResult other = computeSeparationCold(body, {point, {at, 1 - at, height}});
       EXPECT_EQ(other.featureA, Feature::face) << at << " " << height;
     }
-    EXPECT_EQ(decideCold(body, {point, {0, 0.5, height}}).featureA, Feature::edge) << height;
-    EXPECT_EQ(decideCold(body, {point, {1, 1, height}}).featureA, Feature::vertex) << height;
+    EXPECT_EQ(computeSeparationCold(body, {point, {0, 0.5, height}}).featureA, Feature::edge)
+        << height;
+    EXPECT_EQ(computeSeparationCold(body, {point, {1, 1, height}}).featureA, Feature::vertex)
+        << height;
   }
 }
 
-/// What a point of a cube about the origin lies within, by its coordinates.
-Feature featureAt(const Vec3& p, double half) {
+/// The feature of a cube about the origin that contains a point, by the coordinates.
+Feature findFeatureAt(const Vec3& p, double half) {
   switch (std::ranges::count_if(p, [&](double x) { return std::abs(std::abs(x) - half) < 1e-9; })) {
     case 1:
       return Feature::face;
@@ -285,32 +295,34 @@ Feature featureAt(const Vec3& p, double half) {
   }
 }
 
-TEST(NarrowPhase, PointsLieWithinTheFeaturesThatAreTold) {
+TEST(NarrowPhase, PointsLieWithinTheReportedFeatures) {
   constexpr double kHalf = 0.185;
   std::vector<Vec3> corners;
   for (const Vec3& corner : kUnitCube)
     corners.push_back(2 * kHalf * (corner - Vec3(0.5, 0.5, 0.5)));
   const Hull cube = buildHull(corners);
-  const ConvexBody below{.vertices = cube.vertices, .hull = &cube};
+  const PlacedConvex below{.vertices = cube.vertices, .hull = &cube};
   Random random(15);
-  int others = 0;  // the exact search ended at other features than the one in doubles
+  int others = 0;  // the exact search found other features than the search in doubles
   for (int i = 0; i < 400; ++i) {
-    // Parallel faces, or such that only exact numbers tell from them.
+    // Parallel faces, or faces that only exact numbers distinguish from parallel ones.
     const Vec3 axis = i % 2 == 0 ? Vec3::UnitX() : Vec3::UnitY();
     const double turn = i % 4 < 2 ? 1e-13 : 0.5 * std::numbers::pi;
     const Mat3 rotation = Eigen::AngleAxisd(turn, axis).toRotationMatrix();
     const Vec3 at(uniform(random, -0.2, 0.2), uniform(random, 0.4, 2), uniform(random, -0.2, 0.2));
-    const ConvexBody above{
+    const PlacedConvex above{
         .vertices = cube.vertices, .translation = at, .rotation = &rotation, .hull = &cube};
-    const auto expectTold = [&](const auto& told) {
-      EXPECT_EQ(told.featureA, featureAt(told.pointA, kHalf)) << i;
-      EXPECT_EQ(told.featureB, featureAt(rotation.transpose() * (told.pointB - at), kHalf)) << i;
+    const auto expectFeatures = [&](const auto& reported) {
+      EXPECT_EQ(reported.featureA, findFeatureAt(reported.pointA, kHalf)) << i;
+      EXPECT_EQ(reported.featureB,
+                findFeatureAt(rotation.transpose() * (reported.pointB - at), kHalf))
+          << i;
     };
-    const Decision decided = decideCold(below, above);
+    const SeparationResult decided = computeSeparationCold(below, above);
     FeatureCache cache;
-    const Refinement refined = refine(below, above, cache);
-    expectTold(decided);
-    expectTold(refined);
+    const RefinedSeparation refined = refineSeparation(below, above, cache);
+    expectFeatures(decided);
+    expectFeatures(refined);
     others += refined.featureA != decided.featureA || refined.featureB != decided.featureB ? 1 : 0;
   }
   EXPECT_GT(others, 10);
@@ -323,11 +335,11 @@ TEST(NarrowPhase, MovingByTheDistanceMakesContactAndNotEarlier) {
     const std::vector<Vec3> a = randomPoints(random, 12, 1);
     const std::vector<Vec3> b = randomPoints(random, 12, 1);
     const Vec3 at = randomPoint(random, 4);
-    const Decision d = decideCold({a, at}, {b, Vec3::Zero()});
+    const SeparationResult d = computeSeparationCold({a, at}, {b, Vec3::Zero()});
     if (d.verdict != Verdict::separated) continue;
     ++tried;
     const auto moved = [&](double by) {
-      return decideCold({a, at + by * d.normal}, {b, Vec3::Zero()});
+      return computeSeparationCold({a, at + by * d.normal}, {b, Vec3::Zero()});
     };
     EXPECT_EQ(moved(d.distance - 1e-12).verdict, Verdict::separated);
     EXPECT_LT(moved(d.distance).distance, 1e-12);
@@ -343,8 +355,8 @@ TEST(NarrowPhase, AWarmStartChangesTheWorkAndNotTheAnswer) {
   FeatureCache cache;
   for (int step = 0; step < 400; ++step) {
     const Vec3 at{4.0 - 0.02 * step, 0.3, 0.2};
-    const Decision warm = decide({a, at}, {b, Vec3::Zero()}, cache);
-    const Decision cold = decideCold({a, at}, {b, Vec3::Zero()});
+    const SeparationResult warm = computeSeparation({a, at}, {b, Vec3::Zero()}, cache);
+    const SeparationResult cold = computeSeparationCold({a, at}, {b, Vec3::Zero()});
     ASSERT_EQ(warm.verdict, cold.verdict) << "step " << step;
     EXPECT_NEAR(warm.distance, cold.distance, 1e-13) << "step " << step;
   }

@@ -12,72 +12,72 @@ namespace {
 
 using testing::Random;
 
-TEST(WakeUpHeap, GivesTheEarliestPairFirst) {
-  WakeUpHeap heap;
+TEST(PairSchedule, GivesTheEarliestPairFirst) {
+  PairSchedule heap;
   heap.set(1, 2, 0.3);
   heap.set(5, 3, 0.1);
   heap.set(2, 7, 0.2);
   const auto first = heap.popDue(1);
   ASSERT_TRUE(first);
-  EXPECT_EQ(first->pair, WakeUpHeap::BodyPair(3, 5));
+  EXPECT_EQ(first->pair, PairSchedule::BodyPair(3, 5));
   EXPECT_EQ(first->time, 0.1);
   EXPECT_EQ(heap.size(), 2u);
 }
 
-TEST(WakeUpHeap, GivesNothingBeforeItsTime) {
-  WakeUpHeap heap;
+TEST(PairSchedule, GivesNothingBeforeItsTime) {
+  PairSchedule heap;
   EXPECT_FALSE(heap.popDue(1e9));
   heap.set(1, 2, 0.5);
   EXPECT_FALSE(heap.popDue(0.4));
   EXPECT_TRUE(heap.popDue(0.5));
 }
 
-TEST(WakeUpHeap, EqualTimesComeInTheOrderOfTheirPairs) {
-  WakeUpHeap heap;
+TEST(PairSchedule, EqualTimesComeInTheOrderOfTheirPairs) {
+  PairSchedule heap;
   for (const auto& [a, b] : {std::pair{4u, 9u}, {1u, 9u}, {1u, 3u}, {2u, 5u}}) heap.set(a, b, 1);
-  std::vector<WakeUpHeap::BodyPair> order;
+  std::vector<PairSchedule::BodyPair> order;
   while (const auto entry = heap.popDue(1)) order.push_back(entry->pair);
   EXPECT_TRUE(std::is_sorted(order.begin(), order.end()));
   EXPECT_EQ(order.size(), 4u);
 }
 
-TEST(WakeUpHeap, AnImpulseMakesAllPairsOfItsBodyDueAndNoOther) {
-  WakeUpHeap heap;
+TEST(PairSchedule, AnImpulseMakesAllPairsOfItsBodyDueAndNoOther) {
+  PairSchedule heap;
   heap.set(1, 2, 5);
   heap.set(2, 3, 6);
   heap.set(3, 4, 7);
   heap.set(2, 4, 0.5);
-  heap.wakeBody(2, 1);
-  EXPECT_EQ(heap.timeOf(2, 1), 1);
-  EXPECT_EQ(heap.timeOf(3, 2), 1);
-  EXPECT_EQ(heap.timeOf(4, 2), 0.5);  // was due before
-  EXPECT_EQ(heap.timeOf(3, 4), 7);
+  heap.scheduleBodyNow(2, 1);
+  EXPECT_EQ(heap.findTime(2, 1), 1);
+  EXPECT_EQ(heap.findTime(3, 2), 1);
+  EXPECT_EQ(heap.findTime(4, 2), 0.5);  // was due before
+  EXPECT_EQ(heap.findTime(3, 4), 7);
   heap.validate();
 }
 
-TEST(WakeUpHeap, ABodyTakesItsPairsWithIt) {
-  WakeUpHeap heap;
+TEST(PairSchedule, RemovingABodyRemovesItsPairs) {
+  PairSchedule heap;
   heap.set(1, 2, 5);
   heap.set(2, 3, 6);
   heap.set(3, 1, 7);
   heap.removeBody(3);
   EXPECT_EQ(heap.size(), 1u);
-  EXPECT_FALSE(heap.timeOf(2, 3));
+  EXPECT_FALSE(heap.findTime(2, 3));
   EXPECT_FALSE(heap.remove(2, 3));
   heap.validate();
 }
 
-TEST(WakeUpHeap, RefusesWhatIsNoPairAndNoTime) {
-  WakeUpHeap heap;
+TEST(PairSchedule, RefusesInvalidPairsAndTimes) {
+  PairSchedule heap;
   EXPECT_THROW(heap.set(3, 3, 1), std::invalid_argument);
   EXPECT_THROW(heap.set(3, 4, std::nan("")), std::invalid_argument);
   EXPECT_EQ(heap.size(), 0u);
 }
 
-TEST(WakeUpHeap, EqualsASortedMapThroughRandomOperations) {
+TEST(PairSchedule, EqualsASortedMapThroughRandomOperations) {
   Random random(3);
-  WakeUpHeap heap;
-  std::map<WakeUpHeap::BodyPair, double> twin;
+  PairSchedule heap;
+  std::map<PairSchedule::BodyPair, double> reference;
   int popped = 0;
   for (int step = 0; step < 20000; ++step) {
     const auto a = static_cast<std::uint32_t>(random() % 30);
@@ -85,33 +85,33 @@ TEST(WakeUpHeap, EqualsASortedMapThroughRandomOperations) {
     const double time = static_cast<double>(random() % 64);
     switch (random() % 8) {
       case 0:
-        EXPECT_EQ(heap.remove(b, a), twin.erase({a, b}) == 1);
+        EXPECT_EQ(heap.remove(b, a), reference.erase({a, b}) == 1);
         break;
       case 1:
-        heap.wakeBody(a, time);
-        for (auto& [pair, at] : twin)
+        heap.scheduleBodyNow(a, time);
+        for (auto& [pair, at] : reference)
           if (pair.first == a || pair.second == a) at = std::min(at, time);
         break;
       case 2:
       case 3: {
         const auto first =
-            std::min_element(twin.begin(), twin.end(), [](const auto& p, const auto& q) {
+            std::min_element(reference.begin(), reference.end(), [](const auto& p, const auto& q) {
               return std::pair(p.second, p.first) < std::pair(q.second, q.first);
             });
         const auto entry = heap.popDue(time);
-        ASSERT_EQ(entry.has_value(), first != twin.end() && first->second <= time);
+        ASSERT_EQ(entry.has_value(), first != reference.end() && first->second <= time);
         if (!entry) break;
         EXPECT_EQ(entry->pair, first->first);
         EXPECT_EQ(entry->time, first->second);
-        twin.erase(first);
+        reference.erase(first);
         ++popped;
         break;
       }
       default:
         heap.set(a, b, time);
-        twin[{a, b}] = time;
+        reference[{a, b}] = time;
     }
-    ASSERT_EQ(heap.size(), twin.size());
+    ASSERT_EQ(heap.size(), reference.size());
     if (step % 100 == 0) heap.validate();
   }
   EXPECT_GT(popped, 1000);

@@ -29,7 +29,7 @@ inline std::vector<Vec3> randomPoints(Random& random, int count, double size) {
   return points;
 }
 
-/// Points on a small integer lattice, so that touching, flat and equal things happen often.
+/// Points on a small integer lattice, so that touching, flat and equal shapes are frequent.
 inline std::vector<Vec3> latticePoints(Random& random, int count, int size) {
   const auto coordinate = [&] {
     return static_cast<double>(static_cast<int>(random() % (2 * size + 1)) - size);

@@ -1,12 +1,11 @@
 // Steps
-//  1. GJK (Gilbert, Johnson, Keerthi 1988) on M = B - A in rationals: the simplex of M nearest the
-//     origin shrinks strictly with every new support point, and there are finitely many simplices,
-//     so it ends. The nearest point is found by trying every face of the simplex: at most 15.
-//  2. Nearest point not the origin: separated.
-//  3. Otherwise the simplex gives a common point p of A and B, exactly. M has the origin in its
-//     interior if and only if the cone of the directions {b - p} and {p - a} is all of space. If it
-//     is not, and the directions span space, a plane through two of them supports the cone: every
-//     pair is tried.
+//  1. GJK (Gilbert, Johnson, Keerthi 1988) on M = B - A in rationals. It terminates because the
+//     nearest point gets strictly nearer with every support and there are finitely many simplices.
+//     The nearest point is found by trying every face of the simplex: at most 15.
+//  2. If the nearest point is not the origin, the bodies are separated.
+//  3. Otherwise the simplex gives an exact common point p of A and B. The origin is inside M if and
+//     only if the cone of the directions {b - p} and {p - a} is all of space. If it is not, and the
+//     directions span space, a plane through two of them supports the cone: every pair is tried.
 #include "tests/collision/rational_verdict.hpp"
 
 #include <gmpxx.h>
@@ -42,7 +41,7 @@ bool isZero(const Point& a) {
   return sgn(a.x) == 0 && sgn(a.y) == 0 && sgn(a.z) == 0;
 }
 
-std::vector<Point> worldPoints(const ConvexBody& body) {
+std::vector<Point> worldPoints(const PlacedConvex& body) {
   const Point translation{body.translation.x(), body.translation.y(), body.translation.z()};
   std::vector<Point> points;
   points.reserve(body.vertices.size());
@@ -50,15 +49,15 @@ std::vector<Point> worldPoints(const ConvexBody& body) {
   return points;
 }
 
-/// A point of M with the point of A it came from.
+/// A point of M with its point of A.
 struct Support {
   Point difference;
   Point onA;
 };
 
-/// The point of M = B - A that lies least far along `direction`.
-Support leastAlong(const Point& direction, const std::vector<Point>& a,
-                   const std::vector<Point>& b) {
+/// Finds the point of M = B - A with the smallest projection on `direction`.
+Support findSupport(const Point& direction, const std::vector<Point>& a,
+                    const std::vector<Point>& b) {
   const Point* bestA = &a.front();
   Rational mostA = dot(direction, *bestA);
   for (const Point& p : a)
@@ -90,14 +89,15 @@ bool solve(std::array<std::array<Rational, 3>, 3> m, std::array<Rational, 3> r, 
   return true;
 }
 
-struct Nearest {
-  std::vector<Support> simplex;  ///< the smallest face that holds the nearest point
+struct NearestPoint {
+  std::vector<Support> simplex;  ///< the smallest face that contains the nearest point
   Point point;                   ///< of the face, nearest the origin
   Point onA;
 };
 
-/// The point of the face's affine hull nearest the origin, if it lies strictly inside the face.
-bool nearestInside(const std::vector<Support>& face, Nearest& nearest) {
+/// Finds the point of the face's affine hull nearest the origin; false if not strictly inside the
+/// face.
+bool findNearestInside(const std::vector<Support>& face, NearestPoint& nearest) {
   const int n = static_cast<int>(face.size()) - 1;
   std::array<std::array<Rational, 3>, 3> gram;
   std::array<Rational, 3> right, weight;
@@ -124,15 +124,15 @@ bool nearestInside(const std::vector<Support>& face, Nearest& nearest) {
   return true;
 }
 
-Nearest nearestOf(const std::vector<Support>& simplex) {
-  Nearest best;
+NearestPoint findNearest(const std::vector<Support>& simplex) {
+  NearestPoint best;
   Rational bestSquared = -1;
   for (unsigned mask = 1; mask < 1u << simplex.size(); ++mask) {
     std::vector<Support> face;
     for (std::size_t i = 0; i < simplex.size(); ++i)
       if (mask >> i & 1u) face.push_back(simplex[i]);
-    Nearest candidate;
-    if (!nearestInside(face, candidate)) continue;
+    NearestPoint candidate;
+    if (!findNearestInside(face, candidate)) continue;
     const Rational squared = dot(candidate.point, candidate.point);
     if (sgn(bestSquared) < 0 || squared < bestSquared) {
       bestSquared = squared;
@@ -161,7 +161,7 @@ bool spanAllOfSpace(const std::vector<Point>& directions) {
       const Point normal = cross(directions[i], directions[j]);
       if (isZero(normal)) continue;
       if (allOnOneSide(normal, directions)) return false;
-      spansSpace = true;  // something lies off this plane, on both sides
+      spansSpace = true;  // directions lie on both sides of this plane
     }
   }
   return spansSpace;
@@ -169,17 +169,17 @@ bool spanAllOfSpace(const std::vector<Point>& directions) {
 
 }  // namespace
 
-Verdict rationalVerdict(const ConvexBody& bodyA, const ConvexBody& bodyB) {
+Verdict computeRationalVerdict(const PlacedConvex& bodyA, const PlacedConvex& bodyB) {
   const std::vector<Point> a = worldPoints(bodyA);
   const std::vector<Point> b = worldPoints(bodyB);
-  Nearest nearest = nearestOf({Support{b.front() - a.front(), a.front()}});
+  NearestPoint nearest = findNearest({Support{b.front() - a.front(), a.front()}});
   while (!isZero(nearest.point)) {
-    Support next = leastAlong(nearest.point, a, b);
+    Support next = findSupport(nearest.point, a, b);
     if (dot(nearest.point, next.difference) >= dot(nearest.point, nearest.point))
       return Verdict::separated;
     std::vector<Support> simplex = std::move(nearest.simplex);
     simplex.push_back(std::move(next));
-    nearest = nearestOf(simplex);
+    nearest = findNearest(simplex);
   }
   if (nearest.simplex.size() == 4) return Verdict::penetrating;
   std::vector<Point> directions;

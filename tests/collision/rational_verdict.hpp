@@ -1,4 +1,5 @@
-// The slow twin of the verdict: the textbook's definitions in rationals, no filter, no features.
+// Reference implementation of the verdict: textbook definitions in rationals, no filter, no
+// features.
 #pragma once
 
 #include "collision/narrow_phase/narrow_phase.hpp"
@@ -6,6 +7,6 @@
 namespace enfilade::collision::testing {
 
 /// Exact for the given doubles; bodies without a rotation. Costs milliseconds.
-Verdict rationalVerdict(const ConvexBody& a, const ConvexBody& b);
+Verdict computeRationalVerdict(const PlacedConvex& a, const PlacedConvex& b);
 
 }  // namespace enfilade::collision::testing

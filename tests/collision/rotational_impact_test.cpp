@@ -1,12 +1,12 @@
-// Time of impact of bodies that turn: known answers, small steps as the slow twin, and what must
-// hold of every answer.
+// Time of impact of rotating bodies: known answers, small steps as the reference, and invariants of
+// every answer.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "collision/motion/shape_cast.hpp"
+#include "collision/motion/time_of_impact.hpp"
 #include "tests/collision/random_shapes.hpp"
 
 namespace enfilade::collision {
@@ -14,7 +14,7 @@ namespace {
 
 using namespace testing;
 
-std::vector<Vec3> boxOf(const Vec3& low, const Vec3& high) {
+std::vector<Vec3> makeBox(const Vec3& low, const Vec3& high) {
   std::vector<Vec3> points;
   for (int i = 0; i < 8; ++i)
     points.emplace_back((i & 1) != 0 ? high.x() : low.x(), (i & 2) != 0 ? high.y() : low.y(),
@@ -22,16 +22,16 @@ std::vector<Vec3> boxOf(const Vec3& low, const Vec3& high) {
   return points;
 }
 
-const std::vector<Vec3> kCube = boxOf(Vec3::Constant(-1), Vec3::Constant(1));
-const std::vector<Vec3> kHalfCube = boxOf(Vec3::Constant(-0.5), Vec3::Constant(0.5));
+const std::vector<Vec3> kCube = makeBox(Vec3::Constant(-1), Vec3::Constant(1));
+const std::vector<Vec3> kHalfCube = makeBox(Vec3::Constant(-0.5), Vec3::Constant(0.5));
 
-Motion spinning(const Vec3& spin) {
-  return {Vec3::Zero(), Vec3::Zero(), spin};
+Motion makeSpinning(const Vec3& angularVelocity) {
+  return {Vec3::Zero(), Vec3::Zero(), angularVelocity};
 }
 
-TimeOfImpact impactCold(const MovingBody& a, const MovingBody& b, double horizon) {
+TimeOfImpact findImpactCold(const MovingBody& a, const MovingBody& b, double horizon) {
   FeatureCache cache;
-  return timeOfImpact(a, b, horizon, cache);
+  return computeTimeOfImpact(a, b, horizon, cache);
 }
 
 void expectContactAt(const TimeOfImpact& impact, double time) {
@@ -41,117 +41,117 @@ void expectContactAt(const TimeOfImpact& impact, double time) {
   EXPECT_LE(impact.hi - impact.lo, 1e-12 * (1 + impact.hi));
 }
 
-TEST(TurningImpact, ARodAlongAWallMeetsItWithItsTip) {
-  const auto wall = boxOf({-5, -1, -5}, {5, 0, 5});
+TEST(RotationalImpact, ARodAlongAWallMeetsItWithItsTip) {
+  const auto wall = makeBox({-5, -1, -5}, {5, 0, 5});
   for (const double height : {1e-6, 1e-4, 0.01, 0.5}) {
-    const auto rod = boxOf({-1, 0, -0.01}, {1, 0.02, 0.01});
-    const MovingBody a{{rod, {0, height, 0}}, spinning({0, 0, 2})};
-    // The lower corner at (-1, 0) turns down.
-    expectContactAt(impactCold(a, {{wall}, {}}, 10), std::asin(height) / 2);
+    const auto rod = makeBox({-1, 0, -0.01}, {1, 0.02, 0.01});
+    const MovingBody a{{rod, {0, height, 0}}, makeSpinning({0, 0, 2})};
+    // The lower corner at (-1, 0) rotates down.
+    expectContactAt(findImpactCold(a, {{wall}, {}}, 10), std::asin(height) / 2);
   }
 }
 
-TEST(TurningImpact, ACubeBesideAWallMeetsItWithItsEdge) {
-  const auto wall = boxOf({1.2, -5, -5}, {2, 5, 5});
-  const MovingBody cube{{kCube}, spinning({0, 0.5, 0})};
+TEST(RotationalImpact, ACubeNextToAWallMeetsItWithItsEdge) {
+  const auto wall = makeBox({1.2, -5, -5}, {2, 5, 5});
+  const MovingBody cube{{kCube}, makeSpinning({0, 0.5, 0})};
   const double angle = std::atan(1.0) - std::acos(1.2 / std::sqrt(2.0));
-  expectContactAt(impactCold(cube, {{wall}, {}}, 10), angle / 0.5);
+  expectContactAt(findImpactCold(cube, {{wall}, {}}, 10), angle / 0.5);
 }
 
-TEST(TurningImpact, ACubeThatHasRoomTurnsForever) {
-  const auto wall = boxOf({1.4143, -5, -5}, {2, 5, 5});
-  const MovingBody cube{{kCube}, spinning({0, 3, 0})};
-  const TimeOfImpact impact = impactCold(cube, {{wall}, {}}, 20);
+TEST(RotationalImpact, ACubeThatHasRoomTurnsForever) {
+  const auto wall = makeBox({1.4143, -5, -5}, {2, 5, 5});
+  const MovingBody cube{{kCube}, makeSpinning({0, 3, 0})};
+  const TimeOfImpact impact = findImpactCold(cube, {{wall}, {}}, 20);
   EXPECT_EQ(impact.impact, Impact::none);
   EXPECT_EQ(impact.lo, 20);
 }
 
-TEST(TurningImpact, ADoorMeetsAPostNearItsHingeInFewSteps) {
-  const auto door = boxOf({0, 0, -0.02}, {1, 2, 0.02});
+TEST(RotationalImpact, ADoorMeetsAPostNearItsHingeInFewSteps) {
+  const auto door = makeBox({0, 0, -0.02}, {1, 2, 0.02});
   for (const double far : {0.05, 0.2, 0.9}) {
     const std::vector<Vec3> post{{0, 1, 0}};
-    const double angle = 1;  // of the post, seen from the hinge; the door turns towards it
+    const double angle = 1;  // of the post, seen from the hinge; the door rotates towards it
     const MovingBody b{{post, {far * std::cos(angle), 0, -far * std::sin(angle)}}, {}};
-    const MovingBody a{{door}, spinning({0, 0.25, 0})};
-    const TimeOfImpact impact = impactCold(a, b, 64);
+    const MovingBody a{{door}, makeSpinning({0, 0.25, 0})};
+    const TimeOfImpact impact = findImpactCold(a, b, 64);
     expectContactAt(impact, (angle - std::asin(0.02 / far)) / 0.25);
     EXPECT_LE(impact.queries, 25u) << far;
   }
 }
 
-TEST(TurningImpact, TwoTurningRodsCrossedMeetEdgeOnEdge) {
-  // Each turns about its own middle; they meet with long edges, inclined against each other.
-  const auto rod = boxOf({-2, -0.05, -0.05}, {2, 0.05, 0.05});
+TEST(RotationalImpact, TwoTurningRodsCrossedMeetEdgeOnEdge) {
+  // Each rotates about its own centre; they meet at long edges, inclined to each other.
+  const auto rod = makeBox({-2, -0.05, -0.05}, {2, 0.05, 0.05});
   const Mat3 across = Eigen::AngleAxisd(1.2, Vec3::UnitY()).toRotationMatrix();
-  const MovingBody a{{rod}, spinning({0.3, 0, 0.2})};
-  const MovingBody b{{rod, {0.3, 0.4, 0.2}, &across}, spinning({0, 0.1, -0.25})};
-  const TimeOfImpact impact = impactCold(a, b, 64);
+  const MovingBody a{{rod}, makeSpinning({0.3, 0, 0.2})};
+  const MovingBody b{{rod, {0.3, 0.4, 0.2}, &across}, makeSpinning({0, 0.1, -0.25})};
+  const TimeOfImpact impact = findImpactCold(a, b, 64);
   ASSERT_EQ(impact.impact, Impact::contact);
   EXPECT_LE(impact.hi - impact.lo, 1e-12 * (1 + impact.hi));
   EXPECT_LE(impact.queries, 40u);
 }
 
-TEST(TurningImpact, TurningTogetherIsStandingStill) {
-  const MovingBody a{{kCube}, spinning({0, 1, 0})};
-  const MovingBody b{{kHalfCube, {0, 1.5 + 1e-9, 0}}, spinning({0, 1, 0})};
-  EXPECT_EQ(impactCold(a, b, 10).impact, Impact::none);
+TEST(RotationalImpact, BodiesThatRotateTogetherNeverMeet) {
+  const MovingBody a{{kCube}, makeSpinning({0, 1, 0})};
+  const MovingBody b{{kHalfCube, {0, 1.5 + 1e-9, 0}}, makeSpinning({0, 1, 0})};
+  EXPECT_EQ(findImpactCold(a, b, 10).impact, Impact::none);
 }
 
-TEST(TurningImpact, BodiesThatTouchHaveMetAlready) {
-  const MovingBody a{{kCube}, spinning({0, 1, 0})};
+TEST(RotationalImpact, BodiesThatTouchHaveMetAlready) {
+  const MovingBody a{{kCube}, makeSpinning({0, 1, 0})};
   const MovingBody b{{kCube, {2, 0, 0}}, {}};
-  const TimeOfImpact impact = impactCold(a, b, 10);
+  const TimeOfImpact impact = findImpactCold(a, b, 10);
   EXPECT_EQ(impact.impact, Impact::contact);
   EXPECT_EQ(impact.hi, 0);
 }
 
-TEST(TurningImpact, AFallingCubeMeetsTheFloorAfterTheRootOfTwiceTheHeight) {
-  const auto floor = boxOf({-5, -1, -5}, {5, 0, 5});
+TEST(RotationalImpact, AFallingCubeMeetsTheFloorAfterTheRootOfTwiceTheHeight) {
+  const auto floor = makeBox({-5, -1, -5}, {5, 0, 5});
   const MovingBody cube{{kCube, {0, 1 + 4.9, 0}}, {Vec3::Zero(), {0, -9.8, 0}, Vec3::Zero()}};
-  expectContactAt(impactCold(cube, {{floor}, {}}, 10), 1);
+  expectContactAt(findImpactCold(cube, {{floor}, {}}, 10), 1);
 }
 
-TEST(TurningImpact, ABallThrownUpComesBack) {
-  const auto floor = boxOf({-5, -1, -5}, {5, 0, 5});
+TEST(RotationalImpact, ABallThrownUpComesBack) {
+  const auto floor = makeBox({-5, -1, -5}, {5, 0, 5});
   const MovingBody cube{{kCube, {0, 1.5, 0}}, {{0, 4.9, 0}, {0, -9.8, 0}, Vec3::Zero()}};
   const double time = (4.9 + std::sqrt(4.9 * 4.9 + 2 * 9.8 * 0.5)) / 9.8;
-  expectContactAt(impactCold(cube, {{floor}, {}}, 10), time);
+  expectContactAt(findImpactCold(cube, {{floor}, {}}, 10), time);
 }
 
 TEST(GrazingImpact, ABodyThatSlidesOnAFaceMeetsItWhenItsEdgeIsOverIt) {
   // Their faces lie in one plane: they touch and never penetrate. Contact at x = 1.
-  const auto table = boxOf({1, -1, -5}, {9, 0, 5});
+  const auto table = makeBox({1, -1, -5}, {9, 0, 5});
   for (const double speed : {1.0, 0.3, 7.77}) {
     const MovingBody a{{kCube, {-3, 1, 0}}, {{speed, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
-    expectContactAt(impactCold(a, {{table}, {}}, 60), 3 / speed);
+    expectContactAt(findImpactCold(a, {{table}, {}}, 60), 3 / speed);
   }
 }
 
 TEST(GrazingImpact, OneUlpOfRoomIsRoom) {
-  const auto table = boxOf({1, -1, -5}, {9, 0, 5});
+  const auto table = makeBox({1, -1, -5}, {9, 0, 5});
   const MovingBody a{{kCube, {-3, 1 + 0x1p-52, 0}}, {{0.3, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
-  const TimeOfImpact impact = impactCold(a, {{table}, {}}, 60);
+  const TimeOfImpact impact = findImpactCold(a, {{table}, {}}, 60);
   EXPECT_EQ(impact.impact, Impact::none);
 }
 
 TEST(GrazingImpact, OneUlpTooLittleIsAContact) {
-  const auto table = boxOf({1, -1, -5}, {9, 0, 5});
+  const auto table = makeBox({1, -1, -5}, {9, 0, 5});
   const MovingBody a{{kCube, {-3, 1 - 0x1p-53, 0}}, {{0.3, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
-  expectContactAt(impactCold(a, {{table}, {}}, 60), 10);
+  expectContactAt(findImpactCold(a, {{table}, {}}, 60), 10);
 }
 
 TEST(GrazingImpact, PolygonsInOnePlaneMeet) {
   const std::vector<Vec3> square{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
   const MovingBody a{{square}, {{0.7, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
-  expectContactAt(impactCold(a, {{square, {3, 0.5, 0}}, {}}, 60), 2 / 0.7);
+  expectContactAt(findImpactCold(a, {{square, {3, 0.5, 0}}, {}}, 60), 2 / 0.7);
 }
 
-/// A moment before and a moment after they are apart.
-TEST(GrazingImpact, WhatMeetsAtOneInstantMeetsThereIfItIsADouble) {
+/// Shortly before and shortly after contact they are separated.
+TEST(GrazingImpact, AContactOfOneInstantIsFoundIfTheInstantIsADouble) {
   const std::vector<Vec3> point{{0, 0, 0}}, rod{{0, 0, -1}, {0, 0, 1}};
   for (const double time : {0.5, 0.4375, 3.0, 40.125}) {
     const MovingBody a{{point, {-2 * time, 0, 0}}, {{2, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
-    const TimeOfImpact impact = impactCold(a, {{rod}, {}}, 64);
+    const TimeOfImpact impact = findImpactCold(a, {{rod}, {}}, 64);
     expectContactAt(impact, time);
     EXPECT_EQ(impact.hi, time);
   }
@@ -159,12 +159,12 @@ TEST(GrazingImpact, WhatMeetsAtOneInstantMeetsThereIfItIsADouble) {
 
 TEST(GrazingImpact, AThrownCubeThatJustFailsToReachTheCeilingMisses) {
   // It rises by 1/2 m: v^2 / 2g with v = g = 1.
-  const auto ceiling = boxOf({-5, 0, -5}, {5, 1, 5});
+  const auto ceiling = makeBox({-5, 0, -5}, {5, 1, 5});
   const Motion thrown{{0, 1, 0}, {0, -1, 0}, Vec3::Zero()};
   const MovingBody low{{kCube, {0, -1.5 - 1e-12, 0}}, thrown};
-  EXPECT_EQ(impactCold(low, {{ceiling}, {}}, 2).impact, Impact::none);
+  EXPECT_EQ(findImpactCold(low, {{ceiling}, {}}, 2).impact, Impact::none);
   const MovingBody high{{kCube, {0, -1.5 + 0x1p-20, 0}}, thrown};
-  expectContactAt(impactCold(high, {{ceiling}, {}}, 2), 1 - std::sqrt(0x1p-19));
+  expectContactAt(findImpactCold(high, {{ceiling}, {}}, 2), 1 - std::sqrt(0x1p-19));
 }
 
 struct Tumble {
@@ -186,24 +186,25 @@ void makeTumble(Random& random, Tumble& tumble) {
               {randomPoint(random, 0.2), Vec3::Zero(), randomPoint(random, 3)}};
 }
 
-/// The decision at a time, with a pose by Eigen and libm.
-Decision decideAt(const Tumble& tumble, double time) {
+/// The separation at a time, with a pose by Eigen and libm.
+SeparationResult computeSeparationAt(const Tumble& tumble, double time) {
   std::array<Mat3, 2> rotations;
-  std::array<ConvexBody, 2> bodies{tumble.a.body, tumble.b.body};
+  std::array<PlacedConvex, 2> bodies{tumble.a.body, tumble.b.body};
   const std::array<Motion, 2> motions{tumble.a.motion, tumble.b.motion};
   for (std::size_t i = 0; i < 2; ++i) {
-    const Vec3& spin = motions[i].angularVelocity;
-    rotations[i] = Eigen::AngleAxisd(spin.norm() * time, spin.normalized()).toRotationMatrix();
+    const Vec3& angularVelocity = motions[i].angularVelocity;
+    rotations[i] = Eigen::AngleAxisd(angularVelocity.norm() * time, angularVelocity.normalized())
+                       .toRotationMatrix();
     if (bodies[i].rotation != nullptr) rotations[i] *= *bodies[i].rotation;
     bodies[i].rotation = &rotations[i];
     bodies[i].translation +=
         motions[i].velocity * time + 0.5 * time * time * motions[i].acceleration;
   }
   FeatureCache cache;
-  return decide(bodies[0], bodies[1], cache);
+  return computeSeparation(bodies[0], bodies[1], cache);
 }
 
-TEST(TurningImpact, TumblingBodiesMeetWhenSmallStepsSayThatTheyDo) {
+TEST(RotationalImpact, TumblingBodiesMeetWhenSmallStepsSayThatTheyDo) {
   Random random(21);
   constexpr double kHorizon = 3;
   constexpr int kSteps = 1500;
@@ -211,32 +212,33 @@ TEST(TurningImpact, TumblingBodiesMeetWhenSmallStepsSayThatTheyDo) {
   for (int i = 0; i < 120; ++i) {
     Tumble tumble;
     makeTumble(random, tumble);
-    const TimeOfImpact impact = impactCold(tumble.a, tumble.b, kHorizon);
+    const TimeOfImpact impact = findImpactCold(tumble.a, tumble.b, kHorizon);
     ASSERT_NE(impact.impact, Impact::unproved) << i;
     const bool contact = impact.impact == Impact::contact;
     ++(contact ? contacts : misses);
     for (int k = 0; k <= kSteps; ++k) {
       const double time = kHorizon * k / kSteps;
       if (time >= impact.lo - 1e-12) break;
-      ASSERT_EQ(decideAt(tumble, time).verdict, Verdict::separated) << i << " at " << time;
+      ASSERT_EQ(computeSeparationAt(tumble, time).verdict, Verdict::separated)
+          << i << " at " << time;
     }
     if (!contact || impact.hi == 0) continue;
     EXPECT_LE(impact.hi - impact.lo, 1e-12 * (1 + impact.hi)) << i;
-    EXPECT_LT(decideAt(tumble, impact.lo).distance, 1e-10) << i;
-    EXPECT_NE(decideAt(tumble, impact.hi + 1e-12).verdict, Verdict::separated) << i;
+    EXPECT_LT(computeSeparationAt(tumble, impact.lo).distance, 1e-10) << i;
+    EXPECT_NE(computeSeparationAt(tumble, impact.hi + 1e-12).verdict, Verdict::separated) << i;
   }
   EXPECT_GT(contacts, 30);
   EXPECT_GT(misses, 20);
 }
 
-TEST(TurningImpact, SwappingTheBodiesMeetsAtTheSameTime) {
+TEST(RotationalImpact, SwappingTheBodiesMeetsAtTheSameTime) {
   Random random(22);
   int contacts = 0;
   for (int i = 0; i < 60; ++i) {
     Tumble tumble;
     makeTumble(random, tumble);
-    const TimeOfImpact one = impactCold(tumble.a, tumble.b, 3);
-    const TimeOfImpact other = impactCold(tumble.b, tumble.a, 3);
+    const TimeOfImpact one = findImpactCold(tumble.a, tumble.b, 3);
+    const TimeOfImpact other = findImpactCold(tumble.b, tumble.a, 3);
     ASSERT_EQ(one.impact, other.impact) << i;
     if (one.impact != Impact::contact) continue;
     ++contacts;
@@ -247,13 +249,13 @@ TEST(TurningImpact, SwappingTheBodiesMeetsAtTheSameTime) {
   EXPECT_GT(contacts, 15);
 }
 
-TEST(TurningImpact, FewQueriesAreNeeded) {
+TEST(RotationalImpact, FewQueriesAreNeeded) {
   Random random(23);
   std::vector<std::uint32_t> queries;
   for (int i = 0; i < 100; ++i) {
     Tumble tumble;
     makeTumble(random, tumble);
-    queries.push_back(impactCold(tumble.a, tumble.b, 3).queries);
+    queries.push_back(findImpactCold(tumble.a, tumble.b, 3).queries);
   }
   std::sort(queries.begin(), queries.end());
   EXPECT_LE(queries[50], 20u);

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "collision/motion/shape_cast.hpp"
+#include "collision/motion/time_of_impact.hpp"
 #include "tests/collision/random_shapes.hpp"
 
 namespace enfilade::collision {
@@ -16,38 +16,38 @@ using namespace testing;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// The seed's own bound: v is the closing speed of the closest points.
-double seedTimeToContact(double distance, double speed, double acceleration) {
+/// The bound of Lin 1993, section 5.1; `speed` is the closing speed of the closest points.
+double referenceTimeToContact(double distance, double speed, double acceleration) {
   if (acceleration == 0) return distance / speed;
   return (std::sqrt(speed * speed + 2 * acceleration * distance) - speed) / acceleration;
 }
 
-/// A power of ten between 10^-most and 10^most.
-double anyMagnitude(Random& random, double most) {
-  const double exponent = uniform(random, -most, most);
+/// A power of ten between 10^-maxExponent and 10^maxExponent.
+double randomMagnitude(Random& random, double maxExponent) {
+  const double exponent = uniform(random, -maxExponent, maxExponent);
   return std::pow(10.0, exponent);
 }
 
-/// How far the gap closes in `time`, exactly.
-mpq_class closes(const ClosingBounds& closing, const mpq_class& time) {
+/// The exact decrease of the distance in `time`.
+mpq_class computeClosedDistance(const ClosingBounds& closing, const mpq_class& time) {
   return closing.speed * time + mpq_class(closing.acceleration) * time * time / 2;
 }
 
 TEST(TimeToContact, IsNeverAboveTheTruthAndHardlyBelow) {
   Random random(11);
   for (int i = 0; i < 3000; ++i) {
-    const double distance = anyMagnitude(random, 100);
-    ClosingBounds closing{anyMagnitude(random, 100), anyMagnitude(random, 100)};
+    const double distance = randomMagnitude(random, 100);
+    ClosingBounds closing{randomMagnitude(random, 100), randomMagnitude(random, 100)};
     if (i % 5 == 0) closing.speed = 0;
     if (i % 7 == 0) closing.acceleration = 0;
-    const double time = timeToContact(distance, closing);
+    const double time = computeTimeToContact(distance, closing);
     if (closing.speed == 0 && closing.acceleration == 0) {
       EXPECT_EQ(time, kInfinity);
       continue;
     }
-    EXPECT_LE(closes(closing, mpq_class(time)), mpq_class(distance)) << i;
+    EXPECT_LE(computeClosedDistance(closing, mpq_class(time)), mpq_class(distance)) << i;
     const mpq_class later = mpq_class(time) * (1 + mpq_class(0x1p-48));
-    EXPECT_GE(closes(closing, later), mpq_class(distance)) << i;
+    EXPECT_GE(computeClosedDistance(closing, later), mpq_class(distance)) << i;
   }
 }
 
@@ -55,34 +55,36 @@ TEST(TimeToContact, HoldsWhereProductsUnderflowOrOverflow) {
   for (const double distance : {0x1p-1060, 0x1p-600, 1.0, 0x1p600, 0x1p1000}) {
     for (const double speed : {0.0, 0x1p-1070, 0x1p-700, 1.0, 0x1p700}) {
       for (const double acceleration : {0.0, 0x1p-1070, 0x1p-700, 1.0, 0x1p700}) {
-        const double time = timeToContact(distance, {speed, acceleration});
+        const double time = computeTimeToContact(distance, {speed, acceleration});
         if (time == kInfinity) {
           EXPECT_TRUE(speed == 0 && acceleration == 0);
           continue;
         }
-        EXPECT_LE(closes({speed, acceleration}, mpq_class(time)), mpq_class(distance));
+        EXPECT_LE(computeClosedDistance({speed, acceleration}, mpq_class(time)),
+                  mpq_class(distance));
       }
     }
   }
 }
 
 TEST(TimeToContact, WithoutAGapIsNowAndWithoutMotionNever) {
-  EXPECT_EQ(timeToContact(0, {1, 1}), 0);
-  EXPECT_EQ(timeToContact(-1, {1, 1}), 0);
-  EXPECT_EQ(timeToContact(1, {0, 0}), kInfinity);
-  EXPECT_EQ(timeToContact(std::nan(""), {1, 1}), 0);
-  EXPECT_EQ(timeToContact(1, {std::nan(""), 1}), 0);
+  EXPECT_EQ(computeTimeToContact(0, {1, 1}), 0);
+  EXPECT_EQ(computeTimeToContact(-1, {1, 1}), 0);
+  EXPECT_EQ(computeTimeToContact(1, {0, 0}), kInfinity);
+  EXPECT_EQ(computeTimeToContact(std::nan(""), {1, 1}), 0);
+  EXPECT_EQ(computeTimeToContact(1, {std::nan(""), 1}), 0);
 }
 
-//   o----------+----------o   a rod, parallel to the wall, turns about its middle:
-//   ~~~~~~~~~~~~~~~~~~~~~~~   the middle is as close as any point, and at rest
+//   o----------+----------o   a rod, parallel to the wall, rotates about its centre:
+//   ~~~~~~~~~~~~~~~~~~~~~~~   the centre is as close as any point, and at rest
 TEST(TimeToContact, ARodAlongAWallArrivesBeforeTheSeedsBoundAndAfterOurs) {
   constexpr double kHalfLength = 1, kHeight = 1e-4, kSpin = 2;
   const double arrival = std::asin(kHeight / kHalfLength) / kSpin;
-  const double seed = seedTimeToContact(kHeight, 0, kSpin * kSpin * kHalfLength);
+  const double seed = referenceTimeToContact(kHeight, 0, kSpin * kSpin * kHalfLength);
   EXPECT_GT(seed, 100 * arrival);
   const MotionBounds rod{Vec3::Zero(), 0, {0, 0, kSpin}, 0, kHalfLength};
-  const double ours = timeToContact(kHeight, closingBounds(rod, {}, -Vec3::UnitY(), 1));
+  const double ours =
+      computeTimeToContact(kHeight, computeClosingBounds(rod, {}, -Vec3::UnitY(), 1));
   EXPECT_LE(ours, arrival);
   EXPECT_GT(ours, 0.99 * arrival);
 }
@@ -97,7 +99,7 @@ TEST(ClosingBounds, NoVertexClosesFasterThanTheBound) {
     const Vec3 vertex = randomPoint(random, 1);
     const MotionBounds a{velocity, pull.norm(), spin, twist.norm(), vertex.norm()};
     const double interval = 1.5;
-    const ClosingBounds closing = closingBounds(a, {}, n, interval);
+    const ClosingBounds closing = computeClosingBounds(a, {}, n, interval);
     for (double t = 0; t <= interval; t += 0.03) {
       const double angle = spin.norm() * t + twist.norm() * t * t / 2;
       const Vec3 turned = Eigen::AngleAxisd(angle, spin.normalized()) * vertex;
@@ -107,21 +109,21 @@ TEST(ClosingBounds, NoVertexClosesFasterThanTheBound) {
       if (t > 0 && t < 0.1) tightest = std::max(tightest, closed / bound);
     }
   }
-  EXPECT_GT(tightest, 0.6);  // a bound, and no idle one
+  EXPECT_GT(tightest, 0.6);  // the bound is tight
 }
 
-TEST(WakeUp, WaitsForTheContactOrForTheLeastTimeAndSaysWhetherThatIsProved) {
-  const WakeUp far = wakeUp(1, {2, 0}, 1e-3, 5e-4);
+TEST(NextCheck, WaitsForTheContactOrForTheLeastTimeAndSaysWhetherThatIsProved) {
+  const NextCheck far = scheduleCheck(1, {2, 0}, 1e-3, 5e-4);
   EXPECT_NEAR(far.after, 0.5, 1e-12);
   EXPECT_TRUE(far.proved);
   // 1e-3 s at 2 m/s closes 2 mm: more than 2 epsilon of 1 mm.
-  const WakeUp soon = wakeUp(1e-4, {2, 0}, 1e-3, 5e-4);
+  const NextCheck soon = scheduleCheck(1e-4, {2, 0}, 1e-3, 5e-4);
   EXPECT_EQ(soon.after, 1e-3);
   EXPECT_FALSE(soon.proved);
-  const WakeUp slow = wakeUp(1e-4, {0.5, 0}, 1e-3, 5e-4);
+  const NextCheck slow = scheduleCheck(1e-4, {0.5, 0}, 1e-3, 5e-4);
   EXPECT_EQ(slow.after, 1e-3);
   EXPECT_TRUE(slow.proved);
-  EXPECT_FALSE(wakeUp(1e-4, {1, 0}, 1e-3, 5e-4).proved);  // exactly 2 epsilon: not less
+  EXPECT_FALSE(scheduleCheck(1e-4, {1, 0}, 1e-3, 5e-4).proved);  // exactly 2 epsilon: not less
 }
 
 const std::vector<Vec3> kCube{{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1},
@@ -132,16 +134,16 @@ TEST(CannotTouchBefore, IsProvedUpToTheContactAndNotBeyond) {
   MovingBody b{{kCube, {5, 0, 0}}, {}};
   for (const double t : {1.0, 2.0, 2.9999999, 3 - 1e-11}) {
     FeatureCache cache;
-    const CannotTouch answer = cannotTouchBefore(a, b, t, cache);
+    const SeparationForecast answer = separatedUntil(a, b, t, cache);
     EXPECT_TRUE(answer.proved) << t;
     EXPECT_EQ(answer.until, t);
   }
   FeatureCache cache;
-  const CannotTouch beyond = cannotTouchBefore(a, b, 3.1, cache);
+  const SeparationForecast beyond = separatedUntil(a, b, 3.1, cache);
   EXPECT_FALSE(beyond.proved);
   EXPECT_NEAR(beyond.until, 3, 1e-11);
   a.body.translation = {4, 0, 0};
-  EXPECT_FALSE(cannotTouchBefore(a, b, 1e-6, cache).proved);
+  EXPECT_FALSE(separatedUntil(a, b, 1e-6, cache).proved);
 }
 
 using PreciseMatrix = std::array<std::array<mpf_class, 3>, 3>;
@@ -161,12 +163,13 @@ PreciseMatrix operator*(const PreciseMatrix& a, const PreciseMatrix& b) {
   return result;
 }
 
-/// The exponential of the cross product with spin * time: Taylor's series of its 2^-40th part,
-/// squared 40 times.
-PreciseMatrix preciseTurn(const Vec3& spin, double time) {
+/// The exponential of the cross product with angularVelocity * time: Taylor's series of its 2^-40th
+/// part, squared 40 times.
+PreciseMatrix computePreciseRotation(const Vec3& angularVelocity, double time) {
   constexpr int kHalvings = 40;
   Mat3 cross;
-  cross << 0, -spin.z(), spin.y(), spin.z(), 0, -spin.x(), -spin.y(), spin.x(), 0;
+  cross << 0, -angularVelocity.z(), angularVelocity.y(), angularVelocity.z(), 0,
+      -angularVelocity.x(), -angularVelocity.y(), angularVelocity.x(), 0;
   PreciseMatrix part = preciseMatrix(cross);
   for (auto& row : part)
     for (mpf_class& entry : row) {
@@ -189,14 +192,14 @@ TEST(ContinuousPose, ATurnIsWithinItsBoundOfTheMatrixExponential) {
   for (int i = 0; i < 300; ++i) {
     const Mat3 start = Eigen::AngleAxisd(uniform(random, 0, 6), randomPoint(random, 1).normalized())
                            .toRotationMatrix();
-    const Vec3 spin = randomPoint(random, 1) * anyMagnitude(random, 3);
-    const double time = anyMagnitude(random, 1);
-    const Mat3 ours = turned(start, spin, time);
-    const PreciseMatrix truth = preciseTurn(spin, time) * preciseMatrix(start);
+    const Vec3 spin = randomPoint(random, 1) * randomMagnitude(random, 3);
+    const double time = randomMagnitude(random, 1);
+    const Mat3 ours = integrateRotation(start, spin, time);
+    const PreciseMatrix truth = computePreciseRotation(spin, time) * preciseMatrix(start);
     Mat3 off;
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) off(r, c) = mpf_class(truth[r][c] - ours(r, c)).get_d();
-    const double error = turningError(start, spin, time, 1);
+    const double error = computeRotationError(start, spin, time, 1);
     EXPECT_LE(off.norm(), error) << i;
     EXPECT_LT(error, 1e-15 * (1 + spin.norm() * time));
     worst = std::max(worst, off.norm() / error);
@@ -207,7 +210,7 @@ TEST(ContinuousPose, ATurnIsWithinItsBoundOfTheMatrixExponential) {
 TEST(ContinuousPose, QuarterTurnsMoveAxesOntoAxes) {
   const double quarter = 1.5707963267948966;
   for (int k = 0; k < 9; ++k) {
-    const Mat3 turn = turned(Mat3::Identity(), {0, 0, quarter}, k);
+    const Mat3 turn = integrateRotation(Mat3::Identity(), {0, 0, quarter}, k);
     const Vec3 x = turn * Vec3::UnitX();
     EXPECT_NEAR(x.x(), (k % 2 == 0 ? 1 - k % 4 : 0), 2e-15);
     EXPECT_NEAR(x.y(), (k % 2 == 0 ? 0 : 2 - k % 4), 2e-15);
@@ -216,27 +219,27 @@ TEST(ContinuousPose, QuarterTurnsMoveAxesOntoAxes) {
 }
 
 TEST(ContinuousPose, AMillionRadiansAreTooMany) {
-  EXPECT_EQ(turningError(Mat3::Identity(), {2e6, 0, 0}, 1, 1), kInfinity);
+  EXPECT_EQ(computeRotationError(Mat3::Identity(), {2e6, 0, 0}, 1, 1), kInfinity);
 }
 
-TEST(ContinuousPose, TheWayTravelledIsExactWithinWhatItSays) {
+TEST(ContinuousPose, DisplacementIsExactWithinItsErrorBound) {
   Random random(14);
   int exact = 0;
   for (int i = 0; i < 2000; ++i) {
-    const auto number = [&] { return uniform(random, -1, 1) * anyMagnitude(random, 6); };
+    const auto number = [&] { return uniform(random, -1, 1) * randomMagnitude(random, 6); };
     const Difference place{number(), number()}, velocity{number(), number()};
     Difference pull{number(), number()};
     double time = std::abs(number());
     if (i % 2 == 0) pull = {0, 0}, time = static_cast<double>(static_cast<float>(time));
-    const TwoDoubles sum = travelled(place, velocity, pull, time);
+    const DoubleDouble sum = computeDisplacement(place, velocity, pull, time);
     const mpq_class t(time);
     const mpq_class truth = mpq_class(place.to) - mpq_class(place.from) +
                             (mpq_class(velocity.to) - mpq_class(velocity.from)) * t +
                             (mpq_class(pull.to) - mpq_class(pull.from)) * t * t / 2;
     const mpq_class off = abs(truth - mpq_class(sum.high) - mpq_class(sum.low));
-    EXPECT_LE(off, mpq_class(sum.rest)) << i;
-    EXPECT_LE(sum.rest, 0x1p-90 * (1e6 + 1e12 + 1e18));
-    exact += sum.rest == 0 ? 1 : 0;
+    EXPECT_LE(off, mpq_class(sum.error)) << i;
+    EXPECT_LE(sum.error, 0x1p-90 * (1e6 + 1e12 + 1e18));
+    exact += sum.error == 0 ? 1 : 0;
   }
   EXPECT_GT(exact, 500);
   EXPECT_LT(exact, 1500);

@@ -11,7 +11,7 @@ namespace {
 
 using namespace testing;
 
-TEST(TriangleTree, FindsWhatBruteForceFinds) {
+TEST(TriangleTree, EqualsBruteForce) {
   Random random(11);
   for (const std::size_t size : {0u, 1u, 4u, 5u, 300u, 3000u}) {
     std::vector<Triangle> triangles;
@@ -23,13 +23,13 @@ TEST(TriangleTree, FindsWhatBruteForceFinds) {
     ASSERT_EQ(tree.triangles().size(), size);
     std::size_t hits = 0;
     for (int q = 0; q < 50; ++q) {
-      const Box box = grown(Box{Vec3::Zero(), Vec3::Zero()}, uniform(random, 0, 4));
+      const Aabb box = inflated(Aabb{Vec3::Zero(), Vec3::Zero()}, uniform(random, 0, 4));
       const Vec3 at = randomPoint(random, 8);
-      const Box query{box.min + at, box.max + at};
+      const Aabb query{box.min + at, box.max + at};
       std::vector<std::uint32_t> found, expected;
       tree.query(query, found);
       for (std::uint32_t i = 0; i < size; ++i) {
-        Box b;
+        Aabb b;
         for (const Vec3& p : tree.triangles()[i]) b.include(p);
         if (overlaps(b, query)) expected.push_back(i);
       }

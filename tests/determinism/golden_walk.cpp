@@ -1,8 +1,8 @@
-// Prints the state hash at the end of some worlds in which everything that moves moves: walkers on
-// stairs, a crowd, flyers among slivers, a driven arm, doors and a lift, leaves that hit one
-// another, a heap of free bodies, a vibrating tray (by one thread and by two: these two lines must
-// agree). The scenes and commands are made without libm, so that every build on every processor is
-// given the same ones and must print the same lines.
+// Prints the final state hashes of worlds with all kinds of motion: avatars on stairs, a crowd,
+// flyers among slivers, a driven arm, doors and a lift, leaves that hit one another, a heap of
+// dynamic bodies, a vibrating tray (by one thread and by two: these two lines must agree). Scenes
+// and commands are made without libm, so that every build on every processor has the same input and
+// must print the same lines.
 #include <cstdio>
 #include <memory>
 
@@ -17,11 +17,11 @@ using namespace enfilade::scene::testing;
 int refusedCommands = 0;
 
 void order(World& world, const std::string& name, Order o) {
-  if (submit(world, {name, std::move(o), 0})) ++refusedCommands;
+  if (submitAvatarCommand(world, {name, std::move(o), 0})) ++refusedCommands;
 }
 
 void ticks(World& world, int count) {
-  for (int i = 0; i < count; ++i) tick(world);
+  for (int i = 0; i < count; ++i) tickWorld(world);
 }
 
 void print(const char* name, const World& world) {
@@ -82,7 +82,7 @@ void flyers() {
   World world(std::make_shared<const Scene>(b.model));
   for (int i = 0; i < 16; ++i) {
     Spawn spawn;
-    spawn.at = {-3.2 + 2 * (i % 4), 0.3 + 0.9 * (i / 8), -3.2 + 2 * (i / 4)};
+    spawn.position = {-3.2 + 2 * (i % 4), 0.3 + 0.9 * (i / 8), -3.2 + 2 * (i / 4)};
     spawn.height = 0.6;
     spawn.flying = true;
     order(world, "f" + std::to_string(i), spawn);
@@ -156,10 +156,10 @@ void doors() {
     swing.body = "door";
     swing.action = k % 2 ? BodyCommand::Action::close : BodyCommand::Action::open;
     rise.body = "lift";
-    rise.action = BodyCommand::Action::to;
-    rise.to = k % 2 ? 0 : 3;
-    if (submit(world, swing)) ++refusedCommands;
-    if (submit(world, rise)) ++refusedCommands;
+    rise.action = BodyCommand::Action::moveTo;
+    rise.target = k % 2 ? 0 : 3;
+    if (submitBodyCommand(world, swing)) ++refusedCommands;
+    if (submitBodyCommand(world, rise)) ++refusedCommands;
     ticks(world, 150);
   }
   print("doors", world);
@@ -194,21 +194,21 @@ void clashes() {
   cart.keys = {{0, Vec3::Zero(), 0}, {0.2, {6, 0, 0}, 2}, {0.5, Vec3::Zero(), 0}};
   cart.loops = true;
   b.model.bodies.push_back(cart);
-  Lengths lengths;
-  lengths.nearMiss = 0.1;
+  WorldSettings lengths;
+  lengths.nearMissDistance = 0.1;
   World world(std::make_shared<const Scene>(b.model), lengths);
   for (int k = 0; k < 40; ++k) {
     BodyCommand swing;
     swing.body = "leaf" + std::to_string(k % 6);
-    swing.action = BodyCommand::Action::to;
-    swing.to = random.uniform(-3, 3);
-    if (submit(world, swing)) ++refusedCommands;
+    swing.action = BodyCommand::Action::moveTo;
+    swing.target = random.uniform(-3, 3);
+    if (submitBodyCommand(world, swing)) ++refusedCommands;
     ticks(world, 6);
   }
   print("clashes", world);
 }
 
-/// Boxes, slabs and wedges thrown on a heap that somebody walks into.
+/// Boxes, slabs and wedges thrown on a heap, with an avatar that walks into it.
 void heap() {
   Builder b;
   b.box("floor", {-5, -0.2, -5}, {5, 0, 5});
@@ -231,7 +231,7 @@ void heap() {
   print("heap", world);
 }
 
-/// Small boxes on a tray that vibrates: so many that the solver shares them out.
+/// Small boxes on a vibrating tray: enough of them for the solver to use several threads.
 void tray(int threads, const char* name) {
   Builder b;
   b.box("floor", {-5, -0.2, -5}, {5, 0, 5});
@@ -252,12 +252,12 @@ void tray(int threads, const char* name) {
   plate.objects = {1};
   plate.loops = true;
   for (int i = 0; i <= 8; ++i) {
-    const double up = i < 4 ? i - 2 : 6 - i;  // a triangle's wave
+    const double up = i < 4 ? i - 2 : 6 - i;  // a triangle wave
     plate.keys.push_back({i / 120.0, {0.2e-3 * up, 0.7e-3 * up, 0}, 0});
   }
   b.model.bodies.push_back(plate);
   World world(std::make_shared<const Scene>(b.model));
-  setThreads(world, threads);
+  setSolverThreadCount(world, threads);
   ticks(world, 90);
   print(name, world);
 }

@@ -1,5 +1,7 @@
-// Camera paths: the first byte tells the format and the axes, the rest is the text.
-#include "server/capture/path/camera_path.hpp"
+// Fuzz target of camera paths: the first byte selects the format and the axes, the rest is the
+// text.
+#include "server/capture/path/json_path.hpp"
+#include "server/capture/path/tum_path.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
 namespace enfilade::fuzz {
@@ -17,12 +19,12 @@ void tryBytes(std::span<const std::uint8_t> bytes) {
     for (const server::CameraPose& pose : path.poses) {
       require(pose.time >= last, "times ascend");
       last = pose.time;
-      require(pose.eye.allFinite(), "eyes are somewhere");
-      require((pose.turned.transpose() * pose.turned - server::Mat3::Identity()).norm() < 1e-6,
+      require(pose.eye.allFinite(), "eye positions are finite");
+      require((pose.rotation.transpose() * pose.rotation - server::Mat3::Identity()).norm() < 1e-6,
               "a camera is turned, and not bent");
     }
   } catch (const server::CameraPathError& error) {
-    require(error.what()[0] != '\0', "an error says what is wrong");
+    require(error.what()[0] != '\0', "an error has a message");
   }
 }
 

@@ -1,6 +1,6 @@
-// Checkpoints, with a checksum that fits: they make a world that ticks, or none. The first byte
-// tells whether the rest stands for a world's bytes (even), or is laid over those of a busy room's
-// checkpoint (odd: a place, two bytes, and what stands there, again and again).
+// Fuzz target of checkpoints with a correct checksum: they make a world that can tick, or none. If
+// the first byte is even, the rest is a world's bytes. Otherwise the rest patches the checkpoint of
+// a busy room: repeatedly an offset (two bytes) and the new content.
 #include <vector>
 
 #include "scene/world/checkpoint/checkpoint.hpp"
@@ -17,20 +17,20 @@ std::shared_ptr<const scene::Scene> room() {
   return one;
 }
 
-/// Two who walk towards one another, one in the air, and a door that opens.
+/// Two avatars that walk towards one another, one in the air, and a door that opens.
 std::vector<std::uint8_t> busyRoom() {
   scene::World world(room());
   for (const double x : {-4.0, -1.0, 4.0}) {
     const std::string name = "from" + std::to_string(static_cast<int>(x));
     scene::Spawn spawn;
-    spawn.at = {x, x > 0 ? 1.5 : 0.01, 0};
+    spawn.position = {x, x > 0 ? 1.5 : 0.01, 0};
     scene::Walk walk;
-    walk.along = {{-x, 0, 0.5}};
-    require(!scene::submit(world, {name, spawn}), "there is room");
-    require(!scene::submit(world, {name, walk}), "they can walk");
+    walk.waypoints = {{-x, 0, 0.5}};
+    require(!scene::submitAvatarCommand(world, {name, spawn}), "the avatar can spawn");
+    require(!scene::submitAvatarCommand(world, {name, walk}), "the avatars can walk");
   }
-  for (int i = 0; i < 20; ++i) scene::tick(world);
-  return scene::checkpointOf(world);
+  for (int i = 0; i < 20; ++i) scene::tickWorld(world);
+  return scene::makeCheckpoint(world);
 }
 
 const std::vector<std::uint8_t>& genuine() {
@@ -38,7 +38,7 @@ const std::vector<std::uint8_t>& genuine() {
   return one;
 }
 
-/// What it is, the version, the scene, the length of the world, the world, room for the checksum.
+/// Magic, version, scene, length of the world, the world, room for the checksum.
 std::vector<std::uint8_t> wrapped(Bytes world) {
   constexpr std::size_t kWord = 8;
   std::vector<std::uint8_t> bytes(genuine().begin(), genuine().begin() + 3 * kWord);
@@ -62,13 +62,13 @@ void tryBytes(Bytes bytes) {
   if (bytes.empty()) return;
   const Bytes rest = bytes.subspan(1);
   std::vector<std::uint8_t> checkpoint = bytes[0] & 1 ? overlaid(rest) : wrapped(rest);
-  scene::sealCheckpoint(checkpoint);
+  scene::recomputeChecksum(checkpoint);
   try {
-    scene::World world = scene::worldFrom(room(), checkpoint);
-    for (int i = 0; i < 3; ++i) scene::tick(world);
-    scene::checkpointOf(world);
+    scene::World world = scene::restoreWorld(room(), checkpoint);
+    for (int i = 0; i < 3; ++i) scene::tickWorld(world);
+    scene::makeCheckpoint(world);
   } catch (const scene::CheckpointError& error) {
-    require(error.what()[0] != '\0', "an error says what is wrong");
+    require(error.what()[0] != '\0', "an error has a message");
   }
 }
 

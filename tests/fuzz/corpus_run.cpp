@@ -1,4 +1,4 @@
-// Feeds every file of the folders that it is given to a target, where there is no libFuzzer.
+// Feeds every file of the given folders to a fuzz target, in builds without libFuzzer.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -32,7 +32,7 @@ int main(int count, char** arguments) {
   std::size_t tried = 0;
   for (int i = 1; i < count; ++i) {
     for (const auto& file : filesIn(arguments[i])) {
-      // Said before: the last line tells who crashed.
+      // Printed before the call, so that the last line names a crashing file.
       std::fprintf(stderr, "%s\n", file.c_str());
       enfilade::fuzz::tryBytes(bytesOf(file));
       ++tried;

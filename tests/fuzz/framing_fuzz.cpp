@@ -1,4 +1,5 @@
-// The stream of messages: the first byte tells how it is cut, the rest is the stream.
+// Fuzz target of message framing: the first byte selects the size of the pieces, the rest is the
+// stream.
 #include <vector>
 
 #include "protocol/enfilade.pb.h"
@@ -19,14 +20,14 @@ struct Decoded {
 };
 
 Decoded decoded(Bytes stream, Decoder::Expect expect, std::size_t piece) {
-  Decoder decoder(protocol::kServerTakes, expect);
+  Decoder decoder(protocol::kServerLimits, expect);
   Decoded all;
   while (!stream.empty() && !decoder.error()) {
     Bytes some = stream.first(std::min(piece, stream.size()));
     stream = stream.subspan(some.size());
     while (auto message = decoder.next(some)) all.messages.push_back(std::move(*message));
     require(some.empty() || decoder.error(), "the decoder takes all bytes or fails");
-    require(decoder.bytesHeld() <= 2 * decoder.offset() + 64, "room follows the bytes that came");
+    require(decoder.bytesHeld() <= 2 * decoder.offset() + 64, "memory follows the received bytes");
   }
   all.offset = decoder.offset();
   all.failed = decoder.error().has_value();
@@ -42,13 +43,13 @@ bool same(const std::vector<Message>& a, const std::vector<Message>& b) {
 template <typename Envelope>
 void tryParsing(const Message& message) {
   Envelope envelope;
-  if (!protocol::parse(message.header, envelope)) return;
+  if (!protocol::parseHeader(message.header, envelope)) return;
   const std::vector<std::uint8_t> again = protocol::encode(envelope, message.attachment);
   Decoder decoder({1u << 30, 1u << 30}, Decoder::Expect::messages);
   Bytes bytes(again);
   const auto back = decoder.next(bytes);
-  require(back && bytes.empty(), "what is encoded can be decoded");
-  require(back->attachment == message.attachment, "attachments stay as they are");
+  require(back && bytes.empty(), "an encoded message can be decoded");
+  require(back->attachment == message.attachment, "attachments are unchanged");
 }
 
 }  // namespace
@@ -61,7 +62,7 @@ void tryBytes(Bytes bytes) {
   const Decoded whole = decoded(stream, expect, stream.size() + 1);
   const Decoded cut = decoded(stream, expect, piece);
   require(same(whole.messages, cut.messages), "messages do not depend on how the stream is cut");
-  require(whole.failed == cut.failed, "nor do errors");
+  require(whole.failed == cut.failed, "errors do not depend on how the stream is cut");
   require(whole.failed || whole.offset == stream.size(), "all bytes are counted");
   for (const Message& message : whole.messages) {
     tryParsing<v1::ClientMessage>(message);

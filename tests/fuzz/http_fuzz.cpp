@@ -1,5 +1,5 @@
-// What we ourselves read of a request over HTTP: its target, and the headers that decide who may
-// come. The lines of the input are target, Authorization, Host and Origin.
+// Fuzz target of our own HTTP parsing: the request's target, and the headers that decide on access.
+// The lines of the input are target, Authorization, Host and Origin.
 #include <array>
 #include <string_view>
 
@@ -31,18 +31,18 @@ server::Access twoTokens() {
 void tryBytes(std::span<const std::uint8_t> bytes) {
   static const server::Access access = twoTokens();
   std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  const server::Target target = server::targetOf(takeLine(text));
-  const std::string token = server::tokenOf(takeLine(text), target);
-  const auto role = server::roleOf(access, token);
+  const server::Target target = server::parseTarget(takeLine(text));
+  const std::string token = server::extractToken(takeLine(text), target);
+  const auto role = server::findRole(access, token);
   require(!role || token == "0123456789abcdef" || token == "fedcba9876543210",
           "only a token opens");
   const std::string_view host = takeLine(text), origin = takeLine(text);
-  const auto why = server::foreignPage(access, host, origin);
-  require(!why || !why->empty(), "who is refused is told why");
-  const auto asked = server::requestFor(target);
-  if (const auto* problem = std::get_if<server::PageProblem>(&asked)) {
-    require(problem->status >= 400 && problem->status < 600, "a refusal has a status of one");
-    server::response(problem->status, "text/plain", problem->text);
+  const auto why = server::validateOrigin(access, host, origin);
+  require(!why || !why->empty(), "a refusal has a reason");
+  const auto asked = server::parseRequest(target);
+  if (const auto* problem = std::get_if<server::HttpError>(&asked)) {
+    require(problem->status >= 400 && problem->status < 600, "a refusal has an error status");
+    server::makeResponse(problem->status, "text/plain", problem->text);
   }
 }
 

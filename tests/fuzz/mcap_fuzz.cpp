@@ -1,5 +1,6 @@
-// MCAP files. The first byte tells what the rest is: a file (even), or the records of a chunk (odd)
-// that is wrapped into a file whose CRC fits, since hardly a changed byte gets past one.
+// Fuzz target of MCAP files. If the first byte is even, the rest is a file. Otherwise it is the
+// records of a chunk, wrapped into a file with a correct CRC, since hardly any mutation gets past
+// one.
 #include <string>
 #include <vector>
 
@@ -12,7 +13,7 @@ namespace {
 
 using namespace protocol::mcap;
 
-/// What a reader got, and whether it came to the end of a file that its writer had closed.
+/// Content that a reader returned, and whether it reached the end of a properly closed file.
 struct Read {
   std::vector<std::string> messages;
   bool whole = false;
@@ -30,7 +31,7 @@ Read frontToBack(const std::filesystem::path& file) {
     while (const auto message = reader.next()) read.messages.push_back(textOf(*message));
     read.whole = reader.closed();
   } catch (const RecordingError& error) {
-    require(error.what()[0] != '\0', "an error says what is wrong");
+    require(error.what()[0] != '\0', "an error has a message");
   }
   return read;
 }
@@ -46,12 +47,12 @@ Read byIndex(const std::filesystem::path& file) {
     }
     read.whole = reader.closed();
   } catch (const RecordingError& error) {
-    require(error.what()[0] != '\0', "an error says what is wrong");
+    require(error.what()[0] != '\0', "an error has a message");
   }
   return read;
 }
 
-/// A file that was cut off after its first chunk, which is not packed.
+/// A file that was cut off after its first chunk, which is not compressed.
 std::vector<std::uint8_t> fileAround(std::string_view records) {
   std::string head, chunk, file(kMagic);
   putString(head, "");
@@ -59,7 +60,7 @@ std::vector<std::uint8_t> fileAround(std::string_view records) {
   putNumber(chunk, std::uint64_t{0});
   putNumber(chunk, ~std::uint64_t{0} >> 1);
   putNumber(chunk, static_cast<std::uint64_t>(records.size()));
-  putNumber(chunk, crcOf(records));
+  putNumber(chunk, computeCrc(records));
   putString(chunk, "");
   putNumber(chunk, static_cast<std::uint64_t>(records.size()));
   chunk.append(records);
@@ -79,7 +80,7 @@ void tryBytes(std::span<const std::uint8_t> bytes) {
                                 : std::vector<std::uint8_t>(bytes.begin(), bytes.end()));
   const Read whole = frontToBack(file.path()), sought = byIndex(file.path());
   if (whole.whole && sought.whole)
-    require(whole.messages == sought.messages, "both readers read the same");
+    require(whole.messages == sought.messages, "both readers give the same messages");
 }
 
 }  // namespace enfilade::fuzz

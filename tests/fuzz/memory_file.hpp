@@ -1,4 +1,4 @@
-// A file that lives in memory and has a path, for readers that take one.
+// A file in memory that has a path, for readers that take a path.
 #pragma once
 
 #include <sys/mman.h>

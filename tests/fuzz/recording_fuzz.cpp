@@ -1,6 +1,6 @@
-// Recordings whose messages are any: a sequence of items, each with its kind (a byte) and its
-// length (two bytes, little-endian) before it. They stand behind the true start of a small room,
-// and are read as `diff`, `--verify` and a seek read them.
+// Fuzz target of recordings with arbitrary messages: a sequence of items, each preceded by its kind
+// (a byte) and its length (two bytes, little-endian). They follow the true start of a small room's
+// recording, and are read as `diff`, `--verify` and a seek read them.
 #include <spdlog/spdlog.h>
 
 #include "protocol/framing.hpp"
@@ -18,8 +18,8 @@ using Bytes = std::span<const std::uint8_t>;
 using protocol::RecordingWriter;
 using protocol::mcap::RecordingError;
 
-constexpr std::size_t kMostItems = 64;  // of one input: a finding should be small
-constexpr std::uint64_t kMostTicks = 64;
+constexpr std::size_t kMaxItems = 64;  // of one input, so that a finding is small
+constexpr std::uint64_t kMaxTicks = 64;
 
 std::shared_ptr<const scene::Scene> room() {
   spdlog::set_level(spdlog::level::off);
@@ -27,13 +27,13 @@ std::shared_ptr<const scene::Scene> room() {
   return one;
 }
 
-/// As the room's recording begins.
+/// The start of the room's recording.
 v1::RecordingStart trueStart() {
   const MemoryFile file;
   server::RecordingOptions options;
   options.choice.file = file.path();
   options.model.file = "room.obj";
-  server::RecordedWorld world{scene::World(room())};
+  server::RecordableWorld world{scene::World(room())};
   world.record(options);
   world.tick();
   world.recorder()->close();
@@ -72,7 +72,7 @@ void writeItems(const std::filesystem::path& path, Bytes bytes) {
   constexpr std::size_t kHead = 3;
   RecordingWriter file(path, "fuzz");
   writeItem(file, 0, {}, 0);
-  for (std::size_t count = 0; bytes.size() >= kHead && count < kMostItems; ++count) {
+  for (std::size_t count = 0; bytes.size() >= kHead && count < kMaxItems; ++count) {
     const std::uint8_t kind = bytes[0];
     const std::size_t length = bytes[1] | static_cast<std::size_t>(bytes[2]) << 8;
     bytes = bytes.subspan(kHead);
@@ -88,10 +88,10 @@ void readBy(const Work& work) {
   try {
     work();
   } catch (const RecordingError& error) {
-    require(error.what()[0] != '\0', "an error says what is wrong");
+    require(error.what()[0] != '\0', "an error has a message");
   } catch (const scene::CheckpointError&) {
-  } catch (const server::Diverged& diverged) {
-    require(!server::textOf(diverged).empty(), "it says what differs");
+  } catch (const server::Divergence& diverged) {
+    require(!server::formatDivergence(diverged).empty(), "a divergence has a text");
   }
 }
 
@@ -107,13 +107,13 @@ void tryBytes(Bytes bytes) {
   readBy([&] { server::readWalk(file.path()); });
   readBy([&] {
     server::Playback playback(file.path());
-    scene::World world = playback.worldAfter(playback.firstTick(), room());
-    for (std::uint64_t i = 0; i < kMostTicks && playback.step(world); ++i) continue;
+    scene::World world = playback.restoreWorldAfter(playback.firstTick(), room());
+    for (std::uint64_t i = 0; i < kMaxTicks && playback.step(world); ++i) continue;
   });
   readBy([&] {
     server::Playback playback(file.path());
-    if (playback.lastTick() - playback.firstTick() < kMostTicks)
-      playback.worldAfter(playback.lastTick(), room());
+    if (playback.lastTick() - playback.firstTick() < kMaxTicks)
+      playback.restoreWorldAfter(playback.lastTick(), room());
   });
 }
 

@@ -1,7 +1,6 @@
-// Every request, answered by a small world: the input is a sequence of messages, each with who
-// sends it (a byte, of which the lowest bit counts) and its length (two bytes, little-endian)
-// before it. Steps are made at once, so that the world moves. Pictures are drawn by rays, and are
-// small.
+// Fuzz target of all requests, answered by a small world. The input is a sequence of messages, each
+// preceded by its sender (a byte, of which the lowest bit counts) and its length (two bytes,
+// little-endian). Steps run at once, so that the world moves. Images are small and drawn by rays.
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -11,7 +10,9 @@
 #include <vector>
 
 #include "protocol/framing.hpp"
-#include "server/hosting/requests.hpp"
+#include "server/hosting/advance_world.hpp"
+#include "server/hosting/requests/dispatch.hpp"
+#include "server/hosting/world_lifecycle.hpp"
 #include "server/messages/world_messages.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 #include "tests/server/body_room.hpp"
@@ -22,13 +23,13 @@ namespace {
 using Bytes = std::span<const std::uint8_t>;
 using server::Client;
 using server::ClientId;
-using server::ServedWorld;
-using Job = std::function<void(ServedWorld&)>;
+using server::HostedWorld;
+using Job = std::function<void(HostedWorld&)>;
 
-constexpr std::size_t kMostMessages = 64;  // of one input: a finding should be small
+constexpr std::size_t kMaxMessages = 64;  // of one input, so that a finding is small
 constexpr std::uint32_t kPictureSide = 16;
 
-/// What the services hand to the tick thread, which is us.
+/// Replies of the services to the tick thread, which is this thread.
 class Inbox {
  public:
   void post(Job job) {
@@ -50,12 +51,12 @@ class Inbox {
   std::deque<Job> jobs_;
 };
 
-/// What all inputs share, since no request changes it.
+/// State shared by all inputs, since no request changes it.
 struct House {
   House() { spdlog::set_level(spdlog::level::off); }
   std::shared_ptr<const scene::Scene> scene = server::testing::bodyRoom();
   server::FrameService frames{scene, {render::RendererKind::rays, {}}};
-  server::QuestionService questions{scene};
+  server::QueryService questions{scene};
   Inbox inbox;
 };
 
@@ -72,7 +73,7 @@ server::ServerLimits smallLimits() {
   limits.rays = 32;
   limits.scanRays = 256;
   limits.pairs = 8;
-  limits.watches = 2;
+  limits.frameSubscriptions = 2;
   return limits;
 }
 
@@ -80,60 +81,60 @@ class SmallServer {
  public:
   SmallServer()
       : served_(house().scene, house().frames, house().questions, {smallLimits(), {}, 0, {}, {}}) {
-    served_.post = post_;
+    served_.post = [](Job job) { house().inbox.post(std::move(job)); };
     for (const ClientId id : {1, 2}) {
       Client& client = served_.clients[id];
       client.role = server::Role::admin;
       client.out = std::make_shared<server::OutgoingQueue>(
-          server::OutgoingBounds{1u << 24, 64},
-          server::Encoded(std::make_shared<std::vector<std::uint8_t>>()), [] {});
+          server::OutgoingLimits{1u << 24, 64},
+          server::EncodedMessage(std::make_shared<std::vector<std::uint8_t>>()), [] {});
     }
   }
 
-  /// Answers one message; its reply has to come, with the message's number.
+  /// Handles one message; its reply must arrive, with the message's number.
   void take(ClientId id, const v1::ClientMessage& message) {
     Client& client = served_.clients.at(id);
-    client.waiting.push_back({message, {}});
-    server::answerWaiting(served_, id, post_);
-    while (client.answerUnderWay || drawing()) house().inbox.next()(served_);
-    for (std::uint32_t ticks = 0; client.step; ++ticks) {
-      require(ticks < served_.limits.ticksPerStep, "a step ends");
+    client.queue.push_back({message, {}});
+    server::processQueue(served_, id);
+    while (client.pendingReply || drawing()) house().inbox.next()(served_);
+    for (std::uint32_t ticks = 0; client.pendingStep; ++ticks) {
+      require(ticks < served_.limits.ticksPerStep, "a step's length is limited");
       server::advance(served_);
       while (drawing()) house().inbox.next()(served_);
     }
     if (!message.has_bye())
       require(replied(client, message.request_id()), "each request is answered");
-    require(served_.statistics.metrics().worst_penetration() == 0, "nothing penetrates");
+    require(served_.statistics.makeMetrics().worst_penetration() == 0, "nothing penetrates");
   }
   void end() { server::closeWorld(served_); }
 
  private:
   bool drawing() const {
     return std::any_of(served_.clients.begin(), served_.clients.end(), [](const auto& one) {
-      const auto& watches = one.second.watches;
-      return std::any_of(watches.begin(), watches.end(),
-                         [](const auto& watch) { return watch.second.underWay; });
+      const auto& subscriptions = one.second.frameSubscriptions;
+      return std::any_of(subscriptions.begin(), subscriptions.end(),
+                         [](const auto& subscription) { return subscription.second.rendering; });
     });
   }
-  /// Reads all that was sent.
+  /// Reads all messages that were sent.
   static bool replied(Client& client, std::uint64_t requestId) {
     bool found = false;
     for (auto next = client.out->pop(); next.message; next = client.out->pop()) {
-      protocol::Decoder decoder(protocol::kClientTakes, protocol::Decoder::Expect::messages);
+      protocol::Decoder decoder(protocol::kClientLimits, protocol::Decoder::Expect::messages);
       std::vector<std::uint8_t> whole = *next.message.head;
-      if (const auto& rest = next.message.rest)
+      if (const auto& rest = next.message.body)
         whole.insert(whole.end(), rest->begin(), rest->end());
       Bytes bytes(whole);
       const auto framed = decoder.next(bytes);
       v1::ServerMessage reply;
-      require(framed && bytes.empty() && protocol::parse(framed->header, reply), "replies parse");
+      require(framed && bytes.empty() && protocol::parseHeader(framed->header, reply),
+              "replies parse");
       found = found || reply.reply_to() == requestId;
     }
     return found;
   }
 
-  const server::PostToTickThread post_ = [](Job job) { house().inbox.post(std::move(job)); };
-  ServedWorld served_;
+  HostedWorld served_;
 };
 
 void shrink(v1::FrameRequest& request) {
@@ -142,7 +143,7 @@ void shrink(v1::FrameRequest& request) {
   request.set_height(fit(request.height()));
 }
 
-/// What takes long for good reasons is made small.
+/// Reduces counts that are legitimately slow.
 void shrink(v1::ClientMessage& message) {
   if (message.has_frame()) shrink(*message.mutable_frame());
   if (message.watch_frames().has_frame()) shrink(*message.mutable_watch_frames()->mutable_frame());
@@ -153,14 +154,15 @@ void shrink(v1::ClientMessage& message) {
 void tryBytes(Bytes bytes) {
   constexpr std::size_t kHead = 3;
   SmallServer server;
-  for (std::size_t count = 0; bytes.size() >= kHead && count < kMostMessages; ++count) {
+  for (std::size_t count = 0; bytes.size() >= kHead && count < kMaxMessages; ++count) {
     const ClientId id = 1u + (bytes[0] & 1u);
     const std::size_t length = bytes[1] | static_cast<std::size_t>(bytes[2]) << 8;
     bytes = bytes.subspan(kHead);
     const Bytes part = bytes.first(std::min(length, bytes.size()));
     bytes = bytes.subspan(part.size());
     v1::ClientMessage message;
-    if (!protocol::parse(part, message) || message.has_bye()) continue;  // the session's to take
+    if (!protocol::parseHeader(part, message) || message.has_bye())
+      continue;  // the session handles it
     message.set_request_id(count + 1);
     shrink(message);
     server.take(id, message);

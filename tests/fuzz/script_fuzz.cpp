@@ -1,4 +1,4 @@
-// A walk script's text.
+// Fuzz target of the text of a walk script.
 #include "protocol/script/script.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
@@ -14,7 +14,7 @@ void tryBytes(std::span<const std::uint8_t> bytes) {
       last = line.number;
     }
   } catch (const protocol::ScriptError& error) {
-    require(error.what()[0] != '\0', "an error says what is wrong");
+    require(error.what()[0] != '\0', "an error has a message");
   }
 }
 

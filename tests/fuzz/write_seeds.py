@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""Writes the seeds of the fuzz targets whose inputs nobody can write by hand:
+"""Writes the seeds of the fuzz targets with binary inputs:
 
     PYTHONPATH=protocol/clients/python /usr/bin/python3 tests/fuzz/write_seeds.py
 
-Scripts and HTTP requests are text, and seeds of their own in corpus/. What a fuzzer finds is added to
+Seeds of scripts and HTTP requests are text files in corpus/. A fuzzer's findings are added to
 corpus/NAME/ as found-WHAT.
 """
 
@@ -66,7 +66,7 @@ SESSIONS = {
                 'command { avatar: "ann" }', "step { ticks: 0 }", "subscribe { state: true state_rate: -1 }"],
 }
 
-# Of recording_fuzz.cpp: the kind of each item, and the item.
+# Items of recording_fuzz.cpp: the kind of each item, and the item.
 ITEMS = [
     (1, "RecordedCommands", 'tick: 1 commands { avatar { avatar: "ann" spawn { at { y: 0.01 } } } }'),
     (3, "State", "tick: 1 time: 0.0166 hash: 1"),
@@ -145,12 +145,13 @@ def write(target, name, content):
 def main():
     for name, lines in SESSIONS.items():
         parts = list(messages(lines))
-        # Who speaks (bit 0), the length, the message: see requests_fuzz.cpp.
+        # Sender (bit 0), length, message: see requests_fuzz.cpp.
         write("requests", name, b"".join(struct.pack("<BH", 0, len(part)) + part for part in parts))
         write("requests", "two-" + name,
               b"".join(struct.pack("<BH", i % 2, len(part)) + part for i, part in enumerate(parts)))
         stream = b"".join(struct.pack("<II", len(part) + 4, len(part)) + part for part in parts)
-        # Bit 0: it begins with the magic; the rest: in pieces of how many bytes it comes, less one.
+        # Bit 0: the stream begins with the magic; the other bits: size of the pieces in bytes,
+        # minus one.
         write("framing", name, bytes([1 | 16 << 1]) + b"ENF1" + stream)
     part = parts[0]
     write("framing", "attachment", bytes([2]) + struct.pack("<II", len(part) + 9, len(part)) + part + b"12345")

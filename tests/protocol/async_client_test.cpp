@@ -10,12 +10,12 @@ namespace enfilade::protocol {
 namespace {
 
 constexpr std::chrono::milliseconds kPatience{10'000};
-constexpr int kMostTurns = 10'000;
+constexpr int kMaxTurns = 10'000;
 
 /// Advances until `done` holds or the connection is over.
 template <typename Done>
 bool runUntil(AsyncClient& client, const Done& done) {
-  for (int i = 0; i < kMostTurns && !done(); ++i) {
+  for (int i = 0; i < kMaxTurns && !done(); ++i) {
     if (!client.run(kPatience)) break;
   }
   return done();
@@ -40,23 +40,23 @@ v1::ServerMessage eventsOf(std::uint64_t sequence) {
   return message;
 }
 
-TEST(AsyncClient, GreetsWithoutWaitingAndTellsTheWelcomeFirst) {
+TEST(AsyncClient, GreetsWithoutBlockingAndReportsTheWelcomeFirst) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
     connection.send(eventsOf(1));
     connection.untilClosed();
   });
-  std::vector<std::string> told;
+  std::vector<std::string> calls;
   AsyncHandlers handlers;
-  handlers.welcome = [&](const v1::Welcome&) { told.push_back("welcome"); };
-  handlers.events = [&](const v1::TickEvents&) { told.push_back("events"); };
+  handlers.welcome = [&](const v1::Welcome&) { calls.push_back("welcome"); };
+  handlers.events = [&](const v1::TickEvents&) { calls.push_back("events"); };
   AsyncClient client("127.0.0.1", server.port(), handlers);
-  EXPECT_TRUE(told.empty()) << "nobody is told anything before advance()";
-  EXPECT_TRUE(runUntil(client, [&] { return told.size() == 2; }));
-  EXPECT_EQ(told, (std::vector<std::string>{"welcome", "events"}));
+  EXPECT_TRUE(calls.empty()) << "no handler runs before advance()";
+  EXPECT_TRUE(runUntil(client, [&] { return calls.size() == 2; }));
+  EXPECT_EQ(calls, (std::vector<std::string>{"welcome", "events"}));
 }
 
-TEST(AsyncClient, RepliesComeToWhoAskedInTheOrderOfTheRequests) {
+TEST(AsyncClient, RepliesReachTheirRequestersInOrder) {
   constexpr std::uint64_t kRequests = 100;
   const TestServer server([](TestConnection& connection) {
     connection.greet();
@@ -77,7 +77,7 @@ TEST(AsyncClient, RepliesComeToWhoAskedInTheOrderOfTheRequests) {
   EXPECT_TRUE(runUntil(client, [&] { return sequences.size() == kRequests; }));
   ASSERT_EQ(ticks.size(), kRequests);
   for (std::uint64_t i = 0; i < kRequests; ++i) EXPECT_EQ(ticks[i], i);
-  EXPECT_EQ(client.underWay(), 0u);
+  EXPECT_EQ(client.pendingRequests(), 0u);
 }
 
 TEST(AsyncClient, AFutureGetsTheReplyWithItsAttachment) {
@@ -89,14 +89,14 @@ TEST(AsyncClient, AFutureGetsTheReplyWithItsAttachment) {
   });
   AsyncClient client("127.0.0.1", server.port(), {});
   std::future<Reply> future = client.request(metricsRequest());
-  runUntil(client, [&] { return client.underWay() == 0; });
+  runUntil(client, [&] { return client.pendingRequests() == 0; });
   const Reply reply = future.get();
   EXPECT_EQ(reply.message.metrics().ticks(), 7u);
   EXPECT_EQ(reply.attachment, (std::vector<std::uint8_t>{1, 2, 3}));
   EXPECT_FALSE(reply.lost);
 }
 
-TEST(AsyncClient, NobodyThereIsToldAndNotThrown) {
+TEST(AsyncClient, AMissingServerIsReportedAndNotThrown) {
   std::uint16_t port = 0;
   {
     const TestServer server([](TestConnection&) {});
@@ -114,7 +114,7 @@ TEST(AsyncClient, NobodyThereIsToldAndNotThrown) {
   EXPECT_EQ(client.descriptor(), -1);
 }
 
-TEST(AsyncClient, WhatIsUnderWayWhenTheConnectionEndsIsToldAsLost) {
+TEST(AsyncClient, PendingRequestsAreReportedAsLostWhenTheConnectionEnds) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
     connection.receive();
@@ -123,27 +123,27 @@ TEST(AsyncClient, WhatIsUnderWayWhenTheConnectionEndsIsToldAsLost) {
     bye.mutable_bye()->set_reason("the server ends");
     connection.send(bye);
   });
-  std::vector<std::string> told;
+  std::vector<std::string> calls;
   AsyncHandlers handlers;
   handlers.closed = [&](const v1::Error& why) {
     EXPECT_EQ(why.code(), v1::ERROR_SHUTTING_DOWN);
     EXPECT_NE(why.message().find("the server ends"), std::string::npos) << why.message();
-    told.push_back("closed");
+    calls.push_back("closed");
   };
   AsyncClient client("127.0.0.1", server.port(), handlers);
   for (int i = 0; i < 2; ++i) {
     client.request(metricsRequest(), [&](const Reply& reply) {
       EXPECT_TRUE(reply.lost);
       EXPECT_EQ(reply.message.error().code(), v1::ERROR_SHUTTING_DOWN);
-      told.push_back("lost");
+      calls.push_back("lost");
     });
   }
-  runUntil(client, [&] { return told.size() == 3; });
+  runUntil(client, [&] { return calls.size() == 3; });
   client.request(metricsRequest(), [&](const Reply& reply) {
     EXPECT_TRUE(reply.lost);
-    told.push_back("late");
+    calls.push_back("late");
   });
-  EXPECT_EQ(told, (std::vector<std::string>{"lost", "lost", "closed", "late"}));
+  EXPECT_EQ(calls, (std::vector<std::string>{"lost", "lost", "closed", "late"}));
 }
 
 TEST(AsyncClient, MayBeDestroyedInAnyOfItsFunctions) {
@@ -157,7 +157,7 @@ TEST(AsyncClient, MayBeDestroyedInAnyOfItsFunctions) {
     std::optional<AsyncClient> client;
     int calls = 0;
     const auto destroyAt = [&](const std::string& here) {
-      EXPECT_TRUE(client) << here << " was told after " << where;
+      EXPECT_TRUE(client) << here << " was reported after" << where;
       ++calls;
       if (here == where) client.reset();
     };
@@ -168,14 +168,14 @@ TEST(AsyncClient, MayBeDestroyedInAnyOfItsFunctions) {
     client.emplace("127.0.0.1", server.port(), handlers);
     client->request(metricsRequest(), [&](const Reply&) { destroyAt("reply"); });
     client->request(metricsRequest(), [&](const Reply&) { destroyAt("lost"); });
-    for (int i = 0; i < kMostTurns && client && client->run(kPatience); ++i) {
+    for (int i = 0; i < kMaxTurns && client && client->run(kPatience); ++i) {
     }
     EXPECT_FALSE(client) << where;
     EXPECT_GT(calls, 0);
   }
 }
 
-TEST(AsyncClient, DestructionBreaksFuturesAndTellsNobody) {
+TEST(AsyncClient, DestructionBreaksFuturesAndCallsNoHandler) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
     connection.untilClosed();
@@ -189,19 +189,19 @@ TEST(AsyncClient, DestructionBreaksFuturesAndTellsNobody) {
   EXPECT_THROW(future.get(), std::future_error);
 }
 
-TEST(AsyncClient, TakesSoManyRequestsAndNoMore) {
+TEST(AsyncClient, AcceptsALimitedNumberOfRequests) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
     connection.untilClosed();
   });
   AsyncOptions options;
-  options.requestsUnderWay = 4;  // the hello is one
+  options.maxPendingRequests = 4;  // the hello counts as one
   AsyncClient client("127.0.0.1", server.port(), {}, options);
   for (int i = 0; i < 3; ++i) client.request(metricsRequest(), [](const Reply&) {});
   EXPECT_THROW(client.request(metricsRequest(), [](const Reply&) {}), TooManyRequests);
 }
 
-TEST(AsyncClient, TellsThatTheConnectionIsLostBeforeItCountsWhatWasNotSent) {
+TEST(AsyncClient, ReportsALostConnectionBeforeTheLimitOfUnsentRequests) {
   std::uint16_t gone = 0;
   {
     const TestServer server([](TestConnection&) {});
@@ -211,7 +211,7 @@ TEST(AsyncClient, TellsThatTheConnectionIsLostBeforeItCountsWhatWasNotSent) {
   AsyncHandlers handlers;
   handlers.closed = [&](const v1::Error& error) { why = error; };
   AsyncOptions options;
-  options.unsentBytes = protocol::kMagic.size();  // so the hello alone is more
+  options.maxUnsentBytes = protocol::kMagic.size();  // so the hello alone exceeds it
   AsyncClient client("127.0.0.1", gone, handlers, options);
   ASSERT_TRUE(runUntil(client, [&] { return why.has_value(); }));
   bool lost = false;

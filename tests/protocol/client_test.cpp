@@ -7,7 +7,7 @@
 namespace enfilade::protocol {
 namespace {
 
-constexpr std::chrono::milliseconds kShort{150};  // for servers that are to be found silent
+constexpr std::chrono::milliseconds kShort{150};  // timeout for servers that stay silent
 
 Client connectTo(const TestServer& server,
                  std::chrono::milliseconds timeout = ClientOptions{}.timeout) {
@@ -17,7 +17,7 @@ Client connectTo(const TestServer& server,
   return Client("127.0.0.1", server.port(), options);
 }
 
-/// What the exception said; fails the test when there was none.
+/// The exception's message; fails the test if nothing was thrown.
 template <typename Exception, typename Action>
 std::string whatOf(Action action) {
   try {
@@ -25,7 +25,7 @@ std::string whatOf(Action action) {
   } catch (const Exception& thrown) {
     return thrown.what();
   }
-  ADD_FAILURE() << "nothing of this kind was thrown";
+  ADD_FAILURE() << "no exception of this type was thrown";
   return "";
 }
 
@@ -87,7 +87,7 @@ TEST(Client, RefusesAServerOfAnotherMajorVersion) {
   }
 }
 
-TEST(Client, TakesALaterMinorVersionAndFieldsItDoesNotKnow) {
+TEST(Client, AcceptsALaterMinorVersionAndUnknownFields) {
   const TestServer server([](TestConnection& connection) {
     v1::ServerMessage reply = welcomeTo(*connection.receive());
     reply.mutable_welcome()->set_protocol_version("1.99.0");
@@ -101,7 +101,7 @@ TEST(Client, TakesALaterMinorVersionAndFieldsItDoesNotKnow) {
   EXPECT_EQ(connectTo(server).welcome().protocol_version(), "1.99.0");
 }
 
-TEST(Client, TellsWhyAServerRefusedTheGreeting) {
+TEST(Client, ReportsWhyAServerRefusedTheGreeting) {
   const TestServer server([](TestConnection& connection) {
     v1::ServerMessage reply = replyTo(*connection.receive());
     reply.mutable_error()->set_code(v1::ERROR_VERSION);
@@ -124,7 +124,7 @@ TEST(Client, RefusesAWelcomeWithoutATick) {
   EXPECT_THROW(connectTo(server), ProtocolError);
 }
 
-TEST(Client, NamesHostAndPortWhenNobodyListens) {
+TEST(Client, NamesHostAndPortIfNoServerListens) {
   std::uint16_t port = 0;
   {
     const TestServer server([](TestConnection&) {});
@@ -134,7 +134,7 @@ TEST(Client, NamesHostAndPortWhenNobodyListens) {
   EXPECT_NE(what.find("cannot connect to 127.0.0.1:" + std::to_string(port)), std::string::npos);
 }
 
-TEST(Client, KnowsAStrangerByItsFirstBytes) {
+TEST(Client, RefusesAnotherProtocolByItsFirstBytes) {
   const TestServer server([](TestConnection& connection) {
     connection.receive();
     connection.sendRaw("HTTP/1.1 400 Bad Request\r\n\r\n");
@@ -157,7 +157,7 @@ TEST(Client, DoesNotWaitForeverForAReply) {
   });
   Client client = connectTo(server, kShort);
   expectConnectionError(server, "did not answer within 150 ms", [&] { client.step(); });
-  // The reply may still come, so nothing can be asked any more.
+  // The reply may still arrive, so no further request is possible.
   expectConnectionError(server, "did not answer within 150 ms", [&] { client.metrics(); });
 }
 
@@ -173,13 +173,13 @@ TEST(Client, EventsWithoutAnEndDoNotReplaceAReply) {
   EXPECT_EQ(client.takeEvents().size(), 10u);
 }
 
-TEST(Client, TellsAServerThatClosesBeforeItAnswers) {
+TEST(Client, ReportsAServerThatClosesBeforeItReplies) {
   const TestServer server([](TestConnection& connection) { connection.receive(); });
   expectConnectionError(server, "closed the connection before it answered",
                         [&] { connectTo(server); });
 }
 
-TEST(Client, TellsAServerThatClosesInTheMiddleOfAMessage) {
+TEST(Client, ReportsAServerThatClosesInTheMiddleOfAMessage) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
     const auto request = connection.receive();
@@ -193,7 +193,7 @@ TEST(Client, TellsAServerThatClosesInTheMiddleOfAMessage) {
   expectConnectionError(server, "in the middle of a message", [&] { client.step(); });
 }
 
-TEST(Client, RepeatsTheServersLastWords) {
+TEST(Client, RepeatsTheServersFinalMessage) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
     connection.receive();
@@ -236,7 +236,7 @@ TEST(Client, RefusesAMessageAboveItsLimit) {
   ClientOptions options;
   options.limits = {500, 500};
   Client client("127.0.0.1", server.port(), options);
-  expectConnectionError(server, "above the limit of 500", [&] { client.step(); });
+  expectConnectionError(server, "exceeds the limit of 500", [&] { client.step(); });
 }
 
 TEST(Client, RefusesBytesThatAreNoMessage) {
@@ -273,13 +273,13 @@ TEST(Client, EventsThatComeBeforeAReplyAreKeptInOrder) {
   EXPECT_FALSE(client.nextEvent(kShort));
 }
 
-TEST(Client, WaitingInVainLosesNothingOfAMessageHalfCome) {
+TEST(Client, ATimeoutKeepsAnIncompleteMessage) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
     const auto bytes = encode(eventsOf(7));
     const std::span<const std::uint8_t> whole(bytes);
     connection.sendRaw(whole.first(5));
-    const auto request = connection.receive();  // sent after the vain wait
+    const auto request = connection.receive();  // sent after the wait timed out
     connection.sendRaw(whole.subspan(5));
     v1::ServerMessage reply = replyTo(*request);
     reply.mutable_step();
@@ -294,7 +294,7 @@ TEST(Client, WaitingInVainLosesNothingOfAMessageHalfCome) {
   EXPECT_EQ(events[0].events().sequence(), 7u);
 }
 
-TEST(Client, ACommandIsTakenOrRefusedWithItsField) {
+TEST(Client, ACommandIsAcceptedOrRefusedWithItsField) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
     v1::ServerMessage taken = replyTo(*connection.receive());
@@ -314,7 +314,7 @@ TEST(Client, ACommandIsTakenOrRefusedWithItsField) {
   EXPECT_EQ(client.command({})->code(), v1::ERROR_NOT_ALLOWED);
 }
 
-TEST(Client, AnErrorInReplyIsThrownAndTheConnectionGoesOn) {
+TEST(Client, AnErrorReplyIsThrownAndTheConnectionContinues) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
     v1::ServerMessage reply = replyTo(*connection.receive());

@@ -1,4 +1,4 @@
-// What the documents show must be so.
+// Tests that the examples in the documents are true.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -7,7 +7,7 @@
 
 #include "protocol/enfilade.pb.h"
 #include "protocol/framing.hpp"
-#include "protocol/script/script.hpp"
+#include "protocol/script/script_run.hpp"
 
 namespace enfilade::protocol {
 namespace {
@@ -22,7 +22,7 @@ std::string document(const std::string& name) {
   return text.str();
 }
 
-/// What stands in the fenced block that begins with ````mark`.
+/// The content of the fenced block that begins with ````mark`.
 std::string fenced(const std::string& text, const std::string& mark) {
   const std::string fence = "```" + mark + "\n";
   const std::size_t start = text.find(fence);
@@ -45,7 +45,7 @@ Bytes hexBytes(const std::string& block) {
   return bytes;
 }
 
-/// Of a message's fields those that PROTOCOL.md does not name in the given form.
+/// The message's fields that PROTOCOL.md does not name in the given form.
 std::vector<std::string> notNamed(const google::protobuf::Descriptor* message, bool byType) {
   const std::string page = document("PROTOCOL.md");
   std::vector<std::string> missing;
@@ -111,13 +111,13 @@ TEST(Documents, TheClientsBytesOfProtocolMdAreAHello) {
 
 TEST(Documents, TheServersBytesOfProtocolMdAreAFrame) {
   const Bytes bytes = hexBytes(fenced(document("PROTOCOL.md"), "hex server"));
-  Decoder decoder(kClientTakes, Decoder::Expect::messages);
+  Decoder decoder(kClientLimits, Decoder::Expect::messages);
   std::span<const std::uint8_t> rest(bytes);
   const auto message = decoder.next(rest);
   ASSERT_TRUE(message);
   EXPECT_TRUE(rest.empty());
   v1::ServerMessage parsed;
-  ASSERT_TRUE(parse(message->header, parsed));
+  ASSERT_TRUE(parseHeader(message->header, parsed));
   EXPECT_EQ(parsed.reply_to(), 7u);
   EXPECT_EQ(parsed.frame().tick(), 60u);
   EXPECT_EQ(parsed.frame().width(), 2u);

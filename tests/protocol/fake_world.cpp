@@ -27,7 +27,7 @@ std::uint64_t FakeWorld::ticksOf(const std::string& name, const v1::Command& com
   return 1;
 }
 
-/// The first order ends: says so as the real world does.
+/// Ends the first order, with the same reports as the real world.
 void FakeWorld::end(const std::string& name, Avatar& avatar, StepOutcome& outcome) {
   const v1::Command order = avatar.queue.front();
   avatar.queue.pop_front();

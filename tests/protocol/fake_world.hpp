@@ -1,9 +1,9 @@
-// A world of one rule: orders take a fixed number of ticks. It keeps a diary of what it was told at
-// which tick, so that drivers can be compared.
+// A simplified world for tests of drivers: orders take a fixed number of ticks. It logs each
+// command with its tick, so that drivers can be compared.
 //
-// Avatars are told by their names: "stuck..." never arrives, "ghost..." cannot spawn, "restless..."
-// is never idle, "blind..." cannot be captured. A speed above 10 is refused at once. Bodies do as
-// they are told in no time; there is none called "no-...".
+// An avatar's name selects its behaviour: "stuck..." never arrives, "ghost..." cannot spawn,
+// "restless..." is never idle, "blind..." cannot be captured. A speed above 10 is refused at once.
+// Bodies execute commands instantly; no body is called "no-...".
 #pragma once
 
 #include <deque>
@@ -11,13 +11,13 @@
 #include <string>
 #include <vector>
 
-#include "protocol/script/script.hpp"
+#include "protocol/script/script_run.hpp"
 
 namespace enfilade::protocol {
 
 class FakeWorld : public ScriptDriver {
  public:
-  static constexpr std::uint64_t kWalkTicks = 5;   ///< a way point
+  static constexpr std::uint64_t kWalkTicks = 5;   ///< for one waypoint
   static constexpr std::uint64_t kStuckTicks = 3;  ///< until a stuck walker gives up
 
   double tickSeconds() const override { return 1.0 / 60.0; }

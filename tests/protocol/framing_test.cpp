@@ -29,7 +29,7 @@ void append(Bytes& stream, const Bytes& more) {
   stream.insert(stream.end(), more.begin(), more.end());
 }
 
-/// Magic, and three messages: with an attachment, without, and with an empty header.
+/// Magic, and three messages: with an attachment, without one, and with an empty header.
 Bytes sampleStream() {
   Bytes stream(kMagic.begin(), kMagic.end());
   append(stream, encode(walkMessage(3), Bytes{1, 2, 3, 4, 5}));
@@ -55,7 +55,7 @@ bool same(const Outcome& a, const Outcome& b) {
                     });
 }
 
-/// Feeds pieces whose sizes `pieceSize()` gives.
+/// Feeds the stream in pieces of the sizes that `pieceSize()` returns.
 template <typename PieceSize>
 Outcome decodeInPieces(const Bytes& stream, const FramingLimits& limits, PieceSize pieceSize) {
   Decoder decoder(limits);
@@ -82,7 +82,7 @@ std::uint32_t u32At(const Bytes& bytes, std::size_t place) {
   return value;
 }
 
-/// The slow twin: the whole stream lies before it.
+/// Reference implementation: decodes the whole stream at once.
 Outcome decodeWholeStream(const Bytes& stream, const FramingLimits& limits) {
   using Code = FramingError::Code;
   Outcome outcome;
@@ -113,13 +113,13 @@ Outcome decodeWholeStream(const Bytes& stream, const FramingLimits& limits) {
   return outcome;
 }
 
-TEST(Framing, WhatIsEncodedIsDecoded) {
+TEST(Framing, EncodedMessagesAreDecoded) {
   const Outcome outcome = decodeAtOnce(sampleStream(), kSmall);
   ASSERT_FALSE(outcome.error);
   ASSERT_EQ(outcome.messages.size(), 3u);
   EXPECT_TRUE(outcome.betweenMessages);
   v1::ClientMessage first;
-  ASSERT_TRUE(parse(outcome.messages[0].header, first));
+  ASSERT_TRUE(parseHeader(outcome.messages[0].header, first));
   EXPECT_EQ(first.SerializeAsString(), walkMessage(3).SerializeAsString());
   EXPECT_EQ(outcome.messages[0].attachment, (Bytes{1, 2, 3, 4, 5}));
   EXPECT_TRUE(outcome.messages[1].attachment.empty());
@@ -152,7 +152,7 @@ TEST(Framing, ATruncatedStreamGivesItsWholeMessagesAndNoError) {
   EXPECT_EQ(between, 4u);  // after the magic and after each message
 }
 
-TEST(Framing, LengthsAreLittleEndianAndTotalCountsWhatFollowsIt) {
+TEST(Framing, LengthsAreLittleEndianAndTotalCountsTheFollowingBytes) {
   const Bytes bytes = encode(v1::ClientMessage{}, Bytes(0x0102, 1));
   EXPECT_EQ(Bytes(bytes.begin(), bytes.begin() + 8), (Bytes{6, 1, 0, 0, 0, 0, 0, 0}));
   EXPECT_EQ(bytes.size(), 4u + 0x0106u);
@@ -180,7 +180,7 @@ TEST(Framing, AMessageAboveTheLimitIsRefusedByItsLengthAlone) {
   }
 }
 
-TEST(Framing, AHeaderAboveTheLimitIsRefusedWhereItsLengthStands) {
+TEST(Framing, AHeaderAboveTheLimitIsRefusedAtItsLength) {
   EXPECT_FALSE(decodeLengths(4000, 1024).error);
   const Outcome outcome = decodeLengths(4000, 1025);
   ASSERT_TRUE(outcome.error);
@@ -212,7 +212,7 @@ TEST(Framing, TheFirstWrongByteOfTheMagicIsEnough) {
   EXPECT_NE(http.error->reason.find("GET "), std::string::npos);
 }
 
-TEST(Framing, AClaimedLengthTakesNoRoomBeforeItsBytesCome) {
+TEST(Framing, AClaimedLengthAllocatesNothingBeforeItsBytesArrive) {
   Decoder decoder({1u << 30, 1u << 30}, Decoder::Expect::messages);
   const Bytes lengths{0, 0, 0, 0x20, 0, 0, 0, 0x10};  // half a gibibyte
   std::span<const std::uint8_t> piece(lengths);
@@ -225,7 +225,7 @@ TEST(Framing, AClaimedLengthTakesNoRoomBeforeItsBytesCome) {
   EXPECT_LE(decoder.bytesHeld(), 2000u);
 }
 
-TEST(Framing, AfterAnErrorNothingIsTaken) {
+TEST(Framing, AfterAnErrorNothingIsAccepted) {
   Decoder decoder(kSmall);
   const Bytes stream{'X', 'Y'};
   std::span<const std::uint8_t> piece(stream);
@@ -263,7 +263,7 @@ Bytes corrupted(Bytes stream, std::mt19937& random) {
   return stream;
 }
 
-TEST(Framing, CorruptStreamsDecodeAsTheSlowTwinSays) {
+TEST(Framing, CorruptStreamsDecodeAsTheReferenceDecoderSays) {
   std::mt19937 random(20'000);
   const Bytes sound = sampleStream();
   constexpr int kStreams = 20'000;
@@ -276,12 +276,12 @@ TEST(Framing, CorruptStreamsDecodeAsTheSlowTwinSays) {
     ASSERT_TRUE(same(outcome, expected)) << "stream " << i;
     errors += outcome.error ? 1 : 0;
     messages += outcome.messages.size() == 3 ? 1 : 0;
-    for (const Message& message : outcome.messages) {  // parsing them must not fall over either
+    for (const Message& message : outcome.messages) {  // parsing them must not crash, either
       v1::ClientMessage parsed;
-      static_cast<void>(parse(message.header, parsed));
+      static_cast<void>(parseHeader(message.header, parsed));
     }
   }
-  // Neither all broken nor all sound.
+  // Neither all invalid nor all valid.
   EXPECT_GT(errors, kStreams / 20);
   EXPECT_LT(errors, kStreams * 19 / 20);
   EXPECT_GT(messages, kStreams / 20);
@@ -293,26 +293,26 @@ TEST(Framing, AMessageJoinedOfTwoPartsIsTheMessageOfBoth) {
   shared.set_tick(7);
   for (int i = 0; i < 20; ++i) shared.add_notices()->set_text("the shared part is longer than 127");
   const std::string second = shared.SerializeAsString();
-  auto bytes = encodeHeadOfJoined(v1::ServerMessage::kEventsFieldNumber, own.SerializeAsString(),
-                                  second.size());
+  auto bytes = encodeSplicedHead(v1::ServerMessage::kEventsFieldNumber, own.SerializeAsString(),
+                                 second.size());
   bytes.insert(bytes.end(), second.begin(), second.end());
   v1::ServerMessage whole;
   *whole.mutable_events() = shared;
   whole.mutable_events()->set_sequence(300);
-  Decoder decoder(kClientTakes, Decoder::Expect::messages);
+  Decoder decoder(kClientLimits, Decoder::Expect::messages);
   std::span<const std::uint8_t> unread(bytes);
   const auto message = decoder.next(unread);
   ASSERT_TRUE(message);
   v1::ServerMessage parsed;
-  ASSERT_TRUE(parse(message->header, parsed));
+  ASSERT_TRUE(parseHeader(message->header, parsed));
   EXPECT_EQ(parsed.SerializeAsString(), whole.SerializeAsString());
 }
 
-TEST(Version, ItsMajorNumberIsWhatStandsBeforeTheFirstDot) {
-  EXPECT_EQ(majorOf(kVersion), kMajorVersion);
-  EXPECT_EQ(majorOf("12.0.0-rc.1"), 12);
+TEST(Version, TheMajorNumberPrecedesTheFirstDot) {
+  EXPECT_EQ(parseMajorVersion(kVersion), kMajorVersion);
+  EXPECT_EQ(parseMajorVersion("12.0.0-rc.1"), 12);
   for (const char* none : {"", ".", ".1", "1", "x.1", " 1.0", "1x.0", "99999999999.0"}) {
-    EXPECT_EQ(majorOf(none), -1) << none;
+    EXPECT_EQ(parseMajorVersion(none), -1) << none;
   }
 }
 

@@ -1,5 +1,5 @@
-// Recordings as files: what is written is read, a file that was cut off is read as far as it is
-// whole, and no spoilt bit passes for what was written.
+// Tests of MCAP files: written items are read back, a truncated file is read up to its last whole
+// chunk, and every flipped bit is detected.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -31,7 +31,7 @@ std::vector<Item> itemsOf(std::size_t count) {
   return items;
 }
 
-/// Many small chunks, so that a file has all that a long one has.
+/// Many small chunks, so that a short file has all features of a long one.
 WriterOptions smallChunks() {
   return {"mcap_test", 700, std::chrono::hours(1)};
 }
@@ -86,7 +86,7 @@ bool isPrefix(const std::vector<Item>& part, const std::vector<Item>& whole) {
   return part.size() <= whole.size() && std::equal(part.begin(), part.end(), whole.begin());
 }
 
-TEST(Mcap, GivesBackWhatWasWrittenInItsOrder) {
+TEST(Mcap, ReadsMessagesInTheirWrittenOrder) {
   const auto items = itemsOf(500);
   const auto file = fileFor("back");
   put(file, closedFile(items));
@@ -97,20 +97,20 @@ TEST(Mcap, GivesBackWhatWasWrittenInItsOrder) {
   EXPECT_EQ(read.whole, std::filesystem::file_size(file));
 }
 
-TEST(Mcap, TellsChannelsSequencesAndWhoWrote) {
+TEST(Mcap, ReportsChannelsSequencesAndTheWriter) {
   const auto file = fileFor("channels");
   put(file, closedFile(itemsOf(4)));
   Reader reader(file);
   EXPECT_EQ(reader.library(), "mcap_test");
-  std::vector<std::string> told;
+  std::vector<std::string> texts;
   while (const auto message = reader.next())
-    told.push_back(message->channel->topic + " " + message->channel->schemaName + " " +
-                   std::to_string(message->sequence));
-  EXPECT_EQ(told,
+    texts.push_back(message->channel->topic + " " + message->channel->schemaName + " " +
+                    std::to_string(message->sequence));
+  EXPECT_EQ(texts,
             (std::vector<std::string>{"/even Even 1", "/odd Odd 1", "/even Even 2", "/odd Odd 2"}));
 }
 
-TEST(Mcap, WithoutAMessageItIsStillAFile) {
+TEST(Mcap, AFileWithoutMessagesIsValid) {
   const auto file = fileFor("nothing");
   put(file, closedFile({}));
   const Read read = readAll(file);
@@ -119,7 +119,7 @@ TEST(Mcap, WithoutAMessageItIsStillAFile) {
   EXPECT_TRUE(read.items.empty());
 }
 
-TEST(Mcap, CutOffAnywhereItIsReadUpToTheLastWholeChunk) {
+TEST(Mcap, ATruncatedFileIsReadUpToTheLastCompleteChunk) {
   const auto items = itemsOf(200);
   const std::string bytes = closedFile(items);
   const auto file = fileFor("cut");
@@ -138,7 +138,7 @@ TEST(Mcap, CutOffAnywhereItIsReadUpToTheLastWholeChunk) {
   EXPECT_GT(most, items.size() / 2);
 }
 
-TEST(Mcap, ASpoiltBitIsTold) {
+TEST(Mcap, AFlippedBitIsReported) {
   const auto items = itemsOf(60);
   const std::string bytes = closedFile(items);
   const auto file = fileFor("flip");
@@ -149,13 +149,13 @@ TEST(Mcap, ASpoiltBitIsTold) {
     spoilt[at] = static_cast<char>(spoilt[at] ^ (1 << (random() % 8)));
     put(file, spoilt);
     const Read read = readAll(file);
-    // An error, or the words that the file ends early; and never other data.
+    // An error, or the report that the file ends early; and never other data.
     ASSERT_TRUE(!read.error.empty() || !read.closed) << "byte " << at;
     ASSERT_TRUE(isPrefix(read.items, items)) << "byte " << at;
   }
 }
 
-TEST(Mcap, ABitSpoiltInAFileThatWasCutOffIsNeverOtherData) {
+TEST(Mcap, AFlippedBitInATruncatedFileNeverChangesData) {
   const auto items = itemsOf(60);
   const std::string whole = closedFile(items);
   const std::string bytes = whole.substr(0, whole.size() / 2);
@@ -170,21 +170,21 @@ TEST(Mcap, ABitSpoiltInAFileThatWasCutOffIsNeverOtherData) {
   }
 }
 
-TEST(Mcap, BytesAfterTheEndAreTold) {
+TEST(Mcap, BytesAfterTheEndAreReported) {
   const auto file = fileFor("after");
   put(file, closedFile(itemsOf(5)) + "x");
-  EXPECT_NE(readAll(file).error.find("does not end as an MCAP file"), std::string::npos);
+  EXPECT_NE(readAll(file).error.find("the closing magic bytes are missing"), std::string::npos);
 }
 
 TEST(Mcap, OtherFilesAreNamedAndRefused) {
   const auto file = fileFor("other");
   put(file, "this is a text, and no recording");
-  EXPECT_NE(readAll(file).error.find(file.string() + ": at byte 0: this is no MCAP file"),
+  EXPECT_NE(readAll(file).error.find(file.string() + ": at byte 0: not an MCAP file"),
             std::string::npos);
   EXPECT_NE(readAll(fileFor("missing")).error.find("cannot be read"), std::string::npos);
 }
 
-TEST(Mcap, WhatIsFlushedIsThereThoughNobodyClosesIt) {
+TEST(Mcap, FlushedDataIsReadableWithoutClose) {
   const auto items = itemsOf(9);
   const auto file = fileFor("flushed");
   Writer writer(file, smallChunks());
@@ -195,7 +195,7 @@ TEST(Mcap, WhatIsFlushedIsThereThoughNobodyClosesIt) {
   EXPECT_FALSE(read.closed);
 }
 
-/// Files of this process may not grow beyond a size, as on a full disk.
+/// Limits the size of this process's files, as on a full disk.
 class FullDisk {
  public:
   explicit FullDisk(rlim_t bytes) {
@@ -216,22 +216,22 @@ class FullDisk {
   void (*handler_)(int) = nullptr;
 };
 
-TEST(Mcap, AFullDiskIsToldOnceAndLeavesAFileThatCanBeRead) {
+TEST(Mcap, AFullDiskIsReportedOnceAndLeavesAReadableFile) {
   const auto items = itemsOf(400);
   const auto file = fileFor("full");
-  std::string told;
+  std::string message;
   {
     const FullDisk disk(6000);
     Writer writer(file, smallChunks());
     try {
       writeAll(writer, items);
     } catch (const RecordingError& error) {
-      told = error.what();
+      message = error.what();
     }
     EXPECT_NO_THROW(writer.write(1, 0, "after the end"));
     EXPECT_NO_THROW(writer.close());
   }
-  EXPECT_NE(told.find(file.string() + ": File too large"), std::string::npos) << told;
+  EXPECT_NE(message.find(file.string() + ": File too large"), std::string::npos) << message;
   const Read read = readAll(file);
   EXPECT_EQ(read.error, "");
   EXPECT_FALSE(read.items.empty());

@@ -1,4 +1,4 @@
-// Recordings of a world: the messages, and where two states differ.
+// Tests of recording messages, and of the first difference between two states.
 #include "protocol/recording/recording.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ v1::State stateOf(std::uint64_t tick) {
   return state;
 }
 
-TEST(Recording, GivesBackItsMessagesInOrder) {
+TEST(Recording, ReturnsItsMessagesInOrder) {
   const auto file = tests::ownFile("messages.mcap");
   v1::RecordingStart start;
   start.set_scene_file("/models/house.glb");
@@ -53,39 +53,39 @@ TEST(Recording, GivesBackItsMessagesInOrder) {
 }
 
 TEST(Recording, EqualStatesDoNotDiffer) {
-  EXPECT_FALSE(firstDifference(stateOf(3), stateOf(3)));
+  EXPECT_FALSE(findFirstDifference(stateOf(3), stateOf(3)));
 }
 
-TEST(Recording, ADifferenceNamesWhoWhichFieldAndBothValues) {
+TEST(Recording, ADifferenceNamesEntityFieldAndBothValues) {
   v1::State other = stateOf(3);
   other.mutable_avatars(0)->mutable_feet()->set_x(1.5000000000000002);
   other.mutable_bodies(0)->set_coordinate(0.5);
-  auto found = firstDifference(stateOf(3), other);
+  auto found = findFirstDifference(stateOf(3), other);
   ASSERT_TRUE(found);
-  EXPECT_EQ(found->who, "ann");
+  EXPECT_EQ(found->entity, "ann");
   EXPECT_EQ(found->field, "feet.x");
   EXPECT_EQ(found->recorded, "1.5");
   EXPECT_EQ(found->replayed, "1.5000000000000002");
   other.mutable_avatars(0)->mutable_feet()->set_x(1.5);
-  found = firstDifference(stateOf(3), other);
+  found = findFirstDifference(stateOf(3), other);
   ASSERT_TRUE(found);
-  EXPECT_EQ(found->who + " " + found->field + " " + found->recorded + " " + found->replayed,
+  EXPECT_EQ(found->entity + " " + found->field + " " + found->recorded + " " + found->replayed,
             "door coordinate 0.25 0.5");
 }
 
-TEST(Recording, WhoIsMissingIsNamed) {
+TEST(Recording, AMissingEntityIsNamed) {
   v1::State other = stateOf(3);
   other.clear_avatars();
-  const auto found = firstDifference(stateOf(3), other);
+  const auto found = findFirstDifference(stateOf(3), other);
   ASSERT_TRUE(found);
-  EXPECT_EQ(found->who, "ann");
-  EXPECT_EQ(found->replayed, "nobody");
+  EXPECT_EQ(found->entity, "ann");
+  EXPECT_EQ(found->replayed, "absent");
 }
 
-TEST(Recording, WhatOnlyTheHashKnowsIsADifferenceToo) {
+TEST(Recording, ADifferenceOfTheHashAloneIsReported) {
   v1::State other = stateOf(3);
   other.set_hash(0x1235);
-  const auto found = firstDifference(stateOf(3), other);
+  const auto found = findFirstDifference(stateOf(3), other);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->field, "state hash");
   EXPECT_EQ(found->recorded, "0000000000001234");

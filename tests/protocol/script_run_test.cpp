@@ -12,7 +12,7 @@ Script script(std::string_view text) {
   return parseScript(text, "tour.jsonl");
 }
 
-/// The ticks at which `world` was told something, with the tags of what it was told.
+/// The ticks at which `world` received commands, with the commands' tags.
 std::vector<std::string> diaryStarts(const FakeWorld& world) {
   std::vector<std::string> starts;
   for (const std::string& entry : world.diary()) {
@@ -88,7 +88,7 @@ TEST(RunScript, AnEmptyScriptMakesNoTick) {
   EXPECT_EQ(runScript(script("# nothing\n"), world).ticks, 0u);
 }
 
-TEST(RunScript, ARefusedCommandIsToldWithItsLineAndTheScriptGoesOn) {
+TEST(RunScript, ARefusedCommandIsReportedWithItsLineAndTheScriptContinues) {
   FakeWorld world;
   const ScriptResult result = runScript(script(R"({"spawn":"ann","at":[0,0,0]}
 
@@ -104,7 +104,7 @@ TEST(RunScript, ARefusedCommandIsToldWithItsLineAndTheScriptGoesOn) {
   EXPECT_EQ(result.outcomes[0].text, "tour.jsonl:3: ann: refused: speed: too fast");
 }
 
-TEST(RunScript, ARefusedSpawnTellsWhatIsDroppedWithIt) {
+TEST(RunScript, ARefusedSpawnReportsTheDroppedLines) {
   FakeWorld world;
   const ScriptResult result = runScript(script(R"({"spawn":"ghost","at":[0,0,0]}
 {"walk":"ghost","to":[1,0,0]}
@@ -122,7 +122,7 @@ TEST(RunScript, ARefusedSpawnTellsWhatIsDroppedWithIt) {
   EXPECT_EQ(result.outcomes[1].kind, LineOutcome::Kind::dropped);
 }
 
-TEST(RunScript, WhatFollowsARefusedSpawnIsToldInOneLine) {
+TEST(RunScript, LinesAfterARefusedSpawnAreReportedInOneLine) {
   FakeWorld world;
   const ScriptResult result = runScript(script(R"({"spawn":"ghost","at":[0,0,0]}
 {"walk":"ghost","to":[1,0,0]}
@@ -137,8 +137,8 @@ TEST(RunScript, WhatFollowsARefusedSpawnIsToldInOneLine) {
   ASSERT_EQ(result.outcomes.size(), 2u);
   EXPECT_EQ(
       result.outcomes[1].text,
-      "tour.jsonl:2: ghost: not done: its spawn of line 1 was refused; nor is what it is told "
-      "in 2 lines more");
+      "tour.jsonl:2: ghost: not done: its spawn of line 1 was refused, and 2 more lines of this "
+      "avatar were dropped");
 }
 
 TEST(RunScript, ABlockedWalkNamesItsObstacleAndTheNextCommandBegins) {
@@ -156,7 +156,7 @@ TEST(RunScript, ABlockedWalkNamesItsObstacleAndTheNextCommandBegins) {
             "tour.jsonl:2: stuck: blocked by Hall/Table#2 at (4.00, 0.00, 0.00)");
 }
 
-TEST(RunScript, CapturesAreOfTheTickInWhichTheirTurnCame) {
+TEST(RunScript, CapturesShowTheTickInWhichTheyRun) {
   FakeWorld world;
   std::vector<std::string> frames;
   const ScriptResult result =
@@ -181,7 +181,7 @@ TEST(RunScript, CapturesAreOfTheTickInWhichTheirTurnCame) {
   EXPECT_EQ(result.outcomes[0].text, "tour.jsonl:6: blind: no picture \"none\": no renderer");
 }
 
-TEST(RunScript, AWaitThatNeverEndsIsBoundedAndTold) {
+TEST(RunScript, AnEndlessWaitIsBoundedAndReported) {
   FakeWorld world;
   const ScriptResult result = runScript(script(R"({"spawn":"restless","at":[0,0,0]}
 {"wait":1}
@@ -194,8 +194,8 @@ TEST(RunScript, AWaitThatNeverEndsIsBoundedAndTold) {
   ASSERT_EQ(result.outcomes.size(), 2u);
   EXPECT_EQ(result.outcomes[0].kind, LineOutcome::Kind::unfinished);
   EXPECT_EQ(result.outcomes[0].text,
-            "tour.jsonl:2: after 10 s of simulated time somebody still falls, or a body moves "
-            "({\"body\":NAME,\"do\":\"stop\"} stops one); the script goes on");
+            "tour.jsonl:2: after 10 s of simulated time an avatar still falls, or a body moves "
+            "({\"body\":NAME,\"do\":\"stop\"} stops one); the script continues");
   EXPECT_EQ(result.outcomes[1].line, 3u);
 }
 
@@ -243,7 +243,7 @@ TEST(RunScript, NoticesOfOthersEndNoLine) {
   EXPECT_TRUE(result.outcomes.empty());
 }
 
-TEST(RunScript, WhatTheDriverThrowsPassesThrough) {
+TEST(RunScript, ExceptionsOfTheDriverPassThrough) {
   struct Broken : FakeWorld {
     StepOutcome step() override { throw std::runtime_error("gone"); }
   } world;

@@ -1,4 +1,4 @@
-#include "protocol/script/script.hpp"
+#include "protocol/script/script_run.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 namespace enfilade::protocol {
 namespace {
 
-/// The message of the error that `text` must make; "" when there was none.
+/// The error message for `text`; "" if it is valid.
 std::string errorOf(std::string_view text) {
   try {
     parseScript(text, "tour.jsonl");
@@ -28,16 +28,16 @@ void expectError(std::string_view text, const std::string& start) {
 v1::Command onlyCommand(std::string_view text) {
   const Script script = parseScript(text, "tour.jsonl");
   EXPECT_EQ(script.lines.size(), 1u);
-  return std::get<v1::Command>(script.lines.at(0).what);
+  return std::get<v1::Command>(script.lines.at(0).action);
 }
 
-TEST(Script, ANestOfBracketsIsAMistakeAndEndsNothing) {
+TEST(Script, DeeplyNestedBracketsAreAnError) {
   const std::string nest = std::string(200'000, '[') + std::string(200'000, ']');
   for (const std::string& line : {nest, R"({"walk":"ann","to":)" + nest + "}"})
-    EXPECT_TRUE(errorOf(line).ends_with("so deep a nest of lists"));
+    EXPECT_TRUE(errorOf(line).ends_with("a too deeply nested value"));
 }
 
-TEST(Script, ASpawnHasItsPlaceAndWhatElseIsGiven) {
+TEST(Script, ASpawnHasItsPositionAndOptions) {
   const v1::Command plain = onlyCommand(R"({"spawn":"ann","at":[1,-2.5,3e2]})");
   EXPECT_EQ(plain.avatar(), "ann");
   EXPECT_EQ(plain.tag(), 1u);
@@ -77,7 +77,7 @@ TEST(Script, LookWaitCaptureAndLeaveAreRead) {
 
 TEST(Script, AWaitWithoutForIsForAll) {
   const Script script = parseScript(R"({"wait":2})", "s");
-  EXPECT_EQ(std::get<GlobalWait>(script.lines.at(0).what).seconds, 2);
+  EXPECT_EQ(std::get<GlobalWait>(script.lines.at(0).action).seconds, 2);
 }
 
 TEST(Script, BlankLinesCommentsBomAndCarriageReturnsAreTolerated) {
@@ -88,12 +88,12 @@ TEST(Script, BlankLinesCommentsBomAndCarriageReturnsAreTolerated) {
   ASSERT_EQ(script.lines.size(), 2u);
   EXPECT_EQ(script.lines[0].number, 4u);
   EXPECT_EQ(script.lines[1].number, 7u);
-  EXPECT_EQ(std::get<v1::Command>(script.lines[1].what).tag(), 7u);
+  EXPECT_EQ(std::get<v1::Command>(script.lines[1].action).tag(), 7u);
   EXPECT_TRUE(parseScript("", "s").lines.empty());
   EXPECT_TRUE(parseScript("\xEF\xBB\xBF", "s").lines.empty());
 }
 
-TEST(Script, WrongTypesAreToldWithTheField) {
+TEST(Script, WrongTypesAreReportedWithTheField) {
   expectError(R"({"walk":"ann","to":"door"})",
               "tour.jsonl:1: to: must be three numbers [x, y, z] in metres, not \"door\"");
   expectError(R"({"walk":"ann","to":[1,2]})", "tour.jsonl:1: to: must be three numbers");
@@ -109,40 +109,40 @@ TEST(Script, WrongTypesAreToldWithTheField) {
   expectError(R"([1,2])", "tour.jsonl:1: must be an object");
 }
 
-TEST(Script, MissingKeysAreToldWithWhatToAdd) {
+TEST(Script, MissingKeysAreReportedWithARemedy) {
   expectError(R"({"spawn":"ann"})", R"(tour.jsonl:1: at: is missing; add "at":[x,y,z])");
   expectError(R"({"look":"ann"})", "tour.jsonl:1: at: is missing");
   expectError(R"({"walk":"ann"})", "tour.jsonl:1: to: is missing");
   expectError(R"({"capture":"ann"})", "tour.jsonl:1: as: is missing");
-  expectError(R"({})", "tour.jsonl:1: no command; a line has one of spawn, walk, look");
+  expectError(R"({})", "tour.jsonl:1: no command; a line needs one of spawn, walk, look");
   expectError(R"({"for":"ann"})", "tour.jsonl:1: no command");
 }
 
-TEST(Script, UnknownDoubledAndContradictingKeysAreTold) {
+TEST(Script, UnknownRepeatedAndConflictingKeysAreReported) {
   expectError(R"({"walk":"ann","to":[1,2,3],"sped":2})",
-              R"(tour.jsonl:1: "sped" is no key of a line that says walk; its keys are walk, to)");
+              R"(tour.jsonl:1: "sped" is not a key of the command walk; its keys are walk, to)");
   expectError(R"({"hop":"ann"})", "tour.jsonl:1: no command");
-  expectError(R"({"leave":"ann","leave":"bob"})", "tour.jsonl:1: leave: stands twice");
+  expectError(R"({"leave":"ann","leave":"bob"})", "tour.jsonl:1: leave: occurs twice");
   expectError(R"({"walk":"ann","to":[1,2,3],"along":[[1,2,3]]})",
-              R"(tour.jsonl:1: to: stands beside "along")");
+              R"(tour.jsonl:1: to: cannot be combined with "along")");
   expectError(R"({"walk":"ann","leave":"ann"})",
-              R"(tour.jsonl:1: "walk" and "leave" stand in one line)");
+              R"(tour.jsonl:1: "walk" and "leave" are in one line)");
 }
 
-TEST(Script, NumbersThatAreNoneAreRefused) {
+TEST(Script, NonFiniteNumbersAreRefused) {
   for (const char* bad : {"NaN", "nan", "Infinity", "-inf", "1e", "0x10", "+1", "01", ".5"}) {
     expectError(R"({"wait":)" + std::string(bad) + "}", "tour.jsonl:1: is not JSON at column ");
   }
   for (const char* huge : {"1e400", "-1e400", "1e999999999"}) {
     expectError(R"({"walk":"ann","to":[0,0,)" + std::string(huge) + "]}",
-                "tour.jsonl:1: a number is beyond what a double holds");
+                "tour.jsonl:1: a number exceeds the range of a double");
   }
   expectError(R"({"wait":-1})", "tour.jsonl:1: wait: -1 is out of range");
   expectError(R"({"wait":1e300})", "tour.jsonl:1: wait: ");
   expectError(R"({"wait":-0.1,"for":"ann"})", "tour.jsonl:1: wait: -0.1 is out of range");
 }
 
-TEST(Script, NumbersThatNoWorldTakesAreFoundBeforeAnythingMoves) {
+TEST(Script, NumbersOutOfRangeAreRefusedBeforeTheWalk) {
   expectError(R"({"spawn":"a","at":[2e7,0,0]})", "tour.jsonl:1: at.x: ");
   expectError(R"({"spawn":"a","at":[0,0,0],"radius":0.01})", "tour.jsonl:1: radius: ");
   expectError(R"({"spawn":"a","at":[0,0,0],"height":11})", "tour.jsonl:1: height: ");
@@ -197,7 +197,7 @@ TEST(Script, ASpawnHasPartsAndLinks) {
   expectError(R"({"spawn":"a","at":[0,0,0],"links":[{"joint":"revolute","axis":[0,1,0]}]})",
               "tour.jsonl:1: links[0]: must have either");
   expectError(R"({"spawn":"a","at":[0,0,0],"links":[{"joint":"revolute","axes":[0,1,0]}]})",
-              R"(tour.jsonl:1: links[0]: "axes" is no key)");
+              R"(tour.jsonl:1: links[0]: "axes" is not a key)");
   expectError(R"({"spawn":"a","at":[0,0,0],"parts":[{"box":[[0,0,0]]}]})",
               "tour.jsonl:1: parts[0].box: must be two");
 }
@@ -205,10 +205,10 @@ TEST(Script, ASpawnHasPartsAndLinks) {
 v1::BodyCommand onlyBodyCommand(std::string_view text) {
   const Script script = parseScript(text, "tour.jsonl");
   EXPECT_EQ(script.lines.size(), 1u);
-  return std::get<v1::BodyCommand>(script.lines.at(0).what);
+  return std::get<v1::BodyCommand>(script.lines.at(0).action);
 }
 
-TEST(Script, ABodyIsToldWhatToDoInItsOwnUnits) {
+TEST(Script, ABodyCommandUsesTheBodysUnits) {
   const v1::BodyCommand open = onlyBodyCommand(R"({"body":"Hall/Front door","do":"open"})");
   EXPECT_EQ(open.body(), "Hall/Front door");
   EXPECT_TRUE(open.has_open());
@@ -227,7 +227,7 @@ TEST(Script, ABodyIsToldWhatToDoInItsOwnUnits) {
   EXPECT_EQ(onlyBodyCommand(R"({"body":"lift","level":10000})").level(), 10000u);
 }
 
-TEST(Script, ABodyLineThatMakesNoSenseIsToldWithItsField) {
+TEST(Script, AnInvalidBodyLineIsReportedWithItsField) {
   expectError(R"({"body":7,"do":"open"})", "tour.jsonl:1: body: must be a body's name in quotes");
   expectError(R"({"body":"","do":"open"})", "tour.jsonl:1: body: must have 1 to");
   expectError(R"({"body":"d"})", R"(tour.jsonl:1: body: needs one of "do", "to", "turn")");
@@ -235,7 +235,7 @@ TEST(Script, ABodyLineThatMakesNoSenseIsToldWithItsField) {
   expectError(R"({"body":"d","do":"dance"})", R"(tour.jsonl:1: do: must be "open", "close")");
   expectError(R"({"body":"d","do":1})", "tour.jsonl:1: do: must be");
   expectError(R"({"body":"d","to":"up"})", "tour.jsonl:1: to: must be a number of metres");
-  expectError(R"({"body":"d","to":1e999})", "tour.jsonl:1: a number is beyond");
+  expectError(R"({"body":"d","to":1e999})", "tour.jsonl:1: a number exceeds");
   expectError(R"({"body":"d","turn":NaN})", "tour.jsonl:1: is not JSON");
   expectError(R"({"body":"d","level":-1})", "tour.jsonl:1: level: must be a whole number");
   expectError(R"({"body":"d","level":1.5})", "tour.jsonl:1: level: must be a whole number");
@@ -245,8 +245,8 @@ TEST(Script, ABodyLineThatMakesNoSenseIsToldWithItsField) {
   expectError(R"({"body":"d","turn":1,"turn_speed":-3})",
               "tour.jsonl:1: turn_speed: -3 is out of range");
   expectError(R"({"body":"d","turn":1,"speed":1,"turn_speed":3})",
-              R"(tour.jsonl:1: speed: stands beside "turn_speed")");
-  expectError(R"({"body":"d","do":"open","at":[0,0,0]})", R"(tour.jsonl:1: "at" is no key)");
+              R"(tour.jsonl:1: speed: conflicts with "turn_speed")");
+  expectError(R"({"body":"d","do":"open","at":[0,0,0]})", R"(tour.jsonl:1: "at" is not a key)");
 }
 
 TEST(Script, NamesAreShortAndFitForFiles) {
@@ -257,10 +257,10 @@ TEST(Script, NamesAreShortAndFitForFiles) {
     expectError(R"({"capture":"ann","as":")" + std::string(bad) + "\"}", "tour.jsonl:1: as: ");
   }
   expectError("{\"capture\":\"ann\",\"as\":\"a\"}\n\n{\"capture\":\"bob\",\"as\":\"a\"}",
-              R"(tour.jsonl:3: as: "a" is already the picture of line 1)");
+              R"(tour.jsonl:3: as: "a" is already used in line 1)");
 }
 
-TEST(Script, WhatIsNotOneObjectALineIsRefused) {
+TEST(Script, LinesWithoutExactlyOneObjectAreRefused) {
   expectError(R"({"wait":1} x)", "tour.jsonl:1: is not JSON at column 12");
   expectError(R"({"wait":1}{"wait":1})", "tour.jsonl:1: is not JSON");
   expectError(R"({"wait":1},)", "tour.jsonl:1: is not JSON");
@@ -278,7 +278,7 @@ TEST(Script, BytesThatAreNotUtf8AreRefusedEvenInComments) {
   expectError("\xFF\xFE{\0", "tour.jsonl:1: is not UTF-8");
 }
 
-TEST(Script, EveryBadLineIsToldWithItsNumber) {
+TEST(Script, EveryBadLineIsReportedWithItsNumber) {
   const std::string text = "{\"wait\":1}\n\nnonsense\n{\"leave\":\"\"}\n{\"leave\":\"ann\"}\n";
   const std::string error = errorOf(text);
   EXPECT_NE(error.find("tour.jsonl:3: is not JSON"), std::string::npos) << error;

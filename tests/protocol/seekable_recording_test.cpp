@@ -1,5 +1,5 @@
-// Recordings that are read here and there: what a reader from front to back finds, without reading
-// it all.
+// Tests of recordings with random access: results equal those of a sequential reader, without
+// reading the whole file.
 #include "protocol/recording/seekable_recording.hpp"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ v1::State stateOf(std::uint64_t tick) {
   state.set_tick(tick);
   state.set_time(static_cast<double>(tick) * kTick);
   state.set_hash(tick * 0x9E3779B97F4A7C15u);
-  for (int i = 0; i < 5; ++i) {  // some bytes that do not pack well
+  for (int i = 0; i < 5; ++i) {  // some bytes that do not compress well
     state.add_avatars()->mutable_feet()->set_x(1 / static_cast<double>(tick * 7 + i + 1));
   }
   return state;
@@ -44,7 +44,8 @@ void writeTick(RecordingWriter& writer, std::uint64_t tick, bool checkpoint) {
   writer.write(made, static_cast<double>(tick) * kTick);
 }
 
-/// `first`: where a branch begins; 0: no branch. Returns the ticks of its checkpoints.
+/// Writes one run. `first`: first tick of a branch; 0: no branch. Returns the ticks of its
+/// checkpoints.
 std::vector<std::uint64_t> writeRun(RecordingWriter& writer, std::uint64_t first,
                                     std::uint64_t last) {
   std::vector<std::uint64_t> checkpoints;
@@ -74,7 +75,7 @@ Written written(const std::string& name, std::uint64_t first, std::uint64_t last
     writer.close();
     return made;
   }
-  // As a kill leaves it: everything but what closing adds.
+  // As after a kill: everything except the records that closing adds.
   const auto size = writer.bytesWritten();
   writer.close();
   std::filesystem::resize_file(made.file, size);
@@ -112,7 +113,7 @@ void expectSeeks(const Written& made, std::uint64_t first, std::uint64_t last,
   EXPECT_FALSE(recording.next());
 }
 
-TEST(SeekableRecording, GoesOnAfterAnyTickWithTheCheckpointBeforeIt) {
+TEST(SeekableRecording, ResumesAfterAnyTickFromTheCheckpointBeforeIt) {
   expectSeeks(written("seek", 0, 3000, true), 0, 3000);
 }
 
@@ -120,7 +121,7 @@ TEST(SeekableRecording, ABranchBeginsWhereItLeftItsParent) {
   expectSeeks(written("seek_branch", 777, 2000, true), 777, 2000);
 }
 
-/// As tests of agents make them: one short run after the other.
+/// One short run after another, as tests of agents record them.
 TEST(SeekableRecording, EachRunOfAFileIsReadAloneFromAnyTickOn) {
   const std::vector<std::uint64_t> lasts{1700, 3, 1, 2, 1200};
   const auto file = tests::ownFile("runs.mcap");
@@ -150,7 +151,7 @@ TEST(SeekableRecording, EachRunOfAFileIsReadAloneFromAnyTickOn) {
     SeekableRecording(file, 6);
     ADD_FAILURE() << "there are five";
   } catch (const mcap::RecordingError& error) {
-    EXPECT_NE(std::string(error.what()).find("no run 6 in it; give one from 1 to 5"),
+    EXPECT_NE(std::string(error.what()).find("no run 6 in it; give a run from 1 to 5"),
               std::string::npos)
         << error.what();
   }
@@ -186,36 +187,36 @@ TEST(SeekableRecording, AFileThatWasCutAnywhereIsReadAsFarAsItIsWhole) {
   EXPECT_GT(before, 400u);
 }
 
-TEST(SeekableRecording, AFlippedBitInWhatIsReadIsReported) {
+TEST(SeekableRecording, AFlippedBitInReadDataIsReported) {
   const Written made = written("seek_flip", 0, 600, true);
   std::ifstream stream(made.file, std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
   const auto read = [&](const std::string& content) {
-    std::string told;
+    std::string text;
     const auto file = made.file.string() + ".flipped";
     std::ofstream(file, std::ios::binary)
         .write(content.data(), static_cast<std::streamsize>(content.size()));
     SeekableRecording recording(file);
     if (!recording.closed()) return std::string("not closed");
-    if (const auto found = recording.checkpointBefore(600)) told += found->SerializeAsString();
+    if (const auto found = recording.checkpointBefore(600)) text += found->SerializeAsString();
     recording.seek(0);
     while (const auto item = recording.next())
-      told += std::visit([](const auto& message) { return message.SerializeAsString(); }, *item);
-    return told;
+      text += std::visit([](const auto& message) { return message.SerializeAsString(); }, *item);
+    return text;
   };
   const std::string right = read(bytes);
   int reported = 0;
   for (std::size_t i = 0; i < 300; ++i) {
-    std::string spoilt = bytes;
+    std::string flipped = bytes;
     const std::size_t at = (i * 7919 * 31) % bytes.size();
-    spoilt[at] = static_cast<char>(spoilt[at] ^ (1 << (i % 8)));
+    flipped[at] = static_cast<char>(flipped[at] ^ (1 << (i % 8)));
     try {
-      const std::string told = read(spoilt);
-      // The header and what ends the data are not asked for; nothing else may pass.
-      if (told != "not closed") {
-        EXPECT_EQ(told, right) << at;
+      const std::string text = read(flipped);
+      // The header and the end of the data are not checked; nothing else may pass.
+      if (text != "not closed") {
+        EXPECT_EQ(text, right) << at;
       }
-      reported += told == "not closed";
+      reported += text == "not closed";
     } catch (const mcap::RecordingError&) {
       ++reported;
     }

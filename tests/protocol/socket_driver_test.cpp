@@ -21,13 +21,13 @@ constexpr const char* kTour = R"({"spawn":"ann","at":[1,0,0]}
 {"leave":"ann"}
 )";
 
-/// Serves a world as the real server does, and remembers which pictures it was asked for.
+/// Serves a world as the real server does, and logs the requested images.
 struct ServedWorld {
   FakeWorld world;
   std::vector<std::string> framesAskedFor;
   v1::Subscribe subscription;
   bool lockstepAsked = false;
-  bool stranger = false;  ///< another client's avatar does things, too
+  bool stranger = false;  ///< another client's avatar is active, too
 
   void serve(TestConnection& connection) {
     connection.greet();
@@ -136,7 +136,7 @@ TEST(SocketDriver, AScriptRunsAsItDoesInProcess) {
   EXPECT_NE(there.outcomes.back().text.find("no EGL here"), std::string::npos);
 }
 
-TEST(SocketDriver, TakesTheClockAndSubscribes) {
+TEST(SocketDriver, SetsTheClockAndSubscribes) {
   ServedWorld served;
   {
     const TestServer server([&](TestConnection& connection) { served.serve(connection); });
@@ -149,14 +149,14 @@ TEST(SocketDriver, TakesTheClockAndSubscribes) {
   EXPECT_TRUE(served.subscription.notices());
 }
 
-TEST(SocketDriver, WhatOtherClientsAvatarsDoIsNotOurs) {
+TEST(SocketDriver, NoticesOfOtherClientsAvatarsAreIgnored) {
   ServedWorld served;
   served.stranger = true;
   const TestServer server([&](TestConnection& connection) { served.serve(connection); });
   Client client("127.0.0.1", server.port());
   SocketDriver driver(client);
   const Script script = parseScript(R"({"spawn":"ann","at":[1,0,0]})", "tour.jsonl");
-  EXPECT_FALSE(driver.submit(std::get<v1::Command>(script.lines.at(0).what)));
+  EXPECT_FALSE(driver.submit(std::get<v1::Command>(script.lines.at(0).action)));
   const StepOutcome outcome = driver.step();
   ASSERT_EQ(outcome.notices.size(), 1u);
   EXPECT_EQ(outcome.notices[0].avatar(), "ann");
@@ -166,7 +166,7 @@ TEST(SocketDriver, WhatOtherClientsAvatarsDoIsNotOurs) {
   EXPECT_EQ(outcome.contacts[1].a(), 13u);  // and an object
 }
 
-TEST(SocketDriver, ACaptureIsAskedForInItsFormat) {
+TEST(SocketDriver, ACaptureIsRequestedInItsFormat) {
   v1::Notice notice;
   notice.set_avatar("ann");
   notice.set_tick(17);
@@ -175,7 +175,7 @@ TEST(SocketDriver, ACaptureIsAskedForInItsFormat) {
   format.height = 200;
   format.channels = {v1::CHANNEL_IDS, v1::CHANNEL_RGB};
   format.rgbEncoding = v1::ENCODING_PNG;
-  const v1::FrameRequest request = captureRequest(notice, format);
+  const v1::FrameRequest request = makeCaptureRequest(notice, format);
   EXPECT_EQ(request.eyes().avatar(), "ann");
   EXPECT_EQ(request.tick(), 17u);
   EXPECT_EQ(request.width(), 320u);

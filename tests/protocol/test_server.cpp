@@ -13,7 +13,7 @@ std::optional<v1::ClientMessage> TestConnection::receive() {
   for (;;) {
     if (const auto message = decoder_.next(unread_)) {
       v1::ClientMessage parsed;
-      if (!parse(message->header, parsed)) {
+      if (!parseHeader(message->header, parsed)) {
         throw std::runtime_error("the client sent what is no ClientMessage");
       }
       return parsed;
@@ -90,7 +90,7 @@ TestServer::TestServer(std::function<void(TestConnection&)> behave)
 }
 
 TestServer::~TestServer() {
-  ::shutdown(listener_, SHUT_RDWR);  // ends an accept() that nobody came for
+  ::shutdown(listener_, SHUT_RDWR);  // ends an accept() without a client
   thread_.join();
   ::close(listener_);
 }

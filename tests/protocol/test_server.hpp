@@ -1,4 +1,4 @@
-// A server of one connection whose behaviour is a function: for testing clients.
+// A server for one connection with a given behaviour, for testing clients.
 #pragma once
 
 #include <cstdint>
@@ -19,18 +19,18 @@ class TestConnection {
  public:
   explicit TestConnection(int descriptor) : descriptor_(descriptor) {}
 
-  /// The client's next message; nullopt when it closed.
+  /// The client's next message; nullopt if it closed.
   std::optional<v1::ClientMessage> receive();
   void sendRaw(std::span<const std::uint8_t> bytes);
   void sendRaw(const std::string& text);
   void send(const v1::ServerMessage& message, std::span<const std::uint8_t> attachment = {});
-  /// Magic, and a Welcome to the Hello that it receives first and gives back.
+  /// Receives Hello, then sends the magic and a Welcome. Returns the Hello.
   v1::ClientMessage greet();
-  void untilClosed();  ///< swallows what comes until the client closes
+  void untilClosed();  ///< discards input until the client closes
 
  private:
   int descriptor_;
-  Decoder decoder_{kServerTakes};
+  Decoder decoder_{kServerLimits};
   std::vector<std::uint8_t> buffer_;
   std::span<const std::uint8_t> unread_;
 };
@@ -39,7 +39,7 @@ v1::ServerMessage welcomeTo(const v1::ClientMessage& hello);
 
 class TestServer {
  public:
-  /// Serves the first connection with `behave` on a thread of its own, then closes it.
+  /// Serves the first connection with `behave` on its own thread, then closes it.
   explicit TestServer(std::function<void(TestConnection&)> behave);
   ~TestServer();  ///< waits for `behave`
   TestServer(const TestServer&) = delete;

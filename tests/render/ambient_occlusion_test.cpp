@@ -8,7 +8,7 @@
 namespace enfilade::render {
 namespace {
 
-constexpr int kWidth = 161, kHeight = 121;  // odd: the last pixel has no point beside it
+constexpr int kWidth = 161, kHeight = 121;  // odd: the last pixel has no neighbour
 
 Camera camera() {
   Camera camera;
@@ -18,17 +18,17 @@ Camera camera() {
   return camera;
 }
 
-/// What is left of each pixel where the depth at (x, y), metres by focal lengths from the middle,
-/// is as told.
+/// The remaining light of each pixel for a given depth image: depth in metres at (x, y), which are
+/// in focal lengths from the centre.
 std::vector<std::uint8_t> leftOf(const std::function<double(double, double)>& depth) {
   std::vector<float> depths;
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x)
       depths.push_back(static_cast<float>(depth((x + 0.5 - 80) / 100, (y + 0.5 - 60) / 100)));
-  const Hollows hollows(depths, camera());
+  const AmbientOcclusion hollows(depths, camera());
   std::vector<std::uint8_t> left(depths.size());
   for (int y = 0; y < kHeight; ++y)
-    hollows.row(y, std::span(left).subspan(static_cast<std::size_t>(y) * kWidth, kWidth));
+    hollows.computeRow(y, std::span(left).subspan(static_cast<std::size_t>(y) * kWidth, kWidth));
   return left;
 }
 
@@ -41,7 +41,7 @@ double corner(double, double y) {
   return std::min(4.0, y > 0 ? 1.5 / y : 1e9);
 }
 
-TEST(Hollows, PlanesHaveNoneHoweverTheyLie) {
+TEST(AmbientOcclusion, PlanesOfAnyOrientationHaveNone) {
   for (const double x : {0.0, 0.4, -0.6}) {
     for (const double y : {0.0, 0.5, -0.6}) {
       const auto left = leftOf([&](double u, double v) { return 3 / (1 + x * u + y * v); });
@@ -50,7 +50,7 @@ TEST(Hollows, PlanesHaveNoneHoweverTheyLie) {
   }
 }
 
-TEST(Hollows, ACornerIsDarkerThanWhatLiesHalfAMetreOff) {
+TEST(AmbientOcclusion, ACornerIsDarkerThanAPointHalfAMetreAway) {
   const auto left = leftOf(corner);
   const int row = 60 + 37;  // where floor and wall meet
   for (const int x : {20, 80, 81, 140}) {
@@ -59,26 +59,26 @@ TEST(Hollows, ACornerIsDarkerThanWhatLiesHalfAMetreOff) {
   }
 }
 
-TEST(Hollows, WhatStandsFarInFrontLeavesNoOutlineOnTheWall) {
+TEST(AmbientOcclusion, ADistantForegroundLeavesNoOutlineOnTheWall) {
   const auto left = leftOf([](double x, double) { return std::abs(x) < 0.2 ? 1.0 : 6.0; });
   EXPECT_EQ(left, std::vector<std::uint8_t>(left.size(), 255));
 }
 
-TEST(Hollows, WhatStandsALittleInFrontShadesTheWallWithoutABandOfItsOwn) {
+TEST(AmbientOcclusion, ANearForegroundShadesTheWallWithoutABand) {
   const auto left = leftOf([](double x, double) { return std::abs(x) < 0.2 ? 3.8 : 4.0; });
   int before = at(left, 103, 60);
   EXPECT_LT(before, 250);
-  for (int x = 104; x < 125; ++x) {  // away from it the wall only grows lighter
+  for (int x = 104; x < 125; ++x) {  // with distance the wall only becomes lighter
     EXPECT_GE(at(left, x, 60), before - 2) << x;
     before = at(left, x, 60);
   }
   EXPECT_EQ(before, 255);
-  for (int x = 101; x < 125; ++x) {  // nor do directions and ways of the points show
+  for (int x = 101; x < 125; ++x) {  // no pattern of the sample offsets is visible
     for (int y = 50; y < 70; ++y) EXPECT_NEAR(at(left, x, y), at(left, x, 60), 3) << x << ' ' << y;
   }
 }
 
-TEST(Hollows, WhereNothingIsSeenThereAreNone) {
+TEST(AmbientOcclusion, WhereNothingIsSeenThereAreNone) {
   constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
   const auto left = leftOf([&](double x, double y) { return x > 0 ? kNothing : corner(x, y); });
   for (int y = 0; y < kHeight; ++y) {
@@ -87,12 +87,12 @@ TEST(Hollows, WhereNothingIsSeenThereAreNone) {
   EXPECT_LT(at(left, 40, 97), 245);
 }
 
-TEST(Hollows, GlassBeforeThemHidesThemAsFarAsItIsSeen) {
+TEST(AmbientOcclusion, GlassBeforeThemHidesThemAsFarAsItIsSeen) {
   const std::uint8_t colour[3] = {200, 100, 0};
   std::uint8_t bare[3], half[3], hidden[3];
-  darken(colour, 153, 255, bare);
-  darken(colour, 153, 128, half);
-  darken(colour, 153, 0, hidden);
+  applyAo(colour, 153, 255, bare);
+  applyAo(colour, 153, 128, half);
+  applyAo(colour, 153, 0, hidden);
   EXPECT_EQ(bare[0], 120);
   EXPECT_NEAR(half[0], 160, 1);
   EXPECT_EQ(hidden[0], 200);

@@ -1,5 +1,5 @@
-// The slow twin of the ray renderer: every pixel's ray against every triangle, in doubles, by
-// another formula (Moeller and Trumbore 1997). Opaque scenes only.
+// Reference implementation of the ray renderer: every pixel's ray against every triangle, in
+// doubles, by another formula (Moeller and Trumbore 1997). Opaque scenes only.
 #pragma once
 
 #include <cmath>
@@ -15,7 +15,7 @@ struct BruteHit {
   scene::EntityId id = 0;
   double depth = std::numeric_limits<double>::infinity();
   double second = std::numeric_limits<double>::infinity();  ///< depth of the next other object
-  /// How far inside its triangle the ray passes: its least barycentric coordinate.
+  /// Distance of the ray from the triangle's border: its minimum barycentric coordinate.
   double inside = 0;
 };
 
@@ -23,7 +23,7 @@ inline BruteHit bruteForceHit(
     const std::vector<std::pair<scene::EntityId, collision::Triangle>>& all, const Camera& camera,
     const Vec3& from, const Vec3& way) {
   BruteHit best;
-  const Vec3 forward = viewOf(camera).forward;
+  const Vec3 forward = computeCameraBasis(camera).forward;
   for (const auto& [id, t] : all) {
     const Vec3 e1 = t[1] - t[0], e2 = t[2] - t[0];
     const Vec3 p = way.cross(e2);
@@ -46,12 +46,13 @@ inline BruteHit bruteForceHit(
   return best;
 }
 
-/// Row by row.
+/// Pixels are stored row by row.
 inline std::vector<BruteHit> bruteForceFrame(const scene::Model& model, const Camera& camera) {
   std::vector<std::pair<scene::EntityId, collision::Triangle>> all;
   for (std::uint32_t o = 0; o < model.objects.size(); ++o)
-    for (const collision::Triangle& t : scene::solidTriangles(model, o)) all.emplace_back(o + 1, t);
-  const View view = viewOf(camera);
+    for (const collision::Triangle& t : scene::collectSolidTriangles(model, o))
+      all.emplace_back(o + 1, t);
+  const CameraBasis view = computeCameraBasis(camera);
   std::vector<BruteHit> hits;
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {

@@ -10,7 +10,6 @@
 #include <random>
 
 #include "render/camera_basis.hpp"
-#include "render/image/image.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -24,7 +23,7 @@ struct Bad {
 };
 
 TEST(Camera, TheDefaultIsAccepted) {
-  EXPECT_EQ(refusal(Camera{}), std::nullopt);
+  EXPECT_EQ(validateCamera(Camera{}), std::nullopt);
 }
 
 TEST(Camera, RefusalsNameTheField) {
@@ -83,35 +82,35 @@ TEST(Camera, RefusalsNameTheField) {
   for (const Bad& bad : all) {
     Camera camera;
     bad.spoil(camera);
-    const auto why = refusal(camera);
+    const auto why = validateCamera(camera);
     ASSERT_TRUE(why.has_value()) << bad.field;
     EXPECT_EQ(why->rfind(std::string("camera: ") + bad.field + " is ", 0), 0u) << *why;
   }
 }
 
-TEST(Camera, WhoLooksStraightUpOrDownStillHasAPicture) {
-  scene::AvatarView avatar;
+TEST(Camera, AVerticalViewDirectionHasAnImage) {
+  scene::AvatarSnapshot avatar;
   for (const Vec3& gaze : {Vec3(0, 1, 0), Vec3(0, -1, 0), Vec3(1, 0, 0)}) {
-    avatar.gaze = gaze;
-    EXPECT_EQ(refusal(firstPerson(avatar, 64, 48)), std::nullopt);
+    avatar.viewDirection = gaze;
+    EXPECT_EQ(validateCamera(makeFirstPersonCamera(avatar, 64, 48)), std::nullopt);
   }
 }
 
 TEST(Camera, FirstPersonLooksFromTheEyes) {
-  scene::AvatarView avatar;
-  avatar.feet = {1, 2, 3};
+  scene::AvatarSnapshot avatar;
+  avatar.footPosition = {1, 2, 3};
   avatar.eyeHeight = 1.5;
-  avatar.gaze = {0, 0, 1};
-  const Camera camera = firstPerson(avatar, 64, 48);
+  avatar.viewDirection = {0, 0, 1};
+  const Camera camera = makeFirstPersonCamera(avatar, 64, 48);
   EXPECT_EQ(camera.eye, Vec3(1, 3.5, 3));
-  EXPECT_EQ(camera.forward, avatar.gaze);
+  EXPECT_EQ(camera.forward, avatar.viewDirection);
 }
 
 TEST(Camera, APlanShowsTheBoundsWithXToTheRightAndZDownwards) {
-  const scene::Box bounds{{-3, 0, 10}, {9, 3, 14}};
+  const scene::Aabb bounds{{-3, 0, 10}, {9, 3, 14}};
   for (const auto& [width, height] : {std::pair(400, 300), std::pair(100, 400)}) {
-    const Camera camera = plan(bounds, 0, 2, width, height);
-    ASSERT_EQ(refusal(camera), std::nullopt);
+    const Camera camera = makePlanCamera(bounds, 0, 2, width, height);
+    ASSERT_EQ(validateCamera(camera), std::nullopt);
     const Vec3 low = project(camera, {-3, 0, 10});
     const Vec3 high = project(camera, {9, 0, 14});
     EXPECT_LT(low.x(), high.x());
@@ -135,7 +134,7 @@ TEST(Camera, APinholeProjectsAsItsIntrinsicsSay) {
   camera.eye = {1, 2, 3};
   camera.forward = {0, 0, -2};
   camera.pinhole = Pinhole{500, 450, 100, 400};
-  ASSERT_EQ(refusal(camera), std::nullopt);
+  ASSERT_EQ(validateCamera(camera), std::nullopt);
   const Vec3 pixel = project(camera, camera.eye + Vec3(0.3, -0.2, -2));
   EXPECT_NEAR(pixel.x(), 100 + 500 * 0.15, 1e-9);
   EXPECT_NEAR(pixel.y(), 400 + 450 * 0.10, 1e-9);
@@ -147,7 +146,7 @@ TEST(Camera, TheIntrinsicsOfAnOpeningAngleGiveTheSamePicture) {
   camera.forward = {0.3, -0.2, 1};
   const Vec3 point = 7 * camera.forward + Vec3(0.4, 0.5, 0);
   const Vec3 angle = project(camera, point);
-  camera.pinhole = intrinsicsOf(camera);
+  camera.pinhole = computeIntrinsics(camera);
   EXPECT_EQ(camera.pinhole->cx, camera.width / 2.0);
   EXPECT_LT((project(camera, point) - angle).norm(), 1e-9);
 }
@@ -170,7 +169,7 @@ TEST(Camera, CullingKeepsEveryBoxThatHoldsAPointOfThePicture) {
     if (i % 4 == 2) camera.pinhole = Pinhole{300, 400, 320 + 300 * unit(random), 240};
     const Vec3 centre = vector(15);
     const Vec3 half = vector(2).cwiseAbs();
-    const bool kept = mayBeSeen(frustumOf(camera), {centre - half, centre + half});
+    const bool kept = intersectsFrustum(computeFrustum(camera), {centre - half, centre + half});
     bool inside = false;
     for (int sample = 0; sample < 50; ++sample) {
       const Vec3 pixel = project(camera, centre + half.cwiseProduct(vector(1)));

@@ -1,4 +1,4 @@
-// What is left out of a drawing leaves no trace in the picture.
+// Tests that culling leaves no trace in the image.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,7 +23,7 @@ Vec3 within(Random& random, double size) {
   return {x, y, z};
 }
 
-/// Walls with much behind them, some of it glass, some in the same place as others.
+/// Walls with many boxes behind them, some transparent, some in the same place as others.
 std::vector<PlacedBox> rooms(unsigned seed) {
   Random random(seed);
   std::vector<PlacedBox> boxes;
@@ -38,7 +38,7 @@ std::vector<PlacedBox> rooms(unsigned seed) {
     box.centre.y() *= 0.15;
     if (i % 5 == 0) box.size.x() *= -1;
     boxes.push_back(box);
-    if (i % 20 == 0) {  // in the same place, of another colour: a tie in every pixel
+    if (i % 20 == 0) {  // in the same place, with another colour: a depth tie in every pixel
       box.material = coloured(0.9f, 0.1f, 0.1f);
       boxes.push_back(box);
     }
@@ -71,14 +71,14 @@ Camera cameraAt(Random& random, int kind) {
   return camera;
 }
 
-TEST(DepthPyramid, HidesExactlyWhatEveryPixelHides) {
+TEST(DepthPyramid, HidesABoxExactlyIfEveryPixelHidesIt) {
   Random random(3);
   DepthPyramid pyramid;
   int hidden = 0, shown = 0;
   for (int picture = 0; picture < 60; ++picture) {
     const int width = 1 + static_cast<int>(random() % 90),
               height = 1 + static_cast<int>(random() % 90);
-    std::vector<float>& depth = pyramid.base(width, height);
+    std::vector<float>& depth = pyramid.baseLevel(width, height);
     for (float& d : depth) d = random() % 200 == 0 ? 0.1f : 0.5f;
     const std::vector<float> copy = depth;
     pyramid.build();
@@ -91,7 +91,7 @@ TEST(DepthPyramid, HidesExactlyWhatEveryPixelHides) {
       for (int y = r.top; y <= r.bottom; ++y)
         for (int x = r.left; x <= r.right; ++x)
           all = all && copy[static_cast<std::size_t>(y * width + x)] > 0.3f;
-      ASSERT_EQ(pyramid.hides(r, 0.3f), all);
+      ASSERT_EQ(pyramid.isOccluded(r, 0.3f), all);
       ++(all ? hidden : shown);
     }
   }
@@ -105,11 +105,12 @@ TEST(Culling, PicturesFromAnywhereAreThoseOfDrawingEverything) {
   std::uint64_t occluded = 0;
   for (int i = 0; i < 60; ++i) {
     const Camera camera = cameraAt(random, i % 4);
-    const bool all = i % 5 != 0;  // else ids and depth alone, which take another way
-    FrameOptions options{.channels = {all, true, true, all},
-                         .glass = i % 3 == 0 ? Glass::solid : Glass::clear};
+    const bool all = i % 5 != 0;  // otherwise ids and depth alone, which use another code path
+    FrameOptions options{
+        .channels = {all, true, true, all},
+        .transparency = i % 3 == 0 ? TransparencyMode::opaque : TransparencyMode::blend};
     const Frame culled = renderer.render({}, camera, options);
-    options.culling = Culling::outside;
+    options.culling = Culling::frustum;
     const Frame drawn = renderer.render({}, camera, options);
     expectSame(culled, drawn, "picture " + std::to_string(i));
     EXPECT_LE(culled.statistics.drawn, drawn.statistics.drawn);
@@ -128,7 +129,7 @@ TEST(Culling, AWalkKeepsItsPicturesAndMostlyDrawsOnce) {
     camera.eye = {-11 + 0.15 * i, 0.1, 1.7};
     camera.forward = {std::cos(0.02 * i), 0, std::sin(0.02 * i)};
     const Frame culled = renderer.render({}, camera);
-    const Frame single = renderer.render({}, camera, {.culling = Culling::singly});
+    const Frame single = renderer.render({}, camera, {.culling = Culling::none});
     expectSame(culled, single, "step " + std::to_string(i));
     passes += culled.statistics.passes;
     drawn += culled.statistics.drawn;
@@ -138,15 +139,15 @@ TEST(Culling, AWalkKeepsItsPicturesAndMostlyDrawsOnce) {
   EXPECT_LT(3 * drawn, 2 * inside);
 }
 
-TEST(Culling, WhatIsInTheSamePlaceAndComesIntoViewLaterWinsOrLosesAsInDrawingEverything) {
-  // A red and a blue box in one place; the red one, first in order, is hidden from the guess by a
-  // smaller box of its own: the blue one is seen a picture earlier.
+TEST(Culling, CoincidentObjectsThatAppearLaterAreDrawnAsWithoutCulling) {
+  // A red and a blue box in one place. A smaller box hides the red one, the first in order, from
+  // the occlusion guess: the blue one is found a frame earlier.
   for (const bool swapped : {false, true}) {
     PlacedBox red{{0, 0, -6}, {2, 2, 2}, coloured(1, 0, 0)};
     PlacedBox blue{{0, 0, -5.5}, {2, 2, 1}, coloured(0, 0, 1)};
     if (swapped) std::swap(red, blue);
     std::vector<PlacedBox> boxes{red, blue, {{0, 0, -2}, {1, 6, 0.1}, coloured(0, 1, 0)}};
-    // Behind the eye: so many that what is hidden is searched for, however little it is.
+    // Behind the eye: enough boxes to start the search for occluded ones in any case.
     for (int i = 0; i < 300; ++i) boxes.push_back({{0, 0, 10.0 + i}, {0.5, 0.5, 0.5}, {}});
     GlRenderer renderer(sceneOf(boxes));
     Camera camera = squareCamera(64);
@@ -155,7 +156,7 @@ TEST(Culling, WhatIsInTheSamePlaceAndComesIntoViewLaterWinsOrLosesAsInDrawingEve
       for (const bool colours : {true, false}) {
         FrameOptions options{.channels = {.rgb = colours}};
         const Frame culled = renderer.render({}, camera, options);
-        options.culling = Culling::outside;
+        options.culling = Culling::frustum;
         expectSame(culled, renderer.render({}, camera, options), "step " + std::to_string(i));
       }
     }
@@ -168,11 +169,11 @@ TEST(Culling, AWalkThatShowsIdsAloneKeepsThem) {
   camera.width = camera.height = 80;
   int once = 0, again = 0;
   for (int i = 0; i < 120; ++i) {
-    camera.eye = {-11 + 0.15 * (i / 2), 0.1, 1.7};  // every second picture stands
+    camera.eye = {-11 + 0.15 * (i / 2), 0.1, 1.7};  // the camera moves in every second frame only
     camera.forward = {std::cos(0.02 * (i / 2)), 0, std::sin(0.02 * (i / 2))};
     FrameOptions options{.channels = {.rgb = false}};
     const Frame culled = renderer.render({}, camera, options);
-    options.culling = Culling::outside;
+    options.culling = Culling::frustum;
     expectSame(culled, renderer.render({}, camera, options), "step " + std::to_string(i));
     ++(culled.statistics.passes == 1 ? once : again);
   }
@@ -189,7 +190,7 @@ TEST(Culling, SeveralCamerasInTurnEachKeepTheirPictures) {
     for (Camera& camera : cameras) {
       camera.eye += 0.05 * camera.forward;
       const Frame culled = renderer.render({}, camera);
-      expectSame(culled, renderer.render({}, camera, {.culling = Culling::outside}), "a camera");
+      expectSame(culled, renderer.render({}, camera, {.culling = Culling::frustum}), "a camera");
     }
   }
 }
@@ -199,10 +200,10 @@ TEST(Culling, NothingIsLostWhereNothingHides) {
   const Frame frame = renderer.render({}, squareCamera(64));
   EXPECT_EQ(frame.statistics.drawn, 2u);
   EXPECT_EQ(frame.statistics.occluded, 0u);
-  EXPECT_EQ(frame.statistics.outside, 0u);
+  EXPECT_EQ(frame.statistics.frustumCulled, 0u);
 }
 
-TEST(Culling, InASmallSceneWhatHardlyHidesIsDrawnAtOnce) {
+TEST(Culling, ASmallSceneDrawsPoorOccludersAtOnce) {
   std::vector<PlacedBox> boxes{{{0, 0, -4}, {3, 3, 0.1}, {}}};
   for (int i = 0; i < 3; ++i) boxes.push_back({{-1.0 + i, 0, -2}, {0.3, 0.3, 0.3}, {}});
   for (int i = 0; i < 3; ++i) boxes.push_back({{-1.0 + i, 0, -6}, {0.3, 0.3, 0.3}, {}});
@@ -210,7 +211,7 @@ TEST(Culling, InASmallSceneWhatHardlyHidesIsDrawnAtOnce) {
     GlRenderer renderer(sceneOf(some));
     const Camera camera = squareCamera(64);
     const Frame first = renderer.render({}, camera);
-    EXPECT_EQ(first.statistics.drawn, 4u);  // nothing was known
+    EXPECT_EQ(first.statistics.drawn, 4u);  // the visibility cache was empty
     const Frame second = renderer.render({}, camera);
     expectSame(first, second, "with " + std::to_string(some.size()) + " boxes");
     return second.statistics;
@@ -218,7 +219,7 @@ TEST(Culling, InASmallSceneWhatHardlyHidesIsDrawnAtOnce) {
   EXPECT_EQ(secondOf(boxes).drawn, 7u);
   EXPECT_EQ(secondOf(boxes).passes, 1u);
   for (int i = 0; i < 9; ++i) boxes.push_back({{-0.4 + 0.1 * i, 1, -6}, {0.1, 0.1, 0.1}, {}});
-  EXPECT_EQ(secondOf(boxes).drawn, 4u);  // more is hidden than seen
+  EXPECT_EQ(secondOf(boxes).drawn, 4u);  // more boxes are hidden than visible
 }
 
 }  // namespace

@@ -25,17 +25,17 @@ Camera lookingIn(int width, int height, bool parallel = false) {
   return camera;
 }
 
-TEST(TrueRays, AreThoseOfABruteForceSearchInDoubles) {
+TEST(ReferenceTracer, AreThoseOfABruteForceSearchInDoubles) {
   const auto scene = sceneOf(opaque(crowd(150)));
-  TrueRays rays(scene);
+  ReferenceTracer rays(scene);
   std::size_t hits = 0, others = 0;
   for (const bool parallel : {false, true}) {
     const Camera camera = lookingIn(97, 71, parallel);
-    const TrueFrame truth = rays.look({}, camera);
+    const ReferenceFrame truth = rays.render({}, camera);
     const std::vector<BruteHit> brute = bruteForceFrame(scene->model(), camera);
     EXPECT_EQ(truth.undecided, 0u);
     for (std::size_t i = 0; i < brute.size(); ++i) {
-      if (truth.ids[i] != brute[i].id) ++others;  // two formulas, one edge
+      if (truth.ids[i] != brute[i].id) ++others;  // two formulas may differ on one edge
       if (truth.ids[i] != brute[i].id || brute[i].id == 0) continue;
       ++hits;
       EXPECT_NEAR(truth.depth[i], brute[i].depth, 1e-11 * brute[i].depth);
@@ -45,9 +45,9 @@ TEST(TrueRays, AreThoseOfABruteForceSearchInDoubles) {
   EXPECT_LE(others, 1u);
 }
 
-TEST(TrueRays, EdgesAreWhereSomethingElseBegins) {
-  TrueRays rays(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {40, 40, 1}, {}}}));
-  const TrueFrame truth = rays.look({}, squareCamera());  // the box: pixels 75 to 124
+TEST(ReferenceTracer, EdgesAreWhereSomethingElseBegins) {
+  ReferenceTracer rays(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {40, 40, 1}, {}}}));
+  const ReferenceFrame truth = rays.render({}, squareCamera());  // the box covers pixels 75 to 124
   const auto edge = [&](int x, int y) { return truth.edge[static_cast<std::size_t>(200 * y + x)]; };
   EXPECT_TRUE(edge(75, 100));
   EXPECT_TRUE(edge(74, 100));
@@ -59,82 +59,83 @@ TEST(TrueRays, EdgesAreWhereSomethingElseBegins) {
 
 TEST(DepthReport, GlIsWithinItsPromiseAndRaysWithinTheirs) {
   const auto scene = sceneOf(opaque(crowd(300)));
-  TrueRays rays(scene);
+  ReferenceTracer rays(scene);
   GlRenderer gl(scene);
   RayRenderer cast(scene);
   DepthReport glReport, castReport;
   Camera camera = lookingIn(160, 120);
   for (int i = 0; i < 4; ++i) {
     camera.forward = {std::cos(1.5 * i), -0.1, std::sin(1.5 * i)};
-    const TrueFrame truth = rays.look({}, camera);
-    add(glReport, compareWithTruth(gl.render({}, camera), truth));
-    add(castReport, compareWithTruth(cast.render({}, camera), truth));
+    const ReferenceFrame truth = rays.render({}, camera);
+    mergeReports(glReport, compareWithReference(gl.render({}, camera), truth));
+    mergeReports(castReport, compareWithReference(cast.render({}, camera), truth));
   }
   for (const DepthReport* report : {&glReport, &castReport}) {
     EXPECT_EQ(report->frames, 4u);
     EXPECT_EQ(report->pixels, 4u * 160u * 120u);
     EXPECT_EQ(report->undecided, 0u);
-    EXPECT_GT(report->away.pixels, 1000u);
+    EXPECT_GT(report->awayFromEdges.pixels, 1000u);
     EXPECT_EQ(report->idsDiffer[2] + report->idsDiffer[3] + report->idsDiffer[4], 0u);
     EXPECT_LT(report->idsDiffer[0] + report->idsDiffer[1], report->pixels / 2000);
   }
-  EXPECT_LT(glReport.away.mean(), 2e-5);
-  EXPECT_LT(glReport.away.greatest, 3e-3);
-  EXPECT_LT(castReport.away.mean(), 1e-6);
-  EXPECT_LT(castReport.away.greatest, 1e-5);
-  EXPECT_LT(castReport.away.mean(), glReport.away.mean());
+  EXPECT_LT(glReport.awayFromEdges.mean(), 2e-5);
+  EXPECT_LT(glReport.awayFromEdges.max, 3e-3);
+  EXPECT_LT(castReport.awayFromEdges.mean(), 1e-6);
+  EXPECT_LT(castReport.awayFromEdges.max, 1e-5);
+  EXPECT_LT(castReport.awayFromEdges.mean(), glReport.awayFromEdges.mean());
 }
 
 TEST(DepthReport, ErrorsAreFoundWhereTheyWereMade) {
   const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {40, 40, 1}, {}}});
-  TrueRays rays(scene);
+  ReferenceTracer rays(scene);
   RayRenderer renderer(scene);
-  const TrueFrame truth = rays.look({}, squareCamera());
+  const ReferenceFrame truth = rays.render({}, squareCamera());
   Frame frame = renderer.render({}, squareCamera());
-  const DepthReport exact = compareWithTruth(frame, truth);
+  const DepthReport exact = compareWithReference(frame, truth);
   EXPECT_EQ(exact.idsEqual, 40000u);
-  EXPECT_LT(exact.away.greatest, 1e-6);
+  EXPECT_LT(exact.awayFromEdges.max, 1e-6);
   frame.depth[at(frame, 100, 100)] += 0.25f;       // on the box, 4 m away
   frame.depth[at(frame, 10, 10)] = std::nanf("");  // on the wall
   frame.ids[at(frame, 100, 90)] = 2;               // far from any edge
-  frame.ids[at(frame, 76, 100)] = 2;               // beside one
-  const DepthReport wrong = compareWithTruth(frame, truth);
-  EXPECT_NEAR(wrong.away.greatest, 0.25, 1e-6);
-  EXPECT_NEAR(wrong.bands[1].greatest, 0.25, 1e-6);
-  EXPECT_LT(wrong.bands[2].greatest, 1e-6);
+  frame.ids[at(frame, 76, 100)] = 2;               // next to an edge
+  const DepthReport wrong = compareWithReference(frame, truth);
+  EXPECT_NEAR(wrong.awayFromEdges.max, 0.25, 1e-6);
+  EXPECT_NEAR(wrong.bands[1].max, 0.25, 1e-6);
+  EXPECT_LT(wrong.bands[2].max, 1e-6);
   EXPECT_EQ(wrong.missing, 1u);
   EXPECT_EQ(wrong.idsDiffer[1], 1u);
   EXPECT_EQ(wrong.idsDiffer[4], 1u);
   frame.depth.clear();
-  EXPECT_THROW(compareWithTruth(frame, truth), RenderError);
+  EXPECT_THROW(compareWithReference(frame, truth), RenderError);
 }
 
 TEST(DepthReport, ObjectsInOnePlaceAreTiesAndNoDisagreement) {
   const PlacedBox box{{0, 0, -5}, {2, 2, 2}, {}};
   const auto scene = sceneOf({box, box});
-  TrueRays rays(scene);
-  const TrueFrame truth = rays.look({}, squareCamera());
+  ReferenceTracer rays(scene);
+  const ReferenceFrame truth = rays.render({}, squareCamera());
   Frame frame = RayRenderer(scene).render({}, squareCamera());
   for (std::uint32_t& id : frame.ids) id = id == 0 ? 0 : 2;
-  const DepthReport report = compareWithTruth(frame, truth);
+  const DepthReport report = compareWithReference(frame, truth);
   EXPECT_EQ(report.idsTied, 2500u);
   EXPECT_EQ(report.idsEqual, 37500u);
 }
 
 TEST(DepthReport, ItsPercentileIsThatOfTheSortedErrorsWithinABin) {
   DepthErrors errors;
-  for (int i = 1; i <= 1000; ++i) errors.add(1e-6 * i);
+  for (int i = 1; i <= 1000; ++i) errors.addError(1e-6 * i);
   EXPECT_NEAR(errors.percentile99(), 0.00099, 0.06 * 0.00099);
   EXPECT_NEAR(errors.mean(), 500.5e-6, 1e-12);
-  errors.add(7);
-  EXPECT_EQ(errors.greatest, 7);
+  errors.addError(7);
+  EXPECT_EQ(errors.max, 7);
 }
 
 TEST(DepthReport, ItsTextIsJsonWithAllBands) {
   const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
-  const DepthReport report = compareWithTruth(RayRenderer(scene).render({}, squareCamera()),
-                                              TrueRays(scene).look({}, squareCamera()));
-  const nlohmann::json read = nlohmann::json::parse(jsonOf(report));
+  const DepthReport report =
+      compareWithReference(RayRenderer(scene).render({}, squareCamera()),
+                           ReferenceTracer(scene).render({}, squareCamera()));
+  const nlohmann::json read = nlohmann::json::parse(formatReportJson(report));
   EXPECT_EQ(read["pixels"], 40000);
   EXPECT_EQ(read["depth"]["bands"].size(), 6u);
   EXPECT_EQ(read["depth"]["bands"][1]["to_m"], 5);

@@ -37,7 +37,7 @@ TEST(EglContext, DevicesAreTriedWhileOthersAreInUse) {
     threads.emplace_back([&] {
       start.arrive_and_wait();
       const EglContext used;
-      for (const DeviceTrial& trial : tryDevices().devices) count += trial.failure.empty();
+      for (const DeviceProbe& trial : probeDevices().devices) count += trial.failure.empty();
       used.makeCurrent();
     });
   }

@@ -30,7 +30,7 @@ struct Grey16 {
   std::vector<std::uint16_t> values;
 };
 
-/// By libpng's own reader, as it stands in the file: no gamma, no conversion.
+/// Decodes with libpng as stored in the file: no gamma, no conversion.
 Grey16 readPng16(const Bytes& file) {
   struct Source {
     const Bytes& bytes;
@@ -145,10 +145,10 @@ TEST(EncodeNpy, ThreeChannelsAreAThirdAxis) {
 TEST(Depth16, NothingIsZeroAndASurfaceNeverIs) {
   const std::vector<float> metres{
       kNan, 0.0001f, 0.0016f, 1, 65.535f, 65.6f, std::numeric_limits<float>::infinity()};
-  const Depth16 depth = depth16(metres, 1000);
+  const Depth16 depth = quantizeDepth(metres, 1000);
   EXPECT_EQ(depth.steps, (std::vector<std::uint16_t>{0, 1, 2, 1000, 65535, 65535, 65535}));
-  EXPECT_EQ(depth.tooFar, 2U);
-  EXPECT_THROW(depth16(metres, 0), std::runtime_error);
+  EXPECT_EQ(depth.clampedPixels, 2U);
+  EXPECT_THROW(quantizeDepth(metres, 0), std::runtime_error);
 }
 
 TEST(PackDepth, EveryValueComesBackAndSmoothDepthIsSmall) {

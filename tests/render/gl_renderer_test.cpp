@@ -18,7 +18,8 @@ std::set<std::uint32_t> idsIn(const Frame& frame) {
 }
 
 TEST(GlRenderer, ABoxIsSeenExactlyWhereItsGeometrySays) {
-  // Its face is 2 m square, 4 m ahead, where the picture is 8 m wide: the middle 50 pixels of 200.
+  // The box's face is 2 m square, 4 m ahead; the image is 8 m wide there: the middle 50 pixels of
+  // 200.
   GlRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
   const Frame frame = renderer.render({}, squareCamera());
   for (int y = 0; y < 200; ++y) {
@@ -44,7 +45,7 @@ TEST(GlRenderer, DepthIsTrueToRelative1e4NearAndFarInBothProjections) {
     camera.heightY = distance;
     const Frame parallel = renderer.render({}, camera);
     for (const float depth : perspective.depth) ASSERT_NEAR(depth, distance, 1e-4 * distance);
-    // A parallel picture spreads its precision evenly over near..far.
+    // An orthographic image distributes its precision evenly over near..far.
     for (const float depth : parallel.depth) {
       ASSERT_NEAR(depth, distance, 1e-4 * std::max(distance, 1.0));
     }
@@ -67,7 +68,7 @@ TEST(GlRenderer, NearerHidesFartherWhateverTheirOrder) {
   EXPECT_EQ(other.render({}, squareCamera()).ids[100 * 200 + 100], 2u);
 }
 
-TEST(GlRenderer, AMirroredObjectLooksLikeItsTwin) {
+TEST(GlRenderer, AMirroredObjectLooksLikeItsOriginal) {
   GlRenderer straight(sceneOf({{{0.3, 0.2, -4}, {2, 1, 1}, {}}}));
   GlRenderer mirrored(sceneOf({{{0.3, 0.2, -4}, {-2, 1, 1}, {}}}));
   const Frame a = straight.render({}, squareCamera());
@@ -83,11 +84,11 @@ TEST(GlRenderer, GlassTintsTheColourAndLetsIdsAndDepthThrough) {
   GlRenderer renderer(sceneOf({pane, wall}));
   const Frame frame = renderer.render({}, squareCamera());
   EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{2}));
-  const std::size_t through = at(frame, 100, 100), beside = at(frame, 20, 100);
+  const std::size_t through = at(frame, 100, 100), nextTo = at(frame, 20, 100);
   EXPECT_NEAR(frame.depth[through], 5, 5e-4);
-  EXPECT_LT(frame.rgb[3 * through] + 30, frame.rgb[3 * beside]);
+  EXPECT_LT(frame.rgb[3 * through] + 30, frame.rgb[3 * nextTo]);
   EXPECT_GT(frame.rgb[3 * through + 2], frame.rgb[3 * through] + 30);
-  EXPECT_NEAR(frame.rgb[3 * beside], frame.rgb[3 * beside + 2], 25);
+  EXPECT_NEAR(frame.rgb[3 * nextTo], frame.rgb[3 * nextTo + 2], 25);
 }
 
 TEST(GlRenderer, GlassBehindAWallIsNotSeen) {
@@ -103,14 +104,15 @@ TEST(GlRenderer, SolidGlassIsAFirstHitInAllChannels) {
   const PlacedBox pane{{0, 0, -3}, {1, 1, 0.2}, coloured(0.05f, 0.05f, 0.9f, 0.5f)};
   PlacedBox opaque = pane;
   opaque.material = coloured(0.05f, 0.05f, 0.9f);
-  const FrameOptions options{.channels = {true, true, true, true}, .glass = Glass::solid};
+  const FrameOptions options{.channels = {true, true, true, true},
+                             .transparency = TransparencyMode::opaque};
   const Frame solid = GlRenderer(sceneOf({pane, wall})).render({}, squareCamera(), options);
-  const Frame twin = GlRenderer(sceneOf({opaque, wall})).render({}, squareCamera(), options);
+  const Frame expected = GlRenderer(sceneOf({opaque, wall})).render({}, squareCamera(), options);
   EXPECT_EQ(solid.ids[at(solid, 100, 100)], 1u);
   EXPECT_NEAR(solid.depth[at(solid, 100, 100)], 2.9, 3e-4);
-  EXPECT_EQ(solid.rgb, twin.rgb);
-  EXPECT_EQ(solid.ids, twin.ids);
-  EXPECT_EQ(solid.normals, twin.normals);
+  EXPECT_EQ(solid.rgb, expected.rgb);
+  EXPECT_EQ(solid.ids, expected.ids);
+  EXPECT_EQ(solid.normals, expected.normals);
 }
 
 TEST(GlRenderer, NormalsAreThoseOfTheFacesAndLookAtTheEye) {
@@ -130,7 +132,7 @@ TEST(GlRenderer, NormalsAreThoseOfTheFacesAndLookAtTheEye) {
   EXPECT_EQ(normal(3, 3), Eigen::Vector3f(0, 0, 0));
 }
 
-TEST(GlRenderer, EachChannelIsTheSameWhateverElseIsAskedFor) {
+TEST(GlRenderer, EachChannelIsIndependentOfTheOtherRequestedChannels) {
   GlRenderer renderer(sceneOf(crowd(200)));
   const Frame all = renderer.render({}, squareCamera(), {.channels = {true, true, true, true}});
   for (int asked = 0; asked < 16; ++asked) {
@@ -145,8 +147,9 @@ TEST(GlRenderer, EachChannelIsTheSameWhateverElseIsAskedFor) {
   }
 }
 
-TEST(GlRenderer, APinholeBesideTheMiddleSeesThePartOfALargerPicture) {
-  // The right half of a picture twice as wide: same focal length, the axis at the left border.
+TEST(GlRenderer, AnOffCentrePinholeSeesPartOfALargerImage) {
+  // The right half of an image of twice the width: same focal length, principal axis at the left
+  // border.
   GlRenderer renderer(sceneOf(crowd(200)));
   Camera wide = squareCamera(100);
   wide.width = 200;
@@ -172,13 +175,13 @@ TEST(GlRenderer, RangeIsTheDistanceFromTheEye) {
   GlRenderer renderer(sceneOf({{{0, 0, -5}, {40, 40, 2}, {}}}));
   Camera camera = squareCamera();
   const Frame frame = renderer.render({}, camera);
-  const std::vector<float> range = rangeOf(frame);
+  const std::vector<float> range = computeRange(frame);
   EXPECT_NEAR(range[at(frame, 100, 100)], 4, 1e-3);
   const double aside = 0.5 / 100 - 1;  // of the first pixel's centre, at distance 1
   EXPECT_NEAR(range[at(frame, 0, 0)], 4 * std::sqrt(1 + 2 * aside * aside), 2e-3);
   camera.projection = Camera::Projection::orthographic;
   const Frame parallel = renderer.render({}, camera);
-  EXPECT_EQ(rangeOf(parallel)[0], parallel.depth[0]);
+  EXPECT_EQ(computeRange(parallel)[0], parallel.depth[0]);
 }
 
 TEST(GlRenderer, ADeviceThatIsNotThereIsRefusedWithAllThatWereTried) {
@@ -217,7 +220,7 @@ TEST(GlRenderer, AHiddenAvatarIsNotDrawnAndOthersAre) {
   EXPECT_EQ(both.ids[at(both, 75, 100)], 2u);
   EXPECT_EQ(both.ids[at(both, 125, 100)], 3u);
   EXPECT_NEAR(both.depth[at(both, 75, 100)], 3.7, 1e-3);
-  EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera(), {.hidden = 2})),
+  EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera(), {.hiddenEntity = 2})),
             (std::set<std::uint32_t>{1, 3}));
 }
 
@@ -270,7 +273,7 @@ TEST(GlRenderer, ProjectAgreesWithThePictureOfIds) {
         continue;
       }
       const std::size_t index = at(frame, static_cast<int>(pixel.x()), static_cast<int>(pixel.y()));
-      if (frame.depth[index] < pixel.z() - 0.2) continue;  // something stands in front
+      if (frame.depth[index] < pixel.z() - 0.2) continue;  // occluded
       EXPECT_EQ(frame.ids[index], i + 1);
       EXPECT_NEAR(frame.depth[index], pixel.z(), 0.15);
       ++seen;
@@ -299,7 +302,7 @@ TEST(GlRenderer, SizesMayChangeFromPictureToPicture) {
   }
 }
 
-TEST(GlRenderer, FiftyCanBeMadeAndDestroyedAndTwoLiveTogether) {
+TEST(GlRenderer, FiftyAreCreatedAndDestroyedAndTwoCoexist) {
   const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
   GlRenderer lasting(scene);
   const Frame before = lasting.render({}, squareCamera(40));

@@ -1,4 +1,4 @@
-// Boxes and panes made by hand, whose pictures can be worked out on paper.
+// Hand-made scenes of boxes and panes whose images can be computed on paper.
 #pragma once
 
 #include <memory>
@@ -54,7 +54,8 @@ inline scene::Material coloured(float r, float g, float b, float alpha = 1) {
   return material;
 }
 
-/// At the origin, looking along -z, 90 degrees both ways: at distance z the picture is 2 z wide.
+/// A camera at the origin that looks along -z, 90 degrees both ways: at distance z the image is 2 z
+/// wide.
 inline Camera squareCamera(int size = 200) {
   Camera camera;
   camera.forward = -Vec3::UnitZ();

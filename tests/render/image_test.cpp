@@ -9,6 +9,9 @@
 #include <fstream>
 #include <random>
 
+#include "render/image/atomic_file.hpp"
+#include "render/image/contact_sheet.hpp"
+#include "render/image/drawing.hpp"
 #include "render/image/font.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -56,8 +59,8 @@ TEST(Png, BrokenBytesAndWrongSizesAreErrors) {
 TEST(WriteFileWhole, ReplacesAFileAndLeavesNothingElse) {
   const tests::TemporaryFolder folder;
   const fs::path file = folder.path() / "a.bin";
-  writeFileWhole(file, "first", 5);
-  writeFileWhole(file, "second!", 7);
+  writeFileAtomically(file, "first", 5);
+  writeFileAtomically(file, "second!", 7);
   std::ifstream in(file);
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "second!");
   EXPECT_EQ(entriesIn(folder), 1);
@@ -69,7 +72,7 @@ TEST(WriteFileWhole, APipeIsWrittenAndALinkFollowed) {
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   ASSERT_GE(reader, 0);
-  writeFileWhole(pipe, "whole", 5);
+  writeFileAtomically(pipe, "whole", 5);
   char read[8] = {};
   EXPECT_EQ(::read(reader, read, sizeof read), 5);
   ::close(reader);
@@ -77,14 +80,14 @@ TEST(WriteFileWhole, APipeIsWrittenAndALinkFollowed) {
   EXPECT_TRUE(fs::is_fifo(pipe));
 
   fs::create_symlink("file", link);
-  writeFileWhole(link, "first", 5);
-  writeFileWhole(link, "second", 6);
+  writeFileAtomically(link, "first", 5);
+  writeFileAtomically(link, "second", 6);
   EXPECT_TRUE(fs::is_symlink(link));
   EXPECT_EQ(fs::file_size(folder.path() / "file"), 6U);
   EXPECT_EQ(entriesIn(folder), 3);
 
   fs::create_symlink("circle", folder.path() / "circle");
-  EXPECT_THROW(writeFileWhole(folder.path() / "circle", "x", 1), std::runtime_error);
+  EXPECT_THROW(writeFileAtomically(folder.path() / "circle", "x", 1), std::runtime_error);
 }
 
 TEST(WriteFileWhole, AFailureNamesTheFileAndLeavesNoPart) {
@@ -102,7 +105,7 @@ TEST(WriteFileWhole, AFailureNamesTheFileAndLeavesNoPart) {
   EXPECT_EQ(entriesIn(folder), 1);
 }
 
-TEST(Drawing, TextDrawsItsLettersWhereTheyBelong) {
+TEST(PendingFrame, TextDrawsItsLettersWhereTheyBelong) {
   Image image = plain(40, 20);
   drawText(image, 3, 4, "I.", 1, {255, 255, 255});
   for (int y = 0; y < image.height; ++y) {
@@ -110,29 +113,29 @@ TEST(Drawing, TextDrawsItsLettersWhereTheyBelong) {
       const int letter = (x - 3) / kLetterAdvance, column = (x - 3) % kLetterAdvance;
       const bool within =
           x >= 3 && letter < 2 && column < kLetterWidth && y >= 4 && y < 4 + kLetterHeight;
-      const bool ink = within && inked(letter == 0 ? 'I' : '.', column, y - 4);
+      const bool ink = within && isLetterPixel(letter == 0 ? 'I' : '.', column, y - 4);
       EXPECT_EQ(red(image, x, y), ink ? 255 : 0) << x << ' ' << y;
     }
   }
 }
 
-TEST(Drawing, EveryLetterHasAShapeOfItsOwn) {
+TEST(PendingFrame, EveryLetterHasAShapeOfItsOwn) {
   std::vector<std::vector<bool>> shapes;
   for (char c = '!'; c <= '~'; ++c) {
     std::vector<bool> shape;
     for (int i = 0; i < kLetterWidth * kLetterHeight; ++i) {
-      shape.push_back(inked(c, i % kLetterWidth, i / kLetterWidth));
+      shape.push_back(isLetterPixel(c, i % kLetterWidth, i / kLetterWidth));
     }
     EXPECT_EQ(std::count(shapes.begin(), shapes.end(), shape), 0) << c;
     EXPECT_GT(std::count(shape.begin(), shape.end(), true), 1) << c;
     shapes.push_back(shape);
   }
   for (int i = 0; i < kLetterWidth * kLetterHeight; ++i) {
-    EXPECT_FALSE(inked(' ', i % kLetterWidth, i / kLetterWidth));
+    EXPECT_FALSE(isLetterPixel(' ', i % kLetterWidth, i / kLetterWidth));
   }
 }
 
-TEST(Drawing, ADiscHasItsArea) {
+TEST(PendingFrame, ADiscHasItsArea) {
   Image image = plain(60, 60);
   drawDisc(image, 30.3, 29.6, 12, {255, 255, 255});
   double area = 0;
@@ -140,7 +143,7 @@ TEST(Drawing, ADiscHasItsArea) {
   EXPECT_NEAR(area, 3.14159265 * 144, 5);
 }
 
-TEST(Drawing, ALineHasItsLengthTimesItsThicknessInEveryDirection) {
+TEST(PendingFrame, ALineHasItsLengthTimesItsThicknessInEveryDirection) {
   for (int degrees = 0; degrees < 360; degrees += 15) {
     const double angle = degrees * 3.14159265358979 / 180;
     Image image = plain(120, 120);
@@ -148,11 +151,11 @@ TEST(Drawing, ALineHasItsLengthTimesItsThicknessInEveryDirection) {
              {255, 255, 255});
     double area = 0;
     for (int i = 0; i < 120 * 120; ++i) area += red(image, i % 120, i / 120) / 255.0;
-    EXPECT_NEAR(area, 40 * 3 + 3.14159265 * 2.25, 6) << degrees;  // with its round ends
+    EXPECT_NEAR(area, 40 * 3 + 3.14159265 * 2.25, 6) << degrees;  // with its round caps
   }
 }
 
-TEST(Drawing, WhatIsOutsideOrNotANumberIsIgnored) {
+TEST(PendingFrame, PointsOutsideAndNonFiniteOnesAreIgnored) {
   Image image = plain(10, 10, 7);
   const Image before = image;
   drawLine(image, -50, -50, -1e9, -20, 3, {255, 0, 0});
@@ -163,23 +166,23 @@ TEST(Drawing, WhatIsOutsideOrNotANumberIsIgnored) {
   EXPECT_EQ(image.rgb, before.rgb);
 }
 
-TEST(Scaled, TheMeanIsTakenInLinearLight) {
+TEST(ScaledGap, TheMeanIsComputedInLinearLight) {
   Image image = plain(2, 1);
   image.rgb = {0, 0, 0, 255, 255, 255};
-  const Image one = scaled(image, 1, 1);
+  const Image one = resizeImage(image, 1, 1);
   EXPECT_EQ(one.rgb, (std::vector<std::uint8_t>{188, 188, 188}));  // half the light, in sRGB
-  EXPECT_EQ(scaled(plain(31, 17, 93), 7, 40).rgb, plain(7, 40, 93).rgb);
+  EXPECT_EQ(resizeImage(plain(31, 17, 93), 7, 40).rgb, plain(7, 40, 93).rgb);
 }
 
 TEST(ContactSheet, ShowsEveryPictureOnceInAGrid) {
-  std::vector<Captioned> pictures;
+  std::vector<CaptionedImage> pictures;
   for (int i = 0; i < 5; ++i) {
     pictures.push_back({plain(100 + 20 * i, 80), "picture " + std::to_string(i)});
     for (std::size_t p = 0; p < pictures.back().image.rgb.size(); p += 3) {
       pictures.back().image.rgb[p] = static_cast<std::uint8_t>(200 + i);
     }
   }
-  const Image sheet = contactSheet(pictures, "title", 2);
+  const Image sheet = makeContactSheet(pictures, "title", 2);
   std::array<int, 5> count{};
   for (std::size_t p = 0; p < sheet.rgb.size(); p += 3) {
     const int shade = sheet.rgb[p] - 200;
@@ -188,7 +191,7 @@ TEST(ContactSheet, ShowsEveryPictureOnceInAGrid) {
     }
   }
   for (int i = 0; i < 5; ++i) EXPECT_EQ(count[static_cast<std::size_t>(i)], (100 + 20 * i) * 80);
-  EXPECT_GT(contactSheet({}, "empty", 3).rgb.size(), 0u);
+  EXPECT_GT(makeContactSheet({}, "empty", 3).rgb.size(), 0u);
 }
 
 }  // namespace

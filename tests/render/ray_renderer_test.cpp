@@ -19,8 +19,8 @@ std::set<std::uint32_t> idsIn(const Frame& frame) {
   return {frame.ids.begin(), frame.ids.end()};
 }
 
-/// Cameras all around a crowd that reaches 10 m from `middle`: by opening, by a pinhole off the
-/// middle, and parallel ones.
+/// Cameras all around a crowd that reaches 10 m from `middle`: by field of view, by a pinhole with
+/// an off-centre axis, and orthographic ones.
 std::vector<Camera> camerasAround(const Vec3& middle, int count, int width, int height) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -41,7 +41,7 @@ std::vector<Camera> camerasAround(const Vec3& middle, int count, int width, int 
   return cameras;
 }
 
-/// Whether a neighbour shows something else.
+/// Whether a neighbouring pixel shows another object.
 bool nearAnEdge(const Frame& frame, int x, int y) {
   const Camera& camera = frame.camera;
   for (int dy = -1; dy <= 1; ++dy) {
@@ -67,7 +67,7 @@ Agreement compareWithBruteForce(const std::shared_ptr<const scene::Scene>& scene
     const Frame frame = renderer.render({}, camera);
     const std::vector<BruteHit> truth = bruteForceFrame(scene->model(), camera);
     for (std::size_t i = 0; i < truth.size(); ++i) {
-      // At a silhouette, and where two surfaces meet, floats may choose the other one.
+      // At a silhouette, and where two surfaces meet, floats may select the other one.
       const bool clear =
           truth[i].id == 0 || (truth[i].inside > 1e-4 && truth[i].second - truth[i].depth > 1e-4);
       if (!clear || (frame.ids[i] != truth[i].id && truth[i].id == 0)) {
@@ -107,14 +107,14 @@ TEST(RayRenderer, DepthAndIdsAreThoseOfABruteForceSearchInDoubles) {
   const Agreement found = compareWithBruteForce(scene, cameras);
   EXPECT_GT(found.hits, 12u * 67u * 41u / 4);
   EXPECT_LT(found.undecided, 12u * 67u * 41u / 100);
-  EXPECT_LT(found.worst, 2e-6);  // half a unit of a float at 30 m
+  EXPECT_LT(found.worst, 2e-6);  // half a float's unit in the last place at 30 m
 }
 
 TEST(RayRenderer, DepthIsAsTrueAKilometreFromTheOriginOfTheScene) {
   std::vector<PlacedBox> boxes = opaque(crowd(150));
   const Vec3 far(900, 20, -700);
   for (PlacedBox& box : boxes) box.centre += far;
-  boxes.push_back({{0, 0, 0}, {1, 1, 1}, {}});  // so that the scene's middle is elsewhere
+  boxes.push_back({{0, 0, 0}, {1, 1, 1}, {}});  // moves the scene's centre
   const Agreement found = compareWithBruteForce(sceneOf(boxes), camerasAround(far, 6, 67, 41));
   EXPECT_GT(found.hits, 6u * 67u * 41u / 4);
   EXPECT_LT(found.worst, 1e-5);
@@ -126,20 +126,20 @@ TEST(RayRenderer, GlassTintsTheColourAndLetsIdsAndDepthThrough) {
   RayRenderer renderer(sceneOf({pane, wall}));
   const Frame frame = renderer.render({}, squareCamera());
   EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{2}));
-  const std::size_t through = at(frame, 100, 100), beside = at(frame, 20, 100);
+  const std::size_t through = at(frame, 100, 100), nextTo = at(frame, 20, 100);
   EXPECT_EQ(frame.depth[through], 5);
-  EXPECT_LT(frame.rgb[3 * through] + 30, frame.rgb[3 * beside]);
+  EXPECT_LT(frame.rgb[3 * through] + 30, frame.rgb[3 * nextTo]);
   EXPECT_GT(frame.rgb[3 * through + 2], frame.rgb[3 * through] + 30);
   FrameOptions solid;
-  solid.glass = Glass::solid;
+  solid.transparency = TransparencyMode::opaque;
   const Frame first = renderer.render({}, squareCamera(), solid);
   EXPECT_EQ(first.ids[through], 1u);
   EXPECT_NEAR(first.depth[through], 2.95, 1e-6);
-  EXPECT_EQ(first.ids[beside], 2u);
+  EXPECT_EQ(first.ids[nextTo], 2u);
 }
 
 TEST(RayRenderer, APaneSeenSquarelyIsTintedOnceAlongItsDiagonalToo) {
-  // The middle of the picture is the pane's middle: rays go through the edge of its two triangles.
+  // The image centre is the pane's centre: rays hit the shared edge of its two triangles.
   const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, coloured(0.8f, 0.8f, 0.8f)};
   const PlacedBox pane{{0, 0, -3}, {1, 1, 0}, coloured(0.05f, 0.05f, 0.9f, 0.5f)};
   RayRenderer renderer(sceneOf({pane, wall}));
@@ -152,7 +152,7 @@ TEST(RayRenderer, APaneSeenSquarelyIsTintedOnceAlongItsDiagonalToo) {
   }
 }
 
-TEST(RayRenderer, AParallelCameraSeesWhatIsBehindItsEyeWhereNearSaysSo) {
+TEST(RayRenderer, AnOrthographicCameraSeesBehindItsEyeWithNegativeNear) {
   RayRenderer renderer(sceneOf({{{0, 0, 5}, {2, 2, 2}, {}}, {{0, 0, -5}, {20, 20, 2}, {}}}));
   Camera camera = squareCamera();
   camera.projection = Camera::Projection::orthographic;
@@ -165,7 +165,7 @@ TEST(RayRenderer, AParallelCameraSeesWhatIsBehindItsEyeWhereNearSaysSo) {
   EXPECT_EQ(frame.depth[at(frame, 10, 10)], 4);
 }
 
-TEST(RayRenderer, ABodyMadeFlatIsSeen) {
+TEST(RayRenderer, AFlatBodyIsVisible) {
   const auto lift = sceneWithLift();
   scene::Model model = lift->model();
   const std::uint32_t object = model.bodies.front().objects.front();
@@ -203,11 +203,11 @@ TEST(RayRenderer, AHiddenAvatarIsNotDrawnAndOthersAre) {
   EXPECT_EQ(both.ids[at(both, 75, 100)], 2u);
   EXPECT_NEAR(both.depth[at(both, 75, 100)], 3.7, 1e-6);
   FrameOptions eyes;
-  eyes.hidden = 2;
+  eyes.hiddenEntity = 2;
   EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera(), eyes)),
             (std::set<std::uint32_t>{1, 3}));
-  snapshot.avatars.front().feet.x() = 1;
-  snapshot.avatars.back().feet.x() = -1;
+  snapshot.avatars.front().footPosition.x() = 1;
+  snapshot.avatars.back().footPosition.x() = -1;
   const Frame moved = renderer.render(snapshot, squareCamera());
   EXPECT_EQ(moved.ids[at(moved, 75, 100)], 3u);
   snapshot.avatars.clear();
@@ -246,7 +246,7 @@ TEST(RayRenderer, PicturesDoNotDependOnTheNumberOfThreads) {
   }
 }
 
-TEST(RayRenderer, ChannelsNotAskedForAreEmptyAndTheOthersAreTheSame) {
+TEST(RayRenderer, UnrequestedChannelsAreEmptyAndTheOthersAreEqual) {
   RayRenderer renderer(sceneOf(crowd(100)));
   const Camera camera = camerasAround(Vec3::Zero(), 1, 80, 60).front();
   FrameOptions all;
@@ -279,7 +279,7 @@ TEST(RayRenderer, NearAndFarCutAsInEveryPicture) {
   Camera camera = squareCamera();
   camera.near = 4.5;
   const Frame inside = renderer.render({}, camera);
-  EXPECT_NEAR(inside.depth[at(inside, 100, 100)], 6, 1e-6);  // the box's back, from within
+  EXPECT_NEAR(inside.depth[at(inside, 100, 100)], 6, 1e-6);  // the box's back face, from inside
   camera.near = 6.5;
   EXPECT_EQ(renderer.render({}, camera).ids[at(inside, 100, 100)], 2u);
   camera.far = 8;
@@ -297,7 +297,7 @@ TEST(RayRenderer, AnEmptySceneIsSkyAndARefusedCameraAnError) {
   EXPECT_THROW(renderer.render({}, camera), RenderError);
 }
 
-TEST(RayRenderer, IdsAreThoseOfThePictureThatGlDrawsBesidesEdges) {
+TEST(RayRenderer, IdsEqualThoseOfOpenGlExceptAtEdges) {
   const auto scene = sceneOf(crowd(300));
   scene::Snapshot snapshot;
   snapshot.avatars = {avatarAt(301, {1, -1, -4})};
@@ -318,7 +318,7 @@ TEST(RayRenderer, IdsAreThoseOfThePictureThatGlDrawsBesidesEdges) {
           ++differ;
           if (!nearAnEdge(a, x, y)) ++awayFromEdges;
         } else if (a.ids[i] != 0 && !nearAnEdge(a, x, y)) {
-          // GL's parallel pictures spread 24 bits evenly over 60 m.
+          // GL's orthographic images spread 24 bits evenly over 60 m.
           ASSERT_NEAR(a.depth[i], b.depth[i], 3e-3);
           using Normal = Eigen::Map<const Eigen::Vector3f>;
           if (Normal(&a.normals[3 * i]).dot(Normal(&b.normals[3 * i])) < 0.999f) ++turned;
@@ -328,12 +328,12 @@ TEST(RayRenderer, IdsAreThoseOfThePictureThatGlDrawsBesidesEdges) {
   }
   EXPECT_LT(static_cast<double>(differ), 1e-3 * static_cast<double>(pixels));
   EXPECT_EQ(awayFromEdges, 0u);
-  EXPECT_LT(static_cast<double>(turned), 1e-3 * static_cast<double>(pixels));  // a box's edges
+  EXPECT_LT(static_cast<double>(turned), 1e-3 * static_cast<double>(pixels));  // on the box's edges
   EXPECT_LT(meanColour / static_cast<double>(pixels), 0.6);                    // of 255
 }
 
 TEST(RayRenderer, EveryShadeFromBlackToWhiteIsWithinAStepOfGl) {
-  // Boxes side by side, black but for what they give off: from nothing to far more than white.
+  // A row of boxes, black except for their emission, from zero to far beyond white.
   constexpr int kBoxes = 100;
   std::vector<PlacedBox> boxes;
   for (int i = 0; i < kBoxes; ++i) {
@@ -365,7 +365,8 @@ TEST(RayRenderer, ColoursOfTexturesAndPlansAreThoseOfGl) {
   const auto scene = texturedRoom();
   RayRenderer rays(scene);
   GlRenderer gl(scene);
-  for (const Camera& camera : {squareCamera(), plan(scene->bounds(), -1, 0.2, 190, 121)}) {
+  for (const Camera& camera :
+       {squareCamera(), makePlanCamera(scene->bounds(), -1, 0.2, 190, 121)}) {
     const Frame a = rays.render({}, camera), b = gl.render({}, camera);
     double sum = 0;
     for (std::size_t i = 0; i < a.rgb.size(); ++i) sum += std::abs(int{a.rgb[i]} - int{b.rgb[i]});

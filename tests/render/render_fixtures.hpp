@@ -1,4 +1,4 @@
-// What the pictures of both renderers are tested with.
+// Scenes that both renderers are tested with.
 #pragma once
 
 #include <random>
@@ -8,7 +8,7 @@
 
 namespace enfilade::render {
 
-/// Around the origin, within 10 m; some mirrored, some of glass.
+/// Boxes within 10 m of the origin; some mirrored, some transparent.
 inline std::vector<PlacedBox> crowd(int count) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> place(-10, 10);
@@ -31,24 +31,24 @@ inline std::vector<PlacedBox> opaque(std::vector<PlacedBox> boxes) {
   return boxes;
 }
 
-/// A prism 0.6 m wide and 1.75 m high.
-inline scene::AvatarView avatarAt(scene::EntityId id, const Vec3& feet) {
+/// An avatar: a prism 0.6 m wide and 1.75 m high.
+inline scene::AvatarSnapshot avatarAt(scene::EntityId id, const Vec3& feet) {
   std::vector<Vec3> points;
   for (const double y : {0.0, 1.75}) {
     for (const double x : {-0.3, 0.3}) {
       for (const double z : {-0.3, 0.3}) points.emplace_back(x, y, z);
     }
   }
-  scene::AvatarView avatar;
+  scene::AvatarSnapshot avatar;
   avatar.id = id;
-  avatar.feet = feet;
-  avatar.shape = scene::shapeOf(
-      {scene::placedPart(std::make_shared<const collision::Hull>(collision::buildHull(points)),
-                         Vec3::Zero(), collision::Mat3::Identity())});
+  avatar.footPosition = feet;
+  avatar.shape = scene::makeAvatarShape(
+      {scene::makeAvatarPart(std::make_shared<const collision::Hull>(collision::buildHull(points)),
+                             Vec3::Zero(), collision::Mat3::Identity())});
   return avatar;
 }
 
-/// Two metres ahead of squareCamera(), its left half there and its right half cut out.
+/// A square two metres ahead of squareCamera(); its left half is opaque, its right half cut out.
 inline std::shared_ptr<const scene::Scene> maskedSquare() {
   scene::Model model;
   scene::Material leaf;
@@ -66,7 +66,7 @@ inline std::shared_ptr<const scene::Scene> maskedSquare() {
   return std::make_shared<const scene::Scene>(std::move(model));
 }
 
-/// A floor with a chequered texture that repeats, in front of squareCamera(), and a mirrored box.
+/// A floor with a repeated chequered texture, in front of squareCamera(), and a mirrored box.
 inline std::shared_ptr<const scene::Scene> texturedRoom() {
   scene::Model model;
   scene::Material tiles;
@@ -98,7 +98,7 @@ inline std::shared_ptr<const scene::Scene> texturedRoom() {
   return std::make_shared<const scene::Scene>(std::move(model));
 }
 
-/// A wall (object 1) and a metre's cube in front of it (object 2), which is a lift.
+/// A wall (object 1) and in front of it a cube of one metre (object 2), which is a lift.
 inline std::shared_ptr<const scene::Scene> sceneWithLift() {
   scene::Model model =
       sceneOf({{{0, 0, -8}, {40, 40, 1}, {}}, {{0, 0, -5}, {1, 1, 1}, coloured(0.9f, 0.2f, 0.1f)}})
@@ -115,12 +115,12 @@ inline std::shared_ptr<const scene::Scene> sceneWithLift() {
 }
 
 inline scene::Snapshot snapshotOfLift(const scene::Scene& scene, double height) {
-  scene::BodyView lift;
+  scene::BodySnapshot lift;
   lift.id = 2;
   lift.displaced = height != 0;
-  lift.pose.translation = scene.shapeOfBody(0)->origin + Vec3(0, height, 0);
+  lift.pose.translation = scene.bodyShape(0)->origin + Vec3(0, height, 0);
   scene::Snapshot snapshot;
-  snapshot.bodies = std::make_shared<const std::vector<scene::BodyView>>(1, lift);
+  snapshot.bodies = std::make_shared<const std::vector<scene::BodySnapshot>>(1, lift);
   return snapshot;
 }
 

@@ -36,7 +36,7 @@ TEST(RenderThread, SeveralThreadsEachGetTheirOwnPictures) {
   EXPECT_FALSE(renders.deviceName().empty());
 }
 
-TEST(RenderThread, ARefusedCameraComesThroughTheFutureAndTheThreadGoesOn) {
+TEST(RenderThread, ARefusedCameraFailsItsFutureAndTheThreadContinues) {
   RenderThread renders(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
   Camera bad = squareCamera(32);
   bad.eye.x() = std::nan("");
@@ -48,7 +48,7 @@ TEST(RenderThread, ARefusedCameraComesThroughTheFutureAndTheThreadGoesOn) {
   EXPECT_EQ(fine.get().tick, 2u);
 }
 
-TEST(RenderThread, WhatIsQueuedIsFinishedBeforeItEnds) {
+TEST(RenderThread, QueuedImagesAreFinishedBeforeTheEnd) {
   std::vector<std::future<Frame>> frames;
   {
     RenderThread renders(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
@@ -61,14 +61,15 @@ TEST(RenderThread, WhatIsQueuedIsFinishedBeforeItEnds) {
   }
 }
 
-TEST(RenderThread, WithoutADeviceEachPictureIsRefusedAndTheReasonTold) {
+TEST(RenderThread, WithoutADeviceEachImageIsRefusedWithTheReason) {
   RenderThread renders(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}), {.device = "no such device"});
-  auto first = renders.render(snapshotOf(1), squareCamera(32));  // while the device is looked for
+  auto first = renders.render(snapshotOf(1), squareCamera(32));  // while the device is being opened
   EXPECT_TRUE(renders.deviceName().empty());
-  EXPECT_NE(renders.whyNone().find("no such device"), std::string::npos) << renders.whyNone();
+  EXPECT_NE(renders.unavailableReason().find("no such device"), std::string::npos)
+      << renders.unavailableReason();
   auto second = renders.render(snapshotOf(2), squareCamera(32));
-  EXPECT_THROW(first.get(), NoRenderer);
-  EXPECT_THROW(second.get(), NoRenderer);
+  EXPECT_THROW(first.get(), RendererUnavailable);
+  EXPECT_THROW(second.get(), RendererUnavailable);
 }
 
 TEST(RenderThread, WithoutASceneThereIsAnErrorAndNoThread) {

@@ -1,4 +1,4 @@
-// Pictures and renderers leave no memory behind.
+// Tests that images and renderers leak no memory.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -27,7 +27,7 @@ std::vector<PlacedBox> manyBoxes() {
   return boxes;
 }
 
-/// Reloads the scene `reloads` times and takes 20 pictures with each. frame_soak does more of it.
+/// Reloads the scene `reloads` times and draws 20 images with each. frame_soak does more of it.
 template <class OneRenderer>
 void work(int reloads) {
   for (int reload = 0; reload < reloads; ++reload) {
@@ -42,7 +42,7 @@ void work(int reloads) {
 
 template <class OneRenderer>
 void expectFlat() {
-  work<OneRenderer>(6);  // what is kept for good, as compiled shaders
+  work<OneRenderer>(6);  // warms up allocations that are kept, such as compiled shaders
   const double before = residentMegabytes();
   work<OneRenderer>(24);
   EXPECT_LT(residentMegabytes() - before, 12) << "megabytes more after 24 reloads";

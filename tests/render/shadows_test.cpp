@@ -1,4 +1,4 @@
-// The sun's shadows, against boxes cut by lines worked out in doubles.
+// Tests of sun shadows, against boxes intersected with lines in doubles.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,7 +7,7 @@
 #include "render/raytrace/primary_rays.hpp"
 #include "render/raytrace/ray_renderer.hpp"
 #include "render/raytrace/shading.hpp"
-#include "render/service/renderer.hpp"
+#include "render/service/renderer_selector.hpp"
 #include "tests/render/render_fixtures.hpp"
 
 namespace enfilade::render {
@@ -15,9 +15,9 @@ namespace {
 
 enum class Sun : std::uint8_t { reaches, kept, undecided };
 
-/// Whether a line from `start` towards the sun passes the box, which is smaller by `inwards`.
+/// Whether the line from `start` towards the sun intersects the box deflated by `inwards`.
 bool passes(const PlacedBox& box, const Vec3& start, double inwards, double end) {
-  const Vec3 sun = towardsSun();
+  const Vec3 sun = sunDirection();
   const Vec3 half = box.size.cwiseAbs() / 2 - Vec3::Constant(inwards);
   double from = 0, to = end;
   for (int axis = 0; axis < 3; ++axis) {
@@ -29,7 +29,7 @@ bool passes(const PlacedBox& box, const Vec3& start, double inwards, double end)
   return from < to && (half.array() > 0).all();
 }
 
-/// On a face of box `own` that is turned to the sun; no box keeps the sun from its own such faces.
+/// For a point on a sunlit face of box `own`; a box never shadows its own sunlit faces.
 Sun sunAt(const std::vector<PlacedBox>& boxes, std::size_t own, const Vec3& start, double end) {
   Sun sun = Sun::reaches;
   for (const PlacedBox& box : boxes) {
@@ -61,17 +61,17 @@ FrameOptions withShadows(bool shadows = true) {
   return options;
 }
 
-/// Where faces turn away from the sun it is of no matter who else keeps it from them.
+/// Faces turned away from the sun are dark with or without other occluders.
 bool turnedToTheSun(const Frame& frame, std::size_t pixel) {
   const float* n = &frame.normals[3 * pixel];
-  return Eigen::Vector3f(n[0], n[1], n[2]).cast<double>().dot(towardsSun()) > 0.05;
+  return Eigen::Vector3f(n[0], n[1], n[2]).cast<double>().dot(sunDirection()) > 0.05;
 }
 
 class Shadows : public testing::TestWithParam<RendererKind> {};
 
 TEST_P(Shadows, AreWhereLinesTowardsTheSunPassBoxes) {
   const std::vector<PlacedBox> boxes = boxesOnAFloor();
-  Renderer renderer(sceneOf(boxes), GetParam());
+  RendererSelector renderer(sceneOf(boxes), GetParam());
   for (const bool parallel : {false, true}) {
     Camera camera = slantedCamera();
     if (parallel) camera.projection = Camera::Projection::orthographic, camera.heightY = 16;
@@ -81,14 +81,14 @@ TEST_P(Shadows, AreWhereLinesTowardsTheSunPassBoxes) {
     options.shadows = false;
     const Frame sunny = renderer.render({}, camera, options);
     EXPECT_EQ(shaded.ids, sunny.ids);
-    const PixelRays rays = pixelRaysOf(camera);
+    const PrimaryRays rays = computePrimaryRays(camera);
     int kept = 0, reached = 0;
     for (int y = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x) {
         const std::size_t pixel = at(shaded, x, y);
         const auto z = static_cast<double>(shaded.depth[pixel]);
         if (std::isnan(z) || !turnedToTheSun(shaded, pixel)) continue;
-        const double up = towardsSun().dot(rays.forward);
+        const double up = sunDirection().dot(rays.forward);
         const double end = parallel ? ((up < 0 ? camera.near : camera.far) - z) / up
                                     : std::numeric_limits<double>::infinity();
         const Vec3 point = rays.eye + rays.originAt(x, y) + z * rays.directionAt(x, y);
@@ -108,18 +108,18 @@ TEST_P(Shadows, AreWhereLinesTowardsTheSunPassBoxes) {
   }
 }
 
-TEST_P(Shadows, ClearGlassCastsNoneAndSolidGlassDoes) {
+TEST_P(Shadows, OnlySolidGlassCastsShadows) {
   const PlacedBox floor{{0, -1, 0}, {20, 1, 20}, {}};
   const PlacedBox pane{{0, 2, 0}, {6, 0.1, 6}, coloured(0.2f, 0.2f, 0.9f, 0.3f)};
-  Renderer renderer(sceneOf({floor, pane}), GetParam());
-  Camera camera = squareCamera(40);  // beneath the pane, towards its shadow
+  RendererSelector renderer(sceneOf({floor, pane}), GetParam());
+  Camera camera = squareCamera(40);  // below the pane, towards its shadow
   camera.eye = {-2, 1, -2};
   camera.forward = {0, -1, 0};
   camera.up = Vec3::UnitX();
   FrameOptions options = withShadows();
   EXPECT_EQ(renderer.render({}, camera, options).rgb,
             renderer.render({}, camera, withShadows(false)).rgb);
-  options.glass = Glass::solid;
+  options.transparency = TransparencyMode::opaque;
   const Frame shaded = renderer.render({}, camera, options);
   options.shadows = false;
   const Frame sunny = renderer.render({}, camera, options);
@@ -128,7 +128,8 @@ TEST_P(Shadows, ClearGlassCastsNoneAndSolidGlassDoes) {
 }
 
 TEST_P(Shadows, HolesOfTexturesLetTheSunThrough) {
-  // Its left half (x < 0) is a leaf, its right half a hole; a floor lies behind, square to the sun.
+  // The left half of the square (x < 0) is a leaf, its right half a hole; a floor behind it is
+  // perpendicular to the sun.
   scene::Model model = maskedSquare()->model();
   scene::Mesh floor;
   floor.material = 1;
@@ -139,10 +140,10 @@ TEST_P(Shadows, HolesOfTexturesLetTheSunThrough) {
   model.meshes.push_back(floor);
   model.objects.resize(2);
   model.objects[1].meshes = {1};
-  Renderer renderer(std::make_shared<const scene::Scene>(std::move(model)), GetParam());
-  // From a point of the square down along the sun's ray to the floor.
+  RendererSelector renderer(std::make_shared<const scene::Scene>(std::move(model)), GetParam());
+  // Projects a point of the square along the sun's ray to the floor.
   const auto darker = [&](double x) {
-    const Vec3 below = Vec3(x, 0, -2) - 1.5 / towardsSun().y() * towardsSun();
+    const Vec3 below = Vec3(x, 0, -2) - 1.5 / sunDirection().y() * sunDirection();
     Camera camera;
     camera.eye = below + Vec3(0, 0.5, -0.5);
     camera.forward = below - camera.eye;
@@ -152,14 +153,14 @@ TEST_P(Shadows, HolesOfTexturesLetTheSunThrough) {
   };
   EXPECT_GT(darker(-0.5), 5);
   EXPECT_EQ(darker(0.5), 0);
-  EXPECT_EQ(darker(1.5), 0) << "beside the square";
+  EXPECT_EQ(darker(1.5), 0) << "next to the square";
 }
 
-TEST_P(Shadows, WhatAPlanCutsAwayCastsNone) {
+TEST_P(Shadows, GeometryThatAPlanCutsAwayCastsNone) {
   const PlacedBox floor{{0, -0.5, 0}, {20, 1, 20}, {}}, roof{{0, 3, 0}, {20, 0.2, 20}, {}};
   const PlacedBox wall{{0, 1.25, 0}, {0.2, 2.5, 8}, {}};
-  Renderer renderer(sceneOf({floor, roof, wall}), GetParam());
-  Camera camera = plan({Vec3(-4, 0, -4), Vec3(4, 0, 4)}, -0.1, 2, 80, 80);
+  RendererSelector renderer(sceneOf({floor, roof, wall}), GetParam());
+  Camera camera = makePlanCamera({Vec3(-4, 0, -4), Vec3(4, 0, 4)}, -0.1, 2, 80, 80);
   const Frame shaded = renderer.render({}, camera, withShadows());
   const Frame sunny = renderer.render({}, camera, withShadows(false));
   const auto less = [&](double x, double z) {
@@ -167,33 +168,33 @@ TEST_P(Shadows, WhatAPlanCutsAwayCastsNone) {
         3 * at(shaded, static_cast<int>(40 + 10 * x * 0.9), static_cast<int>(40 + 10 * z * 0.9));
     return sunny.rgb[pixel] - shaded.rgb[pixel];
   };
-  EXPECT_GT(less(-0.5, 0), 5) << "behind the wall, up to where it is cut";
+  EXPECT_GT(less(-0.5, 0), 5) << "behind the wall, up to the cut";
   EXPECT_EQ(less(-2.5, 0), 0) << "the roof is cut away";
   EXPECT_EQ(less(2.5, 0), 0);
 }
 
 TEST_P(Shadows, APersonCastsOneButForTheirOwnEyes) {
-  Renderer renderer(sceneOf({{{0, -0.5, 0}, {20, 1, 20}, {}}}), GetParam());
+  RendererSelector renderer(sceneOf({{{0, -0.5, 0}, {20, 1, 20}, {}}}), GetParam());
   scene::Snapshot snapshot;
   snapshot.avatars = {avatarAt(7, Vec3::Zero())};
   Camera camera = slantedCamera();
   FrameOptions options = withShadows();
   const Frame seen = renderer.render(snapshot, camera, options);
   EXPECT_GT(std::count(seen.ids.begin(), seen.ids.end(), 7u), 20);
-  camera.eye = {-0.6, 3, -0.8};  // over the shadow
+  camera.eye = {-0.6, 3, -0.8};  // above the shadow
   camera.forward = {0, -1, 0};
   camera.up = Vec3::UnitX();
   const auto floorOf = [&](const Frame& frame) { return frame.rgb[3 * at(frame, 75, 55)]; };
   const int shaded = floorOf(renderer.render(snapshot, camera, options));
-  options.hidden = 7;
+  options.hiddenEntity = 7;
   EXPECT_GT(floorOf(renderer.render(snapshot, camera, options)), shaded + 5);
 }
 
 INSTANTIATE_TEST_SUITE_P(OfBothRenderers, Shadows,
                          testing::Values(RendererKind::gl, RendererKind::rays),
-                         [](const auto& kind) { return std::string(wordOf(kind.param)); });
+                         [](const auto& kind) { return std::string(toString(kind.param)); });
 
-TEST(ShadowsOfGl, NeedSomebodyWhoFindsThem) {
+TEST(ShadowsOfGl, NeedAShadowMask) {
   GlRenderer renderer(sceneOf(boxesOnAFloor()));
   EXPECT_THROW(renderer.render({}, squareCamera(20), withShadows()), RenderError);
   EXPECT_EQ(renderer.render({}, squareCamera(20)).rgb.size(), 1200u);
@@ -201,23 +202,21 @@ TEST(ShadowsOfGl, NeedSomebodyWhoFindsThem) {
 
 TEST(ShadowsOfGl, AreTheSameWhateverIsLeftOutOfTheDrawing) {
   const auto scene = sceneOf(crowd(600));
-  GlRenderer gl(scene);
   RayRenderer rays(scene);
+  GlRenderer gl(scene, {}, [&](const auto&... frame) { return rays.computeShadowMask(frame...); });
   for (int i = 0; i < 12; ++i) {
     Camera camera = slantedCamera();
     camera.eye = Vec3(12 * std::cos(0.5 * i), 3, 12 * std::sin(0.5 * i));
     camera.forward = -camera.eye;
     FrameOptions options = withShadows();
-    options.glass = i % 3 == 0 ? Glass::solid : Glass::clear;
+    options.transparency = i % 3 == 0 ? TransparencyMode::opaque : TransparencyMode::blend;
     const auto drawn = [&](Culling culling) {
       options.culling = culling;
-      return gl.render({}, camera, options, [&](const std::vector<float>& depth) {
-        return rays.sunlit({}, camera, options, depth);
-      });
+      return gl.render({}, camera, options);
     };
-    const Frame culled = drawn(Culling::hidden);
-    EXPECT_TRUE(culled.rgb == drawn(Culling::outside).rgb) << i;
-    EXPECT_TRUE(culled.rgb == drawn(Culling::singly).rgb) << i;
+    const Frame culled = drawn(Culling::occlusion);
+    EXPECT_TRUE(culled.rgb == drawn(Culling::frustum).rgb) << i;
+    EXPECT_TRUE(culled.rgb == drawn(Culling::none).rgb) << i;
   }
 }
 

@@ -1,4 +1,4 @@
-#include "scene/world/contacts/active_contacts.hpp"
+#include "scene/world/active_contacts.hpp"
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ using namespace testing;
 using Kind = ContactEvent::Kind;
 using Living = std::set<std::tuple<EntityId, EntityId, Kind>>;
 
-/// A wall, a volume, and a tower of boxes that is walked into.
+/// A wall, a volume, and a tower of boxes with an avatar that walks into it.
 std::shared_ptr<const Scene> towerRoom() {
   std::vector<NamedBox> boxes{
       floorBox(), {"wall", {5, 0, -10}, {5.2, 3, 10}}, {"zone", {-1, 0, -1}, {1, 2, 1}}};
@@ -28,7 +28,7 @@ std::shared_ptr<const Scene> towerRoom() {
   return std::make_shared<const Scene>(std::move(model));
 }
 
-/// What was told to begin and not to end.
+/// Applies begin and end events: keeps the contacts that began and did not end.
 void follow(Living& living, const std::vector<ContactEvent>& events) {
   for (const ContactEvent& event : events) {
     if (event.kind == Kind::begin || event.kind == Kind::enter)
@@ -38,26 +38,26 @@ void follow(Living& living, const std::vector<ContactEvent>& events) {
   }
 }
 
-TEST(LivingContacts, AreThoseThatWereToldToBeginAndNotToEnd) {
+TEST(ActiveContacts, AreTheReportedBeginsWithoutAnEnd) {
   World world(towerRoom());
-  submit(world, {"ann", Spawn{{-4, 0, 0}}});
-  submit(world, {"ann", Walk{{Vec3(8, 0, 0)}}});
-  submit(world, {"bob", Spawn{{4, 0, 4}}});
-  submit(world, {"bob", Walk{{Vec3(4.6, 0, 0), Vec3(-4, 0, 0)}}});
-  Living told;
+  submitAvatarCommand(world, {"ann", Spawn{{-4, 0, 0}}});
+  submitAvatarCommand(world, {"ann", Walk{{Vec3(8, 0, 0)}}});
+  submitAvatarCommand(world, {"bob", Spawn{{4, 0, 4}}});
+  submitAvatarCommand(world, {"bob", Walk{{Vec3(4.6, 0, 0), Vec3(-4, 0, 0)}}});
+  Living followed;
   std::size_t entered = 0, ended = 0, betweenBodies = 0;
   for (int tick = 0; tick < 600; ++tick) {
-    if (tick == 500) submit(world, {"bob", Leave{}});
-    const std::size_t before = told.size();
-    follow(told, enfilade::scene::tick(world).contacts);
+    if (tick == 500) submitAvatarCommand(world, {"bob", Leave{}});
+    const std::size_t before = followed.size();
+    follow(followed, enfilade::scene::tickWorld(world).contacts);
     Living living;
-    for (const ContactEvent& event : livingContacts(world)) {
+    for (const ContactEvent& event : collectActiveContacts(world)) {
       EXPECT_TRUE(living.insert({event.a, event.b, event.kind}).second);
       entered += event.kind == Kind::enter ? 1 : 0;
       betweenBodies += event.kind == Kind::begin && event.a <= 6 ? 1 : 0;
     }
-    ended += told.size() < before ? 1 : 0;
-    ASSERT_EQ(living, told) << "tick " << tick;
+    ended += followed.size() < before ? 1 : 0;
+    ASSERT_EQ(living, followed) << "tick " << tick;
   }
   EXPECT_GT(entered, 0u);
   EXPECT_GT(ended, 0u);

@@ -1,4 +1,4 @@
-// Jumping, flying, crouching, and what a move tells of itself.
+// Tests of jumping, flying and crouching, and of the events that a move reports.
 #include <cmath>
 
 #include "tests/scene/world_fixture.hpp"
@@ -10,7 +10,7 @@ using namespace testing;
 using Kind = Notice::Kind;
 
 TEST(Jump, RisesToItsHeightAndEndsOnTheFloor) {
-  Trial run({floorBox()});
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.untilIdle();
   const double ground = run.feet("ann").y();
@@ -21,7 +21,7 @@ TEST(Jump, RisesToItsHeightAndEndsOnTheFloor) {
     top = std::max(top, run.feet("ann").y() - ground);
   }
   EXPECT_EQ(run.count(Kind::done), 1);
-  // On the parabola; the highest tick is at most half a tick from its top.
+  // The highest tick lies on the parabola, at most half a tick from its top.
   EXPECT_LE(top, 0.8 + 1e-9);
   EXPECT_GT(top, 0.8 - 0.5 * 9.80665 / 120 / 120 - 1e-9);
   EXPECT_NEAR(run.feet("ann").y(), ground, 1e-3);
@@ -29,8 +29,8 @@ TEST(Jump, RisesToItsHeightAndEndsOnTheFloor) {
 }
 
 TEST(Jump, RightAfterASpawnWaitsForTheLanding) {
-  Trial run({floorBox()});
-  run.order("ann", Spawn{.at = {0, 0.3, 0}});
+  WorldFixture run({floorBox()});
+  run.order("ann", Spawn{.position = {0, 0.3, 0}});
   run.order("ann", Jump{.height = 0.5});
   double top = 0;
   for (int i = 0; i < 120; ++i) {
@@ -43,7 +43,7 @@ TEST(Jump, RightAfterASpawnWaitsForTheLanding) {
 
 TEST(Jump, OffALedgeGoesFartherThanWalkingOff) {
   const std::vector<NamedBox> scene{floorBox(), {"ledge", {-9, 0, -2}, {0, 2, 2}}};
-  Trial run(scene);
+  WorldFixture run(scene);
   run.order("ann", Spawn{{-0.1, 2, 0}});
   run.untilIdle();
   run.order("ann", Jump{0.5, Vec3(2, 0, 0)});
@@ -56,7 +56,7 @@ TEST(Jump, OffALedgeGoesFartherThanWalkingOff) {
 }
 
 TEST(Jump, ACeilingEndsTheRiseAndIsNotCrossed) {
-  Trial run({floorBox(), {"ceiling", {-9, 2, -9}, {9, 2.001, 9}}});
+  WorldFixture run({floorBox(), {"ceiling", {-9, 2, -9}, {9, 2.001, 9}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.untilIdle();
   run.order("ann", Jump{2});
@@ -72,20 +72,21 @@ TEST(Jump, ACeilingEndsTheRiseAndIsNotCrossed) {
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
-TEST(Jump, OfOneWhoFliesOrAbsurdlyHighIsRefused) {
-  Trial run({floorBox()});
-  EXPECT_TRUE(submit(run.world, {"ann", Jump{std::nan("")}, 0}));
-  EXPECT_TRUE(submit(run.world, {"ann", Jump{0}, 0}));
-  EXPECT_TRUE(submit(run.world, {"ann", Jump{run.world.lengths().jumpLimit * 1.01}, 0}));
-  EXPECT_TRUE(submit(run.world, {"ann", Jump{0.5, Vec3(0, INFINITY, 0)}, 0}));
-  run.order("ann", Spawn{.at = {0, 5, 0}, .flying = true});
+TEST(Jump, OfAFlyingAvatarOrTooHighIsRefused) {
+  WorldFixture run({floorBox()});
+  EXPECT_TRUE(submitAvatarCommand(run.world, {"ann", Jump{std::nan("")}, 0}));
+  EXPECT_TRUE(submitAvatarCommand(run.world, {"ann", Jump{0}, 0}));
+  EXPECT_TRUE(
+      submitAvatarCommand(run.world, {"ann", Jump{run.world.settings().maxJumpHeight * 1.01}, 0}));
+  EXPECT_TRUE(submitAvatarCommand(run.world, {"ann", Jump{0.5, Vec3(0, INFINITY, 0)}, 0}));
+  run.order("ann", Spawn{.position = {0, 5, 0}, .flying = true});
   run.order("ann", Jump{0.5});
   run.ticks(2);
   EXPECT_EQ(run.count(Kind::refused), 1);
 }
 
-TEST(Fly, GoesStraightThroughTheAirAndStopsAtWhatIsThere) {
-  Trial run({floorBox(), {"beam", {4, 2, -3}, {5, 6, 3}}});
+TEST(Fly, FollowsAStraightPathAndStopsAtObstacles) {
+  WorldFixture run({floorBox(), {"beam", {4, 2, -3}, {5, 6, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", Fly{});
   run.order("ann", Walk{{{0, 3, 2}}, 2});
@@ -97,7 +98,7 @@ TEST(Fly, GoesStraightThroughTheAirAndStopsAtWhatIsThere) {
   run.order("ann", Drive{{500, 0, 0}});
   run.ticks(5);
   EXPECT_NEAR(run.feet("ann").x(), 4 - 0.3, 0.01);
-  EXPECT_EQ(run.view("ann").move.stoppedBy, 2u);
+  EXPECT_EQ(run.view("ann").move.blockedBy, 2u);
   run.order("ann", Drive{});
   run.order("ann", Fly{false});
   run.untilIdle();
@@ -106,9 +107,9 @@ TEST(Fly, GoesStraightThroughTheAirAndStopsAtWhatIsThere) {
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
-TEST(Fly, ASpawnInTheAirNeedsNoFloorAndNobodyFliesForEver) {
-  Trial run({floorBox()});
-  run.order("ann", Spawn{.at = {50, 20, 0}, .flying = true});
+TEST(Fly, ASpawnInTheAirNeedsNoFloorAndFlightEnds) {
+  WorldFixture run({floorBox()});
+  run.order("ann", Spawn{.position = {50, 20, 0}, .flying = true});
   run.untilIdle();
   EXPECT_EQ(run.count(Kind::spawned), 1);
   run.order("ann", Drive{{0, 900, 0}});
@@ -117,8 +118,8 @@ TEST(Fly, ASpawnInTheAirNeedsNoFloorAndNobodyFliesForEver) {
   EXPECT_NE(run.text(Kind::left).find("out of the scene"), std::string::npos);
 }
 
-TEST(Crouch, GoesUnderWhatIsTooLowAndStandsUpOnlyWhereThereIsRoom) {
-  Trial run({floorBox(), {"duct", {2, 1.2, -3}, {4, 1.3, 3}}});
+TEST(Crouch, PassesUnderALowObstacleAndStandsUpOnlyWithRoom) {
+  WorldFixture run({floorBox(), {"duct", {2, 1.2, -3}, {4, 1.3, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", to(3, 0));
   run.untilIdle();
@@ -138,8 +139,8 @@ TEST(Crouch, GoesUnderWhatIsTooLowAndStandsUpOnlyWhereThereIsRoom) {
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
-TEST(Crouch, WhatIsLowerThanAThirdOrHigherThanSpawnedIsRefused) {
-  Trial run({floorBox()});
+TEST(Crouch, HeightsBelowAThirdOrAboveTheSpawnHeightAreRefused) {
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", Crouch{0.3});
   run.order("ann", Crouch{1.8});
@@ -148,75 +149,76 @@ TEST(Crouch, WhatIsLowerThanAThirdOrHigherThanSpawnedIsRefused) {
   EXPECT_EQ(run.view("ann").height, 1.75);
 }
 
-TEST(MoveResult, SaysHowFarADriveWentAndWhatStoppedIt) {
-  Trial run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
+TEST(MoveResult, ReportsTheDisplacementAndTheObstacleOfADrive) {
+  WorldFixture run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.untilIdle();
   run.order("ann", Drive{{1.2, 0, 0}});
   run.step();
-  EXPECT_NEAR(run.view("ann").move.asked.x(), 0.02, 1e-12);
-  EXPECT_NEAR(run.view("ann").move.made.x(), 0.02, 1e-12);
-  EXPECT_EQ(run.view("ann").move.stoppedBy, 0u);
+  EXPECT_NEAR(run.view("ann").move.requestedDisplacement.x(), 0.02, 1e-12);
+  EXPECT_NEAR(run.view("ann").move.actualDisplacement.x(), 0.02, 1e-12);
+  EXPECT_EQ(run.view("ann").move.blockedBy, 0u);
   run.ticks(200);
   const MoveResult move = run.view("ann").move;
-  EXPECT_NEAR(move.asked.x(), 0.02, 1e-12);
-  EXPECT_NEAR(move.made.norm(), 0, 1e-9);
-  EXPECT_EQ(nameOf(run.world, move.stoppedBy), "wall");
-  EXPECT_EQ(move.decision.verdict, collision::Verdict::separated);
-  EXPECT_LT(move.decision.distance, 2 * run.world.lengths().epsilon);
-  EXPECT_NEAR(move.decision.normal.x(), 1, 1e-9);
+  EXPECT_NEAR(move.requestedDisplacement.x(), 0.02, 1e-12);
+  EXPECT_NEAR(move.actualDisplacement.norm(), 0, 1e-9);
+  EXPECT_EQ(findEntityName(run.world, move.blockedBy), "wall");
+  EXPECT_EQ(move.separation.verdict, collision::Verdict::separated);
+  EXPECT_LT(move.separation.distance, 2 * run.world.settings().contactOffset);
+  EXPECT_NEAR(move.separation.normal.x(), 1, 1e-9);
 }
 
-TEST(MoveResult, ADrivenAvatarIsToldBlockedOnceEachTimeItBegins) {
-  Trial run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
+TEST(MoveResult, BlockedIsReportedOnceEachTimeItBegins) {
+  WorldFixture run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.untilIdle();
-  const auto told = [&] {
+  const auto countBlocked = [&] {
     return std::count_if(run.events.begin(), run.events.end(), [](const ContactEvent& e) {
       return e.kind == ContactEvent::Kind::blocked;
     });
   };
   run.order("ann", Drive{{1.5, 0, 0}});
   run.ticks(300);
-  EXPECT_EQ(told(), 1);
+  EXPECT_EQ(countBlocked(), 1);
   run.order("ann", Drive{{-1.5, 0, 0}});
   run.ticks(30);
-  EXPECT_EQ(told(), 1);
+  EXPECT_EQ(countBlocked(), 1);
   run.order("ann", Drive{{1.5, 0, 0}});
   run.ticks(100);
-  EXPECT_EQ(told(), 2);
+  EXPECT_EQ(countBlocked(), 2);
 }
 
 TEST(Sliding, StopLeavesNothingOfAMoveAlongAWall) {
-  Lengths lengths;
+  WorldSettings lengths;
   lengths.sliding = Sliding::stop;
-  Trial run({floorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}}, lengths);
+  WorldFixture run({floorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}}, lengths);
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", to(3, 6));
   run.untilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
-  // 3 m across and 6 along: at the wall, 1.7 m across, it came 3.4 m along, and stays there.
+  // The velocity is 3 m/s across and 6 m/s along: the avatar reaches the wall 1.7 m across and 3.4
+  // m along, and stops there.
   EXPECT_NEAR(run.feet("ann").z(), 3.4, 0.01);
   EXPECT_EQ(run.worstPenetration, 0);
-  Trial slides({floorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}});
+  WorldFixture slides({floorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}});
   EXPECT_NE(run.world.snapshot()->stateHash, slides.world.snapshot()->stateHash);
 }
 
 TEST(Spawn, WhereThereIsNoRoomItSaysWhereThereIs) {
-  Trial run({floorBox(), {"pillar", {-1, 0, -1}, {1, 3, 1}}});
+  WorldFixture run({floorBox(), {"pillar", {-1, 0, -1}, {1, 3, 1}}});
   run.order("ann", Spawn{{0.9, 0, 0}});
   run.step();
   const std::string text = run.text(Kind::refused);
   EXPECT_NE(text.find("there is room at [1.4"), std::string::npos) << text;
 }
 
-TEST(Spawn, HighAboveTheFloorIsToldAndAbsurdlyHighRefused) {
-  Trial run({floorBox()});
+TEST(Spawn, HighAboveTheFloorIsReportedAndTooHighIsRefused) {
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 30, 0}});
   run.order("bob", Spawn{{2, 500, 0}});
   run.step();
   EXPECT_NE(run.text(Kind::spawned).find("drops 30 m to floor"), std::string::npos);
-  EXPECT_NE(run.text(Kind::refused).find("nobody drops farther"), std::string::npos);
+  EXPECT_NE(run.text(Kind::refused).find("the maximum drop is"), std::string::npos);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// A world with bodies and everything that its ticks told, for tests.
+// Test fixture: a world with bodies, and all events that its ticks report.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "scene/world/data/world_data.hpp"
+#include "scene/world/world.hpp"
 #include "tests/scene/box_scene.hpp"
 
 namespace enfilade::scene::testing {
@@ -21,50 +22,51 @@ inline BodySpec bodySpec(const std::string& name, BodyKind kind,
   return spec;
 }
 
-/// The verdict of every avatar on every triangle, part and other avatar, one after another: the
-/// slow twin of TickReport::worstPenetration.
+/// Names every penetrating pair by the exact verdict of each avatar on each triangle, part and
+/// other avatar. Reference implementation of TickReport::maxPenetration.
 inline std::string whoPenetrates(const World& world) {
-  const WorldState& state = world.state();
+  const WorldData& state = world.data();
   std::string found;
-  const auto penetrates = [](const collision::ConvexBody& a, const collision::ConvexBody& b) {
+  const auto penetrates = [](const collision::PlacedConvex& a, const collision::PlacedConvex& b) {
     collision::FeatureCache cache;
-    return collision::decide(a, b, cache).verdict == collision::Verdict::penetrating;
+    return collision::computeSeparation(a, b, cache).verdict == collision::Verdict::penetrating;
   };
-  for (const auto& [name, avatar] : state.avatars) {
+  for (const Avatar& avatar : state.avatars) {
     for (const AvatarPart& limb : avatar.shape->parts) {
-      const collision::ConvexBody hull = bodyAt(limb, avatar.feet);
+      const collision::PlacedConvex hull = placeAvatarPart(limb, avatar.footPosition);
       for (const std::uint32_t object : state.scene->solidObjects())
-        for (const collision::Triangle& t : solidTriangles(state.scene->model(), object))
+        for (const collision::Triangle& t : collectSolidTriangles(state.scene->model(), object))
           if (penetrates(hull, {std::span<const Vec3>(t), Vec3::Zero()}))
-            found += name + " in " + state.scene->model().objects[object].path + "; ";
+            found += avatar.name + " in " + state.scene->model().objects[object].path + "; ";
       for (const Body& body : state.bodies)
         for (std::uint32_t i = 0; i < body.shape->parts.size(); ++i)
-          if (body.spec->kind != BodyKind::trigger && penetrates(hull, partOf(body, i)))
-            found += name + " in " + body.spec->name + "; ";
-      for (const auto& [otherName, other] : state.avatars)
+          if (body.spec->kind != BodyKind::trigger && penetrates(hull, makePlacedPart(body, i)))
+            found += avatar.name + " in " + body.spec->name + "; ";
+      for (const Avatar& other : state.avatars)
         for (const AvatarPart& otherLimb : other.shape->parts)
-          if (otherName > name && penetrates(hull, bodyAt(otherLimb, other.feet)))
-            found += name + " in " + otherName + "; ";
+          if (other.name > avatar.name &&
+              penetrates(hull, placeAvatarPart(otherLimb, other.footPosition)))
+            found += avatar.name + " in " + other.name + "; ";
     }
   }
   return found;
 }
 
-struct BodyTrial {
-  explicit BodyTrial(Model model, const Lengths& lengths = {})
+struct BodyFixture {
+  explicit BodyFixture(Model model, const WorldSettings& lengths = {})
       : world(std::make_shared<const Scene>(std::move(model)), lengths) {}
 
   void order(const std::string& name, Order o) {
-    const auto why = submit(world, {name, std::move(o), 0});
+    const auto why = submitAvatarCommand(world, {name, std::move(o), 0});
     ASSERT_FALSE(why) << *why;
   }
-  void tell(BodyCommand command) {
-    const auto why = submit(world, std::move(command));
+  void submit(BodyCommand command) {
+    const auto why = submitBodyCommand(world, std::move(command));
     ASSERT_FALSE(why) << *why;
   }
   TickReport step() {
-    TickReport report = tick(world);
-    EXPECT_EQ(report.worstPenetration, 0) << "tick " << report.snapshot->tick;
+    TickReport report = tickWorld(world);
+    EXPECT_EQ(report.maxPenetration, 0) << "tick " << report.snapshot->tick;
     events.insert(events.end(), report.contacts.begin(), report.contacts.end());
     return report;
   }
@@ -76,15 +78,17 @@ struct BodyTrial {
       if (step().idle) return;
     FAIL() << "not idle after a minute";
   }
-  Vec3 feet(const std::string& name) const { return world.state().avatars.at(name).feet; }
+  Vec3 feet(const std::string& name) const {
+    return world.data().findAvatarByName(name)->footPosition;
+  }
   const Body& body(const std::string& name) const {
-    for (const Body& b : world.state().bodies)
+    for (const Body& b : world.data().bodies)
       if (b.spec->name == name) return b;
     throw std::out_of_range(name);
   }
-  int told(ContactEvent::Kind kind, const std::string& a, const std::string& b) const {
+  int countEvents(ContactEvent::Kind kind, const std::string& a, const std::string& b) const {
     return static_cast<int>(std::count_if(events.begin(), events.end(), [&](const ContactEvent& e) {
-      return e.kind == kind && nameOf(world, e.a) == a && nameOf(world, e.b) == b;
+      return e.kind == kind && findEntityName(world, e.a) == a && findEntityName(world, e.b) == b;
     }));
   }
 

@@ -1,4 +1,4 @@
-// Scenes of boxes with known answers, built by hand.
+// Hand-built scenes of boxes with known answers.
 #pragma once
 
 #include <memory>
@@ -22,7 +22,7 @@ inline std::vector<Vec3> boxPoints(const Vec3& min, const Vec3& max) {
   return points;
 }
 
-/// Twelve triangles, outward.
+/// Twelve triangles, wound outward.
 inline Mesh boxMesh(const Vec3& min, const Vec3& max) {
   Mesh mesh;
   for (const Vec3& corner : boxPoints(min, max)) mesh.positions.push_back(corner.cast<float>());

@@ -1,8 +1,8 @@
-// Chains of links: how their joints move, what stops them, and that nothing is crossed.
+// Tests of kinematic chains: joint motion, blocking, and that no obstacle is crossed.
 #include <cmath>
 #include <random>
 
-#include "scene/world/avatars/avatar_shape.hpp"
+#include "scene/world/data/avatar_shape.hpp"
 #include "tests/scene/world_fixture.hpp"
 
 namespace enfilade::scene {
@@ -14,7 +14,7 @@ using Kind = Notice::Kind;
 /// A turntable on a low base, an upper and a lower arm of 0.8 m, and a hand that slides out.
 Spawn armAt(const Vec3& at) {
   Spawn spawn;
-  spawn.at = at;
+  spawn.position = at;
   spawn.parts = {boxPoints({-0.2, 0, -0.2}, {0.2, 0.5, 0.2})};
   Link table{-1,
              {LinkJoint::Kind::revolute, {0, 0.51, 0}, {0, 1, 0}, -3, 3},
@@ -38,7 +38,7 @@ DriveJoints joints(std::vector<std::optional<double>> to, double speed = 1) {
 }
 
 TEST(Chain, JointsComeExactlyToTheirTargets) {
-  Trial run({floorBox()});
+  WorldFixture run({floorBox()});
   run.order("arm", armAt({0, 0, 0}));
   run.order("arm", joints({1.0, 0.7, {}, 0.25}));
   run.untilIdle();
@@ -49,15 +49,15 @@ TEST(Chain, JointsComeExactlyToTheirTargets) {
   EXPECT_EQ(view.joints[1].value, 0.7);
   EXPECT_EQ(view.joints[2].value, 0.0);
   EXPECT_EQ(view.joints[3].value, 0.25);
-  // The hand: 0.85 + 0.82 + 0.25 along the arm, raised by 0.7, turned by 1 about +Y.
+  // The hand is 0.85 + 0.82 + 0.25 m along the arm, raised by 0.7 rad, rotated by 1 rad about +Y.
   const double along = 1.92, up = 0.71 + along * std::sin(0.7), out = along * std::cos(0.7);
   const Vec3 hand = view.shape->parts.back().offset;
   EXPECT_NEAR((hand - Vec3(out * std::cos(1.0), up, -out * std::sin(1.0))).norm(), 0, 1e-9);
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
-TEST(Chain, ATurnTakesAsLongAsItsSpeedSays) {
-  Trial run({floorBox()});
+TEST(Chain, TheDurationOfARotationFollowsFromItsSpeed) {
+  WorldFixture run({floorBox()});
   run.order("arm", armAt({0, 0, 0}));
   run.untilIdle();
   run.order("arm", joints({1.5}, 3));
@@ -67,13 +67,13 @@ TEST(Chain, ATurnTakesAsLongAsItsSpeedSays) {
 }
 
 TEST(Chain, AWallStopsTheArmAtEpsilonAndIsNamed) {
-  Trial run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
+  WorldFixture run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
   run.order("arm", armAt({0, 0, 0}));
   run.order("arm", joints({0, 0}));
   run.order("arm", joints({1.5}, 2));  // towards -Z
   run.untilIdle();
   ASSERT_EQ(run.count(Kind::blocked), 1);
-  EXPECT_EQ(nameOf(run.world, run.notices.back().obstacle), "wall");
+  EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "wall");
   const double value = run.view("arm").joints[0].value;
   EXPECT_GT(value, 0.5);
   EXPECT_LT(value, 0.8);
@@ -82,9 +82,9 @@ TEST(Chain, AWallStopsTheArmAtEpsilonAndIsNamed) {
   EXPECT_EQ(run.worstPenetration, 0);
   double nearest = 1;
   for (const ContactEvent& e : run.events)
-    if (e.kind == ContactEvent::Kind::blocked) nearest = e.decision.distance;
-  EXPECT_GT(nearest, 0.85 * run.world.lengths().epsilon);
-  EXPECT_LT(nearest, 1.1 * run.world.lengths().epsilon);
+    if (e.kind == ContactEvent::Kind::blocked) nearest = e.separation.distance;
+  EXPECT_GT(nearest, 0.85 * run.world.settings().contactOffset);
+  EXPECT_LT(nearest, 1.1 * run.world.settings().contactOffset);
 }
 
 TEST(Chain, AtAnySpeedAPaneOfNoThicknessIsNotCrossed) {
@@ -96,7 +96,7 @@ TEST(Chain, AtAnySpeedAPaneOfNoThicknessIsNotCrossed) {
   model.objects.push_back({"pane", "", {1}, Eigen::Affine3d::Identity()});
   const auto scene = std::make_shared<const Scene>(model);
   for (const double speed : {0.3, 5.0, 20.0}) {
-    Trial run(scene);
+    WorldFixture run(scene);
     run.order("arm", armAt({0, 0, 0}));
     run.order("arm", joints({0, 0}, speed));
     run.order("arm", joints({3}, speed));
@@ -108,7 +108,7 @@ TEST(Chain, AtAnySpeedAPaneOfNoThicknessIsNotCrossed) {
 }
 
 TEST(Chain, AnArmThatSwingsWhileItsBaseSlidesOffARoofCrossesNoPane) {
-  // The base uses up the room of its fall and goes on sideways while the arm swings fast.
+  // The base falls as far as it can and then slides sideways, while the arm swings fast.
   Model model = boxModel({{"ground", {-20, -0.2, -20}, {20, 0, 20}}});
   Mesh roof;
   roof.positions = {{-1, 2.4F, -3}, {-1, 2.4F, 3}, {0.4F, 0, 3}, {0.4F, 0, -3}};
@@ -121,26 +121,27 @@ TEST(Chain, AnArmThatSwingsWhileItsBaseSlidesOffARoofCrossesNoPane) {
   model.objects.push_back({"pane", "", {2}, Eigen::Affine3d::Identity()});
   const auto scene = std::make_shared<const Scene>(model);
   for (double height = 20; height < 21; height += 0.13) {
-    Trial run(scene);
+    WorldFixture run(scene);
     run.order("arm", armAt({0, height, 0}));
     run.order("arm", joints({{}, 0.0}, 20));
     run.ticks(10);
     for (int i = 0; i < 240; ++i) {
       if (i % 20 == 0) {
         DriveJoints swing = joints({i % 40 == 0 ? 2.9 : -2.9, 0.0}, 20);
-        swing.atOnce = true;
+        swing.immediate = true;
         run.order("arm", swing);
       }
       run.step();
-      const AvatarView arm = run.view("arm");
+      const AvatarSnapshot arm = run.view("arm");
       for (const AvatarPart& part : arm.shape->parts)
-        ASSERT_LT(boxAt(part.box, arm.feet).max.x(), 2.2001) << height << " m, tick " << i;
+        ASSERT_LT(placeBox(part.box, arm.footPosition).max.x(), 2.2001)
+            << height << " m, tick " << i;
     }
   }
 }
 
-TEST(Chain, TheOtherJointsGoOnWhereOneIsStopped) {
-  Trial run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
+TEST(Chain, TheOtherJointsContinueIfOneIsStopped) {
+  WorldFixture run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
   run.order("arm", armAt({0, 0, 0}));
   run.order("arm", joints({0, 0}));
   run.order("arm", joints({1.5, 0.4, {}, 0.1}));
@@ -150,21 +151,21 @@ TEST(Chain, TheOtherJointsGoOnWhereOneIsStopped) {
 }
 
 TEST(Chain, AHandSlidesAlongATableAndPushesOntoIt) {
-  Trial run({floorBox(), {"table", {0.9, 0, -2}, {2.4, 0.6, 2}}});
+  WorldFixture run({floorBox(), {"table", {0.9, 0, -2}, {2.4, 0.6, 2}}});
   run.order("arm", armAt({0, 0, 0}));
   run.order("arm", joints({-0.5, 0.3}));
   run.order("arm", joints({{}, -0.5}));  // down onto the table
   run.untilIdle();
   ASSERT_EQ(run.count(Kind::blocked), 1);
   EXPECT_TRUE(run.touched("table"));
-  run.order("arm", joints({0.5}));  // along it
+  run.order("arm", joints({0.5}));  // along the table
   run.untilIdle();
   EXPECT_EQ(run.view("arm").joints[0].value, 0.5);
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
-TEST(Chain, SomebodyInTheWayStopsItAndTheArmStopsSomebody) {
-  Trial run({floorBox()});
+TEST(Chain, AnAvatarStopsTheArmAndTheArmStopsAnAvatar) {
+  WorldFixture run({floorBox()});
   run.order("arm", armAt({0, 0, 0}));
   run.order("arm", joints({-1.2, 0.2}));
   run.order("bob", Spawn{{1.2, 0, 0}});
@@ -172,7 +173,7 @@ TEST(Chain, SomebodyInTheWayStopsItAndTheArmStopsSomebody) {
   run.order("arm", joints({1.2}));
   run.untilIdle();
   ASSERT_EQ(run.count(Kind::blocked), 1);
-  EXPECT_EQ(nameOf(run.world, run.notices.back().obstacle), "bob");
+  EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "bob");
   run.order("ann", Spawn{{-2, 0, 1.2}});
   run.order("ann", to(4, 1.2));
   run.order("ann", to(4, 0.5));
@@ -180,27 +181,27 @@ TEST(Chain, SomebodyInTheWayStopsItAndTheArmStopsSomebody) {
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
-TEST(Chain, LinksThatAreNoNeighboursStopOneAnotherWhenAsked) {
+TEST(Chain, NonNeighbourLinksStopEachOtherIfRequested) {
   for (const bool selfContact : {false, true}) {
-    Trial run({floorBox()});
+    WorldFixture run({floorBox()});
     Spawn arm = armAt({0, 0, 0});
     arm.selfContact = selfContact;
     run.order("arm", arm);
     run.order("arm", joints({{}, 2.6}));
-    run.order("arm", joints({{}, {}, 2.8}));  // the hand would come down into the base
+    run.order("arm", joints({{}, {}, 2.8}));  // would move the hand down into the base
     run.untilIdle();
     EXPECT_EQ(run.count(Kind::blocked) > 0, selfContact);
   }
 }
 
 TEST(Chain, AnArmOnABaseThatWalksIsSweptWhole) {
-  Trial run({floorBox(), {"post", {3, 0, 0.9}, {3.1, 3, 1.0}}});
+  WorldFixture run({floorBox(), {"post", {3, 0, 0.9}, {3.1, 3, 1.0}}});
   run.order("arm", armAt({0, 0, 0}));
-  run.order("arm", joints({-1.5, 0}));  // the arm sticks out towards +Z
+  run.order("arm", joints({-1.5, 0}));  // the arm points towards +Z
   run.order("arm", to(6, 0));
   run.untilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
-  EXPECT_EQ(nameOf(run.world, run.notices.back().obstacle), "post");
+  EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "post");
   EXPECT_LT(run.feet("arm").x(), 3);
   EXPECT_EQ(run.worstPenetration, 0);
 }
@@ -217,7 +218,7 @@ TEST(Chain, RandomDrivesThroughClutterNeverPenetrate) {
     const double size = uniform(0.02, 0.2);
     boxes.push_back({"box" + std::to_string(i), {x, y, z}, {x + size, y + 0.5 * size, z + 0.05}});
   }
-  Trial run(boxes);
+  WorldFixture run(boxes);
   run.order("arm", armAt({0, 0, 0}));
   run.step();
   if (run.count(Kind::spawned) == 0) GTEST_FAIL() << run.text(Kind::refused);
@@ -231,8 +232,10 @@ TEST(Chain, RandomDrivesThroughClutterNeverPenetrate) {
 }
 
 TEST(Chain, AbsurdLinksAndTargetsAreRefusedAndChangeNothing) {
-  Trial run({floorBox()});
-  const auto refused = [&](Spawn spawn) { return submit(run.world, {"x", spawn, 0}).value_or(""); };
+  WorldFixture run({floorBox()});
+  const auto refused = [&](Spawn spawn) {
+    return submitAvatarCommand(run.world, {"x", spawn, 0}).value_or("");
+  };
   Spawn bad = armAt({0, 0, 0});
   bad.links[1].parent = 1;
   EXPECT_NE(refused(bad).find("links[1].parent"), std::string::npos);
@@ -246,12 +249,12 @@ TEST(Chain, AbsurdLinksAndTargetsAreRefusedAndChangeNothing) {
   bad.links[3].value = 0.5;
   EXPECT_NE(refused(bad).find("links[3].value"), std::string::npos);
   bad = armAt({0, 0, 0});
-  bad.parts.resize(kMostParts + 1, bad.parts[0]);
+  bad.parts.resize(kMaxParts + 1, bad.parts[0]);
   EXPECT_NE(refused(bad).find("parts"), std::string::npos);
-  EXPECT_TRUE(submit(run.world, {"x", joints({std::nan("")}), 0}));
-  EXPECT_TRUE(submit(run.world, {"x", joints({1.0}, 0), 0}));
-  EXPECT_TRUE(submit(run.world, {"x", joints({1.0}, 21), 0}));
-  EXPECT_TRUE(submit(run.world, {"x", joints({}), 0}));
+  EXPECT_TRUE(submitAvatarCommand(run.world, {"x", joints({std::nan("")}), 0}));
+  EXPECT_TRUE(submitAvatarCommand(run.world, {"x", joints({1.0}, 0), 0}));
+  EXPECT_TRUE(submitAvatarCommand(run.world, {"x", joints({1.0}, 21), 0}));
+  EXPECT_TRUE(submitAvatarCommand(run.world, {"x", joints({}), 0}));
   run.order("arm", armAt({0, 0, 0}));
   run.order("arm", joints({3.5}));
   run.order("arm", joints({0, 0, 0, 0, 0}));
@@ -261,13 +264,13 @@ TEST(Chain, AbsurdLinksAndTargetsAreRefusedAndChangeNothing) {
 }
 
 TEST(Chain, PartsTurnAsTheSpawnFaces) {
-  Trial run({floorBox()});
+  WorldFixture run({floorBox()});
   Spawn spawn;
   spawn.facing = 90;
   spawn.parts = {boxPoints({0, 0, -0.1}, {1, 1, 0.1})};
   run.order("box", spawn);
   run.untilIdle();
-  const Box box = run.view("box").shape->box;
+  const Aabb box = run.view("box").shape->box;
   EXPECT_NEAR(box.min.z(), -1, 1e-12);
   EXPECT_NEAR(box.max.z(), 0, 1e-12);
   EXPECT_NEAR(box.max.x(), 0.1, 1e-12);
@@ -275,7 +278,7 @@ TEST(Chain, PartsTurnAsTheSpawnFaces) {
 
 TEST(Chain, TheSameDrivesGiveTheSameHash) {
   const auto hashOf = [](double turn) {
-    Trial run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
+    WorldFixture run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
     run.order("arm", armAt({0, 0, 0}));
     run.order("arm", joints({turn, 0.3, -0.4}, 3));
     run.ticks(200);

@@ -1,4 +1,4 @@
-// Two worlds that ought to go on alike, and commands for them.
+// Test fixture that compares two worlds which must continue identically, with commands for both.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,50 +11,52 @@
 
 namespace enfilade::scene::testing {
 
-/// What a world is told before each tick; the same for the same seed.
-struct ToldOnce {
+/// Commands given to a world before one tick. Equal seeds give equal commands.
+struct TickCommands {
   std::vector<Command> avatars;
   std::vector<BodyCommand> bodies;
 };
 
-inline void give(World& world, const ToldOnce& told) {
-  // What is refused is refused in both worlds.
-  for (const Command& command : told.avatars) submit(world, command);
-  for (const BodyCommand& command : told.bodies) submit(world, command);
+inline void give(World& world, const TickCommands& commands) {
+  // A command that one world refuses is refused by the other, too.
+  for (const Command& command : commands.avatars) submitAvatarCommand(world, command);
+  for (const BodyCommand& command : commands.bodies) submitBodyCommand(world, command);
 }
 
 inline bool same(const Vec3& a, const Vec3& b) {
   return a == b;
 }
-inline bool same(const collision::Decision& a, const collision::Decision& b) {
-  return a.verdict == b.verdict && a.decidedBy == b.decidedBy && a.distance == b.distance &&
+inline bool same(const collision::SeparationResult& a, const collision::SeparationResult& b) {
+  return a.verdict == b.verdict && a.certificate == b.certificate && a.distance == b.distance &&
          a.errorBound == b.errorBound && same(a.pointA, b.pointA) && same(a.pointB, b.pointB) &&
          same(a.normal, b.normal) && a.featureA == b.featureA && a.featureB == b.featureB;
 }
 inline bool same(const ContactEvent& a, const ContactEvent& b) {
   return a.tick == b.tick && a.kind == b.kind && a.reason == b.reason && a.phase == b.phase &&
-         a.a == b.a && a.b == b.b && same(a.decision, b.decision);
+         a.a == b.a && a.b == b.b && same(a.separation, b.separation);
 }
 inline bool same(const Notice& a, const Notice& b) {
   return a.kind == b.kind && a.avatar == b.avatar && a.id == b.id && a.tag == b.tag &&
          same(a.position, b.position) && a.obstacle == b.obstacle && a.text == b.text;
 }
-inline bool same(const AvatarView& a, const AvatarView& b) {
+inline bool same(const AvatarSnapshot& a, const AvatarSnapshot& b) {
   bool joints = a.joints.size() == b.joints.size();
   for (std::size_t i = 0; joints && i < a.joints.size(); ++i)
     joints =
-        a.joints[i].value == b.joints[i].value && a.joints[i].stoppedBy == b.joints[i].stoppedBy;
-  return joints && a.id == b.id && a.name == b.name && same(a.feet, b.feet) &&
-         same(a.gaze, b.gaze) && a.eyeHeight == b.eyeHeight && a.grounded == b.grounded &&
-         a.flying == b.flying && a.standsOn == b.standsOn && a.height == b.height &&
-         same(a.move.asked, b.move.asked) && same(a.move.made, b.move.made) &&
-         a.move.stoppedBy == b.move.stoppedBy && same(a.move.decision, b.move.decision);
+        a.joints[i].value == b.joints[i].value && a.joints[i].blockedBy == b.joints[i].blockedBy;
+  return joints && a.id == b.id && a.name == b.name && same(a.footPosition, b.footPosition) &&
+         same(a.viewDirection, b.viewDirection) && a.eyeHeight == b.eyeHeight &&
+         a.grounded == b.grounded && a.flying == b.flying && a.groundEntity == b.groundEntity &&
+         a.height == b.height && same(a.move.requestedDisplacement, b.move.requestedDisplacement) &&
+         same(a.move.actualDisplacement, b.move.actualDisplacement) &&
+         a.move.blockedBy == b.move.blockedBy && same(a.move.separation, b.move.separation);
 }
-inline bool same(const BodyView& a, const BodyView& b) {
+inline bool same(const BodySnapshot& a, const BodySnapshot& b) {
   return a.id == b.id && a.index == b.index && same(a.pose.translation, b.pose.translation) &&
          a.pose.rotation.coeffs() == b.pose.rotation.coeffs() && a.displaced == b.displaced &&
-         a.coordinate == b.coordinate && same(a.velocity, b.velocity) && same(a.spin, b.spin) &&
-         a.swing == b.swing && a.moving == b.moving && a.blockedBy == b.blockedBy;
+         a.jointPosition == b.jointPosition && same(a.velocity, b.velocity) &&
+         same(a.angularVelocity, b.angularVelocity) && a.velocityDeviation == b.velocityDeviation &&
+         a.moving == b.moving && a.blockedBy == b.blockedBy;
 }
 template <class List>
 bool sameLists(const List& a, const List& b) {
@@ -63,7 +65,7 @@ bool sameLists(const List& a, const List& b) {
   return all;
 }
 
-/// The first thing that two ticks told differently; "" when there is none.
+/// The first difference between two tick reports; "" if they are equal.
 inline std::string difference(const TickReport& a, const TickReport& b) {
   if (a.snapshot->stateHash != b.snapshot->stateHash) return "state hash";
   if (!sameLists(a.contacts, b.contacts)) return "contacts";
@@ -73,17 +75,19 @@ inline std::string difference(const TickReport& a, const TickReport& b) {
   if (a.pairs != b.pairs) return "pairs";
   if (a.narrowQueries != b.narrowQueries) return "narrow queries";
   if (a.rationalQueries != b.rationalQueries) return "rational queries";
-  if (a.boundedSweeps != b.boundedSweeps || a.squeezedBodies != b.squeezedBodies) return "counts";
-  if (a.liveContacts != b.liveContacts) return "live contacts";
-  if (a.worstPenetration != b.worstPenetration) return "penetration";
+  if (a.iterationLimitedCasts != b.iterationLimitedCasts || a.crushedBodies != b.crushedBodies)
+    return "counts";
+  if (a.activeContacts != b.activeContacts) return "live contacts";
+  if (a.maxPenetration != b.maxPenetration) return "penetration";
   return a.idle == b.idle ? "" : "idle";
 }
 
-/// Runs a world by `told` to `until`; with a copy made at each tick of `at`, which goes on beside
-/// it for `beside` ticks and must tell the same.
-inline void goOnAlike(const std::shared_ptr<const Scene>& scene, const Lengths& lengths,
-                      const std::map<std::uint64_t, ToldOnce>& told, std::uint64_t until,
-                      const std::vector<std::uint64_t>& at, std::uint64_t beside) {
+/// Runs a world by the commands in `commands` until tick `until`. At each tick of `at` a copy is
+/// made, which runs in parallel for `duration` ticks and must report the same.
+inline void compareCopies(const std::shared_ptr<const Scene>& scene, const WorldSettings& lengths,
+                          const std::map<std::uint64_t, TickCommands>& commands,
+                          std::uint64_t until, const std::vector<std::uint64_t>& at,
+                          std::uint64_t duration) {
   World world(scene, lengths);
   struct Copy {
     std::uint64_t from;
@@ -92,34 +96,34 @@ inline void goOnAlike(const std::shared_ptr<const Scene>& scene, const Lengths& 
   std::vector<Copy> copies;
   std::size_t made = 0, events = 0;
   for (std::uint64_t t = 0; t < until; ++t) {
-    const auto now = told.find(t + 1);
+    const auto now = commands.find(t + 1);
     if (std::find(at.begin(), at.end(), t) != at.end()) {
-      // Half of the copies are made while commands wait.
-      const bool waiting = now != told.end() && made++ % 2 == 0;
+      // Half of the copies are made while commands are queued.
+      const bool waiting = now != commands.end() && made++ % 2 == 0;
       if (waiting) give(world, now->second);
-      const auto bytes = checkpointOf(world);
-      copies.push_back({t, worldFrom(scene, bytes)});
-      ASSERT_EQ(checkpointOf(copies.back().world), bytes) << "tick " << t;
+      const auto bytes = makeCheckpoint(world);
+      copies.push_back({t, restoreWorld(scene, bytes)});
+      ASSERT_EQ(makeCheckpoint(copies.back().world), bytes) << "tick " << t;
       ASSERT_EQ(copies.back().world.snapshot()->stateHash, world.snapshot()->stateHash);
       ASSERT_TRUE(sameLists(*copies.back().world.snapshot()->bodies, *world.snapshot()->bodies));
       for (Copy& copy : copies)
-        if (now != told.end() && &copy != &copies.back()) give(copy.world, now->second);
-      if (!waiting && now != told.end())
+        if (now != commands.end() && &copy != &copies.back()) give(copy.world, now->second);
+      if (!waiting && now != commands.end())
         give(world, now->second), give(copies.back().world, now->second);
-    } else if (now != told.end()) {
+    } else if (now != commands.end()) {
       give(world, now->second);
       for (Copy& copy : copies) give(copy.world, now->second);
     }
-    const TickReport report = tick(world);
+    const TickReport report = tickWorld(world);
     if (!copies.empty()) events += report.contacts.size();
     for (Copy& copy : copies) {
-      const TickReport other = tick(copy.world);
+      const TickReport other = tickWorld(copy.world);
       ASSERT_EQ(difference(report, other), "")
           << "tick " << t + 1 << ", copied at tick " << copy.from;
     }
-    std::erase_if(copies, [&](const Copy& copy) { return t + 1 >= copy.from + beside; });
+    std::erase_if(copies, [&](const Copy& copy) { return t + 1 >= copy.from + duration; });
   }
-  EXPECT_GT(events, 50u) << "something happens beside the copies";
+  EXPECT_GT(events, 50u) << "events occur while the copies run";
 }
 
 }  // namespace enfilade::scene::testing

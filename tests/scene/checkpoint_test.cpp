@@ -10,7 +10,7 @@ namespace {
 
 using namespace testing;
 
-/// A room with all that moves: doors that are walked into and close again, a lift, a tray that
+/// A room with all moving things: doors that avatars open and that close again, a lift, a tray that
 /// shakes boxes, a tower of boxes, a step, a trigger.
 std::shared_ptr<const Scene> busyRoom() {
   std::vector<NamedBox> boxes{floorBox(),
@@ -36,7 +36,7 @@ std::shared_ptr<const Scene> busyRoom() {
                      {5.45 + 0.2 * (i % 3), 0.8 + 0.2 * (i / 3), 6.15}});
   Model model = boxModel(boxes);
   BodySpec hinged = bodySpec("hinged", BodyKind::hinged, {7});
-  hinged.low = -1.5, hinged.high = 1.5, hinged.closesAfter = 0.5, hinged.speed = 2;
+  hinged.low = -1.5, hinged.high = 1.5, hinged.autoCloseDelay = 0.5, hinged.speed = 2;
   hinged.openedBy = OpenedBy::touch;
   BodySpec sliding = bodySpec("sliding", BodyKind::sliding, {8});
   sliding.anchor = {3, 0, 0}, sliding.axis = Vec3::UnitX(), sliding.high = 0.9;
@@ -69,7 +69,7 @@ class Random {
 
 Spawn spawnOf(std::size_t kind, Random& random) {
   Spawn spawn;
-  spawn.at = {random.uniform(-8, 8), 0.3, random.uniform(-8, 8)};
+  spawn.position = {random.uniform(-8, 8), 0.3, random.uniform(-8, 8)};
   spawn.facing = random.uniform(0, 360);
   if (kind == 1)
     spawn.parts = {boxPoints({-0.2, 0, -0.3}, {0.2, 0.9, 0.3}),
@@ -111,43 +111,43 @@ Order orderOf(std::size_t kind, Random& random) {
   }
 }
 
-std::map<std::uint64_t, ToldOnce> toldInTheRoom(unsigned seed, std::uint64_t until) {
+std::map<std::uint64_t, TickCommands> roomCommands(unsigned seed, std::uint64_t until) {
   constexpr std::size_t kAvatars = 12;
   Random random(seed);
-  std::map<std::uint64_t, ToldOnce> told;
+  std::map<std::uint64_t, TickCommands> commands;
   const auto nameOf = [](std::size_t i) { return "a" + std::to_string(i); };
   std::uint64_t tag = 0;
   for (std::size_t i = 0; i < kAvatars; ++i)
-    told[1].avatars.push_back({nameOf(i), spawnOf(i % 4, random), ++tag});
+    commands[1].avatars.push_back({nameOf(i), spawnOf(i % 4, random), ++tag});
   for (std::uint64_t t = 2; t < until; ++t) {
     const std::size_t who = random.below(kAvatars);
     if (random.below(3) == 0)
-      told[t].avatars.push_back({nameOf(who), orderOf(who % 4, random), ++tag});
+      commands[t].avatars.push_back({nameOf(who), orderOf(who % 4, random), ++tag});
     if (random.below(60) == 0)
-      told[t].avatars.push_back({nameOf(who), spawnOf(who % 4, random), ++tag});
+      commands[t].avatars.push_back({nameOf(who), spawnOf(who % 4, random), ++tag});
     if (random.below(40) != 0) continue;
     BodyCommand command;
     command.body = std::array{"hinged", "sliding", "lift", "tray"}[random.below(4)];
     if (command.body == "lift") {
-      command.action = BodyCommand::Action::level;
+      command.action = BodyCommand::Action::moveToLevel;
       command.level = static_cast<std::uint32_t>(random.below(3));
     } else if (command.body == "tray") {
       command.action = random.below(2) ? BodyCommand::Action::run : BodyCommand::Action::stop;
     } else {
       command.action = random.below(2) ? BodyCommand::Action::open : BodyCommand::Action::close;
     }
-    told[t].bodies.push_back(command);
+    commands[t].bodies.push_back(command);
   }
-  return told;
+  return commands;
 }
 
-Lengths watchful() {
-  Lengths lengths;
-  lengths.nearMiss = 0.1;
+WorldSettings watchful() {
+  WorldSettings lengths;
+  lengths.nearMissDistance = 0.1;
   return lengths;
 }
 
-TEST(Checkpoint, ACopyGoesOnToTheLastBitFromAnyTickOfABusyRoom) {
+TEST(Checkpoint, ACopyFromAnyTickOfABusyRoomIsBitEqual) {
   const auto scene = busyRoom();
   constexpr unsigned kRooms = tests::kSanitized ? 1 : 4;
   for (unsigned seed = 1; seed <= kRooms; ++seed) {
@@ -155,69 +155,69 @@ TEST(Checkpoint, ACopyGoesOnToTheLastBitFromAnyTickOfABusyRoom) {
     Random random(100 + seed);
     std::vector<std::uint64_t> at{0, 1};
     for (int i = 0; i < 8; ++i) at.push_back(2 + random.below(kUntil - 300));
-    goOnAlike(scene, watchful(), toldInTheRoom(seed, kUntil), kUntil, at, 300);
+    compareCopies(scene, watchful(), roomCommands(seed, kUntil), kUntil, at, 300);
     if (HasFatalFailure()) FAIL() << "seed " << seed;
   }
 }
 
-/// The room after some time, in the middle of everything.
+/// The busy room after some ticks, with motions and contacts in progress.
 World livelyWorld(std::uint64_t ticks = 200) {
   World world(busyRoom(), watchful());
-  const auto told = toldInTheRoom(7, ticks);
+  const auto commands = roomCommands(7, ticks);
   for (std::uint64_t t = 1; t <= ticks; ++t) {
-    if (const auto now = told.find(t); now != told.end()) give(world, now->second);
-    tick(world);
+    if (const auto now = commands.find(t); now != commands.end()) give(world, now->second);
+    tickWorld(world);
   }
   return world;
 }
 
-TEST(Checkpoint, ACrowdTakesLessThanFourKilobytesAnAvatar) {
-  Trial run({floorBox()});
+TEST(Checkpoint, ACrowdUsesLessThanFourKilobytesPerAvatar) {
+  WorldFixture run({floorBox()});
   for (int i = 0; i < 40; ++i)
     run.order("a" + std::to_string(i), Spawn{{-8.0 + (i % 8), 0, -4.0 + (i / 8)}});
   run.ticks(10);
   for (int i = 0; i < 40; ++i) run.order("a" + std::to_string(i), Drive{{0.5, 0, 0.3}});
   run.ticks(100);
   EXPECT_EQ(run.world.snapshot()->avatars.size(), 40u);
-  EXPECT_LT(checkpointOf(run.world).size(), 40u * 4096);
+  EXPECT_LT(makeCheckpoint(run.world).size(), 40u * 4096);
 }
 
 TEST(Checkpoint, BytesThatWereChangedOrCutOffAreRefused) {
   const auto scene = busyRoom();
   const World world = livelyWorld();
-  const auto bytes = checkpointOf(world);
-  ASSERT_GT(world.state().rigids.dynamics.pairs.size(), 20u);
+  const auto bytes = makeCheckpoint(world);
+  ASSERT_GT(world.data().dynamicBodies.physicsWorld.pairs.size(), 20u);
   Random random(3);
   for (int i = 0; i < 3000; ++i) {
     auto spoilt = bytes;
     spoilt[i < 64 ? static_cast<std::size_t>(i) : random.below(bytes.size())] ^=
         static_cast<std::uint8_t>(1 + random.below(255));
-    ASSERT_THROW(worldFrom(scene, spoilt), CheckpointError);
+    ASSERT_THROW(restoreWorld(scene, spoilt), CheckpointError);
   }
   for (int i = 0; i < 200; ++i) {
     const std::span cut(bytes.data(),
                         i < 64 ? static_cast<std::size_t>(i) : random.below(bytes.size()));
-    ASSERT_THROW(worldFrom(scene, cut), CheckpointError) << cut.size();
+    ASSERT_THROW(restoreWorld(scene, cut), CheckpointError) << cut.size();
   }
   auto longer = bytes;
   longer.push_back(0);
-  EXPECT_THROW(worldFrom(scene, longer), CheckpointError);
+  EXPECT_THROW(restoreWorld(scene, longer), CheckpointError);
 }
 
-/// With a checksum that fits: what bytes say is not believed either.
+/// The checksum is recomputed, so that only the validation of the content can refuse forged bytes.
 TEST(Checkpoint, BytesThatWereForgedMakeAWorldThatTicksOrNone) {
   const auto scene = busyRoom();
-  const auto bytes = checkpointOf(livelyWorld());
+  const auto bytes = makeCheckpoint(livelyWorld());
   Random random(5);
   int refused = 0, ticked = 0;
   for (int i = 0; i < 150; ++i) {
     auto forged = bytes;
     const std::size_t at = 32 + random.below(bytes.size() - 40);
     forged[at] = static_cast<std::uint8_t>(random.below(256));
-    sealCheckpoint(forged);
+    recomputeChecksum(forged);
     try {
-      World world = worldFrom(scene, forged);
-      for (int t = 0; t < 3; ++t) tick(world);
+      World world = restoreWorld(scene, forged);
+      for (int t = 0; t < 3; ++t) tickWorld(world);
       ++ticked;
     } catch (const CheckpointError&) {
       ++refused;
@@ -229,33 +229,36 @@ TEST(Checkpoint, BytesThatWereForgedMakeAWorldThatTicksOrNone) {
   EXPECT_GT(ticked, 30);
 }
 
-/// Why the checkpoint is not taken; "": it is.
+/// The reason why a checkpoint is refused; "" if it is accepted.
 std::string refusal(const std::shared_ptr<const Scene>& scene,
                     const std::vector<std::uint8_t>& from) {
   try {
-    worldFrom(scene, from);
+    restoreWorld(scene, from);
   } catch (const CheckpointError& error) {
     return error.what();
   }
   return "";
 }
 
-TEST(Checkpoint, WhatIsOutOfOrderIsRefused) {
+TEST(Checkpoint, UnsortedEntriesAreRefused) {
   const auto scene = busyRoom();
   World contacts = livelyWorld();
-  ASSERT_GT(contacts.state().bodyContacts.size(), 2u);
-  EXPECT_EQ(refusal(scene, checkpointOf(contacts)), "");
-  std::swap(contacts.state().bodyContacts[0], contacts.state().bodyContacts[1]);
-  EXPECT_NE(refusal(scene, checkpointOf(contacts)).find("do not ascend"), std::string::npos);
+  ASSERT_GT(contacts.data().bodyContacts.size(), 2u);
+  EXPECT_EQ(refusal(scene, makeCheckpoint(contacts)), "");
+  std::swap(contacts.data().bodyContacts[0], contacts.data().bodyContacts[1]);
+  EXPECT_NE(refusal(scene, makeCheckpoint(contacts)).find("do not ascend"), std::string::npos);
   World solids = livelyWorld();
-  RigidStage& stage = solids.state().rigids;
-  const auto entity = [&](std::size_t i) { return stage.entities[stage.solidOf[stage.bodies[i]]]; };
-  std::swap(stage.solids.at({entity(0), 0}), stage.solids.at({entity(1), 0}));
-  EXPECT_NE(refusal(scene, checkpointOf(solids)).find("the first solids"), std::string::npos);
+  DynamicBodies& stage = solids.data().dynamicBodies;
+  const auto entity = [&](std::size_t i) {
+    return stage.entities[stage.physicsBodyOf[stage.bodyIndices[i]]];
+  };
+  std::swap(stage.physicsBodyByPart.at({entity(0), 0}), stage.physicsBodyByPart.at({entity(1), 0}));
+  EXPECT_NE(refusal(scene, makeCheckpoint(solids)).find("the first physics bodies"),
+            std::string::npos);
 }
 
 TEST(Checkpoint, OfAnotherSceneOrVersionIsRefusedWithBothNamed) {
-  const auto bytes = checkpointOf(livelyWorld(10));
+  const auto bytes = makeCheckpoint(livelyWorld(10));
   EXPECT_NE(refusal(boxScene({floorBox()}), bytes).find("another scene"), std::string::npos);
   auto later = bytes;
   ++later[8];

@@ -1,4 +1,4 @@
-// What stands in an avatar's way: hulls hold their triangles, and solids are solid.
+// Tests of collision geometry: each hull contains its triangles, and solids are solid.
 #include "scene/model/shapes/collision_geometry.hpp"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ Eigen::Affine3d randomPlacement(std::mt19937& random, bool mirror) {
 
 Shape shapeOfOne(const Mesh& mesh) {
   const std::uint32_t first = 0;
-  return shapeOf({&mesh, 1}, {&first, 1});
+  return buildShape({&mesh, 1}, {&first, 1});
 }
 
 Mesh insideOut(Mesh mesh) {
@@ -36,30 +36,30 @@ Mesh insideOut(Mesh mesh) {
   return mesh;
 }
 
-TEST(ObjectParts, AHullHoldsEveryCornerOfItsSurfaceHoweverItIsPlaced) {
+TEST(CollisionGeometry, AHullHoldsEveryCornerOfItsSurfaceHoweverItIsPlaced) {
   std::mt19937 random(5);
   const Shape shape = shapeOfOne(boxMesh({0, 0, 0}, {0.3, 2, 5}));
   for (int i = 0; i < 100; ++i) {
     const Eigen::Affine3d placed = randomPlacement(random, i % 2 == 1);
-    const ObjectParts parts = partsOf(shape, placed);
+    const CollisionGeometry parts = buildCollisionGeometry(shape, placed);
     ASSERT_EQ(parts.localHulls.size(), 1u);
     EXPECT_TRUE(parts.localTriangles.triangles().empty());
     for (const auto& face : parts.localHulls[0].faces) {
       const auto& v = parts.localHulls[0].vertices;
       for (const Eigen::Vector3f& p : shape.vertices) {
-        EXPECT_LE(collision::orientation(v[face[0]], v[face[1]], v[face[2]],
-                                         placed * p.cast<double>() - parts.origin),
+        EXPECT_LE(collision::orient3d(v[face[0]], v[face[1]], v[face[2]],
+                                      placed * p.cast<double>() - parts.origin),
                   0);
       }
     }
   }
 }
 
-TEST(ObjectParts, QueriesFindWhatBruteForceFinds) {
+TEST(CollisionGeometry, QueriesEqualBruteForce) {
   std::mt19937 random(6);
   std::uniform_real_distribution<double> number(0, 20);
   Mesh mesh;
-  for (int i = 0; i < 40; ++i) {  // every fourth without its last triangle, and so open
+  for (int i = 0; i < 40; ++i) {  // every fourth lacks its last triangle and is therefore open
     const double x = number(random), y = number(random), z = number(random);
     Mesh box = boxMesh({x, y, z}, {x + 1, y + 2, z + 1});
     if (i % 4 == 0) box.indices.resize(33);
@@ -67,18 +67,19 @@ TEST(ObjectParts, QueriesFindWhatBruteForceFinds) {
     mesh.positions.insert(mesh.positions.end(), box.positions.begin(), box.positions.end());
     for (const std::uint32_t index : box.indices) mesh.indices.push_back(first + index);
   }
-  const ObjectParts parts = partsOf(shapeOfOne(mesh), Eigen::Affine3d::Identity());
+  const CollisionGeometry parts =
+      buildCollisionGeometry(shapeOfOne(mesh), Eigen::Affine3d::Identity());
   EXPECT_EQ(parts.localHulls.size(), 30u);
   EXPECT_EQ(parts.localTriangles.triangles().size(), 110u);
   std::size_t hits = 0;
   for (int i = 0; i < 200; ++i) {
     const double x = number(random), y = number(random), z = number(random);
-    const Box box{{x, y, z}, {x + 2, y + 1, z + 3}};
+    const Aabb box{{x, y, z}, {x + 2, y + 1, z + 3}};
     std::vector<std::uint32_t> found, expected;
     parts.query(box, found);
     for (std::uint32_t part = 0; part < parts.size(); ++part) {
-      Box own;
-      const collision::ConvexBody body = parts.body(part);
+      Aabb own;
+      const collision::PlacedConvex body = parts.convex(part);
       for (const Vec3& v : body.vertices) own.include(v + body.translation);
       EXPECT_EQ(own.min, parts.box(part).min);
       if (overlaps(own, box)) expected.push_back(part);
@@ -89,7 +90,7 @@ TEST(ObjectParts, QueriesFindWhatBruteForceFinds) {
   EXPECT_GT(hits, 80u);
 }
 
-TEST(ObjectParts, FarPartsAreStoredNearTheirOriginAndAreWhereTheyWere) {
+TEST(CollisionGeometry, FarPartsAreStoredNearTheirOriginAndAreWhereTheyWere) {
   std::mt19937 random(7);
   const Mesh mesh = boxMesh({0, 0, 0}, {0.3, 2, 5});
   Mesh open = mesh;
@@ -101,11 +102,11 @@ TEST(ObjectParts, FarPartsAreStoredNearTheirOriginAndAreWhereTheyWere) {
     placed.translation() *= i % 4 ? 1000 : 1;
     std::vector<Vec3> expected, found;
     for (const Eigen::Vector3f& p : shape.vertices) expected.push_back(placed * p.cast<double>());
-    const ObjectParts parts = partsOf(shape, placed);
+    const CollisionGeometry parts = buildCollisionGeometry(shape, placed);
     for (const Vec3& v : parts.localHulls.at(0).vertices) found.push_back(v + parts.origin);
     for (const Vec3& v : expected)
       EXPECT_EQ(std::count(found.begin(), found.end(), v), 1) << v.transpose();
-    const ObjectParts rest = partsOf(sheets, placed);
+    const CollisionGeometry rest = buildCollisionGeometry(sheets, placed);
     for (const collision::Triangle& t : rest.localTriangles.triangles()) {
       for (const Vec3& corner : t)
         EXPECT_EQ(std::count(expected.begin(), expected.end(), corner + rest.origin), 1);
@@ -116,29 +117,30 @@ TEST(ObjectParts, FarPartsAreStoredNearTheirOriginAndAreWhereTheyWere) {
   }
 }
 
-TEST(ObjectParts, InsideOutWallsAreSolidAndInsideOutRoomsAreRooms) {
+TEST(CollisionGeometry, InsideOutWallsAreSolidAndInsideOutRoomsAreRooms) {
   const Eigen::Affine3d as = Eigen::Affine3d::Identity();
   const Shape wall = shapeOfOne(insideOut(boxMesh({0, 0, 0}, {5, 3, 0.2})));
-  EXPECT_EQ(partsOf(wall, as).localHulls.size(), 1u);
+  EXPECT_EQ(buildCollisionGeometry(wall, as).localHulls.size(), 1u);
   const Shape room = shapeOfOne(insideOut(boxMesh({0, 0, 0}, {5, 3, 4})));
-  EXPECT_EQ(partsOf(room, as).localHulls.size(), 0u);
-  EXPECT_EQ(partsOf(room, as).localTriangles.triangles().size(), 12u);
-  EXPECT_EQ(partsOf(room, Eigen::Affine3d(Eigen::Scaling(0.05))).localHulls.size(), 1u);
+  EXPECT_EQ(buildCollisionGeometry(room, as).localHulls.size(), 0u);
+  EXPECT_EQ(buildCollisionGeometry(room, as).localTriangles.triangles().size(), 12u);
+  EXPECT_EQ(buildCollisionGeometry(room, Eigen::Affine3d(Eigen::Scaling(0.05))).localHulls.size(),
+            1u);
 }
 
-/// Whether an avatar may come into the world at `at`.
+/// The error of spawning an avatar at `at`; "" if it may enter there.
 std::string refusalAt(const std::shared_ptr<const Scene>& scene, const Vec3& at) {
   World world(scene);
-  submit(world, {"ann", Spawn{at}, 0});
-  const TickReport report = tick(world);
+  submitAvatarCommand(world, {"ann", Spawn{at}, 0});
+  const TickReport report = tickWorld(world);
   for (const Notice& notice : report.notices) {
     if (notice.kind == Notice::Kind::refused) return notice.text;
   }
   return "";
 }
 
-TEST(ObjectParts, NobodyComesIntoTheInsideOfSolids) {
-  // A convex block, one with a dent, one mirrored, and a vault with a room in it.
+TEST(CollisionGeometry, AvatarsNeverEnterSolids) {
+  // A convex block, a dented one, a mirrored one, and a vault with a room in it.
   Model model = testing::boxModel({testing::floorBox(), {"block", {2, 0, 2}, {6, 4, 6}}});
   Mesh dented = boxMesh({-6, 0, 2}, {-2, 4, 6});
   dented.indices.erase(dented.indices.begin() + 18, dented.indices.begin() + 24);
@@ -157,9 +159,9 @@ TEST(ObjectParts, NobodyComesIntoTheInsideOfSolids) {
   const auto scene = std::make_shared<const Scene>(std::move(model));
 
   EXPECT_EQ(refusalAt(scene, {0, 0, 0}), "");
-  EXPECT_NE(refusalAt(scene, {4, 0.5, 4}).find("inside block"), std::string::npos);
-  EXPECT_NE(refusalAt(scene, {-4, 0.5, 4}).find("inside dented"), std::string::npos);
-  EXPECT_NE(refusalAt(scene, {-4, 0.5, -4}).find("inside mirrored"), std::string::npos);
+  EXPECT_NE(refusalAt(scene, {4, 0.5, 4}).find("inside the solid block"), std::string::npos);
+  EXPECT_NE(refusalAt(scene, {-4, 0.5, 4}).find("inside the solid dented"), std::string::npos);
+  EXPECT_NE(refusalAt(scene, {-4, 0.5, -4}).find("inside the solid mirrored"), std::string::npos);
   EXPECT_EQ(refusalAt(scene, {5, 0.5, -5}), "");
 }
 

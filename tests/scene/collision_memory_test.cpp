@@ -1,5 +1,5 @@
-// What a scene and its world hold for collision, by what this program allocates: each byte that
-// operator new gives and delete takes back is counted as the allocator counts it.
+// Memory that a scene and its world use for collision. Every operator new and delete of this
+// program is counted with the size that the allocator reports.
 #include <gtest/gtest.h>
 #include <malloc.h>
 
@@ -17,7 +17,7 @@ namespace {
 
 std::atomic<std::size_t> held{0};
 
-/// Null: there is none.
+/// Null: the allocation failed.
 void* tryToTake(std::size_t size, std::align_val_t alignment) noexcept {
   const auto align = static_cast<std::size_t>(alignment);
   const std::size_t whole = (std::max<std::size_t>(size, 1) + align - 1) / align * align;
@@ -87,7 +87,7 @@ void operator delete[](void* place, std::size_t) noexcept {
 namespace enfilade::scene {
 namespace {
 
-/// Of each mesh once, however many objects have it.
+/// Bytes of all meshes, each counted once however many objects share it.
 std::size_t uniqueBytes(const Model& model) {
   std::size_t bytes = 0;
   for (const Mesh& mesh : model.meshes)
@@ -115,7 +115,7 @@ Mesh globe(std::uint32_t rings) {
   return mesh;
 }
 
-/// Each globe stands `copies` times.
+/// Each globe is placed `copies` times.
 Model globes(int meshes, std::uint32_t rings, int copies) {
   Model model;
   model.source = "globes";
@@ -151,12 +151,12 @@ Model buildingWithBodies() {
   return model;
 }
 
-/// Bytes that a scene and a world of it take beside the model.
+/// Bytes that a scene and a world of it allocate, without the model.
 struct Cost {
-  std::size_t scene = 0;   ///< before anything comes near
-  std::size_t world = 0;   ///< the same
-  std::size_t shapes = 0;  ///< once those of all objects were asked for
-  std::size_t parts = 0;   ///< once those of all objects were asked for
+  std::size_t scene = 0;   ///< before any avatar comes near
+  std::size_t world = 0;   ///< before any avatar comes near
+  std::size_t shapes = 0;  ///< after the shapes of all objects were built
+  std::size_t parts = 0;   ///< after the parts of all objects were built
   std::size_t beforeParts() const { return scene + world + shapes; }
 };
 Cost costOf(Model model, bool withParts = false) {
@@ -170,31 +170,31 @@ Cost costOf(Model model, bool withParts = false) {
   const auto scene = std::make_shared<const Scene>(std::move(model));
   cost.scene = more();
   World world(scene);
-  tick(world);
+  tickWorld(world);
   cost.world = more();
   for (std::uint32_t i = 0; i < objects; ++i) scene->shape(i);
   cost.shapes = more();
-  for (std::uint32_t i = 0; withParts && i < objects; ++i) scene->parts(i);
+  for (std::uint32_t i = 0; withParts && i < objects; ++i) scene->collisionGeometry(i);
   cost.parts = more();
   return cost;
 }
 
-TEST(CollisionMemory, OfTheBundledBuildingIsAtMostTwiceItsMeshesBeforePartsAreAskedFor) {
+TEST(CollisionMemory, OfTheBundledBuildingIsAtMostTwiceItsMeshesBeforeThePartsAreUsed) {
   Model model = buildingWithBodies();
   EXPECT_GT(model.bodies.size(), 10u);
   const std::size_t unique = uniqueBytes(model);
   const Cost cost = costOf(std::move(model));
-  EXPECT_GT(cost.beforeParts(), unique / 4) << "it is counted";
+  EXPECT_GT(cost.beforeParts(), unique / 4) << "the allocation is counted";
   EXPECT_LE(cost.beforeParts(), 2 * unique);
 }
 
-TEST(CollisionMemory, OfLargeMeshesIsAtMostTwiceTheseBeforePartsAreAskedForAndMoreAfterwards) {
+TEST(CollisionMemory, OfLargeMeshesIsAtMostTwiceTheseUntilThePartsAreUsed) {
   Model model = globes(6, 60, 1);
   const std::size_t unique = uniqueBytes(model);
   const Cost cost = costOf(std::move(model), true);
-  EXPECT_LE(cost.scene + cost.world, unique / 100) << "nothing is copied before it is asked for";
+  EXPECT_LE(cost.scene + cost.world, unique / 100) << "nothing is copied before its first use";
   EXPECT_LE(cost.beforeParts(), 2 * unique);
-  EXPECT_GT(cost.beforeParts() + cost.parts, 2 * unique) << "what is too much is seen as such";
+  EXPECT_GT(cost.beforeParts() + cost.parts, 2 * unique) << "excess memory is detected";
 }
 
 TEST(CollisionMemory, OfAMeshThatStandsFourHundredTimesIsThatOfOneAndAFewNumbersEach) {

@@ -1,4 +1,4 @@
-// Avatars in one another's way: nobody trembles, nobody is inside anybody, nobody leaves the
+// Tests of avatars that block one another: none jitters, none penetrates another, none leaves the
 // corridor.
 #include <random>
 
@@ -17,9 +17,9 @@ std::vector<NamedBox> corridor(double width, double length) {
           {"east", {length, 0, -5}, {length + 0.1, 3, 5}}};
 }
 
-TEST(Crowd, TwoWhoWalkIntoEachOtherStandStillToTheLastBit) {
+TEST(Crowd, TwoAvatarsThatMeetHeadOnStandBitExactlyStill) {
   for (const double aside : {0.0, 0.05, 0.2, 0.5}) {
-    Trial run(corridor(1.0, 10));
+    WorldFixture run(corridor(1.0, 10));
     run.order("ann", Spawn{{-2, 0, -0.1}});
     run.order("bob", Spawn{{2, 0, -0.1 + (aside > 0.19 ? 0.19 : aside)}});
     run.untilIdle();
@@ -37,9 +37,9 @@ TEST(Crowd, TwoWhoWalkIntoEachOtherStandStillToTheLastBit) {
   }
 }
 
-TEST(Crowd, OneWhoIsDrivenIntoACornerStandsStill) {
+TEST(Crowd, AvatarDrivenIntoCornerStands) {
   for (const double angle : {0.1, 0.5, 0.9}) {
-    Trial run(corridor(1.0, 10));
+    WorldFixture run(corridor(1.0, 10));
     run.order("ann", Spawn{{9, 0, 0}});
     run.untilIdle();
     run.order("ann", Drive{{1 - angle, 0, angle}});
@@ -53,8 +53,8 @@ TEST(Crowd, OneWhoIsDrivenIntoACornerStandsStill) {
   }
 }
 
-TEST(Crowd, TwoHundredInACorridorNeverPenetrateAndNobodyGetsOut) {
-  Trial run(corridor(4, 30));
+TEST(Crowd, TwoHundredAvatarsInACorridorNeverPenetrateOrEscape) {
+  WorldFixture run(corridor(4, 30));
   for (int i = 0; i < 200; ++i) {
     const double x = -24.5 + 1.0 * (i / 4), z = -1.5 + 1.0 * (i % 4);
     run.order("a" + std::to_string(i), Spawn{{x, 0, z}});
@@ -69,19 +69,19 @@ TEST(Crowd, TwoHundredInACorridorNeverPenetrateAndNobodyGetsOut) {
   }
   for (int i = 0; i < 240; ++i) run.step();
   EXPECT_EQ(run.worstPenetration, 0);
-  for (const AvatarView& a : run.world.snapshot()->avatars) {
-    EXPECT_LT(std::abs(a.feet.z()), 1.7) << a.name;
-    EXPECT_LT(std::abs(a.feet.x()), 29.7) << a.name;
-    EXPECT_LT(a.feet.y(), 0.3) << a.name;
+  for (const AvatarSnapshot& a : run.world.snapshot()->avatars) {
+    EXPECT_LT(std::abs(a.footPosition.z()), 1.7) << a.name;
+    EXPECT_LT(std::abs(a.footPosition.x()), 29.7) << a.name;
+    EXPECT_LT(a.footPosition.y(), 0.3) << a.name;
   }
 }
 
-TEST(Crowd, WhoIsDrivenIntoAGapThatIsTooNarrowStandsStill) {
+TEST(Crowd, AvatarDrivenIntoTooNarrowGapStands) {
   for (int i = 0; i < 24; ++i) {
     const double gap = 0.2 + 0.016 * i, turn = 0.5 - 0.04 * i;  // less than 0.6 m
-    Trial run({{"floor", {-10, -0.2, -10}, {10, 0, 10}},
-               {"left", {2, 0, -6}, {2.05, 3, -0.5 * gap}},
-               {"right", {2, 0, 0.5 * gap}, {2.05, 3, 6}}});
+    WorldFixture run({{"floor", {-10, -0.2, -10}, {10, 0, 10}},
+                      {"left", {2, 0, -6}, {2.05, 3, -0.5 * gap}},
+                      {"right", {2, 0, 0.5 * gap}, {2.05, 3, 6}}});
     run.order("ann", Spawn{{0, 0, 0.003 * i}});
     run.untilIdle();
     run.order("ann", Drive{{1.3, 0, 0.1 * turn}});
@@ -95,10 +95,10 @@ TEST(Crowd, WhoIsDrivenIntoAGapThatIsTooNarrowStandsStill) {
   }
 }
 
-/// All press towards one end, each a little aside as well, until they stand.
-TEST(Crowd, WhoStandsBlockedInAThrongDoesNotTremble) {
+/// All avatars press towards one end, each also a little sideways, until they stop.
+TEST(Crowd, AvatarBlockedInACrowdDoesNotJitter) {
   constexpr int kThrong = 120;
-  Trial run(corridor(4, 30));
+  WorldFixture run(corridor(4, 30));
   for (int i = 0; i < kThrong; ++i) {
     const double x = 13.5 + 0.66 * (i / 5), z = -1.5 + 0.75 * (i % 5);
     run.order("a" + std::to_string(i), Spawn{{x, 0, z}});
@@ -110,7 +110,7 @@ TEST(Crowd, WhoStandsBlockedInAThrongDoesNotTremble) {
   run.ticks(420);
   const auto feetOfAll = [&] {
     std::vector<Vec3> feet;
-    for (const AvatarView& a : run.world.snapshot()->avatars) feet.push_back(a.feet);
+    for (const AvatarSnapshot& a : run.world.snapshot()->avatars) feet.push_back(a.footPosition);
     return feet;
   };
   const std::vector<Vec3> before = feetOfAll();

@@ -1,5 +1,5 @@
-// Avatars between something that comes at them and something that does not give way: whatever their
-// shape and however fast it comes, they end outside, by the exact verdict on every part.
+// Avatars between an approaching body and an immovable obstacle. Whatever their shape and its
+// speed, they end outside both, by the exact verdict on every part.
 #include <gtest/gtest.h>
 
 #include "tests/scene/body_fixture.hpp"
@@ -19,12 +19,12 @@ std::vector<Vec3> corners(const Vec3& min, const Vec3& max) {
   return points;
 }
 
-/// Who is squeezed: how it enters, and what it is told before anything comes.
+/// An avatar that is crushed: how it enters, and its orders before the body approaches.
 struct Victim {
   const char* name;
   Spawn spawn;
   std::vector<Order> then;
-  double height;     ///< metres, of the highest point
+  double height;     ///< metres, of the avatar's highest point
   double halfWidth;  ///< metres, across z
 };
 
@@ -40,7 +40,7 @@ Spawn trolley() {
   return spawn;
 }
 
-/// A base with an arm that is stretched out ahead and turned up.
+/// A base with an arm that points forward and upward.
 Spawn arm() {
   Spawn spawn;
   spawn.parts = {corners({-0.2, 0, -0.2}, {0.2, 0.5, 0.2})};
@@ -63,18 +63,18 @@ const std::vector<Victim>& victims() {
   return all;
 }
 
-class Squeezed : public ::testing::TestWithParam<Victim> {
+class CrushedBodies : public ::testing::TestWithParam<Victim> {
  protected:
-  void enter(BodyTrial& t, const Vec3& at) {
+  void enter(BodyFixture& t, const Vec3& at) {
     Spawn spawn = GetParam().spawn;
-    spawn.at = at;
+    spawn.position = at;
     t.order("ann", spawn);
     for (const Order& order : GetParam().then) t.order("ann", order);
     t.ticks(20);
-    ASSERT_EQ(t.world.state().avatars.count("ann"), 1u);
+    ASSERT_TRUE(t.world.data().findAvatarByName("ann"));
   }
-  /// Ticks, and after each the verdict of all on all.
-  void watch(BodyTrial& t, int ticks) {
+  /// Runs ticks and checks every pair by the exact verdict after each of them.
+  void watch(BodyFixture& t, int ticks) {
     for (int i = 0; i < ticks; ++i) {
       t.step();
       ASSERT_EQ(whoPenetrates(t.world), "") << "tick " << i;
@@ -82,10 +82,10 @@ class Squeezed : public ::testing::TestWithParam<Victim> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(Shapes, Squeezed, ::testing::ValuesIn(victims()),
+INSTANTIATE_TEST_SUITE_P(Shapes, CrushedBodies, ::testing::ValuesIn(victims()),
                          [](const auto& shape) { return std::string(shape.param.name); });
 
-TEST_P(Squeezed, AFallingBoxLeavesWhoLeansOnAWallOutside) {
+TEST_P(CrushedBodies, AFallingBoxDoesNotPressALeaningAvatarIntoTheWall) {
   for (const double speed : {0.0, 20.0, 400.0}) {
     SCOPED_TRACE(speed);
     Model model = boxModel({floorBox(),
@@ -93,30 +93,31 @@ TEST_P(Squeezed, AFallingBoxLeavesWhoLeansOnAWallOutside) {
                             {"crate", {-0.2, 5.5, -0.5}, {0.85, 6.4, 0.45}}});
     model.bodies.push_back(bodySpec("crate", BodyKind::rigid, {2}));
     model.bodies[0].mass = 3000;
-    BodyTrial t(std::move(model));
+    BodyFixture t(std::move(model));
     enter(t, {0, 0.001, 0});
-    t.order("ann", Drive{{1.5, 0, 0}});  // leans on the wall, and goes on leaning
+    t.order("ann", Drive{{1.5, 0, 0}});  // pushes against the wall all the time
     watch(t, 20);
-    auto& stage = t.world.state().rigids;
-    auto& crate = stage.dynamics.solids[stage.solids.at({t.body("crate").id, 0})].motion;
-    ASSERT_GT(crate.centre.y(), 3) << "it is still on its way";
+    auto& stage = t.world.data().dynamicBodies;
+    auto& crate =
+        stage.physicsWorld.bodies[stage.physicsBodyByPart.at({t.body("crate").id, 0})].motion;
+    ASSERT_GT(crate.centre.y(), 3) << "it is still moving";
     crate.velocity.y() -= speed;
     double lowest = 6;
     for (int i = 0; i < 90; ++i) {
       watch(t, 1);
       lowest = std::min(lowest, t.body("crate").position.y());
     }
-    EXPECT_LT(lowest, 2.6) << "it came down on nothing";
+    EXPECT_LT(lowest, 2.6) << "it landed on nothing";
     const Body& body = t.body("crate");
     EXPECT_GT(std::abs(body.position.x() - 0.325) + body.orientation.vec().norm(), 0.01)
-        << "it fell past everybody";
+        << "it fell past all avatars";
   }
 }
 
-TEST_P(Squeezed, ADoorThatClosesOnSomeoneInItsFrameStaysOpenAsFarAsItMust) {
+TEST_P(CrushedBodies, ADoorThatClosesOnSomeoneInItsFrameStaysOpenAsFarAsItMust) {
   for (const double speed : {0.5, 8.0, 200.0}) {
     SCOPED_TRACE(speed);
-    // The leaf slides along z to the post, with the victim in between.
+    // The leaf slides along z to the post; the victim stands between them.
     Model model = boxModel({floorBox(),
                             {"post", {-0.6, 0, 1.0}, {0.9, 3, 1.2}},
                             {"leaf", {-0.05, 0.01, -2.6}, {0.05, 2.4, -0.6}}});
@@ -125,16 +126,16 @@ TEST_P(Squeezed, ADoorThatClosesOnSomeoneInItsFrameStaysOpenAsFarAsItMust) {
     door.high = 1.6;
     door.speed = speed;
     model.bodies.push_back(door);
-    BodyTrial t(std::move(model));
+    BodyFixture t(std::move(model));
     enter(t, {0, 0.001, 0.2});
-    t.tell({"door", Action::to, 1.6, 0, {}});
+    t.submit({"door", Action::moveTo, 1.6, 0, {}});
     watch(t, 240);
-    EXPECT_EQ(t.told(Event::blocked, "door", "ann"), 1);
-    EXPECT_NEAR(t.body("door").drive.coordinate, 1.6 - 2 * GetParam().halfWidth, 0.02);
+    EXPECT_EQ(t.countEvents(Event::blocked, "door", "ann"), 1);
+    EXPECT_NEAR(t.body("door").drive.jointPosition, 1.6 - 2 * GetParam().halfWidth, 0.02);
   }
 }
 
-TEST_P(Squeezed, ALiftThatComesDownOnSomeoneStopsAtTheirHighestPoint) {
+TEST_P(CrushedBodies, ALiftThatComesDownOnSomeoneStopsAtTheirHighestPoint) {
   for (const double speed : {0.5, 30.0, 300.0}) {
     SCOPED_TRACE(speed);
     Model model = boxModel({floorBox(), {"car", {-1.5, 3, -1.5}, {1.5, 3.1, 1.5}}});
@@ -143,16 +144,16 @@ TEST_P(Squeezed, ALiftThatComesDownOnSomeoneStopsAtTheirHighestPoint) {
     lift.stops = {-2.9, 0};
     lift.speed = speed;
     model.bodies.push_back(lift);
-    BodyTrial t(std::move(model));
+    BodyFixture t(std::move(model));
     enter(t, {0, 0.001, 0});
-    t.tell({"lift", Action::level, 0, 0, {}});
+    t.submit({"lift", Action::moveToLevel, 0, 0, {}});
     watch(t, speed < 1 ? 360 : 60);
-    EXPECT_EQ(t.told(Event::blocked, "lift", "ann"), 1);
-    EXPECT_NEAR(3 + t.body("lift").drive.coordinate, GetParam().height, 0.08);
+    EXPECT_EQ(t.countEvents(Event::blocked, "lift", "ann"), 1);
+    EXPECT_NEAR(3 + t.body("lift").drive.jointPosition, GetParam().height, 0.08);
   }
 }
 
-/// The hand of an arm that stands beside a lift, over its platform.
+/// The arm stands next to a lift and holds its hand over the platform.
 TEST(ArmAndLift, ALiftThatComesUpUnderAnArmMeetsNothingButItsUnderside) {
   for (const double speed : {0.4, 3.0, 60.0}) {
     SCOPED_TRACE(speed);
@@ -164,27 +165,27 @@ TEST(ArmAndLift, ALiftThatComesUpUnderAnArmMeetsNothingButItsUnderside) {
     lift.stops = {0, 3};
     lift.speed = speed;
     model.bodies.push_back(lift);
-    BodyTrial t(std::move(model));
+    BodyFixture t(std::move(model));
     Spawn spawn = arm();
-    spawn.at = {0, 0.001, 0};
+    spawn.position = {0, 0.001, 0};
     spawn.links[0].value = 0;  // straight out, over the platform
     spawn.links[1].value = 0;
     t.order("ann", spawn);
     t.ticks(10);
-    t.tell({"lift", Action::level, 0, 1, {}});
+    t.submit({"lift", Action::moveToLevel, 0, 1, {}});
     for (int i = 0; i < (speed < 1 ? 500 : 200); ++i) {
       t.step();
       ASSERT_EQ(whoPenetrates(t.world), "") << "tick " << i;
     }
-    EXPECT_GE(t.told(Event::begin, "ann", "lift"), 1);
-    EXPECT_EQ(t.told(Event::blocked, "lift", "ann"), 1) << "the ceiling holds the arm down";
-    // The platform's top lies at -1.1 + coordinate; the arm is between it and the ceiling.
-    EXPECT_LT(t.body("lift").drive.coordinate, 3.1);
-    EXPECT_GT(t.body("lift").drive.coordinate, 1.5);
+    EXPECT_GE(t.countEvents(Event::begin, "ann", "lift"), 1);
+    EXPECT_EQ(t.countEvents(Event::blocked, "lift", "ann"), 1) << "the ceiling holds the arm down";
+    // The platform's top is at y = coordinate - 1.1; the arm is between it and the ceiling.
+    EXPECT_LT(t.body("lift").drive.jointPosition, 3.1);
+    EXPECT_GT(t.body("lift").drive.jointPosition, 1.5);
   }
 }
 
-/// An arm that rides: what sticks out beside the platform meets the next storey's edge.
+/// The arm rides on the lift; its part beyond the platform meets the edge of the next storey.
 TEST(ArmAndLift, AnArmThatRidesALiftAndReachesOutIsHeldByTheEdgeOfTheNextFloor) {
   Model model = boxModel({{"ground", {-10, -1, -10}, {10, -0.8, 10}},
                           {"car", {-0.6, -0.1, -0.6}, {0.6, 0, 0.6}},
@@ -194,22 +195,22 @@ TEST(ArmAndLift, AnArmThatRidesALiftAndReachesOutIsHeldByTheEdgeOfTheNextFloor) 
   lift.stops = {0, 3};
   lift.speed = 2;
   model.bodies.push_back(lift);
-  BodyTrial t(std::move(model));
+  BodyFixture t(std::move(model));
   Spawn spawn = arm();
-  spawn.at = {0.2, 0.001, 0};
+  spawn.position = {0.2, 0.001, 0};
   spawn.links[0].value = 0;
   spawn.links[1].value = 0;
   t.order("ann", spawn);
   t.ticks(20);
-  ASSERT_EQ(t.told(Event::begin, "ann", "lift"), 1);
-  t.tell({"lift", Action::level, 0, 1, {}});
+  ASSERT_EQ(t.countEvents(Event::begin, "ann", "lift"), 1);
+  t.submit({"lift", Action::moveToLevel, 0, 1, {}});
   for (int i = 0; i < 200; ++i) {
     t.step();
     ASSERT_EQ(whoPenetrates(t.world), "") << "tick " << i;
   }
-  EXPECT_EQ(t.told(Event::blocked, "lift", "ann"), 1);
-  EXPECT_NEAR(t.body("lift").drive.coordinate, 2.5 - 0.65, 0.02);
-  // When it has stepped back, the lift goes on and carries it up.
+  EXPECT_EQ(t.countEvents(Event::blocked, "lift", "ann"), 1);
+  EXPECT_NEAR(t.body("lift").drive.jointPosition, 2.5 - 0.65, 0.02);
+  // When the arm has stepped back, the lift continues and carries it up.
   t.order("ann", Drive{{-0.5, 0, 0}});
   t.ticks(66);
   t.order("ann", Drive{});
@@ -217,7 +218,7 @@ TEST(ArmAndLift, AnArmThatRidesALiftAndReachesOutIsHeldByTheEdgeOfTheNextFloor) 
     t.step();
     ASSERT_EQ(whoPenetrates(t.world), "") << "tick " << i;
   }
-  EXPECT_EQ(t.body("lift").drive.coordinate, 3);
+  EXPECT_EQ(t.body("lift").drive.jointPosition, 3);
   EXPECT_NEAR(t.feet("ann").y(), 3, 2e-3);
 }
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <map>
 
 #include "scene/world/checkpoint/checkpoint.hpp"
 #include "tests/scene/body_fixture.hpp"
@@ -23,35 +24,36 @@ Model loose(const std::vector<NamedBox>& boxes, const std::vector<NamedBox>& sti
   return model;
 }
 
-bool penetrate(const collision::ConvexBody& a, const collision::ConvexBody& b) {
+bool penetrate(const collision::PlacedConvex& a, const collision::PlacedConvex& b) {
   collision::FeatureCache cache;
-  return collision::decide(a, b, cache).verdict == collision::Verdict::penetrating;
+  return collision::computeSeparation(a, b, cache).verdict == collision::Verdict::penetrating;
 }
 
-/// Whether the body penetrates a triangle of a still object, by the exact verdict.
+/// Whether the body penetrates a triangle of a static object, by the exact verdict.
 bool isIn(const World& world, const Body& body, std::uint32_t object) {
-  for (const collision::Triangle& t : solidTriangles(world.state().scene->model(), object))
-    if (penetrate(partOf(body, 0), {std::span<const Vec3>(t), Vec3::Zero()})) return true;
+  for (const collision::Triangle& t : collectSolidTriangles(world.data().scene->model(), object))
+    if (penetrate(makePlacedPart(body, 0), {std::span<const Vec3>(t), Vec3::Zero()})) return true;
   return false;
 }
 
-/// Whether any free body penetrates a triangle or another body, driven or free, by the exact
-/// verdict.
+/// Whether any dynamic body penetrates a triangle or another body, kinematic or dynamic, by the
+/// exact verdict.
 bool anyBodyPenetrates(const World& world) {
-  const WorldState& state = world.state();
+  const WorldData& state = world.data();
   for (std::size_t i = 0; i < state.bodies.size(); ++i) {
     const Body& body = state.bodies[i];
     if (body.spec->kind != BodyKind::rigid) continue;
     for (const std::uint32_t object : state.scene->solidObjects())
       if (isIn(world, body, object)) return true;
     for (std::size_t k = 0; k < state.bodies.size(); ++k)
-      if (k != i && penetrate(partOf(body, 0), partOf(state.bodies[k], 0))) return true;
+      if (k != i && penetrate(makePlacedPart(body, 0), makePlacedPart(state.bodies[k], 0)))
+        return true;
   }
   return false;
 }
 
-TEST(RigidBodies, ABoxFallsOntoTheFloorRestsThereAndCostsNothingAsleep) {
-  BodyTrial t(loose({{"box", {0, 1, 0}, {0.4, 1.4, 0.4}}}));
+TEST(DynamicBodies, ABoxFallsOntoTheFloorRestsThereAndCostsNothingAsleep) {
+  BodyFixture t(loose({{"box", {0, 1, 0}, {0.4, 1.4, 0.4}}}));
   t.ticks(150);
   const Body& box = t.body("box");
   EXPECT_TRUE(box.asleep);
@@ -65,27 +67,27 @@ TEST(RigidBodies, ABoxFallsOntoTheFloorRestsThereAndCostsNothingAsleep) {
   EXPECT_EQ(t.body("box").position, rest);
 }
 
-TEST(RigidBodies, ABoxThatRestsKeepsItsContactHoweverFarNearMissesAreLookedFor) {
+TEST(DynamicBodies, ABoxThatRestsKeepsItsContactHoweverFarNearMissesAreLookedFor) {
   for (const double nearMiss : {0.0, 0.05, 0.3, 3.0}) {
-    Lengths lengths;
-    lengths.nearMiss = nearMiss;
-    BodyTrial t(loose({{"box", {-0.2, 0.7, -0.2}, {0.2, 1.1, 0.2}}}), lengths);
+    WorldSettings lengths;
+    lengths.nearMissDistance = nearMiss;
+    BodyFixture t(loose({{"box", {-0.2, 0.7, -0.2}, {0.2, 1.1, 0.2}}}), lengths);
     t.untilIdle();
     t.ticks(10);
     EXPECT_TRUE(t.body("box").asleep);
     EXPECT_FALSE(t.body("box").moved) << nearMiss;
-    EXPECT_EQ(t.told(Event::begin, "box", "floor"), 1) << nearMiss;
-    EXPECT_EQ(t.told(Event::end, "box", "floor"), 0) << nearMiss;
+    EXPECT_EQ(t.countEvents(Event::begin, "box", "floor"), 1) << nearMiss;
+    EXPECT_EQ(t.countEvents(Event::end, "box", "floor"), 0) << nearMiss;
   }
 }
 
-TEST(RigidBodies, ATowerStaysAndSleepsWithoutPenetration) {
+TEST(DynamicBodies, ATowerStaysAndSleepsWithoutPenetration) {
   std::vector<NamedBox> tower;
   for (int i = 0; i < 5; ++i) {
     const double low = 0.001 + 0.301 * i;
     tower.push_back({"b" + std::to_string(i), {0, low, 0}, {0.3, low + 0.3, 0.3}});
   }
-  BodyTrial t(loose(tower));
+  BodyFixture t(loose(tower));
   for (int i = 0; i < 240; ++i) {
     t.step();
     ASSERT_FALSE(anyBodyPenetrates(t.world)) << i;
@@ -97,16 +99,16 @@ TEST(RigidBodies, ATowerStaysAndSleepsWithoutPenetration) {
   }
 }
 
-TEST(RigidBodies, AHeavyBoxThatFallsOntoAnAvatarBesideAWallLeavesItOutside) {
+TEST(DynamicBodies, AHeavyFallingBoxDoesNotPressAnAvatarIntoTheWall) {
   for (const double speed : {5.0, 50.0, 500.0}) {
     Model model = loose({{"crate", {-0.4, 3, -0.4}, {0.7, 4, 0.6}}},
                         {{"wall", {0.31, 0, -3}, {0.5, 2.9, 3}}});
     model.bodies[0].mass = 5000;
-    BodyTrial t(std::move(model));
-    t.order("ann", Spawn{.at = {0, 0.001, 0}});
+    BodyFixture t(std::move(model));
+    t.order("ann", Spawn{.position = {0, 0.001, 0}});
     t.ticks(2);
-    auto& stage = t.world.state().rigids;
-    stage.dynamics.solids[0].motion.velocity = {0.3 * speed, -speed, 0};
+    auto& stage = t.world.data().dynamicBodies;
+    stage.physicsWorld.bodies[0].motion.velocity = {0.3 * speed, -speed, 0};
     double low = 3.5;
     for (int i = 0; i < 120; ++i) {
       t.step();
@@ -117,12 +119,12 @@ TEST(RigidBodies, AHeavyBoxThatFallsOntoAnAvatarBesideAWallLeavesItOutside) {
   }
 }
 
-TEST(RigidBodies, AnAvatarPushesALightBoxAlongAndNotAHeavyOne) {
+TEST(DynamicBodies, AnAvatarPushesALightBoxAlongAndNotAHeavyOne) {
   for (const bool heavy : {false, true}) {
     Model model = loose({{"box", {1, 0.0005, -0.3}, {1.6, 0.6, 0.3}}});
     model.bodies[0].mass = heavy ? 2000 : 20;
-    BodyTrial t(std::move(model));
-    t.order("ann", Spawn{.at = {0, 0.001, 0}});
+    BodyFixture t(std::move(model));
+    t.order("ann", Spawn{.position = {0, 0.001, 0}});
     t.step();
     t.order("ann", Drive{{1, 0, 0}});
     for (int i = 0; i < 180; ++i) {
@@ -136,20 +138,21 @@ TEST(RigidBodies, AnAvatarPushesALightBoxAlongAndNotAHeavyOne) {
       EXPECT_GT(moved, 1.5);
       EXPECT_LT(moved, 3);
     }
-    EXPECT_EQ(t.told(Event::begin, "ann", "box"), 1) << heavy;
-    EXPECT_EQ(t.told(Event::end, "ann", "box"), 0) << "it is pushed all the time; " << heavy;
+    EXPECT_EQ(t.countEvents(Event::begin, "ann", "box"), 1) << heavy;
+    EXPECT_EQ(t.countEvents(Event::end, "ann", "box"), 0)
+        << "the body is pushed all the time; " << heavy;
   }
 }
 
-TEST(RigidBodies, WhatBouncesIsToldWhereverItDoes) {
+TEST(DynamicBodies, EachBounceIsReportedAtItsPlace) {
   std::vector<NamedBox> boxes{{"onto ann", {-0.15, 4, -0.15}, {0.15, 4.3, 0.15}}};
   for (int i = 1; i < 6; ++i)
     boxes.push_back(
         {"b" + std::to_string(i), {2.0 * i, 0.7 * i, 0}, {2.0 * i + 0.3, 0.7 * i + 0.3, 0.3}});
   Model model = loose(boxes);
   for (BodySpec& body : model.bodies) body.restitution = 0.9, body.friction = 0;
-  BodyTrial t(std::move(model));
-  t.order("ann", Spawn{.at = {0, 0.001, 0}});
+  BodyFixture t(std::move(model));
+  t.order("ann", Spawn{.position = {0, 0.001, 0}});
   std::map<std::string, double> speeds;
   std::map<std::string, int> open;  // contacts
   int bounces = 0;
@@ -162,8 +165,8 @@ TEST(RigidBodies, WhatBouncesIsToldWhereverItDoes) {
       const bool begins = event.kind == Event::begin;
       if (!begins && event.kind != Event::end) continue;
       for (const EntityId id : {event.a, event.b}) {
-        open[nameOf(t.world, id)] += begins ? 1 : -1;
-        if (begins) touched.insert(nameOf(t.world, id));
+        open[findEntityName(t.world, id)] += begins ? 1 : -1;
+        if (begins) touched.insert(findEntityName(t.world, id));
       }
     }
     for (const NamedBox& box : boxes) {
@@ -177,8 +180,8 @@ TEST(RigidBodies, WhatBouncesIsToldWhereverItDoes) {
   EXPECT_GT(bounces, 10);
 }
 
-/// What is told first of a cube that falls onto a plate with a corner ahead: which of the two is
-/// `a`, and the features of both.
+/// The first event of a cube that falls corner first onto a plate: the order of `a` and `b`, and
+/// the features of both.
 ContactEvent cornerOnPlate(std::optional<BodyKind> plateIs, std::uint32_t cube) {
   const NamedBox plate{"plate", {-1, 0.1, -2}, {2, 0.2, 1}};
   const NamedBox fallen{"cube", {-0.1, -0.1, -0.1}, {0.1, 0.1, 0.1}};
@@ -192,63 +195,66 @@ ContactEvent cornerOnPlate(std::optional<BodyKind> plateIs, std::uint32_t cube) 
     model.bodies.back().axis = Vec3::UnitX();
     if (*plateIs == BodyKind::sliding) model.bodies.back().high = 0.1;
   }
-  BodyTrial t(std::move(model));
+  BodyFixture t(std::move(model));
   const auto isOfBoth = [&](const ContactEvent& event) {
-    return nameOf(t.world, event.a) != "floor" && nameOf(t.world, event.b) != "floor";
+    return findEntityName(t.world, event.a) != "floor" &&
+           findEntityName(t.world, event.b) != "floor";
   };
-  while (t.world.state().tick < 60) {
+  while (t.world.data().tick < 60) {
     t.step();
     const auto met = std::ranges::find_if(t.events, isOfBoth);
     if (met != t.events.end()) return *met;
   }
-  ADD_FAILURE() << "they do not meet";
+  ADD_FAILURE() << "they do not touch";
   return {};
 }
 
-TEST(RigidBodies, ACubeThatFallsOnItsCornerTellsTheCornerAndTheFaceUnderIt) {
+TEST(DynamicBodies, ACubeFallingOnItsCornerReportsTheCornerAndTheFace) {
   using collision::Feature;
   for (const std::uint32_t cube : {1u, 2u}) {
     for (const auto plateIs : {std::optional<BodyKind>(), std::optional(BodyKind::sliding),
                                std::optional(BodyKind::rigid)}) {
       const ContactEvent met = cornerOnPlate(plateIs, cube);
-      // Of two free ones the one of lesser id tells; else the free one.
+      // If both bodies are dynamic, the one with the lower id reports; otherwise the dynamic one
+      // does.
       const bool cubeTells = plateIs != BodyKind::rigid || cube == 1;
       EXPECT_EQ(met.a, cubeTells ? cube + 1 : 4 - cube);
-      EXPECT_EQ(met.decision.featureA, cubeTells ? Feature::vertex : Feature::face);
-      EXPECT_EQ(met.decision.featureB, cubeTells ? Feature::face : Feature::vertex);
+      EXPECT_EQ(met.separation.featureA, cubeTells ? Feature::vertex : Feature::face);
+      EXPECT_EQ(met.separation.featureB, cubeTells ? Feature::face : Feature::vertex);
     }
   }
 }
 
-TEST(RigidBodies, ASleepingBoxIsWokenByADoorOfAnySpeedThatPushesIt) {
+TEST(DynamicBodies, ASleepingBoxIsWokenByADoorOfAnySpeedThatPushesIt) {
   for (const double speed : {0.5, 1.0, 1.05, 5.0}) {
     Model model = loose({{"box", {0.5, 0.0005, 0.1}, {0.8, 0.3, 0.4}}},
                         {{"leaf", {0, 0.01, -0.02}, {1, 2.1, 0.02}}});
     BodySpec door = bodySpec("door", BodyKind::hinged, {1});
     door.low = -1.5, door.high = 1.5, door.speed = speed;
     model.bodies.push_back(door);
-    BodyTrial t(std::move(model));
+    BodyFixture t(std::move(model));
     t.ticks(120);
     ASSERT_TRUE(t.body("box").asleep);
     const Vec3 before = t.body("box").position;
-    t.tell({"door", BodyCommand::Action::to, -1.2, 0, {}});
+    t.submit({"door", BodyCommand::Action::moveTo, -1.2, 0, {}});
     for (int i = 0; i < 180; ++i) {
-      const std::uint32_t squeezed = t.step().squeezedBodies;
-      // A quick leaf's way is not proved clear of what it takes along; it is clear all the same.
+      const std::uint32_t squeezed = t.step().crushedBodies;
+      // The motion of a fast leaf is not proven clear of the bodies that it carries along, but it
+      // is clear.
       if (speed < 2) {
         EXPECT_EQ(squeezed, 0u) << speed << " tick " << i;
       }
       ASSERT_FALSE(anyBodyPenetrates(t.world)) << speed << " tick " << i;
     }
     EXPECT_GT((t.body("box").position - before).norm(), 0.2) << speed;
-    // On the side of the leaf to which it was pushed.
+    // The box stays on the side of the leaf to which it was pushed.
     const Body& leaf = t.body("door");
     const Vec3 seen = leaf.rotation.transpose() * (t.body("box").position - leaf.position);
     EXPECT_GT(seen.z(), 0.02) << speed;
   }
 }
 
-/// A shuttle that goes back and forth along `way`, and presses boxes against a post.
+/// A shuttle that moves back and forth along `way` and presses boxes against a post.
 Model pressing(const std::vector<NamedBox>& boxes, const Vec3& way, double seconds) {
   Model model =
       loose(boxes, {{"post", {2, 0, -1}, {2.2, 2, 2}}, {"shuttle", {-1, 0.01, 0}, {0, 0.6, 1}}});
@@ -259,16 +265,16 @@ Model pressing(const std::vector<NamedBox>& boxes, const Vec3& way, double secon
   return model;
 }
 
-/// Six laps: nobody comes into the post or is flung; after the first lap none goes farther than
-/// `astray` metres. Returns how many pairs were squeezed.
-std::uint32_t pressSixTimes(BodyTrial& t, double seconds, double astray) {
+/// Runs six laps. No box penetrates the post or is flung away; after the first lap none is farther
+/// than `astray` metres from its start. Returns the number of crushed pairs.
+std::uint32_t pressSixTimes(BodyFixture& t, double seconds, double astray) {
   std::uint32_t squeezed = 0;
   std::vector<Vec3> held;
   const int lap = static_cast<int>(120 * seconds);
   for (int i = 0; i < 6 * lap; ++i) {
-    squeezed += tick(t.world).squeezedBodies;
-    for (std::size_t k = 0; k + 1 < t.world.state().bodies.size(); ++k) {
-      const Body& box = t.world.state().bodies[k];
+    squeezed += tickWorld(t.world).crushedBodies;
+    for (std::size_t k = 0; k + 1 < t.world.data().bodies.size(); ++k) {
+      const Body& box = t.world.data().bodies[k];
       EXPECT_FALSE(isIn(t.world, box, 1)) << box.spec->name << " in the post, tick " << i;
       EXPECT_LT(box.velocity.norm(), 1.5) << box.spec->name << " flung, tick " << i;
       if (i == lap) held.push_back(box.position);
@@ -281,40 +287,40 @@ std::uint32_t pressSixTimes(BodyTrial& t, double seconds, double astray) {
   return squeezed;
 }
 
-TEST(RigidBodies, AShuttleThatPressesABoxAgainstAPostGoesThroughItAndLeavesItThere) {
-  // How far the shuttle comes, metres: a little into the box, past its middle, past the post.
+TEST(DynamicBodies, AShuttleThatPressesABoxAgainstAPostGoesThroughItAndLeavesItThere) {
+  // Travel of the shuttle in metres: a little into the box, past its middle, past the post.
   for (const double far : {1.6, 2.0, 2.3}) {
-    BodyTrial t(pressing({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {far, 0, 0}, far));
+    BodyFixture t(pressing({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {far, 0, 0}, far));
     EXPECT_GT(pressSixTimes(t, far, 0.02), 0u) << far;
     EXPECT_NEAR(t.body("box").position.x(), 1.75, 0.02) << far;
   }
 }
 
-TEST(RigidBodies, AShuttleThatPressesBoxesInARowFlingsNoneOfThem) {
+TEST(DynamicBodies, AShuttleThatPressesARowOfBoxesEjectsNoBox) {
   for (const double far : {1.2, 1.6, 2.5}) {
-    BodyTrial t(pressing({{"first", {0.3, 0.0005, 0.2}, {0.7, 0.5, 0.7}},
-                          {"second", {0.9, 0.0005, 0.25}, {1.3, 0.4, 0.75}}},
-                         {far, 0, 0}, far));
+    BodyFixture t(pressing({{"first", {0.3, 0.0005, 0.2}, {0.7, 0.5, 0.7}},
+                            {"second", {0.9, 0.0005, 0.25}, {1.3, 0.4, 0.75}}},
+                           {far, 0, 0}, far));
     EXPECT_GT(pressSixTimes(t, far, 0.1), 0u) << far;
   }
 }
 
-TEST(RigidBodies, AShuttleThatGoesAslantTakesNoneAlongThatItWentInto) {
+TEST(DynamicBodies, AnObliqueShuttleCarriesNoPenetratedBox) {
   for (const double aside : {-0.4, 0.1, 0.4}) {
-    BodyTrial t(pressing({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {2.2, 0, aside}, 2.2));
+    BodyFixture t(pressing({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {2.2, 0, aside}, 2.2));
     EXPECT_GT(pressSixTimes(t, 2.2, 0.1), 0u) << aside;
   }
 }
 
-TEST(RigidBodies, AWorldTakenUpAgainWhileABoxIsPressedGoesOnAsItWould) {
-  BodyTrial t(pressing({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {2, 0, 0}, 2));
-  while (t.world.snapshot()->tick < 115) tick(t.world);
-  World again = worldFrom(t.world.state().scene, checkpointOf(t.world));
+TEST(DynamicBodies, AWorldRestoredWhileABoxIsPressedContinuesIdentically) {
+  BodyFixture t(pressing({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {2, 0, 0}, 2));
+  while (t.world.snapshot()->tick < 115) tickWorld(t.world);
+  World again = restoreWorld(t.world.data().scene, makeCheckpoint(t.world));
   for (int i = 0; i < 60; ++i)
-    ASSERT_EQ(tick(again).snapshot->stateHash, tick(t.world).snapshot->stateHash) << i;
+    ASSERT_EQ(tickWorld(again).snapshot->stateHash, tickWorld(t.world).snapshot->stateHash) << i;
 }
 
-TEST(RigidBodies, AStackThatSleepsOnALiftIsLiftedAsOne) {
+TEST(DynamicBodies, AStackThatSleepsOnALiftIsLiftedAsOne) {
   for (const int boxes : {1, 2, 5}) {
     std::vector<NamedBox> stack;
     for (int i = 0; i < boxes; ++i) {
@@ -325,18 +331,18 @@ TEST(RigidBodies, AStackThatSleepsOnALiftIsLiftedAsOne) {
     BodySpec lift = bodySpec("lift", BodyKind::lift, {1});
     lift.stops = {0, 2}, lift.high = 2;
     model.bodies.push_back(lift);
-    BodyTrial t(std::move(model));
+    BodyFixture t(std::move(model));
     t.ticks(240);
     ASSERT_TRUE(t.body("b0").asleep);
-    t.tell({"lift", BodyCommand::Action::to, 2, 0, {}});
-    t.ticks(240);  // each asks for no penetration
+    t.submit({"lift", BodyCommand::Action::moveTo, 2, 0, {}});
+    t.ticks(240);  // checks for penetration after each tick
     for (int i = 0; i < boxes; ++i)
       EXPECT_NEAR(t.body("b" + std::to_string(i)).position.y(), 2.35 + 0.5 * i, 0.01) << boxes;
   }
 }
 
-/// Somebody on a stack of crates on a lift that goes up by two metres.
-BodyTrial onCratesOnALift(int crates, const std::vector<NamedBox>& still = {}) {
+/// An avatar on a stack of crates on a lift that rises by two metres.
+BodyFixture onCratesOnALift(int crates, const std::vector<NamedBox>& still = {}) {
   std::vector<NamedBox> stack;
   for (int i = 0; i < crates; ++i) {
     const double low = 0.101 + 0.501 * i;
@@ -348,16 +354,16 @@ BodyTrial onCratesOnALift(int crates, const std::vector<NamedBox>& still = {}) {
   BodySpec lift = bodySpec("lift", BodyKind::lift, {1});
   lift.stops = {0, 2}, lift.high = 2, lift.speed = 1.5;
   model.bodies.push_back(lift);
-  BodyTrial t(std::move(model));
-  t.order("ann", Spawn{.at = {0, 0.102 + 0.501 * crates, 0}});
+  BodyFixture t(std::move(model));
+  t.order("ann", Spawn{.position = {0, 0.102 + 0.501 * crates, 0}});
   t.ticks(200);
-  t.tell({"lift", BodyCommand::Action::to, 2, 0, {}});
+  t.submit({"lift", BodyCommand::Action::moveTo, 2, 0, {}});
   return t;
 }
 
-TEST(RigidBodies, WhoStandsOnCratesOnALiftIsLiftedWithThem) {
+TEST(DynamicBodies, AvatarOnCratesOnALiftIsLifted) {
   for (const int crates : {1, 3}) {
-    BodyTrial t = onCratesOnALift(crates);
+    BodyFixture t = onCratesOnALift(crates);
     const double above = t.feet("ann").y() - t.body("b0").position.y();
     for (int i = 0; i < 240; ++i) {
       t.step();
@@ -367,17 +373,18 @@ TEST(RigidBodies, WhoStandsOnCratesOnALiftIsLiftedWithThem) {
     }
     EXPECT_NEAR(t.body("lift").position.y(), 2, 0.1);
     EXPECT_NEAR(t.body("b0").position.y(), 2.35, 0.01) << crates;
-    t.tell({"lift", BodyCommand::Action::to, 0, 0, {}});
+    t.submit({"lift", BodyCommand::Action::moveTo, 0, 0, {}});
     t.ticks(240);
     EXPECT_NEAR(t.body("b0").position.y(), 0.35, 0.01) << crates;
-    EXPECT_EQ(t.world.state().avatars.at("ann").standsOn,
+    EXPECT_EQ(t.world.data().findAvatarByName("ann")->groundEntity,
               t.body("b" + std::to_string(crates - 1)).id);
     EXPECT_EQ(whoPenetrates(t.world), "");
   }
 }
 
-TEST(RigidBodies, WhoWalksAndJumpsOnCratesThatRiseEndsInNone) {
-  // From the lift onto low crates and a higher one, and over the gap between two lifts.
+TEST(DynamicBodies, AvatarOnRisingCratesPenetratesNoCrate) {
+  // The avatar steps from the lift onto low crates, then a higher one, and over the gap between two
+  // lifts.
   const std::vector<NamedBox> crates{{"c0", {-1.5, 0.101, -1.2}, {-0.5, 0.35, 1.2}},
                                      {"c1", {-0.49, 0.101, -1.2}, {0.5, 0.35, 1.2}},
                                      {"c2", {0.51, 0.101, -1.2}, {1.5, 0.6, 1.2}},
@@ -389,33 +396,33 @@ TEST(RigidBodies, WhoWalksAndJumpsOnCratesThatRiseEndsInNone) {
     lift.stops = {0, 6}, lift.high = 6, lift.speed = object == 1 ? 1.5 : 1.4;
     model.bodies.push_back(lift);
   }
-  BodyTrial t(std::move(model));
-  t.order("ann", Spawn{.at = {-3, 0.102, -0.5}});
-  t.order("bob", Spawn{.at = {0, 0.352, 0.7}});
-  t.order("cid", Spawn{.at = {3, 0.302, 0}});
+  BodyFixture t(std::move(model));
+  t.order("ann", Spawn{.position = {-3, 0.102, -0.5}});
+  t.order("bob", Spawn{.position = {0, 0.352, 0.7}});
+  t.order("cid", Spawn{.position = {3, 0.302, 0}});
   t.ticks(60);
   t.order("ann", Drive{{1.4, 0, 0}});
   for (int i = 0; i < 5; ++i) t.order("bob", Jump{0.3, Vec3(0, 0, 0)});
-  for (const char* lift : {"lift", "cart"}) t.tell({lift, BodyCommand::Action::to, 6, 0, {}});
+  for (const char* lift : {"lift", "cart"}) t.submit({lift, BodyCommand::Action::moveTo, 6, 0, {}});
   double highest = 0;
   std::optional<World> again;
   for (int i = 0; i < 200; ++i) {
     const TickReport report = t.step();
-    ASSERT_EQ(report.squeezedBodies, 0u) << i;
+    ASSERT_EQ(report.crushedBodies, 0u) << i;
     ASSERT_EQ(whoPenetrates(t.world), "") << i;
     ASSERT_FALSE(anyBodyPenetrates(t.world)) << i;
     if (again) {
-      ASSERT_EQ(tick(*again).snapshot->stateHash, report.snapshot->stateHash) << i;
+      ASSERT_EQ(tickWorld(*again).snapshot->stateHash, report.snapshot->stateHash) << i;
     }
-    if (i == 50) again.emplace(worldFrom(t.world.state().scene, checkpointOf(t.world)));
+    if (i == 50) again.emplace(restoreWorld(t.world.data().scene, makeCheckpoint(t.world)));
     highest = std::max(highest, t.feet("ann").y() - t.body("lift").position.y());
   }
   EXPECT_GT(highest, 0.5) << "ann came onto the higher crate";
   EXPECT_GT(t.body("lift").position.y(), 4);
 }
 
-TEST(RigidBodies, ALiftStopsWhereWhoStandsOnACrateUponItHasNoRoom) {
-  BodyTrial t = onCratesOnALift(1, {{"ceiling", {-1, 2.9, -1}, {1, 3, 1}}});
+TEST(DynamicBodies, ALiftStopsIfAnAvatarOnItsCrateHasNoRoom) {
+  BodyFixture t = onCratesOnALift(1, {{"ceiling", {-1, 2.9, -1}, {1, 3, 1}}});
   for (int i = 0; i < 240; ++i) {
     t.step();
     ASSERT_EQ(whoPenetrates(t.world), "") << i;
@@ -423,10 +430,10 @@ TEST(RigidBodies, ALiftStopsWhereWhoStandsOnACrateUponItHasNoRoom) {
   }
   const double room = 2.9 - 1.75 - 0.601;  // over the crate
   EXPECT_NEAR(t.body("b0").position.y(), 0.351 + room, 0.02);
-  EXPECT_EQ(t.told(Event::blocked, "lift", "ann"), 1);
+  EXPECT_EQ(t.countEvents(Event::blocked, "lift", "ann"), 1);
 }
 
-TEST(RigidBodies, ARowOfBoxesAtRestIsPushedAsOneByAShuttle) {
+TEST(DynamicBodies, ARowOfBoxesAtRestIsPushedAsOneByAShuttle) {
   for (const double gap : {0.0004, 0.001, 0.01, 0.1})
     for (const double speed : {0.5, 2.0, 5.0}) {
       std::vector<NamedBox> row;
@@ -440,7 +447,7 @@ TEST(RigidBodies, ARowOfBoxesAtRestIsPushedAsOneByAShuttle) {
       shuttle.keys = {
           {0, Vec3::Zero(), 0}, {begins, Vec3::Zero(), 0}, {begins + 5 / speed, {5, 0, 0}, 0}};
       model.bodies.push_back(shuttle);
-      BodyTrial t(std::move(model));
+      BodyFixture t(std::move(model));
       t.ticks(static_cast<int>(60 * (begins + 5 / speed)) + 2);
       for (int i = 0; i < 3; ++i)
         EXPECT_GT(t.body("b" + std::to_string(i)).position.x(), 3.25 + 0.5 * i)
@@ -448,7 +455,7 @@ TEST(RigidBodies, ARowOfBoxesAtRestIsPushedAsOneByAShuttle) {
     }
 }
 
-TEST(RigidBodies, WhatAPathThatGoesRoundShakesIsNotWaitedFor) {
+TEST(DynamicBodies, BodiesThatALoopingPathShakesDoNotDelayIdle) {
   Model model =
       loose({{"box", {-0.2, 0.5006, -0.2}, {0.2, 0.9, 0.2}}, {"far", {5, 1, 5}, {5.4, 1.4, 5.4}}},
             {{"tray", {-1, 0.4, -1}, {1, 0.5, 1}}});
@@ -456,27 +463,27 @@ TEST(RigidBodies, WhatAPathThatGoesRoundShakesIsNotWaitedFor) {
   tray.keys = {{0, Vec3::Zero(), 0}, {0.05, {0, 0.01, 0}, 0}, {0.1, Vec3::Zero(), 0}};
   tray.loops = true;
   model.bodies.push_back(tray);
-  BodyTrial t(std::move(model));
+  BodyFixture t(std::move(model));
   EXPECT_FALSE(t.step().idle) << "one box falls";
   t.ticks(200);
   EXPECT_TRUE(t.step().idle);
   EXPECT_FALSE(t.body("box").asleep);
-  t.tell({"tray", BodyCommand::Action::stop, 0, 0, {}});
+  t.submit({"tray", BodyCommand::Action::stop, 0, 0, {}});
   EXPECT_FALSE(t.step().idle);
   t.untilIdle();
   EXPECT_TRUE(t.body("box").asleep);
 }
 
-TEST(RigidBodies, AFastPlateTakesASleepingBoxAlong) {
+TEST(DynamicBodies, AFastPlateCarriesASleepingBox) {
   Model model = loose({{"box", {0.5, 0.0005, -0.2}, {0.9, 0.4, 0.2}}},
                       {{"plate", {0.43, 0.01, -1}, {0.48, 1, 1}}});
   BodySpec plate = bodySpec("plate", BodyKind::sliding, {1});
   plate.axis = Vec3::UnitX(), plate.low = 0, plate.high = 3, plate.speed = 10;
   model.bodies.push_back(plate);
-  BodyTrial t(std::move(model));
+  BodyFixture t(std::move(model));
   t.ticks(120);
   ASSERT_TRUE(t.body("box").asleep);
-  t.tell({"plate", BodyCommand::Action::open, 0, 0, {}});
+  t.submit({"plate", BodyCommand::Action::open, 0, 0, {}});
   for (int i = 0; i < 60; ++i) {
     t.step();
     ASSERT_FALSE(anyBodyPenetrates(t.world)) << i;
@@ -484,28 +491,29 @@ TEST(RigidBodies, AFastPlateTakesASleepingBoxAlong) {
   EXPECT_GT(t.body("box").position.x(), 3.48 + 0.2);
 }
 
-TEST(RigidBodies, ABoxHeldBetweenAnAvatarAndAWallComesToRestAndIsToldAsTouched) {
+TEST(DynamicBodies, ABoxBetweenAnAvatarAndAWallComesToRestInContact) {
   Model model =
       loose({{"box", {1, 0.0005, -0.2}, {1.4, 0.4, 0.2}}}, {{"wall", {2, 0, -3}, {2.2, 3, 3}}});
   model.bodies[0].mass = 10;
-  BodyTrial t(std::move(model));
-  t.order("ann", Spawn{.at = {0, 0.001, 0}});
+  BodyFixture t(std::move(model));
+  t.order("ann", Spawn{.position = {0, 0.001, 0}});
   t.order("ann", Walk{{{3, 0, 0}}, 1.3});
   t.untilIdle();
   EXPECT_TRUE(t.body("box").asleep);
-  ASSERT_GE(t.told(Event::begin, "ann", "box"), 1);
+  ASSERT_GE(t.countEvents(Event::begin, "ann", "box"), 1);
   const auto hit = std::find_if(t.events.begin(), t.events.end(), [&](const ContactEvent& e) {
-    return e.kind == Event::begin && nameOf(t.world, e.b) == "box" && nameOf(t.world, e.a) == "ann";
+    return e.kind == Event::begin && findEntityName(t.world, e.b) == "box" &&
+           findEntityName(t.world, e.a) == "ann";
   });
-  EXPECT_LT(hit->time, 0.8) << "told only when the box was stuck";
-  EXPECT_LT(hit->decision.distance, 2 * t.world.lengths().epsilon);
+  EXPECT_LT(hit->time, 0.8) << "reported only after the box was stuck";
+  EXPECT_LT(hit->separation.distance, 2 * t.world.settings().contactOffset);
 }
 
-TEST(RigidBodies, ABoxThatSleepsOnSomeonesHeadFallsWhenHeGoesOrLeavesOrCrouches) {
+TEST(DynamicBodies, ABoxThatSleepsOnSomeonesHeadFallsWhenHeGoesOrLeavesOrCrouches) {
   for (int how = 0; how < 3; ++how) {
     Model model = loose({{"box", {-0.4, 1.76, -0.4}, {0.4, 2.0, 0.4}}});
-    BodyTrial t(std::move(model));
-    t.order("ann", Spawn{.at = {0, 0.001, 0}});
+    BodyFixture t(std::move(model));
+    t.order("ann", Spawn{.position = {0, 0.001, 0}});
     t.untilIdle();
     const double height = t.body("box").position.y();
     ASSERT_TRUE(t.body("box").asleep) << how << " " << t.body("box").position.transpose();
@@ -521,33 +529,33 @@ TEST(RigidBodies, ABoxThatSleepsOnSomeonesHeadFallsWhenHeGoesOrLeavesOrCrouches)
   }
 }
 
-TEST(RigidBodies, WhoComesAndGoesLeavesNothingBehind) {
-  BodyTrial t(loose({{"box", {0.5, 0.0005, -0.2}, {0.9, 0.4, 0.2}}}));
+TEST(DynamicBodies, AvatarsThatLeaveFreeTheirMemory) {
+  BodyFixture t(loose({{"box", {0.5, 0.0005, -0.2}, {0.9, 0.4, 0.2}}}));
   std::size_t most = 0;
   for (int i = 0; i < 30; ++i) {
-    t.order("ann", Spawn{.at = {0, 0.001, 0}});
+    t.order("ann", Spawn{.position = {0, 0.001, 0}});
     t.order("ann", Walk{{{0.3, 0, 0}}, 1});
     t.ticks(20);
     t.order("ann", Leave{});
     t.ticks(3);
-    const std::size_t solids = t.world.state().rigids.dynamics.solids.size();
+    const std::size_t solids = t.world.data().dynamicBodies.physicsWorld.bodies.size();
     if (i == 0) most = solids;
     EXPECT_LE(solids, most) << i;
   }
 }
 
-TEST(RigidBodies, ABodyThatFallsOutOfTheWorldIsToldAndTakenOut) {
-  BodyTrial t(loose({{"box", {12, 1, 0}, {12.4, 1.4, 0.4}}}));
+TEST(DynamicBodies, ABodyThatFallsOutOfTheWorldIsReportedAndRemoved) {
+  BodyFixture t(loose({{"box", {12, 1, 0}, {12.4, 1.4, 0.4}}}));
   t.ticks(400);
-  EXPECT_EQ(t.told(Event::leftWorld, "box", ""), 1);
+  EXPECT_EQ(t.countEvents(Event::leftWorld, "box", ""), 1);
   const Body& box = t.body("box");
-  EXPECT_TRUE(box.left);
+  EXPECT_TRUE(box.outOfWorld);
   const Vec3 caught = box.position;
   EXPECT_TRUE(t.step().idle);
   EXPECT_EQ(t.body("box").position, caught);
 }
 
-/// A tray that comes back to where it was in every tick, with a box on it.
+/// A tray that returns to its start within every tick, with a box on it.
 Model shaker(double amplitude) {
   Model model = boxModel({floorBox(),
                           {"tray", {-0.5, 0.2, -0.5}, {0.5, 0.25, 0.5}},
@@ -561,8 +569,8 @@ Model shaker(double amplitude) {
   return model;
 }
 
-TEST(RigidBodies, ATrayThatShakesWithinATickThrowsWhatLiesOnIt) {
-  BodyTrial still(shaker(0)), shaken(shaker(1e-3));
+TEST(DynamicBodies, ATrayThatShakesWithinATickThrowsItsLoad) {
+  BodyFixture still(shaker(0)), shaken(shaker(1e-3));
   double highest = 0;
   for (int i = 0; i < 200; ++i) {
     still.step();
@@ -576,37 +584,37 @@ TEST(RigidBodies, ATrayThatShakesWithinATickThrowsWhatLiesOnIt) {
   EXPECT_GT(highest, still.body("box").position.y() + 0.5e-3);
 }
 
-/// A block of 1 m that goes 0.2 m along x and back in each tick, and something free.
+/// A block of 1 m that moves 0.2 m along x and back within each tick, and a dynamic box.
 Model ram(const NamedBox& box) {
   Model model = boxModel({floorBox(), {"ram", {-1, 0.1, -0.5}, {0, 1.1, 0.5}}, box});
   BodySpec spec = bodySpec("ram", BodyKind::path, {1});
   spec.keys = {{0, Vec3::Zero(), 0}, {1.0 / 120, {0.2, 0, 0}, 0}, {1.0 / 60, Vec3::Zero(), 0}};
   spec.loops = true;
-  spec.runs = false;
+  spec.autoStart = false;
   model.bodies = {spec, bodySpec(box.path, BodyKind::rigid, {2})};
   return model;
 }
 
-TEST(RigidBodies, ASleepingBoxIsWokenByWhatReachesItAndIsBackWithinATick) {
-  BodyTrial t(ram({"box", {0.1, 0, -0.2}, {0.5, 0.4, 0.2}}));
+TEST(DynamicBodies, ABodyThatReachesASleepingBoxWithinATickWakesIt) {
+  BodyFixture t(ram({"box", {0.1, 0, -0.2}, {0.5, 0.4, 0.2}}));
   t.ticks(120);
   ASSERT_TRUE(t.body("box").asleep);
-  t.tell({"ram", BodyCommand::Action::run, 0, 0, {}});
+  t.submit({"ram", BodyCommand::Action::run, 0, 0, {}});
   t.ticks(30);
   EXPECT_GT(t.body("box").position.x(), 0.4) << "0.1 m farther than it was at least";
   EXPECT_FALSE(anyBodyPenetrates(t.world));
 }
 
-TEST(RigidBodies, ABoxSleepsOnAThingWhosePathIsBlocked) {
+TEST(DynamicBodies, ABoxSleepsOnABlockedPathBody) {
   Model model = ram({"box", {-0.7, 1.1, -0.2}, {-0.3, 1.5, 0.2}});
   model.bodies[0].keys[1].offset = {0.2, 0, 0};
   model.bodies[0].keys[1].time = 1, model.bodies[0].keys[2].time = 2;
   model.meshes.push_back(boxMesh({0.7, 0, -2}, {0.8, 3, 2}));
   model.objects.push_back({"wall", "", {3}, Eigen::Affine3d::Identity()});
-  BodyTrial t(std::move(model));
-  t.order("ann", Spawn{.at = {0.35, 0.01, 0}});
+  BodyFixture t(std::move(model));
+  t.order("ann", Spawn{.position = {0.35, 0.01, 0}});
   t.ticks(60);
-  t.tell({"ram", BodyCommand::Action::run, 0, 0, {}});
+  t.submit({"ram", BodyCommand::Action::run, 0, 0, {}});
   t.ticks(240);
   EXPECT_NE(t.body("ram").blockedBy, 0u);
   EXPECT_TRUE(t.body("box").asleep);
@@ -614,41 +622,42 @@ TEST(RigidBodies, ABoxSleepsOnAThingWhosePathIsBlocked) {
   EXPECT_TRUE(t.body("box").asleep);
 }
 
-TEST(RigidBodies, TwoRunsHaveOneHash) {
+TEST(DynamicBodies, TwoRunsHaveOneHash) {
   const auto run = [] {
-    BodyTrial t(loose({{"a", {0, 1, 0}, {0.4, 1.4, 0.4}}, {"b", {0.1, 2, 0.1}, {0.5, 2.3, 0.6}}}));
-    t.order("ann", Spawn{.at = {2, 0.001, 0}});
+    BodyFixture t(
+        loose({{"a", {0, 1, 0}, {0.4, 1.4, 0.4}}, {"b", {0.1, 2, 0.1}, {0.5, 2.3, 0.6}}}));
+    t.order("ann", Spawn{.position = {2, 0.001, 0}});
     t.step();
     t.order("ann", Drive{{-1, 0, 0}});
     t.ticks(200);
-    return t.world.state().hash;
+    return t.world.data().hash;
   };
   EXPECT_EQ(run(), run());
 }
 
-TEST(RigidBodies, ManyTellTheSameWithAnyNumberOfThreads) {
+TEST(DynamicBodies, EventsDoNotDependOnTheNumberOfThreads) {
   std::vector<NamedBox> boxes;
   for (int i = 0; i < 90; ++i) {
     const double x = 0.35 * (i % 5) + 0.02 * (i / 25), y = 0.1 + 0.4 * (i / 25);
     const double z = 0.35 * (i / 5 % 5) + 0.01 * (i % 7);
     boxes.push_back({"box" + std::to_string(i), {x, y, z}, {x + 0.3, y + 0.3, z + 0.3}});
   }
-  struct Told {
+  struct Run {
     std::vector<std::tuple<std::uint64_t, Event, EntityId, EntityId, double>> events;
     std::vector<std::uint8_t> state;
-    bool operator==(const Told&) const = default;
+    bool operator==(const Run&) const = default;
   };
   const auto run = [&](int threads) {
-    BodyTrial t(loose(boxes));
-    setThreads(t.world, threads);
-    Told told;
+    BodyFixture t(loose(boxes));
+    setSolverThreadCount(t.world, threads);
+    Run result;
     for (int i = 0; i < 90; ++i)
-      for (const ContactEvent& e : tick(t.world).contacts)
-        told.events.emplace_back(e.tick, e.kind, e.a, e.b, e.decision.distance);
-    told.state = checkpointOf(t.world);
-    return told;
+      for (const ContactEvent& e : tickWorld(t.world).contacts)
+        result.events.emplace_back(e.tick, e.kind, e.a, e.b, e.separation.distance);
+    result.state = makeCheckpoint(t.world);
+    return result;
   };
-  const Told alone = run(1);
+  const Run alone = run(1);
   EXPECT_GT(alone.events.size(), 150u);
   EXPECT_EQ(alone, run(2));
   EXPECT_EQ(alone, run(3));

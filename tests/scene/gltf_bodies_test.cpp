@@ -1,4 +1,4 @@
-// What a glTF file tells of bodies: extras of nodes, and the physics extension.
+// Tests of bodies declared in glTF: node extras and the physics extension.
 #include <gtest/gtest.h>
 
 #include "scene/import/bodies/collect_bodies.hpp"
@@ -18,8 +18,8 @@ using tests::TemporaryFolder;
 
 constexpr double kQuarter = 1.5707963267948966;
 
-/// A file of boxes of one metre with these nodes, all of them roots; `more`: members of the
-/// document.
+/// Imports a glTF file of one-metre boxes with these nodes, all of them roots. `more`: further
+/// members of the document.
 Model modelOf(const std::string& roots, const std::string& nodes, const std::string& more = "") {
   const TemporaryFolder folder;
   std::string text = gltf(BoxMesh({1, 1, 1}), roots, nodes);
@@ -37,13 +37,13 @@ std::string failureOf(const std::string& extras) {
 }
 
 std::size_t countOf(const Model& model, const std::string& kind) {
-  for (const Problem& problem : model.problems)
+  for (const Diagnostic& problem : model.diagnostics)
     if (problem.kind == kind) return problem.count;
   return 0;
 }
 
-std::string toldOf(const Model& model, const std::string& kind) {
-  for (const Problem& problem : model.problems)
+std::string diagnosticText(const Model& model, const std::string& kind) {
+  for (const Diagnostic& problem : model.diagnostics)
     if (problem.kind == kind) return problem.example;
   return "";
 }
@@ -62,7 +62,7 @@ std::uint32_t objectOf(const Model& model, const std::string& path) {
 
 // ---- extras -------------------------------------------------------------------------------------
 
-TEST(Extras, SayWhatANodeAndAllBelowItAre) {
+TEST(Extras, DescribeANodeAndItsDescendants) {
   // The node's y axis lies along the scene's x.
   const Model model = modelOf(
       "0", R"({"name":"door","translation":[5,0,0],"rotation":[0,0,-0.7071067811865476,)"
@@ -81,7 +81,7 @@ TEST(Extras, SayWhatANodeAndAllBelowItAre) {
   EXPECT_NO_THROW(Scene{Model(model)});
 }
 
-TEST(Extras, TheNearestNodeHasTheSayAndStillIsSaidToo) {
+TEST(Extras, TheNearestNodeWinsAndMayBeStatic) {
   const Model model = modelOf(
       "0", R"({"name":"lift","children":[1,2,3],"extras":{"walk_kind":"lift","walk_stops":[0,3]}},)"
            R"({"name":"car","mesh":0},)"
@@ -104,7 +104,7 @@ TEST(Extras, MistakesNameTheFileTheNodeAndTheField) {
   has(failureOf(R"({"walk_kind":"rigid","walk_mass":-1})"), "mass is -1");
 }
 
-TEST(Extras, WithoutAKindMakeNoBodyAndAreTold) {
+TEST(Extras, WithoutAKindAreReportedAndDefineNoBody) {
   const Model model = modelOf("0", R"({"name":"a","mesh":0,"extras":{"walk_speed":3}})");
   EXPECT_TRUE(model.bodies.empty());
   EXPECT_EQ(countOf(model, "extras_without_kind"), 1u);
@@ -142,30 +142,31 @@ TEST(Physics, ADynamicNodeIsAFreeBodyOfItsMassVelocityAndMaterial) {
   EXPECT_EQ(crate.mass, 7.0);
   EXPECT_EQ(crate.friction, 0.25);
   EXPECT_EQ(crate.restitution, 0.5);
-  EXPECT_EQ(countOf(model, "unsupported_physics"), 0u) << toldOf(model, "unsupported_physics");
-  testing::BodyTrial trial(Model{model});
-  trial.ticks(6);
-  EXPECT_NEAR(trial.body("crate").velocity.x(), 1, 1e-9) << "flies on as it began";
-  EXPECT_LT(trial.body("crate").velocity.y(), 0);
+  EXPECT_EQ(countOf(model, "unsupported_physics"), 0u)
+      << diagnosticText(model, "unsupported_physics");
+  testing::BodyFixture run(Model{model});
+  run.ticks(6);
+  EXPECT_NEAR(run.body("crate").velocity.x(), 1, 1e-9) << "keeps its initial velocity";
+  EXPECT_LT(run.body("crate").velocity.y(), 0);
 }
 
-TEST(Physics, AShapeIsSolidAndWhatIsDrawnInItsPlaceIsNot) {
+TEST(Physics, ACollisionShapeIsSolidAndItsVisualMeshIsNot) {
   const Model model =
       modelOf("0",
               R"({"name":"ball","mesh":0,)" +
                   physics(R"("motion":{},"collider":{"geometry":{"shape":0}})") + "}",
               document("", R"({"type":"sphere","sphere":{"radius":2}})"));
   ASSERT_EQ(model.objects.size(), 2u);
-  EXPECT_EQ(model.objects[0].use, Object::Use::drawn);
-  EXPECT_EQ(model.objects[1].use, Object::Use::solid);
+  EXPECT_EQ(model.objects[0].usage, Object::Usage::visualOnly);
+  EXPECT_EQ(model.objects[1].usage, Object::Usage::collisionOnly);
   EXPECT_EQ(model.objects[1].path, "ball/collider");
-  EXPECT_EQ(model.objects[1].pieceOf, 0u);
+  EXPECT_EQ(model.objects[1].partOf, 0u);
   ASSERT_EQ(model.bodies.size(), 1u);
   EXPECT_EQ(model.bodies[0].objects, (std::vector<std::uint32_t>{0, 1}));
   const Scene scene{Model(model)};
-  const BodyShape& shape = *scene.shapeOfBody(0);
+  const BodyShape& shape = *scene.bodyShape(0);
   ASSERT_EQ(shape.parts.size(), 1u) << "one hull";
-  EXPECT_EQ(shape.approximate, 0u);
+  EXPECT_EQ(shape.approximateCount, 0u);
   EXPECT_NEAR(shape.volume, 4.0 / 3 * 3.14159265 * 8, 1) << "a polytope of the ball's size";
   EXPECT_NEAR(shape.box.size().y(), 4, 1e-6);
 }
@@ -182,19 +183,19 @@ TEST(Physics, EachImplicitShapeIsConvexAndHasItsSize) {
                R"({"type":"capsule","capsule":{"height":2,"radiusTop":0.5,"radiusBottom":0.5}},)"
                R"({"type":"cylinder","cylinder":{"height":2,"radiusTop":1,"radiusBottom":0.5}})"));
   ASSERT_EQ(model.objects.size(), 6u);
-  EXPECT_TRUE(model.bodies.empty()) << "colliders without motion stand";
+  EXPECT_TRUE(model.bodies.empty()) << "colliders without motion are static";
   const Scene scene{Model(model)};
   const std::map<std::string, Vec3> sizes{{"box/collider", {1, 2, 3}},
                                           {"capsule/collider", {1, 3, 1}},
                                           {"cylinder/collider", {2, 2, 2}}};
-  EXPECT_EQ(scene.solidObjects().size(), 3u) << "what is drawn is not solid";
+  EXPECT_EQ(scene.solidObjects().size(), 3u) << "a drawn mesh is not solid";
   for (const auto& [path, size] : sizes) {
     const std::uint32_t object = objectOf(model, path);
-    EXPECT_EQ(scene.parts(object).hullCount(), 1u) << path;
-    EXPECT_EQ(scene.parts(object).size(), 1u) << path;
-    Box box;
-    for (std::uint32_t i = 0; i < scene.parts(object).size(); ++i)
-      box.include(scene.parts(object).box(i));
+    EXPECT_EQ(scene.collisionGeometry(object).hullCount(), 1u) << path;
+    EXPECT_EQ(scene.collisionGeometry(object).size(), 1u) << path;
+    Aabb box;
+    for (std::uint32_t i = 0; i < scene.collisionGeometry(object).size(); ++i)
+      box.include(scene.collisionGeometry(object).box(i));
     EXPECT_LT((box.size() - size).norm(), 0.02) << path << " " << box.size().transpose();
   }
 }
@@ -217,11 +218,11 @@ TEST(Physics, AJointWithOneAngleLeftIsAHinge) {
   const std::string limits =
       kAtPoint + R"(,{"angularAxes":[0,2],"max":0},{"angularAxes":[1],"min":-0.5,"max":1})";
   const Model model = hinged(limits);
-  ASSERT_EQ(model.bodies.size(), 1u) << toldOf(model, "unsupported_physics");
+  ASSERT_EQ(model.bodies.size(), 1u) << diagnosticText(model, "unsupported_physics");
   EXPECT_EQ(model.bodies[0].kind, BodyKind::hinged);
   EXPECT_EQ(model.bodies[0].axis, Vec3(0, 1, 0));
   EXPECT_EQ(model.bodies[0].anchor, Vec3(0, 1, 0));
-  // The joint's angle is the frame's in the door.
+  // The joint's angle is that of the frame relative to the door.
   EXPECT_EQ(model.bodies[0].low, -1);
   EXPECT_EQ(model.bodies[0].high, 0.5);
   EXPECT_EQ(model.bodies[0].openedBy, OpenedBy::touch);
@@ -235,17 +236,18 @@ TEST(Physics, AJointWithOneDistanceLeftIsASlider) {
   const Model model = hinged(R"({"linearAxes":[1,2],"max":0},{"linearAxes":[0],"min":0,"max":2},)"
                              R"({"angularAxes":[0,1,2],"max":0})",
                              true);
-  ASSERT_EQ(model.bodies.size(), 1u) << toldOf(model, "unsupported_physics");
+  ASSERT_EQ(model.bodies.size(), 1u) << diagnosticText(model, "unsupported_physics");
   EXPECT_EQ(model.bodies[0].kind, BodyKind::sliding);
   EXPECT_EQ(model.bodies[0].axis, Vec3(1, 0, 0));
   EXPECT_EQ(model.bodies[0].high, 2);
 }
 
-TEST(Physics, WhatCannotBeHadIsToldAndTheRestLoads) {
+TEST(Physics, UnsupportedPartsAreReportedAndTheRestLoads) {
   const Model ball = hinged(kAtPoint);  // all angles free
   EXPECT_EQ(bodyOf(ball, "door").kind, BodyKind::rigid);
-  EXPECT_NE(toldOf(ball, "unsupported_physics").find("node 'door/hinge'"), std::string::npos)
-      << toldOf(ball, "unsupported_physics");
+  EXPECT_NE(diagnosticText(ball, "unsupported_physics").find("node 'door/hinge'"),
+            std::string::npos)
+      << diagnosticText(ball, "unsupported_physics");
   const Model kinematic =
       modelOf("0", R"({"name":"a","mesh":0,)" + physics(R"("motion":{"isKinematic":true})") + "}");
   EXPECT_TRUE(kinematic.bodies.empty());
@@ -257,7 +259,7 @@ TEST(Physics, WhatCannotBeHadIsToldAndTheRestLoads) {
               R"("motion":{"mass":-3,"centerOfMass":[0,1,0]},"collider":{"geometry":{"shape":7},)"
               R"("physicsMaterial":"steel"},"joint":{"joint":[],"connectedNode":-1})") +
           "}");
-  EXPECT_TRUE(senseless.bodies.empty()) << "a mass below zero";
+  EXPECT_TRUE(senseless.bodies.empty()) << "a negative mass";
   EXPECT_EQ(countOf(senseless, "unsupported_physics"), 4u);
   EXPECT_NO_THROW(Scene{Model(senseless)});
 }
@@ -271,7 +273,7 @@ TEST(Physics, ATriggerIsNeitherSolidNorDrawn) {
   EXPECT_EQ(model.bodies[0].kind, BodyKind::trigger);
   const Scene scene{Model(model)};
   EXPECT_EQ(scene.solidObjects(), std::vector<std::uint32_t>{0});
-  EXPECT_NEAR(scene.shapeOfBody(0)->box.centre().x() + scene.shapeOfBody(0)->origin.x(), 5, 1e-9);
+  EXPECT_NEAR(scene.bodyShape(0)->box.centre().x() + scene.bodyShape(0)->origin.x(), 5, 1e-9);
 }
 
 // ---- precedence ---------------------------------------------------------------------------------
@@ -291,13 +293,13 @@ TEST(Sources, TheHigherOneHasTheSayAndTheLowerOneAddsTheRest) {
       R"("still":["d-rigid"]})");
   Model model = importModel(file);
   EXPECT_EQ(model.bodies.size(), 4u);
-  findBodies(model, file);
+  collectBodies(model, file);
   ASSERT_EQ(model.bodies.size(), 3u);
   EXPECT_EQ(bodyOf(model, "mine").source, BodySource::sidecar);
   EXPECT_EQ(bodyOf(model, "a").mass, 2.0) << "the physics extension before extras";
   EXPECT_EQ(bodyOf(model, "b-rigid").mass, 3.0) << "extras before names";
   EXPECT_EQ(countOf(model, "replaced_bodies"), 3u);
-  EXPECT_EQ(sourcesOf(model), "1 of sidecar, 1 of khr, 1 of extras");
+  EXPECT_EQ(formatBodySources(model), "1 of sidecar, 1 of khr, 1 of extras");
 }
 
 TEST(Sources, BodiesOfTheFilePassThroughTheStream) {
@@ -319,9 +321,9 @@ TEST(Names, AShapeIsTheCollisionOfWhomItNames) {
       "0,1,2", R"({"name":"chair","mesh":0},{"name":"UCX_chair_01","mesh":0,"scale":[2,2,2]},)"
                R"({"name":"UCX_chair_02","mesh":0,"translation":[3,0,0]})");
   const Scene scene{Model(model)};
-  EXPECT_EQ(model.objects[0].use, Object::Use::drawn);
+  EXPECT_EQ(model.objects[0].usage, Object::Usage::visualOnly);
   EXPECT_EQ(scene.solidObjects(), (std::vector<std::uint32_t>{1, 2}));
-  EXPECT_EQ(model.objects[2].pieceOf, 0u);
+  EXPECT_EQ(model.objects[2].partOf, 0u);
   EXPECT_EQ(countOf(model, "collision_suffix"), 2u);
 }
 
@@ -329,23 +331,23 @@ TEST(Names, GodotsHintsAreKept) {
   const Model model = modelOf(
       "0,1,2,3", R"({"name":"wall-col","mesh":0},{"name":"lamp","mesh":0},)"
                  R"({"name":"lamp-colonly.001","mesh":0},{"name":"barrel-rigid.003","mesh":0})");
-  EXPECT_EQ(model.objects[0].use, Object::Use::whole);
-  EXPECT_EQ(model.objects[1].use, Object::Use::drawn);
-  EXPECT_EQ(model.objects[2].use, Object::Use::solid);
+  EXPECT_EQ(model.objects[0].usage, Object::Usage::both);
+  EXPECT_EQ(model.objects[1].usage, Object::Usage::visualOnly);
+  EXPECT_EQ(model.objects[2].usage, Object::Usage::collisionOnly);
   ASSERT_EQ(model.bodies.size(), 1u);
   EXPECT_EQ(model.bodies[0].source, BodySource::suffix);
   EXPECT_EQ(model.bodies[0].objects, std::vector<std::uint32_t>{3});
   EXPECT_EQ(countOf(model, "collision_suffix"), 3u);
 }
 
-TEST(Names, AShapeOfNobodyIsToldAndStaysSolid) {
+TEST(Names, AShapeWithoutAnObjectIsReportedAndStaysSolid) {
   const Model model =
       modelOf("0,1", R"({"name":"UCX_gone","mesh":0},{"name":"protocol","mesh":0})");
   EXPECT_EQ(countOf(model, "collision_shape_alone"), 1u);
   EXPECT_EQ(Scene{Model(model)}.solidObjects().size(), 2u);
 }
 
-TEST(Names, AShapeFollowsTheBodyOfWhomItStandsFor) {
+TEST(Names, AShapeFollowsTheBodyOfItsObject) {
   const TemporaryFolder folder;
   const auto file =
       folder.write("hall.gltf", gltf(BoxMesh({1, 1, 1}), "0,1",
@@ -353,11 +355,11 @@ TEST(Names, AShapeFollowsTheBodyOfWhomItStandsFor) {
   folder.write("hall.walk.json",
                R"({"walk":1,"bodies":[{"name":"c","kind":"rigid","objects":["chair"]}]})");
   Model model = importModel(file);
-  findBodies(model, file);
+  collectBodies(model, file);
   EXPECT_EQ(bodyOf(model, "c").objects, (std::vector<std::uint32_t>{0, 1}));
   const Scene scene(std::move(model));
   EXPECT_TRUE(scene.solidObjects().empty());
-  EXPECT_EQ(scene.shapeOfBody(0)->parts.size(), 1u) << "that of the shape alone";
+  EXPECT_EQ(scene.bodyShape(0)->parts.size(), 1u) << "the shape's name alone";
 }
 
 }  // namespace

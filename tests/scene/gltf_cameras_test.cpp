@@ -1,4 +1,4 @@
-// Cameras of files written here, whose places at each time are known.
+// Tests of glTF cameras whose pose is known at every time; the tests write the files.
 #include "scene/import/gltf/gltf_cameras.hpp"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ std::string base64(const std::string& bytes) {
   return text;
 }
 
-/// A glTF file with one camera below one node, to be animated.
+/// A glTF file with one camera below one node that can be animated.
 class GltfFile {
  public:
   GltfFile() {
@@ -94,7 +94,7 @@ TEST(GltfCamera, WithoutAnimationItIsOnePose) {
 TEST(GltfCamera, LinearKeysAreMixedAndTheNodesAboveMoveIt) {
   GltfFile file;
   file.animate(1, "translation", "LINEAR", {0, 1, 2}, {0, 0, 0, 0, 4, 0, 0, 4, 8});
-  // A quarter turn of the rig to the left within two seconds.
+  // The rig rotates by a quarter turn to the left within two seconds.
   const float h = std::sqrt(0.5f);
   file.animate(0, "rotation", "LINEAR", {0, 2}, {0, 0, 0, 1, 0, h, 0, h});
   const GltfCameraPath path = file.sample(2);
@@ -118,8 +118,8 @@ TEST(GltfCamera, StepKeysHoldAndTheFirstHoldsBeforeItself) {
 
 TEST(GltfCamera, CubicSplinesFollowTheirTangents) {
   GltfFile file;
-  // Hermite: from 0 to 0 in two seconds, leaving at 3 m/s and arriving at -3 m/s: at the middle
-  // h10 * 2 * 3 + h11 * 2 * (-3) = (0.125 + 0.125) * 6.
+  // Cubic Hermite spline from 0 to 0 in two seconds, with the tangents 3 m/s and -3 m/s: at the
+  // middle h10 * 2 * 3 + h11 * 2 * (-3) = (0.125 + 0.125) * 6.
   file.animate(1, "translation", "CUBICSPLINE", {0, 2},
                {0, 0, 0, 0, 0, 0, 0, 3, 0, 0, -3, 0, 0, 0, 0, 0, 0, 0});
   const GltfCameraPath path = file.sample(1);
@@ -129,7 +129,7 @@ TEST(GltfCamera, CubicSplinesFollowTheirTangents) {
   EXPECT_NEAR(path.poses[2].eye.y(), 0, 1e-12);
 }
 
-TEST(GltfCamera, TheNamedOneIsTakenAndElseTheOneThatMoves) {
+TEST(GltfCamera, TheNamedCameraIsUsedOtherwiseTheAnimatedOne) {
   GltfFile file;
   file.json()["nodes"].push_back({{"name", "still"}, {"camera", 0}});
   std::swap(file.json()["nodes"][1]["name"], file.json()["nodes"][2]["name"]);

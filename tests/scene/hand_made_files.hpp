@@ -1,4 +1,4 @@
-// Tiny model files that tests write for themselves.
+// Writers of small model files for tests: glTF, GLB.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ inline std::string base64(const std::string& bytes) {
   return text;
 }
 
-/// A box of twelve triangles, counter-clockwise outside, from (0,0,0) to `size`.
+/// A box of twelve triangles, counter-clockwise seen from outside, from (0, 0, 0) to `size`.
 struct BoxMesh {
   std::vector<std::array<float, 3>> positions;
   std::vector<std::uint16_t> indices{0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
@@ -51,7 +51,7 @@ struct BoxMesh {
 };
 
 /// glTF JSON with one mesh 0 of material 0. `scene`: the root nodes, as "0,1"; `nodes`: JSON
-/// objects; `material`: its members; `buffer`: the buffer's members besides byteLength.
+/// objects; `material`: its members; `buffer`: the buffer's members except byteLength.
 inline std::string gltfJson(const BoxMesh& mesh, const std::string& scene, const std::string& nodes,
                             const std::string& material, const std::string& buffer) {
   const std::string count = std::to_string(mesh.positions.size());

@@ -1,5 +1,5 @@
-// A storey with one wall, an opening in it and a door in that: small IFC files that tests write for
-// themselves, IFC2x3 or IFC4.
+// Writer of small IFC2x3 and IFC4 files for tests: a storey with one wall, an opening in the wall,
+// and a door in the opening.
 #pragma once
 
 #include <string>
@@ -8,17 +8,17 @@ namespace enfilade::tests {
 
 struct IfcHouse {
   std::string schema = "IFC4";
-  /// The lengths below are in this unit.
+  /// Unit of the lengths below.
   std::string unit = "IFCSIUNIT(*,.LENGTHUNIT.,.MILLI.,.METRE.)";
   double unitsPerMetre = 1000;
-  std::string offset = "0.,0.,0.";  ///< of the building, in units
-  bool voids = true;                ///< the opening is cut out of the wall
+  std::string offset = "0.,0.,0.";  ///< of the building, in length units
+  bool voids = true;                ///< whether the opening is cut out of the wall
   bool door = true;
-  std::string more;  ///< statements, numbers from 500 on
+  std::string more;  ///< further statements, numbered from #500
 
   std::string length(double metres) const { return std::to_string(metres * unitsPerMetre); }
 
-  /// A box with a corner at its placement, and the numbers id .. id + 9 for it.
+  /// A box with one corner at its placement; uses the numbers id .. id + 9.
   std::string box(int id, double width, double depth, double height) const {
     const auto n = [&](int k) { return "#" + std::to_string(id + k); };
     return n(0) + "=IFCCARTESIANPOINT((" + length(width / 2) + "," + length(depth / 2) + "));\n" +
@@ -72,11 +72,11 @@ struct IfcHouse {
     return t + more + "ENDSEC;\nEND-ISO-10303-21;\n";
   }
 
-  /// IFC2x3 insists on an owner of each thing, and assimp with it.
+  /// Adds owners: IFC2x3 requires an owner history for each entity, and assimp checks it.
   static std::string withOwners(std::string t) {
-    const std::string nobody = "',$,";
+    const std::string noOwner = "',$,";
     for (std::size_t at = t.find("'0000"); at != std::string::npos; at = t.find("'0000", at + 1)) {
-      if (t.compare(at + 23, nobody.size(), nobody) == 0) t.replace(at + 23, 4, "',#5,");
+      if (t.compare(at + 23, noOwner.size(), noOwner) == 0) t.replace(at + 23, 4, "',#5,");
     }
     return t +
            "#2=IFCPERSON($,$,'',$,$,$,$,$);\n#3=IFCORGANIZATION($,'x',$,$,$);\n"

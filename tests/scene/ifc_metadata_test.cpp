@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "scene/import/ifc/class_names.hpp"
 #include "scene/import/ifc/import_ifc.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
 
@@ -10,44 +11,44 @@ namespace {
 
 using tests::IfcHouse;
 
-const IfcProduct& productOf(const IfcFacts& facts, const std::string& ifcClass) {
+const IfcProduct& productOf(const IfcMetadata& facts, const std::string& ifcClass) {
   for (const IfcProduct& product : facts.products) {
     if (product.ifcClass == ifcClass) return product;
   }
   throw std::runtime_error("no " + ifcClass);
 }
 
-IfcFacts factsOf(const IfcHouse& house) {
-  return readIfcFacts(StepFile(house.text()));
+IfcMetadata factsOf(const IfcHouse& house) {
+  return readIfcMetadata(StepFile(house.text()));
 }
 
-TEST(IfcFacts, ProductsHaveClassNamePlaceAndRole) {
-  const IfcFacts facts = factsOf({});
+TEST(IfcMetadata, ProductsHaveClassNamePlaceAndRole) {
+  const IfcMetadata facts = factsOf({});
   EXPECT_EQ(facts.schema, "IFC4");
-  EXPECT_TRUE(facts.whole);
+  EXPECT_TRUE(facts.complete);
   EXPECT_EQ(facts.metresPerUnit, 0.001);
   const IfcProduct& wall = productOf(facts, "IfcWall");
   EXPECT_EQ(wall.id, 120u);
   EXPECT_TRUE(wall.hasBody);
-  EXPECT_EQ(wall.role, IfcProduct::Role::thing);
+  EXPECT_EQ(wall.role, IfcProduct::Role::physical);
   EXPECT_EQ(wall.parent, 41u);
   EXPECT_EQ(productOf(facts, "IfcOpeningElement").role, IfcProduct::Role::opening);
   EXPECT_FALSE(productOf(facts, "IfcBuildingStorey").hasBody);
 }
 
-TEST(IfcFacts, PathsLeadFromTheProjectDownAndRepeatsAreNumbered) {
+TEST(IfcMetadata, PathsLeadFromTheProjectDownAndRepeatsAreNumbered) {
   IfcHouse house;
   house.more =
       "#500=IFCWALL('00000000000000000Wall2',$,'Wall',$,$,#102,#115,$,$);\n"
       "#501=IFCRELCONTAINEDINSPATIALSTRUCTURE('0000000000000000000009',$,$,$,(#500),#41);\n"
       "#502=IFCWALL('00000000000000000Wall3',$,$,$,$,#102,#115,$,$);\n";
-  const auto paths = ifcPaths(factsOf(house));
+  const auto paths = buildIfcPaths(factsOf(house));
   EXPECT_EQ(paths.at(120), "Test house/House/Ground%2Ffloor/Wall");
   EXPECT_EQ(paths.at(500), "Test house/House/Ground%2Ffloor/Wall#2");
-  EXPECT_EQ(paths.at(502), "IfcWall") << "it belongs to nothing and has no name";
+  EXPECT_EQ(paths.at(502), "IfcWall") << "it has no parent and no name";
 }
 
-TEST(IfcFacts, PartsThatContainOneAnotherStillHavePaths) {
+TEST(IfcMetadata, PartsThatContainEachOtherHavePaths) {
   IfcHouse house;
   house.more =
       "#500=IFCRELAGGREGATES('0000000000000000000009',$,$,$,#120,(#120));\n"
@@ -55,11 +56,11 @@ TEST(IfcFacts, PartsThatContainOneAnotherStillHavePaths) {
       "#502=IFCWALL('00000000000000000Wall3',$,'b',$,$,#102,#115,$,$);\n"
       "#503=IFCRELAGGREGATES('0000000000000000000010',$,$,$,#501,(#502));\n"
       "#504=IFCRELAGGREGATES('0000000000000000000011',$,$,$,#502,(#501));\n";
-  const auto paths = ifcPaths(factsOf(house));
+  const auto paths = buildIfcPaths(factsOf(house));
   EXPECT_NE(paths.at(501), paths.at(502));
 }
 
-TEST(IfcFacts, DoorsSayHowTheyOpenInEitherVersion) {
+TEST(IfcMetadata, DoorsSayHowTheyOpenInEitherVersion) {
   const IfcProduct four = productOf(factsOf({}), "IfcDoor");
   EXPECT_EQ(four.operation, "SINGLE_SWING_LEFT");
   EXPECT_NEAR(four.overallWidth, 0.9, 1e-12);
@@ -76,17 +77,17 @@ TEST(IfcFacts, DoorsSayHowTheyOpenInEitherVersion) {
       ".F.);\n#501=IFCRELDEFINESBYTYPE('0000000000000000000009',$,$,$,(#320),#500);\n";
   EXPECT_EQ(productOf(factsOf(older), "IfcDoor").operation, "DOUBLE_DOOR_SLIDING");
 
-  IfcHouse typed;  // IFC4, where the door leaves it to its type
-  const std::string told = ".SINGLE_SWING_LEFT.";
+  IfcHouse typed;  // IFC4: the door takes the operation from its type
+  const std::string operation = ".SINGLE_SWING_LEFT.";
   typed.more =
       "#500=IFCDOORTYPE('000000000000000000DTyp',$,$,$,$,$,$,$,$,.DOOR.,.REVOLVING.,$,$);\n"
       "#501=IFCRELDEFINESBYTYPE('0000000000000000000009',$,$,$,(#320),#500);\n";
   std::string text = typed.text();
-  text.replace(text.find(told), told.size(), "$");
-  EXPECT_EQ(productOf(readIfcFacts(StepFile(text)), "IfcDoor").operation, "REVOLVING");
+  text.replace(text.find(operation), operation.size(), "$");
+  EXPECT_EQ(productOf(readIfcMetadata(StepFile(text)), "IfcDoor").operation, "REVOLVING");
 }
 
-TEST(IfcFacts, LiftsAreTransportElements) {
+TEST(IfcMetadata, LiftsAreTransportElements) {
   IfcHouse house;
   house.more =
       "#500=IFCTRANSPORTELEMENT('000000000000000000Lift',$,'Lift',$,$,#102,#115,$,"
@@ -94,48 +95,49 @@ TEST(IfcFacts, LiftsAreTransportElements) {
   EXPECT_EQ(productOf(factsOf(house), "IfcTransportElement").operation, "ELEVATOR");
 }
 
-TEST(IfcFacts, FeetAreAConversion) {
+TEST(IfcMetadata, FeetAreAConversion) {
   IfcHouse house;
   house.unit = "IFCCONVERSIONBASEDUNIT(#600,.LENGTHUNIT.,'FOOT',#601)";
   house.unitsPerMetre = 1 / 0.3048;
   house.more =
       "#601=IFCMEASUREWITHUNIT(IFCLENGTHMEASURE(0.3048),#602);\n"
       "#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
-  const IfcFacts facts = factsOf(house);
+  const IfcMetadata facts = factsOf(house);
   EXPECT_DOUBLE_EQ(facts.metresPerUnit, 0.3048);
   EXPECT_FALSE(facts.siUnit);
   EXPECT_NEAR(productOf(facts, "IfcDoor").overallWidth, 0.9, 1e-5);
-  house.more = "#601=IFCMEASUREWITHUNIT(IFCLENGTHMEASURE(0.3048),#31);\n";  // in a circle
-  EXPECT_TRUE(factsOf(house).unitGuessed);
+  house.more = "#601=IFCMEASUREWITHUNIT(IFCLENGTHMEASURE(0.3048),#31);\n";  // a unit that refers to
+                                                                            // itself
+  EXPECT_TRUE(factsOf(house).unitAssumption);
 }
 
-TEST(IfcFacts, APlaceOnAMapIsToldInMetres) {
+TEST(IfcMetadata, AMapPositionIsReportedInMetres) {
   IfcHouse house;  // in millimetres
-  EXPECT_FALSE(factsOf(house).mapPlace);
+  EXPECT_FALSE(factsOf(house).mapConversion);
   house.more =
       "#600=IFCMAPCONVERSION(#20,#601,456789.125,5428000.5,110.25,0.5,0.8660254037844386,0.9996);\n"
       "#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,#602);\n"
       "#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
-  const std::optional<IfcMapPlace> place = factsOf(house).mapPlace;
+  const std::optional<IfcMapConversion> place = factsOf(house).mapConversion;
   ASSERT_TRUE(place);
   EXPECT_EQ(place->crs, "EPSG:25832");
   EXPECT_EQ(place->east, 456789.125);
   EXPECT_EQ(place->north, 5428000.5);
   EXPECT_EQ(place->height, 110.25);
-  EXPECT_NEAR(place->turn, 1.0471975511965976, 1e-12);
+  EXPECT_NEAR(place->rotation, 1.0471975511965976, 1e-12);
   EXPECT_EQ(place->scale, 0.9996);
-  // Without a unit of its own the map has the project's; what is missing is the default.
+  // A map conversion without a unit uses the project's; missing values use the defaults.
   house.more = "#600=IFCMAPCONVERSION(#20,#999,4000.,5000.,$);\n";
-  const std::optional<IfcMapPlace> bare = factsOf(house).mapPlace;
+  const std::optional<IfcMapConversion> bare = factsOf(house).mapConversion;
   ASSERT_TRUE(bare);
   EXPECT_NEAR(bare->east, 4, 1e-12);
   EXPECT_NEAR(bare->north, 5, 1e-12);
   EXPECT_EQ(bare->height, 0);
-  EXPECT_EQ(bare->turn, 0);
+  EXPECT_EQ(bare->rotation, 0);
   EXPECT_EQ(bare->scale, 1);
 }
 
-TEST(IfcFacts, DrawingsAreNoBodies) {
+TEST(IfcMetadata, DrawingsAreNoBodies) {
   IfcHouse house;
   house.more =
       "#500=IFCSHAPEREPRESENTATION(#20,'Axis','Curve2D',(#113));\n"
@@ -144,18 +146,18 @@ TEST(IfcFacts, DrawingsAreNoBodies) {
   EXPECT_FALSE(productOf(factsOf(house), "IfcBeam").hasBody);
 }
 
-TEST(IfcFacts, ClassesAreWrittenAsTheStandardWritesThem) {
-  EXPECT_EQ(ifcClassName("IFCWALLSTANDARDCASE"), "IfcWallStandardCase");
-  EXPECT_EQ(ifcClassName("IFCSOMETHINGNEW"), "IfcSomethingnew");
+TEST(IfcMetadata, ClassesAreWrittenAsTheStandardWritesThem) {
+  EXPECT_EQ(formatIfcClassName("IFCWALLSTANDARDCASE"), "IfcWallStandardCase");
+  EXPECT_EQ(formatIfcClassName("IFCSOMETHINGNEW"), "IfcSomethingnew");
 }
 
-TEST(IfcFacts, PlacementsInACircleAreNone) {
+TEST(IfcMetadata, PlacementsInACircleAreNone) {
   const StepFile file(
       "#1=IFCLOCALPLACEMENT(#1,#2);#2=IFCAXIS2PLACEMENT3D(#3,$,$);"
       "#3=IFCCARTESIANPOINT((1.,2.,3.));#4=IFCLOCALPLACEMENT($,#2);");
-  EXPECT_FALSE(ifcPlacement(file, 1, 1));
-  ASSERT_TRUE(ifcPlacement(file, 4, 0.5));
-  EXPECT_EQ(ifcPlacement(file, 4, 0.5)->translation(), Vec3(0.5, 1, 1.5));
+  EXPECT_FALSE(readIfcPlacement(file, 1, 1));
+  ASSERT_TRUE(readIfcPlacement(file, 4, 0.5));
+  EXPECT_EQ(readIfcPlacement(file, 4, 0.5)->translation(), Vec3(0.5, 1, 1.5));
 }
 
 }  // namespace

@@ -1,10 +1,11 @@
-// Every way in which an import can go wrong ends in an ImportError that says what to do.
+// Tests that every import failure is an ImportError with a remedy.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
 #include <cerrno>
 #include <cstdlib>
 
+#include "scene/import/file/model_format.hpp"
 #include "scene/import/import_model.hpp"
 #include "tests/scene/hand_made_files.hpp"
 
@@ -16,7 +17,7 @@ using tests::TemporaryFolder;
 
 constexpr char kOneNode[] = R"({"mesh":0,"name":"box"})";
 
-/// What importing `file` fails with; "" when it does not.
+/// The error message of importing `file`; "" if the import succeeds.
 std::string failureOf(const std::filesystem::path& file, const ImportOptions& options = {}) {
   try {
     importModel(file, options);
@@ -30,7 +31,7 @@ bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// Sets ENFILADE_IMPORT_FAULT for as long as it lives.
+/// Sets ENFILADE_IMPORT_FAULT for the lifetime of the object.
 struct Fault {
   explicit Fault(const char* kind) { setenv("ENFILADE_IMPORT_FAULT", kind, 1); }
   ~Fault() { unsetenv("ENFILADE_IMPORT_FAULT"); }
@@ -41,7 +42,7 @@ void expectNoChildren() {
   EXPECT_EQ(errno, ECHILD);
 }
 
-TEST(ImportFailures, MissingFileFolderAndEmptyFileAreTold) {
+TEST(ImportFailures, MissingFileFolderAndEmptyFileAreReported) {
   const TemporaryFolder folder;
   const auto missing = folder.path() / "missing.glb";
   EXPECT_TRUE(contains(failureOf(missing), missing.string() + ": no such file"));
@@ -49,7 +50,7 @@ TEST(ImportFailures, MissingFileFolderAndEmptyFileAreTold) {
   EXPECT_TRUE(contains(failureOf(folder.write("empty.obj", "")), "empty.obj: is empty"));
 }
 
-TEST(ImportFailures, AReaderWhoseModuleIsMissingIsTold) {
+TEST(ImportFailures, AMissingReaderModuleIsReported) {
   const TemporaryFolder folder;
   const auto file = folder.write("box.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   const auto missing = folder.path() / "missing.so";
@@ -93,7 +94,7 @@ TEST(ImportFailures, AGlbWithNoiseInItNeverHurtsTheCaller) {
   expectNoChildren();
 }
 
-TEST(ImportFailures, TextFilesThatAreCutOffOrNotWhatTheySayAreErrors) {
+TEST(ImportFailures, TruncatedAndMislabelledTextFilesAreErrors) {
   const TemporaryFolder folder;
   const std::string gltf = tests::gltf(BoxMesh({1, 1, 1}), "0", kOneNode);
   EXPECT_TRUE(contains(failureOf(folder.write("cut.gltf", gltf.substr(0, 300))), "cut.gltf"));
@@ -136,7 +137,7 @@ TEST(ImportFailures, AChildThatAnswersNothingOrNoiseIsAnError) {
   }
   {
     const Fault fault("garbage");
-    EXPECT_TRUE(contains(failureOf(file), "answered with noise"));
+    EXPECT_TRUE(contains(failureOf(file), "sent invalid data"));
   }
   {
     const Fault fault("memory");

@@ -1,4 +1,4 @@
-// Files with known answers, written by the tests.
+// Import tests on files with known answers; the tests write the files.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,7 +16,7 @@ using tests::gltf;
 using tests::TemporaryFolder;
 
 std::size_t countOf(const Model& model, const std::string& kind) {
-  for (const Problem& problem : model.problems) {
+  for (const Diagnostic& problem : model.diagnostics) {
     if (problem.kind == kind) return problem.count;
   }
   return 0;
@@ -59,7 +59,8 @@ TEST(ImportHandMade, GltfBoxHasItsSizePathAndMaterial) {
 
 TEST(ImportHandMade, TransformsAreChainedInDoublesAndTheOffsetComesOff) {
   const TemporaryFolder folder;
-  // A million metres away, a child 0.125 m further: floats would give multiples of 1/16 m there.
+  // The parent is a million metres away and its child 0.125 m further; float spacing there is 1/16
+  // m.
   const auto file = folder.write(
       "far.gltf", gltf(BoxMesh({1, 1, 1}), "0",
                        R"({"name":"site","translation":[1000000,0,-2000000],"children":[1]},)"
@@ -78,7 +79,7 @@ TEST(ImportHandMade, TransformsAreChainedInDoublesAndTheOffsetComesOff) {
 
 TEST(ImportHandMade, TranslationsThatFloatsCannotHoldAreReadWhole) {
   const TemporaryFolder folder;
-  // Each node has its own place on the map; floats step by half a metre there.
+  // Each node has its own map position; float spacing there is half a metre.
   const std::string nodes = R"({"mesh":0,"translation":[459123.4,112.6,-5428310.7]},)"
                             R"({"mesh":0,"translation":[459125.53,112.6,-5428309.31]})";
   const BoxMesh mesh({1, 1, 1});
@@ -195,14 +196,14 @@ TEST(ImportHandMade, UnitAndUpOfTheUserWin) {
   options.up = 'z';
   const Model model = importModel(file, options);
   EXPECT_EQ(model.metresPerUnit, 0.5);
-  EXPECT_EQ(model.up, 'z');
-  // (x, y, z) with z up is (x, z, -y) with y up.
+  EXPECT_EQ(model.upAxis, 'z');
+  // A point (x, y, z) with z up is (x, z, -y) with y up.
   expectBounds(Scene{Model(model)}, {0, 0, -1}, {0.5, 1.5, 0});
   options.up = 'x';
   expectBounds(Scene(importModel(file, options)), {-1, 0, 0}, {0, 0.5, 1.5});
 }
 
-TEST(ImportHandMade, ObjIsMetresUnlessToldOtherwise) {
+TEST(ImportHandMade, ObjIsInMetresByDefault) {
   const TemporaryFolder folder;
   const auto file = folder.write("box.OBJ", kObj);
   const Model model = importModel(file);
@@ -210,7 +211,7 @@ TEST(ImportHandMade, ObjIsMetresUnlessToldOtherwise) {
   EXPECT_EQ(countOf(model, "no_unit"), 1u);
   expectBounds(Scene{Model(model)}, {0, 0, 0}, {1, 2, 3});
   ImportOptions options;
-  options.metresPerUnit = metresPerUnitFrom("mm");
+  options.metresPerUnit = parseMetresPerUnit("mm");
   const Model small = importModel(file, options);
   EXPECT_EQ(countOf(small, "no_unit"), 0u);
   expectBounds(Scene{Model(small)}, {0, 0, 0}, {0.001, 0.002, 0.003}, 1e-9);
@@ -237,7 +238,7 @@ TEST(ImportHandMade, ColladaUnitAndUpAreAppliedOnceOrReplaced) {
       "tip.dae", colladaBox(R"(<unit name="inch" meter="0.0254"/><up_axis>Z_UP</up_axis>)"));
   const Model model = importModel(file);
   EXPECT_EQ(model.metresPerUnit, 0.0254);
-  EXPECT_EQ(model.up, 'z');
+  EXPECT_EQ(model.upAxis, 'z');
   EXPECT_EQ(pathsOf(model), std::vector<std::string>{"tip"});
   expectBounds(Scene{Model(model)}, Vec3(10, 30, -22) * 0.0254, Vec3(11, 33, -20) * 0.0254);
   ImportOptions options;
@@ -265,7 +266,7 @@ TEST(ImportHandMade, DegenerateTrianglesAreKeptForTheEyeAndSkippedForTouch) {
   const TemporaryFolder folder;
   BoxMesh mesh({1, 1, 1});
   mesh.positions.push_back({9, 0, 0});
-  mesh.indices.insert(mesh.indices.end(), {0, 1, 8});  // on one line
+  mesh.indices.insert(mesh.indices.end(), {0, 1, 8});  // collinear corners
   const Model model = importModel(folder.write("flat.gltf", gltf(mesh, "0", kOneNode)));
   EXPECT_EQ(countOf(model, "degenerate_triangle"), 1u);
   const Scene scene{Model(model)};
@@ -297,12 +298,12 @@ TEST(ImportHandMade, ProgressNamesStagesInOrder) {
 }
 
 TEST(ImportHandMade, UnitsAreParsedOrRefused) {
-  EXPECT_EQ(metresPerUnitFrom("m"), 1);
-  EXPECT_EQ(metresPerUnitFrom("ft"), 0.3048);
-  EXPECT_EQ(metresPerUnitFrom("in"), 0.0254);
-  EXPECT_EQ(metresPerUnitFrom("0.05"), 0.05);
+  EXPECT_EQ(parseMetresPerUnit("m"), 1);
+  EXPECT_EQ(parseMetresPerUnit("ft"), 0.3048);
+  EXPECT_EQ(parseMetresPerUnit("in"), 0.0254);
+  EXPECT_EQ(parseMetresPerUnit("0.05"), 0.05);
   for (const char* wrong : {"", "0", "-1", "nan", "inf", "1 m", "yard", "1e400"}) {
-    EXPECT_FALSE(metresPerUnitFrom(wrong).has_value()) << wrong;
+    EXPECT_FALSE(parseMetresPerUnit(wrong).has_value()) << wrong;
   }
 }
 

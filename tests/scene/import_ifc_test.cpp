@@ -1,5 +1,5 @@
-// IFC by each of its readers, on houses that are known to the millimetre; what happens when one of
-// them fails; archives.
+// IFC import tests for each reader, on houses known to the millimetre, with reader failures and
+// archives.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -31,8 +31,8 @@ std::vector<IfcReader> readersHere() {
   return readers;
 }
 
-const Problem* problemOf(const Model& model, const std::string& kind) {
-  for (const Problem& problem : model.problems) {
+const Diagnostic* problemOf(const Model& model, const std::string& kind) {
+  for (const Diagnostic& problem : model.diagnostics) {
     if (problem.kind == kind) return &problem;
   }
   return nullptr;
@@ -54,7 +54,7 @@ const Object& objectOf(const Model& model, const std::string& ifcClass) {
   throw std::runtime_error("no " + ifcClass);
 }
 
-/// Sets an environment variable for as long as it lives.
+/// Sets an environment variable for the lifetime of the object.
 struct Environment {
   Environment(const char* variable, const std::string& value) : name(variable) {
     setenv(name, value.c_str(), 1);
@@ -78,21 +78,21 @@ TEST(ImportIfc, EachReaderGivesTheSameHouse) {
     ASSERT_EQ(model.objects.size(), 2u);
     expectSize(model, {4, 3, 0.3});
     EXPECT_EQ(model.metresPerUnit, 0.001);
-    EXPECT_EQ(model.up, 'z');
+    EXPECT_EQ(model.upAxis, 'z');
     const Object& door = objectOf(model, "IfcDoor");
     EXPECT_EQ(door.path, "Test house/House/Ground%2Ffloor/Front door");
     EXPECT_EQ(door.globalId, "000000000000000000Door");
-    EXPECT_EQ(door.operation, "SINGLE_SWING_LEFT");
+    EXPECT_EQ(door.operationType, "SINGLE_SWING_LEFT");
     EXPECT_NEAR(door.overallWidth, 0.9, 1e-9);
     ASSERT_TRUE(door.worldFromPlacement);
-    // The file's y is our -z, its z our y.
+    // The file's y is the scene's -z, and its z is the scene's y.
     EXPECT_LT((*door.worldFromPlacement * Vec3(0, 1, 2) - Vec3(1.5, 2, -1.1)).norm(), 1e-9);
     EXPECT_EQ(problemOf(model, "uncut_opening"), nullptr);
     ASSERT_NE(problemOf(model, "skipped_openings"), nullptr);
   }
 }
 
-/// By every reader, so many doors and windows are told to stand in closed walls, with all these
+/// With every reader, the import reports `count` doors and windows in uncut walls, with all these
 /// words.
 void expectUncut(const std::string& text, std::size_t count,
                  std::initializer_list<const char*> words) {
@@ -101,7 +101,7 @@ void expectUncut(const std::string& text, std::size_t count,
   for (const IfcReader reader : readersHere()) {
     const Model model = importModel(file, by(reader));
     SCOPED_TRACE(model.reader);
-    const Problem* uncut = problemOf(model, "uncut_opening");
+    const Diagnostic* uncut = problemOf(model, "uncut_opening");
     ASSERT_NE(uncut, nullptr);
     EXPECT_EQ(uncut->count, count) << uncut->example;
     for (const char* word : words)
@@ -111,7 +111,7 @@ void expectUncut(const std::string& text, std::size_t count,
 
 TEST(ImportIfc, ADoorInAWallWithoutAHoleIsReportedByItsGlobalId) {
   IfcHouse house;
-  // The hole lies beside the door.
+  // The hole is next to the door.
   std::string text = house.text();
   const std::string place = "#200=IFCCARTESIANPOINT((" + house.length(1.5);
   text.replace(text.find(place), place.size(), "#200=IFCCARTESIANPOINT((" + house.length(0.2));
@@ -120,16 +120,16 @@ TEST(ImportIfc, ADoorInAWallWithoutAHoleIsReportedByItsGlobalId) {
   expectUncut(text, 1, {"000000000000000000Door", "0 of 9"});
 }
 
-TEST(ImportIfc, AWallThatNobodySaysToCutIsReportedWithItsDoorAndWindow) {
+TEST(ImportIfc, AnUncutWallIsReportedWithItsDoorAndWindow) {
   IfcHouse house;
   house.voids = false;
-  // Without IfcRelFillsElement there is not even an opening: a window in the wall, another in a
-  // gap beside it.
+  // Without IfcRelFillsElement there is no opening at all: one window in the wall, and one in a gap
+  // next to it.
   house.more = house.placement(500, "#102", 3, 0.1, 1) + house.box(510, 0.5, 0.05, 1) +
                "#520=IFCWINDOW('0000000000000000Window',$,'Window',$,$,#502,#515,$," +
                house.length(1) + "," + house.length(0.5) + ",.WINDOW.,.SINGLE_PANEL.,$);\n" +
                house.placement(530, "#102", 5, 0.1, 1) + house.box(540, 0.5, 0.05, 1) +
-               "#550=IFCWINDOW('0000000000000000Beside',$,'Beside',$,$,#532,#545,$," +
+               "#550=IFCWINDOW('000000000000000Outside',$,'Outside',$,$,#532,#545,$," +
                house.length(1) + "," + house.length(0.5) + ",.WINDOW.,.SINGLE_PANEL.,$);\n";
   expectUncut(house.text(), 2, {"000000000000000000Door", "0000000000000000Window"});
 }
@@ -143,7 +143,8 @@ TEST(ImportIfc, ADoorOfItsWallDoesNotCloseItsOwnHoleAndOneDrawnOpenHidesNone) {
            placement + "," + shape + ",$," + house.length(2.1) + "," + house.length(0.9) +
            ",.DOOR.,.SINGLE_SWING_LEFT.,$);\n";
   };
-  // One in the hole, by the wall's parts; another, drawn open, where the wall is whole.
+  // One door in the hole, which the wall's parts leave; another, modelled open, where the wall is
+  // uncut.
   house.more = house.placement(500, "#202", 0, 0.1, 0) + house.box(510, 0.9, 0.05, 2.1) +
                door("520", "Part", "#502", "#515") +
                "#521=IFCRELAGGREGATES('0000000000000000000009',$,$,$,#120,(#520));\n" +
@@ -166,7 +167,7 @@ TEST(ImportIfc, UnitAndUpAxisOfTheUserWin) {
   EXPECT_EQ(problemOf(model, "uncut_opening"), nullptr);
 }
 
-TEST(ImportIfc, APlaceOnAMapIsToldAndMovesNothing) {
+TEST(ImportIfc, AMapPositionIsReportedAndMovesNothing) {
   const TemporaryFolder folder;
   IfcHouse house;
   house.more =
@@ -177,7 +178,7 @@ TEST(ImportIfc, APlaceOnAMapIsToldAndMovesNothing) {
   for (const IfcReader reader : readersHere()) {
     const Model model = importModel(file, by(reader));
     SCOPED_TRACE(model.reader);
-    const Problem* place = problemOf(model, "map_place");
+    const Diagnostic* place = problemOf(model, "map_place");
     ASSERT_NE(place, nullptr);
     EXPECT_NE(
         place->example.find("EPSG:25832: the file's origin is at E 456789.125, N 5428000.500"),
@@ -190,7 +191,7 @@ TEST(ImportIfc, APlaceOnAMapIsToldAndMovesNothing) {
   }
 }
 
-TEST(ImportIfc, APlaceOnNoMapIsNotTold) {
+TEST(ImportIfc, APositionWithoutAMapIsNotReported) {
   const TemporaryFolder folder;
   for (const char* numbers : {"1.,2.,3.,1.,0.,0.", "1.,2.,3.,0.,0.,1.", "1.E30,2.,3.,1.,0.,1."}) {
     SCOPED_TRACE(numbers);
@@ -205,7 +206,7 @@ TEST(ImportIfc, APlaceOnNoMapIsNotTold) {
 TEST(ImportIfc, AHouseFarFromTheOriginKeepsItsMillimetres) {
   const TemporaryFolder folder;
   IfcHouse house;
-  house.offset = "459123400.,5428310700.,112600.";  // millimetres: a place in UTM
+  house.offset = "459123400.,5428310700.,112600.";  // UTM coordinates in millimetres
   const auto file = folder.write("far.ifc", house.text());
   for (const IfcReader reader : readersHere()) {
     const Model model = importModel(file, by(reader));
@@ -231,7 +232,7 @@ TEST(ImportIfc, ACutOffFileIsReadAsFarAsItGoesAndSaysSo) {
 TEST(ImportIfc, AReaderThatFailsIsFollowedByTheNext) {
   const TemporaryFolder folder;
   IfcHouse house;
-  house.schema = "IFC2X3";  // what assimp reads
+  house.schema = "IFC2X3";  // the schema that assimp supports
   const auto file = folder.write("house.ifc", house.text());
   for (const char* kind : {"web-ifc:crash", "web-ifc:garbage", "web-ifc:exit", "web-ifc:memory"}) {
     const Environment fault("ENFILADE_IMPORT_FAULT", kind);
@@ -251,7 +252,7 @@ TEST(ImportIfc, AReaderThatFailsIsFollowedByTheNext) {
   EXPECT_EQ(objectOf(model, "IfcDoor").path, "Test house/House/Ground%2Ffloor/Front door");
 }
 
-TEST(ImportIfc, AReaderWhoseModuleIsMissingOrNoneIsTold) {
+TEST(ImportIfc, AMissingOrInvalidReaderModuleIsReported) {
   const TemporaryFolder folder;
   const auto file = folder.write("house.ifc", IfcHouse().text());
   for (const auto& module : {folder.path() / "missing.so", folder.write("none.so", "text")}) {
@@ -273,7 +274,7 @@ TEST(ImportIfc, AReaderThatHangsLeavesTimeForTheNext) {
   EXPECT_EQ(importModel(file, options).reader, "ifcplusplus");
 }
 
-TEST(ImportIfc, WithoutNodeTheNextReaderDoesItAndTheUserIsTold) {
+TEST(ImportIfc, WithoutNodeTheNextReaderIsUsedAndReported) {
   const TemporaryFolder folder;
   const auto file = folder.write("house.ifc", IfcHouse().text());
   const Environment nowhere("ENFILADE_WEB_IFC", folder.path());
@@ -300,7 +301,7 @@ TEST(ImportIfc, WhenAllReadersFailTheErrorSaysWhyOfEach) {
   }
 }
 
-TEST(ImportIfc, ProgressTellsOfTheReaders) {
+TEST(ImportIfc, ProgressNamesTheReaders) {
   const TemporaryFolder folder;
   const auto file = folder.write("house.ifc", IfcHouse().text());
   std::vector<std::string> stages;
@@ -327,19 +328,19 @@ TEST(ImportIfc, AnArchiveIsUnpacked) {
   EXPECT_EQ(importModel(unzipped, by(IfcReader::ifcPlusPlus)).objects.size(), 2u);
 }
 
-TEST(ImportIfc, AnArchiveWithNoneOrSeveralOrTooMuchIsRefused) {
+TEST(ImportIfc, AnArchiveWithZeroSeveralOrTooLargeModelsIsRefused) {
   const TemporaryFolder folder;
   const auto none = folder.write("none.ifczip", tests::storedZip({{"readme.txt", "x"}}));
-  EXPECT_NE(failureOf(none).find("none.ifczip: holds no .ifc file"), std::string::npos);
+  EXPECT_NE(failureOf(none).find("none.ifczip: contains no .ifc file"), std::string::npos);
   EXPECT_NE(failureOf(folder.write("empty.ifczip", tests::storedZip({})))
-                .find("empty.ifczip: holds no .ifc file (0 others)"),
+                .find("empty.ifczip: contains no .ifc file (0 others)"),
             std::string::npos);
   const auto two = folder.write("two.ifczip", tests::storedZip({{"a.ifc", "x"}, {"b.ifc", "x"}}));
-  EXPECT_NE(failureOf(two).find("holds 2 .ifc files (a.ifc, b.ifc)"), std::string::npos);
+  EXPECT_NE(failureOf(two).find("has 2 .ifc files (a.ifc, b.ifc)"), std::string::npos);
   const auto noise = folder.write("noise.ifczip", "PK\3\4 and then nothing");
   EXPECT_NE(failureOf(noise).find("noise.ifczip: cannot be unzipped"), std::string::npos);
   std::string locked = tests::storedZip({{"a.ifc", "x"}});
-  locked[locked.find("PK\1\2") + 8] = 1;  // the directory says: encrypted
+  locked[locked.find("PK\1\2") + 8] = 1;  // sets the "encrypted" flag in the directory
   EXPECT_NE(
       failureOf(folder.write("locked.ifczip", locked)).find("is encrypted; unzip it with its"),
       std::string::npos);
@@ -350,7 +351,7 @@ TEST(ImportIfc, AnArchiveWithNoneOrSeveralOrTooMuchIsRefused) {
   const auto large =
       folder.write("large.ifczip", tests::storedZip({{"a.ifc", std::string(40 << 20, ' ')}}));
   ImportOptions options;
-  options.memoryLimit = std::size_t{256} << 20;  // an eighth of it may be text
+  options.memoryLimit = std::size_t{256} << 20;  // an eighth of the limit may be text
   EXPECT_NE(failureOf(large, options).find("unpacks to more than the 32 MiB"), std::string::npos);
 }
 

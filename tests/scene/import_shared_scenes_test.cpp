@@ -1,4 +1,4 @@
-// Real files, against the table of objects, triangles and true extents that comes with them.
+// Import tests on real files, against their table of objects, triangles and true extents.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +8,7 @@
 #include <random>
 #include <set>
 
+#include "scene/import/file/model_format.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/world/data/scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
@@ -20,11 +21,11 @@ namespace {
 struct Expected {
   const char* file;
   std::size_t objects;
-  std::size_t triangles;  ///< of all placements
+  std::size_t triangles;  ///< summed over all placements
   Vec3 extents;           ///< metres
   double metresPerUnit;
   char up;
-  double given = 0;  ///< --unit, 0: none
+  double given = 0;  ///< value of --unit; 0: not given
   IfcReader reader = IfcReader::assimp;
 };
 
@@ -35,8 +36,8 @@ void PrintTo(const Expected& expected, std::ostream* to) {
 constexpr IfcReader kWeb = IfcReader::webIfc, kPlus = IfcReader::ifcPlusPlus,
                     kAssimp = IfcReader::assimp;
 
-// IFC objects are products: nodes of mapped items belong to the product above them. Each of IFC's
-// readers triangulates in its own way.
+// IFC objects are products: nodes of mapped items belong to the product above them. Each IFC reader
+// triangulates in its own way.
 const Expected kScenes[] = {
     {"fzk-haus/AC14-FZK-Haus.ifc", 110, 35792, {18.0, 7.318, 16.0}, 1, 'z', 0, kWeb},
     {"fzk-haus/AC14-FZK-Haus.ifc", 110, 36082, {18.0, 7.318, 16.0}, 1, 'z', 0, kPlus},
@@ -99,7 +100,7 @@ const Expected kScenes[] = {
      'z',
      0,
      kAssimp},
-    // Walls of frames that their openings take away altogether: 60 of 164 products.
+    // Walls of frames whose openings remove them completely: 60 of 164 products.
     {"schependomlaan/ROOT-houten_kozijnen.ifczip",
      104,
      19820,
@@ -168,7 +169,7 @@ std::size_t placedTriangles(const Model& model) {
 }
 
 std::size_t countOf(const Model& model, const std::string& kind) {
-  for (const Problem& problem : model.problems) {
+  for (const Diagnostic& problem : model.diagnostics) {
     if (problem.kind == kind) return problem.count;
   }
   return 0;
@@ -186,13 +187,13 @@ TEST_P(ImportSharedScene, GivesItsObjectsTrianglesAndTrueExtents) {
   }
   Model model = importShared(*shared / "scenes" / expected.file, expected.reader, expected.given);
   EXPECT_EQ(model.objects.size(), expected.objects);
-  // ifcplusplus' solid modelling varies with addresses, where they cannot be held still.
+  // The solid modelling of ifcplusplus varies with addresses if address randomisation stays on.
   const double spare =
       expected.reader == kPlus ? 0.02 * static_cast<double>(expected.triangles) : 0;
   EXPECT_NEAR(static_cast<double>(placedTriangles(model)), static_cast<double>(expected.triangles),
               spare);
   EXPECT_NEAR(model.metresPerUnit, expected.metresPerUnit, 1e-6);
-  EXPECT_EQ(model.up, expected.up);
+  EXPECT_EQ(model.upAxis, expected.up);
   std::set<std::string> paths;
   for (const Object& object : model.objects) paths.insert(object.path);
   EXPECT_EQ(paths.size(), expected.objects) << "paths repeat";
@@ -213,7 +214,7 @@ std::string testNameOf(const ::testing::TestParamInfo<Expected>& info) {
   return name + kReaders.at(info.param.reader) + (info.param.given > 0 ? "_with_unit" : "");
 }
 
-INSTANTIATE_TEST_SUITE_P(Table, ImportSharedScene, ::testing::ValuesIn(kScenes), testNameOf);
+INSTANTIATE_TEST_SUITE_P(TextTable, ImportSharedScene, ::testing::ValuesIn(kScenes), testNameOf);
 
 TEST(ImportSharedScenes, TheTableNamesEveryModelThatIsThere) {
   ENFILADE_NEED_SHARED(shared);
@@ -236,11 +237,11 @@ TEST(ImportSharedScenes, ColladaAndFbxOfTheSameOfficeAreTheSameWorld) {
   EXPECT_LT((dae.bounds().min - fbx.bounds().min).norm(), 1e-4);
   EXPECT_LT((dae.bounds().max - fbx.bounds().max).norm(), 1e-4);
   EXPECT_EQ(countOf(fbx.model(), "unit_assumed"), 1u);
-  // The same boxes, whatever the order.
-  ASSERT_EQ(dae.stillBoxes().size(), fbx.stillBoxes().size());
-  for (const Box& box : dae.stillBoxes()) {
+  // The same boxes in any order.
+  ASSERT_EQ(dae.staticBoxes().size(), fbx.staticBoxes().size());
+  for (const Aabb& box : dae.staticBoxes()) {
     const auto same =
-        std::any_of(fbx.stillBoxes().begin(), fbx.stillBoxes().end(), [&](const Box& other) {
+        std::any_of(fbx.staticBoxes().begin(), fbx.staticBoxes().end(), [&](const Aabb& other) {
           return (box.min - other.min).norm() < 1e-3 && (box.max - other.max).norm() < 1e-3;
         });
     EXPECT_TRUE(same) << box.min.transpose();
@@ -252,7 +253,7 @@ TEST(ImportSharedScenes, ElectricalFixturesInFeetLieInsideTheirBuilding) {
   const auto folder = *shared / "scenes/duplex";
   const Scene house(importShared(folder / "Duplex_A_20110907.ifc", kPlus));
   const Scene fixtures(importShared(folder / "Duplex_Electrical_20121207.ifc", kPlus));
-  const Box room = grown(house.bounds(), 0.2);
+  const Aabb room = inflated(house.bounds(), 0.2);
   EXPECT_TRUE((fixtures.bounds().min.array() >= room.min.array()).all());
   EXPECT_TRUE((fixtures.bounds().max.array() <= room.max.array()).all());
 }
@@ -264,24 +265,24 @@ TEST(ImportSharedScenes, FarAwayBuildingKeepsTheShapesOfTheNearOne) {
   EXPECT_NEAR(far.offset.x(), 459123.4, 10);
   EXPECT_NEAR(far.offset.z(), -5428310.7, 20);
   const Scene farScene{Model(far)};
-  // The far file was made by assimp.
+  // The far file was written by assimp.
   const Scene near(importShared(*shared / "scenes/duplex/Duplex_A_20110907.ifc", kAssimp));
-  // Composed in floats, widths at five thousand kilometres would be multiples of half a metre.
-  // The far file has a node for each mesh, so only objects of one mesh can be compared.
+  // Widths composed in floats at five thousand kilometres would be multiples of half a metre. The
+  // far file has a node for each mesh, so only objects of one mesh can be compared.
   std::size_t compared = 0;
-  for (std::size_t i = 0; i < near.stillBoxes().size(); ++i) {
+  for (std::size_t i = 0; i < near.staticBoxes().size(); ++i) {
     if (near.model().objects[near.solidObjects()[i]].meshes.size() != 1) continue;
     ++compared;
-    const Vec3 size = near.stillBoxes()[i].size();
+    const Vec3 size = near.staticBoxes()[i].size();
     const auto same =
-        std::any_of(farScene.stillBoxes().begin(), farScene.stillBoxes().end(),
-                    [&](const Box& other) { return (size - other.size()).norm() < 1e-3; });
+        std::any_of(farScene.staticBoxes().begin(), farScene.staticBoxes().end(),
+                    [&](const Aabb& other) { return (size - other.size()).norm() < 1e-3; });
     EXPECT_TRUE(same) << size.transpose();
   }
   EXPECT_GT(compared, 100u);
 }
 
-TEST(ImportSharedScenes, IfcReadersAgreeOnWhatAProductIs) {
+TEST(ImportSharedScenes, IfcReadersAgreeOnEachProduct) {
   ENFILADE_NEED_SHARED(shared);
   const auto file = *shared / "scenes/duplex/Duplex_A_20110907.ifc";
   std::vector<IfcReader> readers{kPlus, kAssimp};
@@ -294,7 +295,7 @@ TEST(ImportSharedScenes, IfcReadersAgreeOnWhatAProductIs) {
     for (const Object& object : model.objects) {
       EXPECT_EQ(object.globalId.size(), 22u) << object.path;
       EXPECT_NE(object.ifcClass, "IfcSpace");
-      ids[object.globalId] = object.path + " " + object.operation;
+      ids[object.globalId] = object.path + " " + object.operationType;
     }
     EXPECT_EQ(ids.size(), model.objects.size());
     EXPECT_EQ(countOf(model, "skipped_spaces"), 21u);
@@ -309,7 +310,7 @@ TEST(ImportSharedScenes, IfcDoorsSayHowTheyOpen) {
   std::map<std::string, int> operations;
   for (const Object& object : model.objects) {
     if (object.ifcClass != "IfcDoor") continue;
-    ++operations[object.operation];
+    ++operations[object.operationType];
     EXPECT_GT(object.overallWidth, 0.5) << object.path;
     EXPECT_LT(object.overallHeight, 3) << object.path;
     EXPECT_TRUE(object.worldFromPlacement) << object.path;
@@ -322,7 +323,7 @@ TEST(ImportSharedScenes, WebIfcCutsEveryOpeningAndIfcPlusPlusLeavesSome) {
   ENFILADE_NEED_SHARED(shared);
   const auto file = *shared / "scenes/duplex/Duplex_A_20110907.ifc";
   const std::size_t left = countOf(importShared(file, kPlus), "uncut_opening");
-  EXPECT_GE(left, 1u);  // 4 of 36 in the measurements of this reader
+  EXPECT_GE(left, 1u);  // this reader was measured to leave 4 of 36
   EXPECT_LE(left, 8u);
   ENFILADE_NEED_WEB_IFC();
   for (const char* name : {"duplex/Duplex_A_20110907.ifc", "fzk-haus/AC14-FZK-Haus.ifc"}) {
@@ -357,7 +358,7 @@ TEST(ImportSharedScenes, TwoImportsGiveTheSameHash) {
   EXPECT_EQ(Scene(importShared(file, kAssimp)).hash(), Scene(importShared(file, kAssimp)).hash());
 }
 
-TEST(ImportSharedScenes, WhatAssimpAloneCannotReadEndsInErrorsThatNameIt) {
+TEST(ImportSharedScenes, FilesThatAssimpAloneCannotReadFailWithErrorsThatNameThem) {
   ENFILADE_NEED_SHARED(shared);
   std::size_t tried = 0;
   for (const auto& entry : std::filesystem::directory_iterator(*shared / "scenes/hard-imports")) {
@@ -374,7 +375,7 @@ TEST(ImportSharedScenes, WhatAssimpAloneCannotReadEndsInErrorsThatNameIt) {
   EXPECT_EQ(tried, 4u);
 }
 
-/// Bytes of real files exchanged and files cut, by a seed.
+/// Real files with bytes exchanged or the end cut off, by a seed.
 TEST(ImportSharedScenes, DamagedRealFilesNeverHurtTheCaller) {
   ENFILADE_NEED_SHARED(shared);
   std::ifstream in(*shared / "scenes/schependomlaan/ROOT-kalkzandsteen.ifczip", std::ios::binary);

@@ -11,20 +11,20 @@ namespace {
 
 constexpr double kGravity = 9.80665;
 
-/// A plank of 1 m that stands out along X from a post in the air at the origin.
+/// A plank of 1 m along X, fixed to a post in the air at the origin.
 struct Plank : RigidScene {
   std::uint32_t post = addStill(boxHull({0.05, 0.05, 0.05}), {-0.2, 0, 0});
   std::uint32_t plank = addFree(boxHull({0.5, 0.05, 0.2}), {0.5, 0, 0});
 
   Joint& join(Joint::Kind kind, const Vec3& axis) {
-    std::vector<RigidBody> bodies;
-    for (const Solid& solid : dynamics.solids) bodies.push_back(solid.motion);
-    dynamics.joints.push_back(jointAt(kind, bodies, post, plank, Vec3::Zero(), axis));
+    std::vector<BodyMotion> bodies;
+    for (const PhysicsBody& solid : dynamics.bodies) bodies.push_back(solid.motion);
+    dynamics.joints.push_back(makeJoint(kind, bodies, post, plank, Vec3::Zero(), axis));
     return dynamics.joints.back();
   }
-  /// Where the plank's end is that the joint holds.
+  /// Position of the plank's end that the joint constrains.
   Vec3 held() { return body(plank).centre + body(plank).rotation * Vec3(-0.5, 0, 0); }
-  /// Sine of the angle above the horizon.
+  /// Sine of the plank's angle above the horizontal.
   double lift() { return (body(plank).rotation * Vec3::UnitX()).y(); }
 };
 
@@ -46,7 +46,7 @@ TEST(Joint, AHingeHoldsItsPointAndItsAxisWhileThePlankSwings) {
 TEST(Joint, AHingesLimitsAreNotPassed) {
   Plank scene;
   Joint& hinge = scene.join(Joint::Kind::hinge, Vec3::UnitZ());
-  hinge.limited = true;
+  hinge.hasLimits = true;
   hinge.lower = -0.5, hinge.upper = 0.25;
   scene.run(240);
   EXPECT_NEAR(scene.lift(), std::sin(-0.5), 0.01);
@@ -56,10 +56,10 @@ TEST(Joint, AMotorLiftsThePlankToTheOtherLimitWhenItIsStrongEnough) {
   for (const double strength : {0.5, 2.0}) {
     Plank scene;
     Joint& hinge = scene.join(Joint::Kind::hinge, Vec3::UnitZ());
-    hinge.limited = true;
+    hinge.hasLimits = true;
     hinge.lower = -0.5, hinge.upper = 0.25;
     hinge.motorSpeed = 1;
-    hinge.mostMotor = strength * 0.5 * kGravity / scene.body(scene.plank).inverseMass;
+    hinge.maxMotorForce = strength * 0.5 * kGravity / scene.body(scene.plank).inverseMass;
     scene.run(240);
     EXPECT_NEAR(scene.lift(), std::sin(strength < 1 ? -0.5 : 0.25), 0.01) << strength;
   }
@@ -68,7 +68,7 @@ TEST(Joint, AMotorLiftsThePlankToTheOtherLimitWhenItIsStrongEnough) {
 TEST(Joint, ASliderFallsAlongItsAxisOnlyAndStopsAtItsLimit) {
   Plank scene;
   Joint& slider = scene.join(Joint::Kind::slider, Vec3(0, 1, 0));
-  slider.limited = true;
+  slider.hasLimits = true;
   slider.lower = -0.3, slider.upper = 0;
   scene.run(10);
   EXPECT_NEAR(scene.body(scene.plank).velocity.y(), -kGravity * 10 / 60, 1e-6);

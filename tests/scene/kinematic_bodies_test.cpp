@@ -36,65 +36,65 @@ Model lift(std::vector<NamedBox> others = {}) {
   return model;
 }
 
-TEST(Bodies, ADoorOpensAtItsSpeedAndStandsThere) {
-  BodyTrial t(hingedDoor());
-  t.tell({"door", Action::open, 0, 0, {}});
+TEST(KinematicBodies, ADoorOpensAtItsSpeedAndStandsThere) {
+  BodyFixture t(hingedDoor());
+  t.submit({"door", Action::open, 0, 0, {}});
   t.ticks(30);
-  EXPECT_NEAR(t.body("door").drive.coordinate, kQuarter / 2, 1e-12);
-  EXPECT_NEAR(t.body("door").spin.y(), kQuarter, 1e-9);
+  EXPECT_NEAR(t.body("door").drive.jointPosition, kQuarter / 2, 1e-12);
+  EXPECT_NEAR(t.body("door").angularVelocity.y(), kQuarter, 1e-9);
   t.untilIdle();
-  EXPECT_EQ(t.body("door").drive.coordinate, kQuarter);
-  EXPECT_LE(t.world.state().tick, 61u);
+  EXPECT_EQ(t.body("door").drive.jointPosition, kQuarter);
+  EXPECT_LE(t.world.data().tick, 61u);
   const Vec3 tip = t.body("door").rotation * Vec3(1, 0, 0) + t.body("door").position;
   EXPECT_NEAR((tip - Vec3(0, 0, -1)).norm(), 0, 1e-12);  // counter-clockwise from above
 }
 
-TEST(Bodies, ACloserClosesTheDoorAfterItsDelay) {
+TEST(KinematicBodies, ACloserClosesTheDoorAfterItsDelay) {
   Model model = hingedDoor();
-  model.bodies[0].closesAfter = 0.5;
-  BodyTrial t(std::move(model));
-  t.tell({"door", Action::to, 0.3, 0, {}});
+  model.bodies[0].autoCloseDelay = 0.5;
+  BodyFixture t(std::move(model));
+  t.submit({"door", Action::moveTo, 0.3, 0, {}});
   t.ticks(12);
-  EXPECT_EQ(t.body("door").drive.coordinate, 0.3);
+  EXPECT_EQ(t.body("door").drive.jointPosition, 0.3);
   t.ticks(29);
-  EXPECT_EQ(t.body("door").drive.coordinate, 0.3);
+  EXPECT_EQ(t.body("door").drive.jointPosition, 0.3);
   t.untilIdle();
-  EXPECT_EQ(t.body("door").drive.coordinate, 0);
+  EXPECT_EQ(t.body("door").drive.jointPosition, 0);
 }
 
-TEST(Bodies, ADoorPushesWhoCanYieldAndTouchesHim) {
-  BodyTrial t(hingedDoor());
+TEST(KinematicBodies, ADoorPushesAnAvatarThatCanYield) {
+  BodyFixture t(hingedDoor());
   t.order("ann", Spawn{{0.6, 0.01, -0.5}, 0, 0.3, 1.75});
   t.ticks(30);
-  t.tell({"door", Action::open, 0, 0, {}});
+  t.submit({"door", Action::open, 0, 0, {}});
   t.untilIdle();
-  EXPECT_EQ(t.body("door").drive.coordinate, kQuarter);
-  EXPECT_EQ(t.told(Event::blocked, "door", "ann"), 0);
-  EXPECT_GE(t.told(Event::begin, "ann", "door"), 1);
+  EXPECT_EQ(t.body("door").drive.jointPosition, kQuarter);
+  EXPECT_EQ(t.countEvents(Event::blocked, "door", "ann"), 0);
+  EXPECT_GE(t.countEvents(Event::begin, "ann", "door"), 1);
   EXPECT_EQ(whoPenetrates(t.world), "");
-  EXPECT_LT(t.feet("ann").x(), 0) << "swept aside";
+  EXPECT_LT(t.feet("ann").x(), 0) << "pushed aside";
 }
 
-TEST(Bodies, ADoorStopsAtWhoStandsAgainstAWallAndSaysSoOnce) {
-  // Behind her a wall, at her sides as well: she cannot yield.
-  BodyTrial t(hingedDoor({{"wall", {-2, 0, -1.2}, {2, 3, -1}},
-                          {"left", {0.2, 0, -1}, {0.25, 3, -0.4}},
-                          {"right", {0.9, 0, -1}, {0.95, 3, -0.4}}}));
+TEST(KinematicBodies, ADoorStopsAtAnAvatarAgainstAWallAndReportsItOnce) {
+  // Walls behind and on both sides: the avatar cannot yield.
+  BodyFixture t(hingedDoor({{"wall", {-2, 0, -1.2}, {2, 3, -1}},
+                            {"left", {0.2, 0, -1}, {0.25, 3, -0.4}},
+                            {"right", {0.9, 0, -1}, {0.95, 3, -0.4}}}));
   t.order("ann", Spawn{{0.575, 0.01, -0.68}, 0, 0.3, 1.75});
   t.ticks(30);
-  t.tell({"door", Action::open, 0, 0, {}});
+  t.submit({"door", Action::open, 0, 0, {}});
   t.ticks(90);
-  EXPECT_EQ(t.told(Event::blocked, "door", "ann"), 1);
-  EXPECT_GT(t.body("door").drive.coordinate, 0.05);
-  EXPECT_LT(t.body("door").drive.coordinate, 0.8);
+  EXPECT_EQ(t.countEvents(Event::blocked, "door", "ann"), 1);
+  EXPECT_GT(t.body("door").drive.jointPosition, 0.05);
+  EXPECT_LT(t.body("door").drive.jointPosition, 0.8);
   EXPECT_EQ(whoPenetrates(t.world), "");
-  // When she is gone it goes on.
+  // When the avatar has left, the door continues.
   t.order("ann", Leave{});
   t.untilIdle();
-  EXPECT_EQ(t.body("door").drive.coordinate, kQuarter);
+  EXPECT_EQ(t.body("door").drive.jointPosition, kQuarter);
 }
 
-TEST(Bodies, DoorsOfAnySpeedCrossNobody) {
+TEST(KinematicBodies, DoorsOfAnySpeedCrossNoAvatar) {
   std::mt19937 random(7);
   const auto uniform = [&](double low, double high) {
     return low + (high - low) * (static_cast<double>(random()) / 4294967296.0);
@@ -102,81 +102,81 @@ TEST(Bodies, DoorsOfAnySpeedCrossNobody) {
   int touched = 0;
   for (int run = 0; run < 60; ++run) {
     Model model = hingedDoor({{"wall", {-2, 0, -1.6}, {2, 3, -1.5}}});
-    // 0.01 to 100 m/s at the tip, even on a scale of powers.
+    // 0.01 to 100 m/s at the tip, log-uniform.
     const double tip = std::pow(10.0, uniform(-2, 2));
     model.bodies[0].speed = tip;
-    BodyTrial t(std::move(model));
+    BodyFixture t(std::move(model));
     const double radius = uniform(0.1, 0.45);
     t.order(
         "ann",
         Spawn{{uniform(-0.3, 1.2), 0.01, -uniform(radius + 0.05, 1.4 - radius)}, 0, radius, 1.75});
     t.ticks(10);
-    if (t.world.state().avatars.empty()) continue;
+    if (t.world.data().avatars.empty()) continue;
     const bool startsInTheWay = t.feet("ann").x() > 0 && t.feet("ann").norm() < 0.8;
-    t.tell({"door", Action::open, 0, 0, {}});
+    t.submit({"door", Action::open, 0, 0, {}});
     for (int i = 0; i < 40; ++i) {
       t.step();
       ASSERT_EQ(whoPenetrates(t.world), "") << "run " << run << ", tip " << tip;
     }
-    // Who stood in the leaf's way, and not at its tip, cannot be behind it now.
+    // An avatar in front of the leaf, and not at its tip, must not end up behind it.
     const Vec3 local = t.body("door").rotation.transpose() * t.feet("ann");
     if (startsInTheWay && local.x() > 0 && local.x() < 1) {
       EXPECT_LT(local.z(), 0) << "run " << run;
     }
-    touched += t.told(Event::begin, "ann", "door") > 0;
+    touched += t.countEvents(Event::begin, "ann", "door") > 0;
   }
   EXPECT_GT(touched, 15);
 }
 
-TEST(Bodies, ALiftCarriesItsRiderUpAndDown) {
-  BodyTrial t(lift());
+TEST(KinematicBodies, ALiftCarriesItsRiderUpAndDown) {
+  BodyFixture t(lift());
   t.order("ann", Spawn{{0, 0.1, 0}, 0, 0.3, 1.75});
   t.ticks(30);
-  t.tell({"lift", Action::level, 0, 2, {}});
+  t.submit({"lift", Action::moveToLevel, 0, 2, {}});
   for (int i = 0; i < 600; ++i) {
     if (t.step().idle) break;
     const double above = t.feet("ann").y() - (t.body("lift").position.y() + 0.1);
     ASSERT_GT(above, 0);
-    ASSERT_LT(above, 2 * t.world.lengths().epsilon) << "tick " << i;
+    ASSERT_LT(above, 2 * t.world.settings().contactOffset) << "tick " << i;
   }
-  EXPECT_EQ(t.body("lift").drive.coordinate, 6);
+  EXPECT_EQ(t.body("lift").drive.jointPosition, 6);
   EXPECT_NEAR(t.feet("ann").y(), 6.1, 1e-3);
-  t.tell({"lift", Action::level, 0, 0, {}});
+  t.submit({"lift", Action::moveToLevel, 0, 0, {}});
   for (int i = 0; i < 600; ++i) {
     if (t.step().idle) break;
     ASSERT_LT(t.feet("ann").y() - (t.body("lift").position.y() + 0.1),
-              2 * t.world.lengths().epsilon);
+              2 * t.world.settings().contactOffset);
   }
   EXPECT_NEAR(t.feet("ann").y(), 0.1, 1e-3);
-  EXPECT_EQ(t.told(Event::begin, "ann", "lift"), 1) << "she never lost touch";
+  EXPECT_EQ(t.countEvents(Event::begin, "ann", "lift"), 1) << "she never lost contact";
 }
 
-TEST(Bodies, ALiftThatComesDownOnSomeoneStopsAtTheHead) {
-  BodyTrial t(lift());
-  t.tell({"lift", Action::level, 0, 1, {}});
+TEST(KinematicBodies, ALiftThatComesDownOnSomeoneStopsAtTheHead) {
+  BodyFixture t(lift());
+  t.submit({"lift", Action::moveToLevel, 0, 1, {}});
   t.untilIdle();
   t.order("ann", Spawn{{0.2, 0.01, 0}, 0, 0.3, 1.75});
   t.ticks(30);
-  t.tell({"lift", Action::level, 0, 0, 30.0});
+  t.submit({"lift", Action::moveToLevel, 0, 0, 30.0});
   t.ticks(120);
-  EXPECT_EQ(t.told(Event::blocked, "lift", "ann"), 1);
+  EXPECT_EQ(t.countEvents(Event::blocked, "lift", "ann"), 1);
   EXPECT_EQ(whoPenetrates(t.world), "");
   EXPECT_NEAR(t.body("lift").position.y() + 0.05, 1.75, 0.01);
   EXPECT_NEAR(t.feet("ann").y(), 0, 1e-3);
 }
 
-TEST(Bodies, ALiftStopsWhereItsRiderMeetsTheCeiling) {
-  BodyTrial t(lift({{"ceiling", {-3, 4, -3}, {3, 4.2, 3}}}));
+TEST(KinematicBodies, ALiftStopsWhereItsRiderMeetsTheCeiling) {
+  BodyFixture t(lift({{"ceiling", {-3, 4, -3}, {3, 4.2, 3}}}));
   t.order("ann", Spawn{{0, 0.1, 0}, 0, 0.3, 1.75});
   t.ticks(30);
-  t.tell({"lift", Action::level, 0, 2, {}});
+  t.submit({"lift", Action::moveToLevel, 0, 2, {}});
   t.ticks(400);
-  EXPECT_EQ(t.told(Event::blocked, "lift", "ann"), 1);
+  EXPECT_EQ(t.countEvents(Event::blocked, "lift", "ann"), 1);
   EXPECT_EQ(whoPenetrates(t.world), "");
   EXPECT_NEAR(t.body("lift").position.y() + 0.1 + 1.75, 4, 0.01);
 }
 
-TEST(Bodies, OnABlockedLiftNobodyRises) {
+TEST(KinematicBodies, OnABlockedLiftNoAvatarRises) {
   Model model = boxModel({floorBox(),
                           {"platform", {-1, 0.01, -1}, {1, 0.1, 1}},
                           {"beam", {-1, 2.6, -1}, {-0.2, 2.8, 1}}});
@@ -184,43 +184,43 @@ TEST(Bodies, OnABlockedLiftNobodyRises) {
   spec.high = 3, spec.speed = 1.5;
   spec.stops = {0, 3};
   model.bodies.push_back(spec);
-  BodyTrial t(std::move(model));
-  t.order("tall", Spawn{.at = {-0.5, 0.2, 0}});
-  t.order("free", Spawn{.at = {0.5, 0.2, 0}});
+  BodyFixture t(std::move(model));
+  t.order("tall", Spawn{.position = {-0.5, 0.2, 0}});
+  t.order("free", Spawn{.position = {0.5, 0.2, 0}});
   t.untilIdle();
   for (int again = 0; again < 3; ++again) {
-    t.tell({"lift", Action::to, 3, 0, {}});
+    t.submit({"lift", Action::moveTo, 3, 0, {}});
     t.ticks(120);
     const double top = t.body("lift").position.y() - t.body("lift").shape->origin.y() + 0.1;
-    EXPECT_LT(t.feet("free").y() - top, 2 * t.world.lengths().epsilon) << again;
+    EXPECT_LT(t.feet("free").y() - top, 2 * t.world.settings().contactOffset) << again;
     EXPECT_EQ(whoPenetrates(t.world), "");
-    t.tell({"lift", Action::stop, 0, 0, {}});
+    t.submit({"lift", Action::stop, 0, 0, {}});
     t.ticks(60);
   }
 }
 
-TEST(Bodies, WhatStandsInATriggerFromTheBeginningEntersIt) {
+TEST(KinematicBodies, AnEntityInATriggerAtTheStartEntersIt) {
   Model model =
       boxModel({floorBox(), {"door", {0, 0.01, 0}, {1, 2, 0.1}}, {"zone", {0, 0, -1}, {1, 1, 1}}});
   BodySpec door = bodySpec("door", BodyKind::hinged, {1});
   door.high = 1.5;
   model.bodies = {door, bodySpec("zone", BodyKind::trigger, {2})};
-  BodyTrial t(std::move(model));
+  BodyFixture t(std::move(model));
   t.ticks(5);
-  EXPECT_EQ(t.told(ContactEvent::Kind::enter, "door", "zone"), 1);
+  EXPECT_EQ(t.countEvents(ContactEvent::Kind::enter, "door", "zone"), 1);
 }
 
-TEST(Bodies, APlatformCarriesSidewaysAndATurntableRound) {
+TEST(KinematicBodies, APlatformCarriesSidewaysAndATurntableRound) {
   Model model =
       boxModel({{"plate", {-2, 0, -2}, {2, 0.1, 2}}, {"ground", {-9, -1, -9}, {9, -0.9, 9}}});
   BodySpec spec = bodySpec("plate", BodyKind::path, {0});
   spec.keys = {{0, {0, 0, 0}, 0}, {2, {3, 0, 0}, 0}, {4, {3, 0, 0}, 4 * kQuarter}};
   model.bodies.push_back(spec);
-  BodyTrial t(std::move(model));
-  t.tell({"plate", Action::stop, 0, 0, {}});
+  BodyFixture t(std::move(model));
+  t.submit({"plate", Action::stop, 0, 0, {}});
   t.order("ann", Spawn{{1, 0.1, 0}, 0, 0.3, 1.75});
   t.ticks(30);
-  t.tell({"plate", Action::run, 0, 0, {}});
+  t.submit({"plate", Action::run, 0, 0, {}});
   t.ticks(120);
   EXPECT_NEAR(t.feet("ann").x(), 4, 0.02);
   t.ticks(60);
@@ -230,7 +230,7 @@ TEST(Bodies, APlatformCarriesSidewaysAndATurntableRound) {
   EXPECT_EQ(whoPenetrates(t.world), "");
 }
 
-TEST(Bodies, ATurntableThatLoopsTurnsOnEvenlyAndCarriesWhoStandsOnIt) {
+TEST(KinematicBodies, ALoopingTurntableRotatesEvenlyAndCarriesAvatars) {
   Model model =
       boxModel({{"plate", {-2, 0, -2}, {2, 0.1, 2}}, {"ground", {-9, -1, -9}, {9, -0.9, 9}}});
   BodySpec spec = bodySpec("plate", BodyKind::path, {0});
@@ -238,63 +238,65 @@ TEST(Bodies, ATurntableThatLoopsTurnsOnEvenlyAndCarriesWhoStandsOnIt) {
   spec.keys = {{0, Vec3::Zero(), 0}, {2, Vec3::Zero(), round}};
   spec.loops = true;
   model.bodies.push_back(spec);
-  BodyTrial t(std::move(model));
-  t.order("ann", Spawn{.at = {1, 0.1, 0}});
+  BodyFixture t(std::move(model));
+  t.order("ann", Spawn{.position = {1, 0.1, 0}});
   t.ticks(30);
   for (int i = 0; i < 300; ++i) {
     t.step();
-    EXPECT_NEAR(t.body("plate").spin.y(), round / 2, 1e-9) << i;
+    EXPECT_NEAR(t.body("plate").angularVelocity.y(), round / 2, 1e-9) << i;
     EXPECT_NEAR(t.feet("ann").norm(), 1, 0.2) << i;
   }
-  EXPECT_TRUE(t.told(ContactEvent::Kind::blocked, "plate", "ann") == 0);
+  EXPECT_TRUE(t.countEvents(ContactEvent::Kind::blocked, "plate", "ann") == 0);
 }
 
-/// A block of 1 m that goes to `offset` and back in each tick; it stands where it began after all.
+/// A block of 1 m that moves to `offset` and back within each tick, so its net displacement is
+/// zero.
 Model shaker(const Vec3& offset) {
   Model model = boxModel({floorBox(), {"block", {-0.5, 0.1, -0.5}, {0.5, 1.1, 0.5}}});
   BodySpec spec = bodySpec("block", BodyKind::path, {1});
   spec.keys = {{0, Vec3::Zero(), 0}, {1.0 / 120, offset, 0}, {1.0 / 60, Vec3::Zero(), 0}};
   spec.loops = true;
-  spec.runs = false;
+  spec.autoStart = false;
   model.bodies.push_back(spec);
   return model;
 }
 
-TEST(Bodies, WhoStandsInTheWayOfAPathThatTurnsBackWithinATickIsPushed) {
-  BodyTrial t(shaker({0.2, 0, 0}));
-  t.order("ann", Spawn{.at = {0.9, 0.01, 0}});  // 0.3 m in radius: 0.1 m from the block
+TEST(KinematicBodies, AvatarInTheWayOfAReversingPathIsPushed) {
+  BodyFixture t(shaker({0.2, 0, 0}));
+  t.order("ann", Spawn{.position = {0.9, 0.01, 0}});  // the avatar's radius is 0.3 m: its gap to
+                                                      // the block is 0.1 m
   t.ticks(10);
   EXPECT_NEAR(t.feet("ann").x(), 0.9, 1e-6);
-  t.tell({"block", Action::run, 0, 0, {}});
+  t.submit({"block", Action::run, 0, 0, {}});
   t.ticks(10);
   EXPECT_NEAR(t.feet("ann").x(), 1, 2e-3);
   EXPECT_NEAR(t.body("block").position.x(), 0, 1e-9);
   EXPECT_EQ(whoPenetrates(t.world), "");
 }
 
-TEST(Bodies, WhoCannotYieldStopsAPathThatTurnsBackWithinATickOnItsWay) {
+TEST(KinematicBodies, AvatarThatCannotYieldStopsAReversingPath) {
   Model model = shaker({0.2, 0, 0});
   model.meshes.push_back(boxMesh({1.21, 0, -2}, {1.3, 3, 2}));
   model.objects.push_back({"wall", "", {2}, Eigen::Affine3d::Identity()});
-  BodyTrial t(std::move(model));
-  t.order("ann", Spawn{.at = {0.9, 0.01, 0}});
-  t.tell({"block", Action::run, 0, 0, {}});
+  BodyFixture t(std::move(model));
+  t.order("ann", Spawn{.position = {0.9, 0.01, 0}});
+  t.submit({"block", Action::run, 0, 0, {}});
   t.ticks(20);
-  EXPECT_EQ(t.told(Event::blocked, "block", "ann"), 1);
-  EXPECT_NEAR(t.body("block").position.x(), 0.11, 5e-3) << "where she leaves it no more room";
+  EXPECT_EQ(t.countEvents(Event::blocked, "block", "ann"), 1);
+  EXPECT_NEAR(t.body("block").position.x(), 0.11, 5e-3) << "until she blocks it";
   EXPECT_EQ(whoPenetrates(t.world), "");
   t.order("ann", Leave{});
   for (int i = 0; i < 10; ++i) {
-    const double before = t.body("block").drive.coordinate;
+    const double before = t.body("block").drive.jointPosition;
     t.step();
     EXPECT_EQ(t.body("block").blockedBy, 0u);
     EXPECT_TRUE(t.body("block").moved);
-    EXPECT_NEAR(std::remainder(t.body("block").drive.coordinate - before, 1.0 / 60), 0, 1e-9);
+    EXPECT_NEAR(std::remainder(t.body("block").drive.jointPosition - before, 1.0 / 60), 0, 1e-9);
   }
 }
 
-TEST(Bodies, APathThatLoopsWaitsWhereItIsBlockedAndGoesOnFromThere) {
-  // A lap of 0.5 s with the seam in the middle of its way; ann stands there, between two walls.
+TEST(KinematicBodies, ABlockedLoopingPathWaitsAndContinues) {
+  // A lap of 0.5 s with the seam of the loop mid-path; ann stands there between two walls.
   Model model = boxModel({floorBox(),
                           {"cart", {-0.2, 0.1, -0.2}, {0.2, 1, 0.2}},
                           {"wall", {1.21, 0, -2}, {1.3, 3, 2}}});
@@ -302,14 +304,14 @@ TEST(Bodies, APathThatLoopsWaitsWhereItIsBlockedAndGoesOnFromThere) {
   spec.keys = {{0, Vec3::Zero(), 0}, {0.25, {0.7, 0, 0}, 0}, {0.5, Vec3::Zero(), 0}};
   spec.loops = true;
   model.bodies.push_back(spec);
-  BodyTrial t(std::move(model));
-  t.ticks(4);  // on its way out
-  t.order("ann", Spawn{.at = {0.9, 0.01, 0}});
+  BodyFixture t(std::move(model));
+  t.ticks(4);  // on the outward half
+  t.order("ann", Spawn{.position = {0.9, 0.01, 0}});
   t.ticks(30);
-  EXPECT_EQ(t.told(Event::blocked, "cart", "ann"), 1);
+  EXPECT_EQ(t.countEvents(Event::blocked, "cart", "ann"), 1);
   const double held = t.body("cart").position.x();
   EXPECT_NEAR(held, 0.41, 5e-3);
-  EXPECT_NEAR(t.body("cart").drive.coordinate, held / 0.7 * 0.25, 1e-3);
+  EXPECT_NEAR(t.body("cart").drive.jointPosition, held / 0.7 * 0.25, 1e-3);
   t.order("ann", Leave{});
   for (int i = 0; i < 90; ++i) {
     const Vec3 before = t.body("cart").position;
@@ -319,29 +321,29 @@ TEST(Bodies, APathThatLoopsWaitsWhereItIsBlockedAndGoesOnFromThere) {
   }
 }
 
-TEST(Bodies, APathThatTurnsFastTurnsTheWayThatItsKeysSay) {
-  // 4 radians in the first 4 ms: the nearest turn would be the other way round.
+TEST(KinematicBodies, APathThatTurnsFastTurnsTheWayThatItsKeysSay) {
+  // The arm rotates by 4 radians in the first 4 ms: the shortest rotation would be the wrong way.
   Model model = boxModel({floorBox(), {"arm", {0, 0.1, -0.05}, {1, 0.2, 0.05}}});
   BodySpec spec = bodySpec("arm", BodyKind::path, {1});
   spec.anchor = {0, 0.1, 0};
   spec.keys = {{0, Vec3::Zero(), 0}, {1.0 / 240, Vec3::Zero(), 4}, {1, Vec3::Zero(), 4 * kQuarter}};
   spec.loops = true;
   model.bodies.push_back(spec);
-  BodyTrial t(std::move(model));
+  BodyFixture t(std::move(model));
   for (int lap = 0; lap < 3; ++lap) {
     t.step();
-    const auto& places = t.body("arm").plan.places;
-    EXPECT_NEAR(places[1].turn - places[0].turn, 4, 1e-9) << lap;
-    EXPECT_NEAR(places[0].turn, 0, 1e-9) << lap;
+    const auto& places = t.body("arm").kinematicTarget.keyPoses;
+    EXPECT_NEAR(places[1].angle - places[0].angle, 4, 1e-9) << lap;
+    EXPECT_NEAR(places[0].angle, 0, 1e-9) << lap;
     t.ticks(59);
   }
 }
 
-TEST(Bodies, WhoStandsOnAPathThatTurnsBackWithinATickIsLiftedAndLetDown) {
-  BodyTrial t(shaker({0, 0.01, 0}));
-  t.order("ann", Spawn{.at = {0, 1.11, 0}});
+TEST(KinematicBodies, AvatarOnAReversingPathIsLiftedAndLowered) {
+  BodyFixture t(shaker({0, 0.01, 0}));
+  t.order("ann", Spawn{.position = {0, 1.11, 0}});
   t.ticks(10);
-  t.tell({"block", Action::run, 0, 0, {}});
+  t.submit({"block", Action::run, 0, 0, {}});
   for (int i = 0; i < 60; ++i) {
     t.step();
     EXPECT_NEAR(t.feet("ann").y(), 1.1, 2e-3) << i;
@@ -350,19 +352,19 @@ TEST(Bodies, WhoStandsOnAPathThatTurnsBackWithinATickIsLiftedAndLetDown) {
   EXPECT_EQ(whoPenetrates(t.world), "");
 }
 
-TEST(Bodies, WhoStandsOnWhatTurnsKeepsTheirPlaceOnIt) {
+TEST(KinematicBodies, AvatarOnARotatingBodyKeepsItsPlace) {
   Model model =
       boxModel({{"plate", {-2, 0, -2}, {2, 0.1, 2}}, {"ground", {-9, -1, -9}, {9, -0.9, 9}}});
   BodySpec spec = bodySpec("plate", BodyKind::path, {0});
   spec.keys = {{0, Vec3::Zero(), 0}, {8, Vec3::Zero(), 4 * kQuarter}};
   spec.loops = true;
   model.bodies.push_back(spec);
-  BodyTrial t(std::move(model));
+  BodyFixture t(std::move(model));
   const std::map<std::string, Vec3> at{{"mid", {0, 0.1, 0}},
                                        {"inner", {0.5, 0.1, 0.5}},
                                        {"outer", {1.2, 0.1, 0}},
-                                       {"edge", {0, 0.1, -1.9}}};  // half beside the plate
-  for (const auto& [name, place] : at) t.order(name, Spawn{.at = place});
+                                       {"edge", {0, 0.1, -1.9}}};  // half of it next to the plate
+  for (const auto& [name, place] : at) t.order(name, Spawn{.position = place});
   t.ticks(10);
   std::map<std::string, Vec3> start;
   const auto onPlate = [&](const std::string& name) {
@@ -375,93 +377,93 @@ TEST(Bodies, WhoStandsOnWhatTurnsKeepsTheirPlaceOnIt) {
     EXPECT_LT((onPlate(name) - start[name]).norm(), name == "edge" ? 0.05 : 2e-3) << name;
 }
 
-TEST(Bodies, ASpeedIsRefusedByHowFastItMakesAPoint) {
-  Model model = shaker({0.2, 0, 0});  // 24 m/s at a speed of 1
-  BodyTrial t(std::move(model));
-  const auto told = [&](double speed) {
-    return submit(t.world, {"block", Action::run, 0, 0, speed}).value_or("");
+TEST(KinematicBodies, ASpeedIsRefusedByHowFastItMakesAPoint) {
+  Model model = shaker({0.2, 0, 0});  // 24 m/s at a drive speed of 1
+  BodyFixture t(std::move(model));
+  const auto refusal = [&](double speed) {
+    return submitBodyCommand(t.world, {"block", Action::run, 0, 0, speed}).value_or("");
   };
-  EXPECT_EQ(told(41), "");
-  EXPECT_NE(told(42).find("1008"), std::string::npos) << told(42);
-  EXPECT_NE(told(0).find("above 0"), std::string::npos);
-  EXPECT_NE(told(1e300), "");
-  EXPECT_NE(told(std::nan("")), "");
+  EXPECT_EQ(refusal(41), "");
+  EXPECT_NE(refusal(42).find("1008"), std::string::npos) << refusal(42);
+  EXPECT_NE(refusal(0).find("above 0"), std::string::npos);
+  EXPECT_NE(refusal(1e300), "");
+  EXPECT_NE(refusal(std::nan("")), "");
 }
 
-TEST(Bodies, APathThatLoopsEndsTurnedAsItBegan) {
+TEST(KinematicBodies, APathThatLoopsEndsTurnedAsItBegan) {
   Model model = boxModel({floorBox(), {"plate", {0, 1, 0}, {1, 2, 1}}});
   BodySpec spec = bodySpec("plate", BodyKind::path, {1});
   spec.keys = {{0, Vec3::Zero(), 0}, {2, Vec3::Zero(), 1}};
   spec.loops = true;
   model.bodies.push_back(spec);
-  const auto why = refusalOfBodies(model);
+  const auto why = validateBodies(model);
   ASSERT_TRUE(why);
-  EXPECT_NE(why->find("turned as it begins"), std::string::npos) << *why;
+  EXPECT_NE(why->find("with its initial rotation"), std::string::npos) << *why;
 }
 
-TEST(Bodies, ADoorOpensAwayFromWhoWalksIntoIt) {
+TEST(KinematicBodies, ADoorOpensAwayFromAWalkingAvatar) {
   Model model = hingedDoor(
       {{"left", {-4, 0, -0.1}, {-0.01, 3, 0.1}}, {"right", {1.01, 0, -0.1}, {4, 3, 0.1}}});
   model.bodies[0].openedBy = OpenedBy::touch;
-  BodyTrial t(std::move(model));
+  BodyFixture t(std::move(model));
   t.order("ann", Spawn{{0.6, 0.01, 2}, 0, 0.2, 1.75});
   t.order("ann", Walk{{{0.6, 0, -2}}, 1.4});
   t.untilIdle();
   EXPECT_NEAR(t.feet("ann").z(), -2, 0.01);
-  EXPECT_GT(t.body("door").drive.coordinate, 0.5);
+  EXPECT_GT(t.body("door").drive.jointPosition, 0.5);
 }
 
-TEST(Bodies, TriggersTellWhoEntersAndLeaves) {
+TEST(KinematicBodies, TriggersReportEnterAndLeave) {
   Model model = boxModel({floorBox(), {"zone", {1, 0, -1}, {2, 2, 1}}});
   model.bodies.push_back(bodySpec("zone", BodyKind::trigger, {1}));
-  BodyTrial t(std::move(model));
+  BodyFixture t(std::move(model));
   t.order("ann", Spawn{{-1, 0.01, 0}, 0, 0.3, 1.75});
   t.order("ann", Walk{{{4, 0, 0}}, 2});
   t.untilIdle();
   EXPECT_NEAR(t.feet("ann").x(), 4, 0.01) << "not solid";
-  ASSERT_EQ(t.told(Event::enter, "ann", "zone"), 1);
-  ASSERT_EQ(t.told(Event::leave, "ann", "zone"), 1);
+  ASSERT_EQ(t.countEvents(Event::enter, "ann", "zone"), 1);
+  ASSERT_EQ(t.countEvents(Event::leave, "ann", "zone"), 1);
   for (const ContactEvent& e : t.events) {
-    const bool apart = e.decision.verdict == collision::Verdict::separated;
+    const bool apart = e.separation.verdict == collision::Verdict::separated;
     if (e.kind == Event::enter || e.kind == Event::leave) {
       EXPECT_EQ(apart, e.kind == Event::leave);
     }
   }
 }
 
-TEST(Bodies, WhoLeavesTheWorldLeavesItsTriggers) {
+TEST(KinematicBodies, AvatarThatLeavesTheWorldLeavesItsTriggers) {
   Model model = boxModel({floorBox(), {"zone", {1, 0, -1}, {2, 2, 1}}});
   model.bodies.push_back(bodySpec("zone", BodyKind::trigger, {1}));
-  BodyTrial t(std::move(model));
+  BodyFixture t(std::move(model));
   t.order("ann", Spawn{{1.5, 0.01, 0}, 0, 0.3, 1.75});
   t.ticks(5);
-  EXPECT_EQ(t.told(Event::enter, "ann", "zone"), 1);
+  EXPECT_EQ(t.countEvents(Event::enter, "ann", "zone"), 1);
   t.order("ann", Leave{});
   t.ticks(2);
-  EXPECT_EQ(t.told(Event::leave, "ann", "zone"), 1);
+  EXPECT_EQ(t.countEvents(Event::leave, "ann", "zone"), 1);
 }
 
-TEST(Bodies, ANearMissBeginsIsClosestAndEnds) {
-  Lengths lengths;
-  lengths.nearMiss = 0.2;
-  BodyTrial t(boxModel({floorBox(), {"pillar", {-0.1, 0, 0.4}, {0.1, 2, 0.6}}}), lengths);
+TEST(KinematicBodies, ANearMissBeginsIsClosestAndEnds) {
+  WorldSettings lengths;
+  lengths.nearMissDistance = 0.2;
+  BodyFixture t(boxModel({floorBox(), {"pillar", {-0.1, 0, 0.4}, {0.1, 2, 0.6}}}), lengths);
   t.order("ann", Spawn{{-2, 0.01, 0}, 0, 0.3, 1.75});
   t.order("ann", Walk{{{2, 0, 0}}, 1.5});
   t.untilIdle();
   std::vector<ContactEvent> near;
   for (const ContactEvent& e : t.events)
-    if (e.kind == Event::near && nameOf(t.world, e.b) == "pillar") near.push_back(e);
+    if (e.kind == Event::nearMiss && findEntityName(t.world, e.b) == "pillar") near.push_back(e);
   ASSERT_EQ(near.size(), 3u);
   EXPECT_EQ(near[0].phase, ContactEvent::Phase::begin);
   EXPECT_EQ(near[1].phase, ContactEvent::Phase::min);
   EXPECT_EQ(near[2].phase, ContactEvent::Phase::end);
-  EXPECT_NEAR(near[1].decision.distance, 0.1, 1e-6);
+  EXPECT_NEAR(near[1].separation.distance, 0.1, 1e-6);
   EXPECT_LT(near[0].tick, near[1].tick);
   EXPECT_LT(near[1].tick, near[2].tick);
-  EXPECT_GE(near[2].decision.distance, 0.2);
+  EXPECT_GE(near[2].separation.distance, 0.2);
 }
 
-TEST(Bodies, AFreeBodyTellsWhatItLandsOnAndWhatItLeaves) {
+TEST(KinematicBodies, ADynamicBodyReportsBeginAndEndOfItsContacts) {
   Model model = boxModel(
       {floorBox(), {"crate", {0, 0.5, 0}, {0.5, 1, 0.5}}, {"slab", {-1, 0.2, -1}, {1, 0.3, 1}}});
   model.bodies.push_back(bodySpec("crate", BodyKind::rigid, {1}));
@@ -470,54 +472,55 @@ TEST(Bodies, AFreeBodyTellsWhatItLandsOnAndWhatItLeaves) {
   slab.low = -4;
   slab.speed = 100;
   model.bodies.push_back(slab);
-  BodyTrial t(std::move(model));
+  BodyFixture t(std::move(model));
   t.ticks(90);
-  EXPECT_EQ(t.told(Event::begin, "crate", "slab"), 1);
-  EXPECT_EQ(t.told(Event::begin, "crate", "floor"), 0);
-  t.tell({"slab", Action::open, 0, 0, {}});
+  EXPECT_EQ(t.countEvents(Event::begin, "crate", "slab"), 1);
+  EXPECT_EQ(t.countEvents(Event::begin, "crate", "floor"), 0);
+  t.submit({"slab", Action::open, 0, 0, {}});
   t.ticks(120);
-  EXPECT_EQ(t.told(Event::end, "crate", "slab"), 1);
-  EXPECT_EQ(t.told(Event::begin, "crate", "floor"), 1);
+  EXPECT_EQ(t.countEvents(Event::end, "crate", "slab"), 1);
+  EXPECT_EQ(t.countEvents(Event::begin, "crate", "floor"), 1);
 }
 
-TEST(Bodies, AbsurdCommandsAreRefusedAndChangeNothing) {
-  BodyTrial t(hingedDoor()), twin(hingedDoor());
+TEST(KinematicBodies, AbsurdCommandsAreRefusedAndChangeNothing) {
+  BodyFixture t(hingedDoor()), other(hingedDoor());
   const double nan = std::nan("");
   for (const BodyCommand& command :
-       {BodyCommand{"door", Action::to, nan, 0, {}}, BodyCommand{"door", Action::to, 7, 0, {}},
-        BodyCommand{"door", Action::level, 0, 1, {}}, BodyCommand{"door", Action::run, 0, 0, {}},
-        BodyCommand{"door", Action::open, 0, 0, nan}, BodyCommand{"door", Action::open, 0, 0, -1},
-        BodyCommand{"door", Action::open, 0, 0, 1e9},
+       {BodyCommand{"door", Action::moveTo, nan, 0, {}},
+        BodyCommand{"door", Action::moveTo, 7, 0, {}},
+        BodyCommand{"door", Action::moveToLevel, 0, 1, {}},
+        BodyCommand{"door", Action::run, 0, 0, {}}, BodyCommand{"door", Action::open, 0, 0, nan},
+        BodyCommand{"door", Action::open, 0, 0, -1}, BodyCommand{"door", Action::open, 0, 0, 1e9},
         BodyCommand{"gate", Action::open, 0, 0, {}}}) {
-    EXPECT_TRUE(submit(t.world, command));
+    EXPECT_TRUE(submitBodyCommand(t.world, command));
     t.step();
-    twin.step();
+    other.step();
   }
-  EXPECT_EQ(t.world.snapshot()->stateHash, twin.world.snapshot()->stateHash);
+  EXPECT_EQ(t.world.snapshot()->stateHash, other.world.snapshot()->stateHash);
 }
 
-TEST(Bodies, TheSameCommandsGiveTheSameBits) {
+TEST(KinematicBodies, TheSameCommandsGiveTheSameBits) {
   const auto run = [] {
-    BodyTrial t(hingedDoor({{"wall", {-2, 0, -1.6}, {2, 3, -1.5}}}));
+    BodyFixture t(hingedDoor({{"wall", {-2, 0, -1.6}, {2, 3, -1.5}}}));
     t.order("ann", Spawn{{0.6, 0.01, -0.5}, 0, 0.3, 1.75});
     t.ticks(10);
-    t.tell({"door", Action::open, 0, 0, {}});
+    t.submit({"door", Action::open, 0, 0, {}});
     t.ticks(100);
     return t.world.snapshot()->stateHash;
   };
   EXPECT_EQ(run(), run());
 }
 
-TEST(Bodies, WhatIsWrongWithASpecIsNamed) {
+TEST(KinematicBodies, AnInvalidFieldOfASpecIsNamed) {
   Model model = hingedDoor();
   model.bodies[0].axis = {0, 2, 0};
-  EXPECT_NE(refusalOfBodies(model).value_or("").find("axis"), std::string::npos);
+  EXPECT_NE(validateBodies(model).value_or("").find("axis"), std::string::npos);
   model = hingedDoor();
   model.bodies.push_back(model.bodies[0]);
-  EXPECT_NE(refusalOfBodies(model).value_or("").find("two bodies"), std::string::npos);
+  EXPECT_NE(validateBodies(model).value_or("").find("two bodies"), std::string::npos);
   model = hingedDoor();
   model.bodies[0].low = std::nan("");
-  EXPECT_NE(refusalOfBodies(model).value_or("").find("limits"), std::string::npos);
+  EXPECT_NE(validateBodies(model).value_or("").find("limits"), std::string::npos);
   EXPECT_THROW(Scene{model}, std::invalid_argument);
 }
 

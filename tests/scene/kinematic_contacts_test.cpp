@@ -20,7 +20,7 @@ using Phase = ContactEvent::Phase;
 
 constexpr double kQuarter = 1.5707963267948966;
 
-/// A leaf in the plane z = 0 whose tip is at `tip`, and which turns about `hinge`.
+/// A leaf in the plane z = 0 with its tip at `tip` that rotates about `hinge`.
 BodySpec leafSpec(const std::string& name, std::uint32_t object, double hinge) {
   BodySpec spec = bodySpec(name, BodyKind::hinged, {object});
   spec.anchor = {hinge, 0, 0};
@@ -28,8 +28,7 @@ BodySpec leafSpec(const std::string& name, std::uint32_t object, double hinge) {
   return spec;
 }
 
-/// A lift of 2 x 2 m that rises past a beam, whose underside is at y = 2, from a floor that it
-/// stands on.
+/// A lift of 2 x 2 m that rises from the floor under it past a beam whose underside is at y = 2.
 Model liftUnderABeam() {
   Model model = boxModel(
       {floorBox(), {"car", {-1, 0, -1}, {1, 0.5, 1}}, {"beam", {0.9, 2, -1}, {3, 2.2, 1}}});
@@ -39,63 +38,65 @@ Model liftUnderABeam() {
   return model;
 }
 
-std::vector<ContactEvent> between(const BodyTrial& t, const std::string& a, const std::string& b) {
-  std::vector<ContactEvent> told;
+std::vector<ContactEvent> between(const BodyFixture& t, const std::string& a,
+                                  const std::string& b) {
+  std::vector<ContactEvent> reported;
   for (const ContactEvent& e : t.events)
-    if (nameOf(t.world, e.a) == a && nameOf(t.world, e.b) == b) told.push_back(e);
-  return told;
+    if (findEntityName(t.world, e.a) == a && findEntityName(t.world, e.b) == b)
+      reported.push_back(e);
+  return reported;
 }
 
-TEST(DrivenContacts, ALiftTellsTheBeamThatItGrazesAndNotTheFloorThatItBeganOn) {
-  BodyTrial t(liftUnderABeam());
-  t.tell({"lift", Action::level, 0, 1, {}});
+TEST(KinematicContacts, ALiftReportsAGrazedBeamButNotItsFloor) {
+  BodyFixture t(liftUnderABeam());
+  t.submit({"lift", Action::moveToLevel, 0, 1, {}});
   t.untilIdle();
   const auto up = between(t, "lift", "beam");
   ASSERT_EQ(up.size(), 2u);
   EXPECT_EQ(up[0].kind, Event::begin);
   EXPECT_EQ(up[0].tick, 90u);  // 1.5 m at 1 m/s
   EXPECT_EQ(up[1].kind, Event::end);
-  EXPECT_GE(up[1].decision.distance, 2 * t.world.lengths().epsilon);
-  EXPECT_EQ(up[1].decision.verdict, collision::Verdict::separated);
-  EXPECT_LT(up[1].decision.normal.y(), -0.9) << "the lift is above";
-  t.tell({"lift", Action::level, 0, 0, {}});
+  EXPECT_GE(up[1].separation.distance, 2 * t.world.settings().contactOffset);
+  EXPECT_EQ(up[1].separation.verdict, collision::Verdict::separated);
+  EXPECT_LT(up[1].separation.normal.y(), -0.9) << "the lift is above";
+  t.submit({"lift", Action::moveToLevel, 0, 0, {}});
   t.untilIdle();
   EXPECT_EQ(between(t, "lift", "beam").size(), 4u);
-  EXPECT_EQ(t.events.size(), 4u) << "neither leaving its floor nor coming back is told";
+  EXPECT_EQ(t.events.size(), 4u) << "leaving the floor and returning are not reported";
 }
 
-TEST(DrivenContacts, AContactLastsWhileTheTwoStandAndIsToldOnce) {
-  BodyTrial t(liftUnderABeam());
-  t.tell({"lift", Action::to, 1.6, 0, {}});
+TEST(KinematicContacts, AContactAtRestLastsAndIsReportedOnce) {
+  BodyFixture t(liftUnderABeam());
+  t.submit({"lift", Action::moveTo, 1.6, 0, {}});
   t.untilIdle();
-  EXPECT_EQ(t.step().liveContacts, 1u);
+  EXPECT_EQ(t.step().activeContacts, 1u);
   t.ticks(60);
   EXPECT_EQ(between(t, "lift", "beam").size(), 1u);
-  const auto ends = endContacts(t.world, ContactEvent::Reason::shutdown);
+  const auto ends = endAllContacts(t.world, ContactEvent::Reason::shutdown);
   ASSERT_EQ(ends.size(), 1u);
-  EXPECT_EQ(nameOf(t.world, ends[0].b), "beam");
+  EXPECT_EQ(findEntityName(t.world, ends[0].b), "beam");
 }
 
-TEST(DrivenContacts, DoorsThatHitEachOtherAreToldByTheOneOfLesserId) {
-  // Their leaves are 1.1 m long, and the hinges 2 m apart: half open they meet. Drawn open.
+TEST(KinematicContacts, DoorsThatCollideAreReportedByTheLowerId) {
+  // The leaves are 1.1 m long and the hinges 2 m apart: they meet when half open. Modelled open.
   Model model =
       boxModel({{"right", {1, 0, -1.1}, {1.04, 2, 0}}, {"left", {-1.04, 0, -1.1}, {-1, 2, 0}}});
   model.bodies = {leafSpec("right door", 0, 1.04), leafSpec("left door", 1, -1.04)};
-  BodyTrial t(std::move(model));
-  t.tell({"left door", Action::to, -kQuarter, 0, {}});
+  BodyFixture t(std::move(model));
+  t.submit({"left door", Action::moveTo, -kQuarter, 0, {}});
   t.untilIdle();
   EXPECT_TRUE(t.events.empty());
-  t.tell({"right door", Action::to, kQuarter, 0, {}});
+  t.submit({"right door", Action::moveTo, kQuarter, 0, {}});
   t.untilIdle();
-  EXPECT_EQ(t.told(Event::begin, "right door", "left door"), 1);
-  EXPECT_EQ(t.told(Event::end, "right door", "left door"), 0);
-  t.tell({"left door", Action::to, 0, 0, {}});
+  EXPECT_EQ(t.countEvents(Event::begin, "right door", "left door"), 1);
+  EXPECT_EQ(t.countEvents(Event::end, "right door", "left door"), 0);
+  t.submit({"left door", Action::moveTo, 0, 0, {}});
   t.untilIdle();
-  EXPECT_EQ(t.told(Event::end, "right door", "left door"), 1);
+  EXPECT_EQ(t.countEvents(Event::end, "right door", "left door"), 1);
   EXPECT_EQ(t.events.size(), 2u);
 }
 
-TEST(DrivenContacts, AThingOnAPathTellsTheShelfThatItDrivesThrough) {
+TEST(KinematicContacts, APathBodyReportsAPenetratedShelf) {
   Model model = boxModel({floorBox(),
                           {"cart", {-4, 0, -0.5}, {-3, 1, 0.5}},
                           {"shelf", {-0.1, 0, -2}, {0.1, 2, 2}},
@@ -103,22 +104,22 @@ TEST(DrivenContacts, AThingOnAPathTellsTheShelfThatItDrivesThrough) {
   BodySpec cart = bodySpec("cart", BodyKind::path, {1});
   cart.keys = {{0, Vec3::Zero(), 0}, {4, {8, 0, 0}, 0}};
   model.bodies = {cart};
-  Lengths lengths;
-  lengths.nearMiss = 0.2;
-  BodyTrial t(std::move(model), lengths);
+  WorldSettings lengths;
+  lengths.nearMissDistance = 0.2;
+  BodyFixture t(std::move(model), lengths);
   t.untilIdle();
-  std::vector<std::pair<Event, Phase>> told;
-  for (const ContactEvent& e : between(t, "cart", "shelf")) told.emplace_back(e.kind, e.phase);
-  const std::vector<std::pair<Event, Phase>> expected{{Event::near, Phase::begin},
+  std::vector<std::pair<Event, Phase>> reported;
+  for (const ContactEvent& e : between(t, "cart", "shelf")) reported.emplace_back(e.kind, e.phase);
+  const std::vector<std::pair<Event, Phase>> expected{{Event::nearMiss, Phase::begin},
                                                       {Event::begin, Phase::none},
-                                                      {Event::near, Phase::end},
+                                                      {Event::nearMiss, Phase::end},
                                                       {Event::end, Phase::none}};
-  EXPECT_EQ(told, expected);
+  EXPECT_EQ(reported, expected);
   EXPECT_EQ(t.events.size(), 4u);
 }
 
-TEST(DrivenContacts, WhatIsPassedBetweenTwoTicksIsToldAsBegunAndEnded) {
-  // 1 m a tick, and a sheet of 1 mm; beside the way, 3 mm off, a post that is not met.
+TEST(KinematicContacts, AnObjectPassedBetweenTwoTicksBeginsAndEnds) {
+  // The cart moves 1 m a tick; the sheet is 1 mm thick. A post 3 mm off the path is not met.
   Model model = boxModel({{"cart", {-4.5, 0, -0.5}, {-4.4, 1, 0.5}},
                           {"sheet", {0.2, 0, -2}, {0.201, 2, 2}},
                           {"post", {-2, 0, 0.503}, {-1.9, 1, 0.6}}});
@@ -126,39 +127,39 @@ TEST(DrivenContacts, WhatIsPassedBetweenTwoTicksIsToldAsBegunAndEnded) {
   cart.axis = Vec3::UnitX();
   cart.high = 8, cart.speed = 60;
   model.bodies = {cart};
-  Lengths lengths;
-  lengths.nearMiss = 0.05;
-  BodyTrial t(std::move(model), lengths);
-  t.tell({"cart", Action::open, 0, 0, {}});
+  WorldSettings lengths;
+  lengths.nearMissDistance = 0.05;
+  BodyFixture t(std::move(model), lengths);
+  t.submit({"cart", Action::open, 0, 0, {}});
   t.untilIdle();
   ASSERT_EQ(t.events.size(), 2u);
-  EXPECT_EQ(nameOf(t.world, t.events[0].b), "sheet");
+  EXPECT_EQ(findEntityName(t.world, t.events[0].b), "sheet");
   EXPECT_EQ(t.events[0].kind, Event::begin);
-  EXPECT_LT(t.events[0].decision.distance, 2 * lengths.epsilon);
+  EXPECT_LT(t.events[0].separation.distance, 2 * lengths.contactOffset);
   EXPECT_EQ(t.events[1].kind, Event::end);
   EXPECT_EQ(t.events[0].tick, t.events[1].tick);
 }
 
-TEST(DrivenContacts, ALeafThatTurnsPastAPostBetweenTwoTicksTouchesIt) {
-  // 1.5 rad in one tick; the post stands half way on, out of the boxes before and after.
+TEST(KinematicContacts, ALeafThatTurnsPastAPostBetweenTwoTicksTouchesIt) {
+  // 1.5 rad in one tick; the post stands half way, outside the boxes before and after.
   Model model = boxModel({{"leaf", {0, 0, -0.01}, {1, 2, 0}},
                           {"post", {0.6, 0, -0.61}, {0.61, 2, -0.6}},
                           {"low", {0.6, -1, -0.61}, {0.61, -0.002, -0.6}}});
   BodySpec leaf = leafSpec("door", 0, 0);
   leaf.speed = 90;
   model.bodies = {leaf};
-  BodyTrial t(std::move(model));
-  t.tell({"door", Action::to, 1.5, 0, {}});
+  BodyFixture t(std::move(model));
+  t.submit({"door", Action::moveTo, 1.5, 0, {}});
   t.step();
   ASSERT_EQ(t.events.size(), 2u);
-  EXPECT_EQ(t.told(Event::begin, "door", "post"), 1);
-  EXPECT_EQ(t.told(Event::end, "door", "post"), 1);
+  EXPECT_EQ(t.countEvents(Event::begin, "door", "post"), 1);
+  EXPECT_EQ(t.countEvents(Event::end, "door", "post"), 1);
   t.untilIdle();
   EXPECT_EQ(t.events.size(), 2u);
 }
 
-TEST(DrivenContacts, APathThatTurnsBackWithinATickTouchesWhatItReaches) {
-  // Out to 0.2 m and back in each tick, turning by as much as that: at rest before and after.
+TEST(KinematicContacts, APathThatReversesWithinATickTouchesReachedObjects) {
+  // Moves 0.2 m out and back in each tick and rotates as much: at rest before and after.
   Model model = boxModel({{"arm", {0, 0, -0.05}, {1, 0.1, 0.05}},
                           {"post", {1.15, 0, -0.05}, {1.16, 2, 0.05}},
                           {"far post", {1.203, 0, -0.05}, {1.21, 2, 0.05}},
@@ -167,23 +168,23 @@ TEST(DrivenContacts, APathThatTurnsBackWithinATickTouchesWhatItReaches) {
   arm.keys = {{0, Vec3::Zero(), 0}, {1.0 / 120, {0.2, 0, 0}, 0}, {1.0 / 60, Vec3::Zero(), 0}};
   arm.loops = true;
   model.bodies = {arm};
-  BodyTrial t(model);
+  BodyFixture t(model);
   for (int i = 1; i <= 5; ++i) {
     t.step();
-    EXPECT_EQ(t.told(Event::begin, "arm", "post"), i);
-    EXPECT_EQ(t.told(Event::end, "arm", "post"), i);
+    EXPECT_EQ(t.countEvents(Event::begin, "arm", "post"), i);
+    EXPECT_EQ(t.countEvents(Event::end, "arm", "post"), i);
     EXPECT_EQ(t.events.size(), 2u * static_cast<std::size_t>(i));
   }
   model.bodies[0].keys[1] = {1.0 / 120, Vec3::Zero(), -1};
-  BodyTrial turning(std::move(model));
+  BodyFixture turning(std::move(model));
   turning.step();
-  EXPECT_EQ(turning.told(Event::begin, "arm", "side post"), 1);
+  EXPECT_EQ(turning.countEvents(Event::begin, "arm", "side post"), 1);
   EXPECT_EQ(turning.events.size(), 2u);
 }
 
-/// Two blocks of 0.1 m. In one tick one goes 1 m along x from `x` on, and the other one from
-/// `z` on as `kind` has it: a slide of 1 m along z, or a path that comes back after half a metre.
-BodyTrial crossing(double x, BodyKind kind, double z) {
+/// Two blocks of 0.1 m. In one tick one moves 1 m along x from `x`; the other starts at `z` and
+/// moves by `kind`: a slide of 1 m along z, or a path that returns after half a metre.
+BodyFixture crossing(double x, BodyKind kind, double z) {
   Model model = boxModel({{"a", {x - 0.05, 0, -0.05}, {x + 0.05, 0.1, 0.05}},
                           {"b", {-0.05, 0, z - 0.05}, {0.05, 0.1, z + 0.05}}});
   BodySpec a = bodySpec("a", BodyKind::sliding, {0}), b = bodySpec("b", kind, {1});
@@ -194,26 +195,26 @@ BodyTrial crossing(double x, BodyKind kind, double z) {
     b.loops = true, b.speed = 1;
   }
   model.bodies = {a, b};
-  BodyTrial t(std::move(model));
-  t.tell({"a", Action::to, 1, 0, {}});
-  if (kind == BodyKind::sliding) t.tell({"b", Action::to, 1, 0, {}});
+  BodyFixture t(std::move(model));
+  t.submit({"a", Action::moveTo, 1, 0, {}});
+  if (kind == BodyKind::sliding) t.submit({"b", Action::moveTo, 1, 0, {}});
   t.step();
   return t;
 }
 
-TEST(DrivenContacts, TwoWhoseWaysCrossTouchIfTheyAreThereAtTheSameTime) {
+TEST(KinematicContacts, TwoWhoseWaysCrossTouchIfTheyAreThereAtTheSameTime) {
   for (const BodyKind kind : {BodyKind::sliding, BodyKind::path}) {
-    const BodyTrial meet = crossing(-0.5, kind, -0.5);
-    EXPECT_EQ(meet.told(Event::begin, "a", "b"), 1);
-    EXPECT_EQ(meet.told(Event::end, "a", "b"), 1);
+    const BodyFixture meet = crossing(-0.5, kind, -0.5);
+    EXPECT_EQ(meet.countEvents(Event::begin, "a", "b"), 1);
+    EXPECT_EQ(meet.countEvents(Event::end, "a", "b"), 1);
     EXPECT_EQ(meet.events.size(), 2u);
-    EXPECT_EQ(crossing(-0.75, kind, -0.5).events.size(), 0u) << "the second is through already";
-    EXPECT_EQ(crossing(-0.25, kind, -0.5).events.size(), 0u) << "the first is through already";
+    EXPECT_EQ(crossing(-0.75, kind, -0.5).events.size(), 0u) << "the second has passed already";
+    EXPECT_EQ(crossing(-0.25, kind, -0.5).events.size(), 0u) << "the first has passed already";
   }
 }
 
-TEST(DrivenContacts, TwoThatGoSideBySideCostAFewLooks) {
-  // Two carts 1.3 mm apart, end to end, at 5 m/s.
+TEST(KinematicContacts, TwoThatGoSideBySideCostAFewLooks) {
+  // Two carts 1.3 mm apart, one behind the other, at 5 m/s.
   Model model = boxModel({{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {1.0013, 0, 0}, {2, 1, 1}}});
   for (std::uint32_t i = 0; i < 2; ++i) {
     BodySpec cart = bodySpec(i == 0 ? "a" : "b", BodyKind::sliding, {i});
@@ -221,32 +222,32 @@ TEST(DrivenContacts, TwoThatGoSideBySideCostAFewLooks) {
     cart.high = 10, cart.speed = 5;
     model.bodies.push_back(cart);
   }
-  BodyTrial t(std::move(model));
-  for (const char* name : {"a", "b"}) t.tell({name, Action::open, 0, 0, {}});
+  BodyFixture t(std::move(model));
+  for (const char* name : {"a", "b"}) t.submit({name, Action::open, 0, 0, {}});
   for (int i = 0; i < 60; ++i) {
     const TickReport report = t.step();
     EXPECT_LE(report.narrowQueries, 3u) << i;
-    EXPECT_EQ(report.boundedSweeps, 0u) << i;
+    EXPECT_EQ(report.iterationLimitedCasts, 0u) << i;
   }
   EXPECT_TRUE(t.events.empty());
 }
 
-/// The first object slides along x by `high` metres; near misses begin at 0.3 m.
-BodyTrial trayThatSlid(Model model, double high) {
+/// A world in which the first object slides along x by `high` metres; near misses begin at 0.3 m.
+BodyFixture trayThatSlid(Model model, double high) {
   BodySpec tray = bodySpec("tray", BodyKind::sliding, {0});
   tray.axis = Vec3::UnitX();
   tray.high = high;
   model.bodies = {tray};
-  Lengths lengths;
-  lengths.nearMiss = 0.3;
-  BodyTrial t(std::move(model), lengths);
-  t.tell({"tray", Action::open, 0, 0, {}});
+  WorldSettings lengths;
+  lengths.nearMissDistance = 0.3;
+  BodyFixture t(std::move(model), lengths);
+  t.submit({"tray", Action::open, 0, 0, {}});
   t.untilIdle();
   return t;
 }
 
-TEST(DrivenContacts, ANearMissBeginsIsClosestAndEnds) {
-  const BodyTrial t = trayThatSlid(
+TEST(KinematicContacts, ANearMissBeginsIsClosestAndEnds) {
+  const BodyFixture t = trayThatSlid(
       boxModel({{"tray", {-2, 0, -0.5}, {-1, 0.1, 0.5}}, {"post", {-0.1, 0, 0.6}, {0.1, 2, 0.8}}}),
       4);
   const auto near = between(t, "tray", "post");
@@ -254,42 +255,42 @@ TEST(DrivenContacts, ANearMissBeginsIsClosestAndEnds) {
   EXPECT_EQ(near[0].phase, Phase::begin);
   EXPECT_EQ(near[1].phase, Phase::min);
   EXPECT_EQ(near[2].phase, Phase::end);
-  EXPECT_NEAR(near[1].decision.distance, 0.1, 1e-7);
+  EXPECT_NEAR(near[1].separation.distance, 0.1, 1e-7);
   for (const ContactEvent& event : near) {
-    EXPECT_NE(event.decision.featureA, collision::Feature::none);
-    EXPECT_NE(event.decision.featureB, collision::Feature::none);
+    EXPECT_NE(event.separation.featureA, collision::Feature::none);
+    EXPECT_NE(event.separation.featureB, collision::Feature::none);
   }
   EXPECT_LT(near[0].tick, near[1].tick);
-  EXPECT_GE(near[2].decision.distance, 0.3);
+  EXPECT_GE(near[2].separation.distance, 0.3);
 }
 
-TEST(DrivenContacts, ANearMissThatLivesWhenTheWorldEndsIsToldAsOver) {
-  BodyTrial t = trayThatSlid(
+TEST(KinematicContacts, AnActiveNearMissEndsWithTheWorld) {
+  BodyFixture t = trayThatSlid(
       boxModel({{"tray", {0, 0, 0}, {1, 0.1, 1}}, {"post", {1.5, 0, 0}, {1.6, 2, 1}}}), 0.4);
   ASSERT_EQ(t.events.size(), 1u);
-  const auto ends = endContacts(t.world, ContactEvent::Reason::shutdown);
+  const auto ends = endAllContacts(t.world, ContactEvent::Reason::shutdown);
   ASSERT_EQ(ends.size(), 2u);
   EXPECT_EQ(ends[0].phase, Phase::min);
   EXPECT_EQ(ends[1].phase, Phase::end);
   EXPECT_EQ(ends[1].reason, ContactEvent::Reason::shutdown);
 }
 
-TEST(DrivenContacts, WhatABodyIsMountedOnIsListedAndFollowsFromTheScene) {
+TEST(KinematicContacts, TheMountingOfABodyIsListedAndFollowsFromTheScene) {
   Model model = liftUnderABeam();
-  model.meshes.push_back(boxMesh({1, 0, -1}, {1.2, 2.5, 1}));  // beside the car: touches it
+  model.meshes.push_back(boxMesh({1, 0, -1}, {1.2, 2.5, 1}));  // next to the car, touching it
   model.objects.push_back({"gate", "", {3}, Eigen::Affine3d::Identity()});
   BodySpec gate = bodySpec("gate", BodyKind::sliding, {3});
   gate.high = 1;
   model.bodies.push_back(gate);
   const Scene scene(std::move(model));
-  const double contact = 2 * Lengths{}.epsilon;
-  EXPECT_EQ(mountingOf(scene, 0, contact), (std::vector<EntityId>{1, 4}));
-  EXPECT_EQ(mountingOf(scene, 1, contact), (std::vector<EntityId>{1, 2, 3}));
-  EXPECT_TRUE(isMountedOn(scene, 0, 4, contact));
-  EXPECT_FALSE(isMountedOn(scene, 0, 3, contact));
+  const double contact = 2 * WorldSettings{}.contactOffset;
+  EXPECT_EQ(findExcludedPartners(scene, 0, contact), (std::vector<EntityId>{1, 4}));
+  EXPECT_EQ(findExcludedPartners(scene, 1, contact), (std::vector<EntityId>{1, 2, 3}));
+  EXPECT_TRUE(isExcludedPair(scene, 0, 4, contact));
+  EXPECT_FALSE(isExcludedPair(scene, 0, 3, contact));
 }
 
-TEST(DrivenContacts, BodiesThatStandAreNotLookedAt) {
+TEST(KinematicContacts, BodiesThatStandAreNotLookedAt) {
   Model model = boxModel({floorBox(), {"wall", {-9, 0, 0.5}, {9, 3, 0.6}}});
   for (int i = 0; i < 16; ++i) {
     const double x = -8 + i;
@@ -302,27 +303,27 @@ TEST(DrivenContacts, BodiesThatStandAreNotLookedAt) {
     leaf.anchor.z() = 0.55;
     model.bodies.push_back(leaf);
   }
-  Lengths lengths;
-  lengths.nearMiss = 0.5;
-  BodyTrial t(std::move(model), lengths);
+  WorldSettings lengths;
+  lengths.nearMissDistance = 0.5;
+  BodyFixture t(std::move(model), lengths);
   for (int i = 0; i < 5; ++i) EXPECT_EQ(t.step().narrowQueries, 0u);
-  EXPECT_TRUE(t.world.state().mounted.empty());
-  t.tell({"door3", Action::open, 0, 0, {}});
+  EXPECT_TRUE(t.world.data().excludedPairCache.empty());
+  t.submit({"door3", Action::open, 0, 0, {}});
   const std::uint32_t ofOne = t.step().narrowQueries;
   EXPECT_GT(ofOne, 0u);
-  EXPECT_LE(ofOne, 12u) << "the floor and its neighbours; the wall is what it is mounted on";
+  EXPECT_LE(ofOne, 12u) << "the floor and its neighbours; the wall is its mounting";
 }
 
-TEST(DrivenContacts, ALeafThatGlidesAlongItsFrameIsLookedAtAFewTimes) {
-  // 2 mm from jamb, head and floor; its edge goes 26 mm a tick.
+TEST(KinematicContacts, ALeafThatGlidesAlongItsFrameIsLookedAtAFewTimes) {
+  // The door's gap to jamb, head and floor is 2 mm; its edge moves 26 mm a tick.
   Model model = boxModel({floorBox(),
                           {"leaf", {0, 0.002, 0}, {1, 2, 0.04}},
                           {"jamb", {-0.1, 0, 0}, {-0.002, 2.2, 0.04}},
                           {"head", {-0.1, 2.002, -2}, {1.2, 2.2, 2}}});
   BodySpec leaf = leafSpec("door", 1, 0);
   model.bodies = {leaf};
-  BodyTrial t(std::move(model));
-  t.tell({"door", Action::to, kQuarter, 0, {}});
+  BodyFixture t(std::move(model));
+  t.submit({"door", Action::moveTo, kQuarter, 0, {}});
   int looks = 0;
   for (int i = 0; i < 55; ++i) looks += static_cast<int>(t.step().narrowQueries);
   EXPECT_TRUE(t.events.empty());
@@ -330,7 +331,8 @@ TEST(DrivenContacts, ALeafThatGlidesAlongItsFrameIsLookedAtAFewTimes) {
   EXPECT_LT(looks, 4 * 55);
 }
 
-// ---- the slow twin ------------------------------------------------------------------------------
+// ---- reference implementation
+// --------------------------------------------------------------------
 
 class Chance {
  public:
@@ -355,7 +357,7 @@ Mesh shards(Chance& chance, const Vec3& at, int count) {
   return mesh;
 }
 
-/// Boxes and heaps of triangles, of which every other one is driven.
+/// Boxes and triangle meshes; every other one is kinematic.
 Model busyYard(Chance& chance) {
   Model model = boxModel({{"floor", {-5, -0.2, -5}, {5, 0, 5}}});
   for (std::uint32_t i = 1; i <= 14; ++i) {
@@ -372,7 +374,7 @@ Model busyYard(Chance& chance) {
     spec.speed = i % 4 == 1 ? chance.in(0.3, 3) : chance.in(10, 60);
     if (spec.kind == BodyKind::path) {
       spec.keys = {{0, Vec3::Zero(), 0}, {2, {chance.in(-3, 3), -0.3, 1}, 2}, {5, Vec3::Zero(), 0}};
-      if (chance.below(2) == 0)  // turns back within a tick, at times of its own
+      if (chance.below(2) == 0)  // the path reverses within a tick, at random times
         spec.keys = {{0, Vec3::Zero(), 0},
                      {0.006, {chance.in(-1.5, 1.5), chance.in(-0.5, 0.5), 0.3}, 1},
                      {chance.in(0.012, 0.03), Vec3::Zero(), 0}};
@@ -383,83 +385,87 @@ Model busyYard(Chance& chance) {
   return model;
 }
 
-ToldOnce someCommand(Chance& chance, const Model& model) {
-  ToldOnce told;
+TickCommands someCommand(Chance& chance, const Model& model) {
+  TickCommands commands;
   const BodySpec& spec =
       model.bodies[chance.below(static_cast<std::uint32_t>(model.bodies.size()))];
   if (spec.kind != BodyKind::path)
-    told.bodies.push_back({spec.name, Action::to, chance.in(-1.5, 2.5), 0, {}});
+    commands.bodies.push_back({spec.name, Action::moveTo, chance.in(-1.5, 2.5), 0, {}});
   else
-    told.bodies.push_back({spec.name, chance.below(3) == 0 ? Action::stop : Action::run, 0, 0, {}});
-  return told;
+    commands.bodies.push_back(
+        {spec.name, chance.below(3) == 0 ? Action::stop : Action::run, 0, 0, {}});
+  return commands;
 }
 
-BodyPlace between(const BodyPlace& a, const BodyPlace& b, double s) {
-  return {a.offset + s * (b.offset - a.offset), a.turn + s * (b.turn - a.turn)};
+JointPose between(const JointPose& a, const JointPose& b, double s) {
+  return {a.offset + s * (b.offset - a.offset), a.angle + s * (b.angle - a.angle)};
 }
 
-/// Where a path that loops is, by its keys one after another.
-BodyPlace onPath(const BodySpec& spec, double time) {
+/// Pose on a looping path, found by a linear search over its keys.
+JointPose onPath(const BodySpec& spec, double time) {
   while (time < 0) time += spec.keys.back().time;
   while (time >= spec.keys.back().time) time -= spec.keys.back().time;
   std::size_t i = 1;
   while (spec.keys[i].time < time) ++i;
   const PathKey &a = spec.keys[i - 1], &b = spec.keys[i];
-  return between({a.offset, a.turn}, {b.offset, b.turn}, (time - a.time) / (b.time - a.time));
+  return between({a.offset, a.angle}, {b.offset, b.angle}, (time - a.time) / (b.time - a.time));
 }
 
-/// Where a body that nobody blocked was at `part` of the tick. A path is followed in four
-/// stretches.
-BodyPlace placeAt(const Body& body, double part, double tick) {
-  const BodyPlace now = body.drive.place;
+/// Pose of an unblocked body at fraction `part` of the tick. A path is followed in four segments.
+JointPose placeAt(const Body& body, double part, double tick) {
+  const JointPose now = body.drive.pose;
   if (part == 1 || !body.moved) return now;
   if (body.spec->kind != BodyKind::path) {
     const double back = (part - 1) * tick;
-    return {now.offset + back * body.velocity, now.turn + back * body.spin.dot(body.spec->axis)};
+    return {now.offset + back * body.velocity,
+            now.angle + back * body.angularVelocity.dot(body.spec->axis)};
   }
   const auto station = [&](double quarter) {
-    return onPath(*body.spec, body.drive.coordinate - (1 - quarter / 4) * tick * body.drive.speed);
+    return onPath(*body.spec,
+                  body.drive.jointPosition - (1 - quarter / 4) * tick * body.drive.speed);
   };
   const double quarter = std::floor(4 * part);
   return between(station(quarter), station(quarter + 1), 4 * part - quarter);
 }
 
-/// All pairs of which one is driven, part by part by the exact verdict at every tick.
-struct SlowTwin {
+/// Reference implementation: all pairs with a kinematic body, part by part, by the exact verdict at
+/// every tick.
+struct ReferenceEvents {
   struct Pair {
     bool touching = false, near = false;
     double distance = 0;
   };
   using Key = std::pair<EntityId, EntityId>;
 
-  explicit SlowTwin(const World& w) : world(w) {
+  explicit ReferenceEvents(const World& w) : world(w) {
     for (const Key& key : pairs()) mounted[key] = stateOf(key).touching;
   }
 
-  /// Where they are at `part` of the tick; `turned` keeps what they point at.
-  std::vector<collision::ConvexBody> partsAt(EntityId id, double part,
-                                             collision::Mat3& turned) const {
-    const WorldState& state = world.state();
-    std::vector<collision::ConvexBody> parts;
-    if (const auto body = state.bodyOfId.find(id); body != state.bodyOfId.end()) {
+  /// Parts of a body at fraction `part` of the tick; `turned` owns the rotations that they point
+  /// at.
+  std::vector<collision::PlacedConvex> partsAt(EntityId id, double part,
+                                               collision::Mat3& turned) const {
+    const WorldData& state = world.data();
+    std::vector<collision::PlacedConvex> parts;
+    if (const auto body = state.bodyIndexById.find(id); body != state.bodyIndexById.end()) {
       const Body& b = state.bodies[body->second];
-      const BodyPlace place = placeAt(b, part, world.lengths().tick);
-      turned = Eigen::AngleAxisd(place.turn, b.spec->axis);
+      const JointPose place = placeAt(b, part, world.settings().tickDuration);
+      turned = Eigen::AngleAxisd(place.angle, b.spec->axis);
       for (std::uint32_t i = 0; i < b.shape->parts.size(); ++i) {
-        parts.push_back(partOf(b, i));
+        parts.push_back(makePlacedPart(b, i));
         if (part == 1) continue;
         parts.back().translation = b.spec->anchor + place.offset;
         parts.back().rotation = &turned;
       }
     } else {
-      const ObjectParts& still = state.scene->parts(id - 1);
-      for (std::uint32_t i = 0; i < still.size(); ++i) parts.push_back(still.body(i));
+      const CollisionGeometry& still = state.scene->collisionGeometry(id - 1);
+      for (std::uint32_t i = 0; i < still.size(); ++i) parts.push_back(still.convex(i));
     }
     return parts;
   }
   std::vector<Key> pairs() const {
     std::vector<Key> all;
-    const WorldState& state = world.state();
+    const WorldData& state = world.data();
     for (const Body& a : state.bodies) {
       for (const std::uint32_t still : state.scene->solidObjects())
         all.emplace_back(a.id, still + 1);
@@ -469,73 +475,74 @@ struct SlowTwin {
     return all;
   }
   Pair stateOf(const Key& key, double part = 1) const {
-    const double contact = 2 * world.lengths().epsilon;
+    const double contact = 2 * world.settings().contactOffset;
     Pair state;
     state.distance = std::numeric_limits<double>::infinity();
     collision::Mat3 turnedA, turnedB;
     for (const auto& a : partsAt(key.first, part, turnedA)) {
       for (const auto& b : partsAt(key.second, part, turnedB)) {
         collision::FeatureCache cache;
-        const collision::Decision decision = collision::decide(a, b, cache);
+        const collision::SeparationResult decision = collision::computeSeparation(a, b, cache);
         state.distance = std::min(state.distance, decision.distance);
-        state.touching = state.touching || collision::isNearerThan(a, b, contact, cache);
+        state.touching = state.touching || collision::isCloserThan(a, b, contact, cache);
       }
     }
-    state.near = !state.touching && state.distance < world.lengths().nearMiss;
+    state.near = !state.touching && state.distance < world.settings().nearMissDistance;
     return state;
   }
-  /// Metres: no point of it went farther, and in each part of the tick that part at most.
+  /// Upper bound on the displacement of any point of the body, metres; a fraction of the tick has
+  /// that fraction of it.
   double wayOf(EntityId id) const {
-    const auto at = world.state().bodyOfId.find(id);
-    if (at == world.state().bodyOfId.end()) return 0;
-    const Body& body = world.state().bodies[at->second];
+    const auto at = world.data().bodyIndexById.find(id);
+    if (at == world.data().bodyIndexById.end()) return 0;
+    const Body& body = world.data().bodies[at->second];
     if (!body.moved) return 0;
     double fastest = 0;
     for (int i = 0; i < 4; ++i) {
-      const BodyPlace a = placeAt(body, i / 4.0, world.lengths().tick),
-                      b = placeAt(body, (i + 1) / 4.0, world.lengths().tick);
+      const JointPose a = placeAt(body, i / 4.0, world.settings().tickDuration),
+                      b = placeAt(body, (i + 1) / 4.0, world.settings().tickDuration);
       fastest = std::max(
-          fastest, (a.offset - b.offset).norm() + std::abs(a.turn - b.turn) * body.shape->radius);
+          fastest, (a.offset - b.offset).norm() + std::abs(a.angle - b.angle) * body.shape->radius);
     }
     return 4 * fastest;
   }
-  /// How near they came in the tick after which they are `apart`, as samples tell.
+  /// Smallest sampled distance within the tick that ends at the distance `apart`.
   double nearestOnTheWay(const Key& key, double apart) const {
-    const double contact = 2 * world.lengths().epsilon;
+    const double contact = 2 * world.settings().contactOffset;
     if (apart > contact + wayOf(key.first) + wayOf(key.second)) return apart;
     for (int i = 0; i < kSamples; ++i)
       apart = std::min(apart, stateOf(key, static_cast<double>(i) / kSamples).distance);
     return apart;
   }
-  /// Takes the events of a contact on the way only, which must be there if somebody came so near,
-  /// and may if somebody could have.
-  template <class Told>
-  bool metOnTheWay(const Key& key, double apart, Told& told) {
-    const auto begin = told.find({key.first, key.second, Event::begin, Phase::none});
-    const auto end = told.find({key.first, key.second, Event::end, Phase::none});
-    const bool met = begin != told.end() && end != told.end();
+  /// Consumes the transient contact events. They are required if the sampled distance is small
+  /// enough, and allowed if the lower bound permits a contact.
+  template <class Events>
+  bool metOnTheWay(const Key& key, double apart, Events& reported) {
+    const auto begin = reported.find({key.first, key.second, Event::begin, Phase::none});
+    const auto end = reported.find({key.first, key.second, Event::end, Phase::none});
+    const bool met = begin != reported.end() && end != reported.end();
     const double nearest = nearestOnTheWay(key, apart);
-    const double contact = 2 * world.lengths().epsilon;
+    const double contact = 2 * world.settings().contactOffset;
     if (!met) {
       EXPECT_GE(nearest, 0.75 * contact)
-          << nameOf(world, key.first) << ", " << nameOf(world, key.second);
+          << findEntityName(world, key.first) << ", " << findEntityName(world, key.second);
       return false;
     }
     EXPECT_LT(nearest, contact + (wayOf(key.first) + wayOf(key.second)) / kSamples);
-    told.erase(begin), told.erase(end);
+    reported.erase(begin), reported.erase(end);
     ++onTheWay;
     return true;
   }
   bool moved(EntityId id) const {
-    const auto body = world.state().bodyOfId.find(id);
-    return body != world.state().bodyOfId.end() && world.state().bodies[body->second].moved;
+    const auto body = world.data().bodyIndexById.find(id);
+    return body != world.data().bodyIndexById.end() && world.data().bodies[body->second].moved;
   }
 
-  /// Compares what a tick told with what is so now.
+  /// Compares the events of a tick with the state after it.
   void follow(const TickReport& report) {
-    std::map<std::tuple<EntityId, EntityId, Event, Phase>, double> told;
+    std::map<std::tuple<EntityId, EntityId, Event, Phase>, double> reported;
     for (const ContactEvent& e : report.contacts)
-      EXPECT_TRUE(told.try_emplace({e.a, e.b, e.kind, e.phase}, e.decision.distance).second);
+      EXPECT_TRUE(reported.try_emplace({e.a, e.b, e.kind, e.phase}, e.separation.distance).second);
     std::uint32_t live = 0;
     for (const Key& key : pairs()) {
       Pair& last = now[key];
@@ -543,40 +550,40 @@ struct SlowTwin {
       if (moved(key.first) || moved(key.second)) {
         Pair before = last;
         last = stateOf(key);
-        if (!before.touching && !last.touching && metOnTheWay(key, last.distance, told)) {
+        if (!before.touching && !last.touching && metOnTheWay(key, last.distance, reported)) {
           if (before.near) {
-            EXPECT_EQ(told.erase({key.first, key.second, Event::near, Phase::end}), 1u);
+            EXPECT_EQ(reported.erase({key.first, key.second, Event::nearMiss, Phase::end}), 1u);
           }
           parting[key] = true, before.near = false;
         }
         const auto take = [&](Event kind, Phase phase, bool expected) {
-          const auto at = told.find({key.first, key.second, kind, phase});
-          EXPECT_EQ(at != told.end(), expected)
-              << nameOf(world, key.first) << ", " << nameOf(world, key.second) << ", tick "
-              << report.snapshot->tick << ": " << static_cast<int>(kind);
-          if (at == told.end()) return;
+          const auto at = reported.find({key.first, key.second, kind, phase});
+          EXPECT_EQ(at != reported.end(), expected)
+              << findEntityName(world, key.first) << ", " << findEntityName(world, key.second)
+              << ", tick " << report.snapshot->tick << ": " << static_cast<int>(kind);
+          if (at == reported.end()) return;
           if (phase != Phase::min) {
             EXPECT_NEAR(at->second, last.distance, 1e-12);
           }
-          told.erase(at);
+          reported.erase(at);
         };
         const bool wasAway = !before.touching && !before.near;
-        // Who parts from a contact is near no more, until it was away.
+        // After a contact ends, the pair is not reported as near until it has been away once.
         last.near = last.near && !before.touching && (wasAway ? !parting[key] : true);
         parting[key] = !last.touching && (before.touching || parting[key]) &&
-                       last.distance < world.lengths().nearMiss;
+                       last.distance < world.settings().nearMissDistance;
         take(Event::begin, Phase::none, last.touching && !before.touching);
         take(Event::end, Phase::none, !last.touching && before.touching);
-        take(Event::near, Phase::begin, last.near && wasAway);
-        take(Event::near, Phase::min, before.near && !last.near && !last.touching);
-        take(Event::near, Phase::end, before.near && !last.near);
+        take(Event::nearMiss, Phase::begin, last.near && wasAway);
+        take(Event::nearMiss, Phase::min, before.near && !last.near && !last.touching);
+        take(Event::nearMiss, Phase::end, before.near && !last.near);
         begun += last.touching && !before.touching ? 1 : 0;
         begunNear += last.near && wasAway ? 1 : 0;
       }
       live += last.touching ? 1 : 0;
     }
-    EXPECT_TRUE(told.empty()) << "told of nothing that is so: " << told.size();
-    EXPECT_EQ(report.liveContacts, live);
+    EXPECT_TRUE(reported.empty()) << "events without a cause:" << reported.size();
+    EXPECT_EQ(report.activeContacts, live);
   }
 
   const World& world;
@@ -586,22 +593,23 @@ struct SlowTwin {
   static constexpr int kSamples = 24;
 };
 
-TEST(DrivenContacts, AreThoseThatBruteForceFindsInBusyYards) {
+TEST(KinematicContacts, AreThoseThatBruteForceFindsInBusyYards) {
   int begun = 0, begunNear = 0, onTheWay = 0, mounted = 0;
   constexpr int kYards = tests::kSanitized ? 3 : 12;
   for (unsigned seed = 1; seed <= kYards; ++seed) {
     Chance chance(seed);
-    Lengths lengths;
-    lengths.nearMiss = seed % 2 == 0 ? 0.15 : 0;
+    WorldSettings lengths;
+    lengths.nearMissDistance = seed % 2 == 0 ? 0.15 : 0;
     World world(std::make_shared<const Scene>(busyYard(chance)), lengths);
-    SlowTwin twin(world);
+    ReferenceEvents reference(world);
     for (int i = 0; i < 200 && !::testing::Test::HasFailure(); ++i) {
       if (i % 3 == 0) give(world, someCommand(chance, world.scene().model()));
-      twin.follow(tick(world));
+      reference.follow(tickWorld(world));
     }
-    begun += twin.begun, begunNear += twin.begunNear, onTheWay += twin.onTheWay;
-    for (const auto& [key, is] : twin.mounted) mounted += is ? 1 : 0;
-    for (const auto& [key, is] : world.state().mounted) EXPECT_EQ(twin.mounted.at(key), is);
+    begun += reference.begun, begunNear += reference.begunNear, onTheWay += reference.onTheWay;
+    for (const auto& [key, is] : reference.mounted) mounted += is ? 1 : 0;
+    for (const auto& [key, is] : world.data().excludedPairCache)
+      EXPECT_EQ(reference.mounted.at(key), is);
   }
   EXPECT_GT(begun, 5 * kYards);
   EXPECT_GT(begunNear, 2 * kYards);
@@ -609,24 +617,24 @@ TEST(DrivenContacts, AreThoseThatBruteForceFindsInBusyYards) {
   EXPECT_GT(mounted, kYards);
 }
 
-TEST(DrivenContacts, ARestoredWorldGoesOnAlike) {
+TEST(KinematicContacts, ARestoredWorldContinuesIdentically) {
   Chance chance(22);
-  Lengths lengths;
-  lengths.nearMiss = 0.15;
+  WorldSettings lengths;
+  lengths.nearMissDistance = 0.15;
   const auto scene = std::make_shared<const Scene>(busyYard(chance));
   World world(scene, lengths);
   std::optional<World> copy;
-  std::size_t told = 0;
+  std::size_t reported = 0;
   for (int i = 0; i < 240; ++i) {
-    if (i % 30 == 0) copy.emplace(worldFrom(scene, checkpointOf(world)));
-    const ToldOnce commands = i % 3 == 0 ? someCommand(chance, scene->model()) : ToldOnce{};
+    if (i % 30 == 0) copy.emplace(restoreWorld(scene, makeCheckpoint(world)));
+    const TickCommands commands = i % 3 == 0 ? someCommand(chance, scene->model()) : TickCommands{};
     give(world, commands), give(*copy, commands);
-    const TickReport one = tick(world), other = tick(*copy);
+    const TickReport one = tickWorld(world), other = tickWorld(*copy);
     ASSERT_TRUE(sameLists(one.contacts, other.contacts)) << "tick " << i;
     ASSERT_EQ(one.snapshot->stateHash, other.snapshot->stateHash) << "tick " << i;
-    told += one.contacts.size();
+    reported += one.contacts.size();
   }
-  EXPECT_GT(told, 20u);
+  EXPECT_GT(reported, 20u);
 }
 
 }  // namespace

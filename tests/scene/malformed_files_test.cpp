@@ -1,5 +1,5 @@
-// Files as modellers and enemies make them: each loads as what it shows, or fails with an error
-// that names the file, the stage and what to do.
+// Import tests on malformed and hostile files: each loads, or fails with an error that names the
+// file, the stage and a remedy.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -31,7 +31,7 @@ std::string boxGltf() {
 }
 
 std::size_t countOf(const Model& model, const std::string& kind) {
-  for (const Problem& problem : model.problems)
+  for (const Diagnostic& problem : model.diagnostics)
     if (problem.kind == kind) return problem.count;
   return 0;
 }
@@ -52,18 +52,18 @@ std::string failureOf(const fs::path& file) {
 
 // ---- files that fail ----------------------------------------------------------------------------
 
-struct Spoilt {
+struct Damage {
   const char* name;
   const char* file;
   std::string content;
-  std::vector<const char*> words;  ///< all in the error, beside the file's name
+  std::vector<const char*> words;  ///< all in the error, in addition to the file's name
 };
 
-void PrintTo(const Spoilt& spoilt, std::ostream* to) {
+void PrintTo(const Damage& spoilt, std::ostream* to) {
   *to << spoilt.name;
 }
 
-std::vector<Spoilt> spoiltFiles() {
+std::vector<Damage> damagedFiles() {
   const std::string box = boxGltf();
   const std::string glb = tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode);
   std::string deep = R"({"name":"0","children":[1]})";
@@ -131,9 +131,9 @@ std::vector<Spoilt> spoiltFiles() {
   };
 }
 
-class SpoiltFile : public ::testing::TestWithParam<Spoilt> {};
+class DamagedFile : public ::testing::TestWithParam<Damage> {};
 
-TEST_P(SpoiltFile, FailsWithItsNameTheStageAndARemedy) {
+TEST_P(DamagedFile, FailsWithItsNameTheStageAndARemedy) {
   const TemporaryFolder folder;
   const fs::path file = folder.write(GetParam().file, GetParam().content);
   const std::string error = failureOf(file);
@@ -148,12 +148,12 @@ TEST_P(SpoiltFile, FailsWithItsNameTheStageAndARemedy) {
   EXPECT_LT(error.size(), 600u) << error;
 }
 
-INSTANTIATE_TEST_SUITE_P(Table, SpoiltFile, ::testing::ValuesIn(spoiltFiles()),
+INSTANTIATE_TEST_SUITE_P(TextTable, DamagedFile, ::testing::ValuesIn(damagedFiles()),
                          [](const auto& row) { return std::string(row.param.name); });
 
 // ---- files that load ----------------------------------------------------------------------------
 
-TEST(OddFiles, AnObjWithCrlfNegativeIndicesPolygonsAndNoMaterialsLoads) {
+TEST(MalformedFiles, AnObjWithCrlfNegativeIndicesPolygonsAndNoMaterialsLoads) {
   const TemporaryFolder folder;
   const auto file = folder.write(
       "house plan.obj",
@@ -171,7 +171,7 @@ TEST(OddFiles, AnObjWithCrlfNegativeIndicesPolygonsAndNoMaterialsLoads) {
   EXPECT_GT(countOf(model, "missing_material_file"), 0u);
 }
 
-TEST(OddFiles, APathWithSpacesUmlautsAndAQuoteIsAPathAsAnyOther) {
+TEST(MalformedFiles, APathWithSpacesUmlautsAndAQuoteIsAPathAsAnyOther) {
   const TemporaryFolder folder;
   const std::string inner = "Häuser & 'Räume' 世界 #1";
   fs::create_directories(folder.path() / inner);
@@ -189,7 +189,7 @@ TEST(OddFiles, APathWithSpacesUmlautsAndAQuoteIsAPathAsAnyOther) {
   EXPECT_NE(failureOf(folder.write(inner + "/leer.glb", "")).find(inner), std::string::npos);
 }
 
-TEST(OddFiles, ASymbolicLinkIsWhatItPointsTo) {
+TEST(MalformedFiles, ASymbolicLinkIsFollowed) {
   const TemporaryFolder folder;
   folder.write("box.glb", tests::glb(BoxMesh({1, 2, 3}), "0", kOneNode));
   fs::create_symlink("box.glb", folder.path() / "link.glb");
@@ -202,7 +202,7 @@ TEST(OddFiles, ASymbolicLinkIsWhatItPointsTo) {
   EXPECT_NE(failureOf(folder.path() / "folder.glb").find("is a folder"), std::string::npos);
 }
 
-TEST(OddFiles, WhatMayNotBeReadIsToldAsThat) {
+TEST(MalformedFiles, AnUnreadableFileIsReportedAsSuch) {
   const TemporaryFolder folder;
   const auto locked = folder.write("locked.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
   fs::permissions(locked, fs::perms::none);
@@ -212,8 +212,8 @@ TEST(OddFiles, WhatMayNotBeReadIsToldAsThat) {
   const auto pipe = folder.path() / "pipe.glb";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   EXPECT_NE(failureOf(pipe).find("pipe.glb: is not a regular file"), std::string::npos);
-  // Root may read all: as somebody else, in a process of its own.
-  const auto asNobody = [&] {
+  // Root may read all files, so this runs as another user in a child process.
+  const auto asUnprivileged = [&] {
     if (geteuid() == 0 && (setgid(65534) != 0 || setuid(65534) != 0)) _exit(9);
     for (const fs::path& file : {locked, below}) {
       const std::string error = failureOf(file);
@@ -222,18 +222,18 @@ TEST(OddFiles, WhatMayNotBeReadIsToldAsThat) {
     }
     _exit(0);
   };
-  EXPECT_EXIT(asNobody(), ::testing::ExitedWithCode(0), "Permission denied");
+  EXPECT_EXIT(asUnprivileged(), ::testing::ExitedWithCode(0), "Permission denied");
   fs::permissions(below.parent_path(), fs::perms::owner_all);
 }
 
-TEST(OddFiles, AnExtensionInCapitalsIsOne) {
+TEST(MalformedFiles, AnExtensionInCapitalsIsOne) {
   const TemporaryFolder folder;
   const std::string glb = tests::glb(BoxMesh({1, 2, 3}), "0", kOneNode);
   expectSize(importModel(folder.write("BOX.GLB", glb)), {1, 2, 3});
   expectSize(importModel(folder.write("box.GlTf", boxGltf())), {1, 2, 3});
 }
 
-TEST(OddFiles, FifteenHundredNodesUnderOneAnotherAreOneObject) {
+TEST(MalformedFiles, FifteenHundredNestedNodesAreOneObject) {
   const TemporaryFolder folder;
   std::string nodes = R"({"name":"n","children":[1]})";
   for (int i = 1; i < 1500; ++i)
@@ -245,7 +245,7 @@ TEST(OddFiles, FifteenHundredNodesUnderOneAnotherAreOneObject) {
   EXPECT_NEAR(model.objects[0].worldFromMesh.translation().y(), 1.499, 1e-6);
 }
 
-TEST(OddFiles, ANodeWithoutSizeOrWithNumbersThatAreNoneLeavesTheOthers) {
+TEST(MalformedFiles, AZeroScaleOrNonFiniteNodeKeepsTheOthers) {
   const TemporaryFolder folder;
   const Model flat = importModel(folder.write(
       "flat.gltf", tests::gltf(BoxMesh({1, 2, 3}), "0,1",
@@ -259,19 +259,19 @@ TEST(OddFiles, ANodeWithoutSizeOrWithNumbersThatAreNoneLeavesTheOthers) {
   expectSize(wild, {1, 2, 3});
 }
 
-TEST(OddFiles, IndicesOfVerticesThatAreNotThereLeaveTheirTrianglesOut) {
+TEST(MalformedFiles, IndicesOfVerticesThatAreNotThereLeaveTheirTrianglesOut) {
   const TemporaryFolder folder;
   BoxMesh mesh({1, 2, 3});
   mesh.indices.insert(mesh.indices.end(), {0, 1, 60000, 7, 65535, 2});
   const Model model = importModel(folder.write("a.gltf", tests::gltf(mesh, "0", kOneNode)));
   expectSize(model, {1, 2, 3});
   EXPECT_EQ(model.meshes.at(0).indices.size(), 36u);
-  std::size_t told = 0;
-  for (const Problem& problem : model.problems) told += problem.count;
-  EXPECT_GE(told, 1u) << "it is left out in silence";
+  std::size_t reported = 0;
+  for (const Diagnostic& problem : model.diagnostics) reported += problem.count;
+  EXPECT_GE(reported, 1u) << "omitted without a diagnostic";
 }
 
-TEST(OddFiles, RequiredExtensionsOfLooksAloneAreNoHindrance) {
+TEST(MalformedFiles, RequiredExtensionsOfLooksAloneAreNoHindrance) {
   const TemporaryFolder folder;
   const auto requiring = [&](const std::string& extension) {
     return folder.write("a.gltf",
@@ -283,7 +283,7 @@ TEST(OddFiles, RequiredExtensionsOfLooksAloneAreNoHindrance) {
             std::string::npos);
 }
 
-TEST(OddFiles, IfcInFeetFarFromTheOriginIsInMetresAndNearIt) {
+TEST(MalformedFiles, IfcInFeetFarFromTheOriginIsInMetresAndNearIt) {
   const TemporaryFolder folder;
   tests::IfcHouse house;
   house.unit = "IFCCONVERSIONBASEDUNIT(#33,.LENGTHUNIT.,'FOOT',#32)";
@@ -299,7 +299,7 @@ TEST(OddFiles, IfcInFeetFarFromTheOriginIsInMetresAndNearIt) {
   expectSize(model, {4, 3, 0.3}, 1e-4);
 }
 
-TEST(OddFiles, AnFbxInCentimetresIsInMetres) {
+TEST(MalformedFiles, AnFbxInCentimetresIsInMetres) {
   const TemporaryFolder folder;
   const auto text = [](const char* factor) {
     return std::string(
@@ -327,7 +327,7 @@ TEST(OddFiles, AnFbxInCentimetresIsInMetres) {
   };
   const Model centimetres = importModel(folder.write("cm.fbx", text("1")));
   EXPECT_NEAR(centimetres.metresPerUnit, 0.01, 1e-12);
-  EXPECT_EQ(centimetres.up, 'z');
+  EXPECT_EQ(centimetres.upAxis, 'z');
   expectSize(centimetres, {1, 3, 2}, 1e-5);
   const Model inches = importModel(folder.write("inch.fbx", text("2.54")));
   EXPECT_NEAR(inches.metresPerUnit, 0.0254, 1e-12);

@@ -1,4 +1,5 @@
-// A second start reads what the first one kept; whatever is not as it was is imported again.
+// Tests of the model cache: a second start reads the stored entry; any changed input is imported
+// again.
 #include "scene/import/cache/model_cache.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +21,7 @@ namespace fs = std::filesystem;
 using tests::BoxMesh;
 using tests::TemporaryFolder;
 
-/// A glTF file with its buffer and a picture beside it, and a cache in a folder of its own.
+/// A glTF file with its buffer and an image next to it, and a cache in its own folder.
 class ModelCacheTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -95,7 +96,7 @@ TEST_F(ModelCacheTest, AChangeOfTheFileOrOfTheOptionsIsAnotherEntry) {
   EXPECT_EQ(renamed.model.objects[0].path, "cox");
 }
 
-TEST_F(ModelCacheTest, AChangeOfAFileBesideIsSeen) {
+TEST_F(ModelCacheTest, AChangeOfADependencyIsNoticed) {
   load();
   overwrite(folder_.path() / "box.bin", BoxMesh({4, 2, 3}).bytes());
   const LoadedModel changed = load();
@@ -106,9 +107,10 @@ TEST_F(ModelCacheTest, AChangeOfAFileBesideIsSeen) {
 
 TEST_F(ModelCacheTest, TheLibraryThatReadItIsAmongTheFilesThatMatter) {
   const Model model = load().model;
-  EXPECT_TRUE(std::any_of(model.filesBeside.begin(), model.filesBeside.end(), [](const auto& file) {
-    return file.find("/libassimp.so") != std::string::npos && fs::is_regular_file(file);
-  }));
+  EXPECT_TRUE(
+      std::any_of(model.dependencies.begin(), model.dependencies.end(), [](const auto& file) {
+        return file.find("/libassimp.so") != std::string::npos && fs::is_regular_file(file);
+      }));
 }
 
 TEST_F(ModelCacheTest, APictureThatWasMissingAndCameIsSeen) {
@@ -142,12 +144,12 @@ TEST_F(ModelCacheTest, AnEntryWithAnyBitFlippedOrCutShortIsImportedAgain) {
     EXPECT_FALSE(again.fromCache) << place;
     EXPECT_EQ(again.notes.size(), 1u) << place;
     EXPECT_EQ(serialiseModel(again.model), expected);
-    EXPECT_EQ(contentOf(entry).size(), whole.size()) << "it was not written anew";
+    EXPECT_EQ(contentOf(entry).size(), whole.size()) << "the entry was not rewritten";
     EXPECT_TRUE(load().fromCache);
   }
 }
 
-TEST_F(ModelCacheTest, AnEntryUnderTheNameOfAnotherIsNotTaken) {
+TEST_F(ModelCacheTest, AnEntryUnderAWrongNameIsNotUsed) {
   load();
   const fs::path entry = entries().at(0);
   const std::string box = contentOf(entry);
@@ -157,10 +159,10 @@ TEST_F(ModelCacheTest, AnEntryUnderTheNameOfAnotherIsNotTaken) {
   EXPECT_FALSE(load().fromCache);
 }
 
-TEST_F(ModelCacheTest, WhatWasNotReadForLongestGoesFirst) {
+TEST_F(ModelCacheTest, TheLeastRecentlyReadEntryIsEvictedFirst) {
   load();
   const std::uintmax_t bytes = fs::file_size(entries().at(0));
-  cache_->mostBytes = 3 * bytes + bytes / 2;
+  cache_->maxBytes = 3 * bytes + bytes / 2;
   const std::string text = contentOf(file_);
   const auto old = fs::file_time_type::clock::now() - std::chrono::hours(48);
   fs::last_write_time(entries().at(0), old);
@@ -169,21 +171,21 @@ TEST_F(ModelCacheTest, WhatWasNotReadForLongestGoesFirst) {
     load();
   }
   overwrite(file_, text);
-  EXPECT_TRUE(load().fromCache) << "which makes it the youngest";
+  EXPECT_TRUE(load().fromCache) << "which makes it the most recently used";
   for (const fs::path& entry : entries()) {
     if (fs::last_write_time(entry) > old + std::chrono::hours(1)) continue;
-    FAIL() << "not told as read: " << entry;
+    FAIL() << "not reported as read:" << entry;
   }
   overwrite(file_, text + " ");
   ASSERT_TRUE(load().fromCache);
   overwrite(file_, text + "    ");
   load();
   EXPECT_EQ(entries().size(), 3u);
-  cache_->mostBytes = bytes / 2;
+  cache_->maxBytes = bytes / 2;
   overwrite(file_, text + "      ");
   const LoadedModel large = load();
   ASSERT_EQ(large.notes.size(), 1u);
-  EXPECT_NE(large.notes[0].find("more than the cache may hold"), std::string::npos);
+  EXPECT_NE(large.notes[0].find("exceed the cache limit"), std::string::npos);
 }
 
 TEST_F(ModelCacheTest, WithoutAFolderToWriteToItWorksAndSaysSo) {
@@ -191,12 +193,12 @@ TEST_F(ModelCacheTest, WithoutAFolderToWriteToItWorksAndSaysSo) {
   const LoadedModel loaded = load();
   EXPECT_EQ(loaded.model.objects.size(), 1u);
   ASSERT_EQ(loaded.notes.size(), 1u);
-  EXPECT_NE(loaded.notes[0].find("not kept"), std::string::npos);
+  EXPECT_NE(loaded.notes[0].find("not cached"), std::string::npos);
   cache_->folder = "/dev/full";
   EXPECT_EQ(load().notes.size(), 1u);
 }
 
-TEST_F(ModelCacheTest, WhatCannotBeImportedIsAnErrorAndNoEntry) {
+TEST_F(ModelCacheTest, AFailedImportIsAnErrorWithoutAnEntry) {
   file_ = folder_.write("broken.gltf", "{");
   EXPECT_THROW(load(), ImportError);
   EXPECT_THROW(loadModel(folder_.path() / "none.gltf", {}, cache_), ImportError);
@@ -210,14 +212,14 @@ TEST(ModelCacheFolder, FollowsTheEnvironment) {
       unsetenv(each);
     setenv("HOME", "/home/ann", 1);
     if (name != nullptr) setenv(name, value, 1);
-    return modelCacheOfEnvironment();
+    return modelCacheFromEnvironment();
   };
   EXPECT_EQ(with(nullptr, "")->folder, "/home/ann/.cache/enfilade");
   EXPECT_EQ(with("XDG_CACHE_HOME", "/var/tmp/ann")->folder, "/var/tmp/ann/enfilade");
   EXPECT_EQ(with("XDG_CACHE_HOME", "not/absolute")->folder, "/home/ann/.cache/enfilade");
   EXPECT_FALSE(with("ENFILADE_CACHE", "off"));
   EXPECT_EQ(with("ENFILADE_CACHE", "/srv/models")->folder, "/srv/models");
-  EXPECT_EQ(with("ENFILADE_CACHE_MB", "100")->mostBytes, 100u << 20);
+  EXPECT_EQ(with("ENFILADE_CACHE_MB", "100")->maxBytes, 100u << 20);
   EXPECT_FALSE(with("HOME", ""));
   setenv("HOME", home.c_str(), 1);
 }
@@ -228,10 +230,10 @@ TEST(ShareMeshes, EqualMeshesAreStoredOnceAndUnusedOnesGo) {
                                    {"c", {0, 0, 0}, {1, 1, 2}},
                                    {"d", {0, 0, 0}, {1, 1, 1}}});
   model.meshes[1].name = "another name";
-  model.meshes.push_back(model.meshes[0]);  // used by nobody
+  model.meshes.push_back(model.meshes[0]);  // a mesh without users
   model.materials.resize(2);
   model.meshes[3].material = 1;
-  EXPECT_EQ(shareEqualMeshes(model), 2u);
+  EXPECT_EQ(deduplicateMeshes(model), 2u);
   ASSERT_EQ(model.meshes.size(), 3u);
   EXPECT_EQ(model.objects[0].meshes, model.objects[1].meshes);
   EXPECT_NE(model.objects[0].meshes, model.objects[2].meshes);
@@ -243,7 +245,7 @@ TEST(ShareMeshes, TheSceneStaysTheSame) {
   Model model = testing::boxModel(
       {{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {0, 0, 0}, {1, 1, 1}}, {"c", {0, 0, 0}, {2, 1, 1}}});
   const std::uint64_t hash = Scene(model).hash();
-  shareEqualMeshes(model);
+  deduplicateMeshes(model);
   const Scene shared(std::move(model));
   EXPECT_EQ(shared.hash(), hash);
   EXPECT_EQ(shared.shapeCount(), 2u);

@@ -30,7 +30,7 @@ Model smallModel() {
   object.path = "house/door#2";
   object.globalId = "2O2Fr$t4X7Zf8NOew3FNtn";
   object.ifcClass = "IfcDoor";
-  object.operation = "SINGLE_SWING_LEFT";
+  object.operationType = "SINGLE_SWING_LEFT";
   object.overallWidth = 0.9;
   object.overallHeight = 2.1;
   object.worldFromPlacement = Eigen::Affine3d(Eigen::Translation3d(4, 5, 6));
@@ -38,10 +38,10 @@ Model smallModel() {
   object.worldFromMesh = Eigen::Translation3d(0.1, 0.2, 0.3) * Eigen::Scaling(-1.0, 2.0, 1.0);
   model.objects.push_back(object);
   model.metresPerUnit = 0.3048;
-  model.up = 'z';
+  model.upAxis = 'z';
   model.offset = {459123, 113, -5428311};
-  model.problems.push_back({"missing_texture", 3, "wall.png"});
-  model.filesBeside = {"small.bin", "textures/wall.png"};
+  model.diagnostics.push_back({"missing_texture", 3, "wall.png"});
+  model.dependencies = {"small.bin", "textures/wall.png"};
   return model;
 }
 
@@ -57,12 +57,12 @@ TEST(ModelStream, RoundTripKeepsEveryByte) {
   EXPECT_EQ(back.offset, smallModel().offset);
   EXPECT_EQ(back.reader, "assimp");
   EXPECT_EQ(back.objects[0].ifcClass, "IfcDoor");
-  EXPECT_EQ(back.objects[0].operation, "SINGLE_SWING_LEFT");
+  EXPECT_EQ(back.objects[0].operationType, "SINGLE_SWING_LEFT");
   EXPECT_EQ(back.objects[0].overallHeight, 2.1);
   ASSERT_TRUE(back.objects[0].worldFromPlacement);
   EXPECT_EQ(back.objects[0].worldFromPlacement->translation(), Vec3(4, 5, 6));
-  EXPECT_EQ(back.problems[0].count, 3u);
-  EXPECT_EQ(back.filesBeside, smallModel().filesBeside);
+  EXPECT_EQ(back.diagnostics[0].count, 3u);
+  EXPECT_EQ(back.dependencies, smallModel().dependencies);
 }
 
 TEST(ModelStream, EveryShorterStreamIsRefused) {
@@ -71,7 +71,7 @@ TEST(ModelStream, EveryShorterStreamIsRefused) {
     std::vector<std::byte> cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
     EXPECT_THROW(deserialiseModel(cut), ModelStreamError) << size;
     if (size < 16) continue;
-    const std::uint64_t length = size;  // the same, by somebody who mends the length
+    const std::uint64_t length = size;  // the same with a corrected length
     std::memcpy(cut.data() + 8, &length, sizeof length);
     EXPECT_THROW(deserialiseModel(cut), ModelStreamError) << size;
   }
@@ -88,7 +88,7 @@ TEST(ModelStream, AnotherVersionIsRefusedByItsNumber) {
   }
 }
 
-/// What a reader of the model relies on without asking.
+/// Checks what a reader of the model relies on without checks.
 void expectSafe(const Model& model) {
   for (const Material& m : model.materials) {
     ASSERT_LT(m.baseColourTexture, static_cast<std::int64_t>(model.textures.size()));

@@ -13,7 +13,7 @@ namespace {
 constexpr double kGravity = 9.80665;
 constexpr double kEpsilon = 0.5e-3;
 
-TEST(Dynamics, AFreeFallGoesAsGravityHasIt) {
+TEST(PhysicsWorld, AFreeFallGoesAsGravityHasIt) {
   RigidScene scene;
   const auto box = scene.addFree(boxHull({0.2, 0.2, 0.2}), {0, 100, 0});
   scene.pairAll();
@@ -22,7 +22,7 @@ TEST(Dynamics, AFreeFallGoesAsGravityHasIt) {
   EXPECT_NEAR(scene.body(box).centre.y(), 100 - 0.5 * kGravity, 0.5 * kGravity / 240 + 1e-9);
 }
 
-TEST(Dynamics, ABoxComesToRestWithinEpsilonAndSleepsWithoutCreeping) {
+TEST(PhysicsWorld, ABoxComesToRestWithinEpsilonAndSleepsWithoutCreeping) {
   RigidScene scene;
   scene.addFloor();
   const auto box = scene.addFree(boxHull({0.2, 0.2, 0.2}), {0, 0.3, 0});
@@ -34,13 +34,13 @@ TEST(Dynamics, ABoxComesToRestWithinEpsilonAndSleepsWithoutCreeping) {
   EXPECT_TRUE(scene.asleep(box));
   EXPECT_LT((scene.body(box).centre - landed).norm(), 1e-5);
   const Vec3 slept = scene.body(box).centre;
-  const DynamicsReport report = scene.run(600);
+  const StepReport report = scene.run(600);
   EXPECT_EQ(scene.body(box).centre, slept);
   EXPECT_EQ(report.awake, 0u);
-  EXPECT_EQ(report.looks, 0u);
+  EXPECT_EQ(report.narrowPhaseQueries, 0u);
 }
 
-TEST(Dynamics, AStackOfFiveBoxesStaysAndSleeps) {
+TEST(PhysicsWorld, AStackOfFiveBoxesStaysAndSleeps) {
   RigidScene scene;
   scene.addFloor();
   std::vector<std::uint32_t> boxes;
@@ -55,30 +55,30 @@ TEST(Dynamics, AStackOfFiveBoxesStaysAndSleeps) {
     const Vec3 centre = scene.body(boxes[i]).centre;
     EXPECT_NEAR(centre.y(), 0.2 + 0.4 * i + (i + 1) * 0.75 * kEpsilon, (i + 1) * 0.25 * kEpsilon)
         << i;
-    EXPECT_NEAR(centre.x(), 0.01 * i, 2.5e-3) << i;  // it lands rocking
+    EXPECT_NEAR(centre.x(), 0.01 * i, 2.5e-3) << i;  // the ball rocks when it lands
     EXPECT_TRUE(scene.asleep(boxes[i])) << i;
   }
 }
 
-/// A box on a plane that is tilted by 2 atan(half) about Z: how far it slid in a second, down.
+/// The distance that a box slides down in a second on a plane tilted by 2 atan(half) about Z.
 double slideOf(double half, double friction) {
   RigidScene scene;
   const Quat tilt = turnBy(Vec3::UnitZ(), half);
   scene.addStill(boxHull({20, 0.5, 20}), tilt * Vec3(0, -0.5, 0), tilt);
   const Vec3 start = tilt * Vec3(0, 0.1 + kEpsilon, 0);
   const auto box = scene.addFree(boxHull({0.2, 0.1, 0.2}), start, tilt);
-  for (Solid& solid : scene.dynamics.solids) solid.motion.friction = friction;
+  for (PhysicsBody& solid : scene.dynamics.bodies) solid.motion.friction = friction;
   scene.pairAll();
   scene.run(60);
   return (scene.body(box).centre - start).dot(tilt * -Vec3::UnitX());
 }
 
-TEST(Dynamics, ABoxOnASlopeHoldsBelowTheAngleOfFriction) {
+TEST(PhysicsWorld, ABoxOnASlopeHoldsBelowTheAngleOfFriction) {
   // tan(angle) = 2 half / (1 - half^2) = 0.4167 for half = 0.2.
   EXPECT_LT(std::abs(slideOf(0.2, 0.43)), 1e-4);
 }
 
-TEST(Dynamics, ABoxOnASlopeSlidesAboveTheAngleOfFrictionAsCoulombHasIt) {
+TEST(PhysicsWorld, ABoxOnASlopeSlidesAboveTheAngleOfFrictionAsCoulombHasIt) {
   const double half = 0.2, sine = 2 * half / (1 + half * half);
   const double cosine = (1 - half * half) / (1 + half * half);
   for (const double friction : {0.0, 0.2, 0.35}) {
@@ -87,24 +87,24 @@ TEST(Dynamics, ABoxOnASlopeSlidesAboveTheAngleOfFrictionAsCoulombHasIt) {
   }
 }
 
-TEST(Dynamics, ABallRollsDownASlopeAtFiveSeventhsOfSliding) {
+TEST(PhysicsWorld, ABallRollsDownASlopeAtFiveSeventhsOfSliding) {
   RigidScene scene;
   const double half = 0.1, sine = 2 * half / (1 + half * half);
   const Quat tilt = turnBy(Vec3::UnitZ(), half);
   scene.addStill(boxHull({20, 0.5, 20}), tilt * Vec3(0, -0.5, 0), tilt);
   const auto ball = scene.addFree(ballHull(0.2, 20), tilt * Vec3(0, 0.2 + kEpsilon, 0), tilt);
-  for (Solid& solid : scene.dynamics.solids) solid.motion.friction = 0.8;
+  for (PhysicsBody& solid : scene.dynamics.bodies) solid.motion.friction = 0.8;
   scene.pairAll();
   const Vec3 start = scene.body(ball).centre;
   scene.run(60);
   const double rolled = (scene.body(ball).centre - start).norm();
   const double expected = 0.5 * 5.0 / 7.0 * kGravity * sine;
   EXPECT_NEAR(rolled, expected, 0.1 * expected);
-  EXPECT_NEAR(scene.body(ball).spin.norm() * 0.2, scene.body(ball).velocity.norm(),
+  EXPECT_NEAR(scene.body(ball).angularVelocity.norm() * 0.2, scene.body(ball).velocity.norm(),
               0.05 * scene.body(ball).velocity.norm());
 }
 
-TEST(Dynamics, EnergyOfWhatBouncesAndTumblesNeverGrows) {
+TEST(PhysicsWorld, EnergyOfBouncingAndTumblingBodiesNeverGrows) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> number(-1, 1);
   for (int round = 0; round < 12; ++round) {
@@ -113,7 +113,7 @@ TEST(Dynamics, EnergyOfWhatBouncesAndTumblesNeverGrows) {
     const auto box = scene.addFree(
         boxHull({0.1, 0.2, 0.4}), {0, 2, 0},
         turnBy(Vec3(number(random), number(random), number(random)).normalized(), 0.7));
-    scene.body(box).spin = 10 * Vec3(number(random), number(random), number(random));
+    scene.body(box).angularVelocity = 10 * Vec3(number(random), number(random), number(random));
     scene.body(box).velocity = 3 * Vec3(number(random), number(random), number(random));
     scene.body(box).restitution = 0.1 * round;
     if (round > 9) scene.body(box).restitution = 0.9;
@@ -129,7 +129,7 @@ TEST(Dynamics, EnergyOfWhatBouncesAndTumblesNeverGrows) {
   }
 }
 
-TEST(Dynamics, WhoeverIsMetInTheMiddleOfAStepTakesTheMomentumOver) {
+TEST(PhysicsWorld, ABodyHitInTheMiddleOfAStepTakesTheMomentum) {
   constexpr int kPhases = 16;
   for (int phase = 0; phase < kPhases; ++phase) {
     RigidScene scene;
@@ -144,18 +144,18 @@ TEST(Dynamics, WhoeverIsMetInTheMiddleOfAStepTakesTheMomentumOver) {
     scene.run(20);
     const double a = scene.body(moving).velocity.x(), b = scene.body(standing).velocity.x();
     EXPECT_NEAR(a + b, 6, 0.06) << phase;
-    EXPECT_GT(b, 2.9) << phase << ": nothing was met";
+    EXPECT_GT(b, 2.9) << phase << ": no contact";
   }
 }
 
-TEST(Dynamics, AFastBodyIsStoppedByAThinSheet) {
+TEST(PhysicsWorld, AFastBodyIsStoppedByAThinSheet) {
   RigidScene scene;
   const std::vector<Vec3> sheet{{-20, 0, -20}, {20, 0, -20}, {20, 0, 20}, {-20, 0, 20}};
   scene.addStill(collision::buildHull(sheet), {0, 0, 0});
   const auto box = scene.addFree(boxHull({0.05, 0.05, 0.05}), {0, 3, 0},
                                  turnBy(Vec3(1, 2, 3).normalized(), 0.3));
   scene.body(box).velocity = {0, -400, 0};
-  scene.body(box).spin = {30, 10, 50};
+  scene.body(box).angularVelocity = {30, 10, 50};
   scene.pairAll();
   for (int i = 0; i < 60; ++i) {
     scene.run(1);
@@ -164,11 +164,11 @@ TEST(Dynamics, AFastBodyIsStoppedByAThinSheet) {
   }
 }
 
-TEST(Dynamics, WhoSleepsWakesWhenSomethingFallsOnIt) {
+TEST(PhysicsWorld, ASleepingBodyWakesWhenAnotherFallsOnIt) {
   RigidScene scene;
   scene.addFloor();
   const auto low = scene.addFree(boxHull({0.2, 0.2, 0.2}), {0, 0.2 + kEpsilon, 0});
-  scene.dynamics.solids[low].asleep = true;
+  scene.dynamics.bodies[low].asleep = true;
   const auto high = scene.addFree(boxHull({0.1, 0.1, 0.1}), {0.25, 0.9, 0});
   scene.pairAll();
   bool woke = false;
@@ -182,24 +182,25 @@ TEST(Dynamics, WhoSleepsWakesWhenSomethingFallsOnIt) {
   EXPECT_TRUE(scene.asleep(high));
 }
 
-TEST(Dynamics, APileIsTheSameInTwoRunsAndBesideSleepers) {
+TEST(PhysicsWorld, APileIsEqualInTwoRunsAndNextToSleepers) {
   const auto pile = [](int sleepers) {
     RigidScene scene;
     scene.addFloor();
     for (int i = 0; i < sleepers; ++i) {
       const auto id = scene.addFree(boxHull({0.2, 0.2, 0.2}), {5.0 + i, 0.2005, 0});
-      scene.dynamics.solids[id].asleep = true;
+      scene.dynamics.bodies[id].asleep = true;
     }
-    const auto first = static_cast<std::uint32_t>(scene.dynamics.solids.size());
+    const auto first = static_cast<std::uint32_t>(scene.dynamics.bodies.size());
     for (int i = 0; i < 12; ++i)
       scene.addFree(boxHull({0.1 + 0.01 * i, 0.1, 0.15}), {0.05 * (i % 3), 0.3 + 0.4 * i, 0},
                     turnBy(Vec3::UnitX(), 0.05 * i));
     scene.pairAll();
     scene.run(120);
     std::vector<double> state;
-    for (std::uint32_t i = first; i < scene.dynamics.solids.size(); ++i) {
-      const RigidBody& body = scene.body(i);
-      for (int k = 0; k < 3; ++k) state.push_back(body.centre[k]), state.push_back(body.spin[k]);
+    for (std::uint32_t i = first; i < scene.dynamics.bodies.size(); ++i) {
+      const BodyMotion& body = scene.body(i);
+      for (int k = 0; k < 3; ++k)
+        state.push_back(body.centre[k]), state.push_back(body.angularVelocity[k]);
     }
     return state;
   };
@@ -208,20 +209,20 @@ TEST(Dynamics, APileIsTheSameInTwoRunsAndBesideSleepers) {
   EXPECT_EQ(once, pile(3));
 }
 
-// What a turn does is foreseen in part only where it is little: a tip that flies at a ball reaches
-// it with the speed that it had.
-TEST(Dynamics, ARodThatSwingsAtABallLosesNothingBeforeItHits) {
+// Motion by rotation is predicted only while it is small: a tip that swings at a ball reaches it at
+// full speed.
+TEST(PhysicsWorld, ARodThatSwingsAtABallLosesNothingBeforeItHits) {
   for (const double early : {0.2, 0.25, 0.3, 0.35, 0.4}) {
     RigidScene scene;
     scene.settings.solver.gravity = Vec3::Zero();
     const auto rod = scene.addFree(boxHull({0.5, 0.01, 0.01}), Vec3::Zero(),
                                    turnBy(Vec3::UnitZ(), -0.5 * early));
     const auto ball = scene.addFree(ballHull(0.03), {0.47, 0.05, 0});
-    scene.body(rod).spin = {0, 0, 10};
+    scene.body(rod).angularVelocity = {0, 0, 10};
     scene.pairAll();
     int ticks = 0;
     while (scene.body(ball).velocity.isZero(0) && ticks < 20) {
-      EXPECT_GT(scene.body(rod).spin.z(), 9.9) << early << ", " << ticks;
+      EXPECT_GT(scene.body(rod).angularVelocity.z(), 9.9) << early << ", " << ticks;
       scene.run(1), ++ticks;
     }
     EXPECT_GE(ticks, 2);

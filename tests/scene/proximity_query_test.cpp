@@ -1,5 +1,5 @@
-// How any two stand to one another, beside brute force over all their parts and beside what ticks
-// find.
+// Compares proximity queries between any two entities with brute force over all their parts, and
+// with the ticks' results.
 #include "scene/world/queries/proximity_query.hpp"
 
 #include <cmath>
@@ -10,7 +10,7 @@
 namespace enfilade::scene::testing {
 namespace {
 
-/// An object of triangles that are strewn in a ball: concave, and not closed.
+/// An object of random triangles in a ball: concave and not closed.
 Object strewn(Model& model, std::mt19937& random, const Vec3& middle, double spread) {
   std::normal_distribution<double> coordinate(0, spread);
   const auto near = [&](const Vec3& place) {
@@ -29,26 +29,27 @@ Object strewn(Model& model, std::mt19937& random, const Vec3& middle, double spr
           Eigen::Affine3d::Identity()};
 }
 
-/// A world without avatars, to be asked about.
+/// A world without avatars, as the target of queries.
 struct Still {
   explicit Still(Model model) : world(std::make_shared<const Scene>(std::move(model))) {}
   World world;
-  SceneIndex index{sharedScene(world)};
-  SceneThen then{index, *world.snapshot()};
+  EntityIndex index{sharedScene(world)};
+  SceneAt then{index, *world.snapshot()};
 };
 
-PairState stateOf(const SceneThen& then, EntityId a, EntityId b, bool refined = false) {
-  std::size_t work = kMostWork;
-  return std::get<PairState>(stateOfPair(then, a, b, refined, work));
+PairProximity stateOf(const SceneAt& then, EntityId a, EntityId b, bool refined = false) {
+  std::size_t work = kMaxQueryWork;
+  return std::get<PairProximity>(computePairProximity(then, a, b, refined, work));
 }
 
-/// The slow twin: every part with every part.
-collision::Decision bruteForce(const ObjectParts& a, const ObjectParts& b) {
-  std::optional<collision::Decision> nearest;
+/// Reference implementation: every part with every part.
+collision::SeparationResult bruteForce(const CollisionGeometry& a, const CollisionGeometry& b) {
+  std::optional<collision::SeparationResult> nearest;
   for (std::uint32_t i = 0; i < a.size(); ++i) {
     for (std::uint32_t k = 0; k < b.size(); ++k) {
       collision::FeatureCache cache;
-      const collision::Decision one = collision::decide(a.body(i), b.body(k), cache);
+      const collision::SeparationResult one =
+          collision::computeSeparation(a.convex(i), b.convex(k), cache);
       const bool nearer = !nearest || one.verdict > nearest->verdict ||
                           (one.verdict == nearest->verdict && one.distance < nearest->distance);
       if (nearer) nearest = one;
@@ -57,7 +58,7 @@ collision::Decision bruteForce(const ObjectParts& a, const ObjectParts& b) {
   return nearest.value();
 }
 
-TEST(PairState, TwoStillMeshesAreAsFarApartAsTheirNearestParts) {
+TEST(PairProximity, TheDistanceOfStaticMeshesIsThatOfTheirNearestParts) {
   std::mt19937 random(7);
   int apart = 0;
   constexpr int kPairs = 40;
@@ -66,24 +67,26 @@ TEST(PairState, TwoStillMeshesAreAsFarApartAsTheirNearestParts) {
     model.objects.push_back(strewn(model, random, Vec3::Zero(), 0.3));
     model.objects.push_back(strewn(model, random, Vec3(1.2 + 0.05 * i, 0.4, 0), 0.3));
     const Still still(std::move(model));
-    const PairState found = stateOf(still.then, 1, 2), back = stateOf(still.then, 2, 1),
-                    refined = stateOf(still.then, 1, 2, true);
+    const PairProximity found = stateOf(still.then, 1, 2), back = stateOf(still.then, 2, 1),
+                        refined = stateOf(still.then, 1, 2, true);
     const Scene& scene = still.world.scene();
-    const collision::Decision truth = bruteForce(scene.parts(0), scene.parts(1));
-    ASSERT_EQ(found.decision.verdict, truth.verdict);
-    EXPECT_EQ(back.decision.verdict, truth.verdict);
-    EXPECT_NEAR(found.decision.distance, truth.distance, 1e-12);
-    EXPECT_NEAR(back.decision.distance, truth.distance, 1e-12);
-    EXPECT_NEAR(refined.decision.distance, truth.distance, 1e-12);
-    EXPECT_NEAR((found.decision.pointA - found.decision.pointB).norm(), truth.distance, 1e-9);
+    const collision::SeparationResult truth =
+        bruteForce(scene.collisionGeometry(0), scene.collisionGeometry(1));
+    ASSERT_EQ(found.separation.verdict, truth.verdict);
+    EXPECT_EQ(back.separation.verdict, truth.verdict);
+    EXPECT_NEAR(found.separation.distance, truth.distance, 1e-12);
+    EXPECT_NEAR(back.separation.distance, truth.distance, 1e-12);
+    EXPECT_NEAR(refined.separation.distance, truth.distance, 1e-12);
+    EXPECT_NEAR((found.separation.pointA - found.separation.pointB).norm(), truth.distance, 1e-9);
     apart += truth.verdict == collision::Verdict::separated ? 1 : 0;
   }
   EXPECT_GT(apart, kPairs / 4);
   EXPECT_LT(apart, kPairs);
 }
 
-TEST(PairState, LargeMeshesThatAreFarApartCostLittle) {
-  // Two hilly plates of 40,000 triangles each, 3 m apart: brute force would be 1.6e9 decisions.
+TEST(PairProximity, LargeMeshesThatAreFarApartCostLittle) {
+  // Two hilly plates of 40,000 triangles each, 3 m apart; brute force would take 1.6e9 narrow-phase
+  // calls.
   Model model = boxModel({});
   for (const double height : {0.0, 3.0}) {
     Mesh mesh;
@@ -105,22 +108,23 @@ TEST(PairState, LargeMeshesThatAreFarApartCostLittle) {
                              Eigen::Affine3d::Identity()});
   }
   const Still still(std::move(model));
-  std::size_t work = kMostWork;
-  const auto found = std::get<PairState>(stateOfPair(still.then, 1, 2, false, work));
-  EXPECT_NEAR(found.decision.distance, 2.4015, 1e-3);
-  EXPECT_LT(kMostWork - work, kMostWork / 100);
+  std::size_t work = kMaxQueryWork;
+  const auto found = std::get<PairProximity>(computePairProximity(still.then, 1, 2, false, work));
+  EXPECT_NEAR(found.separation.distance, 2.4015, 1e-3);
+  EXPECT_LT(kMaxQueryWork - work, kMaxQueryWork / 100);
   std::size_t little = 100;
-  const auto none = stateOfPair(still.then, 1, 2, false, little);
-  ASSERT_TRUE(std::holds_alternative<NoAnswer>(none));
-  EXPECT_EQ(std::get<NoAnswer>(none).why, NoAnswer::Why::tooComplex);
-  EXPECT_EQ(little, 0u) << "it stopped before there was nothing left to take";
+  const auto none = computePairProximity(still.then, 1, 2, false, little);
+  ASSERT_TRUE(std::holds_alternative<QueryError>(none));
+  EXPECT_EQ(std::get<QueryError>(none).reason, QueryError::Reason::tooComplex);
+  EXPECT_EQ(little, 0u) << "it stopped too early";
   little = 100;
-  const Near near = std::get<Near>(nearTo(still.then, 1, 5, little));
-  EXPECT_TRUE(near.found.empty());
-  EXPECT_EQ(near.leftOut, 1u);
+  const NearbyEntities near =
+      std::get<NearbyEntities>(findNearbyEntities(still.then, 1, 5, little));
+  EXPECT_TRUE(near.pairs.empty());
+  EXPECT_EQ(near.skipped, 1u);
 }
 
-/// A closed convex mesh with so many corners on a ball of 1 m.
+/// A closed convex mesh with `corners` vertices on a sphere of 1 m.
 Mesh ballMesh(std::mt19937& random, std::size_t corners, const Vec3& middle) {
   std::normal_distribution<double> coordinate;
   std::vector<Vec3> points;
@@ -137,54 +141,56 @@ Mesh ballMesh(std::mt19937& random, std::size_t corners, const Vec3& middle) {
   return mesh;
 }
 
-TEST(PairState, TheDepthOfVeryRoundThingsIsMoreThanOneAnswerIsGiven) {
+TEST(PairProximity, TheDepthOfVeryRoundShapesExceedsTheWorkLimit) {
   std::mt19937 random(3);
   for (const std::size_t corners : {20u, 400u}) {
     Model model = boxModel({{"a", Vec3::Zero(), Vec3::Ones()}, {"b", Vec3::Zero(), Vec3::Ones()}});
     model.meshes = {ballMesh(random, corners, Vec3::Zero()),
                     ballMesh(random, corners, Vec3(1.2, 0, 0))};
     const Still still(std::move(model));
-    ASSERT_EQ(still.world.scene().parts(0).hullCount(), 1u);
-    std::size_t work = kMostWork;
-    const auto state = stateOfPair(still.then, 1, 2, true, work);
-    ASSERT_EQ(std::holds_alternative<PairState>(state), corners == 20);
+    ASSERT_EQ(still.world.scene().collisionGeometry(0).hullCount(), 1u);
+    std::size_t work = kMaxQueryWork;
+    const auto state = computePairProximity(still.then, 1, 2, true, work);
+    ASSERT_EQ(std::holds_alternative<PairProximity>(state), corners == 20);
     if (corners == 20) {
-      EXPECT_GT(std::get<PairState>(state).penetration, 0.3);
+      EXPECT_GT(std::get<PairProximity>(state).penetration, 0.3);
     }
-    EXPECT_EQ(stateOf(still.then, 1, 2).decision.verdict, collision::Verdict::penetrating);
+    EXPECT_EQ(stateOf(still.then, 1, 2).separation.verdict, collision::Verdict::penetrating);
   }
 }
 
-TEST(PairState, BoxesHaveTheDistancesThatWereBuilt) {
+TEST(PairProximity, BoxesHaveTheDistancesThatWereBuilt) {
   const Still still(boxModel(
       {floorBox(), {"wall", {5, 0, -4}, {5.2, 3, 4}}, {"inside", {5.1, 1, 0}, {6, 2, 1}}}));
-  const SceneThen& then = still.then;
-  EXPECT_EQ(entityNamed(then, "wall"), 2u);
-  EXPECT_EQ(entityNamed(then, "window"), 0u);
-  EXPECT_EQ(entityWith(then, 9), 0u);
-  EXPECT_EQ(stateOf(then, 1, 2).decision.verdict, collision::Verdict::touching);
-  EXPECT_EQ(stateOf(then, 2, 3).decision.verdict, collision::Verdict::penetrating);
-  const PairState above = stateOf(then, 1, 3, true);
-  EXPECT_EQ(above.decision.distance, 1.0);
-  EXPECT_EQ(above.decision.normal, Vec3(0, 1, 0));
+  const SceneAt& then = still.then;
+  EXPECT_EQ(findEntity(then, "wall"), 2u);
+  EXPECT_EQ(findEntity(then, "window"), 0u);
+  EXPECT_EQ(resolveEntity(then, 9), 0u);
+  EXPECT_EQ(stateOf(then, 1, 2).separation.verdict, collision::Verdict::touching);
+  EXPECT_EQ(stateOf(then, 2, 3).separation.verdict, collision::Verdict::penetrating);
+  const PairProximity above = stateOf(then, 1, 3, true);
+  EXPECT_EQ(above.separation.distance, 1.0);
+  EXPECT_EQ(above.separation.normal, Vec3(0, 1, 0));
 }
 
-TEST(PairState, WhatIsNearIsWhatTheTickFound) {
-  Trial trial({floorBox(), {"wall", {5, 0, -4}, {5.2, 3, 4}}, {"post", {0, 0, 2}, {0.2, 3, 2.2}}});
-  SceneIndex index(sharedScene(trial.world));
-  trial.order("ann", Spawn{Vec3(0, 0.001, 0), 0});
-  trial.order("ann", Walk{{Vec3(8, 0, 0)}, 2});
+TEST(PairProximity, NearbyEntitiesEqualThoseOfTheTick) {
+  WorldFixture run(
+      {floorBox(), {"wall", {5, 0, -4}, {5.2, 3, 4}}, {"post", {0, 0, 2}, {0.2, 3, 2.2}}});
+  EntityIndex index(sharedScene(run.world));
+  run.order("ann", Spawn{Vec3(0, 0.001, 0), 0});
+  run.order("ann", Walk{{Vec3(8, 0, 0)}, 2});
   for (int i = 0; i < 240; ++i) {
-    trial.step();
-    const SceneThen then{index, *trial.world.snapshot()};
-    const EntityId ann = entityNamed(then, "ann");
-    std::size_t work = kMostWork;
-    const auto near = std::get<Near>(nearTo(then, ann, 2 * trial.world.lengths().epsilon, work));
+    run.step();
+    const SceneAt then{index, *run.world.snapshot()};
+    const EntityId ann = findEntity(then, "ann");
+    std::size_t work = kMaxQueryWork;
+    const auto near = std::get<NearbyEntities>(
+        findNearbyEntities(then, ann, 2 * run.world.settings().contactOffset, work));
     std::set<std::pair<EntityId, EntityId>> pairs;
-    for (const PairState& one : near.found) pairs.insert({one.a, one.b});
-    ASSERT_EQ(pairs, trial.open) << "tick " << then.snapshot.tick;
+    for (const PairProximity& one : near.pairs) pairs.insert({one.a, one.b});
+    ASSERT_EQ(pairs, run.open) << "tick " << then.snapshot.tick;
   }
-  EXPECT_EQ(trial.open.size(), 2u) << "the wall was never reached";
+  EXPECT_EQ(run.open.size(), 2u) << "the wall was never reached";
 }
 
 }  // namespace

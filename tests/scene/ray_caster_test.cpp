@@ -5,7 +5,7 @@
 #include <numbers>
 #include <random>
 
-#include "scene/world/avatars/avatar_shape.hpp"
+#include "scene/world/data/avatar_shape.hpp"
 #include "tests/scene/body_fixture.hpp"
 
 namespace enfilade::scene::testing {
@@ -24,16 +24,16 @@ std::shared_ptr<const Scene> wallAndPane() {
 
 Snapshot someoneAt(const Vec3& feet) {
   Snapshot snapshot;
-  AvatarView ann;
+  AvatarSnapshot ann;
   ann.id = 100;
   ann.name = "ann";
-  ann.feet = feet;
-  ann.shape = prismShape(0.3, 1.75, 1.75, Lengths{});
+  ann.footPosition = feet;
+  ann.shape = makePrismShape(0.3, 1.75, 1.75, WorldSettings{});
   snapshot.avatars.push_back(ann);
   return snapshot;
 }
 
-TEST(RayCaster, TellsWhatIsMetFirstWhereAndHowItFaces) {
+TEST(RayCaster, ReportsFirstHitPointAndNormal) {
   const RayCaster caster(wallAndPane());
   const auto hit = caster.firstHit({{0, 1, 0}, {3, 0, 0}});
   ASSERT_TRUE(hit);
@@ -43,7 +43,7 @@ TEST(RayCaster, TellsWhatIsMetFirstWhereAndHowItFaces) {
   EXPECT_EQ(hit->normal, Vec3(-1, 0, 0));
 }
 
-TEST(RayCaster, LooksThroughGlassWhenAskedTo) {
+TEST(RayCaster, IgnoresGlassIfRequested) {
   const RayCaster caster(wallAndPane());
   const auto hit = caster.firstHit({{0, 1, 0}, Vec3::UnitX()}, {0, true});
   ASSERT_TRUE(hit);
@@ -63,12 +63,12 @@ TEST(RayCaster, EndsAtItsReach) {
 TEST(RayCaster, SeesTheSurfaceThatItLooksAt) {
   const RayCaster caster(wallAndPane());
   const Ray toThePane{{0, 1, 0}, Vec3::UnitX(), 2.0};
-  EXPECT_FALSE(caster.isBlocked(toThePane)) << "its own end is not in its way";
+  EXPECT_FALSE(caster.isBlocked(toThePane)) << "the query's own end does not block it";
 }
 
-TEST(RayCaster, MeetsWhatAFileMakesFlat) {
+TEST(RayCaster, HitsFlatGeometry) {
   Model model = boxModel({floorBox(), {"sheet", {2, 0, -3}, {3, 3, 3}}});
-  model.objects[1].worldFromMesh.linear().row(0).setZero();  // everything of it at x = 0
+  model.objects[1].worldFromMesh.linear().row(0).setZero();  // flattens the object to x = 0
   model.objects[1].worldFromMesh.translation().x() = 2;
   const RayCaster caster(std::make_shared<const Scene>(std::move(model)));
   const auto hit = caster.firstHit({{0, 1, 0}, Vec3::UnitX()});
@@ -81,17 +81,17 @@ TEST(RayCaster, MeetsAvatarsWhereTheyAreNow) {
   RayCaster caster(boxScene({floorBox()}));
   const Ray ray{{-5, 1, 0}, Vec3::UnitX()};
   EXPECT_FALSE(caster.firstHit(ray));
-  caster.follow(someoneAt({3, 0, 0}));
+  caster.update(someoneAt({3, 0, 0}));
   const auto hit = caster.firstHit(ray);
   ASSERT_TRUE(hit);
   EXPECT_EQ(hit->entity, 100u);
   EXPECT_NEAR(hit->distance, 7.7, 0.05);
-  EXPECT_FALSE(caster.firstHit(ray, {100, false})) << "the one that looks does not see itself";
+  EXPECT_FALSE(caster.firstHit(ray, {100, false})) << "the querying avatar does not see itself";
   EXPECT_TRUE(caster.isBlocked(ray));
   EXPECT_FALSE(caster.isBlocked(ray, {100, false}));
-  caster.follow(someoneAt({3, 0, 4}));
+  caster.update(someoneAt({3, 0, 4}));
   EXPECT_FALSE(caster.firstHit(ray));
-  caster.follow({});
+  caster.update({});
   EXPECT_FALSE(caster.firstHit({{-5, 1, 4}, Vec3::UnitX()}));
 }
 
@@ -102,19 +102,19 @@ TEST(RayCaster, MeetsADoorWhereItHasTurnedTo) {
   model.bodies[0].high = 2;
   RayCaster caster(std::make_shared<const Scene>(std::move(model)));
   const Ray atTheLeaf{{0, 1, 0.5}, Vec3::UnitX(), 5};
-  EXPECT_FALSE(caster.firstHit(atTheLeaf)) << "not placed before it is followed";
+  EXPECT_FALSE(caster.firstHit(atTheLeaf)) << "not placed before update()";
   Snapshot snapshot;
-  BodyView door;
+  BodySnapshot door;
   door.id = 2;
-  snapshot.bodies = std::make_shared<const std::vector<BodyView>>(1, door);
-  caster.follow(snapshot);
+  snapshot.bodies = std::make_shared<const std::vector<BodySnapshot>>(1, door);
+  caster.update(snapshot);
   ASSERT_TRUE(caster.firstHit(atTheLeaf));
   EXPECT_EQ(caster.firstHit(atTheLeaf)->entity, 2u);
   EXPECT_DOUBLE_EQ(caster.firstHit(atTheLeaf)->distance, 2);
-  door.displaced = true;  // by a right angle: it lies along +X from its hinge
+  door.displaced = true;  // open by a right angle: the leaf lies along +X from its hinge
   door.pose = {collision::Quat(std::sqrt(0.5), 0, std::sqrt(0.5), 0), {2, 0, 0}};
-  snapshot.bodies = std::make_shared<const std::vector<BodyView>>(1, door);
-  caster.follow(snapshot);
+  snapshot.bodies = std::make_shared<const std::vector<BodySnapshot>>(1, door);
+  caster.update(snapshot);
   EXPECT_FALSE(caster.isBlocked(atTheLeaf));
   const auto hit = caster.firstHit({{2.5, 1, -3}, Vec3::UnitZ()});
   ASSERT_TRUE(hit);
@@ -122,7 +122,7 @@ TEST(RayCaster, MeetsADoorWhereItHasTurnedTo) {
   EXPECT_NEAR(hit->distance, 2.9375, 1e-12);
 }
 
-/// Möller and Trumbore's test with every triangle, in doubles.
+/// Reference: the test of Möller and Trumbore on every triangle, in doubles.
 std::optional<double> slowDistance(const std::vector<collision::Triangle>& triangles,
                                    const Ray& ray) {
   std::optional<double> nearest;
@@ -141,7 +141,7 @@ std::optional<double> slowDistance(const std::vector<collision::Triangle>& trian
   return nearest;
 }
 
-/// Boxes of all turns, scattered.
+/// Boxes of random orientation, scattered.
 Model tumbledBoxes(std::mt19937& random) {
   std::uniform_real_distribution<double> place(-20, 20), size(0.1, 2), turn(-1, 1);
   Model model = boxModel({{"box", {-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}}});
@@ -164,7 +164,7 @@ TEST(RayCaster, AgreesWithDoublesOverAllTriangles) {
   const RayCaster caster(scene);
   std::vector<collision::Triangle> triangles;
   for (const std::uint32_t object : scene->solidObjects())
-    for (const collision::Triangle& t : solidTriangles(scene->model(), object))
+    for (const collision::Triangle& t : collectSolidTriangles(scene->model(), object))
       triangles.push_back(t);
   std::uniform_real_distribution<double> any(-1, 1);
   int hits = 0, differ = 0;
@@ -174,7 +174,7 @@ TEST(RayCaster, AgreesWithDoublesOverAllTriangles) {
     const auto slow = slowDistance(triangles, ray);
     const auto fast = caster.firstHit(ray);
     if (slow.has_value() != fast.has_value()) {
-      ++differ;  // by an edge that one of them passes
+      ++differ;  // along an edge, where one of them misses
       continue;
     }
     if (!slow) continue;
@@ -192,19 +192,19 @@ TEST(RayCaster, LosesNothingFarFromTheOrigin) {
   EXPECT_DOUBLE_EQ(hit->distance, 2000 * std::sqrt(1 + 1e-8));
 }
 
-TEST(RayCaster, RefusesWhatIsNoRay) {
+TEST(RayCaster, RefusesInvalidRays) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(refusal(Ray{}));
-  EXPECT_TRUE(refusal(Ray{{nan, 0, 0}, Vec3::UnitX()}));
-  EXPECT_TRUE(refusal(Ray{{1e8, 0, 0}, Vec3::UnitX()}));
-  EXPECT_TRUE(refusal(Ray{Vec3::Zero(), Vec3::Zero()}));
-  EXPECT_TRUE(refusal(Ray{Vec3::Zero(), {kInfinity, 0, 0}}));
-  EXPECT_TRUE(refusal(Ray{Vec3::Zero(), Vec3::UnitX(), 0}));
-  EXPECT_TRUE(refusal(Ray{Vec3::Zero(), Vec3::UnitX(), nan}));
+  EXPECT_FALSE(validateRay(Ray{}));
+  EXPECT_TRUE(validateRay(Ray{{nan, 0, 0}, Vec3::UnitX()}));
+  EXPECT_TRUE(validateRay(Ray{{1e8, 0, 0}, Vec3::UnitX()}));
+  EXPECT_TRUE(validateRay(Ray{Vec3::Zero(), Vec3::Zero()}));
+  EXPECT_TRUE(validateRay(Ray{Vec3::Zero(), {kInfinity, 0, 0}}));
+  EXPECT_TRUE(validateRay(Ray{Vec3::Zero(), Vec3::UnitX(), 0}));
+  EXPECT_TRUE(validateRay(Ray{Vec3::Zero(), Vec3::UnitX(), nan}));
   RangeScan scan;
-  EXPECT_FALSE(refusal(scan));
+  EXPECT_FALSE(validateScan(scan));
   scan.up = scan.forward;
-  EXPECT_TRUE(refusal(scan));
+  EXPECT_TRUE(validateScan(scan));
 }
 
 TEST(RangeScan, GoesFromLeftToRightAndFromAboveToBelow) {
@@ -213,7 +213,7 @@ TEST(RangeScan, GoesFromLeftToRightAndFromAboveToBelow) {
   scan.height = kPi / 4;
   scan.columns = 3;
   scan.rows = 2;
-  const std::vector<Ray> rays = raysOf(scan);
+  const std::vector<Ray> rays = makeScanRays(scan);
   ASSERT_EQ(rays.size(), 6u);
   const double half = std::sqrt(0.5);
   EXPECT_LT(rays[0].direction.z(), 0) << "left of +X is -Z";
@@ -233,12 +233,13 @@ TEST(RangeScan, OfAFullTurnMeetsAllFourWallsOnce) {
                                    {"south", {-9, 0, 6}, {9, 3, 7}},
                                    {"north", {-9, 0, -6}, {9, 3, -5}}}));
   RangeScan scan;
-  scan.at = {0, 1, 0};
+  scan.origin = {0, 1, 0};
   scan.width = 2 * kPi;
   scan.columns = 4;
   std::vector<double> distances;
-  for (const Ray& ray : raysOf(scan)) distances.push_back(caster.firstHit(ray).value().distance);
-  // From behind, over the left (north) and ahead (east), to the right (south).
+  for (const Ray& ray : makeScanRays(scan))
+    distances.push_back(caster.firstHit(ray).value().distance);
+  // From behind (west), over the left (north) and ahead (east), to the right (south).
   const std::vector<double> expected{4, 5, 3, 6};
   for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(distances[i], expected[i], 1e-12) << i;
 }

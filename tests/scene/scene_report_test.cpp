@@ -9,14 +9,14 @@ namespace enfilade::scene {
 namespace {
 
 std::size_t countOf(const SceneReport& report, const std::string& kind) {
-  for (const Problem& problem : report.problems) {
+  for (const Diagnostic& problem : report.diagnostics) {
     if (problem.kind == kind) return problem.count;
   }
   return 0;
 }
 
 std::string exampleOf(const SceneReport& report, const std::string& kind) {
-  for (const Problem& problem : report.problems) {
+  for (const Diagnostic& problem : report.diagnostics) {
     if (problem.kind == kind) return problem.example;
   }
   return "";
@@ -29,7 +29,7 @@ TEST(SceneReport, CountsObjectsTrianglesAndConvexParts) {
   open.indices.resize(30);
   model.meshes.push_back(open);
   model.objects.push_back({"open", "", {2}, Eigen::Affine3d(Eigen::Translation3d(7, 0, 0))});
-  const SceneReport report = reportOn(Scene(std::move(model)));
+  const SceneReport report = makeSceneReport(Scene(std::move(model)));
   EXPECT_EQ(report.objects, 4u);
   EXPECT_EQ(report.meshes, 3u);
   EXPECT_EQ(report.triangles, 46u);
@@ -38,10 +38,10 @@ TEST(SceneReport, CountsObjectsTrianglesAndConvexParts) {
   EXPECT_EQ(report.shells.open, 1u);
   EXPECT_EQ(report.hullTriangles, 36u);
   EXPECT_EQ(report.partTriangles, 10u);
-  EXPECT_TRUE(report.problems.empty());
+  EXPECT_TRUE(report.diagnostics.empty());
 }
 
-TEST(SceneReport, TellsWhatIsOddWithItsFirstExample) {
+TEST(SceneReport, ReportsDiagnosticsWithTheirFirstExample) {
   Model model = testing::boxModel({{"right", {0, 0, 0}, {1, 1, 1}},
                                    {"repeats", {0, 0, 0}, {1, 2, 1}},
                                    {"turned", {4, 0, 0}, {5, 1, 0.2}},
@@ -56,9 +56,9 @@ TEST(SceneReport, TellsWhatIsOddWithItsFirstExample) {
   Object again = model.objects[0];
   again.path = "again";
   model.objects.push_back(again);
-  model.problems.push_back({"missing_texture", 2, "wall.png"});
-  const SceneReport report = reportOn(Scene(std::move(model)));
-  EXPECT_EQ(report.problems.at(0).kind, "missing_texture");
+  model.diagnostics.push_back({"missing_texture", 2, "wall.png"});
+  const SceneReport report = makeSceneReport(Scene(std::move(model)));
+  EXPECT_EQ(report.diagnostics.at(0).kind, "missing_texture");
   EXPECT_EQ(countOf(report, "duplicate_triangle"), 2u);
   EXPECT_EQ(countOf(report, "degenerate_triangle"), 2u);
   EXPECT_EQ(countOf(report, "inside_out_solid"), 1u);
@@ -70,11 +70,11 @@ TEST(SceneReport, TellsWhatIsOddWithItsFirstExample) {
 }
 
 TEST(SceneReport, SpacesThatAreAirAreNotedAndNothingIsWrongWithThem) {
-  EXPECT_TRUE(kindOf({"skipped_spaces", 3, "hall"}).note);
-  EXPECT_TRUE(kindOf({"skipped_openings", 1, "door's"}).note);
-  EXPECT_FALSE(kindOf({"uncut_opening", 1, "door"}).note);
-  EXPECT_NE(kindOf({"uncut_opening", 1, "door"}).meaning, "");
-  EXPECT_EQ(kindOf({"of_a_later_version", 1, ""}).meaning, "");
+  EXPECT_TRUE(findDiagnosticKind({"skipped_spaces", 3, "hall"}).isNote);
+  EXPECT_TRUE(findDiagnosticKind({"skipped_openings", 1, "door's"}).isNote);
+  EXPECT_FALSE(findDiagnosticKind({"uncut_opening", 1, "door"}).isNote);
+  EXPECT_NE(findDiagnosticKind({"uncut_opening", 1, "door"}).meaning, "");
+  EXPECT_EQ(findDiagnosticKind({"of_a_later_version", 1, ""}).meaning, "");
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 namespace enfilade::scene {
 namespace {
 
-/// Seeded triangles in `objects` objects, some of them without area.
+/// Random triangles by seed in `objects` objects, some of them degenerate.
 Model randomModel(unsigned seed, std::size_t objects) {
   std::mt19937 random(seed);
   const auto number = [&] { return static_cast<float>(random() % 2001) / 100.0f - 10.0f; };
@@ -41,12 +41,12 @@ TEST(Scene, BoxesAreExactlyTheExtremesOfTheTrianglesWithArea) {
   for (std::size_t i = 0; i < scene.solidObjects().size(); ++i) {
     const Object& object = scene.model().objects[scene.solidObjects()[i]];
     const Mesh& mesh = scene.model().meshes[object.meshes[0]];
-    Box box;
+    Aabb box;
     std::size_t solid = 0;
     for (std::size_t t = 0; t < mesh.indices.size(); t += 3) {
-      const Vec3 a = worldPosition(object, mesh, mesh.indices[t]);
-      const Vec3 b = worldPosition(object, mesh, mesh.indices[t + 1]);
-      const Vec3 c = worldPosition(object, mesh, mesh.indices[t + 2]);
+      const Vec3 a = computeWorldPosition(object, mesh, mesh.indices[t]);
+      const Vec3 b = computeWorldPosition(object, mesh, mesh.indices[t + 1]);
+      const Vec3 c = computeWorldPosition(object, mesh, mesh.indices[t + 2]);
       if (a == b || b == c || c == a) {
         ++skipped;
         continue;
@@ -54,12 +54,12 @@ TEST(Scene, BoxesAreExactlyTheExtremesOfTheTrianglesWithArea) {
       ++solid;
       for (const Vec3& p : {a, b, c}) box.include(p);
     }
-    EXPECT_EQ(scene.stillBoxes()[i].min, box.min);
-    EXPECT_EQ(scene.stillBoxes()[i].max, box.max);
+    EXPECT_EQ(scene.staticBoxes()[i].min, box.min);
+    EXPECT_EQ(scene.staticBoxes()[i].max, box.max);
     const Shape& shape = scene.shape(scene.solidObjects()[i]);
     EXPECT_EQ(shape.triangles.size() + shape.duplicate, solid);
     EXPECT_EQ(shape.degenerate, mesh.indices.size() / 3 - solid);
-    EXPECT_EQ(scene.parts(scene.solidObjects()[i]).size(), shape.triangles.size());
+    EXPECT_EQ(scene.collisionGeometry(scene.solidObjects()[i]).size(), shape.triangles.size());
   }
   EXPECT_GT(skipped, 50u);
 }
@@ -69,7 +69,7 @@ TEST(Scene, ObjectsWithoutAreaCannotBeTouched) {
   model.meshes[1].indices = {0, 0, 1, 2, 2, 2};
   const Scene scene(std::move(model));
   EXPECT_EQ(scene.solidObjects(), (std::vector<std::uint32_t>{0, 2}));
-  EXPECT_EQ(scene.parts(1).size(), 0u);
+  EXPECT_EQ(scene.collisionGeometry(1).size(), 0u);
 }
 
 TEST(Scene, AnEmptyModelIsAnEmptyScene) {
@@ -95,22 +95,22 @@ TEST(Scene, HashFollowsPositionsPathsAndPlacesOnly) {
   EXPECT_NE(Scene(bent).hash(), hash);
 }
 
-TEST(Scene, PartsAreOneListWhoeverAsks) {
+TEST(Scene, AllCallersShareOneListOfParts) {
   const Scene scene(randomModel(10, 50));
-  std::vector<std::vector<const ObjectParts*>> seen(4);
+  std::vector<std::vector<const CollisionGeometry*>> seen(4);
   std::vector<std::thread> threads;
   for (auto& list : seen) {
     threads.emplace_back([&scene, &list] {
-      for (std::uint32_t i = 0; i < 50; ++i) list.push_back(&scene.parts(i));
+      for (std::uint32_t i = 0; i < 50; ++i) list.push_back(&scene.collisionGeometry(i));
     });
   }
   for (std::thread& thread : threads) thread.join();
   for (const auto& list : seen) EXPECT_EQ(list, seen[0]);
-  EXPECT_THROW(scene.parts(50), std::out_of_range);
+  EXPECT_THROW(scene.collisionGeometry(50), std::out_of_range);
   EXPECT_THROW(scene.shape(50), std::out_of_range);
 }
 
-TEST(Scene, NothingIsCopiedForCollisionBeforePartsAreAskedFor) {
+TEST(Scene, CollisionDataIsCopiedOnlyWhenThePartsAreUsed) {
   Model model = randomModel(12, 3);
   std::size_t unique = 0;
   for (const Mesh& mesh : model.meshes)
@@ -121,7 +121,7 @@ TEST(Scene, NothingIsCopiedForCollisionBeforePartsAreAskedFor) {
   EXPECT_EQ(scene.memory().geometry, 0u);
   EXPECT_EQ(scene.memory().parts, 0u);
   EXPECT_LT(scene.memory().perObject, 403 * 80);
-  // Copies of a mesh share one shape, and all shapes together take no more than twice the meshes.
+  // Copies of a mesh share one shape, and all shapes together use at most twice the meshes' memory.
   for (std::uint32_t object = 3; object < 403; ++object) {
     ASSERT_EQ(&scene.shape(object), &scene.shape(0));
   }
@@ -130,7 +130,7 @@ TEST(Scene, NothingIsCopiedForCollisionBeforePartsAreAskedFor) {
   EXPECT_EQ(scene.shapeCount(), 3u);
   EXPECT_GT(scene.memory().geometry, 0u);
   EXPECT_LE(scene.memory().geometry, 2 * unique + 3 * (sizeof(Shape) + 20 * sizeof(Shell)));
-  scene.parts(0);
+  scene.collisionGeometry(0);
   EXPECT_GT(scene.memory().parts, 0u);
 }
 

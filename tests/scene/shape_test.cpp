@@ -1,4 +1,4 @@
-// Shapes with known answers: what is closed, what is convex, which way it looks.
+// Tests of shapes with known answers: closed, convex, winding.
 #include "scene/model/shapes/shape.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ using testing::boxMesh;
 
 Shape shapeOfOne(const Mesh& mesh) {
   const std::uint32_t first = 0;
-  return shapeOf({&mesh, 1}, {&first, 1});
+  return buildShape({&mesh, 1}, {&first, 1});
 }
 
 void append(Mesh& to, const Mesh& from) {
@@ -33,7 +33,7 @@ Mesh insideOut(Mesh mesh) {
   return mesh;
 }
 
-/// Each triangle with corners of its own, as exporters of flat shading write them.
+/// Each triangle with its own vertices, as exporters write flat shading.
 Mesh unwelded(const Mesh& mesh) {
   Mesh apart;
   for (const std::uint32_t i : mesh.indices) {
@@ -43,7 +43,7 @@ Mesh unwelded(const Mesh& mesh) {
   return apart;
 }
 
-/// Turned and moved in doubles, then stored as floats.
+/// Transforms in doubles, then rounds to floats.
 Mesh turned(const Mesh& mesh, std::mt19937& random, double reach) {
   std::uniform_real_distribution<double> number(-1, 1);
   const double w = number(random), x = number(random), y = number(random), z = number(random);
@@ -56,7 +56,7 @@ Mesh turned(const Mesh& mesh, std::mt19937& random, double reach) {
   return result;
 }
 
-/// Two polygons of `sides` corners, a fan each, and quads between them.
+/// Two polygons of `sides` vertices, each a fan, with quads between them.
 Mesh prism(int sides, double radius, double height) {
   Mesh mesh;
   for (int i = 0; i < sides; ++i) {
@@ -88,18 +88,19 @@ TEST(Shape, ABoxIsOneConvexSolidHoweverItsCornersAreStored) {
     ASSERT_EQ(shape.shells.size(), 1u);
     EXPECT_EQ(shape.shells[0].kind, Shell::Kind::convex);
     EXPECT_FALSE(shape.shells[0].inward);
-    EXPECT_EQ(shape.boundaryEdges + shape.crowdedEdges + shape.duplicate + shape.degenerate, 0u);
+    EXPECT_EQ(shape.boundaryEdges + shape.nonManifoldEdges + shape.duplicate + shape.degenerate,
+              0u);
   }
 }
 
-TEST(Shape, ABoxOfSeveralMeshesIsStillOneSolid) {
+TEST(Shape, ABoxOfSeveralMeshesIsOneSolid) {
   const Mesh box = boxMesh({0, 0, 0}, {1, 1, 1});
   Mesh sides = box, lid = box;
   lid.indices.assign(box.indices.begin(), box.indices.begin() + 6);
   sides.indices.assign(box.indices.begin() + 6, box.indices.end());
   const std::vector<Mesh> meshes{lid, boxMesh({5, 5, 5}, {6, 6, 6}), sides};
   const std::vector<std::uint32_t> both{2, 0};
-  const Shape shape = shapeOf(meshes, both);
+  const Shape shape = buildShape(meshes, both);
   ASSERT_EQ(shape.shells.size(), 1u);
   EXPECT_TRUE(shape.shells[0].isConvex());
   EXPECT_EQ(shapeOfOne(sides).shells[0].kind, Shell::Kind::open);
@@ -119,11 +120,11 @@ TEST(Shape, TurnedBoxesAndPrismsAreConvexUpToTheRoundingOfTheirFloats) {
     EXPECT_FALSE(shape.shells[0].inward) << i;
     exact += shape.shells[0].kind == Shell::Kind::convex ? 1 : 0;
   }
-  EXPECT_LT(exact, 100) << "rounding bends most of them";
+  EXPECT_LT(exact, 100) << "rounding makes most of them non-planar";
 }
 
 TEST(Shape, ADentDeeperThanRoundingIsNotConvex) {
-  // A pyramid's tip pushed in: the box with a middle on its top, lowered by so many units.
+  // A dented box: its top is a pyramid whose apex lies `depth` units below it.
   for (const double depth : {0.0, 1e-7, 2e-6, 1e-4, 0.3}) {
     Mesh mesh = boxMesh({0, 0, 0}, {1, 1, 1});
     mesh.indices.erase(mesh.indices.begin() + 18, mesh.indices.begin() + 24);  // the top
@@ -133,14 +134,14 @@ TEST(Shape, ADentDeeperThanRoundingIsNotConvex) {
     const Shape shape = shapeOfOne(mesh);
     ASSERT_EQ(shape.shells.size(), 1u) << depth;
     const Shell::Kind expected = depth == 0     ? Shell::Kind::convex
-                                 : depth < 3e-7 ? Shell::Kind::rounded
+                                 : depth < 3e-7 ? Shell::Kind::nearlyConvex
                                                 : Shell::Kind::closed;
     EXPECT_EQ(shape.shells[0].kind, expected) << depth;
   }
 }
 
 TEST(Shape, SplitFacesAndPointsInsideOfFacesDoNoHarm) {
-  // Each face of a box as a grid of 4 x 4 quads: most corners are no corners of the hull.
+  // Each face of a box is a grid of 4 x 4 quads: most vertices are no corners of the hull.
   Mesh mesh;
   for (int axis = 0; axis < 3; ++axis) {
     for (const int side : {0, 1}) {
@@ -169,10 +170,11 @@ TEST(Shape, SplitFacesAndPointsInsideOfFacesDoNoHarm) {
 
 TEST(Shape, TrianglesWithoutAreaAndRepeatedOnesAreCountedAndLeftOut) {
   Mesh mesh = boxMesh({0, 0, 0}, {1, 2, 3});
-  mesh.indices.insert(mesh.indices.end(), {0, 0, 1, 5, 5, 5});  // equal corners
-  mesh.indices.insert(mesh.indices.end(), {3, 2, 0, 3, 1, 0});  // there already, another way round
+  mesh.indices.insert(mesh.indices.end(), {0, 0, 1, 5, 5, 5});  // duplicate corners
+  mesh.indices.insert(mesh.indices.end(), {3, 2, 0, 3, 1, 0});  // duplicates with rotated or
+                                                                // reversed corners
   mesh.positions.emplace_back(0.5f, 0.0f, 0.0f);
-  mesh.indices.insert(mesh.indices.end(), {0, 1, 8});  // on one line
+  mesh.indices.insert(mesh.indices.end(), {0, 1, 8});  // collinear corners
   const Shape shape = shapeOfOne(mesh);
   EXPECT_EQ(shape.degenerate, 3u);
   EXPECT_EQ(shape.duplicate, 2u);
@@ -193,7 +195,7 @@ TEST(Shape, FacesWoundAgainstTheRestAreTurned) {
   std::swap(mesh.indices[4], mesh.indices[5]);
   std::swap(mesh.indices[22], mesh.indices[23]);
   const Shape shape = shapeOfOne(mesh);
-  EXPECT_EQ(shape.rewound, 2u);
+  EXPECT_EQ(shape.flippedTriangles, 2u);
   ASSERT_EQ(shape.shells.size(), 1u);
   EXPECT_EQ(shape.shells[0].kind, Shell::Kind::convex);
   EXPECT_FALSE(shape.shells[0].inward);
@@ -220,12 +222,12 @@ TEST(Shape, SolidsThatShareAnEdgeOrACornerAreNotOneSolid) {
   Mesh edge = boxMesh({0, 0, 0}, {1, 1, 1});
   append(edge, boxMesh({1, 1, 0}, {2, 2, 1}));
   const Shape crowded = shapeOfOne(edge);
-  EXPECT_EQ(crowded.crowdedEdges, 1u);
+  EXPECT_EQ(crowded.nonManifoldEdges, 1u);
   for (const Shell& shell : crowded.shells) EXPECT_FALSE(shell.isConvex());
 }
 
-TEST(Shape, WhatIsConcaveOrFlatBoundsNoConvexSolid) {
-  Mesh stairs = boxMesh({0, 0, 0}, {1, 1, 1});  // an L: two boxes as one outline
+TEST(Shape, ConcaveAndFlatSurfacesBoundNoConvexSolid) {
+  Mesh stairs = boxMesh({0, 0, 0}, {1, 1, 1});  // an L: two boxes in one outline
   stairs.positions.clear();
   stairs.indices.clear();
   const std::array<Vec3, 6> outline{Vec3{0, 0, 0}, {2, 0, 0}, {2, 1, 0},
@@ -246,7 +248,7 @@ TEST(Shape, WhatIsConcaveOrFlatBoundsNoConvexSolid) {
   ASSERT_EQ(concave.shells.size(), 1u);
   EXPECT_EQ(concave.shells[0].kind, Shell::Kind::closed);
   EXPECT_FALSE(concave.shells[0].inward);
-  Mesh pillow;  // both sides of a square, cut along different diagonals
+  Mesh pillow;  // both sides of a square, split along different diagonals
   pillow.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
   pillow.indices = {0, 1, 2, 0, 2, 3, 0, 3, 1, 1, 3, 2};
   EXPECT_FALSE(shapeOfOne(pillow).shells.at(0).isConvex());

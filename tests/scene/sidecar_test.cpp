@@ -16,7 +16,7 @@ Model rooms() {
                    {"hall/chair2", {4, 0, 0}, {4.5, 1, 0.5}}});
 }
 
-/// What is wrong with the bodies of a sidecar; "" when nothing is.
+/// The error for the bodies of a sidecar; "" if they are valid.
 std::string complaint(const std::string& bodies) {
   Model model = rooms();
   try {
@@ -29,7 +29,7 @@ std::string complaint(const std::string& bodies) {
   }
 }
 
-TEST(Sidecar, SaysWhatMovesInRadiansAndMetres) {
+TEST(Sidecar, DefinesBodiesInRadiansAndMetres) {
   Model model = rooms();
   applySidecar(model, R"({"walk":1,"bodies":[
     {"name":"door","kind":"hinged","objects":["hall/leaf"],"anchor":[0,0,0],"axis":[0,2,0],
@@ -40,8 +40,8 @@ TEST(Sidecar, SaysWhatMovesInRadiansAndMetres) {
   const BodySpec& door = model.bodies[0];
   EXPECT_EQ(door.axis, Vec3(0, 1, 0));
   EXPECT_NEAR(door.high, 1.5707963267948966, 1e-15);
-  EXPECT_EQ(door.closed, door.low);
-  EXPECT_EQ(door.closesAfter, 2.0);
+  EXPECT_EQ(door.closedPosition, door.low);
+  EXPECT_EQ(door.autoCloseDelay, 2.0);
   EXPECT_EQ(door.openedBy, OpenedBy::touch);
   EXPECT_EQ(model.bodies[1].name, "chair#1");
   EXPECT_EQ(model.bodies[2].objects, std::vector<std::uint32_t>{3});
@@ -55,7 +55,7 @@ TEST(Sidecar, ABoxBecomesATriggersObject) {
                "s.walk.json");
   ASSERT_EQ(model.objects.size(), 5u);
   const Scene scene(std::move(model));
-  EXPECT_EQ(scene.shapeOfBody(0)->parts.size(), 1u);
+  EXPECT_EQ(scene.bodyShape(0)->parts.size(), 1u);
   EXPECT_EQ(scene.solidObjects().size(), 4u) << "not solid";
 }
 
@@ -66,24 +66,24 @@ TEST(Sidecar, MistakesAreNamedWithTheirPlace) {
   has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"],"anchr":[0,0,0]})"),
       "s.walk.json.bodies[0]: unknown key \"anchr\"");
   has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/gate"],"anchor":[0,0,0]})"),
-      "bodies[0].objects[0]: there is no object \"hall/gate\"");
+      "bodies[0].objects[0]: unknown object \"hall/gate\"");
   has(complaint(R"({"name":"d","kind":"spinning","objects":["hall/leaf"]})"), "bodies[0].kind");
   has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"]})"), "anchor is missing");
   has(complaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[3,1]})"), "stops");
   has(complaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[0,3,1]})"),
       "s.walk.json.bodies[0]: body 'd': stops must ascend");
   has(complaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[0,3,3]})"),
-      "stops must ascend, each once");
+      "stops must ascend strictly");
   has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"],"anchor":[0,0,0],
                     "limits":[10,90]})"),
-      "bodies[0]: body 'd': limits: 0, where it was drawn");
+      "bodies[0]: body 'd': limits: 0, the authored position");
   has(complaint(R"({"name":"d","kind":"path","objects":["hall/leaf"],
                     "keys":[{"time":0},{"time":2},{"time":1}]})"),
       "bodies[0]: body 'd': keys: times must ascend");
   has(complaint(R"({"name":"d","kind":"trigger","box":[[0,0,0],[1,1,0]]})"), "no volume");
   has(complaint(R"({"name":"d","kind":"trigger","box":[[0,0,0],[1,1,1]]},
                    {"name":"d","kind":"rigid","objects":["hall/leaf"]})"),
-      "another body has it");
+      "another body already uses it");
   has(complaint(R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":"6"})"), "number");
   has(complaint(R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":6,"density":500})"),
       "bodies[0]: has a density and a mass");
@@ -91,17 +91,17 @@ TEST(Sidecar, MistakesAreNamedWithTheirPlace) {
                     "box":[[0,0,0],[1,1,1]]})"),
       "bodies[0]: has objects and a box");
   has(complaint(R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":6,"mass":7})"),
-      "s.walk.json: the key \"mass\" is there twice in one object");
+      "s.walk.json: the key \"mass\" is repeated in an object");
 }
 
-TEST(Sidecar, ANestOfBracketsIsAMistakeAndEndsNothing) {
+TEST(Sidecar, DeeplyNestedBracketsAreAnError) {
   const std::string nest = std::string(200'000, '[') + std::string(200'000, ']');
   for (const std::string& body :
        {nest, R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":)" + nest + "}"})
-    EXPECT_NE(complaint(body).find("so deep a nest"), std::string::npos);
+    EXPECT_NE(complaint(body).find("nested too deeply"), std::string::npos);
 }
 
-TEST(Sidecar, WhatIsNoSidecarIsSaidSo) {
+TEST(Sidecar, AnInvalidSidecarIsReported) {
   Model model = rooms();
   EXPECT_THROW(applySidecar(model, "{", "s"), SidecarError);
   EXPECT_THROW(applySidecar(model, "[]", "s"), SidecarError);
@@ -111,14 +111,14 @@ TEST(Sidecar, WhatIsNoSidecarIsSaidSo) {
     applySidecar(model, R"({"walk":1,"still":["hall/ch*"],"bodies":[
                    {"name":"c","kind":"rigid","objects":["hall/chair2"]}]})",
                  "s");
-    FAIL() << "it is a body, and none";
+    FAIL() << "a body cannot be declared as none, too";
   } catch (const SidecarError& error) {
     EXPECT_STREQ(error.what(), "s.still: 'hall/chair2' is in the body 'c': it is either");
   }
 }
 
-TEST(Sidecar, LiesBesideItsModel) {
-  EXPECT_EQ(sidecarOf("a/hall.glb"), "a/hall.walk.json");
+TEST(Sidecar, IsReadFromTheFolderOfItsModel) {
+  EXPECT_EQ(sidecarPath("a/hall.glb"), "a/hall.walk.json");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// A model that is exported again keeps the names of its objects where the modeller kept them.
+// Tests that a model exported again keeps its object names where the modeller kept them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,12 +16,12 @@ using tests::BoxMesh;
 using tests::gltf;
 using tests::TemporaryFolder;
 
-/// Where each path's object lies.
+/// Position of each object by path.
 std::map<std::string, Vec3> placesOf(const Model& model) {
   const Scene scene{Model(model)};
   std::map<std::string, Vec3> places;
   for (std::uint32_t i = 0; i < model.objects.size(); ++i)
-    places[model.objects[i].path] = boxOf(scene, i).min + model.offset;
+    places[model.objects[i].path] = computeAuthoredAabb(scene, i).min + model.offset;
   return places;
 }
 
@@ -49,7 +49,7 @@ TEST(StablePaths, AnotherOrderOfNodesAndAnotherNumberingChangeNothing) {
   EXPECT_TRUE(first.contains("hall/table/lamp"));
 }
 
-TEST(StablePaths, NewSiblingsAndNamelessOnesRenameNobodyElse) {
+TEST(StablePaths, NewSiblingsAndNamelessOnesKeepOtherNames) {
   const TemporaryFolder folder;
   const auto first =
       imported(folder, "0,1,2", node("chair", 1) + "," + node("chair", 2) + "," + node("desk", 3));

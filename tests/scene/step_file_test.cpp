@@ -15,21 +15,21 @@ TEST(StepFile, StatementsAreFoundByTheirNumbers) {
   EXPECT_TRUE(file.hasEnd());
   ASSERT_NE(file.find(12), nullptr);
   EXPECT_EQ(file.find(12)->type, "IFCWALL");
-  EXPECT_EQ(file.find(12, "IFCDOOR"), nullptr);
+  EXPECT_EQ(file.findOfType(12, "IFCDOOR"), nullptr);
   EXPECT_EQ(file.find(4), nullptr);
-  const auto arguments = stepArguments(file.find(12)->arguments);
+  const auto arguments = splitStepArguments(file.find(12)->arguments);
   ASSERT_EQ(arguments.size(), 3u);
-  EXPECT_EQ(stepText(arguments[0]), "a;b");
-  EXPECT_EQ(stepReference(arguments[1]), 3u);
+  EXPECT_EQ(parseStepString(arguments[0]), "a;b");
+  EXPECT_EQ(parseStepReference(arguments[1]), 3u);
   EXPECT_EQ(arguments[2], "$");
-  EXPECT_EQ(stepNumbers(file.find(3)->arguments), (std::vector<double>{0, -1, 0.25}));
+  EXPECT_EQ(parseStepNumbers(file.find(3)->arguments), (std::vector<double>{0, -1, 0.25}));
 }
 
 TEST(StepFile, CommentsAreNoStatementsButTextsKeepTheirs) {
   const StepFile file("DATA;/* #1=IFCWALL(); */#2=IFCDOOR('/* kept */');");
   EXPECT_EQ(file.find(1), nullptr);
   ASSERT_NE(file.find(2), nullptr);
-  EXPECT_EQ(stepText(file.find(2)->arguments), "/* kept */");
+  EXPECT_EQ(parseStepString(file.find(2)->arguments), "/* kept */");
 }
 
 TEST(StepFile, AMissingQuoteCostsOneStatementAndNotTheRest) {
@@ -37,31 +37,32 @@ TEST(StepFile, AMissingQuoteCostsOneStatementAndNotTheRest) {
   EXPECT_EQ(file.find(1), nullptr);
   EXPECT_NE(file.find(2), nullptr);
   EXPECT_NE(file.find(3), nullptr);
-  EXPECT_EQ(file.damaged(), 1u);
+  EXPECT_EQ(file.damagedCount(), 1u);
 }
 
 TEST(StepFile, TextsAreDecodedToUtf8) {
-  EXPECT_EQ(stepText("'it''s'"), "it's");
-  EXPECT_EQ(stepText("'T\\X\\FCr'"), "Tür");
-  EXPECT_EQ(stepText("'\\X2\\00DC\\X0\\ber'"), "Über");
-  EXPECT_EQ(stepText("'\\X2\\D83DDEAA\\X0\\'"), "\xF0\x9F\x9A\xAA");  // a door, by two halves
-  EXPECT_EQ(stepText("'\\X4\\0001F6AA\\X0\\'"), "\xF0\x9F\x9A\xAA");
-  EXPECT_EQ(stepText("'\\S\\d'"), "ä");
-  EXPECT_EQ(stepText("'C:\\\\x'"), "C:\\x");
-  EXPECT_EQ(stepText("'C:\\x'"), "C:\\x") << "what no escape is stays";
-  EXPECT_EQ(stepText("12"), std::nullopt);
+  EXPECT_EQ(parseStepString("'it''s'"), "it's");
+  EXPECT_EQ(parseStepString("'T\\X\\FCr'"), "Tür");
+  EXPECT_EQ(parseStepString("'\\X2\\00DC\\X0\\ber'"), "Über");
+  EXPECT_EQ(parseStepString("'\\X2\\D83DDEAA\\X0\\'"), "\xF0\x9F\x9A\xAA");  // a door emoji as a
+                                                                             // surrogate pair
+  EXPECT_EQ(parseStepString("'\\X4\\0001F6AA\\X0\\'"), "\xF0\x9F\x9A\xAA");
+  EXPECT_EQ(parseStepString("'\\S\\d'"), "ä");
+  EXPECT_EQ(parseStepString("'C:\\\\x'"), "C:\\x");
+  EXPECT_EQ(parseStepString("'C:\\x'"), "C:\\x") << "text that is no escape stays";
+  EXPECT_EQ(parseStepString("12"), std::nullopt);
 }
 
 TEST(StepFile, ArgumentsThatAreSomethingElseAreNothing) {
-  EXPECT_EQ(stepReference("#"), std::nullopt);
-  EXPECT_EQ(stepReference("#99999999999"), std::nullopt);
-  EXPECT_EQ(stepNumber("IFCLENGTHMEASURE(0.3048)"), 0.3048);
-  EXPECT_EQ(stepNumber("'1'"), std::nullopt);
-  EXPECT_EQ(stepNumber("1e999"), std::nullopt);
-  EXPECT_EQ(stepSymbol(".ELEVATOR."), "ELEVATOR");
-  EXPECT_EQ(stepSymbol("$"), "");
-  EXPECT_EQ(stepReferences("(#1,#2,$)"), (std::vector<std::uint32_t>{1, 2}));
-  EXPECT_EQ(stepReferences("#7"), std::vector<std::uint32_t>{7});
+  EXPECT_EQ(parseStepReference("#"), std::nullopt);
+  EXPECT_EQ(parseStepReference("#99999999999"), std::nullopt);
+  EXPECT_EQ(parseStepNumber("IFCLENGTHMEASURE(0.3048)"), 0.3048);
+  EXPECT_EQ(parseStepNumber("'1'"), std::nullopt);
+  EXPECT_EQ(parseStepNumber("1e999"), std::nullopt);
+  EXPECT_EQ(parseStepEnum(".ELEVATOR."), "ELEVATOR");
+  EXPECT_EQ(parseStepEnum("$"), "");
+  EXPECT_EQ(parseStepReferences("(#1,#2,$)"), (std::vector<std::uint32_t>{1, 2}));
+  EXPECT_EQ(parseStepReferences("#7"), std::vector<std::uint32_t>{7});
 }
 
 }  // namespace

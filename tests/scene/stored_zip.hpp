@@ -1,4 +1,4 @@
-// A zip archive whose members are stored as they are.
+// Writer of a zip archive with uncompressed members.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ inline std::uint32_t crc32Of(const std::string& bytes) {
   return ~crc;
 }
 
-/// Names and contents. The layout is that of PKWARE's APPNOTE.TXT, 4.3.
+/// Members are pairs of name and content. Layout: PKWARE APPNOTE.TXT, section 4.3.
 inline std::string storedZip(const std::vector<std::pair<std::string, std::string>>& members) {
   const auto number = [](std::size_t value, std::size_t bytes) {  // little-endian
     std::string text;
@@ -26,7 +26,8 @@ inline std::string storedZip(const std::vector<std::pair<std::string, std::strin
   };
   std::string archive, directory;
   for (const auto& [name, content] : members) {
-    // Version, flags, method, time and date; checksum, both sizes, the name's length, no more.
+    // Version, flags, method, time and date; checksum, both sizes, length of the name, no extra
+    // field.
     const std::string facts = number(10, 2) + number(0, 8) + number(crc32Of(content), 4) +
                               number(content.size(), 4) + number(content.size(), 4) +
                               number(name.size(), 2) + number(0, 2);

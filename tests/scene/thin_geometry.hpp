@@ -1,5 +1,5 @@
-// Closed rooms of things that are easily slipped through, and the exact answer to whether anything
-// was: every triangle against every part by the narrow phase, and on which side of each sheet.
+// Closed rooms of thin obstacles, and an exact check that no avatar crossed one: the narrow phase
+// on every triangle and part, and the side of each sheet.
 #pragma once
 
 #include <algorithm>
@@ -30,12 +30,12 @@ class Seeded {
   std::mt19937_64 random_;
 };
 
-/// A model put together of triangles and boxes.
+/// Builds a model of triangles and boxes.
 struct Builder {
   Model model;
 
   Builder() {
-    model.source = "thin things";
+    model.source = "thin geometry";
     model.materials.emplace_back();
   }
   void add(const std::string& path, Mesh mesh) {
@@ -48,14 +48,14 @@ struct Builder {
   void box(const std::string& path, const Vec3& min, const Vec3& max) {
     add(path, boxMesh(min, max));
   }
-  /// A sheet of no thickness: four corners in order.
+  /// A sheet of zero thickness: four corners in order.
   void sheet(const std::string& path, const std::vector<Vec3>& corners) {
     Mesh mesh;
     for (const Vec3& corner : corners) mesh.positions.push_back(corner.cast<float>());
     mesh.indices = {0, 1, 2, 0, 2, 3};
     add(path, std::move(mesh));
   }
-  /// The same sheet cut into slivers from its first corner: all triangles long and thin.
+  /// The same sheet as slivers from its first corner: all triangles are long and thin.
   void slivers(const std::string& path, const std::vector<Vec3>& corners, int count) {
     Mesh mesh;
     const auto along = [&](const Vec3& from, const Vec3& to, int i) {
@@ -72,7 +72,7 @@ struct Builder {
   }
 };
 
-/// Side walls, roof and floor of one cell, of sheets: x and z in [x, x + size] x [z, z + size].
+/// Side walls, roof and floor of one cell, of sheets: [x, x + size] x [z, z + size].
 inline void sheetCell(Builder& b, const std::string& name, const Vec3& min, const Vec3& max,
                       bool sliced) {
   const auto wall = [&](const std::string& side, const std::vector<Vec3>& corners) {
@@ -91,36 +91,36 @@ inline void sheetCell(Builder& b, const std::string& name, const Vec3& min, cons
   wall("/roof", {{x0, y1, z0}, {x1, y1, z0}, {x1, y1, z1}, {x0, y1, z1}});
 }
 
-/// The verdict on every part of every avatar with every triangle and hull of the scene and every
-/// part of the others: how many are not separated. Takes nothing of what the tick keeps.
+/// The number of non-separated verdicts of every avatar part on each triangle and hull of the scene
+/// and on the other avatars' parts. Uses none of the tick's caches.
 inline int penetrations(const World& world) {
   const auto& avatars = world.snapshot()->avatars;
   std::vector<std::vector<collision::Triangle>> triangles;
-  std::vector<std::pair<Box, collision::ConvexBody>> still;
+  std::vector<std::pair<Aabb, collision::PlacedConvex>> still;
   for (const std::uint32_t object : world.scene().solidObjects()) {
-    triangles.push_back(solidTriangles(world.scene().model(), object));
+    triangles.push_back(collectSolidTriangles(world.scene().model(), object));
     for (const collision::Triangle& t : triangles.back())
-      still.push_back({collision::boxOf(t), {std::span<const Vec3>(t), Vec3::Zero()}});
-    const ObjectParts& parts = world.scene().parts(object);
+      still.push_back({collision::computeAabb(t), {std::span<const Vec3>(t), Vec3::Zero()}});
+    const CollisionGeometry& parts = world.scene().collisionGeometry(object);
     for (std::uint32_t i = 0; i < parts.hullCount(); ++i)
-      still.push_back({parts.box(i), parts.body(i)});
+      still.push_back({parts.box(i), parts.convex(i)});
   }
   int found = 0;
-  const auto judge = [&](const collision::ConvexBody& a, const Box& boxA,
-                         const collision::ConvexBody& b, const Box& boxB) {
-    if (!overlaps(boxA, boxB)) return;  // the boxes are exact or larger
+  const auto check = [&](const collision::PlacedConvex& a, const Aabb& boxA,
+                         const collision::PlacedConvex& b, const Aabb& boxB) {
+    if (!overlaps(boxA, boxB)) return;  // skips by boxes that are exact or larger
     collision::FeatureCache cache;
-    found += collision::decide(a, b, cache).verdict != collision::Verdict::separated;
+    found += collision::computeSeparation(a, b, cache).verdict != collision::Verdict::separated;
   };
   for (std::size_t i = 0; i < avatars.size(); ++i) {
     for (const AvatarPart& part : avatars[i].shape->parts) {
-      const collision::ConvexBody body = bodyAt(part, avatars[i].feet);
-      const Box box = grown(boxAt(part.box, avatars[i].feet), 1e-9);
-      for (const auto& [otherBox, other] : still) judge(body, box, other, otherBox);
+      const collision::PlacedConvex body = placeAvatarPart(part, avatars[i].footPosition);
+      const Aabb box = inflated(placeBox(part.box, avatars[i].footPosition), 1e-9);
+      for (const auto& [otherBox, other] : still) check(body, box, other, otherBox);
       for (std::size_t k = i + 1; k < avatars.size(); ++k)
         for (const AvatarPart& other : avatars[k].shape->parts)
-          judge(body, box, bodyAt(other, avatars[k].feet),
-                grown(boxAt(other.box, avatars[k].feet), 1e-9));
+          check(body, box, placeAvatarPart(other, avatars[k].footPosition),
+                inflated(placeBox(other.box, avatars[k].footPosition), 1e-9));
     }
   }
   return found;
@@ -130,7 +130,7 @@ inline double randomSpeed(Seeded& random) {
   return 0.01 * std::pow(10.0, random.uniform(0, 5));
 }
 
-/// A velocity for a walker, now and then straight at a wall.
+/// A velocity for an avatar, sometimes straight at a wall.
 inline Vec3 randomVelocity(Seeded& random, bool flies) {
   const double angle =
       random.below(4) == 0 ? 0.5 * 3.14159265358979 * random.below(4) : random.uniform(0, 6.2832);
@@ -139,21 +139,21 @@ inline Vec3 randomVelocity(Seeded& random, bool flies) {
   return speed * Vec3(std::cos(angle), up, std::sin(angle)).normalized();
 }
 
-/// Where one avatar enters and has to stay.
+/// A closed cell that its avatar must not leave.
 struct Cell {
   Vec3 min, max;
-  std::optional<Vec3> entry = {};  ///< none: the middle
-  /// Metres: the feet are never lower over this place; empty: than the cell.
+  std::optional<Vec3> entry = {};  ///< absent: the middle
+  /// Lowest allowed height of the feet at this position, metres; empty: the cell's.
   std::function<double(const Vec3& feet)> ground = {};
 };
 
-/// Drives one avatar a cell about and holds it to its cell; what goes wrong is counted.
-struct CellTrial {
+/// Drives one avatar per cell and counts every violation of its cell.
+struct CellFixture {
   World world;
   std::vector<Cell> cells;
   int moves = 0, outside = 0, penetrating = 0, blocked = 0;
 
-  CellTrial(const Model& model, std::vector<Cell> inside, const Lengths& lengths = {})
+  CellFixture(const Model& model, std::vector<Cell> inside, const WorldSettings& lengths = {})
       : world(std::make_shared<const Scene>(model), lengths), cells(std::move(inside)) {}
 
   std::string name(std::size_t i) const { return "a" + std::to_string(100 + i); }
@@ -163,18 +163,18 @@ struct CellTrial {
       const Vec3 middle = 0.5 * (cells[i].min + cells[i].max);
       const Vec3 at = cells[i].entry.value_or(Vec3(middle.x(), cells[i].min.y(), middle.z()));
       Spawn spawn;
-      spawn.at = at + Vec3(0, 0.01, 0);
+      spawn.position = at + Vec3(0, 0.01, 0);
       spawn.height = height;
       spawn.radius = radius;
       command(i, spawn);
     }
-    const TickReport report = tick(world);
+    const TickReport report = tickWorld(world);
     if (report.snapshot->avatars.size() != cells.size())
       throw std::runtime_error("not all came into the world: " + report.notices[0].text);
   }
 
   void command(std::size_t i, Order order) {
-    if (const auto why = submit(world, {name(i), std::move(order), 0}))
+    if (const auto why = submitAvatarCommand(world, {name(i), std::move(order), 0}))
       throw std::runtime_error(*why);
   }
 
@@ -191,17 +191,17 @@ struct CellTrial {
   }
 
   void step(bool judgeAll) {
-    const TickReport report = tick(world);
-    for (const AvatarView& avatar : report.snapshot->avatars) {
+    const TickReport report = tickWorld(world);
+    for (const AvatarSnapshot& avatar : report.snapshot->avatars) {
       ++moves;
       const Cell& cell = cells[std::stoul(avatar.name.substr(1)) - 100];
-      const Box body = boxAt(avatar.shape->box, avatar.feet);
-      outside += !contains(Box{cell.min, cell.max}, body);
-      // What it stands on may give way by the rounding of the file's floats.
-      outside += cell.ground && avatar.feet.y() + 1e-6 < cell.ground(avatar.feet);
-      blocked += avatar.move.stoppedBy != 0;
+      const Aabb body = placeBox(avatar.shape->box, avatar.footPosition);
+      outside += !contains(Aabb{cell.min, cell.max}, body);
+      // The ground tolerance is the rounding of the file's floats.
+      outside += cell.ground && avatar.footPosition.y() + 1e-6 < cell.ground(avatar.footPosition);
+      blocked += avatar.move.blockedBy != 0;
     }
-    penetrating += report.worstPenetration > 0;
+    penetrating += report.maxPenetration > 0;
     if (judgeAll) penetrating += penetrations(world);
   }
 };
@@ -218,7 +218,7 @@ inline std::vector<Cell> gridOfCells(Builder& b, int side, double size, double h
   return cells;
 }
 
-/// Rooms of panes a millimetre thick, with ledges, needles and plates in them.
+/// Rooms of panes one millimetre thick, with ledges, needles and plates in them.
 inline std::vector<Cell> paneRooms(Builder& b, int count, Seeded& random) {
   std::vector<Cell> cells;
   for (int i = 0; i < count; ++i) {
@@ -243,8 +243,8 @@ inline std::vector<Cell> paneRooms(Builder& b, int count, Seeded& random) {
   return cells;
 }
 
-/// Two rooms of sheets each, with a wall of no thickness across x = 0 of each pair that has a gap
-/// of `gap` metres in its middle. They stand one beside the other along z.
+/// Pairs of rooms of sheets along z. The wall of zero thickness at x = 0 between two rooms has a
+/// gap of `gap` metres in its middle.
 inline std::vector<Cell> gapRooms(Builder& b, int count, double gap) {
   std::vector<Cell> cells;
   for (int i = 0; i < count; ++i) {
@@ -260,7 +260,7 @@ inline std::vector<Cell> gapRooms(Builder& b, int count, double gap) {
   return cells;
 }
 
-/// A straight flight of sheets, without thickness, between two side walls of sheets; it rises along
+/// A straight flight of sheets of zero thickness between two side walls of sheets. It rises along
 /// +x from x = 0, in the middle of z.
 inline Cell stairCell(Builder& b, const std::string& name, double riser, double tread, int steps,
                       double z) {
@@ -286,7 +286,7 @@ inline Cell stairCell(Builder& b, const std::string& name, double riser, double 
   across("east", end + 2, -1, roof);
   for (const double side : {south, north})
     sheet("side", {{-2, -1, side}, {end + 2, -1, side}, {end + 2, roof, side}, {-2, roof, side}});
-  // Under the middle of the soles something holds, whatever the way was.
+  // Some surface must support the middle of the soles, whatever the path was.
   const auto ground = [=](const Vec3& feet) {
     return riser * std::max(0.0, std::min(double(steps), std::floor(feet.x() / tread) + 1));
   };

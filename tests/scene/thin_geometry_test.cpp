@@ -1,5 +1,5 @@
-// Random moves at 0.01 to 1000 m/s among things that are easily slipped through. Each scene is a
-// set of closed cells: whoever is in another cell than before has crossed something.
+// Random moves at 0.01 to 1000 m/s among thin obstacles. Each scene is a set of closed cells: an
+// avatar in another cell than before has tunnelled.
 #include "tests/scene/thin_geometry.hpp"
 
 #include <gtest/gtest.h>
@@ -13,10 +13,10 @@ namespace {
 
 using namespace testing;
 
-// How many moves each of the sixteen runs below makes: 1e5 in all. Sanitizers take their time.
+// Moves in each of the sixteen runs below: 1e5 in all. Sanitizers run slowly and get fewer.
 constexpr int kMovesOfOne = tests::kSanitized ? 600 : 6400;
 
-/// What somebody is shut up with, and the seed of it all.
+/// The geometry that encloses the avatars, and the seed of the run.
 struct Shut {
   const char* in;
   std::uint64_t seed;
@@ -32,7 +32,7 @@ std::vector<Cell> cellsOf(const Shut& shut, Builder& b, Seeded& random) {
   if (in == "Slivers") return gridOfCells(b, 3, shut.seed % 2 ? 1.4 : 4, 3, true);
   if (in == "Panes") return paneRooms(b, 4, random);
   if (in == "Gaps") return gapRooms(b, 4, 0.601);
-  std::vector<Cell> stairs;  // from 1:35 to 35:1, evenly in the logarithm
+  std::vector<Cell> stairs;  // from 1:35 to 35:1, log-uniform
   for (int i = 0; i < 8; ++i) {
     const double riser = 0.02 * std::pow(35, random.uniform(0, 1));
     const double tread = 0.02 * std::pow(35, random.uniform(0, 1));
@@ -41,19 +41,19 @@ std::vector<Cell> cellsOf(const Shut& shut, Builder& b, Seeded& random) {
   return stairs;
 }
 
-class ThinThings : public ::testing::TestWithParam<Shut> {};
+class ThinGeometry : public ::testing::TestWithParam<Shut> {};
 
-TEST_P(ThinThings, AreNotCrossedByRandomMovesOfAnySpeed) {
+TEST_P(ThinGeometry, AreNotCrossedByRandomMovesOfAnySpeed) {
   Builder b;
   Seeded random(GetParam().seed);
   const std::vector<Cell> cells = cellsOf(GetParam(), b, random);
-  CellTrial run(b.model, cells);
+  CellFixture run(b.model, cells);
   run.spawn();
   run.randomMoves(random, kMovesOfOne / static_cast<int>(cells.size()));
   EXPECT_EQ(run.outside, 0);
   EXPECT_EQ(run.penetrating, 0);
   EXPECT_GE(run.moves, kMovesOfOne * 9 / 10);
-  EXPECT_GT(run.blocked, run.moves / 20) << "many moves should meet something";
+  EXPECT_GT(run.blocked, run.moves / 20) << "many moves should hit an obstacle";
   EXPECT_LT(run.blocked, run.moves * 19 / 20);
 }
 
@@ -66,13 +66,13 @@ std::vector<Shut> shutUp() {
   return all;
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ThinThings, ::testing::ValuesIn(shutUp()), [](const auto& shut) {
+INSTANTIATE_TEST_SUITE_P(All, ThinGeometry, ::testing::ValuesIn(shutUp()), [](const auto& shut) {
   return shut.param.in + std::to_string(shut.param.seed);
 });
 
 TEST(ThinGaps, ADoorGapAMillimetreWiderIsPassedAndOneNarrowerIsNot) {
-  // Two rooms of 3 m, a wall of no thickness between them with a gap in its middle. The prism is
-  // 0.6 m wide along the gap, and epsilon is kept on both sides.
+  // Two rooms of 3 m with a gap in the wall of zero thickness between them. The prism is 0.6 m wide
+  // along the gap, and the contact offset is kept on both sides.
   for (const double wider : {0.001, 0.002, -0.001}) {
     for (const double speed : {0.3, 1.4, 40.0}) {
       Builder b;
@@ -81,15 +81,15 @@ TEST(ThinGaps, ADoorGapAMillimetreWiderIsPassedAndOneNarrowerIsNot) {
       b.sheet("left", {{0, 0, -2}, {0, 0, -0.5 * gap}, {0, 3, -0.5 * gap}, {0, 3, -2}});
       b.sheet("right", {{0, 0, 0.5 * gap}, {0, 0, 2}, {0, 3, 2}, {0, 3, 0.5 * gap}});
       World world(std::make_shared<const Scene>(b.model));
-      ASSERT_FALSE(submit(world, {"ann", Spawn{{-2, 0, 0}}, 0}));
-      ASSERT_FALSE(submit(world, {"ann", Walk{{{2, 0, 0}}, speed}, 0}));
+      ASSERT_FALSE(submitAvatarCommand(world, {"ann", Spawn{{-2, 0, 0}}, 0}));
+      ASSERT_FALSE(submitAvatarCommand(world, {"ann", Walk{{{2, 0, 0}}, speed}, 0}));
       for (int i = 0; i < 900; ++i) {
-        const TickReport report = tick(world);
-        ASSERT_EQ(report.worstPenetration, 0);
+        const TickReport report = tickWorld(world);
+        ASSERT_EQ(report.maxPenetration, 0);
         if (i > 3 && report.idle) break;
       }
       EXPECT_EQ(penetrations(world), 0);
-      const double x = world.snapshot()->avatars[0].feet.x();
+      const double x = world.snapshot()->avatars[0].footPosition.x();
       if (wider > 0) {
         EXPECT_NEAR(x, 2, 1e-3) << speed;
       } else {
@@ -99,36 +99,38 @@ TEST(ThinGaps, ADoorGapAMillimetreWiderIsPassedAndOneNarrowerIsNot) {
   }
 }
 
-TEST(ThinGaps, WhoIsAimedBesideTheGapIsLedIntoItByItsOwnRoundness) {
+TEST(ThinGaps, AnOffCentreAvatarSlidesIntoTheGap) {
   int through = 0;
   for (int i = -4; i <= 4; ++i) {
     Builder b;
     gapRooms(b, 1, 0.601);
     World world(std::make_shared<const Scene>(b.model));
-    ASSERT_FALSE(submit(world, {"ann", Spawn{{-0.8, 0.01, 0.01 * i}}, 0}));
-    tick(world);
-    ASSERT_FALSE(submit(world, {"ann", Drive{{1.4, 0, 0}}, 0}));
-    for (int k = 0; k < 150; ++k) ASSERT_EQ(tick(world).worstPenetration, 0);
+    ASSERT_FALSE(submitAvatarCommand(world, {"ann", Spawn{{-0.8, 0.01, 0.01 * i}}, 0}));
+    tickWorld(world);
+    ASSERT_FALSE(submitAvatarCommand(world, {"ann", Drive{{1.4, 0, 0}}, 0}));
+    for (int k = 0; k < 150; ++k) ASSERT_EQ(tickWorld(world).maxPenetration, 0);
     EXPECT_EQ(penetrations(world), 0);
-    through += world.snapshot()->avatars[0].feet.x() > 0.5;
+    through += world.snapshot()->avatars[0].footPosition.x() > 0.5;
   }
   EXPECT_GE(through, 5) << "of 9";
 }
 
-TEST(ThinThingsJudge, TheJudgeItselfFindsWhatIsInside) {
-  // A world whose avatar is put into a sheet by hand: the twin above must see it.
+TEST(ThinGeometryOracle, TheOracleFindsAPointInside) {
+  // The avatar is placed into a sheet by hand: the check above must find it.
   Builder b;
   b.box("floor", {-4, -0.2, -4}, {4, 0, 4});
   b.sheet("pane", {{1, 0, -4}, {1, 0, 4}, {1, 3, 4}, {1, 3, -4}});
   World world(std::make_shared<const Scene>(b.model));
-  ASSERT_FALSE(submit(world, {"ann", Spawn{{0, 0, 0}}, 0}));
-  tick(world);
+  ASSERT_FALSE(submitAvatarCommand(world, {"ann", Spawn{{0, 0, 0}}, 0}));
+  tickWorld(world);
   EXPECT_EQ(penetrations(world), 0);
   auto moved = std::make_shared<Snapshot>(*world.snapshot());
   collision::FeatureCache cache;
-  const AvatarView& ann = moved->avatars[0];
+  const AvatarSnapshot& ann = moved->avatars[0];
   const std::vector<Vec3> pane{{1, 0, -4}, {1, 0, 4}, {1, 3, 4}};
-  EXPECT_EQ(collision::decide(bodyAt(ann.shape->parts[0], {0.9, 0.1, 0}), {pane}, cache).verdict,
+  EXPECT_EQ(collision::computeSeparation(placeAvatarPart(ann.shape->parts[0], {0.9, 0.1, 0}),
+                                         {pane}, cache)
+                .verdict,
             collision::Verdict::penetrating);
 }
 

@@ -11,13 +11,13 @@
 namespace enfilade::scene {
 namespace {
 
-TEST(Workers, EachIndexIsDoneOnceByAnyNumberOfThreads) {
+TEST(ThreadPool, EachIndexIsDoneOnceByAnyNumberOfThreads) {
   for (const int threads : {1, 2, 3, 7}) {
-    Workers workers(threads);
-    EXPECT_EQ(workers.count(), threads);
+    ThreadPool workers(threads);
+    EXPECT_EQ(workers.threadCount(), threads);
     for (const std::size_t size : {0u, 1u, 15u, 16u, 17u, 1000u}) {
       std::vector<int> done(size, 0);
-      workers.share(size, 16, [&](std::size_t from, std::size_t to) {
+      workers.parallelFor(size, 16, [&](std::size_t from, std::size_t to) {
         for (std::size_t i = from; i < to; ++i) ++done[i];
       });
       EXPECT_EQ(std::accumulate(done.begin(), done.end(), std::size_t{0}), size);
@@ -26,20 +26,20 @@ TEST(Workers, EachIndexIsDoneOnceByAnyNumberOfThreads) {
   }
 }
 
-TEST(Workers, ManyShortLoopsFollowOneAnother) {
-  Workers workers(2);
+TEST(ThreadPool, ManyShortLoopsRunInSequence) {
+  ThreadPool workers(2);
   std::vector<std::size_t> sums(100, 0);
   for (int round = 0; round < 2000; ++round)
-    workers.share(sums.size(), 8, [&](std::size_t from, std::size_t to) {
+    workers.parallelFor(sums.size(), 8, [&](std::size_t from, std::size_t to) {
       for (std::size_t i = from; i < to; ++i) sums[i] += i;
     });
   for (std::size_t i = 0; i < sums.size(); ++i) EXPECT_EQ(sums[i], 2000 * i);
 }
 
-TEST(Workers, AnExceptionComesBackAndTheNextLoopRuns) {
-  Workers workers(2);
+TEST(ThreadPool, AnExceptionComesBackAndTheNextLoopRuns) {
+  ThreadPool workers(2);
   const auto throwAt = [&](std::size_t bad) {
-    workers.share(64, 8, [&](std::size_t from, std::size_t to) {
+    workers.parallelFor(64, 8, [&](std::size_t from, std::size_t to) {
       if (from <= bad && bad < to) throw std::runtime_error("here");
     });
   };
@@ -48,16 +48,16 @@ TEST(Workers, AnExceptionComesBackAndTheNextLoopRuns) {
   EXPECT_NO_THROW(throwAt(64));
 }
 
-TEST(Colours, PatchesOfOneColourShareNothingThatMoves) {
+TEST(GraphColoring, PatchesOfOneColourShareNothingThatMoves) {
   std::mt19937 random(3);
   std::vector<std::uint8_t> moves(200, 1);
   moves[0] = 0;  // a floor
-  std::vector<ContactPatch> patches(1500);
-  for (ContactPatch& patch : patches) {
+  std::vector<ContactConstraint> patches(1500);
+  for (ContactConstraint& patch : patches) {
     patch.a = static_cast<std::uint32_t>(random() % (random() % 3 == 0 ? 1 : 200));
     patch.b = (patch.a + 1 + static_cast<std::uint32_t>(random() % 199)) % 200;
   }
-  const Colouring colouring = colourPatches(patches, moves);
+  const ConstraintColoring colouring = colorConstraints(patches, moves);
   ASSERT_EQ(colouring.order.size(), patches.size());
   ASSERT_EQ(colouring.ends.back(), patches.size());
   EXPECT_GT(colouring.ends.size(), 5u);
@@ -66,7 +66,7 @@ TEST(Colours, PatchesOfOneColourShareNothingThatMoves) {
   for (std::size_t c = 0; c < colouring.ends.size(); ++c) {
     std::vector<int> users(moves.size(), 0);
     for (std::size_t k = from; k < colouring.ends[c]; ++k) {
-      const ContactPatch& patch = patches[colouring.order[k]];
+      const ContactConstraint& patch = patches[colouring.order[k]];
       ++seen[colouring.order[k]];
       ++users[patch.a], ++users[patch.b];
     }
@@ -79,12 +79,12 @@ TEST(Colours, PatchesOfOneColourShareNothingThatMoves) {
   EXPECT_TRUE(std::all_of(seen.begin(), seen.end(), [](int n) { return n == 1; }));
 }
 
-TEST(Colours, AFewPatchesThatShareABodyKeepTheirOrder) {
-  std::vector<ContactPatch> patches(5);
-  for (ContactPatch& patch : patches) patch.b = 1;
-  patches[2].a = 2, patches[2].b = 3;  // apart from all others
+TEST(GraphColoring, AFewPatchesThatShareABodyKeepTheirOrder) {
+  std::vector<ContactConstraint> patches(5);
+  for (ContactConstraint& patch : patches) patch.b = 1;
+  patches[2].a = 2, patches[2].b = 3;  // disjoint from all others
   const std::vector<std::uint8_t> moves(4, 1);
-  const Colouring colouring = colourPatches(patches, moves);
+  const ConstraintColoring colouring = colorConstraints(patches, moves);
   EXPECT_EQ(colouring.order, (std::vector<std::uint32_t>{0, 2, 1, 3, 4}));
   EXPECT_EQ(colouring.ends, (std::vector<std::uint32_t>{2, 3, 4, 5, 5}));
 }

@@ -19,30 +19,31 @@ std::string contentOf(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-TEST(ReaderVersion, ALibraryIsKnownByItsBuildIdAlone) {
+TEST(ReaderVersion, ALibraryIsIdentifiedByItsBuildIdAlone) {
   const TemporaryFolder folder;
-  const std::string bytes = contentOf(assimpModule());
+  const std::string bytes = contentOf(assimpModulePath());
   const auto copy = folder.write("copy.so", bytes + "and more behind it");
-  ASSERT_TRUE(versionOf(copy));
-  EXPECT_EQ(versionOf(copy), versionOf(assimpModule()));
-  EXPECT_NE(versionOf(copy), contentHashOfFile(copy));
-  EXPECT_NE(versionOf(copy), versionOf(ifcPlusPlusModule()));
-  EXPECT_NE(versionOf(copy), versionOf("/proc/self/exe"));
+  ASSERT_TRUE(computeFileVersion(copy));
+  EXPECT_EQ(computeFileVersion(copy), computeFileVersion(assimpModulePath()));
+  EXPECT_NE(computeFileVersion(copy), computeFileHash(copy));
+  EXPECT_NE(computeFileVersion(copy), computeFileVersion(ifcPlusPlusModulePath()));
+  EXPECT_NE(computeFileVersion(copy), computeFileVersion("/proc/self/exe"));
 }
 
-TEST(ReaderVersion, WhatIsNoLibraryIsKnownByItsContent) {
+TEST(ReaderVersion, OtherFilesAreIdentifiedByTheirContent) {
   const TemporaryFolder folder;
-  const std::string library = contentOf(assimpModule());
-  // Cut in its header, in the table of its parts, before its notes; a header and then noise.
+  const std::string library = contentOf(assimpModulePath());
+  // Truncated in the header, in the program header table, before the notes; and a header followed
+  // by noise.
   for (const std::string& bytes :
        {std::string("text"), library.substr(0, 20), library.substr(0, 100), library.substr(0, 560),
         library.substr(0, 64) + std::string(2000, '\xff'), std::string()}) {
     const auto file = folder.write("file", bytes);
-    ASSERT_TRUE(versionOf(file)) << bytes.size();
-    EXPECT_EQ(versionOf(file), contentHashOfFile(file)) << bytes.size();
+    ASSERT_TRUE(computeFileVersion(file)) << bytes.size();
+    EXPECT_EQ(computeFileVersion(file), computeFileHash(file)) << bytes.size();
   }
-  EXPECT_FALSE(versionOf(folder.path() / "missing"));
-  EXPECT_FALSE(versionOf(folder.path()));
+  EXPECT_FALSE(computeFileVersion(folder.path() / "missing"));
+  EXPECT_FALSE(computeFileVersion(folder.path()));
 }
 
 }  // namespace

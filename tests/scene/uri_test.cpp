@@ -1,4 +1,4 @@
-#include "scene/import/worker/uri.hpp"
+#include "scene/import/file/uri.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,12 +6,12 @@ namespace enfilade::scene {
 namespace {
 
 TEST(Uri, BytesOfTwoDigitsAreDecodedAndOtherPercentSignsStay) {
-  EXPECT_EQ(percentDecoded("a%20b%C3%a4.png"), "a b\xC3\xA4.png");
-  EXPECT_EQ(percentDecoded("%41%"), "A%");
-  EXPECT_EQ(percentDecoded("100%4"), "100%4");
-  EXPECT_EQ(percentDecoded("%2g%-1%+1% 1"), "%2g%-1%+1% 1");
-  EXPECT_EQ(percentDecoded("%2541"), "%41");
-  EXPECT_EQ(percentDecoded(""), "");
+  EXPECT_EQ(decodePercent("a%20b%C3%a4.png"), "a b\xC3\xA4.png");
+  EXPECT_EQ(decodePercent("%41%"), "A%");
+  EXPECT_EQ(decodePercent("100%4"), "100%4");
+  EXPECT_EQ(decodePercent("%2g%-1%+1% 1"), "%2g%-1%+1% 1");
+  EXPECT_EQ(decodePercent("%2541"), "%41");
+  EXPECT_EQ(decodePercent(""), "");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The process that becomes Node.js, with scripts in the place of ours that misbehave.
+// Tests of the process that executes Node.js, with misbehaving scripts in place of ours.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -11,7 +11,7 @@
 namespace enfilade::scene {
 namespace {
 
-/// A folder with `script` where web-ifc is looked for, as long as it lives.
+/// A folder with `script` in web-ifc's place, for the lifetime of the object.
 class ScriptedNode {
  public:
   explicit ScriptedNode(const std::string& script) {
@@ -44,14 +44,15 @@ const send = (kind, body) => {
 };
 
 std::string exampleOf(const Model& model, const std::string& kind) {
-  for (const Problem& problem : model.problems) {
+  for (const Diagnostic& problem : model.diagnostics) {
     if (problem.kind == kind) return problem.example;
   }
   return {};
 }
 
 TEST(WebIfcProcess, AProductThatBringsItDownIsLeftOutAndTheRestIsRead) {
-  // It dies of the first product (the wall, #120), and has a triangle for the second (the door).
+  // The script dies at the first product (the wall, #120) and sends a triangle for the second (the
+  // door).
   const ScriptedNode node(R"(
 send('T', words(first));
 if (first === 0) process.kill(process.pid, 'SIGKILL');

@@ -1,4 +1,4 @@
-// A world of boxes or of any model, and everything that its ticks told.
+// Test fixture: a world of boxes or of any model, and all events that its ticks report.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,15 +12,15 @@
 
 namespace enfilade::scene::testing {
 
-/// A world and everything that its ticks told.
-struct Trial {
-  explicit Trial(const std::vector<NamedBox>& boxes, const Lengths& lengths = {})
-      : Trial(boxScene(boxes), lengths) {}
-  explicit Trial(std::shared_ptr<const Scene> scene, const Lengths& lengths = {})
+/// A world and all events that its ticks reported.
+struct WorldFixture {
+  explicit WorldFixture(const std::vector<NamedBox>& boxes, const WorldSettings& lengths = {})
+      : WorldFixture(boxScene(boxes), lengths) {}
+  explicit WorldFixture(std::shared_ptr<const Scene> scene, const WorldSettings& lengths = {})
       : world(std::move(scene), lengths) {}
 
   void order(const std::string& name, Order o) {
-    const auto why = submit(world, {name, std::move(o), 0});
+    const auto why = submitAvatarCommand(world, {name, std::move(o), 0});
     ASSERT_FALSE(why) << *why;
   }
   void ticks(int count) {
@@ -33,8 +33,8 @@ struct Trial {
     FAIL() << "not idle after a minute";
   }
   TickReport step() {
-    TickReport report = tick(world);
-    worstPenetration = std::max(worstPenetration, report.worstPenetration);
+    TickReport report = tickWorld(world);
+    worstPenetration = std::max(worstPenetration, report.maxPenetration);
     notices.insert(notices.end(), report.notices.begin(), report.notices.end());
     for (const ContactEvent& e : report.contacts) take(e);
     return report;
@@ -44,20 +44,20 @@ struct Trial {
     const std::pair pair(e.a, e.b);
     if (e.kind == ContactEvent::Kind::begin) {
       EXPECT_TRUE(open.insert(pair).second) << "begun twice";
-      EXPECT_LT(e.decision.distance, 2 * world.lengths().epsilon);
+      EXPECT_LT(e.separation.distance, 2 * world.settings().contactOffset);
     }
     if (e.kind == ContactEvent::Kind::end) {
       EXPECT_EQ(open.erase(pair), 1u) << "ended, not begun";
     }
   }
-  AvatarView view(const std::string& name) const {
-    for (const AvatarView& a : world.snapshot()->avatars)
+  AvatarSnapshot view(const std::string& name) const {
+    for (const AvatarSnapshot& a : world.snapshot()->avatars)
       if (a.name == name) return a;
     ADD_FAILURE() << name << " is not in the world";
     return {};
   }
-  Vec3 feet(const std::string& name) const { return view(name).feet; }
-  /// The text of the last notice of this kind; "" for none.
+  Vec3 feet(const std::string& name) const { return view(name).footPosition; }
+  /// The text of the last notice of this kind; "" if there was none.
   std::string text(Notice::Kind kind) const {
     std::string found;
     for (const Notice& n : notices)
@@ -70,7 +70,7 @@ struct Trial {
   }
   bool touched(const std::string& name) const {
     return std::any_of(events.begin(), events.end(), [&](const ContactEvent& e) {
-      return e.kind == ContactEvent::Kind::begin && nameOf(world, e.b) == name;
+      return e.kind == ContactEvent::Kind::begin && findEntityName(world, e.b) == name;
     });
   }
 
@@ -81,7 +81,7 @@ struct Trial {
   double worstPenetration = 0;
 };
 
-/// The scene of a world that outlives what is asked of it.
+/// A shared scene of a world, which outlives the queries on it.
 inline std::shared_ptr<const Scene> sharedScene(const World& world) {
   return {std::shared_ptr<void>(), &world.scene()};
 }

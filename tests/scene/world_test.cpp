@@ -17,17 +17,17 @@ using Kind = Notice::Kind;
 const double kNaN = std::nan("");
 
 TEST(World, ASpawnAtTheFloorsOwnHeightComesToRestOnIt) {
-  Trial run({floorBox()});
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.untilIdle();
-  EXPECT_GE(run.feet("ann").y(), run.world.lengths().epsilon);
-  EXPECT_LT(run.feet("ann").y(), 2 * run.world.lengths().epsilon);
+  EXPECT_GE(run.feet("ann").y(), run.world.settings().contactOffset);
+  EXPECT_LT(run.feet("ann").y(), 2 * run.world.settings().contactOffset);
   EXPECT_TRUE(run.world.snapshot()->avatars[0].grounded);
   EXPECT_TRUE(run.touched("floor"));
 }
 
 TEST(World, ASpawnALittleAboveAFloorDropsOntoIt) {
-  Trial run({floorBox()});
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 1, 0}});
   run.step();
   EXPECT_GT(run.feet("ann").y(), 0.9);
@@ -37,7 +37,7 @@ TEST(World, ASpawnALittleAboveAFloorDropsOntoIt) {
 }
 
 TEST(World, ASpawnInsideSomethingOrOffEveryFloorSaysSo) {
-  Trial run({floorBox(), {"pillar", {-1, 0, -1}, {1, 3, 1}}});
+  WorldFixture run({floorBox(), {"pillar", {-1, 0, -1}, {1, 3, 1}}});
   run.order("inside", Spawn{{0, 0.5, 0}});  // wholly inside the closed pillar
   run.order("across", Spawn{{1, 0, 0}});    // cuts its surface
   run.order("nowhere", Spawn{{50, 0, 0}});
@@ -47,7 +47,7 @@ TEST(World, ASpawnInsideSomethingOrOffEveryFloorSaysSo) {
   std::map<std::string, std::string> text;
   for (const Notice& n : run.notices)
     if (n.kind == Kind::refused) text[n.avatar] = n.text;
-  EXPECT_NE(text["inside"].find("inside pillar"), std::string::npos) << text["inside"];
+  EXPECT_NE(text["inside"].find("inside the solid pillar"), std::string::npos) << text["inside"];
   EXPECT_NE(text["across"].find("pillar"), std::string::npos) << text["across"];
   EXPECT_NE(text["nowhere"].find("no floor"), std::string::npos) << text["nowhere"];
   EXPECT_NE(text["nowhere"].find("1 queued"), std::string::npos) << text["nowhere"];
@@ -55,7 +55,7 @@ TEST(World, ASpawnInsideSomethingOrOffEveryFloorSaysSo) {
 }
 
 TEST(World, AWalkArrivesExactlyWhereItWasSent) {
-  Trial run({floorBox()});
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{-5, 0, 0}});
   run.order("ann", Walk{{{-2, 0, 1}, {3, 0, -2}}, 1.5});
   run.untilIdle();
@@ -64,17 +64,17 @@ TEST(World, AWalkArrivesExactlyWhereItWasSent) {
   EXPECT_NEAR(run.feet("ann").z(), -2, 1e-9);
 }
 
-TEST(World, AWallStopsAWalkAndIsTold) {
-  Trial run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
+TEST(World, AWallStopsAWalkAndIsReported) {
+  WorldFixture run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", to(5, 0));
   run.untilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
-  EXPECT_EQ(nameOf(run.world, run.notices.back().obstacle), "wall");
+  EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "wall");
   EXPECT_TRUE(run.touched("wall"));
-  // The wall, less the radius, less a distance between epsilon and two.
-  EXPECT_LT(run.feet("ann").x(), 1.7 - run.world.lengths().epsilon * 0.8);
-  EXPECT_GT(run.feet("ann").x(), 1.7 - run.world.lengths().epsilon * 2);
+  // The wall, minus the radius, minus a gap between one and two contact offsets.
+  EXPECT_LT(run.feet("ann").x(), 1.7 - run.world.settings().contactOffset * 0.8);
+  EXPECT_GT(run.feet("ann").x(), 1.7 - run.world.settings().contactOffset * 2);
   EXPECT_EQ(run.worstPenetration, 0);
   const bool blocked = std::any_of(run.events.begin(), run.events.end(), [](const auto& e) {
     return e.kind == ContactEvent::Kind::blocked;
@@ -83,7 +83,7 @@ TEST(World, AWallStopsAWalkAndIsTold) {
 }
 
 TEST(World, ASlantedPathSlidesAlongAWall) {
-  Trial run({floorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}});
+  WorldFixture run({floorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", to(3, 6));
   run.untilIdle();
@@ -93,7 +93,8 @@ TEST(World, ASlantedPathSlidesAlongAWall) {
 }
 
 TEST(World, StepsUpToTheStepHeightAreClimbedAndHigherOnesBlock) {
-  Trial run({floorBox(), {"low", {2, 0, -3}, {4, 0.29, 3}}, {"high", {4, 0, -3}, {6, 0.65, 3}}});
+  WorldFixture run(
+      {floorBox(), {"low", {2, 0, -3}, {4, 0.29, 3}}, {"high", {4, 0, -3}, {6, 0.65, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", Walk{{{3, 0.29, 0}, {5, 0.65, 0}}, 1.5});
   run.untilIdle();
@@ -103,8 +104,8 @@ TEST(World, StepsUpToTheStepHeightAreClimbedAndHigherOnesBlock) {
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
-/// The highest of some ledges that somebody walks up.
-double highestClimbed(const Lengths& lengths, const std::vector<double>& ledges) {
+/// The highest ledge that an avatar can walk up.
+double highestClimbed(const WorldSettings& lengths, const std::vector<double>& ledges) {
   constexpr double kApart = 2;
   std::vector<NamedBox> boxes{{"ground", {-1, -1, -1}, {4, 0, 20}}};
   double z = 0;
@@ -112,7 +113,7 @@ double highestClimbed(const Lengths& lengths, const std::vector<double>& ledges)
     boxes.push_back({"ledge" + std::to_string(height), {1, 0, z - 0.95}, {3, height, z + 0.95}});
     z += kApart;
   }
-  Trial run(boxes, lengths);
+  WorldFixture run(boxes, lengths);
   z = 0;
   for (const double height : ledges) {
     run.order("of" + std::to_string(height), Spawn{{0, 0, z}});
@@ -125,7 +126,7 @@ double highestClimbed(const Lengths& lengths, const std::vector<double>& ledges)
   for (const double height : ledges) {
     const double feet = run.feet("of" + std::to_string(height)).y();
     if (feet < 0.5 * height) continue;
-    EXPECT_NEAR(feet, height, 2 * lengths.epsilon);
+    EXPECT_NEAR(feet, height, 2 * lengths.contactOffset);
     highest = std::max(highest, height);
   }
   return highest;
@@ -133,14 +134,14 @@ double highestClimbed(const Lengths& lengths, const std::vector<double>& ledges)
 
 TEST(World, NoLedgeHigherThanAStepIsClimbed) {
   EXPECT_EQ(highestClimbed({}, {0.05, 0.25, 0.295, 0.3, 0.305, 0.33, 0.35}), 0.3);
-  Lengths low;
+  WorldSettings low;
   low.stepHeight = 0.1;
   EXPECT_EQ(highestClimbed(low, {0.01, 0.06, 0.095, 0.1, 0.105, 0.13, 0.15}), 0.1);
 }
 
 TEST(World, StepsAreClimbedWhateverSlopeIs) {
   for (const double degrees : {1.0, 5.0, 20.0, 33.0, 34.0}) {
-    Lengths lengths;
+    WorldSettings lengths;
     lengths.walkableNormalY = std::cos(degrees * 0.017453292519943295);
     EXPECT_EQ(highestClimbed(lengths, {0.01, 0.05, 0.17, 0.25, 0.295, 0.305, 0.33}), 0.295)
         << degrees;
@@ -148,7 +149,7 @@ TEST(World, StepsAreClimbedWhateverSlopeIs) {
 }
 
 TEST(World, ASkirtingBoardIsNoStep) {
-  Trial run(
+  WorldFixture run(
       {floorBox(), {"skirting", {1.98, 0, -3}, {2, 0.1, 3}}, {"wall", {2, 0, -3}, {2.2, 3, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", to(5, 0));
@@ -168,7 +169,7 @@ std::vector<NamedBox> stair(double riser, double tread, int steps) {
 
 TEST(World, AStairIsWalkedUpAndDown) {
   for (const auto& [riser, tread] : {std::pair{0.17, 0.29}, {0.2, 0.2}, {0.1, 0.4}, {0.28, 0.25}}) {
-    Trial run(stair(riser, tread, 12));
+    WorldFixture run(stair(riser, tread, 12));
     const double top = 12 * riser, end = 12 * tread + 1;
     run.order("ann", Spawn{{-2, 0, 0}});
     run.order("ann", to(end, 0, 1.4, top));
@@ -184,7 +185,7 @@ TEST(World, AStairIsWalkedUpAndDown) {
 }
 
 TEST(World, ALedgeIsFallenFromAndLandedBelow) {
-  Trial run({floorBox(), {"platform", {-3, 0, -3}, {0, 2, 3}}});
+  WorldFixture run({floorBox(), {"platform", {-3, 0, -3}, {0, 2, 3}}});
   run.order("ann", Spawn{{-1, 2, 0}});
   run.order("ann", to(3, 0));
   run.untilIdle();
@@ -194,7 +195,7 @@ TEST(World, ALedgeIsFallenFromAndLandedBelow) {
 }
 
 TEST(World, FallingOutOfTheSceneIsLeavingIt) {
-  Trial run({floorBox()});
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{9, 0, 0}});
   run.order("ann", to(30, 0));
   run.untilIdle();
@@ -202,8 +203,8 @@ TEST(World, FallingOutOfTheSceneIsLeavingIt) {
   EXPECT_TRUE(run.open.empty());
 }
 
-TEST(World, AvatarsBlockOneAnotherAndTouch) {
-  Trial run({floorBox()});
+TEST(World, AvatarsBlockEachOtherAndTouch) {
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{-3, 0, 0}});
   run.order("bob", Spawn{{3, 0, 0}});
   run.order("ann", to(3, 0));
@@ -216,8 +217,8 @@ TEST(World, AvatarsBlockOneAnotherAndTouch) {
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
-TEST(World, WhoeverIsBlockedByAnotherIsToldHowNearAndWhere) {
-  Trial run({floorBox()});
+TEST(World, AnAvatarBlockedByAnotherGetsDistanceAndPoint) {
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{-3, 0, 0}});
   run.order("bob", Spawn{{3, 0, 0}});
   run.order("ann", to(3, 0));
@@ -227,18 +228,19 @@ TEST(World, WhoeverIsBlockedByAnotherIsToldHowNearAndWhere) {
   for (const ContactEvent& e : run.events) {
     if (e.kind != ContactEvent::Kind::blocked) continue;
     ++blocked;
-    const double towards = nameOf(run.world, e.a) == "ann" ? 1 : -1;
-    EXPECT_NEAR(e.decision.normal.x(), towards, 1e-6);
-    EXPECT_GT(e.decision.distance, 0.8 * run.world.lengths().epsilon);
-    EXPECT_LT(e.decision.distance, 2 * run.world.lengths().epsilon);
-    EXPECT_NEAR(e.decision.pointA.x(), run.feet(nameOf(run.world, e.a)).x() + 0.3 * towards, 1e-3);
-    EXPECT_NEAR((e.decision.pointB - e.decision.pointA).norm(), e.decision.distance, 1e-12);
+    const double towards = findEntityName(run.world, e.a) == "ann" ? 1 : -1;
+    EXPECT_NEAR(e.separation.normal.x(), towards, 1e-6);
+    EXPECT_GT(e.separation.distance, 0.8 * run.world.settings().contactOffset);
+    EXPECT_LT(e.separation.distance, 2 * run.world.settings().contactOffset);
+    EXPECT_NEAR(e.separation.pointA.x(),
+                run.feet(findEntityName(run.world, e.a)).x() + 0.3 * towards, 1e-3);
+    EXPECT_NEAR((e.separation.pointB - e.separation.pointA).norm(), e.separation.distance, 1e-12);
   }
   EXPECT_EQ(blocked, 2);
 }
 
 TEST(World, AVerySlowWalkArrives) {
-  Trial run({floorBox()});
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", to(0.03, 0, 0.001));
   run.untilIdle();
@@ -247,7 +249,7 @@ TEST(World, AVerySlowWalkArrives) {
 }
 
 TEST(World, AWalkToAPlaceOverheadIsBlockedByNothingOfTheLastWalk) {
-  Trial run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
+  WorldFixture run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", to(5, 0));
   run.untilIdle();
@@ -268,16 +270,17 @@ TEST(World, APaneOfNoThicknessIsNotCrossedAtAnySpeed) {
   const auto scene = std::make_shared<const Scene>(model);
   for (const double speed : {0.5, 10.0, 1000.0}) {
     World world(scene);
-    ASSERT_FALSE(submit(world, {"ann", Spawn{{0, 0, 0}}, 0}));
-    ASSERT_FALSE(submit(world, {"ann", Walk{{{8, 0, 0}}, speed}, 0}));
-    for (int i = 0; i < 600; ++i) ASSERT_EQ(tick(world).worstPenetration, 0);
-    EXPECT_LT(world.snapshot()->avatars[0].feet.x(), 1.7) << speed;
-    EXPECT_GT(world.snapshot()->avatars[0].feet.x(), 1.69) << speed;
+    ASSERT_FALSE(submitAvatarCommand(world, {"ann", Spawn{{0, 0, 0}}, 0}));
+    ASSERT_FALSE(submitAvatarCommand(world, {"ann", Walk{{{8, 0, 0}}, speed}, 0}));
+    for (int i = 0; i < 600; ++i) ASSERT_EQ(tickWorld(world).maxPenetration, 0);
+    EXPECT_LT(world.snapshot()->avatars[0].footPosition.x(), 1.7) << speed;
+    EXPECT_GT(world.snapshot()->avatars[0].footPosition.x(), 1.69) << speed;
   }
 }
 
-TEST(World, ASteepRoofThrowsNobodyThroughTheWallBesideIt) {
-  // A fast fall onto a slope of 60 degrees goes on sideways, towards a pane that was not near.
+TEST(World, ASteepRoofPushesNoAvatarThroughTheAdjacentWall) {
+  // A fast fall onto a slope of 60 degrees continues sideways, towards a pane that was not close
+  // before.
   Model model = boxModel({floorBox()});
   Mesh roof;
   roof.positions = {{-1, 2.4F, -3}, {-1, 2.4F, 3}, {0.4F, 0, 3}, {0.4F, 0, -3}};
@@ -291,12 +294,12 @@ TEST(World, ASteepRoofThrowsNobodyThroughTheWallBesideIt) {
   const auto scene = std::make_shared<const Scene>(model);
   for (double height = 50; height < 51; height += 0.07) {
     World world(scene);
-    ASSERT_FALSE(submit(world, {"ann", Spawn{{0, height, 0}}, 0}));
+    ASSERT_FALSE(submitAvatarCommand(world, {"ann", Spawn{{0, height, 0}}, 0}));
     for (int i = 0; i < 300; ++i) {
-      ASSERT_EQ(tick(world).worstPenetration, 0) << height << " m, tick " << i;
-      ASSERT_LT(world.snapshot()->avatars[0].feet.x(), 0.12) << height << " m, tick " << i;
+      ASSERT_EQ(tickWorld(world).maxPenetration, 0) << height << " m, tick " << i;
+      ASSERT_LT(world.snapshot()->avatars[0].footPosition.x(), 0.12) << height << " m, tick " << i;
     }
-    EXPECT_LT(world.snapshot()->avatars[0].feet.y(), 3) << height;
+    EXPECT_LT(world.snapshot()->avatars[0].footPosition.y(), 3) << height;
   }
 }
 
@@ -311,7 +314,7 @@ TEST(World, ARoomOfNoiseIsNeverPenetratedAndEventsBalance) {
     const double w = uniform(0.01, 0.8), h = uniform(0.01, 1.5), d = uniform(0.01, 0.8);
     boxes.push_back({"box" + std::to_string(i), {x, y, z}, {x + w, y + h, z + d}});
   }
-  Trial run(boxes);
+  WorldFixture run(boxes);
   for (int i = 0; i < 6; ++i) {
     const std::string name = "a" + std::to_string(i);
     run.order(name, Spawn{{uniform(-8, 8), 3, uniform(-8, 8)}});
@@ -323,12 +326,13 @@ TEST(World, ARoomOfNoiseIsNeverPenetratedAndEventsBalance) {
   run.ticks(1500);
   EXPECT_EQ(run.worstPenetration, 0);
   EXPECT_GT(run.events.size(), 100u);
-  for (const ContactEvent& e : endContacts(run.world, ContactEvent::Reason::shutdown)) run.take(e);
+  for (const ContactEvent& e : endAllContacts(run.world, ContactEvent::Reason::shutdown))
+    run.take(e);
   EXPECT_TRUE(run.open.empty());
 }
 
 TEST(World, WaitsLooksAndCapturesRunInTheirOrder) {
-  Trial run({floorBox()});
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", Look{{0, 1.6, -5}});
   run.order("ann", Capture{"north"});
@@ -341,7 +345,7 @@ TEST(World, WaitsLooksAndCapturesRunInTheirOrder) {
       if (n.kind == Kind::capture) {
         captured = report.snapshot->tick;
         EXPECT_EQ(n.text, "north");
-        EXPECT_NEAR(report.snapshot->avatars[0].gaze.z(), -1, 1e-3);
+        EXPECT_NEAR(report.snapshot->avatars[0].viewDirection.z(), -1, 1e-3);
       }
       if (n.kind == Kind::left) left = report.snapshot->tick;
     }
@@ -353,7 +357,7 @@ TEST(World, WaitsLooksAndCapturesRunInTheirOrder) {
 }
 
 TEST(World, DriveActsAtOnceAndZeroStops) {
-  Trial run({floorBox()});
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.untilIdle();
   run.order("ann", Drive{{1.2, 0, 0}});
@@ -364,8 +368,8 @@ TEST(World, DriveActsAtOnceAndZeroStops) {
   EXPECT_NEAR(run.feet("ann").x(), 1.2, 1e-9);
 }
 
-TEST(World, ADriveOfNobodyIsRefusedAndSaysWhatItDropped) {
-  Trial run({floorBox()});
+TEST(World, ADriveOfAnAbsentAvatarIsRefusedAndReportsDroppedOrders) {
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", to(1, 0));
   run.order("ann", Drive{{1.2, 0, 0}});
@@ -377,8 +381,8 @@ TEST(World, ADriveOfNobodyIsRefusedAndSaysWhatItDropped) {
   EXPECT_TRUE(run.world.snapshot()->avatars.empty());
 }
 
-/// Tags of the orders that were told to be dropped, in order; each with what did it.
-std::vector<std::uint64_t> droppedTags(const Trial& run, const std::string& by) {
+/// Tags of the cancelled orders, in order, each with the reason.
+std::vector<std::uint64_t> droppedTags(const WorldFixture& run, const std::string& by) {
   std::vector<std::uint64_t> tags;
   for (const Notice& notice : run.notices) {
     if (notice.kind != Kind::dropped) continue;
@@ -388,16 +392,16 @@ std::vector<std::uint64_t> droppedTags(const Trial& run, const std::string& by) 
   return tags;
 }
 
-TEST(World, OrdersThatADriveDropsAreToldWithTheirTags) {
-  Trial run({floorBox()});
+TEST(World, OrdersDroppedByADriveAreReportedWithTheirTags) {
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.untilIdle();
-  submit(run.world, {"ann", to(3, 0), 7});
-  submit(run.world, {"ann", Wait{5}, 8});
-  submit(run.world, {"bob", Wait{5}, 9});
+  submitAvatarCommand(run.world, {"ann", to(3, 0), 7});
+  submitAvatarCommand(run.world, {"ann", Wait{5}, 8});
+  submitAvatarCommand(run.world, {"bob", Wait{5}, 9});
   run.ticks(10);
   run.notices.clear();
-  submit(run.world, {"ann", Drive{{0, 0, 1}}, 10});
+  submitAvatarCommand(run.world, {"ann", Drive{{0, 0, 1}}, 10});
   run.ticks(2);
   EXPECT_EQ(droppedTags(run, "by a Drive"), (std::vector<std::uint64_t>{7, 8}));
   EXPECT_EQ(run.notices[0].id, run.view("ann").id);
@@ -405,18 +409,18 @@ TEST(World, OrdersThatADriveDropsAreToldWithTheirTags) {
   EXPECT_EQ(run.count(Kind::arrived), 0);
 }
 
-TEST(World, OrdersThatWaitForARefusedSpawnAreToldAsDropped) {
-  Trial run({floorBox(), {"block", {-1, 0, -1}, {1, 2, 1}}});
-  submit(run.world, {"ann", Spawn{{0, 0.5, 0}}, 1});
-  submit(run.world, {"ann", to(3, 0), 2});
-  submit(run.world, {"ann", Leave{}, 3});
+TEST(World, OrdersAfterARefusedSpawnAreReportedAsDropped) {
+  WorldFixture run({floorBox(), {"block", {-1, 0, -1}, {1, 2, 1}}});
+  submitAvatarCommand(run.world, {"ann", Spawn{{0, 0.5, 0}}, 1});
+  submitAvatarCommand(run.world, {"ann", to(3, 0), 2});
+  submitAvatarCommand(run.world, {"ann", Leave{}, 3});
   run.ticks(2);
   EXPECT_EQ(run.count(Kind::refused), 1);
   EXPECT_EQ(droppedTags(run, "by a refused Spawn"), (std::vector<std::uint64_t>{2, 3}));
 }
 
-TEST(World, OfVeryManyDroppedOrdersTheLastThatIsToldCountsTheOthers) {
-  Trial run({floorBox()});
+TEST(World, TheLastNoticeOfManyDroppedOrdersCountsTheOthers) {
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.untilIdle();
   for (int i = 0; i < 10'500; ++i) run.order("ann", Wait{5});
@@ -426,8 +430,8 @@ TEST(World, OfVeryManyDroppedOrdersTheLastThatIsToldCountsTheOthers) {
   EXPECT_EQ(run.notices.back().text, "by a Drive, and 500 more orders");
 }
 
-TEST(World, OneWhoLeavesAndComesBackUnderTheSameNameIsAnother) {
-  Trial run({floorBox()});
+TEST(World, ARespawnUnderTheSameNameIsAnotherAvatar) {
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("bob", Spawn{{0.7, 0, 0}});
   run.order("bob", to(0, 0));
@@ -437,15 +441,16 @@ TEST(World, OneWhoLeavesAndComesBackUnderTheSameNameIsAnother) {
   run.order("ann", Leave{});
   run.order("ann", Spawn{{0, 0, 3}});
   run.untilIdle();
-  EXPECT_EQ(run.count(Kind::arrived), 1) << "bob still runs into the one that left";
+  EXPECT_EQ(run.count(Kind::arrived), 1) << "bob still has contacts with the avatar that left";
   ASSERT_EQ(run.world.snapshot()->avatars.size(), 2u);
   EXPECT_GT(run.world.snapshot()->avatars[1].id, before + 1);
-  for (const ContactEvent& e : endContacts(run.world, ContactEvent::Reason::shutdown)) run.take(e);
+  for (const ContactEvent& e : endAllContacts(run.world, ContactEvent::Reason::shutdown))
+    run.take(e);
   EXPECT_TRUE(run.open.empty());
 }
 
 TEST(World, AWorldOfNothingTicksAndRefusesSpawns) {
-  Trial run(std::vector<NamedBox>{});
+  WorldFixture run(std::vector<NamedBox>{});
   run.ticks(3);
   run.order("ann", Spawn{{0, 0, 0}});
   run.ticks(3);
@@ -454,9 +459,9 @@ TEST(World, AWorldOfNothingTicksAndRefusesSpawns) {
 }
 
 TEST(World, AbsurdCommandsAreRefusedByNameAndChangeNothing) {
-  Trial run({floorBox()});
+  WorldFixture run({floorBox()});
   const auto why = [&](Order o, const std::string& name = "ann") {
-    const auto text = submit(run.world, {name, std::move(o), 0});
+    const auto text = submitAvatarCommand(run.world, {name, std::move(o), 0});
     return text.value_or("taken");
   };
   EXPECT_NE(why(Spawn{{0, kNaN, 0}}).find("at.y is NaN"), std::string::npos);
@@ -474,8 +479,8 @@ TEST(World, AbsurdCommandsAreRefusedByNameAndChangeNothing) {
   EXPECT_TRUE(run.notices.empty());
 }
 
-TEST(World, OrdersForNobodyAreRefusedWhenReached) {
-  Trial run({floorBox()});
+TEST(World, OrdersForAnAbsentAvatarAreRefusedWhenReached) {
+  WorldFixture run({floorBox()});
   run.order("ghost", to(1, 1));
   run.order("ghost", Drive{{1, 0, 0}});
   run.step();
@@ -484,7 +489,7 @@ TEST(World, OrdersForNobodyAreRefusedWhenReached) {
 
 TEST(World, TheSameCommandsGiveTheSameHashAndOthersDoNot) {
   const auto hashOf = [](double speed) {
-    Trial run(stair(0.17, 0.29, 8));
+    WorldFixture run(stair(0.17, 0.29, 8));
     run.order("ann", Spawn{{-2, 0, 0}, 33});
     run.order("bob", Spawn{{-2, 0, 1.5}, 33});
     run.order("ann", to(4, 0.2, speed, 1.36));
@@ -497,33 +502,33 @@ TEST(World, TheSameCommandsGiveTheSameHashAndOthersDoNot) {
 }
 
 TEST(World, ARestingAvatarCostsNoQueries) {
-  Trial run({floorBox()});
+  WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.untilIdle();
   run.ticks(3);
   EXPECT_EQ(run.step().narrowQueries, 0u);
-  EXPECT_EQ(run.step().liveContacts, 1u);
+  EXPECT_EQ(run.step().activeContacts, 1u);
 }
 
-TEST(World, NearMissesAreToldOnceAnApproach) {
-  Lengths lengths;
-  lengths.nearMiss = 0.05;
-  Trial run({floorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, lengths);
+TEST(World, NearMissesAreReportedOncePerApproach) {
+  WorldSettings lengths;
+  lengths.nearMissDistance = 0.05;
+  WorldFixture run({floorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, lengths);
   run.order("ann", Spawn{{-2, 0, 0}});
   run.order("ann", to(2, 0));
   run.untilIdle();
   const auto nears = std::count_if(run.events.begin(), run.events.end(), [&](const auto& e) {
-    return e.kind == ContactEvent::Kind::near && e.phase == ContactEvent::Phase::begin &&
-           nameOf(run.world, e.b) == "post";
+    return e.kind == ContactEvent::Kind::nearMiss && e.phase == ContactEvent::Phase::begin &&
+           findEntityName(run.world, e.b) == "post";
   });
   EXPECT_EQ(nears, 1);
   EXPECT_FALSE(run.touched("post"));
 }
 
-TEST(World, ANearMissOfWhoLeavesIsToldAsOverWithHowNearItCame) {
-  Lengths lengths;
-  lengths.nearMiss = 0.05;
-  Trial run({floorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, lengths);
+TEST(World, ANearMissEndsWithItsMinimumWhenTheAvatarLeaves) {
+  WorldSettings lengths;
+  lengths.nearMissDistance = 0.05;
+  WorldFixture run({floorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, lengths);
   run.order("ann", Spawn{{-2, 0, 0}});
   run.order("ann", to(0, 0));
   run.untilIdle();
@@ -531,12 +536,12 @@ TEST(World, ANearMissOfWhoLeavesIsToldAsOverWithHowNearItCame) {
   run.ticks(2);
   std::vector<ContactEvent> nears;
   for (const ContactEvent& e : run.events)
-    if (e.kind == ContactEvent::Kind::near && e.b == 2) nears.push_back(e);
+    if (e.kind == ContactEvent::Kind::nearMiss && e.b == 2) nears.push_back(e);
   ASSERT_EQ(nears.size(), 3u);
   using Phase = ContactEvent::Phase;
   EXPECT_EQ(nears[0].phase, Phase::begin);
   EXPECT_EQ(nears[1].phase, Phase::min);
-  EXPECT_LE(nears[1].decision.distance, nears[0].decision.distance);
+  EXPECT_LE(nears[1].separation.distance, nears[0].separation.distance);
   EXPECT_EQ(nears[2].phase, Phase::end);
   EXPECT_EQ(nears[2].reason, ContactEvent::Reason::left);
 }

@@ -1,9 +1,10 @@
-// Who may do what, and what a server on an address that strangers reach wants first.
+// Tests of access rights, and of the requirements for a server on a public address.
 #include "server/base/access.hpp"
 
 #include <filesystem>
 #include <fstream>
 
+#include "server/base/server_error.hpp"
 #include "tests/server/raw_connection.hpp"
 #include "tests/server/served_room.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -31,15 +32,15 @@ v1::ErrorCode codeOf(Action action) {
 }
 
 TEST(Access, WithoutTokensEveryoneIsAdmin) {
-  EXPECT_EQ(roleOf({}, ""), Role::admin);
+  EXPECT_EQ(findRole({}, ""), Role::admin);
 }
 
-TEST(Access, OnlyAWholeTokenIsTaken) {
+TEST(Access, OnlyACompleteTokenIsAccepted) {
   const Access access = threeTokens();
-  EXPECT_EQ(roleOf(access, kDriver), Role::drive);
+  EXPECT_EQ(findRole(access, kDriver), Role::drive);
   for (const std::string& wrong : {std::string(), kDriver.substr(1), kDriver + "0",
                                    std::string(kDriver.size(), 'x'), kDriver + kDriver}) {
-    EXPECT_EQ(roleOf(access, wrong), std::nullopt) << wrong;
+    EXPECT_EQ(findRole(access, wrong), std::nullopt) << wrong;
   }
 }
 
@@ -47,21 +48,21 @@ TEST(Access, BrowsersMayComeOnlyFromPagesThatAreKnown) {
   Access access;
   access.hosts = {"house.example.org"};
   access.origins = {"https://viewer.example.org"};
-  EXPECT_FALSE(foreignPage(access, "127.0.0.1:7878", ""));
-  EXPECT_FALSE(foreignPage(access, "[::1]:7878", ""));
-  EXPECT_FALSE(foreignPage(access, "localhost:7878", "http://localhost:7878"));
-  EXPECT_FALSE(foreignPage(access, "house.example.org", "https://viewer.example.org"));
-  EXPECT_TRUE(foreignPage(access, "", ""));
-  EXPECT_TRUE(foreignPage(access, "rebound.example.com:7878", ""));
-  EXPECT_TRUE(foreignPage(access, "localhost:7878", "http://localhost:3000"));
-  EXPECT_TRUE(foreignPage(access, "localhost:7878", "https://evil.example.com"));
-  EXPECT_TRUE(foreignPage(access, "localhost:7878", "null"));
+  EXPECT_FALSE(validateOrigin(access, "127.0.0.1:7878", ""));
+  EXPECT_FALSE(validateOrigin(access, "[::1]:7878", ""));
+  EXPECT_FALSE(validateOrigin(access, "localhost:7878", "http://localhost:7878"));
+  EXPECT_FALSE(validateOrigin(access, "house.example.org", "https://viewer.example.org"));
+  EXPECT_TRUE(validateOrigin(access, "", ""));
+  EXPECT_TRUE(validateOrigin(access, "rebound.example.com:7878", ""));
+  EXPECT_TRUE(validateOrigin(access, "localhost:7878", "http://localhost:3000"));
+  EXPECT_TRUE(validateOrigin(access, "localhost:7878", "https://evil.example.com"));
+  EXPECT_TRUE(validateOrigin(access, "localhost:7878", "null"));
 }
 
 TEST(Access, ATokenFileIsReadOrItsLineNamed) {
   const auto file = tests::ownFile("tokens");
   const auto write = [&](const std::string& text) { std::ofstream(file) << text; };
-  write("# who looks\nobserve " + kLooker + "\n\nadmin " + kAdmin + "\n");
+  write("# observer\nobserve " + kLooker + "\n\nadmin " + kAdmin + "\n");
   EXPECT_EQ(readTokens(file).size(), 2u);
   for (const std::string& bad : {std::string(""), "observe\n" + kLooker, std::string("drive short"),
                                  "king " + kAdmin, "admin " + kAdmin + " more"}) {
@@ -77,13 +78,13 @@ class Roles : public ServedRoom {
   void SetUp() override { serve({}, smallRoom(), threeTokens()); }
 };
 
-TEST_F(Roles, AWrongTokenOrNoneIsTurnedAway) {
+TEST_F(Roles, AWrongOrMissingTokenIsRefused) {
   EXPECT_EQ(codeOf([&] { client("none"); }), v1::ERROR_UNAUTHENTICATED);
   EXPECT_EQ(codeOf([&] { client("wrong", kAdmin + "x"); }), v1::ERROR_UNAUTHENTICATED);
   EXPECT_EQ(client("right", kLooker).welcome().role(), v1::ROLE_OBSERVE);
 }
 
-TEST_F(Roles, EachMayDoWhatItsRoleAllows) {
+TEST_F(Roles, EachRoleHasItsPermissions) {
   protocol::Client looker = client("looker", kLooker), driver = client("driver", kDriver);
   v1::ClientMessage restart;
   restart.mutable_restart();
@@ -94,7 +95,7 @@ TEST_F(Roles, EachMayDoWhatItsRoleAllows) {
   EXPECT_EQ(codeOf([&] { driver.request(restart); }), v1::ERROR_NOT_ALLOWED);
 }
 
-TEST_F(Roles, TheAdminMakesTheWorldAnew) {
+TEST_F(Roles, TheAdminRestartsTheWorld) {
   protocol::Client admin = client("admin", kAdmin);
   const std::uint64_t first = admin.step().state_hash();
   admin.command(spawn("a", 0, 0.01, 0));
@@ -115,13 +116,13 @@ TEST_F(Roles, PagesWantATokenTooButHealthDoesNot) {
   EXPECT_EQ(get("/metrics?token=" + kLooker), "HTTP/1.1 200");
   EXPECT_EQ(get("/metrics", "Authorization: Bearer " + kLooker + "\r\n"), "HTTP/1.1 200");
   EXPECT_EQ(get("/healthz"), "HTTP/1.1 200");
-  // Which worlds there are is told to those alone who may ask.
+  // The list of worlds is given only to clients with the right to see it.
   EXPECT_EQ(get("/healthz?world=main"), "HTTP/1.1 401");
   EXPECT_EQ(get("/healthz?world=nowhere"), "HTTP/1.1 401");
   EXPECT_EQ(get("/healthz?world=main&token=" + kLooker), "HTTP/1.1 200");
 }
 
-TEST(Listening, AnAddressOfStrangersWantsATokenAndInsecure) {
+TEST(Listening, APublicAddressRequiresATokenAndInsecure) {
   const Endpoint everywhere{"0.0.0.0", 0};
   Access access;
   EXPECT_THROW(Server(smallRoom(), everywhere), ServerError);

@@ -1,4 +1,4 @@
-// What --audit tells: in the metrics, in the log, and by the exit code.
+// Tests of --audit: metrics, log and exit code.
 #include <gtest/gtest.h>
 #include <spdlog/sinks/ostream_sink.h>
 #include <spdlog/spdlog.h>
@@ -6,14 +6,14 @@
 #include <sstream>
 
 #include "scene/world/data/world_data.hpp"
+#include "server/app/command_line.hpp"
 #include "server/runs/in_process_driver.hpp"
-#include "server/runs/script_run.hpp"
 #include "tests/server/served_room.hpp"
 
 namespace enfilade::server::testing {
 namespace {
 
-/// What is logged while it lives.
+/// Captures the log for the lifetime of the object.
 class Log {
  public:
   Log() : before_(spdlog::default_logger()) {
@@ -30,11 +30,11 @@ class Log {
   std::ostringstream text_;
 };
 
-/// A broad phase that does not know where the wall is.
+/// Makes the broad phase miss the wall.
 void withholdTheWall(scene::World& world) {
-  std::vector<scene::Box> boxes = world.scene().stillBoxes();
+  std::vector<scene::Aabb> boxes = world.scene().staticBoxes();
   boxes[kWall - 1] = {scene::Vec3::Constant(500), scene::Vec3::Constant(501)};
-  world.state().broadPhase = collision::SortAndSweep(boxes);
+  world.data().broadPhase = collision::SortAndSweep(boxes);
 }
 
 std::variant<ProgramCommand, ExitCode> read(std::vector<const char*> arguments) {
@@ -59,7 +59,7 @@ TEST(AuditOption, IsAWholeNumberOfTicksAndOffWithoutIt) {
   for (const char* bad : {"-1", "1.5", "x", "", "1000001", "99999999999", "1 "}) {
     const auto refused = replay({"--audit", bad});
     ASSERT_TRUE(std::holds_alternative<ExitCode>(refused)) << bad;
-    EXPECT_EQ(std::get<ExitCode>(refused), ExitCode::usage);
+    EXPECT_EQ(std::get<ExitCode>(refused), ExitCode::usageError);
   }
   const auto serve = std::get<ProgramCommand>(read({"serve", "room.obj", "--audit", "7"}));
   EXPECT_EQ(std::get<ServeCommand>(serve).auditEvery, 7u);
@@ -68,8 +68,8 @@ TEST(AuditOption, IsAWholeNumberOfTicksAndOffWithoutIt) {
 TEST(AuditOfAWalk, AMissedPairIsCountedLoggedAndAViolation) {
   scene::World blind(smallRoom());
   withholdTheWall(blind);
-  scene::auditBroadPhase(blind, 2);
-  RecordedWorld world(std::move(blind));
+  scene::setAuditInterval(blind, 2);
+  RecordableWorld world(std::move(blind));
   InProcessDriver driver(world, nullptr);
   const Log log;
   ASSERT_FALSE(driver.submit(spawn("ann", 4.8, 0.01, 0)));
@@ -82,39 +82,39 @@ TEST(AuditOfAWalk, AMissedPairIsCountedLoggedAndAViolation) {
   EXPECT_EQ(audit.missed(), 1u);
   EXPECT_EQ(audit.extra(), 0u);
   EXPECT_GT(audit.timing().max_us(), 0);
-  for (const char* told : {"error", "tick 2", "missed", "'ann'", "'room_wall'", "(5, 0, -4)"}) {
-    EXPECT_NE(log.text().find(told), std::string::npos) << told << " in " << log.text();
+  for (const char* word : {"error", "tick 2", "missed", "'ann'", "'room_wall'", "(5, 0, -4)"}) {
+    EXPECT_NE(log.text().find(word), std::string::npos) << word << " in " << log.text();
   }
-  EXPECT_EQ(judge({}, driver.metrics(), false), ExitCode::violations);
+  EXPECT_EQ(computeExitCode({}, driver.metrics(), false), ExitCode::violations);
 }
 
-TEST(AuditOfAWalk, ManyFindingsOfATickAreCountedAndTheFirstTold) {
+TEST(AuditOfAWalk, ManyFindingsOfATickAreCountedAndTheFirstLogged) {
   scene::World world(smallRoom());
   scene::TickReport report;
   report.snapshot = world.snapshot();
   report.audit.emplace();
   report.audit->findings.resize(20);
   AuditTotals totals;
-  totals.add(*report.audit);
+  totals.addTick(*report.audit);
   EXPECT_EQ(totals.missed, 20u);
-  EXPECT_FALSE(totals.right());
+  EXPECT_FALSE(totals.isClean());
   const Log log;
   logFindings(world, report);
   EXPECT_NE(log.text().find("12 more"), std::string::npos) << log.text();
 }
 
-TEST(AuditOfAWalk, WhatIsRightIsNoViolation) {
+TEST(AuditOfAWalk, ACorrectTickIsNoViolation) {
   v1::Metrics metrics;
-  EXPECT_EQ(judge({}, metrics, true), ExitCode::done);
+  EXPECT_EQ(computeExitCode({}, metrics, true), ExitCode::success);
   metrics.mutable_audit()->set_pairs(5);
-  EXPECT_EQ(judge({}, metrics, true), ExitCode::done);
+  EXPECT_EQ(computeExitCode({}, metrics, true), ExitCode::success);
   metrics.mutable_audit()->set_extra(1);
-  EXPECT_EQ(judge({}, metrics, false), ExitCode::violations);
+  EXPECT_EQ(computeExitCode({}, metrics, false), ExitCode::violations);
 }
 
 class AuditedServer : public ServedRoom {};
 
-TEST_F(AuditedServer, TellsItsAuditInTheMetricsAndAtItsEnd) {
+TEST_F(AuditedServer, ReportsItsAuditInTheMetricsAndAtItsEnd) {
   ServerOptions options;
   options.world.auditEvery = 5;
   server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
@@ -133,10 +133,10 @@ TEST_F(AuditedServer, TellsItsAuditInTheMetricsAndAtItsEnd) {
   server_->stop();
   EXPECT_EQ(server_->auditTotals().ticks, 12u);
   EXPECT_EQ(server_->auditTotals().pairs, audit.pairs());
-  EXPECT_TRUE(server_->auditTotals().right());
+  EXPECT_TRUE(server_->auditTotals().isClean());
 }
 
-TEST_F(AuditedServer, SaysNothingOfAuditsUnlessAskedForThem) {
+TEST_F(AuditedServer, ReportsNoAuditByDefault) {
   serve();
   protocol::Client ann = client("ann");
   ann.step(10);

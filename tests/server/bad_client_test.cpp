@@ -1,4 +1,5 @@
-// Clients that break the rules: each gets a clear error or is cut off, and nobody else notices.
+// Tests of clients that break the rules: each gets a clear error or is disconnected, and no other
+// client is affected.
 #include <thread>
 
 #include "tests/server/raw_connection.hpp"
@@ -9,7 +10,7 @@ namespace {
 
 class BadClients : public ServedRoom {
  protected:
-  /// The server still serves: someone who was there all the time goes on, and a new one may come.
+  /// The server still serves: an existing client continues, and a new one may connect.
   void expectOthersGoOn(protocol::Client& other) {
     const std::uint64_t tick = other.step().tick();
     EXPECT_EQ(client("newcomer").welcome().tick(), tick);
@@ -59,7 +60,7 @@ TEST_F(BadClients, TheFirstMessageHasToBeHello) {
   ASSERT_TRUE(error);
   EXPECT_EQ(error->reply_to(), 7u);
   EXPECT_EQ(error->error().code(), v1::ERROR_BAD_MESSAGE);
-  EXPECT_EQ(client("other").step().tick(), 1u) << "it made no tick";
+  EXPECT_EQ(client("other").step().tick(), 1u) << "no tick was made";
 }
 
 TEST_F(BadClients, ARequestNeedsANumberForItsAnswer) {
@@ -71,7 +72,7 @@ TEST_F(BadClients, ARequestNeedsANumberForItsAnswer) {
   step.mutable_step()->set_ticks(1);
   raw.send(step);
   EXPECT_EQ(raw.readToEnd().error.code(), v1::ERROR_BAD_MESSAGE);
-  EXPECT_EQ(client("other").step().tick(), 1u) << "it made no tick";
+  EXPECT_EQ(client("other").step().tick(), 1u) << "no tick was made";
 }
 
 TEST_F(BadClients, AnotherMajorVersionIsRefused) {
@@ -86,7 +87,7 @@ TEST_F(BadClients, AnotherMajorVersionIsRefused) {
   EXPECT_TRUE(minor.receive()->has_welcome());
 }
 
-TEST_F(BadClients, AMessageCutShortByClosingHarmsNobody) {
+TEST_F(BadClients, AMessageCutShortByClosingAffectsNoOtherClient) {
   serve();
   protocol::Client other = client("other");
   {
@@ -101,7 +102,7 @@ TEST_F(BadClients, AMessageCutShortByClosingHarmsNobody) {
 
 TEST_F(BadClients, SilenceBeforeHelloEndsTheConnection) {
   ServerLimits limits;
-  limits.greeting = std::chrono::milliseconds(50);
+  limits.helloTimeout = std::chrono::milliseconds(50);
   serve(limits);
   RawConnection raw(server_->port());
   EXPECT_EQ(raw.readToEnd().error.code(), v1::ERROR_TIMEOUT);
@@ -109,7 +110,7 @@ TEST_F(BadClients, SilenceBeforeHelloEndsTheConnection) {
 
 TEST_F(BadClients, HalfAMessageAndThenSilenceEndsTheConnection) {
   ServerLimits limits;
-  limits.message = std::chrono::milliseconds(50);
+  limits.messageTimeout = std::chrono::milliseconds(50);
   serve(limits);
   RawConnection raw(server_->port());
   raw.sendHello();
@@ -120,18 +121,18 @@ TEST_F(BadClients, HalfAMessageAndThenSilenceEndsTheConnection) {
 
 TEST_F(BadClients, SilenceBetweenMessagesIsNoFault) {
   ServerLimits limits;
-  limits.greeting = limits.message = std::chrono::milliseconds(30);
+  limits.helloTimeout = limits.messageTimeout = std::chrono::milliseconds(30);
   serve(limits);
   protocol::Client quiet = client("quiet");
   std::this_thread::sleep_for(std::chrono::milliseconds(120));
   EXPECT_EQ(quiet.step().tick(), 1u);
 }
 
-TEST_F(BadClients, WhoDoesNotReadIsDisconnectedWhileOthersGoOn) {
+TEST_F(BadClients, AClientThatDoesNotReadIsDisconnectedAlone) {
   ServerLimits limits;
   limits.outgoingBytes = 64 << 10;
   limits.sendBuffer = 4096;
-  limits.farewell = std::chrono::milliseconds(200);
+  limits.closeTimeout = std::chrono::milliseconds(200);
   serve(limits);
   protocol::Client other = client("other");
   RawConnection raw(server_->port());
@@ -139,8 +140,8 @@ TEST_F(BadClients, WhoDoesNotReadIsDisconnectedWhileOthersGoOn) {
   v1::ClientMessage question;
   question.set_request_id(2);
   for (int i = 0; i < 2000; ++i) question.mutable_describe()->add_ids(kWall);
-  // Asks for far more than sockets and queue together can hold, and reads none of it. Sending fails
-  // when the server has closed.
+  // Requests far more than sockets and queue together can hold, and reads nothing. Sending fails
+  // once the server has closed.
   bool cutOff = false;
   for (int i = 0; i < 20'000 && !cutOff; ++i) {
     cutOff = !raw.send(question);
@@ -150,10 +151,10 @@ TEST_F(BadClients, WhoDoesNotReadIsDisconnectedWhileOthersGoOn) {
   expectOthersGoOn(other);
 }
 
-TEST_F(BadClients, WhoAsksWithoutWaitingForAnswersIsHeldBackAndHearsThemAll) {
+TEST_F(BadClients, AClientThatFloodsIsThrottledAndGetsAllReplies) {
   constexpr std::uint64_t kQuestions = 3000;
   ServerLimits limits;
-  limits.waitingBytes = 100;
+  limits.pendingRequestBytes = 100;
   serve(limits);
   protocol::Client other = client("other");
   RawConnection raw(server_->port());
@@ -177,7 +178,7 @@ TEST_F(BadClients, WhoAsksWithoutWaitingForAnswersIsHeldBackAndHearsThemAll) {
   expectOthersGoOn(other);
 }
 
-TEST_F(BadClients, GoodbyeIsSaidWhenAllThatWasAskedIsAnswered) {
+TEST_F(BadClients, ByeFollowsTheRepliesToAllRequests) {
   serve();
   RawConnection raw(server_->port());
   raw.sendHello();
@@ -190,7 +191,7 @@ TEST_F(BadClients, GoodbyeIsSaidWhenAllThatWasAskedIsAnswered) {
     raw.send(step);
   }
   raw.send(bye);
-  raw.send(step);  // too late: nobody listens
+  raw.send(step);  // too late: the server no longer reads
   for (const std::uint64_t id : {2, 3}) {
     const auto reply = raw.receive();
     ASSERT_TRUE(reply);
@@ -205,7 +206,7 @@ TEST_F(BadClients, GoodbyeIsSaidWhenAllThatWasAskedIsAnswered) {
 
 TEST_F(BadClients, BytesThatDripInEndTheConnectionAllTheSame) {
   ServerLimits limits;
-  limits.message = std::chrono::milliseconds(100);
+  limits.messageTimeout = std::chrono::milliseconds(100);
   serve(limits);
   RawConnection raw(server_->port());
   raw.sendHello();
@@ -219,22 +220,22 @@ TEST_F(BadClients, BytesThatDripInEndTheConnectionAllTheSame) {
   EXPECT_EQ(raw.readToEnd().error.code(), v1::ERROR_TIMEOUT);
 }
 
-TEST_F(BadClients, WhoSaysNothingGivesWayToWhoComes) {
+TEST_F(BadClients, ASilentConnectionIsEvictedForANewOne) {
   ServerLimits limits;
   limits.connections = 3;
   serve(limits);
   protocol::Client ann = client("ann");
   RawConnection first(server_->port()), second(server_->port());
   protocol::Client bob = client("bob");
-  EXPECT_FALSE(first.receive()) << "closed, being the first of the silent ones";
+  EXPECT_FALSE(first.receive()) << "closed as the oldest silent connection";
   second.sendHello();
-  EXPECT_TRUE(second.receive()->has_welcome()) << "there was no need for this one to go";
+  EXPECT_TRUE(second.receive()->has_welcome()) << "there was no need to close this one";
   RawConnection late(server_->port());
-  EXPECT_EQ(late.readToEnd().bye.code(), v1::ERROR_NOT_ALLOWED) << "all are known";
+  EXPECT_EQ(late.readToEnd().bye.code(), v1::ERROR_NOT_ALLOWED) << "all connections are registered";
   EXPECT_EQ(ann.step().tick(), 1u);
 }
 
-TEST_F(BadClients, MoreConnectionsThanTheServerTakesAreTurnedAway) {
+TEST_F(BadClients, ConnectionsAboveTheLimitAreRefused) {
   ServerLimits limits;
   limits.connections = 2;
   serve(limits);

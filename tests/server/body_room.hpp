@@ -1,5 +1,5 @@
-// A room with bodies, for servers and clients: a door in a wall, a volume, and a crate that is
-// already on its way out of the world.
+// Test fixture: a room with bodies for servers and clients. A door in a wall, a volume, and a crate
+// that is already falling out of the world.
 #pragma once
 
 #include <memory>

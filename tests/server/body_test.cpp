@@ -1,4 +1,4 @@
-// Bodies through a connection: commands to them, what they meet, where they are in pictures.
+// Tests of bodies through a connection: commands, contacts, and positions in images.
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -21,7 +21,7 @@ v1::BodyCommand opening(const std::string& body) {
   return command;
 }
 
-/// The event of this kind between these two; null when none came.
+/// The event of this kind between these two; null if none was received.
 const v1::ContactEvent* eventOf(const Heard& heard, v1::ContactEvent::Kind kind,
                                 const std::string& a, const std::string& b) {
   for (const v1::ContactEvent& event : heard.contacts)
@@ -29,7 +29,7 @@ const v1::ContactEvent* eventOf(const Heard& heard, v1::ContactEvent::Kind kind,
   return nullptr;
 }
 
-/// The last State that came, if it tells of the body.
+/// The body's state in the last State message that contains it.
 std::optional<v1::BodyState> stateOf(const std::deque<v1::ServerMessage>& messages,
                                      const std::string& body) {
   std::optional<v1::BodyState> found;
@@ -39,7 +39,7 @@ std::optional<v1::BodyState> stateOf(const std::deque<v1::ServerMessage>& messag
   return found;
 }
 
-TEST_F(ServedBodies, WelcomeTellsWhatMoves) {
+TEST_F(ServedBodies, WelcomeListsTheBodies) {
   protocol::Client ann = client("ann");
   const auto& bodies = ann.welcome().scene().bodies();
   ASSERT_EQ(bodies.size(), 3);
@@ -51,14 +51,14 @@ TEST_F(ServedBodies, WelcomeTellsWhatMoves) {
   EXPECT_GT(bodies[2].mass(), 1);
 }
 
-TEST_F(ServedBodies, ADoorThatIsToldToOpenPushesWhoStandsBehindItAndSaysSo) {
+TEST_F(ServedBodies, AnOpeningDoorPushesAnAvatarAndReportsIt) {
   protocol::Client ann = client("ann"), guest = client("guest");
   guest.subscribe(everything());
   ASSERT_FALSE(ann.command(spawn("ann", 2.6, 0.001, 0.2)));
   ann.step(10);
-  ASSERT_FALSE(guest.bodyCommand(opening("door"))) << "a door belongs to nobody";
+  ASSERT_FALSE(guest.bodyCommand(opening("door"))) << "a door has no owner";
   ann.step(90);
-  guest.metrics();  // all events of the steps come before its reply
+  guest.metrics();  // all events of the steps arrive before its reply
   const auto messages = guest.takeEvents();
   Heard heard;
   heard.add(messages);
@@ -72,7 +72,7 @@ TEST_F(ServedBodies, ADoorThatIsToldToOpenPushesWhoStandsBehindItAndSaysSo) {
   EXPECT_NEAR(door->orientation().w(), std::cos(0.8), 1e-9);
 }
 
-TEST_F(ServedBodies, WhoStandsInATightPlaceBlocksTheDoorWhichIsTold) {
+TEST_F(ServedBodies, AnAvatarWithoutRoomBlocksTheDoorAndIsReported) {
   scene::Model model = bodyRoomModel();
   const auto add = [&](const char* path, const scene::Vec3& min, const scene::Vec3& max) {
     model.meshes.push_back(scene::testing::boxMesh(min, max));
@@ -105,7 +105,7 @@ TEST_F(ServedBodies, WhoStandsInATightPlaceBlocksTheDoorWhichIsTold) {
   EXPECT_EQ(ann.metrics().worst_penetration(), 0);
 }
 
-TEST_F(ServedBodies, WhoWalksThroughAVolumeIsToldToEnterAndToLeaveIt) {
+TEST_F(ServedBodies, AnAvatarThroughATriggerEntersAndLeavesIt) {
   protocol::Client ann = client("ann"), guest = client("guest");
   v1::Subscribe contacts;
   contacts.set_contacts(true);
@@ -127,7 +127,7 @@ TEST_F(ServedBodies, WhoWalksThroughAVolumeIsToldToEnterAndToLeaveIt) {
   EXPECT_GT(leaves->tick(), enters->tick() + 30) << "1.6 m at 1.4 m/s";
 }
 
-TEST_F(ServedBodies, ABodyThatFallsOutOfTheWorldIsToldOnce) {
+TEST_F(ServedBodies, ABodyThatFallsOutOfTheWorldIsReportedOnce) {
   protocol::Client ann = client("ann");
   ann.subscribe(everything());
   for (int i = 0; i < 4; ++i) ann.step(150);
@@ -165,7 +165,7 @@ TEST_F(ServedBodies, APictureShowsTheDoorWhereItIs) {
   ann.step(1);
   const auto shut = idsNow();
   EXPECT_EQ(shut.at(middle), kLeaf);
-  EXPECT_EQ(pixelsOf(shut, kEnd), 0) << "nothing is seen behind the door";
+  EXPECT_EQ(pixelsOf(shut, kEnd), 0) << "nothing is visible behind the door";
   EXPECT_EQ(pixelsOf(shut, kZone), 0) << "volumes are not drawn";
   ASSERT_FALSE(ann.bodyCommand(opening("door")));
   ann.step(90);

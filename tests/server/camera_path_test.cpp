@@ -5,12 +5,15 @@
 #include <cmath>
 #include <random>
 
+#include "server/capture/path/json_path.hpp"
+#include "server/capture/path/tum_path.hpp"
+
 namespace enfilade::server {
 namespace {
 
 constexpr double kFps = 10;
 
-/// What the error says; empty when there is none.
+/// The error message; "" if parsing succeeds.
 template <class Parse>
 std::string saidBy(const Parse& parse) {
   try {
@@ -32,9 +35,9 @@ bool holds(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-TEST(JsonPath, ANestOfBracketsIsAMistakeAndEndsNothing) {
+TEST(JsonPath, DeeplyNestedBracketsAreAnError) {
   const std::string nest = std::string(200'000, '[') + std::string(200'000, ']');
-  EXPECT_TRUE(holds(saidOfJson(R"({"frames":[)" + nest + "]}"), "so deep a nest"));
+  EXPECT_TRUE(holds(saidOfJson(R"({"frames":[)" + nest + "]}"), "a too deeply nested value"));
 }
 
 TEST(TumPath, LinesAreTimePlaceAndRotation) {
@@ -44,20 +47,20 @@ TEST(TumPath, LinesAreTimePlaceAndRotation) {
   ASSERT_EQ(path.poses.size(), 2U);
   EXPECT_EQ(path.poses[0].time, 0.5);
   EXPECT_EQ(path.poses[0].eye, Vec3(1, 2, 3));
-  EXPECT_LT((-path.poses[0].turned.col(2) + Vec3::UnitZ()).norm(), 1e-12);  // looks along -z
+  EXPECT_LT((-path.poses[0].rotation.col(2) + Vec3::UnitZ()).norm(), 1e-12);  // looks along -z
   // A quarter turn to the left about y: along -x.
-  EXPECT_LT((-path.poses[1].turned.col(2) + Vec3::UnitX()).norm(), 1e-8);
+  EXPECT_LT((-path.poses[1].rotation.col(2) + Vec3::UnitX()).norm(), 1e-8);
   EXPECT_FALSE(path.lens);
 }
 
 TEST(TumPath, OpenCvsCameraLooksAlongItsOwnZWithYDown) {
   const CameraPath path = parseTumPath("0 0 0 0 0 0 0 1", "path.txt", CameraAxes::opencv);
-  EXPECT_LT((-path.poses[0].turned.col(2) - Vec3::UnitZ()).norm(), 1e-12);
-  EXPECT_LT((path.poses[0].turned.col(1) + Vec3::UnitY()).norm(), 1e-12);
-  EXPECT_NEAR(path.poses[0].turned.determinant(), 1, 1e-12);
+  EXPECT_LT((-path.poses[0].rotation.col(2) - Vec3::UnitZ()).norm(), 1e-12);
+  EXPECT_LT((path.poses[0].rotation.col(1) + Vec3::UnitY()).norm(), 1e-12);
+  EXPECT_NEAR(path.poses[0].rotation.determinant(), 1, 1e-12);
 }
 
-TEST(TumPath, WrongLinesAreToldWithFileLineAndValue) {
+TEST(TumPath, WrongLinesAreReportedWithFileLineAndValue) {
   const std::string good = "0 0 0 0 0 0 0 1\n";
   EXPECT_TRUE(holds(saidOfTum(good + "\n1 0 0 x 0 0 0 1"), "path.txt:3: 'x'"));
   EXPECT_TRUE(holds(saidOfTum(good + "1 0 0 nan 0 0 0 1"), "path.txt:2: 'nan'"));
@@ -66,8 +69,8 @@ TEST(TumPath, WrongLinesAreToldWithFileLineAndValue) {
   EXPECT_TRUE(holds(saidOfTum(good + "1 0 0 0 0 0 0 1 9"), "path.txt:2: more than eight"));
   EXPECT_TRUE(holds(saidOfTum(good + "1 0 0 0 0 0 0 0"), "path.txt:2: the quaternion's length"));
   EXPECT_TRUE(holds(saidOfTum(good + "0 0 0 0 0 0 0 1"), "path.txt:2: time"));
-  EXPECT_TRUE(holds(saidOfTum(good + "1 2e9 0 0 0 0 0 1"), "path.txt:2: the place"));
-  EXPECT_TRUE(holds(saidOfTum("# nothing\n\n"), "path.txt: holds no pose"));
+  EXPECT_TRUE(holds(saidOfTum(good + "1 2e9 0 0 0 0 0 1"), "path.txt:2: the position"));
+  EXPECT_TRUE(holds(saidOfTum("# nothing\n\n"), "path.txt: contains no pose"));
   EXPECT_TRUE(
       holds(saidOfTum("#t [ns],p,q\n1403636579763555584,1,2,3,1,0,0,0"), "path.txt:2: commas"));
 }
@@ -79,26 +82,26 @@ TEST(Quaternions, ComeBackFromTheirRotation) {
     Eigen::Vector4d q(normal(random), normal(random), normal(random), normal(random));
     q.normalize();
     if (q[3] < 0) q = -q;
-    const auto back = quaternionOf(rotationOf({q[0], q[1], q[2], q[3]}));
+    const auto back = toQuaternion(toRotation({q[0], q[1], q[2], q[3]}));
     for (std::size_t k = 0; k < 4; ++k)
       EXPECT_NEAR(back[k], q[static_cast<Eigen::Index>(k)], 1e-12);
   }
 }
 
-TEST(JsonPath, APoseSaysWhereAndWhither) {
+TEST(JsonPath, APoseHasPositionAndDirection) {
   const CameraPath path = parseJsonPath(
       R"([{"eye":[0,1,0],"look_at":[5,1,0]},
           {"eye":[0,1,0],"forward":[0,-1,0],"up":[1,0,0],"fov":90},
           {"time":3,"eye":[0,1,0],"quaternion":[0,0,0,1]}])",
       "path.json", CameraAxes::opengl, kFps);
   ASSERT_EQ(path.poses.size(), 3U);
-  EXPECT_LT((-path.poses[0].turned.col(2) - Vec3::UnitX()).norm(), 1e-12);
-  EXPECT_LT((path.poses[0].turned.col(1) - Vec3::UnitY()).norm(), 1e-12);
+  EXPECT_LT((-path.poses[0].rotation.col(2) - Vec3::UnitX()).norm(), 1e-12);
+  EXPECT_LT((path.poses[0].rotation.col(1) - Vec3::UnitY()).norm(), 1e-12);
   EXPECT_EQ(path.poses[1].time, 0.1);
   EXPECT_NEAR(path.poses[1].fovY.value(), std::acos(-1) / 2, 1e-12);
-  EXPECT_LT((path.poses[1].turned.col(1) - Vec3::UnitX()).norm(), 1e-12);
+  EXPECT_LT((path.poses[1].rotation.col(1) - Vec3::UnitX()).norm(), 1e-12);
   EXPECT_EQ(path.poses[2].time, 3);
-  for (const CameraPose& pose : path.poses) EXPECT_NEAR(pose.turned.determinant(), 1, 1e-12);
+  for (const CameraPose& pose : path.poses) EXPECT_NEAR(pose.rotation.determinant(), 1, 1e-12);
 }
 
 TEST(JsonPath, NerfstudiosTransformsGiveMatrixAndLens) {
@@ -114,7 +117,7 @@ TEST(JsonPath, NerfstudiosTransformsGiveMatrixAndLens) {
   EXPECT_EQ(path.lens->pinhole.cx, 300);
   EXPECT_EQ(path.lens->pinhole.cy, 240);
   EXPECT_EQ(path.poses[0].eye, Vec3(1, 2, 3));
-  EXPECT_EQ(-path.poses[0].turned.col(2), Vec3(1, 0, 0));
+  EXPECT_EQ(-path.poses[0].rotation.col(2), Vec3(1, 0, 0));
   EXPECT_FALSE(path.poses[0].lens);
   ASSERT_TRUE(path.poses[1].lens);
   EXPECT_EQ(path.poses[1].lens->pinhole.fx, 250);
@@ -137,26 +140,26 @@ TEST(JsonPath, BlendersAngleIsTheOpeningFromSideToSide) {
   EXPECT_TRUE(holds(saidOfJson(R"({"camera_angle_x":3.2,)" + frames), "between 0 and pi"));
 }
 
-TEST(JsonPath, WhatIsWrongIsToldWithItsPlace) {
+TEST(JsonPath, ErrorsAreReportedWithTheirPlace) {
   EXPECT_TRUE(holds(saidOfJson("{"), "path.json: byte"));
   EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,1e999],"look_at":[1,0,0]}])"),
-                    "path.json: a number is beyond what a double holds"));
+                    "path.json: a number exceeds the range of a double"));
   EXPECT_TRUE(holds(saidOfJson("{}"), "list of poses"));
   EXPECT_TRUE(holds(saidOfJson("[]"), "0 poses"));
   EXPECT_TRUE(holds(saidOfJson("[7]"), "pose[0]: must be an object"));
-  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0],"look":[1,0,0]}])"), "\"look\" is no key"));
+  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0],"look":[1,0,0]}])"), "\"look\" is not a key"));
   EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0],"look_at":[1,0,0]}])"), "pose[0].eye"));
   EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,null],"look_at":[1,0,0]}])"), "pose[0].eye[2]"));
-  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0]}])"), "whither"));
-  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0],"look_at":[0,3,0]}])"), "its own up axis"));
-  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0],"look_at":[0,0,0]}])"), "its own up axis"));
+  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0]}])"), "has no direction"));
+  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0],"look_at":[0,3,0]}])"), "zero or parallel to"));
+  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0],"look_at":[0,0,0]}])"), "zero or parallel to"));
   EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0],"quaternion":[0,0,0,2]}])"), "length is 2"));
   EXPECT_TRUE(
       holds(saidOfJson(R"({"frames":[{"transform_matrix":[[2,0,0,0],[0,2,0,0],[0,0,2,0]]}]})"),
             "frames[0].transform_matrix: its left 3x3"));
   EXPECT_TRUE(
       holds(saidOfJson(R"({"frames":[{"transform_matrix":[[-1,0,0,0],[0,1,0,0],[0,0,1,0]]}]})"),
-            "mirrors"));
+            "is a reflection"));
   EXPECT_TRUE(holds(saidOfJson(R"({"k1":0.2,"frames":[{}]})"), "distortion"));
   EXPECT_TRUE(holds(saidOfJson(R"([{"time":1,"eye":[0,0,0],"look_at":[1,0,0]},
                                    {"time":1,"eye":[0,0,0],"look_at":[1,0,0]}])"),

@@ -1,4 +1,4 @@
-// `enfilade capture` as its users run it, in the small room: what lies in the folder afterwards.
+// Tests of the program `enfilade capture` in the small room: content of the output folder.
 #include <sys/resource.h>
 
 #include <cmath>
@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// An array of a .npy file as it stands there.
+/// An array of a .npy file, as stored.
 template <class Value>
 struct Array {
   int height = 0, width = 0;
@@ -44,7 +44,7 @@ Array<Value> readNpy(const fs::path& file) {
   return array;
 }
 
-/// Every file below the folder with what is in it.
+/// Content of every file below the folder, by name.
 std::map<std::string, std::string> treeOf(const fs::path& folder) {
   std::map<std::string, std::string> tree;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
@@ -72,7 +72,8 @@ bool picturesCanBeHad() {
   return can;
 }
 
-/// `poses` along +x from x = 0, 0.2 m apart, at eye height, looking along +x; 30 a second.
+/// A path of `poses` poses along +x from x = 0, 0.2 m apart, at eye height, looking along +x; 30 a
+/// second.
 std::string ahead(int poses) {
   std::ostringstream text;
   for (int i = 0; i < poses; ++i)
@@ -80,14 +81,14 @@ std::string ahead(int poses) {
   return text.str();
 }
 
-class Capture : public ProgramTrial {
+class Capture : public ProgramFixture {
  protected:
   void SetUp() override {
     if (!picturesCanBeHad()) {
       ASSERT_EQ(std::getenv("CI"), nullptr) << "no EGL device: install libegl-mesa0";
       GTEST_SKIP() << "no EGL device: install libegl-mesa0";
     }
-    ProgramTrial::SetUp();
+    ProgramFixture::SetUp();
   }
 
   Ended captured(const std::string& pathFile, const std::string& out,
@@ -101,10 +102,10 @@ class Capture : public ProgramTrial {
     return run(arguments);
   }
 
-  bool film_ = false;  ///< whether ffmpeg may be asked, which need not be here
+  bool film_ = false;  ///< whether ffmpeg is available
 };
 
-TEST_F(Capture, FilesLieWhereTheLayoutSaysAndHoldWhatIsSeen) {
+TEST_F(Capture, FilesFollowTheLayoutAndHoldTheImages) {
   write(folder_ / "path.txt", ahead(2));
   const Ended ended = captured("path.txt", "out", {"--fov", "90"});
   ASSERT_EQ(ended.code, 0) << ended.err;
@@ -127,13 +128,13 @@ TEST_F(Capture, FilesLieWhereTheLayoutSaysAndHoldWhatIsSeen) {
   EXPECT_EQ(instances.at("2").at("path"), "room_wall");
 }
 
-TEST(Instances, TellOfAnIfcProductWhatItIsAndHowItOpens) {
+TEST(Instances, DescribeAnIfcProductAndItsOperation) {
   scene::Model model = bodyRoomModel();
   scene::Object& leaf = model.objects[kLeaf - 1];
   leaf.globalId = "2O2Fr$t4X7Zf8NOew3FNtn";
   leaf.ifcClass = "IfcDoor";
-  leaf.operation = "SINGLE_SWING_LEFT";
-  const auto instances = json::parse(instancesJson(model, {}));
+  leaf.operationType = "SINGLE_SWING_LEFT";
+  const auto instances = json::parse(makeInstancesJson(model, {}));
   EXPECT_EQ(instances.at(std::to_string(kLeaf)), json({{"path", "leaf"},
                                                        {"global_id", "2O2Fr$t4X7Zf8NOew3FNtn"},
                                                        {"class", "IfcDoor"},
@@ -172,7 +173,7 @@ TEST_F(Capture, TransformsSayWhereAPixelLies) {
       if (std::isnan(z)) continue;
       const Eigen::Vector4d inFirst((x + 0.5 - cx) / fx * z, -(y + 0.5 - cy) / fy * z, -z, 1);
       const Eigen::Vector4d world = views[0].worldFromCamera * inFirst;
-      // On the faces that the room is made of.
+      // The point lies on one of the room's faces.
       const double off = std::min({std::abs(world.y()), std::abs(world.x() - 5),
                                    std::abs(world.y() - 3), std::abs(std::abs(world.z()) - 4)});
       if (views[0].ids.at(x, y) != kColumn) {
@@ -185,7 +186,7 @@ TEST_F(Capture, TransformsSayWhereAPixelLies) {
       const int column = static_cast<int>(u), row = static_cast<int>(v);
       if (views[1].ids.at(column, row) != views[0].ids.at(x, y)) continue;  // hidden, or an edge
       ++seen;
-      // The pixel's centre lies up to half a pixel away: floors slope under it.
+      // The pixel's centre is up to half a pixel away, and the floor slopes under it.
       agreeing += std::abs(views[1].depth.at(column, row) + inSecond.z()) < 0.35;
     }
   }
@@ -206,7 +207,7 @@ TEST_F(Capture, ShardsMergeToExactlyTheUnshardedSet) {
   EXPECT_EQ(treeOf(folder_ / "merged"), treeOf(folder_ / "whole"));
 }
 
-TEST_F(Capture, AStoppedRunGoesOnWhereItWasAndNothingElseDoes) {
+TEST_F(Capture, OnlyAnEqualRunResumesAStoppedOne) {
   write(folder_ / "path.txt", ahead(4));
   ASSERT_EQ(captured("path.txt", "out").code, 0);
   const auto whole = treeOf(folder_ / "out");
@@ -219,16 +220,16 @@ TEST_F(Capture, AStoppedRunGoesOnWhereItWasAndNothingElseDoes) {
   EXPECT_EQ(treeOf(folder_ / "out"), whole);
   const Ended other = captured("path.txt", "out", {"--size", "32x24"});
   EXPECT_EQ(other.code, 1);
-  EXPECT_NE(other.err.find("holds another capture (lens: "), std::string::npos) << other.err;
+  EXPECT_NE(other.err.find("contains another capture (lens: "), std::string::npos) << other.err;
   EXPECT_NE(other.err.find("--out"), std::string::npos);
   write(folder_ / "path.txt", ahead(4) + "9 0 1.6 0 0 0 0 1\n");
   EXPECT_EQ(captured("path.txt", "out").code, 1);
   EXPECT_EQ(treeOf(folder_ / "out"), whole);
   fs::remove(folder_ / "out/capture.json");
-  EXPECT_NE(captured("path.txt", "out").err.find("that says whose"), std::string::npos);
+  EXPECT_NE(captured("path.txt", "out").err.find("that identifies them"), std::string::npos);
 }
 
-TEST_F(Capture, ATrialWithALimitGoesOnWithoutIt) {
+TEST_F(Capture, ALimitedRunContinuesWithoutLimit) {
   write(folder_ / "path.txt", ahead(4));
   ASSERT_EQ(captured("path.txt", "out", {"--limit", "2"}).code, 0);
   const Ended all = captured("path.txt", "out");
@@ -241,9 +242,9 @@ TEST_F(Capture, ATrialWithALimitGoesOnWithoutIt) {
   EXPECT_EQ(made.at("names").at("path"), "path.txt");
 }
 
-TEST_F(Capture, ARunThatMadeNoFrameLeavesTheFolderFree) {
+TEST_F(Capture, ARunWithoutFramesReleasesTheFolder) {
   write(folder_ / "path.txt", ahead(1));
-  // 16 bits hold 7 cm: whatever is seen is farther.
+  // 16 bits of the finest unit hold 7 cm, and everything visible is farther away.
   const std::vector<std::string> fine{"--channels", "depth",         "--depth",
                                       "png",        "--depth-scale", "1000000"};
   const Ended refused = captured("path.txt", "out", fine);
@@ -252,28 +253,28 @@ TEST_F(Capture, ARunThatMadeNoFrameLeavesTheFolderFree) {
   std::vector<std::string> clamped = fine;
   clamped.insert(clamped.end(), {"--too-far", "clamp"});
   EXPECT_EQ(captured("path.txt", "out", clamped).code, 0);
-  EXPECT_EQ(captured("path.txt", "out", fine).code, 1) << "now it holds a frame";
+  EXPECT_EQ(captured("path.txt", "out", fine).code, 1) << "the folder now holds a frame";
 }
 
-TEST_F(Capture, AFrameThatShowsNothingIsToldAndIsAViolationWithStrict) {
+TEST_F(Capture, AnEmptyFrameIsReportedAndIsAViolationWithStrict) {
   write(folder_ / "path.json",
         R"([{"eye":[0,1.6,0],"look_at":[5,1,0]},{"eye":[1e6,0,0],"look_at":[2e6,0,0]}])");
   const Ended blind = captured("path.json", "out", {"--every", "3"});
   EXPECT_EQ(blind.code, 0) << blind.err;
   EXPECT_EQ(json::parse(blind.out).at("blind_frames"), json::array({1}));
-  EXPECT_NE(blind.err.find("the first of them frame 1"), std::string::npos) << blind.err;
-  EXPECT_NE(blind.err.find("--every changes nothing"), std::string::npos) << blind.err;
+  EXPECT_NE(blind.err.find("the first is frame 1"), std::string::npos) << blind.err;
+  EXPECT_NE(blind.err.find("--every has no effect"), std::string::npos) << blind.err;
   EXPECT_EQ(captured("path.json", "strict", {"--strict"}).code, 3);
 }
 
-TEST_F(Capture, AFrameFromWithinAWallIsToldWithItsNameAndIsAViolationWithStrict) {
+TEST_F(Capture, AFrameInsideAWallIsReportedByNameAndIsAViolationWithStrict) {
   write(folder_ / "path.txt",
         ahead(1) + "1 5.1 1.6 0 0 -0.7071067811865476 0 0.7071067811865476\n");
-  const Ended told = captured("path.txt", "out");
-  EXPECT_EQ(told.code, 0) << told.err;
-  EXPECT_EQ(json::parse(told.out).at("frames_within_solids"), json::array({1}));
-  EXPECT_NE(told.err.find("frame 1: its camera stands in \"room_wall\""), std::string::npos)
-      << told.err;
+  const Ended run = captured("path.txt", "out");
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_EQ(json::parse(run.out).at("frames_within_solids"), json::array({1}));
+  EXPECT_NE(run.err.find("frame 1: its camera is inside \"room_wall\""), std::string::npos)
+      << run.err;
   EXPECT_EQ(captured("path.txt", "strict", {"--strict"}).code, 3);
 }
 
@@ -281,7 +282,7 @@ TEST_F(Capture, PicturesAreTheSameForAnyNumberOfThreadsOfGl) {
   write(folder_ / "path.txt", ahead(3));
   std::map<std::string, std::string> first;
   for (const char* threads : {"0", "1", "2"}) {
-    ::setenv("LP_NUM_THREADS", threads, 1);  // of Mesa's llvmpipe; others do not look at it
+    ::setenv("LP_NUM_THREADS", threads, 1);  // only for Mesa's llvmpipe; other drivers ignore it
     const std::string out = std::string("out") + threads;
     const Ended ended = captured("path.txt", out,
                                  {"--size", "320x240", "--renderer", "gl", "--overlay", "boxes",
@@ -316,20 +317,20 @@ TEST_F(Capture, TimeOfThePathPassesInTheWorldAndShardsShowTheSame) {
   EXPECT_EQ(treeOf(folder_ / "shards"), treeOf(folder_ / "whole"));
 }
 
-TEST_F(Capture, AScriptThatGoesWrongIsCountedAndIsAViolationWithStrict) {
+TEST_F(Capture, AFailedScriptIsCountedAndIsAViolationWithStrict) {
   write(folder_ / "path.jsonl", R"({"spawn":"ann","at":[0,0,0],"facing":0}
 {"walk":"bob","to":[1,0,0]}
 {"capture":"ann","as":"here"}
 )");
-  const Ended told = captured("path.jsonl", "out");
-  EXPECT_EQ(told.code, 0) << told.err;
-  EXPECT_EQ(json::parse(told.out).at("went_wrong"), 1);
+  const Ended run = captured("path.jsonl", "out");
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_EQ(json::parse(run.out).at("went_wrong"), 1);
   EXPECT_EQ(captured("path.jsonl", "strict", {"--strict"}).code, 3);
 }
 
-TEST_F(Capture, AFullDiskLeavesWholeFilesOnlyAndIsTold) {
+TEST_F(Capture, AFullDiskLeavesOnlyCompleteFilesAndIsReported) {
   write(folder_ / "path.txt", ahead(3));
-  // A .npy of 64 x 48 floats has 12,416 bytes; the .png of the same picture and all else fit.
+  // A .npy of 64 x 48 floats has 12,416 bytes; the .png of the same image and all else fit.
   rlimit before{};
   getrlimit(RLIMIT_FSIZE, &before);
   const rlimit little{8192, before.rlim_max};
@@ -366,7 +367,7 @@ TEST_F(Capture, AnInterruptEndsItWith130AndWholeFiles) {
     EXPECT_LT(tree.size(), 3 + 3 * 4000U);
     for (const auto& [name, text] : tree) EXPECT_EQ(name.find(".part"), std::string::npos) << name;
     EXPECT_EQ(textOf(path("stdout")), "");
-    EXPECT_NE(textOf(path("stderr")).find("goes on from there"), std::string::npos);
+    EXPECT_NE(textOf(path("stderr")).find("continues from there"), std::string::npos);
     EXPECT_NE(textOf(path("stderr")).find("{\"frames\":"), std::string::npos);
   }
 }
@@ -404,10 +405,10 @@ TEST_F(Capture, AWalkIsSeenThroughItsAvatarsEyes) {
                {"--every", "6", "--avatar", "ann", "--channels", "rgb", "--shard", "1/4"});
   ASSERT_EQ(every.code, 0) << every.err;
   EXPECT_GT(json::parse(every.out).at("frames"), 9);
-  EXPECT_EQ(captured("walk.jsonl", "nobody", {"--every", "6", "--avatar", "eve"}).code, 1);
+  EXPECT_EQ(captured("walk.jsonl", "unknown", {"--every", "6", "--avatar", "eve"}).code, 1);
 }
 
-TEST_F(Capture, SixteenBitFilesRefuseWhatDoesNotFitUnlessTold) {
+TEST_F(Capture, SixteenBitFilesRefuseValuesOutOfRangeByDefault) {
   write(folder_ / "path.txt", ahead(1));
   const Ended fits = captured("path.txt", "fits", {"--depth", "png", "--ids", "png"});
   ASSERT_EQ(fits.code, 0) << fits.err;
@@ -442,7 +443,7 @@ TEST_F(Capture, TheTumLayoutIsReadBackAsTheSamePath) {
   EXPECT_EQ(textOf(folder_ / "own/rgb/000001.png"), textOf(folder_ / "tum/rgb/000001.png"));
 }
 
-TEST_F(Capture, EveryChannelIsWrittenWhenAskedFor) {
+TEST_F(Capture, EveryChannelIsWrittenOnRequest) {
   write(folder_ / "path.txt", ahead(1));
   const Ended ended =
       captured("path.txt", "out", {"--channels", "normals,range,depth,rgb", "--rgb", "jpeg"});
@@ -457,7 +458,7 @@ TEST_F(Capture, EveryChannelIsWrittenWhenAskedFor) {
   EXPECT_NEAR(normals.values.at(middle), -1, 1e-5);  // the wall faces the eye
 }
 
-TEST_F(Capture, RaysDrawTheSameSceneAndTheManifestTellsThem) {
+TEST_F(Capture, RaysDrawTheSameSceneAndTheManifestNamesThem) {
   write(folder_ / "path.txt", ahead(1));
   const Ended gl = captured("path.txt", "gl", {"--renderer", "gl"});
   const Ended rays = captured("path.txt", "rays", {"--renderer", "rays"});
@@ -500,7 +501,7 @@ TEST_F(Capture, AnOverlayMarksACopyAndLeavesTheColourAlone) {
     const auto i = 3 * static_cast<std::ptrdiff_t>(y * 160 + x);
     return !std::equal(marked.rgb.begin() + i, marked.rgb.begin() + i + 3, plain.rgb.begin() + i);
   };
-  // Bob's own rectangle has its border marked, and so has the floor where he walked.
+  // The border of Bob's rectangle is marked, and so is the floor on his path.
   int top = 120, left = 160, floorMarked = 0;
   for (int y = 0; y < 120; ++y) {
     for (int x = 0; x < 160; ++x) {
@@ -517,7 +518,7 @@ TEST_F(Capture, AnOverlayMarksACopyAndLeavesTheColourAlone) {
   EXPECT_EQ(captured("walk.jsonl", "wrong", {"--overlay", "boxen"}).code, 2);
 }
 
-TEST(Overlay, NamesOfThingsWithOneMiddleStandApartAndInThePicture) {
+TEST(Overlay, LabelsOfConcentricObjectsAreSeparateAndInsideTheImage) {
   // A ring around a square, both in the picture's lower right corner.
   render::Frame frame;
   frame.camera.width = frame.camera.height = 100;
@@ -546,7 +547,7 @@ TEST(Overlay, NamesOfThingsWithOneMiddleStandApartAndInThePicture) {
   EXPECT_EQ(inked("a/ring", "b/square"), outer + inner);
 }
 
-TEST_F(Capture, DepthReportsLieBesideTheFramesAndAreMadeUpForWhereTheyAreMissing) {
+TEST_F(Capture, DepthReportsAreNextToTheFramesAndAddedIfMissing) {
   write(folder_ / "path.txt", ahead(3));
   const std::vector<std::string> options{"--size", "64x48", "--channels", "rgb"};
   ASSERT_EQ(captured("path.txt", "out", options).code, 0);
@@ -582,7 +583,7 @@ TEST_F(Capture, FfmpegMakesTheFilmWhenAllFramesAreThere) {
       << textOf(folder_ / "out/video.mp4");
 }
 
-TEST_F(Capture, ADryRunTellsAndWritesNothing) {
+TEST_F(Capture, ADryRunReportsAndWritesNothing) {
   write(folder_ / "path.txt", ahead(5));
   const Ended ended = captured("path.txt", "out", {"--dry-run", "--shard", "1/2", "--limit", "4"});
   ASSERT_EQ(ended.code, 0) << ended.err;
@@ -591,7 +592,7 @@ TEST_F(Capture, ADryRunTellsAndWritesNothing) {
   EXPECT_FALSE(fs::exists(folder_ / "out"));
 }
 
-TEST_F(Capture, MistakesAreToldBeforeAnythingIsWritten) {
+TEST_F(Capture, ErrorsAreReportedBeforeAnyOutput) {
   write(folder_ / "path.txt", ahead(1));
   for (const std::vector<std::string>& wrong : {std::vector<std::string>{"--size", "0x10"},
                                                 {"--size", "100000x10"},

@@ -1,67 +1,68 @@
-// Which contacts of two walks are the same one, and what is compared of two recordings.
+// Tests of matching the contacts of two walks, and of comparing two recordings.
 #include <gtest/gtest.h>
 
 #include <random>
 
 #include "protocol/recording/recording.hpp"
+#include "server/diff/align_events.hpp"
 #include "server/diff/walk_difference.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::server {
 namespace {
 
-Happening at(double x, double time) {
-  Happening happening;
+WalkEvent at(double x, double time) {
+  WalkEvent happening;
   happening.point = Vec3(x, 0, 0);
   happening.time = time;
   happening.tick = static_cast<std::uint64_t>(time * 60);
   return happening;
 }
 
-using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
+using IndexPairs = std::vector<std::pair<std::size_t, std::size_t>>;
 
-/// The least cost of pairing two lists in their order, by trying everything.
-double leastCost(const std::vector<Happening>& before, std::size_t i,
-                 const std::vector<Happening>& after, std::size_t j) {
+/// Minimum cost of pairing two lists in order, by exhaustive search.
+double leastCost(const std::vector<WalkEvent>& before, std::size_t i,
+                 const std::vector<WalkEvent>& after, std::size_t j) {
   const auto left = static_cast<double>(before.size() - i + after.size() - j);
-  double best = left * kSamePlace / 2;
+  double best = left * kMaxMatchDistance / 2;
   for (std::size_t k = i; k < before.size(); ++k) {
     for (std::size_t l = j; l < after.size(); ++l) {
       const double apart = (before[k].point - after[l].point).norm();
-      if (apart >= kSamePlace) continue;
-      const double skipped = static_cast<double>(k - i + l - j) * kSamePlace / 2;
+      if (apart >= kMaxMatchDistance) continue;
+      const double skipped = static_cast<double>(k - i + l - j) * kMaxMatchDistance / 2;
       best = std::min(best, skipped + apart + leastCost(before, k + 1, after, l + 1));
     }
   }
   return best;
 }
 
-double costOf(const Pairs& pairs, const std::vector<Happening>& before,
-              const std::vector<Happening>& after) {
+double costOf(const IndexPairs& pairs, const std::vector<WalkEvent>& before,
+              const std::vector<WalkEvent>& after) {
   double cost =
-      static_cast<double>(before.size() + after.size() - 2 * pairs.size()) * kSamePlace / 2;
+      static_cast<double>(before.size() + after.size() - 2 * pairs.size()) * kMaxMatchDistance / 2;
   for (const auto& [i, j] : pairs) cost += (before[i].point - after[j].point).norm();
   return cost;
 }
 
 TEST(MatchedHappenings, TheSameListIsItsOwnMatch) {
-  const std::vector<Happening> list{at(0, 1), at(5, 2), at(0, 3), at(0, 4)};
-  EXPECT_EQ(matchedHappenings(list, list), (Pairs{{0, 0}, {1, 1}, {2, 2}, {3, 3}}));
+  const std::vector<WalkEvent> list{at(0, 1), at(5, 2), at(0, 3), at(0, 4)};
+  EXPECT_EQ(alignEvents(list, list), (IndexPairs{{0, 0}, {1, 1}, {2, 2}, {3, 3}}));
 }
 
-TEST(MatchedHappenings, WhatIsNewInTheMiddleMovesNothing) {
-  const std::vector<Happening> before{at(0, 1), at(6, 3), at(12, 5)};
-  const std::vector<Happening> after{at(0, 1), at(3, 2), at(6, 3), at(12, 5)};
-  EXPECT_EQ(matchedHappenings(before, after), (Pairs{{0, 0}, {1, 2}, {2, 3}}));
+TEST(MatchedHappenings, ANewEventInTheMiddleMovesNoOther) {
+  const std::vector<WalkEvent> before{at(0, 1), at(6, 3), at(12, 5)};
+  const std::vector<WalkEvent> after{at(0, 1), at(3, 2), at(6, 3), at(12, 5)};
+  EXPECT_EQ(alignEvents(before, after), (IndexPairs{{0, 0}, {1, 2}, {2, 3}}));
 }
 
 TEST(MatchedHappenings, ALaterTimeAtTheSamePlaceIsTheSame) {
-  EXPECT_EQ(matchedHappenings({at(1, 10)}, {at(1, 40)}), (Pairs{{0, 0}}));
+  EXPECT_EQ(alignEvents({at(1, 10)}, {at(1, 40)}), (IndexPairs{{0, 0}}));
 }
 
 TEST(MatchedHappenings, AnotherPlaceIsAnother) {
-  EXPECT_EQ(matchedHappenings({at(0, 10)}, {at(kSamePlace, 10)}), Pairs{});
-  EXPECT_EQ(matchedHappenings({at(0, 10)}, {at(0.99 * kSamePlace, 10)}), (Pairs{{0, 0}}));
+  EXPECT_EQ(alignEvents({at(0, 10)}, {at(kMaxMatchDistance, 10)}), IndexPairs{});
+  EXPECT_EQ(alignEvents({at(0, 10)}, {at(0.99 * kMaxMatchDistance, 10)}), (IndexPairs{{0, 0}}));
 }
 
 TEST(MatchedHappenings, NoMatchingIsCheaper) {
@@ -70,13 +71,13 @@ TEST(MatchedHappenings, NoMatchingIsCheaper) {
   std::uniform_int_distribution<int> length(0, 5);
   int paired = 0, possible = 0;
   for (int round = 0; round < 200; ++round) {
-    std::vector<Happening> before, after;
+    std::vector<WalkEvent> before, after;
     for (int i = length(random); i > 0; --i)
       before.push_back(at(place(random), static_cast<double>(before.size())));
     for (int i = length(random); i > 0; --i)
       after.push_back(at(place(random), static_cast<double>(after.size())));
-    const Pairs pairs = matchedHappenings(before, after);
-    // Times decide between equal places with a millimetre a second.
+    const IndexPairs pairs = alignEvents(before, after);
+    // Times break ties between equal positions at a cost of one millimetre a second.
     EXPECT_NEAR(costOf(pairs, before, after), leastCost(before, 0, after, 0), 0.1);
     paired += static_cast<int>(pairs.size());
     possible += static_cast<int>(std::min(before.size(), after.size()));
@@ -86,12 +87,12 @@ TEST(MatchedHappenings, NoMatchingIsCheaper) {
 }
 
 TEST(MatchedHappenings, LongListsAreCutIntoPieces) {
-  std::vector<Happening> before, after;
+  std::vector<WalkEvent> before, after;
   for (int i = 0; i < 4500; ++i) {
     before.push_back(at(i % 7, i));
     if (i % 10 != 3) after.push_back(at(i % 7, i));
   }
-  const Pairs pairs = matchedHappenings(before, after);
+  const IndexPairs pairs = alignEvents(before, after);
   EXPECT_EQ(pairs.size(), after.size());
   for (std::size_t i = 1; i < pairs.size(); ++i) {
     EXPECT_LT(pairs[i - 1].first, pairs[i].first);
@@ -105,15 +106,16 @@ std::filesystem::path fileFor(const std::string& name) {
 
 constexpr double kTick = 1.0 / 60;
 
-/// What is otherwise about a recorded walk.
+/// Deviations from the default of a recorded walk.
 struct Otherwise {
   double nearMiss = 0.3;      ///< metres
-  std::uint64_t parent = 0;   ///< the tick at which a branch left
-  std::string doorName = {};  ///< of the body that the object "house/door" is; empty: it is still
+  std::uint64_t parent = 0;   ///< the tick at which a branch started
+  std::string doorName = {};  ///< name of the body of the object "house/door"; empty: it is static
   std::string doorPath = "house/door";
 };
 
-/// A walk of so many ticks. Ann arrives at tick 90, and a contact is told at tick 10.
+/// A recorded walk of a given number of ticks. Ann arrives at tick 90; a contact is reported at
+/// tick 10.
 class Recorded {
  public:
   Recorded(const std::string& name, const v1::ContactEvent& contact,
@@ -156,7 +158,7 @@ class Recorded {
     writer_.close();
     return file_;
   }
-  /// As a writer leaves it that is killed now.
+  /// The file of a recording whose writer is killed now.
   std::filesystem::path cutOff() const {
     auto cut = file_;
     cut.replace_extension(".cut.mcap");
@@ -193,7 +195,7 @@ class Recorded {
   std::uint64_t tick_ = 0;
 };
 
-/// `a` stands beside `b`, at x = 1, where the normal from a to b goes along x by `sign`.
+/// `a` stands next to `b`, at x = 1, where the normal from a to b points along x by `sign`.
 v1::ContactEvent touch(const char* a, const char* b, double sign) {
   v1::ContactEvent event;
   event.set_kind(v1::ContactEvent::KIND_BEGIN);
@@ -207,26 +209,26 @@ v1::ContactEvent touch(const char* a, const char* b, double sign) {
   return event;
 }
 
-TEST(ComparedWalks, WhatARecordingThatWasCutOffCannotTellIsNotWorse) {
+TEST(ComparedWalks, EventsAfterTheCutOfATruncatedRecordingAreNotWorse) {
   const v1::ContactEvent contact = touch("barrel", "crate", 1);
   const auto whole = Recorded("whole", contact).go(120).close();
   const auto cut = Recorded("killed", contact).go(50).cutOff();
   for (const auto& difference : {compareWalks(whole, cut, 1e-3), compareWalks(cut, whole, 1e-3)}) {
-    EXPECT_TRUE(difference.none());
+    EXPECT_TRUE(difference.isEmpty());
     EXPECT_EQ(difference.worse, 0u);
     EXPECT_EQ(difference.before.runs.back().ticks, 50u);
     EXPECT_EQ(difference.after.runs.back().ticks, 50u);
     EXPECT_NE(difference.before.closed, difference.after.closed);
   }
-  // One that was ended in order did end: Ann never arrived.
+  // A walk that ended in order has its final state: Ann never arrived.
   const auto shorter = Recorded("shorter", contact).go(50).close();
   EXPECT_EQ(compareWalks(whole, shorter, 1e-3).worse, 1u);
 }
 
-TEST(ComparedWalks, WhichOfTwoFreeBodiesIsToldFirstIsNoDifference) {
+TEST(ComparedWalks, TheOrderOfTwoDynamicBodiesIsNoDifference) {
   const auto before = Recorded("barrel_first", touch("barrel", "crate", 1)).go(20).close();
   const auto after = Recorded("crate_first", touch("crate", "barrel", -1)).go(20).close();
-  EXPECT_TRUE(compareWalks(before, after, 1e-3).none());
+  EXPECT_TRUE(compareWalks(before, after, 1e-3).isEmpty());
 }
 
 v1::ContactEvent near(double distance, v1::ContactEvent::Phase phase) {
@@ -237,7 +239,7 @@ v1::ContactEvent near(double distance, v1::ContactEvent::Phase phase) {
   return event;
 }
 
-TEST(ComparedWalks, AClearanceIsTheLeastAndNotWhereItWasFirstTold) {
+TEST(ComparedWalks, AClearanceIsTheMinimumAndNotTheFirstReport) {
   const auto recorded = [](const char* name, double distance, v1::ContactEvent::Phase phase,
                            double radius = 0.3) {
     return Recorded(name, near(distance, phase), {.nearMiss = radius}).go(20).close();
@@ -247,24 +249,24 @@ TEST(ComparedWalks, AClearanceIsTheLeastAndNotWhereItWasFirstTold) {
   const auto nearer = compareWalks(least, recorded("nearer", 0.1, Event::PHASE_MIN), 1e-3);
   EXPECT_EQ(nearer.worse, 1u);
   ASSERT_EQ(nearer.clearances.size(), 1u);
-  EXPECT_NEAR(nearer.clearances[0].least, -0.1, 1e-12);
+  EXPECT_NEAR(nearer.clearances[0].minChange, -0.1, 1e-12);
   EXPECT_TRUE(compareWalks(recorded("first", 0.29, Event::PHASE_BEGIN),
                            recorded("later", 0.28, Event::PHASE_BEGIN), 1e-3)
-                  .none());
-  // A walk that tells only what is nearer than 0.15 m would not have told it.
+                  .isEmpty());
+  // A walk that reports only distances below 0.15 m would not have reported it.
   const auto blind = recorded("blind", 0.14, Event::PHASE_BEGIN, 0.15);
-  EXPECT_TRUE(compareWalks(blind, least, 1e-3).none());
-  EXPECT_TRUE(compareWalks(least, blind, 1e-3).none());
+  EXPECT_TRUE(compareWalks(blind, least, 1e-3).isEmpty());
+  EXPECT_TRUE(compareWalks(least, blind, 1e-3).isEmpty());
 }
 
 TEST(ComparedWalks, ABranchIsComparedFromWhereItLeft) {
   const v1::ContactEvent contact = touch("barrel", "crate", 1);
   const auto parent = Recorded("parent", contact).go(120).close();
   const auto branch = Recorded("branch", contact, {.parent = 50}).go(120).close();
-  EXPECT_TRUE(compareWalks(parent, branch, 1e-3).none());
-  EXPECT_TRUE(compareWalks(branch, parent, 1e-3).none());
+  EXPECT_TRUE(compareWalks(parent, branch, 1e-3).isEmpty());
+  EXPECT_TRUE(compareWalks(branch, parent, 1e-3).isEmpty());
   const auto late = Recorded("late", contact, {.parent = 100}).go(120).close();
-  EXPECT_TRUE(compareWalks(parent, late, 1e-3).none());
+  EXPECT_TRUE(compareWalks(parent, late, 1e-3).isEmpty());
 }
 
 TEST(ComparedWalks, ADoorIsTheSameWhateverItIsCalledAndWhetherItMoves) {
@@ -276,7 +278,7 @@ TEST(ComparedWalks, ADoorIsTheSameWhateverItIsCalledAndWhetherItMoves) {
                            .go(20)
                            .close();
   const auto none = [](const auto& before, const auto& after) {
-    return compareWalks(before, after, 1e-3).none();
+    return compareWalks(before, after, 1e-3).isEmpty();
   };
   EXPECT_TRUE(none(still, body));
   EXPECT_TRUE(none(body, still));
@@ -287,9 +289,9 @@ TEST(ComparedWalks, ADoorIsTheSameWhateverItIsCalledAndWhetherItMoves) {
 }
 
 TEST(ComparedWalks, TimesThatDescendAreRefused) {
-  std::vector<Happening> list;
+  std::vector<WalkEvent> list;
   for (int i = 0; i < 5000; ++i) list.push_back(at(0, 5000 - i));
-  EXPECT_THROW(matchedHappenings(list, list), protocol::mcap::RecordingError);
+  EXPECT_THROW(alignEvents(list, list), protocol::mcap::RecordingError);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The doctor: the proof picture and EGL's vendor files.
+// Tests of `enfilade doctor`: the self-test image and EGL's vendor files.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,44 +14,44 @@ namespace enfilade::server {
 namespace {
 
 TEST(Doctor, TheProofPictureIsTheGoldenOneAtEverySize) {
-  render::GlRenderer renderer(proofScene());
-  EXPECT_EQ(proofProblem(renderer.render({}, proofCamera(640, 480))), "");
-  EXPECT_EQ(proofProblem(renderer.render({}, proofCamera(320, 240))), "");
+  render::GlRenderer renderer(makeSelfTestScene());
+  EXPECT_EQ(validateSelfTestFrame(renderer.render({}, makeSelfTestCamera(640, 480))), "");
+  EXPECT_EQ(validateSelfTestFrame(renderer.render({}, makeSelfTestCamera(320, 240))), "");
 }
 
 TEST(Doctor, RaysProveIdsAndDepthOfTheGoldenPicture) {
-  render::RayRenderer rays(proofScene());
-  const std::string problem = proofProblem(rays.render({}, proofCamera(640, 480)));
+  render::RayRenderer rays(makeSelfTestScene());
+  const std::string problem = validateSelfTestFrame(rays.render({}, makeSelfTestCamera(640, 480)));
   EXPECT_EQ(problem.find("ids"), std::string::npos) << problem;
   EXPECT_EQ(problem.find("depth"), std::string::npos) << problem;
 }
 
 TEST(Doctor, AWrongPictureIsFound) {
-  render::GlRenderer renderer(proofScene());
-  const render::Frame right = renderer.render({}, proofCamera(320, 240));
+  render::GlRenderer renderer(makeSelfTestScene());
+  const render::Frame right = renderer.render({}, makeSelfTestCamera(320, 240));
   render::Frame frame = right;
   for (std::size_t i = 0; i < frame.rgb.size(); i += 3) std::swap(frame.rgb[i], frame.rgb[i + 2]);
-  EXPECT_NE(proofProblem(frame).find("colour"), std::string::npos);
+  EXPECT_NE(validateSelfTestFrame(frame).find("colour"), std::string::npos);
   frame = right;
   std::reverse(frame.ids.begin(), frame.ids.end());
-  EXPECT_NE(proofProblem(frame).find("ids"), std::string::npos);
+  EXPECT_NE(validateSelfTestFrame(frame).find("ids"), std::string::npos);
   frame = right;
   for (float& depth : frame.depth) depth *= 1.01f;
-  EXPECT_NE(proofProblem(frame).find("depth"), std::string::npos);
+  EXPECT_NE(validateSelfTestFrame(frame).find("depth"), std::string::npos);
 }
 
-TEST(Doctor, VendorFilesAreReadAndWhatTheyLackIsTold) {
+TEST(Doctor, VendorFilesAreReadAndMissingFieldsReported) {
   const tests::TemporaryFolder folder;
   folder.write("a.json", R"({"ICD":{"library_path":"libc.so.6"}})");
-  folder.write("b.json", R"({"ICD":{"library_path":"libEGL_of_nobody.so.0"}})");
+  folder.write("b.json", R"({"ICD":{"library_path":"libEGL_missing.so.0"}})");
   folder.write("c.json", "{");
   ::setenv("__EGL_VENDOR_LIBRARY_DIRS", folder.path().c_str(), 1);
-  const std::vector<EglVendor> vendors = eglVendors();
+  const std::vector<EglVendor> vendors = listEglVendors();
   ::unsetenv("__EGL_VENDOR_LIBRARY_DIRS");
   ASSERT_EQ(vendors.size(), 3u);
   EXPECT_EQ(vendors[0].failure, "");
-  EXPECT_NE(vendors[1].failure.find("libEGL_of_nobody"), std::string::npos);
-  EXPECT_EQ(vendors[1].library, "libEGL_of_nobody.so.0");
+  EXPECT_NE(vendors[1].failure.find("libEGL_missing"), std::string::npos);
+  EXPECT_EQ(vendors[1].library, "libEGL_missing.so.0");
   EXPECT_NE(vendors[2].failure, "");
 }
 

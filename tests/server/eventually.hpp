@@ -1,4 +1,4 @@
-// Waits for what another thread brings about.
+// Waits until a condition that another thread brings about holds.
 #pragma once
 
 #include <chrono>
@@ -7,7 +7,7 @@
 
 namespace enfilade::server::testing {
 
-/// Whether it does within some 20 s.
+/// Whether the condition becomes true within about 20 s.
 inline bool becomesTrue(const std::function<bool()>& condition) {
   constexpr int kPatience = 4000;  // tries
   for (int i = 0; i < kPatience; ++i) {

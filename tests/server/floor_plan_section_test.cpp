@@ -28,23 +28,23 @@ scene::Model columnAndSheet() {
   return model;
 }
 
-double lengthOf(const std::vector<CutLine>& lines) {
+double lengthOf(const std::vector<SectionLine>& lines) {
   double length = 0;
-  for (const CutLine& line : lines) length += (line.to - line.from).norm();
+  for (const SectionLine& line : lines) length += (line.to - line.from).norm();
   return length;
 }
 
-TEST(PlanCut, ClosedThingsGiveTheirOutlineAndSingleFacesTheirLine) {
+TEST(PlanCut, ClosedSolidsGiveTheirOutlineAndSingleFacesTheirLine) {
   const scene::Scene scene(columnAndSheet());
-  const auto both = cutAt(scene, 1.2);
+  const auto both = cutScene(scene, 1.2);
   EXPECT_NEAR(lengthOf(both), 4 + 4, 1e-6);
-  for (const CutLine& line : both) {
+  for (const SectionLine& line : both) {
     EXPECT_EQ(line.from.y(), 1.2);
     EXPECT_EQ(line.to.y(), 1.2);
   }
-  EXPECT_NEAR(lengthOf(cutAt(scene, 2.5)), 4, 1e-6);  // the column alone
-  EXPECT_TRUE(cutAt(scene, 3.5).empty());
-  EXPECT_TRUE(cutAt(scene, -0.5).empty());
+  EXPECT_NEAR(lengthOf(cutScene(scene, 2.5)), 4, 1e-6);  // the column alone
+  EXPECT_TRUE(cutScene(scene, 3.5).empty());
+  EXPECT_TRUE(cutScene(scene, -0.5).empty());
 }
 
 TEST(PlanCut, BodiesAreCutWhereTheModelHasThemAndTriggersAreNot) {
@@ -56,9 +56,9 @@ TEST(PlanCut, BodiesAreCutWhereTheModelHasThemAndTriggersAreNot) {
   door.axis = Vec3::UnitX();
   door.high = 1;
   model.bodies = {door};
-  EXPECT_NEAR(lengthOf(cutAt(scene::Scene(model), 1.2)), 8, 1e-6);
+  EXPECT_NEAR(lengthOf(cutScene(scene::Scene(model), 1.2)), 8, 1e-6);
   model.bodies[0].kind = scene::BodyKind::trigger;
-  EXPECT_NEAR(lengthOf(cutAt(scene::Scene(model), 1.2)), 4, 1e-6);
+  EXPECT_NEAR(lengthOf(cutScene(scene::Scene(model), 1.2)), 4, 1e-6);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Subscriptions to pictures.
+// Tests of subscriptions to images.
 #include "tests/server/served_room.hpp"
 
 namespace enfilade::server::testing {
@@ -46,23 +46,23 @@ TEST_F(FrameWatches, OneComesAtOnceAndThenOneATick) {
   EXPECT_EQ(nextFrame(ann).value().tick(), 1u);
 }
 
-TEST_F(FrameWatches, WhatIsLeftOutIsCounted) {
+TEST_F(FrameWatches, OmittedFramesAreCounted) {
   protocol::Client ann = client("ann");
   ann.request(watching(1, 0));
   ann.step(500);
-  std::uint64_t told = 0, last = 0;
+  std::uint64_t counted = 0, last = 0;
   while (last < 500) {
     const auto frame = nextFrame(ann, 300);
-    if (!frame) {  // the last tick's turn was missed while another was drawn
+    if (!frame) {  // the last tick was skipped while another was drawn
       last = ann.step().tick() - 1;
       continue;
     }
     EXPECT_GE(frame->tick(), last);
-    told += 1 + frame->dropped();
+    counted += 1 + frame->dropped();
     last = frame->tick();
-    EXPECT_LE(told, last + 1) << "each tick has one picture, sent or left out";
+    EXPECT_LE(counted, last + 1) << "each tick has one image, sent or dropped";
   }
-  EXPECT_LT(told, 503u);
+  EXPECT_LT(counted, 503u);
 }
 
 TEST_F(FrameWatches, ARateIsOfSimulatedTime) {
@@ -95,7 +95,7 @@ TEST_F(FrameWatches, AnAvatarMayComeLaterAndAWatchEnds) {
   EXPECT_FALSE(nextFrame(ann, 50));
 }
 
-TEST_F(FrameWatches, WhatCannotBeWatchedIsRefused) {
+TEST_F(FrameWatches, InvalidWatchesAreRefused) {
   protocol::Client ann = client("ann");
   EXPECT_EQ(codeOf(ann, watching(0, 0)), v1::ERROR_BAD_MESSAGE);
   EXPECT_EQ(codeOf(ann, watching(17, 0)), v1::ERROR_BAD_MESSAGE);

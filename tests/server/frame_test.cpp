@@ -1,4 +1,4 @@
-// Pictures through a connection: what is seen is what stands there.
+// Tests of images through a connection: visible objects are those of the world.
 #include <cstdlib>
 #include <cstring>
 #include <mutex>
@@ -13,7 +13,7 @@ namespace {
 
 class Frames : public ServedRoom {
  protected:
-  /// Ends the test where nothing can draw: as skipped, or in CI as failed.
+  /// Ends the test without a renderer: as skipped, or in CI as failed.
   void SetUp() override {
     serve();
     ENFILADE_NEED_PICTURES(*server_);
@@ -66,7 +66,7 @@ TEST_F(Frames, AnAvatarSeesTheWallItFacesAtItsDistance) {
   EXPECT_EQ(ids[below], kFloor);
   EXPECT_EQ(frame.description.tick(), step.tick());
   EXPECT_EQ(frame.description.renderer(), server_->rendererName());
-  for (const std::uint32_t id : ids) EXPECT_LE(id, 3u) << "the own body is not in the picture";
+  for (const std::uint32_t id : ids) EXPECT_LE(id, 3u) << "own body not in the image";
 }
 
 TEST_F(Frames, AnotherAvatarIsSeenFromAboveUnderItsOwnId) {
@@ -139,7 +139,7 @@ TEST_F(Frames, IntrinsicsRangeAndNormalsTravel) {
   }
 }
 
-TEST_F(Frames, TheRendererAskedForDrawsAndSeesTheSame) {
+TEST_F(Frames, TheRequestedRendererDrawsTheSameScene) {
   protocol::Client ann = client("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(30);
@@ -159,7 +159,7 @@ TEST_F(Frames, TheRendererAskedForDrawsAndSeesTheSame) {
   EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_MESSAGE);
 }
 
-TEST_F(Frames, APictureThatNoClientTakesIsRefusedAndTheConnectionLives) {
+TEST_F(Frames, AnImageAboveTheClientLimitIsRefusedAndTheConnectionContinues) {
   protocol::Client ann = client("ann");
   v1::FrameRequest request;
   request.mutable_free();
@@ -171,9 +171,9 @@ TEST_F(Frames, APictureThatNoClientTakesIsRefusedAndTheConnectionLives) {
   EXPECT_EQ(ann.step(1, false).tick(), 1u);
 }
 
-TEST_F(Frames, WhatCannotBePicturedIsRefusedByName) {
+TEST_F(Frames, InvalidFrameRequestsAreRefusedByName) {
   protocol::Client ann = client("ann");
-  v1::FrameRequest request = eyesOf("nobody");
+  v1::FrameRequest request = eyesOf("unknown");
   EXPECT_EQ(codeOf(ann, request), v1::ERROR_UNKNOWN_AVATAR);
   request.mutable_free();
   request.set_width(5000);
@@ -182,7 +182,7 @@ TEST_F(Frames, WhatCannotBePicturedIsRefusedByName) {
   *request.mutable_free()->mutable_forward() = vec(0, 0, 0);
   try {
     ann.frame(request);
-    ADD_FAILURE() << "a camera that looks nowhere";
+    ADD_FAILURE() << "a camera without a direction";
   } catch (const protocol::ProtocolError& error) {
     EXPECT_EQ(error.code, v1::ERROR_BAD_CAMERA);
     EXPECT_EQ(error.field, "frame.forward");
@@ -197,7 +197,7 @@ TEST_F(Frames, WhatCannotBePicturedIsRefusedByName) {
   request.set_rgb_encoding(static_cast<v1::Encoding>(9));
   try {
     ann.frame(request);
-    ADD_FAILURE() << "an encoding that nobody knows";
+    ADD_FAILURE() << "an unknown encoding";
   } catch (const protocol::ProtocolError& error) {
     EXPECT_EQ(error.code, v1::ERROR_BAD_MESSAGE);
     EXPECT_EQ(error.field, "frame.rgb_encoding");
@@ -206,7 +206,7 @@ TEST_F(Frames, WhatCannotBePicturedIsRefusedByName) {
   request.mutable_free()->set_fov_y(4);
   try {
     ann.frame(request);
-    ADD_FAILURE() << "a view of more than half a turn";
+    ADD_FAILURE() << "a field of view beyond 180 degrees";
   } catch (const protocol::ProtocolError& error) {
     EXPECT_EQ(error.field, "frame.fov_y");
   }
@@ -214,7 +214,7 @@ TEST_F(Frames, WhatCannotBePicturedIsRefusedByName) {
   EXPECT_EQ(codeOf(ann, request), v1::ERROR_UNSPECIFIED);
 }
 
-TEST(PicturesInTurn, WhatIsReadyAsDrawnDoesNotOvertakeWhatIsEncoded) {
+TEST(FrameOrder, RawImagesDoNotOvertakeEncodedOnes) {
   FrameService service(smallRoom());
   ENFILADE_NEED_PICTURES(service.deviceName());
   const scene::World world(smallRoom());
@@ -229,8 +229,8 @@ TEST(PicturesInTurn, WhatIsReadyAsDrawnDoesNotOvertakeWhatIsEncoded) {
     job.request.set_rgb_encoding(encoding);
     job.request.set_width(encoding == v1::ENCODING_PNG ? 1024 : 2);
     job.request.set_height(job.request.width());
-    job.view = std::get<View>(viewFrom(job.request, *job.snapshot));
-    service.draw(std::move(job), [&, number = ++id](const Encoded& reply) {
+    job.view = std::get<FrameView>(viewFromProto(job.request, *job.snapshot));
+    service.renderFrame(std::move(job), [&, number = ++id](const EncodedMessage& reply) {
       const std::lock_guard lock(mutex);
       EXPECT_TRUE(reply);
       order.push_back(number);

@@ -1,4 +1,4 @@
-// HTTP and WebSocket on the same port, and what is neither.
+// Tests of HTTP and WebSocket on the same port, and of streams that are neither.
 #include "server/net/http_pages.hpp"
 #include "tests/server/raw_connection.hpp"
 #include "tests/server/served_room.hpp"
@@ -11,7 +11,7 @@ const std::string kUpgrade =
     "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
     "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
 
-/// A client's message of a WebSocket, masked by zeros: up to 125 bytes (RFC 6455, 5.2).
+/// A client's WebSocket message, masked by zeros: up to 125 bytes (RFC 6455, 5.2).
 std::vector<std::uint8_t> webSocketMessage(int opcode, const std::vector<std::uint8_t>& payload) {
   std::vector<std::uint8_t> bytes{static_cast<std::uint8_t>(0x80 | opcode),
                                   static_cast<std::uint8_t>(0x80 | payload.size()),
@@ -52,7 +52,7 @@ TEST_F(Http, HealthIsOkAndUnknownPagesAreNamed) {
             "HTTP/1.1 431");
 }
 
-TEST_F(Http, MetricsTellTheTicks) {
+TEST_F(Http, MetricsContainTheTicks) {
   serve();
   protocol::Client other = client("other");
   other.step(7);
@@ -65,7 +65,7 @@ TEST_F(Http, MetricsTellTheTicks) {
       std::string::npos);
 }
 
-TEST_F(Http, PagesOfStrangersAreTurnedAway) {
+TEST_F(Http, ForeignPagesAreRefused) {
   serve();
   const std::string upgrade = "GET / HTTP/1.1\r\n" + kUpgrade;
   EXPECT_EQ(answerTo(upgrade + kHost + "Origin: https://evil.example.com\r\n\r\n").substr(0, 12),
@@ -101,9 +101,9 @@ TEST_F(Http, TextInAWebSocketAndTooLongMessagesEndIt) {
   EXPECT_EQ(client("other").step().tick(), 1u);
 }
 
-TEST_F(Http, WhoIsSlowWithARequestIsGivenUp) {
+TEST_F(Http, ASlowRequestTimesOut) {
   ServerLimits limits;
-  limits.greeting = std::chrono::milliseconds(50);
+  limits.helloTimeout = std::chrono::milliseconds(50);
   serve(limits);
   EXPECT_EQ(answerTo("GET /healthz HTTP/1.1\r\nX-Slow: ").substr(0, 12), "HTTP/1.1 408");
   RawConnection never(server_->port());
@@ -111,10 +111,10 @@ TEST_F(Http, WhoIsSlowWithARequestIsGivenUp) {
   EXPECT_EQ(never.readToEnd().error.code(), v1::ERROR_BAD_MESSAGE);
   RawConnection quiet(server_->port());
   quiet.send("GET / HTTP/1.1\r\n" + kHost + kUpgrade + "\r\n");
-  EXPECT_NE(quiet.readText().find("no whole hello came in time"), std::string::npos);
+  EXPECT_NE(quiet.readText().find("no complete hello before the deadline"), std::string::npos);
 }
 
-TEST_F(Http, ATlsGreetingIsToldWhatIsWrong) {
+TEST_F(Http, ATlsGreetingGetsAnError) {
   serve();
   RawConnection raw(server_->port());
   raw.send(std::vector<std::uint8_t>{0x16, 0x03, 0x01, 0x02, 0x00, 0x01, 0x00, 0x01, 0xFC});
@@ -142,7 +142,7 @@ TEST_F(Http, PicturesFlowAsTheWorldMoves) {
 
 TEST_F(Http, TheEndOfTheServerEndsItsVisits) {
   ServerLimits limits;
-  limits.farewell = std::chrono::milliseconds(100);
+  limits.closeTimeout = std::chrono::milliseconds(100);
   serve(limits);
   RawConnection raw(server_->port());
   raw.send("GET / HTTP/1.1\r\n" + kHost + kUpgrade + "\r\n");
@@ -150,11 +150,11 @@ TEST_F(Http, TheEndOfTheServerEndsItsVisits) {
   raw.send(webSocketMessage(2, hello()));
   raw.readText("small_room");
   server_->stop();
-  EXPECT_NE(raw.readText().find("the server ends"), std::string::npos);
+  EXPECT_NE(raw.readText().find("the server is stopping"), std::string::npos);
 }
 
-TEST(HttpPages, TargetsAreTakenApart) {
-  const Target target = targetOf("/mjpeg/avatar/a%2Eb?width=3&x=%zz&flag");
+TEST(HttpPages, TargetsAreParsed) {
+  const Target target = parseTarget("/mjpeg/avatar/a%2Eb?width=3&x=%zz&flag");
   EXPECT_EQ(target.path, "/mjpeg/avatar/a.b");
   EXPECT_EQ(target.query.at("width"), "3");
   EXPECT_EQ(target.query.at("x"), "%zz");

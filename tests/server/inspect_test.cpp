@@ -1,5 +1,6 @@
-// `enfilade inspect`: what it tells, and how it ends when it is used wrongly.
+// Tests of `enfilade inspect`: its report, and its exit codes after wrong use.
 #include <algorithm>
+#include <regex>
 
 #include "server/base/version.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
@@ -9,12 +10,12 @@ namespace enfilade::server::testing {
 namespace {
 
 namespace fs = std::filesystem;
-class Inspect : public ProgramTrial {};
+class Inspect : public ProgramFixture {};
 
-TEST_F(Inspect, TellsAsJsonWhatIsInTheScene) {
-  const Ended told = run({"inspect", path("room.obj"), "--json", "--unit", "m", "--objects"});
-  ASSERT_EQ(told.code, 0) << told.err;
-  const auto all = nlohmann::json::parse(told.out);
+TEST_F(Inspect, DescribesTheSceneAsJson) {
+  const Ended ended = run({"inspect", path("room.obj"), "--json", "--unit", "m", "--objects"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const auto all = nlohmann::json::parse(ended.out);
   EXPECT_EQ(all.at("objects"), 3);
   EXPECT_EQ(all.at("meshes"), 3);
   EXPECT_EQ(all.at("triangles"), all.at("unique_triangles"));
@@ -24,7 +25,7 @@ TEST_F(Inspect, TellsAsJsonWhatIsInTheScene) {
   EXPECT_EQ(all.at("offset"), nlohmann::json({0.0, 0.0, 0.0}));
   EXPECT_EQ(all.at("bounds").at("size").at(0), 20);
   EXPECT_TRUE(all.at("bodies").is_array());
-  EXPECT_TRUE(all.at("problems").empty()) << told.out;
+  EXPECT_TRUE(all.at("problems").empty()) << ended.out;
   EXPECT_GT(all.at("import_seconds"), 0);
   EXPECT_GT(all.at("peak_mb"), 1);
   ASSERT_EQ(all.at("object_list").size(), 3u);
@@ -32,11 +33,11 @@ TEST_F(Inspect, TellsAsJsonWhatIsInTheScene) {
   EXPECT_EQ(all.at("object_list").at(1).at("box").at("min").at(0), 5);
 }
 
-TEST_F(Inspect, TellsHowADoorOpens) {
+TEST_F(Inspect, DescribesTheOperationOfADoor) {
   write(folder_ / "house.ifc", tests::IfcHouse().text());
-  const Ended told = run({"inspect", path("house.ifc"), "--json", "--objects"});
-  ASSERT_EQ(told.code, 0) << told.err;
-  const auto all = nlohmann::json::parse(told.out);
+  const Ended ended = run({"inspect", path("house.ifc"), "--json", "--objects"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const auto all = nlohmann::json::parse(ended.out);
   int doors = 0;
   for (const auto& object : all.at("object_list")) {
     const bool isDoor = object.value("class", "") == "IfcDoor";
@@ -46,13 +47,13 @@ TEST_F(Inspect, TellsHowADoorOpens) {
   EXPECT_GE(doors, 1);
 }
 
-TEST_F(Inspect, TellsWhereAThingOnAPathGoes) {
+TEST_F(Inspect, DescribesThePathOfABody) {
   write(folder_ / "room.walk.json",
         R"({"walk":1,"bodies":[{"name":"sign","kind":"path","objects":["room_wall"],
             "keys":[{"time":0},{"time":2,"offset":[0,1,0],"turn":180}]}]})");
-  const Ended told = run({"inspect", path("room.obj"), "--json", "--unit", "m"});
-  ASSERT_EQ(told.code, 0) << told.err;
-  const auto body = nlohmann::json::parse(told.out).at("bodies").at(0);
+  const Ended ended = run({"inspect", path("room.obj"), "--json", "--unit", "m"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const auto body = nlohmann::json::parse(ended.out).at("bodies").at(0);
   EXPECT_EQ(body.at("seconds"), 2);
   EXPECT_EQ(body.at("loops"), false);
   EXPECT_EQ(body.at("keys").at(1).at("offset"), nlohmann::json({0, 1, 0}));
@@ -76,7 +77,7 @@ TEST_F(Inspect, DrawsAPlanOfEachStorey) {
   EXPECT_FALSE(fs::exists(folder_ / "plans/storey-2.png"));
 }
 
-TEST_F(Inspect, WrongUseEndsWithTwoAndWhatCannotBeReadWithOne) {
+TEST_F(Inspect, WrongUsageExitsWithTwoAndUnreadableFilesWithOne) {
   const std::vector<std::vector<std::string>> mistakes{
       {"inspect"},
       {"inspect", path("room.obj"), path("room.obj")},
@@ -98,35 +99,39 @@ TEST_F(Inspect, WrongUseEndsWithTwoAndWhatCannotBeReadWithOne) {
   }
 }
 
-TEST_F(Inspect, APlanThatCannotBeWrittenIsToldBeforeTheModelIsRead) {
+TEST_F(Inspect, AnUnwritablePlanIsReportedBeforeTheImport) {
   write(path("file"), "in the way");
   for (const std::string& folder :
        {path("file"), path("file") + "/below", std::string("/proc/x")}) {
     const Ended ended = run({"inspect", path("absent.obj"), "--plan", folder});
     EXPECT_EQ(ended.code, 1);
     EXPECT_EQ(ended.out, "");
-    EXPECT_NE(ended.err.find("cannot write into " + folder), std::string::npos) << ended.err;
+    EXPECT_NE(ended.err.find("cannot write to " + folder), std::string::npos) << ended.err;
     EXPECT_NE(ended.err.find("--plan"), std::string::npos) << ended.err;
   }
   EXPECT_EQ(textOf(path("file")), "in the way");
 }
 
-TEST_F(Inspect, WhatCannotBeWrittenEndsWithOneAndIsNamed) {
+TEST_F(Inspect, UnwritableFilesAreNamedAndExitWithOne) {
   fs::create_symlink("/dev/full", path("stdout"));
   EXPECT_EQ(codeOf(start({"inspect", path("room.obj"), "--json"})), 1);
   EXPECT_NE(textOf(path("stderr")).find("stdout"), std::string::npos) << textOf(path("stderr"));
   fs::remove(path("stdout"));
-  fs::create_directories(path("plans/storey-1.png"));  // in the way of the picture
+  fs::create_directories(path("plans/storey-1.png"));  // blocks the path of the image
   const Ended ended = run({"inspect", path("room.obj"), "--plan", path("plans")});
   EXPECT_EQ(ended.code, 1);
   EXPECT_NE(ended.err.find("storey-1.png"), std::string::npos) << ended.err;
 }
 
-TEST_F(Inspect, TheProgramTellsItsVersion) {
-  const Ended told = run({"--version"});
-  EXPECT_EQ(told.code, 0);
-  EXPECT_EQ(told.out, std::string("enfilade ") + kServerVersion + "\n");
-  EXPECT_EQ(told.err, "");
+TEST_F(Inspect, TheVersionHasCommitAndBuildType) {
+  const Ended printed = run({"--version"});
+  EXPECT_EQ(printed.code, 0);
+  EXPECT_EQ(printed.out, formatVersion() + "\n");
+  EXPECT_TRUE(std::regex_match(
+      printed.out,
+      std::regex(R"(enfilade \d+\.\d+\.\d+ \(commit ([0-9a-f]{10,}|unknown), [\w ]+\)\n)")))
+      << printed.out;
+  EXPECT_EQ(printed.err, "");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// A small load: what `./dev bench server` does with hundreds of clients, for seconds.
+// A small load test; `./dev bench server` does the same with hundreds of clients for seconds.
 #include <array>
 #include <cstdio>
 
@@ -33,7 +33,7 @@ TEST_F(Load, TwentyClientsHearEveryEventOnce) {
   EXPECT_EQ(result.closedInPeace, result.clients);
   EXPECT_EQ(result.replies, result.commands);
   EXPECT_EQ(result.refused, 0u);
-  EXPECT_GT(result.begins, 0u) << "nobody met anything";
+  EXPECT_GT(result.begins, 0u) << "no avatar had a contact";
   EXPECT_EQ(result.begins, result.ends) << "all hear of all contacts, and all end with the server";
   EXPECT_FALSE(result.acceptedToShown.empty());
 }
@@ -41,10 +41,10 @@ TEST_F(Load, TwentyClientsHearEveryEventOnce) {
 TEST_F(Load, VisitorsLeaveNothingBehind) {
   serve();
   protocol::Client other = client("other");
-  v1::SetClock freely;  // so that avatars enter, and leave with their clients
+  v1::SetClock freely;  // so that avatars spawn, and leave with their clients
   freely.mutable_free_run()->set_speed(10);
   other.setClock(freely);
-  tests::visitRudely(server_->port(), 20, 1);  // what is made once is made now
+  tests::visitRudely(server_->port(), 20, 1);  // warms up one-time allocations
   const auto alone = [&] {
     return other.metrics().clients() == 1 && other.metrics().avatars() == 0;
   };
@@ -52,13 +52,13 @@ TEST_F(Load, VisitorsLeaveNothingBehind) {
   const tests::Footprint before = tests::footprint();
   tests::visitRudely(server_->port(), 100, 2);
   {
-    protocol::Client visitor = client("visitor");  // who is in the world for certain
+    protocol::Client visitor = client("visitor");  // in the world for certain
     ASSERT_FALSE(visitor.command(spawn("guest", 3, 0.01, 0)));
     ASSERT_TRUE(becomesTrue([&] { return other.metrics().contacts() > 0; }));
   }
   ASSERT_TRUE(becomesTrue(alone));
   EXPECT_EQ(tests::footprint().threads, before.threads);
-  // A session is gone from the world a moment before its socket is.
+  // A session leaves the world a moment before its socket is closed.
   EXPECT_TRUE(becomesTrue([&] { return tests::footprint().descriptors <= before.descriptors; }));
 }
 

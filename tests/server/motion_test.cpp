@@ -1,4 +1,5 @@
-// How the world moves, from the command line to Policies, and the avatars' orders from messages.
+// Tests of motion settings from the command line to WorldSettings, and of avatar orders from
+// messages.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,24 +19,24 @@ std::variant<ProgramCommand, ExitCode> read(std::vector<const char*> options) {
   return readCommandLine(static_cast<int>(arguments.size()), arguments.data());
 }
 
-scene::Lengths lengthsOf(std::vector<const char*> options) {
-  return std::get<ReplayCommand>(std::get<ProgramCommand>(read(std::move(options)))).lengths;
+scene::WorldSettings lengthsOf(std::vector<const char*> options) {
+  return std::get<ReplayCommand>(std::get<ProgramCommand>(read(std::move(options)))).settings;
 }
 
-TEST(MotionOptions, SetTheWorldsLengthsAndAreToldAsPolicies) {
-  const scene::Lengths lengths = lengthsOf(
+TEST(MotionOptions, SetTheWorldSettingsAndArePolicies) {
+  const scene::WorldSettings lengths = lengthsOf(
       {"--step-height", "0.2", "--epsilon", "0.001", "--slope", "30", "--sliding", "stop"});
   EXPECT_EQ(lengths.stepHeight, 0.2);
-  EXPECT_EQ(lengths.epsilon, 0.001);
-  const v1::Policies policies = messageOf(lengths);
+  EXPECT_EQ(lengths.contactOffset, 0.001);
+  const v1::Policies policies = toProto(lengths);
   EXPECT_NEAR(policies.walkable_slope(), 30 * 3.14159265358979 / 180, 1e-12);
   EXPECT_EQ(policies.sliding(), "stop");
   EXPECT_GT(policies.jump_limit(), 0);
-  EXPECT_EQ(messageOf(lengthsOf({})).sliding(), "slide");
-  EXPECT_EQ(lengthsOf({}).stepHeight, scene::Lengths().stepHeight);
+  EXPECT_EQ(toProto(lengthsOf({})).sliding(), "slide");
+  EXPECT_EQ(lengthsOf({}).stepHeight, scene::WorldSettings().stepHeight);
 }
 
-TEST(MotionOptions, WhatNoWorldCanHaveIsAMistakeOfUsage) {
+TEST(MotionOptions, SettingsOutOfRangeAreUsageErrors) {
   for (const auto& bad : std::vector<std::vector<const char*>>{{"--step-height", "nan"},
                                                                {"--step-height", "-0.1"},
                                                                {"--step-height", "3"},
@@ -47,13 +48,13 @@ TEST(MotionOptions, WhatNoWorldCanHaveIsAMistakeOfUsage) {
                                                                {"--sliding", "glide"}}) {
     const auto refused = read(bad);
     ASSERT_TRUE(std::holds_alternative<ExitCode>(refused)) << bad[0] << " " << bad[1];
-    EXPECT_EQ(std::get<ExitCode>(refused), ExitCode::usage);
+    EXPECT_EQ(std::get<ExitCode>(refused), ExitCode::usageError);
   }
 }
 
 class AvatarOrders : public ::testing::Test {
  protected:
-  RecordedWorld world{scene::World(smallRoom())};
+  RecordableWorld world{scene::World(smallRoom())};
   InProcessDriver driver{world, nullptr};
 
   static v1::Command armAt(double x, double y, double z) {
@@ -74,7 +75,7 @@ class AvatarOrders : public ::testing::Test {
   }
 };
 
-TEST_F(AvatarOrders, AnArmIsSpawnedDrivenAndToldOf) {
+TEST_F(AvatarOrders, AnArmIsSpawnedDrivenAndReported) {
   ASSERT_FALSE(driver.submit(armAt(0, 0.01, 0)));
   v1::Command drive;
   drive.set_avatar("arm");
@@ -88,7 +89,7 @@ TEST_F(AvatarOrders, AnArmIsSpawnedDrivenAndToldOf) {
   EXPECT_EQ(outcome.avatars[0].joints(0).value(), 0.5);
 }
 
-TEST_F(AvatarOrders, ADriveIntoAWallIsAnsweredWithHowFarAndByWhat) {
+TEST_F(AvatarOrders, ADriveIntoAWallReportsDisplacementAndObstacle) {
   v1::Command spawn = armAt(0, 0.01, 0);
   spawn.mutable_spawn()->clear_links();
   ASSERT_FALSE(driver.submit(spawn));
@@ -107,7 +108,7 @@ TEST_F(AvatarOrders, ADriveIntoAWallIsAnsweredWithHowFarAndByWhat) {
   EXPECT_LT(move.distance(), 0.001);
 }
 
-TEST_F(AvatarOrders, WhatIsAbsurdIsRefusedWithItsFieldAndChangesNothing) {
+TEST_F(AvatarOrders, InvalidOrdersAreRefusedWithTheirFieldAndChangeNothing) {
   const double nan = std::nan("");
   const auto field = [&](const v1::Command& command) {
     const auto error = driver.submit(command);
@@ -143,7 +144,7 @@ TEST(CommandLine, MoreScenesThanAServerHasWorldsAreRefused) {
   EXPECT_TRUE(std::holds_alternative<ProgramCommand>(read()));
   arguments.push_back("room.obj");
   ASSERT_TRUE(std::holds_alternative<ExitCode>(read()));
-  EXPECT_EQ(std::get<ExitCode>(read()), ExitCode::usage);
+  EXPECT_EQ(std::get<ExitCode>(read()), ExitCode::usageError);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Recordings that are begun in the middle: verified from there, and gone on with.
+// Tests of recordings that start at a checkpoint: verified from there, and continued.
 #include <set>
 
 #include "protocol/recording/recording.hpp"
@@ -7,14 +7,14 @@
 namespace enfilade::server {
 namespace {
 
-using testing::ProgramTrial;
+using testing::ProgramFixture;
 using testing::write;
 
-/// Ann walks to and fro for a minute; who takes over finds her on her way.
-class Playback : public ProgramTrial {
+/// Ann walks to and fro for a minute; a client that takes over finds her walking.
+class Playback : public ProgramFixture {
  protected:
   void SetUp() override {
-    ProgramTrial::SetUp();
+    ProgramFixture::SetUp();
     std::string walk = R"({"spawn":"ann","at":[0,0,0]})"
                        "\n"
                        R"({"walk":"ann","along":[)";
@@ -35,42 +35,42 @@ class Playback : public ProgramTrial {
     more.insert(more.begin(), {path(file), "--verify"});
     return replay(more);
   }
-  static nlohmann::json toldBy(const Ended& ended) {
+  static nlohmann::json reportOf(const Ended& ended) {
     return nlohmann::json::parse(ended.out, nullptr, false);
   }
 };
 
 TEST_F(Playback, IsVerifiedFromTheCheckpointBeforeATick) {
-  const auto whole = toldBy(verify("walk.mcap"));
+  const auto whole = reportOf(verify("walk.mcap"));
   const std::uint64_t ticks = whole.value("ticks", 0u);
   ASSERT_GT(ticks, 2400u);
   const Ended late = verify("walk.mcap", {"--from", std::to_string(ticks - 100)});
   EXPECT_EQ(late.code, 0) << late.err;
-  const auto told = toldBy(late);
-  const std::uint64_t began = told.value("from_checkpoint", 0u);
+  const auto report = reportOf(late);
+  const std::uint64_t began = report.value("from_checkpoint", 0u);
   EXPECT_GT(began, 0u);
   EXPECT_LE(began, ticks - 100);
-  EXPECT_EQ(told.value("ticks", 0u), ticks - began);
-  EXPECT_EQ(told.value("state_hash", ""), whole.value("state_hash", "-"));
+  EXPECT_EQ(report.value("ticks", 0u), ticks - began);
+  EXPECT_EQ(report.value("state_hash", ""), whole.value("state_hash", "-"));
 }
 
-TEST_F(Playback, AWalkThatIsGoneOnWithEndsAsItWouldHave) {
+TEST_F(Playback, AContinuedWalkEndsIdentically) {
   const Ended branched = replay({path("walk.mcap"), "--from", "1500", "--then", path("wait.jsonl"),
                                  "--out", path("branch"), "--record", path("branch.mcap")});
   ASSERT_EQ(branched.code, 0) << branched.err;
-  const auto whole = toldBy(verify("branch.mcap"));
+  const auto whole = reportOf(verify("branch.mcap"));
   EXPECT_GE(whole.value("ticks", 0u), 600u);
-  // She goes on with what she was told: after the same tick the recorded walk has the same hash.
+  // Ann continues her orders: after the same tick the recorded walk has the same hash.
   const std::uint64_t end = 1500 + whole.value("ticks", std::uint64_t{0});
   write(path("none.jsonl"), "{\"wait\":0}\n");
   const Ended other =
       replay({path("walk.mcap"), "--from", std::to_string(end), "--then", path("none.jsonl"),
               "--out", path("other"), "--record", path("other.mcap")});
   if (other.code == 0) {
-    const auto made = toldBy(verify("other.mcap"));
+    const auto made = reportOf(verify("other.mcap"));
     EXPECT_EQ(made.value("ticks", 1u), 0u);
     EXPECT_EQ(made.value("state_hash", ""), whole.value("state_hash", "-"));
-  } else {  // the branch went on beyond the recording's end
+  } else {  // the branch continued beyond the recording's end
     EXPECT_NE(other.err.find("is not in it"), std::string::npos) << other.err;
   }
 }
@@ -84,8 +84,8 @@ TEST_F(Playback, ABranchIsARecordingThatCanBeSoughtAndLeftAgain) {
                     path("bob.jsonl"), "--out", path("b"), "--record", path("b.mcap")})
                 .code,
             0);
-  const auto whole = toldBy(verify("b.mcap"));
-  const auto part = toldBy(verify("b.mcap", {"--from", "900"}));
+  const auto whole = reportOf(verify("b.mcap"));
+  const auto part = reportOf(verify("b.mcap", {"--from", "900"}));
   EXPECT_EQ(part.value("state_hash", ""), whole.value("state_hash", "-"));
   EXPECT_EQ(part.value("from_checkpoint", 0u), 700u);
   const Ended early = verify("b.mcap", {"--from", "699"});
@@ -98,7 +98,7 @@ TEST_F(Playback, ABranchIsARecordingThatCanBeSoughtAndLeftAgain) {
   EXPECT_EQ(verify("c.mcap").code, 0);
 }
 
-/// The contacts that live when a recording begins, and were told so; what ends must have begun.
+/// The contacts reported as active at the start of a recording; contacts that end must have begun.
 std::set<std::pair<std::string, std::string>> livingAtItsBeginning(const std::string& file) {
   protocol::RecordingReader reader(file);
   std::set<std::pair<std::string, std::string>> live, first;
@@ -121,7 +121,7 @@ std::set<std::pair<std::string, std::string>> livingAtItsBeginning(const std::st
   return first;
 }
 
-TEST_F(Playback, WhatLivesWhereABranchBeginsIsToldThere) {
+TEST_F(Playback, ActiveContactsAreReportedAtTheStartOfABranch) {
   ASSERT_EQ(replay({path("walk.mcap"), "--from", "700", "--then", path("wait.jsonl"), "--out",
                     path("b"), "--record", path("b.mcap")})
                 .code,
@@ -130,7 +130,7 @@ TEST_F(Playback, WhatLivesWhereABranchBeginsIsToldThere) {
   EXPECT_EQ(verify("b.mcap").code, 0);
 }
 
-TEST_F(Playback, WhatCannotBeBegunIsRefusedWithTheReason) {
+TEST_F(Playback, InvalidStartsAreRefusedWithTheReason) {
   const Ended beyond = verify("walk.mcap", {"--from", "100000000"});
   EXPECT_EQ(beyond.code, 1);
   EXPECT_NE(beyond.err.find("give one from 0 to"), std::string::npos) << beyond.err;

@@ -1,4 +1,4 @@
-// The program itself, started in a folder of its own as its users start it.
+// Test fixture that starts the program in its own folder, as its users do.
 #pragma once
 
 #include <fcntl.h>
@@ -33,8 +33,8 @@ inline void write(const std::filesystem::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;
 }
 
-/// With the small room as room.obj.
-class ProgramTrial : public ::testing::Test {
+/// A fixture with the small room as room.obj.
+class ProgramFixture : public ::testing::Test {
  protected:
   struct Ended {
     int code = -1;
@@ -72,7 +72,7 @@ class ProgramTrial : public ::testing::Test {
     return {code, textOf(path("stdout")), textOf(path("stderr"))};
   }
 
-  /// The port of the ready line, when it is there.
+  /// The port from the ready line, once it was printed.
   int awaitReady() const {
     for (int i = 0; i < 3000; ++i) {
       const auto ready = nlohmann::json::parse(textOf(path("stdout")), nullptr, false);

@@ -1,4 +1,4 @@
-// The program as its users start it: exit codes, what it says, what it writes.
+// Tests of the program as its users start it: exit codes, messages, output files.
 #include "tests/server/program_fixture.hpp"
 
 #include <sys/resource.h>
@@ -21,10 +21,10 @@ constexpr const char* kWalk = R"({"spawn":"ann","at":[0,0.01,0],"facing":0}
 {"leave":"bob"}
 )";
 
-class Program : public ProgramTrial {
+class Program : public ProgramFixture {
  protected:
   void SetUp() override {
-    ProgramTrial::SetUp();
+    ProgramFixture::SetUp();
     write(folder_ / "walk.jsonl", kWalk);
   }
 };
@@ -53,7 +53,7 @@ TEST_F(Program, UsageMistakesEndWithTwoAndSayHow) {
   EXPECT_EQ(run({"--help"}).code, 0);
 }
 
-TEST_F(Program, WhatCannotBeReadEndsWithOneAndIsNamed) {
+TEST_F(Program, UnreadableFilesAreNamedAndExitWithOne) {
   const auto replay = [&](const std::string& scene, const std::string& script) {
     return run({"replay", scene, script, "--out", path("out")});
   };
@@ -75,7 +75,7 @@ TEST_F(Program, WhatCannotBeReadEndsWithOneAndIsNamed) {
   EXPECT_FALSE(fs::exists(path("out") + "/summary.json"));
 }
 
-TEST_F(Program, ADeviceThatIsAskedForAndNotThereEndsWithOne) {
+TEST_F(Program, AMissingDeviceExitsWithOne) {
   write(folder_ / "path.txt", "0 0 1 0 0 0 0 1\n");
   for (const std::vector<std::string>& verb : std::vector<std::vector<std::string>>{
            {"serve", path("room.obj"), "--listen", "127.0.0.1:0"},
@@ -93,14 +93,14 @@ TEST_F(Program, ADeviceThatIsAskedForAndNotThereEndsWithOne) {
             1);
 }
 
-TEST_F(Program, TheRendererAskedForDrawsTheWalk) {
+TEST_F(Program, TheRequestedRendererDrawsTheWalk) {
   const Ended ended = run(
       {"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out"), "--renderer", "rays"});
   EXPECT_EQ(ended.code, 0) << ended.err;
   EXPECT_NE(ended.err.find("by Embree"), std::string::npos) << ended.err;
 }
 
-TEST_F(Program, AFolderThatCannotBeWrittenIsToldBeforeTheWalk) {
+TEST_F(Program, AnUnwritableFolderIsReportedBeforeTheWalk) {
   write(path("file"), "in the way");
   const Ended ended =
       run({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("file") + "/out"});
@@ -109,7 +109,7 @@ TEST_F(Program, AFolderThatCannotBeWrittenIsToldBeforeTheWalk) {
   EXPECT_EQ(ended.out, "");
 }
 
-TEST_F(Program, ASecondWalkIntoAFolderRemovesWhatTheFirstWroteAndNothingElse) {
+TEST_F(Program, ASecondWalkIntoAFolderRemovesOnlyTheFirstOnesFiles) {
   const auto replay = [&](const std::string& script) {
     return run({"replay", path("room.obj"), path(script), "--out", path("out")}).code;
   };
@@ -126,7 +126,7 @@ TEST_F(Program, ASecondWalkIntoAFolderRemovesWhatTheFirstWroteAndNothingElse) {
   EXPECT_TRUE(fs::exists(path("out/frames/mine.png")));
 }
 
-TEST_F(Program, WhatStdoutDoesNotTakeEndsWithOne) {
+TEST_F(Program, AFailedWriteToStdoutExitsWithOne) {
   write(folder_ / "path.txt", "0 0 1 0 0 0 0 1\n");
   fs::create_symlink("/dev/full", path("stdout"));
   for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
@@ -163,7 +163,7 @@ TEST_F(Program, AFileBeyondTheLimitIsAnErrorNotADeath) {
       << textOf(path("stderr"));
 }
 
-TEST_F(Program, ServingAStrangersAddressEndsWithOne) {
+TEST_F(Program, ServingAPublicAddressExitsWithOne) {
   const Ended ended = run({"serve", path("room.obj"), "--listen", "0.0.0.0:0"});
   EXPECT_EQ(ended.code, 1);
   EXPECT_NE(ended.err.find("--token-file and --insecure"), std::string::npos) << ended.err;
@@ -195,13 +195,13 @@ TEST_F(Program, StrictTurnsABlockedWalkIntoThree) {
   };
   const Ended lenient = run(arguments(false));
   EXPECT_EQ(lenient.code, 0);
-  EXPECT_FALSE(nlohmann::json::parse(lenient.out).contains("audit")) << "nobody asked for it";
+  EXPECT_FALSE(nlohmann::json::parse(lenient.out).contains("audit")) << "it was not requested";
   const Ended strict = run(arguments(true));
   EXPECT_EQ(strict.code, 3);
   EXPECT_NE(strict.err.find("room_wall"), std::string::npos) << strict.err;
 }
 
-/// contacts.jsonl, up to what ends when the walk does.
+/// Reads contacts.jsonl, without the contacts that end with the walk.
 std::vector<nlohmann::json> contactsOf(const fs::path& out, std::uint64_t lastTick) {
   std::ifstream lines(out / "contacts.jsonl");
   std::vector<nlohmann::json> contacts;
@@ -281,10 +281,10 @@ TEST_F(Program, AWalkOverTheSocketIsTheReplayToTheLastBit) {
   }
 }
 
-TEST_F(Program, ASecondStartReadsWhatTheFirstOneKept) {
+TEST_F(Program, ASecondStartReadsTheCacheOfTheFirst) {
   const auto fromCache = [&](const std::string& option) {
-    const Ended told = run({"inspect", path("room.obj"), "--json", option});
-    return nlohmann::json::parse(told.out).at("from_cache").get<bool>();
+    const Ended ended = run({"inspect", path("room.obj"), "--json", option});
+    return nlohmann::json::parse(ended.out).at("from_cache").get<bool>();
   };
   setenv("ENFILADE_CACHE", path("cache").c_str(), 1);
   EXPECT_FALSE(fromCache("--unit=m"));

@@ -1,5 +1,5 @@
-// Questions about pairs through a connection: distances, what touches what, until when nothing
-// does.
+// Tests of pair queries through a connection: distances, contacts, and lower bounds on the time to
+// contact.
 #include <cmath>
 #include <limits>
 
@@ -91,7 +91,7 @@ TEST_F(Pairs, DistancesAreThoseThatWereBuiltByIdAndByName) {
   EXPECT_EQ(reply.pairs(3).verdict(), v1::VERDICT_TOUCHING);
 }
 
-TEST_F(Pairs, RefinedOnesTellTheDepth) {
+TEST_F(Pairs, RefinedPairsHaveTheDepth) {
   const auto block =
       scene::testing::boxModel({{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {0.75, 0, 0}, {2, 1, 1}}});
   serve({}, std::make_shared<const scene::Scene>(block));
@@ -104,7 +104,7 @@ TEST_F(Pairs, RefinedOnesTellTheDepth) {
   EXPECT_EQ(state.penetration(), 0.25);
 }
 
-TEST_F(Pairs, WhatTouchesOrIsNearComesNearestFirst) {
+TEST_F(Pairs, TouchingEntitiesAreSortedByDistance) {
   protocol::Client ann = inTheRoom();
   const v1::TouchingReply touching = ann.touching(near("left", 0));
   ASSERT_EQ(touching.found_size(), 1);
@@ -116,7 +116,7 @@ TEST_F(Pairs, WhatTouchesOrIsNearComesNearestFirst) {
   EXPECT_EQ(around.left_out(), 0u);
 }
 
-TEST_F(Pairs, WhatALiftIsMountedOnIsListed) {
+TEST_F(Pairs, TheMountingOfALiftIsListed) {
   scene::Model model = scene::testing::boxModel({{"floor", {-5, -0.2, -5}, {5, 0, 5}},
                                                  {"car", {-1, 0, -1}, {1, 0.2, 1}},
                                                  {"beam", {0.5, 2, -1}, {3, 2.2, 1}}});
@@ -131,11 +131,11 @@ TEST_F(Pairs, WhatALiftIsMountedOnIsListed) {
   const v1::TouchingReply ofLift = ann.touching(near("lift", 0));
   ASSERT_EQ(ofLift.mounting_size(), 1);
   EXPECT_EQ(ofLift.mounting(0), 1u);
-  EXPECT_EQ(ofLift.found_size(), 1) << "asked for, it is told as all else";
+  EXPECT_EQ(ofLift.found_size(), 1) << "it is reported when requested";
   EXPECT_EQ(ann.touching(near("beam", 0)).mounting_size(), 0);
 }
 
-TEST_F(Pairs, WhatDoesNotFitIntoOneAnswerIsCounted) {
+TEST_F(Pairs, EntitiesBeyondOneReplyAreCounted) {
   ServerLimits limits;
   limits.replyBytes = 400;  // two pairs
   serve(limits, bodyRoom());
@@ -146,7 +146,7 @@ TEST_F(Pairs, WhatDoesNotFitIntoOneAnswerIsCounted) {
   EXPECT_EQ(around.found(0).b_name(), "floor");
 }
 
-TEST_F(Pairs, ADriverTouchesTheWallWhenItWasTold) {
+TEST_F(Pairs, AnAvatarTouchesTheWallAtTheReportedTime) {
   protocol::Client ann = inTheRoom();
   v1::Command drive;
   drive.set_avatar("ann");
@@ -173,7 +173,7 @@ TEST_F(Pairs, ADriverTouchesTheWallWhenItWasTold) {
   EXPECT_EQ(ann.cannotTouch(any).before(), 0) << "of free bodies nothing is known";
 }
 
-TEST_F(Pairs, WhatCannotBeAskedIsRefusedByItsField) {
+TEST_F(Pairs, InvalidQueriesAreRefusedByTheirField) {
   ServerLimits limits;
   limits.pairs = 2;
   serve(limits, bodyRoom());
@@ -205,10 +205,10 @@ TEST_F(Pairs, WhatCannotBeAskedIsRefusedByItsField) {
   for (const double least : {-1.0, std::nan(""), 3601.0})
     expect(refusalOf([&] { ann.cannotTouch(apart("ann", "left", least)); }), v1::ERROR_BAD_MESSAGE,
            "cannot_touch.least");
-  EXPECT_EQ(ann.distances(between("left", "end")).pairs_size(), 1) << "it goes on";
+  EXPECT_EQ(ann.distances(between("left", "end")).pairs_size(), 1) << "the connection continues";
 }
 
-TEST_F(Pairs, AnAvatarThatLeftIsNotThere) {
+TEST_F(Pairs, AnAvatarThatLeftIsUnknown) {
   protocol::Client ann = inTheRoom();
   const std::uint32_t id = ann.distances(between("ann", "floor")).pairs(0).a();
   v1::Command leave;
@@ -222,18 +222,18 @@ TEST_F(Pairs, AnAvatarThatLeftIsNotThere) {
   }
 }
 
-TEST_F(Pairs, TheWelcomeTellsTheLimits) {
+TEST_F(Pairs, TheWelcomeHasTheLimits) {
   ServerLimits limits;
   limits.pairs = 7;
-  limits.requestsUnderWay = 8;
-  limits.waitingBytes = 9000;
+  limits.pendingRequests = 8;
+  limits.pendingRequestBytes = 9000;
   limits.requestsPerSecond = 10'000;
   serve(limits);
-  const v1::Limits told = client("ann").welcome().limits();
-  EXPECT_EQ(told.max_pairs(), 7u);
-  EXPECT_EQ(told.max_requests_under_way(), 8u);
-  EXPECT_EQ(told.max_bytes_under_way(), 9000u);
-  EXPECT_EQ(told.requests_per_second(), 10'000u);
+  const v1::Limits sent = client("ann").welcome().limits();
+  EXPECT_EQ(sent.max_pairs(), 7u);
+  EXPECT_EQ(sent.max_requests_under_way(), 8u);
+  EXPECT_EQ(sent.max_bytes_under_way(), 9000u);
+  EXPECT_EQ(sent.requests_per_second(), 10'000u);
 }
 
 }  // namespace

@@ -1,9 +1,9 @@
-// Parts of the server that need no socket.
+// Tests of parts of the server that need no socket.
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "server/app/command_line.hpp"
+#include "server/base/endpoint.hpp"
 #include "server/messages/outgoing_queue.hpp"
 #include "server/messages/tick_statistics.hpp"
 #include "server/plans/path_map.hpp"
@@ -32,7 +32,7 @@ TEST(OutgoingQueue, KeepsRepliesInOrderAndOnlyTheLatestState) {
   EXPECT_EQ(woken, 4);
 }
 
-TEST(OutgoingQueue, AboveItsBoundOnlyTheLastWordsAreLeft) {
+TEST(OutgoingQueue, AboveItsBoundOnlyTheFinalMessageIsLeft) {
   OutgoingQueue queue({100, 2}, bytes(7), [] {});
   queue.push({bytes(10), bytes(50)});
   queue.push(bytes(40));
@@ -67,7 +67,7 @@ TEST(OutgoingQueue, CountsPicturesAndNotTheirBytes) {
   EXPECT_TRUE(queue.overflowed());
 }
 
-TEST(OutgoingQueue, FinishingSendsWhatWaitsFirst) {
+TEST(OutgoingQueue, FinishingSendsPendingMessagesFirst) {
   OutgoingQueue queue({100, 2}, bytes(7), [] {});
   queue.push(bytes(1));
   queue.finish(bytes(2));
@@ -86,7 +86,7 @@ TEST(DurationHistogram, AgreesWithSortingWithinABucket) {
   std::vector<double> all;
   for (int i = 0; i < 5000; ++i) {
     all.push_back(durations(random));
-    histogram.add(all.back());
+    histogram.record(all.back());
   }
   std::sort(all.begin(), all.end());
   for (const double fraction : {0.01, 0.5, 0.9, 0.99}) {
@@ -98,33 +98,33 @@ TEST(DurationHistogram, AgreesWithSortingWithinABucket) {
 }
 
 TEST(CommandLine, EndpointsAreHostAndPort) {
-  EXPECT_EQ(endpointFrom("127.0.0.1:7878")->port, 7878);
-  EXPECT_EQ(endpointFrom("[::1]:0")->host, "::1");
-  EXPECT_EQ(endpointFrom("localhost:65535")->host, "localhost");
+  EXPECT_EQ(parseEndpoint("127.0.0.1:7878")->port, 7878);
+  EXPECT_EQ(parseEndpoint("[::1]:0")->host, "::1");
+  EXPECT_EQ(parseEndpoint("localhost:65535")->host, "localhost");
   for (const char* bad : {"", ":", "host", "host:", ":1", "host:x", "host:65536", "host:-1", "::1",
                           "host:1 ", "[]:1", "host:1:2"}) {
-    EXPECT_FALSE(endpointFrom(bad)) << bad;
+    EXPECT_FALSE(parseEndpoint(bad)) << bad;
   }
 }
 
 WalkedPath pathAt(std::initializer_list<std::pair<double, int>> heightsAndTicks) {
   WalkedPath path{"ann", {}, 1};
   for (const auto& [height, ticks] : heightsAndTicks) {
-    for (int i = 0; i < ticks; ++i) path.feet.push_back(Vec3(i, height, 0));
+    for (int i = 0; i < ticks; ++i) path.footPositions.push_back(Vec3(i, height, 0));
   }
   return path;
 }
 
 TEST(WalkMap, StoreysAreTheHeightsWalkedOnForLong) {
-  EXPECT_TRUE(walkedStoreys({}).empty());
-  EXPECT_EQ(walkedStoreys({pathAt({{0.0005, 100}})}), std::vector<double>{0.0005});
-  const auto two = walkedStoreys({pathAt({{0, 300}, {1.1, 5}, {2.2, 5}, {4.2, 200}})});
+  EXPECT_TRUE(findWalkedStoreys({}).empty());
+  EXPECT_EQ(findWalkedStoreys({pathAt({{0.0005, 100}})}), std::vector<double>{0.0005});
+  const auto two = findWalkedStoreys({pathAt({{0, 300}, {1.1, 5}, {2.2, 5}, {4.2, 200}})});
   EXPECT_EQ(two, (std::vector<double>{0, 4.2})) << "stairs are no storey";
 }
 
-TEST(WalkMap, WhoStandsStillMakesNoStorey) {
+TEST(WalkMap, AStandingAvatarDefinesNoStorey) {
   WalkedPath waiting{"bob", std::vector<Vec3>(5000, Vec3(0, 0, 0)), 2};
-  const auto two = walkedStoreys({pathAt({{0, 100}, {4.2, 50}}), waiting});
+  const auto two = findWalkedStoreys({pathAt({{0, 100}, {4.2, 50}}), waiting});
   EXPECT_EQ(two, (std::vector<double>{0, 4.2}));
 }
 
@@ -148,7 +148,7 @@ TEST(WalkMap, PathsAreDrawnInTheirOwnColourOnThePlan) {
   }
   EXPECT_GT(blue, 1000u);
   EXPECT_FALSE(drawMap(trace, {[](const auto&) { return std::optional<PlanPicture>(); }}));
-  // The room's walls are not on the blank picture; their lines are on the map.
+  // The blank image lacks the room's walls; the map shows their lines.
   const auto inkOf = [](const render::Image& image) {
     std::size_t ink = 0;
     for (std::size_t i = 0; i < image.rgb.size(); i += 3)

@@ -67,7 +67,7 @@ std::optional<v1::ServerMessage> RawConnection::receive() {
     unread_.assign(bytes.begin(), bytes.end());
     if (message) {
       v1::ServerMessage parsed;
-      if (!protocol::parse(message->header, parsed)) {
+      if (!protocol::parseHeader(message->header, parsed)) {
         throw std::runtime_error("the server sent what is no ServerMessage");
       }
       return parsed;

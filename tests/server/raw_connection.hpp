@@ -1,4 +1,4 @@
-// A socket without manners: sends any bytes, and reads what the server says to them.
+// A socket that sends arbitrary bytes and reads the server's answers.
 #pragma once
 
 #include <cstdint>
@@ -18,28 +18,28 @@ class RawConnection {
   RawConnection(const RawConnection&) = delete;
   RawConnection& operator=(const RawConnection&) = delete;
 
-  /// Sends all; false when the server has closed.
+  /// Sends all bytes; false if the server has closed.
   bool send(const std::vector<std::uint8_t>& bytes);
   bool send(const std::string& bytes);
   bool send(const v1::ClientMessage& message);
   void sendMagic();
   void sendHello(const std::string& version = "1.0.0");
   void closeSending();
-  /// The next message; nullopt when the server closed, or was silent for 20 s.
+  /// The next message; nullopt if the server closed, or was silent for 20 s.
   std::optional<v1::ServerMessage> receive();
-  /// Reads to the end of the stream; the last Bye, and the first Error before it.
+  /// Result of reading to the end of the stream: the last Bye, and the first Error before it.
   struct End {
     v1::Bye bye;
     v1::Error error;
     bool closed = false;
   };
   End readToEnd();
-  /// What comes until `end` stands in it, the server closes, or 20 s pass.
+  /// Received text until it contains `end`, the server closes, or 20 s pass.
   std::string readText(const std::string& end = "\x01 never");
 
  private:
   int socket_ = -1;
-  protocol::Decoder decoder_{protocol::kClientTakes};
+  protocol::Decoder decoder_{protocol::kClientLimits};
   std::vector<std::uint8_t> unread_;
 };
 

@@ -1,4 +1,4 @@
-// Rays through a connection: what is met is what stands there.
+// Tests of rays through a connection: hits are the world's objects.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -34,7 +34,7 @@ protocol::ProtocolError refusalOf(protocol::Client& client, const v1::RayQuery& 
   return {v1::ERROR_UNSPECIFIED, "taken"};
 }
 
-TEST_F(Rays, TellWhatIsMetAndWhere) {
+TEST_F(Rays, ReportTheHitEntityAndPoint) {
   protocol::Client ann = client("ann");
   const v1::RayReply reply = ann.rays(oneRay(vec(0, 1, 0), vec(2, 0, 0)));
   ASSERT_EQ(reply.hits_size(), 1);
@@ -48,7 +48,7 @@ TEST_F(Rays, TellWhatIsMetAndWhere) {
   EXPECT_FALSE(ann.rays(oneRay(vec(0, 1, 0), vec(2, 0, 0), 4.9)).hits(0).met());
 }
 
-TEST_F(Rays, MeetAnAvatarWhereTheTickHasItButNotTheOneThatLooks) {
+TEST_F(Rays, HitAnAvatarAtItsPoseButNotTheObserver) {
   protocol::Client ann = client("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   const v1::StepReply step = ann.step(1);
@@ -92,7 +92,7 @@ TEST_F(Rays, AScanFromTheEyesGivesDistancesAndEntitiesRowByRow) {
   EXPECT_EQ(seen.entities[7], kFloor);
 }
 
-TEST_F(Rays, PackedOnesMeetWhatTheOthersMeet) {
+TEST_F(Rays, PackedRaysEqualUnpackedOnes) {
   protocol::Client ann = client("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 2, 0.001, 0)));
   ann.step(1);
@@ -128,15 +128,15 @@ TEST_F(Rays, PackedOnesMeetWhatTheOthersMeet) {
       EXPECT_TRUE(std::all_of(of, of + 7, [](double number) { return std::isnan(number); }));
       continue;
     }
-    const std::vector<double> told{hit.distance(),  hit.point().x(),  hit.point().y(),
-                                   hit.point().z(), hit.normal().x(), hit.normal().y(),
-                                   hit.normal().z()};
-    EXPECT_EQ(std::vector<double>(of, of + 7), told) << "to the last bit";
+    const std::vector<double> expected{hit.distance(),  hit.point().x(),  hit.point().y(),
+                                       hit.point().z(), hit.normal().x(), hit.normal().y(),
+                                       hit.normal().z()};
+    EXPECT_EQ(std::vector<double>(of, of + 7), expected) << "to the last bit";
   }
   EXPECT_FALSE(plain.hits(1).met()) << "straight up is nothing";
 }
 
-TEST_F(Rays, WhatCannotBeCastIsRefusedByItsField) {
+TEST_F(Rays, InvalidRaysAreRefusedByTheirField) {
   ServerLimits limits;
   limits.rays = 2;
   limits.scanRays = 100;
@@ -165,7 +165,8 @@ TEST_F(Rays, WhatCannotBeCastIsRefusedByItsField) {
   scan.mutable_scan()->set_columns(4'000'000'000u);
   scan.mutable_scan()->set_rows(4'000'000'000u);
   EXPECT_EQ(refusalOf(ann, scan).code, v1::ERROR_TOO_LARGE);
-  EXPECT_EQ(ann.rays(oneRay(vec(0, 1, 0), vec(1, 0, 0))).hits(0).entity(), kWall) << "it goes on";
+  EXPECT_EQ(ann.rays(oneRay(vec(0, 1, 0), vec(1, 0, 0))).hits(0).entity(), kWall)
+      << "still answers";
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// A world behind its recorder: the file has what the world took and told, and no spoilt bit of it
-// passes.
+// Tests of recording a world: the file contains all commands and events of the world, and every
+// flipped bit is detected.
 #include "server/recording/recordable_world.hpp"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ std::string bytesOf(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// Each item: its kind and its bytes.
+/// Items as pairs of kind and bytes.
 struct Items {
   std::vector<std::string> items;
   bool closed = false;
@@ -54,23 +54,23 @@ Items itemsOf(const std::filesystem::path& file) {
 
 /// Walks about in the small room, restarts, and closes.
 void recordWalk(const std::filesystem::path& file) {
-  RecordedWorld world{scene::World(smallRoom())};
+  RecordableWorld world{scene::World(smallRoom())};
   world.record(optionsFor(file));
   world.submit(spawn("ann", 0, 0, 0));
   world.submit(walkTo("ann", 8, 0, 0));
   for (int i = 0; i < 60; ++i) world.tick();
-  world.end(v1::ContactEvent::REASON_RESTART, "again");
-  world.beginAnew(scene::World(smallRoom()));
+  world.endContacts(v1::ContactEvent::REASON_RESTART, "again");
+  world.reset(scene::World(smallRoom()));
   world.submit(spawn("bob", 4, 0, 0));
   world.submit(walkTo("bob", 9, 0, 0));
   for (int i = 0; i < 60; ++i) world.tick();
-  world.end(v1::ContactEvent::REASON_SHUTDOWN);
+  world.endContacts(v1::ContactEvent::REASON_SHUTDOWN);
   ASSERT_FALSE(world.recorder()->close());
 }
 
-TEST(RecordedWorld, WhatIsRefusedIsNotInTheFileAndWhatIsTakenIs) {
+TEST(RecordableWorld, TheFileHasAcceptedCommandsOnly) {
   const auto file = fileFor("taken");
-  RecordedWorld world{scene::World(smallRoom())};
+  RecordableWorld world{scene::World(smallRoom())};
   world.record(optionsFor(file));
   EXPECT_TRUE(world.submit(spawn("ann", std::nan(""), 0, 0)));
   EXPECT_FALSE(world.submit(spawn("ann", 0, 0, 0)));
@@ -87,27 +87,27 @@ TEST(RecordedWorld, WhatIsRefusedIsNotInTheFileAndWhatIsTakenIs) {
   EXPECT_EQ(commands, 1);
 }
 
-TEST(RecordedWorld, WhatATickThatFailedWasToldIsInTheFile) {
+TEST(RecordableWorld, TheFileHasTheCommandsOfAFailedTick) {
   const auto file = fileFor("failed");
-  RecordedWorld world{scene::World(smallRoom())};
+  RecordableWorld world{scene::World(smallRoom())};
   world.record(optionsFor(file));
   world.tick();
   EXPECT_FALSE(world.submit(spawn("ann", 0, 0, 0)));
-  world.recorder()->tickFailed(world);
+  world.recorder()->onTickFailed(world);
   protocol::RecordingReader reader(file);
   std::uint64_t tick = 0;
   while (const auto item = reader.next())
-    if (const auto* told = std::get_if<v1::RecordedCommands>(&*item)) tick = told->tick();
+    if (const auto* commands = std::get_if<v1::RecordedCommands>(&*item)) tick = commands->tick();
   EXPECT_EQ(tick, 2u);
 }
 
-TEST(RecordedWorld, WhatWasToldBeforeAWorldBeganAnewIsVoid) {
+TEST(RecordableWorld, ARestartDropsPendingCommands) {
   const auto file = fileFor("void");
-  RecordedWorld world{scene::World(smallRoom())};
+  RecordableWorld world{scene::World(smallRoom())};
   world.record(optionsFor(file));
   world.tick();
   EXPECT_FALSE(world.submit(spawn("ann", 0, 0, 0)));
-  world.beginAnew(scene::World(smallRoom()));
+  world.reset(scene::World(smallRoom()));
   world.tick();
   ASSERT_FALSE(world.recorder()->close());
   protocol::RecordingReader reader(file);
@@ -115,8 +115,8 @@ TEST(RecordedWorld, WhatWasToldBeforeAWorldBeganAnewIsVoid) {
     EXPECT_FALSE(std::holds_alternative<v1::RecordedCommands>(*item));
 }
 
-/// ENFILADE_FLIPS asks for more of them.
-TEST(RecordedWorld, OneSpoiltBitIsReportedOrHarmlessAndNeverAnotherWalk) {
+/// ENFILADE_FLIPS sets a larger number of flips.
+TEST(RecordableWorld, AFlippedBitIsReportedOrHarmless) {
   const auto file = fileFor("whole"), spoilt = fileFor("spoilt");
   recordWalk(file);
   const std::string bytes = bytesOf(file);
@@ -133,22 +133,22 @@ TEST(RecordedWorld, OneSpoiltBitIsReportedOrHarmlessAndNeverAnotherWalk) {
     other[at] = static_cast<char>(other[at] ^ (1 << (random() % 8)));
     std::ofstream(spoilt, std::ios::binary) << other;
     const Items read = itemsOf(spoilt);
-    const bool told = !read.error.empty() || !read.closed;
-    reported += told;
+    const bool failed = !read.error.empty() || !read.closed;
+    reported += failed;
     ASSERT_LE(read.items.size(), whole.items.size()) << "byte " << at;
     ASSERT_TRUE(std::equal(read.items.begin(), read.items.end(), whole.items.begin()))
         << "byte " << at;
-    ASSERT_TRUE(told || read.items.size() == whole.items.size()) << "byte " << at;
+    ASSERT_TRUE(failed || read.items.size() == whole.items.size()) << "byte " << at;
   }
   EXPECT_GE(reported, flips * 99 / 100);
   RecordProperty("reported", reported);
   RecordProperty("flips", flips);
 }
 
-TEST(RecordedWorld, WithoutARecorderItIsTheSameWorld) {
-  RecordedWorld bare{scene::World(smallRoom())}, recorded{scene::World(smallRoom())};
+TEST(RecordableWorld, WithoutARecorderItIsTheSameWorld) {
+  RecordableWorld bare{scene::World(smallRoom())}, recorded{scene::World(smallRoom())};
   recorded.record(optionsFor(fileFor("same")));
-  for (RecordedWorld* world : {&bare, &recorded}) {
+  for (RecordableWorld* world : {&bare, &recorded}) {
     world->submit(spawn("ann", 0, 0, 0));
     world->submit(walkTo("ann", 8, 0, 0));
     for (int i = 0; i < 100; ++i) world->tick();

@@ -1,5 +1,5 @@
-// Every number of every request, made NaN, infinite or absurd in turn: all are refused, and the
-// world goes on as one that was never asked.
+// Replaces each number of every request by NaN, infinity and absurd values: all are refused, and
+// the world continues as if no request had been made.
 #include <google/protobuf/message.h>
 
 #include <cmath>
@@ -14,7 +14,7 @@ namespace {
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 
-/// Calls `visit` once for each number of the message and of those in it, while it is `bad`.
+/// Calls `visit` once for each number of the message and its submessages, while it is set to `bad`.
 template <class Visit>
 void spoilEach(Message& part, const std::string& path, double bad, const Visit& visit) {
   const auto* reflection = part.GetReflection();
@@ -45,7 +45,7 @@ v1::Command commandOf(const std::string& avatar) {
   return command;
 }
 
-/// No coordinate is 0, since a proto3 message does not hold what is 0.
+/// No coordinate is 0, since a proto3 message omits zeros.
 v1::Vec3 point() {
   return vec(-4, 0.125, 1);
 }
@@ -134,7 +134,7 @@ std::vector<v1::FrameRequest> everyFrameRequest() {
   return requests;
 }
 
-/// One good request of each kind that carries numbers.
+/// One valid request of each kind with numbers.
 std::vector<v1::ClientMessage> everyRequest(bool frames) {
   std::vector<v1::ClientMessage> all;
   for (const v1::Command& order : everyOrder()) *all.emplace_back().mutable_command() = order;
@@ -150,17 +150,17 @@ std::vector<v1::ClientMessage> everyRequest(bool frames) {
   return all;
 }
 
-/// The error that answers it; nullopt when it was done.
+/// The error reply; nullopt if the request was done.
 std::optional<v1::Error> refusalOf(protocol::Client& client, const v1::ClientMessage& request) {
   try {
     const v1::ServerMessage reply = client.request(request);
     if (!reply.has_command() || reply.command().accepted()) return std::nullopt;
     return reply.command().error();
   } catch (const protocol::ProtocolError& error) {
-    v1::Error told;
-    told.set_message(error.what());
-    told.set_field(error.field);
-    return told;
+    v1::Error refusal;
+    refusal.set_message(error.what());
+    refusal.set_field(error.field);
+    return refusal;
   }
 }
 
@@ -182,7 +182,7 @@ class RefusedNumbers : public ServedRoom {
   }
 };
 
-TEST_F(RefusedNumbers, OfEachRequestAreToldByTheirFieldAndChangeNothing) {
+TEST_F(RefusedNumbers, OfEachRequestAreReportedByFieldAndChangeNothing) {
   const double inf = std::numeric_limits<double>::infinity();
   std::vector<std::uint64_t> quiet;
   {

@@ -1,5 +1,5 @@
-// A recording that clients play over the socket: every tick is the recorded one, wherever they
-// seek, contacts pair for whoever listens, and what branches off it is a recording of its own.
+// Tests of playing a recording over the socket: every tick equals the recorded one after any seek,
+// contacts pair for every client, and a branch is a recording of its own.
 #include <filesystem>
 #include <map>
 #include <random>
@@ -16,10 +16,10 @@ namespace enfilade::server::testing {
 namespace {
 
 using Pair = std::pair<std::uint32_t, std::uint32_t>;
-/// The contacts that live, and the tick at which each began.
+/// The active contacts, and the tick at which each began.
 using Live = std::map<Pair, std::uint64_t>;
 
-/// Follows events; contacts that begin twice or end without a beginning are faults.
+/// Applies events; contacts that begin twice or end without a beginning are faults.
 void follow(Live& live, const v1::TickEvents& events) {
   for (const v1::ContactEvent& event : events.contacts()) {
     const Pair pair{event.a(), event.b()};
@@ -31,7 +31,7 @@ void follow(Live& live, const v1::TickEvents& events) {
   }
 }
 
-/// What was recorded, by tick; 0 is before the first.
+/// Recorded results by tick; 0 is before the first.
 struct Walked {
   std::vector<std::uint64_t> hashes;
   std::vector<Live> live;
@@ -40,7 +40,7 @@ struct Walked {
 
 constexpr std::uint64_t kTicks = 1600, kCyComes = 300, kCyLeaves = 900;
 
-void tellWalkers(RecordedWorld& world, std::uint64_t tick) {
+void commandWalkers(RecordableWorld& world, std::uint64_t tick) {
   v1::Command leave;
   leave.set_avatar("cy");
   leave.mutable_leave();
@@ -52,7 +52,7 @@ void tellWalkers(RecordedWorld& world, std::uint64_t tick) {
 
 /// Ann and bob walk to and fro and into wall and column; cy comes and goes.
 Walked recordWalk(const std::filesystem::path& file) {
-  RecordedWorld world{scene::World(smallRoom())};
+  RecordableWorld world{scene::World(smallRoom())};
   RecordingOptions options;
   options.choice.file = file;
   options.model.file = "room.obj";
@@ -60,25 +60,25 @@ Walked recordWalk(const std::filesystem::path& file) {
   world.submit(spawn("ann", 0, 0, 0));
   world.submit(spawn("bob", 0, 0, 3));
   for (int i = 0; i < 4; ++i) {
-    world.submit(walkTo("ann", 8, 0, 0));  // the wall is in the way
+    world.submit(walkTo("ann", 8, 0, 0));  // the wall blocks the way
     world.submit(walkTo("ann", -3, 0, -2));
-    world.submit(walkTo("bob", 0, 0, 8));  // the column is in the way
+    world.submit(walkTo("bob", 0, 0, 8));  // the column blocks the way
     world.submit(walkTo("bob", -4, 0, 1));
   }
   Walked walked{{world.snapshot()->stateHash}, {{}}};
   while (walked.last() < kTicks) {
-    tellWalkers(world, walked.last());
+    commandWalkers(world, walked.last());
     const auto ticked = world.tick();
     walked.hashes.push_back(world.snapshot()->stateHash);
     walked.live.push_back(walked.live.back());
     follow(walked.live.back(), ticked.events);
   }
-  world.end(v1::ContactEvent::REASON_SHUTDOWN);
+  world.endContacts(v1::ContactEvent::REASON_SHUTDOWN);
   EXPECT_FALSE(world.recorder()->close());
   return walked;
 }
 
-/// Who listens to a world, and what lives for it.
+/// A client that listens to a world, and its active contacts.
 struct Listener {
   protocol::Client client;
   Live live = {};
@@ -92,7 +92,7 @@ struct Listener {
       live[{event.a(), event.b()}] = event.tick();
     replay = client.welcome().replay();
   }
-  /// All that was told before now.
+  /// Receives all messages sent before now.
   void hear() {
     client.metrics();
     for (const v1::ServerMessage& message : client.takeEvents()) {
@@ -119,7 +119,7 @@ class Replays : public ServedRoom {
       options.world.record.emplace();
       options.world.record->choice.file = file(branch);
       options.world.record->model.file = "room.obj";
-      options.world.record->replace = false;
+      options.world.record->overwrite = false;
     }
     server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
   }
@@ -128,7 +128,7 @@ class Replays : public ServedRoom {
   Walked walked_;
 };
 
-/// The error of a request; ERROR_UNSPECIFIED: it got none.
+/// The error of a request; ERROR_UNSPECIFIED if it succeeded.
 v1::Error errorOfRequest(const std::function<void()>& request) {
   v1::Error error;
   try {
@@ -140,21 +140,21 @@ v1::Error errorOfRequest(const std::function<void()>& request) {
   return error;
 }
 
-/// Plays all of a recording and judges it; its last hash.
-std::uint64_t verified(const std::filesystem::path& file) {
-  server::Playback playback(file);
-  scene::World world = playback.worldAfter(playback.firstTick(), smallRoom());
+/// Plays a whole recording with verification; returns its last hash.
+std::uint64_t verified(const std::filesystem::path& file, std::uint32_t run = 1) {
+  server::Playback playback(file, run);
+  scene::World world = playback.restoreWorldAfter(playback.firstTick(), smallRoom());
   try {
     while (playback.step(world)) {
     }
-  } catch (const Diverged& diverged) {
-    ADD_FAILURE() << textOf(diverged);
+  } catch (const Divergence& diverged) {
+    ADD_FAILURE() << formatDivergence(diverged);
   }
   EXPECT_TRUE(playback.closed());
   return world.snapshot()->stateHash;
 }
 
-TEST_F(Replays, EveryTickIsTheRecordedOneAndTheEndIsTold) {
+TEST_F(Replays, EveryTickEqualsTheRecordedOneAndTheEndIsReported) {
   play();
   Listener ann{client("ann")};
   EXPECT_EQ(ann.replay.file(), "walk.mcap");
@@ -188,8 +188,8 @@ TEST_F(Replays, AFreeRunPausesAtTheEnd) {
 
 TEST_F(Replays, AnyTickIsSoughtInAnyOrderAndContactsPairForAll) {
   server::Playback playback(file("walk"));
-  playback.worldAfter(1500, smallRoom());
-  ASSERT_GT(playback.beganAt(), 0u) << "without a checkpoint this tests less than it says";
+  playback.restoreWorldAfter(1500, smallRoom());
+  ASSERT_GT(playback.startTick(), 0u) << "without a checkpoint this tests less than it says";
   play();
   Listener driver{client("driver")}, other{client("other")};
   std::mt19937 random(7);
@@ -201,7 +201,7 @@ TEST_F(Replays, AnyTickIsSoughtInAnyOrderAndContactsPairForAll) {
       EXPECT_EQ(one->live, walked_.live[tick]) << tick;
       EXPECT_EQ(one->replay.tick(), tick);
     }
-    if (i % 4 == 1) {  // out of a branch
+    if (i % 4 == 1) {  // leaves a branch
       driver.client.takeOver();
       EXPECT_FALSE(driver.client.command(spawn("dee", -6, 0.01, -6)));
       EXPECT_NE(driver.client.step(20).state_hash(),
@@ -229,7 +229,7 @@ TEST_F(Replays, ASeekIsDoneInEveryModeOfTheClockAndByTheDriverAlone) {
     EXPECT_EQ(driver.client.seek(tick).state_hash(), walked_.hashes[tick]);
 }
 
-TEST_F(Replays, WhoWatchesGetsTheStateOfThePlaceThatIsSought) {
+TEST_F(Replays, SubscribersGetTheStateOfTheSoughtTick) {
   play();
   protocol::Client driver = client("driver");
   v1::Subscribe states;
@@ -246,7 +246,7 @@ TEST_F(Replays, WhoWatchesGetsTheStateOfThePlaceThatIsSought) {
   EXPECT_TRUE(seen);
 }
 
-TEST_F(Replays, AWatchGoesOnWithAPictureOfThePlaceThatIsSought) {
+TEST_F(Replays, AWatchContinuesWithAnImageOfTheSoughtTick) {
   play("walk", 1000);
   ENFILADE_NEED_PICTURES(*server_);
   protocol::Client driver = client("driver");
@@ -263,7 +263,7 @@ TEST_F(Replays, AWatchGoesOnWithAPictureOfThePlaceThatIsSought) {
       if (event->has_frame() && event->frame().tick() == tick) return true;
     return false;
   };
-  driver.seek(700);  // while the first one is drawn
+  driver.seek(700);  // while the first image is being drawn
   EXPECT_TRUE(pictureOf(700));
   driver.seek(400);
   EXPECT_TRUE(pictureOf(400)) << "also back, where less than a second has gone by";
@@ -271,7 +271,7 @@ TEST_F(Replays, AWatchGoesOnWithAPictureOfThePlaceThatIsSought) {
   EXPECT_TRUE(pictureOf(460));
 }
 
-TEST_F(Replays, WhoJoinsInTheMiddleIsToldWhereItStands) {
+TEST_F(Replays, ALateClientGetsTheStateOfTheReplay) {
   play("walk", 500);
   Listener driver{client("driver")};
   EXPECT_EQ(driver.live, walked_.live[500]);
@@ -291,7 +291,7 @@ TEST_F(Replays, WhoJoinsInTheMiddleIsToldWhereItStands) {
   EXPECT_EQ(Listener{client("later")}.live, walked_.live[1200]);
 }
 
-/// Those that were told to persist among what came, all of them of `tick`.
+/// The persisting contacts among the received events, all of tick `tick`.
 std::set<Pair> persisting(protocol::Client& client, std::uint64_t tick) {
   std::set<Pair> persists;
   for (const v1::ServerMessage& message : client.takeEvents()) {
@@ -304,7 +304,7 @@ std::set<Pair> persisting(protocol::Client& client, std::uint64_t tick) {
   return persists;
 }
 
-/// Those that live after the tick and began before it.
+/// The contacts that are active after the tick and began before it.
 std::set<Pair> lasting(const Live& live, std::uint64_t tick) {
   std::set<Pair> pairs;
   for (const auto& [pair, begun] : live)
@@ -312,13 +312,13 @@ std::set<Pair> lasting(const Live& live, std::uint64_t tick) {
   return pairs;
 }
 
-TEST_F(Replays, ContactsPersistInTheTicksInWhichTheyDidWhenTheyWereRecorded) {
+TEST_F(Replays, ContactsPersistInTheRecordedTicks) {
   play("walk", 200);
   protocol::Client driver = client("driver");
   v1::Subscribe persists;
   persists.set_persists(true);
   driver.subscribe(persists);
-  std::size_t told = 0;
+  std::size_t persisted = 0;
   for (const std::uint64_t from : {200u, 1000u, 100u}) {
     driver.seek(from);
     EXPECT_EQ(persisting(driver, from), std::set<Pair>()) << "a seek is no tick";
@@ -326,16 +326,16 @@ TEST_F(Replays, ContactsPersistInTheTicksInWhichTheyDidWhenTheyWereRecorded) {
       driver.step();
       const std::set<Pair> pairs = persisting(driver, tick);
       EXPECT_EQ(pairs, lasting(walked_.live[tick], tick)) << tick;
-      told += pairs.size();
+      persisted += pairs.size();
     }
   }
-  EXPECT_GT(told, 900u);
+  EXPECT_GT(persisted, 900u);
   driver.takeOver();
   driver.step();
   EXPECT_FALSE(persisting(driver, 401).empty()) << "in a branch, too";
 }
 
-TEST_F(Replays, CommandsAreRefusedUntilSomebodyTakesOver) {
+TEST_F(Replays, CommandsAreRefusedUntilAClientTakesOver) {
   play("walk", 400);
   protocol::Client driver = client("driver"), other = client("other");
   v1::BodyCommand door;
@@ -349,11 +349,11 @@ TEST_F(Replays, CommandsAreRefusedUntilSomebodyTakesOver) {
     EXPECT_NE(refused->message().find("TakeOver"), std::string::npos);
   }
   driver.step();
-  EXPECT_EQ(errorOfRequest([&] { driver.takeOver("nobody"); }).code(), v1::ERROR_UNKNOWN_AVATAR);
+  EXPECT_EQ(errorOfRequest([&] { driver.takeOver("unknown"); }).code(), v1::ERROR_UNKNOWN_AVATAR);
   EXPECT_EQ(driver.takeOver("ann").tick(), 401u);
   EXPECT_FALSE(driver.command(walkTo("ann", -9, 0, -9)));
   EXPECT_TRUE(other.command(walkTo("ann", 0, 0, 0))) << "she is the driver's";
-  EXPECT_TRUE(other.command(walkTo("bob", 0, 0, 0))) << "nobody has bob";
+  EXPECT_TRUE(other.command(walkTo("bob", 0, 0, 0))) << "bob has no owner";
   EXPECT_TRUE(other.command(spawn("bob", -9, 0.01, 9))) << "nor can he be had by a spawn";
   EXPECT_EQ(errorOfRequest([&] { other.takeOver("ann"); }).code(), v1::ERROR_NOT_ALLOWED);
   other.takeOver("bob");
@@ -361,20 +361,20 @@ TEST_F(Replays, CommandsAreRefusedUntilSomebodyTakesOver) {
   EXPECT_FALSE(other.command(spawn("dee", -6, 0.01, -6)));
   const v1::StepReply reply = driver.step(1200, true);
   ASSERT_EQ(reply.avatars_size(), 4);
-  EXPECT_NEAR(reply.avatars(0).feet().x(), -9, 0.01) << "ann went where the driver told her to";
+  EXPECT_NEAR(reply.avatars(0).feet().x(), -9, 0.01) << "ann walked to the driver's target";
   EXPECT_NEAR(reply.avatars(1).feet().x(), 0, 0.01);
 }
 
-TEST_F(Replays, WhoIsNotTakenOverGoesOnAsItWasTold) {
+TEST_F(Replays, AvatarsThatAreNotTakenOverFinishTheirOrders) {
   play("walk", 400);
   protocol::Client driver = client("driver");
   driver.takeOver();
-  // No more is recorded for ann and bob; cy would have been told to leave.
+  // No more is recorded for ann and bob; cy would have received the command to leave.
   EXPECT_EQ(driver.step(kCyLeaves - 400).state_hash(), walked_.hashes[kCyLeaves]);
   EXPECT_NE(driver.step(1).state_hash(), walked_.hashes[kCyLeaves + 1]);
 }
 
-/// Reads a branch: its contacts pair, and those that lived where it begins have their first tick.
+/// Reads a branch: its contacts pair, and those active at its start have their first tick.
 Live beginningOf(const std::filesystem::path& file) {
   protocol::RecordingReader reader(file);
   Live live, beginning;
@@ -412,10 +412,27 @@ TEST_F(Replays, BranchesAreRecordingsOfTheirOwn) {
   EXPECT_EQ(verified(file("branch-2")), second);
   EXPECT_EQ(beginningOf(file("branch")), walked_.live[1000]);
   EXPECT_EQ(beginningOf(file("branch-2")), walked_.live[640]);
-  EXPECT_TRUE(server_->recordedAll());
+  EXPECT_TRUE(server_->isRecordingComplete());
   const server::Playback branch(file("branch"));
   EXPECT_EQ(branch.start().parent().file(), std::filesystem::absolute(file("walk")));
   EXPECT_EQ(branch.firstTick(), 1000u);
+}
+
+TEST_F(Replays, ARestartDirectlyAfterTakeOverIsARunOfItsOwn) {
+  play("walk", 1000, "branch");
+  std::uint64_t last = 0;
+  {
+    protocol::Client driver = client("driver");
+    driver.takeOver();
+    v1::ClientMessage restart;
+    restart.mutable_restart();
+    EXPECT_EQ(driver.request(restart).restart().tick(), 0u);
+    last = driver.step(5).state_hash();
+  }
+  server_->stop();
+  EXPECT_TRUE(server_->isRecordingComplete());
+  EXPECT_EQ(server::Playback(file("branch"), 1).firstTick(), 1000u);
+  EXPECT_EQ(verified(file("branch"), 2), last);
 }
 
 TEST_F(Replays, ABranchIsPlayedAndLeftInItsTurn) {
@@ -442,17 +459,17 @@ TEST_F(Replays, ABranchIsPlayedAndLeftInItsTurn) {
   EXPECT_EQ(verified(file("again")), last);
 }
 
-/// A recording whose state of `tick` is another one.
+/// Copies a recording with a changed state at tick `tick`.
 void falsify(const std::filesystem::path& from, const std::filesystem::path& to,
              std::uint64_t falseTick) {
   protocol::RecordingReader reader(from);
   protocol::RecordingWriter writer(to, "test");
-  const double second = scene::Lengths{}.tick;
+  const double second = scene::WorldSettings{}.tickDuration;
   while (auto item = reader.next()) {
     if (auto* start = std::get_if<v1::RecordingStart>(&*item)) writer.write(*start);
     if (auto* names = std::get_if<v1::RecordedNames>(&*item)) writer.write(*names);
-    if (auto* told = std::get_if<v1::RecordedCommands>(&*item))
-      writer.write(*told, static_cast<double>(told->tick()) * second);
+    if (auto* commands = std::get_if<v1::RecordedCommands>(&*item))
+      writer.write(*commands, static_cast<double>(commands->tick()) * second);
     if (auto* events = std::get_if<v1::TickEvents>(&*item)) writer.write(*events);
     if (auto* state = std::get_if<v1::State>(&*item)) {
       if (state->tick() == falseTick) state->mutable_avatars(0)->mutable_feet()->set_x(1);
@@ -476,7 +493,7 @@ TEST_F(Replays, AReplayThatDivergesStopsBeforeIt) {
   EXPECT_EQ(driver.live, walked_.live[39]);
   EXPECT_EQ(errorOfRequest([&] { driver.client.step(); }).code(), v1::ERROR_REPLAY_ENDED);
   EXPECT_EQ(errorOfRequest([&] { driver.client.seek(41); }).code(), v1::ERROR_REPLAY_ENDED);
-  EXPECT_EQ(driver.client.metrics().ticks(), 39u) << "what is wrong is not told";
+  EXPECT_EQ(driver.client.metrics().ticks(), 39u) << "a wrong tick is not sent";
   EXPECT_EQ(driver.client.seek(10).state_hash(), walked_.hashes[10]);
   driver.hear();
   EXPECT_EQ(driver.replay.diverged(), "");
@@ -496,7 +513,7 @@ TEST_F(Replays, AnotherSceneIsNotPlayed) {
   empty.objects.pop_back();
   EXPECT_THROW(Server(std::make_shared<const scene::Scene>(std::move(empty)),
                       Endpoint{"127.0.0.1", 0}, std::move(options)),
-               Diverged);
+               Divergence);
 }
 
 TEST_F(Replays, ACutOffRecordingIsPlayedToItsLastTick) {
@@ -512,9 +529,9 @@ TEST_F(Replays, ACutOffRecordingIsPlayedToItsLastTick) {
   EXPECT_TRUE(driver.replay.at_end());
 }
 
-/// Through the zone, while the door is opened; the tick at which the zone is entered.
+/// Walks through the zone while the door opens; returns the tick of entering the zone.
 std::uint64_t recordVisit(const std::filesystem::path& file, std::vector<std::uint64_t>& hashes) {
-  RecordedWorld world{scene::World(bodyRoom())};
+  RecordableWorld world{scene::World(bodyRoom())};
   RecordingOptions options;
   options.choice.file = file;
   options.model.file = "room.obj";
@@ -537,7 +554,7 @@ std::uint64_t recordVisit(const std::filesystem::path& file, std::vector<std::ui
   return entered;
 }
 
-/// The events of triggers among what came: kind, reason, tick.
+/// The trigger events among the received ones: kind, reason, tick.
 std::vector<std::tuple<v1::ContactEvent::Kind, v1::ContactEvent::Reason, std::uint64_t>> visits(
     protocol::Client& client) {
   std::vector<std::tuple<v1::ContactEvent::Kind, v1::ContactEvent::Reason, std::uint64_t>> found;
@@ -566,7 +583,7 @@ TEST_F(Replays, DoorsAreOpenedAgainAndTriggersPairLikeContacts) {
   EXPECT_EQ(driver.step(238).state_hash(), hashes[240]);
 }
 
-TEST_F(Replays, WhoMayOnlyObserveNeitherSeeksNorTakesOver) {
+TEST_F(Replays, ObserversMayNotSeekOrTakeOver) {
   Access access;
   access.tokens = {{Role::observe, "observer-0123456789"}, {Role::drive, "driver-0123456789"}};
   play("walk", 0, "", access);

@@ -1,4 +1,4 @@
-// A scene's report, kept by the cache.
+// Tests of caching a scene's report.
 #include "server/commands/report_cache.hpp"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class KeptReport : public ::testing::Test {
+class ReportCacheTest : public ::testing::Test {
  protected:
   std::vector<fs::path> kept() const {
     std::vector<fs::path> files;
@@ -23,7 +23,7 @@ class KeptReport : public ::testing::Test {
   }
   static scene::Model modelWithProblem() {
     scene::Model model = smallRoom()->model();
-    model.problems.push_back({"missing_texture", 3, "a \"quoted\" name, with a line\nbreak"});
+    model.diagnostics.push_back({"missing_texture", 3, "a \"quoted\" name, with a line\nbreak"});
     return model;
   }
 
@@ -31,32 +31,32 @@ class KeptReport : public ::testing::Test {
   std::optional<scene::ModelCache> cache_{{folder_.path() / "cache"}};
 };
 
-TEST_F(KeptReport, IsTheReportThatIsWorkedOut) {
+TEST_F(ReportCacheTest, EqualsTheComputedReport) {
   const scene::Scene scene(modelWithProblem());
-  const std::string worked = textOf(scene::reportOn(scene));
-  EXPECT_EQ(textOf(reportFor(scene, std::nullopt)), worked);
+  const std::string worked = serializeReport(scene::makeSceneReport(scene));
+  EXPECT_EQ(serializeReport(loadOrMakeReport(scene, std::nullopt)), worked);
   EXPECT_TRUE(kept().empty());
-  EXPECT_EQ(textOf(reportFor(scene, cache_)), worked);
+  EXPECT_EQ(serializeReport(loadOrMakeReport(scene, cache_)), worked);
   ASSERT_EQ(kept().size(), 1u);
-  const scene::SceneReport again = reportFor(scene, cache_);
-  EXPECT_EQ(textOf(again), worked);
+  const scene::SceneReport again = loadOrMakeReport(scene, cache_);
+  EXPECT_EQ(serializeReport(again), worked);
   EXPECT_EQ(again.shells.exact, 3u);
-  EXPECT_EQ(again.problems.at(0).example, modelWithProblem().problems[0].example);
+  EXPECT_EQ(again.diagnostics.at(0).example, modelWithProblem().diagnostics[0].example);
 }
 
-TEST_F(KeptReport, IsNotTakenForAnotherSceneOrOtherProblems) {
-  reportFor(scene::Scene(modelWithProblem()), cache_);
+TEST_F(ReportCacheTest, IsNotUsedForAnotherSceneOrOtherDiagnostics) {
+  loadOrMakeReport(scene::Scene(modelWithProblem()), cache_);
   scene::Model other = modelWithProblem();
-  other.problems[0].count = 4;
-  EXPECT_EQ(reportFor(scene::Scene(other), cache_).problems.at(0).count, 4u);
+  other.diagnostics[0].count = 4;
+  EXPECT_EQ(loadOrMakeReport(scene::Scene(other), cache_).diagnostics.at(0).count, 4u);
   other.meshes[0].positions[0].x() += 1;
-  EXPECT_EQ(reportFor(scene::Scene(other), cache_).shells.exact, 2u);
+  EXPECT_EQ(loadOrMakeReport(scene::Scene(other), cache_).shells.exact, 2u);
   EXPECT_EQ(kept().size(), 3u);
 }
 
-TEST_F(KeptReport, WhoseTextIsDamagedIsWorkedOutAgain) {
+TEST_F(ReportCacheTest, ADamagedTextIsRecomputed) {
   const scene::Scene scene(modelWithProblem());
-  const std::string worked = textOf(reportFor(scene, cache_));
+  const std::string worked = serializeReport(loadOrMakeReport(scene, cache_));
   const fs::path file = kept().at(0);
   std::ifstream in(file, std::ios::binary);
   const std::string whole((std::istreambuf_iterator<char>(in)), {});
@@ -65,15 +65,15 @@ TEST_F(KeptReport, WhoseTextIsDamagedIsWorkedOutAgain) {
     damaged[at] ^= 1;
     if (at % 2) damaged.resize(at);
     std::ofstream(file, std::ios::binary) << damaged;
-    EXPECT_EQ(textOf(reportFor(scene, cache_)), worked) << at;
-    EXPECT_EQ(fs::file_size(file), whole.size()) << "it was not written anew";
+    EXPECT_EQ(serializeReport(loadOrMakeReport(scene, cache_)), worked) << at;
+    EXPECT_EQ(fs::file_size(file), whole.size()) << "the entry was not rewritten";
   }
 }
 
-TEST_F(KeptReport, ATextThatIsNoneIsNoReport) {
+TEST_F(ReportCacheTest, AnInvalidTextIsNoReport) {
   for (const char* text : {"", "{}", "[1]", "{\"objects\":-1}", "null"})
-    EXPECT_FALSE(reportFrom(text)) << text;
-  EXPECT_TRUE(reportFrom(textOf({})));
+    EXPECT_FALSE(parseReport(text)) << text;
+  EXPECT_TRUE(parseReport(serializeReport({})));
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// A real server of the small room in the test's process, and clients' orders.
+// Test fixture: a real server of the small room in the test's process, and helpers for clients'
+// orders.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -34,7 +35,7 @@ class ServedRoom : public ::testing::Test {
   std::unique_ptr<Server> server_;
 };
 
-/// Whether the server can draw. In CI it must: Mesa's software is enough.
+/// Whether the server can draw. In CI it must: Mesa's software renderer suffices.
 inline bool drawsPictures(const std::string& renderer) {
   const bool draws = !renderer.empty();
   if (!draws && std::getenv("CI") != nullptr)
@@ -45,7 +46,7 @@ inline bool drawsPictures(const Server& server) {
   return drawsPictures(server.rendererName());
 }
 
-/// Ends the test where nothing can be drawn: as skipped, or in CI as failed.
+/// Ends the test without a renderer: as skipped, or in CI as failed.
 #define ENFILADE_NEED_PICTURES(server) \
   if (!drawsPictures(server)) GTEST_SKIP() << "no EGL device: install libegl-mesa0"
 
@@ -79,7 +80,7 @@ inline v1::Subscribe everything() {
   return subscription;
 }
 
-/// All contact events and notices among what came.
+/// All contact events and notices among the received messages.
 struct Heard {
   std::vector<v1::ContactEvent> contacts;
   std::vector<v1::Notice> notices;

@@ -1,4 +1,4 @@
-// Well-behaved clients of a real server.
+// Tests of well-behaved clients of a real server.
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -6,8 +6,9 @@
 #include <thread>
 
 #include "scene/world/world.hpp"
-#include "server/hosting/requests.hpp"
-#include "server/hosting/tick_loop.hpp"
+#include "server/base/server_error.hpp"
+#include "server/hosting/requests/dispatch.hpp"
+#include "server/worlds/tick_loop.hpp"
 #include "tests/server/eventually.hpp"
 #include "tests/server/served_room.hpp"
 
@@ -16,7 +17,7 @@ namespace {
 
 class Sessions : public ServedRoom {};
 
-/// The code of the ProtocolError that `request` throws; ERROR_UNSPECIFIED when it throws none.
+/// The code of the ProtocolError that `request` throws; ERROR_UNSPECIFIED if it throws none.
 v1::ErrorCode codeThrown(const std::function<void()>& request) {
   try {
     request();
@@ -26,7 +27,7 @@ v1::ErrorCode codeThrown(const std::function<void()>& request) {
   return v1::ERROR_UNSPECIFIED;
 }
 
-TEST_F(Sessions, WelcomeTellsTheSceneAndHowItMoves) {
+TEST_F(Sessions, WelcomeHasTheSceneAndItsPolicies) {
   serve();
   const protocol::Client ann = client("ann");
   const v1::Welcome& welcome = ann.welcome();
@@ -35,9 +36,9 @@ TEST_F(Sessions, WelcomeTellsTheSceneAndHowItMoves) {
   EXPECT_EQ(welcome.scene().objects(), 3u);
   EXPECT_EQ(welcome.scene().hash(), smallRoom()->hash());
   EXPECT_DOUBLE_EQ(welcome.scene().bounds().max().x(), 10);
-  EXPECT_DOUBLE_EQ(welcome.policies().tick(), scene::Lengths{}.tick);
+  EXPECT_DOUBLE_EQ(welcome.policies().tick(), scene::WorldSettings{}.tickDuration);
   EXPECT_NEAR(welcome.policies().walkable_slope(), 50 * 3.14159265358979 / 180, 1e-9);
-  EXPECT_EQ(welcome.limits().max_message(), protocol::kServerTakes.total);
+  EXPECT_EQ(welcome.limits().max_message(), protocol::kServerLimits.total);
   EXPECT_EQ(welcome.tick(), 0u);
   EXPECT_EQ(welcome.clock().mode(), v1::Clock::MODE_LOCKSTEP);
   EXPECT_EQ(welcome.renderer(), server_->rendererName());
@@ -127,7 +128,7 @@ TEST_F(Sessions, ANameIsFreeAlsoAfterItsSpawnWasRefused) {
   leave.set_avatar("guest");
   leave.mutable_leave();
   ASSERT_FALSE(ann.command(spawn("guest", 0, 0.01, 0)));
-  ASSERT_FALSE(ann.command(spawn("guest", 0, 0.01, 0)));  // refused: it is there already
+  ASSERT_FALSE(ann.command(spawn("guest", 0, 0.01, 0)));  // refused: the name exists already
   ASSERT_FALSE(ann.command(leave));
   ASSERT_FALSE(ann.command(spawn("guest", 0, 0.01, 0)));  // queued: the name is still ann's
   EXPECT_EQ(ann.step(2, true).avatars_size(), 0);
@@ -160,7 +161,7 @@ TEST_F(Sessions, AVanishedClientsAvatarLeavesAndItsContactsEnd) {
   EXPECT_EQ(heard.contacts.back().reason(), v1::ContactEvent::REASON_LEFT);
 }
 
-TEST_F(Sessions, WhoSubscribesLateIsToldTheContactsThatLive) {
+TEST_F(Sessions, ALateSubscriberGetsTheActiveContacts) {
   serve();
   protocol::Client ann = client("ann"), bob = client("bob");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
@@ -174,8 +175,8 @@ TEST_F(Sessions, WhoSubscribesLateIsToldTheContactsThatLive) {
 
 using Pair = std::pair<std::uint32_t, std::uint32_t>;
 
-/// The contacts that live for who follows begins and ends. In each tick exactly those that lived
-/// before and go on must be told to persist, once each and behind all else.
+/// The active contacts by the begin and end events. Each tick must report exactly the earlier ones
+/// that continue as persisting, once each and after all other events.
 struct Followed {
   std::set<Pair> live = {};
 
@@ -204,7 +205,7 @@ v1::Subscribe withPersists(v1::Subscribe subscription) {
   return subscription;
 }
 
-/// Asks for the pair, which must stand as the event of the last tick says.
+/// Queries the pair, whose state must equal the event of the last tick.
 void expectAsItIsNow(protocol::Client& client, const v1::ContactEvent& event) {
   v1::DistanceQuery query;
   query.add_pairs()->mutable_a()->set_id(event.a());
@@ -212,13 +213,14 @@ void expectAsItIsNow(protocol::Client& client, const v1::ContactEvent& event) {
   const v1::PairState now = client.distances(query).pairs(0);
   EXPECT_EQ(event.verdict(), now.verdict());
   EXPECT_NEAR(event.distance(), now.distance(), event.error_bound() + now.error_bound());
-  const v1::Vec3 &told = event.normal(), &asked = now.normal();
-  EXPECT_NEAR(told.x() * asked.x() + told.y() * asked.y() + told.z() * asked.z(), 1, 1e-6);
+  const v1::Vec3 &reported = event.normal(), &asked = now.normal();
+  EXPECT_NEAR(reported.x() * asked.x() + reported.y() * asked.y() + reported.z() * asked.z(), 1,
+              1e-6);
   EXPECT_EQ(event.a_name(), now.a_name());
   EXPECT_EQ(event.b_name(), now.b_name());
 }
 
-TEST_F(Sessions, AContactIsToldToPersistInEachTickBetweenItsBeginAndItsEnd) {
+TEST_F(Sessions, AContactPersistsInEachTickBetweenBeginAndEnd) {
   serve();
   protocol::Client ann = client("ann");
   const auto& offers = ann.welcome().capabilities();
@@ -250,7 +252,7 @@ TEST_F(Sessions, AContactIsToldToPersistInEachTickBetweenItsBeginAndItsEnd) {
   EXPECT_EQ(wall.back().tick() - wall.front().tick(), wall.size() - 1);
 }
 
-TEST_F(Sessions, PersistsComeToThoseWhoAskForThemAndAsLongAsTheyDo) {
+TEST_F(Sessions, PersistsReachOnlySubscribers) {
   serve();
   protocol::Client ann = client("ann"), bob = client("bob"), cy = client("cy");
   ann.subscribe(withPersists(everything()));
@@ -285,7 +287,7 @@ TEST_F(Sessions, PersistsComeToThoseWhoAskForThemAndAsLongAsTheyDo) {
   EXPECT_EQ(bobThen.count(v1::ContactEvent::KIND_PERSIST), 3u) << "from the next tick on";
 }
 
-TEST_F(Sessions, ANumberThatIsNoneIsRefusedNamingItsField) {
+TEST_F(Sessions, ANonFiniteNumberIsRefusedByItsField) {
   serve();
   protocol::Client ann = client("ann");
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -328,7 +330,7 @@ TEST_F(Sessions, TheFreeRunningClockTicksByItselfUntilItIsPaused) {
   }
 }
 
-TEST_F(Sessions, MetricsCountWhatHappened) {
+TEST_F(Sessions, MetricsCountTheEvents) {
   serve();
   protocol::Client ann = client("ann"), bob = client("bob");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
@@ -340,7 +342,7 @@ TEST_F(Sessions, MetricsCountWhatHappened) {
   EXPECT_EQ(metrics.contacts(), 1u);
   EXPECT_EQ(metrics.live_contacts(), 1u);
   EXPECT_EQ(metrics.worst_penetration(), 0);
-  ASSERT_EQ(metrics.stages_size(), static_cast<int>(scene::kStages));
+  ASSERT_EQ(metrics.stages_size(), static_cast<int>(scene::kStageCount));
   EXPECT_EQ(metrics.stages(0).name(), "commands");
   EXPECT_GT(metrics.tick().max_us(), 0);
   EXPECT_LE(metrics.tick().median_us(), metrics.tick().max_us());
@@ -365,7 +367,7 @@ TEST_F(Sessions, EntitiesAreDescribedByNameAndKind) {
 TEST_F(Sessions, AnIfcProductIsDescribedWithItsGlobalIdAndItsOperation) {
   scene::Model model = smallRoom()->model();
   model.objects[kWall - 1].globalId = "2O2Fr$t4X7Zf8NOew3FNtn";
-  model.objects[kWall - 1].operation = "SINGLE_SWING_LEFT";
+  model.objects[kWall - 1].operationType = "SINGLE_SWING_LEFT";
   serve({}, std::make_shared<const scene::Scene>(std::move(model)));
   const auto entities = client("ann").describe({});
   ASSERT_EQ(entities.size(), 3u);
@@ -397,7 +399,7 @@ TEST_F(Sessions, EntitiesAreDescribedInPagesOfBoundedSize) {
   EXPECT_EQ(refusal({kFloor, kWall}), v1::ERROR_UNSPECIFIED);
 }
 
-TEST_F(Sessions, OrdersThatADriveDropsAreToldWithTheirTagsAndWhy) {
+TEST_F(Sessions, OrdersDroppedByADriveAreReportedWithTagAndReason) {
   serve();
   protocol::Client ann = client("ann");
   ann.subscribe(everything());
@@ -425,7 +427,7 @@ TEST_F(Sessions, OrdersThatADriveDropsAreToldWithTheirTagsAndWhy) {
   EXPECT_EQ(dropped, (std::vector<std::uint64_t>{7, 8}));
 }
 
-TEST_F(Sessions, WhatIsMissingIsToldByWhatItIs) {
+TEST_F(Sessions, MissingEntitiesAreReportedByKind) {
   serve();
   protocol::Client ann = client("ann");
   v1::Command command;
@@ -437,43 +439,43 @@ TEST_F(Sessions, WhatIsMissingIsToldByWhatItIs) {
   EXPECT_EQ(ann.command(command)->message(), "look.at is missing: give a point");
 }
 
-TEST_F(Sessions, WelcomeTellsEachLimitThatTheServerKeeps) {
+TEST_F(Sessions, WelcomeHasEachLimitOfTheServer) {
   ServerLimits limits;
   limits.avatars = 11;
-  limits.pictureSide = 12;
+  limits.imageSide = 12;
   limits.ticksPerStep = 13;
   limits.waypoints = 14;
   limits.rays = 15;
   limits.scanRays = 16;
-  limits.watches = 17;
+  limits.frameSubscriptions = 17;
   limits.worlds = 18;
   limits.pairs = 19;
-  limits.requestsUnderWay = 20;
-  limits.waitingBytes = 21;
+  limits.pendingRequests = 20;
+  limits.pendingRequestBytes = 21;
   limits.requestsPerSecond = 2200;
   serve(limits);
-  const v1::Limits told = client("ann").welcome().limits();
-  EXPECT_EQ(told.max_message(), protocol::kServerTakes.total);
-  EXPECT_EQ(told.max_avatars(), 11u);
-  EXPECT_EQ(told.max_picture_width(), 12u);
-  EXPECT_EQ(told.max_picture_height(), 12u);
-  EXPECT_EQ(told.max_ticks_per_step(), 13u);
-  EXPECT_EQ(told.max_waypoints(), 14u);
-  EXPECT_EQ(told.max_rays(), 15u);
-  EXPECT_EQ(told.max_scan_rays(), 16u);
-  EXPECT_EQ(told.max_watches(), 17u);
-  EXPECT_EQ(told.max_worlds(), 18u);
-  EXPECT_EQ(told.max_pairs(), 19u);
-  EXPECT_EQ(told.max_requests_under_way(), 20u);
-  EXPECT_EQ(told.max_bytes_under_way(), 21u);
-  EXPECT_EQ(told.requests_per_second(), 2200u);
+  const v1::Limits sent = client("ann").welcome().limits();
+  EXPECT_EQ(sent.max_message(), protocol::kServerLimits.total);
+  EXPECT_EQ(sent.max_avatars(), 11u);
+  EXPECT_EQ(sent.max_picture_width(), 12u);
+  EXPECT_EQ(sent.max_picture_height(), 12u);
+  EXPECT_EQ(sent.max_ticks_per_step(), 13u);
+  EXPECT_EQ(sent.max_waypoints(), 14u);
+  EXPECT_EQ(sent.max_rays(), 15u);
+  EXPECT_EQ(sent.max_scan_rays(), 16u);
+  EXPECT_EQ(sent.max_watches(), 17u);
+  EXPECT_EQ(sent.max_worlds(), 18u);
+  EXPECT_EQ(sent.max_pairs(), 19u);
+  EXPECT_EQ(sent.max_requests_under_way(), 20u);
+  EXPECT_EQ(sent.max_bytes_under_way(), 21u);
+  EXPECT_EQ(sent.requests_per_second(), 2200u);
 }
 
 TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
   FrameService frames(smallRoom());
-  QuestionService questions(smallRoom());
+  QueryService questions(smallRoom());
   TickLoop loop(smallRoom(), frames, questions);
-  const auto out = std::make_shared<OutgoingQueue>(OutgoingBounds{std::size_t{1} << 30, 2},
+  const auto out = std::make_shared<OutgoingQueue>(OutgoingLimits{std::size_t{1} << 30, 2},
                                                    encodeShared(v1::Bye()), [] {});
   const ClientId ann = loop.join("ann", Role::admin, out, 1);
   v1::ClientMessage request;
@@ -489,10 +491,10 @@ TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
   std::optional<v1::Metrics> metrics;
   ASSERT_TRUE(becomesTrue([&] {
     while (const Buffer bytes = out->pop().message.head) {
-      protocol::Decoder decoder(protocol::kClientTakes, protocol::Decoder::Expect::messages);
+      protocol::Decoder decoder(protocol::kClientLimits, protocol::Decoder::Expect::messages);
       std::span<const std::uint8_t> rest(*bytes);
       v1::ServerMessage message;
-      if (!protocol::parse(decoder.next(rest)->header, message)) return false;
+      if (!protocol::parseHeader(decoder.next(rest)->header, message)) return false;
       if (message.reply_to() == 3) metrics = message.metrics();
     }
     return metrics.has_value();
@@ -500,28 +502,28 @@ TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
   EXPECT_GE(metrics->ticks(), 8u) << "not one after each slice";
 }
 
-TEST(Requests, OneThatFailsForAFaultOfOursIsToldAndTheNextIsAnswered) {
+TEST(Requests, AnInternalErrorIsReportedAndTheNextRequestSucceeds) {
   FrameService frames(smallRoom());
-  QuestionService questions(smallRoom());
-  ServedWorld served(smallRoom(), frames, questions);
-  bool faulty = true;  // the first message that is sent throws
+  QueryService questions(smallRoom());
+  HostedWorld served(smallRoom(), frames, questions);
+  bool faulty = true;  // the first message sent throws
   const auto wake = [&] {
     if (std::exchange(faulty, false)) throw std::length_error("too long");
   };
   Client& ann = served.clients[1];
-  ann.out = std::make_shared<OutgoingQueue>(OutgoingBounds{1000, 2}, encodeShared(v1::Bye()), wake);
+  ann.out = std::make_shared<OutgoingQueue>(OutgoingLimits{1000, 2}, encodeShared(v1::Bye()), wake);
   for (const std::uint64_t id : {1, 2}) {
     v1::ClientMessage describe;
     describe.set_request_id(id);
     describe.mutable_describe()->add_ids(kWall);
-    ann.waiting.push_back({describe, {}});
+    ann.queue.push_back({describe, {}});
   }
-  answerWaiting(served, 1, [](const auto&) {});
+  processQueue(served, 1);
   std::vector<v1::ServerMessage> said;
   while (const Buffer bytes = ann.out->pop().message.head) {
-    protocol::Decoder decoder(protocol::kClientTakes, protocol::Decoder::Expect::messages);
+    protocol::Decoder decoder(protocol::kClientLimits, protocol::Decoder::Expect::messages);
     std::span<const std::uint8_t> rest(*bytes);
-    ASSERT_TRUE(protocol::parse(decoder.next(rest)->header, said.emplace_back()));
+    ASSERT_TRUE(protocol::parseHeader(decoder.next(rest)->header, said.emplace_back()));
   }
   ASSERT_EQ(said.size(), 3u) << "what failed in sending, the error, the second answer";
   EXPECT_EQ(said[1].reply_to(), 1u);
@@ -530,7 +532,7 @@ TEST(Requests, OneThatFailsForAFaultOfOursIsToldAndTheNextIsAnswered) {
   EXPECT_TRUE(said[2].has_names());
 }
 
-TEST_F(Sessions, AtShutdownContactsEndAndClientsAreTold) {
+TEST_F(Sessions, AtShutdownContactsEndAndClientsGetBye) {
   serve();
   protocol::Client ann = client("ann");
   ann.subscribe(everything());
@@ -539,13 +541,13 @@ TEST_F(Sessions, AtShutdownContactsEndAndClientsAreTold) {
   Heard heard;
   heard.add(ann.takeEvents());
   std::thread stopping([&] { server_->stop(); });
-  bool told = false;
-  while (!told) {
+  bool ended = false;
+  while (!ended) {
     const auto message = ann.nextEvent(std::chrono::seconds(10));
     ASSERT_TRUE(message);
     heard.add({*message});
-    told = message->has_bye();
-    if (told) {
+    ended = message->has_bye();
+    if (ended) {
       EXPECT_EQ(message->bye().code(), v1::ERROR_SHUTTING_DOWN);
     }
   }
@@ -555,13 +557,13 @@ TEST_F(Sessions, AtShutdownContactsEndAndClientsAreTold) {
   stopping.join();
 }
 
-TEST(Serving, RefusesAddressesThatStrangersReach) {
+TEST(Serving, RefusesPublicAddresses) {
   for (const char* address : {"0.0.0.0", "192.0.2.1", "::", "example.invalid"}) {
     EXPECT_THROW(Server(smallRoom(), {address, 0}), ServerError) << address;
   }
 }
 
-TEST(Serving, SaysThatAPortIsTaken) {
+TEST(Serving, ReportsAPortInUse) {
   const Server first(smallRoom(), {"127.0.0.1", 0});
   try {
     const Server second(smallRoom(), {"127.0.0.1", first.port()});

@@ -8,7 +8,7 @@ namespace {
 
 struct NamedBox {
   const char* name;
-  scene::Box box;
+  scene::Aabb box;
 };
 
 const std::array<NamedBox, 3> kBoxes{
@@ -17,7 +17,7 @@ const std::array<NamedBox, 3> kBoxes{
      {"room_column", {scene::Vec3(-0.25, 0, 5.75), scene::Vec3(0.25, 3, 6.25)}}}};
 
 /// Corner i of a box: bit 0 chooses x, bit 1 y, bit 2 z.
-scene::Vec3 corner(const scene::Box& box, unsigned i) {
+scene::Vec3 corner(const scene::Aabb& box, unsigned i) {
   return {i & 1 ? box.max.x() : box.min.x(), i & 2 ? box.max.y() : box.min.y(),
           i & 4 ? box.max.z() : box.min.z()};
 }

@@ -1,4 +1,4 @@
-// A room made by hand: a floor whose top is at y = 0, a wall across the way along +X, a column.
+// A hand-made room: a floor with its top at y = 0, a wall across +X, a column.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,5 @@
-// A walk among bodies, by the program: what a script tells them, and what contacts.jsonl tells.
+// Tests of the program's walk with bodies: script commands to bodies, and their contacts in
+// contacts.jsonl.
 #include <map>
 
 #include "tests/server/program_fixture.hpp"
@@ -24,10 +25,10 @@ constexpr const char* kWalk = R"({"spawn":"ann","at":[0,0.01,0]}
 {"wait":0}
 )";
 
-class WalkBodies : public ProgramTrial {
+class WalkBodies : public ProgramFixture {
  protected:
   void SetUp() override {
-    ProgramTrial::SetUp();
+    ProgramFixture::SetUp();
     write(folder_ / "room.walk.json", kSidecar);
     write(folder_ / "walk.jsonl", kWalk);
   }
@@ -46,15 +47,15 @@ std::uint64_t tickOf(const std::vector<nlohmann::json>& contacts, const std::str
   return 0;
 }
 
-TEST_F(WalkBodies, AreToldInTheContactsAndTheSameOverTheSocket) {
+TEST_F(WalkBodies, AreInTheContactsAndEqualOverTheSocket) {
   const Ended replayed = run({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("a")});
   ASSERT_EQ(replayed.code, 0) << replayed.err;
-  const auto told = contacts("a");
-  const std::uint64_t enters = tickOf(told, "enter", "ann", "door mat");
-  const std::uint64_t leaves = tickOf(told, "leave", "ann", "door mat");
+  const auto events = contacts("a");
+  const std::uint64_t enters = tickOf(events, "enter", "ann", "door mat");
+  const std::uint64_t leaves = tickOf(events, "leave", "ann", "door mat");
   EXPECT_GT(enters, 30u) << "she waits until the gate is open";
   EXPECT_GT(leaves, enters + 20) << "1.6 m at 3 m/s";
-  EXPECT_GT(tickOf(told, "begin", "crate", "room_floor"), 0u);
+  EXPECT_GT(tickOf(events, "begin", "crate", "room_floor"), 0u);
   const auto summary = nlohmann::json::parse(replayed.out);
   EXPECT_EQ(summary["arrived"], 1) << "the gate is out of the way";
   EXPECT_EQ(summary["refused"], 2) << "a gate has no levels, and there is no dragon";
@@ -77,7 +78,7 @@ TEST_F(WalkBodies, AreToldInTheContactsAndTheSameOverTheSocket) {
   EXPECT_EQ(tickOf(contacts("b"), "leave", "ann", "door mat"), leaves);
 }
 
-TEST_F(WalkBodies, AWrongSidecarIsToldWithItsPlaceAndNothingIsServed) {
+TEST_F(WalkBodies, AnInvalidSidecarIsReportedWithItsPlaceAndNothingIsServed) {
   write(folder_ / "room.walk.json", R"({"walk": 1, "bodies": [{"name": "g", "kind": "hinged",
     "objects": ["room_wall"], "anchor": [0, 0, null]}]})");
   const Ended ended = run({"inspect", path("room.obj")});

@@ -1,5 +1,5 @@
-// Several worlds in one server: made, entered, told apart, dropped.
-#include "server/hosting/world_registry.hpp"
+// Tests of several worlds in one server: create, enter, distinguish, delete.
+#include "server/worlds/world_registry.hpp"
 
 #include <unistd.h>
 
@@ -26,7 +26,7 @@ class ServedWorlds : public ServedRoom {
   }
 };
 
-/// The error that a request got; ERROR_UNSPECIFIED: it got none.
+/// The error of a request; ERROR_UNSPECIFIED if it succeeded.
 v1::ErrorCode codeOf(const std::function<void()>& request) {
   try {
     request();
@@ -64,7 +64,7 @@ std::vector<std::string> namesOf(const std::vector<v1::World>& worlds) {
   return names;
 }
 
-/// The hashes of a walk to the wall.
+/// The state hashes of a walk to the wall.
 std::vector<std::uint64_t> hashesOfWalk(protocol::Client& walker) {
   EXPECT_FALSE(walker.command(spawn("ann", 0, 0.001, 0)));
   EXPECT_FALSE(walker.command(walkTo("ann", 8, 0, 1)));
@@ -79,7 +79,7 @@ v1::SetClock freeRun(double speed) {
   return clock;
 }
 
-/// How the connection of somebody who waits in a world ends.
+/// The Bye of a client that waits in a world.
 v1::Bye lastWordsTo(protocol::Client& client) {
   while (const auto event = client.nextEvent(std::chrono::seconds(20)))
     if (event->has_bye()) return event->bye();
@@ -128,7 +128,7 @@ TEST_F(ServedWorlds, EachIsListedWithItsOwnTicksAndClients) {
   EXPECT_TRUE(worlds[1].clock().has_driver());
 }
 
-TEST_F(ServedWorlds, NamesAreJudged) {
+TEST_F(ServedWorlds, NamesAreValidated) {
   ServerLimits limits;
   limits.worlds = 3;
   serve(limits);
@@ -162,7 +162,7 @@ TEST_F(ServedWorlds, OnlyAnAdminMakesAndDropsThem) {
   drop(admin, "b");
 }
 
-TEST_F(ServedWorlds, WhoIsInADroppedOneIsToldAndSeesItsContactsEnd) {
+TEST_F(ServedWorlds, ClientsOfADroppedWorldAreNotifiedAndTheirContactsEnd) {
   serve();
   protocol::Client main = client("main");
   create(main, "b");
@@ -235,13 +235,14 @@ TEST_F(ServedWorlds, OneIsDroppedWhileItsPicturesAreDrawn) {
     while ((heard = bob.receive()) && !heard->has_bye()) answered.push_back(heard->reply_to());
     ASSERT_TRUE(heard) << "no last words";
     EXPECT_EQ(heard->bye().code(), v1::ERROR_WORLD_DROPPED);
-    // Each once and in order; what the service claimed last may be lost with the connection.
+    // Each once and in order; the last request that the service took may be lost with the
+    // connection.
     for (std::size_t i = 0; i + 1 < answered.size(); ++i) EXPECT_LT(answered[i], answered[i + 1]);
     EXPECT_EQ(main.frame(request).description.width(), 1000u);
   }
 }
 
-TEST_F(ServedWorlds, WhoDropsItsOwnHasAnAnswerFirst) {
+TEST_F(ServedWorlds, AClientThatDropsItsOwnWorldGetsTheReplyFirst) {
   serve();
   protocol::Client main = client("main");
   create(main, "b");
@@ -251,14 +252,14 @@ TEST_F(ServedWorlds, WhoDropsItsOwnHasAnAnswerFirst) {
   EXPECT_EQ(list(main).size(), 1u);
 }
 
-TEST_F(ServedWorlds, OneThatIsToGoWhenEmptyGoesWithItsLastClient) {
+TEST_F(ServedWorlds, ADropWhenEmptyWorldEndsWithItsLastClient) {
   serve();
   protocol::Client main = client("main");
   EXPECT_TRUE(create(main, "b", "", true).drop_when_empty());
   RawConnection http(server_->port());
   http.send("GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n");
   EXPECT_NE(http.readText().find("{world=\"b\"}"), std::string::npos);
-  EXPECT_EQ(list(main).size(), 2u) << "nobody has entered it yet";
+  EXPECT_EQ(list(main).size(), 2u) << "no client has entered it yet";
   {
     protocol::Client first = clientIn("b"), second = clientIn("b");
     { const protocol::Client leaves = std::move(first); }
@@ -268,9 +269,9 @@ TEST_F(ServedWorlds, OneThatIsToGoWhenEmptyGoesWithItsLastClient) {
   EXPECT_TRUE(becomesTrue([&] { return list(main).size() == 1; }));
 }
 
-TEST_F(ServedWorlds, OneThatNobodyEntersGoesAfterAWhile) {
+TEST_F(ServedWorlds, AnUnusedWorldIsDroppedAfterAWhile) {
   ServerLimits limits;
-  limits.entry = std::chrono::milliseconds(300);
+  limits.emptyWorldTimeout = std::chrono::milliseconds(300);
   serve(limits);
   protocol::Client main = client("main");
   create(main, "stays");
@@ -282,9 +283,9 @@ TEST_F(ServedWorlds, OneThatNobodyEntersGoesAfterAWhile) {
   for (const v1::World& world : list(main)) EXPECT_NE(world.name(), "forgotten");
 }
 
-TEST_F(ServedWorlds, AClientThatGoesWhileItIsNotReadIsNoticed) {
+TEST_F(ServedWorlds, AClientThatDisconnectsWhileUnreadIsNoticed) {
   ServerLimits limits;
-  limits.requestsUnderWay = 4;
+  limits.pendingRequests = 4;
   limits.ticksPerStep = 1'000'000'000;  // days
   serve(limits);
   protocol::Client watch = client("watch");
@@ -311,7 +312,7 @@ TEST_F(ServedWorlds, AClientThatGoesWhileItIsNotReadIsNoticed) {
   EXPECT_TRUE(becomesTrue([&] { return list(watch)[1].clients() == 0; }));
 }
 
-/// A hall 100 m wide, with as many posts as are asked for.
+/// A hall 100 m wide with the requested number of posts.
 std::shared_ptr<const scene::Scene> hall(std::size_t posts) {
   scene::Model model = smallRoom()->model();
   model.source = "halls/hall.glb";
@@ -327,7 +328,7 @@ std::shared_ptr<const scene::Scene> hall(std::size_t posts) {
 
 TEST_F(ServedWorlds, ScenesThatAServerBeginsWithHaveAWorldEach) {
   ServerOptions options;
-  options.furtherScenes = {hall(4), hall(5), smallRoom()};
+  options.additionalScenes = {hall(4), hall(5), smallRoom()};
   server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
   EXPECT_EQ(server_->worldNames(),
             (std::vector<std::string>{"main", "hall", "hall-2", "small_room-2"}));
@@ -364,9 +365,9 @@ TEST_F(ServedWorlds, MetricsAndHealthCoverAllOfThem) {
   EXPECT_EQ(get("/mjpeg/avatar/ann?world=c").substr(0, 12), "HTTP/1.1 404");
 }
 
-TEST(Listening, WhoComesWhileTheWorldsEndIsToldSo) {
+TEST(Listening, AClientThatConnectsDuringTheShutdownIsNotified) {
   boost::asio::io_context context{1};
-  Worlds worlds({smallRoom()}, {}, {});
+  WorldRegistry worlds({smallRoom()}, {}, {});
   Listener listener(context, {"127.0.0.1", 0}, worlds, {}, {});
   listener.start();
   std::thread network([&] { context.run(); });
@@ -381,43 +382,43 @@ TEST(Listening, WhoComesWhileTheWorldsEndIsToldSo) {
 
 // ---- without sockets ----------------------------------------------------------------------------
 
-/// What comes of a request for a world.
-std::variant<v1::World, v1::Error> made(Worlds& worlds, const std::string& name) {
+/// The result of a request for a world.
+std::variant<v1::World, v1::Error> made(WorldRegistry& worlds, const std::string& name) {
   std::promise<std::variant<v1::World, v1::Error>> promise;
   worlds.create({name, "small_room", false}, [&](auto world) { promise.set_value(world); });
   return promise.get_future().get();
 }
 
-std::optional<v1::Error> dropped(Worlds& worlds, const std::string& name) {
+std::optional<v1::Error> dropped(WorldRegistry& worlds, const std::string& name) {
   std::promise<std::optional<v1::Error>> promise;
   worlds.drop(name, "main", [&](auto problem) { promise.set_value(problem); });
   return promise.get_future().get();
 }
 
-TEST(Worlds, OneThatFailsIsToldAndTheOthersLive) {
-  Worlds worlds({smallRoom()}, {}, {});
+TEST(WorldRegistry, AFailedWorldIsReportedAndTheOthersContinue) {
+  WorldRegistry worlds({smallRoom()}, {}, {});
   ASSERT_TRUE(std::holds_alternative<v1::World>(made(worlds, "b")));
   const auto world = worlds.find("b");
-  const auto out = std::make_shared<OutgoingQueue>(OutgoingBounds{1u << 20, 2}, Buffer(), [] {});
+  const auto out = std::make_shared<OutgoingQueue>(OutgoingLimits{1u << 20, 2}, Buffer(), [] {});
   ASSERT_NE(world->join("bob", Role::admin, out, 1), 0u);
-  world->post([](ServedWorld&) { throw std::runtime_error("the roof came down"); });
+  world->post([](HostedWorld&) { throw std::runtime_error("the roof came down"); });
   ASSERT_TRUE(becomesTrue([&] { return world->failure() && out->finished(); }));
-  EXPECT_EQ(worlds.list().worlds(1).failure(), "the roof came down");
-  EXPECT_EQ(world->join("late", Role::admin, out, 1), 0u) << "nobody enters it";
+  EXPECT_EQ(worlds.makeWorldList().worlds(1).failure(), "the roof came down");
+  EXPECT_EQ(world->join("late", Role::admin, out, 1), 0u) << "no client can enter it";
   EXPECT_FALSE(worlds.mainWorld().failure());
-  EXPECT_TRUE(worlds.mainWorld().post([](ServedWorld&) {}));
+  EXPECT_TRUE(worlds.mainWorld().post([](HostedWorld&) {}));
   EXPECT_FALSE(dropped(worlds, "b"));
-  EXPECT_EQ(worlds.all().size(), 1u);
+  EXPECT_EQ(worlds.allWorlds().size(), 1u);
 }
 
-TEST(Worlds, WhatIsAskedOfThemAfterTheEndIsRefused) {
-  Worlds worlds({smallRoom()}, {}, {});
+TEST(WorldRegistry, RequestsAfterTheEndAreRefused) {
+  WorldRegistry worlds({smallRoom()}, {}, {});
   worlds.stop();
   EXPECT_EQ(std::get<v1::Error>(made(worlds, "b")).code(), v1::ERROR_SHUTTING_DOWN);
   EXPECT_EQ(dropped(worlds, "b")->code(), v1::ERROR_SHUTTING_DOWN);
 }
 
-/// Bytes of memory that are this process' own now.
+/// Resident memory that only this process uses, in bytes.
 std::size_t residentBytes() {
   std::ifstream file("/proc/self/statm");
   std::size_t all = 0, resident = 0;
@@ -427,30 +428,30 @@ std::size_t residentBytes() {
 
 constexpr std::size_t kMiB = 1u << 20;
 
-TEST(Worlds, SixtyFourAreMadeAndDroppedOverAndOverInFlatMemory) {
-  Worlds worlds({smallRoom()}, {}, {});
+TEST(WorldRegistry, SixtyFourAreCreatedAndDroppedRepeatedlyInConstantMemory) {
+  WorldRegistry worlds({smallRoom()}, {}, {});
   std::vector<std::size_t> after;
   for (int round = 0; round < 20; ++round) {
     for (int i = 1; i < 64; ++i)
       ASSERT_TRUE(std::holds_alternative<v1::World>(made(worlds, "w" + std::to_string(i))));
-    EXPECT_EQ(worlds.all().size(), 64u);
+    EXPECT_EQ(worlds.allWorlds().size(), 64u);
     EXPECT_EQ(std::get<v1::Error>(made(worlds, "one-more")).code(), v1::ERROR_TOO_LARGE);
     for (int i = 1; i < 64; ++i) ASSERT_FALSE(dropped(worlds, "w" + std::to_string(i)));
     after.push_back(residentBytes());
   }
-  EXPECT_EQ(worlds.all().size(), 1u);
+  EXPECT_EQ(worlds.allWorlds().size(), 1u);
   if (!tests::kSanitized) {
     EXPECT_LT(after.back(), after[4] + 4 * kMiB);
   }
 }
 
-/// The scene's meshes, parts and names are not among it.
-TEST(Worlds, OneMoreOfASceneTakesNoMoreOfWhatStandsThanItsBoxes) {
-  constexpr std::size_t kPosts = 30'000, kMostBytesABox = 100, kWorlds = 20;
+/// The scene's meshes, parts and names are shared, so they do not count.
+TEST(WorldRegistry, AnotherWorldOfASceneAddsOnlyBoxesOfStaticObjects) {
+  constexpr std::size_t kPosts = 30'000, kMaxBytesPerBox = 100, kWorlds = 20;
   const auto before = residentBytes();
   const auto scene = hall(kPosts);
-  Worlds worlds({scene}, {}, {});
-  static_cast<void>(worlds.rendererName());  // waits for what draws them, which takes memory, too
+  WorldRegistry worlds({scene}, {}, {});
+  static_cast<void>(worlds.rendererName());  // waits for the renderer, which allocates memory, too
   const auto one = residentBytes();
   for (std::size_t i = 0; i < kWorlds; ++i) {
     std::promise<void> ready;
@@ -458,9 +459,9 @@ TEST(Worlds, OneMoreOfASceneTakesNoMoreOfWhatStandsThanItsBoxes) {
     ready.get_future().get();
   }
   const std::size_t each = (residentBytes() - one) / kWorlds;
-  EXPECT_EQ(worlds.all().size(), kWorlds + 1);
+  EXPECT_EQ(worlds.allWorlds().size(), kWorlds + 1);
   if (!tests::kSanitized) {
-    EXPECT_LT(each, kPosts * kMostBytesABox + kMiB / 2) << one - before << " for the first";
+    EXPECT_LT(each, kPosts * kMaxBytesPerBox + kMiB / 2) << one - before << " for the first";
     EXPECT_LT(each, (one - before) / 4);
   }
 }

@@ -1,4 +1,4 @@
-// An avatar walks for 600 ticks in each of the shared real buildings, and looks around.
+// Smoke test: an avatar walks for 600 ticks in each of the shared real buildings, and looks around.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -35,7 +35,7 @@ double uniform(std::mt19937_64& random, double low, double high) {
   return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
 }
 
-/// Each begin has its end.
+/// Checks that each contact that begins also ends.
 struct Balance {
   std::set<std::pair<scene::EntityId, scene::EntityId>> open;
   int begins = 0;
@@ -54,20 +54,20 @@ struct Balance {
   }
 };
 
-/// Tries seeded places until the avatar stands on something, not only falls past the building.
+/// Tries seeded places until the avatar stands on a surface instead of falling past the building.
 bool standSomewhere(scene::World& world, std::mt19937_64& random, Balance& balance) {
-  const scene::Box& b = world.scene().bounds();
+  const scene::Aabb& b = world.scene().bounds();
   for (int attempt = 0; attempt < 400; ++attempt) {
     const double x = uniform(random, b.min.x(), b.max.x());
     const double z = uniform(random, b.min.z(), b.max.z());
     const double y = uniform(random, b.min.y(), b.min.y() + 0.7 * b.size().y());
-    EXPECT_FALSE(submit(world, {"ann", scene::Spawn{{x, y, z}}, 0}));
-    balance.take(tick(world).contacts);
+    EXPECT_FALSE(submitAvatarCommand(world, {"ann", scene::Spawn{{x, y, z}}, 0}));
+    balance.take(tickWorld(world).contacts);
     if (world.snapshot()->avatars.empty()) continue;
-    for (int i = 0; i < 90; ++i) balance.take(tick(world).contacts);
+    for (int i = 0; i < 90; ++i) balance.take(tickWorld(world).contacts);
     if (!world.snapshot()->avatars.empty() && world.snapshot()->avatars[0].grounded) return true;
-    EXPECT_FALSE(submit(world, {"ann", scene::Leave{}, 0}));
-    balance.take(tick(world).contacts);
+    EXPECT_FALSE(submitAvatarCommand(world, {"ann", scene::Leave{}, 0}));
+    balance.take(tickWorld(world).contacts);
   }
   return false;
 }
@@ -80,7 +80,7 @@ void expectSomethingSeen(const render::Frame& frame, const scene::World& world) 
   EXPECT_GT(colours.size(), 8u) << "the frame is blank";
   ids.erase(0);
   EXPECT_FALSE(ids.empty());
-  for (const scene::EntityId id : ids) EXPECT_FALSE(nameOf(world, id).empty()) << id;
+  for (const scene::EntityId id : ids) EXPECT_FALSE(findEntityName(world, id).empty()) << id;
 }
 
 TEST_P(RealScenes, AnAvatarWalksAndNeverPenetrates) {
@@ -95,33 +95,34 @@ TEST_P(RealScenes, AnAvatarWalksAndNeverPenetrates) {
   ASSERT_TRUE(standSomewhere(world, random, balance));
 
   render::GlRenderer renderer(still);
-  const scene::Box& b = still->bounds();
+  const scene::Aabb& b = still->bounds();
   double worst = 0, walked = 0;  // metres
   for (int i = 0; i < kTicks; ++i) {
     if (i % 120 == 0 && !world.snapshot()->avatars.empty()) {
       const Vec3 goal(uniform(random, b.min.x(), b.max.x()), 0,
                       uniform(random, b.min.z(), b.max.z()));
-      const Vec3 way = goal - world.snapshot()->avatars[0].feet;
+      const Vec3 way = goal - world.snapshot()->avatars[0].footPosition;
       const Vec3 velocity = 1.5 * Vec3(way.x(), 0, way.z()).normalized();
-      EXPECT_FALSE(submit(world, {"ann", scene::Drive{velocity}, 0}));
+      EXPECT_FALSE(submitAvatarCommand(world, {"ann", scene::Drive{velocity}, 0}));
     }
     const auto before = world.snapshot();
-    const scene::TickReport report = tick(world);
-    worst = std::max(worst, report.worstPenetration);
+    const scene::TickReport report = tickWorld(world);
+    worst = std::max(worst, report.maxPenetration);
     balance.take(report.contacts);
     if (!before->avatars.empty() && !report.snapshot->avatars.empty())
-      walked += (report.snapshot->avatars[0].feet - before->avatars[0].feet).norm();
+      walked += (report.snapshot->avatars[0].footPosition - before->avatars[0].footPosition).norm();
     if (i % 200 == 100 && !report.snapshot->avatars.empty()) {
       const auto& ann = report.snapshot->avatars[0];
-      render::Camera eyes = render::firstPerson(ann, 320, 240);
-      eyes.forward = b.centre() - eyes.eye;  // into the building, wherever the walk is heading
-      expectSomethingSeen(renderer.render(*report.snapshot, eyes, {.hidden = ann.id}), world);
+      render::Camera eyes = render::makeFirstPersonCamera(ann, 320, 240);
+      eyes.forward = b.centre() - eyes.eye;  // into the building, whatever the direction of the
+                                             // walk
+      expectSomethingSeen(renderer.render(*report.snapshot, eyes, {.hiddenEntity = ann.id}), world);
     }
   }
   EXPECT_EQ(worst, 0);
   EXPECT_GT(walked, 5) << "it neither walked far nor stayed in the scene";
   EXPECT_GT(balance.begins, 0);
-  balance.take(endContacts(world, ContactEvent::Reason::shutdown));
+  balance.take(endAllContacts(world, ContactEvent::Reason::shutdown));
   EXPECT_TRUE(balance.open.empty());
 }
 

@@ -1,5 +1,5 @@
-// Walks through the bundled and the shared buildings: pictures without what is hidden are those of
-// drawing everything, byte for byte.
+// Smoke test of culling on walks through the bundled and the shared buildings: images are equal to
+// those without culling, byte for byte.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -14,7 +14,7 @@
 namespace enfilade {
 namespace {
 
-/// Of every twelfth picture; counts what was left out of these.
+/// Compares every twelfth image; counts the objects culled in these.
 void expectSamePictures(const std::shared_ptr<const scene::Scene>& scene,
                         const std::vector<tests::WalkStop>& stops, std::uint64_t& left) {
   ASSERT_FALSE(stops.empty());
@@ -23,10 +23,10 @@ void expectSamePictures(const std::shared_ptr<const scene::Scene>& scene,
     render::Camera camera = stops[i].camera;
     camera.width = 160;
     camera.height = 120;
-    render::FrameOptions options{.hidden = stops[i].walker};
+    render::FrameOptions options{.hiddenEntity = stops[i].walker};
     const render::Frame culled = renderer.render(*stops[i].snapshot, camera, options);
     if (i % 12 != 0) continue;
-    options.culling = render::Culling::outside;
+    options.culling = render::Culling::frustum;
     const render::Frame all = renderer.render(*stops[i].snapshot, camera, options);
     EXPECT_TRUE(culled.rgb == all.rgb) << "colour, step " << i;
     EXPECT_TRUE(culled.ids == all.ids) << "ids, step " << i;
@@ -43,7 +43,7 @@ TEST(SamePictures, InTheBundledBuildingAmongOthers) {
   ASSERT_TRUE(walk.beginAt(assets::landmarks::kRooms[1], 0));
   std::uint64_t left = 0;
   expectSamePictures(scene, walk.walk(240), left);
-  EXPECT_GT(left, 20u * 100u);  // of twenty pictures
+  EXPECT_GT(left, 20u * 100u);  // in twenty images
 }
 
 class SamePicturesIn : public ::testing::TestWithParam<const char*> {};
@@ -58,7 +58,7 @@ TEST_P(SamePicturesIn, ASharedScene) {
   ASSERT_TRUE(walk.begin(2));
   std::uint64_t left = 0;
   expectSamePictures(scene, walk.walk(180), left);
-  // Small scenes that hide little are drawn whole.
+  // Small scenes with few hidden objects are drawn whole.
   const bool small = scene->model().objects.size() <= 256;
   EXPECT_TRUE(small || left > 0);
 }

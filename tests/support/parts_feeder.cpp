@@ -9,16 +9,16 @@
 namespace enfilade::testing {
 namespace {
 
-using collision::Box;
+using collision::Aabb;
 using collision::Pose;
 
 constexpr double kTick = 1.0 / 60;
 constexpr double kGravity = 9.80665;
 constexpr double kWallThickness = 0.1;
-/// Metres that a part may go in a tick beyond what its own speed has it.
+/// Metres that a part may move in a tick beyond the distance of its own speed.
 constexpr double kSpareReach = 5e-3;
-constexpr std::size_t kBoxBlock = 32;  // parts that a thread takes at a time
-constexpr double kSpareBox = 8e-3;     // metres: a box that is asked for may come to lie so far out
+constexpr std::size_t kBoxBlock = 32;  // parts that a thread processes at a time
+constexpr double kSpareBox = 8e-3;     // metres by which a new box is inflated
 
 std::vector<Vec3> boxCorners(const Vec3& half) {
   std::vector<Vec3> corners;
@@ -28,7 +28,7 @@ std::vector<Vec3> boxCorners(const Vec3& half) {
   return corners;
 }
 
-/// A prism of `sides` along y; tapered to `top` of its radius.
+/// A prism with `sides` sides along y; tapered to `top` of its radius.
 std::vector<Vec3> prism(int sides, double radius, double halfHeight, double top) {
   std::vector<Vec3> corners;
   for (int i = 0; i < sides; ++i) {
@@ -42,7 +42,7 @@ std::vector<Vec3> prism(int sides, double radius, double halfHeight, double top)
 
 Quat anyRotation(std::mt19937& random) {
   std::normal_distribution<double> number;
-  Quat q;  // drawn one by one: a list of arguments has no order
+  Quat q;  // separate statements: the evaluation order of arguments is unspecified
   for (double* part : {&q.z(), &q.y(), &q.x(), &q.w()}) *part = number(random);
   q.normalize();
   return q;
@@ -93,40 +93,42 @@ Vec3 trayAt(const FeederPlan& plan, double time, bool driven) {
   return sine * Vec3(plan.sidewards, plan.amplitude, 0);
 }
 
-// ---- the judge ---------------------------------------------------------------------------------
+// ---- measurement -------------------------------------------------------------------------------
 
-FeederJudge::FeederJudge(const FeederPlan& plan) : plan_(plan) {
+FeederCheck::FeederCheck(const FeederPlan& plan) : plan_(plan) {
   for (const auto& corners : plan.kinds) kinds_.push_back(collision::buildHull(corners));
   for (const auto& box : plan.tray) tray_.push_back(boxHull(box));
 }
 
-FeederJudgement FeederJudge::judge(const std::vector<PlacedPart>& parts, const Vec3& tray) const {
-  FeederJudgement found;
+FeederFindings FeederCheck::evaluate(const std::vector<PlacedPart>& parts, const Vec3& tray) const {
+  FeederFindings found;
   std::vector<collision::Mat3> rotations;
   collision::SortAndSweep near({});
   for (const PlacedPart& part : parts) rotations.push_back(part.rotation.toRotationMatrix());
   const auto bodyOf = [&](std::size_t i) {
     if (i >= parts.size()) {
       const Hull& hull = tray_[i - parts.size()];
-      return collision::ConvexBody{hull.vertices, tray, nullptr, &hull};
+      return collision::PlacedConvex{hull.vertices, tray, nullptr, &hull};
     }
     const Hull& hull = kinds_[plan_.parts[i].kind];
-    return collision::ConvexBody{hull.vertices, parts[i].position, &rotations[i], &hull};
+    return collision::PlacedConvex{hull.vertices, parts[i].position, &rotations[i], &hull};
   };
   for (std::size_t i = 0; i < parts.size() + tray_.size(); ++i) {
     const auto body = bodyOf(i);
-    near.insert(collision::tightBoxBruteForce(
+    near.insert(collision::tightAabbBruteForce(
         *body.hull, {i < parts.size() ? parts[i].rotation : Quat::Identity(), body.translation}));
   }
   near.update();
-  for (const auto& pair : near.begun()) {
-    if (pair.mover >= parts.size() && pair.other >= parts.size()) continue;
+  for (const auto& pair : near.addedPairs()) {
+    if (pair.proxy >= parts.size() && pair.other >= parts.size()) continue;
     collision::FeatureCache cache;
-    const auto a = bodyOf(pair.mover), b = bodyOf(pair.other);
-    if (collision::decide(a, b, cache).verdict != collision::Verdict::penetrating) continue;
+    const auto a = bodyOf(pair.proxy), b = bodyOf(pair.other);
+    if (collision::computeSeparation(a, b, cache).verdict != collision::Verdict::penetrating)
+      continue;
     collision::DepthCache none;
     ++found.penetrating;
-    found.deepest = std::max(found.deepest, collision::penetrationDepth(a, b, cache, none).depth);
+    found.deepest =
+        std::max(found.deepest, collision::computePenetrationDepth(a, b, cache, none).depth);
   }
   for (const PlacedPart& part : parts) {
     const Vec3 at = part.position - tray;
@@ -137,11 +139,11 @@ FeederJudgement FeederJudge::judge(const std::vector<PlacedPart>& parts, const V
   return found;
 }
 
-// ---- ours --------------------------------------------------------------------------------------
+// ---- our engine --------------------------------------------------------------------------------
 
 Feeder::Feeder(const FeederPlan& plan, int threads)
     : plan_(plan), workers_(threads), broadPhase_({}) {
-  settings_.workers = &workers_;
+  settings_.pool = &workers_;
   settings_.solver.substeps = plan.substeps / plan.looks;
   settings_.solver.seconds = kTick / plan.looks;
   settings_.solver.iterations = 4;
@@ -150,54 +152,55 @@ Feeder::Feeder(const FeederPlan& plan, int threads)
     hulls_.push_back(boxHull(box)), trayHulls.push_back(&hulls_.back());
   for (const auto& corners : plan.kinds)
     hulls_.push_back(collision::buildHull(corners)), kinds.push_back(&hulls_.back());
-  dynamics_.solids.push_back(scene::heldSolid(trayHulls, {}));
+  dynamics_.bodies.push_back(scene::makeKinematicBody(trayHulls, {}));
   for (const FeederPlan::Part& part : plan.parts) {
     const Hull* hull = kinds[part.kind];
-    dynamics_.solids.push_back(
-        scene::freeSolid({&hull, 1}, plan.density, {part.rotation, part.at}));
+    dynamics_.bodies.push_back(
+        scene::makeDynamicBody({&hull, 1}, plan.density, {part.rotation, part.at}));
   }
-  for (scene::Solid& solid : dynamics_.solids) solid.motion.friction = plan.friction;
-  extremes_.resize(dynamics_.solids.size());
-  boxes_.resize(dynamics_.solids.size());
+  for (scene::PhysicsBody& solid : dynamics_.bodies) solid.motion.friction = plan.friction;
+  extremes_.resize(dynamics_.bodies.size());
+  boxes_.resize(dynamics_.bodies.size());
   for (std::uint32_t i = 0; i < trayHulls.size(); ++i) {
-    const double moves = 2 * (plan.amplitude + plan.sidewards) + 2 * settings_.solver.epsilon;
-    broadPhase_.insert(grown(Box{plan.tray[i][0], plan.tray[i][1]}, moves));
+    const double moves = 2 * (plan.amplitude + plan.sidewards) + 2 * settings_.solver.contactOffset;
+    broadPhase_.insert(inflated(Aabb{plan.tray[i][0], plan.tray[i][1]}, moves));
   }
-  for (std::size_t i = 1; i < dynamics_.solids.size(); ++i)
+  for (std::size_t i = 1; i < dynamics_.bodies.size(); ++i)
     movers_.push_back(broadPhase_.insert({Vec3::Zero(), Vec3::Zero()}));
-  // A fresh broad phase counts up: the tray's boxes first, then the parts.
+  // A new broad phase assigns consecutive ids: the tray's boxes first, then the parts.
   for (std::uint32_t i = 0; i < trayHulls.size(); ++i)
     solidOfMover_.push_back(0), partOfMover_.push_back(i);
-  for (std::uint32_t i = 1; i < dynamics_.solids.size(); ++i)
+  for (std::uint32_t i = 1; i < dynamics_.bodies.size(); ++i)
     solidOfMover_.push_back(i), partOfMover_.push_back(0);
 }
 
-/// Once a tick: each part by what it can reach until the next. Its box is moved when it left the
-/// one that it had, which is larger.
+/// Computes each part's bounds until the next tick, once a tick. The inflated box in the broad
+/// phase is moved only when a part leaves it.
 void Feeder::moveBoxes(double lookout) {
-  needed_.resize(dynamics_.solids.size());
-  workers_.share(dynamics_.solids.size(), kBoxBlock, [&](std::size_t from, std::size_t to) {
+  needed_.resize(dynamics_.bodies.size());
+  workers_.parallelFor(dynamics_.bodies.size(), kBoxBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = std::max(from, std::size_t{1}); i < to; ++i) {
-      scene::Solid& solid = dynamics_.solids[i];
-      solid.leash =
-          solid.asleep ? lookout : solid.fastest() * kTick + kGravity * kTick * kTick + kSpareReach;
+      scene::PhysicsBody& solid = dynamics_.bodies[i];
+      solid.maxStepDisplacement =
+          solid.asleep ? lookout
+                       : solid.maxPointSpeed() * kTick + kGravity * kTick * kTick + kSpareReach;
       const Pose pose{solid.motion.rotation, solid.position};
-      needed_[i] =
-          collision::tightBox(*solid.parts[0].hull, pose, extremes_[i], solid.leash + lookout);
+      needed_[i] = collision::tightAabb(*solid.parts[0].hull, pose, extremes_[i],
+                                        solid.maxStepDisplacement + lookout);
     }
   });
-  for (std::size_t i = 1; i < dynamics_.solids.size(); ++i) {
+  for (std::size_t i = 1; i < dynamics_.bodies.size(); ++i) {
     if (contains(boxes_[i], needed_[i])) continue;
-    boxes_[i] = grown(needed_[i], kSpareBox);
+    boxes_[i] = inflated(needed_[i], kSpareBox);
     broadPhase_.move(movers_[i - 1], boxes_[i]);
   }
   broadPhase_.update();
 }
 
-/// Parts after part `i` that it may meet.
+/// Parts after part `i` that it may touch.
 void Feeder::findMet(std::size_t i, double lookout) {
   met_[i].clear();
-  for (const auto& partner : broadPhase_.partners(movers_[i - 1])) {
+  for (const auto& partner : broadPhase_.overlapsOf(movers_[i - 1])) {
     const std::uint32_t other = solidOfMover_[partner.id];
     if (other > i && scene::mayMeet(spheres_[i], spheres_[other], lookout))
       met_[i].push_back(other);
@@ -205,16 +208,17 @@ void Feeder::findMet(std::size_t i, double lookout) {
 }
 
 void Feeder::findPairs() {
-  const double lookout = 2 * settings_.solver.epsilon;
+  const double lookout = 2 * settings_.solver.contactOffset;
   moveBoxes(lookout);
-  const std::uint32_t size = static_cast<std::uint32_t>(dynamics_.solids.size());
+  const std::uint32_t size = static_cast<std::uint32_t>(dynamics_.bodies.size());
   std::vector<scene::PartPairKey> keys;
   for (std::uint32_t i = 1; i < size; ++i)
-    for (const auto& partner : broadPhase_.partners(movers_[i - 1]))
+    for (const auto& partner : broadPhase_.overlapsOf(movers_[i - 1]))
       if (solidOfMover_[partner.id] == 0) keys.push_back({0, i, partOfMover_[partner.id], 0});
   met_.resize(size), spheres_.clear();
-  for (const scene::Solid& solid : dynamics_.solids) spheres_.push_back(scene::reachSphere(solid));
-  workers_.share(size, kBoxBlock, [&](std::size_t from, std::size_t to) {
+  for (const scene::PhysicsBody& solid : dynamics_.bodies)
+    spheres_.push_back(scene::computeMotionSphere(solid));
+  workers_.parallelFor(size, kBoxBlock, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = std::max(from, std::size_t{1}); i < to; ++i) findMet(i, lookout);
   });
   for (std::uint32_t i = 1; i < size; ++i)
@@ -225,53 +229,55 @@ void Feeder::findPairs() {
 
 void Feeder::tick(bool driven) {
   findPairs();
-  scene::Solid& tray = dynamics_.solids[0];
+  scene::PhysicsBody& tray = dynamics_.bodies[0];
   std::vector<double> reach;
-  for (const scene::Solid& solid : dynamics_.solids) reach.push_back(solid.odometer + solid.leash);
+  for (const scene::PhysicsBody& solid : dynamics_.bodies)
+    reach.push_back(solid.accumulatedMotion + solid.maxStepDisplacement);
   report_ = {};
   for (int i = 0; i < plan_.looks; ++i) {
     const double seconds = settings_.solver.seconds;
     for (std::size_t k = 1; k < reach.size(); ++k)
-      dynamics_.solids[k].leash = std::max(0.0, reach[k] - dynamics_.solids[k].odometer);
+      dynamics_.bodies[k].maxStepDisplacement =
+          std::max(0.0, reach[k] - dynamics_.bodies[k].accumulatedMotion);
     const double substep = seconds / settings_.solver.substeps;
     Vec3 at = tray.motion.centre;
-    tray.gaits.clear();
+    tray.substepVelocities.clear();
     for (int n = 1; driven && n <= settings_.solver.substeps; ++n) {
       const Vec3 next = trayAt(plan_, time_ + n * substep, driven);
-      tray.gaits.push_back({(next - at) / substep, Vec3::Zero()});
+      tray.substepVelocities.push_back({(next - at) / substep, Vec3::Zero()});
       at = next;
     }
     tray.motion.velocity = (at - tray.motion.centre) / seconds;
-    const scene::DynamicsReport step = scene::step(dynamics_, settings_);
+    const scene::StepReport step = scene::stepPhysics(dynamics_, settings_);
     time_ += seconds;
     report_.awake = step.awake;
     report_.islands = step.islands;
-    report_.looks += step.looks;
-    report_.patches += step.patches;
-    report_.leaning += step.leaning;
-    report_.proofs += step.proofs;
-    report_.shortened += step.shortened;
-    report_.squeezed += step.squeezed;
-    report_.deepest = std::max(report_.deepest, step.deepest);
+    report_.narrowPhaseQueries += step.narrowPhaseQueries;
+    report_.constraints += step.constraints;
+    report_.touching += step.touching;
+    report_.continuousChecks += step.continuousChecks;
+    report_.reducedMotions += step.reducedMotions;
+    report_.crushed += step.crushed;
+    report_.maxPenetration = std::max(report_.maxPenetration, step.maxPenetration);
   }
 }
 
 std::vector<PlacedPart> Feeder::parts() const {
   std::vector<PlacedPart> placed;
-  for (std::size_t i = 1; i < dynamics_.solids.size(); ++i)
-    placed.push_back({dynamics_.solids[i].position, dynamics_.solids[i].motion.rotation});
+  for (std::size_t i = 1; i < dynamics_.bodies.size(); ++i)
+    placed.push_back({dynamics_.bodies[i].position, dynamics_.bodies[i].motion.rotation});
   return placed;
 }
 
 Vec3 Feeder::tray() const {
-  return dynamics_.solids[0].position;
+  return dynamics_.bodies[0].position;
 }
 
 double Feeder::energy() const {
   double sum = 0;
-  for (const scene::Solid& solid : dynamics_.solids)
-    if (solid.isFree())
-      sum += scene::kineticEnergy(solid.motion) +
+  for (const scene::PhysicsBody& solid : dynamics_.bodies)
+    if (solid.isDynamic())
+      sum += scene::computeKineticEnergy(solid.motion) +
              kGravity * solid.motion.centre.y() / solid.motion.inverseMass;
   return sum;
 }

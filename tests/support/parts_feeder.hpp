@@ -1,5 +1,5 @@
-// A vibrating tray with small convex parts (the seed's 5.4: "thousands of small mechanical parts on
-// a vibrating parts feeder in real time"), for a test and for a benchmark.
+// A vibrating tray with small convex parts (Lin 1993, section 5.4: "thousands of small mechanical
+// parts on a vibrating parts feeder in real time"), for a test and for a benchmark.
 #pragma once
 
 #include <deque>
@@ -17,65 +17,66 @@ using collision::Hull;
 using collision::Quat;
 using collision::Vec3;
 
-/// What is simulated, in no engine's words. Metres, seconds; the tray's floor is at y = 0 where the
-/// drive's sine is 0; the tray is open above and its middle is the origin.
+/// Engine-independent description of the simulation. Metres, seconds. The tray's floor is at y = 0
+/// at phase 0 of the drive; the tray is open above and centred on the origin.
 struct FeederPlan {
   struct Part {
-    std::size_t kind;  ///< of `kinds`
+    std::size_t kind;  ///< index into `kinds`
     Vec3 at;           ///< of the kind's origin, its centre of mass up to a tenth of its size
     Quat rotation;
   };
-  std::vector<std::vector<Vec3>> kinds;  ///< corners
+  std::vector<std::vector<Vec3>> kinds;  ///< vertices of each kind
   std::vector<Part> parts;
   std::vector<std::array<Vec3, 2>> tray;  ///< boxes, min and max: the floor, four walls
   double inner = 0;                       ///< half the inner width
   double wall = 0;                        ///< height of the walls
   double density = 2700;                  ///< aluminium, kg / m^3
   double friction = 0.4;
-  int substeps = 4;           ///< of a tick of 1/60 s
-  int looks = 1;              ///< a tick: how often contacts are found; divides `substeps`
+  int substeps = 4;           ///< per tick of 1/60 s
+  int looks = 1;              ///< contact updates per tick; divides `substeps`
   double frequency = 15;      ///< of the drive, Hz: at most an eighth of the substeps'
-  double amplitude = 2e-3;    ///< upwards: 1.8 times the weight
-  double sidewards = 0.5e-3;  ///< along x, in phase
+  double amplitude = 2e-3;    ///< upwards: 1.8 times gravity
+  double sidewards = 0.5e-3;  ///< along x, in phase with `amplitude`
 };
 
-/// `count` parts of five kinds some 2 cm long, strewn above a tray of about two layers of them.
+/// Makes `count` parts of five kinds of about 2 cm, scattered above a tray that holds about two
+/// layers of them.
 FeederPlan planFeeder(std::size_t count, unsigned seed);
 
-/// Where the tray is at a time, from its middle place; 0 with the drive off.
+/// The tray's displacement from its rest position at a time; 0 with the drive off.
 Vec3 trayAt(const FeederPlan& plan, double time, bool driven);
 
-/// Metres that the deepest two of all parts and the tray's boxes penetrate, by the exact verdict.
-struct FeederJudgement {
+/// Maximum penetration over all parts and the tray's boxes in metres, by the exact verdict.
+struct FeederFindings {
   double deepest = 0;
   std::size_t penetrating = 0;  ///< pairs
-  std::size_t outside = 0;      ///< parts whose middle is not in the tray
+  std::size_t outside = 0;      ///< parts whose centre is outside the tray
 };
 struct PlacedPart {
   Vec3 position;  ///< of the kind's origin
   Quat rotation;
 };
-class FeederJudge {
+class FeederCheck {
  public:
-  explicit FeederJudge(const FeederPlan& plan);
-  FeederJudgement judge(const std::vector<PlacedPart>& parts, const Vec3& tray) const;
+  explicit FeederCheck(const FeederPlan& plan);
+  FeederFindings evaluate(const std::vector<PlacedPart>& parts, const Vec3& tray) const;
 
  private:
   const FeederPlan& plan_;
   std::vector<Hull> kinds_, tray_;
 };
 
-/// Ours.
+/// The parts feeder, simulated by our engine.
 class Feeder {
  public:
   explicit Feeder(const FeederPlan& plan, int threads = 1);
   void tick(bool driven);
   std::vector<PlacedPart> parts() const;
   Vec3 tray() const;
-  double energy() const;  ///< J, of the parts; potential energy above height 0
-  const scene::DynamicsReport& report() const { return report_; }  ///< counts summed over substeps
-  scene::Dynamics& dynamics() { return dynamics_; }
-  scene::DynamicsStep& settings() { return settings_; }
+  double energy() const;  ///< energy of the parts, J; potential energy is relative to height 0
+  const scene::StepReport& report() const { return report_; }  ///< counts summed over substeps
+  scene::PhysicsWorld& dynamics() { return dynamics_; }
+  scene::StepSettings& settings() { return settings_; }
 
  private:
   void moveBoxes(double lookout);
@@ -84,17 +85,18 @@ class Feeder {
 
   const FeederPlan& plan_;
   std::deque<Hull> hulls_;
-  scene::Dynamics dynamics_;
-  scene::Workers workers_;
-  scene::DynamicsStep settings_;
-  scene::DynamicsReport report_;
+  scene::PhysicsWorld dynamics_;
+  scene::ThreadPool workers_;
+  scene::StepSettings settings_;
+  scene::StepReport report_;
   collision::SortAndSweep broadPhase_;
-  std::vector<collision::MoverId> movers_;  ///< of the parts
+  std::vector<collision::ProxyId> movers_;  ///< proxies of the parts
   std::vector<collision::ExtremalVertices> extremes_;
-  std::vector<collision::Box> boxes_;            ///< of the parts, as the broad phase has them
-  std::vector<collision::Box> needed_;           ///< of the parts, in this tick
-  std::vector<scene::ReachSphere> spheres_;      ///< of all solids
-  std::vector<std::vector<std::uint32_t>> met_;  ///< of each part: those after it that it may meet
+  std::vector<collision::Aabb> boxes_;           ///< of the parts, in the broad phase
+  std::vector<collision::Aabb> needed_;          ///< of the parts, exact in this tick
+  std::vector<scene::MotionSphere> spheres_;     ///< of all bodies
+  std::vector<std::vector<std::uint32_t>> met_;  ///< for each part: the later ones that it may
+                                                 ///< touch
   std::vector<std::uint32_t> solidOfMover_, partOfMover_;
   double time_ = 0;
 };

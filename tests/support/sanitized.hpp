@@ -1,4 +1,4 @@
-// Whether a sanitizer watches this build: it slows threads and keeps what is freed. GCC says so by
+// Whether this build has a sanitizer, which slows threads and delays frees. GCC reports it by
 // macros, clang by features.
 #pragma once
 

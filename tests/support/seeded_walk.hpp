@@ -1,5 +1,5 @@
-// A walk through any scene, the same for the same seed: pictures of it are what tests and
-// benchmarks compare.
+// A seeded walk through any scene. Equal seeds give equal walks, whose images tests and benchmarks
+// compare.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace enfilade::tests {
 
 struct WalkStop {
   std::shared_ptr<const scene::Snapshot> snapshot;
-  render::Camera camera;       ///< the eyes of `walker`; its size is left to who draws
+  render::Camera camera;       ///< at the eyes of `walker`; the caller sets its size
   scene::EntityId walker = 0;  ///< not drawn
 };
 
@@ -25,8 +25,8 @@ class SeededWalk {
   SeededWalk(std::shared_ptr<const scene::Scene> scene, unsigned seed)
       : world_(std::move(scene)), random_(seed) {}
 
-  /// Stands `companions` and one avatar more near the middle of the scene, where there is ground;
-  /// false when there is none.
+  /// Spawns `companions` and one more avatar near the middle of the scene, on ground; false if no
+  /// ground was found.
   bool begin(int companions) {
     if (!standSomewhere("ann", 400)) return false;
     for (int i = 0; i < companions; ++i) standSomewhere("friend" + std::to_string(i), 5);
@@ -34,14 +34,14 @@ class SeededWalk {
     return true;
   }
 
-  /// Begins at a place that is known.
+  /// Begins at a given place.
   bool beginAt(const collision::Vec3& feet, double heading) {
     heading_ = heading;
     return stand("ann", feet);
   }
 
-  /// `ticks` of walking towards seeded goals, looking around at the pace of a person. Empty when
-  /// the walker is gone.
+  /// Walks for `ticks` ticks towards seeded goals and looks around at human speed. Empty if the
+  /// walker has left the world.
   std::vector<WalkStop> walk(int ticks, double goalEverySeconds = 2) {
     std::vector<WalkStop> stops;
     const int goalEvery = static_cast<int>(goalEverySeconds * 60);
@@ -49,16 +49,16 @@ class SeededWalk {
       if (i % goalEvery == 0) {
         wanted_ = uniform(0, 2 * std::numbers::pi);
         const collision::Vec3 way(std::cos(wanted_), 0, std::sin(wanted_));
-        for (const scene::AvatarView& avatar : world_.snapshot()->avatars)
-          submit(world_, {avatar.name, scene::Drive{1.5 * way}, 0});
+        for (const scene::AvatarSnapshot& avatar : world_.snapshot()->avatars)
+          submitAvatarCommand(world_, {avatar.name, scene::Drive{1.5 * way}, 0});
       }
-      const scene::TickReport report = tick(world_);
+      const scene::TickReport report = tickWorld(world_);
       const auto& avatars = report.snapshot->avatars;
       const auto ann = std::find_if(avatars.begin(), avatars.end(),
                                     [](const auto& a) { return a.name == "ann"; });
       if (ann == avatars.end()) break;
       turn();
-      WalkStop stop{report.snapshot, render::firstPerson(*ann, 64, 64), ann->id};
+      WalkStop stop{report.snapshot, render::makeFirstPersonCamera(*ann, 64, 64), ann->id};
       stop.camera.forward =
           collision::Vec3(std::cos(heading_), 0.2 * std::sin(0.01 * i), std::sin(heading_));
       stops.push_back(std::move(stop));
@@ -72,23 +72,23 @@ class SeededWalk {
   }
 
   bool stand(const std::string& name, const collision::Vec3& feet) {
-    const auto isThere = [&]() -> const scene::AvatarView* {
+    const auto isThere = [&]() -> const scene::AvatarSnapshot* {
       for (const auto& avatar : world_.snapshot()->avatars)
         if (avatar.name == name) return &avatar;
       return nullptr;
     };
-    if (submit(world_, {name, scene::Spawn{feet}, 0})) return false;
-    tick(world_);
+    if (submitAvatarCommand(world_, {name, scene::Spawn{feet}, 0})) return false;
+    tickWorld(world_);
     if (!isThere()) return false;
-    for (int i = 0; i < 60; ++i) tick(world_);
+    for (int i = 0; i < 60; ++i) tickWorld(world_);
     if (isThere() && isThere()->grounded) return true;
-    submit(world_, {name, scene::Leave{}, 0});
-    tick(world_);
+    submitAvatarCommand(world_, {name, scene::Leave{}, 0});
+    tickWorld(world_);
     return false;
   }
 
   bool standSomewhere(const std::string& name, int attempts) {
-    const scene::Box& b = world_.scene().bounds();
+    const scene::Aabb& b = world_.scene().bounds();
     for (int i = 0; i < attempts; ++i) {
       const double x = uniform(b.min.x() + 0.2 * b.size().x(), b.max.x() - 0.2 * b.size().x());
       const double z = uniform(b.min.z() + 0.2 * b.size().z(), b.max.z() - 0.2 * b.size().z());
@@ -98,11 +98,11 @@ class SeededWalk {
     return false;
   }
 
-  /// Towards where the walk goes, at most 2 rad/s.
+  /// Turns towards the direction of walking, at most 2 rad/s.
   void turn() {
-    constexpr double kFastest = 2.0 / 60;  // radians a tick
+    constexpr double kMaxTurn = 2.0 / 60;  // radians per tick
     heading_ +=
-        std::clamp(std::remainder(wanted_ - heading_, 2 * std::numbers::pi), -kFastest, kFastest);
+        std::clamp(std::remainder(wanted_ - heading_, 2 * std::numbers::pi), -kMaxTurn, kMaxTurn);
   }
 
   scene::World world_;

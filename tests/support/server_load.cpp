@@ -35,7 +35,7 @@ double uniform(std::mt19937_64& random, double low, double high) {
 std::vector<Vec3> standingPlaces(std::shared_ptr<const scene::Scene> still, int count,
                                  unsigned seed) {
   constexpr int kTries = 400;  // for each place
-  const scene::Box bounds = still->bounds();
+  const scene::Aabb bounds = still->bounds();
   scene::World world(std::move(still));
   std::mt19937_64 random(seed);
   std::vector<Vec3> places;
@@ -43,8 +43,8 @@ std::vector<Vec3> standingPlaces(std::shared_ptr<const scene::Scene> still, int 
     const double x = uniform(random, bounds.min.x(), bounds.max.x());
     const double y = uniform(random, bounds.min.y(), bounds.min.y() + 0.7 * bounds.size().y());
     const double z = uniform(random, bounds.min.z(), bounds.max.z());
-    scene::submit(world, {"p" + std::to_string(i), scene::Spawn{Vec3(x, y, z)}, 0});
-    const scene::TickReport report = scene::tick(world);
+    scene::submitAvatarCommand(world, {"p" + std::to_string(i), scene::Spawn{Vec3(x, y, z)}, 0});
+    const scene::TickReport report = scene::tickWorld(world);
     for (const scene::Notice& notice : report.notices) {
       if (notice.kind == scene::Notice::Kind::spawned) places.push_back(notice.position);
     }
@@ -56,15 +56,15 @@ std::vector<Vec3> standingPlaces(std::shared_ptr<const scene::Scene> still, int 
 
 namespace {
 
-constexpr std::size_t kMostFaults = 3;  // told of one client
+constexpr std::size_t kMaxFaults = 3;  // reported per client
 
-struct Told {
-  std::uint64_t firstTick = 0;  ///< that sees the command
-  std::uint64_t heardTick = 0;  ///< when it was sent
+struct DriveCommand {
+  std::uint64_t firstTick = 0;  ///< first tick after the command
+  std::uint64_t heardTick = 0;  ///< the last tick known when it was sent
   Vec3 velocity;
 };
 
-/// One client, and what it must hear.
+/// One client, with checks of the messages that it must receive.
 class Visitor {
  public:
   Visitor(std::size_t number, const LoadOptions& options, LoadResult& result)
@@ -82,7 +82,7 @@ class Visitor {
   protocol::AsyncClient& client() { return client_; }
   bool ready() const { return present_; }
   bool over() const { return over_; }
-  bool answered() const { return client_.underWay() == 0; }
+  bool answered() const { return client_.pendingRequests() == 0; }
   std::uint64_t heardTick() const { return heardTick_; }
 
   void runClock() {
@@ -91,25 +91,25 @@ class Visitor {
     ask(std::move(message), [](const protocol::Reply&) {});
   }
 
-  /// A new way each time, so that a State shows which command it follows.
+  /// Drives in a new direction each time, so that a State identifies the command in effect.
   void drive() {
     const double angle = uniform(random_, 0, 2 * std::numbers::pi);
     const double speed = uniform(random_, 0.5, 1.5);
-    Told told{0, heardTick_, speed * Vec3(std::cos(angle), 0, std::sin(angle))};
+    DriveCommand command{0, heardTick_, speed * Vec3(std::cos(angle), 0, std::sin(angle))};
     v1::ClientMessage message;
     message.mutable_command()->set_avatar(name_);
     v1::Vec3& velocity = *message.mutable_command()->mutable_drive()->mutable_velocity();
-    velocity.set_x(told.velocity.x());
-    velocity.set_z(told.velocity.z());
+    velocity.set_x(command.velocity.x());
+    velocity.set_z(command.velocity.z());
     ++result_.commands;
-    ask(std::move(message), [this, told](const protocol::Reply& reply) mutable {
+    ask(std::move(message), [this, command](const protocol::Reply& reply) mutable {
       ++result_.replies;
       if (!reply.message.command().accepted()) {
         ++result_.refused;
         return;
       }
-      told.firstTick = reply.message.command().tick();
-      if (watches_) told_.push_back(told);
+      command.firstTick = reply.message.command().tick();
+      if (watches_) pending_.push_back(command);
     });
   }
 
@@ -206,7 +206,7 @@ class Visitor {
     result_.droppedStates += state.dropped();
     if (state.tick() <= heardTick_ && heardTick_ != 0) fault("a State came out of order");
     heardTick_ = state.tick();
-    if (told_.empty()) return;
+    if (pending_.empty()) return;
     for (const v1::AvatarState& avatar : state.avatars()) {
       if (avatar.name() != name_) continue;
       follow(state.tick(), Vec3(avatar.move().asked().x(), 0, avatar.move().asked().z()) / tick_);
@@ -214,25 +214,25 @@ class Visitor {
     }
   }
 
-  /// The newest command that the avatar follows was shown now, and those before it gave way.
+  /// The newest command in effect was shown now; it replaced those before it.
   void follow(std::uint64_t tick, const Vec3& velocity) {
     constexpr double kSame = 1e-6;  // metres per second; commands differ by far more
-    for (std::size_t i = told_.size(); i-- > 0;) {
-      if ((told_[i].velocity - velocity).norm() > kSame) continue;
-      result_.acceptedToShown.push_back(tick + 1 - told_[i].firstTick);
-      result_.sentToShown.push_back(tick - told_[i].heardTick);
-      told_.erase(told_.begin(), told_.begin() + static_cast<std::ptrdiff_t>(i + 1));
+    for (std::size_t i = pending_.size(); i-- > 0;) {
+      if ((pending_[i].velocity - velocity).norm() > kSame) continue;
+      result_.acceptedToShown.push_back(tick + 1 - pending_[i].firstTick);
+      result_.sentToShown.push_back(tick - pending_[i].heardTick);
+      pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(i + 1));
       return;
     }
   }
 
   void fault(const std::string& text) {
-    if (faults_++ < kMostFaults) result_.faults.push_back(name_ + ": " + text);
+    if (faults_++ < kMaxFaults) result_.faults.push_back(name_ + ": " + text);
   }
 
   const LoadOptions& options_;
   LoadResult& result_;
-  const bool watches_;  ///< states
+  const bool watches_;  ///< receives states
   const std::string name_;
   std::mt19937_64 random_;
   double tick_ = 1;  ///< seconds
@@ -240,17 +240,17 @@ class Visitor {
   std::uint64_t sequence_ = 0, heardTick_ = 0, lost_ = 0;
   std::size_t faults_ = 0;
   std::set<std::pair<std::uint32_t, std::uint32_t>> open_;
-  std::deque<Told> told_;  ///< accepted, and not shown yet
+  std::deque<DriveCommand> pending_;  ///< accepted, and not shown yet
   protocol::AsyncClient client_;
 };
 
 using Visitors = std::vector<std::unique_ptr<Visitor>>;
 
-/// Lets all that can go on do so; waits up to `patience` where nobody can.
+/// Polls all connections; waits up to `patience` if none is ready.
 void turn(Visitors& visitors, std::chrono::milliseconds patience) {
   std::vector<pollfd> sockets;
   for (const auto& visitor : visitors) {
-    sockets.push_back({visitor->client().descriptor(), visitor->client().wanted(), 0});
+    sockets.push_back({visitor->client().descriptor(), visitor->client().pollEvents(), 0});
   }
   ::poll(sockets.data(), sockets.size(), static_cast<int>(patience.count()));
   for (std::size_t i = 0; i < visitors.size(); ++i) {
@@ -260,7 +260,7 @@ void turn(Visitors& visitors, std::chrono::milliseconds patience) {
   }
 }
 
-/// False when it took too long.
+/// Polls until `done` holds for all; false after a timeout.
 bool turnUntil(Visitors& visitors, const std::function<bool(const Visitor&)>& done) {
   constexpr std::chrono::seconds kPatience{60};
   const auto giveUp = Clock::now() + kPatience;
@@ -272,8 +272,8 @@ bool turnUntil(Visitors& visitors, const std::function<bool(const Visitor&)>& do
   return all();
 }
 
-/// Everyone drives at the rate, each at an own moment of the period. Sockets are looked at once a
-/// millisecond: at each command it would be these clients that take the processor.
+/// All clients send at the rate, each with its own phase. Sockets are polled once a millisecond:
+/// polling after each command would let these clients use up the CPU.
 void driveAll(Visitors& visitors, const LoadOptions& options, LoadResult& result) {
   constexpr std::chrono::milliseconds kLook{1};
   const auto start = Clock::now();
@@ -321,7 +321,7 @@ LoadResult runLoad(const LoadOptions& options, const std::function<void()>& befo
   beforeStop();
   stop();
   if (!turnUntil(visitors, [](const Visitor& one) { return one.over(); })) {
-    result.faults.push_back("not everyone was told goodbye");
+    result.faults.push_back("not every client received a Bye");
   }
   for (const auto& visitor : visitors) visitor->checkEnd();
   std::sort(result.acceptedToShown.begin(), result.acceptedToShown.end());
@@ -339,7 +339,7 @@ void visitRudely(std::uint16_t port, int count, unsigned seed) {
     const auto manner = random() % 7;
     if (manner == 0) continue;  // closes at once
     raw.sendHello();
-    if (manner == 1) continue;  // does not wait for the welcome
+    if (manner == 1) continue;  // does not wait for the Welcome
     if (manner == 2) raw.receive();
     if (manner <= 3) {
       raw.send(std::vector<std::uint8_t>{100, 0, 0, 0, 50, 0, 0, 0, 1, 2, 3});
@@ -351,7 +351,7 @@ void visitRudely(std::uint16_t port, int count, unsigned seed) {
       raw.receive();
       continue;
     }
-    if (manner == 6) {  // its avatar is left to itself
+    if (manner == 6) {  // abandons its avatar
       v1::ClientMessage spawn;
       spawn.set_request_id(2);
       spawn.mutable_command()->set_avatar("visitor" + std::to_string(i));

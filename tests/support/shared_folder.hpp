@@ -1,4 +1,4 @@
-// Where the real scenes lie that are too large for the repository.
+// Locates the folder of the real scenes that are too large for the repository.
 #pragma once
 
 #include <cstdlib>
@@ -7,8 +7,8 @@
 
 namespace enfilade::tests {
 
-/// $ENFILADE_SHARED, else `shared` beside the source folder; nullopt where there is none. A test
-/// that needs it skips then, unless the environment variable CI is set: there it fails.
+/// $ENFILADE_SHARED, otherwise `shared` next to the source folder; nullopt if absent. A test that
+/// needs it is then skipped, or fails if the environment variable CI is set.
 inline std::optional<std::filesystem::path> sharedFolder() {
   namespace fs = std::filesystem;
   if (const char* named = std::getenv("ENFILADE_SHARED"); named != nullptr) {
@@ -21,11 +21,11 @@ inline std::optional<std::filesystem::path> sharedFolder() {
 
 }  // namespace enfilade::tests
 
-/// Ends the test where the folder is missing: as skipped, or in CI as failed.
-#define ENFILADE_NEED_SHARED(folder)                                                           \
-  const auto folder = enfilade::tests::sharedFolder();                                         \
-  if (!folder) {                                                                               \
-    const char* reason = "no shared folder: set ENFILADE_SHARED or put it beside the sources"; \
-    if (std::getenv("CI") != nullptr) FAIL() << reason;                                        \
-    GTEST_SKIP() << reason;                                                                    \
+/// Ends the test if the folder is missing: as skipped, or in CI as failed.
+#define ENFILADE_NEED_SHARED(folder)                                                            \
+  const auto folder = enfilade::tests::sharedFolder();                                          \
+  if (!folder) {                                                                                \
+    const char* reason = "no shared folder: set ENFILADE_SHARED or put it next to the sources"; \
+    if (std::getenv("CI") != nullptr) FAIL() << reason;                                         \
+    GTEST_SKIP() << reason;                                                                     \
   }

@@ -1,4 +1,4 @@
-// Where a test keeps its files: never under a name that another test, or another run, uses too.
+// Paths for tests' files, unique among all tests and concurrent runs.
 #pragma once
 
 #include <unistd.h>
@@ -10,7 +10,7 @@
 
 namespace enfilade::tests {
 
-/// A folder of its own, gone at the end.
+/// A new folder, deleted by the destructor.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -33,11 +33,11 @@ class TemporaryFolder {
   }
 
  private:
-  pid_t owner_ = ::getpid();  // a child that forked off must not take it away
+  pid_t owner_ = ::getpid();  // a forked child must not delete it
   std::filesystem::path path_;
 };
 
-/// A file of this process alone, gone at its end.
+/// A file of this process alone, deleted at exit.
 inline std::filesystem::path ownFile(const std::string& name) {
   static const TemporaryFolder folder;
   return folder.path() / name;

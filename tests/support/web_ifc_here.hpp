@@ -1,4 +1,4 @@
-// Whether web-ifc can read IFC here: it needs Node.js and one `npm ci`.
+// Whether web-ifc can read IFC on this machine: it needs Node.js and one `npm ci`.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -9,8 +9,8 @@
 
 namespace enfilade::tests {
 
-/// Tests leave out what needs web-ifc where it is missing. In CI that is a failure of the test that
-/// asks, so that no reader goes untested unnoticed.
+/// Tests skip web-ifc if it is missing. In CI its absence fails the calling test, so that no reader
+/// is skipped unnoticed.
 inline bool hasWebIfc() {
   const std::string missing = scene::findWebIfc().missing;
   if (!missing.empty() && std::getenv("CI") != nullptr)
@@ -20,6 +20,6 @@ inline bool hasWebIfc() {
 
 }  // namespace enfilade::tests
 
-/// Ends the test where web-ifc is missing: as skipped, or in CI as failed.
+/// Ends the test if web-ifc is missing: as skipped, or in CI as failed.
 #define ENFILADE_NEED_WEB_IFC() \
   if (!enfilade::tests::hasWebIfc()) GTEST_SKIP() << enfilade::scene::findWebIfc().missing

@@ -8,28 +8,28 @@
 namespace enfilade::protocol {
 namespace {
 
-struct Awaited {
+struct PendingRequest {
   std::uint64_t id = 0;
   AsyncClient::OnReply onReply;
 };
 
-v1::Error errorOf(v1::ErrorCode code, const std::string& text) {
+v1::Error makeError(v1::ErrorCode code, const std::string& text) {
   v1::Error error;
   error.set_code(code);
   error.set_message(text);
   return error;
 }
 
-Reply lostReply(const v1::Error& why) {
+Reply makeLostReply(const v1::Error& error) {
   Reply reply;
   reply.lost = true;
-  *reply.message.mutable_error() = why;
+  *reply.message.mutable_error() = error;
   return reply;
 }
 
 }  // namespace
 
-/// Shared with whoever is inside advance(): a function of the user's may destroy the client.
+/// The client's state. advance() shares its ownership, because a handler may destroy the client.
 struct AsyncClient::State {
   State(const std::string& host, std::uint16_t port, AsyncHandlers userHandlers,
         const AsyncOptions& userOptions)
@@ -37,59 +37,60 @@ struct AsyncClient::State {
         handlers(std::move(userHandlers)),
         connection(host, port, userOptions.limits) {}
 
-  void take(Received received);
-  void takeAnswer(Received received);
-  void takeUnasked(Received received);
-  void greeted(const v1::ServerMessage& answer);
-  void end(v1::Error reason);
+  void handleMessage(Received received);
+  void handleReply(Received received);
+  void handleEvent(Received received);
+  void handleWelcome(const v1::ServerMessage& reply);
+  void finish(v1::Error reason);
 
   const AsyncOptions options;
   const AsyncHandlers handlers;
   Connection connection;
-  std::deque<Awaited> awaited;  ///< replies come in the order of the requests
+  std::deque<PendingRequest> pending;  ///< replies arrive in the order of the requests
   std::uint64_t lastId = 0;
-  v1::Error lastWords;  ///< of the server: an error of the connection, or its goodbye
-  bool over = false;    ///< `closed` was told
-  v1::Error why;        ///< when over
-  bool gone = false;    ///< the client is destroyed: nobody is told anything
+  v1::Error finalMessage;        ///< last Error or Bye of the server
+  bool isClosed = false;         ///< AsyncHandlers::closed was called
+  v1::Error closeReason;         ///< valid if isClosed
+  bool clientDestroyed = false;  ///< no handler may be called any more
 };
 
-void AsyncClient::State::end(v1::Error reason) {
-  if (over) return;
-  over = true;
-  why = std::move(reason);
-  connection.breakOff(why.message());
-  for (const Awaited& one : std::exchange(awaited, {})) {
-    if (!gone) one.onReply(lostReply(why));
+void AsyncClient::State::finish(v1::Error reason) {
+  if (isClosed) return;
+  isClosed = true;
+  closeReason = std::move(reason);
+  connection.disconnect(closeReason.message());
+  for (const PendingRequest& one : std::exchange(pending, {})) {
+    if (!clientDestroyed) one.onReply(makeLostReply(closeReason));
   }
-  if (!gone && handlers.closed) handlers.closed(why);
+  if (!clientDestroyed && handlers.closed) handlers.closed(closeReason);
 }
 
-void AsyncClient::State::greeted(const v1::ServerMessage& answer) {
-  if (auto problem = welcomeProblem(answer, connection.peer())) return end(std::move(*problem));
-  if (handlers.welcome) handlers.welcome(answer.welcome());
+void AsyncClient::State::handleWelcome(const v1::ServerMessage& reply) {
+  if (auto problem = validateWelcome(reply, connection.peer())) return finish(std::move(*problem));
+  if (handlers.welcome) handlers.welcome(reply.welcome());
 }
 
-void AsyncClient::State::takeAnswer(Received received) {
-  if (awaited.empty() || awaited.front().id != received.message.reply_to()) {
-    return end(errorOf(v1::ERROR_BAD_MESSAGE, connection.peer() + " answered request " +
-                                                  std::to_string(received.message.reply_to()) +
-                                                  ", whose turn it is not"));
+void AsyncClient::State::handleReply(Received received) {
+  if (pending.empty() || pending.front().id != received.message.reply_to()) {
+    return finish(
+        makeError(v1::ERROR_BAD_MESSAGE, connection.peer() + " answered request " +
+                                             std::to_string(received.message.reply_to()) +
+                                             ", which is not the oldest pending request"));
   }
-  const Awaited asked = std::move(awaited.front());
-  awaited.pop_front();
-  asked.onReply({std::move(received.message), std::move(received.attachment)});
+  const PendingRequest pendingRequest = std::move(pending.front());
+  pending.pop_front();
+  pendingRequest.onReply({std::move(received.message), std::move(received.attachment)});
 }
 
-void AsyncClient::State::takeUnasked(Received received) {
+void AsyncClient::State::handleEvent(Received received) {
   const v1::ServerMessage& message = received.message;
   if (message.has_error()) {
-    lastWords = message.error();
+    finalMessage = message.error();
   } else if (message.has_bye()) {
-    if (lastWords.message().empty())
-      lastWords = errorOf(message.bye().code(), message.bye().reason());
-    lastWords.set_message(connection.peer() + " said goodbye: " + lastWords.message());
-    end(lastWords);
+    if (finalMessage.message().empty())
+      finalMessage = makeError(message.bye().code(), message.bye().reason());
+    finalMessage.set_message(connection.peer() + " closed the session: " + finalMessage.message());
+    finish(finalMessage);
   } else if (message.has_events() && handlers.events) {
     handlers.events(message.events());
   } else if (message.has_state() && handlers.state) {
@@ -101,47 +102,47 @@ void AsyncClient::State::takeUnasked(Received received) {
   }
 }
 
-void AsyncClient::State::take(Received received) {
-  if (received.message.reply_to() != 0) return takeAnswer(std::move(received));
-  takeUnasked(std::move(received));
+void AsyncClient::State::handleMessage(Received received) {
+  if (received.message.reply_to() != 0) return handleReply(std::move(received));
+  handleEvent(std::move(received));
 }
 
 AsyncClient::AsyncClient(const std::string& host, std::uint16_t port, AsyncHandlers handlers,
                          const AsyncOptions& options)
     : state_(std::make_shared<State>(host, port, std::move(handlers), options)) {
-  // It is its turn first, so nothing can stand before the welcome.
-  v1::ClientMessage hello = helloOf(options.name, options.token);
+  // The hello is the first message, so that the welcome is the first reply.
+  v1::ClientMessage hello = makeHello(options.name, options.token);
   hello.mutable_hello()->set_world(options.world);
   request(std::move(hello), [state = state_.get()](const Reply& reply) {
-    if (!reply.lost) state->greeted(reply.message);
+    if (!reply.lost) state->handleWelcome(reply.message);
   });
 }
 
 AsyncClient::~AsyncClient() {
-  if (state_) state_->gone = true;
+  if (state_) state_->clientDestroyed = true;
 }
 
 AsyncClient::AsyncClient(AsyncClient&&) noexcept = default;
 
 AsyncClient& AsyncClient::operator=(AsyncClient&& other) noexcept {
   if (this == &other) return *this;
-  if (state_) state_->gone = true;
+  if (state_) state_->clientDestroyed = true;
   state_ = std::move(other.state_);
   return *this;
 }
 
 void AsyncClient::request(v1::ClientMessage message, OnReply onReply) {
   State& state = *state_;
-  if (state.over) return onReply(lostReply(state.why));
-  if (state.awaited.size() >= state.options.requestsUnderWay ||
-      state.connection.unsent() > state.options.unsentBytes) {
-    throw TooManyRequests(state.connection.peer() + ": " + std::to_string(state.awaited.size()) +
+  if (state.isClosed) return onReply(makeLostReply(state.closeReason));
+  if (state.pending.size() >= state.options.maxPendingRequests ||
+      state.connection.unsent() > state.options.maxUnsentBytes) {
+    throw TooManyRequests(state.connection.peer() + ": " + std::to_string(state.pending.size()) +
                           " requests and " + std::to_string(state.connection.unsent()) +
-                          " bytes are under way: let replies come first");
+                          " bytes are pending: wait for replies first");
   }
   message.set_request_id(++state.lastId);
   state.connection.send(message);
-  state.awaited.push_back({state.lastId, std::move(onReply)});
+  state.pending.push_back({state.lastId, std::move(onReply)});
 }
 
 std::future<Reply> AsyncClient::request(v1::ClientMessage message) {
@@ -150,34 +151,34 @@ std::future<Reply> AsyncClient::request(v1::ClientMessage message) {
   return promise->get_future();
 }
 
-std::size_t AsyncClient::underWay() const {
-  return state_->awaited.size();
+std::size_t AsyncClient::pendingRequests() const {
+  return state_->pending.size();
 }
 
 int AsyncClient::descriptor() const {
   return state_->connection.descriptor();
 }
 
-short AsyncClient::wanted() const {
-  return state_->connection.wanted();
+short AsyncClient::pollEvents() const {
+  return state_->connection.pollEvents();
 }
 
 bool AsyncClient::advance() {
-  const std::shared_ptr<State> state = state_;  // outlives what the functions do to us
-  while (!state->gone && !state->over) {
+  const std::shared_ptr<State> state = state_;  // keeps the state alive for handlers
+  while (!state->clientDestroyed && !state->isClosed) {
     auto received = state->connection.next();
     if (!received) break;
-    state->take(std::move(*received));
+    state->handleMessage(std::move(*received));
   }
-  if (state->gone) return false;
-  if (!state->connection.broken().empty()) {
-    state->end(errorOf(v1::ERROR_UNSPECIFIED, state->connection.broken()));
+  if (state->clientDestroyed) return false;
+  if (!state->connection.disconnectReason().empty()) {
+    state->finish(makeError(v1::ERROR_UNSPECIFIED, state->connection.disconnectReason()));
   }
-  return !state->over;
+  return !state->isClosed;
 }
 
-bool AsyncClient::run(std::chrono::milliseconds patience) {
-  state_->connection.await(wanted(), std::chrono::steady_clock::now() + patience);
+bool AsyncClient::run(std::chrono::milliseconds timeout) {
+  state_->connection.waitFor(pollEvents(), std::chrono::steady_clock::now() + timeout);
   return advance();
 }
 

@@ -1,9 +1,9 @@
-// A client of one server that never waits: replies and what comes unasked arrive in functions of
-// the user's. It has no thread: its owner calls advance() whenever descriptor() is ready, or run(),
-// which waits for that. All functions are called inside advance(), run() and, where the connection
-// is lost, request(); from any of them the client may be used, and destroyed.
+// A non-blocking client of one server. Replies and events arrive in handlers. The client has no
+// thread: its owner calls advance() when descriptor() is ready, or run(), which waits for that.
+// Handlers run inside advance(), run() and, if the connection is lost, request(). A handler may use
+// and destroy the client.
 //
-// Not for use from two threads at once. Reconnecting is the user's: make a new one.
+// Not thread-safe. To reconnect, create a new client.
 #pragma once
 
 #include <chrono>
@@ -21,59 +21,61 @@ namespace enfilade::protocol {
 
 struct AsyncOptions {
   std::string name = "enfilade client";
-  std::string token;  ///< for servers that want one
-  std::string world;  ///< that it enters; empty: the main one
-  FramingLimits limits = kClientTakes;
-  std::size_t requestsUnderWay = 1024;  ///< without a reply
-  std::size_t unsentBytes = 4u << 20;   ///< of requests that the socket does not take yet
+  std::string token;  ///< for servers that require one
+  std::string world;  ///< the world to join; empty: the main world
+  FramingLimits limits = kClientLimits;
+  std::size_t maxPendingRequests = 1024;  ///< limit of requests without a reply
+  std::size_t maxUnsentBytes = 4u << 20;  ///< limit of request bytes that the socket did not accept
+                                          ///< yet
 };
 
-/// More requests than AsyncOptions allows: let replies come first.
+/// Thrown if AsyncOptions allows no more requests. Wait for replies first.
 struct TooManyRequests : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The answer to one request. Where `message` has an Error, the server refused it.
+/// The reply to one request. An Error in `message` means that the server refused the request.
 struct Reply {
   v1::ServerMessage message;
   std::vector<std::uint8_t> attachment;
-  bool lost = false;  ///< no answer: the connection ended, as the Error in `message` says
+  bool lost = false;  ///< the connection ended first; the Error in `message` has the reason
 };
 
-/// What comes unasked; any may be empty.
+/// Handlers of events. Each may be empty.
 struct AsyncHandlers {
-  std::function<void(const v1::Welcome&)> welcome;  ///< once, before all else
+  std::function<void(const v1::Welcome&)> welcome;  ///< called once, before all other handlers
   std::function<void(const v1::TickEvents&)> events;
   std::function<void(const v1::State&)> state;
-  std::function<void(const v1::Frame&, std::vector<std::uint8_t> pixels)> frame;  ///< of a watch
+  std::function<void(const v1::Frame&, std::vector<std::uint8_t> pixels)> frame;  ///< of a frame
+                                                                                  ///< subscription
   std::function<void(const v1::Replay&)> replay;  ///< of a world that plays a recording
-  /// The last call: the connection is over. Requests without an answer were told before.
-  std::function<void(const v1::Error& why)> closed;
+  /// The connection ended. This is the last call; pending requests were completed before.
+  std::function<void(const v1::Error& reason)> closed;
 };
 
 class AsyncClient {
  public:
-  /// Begins to connect and greet. Does not throw where nobody answers: `closed` is told. A name is
-  /// looked up at once; an address in numbers never waits.
+  /// Starts to connect. Does not throw if no server answers: `closed` is called instead. A host
+  /// name is looked up synchronously; a numeric address never blocks.
   AsyncClient(const std::string& host, std::uint16_t port, AsyncHandlers handlers,
               const AsyncOptions& options = {});
-  ~AsyncClient();  ///< closes; whoever waits for a reply is not told, futures are broken
+  ~AsyncClient();  ///< closes; pending handlers are not called, futures are broken
   AsyncClient(AsyncClient&&) noexcept;
   AsyncClient& operator=(AsyncClient&&) noexcept;
 
   using OnReply = std::function<void(Reply)>;
-  /// May be called before the welcome: it goes out behind the hello. request_id is filled in.
+  /// Sends a request and fills in its request_id. May be called before the welcome.
   /// Throws TooManyRequests.
   void request(v1::ClientMessage message, OnReply onReply);
   std::future<Reply> request(v1::ClientMessage message);
-  std::size_t underWay() const;  ///< requests without a reply
+  std::size_t pendingRequests() const;  ///< number of requests without a reply
 
-  int descriptor() const;  ///< for poll(); -1 when the connection is over
-  short wanted() const;    ///< the events to poll for
-  /// Does all that can be done without waiting. False when the connection is over.
+  int descriptor() const;    ///< for poll(); -1 after the connection ended
+  short pollEvents() const;  ///< the events for poll()
+  /// Sends and receives without blocking. Returns false after the connection ended.
   bool advance();
-  /// Waits for the socket, up to `patience`, and advances. False when the connection is over.
-  bool run(std::chrono::milliseconds patience);
+  /// Waits up to `timeout` for the socket and advances. Returns false after the connection ended.
+  bool run(std::chrono::milliseconds timeout);
 
  private:
   struct State;

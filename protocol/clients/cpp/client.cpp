@@ -12,7 +12,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-std::string secondsText(std::chrono::milliseconds time) {
+std::string formatSeconds(std::chrono::milliseconds time) {
   const auto count = time.count();
   return count % 1000 == 0 ? std::to_string(count / 1000) + " s" : std::to_string(count) + " ms";
 }
@@ -34,7 +34,7 @@ std::span<const std::uint8_t> ReceivedFrame::plane(v1::Channel channel) const {
 
 // ---- the connection ----------------------------------------------------------------------------
 
-/// Connection, with waiting.
+/// A Connection with blocking operations.
 struct Client::State {
   State(const std::string& host, std::uint16_t port, const ClientOptions& clientOptions)
       : options(clientOptions), connection(host, port, clientOptions.limits) {}
@@ -43,100 +43,100 @@ struct Client::State {
   void greet(Clock::time_point deadline);
   void send(const v1::ClientMessage& message, Clock::time_point deadline);
   std::optional<Received> receive(Clock::time_point deadline);
-  void keepUnasked(v1::ServerMessage message);
-  [[noreturn]] void breakOff(const std::string& reason);
+  void queueEvent(v1::ServerMessage message);
+  [[noreturn]] void disconnect(const std::string& reason);
   void throwIfBroken() const;
-  bool over() const { return !ended.empty() || !connection.broken().empty(); }
+  bool isClosed() const { return !endReason.empty() || !connection.disconnectReason().empty(); }
 
   ClientOptions options;
   Connection connection;
   std::deque<v1::ServerMessage> events;
   v1::Welcome welcome;
   std::uint64_t lastId = 0;
-  std::string ended;  ///< not empty: the server ended the connection, and why
+  std::string endReason;  ///< not empty: the server's reason for ending the connection
 };
 
-void Client::State::breakOff(const std::string& reason) {
-  connection.breakOff(reason);
-  throw ConnectionError(connection.broken());
+void Client::State::disconnect(const std::string& reason) {
+  connection.disconnect(reason);
+  throw ConnectionError(connection.disconnectReason());
 }
 
 void Client::State::throwIfBroken() const {
-  if (!ended.empty()) throw ConnectionError(ended);
-  if (!connection.broken().empty()) throw ConnectionError(connection.broken());
+  if (!endReason.empty()) throw ConnectionError(endReason);
+  if (!connection.disconnectReason().empty()) throw ConnectionError(connection.disconnectReason());
 }
 
 void Client::State::connect(Clock::time_point deadline) {
-  while (connection.broken().empty() && !connection.connected()) {
-    if (!connection.await(POLLOUT, deadline)) {
-      breakOff("cannot connect to " + connection.peer() + ": nobody answered within " +
-               secondsText(options.timeout) +
-               "; is `enfilade serve` running there, and is the port the one of its ready line?");
+  while (connection.disconnectReason().empty() && !connection.connected()) {
+    if (!connection.waitFor(POLLOUT, deadline)) {
+      disconnect("cannot connect to " + connection.peer() + ": no answer within " +
+                 formatSeconds(options.timeout) +
+                 "; is `enfilade serve` running there, and does the port match its ready line?");
     }
     connection.advance();
   }
   throwIfBroken();
 }
 
-/// Returns when all was sent. What comes meanwhile waits in the socket.
+/// Returns after all bytes were sent. Incoming messages stay in the socket.
 void Client::State::send(const v1::ClientMessage& message, Clock::time_point deadline) {
   connection.send(message);
-  while (connection.unsent() > 0 && connection.broken().empty()) {
+  while (connection.unsent() > 0 && connection.disconnectReason().empty()) {
     if (connection.writeFailed()) {
-      // What the server said last is worth more than the broken pipe.
+      // The server's last message explains more than the broken pipe.
       while (auto received = receive(Clock::now())) {
-        if (received->message.reply_to() == 0) keepUnasked(std::move(received->message));
+        if (received->message.reply_to() == 0) queueEvent(std::move(received->message));
         throwIfBroken();
       }
-      breakOff(connection.peer() + " closed the connection");
+      disconnect(connection.peer() + " closed the connection");
     }
-    if (!connection.await(POLLOUT, deadline)) {
-      breakOff(connection.peer() + " took nothing for " + secondsText(options.timeout) +
-               "; is the server stopped or overloaded?");
+    if (!connection.waitFor(POLLOUT, deadline)) {
+      disconnect(connection.peer() + " accepted no data for " + formatSeconds(options.timeout) +
+                 "; is the server stopped or overloaded?");
     }
     connection.advance();
   }
   throwIfBroken();
 }
 
-/// The next message; nullopt when the deadline came first (what came of it is kept).
+/// Returns the next message; nullopt after the deadline (a partial message is kept).
 std::optional<Received> Client::State::receive(Clock::time_point deadline) {
   for (;;) {
     if (auto received = connection.next()) return received;
     throwIfBroken();
-    if (!connection.await(POLLIN, deadline)) return std::nullopt;
+    if (!connection.waitFor(POLLIN, deadline)) return std::nullopt;
   }
 }
 
-/// Queues an event. After a Bye, which is the last, the connection is broken; errors of the
-/// connection are thrown.
-void Client::State::keepUnasked(v1::ServerMessage message) {
+/// Queues an event. A Bye is the last event and breaks the connection. Throws connection errors.
+void Client::State::queueEvent(v1::ServerMessage message) {
   if (message.has_error()) {
     const v1::Error& error = message.error();
-    ended = connection.peer() + " ended the connection: " + error.message();
-    throw ProtocolError(error.code(), ended, error.field());
+    endReason = connection.peer() + " ended the connection: " + error.message();
+    throw ProtocolError(error.code(), endReason, error.field());
   }
   if (message.has_bye()) {
     const std::string& reason = message.bye().reason();
-    ended = connection.peer() + " said goodbye: " + (reason.empty() ? "no reason given" : reason);
+    endReason =
+        connection.peer() + " closed the session: " + (reason.empty() ? "no reason given" : reason);
   }
   events.push_back(std::move(message));
 }
 
 void Client::State::greet(Clock::time_point deadline) {
-  v1::ClientMessage hello = helloOf(options.name, options.token);
+  v1::ClientMessage hello = makeHello(options.name, options.token);
   hello.set_request_id(++lastId);
   hello.mutable_hello()->set_world(options.world);
   send(hello, deadline);
   auto received = receive(deadline);
   if (!received) {
-    breakOff(connection.peer() + " did not answer the greeting within " +
-             secondsText(options.timeout) + "; is that an Enfilade server?");
+    disconnect(connection.peer() + " did not answer the greeting within " +
+               formatSeconds(options.timeout) + "; is that an Enfilade server?");
   }
   if (received->message.has_bye()) {
-    breakOff(connection.peer() + " refused the connection: " + received->message.bye().reason());
+    disconnect(connection.peer() + " refused the connection: " + received->message.bye().reason());
   }
-  if (const auto problem = welcomeProblem(received->message, connection.peer())) {
+  if (const auto problem = validateWelcome(received->message, connection.peer())) {
     throw ProtocolError(problem->code(), problem->message(), problem->field());
   }
   welcome = std::move(*received->message.mutable_welcome());
@@ -152,14 +152,14 @@ Client::Client(const std::string& host, std::uint16_t port, const ClientOptions&
 }
 
 Client::~Client() {
-  if (!state_ || state_->over()) return;
+  if (!state_ || state_->isClosed()) return;
   v1::ClientMessage bye;
   bye.set_request_id(++state_->lastId);
   bye.mutable_bye();
   try {
     state_->send(bye, Clock::now() + std::chrono::milliseconds(100));
   } catch (const std::exception&) {
-    // The connection ends either way.
+    // The connection ends in any case.
   }
 }
 
@@ -180,19 +180,19 @@ v1::ServerMessage Client::request(v1::ClientMessage message,
   for (;;) {
     auto received = state_->receive(deadline);
     if (!received) {
-      state_->breakOff(state_->connection.peer() + " did not answer within " +
-                       secondsText(state_->options.timeout) +
-                       "; is it overloaded? A longer timeout may help");
+      state_->disconnect(state_->connection.peer() + " did not answer within " +
+                         formatSeconds(state_->options.timeout) +
+                         "; is it overloaded? A longer timeout may help");
     }
     if (received->message.reply_to() == 0) {
-      state_->keepUnasked(std::move(received->message));
+      state_->queueEvent(std::move(received->message));
       state_->throwIfBroken();
       continue;
     }
     if (received->message.reply_to() != id) {
-      state_->breakOff(state_->connection.peer() + " answered request " +
-                       std::to_string(received->message.reply_to()) + " instead of " +
-                       std::to_string(id));
+      state_->disconnect(state_->connection.peer() + " answered request " +
+                         std::to_string(received->message.reply_to()) + " instead of " +
+                         std::to_string(id));
     }
     if (received->message.has_error()) {
       const v1::Error& error = received->message.error();
@@ -205,12 +205,12 @@ v1::ServerMessage Client::request(v1::ClientMessage message,
 
 namespace {
 
-/// Throws when the reply is not of the kind that was asked for.
+/// Throws if the reply has another type than requested.
 void expectBody(const v1::ServerMessage& reply, v1::ServerMessage::BodyCase wanted,
                 const char* name) {
   if (reply.body_case() != wanted) {
     throw ProtocolError(v1::ERROR_BAD_MESSAGE, std::string("the server's reply is not a ") + name +
-                                                   "; do the versions fit?");
+                                                   "; do the versions match?");
   }
 }
 
@@ -219,21 +219,21 @@ void expectBody(const v1::ServerMessage& reply, v1::ServerMessage::BodyCase want
 std::optional<v1::Error> Client::command(const v1::Command& command) {
   v1::ClientMessage message;
   *message.mutable_command() = command;
-  return tell(std::move(message));
+  return sendCommand(std::move(message));
 }
 
 std::optional<v1::Error> Client::bodyCommand(const v1::BodyCommand& command) {
   v1::ClientMessage message;
   *message.mutable_body_command() = command;
-  return tell(std::move(message));
+  return sendCommand(std::move(message));
 }
 
-std::optional<v1::Error> Client::tell(v1::ClientMessage message) {
+std::optional<v1::Error> Client::sendCommand(v1::ClientMessage message) {
   v1::ServerMessage reply;
   try {
     reply = request(std::move(message));
   } catch (const ProtocolError& problem) {
-    if (state_->over()) throw;
+    if (state_->isClosed()) throw;
     v1::Error error;
     error.set_code(problem.code);
     error.set_message(problem.what());
@@ -297,7 +297,7 @@ ReceivedFrame Client::frame(const v1::FrameRequest& frameRequest) {
     if (plane.offset() > frame.pixels.size() ||
         plane.length() > frame.pixels.size() - plane.offset()) {
       throw ProtocolError(v1::ERROR_BAD_MESSAGE,
-                          "a plane of the frame reaches beyond its attachment of " +
+                          "a plane of the frame exceeds its attachment of " +
                               std::to_string(frame.pixels.size()) + " bytes",
                           "frame.planes");
     }
@@ -308,7 +308,7 @@ ReceivedFrame Client::frame(const v1::FrameRequest& frameRequest) {
 v1::RayReply Client::rays(const v1::RayQuery& query, ReceivedScan* scan) {
   v1::ClientMessage message;
   *message.mutable_rays() = query;
-  message.mutable_rays()->clear_packed();  // hits are what the caller gets
+  message.mutable_rays()->clear_packed();  // the caller gets hits
   std::vector<std::uint8_t> bytes;
   v1::ServerMessage reply = request(std::move(message), &bytes);
   expectBody(reply, v1::ServerMessage::kRays, "RayReply");
@@ -374,15 +374,15 @@ std::deque<v1::ServerMessage> Client::takeEvents() {
   return std::exchange(state_->events, {});
 }
 
-std::optional<v1::ServerMessage> Client::nextEvent(std::chrono::milliseconds patience) {
+std::optional<v1::ServerMessage> Client::nextEvent(std::chrono::milliseconds timeout) {
   if (state_->events.empty()) {
     state_->throwIfBroken();
-    auto received = state_->receive(Clock::now() + patience);
+    auto received = state_->receive(Clock::now() + timeout);
     if (!received) return std::nullopt;
     if (received->message.reply_to() != 0) {
-      state_->breakOff(state_->connection.peer() + " answered a request that is not outstanding");
+      state_->disconnect(state_->connection.peer() + " answered a request that is not pending");
     }
-    state_->keepUnasked(std::move(received->message));
+    state_->queueEvent(std::move(received->message));
   }
   v1::ServerMessage event = std::move(state_->events.front());
   state_->events.pop_front();

@@ -31,8 +31,8 @@ std::optional<v1::Error> SocketDriver::submit(const v1::BodyCommand& command) {
   return client_.bodyCommand(command);
 }
 
-/// Other clients' avatars are in the same world; their doings are not this script's. What bodies do
-/// to one another is everybody's.
+/// True for contacts of this script's avatars and for contacts between bodies. Other clients'
+/// avatars may be in the same world.
 bool SocketDriver::concerns(const v1::ContactEvent& contact) const {
   const auto isAvatar = [&](std::uint32_t id) { return id > client_.welcome().scene().objects(); };
   const bool a = isAvatar(contact.a()), b = isAvatar(contact.b());
@@ -72,7 +72,7 @@ CapturedFrame SocketDriver::capture(const v1::Notice& notice) {
   captured.avatar = notice.avatar();
   captured.tag = notice.tag();
   try {
-    ReceivedFrame frame = client_.frame(captureRequest(notice, format_));
+    ReceivedFrame frame = client_.frame(makeCaptureRequest(notice, format_));
     captured.description = std::move(frame.description);
     captured.pixels = std::move(frame.pixels);
   } catch (const ProtocolError& problem) {
@@ -81,7 +81,7 @@ CapturedFrame SocketDriver::capture(const v1::Notice& notice) {
   return captured;
 }
 
-v1::FrameRequest captureRequest(const v1::Notice& notice, const CaptureFormat& format) {
+v1::FrameRequest makeCaptureRequest(const v1::Notice& notice, const CaptureFormat& format) {
   v1::FrameRequest request;
   request.mutable_eyes()->set_avatar(notice.avatar());
   request.set_width(format.width);

@@ -1,15 +1,15 @@
-// Drives a script over a connection, in lockstep.
+// Runs a script over a connection, in lockstep with the server's ticks.
 #pragma once
 
 #include <set>
 #include <string>
 
 #include "protocol/clients/cpp/client.hpp"
-#include "protocol/script/script.hpp"
+#include "protocol/script/script_run.hpp"
 
 namespace enfilade::protocol {
 
-/// What pictures a script's captures are.
+/// The format of a script's captures.
 struct CaptureFormat {
   std::uint32_t width = 640, height = 480;  ///< pixels
   std::vector<v1::Channel> channels{v1::CHANNEL_RGB};
@@ -18,8 +18,8 @@ struct CaptureFormat {
 
 class SocketDriver : public ScriptDriver {
  public:
-  /// Takes the clock and subscribes to contacts and notices. `client` outlives the driver. Throws
-  /// ProtocolError when another client drives.
+  /// Takes control of the clock and subscribes to contacts and notices. `client` outlives the
+  /// driver. Throws ProtocolError if another client controls the clock.
   explicit SocketDriver(Client& client, CaptureFormat format = {});
 
   double tickSeconds() const override;
@@ -33,10 +33,10 @@ class SocketDriver : public ScriptDriver {
 
   Client& client_;
   CaptureFormat format_;
-  std::set<std::string> avatars_;  ///< that this script commands
+  std::set<std::string> avatars_;  ///< avatars of this script
 };
 
-/// What to ask for when `notice` says that a capture is due.
-v1::FrameRequest captureRequest(const v1::Notice& notice, const CaptureFormat& format);
+/// Makes the frame request for a capture notice.
+v1::FrameRequest makeCaptureRequest(const v1::Notice& notice, const CaptureFormat& format);
 
 }  // namespace enfilade::protocol

@@ -1,14 +1,14 @@
-// A client of Enfilade over WebSocket, for browsers and Node.js. The messages are those of
+// Client of Enfilade over WebSocket, for browsers and Node.js. The messages are those of
 // enfilade.proto: `client.request("step", { ticks: 60 })`, with fields in camelCase and 64-bit numbers
-// as BigInt. The file that describes them is the Python client's, which the build keeps up to date.
+// as BigInt. Their descriptor is the file of the Python client, which the build keeps up to date.
 import { create, createFileRegistry, fromBinary, toBinary } from "@bufbuild/protobuf";
 import { FileDescriptorSetSchema } from "@bufbuild/protobuf/wkt";
 
 export const PROTOCOL_VERSION = "1.0.0";
 const LENGTHS = 8; // bytes before a message: total, header_length
-const LARGEST_MESSAGE = 1 << 28; // bytes, as the other clients take
+const LARGEST_MESSAGE = 1 << 28; // bytes, as in the other clients
 
-/** The server's own words. `fatal`: they came with the end of the connection. */
+/** An error that the server reported. `fatal`: the connection ended with it. */
 export class ServerError extends Error {
   constructor(code, message, field = "", fatal = false) {
     super(`${code}: ${message}` + (field ? ` (field: ${field})` : ""));
@@ -40,8 +40,8 @@ async function webSocketClass() {
 }
 
 /**
- * Connects, for example to "ws://127.0.0.1:7878", and enters a world. Events go to `on.events`, `on.state`, `on.frame`
- * (with its attachment), `on.replay` and `on.bye`, in the order in which they come.
+ * Connects, for example to "ws://127.0.0.1:7878", and enters a world. Events go to
+ * `on.events`, `on.state`, `on.frame` (with its attachment), `on.replay` and `on.bye`, in their order.
  */
 export async function connect(
   url, { name = "enfilade javascript", token = "", world = "main", on = {} } = {},
@@ -86,7 +86,7 @@ export class Client {
 
   /**
    * Sends one request, named as in ClientMessage, and resolves to { body, attachment }. Several may be
-   * under way. Rejects with a ServerError where the server refuses.
+   * pending. Rejects with a ServerError if the server refuses.
    */
   request(what, fields = {}) {
     if (this.#ended) return Promise.reject(this.#ended);
@@ -120,12 +120,12 @@ export class Client {
     return this.request("step", { ticks, avatars }).then((reply) => reply.body);
   }
 
-  /** Of a world that plays a recording: goes on from another tick. */
+  /** Moves a world that plays a recording to another tick. */
   seek(tick) {
     return this.request("seek", { tick: BigInt(tick) }).then((reply) => reply.body);
   }
 
-  /** Leaves the recording here; `avatar`, if any, becomes this client's. */
+  /** Leaves the recording at the present tick; `avatar`, if given, then belongs to this client. */
   takeOver(avatar = "") {
     return this.request("takeOver", { avatar }).then((reply) => reply.body);
   }
@@ -134,7 +134,7 @@ export class Client {
     this.#socket.close(1000);
   }
 
-  /** Takes the whole messages of the stream; what is left waits for more. */
+  /** Takes the complete messages of the stream and keeps the rest for later. */
   #hear(bytes) {
     let data = bytes;
     if (this.#unread.length > 0) {
@@ -187,7 +187,7 @@ export class Client {
   }
 }
 
-/** A frame's channels as typed arrays: pixels(frame, attachment).rgb, .depth, .ids. */
+/** Returns a frame's channels as typed arrays: pixels(frame, attachment).rgb, .depth, .ids. */
 export function pixels(frame, attachment) {
   const kinds = { 1: ["rgb", Uint8Array], 2: ["ids", Uint32Array], 3: ["depth", Float32Array],
     4: ["normals", Float32Array], 5: ["range", Float32Array] };

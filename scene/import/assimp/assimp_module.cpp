@@ -1,4 +1,4 @@
-// A library of its own: see assimp_reader.hpp.
+// The assimp reader, built as a separate module: see assimp_reader.hpp.
 #include <assimp/DefaultIOSystem.h>
 #include <assimp/GltfMaterial.h>
 #include <assimp/MemoryIOWrapper.h>
@@ -15,121 +15,123 @@
 #include <utility>
 
 #include "scene/import/assimp/assimp_reader.hpp"
+#include "scene/import/file/uri.hpp"
 #include "scene/import/worker/ipc_messages.hpp"
-#include "scene/import/worker/uri.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-/// Passes assimp's progress on, at most a hundred times.
-class ForwardProgress : public Assimp::ProgressHandler {
+/// Forwards assimp's progress, at most once per percent.
+class ProgressForwarder : public Assimp::ProgressHandler {
  public:
   bool Update(float fraction) override {
     const int percent = static_cast<int>(100 * fraction);
-    if (percent > last_ && percent <= 100) sendProgress("parse", fraction);
-    if (percent > last_) last_ = percent;
+    if (percent > lastPercent_ && percent <= 100) sendProgress("parse", fraction);
+    if (percent > lastPercent_) lastPercent_ = percent;
     return true;
   }
 
  private:
-  int last_ = 0;
+  int lastPercent_ = 0;
 };
 
-/// Takes down which files assimp opens and looks for, and gives it a mended text for one of them.
-class WatchedFiles : public Assimp::DefaultIOSystem {
+/// Records the files that assimp opens or looks for, and substitutes the repaired text of one file.
+class TrackingIoSystem : public Assimp::DefaultIOSystem {
  public:
-  WatchedFiles(const FileToRead& mended, std::vector<std::string>& names)
-      : mended_(mended), names_(names) {}
+  TrackingIoSystem(const AssimpInput& input, std::vector<std::string>& dependencies)
+      : input_(input), dependencies_(dependencies) {}
 
   bool Exists(const char* file) const override {
-    names_.emplace_back(file);
-    return DefaultIOSystem::Exists(file) || !decoded(file).empty();
+    dependencies_.emplace_back(file);
+    return DefaultIOSystem::Exists(file) || !findPercentDecoded(file).empty();
   }
   Assimp::IOStream* Open(const char* file, const char* mode) override {
-    names_.emplace_back(file);
-    if (mended_.text.empty() || file != mended_.file) {
-      const std::string other = decoded(file);
+    dependencies_.emplace_back(file);
+    if (input_.text.empty() || file != input_.file) {
+      const std::string other = findPercentDecoded(file);
       return DefaultIOSystem::Open(other.empty() ? file : other.c_str(), mode);
     }
-    // assimp only reads from it, and the text lives longer.
-    return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(mended_.text.data()),
-                                      mended_.text.size());
+    // assimp only reads from the stream, and the text outlives it.
+    return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(input_.text.data()),
+                                      input_.text.size());
   }
 
  private:
-  /// URIs say %20 for a blank (RFC 3986), which assimp 5.2.5 leaves as it is. The name without
-  /// such, if only that is there; else empty.
-  std::string decoded(const std::string& file) const {
+  /// assimp 5.2.5 does not decode %20 and the like in URIs (RFC 3986). Returns the decoded name if
+  /// only a file of that name exists, otherwise "".
+  std::string findPercentDecoded(const std::string& file) const {
     if (DefaultIOSystem::Exists(file.c_str())) return "";
-    std::string name = percentDecoded(file);
+    std::string name = decodePercent(file);
     if (name == file) return "";
-    names_.push_back(name);
+    dependencies_.push_back(name);
     return DefaultIOSystem::Exists(name.c_str()) ? name : "";
   }
 
-  const FileToRead& mended_;
-  std::vector<std::string>& names_;
+  const AssimpInput& input_;
+  std::vector<std::string>& dependencies_;
 };
 
 // ---- materials ----------------------------------------------------------------------------------
 
-std::string textOf(const aiString& text) {
+std::string toString(const aiString& text) {
   return {text.C_Str(), text.length};
 }
 
 template <typename T>
-std::optional<T> property(const aiMaterial& from, const char* key, unsigned type, unsigned index) {
+std::optional<T> getProperty(const aiMaterial& from, const char* key, unsigned type,
+                             unsigned index) {
   T value{};
   return from.Get(key, type, index, value) == AI_SUCCESS ? std::optional(value) : std::nullopt;
 }
 
-std::optional<Eigen::Vector4f> colour(const aiMaterial& from, const char* key, unsigned type,
-                                      unsigned index) {
-  const auto c = property<aiColor4D>(from, key, type, index);
+std::optional<Eigen::Vector4f> getColour(const aiMaterial& from, const char* key, unsigned type,
+                                         unsigned index) {
+  const auto c = getProperty<aiColor4D>(from, key, type, index);
   if (!c) return std::nullopt;
   return Eigen::Vector4f(c->r, c->g, c->b, c->a);
 }
 
-std::string baseColourTexture(const aiMaterial& from) {
+std::string findBaseColourTexture(const aiMaterial& from) {
   for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
     aiString name;
-    if (from.GetTexture(type, 0, &name) == AI_SUCCESS && name.length > 0) return textOf(name);
+    if (from.GetTexture(type, 0, &name) == AI_SUCCESS && name.length > 0) return toString(name);
   }
   return "";
 }
 
-FileMaterial fileMaterial(const aiMaterial& from) {
+FileMaterial readMaterial(const aiMaterial& from) {
   FileMaterial to;
-  to.name = textOf(const_cast<aiMaterial&>(from).GetName());
-  to.baseColour = colour(from, AI_MATKEY_BASE_COLOR);
-  if (!to.baseColour) to.baseColour = colour(from, AI_MATKEY_COLOR_DIFFUSE);
-  if (const auto emissive = colour(from, AI_MATKEY_COLOR_EMISSIVE))
+  to.name = toString(const_cast<aiMaterial&>(from).GetName());
+  to.baseColour = getColour(from, AI_MATKEY_BASE_COLOR);
+  if (!to.baseColour) to.baseColour = getColour(from, AI_MATKEY_COLOR_DIFFUSE);
+  if (const auto emissive = getColour(from, AI_MATKEY_COLOR_EMISSIVE))
     to.emissive = emissive->head<3>();
-  to.metallic = property<float>(from, AI_MATKEY_METALLIC_FACTOR);
-  to.roughness = property<float>(from, AI_MATKEY_ROUGHNESS_FACTOR);
-  to.opacity = property<float>(from, AI_MATKEY_OPACITY);
-  to.alphaCutoff = property<float>(from, AI_MATKEY_GLTF_ALPHACUTOFF);
-  to.doubleSided = property<bool>(from, AI_MATKEY_TWOSIDED);
-  to.alphaMode = textOf(property<aiString>(from, AI_MATKEY_GLTF_ALPHAMODE).value_or(aiString()));
-  to.baseColourTexture = baseColourTexture(from);
+  to.metallic = getProperty<float>(from, AI_MATKEY_METALLIC_FACTOR);
+  to.roughness = getProperty<float>(from, AI_MATKEY_ROUGHNESS_FACTOR);
+  to.opacity = getProperty<float>(from, AI_MATKEY_OPACITY);
+  to.alphaCutoff = getProperty<float>(from, AI_MATKEY_GLTF_ALPHACUTOFF);
+  to.doubleSided = getProperty<bool>(from, AI_MATKEY_TWOSIDED);
+  to.alphaMode =
+      toString(getProperty<aiString>(from, AI_MATKEY_GLTF_ALPHAMODE).value_or(aiString()));
+  to.baseColourTexture = findBaseColourTexture(from);
   to.emissiveTexture = from.GetTextureCount(aiTextureType_EMISSIVE) > 0;
   return to;
 }
 
 // ---- reading ------------------------------------------------------------------------------------
 
-std::string ownFile() {
+std::string findAssimpLibrary() {
   Dl_info info{};
   const bool found = dladdr(reinterpret_cast<const void*>(&aiGetVersionMajor), &info) != 0;
   return found && info.dli_fname ? info.dli_fname : "";
 }
 
-void read(const FileToRead& file, FileRead& to) {
-  to.library = ownFile();
-  auto* importer = new Assimp::Importer;  // left to _exit: tearing a large scene down takes time
-  // The importer deletes both.
-  importer->SetIOHandler(new WatchedFiles(file, to.files));
-  importer->SetProgressHandler(new ForwardProgress);
+void readFile(const AssimpInput& file, AssimpOutput& to) {
+  to.library = findAssimpLibrary();
+  auto* importer = new Assimp::Importer;  // never deleted: destroying a large scene takes long
+  // The importer owns both handlers.
+  importer->SetIOHandler(new TrackingIoSystem(file, to.dependencies));
+  importer->SetProgressHandler(new ProgressForwarder);
   importer->SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, false);
   importer->SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, true);
   constexpr unsigned kSteps = aiProcess_Triangulate | aiProcess_JoinIdenticalVertices;
@@ -141,7 +143,7 @@ void read(const FileToRead& file, FileRead& to) {
     return;
   }
   for (unsigned i = 0; i < scene->mNumMaterials; ++i)
-    to.materials.push_back(fileMaterial(*scene->mMaterials[i]));
+    to.materials.push_back(readMaterial(*scene->mMaterials[i]));
   to.scene = scene;
 }
 
@@ -149,7 +151,7 @@ void read(const FileToRead& file, FileRead& to) {
 }  // namespace enfilade::scene
 
 extern "C" [[gnu::visibility("default")]] void enfiladeReadByAssimp1(
-    const enfilade::scene::FileToRead& file, enfilade::scene::FileRead& read) {
-  enfilade::scene::read(file, read);
+    const enfilade::scene::AssimpInput& file, enfilade::scene::AssimpOutput& read) {
+  enfilade::scene::readFile(file, read);
 }
-static_assert(std::is_same_v<decltype(enfiladeReadByAssimp1), enfilade::scene::ReadByAssimp>);
+static_assert(std::is_same_v<decltype(enfiladeReadByAssimp1), enfilade::scene::AssimpReadFunction>);

@@ -4,13 +4,14 @@
 
 namespace enfilade::scene {
 
-std::filesystem::path assimpModule() {
-  return moduleFile("assimp_reader.so", "ENFILADE_ASSIMP", ENFILADE_ASSIMP_READER_MODULE);
+std::filesystem::path assimpModulePath() {
+  return findModule("assimp_reader.so", "ENFILADE_ASSIMP", ENFILADE_ASSIMP_READER_MODULE);
 }
 
-FileRead readByAssimp(const FileToRead& file) {
-  FileRead read;
-  reinterpret_cast<ReadByAssimp*>(openModule(assimpModule(), kReadByAssimp))(file, read);
+AssimpOutput readWithAssimp(const AssimpInput& file) {
+  AssimpOutput read;
+  reinterpret_cast<AssimpReadFunction*>(openModule(assimpModulePath(), kAssimpReadSymbol))(file,
+                                                                                           read);
   return read;
 }
 

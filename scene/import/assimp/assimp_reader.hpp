@@ -1,6 +1,6 @@
-// Reads a file with assimp, which stands behind a module: reader_module.hpp. Runs in the import
-// child only. What assimp made of the file is plain data; what it says of materials, it has
-// functions for, so that the module asks them.
+// Reads a file with assimp, which is loaded as a module (reader_module.hpp). Runs only in the
+// import worker. The scene is plain data of assimp; the module copies the materials, because
+// assimp offers them only through functions.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,41 +13,43 @@ struct aiScene;
 
 namespace enfilade::scene {
 
-/// What the file says of one material; nothing where it says nothing. Colours are RGBA, of glTF
-/// linear, else sRGB.
+/// One material as the file states it; absent values are empty. Colours are RGBA: linear for glTF,
+/// sRGB for all other formats.
 struct FileMaterial {
   std::string name;
-  std::optional<Eigen::Vector4f> baseColour;  ///< the diffuse one where there is no other
+  std::optional<Eigen::Vector4f> baseColour;  ///< the diffuse colour if there is no base colour
   Eigen::Vector3f emissive = Eigen::Vector3f::Zero();
   std::optional<float> metallic, roughness, opacity, alphaCutoff;
   std::optional<bool> doubleSided;
-  std::string alphaMode;          ///< glTF's
-  std::string baseColourTexture;  ///< the diffuse one where there is no other
+  std::string alphaMode;          ///< glTF's alphaMode
+  std::string baseColourTexture;  ///< the diffuse texture if there is no base colour texture
   bool emissiveTexture = false;
 };
 
-struct FileToRead {
+/// A file for assimp.
+struct AssimpInput {
   std::string file;
-  std::string text;    ///< in its place, where it was unzipped or mended
-  bool isIfc = false;  ///< then only `text` counts
+  std::string text;    ///< replaces the file's contents if it was unzipped or repaired
+  bool isIfc = false;  ///< true: assimp reads only `text`
 };
 
-struct FileRead {
-  const aiScene* scene = nullptr;       ///< lives as long as the process; null: `failure` says why
-  std::vector<FileMaterial> materials;  ///< in assimp's order
-  std::vector<std::string> files;       ///< that assimp opened or looked for
+/// The result of reading a file with assimp.
+struct AssimpOutput {
+  const aiScene* scene = nullptr;         ///< lives as long as the process; null: see `failure`
+  std::vector<FileMaterial> materials;    ///< in assimp's order
+  std::vector<std::string> dependencies;  ///< files that assimp opened or looked for
   std::string failure;
-  std::string library;  ///< the file of assimp itself
+  std::string library;  ///< path of assimp's shared library
 };
 
-std::filesystem::path assimpModule();
+std::filesystem::path assimpModulePath();
 
-/// Sends progress on its way. Throws ImportError where the module cannot be opened.
-FileRead readByAssimp(const FileToRead& file);
+/// Sends progress messages meanwhile. Throws ImportError if the module cannot be opened.
+AssimpOutput readWithAssimp(const AssimpInput& file);
 
-/// What the module exports, by the name kReadByAssimp. Whoever changes this, what it passes, or how
-/// progress goes through the pipe gives it another number.
-using ReadByAssimp = void(const FileToRead& file, FileRead& read);
-inline constexpr const char* kReadByAssimp = "enfiladeReadByAssimp1";
+/// The module's exported function; its symbol is kAssimpReadSymbol. Increase the number in the
+/// symbol whenever this signature, its structs or the progress message changes.
+using AssimpReadFunction = void(const AssimpInput& file, AssimpOutput& read);
+inline constexpr const char* kAssimpReadSymbol = "enfiladeReadByAssimp1";
 
 }  // namespace enfilade::scene

@@ -1,31 +1,34 @@
-// Triangles of assimp's meshes.
+#include "scene/import/assimp/meshes.hpp"
+
 #include <assimp/scene.h>
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
-#include "scene/import/assimp/convert_scene.hpp"
+#include "scene/import/file/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr float kGreatest = 1e9f;  // a greater coordinate is as broken as NaN, whatever the unit
+constexpr float kMaxCoordinate = 1e9f;  // file units; a greater coordinate is invalid, like NaN
 
-bool isSane(const aiVector3D& v) {
+bool isValidVector(const aiVector3D& v) {
   // Comparisons with NaN are false.
-  return std::abs(v.x) <= kGreatest && std::abs(v.y) <= kGreatest && std::abs(v.z) <= kGreatest;
+  return std::abs(v.x) <= kMaxCoordinate && std::abs(v.y) <= kMaxCoordinate &&
+         std::abs(v.z) <= kMaxCoordinate;
 }
 
-Vec3 areaVector(const Mesh& mesh, std::size_t triangle) {
+Vec3 computeAreaVector(const Mesh& mesh, std::size_t triangle) {
   const Vec3 a = mesh.positions[mesh.indices[3 * triangle]].cast<double>();
   const Vec3 b = mesh.positions[mesh.indices[3 * triangle + 1]].cast<double>();
   const Vec3 c = mesh.positions[mesh.indices[3 * triangle + 2]].cast<double>();
   return (b - a).cross(c - a);
 }
 
-/// What was left out of one mesh, and what is odd in the rest.
+/// Faces of one mesh that were dropped (pointsAndLines, invalid) or are degenerate.
 struct FaceCounts {
-  std::size_t pointsAndLines = 0, broken = 0, degenerate = 0;
+  std::size_t pointsAndLines = 0, invalid = 0, degenerate = 0;
 };
 
 FaceCounts copyTriangles(const aiMesh& from, Mesh& to) {
@@ -38,19 +41,19 @@ FaceCounts copyTriangles(const aiMesh& from, Mesh& to) {
     }
     const std::span corners(face.mIndices, 3);
     const bool whole = std::all_of(corners.begin(), corners.end(), [&](unsigned i) {
-      return i < vertices.size() && isSane(vertices[i]);
+      return i < vertices.size() && isValidVector(vertices[i]);
     });
     if (!whole) {
-      ++counts.broken;
+      ++counts.invalid;
       continue;
     }
     to.indices.insert(to.indices.end(), corners.begin(), corners.end());
-    if (areaVector(to, to.indices.size() / 3 - 1).isZero(0.0)) ++counts.degenerate;
+    if (computeAreaVector(to, to.triangleCount() - 1).isZero(0.0)) ++counts.degenerate;
   }
   return counts;
 }
 
-/// Unit length; a normal that is none is replaced by that of a triangle at the vertex.
+/// Normalises the normals; an invalid one is replaced by the normal of a triangle at the vertex.
 void copyNormals(const aiMesh& from, Mesh& to) {
   if (!from.HasNormals()) return;
   std::vector<bool> bad(from.mNumVertices, false);
@@ -66,7 +69,7 @@ void copyNormals(const aiMesh& from, Mesh& to) {
   }
   if (!anyBad) return;
   for (std::size_t i = 0; i < to.indices.size(); ++i) {
-    const Vec3 area = areaVector(to, i / 3);
+    const Vec3 area = computeAreaVector(to, i / 3);
     if (!bad[to.indices[i]] || !(area.norm() > 0)) continue;
     to.normals[to.indices[i]] = area.normalized().cast<float>();
     bad[to.indices[i]] = false;
@@ -76,61 +79,38 @@ void copyNormals(const aiMesh& from, Mesh& to) {
 void copyUvs(const aiMesh& from, Mesh& to) {
   if (!from.HasTextureCoords(0)) return;
   for (const aiVector3D& uv : std::span(from.mTextureCoords[0], from.mNumVertices)) {
-    // assimp counts v from the bottom.
-    to.uvs.push_back(isSane(uv) ? Eigen::Vector2f(uv.x, 1 - uv.y) : Eigen::Vector2f::Zero());
+    // assimp's v axis points up.
+    to.uvs.push_back(isValidVector(uv) ? Eigen::Vector2f(uv.x, 1 - uv.y) : Eigen::Vector2f::Zero());
   }
 }
 
-Mesh convertMesh(const aiMesh& from, ProblemLog& problems) {
+Mesh convertMesh(const aiMesh& from, std::vector<Diagnostic>& diagnostics) {
   Mesh to;
   to.name.assign(from.mName.C_Str(), from.mName.length);
   to.material = from.mMaterialIndex;
   for (const aiVector3D& v : std::span(from.mVertices, from.mNumVertices)) {
-    to.positions.push_back(isSane(v) ? Eigen::Vector3f(v.x, v.y, v.z) : Eigen::Vector3f::Zero());
+    to.positions.push_back(isValidVector(v) ? Eigen::Vector3f(v.x, v.y, v.z)
+                                            : Eigen::Vector3f::Zero());
   }
   const FaceCounts counts = copyTriangles(from, to);
   copyNormals(from, to);
   copyUvs(from, to);
-  problems.add("points_and_lines_dropped", to.name, counts.pointsAndLines);
-  problems.add("broken_triangle_dropped", to.name + ": a vertex is NaN, infinite or beyond 1e9",
-               counts.broken);
-  problems.add("degenerate_triangle", to.name, counts.degenerate);
-  if (from.HasVertexColors(0)) problems.add("vertex_colours_ignored", to.name);
+  addDiagnostic(diagnostics, "points_and_lines_dropped", to.name, counts.pointsAndLines);
+  addDiagnostic(diagnostics, "broken_triangle_dropped",
+                to.name + ": a vertex is NaN, infinite or beyond 1e9", counts.invalid);
+  addDiagnostic(diagnostics, "degenerate_triangle", to.name, counts.degenerate);
+  if (from.HasVertexColors(0)) addDiagnostic(diagnostics, "vertex_colours_ignored", to.name);
   return to;
 }
 
 }  // namespace
 
-std::vector<Mesh> convertMeshes(const aiScene& scene, ProblemLog& problems) {
+std::vector<Mesh> convertMeshes(const aiScene& scene, std::vector<Diagnostic>& diagnostics) {
   std::vector<Mesh> meshes;
   for (const aiMesh* mesh : std::span(scene.mMeshes, scene.mNumMeshes)) {
-    meshes.push_back(convertMesh(*mesh, problems));
+    meshes.push_back(convertMesh(*mesh, diagnostics));
   }
   return meshes;
-}
-
-Mesh transformed(const Mesh& mesh, const Eigen::Affine3d& transform) {
-  Mesh result = mesh;
-  for (Eigen::Vector3f& p : result.positions) p = (transform * p.cast<double>()).cast<float>();
-  const double determinant = transform.linear().determinant();
-  // The cofactors are the inverse transpose times the determinant: no division, and flat
-  // transforms keep a normal.
-  const Eigen::Matrix3d& m = transform.linear();
-  Eigen::Matrix3d cofactors;
-  cofactors.col(0) = m.col(1).cross(m.col(2));
-  cofactors.col(1) = m.col(2).cross(m.col(0));
-  cofactors.col(2) = m.col(0).cross(m.col(1));
-  if (determinant < 0) cofactors = -cofactors;
-  for (Eigen::Vector3f& n : result.normals) {
-    const Vec3 normal = cofactors * n.cast<double>();
-    if (normal.norm() > 0) n = normal.normalized().cast<float>();
-  }
-  if (determinant < 0) {
-    for (std::size_t i = 0; i + 2 < result.indices.size(); i += 3) {
-      std::swap(result.indices[i + 1], result.indices[i + 2]);
-    }
-  }
-  return result;
 }
 
 }  // namespace enfilade::scene

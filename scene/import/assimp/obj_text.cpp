@@ -1,21 +1,23 @@
-// OBJ files with coordinates on a map: assimp reads vertices into floats, so what they share is
-// taken off the text before, in doubles.
+#include "scene/import/assimp/obj_text.hpp"
+
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <fstream>
 #include <string_view>
+#include <utility>
+#include <vector>
 
-#include "scene/import/assimp/convert_scene.hpp"
+#include "scene/import/assembly/coordinates.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-/// The lines of `text`, one after the other, without their ends.
-class Lines {
+/// Iterates over the lines of a text, without line ends.
+class LineReader {
  public:
-  explicit Lines(std::string_view text) : rest_(text) {}
+  explicit LineReader(std::string_view text) : rest_(text) {}
   bool next(std::string_view& line) {
     if (rest_.empty()) return false;
     const std::size_t end = std::min(rest_.find('\n'), rest_.size());
@@ -28,20 +30,20 @@ class Lines {
   std::string_view rest_;
 };
 
-struct Vertex {
-  std::array<double, 3> at{};
-  std::string_view tail;  ///< weight or colour, with the blank before it
+struct ObjVertex {
+  std::array<double, 3> position{};
+  std::string_view tail;  ///< weight or colour, with the preceding blank
 };
 
-/// "v x y z ..."; false for every other line.
-bool readVertex(std::string_view line, Vertex& vertex) {
+/// Parses "v x y z ..."; false for every other line.
+bool parseVertex(std::string_view line, ObjVertex& vertex) {
   const std::size_t begin = line.find_first_not_of(" \t");
   if (begin == std::string_view::npos || line[begin] != 'v' || begin + 1 >= line.size()) {
     return false;
   }
   line.remove_prefix(begin + 1);
   if (line.front() != ' ' && line.front() != '\t') return false;
-  for (double& coordinate : vertex.at) {
+  for (double& coordinate : vertex.position) {
     line.remove_prefix(std::min(line.find_first_not_of(" \t+"), line.size()));
     const auto read = std::from_chars(line.data(), line.data() + line.size(), coordinate);
     if (read.ec != std::errc() || !std::isfinite(coordinate)) return false;
@@ -51,22 +53,19 @@ bool readVertex(std::string_view line, Vertex& vertex) {
   return true;
 }
 
-Vec3 medianVertex(std::string_view text) {
+Vec3 computeMedianVertex(std::string_view text) {
   std::array<std::vector<double>, 3> coordinates;
-  Lines lines(text);
+  LineReader lines(text);
   std::string_view line;
-  Vertex vertex;
+  ObjVertex vertex;
   while (lines.next(line)) {
-    if (!readVertex(line, vertex)) continue;
-    for (std::size_t axis = 0; axis < 3; ++axis) coordinates[axis].push_back(vertex.at[axis]);
+    if (!parseVertex(line, vertex)) continue;
+    for (std::size_t axis = 0; axis < 3; ++axis) coordinates[axis].push_back(vertex.position[axis]);
   }
   Vec3 median = Vec3::Zero();
-  for (std::size_t axis = 0; axis < 3 && !coordinates[0].empty(); ++axis) {
-    const auto middle =
-        coordinates[axis].begin() + static_cast<std::ptrdiff_t>(coordinates[axis].size() / 2);
-    std::nth_element(coordinates[axis].begin(), middle, coordinates[axis].end());
-    median[static_cast<Eigen::Index>(axis)] = *middle;
-  }
+  if (coordinates[0].empty()) return median;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    median[static_cast<Eigen::Index>(axis)] = computeMedian(std::move(coordinates[axis]));
   return median;
 }
 
@@ -78,22 +77,22 @@ void appendNumber(std::string& to, double value) {
 
 }  // namespace
 
-ShiftedText shiftedObj(const std::filesystem::path& file, double farAway) {
+RebasedText rebaseObj(const std::filesystem::path& file, double maxDistance) {
   std::ifstream in(file, std::ios::binary);
   const std::string text((std::istreambuf_iterator<char>(in)), {});
-  ShiftedText shifted;
-  const Vec3 median = medianVertex(text);
-  if (!(median.norm() > farAway)) return shifted;
+  RebasedText shifted;
+  const Vec3 median = computeMedianVertex(text);
+  if (!(median.norm() > maxDistance)) return shifted;
   shifted.shift = {std::round(median.x()), std::round(median.y()), std::round(median.z())};
-  Lines lines(text);
+  LineReader lines(text);
   std::string_view line;
-  Vertex vertex;
+  ObjVertex vertex;
   while (lines.next(line)) {
-    if (readVertex(line, vertex)) {
+    if (parseVertex(line, vertex)) {
       shifted.text += 'v';
       for (std::size_t axis = 0; axis < 3; ++axis) {
         appendNumber(shifted.text,
-                     vertex.at[axis] - shifted.shift[static_cast<Eigen::Index>(axis)]);
+                     vertex.position[axis] - shifted.shift[static_cast<Eigen::Index>(axis)]);
       }
       shifted.text += vertex.tail;
     } else {

@@ -7,138 +7,142 @@ namespace {
 
 constexpr double kRadiansPerDegree = 0.017453292519943295;
 
-void allow(const JsonPlace& place, std::vector<const char*> keys,
-           const std::vector<const char*>& more) {
+void allowKeys(const JsonCursor& cursor, std::vector<const char*> keys,
+               const std::vector<const char*>& more) {
   keys.insert(keys.end(), more.begin(), more.end());
-  allowOnly(place, keys);
+  requireKnownKeys(cursor, keys);
 }
 
-/// `scale` is radians per degree for what turns.
-void readMotion(const JsonPlace& place, BodySpec& body, double scale) {
-  if (place.has("limits")) {
-    const std::vector<double> limits = numbersOf(place.at("limits"));
-    if (limits.size() != 2) place.at("limits").fail("must be two numbers");
+/// `scale`: radians per degree for rotations, else 1.
+void readMotion(const JsonCursor& cursor, BodySpec& body, double scale) {
+  if (cursor.has("limits")) {
+    const std::vector<double> limits = readNumbers(cursor.at("limits"));
+    if (limits.size() != 2) cursor.at("limits").fail("must be two numbers");
     body.low = scale * limits[0];
     body.high = scale * limits[1];
   }
-  if (place.has("closed")) body.closed = scale * numberOf(place.at("closed"));
-  if (place.has("speed")) body.speed = scale * numberOf(place.at("speed"));
-  if (place.has("acceleration")) body.acceleration = scale * numberOf(place.at("acceleration"));
-  if (place.has("closes_after")) body.closesAfter = numberOf(place.at("closes_after"));
-  if (!place.has("opened_by")) return;
-  const std::string by = textOf(place.at("opened_by"));
+  if (cursor.has("closed")) body.closedPosition = scale * readNumber(cursor.at("closed"));
+  if (cursor.has("speed")) body.speed = scale * readNumber(cursor.at("speed"));
+  if (cursor.has("acceleration")) body.acceleration = scale * readNumber(cursor.at("acceleration"));
+  if (cursor.has("closes_after")) body.autoCloseDelay = readNumber(cursor.at("closes_after"));
+  if (!cursor.has("opened_by")) return;
+  const std::string by = readText(cursor.at("opened_by"));
   if (by != "touch" && by != "command")
-    place.at("opened_by").fail("must be \"touch\" or \"command\"");
+    cursor.at("opened_by").fail("must be \"touch\" or \"command\"");
   body.openedBy = by == "touch" ? OpenedBy::touch : OpenedBy::command;
 }
 
-BodyFields readAxis(const JsonPlace& place, BodySpec& body) {
-  BodyFields fields;
-  if ((fields.axis = place.has("axis"))) {
-    const Vec3 axis = vectorOf(place.at("axis"));
-    if (!(axis.norm() > 1e-6) || !axis.allFinite()) place.at("axis").fail("has no direction");
+ExplicitBodyFields readAxis(const JsonCursor& cursor, BodySpec& body) {
+  ExplicitBodyFields fields;
+  if ((fields.axis = cursor.has("axis"))) {
+    const Vec3 axis = readVector(cursor.at("axis"));
+    if (!(axis.norm() > 1e-6) || !axis.allFinite()) cursor.at("axis").fail("has no direction");
     body.axis = axis.normalized();
   }
-  if ((fields.anchor = place.has("anchor"))) body.anchor = vectorOf(place.at("anchor"));
+  if ((fields.anchor = cursor.has("anchor"))) body.anchor = readVector(cursor.at("anchor"));
   return fields;
 }
 
 const std::vector<const char*> kDoorKeys{"anchor", "axis",         "limits",       "closed",
                                          "speed",  "acceleration", "closes_after", "opened_by"};
 
-void readHinged(const JsonPlace& place, BodySpec& body) {
+void readHinged(const JsonCursor& cursor, BodySpec& body) {
   body.high = 90 * kRadiansPerDegree;
   body.speed = 90 * kRadiansPerDegree;
-  readMotion(place, body, kRadiansPerDegree);
+  readMotion(cursor, body, kRadiansPerDegree);
 }
 
-void readSliding(const JsonPlace& place, BodySpec& body, bool hasAxis) {
-  if (!place.has("limits")) place.fail("limits is missing: [from, to] in metres along the axis");
+void readSliding(const JsonCursor& cursor, BodySpec& body, bool hasAxis) {
+  if (!cursor.has("limits")) cursor.fail("limits is missing: [from, to] in metres along the axis");
   if (!hasAxis) body.axis = Vec3::UnitX();
-  readMotion(place, body, 1);
+  readMotion(cursor, body, 1);
 }
 
-void readLift(const JsonPlace& place, BodySpec& body) {
-  if (!place.has("stops"))
-    place.fail("stops is missing: a list of metres along the axis, as [0,3]");
-  body.stops = numbersOf(place.at("stops"));
+void readLift(const JsonCursor& cursor, BodySpec& body) {
+  if (!cursor.has("stops"))
+    cursor.fail("stops is missing: a list of metres along the axis, as [0,3]");
+  body.stops = readNumbers(cursor.at("stops"));
   for (const double stop : body.stops) {
     body.low = std::min(body.low, stop);
     body.high = std::max(body.high, stop);
   }
-  readMotion(place, body, 1);
+  readMotion(cursor, body, 1);
 }
 
-PathKey keyOf(const JsonPlace& place) {
-  allowOnly(place, {"time", "offset", "turn"});
+PathKey readJsonPathKey(const JsonCursor& cursor) {
+  requireKnownKeys(cursor, {"time", "offset", "turn"});
   PathKey key;
-  if (!place.has("time")) place.fail("time is missing: seconds since the path began");
-  key.time = numberOf(place.at("time"));
-  if (place.has("offset")) key.offset = vectorOf(place.at("offset"));
-  if (place.has("turn")) key.turn = kRadiansPerDegree * numberOf(place.at("turn"));
+  if (!cursor.has("time")) cursor.fail("time is missing: seconds since the path began");
+  key.time = readNumber(cursor.at("time"));
+  if (cursor.has("offset")) key.offset = readVector(cursor.at("offset"));
+  if (cursor.has("turn")) key.angle = kRadiansPerDegree * readNumber(cursor.at("turn"));
   return key;
 }
 
-void readPath(const JsonPlace& place, BodySpec& body) {
-  if (!place.has("keys") || !place.at("keys").value.is_array())
-    place.fail("keys is missing: a list of {\"time\":s,\"offset\":[x,y,z],\"turn\":degrees}");
-  const JsonPlace keys = place.at("keys");
-  for (std::size_t i = 0; i < keys.value.size(); ++i) body.keys.push_back(keyOf(keys.at(i)));
-  if (place.has("speed")) body.speed = numberOf(place.at("speed"));
-  if (place.has("loops")) body.loops = truthOf(place.at("loops"));
-  if (place.has("runs")) body.runs = truthOf(place.at("runs"));
+void readPath(const JsonCursor& cursor, BodySpec& body) {
+  if (!cursor.has("keys") || !cursor.at("keys").value.is_array())
+    cursor.fail("keys is missing: a list of {\"time\":s,\"offset\":[x,y,z],\"turn\":degrees}");
+  const JsonCursor keys = cursor.at("keys");
+  for (std::size_t i = 0; i < keys.value.size(); ++i)
+    body.keys.push_back(readJsonPathKey(keys.at(i)));
+  if (cursor.has("speed")) body.speed = readNumber(cursor.at("speed"));
+  if (cursor.has("loops")) body.loops = readBool(cursor.at("loops"));
+  if (cursor.has("runs")) body.autoStart = readBool(cursor.at("runs"));
 }
 
-void readRigid(const JsonPlace& place, BodySpec& body) {
-  if (place.has("density") && place.has("mass"))
-    place.fail("has a density and a mass: one follows from the other");
-  if (place.has("density")) body.density = numberOf(place.at("density"));
-  if (place.has("mass")) body.mass = numberOf(place.at("mass"));
-  if (place.has("friction")) body.friction = numberOf(place.at("friction"));
-  if (place.has("restitution")) body.restitution = numberOf(place.at("restitution"));
+void readRigid(const JsonCursor& cursor, BodySpec& body) {
+  if (cursor.has("density") && cursor.has("mass"))
+    cursor.fail("has a density and a mass: one follows from the other");
+  if (cursor.has("density")) body.density = readNumber(cursor.at("density"));
+  if (cursor.has("mass")) body.mass = readNumber(cursor.at("mass"));
+  if (cursor.has("friction")) body.friction = readNumber(cursor.at("friction"));
+  if (cursor.has("restitution")) body.restitution = readNumber(cursor.at("restitution"));
 }
 
 }  // namespace
 
-BodyKind kindOf(const JsonPlace& place) {
-  const std::string word = textOf(place.at("kind"));
-  for (const BodyKind kind : {BodyKind::hinged, BodyKind::sliding, BodyKind::lift, BodyKind::path,
-                              BodyKind::rigid, BodyKind::trigger})
-    if (word == wordOf(kind)) return kind;
-  place.at("kind").fail("must be hinged, sliding, lift, path, rigid or trigger, not \"" + word +
-                        "\"");
+BodyKind readBodyKind(const JsonCursor& cursor) {
+  const std::string word = readText(cursor.at("kind"));
+  std::string all;
+  for (std::uint8_t i = 0; i < kBodyKindCount; ++i) {
+    const auto kind = static_cast<BodyKind>(i);
+    if (word == toString(kind)) return kind;
+    all += (i == 0 ? "" : i + 1 == kBodyKindCount ? " or " : ", ") + std::string(toString(kind));
+  }
+  cursor.at("kind").fail("must be " + all + ", not \"" + word + "\"");
 }
 
-BodyFields readBodyFields(const JsonPlace& place, std::vector<const char*> more, BodySpec& body) {
+ExplicitBodyFields readBodyFields(const JsonCursor& cursor, std::vector<const char*> more,
+                                  BodySpec& body) {
   more.insert(more.end(), {"name", "kind"});
-  BodyFields fields;
+  ExplicitBodyFields fields;
   switch (body.kind) {
     case BodyKind::hinged:
-      allow(place, kDoorKeys, more);
-      fields = readAxis(place, body);
-      readHinged(place, body);
+      allowKeys(cursor, kDoorKeys, more);
+      fields = readAxis(cursor, body);
+      readHinged(cursor, body);
       break;
     case BodyKind::sliding:
-      allow(place, kDoorKeys, more);
-      fields = readAxis(place, body);
-      readSliding(place, body, fields.axis);
+      allowKeys(cursor, kDoorKeys, more);
+      fields = readAxis(cursor, body);
+      readSliding(cursor, body, fields.axis);
       break;
     case BodyKind::lift:
-      allow(place, {"axis", "stops", "speed", "acceleration"}, more);
-      fields = readAxis(place, body);
-      readLift(place, body);
+      allowKeys(cursor, {"axis", "stops", "speed", "acceleration"}, more);
+      fields = readAxis(cursor, body);
+      readLift(cursor, body);
       break;
     case BodyKind::path:
-      allow(place, {"anchor", "axis", "keys", "speed", "loops", "runs"}, more);
-      fields = readAxis(place, body);
-      readPath(place, body);
+      allowKeys(cursor, {"anchor", "axis", "keys", "speed", "loops", "runs"}, more);
+      fields = readAxis(cursor, body);
+      readPath(cursor, body);
       break;
     case BodyKind::rigid:
-      allow(place, {"density", "mass", "friction", "restitution"}, more);
-      readRigid(place, body);
+      allowKeys(cursor, {"density", "mass", "friction", "restitution"}, more);
+      readRigid(cursor, body);
       break;
     case BodyKind::trigger:
-      allow(place, {}, more);
+      allowKeys(cursor, {}, more);
       break;
   }
   return fields;

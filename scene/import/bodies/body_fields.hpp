@@ -1,4 +1,4 @@
-// What a body's keys say (SIDECAR.md), for sidecars and for extras of glTF nodes. Private to
+// Reads the keys of a body (SIDECAR.md), from sidecars and from extras of glTF nodes. Private to
 // scene/.
 #pragma once
 
@@ -7,16 +7,17 @@
 
 namespace enfilade::scene {
 
-/// Whether what has a default of its own was there.
-struct BodyFields {
+/// Which keys with a default were given.
+struct ExplicitBodyFields {
   bool anchor = false, axis = false;
 };
 
 /// Reads "kind". Throws SidecarError.
-BodyKind kindOf(const JsonPlace& place);
+BodyKind readBodyKind(const JsonCursor& cursor);
 
-/// Reads all keys of a body of body.kind into it, angles from degrees. `more`: keys besides that
-/// the caller reads. Throws SidecarError for keys that are unknown, missing or senseless.
-BodyFields readBodyFields(const JsonPlace& place, std::vector<const char*> more, BodySpec& body);
+/// Reads all keys of a body of body.kind into it, angles from degrees. `more`: additional keys that
+/// the caller reads. Throws SidecarError for unknown, missing or invalid keys.
+ExplicitBodyFields readBodyFields(const JsonCursor& cursor, std::vector<const char*> more,
+                                  BodySpec& body);
 
 }  // namespace enfilade::scene

@@ -1,4 +1,4 @@
-// Which source has the say over an object, where several name it.
+// Precedence of sources that describe the same object.
 #pragma once
 
 #include <set>
@@ -8,17 +8,15 @@
 
 namespace enfilade::scene {
 
-/// Appends bodies of one lower source to the model's. One that shares an object with a body that is
-/// there already is left out, and counted as the problem `replaced_bodies`; objects in `still` are
-/// taken out of theirs, and a body without any is none. Names that are taken get "#2", ...
-/// The bodies themselves share no objects.
-void addLowerBodies(Model& model, std::vector<BodySpec> bodies,
-                    const std::set<std::uint32_t>& still);
+/// Merges the bodies of a lower-priority source into the model. A body that shares an object with
+/// an existing one is dropped and counted as `replaced_bodies`. Objects in `staticObjects` are
+/// removed from their bodies, and empty bodies are dropped. Duplicate names get "#2", ... The given
+/// bodies must not share objects.
+void mergeLowerPriorityBodies(Model& model, std::vector<BodySpec> bodies,
+                              const std::set<std::uint32_t>& staticObjects);
 
-/// Collision shapes join the bodies of what they stand for, if they are in none.
-void takeCollisionShapesAlong(Model& model);
-
-/// Counts a problem of the model, and keeps the first example.
-void addProblem(Model& model, const char* kind, const std::string& example, std::size_t count = 1);
+/// Adds collision shapes to the bodies of the objects that they belong to, unless they are in a
+/// body already.
+void attachCollisionShapes(Model& model);
 
 }  // namespace enfilade::scene

@@ -9,16 +9,18 @@
 #include "scene/import/bodies/body_precedence.hpp"
 #include "scene/import/bodies/ifc_doors.hpp"
 #include "scene/import/bodies/sidecar.hpp"
+#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/model/shapes/collision_geometry.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kLargestSidecar = std::size_t{64} << 20;  // bytes
+constexpr std::size_t kMaxSidecarBytes = std::size_t{64} << 20;  // bytes
 
-std::string readWhole(const std::filesystem::path& file) {
+std::string readFile(const std::filesystem::path& file) {
   std::error_code problem;
   const auto size = std::filesystem::file_size(file, problem);
-  if (!problem && size > kLargestSidecar)
+  if (!problem && size > kMaxSidecarBytes)
     throw SidecarError(file.string() + ": is larger than 64 MiB; is it a sidecar?");
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
@@ -27,67 +29,67 @@ std::string readWhole(const std::filesystem::path& file) {
   return text.str();
 }
 
-Sidecar applySidecarBeside(Model& model, const std::filesystem::path& file) {
-  const std::filesystem::path sidecar = sidecarOf(file);
+Sidecar applySidecarOf(Model& model, const std::filesystem::path& file) {
+  const std::filesystem::path sidecar = sidecarPath(file);
   std::error_code problem;
   if (!std::filesystem::exists(sidecar, problem)) return {};
-  return applySidecar(model, readWhole(sidecar), sidecar.filename().string());
+  return applySidecar(model, readFile(sidecar), sidecar.filename().string());
 }
 
-bool hasArea(const Mesh& mesh) {
+bool hasSurface(const Mesh& mesh) {
   for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
     const auto corner = [&](std::size_t k) -> Vec3 {
       return mesh.positions[mesh.indices[i + k]].cast<double>();
     };
-    const Vec3 origin = corner(0);
-    if ((corner(1) - origin).cross(corner(2) - origin).squaredNorm() > 0) return true;
+    if (hasNumericalArea({corner(0), corner(1), corner(2)})) return true;
   }
   return false;
 }
 
-/// A file that other programs wrote must not keep the scene from loading: what it calls a body and
-/// has no surface to collide with stays out, told. (A sidecar's is an error.)
+/// Drops bodies of imported files that have no surface to collide with, and counts them. Such a
+/// file must not prevent loading. (In a sidecar it is an error.)
 void dropBodiesWithoutArea(Model& model) {
   std::erase_if(model.bodies, [&](const BodySpec& body) {
     if (body.source == BodySource::sidecar) return false;
     for (const std::uint32_t index : body.objects) {
       const Object& object = model.objects[index];
-      if (object.use == Object::Use::drawn) continue;
+      if (object.usage == Object::Usage::visualOnly) continue;
       for (const std::uint32_t mesh : object.meshes)
-        if (hasArea(model.meshes[mesh])) return false;
+        if (hasSurface(model.meshes[mesh])) return false;
     }
-    addProblem(model, "body_without_area",
-               body.name + " of " + wordOf(body.source) + ": its objects have no surface");
+    addDiagnostic(model.diagnostics, "body_without_area",
+                  body.name + " of " + toString(body.source) + ": its objects have no surface");
     return true;
   });
 }
 
 }  // namespace
 
-void findBodies(Model& model, const std::filesystem::path& file, IfcDoors doors) {
+void collectBodies(Model& model, const std::filesystem::path& file, IfcDoors doors) {
   std::vector<BodySpec> ofFile = std::move(model.bodies), ofIfc;
   model.bodies.clear();
-  // Doors are split before the sidecar is read, which may name their leaves and frames.
+  // Doors are split before the sidecar is read, because it may name their leaves and frames.
   ofIfc = splitDoors(model);
-  const Sidecar sidecar = applySidecarBeside(model, file);
+  const Sidecar sidecar = applySidecarOf(model, file);
   const auto firstOfIfc =
       std::stable_partition(ofFile.begin(), ofFile.end(),
                             [](const BodySpec& body) { return body.source != BodySource::ifc; });
   ofIfc.insert(ofIfc.end(), std::make_move_iterator(firstOfIfc),
                std::make_move_iterator(ofFile.end()));
   ofFile.erase(firstOfIfc, ofFile.end());
-  addLowerBodies(model, std::move(ofFile), sidecar.still);
-  if (doors == IfcDoors::move) addLowerBodies(model, std::move(ofIfc), sidecar.still);
-  takeCollisionShapesAlong(model);
+  mergeLowerPriorityBodies(model, std::move(ofFile), sidecar.staticObjects);
+  if (doors == IfcDoors::movable)
+    mergeLowerPriorityBodies(model, std::move(ofIfc), sidecar.staticObjects);
+  attachCollisionShapes(model);
   dropBodiesWithoutArea(model);
 }
 
-std::string sourcesOf(const Model& model) {
+std::string formatBodySources(const Model& model) {
   std::map<BodySource, std::size_t> counts;
   for (const BodySpec& body : model.bodies) ++counts[body.source];
   std::string text;
   for (const auto& [source, count] : counts)
-    text += (text.empty() ? "" : ", ") + std::to_string(count) + " of " + wordOf(source);
+    text += (text.empty() ? "" : ", ") + std::to_string(count) + " of " + toString(source);
   return text;
 }
 

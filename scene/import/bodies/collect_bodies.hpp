@@ -1,6 +1,6 @@
-// What moves in a model, from all that says so. The first that names an object has the say over it:
-// the sidecar, then what the import read from the file itself (KHR_physics_rigid_bodies, extras of
-// nodes, suffixes of names), then IFC's doors and lifts. All else is still.
+// Collects the bodies of a model from all sources. If several sources describe an object, the first
+// in this list wins: the sidecar, the imported file itself (KHR_physics_rigid_bodies, extras of
+// nodes, name suffixes), IFC doors and elevators. All other objects are static.
 #pragma once
 
 #include <filesystem>
@@ -9,15 +9,15 @@
 
 namespace enfilade::scene {
 
-/// Whether doors and lifts of IFC are bodies where the file says enough of them.
-enum class IfcDoors : std::uint8_t { move, still };
+/// Whether IFC doors and elevators become bodies if the file describes them well enough.
+enum class IfcDoors : std::uint8_t { movable, fixed };
 
-/// Completes the bodies of a model as it was imported: with those of the sidecar beside `file`, if
-/// there is one, and with doors, whose frames become objects of their own (see splitDoors()).
-/// Throws SidecarError.
-void findBodies(Model& model, const std::filesystem::path& file, IfcDoors doors = IfcDoors::move);
+/// Adds the bodies of the sidecar of `file`, if it exists, and those of doors to an imported model.
+/// Door frames become separate objects (see splitDoors()). Throws SidecarError.
+void collectBodies(Model& model, const std::filesystem::path& file,
+                   IfcDoors doors = IfcDoors::movable);
 
-/// "3 of the sidecar, 5 of ifc", for people.
-std::string sourcesOf(const Model& model);
+/// Returns a text for users, such as "3 of the sidecar, 5 of ifc".
+std::string formatBodySources(const Model& model);
 
 }  // namespace enfilade::scene

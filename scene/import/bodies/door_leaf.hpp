@@ -1,5 +1,5 @@
-// Which triangles of a door are its leaves, and which its frame. Files of buildings draw both as
-// one product; a door that turned with its frame would stand in the wall.
+// Splits a door's triangles into leaves and frame. Building files draw both as one product, but
+// only the leaf moves.
 #pragma once
 
 #include <cstdint>
@@ -10,26 +10,27 @@
 
 namespace enfilade::scene {
 
-/// In the door's frame: that of its placement, metres, z up; if `turned` with x and y exchanged, so
-/// that x always runs along the width and y through the wall.
+/// A door leaf in the door frame: that of its placement, metres, z up. If `hasSwappedAxes`, x and y
+/// are swapped, so that x always runs along the width.
 struct DoorLeaf {
-  Box box;        ///< of all that moves with it
-  Box panel;      ///< of what fills the opening: `box` without handles
-  int latch = 0;  ///< -1, 1: a handle sits towards x's low, high end; 0: none is found
+  Aabb box;       ///< of all that moves with the leaf
+  Aabb panel;     ///< of the panel that fills the opening: without handles
+  int latch = 0;  ///< -1, 1: handle at the low or high end of x; 0: none found
 };
 
+/// Result of splitDoorTriangles().
 struct DoorPieces {
   static constexpr std::uint8_t kFrame = 255;
 
-  std::vector<DoorLeaf> leaves;  ///< by x, ascending; empty: `why` says why there are none
-  std::string why;
-  bool turned = false;  ///< the door's width runs along the placement's y
-  /// Of each triangle of each mesh of the object, in their order: which leaf it is of, or kFrame.
+  std::vector<DoorLeaf> leaves;  ///< ascending by x; empty: see `reason`
+  std::string reason;
+  bool hasSwappedAxes = false;  ///< the door's width runs along the placement's y
+  /// For each triangle of the object's meshes, in order: its leaf, or kFrame.
   std::vector<std::uint8_t> pieceOfTriangle;
 };
 
-/// Of an object that has a placement. Leaves are found where connected surfaces fill the middle of
-/// the door and the rest does not; nothing is guessed.
-DoorPieces piecesOfDoor(const Model& model, const Object& door);
+/// Splits an object that has a placement. A leaf is found only if connected surfaces fill the
+/// middle of the door and the rest does not.
+DoorPieces splitDoorTriangles(const Model& model, const Object& door);
 
 }  // namespace enfilade::scene

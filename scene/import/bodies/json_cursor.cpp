@@ -10,26 +10,26 @@ namespace enfilade::scene {
 
 using nlohmann::json;
 
-void JsonPlace::fail(const std::string& what) const {
+void JsonCursor::fail(const std::string& what) const {
   throw SidecarError(name + ": " + what);
 }
 
 namespace {
 
-constexpr int kDeepest = 16;  // lists and objects in one another
+constexpr int kMaxDepth = 16;  // nested lists and objects
 
-/// Whether more than `depth` lie in one another. (nlohmann writes them by recursion.)
-bool isDeeper(const json& value, int depth) {
+/// Returns whether the nesting is deeper than `depth`. (nlohmann serialises by recursion.)
+bool isDeeperThan(const json& value, int depth) {
   if (!value.is_structured()) return false;
   if (depth == 0) return true;
   return std::any_of(value.begin(), value.end(),
-                     [&](const json& inner) { return isDeeper(inner, depth - 1); });
+                     [&](const json& inner) { return isDeeperThan(inner, depth - 1); });
 }
 
-/// Finds a key that is there twice in one object: nlohmann keeps the last one. (Its own callback
-/// goes through the whole list at each object's end.)
-struct KeyWatcher : json::json_sax_t {
-  std::vector<std::set<std::string>> open;  // objects, by their keys so far
+/// Finds a repeated key in an object, of which nlohmann would keep the last. (Its own callback
+/// visits the whole list at each object's end.)
+struct DuplicateKeyFinder : json::json_sax_t {
+  std::vector<std::set<std::string>> open;  // keys so far of each open object
   std::optional<std::string> repeated;
 
   bool key(string_t& key) override {
@@ -55,12 +55,12 @@ struct KeyWatcher : json::json_sax_t {
 
 }  // namespace
 
-json parsed(std::string_view text, const std::string& source) {
-  KeyWatcher watcher;
+json parseJson(std::string_view text, const std::string& source) {
+  DuplicateKeyFinder watcher;
   json::sax_parse(text, &watcher);
   if (watcher.repeated)
-    throw SidecarError(source + ": the key " + excerpt(*watcher.repeated) +
-                       " is there twice in one object");
+    throw SidecarError(source + ": the key " + formatExcerpt(*watcher.repeated) +
+                       " is repeated in an object");
   try {
     return json::parse(text);
   } catch (const json::exception& problem) {
@@ -68,52 +68,56 @@ json parsed(std::string_view text, const std::string& source) {
   }
 }
 
-std::string excerpt(const json& value) {
-  if (isDeeper(value, kDeepest)) return "so deep a nest of lists";
+std::string formatExcerpt(const json& value) {
+  if (isDeeperThan(value, kMaxDepth)) return "a value nested too deeply";
   const std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
   return text.size() > 40 ? text.substr(0, 37) + "..." : text;
 }
 
-double numberOf(const JsonPlace& place) {
-  if (!place.value.is_number()) place.fail("must be a number, not " + excerpt(place.value));
-  return place.value.get<double>();
+double readNumber(const JsonCursor& cursor) {
+  if (!cursor.value.is_number())
+    cursor.fail("must be a number, not " + formatExcerpt(cursor.value));
+  return cursor.value.get<double>();
 }
 
-bool truthOf(const JsonPlace& place) {
-  if (!place.value.is_boolean()) place.fail("must be true or false, not " + excerpt(place.value));
-  return place.value.get<bool>();
+bool readBool(const JsonCursor& cursor) {
+  if (!cursor.value.is_boolean())
+    cursor.fail("must be true or false, not " + formatExcerpt(cursor.value));
+  return cursor.value.get<bool>();
 }
 
-std::string textOf(const JsonPlace& place) {
-  if (!place.value.is_string() || place.value.get<std::string>().empty())
-    place.fail("must be a text, not " + excerpt(place.value));
-  return place.value.get<std::string>();
+std::string readText(const JsonCursor& cursor) {
+  if (!cursor.value.is_string() || cursor.value.get<std::string>().empty())
+    cursor.fail("must be a text, not " + formatExcerpt(cursor.value));
+  return cursor.value.get<std::string>();
 }
 
-std::vector<double> numbersOf(const JsonPlace& place) {
-  if (!place.value.is_array()) place.fail("must be a list of numbers, not " + excerpt(place.value));
+std::vector<double> readNumbers(const JsonCursor& cursor) {
+  if (!cursor.value.is_array())
+    cursor.fail("must be a list of numbers, not " + formatExcerpt(cursor.value));
   std::vector<double> all;
-  for (std::size_t i = 0; i < place.value.size(); ++i) all.push_back(numberOf(place.at(i)));
+  for (std::size_t i = 0; i < cursor.value.size(); ++i) all.push_back(readNumber(cursor.at(i)));
   return all;
 }
 
-collision::Vec3 vectorOf(const JsonPlace& place) {
-  const std::vector<double> xyz = numbersOf(place);
-  if (xyz.size() != 3) place.fail("must be three numbers, not " + excerpt(place.value));
+collision::Vec3 readVector(const JsonCursor& cursor) {
+  const std::vector<double> xyz = readNumbers(cursor);
+  if (xyz.size() != 3) cursor.fail("must be three numbers, not " + formatExcerpt(cursor.value));
   return {xyz[0], xyz[1], xyz[2]};
 }
 
-void allowOnly(const JsonPlace& place, const std::vector<const char*>& keys) {
-  if (!place.value.is_object()) place.fail("must be an object, not " + excerpt(place.value));
-  for (const auto& [key, value] : place.value.items()) {
-    if (key.compare(0, place.prefix.size(), place.prefix) != 0) continue;
+void requireKnownKeys(const JsonCursor& cursor, const std::vector<const char*>& keys) {
+  if (!cursor.value.is_object())
+    cursor.fail("must be an object, not " + formatExcerpt(cursor.value));
+  for (const auto& [key, value] : cursor.value.items()) {
+    if (key.compare(0, cursor.prefix.size(), cursor.prefix) != 0) continue;
     const bool known = std::any_of(keys.begin(), keys.end(), [&, k = key](const char* allowed) {
-      return k == place.prefix + allowed;
+      return k == cursor.prefix + allowed;
     });
     if (known) continue;
     std::string all;
-    for (const char* allowed : keys) all += (all.empty() ? "" : ", ") + place.prefix + allowed;
-    place.fail("unknown key " + excerpt(key) + "; known here are " + all);
+    for (const char* allowed : keys) all += (all.empty() ? "" : ", ") + cursor.prefix + allowed;
+    cursor.fail("unknown key " + formatExcerpt(key) + "; known here are " + all);
   }
 }
 

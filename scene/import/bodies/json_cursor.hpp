@@ -1,5 +1,4 @@
-// A value of a JSON text and its place in it, so that whoever reads it can say where a mistake is.
-// Private to scene/.
+// A JSON value with its path in the document, so that errors can name the place. Private to scene/.
 #pragma once
 
 #include <initializer_list>
@@ -12,34 +11,36 @@
 
 namespace enfilade::scene {
 
-struct JsonPlace {
+/// A JSON value and its path.
+struct JsonCursor {
   const nlohmann::json& value;
-  std::string name;         ///< as "hall.walk.json.bodies[2]"
-  std::string prefix = {};  ///< of this object's own keys, as "walk_"; keys without it are not ours
+  std::string name;  ///< such as "hall.walk.json.bodies[2]"
+  /// prefix of this object's own keys, such as "walk_"; other keys are ignored
+  std::string prefix = {};
 
   /// Throws SidecarError.
   [[noreturn]] void fail(const std::string& what) const;
   bool has(const char* key) const { return value.contains(prefix + key); }
-  JsonPlace at(const char* key) const {
+  JsonCursor at(const char* key) const {
     return {value.at(prefix + key), name + "." + prefix + key};
   }
-  JsonPlace at(std::size_t i) const { return {value.at(i), name + "[" + std::to_string(i) + "]"}; }
+  JsonCursor at(std::size_t i) const { return {value.at(i), name + "[" + std::to_string(i) + "]"}; }
 };
 
-/// Throws SidecarError where it is no JSON, or says a key twice in one object.
-nlohmann::json parsed(std::string_view text, const std::string& source);
+/// Parses a text. Throws SidecarError if it is not JSON or repeats a key in an object.
+nlohmann::json parseJson(std::string_view text, const std::string& source);
 
-/// At most 40 characters of it.
-std::string excerpt(const nlohmann::json& value);
+/// Returns at most 40 characters of the value.
+std::string formatExcerpt(const nlohmann::json& value);
 
-// Each fails unless the value is what is wanted.
-double numberOf(const JsonPlace& place);
-bool truthOf(const JsonPlace& place);
-std::string textOf(const JsonPlace& place);  ///< not empty
-std::vector<double> numbersOf(const JsonPlace& place);
-collision::Vec3 vectorOf(const JsonPlace& place);
+// Each throws SidecarError unless the value has the type.
+double readNumber(const JsonCursor& cursor);
+bool readBool(const JsonCursor& cursor);
+std::string readText(const JsonCursor& cursor);  ///< not empty
+std::vector<double> readNumbers(const JsonCursor& cursor);
+collision::Vec3 readVector(const JsonCursor& cursor);
 
-/// Fails unless it is an object all of whose keys are among these.
-void allowOnly(const JsonPlace& place, const std::vector<const char*>& keys);
+/// Throws SidecarError unless the value is an object with only these keys.
+void requireKnownKeys(const JsonCursor& cursor, const std::vector<const char*>& keys);
 
 }  // namespace enfilade::scene

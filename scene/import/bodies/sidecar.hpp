@@ -1,4 +1,5 @@
-// The sidecar of a model: what moves in it, told by hand in `<scene>.walk.json` (SIDECAR.md).
+// Sidecar of a model: the hand-written file `<scene>.walk.json` that describes its bodies
+// (SIDECAR.md).
 #pragma once
 
 #include <filesystem>
@@ -11,21 +12,21 @@
 
 namespace enfilade::scene {
 
-/// "file.bodies[2].axis: what is wrong; remedy".
+/// An error in a sidecar: "file.bodies[2].axis: what is wrong; remedy".
 struct SidecarError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// hall.glb -> hall.walk.json, beside it.
-std::filesystem::path sidecarOf(const std::filesystem::path& model);
+/// Returns the sidecar's path: hall.walk.json for hall.glb, in the same folder.
+std::filesystem::path sidecarPath(const std::filesystem::path& model);
 
-/// What a sidecar says besides its bodies.
+/// The content of a sidecar other than its bodies.
 struct Sidecar {
-  std::set<std::uint32_t> still;  ///< objects that are no bodies, whatever else says so
+  std::set<std::uint32_t> staticObjects;  ///< objects that are static whatever other sources say
 };
 
-/// Appends the sidecar's bodies to the model, and an object for each trigger that is given as a
-/// box. `source` names the text in errors. Throws SidecarError; the model is then as before.
+/// Appends the sidecar's bodies to the model, and an object for each trigger with a box. `source`
+/// names the text in errors. Throws SidecarError and then leaves the model unchanged.
 Sidecar applySidecar(Model& model, std::string_view text, const std::string& source);
 
 }  // namespace enfilade::scene

@@ -11,7 +11,7 @@ namespace {
 constexpr std::uint32_t kNone = 0xffffffff;
 
 template <class Vector>
-void addBits(Hasher& hash, const std::vector<Vector>& values) {
+void addVectorBits(Hasher& hash, const std::vector<Vector>& values) {
   hash.add(std::uint64_t{values.size()});
   for (const Vector& v : values) {
     for (Eigen::Index i = 0; i < v.size(); ++i) {
@@ -20,11 +20,11 @@ void addBits(Hasher& hash, const std::vector<Vector>& values) {
   }
 }
 
-std::uint64_t hashOf(const Mesh& mesh) {
+std::uint64_t computeMeshHash(const Mesh& mesh) {
   Hasher hash;
-  addBits(hash, mesh.positions);
-  addBits(hash, mesh.normals);
-  addBits(hash, mesh.uvs);
+  addVectorBits(hash, mesh.positions);
+  addVectorBits(hash, mesh.normals);
+  addVectorBits(hash, mesh.uvs);
   hash.add(std::uint64_t{mesh.indices.size()});
   for (const std::uint32_t i : mesh.indices) hash.add(std::uint64_t{i});
   hash.add(std::uint64_t{mesh.material});
@@ -32,7 +32,7 @@ std::uint64_t hashOf(const Mesh& mesh) {
 }
 
 template <class Vector>
-bool sameBits(const std::vector<Vector>& a, const std::vector<Vector>& b) {
+bool areBitwiseEqual(const std::vector<Vector>& a, const std::vector<Vector>& b) {
   const auto same = [](const Vector& u, const Vector& v) {
     for (Eigen::Index i = 0; i < u.size(); ++i) {
       if (std::bit_cast<std::uint32_t>(u[i]) != std::bit_cast<std::uint32_t>(v[i])) return false;
@@ -42,21 +42,22 @@ bool sameBits(const std::vector<Vector>& a, const std::vector<Vector>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), same);
 }
 
-bool sameContent(const Mesh& a, const Mesh& b) {
-  return a.material == b.material && a.indices == b.indices && sameBits(a.positions, b.positions) &&
-         sameBits(a.normals, b.normals) && sameBits(a.uvs, b.uvs);
+bool areMeshesEqual(const Mesh& a, const Mesh& b) {
+  return a.material == b.material && a.indices == b.indices &&
+         areBitwiseEqual(a.positions, b.positions) && areBitwiseEqual(a.normals, b.normals) &&
+         areBitwiseEqual(a.uvs, b.uvs);
 }
 
-/// For each mesh the first one of the same content.
-std::vector<std::uint32_t> firstOfEach(const std::vector<Mesh>& meshes) {
+/// Returns for each mesh the index of the first equal one.
+std::vector<std::uint32_t> findFirstEqualMeshes(const std::vector<Mesh>& meshes) {
   std::multimap<std::uint64_t, std::uint32_t> byHash;
   std::vector<std::uint32_t> first;
   for (std::uint32_t i = 0; i < meshes.size(); ++i) {
-    const std::uint64_t hash = hashOf(meshes[i]);
+    const std::uint64_t hash = computeMeshHash(meshes[i]);
     std::uint32_t found = i;
     const auto [begin, end] = byHash.equal_range(hash);
     for (auto other = begin; other != end && found == i; ++other) {
-      if (sameContent(meshes[other->second], meshes[i])) found = other->second;
+      if (areMeshesEqual(meshes[other->second], meshes[i])) found = other->second;
     }
     if (found == i) byHash.emplace(hash, i);
     first.push_back(found);
@@ -66,8 +67,8 @@ std::vector<std::uint32_t> firstOfEach(const std::vector<Mesh>& meshes) {
 
 }  // namespace
 
-std::size_t shareEqualMeshes(Model& model) {
-  const std::vector<std::uint32_t> first = firstOfEach(model.meshes);
+std::size_t deduplicateMeshes(Model& model) {
+  const std::vector<std::uint32_t> first = findFirstEqualMeshes(model.meshes);
   std::vector<bool> used(model.meshes.size(), false);
   for (const Object& object : model.objects) {
     for (const std::uint32_t mesh : object.meshes) used[first[mesh]] = true;
@@ -82,9 +83,9 @@ std::size_t shareEqualMeshes(Model& model) {
   for (Object& object : model.objects) {
     for (std::uint32_t& mesh : object.meshes) mesh = number[first[mesh]];
   }
-  const std::size_t gone = model.meshes.size() - kept.size();
+  const std::size_t removed = model.meshes.size() - kept.size();
   model.meshes = std::move(kept);
-  return gone;
+  return removed;
 }
 
 }  // namespace enfilade::scene

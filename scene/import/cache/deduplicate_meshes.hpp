@@ -1,12 +1,12 @@
-// Meshes that a file repeats are stored once.
+// Removes duplicate meshes of a model.
 #pragma once
 
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {
 
-/// Objects of meshes that are equal to the last bit (names apart) come to use the first of them;
-/// the others go, and so do meshes that no object uses. Returns how many went.
-std::size_t shareEqualMeshes(Model& model);
+/// Lets objects with bitwise equal meshes (names apart) share the first of them. Removes the others
+/// and unused meshes. Returns the number removed.
+std::size_t deduplicateMeshes(Model& model);
 
 }  // namespace enfilade::scene

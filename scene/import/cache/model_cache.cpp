@@ -1,8 +1,8 @@
-// The name of an entry is the hash of the model file's bytes, the options, and who reads it: this
-// program as it was linked and the readers' versions. In the entry stand the hashes of the other
-// files that the import read, and the names of those that it looked for in vain; they are compared
-// before the entry serves. Entries are written under another name and renamed, so that one with the
-// right name is whole; what a broken disk makes of it afterwards, its checksum tells.
+// Layout of the cache. An entry's name is the hash of the model file's content, the options, this
+// program's build id and the readers' versions. The entry holds hashes of all other files that the
+// import read, and the names of files that it did not find. They are compared before the entry is
+// used. Entries are written under a temporary name and renamed, so an entry is complete; its
+// checksum detects later damage.
 #include "scene/import/cache/model_cache.hpp"
 
 #include <fcntl.h>
@@ -20,10 +20,12 @@
 
 #include "scene/import/cache/deduplicate_meshes.hpp"
 #include "scene/import/cache/model_cache_entry.hpp"
-#include "scene/import/file_metadata.hpp"
+#include "scene/import/file/ascii.hpp"
+#include "scene/import/file/content_hash.hpp"
+#include "scene/import/file/model_format.hpp"
 #include "scene/import/ifc/web_ifc.hpp"
+#include "scene/import/import_model.hpp"
 #include "scene/import/toolchain_version.hpp"
-#include "scene/import/worker/content_hash.hpp"
 #include "scene/import/worker/model_stream.hpp"
 
 namespace enfilade::scene {
@@ -32,18 +34,19 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr const char* kEnding = ".model";
-constexpr const char* kTextEnding = ".text";
-constexpr const char* kUnfinished = ".unfinished";
-constexpr auto kAbandoned = std::chrono::hours(1);  // an unfinished entry that nobody finishes
+constexpr const char* kModelExtension = ".model";
+constexpr const char* kTextExtension = ".text";
+constexpr const char* kTemporaryExtension = ".unfinished";
+constexpr auto kTemporaryLifetime =
+    std::chrono::hours(1);  // a temporary file this old is abandoned
 
 double secondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// ---- what an entry is found by ------------------------------------------------------------------
+// ---- keys --------------------------------------------------------------------------------------
 
-std::string optionText(const ImportOptions& options) {
+std::string formatOptions(const ImportOptions& options) {
   std::string text = "unit ";
   text += options.metresPerUnit
               ? std::to_string(std::bit_cast<std::uint64_t>(*options.metresPerUnit))
@@ -59,48 +62,49 @@ std::string optionText(const ImportOptions& options) {
   return text;
 }
 
-/// Readers that are no libraries of this program.
-std::string outerReaders(const fs::path& file) {
-  if (modelFormatOf(file) != ModelFormat::ifc) return {};
-  const WebIfcPlace place = findWebIfc();
-  if (!place.missing.empty()) return " without web-ifc";
-  const fs::path script = place.script;
+/// Describes readers that are not libraries of this program.
+std::string describeExternalReaders(const fs::path& file) {
+  if (detectModelFormat(file) != ModelFormat::ifc) return {};
+  const WebIfcLocation location = findWebIfc();
+  if (!location.missing.empty()) return " without web-ifc";
+  const fs::path script = location.script;
   std::string text = " web-ifc";
   for (const fs::path& part : {script, script.parent_path() / "node_modules/web-ifc/package.json"})
-    text += " " + hexOf(contentHashOfFile(part).value_or(ContentHash{}));
+    text += " " + toHex(computeFileHash(part).value_or(ContentHash{}));
   return text;
 }
 
-/// Whether another import of the same file might make more of it: a reader took too long, or was
-/// brought down by something that may not last.
-bool isMakeshift(const Model& model) {
-  return std::any_of(model.problems.begin(), model.problems.end(),
-                     [](const Problem& problem) { return problem.kind == "ifc_reader_failed"; });
+/// Returns whether another import of the same file might read more: a reader timed out or failed
+/// for a reason that may be temporary.
+bool isProvisional(const Model& model) {
+  return std::any_of(
+      model.diagnostics.begin(), model.diagnostics.end(),
+      [](const Diagnostic& diagnostic) { return diagnostic.kind == "ifc_reader_failed"; });
 }
 
-/// nullopt when the file cannot be read: the import will say why.
-std::optional<ContentHash> keyOf(const fs::path& file, const ImportOptions& options) {
-  const auto content = contentHashOfFile(file);
+/// Computes the key; nullopt if the file cannot be read (the import reports why).
+std::optional<ContentHash> computeKey(const fs::path& file, const ImportOptions& options) {
+  const auto content = computeFileHash(file);
   if (!content) return std::nullopt;
-  std::string extension = file.extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return contentHash(hexOf(*content) + extension + " " + optionText(options) + " stream " +
-                     std::to_string(kModelStreamVersion) + " " + readerVersions() +
-                     outerReaders(file));
+  const std::string extension = toLowerCase(file.extension().string());
+  return computeContentHash(toHex(*content) + extension + " " + formatOptions(options) +
+                            " stream " + std::to_string(kModelStreamVersion) + " " +
+                            describeReaderVersions() + describeExternalReaders(file));
 }
 
-/// As it is now; the path is taken relative to the model's folder where the entry says so.
-FileBeside lookAt(const fs::path& file, const std::string& path) {
-  const auto content = versionOf(file.parent_path() / path);
+/// Fingerprints a dependency. A relative path is relative to the model's folder.
+Dependency fingerprint(const fs::path& file, const std::string& path) {
+  const auto content = computeFileVersion(file.parent_path() / path);
   return {path, content.has_value(), content.value_or(ContentHash{})};
 }
 
-/// Relative to the model's folder where they lie below it, so that the folder may be moved.
-std::vector<FileBeside> filesBeside(const fs::path& file, const Model& model) {
+/// Lists the dependencies, relative to the model's folder if they lie below it, so that the folder
+/// may be moved.
+std::vector<Dependency> listDependencies(const fs::path& file, const Model& model) {
   const fs::path folder = fs::absolute(file).lexically_normal().parent_path();
   std::vector<std::string> paths;
-  for (const std::string& named : model.filesBeside) {
-    const fs::path whole = fs::absolute(named).lexically_normal();
+  for (const std::string& dependency : model.dependencies) {
+    const fs::path whole = fs::absolute(dependency).lexically_normal();
     const fs::path below = whole.lexically_relative(folder);
     const bool outside = below.empty() || *below.begin() == "..";
     paths.push_back((outside ? whole : below).string());
@@ -108,21 +112,21 @@ std::vector<FileBeside> filesBeside(const fs::path& file, const Model& model) {
   std::sort(paths.begin(), paths.end());
   paths.erase(std::unique(paths.begin(), paths.end()), paths.end());
   std::erase(paths, file.filename().string());
-  std::vector<FileBeside> files;
-  for (const std::string& path : paths) files.push_back(lookAt(file, path));
+  std::vector<Dependency> files;
+  for (const std::string& path : paths) files.push_back(fingerprint(file, path));
   return files;
 }
 
 // ---- reading ------------------------------------------------------------------------------------
 
-/// An entry's bytes as the file holds them, not copied. Entries are replaced and removed, and never
-/// cut short while somebody may read them.
-class EntryFile {
+/// An entry's file mapped into memory. Entries are replaced and removed, but never truncated while
+/// a reader may map them.
+class MappedFile {
  public:
-  explicit EntryFile(const fs::path& path) {
+  explicit MappedFile(const fs::path& path) {
     const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
     if (fd < 0) return;
-    there_ = true;
+    exists_ = true;
     struct stat status {};
     if (fstat(fd, &status) == 0 && status.st_size > 0) {
       size_ = static_cast<std::size_t>(status.st_size);
@@ -131,33 +135,34 @@ class EntryFile {
     }
     close(fd);
   }
-  ~EntryFile() {
+  ~MappedFile() {
     if (size_ > 0) munmap(data_, size_);
   }
-  EntryFile(const EntryFile&) = delete;
-  EntryFile& operator=(const EntryFile&) = delete;
+  MappedFile(const MappedFile&) = delete;
+  MappedFile& operator=(const MappedFile&) = delete;
 
-  bool there() const { return there_; }
+  bool exists() const { return exists_; }
   std::span<const std::byte> bytes() const { return {static_cast<const std::byte*>(data_), size_}; }
 
  private:
-  bool there_ = false;
+  bool exists_ = false;
   void* data_ = nullptr;
   std::size_t size_ = 0;
 };
 
-std::optional<CacheEntry> entryFor(const fs::path& file, const fs::path& path,
-                                   const ContentHash& key, std::vector<std::string>& notes) {
-  const EntryFile kept(path);
-  if (!kept.there()) return std::nullopt;
+std::optional<CacheEntry> findEntry(const fs::path& file, const fs::path& path,
+                                    const ContentHash& key, std::vector<std::string>& notes) {
+  const MappedFile mapped(path);
+  if (!mapped.exists()) return std::nullopt;
   try {
-    CacheEntry entry = deserialiseEntry(kept.bytes());
-    if (!(entry.key == key)) throw ModelStreamError("cache entry: of another file");
-    const bool same =
-        std::all_of(entry.beside.begin(), entry.beside.end(),
-                    [&](const FileBeside& beside) { return lookAt(file, beside.path) == beside; });
+    CacheEntry entry = deserialiseEntry(mapped.bytes());
+    if (!(entry.key == key)) throw ModelStreamError("cache entry: belongs to another file");
+    const bool same = std::all_of(entry.dependencies.begin(), entry.dependencies.end(),
+                                  [&](const Dependency& dependency) {
+                                    return fingerprint(file, dependency.path) == dependency;
+                                  });
     if (!same) return std::nullopt;
-    utimensat(AT_FDCWD, path.c_str(), nullptr, 0);  // read now: it goes last
+    utimensat(AT_FDCWD, path.c_str(), nullptr, 0);  // marks it as recently used
     return entry;
   } catch (const ModelStreamError& error) {
     notes.push_back(path.string() + ": " + error.what() + "; the model is imported again");
@@ -167,43 +172,44 @@ std::optional<CacheEntry> entryFor(const fs::path& file, const fs::path& path,
 
 // ---- writing ------------------------------------------------------------------------------------
 
-struct Entry {
+struct StoredEntry {
   fs::path path;
   std::uintmax_t bytes = 0;
-  fs::file_time_type used;
+  fs::file_time_type lastUsed;
 };
 
-/// The entries in the folder; unfinished ones of programs that died are removed.
-std::vector<Entry> entriesIn(const fs::path& folder) {
-  std::vector<Entry> entries;
+/// Lists the entries, and removes temporary files of programs that died.
+std::vector<StoredEntry> listEntries(const fs::path& folder) {
+  std::vector<StoredEntry> entries;
   std::error_code error;
   for (const auto& found : fs::directory_iterator(folder, error)) {
     const fs::path& path = found.path();
-    const auto used = found.last_write_time(error);
-    if (path.extension() == kUnfinished && used < fs::file_time_type::clock::now() - kAbandoned)
+    const auto lastUsed = found.last_write_time(error);
+    if (path.extension() == kTemporaryExtension &&
+        lastUsed < fs::file_time_type::clock::now() - kTemporaryLifetime)
       fs::remove(path, error);
-    if (path.extension() == kEnding || path.extension() == kTextEnding)
-      entries.push_back({path, found.file_size(error), used});
+    if (path.extension() == kModelExtension || path.extension() == kTextExtension)
+      entries.push_back({path, found.file_size(error), lastUsed});
   }
   return entries;
 }
 
-/// Removes what was not read for longest until `coming` bytes fit.
-void makeRoom(const ModelCache& cache, std::uintmax_t coming) {
-  std::vector<Entry> entries = entriesIn(cache.folder);
+/// Evicts the least recently read entries until `incomingBytes` fit.
+void evictOldEntries(const ModelCache& cache, std::uintmax_t incomingBytes) {
+  std::vector<StoredEntry> entries = listEntries(cache.folder);
   std::sort(entries.begin(), entries.end(),
-            [](const Entry& a, const Entry& b) { return a.used < b.used; });
-  std::uintmax_t sum = coming;
-  for (const Entry& entry : entries) sum += entry.bytes;
-  for (const Entry& entry : entries) {
-    if (sum <= cache.mostBytes) return;
+            [](const StoredEntry& a, const StoredEntry& b) { return a.lastUsed < b.lastUsed; });
+  std::uintmax_t totalBytes = incomingBytes;
+  for (const StoredEntry& entry : entries) totalBytes += entry.bytes;
+  for (const StoredEntry& entry : entries) {
+    if (totalBytes <= cache.maxBytes) return;
     std::error_code error;
-    if (fs::remove(entry.path, error)) sum -= entry.bytes;
+    if (fs::remove(entry.path, error)) totalBytes -= entry.bytes;
   }
 }
 
-/// Why the bytes could not be written to `fd`; 0 when they were.
-int writeAll(int fd, const std::vector<std::byte>& bytes) {
+/// Writes all bytes to `fd`. Returns errno, or 0.
+int writeAllBytes(int fd, const std::vector<std::byte>& bytes) {
   std::size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t size = write(fd, bytes.data() + done, bytes.size() - done);
@@ -214,13 +220,13 @@ int writeAll(int fd, const std::vector<std::byte>& bytes) {
   return 0;
 }
 
-/// Under another name, then renamed. Returns what went wrong, or "".
-std::string writeWhole(const fs::path& path, const std::vector<std::byte>& bytes) {
-  std::string unfinished = path.string() + ".XXXXXX" + kUnfinished;
+/// Writes to a temporary file and renames it. Returns the error, or "".
+std::string writeAtomically(const fs::path& path, const std::vector<std::byte>& bytes) {
+  std::string unfinished = path.string() + ".XXXXXX" + kTemporaryExtension;
   const int fd =
-      mkostemps(unfinished.data(), static_cast<int>(std::strlen(kUnfinished)), O_CLOEXEC);
+      mkostemps(unfinished.data(), static_cast<int>(std::strlen(kTemporaryExtension)), O_CLOEXEC);
   if (fd < 0) return path.parent_path().string() + ": " + std::strerror(errno);
-  int error = writeAll(fd, bytes);
+  int error = writeAllBytes(fd, bytes);
   if (close(fd) != 0 && error == 0) error = errno;
   if (error == 0 && rename(unfinished.c_str(), path.c_str()) != 0) error = errno;
   if (error == 0) return "";
@@ -228,65 +234,66 @@ std::string writeWhole(const fs::path& path, const std::vector<std::byte>& bytes
   return path.string() + ": " + std::strerror(error);
 }
 
-std::string keepBytes(const ModelCache& cache, const fs::path& path,
-                      const std::vector<std::byte>& bytes) {
+std::string storeBytes(const ModelCache& cache, const fs::path& path,
+                       const std::vector<std::byte>& bytes) {
   std::error_code error;
   fs::create_directories(cache.folder, error);
   if (error) return cache.folder.string() + ": " + error.message();
-  if (bytes.size() > cache.mostBytes) {
-    return path.string() + ": " + std::to_string(bytes.size() >> 20) +
-           " MB are more than the cache may hold";
+  if (bytes.size() > cache.maxBytes) {
+    return path.string() + ": " + std::to_string(bytes.size() >> 20) + " MB exceed the cache limit";
   }
-  makeRoom(cache, bytes.size());
-  return writeWhole(path, bytes);
+  evictOldEntries(cache, bytes.size());
+  return writeAtomically(path, bytes);
 }
 
-/// The name of a kept text and, before the text itself, its checksum.
-fs::path textPath(const ModelCache& cache, const std::string& key) {
-  return cache.folder / (hexOf(contentHash(key + " " + readerVersions())) + kTextEnding);
+/// File name of a cached text, and the checksum that precedes the text in the file.
+fs::path makeTextPath(const ModelCache& cache, const std::string& key) {
+  return cache.folder /
+         (toHex(computeContentHash(key + " " + describeReaderVersions())) + kTextExtension);
 }
-std::string checksumOf(const std::string& key, std::string_view text) {
-  return hexOf(contentHash(key + " " + std::string(text)));
+std::string computeTextChecksum(const std::string& key, std::string_view text) {
+  return toHex(computeContentHash(key + " " + std::string(text)));
 }
 
-LoadedModel imported(const fs::path& file, const ImportOptions& options,
-                     const ImportProgress& progress) {
+LoadedModel importUncached(const fs::path& file, const ImportOptions& options,
+                           const ImportProgress& progress) {
   const auto start = Clock::now();
   LoadedModel loaded;
   loaded.model = importModel(file, options, progress);
-  shareEqualMeshes(loaded.model);
+  deduplicateMeshes(loaded.model);
   loaded.importSeconds = secondsSince(start);
   return loaded;
 }
 
-std::optional<std::string> environment(const char* name) {
+std::optional<std::string> readEnvironment(const char* name) {
   const char* value = std::getenv(name);
   return value == nullptr || *value == '\0' ? std::nullopt : std::optional<std::string>(value);
 }
 
-std::optional<fs::path> cacheFolder() {
-  const auto told = environment("ENFILADE_CACHE");
-  if (told == "off") return std::nullopt;
-  if (told && fs::path(*told).is_absolute()) return fs::path(*told);
-  // Relative paths are to be ignored, says the specification.
-  if (const auto caches = environment("XDG_CACHE_HOME"); caches && fs::path(*caches).is_absolute())
+std::optional<fs::path> findCacheFolder() {
+  const auto setting = readEnvironment("ENFILADE_CACHE");
+  if (setting == "off") return std::nullopt;
+  if (setting && fs::path(*setting).is_absolute()) return fs::path(*setting);
+  // The specification says to ignore relative paths.
+  if (const auto caches = readEnvironment("XDG_CACHE_HOME");
+      caches && fs::path(*caches).is_absolute())
     return fs::path(*caches) / "enfilade";
-  if (const auto home = environment("HOME")) return fs::path(*home) / ".cache" / "enfilade";
+  if (const auto home = readEnvironment("HOME")) return fs::path(*home) / ".cache" / "enfilade";
   return std::nullopt;
 }
 
 }  // namespace
 
-std::optional<ModelCache> modelCacheOfEnvironment() {
-  const std::optional<fs::path> folder = cacheFolder();
+std::optional<ModelCache> modelCacheFromEnvironment() {
+  const std::optional<fs::path> folder = findCacheFolder();
   if (!folder) return std::nullopt;
   ModelCache cache{*folder};
-  if (const auto bound = environment("ENFILADE_CACHE_MB")) {
+  if (const auto limit = readEnvironment("ENFILADE_CACHE_MB")) {
     std::uintmax_t megabytes = 0;
-    const char* end = bound->data() + bound->size();
-    const auto read = std::from_chars(bound->data(), end, megabytes);
+    const char* end = limit->data() + limit->size();
+    const auto read = std::from_chars(limit->data(), end, megabytes);
     if (read.ec == std::errc() && read.ptr == end && megabytes < (1u << 30))
-      cache.mostBytes = megabytes << 20;
+      cache.maxBytes = megabytes << 20;
   }
   return cache;
 }
@@ -294,29 +301,29 @@ std::optional<ModelCache> modelCacheOfEnvironment() {
 LoadedModel loadModel(const fs::path& file, const ImportOptions& options,
                       const std::optional<ModelCache>& cache, const ImportProgress& progress) {
   const auto start = Clock::now();
-  const auto key = cache ? keyOf(file, options) : std::nullopt;
+  const auto key = cache ? computeKey(file, options) : std::nullopt;
   LoadedModel loaded;
   if (!key) {
-    loaded = imported(file, options, progress);
+    loaded = importUncached(file, options, progress);
     loaded.loadSeconds = secondsSince(start);
     return loaded;
   }
-  const fs::path path = cache->folder / (hexOf(*key) + kEnding);
+  const fs::path path = cache->folder / (toHex(*key) + kModelExtension);
   std::vector<std::string> notes;
-  if (auto entry = entryFor(file, path, *key, notes)) {
+  if (auto entry = findEntry(file, path, *key, notes)) {
     loaded.model = std::move(entry->model);
     loaded.model.source = file.string();
     loaded.fromCache = true;
     loaded.importSeconds = entry->importSeconds;
   } else {
-    loaded = imported(file, options, progress);
-    CacheEntry made{*key, loaded.importSeconds, filesBeside(file, loaded.model), {}};
-    // Somebody may have saved the file while it was read.
-    if (!isMakeshift(loaded.model) && keyOf(file, options) == key) {
-      made.model = std::move(loaded.model);
-      const std::string wrong = keepBytes(*cache, path, serialiseEntry(made));
-      if (!wrong.empty()) notes.push_back("not kept for the next start: " + wrong);
-      loaded.model = std::move(made.model);
+    loaded = importUncached(file, options, progress);
+    CacheEntry newEntry{*key, loaded.importSeconds, listDependencies(file, loaded.model), {}};
+    // The file may have been saved during the import.
+    if (!isProvisional(loaded.model) && computeKey(file, options) == key) {
+      newEntry.model = std::move(loaded.model);
+      const std::string failure = storeBytes(*cache, path, serialiseEntry(newEntry));
+      if (!failure.empty()) notes.push_back("not cached for the next start: " + failure);
+      loaded.model = std::move(newEntry.model);
     }
   }
   loaded.notes = std::move(notes);
@@ -324,22 +331,24 @@ LoadedModel loadModel(const fs::path& file, const ImportOptions& options,
   return loaded;
 }
 
-std::optional<std::string> keptText(const ModelCache& cache, const std::string& key) {
-  const fs::path path = textPath(cache, key);
-  const EntryFile kept(path);
-  const std::string_view whole(reinterpret_cast<const char*>(kept.bytes().data()),
-                               kept.bytes().size());
-  const std::size_t sum = checksumOf(key, "").size();
-  if (whole.size() < sum || whole.substr(0, sum) != checksumOf(key, whole.substr(sum)))
+std::optional<std::string> loadCachedText(const ModelCache& cache, const std::string& key) {
+  const fs::path path = makeTextPath(cache, key);
+  const MappedFile mapped(path);
+  const std::string_view whole(reinterpret_cast<const char*>(mapped.bytes().data()),
+                               mapped.bytes().size());
+  const std::size_t checksumSize = computeTextChecksum(key, "").size();
+  if (whole.size() < checksumSize ||
+      whole.substr(0, checksumSize) != computeTextChecksum(key, whole.substr(checksumSize)))
     return std::nullopt;
   utimensat(AT_FDCWD, path.c_str(), nullptr, 0);
-  return std::string(whole.substr(sum));
+  return std::string(whole.substr(checksumSize));
 }
 
-std::string keepText(const ModelCache& cache, const std::string& key, const std::string& text) {
-  const std::string whole = checksumOf(key, text) + text;
+std::string storeCachedText(const ModelCache& cache, const std::string& key,
+                            const std::string& text) {
+  const std::string whole = computeTextChecksum(key, text) + text;
   const auto* first = reinterpret_cast<const std::byte*>(whole.data());
-  return keepBytes(cache, textPath(cache, key), {first, first + whole.size()});
+  return storeBytes(cache, makeTextPath(cache, key), {first, first + whole.size()});
 }
 
 }  // namespace enfilade::scene

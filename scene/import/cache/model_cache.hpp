@@ -1,5 +1,5 @@
-// Models that were imported before, kept on disk: a second start of the same file reads back what
-// the first one made of it. An entry is found by what the file holds, not by its name or its time.
+// On-disk cache of imported models, so that a restart with the same file loads the earlier result.
+// The key is the file's content, not its name or time.
 #pragma once
 
 #include <cstdint>
@@ -8,44 +8,46 @@
 #include <string>
 #include <vector>
 
-#include "scene/import/import_model.hpp"
+#include "scene/import/file/import_options.hpp"
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {
 
+/// Location and size limit of the cache.
 struct ModelCache {
-  std::filesystem::path folder;  ///< made when the first entry is written
-  /// Bytes that all entries may take together; those not read for longest go first.
-  std::uintmax_t mostBytes = std::uintmax_t{4} << 30;
+  std::filesystem::path folder;  ///< created with the first entry
+  /// Maximal total size in bytes; the least recently read entries are evicted first.
+  std::uintmax_t maxBytes = std::uintmax_t{4} << 30;
 };
 
-/// $XDG_CACHE_HOME/enfilade, else ~/.cache/enfilade (XDG Base Directory Specification 0.8), as the
-/// environment says: ENFILADE_CACHE=off gives none, ENFILADE_CACHE=/a/folder that folder,
-/// ENFILADE_CACHE_MB another bound. nullopt when there is none or no home is known.
-std::optional<ModelCache> modelCacheOfEnvironment();
+/// Cache of the environment: $XDG_CACHE_HOME/enfilade, else ~/.cache/enfilade (XDG Base Directory
+/// Specification 0.8). ENFILADE_CACHE=off disables it, ENFILADE_CACHE=/a/folder sets the folder,
+/// ENFILADE_CACHE_MB the limit. nullopt: disabled, or no home directory.
+std::optional<ModelCache> modelCacheFromEnvironment();
 
+/// A model, and how it was obtained.
 struct LoadedModel {
   Model model;
   bool fromCache = false;
-  double importSeconds = 0;  ///< that the import took, now or when the entry was made
-  double loadSeconds = 0;    ///< that it took now
-  /// What went wrong with the cache and was helped by importing, one line each: a damaged entry, a
-  /// folder that cannot be written, a disk that is full.
+  double importSeconds = 0;  ///< duration of the import, now or when the entry was made
+  double loadSeconds = 0;    ///< duration of this call
+  /// Cache problems that an import made up for, one line each: a damaged entry, a read-only folder,
+  /// a full disk.
   std::vector<std::string> notes;
 };
 
-/// importModel(), with meshes of equal content stored once, or what a cache kept of it. An entry
-/// serves only if the file, each other file that was read or looked for, the options, this program
-/// and its readers are what they were, and if its checksum holds. Throws ImportError.
+/// Returns the cached model, or imports it with equal meshes stored once. An entry is valid only if
+/// the file, its dependencies, the options, this program and its readers are unchanged, and the
+/// checksum is correct. Throws ImportError.
 LoadedModel loadModel(const std::filesystem::path& file, const ImportOptions& options,
                       const std::optional<ModelCache>& cache, const ImportProgress& progress = {});
 
-/// What was worked out of a model at some cost, as a text kept beside the entries under `key`,
-/// which says all that it follows from but the program, which is added. nullopt when none is kept,
-/// or the checksum does not hold.
-std::optional<std::string> keptText(const ModelCache& cache, const std::string& key);
+/// Returns the text cached under `key`; nullopt if it is missing or damaged. The key must contain
+/// all inputs of the text; the program's version is added.
+std::optional<std::string> loadCachedText(const ModelCache& cache, const std::string& key);
 
-/// Keeps it for the next start. Returns what went wrong, or "".
-std::string keepText(const ModelCache& cache, const std::string& key, const std::string& text);
+/// Stores a text for the next start. Returns the error, or "".
+std::string storeCachedText(const ModelCache& cache, const std::string& key,
+                            const std::string& text);
 
 }  // namespace enfilade::scene

@@ -1,5 +1,5 @@
-// One entry of the model cache as bytes: what it was made from, a model stream, and a checksum of
-// all of it. Private to scene/.
+// Serialises an entry of the model cache: its key and dependencies, a model stream, and a checksum.
+// Private to scene/.
 #pragma once
 
 #include <cstddef>
@@ -7,29 +7,30 @@
 #include <string>
 #include <vector>
 
-#include "scene/import/worker/content_hash.hpp"
+#include "scene/import/file/content_hash.hpp"
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {
 
 /// Another file that the import read or looked for.
-struct FileBeside {
-  std::string path;  ///< as the importer tells it
-  bool there = false;
-  ContentHash content;  ///< zero where there was none
-  bool operator==(const FileBeside&) const = default;
+struct Dependency {
+  std::string path;  ///< as the importer reports it
+  bool exists = false;
+  ContentHash content;  ///< zero if the file does not exist
+  bool operator==(const Dependency&) const = default;
 };
 
+/// Content of a cache entry.
 struct CacheEntry {
   ContentHash key;
   double importSeconds = 0;
-  std::vector<FileBeside> beside;
+  std::vector<Dependency> dependencies;
   Model model;
 };
 
 std::vector<std::byte> serialiseEntry(const CacheEntry& entry);
 
-/// Throws ModelStreamError saying what is wrong: nothing is read before the checksum holds.
+/// Checks the checksum before it reads anything else. Throws ModelStreamError with the reason.
 CacheEntry deserialiseEntry(std::span<const std::byte> bytes);
 
 }  // namespace enfilade::scene

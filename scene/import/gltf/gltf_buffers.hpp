@@ -1,5 +1,4 @@
-// Numbers out of a glTF file's buffers, each access checked against what is there. Private to the
-// import.
+// Reads numbers from a glTF file's buffers with bounds checks. Private to the import.
 #pragma once
 
 #include <filesystem>
@@ -7,30 +6,30 @@
 #include <string>
 #include <vector>
 
-#include "scene/import/file_metadata.hpp"
+#include "scene/import/file/model_format.hpp"
 
 namespace enfilade::scene {
 
 class GltfBuffers {
  public:
-  /// `json` must live longer. Throws ImportError.
+  /// `json` must outlive this object. Throws ImportError.
   GltfBuffers(std::filesystem::path file, ModelFormat format, const nlohmann::json& json);
 
-  /// All components of an accessor of floats or normalised integers, `perElement` of them each.
-  /// Throws ImportError, also for another type.
-  std::vector<double> numbers(std::size_t accessor, std::size_t perElement);
+  /// All components of an accessor of floats or normalised integers, `perElement` per element.
+  /// Throws ImportError, also for any other type.
+  std::vector<double> readNumbers(std::size_t accessor, std::size_t perElement);
 
  private:
   struct Slice {
     const std::string* bytes;
     std::size_t first, stride;
   };
-  [[noreturn]] void refuse(const std::string& what) const;
-  const nlohmann::json& entry(const char* list, std::size_t index) const;
-  std::size_t whole(const nlohmann::json& object, const char* key, std::size_t otherwise) const;
-  const std::string& buffer(std::size_t index);
-  std::string read(std::size_t index) const;
-  Slice sliceOf(const nlohmann::json& accessor, std::size_t elementBytes, std::size_t count);
+  [[noreturn]] void fail(const std::string& message) const;
+  const nlohmann::json& getEntry(const char* list, std::size_t index) const;
+  std::size_t getInteger(const nlohmann::json& object, const char* key, std::size_t fallback) const;
+  const std::string& getBuffer(std::size_t index);
+  std::string readBuffer(std::size_t index) const;
+  Slice makeSlice(const nlohmann::json& accessor, std::size_t elementBytes, std::size_t count);
 
   std::filesystem::path file_;
   ModelFormat format_;

@@ -1,5 +1,4 @@
-// The cameras of a glTF file and how its animations move them. Reads JSON and buffers alone: no
-// mesh, no assimp.
+// Samples the animated cameras of a glTF file. Reads only JSON and buffers: no meshes, no assimp.
 #pragma once
 
 #include <filesystem>
@@ -11,29 +10,29 @@
 
 namespace enfilade::scene {
 
-/// A camera at one time, in the file's own frame and unit. It looks along `forward`.
+/// A camera at one time, in the file's own frame and unit. Its view direction is `forward`.
 struct GltfCameraPose {
   double time = 0;  ///< seconds
   Vec3 eye = Vec3::Zero();
-  Vec3 forward = -Vec3::UnitZ(), up = Vec3::UnitY();  ///< unit, square to one another
+  Vec3 forward = -Vec3::UnitZ(), up = Vec3::UnitY();  ///< unit length, orthogonal
 };
 
+/// The sampled poses of one camera.
 struct GltfCameraPath {
-  std::string name;                   ///< of its node
+  std::string name;                   ///< of the camera's node
   double fovY = 0;                    ///< radians
-  std::vector<GltfCameraPose> poses;  ///< at least one; one only where nothing moves it
-  std::vector<std::string> notes;     ///< what was chosen or left out, for a person
+  std::vector<GltfCameraPose> poses;  ///< at least one; exactly one if the camera is not animated
+  std::vector<std::string> notes;     ///< readable remarks, such as ignored channels
 };
 
-/// The camera of the node (or else the camera) called `name`; "": the first that an animation
-/// moves, else the first. Sampled `fps` times a second from 0 to the last key of what moves it,
-/// keys held before the first one and after the last. All animations act together. Throws
+/// Samples the camera whose node, or itself, is named `name`; "": the first animated camera,
+/// otherwise the first. Samples `fps` times a second from 0 to the last key that affects it; values
+/// are constant before the first and after the last key. All animations act together. Throws
 /// ImportError.
 GltfCameraPath sampleGltfCamera(const std::filesystem::path& file, const std::string& name,
                                 double fps);
 
-/// Where a place of the model's file lies in its scene: unit, up axis and offset as they were
-/// taken.
-Eigen::Affine3d sceneFromFile(const Model& model);
+/// Transforms a position of the model's file to the scene: applies unit, up axis and offset.
+Eigen::Affine3d computeSceneFromFile(const Model& model);
 
 }  // namespace enfilade::scene

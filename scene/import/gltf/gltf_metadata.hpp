@@ -1,17 +1,17 @@
-// What the JSON of a glTF file says about its meshes, before assimp has them.
+// Reads mesh metadata from the JSON of a glTF file, before assimp reads the file.
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
 #include <optional>
 
-#include "scene/import/file_metadata.hpp"
+#include "scene/import/file/model_format.hpp"
 
 namespace enfilade::scene {
 
-/// How many triangles the meshes have by their accessors, each mesh once; nullopt where the JSON
-/// makes no sense, which assimp will tell. Throws ImportError for a file that requires an extension
-/// without which its shapes cannot be read.
-std::optional<std::size_t> gltfTriangles(const std::filesystem::path& file, ModelFormat format);
+/// Number of triangles by the accessors, each mesh counted once; nullopt for invalid JSON, which
+/// assimp will report. Throws ImportError if the file requires an unsupported extension.
+std::optional<std::size_t> countGltfTriangles(const std::filesystem::path& file,
+                                              ModelFormat format);
 
 }  // namespace enfilade::scene

@@ -1,14 +1,14 @@
-// Files write classes in capitals; these are the products of IFC2x3, IFC4 and IFC4x3 as the
-// standard writes them.
+#include "scene/import/ifc/class_names.hpp"
+
 #include <algorithm>
 #include <iterator>
 
-#include "scene/import/ifc/ifc_metadata.hpp"
+#include "scene/import/file/ascii.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr std::string_view kNames[] = {
+constexpr std::string_view kClassNames[] = {
     "Actuator",
     "AirTerminal",
     "AirTerminalBox",
@@ -223,25 +223,21 @@ constexpr std::string_view kNames[] = {
     "WindowStandardCase",
 };
 
-char lower(char c) {
-  return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
-}
-
-bool sameButForCase(std::string_view a, std::string_view b) {
+bool equalsIgnoreCase(std::string_view a, std::string_view b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](char x, char y) { return lower(x) == lower(y); });
+                    [](char x, char y) { return toLowerCase(x) == toLowerCase(y); });
 }
 
 }  // namespace
 
-std::string ifcClassName(std::string_view type) {
+std::string formatIfcClassName(std::string_view type) {
   if (type.starts_with("IFC")) type.remove_prefix(3);
   const auto* known =
-      std::find_if(std::begin(kNames), std::end(kNames),
-                   [&](std::string_view name) { return sameButForCase(name, type); });
-  if (known != std::end(kNames)) return "Ifc" + std::string(*known);
-  std::string name = "Ifc" + std::string(type);  // of another version: as good as can be
-  std::transform(name.begin() + 3, name.end(), name.begin() + 3, lower);
+      std::find_if(std::begin(kClassNames), std::end(kClassNames),
+                   [&](std::string_view name) { return equalsIgnoreCase(name, type); });
+  if (known != std::end(kClassNames)) return "Ifc" + std::string(*known);
+  std::string name = "Ifc" + std::string(type);  // unknown class: approximate spelling
+  for (std::size_t i = 3; i < name.size(); ++i) name[i] = toLowerCase(name[i]);
   if (name.size() > 3 && name[3] >= 'a' && name[3] <= 'z')
     name[3] = static_cast<char>(name[3] - 32);
   return name;

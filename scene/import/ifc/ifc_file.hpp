@@ -1,4 +1,4 @@
-// The text of an IFC file, out of its zip archive where it lies in one.
+// Reads the text of an IFC file, also from a zip archive.
 #pragma once
 
 #include <cstddef>
@@ -7,9 +7,9 @@
 
 namespace enfilade::scene {
 
-/// `.ifc` as it is, `.ifczip` unpacked in memory; which of both is told by the first bytes. Throws
-/// ImportError when it cannot be read, is no archive, holds none or several .ifc files, or would
-/// unpack to more than `largest` bytes.
-std::string readIfcFile(const std::filesystem::path& file, std::size_t largest);
+/// Reads `.ifc` directly and unpacks `.ifczip` in memory; the first bytes decide. Throws
+/// ImportError if the file is unreadable, is not an archive, does not contain exactly one .ifc
+/// file, or would unpack to more than `maxBytes`.
+std::string readIfcFile(const std::filesystem::path& file, std::size_t maxBytes);
 
 }  // namespace enfilade::scene

@@ -1,77 +1,60 @@
-// What the text of an IFC file says of its products, whoever reads their shapes: names, classes,
-// places in the building, doors' ways of opening, what fills which opening. Taken from the text and
-// not from a reader, so that ids and names are the same with each of them.
+// Metadata of an IFC file's products: names, classes, placements, hierarchy, door operations and
+// opening fillings. Read from the text and not from a geometry reader, so that ids and names do not
+// depend on the reader.
 #pragma once
 
 #include <Eigen/Geometry>
 #include <map>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "scene/import/ifc/ifc_units.hpp"
 #include "scene/import/ifc/step_file.hpp"
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {
 
+/// An IfcProduct of the file.
 struct IfcProduct {
-  /// What its body stands for. Only `thing` is solid.
-  enum class Role : std::uint8_t { thing, space, opening, drawing };
+  /// Meaning of the product's body. Only `physical` is solid.
+  enum class Role : std::uint8_t { physical, space, opening, drawing };
 
-  std::uint32_t id = 0;  ///< express id: the number behind '#'
-  Role role = Role::thing;
-  bool hasBody = false;  ///< its representation promises surfaces or solids
+  std::uint32_t id = 0;  ///< express id: the number after '#'
+  Role role = Role::physical;
+  bool hasBody = false;  ///< its representation declares surfaces or solids
   std::string globalId;
   std::string ifcClass;       ///< as "IfcDoor"
   std::string name;           ///< UTF-8, may be empty
-  std::string operation;      ///< of doors, windows, lifts; see Object::operation
-  std::uint32_t parent = 0;   ///< what it belongs to or is contained in; 0: nothing
-  std::uint32_t opening = 0;  ///< doors and windows: what they fill
-  std::uint32_t host = 0;     ///< doors and windows: whose opening that is
-  double overallWidth = 0, overallHeight = 0;        ///< metres, 0: not told
+  std::string operation;      ///< of doors, windows, elevators; see Object::operation
+  std::uint32_t parent = 0;   ///< its aggregate or spatial container; 0: no parent
+  std::uint32_t opening = 0;  ///< doors and windows: the opening that they fill
+  std::uint32_t host = 0;     ///< doors and windows: the element with that opening
+  double overallWidth = 0, overallHeight = 0;        ///< metres; 0: not stated
   std::optional<Eigen::Affine3d> fileFromPlacement;  ///< metres, the file's axes, no scale
 };
 
-/// Where the file's coordinates lie on a map (IfcMapConversion). Told, not heeded: a model stays in
-/// its own coordinates.
-struct IfcMapPlace {
-  std::string crs;                         ///< the map's name, as "EPSG:25832"; may be empty
-  double east = 0, north = 0, height = 0;  ///< of the file's origin, metres
-  double turn = 0;                         ///< of the file's x axis from east to north, radians
-  double scale = 1;                        ///< from the file's lengths to the map's
-};
-
-struct IfcFacts {
+/// Metadata of the whole file.
+struct IfcMetadata {
   double metresPerUnit = 1;
-  std::optional<std::string> unitGuessed;  ///< why the unit is a guess
-  bool siUnit = true;                      ///< false: feet and the like
-  std::optional<IfcMapPlace> mapPlace;
+  std::optional<std::string> unitAssumption;  ///< the reason if the unit is assumed
+  bool siUnit = true;                         ///< false: feet and other conversion-based units
+  std::optional<IfcMapConversion> mapConversion;
   std::string schema;
-  bool whole = true;                              ///< END-ISO-10303-21 is there
-  std::vector<IfcProduct> products;               ///< in file order; one an express id
-  std::map<std::uint32_t, std::size_t> byId;      ///< into products
-  std::map<std::uint32_t, std::string> projects;  ///< their names; they are no products
-  std::vector<Problem> problems;
+  bool complete = true;                           ///< END-ISO-10303-21 is present
+  std::vector<IfcProduct> products;               ///< in file order; one per express id
+  std::map<std::uint32_t, std::size_t> byId;      ///< index into products
+  std::map<std::uint32_t, std::string> projects;  ///< names; projects are not products
+  std::vector<Diagnostic> diagnostics;
 
   const IfcProduct* find(std::uint32_t id) const;
 };
 
-/// Never throws for what a file may hold; what is missing is missing.
-IfcFacts readIfcFacts(const StepFile& file);
+/// Never throws on file contents; missing values stay empty.
+IfcMetadata readIfcMetadata(const StepFile& file);
 
-/// Metres in the length unit of the project; nullopt: none is told.
-std::optional<double> ifcMetresPerUnit(const StepFile& file, bool& siUnit);
-
-/// nullopt: the file tells of no place on a map, or of none that can be. Metres come of the map's
-/// unit, or of `metresPerUnit` where the map has none.
-std::optional<IfcMapPlace> ifcMapPlace(const StepFile& file, double metresPerUnit);
-
-/// "IFCWALLSTANDARDCASE" as "IfcWallStandardCase".
-std::string ifcClassName(std::string_view type);
-
-/// Where a placement lies in the world, in metres and the file's axes; nullopt when it is broken.
-std::optional<Eigen::Affine3d> ifcPlacement(const StepFile& file, std::uint32_t placement,
-                                            double metresPerUnit);
+/// A placement's transform to the file's world, in metres and the file's axes; nullopt if invalid.
+std::optional<Eigen::Affine3d> readIfcPlacement(const StepFile& file, std::uint32_t placement,
+                                                double metresPerUnit);
 
 }  // namespace enfilade::scene

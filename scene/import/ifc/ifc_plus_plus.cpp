@@ -4,12 +4,13 @@
 
 namespace enfilade::scene {
 
-std::filesystem::path ifcPlusPlusModule() {
-  return moduleFile("ifc_plus_plus.so", "ENFILADE_IFC_PLUS_PLUS", ENFILADE_IFC_PLUS_PLUS_MODULE);
+std::filesystem::path ifcPlusPlusModulePath() {
+  return findModule("ifc_plus_plus.so", "ENFILADE_IFC_PLUS_PLUS", ENFILADE_IFC_PLUS_PLUS_MODULE);
 }
 
-void sendShapesByIfcPlusPlus(std::string text) {
-  reinterpret_cast<SendShapes*>(openModule(ifcPlusPlusModule(), kSendShapes))(text);
+void sendMeshesWithIfcPlusPlus(std::string text) {
+  reinterpret_cast<SendMeshesFunction*>(openModule(ifcPlusPlusModulePath(), kSendMeshesSymbol))(
+      text);
 }
 
 }  // namespace enfilade::scene

@@ -1,6 +1,6 @@
-// The process that reads IFC with ifcplusplus (and its solid modeller carve): they crash and hang
-// on some files, so it is one of its own. The library is as slow to link at run time as many a
-// scene to load, so it stands behind a module that this process alone opens.
+// Reads IFC with ifcplusplus and its solid modeller carve. They crash or hang on some files, so
+// they run in their own process. Linking the library at run time is slow, so only that process
+// opens the module that contains it.
 #pragma once
 
 #include <filesystem>
@@ -8,17 +8,17 @@
 
 namespace enfilade::scene {
 
-/// Where the module is: named by ENFILADE_IFC_PLUS_PLUS, beside the program, where it is installed,
-/// or where it was built.
-std::filesystem::path ifcPlusPlusModule();
+/// Path of the module: $ENFILADE_IFC_PLUS_PLUS, otherwise next to the program, in the install
+/// folder or in the build folder.
+std::filesystem::path ifcPlusPlusModulePath();
 
-/// Sends the shapes of all products of `text`. Throws std::exception when the file cannot be read,
-/// or the module not opened.
-void sendShapesByIfcPlusPlus(std::string text);
+/// Sends the meshes of all products of `text`. Throws std::exception if the file cannot be read or
+/// the module cannot be opened.
+void sendMeshesWithIfcPlusPlus(std::string text);
 
-/// What the module exports, by the name kSendShapes. Whoever changes this or how shapes pass
-/// through the pipe gives it another number, so that no program opens a module that is not its own.
-using SendShapes = void(std::string& text);
-inline constexpr const char* kSendShapes = "enfiladeSendShapes1";
+/// The module's exported function; its symbol is kSendMeshesSymbol. Increase the number in the
+/// symbol whenever this signature or the wire format changes: a program then rejects old modules.
+using SendMeshesFunction = void(std::string& text);
+inline constexpr const char* kSendMeshesSymbol = "enfiladeSendShapes1";
 
 }  // namespace enfilade::scene

@@ -1,4 +1,4 @@
-// A library of its own: see ifc_plus_plus.hpp.
+// The ifcplusplus reader, built as a separate module: see ifc_plus_plus.hpp.
 #include "scene/import/ifc/ifc_plus_plus.hpp"
 
 #include <ifcpp/geometry/Carve/GeometryConverter.h>
@@ -19,28 +19,28 @@ namespace {
 using CarveMeshes = carve::mesh::MeshSet<3>;
 using CarveFace = carve::mesh::Face<3>;
 
-constexpr std::size_t kMostCorners = 3;  // of a face once all are triangles
+constexpr std::size_t kTriangleCorners = 3;  // of a triangulated face
 
-/// File, Z up, to ours.
+/// From the file's Z up to Y up.
 Eigen::Affine3d yUpFromZUp() {
-  Eigen::Matrix3d turn;
-  turn << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-  return Eigen::Affine3d(turn);
+  Eigen::Matrix3d rotation;
+  rotation << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  return Eigen::Affine3d(rotation);
 }
 
-/// Passes ifcplusplus' progress on. It counts reading and shapes from 0 to 1 each.
+/// Forwards ifcplusplus' progress; parsing and meshing each run from 0 to 1.
 void forwardProgress(void*, std::shared_ptr<StatusCallback::Message> message) {
   if (!message || message->m_message_type != StatusCallback::MESSAGE_TYPE_PROGRESS_VALUE) return;
   const bool shapes = message->m_progress_type == "geometry";
   sendProgress(shapes ? "shapes (ifcplusplus)" : "parse (ifcplusplus)", message->m_progress_value);
 }
 
-/// The steps of loadModelFromString(), but with the schema that the header says; that function
-/// leaves it at IFC4, and loadModelFromFile() wants a locale that may not be there.
+/// The steps of loadModelFromString(), but with the header's schema; that function assumes IFC4.
+/// loadModelFromFile() requires a locale that may not be installed.
 std::shared_ptr<BuildingModel> readModel(std::string text) {
   auto model = std::make_shared<BuildingModel>();
   ReaderSTEP reader;
-  static int any = 0;  // ifcplusplus calls nobody back without an object
+  static int any = 0;  // ifcplusplus calls back only with a non-null object
   reader.setMessageCallBack(&any, forwardProgress);
   model->clearIfcModel();
   reader.removeComments(text);
@@ -51,7 +51,7 @@ std::shared_ptr<BuildingModel> readModel(std::string text) {
   return model;
 }
 
-/// Gathers the triangles of one item in doubles and sends them about their own centre.
+/// Collects the triangles of one item in doubles and sends them relative to their centre.
 class ItemTriangles {
  public:
   void add(const CarveMeshes& meshes) {
@@ -62,8 +62,8 @@ class ItemTriangles {
   bool empty() const { return corners_.empty(); }
 
   /// `fileFromProduct`: metres, Z up.
-  IfcPart send(std::uint32_t id, const Eigen::Vector4f& colour,
-               const Eigen::Affine3d& fileFromProduct) const {
+  IfcPlacedGeometry send(std::uint32_t id, const Eigen::Vector4f& colour,
+                         const Eigen::Affine3d& fileFromProduct) const {
     Eigen::AlignedBox3d box;
     for (const Eigen::Vector3d& corner : corners_) box.extend(corner);
     const Eigen::Vector3d middle = box.center();
@@ -76,11 +76,11 @@ class ItemTriangles {
       geometry.indices.push_back(static_cast<std::uint32_t>(i));
     }
     sendGeometry(id, geometry);
-    IfcPart part;
-    part.geometry = id;
-    part.colour = colour;
-    part.worldFromGeometry = yUpFromZUp() * fileFromProduct * Eigen::Translation3d(centre);
-    return part;
+    IfcPlacedGeometry placed;
+    placed.geometry = id;
+    placed.colour = colour;
+    placed.worldFromGeometry = yUpFromZUp() * fileFromProduct * Eigen::Translation3d(centre);
+    return placed;
   }
 
  private:
@@ -91,7 +91,7 @@ class ItemTriangles {
       polygon.emplace_back(edge->vert->v.x, edge->vert->v.y, edge->vert->v.z);
       if (!polygon.back().allFinite()) return;
     }
-    // More corners are left where triangulating failed: a fan is as good a guess as any.
+    // A face has more corners if triangulation failed; it becomes a fan.
     for (std::size_t i = 2; i < polygon.size(); ++i) {
       const Eigen::Vector3d normal = (polygon[i - 1] - polygon[0]).cross(polygon[i] - polygon[0]);
       const Eigen::Vector3d unit =
@@ -109,15 +109,15 @@ class ItemTriangles {
 void triangulate(std::shared_ptr<CarveMeshes>& meshes) {
   for (const auto* mesh : meshes->meshes) {
     for (const CarveFace* face : mesh->faces) {
-      if (face->nVertices() == kMostCorners) continue;
+      if (face->nVertices() == kTriangleCorners) continue;
       CSG_Adapter::retriangulateMeshSet(meshes);
       return;
     }
   }
 }
 
-Eigen::Vector4f colourOf(const std::vector<std::shared_ptr<AppearanceData>>& item,
-                         const std::vector<std::shared_ptr<AppearanceData>>& product) {
+Eigen::Vector4f findColour(const std::vector<std::shared_ptr<AppearanceData>>& item,
+                           const std::vector<std::shared_ptr<AppearanceData>>& product) {
   for (const auto* list : {&item, &product}) {
     for (const auto& appearance : *list) {
       if (!appearance || appearance->m_apply_to_geometry_type == AppearanceData::GEOM_TYPE_CURVE) {
@@ -137,8 +137,8 @@ bool isDrawing(const RepresentationData& representation) {
   return kDrawings.contains(representation.m_representation_identifier);
 }
 
-/// carve keeps its matrices column by column.
-Eigen::Affine3d affineFrom(const carve::math::Matrix& matrix) {
+/// carve's matrices are column-major.
+Eigen::Affine3d toAffine(const carve::math::Matrix& matrix) {
   Eigen::Affine3d result = Eigen::Affine3d::Identity();
   for (int column = 0; column < 4; ++column) {
     for (int row = 0; row < 3; ++row) result.matrix()(row, column) = matrix.m[column][row];
@@ -146,9 +146,10 @@ Eigen::Affine3d affineFrom(const carve::math::Matrix& matrix) {
   return result;
 }
 
-void sendShape(std::uint32_t product, ProductShapeData& shape, std::uint32_t& nextGeometry) {
-  const Eigen::Affine3d fileFromProduct = affineFrom(shape.getTransform());
-  std::vector<IfcPart> parts;
+void sendProductMeshes(std::uint32_t product, ProductShapeData& shape,
+                       std::uint32_t& nextGeometry) {
+  const Eigen::Affine3d fileFromProduct = toAffine(shape.getTransform());
+  std::vector<IfcPlacedGeometry> placedGeometries;
   for (const auto& representation : shape.m_vec_representations) {
     if (!representation || isDrawing(*representation)) continue;
     for (const auto& item : representation->m_vec_item_data) {
@@ -162,14 +163,14 @@ void sendShape(std::uint32_t product, ProductShapeData& shape, std::uint32_t& ne
         }
       }
       if (triangles.empty()) continue;
-      const auto colour = colourOf(item->m_vec_item_appearances, shape.getAppearances());
-      parts.push_back(triangles.send(nextGeometry++, colour, fileFromProduct));
+      const auto colour = findColour(item->m_vec_item_appearances, shape.getAppearances());
+      placedGeometries.push_back(triangles.send(nextGeometry++, colour, fileFromProduct));
     }
   }
-  sendProduct(product, parts);
+  sendProduct(product, placedGeometries);
 }
 
-void sendShapes(std::string text) {
+void sendMeshes(std::string text) {
   sendProgress("parse (ifcplusplus)", 0);
   std::shared_ptr<BuildingModel> model = readModel(std::move(text));
   GeometryConverter converter(model);
@@ -182,21 +183,21 @@ void sendShapes(std::string text) {
     if (!shape || id < 0) continue;
     const auto product = static_cast<std::uint32_t>(id);
     try {
-      sendShape(product, *shape, nextGeometry);
+      sendProductMeshes(product, *shape, nextGeometry);
     } catch (const std::exception& error) {
       std::string frame(4, '\0');
       std::memcpy(frame.data(), &product, 4);
       frame += error.what();
-      sendFrame(ImportFrame::failure, frame.data(), frame.size());
+      sendMessage(ImportMessage::failure, frame.data(), frame.size());
     }
   }
-  sendFrame(ImportFrame::done, nullptr, 0);
+  sendMessage(ImportMessage::done, nullptr, 0);
 }
 
 }  // namespace
 }  // namespace enfilade::scene
 
 extern "C" [[gnu::visibility("default")]] void enfiladeSendShapes1(std::string& text) {
-  enfilade::scene::sendShapes(std::move(text));
+  enfilade::scene::sendMeshes(std::move(text));
 }
-static_assert(std::is_same_v<decltype(enfiladeSendShapes1), enfilade::scene::SendShapes>);
+static_assert(std::is_same_v<decltype(enfiladeSendShapes1), enfilade::scene::SendMeshesFunction>);

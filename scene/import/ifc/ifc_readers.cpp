@@ -17,19 +17,18 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kMostStarts = 8;           // of web-ifc for one file: each start reads the file again
-constexpr double kPatience = 20;         // seconds that web-ifc may spend on one product
-constexpr int kFirstOwnDescriptor = 10;  // above those that an importing process expects
+constexpr int kMaxStarts = 8;           // of web-ifc per file; each start parses the file again
+constexpr double kProductTimeout = 20;  // seconds that web-ifc may spend on one product
 
-/// `bytes` in memory that has a file descriptor.
-int sharedMemory(const void* bytes, std::size_t size, const std::string& file) {
+/// Copies `bytes` to anonymous memory and returns its file descriptor.
+int createSharedMemory(const void* bytes, std::size_t size, const std::string& file) {
   const auto fail = [&] {
-    throw ImportError(file + ": no memory to hand the file to its reader: " + std::strerror(errno) +
+    throw ImportError(file + ": no memory to pass the file to its reader: " + std::strerror(errno) +
                       " (start)");
   };
   const int low = memfd_create("enfilade-ifc", MFD_CLOEXEC);
   if (low < 0) fail();
-  const int fd = fcntl(low, F_DUPFD_CLOEXEC, kFirstOwnDescriptor);
+  const int fd = fcntl(low, F_DUPFD_CLOEXEC, kFirstParentDescriptor);
   close(low);
   if (fd < 0) fail();
   const auto* next = static_cast<const char*>(bytes);
@@ -43,51 +42,51 @@ int sharedMemory(const void* bytes, std::size_t size, const std::string& file) {
   return fd;
 }
 
-/// What a reader has told so far.
-struct Hearing {
+/// Status that a reader has reported so far.
+struct ReaderStatus {
   std::string stage = "start";
   std::string error;
   bool done = false;
   std::optional<std::uint32_t> trying;
 };
 
-std::string textOf(std::span<const std::byte> body) {
+std::string toString(std::span<const std::byte> body) {
   return {reinterpret_cast<const char*>(body.data()), body.size()};
 }
 
-bool hear(ImportFrame kind, std::span<const std::byte> body, const ImportProgress& progress,
-          Hearing& hearing, IfcShapes& shapes) {
+bool handleMessage(ImportMessage kind, std::span<const std::byte> body,
+                   const ImportProgress& progress, ReaderStatus& status, IfcMeshes& meshes) {
   double fraction = 0;
   std::uint32_t index = 0;
   switch (kind) {
-    case ImportFrame::progress:
-      if (!readProgress(body, hearing.stage, fraction)) return false;
-      if (progress) progress(hearing.stage, fraction);
+    case ImportMessage::progress:
+      if (!readProgress(body, status.stage, fraction)) return false;
+      if (progress) progress(status.stage, fraction);
       return true;
-    case ImportFrame::error:
-      hearing.error = textOf(body);
+    case ImportMessage::error:
+      status.error = toString(body);
       return true;
-    case ImportFrame::done:
-      hearing.done = true;
+    case ImportMessage::done:
+      status.done = true;
       return true;
-    case ImportFrame::trying:
+    case ImportMessage::trying:
       if (body.size() != sizeof index) return false;
       std::memcpy(&index, body.data(), sizeof index);
-      hearing.trying = index;
+      status.trying = index;
       return true;
     default:
-      return takeShapes(kind, body, shapes);
+      return readIfcMessage(kind, body, meshes);
   }
 }
 
-/// Why a reader ended before the end; empty: it did not.
-std::string failureOf(const Hearing& hearing, const ImportEnd& end) {
-  if (hearing.done) return {};
-  if (!hearing.error.empty()) return hearing.error;
-  return end.words() + " during '" + hearing.stage + "'";
+/// Reason for a reader's early end; empty: complete.
+std::string describeFailure(const ReaderStatus& status, const ImportExit& end) {
+  if (status.done) return {};
+  if (!status.error.empty()) return status.error;
+  return end.describe() + " during '" + status.stage + "'";
 }
 
-double forever() {
+double noTimeout() {
   return std::numeric_limits<double>::infinity();
 }
 
@@ -96,108 +95,113 @@ double forever() {
 IfcInput::IfcInput(const ImportRequest& request, const std::string& text,
                    std::vector<std::uint32_t> wanted)
     : request_(request), wanted_(std::move(wanted)) {
-  file_ = sharedMemory(text.data(), text.size(), request.file);
-  list_ = sharedMemory(wanted_.data(), wanted_.size() * sizeof wanted_[0], request.file);
+  fileDescriptor_ = createSharedMemory(text.data(), text.size(), request.file);
+  listDescriptor_ =
+      createSharedMemory(wanted_.data(), wanted_.size() * sizeof wanted_[0], request.file);
 }
 
 IfcInput::~IfcInput() {
-  close(file_);
-  close(list_);
+  close(fileDescriptor_);
+  close(listDescriptor_);
 }
 
-ImportRequest IfcInput::requestFor(ImportTask task, double timeLimit) const {
+ImportRequest IfcInput::makeRequest(ImportTask task, double timeLimit) const {
   ImportRequest request = request_;
   request.task = task;
   request.timeLimit = timeLimit;
-  request.ifcFile = file_;
-  request.ifcWanted = list_;
+  request.ifcFile = fileDescriptor_;
+  request.ifcProductIds = listDescriptor_;
   return request;
 }
 
 namespace {
 
-/// What was never tried is no product of which nothing was left.
-void giveUpFrom(std::size_t first, const std::vector<std::uint32_t>& wanted, IfcReading& reading) {
+/// Records products from index `first` on as not tried, to distinguish them from products without
+/// triangles.
+void markNotTried(std::size_t first, const std::vector<std::uint32_t>& wanted,
+                  IfcReadResult& result) {
   for (std::size_t i = first; i < wanted.size(); ++i)
-    if (!reading.shapes.products.contains(wanted[i]))
-      reading.shapes.failures.try_emplace(wanted[i], "not tried: web-ifc " + reading.failure);
+    if (!result.meshes.products.contains(wanted[i]))
+      result.meshes.failures.try_emplace(wanted[i], "not tried: web-ifc " + result.failure);
 }
 
 }  // namespace
 
-IfcReading readByWebIfc(const IfcInput& input, double timeLimit, const ImportProgress& progress) {
-  IfcReading reading;
-  const WebIfcPlace place = findWebIfc();
-  if (!place.missing.empty()) {
-    reading.failure = place.missing;
-    reading.absent = true;
-    return reading;
+IfcReadResult readWithWebIfc(const IfcInput& input, double timeLimit,
+                             const ImportProgress& progress) {
+  IfcReadResult result;
+  const WebIfcLocation location = findWebIfc();
+  if (!location.missing.empty()) {
+    result.failure = location.missing;
+    result.notInstalled = true;
+    return result;
   }
   const auto start = Clock::now();
   std::uint32_t first = 0;
-  for (int starts = 0; starts < kMostStarts; ++starts) {
+  for (int starts = 0; starts < kMaxStarts; ++starts) {
     const double used = std::chrono::duration<double>(Clock::now() - start).count();
-    ImportRequest request = input.requestFor(ImportTask::webIfc, timeLimit - used);
-    request.program = place.node;
-    request.script = place.script;
+    ImportRequest request = input.makeRequest(ImportTask::webIfc, timeLimit - used);
+    request.program = location.node;
+    request.script = location.script;
     request.firstProduct = first;
-    Hearing hearing;
-    const ImportEnd end = runImportProcess(
+    ReaderStatus status;
+    const ImportExit end = runImportProcess(
         request,
-        [&](ImportFrame kind, std::span<const std::byte> body) {
-          return hear(kind, body, progress, hearing, reading.shapes);
+        [&](ImportMessage kind, std::span<const std::byte> body) {
+          return handleMessage(kind, body, progress, status, result.meshes);
         },
-        [&] { return hearing.trying ? kPatience : forever(); });
-    reading.failure = failureOf(hearing, end);
-    const bool overOne = hearing.trying && *hearing.trying < input.wanted().size();
-    if (hearing.done) return reading;
-    if (!overOne || end.how == ImportEnd::How::timeLimit) {
-      giveUpFrom(hearing.trying.value_or(first), input.wanted(), reading);
-      return reading;
+        [&] { return status.trying ? kProductTimeout : noTimeout(); });
+    result.failure = describeFailure(status, end);
+    const bool failedOnProduct = status.trying && *status.trying < input.wanted().size();
+    if (status.done) return result;
+    if (!failedOnProduct || end.reason == ImportExit::Reason::timeLimit) {
+      markNotTried(status.trying.value_or(first), input.wanted(), result);
+      return result;
     }
-    // One product brought it down: leave that one out, keep what it has of the others.
-    const std::uint32_t culprit = input.wanted()[*hearing.trying];
-    reading.shapes.products.erase(culprit);
-    reading.shapes.failures.try_emplace(culprit, "web-ifc " + reading.failure);
-    first = *hearing.trying + 1;
+    // One product crashed the reader: skip it and keep the meshes of the others.
+    const std::uint32_t culprit = input.wanted()[*status.trying];
+    result.meshes.products.erase(culprit);
+    result.meshes.failures.try_emplace(culprit, "web-ifc " + result.failure);
+    first = *status.trying + 1;
   }
-  giveUpFrom(first, input.wanted(), reading);
-  return reading;
+  markNotTried(first, input.wanted(), result);
+  return result;
 }
 
-IfcReading readByIfcPlusPlus(const IfcInput& input, double timeLimit,
-                             const ImportProgress& progress) {
-  IfcReading reading;
-  Hearing hearing;
-  const ImportEnd end = runImportProcess(
-      input.requestFor(ImportTask::ifcPlusPlus, timeLimit),
-      [&](ImportFrame kind, std::span<const std::byte> body) {
-        return hear(kind, body, progress, hearing, reading.shapes);
+IfcReadResult readWithIfcPlusPlus(const IfcInput& input, double timeLimit,
+                                  const ImportProgress& progress) {
+  IfcReadResult result;
+  ReaderStatus status;
+  const ImportExit end = runImportProcess(
+      input.makeRequest(ImportTask::ifcPlusPlus, timeLimit),
+      [&](ImportMessage kind, std::span<const std::byte> body) {
+        return handleMessage(kind, body, progress, status, result.meshes);
       },
-      forever);
-  reading.failure = failureOf(hearing, end);
-  return reading;
+      noTimeout);
+  result.failure = describeFailure(status, end);
+  return result;
 }
 
-AssimpReading readIfcByAssimp(const IfcInput& input, double timeLimit,
-                              const ImportProgress& progress) {
-  AssimpReading reading;
-  Hearing hearing;
-  IfcShapes none;
-  const ImportEnd end = runImportProcess(
-      input.requestFor(ImportTask::assimp, timeLimit),
-      [&](ImportFrame kind, std::span<const std::byte> body) {
-        if (kind != ImportFrame::model) return hear(kind, body, progress, hearing, none);
+AssimpReadResult readIfcWithAssimp(const IfcInput& input, double timeLimit,
+                                   const ImportProgress& progress) {
+  AssimpReadResult result;
+  ReaderStatus status;
+  IfcMeshes noMeshes;
+  const ImportExit end = runImportProcess(
+      input.makeRequest(ImportTask::assimp, timeLimit),
+      [&](ImportMessage kind, std::span<const std::byte> body) {
+        if (kind != ImportMessage::model)
+          return handleMessage(kind, body, progress, status, noMeshes);
         try {
-          reading.model = deserialiseModel(body);
+          result.model = deserialiseModel(body);
         } catch (const ModelStreamError&) {
           return false;
         }
-        return hearing.done = true;
+        return status.done = true;
       },
-      forever);
-  reading.failure = failureOf(hearing, end);
-  return reading;
+      noTimeout);
+  result.failure = describeFailure(status, end);
+  return result;
 }
 
 }  // namespace enfilade::scene

@@ -1,5 +1,5 @@
-// The processes that read IFC: starts them, listens to them, starts them again where one product
-// brought them down.
+// Runs the IFC reader processes: starts them, receives their messages, and restarts web-ifc after a
+// product that crashed it.
 #pragma once
 
 #include <functional>
@@ -13,41 +13,44 @@
 
 namespace enfilade::scene {
 
-/// The file and what is wanted of it, in memory that the readers' processes share.
+/// The file and the requested products, in memory shared with the reader processes.
 class IfcInput {
  public:
-  /// `request`: the import's; its limits hold for each reader.
+  /// `request`: the import request; its limits apply to each reader.
   IfcInput(const ImportRequest& request, const std::string& text,
            std::vector<std::uint32_t> wanted);
   ~IfcInput();
   IfcInput(const IfcInput&) = delete;
   IfcInput& operator=(const IfcInput&) = delete;
 
-  ImportRequest requestFor(ImportTask task, double timeLimit) const;
+  ImportRequest makeRequest(ImportTask task, double timeLimit) const;
   const std::vector<std::uint32_t>& wanted() const { return wanted_; }
 
  private:
   ImportRequest request_;
   std::vector<std::uint32_t> wanted_;
-  int file_ = -1, list_ = -1;
+  int fileDescriptor_ = -1, listDescriptor_ = -1;
 };
 
-struct IfcReading {
-  IfcShapes shapes;
-  std::string failure;  ///< why it ended before the end; empty: it did not
-  bool absent = false;  ///< the reader is not installed; `failure` says how to get it
+/// The result of a reader that delivers meshes.
+struct IfcReadResult {
+  IfcMeshes meshes;
+  std::string failure;        ///< reason for an early end; empty: complete
+  bool notInstalled = false;  ///< the reader is not installed; `failure` states how to install it
 };
 
-/// Both return what they got, even where they fail. `timeLimit`: seconds for all of it.
-IfcReading readByWebIfc(const IfcInput& input, double timeLimit, const ImportProgress& progress);
-IfcReading readByIfcPlusPlus(const IfcInput& input, double timeLimit,
+/// Both return the meshes received so far, even on failure. `timeLimit`: total seconds.
+IfcReadResult readWithWebIfc(const IfcInput& input, double timeLimit,
                              const ImportProgress& progress);
+IfcReadResult readWithIfcPlusPlus(const IfcInput& input, double timeLimit,
+                                  const ImportProgress& progress);
 
-struct AssimpReading {
+/// The result of reading IFC with assimp.
+struct AssimpReadResult {
   std::optional<Model> model;
-  std::string failure;  ///< empty: there is a model
+  std::string failure;  ///< empty: `model` is set
 };
-AssimpReading readIfcByAssimp(const IfcInput& input, double timeLimit,
-                              const ImportProgress& progress);
+AssimpReadResult readIfcWithAssimp(const IfcInput& input, double timeLimit,
+                                   const ImportProgress& progress);
 
 }  // namespace enfilade::scene

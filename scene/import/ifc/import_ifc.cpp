@@ -6,127 +6,137 @@
 #include <cstdio>
 #include <set>
 
+#include "scene/import/assembly/coordinates.hpp"
+#include "scene/import/assembly/finish_model.hpp"
+#include "scene/import/assembly/path_names.hpp"
+#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/import/file/srgb.hpp"
+#include "scene/import/ifc/elevators.hpp"
 #include "scene/import/ifc/ifc_file.hpp"
 #include "scene/import/ifc/ifc_readers.hpp"
+#include "scene/import/ifc/openings.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kDeepestPath = 100;      // levels from the project to a product
-constexpr double kOwnShare = 0.95;     // of the time limit: the rest is for the answer
-constexpr double kReaderShare = 0.6;   // of what is left, for a reader that others may follow
-constexpr std::size_t kTextShare = 8;  // the file's text may take this part of the memory
-constexpr std::size_t kLargestText = std::size_t{4} << 30;  // bytes, where memory has no limit
+constexpr int kMaxPathDepth = 100;  // levels from the project to a product
+constexpr double kImportTimeFraction =
+    0.95;  // of the time limit; the rest is for sending the result
+constexpr double kReaderTimeFraction = 0.6;  // of the remaining time, if another reader may follow
+constexpr std::size_t kTextMemoryDivisor = 8;  // the text may take 1/8 of the memory limit
+constexpr std::size_t kMaxTextBytes = std::size_t{4} << 30;  // bytes, without a memory limit
 
-class Paths {
+class PathBuilder {
  public:
-  explicit Paths(const IfcFacts& facts) : facts_(facts) {}
+  explicit PathBuilder(const IfcMetadata& metadata) : metadata_(metadata) {}
 
-  const std::string& pathOf(std::uint32_t id, int depth = 0) {
+  const std::string& buildPath(std::uint32_t id, int depth = 0) {
     const auto known = paths_.find(id);
     if (known != paths_.end()) return known->second;
-    const IfcProduct* product = facts_.find(id);
-    const std::uint32_t parent = product == nullptr ? 0 : parentOf(*product, depth);
-    const std::string above = parent == 0 ? std::string() : pathOf(parent, depth + 1) + "/";
-    return paths_[id] = above + siblings_[parent].claim(segmentFor(id, product));
+    const IfcProduct* product = metadata_.find(id);
+    const std::uint32_t parent = product == nullptr ? 0 : findParent(*product, depth);
+    const std::string above = parent == 0 ? std::string() : buildPath(parent, depth + 1) + "/";
+    return paths_[id] = above + siblings_[parent].makeUnique(makePathSegment(id, product));
   }
-  std::map<std::uint32_t, std::string> take() { return std::move(paths_); }
+  std::map<std::uint32_t, std::string> takePaths() { return std::move(paths_); }
 
  private:
-  std::uint32_t parentOf(const IfcProduct& product, int depth) const {
+  std::uint32_t findParent(const IfcProduct& product, int depth) const {
     const bool known =
-        facts_.find(product.parent) != nullptr || facts_.projects.contains(product.parent);
-    return known && product.parent != product.id && depth < kDeepestPath ? product.parent : 0;
+        metadata_.find(product.parent) != nullptr || metadata_.projects.contains(product.parent);
+    return known && product.parent != product.id && depth < kMaxPathDepth ? product.parent : 0;
   }
-  std::string segmentFor(std::uint32_t id, const IfcProduct* product) const {
-    const auto project = facts_.projects.find(id);
+  std::string makePathSegment(std::uint32_t id, const IfcProduct* product) const {
+    const auto project = metadata_.projects.find(id);
     const std::string& name = product != nullptr ? product->name : project->second;
-    if (!name.empty()) return encodedName(name);
+    if (!name.empty()) return encodePathSegment(name);
     return product != nullptr ? product->ifcClass : "IfcProject";
   }
 
-  const IfcFacts& facts_;
+  const IfcMetadata& metadata_;
   std::map<std::uint32_t, std::string> paths_;
   std::map<std::uint32_t, SiblingNames> siblings_;
 };
 
-std::string nameOf(const IfcProduct& product) {
+std::string describeProduct(const IfcProduct& product) {
   std::string text = product.globalId + " (" + product.ifcClass;
   if (!product.name.empty()) text += " '" + product.name + "'";
   return text + ")";
 }
 
-/// Materials by colour, and the meshes and drafts that the shapes become.
-class DraftBuilder {
+/// Converts the readers' meshes to imported nodes and meshes, with one material per colour.
+class NodeBuilder {
  public:
-  DraftBuilder(const IfcFacts& facts, const Eigen::Affine3d& worldFromFile, Model& model)
-      : facts_(facts),
-        paths_(ifcPaths(facts)),
-        worldFromReader_(worldFromFile.linear() * yUpFrom('z').transpose() / facts.metresPerUnit),
+  NodeBuilder(const IfcMetadata& metadata, const Eigen::Affine3d& worldFromFile, Model& model)
+      : metadata_(metadata),
+        paths_(buildIfcPaths(metadata)),
+        worldFromReader_(worldFromFile.linear() * makeYUpRotation('z').transpose() /
+                         metadata.metresPerUnit),
         model_(model) {}
 
-  void add(const IfcProduct& product, const IfcShapes& shapes) {
-    ObjectDraft draft;
-    draft.object = objectFor(product);
-    for (const IfcPart& part : shapes.products.at(product.id)) {
-      const IfcGeometry& geometry = shapes.geometries.at(part.geometry);
+  void addProduct(const IfcProduct& product, const IfcMeshes& meshes) {
+    ImportedNode imported;
+    imported.object = makeObject(product);
+    for (const IfcPlacedGeometry& placed : meshes.products.at(product.id)) {
+      const IfcGeometry& geometry = meshes.geometries.at(placed.geometry);
       if (geometry.indices.empty()) continue;
-      draft.placements.push_back(
-          {meshFor(shapes, part, product), worldFromReader_ * part.worldFromGeometry});
+      imported.instances.push_back(
+          {findOrAddMesh(meshes, placed, product), worldFromReader_ * placed.worldFromGeometry});
     }
-    if (!draft.placements.empty()) drafts.push_back(std::move(draft));
+    if (!imported.instances.empty()) importedNodes.push_back(std::move(imported));
   }
 
-  /// What the file says of a product, placed where the file places it.
-  Object objectFor(const IfcProduct& product) const {
+  /// An object with the product's metadata and placement.
+  Object makeObject(const IfcProduct& product) const {
     Object object;
     object.path = paths_.at(product.id);
     object.globalId = product.globalId;
     object.ifcClass = product.ifcClass;
-    object.operation = product.operation;
-    const double scale = model_.metresPerUnit / facts_.metresPerUnit;
+    object.operationType = product.operation;
+    const double scale = model_.metresPerUnit / metadata_.metresPerUnit;
     object.overallWidth = product.overallWidth * scale;
     object.overallHeight = product.overallHeight * scale;
     if (product.fileFromPlacement) {
-      const Eigen::Matrix3d turn = yUpFrom(model_.up);
+      const Eigen::Matrix3d rotation = makeYUpRotation(model_.upAxis);
       object.worldFromPlacement.emplace(Eigen::Affine3d::Identity());
-      object.worldFromPlacement->linear() = turn * product.fileFromPlacement->linear();
+      object.worldFromPlacement->linear() = rotation * product.fileFromPlacement->linear();
       object.worldFromPlacement->translation() =
-          turn * product.fileFromPlacement->translation() * scale;
+          rotation * product.fileFromPlacement->translation() * scale;
     }
     return object;
   }
 
-  std::vector<ObjectDraft> drafts;
-  std::vector<Mesh> meshes;
+  std::vector<ImportedNode> importedNodes;
+  std::vector<Mesh> convertedMeshes;
 
  private:
-  std::uint32_t meshFor(const IfcShapes& shapes, const IfcPart& part, const IfcProduct& product) {
-    const std::uint32_t material = materialFor(part.colour);
-    const auto [known, isNew] = meshOf_.try_emplace({&shapes, part.geometry, material},
-                                                    static_cast<std::uint32_t>(meshes.size()));
+  std::uint32_t findOrAddMesh(const IfcMeshes& meshes, const IfcPlacedGeometry& placed,
+                              const IfcProduct& product) {
+    const std::uint32_t material = findOrAddMaterial(placed.colour);
+    const auto [known, isNew] = meshByGeometry_.try_emplace(
+        {&meshes, placed.geometry, material}, static_cast<std::uint32_t>(convertedMeshes.size()));
     if (!isNew) return known->second;
-    const IfcGeometry& geometry = shapes.geometries.at(part.geometry);
+    const IfcGeometry& geometry = meshes.geometries.at(placed.geometry);
     Mesh mesh;
     mesh.name = product.name.empty() ? product.ifcClass : product.name;
     mesh.positions = geometry.positions;
     mesh.normals = geometry.normals;
     mesh.indices = geometry.indices;
     mesh.material = material;
-    meshes.push_back(std::move(mesh));
+    convertedMeshes.push_back(std::move(mesh));
     return known->second;
   }
 
-  std::uint32_t materialFor(const Eigen::Vector4f& colour) {
+  std::uint32_t findOrAddMaterial(const Eigen::Vector4f& colour) {
     const std::array<float, 4> key{colour[0], colour[1], colour[2], colour[3]};
     const auto [known, isNew] =
-        materialOf_.try_emplace(key, static_cast<std::uint32_t>(model_.materials.size()));
+        materialByColour_.try_emplace(key, static_cast<std::uint32_t>(model_.materials.size()));
     if (!isNew) return known->second;
     Material material;
     material.name = "colour " + std::to_string(known->second + 1);
-    for (int i = 0; i < 3; ++i) material.baseColour[i] = linearFromSrgb(colour[i]);
+    for (int i = 0; i < 3; ++i) material.baseColour[i] = srgbToLinear(colour[i]);
     material.baseColour[3] = colour[3];
     if (colour[3] < 1) material.alpha = Material::Alpha::blend;
     material.doubleSided = true;
@@ -134,295 +144,310 @@ class DraftBuilder {
     return known->second;
   }
 
-  const IfcFacts& facts_;
+  const IfcMetadata& metadata_;
   std::map<std::uint32_t, std::string> paths_;
-  Eigen::Affine3d worldFromReader_;  ///< of what readers deliver in metres, Y up
+  Eigen::Affine3d worldFromReader_;  ///< readers deliver metres, Y up
   Model& model_;
-  std::map<std::array<float, 4>, std::uint32_t> materialOf_;
-  std::map<std::tuple<const IfcShapes*, std::uint32_t, std::uint32_t>, std::uint32_t> meshOf_;
+  std::map<std::array<float, 4>, std::uint32_t> materialByColour_;
+  std::map<std::tuple<const IfcMeshes*, std::uint32_t, std::uint32_t>, std::uint32_t>
+      meshByGeometry_;
 };
 
-/// True when a part's floats are too coarse for where they lie.
-bool isCoarse(const IfcShapes& shapes, std::uint32_t product) {
-  const auto found = shapes.products.find(product);
-  if (found == shapes.products.end()) return false;
-  return std::any_of(found->second.begin(), found->second.end(), [&](const IfcPart& part) {
-    float greatest = 0;
-    for (const Eigen::Vector3f& p : shapes.geometries.at(part.geometry).positions) {
-      greatest = std::max(greatest, p.cwiseAbs().maxCoeff());
-    }
-    const double scale = part.worldFromGeometry.linear().cwiseAbs().maxCoeff();
-    return static_cast<double>(greatest) * scale * 0x1p-23 > kCoarse;
-  });
+/// Whether a geometry of the product has floats coarser than kMaxFloatSpacing.
+bool isLowPrecision(const IfcMeshes& meshes, std::uint32_t product) {
+  const auto found = meshes.products.find(product);
+  if (found == meshes.products.end()) return false;
+  return std::any_of(
+      found->second.begin(), found->second.end(), [&](const IfcPlacedGeometry& placed) {
+        float maxCoordinate = 0;
+        for (const Eigen::Vector3f& p : meshes.geometries.at(placed.geometry).positions) {
+          maxCoordinate = std::max(maxCoordinate, p.cwiseAbs().maxCoeff());
+        }
+        const double scale = placed.worldFromGeometry.linear().cwiseAbs().maxCoeff();
+        return static_cast<double>(maxCoordinate) * scale * 0x1p-23 > kMaxFloatSpacing;
+      });
 }
 
-std::string textOf(const IfcMapPlace& place) {
+std::string formatMapConversion(const IfcMapConversion& conversion) {
   constexpr double kDegrees = 57.29577951308232;
   char text[160];
   std::snprintf(text, sizeof text,
                 "the file's origin is at E %.3f, N %.3f, H %.3f m, its x axis %.6f degrees from "
                 "east to north, scale %.9g",
-                place.east, place.north, place.height, place.turn * kDegrees, place.scale);
-  return (place.crs.empty() ? "a map without a name" : place.crs) + ": " + text;
+                conversion.east, conversion.north, conversion.height,
+                conversion.rotation * kDegrees, conversion.scale);
+  return (conversion.crs.empty() ? "unnamed map" : conversion.crs) + ": " + text;
 }
 
 class IfcImport {
  public:
   IfcImport(const ImportRequest& request, const ImportProgress& progress)
-      : request_(request), progress_(progress), start_(Clock::now()) {}
+      : request_(request), progress_(progress), startTime_(Clock::now()) {}
 
   Model run() {
-    tell("open", 0);
-    const std::size_t largest =
-        request_.memoryLimit > 0 ? request_.memoryLimit / kTextShare : kLargestText;
-    std::string text = readIfcFile(request_.file, largest);
+    reportProgress("open", 0);
+    const std::size_t maxBytes =
+        request_.memoryLimit > 0 ? request_.memoryLimit / kTextMemoryDivisor : kMaxTextBytes;
+    std::string text = readIfcFile(request_.file, maxBytes);
     if (text.find("ISO-10303-21") == std::string::npos) {
       throw ImportError(request_.file + ": not an IFC file (it does not begin with " +
                         "ISO-10303-21); export it again as IFC (open)");
     }
-    tell("index", 0);
+    reportProgress("index", 0);
     const StepFile file(std::move(text));
-    facts_ = readIfcFacts(file);
-    reportFacts(file);
-    input_.emplace(request_, file.text(), wantedProducts());
-    Model model = readShapes();
+    metadata_ = readIfcMetadata(file);
+    reportMetadata(file);
+    input_.emplace(request_, file.text(), collectWantedProducts());
+    Model model = readMeshes();
     model.source = request_.file;
-    tell("openings", 0);
-    reportOpenings(checkOpenings(model, facts_), problems_);
-    findLifts(model, facts_, problems_);
-    for (const Problem& problem : problems_.problems()) model.problems.push_back(problem);
+    reportProgress("openings", 0);
+    reportOpenings(checkOpenings(model, metadata_), diagnostics_);
+    findElevators(model, metadata_, diagnostics_);
+    model.diagnostics.insert(model.diagnostics.end(), diagnostics_.begin(), diagnostics_.end());
     return model;
   }
 
  private:
-  void tell(const char* stage, double fraction) const {
+  void reportProgress(const char* stage, double fraction) const {
     if (progress_) progress_(stage, fraction);
   }
 
-  double timeLeft() const {
-    return request_.timeLimit * kOwnShare -
-           std::chrono::duration<double>(Clock::now() - start_).count();
+  double remainingTime() const {
+    return request_.timeLimit * kImportTimeFraction -
+           std::chrono::duration<double>(Clock::now() - startTime_).count();
   }
 
-  void reportFacts(const StepFile& file) {
-    if (!facts_.whole) {
-      problems_.add("cut_off_file",
-                    "END-ISO-10303-21 is missing at the end: products may be missing too; copy or "
+  void reportMetadata(const StepFile& file) {
+    if (!metadata_.complete) {
+      addDiagnostic(diagnostics_, "cut_off_file",
+                    "END-ISO-10303-21 is missing at the end: products may be missing, too; copy or "
                     "export it again");
     }
-    problems_.add("damaged_statement", "left out by the index", file.damaged());
-    if (facts_.unitGuessed && !request_.metresPerUnit) {
-      problems_.add("no_unit", *facts_.unitGuessed);
+    addDiagnostic(diagnostics_, "damaged_statement", "skipped by the index", file.damagedCount());
+    if (metadata_.unitAssumption && !request_.metresPerUnit) {
+      addDiagnostic(diagnostics_, "no_unit", *metadata_.unitAssumption);
     }
-    if (facts_.mapPlace) problems_.add("map_place", textOf(*facts_.mapPlace));
-    for (const IfcProduct& product : facts_.products) {
+    if (metadata_.mapConversion)
+      addDiagnostic(diagnostics_, "map_place", formatMapConversion(*metadata_.mapConversion));
+    for (const IfcProduct& product : metadata_.products) {
       if (!product.hasBody) continue;
-      if (product.role == IfcProduct::Role::space) problems_.add("skipped_spaces", nameOf(product));
+      if (product.role == IfcProduct::Role::space)
+        addDiagnostic(diagnostics_, "skipped_spaces", describeProduct(product));
       if (product.role == IfcProduct::Role::opening) {
-        problems_.add("skipped_openings", nameOf(product));
+        addDiagnostic(diagnostics_, "skipped_openings", describeProduct(product));
       }
     }
   }
 
-  std::vector<std::uint32_t> wantedProducts() const {
+  std::vector<std::uint32_t> collectWantedProducts() const {
     std::vector<std::uint32_t> wanted;
-    for (const IfcProduct& product : facts_.products) {
+    for (const IfcProduct& product : metadata_.products) {
       if (isWanted(product)) wanted.push_back(product.id);
     }
     if (wanted.empty()) {
-      throw ImportError(request_.file + ": holds no products with a shape" +
-                        (facts_.whole ? "" : ", and is cut off (END-ISO-10303-21 is missing)") +
-                        "; export it again with its geometry (open)");
+      throw ImportError(
+          request_.file + ": contains no products with a shape" +
+          (metadata_.complete ? "" : ", and is cut off (END-ISO-10303-21 is missing)") +
+          "; export it again with its geometry (open)");
     }
     return wanted;
   }
   static bool isWanted(const IfcProduct& product) {
-    return product.hasBody && product.role == IfcProduct::Role::thing;
+    return product.hasBody && product.role == IfcProduct::Role::physical;
   }
 
-  bool mayUse(IfcReader reader) const {
+  bool isReaderAllowed(IfcReader reader) const {
     return request_.ifcReader == IfcReader::automatic || request_.ifcReader == reader;
   }
 
-  /// What another reader may take of the time that is left; all of it, where none may follow.
-  double share() const {
-    return request_.ifcReader == IfcReader::automatic ? timeLeft() * kReaderShare : timeLeft();
+  /// Time limit of the next reader, seconds: the remaining time, or a part of it if another reader
+  /// may follow.
+  double readerTimeLimit() const {
+    return request_.ifcReader == IfcReader::automatic ? remainingTime() * kReaderTimeFraction
+                                                      : remainingTime();
   }
 
-  Model readShapes() {
-    if (mayUse(IfcReader::webIfc)) {
-      const IfcReading web = readByWebIfc(*input_, share(), progress_);
-      noteFailure("web-ifc", web);
-      if (hasTriangles(web.shapes)) return modelOf(web.shapes, "web-ifc");
+  Model readMeshes() {
+    if (isReaderAllowed(IfcReader::webIfc)) {
+      const IfcReadResult web = readWithWebIfc(*input_, readerTimeLimit(), progress_);
+      recordFailure("web-ifc", web);
+      if (hasTriangles(web.meshes)) return makeModel(web.meshes, "web-ifc");
     }
-    if (mayUse(IfcReader::ifcPlusPlus)) {
-      const IfcReading plus = readByIfcPlusPlus(*input_, share(), progress_);
-      noteFailure("ifcplusplus", plus);
-      if (hasTriangles(plus.shapes)) return modelOf(plus.shapes, "ifcplusplus");
+    if (isReaderAllowed(IfcReader::ifcPlusPlus)) {
+      const IfcReadResult plus = readWithIfcPlusPlus(*input_, readerTimeLimit(), progress_);
+      recordFailure("ifcplusplus", plus);
+      if (hasTriangles(plus.meshes)) return makeModel(plus.meshes, "ifcplusplus");
     }
-    if (mayUse(IfcReader::assimp)) {
-      AssimpReading assimp = readIfcByAssimp(*input_, timeLeft(), progress_);
-      if (assimp.model) return described(std::move(*assimp.model));
+    if (isReaderAllowed(IfcReader::assimp)) {
+      AssimpReadResult assimp = readIfcWithAssimp(*input_, remainingTime(), progress_);
+      if (assimp.model) return addMetadata(std::move(*assimp.model));
       failures_ += (failures_.empty() ? "" : "; ") + ("assimp: " + assimp.failure);
     }
     const bool all = request_.ifcReader == IfcReader::automatic;
     throw ImportError(
         request_.file + ": cannot be read: " + failures_ + "; " +
-        (facts_.whole ? "" : "it is cut off (END-ISO-10303-21 is missing): copy it again; ") +
+        (metadata_.complete ? "" : "it is cut off (END-ISO-10303-21 is missing): copy it again; ") +
         (all ? "" : "try --ifc-reader auto, ") +
         "check it with an IFC validator, or re-export it as IFC2x3 or glTF (parse)");
   }
 
-  void noteFailure(const std::string& reader, const IfcReading& reading) {
-    std::string why = reading.failure;
-    if (why.empty() && !hasTriangles(reading.shapes)) why = "delivers no triangles";
-    if (why.empty()) return;
-    failures_ += (failures_.empty() ? "" : "; ") + reader + ": " + why;
-    problems_.add(reading.absent ? "ifc_reader_absent" : "ifc_reader_failed", reader + ": " + why);
+  void recordFailure(const std::string& reader, const IfcReadResult& result) {
+    std::string reason = result.failure;
+    if (reason.empty() && !hasTriangles(result.meshes)) reason = "delivers no triangles";
+    if (reason.empty()) return;
+    failures_ += (failures_.empty() ? "" : "; ") + reader + ": " + reason;
+    addDiagnostic(diagnostics_, result.notInstalled ? "ifc_reader_absent" : "ifc_reader_failed",
+                  reader + ": " + reason);
   }
 
-  bool hasTriangles(const IfcShapes& shapes) const {
+  bool hasTriangles(const IfcMeshes& meshes) const {
     return std::any_of(input_->wanted().begin(), input_->wanted().end(),
-                       [&](std::uint32_t id) { return shapes.triangles(id) > 0; });
+                       [&](std::uint32_t id) { return meshes.countTriangles(id) > 0; });
   }
 
-  Model emptyModel(const std::string& reader) const {
+  Model makeEmptyModel(const std::string& reader) const {
     Model model;
     model.reader = reader;
-    model.metresPerUnit = request_.metresPerUnit.value_or(facts_.metresPerUnit);
-    model.up = request_.up.value_or('z');
+    model.metresPerUnit = request_.metresPerUnit.value_or(metadata_.metresPerUnit);
+    model.upAxis = request_.up.value_or('z');
     return model;
   }
 
-  static Eigen::Affine3d worldFromFile(const Model& model) {
+  static Eigen::Affine3d computeWorldFromFile(const Model& model) {
     Eigen::Affine3d transform = Eigen::Affine3d::Identity();
-    transform.linear() = yUpFrom(model.up) * model.metresPerUnit;
+    transform.linear() = makeYUpRotation(model.upAxis) * model.metresPerUnit;
     return transform;
   }
 
-  /// Whose shape of a product is taken.
+  /// The reader whose meshes a product gets.
   enum class Source : std::uint8_t { none, first, second };
 
-  Model modelOf(const IfcShapes& shapes, const std::string& reader) {
-    const std::optional<IfcReading> second = secondReading(shapes, reader);
-    tell("convert", 0);
+  Model makeModel(const IfcMeshes& meshes, const std::string& reader) {
+    const std::optional<IfcReadResult> second = readMissingProducts(meshes, reader);
+    reportProgress("convert", 0);
     std::map<std::uint32_t, Source> sources;
     for (const std::uint32_t id : input_->wanted()) {
-      const bool other = second && second->shapes.triangles(id) > 0 && needsOther(shapes, id);
-      const bool own = shapes.triangles(id) > 0;
+      const bool other =
+          second && second->meshes.countTriangles(id) > 0 && needsSecondReader(meshes, id);
+      const bool own = meshes.countTriangles(id) > 0;
       sources[id] = other ? Source::second : own ? Source::first : Source::none;
     }
-    Model model = build(shapes, second, sources, reader);
-    if (leaveOutBlockers(model, shapes, sources)) model = build(shapes, second, sources, reader);
-    reportSources(shapes, sources);
+    Model model = buildModel(meshes, second, sources, reader);
+    if (dropFullyCutHosts(model, meshes, sources))
+      model = buildModel(meshes, second, sources, reader);
+    reportSources(meshes, sources);
     return model;
   }
 
-  Model build(const IfcShapes& first, const std::optional<IfcReading>& second,
-              const std::map<std::uint32_t, Source>& sources, const std::string& reader) const {
-    Model model = emptyModel(reader);
-    ProblemLog problems;
-    DraftBuilder builder(facts_, worldFromFile(model), model);
-    for (const auto& product : facts_.products) {
+  Model buildModel(const IfcMeshes& first, const std::optional<IfcReadResult>& second,
+                   const std::map<std::uint32_t, Source>& sources,
+                   const std::string& reader) const {
+    Model model = makeEmptyModel(reader);
+    NodeBuilder builder(metadata_, computeWorldFromFile(model), model);
+    for (const auto& product : metadata_.products) {
       const auto source = sources.find(product.id);
       if (source == sources.end() || source->second == Source::none) continue;
-      builder.add(product, source->second == Source::first ? first : second->shapes);
+      builder.addProduct(product, source->second == Source::first ? first : second->meshes);
     }
-    finishModel(std::move(builder.drafts), std::move(builder.meshes), request_.file,
-                request_.offset, model, problems);
-    model.problems = problems.problems();
+    finishModel(std::move(builder.importedNodes), std::move(builder.convertedMeshes), request_.file,
+                request_.offset, model);
     return model;
   }
 
-  /// Where web-ifc delivers nothing of a wall, and ifcplusplus one that closes the wall's own
-  /// doors, its openings took all of it away (a frame's wall is often no larger than its opening).
-  bool leaveOutBlockers(const Model& model, const IfcShapes& first,
-                        std::map<std::uint32_t, Source>& sources) {
+  /// Drops a wall that web-ifc delivers empty and ifcplusplus delivers with its own doors closed:
+  /// its openings removed all of it (a frame's wall is often no larger than its opening). Returns
+  /// whether any wall was dropped.
+  bool dropFullyCutHosts(const Model& model, const IfcMeshes& first,
+                         std::map<std::uint32_t, Source>& sources) {
     bool any = false;
-    for (const UncutOpening& uncut : checkOpenings(model, facts_).uncut) {
+    for (const UncutOpening& uncut : checkOpenings(model, metadata_).uncut) {
       const auto source = sources.find(uncut.host);
       if (source == sources.end() || source->second != Source::second) continue;
-      if (first.failures.contains(uncut.host)) continue;  // not nothing: it could not be read
+      if (first.failures.contains(uncut.host)) continue;  // unreadable, not empty
       source->second = Source::none;
-      problems_.add("cut_away_product", nameOf(*facts_.find(uncut.host)) +
-                                            ": nothing of it is left beside its openings");
-      cutAway_.insert(uncut.host);
+      addDiagnostic(
+          diagnostics_, "cut_away_product",
+          describeProduct(*metadata_.find(uncut.host)) + ": its openings remove all of it");
+      fullyCutHosts_.insert(uncut.host);
       any = true;
     }
     return any;
   }
 
-  void reportSources(const IfcShapes& first, const std::map<std::uint32_t, Source>& sources) {
+  void reportSources(const IfcMeshes& first, const std::map<std::uint32_t, Source>& sources) {
     for (const auto& [id, source] : sources) {
-      const IfcProduct& product = *facts_.find(id);
+      const IfcProduct& product = *metadata_.find(id);
       if (source == Source::second) {
-        problems_.add("openings_unverified",
-                      nameOf(product) + ": its shape is ifcplusplus', whose openings may be uncut");
-      } else if (source == Source::none && !cutAway_.contains(id)) {
-        problems_.add("missing_product", nameOf(product) + reasonOf(first, id));
+        addDiagnostic(diagnostics_, "openings_unverified",
+                      describeProduct(product) + ": shape by ifcplusplus; openings may be closed");
+      } else if (source == Source::none && !fullyCutHosts_.contains(id)) {
+        addDiagnostic(diagnostics_, "missing_product",
+                      describeProduct(product) + describeMissing(first, id));
       }
     }
   }
 
-  static bool needsOther(const IfcShapes& shapes, std::uint32_t product) {
-    return shapes.triangles(product) == 0 || isCoarse(shapes, product);
+  static bool needsSecondReader(const IfcMeshes& meshes, std::uint32_t product) {
+    return meshes.countTriangles(product) == 0 || isLowPrecision(meshes, product);
   }
 
-  static std::string reasonOf(const IfcShapes& shapes, std::uint32_t product) {
-    const auto failure = shapes.failures.find(product);
-    if (failure == shapes.failures.end()) return ": has a body, but came back without triangles";
+  static std::string describeMissing(const IfcMeshes& meshes, std::uint32_t product) {
+    const auto failure = meshes.failures.find(product);
+    if (failure == meshes.failures.end()) return ": has a body, but the reader gave no triangles";
     return ": " + failure->second;
   }
 
-  /// ifcplusplus' reading of the file, where web-ifc left something out.
-  std::optional<IfcReading> secondReading(const IfcShapes& shapes, const std::string& reader) {
+  /// Reads the file with ifcplusplus if web-ifc delivered no or imprecise meshes for some product.
+  std::optional<IfcReadResult> readMissingProducts(const IfcMeshes& meshes,
+                                                   const std::string& reader) {
     const auto& wanted = input_->wanted();
-    const bool whole = std::none_of(wanted.begin(), wanted.end(),
-                                    [&](std::uint32_t id) { return needsOther(shapes, id); });
+    const bool whole = std::none_of(wanted.begin(), wanted.end(), [&](std::uint32_t id) {
+      return needsSecondReader(meshes, id);
+    });
     if (whole || reader != "web-ifc" || request_.ifcReader != IfcReader::automatic) {
       return std::nullopt;
     }
-    IfcReading second = readByIfcPlusPlus(*input_, share(), progress_);
-    noteFailure("ifcplusplus", second);
+    IfcReadResult second = readWithIfcPlusPlus(*input_, readerTimeLimit(), progress_);
+    recordFailure("ifcplusplus", second);
     return second;
   }
 
-  /// assimp's model with what the file's text says of its products.
-  Model described(Model model) const {
+  /// Adds the text's product metadata to assimp's model.
+  Model addMetadata(Model model) const {
     std::map<std::string, const IfcProduct*> byGlobalId;
-    for (const IfcProduct& product : facts_.products) {
+    for (const IfcProduct& product : metadata_.products) {
       byGlobalId.emplace(product.globalId, &product);
     }
-    const DraftBuilder builder(facts_, worldFromFile(model), model);
+    const NodeBuilder builder(metadata_, computeWorldFromFile(model), model);
     std::set<std::string> taken;
     for (Object& object : model.objects) {
       const auto product = byGlobalId.find(object.globalId);
       if (product == byGlobalId.end() || !taken.insert(object.globalId).second) continue;
-      Object told = builder.objectFor(*product->second);
-      told.meshes = std::move(object.meshes);
-      told.worldFromMesh = object.worldFromMesh;
-      if (told.worldFromPlacement) told.worldFromPlacement->pretranslate(-model.offset);
-      object = std::move(told);
+      Object described = builder.makeObject(*product->second);
+      described.meshes = std::move(object.meshes);
+      described.worldFromMesh = object.worldFromMesh;
+      if (described.worldFromPlacement) described.worldFromPlacement->pretranslate(-model.offset);
+      object = std::move(described);
     }
     return model;
   }
 
   const ImportRequest& request_;
   const ImportProgress& progress_;
-  Clock::time_point start_;
-  IfcFacts facts_;
+  Clock::time_point startTime_;
+  IfcMetadata metadata_;
   std::optional<IfcInput> input_;
-  ProblemLog problems_;
-  std::set<std::uint32_t> cutAway_;
+  std::vector<Diagnostic> diagnostics_;
+  std::set<std::uint32_t> fullyCutHosts_;
   std::string failures_;
 };
 
 }  // namespace
 
-std::map<std::uint32_t, std::string> ifcPaths(const IfcFacts& facts) {
-  Paths paths(facts);
-  for (const IfcProduct& product : facts.products) paths.pathOf(product.id);
-  return paths.take();
+std::map<std::uint32_t, std::string> buildIfcPaths(const IfcMetadata& metadata) {
+  PathBuilder paths(metadata);
+  for (const IfcProduct& product : metadata.products) paths.buildPath(product.id);
+  return paths.takePaths();
 }
 
 Model importIfc(const ImportRequest& request, const ImportProgress& progress) {

@@ -7,13 +7,13 @@
 namespace enfilade::scene {
 namespace {
 
-std::string_view trimmed(std::string_view text) {
+std::string_view trim(std::string_view text) {
   const std::size_t begin = text.find_first_not_of(" \t\r\n");
   if (begin == std::string_view::npos) return {};
   return text.substr(begin, text.find_last_not_of(" \t\r\n") - begin + 1);
 }
 
-/// Blanks out /* comments */ that stand outside of texts; an unclosed one is left as it is.
+/// Blanks out /* comments */ outside of strings; an unclosed comment is kept.
 void blankComments(std::string& text) {
   bool quoted = false;
   for (std::size_t i = 0; i + 1 < text.size(); ++i) {
@@ -39,7 +39,7 @@ void appendUtf8(std::string& to, std::uint32_t code) {
   put(0x80 | (code & 63));
 }
 
-std::optional<std::uint32_t> hexNumber(std::string_view digits, std::size_t count) {
+std::optional<std::uint32_t> parseHex(std::string_view digits, std::size_t count) {
   std::uint32_t value = 0;
   if (digits.size() < count) return std::nullopt;
   const char* end = digits.data() + count;
@@ -47,11 +47,11 @@ std::optional<std::uint32_t> hexNumber(std::string_view digits, std::size_t coun
   return read.ec == std::errc() && read.ptr == end ? std::optional(value) : std::nullopt;
 }
 
-/// Characters in groups of `width` hexadecimal digits up to \X0\; returns what was used.
+/// Decodes groups of `width` hexadecimal digits up to \X0\; returns the number of characters used.
 std::size_t decodeGroups(std::string_view rest, std::size_t width, std::string& to) {
   std::size_t at = 0;
-  std::uint32_t high = 0;  // the first half of a pair of UTF-16
-  while (const auto code = hexNumber(rest.substr(at), width)) {
+  std::uint32_t high = 0;  // the high surrogate of a UTF-16 pair
+  while (const auto code = parseHex(rest.substr(at), width)) {
     at += width;
     if (*code >= 0xd800 && *code < 0xdc00) {
       high = *code;
@@ -65,13 +65,14 @@ std::size_t decodeGroups(std::string_view rest, std::size_t width, std::string& 
   return rest.substr(at).starts_with("\\X0\\") ? at + 4 : at;
 }
 
-/// ISO 10303-21, 6.4.3: what a backslash begins. Returns the characters used, 0: nothing known.
+/// Decodes an escape sequence (ISO 10303-21, 6.4.3). Returns the number of characters used; 0: not
+/// an escape sequence.
 std::size_t decodeEscape(std::string_view text, std::string& to) {
   if (text.starts_with("\\\\")) return to += '\\', 2;
   if (text.starts_with("\\X2\\")) return 4 + decodeGroups(text.substr(4), 4, to);
   if (text.starts_with("\\X4\\")) return 4 + decodeGroups(text.substr(4), 8, to);
   if (text.starts_with("\\X\\")) {
-    if (const auto code = hexNumber(text.substr(3), 2)) return appendUtf8(to, *code), 5;
+    if (const auto code = parseHex(text.substr(3), 2)) return appendUtf8(to, *code), 5;
   }
   if (text.starts_with("\\S\\") && text.size() > 3) {
     return appendUtf8(to, 128u + (static_cast<unsigned char>(text[3]) & 127u)), 4;
@@ -79,8 +80,8 @@ std::size_t decodeEscape(std::string_view text, std::string& to) {
   return 0;
 }
 
-/// Where the text that opens at `begin` closes (its last quote), or the end.
-std::size_t closingQuote(std::string_view text, std::size_t begin) {
+/// Position of the quote that closes the string opened at `begin`, or the end of the text.
+std::size_t findClosingQuote(std::string_view text, std::size_t begin) {
   for (std::size_t i = begin + 1; i < text.size(); ++i) {
     if (text[i] != '\'') continue;
     if (i + 1 < text.size() && text[i + 1] == '\'') {
@@ -100,17 +101,17 @@ StepFile::StepFile(std::string text) : text_(std::move(text)) {
   std::size_t begin = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (all[i] == '\'') {
-      const std::size_t close = closingQuote(all, i);
+      const std::size_t close = findClosingQuote(all, i);
       const std::size_t next = all.substr(0, close).find("\n#", i);
       if (next == std::string_view::npos) {
         i = close;
-      } else {  // a quote is missing: what stands on the next line is another statement
-        ++damaged_;
+      } else {  // missing quote: the next line is another statement
+        ++damagedCount_;
         i = begin = next + 1;
       }
     }
     if (i >= all.size() || all[i] != ';') continue;
-    addStatement(trimmed(all.substr(begin, i - begin)));
+    addStatement(trim(all.substr(begin, i - begin)));
     begin = i + 1;
   }
   byId_.resize(statements_.size());
@@ -124,25 +125,25 @@ void StepFile::addStatement(std::string_view statement) {
   if (statement.starts_with("FILE_SCHEMA")) {
     const std::size_t quote = statement.find('\'');
     if (quote == std::string_view::npos) return;
-    schema_ = statement.substr(quote + 1, closingQuote(statement, quote) - quote - 1);
+    schema_ = statement.substr(quote + 1, findClosingQuote(statement, quote) - quote - 1);
     return;
   }
   if (!statement.starts_with('#')) return;
-  StepStatement made;
+  StepStatement parsed;
   const char* end = statement.data() + statement.size();
-  const auto number = std::from_chars(statement.data() + 1, end, made.id);
+  const auto number = std::from_chars(statement.data() + 1, end, parsed.id);
   const std::string_view rest =
-      trimmed(statement.substr(static_cast<std::size_t>(number.ptr - statement.data())));
+      trim(statement.substr(static_cast<std::size_t>(number.ptr - statement.data())));
   const std::size_t open = rest.find('(');
   const bool whole = number.ec == std::errc() && rest.starts_with('=') &&
                      open != std::string_view::npos && rest.ends_with(')');
   if (!whole) {
-    ++damaged_;
+    ++damagedCount_;
     return;
   }
-  made.type = trimmed(rest.substr(1, open - 1));
-  made.arguments = rest.substr(open + 1, rest.size() - open - 2);
-  statements_.push_back(made);
+  parsed.type = trim(rest.substr(1, open - 1));
+  parsed.arguments = rest.substr(open + 1, rest.size() - open - 2);
+  statements_.push_back(parsed);
 }
 
 const StepStatement* StepFile::find(std::uint32_t id) const {
@@ -153,7 +154,7 @@ const StepStatement* StepFile::find(std::uint32_t id) const {
   return &statements_[*found];
 }
 
-const StepStatement* StepFile::find(std::uint32_t id, std::string_view type) const {
+const StepStatement* StepFile::findOfType(std::uint32_t id, std::string_view type) const {
   const StepStatement* found = find(id);
   return found != nullptr && found->type == type ? found : nullptr;
 }
@@ -166,24 +167,24 @@ bool StepFile::hasEnd() const {
   return text_.rfind("END-ISO-10303-21") != std::string::npos;
 }
 
-std::vector<std::string_view> stepArguments(std::string_view arguments) {
+std::vector<std::string_view> splitStepArguments(std::string_view arguments) {
   std::vector<std::string_view> result;
   std::size_t begin = 0;
   int depth = 0;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const char c = arguments[i];
-    if (c == '\'') i = closingQuote(arguments, i);
+    if (c == '\'') i = findClosingQuote(arguments, i);
     if (c == '(') ++depth;
     if (c == ')') --depth;
     if (c != ',' || depth != 0) continue;
-    result.push_back(trimmed(arguments.substr(begin, i - begin)));
+    result.push_back(trim(arguments.substr(begin, i - begin)));
     begin = i + 1;
   }
-  result.push_back(trimmed(arguments.substr(begin)));
+  result.push_back(trim(arguments.substr(begin)));
   return result;
 }
 
-std::optional<std::uint32_t> stepReference(std::string_view argument) {
+std::optional<std::uint32_t> parseStepReference(std::string_view argument) {
   std::uint32_t id = 0;
   if (!argument.starts_with('#')) return std::nullopt;
   const char* end = argument.data() + argument.size();
@@ -191,10 +192,10 @@ std::optional<std::uint32_t> stepReference(std::string_view argument) {
   return read.ec == std::errc() && read.ptr == end ? std::optional(id) : std::nullopt;
 }
 
-std::optional<double> stepNumber(std::string_view argument) {
+std::optional<double> parseStepNumber(std::string_view argument) {
   const std::size_t open = argument.find('(');
   if (open != std::string_view::npos && open > 0 && argument.ends_with(')')) {
-    argument = trimmed(argument.substr(open + 1, argument.size() - open - 2));
+    argument = trim(argument.substr(open + 1, argument.size() - open - 2));
   }
   if (argument.starts_with('+')) argument.remove_prefix(1);
   double value = 0;
@@ -204,7 +205,7 @@ std::optional<double> stepNumber(std::string_view argument) {
   return value;
 }
 
-std::optional<std::string> stepText(std::string_view argument) {
+std::optional<std::string> parseStepString(std::string_view argument) {
   if (argument.size() < 2 || argument.front() != '\'' || argument.back() != '\'') {
     return std::nullopt;
   }
@@ -215,33 +216,33 @@ std::optional<std::string> stepText(std::string_view argument) {
     i += used;
     if (used > 0) continue;
     result += text[i];
-    i += text[i] == '\'' ? 2 : 1;  // quotes stand doubled
+    i += text[i] == '\'' ? 2 : 1;  // quotes are doubled
   }
   return result;
 }
 
-std::string_view stepSymbol(std::string_view argument) {
+std::string_view parseStepEnum(std::string_view argument) {
   if (argument.size() < 3 || argument.front() != '.' || argument.back() != '.') return {};
   return argument.substr(1, argument.size() - 2);
 }
 
-std::vector<std::uint32_t> stepReferences(std::string_view argument) {
+std::vector<std::uint32_t> parseStepReferences(std::string_view argument) {
   std::vector<std::uint32_t> ids;
   if (argument.size() >= 2 && argument.front() == '(' && argument.back() == ')') {
-    for (const std::string_view one : stepArguments(argument.substr(1, argument.size() - 2))) {
-      if (const auto id = stepReference(one)) ids.push_back(*id);
+    for (const std::string_view one : splitStepArguments(argument.substr(1, argument.size() - 2))) {
+      if (const auto id = parseStepReference(one)) ids.push_back(*id);
     }
-  } else if (const auto id = stepReference(argument)) {
+  } else if (const auto id = parseStepReference(argument)) {
     ids.push_back(*id);
   }
   return ids;
 }
 
-std::vector<double> stepNumbers(std::string_view argument) {
+std::vector<double> parseStepNumbers(std::string_view argument) {
   std::vector<double> numbers;
   if (argument.size() < 2 || argument.front() != '(' || argument.back() != ')') return numbers;
-  for (const std::string_view one : stepArguments(argument.substr(1, argument.size() - 2))) {
-    if (const auto number = stepNumber(one)) numbers.push_back(*number);
+  for (const std::string_view one : splitStepArguments(argument.substr(1, argument.size() - 2))) {
+    if (const auto number = parseStepNumber(one)) numbers.push_back(*number);
   }
   return numbers;
 }

@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string nodeInPath() {
+std::string findNodeExecutable() {
   const char* path = std::getenv("PATH");
   std::istringstream folders(path == nullptr ? "/usr/local/bin:/usr/bin:/bin" : path);
   for (std::string folder; std::getline(folders, folder, ':');) {
@@ -28,7 +28,7 @@ std::string nodeInPath() {
   return {};
 }
 
-std::vector<fs::path> scriptFolders() {
+std::vector<fs::path> listScriptFolders() {
   if (const char* named = std::getenv("ENFILADE_WEB_IFC"); named != nullptr) return {named};
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
@@ -37,25 +37,25 @@ std::vector<fs::path> scriptFolders() {
 
 }  // namespace
 
-WebIfcPlace findWebIfc() {
-  WebIfcPlace place;
-  place.node = nodeInPath();
-  std::string looked;
-  for (const fs::path& folder : scriptFolders()) {
+WebIfcLocation findWebIfc() {
+  WebIfcLocation location;
+  location.node = findNodeExecutable();
+  std::string searched;
+  for (const fs::path& folder : listScriptFolders()) {
     std::error_code error;
     const bool whole = fs::is_regular_file(folder / "read_ifc.js", error) &&
                        fs::is_directory(folder / "node_modules/web-ifc", error);
-    looked += (looked.empty() ? "" : ", ") + folder.string();
+    searched += (searched.empty() ? "" : ", ") + folder.string();
     if (!whole) continue;
-    place.script = (folder / "read_ifc.js").string();
+    location.script = (folder / "read_ifc.js").string();
     break;
   }
-  if (place.script.empty()) {
-    place.missing = "web-ifc is not in " + looked + " (call npm ci there, or ./dev)";
-  } else if (place.node.empty()) {
-    place.missing = "Node.js is not installed (apt-get install nodejs npm, or ./dev)";
+  if (location.script.empty()) {
+    location.missing = "web-ifc is not in " + searched + " (run npm ci there, or ./dev)";
+  } else if (location.node.empty()) {
+    location.missing = "Node.js is not installed (apt-get install nodejs npm, or ./dev)";
   }
-  return place;
+  return location;
 }
 
 }  // namespace enfilade::scene

@@ -1,17 +1,18 @@
-// Where Node.js and the script with web-ifc are. Both are optional.
+// Locates Node.js and the web-ifc script. Both are optional.
 #pragma once
 
 #include <string>
 
 namespace enfilade::scene {
 
-struct WebIfcPlace {
-  std::string node, script;  ///< paths; empty: not there
-  std::string missing;       ///< what is not there and how to get it; empty: all is there
+/// Paths of Node.js and the script.
+struct WebIfcLocation {
+  std::string node, script;  ///< empty: not found
+  std::string missing;       ///< the missing component and how to install it; empty: complete
 };
 
-/// The script's folder: $ENFILADE_WEB_IFC, else share/enfilade/web_ifc beside the program's bin/,
-/// else the source folder that the program was built from. Node is looked for in PATH.
-WebIfcPlace findWebIfc();
+/// Searches for Node.js in PATH. The script's folder is $ENFILADE_WEB_IFC, otherwise
+/// share/enfilade/web_ifc next to the program's bin/, otherwise the source folder of the build.
+WebIfcLocation findWebIfc();
 
 }  // namespace enfilade::scene

@@ -8,7 +8,7 @@
 namespace enfilade::scene {
 namespace {
 
-void writeAll(const void* data, std::size_t size) {
+void writeToPipe(const void* data, std::size_t size) {
   const auto* bytes = static_cast<const char*>(data);
   while (size > 0) {
     const ssize_t written = write(kImportPipe, bytes, size);
@@ -21,24 +21,24 @@ void writeAll(const void* data, std::size_t size) {
 
 }  // namespace
 
-void sendFrame(ImportFrame kind, const void* data, std::size_t size) {
+void sendMessage(ImportMessage kind, const void* data, std::size_t size) {
   const std::uint64_t length = size;
-  char header[ImportFrameHeader::kSize];
+  char header[ImportMessageHeader::kSize];
   header[0] = static_cast<char>(kind);
   std::memcpy(header + 1, &length, sizeof length);
-  writeAll(header, sizeof header);
-  writeAll(data, size);
+  writeToPipe(header, sizeof header);
+  writeToPipe(data, size);
 }
 
 void sendProgress(const std::string& stage, double fraction) {
-  std::string frame(sizeof fraction, '\0');
-  std::memcpy(frame.data(), &fraction, sizeof fraction);
-  frame += stage;
-  sendFrame(ImportFrame::progress, frame.data(), frame.size());
+  std::string message(sizeof fraction, '\0');
+  std::memcpy(message.data(), &fraction, sizeof fraction);
+  message += stage;
+  sendMessage(ImportMessage::progress, message.data(), message.size());
 }
 
 void sendError(const std::string& text) {
-  sendFrame(ImportFrame::error, text.data(), text.size());
+  sendMessage(ImportMessage::error, text.data(), text.size());
 }
 
 }  // namespace enfilade::scene

@@ -1,6 +1,5 @@
-// What passes through the pipe from an importing process to the one that started it: frames of a
-// kind, a length and that many bytes, little-endian. scene/import/ifc/web_ifc/read_ifc.js writes
-// them as well.
+// Messages from an import worker to its parent, through a pipe: kind, length and that many bytes,
+// little-endian. scene/import/ifc/web_ifc/read_ifc.js writes them as well.
 #pragma once
 
 #include <cstddef>
@@ -11,19 +10,21 @@
 
 namespace enfilade::scene {
 
-enum class ImportFrame : std::uint8_t {
+/// Kind of a message.
+enum class ImportMessage : std::uint8_t {
   progress = 'P',  ///< a double 0..1 and the stage's name
-  error = 'E',     ///< text for the user; the last frame
-  model = 'M',     ///< a model stream; the last frame
-  // Of the readers of IFC, see ifc/shapes.hpp:
+  error = 'E',     ///< text for the user; the last message
+  model = 'M',     ///< a model stream; the last message
+  // Of the IFC readers, see ifc/ifc_meshes.hpp:
   trying = 'T',
   geometry = 'G',
   product = 'O',
   failure = 'F',
-  done = 'D'  ///< nothing; the last frame
+  done = 'D'  ///< no content; the last message
 };
 
-struct ImportFrameHeader {
+/// Header of a message in the pipe.
+struct ImportMessageHeader {
   std::uint8_t kind;
   std::uint64_t size;
   static constexpr std::size_t kSize = 9;  ///< bytes in the pipe
@@ -31,14 +32,17 @@ struct ImportFrameHeader {
 
 inline constexpr char kImportVerb[] = "--enfilade-import-child";
 
-// File descriptors of an importing process.
-inline constexpr int kImportPipe = 3;  ///< frames, written
-inline constexpr int kIfcFile = 4;     ///< readers of IFC: the file
-inline constexpr int kIfcWanted = 5;   ///< readers of IFC: express ids, 32 bits each
+// File descriptors of an import worker.
+inline constexpr int kImportPipe = 3;  ///< messages, written
+inline constexpr int kIfcFile = 4;     ///< IFC readers: the file
+/// IFC readers: express ids of the requested products, 32 bits each
+inline constexpr int kIfcProductIds = 5;
+/// The parent's own descriptors begin here, so that none collides with those of a worker.
+inline constexpr int kFirstParentDescriptor = 10;
 
-// ---- for the process that writes: it ends when nobody listens any more --------------------------
+// ---- for the worker: it exits if the parent is gone ---------------------------------------------
 
-void sendFrame(ImportFrame kind, const void* data, std::size_t size);
+void sendMessage(ImportMessage kind, const void* data, std::size_t size);
 void sendProgress(const std::string& stage, double fraction);
 void sendError(const std::string& text);
 

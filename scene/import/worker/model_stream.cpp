@@ -9,17 +9,17 @@
 namespace enfilade::scene {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the stream is written as memory lies");
+static_assert(std::endian::native == std::endian::little, "the stream has memory byte order");
 
 constexpr std::uint32_t kNoObject = 0xffffffff;
 constexpr std::uint32_t kMagic = 0x4d464e45;  // "ENFM"
 
-/// The scalars of a vector of scalars or of fixed-size Eigen vectors, which lie without gaps.
+/// Scalars of a vector of scalars or of fixed-size Eigen vectors, which lie without gaps.
 template <class T>
 constexpr std::size_t kPackedSize = sizeof(T);
 static_assert(sizeof(Eigen::Vector3f) == 12 && sizeof(Eigen::Vector2f) == 8);
 
-class Writer {
+class StreamWriter {
  public:
   template <class T>
   requires std::is_arithmetic_v<T>
@@ -56,9 +56,9 @@ class Writer {
   std::vector<std::byte> bytes_;
 };
 
-class Reader {
+class StreamReader {
  public:
-  explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
+  explicit StreamReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
 
   template <class T>
   requires std::is_arithmetic_v<T> T get(const char* field) {
@@ -67,9 +67,9 @@ class Reader {
     return value;
   }
   bool getBool(const char* field) { return getUpTo(1, field) == 1; }
-  std::uint8_t getUpTo(std::uint8_t greatest, const char* field) {
+  std::uint8_t getUpTo(std::uint8_t maxValue, const char* field) {
     const auto value = get<std::uint8_t>(field);
-    if (value > greatest) fail(field, "value " + std::to_string(value) + " is unknown");
+    if (value > maxValue) fail(field, "value " + std::to_string(value) + " is unknown");
     return value;
   }
   double getFinite(const char* field) {
@@ -105,7 +105,7 @@ class Reader {
     }
     return m;
   }
-  /// A count of things that take at least `smallest` bytes each.
+  /// Reads a count of items that take at least `smallest` bytes each.
   std::size_t count(std::size_t smallest, const char* field) {
     const auto n = get<std::uint64_t>(field);
     if (n > remaining() / smallest) {
@@ -124,7 +124,7 @@ class Reader {
  private:
   void take(void* to, std::size_t size, const char* field) {
     if (size > remaining()) fail(field, "the stream ends here");
-    // Eigen vectors are plain arrays of scalars, checked above; hence void.
+    // Eigen vectors are plain arrays of scalars, as checked above; hence void.
     if (size > 0) std::memcpy(to, bytes_.data() + position_, size);
     position_ += size;
   }
@@ -133,9 +133,9 @@ class Reader {
   std::size_t position_ = 0;
 };
 
-// ---- one pair of functions a type ---------------------------------------------------------------
+// ---- one pair of functions per type -------------------------------------------------------------
 
-void write(Writer& out, const Material& m) {
+void write(StreamWriter& out, const Material& m) {
   out.put(m.name);
   out.putMatrix(m.baseColour);
   out.putMatrix(m.emissive);
@@ -147,7 +147,7 @@ void write(Writer& out, const Material& m) {
   out.put(m.baseColourTexture);
 }
 
-Material readMaterial(Reader& in, std::size_t textures) {
+Material readMaterial(StreamReader& in, std::size_t textures) {
   Material m;
   m.name = in.getText("material name");
   m.baseColour = in.getMatrix<Eigen::Vector4f>("base colour");
@@ -164,14 +164,14 @@ Material readMaterial(Reader& in, std::size_t textures) {
   return m;
 }
 
-void write(Writer& out, const Texture& t) {
+void write(StreamWriter& out, const Texture& t) {
   out.put(t.name);
   out.put(t.width);
   out.put(t.height);
   out.putArray(t.rgba);
 }
 
-Texture readTexture(Reader& in) {
+Texture readTexture(StreamReader& in) {
   Texture t;
   t.name = in.getText("texture name");
   t.width = in.get<std::uint32_t>("texture width");
@@ -184,7 +184,7 @@ Texture readTexture(Reader& in) {
   return t;
 }
 
-void write(Writer& out, const Mesh& m) {
+void write(StreamWriter& out, const Mesh& m) {
   out.put(m.name);
   out.putArray(m.positions);
   out.putArray(m.normals);
@@ -193,7 +193,7 @@ void write(Writer& out, const Mesh& m) {
   out.put(m.material);
 }
 
-Mesh readMesh(Reader& in, std::size_t materials) {
+Mesh readMesh(StreamReader& in, std::size_t materials) {
   Mesh m;
   m.name = in.getText("mesh name");
   m.positions = in.getArray<Eigen::Vector3f>("positions");
@@ -205,9 +205,9 @@ Mesh readMesh(Reader& in, std::size_t materials) {
   for (const Eigen::Vector3f& p : m.positions) {
     if (!p.allFinite()) in.fail("positions", "not a finite number");
   }
-  if (!m.normals.empty() && m.normals.size() != n) in.fail("normals", "not one a position");
-  if (!m.uvs.empty() && m.uvs.size() != n) in.fail("uvs", "not one a position");
-  if (m.indices.size() % 3 != 0) in.fail("indices", "not three a triangle");
+  if (!m.normals.empty() && m.normals.size() != n) in.fail("normals", "not one per position");
+  if (!m.uvs.empty() && m.uvs.size() != n) in.fail("uvs", "not one per position");
+  if (m.indices.size() % 3 != 0) in.fail("indices", "not three per triangle");
   for (const std::uint32_t i : m.indices) {
     if (i >= n) in.fail("indices", "no vertex " + std::to_string(i));
   }
@@ -215,28 +215,28 @@ Mesh readMesh(Reader& in, std::size_t materials) {
   return m;
 }
 
-void write(Writer& out, const Object& o) {
+void write(StreamWriter& out, const Object& o) {
   out.put(o.path);
   out.put(o.globalId);
   out.put(o.ifcClass);
-  out.put(o.operation);
+  out.put(o.operationType);
   out.putArray(o.meshes);
   out.putMatrix(o.worldFromMesh.matrix().topRows<3>());
   out.put(o.overallWidth);
   out.put(o.overallHeight);
   out.put(static_cast<std::uint8_t>(o.worldFromPlacement.has_value()));
   if (o.worldFromPlacement) out.putMatrix(o.worldFromPlacement->matrix().topRows<3>());
-  out.put(static_cast<std::uint8_t>(o.use));
-  out.put(o.pieceOf.value_or(kNoObject));
+  out.put(static_cast<std::uint8_t>(o.usage));
+  out.put(o.partOf.value_or(kNoObject));
 }
 
-/// Pieces may come before what they are pieces of: that is looked at when all are there.
-Object readObject(Reader& in, std::size_t meshes) {
+/// Parts may precede their whole; that index is checked when all objects are read.
+Object readObject(StreamReader& in, std::size_t meshes) {
   Object o;
   o.path = in.getText("object path");
   o.globalId = in.getText("GlobalId");
   o.ifcClass = in.getText("IFC class");
-  o.operation = in.getText("operation");
+  o.operationType = in.getText("operation");
   o.meshes = in.getArray<std::uint32_t>("object meshes");
   for (const std::uint32_t mesh : o.meshes) {
     if (mesh >= meshes) in.fail("object meshes", "no mesh " + std::to_string(mesh));
@@ -249,123 +249,124 @@ Object readObject(Reader& in, std::size_t meshes) {
     o.worldFromPlacement.emplace(Eigen::Affine3d::Identity());
     o.worldFromPlacement->matrix().topRows<3>() = in.getMatrix<Rows>("placement");
   }
-  o.use = static_cast<Object::Use>(in.getUpTo(2, "object use"));
+  o.usage = static_cast<Object::Usage>(in.getUpTo(2, "object use"));
   const auto whole = in.get<std::uint32_t>("piece of");
-  if (whole != kNoObject) o.pieceOf = whole;
+  if (whole != kNoObject) o.partOf = whole;
   return o;
 }
 
-void write(Writer& out, const PathKey& key) {
+void write(StreamWriter& out, const PathKey& key) {
   out.put(key.time);
   out.putMatrix(key.offset);
-  out.put(key.turn);
+  out.put(key.angle);
 }
 
-PathKey readPathKey(Reader& in) {
+PathKey readPathKey(StreamReader& in) {
   PathKey key;
   key.time = in.getFinite("key time");
   key.offset = in.getMatrix<Vec3>("key offset");
-  key.turn = in.getFinite("key turn");
+  key.angle = in.getFinite("key turn");
   return key;
 }
 
-/// Numbers of a body that are always there, in the order of the stream.
-std::array<double BodySpec::*, 8> numbersOfBody() {
-  return {&BodySpec::low,          &BodySpec::high,    &BodySpec::closed,   &BodySpec::speed,
-          &BodySpec::acceleration, &BodySpec::density, &BodySpec::friction, &BodySpec::restitution};
+/// Numbers that every body has, in stream order.
+std::array<double BodySpec::*, 8> listBodyNumbers() {
+  return {&BodySpec::low,      &BodySpec::high,         &BodySpec::closedPosition,
+          &BodySpec::speed,    &BodySpec::acceleration, &BodySpec::density,
+          &BodySpec::friction, &BodySpec::restitution};
 }
 
-void write(Writer& out, const std::optional<double>& number) {
+void write(StreamWriter& out, const std::optional<double>& number) {
   out.put(static_cast<std::uint8_t>(number.has_value()));
   out.put(number.value_or(0));
 }
 
-std::optional<double> readOptional(Reader& in, const char* field) {
+std::optional<double> readOptional(StreamReader& in, const char* field) {
   const bool there = in.getBool(field);
   const double number = in.getFinite(field);
   return there ? std::optional(number) : std::nullopt;
 }
 
-void write(Writer& out, const BodySpec& b) {
+void write(StreamWriter& out, const BodySpec& b) {
   out.put(b.name);
   out.put(static_cast<std::uint8_t>(b.kind));
   out.put(static_cast<std::uint8_t>(b.source));
   out.putArray(b.objects);
   out.putMatrix(b.anchor);
   out.putMatrix(b.axis);
-  for (const auto number : numbersOfBody()) out.put(b.*number);
+  for (const auto number : listBodyNumbers()) out.put(b.*number);
   out.putArray(b.stops);
-  write(out, b.closesAfter);
+  write(out, b.autoCloseDelay);
   out.put(static_cast<std::uint8_t>(b.openedBy));
   out.put(std::uint64_t{b.keys.size()});
   for (const PathKey& key : b.keys) write(out, key);
   out.put(static_cast<std::uint8_t>(b.loops));
-  out.put(static_cast<std::uint8_t>(b.runs));
+  out.put(static_cast<std::uint8_t>(b.autoStart));
   write(out, b.mass);
   out.putMatrix(b.velocity);
-  out.putMatrix(b.spin);
+  out.putMatrix(b.angularVelocity);
 }
 
-BodySpec readBodySpec(Reader& in) {
+BodySpec readBodySpec(StreamReader& in) {
   BodySpec b;
   b.name = in.getText("body name");
-  b.kind = static_cast<BodyKind>(in.getUpTo(5, "body kind"));
+  b.kind = static_cast<BodyKind>(in.getUpTo(kBodyKindCount - 1, "body kind"));
   b.source = static_cast<BodySource>(in.getUpTo(4, "body source"));
   b.objects = in.getArray<std::uint32_t>("body objects");
   b.anchor = in.getMatrix<Vec3>("body anchor");
   b.axis = in.getMatrix<Vec3>("body axis");
-  for (const auto number : numbersOfBody()) b.*number = in.getFinite("body number");
+  for (const auto number : listBodyNumbers()) b.*number = in.getFinite("body number");
   b.stops = in.getArray<double>("body stops");
-  b.closesAfter = readOptional(in, "closes after");
+  b.autoCloseDelay = readOptional(in, "closes after");
   b.openedBy = static_cast<OpenedBy>(in.getUpTo(1, "opened by"));
   const std::size_t keys = in.count(40, "path keys");
   for (std::size_t i = 0; i < keys; ++i) b.keys.push_back(readPathKey(in));
   b.loops = in.getBool("loops");
-  b.runs = in.getBool("runs");
+  b.autoStart = in.getBool("runs");
   b.mass = readOptional(in, "mass");
   b.velocity = in.getMatrix<Vec3>("body velocity");
-  b.spin = in.getMatrix<Vec3>("body spin");
+  b.angularVelocity = in.getMatrix<Vec3>("body spin");
   return b;
 }
 
-void write(Writer& out, const Problem& p) {
-  out.put(p.kind);
-  out.put(std::uint64_t{p.count});
-  out.put(p.example);
+void write(StreamWriter& out, const Diagnostic& diagnostic) {
+  out.put(diagnostic.kind);
+  out.put(std::uint64_t{diagnostic.count});
+  out.put(diagnostic.example);
 }
 
-Problem readProblem(Reader& in) {
-  Problem p;
-  p.kind = in.getText("problem kind");
-  p.count = in.get<std::uint64_t>("problem count");
-  p.example = in.getText("problem example");
-  return p;
+Diagnostic readDiagnostic(StreamReader& in) {
+  Diagnostic diagnostic;
+  diagnostic.kind = in.getText("problem kind");
+  diagnostic.count = in.get<std::uint64_t>("problem count");
+  diagnostic.example = in.getText("problem example");
+  return diagnostic;
 }
 
 template <class T>
-void writeAll(Writer& out, const std::vector<T>& values) {
+void writeAll(StreamWriter& out, const std::vector<T>& values) {
   out.put(std::uint64_t{values.size()});
   for (const T& value : values) write(out, value);
 }
 
-/// `smallest`: the fewest bytes that one of them takes, so that a lying count cannot allocate.
+/// `smallest`: minimum size of an item in bytes, so that a false count cannot allocate much.
 template <class T, class Read>
-void readAll(Reader& in, std::vector<T>& values, std::size_t smallest, const char* field,
+void readAll(StreamReader& in, std::vector<T>& values, std::size_t smallest, const char* field,
              const Read& read) {
   const std::size_t n = in.count(smallest, field);
-  values.reserve(n);  // no more than some times the bytes that remain
+  values.reserve(n);  // a small multiple of the remaining bytes
   for (std::size_t i = 0; i < n; ++i) values.push_back(read());
 }
 
-std::size_t roughSize(const Model& model) {
+std::size_t estimateSize(const Model& model) {
   std::size_t size = 1024 + model.objects.size() * 256;
   for (const Texture& t : model.textures) size += t.rgba.size() + 256;
   for (const Mesh& m : model.meshes) size += m.positions.size() * 32 + m.indices.size() * 4 + 256;
   return size;
 }
 
-void readHeader(Reader& in, std::size_t size) {
-  if (in.get<std::uint32_t>("magic") != kMagic) in.fail("magic", "this is no model stream");
+void readHeader(StreamReader& in, std::size_t size) {
+  if (in.get<std::uint32_t>("magic") != kMagic) in.fail("magic", "not a model stream");
   const auto version = in.get<std::uint32_t>("version");
   if (version != kModelStreamVersion) {
     in.fail("version", std::to_string(version) + ", but this program reads " +
@@ -381,8 +382,8 @@ void readHeader(Reader& in, std::size_t size) {
 }  // namespace
 
 std::vector<std::byte> serialiseModel(const Model& model) {
-  Writer out;
-  out.reserve(roughSize(model));
+  StreamWriter out;
+  out.reserve(estimateSize(model));
   out.put(kMagic);
   out.put(kModelStreamVersion);
   out.put(std::uint64_t{0});  // the length, set by finish()
@@ -394,16 +395,16 @@ std::vector<std::byte> serialiseModel(const Model& model) {
   writeAll(out, model.objects);
   writeAll(out, model.bodies);
   out.put(model.metresPerUnit);
-  out.put(static_cast<std::uint8_t>(model.up));
+  out.put(static_cast<std::uint8_t>(model.upAxis));
   out.putMatrix(model.offset);
-  writeAll(out, model.problems);
-  out.put(std::uint64_t{model.filesBeside.size()});
-  for (const std::string& file : model.filesBeside) out.put(file);
+  writeAll(out, model.diagnostics);
+  out.put(std::uint64_t{model.dependencies.size()});
+  for (const std::string& file : model.dependencies) out.put(file);
   return out.finish();
 }
 
 Model deserialiseModel(std::span<const std::byte> bytes) {
-  Reader in(bytes);
+  StreamReader in(bytes);
   readHeader(in, bytes.size());
   Model model;
   model.source = in.getText("source");
@@ -414,18 +415,18 @@ Model deserialiseModel(std::span<const std::byte> bytes) {
   readAll(in, model.meshes, 44, "meshes", [&] { return readMesh(in, model.materials.size()); });
   readAll(in, model.objects, 158, "objects", [&] { return readObject(in, model.meshes.size()); });
   for (const Object& object : model.objects) {
-    if (object.pieceOf && *object.pieceOf >= model.objects.size())
-      in.fail("piece of", "no object " + std::to_string(*object.pieceOf));
+    if (object.partOf && *object.partOf >= model.objects.size())
+      in.fail("piece of", "no object " + std::to_string(*object.partOf));
   }
   readAll(in, model.bodies, 215, "bodies", [&] { return readBodySpec(in); });
-  if (const auto why = refusalOfBodies(model)) in.fail("bodies", *why);
+  if (const auto reason = validateBodies(model)) in.fail("bodies", *reason);
   model.metresPerUnit = in.getFinite("metres per unit");
   if (model.metresPerUnit <= 0) in.fail("metres per unit", "not positive");
-  model.up = static_cast<char>(in.get<std::uint8_t>("up axis"));
-  if (model.up < 'x' || model.up > 'z') in.fail("up axis", "neither x, y nor z");
+  model.upAxis = static_cast<char>(in.get<std::uint8_t>("up axis"));
+  if (model.upAxis < 'x' || model.upAxis > 'z') in.fail("up axis", "neither x, y nor z");
   model.offset = in.getMatrix<Vec3>("offset");
-  readAll(in, model.problems, 24, "problems", [&] { return readProblem(in); });
-  readAll(in, model.filesBeside, 8, "files beside", [&] { return in.getText("file beside"); });
+  readAll(in, model.diagnostics, 24, "problems", [&] { return readDiagnostic(in); });
+  readAll(in, model.dependencies, 8, "dependencies", [&] { return in.getText("dependency"); });
   if (in.remaining() != 0) in.fail("end", std::to_string(in.remaining()) + " bytes too many");
   return model;
 }

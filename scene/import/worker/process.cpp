@@ -25,10 +25,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kReadSize = 1 << 18;  // bytes taken from the pipe at once
-constexpr int kFirstOwnDescriptor = 10;     // above those that a copy expects, so that none collide
-constexpr double kFarewell = 10;       // seconds between the end of the pipe and of the process
-constexpr double kLongestWait = 3600;  // seconds; poll() counts milliseconds in an int
+constexpr std::size_t kReadSize = 1 << 18;  // bytes per read from the pipe
+constexpr double kExitTimeout = 10;    // seconds between the end of the pipe and of the process
+constexpr double kMaxPollWait = 3600;  // seconds; poll() counts milliseconds in an int
 
 // ---- owners -------------------------------------------------------------------------------------
 
@@ -49,29 +48,29 @@ class FileDescriptor {
   int fd_;
 };
 
-/// A process that is waited for in any case, so that no zombie stays behind.
-class Child {
+/// A child process that is always waited for, so that no zombie remains.
+class WorkerProcess {
  public:
-  explicit Child(pid_t pid) : pid_(pid) {}
-  ~Child() {
+  explicit WorkerProcess(pid_t pid) : pid_(pid) {}
+  ~WorkerProcess() {
     if (pid_ > 0) {
       kill(pid_, SIGKILL);
       wait();
     }
   }
-  Child(const Child&) = delete;
-  Child& operator=(const Child&) = delete;
+  WorkerProcess(const WorkerProcess&) = delete;
+  WorkerProcess& operator=(const WorkerProcess&) = delete;
 
-  /// The status as waitpid() gives it; -1 when somebody else has taken it. Who has closed the pipe
-  /// and is not gone in `patience` seconds is killed.
-  int waitFor(double patience) {
+  /// Returns the status as waitpid() does; -1 if another caller has taken it. Kills a process that
+  /// has not exited after `timeout` seconds.
+  int waitFor(double timeout) {
     const auto start = Clock::now();
     int status = -1;
-    while (std::chrono::duration<double>(Clock::now() - start).count() < patience) {
-      const pid_t gone = waitpid(pid_, &status, WNOHANG);
-      if (gone == 0) {
+    while (std::chrono::duration<double>(Clock::now() - start).count() < timeout) {
+      const pid_t exitedPid = waitpid(pid_, &status, WNOHANG);
+      if (exitedPid == 0) {
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      } else if (gone == pid_ || errno != EINTR) {
+      } else if (exitedPid == pid_ || errno != EINTR) {
         pid_ = -1;
         return status;
       }
@@ -108,23 +107,23 @@ struct SpawnSettings {
 
 // ---- starting -----------------------------------------------------------------------------------
 
-constexpr std::size_t kArguments = 14;
+constexpr std::size_t kArgumentCount = 14;
 
-/// "x,y,z".
-std::string textOf(const Vec3& v) {
-  return shortest(v.x()) + ',' + shortest(v.y()) + ',' + shortest(v.z());
+/// Formats as "x,y,z".
+std::string formatVec3(const Vec3& v) {
+  return formatShortest(v.x()) + ',' + formatShortest(v.y()) + ',' + formatShortest(v.z());
 }
 
-std::array<std::string, kArguments> argumentsFor(const ImportRequest& request) {
+std::array<std::string, kArgumentCount> makeArguments(const ImportRequest& request) {
   return {"enfilade",
           kImportVerb,
           std::to_string(getpid()),
           std::to_string(static_cast<int>(request.task)),
           std::to_string(request.memoryLimit),
-          shortest(request.timeLimit),
-          request.metresPerUnit ? shortest(*request.metresPerUnit) : "-",
+          formatShortest(request.timeLimit),
+          request.metresPerUnit ? formatShortest(*request.metresPerUnit) : "-",
           request.up ? std::string(1, *request.up) : "-",
-          request.offset ? textOf(*request.offset) : "-",
+          request.offset ? formatVec3(*request.offset) : "-",
           std::to_string(static_cast<int>(request.ifcReader)),
           std::to_string(request.firstProduct),
           request.program,
@@ -133,29 +132,30 @@ std::array<std::string, kArguments> argumentsFor(const ImportRequest& request) {
 }
 
 template <class T>
-T numberFrom(std::string_view text) {
+T parseArgument(std::string_view text) {
   T value{};
   std::from_chars(text.data(), text.data() + text.size(), value);
   return value;
 }
 
-Vec3 vectorFrom(std::string_view text) {
+Vec3 parseVec3(std::string_view text) {
   Vec3 v;
   for (double& coordinate : v) {
-    coordinate = numberFrom<double>(text);
+    coordinate = parseArgument<double>(text);
     text.remove_prefix(std::min(text.find(',') + 1, text.size()));
   }
   return v;
 }
 
-/// stdout and stderr carry the parent's data and log; what libraries print there is dropped.
-void handOver(SpawnSettings& settings, const ImportRequest& request, int writeEnd) {
+/// Sets the worker's descriptors and signals. stdout and stderr carry the parent's data and log, so
+/// output of libraries is dropped.
+void configureDescriptors(SpawnSettings& settings, const ImportRequest& request, int writeEnd) {
   posix_spawn_file_actions_adddup2(&settings.files, writeEnd, kImportPipe);
   if (request.ifcFile >= 0) {
     posix_spawn_file_actions_adddup2(&settings.files, request.ifcFile, kIfcFile);
   }
-  if (request.ifcWanted >= 0) {
-    posix_spawn_file_actions_adddup2(&settings.files, request.ifcWanted, kIfcWanted);
+  if (request.ifcProductIds >= 0) {
+    posix_spawn_file_actions_adddup2(&settings.files, request.ifcProductIds, kIfcProductIds);
   }
   posix_spawn_file_actions_addopen(&settings.files, 0, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&settings.files, 1, "/dev/null", O_WRONLY, 0);
@@ -168,13 +168,13 @@ void handOver(SpawnSettings& settings, const ImportRequest& request, int writeEn
   posix_spawnattr_setflags(&settings.attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
 }
 
-pid_t startCopy(const ImportRequest& request, int writeEnd) {
-  const std::array<std::string, kArguments> arguments = argumentsFor(request);
+pid_t spawnWorker(const ImportRequest& request, int writeEnd) {
+  const std::array<std::string, kArgumentCount> arguments = makeArguments(request);
   std::vector<char*> argv;
   for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
   argv.push_back(nullptr);
   SpawnSettings settings;
-  handOver(settings, request, writeEnd);
+  configureDescriptors(settings, request, writeEnd);
   pid_t pid = -1;
   const int error = posix_spawn(&pid, "/proc/self/exe", &settings.files, &settings.attributes,
                                 argv.data(), environ);
@@ -185,7 +185,7 @@ pid_t startCopy(const ImportRequest& request, int writeEnd) {
   return pid;
 }
 
-/// Both ends of a pipe, out of the way of the descriptors that a copy expects.
+/// Opens a pipe whose descriptors do not collide with those of a worker.
 std::array<int, 2> openPipe(const ImportRequest& request) {
   std::array<int, 2> ends{};
   const auto fail = [&] {
@@ -194,43 +194,43 @@ std::array<int, 2> openPipe(const ImportRequest& request) {
   };
   if (pipe2(ends.data(), O_CLOEXEC) != 0) fail();
   const FileDescriptor lowRead(ends[0]), lowWrite(ends[1]);
-  FileDescriptor readEnd(fcntl(lowRead.get(), F_DUPFD_CLOEXEC, kFirstOwnDescriptor));
-  FileDescriptor writeEnd(fcntl(lowWrite.get(), F_DUPFD_CLOEXEC, kFirstOwnDescriptor));
+  FileDescriptor readEnd(fcntl(lowRead.get(), F_DUPFD_CLOEXEC, kFirstParentDescriptor));
+  FileDescriptor writeEnd(fcntl(lowWrite.get(), F_DUPFD_CLOEXEC, kFirstParentDescriptor));
   if (readEnd.get() < 0 || writeEnd.get() < 0) fail();
   return {readEnd.release(), writeEnd.release()};
 }
 
-// ---- listening ----------------------------------------------------------------------------------
+// ---- receiving ----------------------------------------------------------------------------------
 
-bool isFrameKind(std::uint8_t kind) {
+bool isMessageKind(std::uint8_t kind) {
   return std::string_view("PEMTGOFD").find(static_cast<char>(kind)) != std::string_view::npos;
 }
 
-/// Makes frames of bytes as they come.
-class FrameBuffer {
+/// Assembles messages from bytes.
+class MessageBuffer {
  public:
-  /// No frame may be longer than all that its writer may hold in memory.
-  explicit FrameBuffer(std::size_t longest) : longest_(longest) {}
-  /// False when the bytes make no sense.
-  bool take(std::span<const std::byte> bytes, const TakeFrame& takeFrame) {
+  /// A message may not exceed the memory that its writer may use.
+  explicit MessageBuffer(std::size_t maxMessageSize) : maxMessageSize_(maxMessageSize) {}
+  /// Returns false if the bytes are invalid.
+  bool append(std::span<const std::byte> bytes, const MessageHandler& handler) {
     buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
     std::size_t used = 0;
-    while (buffer_.size() - used >= ImportFrameHeader::kSize) {
-      ImportFrameHeader header{};
+    while (buffer_.size() - used >= ImportMessageHeader::kSize) {
+      ImportMessageHeader header{};
       header.kind = static_cast<std::uint8_t>(buffer_[used]);
       std::memcpy(&header.size, buffer_.data() + used + 1, sizeof header.size);
-      if (!isFrameKind(header.kind) || header.size > longest_) return false;
-      if (header.size > buffer_.size() - used - ImportFrameHeader::kSize) break;
-      const std::span body(buffer_.data() + used + ImportFrameHeader::kSize, header.size);
-      if (!takeFrame(static_cast<ImportFrame>(header.kind), body)) return false;
-      used += ImportFrameHeader::kSize + header.size;
+      if (!isMessageKind(header.kind) || header.size > maxMessageSize_) return false;
+      if (header.size > buffer_.size() - used - ImportMessageHeader::kSize) break;
+      const std::span body(buffer_.data() + used + ImportMessageHeader::kSize, header.size);
+      if (!handler(static_cast<ImportMessage>(header.kind), body)) return false;
+      used += ImportMessageHeader::kSize + header.size;
     }
     buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(used));
     return true;
   }
 
  private:
-  std::size_t longest_;
+  std::size_t maxMessageSize_;
   std::vector<std::byte> buffer_;
 };
 
@@ -238,58 +238,59 @@ double secondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Listens until the process closes the pipe or is to be killed.
-ImportEnd::How listen(int readEnd, const ImportRequest& request, const TakeFrame& take,
-                      const std::function<double()>& stallLimit) {
+/// Receives messages until the worker closes the pipe or must be killed.
+ImportExit::Reason receiveMessages(int readEnd, const ImportRequest& request,
+                                   const MessageHandler& handler,
+                                   const std::function<double()>& stallLimit) {
   const auto start = Clock::now();
-  auto heard = start;
+  auto lastMessage = start;
   std::vector<std::byte> chunk(kReadSize);
-  FrameBuffer frames(request.memoryLimit > 0 ? request.memoryLimit
-                                             : std::numeric_limits<std::size_t>::max());
+  MessageBuffer messages(request.memoryLimit > 0 ? request.memoryLimit
+                                                 : std::numeric_limits<std::size_t>::max());
   for (;;) {  // ends with the time limit at the latest
     const double left = request.timeLimit - secondsSince(start);
-    const double patience = stallLimit() - secondsSince(heard);
-    if (!(left > 0)) return ImportEnd::How::timeLimit;
-    if (!(patience > 0)) return ImportEnd::How::stallLimit;
-    const double wait = std::min({left, patience, kLongestWait});
+    const double stallTime = stallLimit() - secondsSince(lastMessage);
+    if (!(left > 0)) return ImportExit::Reason::timeLimit;
+    if (!(stallTime > 0)) return ImportExit::Reason::stallLimit;
+    const double wait = std::min({left, stallTime, kMaxPollWait});
     pollfd waiting{readEnd, POLLIN, 0};
     if (poll(&waiting, 1, static_cast<int>(wait * 1000) + 1) <= 0) continue;  // or interrupted
     const ssize_t size = read(readEnd, chunk.data(), chunk.size());
     if (size < 0 && errno == EINTR) continue;
-    if (size <= 0) return ImportEnd::How::exited;
-    heard = Clock::now();
-    if (!frames.take(std::span(chunk).first(static_cast<std::size_t>(size)), take)) {
-      return ImportEnd::How::garbled;
+    if (size <= 0) return ImportExit::Reason::exited;
+    lastMessage = Clock::now();
+    if (!messages.append(std::span(chunk).first(static_cast<std::size_t>(size)), handler)) {
+      return ImportExit::Reason::malformed;
     }
   }
 }
 
 }  // namespace
 
-std::optional<ImportRequest> importRequestFrom(int argc, char** argv, int& parent) {
-  if (argc != static_cast<int>(kArguments)) return std::nullopt;
+std::optional<ImportRequest> parseImportRequest(int argc, char** argv, int& parent) {
+  if (argc != static_cast<int>(kArgumentCount)) return std::nullopt;
   ImportRequest request;
-  parent = numberFrom<int>(argv[2]);
-  request.task = static_cast<ImportTask>(numberFrom<int>(argv[3]));
-  request.memoryLimit = numberFrom<std::size_t>(argv[4]);
-  request.timeLimit = numberFrom<double>(argv[5]);
-  if (std::string_view(argv[6]) != "-") request.metresPerUnit = numberFrom<double>(argv[6]);
+  parent = parseArgument<int>(argv[2]);
+  request.task = static_cast<ImportTask>(parseArgument<int>(argv[3]));
+  request.memoryLimit = parseArgument<std::size_t>(argv[4]);
+  request.timeLimit = parseArgument<double>(argv[5]);
+  if (std::string_view(argv[6]) != "-") request.metresPerUnit = parseArgument<double>(argv[6]);
   if (std::string_view(argv[7]) != "-") request.up = argv[7][0];
-  if (std::string_view(argv[8]) != "-") request.offset = vectorFrom(argv[8]);
-  request.ifcReader = static_cast<IfcReader>(numberFrom<int>(argv[9]));
-  request.firstProduct = numberFrom<std::uint32_t>(argv[10]);
+  if (std::string_view(argv[8]) != "-") request.offset = parseVec3(argv[8]);
+  request.ifcReader = static_cast<IfcReader>(parseArgument<int>(argv[9]));
+  request.firstProduct = parseArgument<std::uint32_t>(argv[10]);
   request.program = argv[11];
   request.script = argv[12];
   request.file = argv[13];
   return request;
 }
 
-std::string ImportEnd::words() const {
-  if (how == How::timeLimit) return "took too long";
-  if (how == How::stallLimit) return "hung";
-  if (how == How::garbled) return "answered with noise";
+std::string ImportExit::describe() const {
+  if (reason == Reason::timeLimit) return "timed out";
+  if (reason == Reason::stallLimit) return "hung";
+  if (reason == Reason::malformed) return "sent invalid data";
   if (status != -1 && WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) {
-    return "was killed, by hand or by the system for want of memory";
+    return "was killed, by a user or by the system for lack of memory";
   }
   if (status != -1 && WIFSIGNALED(status)) {
     return std::string("crashed (") + strsignal(WTERMSIG(status)) + ")";
@@ -297,17 +298,17 @@ std::string ImportEnd::words() const {
   return "ended without an answer";
 }
 
-ImportEnd runImportProcess(const ImportRequest& request, const TakeFrame& take,
-                           const std::function<double()>& stallLimit) {
+ImportExit runImportProcess(const ImportRequest& request, const MessageHandler& handler,
+                            const std::function<double()>& stallLimit) {
   const std::array<int, 2> ends = openPipe(request);
   const FileDescriptor readEnd(ends[0]);
   FileDescriptor writeEnd(ends[1]);
-  Child child(startCopy(request, writeEnd.get()));
+  WorkerProcess worker(spawnWorker(request, writeEnd.get()));
   writeEnd.close();
-  ImportEnd end;
-  end.how = listen(readEnd.get(), request, take, stallLimit);
-  if (end.how == ImportEnd::How::exited) end.status = child.waitFor(kFarewell);
-  return end;
+  ImportExit outcome;
+  outcome.reason = receiveMessages(readEnd.get(), request, handler, stallLimit);
+  if (outcome.reason == ImportExit::Reason::exited) outcome.status = worker.waitFor(kExitTimeout);
+  return outcome;
 }
 
 bool readProgress(std::span<const std::byte> body, std::string& stage, double& fraction) {
@@ -319,7 +320,7 @@ bool readProgress(std::span<const std::byte> body, std::string& stage, double& f
   return true;
 }
 
-std::string shortest(double value) {
+std::string formatShortest(double value) {
   std::array<char, 32> text;
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
   return {text.data(), end};

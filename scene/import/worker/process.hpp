@@ -1,5 +1,5 @@
-// The asking side of an importing process: starts a copy of our own executable with hidden
-// arguments, listens to its frames, and ends it when it takes too long.
+// The parent's side of an import worker: starts a copy of this executable with hidden arguments,
+// receives its messages, and kills it after a timeout.
 #pragma once
 
 #include <cstddef>
@@ -10,19 +10,20 @@
 #include <string>
 #include <vector>
 
-#include "scene/import/import_model.hpp"
+#include "scene/import/file/import_options.hpp"
 #include "scene/import/worker/ipc_messages.hpp"
 
 namespace enfilade::scene {
 
-/// What the copy shall do.
+/// Task of an import worker.
 enum class ImportTask : std::uint8_t {
   model,        ///< the whole import: answers with a model
   assimp,       ///< an IFC file by assimp: answers with a model
-  webIfc,       ///< becomes Node.js: answers with shapes of IFC products
-  ifcPlusPlus,  ///< answers with shapes of IFC products
+  webIfc,       ///< becomes Node.js: answers with meshes of IFC products
+  ifcPlusPlus,  ///< answers with meshes of IFC products
 };
 
+/// Arguments of an import worker.
 struct ImportRequest {
   ImportTask task = ImportTask::model;
   std::string file;
@@ -30,43 +31,45 @@ struct ImportRequest {
   std::optional<char> up;
   std::optional<Vec3> offset;
   IfcReader ifcReader = IfcReader::automatic;
-  std::size_t memoryLimit = 0;       ///< bytes; 0: none
-  double timeLimit = 0;              ///< seconds
-  std::string program, script;       ///< webIfc: node, and what it runs
-  std::uint32_t firstProduct = 0;    ///< webIfc: index into the wanted ones
-  int ifcFile = -1, ifcWanted = -1;  ///< file descriptors handed on; not owned, -1: none
+  std::size_t memoryLimit = 0;           ///< bytes; 0: unlimited
+  double timeLimit = 0;                  ///< seconds
+  std::string program, script;           ///< webIfc: the node program and its script
+  std::uint32_t firstProduct = 0;        ///< webIfc: index into the requested products
+  int ifcFile = -1, ifcProductIds = -1;  ///< inherited file descriptors; not owned, -1: unset
 };
 
-/// The request as the copy finds it in its arguments; nullopt when it makes no sense.
-/// `parent`: the process that asked.
-std::optional<ImportRequest> importRequestFrom(int argc, char** argv, int& parent);
+/// Parses the arguments of a worker; nullopt if they are invalid. `parent`: process id of the
+/// parent.
+std::optional<ImportRequest> parseImportRequest(int argc, char** argv, int& parent);
 
-struct ImportEnd {
-  enum class How : std::uint8_t {
-    exited,      ///< closed its pipe and ended; `status` holds
-    timeLimit,   ///< killed, its time was over
-    stallLimit,  ///< killed, it was silent for too long
-    garbled      ///< killed, it wrote what is no frame
+/// How an import worker ended.
+struct ImportExit {
+  enum class Reason : std::uint8_t {
+    exited,      ///< closed its pipe and exited; `status` is valid
+    timeLimit,   ///< killed after the time limit
+    stallLimit,  ///< killed after a time without messages
+    malformed    ///< killed after an invalid message
   };
-  How how = How::exited;
-  int status = 0;  ///< as waitpid() gives it; -1: somebody else has taken it
+  Reason reason = Reason::exited;
+  int status = 0;  ///< as waitpid() returns it; -1: taken by another caller
 
-  /// "crashed (Segmentation fault)", "ended without an answer", ...
-  std::string words() const;
+  /// Returns "crashed (Segmentation fault)", "ended without an answer", ...
+  std::string describe() const;
 };
 
-/// Takes a frame; false: it makes no sense. What it throws ends the process and is passed on.
-using TakeFrame = std::function<bool(ImportFrame, std::span<const std::byte>)>;
+/// Handles a message; false: it is invalid. An exception kills the worker and is passed on.
+using MessageHandler = std::function<bool(ImportMessage, std::span<const std::byte>)>;
 
-/// Returns when the process is gone, in any case. `stallLimit`: seconds without a frame, asked
-/// before each wait; infinity: none. Throws ImportError when no process can be started.
-ImportEnd runImportProcess(const ImportRequest& request, const TakeFrame& take,
-                           const std::function<double()>& stallLimit);
+/// Runs a worker until it is gone, in any case. `stallLimit`: maximal seconds without a message,
+/// evaluated before each wait; infinity: unlimited. Throws ImportError if the worker cannot be
+/// started.
+ImportExit runImportProcess(const ImportRequest& request, const MessageHandler& handler,
+                            const std::function<double()>& stallLimit);
 
-/// A progress frame's stage and fraction; false when it is none.
+/// Reads stage and fraction of a progress message; false if it is invalid.
 bool readProgress(std::span<const std::byte> body, std::string& stage, double& fraction);
 
-/// The shortest text that reads back as the same number.
-std::string shortest(double value);
+/// Returns the shortest text that parses to the same number.
+std::string formatShortest(double value);
 
 }  // namespace enfilade::scene

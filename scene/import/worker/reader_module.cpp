@@ -4,25 +4,26 @@
 
 #include <cstdlib>
 
-#include "scene/import/import_model.hpp"
+#include "scene/import/file/import_options.hpp"
 
 namespace enfilade::scene {
 
-std::filesystem::path moduleFile(const char* name, const char* variable, const char* built) {
+std::filesystem::path findModule(const char* name, const char* variable, const char* builtPath) {
   if (const char* named = std::getenv(variable); named != nullptr) return named;
   std::error_code error;
   const auto folder = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
-  for (const auto& place : {folder / name, folder / "../lib/enfilade" / name})
-    if (std::filesystem::is_regular_file(place, error)) return place;
-  return built;
+  for (const auto& candidate : {folder / name, folder / "../lib/enfilade" / name})
+    if (std::filesystem::is_regular_file(candidate, error)) return candidate;
+  return builtPath;
 }
 
 void* openModule(const std::filesystem::path& module, const char* symbol) {
-  void* opened = dlopen(module.c_str(), RTLD_NOW | RTLD_LOCAL);
-  void* found = opened ? dlsym(opened, symbol) : nullptr;
-  if (found) return found;
-  const char* why = dlerror();
-  throw ImportError("the reader " + module.string() + " cannot be opened (" + (why ? why : "?") +
+  void* library = dlopen(module.c_str(), RTLD_NOW | RTLD_LOCAL);
+  void* address = library ? dlsym(library, symbol) : nullptr;
+  if (address) return address;
+  const char* reason = dlerror();
+  throw ImportError("the reader " + module.string() + " cannot be opened (" +
+                    (reason ? reason : "?") +
                     "): install it with the program, or raise the memory limit");
 }
 

@@ -1,17 +1,17 @@
-// Libraries that read models are as slow to link at run time as many a scene to load, so each
-// stands behind a module of ours that only the process opens that reads with it.
+// Loads reader modules at run time. Linking the readers' libraries takes as long as loading many a
+// scene, so only the process that needs a reader opens its module.
 #pragma once
 
 #include <filesystem>
 
 namespace enfilade::scene {
 
-/// Where the module `name` is: named by the environment's `variable`, beside the program, where it
-/// is installed, or where it was `built`.
-std::filesystem::path moduleFile(const char* name, const char* variable, const char* built);
+/// Returns the path of module `name`: from the environment `variable`, next to the program, its
+/// installed place, or `builtPath`.
+std::filesystem::path findModule(const char* name, const char* variable, const char* builtPath);
 
-/// What `module` exports as `symbol`, for as long as the process lives. Throws ImportError where it
-/// cannot be opened.
+/// Returns the symbol `symbol` of a module, which stays loaded. Throws ImportError if it cannot be
+/// opened.
 void* openModule(const std::filesystem::path& module, const char* symbol);
 
 }  // namespace enfilade::scene

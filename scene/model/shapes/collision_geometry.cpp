@@ -6,24 +6,25 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr std::uint32_t kLeafSize = 4;  // hulls: as triangles, see triangle_tree.cpp
+constexpr std::uint32_t kLeafSize = 4;  // hulls; as for triangles, see triangle_tree.cpp
 
-Vec3 at(const Shape& shape, std::uint32_t vertex, const Eigen::Affine3d& placed) {
-  return placed * shape.vertices[vertex].cast<double>();  // as worldPosition()
+Vec3 placedVertex(const Shape& shape, std::uint32_t vertex, const Eigen::Affine3d& transform) {
+  return transform * shape.vertices[vertex].cast<double>();  // as computeWorldPosition()
 }
 
-collision::Triangle triangleAt(const Shape& shape, std::size_t t, const Eigen::Affine3d& placed) {
+collision::Triangle placedTriangle(const Shape& shape, std::size_t t,
+                                   const Eigen::Affine3d& transform) {
   const auto& corners = shape.triangles[t];
-  return {at(shape, corners[0], placed), at(shape, corners[1], placed),
-          at(shape, corners[2], placed)};
+  return {placedVertex(shape, corners[0], transform), placedVertex(shape, corners[1], transform),
+          placedVertex(shape, corners[2], transform)};
 }
 
-/// 3 V / A of what the surface encloses, metres.
-double thickness(const Shape& shape, const Shell& shell, const Eigen::Affine3d& placed) {
-  const Vec3 origin = at(shape, shape.triangles[shell.first][0], placed);
+/// 3 V / A of the enclosed volume, metres.
+double computeThickness(const Shape& shape, const Shell& shell, const Eigen::Affine3d& transform) {
+  const Vec3 origin = placedVertex(shape, shape.triangles[shell.first][0], transform);
   double sixfoldVolume = 0, doubleArea = 0;
   for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
-    const auto [a, b, c] = triangleAt(shape, t, placed);
+    const auto [a, b, c] = placedTriangle(shape, t, transform);
     const Vec3 normal = (b - a).cross(c - a);
     sixfoldVolume += (a - origin).dot(normal);
     doubleArea += normal.norm();
@@ -31,54 +32,55 @@ double thickness(const Shape& shape, const Shell& shell, const Eigen::Affine3d& 
   return doubleArea > 0 ? std::abs(sixfoldVolume) / doubleArea : 0;
 }
 
-/// It looks into the solid of another surface of the shape.
+/// True if the shell faces into the solid of another shell of the shape.
 bool isCavity(const Shape& shape, const Shell& shell) {
   return shell.inward && std::any_of(shape.shells.begin(), shape.shells.end(),
                                      [](const Shell& other) { return other.hollow; });
 }
 
-/// A whole number near the middle of low..high that can be subtracted from all numbers between them
-/// without rounding: by P. H. Sterbenz' lemma from those between its half and its double.
-double exactOrigin(double low, double high) {
+/// An integer near the middle of low..high that can be subtracted from every number between them
+/// without rounding. By Sterbenz' lemma this holds for numbers between its half and its double.
+double findExactOrigin(double low, double high) {
   const double middle = std::round(0.5 * low + 0.5 * high);
-  const double least = low > 0 ? low : -high, most = low > 0 ? high : -low;
+  const double minMagnitude = low > 0 ? low : -high, maxMagnitude = low > 0 ? high : -low;
   const double size = std::abs(middle);
-  return size <= 2 * least && most <= 2 * size ? middle : 0;
+  return size <= 2 * minMagnitude && maxMagnitude <= 2 * size ? middle : 0;
 }
 
-Vec3 originFor(const Shape& shape, const Eigen::Affine3d& placed) {
-  Box box;
-  for (std::uint32_t v = 0; v < shape.vertices.size(); ++v) box.include(at(shape, v, placed));
+Vec3 computeOrigin(const Shape& shape, const Eigen::Affine3d& transform) {
+  Aabb box;
+  for (std::uint32_t v = 0; v < shape.vertices.size(); ++v)
+    box.include(placedVertex(shape, v, transform));
   if (box.empty()) return Vec3::Zero();
-  return {exactOrigin(box.min.x(), box.max.x()), exactOrigin(box.min.y(), box.max.y()),
-          exactOrigin(box.min.z(), box.max.z())};
+  return {findExactOrigin(box.min.x(), box.max.x()), findExactOrigin(box.min.y(), box.max.y()),
+          findExactOrigin(box.min.z(), box.max.z())};
 }
 
-collision::Triangle relative(collision::Triangle triangle, const Vec3& origin) {
+collision::Triangle makeRelative(collision::Triangle triangle, const Vec3& origin) {
   for (Vec3& corner : triangle) corner -= origin;
   return triangle;
 }
 
-collision::Hull hullOf(const Shape& shape, const Shell& shell, const Eigen::Affine3d& placed,
-                       const Vec3& origin) {
+collision::Hull buildShellHull(const Shape& shape, const Shell& shell,
+                               const Eigen::Affine3d& transform, const Vec3& origin) {
   std::vector<Vec3> points;
-  for (const std::uint32_t v : verticesOf(shape, {&shell, 1}))
-    points.emplace_back(at(shape, v, placed) - origin);
+  for (const std::uint32_t v : collectVertices(shape, {&shell, 1}))
+    points.emplace_back(placedVertex(shape, v, transform) - origin);
   return collision::buildHull(points);
 }
 
-void addHull(collision::Hull hull, ObjectParts& parts) {
-  Box box;
-  for (const Vec3& v : hull.vertices) box.include(v + parts.origin);
-  parts.hullBoxes.push_back(box);
-  parts.localHulls.push_back(std::move(hull));
+void addHull(collision::Hull hull, CollisionGeometry& geometry) {
+  Aabb box;
+  for (const Vec3& v : hull.vertices) box.include(v + geometry.origin);
+  geometry.hullBoxes.push_back(box);
+  geometry.localHulls.push_back(std::move(hull));
 }
 
-/// How often one surface goes around `point`, by the signed crossings of a ray: 1 inside a solid
-/// whose faces look outwards. An edge seen from both its triangles gives exactly opposite areas, so
-/// that a ray slips between two triangles only if it meets their edge to the last bit.
-int crossing(const collision::Triangle& t, const Vec3& point) {
-  const Vec3 ray{0.8017, 0.5345, 0.2673};  // no axis of any building
+/// Signed crossing of a ray from `point` with a triangle. The sum over a surface is its winding
+/// number: 1 inside a solid whose faces look outwards. Both triangles of an edge give exactly
+/// opposite areas, so a ray slips between them only if it meets the edge to the last bit.
+int computeCrossing(const collision::Triangle& t, const Vec3& point) {
+  const Vec3 ray{0.8017, 0.5345, 0.2673};  // parallel to no axis of any building
   const std::array<Vec3, 3> p{t[0] - point, t[1] - point, t[2] - point};
   std::array<double, 3> area;
   for (std::size_t i = 0; i < 3; ++i) area[i] = ray.dot(p[i].cross(p[(i + 1) % 3]));
@@ -92,69 +94,69 @@ int crossing(const collision::Triangle& t, const Vec3& point) {
 
 }  // namespace
 
-bool hasArea(const collision::Triangle& t) {
-  // Equal corners are asked for by themselves: their cross product is zero only up to overflow.
+bool hasNumericalArea(const collision::Triangle& t) {
+  // Equal corners need a test of their own: their cross product is zero only up to overflow.
   if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return false;
   return !(t[1] - t[0]).cross(t[2] - t[0]).isZero(0.0);
 }
 
-bool becomesHull(const Shape& shape, const Shell& shell, const Eigen::Affine3d& placed) {
+bool isTreatedAsHull(const Shape& shape, const Shell& shell, const Eigen::Affine3d& transform) {
   if (!shell.isConvex() || shell.hollow) return false;
   if (!shell.inward) return true;
-  return !isCavity(shape, shell) && thickness(shape, shell, placed) < kRoomRadius;
+  return !isCavity(shape, shell) && computeThickness(shape, shell, transform) < kRoomRadius;
 }
 
-ObjectParts partsOf(const Shape& shape, const Eigen::Affine3d& placed) {
-  ObjectParts parts;
-  parts.origin = originFor(shape, placed);
+CollisionGeometry buildCollisionGeometry(const Shape& shape, const Eigen::Affine3d& transform) {
+  CollisionGeometry geometry;
+  geometry.origin = computeOrigin(shape, transform);
   std::vector<collision::Triangle> triangles;
-  std::vector<signed char> sides;
-  const signed char outside = placed.linear().determinant() < 0 ? -1 : 1;
+  std::vector<signed char> windingSigns;
+  const signed char outside = transform.linear().determinant() < 0 ? -1 : 1;
   for (const Shell& shell : shape.shells) {
-    if (becomesHull(shape, shell, placed)) {
-      addHull(hullOf(shape, shell, placed, parts.origin), parts);
+    if (isTreatedAsHull(shape, shell, transform)) {
+      addHull(buildShellHull(shape, shell, transform, geometry.origin), geometry);
       continue;
     }
     for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
-      const auto triangle = relative(triangleAt(shape, t, placed), parts.origin);
-      if (!hasArea(triangle)) continue;
+      const auto triangle = makeRelative(placedTriangle(shape, t, transform), geometry.origin);
+      if (!hasNumericalArea(triangle)) continue;
       triangles.push_back(triangle);
-      sides.push_back(shell.bounds() ? outside : static_cast<signed char>(0));
+      windingSigns.push_back(shell.bounds() ? outside : static_cast<signed char>(0));
     }
   }
-  if (!parts.localHulls.empty())
-    parts.hullTree = collision::buildBoxTree(parts.hullBoxes, kLeafSize);
-  if (triangles.empty()) return parts;
-  parts.localTriangles = collision::TriangleTree(triangles);
+  if (!geometry.localHulls.empty())
+    geometry.hullTree = collision::buildBoxTree(geometry.hullBoxes, kLeafSize);
+  if (triangles.empty()) return geometry;
+  geometry.localTriangles = collision::TriangleTree(triangles);
   for (std::uint32_t i = 0; i < triangles.size(); ++i) {
-    parts.sides.push_back(sides[parts.localTriangles.given(i)]);
+    geometry.windingSigns.push_back(windingSigns[geometry.localTriangles.inputIndex(i)]);
   }
-  return parts;
+  return geometry;
 }
 
-collision::ConvexBody ObjectParts::body(std::uint32_t part) const {
+collision::PlacedConvex CollisionGeometry::convex(std::uint32_t part) const {
   if (const collision::Hull* own = hull(part)) return {own->vertices, origin, nullptr, own};
   const collision::Triangle& t = localTriangles.triangles()[part - hullCount()];
   return {std::span<const Vec3>(t), origin};
 }
 
-Box ObjectParts::box(std::uint32_t part) const {
+Aabb CollisionGeometry::box(std::uint32_t part) const {
   if (part < hullCount()) return hullBoxes[part];
-  const Box local = collision::boxOf(localTriangles.triangles()[part - hullCount()]);
+  const Aabb local = collision::computeAabb(localTriangles.triangles()[part - hullCount()]);
   return {local.min + origin, local.max + origin};
 }
 
-void ObjectParts::query(const Box& box, std::vector<std::uint32_t>& parts) const {
+void CollisionGeometry::query(const Aabb& box, std::vector<std::uint32_t>& parts) const {
   const auto begin = static_cast<std::ptrdiff_t>(parts.size());
-  collision::forEachLeafMeeting(hullTree, collision::narrowed(box, hullTree.origin),
-                                [&](std::uint32_t first, std::uint32_t count) {
-                                  for (std::uint32_t i = first; i < first + count; ++i) {
-                                    const std::uint32_t hull = hullTree.order[i];
-                                    if (overlaps(hullBoxes[hull], box)) parts.push_back(hull);
-                                  }
-                                });
+  collision::forEachOverlappingLeaf(hullTree, collision::toFloatAabb(box, hullTree.origin),
+                                    [&](std::uint32_t first, std::uint32_t count) {
+                                      for (std::uint32_t i = first; i < first + count; ++i) {
+                                        const std::uint32_t hull = hullTree.order[i];
+                                        if (overlaps(hullBoxes[hull], box)) parts.push_back(hull);
+                                      }
+                                    });
   std::sort(parts.begin() + begin, parts.end());
-  // The subtraction may round: two units wider, and what comes too much goes.
+  // The subtraction may round: query two units wider, then filter exactly.
   const Vec3 rounding = 0x1p-51 * box.min.cwiseAbs().cwiseMax(box.max.cwiseAbs());
   const auto hullsEnd = static_cast<std::ptrdiff_t>(parts.size());
   localTriangles.query({box.min - origin - rounding, box.max - origin + rounding}, parts);
@@ -164,8 +166,8 @@ void ObjectParts::query(const Box& box, std::vector<std::uint32_t>& parts) const
               parts.end());
 }
 
-std::size_t ObjectParts::bytes() const {
-  std::size_t sum = sizeof *this + sides.capacity() + hullBoxes.capacity() * sizeof(Box) +
+std::size_t CollisionGeometry::bytes() const {
+  std::size_t sum = sizeof *this + windingSigns.capacity() + hullBoxes.capacity() * sizeof(Aabb) +
                     localTriangles.triangles().capacity() * sizeof(collision::Triangle);
   for (const collision::BoxTree* tree : {&hullTree, &localTriangles.boxes()}) {
     sum += tree->nodes.capacity() * sizeof(collision::BoxTree::Node) +
@@ -173,34 +175,55 @@ std::size_t ObjectParts::bytes() const {
   }
   for (const collision::Hull& hull : localHulls) {
     sum += sizeof hull + hull.vertices.capacity() * sizeof(Vec3);
-    sum += (hull.neighbourStart.capacity() + hull.neighbours.capacity()) * sizeof(std::uint32_t);
+    sum += (hull.neighbourOffsets.capacity() + hull.neighbours.capacity()) * sizeof(std::uint32_t);
     for (const auto& face : hull.faces) sum += sizeof face + face.capacity() * sizeof(face[0]);
   }
   return sum;
 }
 
-std::vector<collision::TreeOfParts> treesOf(const ObjectParts& parts) {
-  std::vector<collision::TreeOfParts> trees;
-  const collision::BoxTree& triangles = parts.localTriangles.boxes();
-  if (!parts.hullTree.empty())
-    trees.push_back(
-        {&parts.hullTree, collision::Mat3::Identity(), Vec3::Zero(),
-         [&parts](std::uint32_t item) { return parts.body(parts.hullTree.order[item]); }});
+std::vector<collision::CompoundView> makeCompoundViews(const CollisionGeometry& geometry) {
+  std::vector<collision::CompoundView> views;
+  const collision::BoxTree& triangles = geometry.localTriangles.boxes();
+  if (!geometry.hullTree.empty())
+    views.push_back({&geometry.hullTree, collision::Mat3::Identity(), Vec3::Zero(),
+                     [&geometry](std::uint32_t item) {
+                       return geometry.convex(geometry.hullTree.order[item]);
+                     }});
   if (!triangles.empty())
-    trees.push_back(
-        {&triangles, collision::Mat3::Identity(), parts.origin,
-         [&parts](std::uint32_t item) { return parts.body(parts.hullCount() + item); }});
-  return trees;
+    views.push_back(
+        {&triangles, collision::Mat3::Identity(), geometry.origin,
+         [&geometry](std::uint32_t item) { return geometry.convex(geometry.hullCount() + item); }});
+  return views;
 }
 
-bool surrounds(const ObjectParts& parts, const Vec3& point) {
+bool isInsideTriangleShells(const CollisionGeometry& geometry, const Vec3& point) {
   int winding = 0;
-  const auto& triangles = parts.localTriangles.triangles();
-  const Vec3 local = point - parts.origin;
+  const auto& triangles = geometry.localTriangles.triangles();
+  const Vec3 local = point - geometry.origin;
   for (std::size_t i = 0; i < triangles.size(); ++i) {
-    if (parts.sides[i] != 0) winding += parts.sides[i] * crossing(triangles[i], local);
+    if (geometry.windingSigns[i] != 0)
+      winding += geometry.windingSigns[i] * computeCrossing(triangles[i], local);
   }
   return winding > 0;
+}
+
+std::vector<collision::Triangle> collectSolidTriangles(const Model& model, std::uint32_t object) {
+  std::vector<collision::Triangle> triangles;
+  const Object& placed = model.objects[object];
+  std::vector<Vec3> worldPositions;
+  for (const std::uint32_t meshIndex : placed.meshes) {
+    const Mesh& mesh = model.meshes[meshIndex];
+    worldPositions.resize(mesh.positions.size());
+    for (std::uint32_t v = 0; v < worldPositions.size(); ++v)
+      worldPositions[v] = computeWorldPosition(placed, mesh, v);
+    for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+      const collision::Triangle t{worldPositions[mesh.indices[i]],
+                                  worldPositions[mesh.indices[i + 1]],
+                                  worldPositions[mesh.indices[i + 2]]};
+      if (hasNumericalArea(t)) triangles.push_back(t);
+    }
+  }
+  return triangles;
 }
 
 }  // namespace enfilade::scene

@@ -1,4 +1,5 @@
-// What an object is for collision: hulls of its convex solids, triangles of the rest.
+// CollisionGeometry: an object's geometry for collision, hulls for convex solids and triangles for
+// the rest.
 #pragma once
 
 #include <cstdint>
@@ -13,21 +14,21 @@
 
 namespace enfilade::scene {
 
-/// In the frame that the shape was placed in, metres; a part's number is that of its hull, or the
+/// In the frame in which the shape was placed, metres. A part's index is that of its hull, or the
 /// number of hulls + the index of its triangle.
-struct ObjectParts {
-  /// Hulls and triangles are stored relative to this place near them, so that bodies far from the
-  /// scene's origin lose no digits. Subtracting it rounded nothing: the parts are where they were.
+struct CollisionGeometry {
+  /// Hulls and triangles are stored relative to this nearby point, so that objects far from the
+  /// scene's origin lose no digits. The subtraction was exact: the parts did not move.
   Vec3 origin = Vec3::Zero();
-  /// Solids: each holds every triangle of its surface, and is the surface's solid exactly, or up to
-  /// the rounding of the coordinates (convex_surface.hpp).
+  /// Each hull contains every triangle of its surface. It equals the surface's solid exactly, or up
+  /// to the rounding of the coordinates (convex_surface.hpp).
   std::vector<collision::Hull> localHulls;
-  collision::TriangleTree localTriangles;  ///< closed, without thickness
-  /// Of each triangle: 1 when it is part of a closed surface and counter-clockwise seen from
-  /// outside, -1 when clockwise (the placement mirrors), 0 when its surface bounds nothing.
-  std::vector<signed char> sides;
+  collision::TriangleTree localTriangles;  ///< closed sets, without thickness
+  /// Per triangle: 1 if it is part of a closed surface and counter-clockwise seen from outside, -1
+  /// if clockwise (the placement mirrors), 0 if its surface is open.
+  std::vector<signed char> windingSigns;
 
-  std::vector<Box> hullBoxes;   ///< not relative to the origin
+  std::vector<Aabb> hullBoxes;  ///< not relative to the origin
   collision::BoxTree hullTree;  ///< over hullBoxes
 
   std::uint32_t hullCount() const { return static_cast<std::uint32_t>(localHulls.size()); }
@@ -38,33 +39,36 @@ struct ObjectParts {
   const collision::Hull* hull(std::uint32_t part) const {
     return part < hullCount() ? &localHulls[part] : nullptr;
   }
-  /// Where it stands, and its exact box.
-  collision::ConvexBody body(std::uint32_t part) const;
-  Box box(std::uint32_t part) const;
-  /// Appends the numbers of all parts whose boxes overlap `box`, ascending.
-  void query(const Box& box, std::vector<std::uint32_t>& parts) const;
+  /// Part at its position, and its exact AABB.
+  collision::PlacedConvex convex(std::uint32_t part) const;
+  Aabb box(std::uint32_t part) const;
+  /// Appends the indices of all parts whose AABBs overlap `box`, ascending.
+  void query(const Aabb& box, std::vector<std::uint32_t>& parts) const;
   std::size_t bytes() const;
 };
 
-/// A surface that looks inwards is a solid turned inside out when no ball of this radius (metres)
-/// fits into it; else somebody may mean the room that it is from within, and it stays triangles. A
-/// convex solid of volume V and area A holds no ball of a radius above 3 V / A.
+/// An inward-facing surface is an inside-out solid if no ball of this radius (metres) fits into it.
+/// Otherwise it may be a room seen from within, and stays triangles. A convex solid of volume V and
+/// area A contains no ball with a radius above 3 V / A.
 inline constexpr double kRoomRadius = 0.3;
 
-/// `placed` must keep its values finite; it may mirror, and flatten.
-ObjectParts partsOf(const Shape& shape, const Eigen::Affine3d& placed);
+/// `transform` must keep values finite; it may mirror and flatten.
+CollisionGeometry buildCollisionGeometry(const Shape& shape, const Eigen::Affine3d& transform);
 
-/// For questions about the nearest of them. Points into `parts`.
-std::vector<collision::TreeOfParts> treesOf(const ObjectParts& parts);
+/// Compound views for nearest-part queries. They point into `geometry`.
+std::vector<collision::CompoundView> makeCompoundViews(const CollisionGeometry& geometry);
 
-/// Whether a placed triangle has an area, as far as doubles tell.
-bool hasArea(const collision::Triangle& t);
+/// True if a placed triangle has an area in double precision.
+bool hasNumericalArea(const collision::Triangle& t);
 
-/// Whether collision takes the hull of this surface of the shape, so placed.
-bool becomesHull(const Shape& shape, const Shell& shell, const Eigen::Affine3d& placed);
+/// Triangles of an object that have an area, scene frame, in the order of the model.
+std::vector<collision::Triangle> collectSolidTriangles(const Model& model, std::uint32_t object);
 
-/// Whether `point` lies inside of a closed surface of the triangles (not of the hulls), by how
-/// often they go around it. Points on the surface may be told either way.
-bool surrounds(const ObjectParts& parts, const Vec3& point);
+/// True if collision uses the hull of this shell with this transform.
+bool isTreatedAsHull(const Shape& shape, const Shell& shell, const Eigen::Affine3d& transform);
+
+/// True if `point` lies inside a closed surface of the triangles (not of the hulls), by winding
+/// number. For points on the surface either result is possible.
+bool isInsideTriangleShells(const CollisionGeometry& geometry, const Vec3& point);
 
 }  // namespace enfilade::scene

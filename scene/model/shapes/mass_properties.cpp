@@ -1,9 +1,9 @@
 // Integrals of 1, x and x x^T over a solid are sums over its triangles (Mirtich, "Fast and Accurate
-// Computation of Polyhedral Mass Properties", 1996). Here each triangle spans a tetrahedron with a
-// point near the solid: over one with corners 0, p, q, r and D = det(p, q, r),
+// Computation of Polyhedral Mass Properties", 1996). Each triangle spans a tetrahedron with a point
+// near the solid. For corners 0, p, q, r and D = det(p, q, r):
 //   volume D / 6,  first moment D / 24 s,  second D / 120 (p p^T + q q^T + r r^T + s s^T),
-// s = p + q + r: exact polynomials, so the only error is rounding. The point is the middle of the
-// box, lest a body far from its frame's origin lose digits.
+// s = p + q + r. These are exact polynomials, so the only error is rounding. The point is the
+// centre of the AABB, so that a body far from its frame's origin loses no digits.
 #include "scene/model/shapes/mass_properties.hpp"
 
 #include <cmath>
@@ -14,8 +14,8 @@
 namespace enfilade::scene {
 namespace {
 
-/// Less volume than this part of the box' cube is rounding, and no solid.
-constexpr double kFlat = 0x1p-40;
+/// Volumes below this fraction of the AABB's cube are rounding errors, not solids.
+constexpr double kMinRelativeVolume = 0x1p-40;
 
 struct Integrals {
   double volume = 0;
@@ -23,12 +23,12 @@ struct Integrals {
   Mat3 second = Mat3::Zero();
 };
 
-Mat3 outer(const Vec3& v) {
+Mat3 outerProduct(const Vec3& v) {
   return v * v.transpose();
 }
 
 /// sum of m (|x|^2 1 - x x^T) from the sum of m x x^T.
-Mat3 inertiaOf(const Mat3& second) {
+Mat3 computeInertia(const Mat3& second) {
   return second.trace() * Mat3::Identity() - second;
 }
 
@@ -39,7 +39,8 @@ Integrals integrate(std::span<const collision::Triangle> triangles, const Vec3& 
     const double determinant = p.dot(q.cross(r));
     sum.volume += determinant / 6;
     sum.first += determinant / 24 * s;
-    sum.second += determinant / 120 * (outer(p) + outer(q) + outer(r) + outer(s));
+    sum.second +=
+        determinant / 120 * (outerProduct(p) + outerProduct(q) + outerProduct(r) + outerProduct(s));
   }
   return sum;
 }
@@ -52,15 +53,15 @@ void requirePositive(double value, const char* what) {
 
 }  // namespace
 
-MassProperties massOfMesh(std::span<const collision::Triangle> triangles, double density) {
+MassProperties computeMeshMass(std::span<const collision::Triangle> triangles, double density) {
   requirePositive(density, "density");
-  collision::Box box;
-  for (const collision::Triangle& t : triangles) box.include(collision::boxOf(t));
+  collision::Aabb box;
+  for (const collision::Triangle& t : triangles) box.include(collision::computeAabb(t));
   if (box.empty()) throw std::invalid_argument("a body without triangles has no mass");
   const Vec3 origin = box.centre();
   const Integrals sum = integrate(triangles, origin);
   const double size = box.size().maxCoeff();
-  if (!(sum.volume > kFlat * size * size * size))
+  if (!(sum.volume > kMinRelativeVolume * size * size * size))
     throw std::invalid_argument(
         "a body that is flat, open or inside out has no mass: close its mesh, turn its faces "
         "outwards, or give its hull");
@@ -69,20 +70,20 @@ MassProperties massOfMesh(std::span<const collision::Triangle> triangles, double
   result.mass = density * sum.volume;
   const Vec3 centre = sum.first / sum.volume;
   result.centre = origin + centre;
-  result.inertia = density * inertiaOf(sum.second - sum.volume * outer(centre));
+  result.inertia = density * computeInertia(sum.second - sum.volume * outerProduct(centre));
   return result;
 }
 
-MassProperties massOfHull(const collision::Hull& hull, double density) {
+MassProperties computeHullMass(const collision::Hull& hull, double density) {
   std::vector<collision::Triangle> triangles;
   for (const auto& face : hull.faces)
     for (std::size_t i = 1; i + 1 < face.size(); ++i)
       triangles.push_back(
           {hull.vertices[face[0]], hull.vertices[face[i]], hull.vertices[face[i + 1]]});
-  return massOfMesh(triangles, density);
+  return computeMeshMass(triangles, density);
 }
 
-MassProperties together(std::span<const MassProperties> parts) {
+MassProperties combineMassProperties(std::span<const MassProperties> parts) {
   if (parts.empty()) throw std::invalid_argument("a body without parts has no mass");
   MassProperties sum;
   for (const MassProperties& part : parts) {
@@ -92,11 +93,12 @@ MassProperties together(std::span<const MassProperties> parts) {
   }
   sum.centre /= sum.mass;
   for (const MassProperties& part : parts)
-    sum.inertia += part.inertia + part.mass * inertiaOf(outer(part.centre - sum.centre));
+    sum.inertia +=
+        part.inertia + part.mass * computeInertia(outerProduct(part.centre - sum.centre));
   return sum;
 }
 
-MassProperties withMass(MassProperties properties, double mass) {
+MassProperties scaleToMass(MassProperties properties, double mass) {
   requirePositive(mass, "mass");
   properties.inertia *= mass / properties.mass;
   properties.mass = mass;

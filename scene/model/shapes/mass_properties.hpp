@@ -1,4 +1,4 @@
-// Mass, centre and inertia of solids of uniform density, from their surfaces.
+// Mass, centre of mass and inertia of solids of uniform density, from their surfaces.
 #pragma once
 
 #include <span>
@@ -18,18 +18,18 @@ struct MassProperties {
   Mat3 inertia = Mat3::Zero();  ///< about the centre, in the axes of that frame, kg m^2
 };
 
-/// Of a closed mesh whose triangles run anticlockwise seen from outside. `density` in kg / m^3.
-/// Throws std::invalid_argument where that is not > 0 and finite, or the mesh holds no volume
-/// (flat, open on average, or inside out).
-MassProperties massOfMesh(std::span<const collision::Triangle> triangles, double density);
+/// Mass properties of a closed mesh whose triangles are counter-clockwise seen from outside.
+/// `density` in kg / m^3. Throws std::invalid_argument if the density is not > 0 and finite, or if
+/// the mesh encloses no volume (flat, open on average, or inside out).
+MassProperties computeMeshMass(std::span<const collision::Triangle> triangles, double density);
 
-/// The same of a convex hull.
-MassProperties massOfHull(const collision::Hull& hull, double density);
+/// The same for a convex hull.
+MassProperties computeHullMass(const collision::Hull& hull, double density);
 
-/// Of several solids that do not overlap (where they do, what they share counts twice).
-MassProperties together(std::span<const MassProperties> parts);
+/// Sum of several solids that do not overlap (overlapping volume counts twice).
+MassProperties combineMassProperties(std::span<const MassProperties> parts);
 
-/// The same body with another mass (kg, > 0 and finite; std::invalid_argument otherwise).
-MassProperties withMass(MassProperties properties, double mass);
+/// Scales to another mass (kg, > 0 and finite; std::invalid_argument otherwise).
+MassProperties scaleToMass(MassProperties properties, double mass);
 
 }  // namespace enfilade::scene

@@ -1,6 +1,6 @@
-// Steps: weld equal positions; drop triangles without area and repeated ones; sort the edges; join
-// triangles over edges that two of them share; wind each surface as most of its triangles are; ask
-// of each closed surface whether it is convex and which way it looks.
+// Steps: weld equal positions; drop duplicate triangles and those without area; sort the edges;
+// connect triangles over edges that exactly two share; give each surface the winding of most of its
+// triangles; classify each closed surface as convex or not, and as inward or outward.
 #include "scene/model/shapes/shape.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 using Index = std::uint32_t;
 using Corners = std::array<Index, 3>;
 
-/// A triangle's edge: its corners ascending, and which triangle runs along it in which sense.
+/// A triangle's edge: its corners ascending, its triangle, and the direction in that triangle.
 struct EdgeUse {
   Index low, high;
   Index triangle;
@@ -25,26 +25,26 @@ struct EdgeUse {
   auto corners() const { return std::tie(low, high); }
 };
 
-bool before(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+bool isLexicographicallyLess(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
   return std::tie(a.x(), a.y(), a.z()) < std::tie(b.x(), b.y(), b.z());
 }
 
-/// All corners of these meshes as indices into positions that are each stored once, in the order of
-/// their first use; 0 and -0 are one position.
-std::vector<Index> weld(std::span<const Mesh> meshes, std::span<const Index> which,
-                        std::vector<Eigen::Vector3f>& vertices) {
+/// Returns all corners of these meshes as indices into unique positions, in the order of first use;
+/// 0 and -0 are equal.
+std::vector<Index> weldVertices(std::span<const Mesh> meshes, std::span<const Index> meshIndices,
+                                std::vector<Eigen::Vector3f>& vertices) {
   std::vector<Eigen::Vector3f> corners;
-  for (const Index mesh : which)
+  for (const Index mesh : meshIndices)
     for (const Index i : meshes[mesh].indices) corners.push_back(meshes[mesh].positions[i]);
   std::vector<Index> order(corners.size());
   std::iota(order.begin(), order.end(), 0u);
   std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-    if (before(corners[a], corners[b])) return true;
-    return !before(corners[b], corners[a]) && a < b;
+    if (isLexicographicallyLess(corners[a], corners[b])) return true;
+    return !isLexicographicallyLess(corners[b], corners[a]) && a < b;
   });
   std::vector<Index> first(corners.size());  // the first corner at the same position
   for (std::size_t i = 0; i < order.size(); ++i) {
-    const bool same = i > 0 && !before(corners[order[i - 1]], corners[order[i]]);
+    const bool same = i > 0 && !isLexicographicallyLess(corners[order[i - 1]], corners[order[i]]);
     first[order[i]] = same ? first[order[i - 1]] : order[i];
   }
   for (Index i = 0; i < first.size(); ++i) {
@@ -52,32 +52,33 @@ std::vector<Index> weld(std::span<const Mesh> meshes, std::span<const Index> whi
       first[i] = static_cast<Index>(vertices.size());
       vertices.push_back(corners[i]);
     } else {
-      first[i] = first[first[i]];  // its first use was renumbered already
+      first[i] = first[first[i]];  // its first use is already renumbered
     }
   }
   return first;
 }
 
-Corners sorted(Corners corners) {
+Corners sortTriangleCorners(Corners corners) {
   std::sort(corners.begin(), corners.end());
   return corners;
 }
 
-/// Triangles with an area, each set of corners once, in their order.
+/// Triangles with an area and without duplicates, in their order.
 std::vector<Corners> cleanTriangles(const std::vector<Index>& corners, Shape& shape) {
   std::vector<Corners> triangles;
   for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
     const Corners t{corners[i], corners[i + 1], corners[i + 2]};
     const auto& v = shape.vertices;
     const bool repeats = t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
-    if (repeats || !hasArea(v[t[0]], v[t[1]], v[t[2]])) {
+    if (repeats || !hasExactArea(v[t[0]], v[t[1]], v[t[2]])) {
       ++shape.degenerate;
     } else {
       triangles.push_back(t);
     }
   }
   std::vector<std::pair<Corners, Index>> keys;
-  for (Index t = 0; t < triangles.size(); ++t) keys.emplace_back(sorted(triangles[t]), t);
+  for (Index t = 0; t < triangles.size(); ++t)
+    keys.emplace_back(sortTriangleCorners(triangles[t]), t);
   std::sort(keys.begin(), keys.end());
   std::vector<bool> repeated(triangles.size(), false);
   for (std::size_t i = 1; i < keys.size(); ++i) {
@@ -107,23 +108,23 @@ std::vector<EdgeUse> sortedEdges(const std::vector<Corners>& triangles) {
   return edges;
 }
 
-/// What lies across the three edges of a triangle.
+/// Neighbours across the three edges of a triangle.
 struct Neighbours {
   static constexpr Index kNone = 0xffffffff;
-  std::array<Index, 3> beyond{kNone, kNone, kNone};
-  std::array<bool, 3> against{};  ///< that neighbour is wound the other way round
-  bool open = false;              ///< an edge is not shared by two
+  std::array<Index, 3> across{kNone, kNone, kNone};
+  std::array<bool, 3> oppositelyWound{};  ///< that neighbour has the opposite winding
+  bool open = false;                      ///< an edge is not shared by exactly two
 };
 
-int slotOf(const Corners& t, const EdgeUse& edge) {
+int findEdgeSlot(const Corners& t, const EdgeUse& edge) {
   for (int k = 0; k < 3; ++k) {
     const Index from = t[k], to = t[(k + 1) % 3];
     if (std::min(from, to) == edge.low && std::max(from, to) == edge.high) return k;
   }
-  return 0;  // not reached: the edge is one of the triangle's
+  return 0;  // unreachable: the edge belongs to the triangle
 }
 
-std::vector<Neighbours> link(const std::vector<Corners>& triangles, Shape& shape) {
+std::vector<Neighbours> linkNeighbours(const std::vector<Corners>& triangles, Shape& shape) {
   std::vector<Neighbours> links(triangles.size());
   const std::vector<EdgeUse> edges = sortedEdges(triangles);
   for (auto first = edges.begin(); first != edges.end();) {
@@ -131,12 +132,14 @@ std::vector<Neighbours> link(const std::vector<Corners>& triangles, Shape& shape
         first, edges.end(), [&](const EdgeUse& e) { return e.corners() != first->corners(); });
     if (last - first == 2) {
       const EdgeUse &a = *first, &b = *(first + 1);
-      const int ka = slotOf(triangles[a.triangle], a), kb = slotOf(triangles[b.triangle], b);
-      links[a.triangle].beyond[ka] = b.triangle;
-      links[b.triangle].beyond[kb] = a.triangle;
-      links[a.triangle].against[ka] = links[b.triangle].against[kb] = a.forward == b.forward;
+      const int ka = findEdgeSlot(triangles[a.triangle], a),
+                kb = findEdgeSlot(triangles[b.triangle], b);
+      links[a.triangle].across[ka] = b.triangle;
+      links[b.triangle].across[kb] = a.triangle;
+      links[a.triangle].oppositelyWound[ka] = links[b.triangle].oppositelyWound[kb] =
+          a.forward == b.forward;
     } else {
-      ++(last - first == 1 ? shape.boundaryEdges : shape.crowdedEdges);
+      ++(last - first == 1 ? shape.boundaryEdges : shape.nonManifoldEdges);
       for (auto edge = first; edge != last; ++edge) links[edge->triangle].open = true;
     }
     first = last;
@@ -144,17 +147,17 @@ std::vector<Neighbours> link(const std::vector<Corners>& triangles, Shape& shape
   return links;
 }
 
-/// Takes the triangles connected with `seed` in the order of their finding and turns them to the
-/// sense of most of them.
-class SurfaceWalk {
+/// Traverses the triangles connected with `seed` breadth first, and gives them the winding of most
+/// of them.
+class SurfaceTraversal {
  public:
-  SurfaceWalk(std::vector<Corners>& triangles, const std::vector<Neighbours>& links)
+  SurfaceTraversal(std::vector<Corners>& triangles, const std::vector<Neighbours>& links)
       : triangles_(triangles), links_(links), sense_(triangles.size(), 0) {}
 
-  bool taken(Index triangle) const { return sense_[triangle] != 0; }
+  bool isVisited(Index triangle) const { return sense_[triangle] != 0; }
 
   /// Appends the surface's triangles to `shape`.
-  void take(Index seed, Shape& shape) {
+  void traverse(Index seed, Shape& shape) {
     found_.assign(1, seed);
     sense_[seed] = 1;
     bool open = false;
@@ -168,31 +171,31 @@ class SurfaceWalk {
     shell.kind = open ? Shell::Kind::open : Shell::Kind::closed;
     shell.first = static_cast<Index>(shape.triangles.size());
     shell.count = static_cast<Index>(found_.size());
-    windAlike(shape);
+    unifyWinding(shape);
     shape.shells.push_back(shell);
   }
 
  private:
-  /// False where a triangle is reached in both senses: the surface has but one side.
+  /// False if a triangle is reached with both windings: the surface is one-sided.
   bool visit(const Neighbours& link, std::size_t k, signed char sense) {
-    const Index next = link.beyond[k];
+    const Index next = link.across[k];
     if (next == Neighbours::kNone) return true;
-    const auto wanted = static_cast<signed char>(link.against[k] ? -sense : sense);
+    const auto wanted = static_cast<signed char>(link.oppositelyWound[k] ? -sense : sense);
     if (sense_[next] != 0) return sense_[next] == wanted;
     sense_[next] = wanted;
     found_.push_back(next);
     return true;
   }
 
-  void windAlike(Shape& shape) {
-    const auto against =
+  void unifyWinding(Shape& shape) {
+    const auto reversedCount =
         std::count_if(found_.begin(), found_.end(), [&](Index t) { return sense_[t] < 0; });
-    const bool most = 2 * static_cast<std::size_t>(against) > found_.size();
+    const bool isMostlyReversed = 2 * static_cast<std::size_t>(reversedCount) > found_.size();
     for (const Index t : found_) {
       Corners corners = triangles_[t];
-      if ((sense_[t] < 0) != most) {
+      if ((sense_[t] < 0) != isMostlyReversed) {
         std::swap(corners[1], corners[2]);
-        ++shape.rewound;
+        ++shape.flippedTriangles;
       }
       shape.triangles.push_back(corners);
     }
@@ -200,12 +203,12 @@ class SurfaceWalk {
 
   std::vector<Corners>& triangles_;
   const std::vector<Neighbours>& links_;
-  std::vector<signed char> sense_;  // 0: not taken; 1: as the seed; -1: against it
+  std::vector<signed char> sense_;  // 0: not visited; 1: as the seed; -1: opposite
   std::vector<Index> found_;
 };
 
-/// Vertices that no triangle uses go.
-void keepUsedVertices(Shape& shape) {
+/// Removes vertices that no triangle uses.
+void removeUnusedVertices(Shape& shape) {
   constexpr Index kUnused = 0xffffffff;
   std::vector<Index> number(shape.vertices.size(), kUnused);
   std::vector<Eigen::Vector3f> kept;
@@ -222,36 +225,36 @@ void keepUsedVertices(Shape& shape) {
   shape.vertices = std::move(kept);
 }
 
-Box boxOf(const Shape& shape, const Shell& shell) {
-  Box box;
+Aabb computeShellAabb(const Shape& shape, const Shell& shell) {
+  Aabb box;
   for (Index t = shell.first; t < shell.first + shell.count; ++t) {
     for (const Index v : shape.triangles[t]) box.include(shape.vertices[v].cast<double>());
   }
   return box;
 }
 
-/// A solid with a cavity is not what its outer surface bounds.
+/// Marks surfaces with a cavity: such a solid is not the one that its outer surface bounds.
 void findCavities(Shape& shape) {
-  std::vector<Box> inwardBoxes;
+  std::vector<Aabb> inwardBoxes;
   for (const Shell& s : shape.shells) {
-    if (s.bounds() && s.inward) inwardBoxes.push_back(boxOf(shape, s));
+    if (s.bounds() && s.inward) inwardBoxes.push_back(computeShellAabb(shape, s));
   }
   if (inwardBoxes.empty()) return;
   for (Shell& s : shape.shells) {
     if (!s.bounds() || s.inward) continue;
-    const Box box = boxOf(shape, s);
+    const Aabb box = computeShellAabb(shape, s);
     s.hollow = std::any_of(inwardBoxes.begin(), inwardBoxes.end(),
-                           [&](const Box& inner) { return overlaps(inner, box); });
+                           [&](const Aabb& inner) { return overlaps(inner, box); });
   }
 }
 
 }  // namespace
 
-bool hasArea(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c) {
+bool hasExactArea(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c) {
   return !collision::collinear(a.cast<double>(), b.cast<double>(), c.cast<double>());
 }
 
-std::vector<Index> verticesOf(const Shape& shape, std::span<const Shell> shells) {
+std::vector<Index> collectVertices(const Shape& shape, std::span<const Shell> shells) {
   std::vector<Index> vertices;
   for (const Shell& shell : shells)
     for (Index t = shell.first; t < shell.first + shell.count; ++t)
@@ -261,24 +264,24 @@ std::vector<Index> verticesOf(const Shape& shape, std::span<const Shell> shells)
   return vertices;
 }
 
-Shape shapeOf(std::span<const Mesh> meshes, std::span<const Index> which) {
+Shape buildShape(std::span<const Mesh> meshes, std::span<const Index> meshIndices) {
   Shape shape;
-  const std::vector<Index> corners = weld(meshes, which, shape.vertices);
+  const std::vector<Index> corners = weldVertices(meshes, meshIndices, shape.vertices);
   std::vector<Corners> triangles = cleanTriangles(corners, shape);
-  const std::vector<Neighbours> links = link(triangles, shape);
+  const std::vector<Neighbours> links = linkNeighbours(triangles, shape);
   shape.triangles.reserve(triangles.size());
-  SurfaceWalk walk(triangles, links);
+  SurfaceTraversal traversal(triangles, links);
   for (Index t = 0; t < triangles.size(); ++t) {
-    if (!walk.taken(t)) walk.take(t, shape);
+    if (!traversal.isVisited(t)) traversal.traverse(t, shape);
   }
-  keepUsedVertices(shape);
+  removeUnusedVertices(shape);
   for (Shell& shell : shape.shells) {
     if (!shell.bounds()) continue;
-    const ConvexityVerdict verdict = judgeConvexity(
+    const ConvexityResult verdict = classifyConvexity(
         shape.vertices, std::span(shape.triangles).subspan(shell.first, shell.count));
     shell.kind = verdict.kind;
     shell.inward = verdict.inward;
-    if (verdict.untried) ++shape.untried;
+    if (verdict.notTested) ++shape.notTested;
   }
   findCavities(shape);
   return shape;

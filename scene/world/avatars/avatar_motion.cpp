@@ -1,267 +1,277 @@
-// How an avatar moves in one tick: collide and slide (up to kSlides planes), steps up to
-// Lengths::stepHeight, follows the ground down by as much, falls otherwise. Every piece of the way
-// is swept, so that nothing is crossed at any speed, and each ends epsilon away from what stopped
-// it. No move leaves the box that the avatar announced to the broad phase: a slide that would, as
-// after a fast fall onto a steep roof, goes on in the next tick. Sliding is a declared policy
-// (Lengths::sliding): what is left of a move after a stop goes on along the plane, or is not made.
-// Who flies is swept in all directions and feels neither ground nor gravity.
+// Motion of an avatar in one tick: a character controller with collide and slide.
+//  - On the ground it slides along up to kMaxSlidePlanes planes, steps up or down by at most
+//    WorldSettings::stepHeight, and otherwise falls.
+//  - Each segment of the motion is a shape cast, so that no obstacle is crossed at any speed. It
+//    ends one contact offset before the obstacle.
+//  - The motion stays inside the motion bounds in the broad phase. A slide that would leave them,
+//    as after a fast fall onto a steep roof, continues in the next tick.
+//  - WorldSettings::sliding decides whether the displacement after a hit slides or is discarded.
+//  - A flying avatar moves in all directions, without ground or gravity.
+#include "scene/world/avatars/avatar_motion.hpp"
+
 #include <algorithm>
 #include <cmath>
 
-#include "scene/world/data/world_data.hpp"
+#include "scene/world/avatars/joint_motion.hpp"
+#include "scene/world/contacts/obstacles.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr int kSlides = 5;            // planes met in one move: a corner of three and two to spare
-constexpr double kNoMove = 1e-9;      // of epsilon: what is left of a move below this is not made
-constexpr double kTread = 0.05;       // metres: what is less deep, as a skirting board, is no step
-constexpr double kWorthAStep = 1e-3;  // of the wish: a step must win at least this much ground
+constexpr int kMaxSlidePlanes = 5;  // planes hit in one move: a corner of three, and two more
+constexpr double kMinMoveFraction = 1e-9;  // of the contact offset: shorter remainders are dropped
+constexpr double kMinStepDepth =
+    0.05;                              // metres: a shallower ledge, as a skirting board, is no step
+constexpr double kMinStepGain = 1e-3;  // of the desired length: minimum gain of a step
 
-/// One avatar's motion through one tick.
-struct Mover {
-  const Lengths& lengths;
+/// The motion of one avatar in one tick.
+struct AvatarMover {
+  const WorldSettings& settings;
   Avatar& avatar;
   QueryCount& count;
-  Vec3 feet;
-  Box feetRoom;  ///< the feet stay in here, so that the body stays inside Avatar::reach
+  Vec3 footPosition;
+  Aabb allowedFootBounds;  ///< keeps the avatar inside Avatar::motionBounds
 
-  collision::StoppingBand band() const { return bandOf(lengths); }
-  bool walkable(const Vec3& normal) const { return normal.y() >= lengths.walkableNormalY; }
+  collision::ContactOffset contactOffset() const { return makeContactOffset(settings); }
+  bool isWalkable(const Vec3& normal) const { return normal.y() >= settings.walkableNormalY; }
 };
 
 struct SlideResult {
-  Stop steep;           ///< the first thing met that cannot be walked on, if any
-  EntityId ground = 0;  ///< the last thing met that can
+  ShapeCastHit blockingHit;  ///< first hit on a non-walkable surface, if any
+  EntityId ground = 0;       ///< last entity hit with a walkable surface
 };
 
-Stop sweepFrom(Mover& m, const Vec3& displacement) {
-  const double part = partInside(m.feetRoom, m.feet, displacement);
-  const Vec3 granted = part * displacement;
-  Stop stop = sweepShape(*m.avatar.shape, m.feet, granted, m.avatar.obstacles, m.band(), m.count);
-  m.feet += stop.fraction * granted;
-  stop.fraction *= part;
-  return stop;
+ShapeCastHit castFrom(AvatarMover& m, const Vec3& displacement) {
+  const double allowedFraction =
+      computeClipFraction(m.allowedFootBounds, m.footPosition, displacement);
+  const Vec3 allowed = allowedFraction * displacement;
+  ShapeCastHit hit = castAvatarShape(*m.avatar.shape, m.footPosition, allowed, m.avatar.obstacles,
+                                     m.contactOffset(), m.count);
+  m.footPosition += hit.fraction * allowed;
+  hit.fraction *= allowedFraction;
+  return hit;
 }
 
-/// `wish` with all parts into the planes removed: along one plane if that suits all others, else
-/// along the crease of two, else nothing.
-Vec3 alongPlanes(const Vec3& wish, const std::vector<Vec3>& normals) {
-  const auto suitsAll = [&](const Vec3& move) {
+/// Projects `desired` so that it enters no plane: onto one plane if the result suits all others,
+/// else onto the crease of two planes, else zero.
+Vec3 projectOntoPlanes(const Vec3& desired, const std::vector<Vec3>& normals) {
+  const auto isAllowed = [&](const Vec3& move) {
     for (const Vec3& n : normals)
-      if (move.dot(n) < -1e-12 * wish.norm()) return false;
+      if (move.dot(n) < -1e-12 * desired.norm()) return false;
     return true;
   };
   for (std::size_t i = normals.size(); i-- > 0;) {
-    const Vec3 move = wish - std::min(0.0, wish.dot(normals[i])) * normals[i];
-    if (suitsAll(move)) return move;
+    const Vec3 move = desired - std::min(0.0, desired.dot(normals[i])) * normals[i];
+    if (isAllowed(move)) return move;
   }
   for (std::size_t i = normals.size(); i-- > 0;) {
     for (std::size_t j = i; j-- > 0;) {
       const Vec3 crease = normals[i].cross(normals[j]);
       const double squared = crease.squaredNorm();
       if (!(squared > 1e-12)) continue;
-      const Vec3 move = (wish.dot(crease) / squared) * crease;
-      if (suitsAll(move)) return move;
+      const Vec3 move = (desired.dot(crease) / squared) * crease;
+      if (isAllowed(move)) return move;
     }
   }
   return Vec3::Zero();
 }
 
-/// A walker does not climb what is steep nor duck under what leans over it: such planes act as
-/// upright walls.
-Vec3 planeForWalking(const Mover& m, const Vec3& normal) {
-  if (m.walkable(normal)) return normal;
+/// Plane that a walking avatar collides with. Non-walkable and overhanging surfaces act as vertical
+/// walls, so that it does not climb or duck.
+Vec3 makeWalkingPlane(const AvatarMover& m, const Vec3& normal) {
+  if (m.isWalkable(normal)) return normal;
   const Vec3 upright{normal.x(), 0, normal.z()};
   const double length = upright.norm();
   return length > 1e-6 ? Vec3(upright / length) : normal;
 }
 
-/// How a move goes on after a stop.
-enum class Manner : std::uint8_t {
-  walk,  ///< up slopes that can be walked on; what is steep acts as an upright wall
-  drop,  ///< straight down to the first thing that can be stood on, sliding off what is steep
-  fall,  ///< as drop, but what is left of the move across the ground is still made
-  fly    ///< nothing is ground
+/// Response of a move to a hit.
+enum class MoveMode : std::uint8_t {
+  walk,  ///< up walkable slopes; non-walkable surfaces act as vertical walls
+  drop,  ///< straight down to a walkable surface, sliding off others
+  fall,  ///< as drop, but the horizontal remainder continues
+  fly    ///< no surface counts as ground
 };
 
-/// What is left of a move after it met a plane that can be stood on.
-Vec3 afterGround(const Vec3& rest, Manner manner) {
-  switch (manner) {
-    case Manner::walk:
-      return rest;
-    case Manner::drop:
+/// Remaining displacement after a hit on a walkable plane.
+Vec3 clipOnGround(const Vec3& remainder, MoveMode mode) {
+  switch (mode) {
+    case MoveMode::walk:
+      return remainder;
+    case MoveMode::drop:
       return Vec3::Zero();
     default:
-      return {rest.x(), 0, rest.z()};
+      return {remainder.x(), 0, remainder.z()};
   }
 }
 
-/// What is left of a move after it met a plane that cannot: gravity goes on whatever the policy.
-Vec3 afterSteep(const Vec3& rest, Manner manner, Sliding sliding) {
-  if (sliding == Sliding::slide || manner == Manner::drop) return rest;
-  return manner == Manner::fall ? Vec3(0, std::min(0.0, rest.y()), 0) : Vec3(Vec3::Zero());
+/// Remaining displacement after a hit on a non-walkable plane. A fall continues under any policy.
+Vec3 clipOnNonWalkable(const Vec3& remainder, MoveMode mode, Sliding sliding) {
+  if (sliding == Sliding::slide || mode == MoveMode::drop) return remainder;
+  return mode == MoveMode::fall ? Vec3(0, std::min(0.0, remainder.y()), 0) : Vec3(Vec3::Zero());
 }
 
-/// Moves by `wish`, sliding along what is met. What is left of the wish itself is put along the
-/// planes, not what an earlier plane made of it: that may point against the wish, and who stands in
-/// a notch would go to and fro in it for ever.
-SlideResult slide(Mover& m, const Vec3& wish, Manner manner) {
+/// Collide and slide by `desired`. Projects the remaining *desired* displacement onto the planes,
+/// not the clipped one; otherwise an avatar in a notch oscillates.
+SlideResult collideAndSlide(AvatarMover& m, const Vec3& desired, MoveMode mode) {
   SlideResult result;
   std::vector<Vec3> planes;
-  const double enough = kNoMove * m.lengths.epsilon;
-  Vec3 rest = wish, move = wish;
-  for (int i = 0; i < kSlides && move.norm() > enough; ++i) {
-    const Stop stop = sweepFrom(m, move);
-    if (stop.entity == 0) break;
-    rest *= 1 - stop.fraction;
-    if (manner != Manner::fly && m.walkable(stop.normal)) {
-      result.ground = stop.entity;
-      rest = afterGround(rest, manner);
+  const double minMove = kMinMoveFraction * m.settings.contactOffset;
+  Vec3 remainder = desired, move = desired;
+  for (int i = 0; i < kMaxSlidePlanes && move.norm() > minMove; ++i) {
+    const ShapeCastHit hit = castFrom(m, move);
+    if (hit.entity == 0) break;
+    remainder *= 1 - hit.fraction;
+    if (mode != MoveMode::fly && m.isWalkable(hit.normal)) {
+      result.ground = hit.entity;
+      remainder = clipOnGround(remainder, mode);
     } else {
-      if (result.steep.entity == 0) result.steep = stop;
-      rest = afterSteep(rest, manner, m.lengths.sliding);
+      if (result.blockingHit.entity == 0) result.blockingHit = hit;
+      remainder = clipOnNonWalkable(remainder, mode, m.settings.sliding);
     }
-    planes.push_back(manner == Manner::walk ? planeForWalking(m, stop.normal) : stop.normal);
-    move = alongPlanes(rest, planes);
-    // Back out to epsilon where grazing moves came nearer.
-    move += std::max(0.0, m.lengths.epsilon - stop.distance) * planes.back();
+    planes.push_back(mode == MoveMode::walk ? makeWalkingPlane(m, hit.normal) : hit.normal);
+    move = projectOntoPlanes(remainder, planes);
+    // Restore the contact offset where grazing moves came closer.
+    move += std::max(0.0, m.settings.contactOffset - hit.distance) * planes.back();
   }
   return result;
 }
 
-/// Lets the feet down by at most `depth` onto something walkable and returns that; 0 (and unmoved)
-/// if there is nothing such.
-EntityId settle(Mover& m, double depth) {
-  const Vec3 before = m.feet;
-  const EntityId ground = slide(m, {0, -depth, 0}, Manner::drop).ground;
-  if (ground == 0) m.feet = before;
+/// Moves down by at most `depth` onto a walkable surface and returns its entity. Returns 0 and does
+/// not move without one.
+EntityId snapToGround(AvatarMover& m, double depth) {
+  const Vec3 before = m.footPosition;
+  const EntityId ground = collideAndSlide(m, {0, -depth, 0}, MoveMode::drop).ground;
+  if (ground == 0) m.footPosition = before;
   return ground;
 }
 
-double progress(const Vec3& from, const Vec3& to, const Vec3& direction) {
+double computeProgress(const Vec3& from, const Vec3& to, const Vec3& direction) {
   return (to - from).dot(direction);
 }
 
-/// Whether the way goes on for at least half a tread beyond `gained`; the feet stay.
-bool hasTread(Mover& m, const Vec3& direction, double gained) {
-  const Vec3 before = m.feet;
-  slide(m, (gained + kTread) * direction, Manner::walk);
-  const double room = progress(before, m.feet, direction);
-  m.feet = before;
-  return room > gained + 0.5 * kTread;
+/// True if a walk can continue by half of kMinStepDepth beyond `gained`. Restores the feet.
+bool hasStepDepth(AvatarMover& m, const Vec3& direction, double gained) {
+  const Vec3 before = m.footPosition;
+  collideAndSlide(m, (gained + kMinStepDepth) * direction, MoveMode::walk);
+  const double progress = computeProgress(before, m.footPosition, direction);
+  m.footPosition = before;
+  return progress > gained + 0.5 * kMinStepDepth;
 }
 
-/// How high the feet go for a step: the rest of it a prism glides up its bevel.
-double liftOf(const Mover& m) {
+/// Height to lift the feet for a step, metres. A prism slides up the rest of the step on its bevel.
+double computeStepLift(const AvatarMover& m) {
   const Avatar& avatar = m.avatar;
-  const bool isPrism = avatar.standing > 0;
-  return m.lengths.stepHeight - (isPrism ? bevelOf(avatar.radius, avatar.standing, m.lengths) : 0);
+  const bool isPrism = avatar.spawnHeight > 0;
+  return m.settings.stepHeight -
+         (isPrism ? computeBevelHeight(avatar.radius, avatar.spawnHeight, m.settings) : 0);
 }
 
-/// Tries the wish one step higher; true if that wins ground and ends on something walkable.
-bool stepUp(Mover& m, const Vec3& start, const Vec3& wish, double toBeat) {
-  const Vec3 low = m.feet;
-  m.feet = start;
-  sweepFrom(m, {0, liftOf(m), 0});
-  const double raised = m.feet.y() - start.y();
-  const double length = wish.norm();
-  if (hasTread(m, wish / length, toBeat)) {
-    slide(m, wish, Manner::walk);
-    if (settle(m, raised + m.lengths.epsilon) != 0 &&
-        progress(start, m.feet, wish / length) > toBeat + kWorthAStep * length)
+/// Tries the move one step higher. Returns true if it gains distance and ends on a walkable
+/// surface; otherwise restores the feet.
+bool tryStepUp(AvatarMover& m, const Vec3& start, const Vec3& desired, double minProgress) {
+  const Vec3 low = m.footPosition;
+  m.footPosition = start;
+  castFrom(m, {0, computeStepLift(m), 0});
+  const double raised = m.footPosition.y() - start.y();
+  const double length = desired.norm();
+  if (hasStepDepth(m, desired / length, minProgress)) {
+    collideAndSlide(m, desired, MoveMode::walk);
+    if (snapToGround(m, raised + m.settings.contactOffset) != 0 &&
+        computeProgress(start, m.footPosition, desired / length) >
+            minProgress + kMinStepGain * length)
       return true;
   }
-  m.feet = low;
+  m.footPosition = low;
   return false;
 }
 
-void stoppedBy(Avatar& avatar, const Stop& stop) {
-  avatar.stoppedBy = stop.entity;
-  avatar.atStop = stop.atStop;
+void recordBlockingHit(Avatar& avatar, const ShapeCastHit& hit) {
+  avatar.blockedBy = hit.entity;
+  avatar.blockingHit = hit.separation;
 }
 
-void standOn(Avatar& avatar, EntityId ground) {
-  avatar.standsOn = ground;
+void setGround(Avatar& avatar, EntityId ground) {
+  avatar.groundEntity = ground;
   avatar.grounded = ground != 0;
 }
 
-void walkOnGround(Mover& m, const Vec3& wish) {
-  const Vec3 start = m.feet;
-  const double length = wish.norm();
-  Stop steep;
+void moveOnGround(AvatarMover& m, const Vec3& desired) {
+  const Vec3 start = m.footPosition;
+  const double length = desired.norm();
+  ShapeCastHit blockingHit;
   if (length > 0) {
-    steep = slide(m, wish, Manner::walk).steep;
-    const double gained = progress(start, m.feet, wish / length);
-    if (steep.entity != 0 && stepUp(m, start, wish, gained)) steep = {};
+    blockingHit = collideAndSlide(m, desired, MoveMode::walk).blockingHit;
+    const double progress = computeProgress(start, m.footPosition, desired / length);
+    if (blockingHit.entity != 0 && tryStepUp(m, start, desired, progress)) blockingHit = {};
   }
-  standOn(m.avatar, settle(m, m.lengths.stepHeight));
+  setGround(m.avatar, snapToGround(m, m.settings.stepHeight));
   m.avatar.fallSpeed = 0;
-  stoppedBy(m.avatar, steep);
+  recordBlockingHit(m.avatar, blockingHit);
 }
 
-/// The speed of a fall after a tick that asked for `asked` metres downwards and got `made`: what
-/// holds up a fall, or meets the head of one who rises, takes its speed.
-double speedAfter(double speed, double asked, double made, double tick) {
-  constexpr double kHeldUp = 0.99;  // of the way: less than that is not the rounding of a slide
-  const bool heldUp = asked > 0 ? made < kHeldUp * asked : made > kHeldUp * asked;
-  if (!heldUp) return speed;
-  return speed > 0 ? std::min(speed, std::max(0.0, made / tick)) : 0;
+/// Fall speed after a tick with `requested` and `actual` downward displacement, metres. An obstacle
+/// below a falling avatar, or above a rising one, reduces it.
+double computeFallSpeed(double speed, double requested, double actual, double tick) {
+  constexpr double kMinFallFraction = 0.99;  // of the displacement: less is more than rounding
+  const bool isBlocked =
+      requested > 0 ? actual < kMinFallFraction * requested : actual > kMinFallFraction * requested;
+  if (!isBlocked) return speed;
+  return speed > 0 ? std::min(speed, std::max(0.0, actual / tick)) : 0;
 }
 
-/// Falls, or rises after a jump: exactly on the parabola, tick by tick.
-void fall(Mover& m, const Vec3& wish) {
-  const Lengths& l = m.lengths;
+/// Falls, or rises after a jump: each tick ends exactly on the parabola.
+void moveFalling(AvatarMover& m, const Vec3& desired) {
+  const WorldSettings& settings = m.settings;
   const double before = m.avatar.fallSpeed;
-  const double after = std::min(before + l.gravity * l.tick, l.speedLimit);
-  const double down = 0.5 * (before + after) * l.tick;
-  const double height = m.feet.y();
-  const SlideResult met = slide(m, wish - Vec3(0, down, 0), Manner::fall);
-  stoppedBy(m.avatar, met.steep);
-  standOn(m.avatar, met.ground);
-  const double made = height - m.feet.y();
-  m.avatar.fallSpeed = m.avatar.grounded ? 0 : speedAfter(after, down, made, l.tick);
+  const double after =
+      std::min(before + settings.gravity * settings.tickDuration, settings.maxSpeed);
+  const double down = 0.5 * (before + after) * settings.tickDuration;
+  const double height = m.footPosition.y();
+  const SlideResult result = collideAndSlide(m, desired - Vec3(0, down, 0), MoveMode::fall);
+  recordBlockingHit(m.avatar, result.blockingHit);
+  setGround(m.avatar, result.ground);
+  const double actual = height - m.footPosition.y();
+  m.avatar.fallSpeed =
+      m.avatar.grounded ? 0 : computeFallSpeed(after, down, actual, settings.tickDuration);
 }
 
-void fly(Mover& m, const Vec3& wish) {
+void moveFlying(AvatarMover& m, const Vec3& desired) {
   m.avatar.fallSpeed = 0;
-  standOn(m.avatar, 0);
-  stoppedBy(m.avatar, slide(m, wish, Manner::fly).steep);
+  setGround(m.avatar, 0);
+  recordBlockingHit(m.avatar, collideAndSlide(m, desired, MoveMode::fly).blockingHit);
 }
 
 }  // namespace
 
-Box feetRoomOf(const Lengths& lengths, const Avatar& avatar) {
-  return feetRoomIn(avatar.reach, avatar.shape->box,
-                    lookoutOf(lengths) + chainReach(avatar.chain, lengths.tick));
+Aabb computeMotionBounds(const WorldSettings& settings, const Avatar& avatar) {
+  const double across = avatar.desiredVelocity.norm() * settings.tickDuration + kMinStepDepth +
+                        computeMaxChainDisplacement(avatar.chain, settings.tickDuration);
+  const double down = (std::abs(avatar.fallSpeed) + settings.gravity * settings.tickDuration) *
+                      settings.tickDuration;
+  // Room for restoring the contact offset, and for the search of contacts and near misses.
+  const double margin = 8 * settings.contactOffset + settings.nearMissDistance;
+  Aabb box = placeBox(avatar.shape->box, avatar.footPosition);
+  box.min -= Vec3(across, across + std::max(settings.stepHeight, down), across);
+  box.max += Vec3(across, across + std::max(settings.stepHeight, down), across);
+  return inflated(box, margin);
 }
 
-Box reachOf(const WorldState& world, const Avatar& avatar, const Vec3& velocity) {
-  const Lengths& l = world.lengths;
-  const double across = velocity.norm() * l.tick + kTread + chainReach(avatar.chain, l.tick);
-  const double down = (std::abs(avatar.fallSpeed) + l.gravity * l.tick) * l.tick;
-  // Slides back out by epsilon, contacts and near misses look a little further.
-  const double margin = 8 * l.epsilon + l.nearMiss;
-  Box box = boxAt(avatar.shape->box, avatar.feet);
-  box.min -= Vec3(across, across + std::max(l.stepHeight, down), across);
-  box.max += Vec3(across, across + std::max(l.stepHeight, down), across);
-  return grown(box, margin);
-}
-
-void moveAvatar(WorldState& world, Avatar& avatar, const Vec3& velocity, QueryCount& count) {
-  Mover m{world.lengths, avatar, count, avatar.feet, feetRoomOf(world.lengths, avatar)};
-  const Vec3 wish = velocity * world.lengths.tick;
+void moveAvatar(WorldData& world, Avatar& avatar, QueryCount& count) {
+  AvatarMover m{world.settings, avatar, count, avatar.footPosition,
+                computeAvatarFootBounds(world.settings, avatar)};
+  const Vec3 desired = avatar.desiredVelocity * world.settings.tickDuration;
   if (avatar.flying) {
-    fly(m, wish);
+    moveFlying(m, desired);
   } else if (avatar.grounded) {
-    walkOnGround(m, wish);
+    moveOnGround(m, desired);
   } else {
-    fall(m, wish);
+    moveFalling(m, desired);
   }
-  avatar.asked = wish;
-  avatar.lastMove = m.feet - avatar.feet;
-  avatar.feet = m.feet;
-  avatar.stirred = false;
+  avatar.requestedDisplacement = desired;
+  avatar.lastDisplacement = m.footPosition - avatar.footPosition;
+  avatar.footPosition = m.footPosition;
+  avatar.dirty = false;
   if (avatar.chain.speed > 0) moveJoints(world, avatar, count);
 }
 

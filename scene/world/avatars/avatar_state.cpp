@@ -1,19 +1,18 @@
-// What the state hash and the snapshot take of an avatar.
-#include "scene/world/data/world_data.hpp"
+#include "scene/world/avatars/avatar_state.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-/// What most avatars do not have costs one word.
-void hashWhatIsRare(const Avatar& avatar, Hasher& hash) {
-  const bool crouches = avatar.height != avatar.standing;
+/// Hashes optional state: one word of flags, and the values that are in use.
+void hashOptionalState(const Avatar& avatar, Hasher& hash) {
+  const bool isCrouching = avatar.height != avatar.spawnHeight;
   hash.add(std::uint64_t{avatar.grounded} | std::uint64_t{avatar.flying} << 1 |
-           std::uint64_t{avatar.jumping} << 2 | std::uint64_t{avatar.blockedTold} << 3 |
-           std::uint64_t{crouches} << 4 | std::uint64_t{!avatar.chain.links.empty()} << 5);
-  if (crouches) hash.add(avatar.height);
+           std::uint64_t{avatar.jumping} << 2 | std::uint64_t{avatar.blockedReported} << 3 |
+           std::uint64_t{isCrouching} << 4 | std::uint64_t{!avatar.chain.links.empty()} << 5);
+  if (isCrouching) hash.add(avatar.height);
   if (avatar.chain.links.empty()) return;
   hash.add(avatar.chain.speed);
-  hash.add(avatar.chain.patienceLeft);
+  hash.add(avatar.chain.timeoutLeft);
   for (const ChainLink& link : avatar.chain.links) {
     hash.add(link.value);
     hash.add(link.target);
@@ -24,38 +23,39 @@ void hashWhatIsRare(const Avatar& avatar, Hasher& hash) {
 
 void hashAvatar(const Avatar& avatar, Hasher& hash) {
   hash.add(std::uint64_t{avatar.id});
-  hash.add(avatar.feet);
-  hash.add(avatar.gaze);
+  hash.add(avatar.footPosition);
+  hash.add(avatar.viewDirection);
   hash.add(avatar.fallSpeed);
-  hash.add(std::uint64_t{avatar.standsOn});
-  hash.add(avatar.drive);
-  hash.add(std::uint64_t{avatar.walk.leg});
-  hash.add(avatar.walk.nearest);
-  hash.add(avatar.walk.patienceLeft);
-  hash.add(avatar.waitLeft);
-  hash.add(avatar.hangsFor);
-  hashWhatIsRare(avatar, hash);
+  hash.add(std::uint64_t{avatar.groundEntity});
+  hash.add(avatar.driveVelocity);
+  hash.add(std::uint64_t{avatar.walk.waypointIndex});
+  hash.add(avatar.walk.minDistance);
+  hash.add(avatar.walk.timeoutLeft);
+  hash.add(avatar.waitTimeLeft);
+  hash.add(avatar.stalledInAirTime);
+  hashOptionalState(avatar, hash);
   for (const Contact& contact : avatar.contacts)
     hash.add((std::uint64_t{contact.other} << 1) | std::uint64_t{contact.touching});
 }
 
-AvatarView viewOf(const std::string& name, const Avatar& avatar) {
-  AvatarView view;
-  view.id = avatar.id;
-  view.name = name;
-  view.feet = avatar.feet;
-  view.gaze = avatar.gaze;
-  view.eyeHeight = avatar.eyeHeight;
-  view.grounded = avatar.grounded;
-  view.shape = avatar.shape;
-  view.flying = avatar.flying;
-  view.standsOn = avatar.standsOn;
-  view.height = avatar.height;
-  view.standing = avatar.standing;
-  view.move = {avatar.asked, avatar.lastMove, avatar.stoppedBy, avatar.atStop};
+AvatarSnapshot makeAvatarSnapshot(const Avatar& avatar) {
+  AvatarSnapshot snapshot;
+  snapshot.id = avatar.id;
+  snapshot.name = avatar.name;
+  snapshot.footPosition = avatar.footPosition;
+  snapshot.viewDirection = avatar.viewDirection;
+  snapshot.eyeHeight = avatar.eyeHeight;
+  snapshot.grounded = avatar.grounded;
+  snapshot.shape = avatar.shape;
+  snapshot.flying = avatar.flying;
+  snapshot.groundEntity = avatar.groundEntity;
+  snapshot.height = avatar.height;
+  snapshot.spawnHeight = avatar.spawnHeight;
+  snapshot.move = {avatar.requestedDisplacement, avatar.lastDisplacement, avatar.blockedBy,
+                   avatar.blockingHit};
   for (const ChainLink& link : avatar.chain.links)
-    view.joints.push_back({link.value, link.stoppedBy, leverOf(link)});
-  return view;
+    snapshot.joints.push_back({link.value, link.blockedBy, computeLeverArm(link)});
+  return snapshot;
 }
 
 }  // namespace enfilade::scene

@@ -1,196 +1,195 @@
-// Jumping, flying, crouching and driving joints: how these orders start, go on and end.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdio>
+// Execution of the orders Jump, Fly, Crouch and DriveJoints.
+#include "scene/world/avatars/immediate_orders.hpp"
 
-#include "scene/world/avatars/order_context.hpp"
+#include <algorithm>
+#include <cmath>
+
+#include "scene/world/bodies/physics_bodies.hpp"
+#include "scene/world/contacts/obstacles.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr double kEyesBelowTop = 0.15;  // metres, at most a tenth of the height
-// Of epsilon: who stands up keeps this much from what is above; what it leans on is never nearer
-// than 7/8 (StoppingBand), so that it does not count as in the way.
-constexpr double kHeadroom = 0.75;
+// Clearance for standing up, as a fraction of the contact offset. It is below the minimum gap to a
+// touched obstacle, 7/8 (collision::ContactOffset), so that such an obstacle does not block.
+constexpr double kHeadroomFraction = 0.75;
 
-void startJump(Avatar& avatar, const Jump& jump, const Lengths& lengths) {
+void startJump(Avatar& avatar, const Jump& jump, const WorldSettings& settings) {
   avatar.jumping = true;
   avatar.grounded = false;
-  avatar.standsOn = 0;
-  avatar.fallSpeed = -std::sqrt(2 * lengths.gravity * jump.height);
+  avatar.groundEntity = 0;
+  avatar.fallSpeed = -std::sqrt(2 * settings.gravity * jump.height);
   avatar.walk = {};
-  avatar.hangsFor = 0;
+  avatar.stalledInAirTime = 0;
 }
 
-/// In the air, but not on its way: held by what cannot be stood on.
-bool hangs(Avatar& avatar, const Lengths& lengths) {
-  const bool goes = avatar.lastMove.norm() > lengths.epsilon;
-  avatar.hangsFor = goes ? 0 : avatar.hangsFor + lengths.tick;
-  return avatar.hangsFor >= lengths.patience - kTimeRounding;
+/// Updates stalledInAirTime. True if the avatar made no progress in the air for stuckTimeout: it is
+/// held by non-walkable surfaces.
+bool updateStalledInAir(Avatar& avatar, const WorldSettings& settings) {
+  const bool moved = avatar.lastDisplacement.norm() > settings.contactOffset;
+  avatar.stalledInAirTime = moved ? 0 : avatar.stalledInAirTime + settings.tickDuration;
+  return avatar.stalledInAirTime >= settings.stuckTimeout - kTimeTolerance;
 }
 
-void setHeight(WorldState& world, Avatar& avatar, std::shared_ptr<const AvatarShape> shape,
-               double height) {
-  wakeLeaning(world, avatar);
+void setPrismHeight(WorldData& world, Avatar& avatar, std::shared_ptr<const AvatarShape> shape,
+                    double height) {
+  wakeTouchingBodies(world, avatar);
   avatar.shape = std::move(shape);
   avatar.height = height;
-  avatar.eyeHeight = eyeHeightOf(height);
-  avatar.stirred = true;
+  avatar.eyeHeight = computeEyeHeight(height);
+  avatar.dirty = true;
 }
 
-/// What is in the way of an avatar that would have this shape; 0: nothing.
-EntityId inTheWayOf(Follower& f, const AvatarShape& shape) {
-  const Avatar& avatar = *f.avatar();
-  const double clearance = kHeadroom * f.world.lengths.epsilon;
-  const Box box = grown(boxAt(shape.box, avatar.feet), 2 * clearance);
-  std::vector<Obstacle> obstacles = obstaclesIn(f.world, box, avatar.id);
+/// The entity that overlaps the avatar with this shape; 0: none.
+EntityId findBlockingEntity(OrderContext& context, const AvatarShape& shape) {
+  const Avatar& avatar = *context.findAvatar();
+  const double clearance = kHeadroomFraction * context.world.settings.contactOffset;
+  const Aabb box = inflated(placeBox(shape.box, avatar.footPosition), 2 * clearance);
+  std::vector<Obstacle> obstacles = collectObstaclesInBox(context.world, box, avatar.id);
   EntityId nearest = 0;
-  return isFree(shape, avatar.feet, clearance, obstacles, f.count, nearest) ? 0 : nearest;
+  return isClear(shape, avatar.footPosition, clearance, obstacles, context.count, nearest)
+             ? 0
+             : nearest;
 }
 
-/// Why `chain` cannot be driven so; "" when it can.
-std::string jointProblem(const Chain& chain, const DriveJoints& drive) {
+/// Error of the order for this chain; "" if it is valid.
+std::string validateJointTargets(const Chain& chain, const DriveJoints& drive) {
   if (chain.links.empty()) return "it has no joints; give links when it spawns";
-  if (drive.to.size() > chain.links.size())
-    return "to has " + std::to_string(drive.to.size()) + " values for " +
+  if (drive.targets.size() > chain.links.size())
+    return "to has " + std::to_string(drive.targets.size()) + " values for " +
            std::to_string(chain.links.size()) + " joints";
-  for (std::size_t i = 0; i < drive.to.size(); ++i) {
+  for (std::size_t i = 0; i < drive.targets.size(); ++i) {
     const LinkJoint& joint = chain.links[i].joint;
-    if (!drive.to[i] || (*drive.to[i] >= joint.low && *drive.to[i] <= joint.high)) continue;
-    return "to[" + std::to_string(i) + "] is " + shortNumber(*drive.to[i]) +
-           "; the joint goes from " + shortNumber(joint.low) + " to " + shortNumber(joint.high);
+    if (!drive.targets[i] || (*drive.targets[i] >= joint.low && *drive.targets[i] <= joint.high))
+      continue;
+    return "to[" + std::to_string(i) + "] is " + formatShortNumber(*drive.targets[i]) +
+           "; the joint's range is " + formatShortNumber(joint.low) + " to " +
+           formatShortNumber(joint.high);
   }
   return "";
 }
 
-void startJoints(Chain& chain, const DriveJoints& drive, const Lengths& lengths) {
+void startJointMotion(Chain& chain, const DriveJoints& drive, const WorldSettings& settings) {
   for (std::size_t i = 0; i < chain.links.size(); ++i) {
     ChainLink& link = chain.links[i];
-    link.target = i < drive.to.size() && drive.to[i] ? *drive.to[i] : link.value;
+    link.target = i < drive.targets.size() && drive.targets[i] ? *drive.targets[i] : link.value;
   }
   chain.speed = drive.speed;
-  chain.patienceLeft = lengths.patience;
+  chain.timeoutLeft = settings.stuckTimeout;
 }
 
-bool arrived(const Chain& chain) {
+bool haveJointsArrived(const Chain& chain) {
   return std::all_of(chain.links.begin(), chain.links.end(),
                      [](const ChainLink& link) { return link.value == link.target; });
 }
 
-std::string jointValues(const Chain& chain) {
+std::string formatJointValues(const Chain& chain) {
   std::string text = "joints at [";
   for (const ChainLink& link : chain.links)
-    text += (text.back() == '[' ? "" : ", ") + shortNumber(link.value);
+    text += (text.back() == '[' ? "" : ", ") + formatShortNumber(link.value);
   return text + "]";
 }
 
-EntityId firstStop(const Chain& chain) {
+EntityId findJointBlocker(const Chain& chain) {
   for (const ChainLink& link : chain.links)
-    if (link.stoppedBy != 0) return link.stoppedBy;
+    if (link.blockedBy != 0) return link.blockedBy;
   return 0;
 }
 
-void endJoints(Chain& chain) {
+void stopJoints(Chain& chain) {
   chain.speed = 0;
   for (ChainLink& link : chain.links) link.target = link.value;
 }
 
 }  // namespace
 
-double eyeHeightOf(double height) {
-  return height - std::min(kEyesBelowTop, 0.1 * height);
-}
-
-std::string shortNumber(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g", value);
-  return text.data();
-}
-
-Outcome follow(const Jump& jump, Follower& f) {
-  Avatar& avatar = *f.avatar();
+OrderStatus executeOrder(const Jump& jump, OrderContext& context) {
+  Avatar& avatar = *context.findAvatar();
   if (!avatar.jumping) {
-    if (avatar.flying || (!avatar.grounded && hangs(avatar, f.world.lengths))) {
-      f.tell(Notice::Kind::refused, avatar.flying ? "who flies does not jump; fly off first"
-                                                  : "it hangs on what nobody can jump from");
-      avatar.hangsFor = 0;
-      return Outcome::ended;
+    if (avatar.flying || (!avatar.grounded && updateStalledInAir(avatar, context.world.settings))) {
+      context.emitNotice(Notice::Kind::refused,
+                         avatar.flying ? "it flies; end the flight first"
+                                       : "it cannot jump: nothing below it is walkable");
+      avatar.stalledInAirTime = 0;
+      return OrderStatus::done;
     }
-    if (!avatar.grounded) return Outcome::goesOn;  // as after a spawn: it has to land first
-    startJump(avatar, jump, f.world.lengths);
-    return Outcome::goesOn;
+    if (!avatar.grounded) return OrderStatus::running;  // as after a spawn: wait until it lands
+    startJump(avatar, jump, context.world.settings);
+    return OrderStatus::running;
   }
-  const bool stuck = !avatar.grounded && hangs(avatar, f.world.lengths);
-  if (!avatar.grounded && !stuck) return Outcome::goesOn;
+  const bool stuck = !avatar.grounded && updateStalledInAir(avatar, context.world.settings);
+  if (!avatar.grounded && !stuck) return OrderStatus::running;
   avatar.jumping = false;
   avatar.walk = {};
   if (stuck) {
-    f.tell(Notice::Kind::blocked, "hangs in the air", avatar.stoppedBy);
+    context.emitNotice(Notice::Kind::blocked, "stopped in the air without landing",
+                       avatar.blockedBy);
   } else {
-    f.tell(Notice::Kind::done);
+    context.emitNotice(Notice::Kind::done);
   }
-  return Outcome::ended;
+  return OrderStatus::done;
 }
 
-Outcome follow(const Fly& fly, Follower& f) {
-  Avatar& avatar = *f.avatar();
+OrderStatus executeOrder(const Fly& fly, OrderContext& context) {
+  Avatar& avatar = *context.findAvatar();
   if (fly.on != avatar.flying) {
     avatar.flying = fly.on;
-    avatar.grounded = false;  // who alights falls, if only onto what it stands on
-    avatar.standsOn = 0;
+    avatar.grounded = false;  // it falls, at least by the contact offset
+    avatar.groundEntity = 0;
     avatar.fallSpeed = 0;
-    avatar.stirred = true;
+    avatar.dirty = true;
   }
-  f.tell(Notice::Kind::done);
-  return Outcome::ended;
+  context.emitNotice(Notice::Kind::done);
+  return OrderStatus::done;
 }
 
-Outcome follow(const Crouch& crouch, Follower& f) {
-  Avatar& avatar = *f.avatar();
-  const double height = crouch.height == 0 ? avatar.standing : crouch.height;
-  if (avatar.standing == 0 || !avatar.chain.links.empty()) {
-    f.tell(Notice::Kind::refused, "only a prism crouches; this shape is made of parts");
-    return Outcome::ended;
+OrderStatus executeOrder(const Crouch& crouch, OrderContext& context) {
+  Avatar& avatar = *context.findAvatar();
+  const double height = crouch.height == 0 ? avatar.spawnHeight : crouch.height;
+  if (avatar.spawnHeight == 0 || !avatar.chain.links.empty()) {
+    context.emitNotice(Notice::Kind::refused,
+                       "only a prism can crouch; this shape is made of parts");
+    return OrderStatus::done;
   }
-  if (!(height >= kLowestCrouch * avatar.standing && height <= avatar.standing)) {
-    f.tell(Notice::Kind::refused, "height is " + shortNumber(height) + "; it must lie in " +
-                                      shortNumber(kLowestCrouch * avatar.standing) + ".." +
-                                      shortNumber(avatar.standing));
-    return Outcome::ended;
+  if (!(height >= kMinCrouchFraction * avatar.spawnHeight && height <= avatar.spawnHeight)) {
+    context.emitNotice(Notice::Kind::refused,
+                       "height is " + formatShortNumber(height) + "; it must lie in " +
+                           formatShortNumber(kMinCrouchFraction * avatar.spawnHeight) + ".." +
+                           formatShortNumber(avatar.spawnHeight));
+    return OrderStatus::done;
   }
-  auto shape = prismShape(avatar.radius, height, avatar.standing, f.world.lengths);
-  // The lower prism lies inside the higher one: only who grows sweeps over something new.
-  const EntityId obstacle = height > avatar.height ? inTheWayOf(f, *shape) : 0;
+  auto shape = makePrismShape(avatar.radius, height, avatar.spawnHeight, context.world.settings);
+  // The lower prism lies inside the higher one, so only growing can cause an overlap.
+  const EntityId obstacle = height > avatar.height ? findBlockingEntity(context, *shape) : 0;
   if (obstacle != 0) {
-    f.tell(Notice::Kind::refused, "there is no room to be " + shortNumber(height) + " m high",
-           obstacle);
-    return Outcome::ended;
+    context.emitNotice(Notice::Kind::refused,
+                       "there is no room to be " + formatShortNumber(height) + " m high", obstacle);
+    return OrderStatus::done;
   }
-  setHeight(f.world, avatar, std::move(shape), height);
-  f.tell(Notice::Kind::done);
-  return Outcome::ended;
+  setPrismHeight(context.world, avatar, std::move(shape), height);
+  context.emitNotice(Notice::Kind::done);
+  return OrderStatus::done;
 }
 
-Outcome follow(const DriveJoints& drive, Follower& f) {
-  Chain& chain = f.avatar()->chain;
+OrderStatus executeOrder(const DriveJoints& drive, OrderContext& context) {
+  Chain& chain = context.findAvatar()->chain;
   if (chain.speed == 0) {
-    if (const std::string why = jointProblem(chain, drive); !why.empty()) {
-      f.tell(Notice::Kind::refused, why);
-      return Outcome::ended;
+    if (const std::string error = validateJointTargets(chain, drive); !error.empty()) {
+      context.emitNotice(Notice::Kind::refused, error);
+      return OrderStatus::done;
     }
-    startJoints(chain, drive, f.world.lengths);
-    if (!arrived(chain)) return Outcome::goesOn;
+    startJointMotion(chain, drive, context.world.settings);
+    if (!haveJointsArrived(chain)) return OrderStatus::running;
   }
-  const bool there = arrived(chain);
-  if (!there && chain.patienceLeft > kTimeRounding) return Outcome::goesOn;
-  if (there) {
-    f.tell(Notice::Kind::done, jointValues(chain));
+  const bool arrived = haveJointsArrived(chain);
+  if (!arrived && chain.timeoutLeft > kTimeTolerance) return OrderStatus::running;
+  if (arrived) {
+    context.emitNotice(Notice::Kind::done, formatJointValues(chain));
   } else {
-    f.tell(Notice::Kind::blocked, jointValues(chain), firstStop(chain));
+    context.emitNotice(Notice::Kind::blocked, formatJointValues(chain), findJointBlocker(chain));
   }
-  endJoints(chain);
-  return Outcome::ended;
+  stopJoints(chain);
+  return OrderStatus::done;
 }
 
 }  // namespace enfilade::scene

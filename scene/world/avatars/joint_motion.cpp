@@ -1,150 +1,158 @@
-// One tick of a driven chain. The joints move one after the other, from the base on. Each takes
-// with it all links that hang on it, as one: a revolute joint turns them about its axis, swept by
-// collision/motion/rotational_shape_cast.hpp, a prismatic one shifts them. Each ends about epsilon
-// away from what stopped it; the joints beyond go on.
+// One tick of a driven chain. The joints move one after the other, starting at the base. Each joint
+// moves its link and all descendants as one rigid body: a revolute joint by a rotational shape cast
+// (collision/motion/rotational_shape_cast.hpp), a prismatic joint by a linear one. Each stops about
+// one contact offset before an obstacle; the following joints still move.
+#include "scene/world/avatars/joint_motion.hpp"
+
 #include <algorithm>
 #include <cmath>
 
 #include "collision/motion/rotational_shape_cast.hpp"
-#include "scene/world/data/world_data.hpp"
+#include "scene/world/contacts/obstacles.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr double kWorthTelling = 1e-6;  // of a joint's step: less is no progress
+constexpr double kMinProgressFraction = 1e-6;  // of a joint's step: minimum that counts as progress
 
-/// How one joint wants to move, in the world.
+/// The requested motion of one joint in this tick, scene frame.
 struct JointStep {
   std::size_t joint = 0;
-  double by = 0;  ///< radians or metres
-  bool turns = false;
+  double delta = 0;  ///< radians or metres
+  bool isRevolute = false;
   Vec3 pivot = Vec3::Zero();
   Vec3 axis = Vec3::UnitY();
-  double reach = 0;  ///< metres that no point moves farther than, for the whole step
+  double maxDisplacement = 0;  ///< metres: bound on the displacement of any point in the step
 };
 
-/// What stopped a step so far.
-struct StepStop {
+/// The earliest hit of a step so far.
+struct StepHit {
   double fraction = 1;
   EntityId entity = 0;
-  collision::Decision decision;
+  collision::SeparationResult separation;
 };
 
-collision::SweepResult sweepPart(const AvatarPart& part, const Vec3& feet, const JointStep& step,
-                                 double by, const collision::ConvexBody& other,
-                                 const collision::StoppingBand& band,
-                                 collision::FeatureCache& cache) {
-  const collision::ConvexBody body = bodyAt(part, feet);
-  if (step.turns)
-    return collision::sweepTurning(body, {step.pivot, step.axis, by}, other, band, cache);
-  return collision::sweep(body, by * step.axis, other, band, cache);
+collision::ShapeCastResult castPart(const AvatarPart& part, const Vec3& footPosition,
+                                    const JointStep& step, double delta,
+                                    const collision::PlacedConvex& other,
+                                    const collision::ContactOffset& contactOffset,
+                                    collision::FeatureCache& cache) {
+  const collision::PlacedConvex placed = placeAvatarPart(part, footPosition);
+  if (step.isRevolute)
+    return collision::castShapeRotating(placed, {step.pivot, step.axis, delta}, other,
+                                        contactOffset, cache);
+  return collision::castShape(placed, delta * step.axis, other, contactOffset, cache);
 }
 
 struct JointMover {
   Avatar& avatar;
   QueryCount& count;
-  collision::StoppingBand band;
+  collision::ContactOffset contactOffset;
 
-  std::size_t baseParts() const { return avatar.base.size(); }
+  std::size_t basePartCount() const { return avatar.baseParts.size(); }
 
-  void meet(std::size_t part, const JointStep& step, const Box& otherBox, EntityId entity,
-            const collision::ConvexBody& other, collision::FeatureCache& cache, StepStop& stop) {
-    const AvatarPart& moved = avatar.shape->parts[part];
-    const double far = step.reach * stop.fraction + band.high;
-    if (!overlaps(grown(boxAt(moved.box, avatar.feet), far), otherBox)) return;
-    const auto swept =
-        sweepPart(moved, avatar.feet, step, stop.fraction * step.by, other, band, cache);
-    count.narrow += swept.queries;
-    count.rational += swept.rationals;
-    count.bounded += swept.boundReached ? 1 : 0;
-    const double fraction = stop.fraction * swept.fraction;
-    if (!swept.stopped || (stop.entity != 0 && fraction >= stop.fraction)) return;
-    stop = {fraction, entity, swept.atStop};
+  void castAgainst(std::size_t part, const JointStep& step, const Aabb& otherBox, EntityId entity,
+                   const collision::PlacedConvex& other, collision::FeatureCache& cache,
+                   StepHit& hit) {
+    const AvatarPart& movedPart = avatar.shape->parts[part];
+    const double margin = step.maxDisplacement * hit.fraction + contactOffset.rest;
+    if (!overlaps(inflated(placeBox(movedPart.box, avatar.footPosition), margin), otherBox)) return;
+    const auto result = castPart(movedPart, avatar.footPosition, step, hit.fraction * step.delta,
+                                 other, contactOffset, cache);
+    count.narrow += result.queries;
+    count.rational += result.exactQueries;
+    count.bounded += result.iterationLimitReached ? 1 : 0;
+    const double fraction = hit.fraction * result.fraction;
+    if (!result.stopped || (hit.entity != 0 && fraction >= hit.fraction)) return;
+    hit = {fraction, entity, result.separationAtStop};
   }
 
-  /// Links that hang on one another touch where they are joined; the base's parts are its first
-  /// links' neighbours.
-  bool mayTouchItself(std::size_t link, std::size_t otherPart) const {
+  /// True if the link and the part are joined, and therefore touch. The base's parts are adjacent
+  /// to the links without a parent.
+  bool isAdjacent(std::size_t link, std::size_t otherPart) const {
     const Chain& chain = avatar.chain;
-    if (otherPart < baseParts()) return chain.links[link].parent < 0;
-    const auto other = static_cast<std::int32_t>(otherPart - baseParts());
+    if (otherPart < basePartCount()) return chain.links[link].parent < 0;
+    const auto other = static_cast<std::int32_t>(otherPart - basePartCount());
     return chain.links[link].parent == other ||
            chain.links[static_cast<std::size_t>(other)].parent == static_cast<std::int32_t>(link);
   }
 
-  void meetItself(std::size_t link, const JointStep& step, StepStop& stop) {
+  void castAgainstSelf(std::size_t link, const JointStep& step, StepHit& hit) {
     const auto& parts = avatar.shape->parts;
     for (std::size_t other = 0; other < parts.size(); ++other) {
-      const bool goesAlong =
-          other >= baseParts() && moves(avatar.chain, step.joint, other - baseParts());
-      if (goesAlong || mayTouchItself(link, other)) continue;
-      collision::FeatureCache none;
-      meet(baseParts() + link, step, boxAt(parts[other].box, avatar.feet), avatar.id,
-           bodyAt(parts[other], avatar.feet), none, stop);
+      const bool isCarried = other >= basePartCount() &&
+                             doesJointMoveLink(avatar.chain, step.joint, other - basePartCount());
+      if (isCarried || isAdjacent(link, other)) continue;
+      collision::FeatureCache emptyCache;
+      castAgainst(basePartCount() + link, step, placeBox(parts[other].box, avatar.footPosition),
+                  avatar.id, placeAvatarPart(parts[other], avatar.footPosition), emptyCache, hit);
     }
   }
 
-  StepStop sweep(const JointStep& step) {
-    StepStop stop;
+  StepHit castStep(const JointStep& step) {
+    StepHit hit;
     for (std::size_t link = step.joint; link < avatar.chain.links.size(); ++link) {
-      if (!moves(avatar.chain, step.joint, link)) continue;
-      const std::size_t part = baseParts() + link;
+      if (!doesJointMoveLink(avatar.chain, step.joint, link)) continue;
+      const std::size_t part = basePartCount() + link;
       for (Obstacle& obstacle : avatar.obstacles) {
-        meet(part, step, obstacle.box, obstacle.entity, obstacle.body, obstacle.cacheOf(part),
-             stop);
-        if (stop.fraction == 0) return stop;
+        castAgainst(part, step, obstacle.box, obstacle.entity, obstacle.convex,
+                    obstacle.cacheFor(part), hit);
+        if (hit.fraction == 0) return hit;
       }
-      if (avatar.chain.selfContact) meetItself(link, step, stop);
+      if (avatar.chain.selfContact) castAgainstSelf(link, step, hit);
     }
-    return stop;
+    return hit;
   }
 };
 
-JointStep stepOf(const Avatar& avatar, const LinkPose& pose, std::size_t joint, double by) {
+JointStep makeJointStep(const Avatar& avatar, const LinkPose& pose, std::size_t joint,
+                        double delta) {
   const ChainLink& link = avatar.chain.links[joint];
   JointStep step;
   step.joint = joint;
-  step.by = by;
-  step.turns = link.joint.kind == LinkJoint::Kind::revolute;
-  step.pivot = avatar.feet + pose.origin;
+  step.delta = delta;
+  step.isRevolute = link.joint.kind == LinkJoint::Kind::revolute;
+  step.pivot = avatar.footPosition + pose.origin;
   step.axis = pose.axis;
-  step.reach = std::abs(by) * (step.turns ? link.reach : 1);
+  step.maxDisplacement = std::abs(delta) * (step.isRevolute ? link.maxRadius : 1);
   return step;
 }
 
-/// Moves one joint by `by` as far as it goes; whether it went anywhere.
-bool moveJoint(JointMover& mover, std::size_t joint, double by) {
+/// Moves one joint by `delta`, or up to the first hit. Returns whether it made progress.
+bool moveJoint(JointMover& mover, std::size_t joint, double delta) {
   Avatar& avatar = mover.avatar;
   ChainLink& link = avatar.chain.links[joint];
-  const StepStop stop = mover.sweep(stepOf(avatar, posesOf(avatar.chain)[joint], joint, by));
-  link.stoppedBy = stop.entity;
-  if (stop.entity != 0 && avatar.stoppedBy == 0) {
-    avatar.stoppedBy = stop.entity;
-    avatar.atStop = stop.decision;
+  const StepHit hit =
+      mover.castStep(makeJointStep(avatar, computeLinkPoses(avatar.chain)[joint], joint, delta));
+  link.blockedBy = hit.entity;
+  if (hit.entity != 0 && avatar.blockedBy == 0) {
+    avatar.blockedBy = hit.entity;
+    avatar.blockingHit = hit.separation;
   }
   const double before = link.value;
-  const bool whole = stop.fraction == 1 && before + by == link.target;
-  link.value = whole ? link.target : before + stop.fraction * by;
+  const bool reachesTarget = hit.fraction == 1 && before + delta == link.target;
+  link.value = reachesTarget ? link.target : before + hit.fraction * delta;
   if (link.value == before) return false;
-  avatar.shape = shapeWith(avatar.base, avatar.chain);
-  return stop.fraction > kWorthTelling;
+  avatar.shape = makeChainShape(avatar.baseParts, avatar.chain);
+  return hit.fraction > kMinProgressFraction;
 }
 
 }  // namespace
 
-void moveJoints(WorldState& world, Avatar& avatar, QueryCount& count) {
-  JointMover mover{avatar, count, bandOf(world.lengths)};
+void moveJoints(WorldData& world, Avatar& avatar, QueryCount& count) {
+  JointMover mover{avatar, count, makeContactOffset(world.settings)};
   Chain& chain = avatar.chain;
-  const double most = chain.speed * world.lengths.tick;
-  bool went = false;
+  const double maxDelta = chain.speed * world.settings.tickDuration;
+  bool moved = false;
   for (std::size_t i = 0; i < chain.links.size(); ++i) {
-    chain.links[i].stoppedBy = 0;
-    const double left = chain.links[i].target - chain.links[i].value;
-    if (left == 0) continue;
-    const double by = std::max(-most, std::min(most, left));
-    if (moveJoint(mover, i, by)) went = true;
+    chain.links[i].blockedBy = 0;
+    const double remaining = chain.links[i].target - chain.links[i].value;
+    if (remaining == 0) continue;
+    const double delta = std::max(-maxDelta, std::min(maxDelta, remaining));
+    if (moveJoint(mover, i, delta)) moved = true;
   }
-  chain.patienceLeft = went ? world.lengths.patience : chain.patienceLeft - world.lengths.tick;
+  chain.timeoutLeft =
+      moved ? world.settings.stuckTimeout : chain.timeoutLeft - world.settings.tickDuration;
 }
 
 }  // namespace enfilade::scene

@@ -1,47 +1,44 @@
-// How one avatar's orders are followed in one tick; private to orders.cpp and order_moves.cpp.
+// Context and result of the execution of an order. Private to avatars/.
 #pragma once
 
+#include <array>
+#include <cstdio>
+
+#include "scene/world/data/tick_report.hpp"
 #include "scene/world/data/world_data.hpp"
 
 namespace enfilade::scene {
 
-inline constexpr double kTimeRounding = 1e-9;  ///< seconds: sums of ticks against whole waits
+inline constexpr double kTimeTolerance = 1e-9;  ///< seconds: rounding of summed tick durations
 
-/// One avatar's name, queue and body, while its orders are followed in this tick.
-struct Follower {
-  WorldState& world;
+/// The avatar and queue whose orders are executed, and the outputs of the tick.
+struct OrderContext {
+  WorldData& world;
   TickReport& report;
   QueryCount& count;
-  const std::string& name;
-  std::deque<QueuedOrder>& queue;
+  OrderQueue& queue;
 
-  Avatar* avatar() const {
-    const auto found = world.avatars.find(name);
-    return found == world.avatars.end() ? nullptr : &found->second;
-  }
-  std::uint64_t tag() const { return queue.front().tag; }
-  void tell(Notice::Kind kind, std::string text = {}, EntityId obstacle = 0) const {
-    Notice notice{kind, name, 0, tag(), Vec3::Zero(), obstacle, std::move(text)};
-    if (const Avatar* a = avatar()) notice.id = a->id, notice.position = a->feet;
+  Avatar* findAvatar() const { return world.findAvatar(queue.avatar); }
+  std::uint64_t tag() const { return queue.orders.front().tag; }
+  void emitNotice(Notice::Kind kind, std::string text = {}, EntityId obstacle = 0) const {
+    Notice notice{kind, queue.name, 0, tag(), Vec3::Zero(), obstacle, std::move(text)};
+    if (const Avatar* a = findAvatar()) notice.id = a->id, notice.position = a->footPosition;
     report.notices.push_back(std::move(notice));
   }
 };
 
-/// What following the front order came to.
-enum class Outcome : std::uint8_t {
-  ended,      ///< took no time: the next order may start in this tick
-  endedTick,  ///< done, but the avatar stays as it is until the next tick
-  goesOn
+/// Status of the front order after its execution in this tick.
+enum class OrderStatus : std::uint8_t {
+  done,          ///< completed: the next order may start in this tick
+  doneThisTick,  ///< completed, but the next order starts in the next tick
+  running
 };
 
-/// Metres above the feet, of an avatar of this height.
-double eyeHeightOf(double height);
-/// "0.123", for a person.
-std::string shortNumber(double value);
-
-Outcome follow(const Jump& jump, Follower& f);
-Outcome follow(const Fly& fly, Follower& f);
-Outcome follow(const Crouch& crouch, Follower& f);
-Outcome follow(const DriveJoints& drive, Follower& f);
+/// Formats a number with three significant digits for messages: "0.123".
+inline std::string formatShortNumber(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.3g", value);
+  return text.data();
+}
 
 }  // namespace enfilade::scene

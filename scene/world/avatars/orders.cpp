@@ -1,340 +1,366 @@
-// The avatars' queues: commands come in, orders start, go on and end. An order that takes no time
-// ends in the tick that it starts in and the next one starts; a capture keeps the avatar still for
-// its tick, so that the picture shows the place it was asked for.
+// The avatars' order queues. Commands are enqueued; the front order of each queue runs until it is
+// done. An order that takes no time ends in the tick in which it starts, and the next one starts. A
+// Capture holds the avatar for its tick, so that the image shows the requested position.
+#include "scene/world/avatars/orders.hpp"
+
 #include <algorithm>
 #include <cmath>
 
 #include "scene/model/rotation.hpp"
+#include "scene/world/avatars/avatar_motion.hpp"
+#include "scene/world/avatars/immediate_orders.hpp"
 #include "scene/world/avatars/order_context.hpp"
+#include "scene/world/avatars/spawn.hpp"
+#include "scene/world/bodies/physics_bodies.hpp"
+#include "scene/world/contacts/contacts.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr double kArrivedAcross = 1e-3;  // metres over the ground from the way point
-constexpr double kArrivedUp = 1.0;       // metres: a way point on another storey is not reached
-constexpr double kProgress = 0.01;       // metres nearer that count as progress, less if slow
-constexpr double kBelowScene = 10;       // metres below the lowest point of the scene
-constexpr double kBeyondScene = 1000;    // metres out of the scene's bounds that may be flown
+constexpr double kArrivalDistance = 1e-3;     // metres, horizontal distance to the way point
+constexpr double kArrivalHeight = 1.0;        // metres, vertical: excludes another storey
+constexpr double kMinProgress = 0.01;         // metres; less for slow walks
+constexpr double kMaxDepthBelowScene = 10;    // metres below the lowest point of the scene
+constexpr double kMaxDistanceOutside = 1000;  // metres beyond the scene's bounds
 
-double acrossGround(const Vec3& from, const Vec3& to) {
+double computeGroundDistance(const Vec3& from, const Vec3& to) {
   const double x = to.x() - from.x(), z = to.z() - from.z();
   return std::sqrt(x * x + z * z);
 }
 
-/// Metres still to go: over the ground, or in space for who flies.
-double wayLeft(const Avatar& avatar, const Vec3& goal) {
-  return avatar.flying ? (goal - avatar.feet).norm() : acrossGround(avatar.feet, goal);
+/// Distance to `goal`, metres: horizontal, or in space for a flying avatar.
+double computeRemainingDistance(const Avatar& avatar, const Vec3& goal) {
+  return avatar.flying ? (goal - avatar.footPosition).norm()
+                       : computeGroundDistance(avatar.footPosition, goal);
 }
 
-/// "" for none.
-std::string toldDropped(std::size_t orders) {
+/// Suffix of a message; "" for zero orders.
+std::string formatDroppedCount(std::size_t orders) {
   return orders == 0 ? "" : "; " + std::to_string(orders) + " queued orders are dropped";
 }
 
-/// Takes all orders but the first `kept` out of a queue and tells each, as `like` does but for its
-/// tag; `by`: what did it. Of very many the last that is told counts the others.
-void dropQueued(std::deque<QueuedOrder>& queue, std::size_t kept, Notice like,
-                const std::string& by, TickReport& report) {
-  constexpr std::size_t kMostTold = 10'000;  // some 1 MB in a message
-  like.kind = Notice::Kind::dropped;
-  like.text = by;
-  const std::size_t told = std::min(queue.size(), kept + kMostTold);
-  for (std::size_t i = kept; i < told; ++i) {
-    like.tag = queue[i].tag;
-    if (i + 1 == told && told < queue.size())
-      like.text += ", and " + std::to_string(queue.size() - told) + " more orders";
-    report.notices.push_back(like);
+/// Removes all orders but the first `kept` from a queue and reports each with `cause`. The notices
+/// are copies of `notice` with the order's tag. Beyond kMaxNotices, the last one counts the rest.
+void dropQueuedOrders(std::deque<QueuedOrder>& queue, std::size_t kept, Notice notice,
+                      const std::string& cause, TickReport& report) {
+  constexpr std::size_t kMaxNotices = 10'000;  // about 1 MB in a message
+  notice.kind = Notice::Kind::dropped;
+  notice.text = cause;
+  const std::size_t reportedEnd = std::min(queue.size(), kept + kMaxNotices);
+  for (std::size_t i = kept; i < reportedEnd; ++i) {
+    notice.tag = queue[i].tag;
+    if (i + 1 == reportedEnd && reportedEnd < queue.size())
+      notice.text += ", and " + std::to_string(queue.size() - reportedEnd) + " more orders";
+    report.notices.push_back(notice);
   }
   queue.resize(std::min(queue.size(), kept));
 }
 
-Outcome follow(const Spawn& spawn, Follower& f) {
-  if (f.avatar()) {
-    f.tell(Notice::Kind::refused, "an avatar of this name is already in the world");
-    return Outcome::ended;
+/// Removes an avatar from the world; its contacts end and are reported.
+void removeAvatar(WorldData& world, OrderQueue& queue, std::vector<ContactEvent>& events) {
+  Avatar& avatar = *world.findAvatar(queue.avatar);
+  removeAvatarFromSolver(world, avatar);
+  endAvatarContacts(world, avatar, ContactEvent::Reason::left, events);
+  world.broadPhase.remove(avatar.proxy);
+  world.eraseAvatar(queue.avatar);
+  queue.avatar = 0;
+}
+
+OrderStatus executeOrder(const Spawn& spawn, OrderContext& context) {
+  if (context.findAvatar()) {
+    context.emitNotice(Notice::Kind::refused, "an avatar of this name is already in the world");
+    return OrderStatus::done;
   }
   Avatar avatar;
-  std::string told;
-  if (const auto why = placeAvatar(f.world, spawn, avatar, told, f.count)) {
-    f.tell(Notice::Kind::refused, *why + toldDropped(f.queue.size() - 1));
-    dropQueued(f.queue, 1, f.report.notices.back(), "by a refused Spawn", f.report);
-    return Outcome::ended;
+  std::string message;
+  if (const auto error = placeAvatar(context.world, spawn, avatar, message, context.count)) {
+    context.emitNotice(Notice::Kind::refused,
+                       *error + formatDroppedCount(context.queue.orders.size() - 1));
+    dropQueuedOrders(context.queue.orders, 1, context.report.notices.back(), "by a refused Spawn",
+                     context.report);
+    return OrderStatus::done;
   }
-  avatar.id = f.world.firstAvatarId() + static_cast<EntityId>(f.world.avatarNames.size());
-  avatar.gaze = headingFromDegrees(spawn.facing);
-  avatar.mover = f.world.broadPhase.insert(reachOf(f.world, avatar, Vec3::Zero()));
-  f.world.avatarOfMover[avatar.mover] = f.name;
-  f.world.avatarNames.push_back(f.name);
-  f.world.avatars.emplace(f.name, std::move(avatar));
-  f.tell(Notice::Kind::spawned, told);
-  return Outcome::endedTick;
+  avatar.name = context.queue.name;
+  avatar.viewDirection = makeHeadingFromDegrees(spawn.facing);
+  avatar.proxy =
+      context.world.broadPhase.insert(computeMotionBounds(context.world.settings, avatar));
+  context.queue.avatar = context.world.insertAvatar(std::move(avatar));
+  context.emitNotice(Notice::Kind::spawned, message);
+  return OrderStatus::doneThisTick;
 }
 
-void startLeg(Avatar& avatar, const Walk& walk, const Lengths& lengths) {
-  avatar.walk.nearest = wayLeft(avatar, walk.along[avatar.walk.leg]);
-  avatar.walk.patienceLeft = lengths.patience;
+void startWaypoint(Avatar& avatar, const Walk& walk, const WorldSettings& settings) {
+  avatar.walk.minDistance =
+      computeRemainingDistance(avatar, walk.waypoints[avatar.walk.waypointIndex]);
+  avatar.walk.timeoutLeft = settings.stuckTimeout;
 }
 
-Outcome follow(const Walk& walk, Follower& f) {
-  Avatar& avatar = *f.avatar();
-  avatar.drive = Vec3::Zero();
-  if (avatar.walk.nearest < 0) startLeg(avatar, walk, f.world.lengths);
-  return Outcome::goesOn;
+OrderStatus executeOrder(const Walk& walk, OrderContext& context) {
+  Avatar& avatar = *context.findAvatar();
+  avatar.driveVelocity = Vec3::Zero();
+  if (avatar.walk.minDistance < 0) startWaypoint(avatar, walk, context.world.settings);
+  return OrderStatus::running;
 }
 
-Outcome follow(const Look& look, Follower& f) {
-  Avatar& avatar = *f.avatar();
-  const Vec3 eyes = avatar.feet + Vec3(0, avatar.eyeHeight, 0);
-  const double distance = (look.at - eyes).norm();
+OrderStatus executeOrder(const Look& look, OrderContext& context) {
+  Avatar& avatar = *context.findAvatar();
+  const Vec3 eyes = avatar.footPosition + Vec3(0, avatar.eyeHeight, 0);
+  const double distance = (look.target - eyes).norm();
   if (!(distance > 1e-6)) {
-    f.tell(Notice::Kind::refused, "the point to look at is where the eyes are");
-    return Outcome::ended;
+    context.emitNotice(Notice::Kind::refused, "the point to look at is where the eyes are");
+    return OrderStatus::done;
   }
-  avatar.gaze = (look.at - eyes) / distance;
-  f.tell(Notice::Kind::done);
-  return Outcome::ended;
+  avatar.viewDirection = (look.target - eyes) / distance;
+  context.emitNotice(Notice::Kind::done);
+  return OrderStatus::done;
 }
 
-Outcome follow(const Wait& wait, Follower& f) {
-  Avatar& avatar = *f.avatar();
-  if (avatar.waitLeft < 0) avatar.waitLeft = wait.seconds;
-  if (avatar.waitLeft > kTimeRounding) {
-    avatar.waitLeft -= f.world.lengths.tick;
-    if (avatar.waitLeft < 0) avatar.waitLeft = 0;
-    return Outcome::goesOn;
+OrderStatus executeOrder(const Wait& wait, OrderContext& context) {
+  Avatar& avatar = *context.findAvatar();
+  if (avatar.waitTimeLeft < 0) avatar.waitTimeLeft = wait.seconds;
+  if (avatar.waitTimeLeft > kTimeTolerance) {
+    avatar.waitTimeLeft -= context.world.settings.tickDuration;
+    if (avatar.waitTimeLeft < 0) avatar.waitTimeLeft = 0;
+    return OrderStatus::running;
   }
-  avatar.waitLeft = -1;
-  f.tell(Notice::Kind::done);
-  return Outcome::ended;
+  avatar.waitTimeLeft = -1;
+  context.emitNotice(Notice::Kind::done);
+  return OrderStatus::done;
 }
 
-Outcome follow(const Capture& capture, Follower& f) {
-  f.tell(Notice::Kind::capture, capture.as);
-  return Outcome::endedTick;
+OrderStatus executeOrder(const Capture& capture, OrderContext& context) {
+  context.emitNotice(Notice::Kind::capture, capture.name);
+  return OrderStatus::doneThisTick;
 }
 
-Outcome follow(const Leave&, Follower& f) {
-  f.tell(Notice::Kind::left);
-  removeAvatar(f.world, f.name, f.report.contacts);
-  return Outcome::endedTick;
+OrderStatus executeOrder(const Leave&, OrderContext& context) {
+  context.emitNotice(Notice::Kind::left);
+  removeAvatar(context.world, context.queue, context.report.contacts);
+  return OrderStatus::doneThisTick;
 }
 
-Outcome follow(const Drive&, Follower&) {
-  return Outcome::ended;
-}  // taken in by takeIn()
+/// Does nothing: enqueueCommands() executes a Drive.
+OrderStatus executeOrder(const Drive&, OrderContext&) {
+  return OrderStatus::done;
+}
 
-Outcome followFront(Follower& f) {
-  const Order& order = f.queue.front().order;  // stays where it is until followQueue() pops it
-  if (!f.avatar() && !std::holds_alternative<Spawn>(order)) {
-    f.tell(Notice::Kind::refused, "there is no avatar of this name");
-    return Outcome::ended;
+OrderStatus executeFrontOrder(OrderContext& context) {
+  const Order& order = context.queue.orders.front().order;  // valid until runQueue() pops it
+  if (!context.findAvatar() && !std::holds_alternative<Spawn>(order)) {
+    context.emitNotice(Notice::Kind::refused, "there is no avatar of this name");
+    return OrderStatus::done;
   }
-  return std::visit([&](const auto& o) { return follow(o, f); }, order);
+  return std::visit([&](const auto& o) { return executeOrder(o, context); }, order);
 }
 
-/// Starts orders until one takes time. Bounded by the length of the queue.
-void followQueue(Follower& f) {
-  while (!f.queue.empty()) {
-    const Outcome outcome = followFront(f);
-    if (outcome == Outcome::goesOn) return;
-    f.queue.pop_front();
-    if (outcome == Outcome::endedTick) return;
+/// Executes orders until one takes time. Bounded by the length of the queue.
+void runQueue(OrderContext& context) {
+  while (!context.queue.orders.empty()) {
+    const OrderStatus status = executeFrontOrder(context);
+    if (status == OrderStatus::running) return;
+    context.queue.orders.pop_front();
+    if (status == OrderStatus::doneThisTick) return;
   }
 }
 
-/// What of the orders that act at once it is.
-std::string byWhat(const Order& order) {
-  return std::holds_alternative<Drive>(order) ? "by a Drive" : "by a DriveJoints at once";
+/// Name of an immediate order, as the cause in a notice.
+std::string describeCause(const Order& order) {
+  return std::holds_alternative<Drive>(order) ? "by a Drive" : "by an immediate DriveJoints";
 }
 
-/// Drops what the avatar was told before, as for an order that does not queue. Its body, if it is
-/// in the world; else that is told.
-Avatar* dropOrders(WorldState& world, const Command& command, TickReport& report) {
-  std::deque<QueuedOrder>& queue = world.queues[command.avatar];
-  const std::string counted = toldDropped(queue.size());
-  const auto found = world.avatars.find(command.avatar);
-  const bool absent = found == world.avatars.end();
+/// The queue of a name; creates it on first use.
+OrderQueue& ensureQueue(WorldData& world, const std::string& name) {
+  const auto at = std::ranges::lower_bound(world.queues, name, {}, &OrderQueue::name);
+  return at != world.queues.end() && at->name == name ? *at
+                                                      : *world.queues.insert(at, OrderQueue{name});
+}
+
+/// Drops all orders of an avatar, for an immediate order. Returns the avatar; reports and returns
+/// null if it is not in the world.
+Avatar* dropPendingOrders(WorldData& world, const Command& command, TickReport& report) {
+  OrderQueue& queue = ensureQueue(world, command.avatar);
+  const std::string droppedText = formatDroppedCount(queue.orders.size());
+  Avatar* avatar = world.findAvatar(queue.avatar);
   Notice notice{Notice::Kind::refused, command.avatar, 0, command.tag, Vec3::Zero(), 0, {}};
-  if (!absent) notice.id = found->second.id, notice.position = found->second.feet;
-  dropQueued(queue, 0, notice, byWhat(command.order), report);
-  if (absent) {
-    notice.text = "there is no avatar of this name" + counted;
+  if (avatar) notice.id = avatar->id, notice.position = avatar->footPosition;
+  dropQueuedOrders(queue.orders, 0, notice, describeCause(command.order), report);
+  if (!avatar) {
+    notice.text = "there is no avatar of this name" + droppedText;
     report.notices.push_back(std::move(notice));
     return nullptr;
   }
-  Avatar& avatar = found->second;
-  avatar.walk = {};
-  avatar.waitLeft = -1;
-  avatar.jumping = false;
-  avatar.hangsFor = 0;
-  avatar.chain.speed = 0;
-  return &avatar;
+  avatar->walk = {};
+  avatar->waitTimeLeft = -1;
+  avatar->jumping = false;
+  avatar->stalledInAirTime = 0;
+  avatar->chain.speed = 0;
+  return avatar;
 }
 
-bool actsAtOnce(const Order& order) {
+bool isImmediate(const Order& order) {
   const auto* joints = std::get_if<DriveJoints>(&order);
-  return std::holds_alternative<Drive>(order) || (joints && joints->atOnce);
+  return std::holds_alternative<Drive>(order) || (joints && joints->immediate);
 }
 
-void takeIn(WorldState& world, TickReport& report) {
-  for (Command& command : world.incoming) {
+void enqueueCommands(WorldData& world, TickReport& report) {
+  for (Command& command : world.pendingCommands) {
     Avatar* avatar = nullptr;
-    if (actsAtOnce(command.order) && !(avatar = dropOrders(world, command, report))) continue;
+    if (isImmediate(command.order) && !(avatar = dropPendingOrders(world, command, report)))
+      continue;
     if (const Drive* drive = std::get_if<Drive>(&command.order)) {
-      avatar->drive = drive->velocity;
+      avatar->driveVelocity = drive->velocity;
     } else {
-      world.queues[command.avatar].push_back({std::move(command.order), command.tag});
+      ensureQueue(world, command.avatar).orders.push_back({std::move(command.order), command.tag});
     }
   }
-  world.incoming.clear();
+  world.pendingCommands.clear();
 }
 
-Vec3 overGround(const Vec3& velocity) {
+Vec3 projectToGround(const Vec3& velocity) {
   return {velocity.x(), 0, velocity.z()};
 }
 
-/// The velocity of a walk; its last tick ends on its way point.
-Vec3 velocityOf(const WorldState& world, const Avatar& avatar, const Walk& walk) {
-  const Vec3& goal = walk.along[avatar.walk.leg];
-  const double distance = wayLeft(avatar, goal);
+/// Velocity of a walk, m/s; reduced in the last tick to end exactly at the way point.
+Vec3 computeWalkVelocity(const WorldData& world, const Avatar& avatar, const Walk& walk) {
+  const Vec3& goal = walk.waypoints[avatar.walk.waypointIndex];
+  const double distance = computeRemainingDistance(avatar, goal);
   if (!(distance > 0)) return Vec3::Zero();
-  const double speed = std::min(walk.speed, distance / world.lengths.tick);
-  const Vec3 way = goal - avatar.feet;
-  return (avatar.flying ? way : overGround(way)) * (speed / distance);
+  const double speed = std::min(walk.speed, distance / world.settings.tickDuration);
+  const Vec3 toGoal = goal - avatar.footPosition;
+  return (avatar.flying ? toGoal : projectToGround(toGoal)) * (speed / distance);
 }
 
-/// The velocity that the front order asks for.
-Vec3 velocityOf(const WorldState& world, const Avatar& avatar,
-                const std::deque<QueuedOrder>& queue) {
-  const Vec3 driven = avatar.flying ? avatar.drive : overGround(avatar.drive);
-  if (queue.empty()) return driven;
+/// Velocity requested by the front order or, without one, by Drive, m/s.
+Vec3 computeDesiredVelocity(const WorldData& world, const Avatar& avatar,
+                            const std::deque<QueuedOrder>& queue) {
+  const Vec3 driveVelocity =
+      avatar.flying ? avatar.driveVelocity : projectToGround(avatar.driveVelocity);
+  if (queue.empty()) return driveVelocity;
   const Order& order = queue.front().order;
   if (const Walk* walk = std::get_if<Walk>(&order))
-    return avatar.walk.nearest < 0 ? Vec3(Vec3::Zero()) : velocityOf(world, avatar, *walk);
+    return avatar.walk.minDistance < 0 ? Vec3(Vec3::Zero())
+                                       : computeWalkVelocity(world, avatar, *walk);
   if (const Jump* jump = std::get_if<Jump>(&order); jump && avatar.jumping)
-    return jump->velocity ? overGround(*jump->velocity) : driven;
-  return std::holds_alternative<DriveJoints>(order) ? driven : Vec3(Vec3::Zero());
+    return jump->velocity ? projectToGround(*jump->velocity) : driveVelocity;
+  return std::holds_alternative<DriveJoints>(order) ? driveVelocity : Vec3(Vec3::Zero());
 }
 
-void endWalk(Follower& f, Notice::Kind kind, std::string text = {}) {
-  f.tell(kind, std::move(text), kind == Notice::Kind::blocked ? f.avatar()->stoppedBy : 0);
-  f.avatar()->walk = {};
-  f.queue.pop_front();
+void endWalk(OrderContext& context, Notice::Kind kind, std::string text = {}) {
+  context.emitNotice(kind, std::move(text),
+                     kind == Notice::Kind::blocked ? context.findAvatar()->blockedBy : 0);
+  context.findAvatar()->walk = {};
+  context.queue.orders.pop_front();
 }
 
-std::string whyBlocked(const Follower& f, const Vec3& goal) {
-  const double up = goal.y() - f.avatar()->feet.y();
-  if (!f.avatar()->flying && acrossGround(f.avatar()->feet, goal) <= kArrivedAcross)
-    return "the way point lies " + shortNumber(std::abs(up)) + " m " + (up > 0 ? "above" : "below");
-  return "no progress for " + shortNumber(f.world.lengths.patience) + " s";
+std::string describeBlocking(const OrderContext& context, const Vec3& goal) {
+  const double up = goal.y() - context.findAvatar()->footPosition.y();
+  if (!context.findAvatar()->flying &&
+      computeGroundDistance(context.findAvatar()->footPosition, goal) <= kArrivalDistance)
+    return "the way point lies " + formatShortNumber(std::abs(up)) + " m " +
+           (up > 0 ? "above" : "below");
+  return "no progress for " + formatShortNumber(context.world.settings.stuckTimeout) + " s";
 }
 
-void judge(const Walk& walk, Follower& f) {
-  Avatar& avatar = *f.avatar();
-  const Vec3& goal = walk.along[avatar.walk.leg];
-  const double distance = wayLeft(avatar, goal);
-  if (distance <= kArrivedAcross && std::abs(goal.y() - avatar.feet.y()) <= kArrivedUp) {
-    if (++avatar.walk.leg < walk.along.size()) return startLeg(avatar, walk, f.world.lengths);
-    return endWalk(f, Notice::Kind::arrived);
+void updateWalk(const Walk& walk, OrderContext& context) {
+  Avatar& avatar = *context.findAvatar();
+  const Vec3& goal = walk.waypoints[avatar.walk.waypointIndex];
+  const double distance = computeRemainingDistance(avatar, goal);
+  if (distance <= kArrivalDistance &&
+      std::abs(goal.y() - avatar.footPosition.y()) <= kArrivalHeight) {
+    if (++avatar.walk.waypointIndex < walk.waypoints.size())
+      return startWaypoint(avatar, walk, context.world.settings);
+    return endWalk(context, Notice::Kind::arrived);
   }
-  const double couldBeWalked = walk.speed * f.world.lengths.patience;
-  if (distance < avatar.walk.nearest - std::min(kProgress, 0.5 * couldBeWalked)) {
-    avatar.walk.nearest = distance;
-    avatar.walk.patienceLeft = f.world.lengths.patience;
+  const double maxWalkDistance = walk.speed * context.world.settings.stuckTimeout;
+  if (distance < avatar.walk.minDistance - std::min(kMinProgress, 0.5 * maxWalkDistance)) {
+    avatar.walk.minDistance = distance;
+    avatar.walk.timeoutLeft = context.world.settings.stuckTimeout;
     return;
   }
-  avatar.walk.patienceLeft -= f.world.lengths.tick;
-  if (avatar.walk.patienceLeft > kTimeRounding) return;
-  tellBlocked(f.world, avatar, f.report, f.count);
-  endWalk(f, Notice::Kind::blocked, whyBlocked(f, goal));
+  avatar.walk.timeoutLeft -= context.world.settings.tickDuration;
+  if (avatar.walk.timeoutLeft > kTimeTolerance) return;
+  emitBlocked(context.world, avatar, context.report, context.count);
+  endWalk(context, Notice::Kind::blocked, describeBlocking(context, goal));
 }
 
-/// A driven avatar or joint that something stops: told when that begins, not as long as it lasts.
-void tellDrivenAgainst(WorldState& world, TickReport& report, QueryCount& count) {
-  for (auto& [name, avatar] : world.avatars) {
-    const bool driven = !avatar.drive.isZero(0) && world.queues[name].empty();
-    const bool blocked = (driven || avatar.chain.speed > 0) && avatar.stoppedBy != 0;
-    if (blocked && !avatar.blockedTold) tellBlocked(world, avatar, report, count);
-    avatar.blockedTold = blocked;
+/// Reports avatars that are blocked while driven or moving joints, once per block.
+void reportBlockedDrives(WorldData& world, TickReport& report, QueryCount& count) {
+  for (const OrderQueue& queue : world.queues) {
+    Avatar* avatar = world.findAvatar(queue.avatar);
+    if (!avatar) continue;
+    const bool driven = !avatar->driveVelocity.isZero(0) && queue.orders.empty();
+    const bool blocked = (driven || avatar->chain.speed > 0) && avatar->blockedBy != 0;
+    if (blocked && !avatar->blockedReported) emitBlocked(world, *avatar, report, count);
+    avatar->blockedReported = blocked;
   }
 }
 
-/// Why an avatar cannot stay in the world; "" when it can.
-std::string whyOut(const WorldState& world, const Avatar& avatar) {
-  const Box& bounds = world.scene->bounds();
-  if (avatar.feet.y() < bounds.min.y() - kBelowScene) return "fell out of the scene";
-  if (!contains(grown(bounds, kBeyondScene), {avatar.feet, avatar.feet}))
-    return "is " + shortNumber(kBeyondScene) + " m out of the scene";
+/// Reason to remove an avatar from the world; "" if it is inside its limits.
+std::string describeOutOfScene(const WorldData& world, const Avatar& avatar) {
+  const Aabb& bounds = world.scene->bounds();
+  if (avatar.footPosition.y() < bounds.min.y() - kMaxDepthBelowScene)
+    return "fell out of the scene";
+  if (!contains(inflated(bounds, kMaxDistanceOutside), {avatar.footPosition, avatar.footPosition}))
+    return "is " + formatShortNumber(kMaxDistanceOutside) + " m out of the scene";
   return "";
 }
 
-/// Nobody falls or flies for ever: outside the scene an avatar leaves it, and its queue is dropped.
-void removeLost(WorldState& world, TickReport& report) {
-  std::map<std::string, std::string> lost;
-  for (const auto& [name, avatar] : world.avatars)
-    if (std::string why = whyOut(world, avatar); !why.empty()) lost[name] = std::move(why);
-  for (const auto& [name, why] : lost) {
-    const Avatar& avatar = world.avatars.at(name);
-    const Notice left{Notice::Kind::left,
-                      name,
-                      avatar.id,
-                      0,
-                      avatar.feet,
-                      0,
-                      why + "; its queued orders are dropped"};
-    report.notices.push_back(left);
-    dropQueued(world.queues[name], 0, left, "as the avatar left the scene", report);
-    removeAvatar(world, name, report.contacts);
+/// Removes avatars that fell or flew out of the scene, and drops their queues.
+void removeLostAvatars(WorldData& world, TickReport& report) {
+  for (OrderQueue& queue : world.queues) {
+    const Avatar* avatar = world.findAvatar(queue.avatar);
+    const std::string reason = avatar ? describeOutOfScene(world, *avatar) : "";
+    if (reason.empty()) continue;
+    const Notice notice{Notice::Kind::left,
+                        queue.name,
+                        avatar->id,
+                        0,
+                        avatar->footPosition,
+                        0,
+                        reason + "; its queued orders are dropped"};
+    report.notices.push_back(notice);
+    dropQueuedOrders(queue.orders, 0, notice, "as the avatar left the scene", report);
+    removeAvatar(world, queue, report.contacts);
   }
 }
 
 }  // namespace
 
-std::size_t sizeOf(const Order& order) {
+std::size_t computeOrderCost(const Order& order) {
   const Walk* walk = std::get_if<Walk>(&order);
-  return 1 + (walk ? walk->along.size() : 0);
+  return 1 + (walk ? walk->waypoints.size() : 0);
 }
 
-Wish followOrders(WorldState& world, TickReport& report, QueryCount& count) {
-  takeIn(world, report);
-  Wish wish;
-  for (auto& [name, queue] : world.queues) {
-    Follower follower{world, report, count, name, queue};
-    followQueue(follower);
-    Avatar* avatar = follower.avatar();
+void runOrders(WorldData& world, TickReport& report, QueryCount& count) {
+  enqueueCommands(world, report);
+  for (OrderQueue& queue : world.queues) {
+    OrderContext context{world, report, count, queue};
+    runQueue(context);
+    Avatar* avatar = context.findAvatar();
     if (!avatar) continue;
-    const Vec3 velocity = velocityOf(world, *avatar, queue);
-    if (const double speed = velocity.norm(); speed > 0) avatar->gaze = velocity / speed;
-    wish[name] = velocity;
+    avatar->desiredVelocity = computeDesiredVelocity(world, *avatar, queue.orders);
+    if (const double speed = avatar->desiredVelocity.norm(); speed > 0)
+      avatar->viewDirection = avatar->desiredVelocity / speed;
   }
-  std::erase_if(world.queues, [&](const auto& entry) {
-    return entry.second.empty() && !world.avatars.contains(entry.first);
-  });
-  if (world.waiting > 0) {
-    world.waiting = 0;
-    for (const auto& [name, queue] : world.queues)
-      for (const QueuedOrder& queued : queue) world.waiting += sizeOf(queued.order);
-  }
-  return wish;
+  std::erase_if(world.queues,
+                [](const OrderQueue& queue) { return queue.orders.empty() && queue.avatar == 0; });
+  if (world.queuedOrderCount == 0) return;
+  world.queuedOrderCount = 0;
+  for (const OrderQueue& queue : world.queues)
+    for (const QueuedOrder& queued : queue.orders)
+      world.queuedOrderCount += computeOrderCost(queued.order);
 }
 
-void removeAvatar(WorldState& world, const std::string& name, std::vector<ContactEvent>& events) {
-  Avatar& avatar = world.avatars.at(name);
-  forgetAvatar(world, avatar);
-  endContactsOf(world, avatar, ContactEvent::Reason::left, events);
-  world.broadPhase.remove(avatar.mover);
-  world.avatarOfMover.erase(avatar.mover);
-  world.avatars.erase(name);
-}
-
-void judgeWalks(WorldState& world, TickReport& report, QueryCount& count) {
-  for (auto& [name, queue] : world.queues) {
-    Follower follower{world, report, count, name, queue};
-    if (queue.empty() || !follower.avatar() || follower.avatar()->walk.nearest < 0) continue;
-    if (const Walk* walk = std::get_if<Walk>(&queue.front().order)) judge(*walk, follower);
+void updateWalkProgress(WorldData& world, TickReport& report, QueryCount& count) {
+  for (OrderQueue& queue : world.queues) {
+    OrderContext context{world, report, count, queue};
+    const Avatar* avatar = context.findAvatar();
+    if (queue.orders.empty() || !avatar || avatar->walk.minDistance < 0) continue;
+    if (const Walk* walk = std::get_if<Walk>(&queue.orders.front().order))
+      updateWalk(*walk, context);
   }
-  tellDrivenAgainst(world, report, count);
-  removeLost(world, report);
+  reportBlockedDrives(world, report, count);
+  removeLostAvatars(world, report);
 }
 
 }  // namespace enfilade::scene

@@ -1,353 +1,295 @@
-// What kinematic bodies are about: commands, closers, doors that are walked into; and from that
-// where each wants to be at the end of the tick.
+// Drive of kinematic bodies: executes commands, automatic closing and doors opened by touch, and
+// computes the motion planned for the tick.
+#include "scene/world/bodies/kinematic_drive.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
-#include "scene/world/contacts/excluded_pairs.hpp"
-#include "scene/world/data/world_data.hpp"
-
 namespace enfilade::scene {
 namespace {
 
-constexpr double kTimeRounding = 1e-9;  // seconds: sums of ticks against whole delays
+constexpr double kTimeRounding = 1e-9;  // seconds; tolerance of summed ticks against a delay
 
-/// Where a path is at a time between its first key and its last.
-BodyPlace placeOnPath(const std::vector<PathKey>& keys, double time) {
-  const auto after = std::upper_bound(keys.begin() + 1, keys.end() - 1, time,
-                                      [](double t, const PathKey& key) { return t < key.time; });
-  const PathKey &a = *(after - 1), &b = *after;
-  return placeBetween({a.offset, a.turn}, {b.offset, b.turn}, (time - a.time) / (b.time - a.time));
+double findOpenLimit(const BodySpec& spec) {
+  const auto [low, high] = getJointLimits(spec);
+  return high - spec.closedPosition >= spec.closedPosition - low ? high : low;
 }
 
-BodyPlace placeOf(const BodySpec& spec, double coordinate) {
-  switch (spec.kind) {
-    case BodyKind::hinged:
-      return {Vec3::Zero(), coordinate};
-    case BodyKind::path:
-      return placeOnPath(spec.keys, coordinate);
-    default:
-      return {coordinate * spec.axis, 0};
-  }
-}
-
-double openEnd(const BodySpec& spec) {
-  const auto [low, high] = limitsOf(spec);
-  return high - spec.closed >= spec.closed - low ? high : low;
-}
-
-void goTo(Body& body, double target, double speed) {
-  BodyDrive& drive = body.drive;
+void startMotionTo(Body& body, double target, double speed) {
+  KinematicDrive& drive = body.drive;
   drive.target = target;
   drive.speed = speed;
-  drive.going = goesRound(*body.spec) || target != drive.coordinate;
-  drive.closesIn = -1;
+  drive.moving = isLoopingPath(*body.spec) || target != drive.jointPosition;
+  drive.autoCloseIn = -1;
 }
 
-void follow(Body& body, const BodyCommand& command) {
+void applyBodyCommand(Body& body, const BodyCommand& command) {
   const double speed = command.speed.value_or(body.spec->speed);
   switch (command.action) {
     case BodyCommand::Action::open:
     case BodyCommand::Action::run:
-      return goTo(body, openEnd(*body.spec), speed);
+      return startMotionTo(body, findOpenLimit(*body.spec), speed);
     case BodyCommand::Action::close:
-      return goTo(body, body.spec->closed, speed);
-    case BodyCommand::Action::to:
-      return goTo(body, command.to, speed);
-    case BodyCommand::Action::level:
-      return goTo(body, body.spec->stops[command.level], speed);
+      return startMotionTo(body, body.spec->closedPosition, speed);
+    case BodyCommand::Action::moveTo:
+      return startMotionTo(body, command.target, speed);
+    case BodyCommand::Action::moveToLevel:
+      return startMotionTo(body, body.spec->stops[command.level], speed);
     case BodyCommand::Action::stop:
-      body.drive.going = false;
-      body.drive.rate = 0;
-      body.drive.closesIn = -1;
+      body.drive.moving = false;
+      body.drive.jointVelocity = 0;
+      body.drive.autoCloseIn = -1;
   }
 }
 
-/// A door that is walked into opens away from who does, or the other way where it only opens so.
-void openFor(Body& body, const Contact& contact) {
+/// A door opened by touch opens away from the avatar, or the other way if its limits allow no
+/// other.
+void openDoorFor(Body& body, const Contact& contact) {
   const BodySpec& spec = *body.spec;
-  if (spec.openedBy != OpenedBy::touch || body.drive.going) return;
-  const Vec3 push = contact.decision.normal;  // from the avatar to the body
-  const Vec3 arm = contact.decision.pointB - body.position;
-  const double way = spec.kind == BodyKind::hinged ? spec.axis.dot(arm.cross(push)) : 0;
-  double target = openEnd(spec);
-  if (way != 0) target = way > 0 ? spec.high : spec.low;
-  goTo(body, target == spec.closed ? openEnd(spec) : target, spec.speed);
+  if (spec.openedBy != OpenedBy::touch || body.drive.moving) return;
+  const Vec3 push = contact.separation.normal;  // from the avatar to the body
+  const Vec3 arm = contact.separation.pointB - body.position;
+  const double openingSense = getTraits(spec.kind).rotates ? spec.axis.dot(arm.cross(push)) : 0;
+  double target = findOpenLimit(spec);
+  if (openingSense != 0) target = openingSense > 0 ? spec.high : spec.low;
+  startMotionTo(body, target == spec.closedPosition ? findOpenLimit(spec) : target, spec.speed);
 }
 
-void openForWalkers(WorldState& world) {
-  for (const auto& [name, avatar] : world.avatars) {
-    const auto found = world.bodyOfId.find(avatar.stoppedBy);
-    if (avatar.stoppedBy == 0 || found == world.bodyOfId.end()) continue;
+void openTouchedDoors(WorldData& world) {
+  for (const Avatar& avatar : world.avatars) {
+    const auto found = world.bodyIndexById.find(avatar.blockedBy);
+    if (avatar.blockedBy == 0 || found == world.bodyIndexById.end()) continue;
     Body& body = world.bodies[found->second];
     for (const Contact& contact : avatar.contacts)
-      if (contact.other == body.id) openFor(body, contact);
+      if (contact.other == body.id) openDoorFor(body, contact);
   }
 }
 
-/// A closer waits while the door stands open, and then closes it.
-void runCloser(Body& body, double tick) {
-  BodyDrive& drive = body.drive;
-  if (!body.spec->closesAfter || drive.going || drive.coordinate == body.spec->closed) return;
-  if (drive.closesIn < 0) drive.closesIn = *body.spec->closesAfter;
-  drive.closesIn -= tick;
-  if (drive.closesIn <= kTimeRounding) {
-    goTo(body, body.spec->closed, body.spec->speed);
+/// Runs the timer of a door that stands open, and closes the door when the timer expires.
+void updateAutoClose(Body& body, double tick) {
+  KinematicDrive& drive = body.drive;
+  if (!body.spec->autoCloseDelay || drive.moving ||
+      drive.jointPosition == body.spec->closedPosition)
+    return;
+  if (drive.autoCloseIn < 0) drive.autoCloseIn = *body.spec->autoCloseDelay;
+  drive.autoCloseIn -= tick;
+  if (drive.autoCloseIn <= kTimeRounding) {
+    startMotionTo(body, body.spec->closedPosition, body.spec->speed);
   }
 }
 
-/// The signed rate for this tick: speeds up and slows down by the spec's acceleration.
-double nextRate(const Body& body, double gap, double tick) {
-  const BodyDrive& drive = body.drive;
-  const double sense = gap < 0 ? -1 : 1;
+/// Signed velocity for this tick, limited by the spec's acceleration.
+double computeJointVelocity(const Body& body, double remaining, double tick) {
+  const KinematicDrive& drive = body.drive;
+  const double sense = remaining < 0 ? -1 : 1;
   const double a = body.spec->acceleration;
   if (a == 0) return sense * drive.speed;
-  const double along = std::min(sense * drive.rate + a * tick, drive.speed);
-  return sense * std::min(along, std::sqrt(2 * a * std::abs(gap)));
+  const double speed = std::min(sense * drive.jointVelocity + a * tick, drive.speed);
+  return sense * std::min(speed, std::sqrt(2 * a * std::abs(remaining)));
 }
 
-/// Where it wants to be at the end of the tick, and how fast that is.
-std::pair<double, double> nextCoordinate(const Body& body, double tick) {
-  const BodyDrive& drive = body.drive;
-  if (goesRound(*body.spec)) {
-    const double next = drive.coordinate + drive.speed * tick;
+/// Joint position wanted at the end of the tick, and the velocity there.
+std::pair<double, double> computeNextJointPosition(const Body& body, double tick) {
+  const KinematicDrive& drive = body.drive;
+  if (isLoopingPath(*body.spec)) {
+    const double next = drive.jointPosition + drive.speed * tick;
     return {std::fmod(next, body.spec->keys.back().time), drive.speed};
   }
-  const double gap = drive.target - drive.coordinate;
-  const double rate = nextRate(body, gap, tick);
-  if (std::abs(rate) * tick >= std::abs(gap) && rate * gap >= 0) return {drive.target, 0};
-  const auto [low, high] = limitsOf(*body.spec);
-  return {std::clamp(drive.coordinate + rate * tick, low, high), rate};
+  const double remaining = drive.target - drive.jointPosition;
+  const double jointVelocity = computeJointVelocity(body, remaining, tick);
+  if (std::abs(jointVelocity) * tick >= std::abs(remaining) && jointVelocity * remaining >= 0)
+    return {drive.target, 0};
+  const auto [low, high] = getJointLimits(*body.spec);
+  return {std::clamp(drive.jointPosition + jointVelocity * tick, low, high), jointVelocity};
 }
 
-/// Radians that a path that loops turns by in each lap: 0, or whole turns.
-double turnOfLap(const BodySpec& spec) {
-  return spec.keys.back().turn - spec.keys.front().turn;
+/// Rotation of a looping path in one period, radians: 0 or whole turns.
+double computeAnglePerPeriod(const BodySpec& spec) {
+  return spec.keys.back().angle - spec.keys.front().angle;
 }
 
-/// Where a path that loops is `time` seconds after a lap began; turns count on from lap to lap, and
-/// those of lap number `counted` are the keys'.
-BodyPlace placeOnLoop(const BodySpec& spec, double time, double counted) {
-  const double lap = spec.keys.back().time, at = std::fmod(time, lap);
-  BodyPlace place = placeOf(spec, at);
-  place.turn += (std::round((time - at) / lap) - counted) * turnOfLap(spec);
-  return place;
+/// Joint pose of a looping path `time` seconds after a period began. Angles accumulate from period
+/// to period; the keys' angles are those of period number `countedPeriods`.
+JointPose interpolateLoop(const BodySpec& spec, double time, double countedPeriods) {
+  const double period = spec.keys.back().time, at = std::fmod(time, period);
+  JointPose jointPose = computeJointPose(spec, at);
+  jointPose.angle +=
+      (std::round((time - at) / period) - countedPeriods) * computeAnglePerPeriod(spec);
+  return jointPose;
 }
 
-/// By as many laps more or less that it is nearest to `place`.
-double sameTurnNear(const BodyPlace& place, double turn, const BodySpec& spec) {
-  const double lap = turnOfLap(spec);
-  return lap == 0 ? turn : turn - std::round((turn - place.turn) / lap) * lap;
+/// Adds whole periods of rotation until the angle is nearest to that of `jointPose`.
+double unwrapAngle(const JointPose& jointPose, double angle, const BodySpec& spec) {
+  const double anglePerPeriod = computeAnglePerPeriod(spec);
+  return anglePerPeriod == 0
+             ? angle
+             : angle - std::round((angle - jointPose.angle) / anglePerPeriod) * anglePerPeriod;
 }
 
-/// Where a path comes through, at the end of each of the solver's substeps; the last is the goal.
-void planPath(Body& body, double tick) {
-  BodyPlan& plan = body.plan;
+/// Computes the key poses of a path at the end of each solver substep; the last one is the goal.
+void planPathSegments(Body& body, double tick) {
+  KinematicTarget& target = body.kinematicTarget;
   const BodySpec& spec = *body.spec;
-  const double now = body.drive.coordinate;
-  const bool loops = goesRound(spec);
-  const double way =
-      loops ? body.drive.speed * tick : plan.coordinate - now;  // seconds of the path
-  const double counted =
-      loops ? std::round((now + way - plan.coordinate) / spec.keys.back().time) : 0;
-  plan.stretches = kSolverSubsteps;
+  const double now = body.drive.jointPosition;
+  const bool loops = isLoopingPath(spec);
+  const double duration =
+      loops ? body.drive.speed * tick : target.jointPosition - now;  // seconds of the path
+  const double countedPeriods =
+      loops ? std::round((now + duration - target.jointPosition) / spec.keys.back().time) : 0;
+  target.segments = kSolverSubsteps;
   for (std::size_t i = 1; i < kSolverSubsteps; ++i) {
-    const double at = now + static_cast<double>(i) / kSolverSubsteps * way;
-    plan.places[i] = loops ? placeOnLoop(spec, at, counted) : placeOf(spec, at);
+    const double at = now + static_cast<double>(i) / kSolverSubsteps * duration;
+    target.keyPoses[i] =
+        loops ? interpolateLoop(spec, at, countedPeriods) : computeJointPose(spec, at);
   }
-  plan.places[kSolverSubsteps] = placeOf(spec, plan.coordinate);
+  target.keyPoses[kSolverSubsteps] = computeJointPose(spec, target.jointPosition);
   if (!loops) return;
-  double& turn = body.drive.place.turn;
-  turn = sameTurnNear(placeOnLoop(spec, now, counted), turn, spec);
-  plan.places[0].turn = turn;
+  double& angle = body.drive.pose.angle;
+  angle = unwrapAngle(interpolateLoop(spec, now, countedPeriods), angle, spec);
+  target.keyPoses[0].angle = angle;
 }
 
-/// Of a path that does not go evenly.
-double swingOf(const BodyPlan& plan, double radius, double tick) {
-  if (plan.stretches == 1) return 0;
-  const BodyPlace &start = plan.places[0], &end = plan.places[plan.stretches];
-  const auto n = static_cast<double>(plan.stretches);
-  const Vec3 evenMove = (end.offset - start.offset) / n;
-  const double evenTurn = (end.turn - start.turn) / n;
-  double most = 0;
-  for (std::size_t i = 0; i < plan.stretches; ++i) {
-    const BodyPlace &from = plan.places[i], &to = plan.places[i + 1];
-    most = std::max(most, (to.offset - from.offset - evenMove).norm() +
-                              std::abs(to.turn - from.turn - evenTurn) * radius);
+/// Maximum deviation of a path from uniform motion.
+double computeVelocityDeviation(const KinematicTarget& target, double radius, double tick) {
+  if (target.segments == 1) return 0;
+  const JointPose &start = target.keyPoses[0], &end = target.keyPoses[target.segments];
+  const auto n = static_cast<double>(target.segments);
+  const Vec3 meanOffset = (end.offset - start.offset) / n;
+  const double meanAngle = (end.angle - start.angle) / n;
+  double maxDeviation = 0;
+  for (std::size_t i = 0; i < target.segments; ++i) {
+    const JointPose &from = target.keyPoses[i], &to = target.keyPoses[i + 1];
+    maxDeviation = std::max(maxDeviation, (to.offset - from.offset - meanOffset).norm() +
+                                              std::abs(to.angle - from.angle - meanAngle) * radius);
   }
-  return n * most / tick;
+  return n * maxDeviation / tick;
 }
 
-void plan(Body& body, double tick) {
-  BodyPlan& plan = body.plan;
-  plan = {};
-  plan.places[0] = body.drive.place;
-  plan.coordinate = body.drive.coordinate;
-  if (!body.drive.going) return;
-  std::tie(plan.coordinate, body.drive.rate) = nextCoordinate(body, tick);
-  if (body.spec->kind == BodyKind::path)
-    planPath(body, tick);
+void planKinematicTarget(Body& body, double tick) {
+  KinematicTarget& target = body.kinematicTarget;
+  target = {};
+  target.keyPoses[0] = body.drive.pose;
+  target.jointPosition = body.drive.jointPosition;
+  if (!body.drive.moving) return;
+  std::tie(target.jointPosition, body.drive.jointVelocity) = computeNextJointPosition(body, tick);
+  if (getTraits(body.spec->kind).takesKeys)
+    planPathSegments(body, tick);
   else
-    plan.places[1] = placeOf(*body.spec, plan.coordinate);
-  for (std::size_t i = 1; i <= plan.stretches; ++i)
-    plan.farthest =
-        std::max(plan.farthest, farthestWay(*body.shape, plan.places[0], plan.places[i]));
-  plan.swing = swingOf(plan, body.shape->radius, tick);
+    target.keyPoses[1] = computeJointPose(*body.spec, target.jointPosition);
+  for (std::size_t i = 1; i <= target.segments; ++i)
+    target.maxDisplacement =
+        std::max(target.maxDisplacement,
+                 computeDisplacementBound(*body.shape, target.keyPoses[0], target.keyPoses[i]));
+  target.velocityDeviation = computeVelocityDeviation(target, body.shape->radius, tick);
 }
 
 }  // namespace
 
-collision::Pose startPoseOf(const BodySpec& spec) {
-  return poseAt(spec, placeOf(spec, 0));
-}
-
-void startDrive(Body& body) {
-  BodyDrive& drive = body.drive;
+void initKinematicDrive(Body& body) {
+  KinematicDrive& drive = body.drive;
   drive.speed = body.spec->speed;
-  drive.place = placeOf(*body.spec, 0);
-  drive.going = body.spec->kind == BodyKind::path && body.spec->runs;
-  drive.target = drive.going ? openEnd(*body.spec) : 0;
-  const collision::Pose pose = startPoseOf(*body.spec);
-  placeBody(body, pose.translation, pose.rotation);
+  drive.pose = computeJointPose(*body.spec, 0);
+  drive.moving = getTraits(body.spec->kind).takesKeys && body.spec->autoStart;
+  drive.target = drive.moving ? findOpenLimit(*body.spec) : 0;
+  const collision::Pose pose = computeStartPose(*body.spec);
+  setBodyPose(body, pose.translation, pose.rotation);
 }
 
-void followBodyCommands(WorldState& world) {
-  for (const BodyCommand& command : world.incomingForBodies) {
+void applyBodyCommands(WorldData& world) {
+  for (const BodyCommand& command : world.pendingBodyCommands) {
     for (Body& body : world.bodies)
-      if (body.spec->name == command.body) follow(body, command);
+      if (body.spec->name == command.body) applyBodyCommand(body, command);
   }
-  world.incomingForBodies.clear();
-  openForWalkers(world);
+  world.pendingBodyCommands.clear();
+  openTouchedDoors(world);
 }
 
-void planBodies(WorldState& world) {
-  const double lookout = lookoutOf(world.lengths);
-  world.goingBodies.clear();
-  for (const std::uint32_t i : world.kinematics) {
+void planKinematicMotion(WorldData& world) {
+  const double margin = computeContactQueryMargin(world.settings);
+  world.movingBodies.clear();
+  for (const std::uint32_t i : world.kinematicBodies) {
     Body& body = world.bodies[i];
-    const bool reachedOut = body.moved || body.plan.farthest > 0;
+    const bool hadMotionBounds = body.moved || body.kinematicTarget.maxDisplacement > 0;
     body.moved = false;
-    body.velocity = body.spin = Vec3::Zero();
-    body.positionBefore = body.position;
-    body.orientationBefore = body.orientation;
-    runCloser(body, world.lengths.tick);
-    plan(body, world.lengths.tick);
-    if (body.drive.going) world.goingBodies.push_back(i);
-    if (body.plan.farthest == 0 && !reachedOut) continue;
-    body.reach = boxOf(body);
-    if (body.plan.farthest > 0) body.reach = grown(body.reach, body.plan.farthest + lookout);
-    world.broadPhase.move(body.mover, body.reach);
+    body.velocity = body.angularVelocity = Vec3::Zero();
+    body.previousPosition = body.position;
+    body.previousOrientation = body.orientation;
+    updateAutoClose(body, world.settings.tickDuration);
+    planKinematicTarget(body, world.settings.tickDuration);
+    if (body.drive.moving) world.movingBodies.push_back(i);
+    if (body.kinematicTarget.maxDisplacement == 0 && !hadMotionBounds) continue;
+    body.motionBounds = computeAabb(body);
+    if (body.kinematicTarget.maxDisplacement > 0)
+      body.motionBounds =
+          inflated(body.motionBounds, body.kinematicTarget.maxDisplacement + margin);
+    world.broadPhase.move(body.proxy, body.motionBounds);
   }
 }
 
-double pushRoom(const WorldState& world, const Avatar& avatar) {
-  std::vector<std::uint32_t> rest = world.goingBodies;
+double computePushMargin(const WorldData& world, const Avatar& avatar) {
+  std::vector<std::uint32_t> rest = world.movingBodies;
   double room = 0;
-  // What one pushes may come into the way of another: at most as many rounds as bodies.
+  // A pushed body may enter the path of another one: at most as many passes as bodies.
   for (bool more = !rest.empty(); more;) {
     more = false;
-    const Box within = grown(avatar.reach, room);
+    const Aabb within = inflated(avatar.motionBounds, room);
     std::erase_if(rest, [&](std::uint32_t i) {
       const Body& body = world.bodies[i];
-      if (!overlaps(within, body.reach)) return false;
-      room += body.plan.farthest + 4 * world.lengths.epsilon;
+      if (!overlaps(within, body.motionBounds)) return false;
+      room += body.kinematicTarget.maxDisplacement + 4 * world.settings.contactOffset;
       return more = true;
     });
   }
-  // Free bodies push and carry, too, as far as they are driven themselves.
-  double carried = 0;
-  for (const auto& partner : world.broadPhase.partners(avatar.mover)) {
-    const auto found = partner.moves ? world.bodyOfMover.find(partner.id) : world.bodyOfMover.end();
-    if (found != world.bodyOfMover.end())
-      carried = std::max(carried, world.bodies[found->second].driven);
+  // Dynamic bodies push and carry, too, as far as kinematic bodies drive them.
+  double maxPush = 0;
+  for (const auto& overlap : world.broadPhase.overlapsOf(avatar.proxy)) {
+    const std::uint32_t body = overlap.isDynamic ? world.findBodyByProxy(overlap.id) : kNoBody;
+    if (body != kNoBody) maxPush = std::max(maxPush, world.bodies[body].kinematicPushBound);
   }
-  return carried > 0 ? room + carried + 4 * world.lengths.epsilon : room;
-}
-
-bool isBusy(const Body& body) {
-  const BodyDrive& drive = body.drive;
-  // What a path that goes round shakes never rests, as little as the path itself.
-  if (!isKinematic(body.spec->kind)) return !body.asleep && body.driven == 0;
-  if (goesRound(*body.spec)) return false;
-  return (drive.going && body.blockedBy == 0) || drive.closesIn >= 0;
+  return maxPush > 0 ? room + maxPush + 4 * world.settings.contactOffset : room;
 }
 
 namespace {
 
-BodyView viewOf(const Body& body, std::uint32_t index) {
-  BodyView view;
-  view.id = body.id;
-  view.index = index;
-  view.pose = {body.orientation, body.position};
-  view.displaced = body.turned || body.position != body.shape->origin;
-  view.coordinate = body.drive.coordinate;
-  view.velocity = body.velocity;
-  view.spin = body.spin;
-  view.swing = body.moved ? body.plan.swing : 0;
-  view.moving = body.moved || (body.spec->kind == BodyKind::rigid && !body.asleep);
-  view.blockedBy = body.blockedBy;
-  return view;
-}
-
-bool isAsViewed(const Body& body, const BodyView& view) {
-  return !view.moving && !body.moved && (body.asleep || isKinematic(body.spec->kind)) &&
-         view.blockedBy == body.blockedBy && view.coordinate == body.drive.coordinate;
+std::string describeAcceptedCommands(const BodySpec& spec) {
+  if (getTraits(spec.kind).takesStops) return "use to, level or stop";
+  if (!getTraits(spec.kind).takesKeys) return "use open, close, to or stop";
+  return spec.loops ? "use run or stop" : "use to, run or stop";
 }
 
 }  // namespace
 
-std::shared_ptr<const std::vector<BodyView>> viewsOfBodies(const WorldState& world) {
-  if (world.snapshot) {
-    const std::vector<BodyView>& last = *world.snapshot->bodies;
-    bool same = true;
-    for (std::size_t i = 0; same && i < last.size(); ++i)
-      same = isAsViewed(world.bodies[i], last[i]);
-    if (same) return world.snapshot->bodies;
-  }
-  auto views = std::make_shared<std::vector<BodyView>>();
-  for (const Body& body : world.bodies)
-    views->push_back(viewOf(body, static_cast<std::uint32_t>(views->size())));
-  return views;
-}
-
-namespace {
-
-std::string commandsOf(const BodySpec& spec) {
-  if (spec.kind == BodyKind::lift) return "give to, level or stop";
-  if (spec.kind != BodyKind::path) return "give open, close, to or stop";
-  return spec.loops ? "give run or stop" : "give to, run or stop";
-}
-
-}  // namespace
-
-std::optional<std::string> refusalOf(const Body& body, const BodyCommand& command,
-                                     const Lengths& lengths) {
+std::optional<std::string> validateBodyCommandFields(const Body& body, const BodyCommand& command,
+                                                     const WorldSettings& settings) {
   using Action = BodyCommand::Action;
   const BodySpec& spec = *body.spec;
-  const std::string kind = wordOf(spec.kind);
+  const std::string kind = toString(spec.kind);
   if (!isKinematic(spec.kind))
-    return "body '" + spec.name + "' is " + kind + ": it takes no commands";
-  const bool door = spec.kind == BodyKind::hinged || spec.kind == BodyKind::sliding;
-  const auto [low, high] = limitsOf(spec);
+    return "body '" + spec.name + "' is " + kind + ": it accepts no commands";
+  const bool door = getTraits(spec.kind).isDoor;
+  const auto [low, high] = getJointLimits(spec);
   if ((command.action == Action::open || command.action == Action::close) && !door)
-    return "body '" + spec.name + "' is no door but " + kind + ": " + commandsOf(spec);
-  if (command.action == Action::run && spec.kind != BodyKind::path)
-    return "run is for paths; body '" + spec.name + "' is " + kind + ": " + commandsOf(spec);
-  if (command.action == Action::to && goesRound(spec))
-    return "to: body '" + spec.name + "' goes round; " + commandsOf(spec);
-  if (command.action == Action::to && !(command.to >= low && command.to <= high))
-    return "to is " + std::to_string(command.to) + "; it must lie in " + std::to_string(low) +
-           ".." + std::to_string(high) + (spec.kind == BodyKind::hinged ? " radians" : "");
-  if (command.action == Action::level && command.level >= spec.stops.size())
+    return "body '" + spec.name + "' is not a door but " + kind + ": " +
+           describeAcceptedCommands(spec);
+  if (command.action == Action::run && !getTraits(spec.kind).takesKeys)
+    return "run is for paths; body '" + spec.name + "' is " + kind + ": " +
+           describeAcceptedCommands(spec);
+  if (command.action == Action::moveTo && isLoopingPath(spec))
+    return "to: body '" + spec.name + "' is a looping path; " + describeAcceptedCommands(spec);
+  if (command.action == Action::moveTo && !(command.target >= low && command.target <= high))
+    return "to is " + std::to_string(command.target) + "; it must lie in " + std::to_string(low) +
+           ".." + std::to_string(high) + (getTraits(spec.kind).rotates ? " radians" : "");
+  if (command.action == Action::moveToLevel && command.level >= spec.stops.size())
     return "level is " + std::to_string(command.level) + "; body '" + spec.name + "' has " +
            std::to_string(spec.stops.size()) + " stops, counted from 0";
   if (!command.speed) return std::nullopt;
-  if (auto why = refusalOfSpeed(*command.speed)) return why;
-  const double fastest = *command.speed * fastestPointOf(spec, body.shape->radius);
-  if (fastest <= lengths.speedLimit) return std::nullopt;
-  return "speed is " + std::to_string(*command.speed) + ", by which a point goes " +
-         std::to_string(fastest) + " m/s; none may be faster than " +
-         std::to_string(lengths.speedLimit) + " m/s";
+  if (auto error = validateSpeed(*command.speed)) return error;
+  const double maxSpeed = *command.speed * computeMaxPointSpeed(spec, body.shape->radius);
+  if (maxSpeed <= settings.maxSpeed) return std::nullopt;
+  return "speed is " + std::to_string(*command.speed) + ", which moves a point at " +
+         std::to_string(maxSpeed) + " m/s; the limit is " + std::to_string(settings.maxSpeed) +
+         " m/s";
 }
 
 }  // namespace enfilade::scene

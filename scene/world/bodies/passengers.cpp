@@ -1,24 +1,24 @@
 #include "scene/world/bodies/passengers.hpp"
 
 #include <set>
-#include <string>
 
 #include "collision/narrow_phase/contact_manifold.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-/// The steepest normal of parts that touch, from `a` to `b`: of a crate in a corner the nearest
-/// part may be the wall.
-double steepestTouch(const WorldState& world, const Body& a, const Body& b) {
+/// Y component of the steepest contact normal from `a` to `b` over all touching parts: the part
+/// nearest to a crate in a corner may belong to the wall.
+double findSteepestNormalY(const WorldData& world, const Body& a, const Body& b) {
   double steepest = 0;
-  const double near = contactLimit(world.lengths);
+  const double limit = computeContactThreshold(world.settings);
   for (std::uint32_t i = 0; i < a.partBoxes.size(); ++i) {
-    const Box box = grown(a.partBoxes[i], near);
+    const Aabb box = inflated(a.partBoxes[i], limit);
     for (std::uint32_t k = 0; k < b.partBoxes.size(); ++k) {
       if (!overlaps(box, b.partBoxes[k])) continue;
       collision::FeatureCache cache;
-      const auto at = collision::decideWithin(partOf(a, i), partOf(b, k), near, cache);
+      const auto at = collision::computeSeparationWithin(makePlacedPart(a, i), makePlacedPart(b, k),
+                                                         limit, cache);
       const bool touches = at && at->verdict != collision::Verdict::penetrating;
       if (touches && std::abs(at->normal.y()) > std::abs(steepest)) steepest = at->normal.y();
     }
@@ -26,81 +26,82 @@ double steepestTouch(const WorldState& world, const Body& a, const Body& b) {
   return steepest;
 }
 
-/// Whether the second stands on the first, > 0, or the first on the second, < 0; by the contact of
-/// the last tick.
-double standing(const WorldState& world, const Contact& contact, const Body& first,
-                const Body& second) {
-  const double least = world.lengths.walkableNormalY;
-  if (contact.decision.verdict == collision::Verdict::penetrating)  // there is no normal
+/// > 0: the second body stands on the first; < 0: the first stands on the second; 0: neither. Uses
+/// the contact of the last tick.
+double computeSupportNormalY(const WorldData& world, const Contact& contact, const Body& first,
+                             const Body& second) {
+  const double minNormalY = world.settings.walkableNormalY;
+  if (contact.separation.verdict == collision::Verdict::penetrating)  // there is no normal
     return second.position.y() - first.position.y();
-  double up = contact.decision.normal.y();
-  const bool isOne = first.partBoxes.size() == 1 && second.partBoxes.size() == 1;
-  if (std::abs(up) < least && !isOne) up = steepestTouch(world, first, second);
-  return std::abs(up) < least ? 0 : up;
+  double up = contact.separation.normal.y();
+  const bool haveOnePart = first.partBoxes.size() == 1 && second.partBoxes.size() == 1;
+  if (std::abs(up) < minNormalY && !haveOnePart) up = findSteepestNormalY(world, first, second);
+  return std::abs(up) < minNormalY ? 0 : up;
 }
 
-std::vector<Load> loadsOf(const WorldState& world, const Body& body, const Supports& supports) {
-  std::vector<Load> loads;
-  std::vector<EntityId> open{body.id};
-  std::set<EntityId> known{body.id};
-  while (!open.empty()) {
-    const EntityId below = open.back();
-    open.pop_back();
-    for (auto at = std::ranges::lower_bound(supports, std::pair(below, EntityId{0}));
-         at != supports.end() && at->first == below; ++at) {
-      if (!known.insert(at->second).second) continue;
-      open.push_back(at->second);
-      const std::uint32_t index = world.bodyOfId.at(at->second);
+std::vector<CarriedBody> findCarriedBodies(const WorldData& world, const Body& body,
+                                           const SupportGraph& supportGraph) {
+  std::vector<CarriedBody> carriedBodies;
+  std::vector<EntityId> pending{body.id};
+  std::set<EntityId> visited{body.id};
+  while (!pending.empty()) {
+    const EntityId below = pending.back();
+    pending.pop_back();
+    for (auto at = std::ranges::lower_bound(supportGraph, std::pair(below, EntityId{0}));
+         at != supportGraph.end() && at->first == below; ++at) {
+      if (!visited.insert(at->second).second) continue;
+      pending.push_back(at->second);
+      const std::uint32_t index = world.bodyIndexById.at(at->second);
       const Body& above = world.bodies[index];
-      loads.push_back({index, inBody(body, above.position), above.position.y(), above.risesBy});
+      carriedBodies.push_back(
+          {index, toBodyFrame(body, above.position), above.position.y(), above.pendingLift});
     }
   }
-  return loads;
+  return carriedBodies;
 }
 
-/// Avatars that the broad phase has near the body, in order of name.
-std::vector<Avatar*> avatarsNear(WorldState& world, const Body& body) {
-  std::vector<std::string> names;
-  for (const auto& partner : world.broadPhase.partners(body.mover)) {
-    if (!partner.moves) continue;
-    const auto found = world.avatarOfMover.find(partner.id);
-    if (found != world.avatarOfMover.end()) names.push_back(found->second);
-  }
-  std::sort(names.begin(), names.end());
+/// Avatars that overlap the body in the broad phase, sorted by name.
+std::vector<Avatar*> findNearbyAvatars(WorldData& world, const Body& body) {
   std::vector<Avatar*> avatars;
-  for (const std::string& name : names) avatars.push_back(&world.avatars.at(name));
+  for (const auto& overlap : world.broadPhase.overlapsOf(body.proxy))
+    if (Avatar* avatar = overlap.isDynamic ? world.findAvatarByProxy(overlap.id) : nullptr)
+      avatars.push_back(avatar);
+  std::ranges::sort(avatars);  // WorldData::avatars is sorted by name
   return avatars;
 }
 
-/// Where the avatar leans on the body, as near to its feet as that comes: carried by that point,
-/// who stands on what turns goes round with its feet, and who has a finger on it with the finger.
-Vec3 leaningPoint(const WorldState& world, const Body& body, const Avatar& avatar,
-                  const Contact& contact) {
-  const double near = contactLimit(world.lengths);
-  Box patch{contact.decision.pointB, contact.decision.pointB};
-  for (const AvatarPart& limb : avatar.shape->parts) {
-    const Box box = grown(boxAt(limb.box, avatar.feet), near);
+/// Support point of the avatar on the body, as close to its feet as the contact area allows. The
+/// avatar moves with this point: feet on a turntable follow the place below them, and a touching
+/// finger follows the fingertip.
+Vec3 findSupportPoint(const WorldData& world, const Body& body, const Avatar& avatar,
+                      const Contact& contact) {
+  const double limit = computeContactThreshold(world.settings);
+  Aabb contactArea{contact.separation.pointB, contact.separation.pointB};
+  for (const AvatarPart& avatarPart : avatar.shape->parts) {
+    const Aabb box = inflated(placeBox(avatarPart.box, avatar.footPosition), limit);
     for (std::uint32_t i = 0; i < body.partBoxes.size(); ++i) {
       if (!overlaps(box, body.partBoxes[i])) continue;
-      const collision::ConvexBody own = bodyAt(limb, avatar.feet), under = partOf(body, i);
+      const collision::PlacedConvex placedPart = placeAvatarPart(avatarPart, avatar.footPosition),
+                                    under = makePlacedPart(body, i);
       collision::FeatureCache cache;
-      const collision::Decision at = collision::decide(own, under, cache);
-      if (at.verdict != collision::Verdict::separated || at.distance >= near) continue;
-      if (-at.normal.y() < world.lengths.walkableNormalY) continue;
-      const collision::ContactManifold manifold = collision::contactManifold(
-          own, under,
-          {at.normal, at.pointA, at.pointB, near, collision::ContactManifold::kMostPoints});
-      for (const collision::ContactPoint& point : manifold.list()) patch.include(point.pointB);
+      const collision::SeparationResult at = collision::computeSeparation(placedPart, under, cache);
+      if (at.verdict != collision::Verdict::separated || at.distance >= limit) continue;
+      if (-at.normal.y() < world.settings.walkableNormalY) continue;
+      const collision::ContactManifold manifold = collision::computeContactManifold(
+          placedPart, under,
+          {at.normal, at.pointA, at.pointB, limit, collision::ContactManifold::kMaxPoints});
+      for (const collision::ContactPoint& point : manifold.activePoints())
+        contactArea.include(point.pointB);
     }
   }
-  return avatar.feet.cwiseMax(patch.min).cwiseMin(patch.max);
+  return avatar.footPosition.cwiseMax(contactArea.min).cwiseMin(contactArea.max);
 }
 
-bool standsOn(const WorldState& world, const Body& body, const Avatar& avatar, Vec3& at) {
+bool findStandingPoint(const WorldData& world, const Body& body, const Avatar& avatar, Vec3& at) {
   for (const Contact& contact : avatar.contacts) {
-    const bool below = -contact.decision.normal.y() >= world.lengths.walkableNormalY;
+    const bool below = -contact.separation.normal.y() >= world.settings.walkableNormalY;
     if (contact.other != body.id || !contact.touching || !below) continue;
-    at = leaningPoint(world, body, avatar, contact);
+    at = findSupportPoint(world, body, avatar, contact);
     return true;
   }
   return false;
@@ -108,43 +109,47 @@ bool standsOn(const WorldState& world, const Body& body, const Avatar& avatar, V
 
 }  // namespace
 
-Supports supportsOf(const WorldState& world) {
-  Supports supports;
-  if (world.avatars.empty() || world.goingBodies.empty()) return supports;
+SupportGraph buildSupportGraph(const WorldData& world) {
+  SupportGraph supportGraph;
+  if (world.avatars.empty() || world.movingBodies.empty()) return supportGraph;
   for (const auto& [pair, contact] : world.bodyContacts) {
     if (!contact.touching || pair.second >= world.firstAvatarId()) continue;
-    const auto first = world.bodyOfId.find(pair.first), second = world.bodyOfId.find(pair.second);
-    if (first == world.bodyOfId.end() || second == world.bodyOfId.end()) continue;
+    const auto first = world.bodyIndexById.find(pair.first),
+               second = world.bodyIndexById.find(pair.second);
+    if (first == world.bodyIndexById.end() || second == world.bodyIndexById.end()) continue;
     const Body &a = world.bodies[first->second], &b = world.bodies[second->second];
-    const double up = standing(world, contact, a, b);
+    const double up = computeSupportNormalY(world, contact, a, b);
     const Body &below = up > 0 ? a : b, &above = up > 0 ? b : a;
-    const bool carries = up != 0 && above.spec->kind == BodyKind::rigid && !above.left;
-    if (carries) supports.emplace_back(below.id, above.id);
+    const bool carries = up != 0 && isDynamic(above.spec->kind) && !above.outOfWorld;
+    if (carries) supportGraph.emplace_back(below.id, above.id);
   }
-  std::ranges::sort(supports);
-  return supports;
+  std::ranges::sort(supportGraph);
+  return supportGraph;
 }
 
-Company companyOf(WorldState& world, const Body& body, const Supports& supports) {
-  Company company{loadsOf(world, body, supports), avatarsNear(world, body), {}};
+Passengers findPassengers(WorldData& world, const Body& body, const SupportGraph& supportGraph) {
+  Passengers passengers{
+      findCarriedBodies(world, body, supportGraph), findNearbyAvatars(world, body), {}};
   Vec3 at;
-  for (Avatar* avatar : company.near)
-    if (avatar->grounded && standsOn(world, body, *avatar, at))
-      company.riders.push_back({avatar, inBody(body, at), false});
-  const std::size_t direct = company.riders.size();
-  for (Load& load : company.loads) {
-    const Body& loaded = world.bodies[load.index];
-    load.near = avatarsNear(world, loaded);
-    for (Avatar* avatar : load.near) {
-      if (!avatar->grounded || avatar->standsOn != loaded.id) continue;
-      const auto end = company.riders.begin() + static_cast<std::ptrdiff_t>(direct);
-      if (std::find_if(company.riders.begin(), end,
-                       [&](const Rider& rider) { return rider.avatar == avatar; }) == end)
-        company.riders.push_back({avatar, inBody(body, avatar->feet), true});
+  for (Avatar* avatar : passengers.nearbyAvatars)
+    if (avatar->grounded && findStandingPoint(world, body, *avatar, at))
+      passengers.avatars.push_back({avatar, toBodyFrame(body, at), false});
+  const std::size_t directCount = passengers.avatars.size();
+  for (CarriedBody& carried : passengers.bodies) {
+    const Body& carriedBody = world.bodies[carried.index];
+    carried.nearbyAvatars = findNearbyAvatars(world, carriedBody);
+    for (Avatar* avatar : carried.nearbyAvatars) {
+      if (!avatar->grounded || avatar->groundEntity != carriedBody.id) continue;
+      const auto end = passengers.avatars.begin() + static_cast<std::ptrdiff_t>(directCount);
+      if (std::find_if(passengers.avatars.begin(), end, [&](const CarriedAvatar& carriedAvatar) {
+            return carriedAvatar.avatar == avatar;
+          }) == end)
+        passengers.avatars.push_back({avatar, toBodyFrame(body, avatar->footPosition), true});
     }
   }
-  std::erase_if(company.loads, [](const Load& load) { return load.near.empty(); });
-  return company;
+  std::erase_if(passengers.bodies,
+                [](const CarriedBody& carried) { return carried.nearbyAvatars.empty(); });
+  return passengers;
 }
 
 }  // namespace enfilade::scene

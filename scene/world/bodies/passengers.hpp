@@ -1,5 +1,5 @@
-// Whom a driven body takes along in a tick, and who may be in its way: free bodies that rest on it,
-// avatars that stand on it or on those, and avatars near them.
+// Passengers of a kinematic body in a tick: dynamic bodies that rest on it, avatars that stand on
+// it or on those, and avatars near any of them, which may obstruct the motion.
 #pragma once
 
 #include <algorithm>
@@ -10,42 +10,42 @@
 
 namespace enfilade::scene {
 
-/// A free body that rests on the body, or on such a one. It is taken to rise as its middle is
-/// carried, straight up: what tilts, or is held, is left to the solver.
-struct Load {
-  std::uint32_t index;             ///< into WorldState::bodies
-  Vec3 middle;                     ///< in the carrier's frame
-  double height;                   ///< of the middle, when the tick began
-  double risen;                    ///< metres, by other driven bodies in this tick
-  double rise = 0;                 ///< metres, with the carrier so far
-  double toRise = 0;               ///< metres, on the way at hand
-  std::vector<Avatar*> near = {};  ///< whom it may meet
+/// A dynamic body that rests on the carrier, directly or on another carried body. It is assumed to
+/// rise straight up with its centre; the solver resolves tilting and obstruction.
+struct CarriedBody {
+  std::uint32_t index;                      ///< into WorldData::bodies
+  Vec3 centre;                              ///< in the carrier's frame
+  double initialHeight;                     ///< of the centre, at the start of the tick
+  double externalLift;                      ///< metres, by other kinematic bodies in this tick
+  double lift = 0;                          ///< metres, by the carrier so far
+  double remainingLift = 0;                 ///< metres, on the current motion
+  std::vector<Avatar*> nearbyAvatars = {};  ///< avatars that it may hit
 
-  /// Where it is already; the way at hand may end below.
-  double from() const { return std::max(rise, risen); }
-  bool isLifted() const { return rise + toRise > from(); }
+  /// Lift that is already applied; the current motion may end below it.
+  double appliedLift() const { return std::max(lift, externalLift); }
+  bool isLifted() const { return lift + remainingLift > appliedLift(); }
 };
 
-struct Rider {
+struct CarriedAvatar {
   Avatar* avatar;
-  Vec3 contact;         ///< on the body, in its frame
-  bool onLoad;          ///< stands on a load, not on the body itself
-  bool lifted = false;  ///< all of the way at hand: no load comes nearer
+  Vec3 contact;              ///< on the carrier, in its frame
+  bool onCarriedBody;        ///< stands on a carried body, not on the carrier itself
+  bool fullyLifted = false;  ///< for the whole current motion: no carried body gets closer
 };
 
-/// Who goes with the driven body in this tick, or may be in its way.
-struct Company {
-  std::vector<Load> loads;  ///< near somebody
-  std::vector<Avatar*> near;
-  std::vector<Rider> riders;
+/// Passengers of a kinematic body in this tick, and the avatars that may obstruct it.
+struct Passengers {
+  std::vector<CarriedBody> bodies;  ///< those with an avatar nearby
+  std::vector<Avatar*> nearbyAvatars;
+  std::vector<CarriedAvatar> avatars;
 };
 
-/// Which free body stands on which body: the lower one first; ascending.
-using Supports = std::vector<std::pair<EntityId, EntityId>>;
+/// Pairs (lower body, dynamic body that stands on it), ascending.
+using SupportGraph = std::vector<std::pair<EntityId, EntityId>>;
 
-/// Of the last tick. None where there is nobody whom they could lift.
-Supports supportsOf(const WorldState& world);
+/// Built from the contacts of the last tick. Empty if no avatar or moving kinematic body exists.
+SupportGraph buildSupportGraph(const WorldData& world);
 
-Company companyOf(WorldState& world, const Body& body, const Supports& supports);
+Passengers findPassengers(WorldData& world, const Body& body, const SupportGraph& supportGraph);
 
 }  // namespace enfilade::scene

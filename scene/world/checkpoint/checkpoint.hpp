@@ -1,10 +1,8 @@
-// A world as bytes, and back: whole, with all that may change the last bits of what comes later, so
-// that the copy goes on with the state hash of the original at every tick.
-//
-// The bytes are of one version of this program's layout (kCheckpointVersion). They begin with eight
-// bytes that tell what they are, the version, the scene's hash and the length of what follows, and
-// end with a checksum. What can be worked out exactly is not among them: the scene, shapes that
-// follow from the orders that made them, pairs of boxes.
+// Checkpoints: the complete state of a world as bytes. A restored world has the same state hash as
+// the original at every later tick.
+// The layout belongs to one version (kCheckpointVersion). The bytes are: 8 bytes of magic, the
+// version, the scene's hash, the length of the content, the content, a checksum. State that can be
+// recomputed exactly is left out: the scene, shapes that follow from spawn orders, pairs of AABBs.
 #pragma once
 
 #include <cstdint>
@@ -17,26 +15,25 @@
 
 namespace enfilade::scene {
 
-/// Goes up whenever the bytes of the same world would be others.
+/// Increases with every change of the layout.
 inline constexpr std::uint32_t kCheckpointVersion = 3;
 
-/// Why bytes make no world: what is wrong, and where.
+/// Reason why the bytes are not a valid checkpoint, with the place.
 struct CheckpointError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Between two ticks. Whether ticks are audited, and by how many threads they are made, is no part
-/// of it.
-std::vector<std::uint8_t> checkpointOf(const World& world);
+/// Call between two ticks. Auditing and the number of threads are not part of a checkpoint.
+std::vector<std::uint8_t> makeCheckpoint(const World& world);
 
-/// The world of which `checkpoint` was taken, in the same scene. Throws CheckpointError where the
-/// bytes are damaged, of another version or scene, or where no world can be as they say.
-World worldFrom(std::shared_ptr<const Scene> scene, std::span<const std::uint8_t> checkpoint);
+/// Restores the world of `checkpoint` in the same scene. Throws CheckpointError if the bytes are
+/// damaged, have another version or scene, or describe an impossible world.
+World restoreWorld(std::shared_ptr<const Scene> scene, std::span<const std::uint8_t> checkpoint);
 
-/// That the bytes say they are of; 0: they are no checkpoint.
-std::uint32_t checkpointVersion(std::span<const std::uint8_t> checkpoint);
+/// Version in the header; 0: not a checkpoint.
+std::uint32_t readCheckpointVersion(std::span<const std::uint8_t> checkpoint);
 
-/// Makes the checksum fit bytes that were changed on purpose, as a test does.
-void sealCheckpoint(std::vector<std::uint8_t>& bytes);
+/// Recomputes the checksum after a deliberate change of the bytes, for tests.
+void recomputeChecksum(std::vector<std::uint8_t>& bytes);
 
 }  // namespace enfilade::scene

@@ -1,130 +1,146 @@
 #include "scene/world/checkpoint/checkpoint_validation.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <set>
 
+#include "scene/world/avatars/spawn.hpp"
+#include "scene/world/bodies/kinematic_drive.hpp"
 #include "scene/world/checkpoint/layouts.hpp"
+#include "scene/world/data/validation.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-void require(bool good, const std::string& what) {
-  if (!good) throw CheckpointError("the checkpoint tells of no world that can be: " + what);
+void require(bool condition, const std::string& message) {
+  if (!condition) throw CheckpointError("the checkpoint describes an impossible world: " + message);
 }
 
-void requireNone(const std::optional<std::string>& refusal, const std::string& whose) {
-  require(!refusal, whose + ": " + refusal.value_or(""));
+void requireValid(const std::optional<std::string>& error, const std::string& subject) {
+  require(!error, subject + ": " + error.value_or(""));
 }
 
-struct Check {
-  const WorldState& world;
+template <class Named>
+bool doNamesAscend(const std::vector<Named>& list) {
+  return std::ranges::adjacent_find(list, std::ranges::greater_equal(), &Named::name) == list.end();
+}
 
-  const Lengths& lengths() const { return world.lengths; }
+struct CheckpointChecker {
+  const WorldData& world;
+
+  const WorldSettings& settings() const { return world.settings; }
   bool isAvatar(EntityId id) const { return id >= world.firstAvatarId(); }
   bool isKnown(EntityId id) const {
-    return id < world.firstAvatarId() + world.avatarNames.size();  // 0: nobody
+    return id < world.firstAvatarId() + world.avatarNames.size();  // 0: none
   }
-  const Avatar* avatar(EntityId id) const {
-    if (!isAvatar(id) || !isKnown(id)) return nullptr;
-    const auto at = world.avatars.find(world.avatarNames[id - world.firstAvatarId()]);
-    return at != world.avatars.end() && at->second.id == id ? &at->second : nullptr;
-  }
-  const Body* body(EntityId id) const {
-    const auto at = world.bodyOfId.find(id);
-    return at == world.bodyOfId.end() ? nullptr : &world.bodies[at->second];
+  const Body* findBody(EntityId id) const {
+    const auto at = world.bodyIndexById.find(id);
+    return at == world.bodyIndexById.end() ? nullptr : &world.bodies[at->second];
   }
 
-  void contacts(const Avatar& avatar, const std::string& name) const {
+  void checkContacts(const Avatar& avatar, const std::string& name) const {
     for (std::size_t i = 0; i < avatar.contacts.size(); ++i) {
       const EntityId other = avatar.contacts[i].other;
-      require(other != 0 && isKnown(other), name + " touches what is not there");
+      require(other != 0 && isKnown(other), name + " touches an unknown entity");
       require(i == 0 || avatar.contacts[i - 1].other < other, name + "'s contacts do not ascend");
     }
   }
-  std::size_t partsOf(const Obstacle& obstacle) const {
-    if (const Body* met = body(obstacle.entity)) return met->partBoxes.size();
+  std::size_t countParts(const Obstacle& obstacle) const {
+    if (const Body* body = findBody(obstacle.entity)) return body->partBoxes.size();
     if (!isAvatar(obstacle.entity))
-      return obstacle.entity == 0 ? 0 : world.scene->parts(obstacle.entity - 1).size();
-    if (const Avatar* met = avatar(obstacle.entity)) return met->shape->parts.size();
-    // One who left after the broad phase was asked: it is looked for anew before it is met.
+      return obstacle.entity == 0 ? 0 : world.scene->collisionGeometry(obstacle.entity - 1).size();
+    if (const Avatar* avatar = world.findAvatar(obstacle.entity))
+      return avatar->shape->parts.size();
+    // An avatar that left after the broad phase ran: its parts are looked up again before use.
     return isKnown(obstacle.entity) ? ~std::size_t{0} : 0;
   }
-  void obstacles(const Avatar& avatar, const std::string& name) const {
+  void checkObstacles(const Avatar& avatar, const std::string& name) const {
     const Obstacle* last = nullptr;
     for (const Obstacle& obstacle : avatar.obstacles) {
-      require(obstacle.part < partsOf(obstacle), name + " is near a part that is not there");
-      require(avatar.pairsChanged || !isAvatar(obstacle.entity) || this->avatar(obstacle.entity),
-              name + " is near somebody who left, and nobody will look");
+      require(obstacle.part < countParts(obstacle), name + " has an obstacle with an unknown part");
+      require(
+          avatar.pairsChanged || !isAvatar(obstacle.entity) || world.findAvatar(obstacle.entity),
+          name + " has an obstacle that left, without a pending update");
       require(obstacle.moreCaches.size() < avatar.shape->parts.size(),
-              name + " has fewer parts than are near something");
+              name + " has obstacle caches of unknown parts");
       require(
           !last || std::pair(last->entity, last->part) < std::pair(obstacle.entity, obstacle.part),
           name + "'s obstacles do not ascend");
       last = &obstacle;
     }
   }
-  void queue(const std::string& name) const {
-    const auto at = world.queues.find(name);
-    const Avatar* avatar = world.avatars.contains(name) ? &world.avatars.at(name) : nullptr;
-    if (!avatar) return;
-    const bool waits = at != world.queues.end() && !at->second.empty();
-    const Walk* walk = waits ? std::get_if<Walk>(&at->second.front().order) : nullptr;
-    require(avatar->walk.leg < (walk ? walk->along.size() : 1), name + " walks to no way point");
-    if (avatar->chain.speed == 0) return;
-    const auto* joints = waits ? std::get_if<DriveJoints>(&at->second.front().order) : nullptr;
-    require(joints && joints->to.size() <= avatar->chain.links.size(),
-            name + " moves joints that nobody drives");
+  void checkQueue(const Avatar& avatar) const {
+    const auto queue = std::ranges::lower_bound(world.queues, avatar.name, {}, &OrderQueue::name);
+    require(queue != world.queues.end() && queue->avatar == avatar.id,
+            avatar.name + " has no queue");
+    const Order* order = queue->orders.empty() ? nullptr : &queue->orders.front().order;
+    const Walk* walk = order ? std::get_if<Walk>(order) : nullptr;
+    require(avatar.walk.waypointIndex < (walk ? walk->waypoints.size() : 1),
+            avatar.name + " has an unknown waypoint");
+    if (avatar.chain.speed == 0) return;
+    const auto* joints = order ? std::get_if<DriveJoints>(order) : nullptr;
+    require(joints && joints->targets.size() <= avatar.chain.links.size(),
+            avatar.name + " moves joints without a command");
   }
-  void avatars() const {
-    std::set<collision::MoverId> movers;
-    for (const Body& body : world.bodies) movers.insert(body.mover);
-    for (const auto& [name, a] : world.avatars) {
-      require(isAvatar(a.id) && avatar(a.id) == &a, name + " has the id of somebody else");
-      require(movers.insert(a.mover).second, name + " has the box of somebody else");
-      require(isKnown(a.standsOn) && isKnown(a.stoppedBy), name + " met what is not there");
-      require(a.chain.speed >= 0 && a.chain.speed <= lengths().jointSpeedLimit,
+  void checkAvatars() const {
+    std::set<collision::ProxyId> proxies;
+    for (const Body& body : world.bodies) proxies.insert(body.proxy);
+    require(doNamesAscend(world.avatars), "names of avatars do not ascend");
+    for (const Avatar& a : world.avatars) {
+      const std::string& name = a.name;
+      require(
+          world.findAvatar(a.id) == &a && world.avatarNames[a.id - world.firstAvatarId()] == name,
+          name + " has the id of another avatar");
+      require(proxies.insert(a.proxy).second, name + " has the proxy of another entity");
+      require(isKnown(a.groundEntity) && isKnown(a.blockedBy),
+              name + " refers to an unknown entity");
+      require(a.chain.speed >= 0 && a.chain.speed <= settings().maxJointSpeed,
               name + "'s joints are too fast");
       for (const ChainLink& link : a.chain.links)
-        require(isKnown(link.stoppedBy) && std::min(link.value, link.target) >= link.joint.low &&
+        require(isKnown(link.blockedBy) && std::min(link.value, link.target) >= link.joint.low &&
                     std::max(link.value, link.target) <= link.joint.high,
-                name + " has a joint where it cannot be");
-      contacts(a, name);
-      obstacles(a, name);
-      queue(name);
+                name + " has a joint outside its limits");
+      checkContacts(a, name);
+      checkObstacles(a, name);
+      checkQueue(a);
     }
   }
-  void orders() const {
-    for (const auto& [name, queue] : world.queues)
-      for (const QueuedOrder& queued : queue)
-        requireNone(refusalOf(Command{name, queued.order, queued.tag}, lengths()), name);
-    for (const Command& command : world.incoming)
-      requireNone(refusalOf(command, lengths()), command.avatar);
-    for (const BodyCommand& command : world.incomingForBodies) {
+  void checkOrders() const {
+    require(doNamesAscend(world.queues), "names of queues do not ascend");
+    for (const OrderQueue& queue : world.queues)
+      for (const QueuedOrder& queued : queue.orders)
+        requireValid(validateCommandFields({queue.name, queued.order, queued.tag}, settings()),
+                     queue.name);
+    for (const Command& command : world.pendingCommands)
+      requireValid(validateCommandFields(command, settings()), command.avatar);
+    for (const BodyCommand& command : world.pendingBodyCommands) {
       const auto at = std::find_if(world.bodies.begin(), world.bodies.end(), [&](const Body& body) {
         return body.spec->name == command.body;
       });
-      require(at != world.bodies.end(), "there is no body '" + command.body + "'");
-      requireNone(refusalOf(*at, command, lengths()), command.body);
+      require(at != world.bodies.end(), "no body named '" + command.body + "'");
+      requireValid(validateBodyCommandFields(*at, command, settings()), command.body);
     }
-    require(world.waiting <= kMostWaiting, "too many orders wait");
+    require(world.queuedOrderCount <= kMaxQueuedOrders, "too many orders are queued");
   }
-  void bodies() const {
+  void checkBodies() const {
     for (const Body& b : world.bodies) {
-      require(isKnown(b.blockedBy), b.spec->name + " is blocked by nobody");
-      require(!isKinematic(b.spec->kind) || b.drive.speed > 0, b.spec->name + " goes at no speed");
-      require(b.plan.farthest >= 0 && b.plan.swing >= 0, b.spec->name + " goes less than nothing");
-      require(std::is_sorted(b.inside.begin(), b.inside.end()), b.spec->name + "'s visitors");
-      for (const EntityId who : b.inside) {
-        const Body* visitor = body(who);
-        require(avatar(who) || (visitor && visitor->spec->kind != BodyKind::trigger),
-                b.spec->name + " is visited by nobody");
+      require(isKnown(b.blockedBy), b.spec->name + " is blocked by an unknown entity");
+      require(!isKinematic(b.spec->kind) || b.drive.speed > 0, b.spec->name + " has no speed");
+      require(b.kinematicTarget.maxDisplacement >= 0 && b.kinematicTarget.velocityDeviation >= 0,
+              b.spec->name + " moves by less than 0");
+      require(std::is_sorted(b.occupants.begin(), b.occupants.end()),
+              b.spec->name + "'s occupant order");
+      for (const EntityId occupant : b.occupants) {
+        const Body* visitor = findBody(occupant);
+        require(world.findAvatar(occupant) || (visitor && !isTrigger(visitor->spec->kind)),
+                b.spec->name + " contains an unknown entity");
       }
     }
     const EntityPair* last = nullptr;
     for (const auto& [key, contact] : world.bodyContacts) {
-      require(
-          body(key.first) && key.second != 0 && isKnown(key.second) && contact.other == key.second,
-          "a body touches what is not there");
+      require(findBody(key.first) && key.second != 0 && isKnown(key.second) &&
+                  contact.other == key.second,
+              "a body touches an unknown entity");
       require(!last || *last < key, "contacts of bodies do not ascend");
       last = &key;
     }
@@ -136,65 +152,69 @@ bool isRotation(const collision::Mat3& m) {
   return ((m * m.transpose() - collision::Mat3::Identity()).array().abs() <= kRounding).all();
 }
 
-std::size_t partsOf(const Solid& solid) {
-  return solid.parts.size() + (solid.mesh ? solid.mesh->triangles().size() : 0);
+std::size_t countConvexParts(const PhysicsBody& body) {
+  return body.parts.size() + (body.mesh ? body.mesh->triangles().size() : 0);
 }
 
 }  // namespace
 
-void shapeAsRead(const Reader& a, Avatar& avatar) {
+void restoreAvatarShape(const Reader& a, Avatar& avatar) {
   constexpr double kRounding = 1e-12;
   Spawn order;
-  if (avatar.madeOf) {
-    order = *avatar.madeOf;
-    if (order.parts.empty() && order.links.empty()) a.refuse("a prism needs no order");
+  if (avatar.spawnOrder) {
+    order = *avatar.spawnOrder;
+    if (order.parts.empty() && order.links.empty()) a.refuse("a prism must not have a spawn order");
   } else {
     order.radius = avatar.radius;
-    order.height = avatar.standing;
+    order.height = avatar.spawnHeight;
   }
-  if (const auto why = refusalOf(Command{"avatar", order, 0}, {})) a.refuse(*why);
-  const double standing = avatar.standing, height = avatar.height, radius = avatar.radius;
+  if (const auto error = validateCommandFields(Command{"avatar", order, 0}, {})) a.refuse(*error);
+  const double spawnHeight = avatar.spawnHeight, height = avatar.height, radius = avatar.radius;
   try {
-    shapeAvatar(order, a.lengths, avatar);
-  } catch (const std::invalid_argument& why) {
-    a.refuse(why.what());
+    applySpawnShape(order, a.settings, avatar);
+  } catch (const std::invalid_argument& error) {
+    a.refuse(error.what());
   }
-  const bool same = avatar.standing == standing && avatar.radius == radius;
-  const bool crouches = !avatar.madeOf && height < standing;
-  if (!same || (height != standing && !crouches) || height < (kLowestCrouch - kRounding) * standing)
-    a.refuse("an avatar is as high as it cannot be");
-  if (crouches) avatar.shape = prismShape(radius, height, standing, a.lengths);
+  const bool same = avatar.spawnHeight == spawnHeight && avatar.radius == radius;
+  const bool isCrouching = !avatar.spawnOrder && height < spawnHeight;
+  if (!same || (height != spawnHeight && !isCrouching) ||
+      height < (kMinCrouchFraction - kRounding) * spawnHeight)
+    a.refuse("an avatar has an impossible height");
+  if (isCrouching) avatar.shape = makePrismShape(radius, height, spawnHeight, a.settings);
   avatar.height = height;
 }
 
-void checkRead(const WorldState& world) {
-  const Check check{world};
-  check.orders();
-  check.bodies();
-  check.avatars();
+void validateRestoredWorld(const WorldData& world) {
+  const CheckpointChecker checker{world};
+  checker.checkOrders();
+  checker.checkBodies();
+  checker.checkAvatars();
 }
 
-void checkRigids(const WorldState& world) {
-  const RigidStage& stage = world.rigids;
-  const std::vector<Solid>& solids = stage.dynamics.solids;
-  for (std::uint32_t i = 0; i < stage.bodies.size(); ++i)
-    require(stage.solidOf[stage.bodies[i]] == i, "the free bodies are not the first solids");
-  for (const Solid& solid : solids)
-    require((solid.gaits.empty() || solid.gaits.size() == kSolverSubsteps) && !(solid.leash < 0) &&
-                isRotation(solid.rotation),
-            "a solid goes or stands as none can");
-  const std::set<std::uint32_t> vacant(stage.vacant.begin(), stage.vacant.end());
-  const NearPair* last = nullptr;
-  for (const NearPair& pair : stage.dynamics.pairs) {
+void validateDynamicBodies(const WorldData& world) {
+  const DynamicBodies& dynamicBodies = world.dynamicBodies;
+  const std::vector<PhysicsBody>& physicsBodies = dynamicBodies.physicsWorld.bodies;
+  for (std::uint32_t i = 0; i < dynamicBodies.bodyIndices.size(); ++i)
+    require(dynamicBodies.physicsBodyOf[dynamicBodies.bodyIndices[i]] == i,
+            "dynamic bodies are not the first physics bodies");
+  for (const PhysicsBody& body : physicsBodies)
+    require((body.substepVelocities.empty() || body.substepVelocities.size() == kSolverSubsteps) &&
+                !(body.maxStepDisplacement < 0) && isRotation(body.rotation),
+            "a physics body has an impossible motion or pose");
+  const std::set<std::uint32_t> freeSlots(dynamicBodies.freeSlots.begin(),
+                                          dynamicBodies.freeSlots.end());
+  const BodyPair* last = nullptr;
+  for (const BodyPair& pair : dynamicBodies.physicsWorld.pairs) {
     const auto [a, b, partA, partB] = pair.key;
-    require(a < b && b < solids.size() && !vacant.contains(a) && !vacant.contains(b),
-            "two solids meet of which one is not there");
-    // A solid without parts is of an avatar that has another shape now: its pairs are forgotten
-    // before they are asked for.
-    require((partsOf(solids[a]) == 0 || partA < partsOf(solids[a])) &&
-                (partsOf(solids[b]) == 0 || partB < partsOf(solids[b])),
-            "two solids meet by a part that is not there");
-    require(!last || last->key < pair.key, "pairs of solids do not ascend");
+    require(a < b && b < physicsBodies.size() && !freeSlots.contains(a) && !freeSlots.contains(b),
+            "a pair has an unknown physics body");
+    // A physics body without parts belongs to an avatar that has another shape now: its pairs are
+    // dropped before use.
+    require(
+        (countConvexParts(physicsBodies[a]) == 0 || partA < countConvexParts(physicsBodies[a])) &&
+            (countConvexParts(physicsBodies[b]) == 0 || partB < countConvexParts(physicsBodies[b])),
+        "a pair has an unknown part");
+    require(!last || last->key < pair.key, "pairs of physics bodies do not ascend");
     last = &pair;
   }
 }

@@ -1,14 +1,14 @@
-// What must be true of a world that was read, so that nothing in it points beyond what there is: a
-// checksum proves that bytes are as somebody wrote them, not who did.
+// Validation of a restored world, so that no index or pointer leaves its range. The checksum
+// detects damage, not forgery.
 #pragma once
 
 #include "scene/world/data/world_data.hpp"
 
 namespace enfilade::scene {
 
-/// All but the free bodies' solids, which are not made yet. Throws CheckpointError.
-void checkRead(const WorldState& world);
-/// Solids and pairs.
-void checkRigids(const WorldState& world);
+/// Validates all state but the physics bodies, which do not exist yet. Throws CheckpointError.
+void validateRestoredWorld(const WorldData& world);
+/// Validates physics bodies and pairs. Throws CheckpointError.
+void validateDynamicBodies(const WorldData& world);
 
 }  // namespace enfilade::scene

@@ -1,6 +1,5 @@
-// How what a world is made of lies in a checkpoint. A member that is named in a binding and does
-// not follow in `a(...)` is worked out when a world is read, or made anew before it is next asked
-// for; which of the two is said beside it.
+// Checkpoint layouts of the world's types. A member that is in a binding but not in `a(...)` is
+// recomputed when a world is read, or before its next use; a comment says which.
 #pragma once
 
 #include "scene/world/checkpoint/archive.hpp"
@@ -9,31 +8,31 @@
 namespace enfilade::scene {
 
 template <>
-struct MostOf<collision::Verdict> {
+struct MaxEnumerator<collision::Verdict> {
   static constexpr auto value = collision::Verdict::penetrating;
 };
 template <>
-struct MostOf<collision::DecidedBy> {
-  static constexpr auto value = collision::DecidedBy::rational;
+struct MaxEnumerator<collision::Certificate> {
+  static constexpr auto value = collision::Certificate::rational;
 };
 template <>
-struct MostOf<collision::Feature> {
+struct MaxEnumerator<collision::Feature> {
   static constexpr auto value = collision::Feature::face;
 };
 template <>
-struct MostOf<CloseUp::Plane> {
-  static constexpr auto value = CloseUp::Plane::faceOfB;
+struct MaxEnumerator<PairCache::NormalSource> {
+  static constexpr auto value = PairCache::NormalSource::faceB;
 };
 template <>
-struct MostOf<LinkJoint::Kind> {
+struct MaxEnumerator<LinkJoint::Kind> {
   static constexpr auto value = LinkJoint::Kind::prismatic;
 };
 template <>
-struct MostOf<BodyCommand::Action> {
+struct MaxEnumerator<BodyCommand::Action> {
   static constexpr auto value = BodyCommand::Action::run;
 };
 template <>
-struct MostOf<Sliding> {
+struct MaxEnumerator<Sliding> {
   static constexpr auto value = Sliding::stop;
 };
 
@@ -42,17 +41,17 @@ struct MostOf<Sliding> {
 template <>
 struct Layout<collision::VertexPair> {
   template <class A>
-  static void archive(A& a, Held<A, collision::VertexPair>& pair) {
-    auto& [ofA, ofB] = pair;
-    a(ofA, ofB);
+  static void archive(A& a, MaybeConst<A, collision::VertexPair>& pair) {
+    auto& [vertexA, vertexB] = pair;
+    a(vertexA, vertexB);
   }
 };
 
-/// Most are of obstacles that were never near, of which nothing is known.
+/// Most caches belong to obstacles that were never close; these hold no features.
 template <>
 struct Layout<collision::FeatureCache> {
   template <class A>
-  static void archive(A& a, Held<A, collision::FeatureCache>& cache) {
+  static void archive(A& a, MaybeConst<A, collision::FeatureCache>& cache) {
     auto& [pairs, size, axis] = cache;
     bool known = false;
     if constexpr (A::kWrites)
@@ -61,30 +60,30 @@ struct Layout<collision::FeatureCache> {
     if (!known) return;
     a(pairs, size, axis);
     if constexpr (!A::kWrites)
-      if (size < 0 || size > 4) a.refuse("features of " + std::to_string(size) + " pairs");
+      if (size < 0 || size > 4) a.refuse("a feature cache has " + std::to_string(size) + " pairs");
   }
 };
 
 template <>
-struct Layout<collision::Decision> {
+struct Layout<collision::SeparationResult> {
   template <class A>
-  static void archive(A& a, Held<A, collision::Decision>& decision) {
-    auto& [verdict, decidedBy, featureA, featureB, distance, errorBound, pointA, pointB, normal] =
-        decision;
-    a(verdict, decidedBy, featureA, featureB, distance, errorBound, pointA, pointB, normal);
+  static void archive(A& a, MaybeConst<A, collision::SeparationResult>& separation) {
+    auto& [verdict, certificate, featureA, featureB, distance, errorBound, pointA, pointB, normal] =
+        separation;
+    a(verdict, certificate, featureA, featureB, distance, errorBound, pointA, pointB, normal);
   }
 };
 
 template <>
 struct Layout<collision::DepthCache> {
   template <class A>
-  static void archive(A& a, Held<A, collision::DepthCache>& cache) {
+  static void archive(A& a, MaybeConst<A, collision::DepthCache>& cache) {
     auto& [vertices, facets] = cache;
     a(vertices, facets);
     if constexpr (!A::kWrites)
       for (const auto& facet : facets)
         for (const std::uint16_t corner : facet)
-          if (corner >= vertices.size()) a.refuse("a facet has a corner that is not there");
+          if (corner >= vertices.size()) a.refuse("a facet has an unknown corner");
   }
 };
 
@@ -93,7 +92,7 @@ struct Layout<collision::DepthCache> {
 template <>
 struct Layout<LinkJoint> {
   template <class A>
-  static void archive(A& a, Held<A, LinkJoint>& joint) {
+  static void archive(A& a, MaybeConst<A, LinkJoint>& joint) {
     auto& [kind, anchor, axis, low, high] = joint;
     a(kind, anchor, axis, low, high);
   }
@@ -101,7 +100,7 @@ struct Layout<LinkJoint> {
 template <>
 struct Layout<Link> {
   template <class A>
-  static void archive(A& a, Held<A, Link>& link) {
+  static void archive(A& a, MaybeConst<A, Link>& link) {
     auto& [parent, joint, points, value] = link;
     a(parent, joint, points, value);
   }
@@ -109,31 +108,31 @@ struct Layout<Link> {
 template <>
 struct Layout<Spawn> {
   template <class A>
-  static void archive(A& a, Held<A, Spawn>& spawn) {
-    auto& [at, facing, radius, height, flying, parts, links, selfContact] = spawn;
-    a(at, facing, radius, height, flying, parts, links, selfContact);
+  static void archive(A& a, MaybeConst<A, Spawn>& spawn) {
+    auto& [position, facing, radius, height, flying, parts, links, selfContact] = spawn;
+    a(position, facing, radius, height, flying, parts, links, selfContact);
   }
 };
 template <>
 struct Layout<Walk> {
   template <class A>
-  static void archive(A& a, Held<A, Walk>& walk) {
-    auto& [along, speed] = walk;
-    a(along, speed);
+  static void archive(A& a, MaybeConst<A, Walk>& walk) {
+    auto& [waypoints, speed] = walk;
+    a(waypoints, speed);
   }
 };
 template <>
 struct Layout<Look> {
   template <class A>
-  static void archive(A& a, Held<A, Look>& look) {
-    auto& [at] = look;
-    a(at);
+  static void archive(A& a, MaybeConst<A, Look>& look) {
+    auto& [target] = look;
+    a(target);
   }
 };
 template <>
 struct Layout<Wait> {
   template <class A>
-  static void archive(A& a, Held<A, Wait>& wait) {
+  static void archive(A& a, MaybeConst<A, Wait>& wait) {
     auto& [seconds] = wait;
     a(seconds);
   }
@@ -141,22 +140,22 @@ struct Layout<Wait> {
 template <>
 struct Layout<Capture> {
   template <class A>
-  static void archive(A& a, Held<A, Capture>& capture) {
-    auto& [as] = capture;
-    a(as);
+  static void archive(A& a, MaybeConst<A, Capture>& capture) {
+    auto& [name] = capture;
+    a(name);
   }
 };
 template <>
 struct Layout<Leave> {
   template <class A>
-  static void archive(A&, Held<A, Leave>&) {
+  static void archive(A&, MaybeConst<A, Leave>&) {
     static_assert(std::is_empty_v<Leave>);
   }
 };
 template <>
 struct Layout<Drive> {
   template <class A>
-  static void archive(A& a, Held<A, Drive>& drive) {
+  static void archive(A& a, MaybeConst<A, Drive>& drive) {
     auto& [velocity] = drive;
     a(velocity);
   }
@@ -164,7 +163,7 @@ struct Layout<Drive> {
 template <>
 struct Layout<Jump> {
   template <class A>
-  static void archive(A& a, Held<A, Jump>& jump) {
+  static void archive(A& a, MaybeConst<A, Jump>& jump) {
     auto& [height, velocity] = jump;
     a(height, velocity);
   }
@@ -172,7 +171,7 @@ struct Layout<Jump> {
 template <>
 struct Layout<Fly> {
   template <class A>
-  static void archive(A& a, Held<A, Fly>& fly) {
+  static void archive(A& a, MaybeConst<A, Fly>& fly) {
     auto& [on] = fly;
     a(on);
   }
@@ -180,7 +179,7 @@ struct Layout<Fly> {
 template <>
 struct Layout<Crouch> {
   template <class A>
-  static void archive(A& a, Held<A, Crouch>& crouch) {
+  static void archive(A& a, MaybeConst<A, Crouch>& crouch) {
     auto& [height] = crouch;
     a(height);
   }
@@ -188,15 +187,15 @@ struct Layout<Crouch> {
 template <>
 struct Layout<DriveJoints> {
   template <class A>
-  static void archive(A& a, Held<A, DriveJoints>& drive) {
-    auto& [to, speed, atOnce] = drive;
-    a(to, speed, atOnce);
+  static void archive(A& a, MaybeConst<A, DriveJoints>& drive) {
+    auto& [targets, speed, immediate] = drive;
+    a(targets, speed, immediate);
   }
 };
 template <>
 struct Layout<Command> {
   template <class A>
-  static void archive(A& a, Held<A, Command>& command) {
+  static void archive(A& a, MaybeConst<A, Command>& command) {
     auto& [avatar, order, tag] = command;
     a(avatar, order, tag);
   }
@@ -204,27 +203,37 @@ struct Layout<Command> {
 template <>
 struct Layout<BodyCommand> {
   template <class A>
-  static void archive(A& a, Held<A, BodyCommand>& command) {
-    auto& [body, action, to, level, speed] = command;
-    a(body, action, to, level, speed);
+  static void archive(A& a, MaybeConst<A, BodyCommand>& command) {
+    auto& [body, action, target, level, speed] = command;
+    a(body, action, target, level, speed);
   }
 };
 template <>
 struct Layout<QueuedOrder> {
   template <class A>
-  static void archive(A& a, Held<A, QueuedOrder>& queued) {
+  static void archive(A& a, MaybeConst<A, QueuedOrder>& queued) {
     auto& [order, tag] = queued;
     a(order, tag);
   }
 };
+/// `avatar` follows from the names.
 template <>
-struct Layout<Lengths> {
+struct Layout<OrderQueue> {
   template <class A>
-  static void archive(A& a, Held<A, Lengths>& lengths) {
-    auto& [epsilon, stepHeight, nearMiss, walkableNormalY, gravity, speedLimit, pushForce, tick,
-           patience, jumpLimit, jointSpeedLimit, sliding] = lengths;
-    a(epsilon, stepHeight, nearMiss, walkableNormalY, gravity, speedLimit, pushForce, tick,
-      patience, jumpLimit, jointSpeedLimit, sliding);
+  static void archive(A& a, MaybeConst<A, OrderQueue>& queue) {
+    auto& [name, avatar, orders] = queue;
+    a(name, orders);
+  }
+};
+template <>
+struct Layout<WorldSettings> {
+  template <class A>
+  static void archive(A& a, MaybeConst<A, WorldSettings>& settings) {
+    auto& [contactOffset, stepHeight, nearMissDistance, walkableNormalY, gravity, maxSpeed,
+           maxPushForce, tickDuration, stuckTimeout, maxJumpHeight, maxJointSpeed, sliding] =
+        settings;
+    a(contactOffset, stepHeight, nearMissDistance, walkableNormalY, gravity, maxSpeed, maxPushForce,
+      tickDuration, stuckTimeout, maxJumpHeight, maxJointSpeed, sliding);
   }
 };
 
@@ -233,205 +242,215 @@ struct Layout<Lengths> {
 template <>
 struct Layout<Contact> {
   template <class A>
-  static void archive(A& a, Held<A, Contact>& contact) {
-    auto& [other, touching, decision, penetration, nearTold, closest, closestTick] = contact;
-    a(other, touching, decision, penetration, nearTold);
-    if (nearTold) a(closest, closestTick);  // of a near miss only
+  static void archive(A& a, MaybeConst<A, Contact>& contact) {
+    auto& [other, touching, separation, penetration, nearMissReported, closest, closestTick] =
+        contact;
+    a(other, touching, separation, penetration, nearMissReported);
+    if (nearMissReported) a(closest, closestTick);  // only for a near miss
   }
 };
 
 template <>
 struct Layout<WalkProgress> {
   template <class A>
-  static void archive(A& a, Held<A, WalkProgress>& walk) {
-    auto& [leg, nearest, patienceLeft] = walk;
-    a(leg, nearest, patienceLeft);
+  static void archive(A& a, MaybeConst<A, WalkProgress>& walk) {
+    auto& [waypointIndex, minDistance, timeoutLeft] = walk;
+    a(waypointIndex, minDistance, timeoutLeft);
   }
 };
 
-/// `box` and `body` follow from where everybody is, `ofBody` from `entity`.
+/// `box` and `convex` follow from the current poses, `bodyIndex` from `entity`.
 template <>
 struct Layout<Obstacle> {
   template <class A>
-  static void archive(A& a, Held<A, Obstacle>& obstacle) {
-    auto& [entity, part, ofBody, box, body, cache, moreCaches] = obstacle;
+  static void archive(A& a, MaybeConst<A, Obstacle>& obstacle) {
+    auto& [entity, part, bodyIndex, box, convex, cache, moreCaches] = obstacle;
     a(entity, part, cache, moreCaches);
   }
 };
 
-/// `parent`, `joint`, `hull` and `reach` follow from the spawn order.
+/// `parent`, `joint`, `hull` and `maxRadius` follow from the spawn order.
 template <>
 struct Layout<ChainLink> {
   template <class A>
-  static void archive(A& a, Held<A, ChainLink>& link) {
-    auto& [parent, joint, hull, reach, value, target, stoppedBy] = link;
-    a(value, target, stoppedBy);
+  static void archive(A& a, MaybeConst<A, ChainLink>& link) {
+    auto& [parent, joint, hull, maxRadius, value, target, blockedBy] = link;
+    a(value, target, blockedBy);
   }
 };
 
-/// The links are there already, and so are `avatarFromBase` and `selfContact`: by the spawn order.
+/// The links, `avatarFromBase` and `selfContact` already exist: they follow from the spawn order.
 template <>
 struct Layout<Chain> {
   template <class A>
-  static void archive(A& a, Held<A, Chain>& chain) {
-    auto& [links, avatarFromBase, selfContact, speed, patienceLeft] = chain;
+  static void archive(A& a, MaybeConst<A, Chain>& chain) {
+    auto& [links, avatarFromBase, selfContact, speed, timeoutLeft] = chain;
     for (auto& link : links) a(link);
-    a(speed, patienceLeft);
+    a(speed, timeoutLeft);
   }
 };
 
-/// Shape, base and chain of an avatar of which what they follow from was read; refuses what no
-/// order can have made (checks.cpp).
-void shapeAsRead(const Reader& a, Avatar& avatar);
+/// Computes shape, base and chain of an avatar from the members that were read. Throws
+/// CheckpointError if no order can have created it (checkpoint_validation.cpp).
+void restoreAvatarShape(const Reader& a, Avatar& avatar);
 
+/// `desiredVelocity` follows from the orders at the start of the next tick.
 template <>
 struct Layout<Avatar> {
   template <class A>
-  static void archive(A& a, Held<A, Avatar>& avatar) {
-    auto& [id, shape, madeOf, feet, gaze, eyeHeight, fallSpeed, grounded, standsOn, flying, jumping,
-           standing, height, radius, base, chain, drive, walk, waitLeft, hangsFor, lastMove, asked,
-           resting, stirred, stoppedBy, pairsChanged, atStop, blockedTold, mover, reach, gathered,
-           obstacles, meetsBodies, contacts] = avatar;
-    a(madeOf, standing, height, radius);
-    if constexpr (!A::kWrites) shapeAsRead(a, avatar);  // `shape`, `base`
+  static void archive(A& a, MaybeConst<A, Avatar>& avatar) {
+    auto& [name, id, shape, spawnOrder, footPosition, viewDirection, eyeHeight, fallSpeed, grounded,
+           groundEntity, flying, jumping, spawnHeight, height, radius, baseParts, chain,
+           driveVelocity, desiredVelocity, walk, waitTimeLeft, stalledInAirTime, lastDisplacement,
+           requestedDisplacement, idle, dirty, blockedBy, pairsChanged, blockingHit,
+           blockedReported, proxy, motionBounds, cachedBounds, obstacles, hasBodyObstacles,
+           contacts] = avatar;
+    a(name, spawnOrder, spawnHeight, height, radius);
+    if constexpr (!A::kWrites) restoreAvatarShape(a, avatar);  // `shape`, `baseParts`
     a(chain);
     if constexpr (!A::kWrites)
-      if (!chain.links.empty()) shape = shapeWith(base, chain);
-    a(id, feet, gaze, eyeHeight, fallSpeed, grounded, standsOn, flying, jumping, drive, walk,
-      waitLeft, hangsFor, lastMove, asked, resting, stirred, stoppedBy, pairsChanged, atStop,
-      blockedTold, mover, reach, gathered, obstacles, meetsBodies, contacts);
+      if (!chain.links.empty()) shape = makeChainShape(baseParts, chain);
+    a(id, footPosition, viewDirection, eyeHeight, fallSpeed, grounded, groundEntity, flying,
+      jumping, driveVelocity, walk, waitTimeLeft, stalledInAirTime, lastDisplacement,
+      requestedDisplacement, idle, dirty, blockedBy, pairsChanged, blockingHit, blockedReported,
+      proxy, motionBounds, cachedBounds, obstacles, hasBodyObstacles, contacts);
   }
 };
 
 // ---- bodies ------------------------------------------------------------------------------------
 
 template <>
-struct Layout<BodyPlace> {
+struct Layout<JointPose> {
   template <class A>
-  static void archive(A& a, Held<A, BodyPlace>& place) {
-    auto& [offset, turn] = place;
-    a(offset, turn);
+  static void archive(A& a, MaybeConst<A, JointPose>& pose) {
+    auto& [offset, angle] = pose;
+    a(offset, angle);
   }
 };
 template <>
-struct Layout<BodyDrive> {
+struct Layout<KinematicDrive> {
   template <class A>
-  static void archive(A& a, Held<A, BodyDrive>& drive) {
-    auto& [place, coordinate, rate, target, speed, going, closesIn] = drive;
-    a(place, coordinate, rate, target, speed, going, closesIn);
+  static void archive(A& a, MaybeConst<A, KinematicDrive>& drive) {
+    auto& [pose, jointPosition, jointVelocity, target, speed, moving, autoCloseIn] = drive;
+    a(pose, jointPosition, jointVelocity, target, speed, moving, autoCloseIn);
   }
 };
-/// The places are planned anew before they are asked for; what the snapshot tells is not.
+/// The key poses are planned before their next use; only the values in the snapshot are written.
 template <>
-struct Layout<BodyPlan> {
+struct Layout<KinematicTarget> {
   template <class A>
-  static void archive(A& a, Held<A, BodyPlan>& plan) {
-    auto& [stretches, places, coordinate, farthest, swing] = plan;
-    a(farthest, swing);
+  static void archive(A& a, MaybeConst<A, KinematicTarget>& target) {
+    auto& [segments, keyPoses, jointPosition, maxDisplacement, velocityDeviation] = target;
+    a(maxDisplacement, velocityDeviation);
   }
 };
-/// `id`, `spec`, `shape` and `mover` are as in any world of the scene; `rotation`, `turned` and
-/// `partBoxes` follow from the pose. Where it was before is set before it is asked for.
+/// `id`, `spec`, `shape` and `proxy` are as in any world of the scene; `rotation`, `isRotated` and
+/// `partBoxes` follow from the pose. The previous pose is set before use.
 template <>
 struct Layout<Body> {
   template <class A>
-  static void archive(A& a, Held<A, Body>& body) {
-    auto& [id, spec, shape, position, orientation, rotation, turned, partBoxes, positionBefore,
-           orientationBefore, velocity, spin, asleep, moved, driven, risesBy, left, blockedBy,
-           drive, plan, mover, reach, inside] = body;
+  static void archive(A& a, MaybeConst<A, Body>& body) {
+    auto& [id, spec, shape, position, orientation, rotation, isRotated, partBoxes, previousPosition,
+           previousOrientation, velocity, angularVelocity, asleep, moved, kinematicPushBound,
+           pendingLift, outOfWorld, blockedBy, drive, kinematicTarget, proxy, motionBounds,
+           occupants] = body;
     a(position, orientation);
-    if constexpr (!A::kWrites) placeBody(body, position, orientation);
-    a(velocity, spin, asleep, moved, left, blockedBy, drive, plan, reach, inside);
+    if constexpr (!A::kWrites) setBodyPose(body, position, orientation);
+    a(velocity, angularVelocity, asleep, moved, outOfWorld, blockedBy, drive, kinematicTarget,
+      motionBounds, occupants);
   }
 };
 
-// ---- free bodies -------------------------------------------------------------------------------
+// ---- dynamic bodies ----------------------------------------------------------------------------
 
 template <>
 struct Layout<PartPairKey> {
   template <class A>
-  static void archive(A& a, Held<A, PartPairKey>& key) {
-    auto& [solidA, solidB, partA, partB] = key;
-    a(solidA, solidB, partA, partB);
+  static void archive(A& a, MaybeConst<A, PartPairKey>& key) {
+    auto& [bodyA, bodyB, partA, partB] = key;
+    a(bodyA, bodyB, partA, partB);
   }
 };
 template <>
-struct Layout<PatchPoint> {
+struct Layout<ContactConstraintPoint> {
   template <class A>
-  static void archive(A& a, Held<A, PatchPoint>& point) {
-    auto& [armA, armB, separation, impulse, push] = point;
-    a(armA, armB, separation, impulse, push);
+  static void archive(A& a, MaybeConst<A, ContactConstraintPoint>& point) {
+    auto& [armA, armB, separation, impulse, motorImpulse] = point;
+    a(armA, armB, separation, impulse, motorImpulse);
   }
 };
-/// `first`, `second` are set when it is solved.
+/// The body indices are set by the solver.
 template <>
-struct Layout<ContactPatch> {
+struct Layout<ContactConstraint> {
   template <class A>
-  static void archive(A& a, Held<A, ContactPatch>& patch) {
-    auto& [first, second, normal, friction, restitution, points, size, rub, twist, pushSpeed,
-           mostPush, pushed] = patch;
-    a(normal, friction, restitution, size, rub, twist, pushSpeed, mostPush);
+  static void archive(A& a, MaybeConst<A, ContactConstraint>& constraint) {
+    auto& [bodyA, bodyB, normal, friction, restitution, points, pointCount, tangentImpulse,
+           torsionImpulse, targetSpeed, maxPushForce, gaveImpulse] = constraint;
+    a(normal, friction, restitution, pointCount, tangentImpulse, torsionImpulse, targetSpeed,
+      maxPushForce);
     if constexpr (!A::kWrites)
-      if (size > points.size()) a.refuse("a patch of " + std::to_string(size) + " points");
-    for (std::size_t i = 0; i < size; ++i) a(points[i]);
+      if (pointCount > points.size())
+        a.refuse("a contact has " + std::to_string(pointCount) + " points");
+    for (std::size_t i = 0; i < pointCount; ++i) a(points[i]);
   }
 };
-/// Patch and anchors are the pair's to write: they mean nothing where NearPair::hasPatch is not.
+/// The pair writes constraint and anchors: they are valid only if it has a constraint.
 template <>
-struct Layout<CloseUp> {
+struct Layout<PairCache> {
   template <class A>
-  static void archive(A& a, Held<A, CloseUp>& close) {
-    auto& [features, depth, penetration, patch, anchors, plane] = close;
-    a(features, depth, penetration, plane);
+  static void archive(A& a, MaybeConst<A, PairCache>& cache) {
+    auto& [features, depth, penetration, constraint, anchors, normalSource] = cache;
+    a(features, depth, penetration, normalSource);
   }
 };
 template <>
-struct Layout<NearPair> {
+struct Layout<BodyPair> {
   template <class A>
-  static void archive(A& a, Held<A, NearPair>& pair) {
-    auto& [key, apart, since, axis, verdict, close, hasPatch, told, met] = pair;
-    a(key, apart, since, axis, verdict, close, hasPatch, told);
+  static void archive(A& a, MaybeConst<A, BodyPair>& pair) {
+    auto& [key, lowerBound, teleportedAtBound, separatingAxis, verdict, cache, hasConstraint,
+           reported, gaveImpulse] = pair;
+    a(key, lowerBound, teleportedAtBound, separatingAxis, verdict, cache, hasConstraint, reported);
     if constexpr (!A::kWrites)
-      if (!close && (hasPatch || verdict == collision::Verdict::penetrating))
-        a.refuse("two solids meet of which nothing is told");
-    if (!hasPatch) return;
-    a(close->patch);
-    for (std::size_t i = 0; i < close->patch.size; ++i) a(close->anchors[i]);
+      if (!cache && (hasConstraint || verdict == collision::Verdict::penetrating))
+        a.refuse("a pair of physics bodies lacks its contact data");
+    if (!hasConstraint) return;
+    a(cache->constraint);
+    for (std::size_t i = 0; i < cache->constraint.pointCount; ++i) a(cache->anchors[i]);
   }
 };
 template <>
-struct Layout<Gait> {
+struct Layout<SubstepVelocity> {
   template <class A>
-  static void archive(A& a, Held<A, Gait>& gait) {
-    auto& [velocity, spin] = gait;
-    a(velocity, spin);
+  static void archive(A& a, MaybeConst<A, SubstepVelocity>& substepVelocity) {
+    auto& [velocity, angularVelocity] = substepVelocity;
+    a(velocity, angularVelocity);
   }
 };
-/// Inertia, friction and restitution are those of the body; whether it is free is the solid's to
-/// write.
+/// Inertia, friction and restitution are those of the body; the physics body writes whether it is
+/// dynamic.
 template <>
-struct Layout<RigidBody> {
+struct Layout<BodyMotion> {
   template <class A>
-  static void archive(A& a, Held<A, RigidBody>& body) {
-    auto& [centre, rotation, velocity, spin, inverseMass, inertia, inverseInertia, friction,
-           restitution] = body;
-    a(centre, rotation, velocity, spin);
+  static void archive(A& a, MaybeConst<A, BodyMotion>& motion) {
+    auto& [centre, rotation, velocity, angularVelocity, inverseMass, inertia, inverseInertia,
+           friction, restitution] = motion;
+    a(centre, rotation, velocity, angularVelocity);
   }
 };
-/// `hull`, `centreInFrame`, `parts`, `mesh` and `radius` are the shape, which is given to it
-/// before.
+/// `hull`, `centreInFrame`, `parts`, `mesh` and `radius` are the shape, which is assigned before.
 template <>
-struct Layout<Solid> {
+struct Layout<PhysicsBody> {
   template <class A>
-  static void archive(A& a, Held<A, Solid>& solid) {
-    auto& [hull, motion, centreInFrame, parts, mesh, radius, asleep, calmFor, pushVelocity,
-           mostPush, leash, gaits, pushed, restless, rotation, position, odometer, jumped] = solid;
-    bool isFree = solid.isFree();  // one that left the world no longer is
-    a(motion, isFree, asleep, calmFor, pushVelocity, mostPush);
+  static void archive(A& a, MaybeConst<A, PhysicsBody>& body) {
+    auto& [hull, motion, centreInFrame, parts, mesh, radius, asleep, sleepTimer, targetVelocity,
+           maxPushForce, maxStepDisplacement, substepVelocities, pushSpeedBound, preventsSleep,
+           rotation, position, accumulatedMotion, teleportedDistance] = body;
+    bool isFree = body.isDynamic();  // false for a body that left the world
+    a(motion, isFree, asleep, sleepTimer, targetVelocity, maxPushForce);
     if constexpr (!A::kWrites)
       if (!isFree) motion.inverseMass = 0;
-    archiveExtended(a, leash);
-    a(gaits, restless, rotation, position, odometer, jumped);
+    archiveExtended(a, maxStepDisplacement);
+    a(substepVelocities, preventsSleep, rotation, position, accumulatedMotion, teleportedDistance);
   }
 };
 

@@ -3,60 +3,61 @@
 #include <algorithm>
 
 #include "collision/narrow_phase/refine.hpp"
+#include "scene/world/data/body.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-using Trees = std::vector<collision::TreeOfParts>;
+using CompoundViews = std::vector<collision::CompoundView>;
 
-/// Of one pair, as nearestParts() counts it: what is not decided by then is not mounted, whoever
-/// asks. Pairs that touch are decided sooner by far.
-constexpr std::size_t kMostWork = 1'000'000;
+/// Work limit of one pair, in units of findNearestParts(). A pair that exceeds it is not excluded.
+/// Touching pairs need far less.
+constexpr std::size_t kMaxPairWork = 1'000'000;
 
-Trees bodyAtStart(const Scene& scene, std::uint32_t body) {
-  return {treeAt(*scene.shapeOfBody(body), startPoseOf(scene.model().bodies[body]))};
+CompoundViews makeBodyAtStart(const Scene& scene, std::uint32_t body) {
+  return {makeCompoundView(*scene.bodyShape(body), computeStartPose(scene.model().bodies[body]))};
 }
 
-Trees atStart(const Scene& scene, EntityId entity) {
+CompoundViews makeEntityAtStart(const Scene& scene, EntityId entity) {
   const auto& bodies = scene.model().bodies;
   for (std::uint32_t i = 0; i < bodies.size(); ++i)
-    if (bodies[i].objects[0] + 1 == entity) return bodyAtStart(scene, i);
-  return treesOf(scene.parts(entity - 1));
+    if (bodies[i].objects[0] + 1 == entity) return makeBodyAtStart(scene, i);
+  return makeCompoundViews(scene.collisionGeometry(entity - 1));
 }
 
-bool areNearer(const Trees& a, const Trees& b, double contact) {
-  std::size_t work = kMostWork;
-  const collision::NearestParts nearest = collision::nearestParts(a, b, contact, work);
-  if (nearest.found != collision::NearestParts::Found::nearest) return false;
+bool areCloserThan(const CompoundViews& a, const CompoundViews& b, double contact) {
+  std::size_t budget = kMaxPairWork;
+  const collision::NearestParts nearest = collision::findNearestParts(a, b, contact, budget);
+  if (nearest.outcome != collision::NearestParts::Outcome::nearest) return false;
   collision::FeatureCache cache;
-  return collision::isNearerThan(nearest.decision, nearest.a, nearest.b, contact, cache);
+  return collision::isCloserThan(nearest.separation, nearest.a, nearest.b, contact, cache);
 }
 
 }  // namespace
 
-bool isMountedOn(const Scene& scene, std::uint32_t body, EntityId other, double contact) {
-  return areNearer(bodyAtStart(scene, body), atStart(scene, other), contact);
+bool isExcludedPair(const Scene& scene, std::uint32_t body, EntityId other, double contact) {
+  return areCloserThan(makeBodyAtStart(scene, body), makeEntityAtStart(scene, other), contact);
 }
 
-std::vector<EntityId> mountingOf(const Scene& scene, std::uint32_t body, double contact) {
-  std::vector<EntityId> mounting;
+std::vector<EntityId> findExcludedPartners(const Scene& scene, std::uint32_t body, double contact) {
+  std::vector<EntityId> excluded;
   const auto& bodies = scene.model().bodies;
-  if (!isKinematic(bodies[body].kind)) return mounting;
-  const Trees own = bodyAtStart(scene, body);
-  const Box lookout = grown(collision::boxOf(own[0]), contact);
-  const auto& solids = scene.solidObjects();
-  for (std::size_t i = 0; i < solids.size(); ++i)
-    if (overlaps(lookout, scene.stillBoxes()[i]) &&
-        areNearer(own, treesOf(scene.parts(solids[i])), contact))
-      mounting.push_back(solids[i] + 1);
+  if (!isKinematic(bodies[body].kind)) return excluded;
+  const CompoundViews own = makeBodyAtStart(scene, body);
+  const Aabb searchBox = inflated(collision::computeAabb(own[0]), contact);
+  const auto& solidObjects = scene.solidObjects();
+  for (std::size_t i = 0; i < solidObjects.size(); ++i)
+    if (overlaps(searchBox, scene.staticBoxes()[i]) &&
+        areCloserThan(own, makeCompoundViews(scene.collisionGeometry(solidObjects[i])), contact))
+      excluded.push_back(solidObjects[i] + 1);
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (i == body || !isKinematic(bodies[i].kind)) continue;
-    const Trees other = bodyAtStart(scene, i);
-    if (overlaps(lookout, collision::boxOf(other[0])) && areNearer(own, other, contact))
-      mounting.push_back(bodies[i].objects[0] + 1);
+    const CompoundViews other = makeBodyAtStart(scene, i);
+    if (overlaps(searchBox, collision::computeAabb(other[0])) && areCloserThan(own, other, contact))
+      excluded.push_back(bodies[i].objects[0] + 1);
   }
-  std::sort(mounting.begin(), mounting.end());
-  return mounting;
+  std::sort(excluded.begin(), excluded.end());
+  return excluded;
 }
 
 }  // namespace enfilade::scene

@@ -1,7 +1,7 @@
-// What a driven body is mounted on: what it touches or penetrates (d < 2 epsilon, by the exact
-// verdict) where it stands when a world begins, as a door its frame, a lift the floor of its shaft,
-// a cart the ground. No contact and no near miss of such a pair is told: it is so as the model was
-// made. It follows from the scene alone, and is worked out when it is first asked for.
+// Excluded pairs: entities that a kinematic body touches or penetrates (d < 2 contactOffset, exact
+// verdict) in its initial pose, such as a door and its frame, a lift and the shaft's floor, a cart
+// and the ground. Such pairs report no contact and no near miss: the model was built that way. They
+// depend on the scene alone and are computed on first use.
 #pragma once
 
 #include <vector>
@@ -11,14 +11,11 @@
 
 namespace enfilade::scene {
 
-/// Where a driven body begins.
-collision::Pose startPoseOf(const BodySpec& spec);
+/// True if kinematic body `body` (index into Model::bodies) starts closer than `contact` metres to
+/// `other`, a static object or another kinematic body.
+bool isExcludedPair(const Scene& scene, std::uint32_t body, EntityId other, double contact);
 
-/// Whether body `body` (index into Model::bodies, driven) begins nearer than `contact` metres to
-/// `other`: a still object, or another driven body.
-bool isMountedOn(const Scene& scene, std::uint32_t body, EntityId other, double contact);
-
-/// All that it is mounted on, ascending; none for a body that is not driven.
-std::vector<EntityId> mountingOf(const Scene& scene, std::uint32_t body, double contact);
+/// All excluded partners of a body, ascending; empty if it is not kinematic.
+std::vector<EntityId> findExcludedPartners(const Scene& scene, std::uint32_t body, double contact);
 
 }  // namespace enfilade::scene

@@ -2,125 +2,46 @@
 
 #include <algorithm>
 
-#include "scene/world/data/world_data.hpp"
-
 namespace enfilade::scene {
 namespace {
 
-constexpr double kGatherMargin = 0.15;  // metres: obstacles are collected for some ticks at once
+constexpr double kCollectMargin =
+    0.15;  // metres: obstacles are collected for several ticks at once
 
-}  // namespace
-
-Stop sweepShape(const AvatarShape& shape, const Vec3& feet, const Vec3& displacement,
-                std::vector<Obstacle>& obstacles, const collision::StoppingBand& band,
-                QueryCount& count) {
-  Stop stop;
-  Vec3 rest = displacement;  // only what lies before the earliest stop so far matters
-  for (std::size_t i = 0; i < shape.parts.size(); ++i) {
-    const Box start = boxAt(shape.parts[i].box, feet);
-    Box path = grown(collision::swept(start, rest), band.high);
-    for (Obstacle& obstacle : obstacles) {
-      if (!overlaps(path, obstacle.box)) continue;
-      const collision::SweepResult result = collision::sweep(
-          bodyAt(shape.parts[i], feet), rest, obstacle.body, band, obstacle.cacheOf(i));
-      count.narrow += result.queries;
-      count.rational += result.rationals;
-      count.bounded += result.boundReached ? 1 : 0;
-      const double fraction = stop.fraction * result.fraction;
-      if (!result.stopped || (stop.entity != 0 && fraction >= stop.fraction)) continue;
-      stop = {fraction, obstacle.entity, -result.atStop.normal, result.atStop.distance,
-              result.atStop};
-      if (fraction == 0) return stop;
-      rest = fraction * displacement;
-      path = grown(collision::swept(start, rest), band.high);
-    }
-  }
-  return stop;
-}
-
-bool isFree(const AvatarShape& shape, const Vec3& feet, double clearance,
-            std::vector<Obstacle>& obstacles, QueryCount& count, EntityId& nearest) {
-  for (std::size_t i = 0; i < shape.parts.size(); ++i) {
-    const Box box = grown(boxAt(shape.parts[i].box, feet), clearance);
-    for (Obstacle& obstacle : obstacles) {
-      if (!overlaps(box, obstacle.box)) continue;
-      ++count.narrow;
-      const auto decision = collision::decideWithin(bodyAt(shape.parts[i], feet), obstacle.body,
-                                                    clearance, obstacle.cacheOf(i));
-      if (!decision) continue;
-      if (decision->decidedBy == collision::DecidedBy::rational) ++count.rational;
-      nearest = obstacle.entity;
-      return false;
-    }
-  }
-  return true;
-}
-
-Box feetRoomIn(const Box& reach, const Box& shapeBox, double clearance) {
-  return grown(Box{reach.min - shapeBox.min, reach.max - shapeBox.max}, -clearance);
-}
-
-double partInside(const Box& room, const Vec3& feet, const Vec3& displacement) {
-  double part = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double way = displacement[axis];
-    const double left = (way > 0 ? room.max[axis] : room.min[axis]) - feet[axis];
-    if (way != 0) part = std::min(part, std::max(0.0, left / way));
-  }
-  return part;
-}
-
-void placeObstacle(const WorldState& world, Obstacle& obstacle) {
-  if (obstacle.ofBody != kNoBody) {
-    const Body& body = world.bodies[obstacle.ofBody];
-    obstacle.box = body.partBoxes[obstacle.part];
-    obstacle.body = partOf(body, obstacle.part);
-    // Where it will stand: the solver moves it when avatars have moved.
-    obstacle.box.min.y() += body.risesBy, obstacle.box.max.y() += body.risesBy;
-    obstacle.body.translation.y() += body.risesBy;
-  } else if (obstacle.entity >= world.firstAvatarId()) {
-    const auto& name = world.avatarNames[obstacle.entity - world.firstAvatarId()];
-    const Avatar& other = world.avatars.at(name);
-    const AvatarPart& part = other.shape->parts[obstacle.part];
-    obstacle.box = boxAt(part.box, other.feet);
-    obstacle.body = bodyAt(part, other.feet);
-  }
-}
-
-void gatherStill(const Scene& scene, std::uint32_t object, const Box& reach,
-                 std::vector<Obstacle>& obstacles) {
-  const ObjectParts& parts = scene.parts(object);
+/// Appends the parts of static object `object` that may overlap `bounds`.
+void collectStaticObstacles(const Scene& scene, std::uint32_t object, const Aabb& bounds,
+                            std::vector<Obstacle>& obstacles) {
+  const CollisionGeometry& geometry = scene.collisionGeometry(object);
   thread_local std::vector<std::uint32_t> found;
   found.clear();
-  parts.query(reach, found);
+  geometry.query(bounds, found);
   for (const std::uint32_t part : found) {
     Obstacle obstacle;
     obstacle.entity = object + 1;
     obstacle.part = part;
-    obstacle.box = parts.box(part);
-    obstacle.body = parts.body(part);
+    obstacle.box = geometry.box(part);
+    obstacle.convex = geometry.convex(part);
     obstacles.push_back(obstacle);
   }
 }
 
-namespace {
-
 /// All parts of a body; triggers are not solid.
-void listParts(const WorldState& world, std::uint32_t index, std::vector<Obstacle>& obstacles) {
+void appendBodyParts(const WorldData& world, std::uint32_t index,
+                     std::vector<Obstacle>& obstacles) {
   const Body& body = world.bodies[index];
-  if (body.spec->kind == BodyKind::trigger) return;
+  if (isTrigger(body.spec->kind)) return;
   for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part) {
     Obstacle obstacle;
     obstacle.entity = body.id;
     obstacle.part = part;
-    obstacle.ofBody = index;
+    obstacle.bodyIndex = index;
     obstacles.push_back(obstacle);
   }
 }
 
-/// Ascending; the axes of last tick are handed on by merging.
-void sortAndHandOn(std::vector<Obstacle>& obstacles, std::vector<Obstacle>& last) {
-  // Movers' ids are reused and so not in the order of entities.
+/// Sorts ascending, and takes over the caches of the last tick by merging.
+void sortAndKeepCaches(std::vector<Obstacle>& obstacles, std::vector<Obstacle>& last) {
+  // Proxy ids are reused, so their order is not that of the entities.
   const auto key = [](const Obstacle& o) { return std::pair(o.entity, o.part); };
   std::sort(obstacles.begin(), obstacles.end(),
             [&](const Obstacle& a, const Obstacle& b) { return key(a) < key(b); });
@@ -134,61 +55,144 @@ void sortAndHandOn(std::vector<Obstacle>& obstacles, std::vector<Obstacle>& last
   }
 }
 
-/// Bodies that stand are as still objects.
-bool mayMove(const WorldState& world, collision::MoverId mover) {
-  const auto found = world.bodyOfMover.find(mover);
-  if (found == world.bodyOfMover.end()) return true;
-  const Body& body = world.bodies[found->second];
-  return body.moved || (body.spec->kind == BodyKind::rigid && !body.asleep);
+/// Stationary bodies are treated as static.
+bool mayMove(const WorldData& world, collision::ProxyId proxy) {
+  const std::uint32_t index = world.findBodyByProxy(proxy);
+  if (index == kNoBody) return true;
+  const Body& body = world.bodies[index];
+  return body.moved || (isDynamic(body.spec->kind) && !body.asleep);
+}
+
+/// Appends the parts of a body that overlap `bounds`, at their current pose.
+void collectBodyObstacles(const WorldData& world, std::uint32_t body, const Aabb& bounds,
+                          std::vector<Obstacle>& obstacles) {
+  if (!overlaps(world.bodies[body].motionBounds, bounds)) return;
+  std::vector<Obstacle> all;
+  appendBodyParts(world, body, all);
+  for (Obstacle& obstacle : all) {
+    updateObstaclePose(world, obstacle);
+    if (overlaps(obstacle.box, bounds)) obstacles.push_back(obstacle);
+  }
 }
 
 }  // namespace
 
-bool nobodyMovesNear(const WorldState& world, const Avatar& avatar) {
-  const auto partners = world.broadPhase.partners(avatar.mover);
-  for (std::size_t i = partners.size(); i-- > 0 && partners[i].moves;)  // movers come last
-    if (mayMove(world, partners[i].id)) return false;
+ShapeCastHit castAvatarShape(const AvatarShape& shape, const Vec3& footPosition,
+                             const Vec3& displacement, std::vector<Obstacle>& obstacles,
+                             const collision::ContactOffset& contactOffset, QueryCount& count) {
+  ShapeCastHit hit;
+  Vec3 rest = displacement;  // only the displacement before the earliest hit so far matters
+  for (std::size_t i = 0; i < shape.parts.size(); ++i) {
+    const Aabb start = placeBox(shape.parts[i].box, footPosition);
+    Aabb sweptBox = inflated(collision::sweptAabb(start, rest), contactOffset.rest);
+    for (Obstacle& obstacle : obstacles) {
+      if (!overlaps(sweptBox, obstacle.box)) continue;
+      const collision::ShapeCastResult result =
+          collision::castShape(placeAvatarPart(shape.parts[i], footPosition), rest, obstacle.convex,
+                               contactOffset, obstacle.cacheFor(i));
+      count.narrow += result.queries;
+      count.rational += result.exactQueries;
+      count.bounded += result.iterationLimitReached ? 1 : 0;
+      const double fraction = hit.fraction * result.fraction;
+      if (!result.stopped || (hit.entity != 0 && fraction >= hit.fraction)) continue;
+      hit = {fraction, obstacle.entity, -result.separationAtStop.normal,
+             result.separationAtStop.distance, result.separationAtStop};
+      if (fraction == 0) return hit;
+      rest = fraction * displacement;
+      sweptBox = inflated(collision::sweptAabb(start, rest), contactOffset.rest);
+    }
+  }
+  return hit;
+}
+
+bool isClear(const AvatarShape& shape, const Vec3& footPosition, double clearance,
+             std::vector<Obstacle>& obstacles, QueryCount& count, EntityId& nearest) {
+  for (std::size_t i = 0; i < shape.parts.size(); ++i) {
+    const Aabb box = inflated(placeBox(shape.parts[i].box, footPosition), clearance);
+    for (Obstacle& obstacle : obstacles) {
+      if (!overlaps(box, obstacle.box)) continue;
+      ++count.narrow;
+      const auto separation =
+          collision::computeSeparationWithin(placeAvatarPart(shape.parts[i], footPosition),
+                                             obstacle.convex, clearance, obstacle.cacheFor(i));
+      if (!separation) continue;
+      if (separation->certificate == collision::Certificate::rational) ++count.rational;
+      nearest = obstacle.entity;
+      return false;
+    }
+  }
   return true;
 }
 
-void gatherParts(const WorldState& world, std::uint32_t body, const Box& reach,
-                 std::vector<Obstacle>& obstacles) {
-  if (!overlaps(world.bodies[body].reach, reach)) return;
-  std::vector<Obstacle> all;
-  listParts(world, body, all);
-  for (Obstacle& obstacle : all) {
-    placeObstacle(world, obstacle);
-    if (overlaps(obstacle.box, reach)) obstacles.push_back(obstacle);
+double computeClipFraction(const Aabb& footBounds, const Vec3& footPosition,
+                           const Vec3& displacement) {
+  double fraction = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double step = displacement[axis];
+    const double remaining =
+        (step > 0 ? footBounds.max[axis] : footBounds.min[axis]) - footPosition[axis];
+    if (step != 0) fraction = std::min(fraction, std::max(0.0, remaining / step));
+  }
+  return fraction;
+}
+
+Aabb computeAvatarFootBounds(const WorldSettings& settings, const Avatar& avatar) {
+  const double clearance = computeContactQueryMargin(settings) +
+                           computeMaxChainDisplacement(avatar.chain, settings.tickDuration);
+  const Aabb &bounds = avatar.motionBounds, &shapeBox = avatar.shape->box;
+  return inflated(Aabb{bounds.min - shapeBox.min, bounds.max - shapeBox.max}, -clearance);
+}
+
+void updateObstaclePose(const WorldData& world, Obstacle& obstacle) {
+  if (obstacle.bodyIndex != kNoBody) {
+    const Body& body = world.bodies[obstacle.bodyIndex];
+    obstacle.box = body.partBoxes[obstacle.part];
+    obstacle.convex = makePlacedPart(body, obstacle.part);
+    // Where the body will stand: the solver moves it after the avatars.
+    obstacle.box.min.y() += body.pendingLift, obstacle.box.max.y() += body.pendingLift;
+    obstacle.convex.translation.y() += body.pendingLift;
+  } else if (obstacle.entity >= world.firstAvatarId()) {
+    const Avatar& other = *world.findAvatar(obstacle.entity);
+    const AvatarPart& part = other.shape->parts[obstacle.part];
+    obstacle.box = placeBox(part.box, other.footPosition);
+    obstacle.convex = placeAvatarPart(part, other.footPosition);
   }
 }
 
-void followOthers(const WorldState& world, Avatar& avatar) {
+bool areNeighboursStationary(const WorldData& world, const Avatar& avatar) {
+  const auto overlapping = world.broadPhase.overlapsOf(avatar.proxy);
+  for (std::size_t i = overlapping.size();
+       i-- > 0 && overlapping[i].isDynamic;)  // dynamic proxies come last
+    if (mayMove(world, overlapping[i].id)) return false;
+  return true;
+}
+
+void refreshDynamicObstacles(const WorldData& world, Avatar& avatar) {
   for (std::size_t i = avatar.obstacles.size(); i-- > 0;) {
     Obstacle& obstacle = avatar.obstacles[i];
     // Avatars come last, bodies anywhere.
-    if (!avatar.meetsBodies && obstacle.entity < world.firstAvatarId()) return;
-    placeObstacle(world, obstacle);
+    if (!avatar.hasBodyObstacles && obstacle.entity < world.firstAvatarId()) return;
+    updateObstaclePose(world, obstacle);
   }
 }
 
-void gatherObstacles(WorldState& world, Avatar& avatar) {
-  const bool complete = !avatar.pairsChanged && contains(avatar.gathered, avatar.reach);
+void collectObstacles(WorldData& world, Avatar& avatar) {
+  const bool complete = !avatar.pairsChanged && contains(avatar.cachedBounds, avatar.motionBounds);
   avatar.pairsChanged = false;
-  if (complete) return followOthers(world, avatar);
+  if (complete) return refreshDynamicObstacles(world, avatar);
   std::vector<Obstacle> last;
   last.swap(avatar.obstacles);
-  avatar.meetsBodies = false;
-  avatar.gathered = grown(avatar.reach, kGatherMargin);
-  for (const auto& partner : world.broadPhase.partners(avatar.mover)) {
-    if (!partner.moves) {
-      gatherStill(*world.scene, world.scene->solidObjects()[partner.id], avatar.gathered,
-                  avatar.obstacles);
-    } else if (const auto body = world.bodyOfMover.find(partner.id);
-               body != world.bodyOfMover.end()) {
-      listParts(world, body->second, avatar.obstacles);
-      avatar.meetsBodies = true;
+  avatar.hasBodyObstacles = false;
+  avatar.cachedBounds = inflated(avatar.motionBounds, kCollectMargin);
+  for (const auto& overlap : world.broadPhase.overlapsOf(avatar.proxy)) {
+    if (!overlap.isDynamic) {
+      collectStaticObstacles(*world.scene, world.scene->solidObjects()[overlap.id],
+                             avatar.cachedBounds, avatar.obstacles);
+    } else if (const std::uint32_t body = world.findBodyByProxy(overlap.id); body != kNoBody) {
+      appendBodyParts(world, body, avatar.obstacles);
+      avatar.hasBodyObstacles = true;
     } else {
-      const Avatar& other = world.avatars.at(world.avatarOfMover.at(partner.id));
+      const Avatar& other = *world.findAvatarByProxy(overlap.id);
       for (std::uint32_t part = 0; part < other.shape->parts.size(); ++part) {
         avatar.obstacles.emplace_back();
         avatar.obstacles.back().entity = other.id;
@@ -196,8 +200,29 @@ void gatherObstacles(WorldState& world, Avatar& avatar) {
       }
     }
   }
-  sortAndHandOn(avatar.obstacles, last);
-  followOthers(world, avatar);
+  sortAndKeepCaches(avatar.obstacles, last);
+  refreshDynamicObstacles(world, avatar);
+}
+
+std::vector<Obstacle> collectObstaclesInBox(const WorldData& world, const Aabb& box,
+                                            EntityId except) {
+  std::vector<Obstacle> obstacles;
+  for (const collision::StaticId staticId : world.broadPhase.overlapStatic(box))
+    collectStaticObstacles(*world.scene, world.scene->solidObjects()[staticId], box, obstacles);
+  for (std::uint32_t i = 0; i < world.bodies.size(); ++i)
+    collectBodyObstacles(world, i, box, obstacles);
+  for (const Avatar& other : world.avatars) {
+    if (other.id == except) continue;
+    for (std::uint32_t part = 0; part < other.shape->parts.size(); ++part) {
+      Obstacle obstacle;
+      obstacle.entity = other.id;
+      obstacle.part = part;
+      obstacle.box = placeBox(other.shape->parts[part].box, other.footPosition);
+      obstacle.convex = placeAvatarPart(other.shape->parts[part], other.footPosition);
+      if (overlaps(obstacle.box, box)) obstacles.push_back(obstacle);
+    }
+  }
+  return obstacles;
 }
 
 }  // namespace enfilade::scene

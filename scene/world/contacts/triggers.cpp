@@ -1,16 +1,18 @@
-// Who is in which trigger volume: an avatar or a body that touches or penetrates it, by the exact
-// verdict. Only movers are asked for, and only those that moved since the last tick.
+// Trigger volumes: an avatar or a body is inside if it touches or penetrates the volume, by the
+// exact verdict. Only entities with a dynamic proxy that moved since the last tick are queried.
+#include "scene/world/contacts/triggers.hpp"
+
 #include <algorithm>
 #include <limits>
 
-#include "scene/world/data/world_data.hpp"
+#include "scene/world/contacts/contacts.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-using collision::Decision;
+using collision::SeparationResult;
 
-/// Someone near a trigger: an avatar, or a body that is no trigger.
+/// An entity near a trigger: an avatar, or a body that is not a trigger.
 struct Visitor {
   EntityId id = 0;
   bool moved = true;
@@ -18,19 +20,15 @@ struct Visitor {
   const Body* body = nullptr;
 };
 
-std::vector<Visitor> visitorsOf(const WorldState& world, const Body& trigger) {
+std::vector<Visitor> findVisitors(const WorldData& world, const Body& trigger) {
   std::vector<Visitor> visitors;
-  for (const auto& partner : world.broadPhase.partners(trigger.mover)) {
-    if (!partner.moves) continue;
-    if (const auto name = world.avatarOfMover.find(partner.id); name != world.avatarOfMover.end()) {
-      const auto avatar = world.avatars.find(name->second);
-      if (avatar != world.avatars.end())
-        visitors.push_back({avatar->second.id, !avatar->second.resting, &avatar->second, nullptr});
-    } else if (const auto index = world.bodyOfMover.find(partner.id);
-               index != world.bodyOfMover.end()) {
-      const Body& body = world.bodies[index->second];
-      if (body.spec->kind != BodyKind::trigger)
-        visitors.push_back({body.id, body.moved, nullptr, &body});
+  for (const auto& overlap : world.broadPhase.overlapsOf(trigger.proxy)) {
+    if (!overlap.isDynamic) continue;
+    if (const Avatar* avatar = world.findAvatarByProxy(overlap.id)) {
+      visitors.push_back({avatar->id, !avatar->idle, avatar, nullptr});
+    } else if (const std::uint32_t index = world.findBodyByProxy(overlap.id); index != kNoBody) {
+      const Body& body = world.bodies[index];
+      if (!isTrigger(body.spec->kind)) visitors.push_back({body.id, body.moved, nullptr, &body});
     }
   }
   std::sort(visitors.begin(), visitors.end(),
@@ -38,92 +36,95 @@ std::vector<Visitor> visitorsOf(const WorldState& world, const Body& trigger) {
   return visitors;
 }
 
-std::vector<collision::ConvexBody> partsOf(const Visitor& visitor) {
-  std::vector<collision::ConvexBody> parts;
+std::vector<collision::PlacedConvex> makePlacedParts(const Visitor& visitor) {
+  std::vector<collision::PlacedConvex> parts;
   if (visitor.avatar) {
     for (const AvatarPart& part : visitor.avatar->shape->parts)
-      parts.push_back(bodyAt(part, visitor.avatar->feet));
+      parts.push_back(placeAvatarPart(part, visitor.avatar->footPosition));
     return parts;
   }
   for (std::uint32_t i = 0; i < visitor.body->shape->parts.size(); ++i)
-    parts.push_back(partOf(*visitor.body, i));
+    parts.push_back(makePlacedPart(*visitor.body, i));
   return parts;
 }
 
-/// How near the visitor is to the trigger's volume.
-Decision decide(const Visitor& visitor, const Body& trigger, QueryCount& count) {
-  Decision best;
+/// Separation of the visitor and the trigger's volume.
+SeparationResult computeVisitorSeparation(const Visitor& visitor, const Body& trigger,
+                                          QueryCount& count) {
+  SeparationResult best;
   best.distance = std::numeric_limits<double>::infinity();
-  for (const collision::ConvexBody& part : partsOf(visitor)) {
+  for (const collision::PlacedConvex& part : makePlacedParts(visitor)) {
     for (std::uint32_t i = 0; i < trigger.shape->parts.size(); ++i) {
       collision::FeatureCache cache;
-      const Decision decision = collision::decide(part, partOf(trigger, i), cache);
+      const SeparationResult separation =
+          collision::computeSeparation(part, makePlacedPart(trigger, i), cache);
       ++count.narrow;
-      if (decision.decidedBy == collision::DecidedBy::rational) ++count.rational;
-      if (nearer(decision, best)) best = decision;
+      if (separation.certificate == collision::Certificate::rational) ++count.rational;
+      if (isCloser(separation, best)) best = separation;
     }
   }
   return best;
 }
 
-void tell(const WorldState& world, ContactEvent::Kind kind, EntityId who, const Body& trigger,
-          const Decision& decision, std::vector<ContactEvent>& events) {
+void emitTriggerEvent(const WorldData& world, ContactEvent::Kind kind, EntityId visitor,
+                      const Body& trigger, const SeparationResult& separation,
+                      std::vector<ContactEvent>& events) {
   Contact contact;
   contact.other = trigger.id;
-  contact.decision = decision;
-  events.push_back(eventOf(world, kind, who, contact));
+  contact.separation = separation;
+  events.push_back(makeContactEvent(world, kind, visitor, contact));
 }
 
-/// An avatar or a body of the world, or nobody.
-Visitor visitorOf(const WorldState& world, EntityId who) {
-  Visitor visitor{who, true, nullptr, nullptr};
-  for (const auto& [name, avatar] : world.avatars)
-    if (avatar.id == who) visitor.avatar = &avatar;
-  if (const auto body = world.bodyOfId.find(who); body != world.bodyOfId.end())
+/// The avatar or body with id `entity`; without either, both pointers stay null.
+Visitor findVisitor(const WorldData& world, EntityId entity) {
+  Visitor visitor{entity, true, world.findAvatar(entity), nullptr};
+  if (const auto body = world.bodyIndexById.find(entity); body != world.bodyIndexById.end())
     visitor.body = &world.bodies[body->second];
   return visitor;
 }
 
-void watch(const WorldState& world, Body& trigger, TickReport& report, QueryCount& count) {
+void updateTrigger(const WorldData& world, Body& trigger, TickReport& report, QueryCount& count) {
   std::vector<EntityId> inside;
-  std::vector<EntityId> near;
-  const bool first = world.tick == 1;  // who stands in it from the beginning enters it then
-  for (const Visitor& visitor : visitorsOf(world, trigger)) {
+  std::vector<EntityId> nearby;
+  const bool first = world.tick == 1;  // an entity that starts inside enters in the first tick
+  for (const Visitor& visitor : findVisitors(world, trigger)) {
     const bool moved = visitor.moved || first;
-    near.push_back(visitor.id);
-    const bool was = std::binary_search(trigger.inside.begin(), trigger.inside.end(), visitor.id);
-    if (!moved && was) inside.push_back(visitor.id);
+    nearby.push_back(visitor.id);
+    const bool wasInside =
+        std::binary_search(trigger.occupants.begin(), trigger.occupants.end(), visitor.id);
+    if (!moved && wasInside) inside.push_back(visitor.id);
     if (!moved) continue;
-    const Decision decision = decide(visitor, trigger, count);
-    const bool is = decision.verdict != collision::Verdict::separated;
-    if (is) inside.push_back(visitor.id);
-    if (is != was)
-      tell(world, is ? ContactEvent::Kind::enter : ContactEvent::Kind::leave, visitor.id, trigger,
-           decision, report.contacts);
+    const SeparationResult separation = computeVisitorSeparation(visitor, trigger, count);
+    const bool isInside = separation.verdict != collision::Verdict::separated;
+    if (isInside) inside.push_back(visitor.id);
+    if (isInside != wasInside)
+      emitTriggerEvent(world, isInside ? ContactEvent::Kind::enter : ContactEvent::Kind::leave,
+                       visitor.id, trigger, separation, report.contacts);
   }
-  for (const EntityId id : trigger.inside)  // those whose reach has left the trigger
-    if (!std::binary_search(near.begin(), near.end(), id))
-      tell(world, ContactEvent::Kind::leave, id, trigger,
-           decide(visitorOf(world, id), trigger, count), report.contacts);
-  trigger.inside = std::move(inside);
+  for (const EntityId id : trigger.occupants)  // entities whose motion bounds have left the trigger
+    if (!std::binary_search(nearby.begin(), nearby.end(), id))
+      emitTriggerEvent(world, ContactEvent::Kind::leave, id, trigger,
+                       computeVisitorSeparation(findVisitor(world, id), trigger, count),
+                       report.contacts);
+  trigger.occupants = std::move(inside);
 }
 
 }  // namespace
 
-void watchTriggers(WorldState& world, TickReport& report, QueryCount& count) {
-  for (const std::uint32_t i : world.triggers) watch(world, world.bodies[i], report, count);
+void updateTriggers(WorldData& world, TickReport& report, QueryCount& count) {
+  for (const std::uint32_t i : world.triggers) updateTrigger(world, world.bodies[i], report, count);
 }
 
-void leaveTriggers(WorldState& world, EntityId who, ContactEvent::Reason reason,
-                   std::vector<ContactEvent>& events) {
+void removeFromTriggers(WorldData& world, EntityId entity, ContactEvent::Reason reason,
+                        std::vector<ContactEvent>& events) {
   for (const std::uint32_t i : world.triggers) {
     Body& trigger = world.bodies[i];
-    const auto at = std::lower_bound(trigger.inside.begin(), trigger.inside.end(), who);
-    if (at == trigger.inside.end() || *at != who) continue;
-    trigger.inside.erase(at);
+    const auto at = std::lower_bound(trigger.occupants.begin(), trigger.occupants.end(), entity);
+    if (at == trigger.occupants.end() || *at != entity) continue;
+    trigger.occupants.erase(at);
     QueryCount count;
-    tell(world, ContactEvent::Kind::leave, who, trigger,
-         decide(visitorOf(world, who), trigger, count), events);
+    emitTriggerEvent(world, ContactEvent::Kind::leave, entity, trigger,
+                     computeVisitorSeparation(findVisitor(world, entity), trigger, count), events);
     events.back().reason = reason;
   }
 }

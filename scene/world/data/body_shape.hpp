@@ -1,5 +1,5 @@
-// The shape of a body: convex parts in the body's frame, and how its mass lies in it. Made once a
-// scene; worlds and bodies share it.
+// The collision shape and mass properties of a body, in the body's frame. Built once per scene;
+// shared by worlds and bodies.
 #pragma once
 
 #include <cstdint>
@@ -14,33 +14,34 @@
 namespace enfilade::scene {
 
 struct BodyShape {
-  /// Solids for closed convex pieces, else triangles (a hull of three vertices); rigid bodies and
-  /// triggers take the hull of each connected piece.
+  /// Kinematic bodies: a hull per closed convex shell, otherwise one hull of three vertices per
+  /// triangle. Rigid bodies and triggers: the convex hull of each connected piece.
   std::vector<collision::Hull> parts;
-  Vec3 origin = Vec3::Zero();  ///< of the body's frame, in the scene's, where it was authored
-  collision::BoxTree tree;     ///< over the parts, body's frame
-  Box box;                     ///< of all parts, body's frame
-  double radius = 0;           ///< greatest distance of a vertex from the origin; not below it
-  std::uint32_t hulls = 0;     ///< of the parts, those that are solids or flat polygons
-  /// Pieces that a hull stands for although it is larger than they are. 0: exact.
-  std::uint32_t approximate = 0;
+  Vec3 origin = Vec3::Zero();   ///< of the body's frame as authored, scene frame, metres
+  collision::BoxTree tree;      ///< over `parts`, body frame
+  Aabb box;                     ///< of all parts, body frame
+  double radius = 0;            ///< upper bound of a vertex's distance from the origin, metres
+  std::uint32_t hullCount = 0;  ///< number of parts that are solids or flat polygons
+  /// Number of pieces replaced by a hull that is larger than the piece. 0: exact.
+  std::uint32_t approximateCount = 0;
 
-  // Of rigid bodies: the parts as solids of one density (overlaps count twice).
-  double volume = 0;  ///< cubic metres; > 0, else the box's, a millimetre thick at least
+  // Rigid bodies only: the parts as solids of uniform density. Overlaps count twice.
+  double volume = 0;  ///< cubic metres, > 0; for flat shapes of the box, >= 1 mm thick
   double mass = 0;    ///< kilograms
-  /// kg m^2 about the origin, the centre of mass, axes of the body's frame.
+  /// kg m^2, about the centre of mass (the body's origin), body axes.
   collision::Mat3 inertia = collision::Mat3::Identity();
 };
 
-/// What lists of meshes are made of (indices into Model::meshes).
-using ShapesOfMeshes = std::map<std::vector<std::uint32_t>, Shape>;
+/// Cache of shapes, keyed by a list of indices into Model::meshes.
+using MeshShapeCache = std::map<std::vector<std::uint32_t>, Shape>;
 
-/// Of a body that refusalOfBodies() has nothing against. `known`: of the same model; what is not
-/// there is added. Throws std::invalid_argument, naming the body, when its objects have no triangle
-/// with an area.
-BodyShape shapeOf(const Model& model, const BodySpec& spec, ShapesOfMeshes& known);
+/// Builds the shape of a body that validateBodies() accepts. `cache` holds shapes of the same
+/// model; missing ones are added. Throws std::invalid_argument with the body's name if no triangle
+/// of its objects has an area.
+BodyShape buildBodyShape(const Model& model, const BodySpec& spec, MeshShapeCache& cache);
 
-/// Its parts where a body of this shape stands at a pose. Points into the shape.
-collision::TreeOfParts treeAt(const BodyShape& shape, const collision::Pose& worldFromBody);
+/// The parts of `shape` at a pose. Points into `shape`, which must outlive the result.
+collision::CompoundView makeCompoundView(const BodyShape& shape,
+                                         const collision::Pose& worldFromBody);
 
 }  // namespace enfilade::scene

@@ -1,53 +1,53 @@
-// The one home of the motion's lengths, limits and policies. Verdicts have no tolerance; motion has
-// these.
+// Settings of a world's motion: offsets, limits, time step and policies. Collision verdicts have no
+// tolerance; only motion uses these values.
 #pragma once
 
 #include <cstdint>
-#include <optional>
-#include <string>
 
 namespace enfilade::scene {
 
-/// What is left of a move when something that cannot be walked on stops it.
+/// Policy for the remaining displacement after a non-walkable obstacle stops a move.
 enum class Sliding : std::uint8_t {
-  slide,  ///< goes on along what stopped it
-  stop    ///< is not made
+  slide,  ///< slides along the obstacle
+  stop    ///< is discarded
 };
 
-/// Told to clients in Welcome and part of the configuration's hash.
-struct Lengths {
-  /// metres. Movers come to rest this far from what they lean on; a contact is d < 2 epsilon
-  /// (seed 5.1.1: bodies shrunk by epsilon).
-  double epsilon = 0.5e-3;
-  /// metres. The highest ledge that an avatar walks up, and the deepest it walks down, in one step.
+/// Sent to clients in Welcome, and part of the configuration's hash.
+struct WorldSettings {
+  /// metres. Gap that avatars and bodies keep from obstacles. A contact is a distance below twice
+  /// this value, as if shapes were shrunk by it (Lin 1993, section 5.1.1).
+  double contactOffset = 0.5e-3;
+  /// metres. Maximum height that an avatar steps up or down at once.
   double stepHeight = 0.3;
-  /// metres. A pair that comes closer than this without contact is told as `near`; 0: never.
-  double nearMiss = 0;
-  /// 1. An avatar stands on what faces up at least this much (cosine of 50 degrees).
+  /// metres. A pair that comes closer than this without contact is reported as `near`; 0: never.
+  double nearMissDistance = 0;
+  /// Minimum y component of a walkable surface's unit normal (cosine of 50 degrees).
   double walkableNormalY = 0.6427876096865393;
   /// metres per second squared, downwards.
   double gravity = 9.80665;
-  /// metres per second. A fall gets no faster; also the fastest speed that a command may ask for.
-  double speedLimit = 1000;
-  /// newtons. What an avatar pushes a free body with at most.
-  double pushForce = 300;
-  /// seconds of simulated time.
-  double tick = 1.0 / 60.0;
+  /// metres per second. Maximum speed of a fall, and maximum speed that a command may request.
+  double maxSpeed = 1000;
+  /// newtons. Maximum force with which an avatar pushes a rigid body.
+  double maxPushForce = 300;
+  /// seconds of simulated time per tick.
+  double tickDuration = 1.0 / 60.0;
   /// seconds of simulated time without progress after which a walk ends as blocked.
-  double patience = 2;
-  /// metres. The highest jump that a command may ask for.
-  double jumpLimit = 2.5;
-  /// radians or metres per second. The fastest that a command may move a joint.
-  double jointSpeedLimit = 20;
+  double stuckTimeout = 2;
+  /// metres. Maximum jump height that a command may request.
+  double maxJumpHeight = 2.5;
+  /// radians or metres per second. Maximum joint speed that a command may request.
+  double maxJointSpeed = 20;
   Sliding sliding = Sliding::slide;
 };
 
-/// metres. Two that are nearer are in contact.
-inline double contactLimit(const Lengths& lengths) {
-  return 2 * lengths.epsilon;
+/// Distance below which a pair is in contact, metres.
+inline double computeContactThreshold(const WorldSettings& settings) {
+  return 2 * settings.contactOffset;
 }
 
-/// Why a world cannot have these lengths, naming the one that is wrong; nullopt when it can.
-std::optional<std::string> lengthsProblem(const Lengths& lengths);
+/// Distance within which contacts and near misses are searched, metres.
+inline double computeContactQueryMargin(const WorldSettings& settings) {
+  return 2 * settings.contactOffset + settings.nearMissDistance;
+}
 
 }  // namespace enfilade::scene

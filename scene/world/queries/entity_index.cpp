@@ -5,57 +5,60 @@
 namespace enfilade::scene {
 namespace {
 
-using collision::TreeOfParts;
+using collision::CompoundView;
 
-EntityId firstAvatar(const SceneThen& then) {
-  return static_cast<EntityId>(then.scene().model().objects.size()) + 1;
+EntityId firstAvatarId(const SceneAt& sceneAt) {
+  return static_cast<EntityId>(sceneAt.scene().model().objects.size()) + 1;
 }
 
 template <class Map, class Key>
-const std::uint32_t* found(const Map& map, const Key& key) {
+const std::uint32_t* findValue(const Map& map, const Key& key) {
   const auto at = map.find(key);
   return at == map.end() ? nullptr : &at->second;
 }
 
-Placed placedAvatar(const AvatarView& avatar) {
+PlacedEntity makePlacedAvatar(const AvatarSnapshot& avatar) {
   const auto& parts = avatar.shape->parts;
-  std::vector<Box> boxes;
+  std::vector<Aabb> boxes;
   for (const AvatarPart& part : parts) boxes.push_back(part.box);
-  Placed placed;
-  placed.own = std::make_shared<const collision::BoxTree>(collision::buildBoxTree(boxes, 1));
-  placed.parts = parts.size();
-  placed.trees.push_back({placed.own.get(), Mat3::Identity(), avatar.feet,
-                          [&parts, &avatar, tree = placed.own.get()](std::uint32_t item) {
-                            return bodyAt(parts[tree->order[item]], avatar.feet);
-                          }});
+  PlacedEntity placed;
+  placed.ownedTree = std::make_shared<const collision::BoxTree>(collision::buildBoxTree(boxes, 1));
+  placed.partCount = parts.size();
+  placed.compounds.push_back({placed.ownedTree.get(), Mat3::Identity(), avatar.footPosition,
+                              [&parts, &avatar, tree = placed.ownedTree.get()](std::uint32_t item) {
+                                return placeAvatarPart(parts[tree->order[item]],
+                                                       avatar.footPosition);
+                              }});
   return placed;
 }
 
-Placed placedBody(const SceneThen& then, const BodyView& body) {
-  const BodyShape& shape = *then.scene().shapeOfBody(body.index);
-  Placed placed;
-  placed.parts = shape.parts.size();
-  placed.trees.push_back(treeAt(shape, body.pose));
+PlacedEntity makePlacedBody(const SceneAt& sceneAt, const BodySnapshot& body) {
+  const BodyShape& shape = *sceneAt.scene().bodyShape(body.index);
+  PlacedEntity placed;
+  placed.partCount = shape.parts.size();
+  placed.compounds.push_back(makeCompoundView(shape, body.pose));
   return placed;
 }
 
-Placed placedObject(const ObjectParts& parts) {
-  Placed placed;
-  placed.parts = parts.size();
-  placed.trees = treesOf(parts);
+PlacedEntity makePlacedObject(const CollisionGeometry& geometry) {
+  PlacedEntity placed;
+  placed.partCount = geometry.size();
+  placed.compounds = makeCompoundViews(geometry);
   return placed;
 }
 
-Placed withoutBox(const SceneThen& then, EntityId entity) {
-  if (const AvatarView* avatar = avatarOf(then, entity)) return placedAvatar(*avatar);
-  if (const BodyView* body = bodyOf(then, entity)) return placedBody(then, *body);
-  if (then.scene().model().objects[entity - 1].use == Object::Use::drawn) return {};
-  return placedObject(then.scene().parts(entity - 1));
+PlacedEntity makePlacedWithoutBox(const SceneAt& sceneAt, EntityId entity) {
+  if (const AvatarSnapshot* avatar = findAvatarSnapshot(sceneAt, entity))
+    return makePlacedAvatar(*avatar);
+  if (const BodySnapshot* body = findBodySnapshot(sceneAt, entity))
+    return makePlacedBody(sceneAt, *body);
+  if (sceneAt.scene().model().objects[entity - 1].usage == Object::Usage::visualOnly) return {};
+  return makePlacedObject(sceneAt.scene().collisionGeometry(entity - 1));
 }
 
 }  // namespace
 
-SceneIndex::SceneIndex(std::shared_ptr<const Scene> scene) : scene_(std::move(scene)) {
+EntityIndex::EntityIndex(std::shared_ptr<const Scene> scene) : scene_(std::move(scene)) {
   const Model& model = scene_->model();
   for (EntityId i = 0; i < model.objects.size(); ++i)
     objects_.emplace(model.objects[i].path, i + 1);
@@ -65,71 +68,73 @@ SceneIndex::SceneIndex(std::shared_ptr<const Scene> scene) : scene_(std::move(sc
   }
 }
 
-EntityId SceneIndex::objectOfPath(const std::string& path) const {
-  const EntityId* id = found(objects_, path);
+EntityId EntityIndex::findObject(const std::string& path) const {
+  const EntityId* id = findValue(objects_, path);
   return id ? *id : 0;
 }
 
-const std::uint32_t* SceneIndex::bodyNamed(const std::string& name) const {
-  return found(bodies_, name);
+const std::uint32_t* EntityIndex::findBody(const std::string& name) const {
+  return findValue(bodies_, name);
 }
 
-const std::uint32_t* SceneIndex::bodyOfObject(EntityId id) const {
-  return found(bodyOfObject_, id);
+const std::uint32_t* EntityIndex::findBodyOfObject(EntityId id) const {
+  return findValue(bodyOfObject_, id);
 }
 
-const AvatarView* avatarOf(const SceneThen& then, EntityId id) {
-  const auto& avatars = then.snapshot.avatars;  // ascending
-  const auto at = std::lower_bound(avatars.begin(), avatars.end(), id,
-                                   [](const AvatarView& one, EntityId i) { return one.id < i; });
+const AvatarSnapshot* findAvatarSnapshot(const SceneAt& sceneAt, EntityId id) {
+  const auto& avatars = sceneAt.snapshot.avatars;  // ascending
+  const auto at =
+      std::lower_bound(avatars.begin(), avatars.end(), id,
+                       [](const AvatarSnapshot& one, EntityId i) { return one.id < i; });
   return at == avatars.end() || at->id != id ? nullptr : &*at;
 }
 
-const BodyView* bodyOf(const SceneThen& then, EntityId id) {
-  const std::uint32_t* body = then.index.bodyOfObject(id);
-  if (!body || (*then.snapshot.bodies)[*body].id != id) return nullptr;
-  return &(*then.snapshot.bodies)[*body];
+const BodySnapshot* findBodySnapshot(const SceneAt& sceneAt, EntityId id) {
+  const std::uint32_t* body = sceneAt.index.findBodyOfObject(id);
+  if (!body || (*sceneAt.snapshot.bodies)[*body].id != id) return nullptr;
+  return &(*sceneAt.snapshot.bodies)[*body];
 }
 
-EntityId entityWith(const SceneThen& then, EntityId id) {
-  if (id >= firstAvatar(then)) return avatarOf(then, id) ? id : 0;
-  const std::uint32_t* body = then.index.bodyOfObject(id);
-  return body ? (*then.snapshot.bodies)[*body].id : id;
+EntityId resolveEntity(const SceneAt& sceneAt, EntityId id) {
+  if (id >= firstAvatarId(sceneAt)) return findAvatarSnapshot(sceneAt, id) ? id : 0;
+  const std::uint32_t* body = sceneAt.index.findBodyOfObject(id);
+  return body ? (*sceneAt.snapshot.bodies)[*body].id : id;
 }
 
-EntityId entityNamed(const SceneThen& then, const std::string& name) {
-  for (const AvatarView& avatar : then.snapshot.avatars)
+EntityId findEntity(const SceneAt& sceneAt, const std::string& name) {
+  for (const AvatarSnapshot& avatar : sceneAt.snapshot.avatars)
     if (avatar.name == name) return avatar.id;
-  if (const std::uint32_t* body = then.index.bodyNamed(name))
-    return (*then.snapshot.bodies)[*body].id;
-  return entityWith(then, then.index.objectOfPath(name));
+  if (const std::uint32_t* body = sceneAt.index.findBody(name))
+    return (*sceneAt.snapshot.bodies)[*body].id;
+  return resolveEntity(sceneAt, sceneAt.index.findObject(name));
 }
 
-std::string nameOf(const SceneThen& then, EntityId entity) {
-  if (const AvatarView* avatar = avatarOf(then, entity)) return avatar->name;
-  if (const BodyView* body = bodyOf(then, entity))
-    return then.scene().model().bodies[body->index].name;
-  const bool isObject = entity != 0 && entity < firstAvatar(then);
-  return isObject ? then.scene().model().objects[entity - 1].path : "";
+std::string lookUpEntityName(const SceneAt& sceneAt, EntityId entity) {
+  if (const AvatarSnapshot* avatar = findAvatarSnapshot(sceneAt, entity)) return avatar->name;
+  if (const BodySnapshot* body = findBodySnapshot(sceneAt, entity))
+    return sceneAt.scene().model().bodies[body->index].name;
+  const bool isObject = entity != 0 && entity < firstAvatarId(sceneAt);
+  return isObject ? sceneAt.scene().model().objects[entity - 1].path : "";
 }
 
-Placed placedParts(const SceneThen& then, EntityId entity) {
-  Placed placed = withoutBox(then, entity);
-  for (const TreeOfParts& tree : placed.trees) placed.box.include(collision::boxOf(tree));
+PlacedEntity makePlacedEntity(const SceneAt& sceneAt, EntityId entity) {
+  PlacedEntity placed = makePlacedWithoutBox(sceneAt, entity);
+  for (const CompoundView& view : placed.compounds)
+    placed.box.include(collision::computeAabb(view));
   return placed;
 }
 
-Box boxOf(const SceneThen& then, const BodyView& body) {
+Aabb computeBodyAabb(const SceneAt& sceneAt, const BodySnapshot& body) {
   constexpr double kRounding = 64 * 0x1p-53;  // as in collision/compound/compound_shape.cpp
-  const BodyShape& shape = *then.scene().shapeOfBody(body.index);
+  const BodyShape& shape = *sceneAt.scene().bodyShape(body.index);
   const Mat3 rotation = body.pose.rotation.toRotationMatrix();
   const Vec3 middle = rotation * shape.box.centre() + body.pose.translation;
-  const Vec3 reach = rotation.cwiseAbs() * (0.5 * shape.box.size());
+  const Vec3 halfExtent = rotation.cwiseAbs() * (0.5 * shape.box.size());
   const double size = body.pose.translation.cwiseAbs().maxCoeff() + 3 * shape.radius;
-  return collision::grown(Box{middle - reach, middle + reach}, kRounding * size);
+  return collision::inflated(Aabb{middle - halfExtent, middle + halfExtent}, kRounding * size);
 }
 
-double gapOf(const Box& a, const Box& b) {
+double computeGap(const Aabb& a, const Aabb& b) {
   return (a.min - b.max).cwiseMax(b.min - a.max).cwiseMax(0).norm();
 }
 

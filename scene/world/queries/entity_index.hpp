@@ -1,5 +1,5 @@
-// What finds the things of a scene by name and by id, as it is at a tick, and where their convex
-// parts stand then: for questions that somebody asks beside the tick.
+// Finds the entities of a scene at a tick by name and by id, with their placed convex parts: for
+// queries outside the tick.
 #pragma once
 
 #include <memory>
@@ -14,18 +14,18 @@
 
 namespace enfilade::scene {
 
-/// Worked out once a scene.
-class SceneIndex {
+/// Index of a scene's objects and bodies. Built once per scene.
+class EntityIndex {
  public:
-  explicit SceneIndex(std::shared_ptr<const Scene> scene);
+  explicit EntityIndex(std::shared_ptr<const Scene> scene);
 
   const Scene& scene() const { return *scene_; }
-  /// The first of this path; 0: there is none.
-  EntityId objectOfPath(const std::string& path) const;
-  /// Index into Model::bodies; null: none is called so.
-  const std::uint32_t* bodyNamed(const std::string& name) const;
-  /// The body that the object `id` is part of, as bodyNamed().
-  const std::uint32_t* bodyOfObject(EntityId id) const;
+  /// The first object with this path; 0: unknown.
+  EntityId findObject(const std::string& path) const;
+  /// Index into Model::bodies; null: unknown.
+  const std::uint32_t* findBody(const std::string& name) const;
+  /// The body that contains object `id`, as findBody().
+  const std::uint32_t* findBodyOfObject(EntityId id) const;
 
  private:
   std::shared_ptr<const Scene> scene_;
@@ -34,37 +34,38 @@ class SceneIndex {
   std::unordered_map<EntityId, std::uint32_t> bodyOfObject_;
 };
 
-/// A scene as it is at a tick.
-struct SceneThen {
-  SceneIndex& index;
+/// A scene in its state at a tick.
+struct SceneAt {
+  EntityIndex& index;
   const Snapshot& snapshot;
   const Scene& scene() const { return index.scene(); }
 };
 
-/// Null: `id` is none that is there.
-const AvatarView* avatarOf(const SceneThen& then, EntityId id);
-const BodyView* bodyOf(const SceneThen& then, EntityId id);
+/// Null if no such entity is present.
+const AvatarSnapshot* findAvatarSnapshot(const SceneAt& sceneAt, EntityId id);
+const BodySnapshot* findBodySnapshot(const SceneAt& sceneAt, EntityId id);
 
-/// The entity with this id; of an object of a body the body. 0: none is there.
-EntityId entityWith(const SceneThen& then, EntityId id);
-/// By an avatar's or a body's name, or an object's path, in this order; 0: none is there.
-EntityId entityNamed(const SceneThen& then, const std::string& name);
-/// Its name, or its path; "" for none.
-std::string nameOf(const SceneThen& then, EntityId entity);
+/// The entity with this id; for an object of a body, the body. 0: not present.
+EntityId resolveEntity(const SceneAt& sceneAt, EntityId id);
+/// Looks up an avatar's name, then a body's name, then an object's path; 0: not present.
+EntityId findEntity(const SceneAt& sceneAt, const std::string& name);
+/// The entity's name or path; "" if unknown.
+std::string lookUpEntityName(const SceneAt& sceneAt, EntityId entity);
 
-/// The solid parts of an entity where they stand. Points into the scene and the snapshot.
-struct Placed {
-  std::vector<collision::TreeOfParts> trees;  ///< none: nothing of it can be touched
-  std::size_t parts = 0;
-  Box box;  ///< of all parts, scene frame: not smaller than theirs
-  std::shared_ptr<const collision::BoxTree> own;  ///< of `trees`, where the scene holds none
+/// The solid parts of an entity at its pose. Points into the scene and the snapshot.
+struct PlacedEntity {
+  std::vector<collision::CompoundView> compounds;  ///< empty: the entity is not solid
+  std::size_t partCount = 0;
+  Aabb box;                                             ///< contains all parts, scene frame
+  std::shared_ptr<const collision::BoxTree> ownedTree;  ///< owns the tree in `compounds` that the
+                                                        ///< scene does not own
 };
-/// Of an entity that is there.
-Placed placedParts(const SceneThen& then, EntityId entity);
-/// Its box, as Placed::box, without a look at its parts.
-Box boxOf(const SceneThen& then, const BodyView& body);
+/// `entity` must be present.
+PlacedEntity makePlacedEntity(const SceneAt& sceneAt, EntityId entity);
+/// Like PlacedEntity::box, but without visiting the parts; may be larger.
+Aabb computeBodyAabb(const SceneAt& sceneAt, const BodySnapshot& body);
 
-/// Metres between two boxes.
-double gapOf(const Box& a, const Box& b);
+/// Distance between two AABBs, metres.
+double computeGap(const Aabb& a, const Aabb& b);
 
 }  // namespace enfilade::scene

@@ -5,28 +5,29 @@
 namespace enfilade::scene {
 namespace {
 
-bool isInsideHull(const ObjectParts& parts, const Vec3& point) {
+bool isInsideAnyHull(const CollisionGeometry& geometry, const Vec3& point) {
   const std::array<Vec3, 1> vertex{Vec3::Zero()};
-  for (std::uint32_t i = 0; i < parts.hullCount(); ++i) {
-    if (!overlaps(parts.hullBoxes[i], {point, point})) continue;
+  for (std::uint32_t i = 0; i < geometry.hullCount(); ++i) {
+    if (!overlaps(geometry.hullBoxes[i], {point, point})) continue;
     collision::FeatureCache cache;
-    const auto decision = collision::decide({vertex, point}, parts.body(i), cache);
-    if (decision.verdict != collision::Verdict::separated) return true;
+    const auto separation =
+        collision::computeSeparation({vertex, point}, geometry.convex(i), cache);
+    if (separation.verdict != collision::Verdict::separated) return true;
   }
   return false;
 }
 
 }  // namespace
 
-bool holds(const ObjectParts& parts, const Vec3& point) {
-  return isInsideHull(parts, point) || surrounds(parts, point);
+bool containsPoint(const CollisionGeometry& geometry, const Vec3& point) {
+  return isInsideAnyHull(geometry, point) || isInsideTriangleShells(geometry, point);
 }
 
-EntityId solidAround(const Scene& scene, const Vec3& point) {
+EntityId findObjectContaining(const Scene& scene, const Vec3& point) {
   const std::vector<std::uint32_t>& objects = scene.solidObjects();
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    if (!overlaps(scene.stillBoxes()[i], {point, point})) continue;
-    if (holds(scene.parts(objects[i]), point)) return objects[i] + 1;
+    if (!overlaps(scene.staticBoxes()[i], {point, point})) continue;
+    if (containsPoint(scene.collisionGeometry(objects[i]), point)) return objects[i] + 1;
   }
   return 0;
 }

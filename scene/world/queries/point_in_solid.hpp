@@ -1,4 +1,4 @@
-// What a point lies in.
+// Point-in-solid queries.
 #pragma once
 
 #include "scene/world/data/scene.hpp"
@@ -6,11 +6,11 @@
 
 namespace enfilade::scene {
 
-/// Whether one of the object's closed solids holds `point` (scene frame, metres) or touches it.
-bool holds(const ObjectParts& parts, const Vec3& point);
+/// True if one of the object's closed solids contains `point` (scene frame, metres) or touches it.
+bool containsPoint(const CollisionGeometry& geometry, const Vec3& point);
 
-/// The first still object, in the order of the model, that holds `point`; 0: none does. Builds the
-/// parts of objects whose box holds it.
-EntityId solidAround(const Scene& scene, const Vec3& point);
+/// The first static object, in model order, that contains `point`; 0: none. Builds the collision
+/// geometry of objects whose AABB contains the point.
+EntityId findObjectContaining(const Scene& scene, const Vec3& point);
 
 }  // namespace enfilade::scene

@@ -10,59 +10,59 @@ namespace enfilade::scene {
 namespace {
 
 using collision::NearestParts;
-using Found = NearestParts::Found;
+using Outcome = NearestParts::Outcome;
 
 constexpr double kAnyDistance = std::numeric_limits<double>::infinity();
 
-bool take(std::size_t& work, std::size_t cost) {
-  if (work < cost) return false;
-  work -= cost;
+bool spendWork(std::size_t& budget, std::size_t cost) {
+  if (budget < cost) return false;
+  budget -= cost;
   return true;
 }
 
-std::size_t refinementWork(const NearestParts& parts) {
-  if (parts.decision.verdict != collision::Verdict::penetrating) return kRefinementWork;
+std::size_t computeRefinementWork(const NearestParts& parts) {
+  if (parts.separation.verdict != collision::Verdict::penetrating) return kRefinementWork;
   return kRefinementWork + kDepthWork * parts.a.vertices.size() * parts.b.vertices.size();
 }
 
-void refineInto(PairState& state, const NearestParts& parts) {
+void refineProximity(PairProximity& proximity, const NearestParts& parts) {
   constexpr double kRelative = 1e-15;
   collision::FeatureCache cache;
-  const collision::Refinement exact = collision::refine(parts.a, parts.b, cache);
-  state.decision.verdict = exact.verdict;
-  state.decision.decidedBy = exact.decidedBy;
-  state.decision.featureA = exact.featureA;
-  state.decision.featureB = exact.featureB;
-  state.decision.distance = exact.distance;
-  state.decision.errorBound = kRelative * exact.distance;
-  state.decision.pointA = exact.pointA;
-  state.decision.pointB = exact.pointB;
-  if (exact.distance > 0) state.decision.normal = exact.closest.normalized();
-  state.penetration = exact.penetration;
+  const collision::RefinedSeparation exact = collision::refineSeparation(parts.a, parts.b, cache);
+  proximity.separation.verdict = exact.verdict;
+  proximity.separation.certificate = exact.certificate;
+  proximity.separation.featureA = exact.featureA;
+  proximity.separation.featureB = exact.featureB;
+  proximity.separation.distance = exact.distance;
+  proximity.separation.errorBound = kRelative * exact.distance;
+  proximity.separation.pointA = exact.pointA;
+  proximity.separation.pointB = exact.pointB;
+  if (exact.distance > 0) proximity.separation.normal = exact.closest.normalized();
+  proximity.penetration = exact.penetration;
 }
 
 struct Candidate {
-  double gap;  ///< metres, of the boxes
+  double gap;  ///< metres, between the AABBs
   EntityId id;
 };
 
-/// All that may be within `within` of a box, but for triggers, which are not solid; the nearest
-/// boxes first.
-std::vector<Candidate> candidatesNear(const SceneThen& then, const Box& box, double within,
-                                      EntityId except) {
+/// All entities whose AABB is within `within` of a box, nearest first. Triggers are skipped: they
+/// are not solid.
+std::vector<Candidate> findCandidates(const SceneAt& sceneAt, const Aabb& box, double within,
+                                      EntityId ignoredEntity) {
   std::vector<Candidate> candidates;
-  const auto consider = [&](EntityId id, const Box& other) {
-    const double gap = gapOf(box, other);
-    if (gap <= within && id != except) candidates.push_back({gap, id});
+  const auto consider = [&](EntityId id, const Aabb& other) {
+    const double gap = computeGap(box, other);
+    if (gap <= within && id != ignoredEntity) candidates.push_back({gap, id});
   };
-  const auto& solids = then.scene().solidObjects();
-  for (std::size_t i = 0; i < solids.size(); ++i)
-    consider(solids[i] + 1, then.scene().stillBoxes()[i]);
-  for (const BodyView& body : *then.snapshot.bodies)
-    if (then.scene().model().bodies[body.index].kind != BodyKind::trigger)
-      consider(body.id, boxOf(then, body));
-  for (const AvatarView& avatar : then.snapshot.avatars)
-    consider(avatar.id, boxAt(avatar.shape->box, avatar.feet));
+  const auto& solidObjects = sceneAt.scene().solidObjects();
+  for (std::size_t i = 0; i < solidObjects.size(); ++i)
+    consider(solidObjects[i] + 1, sceneAt.scene().staticBoxes()[i]);
+  for (const BodySnapshot& body : *sceneAt.snapshot.bodies)
+    if (!isTrigger(sceneAt.scene().model().bodies[body.index].kind))
+      consider(body.id, computeBodyAabb(sceneAt, body));
+  for (const AvatarSnapshot& avatar : sceneAt.snapshot.avatars)
+    consider(avatar.id, placeBox(avatar.shape->box, avatar.footPosition));
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& x, const Candidate& y) {
     return std::tuple(x.gap, x.id) < std::tuple(y.gap, y.id);
   });
@@ -70,67 +70,71 @@ std::vector<Candidate> candidatesNear(const SceneThen& then, const Box& box, dou
 }
 
 bool isWithin(const NearestParts& parts, double within) {
-  if (parts.found != Found::nearest) return false;
-  if (parts.decision.verdict != collision::Verdict::separated) return true;
+  if (parts.outcome != Outcome::nearest) return false;
+  if (parts.separation.verdict != collision::Verdict::separated) return true;
   collision::FeatureCache cache;
-  return collision::isNearerThan(parts.decision, parts.a, parts.b, within, cache);
+  return collision::isCloserThan(parts.separation, parts.a, parts.b, within, cache);
 }
 
-bool isBefore(const PairState& x, const PairState& y) {
-  const auto order = [](const PairState& one) {
-    return std::tuple(-static_cast<int>(one.decision.verdict), one.decision.distance, one.b);
+bool isBefore(const PairProximity& x, const PairProximity& y) {
+  const auto order = [](const PairProximity& one) {
+    return std::tuple(-static_cast<int>(one.separation.verdict), one.separation.distance, one.b);
   };
   return order(x) < order(y);
 }
 
 }  // namespace
 
-NoAnswer tooComplex(const char* field) {
-  return {NoAnswer::Why::tooComplex, field,
-          "needs more work than one answer is given: ask for fewer pairs, or for smaller pieces"};
+QueryError makeTooComplexError(const char* field) {
+  return {QueryError::Reason::tooComplex, field,
+          "exceeds the work limit of one query: ask for fewer pairs or smaller objects"};
 }
 
-std::variant<Placed, NoAnswer> solidParts(const SceneThen& then, EntityId entity,
-                                          const char* field) {
-  Placed placed = placedParts(then, entity);
-  if (placed.parts > 0) return placed;
-  return NoAnswer{NoAnswer::Why::notSolid, field,
-                  "is nothing that can be touched: it has no area, or is only drawn"};
+std::variant<PlacedEntity, QueryError> findSolidParts(const SceneAt& sceneAt, EntityId entity,
+                                                      const char* field) {
+  PlacedEntity placed = makePlacedEntity(sceneAt, entity);
+  if (placed.partCount > 0) return placed;
+  return QueryError{QueryError::Reason::notSolid, field,
+                    "is not solid: it has no area, or is only drawn"};
 }
 
-std::variant<PairState, NoAnswer> stateOfPair(const SceneThen& then, EntityId a, EntityId b,
-                                              bool refined, std::size_t& work) {
-  const auto first = solidParts(then, a, "a"), second = solidParts(then, b, "b");
+std::variant<PairProximity, QueryError> computePairProximity(const SceneAt& sceneAt, EntityId a,
+                                                             EntityId b, bool refined,
+                                                             std::size_t& budget) {
+  const auto first = findSolidParts(sceneAt, a, "a"), second = findSolidParts(sceneAt, b, "b");
   for (const auto* one : {&first, &second})
-    if (const auto* why = std::get_if<NoAnswer>(one)) return *why;
-  const NearestParts parts = collision::nearestParts(
-      std::get<Placed>(first).trees, std::get<Placed>(second).trees, kAnyDistance, work);
-  if (parts.found != Found::nearest) return tooComplex("b");
-  PairState state{a, b, parts.decision, 0};
-  if (refined && !take(work, refinementWork(parts))) return tooComplex("b");
-  if (refined) refineInto(state, parts);
-  return state;
+    if (const auto* error = std::get_if<QueryError>(one)) return *error;
+  const NearestParts parts =
+      collision::findNearestParts(std::get<PlacedEntity>(first).compounds,
+                                  std::get<PlacedEntity>(second).compounds, kAnyDistance, budget);
+  if (parts.outcome != Outcome::nearest) return makeTooComplexError("b");
+  PairProximity proximity{a, b, parts.separation, 0};
+  if (refined && !spendWork(budget, computeRefinementWork(parts))) return makeTooComplexError("b");
+  if (refined) refineProximity(proximity, parts);
+  return proximity;
 }
 
-std::variant<Near, NoAnswer> nearTo(const SceneThen& then, EntityId entity, double within,
-                                    std::size_t& work) {
-  const auto solid = solidParts(then, entity, "entity");
-  if (const auto* why = std::get_if<NoAnswer>(&solid)) return *why;
-  const auto& own = std::get<Placed>(solid);
-  // Boxes that are a rounding apart may be of things that touch.
-  const double lookout = within + 1e-9 * (1 + own.box.max.cwiseAbs().maxCoeff());
-  Near near;
-  for (const Candidate& candidate : candidatesNear(then, own.box, lookout, entity)) {
-    std::size_t share = std::min(work, kMostWorkOfNear);
-    const std::size_t before = share;
-    const Placed other = placedParts(then, candidate.id);
-    const NearestParts parts = collision::nearestParts(own.trees, other.trees, within, share);
-    work -= before - share;
-    if (parts.found == Found::gaveUp) ++near.leftOut;
-    if (isWithin(parts, within)) near.found.push_back({entity, candidate.id, parts.decision, 0});
+std::variant<NearbyEntities, QueryError> findNearbyEntities(const SceneAt& sceneAt, EntityId entity,
+                                                            double within, std::size_t& budget) {
+  const auto solid = findSolidParts(sceneAt, entity, "entity");
+  if (const auto* error = std::get_if<QueryError>(&solid)) return *error;
+  const auto& own = std::get<PlacedEntity>(solid);
+  // AABBs that are apart by rounding only may belong to shapes that touch.
+  const double searchDistance = within + 1e-9 * (1 + own.box.max.cwiseAbs().maxCoeff());
+  NearbyEntities result;
+  for (const Candidate& candidate : findCandidates(sceneAt, own.box, searchDistance, entity)) {
+    std::size_t entityBudget = std::min(budget, kMaxWorkPerEntity);
+    const std::size_t before = entityBudget;
+    const PlacedEntity other = makePlacedEntity(sceneAt, candidate.id);
+    const NearestParts parts =
+        collision::findNearestParts(own.compounds, other.compounds, within, entityBudget);
+    budget -= before - entityBudget;
+    if (parts.outcome == Outcome::budgetExhausted) ++result.skipped;
+    if (isWithin(parts, within))
+      result.pairs.push_back({entity, candidate.id, parts.separation, 0});
   }
-  std::stable_sort(near.found.begin(), near.found.end(), isBefore);
-  return near;
+  std::stable_sort(result.pairs.begin(), result.pairs.end(), isBefore);
+  return result;
 }
 
 }  // namespace enfilade::scene

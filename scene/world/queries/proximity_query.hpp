@@ -1,5 +1,5 @@
-// How entities stand to one another, out of a snapshot: any two, still or moving, whatever their
-// shape. Questions that somebody asks, not what the tick does: nothing here touches a world.
+// Proximity queries on a snapshot: separation of two entities, static or moving, of any shape, and
+// the entities near one. They run outside the tick and never touch a world.
 #pragma once
 
 #include <string>
@@ -10,49 +10,50 @@
 
 namespace enfilade::scene {
 
-/// Two that were compared, `a` and `b` as they were asked for.
-struct PairState {
+/// Result for a pair, `a` and `b` in the order of the request.
+struct PairProximity {
   EntityId a = 0, b = 0;
-  collision::Decision decision;  ///< of their nearest parts, from a to b, scene frame
-  double penetration = 0;        ///< metres, of those parts; only when it was refined
+  collision::SeparationResult separation;  ///< of the nearest parts, from a to b, scene frame
+  double penetration = 0;                  ///< metres, of those parts; only if refined
 };
 
-/// Why an answer cannot be given.
-struct NoAnswer {
-  enum class Why : std::uint8_t {
-    notSolid,   ///< there is nothing of it to be touched
-    tooComplex  ///< it needs more work than was left
+/// Reason why a query has no result.
+struct QueryError {
+  enum class Reason : std::uint8_t {
+    notSolid,   ///< the entity has no solid part
+    tooComplex  ///< the work limit was exceeded
   };
-  Why why = Why::notSolid;
+  Reason reason = Reason::notSolid;
   std::string field;  ///< "a", "b" or "entity"
-  std::string text;   ///< a clause that follows the name of the field
+  std::string text;   ///< a clause that follows the field's name
 };
 
-/// What one answer may cost: pairs of boxes that are looked at, decisions on parts more, numbers
-/// that are refined much more (the constants below); some 0.3 s of one processor.
-inline constexpr std::size_t kMostWork = 4'000'000;
-/// What one entity may cost of it among all that are near.
-inline constexpr std::size_t kMostWorkOfNear = 400'000;
-/// To refine the numbers of two parts; of two that penetrate, for each pair of their vertices, too.
+/// Work limit of one query: one unit per tested pair of AABBs, more per separation of parts, much
+/// more per refinement (constants below). The limit is about 0.3 s of one processor.
+inline constexpr std::size_t kMaxQueryWork = 4'000'000;
+/// Work limit for one entity among all nearby ones.
+inline constexpr std::size_t kMaxWorkPerEntity = 400'000;
+/// Work of refining the numbers of two parts; if they penetrate, kDepthWork is added for each pair
+/// of vertices.
 inline constexpr std::size_t kRefinementWork = 2000, kDepthWork = 150;
 
-/// The verdict on two different entities that are there, exact, with their distance. `refined`: the
-/// numbers as by collision::refine(). Takes what it does from `work`.
-std::variant<PairState, NoAnswer> stateOfPair(const SceneThen& then, EntityId a, EntityId b,
-                                              bool refined, std::size_t& work);
+/// Exact verdict and distance of two different entities, which must be present. `refined`: numbers
+/// as from refineSeparation(). Subtracts its cost from `budget`.
+std::variant<PairProximity, QueryError> computePairProximity(const SceneAt& sceneAt, EntityId a,
+                                                             EntityId b, bool refined,
+                                                             std::size_t& budget);
 
-/// Everything solid that touches `entity`, or is nearer than `within` (metres, >= 0): the nearest
-/// first, then by id. What the work does not suffice for is left out of `found` and counted.
-struct Near {
-  std::vector<PairState> found;
-  std::size_t leftOut = 0;
+struct NearbyEntities {
+  std::vector<PairProximity> pairs;  ///< nearest first, then by id
+  std::size_t skipped = 0;           ///< entities for which the budget did not suffice
 };
-std::variant<Near, NoAnswer> nearTo(const SceneThen& then, EntityId entity, double within,
-                                    std::size_t& work);
+/// All solid entities that touch `entity` or are closer than `within` (metres, >= 0).
+std::variant<NearbyEntities, QueryError> findNearbyEntities(const SceneAt& sceneAt, EntityId entity,
+                                                            double within, std::size_t& budget);
 
-/// Of an entity that is there, with why not when it has no solid part.
-std::variant<Placed, NoAnswer> solidParts(const SceneThen& then, EntityId entity,
-                                          const char* field);
-NoAnswer tooComplex(const char* field);
+/// Solid parts of an entity, which must be present; an error if it has none.
+std::variant<PlacedEntity, QueryError> findSolidParts(const SceneAt& sceneAt, EntityId entity,
+                                                      const char* field);
+QueryError makeTooComplexError(const char* field);
 
 }  // namespace enfilade::scene

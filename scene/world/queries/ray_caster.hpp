@@ -1,9 +1,8 @@
-// Rays against everything that can be touched: picking, line of sight, range scans. Embree finds
-// the triangle (float, ROBUST mode); where the ray meets it is worked out in doubles. Which of two
-// surfaces comes first is so decided to some 1e-6 of the coordinates, how far it is to 1e-15.
-//
-// Outside the tick: Embree's bits depend on the processor's instruction set, so nothing that a
-// world does may follow from a ray.
+// Ray casts against all drawn objects, bodies and avatars: picking, line of sight, range scans.
+// Embree finds the triangle (float, ROBUST mode); the hit point is computed in doubles. The order
+// of two surfaces is therefore certain to about 1e-6 of the coordinates, the distance to 1e-15.
+// Outside the tick only: Embree's bits depend on the processor's instruction set, so no state of a
+// world may depend on a ray.
 #pragma once
 
 #include <limits>
@@ -18,51 +17,47 @@
 namespace enfilade::scene {
 
 struct Ray {
-  Vec3 origin = Vec3::Zero();                              ///< scene frame, metres
-  Vec3 direction = Vec3::UnitX();                          ///< any length but zero
-  double reach = std::numeric_limits<double>::infinity();  ///< metres, > 0
+  Vec3 origin = Vec3::Zero();                                    ///< scene frame, metres
+  Vec3 direction = Vec3::UnitX();                                ///< any length above zero
+  double maxDistance = std::numeric_limits<double>::infinity();  ///< metres, > 0
 };
 
 struct RayHit {
   EntityId entity = 0;
   double distance = 0;          ///< metres from the origin
   Vec3 point = Vec3::Zero();    ///< scene frame, metres
-  Vec3 normal = Vec3::UnitY();  ///< unit, of the triangle, towards the side the ray comes from
+  Vec3 normal = Vec3::UnitY();  ///< unit, of the triangle, facing the ray's origin
 };
 
-/// What a ray passes.
+/// Geometry that a ray ignores.
 struct RayFilter {
-  EntityId through = 0;       ///< this entity, as the avatar that looks; 0: none
-  bool throughGlass = false;  ///< what is drawn half-transparent (Material::Alpha::blend)
+  EntityId ignoredEntity = 0;      ///< such as the avatar that looks; 0: none
+  bool ignoreTransparent = false;  ///< half-transparent surfaces (Material::Alpha::blend)
 };
 
-/// Rays over a rectangle of angles, as a range scanner casts them.
+/// Rays over a rectangle of angles, as cast by a range scanner.
 struct RangeScan {
-  Vec3 at = Vec3::Zero();        ///< scene frame, metres
-  Vec3 forward = Vec3::UnitX();  ///< the middle of the scan; any length but zero
-  Vec3 up = Vec3::UnitY();       ///< not along forward
+  Vec3 origin = Vec3::Zero();    ///< scene frame, metres
+  Vec3 forward = Vec3::UnitX();  ///< centre of the scan; any length above zero
+  Vec3 up = Vec3::UnitY();       ///< not parallel to forward
   double width = 0;              ///< radians, 0..2 pi, about `up`, from left to right
-  double height = 0;             ///< radians, 0..pi, from above to below; 0: one plane
-  std::uint32_t columns = 1;     ///< rays side by side; a full turn does not repeat its first
-  std::uint32_t rows = 1;        ///< rays above one another
-  double reach = std::numeric_limits<double>::infinity();  ///< metres, > 0
+  double height = 0;             ///< radians, 0..pi, from top to bottom; 0: one plane
+  std::uint32_t columns = 1;     ///< rays per row; a full turn does not repeat its first ray
+  std::uint32_t rows = 1;        ///< number of rows
+  double maxDistance = std::numeric_limits<double>::infinity();  ///< metres, > 0
 };
 
-/// Why rays or a scan cannot be cast, naming the field; nullopt when they can.
-std::optional<std::string> refusal(const Ray& ray);
-std::optional<std::string> refusal(const RangeScan& scan);
+/// Return an error text that starts with the field's name; nullopt if valid.
+std::optional<std::string> validateRay(const Ray& ray);
+std::optional<std::string> validateScan(const RangeScan& scan);
 
-/// Row by row from above, each from left to right. Angles are measured about what of `up` is square
-/// to `forward`, and from the plane square to that, so a row is a cone; directions have unit
-/// length.
-std::vector<Ray> raysOf(const RangeScan& scan);
+/// Row by row from the top, each from left to right. Angles are measured about the component of
+/// `up` perpendicular to `forward`, and from the plane perpendicular to that, so a row is a cone.
+/// Directions have unit length.
+std::vector<Ray> makeScanRays(const RangeScan& scan);
 
-/// The still scene, built at construction (meshes stored once), and what moves, as of a snapshot.
-/// One thread at a time may follow(); any number may cast between.
-/// Whether Embree can have an instance there. It inverts the transform in floats, and Debian's
-/// build of it ends the program where that cannot be done, as for an object that a file makes flat.
-bool canBeInstanced(const Eigen::Affine3d& worldFromMesh);
-
+/// Ray queries on a scene. Static objects are built at construction (each mesh once), others by
+/// update(). One thread at a time may call update(); between calls any number may cast rays.
 class RayCaster {
  public:
   explicit RayCaster(std::shared_ptr<const Scene> scene);
@@ -70,13 +65,13 @@ class RayCaster {
   RayCaster(RayCaster&&) noexcept;
   RayCaster& operator=(RayCaster&&) noexcept;
 
-  /// Takes avatars and bodies where `snapshot` has them: bodies as they are drawn, under the id of
-  /// their first object; triggers are not there. Before the first call there are none.
-  void follow(const Snapshot& snapshot);
+  /// Updates avatars and bodies from `snapshot`: bodies as they are drawn, under the id of their
+  /// first object, without triggers. Before the first call there are none.
+  void update(const Snapshot& snapshot);
 
-  /// What a ray that refusal() lets pass meets first.
+  /// First hit of a ray that validateRay() accepts.
   std::optional<RayHit> firstHit(const Ray& ray, const RayFilter& filter = {}) const;
-  /// Whether anything is met within the reach; quicker than what is met first.
+  /// True if anything is hit within maxDistance; faster than firstHit().
   bool isBlocked(const Ray& ray, const RayFilter& filter = {}) const;
 
  private:

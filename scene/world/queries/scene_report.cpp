@@ -8,66 +8,67 @@
 namespace enfilade::scene {
 namespace {
 
-/// Counts problems by kind; the first example is kept.
-class Findings {
+/// Counts diagnostics by kind and keeps the first example.
+class DiagnosticCounter {
  public:
-  explicit Findings(std::vector<Problem>& problems) : problems_(problems) {}
+  explicit DiagnosticCounter(std::vector<Diagnostic>& diagnostics) : diagnostics_(diagnostics) {}
 
   void add(const char* kind, std::size_t count, const std::string& example) {
     if (count == 0) return;
-    const auto known = std::find_if(problems_.begin(), problems_.end(),
-                                    [&](const Problem& p) { return p.kind == kind; });
-    if (known == problems_.end()) {
-      problems_.push_back({kind, count, example});
+    const auto known =
+        std::find_if(diagnostics_.begin(), diagnostics_.end(),
+                     [&](const Diagnostic& diagnostic) { return diagnostic.kind == kind; });
+    if (known == diagnostics_.end()) {
+      diagnostics_.push_back({kind, count, example});
     } else {
       known->count += count;
     }
   }
 
  private:
-  std::vector<Problem>& problems_;
+  std::vector<Diagnostic>& diagnostics_;
 };
 
-bool told(const std::vector<Problem>& problems, const char* kind) {
-  return std::any_of(problems.begin(), problems.end(),
-                     [&](const Problem& p) { return p.kind == kind; });
+bool hasDiagnostic(const std::vector<Diagnostic>& diagnostics, const char* kind) {
+  return std::any_of(diagnostics.begin(), diagnostics.end(),
+                     [&](const Diagnostic& diagnostic) { return diagnostic.kind == kind; });
 }
 
-/// What is odd about a shape, told of the first object that has it.
-void findInShape(const Shape& shape, const std::string& path, bool degenerateTold,
-                 Findings& findings) {
-  if (!degenerateTold) findings.add("degenerate_triangle", shape.degenerate, path);
-  findings.add("duplicate_triangle", shape.duplicate, path);
-  findings.add("inconsistent_winding", shape.rewound, path);
-  findings.add("non_manifold_edge", shape.crowdedEdges, path);
-  findings.add("convexity_untried", shape.untried, path);
+/// Adds the defects of a shape, with the first object that has it as example.
+void countShapeDefects(const Shape& shape, const std::string& path, bool degenerateReported,
+                       DiagnosticCounter& counter) {
+  if (!degenerateReported) counter.add("degenerate_triangle", shape.degenerate, path);
+  counter.add("duplicate_triangle", shape.duplicate, path);
+  counter.add("inconsistent_winding", shape.flippedTriangles, path);
+  counter.add("non_manifold_edge", shape.nonManifoldEdges, path);
+  counter.add("convexity_untried", shape.notTested, path);
 }
 
 void countShell(const Shape& shape, const Shell& shell, const Object& object, SceneReport& report,
-                Findings& findings) {
+                DiagnosticCounter& counter) {
   ShellCounts& shells = report.shells;
-  const bool hull = becomesHull(shape, shell, object.worldFromMesh);
+  const bool hull = isTreatedAsHull(shape, shell, object.worldFromMesh);
   (hull ? report.hullTriangles : report.partTriangles) += shell.count;
-  if (hull && shell.inward) findings.add("inside_out_solid", 1, object.path);
+  if (hull && shell.inward) counter.add("inside_out_solid", 1, object.path);
   if (hull) {
-    ++(shell.kind == Shell::Kind::convex ? shells.exact : shells.rounded);
+    ++(shell.kind == Shell::Kind::convex ? shells.exact : shells.nearlyConvex);
   } else if (shell.isConvex() && shell.hollow) {
     ++shells.hollow;
   } else if (shell.bounds() && shell.inward) {
     ++shells.inward;
     if (!shape.shells.empty() && std::none_of(shape.shells.begin(), shape.shells.end(),
                                               [](const Shell& s) { return s.hollow; })) {
-      findings.add("inward_shell", 1, object.path);
+      counter.add("inward_shell", 1, object.path);
     }
   } else {
     ++(shell.bounds() ? shells.closed : shells.open);
   }
 }
 
-using PlaceKey = std::array<double, 12>;
+using TransformKey = std::array<double, 12>;
 
-PlaceKey placeOf(const Object& object) {
-  PlaceKey key{};
+TransformKey makeTransformKey(const Object& object) {
+  TransformKey key{};
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column)
       key[static_cast<std::size_t>(4 * row + column)] = object.worldFromMesh(row, column);
@@ -75,65 +76,66 @@ PlaceKey placeOf(const Object& object) {
   return key;
 }
 
-/// Objects of one shape in the very same place.
-void findRepeats(const Scene& scene, Findings& findings) {
+/// Counts objects with the same shape and the same transform.
+void countRepeatedObjects(const Scene& scene, DiagnosticCounter& counter) {
   const auto& objects = scene.model().objects;
   const auto less = [&](std::uint32_t a, std::uint32_t b) {
-    const std::uint32_t shapeA = scene.shapeNumber(a), shapeB = scene.shapeNumber(b);
+    const std::uint32_t shapeA = scene.shapeIndex(a), shapeB = scene.shapeIndex(b);
     if (shapeA != shapeB) return shapeA < shapeB;
-    return placeOf(objects[a]) < placeOf(objects[b]);
+    return makeTransformKey(objects[a]) < makeTransformKey(objects[b]);
   };
   std::vector<std::uint32_t> order = scene.solidObjects();
   std::stable_sort(order.begin(), order.end(), less);
   for (std::size_t i = 1; i < order.size(); ++i) {
-    if (!less(order[i - 1], order[i])) findings.add("repeated_object", 1, objects[order[i]].path);
+    if (!less(order[i - 1], order[i])) counter.add("repeated_object", 1, objects[order[i]].path);
   }
 }
 
 }  // namespace
 
-Box boxOf(const Scene& scene, std::uint32_t object) {
-  const auto& still = scene.solidObjects();
-  const auto at = std::lower_bound(still.begin(), still.end(), object);
-  if (at != still.end() && *at == object)
-    return scene.stillBoxes()[static_cast<std::size_t>(at - still.begin())];
-  Box box;
-  const Eigen::Affine3d& placed = scene.model().objects[object].worldFromMesh;
-  if (scene.parts(object).size() == 0) return box;
+Aabb computeAuthoredAabb(const Scene& scene, std::uint32_t object) {
+  const auto& staticObjects = scene.solidObjects();
+  const auto at = std::lower_bound(staticObjects.begin(), staticObjects.end(), object);
+  if (at != staticObjects.end() && *at == object)
+    return scene.staticBoxes()[static_cast<std::size_t>(at - staticObjects.begin())];
+  Aabb box;
+  const Eigen::Affine3d& transform = scene.model().objects[object].worldFromMesh;
+  if (scene.collisionGeometry(object).size() == 0) return box;
   for (const Eigen::Vector3f& v : scene.shape(object).vertices)
-    box.include(placed * v.cast<double>());
+    box.include(transform * v.cast<double>());
   return box;
 }
 
-SceneReport reportOn(const Scene& scene) {
+SceneReport makeSceneReport(const Scene& scene) {
   const Model& model = scene.model();
   SceneReport report;
   report.objects =
       static_cast<std::size_t>(std::count_if(model.objects.begin(), model.objects.end(),
-                                             [](const Object& object) { return !object.pieceOf; }));
+                                             [](const Object& object) { return !object.partOf; }));
   report.meshes = model.meshes.size();
-  report.problems = model.problems;
+  report.diagnostics = model.diagnostics;
   for (const Mesh& mesh : model.meshes) {
-    report.uniqueTriangles += mesh.indices.size() / 3;
+    report.uniqueTriangles += mesh.triangleCount();
     report.uniquePositions += mesh.positions.size();
   }
-  Findings findings(report.problems);
-  const bool degenerateTold = told(model.problems, "degenerate_triangle");
+  DiagnosticCounter counter(report.diagnostics);
+  const bool degenerateReported = hasDiagnostic(model.diagnostics, "degenerate_triangle");
   std::vector<bool> seen(scene.shapeCount(), false);
   for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
     const Object& object = model.objects[i];
     for (const std::uint32_t mesh : object.meshes)
-      report.triangles += model.meshes[mesh].indices.size() / 3;
+      report.triangles += model.meshes[mesh].triangleCount();
     const Shape& shape = scene.shape(i);
-    if (!seen[scene.shapeNumber(i)]) findInShape(shape, object.path, degenerateTold, findings);
-    seen[scene.shapeNumber(i)] = true;
-    for (const Shell& shell : shape.shells) countShell(shape, shell, object, report, findings);
-    const bool solid = !boxOf(scene, i).empty();
-    if (!solid) findings.add("object_without_area", 1, object.path);
-    const bool counts = solid && !object.pieceOf && object.use != Object::Use::drawn;
+    if (!seen[scene.shapeIndex(i)])
+      countShapeDefects(shape, object.path, degenerateReported, counter);
+    seen[scene.shapeIndex(i)] = true;
+    for (const Shell& shell : shape.shells) countShell(shape, shell, object, report, counter);
+    const bool solid = !computeAuthoredAabb(scene, i).empty();
+    if (!solid) counter.add("object_without_area", 1, object.path);
+    const bool counts = solid && !object.partOf && object.usage != Object::Usage::visualOnly;
     report.solidObjects += counts ? 1 : 0;
   }
-  findRepeats(scene, findings);
+  countRepeatedObjects(scene, counter);
   return report;
 }
 

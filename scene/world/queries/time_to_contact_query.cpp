@@ -1,13 +1,14 @@
-// 1. How far apart the two are: exactly (pair_state.*).
-// 2. How each may move: a velocity, a spin, an acceleration; and a speed in any direction for what
-//    is known no better (Motion::anyway): joints, what pushes, rounding to ticks.
-// 3. The gap along a direction closes no faster than those bounds along it. Along the relative
-//    velocity this holds for any two entities. Two convex bodies have a second gap, along their
-//    separating normal, which closes more slowly, but may be smaller; the better one counts.
-//
-// Ticks. A fall is a parabola on the ticks: a tick that begins at speed s goes (s + g dt / 2) dt.
-// What went `made` in the last tick so has the speed made / dt + g dt / 2 now. Free bodies fall in
-// substeps, each by its speed after it: sooner by at most g dt / 2 of speed.
+// Algorithm (Lin 1993, section 5.1; Cohen et al. 1995):
+// 1. Compute the exact separation of the two (proximity_query.*).
+// 2. Bound the motion of each: velocity, angular velocity, acceleration, and an isotropic speed
+//    (Motion::isotropicSpeed) for joints, pushes and the rounding to ticks.
+// 3. The gap along a direction closes no faster than these bounds allow. Along the relative
+//    velocity this holds for any two entities. Two convex shapes have a second gap, along their
+//    separating normal; it closes more slowly, but may be smaller. The better of the two is used.
+// Ticks: a fall is a parabola sampled at ticks. A tick that begins at speed s covers (s + g dt / 2)
+// dt, so a displacement of `d` in the last tick means a speed of d / dt + g dt / 2 now. Dynamic
+// bodies fall in substeps, each with its speed after the substep: they are early by at most g dt /
+// 2 of speed.
 #include "scene/world/queries/time_to_contact_query.hpp"
 
 #include <Eigen/Eigenvalues>
@@ -20,225 +21,242 @@ namespace enfilade::scene {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-// A push is level although the normal is not: by 1 / 0.714^2 of what the body goes
-// (bodies/body_motion.cpp).
-constexpr double kMostPush = 2;
+// A push is horizontal although the normal is not: at most 1 / 0.714^2 of the body's displacement
+// (bodies/kinematic_motion.cpp).
+constexpr double kMaxPushFactor = 2;
 
-/// How one may move from now on.
+/// Bounds of an entity's motion from now on.
 struct Motion {
   collision::MotionBounds bounds;
-  double anyway = 0;    ///< m/s, beside that, in any direction
-  double atOnce = 0;    ///< metres that it may grow by in no time
-  bool bounded = true;  ///< else nothing is known
+  double isotropicSpeed = 0;   ///< m/s, in any direction, in addition to `bounds`
+  double immediateGrowth = 0;  ///< metres by which it may grow instantly
+  bool bounded = true;         ///< false: no bound is known
 };
 
-double jointSpeeds(const AvatarView& avatar, const Lengths& lengths) {
+double sumJointSpeeds(const AvatarSnapshot& avatar, const WorldSettings& settings) {
   double speed = 0;
-  for (const JointView& joint : avatar.joints) speed += lengths.jointSpeedLimit * joint.lever;
+  for (const JointSnapshot& joint : avatar.joints) speed += settings.maxJointSpeed * joint.leverArm;
   return speed;
 }
 
-/// A body that may carry or push, or the entity that is asked about, with its spec.
-struct Moving {
-  const BodyView& view;
+/// A body's snapshot with its spec: one that may carry or push, or the entity of the query.
+struct BodyInfo {
+  const BodySnapshot& snapshot;
   const BodySpec& spec;
   double radius;  ///< metres
 };
 
-Moving movingOf(const SceneThen& then, const BodyView& body) {
-  return {body, then.scene().model().bodies[body.index],
-          then.scene().shapeOfBody(body.index)->radius};
+BodyInfo makeBodyInfo(const SceneAt& sceneAt, const BodySnapshot& body) {
+  return {body, sceneAt.scene().model().bodies[body.index],
+          sceneAt.scene().bodyShape(body.index)->radius};
 }
 
 // ---- present motion -----------------------------------------------------------------------------
 
-double fastestPoint(const Moving& body) {
-  return body.view.velocity.norm() + body.view.spin.norm() * body.radius + body.view.swing;
+double computeMaxPointSpeedNow(const BodyInfo& body) {
+  return body.snapshot.velocity.norm() + body.snapshot.angularVelocity.norm() * body.radius +
+         body.snapshot.velocityDeviation;
 }
 
-bool isTouched(const SceneThen& then, const AvatarView& avatar, const BodyView& body,
+bool isTouched(const SceneAt& sceneAt, const AvatarSnapshot& avatar, const BodySnapshot& body,
                double within) {
-  const Placed own = placedParts(then, avatar.id), other = placedParts(then, body.id);
-  std::size_t work = kMostWorkOfNear;
-  // Where that does not suffice it may be touched.
-  return collision::nearestParts(own.trees, other.trees, within, work).found !=
-         collision::NearestParts::Found::none;
+  const PlacedEntity own = makePlacedEntity(sceneAt, avatar.id),
+                     other = makePlacedEntity(sceneAt, body.id);
+  std::size_t budget = kMaxWorkPerEntity;
+  // If the budget does not suffice, it counts as touched.
+  return collision::findNearestParts(own.compounds, other.compounds, within, budget).outcome !=
+         collision::NearestParts::Outcome::outOfRange;
 }
 
-/// Whether the avatar stands on a free body: that may be carried, and the avatar with it, by what
-/// is far from both.
-bool standsOnFree(const SceneThen& then, const AvatarView& avatar) {
-  const BodyView* ground = bodyOf(then, avatar.standsOn);
-  return ground && movingOf(then, *ground).spec.kind == BodyKind::rigid;
+/// True if the avatar stands on a dynamic body: a distant body may carry both.
+bool standsOnRigidBody(const SceneAt& sceneAt, const AvatarSnapshot& avatar) {
+  const BodySnapshot* ground = findBodySnapshot(sceneAt, avatar.groundEntity);
+  return ground && isDynamic(makeBodyInfo(sceneAt, *ground).spec.kind);
 }
 
-/// Adds what the bodies that the avatar touches do to it: a lift that it stands on carries it.
-void addCarriers(const SceneThen& then, const AvatarView& avatar, const Lengths& lengths,
-                 Motion& motion) {
-  const double within = 4 * lengths.epsilon;
-  const Box box = collision::grown(boxAt(avatar.shape->box, avatar.feet), 2 * within);
-  const bool onFree = standsOnFree(then, avatar);
-  for (const BodyView& view : *then.snapshot.bodies) {
-    const Moving body = movingOf(then, view);
-    if (!isKinematic(body.spec.kind) || !view.moving) continue;
-    const bool touched = overlaps(boxOf(then, view), box) && isTouched(then, avatar, view, within);
+/// Adds the effect of the bodies that the avatar touches: a lift carries an avatar that stands on
+/// it.
+void addCarrierMotion(const SceneAt& sceneAt, const AvatarSnapshot& avatar,
+                      const WorldSettings& settings, Motion& motion) {
+  const double within = 4 * settings.contactOffset;
+  const Aabb box =
+      collision::inflated(placeBox(avatar.shape->box, avatar.footPosition), 2 * within);
+  const bool onFree = standsOnRigidBody(sceneAt, avatar);
+  for (const BodySnapshot& snapshot : *sceneAt.snapshot.bodies) {
+    const BodyInfo body = makeBodyInfo(sceneAt, snapshot);
+    if (!isKinematic(body.spec.kind) || !snapshot.moving) continue;
+    const bool touched = overlaps(computeBodyAabb(sceneAt, snapshot), box) &&
+                         isTouched(sceneAt, avatar, snapshot, within);
     if (!touched && !onFree) continue;
-    if (avatar.standsOn == view.id && view.spin.isZero(0)) {
-      motion.bounds.velocity += view.velocity;
-      motion.anyway += kMostPush * view.swing;
+    if (avatar.groundEntity == snapshot.id && snapshot.angularVelocity.isZero(0)) {
+      motion.bounds.velocity += snapshot.velocity;
+      motion.isotropicSpeed += kMaxPushFactor * snapshot.velocityDeviation;
     } else {
-      motion.anyway += kMostPush * fastestPoint(body);
+      motion.isotropicSpeed += kMaxPushFactor * computeMaxPointSpeedNow(body);
     }
   }
 }
 
-Motion presentMotion(const SceneThen& then, const AvatarView& avatar, const Lengths& lengths) {
+Motion computeAvatarMotion(const SceneAt& sceneAt, const AvatarSnapshot& avatar,
+                           const WorldSettings& settings) {
   Motion motion;
-  motion.anyway = jointSpeeds(avatar, lengths);
-  motion.bounds.velocity = avatar.move.made / lengths.tick;
-  addCarriers(then, avatar, lengths, motion);
+  motion.isotropicSpeed = sumJointSpeeds(avatar, settings);
+  motion.bounds.velocity = avatar.move.actualDisplacement / settings.tickDuration;
+  addCarrierMotion(sceneAt, avatar, settings, motion);
   if (avatar.grounded || avatar.flying) return motion;
-  motion.bounds.velocity.y() -= 0.5 * lengths.gravity * lengths.tick;
-  motion.bounds.acceleration = lengths.gravity;
+  motion.bounds.velocity.y() -= 0.5 * settings.gravity * settings.tickDuration;
+  motion.bounds.acceleration = settings.gravity;
   return motion;
 }
 
-/// What turns freely keeps its angular momentum; its spin goes to and fro below this.
-double fastestSpin(const SceneThen& then, const BodyView& body) {
-  const Mat3& inertia = then.scene().shapeOfBody(body.index)->inertia;
+/// A freely rotating body conserves its angular momentum; its angular velocity varies below this
+/// bound.
+double computeMaxAngularSpeed(const SceneAt& sceneAt, const BodySnapshot& body) {
+  const Mat3& inertia = sceneAt.scene().bodyShape(body.index)->inertia;
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(inertia, Eigen::EigenvaluesOnly);
-  const Vec3 local = body.pose.rotation.conjugate() * body.spin;
-  const double least = solver.eigenvalues().minCoeff();
-  return std::max(body.spin.norm(), least > 0 ? (inertia * local).norm() / least : kNever);
+  const Vec3 local = body.pose.rotation.conjugate() * body.angularVelocity;
+  const double minInertia = solver.eigenvalues().minCoeff();
+  return std::max(body.angularVelocity.norm(),
+                  minInertia > 0 ? (inertia * local).norm() / minInertia : kNever);
 }
 
-Motion presentMotion(const SceneThen& then, const BodyView& view, const Lengths& lengths) {
-  const Moving body = movingOf(then, view);
+Motion computeBodyMotion(const SceneAt& sceneAt, const BodySnapshot& snapshot,
+                         const WorldSettings& settings) {
+  const BodyInfo body = makeBodyInfo(sceneAt, snapshot);
   Motion motion;
-  if (!view.moving || body.spec.kind == BodyKind::trigger) return motion;
-  motion.bounds.velocity = view.velocity;
-  motion.bounds.angularVelocity = view.spin;
+  if (!snapshot.moving || isTrigger(body.spec.kind)) return motion;
+  motion.bounds.velocity = snapshot.velocity;
+  motion.bounds.angularVelocity = snapshot.angularVelocity;
   motion.bounds.radius = body.radius;
-  motion.anyway = view.swing;
-  if (body.spec.kind != BodyKind::rigid) return motion;
+  motion.isotropicSpeed = snapshot.velocityDeviation;
+  if (!isDynamic(body.spec.kind)) return motion;
   motion.bounds.angularVelocity =
-      fastestSpin(then, view) * Vec3::UnitX();  // only its length counts
-  motion.bounds.acceleration = lengths.gravity;
-  motion.anyway = 0.5 * lengths.gravity * lengths.tick;
+      computeMaxAngularSpeed(sceneAt, snapshot) * Vec3::UnitX();  // only its length matters
+  motion.bounds.acceleration = settings.gravity;
+  motion.isotropicSpeed = 0.5 * settings.gravity * settings.tickDuration;
   return motion;
 }
 
 // ---- any command --------------------------------------------------------------------------------
 
-/// Metres a second: no point of the body is ever faster, whatever it is told.
-double fastestEver(const Moving& body, const Lengths& lengths) {
-  if (body.spec.kind == BodyKind::rigid) return kNever;
-  if (body.spec.kind == BodyKind::trigger) return 0;
-  return std::max(lengths.speedLimit, body.spec.speed * fastestPointOf(body.spec, body.radius));
+/// Maximum speed of any point of the body under any command, m/s.
+double computeBodySpeedLimit(const BodyInfo& body, const WorldSettings& settings) {
+  if (isDynamic(body.spec.kind)) return kNever;
+  if (isTrigger(body.spec.kind)) return 0;
+  return std::max(settings.maxSpeed,
+                  body.spec.speed * computeMaxPointSpeed(body.spec, body.radius));
 }
 
-/// What an avatar does by itself: it walks, steps up or falls, and keeps epsilon away.
-double fastestAlone(const AvatarView& avatar, const Lengths& lengths) {
-  const double slack = lengths.stepHeight + 16 * lengths.epsilon;  // metres a tick
-  return 2 * lengths.speedLimit + slack / lengths.tick + jointSpeeds(avatar, lengths);
+/// Maximum speed of an avatar by itself: it walks, steps up or falls, and keeps its contact offset.
+double computeAvatarSpeedLimit(const AvatarSnapshot& avatar, const WorldSettings& settings) {
+  const double slack = settings.stepHeight + 16 * settings.contactOffset;  // metres a tick
+  return 2 * settings.maxSpeed + slack / settings.tickDuration + sumJointSpeeds(avatar, settings);
 }
 
-/// Before the gap of `distance` has closed neither went farther than that. So bodies count that can
-/// come to the avatar meanwhile.
-Motion anyMotion(const SceneThen& then, const AvatarView& avatar, const Lengths& lengths,
-                 double distance) {
+/// Bounds under any command. Until the gap of `distance` has closed, neither entity moves farther
+/// than that; therefore all bodies count that can reach the avatar meanwhile.
+Motion boundAvatarMotion(const SceneAt& sceneAt, const AvatarSnapshot& avatar,
+                         const WorldSettings& settings, double distance) {
   Motion motion;
-  motion.atOnce = avatar.standing - avatar.height;  // it may have crouched
-  const double alone = fastestAlone(avatar, lengths);
-  motion.anyway = alone;
-  const Box box = boxAt(avatar.shape->box, avatar.feet);
-  const bool onFree = standsOnFree(then, avatar);
-  for (const BodyView& view : *then.snapshot.bodies) {
-    const Moving body = movingOf(then, view);
+  motion.immediateGrowth = avatar.spawnHeight - avatar.height;  // it may have crouched
+  const double ownSpeed = computeAvatarSpeedLimit(avatar, settings);
+  motion.isotropicSpeed = ownSpeed;
+  const Aabb box = placeBox(avatar.shape->box, avatar.footPosition);
+  const bool onFree = standsOnRigidBody(sceneAt, avatar);
+  for (const BodySnapshot& snapshot : *sceneAt.snapshot.bodies) {
+    const BodyInfo body = makeBodyInfo(sceneAt, snapshot);
     if (!isKinematic(body.spec.kind)) continue;
-    const double fastest = fastestEver(body, lengths);
-    const double comes = distance * (1 + fastest / alone) + motion.atOnce;
-    if (onFree || gapOf(box, boxOf(then, view)) <= comes) motion.anyway += kMostPush * fastest;
+    const double maxSpeed = computeBodySpeedLimit(body, settings);
+    const double maxApproach = distance * (1 + maxSpeed / ownSpeed) + motion.immediateGrowth;
+    if (onFree || computeGap(box, computeBodyAabb(sceneAt, snapshot)) <= maxApproach)
+      motion.isotropicSpeed += kMaxPushFactor * maxSpeed;
   }
   return motion;
 }
 
-Motion anyMotion(const SceneThen& then, const BodyView& view, const Lengths& lengths) {
+Motion boundBodyMotion(const SceneAt& sceneAt, const BodySnapshot& snapshot,
+                       const WorldSettings& settings) {
   Motion motion;
-  motion.anyway = fastestEver(movingOf(then, view), lengths);
-  motion.bounded = motion.anyway < kNever;
+  motion.isotropicSpeed = computeBodySpeedLimit(makeBodyInfo(sceneAt, snapshot), settings);
+  motion.bounded = motion.isotropicSpeed < kNever;
   return motion;
 }
 
-Motion motionOf(const SceneThen& then, EntityId entity, const Lengths& lengths, Assume assume,
-                double distance) {
-  const bool present = assume == Assume::presentMotion;
-  if (const AvatarView* avatar = avatarOf(then, entity))
-    return present ? presentMotion(then, *avatar, lengths)
-                   : anyMotion(then, *avatar, lengths, distance);
-  if (const BodyView* body = bodyOf(then, entity))
-    return present ? presentMotion(then, *body, lengths) : anyMotion(then, *body, lengths);
+Motion computeMotion(const SceneAt& sceneAt, EntityId entity, const WorldSettings& settings,
+                     MotionAssumption assumption, double distance) {
+  const bool present = assumption == MotionAssumption::presentMotion;
+  if (const AvatarSnapshot* avatar = findAvatarSnapshot(sceneAt, entity))
+    return present ? computeAvatarMotion(sceneAt, *avatar, settings)
+                   : boundAvatarMotion(sceneAt, *avatar, settings, distance);
+  if (const BodySnapshot* body = findBodySnapshot(sceneAt, entity))
+    return present ? computeBodyMotion(sceneAt, *body, settings)
+                   : boundBodyMotion(sceneAt, *body, settings);
   return {};
 }
 
 // ---- the gap ------------------------------------------------------------------------------------
 
-/// A gap and how fast it closes.
+/// A gap and the bound of its closing speed.
 struct Approach {
-  double gap = 0;  ///< metres: proved
+  double gap = 0;  ///< metres, certified
   collision::ClosingBounds closing;
-  double contact() const { return collision::timeToContact(gap, closing); }
+  double timeToContact() const { return collision::computeTimeToContact(gap, closing); }
 };
 
-/// `direction`: unit.
-Approach approachAlong(const Vec3& direction, double gap, const Motion& a, const Motion& b) {
-  // Spins are even, so that any interval will do.
-  Approach approach{gap - a.atOnce - b.atOnce,
-                    collision::closingBounds(a.bounds, b.bounds, direction, 0)};
-  approach.closing.speed += a.anyway + b.anyway;
+/// `direction` has unit length.
+Approach computeApproachAlong(const Vec3& direction, double gap, const Motion& a, const Motion& b) {
+  // Angular velocities are constant, so any interval is valid.
+  Approach approach{gap - a.immediateGrowth - b.immediateGrowth,
+                    collision::computeClosingBounds(a.bounds, b.bounds, direction, 0)};
+  approach.closing.speed += a.isotropicSpeed + b.isotropicSpeed;
   return approach;
 }
 
-Approach slowestApproach(const collision::NearestParts& parts, bool convex, const Motion& a,
-                         const Motion& b) {
-  const collision::Decision& decision = parts.decision;
+Approach computeSlowestApproach(const collision::NearestParts& parts, bool convex, const Motion& a,
+                                const Motion& b) {
+  const collision::SeparationResult& separation = parts.separation;
   const Vec3 relative = a.bounds.velocity - b.bounds.velocity;
-  const Vec3 direction = relative.norm() > 0 ? Vec3(relative.normalized()) : decision.normal;
-  const Approach any = approachAlong(direction, decision.distance - decision.errorBound, a, b);
-  if (!convex) return any;
-  collision::FeatureCache along;
-  along.axis = decision.normal;
-  const double gap = collision::provedSeparation(parts.a, parts.b, along);
-  const Approach square = approachAlong(decision.normal, gap, a, b);
-  return square.contact() > any.contact() ? square : any;
+  const Vec3 direction = relative.norm() > 0 ? Vec3(relative.normalized()) : separation.normal;
+  const Approach alongVelocity =
+      computeApproachAlong(direction, separation.distance - separation.errorBound, a, b);
+  if (!convex) return alongVelocity;
+  collision::FeatureCache cache;
+  cache.axis = separation.normal;
+  const double gap = collision::computeSeparationLowerBound(parts.a, parts.b, cache);
+  const Approach alongNormal = computeApproachAlong(separation.normal, gap, a, b);
+  return alongNormal.timeToContact() > alongVelocity.timeToContact() ? alongNormal : alongVelocity;
 }
 
 }  // namespace
 
-std::variant<TimeApart, NoAnswer> timeApart(const SceneThen& then, const Lengths& lengths,
-                                            EntityId a, EntityId b, Assume assume, double least,
-                                            std::size_t& work) {
-  const auto first = solidParts(then, a, "a"), second = solidParts(then, b, "b");
+std::variant<TimeToContact, QueryError> computeTimeToContact(const SceneAt& sceneAt,
+                                                             const WorldSettings& settings,
+                                                             EntityId a, EntityId b,
+                                                             MotionAssumption assumption,
+                                                             double minWait, std::size_t& budget) {
+  const auto first = findSolidParts(sceneAt, a, "a"), second = findSolidParts(sceneAt, b, "b");
   for (const auto* one : {&first, &second})
-    if (const auto* why = std::get_if<NoAnswer>(one)) return *why;
-  const auto &placedA = std::get<Placed>(first), &placedB = std::get<Placed>(second);
-  const auto parts = collision::nearestParts(placedA.trees, placedB.trees, kNever, work);
-  if (parts.found != collision::NearestParts::Found::nearest) return tooComplex("b");
-  const Motion motionA = motionOf(then, a, lengths, assume, parts.decision.distance),
-               motionB = motionOf(then, b, lengths, assume, parts.decision.distance);
-  TimeApart apart;
-  apart.now = {a, b, parts.decision, 0};
-  apart.bounded = motionA.bounded && motionB.bounded;
-  if (!apart.bounded) {
-    apart.again = {least, false};
-    return apart;
+    if (const auto* error = std::get_if<QueryError>(one)) return *error;
+  const auto &placedA = std::get<PlacedEntity>(first), &placedB = std::get<PlacedEntity>(second);
+  const auto parts =
+      collision::findNearestParts(placedA.compounds, placedB.compounds, kNever, budget);
+  if (parts.outcome != collision::NearestParts::Outcome::nearest) return makeTooComplexError("b");
+  const Motion motionA = computeMotion(sceneAt, a, settings, assumption, parts.separation.distance),
+               motionB = computeMotion(sceneAt, b, settings, assumption, parts.separation.distance);
+  TimeToContact result;
+  result.proximity = {a, b, parts.separation, 0};
+  result.bounded = motionA.bounded && motionB.bounded;
+  if (!result.bounded) {
+    result.nextCheck = {minWait, false};
+    return result;
   }
-  const bool convex = placedA.parts == 1 && placedB.parts == 1;
-  const Approach approach = slowestApproach(parts, convex, motionA, motionB);
-  apart.closing = approach.closing;
-  apart.contact = approach.contact();
-  apart.again = collision::wakeUp(approach.gap, approach.closing, least, lengths.epsilon);
-  return apart;
+  const bool convex = placedA.partCount == 1 && placedB.partCount == 1;
+  const Approach approach = computeSlowestApproach(parts, convex, motionA, motionB);
+  result.closing = approach.closing;
+  result.separatedUntil = approach.timeToContact();
+  result.nextCheck =
+      collision::scheduleCheck(approach.gap, approach.closing, minWait, settings.contactOffset);
+  return result;
 }
 
 }  // namespace enfilade::scene

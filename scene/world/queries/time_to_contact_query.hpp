@@ -1,5 +1,5 @@
-// Before which time two entities cannot touch: from how far apart they are, exactly, and from
-// bounds on how they may move (seed 5.1, collision/continuous.*).
+// Time before which two entities cannot touch, from their exact distance and bounds of their motion
+// (Lin 1993, section 5.1; Cohen et al. 1995).
 #pragma once
 
 #include "collision/motion/time_to_contact.hpp"
@@ -8,27 +8,30 @@
 
 namespace enfilade::scene {
 
-/// What is assumed of the time to come.
-enum class Assume : std::uint8_t {
-  /// Velocity and spin stay as they were in the last tick, being carried or pushed among it; who
-  /// falls falls on; joints do all that they may.
+/// Assumption about future motion.
+enum class MotionAssumption : std::uint8_t {
+  /// Velocities stay as in the last tick, including those of being carried or pushed. Falling
+  /// avatars continue to fall; joints move within their limits.
   presentMotion,
-  /// Avatars, doors, lifts and things on paths go as fast as they may be told to, at once. Of free
-  /// bodies nothing is known.
+  /// Avatars, doors, lifts and paths immediately move as fast as any command allows. Dynamic bodies
+  /// are unbounded.
   anyCommand
 };
 
-struct TimeApart {
-  PairState now;
-  bool bounded = true;               ///< else nothing is known of how they move
-  collision::ClosingBounds closing;  ///< how fast they come nearer, at most; when it is bounded
-  double contact = 0;                ///< seconds before which they cannot touch; infinity: never
-  collision::WakeUp again;           ///< with the least time that is worth waiting
+struct TimeToContact {
+  PairProximity proximity;
+  bool bounded = true;               ///< false: the motion of one has no bound
+  collision::ClosingBounds closing;  ///< upper bound of the closing motion; valid if bounded
+  double separatedUntil = 0;         ///< seconds; infinity: never
+  collision::NextCheck nextCheck;    ///< computed with `minWait`
 };
 
-/// Of two different entities that are there. `least` >= 0, seconds. Takes what it does from `work`.
-std::variant<TimeApart, NoAnswer> timeApart(const SceneThen& then, const Lengths& lengths,
-                                            EntityId a, EntityId b, Assume assume, double least,
-                                            std::size_t& work);
+/// Both entities must be present and different. `minWait` >= 0, seconds. Subtracts its cost from
+/// `budget`.
+std::variant<TimeToContact, QueryError> computeTimeToContact(const SceneAt& sceneAt,
+                                                             const WorldSettings& settings,
+                                                             EntityId a, EntityId b,
+                                                             MotionAssumption assumption,
+                                                             double minWait, std::size_t& budget);
 
 }  // namespace enfilade::scene

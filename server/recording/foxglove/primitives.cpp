@@ -7,9 +7,9 @@ namespace enfilade::server {
 namespace {
 
 const Eigen::Vector3f kAvatarColour{0.85f, 0.4f, 0.1f};
-constexpr double kNameHeight = 0.12;  // metres, of the letters above an avatar
+constexpr double kNameHeight = 0.12;  // metres, font size of the name above an avatar
 
-foxglove::Point3 pointOf(const scene::Vec3& v) {
+foxglove::Point3 toPoint(const scene::Vec3& v) {
   foxglove::Point3 point;
   point.set_x(v.x());
   point.set_y(v.y());
@@ -17,28 +17,29 @@ foxglove::Point3 pointOf(const scene::Vec3& v) {
   return point;
 }
 
-/// Linear as materials have it, sRGB as viewers want it.
-float encoded(float linear) {
+/// Converts a linear colour component (materials) to sRGB (viewers).
+float encodeSrgb(float linear) {
   return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f;
 }
 
-foxglove::Color colourOf(const scene::Material& material) {
+foxglove::Color materialColour(const scene::Material& material) {
   const Eigen::Vector4f& base = material.baseColour;
-  const bool seenThrough = material.alpha == scene::Material::Alpha::blend;
-  return server::colourOf(Eigen::Vector3f(encoded(base[0]), encoded(base[1]), encoded(base[2])),
-                          seenThrough ? static_cast<double>(base[3]) : 1.0);
+  const bool isTransparent = material.alpha == scene::Material::Alpha::blend;
+  return server::makeColour(
+      Eigen::Vector3f(encodeSrgb(base[0]), encodeSrgb(base[1]), encodeSrgb(base[2])),
+      isTransparent ? static_cast<double>(base[3]) : 1.0);
 }
 
-/// Adds a mesh of an object, less `origin`.
+/// Appends an object's mesh, relative to `origin`.
 void addMesh(foxglove::TriangleListPrimitive& into, const scene::Object& object,
              const scene::Mesh& mesh, const scene::Vec3& origin) {
   const auto first = static_cast<std::uint32_t>(into.points_size());
   for (std::uint32_t vertex = 0; vertex < mesh.positions.size(); ++vertex)
-    *into.add_points() = pointOf(scene::worldPosition(object, mesh, vertex) - origin);
+    *into.add_points() = toPoint(scene::computeWorldPosition(object, mesh, vertex) - origin);
   for (const std::uint32_t index : mesh.indices) into.add_indices(first + index);
 }
 
-/// The objects' triangles, those of one material in one list.
+/// Adds the objects' triangles, one list per material.
 void addObjects(foxglove::SceneEntity& entity, const scene::Model& model,
                 const std::vector<std::uint32_t>& objects, const scene::Vec3& origin) {
   std::map<std::uint32_t, foxglove::TriangleListPrimitive*> lists;
@@ -49,35 +50,36 @@ void addObjects(foxglove::SceneEntity& entity, const scene::Model& model,
       auto& list = lists[mesh.material];
       if (!list) {
         list = entity.add_triangles();
-        *list->mutable_color() = colourOf(model.materials[mesh.material]);
+        *list->mutable_color() = materialColour(model.materials[mesh.material]);
       }
       addMesh(*list, object, mesh, origin);
     }
   }
 }
 
-std::vector<std::uint32_t> stillObjects(const scene::Model& model) {
-  std::vector<bool> moves(model.objects.size());
+std::vector<std::uint32_t> findStaticObjects(const scene::Model& model) {
+  std::vector<bool> isMoving(model.objects.size());
   for (const scene::BodySpec& body : model.bodies)
-    for (const std::uint32_t object : body.objects) moves[object] = true;
-  std::vector<std::uint32_t> still;
+    for (const std::uint32_t object : body.objects) isMoving[object] = true;
+  std::vector<std::uint32_t> staticObjects;
   for (std::uint32_t i = 0; i < model.objects.size(); ++i)
-    if (!moves[i] && model.objects[i].use != scene::Object::Use::solid) still.push_back(i);
-  return still;
+    if (!isMoving[i] && model.objects[i].usage != scene::Object::Usage::collisionOnly)
+      staticObjects.push_back(i);
+  return staticObjects;
 }
 
-std::size_t trianglesOf(const scene::Model& model, const std::vector<std::uint32_t>& objects) {
+std::size_t countTriangles(const scene::Model& model, const std::vector<std::uint32_t>& objects) {
   std::size_t triangles = 0;
   for (const std::uint32_t object : objects)
     for (const std::uint32_t mesh : model.objects[object].meshes)
-      triangles += model.meshes[mesh].indices.size() / 3;
+      triangles += model.meshes[mesh].triangleCount();
   return triangles;
 }
 
 void addHull(foxglove::TriangleListPrimitive& into, const scene::AvatarPart& part) {
   const auto first = static_cast<std::uint32_t>(into.points_size());
   for (const scene::Vec3& vertex : part.hull->vertices)
-    *into.add_points() = pointOf(part.rotation * vertex + part.offset);
+    *into.add_points() = toPoint(part.rotation * vertex + part.offset);
   for (const auto& face : part.hull->faces)
     for (std::size_t corner = 2; corner < face.size(); ++corner)
       for (const std::uint32_t vertex : {face[0], face[corner - 1], face[corner]})
@@ -86,7 +88,7 @@ void addHull(foxglove::TriangleListPrimitive& into, const scene::AvatarPart& par
 
 }  // namespace
 
-google::protobuf::Timestamp timestampOf(double seconds) {
+google::protobuf::Timestamp toTimestamp(double seconds) {
   google::protobuf::Timestamp stamp;
   const auto nanoseconds = static_cast<std::int64_t>(std::llround(seconds * 1e9));
   stamp.set_seconds(nanoseconds / 1'000'000'000);
@@ -94,7 +96,7 @@ google::protobuf::Timestamp timestampOf(double seconds) {
   return stamp;
 }
 
-foxglove::Vector3 vectorOf(const scene::Vec3& v) {
+foxglove::Vector3 toVector(const scene::Vec3& v) {
   foxglove::Vector3 message;
   message.set_x(v.x());
   message.set_y(v.y());
@@ -102,7 +104,7 @@ foxglove::Vector3 vectorOf(const scene::Vec3& v) {
   return message;
 }
 
-foxglove::Quaternion quaternionOf(const Eigen::Quaterniond& q) {
+foxglove::Quaternion toQuaternion(const Eigen::Quaterniond& q) {
   foxglove::Quaternion message;
   message.set_x(q.x());
   message.set_y(q.y());
@@ -111,7 +113,7 @@ foxglove::Quaternion quaternionOf(const Eigen::Quaterniond& q) {
   return message;
 }
 
-foxglove::Color colourOf(const Eigen::Vector3f& rgb, double alpha) {
+foxglove::Color makeColour(const Eigen::Vector3f& rgb, double alpha) {
   foxglove::Color colour;
   colour.set_r(static_cast<double>(rgb.x()));
   colour.set_g(static_cast<double>(rgb.y()));
@@ -120,62 +122,62 @@ foxglove::Color colourOf(const Eigen::Vector3f& rgb, double alpha) {
   return colour;
 }
 
-Eigen::Quaterniond upright() {
+Eigen::Quaterniond zUpFromYUp() {
   const double half = std::sqrt(0.5);
-  return {half, half, 0, 0};  // a quarter turn about X
+  return {half, half, 0, 0};  // 90 degrees about X
 }
 
-foxglove::CubePrimitive cubeOf(const scene::Box& box, const foxglove::Color& colour) {
+foxglove::CubePrimitive makeCube(const scene::Aabb& box, const foxglove::Color& colour) {
   foxglove::CubePrimitive cube;
-  *cube.mutable_pose()->mutable_position() = vectorOf((box.min + box.max) / 2);
-  *cube.mutable_pose()->mutable_orientation() = quaternionOf(Eigen::Quaterniond::Identity());
-  *cube.mutable_size() = vectorOf(box.max - box.min);
+  *cube.mutable_pose()->mutable_position() = toVector((box.min + box.max) / 2);
+  *cube.mutable_pose()->mutable_orientation() = toQuaternion(Eigen::Quaterniond::Identity());
+  *cube.mutable_size() = toVector(box.max - box.min);
   *cube.mutable_color() = colour;
   return cube;
 }
 
-foxglove::SceneEntity stillEntity(const scene::Scene& scene, std::size_t mostTriangles,
-                                  std::size_t mostBoxes) {
-  const std::vector<std::uint32_t> still = stillObjects(scene.model());
-  const foxglove::Color pale = colourOf(Eigen::Vector3f::Constant(0.7f), 0.25);
+foxglove::SceneEntity makeStaticEntity(const scene::Scene& scene, std::size_t maxTriangles,
+                                       std::size_t maxBoxes) {
+  const std::vector<std::uint32_t> staticObjects = findStaticObjects(scene.model());
+  const foxglove::Color pale = makeColour(Eigen::Vector3f::Constant(0.7f), 0.25);
   foxglove::SceneEntity entity;
   entity.set_id("still");
   entity.set_frame_id("scene");
-  if (trianglesOf(scene.model(), still) <= mostTriangles) {
-    addObjects(entity, scene.model(), still, scene::Vec3::Zero());
-  } else if (scene.stillBoxes().size() <= mostBoxes) {
-    for (const scene::Box& box : scene.stillBoxes()) *entity.add_cubes() = cubeOf(box, pale);
+  if (countTriangles(scene.model(), staticObjects) <= maxTriangles) {
+    addObjects(entity, scene.model(), staticObjects, scene::Vec3::Zero());
+  } else if (scene.staticBoxes().size() <= maxBoxes) {
+    for (const scene::Aabb& box : scene.staticBoxes()) *entity.add_cubes() = makeCube(box, pale);
   } else {
-    *entity.add_cubes() = cubeOf(scene.bounds(), pale);
+    *entity.add_cubes() = makeCube(scene.bounds(), pale);
   }
   return entity;
 }
 
-foxglove::SceneEntity bodyEntity(const scene::Scene& scene, std::size_t body) {
+foxglove::SceneEntity makeBodyEntity(const scene::Scene& scene, std::size_t body) {
   const scene::BodySpec& spec = scene.model().bodies[body];
   foxglove::SceneEntity entity;
   entity.set_id("body/" + spec.name);
   entity.set_frame_id("body/" + spec.name);
   entity.set_frame_locked(true);
-  addObjects(entity, scene.model(), spec.objects, scene.shapeOfBody(body)->origin);
+  addObjects(entity, scene.model(), spec.objects, scene.bodyShape(body)->origin);
   return entity;
 }
 
-foxglove::SceneEntity avatarEntity(const scene::AvatarView& avatar) {
+foxglove::SceneEntity makeAvatarEntity(const scene::AvatarSnapshot& avatar) {
   foxglove::SceneEntity entity;
   entity.set_id("avatar/" + avatar.name);
   entity.set_frame_id("avatar/" + avatar.name);
   entity.set_frame_locked(true);
   foxglove::TriangleListPrimitive& body = *entity.add_triangles();
-  *body.mutable_color() = colourOf(kAvatarColour);
+  *body.mutable_color() = makeColour(kAvatarColour);
   for (const scene::AvatarPart& part : avatar.shape->parts) addHull(body, part);
   foxglove::TextPrimitive& name = *entity.add_texts();
   *name.mutable_pose()->mutable_position() =
-      vectorOf({0, avatar.shape->box.max.y() + kNameHeight, 0});
-  *name.mutable_pose()->mutable_orientation() = quaternionOf(Eigen::Quaterniond::Identity());
+      toVector({0, avatar.shape->box.max.y() + kNameHeight, 0});
+  *name.mutable_pose()->mutable_orientation() = toQuaternion(Eigen::Quaterniond::Identity());
   name.set_billboard(true);
   name.set_font_size(kNameHeight);
-  *name.mutable_color() = colourOf(kAvatarColour);
+  *name.mutable_color() = makeColour(kAvatarColour);
   name.set_text(avatar.name);
   return entity;
 }

@@ -1,4 +1,4 @@
-// Enfilade's plain data as the messages that viewers know.
+// Conversion of Enfilade's plain data to Foxglove messages.
 #pragma once
 
 #include <string>
@@ -8,26 +8,26 @@
 
 namespace enfilade::server {
 
-/// `seconds` of simulated time, >= 0.
-google::protobuf::Timestamp timestampOf(double seconds);
+/// `seconds`: simulated time, >= 0.
+google::protobuf::Timestamp toTimestamp(double seconds);
 
-foxglove::Vector3 vectorOf(const scene::Vec3& v);
-foxglove::Quaternion quaternionOf(const Eigen::Quaterniond& q);
-foxglove::Color colourOf(const Eigen::Vector3f& rgb, double alpha = 1);
+foxglove::Vector3 toVector(const scene::Vec3& v);
+foxglove::Quaternion toQuaternion(const Eigen::Quaterniond& q);
+foxglove::Color makeColour(const Eigen::Vector3f& rgb, double alpha = 1);
 
-/// The turn between Y up and Z up: a frame turned so has its Y where its parent has its Z.
-Eigen::Quaterniond upright();
+/// Rotation from a Y-up frame to its Z-up parent: 90 degrees about X.
+Eigen::Quaterniond zUpFromYUp();
 
-/// A box along its frame's axes.
-foxglove::CubePrimitive cubeOf(const scene::Box& box, const foxglove::Color& colour);
+/// An AABB as a cube.
+foxglove::CubePrimitive makeCube(const scene::Aabb& box, const foxglove::Color& colour);
 
-/// What stands still: all of its triangles if they are at most `mostTriangles`, else a box for each
-/// object if those are at most `mostBoxes`, else the one box around everything.
-foxglove::SceneEntity stillEntity(const scene::Scene& scene, std::size_t mostTriangles,
-                                  std::size_t mostBoxes);
-/// An object that is part of a body, in the body's frame.
-foxglove::SceneEntity bodyEntity(const scene::Scene& scene, std::size_t body);
-/// Its parts and its name, in the avatar's frame.
-foxglove::SceneEntity avatarEntity(const scene::AvatarView& avatar);
+/// The static objects: all triangles if there are at most `maxTriangles`, otherwise one AABB per
+/// object if there are at most `maxBoxes`, otherwise the AABB of the scene.
+foxglove::SceneEntity makeStaticEntity(const scene::Scene& scene, std::size_t maxTriangles,
+                                       std::size_t maxBoxes);
+/// The objects of body `body`, in the body's frame.
+foxglove::SceneEntity makeBodyEntity(const scene::Scene& scene, std::size_t body);
+/// The avatar's parts and name, in the avatar's frame.
+foxglove::SceneEntity makeAvatarEntity(const scene::AvatarSnapshot& avatar);
 
 }  // namespace enfilade::server

@@ -9,52 +9,53 @@
 namespace enfilade::server {
 namespace {
 
-constexpr double kPlacedEvery = 0.1;  // seconds: viewers draw the way between
+constexpr double kTransformPeriod = 0.1;  // seconds; viewers interpolate between transforms
 
-/// Beyond these a scene's looks would outweigh its walk.
-constexpr std::size_t kMostTriangles = 100'000, kMostBoxes = 20'000;
+/// Above these limits the scene's geometry would dominate the recording's size.
+constexpr std::size_t kMaxTriangles = 100'000, kMaxBoxes = 20'000;
 
-constexpr double kMarkDiameter = 0.08;  // metres, of a contact
-const Eigen::Vector3f kMarkColour{0.9f, 0.05f, 0.1f};
+constexpr double kMarkerDiameter = 0.08;  // metres, of a contact's sphere
+const Eigen::Vector3f kMarkerColour{0.9f, 0.05f, 0.1f};
 
-constexpr const char* kTransforms = "/tf";
-constexpr const char* kLooks = "/scene";
+constexpr const char* kTransformTopic = "/tf";
+constexpr const char* kSceneTopic = "/scene";
 
-foxglove::FrameTransform transformOf(double time, const std::string& parent,
-                                     const std::string& child, const scene::Vec3& translation,
-                                     const Eigen::Quaterniond& rotation) {
+foxglove::FrameTransform makeTransform(double time, const std::string& parent,
+                                       const std::string& child, const scene::Vec3& translation,
+                                       const Eigen::Quaterniond& rotation) {
   foxglove::FrameTransform transform;
-  *transform.mutable_timestamp() = timestampOf(time);
+  *transform.mutable_timestamp() = toTimestamp(time);
   transform.set_parent_frame_id(parent);
   transform.set_child_frame_id(child);
-  *transform.mutable_translation() = vectorOf(translation);
-  *transform.mutable_rotation() = quaternionOf(rotation);
+  *transform.mutable_translation() = toVector(translation);
+  *transform.mutable_rotation() = toQuaternion(rotation);
   return transform;
 }
 
-/// Of a camera: x right, y down, z ahead.
-Eigen::Quaterniond opticalAxes(const scene::AvatarView& avatar) {
-  const render::View view = render::viewOf(render::firstPerson(avatar, 1, 1));
-  scene::Vec3 down = -view.up;
+/// Orientation of an avatar's camera frame: x right, y down, z forward.
+Eigen::Quaterniond computeOpticalRotation(const scene::AvatarSnapshot& avatar) {
+  const render::CameraBasis basis =
+      render::computeCameraBasis(render::makeFirstPersonCamera(avatar, 1, 1));
+  scene::Vec3 down = -basis.up;
   Eigen::Matrix3d axes;
-  axes << view.right, down, view.forward;
+  axes << basis.right, down, basis.forward;
   return Eigen::Quaterniond(axes).normalized();
 }
 
-std::string contactId(const v1::ContactEvent& event) {
+std::string makeContactId(const v1::ContactEvent& event) {
   return "contact/" + event.a_name() + "/" + event.b_name();
 }
 
-foxglove::SceneEntity markOf(const v1::ContactEvent& event, double time) {
+foxglove::SceneEntity makeContactMarker(const v1::ContactEvent& event, double time) {
   foxglove::SceneEntity entity;
-  *entity.mutable_timestamp() = timestampOf(time);
-  entity.set_id(contactId(event));
+  *entity.mutable_timestamp() = toTimestamp(time);
+  entity.set_id(makeContactId(event));
   entity.set_frame_id("scene");
-  foxglove::SpherePrimitive& mark = *entity.add_spheres();
-  *mark.mutable_pose()->mutable_position() = vectorOf(vectorFrom(event.point_b()));
-  *mark.mutable_pose()->mutable_orientation() = quaternionOf(Eigen::Quaterniond::Identity());
-  *mark.mutable_size() = vectorOf(scene::Vec3::Constant(kMarkDiameter));
-  *mark.mutable_color() = colourOf(kMarkColour);
+  foxglove::SpherePrimitive& marker = *entity.add_spheres();
+  *marker.mutable_pose()->mutable_position() = toVector(vectorFromProto(event.point_b()));
+  *marker.mutable_pose()->mutable_orientation() = toQuaternion(Eigen::Quaterniond::Identity());
+  *marker.mutable_size() = toVector(scene::Vec3::Constant(kMarkerDiameter));
+  *marker.mutable_color() = makeColour(kMarkerColour);
   for (const auto& [key, value] : {std::pair("a", event.a_name()), std::pair("b", event.b_name()),
                                    std::pair("distance", std::to_string(event.distance()))}) {
     foxglove::KeyValuePair& pair = *entity.add_metadata();
@@ -64,126 +65,129 @@ foxglove::SceneEntity markOf(const v1::ContactEvent& event, double time) {
   return entity;
 }
 
-foxglove::SceneEntityDeletion deletionOf(double time, const std::string& id) {
+foxglove::SceneEntityDeletion makeDeletion(double time, const std::string& id) {
   foxglove::SceneEntityDeletion deletion;
-  *deletion.mutable_timestamp() = timestampOf(time);
+  *deletion.mutable_timestamp() = toTimestamp(time);
   deletion.set_id(id);
   return deletion;
 }
 
-bool isOf(const v1::ContactEvent& event, v1::ContactEvent::Kind kind) {
+bool hasKind(const v1::ContactEvent& event, v1::ContactEvent::Kind kind) {
   return event.kind() == kind;
 }
 
 }  // namespace
 
-void ViewerChannels::begin(const scene::World& world) {
+void ViewerChannels::writeScene(const scene::World& world) {
   const scene::Scene& scene = world.scene();
-  foxglove::SceneUpdate looks;
-  foxglove::SceneEntityDeletion& all = *looks.add_deletions();
-  all.set_type(foxglove::SceneEntityDeletion::ALL);
-  *all.mutable_timestamp() = timestampOf(file_.fileTime(0));
-  *looks.add_entities() = stillEntity(scene, kMostTriangles, kMostBoxes);
+  foxglove::SceneUpdate update;
+  foxglove::SceneEntityDeletion& deleteAll = *update.add_deletions();
+  deleteAll.set_type(foxglove::SceneEntityDeletion::ALL);
+  *deleteAll.mutable_timestamp() = toTimestamp(file_.fileTime(0));
+  *update.add_entities() = makeStaticEntity(scene, kMaxTriangles, kMaxBoxes);
   for (std::size_t body = 0; body < scene.model().bodies.size(); ++body)
-    if (scene.model().bodies[body].kind != scene::BodyKind::trigger)
-      *looks.add_entities() = bodyEntity(scene, body);
-  for (foxglove::SceneEntity& entity : *looks.mutable_entities())
-    *entity.mutable_timestamp() = all.timestamp();
-  file_.write(kLooks, 0, looks);
-  shown_.clear();
-  nextTime_ = 0;
-  placeEveryone(world, true);
+    if (!isTrigger(scene.model().bodies[body].kind))
+      *update.add_entities() = makeBodyEntity(scene, body);
+  for (foxglove::SceneEntity& entity : *update.mutable_entities())
+    *entity.mutable_timestamp() = deleteAll.timestamp();
+  file_.write(kSceneTopic, 0, update);
+  shownShapes_.clear();
+  nextTransformTime_ = 0;
+  writeTransforms(world, true);
 }
 
-/// `all`: what never moves, and what stands where the model has it, too.
-void ViewerChannels::placeEveryone(const scene::World& world, bool all) {
+/// `includeStatic`: also writes the root transform and the bodies at their initial poses.
+void ViewerChannels::writeTransforms(const scene::World& world, bool includeStatic) {
   const scene::Snapshot& snapshot = *world.snapshot();
   const double time = file_.fileTime(snapshot.time);
-  foxglove::FrameTransforms places;
-  const auto place = [&](const std::string& parent, const std::string& child, const scene::Vec3& at,
-                         const Eigen::Quaterniond& turn) {
-    *places.add_transforms() = transformOf(time, parent, child, at, turn);
+  foxglove::FrameTransforms transforms;
+  const auto addTransform = [&](const std::string& parent, const std::string& child,
+                                const scene::Vec3& at, const Eigen::Quaterniond& rotation) {
+    *transforms.add_transforms() = makeTransform(time, parent, child, at, rotation);
   };
-  if (all) place("map", "scene", scene::Vec3::Zero(), upright());
-  for (const scene::AvatarView& avatar : snapshot.avatars) {
-    place("scene", "avatar/" + avatar.name, avatar.feet, Eigen::Quaterniond::Identity());
-    place("avatar/" + avatar.name, "eyes/" + avatar.name, {0, avatar.eyeHeight, 0},
-          opticalAxes(avatar));
+  if (includeStatic) addTransform("map", "scene", scene::Vec3::Zero(), zUpFromYUp());
+  for (const scene::AvatarSnapshot& avatar : snapshot.avatars) {
+    addTransform("scene", "avatar/" + avatar.name, avatar.footPosition,
+                 Eigen::Quaterniond::Identity());
+    addTransform("avatar/" + avatar.name, "eyes/" + avatar.name, {0, avatar.eyeHeight, 0},
+                 computeOpticalRotation(avatar));
   }
-  for (const scene::BodyView& body : *snapshot.bodies)
-    if (all || body.displaced || body.moving)
-      place("scene", "body/" + world.scene().model().bodies[body.index].name, body.pose.translation,
-            Eigen::Quaterniond(body.pose.rotation));
-  if (!places.transforms().empty()) file_.write(kTransforms, snapshot.time, places);
+  for (const scene::BodySnapshot& body : *snapshot.bodies)
+    if (includeStatic || body.displaced || body.moving)
+      addTransform("scene", "body/" + world.scene().model().bodies[body.index].name,
+                   body.pose.translation, Eigen::Quaterniond(body.pose.rotation));
+  if (!transforms.transforms().empty()) file_.write(kTransformTopic, snapshot.time, transforms);
 }
 
-void ViewerChannels::showAvatars(const scene::World& world) {
+void ViewerChannels::writeAvatars(const scene::World& world) {
   const scene::Snapshot& snapshot = *world.snapshot();
   const double time = file_.fileTime(snapshot.time);
-  foxglove::SceneUpdate looks;
-  auto before = std::exchange(shown_, {});
-  for (const scene::AvatarView& avatar : snapshot.avatars) {
-    shown_[avatar.name] = avatar.shape;
+  foxglove::SceneUpdate update;
+  auto before = std::exchange(shownShapes_, {});
+  for (const scene::AvatarSnapshot& avatar : snapshot.avatars) {
+    shownShapes_[avatar.name] = avatar.shape;
     const auto earlier = before.extract(avatar.name);
     if (!earlier.empty() && earlier.mapped() == avatar.shape) continue;
-    *looks.add_entities() = avatarEntity(avatar);
-    *looks.mutable_entities()->rbegin()->mutable_timestamp() = timestampOf(time);
+    *update.add_entities() = makeAvatarEntity(avatar);
+    *update.mutable_entities()->rbegin()->mutable_timestamp() = toTimestamp(time);
   }
   for (const auto& [name, shape] : before)
-    *looks.add_deletions() = deletionOf(time, "avatar/" + name);
-  if (!looks.entities().empty() || !looks.deletions().empty())
-    file_.write(kLooks, snapshot.time, looks);
+    *update.add_deletions() = makeDeletion(time, "avatar/" + name);
+  if (!update.entities().empty() || !update.deletions().empty())
+    file_.write(kSceneTopic, snapshot.time, update);
 }
 
-void ViewerChannels::showContacts(const v1::TickEvents& events) {
-  foxglove::SceneUpdate looks;
+void ViewerChannels::writeContacts(const v1::TickEvents& events) {
+  foxglove::SceneUpdate update;
   const double time = file_.fileTime(events.time());
   for (const v1::ContactEvent& event : events.contacts()) {
-    if (isOf(event, v1::ContactEvent::KIND_BEGIN)) *looks.add_entities() = markOf(event, time);
-    if (isOf(event, v1::ContactEvent::KIND_END))
-      *looks.add_deletions() = deletionOf(time, contactId(event));
+    if (hasKind(event, v1::ContactEvent::KIND_BEGIN))
+      *update.add_entities() = makeContactMarker(event, time);
+    if (hasKind(event, v1::ContactEvent::KIND_END))
+      *update.add_deletions() = makeDeletion(time, makeContactId(event));
   }
-  if (!looks.entities().empty() || !looks.deletions().empty())
-    file_.write(kLooks, events.time(), looks);
+  if (!update.entities().empty() || !update.deletions().empty())
+    file_.write(kSceneTopic, events.time(), update);
 }
 
-void ViewerChannels::ticked(const scene::World& world, const v1::TickEvents& events) {
+void ViewerChannels::writeTick(const scene::World& world, const v1::TickEvents& events) {
   const scene::Snapshot& snapshot = *world.snapshot();
-  const bool pictured = std::any_of(
+  const bool hasCapture = std::any_of(
       events.notices().begin(), events.notices().end(),
       [](const v1::Notice& notice) { return notice.kind() == v1::Notice::KIND_CAPTURE; });
-  showContacts(events);
-  if (snapshot.time + world.lengths().tick / 2 < nextTime_ && !pictured) return;
-  nextTime_ = snapshot.time + kPlacedEvery;
-  placeEveryone(world, false);
-  showAvatars(world);
+  writeContacts(events);
+  if (snapshot.time + world.settings().tickDuration / 2 < nextTransformTime_ && !hasCapture) return;
+  nextTransformTime_ = snapshot.time + kTransformPeriod;
+  writeTransforms(world, false);
+  writeAvatars(world);
 }
 
-void ViewerChannels::told(const v1::TickEvents& events) {
-  showContacts(events);
+void ViewerChannels::writeEvents(const v1::TickEvents& events) {
+  writeContacts(events);
 }
 
-void ViewerChannels::picture(const std::string& avatar, const v1::Frame& description,
-                             const EncodedPicture& picture) {
+void ViewerChannels::writeImage(const std::string& avatar, const v1::Frame& description,
+                                const EncodedImage& encodedImage) {
   const std::string topic = "/frames/" + avatar, frame = "eyes/" + avatar;
   foxglove::CompressedImage image;
-  *image.mutable_timestamp() = timestampOf(file_.fileTime(description.time()));
+  *image.mutable_timestamp() = toTimestamp(file_.fileTime(description.time()));
   image.set_frame_id(frame);
-  image.set_format(picture.format);
-  image.set_data(picture.bytes.data(), picture.bytes.size());
+  image.set_format(encodedImage.format);
+  image.set_data(encodedImage.bytes.data(), encodedImage.bytes.size());
   file_.write(topic + "/image", description.time(), image);
   if (!description.has_intrinsics()) return;
-  const v1::Intrinsics& lens = description.intrinsics();
+  const v1::Intrinsics& intrinsics = description.intrinsics();
   foxglove::CameraCalibration calibration;
   *calibration.mutable_timestamp() = image.timestamp();
   calibration.set_frame_id(frame);
   calibration.set_width(description.width());
   calibration.set_height(description.height());
-  for (const double k : {lens.fx(), 0.0, lens.cx(), 0.0, lens.fy(), lens.cy(), 0.0, 0.0, 1.0})
+  for (const double k : {intrinsics.fx(), 0.0, intrinsics.cx(), 0.0, intrinsics.fy(),
+                         intrinsics.cy(), 0.0, 0.0, 1.0})
     calibration.add_k(k);
   for (const double r : {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}) calibration.add_r(r);
-  for (const double p :
-       {lens.fx(), 0.0, lens.cx(), 0.0, 0.0, lens.fy(), lens.cy(), 0.0, 0.0, 0.0, 1.0, 0.0})
+  for (const double p : {intrinsics.fx(), 0.0, intrinsics.cx(), 0.0, 0.0, intrinsics.fy(),
+                         intrinsics.cy(), 0.0, 0.0, 0.0, 1.0, 0.0})
     calibration.add_p(p);
   file_.write(topic + "/calibration", description.time(), calibration);
 }

@@ -1,5 +1,5 @@
-// What viewers of recordings (Foxglove, Lichtblick) show without being taught: where everyone is
-// (/tf), what all look like and who touches what (/scene), pictures (/frames/NAME/...).
+// Channels for recording viewers (Foxglove, Lichtblick) in standard schemas: transforms (/tf),
+// geometry and contacts (/scene), images (/frames/NAME/...).
 #pragma once
 
 #include <map>
@@ -10,33 +10,33 @@
 
 namespace enfilade::server {
 
-/// Frames: `map` (Z up, as viewers have it) is the root; `scene` is the scene's own frame, Y up,
-/// metres; `avatar/NAME` stands at the feet, `eyes/NAME` looks (x right, y down, z ahead),
-/// `body/NAME` goes with a body. All functions throw protocol::mcap::RecordingError.
+/// Frames: `map` is the root (Z up, the viewers' convention). `scene` is the scene's frame (Y up,
+/// metres). `avatar/NAME` is at the foot position; `eyes/NAME` is the camera (x right, y down, z
+/// forward). `body/NAME` moves with a body. All functions throw protocol::mcap::RecordingError.
 class ViewerChannels {
  public:
   explicit ViewerChannels(protocol::RecordingWriter& file) : file_(file) {}
 
-  /// At the world's beginning: the root and what stands still, of which triangles are written if
-  /// there are few, else boxes.
-  void begin(const scene::World& world);
-  /// After a tick: contacts as they come and go, everything else ten times a second.
-  void ticked(const scene::World& world, const v1::TickEvents& events);
-  /// Without a tick.
-  void told(const v1::TickEvents& events);
-  /// A picture through the eyes of `avatar`.
-  void picture(const std::string& avatar, const v1::Frame& description,
-               const EncodedPicture& picture);
+  /// Writes the root transform, the static objects and the bodies; call it at the start of a run.
+  /// Static objects are triangles if there are few, otherwise AABBs.
+  void writeScene(const scene::World& world);
+  /// Call it after a tick. Writes contact changes every tick, everything else ten times a second.
+  void writeTick(const scene::World& world, const v1::TickEvents& events);
+  /// Writes contact changes that happen without a tick.
+  void writeEvents(const v1::TickEvents& events);
+  /// Writes an image of `avatar`'s view with its calibration.
+  void writeImage(const std::string& avatar, const v1::Frame& description,
+                  const EncodedImage& encodedImage);
 
  private:
-  void placeEveryone(const scene::World& world, bool all);
-  void showAvatars(const scene::World& world);
-  void showContacts(const v1::TickEvents& events);
+  void writeTransforms(const scene::World& world, bool includeStatic);
+  void writeAvatars(const scene::World& world);
+  void writeContacts(const v1::TickEvents& events);
 
   protocol::RecordingWriter& file_;
-  double nextTime_ = 0;  ///< seconds: when everyone is placed again
-  /// The shapes of the avatars that are shown, by name.
-  std::map<std::string, std::shared_ptr<const scene::AvatarShape>> shown_;
+  double nextTransformTime_ = 0;  ///< seconds: time of the next transforms
+  /// Shapes of the displayed avatars, by name.
+  std::map<std::string, std::shared_ptr<const scene::AvatarShape>> shownShapes_;
 };
 
 }  // namespace enfilade::server

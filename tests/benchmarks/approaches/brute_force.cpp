@@ -1,4 +1,4 @@
-// Every mover against every still box and every other mover.
+// Broad phase by brute force: every mover against every static box and every other mover.
 #include "tests/benchmarks/broad_phase_method.hpp"
 
 namespace enfilade::benchmarks {
@@ -6,9 +6,9 @@ namespace {
 
 class BruteForce : public BroadPhase {
  public:
-  explicit BruteForce(std::span<const Box> still) : still_(still) {}
+  explicit BruteForce(std::span<const Aabb> still) : still_(still) {}
 
-  void tick(std::span<const Box> movers, PairTally& tally) override {
+  void tick(std::span<const Aabb> movers, PairTally& tally) override {
     for (std::uint32_t a = 0; a < movers.size(); ++a) {
       for (std::uint32_t s = 0; s < still_.size(); ++s) {
         if (collision::overlaps(movers[a], still_[s])) tally.addStill(a, s);
@@ -20,7 +20,7 @@ class BruteForce : public BroadPhase {
   }
 
  private:
-  std::span<const Box> still_;
+  std::span<const Aabb> still_;
 };
 
 }  // namespace

@@ -1,51 +1,50 @@
-// BSP tree of the still scene (seed 5.3.1), its planes aligned with the axes.
+// Axis-aligned BSP tree of the static scene (Lin 1993, section 5.3.1).
 //
-// A node is cut at the median of its boxes' centres, along the axis on which they spread most; a
-// box that crosses the plane goes to both sides, so the cutting ends where it no longer parts
-// anything. A mover descends into the sides it reaches; a stamp keeps a box from being told twice.
-// Movers among themselves: one sort and sweep (mover_sweep.hpp), as a BSP is no structure for what
-// moves.
+// A node is split at the median of its boxes' centres, along the axis of their largest spread. A
+// box that crosses the plane goes to both sides, so splitting ends where it no longer separates. A
+// mover descends into the sides it overlaps; a stamp prevents duplicate reports. Pairs of movers
+// come from one sort and sweep (mover_sweep.hpp), since a BSP does not suit moving boxes.
 #include "tests/benchmarks/approaches/mover_sweep.hpp"
 
 namespace enfilade::benchmarks {
 namespace {
 
 constexpr std::size_t kLeafBoxes = 8;
-constexpr int kMostLevels = 32;
+constexpr int kMaxLevels = 32;
 
 class BspTree : public BroadPhase {
  public:
-  explicit BspTree(std::span<const Box> still) : still_(still), stamp_(still.size(), 0) {
+  explicit BspTree(std::span<const Aabb> still) : still_(still), stamp_(still.size(), 0) {
     std::vector<std::uint32_t> all(still.size());
     std::iota(all.begin(), all.end(), 0u);
     nodes_.emplace_back();
     build(0, std::move(all), 0);
   }
 
-  void tick(std::span<const Box> movers, PairTally& tally) override {
+  void tick(std::span<const Aabb> movers, PairTally& tally) override {
     for (std::uint32_t id = 0; id < movers.size(); ++id) {
       ++now_;
       ask(0, movers[id], id, tally);
     }
-    movers_.tell(movers, tally);
+    movers_.reportPairs(movers, tally);
   }
 
  private:
   struct Node {
     std::int32_t axis = -1;           ///< -1: a leaf
     double at = 0;                    ///< metres
-    std::uint32_t low = 0, high = 0;  ///< children; a leaf: its part of `listed_`
+    std::uint32_t low = 0, high = 0;  ///< children; a leaf: its range of `listed_`
   };
 
   void build(std::uint32_t node, std::vector<std::uint32_t> boxes, int level) {
-    if (boxes.size() > kLeafBoxes && level < kMostLevels && cut(node, boxes, level)) return;
+    if (boxes.size() > kLeafBoxes && level < kMaxLevels && cut(node, boxes, level)) return;
     nodes_[node].low = static_cast<std::uint32_t>(listed_.size());
     listed_.insert(listed_.end(), boxes.begin(), boxes.end());
     nodes_[node].high = static_cast<std::uint32_t>(listed_.size());
   }
 
   bool cut(std::uint32_t node, std::vector<std::uint32_t>& boxes, int level) {
-    Box centres;
+    Aabb centres;
     for (const std::uint32_t b : boxes) centres.include(still_[b].centre());
     int axis = 0;
     centres.size().maxCoeff(&axis);
@@ -59,7 +58,7 @@ class BspTree : public BroadPhase {
       if (still_[b].min[axis] <= at) low.push_back(b);
       if (still_[b].max[axis] >= at) high.push_back(b);
     }
-    // Not worth it when most boxes would stand on both sides.
+    // Not worth it if most boxes would be on both sides.
     if (4 * std::max(low.size(), high.size()) > 3 * boxes.size()) return false;
     std::vector<std::uint32_t>().swap(boxes);
     const auto first = static_cast<std::uint32_t>(nodes_.size());
@@ -70,7 +69,7 @@ class BspTree : public BroadPhase {
     return true;
   }
 
-  void ask(std::uint32_t index, const Box& box, std::uint32_t id, PairTally& tally) {
+  void ask(std::uint32_t index, const Aabb& box, std::uint32_t id, PairTally& tally) {
     const Node node = nodes_[index];
     if (node.axis >= 0) {
       if (box.min[node.axis] <= node.at) ask(node.low, box, id, tally);
@@ -85,10 +84,10 @@ class BspTree : public BroadPhase {
     }
   }
 
-  std::span<const Box> still_;
+  std::span<const Aabb> still_;
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> listed_;
-  std::vector<std::uint64_t> stamp_;  ///< by still box: the question that told it last
+  std::vector<std::uint64_t> stamp_;  ///< by static box: the last query that reported it
   std::uint64_t now_ = 0;
   MoverSweep movers_;
 };

@@ -1,9 +1,9 @@
-// Uniform spatial subdivision (seed 5.3.2): space is cut into equal cells, those in use are found
-// by hashing, every box is listed in all cells that it meets.
+// Uniform spatial subdivision (Lin 1993, section 5.3.2): equal cells, hashed; every box is listed
+// in all cells that it overlaps.
 //
-// Still boxes are listed once, in one array ordered by cell. Movers are listed afresh every tick.
-// A pair is told only in the cell that holds the low corner of its common box, so that it is told
-// once.
+// Static boxes are listed once, in one array ordered by cell. Movers are listed again every tick.
+// Only the cell with the low corner of the boxes' intersection reports a pair, so that it is
+// reported once.
 #include <array>
 #include <cmath>
 
@@ -24,7 +24,7 @@ Place placeOf(const Vec3& p) {
 }
 
 template <typename Visit>
-void forEachPlace(const Box& box, Visit&& visit) {
+void forEachPlace(const Aabb& box, Visit&& visit) {
   const Place low = placeOf(box.min);
   const Place high = placeOf(box.max);
   for (std::int32_t x = low[0]; x <= high[0]; ++x) {
@@ -34,7 +34,7 @@ void forEachPlace(const Box& box, Visit&& visit) {
   }
 }
 
-/// From places to numbers 0, 1, 2, ... in the order of their first use; open addressing.
+/// Maps cells to numbers 0, 1, 2, ... in the order of their first use; open addressing.
 class PlaceTable {
  public:
   static constexpr std::uint32_t kNone = static_cast<std::uint32_t>(-1);
@@ -84,9 +84,9 @@ class PlaceTable {
 
 class HashGrid : public BroadPhase {
  public:
-  explicit HashGrid(std::span<const Box> still) : still_(still) {
+  explicit HashGrid(std::span<const Aabb> still) : still_(still) {
     std::vector<std::uint32_t> counts;
-    for (const Box& box : still) {
+    for (const Aabb& box : still) {
       forEachPlace(box, [&](const Place& place) {
         const std::uint32_t cell = stillCells_.findOrAdd(place);
         if (cell == counts.size()) counts.push_back(0);
@@ -104,35 +104,35 @@ class HashGrid : public BroadPhase {
     }
   }
 
-  void tick(std::span<const Box> movers, PairTally& tally) override {
+  void tick(std::span<const Aabb> movers, PairTally& tally) override {
     moverCells_.clear();
     for (auto& list : moverLists_) list.clear();
     for (std::uint32_t id = 0; id < movers.size(); ++id) {
       forEachPlace(movers[id], [&](const Place& place) {
-        tellStill(id, movers[id], place, tally);
-        tellMovers(id, movers, place, tally);
+        reportStatic(id, movers[id], place, tally);
+        reportDynamic(id, movers, place, tally);
       });
     }
   }
 
  private:
-  static bool ownsPair(const Place& place, const Box& a, const Box& b) {
+  static bool ownsPair(const Place& place, const Aabb& a, const Aabb& b) {
     return placeOf(a.min.cwiseMax(b.min)) == place;
   }
 
-  void tellStill(std::uint32_t id, const Box& box, const Place& place, PairTally& tally) {
+  void reportStatic(std::uint32_t id, const Aabb& box, const Place& place, PairTally& tally) {
     const std::uint32_t cell = stillCells_.find(place);
     if (cell == PlaceTable::kNone) return;
     for (std::uint32_t k = first_[cell]; k < first_[cell + 1]; ++k) {
-      const Box& other = still_[listed_[k]];
+      const Aabb& other = still_[listed_[k]];
       if (collision::overlaps(box, other) && ownsPair(place, box, other)) {
         tally.addStill(id, listed_[k]);
       }
     }
   }
 
-  void tellMovers(std::uint32_t id, std::span<const Box> movers, const Place& place,
-                  PairTally& tally) {
+  void reportDynamic(std::uint32_t id, std::span<const Aabb> movers, const Place& place,
+                     PairTally& tally) {
     const std::uint32_t cell = moverCells_.findOrAdd(place);
     if (cell >= moverLists_.size()) moverLists_.resize(cell + 1);
     for (const std::uint32_t other : moverLists_[cell]) {
@@ -144,10 +144,10 @@ class HashGrid : public BroadPhase {
     moverLists_[cell].push_back(id);
   }
 
-  std::span<const Box> still_;
+  std::span<const Aabb> still_;
   PlaceTable stillCells_, moverCells_;
-  std::vector<std::uint32_t> first_;   ///< by cell, and one more: offsets into `listed_`
-  std::vector<std::uint32_t> listed_;  ///< still boxes by cell
+  std::vector<std::uint32_t> first_;   ///< by cell, plus one: offsets into `listed_`
+  std::vector<std::uint32_t> listed_;  ///< static boxes by cell
   std::vector<std::vector<std::uint32_t>> moverLists_;
 };
 

@@ -1,13 +1,13 @@
-// Interval tree for 2-D intersection tests (seed 5.2.3).
+// Interval tree for 2-D intersection tests (Lin 1993, section 5.2.3).
 //
-// A line sweeps along x. Where it meets the beginning of a box, the box's interval on z is put into
-// an interval tree and compared with those in it; at its end it is taken out. A pair of rectangles
-// that overlap is then tested on y. The still end points on x are sorted once and merged with the
-// movers' each tick; still and moving intervals lie in two trees, so that still boxes meet movers
-// only. Every tick sweeps over the whole still scene: O(n log n), as the seed says.
+// A line sweeps along x. At the start of a box, its interval on z is inserted into an interval tree
+// and compared with those in it; at its end it is removed. Overlapping pairs of rectangles are then
+// tested on y. The static end points on x are sorted once and merged with the movers' each tick.
+// Static and dynamic intervals are in two trees, so that no two static boxes are paired. Every tick
+// sweeps over the whole static scene: O(n log n), as in the thesis.
 //
-// Departures: the tree's split values are a sample of at most 4095 still ends, fixed for all ticks,
-// and a node's intervals are kept in no order and tested one by one.
+// Departures: the split values are a sample of at most 4095 static ends, fixed for all ticks; a
+// node's intervals are unordered and tested one by one.
 #include <algorithm>
 #include <array>
 
@@ -16,7 +16,7 @@
 namespace enfilade::benchmarks {
 namespace {
 
-constexpr std::size_t kMostSplits = 4095;
+constexpr std::size_t kMaxSplits = 4095;
 
 class IntervalTree {
  public:
@@ -44,7 +44,7 @@ class IntervalTree {
   void remove(std::uint32_t id) {
     const Place place = places_[id];
     std::size_t first = 0, size = splits_.size();
-    while (true) {  // the way down to the node, by its index
+    while (true) {  // walks down to the node by its index
       const std::size_t middle = first + size / 2;
       --nodes_[middle].below;
       if (middle == place.node) break;
@@ -57,7 +57,7 @@ class IntervalTree {
     ids.pop_back();
   }
 
-  /// Visits all intervals that may overlap [low, high], and none that cannot by its node.
+  /// Visits all intervals that may overlap [low, high]; skips nodes that cannot.
   template <typename Visit>
   void ask(double low, double high, Visit&& visit) const {
     ask(0, splits_.size(), low, high, visit);
@@ -65,7 +65,7 @@ class IntervalTree {
 
  private:
   struct Node {
-    std::uint32_t below = 0;  ///< intervals here and in all nodes below
+    std::uint32_t below = 0;  ///< intervals in this node and all nodes below
     std::vector<std::uint32_t> ids;
   };
   struct Place {
@@ -89,7 +89,7 @@ class IntervalTree {
 
 class IntervalSweep : public BroadPhase {
  public:
-  explicit IntervalSweep(std::span<const Box> still)
+  explicit IntervalSweep(std::span<const Aabb> still)
       : still_(still), splits_(sampledSplits(still)), stillTree_(splits_, still.size()) {
     for (std::uint32_t s = 0; s < still.size(); ++s) {
       addEnds({still[s].min.x(), s, false, false}, still[s].max.x(), stillEnds_);
@@ -97,7 +97,7 @@ class IntervalSweep : public BroadPhase {
     std::sort(stillEnds_.begin(), stillEnds_.end(), before);
   }
 
-  void tick(std::span<const Box> movers, PairTally& tally) override {
+  void tick(std::span<const Aabb> movers, PairTally& tally) override {
     if (!moverTree_) moverTree_ = std::make_unique<IntervalTree>(splits_, movers.size());
     moverEnds_.clear();
     for (std::uint32_t id = 0; id < movers.size(); ++id) {
@@ -118,7 +118,7 @@ class IntervalSweep : public BroadPhase {
     std::uint32_t id;
     bool moves, upper;
   };
-  /// At equal places lower ends come first: closed intervals that touch overlap.
+  /// At equal positions lower ends come first: closed intervals that touch overlap.
   static bool before(const End& a, const End& b) {
     return a.at != b.at ? a.at < b.at : a.upper < b.upper;
   }
@@ -127,19 +127,19 @@ class IntervalSweep : public BroadPhase {
     ends.push_back({upperAt, lower.id, lower.moves, true});
   }
 
-  static std::vector<double> sampledSplits(std::span<const Box> still) {
+  static std::vector<double> sampledSplits(std::span<const Aabb> still) {
     std::vector<double> all;
-    for (const Box& box : still) all.insert(all.end(), {box.min.z(), box.max.z()});
+    for (const Aabb& box : still) all.insert(all.end(), {box.min.z(), box.max.z()});
     std::sort(all.begin(), all.end());
     std::size_t count = 1;
-    while (2 * count + 1 <= std::min(all.size(), kMostSplits)) count = 2 * count + 1;
+    while (2 * count + 1 <= std::min(all.size(), kMaxSplits)) count = 2 * count + 1;
     std::vector<double> splits(count);
     for (std::size_t k = 0; k < count; ++k) splits[k] = all[(k + 1) * all.size() / (count + 1)];
     return splits;
   }
 
-  void meet(const End& end, std::span<const Box> movers, PairTally& tally) {
-    const Box& box = end.moves ? movers[end.id] : still_[end.id];
+  void meet(const End& end, std::span<const Aabb> movers, PairTally& tally) {
+    const Aabb& box = end.moves ? movers[end.id] : still_[end.id];
     IntervalTree& own = end.moves ? *moverTree_ : stillTree_;
     if (end.upper) {
       own.remove(end.id);
@@ -158,7 +158,7 @@ class IntervalSweep : public BroadPhase {
     own.insert(end.id, box.min.z(), box.max.z());
   }
 
-  std::span<const Box> still_;
+  std::span<const Aabb> still_;
   std::vector<double> splits_;
   IntervalTree stillTree_;
   std::unique_ptr<IntervalTree> moverTree_;

@@ -1,9 +1,9 @@
-// Octree (seed 5.3.1), in the loose form of Ulrich (Game Programming Gems, 2000).
+// Octree (Lin 1993, section 5.3.1), in the loose form of Ulrich (Game Programming Gems, 2000).
 //
-// A node of edge e holds the boxes whose centres lie in its cube and whose size is at most e: they
-// stay inside the cube grown by e/2 on every side, so a box never hangs at the root only because it
-// crosses a middle plane. A node is made when a box first needs it. Movers take their place afresh
-// every tick, in the same tree; the nodes they made stay.
+// A node of edge e holds boxes of size at most e with centres in its cube. They stay inside the
+// cube inflated by e/2, so a box is not kept at the root only because it crosses a middle plane.
+// Nodes are created on first use. Movers are inserted again every tick in the same tree; their
+// nodes stay.
 #include <array>
 #include <cmath>
 
@@ -12,14 +12,14 @@
 namespace enfilade::benchmarks {
 namespace {
 
-constexpr int kMostLevels = 20;
-constexpr double kLeastEdge = 2;  // metres: about an avatar; smaller nodes only cost visits
+constexpr int kMaxLevels = 20;
+constexpr double kMinEdge = 2;  // metres: about an avatar; smaller nodes only add visits
 
 class LooseOctree : public BroadPhase {
  public:
-  explicit LooseOctree(std::span<const Box> still) : still_(still) {
-    Box whole;
-    for (const Box& box : still) whole.include(box);
+  explicit LooseOctree(std::span<const Aabb> still) : still_(still) {
+    Aabb whole;
+    for (const Aabb& box : still) whole.include(box);
     rootCentre_ = whole.centre();
     rootEdge_ = whole.size().maxCoeff();
     nodes_.emplace_back();
@@ -28,7 +28,7 @@ class LooseOctree : public BroadPhase {
     listStill(nodeOfStill);
   }
 
-  void tick(std::span<const Box> movers, PairTally& tally) override {
+  void tick(std::span<const Aabb> movers, PairTally& tally) override {
     for (const std::uint32_t node : used_) nodes_[node].movers.clear();
     used_.clear();
     for (std::uint32_t id = 0; id < movers.size(); ++id) {
@@ -41,21 +41,21 @@ class LooseOctree : public BroadPhase {
 
  private:
   struct Node {
-    std::array<std::uint32_t, 8> child{};  ///< 0: none
+    std::array<std::uint32_t, 8> child{};  ///< 0: no child
     std::uint32_t firstStill = 0, stillCount = 0;
     std::vector<std::uint32_t> movers;
   };
 
-  /// The smallest node whose edge is not less than the box; makes the way to it. A centre outside
-  /// the root's cube stays at the root, which every question looks at.
-  std::uint32_t nodeFor(const Box& box) {
-    const double size = std::max(box.size().maxCoeff(), kLeastEdge);
+  /// Finds or creates the smallest node whose edge is at least the box's size. A box with its
+  /// centre outside the root's cube stays at the root, which every query visits.
+  std::uint32_t nodeFor(const Aabb& box) {
+    const double size = std::max(box.size().maxCoeff(), kMinEdge);
     const Vec3 at = box.centre();
     Vec3 centre = rootCentre_;
     double edge = rootEdge_;
     std::uint32_t node = 0;
     if (((at - centre).array().abs() > 0.5 * edge).any()) return 0;
-    for (int level = 0; level < kMostLevels && 0.5 * edge >= size; ++level) {
+    for (int level = 0; level < kMaxLevels && 0.5 * edge >= size; ++level) {
       const std::size_t octant = octantOf(at, centre);
       centre += 0.25 * edge * directionOf(octant);
       edge *= 0.5;
@@ -92,9 +92,9 @@ class LooseOctree : public BroadPhase {
   }
 
   void ask(std::uint32_t index, const Vec3& centre, double edge, std::uint32_t id,
-           std::span<const Box> movers, PairTally& tally) const {
+           std::span<const Aabb> movers, PairTally& tally) const {
     const Node& node = nodes_[index];
-    const Box& box = movers[id];
+    const Aabb& box = movers[id];
     for (std::uint32_t k = node.firstStill; k < node.firstStill + node.stillCount; ++k) {
       if (collision::overlaps(box, still_[listed_[k]])) tally.addStill(id, listed_[k]);
     }
@@ -104,7 +104,8 @@ class LooseOctree : public BroadPhase {
     for (std::size_t octant = 0; octant < 8; ++octant) {
       if (node.child[octant] == 0) continue;
       const Vec3 at = centre + 0.25 * edge * directionOf(octant);
-      // The child's cube of edge/2, loose: edge/2 from its centre, and a little for rounding.
+      // The child's loose bounds: its cube of edge/2, inflated by edge/4 on every side, and by
+      // rounding.
       const Vec3 reach = Vec3::Constant(0.5001 * edge);
       if (collision::overlaps(box, {at - reach, at + reach})) {
         ask(node.child[octant], at, 0.5 * edge, id, movers, tally);
@@ -112,11 +113,11 @@ class LooseOctree : public BroadPhase {
     }
   }
 
-  std::span<const Box> still_;
+  std::span<const Aabb> still_;
   Vec3 rootCentre_;
   double rootEdge_;
   std::vector<Node> nodes_;
-  std::vector<std::uint32_t> listed_;  ///< still boxes by node
+  std::vector<std::uint32_t> listed_;  ///< static boxes by node
   std::vector<std::uint32_t> used_;    ///< nodes that hold movers
 };
 

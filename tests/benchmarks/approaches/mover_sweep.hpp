@@ -1,5 +1,4 @@
-// Pairs of movers by one sort and one sweep along x: for approaches that treat the still scene
-// only.
+// Pairs of movers by one sort and sweep along x, for approaches that handle only the static scene.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +10,7 @@ namespace enfilade::benchmarks {
 
 class MoverSweep {
  public:
-  void tell(std::span<const Box> movers, PairTally& tally) {
+  void reportPairs(std::span<const Aabb> movers, PairTally& tally) {
     if (order_.size() != movers.size()) {
       order_.resize(movers.size());
       std::iota(order_.begin(), order_.end(), 0u);
@@ -20,9 +19,9 @@ class MoverSweep {
       return movers[a].min.x() < movers[b].min.x();
     });
     for (std::size_t i = 0; i < order_.size(); ++i) {
-      const Box& box = movers[order_[i]];
+      const Aabb& box = movers[order_[i]];
       for (std::size_t k = i + 1; k < order_.size(); ++k) {
-        const Box& other = movers[order_[k]];
+        const Aabb& other = movers[order_[k]];
         if (other.min.x() > box.max.x()) break;
         if (collision::overlaps(box, other)) tally.addMovers(order_[i], order_[k]);
       }
@@ -30,7 +29,7 @@ class MoverSweep {
   }
 
  private:
-  std::vector<std::uint32_t> order_;  ///< last tick's, nearly sorted
+  std::vector<std::uint32_t> order_;  ///< the last tick's order, nearly sorted
 };
 
 }  // namespace enfilade::benchmarks

@@ -1,4 +1,5 @@
-// Boost.Geometry: a packed R-tree of the still boxes, a second one of the movers every tick.
+// Peer: Boost.Geometry, with a packed R-tree of the static boxes and a new one of the movers every
+// tick.
 #include <boost/geometry.hpp>
 #include <boost/geometry/index/rtree.hpp>
 
@@ -11,9 +12,9 @@ namespace bgi = boost::geometry::index;
 
 class BoostRtree : public BroadPhase {
  public:
-  explicit BoostRtree(std::span<const Box> still) : still_(values(still)) {}
+  explicit BoostRtree(std::span<const Aabb> still) : still_(values(still)) {}
 
-  void tick(std::span<const Box> movers, PairTally& tally) override {
+  void tick(std::span<const Aabb> movers, PairTally& tally) override {
     const Tree moving(values(movers));
     for (std::uint32_t id = 0; id < movers.size(); ++id) {
       const BoostBox box = boostBox(movers[id]);
@@ -33,10 +34,10 @@ class BoostRtree : public BroadPhase {
   using Value = std::pair<BoostBox, std::uint32_t>;
   using Tree = bgi::rtree<Value, bgi::rstar<16>>;
 
-  static BoostBox boostBox(const Box& b) {
+  static BoostBox boostBox(const Aabb& b) {
     return {Point(b.min.x(), b.min.y(), b.min.z()), Point(b.max.x(), b.max.y(), b.max.z())};
   }
-  static std::vector<Value> values(std::span<const Box> boxes) {
+  static std::vector<Value> values(std::span<const Aabb> boxes) {
     std::vector<Value> result;
     for (std::uint32_t k = 0; k < boxes.size(); ++k) result.emplace_back(boostBox(boxes[k]), k);
     return result;

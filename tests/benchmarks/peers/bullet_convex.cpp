@@ -1,5 +1,5 @@
-// Bullet in double precision: GJK and EPA (btGjkEpaSolver2) on convex hulls without margin, started
-// from the last separating direction when warm.
+// Peer: Bullet in double precision, GJK and EPA (btGjkEpaSolver2) on convex hulls without margin;
+// warm queries start from the last separating direction.
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/NarrowPhaseCollision/btGjkEpa2.h>
 
@@ -38,17 +38,17 @@ class BulletPair : public PairOfBodies {
     const btTransform atB = transformOf(b);
     btVector3 guess = known_ ? guess_ : atB.getOrigin() - atA.getOrigin();
     if (guess.length2() == 0) guess = btVector3(1, 0, 0);
-    btGjkEpaSolver2::sResults told{};
-    if (btGjkEpaSolver2::Distance(&a_, atA, &b_, atB, guess, told)) {
-      keep(told.witnesses[0] - told.witnesses[1]);
-      return apart(told.distance);
+    btGjkEpaSolver2::sResults result{};
+    if (btGjkEpaSolver2::Distance(&a_, atA, &b_, atB, guess, result)) {
+      keep(result.witnesses[0] - result.witnesses[1]);
+      return apart(result.distance);
     }
     known_ = false;
     if (!depth_) return collides();
-    if (btGjkEpaSolver2::Penetration(&a_, atA, &b_, atB, guess, told, false)) {
-      return collides(-told.distance);
+    if (btGjkEpaSolver2::Penetration(&a_, atA, &b_, atB, guess, result, false)) {
+      return collides(-result.distance);
     }
-    return collides();  // it collides, and the depth was not found
+    return collides();  // collides, but the depth was not found
   }
 
  private:

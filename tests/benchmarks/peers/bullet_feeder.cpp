@@ -1,5 +1,5 @@
-// Bullet, doubles: convex hulls with a margin of half a millimetre, its sequential-impulse solver
-// as it comes, contacts found in every substep.
+// Peer: Bullet in doubles, convex hulls with a margin of 0.5 mm, its default sequential-impulse
+// solver, contacts found in every substep.
 #include <btBulletDynamicsCommon.h>
 
 #include "tests/benchmarks/feeder_engine.hpp"
@@ -87,11 +87,12 @@ class BulletFeeder : public FeederEngine {
   void addBody(double mass, btMotionState* motion, btCollisionShape* shape,
                const btVector3& inertia) {
     bodies_.push_back(std::make_unique<btRigidBody>(mass, motion, shape, inertia));
-    bodies_.back()->setFriction(std::sqrt(plan_.friction));  // a pair has the product
+    bodies_.back()->setFriction(std::sqrt(plan_.friction));  // Bullet multiplies the friction of a
+                                                             // pair
     world_.addRigidBody(bodies_.back().get());
   }
   double collisionVolume(std::size_t kind) const {
-    return scene::massOfHull(collision::buildHull(plan_.kinds[kind]), 1).volume;
+    return scene::computeHullMass(collision::buildHull(plan_.kinds[kind]), 1).volume;
   }
 
   const FeederPlan& plan_;

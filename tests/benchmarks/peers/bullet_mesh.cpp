@@ -1,8 +1,8 @@
-// Bullet in double precision: its quantized tree of boxes over the triangles, and GJK on each that
-// the box of the body meets.
+// Peer: Bullet in double precision, its quantized BVH of the triangles, and GJK on each triangle
+// whose box overlaps the body's.
 //
-// Bullet has no distance to a mesh; here the box is grown by the last distance, or doubled until a
-// triangle is found that is no farther than it was grown.
+// Bullet has no distance query to a mesh. The box is inflated by the last distance, or doubled
+// until a triangle is found within the inflation.
 #include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/CollisionShapes/btTriangleMesh.h>
@@ -15,7 +15,7 @@ namespace enfilade::benchmarks {
 namespace {
 
 constexpr double kFirstReach = 0.5;  // metres
-constexpr int kMostDoublings = 20;
+constexpr int kMaxDoublings = 20;
 
 btVector3 bulletVector(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
@@ -28,11 +28,11 @@ class EachTriangle : public btTriangleCallback {
   void processTriangle(btVector3* corners, int, int index) override {
     btTriangleShape triangle(corners[0], corners[1], corners[2]);
     triangle.setMargin(0);
-    btGjkEpaSolver2::sResults told{};
+    btGjkEpaSolver2::sResults result{};
     const btVector3 guess = corners[0] - at_.getOrigin();
     if (btGjkEpaSolver2::Distance(&body_, at_, &triangle, btTransform::getIdentity(), guess,
-                                  told)) {
-      nearest = std::min(nearest, told.distance);
+                                  result)) {
+      nearest = std::min(nearest, result.distance);
     } else {
       nearest = 0;
       met.push_back(static_cast<std::uint32_t>(index));
@@ -61,7 +61,7 @@ class BulletMeshQuery : public MeshQuery {
 
   double distance(const Placement& body) override {
     double reach = last_ > 0 ? 1.1 * last_ : kFirstReach;
-    for (int k = 0; k < kMostDoublings; ++k, reach *= 2) {
+    for (int k = 0; k < kMaxDoublings; ++k, reach *= 2) {
       const double found = ask(body, reach).nearest;
       if (found <= reach) {
         last_ = found;

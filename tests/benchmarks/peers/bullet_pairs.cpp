@@ -1,9 +1,8 @@
-// Bullet in double precision: its dynamic tree of boxes (Dbvt) and its 32-bit axis sweep.
+// Peer: Bullet in double precision, its dynamic AABB tree (Dbvt) and its 32-bit axis sweep.
 //
-// Both keep a cache of pairs whose fattened or quantized boxes overlap; told are those whose exact
-// boxes overlap. Filter groups keep still boxes from pairing with one another. Dbvt takes about a
-// hundred ticks to move what stands into its tree of fixed boxes and to put that in order: they are
-// made at construction and count as building.
+// Both cache pairs whose fattened or quantized boxes overlap; pairs with overlapping exact boxes
+// are reported. Filter groups exclude static pairs. Dbvt needs about a hundred ticks to move static
+// boxes into its fixed tree and to balance it: these run at construction and count as building.
 #include <BulletCollision/BroadphaseCollision/btAxisSweep3.h>
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
 
@@ -19,17 +18,17 @@ btVector3 bulletVector(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-/// A proxy's owner is an integer in a pointer: 2 * id, and 1 for movers.
+/// A proxy's user pointer holds an integer: 2 * id, plus 1 for movers.
 std::uintptr_t tagOf(const btBroadphaseProxy& proxy) {
   return reinterpret_cast<std::uintptr_t>(proxy.m_clientObject);
 }
 
 class BulletPairs : public BroadPhase {
  public:
-  BulletPairs(std::span<const Box> still, bool axisSweep) : still_(still) {
-    Box world;
-    for (const Box& box : still) world.include(box);
-    world = collision::grown(world, 10);
+  BulletPairs(std::span<const Aabb> still, bool axisSweep) : still_(still) {
+    Aabb world;
+    for (const Aabb& box : still) world.include(box);
+    world = collision::inflated(world, 10);
     if (axisSweep) {
       broadphase_ = std::make_unique<bt32BitAxisSweep3>(
           bulletVector(world.min), bulletVector(world.max),
@@ -46,7 +45,7 @@ class BulletPairs : public BroadPhase {
   BulletPairs(const BulletPairs&) = delete;
   BulletPairs& operator=(const BulletPairs&) = delete;
 
-  void tick(std::span<const Box> movers, PairTally& tally) override {
+  void tick(std::span<const Aabb> movers, PairTally& tally) override {
     if (proxies_.size() == still_.size()) {
       for (std::size_t k = 0; k < movers.size(); ++k) {
         add(movers[k], 2 * k + 1, kMoverGroup, kStillGroup | kMoverGroup);
@@ -58,17 +57,17 @@ class BulletPairs : public BroadPhase {
       }
     }
     broadphase_->calculateOverlappingPairs(nullptr);
-    tell(movers, tally);
+    reportPairs(movers, tally);
   }
 
  private:
-  void add(const Box& box, std::uintptr_t tag, int group, int mask) {
+  void add(const Aabb& box, std::uintptr_t tag, int group, int mask) {
     proxies_.push_back(broadphase_->createProxy(bulletVector(box.min), bulletVector(box.max), 0,
                                                 reinterpret_cast<void*>(tag), group, mask,
                                                 nullptr));
   }
 
-  void tell(std::span<const Box> movers, PairTally& tally) const {
+  void reportPairs(std::span<const Aabb> movers, PairTally& tally) const {
     const btBroadphasePairArray& pairs =
         broadphase_->getOverlappingPairCache()->getOverlappingPairArray();
     for (int k = 0; k < pairs.size(); ++k) {
@@ -84,9 +83,9 @@ class BulletPairs : public BroadPhase {
     }
   }
 
-  std::span<const Box> still_;
+  std::span<const Aabb> still_;
   std::unique_ptr<btBroadphaseInterface> broadphase_;
-  std::vector<btBroadphaseProxy*> proxies_;  ///< still ones, then movers
+  std::vector<btBroadphaseProxy*> proxies_;  ///< static ones, then movers
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// libccd's Minkowski portal refinement: a verdict, and a depth; no distance.
+// Peer: libccd's Minkowski portal refinement; a verdict and a depth, no distance.
 #include <ccd/ccd.h>
 #include <ccd/quat.h>
 
@@ -8,7 +8,7 @@
 namespace enfilade::benchmarks {
 namespace {
 
-constexpr unsigned long kMostIterations = 1000;
+constexpr unsigned long kMaxIterations = 1000;
 
 struct Shape {
   Points vertices;
@@ -57,7 +57,7 @@ class CcdPair : public PairOfBodies {
     CCD_INIT(&ccd_);
     ccd_.support1 = ccd_.support2 = support;
     ccd_.center1 = ccd_.center2 = centre;
-    ccd_.max_iterations = kMostIterations;
+    ccd_.max_iterations = kMaxIterations;
   }
 
   Answer ask(const Placement& a, const Placement& b) override {

@@ -1,5 +1,5 @@
-// CGAL's distance of polytopes by quadratic programming, exact for the points it is given: they are
-// the world vertices rounded to doubles.
+// Peer: CGAL's distance of polytopes by quadratic programming, exact for its input points, which
+// are the world vertices rounded to doubles.
 #include <CGAL/Cartesian.h>
 #include <CGAL/Gmpzf.h>
 #include <CGAL/Polytope_distance_d.h>

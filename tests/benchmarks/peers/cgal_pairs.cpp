@@ -1,5 +1,5 @@
-// CGAL: intersection of two sequences of boxes (Zomorodian and Edelsbrunner 2002), asked afresh
-// every tick; it keeps nothing between calls.
+// Peer: CGAL's intersection of two sequences of boxes (Zomorodian and Edelsbrunner 2002), computed
+// from scratch every tick.
 #include <CGAL/box_intersection_d.h>
 
 #include "tests/benchmarks/broad_phase_method.hpp"
@@ -9,9 +9,9 @@ namespace {
 
 class CgalBoxes : public BroadPhase {
  public:
-  explicit CgalBoxes(std::span<const Box> still) { fill(still, still_); }
+  explicit CgalBoxes(std::span<const Aabb> still) { fill(still, still_); }
 
-  void tick(std::span<const Box> movers, PairTally& tally) override {
+  void tick(std::span<const Aabb> movers, PairTally& tally) override {
     movers_.clear();
     fill(movers, movers_);
     CGAL::box_intersection_d(
@@ -25,7 +25,7 @@ class CgalBoxes : public BroadPhase {
 
  private:
   struct Handled : CGAL::Box_intersection_d::Box_d<double, 3> {
-    Handled(const Box& box, std::uint32_t id) : number(id) {
+    Handled(const Aabb& box, std::uint32_t id) : number(id) {
       std::array<double, 3> low{box.min.x(), box.min.y(), box.min.z()};
       std::array<double, 3> high{box.max.x(), box.max.y(), box.max.z()};
       extend(low.data());
@@ -34,7 +34,7 @@ class CgalBoxes : public BroadPhase {
     std::uint32_t number;
   };
 
-  static void fill(std::span<const Box> boxes, std::vector<Handled>& to) {
+  static void fill(std::span<const Aabb> boxes, std::vector<Handled>& to) {
     for (std::uint32_t k = 0; k < boxes.size(); ++k) to.emplace_back(boxes[k], k);
   }
 

@@ -1,6 +1,6 @@
-// Embree: a BVH of the still boxes, a second one of the movers built afresh every tick (quality
-// low), and its collision of two trees. Its bounds are floats, rounded outwards here; the callback
-// tests the exact boxes.
+// Peer: Embree, with a BVH of the static boxes, a new low-quality one of the movers every tick, and
+// its collision of two trees. Its bounds are floats, rounded outwards here; the callback tests the
+// exact boxes.
 #include <embree3/rtcore.h>
 
 #include <cmath>
@@ -21,8 +21,8 @@ float above(double x) {
 }
 
 void boundsOf(const RTCBoundsFunctionArguments* args) {
-  const Box& box =
-      static_cast<const std::span<const Box>*>(args->geometryUserPtr)->data()[args->primID];
+  const Aabb& box =
+      static_cast<const std::span<const Aabb>*>(args->geometryUserPtr)->data()[args->primID];
   RTCBounds& b = *args->bounds_o;
   b.lower_x = below(box.min.x());
   b.lower_y = below(box.min.y());
@@ -34,7 +34,7 @@ void boundsOf(const RTCBoundsFunctionArguments* args) {
 
 class EmbreeBvh : public BroadPhase {
  public:
-  explicit EmbreeBvh(std::span<const Box> still)
+  explicit EmbreeBvh(std::span<const Aabb> still)
       : device_(rtcNewDevice("threads=1,set_affinity=0")), still_(still) {
     rtcSetDeviceMemoryMonitorFunction(device_, countBytes, this);
     stillScene_ = sceneOf(&still_, RTC_BUILD_QUALITY_MEDIUM, stillGeometry_);
@@ -49,7 +49,7 @@ class EmbreeBvh : public BroadPhase {
   EmbreeBvh(const EmbreeBvh&) = delete;
   EmbreeBvh& operator=(const EmbreeBvh&) = delete;
 
-  void tick(std::span<const Box> movers, PairTally& tally) override {
+  void tick(std::span<const Aabb> movers, PairTally& tally) override {
     movers_ = movers;
     if (moverScene_ == nullptr) {
       moverScene_ = sceneOf(&movers_, RTC_BUILD_QUALITY_LOW, moverGeometry_);
@@ -58,13 +58,13 @@ class EmbreeBvh : public BroadPhase {
     }
     rtcCommitScene(moverScene_);
     tally_ = &tally;
-    rtcCollide(moverScene_, stillScene_, tellStill, this);
-    rtcCollide(moverScene_, moverScene_, tellMovers, this);
+    rtcCollide(moverScene_, stillScene_, reportStatic, this);
+    rtcCollide(moverScene_, moverScene_, reportDynamic, this);
   }
   std::size_t hiddenBytes() const override { return static_cast<std::size_t>(bytes_); }
 
  private:
-  RTCScene sceneOf(std::span<const Box>* boxes, RTCBuildQuality quality, RTCGeometry& geometry) {
+  RTCScene sceneOf(std::span<const Aabb>* boxes, RTCBuildQuality quality, RTCGeometry& geometry) {
     RTCScene scene = rtcNewScene(device_);
     rtcSetSceneBuildQuality(scene, quality);
     if (quality == RTC_BUILD_QUALITY_LOW) rtcSetSceneFlags(scene, RTC_SCENE_FLAG_DYNAMIC);
@@ -75,7 +75,7 @@ class EmbreeBvh : public BroadPhase {
     rtcSetGeometryBoundsFunction(geometry, boundsOf, nullptr);
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene, geometry);
-    rtcReleaseGeometry(geometry);  // the scene keeps it
+    rtcReleaseGeometry(geometry);  // the scene holds a reference
     return scene;
   }
 
@@ -83,7 +83,7 @@ class EmbreeBvh : public BroadPhase {
     static_cast<EmbreeBvh*>(self)->bytes_ += bytes;
     return true;
   }
-  static void tellStill(void* self, RTCCollision* collisions, unsigned count) {
+  static void reportStatic(void* self, RTCCollision* collisions, unsigned count) {
     const auto& bvh = *static_cast<EmbreeBvh*>(self);
     for (unsigned k = 0; k < count; ++k) {
       const RTCCollision& c = collisions[k];
@@ -92,7 +92,7 @@ class EmbreeBvh : public BroadPhase {
       }
     }
   }
-  static void tellMovers(void* self, RTCCollision* collisions, unsigned count) {
+  static void reportDynamic(void* self, RTCCollision* collisions, unsigned count) {
     const auto& bvh = *static_cast<EmbreeBvh*>(self);
     for (unsigned k = 0; k < count; ++k) {
       const RTCCollision& c = collisions[k];
@@ -104,7 +104,7 @@ class EmbreeBvh : public BroadPhase {
   }
 
   RTCDevice device_;
-  std::span<const Box> still_, movers_;
+  std::span<const Aabb> still_, movers_;
   RTCScene stillScene_ = nullptr, moverScene_ = nullptr;
   RTCGeometry stillGeometry_ = nullptr, moverGeometry_ = nullptr;
   PairTally* tally_ = nullptr;

@@ -1,6 +1,5 @@
-// FCL's two solvers for a pair of convex shapes, called without its dispatch, which would add to
-// them: libccd's GJK and EPA, and its own ("indep"), the latter at its own and at a tight
-// tolerance.
+// Peer: FCL's two convex solvers, called without its dispatch overhead: libccd's GJK and EPA, and
+// its own ("indep") at the default and at a tight tolerance.
 #include <fcl/geometry/shape/convex.h>
 #include <fcl/narrowphase/detail/gjk_solver_indep.h>
 #include <fcl/narrowphase/detail/gjk_solver_libccd.h>

@@ -1,5 +1,5 @@
-// FCL: its tree of OBBRSS volumes (oriented boxes and rectangle swept spheres) against a convex
-// shape, through its public functions; contacts without their positions.
+// Peer: FCL's tree of OBBRSS volumes (oriented boxes and rectangle swept spheres) against a convex
+// shape, by its public functions; contacts without positions.
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/geometry/shape/convex.h>
 #include <fcl/narrowphase/collision.h>

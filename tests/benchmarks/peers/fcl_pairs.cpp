@@ -1,5 +1,5 @@
-// FCL: dynamic tree of boxes, and sweep and prune (SSaP), each with one manager for the still scene
-// and one for the movers, so that still boxes are not on the path of a tick.
+// Peer: FCL's dynamic AABB tree and its sweep and prune (SSaP), each with one manager for the
+// static scene and one for the movers, so that a tick does not touch static boxes.
 #include <fcl/broadphase/broadphase_SSaP.h>
 #include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
 #include <fcl/geometry/shape/box.h>
@@ -11,24 +11,24 @@ namespace {
 
 using Object = fcl::CollisionObjectd;
 
-/// FCL makes an object's box from its shape; here the box itself is given.
-void setBox(Object& object, const Box& box) {
+/// Sets the given box directly; FCL would compute one from the shape.
+void setBox(Object& object, const Aabb& box) {
   fcl::AABBd& aabb = const_cast<fcl::AABBd&>(object.getAABB());
   aabb.min_ = box.min;
   aabb.max_ = box.max;
 }
 
 struct Asked {
-  std::span<const Box> still, movers;
+  std::span<const Aabb> still, movers;
   PairTally* tally;
 };
 
-/// An object's owner is an integer in a pointer: 2 * id, and 1 for movers.
+/// An object's user pointer holds an integer: 2 * id, plus 1 for movers.
 std::uintptr_t tagOf(const Object& object) {
   return reinterpret_cast<std::uintptr_t>(object.getUserData());
 }
 
-bool tell(Object* first, Object* second, void* data) {
+bool reportPairs(Object* first, Object* second, void* data) {
   const Asked& asked = *static_cast<Asked*>(data);
   std::uintptr_t a = tagOf(*first);
   std::uintptr_t b = tagOf(*second);
@@ -41,20 +41,20 @@ bool tell(Object* first, Object* second, void* data) {
   }
   if (moves) asked.tally->addMovers(mover, other);
   if (!moves) asked.tally->addStill(mover, other);
-  return false;  // go on
+  return false;  // continue
 }
 
 template <typename Manager>
 class FclPairs : public BroadPhase {
  public:
-  explicit FclPairs(std::span<const Box> still)
+  explicit FclPairs(std::span<const Aabb> still)
       : still_(still), shape_(std::make_shared<fcl::Boxd>(1, 1, 1)) {
     for (std::size_t k = 0; k < still.size(); ++k) add(still[k], 2 * k, stillObjects_);
     stillManager_.registerObjects(pointers(stillObjects_));
     stillManager_.setup();
   }
 
-  void tick(std::span<const Box> movers, PairTally& tally) override {
+  void tick(std::span<const Aabb> movers, PairTally& tally) override {
     if (moverObjects_.empty()) {
       for (std::size_t k = 0; k < movers.size(); ++k) add(movers[k], 2 * k + 1, moverObjects_);
       moverManager_.registerObjects(pointers(moverObjects_));
@@ -64,14 +64,14 @@ class FclPairs : public BroadPhase {
       moverManager_.update();
     }
     Asked asked{still_, movers, &tally};
-    moverManager_.collide(&stillManager_, &asked, tell);
-    moverManager_.collide(&asked, tell);
+    moverManager_.collide(&stillManager_, &asked, reportPairs);
+    moverManager_.collide(&asked, reportPairs);
   }
 
  private:
   using Objects = std::vector<std::unique_ptr<Object>>;
 
-  void add(const Box& box, std::uintptr_t tag, Objects& objects) {
+  void add(const Aabb& box, std::uintptr_t tag, Objects& objects) {
     objects.push_back(std::make_unique<Object>(shape_));
     objects.back()->setUserData(reinterpret_cast<void*>(tag));
     setBox(*objects.back(), box);
@@ -82,7 +82,7 @@ class FclPairs : public BroadPhase {
     return result;
   }
 
-  std::span<const Box> still_;
+  std::span<const Aabb> still_;
   std::shared_ptr<fcl::Boxd> shape_;
   Objects stillObjects_, moverObjects_;
   Manager stillManager_, moverManager_;

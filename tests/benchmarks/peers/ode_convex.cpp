@@ -1,4 +1,4 @@
-// ODE's convex against convex: separating axes over faces and edges; contacts with depths, no
+// Peer: ODE's convex against convex, separating axes over faces and edges; contacts with depths, no
 // distance. Solids only.
 #include <ode/ode.h>
 
@@ -10,9 +10,9 @@
 namespace enfilade::benchmarks {
 namespace {
 
-constexpr int kMostContacts = 8;
+constexpr int kMaxContacts = 8;
 
-/// The arrays that a convex geom refers to and does not copy.
+/// Owns the arrays that a convex geom refers to without a copy.
 class Shape {
  public:
   explicit Shape(const Points& points) {
@@ -66,8 +66,8 @@ class OdePair : public PairOfBodies {
     if (a_.geom() == nullptr || b_.geom() == nullptr) return {};
     a_.place(a);
     b_.place(b);
-    std::array<dContactGeom, kMostContacts> contacts;
-    const int count = dCollide(a_.geom(), b_.geom(), kMostContacts, contacts.data(),
+    std::array<dContactGeom, kMaxContacts> contacts;
+    const int count = dCollide(a_.geom(), b_.geom(), kMaxContacts, contacts.data(),
                                static_cast<int>(sizeof(dContactGeom)));
     if (count == 0) {
       Answer answer;

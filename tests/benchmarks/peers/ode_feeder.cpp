@@ -1,5 +1,5 @@
-// ODE, doubles: convex geoms, its quick step with 20 iterations as it comes, contacts found in
-// every substep.
+// Peer: ODE in doubles, convex geoms, its quick step with the default 20 iterations, contacts found
+// in every substep.
 #include <ode/ode.h>
 
 #include <array>
@@ -15,9 +15,9 @@ using testing::PlacedPart;
 using testing::Quat;
 using testing::Vec3;
 
-constexpr int kMostContacts = 8;
+constexpr int kMaxContacts = 8;
 
-/// The arrays that a convex geom refers to and does not copy.
+/// Owns the arrays that a convex geom refers to without a copy.
 struct Kind {
   std::vector<dReal> planes, points;
   std::vector<unsigned> polygons;
@@ -26,7 +26,7 @@ struct Kind {
 
   Kind(const std::vector<Vec3>& given, double density) {
     const collision::Hull hull = collision::buildHull(given);
-    mass = scene::massOfHull(hull, density);
+    mass = scene::computeHullMass(hull, density);
     for (const Vec3& v : hull.vertices) {
       const Vec3 p = v - mass.centre;
       points.insert(points.end(), {p.x(), p.y(), p.z()});
@@ -97,8 +97,8 @@ class OdeFeeder : public FeederEngine {
   }
   void addContacts(dGeomID a, dGeomID b) {
     if (dGeomGetBody(a) == dGeomGetBody(b)) return;
-    std::array<dContact, kMostContacts> contacts{};
-    const int count = dCollide(a, b, kMostContacts, &contacts[0].geom, sizeof(dContact));
+    std::array<dContact, kMaxContacts> contacts{};
+    const int count = dCollide(a, b, kMaxContacts, &contacts[0].geom, sizeof(dContact));
     for (int i = 0; i < count; ++i) {
       dContact& contact = contacts[static_cast<std::size_t>(i)];
       contact.surface.mode = dContactApprox1;

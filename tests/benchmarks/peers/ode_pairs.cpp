@@ -1,6 +1,6 @@
-// ODE: sweep-and-prune and hash spaces; category bits keep still boxes apart. ODE sorts or
-// rehashes a space whenever it is asked. Boxes are made from a centre and sizes, so their bounds
-// may differ from the given ones by a rounding; the callback tests the given ones.
+// Peer: ODE's sweep-and-prune and hash spaces; category bits exclude static pairs. ODE sorts or
+// rehashes a space at each query. Boxes are made from a centre and sizes, so their bounds may
+// differ from the given ones by a rounding; the callback tests the given ones.
 #include <ode/ode.h>
 
 #include "tests/benchmarks/broad_phase_method.hpp"
@@ -9,7 +9,7 @@ namespace enfilade::benchmarks {
 namespace {
 
 struct Asked {
-  std::span<const Box> still, movers;
+  std::span<const Aabb> still, movers;
   PairTally* tally;
 };
 
@@ -17,7 +17,7 @@ std::uintptr_t tagOf(dGeomID geom) {
   return reinterpret_cast<std::uintptr_t>(dGeomGetData(geom));
 }
 
-void tell(void* data, dGeomID first, dGeomID second) {
+void reportPairs(void* data, dGeomID first, dGeomID second) {
   const Asked& asked = *static_cast<Asked*>(data);
   std::uintptr_t a = tagOf(first);
   std::uintptr_t b = tagOf(second);
@@ -34,7 +34,7 @@ void tell(void* data, dGeomID first, dGeomID second) {
 
 class OdeSpace : public BroadPhase {
  public:
-  OdeSpace(std::span<const Box> still, bool hashed) : still_(still) {
+  OdeSpace(std::span<const Aabb> still, bool hashed) : still_(still) {
     static const int started = dInitODE2(0);
     (void)started;
     space_ = hashed ? dHashSpaceCreate(nullptr) : dSweepAndPruneSpaceCreate(nullptr, dSAP_AXES_XZY);
@@ -44,7 +44,7 @@ class OdeSpace : public BroadPhase {
   OdeSpace(const OdeSpace&) = delete;
   OdeSpace& operator=(const OdeSpace&) = delete;
 
-  void tick(std::span<const Box> movers, PairTally& tally) override {
+  void tick(std::span<const Aabb> movers, PairTally& tally) override {
     for (std::size_t k = 0; k < movers.size(); ++k) {
       if (movers_.size() < movers.size()) {
         movers_.push_back(add(movers[k], 2 * k + 1, 2, 3));
@@ -53,18 +53,18 @@ class OdeSpace : public BroadPhase {
       }
     }
     Asked asked{still_, movers, &tally};
-    dSpaceCollide(space_, &asked, tell);
+    dSpaceCollide(space_, &asked, reportPairs);
   }
 
  private:
-  /// Grown by more than the rounding of centre and sizes, so that no pair is lost by it.
-  static void place(dGeomID geom, const Box& box) {
+  /// Inflated by more than the rounding of centre and sizes, so that no pair is lost.
+  static void place(dGeomID geom, const Aabb& box) {
     const Vec3 centre = box.centre();
     const Vec3 size = box.size() + Vec3::Constant(1e-9);
     dGeomBoxSetLengths(geom, size.x(), size.y(), size.z());
     dGeomSetPosition(geom, centre.x(), centre.y(), centre.z());
   }
-  dGeomID add(const Box& box, std::uintptr_t tag, unsigned long category, unsigned long collides) {
+  dGeomID add(const Aabb& box, std::uintptr_t tag, unsigned long category, unsigned long collides) {
     dGeomID geom = dCreateBox(space_, 1, 1, 1);
     place(geom, box);
     dGeomSetData(geom, reinterpret_cast<void*>(tag));
@@ -73,7 +73,7 @@ class OdeSpace : public BroadPhase {
     return geom;
   }
 
-  std::span<const Box> still_;
+  std::span<const Aabb> still_;
   dSpaceID space_;
   std::vector<dGeomID> movers_;
 };

@@ -11,11 +11,11 @@ const decompressHandlers = { zstd: (packed, size) => decompress(packed, new Uint
 const channels = {}, messages = [];
 const base64 = (data) => Buffer.from(data).toString("base64");
 const count = (channel, schema, message) => {
-  const told = (channels[channel.topic] ??= { messages: 0, bytes: 0, type: schema.name });
-  told.messages += 1;
-  told.bytes += message.data.byteLength;
+  const summary = (channels[channel.topic] ??= { messages: 0, bytes: 0, type: schema.name });
+  summary.messages += 1;
+  summary.bytes += message.data.byteLength;
   if (!whole) return;
-  told.schema ??= base64(schema.data);
+  summary.schema ??= base64(schema.data);
   messages.push([channel.topic, Number(message.logTime) / 1e9, base64(message.data)]);
 };
 

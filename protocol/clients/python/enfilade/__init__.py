@@ -11,7 +11,7 @@
             print(contact.tick, contact.kind, contact.b_name, contact.distance)
         picture = ann.frame(width=320, height=240, channels=("rgb", "depth"))
 
-Metres, seconds, radians; right-handed, Y up. PROTOCOL.md tells what happens on the wire.
+Metres, seconds, radians; right-handed, Y up. PROTOCOL.md describes the wire protocol.
 """
 
 from . import messages

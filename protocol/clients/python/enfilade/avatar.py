@@ -1,4 +1,4 @@
-"""An avatar, as its client tells it what to do."""
+"""An avatar and the orders that its client gives it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .results import AvatarState, Frame
 if TYPE_CHECKING:
     from .client import Client
 
-ENTRY_TICKS = 3  # that enter() makes: whoever had the name before leaves in the first
+ENTRY_TICKS = 3  # maximum of enter(): an earlier avatar of the name leaves in the first
 
 
 class Avatar:
-    """An avatar of this client. Orders queue, and are carried out as ticks are made."""
+    """An avatar of this client. Orders are queued and executed as ticks run."""
 
     def __init__(self, client: Client, name: str) -> None:
         self._client = client
@@ -24,12 +24,12 @@ class Avatar:
         self.entry = 0  # the tag of its spawn
 
     def enter(self) -> AvatarState:
-        """Makes ticks, in lockstep, until it is in the world: one, or two where somebody of this name
-        is about to leave. Raises OrderFailed where it cannot enter."""
-        with self._client._hearing_notices():
+        """Runs ticks, in lockstep, until the avatar is in the world: one, or two if an earlier
+        avatar of this name is about to leave. Raises OrderFailed if it cannot enter."""
+        with self._client._with_notices():
             for _ in range(ENTRY_TICKS):
                 state = self._client.step(1, avatars=True).avatars.get(self.name)
-                # Before the state: it may be another avatar's, of the same name.
+                # Checked before the state, which may belong to another avatar of the same name.
                 why = [one.text for one in self._client._notices
                        if one.tag == self.entry and one.avatar == self.name and
                        one.kind == "refused"]
@@ -37,11 +37,11 @@ class Avatar:
                     raise OrderFailed(f"avatar {self.name!r} did not enter: {why[-1]}")
                 if state is not None:
                     return state
-        raise OrderFailed(f"avatar {self.name!r} did not enter within {ENTRY_TICKS} ticks: was the "
-                          "clock set, or its spawn dropped, meanwhile?")
+        raise OrderFailed(f"avatar {self.name!r} did not enter within {ENTRY_TICKS} ticks; did "
+                          "another call set the clock or drop its spawn?")
 
     def walk(self, *along: Point, speed: Optional[float] = None) -> int:
-        """To each of the points in turn."""
+        """Walks to each of the points in turn."""
         order = messages.Walk(along=[vec(point) for point in along])
         if speed is not None:
             order.speed = speed
@@ -54,7 +54,7 @@ class Avatar:
         return self._client.command(self.name, wait=messages.Wait(seconds=seconds))
 
     def drive(self, velocity: Point) -> int:
-        """From now on; drops what is queued. Zero stops."""
+        """Moves at this velocity from now on and drops the queue. Zero stops."""
         return self._client.command(self.name, drive=messages.Drive(velocity=vec(velocity)))
 
     def jump(self, height: Optional[float] = None) -> int:
@@ -68,7 +68,7 @@ class Avatar:
 
     def drive_joints(self, values: Sequence[Optional[float]], *, speed: Optional[float] = None,
                      at_once: bool = False) -> int:
-        """To these values, one a link; None leaves a joint as it is."""
+        """Moves the joints to these values, one per link; None leaves a joint unchanged."""
         target = messages.DriveJoints.Target
         return self._client.command(self.name, drive_joints=messages.DriveJoints(
             to=[target(value=value) for value in values], speed=speed, at_once=at_once))
@@ -77,5 +77,5 @@ class Avatar:
         return self._client.command(self.name, leave=messages.Leave())
 
     def frame(self, **options: Any) -> Frame:
-        """What it sees; options as of Client.frame()."""
+        """Returns a picture from its eyes; options as for Client.frame()."""
         return self._client.frame(self.name, **options)

@@ -1,9 +1,8 @@
 """Messages over a TCP connection: magic, lengths, deadlines. See PROTOCOL.md, "Framing".
 
-An exception that a signal's handler raises (KeyboardInterrupt) may come between any two bytecodes,
-and nothing here may get out of step by it. So what a read or a write moved is noted by the same call
-of C that made it (_Moved), every other change of state is one assignment, and a message stays `next`
-until its reader says that it was kept.
+A signal handler may raise an exception (KeyboardInterrupt) between any two bytecodes. The stream
+stays consistent: the C call that moves bytes also records their number (_Moved), every other change
+of state is one assignment, and a message stays `next` until its reader calls done().
 """
 
 from __future__ import annotations
@@ -20,16 +19,16 @@ from . import messages
 from .errors import ConnectionFailed, ServerError
 
 MAGIC = b"ENF1"
-LARGEST_MESSAGE = 1 << 28  # bytes, of what a server may send; the C++ client takes as much
+LARGEST_MESSAGE = 1 << 28  # bytes; the C++ client accepts as much
 LARGEST_HEADER = 1 << 24
 _LENGTHS = struct.Struct("<II")
-_BUFFER = 1 << 14  # bytes; what is longer goes right into memory of its own
+_BUFFER = 1 << 14  # bytes; longer messages get memory of their own
 _ALIGNMENT = 64  # bytes, of attachments
 
 
 class _Moved:
-    """Bytes on their way: the first sum(counts) of `view` came, or went; those before `start` were
-    used."""
+    """Bytes in transfer: the first sum(counts) of `view` are transferred; those before `start` are
+    consumed."""
 
     __slots__ = ("view", "counts", "start")
 
@@ -39,14 +38,14 @@ class _Moved:
         self.start = start
 
     def move(self, call: Any) -> int:
-        """Gives the rest to recv_into() or send(). map() and extend() are C: no handler runs between
-        the call and the note of what it returned."""
+        """Passes the rest to recv_into() or send(). map() and extend() are C: no handler runs between
+        the call and the record of its result."""
         self.counts.extend(map(call, (self.view[sum(self.counts):],)))
         return self.counts[-1]
 
 
 class Received:
-    """A message, and its attachment, which nobody else holds."""
+    """A message and its attachment, which has no other owner."""
 
     __slots__ = ("message", "attachment", "source", "end", "marks")
 
@@ -54,30 +53,30 @@ class Received:
         self.message = message
         self.attachment = attachment
         self.source = source
-        self.end = end  # where the next one begins in `source`
-        self.marks: Any = None  # of the reader
+        self.end = end  # start of the next message in `source`
+        self.marks: Any = None  # for the reader's use
 
 
 class Connection:
-    """One message at a time, in both directions. Not for use from two threads at once."""
+    """A connection that transfers one message at a time, in both directions. Not thread-safe."""
 
     def __init__(self, host: str, port: int, timeout: float) -> None:
         self.peer = f"{host}:{port}"
         self.timeout = timeout
         self.broken = ""
-        self.fate: Callable[[], str] = lambda: ""  # what became of the server, where that is known
-        self.max_message = 0  # bytes that the server takes; 0: not known yet
+        self.fate: Callable[[], str] = lambda: ""  # how the server ended, if known
+        self.max_message = 0  # bytes that the server accepts; 0: unknown yet
         try:
             self._socket = socket.create_connection((host, port), timeout)
         except (OSError, OverflowError) as error:
             raise ConnectionFailed(
                 f"cannot connect to {self.peer}: {error}; is `enfilade serve` running there, and "
-                "is the port the one of its ready line?") from error
+                "is this the port of its ready line?") from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._readable = select.poll()
         self._readable.register(self._socket, select.POLLIN)
         self._came = _Moved(memoryview(bytearray(_BUFFER)))
-        self._went = _Moved(memoryview(MAGIC))  # goes with the first message
+        self._went = _Moved(memoryview(MAGIC))  # sent with the first message
         self._next: Optional[Received] = None
         self._magic_seen = False
 
@@ -85,25 +84,25 @@ class Connection:
         self.broken = self.broken or "the client was closed"
         self._socket.close()
 
-    def say_no_more(self) -> None:
-        """Ends this side of a connection that has something to read; that can still be read."""
+    def shutdown_send(self) -> None:
+        """Shuts down the sending side if there is data to read, which stays readable."""
         try:
             if self._readable.poll(0):
                 self._socket.shutdown(socket.SHUT_WR)
         except OSError:
-            pass  # closed already, here or there
+            pass  # already closed on one side
 
     def send(self, requests: Iterable[Any]) -> None:
-        """All of them in one write, after what an interrupted one left. Raises ValueError, and sends
-        nothing, when one is longer than the server takes."""
+        """Sends all in one write, after the rest of an interrupted one. Raises ValueError and sends
+        nothing if one is longer than the server accepts."""
         if self.broken:
             raise ConnectionFailed(f"{self.peer}: {self.broken}")
         parts: List[Any] = [self._went.view[sum(self._went.counts):]]
         for request in requests:
             header = request.SerializeToString()
             if self.max_message and 8 + len(header) > self.max_message:
-                raise ValueError(f"a request has {8 + len(header)} bytes, and the server takes "
-                                 f"{self.max_message} (limits.max_message): ask for less at a time")
+                raise ValueError(f"a request has {8 + len(header)} bytes; the server accepts "
+                                 f"{self.max_message} (limits.max_message): split the request")
             parts += (_LENGTHS.pack(4 + len(header), len(header)), header)
         self._went = went = _Moved(memoryview(b"".join(parts)))
         deadline = time.monotonic() + self.timeout
@@ -113,22 +112,22 @@ class Connection:
                 if time.monotonic() > deadline:
                     raise socket.timeout()
         except socket.timeout as error:
-            self.broken = f"the server took nothing for {self.timeout:g} s"
+            self.broken = f"the server read nothing for {self.timeout:g} s"
             raise ConnectionFailed(f"{self.peer}: {self.broken}") from error
         except OSError as error:
-            # Not closed yet: what it said last may still be read.
+            # Not closed yet: its final message is still readable.
             self.broken = f"the connection broke: {error}{self._fate()}"
             raise ConnectionFailed(f"{self.peer}: {self.broken}") from error
 
     def next(self, seconds: Optional[float] = None) -> Optional[Received]:
-        """The message that is next, the same one until done() is told; None when `seconds` passed
-        between messages. Half a message is waited for as long as a reply is."""
+        """Returns the next message, the same one until done(); None after `seconds` without one.
+        Half a message is awaited as long as a reply."""
         if self._next is not None:
             return self._next
         if self._socket.fileno() < 0:
             raise ConnectionFailed(f"{self.peer}: {self.broken}")
         came = self._came
-        if came.start == sum(came.counts):  # used up: begin at the start of a buffer
+        if came.start == sum(came.counts):  # all consumed: restart at the start of a buffer
             whole = len(came.view) == _BUFFER
             self._came = came = _Moved(came.view if whole else memoryview(bytearray(_BUFFER)))
             if seconds is not None and not self._readable.poll(max(0.0, seconds) * 1000):
@@ -136,22 +135,22 @@ class Connection:
         if not self._magic_seen:
             self._fill(4)
             if bytes(came.view[:4]) != MAGIC:
-                raise self._failed("it does not speak this protocol; is that an Enfilade server?")
+                raise self._failed("it does not speak this protocol; is it an Enfilade server?")
             came.start = 4
             self._magic_seen = True
         self._next = self._read_one()
         return self._next
 
     def done(self, received: Received) -> None:
-        """`received` was kept. To say so twice is to say so once."""
+        """Releases `received`. A second call has no effect."""
         received.source.start = received.end
         self._next = None
 
     # ---- bytes ------------------------------------------------------------------------------
 
     def _fate(self) -> str:
-        return "; " + (self.fate() or "the server ended, was killed, or cut this client off: its log "
-                                      "may say why")
+        return "; " + (self.fate() or "the server ended, was killed, or disconnected this client: its "
+                                      "log may give the reason")
 
     def _failed(self, why: str) -> ConnectionFailed:
         self.broken = self.broken or why
@@ -169,7 +168,7 @@ class Connection:
         header, end = came.start + 8, came.start + 4 + total
         attachment = came.view[header + header_length:end]
         if attachment and len(came.view) == _BUFFER:
-            # An array of numpy's, not a bytearray: nobody needs it zeroed first.
+            # An array of numpy, not a bytearray, which would be zeroed first.
             own = memoryview(numpy.empty(len(attachment), numpy.uint8))
             own[:] = attachment
             attachment = own
@@ -177,11 +176,11 @@ class Connection:
         try:
             message.ParseFromString(came.view[header:header + header_length])
         except Exception as error:  # its class differs between protobuf's implementations
-            raise self._failed(f"a message does not parse: {error}; do the versions fit?") from error
+            raise self._failed(f"a message does not parse: {error}; do the versions match?") from error
         return Received(message, attachment, came, end)
 
     def _make_room(self, length: int, before_attachment: int) -> None:
-        """Has `length` bytes from the start on in one piece; a long message has it for itself."""
+        """Makes space for `length` contiguous bytes from the start on; a long message gets its own."""
         came = self._came
         if came.start + length <= len(came.view):
             return
@@ -195,7 +194,7 @@ class Connection:
         self._came = _Moved(view, start + len(rest), start)
 
     def _fill(self, wanted: int) -> None:
-        """Has `wanted` unread bytes."""
+        """Reads until `wanted` unread bytes are there."""
         came = self._came
         if sum(came.counts) - came.start >= wanted:
             return
@@ -208,9 +207,9 @@ class Connection:
             except OSError as error:
                 raise self._failed(f"the connection broke: {error}{self._fate()}") from error
             if count == 0:
-                raise self._failed("the connection ended without a goodbye" + self._fate())
+                raise self._failed("the connection ended without Bye" + self._fate())
             if count < 0 or time.monotonic() > deadline:
-                raise self._failed(f"no answer within {self.timeout:g} s; is the server "
+                raise self._failed(f"no reply within {self.timeout:g} s; is the server "
                                    "overloaded? A longer timeout may help")
 
 

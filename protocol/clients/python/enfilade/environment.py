@@ -1,8 +1,8 @@
-"""Environments with Gymnasium's API: an avatar walks through the scene and sees.
+"""Environments with Gymnasium's API: an avatar walks through the scene and observes pictures.
 
-Gymnasium itself is optional: where it is installed, the classes here are its environments and use its
-spaces. Everything is made in lockstep and begins anew with reset(), so that the same seed and the same
-actions give the same observations, pixel for pixel on the same renderer.
+Gymnasium itself is optional: if it is installed, these classes are its environments and use its
+spaces. The world runs in lockstep and restarts with reset(). The same seed and the same actions
+therefore give the same observations, pixel for pixel on the same renderer.
 """
 
 from __future__ import annotations
@@ -41,23 +41,24 @@ def _numbers(given: Any, name: str, counts: Sequence[int]) -> Tuple[float, ...]:
 class WalkEnv(spaces.EnvBase):
     """One avatar in a world of its own.
 
-    scene or address: a model that a server process is started for, or HOST:PORT of one that runs
-        (this client must then drive its world `world`). Or client: one that is connected, which
-        close() leaves as it is.
-    starts: places to begin at, (x, y, z) of the feet or (x, y, z, facing in degrees); one is chosen at
-        each reset, and a facing where none is given.
-    goal: where the walk ends well, within `goal_radius` metres on the ground.
+    scene or address: a model, for which a server process is started, or HOST:PORT of a running
+        server (this client must then drive its world `world`). Or client: a connected one, which
+        close() leaves open.
+    starts: start positions, (x, y, z) of the feet or (x, y, z, facing in degrees); each reset chooses
+        one at random, and a facing if none is given.
+    goal: the walk succeeds within `goal_radius` metres of it, on the ground.
     size: (width, height) of the pictures in pixels; `channels` of "rgb", "depth", "ids", or none.
-    ticks_per_step: 1/60 s each. speed: metres a second. turn_speed: radians a second.
-    discrete: actions are 0 stand, 1 go ahead, 2 turn left, 3 turn right; else two numbers in -1..1,
+    ticks_per_step: 1/60 s each. speed: metres per second. turn_speed: radians per second.
+    discrete: actions are 0 stand, 1 walk ahead, 2 turn left, 3 turn right; else two numbers in -1..1,
         ahead and turn (left is positive).
 
-    Observations: the channels (depth in metres, inf where there is nothing), "position" of the feet,
-    "heading" as its cosine and sine, and "to_goal" in metres when there is a goal. The reward is the way
-    made towards the goal, or without one the way made, in metres; override reward() and is_over().
+    Observations: the channels (depth in metres, inf for the background), "position" of the feet,
+    "heading" as its cosine and sine, and "to_goal" in metres if there is a goal. The reward is the
+    progress towards the goal, or without a goal the distance walked, in metres; override reward() and
+    is_over().
 
-    Raises ValueError, which names the argument, before anything is sent. An exception in the middle
-    of a step (KeyboardInterrupt) leaves it usable, though the world may have gone on by that step.
+    Raises ValueError with the name of the argument before anything is sent. An exception during a
+    step (KeyboardInterrupt) leaves it usable, but the world may have advanced by that step.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
@@ -71,7 +72,7 @@ class WalkEnv(spaces.EnvBase):
                  render_mode: Optional[str] = "rgb_array", server_arguments: Sequence[str] = (),
                  client: Optional[Client] = None, world: str = "main", token: str = "") -> None:
         if not len(starts):
-            raise ValueError("starts: give at least one place to begin at")
+            raise ValueError("starts: give at least one start position")
         self.starts = [_numbers(start, f"starts[{i}]", (3, 4)) for i, start in enumerate(starts)]
         self.goal = None if goal is None else np.array(_numbers(goal, "goal", (3,)))
         self._first_goal = self.goal
@@ -83,13 +84,14 @@ class WalkEnv(spaces.EnvBase):
             if operator.index(count) < 1:
                 raise ValueError(f"{name}: give at least 1, not {count}")
         if any(side < 1 or side != int(side) for side in _numbers(size, "size", (2,))):
-            raise ValueError(f"size: give pixels, whole and at least 1, not {size!r}")
+            raise ValueError(f"size: give whole numbers of pixels, at least 1, not {size!r}")
         if not 0 < goal_radius < math.inf:
             raise ValueError(f"goal_radius: give metres above 0, not {goal_radius}")
         if not 0 < fov_y < math.pi:
             raise ValueError(f"fov_y: give radians between 0 and pi, not {fov_y}")
         if not (0 < speed < math.inf and 0 <= turn_speed < math.inf):
-            raise ValueError(f"speed, turn_speed: {speed}, {turn_speed} cannot be gone")
+            raise ValueError("speed, turn_speed: give a number above 0 and one not below 0, "
+                             f"not {speed}, {turn_speed}")
         if isinstance(server_arguments, str):
             raise ValueError("server_arguments: give a list of strings")
         if sum(one is not None for one in (scene, address or None, client)) != 1:
@@ -108,7 +110,7 @@ class WalkEnv(spaces.EnvBase):
         self._heading = 0.0
         self._steps = 0
         self._start: Sequence[float] = ()  # of the episode
-        self._tag = 0  # of the spawn that the last reset() sent
+        self._tag = 0  # of the last reset()'s spawn
         self._state: Optional[results.AvatarState] = None
         self._rgb: Optional[np.ndarray] = None
         self.server: Optional[Server] = None
@@ -126,10 +128,10 @@ class WalkEnv(spaces.EnvBase):
         self.client.subscribe(contacts=True, notices=True)
         limit = self.client.welcome.policies.speed_limit
         if self.speed > limit:
-            raise ValueError(f"speed: the server's limit is {limit:g} m/s, and {self.speed:g} is asked")
+            raise ValueError(f"speed: {self.speed:g} m/s exceeds the server's limit of {limit:g}")
         most = self.client.limits.max_ticks_per_step
         if self.ticks_per_step > most:
-            raise ValueError(f"ticks_per_step: the server makes at most {most} at a time")
+            raise ValueError(f"ticks_per_step: the server runs at most {most} at a time")
         self._seconds = self.ticks_per_step * self.client.tick_seconds
         self.metadata = {**self.metadata, "render_fps": 1 / self._seconds}
 
@@ -156,16 +158,16 @@ class WalkEnv(spaces.EnvBase):
             parts["to_goal"] = box(-np.inf, np.inf, (3,), np.float64)
         return spaces.Dict(parts)
 
-    # ---- what a task may override -----------------------------------------------------------
+    # ---- a task may override these -----------------------------------------------------------
 
     def reward(self, before: np.ndarray, after: np.ndarray, info: Dict[str, Any]) -> float:
-        """Of a step from one position of the feet to another, in metres."""
+        """Returns the reward of a step between two positions of the feet, in metres."""
         if self.goal is None:
             return float(math.hypot(after[0] - before[0], after[2] - before[2]))
         return self._to_goal(before) - self._to_goal(after)
 
     def is_over(self, position: np.ndarray, info: Dict[str, Any]) -> bool:
-        """Whether the task is done, well or badly (`terminated`)."""
+        """Returns whether the task has ended, with or without success (`terminated`)."""
         return self.goal is not None and self._to_goal(position) <= self.goal_radius
 
     def _to_goal(self, position: np.ndarray) -> float:
@@ -176,15 +178,15 @@ class WalkEnv(spaces.EnvBase):
 
     def reset(self, *, seed: Optional[int] = None,
               options: Optional[Dict[str, Any]] = None) -> Tuple[Observation, Dict[str, Any]]:
-        """The world anew. `options` may have "start", as of `starts`, and "goal", where the environment
-        was made with one: both for this episode."""
+        """Restarts the world. `options` may have "start", as in `starts`, and "goal", if the
+        environment has one: both for this episode."""
         return self._take_reset(self._post_reset(seed, options or {}))
 
     def step(self, action: Any) -> Tuple[Observation, float, bool, bool, Dict[str, Any]]:
         return self._take_step(self._post_step(self._meaning(action)))
 
     def render(self) -> Optional[np.ndarray]:
-        """The colours that were seen last; None before reset() and after close()."""
+        """Returns the last colour picture; None before reset() and after close()."""
         if self.render_mode is None or self._state is None:
             return None
         if self._rgb is not None:
@@ -210,7 +212,7 @@ class WalkEnv(spaces.EnvBase):
     def _post_reset(self, seed: Optional[int], options: Dict[str, Any]) -> List[int]:
         start, self.goal = self._chosen(seed, options)
         facing = start[3] if len(start) > 3 else float(self.np_random.uniform(0, 360))
-        self._state = self._rgb = None  # until it stands there
+        self._state = self._rgb = None  # until the spawn succeeds
         self._heading = math.radians(facing)
         self._steps = 0
         self._tag += 1
@@ -222,13 +224,13 @@ class WalkEnv(spaces.EnvBase):
             {"step": messages.Step(ticks=1, avatars=True)}, *self._picture()])
 
     def _chosen(self, seed: Optional[int], options: Dict[str, Any]) -> Tuple[Any, Any]:
-        """Where the episode begins, and its goal."""
+        """Returns the start and the goal of the episode."""
         unknown = set(options) - {"start", "goal"}
         if unknown:
-            raise ValueError(f"options: {sorted(unknown)} are none; there are start and goal")
+            raise ValueError(f"options: unknown {sorted(unknown)}; give start or goal")
         goal = options.get("goal")
         if goal is not None and self._first_goal is None:
-            raise ValueError("options: a goal is for an environment that was made with one")
+            raise ValueError("options: goal needs an environment with a goal")
         goal = self._first_goal if goal is None else np.array(_numbers(goal, "goal", (3,)))
         start = options.get("start")
         if start is not None:
@@ -252,14 +254,14 @@ class WalkEnv(spaces.EnvBase):
         why = self._refusals()
         if self._name not in entered.avatars:
             where = ", ".join(f"{metres:g}" for metres in self._start[:3])
-            raise OrderFailed(f"the avatar could not begin at ({where}): {' '.join(why)}")
+            raise OrderFailed(f"the avatar could not spawn at ({where}): {' '.join(why)}")
         for reply, _ in replies[3:]:
             raise_refusal(reply)
         self._state = entered.avatars[self._name]
         return self._observation(replies[3:]), self._info(entered, contacts)
 
     def _refusals(self) -> List[str]:
-        """Of the spawn. Nothing here waits for the other notices."""
+        """Returns the refusals of the spawn, and discards all other notices."""
         kept = self.client._notices
         why = [one.text for one in kept if one.kind == "refused" and
                (one.avatar, one.tag) == (self._name, self._tag)]
@@ -268,8 +270,8 @@ class WalkEnv(spaces.EnvBase):
 
     def _check_begun(self) -> None:
         if self._state is None:
-            raise RuntimeError("reset() comes before step(): there is no episode, or the last reset() "
-                               "or step() failed, or the environment was closed")
+            raise RuntimeError("call reset() first: no episode has begun, the last reset() or step() "
+                               "failed, or the environment was closed")
 
     def _post_step(self, meaning: Tuple[float, float]) -> List[int]:
         self._check_begun()
@@ -287,14 +289,14 @@ class WalkEnv(spaces.EnvBase):
                                                      Dict[str, Any]]:
         replies = self.client.replies(posted)
         old, contacts = self._state, self.client._kept_contacts()
-        self.client._notices.clear()  # nothing here waits for them
-        self._state = None  # should this fail
+        self.client._notices.clear()  # unused here
+        self._state = None  # in case this fails
         for reply, _ in replies:
             raise_refusal(reply)
         assert old is not None
         made = results.step(replies[1][0].step)
         if self._name not in made.avatars:
-            raise OrderFailed("the avatar is no longer in the world: somebody else acts in it")
+            raise OrderFailed("the avatar is no longer in the world: another client commands it")
         self._state = made.avatars[self._name]
         self._steps += 1
         info = self._info(made, contacts)
@@ -303,7 +305,7 @@ class WalkEnv(spaces.EnvBase):
                 self.is_over(after, info), self._steps >= self.max_steps, info)
 
     def _meaning(self, action: Any) -> Tuple[float, float]:
-        """Ahead and turn. Raises ValueError."""
+        """Returns ahead and turn of an action. Raises ValueError."""
         if self.discrete:
             try:
                 return _DISCRETE[range(4).index(operator.index(action))]
@@ -337,7 +339,7 @@ class WalkEnv(spaces.EnvBase):
                 if name in self.channels:
                     seen[name] = getattr(frame, name)
             if "rgb" in seen and self.render_mode is not None:
-                self._rgb = seen["rgb"].copy()  # the observation is its reader's own
+                self._rgb = seen["rgb"].copy()  # the observation belongs to its reader
             if "depth" in seen:
                 depth = seen["depth"]
                 depth[np.isnan(depth)] = np.inf

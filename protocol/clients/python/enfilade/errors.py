@@ -1,4 +1,4 @@
-"""What can go wrong, as exceptions."""
+"""The exceptions of this package."""
 
 from __future__ import annotations
 
@@ -6,41 +6,41 @@ from typing import Any
 
 from . import messages
 
-# What helps, by the code, where it helps whatever was wrong: of other codes only the server's own
-# sentence can know.
+# Remedies by code, for codes with one remedy for all causes. For the others the server's message
+# has the remedy.
 _REMEDIES = {
     "ERROR_VERSION": "use the client of the server's release",
     "ERROR_UNKNOWN_AVATAR": "spawn the avatar, and step until it has entered",
-    "ERROR_INTERNAL": "look into the server's log, and report it",
-    "ERROR_TOO_SLOW": "read events as they come, or subscribe to less",
+    "ERROR_INTERNAL": "read the server's log, and report the error",
+    "ERROR_TOO_SLOW": "read events as they arrive, or subscribe to less",
     "ERROR_TICK_GONE": "ask before the next step, or without a tick",
     "ERROR_TIMEOUT": "send whole messages without long pauses",
     "ERROR_UNSUPPORTED": "use a server that offers it; see Client.capabilities",
-    "ERROR_UNAUTHENTICATED": "in Python the token is connect()'s token=",
-    "ERROR_REPLAY_ENDED": "seek() goes elsewhere, take_over() goes on from here",
-    "ERROR_UNKNOWN_ENTITY": "give an id, a name or a path of what is in the world now",
+    "ERROR_UNAUTHENTICATED": "pass the token to connect() as token=",
+    "ERROR_REPLAY_ENDED": "seek() to another tick, or take_over() from here",
+    "ERROR_UNKNOWN_ENTITY": "give the id, name or path of an entity that is in the world",
     "ERROR_TOO_COMPLEX": "ask for fewer pairs, or for smaller pieces",
 }
-# Of these, where the error names a field.
+# Codes whose remedy is the named field.
 _BY_FIELD = ("ERROR_BAD_MESSAGE", "ERROR_REFUSED_COMMAND", "ERROR_BAD_CAMERA", "ERROR_BAD_RAYS")
 
 
 def _remedy(code: str, field: str) -> str:
     if code in _BY_FIELD and field:
-        return "change the field that is named"
+        return "change the named field"
     return _REMEDIES.get(code, "")
 
 
 class EnfiladeError(Exception):
-    """All errors of this package."""
+    """Base class of all errors of this package."""
 
 
 class ConnectionFailed(EnfiladeError):
-    """The connection could not be made, broke or fell silent. The client is of no more use."""
+    """The connection could not be made, broke or timed out. The client is unusable."""
 
 
 class ServerError(EnfiladeError):
-    """The server's own words. `fatal` ones came with the end of the connection."""
+    """An error that the server reported. `fatal`: the connection ended with it."""
 
     def __init__(self, number: int, message: str, field: str = "", fatal: bool = False) -> None:
         self._number = number
@@ -57,13 +57,13 @@ class ServerError(EnfiladeError):
             text += f"; {self.remedy}"
         super().__init__(text)
 
-    def __reduce__(self) -> Any:  # made again of its parts, not of its text
+    def __reduce__(self) -> Any:  # restored from its parts, not from its text
         return (type(self), (self._number, self.message, self.field, self.fatal))
 
 
 class OrderFailed(EnfiladeError):
-    """An order was taken, and could not be done: a spawn without room, a walk that is blocked."""
+    """An order was accepted but failed: a spawn without space, a blocked walk."""
 
 
 class StartFailed(EnfiladeError):
-    """A server process did not come up; the text has its last words."""
+    """A server process did not start; the text has the end of its log."""

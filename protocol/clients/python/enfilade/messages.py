@@ -1,8 +1,8 @@
-"""The messages of enfilade.proto, as classes that are made when this is imported.
+"""The messages of enfilade.proto, as classes created at import.
 
-`messages.Hello(protocol_version="1.0.0")`; values of enums that stand in no message are attributes
-too: `messages.ERROR_VERSION`. `messages.desc` beside this file is what protoc makes of the .proto;
-a pool of its own keeps it apart from other programs' messages.
+Example: `messages.Hello(protocol_version="1.0.0")`. Values of enums outside messages are attributes
+too: `messages.ERROR_VERSION`. protoc generates `messages.desc` from the .proto. A separate pool
+avoids clashes with other programs' messages.
 """
 
 from __future__ import annotations
@@ -51,6 +51,6 @@ def __getattr__(name: str) -> Any:
 
 
 def word(enum: Any, number: int, prefix: str) -> str:
-    """A value's name without its prefix and in small letters: KIND_BEGIN is "begin"."""
+    """Returns a value's name without its prefix, in lower case: KIND_BEGIN is "begin"."""
     value = enum.values_by_number.get(number)
     return value.name[len(prefix):].lower() if value else str(number)

@@ -1,4 +1,4 @@
-"""A server process of one's own."""
+"""A server process that this Python process starts and stops."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from .errors import StartFailed
 
 _STOPPING_SECONDS = 10.0  # from SIGTERM to SIGKILL
 _CHECK_SECONDS = 0.02
-_DYING_SECONDS = 0.5  # between the end of a connection and that of its process
+_DYING_SECONDS = 0.5  # from the end of a connection to that of its process
 
 
 def find_program() -> str:
-    """The server's program: $ENFILADE, or `enfilade` on the PATH, or the build of the checkout that
-    this package is in, or that is the current folder."""
+    """Finds the server's program: $ENFILADE, or `enfilade` on the PATH, or the build of a checkout:
+    that of this package, or the current folder."""
     named = os.environ.get("ENFILADE")
     if named:
         return named
@@ -37,19 +37,20 @@ def find_program() -> str:
         ours = (folder / "protocol" / "enfilade.proto").is_file()
         if ours and built.is_file() and os.access(built, os.X_OK):
             return str(built)
-    raise StartFailed("there is no program `enfilade`: put it on the PATH, name it by $ENFILADE "
+    raise StartFailed("the program `enfilade` was not found: put it on the PATH, name it in $ENFILADE "
                       "(export ENFILADE=CHECKOUT/build/enfilade), or give program=")
 
 
 def serve(scene: Union[str, Path], *arguments: str, program: Optional[str] = None,
           seconds: float = 120.0) -> "Server":
-    """Serves `scene`, a model or a recording that is played, on a free port of 127.0.0.1 and returns
-    when clients may connect. `arguments` are further ones of `enfilade serve`. Raises StartFailed after `seconds`, or when it ends."""
+    """Serves `scene`, a model or a recording, on a free port of 127.0.0.1 and returns when clients
+    may connect. `arguments` are further arguments of `enfilade serve`. Raises StartFailed after
+    `seconds`, or if the server ends."""
     return Server(scene, arguments, program or find_program(), seconds)
 
 
 class _Running:
-    """What a Server holds: apart from it, so that the Server may be collected."""
+    """The process of a Server. A separate object, so that the Server can be collected."""
 
     def __init__(self, command: List[str]) -> None:
         self.said = ""
@@ -62,18 +63,18 @@ class _Running:
         self.clients: "weakref.WeakSet[Client]" = weakref.WeakSet()
         _running.add(self)
 
-    def tell(self) -> None:
-        """To end; does not wait. It ends by the end of its standard input, too."""
+    def terminate(self) -> None:
+        """Asks the process to end, without waiting. The end of its stdin also ends it."""
         if self.process.poll() is None:
             self.process.terminate()
 
     def wait(self) -> int:
-        """Until it has ended, or is killed."""
+        """Waits until it has ended, and kills it after a time limit."""
         deadline = time.monotonic() + _STOPPING_SECONDS
         while self.process.poll() is None and time.monotonic() < deadline:
-            # It waits a while for clients that do not close; these have its last words to read.
+            # It waits for clients that do not close; they still have its final message to read.
             for client in list(self.clients):
-                client.say_no_more()
+                client.shutdown_send()
             try:
                 self.process.wait(_CHECK_SECONDS)
             except subprocess.TimeoutExpired:
@@ -90,7 +91,7 @@ class _Running:
         return code
 
     def fate(self) -> str:
-        """How it ended, for a client whose connection did."""
+        """Returns how the process ended, for a client whose connection ended."""
         try:
             code = self.process.wait(_DYING_SECONDS)
         except subprocess.TimeoutExpired:
@@ -100,10 +101,10 @@ class _Running:
         else:
             how = f"by signal {-code} ({signal.strsignal(-code)})"
         last = self.read_log(end=True).strip().splitlines()[-1:]
-        return f"the server ended {how}" + (f"; its last words: {last[0]}" if last else "")
+        return f"the server ended {how}" + (f"; the last line of its log: {last[0]}" if last else "")
 
     def read_log(self, *, end: bool = False) -> str:
-        """Its first megabyte, or its last 4 kB."""
+        """Returns its first megabyte, or its last 4 kB."""
         if self.log.closed:
             return self.said
         size = os.fstat(self.log.fileno()).st_size
@@ -115,7 +116,7 @@ _running: Set[_Running] = set()
 
 
 def _reap() -> None:
-    """Lets go of servers that were told to end, and did."""
+    """Releases servers that have ended on request."""
     for one in list(_running):
         if one.process.poll() is not None:
             one.wait()
@@ -124,15 +125,15 @@ def _reap() -> None:
 @atexit.register
 def _stop_all() -> None:
     for one in list(_running):
-        one.tell()
+        one.terminate()
     for one in list(_running):
         one.wait()
 
 
 class Server:
-    """It is stopped by stop(), at the end of a `with`, when nobody holds it any more, and at the end of
-    this Python; also when this Python is killed: the server ends when the other end of its standard
-    input is closed."""
+    """A running server. It is stopped by stop(), at the end of a `with`, when no object refers to it
+    any more, and at the end of this Python process. It also ends if this process is killed: the
+    server ends when its stdin is closed."""
 
     def __init__(self, scene: Union[str, Path], arguments: Sequence[str], program: str,
                  seconds: float) -> None:
@@ -140,8 +141,8 @@ class Server:
         command = [program, "serve", str(scene), "--listen", "127.0.0.1:0",
                    "--stop-at-end-of-input", *arguments]
         self._running = _Running(command)
-        # Does not wait: a collection must not stand still for it.
-        weakref.finalize(self, self._running.tell).atexit = False
+        # Does not wait: a garbage collection must not block.
+        weakref.finalize(self, self._running.terminate).atexit = False
         self.process = self._running.process
         try:
             self.ready: Any = self._await_ready(time.monotonic() + seconds)
@@ -157,11 +158,11 @@ class Server:
         while not line.endswith(b"\n"):
             left = deadline - time.monotonic()
             if left <= 0 or not select.select([out], [], [], left)[0]:
-                raise StartFailed(f"the server was not ready in time; it said:\n{self.log()}")
+                raise StartFailed(f"the server was not ready in time; its log:\n{self.log()}")
             piece = os.read(out.fileno(), 4096)
             if not piece:
                 self.process.wait(_STOPPING_SECONDS)
-                raise StartFailed(f"the server ended with {self.process.returncode}; it said:\n"
+                raise StartFailed(f"the server ended with {self.process.returncode}; its log:\n"
                                   f"{self.log()}")
             line += piece
         try:
@@ -173,7 +174,7 @@ class Server:
         return ready
 
     def log(self) -> str:
-        """What it wrote to stderr so far; also after stop()."""
+        """Returns its stderr so far; also after stop()."""
         return self._running.read_log()
 
     def connect(self, *, name: str = "enfilade python", token: str = "", timeout: float = 30.0,
@@ -184,8 +185,8 @@ class Server:
         return client
 
     def stop(self) -> int:
-        """Tells it to end, waits, kills it when it does not; its exit code."""
-        self._running.tell()
+        """Asks it to end, waits, and kills it after a time limit. Returns its exit code."""
+        self._running.terminate()
         return self._running.wait()
 
     def __enter__(self) -> "Server":

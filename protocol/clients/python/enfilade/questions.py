@@ -1,4 +1,4 @@
-"""Requests for pictures, of Python's arguments; and points for all requests."""
+"""Requests built from Python arguments: pictures and queries, and points for all requests."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def points(points: Any, name: str) -> np.ndarray:
     if array.size == 0:
         return array.reshape(0, 3)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise ValueError(f"{name}: give N x 3 numbers, not of the shape {array.shape}")
+        raise ValueError(f"{name}: give N x 3 numbers, not the shape {array.shape}")
     return array
 
 
 def entity(which: Any) -> Any:
-    """An EntityRef of an id, of a name or path, or of what has a name, as an Avatar."""
+    """Returns the EntityRef of an id, a name, a path, or an object with a name, as an Avatar."""
     if isinstance(which, str):
         return messages.EntityRef(name=which)
     if isinstance(getattr(which, "name", None), str):
@@ -40,7 +40,7 @@ def entity(which: Any) -> Any:
 def _named(prefix: str, name: str, argument: str) -> int:
     number = messages._found.get(prefix + name.upper())
     if number is None:
-        raise ValueError(f"{argument}: {name!r} is none")
+        raise ValueError(f"{argument}: unknown value {name!r}")
     return int(number)
 
 
@@ -48,7 +48,7 @@ def cannot_touch_query(a: Any, b: Any, assume: str, least: float, tick: Optional
     kinds = messages.CannotTouchQuery.DESCRIPTOR.enum_types_by_name["Assume"].values_by_name
     kind = kinds.get("ASSUME_" + assume.upper())
     if kind is None or kind.number == 0:
-        raise ValueError(f"assume: {assume!r} is none; give present_motion or any_command")
+        raise ValueError(f"assume: unknown value {assume!r}; give present_motion or any_command")
     return messages.CannotTouchQuery(a=entity(a), b=entity(b), assume=kind.number, least=least,
                                      tick=tick)
 
@@ -60,7 +60,7 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
                   near: Optional[float] = None, far: Optional[float] = None,
                   channels: Sequence[str] = ("rgb",), glass: str = "", renderer: str = "",
                   shadows: bool = False, tick: Optional[int] = None) -> Any:
-    """The FrameRequest that Client.frame() sends."""
+    """Returns the FrameRequest that Client.frame() sends."""
     if sum(one is not None for one in (fov_y, intrinsics, height_y)) > 1:
         raise ValueError("frame: give one of fov_y, intrinsics and height_y")
     if target is not None and forward is not None:
@@ -68,7 +68,8 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
     if eye is None and not avatar:
         raise ValueError("frame: give an avatar or an eye")
     if eye is None and not (target is None and up is None and height_y is None):
-        raise ValueError("frame: target, up and height_y need an eye; eyes of an avatar take forward")
+        raise ValueError("frame: target, up and height_y need an eye; for an avatar's eyes give "
+                         "forward")
     asked = messages.FrameRequest(width=width, height=height, channels=results.channels(channels),
                                   shadows=shadows, tick=tick)
     if eye is None:

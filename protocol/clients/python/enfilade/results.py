@@ -1,4 +1,4 @@
-"""What the server tells, as plain Python data. Metres, seconds, radians; the scene's frame, Y up."""
+"""Replies and events of the server as plain Python data. Metres, seconds, radians; Y up."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ class Contact:
     point_b: Vector
     normal: Vector  # unit, from a to b
     decided_by: str  # "filter" or "rational"
-    feature_a: str  # of the nearest parts, where point_a and point_b are: "vertex", "edge", "face";
-    feature_b: str  # "" when they penetrate, and of "left_world"
+    feature_a: str  # of the nearest part, at point_a: "vertex", "edge", "face"; "" if they
+    feature_b: str  # penetrate, and for "left_world"
 
 
 def contact(event: Any) -> Contact:
@@ -64,7 +64,7 @@ def contact(event: Any) -> Contact:
 
 @dataclass(frozen=True)
 class Notice:
-    """How an order went: Notice of the .proto."""
+    """The outcome of an order: Notice of the .proto."""
 
     tick: int
     kind: str  # "spawned", "refused", "arrived", "blocked", "done", "capture", "left",
@@ -88,7 +88,7 @@ def notice(message: Any) -> Notice:
 
 @dataclass(frozen=True)
 class AvatarState:
-    """Where an avatar is, and how its last move went: AvatarState of the .proto."""
+    """An avatar's position and its last move: AvatarState of the .proto."""
 
     id: int
     name: str
@@ -97,9 +97,9 @@ class AvatarState:
     eye_height: float
     grounded: bool
     flying: bool
-    asked: Vector  # metres: what its orders asked for in the tick
-    made: Vector  # metres: how far the feet came
-    stopped_by: int  # entity id; 0: nothing
+    asked: Vector  # metres: requested displacement of the tick
+    made: Vector  # metres: actual displacement of the feet
+    stopped_by: int  # entity id of the first obstacle; 0: none
     stopped_by_name: str
     joints: Tuple[float, ...] = ()
 
@@ -122,8 +122,8 @@ class Step:
     tick: int
     time: float
     state_hash: int  # equal hashes: equal worlds, to the last bit
-    idle: bool  # every queue is empty and nobody is falling or driven
-    avatars: Dict[str, AvatarState] = field(default_factory=dict)  # when asked for
+    idle: bool  # every queue is empty and no avatar falls or is driven
+    avatars: Dict[str, AvatarState] = field(default_factory=dict)  # if requested
 
 
 def step(reply: Any) -> Step:
@@ -133,7 +133,7 @@ def step(reply: Any) -> Step:
 
 @dataclass(frozen=True)
 class State:
-    """Where everyone is: State of the .proto. `dropped` were left out since the last one."""
+    """All avatars: State of the .proto. `dropped` states were omitted since the last one."""
 
     tick: int
     time: float
@@ -150,22 +150,22 @@ def state(message: Any) -> State:
 
 @dataclass(frozen=True, eq=False)  # arrays do not compare as one
 class Frame:
-    """A picture. Channels that were not asked for are None. The arrays are writable and nobody
-    else's; they share one piece of memory."""
+    """A picture. Channels that were not requested are None. The arrays are writable and have no
+    other owner; they share one piece of memory."""
 
     tick: int
     time: float
     renderer: str
     software: bool
     rgb: Optional[np.ndarray]  # height x width x 3, uint8, sRGB
-    depth: Optional[np.ndarray]  # height x width, float32: metres along the axis; NaN: nothing
-    ids: Optional[np.ndarray]  # height x width, uint32: entity ids; 0: nothing
-    normals: Optional[np.ndarray]  # height x width x 3, float32: unit, facing the eye; 0: nothing
-    range: Optional[np.ndarray]  # height x width, float32: metres along the ray; NaN: nothing
-    message: Any  # the Frame of the .proto, with the camera as it was used
+    depth: Optional[np.ndarray]  # height x width, float32: metres along the axis; NaN: background
+    ids: Optional[np.ndarray]  # height x width, uint32: entity ids; 0: background
+    normals: Optional[np.ndarray]  # height x width x 3, float32: unit, facing the eye; 0: none
+    range: Optional[np.ndarray]  # height x width, float32: metres along the ray; NaN: none
+    message: Any  # the Frame of the .proto, with the camera as used
 
 
-# By name: number, type and values of a pixel. The bytes of rgb last, so that the numbers of the others
+# By name: number, type and values per pixel. The bytes of rgb come last, so that the other channels
 # are aligned.
 _CHANNELS = {"depth": (messages.CHANNEL_DEPTH, np.dtype(np.float32), 1),
              "ids": (messages.CHANNEL_IDS, np.dtype(np.uint32), 1),
@@ -177,10 +177,10 @@ _RAW: int = messages.ENCODING_RAW
 
 
 def channels(names: Any) -> List[int]:
-    """The numbers of channels, in the order of _CHANNELS."""
+    """Returns the numbers of channels, in the order of _CHANNELS."""
     unknown = set(names) - set(_CHANNELS)
     if unknown:
-        raise ValueError(f"channels: {sorted(unknown)} are none; give of {sorted(_CHANNELS)}")
+        raise ValueError(f"channels: unknown {sorted(unknown)}; give some of {sorted(_CHANNELS)}")
     return [channel[0] for name, channel in _CHANNELS.items() if name in names]
 
 
@@ -204,13 +204,13 @@ def frame(message: Any, attachment: memoryview) -> Frame:
 
 @dataclass(frozen=True, eq=False)  # arrays do not compare as one
 class Hits:
-    """What rays meet, an entry a ray. Where nothing is met: entity 0, NaN elsewhere."""
+    """The first hits of rays, an entry per ray. Without a hit: entity 0, NaN elsewhere."""
 
     tick: int
     entity: np.ndarray  # uint32
     distance: np.ndarray  # float64, metres from the origin
     point: np.ndarray  # N x 3
-    normal: np.ndarray  # N x 3, unit, towards where the ray comes from
+    normal: np.ndarray  # N x 3, unit, towards the ray's origin
     names: List[str]
 
 
@@ -226,7 +226,7 @@ _RAYS_KEY = bytes((messages.ClientMessage.DESCRIPTOR.fields_by_name["rays"].numb
 
 
 def _length(count: int) -> bytes:
-    """As protobuf writes it: seven bits a byte, the lowest first."""
+    """Encodes a varint of protobuf: seven bits per byte, the lowest first."""
     written = bytearray()
     while count > 127:
         written.append(count & 127 | 128)
@@ -235,9 +235,9 @@ def _length(count: int) -> bytes:
 
 
 class RayRequest:
-    """A ClientMessage with the rays of N x 3 arrays, written by numpy: a hundred times as quick as a
-    message a ray. `options` are the other fields of the RayQuery: protobuf joins messages by joining
-    their bytes."""
+    """A ClientMessage with the rays of N x 3 arrays, written by numpy: a hundred times faster than a
+    message per ray. `options` are the other fields of the RayQuery: concatenated bytes are merged
+    messages in protobuf."""
 
     def __init__(self, request_id: int, origins: np.ndarray, directions: np.ndarray, reach: float,
                  options: Any) -> None:
@@ -269,10 +269,10 @@ def hits(reply: Any) -> Hits:
 
 
 def packed_hits(reply: Any, attachment: memoryview) -> Hits:
-    """Of a packed query: RayReply.met tells what its attachment holds."""
+    """Returns the hits of a packed query: RayReply.met names the entities of its attachment."""
     count, rest = divmod(len(attachment), 60)
     if rest:
-        raise ValueError(f"the answer to rays has {len(attachment)} bytes, not 60 for each")
+        raise ValueError(f"the reply to rays has {len(attachment)} bytes, not 60 per ray")
     numbers = np.frombuffer(attachment, "<f8", 7 * count).reshape(count, 7)
     entity = np.frombuffer(attachment, "<u4", count, 56 * count)
     names = {0: "", **{one.id: one.name for one in reply.met}}
@@ -281,7 +281,7 @@ def packed_hits(reply: Any, attachment: memoryview) -> Hits:
 
 
 def joined(parts: List[Hits]) -> Hits:
-    """The answers to parts of one question, in order."""
+    """Joins the replies to the parts of one query, in order."""
     if len(parts) == 1:
         return parts[0]
     return Hits(parts[-1].tick, *(np.concatenate([getattr(part, name) for part in parts])
@@ -291,11 +291,11 @@ def joined(parts: List[Hits]) -> Hits:
 
 @dataclass(frozen=True, eq=False)  # arrays do not compare as one
 class Scan:
-    """A range scan, row by row from above, each from the left."""
+    """A range scan: rows from the top, each from the left."""
 
     tick: int
-    distance: np.ndarray  # rows x columns, float32, metres along each ray; NaN: nothing
-    entity: np.ndarray  # rows x columns, uint32; 0: nothing
+    distance: np.ndarray  # rows x columns, float32, metres along each ray; NaN: no hit
+    entity: np.ndarray  # rows x columns, uint32; 0: no hit
 
 
 def scan(reply: Any, attachment: memoryview) -> Scan:
@@ -310,18 +310,18 @@ def scan(reply: Any, attachment: memoryview) -> Scan:
 
 @dataclass(frozen=True)
 class Replay:
-    """How the recording that a world plays stands: Replay of the .proto."""
+    """The state of a replay: Replay of the .proto."""
 
     file: str
-    first_tick: int  # that can be sought
+    first_tick: int  # first target of seek()
     last_tick: int
-    tick: int  # when this was told
+    tick: int  # of this state
     at_end: bool
-    branched: bool  # somebody took over
-    branched_at: int  # the last recorded tick before
+    branched: bool  # a client took over
+    branched_at: int  # the last recorded tick before the branch
     clock: str  # "lockstep", "free_run", "paused"
     speed: float  # simulated seconds a second, when it runs freely
-    diverged: str  # why it cannot go on as recorded; "": it can
+    diverged: str  # the difference from the recording; "": none
 
 
 def replay(message: Any) -> Replay:
@@ -338,7 +338,7 @@ def _mode(clock: Any) -> str:
 
 @dataclass(frozen=True)
 class Pair:
-    """How two entities stand to one another: PairState of the .proto. Exact for its tick."""
+    """The relation of two entities: PairState of the .proto. Exact for its tick."""
 
     tick: int
     a: int
@@ -352,8 +352,8 @@ class Pair:
     point_b: Vector
     normal: Vector  # unit, from a to b
     decided_by: str  # "filter" or "rational"
-    penetration: float  # metres, of the nearest parts; only when it was refined
-    feature_a: str  # as Contact's
+    penetration: float  # metres, of the nearest parts; only if refined
+    feature_a: str  # as in Contact
     feature_b: str
 
 
@@ -370,12 +370,12 @@ def pair(message: Any, tick: int) -> Pair:
 
 @dataclass(frozen=True)
 class Touching:
-    """What touches an entity, or is near to it; the nearest first."""
+    """The entities that touch an entity, or are close to it; the nearest first."""
 
     tick: int
-    found: List[Pair]  # `a` is the entity that was asked about
-    left_out: int  # that were near, but took more work or room than one answer is given
-    mounting: List[int]  # of a driven body: what it touches where it begins, which events leave out
+    found: List[Pair]  # `a` is the queried entity
+    left_out: int  # close entities that exceed the work or size of one reply
+    mounting: List[int]  # of a kinematic body: its initial contacts, which events exclude
 
 
 def touching(reply: Any) -> Touching:
@@ -385,15 +385,15 @@ def touching(reply: Any) -> Touching:
 
 @dataclass(frozen=True)
 class Apart:
-    """Until when two certainly stay apart: CannotTouchReply of the .proto."""
+    """The time until which two certainly stay apart: CannotTouchReply of the .proto."""
 
     tick: int
     now: Pair
-    before: float  # seconds from now; 0: nothing is known; infinity: they cannot touch at all
+    before: float  # seconds from now; 0: unknown; infinity: they cannot touch at all
     closing_speed: float
     closing_acceleration: float
     look_again: float  # seconds
-    proved: bool  # nothing is missed by looking again only then
+    proved: bool  # no contact is missed before `look_again`
 
 
 def apart(reply: Any) -> Apart:
@@ -414,9 +414,9 @@ class World:
     tick: int
     clock: str  # "lockstep", "free_run", "paused"
     speed: float  # simulated seconds a second, when it runs freely
-    driven: bool  # some client holds its clock
+    driven: bool  # a client drives its clock
     drop_when_empty: bool
-    failure: str  # what ended it; "": it lives
+    failure: str  # the error that ended it; "": it runs
 
 
 def world(message: Any) -> World:

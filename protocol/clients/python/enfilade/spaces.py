@@ -1,4 +1,4 @@
-"""Spaces of observations and actions: gymnasium's where it is installed, else these few."""
+"""Spaces of observations and actions: those of gymnasium if installed, else these."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class _Discrete(_Space):
 
 
 class _Dict(_Space):
-    """A space a name."""
+    """One space per name."""
 
     def __init__(self, spaces: Mapping[str, Any]) -> None:
         super().__init__(None, None)
@@ -97,7 +97,7 @@ class _Dict(_Space):
 
 EnvBase: Any = object
 VectorEnvBase: Any = object
-NEXT_STEP: Any = "NextStep"  # how episodes begin anew: gymnasium.vector.AutoresetMode's value
+NEXT_STEP: Any = "NextStep"  # restart of episodes: a value of gymnasium.vector.AutoresetMode
 Box: Any = _Box
 Discrete: Any = _Discrete
 Dict: Any = _Dict
@@ -110,13 +110,13 @@ else:
     HAVE_GYMNASIUM = True
     EnvBase = gymnasium.Env
     VectorEnvBase = gymnasium.vector.VectorEnv
-    if hasattr(gymnasium.vector, "AutoresetMode"):  # from 1.1 on
+    if hasattr(gymnasium.vector, "AutoresetMode"):  # since 1.1
         NEXT_STEP = gymnasium.vector.AutoresetMode.NEXT_STEP
     Box, Discrete, Dict = gymnasium.spaces.Box, gymnasium.spaces.Discrete, gymnasium.spaces.Dict
 
 
 def batched(space: Any, count: int) -> Any:
-    """The space of `count` values of `space`, stacked."""
+    """Returns the space of `count` stacked values of `space`."""
     if HAVE_GYMNASIUM:
         from gymnasium.vector.utils import batch_space
         return batch_space(space, count)

@@ -1,4 +1,4 @@
-"""Several environments over one server: a world of its own for each."""
+"""Several environments on one server, each with a world of its own."""
 
 from __future__ import annotations
 
@@ -15,22 +15,23 @@ from .process import Server, serve
 
 
 class VectorWalkEnv(spaces.VectorEnvBase):
-    """Several WalkEnvs that work at the same time in worlds of one server, which share its scene.
-    Gymnasium's VectorEnv where that is installed, and its methods and attributes everywhere.
+    """Several WalkEnvs that run at the same time, in worlds of one server that share its scene.
+    A VectorEnv of Gymnasium if that is installed, with its methods and attributes everywhere.
 
-    scene or address: a model that a server process is started for, or HOST:PORT of one that runs and
-        lets this client make worlds (the role admin). They are dropped when their client leaves.
+    scene or address: a model, for which a server process is started, or HOST:PORT of a running
+        server that lets this client create worlds (the role admin). Each world is dropped when its
+        client leaves.
     world_scene: one of the server's scenes, by name; empty: the first.
-    token: where the server wants one, of the role admin.
-    make: makes one environment for a client in a world of its own, make(number, client); by default
+    token: if the server requires one, of the role admin.
+    make: creates one environment for a client in a world of its own, make(number, client); by default
         WalkEnv(client=client, **options).
 
-    One whose episode ended begins anew with the next step(), whose action for it is left aside and
-    whose reward is 0 (Gymnasium's "next step" mode).
+    An environment whose episode ended restarts with the next step(). That step ignores its action,
+    and its reward is 0 (Gymnasium's "next step" mode).
 
-    A wrong number of actions or seeds, or an action that is none, is a ValueError before anything is
-    sent. Where one environment fails later, all are waited for, its error, with its number, is
-    raised, and reset() comes next; when the server died, all have to be made anew.
+    A wrong number of actions or seeds, or an invalid action, is a ValueError before anything is sent.
+    If an environment fails later, all replies are awaited and its error is raised with its number.
+    Call reset() then. If the server ended, create all environments again.
     """
 
     metadata: Dict[str, Any] = {"render_modes": ["rgb_array"], "autoreset_mode": spaces.NEXT_STEP}
@@ -46,7 +47,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         if isinstance(server_arguments, str):
             raise ValueError("server_arguments: give a list of strings")
         if make is not None and options:
-            raise ValueError(f"make: it has to know {sorted(options)} itself")
+            raise ValueError(f"make: set {sorted(options)} inside make; options are for the default")
         self.num_envs = num_envs
         self.closed = False
         self.server: Optional[Server] = None
@@ -69,15 +70,16 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         self.single_action_space = self.envs[0].action_space
         self.observation_space = spaces.batched(self.single_observation_space, num_envs)
         self.action_space = spaces.batched(self.single_action_space, num_envs)
-        self._over: Optional[np.ndarray] = None  # None: reset() comes next
+        self._over: Optional[np.ndarray] = None  # None: reset() is next
 
     def _in_worlds(self, address: str, scene: str, token: str) -> List[Client]:
-        """A client in each of as many new worlds."""
+        """Creates num_envs worlds with a client in each."""
         name = "enfilade environments"
         with connect(address, name=name, token=token) as maker:
             most = maker.limits.max_worlds - len(maker.worlds())
             if self.num_envs > most:
-                raise ValueError(f"num_envs: the server takes {most} more worlds, not {self.num_envs}")
+                raise ValueError(f"num_envs: the server accepts {most} more worlds, "
+                                 f"not {self.num_envs}")
             for _ in range(self.num_envs):
                 world = maker.create_world(scene=scene or maker.scenes[0], drop_when_empty=True)
                 try:
@@ -90,7 +92,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
 
     def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None,
               options: Optional[Dict[str, Any]] = None) -> Tuple[Observation, Dict[str, Any]]:
-        """`seed` is one for each, or a number to which the environment's own number is added."""
+        """`seed`: one per environment, or a number to which each adds its own index."""
         seeds = self._seeds(seed)
         self._over = None
         taken = self._each(lambda i: self.envs[i]._post_reset(seeds[i], options or {}),
@@ -105,17 +107,17 @@ class VectorWalkEnv(spaces.VectorEnvBase):
             return [int(seed) + i for i in range(self.num_envs)]
         seeds = [None if one is None else operator.index(one) for one in seed]
         if len(seeds) != self.num_envs:
-            raise ValueError(f"seed: {len(seeds)} for {self.num_envs} environments")
+            raise ValueError(f"seed: give {self.num_envs}, one per environment, not {len(seeds)}")
         return seeds
 
     def step(self, actions: Any) -> Tuple[Observation, np.ndarray, np.ndarray, np.ndarray,
                                           Dict[str, Any]]:
         over = self._over
         if over is None:
-            raise RuntimeError("reset() comes before step(), also after one that failed")
+            raise RuntimeError("call reset() first, also after a failed step()")
         actions = list(actions)
         if len(actions) != self.num_envs:
-            raise ValueError(f"actions: {len(actions)} for {self.num_envs} environments")
+            raise ValueError(f"actions: give {self.num_envs}, one per environment, not {len(actions)}")
         meanings = [(0.0, 0.0) if ended else env._meaning(action)
                     for env, ended, action in zip(self.envs, over, actions)]
 
@@ -136,7 +138,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
                 np.array(truncated), self._gathered(infos))
 
     def _each(self, post: Callable[[int], List[int]], take: Callable[[int, List[int]], Any]) -> Any:
-        """Posts all and takes all, also where some fail; the first failure is raised then."""
+        """Posts all and takes all, even if some fail; then raises the first failure."""
         failures: List[Tuple[int, Exception]] = []
         posted: List[Optional[List[int]]] = []
         taken: List[Any] = []
@@ -163,7 +165,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         return [env.render() for env in self.envs]
 
     def close(self, **_: Any) -> None:
-        """Closes all, and the server that was started for them; worlds go with their clients."""
+        """Closes all, and their own server; each world ends with its client."""
         self.closed = True
         self._over = None
         for env in self.envs:
@@ -179,7 +181,8 @@ class VectorWalkEnv(spaces.VectorEnvBase):
 
     @staticmethod
     def _gathered(infos: Sequence[Dict[str, Any]]) -> Dict[str, Any]:
-        """Arrays of objects: a state hash has 64 bits, and contacts are lists. `_NAME`: who has it."""
+        """Returns arrays of objects: a state hash has 64 bits, and contacts are lists. `_NAME` marks
+        the environments that have NAME."""
         gathered: Dict[str, Any] = {}
         for name in dict.fromkeys(name for info in infos for name in info):
             values = np.empty(len(infos), object)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints who touches what on a walk, as it happens: one JSON object a line."""
+"""Prints the contacts of a walk as they occur: one JSON object per line."""
 
 import argparse
 import dataclasses

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A random walk with depth: how far one comes, and what is in the way."""
+"""A random walk that observes depth: prints the distance walked and the obstacles."""
 
 import argparse
 
@@ -8,7 +8,7 @@ import numpy as np
 import enfilade
 
 parser = argparse.ArgumentParser(description=__doc__)
-parser.add_argument("scene", help="a model, or HOST:PORT of a server that nobody else drives")
+parser.add_argument("scene", help="a model, or HOST:PORT of a server without another driver")
 parser.add_argument("--start", nargs=3, type=float, default=(1.5, 0.05, 0), metavar=("X", "Y", "Z"))
 parser.add_argument("--steps", type=int, default=50)
 parser.add_argument("--seed", type=int, default=1)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Records what a walker sees: one NPZ file a picture, with colour, depth, object ids and the camera."""
+"""Records a walker's views: one NPZ file per picture, with colour, depth, object ids and camera."""
 
 import argparse
 import json
@@ -14,7 +14,7 @@ parser.add_argument("scene", help="a model")
 parser.add_argument("out", type=Path, help="folder for the files")
 parser.add_argument("--start", nargs=3, type=float, default=(1.5, 0.05, 0), metavar=("X", "Y", "Z"))
 parser.add_argument("--to", nargs=3, type=float, default=(9, 0, 0), metavar=("X", "Y", "Z"))
-parser.add_argument("--every", type=int, default=30, help="ticks from picture to picture")
+parser.add_argument("--every", type=int, default=30, help="ticks between pictures")
 parser.add_argument("--size", nargs=2, type=int, default=(160, 120), metavar=("WIDTH", "HEIGHT"))
 options = parser.parse_args()
 options.out.mkdir(parents=True, exist_ok=True)

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Plays a recording up to a tick, takes an avatar over there and sends it elsewhere."""
+"""Plays a recording up to a tick, takes over an avatar and sends it elsewhere."""
 
 import argparse
 
 import enfilade
 
 parser = argparse.ArgumentParser(description=__doc__)
-parser.add_argument("recording", help="of `enfilade serve` or `replay`, with its model in its place")
-parser.add_argument("--tick", type=int, default=600, help="where it is left")
+parser.add_argument("recording", help="of `enfilade serve` or `replay`, with its model at its path")
+parser.add_argument("--tick", type=int, default=600, help="tick of the take-over")
 parser.add_argument("--avatar", required=True)
 parser.add_argument("--to", nargs=3, type=float, required=True, metavar=("X", "Y", "Z"))
 parser.add_argument("--record", help="a new file for the branch")

@@ -1,11 +1,11 @@
-// Reads the shapes of IFC products with web-ifc. The importer starts this in a process of its own:
+// Reads the meshes of IFC products with web-ifc. The importer starts this script as a process:
 //
 //   node read_ifc.js FIRST
 //
-// File descriptor 3 takes the answer, 4 is the IFC file, 5 the products that are wanted: their
-// express ids as 32-bit numbers, of which those before index FIRST are done. The answer is frames of
-// a kind (one byte), a length (64 bits) and that many bytes, all little-endian; what they hold is
-// written at the head of scene/import/ifc/ifc_meshes.hpp.
+// File descriptor 3 receives the messages, 4 is the IFC file, 5 the list of requested products:
+// their express ids as 32-bit numbers. Products before index FIRST are done. A message is a kind
+// (one byte), a length (64 bits) and that many bytes, all little-endian. Their contents are
+// documented in scene/import/ifc/ifc_meshes.hpp.
 import fs from 'node:fs';
 import { createRequire } from 'node:module';
 
@@ -51,7 +51,7 @@ function readAll(descriptor) {
   return bytes;
 }
 
-// Each geometry is sent once, before the first product that is made of it.
+// Sends each geometry once, before the first product that uses it.
 function sendGeometry(api, model, id, known) {
   if (known.has(id)) return;
   known.add(id);
@@ -75,8 +75,8 @@ function sendProduct(api, model, mesh, known) {
   sendFrame('O', words(mesh.expressID, count), ...parts);
 }
 
-// True when the heap of web-ifc can no longer be trusted: its own exceptions leave it whole, a trap
-// of WebAssembly does not.
+// Whether the heap of web-ifc may be corrupt: a WebAssembly trap corrupts it, web-ifc's own
+// exceptions do not.
 function isBroken(error) {
   return error instanceof WebAssembly.RuntimeError || error instanceof RangeError;
 }
@@ -91,7 +91,7 @@ async function main() {
   const { IfcAPI, LogLevel } = createRequire(import.meta.url)('web-ifc');
   const api = new IfcAPI();
   await api.Init();
-  api.SetLogLevel(LogLevel.LOG_LEVEL_OFF); // it would log to stdout
+  api.SetLogLevel(LogLevel.LOG_LEVEL_OFF); // it logs to stdout otherwise
   const wantedBytes = readAll(WANTED);
   const wanted = new Uint32Array(wantedBytes.buffer, 0, wantedBytes.length / 4);
   const model = api.OpenModel(readAll(IFC_FILE));
@@ -101,7 +101,7 @@ async function main() {
   }
   const known = new Set();
   for (let i = first; i < wanted.length; ++i) {
-    sendFrame('T', words(i)); // whoever listens knows what was tried, should this process die
+    sendFrame('T', words(i)); // identifies the product if this process dies
     if (i % 64 === 0) sendProgress('shapes (web-ifc)', i / wanted.length);
     try {
       api.StreamMeshes(model, [wanted[i]], (mesh) => sendProduct(api, model, mesh, known));

@@ -1,0 +1,21 @@
+// Unit roundoffs and extended precision, shared by the error bounds of all rooms.
+#pragma once
+
+#include <limits>
+
+#include "collision/types.hpp"
+
+namespace enfilade::collision {
+
+using LongReal = long double;
+using LongVec3 = Eigen::Matrix<LongReal, 3, 1>;
+
+template <class Real>
+constexpr Real unitRoundoff() {
+  return std::numeric_limits<Real>::epsilon() / 2;
+}
+
+inline constexpr double kRoundoff = 0x1p-53;  ///< unit roundoff of double
+inline constexpr LongReal kLongRoundoff = unitRoundoff<LongReal>();
+
+}  // namespace enfilade::collision

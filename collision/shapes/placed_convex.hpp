@@ -1,0 +1,23 @@
+// A convex body at a pose: the input of all queries on pairs.
+#pragma once
+
+#include <span>
+
+#include "collision/types.hpp"
+
+namespace enfilade::collision {
+
+struct Hull;
+
+/// A convex hull at a pose, for one query: the hull of `vertices` (body's frame, metres; at least
+/// one), placed at rotation * vertex + translation. All values must be finite; every query throws
+/// std::invalid_argument that names the first value that is not. The doubles are used exactly: a
+/// rotation that is orthonormal only up to rounding gives a very slightly sheared body.
+struct PlacedConvex {
+  std::span<const Vec3> vertices;
+  Vec3 translation = Vec3::Zero();
+  const Mat3* rotation = nullptr;  ///< worldFromBody; null: identity
+  const Hull* hull = nullptr;      ///< of exactly these vertices; null: queries scan all vertices
+};
+
+}  // namespace enfilade::collision

@@ -1,0 +1,13 @@
+// Writes files that are complete at every moment.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+
+namespace enfilade::render {
+
+/// Writes a temporary file in the same folder and renames it, so that `file` is always complete.
+/// Follows links; writes directly to devices and pipes. Throws std::runtime_error naming the file.
+void writeFileAtomically(const std::filesystem::path& file, const void* data, std::size_t bytes);
+
+}  // namespace enfilade::render

@@ -1,0 +1,22 @@
+// The kinds of renderers, and the rule that chooses between them.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "render/frame.hpp"
+
+namespace enfilade::render {
+
+enum class RendererKind : std::uint8_t { automatic, gl, rays };
+
+/// "auto", "gl" or "rays".
+const char* toString(RendererKind kind);
+std::optional<RendererKind> parseRendererKind(const std::string& name);
+
+/// The rule for `automatic`. It depends only on device, size and channels and not on time, so that
+/// a frame's bytes do not vary between runs, nor its style during a capture. Colour is always drawn
+/// with GL.
+RendererKind chooseRendererKind(bool softwareGl, const Camera& camera, const Channels& channels);
+
+}  // namespace enfilade::render

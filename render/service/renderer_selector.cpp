@@ -1,0 +1,118 @@
+#include "render/service/renderer_selector.hpp"
+
+#include <chrono>
+
+#include "collision/assert.hpp"
+#include "render/gl/gl_renderer.hpp"
+#include "render/raytrace/ray_renderer.hpp"
+
+namespace enfilade::render {
+
+struct RendererSelector::State {
+  std::shared_ptr<const scene::Scene> scene;
+  RendererKind kind;
+  DeviceChoice device;
+  std::unique_ptr<GlRenderer> gl;
+  std::unique_ptr<RayRenderer> rays;
+  std::string glFailure;  ///< why GL is unavailable; empty: available or not tried yet
+  std::string warning;
+
+  GlRenderer& glRenderer() {
+    if (gl) return *gl;
+    if (!glFailure.empty()) throw RendererUnavailable(glFailure);
+    try {
+      gl = std::make_unique<GlRenderer>(scene, device, [this](const auto&... frame) {
+        return shadowTracer().computeShadowMask(frame...);
+      });
+    } catch (const RenderError& error) {
+      glFailure = error.what();  // devices are not probed again for every frame
+      throw RendererUnavailable(glFailure);
+    }
+    return *gl;
+  }
+
+  RayRenderer& rayRenderer() {
+    if (device.requireGpu) {
+      throw RendererUnavailable(
+          "the ray renderer runs on the CPU, but a GPU is required: request gl");
+    }
+    return shadowTracer();
+  }
+
+  /// The ray renderer; it computes the shadow masks of both renderers.
+  RayRenderer& shadowTracer() {
+    if (!rays) rays = std::make_unique<RayRenderer>(scene);
+    return *rays;
+  }
+
+  RendererKind chooseKind(const Camera& camera, const FrameOptions& options,
+                          RendererKind requested) const {
+    const RendererKind wanted = requested == RendererKind::automatic ? kind : requested;
+    if (wanted != RendererKind::automatic) return wanted;
+    if (!gl) return RendererKind::rays;
+    if (device.requireGpu) return RendererKind::gl;
+    return chooseRendererKind(gl->software(), camera, options.channels);
+  }
+
+  /// Creates the renderer of `one` kind, which is not automatic, on first use.
+  Renderer& findOrCreate(RendererKind one) {
+    ENFILADE_ASSERT(one != RendererKind::automatic);
+    if (one == RendererKind::rays) return rayRenderer();
+    return glRenderer();
+  }
+
+  const Renderer& defaultRenderer() const {
+    ENFILADE_ASSERT(gl || rays);
+    if (gl) return *gl;
+    return *rays;
+  }
+
+  /// Initialises `automatic`: GL, otherwise rays.
+  void tryGl() {
+    try {
+      warning = glRenderer().deviceWarning();
+    } catch (const RenderError& error) {
+      if (device.requireGpu || !device.device.empty()) throw;
+      warning = std::string("rendering with rays, because OpenGL is unavailable: ") + error.what();
+      rayRenderer();
+    }
+  }
+};
+
+RendererSelector::RendererSelector(std::shared_ptr<const scene::Scene> scene, RendererKind kind,
+                                   const DeviceChoice& device)
+    : state_(std::make_unique<State>()) {
+  if (!scene) throw RenderError("Renderer: no scene");
+  state_->scene = std::move(scene);
+  state_->kind = kind;
+  state_->device = device;
+  if (kind == RendererKind::automatic)
+    state_->tryGl();
+  else
+    state_->warning = state_->findOrCreate(kind).deviceWarning();
+}
+
+RendererSelector::~RendererSelector() = default;
+
+Frame RendererSelector::render(const scene::Snapshot& snapshot, const Camera& camera,
+                               const FrameOptions& options, RendererKind kind) {
+  // The time excludes the creation of the renderer.
+  Renderer& renderer = state_->findOrCreate(state_->chooseKind(camera, options, kind));
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start = Clock::now();
+  Frame frame = renderer.render(snapshot, camera, options);
+  frame.statistics.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  return frame;
+}
+
+const std::string& RendererSelector::deviceName() const {
+  return state_->defaultRenderer().deviceName();
+}
+bool RendererSelector::software() const {
+  return state_->defaultRenderer().software();
+}
+const std::string& RendererSelector::deviceWarning() const {
+  return state_->warning;
+}
+
+}  // namespace enfilade::render

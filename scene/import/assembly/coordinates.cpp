@@ -1,0 +1,20 @@
+#include "scene/import/assembly/coordinates.hpp"
+
+#include <algorithm>
+
+namespace enfilade::scene {
+
+Eigen::Matrix3d makeYUpRotation(char up) {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  if (up == 'z') rotation << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  if (up == 'x') rotation << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  return rotation;
+}
+
+double computeMedian(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace enfilade::scene

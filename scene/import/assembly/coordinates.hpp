@@ -1,0 +1,20 @@
+// Coordinates of imported models: up axis, distance and precision.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace enfilade::scene {
+
+/// Metres from the origin; beyond this, floats no longer resolve a millimetre.
+inline constexpr double kMaxPreciseDistance = 1000;
+/// Metres between neighbouring floats; beyond it, a diagnostic.
+inline constexpr double kMaxFloatSpacing = 1e-4;
+
+/// Rotates the up axis `up` ('x', 'y' or 'z') to Y, by a quarter turn about the third axis.
+Eigen::Matrix3d makeYUpRotation(char up);
+
+/// The upper median of at least one value.
+double computeMedian(std::vector<double> values);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,56 @@
+#include "scene/import/assembly/path_names.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+/// Length in bytes of the UTF-8 sequence at `i`; 0 if it is invalid.
+std::size_t utf8SequenceLength(std::string_view text, std::size_t i) {
+  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
+  const unsigned char first = byte(i);
+  if (first < 0x80) return 1;
+  const std::size_t length = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
+  if (first < 0xc2 || first > 0xf4 || i + length > text.size()) return 0;
+  for (std::size_t k = i + 1; k < i + length; ++k) {
+    if ((byte(k) & 0xc0) != 0x80) return 0;
+  }
+  // Reject overlong forms, surrogates and code points beyond U+10FFFF.
+  const unsigned char second = byte(i + 1);
+  if ((first == 0xe0 && second < 0xa0) || (first == 0xed && second > 0x9f) ||
+      (first == 0xf0 && second < 0x90) || (first == 0xf4 && second > 0x8f)) {
+    return 0;
+  }
+  return length;
+}
+
+}  // namespace
+
+std::string encodePathSegment(std::string_view name) {
+  static constexpr char kDigits[] = "0123456789ABCDEF";
+  std::string result;
+  for (std::size_t i = 0; i < name.size();) {
+    const auto c = static_cast<unsigned char>(name[i]);
+    const std::size_t length = utf8SequenceLength(name, i);
+    if (length == 0 || c < 0x20 || c == 0x7f || c == '/' || c == '%') {
+      result += '%';
+      result += kDigits[c >> 4];
+      result += kDigits[c & 15];
+      ++i;
+    } else {
+      result += name.substr(i, length);
+      i += length;
+    }
+  }
+  return result;
+}
+
+std::string SiblingNames::makeUnique(const std::string& name) {
+  std::string unique = name;
+  std::size_t& repeats = repeats_[name];
+  while (!taken_.insert(unique).second) {
+    ++repeats;
+    unique = name + "#" + std::to_string(repeats + 1);
+  }
+  return unique;
+}
+
+}  // namespace enfilade::scene

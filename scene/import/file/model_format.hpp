@@ -1,0 +1,36 @@
+// Formats of model files, and what a file says about its coordinates.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "scene/model/model.hpp"
+
+namespace enfilade::scene {
+
+enum class ModelFormat : std::uint8_t { gltf, glb, obj, collada, fbx, ifc };
+
+/// Detects the format by the extension, in any case; nullopt for an unknown one.
+std::optional<ModelFormat> detectModelFormat(const std::filesystem::path& file);
+
+/// Returns the extensions that importModel() accepts, lower case, with the dot.
+std::span<const std::string_view> importableExtensions();
+
+/// What a model file says about its coordinates.
+struct FileMetadata {
+  double metresPerUnit = 1;  ///< metres per unit of the file's coordinates
+  char up = 'y';
+  /// Scale and up axis that assimp applies to the root by itself. The import undoes both.
+  double assimpScale = 1;
+  char assimpUp = 'y';
+  /// Triangles that the file declares, each mesh once; nullopt: unknown.
+  std::optional<std::size_t> triangles;
+  std::vector<Diagnostic> problems;  ///< no_unit, unit_assumed, mended_text
+};
+
+}  // namespace enfilade::scene

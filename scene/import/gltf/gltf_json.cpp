@@ -1,0 +1,30 @@
+#include "scene/import/gltf/gltf_json.hpp"
+
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+
+namespace enfilade::scene {
+namespace {
+
+constexpr std::size_t kGlbHeader = 20;  // bytes: file header and header of the first chunk
+
+}  // namespace
+
+std::string readGltfJson(const std::filesystem::path& file, ModelFormat format) {
+  std::ifstream in(file, std::ios::binary);
+  if (format == ModelFormat::gltf) return {std::istreambuf_iterator<char>(in), {}};
+  std::array<char, kGlbHeader> header{};
+  in.read(header.data(), header.size());
+  std::uint32_t length = 0;
+  std::memcpy(&length, header.data() + 12, sizeof length);
+  std::error_code error;
+  if (!in || length > file_size(file, error)) return {};
+  std::string text(length, '\0');
+  in.read(text.data(), length);
+  return text;
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,39 @@
+// Reads the node transforms of a glTF file in doubles. assimp rounds them to floats, which is half
+// a metre at five thousand kilometres. This reader parses the JSON again and matches its tree to
+// assimp's.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "scene/import/file/model_format.hpp"
+
+struct aiNode;
+struct aiScene;
+
+namespace enfilade::scene {
+
+/// A node with the glTF file's own double-precision transform; assimp rounds it to floats.
+struct GltfNode {
+  Eigen::Affine3d parentFromNode;
+  std::size_t index;  ///< index into the file's list of nodes
+};
+using GltfNodes = std::map<const aiNode*, GltfNode>;
+
+/// Reads a glTF file's nodes in doubles. Nodes without a matching assimp node are left out.
+GltfNodes readGltfNodes(const aiScene& scene, const std::filesystem::path& file,
+                        ModelFormat format);
+
+/// The path and world transform of a glTF node.
+struct NodeTransform {
+  std::string path;                        ///< of its object, if it has meshes
+  Eigen::Affine3d worldFromNode;           ///< metres, Y up, offset not yet removed
+  std::optional<std::size_t> parentIndex;  ///< index of the parent node
+};
+using NodeTransforms = std::map<std::size_t, NodeTransform>;  ///< by node index
+
+}  // namespace enfilade::scene

@@ -1,0 +1,14 @@
+// Continuous collision: limits each body's motion to the part that is proved clear. Step 3 at the
+// head of physics_world.cpp.
+#pragma once
+
+#include "scene/physics/step_scratch.hpp"
+
+namespace enfilade::scene {
+
+/// Moves the bodies towards the solver's result as far as that is proved clear: sets the swept
+/// poses and the fractions of the motions that are kept.
+void clampToProvenMotion(const PhysicsWorld& world, double seconds, double contactOffset,
+                         StepScratch& scratch);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,15 @@
+// Contacts that are active in a world between two ticks.
+#pragma once
+
+#include <vector>
+
+#include "scene/world/world.hpp"
+
+namespace enfilade::scene {
+
+/// Returns the active contacts as events of the last tick, sorted by (a, b, kind): `begin` for each
+/// contact that has not ended, with its current separation, and `enter`, without a separation, for
+/// each entity in a trigger. The world does not store when they began.
+std::vector<ContactEvent> collectActiveContacts(const World& world);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,15 @@
+// Motion of an avatar in a tick.
+#pragma once
+
+#include "scene/world/data/tick_report.hpp"
+#include "scene/world/data/world_data.hpp"
+
+namespace enfilade::scene {
+
+/// Bounds of an avatar's motion in this tick at its desired velocity, scene frame.
+Aabb computeMotionBounds(const WorldSettings& settings, const Avatar& avatar);
+
+/// Moves an avatar: walks, slides, steps, falls or flies.
+void moveAvatar(WorldData& world, Avatar& avatar, QueryCount& count);
+
+}  // namespace enfilade::scene

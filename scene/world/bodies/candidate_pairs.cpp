@@ -1,0 +1,231 @@
+#include "scene/world/bodies/candidate_pairs.hpp"
+
+#include <algorithm>
+#include <span>
+
+#include "scene/world/bodies/physics_bodies.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using PairKeys = std::vector<PartPairKey>;
+
+void addPairKey(std::uint32_t physicsBody, std::uint32_t part, std::uint32_t other,
+                std::uint32_t otherPart, PairKeys& keys) {
+  if (physicsBody < other) {
+    keys.push_back({physicsBody, other, part, otherPart});
+  } else {
+    keys.push_back({other, physicsBody, otherPart, part});
+  }
+}
+
+/// Bounds of a part's motion in this tick, with the contact margin.
+Aabb computePartBounds(const WorldData& world, const Body& body, std::uint32_t part) {
+  double margin = computeContactQueryMargin(world.settings);
+  // Relative to the final pose: twice the maximum displacement, in case it moved there and back.
+  if (isKinematic(body.spec->kind)) margin += 2 * body.kinematicTarget.maxDisplacement;
+  if (isDynamic(body.spec->kind))
+    margin += world.dynamicBodies.physicsWorld
+                  .bodies[world.dynamicBodies.physicsBodyOf[world.findBodyByProxy(body.proxy)]]
+                  .maxStepDisplacement;
+  return inflated(body.partBoxes[part], margin);
+}
+
+/// Bounds of the motion of all rigid bodies in this tick.
+struct SweptBounds {
+  /// By physics body of a rigid body: its bounding sphere, and the first box of its parts.
+  std::vector<MotionSphere> spheres;
+  std::vector<std::uint32_t> firstBox;
+  std::vector<Aabb> boxes;  ///< of parts, inflated by the contact margin
+
+  std::span<const Aabb> findPartBoxes(std::uint32_t physicsBody) const {
+    return std::span(boxes).subspan(firstBox[physicsBody],
+                                    firstBox[physicsBody + 1] - firstBox[physicsBody]);
+  }
+};
+
+SweptBounds computeSweptBounds(const WorldData& world, ThreadPool* threadPool) {
+  const DynamicBodies& dynamicBodies = world.dynamicBodies;
+  SweptBounds bounds;
+  bounds.firstBox.push_back(0);
+  for (const std::uint32_t body : dynamicBodies.bodyIndices)
+    bounds.firstBox.push_back(bounds.firstBox.back() +
+                              static_cast<std::uint32_t>(world.bodies[body].partBoxes.size()));
+  bounds.spheres.resize(dynamicBodies.bodyIndices.size());
+  bounds.boxes.resize(bounds.firstBox.back());
+  parallelForOrSerial(
+      threadPool, dynamicBodies.bodyIndices.size(), kBodiesPerTask,
+      [&](std::size_t from, std::size_t to) {
+        for (std::size_t i = from; i < to; ++i) {
+          const Body& body = world.bodies[dynamicBodies.bodyIndices[i]];
+          bounds.spheres[i] = computeMotionSphere(dynamicBodies.physicsWorld.bodies[i]);
+          for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
+            bounds.boxes[bounds.firstBox[i] + part] = computePartBounds(world, body, part);
+        }
+      });
+  return bounds;
+}
+
+/// True for rigid bodies: their physics bodies are the first ones.
+bool isDynamic(const DynamicBodies& dynamicBodies, std::uint32_t body) {
+  return dynamicBodies.physicsBodyOf[body] < dynamicBodies.bodyIndices.size();
+}
+
+/// Broad-phase overlaps of some active bodies.
+struct ActiveBodyOverlaps {
+  PairKeys pairs;  ///< of parts of two rigid bodies
+  /// An active body, and an overlap with anything but a rigid body.
+  std::vector<std::pair<std::uint32_t, collision::SortAndSweep::Overlap>> others;
+};
+
+/// Appends the overlapping pairs of parts of two rigid bodies.
+void addDynamicPair(const DynamicBodies& dynamicBodies, std::uint32_t body, std::uint32_t otherBody,
+                    const SweptBounds& bounds, double margin, PairKeys& keys) {
+  const std::uint32_t physicsBody = dynamicBodies.physicsBodyOf[body],
+                      other = dynamicBodies.physicsBodyOf[otherBody];
+  if (!mayMeet(bounds.spheres[physicsBody], bounds.spheres[other], margin)) return;
+  const std::span<const Aabb> parts = bounds.findPartBoxes(physicsBody),
+                              others = bounds.findPartBoxes(other);
+  for (std::uint32_t part = 0; part < parts.size(); ++part)
+    for (std::uint32_t otherPart = 0; otherPart < others.size(); ++otherPart)
+      if (overlaps(parts[part], others[otherPart]))
+        addPairKey(physicsBody, part, other, otherPart, keys);
+}
+
+void addOverlaps(const WorldData& world, std::uint32_t activeBody, const SweptBounds& bounds,
+                 std::span<const std::uint8_t> isActive, ActiveBodyOverlaps& found) {
+  const DynamicBodies& dynamicBodies = world.dynamicBodies;
+  const double margin = computeContactQueryMargin(world.settings);
+  for (const auto& overlap : world.broadPhase.overlapsOf(world.bodies[activeBody].proxy)) {
+    const std::uint32_t otherBody = overlap.isDynamic ? world.findBodyByProxy(overlap.id) : kNoBody;
+    if (otherBody == kNoBody || !isDynamic(dynamicBodies, otherBody)) {
+      found.others.emplace_back(activeBody, overlap);
+    } else if (otherBody > activeBody ||
+               isActive[otherBody] == 0) {  // the first of two active ones adds the pair
+      addDynamicPair(dynamicBodies, activeBody, otherBody, bounds, margin, found.pairs);
+    }
+  }
+}
+
+ActiveBodyOverlaps collectOverlaps(const WorldData& world, const SweptBounds& bounds,
+                                   ThreadPool* threadPool) {
+  const DynamicBodies& dynamicBodies = world.dynamicBodies;
+  std::vector<std::uint8_t> isActive(world.bodies.size(), 0);
+  for (const std::uint32_t i : dynamicBodies.activeBodies) isActive[i] = 1;
+  std::vector<ActiveBodyOverlaps> blocks(dynamicBodies.activeBodies.size() / kBodiesPerTask + 1);
+  parallelForOrSerial(threadPool, dynamicBodies.activeBodies.size(), kBodiesPerTask,
+                      [&](std::size_t from, std::size_t to) {
+                        for (std::size_t i = from; i < to; ++i)
+                          addOverlaps(world, dynamicBodies.activeBodies[i], bounds, isActive,
+                                      blocks[from / kBodiesPerTask]);
+                      });
+  ActiveBodyOverlaps all = std::move(blocks.front());
+  for (std::size_t i = 1; i < blocks.size(); ++i) {
+    all.pairs.insert(all.pairs.end(), blocks[i].pairs.begin(), blocks[i].pairs.end());
+    all.others.insert(all.others.end(), blocks[i].others.begin(), blocks[i].others.end());
+  }
+  return all;
+}
+
+bool isSolid(const Body& body) {
+  return !isTrigger(body.spec->kind);
+}
+
+/// Collects the pairs of a rigid body with anything but a rigid body.
+struct PairCollector {
+  WorldData& world;
+  const SweptBounds& bounds;
+  PairKeys keys = {};
+
+  void addOverlap(std::uint32_t activeBody, const collision::SortAndSweep::Overlap& overlap) {
+    const std::uint32_t physicsBody = world.dynamicBodies.physicsBodyOf[activeBody];
+    if (!overlap.isDynamic) {
+      addStatic(world.bodies[activeBody], physicsBody, world.scene->solidObjects()[overlap.id]);
+    } else if (const std::uint32_t otherBody = world.findBodyByProxy(overlap.id);
+               otherBody == kNoBody) {
+      addAvatar(physicsBody, *world.findAvatarByProxy(overlap.id));
+    } else if (isSolid(world.bodies[otherBody])) {
+      addKinematic(physicsBody, otherBody);
+    }
+  }
+  void addStatic(const Body& body, std::uint32_t physicsBody, std::uint32_t object) {
+    const CollisionGeometry& parts = world.scene->collisionGeometry(object);
+    std::vector<std::uint32_t> found;
+    parts.query(body.motionBounds, found);
+    if (found.empty()) return;
+    const std::uint32_t other = ensureStaticObject(world, object);
+    for (const std::uint32_t part : found) addPartPairs(physicsBody, parts.box(part), other, part);
+  }
+  void addKinematic(std::uint32_t physicsBody, std::uint32_t index) {
+    const Body& body = world.bodies[index];
+    const std::uint32_t other = ensureSceneBody(world, index);
+    for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
+      addPartPairs(physicsBody, computePartBounds(world, body, part), other, part);
+  }
+  void addAvatar(std::uint32_t physicsBody, const Avatar& avatar) {
+    for (std::uint32_t i = 0; i < avatar.shape->parts.size(); ++i) {
+      const std::uint32_t other = ensureAvatarPart(world, avatar, i);
+      addPartPairs(physicsBody, placeBox(avatar.shape->parts[i].box, avatar.footPosition), other,
+                   0);
+    }
+  }
+  void addPartPairs(std::uint32_t physicsBody, const Aabb& box, std::uint32_t other,
+                    std::uint32_t otherPart) {
+    const std::span<const Aabb> parts = bounds.findPartBoxes(physicsBody);
+    for (std::uint32_t part = 0; part < parts.size(); ++part)
+      if (overlaps(parts[part], box)) addPairKey(physicsBody, part, other, otherPart, keys);
+  }
+};
+
+}  // namespace
+
+void collectPairs(WorldData& world, ThreadPool* threadPool) {
+  const SweptBounds bounds = computeSweptBounds(world, threadPool);
+  ActiveBodyOverlaps found = collectOverlaps(world, bounds, threadPool);
+  PairCollector collector{world, bounds};
+  for (const auto& [activeBody, overlap] : found.others) collector.addOverlap(activeBody, overlap);
+  // Ascending already, except where a sleeping body may be woken.
+  if (!std::ranges::is_sorted(found.pairs)) std::ranges::sort(found.pairs);
+  std::ranges::sort(collector.keys);
+  PairKeys keys(found.pairs.size() + collector.keys.size());
+  std::ranges::merge(found.pairs, collector.keys, keys.begin());
+  setPairs(world.dynamicBodies.physicsWorld, keys, threadPool);
+}
+
+std::vector<std::uint32_t> collectActiveBodies(const WorldData& world) {
+  const std::vector<std::uint32_t>& all = world.dynamicBodies.bodyIndices;
+  const auto isAwake = [&](std::uint32_t i) { return !world.bodies[i].asleep; };
+  if (std::ranges::all_of(all, isAwake)) return all;
+  std::vector<std::uint8_t> isActive(world.bodies.size(), 0);
+  std::vector<std::uint32_t> pending;
+  const auto add = [&](std::uint32_t body) {
+    if (!isDynamic(world.bodies[body].spec->kind) || isActive[body]) return;
+    isActive[body] = 1;
+    pending.push_back(body);
+  };
+  const auto addNeighbours = [&](collision::ProxyId proxy) {
+    for (const auto& overlap : world.broadPhase.overlapsOf(proxy)) {
+      if (!overlap.isDynamic) continue;
+      const std::uint32_t body = world.findBodyByProxy(overlap.id);
+      if (body != kNoBody) add(body);
+    }
+  };
+  for (const std::uint32_t i : all)
+    if (isAwake(i)) add(i);
+  for (const std::uint32_t i : world.movingBodies) addNeighbours(world.bodies[i].proxy);
+  for (const Avatar& avatar : world.avatars)
+    if (world.bodyIndexById.contains(avatar.blockedBy))
+      add(world.bodyIndexById.at(avatar.blockedBy));
+  // Bodies that overlap an active body become active. Each body is added once.
+  while (!pending.empty()) {
+    const std::uint32_t body = pending.back();
+    pending.pop_back();
+    addNeighbours(world.bodies[body].proxy);
+  }
+  std::vector<std::uint32_t> activeBodies;
+  for (const std::uint32_t i : all)
+    if (isActive[i]) activeBodies.push_back(i);
+  return activeBodies;
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,18 @@
+// Contacts between bodies, and of bodies with static objects.
+#pragma once
+
+#include <vector>
+
+#include "scene/world/data/tick_report.hpp"
+#include "scene/world/data/world_data.hpp"
+
+namespace enfilade::scene {
+
+/// The current contact of a pair; null if there is no contact.
+const Contact* lookUpBodyContact(const WorldData& world, const EntityPair& pair);
+/// Updates and reports contacts between bodies and non-avatars.
+void detectBodyContacts(WorldData& world, TickReport& report, QueryCount& count);
+void endBodyContacts(WorldData& world, ContactEvent::Reason reason,
+                     std::vector<ContactEvent>& events);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,81 @@
+// An avatar in a world, and its queued orders.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "collision/broad_phase/sort_and_sweep.hpp"
+#include "scene/world/data/chain.hpp"
+#include "scene/world/data/contact.hpp"
+#include "scene/world/data/obstacle.hpp"
+#include "scene/world/data/orders.hpp"
+
+namespace enfilade::scene {
+
+/// Progress of a walk: the minimum distance to its current way point so far.
+struct WalkProgress {
+  std::size_t waypointIndex = 0;  ///< index of the current way point
+  double minDistance = -1;        ///< metres, horizontal or, if flying, in space; -1: none yet
+  double timeoutLeft = 0;         ///< seconds
+};
+
+struct Avatar {
+  std::string name;
+  EntityId id = 0;
+  std::shared_ptr<const AvatarShape> shape;
+  std::shared_ptr<const Spawn> spawnOrder;  ///< the order with its parts or links; null: a prism
+  Vec3 footPosition = Vec3::Zero();         ///< scene frame, metres
+  Vec3 viewDirection = Vec3::UnitX();       ///< unit
+  double eyeHeight = 0;
+  double fallSpeed = 0;  ///< metres per second, downwards > 0
+  bool grounded = false;
+  EntityId groundEntity = 0;  ///< entity it stands on; 0 if not grounded
+  bool flying = false;
+  bool jumping = false;
+  double spawnHeight = 0;  ///< metres, of the prism at spawn; 0 for a shape made of parts
+  double height = 0;       ///< metres, current height of the prism
+  double radius = 0;       ///< metres, of the prism
+  std::vector<AvatarPart> baseParts;  ///< parts of `shape` that are no links; empty without a chain
+  Chain chain;
+  Vec3 driveVelocity = Vec3::Zero();    ///< m/s, requested by Drive
+  Vec3 desiredVelocity = Vec3::Zero();  ///< m/s, requested by its orders in this tick
+  WalkProgress walk;
+  double waitTimeLeft = -1;     ///< seconds; negative: not waiting
+  double stalledInAirTime = 0;  ///< seconds without motion in the air during or before a jump
+
+  // Results of the last motion.
+  Vec3 lastDisplacement = Vec3::Zero();
+  Vec3 requestedDisplacement = Vec3::Zero();  ///< metres
+  bool idle = false;   ///< grounded, at rest, no moving neighbours: skipped in this tick
+  bool dirty = false;  ///< shape or position changed since: not idle in this tick
+  EntityId blockedBy = 0;
+  bool pairsChanged = true;  ///< its broad-phase pairs changed since `obstacles` were collected
+  collision::SeparationResult blockingHit;  ///< to `blockedBy`, where the move ended
+  bool blockedReported = false;             ///< driven against an obstacle; reported at the start
+
+  // Caches from tick to tick. They change no verdict, but the last bits of distances and so of the
+  // motion. They are determined by the commands; a copy of a world must copy them.
+  collision::ProxyId proxy = 0;
+  Aabb motionBounds;                ///< bounds of its motion in this tick, scene frame, metres
+  Aabb cachedBounds;                ///< region in which `obstacles` are complete
+  std::vector<Obstacle> obstacles;  ///< ascending (entity, part)
+  bool hasBodyObstacles = false;    ///< `obstacles` contain parts of bodies
+  std::vector<Contact> contacts;    ///< ascending `other`; part of the state, not a cache
+};
+
+struct QueuedOrder {
+  Order order;
+  std::uint64_t tag = 0;
+};
+
+/// The orders for a name, in sequence. Exists while it holds orders or the avatar is in the world.
+struct OrderQueue {
+  std::string name;
+  EntityId avatar = 0;  ///< of this name; 0: not in the world
+  std::deque<QueuedOrder> orders = {};
+};
+
+}  // namespace enfilade::scene

@@ -1,0 +1,65 @@
+// The shape of an avatar: convex parts in the avatar's frame. Its origin is at the feet, its axes
+// are the scene's. An avatar does not rotate; only the links of a chain do.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "collision/narrow_phase/narrow_phase.hpp"
+#include "collision/shapes/hull.hpp"
+#include "scene/world/data/world_settings.hpp"
+
+namespace enfilade::scene {
+
+using collision::Aabb;
+using collision::Mat3;
+using collision::Vec3;
+
+struct AvatarPart {
+  std::shared_ptr<const collision::Hull> hull;
+  Vec3 offset = Vec3::Zero();        ///< metres, of the hull's origin, avatar frame
+  Mat3 rotation = Mat3::Identity();  ///< avatarFromHull
+  bool rotated = false;              ///< `rotation` is not the identity
+  Aabb box;                          ///< of the placed hull, avatar frame
+};
+
+/// Immutable: an avatar that crouches or moves its joints gets a new shape.
+struct AvatarShape {
+  std::vector<AvatarPart> parts;  ///< at least one
+  Aabb box;                       ///< of all parts
+};
+
+/// Places `hull` in the avatar's frame and computes its box.
+AvatarPart makeAvatarPart(std::shared_ptr<const collision::Hull> hull, const Vec3& offset,
+                          const Mat3& avatarFromHull);
+
+std::shared_ptr<const AvatarShape> makeAvatarShape(std::vector<AvatarPart> parts);
+
+/// Height of a prism's bevels, metres; at most a step. Their slope is walkable, so that an avatar
+/// slides up a ledge on the lower one. Depends on the height at spawn, so that the prism of a
+/// crouching avatar lies inside the full one.
+double computeBevelHeight(double radius, double spawnHeight, const WorldSettings& settings);
+
+/// A bevelled prism with twelve sides, metres: origin at the centre of the bottom, +Y up. The
+/// widest ring has the given radius. Requires height >= spawnHeight / 4.
+collision::Hull buildPrismHull(double radius, double height, double bevel);
+
+/// A shape with the prism as its only part.
+std::shared_ptr<const AvatarShape> makePrismShape(double radius, double height, double spawnHeight,
+                                                  const WorldSettings& settings);
+
+/// Height of the eyes above the feet for an avatar of this height, metres.
+double computeEyeHeight(double height);
+
+/// `box` of the avatar's frame in the scene's frame, for feet at `footPosition`.
+inline Aabb placeBox(const Aabb& box, const Vec3& footPosition) {
+  return {box.min + footPosition, box.max + footPosition};
+}
+
+/// A part in the scene's frame, for feet at `footPosition`. Points into `part`.
+inline collision::PlacedConvex placeAvatarPart(const AvatarPart& part, const Vec3& footPosition) {
+  return {part.hull->vertices, footPosition + part.offset, part.rotated ? &part.rotation : nullptr,
+          part.hull.get()};
+}
+
+}  // namespace enfilade::scene

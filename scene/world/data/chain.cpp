@@ -1,0 +1,100 @@
+#include "scene/world/data/chain.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "collision/motion/moving_pose.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+/// Maximum distance of the link's points from the origin of its frame, metres.
+double computeLinkRadius(const ChainLink& link) {
+  return link.hull->radius;
+}
+
+/// Bound on the distance of any point of `link` and its descendants from the link's origin, metres.
+double computeMaxRadius(const Chain& chain, std::size_t link) {
+  double maxRadius = computeLinkRadius(chain.links[link]);
+  for (std::size_t child = link + 1; child < chain.links.size(); ++child) {
+    if (chain.links[child].parent != static_cast<std::int32_t>(link)) continue;
+    const LinkJoint& joint = chain.links[child].joint;
+    const bool isPrismatic = joint.kind == LinkJoint::Kind::prismatic;
+    const double travel = isPrismatic ? std::max(std::abs(joint.low), std::abs(joint.high)) : 0;
+    maxRadius = std::max(maxRadius, joint.anchor.norm() + travel + chain.links[child].maxRadius);
+  }
+  return maxRadius;
+}
+
+}  // namespace
+
+Chain makeChain(const Spawn& order, const Mat3& avatarFromBase) {
+  Chain chain;
+  chain.avatarFromBase = avatarFromBase;
+  chain.selfContact = order.selfContact;
+  for (const Link& link : order.links) {
+    ChainLink chainLink;
+    chainLink.parent = link.parent;
+    chainLink.joint = link.joint;
+    chainLink.joint.axis = link.joint.axis.normalized();
+    chainLink.hull = std::make_shared<const collision::Hull>(collision::buildHull(link.points));
+    chainLink.value = chainLink.target = link.value;
+    chain.links.push_back(std::move(chainLink));
+  }
+  for (std::size_t i = chain.links.size(); i-- > 0;)
+    chain.links[i].maxRadius = computeMaxRadius(chain, i);
+  return chain;
+}
+
+std::vector<LinkPose> computeLinkPoses(const Chain& chain) {
+  std::vector<LinkPose> poses;
+  poses.reserve(chain.links.size());
+  for (const ChainLink& link : chain.links) {
+    LinkPose parent;
+    parent.rotation = chain.avatarFromBase;
+    if (link.parent >= 0) parent = poses[static_cast<std::size_t>(link.parent)];
+    LinkPose pose;
+    pose.axis = parent.rotation * link.joint.axis;
+    pose.origin = parent.origin + parent.rotation * link.joint.anchor;
+    if (link.joint.kind == LinkJoint::Kind::prismatic) {
+      pose.rotation = parent.rotation;
+      pose.origin += link.value * pose.axis;
+    } else {
+      pose.rotation = collision::integrateRotation(parent.rotation, link.value * pose.axis, 1);
+    }
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+std::shared_ptr<const AvatarShape> makeChainShape(const std::vector<AvatarPart>& base,
+                                                  const Chain& chain) {
+  std::vector<AvatarPart> parts = base;
+  const std::vector<LinkPose> poses = computeLinkPoses(chain);
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    parts.push_back(makeAvatarPart(chain.links[i].hull, poses[i].origin, poses[i].rotation));
+  return makeAvatarShape(std::move(parts));
+}
+
+bool doesJointMoveLink(const Chain& chain, std::size_t joint, std::size_t link) {
+  // Parents have lower indices than their links, so the loop ends at the base.
+  for (auto ancestor = static_cast<std::int32_t>(link); ancestor >= 0;
+       ancestor = chain.links[static_cast<std::size_t>(ancestor)].parent)
+    if (ancestor == static_cast<std::int32_t>(joint)) return true;
+  return false;
+}
+
+double computeLeverArm(const ChainLink& link) {
+  return link.joint.kind == LinkJoint::Kind::revolute ? link.maxRadius : 1;
+}
+
+double computeMaxChainDisplacement(const Chain& chain, double tick) {
+  double displacement = 0;
+  for (const ChainLink& link : chain.links) {
+    const double step = std::min(std::abs(link.target - link.value), chain.speed * tick);
+    displacement += step * computeLeverArm(link);
+  }
+  return displacement;
+}
+
+}  // namespace enfilade::scene

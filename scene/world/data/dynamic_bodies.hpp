@@ -1,0 +1,43 @@
+// The rigid bodies of a world in the solver, and every entity that they met so far, with the last
+// tick's impulses and features. The commands determine all of it; a copy of a world must copy it.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "scene/physics/physics_world.hpp"
+#include "scene/physics/thread_pool.hpp"
+#include "scene/world/data/body.hpp"
+#include "scene/world/data/snapshot.hpp"
+
+namespace enfilade::scene {
+
+/// Block size of parallel loops over bodies.
+inline constexpr std::size_t kBodiesPerTask = 32;
+
+struct DynamicBodies {
+  PhysicsWorld physicsWorld;
+  std::vector<std::uint32_t> bodyIndices;  ///< of rigid bodies, into WorldData::bodies
+  /// Index into physicsWorld's bodies by (entity, part); an avatar has one per part, others only
+  /// part 0. Those of `bodyIndices` are first, in their order; others are created when first met.
+  std::map<std::pair<EntityId, std::uint32_t>, std::uint32_t> physicsBodyByPart;
+  std::vector<EntityId> entities;            ///< of each physics body; 0: unused
+  std::vector<std::uint32_t> freeSlots;      ///< physics bodies of avatars that left, for reuse
+  std::vector<std::uint32_t> sceneBodyOf;    ///< by physics body: index into WorldData::bodies
+  std::vector<std::uint32_t> physicsBodyOf;  ///< by WorldData::bodies; kNoBody: not met yet
+  std::unique_ptr<ThreadPool> threadPool;    ///< once there are many bodies; not part of the state
+  int threadPoolSize = 0;                    ///< threads of `threadPool`
+  int maxThreads = 0;                        ///< 0: kDefaultThreads; at most the processors
+  std::vector<std::uint32_t> activeBodies;   ///< awake or possibly woken in this tick, ascending
+  StepReport lastReport;                     ///< of the last tick with an awake body
+  /// Pairs of an avatar and a rigid body that exchanged an impulse in this tick, even if they are
+  /// separated at its end; ascending.
+  std::vector<std::pair<EntityId, EntityId>> avatarBodyPairs;
+};
+
+/// The thread pool for this tick; null if too few bodies are active to be worth it.
+ThreadPool* acquireThreadPool(DynamicBodies& dynamicBodies);
+
+}  // namespace enfilade::scene

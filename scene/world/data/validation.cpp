@@ -1,0 +1,178 @@
+// Numbers, names and lists. Each error names the field, the value and the allowed range.
+#include "scene/world/data/validation.hpp"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "scene/model/names.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr double kMaxCoordinate = 1e7;  // metres: doubles still resolve 2 nm there
+constexpr double kMaxWait = 86400;      // seconds
+constexpr std::size_t kMaxWaypoints = 100000;
+constexpr double kMaxJointAngle = 1000;  // radians: magnitude of a joint's limits
+
+std::string formatExactNumber(double value) {
+  if (std::isnan(value)) return "NaN";
+  if (std::isinf(value)) return value > 0 ? "infinity" : "-infinity";
+  std::array<char, 32> text{};  // shortest round-trip form
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  return {text.data(), end};
+}
+
+using OptionalError = std::optional<std::string>;
+
+OptionalError validateRange(const std::string& field, double value, double min, double max) {
+  if (value >= min && value <= max) return std::nullopt;
+  return field + " is " + formatExactNumber(value) + "; it must lie in " + formatExactNumber(min) +
+         ".." + formatExactNumber(max);
+}
+
+/// As validateRange(), but `value` must be above 0.
+OptionalError validatePositive(const std::string& field, double value, double max) {
+  if (!(value > 0)) return field + " is " + formatExactNumber(value) + "; it must be above 0";
+  return validateRange(field, value, 0, max);
+}
+
+OptionalError validatePoint(const std::string& field, const Vec3& point,
+                            double maxCoordinate = kMaxCoordinate) {
+  constexpr std::array<const char*, 3> kAxes{".x", ".y", ".z"};
+  for (int i = 0; i < 3; ++i)
+    if (auto error = validateRange(field + kAxes[i], point[i], -maxCoordinate, maxCoordinate))
+      return error;
+  return std::nullopt;
+}
+
+OptionalError validateName(const std::string& field, const std::string& name) {
+  if (isValidName(name)) return std::nullopt;
+  return field + kNameRule;
+}
+
+OptionalError validatePart(const std::string& field, const std::vector<Vec3>& points) {
+  if (points.empty()) return field + " has no point; give the corners of a convex body";
+  if (points.size() > kMaxPartPoints)
+    return field + " has more than " + std::to_string(kMaxPartPoints) + " points";
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (auto error =
+            validatePoint(field + "[" + std::to_string(i) + "]", points[i], kMaxPartCoordinate))
+      return error;
+  return std::nullopt;
+}
+
+OptionalError validateLink(const std::string& field, const Link& link, std::size_t index) {
+  if (auto error = validatePart(field + ".points", link.points)) return error;
+  if (link.parent < -1 || link.parent >= static_cast<std::int32_t>(index))
+    return field + ".parent is " + std::to_string(link.parent) +
+           "; it must be an earlier link, counted from 0, or -1 for the base";
+  const LinkJoint& joint = link.joint;
+  if (auto error = validatePoint(field + ".anchor", joint.anchor, kMaxPartCoordinate)) return error;
+  if (auto error = validatePoint(field + ".axis", joint.axis, kMaxPartCoordinate)) return error;
+  if (!(joint.axis.norm() > 1e-6)) return field + ".axis has no direction; give one, as [0, 1, 0]";
+  const bool isRevolute = joint.kind == LinkJoint::Kind::revolute;
+  const double maxValue = isRevolute ? kMaxJointAngle : kMaxPartCoordinate;
+  if (auto error = validateRange(field + ".low", joint.low, -maxValue, maxValue)) return error;
+  if (auto error = validateRange(field + ".high", joint.high, joint.low, maxValue)) return error;
+  return validateRange(field + ".value", link.value, joint.low, joint.high);
+}
+
+OptionalError validateOrder(const Spawn& spawn, const WorldSettings&) {
+  if (auto error = validatePoint("at", spawn.position)) return error;
+  if (auto error = validateRange("facing", spawn.facing, -1e6, 1e6)) return error;
+  if (auto error = validateRange("radius", spawn.radius, 0.05, 5)) return error;
+  if (auto error = validateRange("height", spawn.height, 0.2, 10)) return error;
+  if (spawn.parts.size() > kMaxParts)
+    return "parts has more than " + std::to_string(kMaxParts) + " parts";
+  if (spawn.links.size() > kMaxLinks)
+    return "links has more than " + std::to_string(kMaxLinks) + " links";
+  for (std::size_t i = 0; i < spawn.parts.size(); ++i)
+    if (auto error = validatePart("parts[" + std::to_string(i) + "]", spawn.parts[i])) return error;
+  for (std::size_t i = 0; i < spawn.links.size(); ++i)
+    if (auto error = validateLink("links[" + std::to_string(i) + "]", spawn.links[i], i))
+      return error;
+  return std::nullopt;
+}
+
+OptionalError validateOrder(const Walk& walk, const WorldSettings& settings) {
+  if (walk.waypoints.empty()) return "along has no way point; give at least one";
+  if (walk.waypoints.size() > kMaxWaypoints)
+    return "along has more than " + std::to_string(kMaxWaypoints) + " way points";
+  for (std::size_t i = 0; i < walk.waypoints.size(); ++i)
+    if (auto error = validatePoint("along[" + std::to_string(i) + "]", walk.waypoints[i]))
+      return error;
+  return validatePositive("speed", walk.speed, settings.maxSpeed);
+}
+
+OptionalError validateOrder(const Look& look, const WorldSettings&) {
+  return validatePoint("at", look.target);
+}
+OptionalError validateOrder(const Wait& wait, const WorldSettings&) {
+  return validateRange("seconds", wait.seconds, 0, kMaxWait);
+}
+OptionalError validateOrder(const Capture& capture, const WorldSettings&) {
+  return validateName("as", capture.name);
+}
+OptionalError validateOrder(const Leave&, const WorldSettings&) {
+  return std::nullopt;
+}
+
+OptionalError validateVelocity(const Vec3& velocity, const WorldSettings& settings) {
+  if (auto error = validatePoint("velocity", velocity)) return error;
+  return validateRange("velocity's length", velocity.norm(), 0, settings.maxSpeed);
+}
+
+OptionalError validateOrder(const Drive& drive, const WorldSettings& settings) {
+  return validateVelocity(drive.velocity, settings);
+}
+OptionalError validateOrder(const Jump& jump, const WorldSettings& settings) {
+  if (auto error = validatePositive("height", jump.height, settings.maxJumpHeight)) return error;
+  return jump.velocity ? validateVelocity(*jump.velocity, settings) : std::nullopt;
+}
+OptionalError validateOrder(const Fly&, const WorldSettings&) {
+  return std::nullopt;
+}
+OptionalError validateOrder(const Crouch& crouch, const WorldSettings&) {
+  return validateRange("height", crouch.height, 0, 10);
+}
+
+OptionalError validateOrder(const DriveJoints& drive, const WorldSettings& settings) {
+  if (drive.targets.empty())
+    return "to has no value; give one for each joint, or none for those that stay";
+  if (drive.targets.size() > kMaxLinks)
+    return "to has more than " + std::to_string(kMaxLinks) + " values";
+  for (std::size_t i = 0; i < drive.targets.size(); ++i)
+    if (drive.targets[i])
+      if (auto error = validateRange("to[" + std::to_string(i) + "]", *drive.targets[i],
+                                     -kMaxJointAngle, kMaxJointAngle))
+        return error;
+  return validatePositive("speed", drive.speed, settings.maxJointSpeed);
+}
+
+}  // namespace
+
+std::optional<std::string> validateCommandFields(const Command& command,
+                                                 const WorldSettings& settings) {
+  if (auto error = validateName("avatar", command.avatar)) return error;
+  return std::visit([&](const auto& order) { return validateOrder(order, settings); },
+                    command.order);
+}
+
+std::optional<std::string> validateWorldSettings(const WorldSettings& settings) {
+  if (auto error = validateRange("epsilon", settings.contactOffset, 1e-6, 0.05)) return error;
+  if (auto error = validateRange("step height", settings.stepHeight, 0, 2)) return error;
+  if (auto error = validateRange("near miss", settings.nearMissDistance, 0, 10)) return error;
+  if (auto error = validateRange("walkable normal", settings.walkableNormalY, 0.01, 1))
+    return error;
+  if (auto error = validateRange("gravity", settings.gravity, 0.01, 100)) return error;
+  if (auto error = validateRange("speed limit", settings.maxSpeed, 0.01, 1e4)) return error;
+  if (auto error = validateRange("tick", settings.tickDuration, 1e-4, 1)) return error;
+  if (auto error = validateRange("patience", settings.stuckTimeout, settings.tickDuration, 3600))
+    return error;
+  if (auto error = validateRange("jump limit", settings.maxJumpHeight, 0, 1000)) return error;
+  if (auto error = validateRange("joint speed limit", settings.maxJointSpeed, 0, 100)) return error;
+  return validateRange("push force", settings.maxPushForce, 0, 1e6);
+}
+
+}  // namespace enfilade::scene

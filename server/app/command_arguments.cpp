@@ -1,0 +1,411 @@
+#include "server/app/command_arguments.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include "scene/model/rotation.hpp"
+#include "scene/world/audit.hpp"
+#include "scene/world/data/validation.hpp"
+#include "server/base/endpoint.hpp"
+#include "server/base/parse_number.hpp"
+
+namespace enfilade::server {
+namespace {
+
+std::string validateUnit(const std::string& text) {
+  if (scene::parseMetresPerUnit(text)) return {};
+  return text + ": give m, mm, cm, ft, in or a positive number of metres";
+}
+
+std::string validateFile(const std::string& text) {
+  return text.empty() ? "the file name is empty: give one, for example walk.mcap" : "";
+}
+
+std::string validateEndpoint(const std::string& text) {
+  if (parseEndpoint(text)) return {};
+  return text + ": give HOST:PORT with a port from 0 to 65535, for example 127.0.0.1:7878";
+}
+
+std::string validateSeconds(const std::string& text) {
+  const auto seconds = parseNumber<double>(text);
+  if (seconds && *seconds >= 0 && *seconds <= 1e6) return {};
+  return text + ": give seconds from 0 to 1000000";
+}
+
+std::string validateTolerance(const std::string& text) {
+  const auto metres = parseNumber<double>(text);
+  if (metres && *metres >= 0 && *metres <= 1000) return {};
+  return text + ": give metres from 0 to 1000";
+}
+
+std::string validateAudit(const std::string& text) {
+  const auto ticks = parseNumber<std::uint32_t>(text);
+  if (ticks && *ticks <= scene::kMaxAuditInterval) return {};
+  return text + ": give a whole number of ticks from 1 to " +
+         std::to_string(scene::kMaxAuditInterval) + ", or 0 for no audit";
+}
+
+/// Lists the options that follow under this heading of --help.
+void setGroup(CLI::App& verb, const char* heading) {
+  verb.option_defaults()->group(heading);
+}
+
+void addAudit(CLI::App& verb, CommandArguments& into) {
+  setGroup(verb, "Checks");
+  verb.add_option("--audit", into.auditEvery,
+                  "Compare the broad phase with brute force every N ticks (0: never). Exits with 3 "
+                  "if pairs differ. Cost: avatars x objects x 5 ns, spread over ticks of about 2 "
+                  "ms")
+      ->capture_default_str()
+      ->check(CLI::Validator(validateAudit, "N"));
+}
+
+/// Sets one setting from the text of its option. Returns the error, or an empty text.
+std::string setSetting(scene::WorldSettings& settings, double scene::WorldSettings::*field,
+                       const std::string& text) {
+  const auto number = parseNumber<double>(text);
+  if (!number) return text + " is not a number";
+  settings.*field = *number;
+  return scene::validateWorldSettings(settings).value_or("");
+}
+
+std::string validateSlope(const std::string& text) {
+  const auto degrees = parseNumber<double>(text);
+  return degrees && *degrees >= 0 && *degrees <= 89 ? "" : text + ": give 0 to 89 degrees";
+}
+
+CLI::Validator makeSettingValidator(double scene::WorldSettings::*field) {
+  return CLI::Validator(
+      [field](const std::string& text) {
+        scene::WorldSettings settings;
+        return setSetting(settings, field, text);
+      },
+      "METRES");
+}
+
+/// Adds the options of motion. Defaults are in scene/world/data/world_settings.hpp.
+void addMotion(CLI::App& verb, CommandArguments& into) {
+  setGroup(verb, "Motion");
+  verb.add_option("--step-height", into.stepHeight, "Highest step that avatars climb (0.3)")
+      ->check(makeSettingValidator(&scene::WorldSettings::stepHeight));
+  verb.add_option("--epsilon", into.epsilon,
+                  "Gap that avatars and bodies keep from obstacles "
+                  "(0.0005)")
+      ->check(makeSettingValidator(&scene::WorldSettings::contactOffset));
+  verb.add_option("--near-miss", into.nearMiss,
+                  "Report pairs that come closer than this without contact; 0: none (0)")
+      ->check(makeSettingValidator(&scene::WorldSettings::nearMissDistance));
+  verb.add_option("--slope", into.slope, "Steepest slope that avatars stand on, in degrees (50)")
+      ->check(CLI::Validator(validateSlope, "DEGREES"));
+  verb.add_option("--sliding", into.sliding,
+                  "Reaction to obstacles: avatars slide along them, "
+                  "or stop")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"slide", "stop"}));
+}
+
+void addAccess(CLI::App& verb, CommandArguments& into) {
+  setGroup(verb, "Access");
+  verb.add_option("--token-file", into.tokenFile,
+                  "File with a role (observe, drive, admin) and a token per line; clients need a "
+                  "token")
+      ->type_name("")
+      ->check(CLI::ExistingFile.description("FILE"));
+  verb.add_flag("--insecure", into.access.insecure,
+                "Allow a token file on a public address, although the connection is not encrypted");
+  verb.add_option("--allow-host", into.access.hosts,
+                  "Host names that browsers may use for the server, next to localhost and "
+                  "addresses")
+      ->type_name("HOST");
+  verb.add_option("--allow-origin", into.access.origins,
+                  "Origins whose pages may connect, for example https://example.org")
+      ->type_name("URL");
+}
+
+void addModel(CLI::App& verb, ModelArguments& into) {
+  setGroup(verb, "Model");
+  verb.add_option("SCENE", into.file, "Model file: glTF, GLB, OBJ, COLLADA, FBX, IFC or IFCZIP")
+      ->required();
+  verb.add_option("--unit", into.unit, "Unit of the file: m, mm, cm, ft, in or a number of metres")
+      ->check(CLI::Validator(validateUnit, "UNIT"));
+  verb.add_option("--up", into.up, "Up axis of the file")->check(CLI::IsMember({"x", "y", "z"}));
+  verb.add_option("--offset", into.offset,
+                  "Offset (m, Y up) subtracted from the file's coordinates; use one value for all "
+                  "versions of a model. Default: 0 near the origin, else the model's position")
+      ->delimiter(',')
+      ->type_name("X,Y,Z")
+      ->expected(3);
+  verb.add_flag("--no-cache", into.noCache, "Import the model again and ignore the cached import");
+  verb.add_option(
+          "--ifc-reader", into.ifcReader,
+          "IFC reader. auto: web-ifc, else ifcplusplus (also for products that web-ifc omits), "
+          "else assimp")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "web-ifc", "ifcplusplus", "assimp"}));
+  verb.add_option("--ifc-doors", into.ifcDoors,
+                  "IFC doors and lifts. move: they are bodies if the file describes their motion; "
+                  "still: only the sidecar defines bodies")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"move", "still"}));
+}
+
+void addDevice(CLI::App& verb, CommandArguments& into) {
+  setGroup(verb, "Drawing");
+  verb.add_option("--device", into.device.device,
+                  "Graphics device: index, part of the name or UUID from `enfilade doctor`. "
+                  "Default: "
+                  "the best device")
+      ->type_name("DEVICE");
+  verb.add_flag("--require-gpu", into.device.requireGpu, "Exit with 1 if only a CPU can draw");
+}
+
+void addRenderer(CLI::App& verb, CommandArguments& into) {
+  setGroup(verb, "Drawing");
+  verb.add_option("--renderer", into.renderer,
+                  "gl: OpenGL; rays: Embree ray tracing; auto: the faster one for device, size and "
+                  "channels")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "gl", "rays"}));
+}
+
+void addWalk(CLI::App& verb, CommandArguments& into) {
+  setGroup(verb, "Options");
+  verb.add_option("SCRIPT", into.script, "Walk script: JSON lines (protocol/SCRIPT.md)")
+      ->required();
+  verb.add_option("--out", into.out, "Output folder for pictures, contacts and summary")
+      ->required()
+      ->check(CLI::Validator(validateFolder, "DIR"));
+  verb.add_flag("--strict", into.strict,
+                "Exit with 3 if an order was refused or a walk was "
+                "blocked");
+}
+
+std::string validateTick(const std::string& text) {
+  return parseNumber<std::uint64_t>(text) ? ""
+                                          : text +
+                                                ": give the number of a tick, for example "
+                                                "600";
+}
+
+std::string validateRun(const std::string& text) {
+  const auto run = parseNumber<std::uint32_t>(text);
+  return run && *run > 0 ? "" : text + ": give the number of a run, starting at 1";
+}
+
+void addRun(CLI::App& verb, CommandArguments& into, const std::string& defaultRun) {
+  verb.add_option("--run", into.run,
+                  "Run of the RECORDING to use, numbered as in `enfilade inspect` (default: " +
+                      defaultRun + ")")
+      ->check(CLI::Validator(validateRun, "N"));
+}
+
+void addBranch(CLI::App& verb, CommandArguments& into) {
+  setGroup(verb, "Recordings");
+  verb.add_option("--from", into.from,
+                  "[SCENE] RECORDING: start after this tick, from the nearest checkpoint")
+      ->check(CLI::Validator(validateTick, "TICK"));
+  verb.add_option("--then", into.then,
+                  "Script that runs from there instead of the rest of the recording")
+      ->check(CLI::Validator(validateFile, "SCRIPT"));
+  addRun(verb, into, "the first; all for --verify without --from");
+}
+
+void addPlaybackOptions(CLI::App& serve, CommandArguments& into) {
+  setGroup(serve, "Recordings");
+  serve.add_option("--from", into.from, "RECORDING instead of SCENE: start after this tick")
+      ->check(CLI::Validator(validateTick, "TICK"));
+  addRun(serve, into, "the first");
+  serve.footer(
+      "Uses:\n"
+      "  enfilade serve SCENE [FURTHER..]       a world per scene; clients enter by name\n"
+      "  enfilade serve [SCENE] RECORDING       clients play, seek and take avatars over\n"
+      "Each branch of a played recording has its own file: FILE, FILE-2, ... Exits with 4 if the\n"
+      "replay diverges before the first served tick.\n"
+      "Example: enfilade serve house.ifc --listen 127.0.0.1:0 --record walk.mcap");
+}
+
+void addRecording(CLI::App& verb, CommandArguments& into, const char* description) {
+  setGroup(verb, "Recordings");
+  CLI::Option* file = verb.add_option("--record", into.record.file, description)
+                          ->check(CLI::Validator(validateFile, "FILE"));
+  verb.add_option("--record-channels", into.recordChannels,
+                  "walk: the data that a replay needs; foxglove: also channels for Foxglove and "
+                  "Lichtblick, ten times a second")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"walk", "foxglove"}))
+      ->needs(file);
+  verb.add_option("--record-frames", into.recordFrames,
+                  "Record JPEG views of each avatar, one per SECONDS of simulated time, and all "
+                  "other "
+                  "frames from its eyes; 0: only the other frames")
+      ->check(CLI::Validator(validateSeconds, "SECONDS"))
+      ->needs(file);
+}
+
+void addTolerance(CLI::App& verb, CommandArguments& into) {
+  setGroup(verb, "Comparison");
+  verb.add_option("--tolerance", into.tolerance,
+                  "Position and clearance differences up to this are ignored")
+      ->capture_default_str()
+      ->check(CLI::Validator(validateTolerance, "METRES"));
+}
+
+}  // namespace
+
+void addServeOptions(CLI::App& serve, CommandArguments& into) {
+  addModel(serve, into.model);
+  addPlaybackOptions(serve, into);
+  setGroup(serve, "Options");
+  serve.add_option("FURTHER", into.furtherScenes,
+                   "Further models, each with its own world on this server");
+  serve.add_option("--listen", into.listen, "Address and port; port 0: the system chooses a port")
+      ->capture_default_str()
+      ->check(CLI::Validator(validateEndpoint, "HOST:PORT"));
+  addAccess(serve, into);
+  setGroup(serve, "Options");
+  serve.add_flag(
+      "--stop-at-end-of-input", into.stopAtEndOfInput,
+      "Stop when standard input is closed, so that the server ends with its parent process");
+  addDevice(serve, into);
+  addRenderer(serve, into);
+  addAudit(serve, into);
+  addMotion(serve, into);
+  addRecording(
+      serve, into,
+      "Record the world `main`, or the branches of a played recording, to a new file (MCAP)");
+}
+
+void addReplayOptions(CLI::App& replay, CommandArguments& into) {
+  addModel(replay, into.model);
+  addWalk(replay, into);
+  addDevice(replay, into);
+  addRenderer(replay, into);
+  addAudit(replay, into);
+  addMotion(replay, into);
+  addRecording(replay, into, "Record the walk to this file (MCAP)");
+  for (const char* optional : {"SCRIPT", "--out"}) replay.get_option(optional)->required(false);
+  setGroup(replay, "Recordings");
+  replay.add_flag("--verify", into.verify,
+                  "[SCENE] RECORDING: re-run it and compare the state after every tick; 4: "
+                  "diverged");
+  addBranch(replay, into);
+  setGroup(replay, "Comparison");
+  replay.add_flag("--json", into.json, "SCENE RECORDING: print the changes as one JSON object");
+  replay
+      .add_option("--pictures", into.pictures,
+                  "SCENE RECORDING: maximum number of change pictures, worst first")
+      ->capture_default_str()
+      ->check(CLI::Range(0U, 1000U).description("N"));
+  addTolerance(replay, into);
+  replay.footer(
+      "Uses:\n"
+      "  enfilade replay SCENE SCRIPT --out DIR                run a walk script\n"
+      "  enfilade replay [SCENE] RECORDING --verify            re-run and compare every tick\n"
+      "  enfilade replay [SCENE] RECORDING --from TICK --then SCRIPT --out DIR\n"
+      "                                                        continue a recording differently\n"
+      "  enfilade replay SCENE RECORDING --out DIR             the same walk in another model\n"
+      "The last use writes diff.txt, diff.json and changes/, and exits with 3 if something got\n"
+      "worse (see enfilade diff --help).\n"
+      "Example: enfilade replay house.glb walk.jsonl --out out --record walk.mcap --strict");
+}
+
+void addDiffOptions(CLI::App& verb, CommandArguments& into) {
+  verb.add_option("BEFORE", into.before, "Recording (MCAP) of the earlier walk")->required();
+  verb.add_option("AFTER", into.after, "Recording (MCAP) of the later walk")->required();
+  verb.add_flag("--json", into.json, "Print one JSON object");
+  addTolerance(verb, into);
+  verb.footer(
+      "Exits with 3 if something got worse: a new contact (except ground), a new blocked move, a\n"
+      "new fall out of the scene, an order that no longer succeeds, or a clearance that shrank by\n"
+      "more than the tolerance.\n"
+      "Example: enfilade diff before.mcap after.mcap --json");
+}
+
+void addExportOptions(CLI::App& verb, CommandArguments& into) {
+  verb.add_option("RECORDING", into.recording, "Recording (MCAP)")->required();
+  verb.add_option("--out", into.out,
+                  "Folder for contacts.jsonl, trajectories in TUM format, and cameras.glb")
+      ->required()
+      ->check(CLI::Validator(validateFolder, "DIR"));
+  verb.footer("Example: enfilade export walk.mcap --out out/walk");
+}
+
+void addCaptureCommandOptions(CLI::App& capture, CommandArguments& into) {
+  addModel(capture, into.model);
+  addCaptureOptions(capture, into.capture);
+  addDevice(capture, into);
+  capture.footer(
+      "Formats, axes and shards: server/capture/CAPTURE.md.\n"
+      "Example: enfilade capture house.glb path.txt --out frames --size 640x480 --channels "
+      "rgb,depth");
+}
+
+void addWalkOptions(CLI::App& walk, CommandArguments& into) {
+  addWalk(walk, into);
+  walk.add_option("--connect", into.connect, "Address and port of the server")
+      ->required()
+      ->check(CLI::Validator(validateEndpoint, "HOST:PORT"));
+  walk.footer("Example: enfilade walk walk.jsonl --connect 127.0.0.1:7878 --out out");
+}
+
+void addDoctorOptions(CLI::App& verb, CommandArguments& into) {
+  verb.add_flag("--json", into.doctor.json, "Print one JSON object");
+  verb.add_flag("--require-gpu", into.doctor.requireGpu, "Exit with 1 if only a CPU can draw");
+  verb.add_option("--out", into.doctor.out, "PNG file for the self-test picture")
+      ->type_name("FILE");
+  verb.footer("Example: enfilade doctor --require-gpu --json");
+}
+
+void addInspectOptions(CLI::App& inspect, CommandArguments& into) {
+  addModel(inspect, into.model);
+  setGroup(inspect, "Options");
+  inspect.add_flag("--json", into.json, "Print one JSON object");
+  inspect.add_flag("--objects", into.objects,
+                   "Also list all objects: id, path, box, class, operation");
+  inspect.add_flag("--strict", into.strict, "Exit with 3 if there are problems");
+  inspect.add_option("--plan", into.plan, "Folder for one floor plan per storey")
+      ->check(CLI::Validator(validateFolder, "DIR"));
+  inspect.footer(
+      "SCENE may be a RECORDING: --json and --strict apply.\n"
+      "Example: enfilade inspect house.ifc --plan out/plans --strict");
+}
+
+ModelOptions makeModelOptions(const ModelArguments& read) {
+  ModelOptions options;
+  options.file = read.file;
+  options.cache = !read.noCache;
+  if (!read.unit.empty()) options.metresPerUnit = scene::parseMetresPerUnit(read.unit);
+  if (!read.up.empty()) options.up = read.up.front();
+  if (!read.offset.empty()) options.offset = {read.offset[0], read.offset[1], read.offset[2]};
+  options.ifcReader = scene::parseIfcReader(read.ifcReader).value_or(scene::IfcReader::automatic);
+  options.doors = read.ifcDoors == "still" ? scene::IfcDoors::fixed : scene::IfcDoors::movable;
+  return options;
+}
+
+DrawingOptions makeDrawingOptions(const CommandArguments& read) {
+  return {render::parseRendererKind(read.renderer).value_or(render::RendererKind::automatic),
+          read.device};
+}
+
+RecordingChoice makeRecordingChoice(const CommandArguments& read) {
+  RecordingChoice choice = read.record;
+  if (!read.recordFrames.empty()) choice.pictureInterval = parseNumber<double>(read.recordFrames);
+  choice.forViewers = choice.pictureInterval || read.recordChannels == "foxglove";
+  return choice;
+}
+
+scene::WorldSettings makeWorldSettings(const CommandArguments& read) {
+  scene::WorldSettings settings;
+  if (!read.stepHeight.empty())
+    setSetting(settings, &scene::WorldSettings::stepHeight, read.stepHeight);
+  if (!read.epsilon.empty())
+    setSetting(settings, &scene::WorldSettings::contactOffset, read.epsilon);
+  if (!read.nearMiss.empty())
+    setSetting(settings, &scene::WorldSettings::nearMissDistance, read.nearMiss);
+  // makeHeadingFromDegrees() gives the same cosine on every processor, which determinism needs.
+  if (!read.slope.empty())
+    settings.walkableNormalY = scene::makeHeadingFromDegrees(*parseNumber<double>(read.slope)).x();
+  settings.sliding = read.sliding == "stop" ? scene::Sliding::stop : scene::Sliding::slide;
+  return settings;
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,18 @@
+// Network addresses of the command line.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace enfilade::server {
+
+struct Endpoint {
+  std::string host;        ///< a name or an address; IPv6 without brackets
+  std::uint16_t port = 0;  ///< 0: the system chooses (only for listening)
+};
+
+/// Parses `HOST:PORT` or `[IPV6]:PORT`; nullopt for any other text.
+std::optional<Endpoint> parseEndpoint(const std::string& text);
+
+}  // namespace enfilade::server

@@ -1,0 +1,11 @@
+// Commands to avatars and bodies.
+#pragma once
+
+#include "server/hosting/requests/request_context.hpp"
+
+namespace enfilade::server {
+
+void handleCommand(const RequestContext& context, const v1::Command& command);
+void handleBodyCommand(const RequestContext& context, const v1::BodyCommand& command);
+
+}  // namespace enfilade::server

@@ -1,0 +1,142 @@
+#include "server/hosting/requests/dispatch.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include "collision/assert.hpp"
+#include "server/hosting/requests/clock_requests.hpp"
+#include "server/hosting/requests/command_requests.hpp"
+#include "server/hosting/requests/frame_requests.hpp"
+#include "server/hosting/requests/query_requests.hpp"
+#include "server/hosting/requests/subscription_requests.hpp"
+#include "server/hosting/requests/world_requests.hpp"
+
+namespace enfilade::server {
+namespace {
+
+/// Earlier requests are already answered; the session closes after this reply.
+void handleBye(const RequestContext& context) {
+  ENFILADE_ASSERT(!context.client.pendingReply && !context.client.pendingStep);
+  v1::ServerMessage message;
+  message.mutable_bye()->set_reason("the client said bye");
+  context.client.out->finish(encodeShared(message));
+}
+
+/// The lowest role that may send this request.
+Role requiredRole(v1::ClientMessage::BodyCase body) {
+  switch (body) {  // no `default`: the compiler rejects a request without a role
+    case v1::ClientMessage::kHello:
+    case v1::ClientMessage::kSubscribe:
+    case v1::ClientMessage::kFrame:
+    case v1::ClientMessage::kWatchFrames:
+    case v1::ClientMessage::kRays:
+    case v1::ClientMessage::kDistances:
+    case v1::ClientMessage::kTouching:
+    case v1::ClientMessage::kCannotTouch:
+    case v1::ClientMessage::kDescribe:
+    case v1::ClientMessage::kMetrics:
+    case v1::ClientMessage::kListWorlds:
+    case v1::ClientMessage::kBye:
+    case v1::ClientMessage::BODY_NOT_SET:
+      return Role::observe;
+    case v1::ClientMessage::kCommand:
+    case v1::ClientMessage::kBodyCommand:
+    case v1::ClientMessage::kStep:
+    case v1::ClientMessage::kSetClock:
+    case v1::ClientMessage::kSeek:
+    case v1::ClientMessage::kTakeOver:
+      return Role::drive;
+    case v1::ClientMessage::kRestart:
+    case v1::ClientMessage::kCreateWorld:
+    case v1::ClientMessage::kDropWorld:
+      return Role::admin;
+  }
+  return Role::admin;
+}
+
+void dispatchRequest(const RequestContext& context) {
+  const v1::ClientMessage& message = context.message;
+  const Role required = requiredRole(message.body_case());
+  if (context.client.role < required) {
+    return replyError(context, v1::ERROR_NOT_ALLOWED,
+                      std::string("this needs a token with the role ") + toString(required) +
+                          ", and yours is " + toString(context.client.role) +
+                          ": ask the server's operator for one");
+  }
+  switch (message.body_case()) {
+    case v1::ClientMessage::kCommand:
+      return handleCommand(context, message.command());
+    case v1::ClientMessage::kBodyCommand:
+      return handleBodyCommand(context, message.body_command());
+    case v1::ClientMessage::kStep:
+      return handleStep(context, message.step());
+    case v1::ClientMessage::kSetClock:
+      return handleSetClock(context, message.set_clock());
+    case v1::ClientMessage::kRestart:
+      return handleRestart(context);
+    case v1::ClientMessage::kSeek:
+      return handleSeek(context, message.seek());
+    case v1::ClientMessage::kTakeOver:
+      return handleTakeOver(context, message.take_over());
+    case v1::ClientMessage::kSubscribe:
+      return handleSubscribe(context, message.subscribe());
+    case v1::ClientMessage::kFrame:
+      return handleFrame(context, message.frame());
+    case v1::ClientMessage::kWatchFrames:
+      return handleWatchFrames(context, message.watch_frames());
+    case v1::ClientMessage::kRays:
+      return handleRays(context, message.rays());
+    case v1::ClientMessage::kDistances:
+      return handleDistances(context, message.distances());
+    case v1::ClientMessage::kTouching:
+      return handleTouching(context, message.touching());
+    case v1::ClientMessage::kCannotTouch:
+      return handleCannotTouch(context, message.cannot_touch());
+    case v1::ClientMessage::kDescribe:
+      return handleDescribe(context, message.describe());
+    case v1::ClientMessage::kMetrics:
+      return handleMetrics(context);
+    case v1::ClientMessage::kCreateWorld:
+      return handleCreateWorld(context, message.create_world());
+    case v1::ClientMessage::kDropWorld:
+      return handleDropWorld(context, message.drop_world());
+    case v1::ClientMessage::kListWorlds:
+      return handleListWorlds(context);
+    case v1::ClientMessage::kHello:
+      return replyError(context, v1::ERROR_NOT_ALLOWED,
+                        "hello was already sent: reconnect to send another");
+    case v1::ClientMessage::kBye:
+      return handleBye(context);
+    case v1::ClientMessage::BODY_NOT_SET:
+      break;
+  }
+  replyError(context, v1::ERROR_UNSUPPORTED, "this server does not know the request", "body");
+}
+
+/// An internal error in a request affects only the requesting client.
+void handleSafely(const RequestContext& context) {
+  try {
+    dispatchRequest(context);
+  } catch (const std::exception& error) {
+    spdlog::error("a request of '{}' failed: {}", context.client.name, error.what());
+    context.client.pendingReply.reset();
+    context.client.pendingStep.reset();
+    replyError(context, v1::ERROR_INTERNAL, error.what());
+  }
+}
+
+}  // namespace
+
+void processQueue(HostedWorld& hosted, ClientId id) {
+  const auto found = hosted.clients.find(id);
+  if (found == hosted.clients.end() || hosted.closeNotice) return;
+  Client& client = found->second;
+  // A disconnected client gets no replies and must not delay other clients.
+  while (!client.queue.empty() && !client.pendingStep && !client.pendingReply &&
+         !client.out->finished()) {
+    const QueuedRequest request = std::move(client.queue.front());
+    client.queue.pop_front();
+    handleSafely({hosted, id, client, request.message, processQueue});
+  }
+}
+
+}  // namespace enfilade::server

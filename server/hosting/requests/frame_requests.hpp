@@ -1,0 +1,11 @@
+// Requests for one frame.
+#pragma once
+
+#include "server/hosting/requests/request_context.hpp"
+
+namespace enfilade::server {
+
+/// The frame service replies.
+void handleFrame(const RequestContext& context, const v1::FrameRequest& request);
+
+}  // namespace enfilade::server

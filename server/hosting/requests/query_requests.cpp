@@ -1,0 +1,124 @@
+#include "server/hosting/requests/query_requests.hpp"
+
+#include <algorithm>
+
+namespace enfilade::server {
+namespace {
+
+/// Forwards a query about the last tick to the query service.
+template <class Query>
+void forwardQuery(const RequestContext& context, const Query& query, const char* tickField) {
+  HostedWorld& hosted = context.hosted;
+  if (query.has_tick()) {
+    if (auto error = validateTick(hosted, query.tick(), tickField))
+      return replyError(context, std::move(*error));
+  }
+  hosted.queries.submit(
+      {hosted.world.snapshot(), context.message, hosted.world.settings(), hosted.limits},
+      deferReply(context));
+}
+
+v1::Entity makeEntity(const scene::World& world, std::uint32_t id) {
+  const auto& objects = world.scene().model().objects;
+  v1::Entity entity;
+  entity.set_id(id);
+  entity.set_name(scene::findEntityName(world, id));
+  if (id >= 1 && id <= objects.size()) {
+    entity.set_kind(v1::Entity::KIND_OBJECT);
+    entity.set_global_id(objects[id - 1].globalId);
+    entity.set_operation(objects[id - 1].operationType);
+  } else if (!entity.name().empty()) {
+    entity.set_kind(v1::Entity::KIND_AVATAR);
+  }
+  return entity;
+}
+
+/// Adds entities to a reply up to ServerLimits::replyBytes.
+class BoundedNames {
+ public:
+  BoundedNames(const HostedWorld& hosted, v1::EntityNames& names)
+      : hosted_(hosted), names_(names) {}
+
+  /// Returns false and adds nothing if the reply would become too large.
+  bool addEntity(std::uint32_t id) {
+    constexpr std::size_t kFieldBytes = 8;  // maximum size of an entity's tag and length
+    v1::Entity entity = makeEntity(hosted_.world, id);
+    bytes_ += entity.ByteSizeLong() + kFieldBytes;
+    if (bytes_ > hosted_.limits.replyBytes) return false;
+    *names_.add_entities() = std::move(entity);
+    return true;
+  }
+  bool addAllEntities() {
+    const auto& objects = hosted_.world.scene().model().objects;
+    for (std::uint32_t id = 1; id <= objects.size(); ++id) {
+      if (!addEntity(id)) return false;
+    }
+    const auto& avatars = hosted_.world.snapshot()->avatars;
+    return std::all_of(avatars.begin(), avatars.end(),
+                       [this](const auto& a) { return addEntity(a.id); });
+  }
+
+ private:
+  const HostedWorld& hosted_;
+  v1::EntityNames& names_;
+  std::size_t bytes_ = 0;
+};
+
+}  // namespace
+
+void handleRays(const RequestContext& context, const v1::RayQuery& query) {
+  forwardQuery(context, query, "rays.tick");
+}
+void handleDistances(const RequestContext& context, const v1::DistanceQuery& query) {
+  forwardQuery(context, query, "distances.tick");
+}
+void handleTouching(const RequestContext& context, const v1::TouchingQuery& query) {
+  forwardQuery(context, query, "touching.tick");
+}
+void handleCannotTouch(const RequestContext& context, const v1::CannotTouchQuery& query) {
+  forwardQuery(context, query, "cannot_touch.tick");
+}
+
+void handleDescribe(const RequestContext& context, const v1::DescribeEntities& request) {
+  const ServerLimits& limits = context.hosted.limits;
+  const auto count = static_cast<std::size_t>(request.ids_size());
+  const std::string remedy =
+      "request in pages of at most " + std::to_string(limits.describedIds) + " ids";
+  if (count > limits.describedIds) {
+    return replyError(context, v1::ERROR_TOO_LARGE,
+                      "ids has " + std::to_string(count) + " ids: " + remedy, "describe.ids");
+  }
+  v1::ServerMessage message;
+  BoundedNames names(context.hosted, *message.mutable_names());
+  const bool allNamed = count == 0
+                            ? names.addAllEntities()
+                            : std::all_of(request.ids().begin(), request.ids().end(),
+                                          [&](std::uint32_t id) { return names.addEntity(id); });
+  if (!allNamed) {
+    return replyError(context, v1::ERROR_TOO_LARGE,
+                      "the names need more than the " + std::to_string(limits.replyBytes) +
+                          " bytes of a reply: give ids and " + remedy +
+                          ", fewer where names are long",
+                      "describe.ids");
+  }
+  sendReply(context, std::move(message));
+}
+
+void handleMetrics(const RequestContext& context) {
+  HostedWorld& hosted = context.hosted;
+  v1::ServerMessage message;
+  v1::Metrics& metrics = *message.mutable_metrics();
+  metrics = hosted.statistics.makeMetrics();
+  metrics.set_clients(static_cast<std::uint32_t>(hosted.clients.size()));
+  metrics.set_avatars(static_cast<std::uint32_t>(hosted.world.snapshot()->avatars.size()));
+  metrics.set_frames(*hosted.renderedFrames);
+  metrics.set_dropped(hosted.droppedStates + hosted.droppedFrames);
+  if (const WorldRecorder* recorder = hosted.world.recorder()) {
+    metrics.mutable_recording()->set_ticks(recorder->ticks());
+    metrics.mutable_recording()->set_bytes(recorder->bytes());
+    metrics.mutable_recording()->set_broken(recorder->isBroken());
+  }
+  sendReply(context, std::move(message));
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,53 @@
+#include "server/hosting/requests/request_context.hpp"
+
+#include "collision/assert.hpp"
+#include "server/messages/world_messages.hpp"
+
+namespace enfilade::server {
+
+std::uint64_t lastTick(const HostedWorld& hosted) {
+  return hosted.world.snapshot()->tick;
+}
+
+std::optional<v1::Error> validateTick(const HostedWorld& hosted, std::uint64_t tick,
+                                      const char* field) {
+  const std::uint64_t last = lastTick(hosted);
+  if (tick == last) return std::nullopt;
+  return makeError(v1::ERROR_TICK_GONE,
+                   "the last tick is " + std::to_string(last) + ", not " + std::to_string(tick),
+                   field);
+}
+
+void sendReply(const RequestContext& context, v1::ServerMessage message) {
+  message.set_reply_to(context.message.request_id());
+  sendMessage(context.client, message);
+}
+
+void replyError(const RequestContext& context, v1::Error error) {
+  sendError(context.client, context.message.request_id(), std::move(error));
+}
+
+void replyError(const RequestContext& context, v1::ErrorCode code, std::string reason,
+                std::string field) {
+  replyError(context, makeError(code, std::move(reason), std::move(field)));
+}
+
+std::function<void(EncodedMessage)> deferReply(const RequestContext& context,
+                                               void (OutgoingQueue::*deliver)(EncodedMessage)) {
+  const PendingReply pendingReply{context.message.request_id()};
+  ENFILADE_ASSERT(!context.client.pendingReply);
+  context.client.pendingReply = pendingReply;
+  return [out = context.client.out, id = context.clientId, post = context.hosted.post,
+          resumeQueue = context.resumeQueue, deliver, pendingReply](EncodedMessage encoded) {
+    if (!pendingReply.claim()) return;  // the world ended and has answered
+    ((*out).*deliver)(std::move(encoded));
+    post([id, resumeQueue](HostedWorld& current) {
+      const auto client = current.clients.find(id);
+      if (client == current.clients.end()) return;
+      client->second.pendingReply.reset();
+      resumeQueue(current, id);
+    });
+  };
+}
+
+}  // namespace enfilade::server

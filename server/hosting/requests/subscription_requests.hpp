@@ -1,0 +1,11 @@
+// Subscriptions to states, events and frames.
+#pragma once
+
+#include "server/hosting/requests/request_context.hpp"
+
+namespace enfilade::server {
+
+void handleSubscribe(const RequestContext& context, const v1::Subscribe& subscription);
+void handleWatchFrames(const RequestContext& context, const v1::WatchFrames& request);
+
+}  // namespace enfilade::server

@@ -1,0 +1,12 @@
+// Requests to create, drop and list worlds.
+#pragma once
+
+#include "server/hosting/requests/request_context.hpp"
+
+namespace enfilade::server {
+
+void handleCreateWorld(const RequestContext& context, const v1::CreateWorld& request);
+void handleDropWorld(const RequestContext& context, const v1::DropWorld& request);
+void handleListWorlds(const RequestContext& context);
+
+}  // namespace enfilade::server

@@ -1,0 +1,81 @@
+#include "render/service/renderer_selector.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/render/render_fixtures.hpp"
+
+namespace enfilade::render {
+namespace {
+
+constexpr Channels kColour{true, true, true, false};
+constexpr Channels kMeasured{false, true, true, false};
+
+TEST(RendererSelector, TheWordsOfTheKindsAreReadAsTheyAreWritten) {
+  for (const RendererKind kind : {RendererKind::automatic, RendererKind::gl, RendererKind::rays})
+    EXPECT_EQ(parseRendererKind(toString(kind)), kind);
+  EXPECT_EQ(parseRendererKind("vulkan"), std::nullopt);
+}
+
+TEST(RendererSelector, AGpuIsAlwaysPreferred) {
+  for (const int size : {1, 256, 4096})
+    for (const Channels& channels : {kColour, kMeasured})
+      EXPECT_EQ(chooseRendererKind(false, squareCamera(size), channels), RendererKind::gl);
+}
+
+TEST(RendererSelector, EachKindDrawsWithItsOwnAndARequestGoesBeforeIt) {
+  const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
+  RendererSelector gl(scene, RendererKind::gl), rays(scene, RendererKind::rays);
+  const Camera camera = squareCamera(20);
+  const std::string glName = gl.render({}, camera).renderer;
+  const std::string raysName = rays.render({}, camera).renderer;
+  EXPECT_EQ(glName, gl.deviceName());
+  EXPECT_EQ(raysName, rays.deviceName());
+  EXPECT_EQ(raysName.rfind("Embree ", 0), 0u);
+  EXPECT_NE(glName, raysName);
+  EXPECT_EQ(gl.render({}, camera, {}, RendererKind::rays).renderer, raysName);
+  EXPECT_EQ(rays.render({}, camera, {}, RendererKind::gl).renderer, glName);
+  EXPECT_EQ(rays.render({}, camera).renderer, raysName);
+}
+
+TEST(RendererSelector, OnACpuRaysMeasureSmallPicturesAndGlDrawsAllColours) {
+  for (const int size : {1, 128, 256}) {
+    EXPECT_EQ(chooseRendererKind(true, squareCamera(size), kMeasured), RendererKind::rays) << size;
+    EXPECT_EQ(chooseRendererKind(true, squareCamera(size), kColour), RendererKind::gl) << size;
+  }
+  for (const int size : {257, 640, 4096})
+    EXPECT_EQ(chooseRendererKind(true, squareCamera(size), kMeasured), RendererKind::gl) << size;
+}
+
+TEST(RendererSelector, AutomaticFollowsItsRule) {
+  const auto scene = sceneOf(crowd(50));
+  RendererSelector renderer(scene);
+  for (const Channels& channels : {kColour, kMeasured}) {
+    for (const int size : {20, 300}) {
+      FrameOptions options;
+      options.channels = channels;
+      const Camera camera = squareCamera(size);
+      const bool rays = renderer.render({}, camera, options).renderer.rfind("Embree", 0) == 0;
+      const RendererKind expected = chooseRendererKind(renderer.software(), camera, channels);
+      EXPECT_EQ(rays, expected == RendererKind::rays);
+    }
+  }
+}
+
+TEST(RendererSelector, ADeviceThatIsNotThereIsAnErrorWithTheKindsThatNeedOne) {
+  const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
+  const DeviceChoice none{"no device is called so", false};
+  EXPECT_THROW(RendererSelector(scene, RendererKind::gl, none), RenderError);
+  EXPECT_THROW(RendererSelector(scene, RendererKind::automatic, none), RenderError);
+  RendererSelector rays(scene, RendererKind::rays, none);
+  EXPECT_EQ(rays.render({}, squareCamera(20)).ids.size(), 400u);
+  EXPECT_THROW(rays.render({}, squareCamera(20), {}, RendererKind::gl), RenderError);
+  EXPECT_EQ(rays.render({}, squareCamera(20)).ids.size(), 400u);
+}
+
+TEST(RendererSelector, RaysAreRefusedWhereAGpuIsRequired) {
+  const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
+  EXPECT_THROW(RendererSelector(scene, RendererKind::rays, {"", true}), RenderError);
+}
+
+}  // namespace
+}  // namespace enfilade::render
