@@ -1,5 +1,4 @@
 // The hall: two storeys high, with a gallery around it on columns and a skylight above.
-#include <algorithm>
 
 #include "assets/parts.hpp"
 

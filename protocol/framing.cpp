@@ -26,6 +26,11 @@ void appendLittleEndian(std::vector<std::uint8_t>& bytes, std::uint32_t value) {
   }
 }
 
+void appendVarint(std::vector<std::uint8_t>& bytes, std::uint64_t value) {
+  for (; value >= 0x80; value >>= 7) bytes.push_back(static_cast<std::uint8_t>(value | 0x80));
+  bytes.push_back(static_cast<std::uint8_t>(value));
+}
+
 /// Formats bytes as hexadecimal digits and, if all are printable, also as text.
 std::string formatBytes(std::span<const std::uint8_t> bytes) {
   static constexpr char digits[] = "0123456789abcdef";
@@ -168,6 +173,28 @@ std::vector<std::uint8_t> encodeHead(const google::protobuf::MessageLite& header
   appendLittleEndian(bytes, static_cast<std::uint32_t>(headerLength));
   bytes.resize(2 * kLengthBytes + headerLength);
   header.SerializeWithCachedSizesToArray(bytes.data() + 2 * kLengthBytes);
+  return bytes;
+}
+
+std::vector<std::uint8_t> encodeSplicedHead(std::uint32_t field, std::string_view first,
+                                            std::size_t secondLength) {
+  constexpr std::uint32_t kLengthDelimited = 2;   // protobuf's wire type of messages
+  constexpr std::size_t kMaxFieldHeadBytes = 20;  // tag and length
+  std::vector<std::uint8_t> fieldHead;
+  fieldHead.reserve(kMaxFieldHeadBytes);
+  appendVarint(fieldHead, field << 3 | kLengthDelimited);
+  appendVarint(fieldHead, first.size() + secondLength);
+  const std::size_t headerLength = fieldHead.size() + first.size() + secondLength;
+  if (headerLength > std::numeric_limits<std::int32_t>::max()) {
+    throw std::length_error("a message of " + std::to_string(headerLength) +
+                            " bytes exceeds the limit of protobuf");
+  }
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(2 * kLengthBytes + fieldHead.size() + first.size());
+  appendLittleEndian(bytes, static_cast<std::uint32_t>(kLengthBytes + headerLength));
+  appendLittleEndian(bytes, static_cast<std::uint32_t>(headerLength));
+  bytes.insert(bytes.end(), fieldHead.begin(), fieldHead.end());
+  bytes.insert(bytes.end(), first.begin(), first.end());
   return bytes;
 }
 

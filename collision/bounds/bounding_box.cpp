@@ -1,45 +1,30 @@
-// Bounding cube and tight box from the last tick's extremal vertices (Lin 1993, section 5.2.1).
+// Hill climbing (Lin 1993, section 5.2.1) handles one side of one axis at a time. It starts at the
+// last tick's vertex and moves to the most extreme neighbour while that is more extreme. A test is
+// one dot product with a row of the rotation matrix; the neighbours of a vertex lie together in
+// memory, two to a SIMD register. Lin stops there. In rounded arithmetic that is not enough: along
+// a face that is nearly perpendicular to the axis, every step may be below the rounding error, and
+// the climb may stop far from the extremal vertex. findHigherVertex() therefore also searches the
+// neighbours of all vertices that rounding cannot distinguish from the highest one (the plateau).
 //
-// tightAabb() handles one side of one axis at a time. It starts at the last tick's vertex and moves
-// to a more extreme neighbour while there is one. Each test is one dot product with a row of the
-// rotation matrix. Lin stops there. In rounded arithmetic that is not enough: along a face that is
-// nearly perpendicular to the axis, every step may be below the rounding error, and the climb may
-// stop far from the extremal vertex. findHigherVertex() therefore also searches the neighbours of
-// all vertices that rounding cannot distinguish from the highest one (the plateau).
+// Both tight methods return the maximum of the same rounded projections. Let e = 2^-53 and r the
+// radius. A dot product of a computed row errs by at most 3.1e r, and a vertex may have been moved
+// by 2e r since the hull was built. Let v be the last vertex of a climb and t the extremal one of
+// the hull as built. Along some path of edges from v to t the exact projections rise, so every
+// vertex of the path has a computed projection of at least that of v minus 10.2e r. kPlateau = 16e
+// exceeds that: the search of the plateau meets every vertex that may be the maximum.
 //
-// tightAabbVoronoi() is Lin's other method. It places a plane perpendicular to the axis outside the
-// body and takes the plane's point nearest to the last tick's vertex. It tests that point against
-// the bounding planes of the vertex' Voronoi region. The vertex always lies in the region of the
-// plane, so the other half of the vertex-face test (Lin 1993, chapter 3) is omitted. It ends with
-// the same plateau search.
-//
-// Choice of the box. Instructions per box, bodies of 8 / 20 / 60 vertices that rotate by 2 degrees
-// per tick, measured with callgrind:
-//   cube 136   climbing 1663 / 1814 / 1900   Voronoi 2099 / 2364 / 2489   all 1648 / 3592 / 10072
-// Hill climbing is therefore the method of the tight box. A larger box causes more narrow-phase
-// queries, each about 2000 instructions for a pair that is clear (computeSeparationWithin(), warm).
-// Overlapping boxes in a furnished storey, cube and tight box, by half extents in metres, 20
-// vertices:
-//   0.25 round 0.53 0.46    0.5 round 1.98 1.60    0.2 x 0.1 x 0.1  0.38 0.20
-//   0.5 x 0.25 x 0.25  1.88 0.76     1 x 0.25 x 0.25  7.68 1.41     2 x 0.5 x 0.5  60.8 9.5
-// chooseAabbMethod() estimates this difference from the radius, the mean width, and the density and
-// size of the objects. It takes the tight box if that saves more than it costs. Cubes win except
-// for oblong bodies (Cohen et al. 1995, section 4) and for large bodies among many objects.
-//
-// Rounding. Let e = 2^-53 and r the maximum norm of a vertex. The matrix comes from a quaternion
-// whose squared norm is within 16e of 1. An entry has an error of at most 5e on the diagonal and 2e
-// elsewhere, so a row has less than 6e. The normalised rotation is within 39e of it. The dot
-// product of a computed row adds at most 3.1e r. The sum is less than 49e r, and kRotationError =
-// 64e covers the rounding of r. Adding the translation and the bound itself costs 2e of the sum;
-// kSumError = 4e. The comparison of two vertices uses one computed matrix, which is an exact linear
-// map: the order of two dot products is certain if they differ by more than 6.2e r.
-
+// Rounding of a box. The matrix comes from a quaternion whose squared norm is within 16e of 1. An
+// entry has an error of at most 5e on the diagonal and 2e elsewhere, so a row has less than 6e. The
+// normalised rotation is within 39e of it. With the dot product the sum is less than 49e r, and
+// kRotationError = 64e covers the rounding of r. Adding the translation and the margin costs 2e of
+// the sums, which are below the sum of their terms; kSumError = 4e.
 #include "collision/bounds/bounding_box.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "collision/assert.hpp"
+#include "collision/double2.hpp"
 #include "collision/floating_point.hpp"
 
 namespace enfilade::collision {
@@ -47,123 +32,174 @@ namespace {
 
 constexpr double kRotationError = 64 * kRoundoff;
 constexpr double kSumError = 4 * kRoundoff;
-constexpr double kDotError = 8 * kRoundoff;
+constexpr double kPlateau = 16 * kRoundoff;
 constexpr double kUnderflow = 0x1p-1000;  // above the loss of a few products to underflow
 
-// Instructions; measurements at the head of this file.
-constexpr double kCubeCost = 136;
-constexpr double kTightCost = 1800;
-constexpr double kPairCost = 2000;
+// Nanoseconds, measured by `./dev bench boxes` (tests/benchmarks/report/boxes.md). A pair is a
+// warm narrow-phase query of two bodies that are clear.
+constexpr double kCubeCost = 6, kScanCost = 9, kScanCostPerVertex = 1.4, kClimbCost = 85;
+constexpr double kPairCost = 200;
 
-/// Projection of the vertices on one signed axis.
-struct Projection {
+constexpr std::size_t kBlock = 6;  // doubles a block: two vertices
+const Double2 kLowest = {-std::numeric_limits<double>::infinity(),
+                         -std::numeric_limits<double>::infinity()};
+
+double project(const Vec3& direction, const Vec3& v) {
+  return direction.x() * v.x() + direction.y() * v.y() + direction.z() * v.z();
+}
+
+/// Projections of the two vertices of a block; the same operations as in project().
+Double2 projectBlock(const Vec3& direction, const double* block) {
+  return direction.x() * loadDouble2(block) + direction.y() * loadDouble2(block + 2) +
+         direction.z() * loadDouble2(block + 4);
+}
+
+Double2 larger(Double2 a, Double2 b) {
+  return a > b ? a : b;
+}
+double larger(Double2 lanes) {
+  return std::max(lanes[0], lanes[1]);
+}
+
+void appendFans(const Hull& hull, SupportTable& table) {
+  for (std::uint32_t v = 0; v < hull.vertices.size(); ++v) {
+    table.fanOffsets.push_back(static_cast<std::uint32_t>(table.fans.size() / kBlock));
+    const auto neighbours = hull.neighboursOf(v);
+    for (std::size_t k = 0; k < neighbours.size(); k += 2) {
+      const std::uint32_t first = neighbours[k],
+                          second = neighbours[std::min(k + 1, neighbours.size() - 1)];
+      table.fanVertices.insert(table.fanVertices.end(), {first, second});
+      for (int axis = 0; axis < 3; ++axis)
+        table.fans.insert(table.fans.end(),
+                          {hull.vertices[first][axis], hull.vertices[second][axis]});
+    }
+  }
+  table.fanOffsets.push_back(static_cast<std::uint32_t>(table.fans.size() / kBlock));
+}
+
+/// A vertex, and its projection on a signed axis.
+struct Top {
+  std::uint32_t vertex;
+  double height;
+};
+
+/// Finds the extremal vertex along one signed axis.
+struct Climber {
   const Hull& hull;
+  const SupportTable& table;
   Vec3 direction;
-  double operator()(std::uint32_t vertex) const {
-    const Vec3& v = hull.vertices[vertex];
-    return direction.x() * v.x() + direction.y() * v.y() + direction.z() * v.z();
+  std::uint64_t& looked;
+
+  double heightOf(std::uint32_t vertex) const { return project(direction, hull.vertices[vertex]); }
+
+  Top findHighestVertex() {
+    looked += hull.vertices.size();
+    Top top{0, heightOf(0)};
+    for (std::uint32_t v = 1; v < hull.vertices.size(); ++v)
+      if (const double height = heightOf(v); height > top.height) top = {v, height};
+    return top;
+  }
+
+  /// Searches all vertices that are connected to `top` through vertices not provably lower.
+  /// Returns the first higher vertex, or `top` if no vertex is higher; it is then extremal.
+  Top findHigherVertex(const Top& top, double slack) {
+    constexpr std::size_t kMaxPlateau = 64;  // plateau size above which a scan is as good
+    std::array<std::uint32_t, kMaxPlateau> plateau;
+    std::size_t size = 0;
+    plateau[size++] = top.vertex;
+    for (std::size_t k = 0; k < size; ++k) {
+      const auto neighbours = hull.neighboursOf(plateau[k]);
+      looked += neighbours.size();
+      for (const std::uint32_t next : neighbours) {
+        const double height = heightOf(next);
+        if (height < top.height - slack) continue;
+        if (height > top.height) return {next, height};
+        if (std::find(plateau.begin(), plateau.begin() + size, next) != plateau.begin() + size)
+          continue;
+        if (size == kMaxPlateau) return findHighestVertex();
+        plateau[size++] = next;
+      }
+    }
+    return top;
+  }
+
+  /// The highest neighbour of `vertex`; a height of minus infinity if it has none.
+  Top findHighestNeighbour(std::uint32_t vertex) {
+    const std::uint32_t from = table.fanOffsets[vertex], to = table.fanOffsets[vertex + 1];
+    looked += 2 * (to - from);
+    Double2 highest = kLowest;
+    for (std::uint32_t k = from; k < to; ++k)
+      highest = larger(highest, projectBlock(direction, &table.fans[kBlock * k]));
+    return {from, larger(highest)};
+  }
+
+  /// Index of the first neighbour of this height in the blocks from `block` on.
+  std::uint32_t findNeighbour(std::uint32_t block, double height) const {
+    for (;; ++block) {
+      const Double2 heights = projectBlock(direction, &table.fans[kBlock * block]);
+      if (heights[0] == height) return table.fanVertices[2 * block];
+      if (heights[1] == height) return table.fanVertices[2 * block + 1];
+    }
+  }
+
+  /// Height of the extremal vertex; `start` becomes that vertex.
+  double climb(std::uint32_t& start) {
+    const double slack = kPlateau * hull.radius + kUnderflow;
+    Top top{start < hull.vertices.size() ? start : 0, 0};
+    top.height = heightOf(top.vertex);
+    for (;;) {  // heights rise strictly: at most one visit per vertex
+      const Top next = findHighestNeighbour(top.vertex);
+      if (next.height > top.height) {
+        top = {findNeighbour(next.vertex, next.height), next.height};
+        continue;
+      }
+      if (next.height < top.height - slack) break;
+      const Top higher = findHigherVertex(top, slack);
+      if (!(higher.height > top.height)) break;
+      top = higher;
+    }
+    start = top.vertex;
+    return top.height;
   }
 };
 
-/// projection + translation + clearance, increased by the bound of its rounding error.
-double roundOutward(double projection, double translation, double radius, double clearance) {
-  const double sum = projection + translation;
-  const double lost =
-      kRotationError * radius + kSumError * (std::abs(sum) + clearance) + kUnderflow;
-  return sum + (lost + clearance);
-}
-
-std::uint32_t findExtremalBruteForce(const Projection& projection) {
-  std::uint32_t highest = 0;
-  for (std::uint32_t v = 1; v < projection.hull.vertices.size(); ++v) {
-    if (projection(v) > projection(highest)) highest = v;
-  }
-  return highest;
-}
-
-/// Searches all vertices connected to `top` through vertices that are not provably lower; usually
-/// these are its neighbours. Returns the first higher vertex, or `top` if no vertex is higher.
-/// `top` is then extremal within the error of a dot product, because projections rise along some
-/// path of edges from `top` to the true extremal vertex.
-std::uint32_t findHigherVertex(const Projection& projection, std::uint32_t top, double slack) {
-  constexpr std::size_t kMaxPlateau = 64;  // plateau size above which brute force is as good
-  ENFILADE_ASSERT(top < projection.hull.vertices.size());
-  std::array<std::uint32_t, kMaxPlateau> plateau;
-  std::size_t size = 0;
-  plateau[size++] = top;
-  const double best = projection(top);
-  for (std::size_t k = 0; k < size; ++k) {
-    for (const std::uint32_t next : projection.hull.neighboursOf(plateau[k])) {
-      const double candidate = projection(next);
-      if (candidate < best - slack) continue;
-      if (candidate > best) return next;
-      if (std::find(plateau.begin(), plateau.begin() + size, next) != plateau.begin() + size) {
-        continue;
-      }
-      if (size == kMaxPlateau) return findExtremalBruteForce(projection);
-      plateau[size++] = next;
-    }
-  }
-  return top;
-}
-
-std::uint32_t hillClimb(const Projection& projection, std::uint32_t start) {
-  const double slack = kDotError * projection.hull.radius + kUnderflow;
-  std::uint32_t vertex = start < projection.hull.vertices.size() ? start : 0;
-  for (;;) {  // projections rise strictly: at most one visit per vertex
-    const std::uint32_t higher = findHigherVertex(projection, vertex, slack);
-    if (!(projection(higher) > projection(vertex))) return vertex;
-    vertex = higher;
-  }
-}
-
-/// Walks from vertex to vertex towards a plane perpendicular to `direction`. Continues while the
-/// plane's point nearest to the vertex violates a bounding plane of the vertex' Voronoi region (one
-/// per edge). The plane may lie anywhere outside the body; here at twice its radius. Rounding can
-/// cause a cycle, so the number of vertices limits the steps.
-std::uint32_t walkVoronoiRegions(const Hull& hull, const Vec3& direction, std::uint32_t vertex) {
-  for (std::size_t steps = 0; steps < hull.vertices.size(); ++steps) {
-    const Vec3& from = hull.vertices[vertex];
-    const Vec3 toNearest = (2 * hull.radius - direction.dot(from)) * direction;
-    const auto neighbours = hull.neighboursOf(vertex);
-    const auto violated =
-        std::find_if(neighbours.begin(), neighbours.end(), [&](std::uint32_t neighbour) {
-          return toNearest.dot(hull.vertices[neighbour] - from) > 0;
-        });
-    if (violated == neighbours.end()) break;
-    vertex = *violated;
-  }
-  return vertex;
-}
-
-/// Voronoi walk, then the same plateau search as in hillClimb().
-std::uint32_t findExtremalVoronoi(const Projection& projection, std::uint32_t start) {
-  const std::uint32_t vertex = walkVoronoiRegions(
-      projection.hull, projection.direction, start < projection.hull.vertices.size() ? start : 0);
-  const double slack = kDotError * projection.hull.radius + kUnderflow;
-  const std::uint32_t higher = findHigherVertex(projection, vertex, slack);
-  return higher == vertex ? vertex : hillClimb(projection, higher);
-}
-
-template <typename FindHighest>
-Aabb computeTightAabb(const Hull& hull, const Pose& worldFromBody, double clearance,
-                      FindHighest&& find) {
-  const Mat3 rotation = worldFromBody.rotation.toRotationMatrix();
-  Aabb box;
+Aabb climbSides(const Hull& hull, const SupportTable& table, const Mat3& rotation,
+                ExtremalVertices& last, std::uint64_t& looked) {
+  Aabb extents;
   for (int axis = 0; axis < 3; ++axis) {
     const Vec3 row = rotation.row(axis).transpose();
-    const double translation = worldFromBody.translation[axis];
-    for (const int upper : {0, 1}) {
-      const Projection projection{hull, upper == 1 ? row : Vec3(-row)};
-      const double extent = projection(find(projection, 2 * axis + upper));
-      if (upper == 1) {
-        box.max[axis] = roundOutward(extent, translation, hull.radius, clearance);
-      } else {
-        box.min[axis] = -roundOutward(extent, -translation, hull.radius, clearance);
-      }
-    }
+    const auto side = static_cast<std::size_t>(2 * axis);
+    extents.min[axis] = -Climber{hull, table, -row, looked}.climb(last.vertex[side]);
+    extents.max[axis] = Climber{hull, table, row, looked}.climb(last.vertex[side + 1]);
   }
-  return box;
+  return extents;
+}
+
+/// Rows 0 and 1 of the rotation side by side, row 2 alone. The same sums as in project(), in the
+/// same order.
+Aabb scanVertices(const Hull& hull, const Mat3& rotation) {
+  const Double2 column0 = {rotation(0, 0), rotation(1, 0)},
+                column1 = {rotation(0, 1), rotation(1, 1)},
+                column2 = {rotation(0, 2), rotation(1, 2)};
+  const Vec3 row2 = rotation.row(2).transpose();
+  Double2 highest = kLowest, lowest = -kLowest;
+  double highest2 = highest[0], lowest2 = lowest[0];
+  for (const Vec3& v : hull.vertices) {
+    const Double2 heights = column0 * v.x() + column1 * v.y() + column2 * v.z();
+    const double height2 = project(row2, v);
+    highest = larger(highest, heights);
+    lowest = lowest < heights ? lowest : heights;
+    highest2 = std::max(highest2, height2);
+    lowest2 = std::min(lowest2, height2);
+  }
+  return {Vec3(lowest[0], lowest[1], lowest2), Vec3(highest[0], highest[1], highest2)};
+}
+
+/// `extents` at `translation`, inflated by the bound of its rounding error and by `clearance`.
+Aabb placeExtents(const Aabb& extents, const Vec3& translation, double radius, double clearance) {
+  const double size = 2 * radius + translation.cwiseAbs().maxCoeff() + clearance;
+  const double margin = kRotationError * radius + kSumError * size + kUnderflow + clearance;
+  return inflated({extents.min + translation, extents.max + translation}, margin);
 }
 
 /// Mean width of the hull over 13 directions: axes, face diagonals and space diagonals of a cube.
@@ -172,59 +208,69 @@ double computeMeanWidth(const Hull& hull) {
   int directions = 0;
   for (int code = 14; code < 27; ++code) {  // the half of {-1, 0, 1}^3 after 0 0 0
     const Vec3 direction(code / 9 - 1, code / 3 % 3 - 1, code % 3 - 1);
-    const Projection up{hull, direction}, down{hull, -direction};
-    sum += (up(findExtremalBruteForce(up)) + down(findExtremalBruteForce(down))) / direction.norm();
+    double highest = -std::numeric_limits<double>::infinity(), lowest = -highest;
+    for (const Vec3& v : hull.vertices) {
+      const double height = project(direction, v);
+      highest = std::max(highest, height);
+      lowest = std::min(lowest, height);
+    }
+    sum += (highest - lowest) / direction.norm();
     ++directions;
   }
   return sum / directions;
 }
 
+/// Bodies of its own kind that overlap the cube of a body and not its tight box, if these bodies
+/// lie side by side: an upper bound for what the cube costs.
+double estimateFalsePairs(const Hull& hull) {
+  const double width = computeMeanWidth(hull);
+  if (!(width > 0)) return 0;
+  const double cube = 2 * hull.radius / width + 1, tight = 2;  // of two boxes together, in widths
+  return cube * cube * cube - tight * tight * tight;
+}
+
 }  // namespace
 
-Aabb boundingSphereCube(const Hull& hull, const Pose& worldFromBody, double clearance) {
-  Aabb box;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double at = worldFromBody.translation[axis];
-    box.max[axis] = roundOutward(hull.radius, at, hull.radius, clearance);
-    box.min[axis] = -roundOutward(hull.radius, -at, hull.radius, clearance);
+SupportTable buildSupportTable(const Hull& hull, AabbMethod method) {
+  ENFILADE_ASSERT(!hull.vertices.empty());
+  SupportTable table;
+  table.method = method;
+  if (method == AabbMethod::hillClimb) appendFans(hull, table);
+  return table;
+}
+
+SupportTable buildSupportTable(const Hull& hull) {
+  return buildSupportTable(hull, chooseAabbMethod(hull));
+}
+
+Aabb computeAabb(const Hull& hull, const SupportTable& table, const Mat3& rotation,
+                 const Vec3& translation, ExtremalVertices& last, std::uint64_t& looked,
+                 double clearance) {
+  switch (table.method) {
+    case AabbMethod::sphereCube: {
+      const Vec3 extent = Vec3::Constant(hull.radius);
+      return placeExtents({-extent, extent}, translation, hull.radius, clearance);
+    }
+    case AabbMethod::hillClimb:
+      return placeExtents(climbSides(hull, table, rotation, last, looked), translation, hull.radius,
+                          clearance);
+    case AabbMethod::vertexScan:
+      break;
   }
-  return box;
+  looked += hull.vertices.size();
+  return computeTightAabb(hull, rotation, translation, clearance);
 }
 
-Aabb tightAabb(const Hull& hull, const Pose& worldFromBody, ExtremalVertices& last,
-               double clearance) {
-  return computeTightAabb(hull, worldFromBody, clearance,
-                          [&last](const Projection& projection, int side) {
-                            std::uint32_t& vertex = last.vertex[static_cast<std::size_t>(side)];
-                            vertex = hillClimb(projection, vertex);
-                            return vertex;
-                          });
-}
-
-Aabb tightAabbVoronoi(const Hull& hull, const Pose& worldFromBody, ExtremalVertices& last,
+Aabb computeTightAabb(const Hull& hull, const Mat3& rotation, const Vec3& translation,
                       double clearance) {
-  return computeTightAabb(hull, worldFromBody, clearance,
-                          [&last](const Projection& projection, int side) {
-                            std::uint32_t& vertex = last.vertex[static_cast<std::size_t>(side)];
-                            vertex = findExtremalVoronoi(projection, vertex);
-                            return vertex;
-                          });
+  return placeExtents(scanVertices(hull, rotation), translation, hull.radius, clearance);
 }
 
-Aabb tightAabbBruteForce(const Hull& hull, const Pose& worldFromBody, double clearance) {
-  return computeTightAabb(hull, worldFromBody, clearance, [](const Projection& projection, int) {
-    return findExtremalBruteForce(projection);
-  });
-}
-
-AabbMethod chooseAabbMethod(const Hull& hull, const SceneDensity& density) {
-  const auto countOverlaps = [&](double edge) {
-    const double combinedEdge = edge + density.meanObjectSize;
-    return density.objectsPerCubicMetre * combinedEdge * combinedEdge * combinedEdge;
-  };
-  const double falsePairs = countOverlaps(2 * hull.radius) - countOverlaps(computeMeanWidth(hull));
-  return falsePairs * kPairCost > kTightCost - kCubeCost ? AabbMethod::tightAabb
-                                                         : AabbMethod::boundingSphereCube;
+AabbMethod chooseAabbMethod(const Hull& hull) {
+  const double cube = kCubeCost + kPairCost * estimateFalsePairs(hull);
+  const double scan = kScanCost + kScanCostPerVertex * static_cast<double>(hull.vertices.size());
+  if (cube < std::min(scan, kClimbCost)) return AabbMethod::sphereCube;
+  return scan <= kClimbCost ? AabbMethod::vertexScan : AabbMethod::hillClimb;
 }
 
 }  // namespace enfilade::collision

@@ -1,60 +1,62 @@
-// Bounding boxes of moving convex bodies (Cohen et al. 1995, section 4): the fixed-size cube, two
-// algorithms for the tight box that start from the last tick's extremal vertices, and the rule that
-// chooses between cube and tight box.
+// Bounding boxes of moving convex bodies (Lin 1993, section 5.2.1; Cohen et al. 1995, section 4):
+// the cube of the bounding sphere, and the tight box by hill climbing from the last tick's extremal
+// vertices or by a scan of all vertices.
 #pragma once
 
 #include <array>
+#include <vector>
 
 #include "collision/shapes/hull.hpp"
 #include "collision/types.hpp"
 
 namespace enfilade::collision {
 
-/// Extremal vertices of the last tick: hull vertex indices for -x, +x, -y, +y, -z, +z.
-/// Any indices are valid starting points of the hill climb; good ones make an update O(1).
+enum class AabbMethod : std::uint8_t {
+  sphereCube,  ///< cube of the bounding sphere about the body's origin
+  vertexScan,  ///< tight: looks at all vertices
+  hillClimb    ///< tight: looks at the neighbours of last tick's extremal vertices
+};
+
+/// The method that is used for a hull and, for hill climbing, the coordinates of the neighbours of
+/// each vertex, which lie together.
+struct SupportTable {
+  AabbMethod method = AabbMethod::vertexScan;
+  /// Neighbours of vertex v: blocks fanOffsets[v] to fanOffsets[v + 1] of `fans`, each two
+  /// neighbours as x x y y z z, with their indices in `fanVertices`. The last block of a vertex may
+  /// repeat a neighbour.
+  std::vector<std::uint32_t> fanOffsets, fanVertices;
+  std::vector<double> fans;
+};
+
+/// `hull` as buildHull() makes it. Each vertex may since have been moved by up to 2 units of
+/// rounding of the radius.
+SupportTable buildSupportTable(const Hull& hull, AabbMethod method);
+/// With the method that chooseAabbMethod() returns.
+SupportTable buildSupportTable(const Hull& hull);
+
+/// Extremal vertices of the last tick: vertex indices for -x, +x, -y, +y, -z, +z. They influence
+/// cost only: every box is the same to the last bit whatever these indices are.
 struct ExtremalVertices {
   std::array<std::uint32_t, 6> vertex{};
 };
 
-// All boxes below contain the exact box of the exact pose, inflated by `clearance` (metres, >= 0,
-// finite). The exact pose rotates by the quaternion as if it were normalised exactly. The boxes are
-// rounded outwards by a proved bound. Poses must be finite, with |rotation| = 1 up to 16 units of
-// rounding.
+// The boxes below contain the exact box of all vertices at rotation * v + translation, inflated by
+// `clearance` (metres, >= 0, finite), of this matrix and of the unit quaternion that it was
+// computed from. `rotation`: from a quaternion with |q| = 1 up to 16 units of rounding; all values
+// finite.
 
-/// Cube around the bounding sphere about the body's origin. Its size does not depend on the pose.
-Aabb boundingSphereCube(const Hull& hull, const Pose& worldFromBody, double clearance = 0);
+/// Box by the method of `table`, which is that of `hull`. Adds the vertices that it looks at to
+/// `looked`.
+Aabb computeAabb(const Hull& hull, const SupportTable& table, const Mat3& rotation,
+                 const Vec3& translation, ExtremalVertices& last, std::uint64_t& looked,
+                 double clearance = 0);
 
-/// Tight box by hill climbing from `last`: for each side, moves to a neighbour vertex while it is
-/// more extreme. Replaces `last` by the extremal vertices of this tick.
-Aabb tightAabb(const Hull& hull, const Pose& worldFromBody, ExtremalVertices& last,
-               double clearance = 0);
-
-/// Tight box by Voronoi regions (Cohen et al. 1995): for each side, tests whether the nearest point
-/// of a distant plane lies in the Voronoi region of the last tick's vertex.
-Aabb tightAabbVoronoi(const Hull& hull, const Pose& worldFromBody, ExtremalVertices& last,
+/// Tight box by a scan of all vertices: the same as by hill climbing, to the last bit.
+Aabb computeTightAabb(const Hull& hull, const Mat3& rotation, const Vec3& translation,
                       double clearance = 0);
 
-/// Reference implementation of tightAabb(): tests every vertex for every axis.
-Aabb tightAabbBruteForce(const Hull& hull, const Pose& worldFromBody, double clearance = 0);
-
-enum class AabbMethod : std::uint8_t { boundingSphereCube, tightAabb };
-
-/// Rough density of the scene. It influences cost only, never a result.
-struct SceneDensity {
-  double objectsPerCubicMetre = 0.75;  ///< a furnished storey: 68 in a room of 6 m x 5 m x 3 m
-  double meanObjectSize = 0.45;        ///< mean edge of the objects' boxes, metres
-};
-
-/// Chooses the box that costs less per tick, including the extra narrow-phase queries of a larger
-/// box: the cube for small or round bodies, the tight box for oblong or off-centre bodies.
-AabbMethod chooseAabbMethod(const Hull& hull, const SceneDensity& density = {});
-
-/// Computes the box by `method`, which is chosen once per body.
-inline Aabb computeAabbWith(AabbMethod method, const Hull& hull, const Pose& worldFromBody,
-                            ExtremalVertices& last, double clearance = 0) {
-  return method == AabbMethod::boundingSphereCube
-             ? boundingSphereCube(hull, worldFromBody, clearance)
-             : tightAabb(hull, worldFromBody, last, clearance);
-}
+/// The method that costs least per tick for a body that turns by a few degrees, including the
+/// narrow-phase queries that a larger box causes among bodies of its own size.
+AabbMethod chooseAabbMethod(const Hull& hull);
 
 }  // namespace enfilade::collision

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <array>
-#include <cstring>
 
+#include "collision/double2.hpp"
 #include "collision/types.hpp"
 
 namespace enfilade::collision {
@@ -21,26 +21,6 @@ inline SignedBounds toMinEndpoints(const Aabb& box) {
 }
 inline Aabb aabbFromMinEndpoints(const SignedBounds& o) {
   return {Vec3(o[3], o[4], o[5]), Vec3(-o[0], -o[1], -o[2])};
-}
-
-// Two signed axes at a time, as gcc and clang vector types, which exist on every processor. A
-// comparison gives -1 for true and 0 for false.
-using Double2 = double __attribute__((vector_size(16)));
-using Mask2 = long long __attribute__((vector_size(16)));
-
-inline Double2 loadDouble2(const double* from) {
-  Double2 lanes;
-  std::memcpy(&lanes, from, sizeof(lanes));
-  return lanes;
-}
-
-/// One bit per lane, for the mask of a single comparison: gcc 12 splits combined masks into lanes.
-inline unsigned toBits(Mask2 mask) {
-#ifdef __SSE2__
-  return static_cast<unsigned>(__builtin_ia32_movmskpd(reinterpret_cast<Double2>(mask)));
-#else
-  return static_cast<unsigned>((mask[0] & 1) | (mask[1] & 2));
-#endif
 }
 
 /// Bit k: a[k] > b[k].

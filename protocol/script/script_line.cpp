@@ -4,11 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <span>
-#include <utility>
 
 #include "protocol/json_depth.hpp"
 

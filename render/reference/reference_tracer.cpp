@@ -1,7 +1,6 @@
 #include "render/reference/reference_tracer.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <mutex>

@@ -120,7 +120,7 @@ class MessageListener {
 [[noreturn]] void throwFailed(const ImportRequest& request, const std::string& stage,
                               const ImportExit& outcome) {
   if (outcome.reason == ImportExit::Reason::timeLimit) {
-    throw ImportError(request.file + ": not read within " + formatShortest(request.timeLimit) +
+    throw ImportError(request.file + ": not read within " + formatShortest(request.options.timeLimit) +
                       " s (stage '" + stage +
                       "'); simplify or split the file, re-export it as glTF, or allow more time");
   }
@@ -142,12 +142,7 @@ Model importModel(const fs::path& file, const ImportOptions& options,
   validateReadable(file);
   ImportRequest request;
   request.file = file.string();
-  request.metresPerUnit = options.metresPerUnit;
-  request.up = options.up;
-  request.offset = options.offset;
-  request.ifcReader = options.ifcReader;
-  request.memoryLimit = options.memoryLimit;
-  request.timeLimit = options.timeLimit;
+  request.options = options;
   MessageListener listener(file, progress);
   const ImportExit outcome = runImportProcess(
       request,

@@ -54,11 +54,11 @@ void limitThisProcess(const ImportRequest& request, pid_t parent) {
   const bool node = request.task == ImportTask::webIfc;
   rlimit memory{};
   getrlimit(RLIMIT_AS, &memory);
-  const bool limited = request.memoryLimit > 0 && !kSanitized;
-  memory.rlim_cur = limited && !node ? request.memoryLimit : memory.rlim_max;
+  const bool limited = request.options.memoryLimit > 0 && !kSanitized;
+  memory.rlim_cur = limited && !node ? request.options.memoryLimit : memory.rlim_max;
   setrlimit(RLIMIT_AS, &memory);
-  const rlimit data{request.memoryLimit, request.memoryLimit};
-  if (node && request.memoryLimit > 0) setrlimit(RLIMIT_DATA, &data);
+  const rlimit data{request.options.memoryLimit, request.options.memoryLimit};
+  if (node && request.options.memoryLimit > 0) setrlimit(RLIMIT_DATA, &data);
 }
 
 /// Prefix in ENFILADE_IMPORT_FAULT that selects this task, with the colon.
@@ -137,9 +137,7 @@ Model importByAssimp(const ImportRequest& request) {
   ConvertInput input;
   input.file = request.file;
   input.format = detectModelFormat(request.file).value();  // checked by the parent
-  input.metresPerUnit = request.metresPerUnit;
-  input.up = request.up;
-  input.offset = request.offset;
+  input.options = request.options;
   AssimpInput file{request.file, "", request.task == ImportTask::assimp};
   if (file.isIfc) {
     file.text = readDescriptor(kIfcFile);
@@ -149,7 +147,7 @@ Model importByAssimp(const ImportRequest& request) {
     if (input.format == ModelFormat::collada)
       file.text = repairCollada(request.file, input.metadata);
     if (input.format == ModelFormat::obj) {
-      const double unit = request.metresPerUnit.value_or(input.metadata.metresPerUnit);
+      const double unit = request.options.metresPerUnit.value_or(input.metadata.metresPerUnit);
       RebasedText rebased = rebaseObj(request.file, kMaxPreciseDistance / unit);
       file.text = std::move(rebased.text);
       input.shift = rebased.shift;
@@ -183,7 +181,7 @@ void disableAslr(char** argv) {
 
 /// Replaces this process with Node.js. Returns only by an exception.
 void execNode(const ImportRequest& request) {
-  const std::size_t megabytes = std::max<std::size_t>(request.memoryLimit >> 21, 256);
+  const std::size_t megabytes = std::max<std::size_t>(request.options.memoryLimit >> 21, 256);
   const std::string heap = "--max-old-space-size=" + std::to_string(megabytes);
   const std::string first = std::to_string(request.firstProduct);
   unsetenv("NODE_OPTIONS");
@@ -225,7 +223,7 @@ std::optional<int> runImportWorker(int argc, char** argv) {
     code = 0;
   } catch (const std::bad_alloc&) {
     sendError(request->file + ": needs more than the " +
-              std::to_string(request->memoryLimit >> 20) +
+              std::to_string(request->options.memoryLimit >> 20) +
               " MiB of memory that an import may take; split the file or raise the limit");
   } catch (const std::exception& error) {
     // IFC readers omit the file's name; their parent adds it.

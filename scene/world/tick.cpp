@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <tuple>
+#include <utility>
 
 #include "scene/world/audit.hpp"
 #include "scene/world/avatars/avatar_motion.hpp"
@@ -93,6 +94,15 @@ void hashState(WorldData& world) {
   world.hash = hash.value();
 }
 
+void reportBoxWork(WorldData& world, TickReport& report) {
+  for (Body& body : world.bodies) {
+    report.verticesLookedAt += std::exchange(body.boxes.verticesLookedAt, 0);
+    report.partBoxesMade += std::exchange(body.boxes.partBoxesMade, 0);
+  }
+  for (Avatar& avatar : world.avatars)
+    report.verticesLookedAt += std::exchange(avatar.chain.verticesLookedAt, 0);
+}
+
 /// True if the avatar is falling, or driven by a client.
 bool isAvatarBusy(const Avatar& avatar) {
   return !avatar.driveVelocity.isZero(0) ||
@@ -168,6 +178,7 @@ TickReport runTick(WorldData& world) {
   report.narrowQueries = count.narrow;
   report.rationalQueries = count.rational;
   report.iterationLimitedCasts = count.bounded;
+  reportBoxWork(world, report);
   report.idle = isWorldIdle(world);
   return report;
 }

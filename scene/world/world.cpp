@@ -42,7 +42,7 @@ void makeBodies(WorldData& world) {
       if (isTrigger(body.spec->kind)) world.triggers.push_back(i);
       setBodyPose(body, body.shape->origin, collision::Quat::Identity());
     }
-    body.motionBounds = computeAabb(body);
+    body.motionBounds = body.boxes.whole;
     body.proxy = world.broadPhase.insert(body.motionBounds);
     if (body.proxy >= world.bodyIndexByProxy.size())
       world.bodyIndexByProxy.resize(body.proxy + 1, kNoBody);

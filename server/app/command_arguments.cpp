@@ -373,10 +373,10 @@ ModelOptions makeModelOptions(const ModelArguments& read) {
   ModelOptions options;
   options.file = read.file;
   options.cache = !read.noCache;
-  if (!read.unit.empty()) options.metresPerUnit = scene::parseMetresPerUnit(read.unit);
-  if (!read.up.empty()) options.up = read.up.front();
-  if (!read.offset.empty()) options.offset = {read.offset[0], read.offset[1], read.offset[2]};
-  options.ifcReader = scene::parseIfcReader(read.ifcReader).value_or(scene::IfcReader::automatic);
+  if (!read.unit.empty()) options.import.metresPerUnit = scene::parseMetresPerUnit(read.unit);
+  if (!read.up.empty()) options.import.up = read.up.front();
+  if (!read.offset.empty()) options.import.offset = {read.offset[0], read.offset[1], read.offset[2]};
+  options.import.ifcReader = scene::parseIfcReader(read.ifcReader).value_or(scene::IfcReader::automatic);
   options.doors = read.ifcDoors == "still" ? scene::IfcDoors::fixed : scene::IfcDoors::movable;
   return options;
 }

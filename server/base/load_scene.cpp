@@ -25,14 +25,9 @@ void logLoadedScene(const scene::Scene& scene, const std::string& name, const Lo
 
 LoadedScene loadSceneTimed(const ModelOptions& options) {
   const auto start = std::chrono::steady_clock::now();
-  scene::ImportOptions import;
-  import.metresPerUnit = options.metresPerUnit;
-  import.up = options.up;
-  import.offset = options.offset;
-  import.ifcReader = options.ifcReader;
   Progress bar;
   scene::LoadedModel model = scene::loadModel(
-      options.file, import, options.cache ? scene::modelCacheFromEnvironment() : std::nullopt,
+      options.file, options.import, options.cache ? scene::modelCacheFromEnvironment() : std::nullopt,
       [&](const std::string& stage, double fraction) { bar.show(fraction, stage); });
   bar.clear();
   for (const std::string& note : model.notes) spdlog::warn("cache: {}", note);

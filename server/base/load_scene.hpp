@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <optional>
 
 #include "scene/import/bodies/collect_bodies.hpp"
 #include "scene/import/import_model.hpp"
@@ -11,15 +10,11 @@
 
 namespace enfilade::server {
 
-/// Import options that override the model file; nullopt: the file's value.
+/// A model file and how to import it.
 struct ModelOptions {
   std::filesystem::path file;
-  std::optional<double> metresPerUnit;
-  std::optional<char> up;  ///< 'x', 'y' or 'z'
-  /// Metres, Y up, subtracted from the file's coordinates; nullopt: chosen by the importer.
-  std::optional<scene::Vec3> offset;
+  scene::ImportOptions import;
   bool cache = true;  ///< use a cached import
-  scene::IfcReader ifcReader = scene::IfcReader::automatic;
   scene::IfcDoors doors = scene::IfcDoors::movable;
 };
 

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "render/service/renderer_selector.hpp"

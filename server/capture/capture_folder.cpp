@@ -23,10 +23,6 @@ namespace fs = std::filesystem;
 /// Age of an abandoned part file. Younger ones may belong to a shard on another machine.
 constexpr std::chrono::seconds kStalePartFileAge{60};
 
-void writeText(const fs::path& file, const std::string& text) {
-  render::writeFileAtomically(file, text.data(), text.size());
-}
-
 std::optional<std::string> readText(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) return std::nullopt;
@@ -88,7 +84,7 @@ void claimFolder(const fs::path& folder, const PictureOptions& options,
     removeStalePartFiles(folder / channel);
   }
   removeStalePartFiles(folder);
-  if (!existing) writeText(folder / kManifestName, manifest);
+  if (!existing) render::writeFileAtomically(folder / kManifestName, manifest);
 }
 
 void releaseFolder(const fs::path& folder) {
@@ -100,15 +96,15 @@ void releaseFolder(const fs::path& folder) {
 
 void writeMetadataFiles(const fs::path& folder, const scene::Scene& scene, const CapturePlan& plan,
                         const PictureOptions& options) {
-  writeText(folder / "instances.json", makeInstancesJson(scene.model(), plan.avatars));
-  writeText(folder / "transforms.json", makeTransformsJson(plan.frames, options, scene.model()));
+  render::writeFileAtomically(folder / "instances.json", makeInstancesJson(scene.model(), plan.avatars));
+  render::writeFileAtomically(folder / "transforms.json", makeTransformsJson(plan.frames, options, scene.model()));
   if (options.layout != FolderLayout::tum) return;
   std::size_t channel = 0;
   if (options.channels.rgb)
-    writeText(folder / "rgb.txt", makeTumFileList(plan.frames, options, channel++, "color images"));
+    render::writeFileAtomically(folder / "rgb.txt", makeTumFileList(plan.frames, options, channel++, "color images"));
   if (options.channels.depth)
-    writeText(folder / "depth.txt", makeTumFileList(plan.frames, options, channel, "depth maps"));
-  writeText(folder / "groundtruth.txt", makeTumGroundTruth(plan.frames));
+    render::writeFileAtomically(folder / "depth.txt", makeTumFileList(plan.frames, options, channel, "depth maps"));
+  render::writeFileAtomically(folder / "groundtruth.txt", makeTumGroundTruth(plan.frames));
 }
 
 }  // namespace enfilade::server

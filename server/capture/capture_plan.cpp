@@ -1,6 +1,5 @@
 #include "server/capture/capture_plan.hpp"
 
-#include <array>
 #include <cmath>
 #include <fstream>
 #include <sstream>

@@ -1,7 +1,6 @@
 // The frames of a capture: their cameras, and the snapshots that they show.
 #pragma once
 
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>

@@ -15,7 +15,7 @@ constexpr const char* kReportFolder = "depth_report";
 
 void writeReport(const fs::path& file, const render::DepthReport& report) {
   const std::string text = render::formatReportJson(report);
-  render::writeFileAtomically(file, text.data(), text.size());
+  render::writeFileAtomically(file, text);
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "server/capture/metadata_files.hpp"
 
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 

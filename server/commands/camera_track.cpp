@@ -125,7 +125,7 @@ void writeCameras(const std::filesystem::path& file, const std::vector<CameraTra
   appendNumber(whole, 2);
   appendNumber(whole, static_cast<std::uint32_t>(chunks.size() + 12));
   whole += chunks;
-  render::writeFileAtomically(file, whole.data(), whole.size());
+  render::writeFileAtomically(file, whole);
 }
 
 }  // namespace enfilade::server

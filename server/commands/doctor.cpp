@@ -3,8 +3,6 @@
 #include <spdlog/fmt/fmt.h>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "render/gl/egl_context.hpp"

@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
-#include <cstdio>
 #include <map>
 #include <stdexcept>
 
@@ -36,11 +35,11 @@ constexpr std::uint64_t kTicksPerUpdate = 64;
 ModelOptions makeModelOptions(const ModelOptions& requested, const v1::RecordingStart& start) {
   const ModelOptions recorded = modelOptionsFromProto(start.choices());
   ModelOptions model = requested;
-  if (!model.metresPerUnit) model.metresPerUnit = recorded.metresPerUnit;
-  if (!model.up) model.up = recorded.up;
+  if (!model.import.metresPerUnit) model.import.metresPerUnit = recorded.import.metresPerUnit;
+  if (!model.import.up) model.import.up = recorded.import.up;
   // The automatic offset depends on all objects, so that positions of commands would shift.
-  if (!model.offset) model.offset = vectorFromProto(start.scene().offset());
-  if (model.ifcReader == scene::IfcReader::automatic) model.ifcReader = recorded.ifcReader;
+  if (!model.import.offset) model.import.offset = vectorFromProto(start.scene().offset());
+  if (model.import.ifcReader == scene::IfcReader::automatic) model.import.ifcReader = recorded.import.ifcReader;
   if (model.doors == scene::IfcDoors::movable) model.doors = recorded.doors;
   return model;
 }
@@ -175,10 +174,6 @@ std::shared_ptr<const scene::Scene> loadRecordedScene(const v1::RecordingStart& 
   }
 }
 
-void writeText(const std::filesystem::path& file, const std::string& text) {
-  render::writeFileAtomically(file, text.data(), text.size());
-}
-
 PlanRenderer makePlanRenderer(render::RendererSelector* renderer, const scene::World& world) {
   return [renderer, &world](const render::Camera& camera) -> std::optional<PlanPicture> {
     if (!renderer) return std::nullopt;
@@ -251,8 +246,8 @@ ExitCode resimulate(const ResimulateCommand& requested) {
         }
         const std::string text = formatDifferenceText(difference),
                           json = formatDifferenceJson(difference);
-        writeText(command.out / "diff.txt", text);
-        writeText(command.out / "diff.json", json + "\n");
+        render::writeFileAtomically(command.out / "diff.txt", text);
+        render::writeFileAtomically(command.out / "diff.json", json + "\n");
         writeToStdout(command.json ? json + "\n" : text,
                       "the changes are in " + (command.out / "diff.txt").string());
         return difference.worse > 0 ? ExitCode::violations : ExitCode::success;

@@ -1,7 +1,7 @@
 #include "server/hosting/tick_broadcast.hpp"
 
 #include "collision/assert.hpp"
-#include "protocol/spliced_message.hpp"
+#include "protocol/framing.hpp"
 
 namespace enfilade::server {
 namespace {

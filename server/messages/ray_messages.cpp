@@ -1,7 +1,6 @@
 #include "server/messages/ray_messages.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <set>

@@ -78,6 +78,8 @@ void TickStatistics::addTick(const scene::TickReport& report) {
   narrowQueries_ += report.narrowQueries;
   rationalQueries_ += report.rationalQueries;
   crushedBodies_ += report.crushedBodies;
+  verticesLookedAt_ += report.verticesLookedAt;
+  partBoxesMade_ += report.partBoxesMade;
   pairs_ = report.pairs;
   activeContacts_ = report.activeContacts;
   avatars_ = static_cast<std::uint32_t>(report.snapshot->avatars.size());
@@ -102,6 +104,8 @@ v1::Metrics TickStatistics::makeMetrics() const {
   metrics.set_rational_queries(rationalQueries_);
   metrics.set_worst_penetration(worstPenetration_);
   metrics.set_squeezed_bodies(crushedBodies_);
+  metrics.set_vertices_looked_at(verticesLookedAt_);
+  metrics.set_part_boxes_made(partBoxesMade_);
   metrics.set_avatars(avatars_);
   if (audit_.ticks > 0) fillAudit(*metrics.mutable_audit(), audit_, auditDurations_);
   return metrics;

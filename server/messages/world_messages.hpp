@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <variant>
 
 #include "protocol/enfilade.pb.h"
 #include "scene/world/world.hpp"

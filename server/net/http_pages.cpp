@@ -3,7 +3,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <optional>
 #include <sstream>
 
 #include "collision/assert.hpp"
@@ -211,6 +210,10 @@ std::string makeMetricsPage(std::span<const WorldMetrics> worlds) {
       [](const M& m) { return m.narrow_queries(); });
   add("rational_queries_total", "counter", "Pairs decided by exact arithmetic.",
       [](const M& m) { return m.rational_queries(); });
+  add("vertices_looked_at_total", "counter", "Vertices for the boxes of moving bodies.",
+      [](const M& m) { return m.vertices_looked_at(); });
+  add("part_boxes_made_total", "counter", "Boxes of parts of bodies with several parts.",
+      [](const M& m) { return m.part_boxes_made(); });
   add("frames_total", "counter", "Rendered frames.", [](const M& m) { return m.frames(); });
   add("dropped_total", "counter", "States and frames dropped for slow clients.",
       [](const M& m) { return m.dropped(); });

@@ -5,8 +5,6 @@
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <memory>
-#include <vector>
 
 #include "server/base/endpoint.hpp"
 #include "server/net/server_context.hpp"

@@ -239,21 +239,21 @@ std::optional<scene::WorldSettings> settingsFromProto(const v1::Lengths& message
 
 v1::ModelChoices toProto(const ModelOptions& model) {
   v1::ModelChoices message;
-  if (model.metresPerUnit) message.set_metres_per_unit(*model.metresPerUnit);
-  if (model.up) message.set_up(std::string(1, *model.up));
-  if (model.offset) *message.mutable_offset() = toProto(*model.offset);
+  if (model.import.metresPerUnit) message.set_metres_per_unit(*model.import.metresPerUnit);
+  if (model.import.up) message.set_up(std::string(1, *model.import.up));
+  if (model.import.offset) *message.mutable_offset() = toProto(*model.import.offset);
   for (const auto& [reader, name] : kIfcReaders)
-    if (reader == model.ifcReader) message.set_ifc_reader(name);
+    if (reader == model.import.ifcReader) message.set_ifc_reader(name);
   message.set_ifc_doors(model.doors == scene::IfcDoors::fixed ? "still" : "move");
   return message;
 }
 
 ModelOptions modelOptionsFromProto(const v1::ModelChoices& message) {
   ModelOptions model;
-  if (message.has_metres_per_unit()) model.metresPerUnit = message.metres_per_unit();
-  if (!message.up().empty()) model.up = message.up().front();
-  if (message.has_offset()) model.offset = vectorFromProto(message.offset());
-  model.ifcReader =
+  if (message.has_metres_per_unit()) model.import.metresPerUnit = message.metres_per_unit();
+  if (!message.up().empty()) model.import.up = message.up().front();
+  if (message.has_offset()) model.import.offset = vectorFromProto(message.offset());
+  model.import.ifcReader =
       scene::parseIfcReader(message.ifc_reader()).value_or(scene::IfcReader::automatic);
   model.doors = message.ifc_doors() == "still" ? scene::IfcDoors::fixed : scene::IfcDoors::movable;
   return model;

@@ -43,19 +43,11 @@ protocol::StepOutcome InProcessDriver::step() {
 }
 
 protocol::CapturedFrame InProcessDriver::capture(const v1::Notice& notice) {
-  protocol::CapturedFrame captured;
-  captured.name = notice.text();
-  captured.avatar = notice.avatar();
-  captured.tag = notice.tag();
-  try {
-    protocol::ReceivedFrame received = frame(protocol::makeCaptureRequest(notice, format_));
+  return protocol::captureFrame(notice, format_, [&](const v1::FrameRequest& request) {
+    protocol::ReceivedFrame received = frame(request);
     record(notice.avatar(), received);
-    captured.description = std::move(received.description);
-    captured.pixels = std::move(received.pixels);
-  } catch (const protocol::ProtocolError& problem) {
-    captured.error = problem.what();
-  }
-  return captured;
+    return received;
+  });
 }
 
 void InProcessDriver::record(const std::string& avatar, const protocol::ReceivedFrame& received) {

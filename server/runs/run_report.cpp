@@ -2,7 +2,6 @@
 
 #include <spdlog/spdlog.h>
 
-#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -48,10 +47,6 @@ const char* getOutcomeName(protocol::LineOutcome::Kind kind) {
       return "dropped";
   }
   return "unknown";
-}
-
-void writeText(const std::filesystem::path& file, const std::string& text) {
-  render::writeFileAtomically(file, text.data(), text.size());
 }
 
 render::Image toImage(const v1::Frame& description, const std::vector<std::uint8_t>& pixels) {
@@ -117,7 +112,7 @@ RunReport::RunReport(std::filesystem::path folder) : folder_(std::move(folder)) 
   try {
     std::filesystem::create_directories(folder_ / "frames");
     const std::filesystem::path probe = folder_ / ".writable";
-    writeText(probe, "");
+    render::writeFileAtomically(probe, "");
     std::filesystem::remove(probe);
   } catch (const std::exception& error) {
     throw ReportError("cannot write to " + folder_.string() + ": " + error.what() +
@@ -206,7 +201,7 @@ void RunReport::addFrame(const protocol::CapturedFrame& frame,
 
 void RunReport::writeContacts(const std::vector<v1::ContactEvent>& ended) {
   for (const v1::ContactEvent& event : ended) addContact(event);
-  writeText(folder_ / "contacts.jsonl", contactLines_);
+  render::writeFileAtomically(folder_ / "contacts.jsonl", contactLines_);
 }
 
 void RunReport::writePictures(const RunSummary& runSummary, const MapBackground& background) {
@@ -275,12 +270,14 @@ std::string RunReport::writeSummary(const RunSummary& runSummary,
                {"uncaptured", result.uncaptured},
                {"narrow_queries", metrics.narrow_queries()},
                {"rational_queries", metrics.rational_queries()},
+               {"vertices_looked_at", metrics.vertices_looked_at()},
+               {"part_boxes_made", metrics.part_boxes_made()},
                {"frames", frames},
                {"walks", walks},
                {"outcomes", outcomesToJson(result)}};
   if (metrics.has_audit()) summary["audit"] = toJson(metrics.audit());
   const auto replace = Json::error_handler_t::replace;
-  writeText(folder_ / "summary.json", summary.dump(2, ' ', false, replace) + "\n");
+  render::writeFileAtomically(folder_ / "summary.json", summary.dump(2, ' ', false, replace) + "\n");
   return summary.dump(-1, ' ', false, replace);
 }
 

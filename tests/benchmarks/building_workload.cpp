@@ -10,15 +10,15 @@ constexpr int kObjectsPerRoom = 68;
 constexpr double kRoomX = 6, kRoomZ = 5, kStorey = 3;
 constexpr double kSecondsPerTick = 1.0 / 60;
 
-Box boxAt(double x, double y, double z, double sx, double sy, double sz) {
+Aabb makeBox(double x, double y, double z, double sx, double sy, double sz) {
   return {Vec3(x, y, z), Vec3(x + sx, y + sy, z + sz)};
 }
 
-void furnishRoom(Random& random, const Vec3& at, std::vector<Box>& still) {
-  still.push_back(boxAt(at.x(), at.y() - 0.2, at.z(), kRoomX, 0.2, kRoomZ));
-  still.push_back(boxAt(at.x(), at.y(), at.z(), kRoomX, kStorey - 0.2, 0.15));
-  still.push_back(boxAt(at.x(), at.y(), at.z(), 0.15, kStorey - 0.2, 2));
-  still.push_back(boxAt(at.x(), at.y(), at.z() + 3, 0.15, kStorey - 0.2, 2));
+void furnishRoom(Random& random, const Vec3& at, std::vector<Aabb>& still) {
+  still.push_back(makeBox(at.x(), at.y() - 0.2, at.z(), kRoomX, 0.2, kRoomZ));
+  still.push_back(makeBox(at.x(), at.y(), at.z(), kRoomX, kStorey - 0.2, 0.15));
+  still.push_back(makeBox(at.x(), at.y(), at.z(), 0.15, kStorey - 0.2, 2));
+  still.push_back(makeBox(at.x(), at.y(), at.z() + 3, 0.15, kStorey - 0.2, 2));
   for (int k = 4; k < kObjectsPerRoom; ++k) {
     const bool large = k % 8 == 0;
     const double sx = uniform(random, 0.05, large ? 2.0 : 0.5);
@@ -27,7 +27,7 @@ void furnishRoom(Random& random, const Vec3& at, std::vector<Box>& still) {
     const double x = uniform(random, 0.2, kRoomX - sx);
     const double y = uniform(random, 0, k % 3 == 0 ? 2.0 : 0.9);
     const double z = uniform(random, 0.2, kRoomZ - sz);
-    still.push_back(boxAt(at.x() + x, at.y() + y, at.z() + z, sx, sy, sz));
+    still.push_back(makeBox(at.x() + x, at.y() + y, at.z() + z, sx, sy, sz));
   }
 }
 
@@ -68,7 +68,7 @@ std::vector<Body> makeBodies(Random& random, std::size_t count, const Building& 
   return bodies;
 }
 
-Box step(Body& body, const Vec3& extent) {
+Aabb step(Body& body, const Vec3& extent) {
   for (const int axis : {0, 2}) {
     if (body.centre[axis] < 0) body.velocity[axis] = std::abs(body.velocity[axis]);
     if (body.centre[axis] > extent[axis]) body.velocity[axis] = -std::abs(body.velocity[axis]);
@@ -86,7 +86,7 @@ BuildingMotion::BuildingMotion(const Building& building, std::size_t movers)
   bodies_ = makeBodies(random, movers, building);
 }
 
-std::span<const Box> BuildingMotion::next() {
+std::span<const Aabb> BuildingMotion::next() {
   for (std::size_t k = 0; k < bodies_.size(); ++k) boxes_[k] = step(bodies_[k], extent_);
   return boxes_;
 }

@@ -72,6 +72,7 @@ bench_methods(bench_broad_phases pairs broad_phase_methods.cpp
   approaches/interval_tree.cpp approaches/loose_octree.cpp)
 bench_methods(bench_narrow_phases convex narrow_phase_methods.cpp our_narrow_phases.cpp)
 bench_methods(bench_mesh_queries mesh mesh_methods.cpp our_mesh_queries.cpp)
+bench_methods(bench_boxes boxes box_methods.cpp)
 
 enfilade_benchmark(collision_broad_phase
   SOURCES collision_broad_phase.cpp building_workload.cpp
@@ -90,7 +91,10 @@ enfilade_benchmark(collision_icollide
 enfilade_benchmark(collision_time_to_contact
   SOURCES collision_time_to_contact.cpp building_workload.cpp
   LIBRARIES enfilade_collision nlohmann_json::nlohmann_json)
-set(programs collision_broad_phase collision_narrow_phase collision_mesh collision_icollide
+enfilade_benchmark(collision_boxes
+  SOURCES collision_boxes.cpp
+  LIBRARIES bench_boxes gmpxx gmp)
+set(programs collision_boxes collision_broad_phase collision_narrow_phase collision_mesh collision_icollide
   collision_time_to_contact)
 set_target_properties(${programs} PROPERTIES EXCLUDE_FROM_ALL ON)
 add_custom_target(collision_benchmarks DEPENDS ${programs})

@@ -22,6 +22,7 @@ namespace {
 
 using namespace enfilade::benchmarks;
 namespace collision = enfilade::collision;
+using collision::AabbMethod;
 using collision::Hull;
 using collision::PlacedConvex;
 using collision::Pose;
@@ -107,7 +108,8 @@ class Swarm {
 
 Contacts truthOf(const Swarm& swarm) {
   std::vector<Aabb> boxes;
-  for (const Flyer& f : swarm.flyers) boxes.push_back(tightAabbBruteForce(swarm.hull, f.pose));
+  for (const Flyer& f : swarm.flyers)
+    boxes.push_back(computeTightAabb(swarm.hull, f.rotation, f.pose.translation));
   Contacts contacts;
   for (std::uint32_t a = 0; a < boxes.size(); ++a) {
     for (std::uint32_t b = a + 1; b < boxes.size(); ++b) {
@@ -150,35 +152,38 @@ class Detector {
   virtual Frame frame(const Swarm& swarm, Contacts& contacts) = 0;
 };
 
-enum class Boxes { fixedCubes, tight, tightByWalls };
+enum class Boxes { fixedCubes, tight };
 
 class BoxMaker {
  public:
-  explicit BoxMaker(Boxes kind) : kind_(kind) {}
+  BoxMaker(Boxes kind, const Hull& hull)
+      : hull_(hull),
+        support_(kind == Boxes::fixedCubes
+                     ? collision::buildSupportTable(hull, AabbMethod::sphereCube)
+                     : collision::buildSupportTable(hull)) {}
   std::span<const Aabb> boxes(const Swarm& swarm) {
     boxes_.resize(swarm.flyers.size());
     extremal_.resize(swarm.flyers.size());
     for (std::size_t k = 0; k < boxes_.size(); ++k) {
-      const Pose& pose = swarm.flyers[k].pose;
-      if (kind_ == Boxes::fixedCubes) boxes_[k] = boundingSphereCube(swarm.hull, pose);
-      if (kind_ == Boxes::tight) boxes_[k] = tightAabb(swarm.hull, pose, extremal_[k]);
-      if (kind_ == Boxes::tightByWalls) {
-        boxes_[k] = tightAabbVoronoi(swarm.hull, pose, extremal_[k]);
-      }
+      const Flyer& f = swarm.flyers[k];
+      boxes_[k] = collision::computeAabb(hull_, support_, f.rotation, f.pose.translation,
+                                         extremal_[k], looked_);
     }
     return boxes_;
   }
 
  private:
-  Boxes kind_;
+  const Hull& hull_;
+  collision::SupportTable support_;
   std::vector<Aabb> boxes_;
   std::vector<collision::ExtremalVertices> extremal_;
+  std::uint64_t looked_ = 0;
 };
 
 /// Sort and sweep, and the narrow phase warm-started from the last frame's features.
 class OurDetector : public Detector {
  public:
-  explicit OurDetector(Boxes kind) : boxes_(kind), sweep_({}) {}
+  OurDetector(Boxes kind, const Hull& hull) : boxes_(kind, hull), sweep_({}) {}
 
   Frame frame(const Swarm& swarm, Contacts& contacts) override {
     Frame frame;
@@ -221,7 +226,7 @@ class OurDetector : public Detector {
 class PeerDetector : public Detector {
  public:
   PeerDetector(const BroadPhaseMethod& broad, const NarrowPhaseMethod& narrow, const Swarm& swarm)
-      : boxes_(Boxes::fixedCubes),
+      : boxes_(Boxes::fixedCubes, swarm.hull),
         broad_(broad.make({})),
         pair_(narrow.make(swarm.hull.vertices, swarm.hull.vertices)) {}
 
@@ -279,9 +284,8 @@ std::vector<Contestant> contestants(const Swarm& swarm, const Arguments& argumen
     all.back().name = name;
     all.back().detector = std::move(detector);
   };
-  add("ours, fixed cubes", std::make_unique<OurDetector>(Boxes::fixedCubes));
-  add("ours, tight boxes", std::make_unique<OurDetector>(Boxes::tight));
-  add("ours, tight boxes by walls", std::make_unique<OurDetector>(Boxes::tightByWalls));
+  add("ours, fixed cubes", std::make_unique<OurDetector>(Boxes::fixedCubes, swarm.hull));
+  add("ours, tight boxes", std::make_unique<OurDetector>(Boxes::tight, swarm.hull));
   const std::pair<const char*, const char*> stacks[] = {{"FCL dynamic tree", "FCL libccd"},
                                                         {"Bullet Dbvt", "Bullet GjkEpa2"}};
   for (const BroadPhaseMethod& broad : broadPhaseMethods()) {

@@ -6,7 +6,6 @@
 #include <random>
 
 #include "protocol/enfilade.pb.h"
-#include "protocol/spliced_message.hpp"
 
 namespace enfilade::protocol {
 namespace {

@@ -389,7 +389,7 @@ TEST(IfcDoors, AnAvatarWalksThroughARealDoorFromEitherSide) {
   for (const double side : {1.0, -1.0}) {
     BodyFixture run{Model(model)};
     const std::string name = "Projekt/Gelände/AC14-FZK-Haus/0. Erdgeschoss/Innentuer-2";
-    const Aabb leaf = computeAabb(run.body(name));
+    const Aabb leaf = run.body(name).boxes.whole;
     const Vec3 ahead(0, 0, 0.9 * side), middle(leaf.centre().x(), leaf.min.y(), leaf.centre().z());
     run.order("ann", Spawn{middle + ahead + Vec3(0, 0.01, 0), 0, 0.3, 1.75});
     run.order("ann", Walk{{middle - ahead}, 1});

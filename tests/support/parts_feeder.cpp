@@ -115,8 +115,9 @@ FeederFindings FeederCheck::evaluate(const std::vector<PlacedPart>& parts, const
   };
   for (std::size_t i = 0; i < parts.size() + tray_.size(); ++i) {
     const auto body = bodyOf(i);
-    near.insert(collision::tightAabbBruteForce(
-        *body.hull, {i < parts.size() ? parts[i].rotation : Quat::Identity(), body.translation}));
+    near.insert(collision::computeTightAabb(
+        *body.hull, body.rotation ? *body.rotation : collision::Mat3::Identity(),
+        body.translation));
   }
   near.update();
   for (const auto& pair : near.addedPairs()) {
@@ -159,7 +160,6 @@ Feeder::Feeder(const FeederPlan& plan, int threads)
         scene::makeDynamicBody({&hull, 1}, plan.density, {part.rotation, part.at}));
   }
   for (scene::PhysicsBody& solid : dynamics_.bodies) solid.motion.friction = plan.friction;
-  extremes_.resize(dynamics_.bodies.size());
   boxes_.resize(dynamics_.bodies.size());
   for (std::uint32_t i = 0; i < trayHulls.size(); ++i) {
     const double moves = 2 * (plan.amplitude + plan.sidewards) + 2 * settings_.solver.contactOffset;
@@ -184,9 +184,8 @@ void Feeder::moveBoxes(double lookout) {
       solid.maxStepDisplacement =
           solid.asleep ? lookout
                        : solid.maxPointSpeed() * kTick + kGravity * kTick * kTick + kSpareReach;
-      const Pose pose{solid.motion.rotation, solid.position};
-      needed_[i] = collision::tightAabb(*solid.parts[0].hull, pose, extremes_[i],
-                                        solid.maxStepDisplacement + lookout);
+      needed_[i] = collision::computeTightAabb(*solid.parts[0].hull, solid.rotation, solid.position,
+                                               solid.maxStepDisplacement + lookout);
     }
   });
   for (std::size_t i = 1; i < dynamics_.bodies.size(); ++i) {

@@ -11,9 +11,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <memory>
-#include <system_error>
 
 namespace enfilade::protocol {
 namespace {

@@ -60,25 +60,11 @@ StepOutcome SocketDriver::step() {
   }
   for (const v1::Notice& notice : outcome.notices) {
     if (notice.kind() == v1::Notice::KIND_CAPTURE) {
-      outcome.frames.push_back(capture(notice));
+      outcome.frames.push_back(captureFrame(
+          notice, format_, [&](const v1::FrameRequest& request) { return client_.frame(request); }));
     }
   }
   return outcome;
-}
-
-CapturedFrame SocketDriver::capture(const v1::Notice& notice) {
-  CapturedFrame captured;
-  captured.name = notice.text();
-  captured.avatar = notice.avatar();
-  captured.tag = notice.tag();
-  try {
-    ReceivedFrame frame = client_.frame(makeCaptureRequest(notice, format_));
-    captured.description = std::move(frame.description);
-    captured.pixels = std::move(frame.pixels);
-  } catch (const ProtocolError& problem) {
-    captured.error = problem.what();
-  }
-  return captured;
 }
 
 v1::FrameRequest makeCaptureRequest(const v1::Notice& notice, const CaptureFormat& format) {
@@ -90,6 +76,22 @@ v1::FrameRequest makeCaptureRequest(const v1::Notice& notice, const CaptureForma
   request.set_rgb_encoding(format.rgbEncoding);
   request.set_tick(notice.tick());
   return request;
+}
+
+CapturedFrame captureFrame(const v1::Notice& notice, const CaptureFormat& format,
+                           const std::function<ReceivedFrame(const v1::FrameRequest&)>& frame) {
+  CapturedFrame captured;
+  captured.name = notice.text();
+  captured.avatar = notice.avatar();
+  captured.tag = notice.tag();
+  try {
+    ReceivedFrame received = frame(makeCaptureRequest(notice, format));
+    captured.description = std::move(received.description);
+    captured.pixels = std::move(received.pixels);
+  } catch (const ProtocolError& problem) {
+    captured.error = problem.what();
+  }
+  return captured;
 }
 
 }  // namespace enfilade::protocol

@@ -1,6 +1,7 @@
 // Runs a script over a connection, in lockstep with the server's ticks.
 #pragma once
 
+#include <functional>
 #include <set>
 #include <string>
 
@@ -28,7 +29,6 @@ class SocketDriver : public ScriptDriver {
   StepOutcome step() override;
 
  private:
-  CapturedFrame capture(const v1::Notice& notice);
   bool concerns(const v1::ContactEvent& contact) const;
 
   Client& client_;
@@ -38,5 +38,9 @@ class SocketDriver : public ScriptDriver {
 
 /// Makes the frame request for a capture notice.
 v1::FrameRequest makeCaptureRequest(const v1::Notice& notice, const CaptureFormat& format);
+/// Requests the picture of a capture notice from `frame`, whose ProtocolError becomes
+/// CapturedFrame::error.
+CapturedFrame captureFrame(const v1::Notice& notice, const CaptureFormat& format,
+                           const std::function<ReceivedFrame(const v1::FrameRequest&)>& frame);
 
 }  // namespace enfilade::protocol

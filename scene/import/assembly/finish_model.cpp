@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "scene/import/assembly/coordinates.hpp"
-#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/model/add_diagnostic.hpp"
 #include "scene/import/file/import_options.hpp"
 
 namespace enfilade::scene {

@@ -12,7 +12,6 @@
 #include <assimp/ProgressHandler.hpp>
 #include <cstdint>
 #include <type_traits>
-#include <utility>
 
 #include "scene/import/assimp/assimp_reader.hpp"
 #include "scene/import/file/uri.hpp"

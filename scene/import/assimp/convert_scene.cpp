@@ -12,7 +12,7 @@
 #include "scene/import/assimp/nodes.hpp"
 #include "scene/import/bodies/gltf_bodies.hpp"
 #include "scene/import/bodies/name_suffixes.hpp"
-#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/model/add_diagnostic.hpp"
 #include "scene/import/gltf/gltf_nodes.hpp"
 
 namespace enfilade::scene {
@@ -51,11 +51,11 @@ Model convertScene(const aiScene& scene, const std::vector<FileMaterial>& materi
   for (const Diagnostic& diagnostic : input.metadata.problems) {
     // A unit that the user gave is not a guess.
     const bool aboutUnit = diagnostic.kind == "no_unit" || diagnostic.kind == "unit_assumed";
-    if (aboutUnit && input.metresPerUnit) continue;
+    if (aboutUnit && input.options.metresPerUnit) continue;
     addDiagnostic(model.diagnostics, diagnostic.kind, diagnostic.example, diagnostic.count);
   }
-  model.metresPerUnit = input.metresPerUnit.value_or(input.metadata.metresPerUnit);
-  model.upAxis = input.up.value_or(input.metadata.up);
+  model.metresPerUnit = input.options.metresPerUnit.value_or(input.metadata.metresPerUnit);
+  model.upAxis = input.options.up.value_or(input.metadata.up);
   convertMaterials(scene, materials, input.file, input.format, model, progress);
 
   if (progress) progress("convert", 0);
@@ -72,7 +72,7 @@ Model convertScene(const aiScene& scene, const std::vector<FileMaterial>& materi
       scene, input.format, worldFromRoot, exact, meshes, model.diagnostics, transforms);
   if (progress) progress("convert", 0.5);
 
-  finishModel(std::move(importedNodes), std::move(meshes), input.file, input.offset, model);
+  finishModel(std::move(importedNodes), std::move(meshes), input.file, input.options.offset, model);
   std::set<std::uint32_t> staticObjects;
   if (gltf) staticObjects = addGltfBodies(input.file, input.format, transforms, model);
   if (input.format != ModelFormat::ifc) addNamedBodies(model, staticObjects);

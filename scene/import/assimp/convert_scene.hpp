@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <vector>
 
 #include "scene/import/assimp/assimp_reader.hpp"
@@ -11,14 +10,12 @@
 
 namespace enfilade::scene {
 
-/// The file, its metadata and the user's overrides.
+/// The file, its metadata and the user's options, which override the metadata.
 struct ConvertInput {
   std::filesystem::path file;
   ModelFormat format = ModelFormat::gltf;
   FileMetadata metadata;
-  std::optional<double> metresPerUnit;  ///< the user's value; overrides the file's
-  std::optional<char> up;               ///< the user's up axis; overrides the file's
-  std::optional<Vec3> offset;           ///< the user's offset; otherwise a computed one (m, Y up)
+  ImportOptions options;
   Vec3 shift = Vec3::Zero();  ///< subtracted before assimp read the file; file units and axes
 };
 

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <map>
 
-#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/model/add_diagnostic.hpp"
 #include "scene/import/file/decode_image.hpp"
 #include "scene/import/file/srgb.hpp"
 #include "scene/import/file/uri.hpp"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <span>
 
-#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {

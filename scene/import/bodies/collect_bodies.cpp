@@ -9,7 +9,7 @@
 #include "scene/import/bodies/body_precedence.hpp"
 #include "scene/import/bodies/ifc_doors.hpp"
 #include "scene/import/bodies/sidecar.hpp"
-#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/model/add_diagnostic.hpp"
 #include "scene/model/shapes/collision_geometry.hpp"
 
 namespace enfilade::scene {

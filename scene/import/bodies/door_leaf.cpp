@@ -14,7 +14,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <span>
 
 #include "collision/shapes/triangle_tree.hpp"
 #include "scene/model/shapes/shape.hpp"

@@ -6,7 +6,8 @@
 #include <set>
 
 #include "scene/import/bodies/implicit_shapes.hpp"
-#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/import/gltf/gltf_json.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -19,22 +20,9 @@ constexpr double kLockedTolerance = 1e-6;  // metres or radians: a smaller range
 constexpr double kHalfTurn = 3.141592653589793;  // radians: range of a hinge without limits
 constexpr const char* kExtension = "KHR_physics_rigid_bodies";
 
-/// Returns the member, or null.
-const Json* findMember(const Json* json, const char* key) {
-  if (json == nullptr || !json->is_object()) return nullptr;
-  const auto found = json->find(key);
-  return found == json->end() ? nullptr : &*found;
-}
-
 const Json* findListEntry(const Json* list, std::optional<std::size_t> index) {
   const bool there = list != nullptr && list->is_array() && index && *index < list->size();
   return there ? &(*list)[*index] : nullptr;
-}
-
-std::optional<std::size_t> readIndexMember(const Json* json, const char* key) {
-  const Json* value = findMember(json, key);
-  if (value == nullptr || !value->is_number_unsigned()) return std::nullopt;
-  return value->get<std::size_t>();
 }
 
 std::optional<double> readNumberMember(const Json* json, const char* key) {

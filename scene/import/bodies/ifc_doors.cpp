@@ -8,7 +8,7 @@
 
 #include "scene/import/bodies/body_precedence.hpp"
 #include "scene/import/bodies/door_leaf.hpp"
-#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -1,7 +1,5 @@
 #include "scene/import/bodies/implicit_shapes.hpp"
 
-#include <cmath>
-
 #include "scene/model/rotation.hpp"
 
 namespace enfilade::scene {

@@ -1,7 +1,6 @@
 // A JSON value with its path in the document, so that errors can name the place. Private to scene/.
 #pragma once
 
-#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "scene/import/bodies/body_precedence.hpp"
-#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -43,18 +42,17 @@ struct Node {
 
 const Json& getList(const Json& object, const char* key) {
   static const Json none = Json::array();
-  const auto found = object.is_object() ? object.find(key) : object.end();
-  return found != object.end() && found->is_array() ? *found : none;
+  const Json* list = findMember(&object, key);
+  return list != nullptr && list->is_array() ? *list : none;
 }
 
 std::size_t getIndex(const Json& object, const char* key) {
-  const auto found = object.is_object() ? object.find(key) : object.end();
-  return found != object.end() && found->is_number_unsigned() ? found->get<std::size_t>() : kNone;
+  return readIndexMember(&object, key).value_or(kNone);
 }
 
 std::string getString(const Json& object, const char* key) {
-  const auto found = object.is_object() ? object.find(key) : object.end();
-  return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
+  const Json* text = findMember(&object, key);
+  return text != nullptr && text->is_string() ? text->get<std::string>() : std::string();
 }
 
 class GltfCameraReader {

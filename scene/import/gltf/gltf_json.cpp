@@ -27,4 +27,16 @@ std::string readGltfJson(const std::filesystem::path& file, ModelFormat format) 
   return text;
 }
 
+const nlohmann::json* findMember(const nlohmann::json* json, const char* key) {
+  if (json == nullptr || !json->is_object()) return nullptr;
+  const auto found = json->find(key);
+  return found == json->end() ? nullptr : &*found;
+}
+
+std::optional<std::size_t> readIndexMember(const nlohmann::json* json, const char* key) {
+  const nlohmann::json* value = findMember(json, key);
+  if (value == nullptr || !value->is_number_unsigned()) return std::nullopt;
+  return value->get<std::size_t>();
+}
+
 }  // namespace enfilade::scene

@@ -1,7 +1,10 @@
 // The JSON of a glTF file.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "scene/import/file/model_format.hpp"
@@ -13,5 +16,10 @@ inline constexpr int kMaxNodeDepth = 2000;
 
 /// The JSON text of a glTF or GLB file; empty if it cannot be read.
 std::string readGltfJson(const std::filesystem::path& file, ModelFormat format);
+
+/// Returns the member of an object; null if there is none, or if `json` is null or no object.
+const nlohmann::json* findMember(const nlohmann::json* json, const char* key);
+/// Returns a member that is a number of an entry; nullopt for anything else.
+std::optional<std::size_t> readIndexMember(const nlohmann::json* json, const char* key);
 
 }  // namespace enfilade::scene

@@ -43,28 +43,19 @@ void requireKnownExtensions(const Json& gltf, const std::filesystem::path& file)
   }
 }
 
-std::size_t getNumber(const Json& object, const char* key, std::size_t fallback) {
-  const auto found = object.find(key);
-  return found != object.end() && found->is_number_unsigned() ? found->get<std::size_t>()
-                                                              : fallback;
-}
-
 /// Corners of a primitive: its index count, otherwise its vertex count. 0 for invalid JSON.
 std::size_t countCorners(const Json& primitive, const Json& accessors) {
-  constexpr std::size_t kNone = ~std::size_t{0};
-  const auto attributes = primitive.find("attributes");
-  const bool hasAttributes = attributes != primitive.end() && attributes->is_object();
-  const std::size_t vertices = hasAttributes ? getNumber(*attributes, "POSITION", kNone) : kNone;
-  const std::size_t accessor = getNumber(primitive, "indices", vertices);
-  if (accessor >= accessors.size() || !accessors[accessor].is_object()) return 0;
-  return getNumber(accessors[accessor], "count", 0);
+  auto accessor = readIndexMember(&primitive, "indices");
+  if (!accessor) accessor = readIndexMember(findMember(&primitive, "attributes"), "POSITION");
+  if (!accessor || *accessor >= accessors.size()) return 0;
+  return readIndexMember(&accessors[*accessor], "count").value_or(0);
 }
 
 std::size_t countTriangles(const Json& primitive, const Json& accessors) {
   constexpr std::size_t kTriangles = 4, kStrip = 5, kFan = 6;  // glTF 2.0, 5.24.4
   if (!primitive.is_object()) return 0;
   const std::size_t corners = countCorners(primitive, accessors);
-  const std::size_t mode = getNumber(primitive, "mode", kTriangles);
+  const std::size_t mode = readIndexMember(&primitive, "mode").value_or(kTriangles);
   if (mode == kTriangles) return corners / 3;
   return mode == kStrip || mode == kFan ? std::max<std::size_t>(corners, 2) - 2 : 0;
 }

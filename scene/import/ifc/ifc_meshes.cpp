@@ -1,6 +1,5 @@
 #include "scene/import/ifc/ifc_meshes.hpp"
 
-#include <cmath>
 #include <cstring>
 #include <type_traits>
 

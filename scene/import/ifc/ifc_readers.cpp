@@ -108,7 +108,7 @@ IfcInput::~IfcInput() {
 ImportRequest IfcInput::makeRequest(ImportTask task, double timeLimit) const {
   ImportRequest request = request_;
   request.task = task;
-  request.timeLimit = timeLimit;
+  request.options.timeLimit = timeLimit;
   request.ifcFile = fileDescriptor_;
   request.ifcProductIds = listDescriptor_;
   return request;

@@ -2,7 +2,6 @@
 // product that crashed it.
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>

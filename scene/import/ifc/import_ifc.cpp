@@ -9,7 +9,7 @@
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/import/assembly/finish_model.hpp"
 #include "scene/import/assembly/path_names.hpp"
-#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/model/add_diagnostic.hpp"
 #include "scene/import/file/srgb.hpp"
 #include "scene/import/ifc/elevators.hpp"
 #include "scene/import/ifc/ifc_file.hpp"
@@ -187,7 +187,7 @@ class IfcImport {
   Model run() {
     reportProgress("open", 0);
     const std::size_t maxBytes =
-        request_.memoryLimit > 0 ? request_.memoryLimit / kTextMemoryDivisor : kMaxTextBytes;
+        request_.options.memoryLimit > 0 ? request_.options.memoryLimit / kTextMemoryDivisor : kMaxTextBytes;
     std::string text = readIfcFile(request_.file, maxBytes);
     if (text.find("ISO-10303-21") == std::string::npos) {
       throw ImportError(request_.file + ": not an IFC file (it does not begin with " +
@@ -213,7 +213,7 @@ class IfcImport {
   }
 
   double remainingTime() const {
-    return request_.timeLimit * kImportTimeFraction -
+    return request_.options.timeLimit * kImportTimeFraction -
            std::chrono::duration<double>(Clock::now() - startTime_).count();
   }
 
@@ -224,7 +224,7 @@ class IfcImport {
                     "export it again");
     }
     addDiagnostic(diagnostics_, "damaged_statement", "skipped by the index", file.damagedCount());
-    if (metadata_.unitAssumption && !request_.metresPerUnit) {
+    if (metadata_.unitAssumption && !request_.options.metresPerUnit) {
       addDiagnostic(diagnostics_, "no_unit", *metadata_.unitAssumption);
     }
     if (metadata_.mapConversion)
@@ -257,13 +257,13 @@ class IfcImport {
   }
 
   bool isReaderAllowed(IfcReader reader) const {
-    return request_.ifcReader == IfcReader::automatic || request_.ifcReader == reader;
+    return request_.options.ifcReader == IfcReader::automatic || request_.options.ifcReader == reader;
   }
 
   /// Time limit of the next reader, seconds: the remaining time, or a part of it if another reader
   /// may follow.
   double readerTimeLimit() const {
-    return request_.ifcReader == IfcReader::automatic ? remainingTime() * kReaderTimeFraction
+    return request_.options.ifcReader == IfcReader::automatic ? remainingTime() * kReaderTimeFraction
                                                       : remainingTime();
   }
 
@@ -283,7 +283,7 @@ class IfcImport {
       if (assimp.model) return addMetadata(std::move(*assimp.model));
       failures_ += (failures_.empty() ? "" : "; ") + ("assimp: " + assimp.failure);
     }
-    const bool all = request_.ifcReader == IfcReader::automatic;
+    const bool all = request_.options.ifcReader == IfcReader::automatic;
     throw ImportError(
         request_.file + ": cannot be read: " + failures_ + "; " +
         (metadata_.complete ? "" : "it is cut off (END-ISO-10303-21 is missing): copy it again; ") +
@@ -308,8 +308,8 @@ class IfcImport {
   Model makeEmptyModel(const std::string& reader) const {
     Model model;
     model.reader = reader;
-    model.metresPerUnit = request_.metresPerUnit.value_or(metadata_.metresPerUnit);
-    model.upAxis = request_.up.value_or('z');
+    model.metresPerUnit = request_.options.metresPerUnit.value_or(metadata_.metresPerUnit);
+    model.upAxis = request_.options.up.value_or('z');
     return model;
   }
 
@@ -350,7 +350,7 @@ class IfcImport {
       builder.addProduct(product, source->second == Source::first ? first : second->meshes);
     }
     finishModel(std::move(builder.importedNodes), std::move(builder.convertedMeshes), request_.file,
-                request_.offset, model);
+                request_.options.offset, model);
     return model;
   }
 
@@ -404,7 +404,7 @@ class IfcImport {
     const bool whole = std::none_of(wanted.begin(), wanted.end(), [&](std::uint32_t id) {
       return needsSecondReader(meshes, id);
     });
-    if (whole || reader != "web-ifc" || request_.ifcReader != IfcReader::automatic) {
+    if (whole || reader != "web-ifc" || request_.options.ifcReader != IfcReader::automatic) {
       return std::nullopt;
     }
     IfcReadResult second = readWithIfcPlusPlus(*input_, readerTimeLimit(), progress_);

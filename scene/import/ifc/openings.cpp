@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -4,9 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <string>
-#include <string_view>
 
 namespace enfilade::scene {
 

@@ -12,7 +12,6 @@
 #include <cerrno>
 #include <charconv>
 #include <chrono>
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <thread>
@@ -119,12 +118,12 @@ std::array<std::string, kArgumentCount> makeArguments(const ImportRequest& reque
           kImportVerb,
           std::to_string(getpid()),
           std::to_string(static_cast<int>(request.task)),
-          std::to_string(request.memoryLimit),
-          formatShortest(request.timeLimit),
-          request.metresPerUnit ? formatShortest(*request.metresPerUnit) : "-",
-          request.up ? std::string(1, *request.up) : "-",
-          request.offset ? formatVec3(*request.offset) : "-",
-          std::to_string(static_cast<int>(request.ifcReader)),
+          std::to_string(request.options.memoryLimit),
+          formatShortest(request.options.timeLimit),
+          request.options.metresPerUnit ? formatShortest(*request.options.metresPerUnit) : "-",
+          request.options.up ? std::string(1, *request.options.up) : "-",
+          request.options.offset ? formatVec3(*request.options.offset) : "-",
+          std::to_string(static_cast<int>(request.options.ifcReader)),
           std::to_string(request.firstProduct),
           request.program,
           request.script,
@@ -245,10 +244,10 @@ ImportExit::Reason receiveMessages(int readEnd, const ImportRequest& request,
   const auto start = Clock::now();
   auto lastMessage = start;
   std::vector<std::byte> chunk(kReadSize);
-  MessageBuffer messages(request.memoryLimit > 0 ? request.memoryLimit
+  MessageBuffer messages(request.options.memoryLimit > 0 ? request.options.memoryLimit
                                                  : std::numeric_limits<std::size_t>::max());
   for (;;) {  // ends with the time limit at the latest
-    const double left = request.timeLimit - secondsSince(start);
+    const double left = request.options.timeLimit - secondsSince(start);
     const double stallTime = stallLimit() - secondsSince(lastMessage);
     if (!(left > 0)) return ImportExit::Reason::timeLimit;
     if (!(stallTime > 0)) return ImportExit::Reason::stallLimit;
@@ -272,12 +271,12 @@ std::optional<ImportRequest> parseImportRequest(int argc, char** argv, int& pare
   ImportRequest request;
   parent = parseArgument<int>(argv[2]);
   request.task = static_cast<ImportTask>(parseArgument<int>(argv[3]));
-  request.memoryLimit = parseArgument<std::size_t>(argv[4]);
-  request.timeLimit = parseArgument<double>(argv[5]);
-  if (std::string_view(argv[6]) != "-") request.metresPerUnit = parseArgument<double>(argv[6]);
-  if (std::string_view(argv[7]) != "-") request.up = argv[7][0];
-  if (std::string_view(argv[8]) != "-") request.offset = parseVec3(argv[8]);
-  request.ifcReader = static_cast<IfcReader>(parseArgument<int>(argv[9]));
+  request.options.memoryLimit = parseArgument<std::size_t>(argv[4]);
+  request.options.timeLimit = parseArgument<double>(argv[5]);
+  if (std::string_view(argv[6]) != "-") request.options.metresPerUnit = parseArgument<double>(argv[6]);
+  if (std::string_view(argv[7]) != "-") request.options.up = argv[7][0];
+  if (std::string_view(argv[8]) != "-") request.options.offset = parseVec3(argv[8]);
+  request.options.ifcReader = static_cast<IfcReader>(parseArgument<int>(argv[9]));
   request.firstProduct = parseArgument<std::uint32_t>(argv[10]);
   request.program = argv[11];
   request.script = argv[12];

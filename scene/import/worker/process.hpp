@@ -3,12 +3,10 @@
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
 #include <functional>
 #include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "scene/import/file/import_options.hpp"
 #include "scene/import/worker/ipc_messages.hpp"
@@ -27,12 +25,7 @@ enum class ImportTask : std::uint8_t {
 struct ImportRequest {
   ImportTask task = ImportTask::model;
   std::string file;
-  std::optional<double> metresPerUnit;
-  std::optional<char> up;
-  std::optional<Vec3> offset;
-  IfcReader ifcReader = IfcReader::automatic;
-  std::size_t memoryLimit = 0;           ///< bytes; 0: unlimited
-  double timeLimit = 0;                  ///< seconds
+  ImportOptions options;                 ///< memoryLimit 0: unlimited
   std::string program, script;           ///< webIfc: the node program and its script
   std::uint32_t firstProduct = 0;        ///< webIfc: index into the requested products
   int ifcFile = -1, ifcProductIds = -1;  ///< inherited file descriptors; not owned, -1: unset

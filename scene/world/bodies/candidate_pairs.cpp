@@ -28,7 +28,7 @@ Aabb computePartBounds(const WorldData& world, const Body& body, std::uint32_t p
     margin += world.dynamicBodies.physicsWorld
                   .bodies[world.dynamicBodies.physicsBodyOf[world.findBodyByProxy(body.proxy)]]
                   .maxStepDisplacement;
-  return inflated(body.partBoxes[part], margin);
+  return inflated(getPartBox(body, part), margin);
 }
 
 /// Bounds of the motion of all rigid bodies in this tick.
@@ -44,22 +44,24 @@ struct SweptBounds {
   }
 };
 
-SweptBounds computeSweptBounds(const WorldData& world, ThreadPool* threadPool) {
+/// Bodies that overlap nothing keep empty boxes.
+SweptBounds computeSweptBounds(WorldData& world, ThreadPool* threadPool) {
   const DynamicBodies& dynamicBodies = world.dynamicBodies;
   SweptBounds bounds;
   bounds.firstBox.push_back(0);
   for (const std::uint32_t body : dynamicBodies.bodyIndices)
-    bounds.firstBox.push_back(bounds.firstBox.back() +
-                              static_cast<std::uint32_t>(world.bodies[body].partBoxes.size()));
+    bounds.firstBox.push_back(bounds.firstBox.back() + getPartCount(world.bodies[body]));
   bounds.spheres.resize(dynamicBodies.bodyIndices.size());
   bounds.boxes.resize(bounds.firstBox.back());
   parallelForOrSerial(
       threadPool, dynamicBodies.bodyIndices.size(), kBodiesPerTask,
       [&](std::size_t from, std::size_t to) {
         for (std::size_t i = from; i < to; ++i) {
-          const Body& body = world.bodies[dynamicBodies.bodyIndices[i]];
+          Body& body = world.bodies[dynamicBodies.bodyIndices[i]];
           bounds.spheres[i] = computeMotionSphere(dynamicBodies.physicsWorld.bodies[i]);
-          for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
+          if (world.broadPhase.overlapsOf(body.proxy).empty()) continue;
+          makePartBoxes(body);
+          for (std::uint32_t part = 0; part < getPartCount(body); ++part)
             bounds.boxes[bounds.firstBox[i] + part] = computePartBounds(world, body, part);
         }
       });
@@ -159,7 +161,7 @@ struct PairCollector {
   void addKinematic(std::uint32_t physicsBody, std::uint32_t index) {
     const Body& body = world.bodies[index];
     const std::uint32_t other = ensureSceneBody(world, index);
-    for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part)
+    for (std::uint32_t part = 0; part < getPartCount(body); ++part)
       addPartPairs(physicsBody, computePartBounds(world, body, part), other, part);
   }
   void addAvatar(std::uint32_t physicsBody, const Avatar& avatar) {

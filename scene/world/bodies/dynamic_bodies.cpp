@@ -140,7 +140,7 @@ std::vector<double> computeKinematicPushBounds(const WorldData& world) {
   std::vector<Aabb> boxes;
   std::vector<std::size_t> unpushed, pending;
   for (std::size_t k = 0; k < bodyIndices.size(); ++k) {
-    boxes.push_back(computeAabb(world.bodies[bodyIndices[k]]));
+    boxes.push_back(world.bodies[bodyIndices[k]].boxes.whole);
     for (const std::uint32_t i : world.movingBodies)
       if (overlaps(world.bodies[i].motionBounds, boxes[k]))
         pushBounds[k] = std::max(pushBounds[k], world.bodies[i].kinematicTarget.maxDisplacement);
@@ -199,7 +199,7 @@ void planDynamicMotion(WorldData& world) {
         isStationary
             ? margin
             : physicsBody.maxPointSpeed() * tick + fallDistance + std::max(pushBound, extraMotion);
-    const Aabb required = inflated(computeAabb(body), physicsBody.maxStepDisplacement + margin);
+    const Aabb required = inflated(body.boxes.whole, physicsBody.maxStepDisplacement + margin);
     if (!isStationary && contains(body.motionBounds, required)) continue;
     body.motionBounds =
         inflated(required, std::min(kAabbMargin, kAabbMarginPerRadius * physicsBody.radius));

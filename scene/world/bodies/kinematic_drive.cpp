@@ -219,7 +219,7 @@ void planKinematicMotion(WorldData& world) {
     planKinematicTarget(body, world.settings.tickDuration);
     if (body.drive.moving) world.movingBodies.push_back(i);
     if (body.kinematicTarget.maxDisplacement == 0 && !hadMotionBounds) continue;
-    body.motionBounds = computeAabb(body);
+    body.motionBounds = body.boxes.whole;
     if (body.kinematicTarget.maxDisplacement > 0)
       body.motionBounds =
           inflated(body.motionBounds, body.kinematicTarget.maxDisplacement + margin);

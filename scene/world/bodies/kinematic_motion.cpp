@@ -91,8 +91,8 @@ void findFirstHit(const Body& body, const ScrewMotion& motion, double maxDisplac
   for (const AvatarPart& avatarPart : avatar.shape->parts) {
     const Aabb box = inflated(placeBox(avatarPart.box, avatar.footPosition),
                               contactOffset.rest + maxDisplacement);
-    for (std::size_t part = 0; part < body.partBoxes.size(); ++part) {
-      if (!overlaps(box, body.partBoxes[part])) continue;
+    for (std::uint32_t part = 0; part < getPartCount(body); ++part) {
+      if (!overlaps(box, getPartBox(body, part))) continue;
       const PartCastResult cast =
           castMovingPart({body.shape->parts[part], motion},
                          placeAvatarPart(avatarPart, avatar.footPosition), contactOffset, count);
@@ -114,8 +114,8 @@ void findFirstCarriedHit(const CarriedBody& carried, Avatar& avatar, const World
   for (const AvatarPart& avatarPart : avatar.shape->parts) {
     Aabb box = inflated(placeBox(avatarPart.box, avatar.footPosition), contactOffset.rest + lift);
     box.min -= appliedLift, box.max -= appliedLift;
-    for (std::size_t part = 0; part < body.partBoxes.size(); ++part) {
-      if (!overlaps(box, body.partBoxes[part])) continue;
+    for (std::uint32_t part = 0; part < getPartCount(body); ++part) {
+      if (!overlaps(box, getPartBox(body, part))) continue;
       PartCastResult cast =
           castMovingPart({body.shape->parts[part], motion},
                          placeAvatarPart(avatarPart, avatar.footPosition), contactOffset, count);
@@ -273,12 +273,19 @@ void updateJointPosition(Body& body, double fraction, double tick) {
   drive.moving = isLoopingPath(*body.spec) || drive.jointPosition != drive.target;
 }
 
+/// The parts get boxes only while the body overlaps something.
+void updatePartBoxes(const WorldData& world, Body& body) {
+  if (!world.broadPhase.overlapsOf(body.proxy).empty()) makePartBoxes(body);
+}
+
 void moveKinematicBody(WorldData& world, Body& body, const SupportGraph& supportGraph,
                        TickReport& report, QueryCount& count) {
+  updatePartBoxes(world, body);
   const Vec3 before = body.position;
   const double tick = world.settings.tickDuration;
   Passengers passengers = findPassengers(world, body, supportGraph);
   updateJointPosition(body, moveAlongSegments(world, body, passengers, report, count), tick);
+  updatePartBoxes(world, body);
   updateCarriedLifts(world, body, body.drive.pose, passengers.bodies);
   body.velocity = (body.position - before) / tick;
   body.angularVelocity =

@@ -12,10 +12,10 @@ namespace {
 double findSteepestNormalY(const WorldData& world, const Body& a, const Body& b) {
   double steepest = 0;
   const double limit = computeContactThreshold(world.settings);
-  for (std::uint32_t i = 0; i < a.partBoxes.size(); ++i) {
-    const Aabb box = inflated(a.partBoxes[i], limit);
-    for (std::uint32_t k = 0; k < b.partBoxes.size(); ++k) {
-      if (!overlaps(box, b.partBoxes[k])) continue;
+  for (std::uint32_t i = 0; i < getPartCount(a); ++i) {
+    const Aabb box = inflated(getPartBox(a, i), limit);
+    for (std::uint32_t k = 0; k < getPartCount(b); ++k) {
+      if (!overlaps(box, getPartBox(b, k))) continue;
       collision::FeatureCache cache;
       const auto at = collision::computeSeparationWithin(makePlacedPart(a, i), makePlacedPart(b, k),
                                                          limit, cache);
@@ -34,7 +34,7 @@ double computeSupportNormalY(const WorldData& world, const Contact& contact, con
   if (contact.separation.verdict == collision::Verdict::penetrating)  // there is no normal
     return second.position.y() - first.position.y();
   double up = contact.separation.normal.y();
-  const bool haveOnePart = first.partBoxes.size() == 1 && second.partBoxes.size() == 1;
+  const bool haveOnePart = getPartCount(first) == 1 && getPartCount(second) == 1;
   if (std::abs(up) < minNormalY && !haveOnePart) up = findSteepestNormalY(world, first, second);
   return std::abs(up) < minNormalY ? 0 : up;
 }
@@ -79,8 +79,8 @@ Vec3 findSupportPoint(const WorldData& world, const Body& body, const Avatar& av
   Aabb contactArea{contact.separation.pointB, contact.separation.pointB};
   for (const AvatarPart& avatarPart : avatar.shape->parts) {
     const Aabb box = inflated(placeBox(avatarPart.box, avatar.footPosition), limit);
-    for (std::uint32_t i = 0; i < body.partBoxes.size(); ++i) {
-      if (!overlaps(box, body.partBoxes[i])) continue;
+    for (std::uint32_t i = 0; i < getPartCount(body); ++i) {
+      if (!overlaps(box, getPartBox(body, i))) continue;
       const collision::PlacedConvex placedPart = placeAvatarPart(avatarPart, avatar.footPosition),
                                     under = makePlacedPart(body, i);
       collision::FeatureCache cache;

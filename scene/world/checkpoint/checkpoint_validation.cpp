@@ -46,7 +46,7 @@ struct CheckpointChecker {
     }
   }
   std::size_t countParts(const Obstacle& obstacle) const {
-    if (const Body* body = findBody(obstacle.entity)) return body->partBoxes.size();
+    if (const Body* body = findBody(obstacle.entity)) return getPartCount(*body);
     if (!isAvatar(obstacle.entity))
       return obstacle.entity == 0 ? 0 : world.scene->collisionGeometry(obstacle.entity - 1).size();
     if (const Avatar* avatar = world.findAvatar(obstacle.entity))

@@ -274,7 +274,7 @@ template <>
 struct Layout<ChainLink> {
   template <class A>
   static void archive(A& a, MaybeConst<A, ChainLink>& link) {
-    auto& [parent, joint, hull, maxRadius, value, target, blockedBy] = link;
+    auto& [parent, joint, hull, support, lastExtremes, maxRadius, value, target, blockedBy] = link;
     a(value, target, blockedBy);
   }
 };
@@ -284,7 +284,7 @@ template <>
 struct Layout<Chain> {
   template <class A>
   static void archive(A& a, MaybeConst<A, Chain>& chain) {
-    auto& [links, avatarFromBase, selfContact, speed, timeoutLeft] = chain;
+    auto& [links, avatarFromBase, selfContact, speed, timeoutLeft, verticesLookedAt] = chain;
     for (auto& link : links) a(link);
     a(speed, timeoutLeft);
   }
@@ -345,12 +345,12 @@ struct Layout<KinematicTarget> {
   }
 };
 /// `id`, `spec`, `shape` and `proxy` are as in any world of the scene; `rotation`, `isRotated` and
-/// `partBoxes` follow from the pose. The previous pose is set before use.
+/// `boxes` follow from the pose. The previous pose is set before use.
 template <>
 struct Layout<Body> {
   template <class A>
   static void archive(A& a, MaybeConst<A, Body>& body) {
-    auto& [id, spec, shape, position, orientation, rotation, isRotated, partBoxes, previousPosition,
+    auto& [id, spec, shape, position, orientation, rotation, isRotated, boxes, previousPosition,
            previousOrientation, velocity, angularVelocity, asleep, moved, kinematicPushBound,
            pendingLift, outOfWorld, blockedBy, drive, kinematicTarget, proxy, motionBounds,
            occupants] = body;

@@ -62,13 +62,13 @@ Aabb computeSweptPartAabb(const Body& body, const Aabb& box, double radius) {
 }
 
 Aabb computeSweptAabb(const Body& body) {
-  return computeSweptPartAabb(body, computeAabb(body), body.shape->radius);
+  return computeSweptPartAabb(body, body.boxes.whole, body.shape->radius);
 }
 
 std::vector<Aabb> computeSweptPartAabbs(const Body& body) {
   std::vector<Aabb> boxes;
-  for (std::size_t i = 0; i < body.partBoxes.size(); ++i)
-    boxes.push_back(computeSweptPartAabb(body, body.partBoxes[i], body.shape->parts[i].radius));
+  for (std::uint32_t i = 0; i < getPartCount(body); ++i)
+    boxes.push_back(computeSweptPartAabb(body, getPartBox(body, i), body.shape->parts[i].radius));
   return boxes;
 }
 

@@ -30,7 +30,7 @@ void appendBodyParts(const WorldData& world, std::uint32_t index,
                      std::vector<Obstacle>& obstacles) {
   const Body& body = world.bodies[index];
   if (isTrigger(body.spec->kind)) return;
-  for (std::uint32_t part = 0; part < body.partBoxes.size(); ++part) {
+  for (std::uint32_t part = 0; part < getPartCount(body); ++part) {
     Obstacle obstacle;
     obstacle.entity = body.id;
     obstacle.part = part;
@@ -146,7 +146,7 @@ Aabb computeAvatarFootBounds(const WorldSettings& settings, const Avatar& avatar
 void updateObstaclePose(const WorldData& world, Obstacle& obstacle) {
   if (obstacle.bodyIndex != kNoBody) {
     const Body& body = world.bodies[obstacle.bodyIndex];
-    obstacle.box = body.partBoxes[obstacle.part];
+    obstacle.box = getPartBox(body, obstacle.part);
     obstacle.convex = makePlacedPart(body, obstacle.part);
     // Where the body will stand: the solver moves it after the avatars.
     obstacle.box.min.y() += body.pendingLift, obstacle.box.max.y() += body.pendingLift;

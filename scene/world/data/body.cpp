@@ -3,22 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/assert.hpp"
 #include "scene/model/rotation.hpp"
 
 namespace enfilade::scene {
 namespace {
-
-/// Relative rounding of a rotated and translated vertex: more than the four roundings that occur.
-constexpr double kRelativeRounding = 0x1p-49;
-
-Aabb computePartAabb(const collision::Hull& hull, const Body& body) {
-  Aabb box;
-  for (const Vec3& vertex : hull.vertices)
-    box.include(body.isRotated ? Vec3(body.rotation * vertex + body.position)
-                               : Vec3(vertex + body.position));
-  const double extent = 2 * hull.radius + body.position.cwiseAbs().maxCoeff();
-  return inflated(box, kRelativeRounding * extent);
-}
 
 /// Joint pose of a path at a time between its first key and its last.
 JointPose interpolatePath(const std::vector<PathKey>& keys, double time) {
@@ -29,6 +18,20 @@ JointPose interpolatePath(const std::vector<PathKey>& keys, double time) {
                               (time - a.time) / (b.time - a.time));
 }
 
+void updateWholeBox(Body& body) {
+  const BodyShape& shape = *body.shape;
+  BodyBoxes& boxes = body.boxes;
+  const bool isSingle = shape.parts.size() == 1;
+  const std::size_t outline = isSingle ? 0 : shape.parts.size();
+  boxes.parts.resize(shape.parts.size());
+  boxes.last.resize(outline + 1);
+  boxes.whole = computeAabb(isSingle ? shape.parts[0] : shape.outline,
+                            isSingle ? shape.partSupports[0] : shape.outlineSupport, body.rotation,
+                            body.position, boxes.last[outline], boxes.verticesLookedAt);
+  boxes.hasParts = isSingle;
+  if (isSingle) boxes.parts[0] = boxes.whole;
+}
+
 }  // namespace
 
 void setBodyPose(Body& body, const Vec3& position, const collision::Quat& orientation) {
@@ -36,21 +39,32 @@ void setBodyPose(Body& body, const Vec3& position, const collision::Quat& orient
   body.orientation = orientation;
   body.rotation = orientation.toRotationMatrix();
   body.isRotated = body.rotation != collision::Mat3::Identity();
-  const auto& parts = body.shape->parts;
-  body.partBoxes.resize(parts.size());
-  for (std::size_t i = 0; i < parts.size(); ++i)
-    body.partBoxes[i] = computePartAabb(parts[i], body);
+  updateWholeBox(body);
+}
+
+void makePartBoxes(Body& body) {
+  BodyBoxes& boxes = body.boxes;
+  if (boxes.hasParts) return;
+  for (std::uint32_t part = 0; part < getPartCount(body); ++part)
+    boxes.parts[part] =
+        computeAabb(body.shape->parts[part], body.shape->partSupports[part], body.rotation,
+                    body.position, boxes.last[part], boxes.verticesLookedAt);
+  boxes.partBoxesMade += boxes.parts.size();
+  boxes.hasParts = true;
+}
+
+Aabb getPartBox(const Body& body, std::uint32_t part) {
+  ENFILADE_ASSERT(part < getPartCount(body));
+  if (body.boxes.hasParts) return body.boxes.parts[part];
+  collision::ExtremalVertices last = body.boxes.last[part];
+  std::uint64_t looked = 0;
+  return computeAabb(body.shape->parts[part], body.shape->partSupports[part], body.rotation,
+                     body.position, last, looked);
 }
 
 collision::PlacedConvex makePlacedPart(const Body& body, std::uint32_t part) {
   const collision::Hull& hull = body.shape->parts[part];
   return {hull.vertices, body.position, body.isRotated ? &body.rotation : nullptr, &hull};
-}
-
-Aabb computeAabb(const Body& body) {
-  Aabb box;
-  for (const Aabb& part : body.partBoxes) box.include(part);
-  return box;
 }
 
 collision::Pose computeBodyPose(const BodySpec& spec, const JointPose& jointPose) {

@@ -49,6 +49,20 @@ struct KinematicTarget {
   double velocityDeviation = 0;  ///< m/s; maximum deviation from uniform motion (see BodySnapshot)
 };
 
+/// Boxes of a body at its pose: scene frame, metres; they contain the exact boxes. The box of a
+/// body with several parts comes first; its parts get boxes only while that one overlaps something
+/// (Lin 1993, section 5.2.1).
+struct BodyBoxes {
+  Aabb whole;
+  std::vector<Aabb> parts;                        ///< valid while `hasParts`
+  bool hasParts = false;                          ///< of a body with one part: always
+  std::vector<collision::ExtremalVertices> last;  ///< of the parts, then of the outline
+
+  // Work since the end of the last tick.
+  std::uint64_t verticesLookedAt = 0;
+  std::uint64_t partBoxesMade = 0;
+};
+
 struct Body {
   EntityId id = 0;  ///< id of its first object
   const BodySpec* spec = nullptr;
@@ -59,8 +73,8 @@ struct Body {
   Vec3 position = Vec3::Zero();  ///< scene frame, metres; shape->origin in the authored pose
   collision::Quat orientation = collision::Quat::Identity();  ///< unit
   collision::Mat3 rotation = collision::Mat3::Identity();     ///< of `orientation`
-  bool isRotated = false;       ///< `rotation` differs from the identity in at least one bit
-  std::vector<Aabb> partBoxes;  ///< scene frame; contain the exact AABBs
+  bool isRotated = false;  ///< `rotation` differs from the identity in at least one bit
+  BodyBoxes boxes;
 
   // Moving kinematic body: the pose before the tick.
   Vec3 previousPosition = Vec3::Zero();
@@ -86,7 +100,11 @@ struct Body {
   std::vector<EntityId> occupants;  ///< triggers: ids of the entities inside, ascending
 };
 
-/// Sets the pose of a body and updates its AABBs.
+inline std::uint32_t getPartCount(const Body& body) {
+  return static_cast<std::uint32_t>(body.shape->parts.size());
+}
+
+/// Sets the pose of a body and updates its box. The boxes of several parts become invalid.
 void setBodyPose(Body& body, const Vec3& position, const collision::Quat& orientation);
 
 /// Converts a point from scene frame to body frame.
@@ -97,8 +115,11 @@ inline Vec3 toBodyFrame(const Body& body, const Vec3& point) {
 /// Part `part` as input of the narrow phase. Points into the body.
 collision::PlacedConvex makePlacedPart(const Body& body, std::uint32_t part);
 
-/// Union of the AABBs of all parts, scene frame.
-Aabb computeAabb(const Body& body);
+/// Makes the boxes of all parts, unless they are valid.
+void makePartBoxes(Body& body);
+
+/// The box of one part; it is computed if the boxes of the parts are invalid.
+Aabb getPartBox(const Body& body, std::uint32_t part);
 
 /// World pose of a kinematic body at a joint pose.
 collision::Pose computeBodyPose(const BodySpec& spec, const JointPose& jointPose);

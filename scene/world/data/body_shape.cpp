@@ -193,6 +193,17 @@ void computeExtents(BodyShape& shape) {
   shape.radius *= 1 + 0x1p-48;
 }
 
+void buildSupportTables(BodyShape& shape) {
+  std::vector<Vec3> points;
+  for (const Hull& hull : shape.parts) {
+    shape.partSupports.push_back(collision::buildSupportTable(hull));
+    points.insert(points.end(), hull.vertices.begin(), hull.vertices.end());
+  }
+  if (shape.parts.size() == 1) return;
+  shape.outline = collision::buildHull(points);
+  shape.outlineSupport = collision::buildSupportTable(shape.outline);
+}
+
 }  // namespace
 
 BodyShape buildBodyShape(const Model& model, const BodySpec& spec, MeshShapeCache& cache) {
@@ -220,6 +231,7 @@ BodyShape buildBodyShape(const Model& model, const BodySpec& spec, MeshShapeCach
   for (const Hull& hull : shape.parts)
     for (Aabb& box = boxes.emplace_back(); const Vec3& vertex : hull.vertices) box.include(vertex);
   shape.tree = collision::buildBoxTree(boxes, 1);
+  buildSupportTables(shape);
   return shape;
 }
 

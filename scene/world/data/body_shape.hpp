@@ -6,6 +6,7 @@
 #include <map>
 #include <vector>
 
+#include "collision/bounds/bounding_box.hpp"
 #include "collision/compound/compound_distance.hpp"
 #include "collision/shapes/hull.hpp"
 #include "scene/model/model.hpp"
@@ -17,6 +18,11 @@ struct BodyShape {
   /// Kinematic bodies: a hull per closed convex shell, otherwise one hull of three vertices per
   /// triangle. Rigid bodies and triggers: the convex hull of each connected piece.
   std::vector<collision::Hull> parts;
+  std::vector<collision::SupportTable> partSupports;  ///< of `parts`, for their boxes
+  /// Convex hull of all parts and its support table, for the box of the body; not set with one
+  /// part.
+  collision::Hull outline;
+  collision::SupportTable outlineSupport;
   Vec3 origin = Vec3::Zero();   ///< of the body's frame as authored, scene frame, metres
   collision::BoxTree tree;      ///< over `parts`, body frame
   Aabb box;                     ///< of all parts, body frame

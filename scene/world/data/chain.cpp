@@ -38,6 +38,7 @@ Chain makeChain(const Spawn& order, const Mat3& avatarFromBase) {
     chainLink.joint = link.joint;
     chainLink.joint.axis = link.joint.axis.normalized();
     chainLink.hull = std::make_shared<const collision::Hull>(collision::buildHull(link.points));
+    chainLink.support = collision::buildSupportTable(*chainLink.hull);
     chainLink.value = chainLink.target = link.value;
     chain.links.push_back(std::move(chainLink));
   }
@@ -68,11 +69,16 @@ std::vector<LinkPose> computeLinkPoses(const Chain& chain) {
 }
 
 std::shared_ptr<const AvatarShape> makeChainShape(const std::vector<AvatarPart>& base,
-                                                  const Chain& chain) {
+                                                  Chain& chain) {
   std::vector<AvatarPart> parts = base;
   const std::vector<LinkPose> poses = computeLinkPoses(chain);
-  for (std::size_t i = 0; i < poses.size(); ++i)
-    parts.push_back(makeAvatarPart(chain.links[i].hull, poses[i].origin, poses[i].rotation));
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    ChainLink& link = chain.links[i];
+    const LinkPose& pose = poses[i];
+    const Aabb box = computeAabb(*link.hull, link.support, pose.rotation, pose.origin,
+                                 link.lastExtremes, chain.verticesLookedAt);
+    parts.push_back({link.hull, pose.origin, pose.rotation, !pose.rotation.isIdentity(0), box});
+  }
   return makeAvatarShape(std::move(parts));
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "collision/bounds/bounding_box.hpp"
 #include "scene/world/data/avatar_shape.hpp"
 #include "scene/world/data/orders.hpp"
 #include "scene/world/data/snapshot.hpp"
@@ -15,6 +16,8 @@ struct ChainLink {
   std::int32_t parent = -1;
   LinkJoint joint;  ///< `axis` has unit length
   std::shared_ptr<const collision::Hull> hull;
+  collision::SupportTable support;           ///< of `hull`, for its box
+  collision::ExtremalVertices lastExtremes;  ///< cost only
   double maxRadius = 0;  ///< metres: bound on the distance of moved points from the joint
 
   double value = 0;   ///< radians or metres
@@ -26,8 +29,9 @@ struct Chain {
   std::vector<ChainLink> links;
   Mat3 avatarFromBase = Mat3::Identity();  ///< rotation by Spawn::facing
   bool selfContact = false;
-  double speed = 0;        ///< rad/s or m/s; 0: not driven
-  double timeoutLeft = 0;  ///< seconds
+  double speed = 0;                    ///< rad/s or m/s; 0: not driven
+  double timeoutLeft = 0;              ///< seconds
+  std::uint64_t verticesLookedAt = 0;  ///< for boxes of links, since the end of the last tick
 };
 
 /// Pose of a link's frame; `rotation` is avatarFromLink.
@@ -43,9 +47,10 @@ Chain makeChain(const Spawn& order, const Mat3& avatarFromBase);
 /// Forward kinematics: poses of all links for the current joint values.
 std::vector<LinkPose> computeLinkPoses(const Chain& chain);
 
-/// Shape of `base` and the links at their current poses; the parts of the base come first.
+/// Shape of `base` and the links at their current poses; the parts of the base come first. Updates
+/// only the chain's extremal vertices and counters.
 std::shared_ptr<const AvatarShape> makeChainShape(const std::vector<AvatarPart>& base,
-                                                  const Chain& chain);
+                                                  Chain& chain);
 
 /// True if joint `joint` moves link `link`: the joint of the link itself or of an ancestor.
 bool doesJointMoveLink(const Chain& chain, std::size_t joint, std::size_t link);

@@ -99,6 +99,8 @@ struct TickReport {
   std::uint32_t narrowQueries = 0;          ///< by shape casts, contacts and the solver
   std::uint32_t rationalQueries = 0;        ///< of those, decided by exact arithmetic
   std::uint32_t iterationLimitedCasts = 0;  ///< shape casts stopped at their iteration limit
+  std::uint64_t verticesLookedAt = 0;       ///< for the boxes of moving bodies and chain links
+  std::uint64_t partBoxesMade = 0;          ///< of bodies with several parts
   std::uint32_t activeContacts = 0;
   std::uint32_t crushedBodies = 0;  ///< penetrating pairs of a kinematic and a rigid body
   /// Maximum depth of avatars and rigid bodies, metres, by the exact verdict; 0: no penetration.

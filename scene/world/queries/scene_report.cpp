@@ -2,32 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
-#include <string_view>
+
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {
-
-/// Counts diagnostics by kind and keeps the first example.
-class DiagnosticCounter {
- public:
-  explicit DiagnosticCounter(std::vector<Diagnostic>& diagnostics) : diagnostics_(diagnostics) {}
-
-  void add(const char* kind, std::size_t count, const std::string& example) {
-    if (count == 0) return;
-    const auto known =
-        std::find_if(diagnostics_.begin(), diagnostics_.end(),
-                     [&](const Diagnostic& diagnostic) { return diagnostic.kind == kind; });
-    if (known == diagnostics_.end()) {
-      diagnostics_.push_back({kind, count, example});
-    } else {
-      known->count += count;
-    }
-  }
-
- private:
-  std::vector<Diagnostic>& diagnostics_;
-};
 
 bool hasDiagnostic(const std::vector<Diagnostic>& diagnostics, const char* kind) {
   return std::any_of(diagnostics.begin(), diagnostics.end(),
@@ -36,20 +15,21 @@ bool hasDiagnostic(const std::vector<Diagnostic>& diagnostics, const char* kind)
 
 /// Adds the defects of a shape, with the first object that has it as example.
 void countShapeDefects(const Shape& shape, const std::string& path, bool degenerateReported,
-                       DiagnosticCounter& counter) {
-  if (!degenerateReported) counter.add("degenerate_triangle", shape.degenerate, path);
-  counter.add("duplicate_triangle", shape.duplicate, path);
-  counter.add("inconsistent_winding", shape.flippedTriangles, path);
-  counter.add("non_manifold_edge", shape.nonManifoldEdges, path);
-  counter.add("convexity_untried", shape.notTested, path);
+                       std::vector<Diagnostic>& diagnostics) {
+  if (!degenerateReported)
+    addDiagnostic(diagnostics, "degenerate_triangle", path, shape.degenerate);
+  addDiagnostic(diagnostics, "duplicate_triangle", path, shape.duplicate);
+  addDiagnostic(diagnostics, "inconsistent_winding", path, shape.flippedTriangles);
+  addDiagnostic(diagnostics, "non_manifold_edge", path, shape.nonManifoldEdges);
+  addDiagnostic(diagnostics, "convexity_untried", path, shape.notTested);
 }
 
-void countShell(const Shape& shape, const Shell& shell, const Object& object, SceneReport& report,
-                DiagnosticCounter& counter) {
+void countShell(const Shape& shape, const Shell& shell, const Object& object,
+                SceneReport& report) {
   ShellCounts& shells = report.shells;
   const bool hull = isTreatedAsHull(shape, shell, object.worldFromMesh);
   (hull ? report.hullTriangles : report.partTriangles) += shell.count;
-  if (hull && shell.inward) counter.add("inside_out_solid", 1, object.path);
+  if (hull && shell.inward) addDiagnostic(report.diagnostics, "inside_out_solid", object.path);
   if (hull) {
     ++(shell.kind == Shell::Kind::convex ? shells.exact : shells.nearlyConvex);
   } else if (shell.isConvex() && shell.hollow) {
@@ -58,7 +38,7 @@ void countShell(const Shape& shape, const Shell& shell, const Object& object, Sc
     ++shells.inward;
     if (!shape.shells.empty() && std::none_of(shape.shells.begin(), shape.shells.end(),
                                               [](const Shell& s) { return s.hollow; })) {
-      counter.add("inward_shell", 1, object.path);
+      addDiagnostic(report.diagnostics, "inward_shell", object.path);
     }
   } else {
     ++(shell.bounds() ? shells.closed : shells.open);
@@ -77,7 +57,7 @@ TransformKey makeTransformKey(const Object& object) {
 }
 
 /// Counts objects with the same shape and the same transform.
-void countRepeatedObjects(const Scene& scene, DiagnosticCounter& counter) {
+void countRepeatedObjects(const Scene& scene, std::vector<Diagnostic>& diagnostics) {
   const auto& objects = scene.model().objects;
   const auto less = [&](std::uint32_t a, std::uint32_t b) {
     const std::uint32_t shapeA = scene.shapeIndex(a), shapeB = scene.shapeIndex(b);
@@ -87,7 +67,8 @@ void countRepeatedObjects(const Scene& scene, DiagnosticCounter& counter) {
   std::vector<std::uint32_t> order = scene.solidObjects();
   std::stable_sort(order.begin(), order.end(), less);
   for (std::size_t i = 1; i < order.size(); ++i) {
-    if (!less(order[i - 1], order[i])) counter.add("repeated_object", 1, objects[order[i]].path);
+    if (!less(order[i - 1], order[i]))
+      addDiagnostic(diagnostics, "repeated_object", objects[order[i]].path);
   }
 }
 
@@ -118,7 +99,6 @@ SceneReport makeSceneReport(const Scene& scene) {
     report.uniqueTriangles += mesh.triangleCount();
     report.uniquePositions += mesh.positions.size();
   }
-  DiagnosticCounter counter(report.diagnostics);
   const bool degenerateReported = hasDiagnostic(model.diagnostics, "degenerate_triangle");
   std::vector<bool> seen(scene.shapeCount(), false);
   for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
@@ -127,15 +107,15 @@ SceneReport makeSceneReport(const Scene& scene) {
       report.triangles += model.meshes[mesh].triangleCount();
     const Shape& shape = scene.shape(i);
     if (!seen[scene.shapeIndex(i)])
-      countShapeDefects(shape, object.path, degenerateReported, counter);
+      countShapeDefects(shape, object.path, degenerateReported, report.diagnostics);
     seen[scene.shapeIndex(i)] = true;
-    for (const Shell& shell : shape.shells) countShell(shape, shell, object, report, counter);
+    for (const Shell& shell : shape.shells) countShell(shape, shell, object, report);
     const bool solid = !computeAuthoredAabb(scene, i).empty();
-    if (!solid) counter.add("object_without_area", 1, object.path);
+    if (!solid) addDiagnostic(report.diagnostics, "object_without_area", object.path);
     const bool counts = solid && !object.partOf && object.usage != Object::Usage::visualOnly;
     report.solidObjects += counts ? 1 : 0;
   }
-  countRepeatedObjects(scene, counter);
+  countRepeatedObjects(scene, report.diagnostics);
   return report;
 }
 

@@ -14,7 +14,6 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace enfilade::scene {

@@ -1,8 +1,6 @@
 // Conversion of Enfilade's plain data to Foxglove messages.
 #pragma once
 
-#include <string>
-
 #include "protocol/foxglove.pb.h"
 #include "scene/world/world.hpp"
 

@@ -1,4 +1,4 @@
-#include "scene/import/file/add_diagnostic.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 #include <algorithm>
 

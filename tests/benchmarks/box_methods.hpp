@@ -1,0 +1,25 @@
+// The benchmarked ways to compute the box of a turning body: ours, and the peers that are
+// installed.
+#pragma once
+
+#include "collision/bounds/bounding_box.hpp"
+#include "tests/benchmarks/box_method.hpp"
+
+namespace enfilade::benchmarks {
+
+inline const char* nameOf(collision::AabbMethod method) {
+  switch (method) {
+    case collision::AabbMethod::sphereCube:
+      return "sphere cube";
+    case collision::AabbMethod::vertexScan:
+      return "vertex scan";
+    case collision::AabbMethod::hillClimb:
+      return "hill climb";
+  }
+  return "";
+}
+
+/// Our three methods, "recompute" (every vertex by a matrix product, as before them), the peers.
+std::vector<BoxMethod> boxMethods();
+
+}  // namespace enfilade::benchmarks

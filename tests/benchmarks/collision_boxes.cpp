@@ -1,0 +1,164 @@
+// Boxes of turning bodies (Lin 1993, section 5.2.1): cost of each method, vertices that it looks
+// at, size of its box, and boxes that do not contain the body, by rationals.
+//
+//   collision_boxes [--quick] [--out FILE] [--only PART_OF_A_METHOD]
+//
+// 1,000 bodies with the same hull, an ellipsoid of 8, 22, 106 or 500 vertices and half axes of 0.2,
+// 0.15 and 0.1 m. Each turns about its own axis by 2 or 10 degrees a tick. In every tick each
+// method computes all boxes; the methods take turns, so that they meet the same machine.
+#include <gmpxx.h>
+
+#include <numbers>
+
+#include "tests/benchmarks/box_methods.hpp"
+#include "tests/benchmarks/measurement.hpp"
+#include "tests/benchmarks/random.hpp"
+
+namespace enfilade::benchmarks {
+namespace {
+
+constexpr std::size_t kBodies = 1000;
+constexpr double kRadiansPerDegree = std::numbers::pi / 180;
+
+Hull makeEllipsoid(Random& random, std::size_t vertices) {
+  std::vector<Vec3> points;
+  for (std::size_t k = 0; k < vertices; ++k)
+    points.push_back(direction(random).cwiseProduct(Vec3(0.2, 0.15, 0.1)));
+  return collision::buildHull(points);
+}
+
+/// Bodies that turn about their own axes, each by the same angle a tick.
+class Turning {
+ public:
+  Turning(Random& random, double degrees) {
+    for (std::size_t k = 0; k < kBodies; ++k) {
+      const Vec3 axis = direction(random);
+      const double x = uniform(random, -50, 50), y = uniform(random, 0, 3),
+                   z = uniform(random, -50, 50);
+      poses_.push_back({Quat::Identity(), Mat3::Identity(), Vec3(x, y, z)});
+      steps_.emplace_back(Eigen::AngleAxisd(degrees * kRadiansPerDegree, axis));
+    }
+  }
+  const std::vector<TurnedPose>& next() {
+    for (std::size_t k = 0; k < kBodies; ++k) {
+      poses_[k].orientation = (steps_[k] * poses_[k].orientation).normalized();
+      poses_[k].rotation = poses_[k].orientation.toRotationMatrix();
+    }
+    return poses_;
+  }
+
+ private:
+  std::vector<TurnedPose> poses_;
+  std::vector<Quat> steps_;
+};
+
+using Rationals = std::array<mpq_class, 3>;
+using RationalMatrix = std::array<Rationals, 3>;
+
+RationalMatrix makeMatrix(const Mat3& rotation) {
+  RationalMatrix rows;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      rows[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] = rotation(i, j);
+  return rows;
+}
+
+/// The rotation of the quaternion after exact normalisation.
+RationalMatrix makeMatrix(const Quat& q) {
+  const mpq_class w(q.w()), x(q.x()), y(q.y()), z(q.z());
+  const mpq_class n = w * w + x * x + y * y + z * z;
+  RationalMatrix rows{Rationals{n - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+                      Rationals{2 * (x * y + w * z), n - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+                      Rationals{2 * (x * z - w * y), 2 * (y * z + w * x), n - 2 * (x * x + y * y)}};
+  for (Rationals& row : rows)
+    for (mpq_class& entry : row) entry /= n;
+  return rows;
+}
+
+bool containsExactly(const Aabb& box, const Hull& hull, const RationalMatrix& rotation,
+                     const Vec3& translation) {
+  for (const Vec3& v : hull.vertices) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto k = static_cast<int>(axis);
+      const Rationals& row = rotation[axis];
+      const mpq_class at = row[0] * v.x() + row[1] * v.y() + row[2] * v.z() + translation[k];
+      if (at < box.min[k] || at > box.max[k]) return false;
+    }
+  }
+  return true;
+}
+
+struct Contestant {
+  std::string name;
+  std::unique_ptr<BoxUpdate> update;
+  std::vector<Aabb> boxes;
+  std::vector<double> nanoseconds;  ///< a box, per tick
+  std::size_t checked = 0, notConservative = 0;
+  double volume = 0;
+};
+
+void checkBoxes(Contestant& one, const Hull& hull, const std::vector<TurnedPose>& poses,
+                std::size_t stride) {
+  for (std::size_t k = 0; k < poses.size(); k += stride) {
+    const TurnedPose& pose = poses[k];
+    const bool contains =
+        containsExactly(one.boxes[k], hull, makeMatrix(pose.rotation), pose.translation) &&
+        containsExactly(one.boxes[k], hull, makeMatrix(pose.orientation), pose.translation);
+    ++one.checked;
+    one.notConservative += contains ? 0 : 1;
+  }
+}
+
+void measure(std::size_t vertices, double degrees, const Arguments& arguments, Results& results) {
+  Random random(vertices);
+  const Hull hull = makeEllipsoid(random, vertices);
+  Turning turning(random, degrees);
+  std::vector<Contestant> all;
+  for (const BoxMethod& method : boxMethods()) {
+    if (!arguments.wants(method.name)) continue;
+    all.push_back({method.name, method.make(hull, kBodies), std::vector<Aabb>(kBodies), {}});
+  }
+  const std::size_t ticks = arguments.quick ? 20 : 200;
+  for (std::size_t tick = 0; tick < ticks; ++tick) {
+    const std::vector<TurnedPose>& poses = turning.next();
+    for (std::size_t turn = 0; turn < all.size(); ++turn) {
+      Contestant& one = all[(tick + turn) % all.size()];
+      const auto start = Clock::now();
+      one.update->update(poses, one.boxes);
+      one.nanoseconds.push_back(1e9 * secondsSince(start) / kBodies);
+      for (const Aabb& box : one.boxes) one.volume += box.size().prod();
+      if (tick % 20 == 19) checkBoxes(one, hull, poses, 1 + vertices / 8);
+    }
+  }
+  const std::string chosen = nameOf(collision::chooseAabbMethod(hull));
+  for (const Contestant& one : all) {
+    const double boxes = static_cast<double>(ticks * kBodies);
+    const double looked = static_cast<double>(one.update->looked()) / boxes;
+    const double time = quantile(one.nanoseconds, 0.5);
+    std::printf(
+        "%4zu vertices %3g degrees | %-12s %8.1f ns %8.1f vertices a box | mean volume "
+        "%8.5f m3 | %zu of %zu not conservative%s\n",
+        hull.vertices.size(), degrees, one.name.c_str(), time, looked, one.volume / boxes,
+        one.notConservative, one.checked, one.name == chosen ? " | chosen" : "");
+    results.add({{"vertices", hull.vertices.size()},
+                 {"degrees", degrees},
+                 {"method", one.name},
+                 {"ns", number(time)},
+                 {"looked", looked},
+                 {"volume", one.volume / boxes},
+                 {"checked", one.checked},
+                 {"not_conservative", one.notConservative},
+                 {"chosen", one.name == chosen}});
+  }
+}
+
+}  // namespace
+}  // namespace enfilade::benchmarks
+
+int main(int argc, char** argv) {
+  using namespace enfilade::benchmarks;
+  const Arguments arguments(argc, argv);
+  Results results(arguments);
+  for (const std::size_t vertices : {8u, 22u, 106u, 500u})
+    for (const double degrees : {2.0, 10.0}) measure(vertices, degrees, arguments, results);
+}
