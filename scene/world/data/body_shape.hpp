@@ -6,7 +6,7 @@
 #include <map>
 #include <vector>
 
-#include "collision/compound/compound_distance.hpp"
+#include "collision/compound/compound_view.hpp"
 #include "collision/shapes/hull.hpp"
 #include "scene/model/model.hpp"
 #include "scene/model/shapes/shape.hpp"

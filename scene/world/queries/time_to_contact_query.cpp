@@ -17,6 +17,8 @@
 #include <cmath>
 #include <limits>
 
+#include "collision/compound/nearest_parts.hpp"
+
 namespace enfilade::scene {
 namespace {
 
