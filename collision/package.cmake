@@ -8,10 +8,11 @@ set(public_headers
   bounds/bounding_box.hpp
   broad_phase/broad_phase_audit.hpp
   broad_phase/sort_and_sweep.hpp
-  compound/compound_distance.hpp
-  compound/compound_shape.hpp
+  compound/compound_view.hpp
   compound/hull_planes.hpp
   compound/mesh_query.hpp
+  compound/nearest_parts.hpp
+  compound/overlapping_parts.hpp
   compound/query_bounds.hpp
   minkowski/feature_cache.hpp
   minkowski/verdict.hpp

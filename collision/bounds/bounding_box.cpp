@@ -220,6 +220,10 @@ double computeMeanWidth(const Hull& hull) {
   return sum / directions;
 }
 
+double estimateScanCost(const Hull& hull) {
+  return kScanCost + kScanCostPerVertex * static_cast<double>(hull.vertices.size());
+}
+
 /// Bodies of its own kind that overlap the cube of a body and not its tight box, if these bodies
 /// lie side by side: an upper bound for what the cube costs.
 double estimateFalsePairs(const Hull& hull) {
@@ -268,9 +272,12 @@ Aabb computeTightAabb(const Hull& hull, const Mat3& rotation, const Vec3& transl
 
 AabbMethod chooseAabbMethod(const Hull& hull) {
   const double cube = kCubeCost + kPairCost * estimateFalsePairs(hull);
-  const double scan = kScanCost + kScanCostPerVertex * static_cast<double>(hull.vertices.size());
-  if (cube < std::min(scan, kClimbCost)) return AabbMethod::sphereCube;
-  return scan <= kClimbCost ? AabbMethod::vertexScan : AabbMethod::hillClimb;
+  return cube < std::min(estimateScanCost(hull), kClimbCost) ? AabbMethod::sphereCube
+                                                             : chooseTightMethod(hull);
+}
+
+AabbMethod chooseTightMethod(const Hull& hull) {
+  return estimateScanCost(hull) <= kClimbCost ? AabbMethod::vertexScan : AabbMethod::hillClimb;
 }
 
 }  // namespace enfilade::collision

@@ -58,5 +58,7 @@ Aabb computeTightAabb(const Hull& hull, const Mat3& rotation, const Vec3& transl
 /// The method that costs least per tick for a body that turns by a few degrees, including the
 /// narrow-phase queries that a larger box causes among bodies of its own size.
 AabbMethod chooseAabbMethod(const Hull& hull);
+/// The cheaper of the two tight methods.
+AabbMethod chooseTightMethod(const Hull& hull);
 
 }  // namespace enfilade::collision

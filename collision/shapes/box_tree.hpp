@@ -1,4 +1,4 @@
-// Binary bounding volume hierarchy over axis-aligned boxes. TriangleTree and CompoundShape use it.
+// Binary bounding volume hierarchy over axis-aligned boxes. TriangleTree and CompoundView use it.
 #pragma once
 
 #include <array>

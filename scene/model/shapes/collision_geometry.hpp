@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "collision/compound/compound_distance.hpp"
+#include "collision/compound/compound_view.hpp"
 #include "collision/narrow_phase/narrow_phase.hpp"
 #include "collision/shapes/box_tree.hpp"
 #include "collision/shapes/hull.hpp"

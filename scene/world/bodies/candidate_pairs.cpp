@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include "scene/world/bodies/physics_bodies.hpp"
 
@@ -19,8 +20,11 @@ void addPairKey(std::uint32_t physicsBody, std::uint32_t part, std::uint32_t oth
   }
 }
 
-/// Bounds of a part's motion in this tick, with the contact margin.
-Aabb computePartBounds(const WorldData& world, const Body& body, std::uint32_t part) {
+/// Parts x parts above which a front of the part trees costs less than testing all pairs.
+constexpr std::size_t kMaxPairsWithoutFront = 32;
+
+/// Bound of a body's motion in this tick, plus the contact margin, metres.
+double computeBoundsMargin(const WorldData& world, const Body& body) {
   double margin = computeContactQueryMargin(world.settings);
   // Relative to the final pose: twice the maximum displacement, in case it moved there and back.
   if (isKinematic(body.spec->kind)) margin += 2 * body.kinematicTarget.maxDisplacement;
@@ -28,7 +32,12 @@ Aabb computePartBounds(const WorldData& world, const Body& body, std::uint32_t p
     margin += world.dynamicBodies.physicsWorld
                   .bodies[world.dynamicBodies.physicsBodyOf[world.findBodyByProxy(body.proxy)]]
                   .maxStepDisplacement;
-  return inflated(getPartBox(body, part), margin);
+  return margin;
+}
+
+/// Bounds of a part's motion in this tick, with the contact margin.
+Aabb computePartBounds(const WorldData& world, const Body& body, std::uint32_t part) {
+  return inflated(getPartBox(body, part), computeBoundsMargin(world, body));
 }
 
 /// Bounds of the motion of all rigid bodies in this tick.
@@ -36,7 +45,8 @@ struct SweptBounds {
   /// By physics body of a rigid body: its bounding sphere, and the first box of its parts.
   std::vector<MotionSphere> spheres;
   std::vector<std::uint32_t> firstBox;
-  std::vector<Aabb> boxes;  ///< of parts, inflated by the contact margin
+  std::vector<double> margins;  ///< by physics body: metres by which its boxes are inflated
+  std::vector<Aabb> boxes;      ///< of parts, inflated
 
   std::span<const Aabb> findPartBoxes(std::uint32_t physicsBody) const {
     return std::span(boxes).subspan(firstBox[physicsBody],
@@ -52,6 +62,7 @@ SweptBounds computeSweptBounds(WorldData& world, ThreadPool* threadPool) {
   for (const std::uint32_t body : dynamicBodies.bodyIndices)
     bounds.firstBox.push_back(bounds.firstBox.back() + getPartCount(world.bodies[body]));
   bounds.spheres.resize(dynamicBodies.bodyIndices.size());
+  bounds.margins.resize(dynamicBodies.bodyIndices.size());
   bounds.boxes.resize(bounds.firstBox.back());
   parallelForOrSerial(
       threadPool, dynamicBodies.bodyIndices.size(), kBodiesPerTask,
@@ -59,10 +70,12 @@ SweptBounds computeSweptBounds(WorldData& world, ThreadPool* threadPool) {
         for (std::size_t i = from; i < to; ++i) {
           Body& body = world.bodies[dynamicBodies.bodyIndices[i]];
           bounds.spheres[i] = computeMotionSphere(dynamicBodies.physicsWorld.bodies[i]);
+          bounds.margins[i] = computeBoundsMargin(world, body);
           if (world.broadPhase.overlapsOf(body.proxy).empty()) continue;
           makePartBoxes(body);
           for (std::uint32_t part = 0; part < getPartCount(body); ++part)
-            bounds.boxes[bounds.firstBox[i] + part] = computePartBounds(world, body, part);
+            bounds.boxes[bounds.firstBox[i] + part] =
+                inflated(body.boxes.parts[part], bounds.margins[i]);
         }
       });
   return bounds;
@@ -80,38 +93,74 @@ struct ActiveBodyOverlaps {
   std::vector<std::pair<std::uint32_t, collision::SortAndSweep::Overlap>> others;
 };
 
-/// Appends the overlapping pairs of parts of two rigid bodies.
-void addDynamicPair(const DynamicBodies& dynamicBodies, std::uint32_t body, std::uint32_t otherBody,
-                    const SweptBounds& bounds, double margin, PairKeys& keys) {
-  const std::uint32_t physicsBody = dynamicBodies.physicsBodyOf[body],
-                      other = dynamicBodies.physicsBodyOf[otherBody];
-  if (!mayMeet(bounds.spheres[physicsBody], bounds.spheres[other], margin)) return;
-  const std::span<const Aabb> parts = bounds.findPartBoxes(physicsBody),
-                              others = bounds.findPartBoxes(other);
-  for (std::uint32_t part = 0; part < parts.size(); ++part)
-    for (std::uint32_t otherPart = 0; otherPart < others.size(); ++otherPart)
-      if (overlaps(parts[part], others[otherPart]))
-        addPairKey(physicsBody, part, other, otherPart, keys);
-}
+/// Collects the overlapping pairs of parts of an active body and other rigid bodies.
+struct DynamicPairCollector {
+  const WorldData& world;
+  const SweptBounds& bounds;
+  const std::uint32_t activeBody;
+  PartFronts& fronts;     ///< of the active body in this tick, empty at first
+  PartFronts& oldFronts;  ///< of its last active tick
+  PairKeys& keys;
 
-void addOverlaps(const WorldData& world, std::uint32_t activeBody, const SweptBounds& bounds,
+  void addBody(std::uint32_t otherBody) {
+    const std::uint32_t physicsBody = world.dynamicBodies.physicsBodyOf[activeBody],
+                        other = world.dynamicBodies.physicsBodyOf[otherBody];
+    if (!mayMeet(bounds.spheres[physicsBody], bounds.spheres[other],
+                 computeContactQueryMargin(world.settings)))
+      return;
+    const std::span<const Aabb> parts = bounds.findPartBoxes(physicsBody),
+                                others = bounds.findPartBoxes(other);
+    if (parts.size() * others.size() > kMaxPairsWithoutFront) return addByFront(otherBody);
+    for (std::uint32_t part = 0; part < parts.size(); ++part)
+      for (std::uint32_t otherPart = 0; otherPart < others.size(); ++otherPart)
+        if (overlaps(parts[part], others[otherPart]))
+          addPairKey(physicsBody, part, other, otherPart, keys);
+  }
+
+ private:
+  void addByFront(std::uint32_t otherBody) {
+    const std::uint32_t physicsBody = world.dynamicBodies.physicsBodyOf[activeBody],
+                        other = world.dynamicBodies.physicsBodyOf[otherBody];
+    collision::PartFront& front = fronts[other];
+    if (const auto old = oldFronts.find(other); old != oldFronts.end())
+      front = std::move(old->second);
+    const collision::CompoundView view = makeView(activeBody), otherView = makeView(otherBody);
+    std::vector<collision::PartPair> pairs;
+    collision::findOverlappingParts(
+        {view, bounds.findPartBoxes(physicsBody), bounds.margins[physicsBody]},
+        {otherView, bounds.findPartBoxes(other), bounds.margins[other]}, front, pairs);
+    for (const auto& [part, otherPart] : pairs)
+      addPairKey(physicsBody, part, other, otherPart, keys);
+  }
+
+  collision::CompoundView makeView(std::uint32_t index) const {
+    const Body& body = world.bodies[index];
+    return makeCompoundView(*body.shape, {body.orientation, body.position});
+  }
+};
+
+void addOverlaps(WorldData& world, std::uint32_t activeBody, const SweptBounds& bounds,
                  std::span<const std::uint8_t> isActive, ActiveBodyOverlaps& found) {
-  const DynamicBodies& dynamicBodies = world.dynamicBodies;
-  const double margin = computeContactQueryMargin(world.settings);
+  DynamicBodies& dynamicBodies = world.dynamicBodies;
+  // Only this call uses the fronts of the active body. Those without an overlap are dropped.
+  PartFronts& fronts = dynamicBodies.partFronts[dynamicBodies.physicsBodyOf[activeBody]];
+  PartFronts oldFronts = std::exchange(fronts, {});
+  DynamicPairCollector collector{world, bounds, activeBody, fronts, oldFronts, found.pairs};
   for (const auto& overlap : world.broadPhase.overlapsOf(world.bodies[activeBody].proxy)) {
     const std::uint32_t otherBody = overlap.isDynamic ? world.findBodyByProxy(overlap.id) : kNoBody;
     if (otherBody == kNoBody || !isDynamic(dynamicBodies, otherBody)) {
       found.others.emplace_back(activeBody, overlap);
     } else if (otherBody > activeBody ||
                isActive[otherBody] == 0) {  // the first of two active ones adds the pair
-      addDynamicPair(dynamicBodies, activeBody, otherBody, bounds, margin, found.pairs);
+      collector.addBody(otherBody);
     }
   }
 }
 
-ActiveBodyOverlaps collectOverlaps(const WorldData& world, const SweptBounds& bounds,
+ActiveBodyOverlaps collectOverlaps(WorldData& world, const SweptBounds& bounds,
                                    ThreadPool* threadPool) {
-  const DynamicBodies& dynamicBodies = world.dynamicBodies;
+  DynamicBodies& dynamicBodies = world.dynamicBodies;
+  dynamicBodies.partFronts.resize(dynamicBodies.bodyIndices.size());
   std::vector<std::uint8_t> isActive(world.bodies.size(), 0);
   for (const std::uint32_t i : dynamicBodies.activeBodies) isActive[i] = 1;
   std::vector<ActiveBodyOverlaps> blocks(dynamicBodies.activeBodies.size() / kBodiesPerTask + 1);

@@ -68,6 +68,7 @@ void restorePhysicsBodies(const Reader& a, WorldData& world) {
   physicsBodies.clear();
   physicsBodies.resize(count);
   dynamicBodies.entities.assign(count, 0);
+  dynamicBodies.partFronts.clear();
   dynamicBodies.sceneBodyOf.assign(count, kNoBody);
   dynamicBodies.physicsBodyOf.assign(world.bodies.size(), kNoBody);
   std::vector<std::uint8_t> claimed(count, 0);
@@ -103,14 +104,14 @@ void archivePhysicsBody(A& a, MaybeConst<A, WorldData>& world, EntityId entity, 
 }
 
 /// Members that are not written follow from the scene and the written ones: `bodyIndices`,
-/// `entities`, `sceneBodyOf`, `physicsBodyOf`. The thread pool is not part of the state.
-/// `activeBodies` are found before use, and `lastReport` is reported only in the tick that produced
-/// it.
+/// `entities`, `sceneBodyOf`, `physicsBodyOf`. The thread pool and `partFronts` are not part of
+/// the state. `activeBodies` are found before use, and `lastReport` is reported only in the tick
+/// that produced it.
 template <class A>
 void archiveDynamicBodies(A& a, MaybeConst<A, WorldData>& world) {
   auto& [physicsWorld, bodyIndices, physicsBodyByPart, entities, freeSlots, sceneBodyOf,
-         physicsBodyOf, threadPool, threadPoolSize, maxThreads, activeBodies, lastReport,
-         avatarBodyPairs] = world.dynamicBodies;
+         physicsBodyOf, threadPool, threadPoolSize, maxThreads, activeBodies, partFronts,
+         lastReport, avatarBodyPairs] = world.dynamicBodies;
   auto& [physicsBodies, joints, pairs] = physicsWorld;
   if (!joints.empty()) throw std::logic_error("checkpoints do not support physics joints");
   a(physicsBodyByPart, freeSlots);

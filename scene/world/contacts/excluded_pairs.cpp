@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "collision/compound/nearest_parts.hpp"
 #include "collision/narrow_phase/refine.hpp"
 #include "scene/world/data/body.hpp"
 

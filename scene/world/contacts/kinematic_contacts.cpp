@@ -12,6 +12,7 @@
 #include <set>
 #include <utility>
 
+#include "collision/compound/nearest_parts.hpp"
 #include "collision/narrow_phase/refine.hpp"
 #include "scene/world/contacts/body_contacts.hpp"
 #include "scene/world/contacts/body_sweep.hpp"

@@ -196,7 +196,9 @@ void computeExtents(BodyShape& shape) {
 void buildSupportTables(BodyShape& shape) {
   std::vector<Vec3> points;
   for (const Hull& hull : shape.parts) {
-    shape.partSupports.push_back(collision::buildSupportTable(hull));
+    const bool isSingle = shape.parts.size() == 1;
+    shape.partSupports.push_back(collision::buildSupportTable(
+        hull, isSingle ? collision::chooseAabbMethod(hull) : collision::chooseTightMethod(hull)));
     points.insert(points.end(), hull.vertices.begin(), hull.vertices.end());
   }
   if (shape.parts.size() == 1) return;
@@ -233,6 +235,15 @@ BodyShape buildBodyShape(const Model& model, const BodySpec& spec, MeshShapeCach
   shape.tree = collision::buildBoxTree(boxes, 1);
   buildSupportTables(shape);
   return shape;
+}
+
+Eigen::Affine3d computeWorldFromAuthored(const BodyShape& shape,
+                                         const collision::Pose& worldFromBody) {
+  Eigen::Affine3d worldFromAuthored = Eigen::Affine3d::Identity();
+  worldFromAuthored.translate(worldFromBody.translation)
+      .rotate(worldFromBody.rotation)
+      .translate(-shape.origin);
+  return worldFromAuthored;
 }
 
 collision::CompoundView makeCompoundView(const BodyShape& shape,

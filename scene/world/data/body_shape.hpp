@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "collision/bounds/bounding_box.hpp"
-#include "collision/compound/compound_distance.hpp"
+#include "collision/compound/compound_view.hpp"
 #include "collision/shapes/hull.hpp"
 #include "scene/model/model.hpp"
 #include "scene/model/shapes/shape.hpp"
@@ -18,7 +18,8 @@ struct BodyShape {
   /// Kinematic bodies: a hull per closed convex shell, otherwise one hull of three vertices per
   /// triangle. Rigid bodies and triggers: the convex hull of each connected piece.
   std::vector<collision::Hull> parts;
-  std::vector<collision::SupportTable> partSupports;  ///< of `parts`, for their boxes
+  /// Of `parts`, for their boxes. Those of several parts are tight, as `tree` is.
+  std::vector<collision::SupportTable> partSupports;
   /// Convex hull of all parts and its support table, for the box of the body; not set with one
   /// part.
   collision::Hull outline;
@@ -45,6 +46,10 @@ using MeshShapeCache = std::map<std::vector<std::uint32_t>, Shape>;
 /// model; missing ones are added. Throws std::invalid_argument with the body's name if no triangle
 /// of its objects has an area.
 BodyShape buildBodyShape(const Model& model, const BodySpec& spec, MeshShapeCache& cache);
+
+/// Maps a point of the model to where the body at this pose has it.
+Eigen::Affine3d computeWorldFromAuthored(const BodyShape& shape,
+                                         const collision::Pose& worldFromBody);
 
 /// The parts of `shape` at a pose. Points into `shape`, which must outlive the result.
 collision::CompoundView makeCompoundView(const BodyShape& shape,

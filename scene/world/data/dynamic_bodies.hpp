@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "collision/compound/overlapping_parts.hpp"
 #include "scene/physics/physics_world.hpp"
 #include "scene/physics/thread_pool.hpp"
 #include "scene/world/data/body.hpp"
@@ -16,6 +17,9 @@ namespace enfilade::scene {
 
 /// Block size of parallel loops over bodies.
 inline constexpr std::size_t kBodiesPerTask = 32;
+
+/// Fronts of an active body's pairs with bodies of many parts, by the other physics body.
+using PartFronts = std::map<std::uint32_t, collision::PartFront>;
 
 struct DynamicBodies {
   PhysicsWorld physicsWorld;
@@ -31,7 +35,10 @@ struct DynamicBodies {
   int threadPoolSize = 0;                    ///< threads of `threadPool`
   int maxThreads = 0;                        ///< 0: kDefaultThreads; at most the processors
   std::vector<std::uint32_t> activeBodies;   ///< awake or possibly woken in this tick, ascending
-  StepReport lastReport;                     ///< of the last tick with an awake body
+  /// By physics body of a rigid body. Not part of the state: only the cost of candidate pairs
+  /// depends on it.
+  std::vector<PartFronts> partFronts;
+  StepReport lastReport;  ///< of the last tick with an awake body
   /// Pairs of an avatar and a rigid body that exchanged an impulse in this tick, even if they are
   /// separated at its end; ascending.
   std::vector<std::pair<EntityId, EntityId>> avatarBodyPairs;

@@ -125,7 +125,7 @@ PlacedEntity makePlacedEntity(const SceneAt& sceneAt, EntityId entity) {
 }
 
 Aabb computeBodyAabb(const SceneAt& sceneAt, const BodySnapshot& body) {
-  constexpr double kRounding = 64 * 0x1p-53;  // as in collision/compound/compound_shape.cpp
+  constexpr double kRounding = 64 * 0x1p-53;  // as in collision/compound/compound_view.cpp
   const BodyShape& shape = *sceneAt.scene().bodyShape(body.index);
   const Mat3 rotation = body.pose.rotation.toRotationMatrix();
   const Vec3 middle = rotation * shape.box.centre() + body.pose.translation;

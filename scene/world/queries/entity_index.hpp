@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "collision/compound/compound_distance.hpp"
+#include "collision/compound/compound_view.hpp"
 #include "scene/world/data/scene.hpp"
 #include "scene/world/data/snapshot.hpp"
 

@@ -4,6 +4,7 @@
 #include <limits>
 #include <tuple>
 
+#include "collision/compound/nearest_parts.hpp"
 #include "collision/narrow_phase/refine.hpp"
 
 namespace enfilade::scene {

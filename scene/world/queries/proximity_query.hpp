@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "collision/narrow_phase/narrow_phase.hpp"
 #include "scene/world/queries/entity_index.hpp"
 
 namespace enfilade::scene {

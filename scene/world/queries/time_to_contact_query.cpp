@@ -16,6 +16,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "collision/compound/nearest_parts.hpp"
+
 namespace enfilade::scene {
 namespace {
 

@@ -8,21 +8,15 @@
 // Ties (all overlapping boxes have distance 0) are broken in favour of the last pair. This is a
 // depth-first descent to penetrating parts, which end the search, with few open pairs.
 //
-// Rounding. The error of a rotated box is a few units u = 2^-53 of M = |translation| + 3 * (extent
-// of the tree); see compound_shape.cpp. The pad deducted from a gap is 128u of both. It also covers
-// the subtraction and the square root.
-#include "collision/compound/compound_distance.hpp"
+// The rounding pad of both objects (compound_view.cpp) is deducted from each gap.
+#include "collision/compound/nearest_parts.hpp"
 
 #include <algorithm>
 #include <queue>
 #include <vector>
 
-#include "collision/assert.hpp"
-
 namespace enfilade::collision {
 namespace {
-
-constexpr double kRoundingPad = 128 * 0x1p-53;  // see the head of this file
 
 using Branch = BoxTree::Branch;
 
@@ -40,20 +34,6 @@ struct OpenPair {
     return gap != other.gap ? gap > other.gap : number < other.number;
   }
 };
-
-Aabb computeWorldAabb(const OpenBranch& open) {
-  const FloatAabb& box = open.branch->box;
-  const Vec3 min(box.min[0], box.min[1], box.min[2]), max(box.max[0], box.max[1], box.max[2]);
-  const CompoundView& view = *open.view;
-  const Vec3 middle = view.rotation * (0.5 * (min + max) + view.tree->origin) + view.translation;
-  const Vec3 halfExtent = view.rotation.cwiseAbs() * (0.5 * (max - min));
-  return {middle - halfExtent, middle + halfExtent};
-}
-
-double computeRoundingPad(const CompoundView& view) {
-  const double extent = view.tree->origin.cwiseAbs().maxCoeff() + view.tree->extent;
-  return kRoundingPad * (view.translation.cwiseAbs().maxCoeff() + 3 * extent);
-}
 
 /// Distance of two boxes, at least 0. `pad`: rounding error of both.
 double computeGap(const Aabb& a, const Aabb& b, double pad) {
@@ -78,19 +58,14 @@ std::vector<Item> collectItems(const OpenBranch& leaf) {
   return items;
 }
 
-bool shouldOpenA(const OpenPair& pair) {
-  if (pair.a.branch->isLeaf()) return false;
-  return pair.b.branch->isLeaf() ||
-         computeBranchSize(*pair.a.branch) >= computeBranchSize(*pair.b.branch);
-}
-
 class BestFirstSearch {
  public:
   BestFirstSearch(double within, std::size_t& budget) : limit_(within), budget_(budget) {}
 
   void pushPair(const OpenBranch& a, const OpenBranch& b) {
-    const double gap = computeGap(computeWorldAabb(a), computeWorldAabb(b),
-                                  computeRoundingPad(*a.view) + computeRoundingPad(*b.view));
+    const double gap =
+        computeGap(computeBranchAabb(*a.view, *a.branch), computeBranchAabb(*b.view, *b.branch),
+                   computeRoundingPad(*a.view) + computeRoundingPad(*b.view));
     if (gap <= limit_) open_.push({gap, ++count_, a, b});
   }
 
@@ -117,9 +92,8 @@ class BestFirstSearch {
   }
 
   void expand(const OpenPair& pair) {
-    const bool first = shouldOpenA(pair);
+    const bool first = shouldOpenFirst(*pair.a.branch, *pair.b.branch);
     const OpenBranch& opened = first ? pair.a : pair.b;
-    ENFILADE_ASSERT(!opened.branch->isLeaf());
     for (const Branch& child : opened.view->tree->nodes[opened.branch->first].children) {
       const OpenBranch one{opened.view, &child};
       if (first) pushPair(one, pair.b);
@@ -163,10 +137,6 @@ class BestFirstSearch {
 };
 
 }  // namespace
-
-Aabb computeAabb(const CompoundView& view) {
-  return inflated(computeWorldAabb({&view, &view.tree->root}), computeRoundingPad(view));
-}
 
 NearestParts findNearestParts(std::span<const CompoundView> a, std::span<const CompoundView> b,
                               double within, std::size_t& budget) {

@@ -2,25 +2,12 @@
 // two parts that attain it.
 #pragma once
 
-#include <functional>
 #include <span>
 
+#include "collision/compound/compound_view.hpp"
 #include "collision/narrow_phase/narrow_phase.hpp"
-#include "collision/shapes/box_tree.hpp"
 
 namespace enfilade::collision {
-
-/// Non-owning view of convex parts under a box tree. An object consists of one or more views.
-struct CompoundView {
-  const BoxTree* tree = nullptr;
-  Mat3 rotation = Mat3::Identity();  ///< worldFromTree
-  Vec3 translation = Vec3::Zero();   ///< metres
-  /// Maps an item of the tree to its part in the world frame.
-  std::function<PlacedConvex(std::uint32_t)> part;
-};
-
-/// Conservative world box of all parts. The tree must not be empty.
-Aabb computeAabb(const CompoundView& view);
 
 struct NearestParts {
   enum class Outcome : std::uint8_t {
