@@ -40,6 +40,7 @@
 
 #include "collision/assert.hpp"
 #include "collision/floating_point.hpp"
+#include "collision/motion/motion_bounds.hpp"
 #include "collision/narrow_phase/refine.hpp"
 
 namespace enfilade::collision {
@@ -122,14 +123,6 @@ double computeGapBound(const GapBound& f, double tau) {
     size += tau * std::abs(line.speed) + line.behind;
   }
   return value - kSlack * size;
-}
-
-/// Smallest tau > 0 with gap - tau speed - curvature tau^2 / 2 = 0; gap > 0, curvature >= 0.
-double findFirstRoot(double gap, double speed, double curvature) {
-  ENFILADE_ASSERT(gap > 0 && !(curvature < 0));
-  const double root = std::sqrt(speed * speed + 2 * curvature * gap);
-  if (speed > 0) return 2 * gap / (speed + root);
-  return curvature > 0 ? (root - speed) / curvature : kInfinity;
 }
 
 /// Time up to which f is proved positive: close to its root, at most `cap`.
