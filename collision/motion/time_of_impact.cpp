@@ -16,8 +16,9 @@
 //     in their planes. The right one accounts for all first-order terms, so the steps converge
 //     quadratically, like Newton's; without it a swinging door needs hundreds of steps. A further
 //     bound treats the bodies as solids of revolution, which only translate.
-//  4. When the steps become small, times slightly ahead are probed. A depth above the pose error
-//     proves a contact. If the pose is exact, touching proves it, too.
+//  4. When the steps become small, times slightly ahead are probed. A crossing of features proves a
+//     contact (crossing.hpp). So does a depth above the pose error and, if the pose is exact,
+//     touching.
 //
 // Departure: Mirtich bounds the speed of all points by one number and never rotates the plane.
 //
@@ -40,6 +41,7 @@
 
 #include "collision/assert.hpp"
 #include "collision/floating_point.hpp"
+#include "collision/motion/crossing.hpp"
 #include "collision/motion/motion_bounds.hpp"
 #include "collision/narrow_phase/refine.hpp"
 
@@ -390,11 +392,20 @@ class ConservativeAdvancement {
     ++probes_;
     for (double width = 0x1p-46; width <= maxWidth; width *= 4) {
       const double hi = std::min(horizon_, roundToFewBits(time_ + width * (1 + time_), width / 32));
-      if (findContactBy(hi)) return true;
+      if (findCrossingBy(hi) || findContactBy(hi)) return true;
     }
     // Grazing bodies touch at one instant. It can be detected only if it is a double, and then it
     // probably has few bits.
     return findContactBy(std::min(horizon_, findSimplestTime(time_, kNarrowWindow * (1 + time_))));
+  }
+
+  /// The interval of the proof extends as far back from time_, so that its signs are certain there.
+  /// The bodies are separated up to time_: a contact in the interval is not before it.
+  bool findCrossingBy(double hi) {
+    const double from = std::max(0.0, time_ - (hi - time_));
+    const bool cross = from < hi && isCrossingProved(a_, b_, from, hi, cache_);
+    if (cross) finish(Impact::contact, time_, hi);
+    return cross;
   }
 
   bool findContactBy(double hi) {
