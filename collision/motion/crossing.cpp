@@ -21,8 +21,10 @@
 #include <array>
 #include <cmath>
 #include <span>
+#include <vector>
 
 #include "collision/assert.hpp"
+#include "collision/exact/exact_minkowski.hpp"
 #include "collision/floating_point.hpp"
 
 namespace enfilade::collision {
@@ -194,7 +196,89 @@ class CrossingSearch {
   Signs signs_{};
 };
 
+/// The Minkowski difference B - A at time 0 and A's velocity relative to B. The bodies meet at t if
+/// t * velocity lies in the difference. Its faces are triangles (a vertex of one body, a triangle
+/// of the other) and parallelograms (an edge of each).
+class ExactTranslation {
+ public:
+  ExactTranslation(const MovingBody& a, const MovingBody& b)
+      : difference_(a.body, b.body),
+        sizeA_(static_cast<std::uint32_t>(a.body.vertices.size())),
+        sizeB_(static_cast<std::uint32_t>(b.body.vertices.size())) {
+    std::array<mpq_class, 3> velocity;
+    for (int k = 0; k < 3; ++k) {
+      velocity[k] = mpq_class(a.motion.velocity[k]) - mpq_class(b.motion.velocity[k]);
+      denominator_ = std::max(denominator_, velocity[k].get_den());  // all are powers of two
+    }
+    for (mpq_class& coordinate : velocity) coordinate *= denominator_;
+    velocity_ = {velocity[0].get_num(), velocity[1].get_num(), velocity[2].get_num()};
+  }
+
+  std::optional<mpq_class> findFirstTime() {
+    for (std::uint32_t i = 0; i < sizeA_; ++i)
+      for (std::uint32_t j = 0; j < sizeB_; ++j) addFaces({i, j});
+    return first_;
+  }
+
+ private:
+  /// Adds each face with `corner` as the one of the highest vertices.
+  void addFaces(VertexPair corner) {
+    const auto [a, b] = corner;
+    for (std::uint32_t i = 0; i < b; ++i)
+      for (std::uint32_t j = 0; j < i; ++j) addFace({{{a, b}, {a, i}, {a, j}}});
+    for (std::uint32_t i = 0; i < a; ++i)
+      for (std::uint32_t j = 0; j < i; ++j) addFace({{{a, b}, {i, b}, {j, b}}});
+    for (std::uint32_t i = 0; i < a; ++i)
+      for (std::uint32_t j = 0; j < b; ++j) addFace({{{a, b}, {i, b}, {i, j}, {a, j}}});
+  }
+
+  void addFace(const std::vector<VertexPair>& corners) {
+    std::vector<ExactPoint> points;
+    for (const VertexPair& corner : corners) points.push_back(difference_(corner));
+    const ExactPoint normal = cross(points[1] - points[0], points[2] - points[0]);
+    const Integer speed = dot(normal, velocity_), height = dot(normal, points[0]);
+    if (speed == 0) return;
+    bool anyLeft = false, anyRight = false;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Integer side = dot(velocity_, cross(points[i], points[(i + 1) % points.size()]));
+      anyLeft = anyLeft || side > 0;
+      anyRight = anyRight || side < 0;
+    }
+    if (anyLeft && anyRight) return;
+    mpq_class time(height * denominator_, speed);
+    time.canonicalize();
+    if (time < 0) return;
+    if (difference_.scale() >= 0)
+      time *= Integer(1) << static_cast<unsigned>(difference_.scale());
+    else
+      time /= Integer(1) << static_cast<unsigned>(-difference_.scale());
+    if (!first_ || time < *first_) first_ = time;
+  }
+
+  ExactMinkowskiDifference difference_;
+  std::uint32_t sizeA_, sizeB_;
+  Integer denominator_ = 1;
+  ExactPoint velocity_;  ///< times denominator_
+  std::optional<mpq_class> first_;
+};
+
+bool isSmall(const MovingBody& body) {
+  return body.body.vertices.size() <= kMaxSearchedVertices;
+}
+
 }  // namespace
+
+std::optional<double> findExactCrossingTime(const MovingBody& a, const MovingBody& b) {
+  if (a.motion.isRotating() || b.motion.isRotating() || !isSmall(a) || !isSmall(b) ||
+      a.motion.acceleration != b.motion.acceleration)
+    return std::nullopt;
+  const std::optional<mpq_class> time = ExactTranslation(a, b).findFirstTime();
+  if (!time) return std::nullopt;
+  double rounded = time->get_d();  // towards zero
+  if (mpq_class(rounded) < *time)
+    rounded = std::nextafter(rounded, std::numeric_limits<double>::infinity());
+  return rounded;
+}
 
 bool isCrossingProved(const MovingBody& a, const MovingBody& b, double from, double to,
                       const FeatureCache& features) {

@@ -3,6 +3,8 @@
 // double, as a rule.
 #pragma once
 
+#include <optional>
+
 #include "collision/motion/moving_pose.hpp"
 
 namespace enfilade::collision {
@@ -12,5 +14,10 @@ namespace enfilade::collision {
 /// vertices are searched for others.
 bool isCrossingProved(const MovingBody& a, const MovingBody& b, double from, double to,
                       const FeatureCache& features);
+
+/// For bodies of few vertices that translate uniformly relative to each other: the first crossing
+/// of a vertex and a triangle or of two edges, their boundaries included, in exact arithmetic.
+/// Seconds after time 0, rounded up. nullopt: no such crossing, or another motion.
+std::optional<double> findExactCrossingTime(const MovingBody& a, const MovingBody& b);
 
 }  // namespace enfilade::collision

@@ -17,8 +17,8 @@
 //     quadratically, like Newton's; without it a swinging door needs hundreds of steps. A further
 //     bound treats the bodies as solids of revolution, which only translate.
 //  4. When the steps become small, times slightly ahead are probed. A crossing of features proves a
-//     contact (crossing.hpp). So does a depth above the pose error and, if the pose is exact,
-//     touching.
+//     contact (crossing.hpp), even if no double is the time of the contact. So does a depth above
+//     the pose error and, if the pose is exact, touching.
 //
 // Departure: Mirtich bounds the speed of all points by one number and never rotates the plane.
 //
@@ -394,6 +394,7 @@ class ConservativeAdvancement {
       const double hi = std::min(horizon_, roundToFewBits(time_ + width * (1 + time_), width / 32));
       if (findCrossingBy(hi) || findContactBy(hi)) return true;
     }
+    if (findExactCrossing(maxWidth)) return true;
     // Grazing bodies touch at one instant. It can be detected only if it is a double, and then it
     // probably has few bits.
     return findContactBy(std::min(horizon_, findSimplestTime(time_, kNarrowWindow * (1 + time_))));
@@ -408,6 +409,15 @@ class ConservativeAdvancement {
     return cross;
   }
 
+  /// For crossings too close to an edge for findCrossingBy(). The search runs at most once.
+  bool findExactCrossing(double maxWidth) {
+    if (!exactCrossing_) exactCrossing_ = findExactCrossingTime(a_, b_).value_or(kInfinity);
+    const double hi = *exactCrossing_;
+    if (hi < time_ || hi > std::min(horizon_, time_ + maxWidth * (1 + time_))) return false;
+    finish(Impact::contact, time_, hi);
+    return true;
+  }
+
   bool findContactBy(double hi) {
     const bool meet = isContactAt(hi);
     if (meet) finish(Impact::contact, time_, hi);
@@ -420,6 +430,7 @@ class ConservativeAdvancement {
   FeatureCache& cache_;
   double time_ = 0;
   int probes_ = 0;
+  std::optional<double> exactCrossing_;  ///< seconds; empty: not searched; infinite: none
   bool ended_ = false;
   TimeOfImpact result_;
 };

@@ -228,6 +228,40 @@ TEST(Crossing, NearAnEdgeNoMissIsAContact) {
   EXPECT_GT(proved, hits / 2);
 }
 
+TEST(Crossing, AHitOfAnEdgeOrOfAVertexOfATriangleIsProved) {
+  struct Case {
+    double x, y;
+  };
+  for (const auto& [x, y] : {Case{0.5, 0.5}, Case{0.25, 0}, Case{0, 0}, Case{0, 1}}) {
+    const MovingBody a{{kPoint, {x, y, -1}}, translate({0, 0, 0.3})};
+    expectContactAtExactly(findImpact(a, {{kTriangle}, {}}, 10), 1 / mpq_class(0.3));
+  }
+}
+
+TEST(Crossing, ThinBodiesOnALatticeMeetAtTheExactTime) {
+  Random random(34);
+  int contacts = 0, aligned = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const std::vector<Vec3> pointsA = latticePoints(random, 1 + i % 3, 2);
+    const std::vector<Vec3> pointsB = latticePoints(random, 3, 2);
+    const Vec3 direction = latticePoints(random, 1, 2)[0];
+    const MovingBody a{{pointsA, -6 * direction}, translate(0.3 * direction)};
+    const MovingBody b{{pointsB}, {}};
+    FeatureCache cache;
+    if (computeSeparation(a.body, b.body, cache).verdict != Verdict::separated) continue;
+    const auto time = findFirstTime(a, b);
+    if (!time) continue;
+    const TimeOfImpact impact = findImpact(a, b, 100);
+    ASSERT_EQ(impact.impact, Impact::contact) << i;
+    ++contacts;
+    EXPECT_LE(mpq_class(impact.lo), *time) << i;
+    EXPECT_LE(impact.hi - impact.lo, 1e-12 * (1 + impact.hi)) << i;
+    aligned += mpq_class(impact.hi) < *time;  // an earlier contact within one plane
+  }
+  EXPECT_GT(contacts, 300);
+  EXPECT_LT(aligned, contacts / 10);
+}
+
 TEST(Crossing, ADoorWithoutThicknessMeetsAPoint) {
   const std::vector<Vec3> door{{0, 0, 0}, {1, 0, 0}, {1, 2, 0}, {0, 2, 0}};
   for (const double radius : {0.05, 0.3, 0.99}) {
