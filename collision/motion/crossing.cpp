@@ -15,6 +15,9 @@
 // the relative acceleration, h the length of the interval. On the chords, side() is quadratic. It
 // departs from the line between its ends by at most |d| |u1 - u0| |q1 - q0| / 4, for the changes of
 // u = xj - xi and q = xk - xi. All signs must hold by more than these bounds.
+//
+// Where these bounds do not suffice, a uniform translation is decided in exact arithmetic, as a ray
+// against the faces of the Minkowski difference.
 #include "collision/motion/crossing.hpp"
 
 #include <algorithm>
@@ -31,6 +34,7 @@ namespace enfilade::collision {
 namespace {
 
 constexpr std::size_t kMaxSearchedVertices = 4;  // of each body: at most 68 pairs of features
+constexpr std::size_t kMaxFaces = 200;           // for exact arithmetic, two microseconds each
 constexpr LongReal kSlack = 1 + 0x1p-40L;        // exceeds the rounding of the bounds
 
 /// A point, or a difference of points, at both ends of the interval.
@@ -214,10 +218,14 @@ class ExactTranslation {
     velocity_ = {velocity[0].get_num(), velocity[1].get_num(), velocity[2].get_num()};
   }
 
-  std::optional<mpq_class> findFirstTime() {
+  std::optional<CrossingTime> findFirstContact() {
     for (std::uint32_t i = 0; i < sizeA_; ++i)
       for (std::uint32_t j = 0; j < sizeB_; ++j) addFaces({i, j});
-    return first_;
+    constexpr double kNever = std::numeric_limits<double>::infinity();
+    if (!isTransversal_) return std::nullopt;
+    if (!first_) return CrossingTime{kNever, kNever};
+    const double lo = first_->get_d();  // rounds towards zero
+    return CrossingTime{lo, mpq_class(lo) == *first_ ? lo : std::nextafter(lo, kNever)};
   }
 
  private:
@@ -238,6 +246,7 @@ class ExactTranslation {
     const ExactPoint normal = cross(points[1] - points[0], points[2] - points[0]);
     const Integer speed = dot(normal, velocity_), height = dot(normal, points[0]);
     if (speed == 0) return;
+    isTransversal_ = true;
     bool anyLeft = false, anyRight = false;
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Integer side = dot(velocity_, cross(points[i], points[(i + 1) % points.size()]));
@@ -258,26 +267,27 @@ class ExactTranslation {
   ExactMinkowskiDifference difference_;
   std::uint32_t sizeA_, sizeB_;
   Integer denominator_ = 1;
-  ExactPoint velocity_;  ///< times denominator_
+  ExactPoint velocity_;         ///< times denominator_
+  bool isTransversal_ = false;  ///< the velocity is not parallel to every face
   std::optional<mpq_class> first_;
 };
 
-bool isSmall(const MovingBody& body) {
-  return body.body.vertices.size() <= kMaxSearchedVertices;
+/// Number of the faces of a difference that ExactTranslation examines.
+std::size_t countFaces(std::size_t a, std::size_t b) {
+  if (std::max(a, b) > kMaxFaces) return kMaxFaces + 1;
+  return a * (a - 1) * (a - 2) / 6 * b + b * (b - 1) * (b - 2) / 6 * a +
+         a * (a - 1) / 2 * (b * (b - 1) / 2);
 }
 
 }  // namespace
 
-std::optional<double> findExactCrossingTime(const MovingBody& a, const MovingBody& b) {
-  if (a.motion.isRotating() || b.motion.isRotating() || !isSmall(a) || !isSmall(b) ||
-      a.motion.acceleration != b.motion.acceleration)
+std::optional<CrossingTime> findExactCrossingTime(const MovingBody& a, const MovingBody& b) {
+  if (a.motion.isRotating() || b.motion.isRotating() ||
+      a.motion.acceleration != b.motion.acceleration ||
+      countFaces(a.body.vertices.size(), b.body.vertices.size()) > kMaxFaces)
     return std::nullopt;
-  const std::optional<mpq_class> time = ExactTranslation(a, b).findFirstTime();
-  if (!time) return std::nullopt;
-  double rounded = time->get_d();  // towards zero
-  if (mpq_class(rounded) < *time)
-    rounded = std::nextafter(rounded, std::numeric_limits<double>::infinity());
-  return rounded;
+  ExactTranslation translation(a, b);
+  return translation.findFirstContact();
 }
 
 bool isCrossingProved(const MovingBody& a, const MovingBody& b, double from, double to,

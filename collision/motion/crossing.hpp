@@ -15,9 +15,14 @@ namespace enfilade::collision {
 bool isCrossingProved(const MovingBody& a, const MovingBody& b, double from, double to,
                       const FeatureCache& features);
 
-/// For bodies of few vertices that translate uniformly relative to each other: the first crossing
-/// of a vertex and a triangle or of two edges, their boundaries included, in exact arithmetic.
-/// Seconds after time 0, rounded up. nullopt: no such crossing, or another motion.
-std::optional<double> findExactCrossingTime(const MovingBody& a, const MovingBody& b);
+/// Seconds, consecutive doubles or one double; infinite: the bodies never meet.
+struct CrossingTime {
+  double lo, hi;
+};
+
+/// The exact first contact of two separated bodies of few vertices that translate uniformly
+/// relative to each other. nullopt: other motions, larger bodies, or all motion is within one
+/// plane.
+std::optional<CrossingTime> findExactCrossingTime(const MovingBody& a, const MovingBody& b);
 
 }  // namespace enfilade::collision

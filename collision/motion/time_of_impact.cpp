@@ -387,14 +387,15 @@ class ConservativeAdvancement {
     return pair.error() == 0 || refined.penetration * (1 - 1e-9) > pair.error();
   }
 
-  /// Probes for a contact up to `maxWidth` (of 1 s + time) ahead, nearest times first.
+  /// Probes for a contact up to `maxWidth` (of 1 s + time) ahead, nearest times first. Returns
+  /// whether the query is decided.
   bool findContactWithin(double maxWidth) {
     ++probes_;
     for (double width = 0x1p-46; width <= maxWidth; width *= 4) {
       const double hi = std::min(horizon_, roundToFewBits(time_ + width * (1 + time_), width / 32));
       if (findCrossingBy(hi) || findContactBy(hi)) return true;
     }
-    if (findExactCrossing(maxWidth)) return true;
+    if (decideExactly()) return true;
     // Grazing bodies touch at one instant. It can be detected only if it is a double, and then it
     // probably has few bits.
     return findContactBy(std::min(horizon_, findSimplestTime(time_, kNarrowWindow * (1 + time_))));
@@ -409,12 +410,16 @@ class ConservativeAdvancement {
     return cross;
   }
 
-  /// For crossings too close to an edge for findCrossingBy(). The search runs at most once.
-  bool findExactCrossing(double maxWidth) {
-    if (!exactCrossing_) exactCrossing_ = findExactCrossingTime(a_, b_).value_or(kInfinity);
-    const double hi = *exactCrossing_;
-    if (hi < time_ || hi > std::min(horizon_, time_ + maxWidth * (1 + time_))) return false;
-    finish(Impact::contact, time_, hi);
+  /// Decides crossings too close to an edge for findCrossingBy(), and near misses.
+  bool decideExactly() {
+    if (exactlyUndecided_) return false;
+    const std::optional<CrossingTime> time = findExactCrossingTime(a_, b_);
+    exactlyUndecided_ = !time;
+    if (!time) return false;
+    if (time->hi > horizon_)
+      finish(Impact::none, horizon_, horizon_);
+    else
+      finish(Impact::contact, std::max(time->lo, time_), std::max(time->hi, time_));
     return true;
   }
 
@@ -430,7 +435,7 @@ class ConservativeAdvancement {
   FeatureCache& cache_;
   double time_ = 0;
   int probes_ = 0;
-  std::optional<double> exactCrossing_;  ///< seconds; empty: not searched; infinite: none
+  bool exactlyUndecided_ = false;
   bool ended_ = false;
   TimeOfImpact result_;
 };
