@@ -15,7 +15,8 @@ constexpr Real unitRoundoff() {
   return std::numeric_limits<Real>::epsilon() / 2;
 }
 
-inline constexpr double kRoundoff = 0x1p-53;  ///< unit roundoff of double
+inline constexpr double kRoundoff = 0x1p-53;           ///< unit roundoff of double
+inline constexpr double kRoundUpFactor = 1 + 0x1p-40;  ///< exceeds a few rounding errors
 inline constexpr LongReal kLongRoundoff = unitRoundoff<LongReal>();
 
 }  // namespace enfilade::collision

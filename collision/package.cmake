@@ -16,9 +16,10 @@ set(public_headers
   compound/query_bounds.hpp
   minkowski/feature_cache.hpp
   minkowski/verdict.hpp
+  motion/interpolated_motion.hpp
   motion/moving_pose.hpp
   motion/pair_schedule.hpp
-  motion/rotational_shape_cast.hpp
+  motion/rigid_motion.hpp
   motion/shape_cast.hpp
   motion/time_of_impact.hpp
   motion/time_to_contact.hpp

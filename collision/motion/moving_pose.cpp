@@ -2,8 +2,7 @@
 //  1. Translation: every product is exactly two doubles (Dekker 1971, no fused multiply-add). All
 //     of them are added to an expansion without error (Shewchuk 1997, Grow-Expansion). Its two
 //     leading components are kept; the others bound the error.
-//  2. Rotation: Rodrigues' formula in long double, rounded to doubles once. Sine and cosine are
-//     implemented here because those of libm differ between processors.
+//  2. Rotation: Rodrigues' formula in long double, rounded to doubles once.
 //
 // Error of a rotated point. Let eta be the unit roundoff of long double (2^-64 on x86-64) and u =
 // 2^-53. The error of the axis is 4 eta per coordinate, that of sine and cosine 8 eta, apart from
@@ -18,6 +17,7 @@
 
 #include "collision/assert.hpp"
 #include "collision/floating_point.hpp"
+#include "collision/motion/sine_cosine.hpp"
 
 namespace enfilade::collision {
 namespace {
@@ -25,11 +25,7 @@ namespace {
 using LongMat3 = Eigen::Matrix<LongReal, 3, 3>;
 
 constexpr auto kLongUnit = static_cast<double>(kLongRoundoff);
-constexpr double kMaxAngle = 1e6;   // quarters * kHalfPi[0] is exact up to 2^31 quarter turns
 constexpr double kTiny = 0x1p-900;  // the error term of a smaller product may underflow
-
-// pi/2 as a sum of three terms of 33 bits.
-constexpr std::array<double, 3> kHalfPi{0x1.921fb544p+0, 0x1.0b4611a6p-34, 0x1.3198a2ep-69};
 
 /// a + b == sum + error (Knuth).
 double twoSum(double a, double b, double& error) {
@@ -107,42 +103,6 @@ class Expansion {
   double lost_ = 0;
 };
 
-struct SineAndCosine {
-  LongReal sine, cosine;
-};
-
-/// Taylor polynomials; the truncation error is below eta for |x| <= pi/4.
-SineAndCosine computeSmallSineAndCosine(LongReal x) {
-  ENFILADE_ASSERT(std::abs(x) < 0.7854L);
-  const LongReal q = x * x;
-  LongReal sine = 0, cosine = 0;
-  for (int n = 25; n >= 3; n -= 2) sine = (1 + sine) * (-q / static_cast<LongReal>(n * (n - 1)));
-  for (int n = 26; n >= 2; n -= 2)
-    cosine = (1 + cosine) * (-q / static_cast<LongReal>(n * (n - 1)));
-  return {x * (1 + sine), 1 + cosine};
-}
-
-/// 0 <= angle <= kMaxAngle. Reduces the angle by whole quarter turns.
-SineAndCosine computeSineAndCosine(LongReal angle) {
-  ENFILADE_ASSERT(angle >= 0 && angle <= static_cast<LongReal>(kMaxAngle));
-  const auto quarters =
-      static_cast<long>(angle * LongReal{0.63661977236758134308L} + LongReal{0.5L});
-  LongReal rest = angle;
-  for (const double part : kHalfPi)
-    rest -= static_cast<LongReal>(quarters) * static_cast<LongReal>(part);
-  const auto [s, c] = computeSmallSineAndCosine(rest);
-  switch (quarters % 4) {
-    case 0:
-      return {s, c};
-    case 1:
-      return {c, -s};
-    case 2:
-      return {-s, -c};
-    default:
-      return {-c, s};
-  }
-}
-
 LongReal computeLongNorm(const LongVec3& v) {
   return std::sqrt(v.x() * v.x() + v.y() * v.y() + v.z() * v.z());
 }
@@ -160,7 +120,7 @@ Mat3 integrateRotation(const Mat3& rotation, const Vec3& angularVelocity, double
   const LongReal angle = speed * static_cast<LongReal>(time);
   if (!(angle <= static_cast<LongReal>(kMaxAngle))) return rotation;  // infinite error
   const LongVec3 k = omega / speed;
-  const auto [s, c] = computeSineAndCosine(angle);
+  const auto [s, c] = computeSineCosine(angle);
   LongMat3 increment = (1 - c) * (k * k.transpose()) + c * LongMat3::Identity();
   increment(0, 1) -= s * k.z(), increment(1, 0) += s * k.z();
   increment(0, 2) += s * k.y(), increment(2, 0) -= s * k.y();

@@ -1,114 +1,274 @@
-// Conservative advancement (Mirtich 1996, section 2.3; Lin 1993, section 5.1) for translation. If a
-// plane with normal n separates A and B by d, the motion of A by s * displacement leaves a distance
-// of at least d - s * (displacement . n). A can thus advance by (d - target) / (displacement . n).
-// The closest points are then recomputed. The first advance aims at `rest` and records its
-// fraction. The second continues to `min` to check that the obstacle really blocks the motion.
+// Shape casts by conservative advancement (conservative_advancement.hpp). The motions differ in the
+// bound of a step.
+//
+// Translation. If a plane with normal n separates A and B by d, the motion of A by s * displacement
+// leaves a distance of at least d - s * (displacement . n).
+//
+// Rotation about a fixed line. Let u be the axis and r a vertex relative to the pivot. A rotation
+// by phi moves the vertex along n by
+//   c sin(phi) + k (1 - cos(phi)),  c = n . (u x r),  k = n . (u x (u x r)),
+// whose second derivative is at most |n x u| |u x r|. Two planes are tried, and the longer step is
+// taken. A fixed plane bounds the motion of A's vertices. A plane that rotates with A bounds the
+// opposite motion of B's vertices. With the second plane, the speed of the far end of a long link
+// does not limit the approach of its face to a post.
+//
+// Uniform motion between two poses: as the rotation, about the moving origin, with a plane that
+// does not rotate. A body is near its goal most of the time, where the plane of the nearest face is
+// a good one. If both bodies move, the plane moves with the second one; if both rotate, each may
+// use up half of the gap.
+//
+// Departure: Mirtich bounds the speed of all points by one number.
 #include "collision/motion/shape_cast.hpp"
 
-#include "collision/assert.hpp"
+#include "collision/motion/conservative_advancement.hpp"
+#include "collision/motion/motion_bounds.hpp"
 #include "collision/narrow_phase/penetration_depth.hpp"
 
 namespace enfilade::collision {
 namespace {
 
-constexpr int kMaxSteps = 48;                   // steps per target; about five are usual
-constexpr double kArrivalTolerance = 1.0 / 32;  // of (rest - min): tolerance at a target
-// Of |displacement|: slower approach counts as none, because the direction of a small distance
-// between large bodies has an error of this size.
+constexpr int kMaxTranslationSteps = 48;  // per target; about five are usual
+constexpr int kMaxRotationSteps = 96;     // per target; a dozen is usual
+constexpr int kMaxScrewSteps = 200;       // two or three are usual
+// Of |displacement|, or of the radius: slower approach counts as none, because the direction of a
+// small distance between large bodies has an error of this size.
 constexpr double kGrazing = 1e-9;
+constexpr double kKeptDistanceRatio = 15.0 / 16;  // of an initial distance below min: to be kept
+constexpr double kRelativeSlack = 0x1p-40;        // of a step; more than the rounding of a root
+constexpr double kMinStepNearContact = 1.0 / 32;  // shorter steps close to contact end the cast
+constexpr double kMinStep = 1e-9;                 // shorter steps are no progress
 
-struct Advance {
-  double fraction;
-  bool reached;  ///< reached the target distance; false: passed with the whole displacement
-  bool iterationLimitReached = false;
-  SeparationResult last;
+// ---- translation -------------------------------------------------------------------------------
+
+struct TranslationCast {
+  const PlacedConvex& a;
+  const Vec3& displacement;
+  const PlacedConvex& b;
+  FeatureCache& cache;
+
+  PlacedConvex placeAt(double fraction) const {
+    PlacedConvex moved = a;
+    moved.translation += fraction * displacement;
+    return moved;
+  }
+
+  /// True if last tick's axis alone proves that A keeps `distance` from B.
+  bool isMissCertified(double distance) const {
+    const double length = cache.axis.norm();
+    if (!(length > 0)) return false;
+    const double closing = std::max(0.0, displacement.dot(cache.axis) / length);
+    const double rounding = 0x1p-49 * displacement.norm();  // product, sums, length, quotient < 10u
+    return computeSeparationLowerBound(a, b, cache) > distance + closing + rounding;
+  }
+
+  Advancement advanceTo(const TargetDistance& target, double from, ShapeCastResult& result) {
+    const double arrival = target.distance + target.tolerance;
+    return advanceConservatively(
+        from, kMaxTranslationSteps, result,
+        [&](double at) {
+          return computeSeparationWithin(placeAt(at), b, arrival + (1 - at) * displacement.norm(),
+                                         cache);
+        },
+        [&](double, const SeparationResult& separation) {
+          double closing = displacement.dot(separation.normal);
+          if (!(closing > kGrazing * displacement.norm())) closing = 0;
+          if (separation.verdict == Verdict::separated && closing == 0)
+            return std::numeric_limits<double>::infinity();
+          if (isWithin(separation, arrival)) return kArrived;
+          const double gap = separation.distance - separation.errorBound - target.distance;
+          return findFirstRoot(gap, closing, 0);
+        });
+  }
+
+  /// True if the displacement does not increase the overlap along the axis of minimum penetration.
+  /// If the bodies penetrate, sets the normal to that axis.
+  bool isLeaving(Advancement& at) {
+    if (at.separation.verdict == Verdict::penetrating) {
+      DepthCache none;
+      at.separation.normal = computePenetrationDepth(placeAt(at.fraction), b, cache, none).normal;
+    }
+    return displacement.dot(at.separation.normal) <= 0;
+  }
+
+  std::optional<TargetDistance> findSecondTarget(const Advancement&, const TargetDistance& min) {
+    return min;
+  }
 };
 
-/// True if last tick's axis alone proves that A keeps `distance` from B along the displacement.
-bool isMissCertified(const PlacedConvex& a, const Vec3& displacement, const PlacedConvex& b,
-                     double distance, const FeatureCache& cache) {
-  const double length = cache.axis.norm();
-  if (!(length > 0)) return false;
-  const double closing = std::max(0.0, displacement.dot(cache.axis) / length);
-  const double rounding = 0x1p-49 * displacement.norm();  // product, sums, length, quotient: < 10u
-  return computeSeparationLowerBound(a, b, cache) > distance + closing + rounding;
+// ---- rotation about a fixed line ---------------------------------------------------------------
+
+Vec3 placeVertex(const PlacedConvex& body, const Vec3& vertex) {
+  return (body.rotation ? Vec3(*body.rotation * vertex) : vertex) + body.translation;
 }
 
-double computeClosingSpeed(const Vec3& displacement, const SeparationResult& at) {
-  const double closing = displacement.dot(at.normal);
-  return closing > kGrazing * displacement.norm() ? closing : 0;
-}
+/// Path of a vertex that rotates about a line; the parameter is the angle.
+struct RotationPath {
+  const PlacedConvex& body;
+  Vec3 normal, pivot, axis;
+  Vec3 tangent = normal.cross(axis);  // n . (u x r) = (n x u) . r
+  double across = tangent.norm();
 
-Advance advanceTo(double target, double tolerance, double from, const PlacedConvex& a,
-                  const Vec3& displacement, const PlacedConvex& b, FeatureCache& cache,
-                  ShapeCastResult& result) {
-  Advance advance{from, false, false, {}};
-  for (int i = 0; i < kMaxSteps; ++i) {
-    ENFILADE_ASSERT(advance.fraction >= 0 && advance.fraction < 1);
-    PlacedConvex moved = a;
-    moved.translation += advance.fraction * displacement;
-    const double maxDistance = target + tolerance + (1 - advance.fraction) * displacement.norm();
-    const std::optional<SeparationResult> separation =
-        computeSeparationWithin(moved, b, maxDistance, cache);
-    ++result.queries;
-    if (!separation) return advance;  // proved out of range for the remaining motion
-    advance.last = *separation;
-    if (advance.last.certificate == Certificate::rational) ++result.exactQueries;
-    const double distance = advance.last.distance - advance.last.errorBound;
-    const bool separated = advance.last.verdict == Verdict::separated;
-    const double closing = computeClosingSpeed(displacement, advance.last);
-    if (separated && closing == 0) return advance;  // separated for the remaining motion
-    if (!separated || distance <= target + tolerance) {
-      advance.reached = true;
-      return advance;
-    }
-    const double step = (distance - target) / closing;
-    if (advance.fraction + step >= 1) return advance;
-    advance.fraction += step;
+  Vec3 arm(const Vec3& vertex) const { return placeVertex(body, vertex) - pivot; }
+  double height(const Vec3& r) const { return normal.dot(r); }
+  double speed(const Vec3& r) const { return tangent.dot(r); }
+  double curvature(const Vec3& r) const { return across * axis.cross(r).norm(); }
+};
+
+struct RotationCast {
+  const PlacedConvex& a;
+  const AxisRotation& rotation;
+  const PlacedConvex& b;
+  FeatureCache& cache;
+  Vec3 axis = rotation.angle > 0 ? rotation.axis : Vec3(-rotation.axis);
+  double angle = std::abs(rotation.angle);
+  double maxRadius = computeMaxDistance();  ///< of A's points from the pivot, metres
+
+  double computeMaxDistance() const {
+    double squared = 0;
+    for (const Vec3& v : a.vertices)
+      squared = std::max(squared, (placeVertex(a, v) - rotation.pivot).squaredNorm());
+    return std::sqrt(squared);
   }
-  advance.reached = advance.iterationLimitReached = true;
-  return advance;
-}
 
-/// For overlapping bodies: true if the displacement does not increase the overlap along the axis of
-/// minimum penetration. If the bodies penetrate, sets the normal of `at` to that axis.
-bool isSeparatingMotion(const PlacedConvex& a, const PlacedConvex& b, const Vec3& displacement,
-                        const FeatureCache& cache, SeparationResult& at) {
-  if (at.verdict == Verdict::penetrating) {
-    DepthCache none;
-    at.normal = computePenetrationDepth(a, b, cache, none).normal;
+  /// Angle (radians) up to which a gap along `normal` (from A to B) is proved to stay open.
+  double computeCertifiedAngle(const PlacedConvex& moved, const Vec3& normal, double gap) const {
+    const double fixedPlaneAngle =
+        findPlaneCrossing(a.vertices, gap, RotationPath{moved, normal, rotation.pivot, axis});
+    const double rotatingPlaneAngle =
+        findPlaneCrossing(b.vertices, gap, RotationPath{b, -normal, rotation.pivot, -axis});
+    return (1 - kRelativeSlack) * std::max(fixedPlaneAngle, rotatingPlaneAngle);
   }
-  return displacement.dot(at.normal) <= 0;
+
+  Advancement advanceTo(const TargetDistance& target, double from, ShapeCastResult& result) {
+    RigidTransform pose;
+    PlacedConvex moved;
+    return advanceConservatively(
+        from, kMaxRotationSteps, result,
+        [&](double at) {
+          pose = computeTransformAfter(a, rotation, at);
+          moved = place({a.vertices, a.hull}, pose);
+          const double maxTravel = (1 - at) * angle * maxRadius;
+          return computeSeparationWithin(moved, b, target.distance + target.tolerance + maxTravel,
+                                         cache);
+        },
+        [&](double, const SeparationResult& separation) {
+          const double gap = separation.distance - separation.errorBound - target.distance;
+          if (separation.verdict != Verdict::separated || gap <= target.tolerance) return kArrived;
+          return computeCertifiedAngle(moved, separation.normal, gap) / angle;
+        });
+  }
+
+  bool isLeaving(const Advancement&) const { return false; }
+
+  std::optional<TargetDistance> findSecondTarget(const Advancement& rest,
+                                                 const TargetDistance& min) const {
+    const SeparationResult& start = rest.separation;
+    if (rest.fraction != 0 || start.distance > min.distance + min.tolerance) return min;
+    const Vec3 r = start.pointA - rotation.pivot;
+    if (start.normal.dot(axis.cross(r)) > kGrazing * maxRadius) return std::nullopt;
+    const double kept = kKeptDistanceRatio * start.distance;
+    return TargetDistance{kept, std::min(min.tolerance, 0.25 * (start.distance - kept))};
+  }
+};
+
+// ---- uniform motion between two poses ----------------------------------------------------------
+
+/// Path of a vertex along `normal`, in the body frame at `rotation`; the parameter is the fraction.
+struct ScrewPath {
+  Vec3 localNormal, tangent;
+  double translationSpeed, curvaturePerRadius;
+
+  ScrewPath(const ScrewMotion& motion, const Vec3& relativeTranslation, const Mat3& rotation,
+            const Vec3& normal)
+      : localNormal(rotation.transpose() * normal),
+        // n . (w x r) = (n x w) . r, and n . (w x (w x r)) = (n x w) . (w x r) for any rotated r.
+        tangent(rotation.transpose() * normal.cross(motion.angle * motion.axis)),
+        translationSpeed(normal.dot(relativeTranslation)),
+        curvaturePerRadius(tangent.norm() * std::abs(motion.angle) * (1 + kRelativeSlack)) {}
+
+  const Vec3& arm(const Vec3& vertex) const { return vertex; }
+  double height(const Vec3& r) const { return localNormal.dot(r); }
+  double speed(const Vec3& r) const { return translationSpeed + tangent.dot(r); }
+  double curvature(const Vec3& r) const { return curvaturePerRadius * r.norm(); }
+};
+
+/// `query(fraction)` returns the separation; `certify(normal, gap)` the fraction for which a plane
+/// is proved to keep the gap open.
+template <class Query, class Certify>
+ShapeCastResult castScrew(const ContactOffset& offset, const Query& query, const Certify& certify) {
+  ShapeCastResult result;
+  const Advancement stop = advanceConservatively(
+      0, kMaxScrewSteps, result, query, [&](double at, const SeparationResult& separation) {
+        if (separation.verdict != Verdict::separated) return kArrived;
+        const double distance = separation.distance - separation.errorBound;
+        const double certified =
+            certify(separation.normal, std::max(0.0, distance - offset.min)) * (1 - kRelativeSlack);
+        const double minStep = distance <= offset.rest ? kMinStepNearContact : kMinStep;
+        return at + certified < 1 && certified < minStep ? kArrived : certified;
+      });
+  if (!stop.arrived) return result;
+  result.stopped = true;
+  result.iterationLimitReached = stop.iterationLimitReached;
+  result.fraction = stop.queriedFraction;
+  result.separationAtStop = stop.separation;
+  return result;
 }
 
 }  // namespace
 
 ShapeCastResult castShape(const PlacedConvex& a, const Vec3& displacement, const PlacedConvex& b,
                           const ContactOffset& offset, FeatureCache& cache) {
-  ENFILADE_ASSERT(offset.min < offset.rest);
   ShapeCastResult result;
-  if (displacement.isZero(0) || isMissCertified(a, displacement, b, offset.min, cache))
-    return result;
-
-  const double tolerance = kArrivalTolerance * (offset.rest - offset.min);
-  Advance restAdvance = advanceTo(offset.rest, tolerance, 0, a, displacement, b, cache, result);
-  if (!restAdvance.reached) return result;
-  Advance minAdvance = restAdvance;
-  const bool overlapping = restAdvance.last.verdict != Verdict::separated;
-  if (overlapping) {
-    PlacedConvex moved = a;
-    moved.translation += restAdvance.fraction * displacement;
-    if (isSeparatingMotion(moved, b, displacement, cache, restAdvance.last)) return result;
-  }
-  if (!overlapping && !restAdvance.iterationLimitReached)
-    minAdvance =
-        advanceTo(offset.min, tolerance, restAdvance.fraction, a, displacement, b, cache, result);
-  if (!minAdvance.reached) return result;
-  result.stopped = true;
-  result.iterationLimitReached = minAdvance.iterationLimitReached;
-  result.fraction = restAdvance.fraction;
-  result.separationAtStop = restAdvance.last;
+  TranslationCast cast{a, displacement, b, cache};
+  if (!displacement.isZero(0) && !cast.isMissCertified(offset.min))
+    castToOffset(cast, offset, result);
   return result;
+}
+
+ShapeCastResult castShape(const PlacedConvex& a, const AxisRotation& rotation,
+                          const PlacedConvex& b, const ContactOffset& offset, FeatureCache& cache) {
+  ShapeCastResult result;
+  if (rotation.angle == 0) return result;
+  RotationCast cast{a, rotation, b, cache};
+  castToOffset(cast, offset, result);
+  return result;
+}
+
+ShapeCastResult castShape(const MovingShape& a, const PlacedConvex& b, const ContactOffset& offset,
+                          FeatureCache& cache) {
+  RigidTransform pose;
+  return castScrew(
+      offset,
+      [&](double at) {
+        pose = computeTransformAfter(a.motion, at);
+        return std::optional(computeSeparation(place(a.shape, pose), b, cache));
+      },
+      [&](const Vec3& normal, double gap) {
+        const ScrewPath path(a.motion, a.motion.translation, pose.rotation, normal);
+        return findPlaneCrossing(a.shape.vertices, gap, path);
+      });
+}
+
+ShapeCastResult castShape(const MovingShape& a, const MovingShape& b, const ContactOffset& offset,
+                          FeatureCache& cache) {
+  RigidTransform poseA, poseB;
+  const Vec3 relativeTranslation = a.motion.translation - b.motion.translation;
+  const bool rotatesB = b.motion.angle != 0;
+  return castScrew(
+      offset,
+      [&](double at) {
+        poseA = computeTransformAfter(a.motion, at), poseB = computeTransformAfter(b.motion, at);
+        return std::optional(
+            computeSeparation(place(a.shape, poseA), place(b.shape, poseB), cache));
+      },
+      [&](const Vec3& normal, double gap) {
+        const ScrewPath pathA(a.motion, relativeTranslation, poseA.rotation, normal);
+        const double share = rotatesB ? gap / 2 : gap;
+        const double step = findPlaneCrossing(a.shape.vertices, share, pathA);
+        if (!rotatesB) return step;
+        const ScrewPath pathB(b.motion, Vec3::Zero(), poseB.rotation, -normal);
+        return std::min(step, findPlaneCrossing(b.shape.vertices, share, pathB));
+      });
 }
 
 }  // namespace enfilade::collision

@@ -16,8 +16,9 @@
 //     in their planes. The right one accounts for all first-order terms, so the steps converge
 //     quadratically, like Newton's; without it a swinging door needs hundreds of steps. A further
 //     bound treats the bodies as solids of revolution, which only translate.
-//  4. When the steps become small, times slightly ahead are probed. A depth above the pose error
-//     proves a contact. If the pose is exact, touching proves it, too.
+//  4. When the steps become small, times slightly ahead are probed. A crossing of features proves a
+//     contact (crossing.hpp), even if no double is the time of the contact. So does a depth above
+//     the pose error and, if the pose is exact, touching.
 //
 // Departure: Mirtich bounds the speed of all points by one number and never rotates the plane.
 //
@@ -40,6 +41,8 @@
 
 #include "collision/assert.hpp"
 #include "collision/floating_point.hpp"
+#include "collision/motion/crossing.hpp"
+#include "collision/motion/motion_bounds.hpp"
 #include "collision/narrow_phase/refine.hpp"
 
 namespace enfilade::collision {
@@ -122,14 +125,6 @@ double computeGapBound(const GapBound& f, double tau) {
     size += tau * std::abs(line.speed) + line.behind;
   }
   return value - kSlack * size;
-}
-
-/// Smallest tau > 0 with gap - tau speed - curvature tau^2 / 2 = 0; gap > 0, curvature >= 0.
-double findFirstRoot(double gap, double speed, double curvature) {
-  ENFILADE_ASSERT(gap > 0 && !(curvature < 0));
-  const double root = std::sqrt(speed * speed + 2 * curvature * gap);
-  if (speed > 0) return 2 * gap / (speed + root);
-  return curvature > 0 ? (root - speed) / curvature : kInfinity;
 }
 
 /// Time up to which f is proved positive: close to its root, at most `cap`.
@@ -392,16 +387,40 @@ class ConservativeAdvancement {
     return pair.error() == 0 || refined.penetration * (1 - 1e-9) > pair.error();
   }
 
-  /// Probes for a contact up to `maxWidth` (of 1 s + time) ahead, nearest times first.
+  /// Probes for a contact up to `maxWidth` (of 1 s + time) ahead, nearest times first. Returns
+  /// whether the query is decided.
   bool findContactWithin(double maxWidth) {
     ++probes_;
     for (double width = 0x1p-46; width <= maxWidth; width *= 4) {
       const double hi = std::min(horizon_, roundToFewBits(time_ + width * (1 + time_), width / 32));
-      if (findContactBy(hi)) return true;
+      if (findCrossingBy(hi) || findContactBy(hi)) return true;
     }
+    if (decideExactly()) return true;
     // Grazing bodies touch at one instant. It can be detected only if it is a double, and then it
     // probably has few bits.
     return findContactBy(std::min(horizon_, findSimplestTime(time_, kNarrowWindow * (1 + time_))));
+  }
+
+  /// The interval of the proof extends as far back from time_, so that its signs are certain there.
+  /// The bodies are separated up to time_: a contact in the interval is not before it.
+  bool findCrossingBy(double hi) {
+    const double from = std::max(0.0, time_ - (hi - time_));
+    const bool cross = from < hi && isCrossingProved(a_, b_, from, hi, cache_);
+    if (cross) finish(Impact::contact, time_, hi);
+    return cross;
+  }
+
+  /// Decides crossings too close to an edge for findCrossingBy(), and near misses.
+  bool decideExactly() {
+    if (exactlyUndecided_) return false;
+    const std::optional<CrossingTime> time = findExactCrossingTime(a_, b_);
+    exactlyUndecided_ = !time;
+    if (!time) return false;
+    if (time->hi > horizon_)
+      finish(Impact::none, horizon_, horizon_);
+    else
+      finish(Impact::contact, std::max(time->lo, time_), std::max(time->hi, time_));
+    return true;
   }
 
   bool findContactBy(double hi) {
@@ -416,6 +435,7 @@ class ConservativeAdvancement {
   FeatureCache& cache_;
   double time_ = 0;
   int probes_ = 0;
+  bool exactlyUndecided_ = false;
   bool ended_ = false;
   TimeOfImpact result_;
 };

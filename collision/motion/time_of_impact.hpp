@@ -14,9 +14,9 @@ enum class Impact : std::uint8_t {
 struct TimeOfImpact {
   Impact impact = Impact::none;
   double lo = 0;  ///< seconds: separated at all times before lo
-  double hi = 0;  ///< seconds: touching or penetrating at hi (contact only). hi - lo is at most
-                  ///< 1e-12 (1 s + hi). It is larger only if the approach is so slow that the
-                  ///< rounding of a rotated pose (PairAtTime::error()) hides the time
+  double hi = 0;  ///< seconds: touching, penetrating, or crossed by hi (contact only). hi - lo is
+                  ///< at most 1e-12 (1 s + hi). It is larger only if the approach is so slow that
+                  ///< the rounding of a rotated pose (PairAtTime::error()) hides the time
   Vec3 normal = Vec3::UnitY();  ///< unit, from A to B; of the last separating plane
   std::uint32_t queries = 0;    ///< number of narrow-phase queries
 };

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "collision/types.hpp"
+#include "collision/shapes/placed_convex.hpp"
 
 namespace enfilade::collision {
 
@@ -22,6 +22,10 @@ struct Hull {
             neighbours.data() + neighbourOffsets[vertex + 1]};
   }
 };
+
+inline ConvexShape makeConvexShape(const Hull& hull) {
+  return {hull.vertices, &hull};
+}
 
 /// Builds the convex hull of `points` (at least one, all finite; throws std::invalid_argument
 /// otherwise). Orientation tests are exact: duplicate, coplanar and collinear points are allowed.

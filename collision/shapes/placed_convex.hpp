@@ -9,6 +9,12 @@ namespace enfilade::collision {
 
 struct Hull;
 
+/// A convex shape without a pose: the hull of `vertices` (body's frame, metres; at least one).
+struct ConvexShape {
+  std::span<const Vec3> vertices;
+  const Hull* hull = nullptr;  ///< of exactly these vertices; null: queries scan all vertices
+};
+
 /// A convex hull at a pose, for one query: the hull of `vertices` (body's frame, metres; at least
 /// one), placed at rotation * vertex + translation. All values must be finite; every query throws
 /// std::invalid_argument that names the first value that is not. The doubles are used exactly: a

@@ -1,18 +1,18 @@
-// Deterministic rotations from angles, by basic arithmetic: libm's sin and cos differ between
-// processors.
+// Deterministic headings from angles.
 #pragma once
 
-#include "collision/types.hpp"
+#include "collision/motion/sine_cosine.hpp"
 
 namespace enfilade::scene {
 
 /// Unit vector in the ground plane: 0 degrees is +X, 90 is -Z (counter-clockwise seen from above).
 /// Finite `degrees` of any size; the result is within 1e-15 of the true direction for |degrees| up
 /// to 1e4 and always of unit length within 4 ulp.
-collision::Vec3 makeHeadingFromDegrees(double degrees);
+inline collision::Vec3 makeHeadingFromDegrees(double degrees) {
+  const auto [s, c] = collision::computeSineCosineOfDegrees(degrees);
+  return {c, 0, -s};
+}
 
-/// Rotation by `radians` (finite) about `axis` (unit): whole turns are removed, then as
-/// makeHeadingFromDegrees(). A unit quaternion within 4 ulp; exactly the identity for 0.
-collision::Quat makeAxisRotation(const collision::Vec3& axis, double radians);
+using collision::makeAxisRotation;
 
 }  // namespace enfilade::scene

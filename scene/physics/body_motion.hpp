@@ -1,14 +1,14 @@
 // Motion state of one rigid body, and its integration without contacts.
 #pragma once
 
-#include "collision/types.hpp"
+#include "collision/floating_point.hpp"
 #include "scene/model/shapes/mass_properties.hpp"
 
 namespace enfilade::scene {
 
 using collision::Quat;
 
-inline constexpr double kRoundUpFactor = 1 + 0x1p-40;  ///< exceeds a few rounding errors
+using collision::kRoundUpFactor;
 
 /// State and mass properties of a rigid body. World frame; metres, seconds, kilograms.
 struct BodyMotion {

@@ -9,6 +9,8 @@
 namespace enfilade::scene {
 namespace {
 
+using collision::InterpolatedMotion;
+
 constexpr std::size_t kBodiesPerTask = 32;  // bodies in one task
 constexpr std::size_t kScannedPairsPerTask =
     512;                                  // pairs in one task, where each costs next to nothing
@@ -17,10 +19,10 @@ constexpr double kRestGapFraction = 0.5;  // of contactOffset: bodies rest at no
 constexpr double kMaxDepenetrationFraction = 0.25;
 constexpr int kPartialPasses = 4;  // after these passes a blocking body does not move at all
 
-SweptPose makeSweptPose(const PhysicsBody& body, const BodyMotion& goal) {
-  SweptPose sweep = makeStationaryPose(body);
+InterpolatedMotion makeSweptMotion(const PhysicsBody& body, const BodyMotion& goal) {
+  InterpolatedMotion sweep = makeStationaryMotion(body);
   sweep.toCentre = goal.centre, sweep.toRotation = goal.rotation;
-  sweep.stationaryBody = nullptr;
+  sweep.isStationary = false;
   updateDerived(sweep);
   return sweep;
 }
@@ -31,26 +33,26 @@ double computePairClearFraction(const PhysicsWorld& world, const BodyPair& pair,
                                 const StepScratch& scratch, std::uint8_t& usedNarrowPhase) {
   if (pair.verdict != collision::Verdict::separated) return 1;
   const PhysicsBody &a = world.bodies[pair.key.a], &b = world.bodies[pair.key.b];
-  const SweptPose& sweepA = scratch.sweptPoses[scratch.localIndices[pair.key.a]];
-  const SweptPose& sweepB = scratch.sweptPoses[scratch.localIndices[pair.key.b]];
-  const PartShape partA = getPartShape(a, pair.key.partA), partB = getPartShape(b, pair.key.partB);
-  const double fraction =
-      pair.separatingAxis.isZero(0)
-          ? -1
-          : clearFractionAlong(partA, sweepA, partB, sweepB, pair.separatingAxis);
+  const InterpolatedMotion& sweepA = scratch.sweptMotions[scratch.localIndices[pair.key.a]];
+  const InterpolatedMotion& sweepB = scratch.sweptMotions[scratch.localIndices[pair.key.b]];
+  const collision::InterpolatedShape partA{getPartShape(a, pair.key.partA), sweepA};
+  const collision::InterpolatedShape partB{getPartShape(b, pair.key.partB), sweepB};
+  const double fraction = pair.separatingAxis.isZero(0)
+                              ? -1
+                              : computeClearFractionAlong(partA, partB, pair.separatingAxis);
   if (fraction == 1) return 1;
   usedNarrowPhase = 1;
   // If they overlap at the end, the plane that separated them is as good as any.
-  if (fraction >= 0 && !isSeparatedAtEnd(partA, sweepA, partB, sweepB, pair.features()))
-    return fraction;
-  return computeClearance(partA, sweepA, partB, sweepB, pair.features(), lowerBound).fraction;
+  if (fraction >= 0 && !isSeparatedAtEnd(partA, partB, pair.features())) return fraction;
+  return computeClearance(partA, partB, pair.features(), lowerBound).fraction;
 }
 
 /// Shortens a motion that exceeds maxStepDisplacement. The velocity does not change.
-void limitDisplacement(const PhysicsBody& body, SweptPose& sweep) {
-  for (int i = 0; i < kMaxHalvings && computeMaxDisplacement(sweep) > body.maxStepDisplacement; ++i)
+void limitDisplacement(const PhysicsBody& body, InterpolatedMotion& sweep) {
+  for (int i = 0;
+       i < collision::kMaxHalvings && computeMaxDisplacement(sweep) > body.maxStepDisplacement; ++i)
     sweep = makeFirstHalf(sweep, computeMiddlePose(sweep));
-  if (computeMaxDisplacement(sweep) > body.maxStepDisplacement) sweep = makeStationaryPose(body);
+  if (computeMaxDisplacement(sweep) > body.maxStepDisplacement) sweep = makeStationaryMotion(body);
 }
 
 constexpr std::uint32_t kSeveralCarriers = kNoIndex - 1;  // in place of an index
@@ -73,8 +75,8 @@ std::vector<std::uint32_t> findCarriers(const PhysicsWorld& world, const StepScr
     const bool isFirstDynamic = bodyAt(constraint.a).isAwake();
     if (!holds(constraint) || isFirstDynamic == bodyAt(constraint.b).isAwake()) continue;
     const std::uint32_t candidate = isFirstDynamic ? constraint.b : constraint.a;
-    if (scratch.sweptPoses[candidate].stationaryBody) continue;
-    ENFILADE_ASSERT(candidate < scratch.sweptPoses.size());
+    if (scratch.sweptMotions[candidate].isStationary) continue;
+    ENFILADE_ASSERT(candidate < scratch.sweptMotions.size());
     std::uint32_t& carrier = carriers[islands.find(isFirstDynamic ? constraint.a : constraint.b)];
     carrier = carrier == kNoIndex || carrier == candidate ? candidate : kSeveralCarriers;
   }
@@ -82,7 +84,7 @@ std::vector<std::uint32_t> findCarriers(const PhysicsWorld& world, const StepScr
 }
 
 CarrierMotion makeCarrierMotion(std::uint32_t carrier, double seconds, const StepScratch& scratch) {
-  const SweptPose& sweep = scratch.sweptPoses[carrier];
+  const InterpolatedMotion& sweep = scratch.sweptMotions[carrier];
   CarrierMotion carrierMotion;
   carrierMotion.carrier = carrier;
   carrierMotion.pivot = sweep.fromCentre;
@@ -107,16 +109,16 @@ void assignCarriers(const PhysicsWorld& world, double seconds, StepScratch& scra
 }
 
 /// Sets the motions of all moving bodies; the others are stationary.
-void computeSweptPoses(const PhysicsWorld& world, StepScratch& scratch) {
-  scratch.sweptPoses.resize(scratch.motions.size());
+void computeSweptMotions(const PhysicsWorld& world, StepScratch& scratch) {
+  scratch.sweptMotions.resize(scratch.motions.size());
   scratch.pool->parallelFor(
       scratch.motions.size(), kBodiesPerTask, [&](std::size_t from, std::size_t to) {
         for (std::size_t i = from; i < to; ++i) {
           const PhysicsBody& body = world.bodies[scratch.bodyIndices[i]];
           const bool isMoving = body.isAwake() || body.isKinematic();
-          scratch.sweptPoses[i] =
-              isMoving ? makeSweptPose(body, scratch.motions[i]) : makeStationaryPose(body);
-          if (body.isAwake()) limitDisplacement(body, scratch.sweptPoses[i]);
+          scratch.sweptMotions[i] =
+              isMoving ? makeSweptMotion(body, scratch.motions[i]) : makeStationaryMotion(body);
+          if (body.isAwake()) limitDisplacement(body, scratch.sweptMotions[i]);
         }
       });
 }
@@ -174,7 +176,7 @@ void startPasses(const PhysicsWorld& world, const StepScratch& scratch, Pass& pa
     pass.teleportedDistances.push_back(world.bodies[body].teleportedDistance);
   pass.meanDisplacement = Vec3::Zero();
   for (std::uint32_t i = 0; i < scratch.report.awake; ++i)  // awake bodies come first
-    pass.meanDisplacement += scratch.sweptPoses[i].toCentre - scratch.sweptPoses[i].fromCentre;
+    pass.meanDisplacement += scratch.sweptMotions[i].toCentre - scratch.sweptMotions[i].fromCentre;
   if (scratch.report.awake > 0) pass.meanDisplacement /= scratch.report.awake;
 }
 
@@ -183,7 +185,8 @@ bool updateRelativeBounds(StepScratch& scratch, Pass& pass) {
   bool hasGrown = false;
   for (std::size_t i = 0; i < scratch.motions.size(); ++i) {
     if (pass.needsProof[i] == 0) continue;
-    const MotionBound& bound = scratch.motionBounds[i] = computeMotionBound(scratch.sweptPoses[i]);
+    const collision::DisplacementBound& bound = scratch.motionBounds[i] =
+        computeDisplacementBound(scratch.sweptMotions[i]);
     const double relativeBound =
         (bound.displacement - pass.meanDisplacement).norm() + bound.rotationalBound;
     if (relativeBound <= pass.relativeBounds[i]) continue;
@@ -231,7 +234,7 @@ void runProofPass(const PhysicsWorld& world, StepScratch& scratch, Pass& pass) {
           const std::uint32_t k = pass.nearPairs[n];
           const auto [a, b] = scratch.pairBodies[k];
           if (pass.needsProof[a] == 0 && pass.needsProof[b] == 0) continue;
-          if (computeClosingBound(scratch.motionBounds[a], scratch.motionBounds[b]) <
+          if (computeApproachBound(scratch.motionBounds[a], scratch.motionBounds[b]) <
               pass.lowerBounds[n])
             continue;
           const BodyPair& pair = world.pairs[scratch.activePairs[k]];
@@ -248,9 +251,9 @@ void runProofPass(const PhysicsWorld& world, StepScratch& scratch, Pass& pass) {
 void scaleMotion(std::uint32_t body, double fraction, StepScratch& scratch) {
   ENFILADE_ASSERT(fraction >= 0 && fraction < 1);
   scratch.motionFractions[body] *= fraction;
-  SweptPose& sweep = scratch.sweptPoses[body];
+  InterpolatedMotion& sweep = scratch.sweptMotions[body];
   const CarrierMotion& carrierMotion = scratch.carrierMotions[body];
-  if (carrierMotion.carrier != kNoIndex) sweep.stationaryBody = nullptr;
+  if (carrierMotion.carrier != kNoIndex) sweep.isStationary = false;
   sweep.toCentre -= carrierMotion.translation;
   if (carrierMotion.rotates) {
     sweep.toCentre = carrierMotion.rotation.conjugate() * (sweep.toCentre - carrierMotion.pivot) +
@@ -258,7 +261,7 @@ void scaleMotion(std::uint32_t body, double fraction, StepScratch& scratch) {
     sweep.toRotation = carrierMotion.rotation.conjugate() * sweep.toRotation;
   }
   updateDerived(sweep);
-  sweep = truncateSweep(sweep, fraction);
+  sweep = truncateMotion(sweep, fraction);
   if (carrierMotion.rotates) {
     sweep.toCentre =
         carrierMotion.rotation * (sweep.toCentre - carrierMotion.pivot) + carrierMotion.pivot;
@@ -273,7 +276,7 @@ void scaleMotion(std::uint32_t body, double fraction, StepScratch& scratch) {
 void detachFromCarrier(const PhysicsWorld& world, std::uint32_t body, StepScratch& scratch) {
   scratch.motionFractions[body] = 0, scratch.hasOwnMotion[body] = 0;
   scratch.carrierMotions[body] = {};
-  scratch.sweptPoses[body] = makeStationaryPose(world.bodies[scratch.bodyIndices[body]]);
+  scratch.sweptMotions[body] = makeStationaryMotion(world.bodies[scratch.bodyIndices[body]]);
 }
 
 /// Returns whether a body has motion of its own left.
@@ -292,12 +295,12 @@ bool isCarriedInto(std::uint32_t body, std::uint32_t other, const StepScratch& s
 /// If no part of the body's motion was certified, depenetrate it once. Returns whether it moves.
 bool depenetrate(std::uint32_t body, double maxDisplacement, StepScratch& scratch) {
   const Vec3 depenetration = std::exchange(scratch.depenetrations[body], Vec3::Zero());
-  SweptPose sweep = scratch.sweptPoses[body];
+  InterpolatedMotion sweep = scratch.sweptMotions[body];
   sweep.toCentre += depenetration;
-  sweep.stationaryBody = nullptr;
+  sweep.isStationary = false;
   updateDerived(sweep);
   if (depenetration.isZero(0) || computeMaxDisplacement(sweep) > maxDisplacement) return false;
-  scratch.sweptPoses[body] = sweep;
+  scratch.sweptMotions[body] = sweep;
   return true;
 }
 
@@ -309,7 +312,7 @@ void reduceMotion(const PhysicsWorld& world, std::uint32_t body, double fraction
   if (hasOwnMotion) scaleMotion(body, fraction, scratch);
   if (hasOwnMotion && fraction == 0)
     scratch.hasOwnMotion[body] = depenetrate(body, maxDisplacement, scratch);
-  if (!hasOwnMotion || computeMaxDisplacement(scratch.sweptPoses[body]) > maxDisplacement)
+  if (!hasOwnMotion || computeMaxDisplacement(scratch.sweptMotions[body]) > maxDisplacement)
     detachFromCarrier(world, body, scratch);
 }
 
@@ -350,7 +353,7 @@ void clampToProvenMotion(const PhysicsWorld& world, double seconds, double conta
   scratch.motionFractions.assign(scratch.motions.size(), 1);
   scratch.hasOwnMotion.assign(scratch.motions.size(), 1);
   scratch.motionBounds.resize(scratch.motions.size());
-  computeSweptPoses(world, scratch);
+  computeSweptMotions(world, scratch);
   assignCarriers(world, seconds, scratch);
   thread_local Pass kept;  // reused, as StepScratch is
   Pass& pass = kept;

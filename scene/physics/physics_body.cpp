@@ -37,10 +37,23 @@ ConvexPart makeConvexPart(const collision::Hull& hull) {
   return part;
 }
 
+// The same expressions as in collision::updateDerived(): the results are equal to the last bit.
 void updateTransform(PhysicsBody& body) {
   ENFILADE_ASSERT(!(std::abs(body.motion.rotation.squaredNorm() - 1) > 1e-6));
   body.rotation = body.motion.rotation.toRotationMatrix();
   body.position = body.motion.centre - body.rotation * body.centreInFrame;
+}
+
+collision::InterpolatedMotion makeStationaryMotion(const PhysicsBody& body) {
+  collision::InterpolatedMotion motion;
+  motion.fromCentre = motion.toCentre = body.motion.centre;
+  motion.fromRotation = motion.toRotation = body.motion.rotation;
+  motion.radius = body.radius;
+  motion.centreInFrame = body.centreInFrame;
+  motion.isStationary = true;
+  motion.fromMatrix = motion.toMatrix = body.rotation;
+  motion.fromPosition = motion.toPosition = body.position;
+  return motion;
 }
 
 PhysicsBody makeDynamicBody(std::span<const collision::Hull* const> hulls, double density,

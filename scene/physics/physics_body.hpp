@@ -7,20 +7,15 @@
 #include <span>
 #include <vector>
 
-#include "collision/narrow_phase/narrow_phase.hpp"
+#include "collision/motion/interpolated_motion.hpp"
 #include "collision/shapes/triangle_tree.hpp"
 #include "scene/model/shapes/collision_geometry.hpp"
 #include "scene/physics/body_motion.hpp"
 
 namespace enfilade::scene {
 
-/// Shape of a part. The vertices are in the body frame and owned elsewhere.
-struct PartShape {
-  std::span<const Vec3> vertices;
-  const collision::Hull* hull = nullptr;  ///< hull of these vertices; null: at most three vertices
-};
-
-struct ConvexPart : PartShape {
+/// A part of a body. The vertices are in the body frame and owned elsewhere.
+struct ConvexPart : collision::ConvexShape {
   std::vector<Vec3> faceNormals;  ///< outward unit normals of the hull's faces
 };
 
@@ -95,7 +90,10 @@ struct PhysicsBody {
 /// Recomputes the world transform from `motion`.
 void updateTransform(PhysicsBody& body);
 
-inline PartShape getPartShape(const PhysicsBody& body, std::uint32_t part) {
+/// Returns the motion of a stationary body.
+collision::InterpolatedMotion makeStationaryMotion(const PhysicsBody& body);
+
+inline collision::ConvexShape getPartShape(const PhysicsBody& body, std::uint32_t part) {
   if (part >= body.parts.size()) return {body.mesh->triangles()[part - body.parts.size()], nullptr};
   return body.parts[part];
 }

@@ -2,7 +2,8 @@
 //  1. Update the pairs of awake bodies (body_pair.hpp). An awake body in contact wakes a
 //     sleeping one, whose pairs are then updated too.
 //  2. Solve the awake bodies and all that they may touch (solver.hpp).
-//  3. Prove every pair that could touch on its way clear (swept_pose.hpp). Where that fails, the
+//  3. Prove every pair that could touch on its way clear
+//  (collision/motion/interpolated_motion.hpp). Where that fails, the
 //     dynamic bodies move only as far as proved, at reduced velocity. Their other pairs are then
 //     checked again, until no body needs to be reduced. This ends: a body moves less far each time,
 //     and after a few passes not at all. If no part of a body's motion was certified, depenetrate
@@ -242,7 +243,7 @@ void gatherJoints(const PhysicsWorld& world, StepScratch& scratch) {
 /// Metres by which the points of a constraint approach on the swept poses; < 0: they separate.
 double computeApproach(const ContactConstraint& constraint, const StepScratch& scratch) {
   const auto displacementOf = [&](std::uint32_t body, const Vec3& arm) -> Vec3 {
-    const SweptPose& sweep = scratch.sweptPoses[body];
+    const collision::InterpolatedMotion& sweep = scratch.sweptMotions[body];
     const Vec3 inFrame = sweep.fromMatrix.transpose() * arm;
     return sweep.toCentre - sweep.fromCentre + (sweep.toMatrix - sweep.fromMatrix) * inFrame;
   };
@@ -315,7 +316,7 @@ void applyMotions(PhysicsWorld& world, StepScratch& scratch) {
     PhysicsBody& body = world.bodies[scratch.bodyIndices[i]];
     const bool isAwake = body.isAwake();
     if (!isAwake && !body.isKinematic()) continue;
-    const SweptPose& sweep = scratch.sweptPoses[i];
+    const collision::InterpolatedMotion& sweep = scratch.sweptMotions[i];
     ENFILADE_ASSERT(scratch.motionFractions[i] >= 0 && scratch.motionFractions[i] <= 1);
     body.motion.centre = sweep.toCentre, body.motion.rotation = sweep.toRotation;
     if (isAwake) {
@@ -338,7 +339,7 @@ void applyMotions(PhysicsWorld& world, StepScratch& scratch) {
           double& lowerBound = world.pairs[scratch.activePairs[k]].lowerBound;
           const auto [a, b] = scratch.pairBodies[k];
           const double closing =
-              computeClosingBound(scratch.motionBounds[a], scratch.motionBounds[b]);
+              computeApproachBound(scratch.motionBounds[a], scratch.motionBounds[b]);
           lowerBound -= closing + 0x1p-51 * (std::abs(lowerBound) + closing);
         }
       });
@@ -381,7 +382,8 @@ void updateSleep(PhysicsWorld& world, const StepSettings& settings, StepScratch&
     if (!body.isAwake()) continue;
     ENFILADE_ASSERT(scratch.localIndices[i] != kNoIndex);
     // Displacement decides, not velocity: a body that every pass stops is at rest, too.
-    const double displacement = computeMaxDisplacement(scratch.sweptPoses[scratch.localIndices[i]]);
+    const double displacement =
+        computeMaxDisplacement(scratch.sweptMotions[scratch.localIndices[i]]);
     const bool isResting =
         displacement < settings.sleep.sleepVelocity * settings.solver.seconds && !keptAwake[i];
     body.sleepTimer = isResting ? body.sleepTimer + settings.solver.seconds : 0;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "scene/physics/physics_world.hpp"
-#include "scene/physics/swept_pose.hpp"
 #include "scene/physics/thread_pool.hpp"
 
 namespace enfilade::scene {
@@ -66,8 +65,8 @@ struct StepScratch {
       motionFractions;  ///< of each of `motions`: the fraction of its motion that is kept
   std::vector<std::uint8_t> hasOwnMotion;  ///< of each of `motions`
   std::vector<Vec3> depenetrations;        ///< of each of `motions`: metres
-  std::vector<SweptPose> sweptPoses;
-  std::vector<MotionBound> motionBounds;      ///< of each of `sweptPoses`
+  std::vector<collision::InterpolatedMotion> sweptMotions;
+  std::vector<collision::DisplacementBound> motionBounds;  ///< of each of `sweptMotions`
   std::vector<CarrierMotion> carrierMotions;  ///< of each of `motions`: the motion of its carrier
 };
 

@@ -1,4 +1,4 @@
-#include "collision/motion/rotational_shape_cast.hpp"
+#include "collision/motion/shape_cast.hpp"
 
 #include <gtest/gtest.h>
 
@@ -34,7 +34,7 @@ TEST(RotationalShapeCast, ARodStopsEpsilonBeforeTheWallItsTipComesTo) {
   const auto wall = makeBoxPoints({-2, -1, -0.6}, {2, 1, -0.55});  // +Y rotation: towards -Z
   FeatureCache cache;
   const AxisRotation turn{Vec3::Zero(), Vec3::UnitY(), 2};
-  const ShapeCastResult swept = castShapeRotating({rod}, turn, {wall}, kBand, cache);
+  const ShapeCastResult swept = castShape({rod}, turn, {wall}, kBand, cache);
   ASSERT_TRUE(swept.stopped);
   // The corner (1, 0.05) is at -sin(phi) - 0.05 cos(phi), and must be at -0.55 + 1.03 mm.
   const double far = std::hypot(1, 0.05), start = std::atan2(0.05, 1);
@@ -48,7 +48,7 @@ TEST(RotationalShapeCast, APostNearThePivotIsReachedInFewStepsThoughTheTipIsFast
   const auto post = makeBoxPoints({0.1, -1, -0.2}, {0.12, 1, -0.1});
   FeatureCache cache;
   const AxisRotation turn{Vec3::Zero(), Vec3::UnitY(), 3};
-  const ShapeCastResult swept = castShapeRotating({rod}, turn, {post}, kBand, cache);
+  const ShapeCastResult swept = castShape({rod}, turn, {post}, kBand, cache);
   ASSERT_TRUE(swept.stopped);
   EXPECT_FALSE(swept.iterationLimitReached);
   EXPECT_LT(swept.queries, 20u);
@@ -59,12 +59,12 @@ TEST(RotationalShapeCast, ATurnAlongATableIsFreeAndOneAwayFromItToo) {
   const auto rod = makeBoxPoints({0, 0.001, -0.05}, {1, 0.1, 0.05});
   const auto table = makeBoxPoints({-2, -0.1, -2}, {2, 0, 2});
   FeatureCache cache;
-  EXPECT_FALSE(
-      castShapeRotating({rod}, {Vec3::Zero(), Vec3::UnitY(), 6}, {table}, kBand, cache).stopped);
+  EXPECT_FALSE(castShape({rod}, AxisRotation{Vec3::Zero(), Vec3::UnitY(), 6}, {table}, kBand, cache)
+                   .stopped);
   const AxisRotation up{{-0.5, 0, 0}, Vec3::UnitZ(), 1};
-  EXPECT_FALSE(castShapeRotating({rod}, up, {table}, kBand, cache).stopped);
+  EXPECT_FALSE(castShape({rod}, up, {table}, kBand, cache).stopped);
   const AxisRotation down{{-0.5, 0, 0}, Vec3::UnitZ(), -1};
-  EXPECT_EQ(castShapeRotating({rod}, down, {table}, kBand, cache).fraction, 0);
+  EXPECT_EQ(castShape({rod}, down, {table}, kBand, cache).fraction, 0);
 }
 
 TEST(RotationalShapeCast, NothingIsCrossedOnTheWayOfRandomTurns) {
@@ -87,7 +87,7 @@ TEST(RotationalShapeCast, NothingIsCrossedOnTheWayOfRandomTurns) {
     const AxisRotation turn{point(1), direction.normalized(), uniform(-4, 4)};
     if (!(computeDistanceAfter({a}, turn, 0, {b}) > kBand.rest)) continue;
     FeatureCache cache;
-    const ShapeCastResult swept = castShapeRotating({a}, turn, {b}, kBand, cache);
+    const ShapeCastResult swept = castShape({a}, turn, {b}, kBand, cache);
     ++queryCount, stopped += swept.stopped;
     EXPECT_FALSE(swept.iterationLimitReached) << k;
     for (int i = 0; i <= 100; ++i)

@@ -5,11 +5,12 @@
 
 #include <random>
 
-#include "scene/physics/swept_pose.hpp"
 #include "tests/scene/physics_scene.hpp"
 
 namespace enfilade::scene {
 namespace {
+
+using collision::InterpolatedMotion;
 
 class BodyPairs : public ::testing::Test {
  protected:
@@ -26,9 +27,9 @@ class BodyPairs : public ::testing::Test {
     return makeDynamicBody({&hull, 1}, 1000, {rotation(), at});
   }
   /// Part of the motion is a rotation.
-  SweptPose wayOf(const PhysicsBody& solid, double length) {
-    SweptPose way = makeStationaryPose(solid);
-    way.stationaryBody = nullptr;
+  InterpolatedMotion wayOf(const PhysicsBody& solid, double length) {
+    InterpolatedMotion way = makeStationaryMotion(solid);
+    way.isStationary = false;
     way.toCentre += vector(length);
     way.toRotation = (way.toRotation * Quat(1, number(0.1), number(0.1), number(0.1))).normalized();
     updateDerived(way);
@@ -104,12 +105,12 @@ TEST_F(BodyPairs, FrictionInsideAKinematicBodyActsOnlyAheadOfIt) {
 }
 
 TEST_F(BodyPairs, AFractionOfAMotionEqualsRepeatedHalving) {
-  constexpr int kParts = 1 << kMaxHalvings;
-  const SweptPose way = wayOf(box(vector(1)), 0.5);
+  constexpr int kParts = 1 << collision::kMaxHalvings;
+  const InterpolatedMotion way = wayOf(box(vector(1)), 0.5);
   for (int n = 1; n < kParts; ++n) {
-    SweptPose rest = way, done = way;
+    InterpolatedMotion rest = way, done = way;
     for (int bit = kParts / 2, left = n; left > 0; bit /= 2) {
-      const CentrePose middle = computeMiddlePose(rest);
+      const collision::CentrePose middle = computeMiddlePose(rest);
       if (left >= bit) {
         done = makeFirstHalf(rest, middle);
         rest = makeSecondHalf(rest, middle), left -= bit;
@@ -117,7 +118,7 @@ TEST_F(BodyPairs, AFractionOfAMotionEqualsRepeatedHalving) {
         rest = makeFirstHalf(rest, middle);
       }
     }
-    const SweptPose part = truncateSweep(way, static_cast<double>(n) / kParts);
+    const InterpolatedMotion part = truncateMotion(way, static_cast<double>(n) / kParts);
     EXPECT_EQ(part.toCentre, done.toCentre) << n;
     EXPECT_EQ(part.toRotation.coeffs(), done.toRotation.coeffs()) << n;
     EXPECT_EQ(part.toMatrix, done.toMatrix) << n;
@@ -137,14 +138,15 @@ TEST_F(BodyPairs, AMotionClearedByACachedBoundIsClear) {
     // Earlier knowledge: a distance bound below the true distance, and an outdated axis.
     const double apart = 0.5 * start.distance;
     cache.axis += 0.1 * cache.axis.norm() * vector(1);
-    const PartShape part = getPartShape(a, 0);
-    const SweptPose wayA = wayOf(a, 0.3), wayB = wayOf(b, 0.3);
-    const double fraction = computeClearance(part, wayA, part, wayB, cache, apart).fraction;
+    const collision::ConvexShape part = getPartShape(a, 0);
+    const InterpolatedMotion wayA = wayOf(a, 0.3), wayB = wayOf(b, 0.3);
+    const double fraction = computeClearance({part, wayA}, {part, wayB}, cache, apart).fraction;
     ++(fraction == 1 ? whole : cut);
-    for (double at = 0x1p-6; at <= fraction; at += 0x1p-6)
-      EXPECT_TRUE(
-          isSeparatedAtEnd(part, truncateSweep(wayA, at), part, truncateSweep(wayB, at), cache))
+    for (double at = 0x1p-6; at <= fraction; at += 0x1p-6) {
+      const InterpolatedMotion doneA = truncateMotion(wayA, at), doneB = truncateMotion(wayB, at);
+      EXPECT_TRUE(isSeparatedAtEnd({part, doneA}, {part, doneB}, cache))
           << i << " at " << at << " of " << fraction;
+    }
   }
   EXPECT_GT(whole, 100);
   EXPECT_GT(cut, 100);

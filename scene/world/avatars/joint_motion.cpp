@@ -1,13 +1,13 @@
 // One tick of a driven chain. The joints move one after the other, starting at the base. Each joint
 // moves its link and all descendants as one rigid body: a revolute joint by a rotational shape cast
-// (collision/motion/rotational_shape_cast.hpp), a prismatic joint by a linear one. Each stops about
+// (collision/motion/shape_cast.hpp), a prismatic joint by a linear one. Each stops about
 // one contact offset before an obstacle; the following joints still move.
 #include "scene/world/avatars/joint_motion.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "collision/motion/rotational_shape_cast.hpp"
+#include "collision/motion/shape_cast.hpp"
 #include "scene/world/contacts/obstacles.hpp"
 
 namespace enfilade::scene {
@@ -39,8 +39,8 @@ collision::ShapeCastResult castPart(const AvatarPart& part, const Vec3& footPosi
                                     collision::FeatureCache& cache) {
   const collision::PlacedConvex placed = placeAvatarPart(part, footPosition);
   if (step.isRevolute)
-    return collision::castShapeRotating(placed, {step.pivot, step.axis, delta}, other,
-                                        contactOffset, cache);
+    return collision::castShape(placed, collision::AxisRotation{step.pivot, step.axis, delta},
+                                other, contactOffset, cache);
   return collision::castShape(placed, delta * step.axis, other, contactOffset, cache);
 }
 
@@ -59,9 +59,7 @@ struct JointMover {
     if (!overlaps(inflated(placeBox(movedPart.box, avatar.footPosition), margin), otherBox)) return;
     const auto result = castPart(movedPart, avatar.footPosition, step, hit.fraction * step.delta,
                                  other, contactOffset, cache);
-    count.narrow += result.queries;
-    count.rational += result.exactQueries;
-    count.bounded += result.iterationLimitReached ? 1 : 0;
+    count.add(result);
     const double fraction = hit.fraction * result.fraction;
     if (!result.stopped || (hit.entity != 0 && fraction >= hit.fraction)) return;
     hit = {fraction, entity, result.separationAtStop};

@@ -18,7 +18,6 @@
 #include <cmath>
 
 #include "scene/world/bodies/passengers.hpp"
-#include "scene/world/contacts/body_sweep.hpp"
 #include "scene/world/contacts/contacts.hpp"
 #include "scene/world/contacts/obstacles.hpp"
 
@@ -31,7 +30,7 @@ constexpr double kMinPushGain =
     1e-3;  // fraction of contactOffset: a push that gains less has failed
 constexpr double kLevelPushNormalThreshold = 0.7;  // |normal.y| below which a push stays horizontal
 
-ScrewMotion makeScrewMotion(const Body& body, const JointPose& to) {
+collision::ScrewMotion makeScrewMotion(const Body& body, const JointPose& to) {
   const JointPose& from = body.drive.pose;
   return {body.rotation, body.position, to.offset - from.offset, body.spec->axis,
           to.angle - from.angle};
@@ -82,10 +81,22 @@ struct FirstHit {
   Avatar* avatar = nullptr;
   const CarriedBody* carried =
       nullptr;  ///< carried body that hit the avatar; null: the body itself
-  PartCastResult cast;
+  collision::ShapeCastResult cast;
 };
 
-void findFirstHit(const Body& body, const ScrewMotion& motion, double maxDisplacement,
+collision::ShapeCastResult castPart(const collision::Hull& part,
+                                    const collision::ScrewMotion& motion,
+                                    const collision::PlacedConvex& other,
+                                    const collision::ContactOffset& contactOffset,
+                                    QueryCount& count) {
+  collision::FeatureCache cache;
+  const collision::ShapeCastResult cast =
+      collision::castShape({makeConvexShape(part), motion}, other, contactOffset, cache);
+  count.add(cast);
+  return cast;
+}
+
+void findFirstHit(const Body& body, const collision::ScrewMotion& motion, double maxDisplacement,
                   Avatar& avatar, const WorldData& world, FirstHit& firstHit, QueryCount& count) {
   const collision::ContactOffset contactOffset = makeContactOffset(world.settings);
   for (const AvatarPart& avatarPart : avatar.shape->parts) {
@@ -93,9 +104,9 @@ void findFirstHit(const Body& body, const ScrewMotion& motion, double maxDisplac
                               contactOffset.rest + maxDisplacement);
     for (std::uint32_t part = 0; part < getPartCount(body); ++part) {
       if (!overlaps(box, getPartBox(body, part))) continue;
-      const PartCastResult cast =
-          castMovingPart({body.shape->parts[part], motion},
-                         placeAvatarPart(avatarPart, avatar.footPosition), contactOffset, count);
+      const collision::ShapeCastResult cast =
+          castPart(body.shape->parts[part], motion,
+                   placeAvatarPart(avatarPart, avatar.footPosition), contactOffset, count);
       if (cast.stopped && (!firstHit.avatar || cast.fraction < firstHit.cast.fraction))
         firstHit = {&avatar, nullptr, cast};
     }
@@ -109,16 +120,16 @@ void findFirstCarriedHit(const CarriedBody& carried, Avatar& avatar, const World
   const Body& body = world.bodies[carried.index];
   const double from = carried.appliedLift(), lift = carried.lift + carried.remainingLift - from;
   const Vec3 appliedLift(0, from, 0);
-  const ScrewMotion motion{
+  const collision::ScrewMotion motion{
       body.rotation, Vec3(body.position + appliedLift), {0, lift, 0}, Vec3::UnitY(), 0};
   for (const AvatarPart& avatarPart : avatar.shape->parts) {
     Aabb box = inflated(placeBox(avatarPart.box, avatar.footPosition), contactOffset.rest + lift);
     box.min -= appliedLift, box.max -= appliedLift;
     for (std::uint32_t part = 0; part < getPartCount(body); ++part) {
       if (!overlaps(box, getPartBox(body, part))) continue;
-      PartCastResult cast =
-          castMovingPart({body.shape->parts[part], motion},
-                         placeAvatarPart(avatarPart, avatar.footPosition), contactOffset, count);
+      collision::ShapeCastResult cast =
+          castPart(body.shape->parts[part], motion,
+                   placeAvatarPart(avatarPart, avatar.footPosition), contactOffset, count);
       if (!cast.stopped) continue;
       cast.fraction = (from + cast.fraction * lift - carried.lift) / carried.remainingLift;
       if (!firstHit.avatar || cast.fraction < firstHit.cast.fraction)
@@ -142,7 +153,7 @@ void applyJointPose(Body& body, const JointPose& to, double fraction) {
 /// Pushes the avatar that was hit; returns false if the body gains nothing.
 bool pushHitAvatar(WorldData& world, const Body& body, const JointPose& to, const FirstHit& hit,
                    const std::vector<CarriedBody>& carriedBodies, QueryCount& count) {
-  const collision::SeparationResult& at = hit.cast.separation;
+  const collision::SeparationResult& at = hit.cast.separationAtStop;
   if (at.verdict != collision::Verdict::separated) return false;
   const double remaining = 1 - hit.cast.fraction;  // applies to a carried body; the body itself was
                                                    // already advanced
@@ -166,7 +177,7 @@ void emitBodyBlocked(const WorldData& world, Body& body, const FirstHit& hit, Ti
   if (alreadyReported) return;
   Contact contact;
   contact.other = hit.avatar->id;
-  contact.separation = hit.cast.separation;
+  contact.separation = hit.cast.separationAtStop;
   report.contacts.push_back(makeContactEvent(world, ContactEvent::Kind::blocked, body.id, contact));
 }
 
@@ -197,7 +208,7 @@ double moveUntilBlocked(WorldData& world, Body& body, const JointPose& to, Passe
   FirstHit hit;
   for (int i = 0; i < kMaxPushes; ++i) {
     hit = {};
-    const ScrewMotion motion = makeScrewMotion(body, to);
+    const collision::ScrewMotion motion = makeScrewMotion(body, to);
     const double maxDisplacement = computeDisplacementBound(*body.shape, body.drive.pose, to);
     updateCarriedLifts(world, body, to, passengers.bodies);
     for (Avatar* avatar : passengers.nearbyAvatars)

@@ -3,8 +3,8 @@
 // pairs (excluded_pairs.hpp) are skipped. The nearest parts are found without a warm start, so that
 // the result depends on the current poses alone.
 // Two bodies that are clear before and after the tick may have touched within it. If their motions
-// are longer than their distance, their parts are cast (body_sweep.hpp) segment by segment; the
-// cast keeps 3/4 of the contact distance.
+// are longer than their distance, their parts are cast (collision/motion/shape_cast.hpp) segment by
+// segment; the cast keeps 3/4 of the contact distance.
 #include "scene/world/contacts/kinematic_contacts.hpp"
 
 #include <cmath>
@@ -15,7 +15,6 @@
 #include "collision/compound/nearest_parts.hpp"
 #include "collision/narrow_phase/refine.hpp"
 #include "scene/world/contacts/body_contacts.hpp"
-#include "scene/world/contacts/body_sweep.hpp"
 #include "scene/world/contacts/excluded_pairs.hpp"
 
 namespace enfilade::scene {
@@ -161,7 +160,7 @@ std::optional<Contact> computeContact(const WorldData& world, const EntityPair& 
 
 /// The i-th of n equal parts of the body's tick: its own segments, or equal parts of its one
 /// segment.
-ScrewMotion makeSegmentMotion(const Body& body, std::size_t i, std::size_t n) {
+collision::ScrewMotion makeSegmentMotion(const Body& body, std::size_t i, std::size_t n) {
   const auto keyPoseAt = [&](std::size_t at) {
     const KinematicTarget& target = body.kinematicTarget;
     if (!body.moved) return body.drive.pose;
@@ -186,23 +185,31 @@ std::optional<Contact> findTransientTouch(const WorldData& world, const EntityPa
   const std::size_t n =
       std::max(body.kinematicTarget.segments, other ? other->kinematicTarget.segments : 1);
   for (std::size_t i = 0; i < n; ++i) {
-    const ScrewMotion motion = makeSegmentMotion(body, i, n);
-    const ScrewMotion otherMotion = other ? makeSegmentMotion(*other, i, n) : ScrewMotion();
-    PartCastResult earliest;
+    const collision::ScrewMotion motion = makeSegmentMotion(body, i, n);
+    const collision::ScrewMotion otherMotion =
+        other ? makeSegmentMotion(*other, i, n) : collision::ScrewMotion();
+    collision::ShapeCastResult earliest;
     for (const auto& [a, b] : pairs) {
-      const MovingPart part{body.shape->parts[a], motion};
-      const PartCastResult cast =
-          other ? castMovingParts(part, MovingPart{other->shape->parts[b], otherMotion},
-                                  contactOffset, count)
-                : castMovingPart(part, world.scene->collisionGeometry(key.second - 1).convex(b),
-                                 contactOffset, count);
-      if (cast.reachedRestOffset && cast.fraction < earliest.fraction) earliest = cast;
+      const collision::MovingShape part{makeConvexShape(body.shape->parts[a]), motion};
+      collision::FeatureCache cache;
+      const collision::ShapeCastResult cast =
+          other
+              ? collision::castShape(
+                    part,
+                    collision::MovingShape{makeConvexShape(other->shape->parts[b]), otherMotion},
+                    contactOffset, cache)
+              : collision::castShape(part, world.scene->collisionGeometry(key.second - 1).convex(b),
+                                     contactOffset, cache);
+      count.add(cast);
+      const bool reached =
+          cast.stopped && collision::isWithin(cast.separationAtStop, contactOffset.rest);
+      if (reached && cast.fraction < earliest.fraction) earliest = cast;
     }
-    if (earliest.reachedRestOffset) {
+    if (earliest.stopped) {
       Contact touch;
       touch.other = key.second;
       touch.touching = true;
-      touch.separation = earliest.separation;
+      touch.separation = earliest.separationAtStop;
       return touch;
     }
   }

@@ -90,9 +90,7 @@ ShapeCastHit castAvatarShape(const AvatarShape& shape, const Vec3& footPosition,
       const collision::ShapeCastResult result =
           collision::castShape(placeAvatarPart(shape.parts[i], footPosition), rest, obstacle.convex,
                                contactOffset, obstacle.cacheFor(i));
-      count.narrow += result.queries;
-      count.rational += result.exactQueries;
-      count.bounded += result.iterationLimitReached ? 1 : 0;
+      count.add(result);
       const double fraction = hit.fraction * result.fraction;
       if (!result.stopped || (hit.entity != 0 && fraction >= hit.fraction)) continue;
       hit = {fraction, obstacle.entity, -result.separationAtStop.normal,

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "collision/motion/shape_cast.hpp"
 #include "scene/world/data/snapshot.hpp"
 
 namespace enfilade::scene {
@@ -115,6 +116,12 @@ struct QueryCount {
   std::uint32_t narrow = 0;
   std::uint32_t rational = 0;
   std::uint32_t bounded = 0;  ///< casts that stopped at their iteration limit
+
+  void add(const collision::ShapeCastResult& cast) {
+    narrow += cast.queries;
+    rational += cast.exactQueries;
+    bounded += cast.iterationLimitReached ? 1 : 0;
+  }
 };
 
 }  // namespace enfilade::scene
