@@ -375,8 +375,10 @@ ModelOptions makeModelOptions(const ModelArguments& read) {
   options.cache = !read.noCache;
   if (!read.unit.empty()) options.import.metresPerUnit = scene::parseMetresPerUnit(read.unit);
   if (!read.up.empty()) options.import.up = read.up.front();
-  if (!read.offset.empty()) options.import.offset = {read.offset[0], read.offset[1], read.offset[2]};
-  options.import.ifcReader = scene::parseIfcReader(read.ifcReader).value_or(scene::IfcReader::automatic);
+  if (!read.offset.empty())
+    options.import.offset = {read.offset[0], read.offset[1], read.offset[2]};
+  options.import.ifcReader =
+      scene::parseIfcReader(read.ifcReader).value_or(scene::IfcReader::automatic);
   options.doors = read.ifcDoors == "still" ? scene::IfcDoors::fixed : scene::IfcDoors::movable;
   return options;
 }
