@@ -99,6 +99,9 @@ std::vector<std::uint8_t> encode(const google::protobuf::MessageLite& header,
 std::vector<std::uint8_t> encodeHead(const google::protobuf::MessageLite& header,
                                      std::size_t attachmentLength);
 
+/// Appends the four bytes of `value`.
+void appendLittleEndian(std::vector<std::uint8_t>& bytes, std::uint32_t value);
+
 /// Parses a message header; false if invalid. Unlike ParseFromArray() it does not write to stderr,
 /// which a hostile peer could flood.
 bool parseHeader(std::span<const std::uint8_t> header, google::protobuf::MessageLite& into);

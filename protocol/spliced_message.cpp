@@ -4,18 +4,14 @@
 #include <stdexcept>
 #include <string>
 
+#include "protocol/framing.hpp"
+
 namespace enfilade::protocol {
 namespace {
 
 void appendVarint(std::vector<std::uint8_t>& bytes, std::uint64_t value) {
   for (; value >= 0x80; value >>= 7) bytes.push_back(static_cast<std::uint8_t>(value | 0x80));
   bytes.push_back(static_cast<std::uint8_t>(value));
-}
-
-void appendLittleEndian(std::vector<std::uint8_t>& bytes, std::uint64_t value) {
-  for (int shift = 0; shift < 32; shift += 8) {
-    bytes.push_back(static_cast<std::uint8_t>(value >> shift & 0xFFu));
-  }
 }
 
 }  // namespace

@@ -51,10 +51,10 @@ std::size_t getNumber(const Json& object, const char* key, std::size_t fallback)
 
 /// Corners of a primitive: its index count, otherwise its vertex count. 0 for invalid JSON.
 std::size_t countCorners(const Json& primitive, const Json& accessors) {
-  constexpr std::size_t kNone = ~std::size_t{0};
   const auto attributes = primitive.find("attributes");
   const bool hasAttributes = attributes != primitive.end() && attributes->is_object();
-  const std::size_t vertices = hasAttributes ? getNumber(*attributes, "POSITION", kNone) : kNone;
+  const std::size_t vertices =
+      hasAttributes ? getNumber(*attributes, "POSITION", kNoIndex) : kNoIndex;
   const std::size_t accessor = getNumber(primitive, "indices", vertices);
   if (accessor >= accessors.size() || !accessors[accessor].is_object()) return 0;
   return getNumber(accessors[accessor], "count", 0);
