@@ -78,8 +78,8 @@ class Checker {
 
   bool inContact(const Pair& pair) {
     std::size_t work = kMaxQueryWork;
-    const auto found = std::get<PairProximity>(computePairProximity(
-        {index_, *world_.snapshot()}, pair.first, pair.second, false, work));
+    const auto found = std::get<PairProximity>(
+        computePairProximity({index_, *world_.snapshot()}, pair.first, pair.second, false, work));
     return found.separation.verdict != collision::Verdict::separated ||
            found.separation.distance < computeContactThreshold(world_.settings());
   }
@@ -234,8 +234,8 @@ TEST(ContactHorizon, IsInTheFutureWhereTheWayIsClear) {
     horizons.update(world.snapshot());
     for (const auto& [id, horizon] : horizons.horizons()) {
       std::size_t work = kMaxQueryWork;
-      const auto near = std::get<NearbyEntities>(
-          findNearbyEntities({index, *world.snapshot()}, id, 0.5, work));
+      const auto near =
+          std::get<NearbyEntities>(findNearbyEntities({index, *world.snapshot()}, id, 0.5, work));
       if (near.pairs.size() > horizon.touching.size()) continue;
       ++clear;
       EXPECT_GT(horizon.notBefore(), world.snapshot()->time);

@@ -68,6 +68,8 @@ class ContactHorizons {
   /// Forgets all proofs: the next snapshot is of another world.
   void reset();
 
+  /// The tick of the last update; there must have been one.
+  std::uint64_t tick() const { return state_.snapshot()->tick; }
   /// Of the selected avatars that are present, by id.
   const std::map<EntityId, ContactHorizon>& horizons() const { return horizons_; }
   /// Of all pairs near the avatars, the one with the earliest possible contact.
