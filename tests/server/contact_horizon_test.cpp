@@ -84,7 +84,7 @@ TEST_F(ContactHorizons, NoContactBeginsBeforeThem) {
   EXPECT_FALSE(ann.command(walkTo("ann", 1.9, 0, 0)));
   const double tick = ann.welcome().policies().tick();
   std::map<std::uint32_t, double> proved;  // by entity
-  int begun = 0, told = 0;
+  int begun = 0, reported = 0;
   for (int i = 0; i < 150; ++i) {
     ann.step();
     for (const v1::ServerMessage& message : ann.takeEvents()) {
@@ -96,15 +96,15 @@ TEST_F(ContactHorizons, NoContactBeginsBeforeThem) {
         EXPECT_LT(event.time() - proved.at(event.b()), 3 * tick) << "and soon after";
       }
       for (const v1::ContactHorizon& horizon : message.events().horizons()) {
-        ++told;
+        ++reported;
         for (const auto& approach : horizon.approaches())
           proved[approach.entity()] = std::max(proved[approach.entity()], approach.not_before());
       }
     }
   }
   EXPECT_EQ(begun, 1) << "the door";
-  EXPECT_GT(told, 20);
-  EXPECT_LT(told, 150);
+  EXPECT_GT(reported, 20);
+  EXPECT_LT(reported, 150);
 }
 
 TEST_F(ContactHorizons, OneClientGetsItsAvatarAndAnotherAll) {

@@ -31,7 +31,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMaxSearchSeconds = 3600;
 /// Work limit for one pair; above it the boxes must suffice.
 constexpr std::size_t kMaxWorkPerPair = 40'000;
-/// Work of a pair besides its distance.
+/// Work of a pair in addition to its distance.
 constexpr std::size_t kPairWork = 8;
 /// Fraction of the search time that boxes must prove, so that no exact distance is needed.
 constexpr double kBoxesSuffice = 0.5;
