@@ -62,6 +62,12 @@ std::optional<double> PairSchedule::findTime(std::uint32_t a, std::uint32_t b) c
   return slots_[found->second].entry.time;
 }
 
+std::vector<PairSchedule::Entry> PairSchedule::findEntries(std::uint32_t body) const {
+  std::vector<Entry> entries;
+  for (const std::uint32_t slot : findSlots(body)) entries.push_back(slots_[slot].entry);
+  return entries;
+}
+
 std::optional<PairSchedule::Entry> PairSchedule::earliest() const {
   if (heap_.empty()) return std::nullopt;
   ENFILADE_ASSERT(slots_[heap_.front()].heapIndex == 0);

@@ -32,6 +32,8 @@ class PairSchedule {
   void scheduleBodyNow(std::uint32_t body, double now);
 
   std::optional<double> findTime(std::uint32_t a, std::uint32_t b) const;
+  /// All pairs of a body, ascending by the other body.
+  std::vector<Entry> findEntries(std::uint32_t body) const;
   /// Earliest entry; nullopt if the schedule is empty.
   std::optional<Entry> earliest() const;
   /// Removes and returns the earliest entry if it is due at `now`.

@@ -73,13 +73,14 @@ std::string validateSlope(const std::string& text) {
   return degrees && *degrees >= 0 && *degrees <= 89 ? "" : text + ": give 0 to 89 degrees";
 }
 
-CLI::Validator makeSettingValidator(double scene::WorldSettings::*field) {
+CLI::Validator makeSettingValidator(double scene::WorldSettings::*field,
+                                    const std::string& unit = "METRES") {
   return CLI::Validator(
       [field](const std::string& text) {
         scene::WorldSettings settings;
         return setSetting(settings, field, text);
       },
-      "METRES");
+      unit);
 }
 
 /// Adds the options of motion. Defaults are in scene/world/data/world_settings.hpp.
@@ -96,6 +97,10 @@ void addMotion(CLI::App& verb, CommandArguments& into) {
       ->check(makeSettingValidator(&scene::WorldSettings::nearMissDistance));
   verb.add_option("--slope", into.slope, "Steepest slope that avatars stand on, in degrees (50)")
       ->check(CLI::Validator(validateSlope, "DEGREES"));
+  verb.add_option("--speed-limit", into.speedLimit,
+                  "Highest speed of commands and falls, in m/s (1000); contact horizons need a low "
+                  "one")
+      ->check(makeSettingValidator(&scene::WorldSettings::maxSpeed, "SPEED"));
   verb.add_option("--sliding", into.sliding,
                   "Reaction to obstacles: avatars slide along them, "
                   "or stop")
@@ -403,6 +408,8 @@ scene::WorldSettings makeWorldSettings(const CommandArguments& read) {
     setSetting(settings, &scene::WorldSettings::contactOffset, read.epsilon);
   if (!read.nearMiss.empty())
     setSetting(settings, &scene::WorldSettings::nearMissDistance, read.nearMiss);
+  if (!read.speedLimit.empty())
+    setSetting(settings, &scene::WorldSettings::maxSpeed, read.speedLimit);
   // makeHeadingFromDegrees() gives the same cosine on every processor, which determinism needs.
   if (!read.slope.empty())
     settings.walkableNormalY = scene::makeHeadingFromDegrees(*parseNumber<double>(read.slope)).x();

@@ -42,7 +42,7 @@ struct CommandArguments {
   std::string before, after, recording;
   double tolerance = 0.001;
   std::uint32_t pictures = 12;
-  std::string auditEvery = "0", epsilon, stepHeight, nearMiss, slope, sliding = "slide";
+  std::string auditEvery = "0", epsilon, stepHeight, nearMiss, slope, speedLimit, sliding = "slide";
 };
 
 // Each function adds the options of one command with their validators. `into` must outlive `verb`.

@@ -35,8 +35,8 @@ void applyBranch(const CommandArguments& read, ReplayCommand& command) {
 
 /// Rejects options whose values come from the recording. Empty: none was given.
 std::string validateRecordedOptions(const CLI::App& verb) {
-  for (const char* option : {"--step-height", "--epsilon", "--slope", "--sliding", "--near-miss",
-                             "--unit", "--up", "--ifc-reader", "--ifc-doors"})
+  for (const char* option : {"--step-height", "--epsilon", "--slope", "--speed-limit", "--sliding",
+                             "--near-miss", "--unit", "--up", "--ifc-reader", "--ifc-doors"})
     if (verb.count(option) > 0)
       return std::string(option) +
              " cannot be given: the recording "
@@ -123,8 +123,9 @@ std::variant<ProgramCommand, ExitCode> makeServeCommand(const CLI::App& serve,
 
 /// Rejects options that a re-simulation in another model does not support. Empty: valid.
 std::string validateResimulate(const CLI::App& replay) {
-  for (const char* option : {"--strict", "--audit", "--step-height", "--epsilon", "--slope",
-                             "--sliding", "--near-miss", "--record-channels", "--record-frames"})
+  for (const char* option :
+       {"--strict", "--audit", "--step-height", "--epsilon", "--slope", "--speed-limit",
+        "--sliding", "--near-miss", "--record-channels", "--record-frames"})
     if (replay.count(option) > 0)
       return std::string(option) + " cannot be given: a re-simulation uses the recorded values";
   return "";

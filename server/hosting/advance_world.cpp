@@ -6,6 +6,7 @@
 #include "scene/world/active_contacts.hpp"
 #include "server/base/audit_log.hpp"
 #include "server/hosting/frame_subscriptions.hpp"
+#include "server/hosting/horizon_subscriptions.hpp"
 #include "server/hosting/replay_control.hpp"
 #include "server/hosting/tick_broadcast.hpp"
 #include "server/messages/body_messages.hpp"
@@ -93,7 +94,9 @@ void broadcastTick(HostedWorld& hosted, const RecordableWorld::TickResult& resul
   publishStatus(hosted);
   releaseOwners(hosted, report.notices);
   updateActiveContacts(hosted, events);
+  updateHorizons(hosted);
   TickBroadcast shared{events, findPersistentContacts(hosted)};
+  shared.horizons = hosted.horizons.get();
   for (auto& [id, client] : hosted.clients) {
     sendEvents(client, shared);
     sendState(hosted, client, *report.snapshot, shared);

@@ -67,6 +67,7 @@ void stopAvatar(HostedWorld& hosted, const std::string& avatar) {
 
 void removeClient(HostedWorld& hosted, ClientId id) {
   if (hosted.clients.erase(id) == 0) return;
+  hosted.horizonSelectionChanged = true;
   if (hosted.clock.driver == id) hosted.clock.driver.reset();
   publishStatus(hosted);
   std::erase_if(hosted.owners, [&](const auto& owner) {

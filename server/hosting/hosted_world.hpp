@@ -12,6 +12,7 @@
 #include <string>
 
 #include "protocol/enfilade.pb.h"
+#include "scene/world/queries/contact_horizon.hpp"
 #include "scene/world/world.hpp"
 #include "server/base/access.hpp"
 #include "server/hosting/flow_control.hpp"
@@ -67,6 +68,7 @@ struct Client {
   std::shared_ptr<OutgoingQueue> out;
   v1::Subscribe subscription;
   std::uint64_t sequence = 0;       ///< of the last TickEvents
+  bool needsAllHorizons = false;    ///< unchanged contact horizons, too, after the next tick
   double nextStateTime = 0;         ///< seconds of simulated time
   std::uint64_t droppedStates = 0;  ///< since the last sent state
   std::deque<QueuedRequest> queue;  ///< replies keep the order of requests
@@ -129,6 +131,8 @@ struct HostedWorld {
   std::map<std::string, ClientId> owners;
   std::set<std::string> pendingRelease;  ///< names in `owners` that may become free
   std::map<std::pair<scene::EntityId, scene::EntityId>, v1::ContactEvent> activeContacts;
+  std::unique_ptr<scene::ContactHorizons> horizons;  ///< null without a subscriber
+  bool horizonSelectionChanged = false;              ///< a client subscribed or left
   TickStatistics statistics;
   bool idle = true;                  ///< of the last tick
   std::uint64_t droppedStates = 0;   ///< of all clients

@@ -2,6 +2,7 @@
 
 #include "collision/assert.hpp"
 #include "protocol/framing.hpp"
+#include "server/hosting/horizon_subscriptions.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -57,8 +58,13 @@ Buffer serializeState(const scene::World& world) {
 
 void sendEvents(Client& client, TickBroadcast& outgoing) {
   const Buffer& shared = findOrSerializeEvents(outgoing, client.subscription);
-  if (shared->empty()) return;
   v1::TickEvents own;
+  if (outgoing.horizons) addHorizons(client, *outgoing.horizons, own);
+  if (shared->empty()) {
+    if (own.horizons().empty()) return;
+    own.set_tick(outgoing.tickEvents.tick());
+    own.set_time(outgoing.tickEvents.time());
+  }
   own.set_sequence(++client.sequence);
   client.out->push(
       spliceMessage(v1::ServerMessage::kEventsFieldNumber, own.SerializeAsString(), shared));

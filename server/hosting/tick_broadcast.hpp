@@ -14,6 +14,8 @@ struct TickBroadcast {
   std::vector<v1::ContactEvent> persistentContacts = {};  ///< appended to them
   std::array<Buffer, 16> eventBuffers = {};  ///< serialized, indexed by subscription flags
   Buffer stateBuffer = {};                   ///< serialized
+  /// Sent to their subscribers; null: none.
+  const scene::ContactHorizons* horizons = nullptr;
 };
 
 /// Sends the events of the client's subscription.

@@ -2,6 +2,7 @@
 
 #include "collision/assert.hpp"
 #include "server/hosting/frame_subscriptions.hpp"
+#include "server/hosting/horizon_subscriptions.hpp"
 #include "server/hosting/tick_broadcast.hpp"
 #include "server/messages/world_messages.hpp"
 
@@ -36,6 +37,7 @@ void resetWorld(HostedWorld& hosted) {
   broadcastEvents(hosted, events);
   for (auto& [id, client] : hosted.clients) resetSubscriptionTimes(client);
   hosted.world.reset(makeInitialWorld(hosted.scene, hosted.world.settings(), hosted.auditEvery));
+  resetHorizons(hosted);
   hosted.owners.clear();
   hosted.pendingRelease.clear();
   hosted.activeContacts.clear();
@@ -45,6 +47,7 @@ void resetWorld(HostedWorld& hosted) {
 void replaceWorld(HostedWorld& hosted, scene::World world, const v1::TickEvents& activeContacts) {
   broadcastEvents(hosted, hosted.world.endContacts(v1::ContactEvent::REASON_SEEK));
   hosted.world.switchTo(std::move(world));
+  resetHorizons(hosted);
   hosted.owners.clear();
   hosted.pendingRelease.clear();
   hosted.activeContacts.clear();

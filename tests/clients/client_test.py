@@ -286,6 +286,42 @@ class Seeing(RoomCase):
         self.assertLess(sooner.before, 0.1)
         self.assertEqual(self.client.cannot_touch_before("wall", "column").before, float("inf"))
 
+    def test_no_contact_begins_before_its_horizon(self):
+        with enfilade.serve(self.scene, "--speed-limit", "2") as server, server.connect() as client:
+            ann = client.spawn("ann", at=(0, 0.001, 0))
+            ann.enter()
+            state = client.step(30, avatars=True).avatars["ann"]
+            client.subscribe(contacts=True, contact_horizon=[state.id], approaches=16)
+            ann.walk((8, 0, 0))
+            client.step(300)
+            horizons = list(client.horizons())
+            self.assertEqual({one.avatar for one in horizons}, {state.id})
+            self.assertEqual(horizons[0].touching, (FLOOR,))
+            self.assertEqual(horizons[0].unbounded, 0)
+            self.assertGreater(horizons[0].not_before, horizons[0].time)
+            self.assertEqual(horizons[0].not_before, horizons[0].approaches[0][1])
+            wall, = [one for one in client.contacts() if one.kind == "begin"]
+            self.assertEqual(wall.b, WALL)
+            proved = [time for one in horizons if one.tick < wall.tick
+                      for entity, time in one.approaches if entity == WALL]
+            self.assertGreater(len(proved), 3)
+            self.assertLessEqual(max(proved), wall.time)
+            self.assertIn(WALL, horizons[-1].touching)
+            self.assertLess(len(horizons), 300)
+            client.subscribe(contact_horizon=True)
+            client.step()
+            self.assertEqual(len(next(client.horizons()).approaches), 1)
+
+    def test_horizons_of_no_avatar_are_refused(self):
+        with self.assertRaisesRegex(ValueError, "contact_horizon"):
+            self.client.subscribe(contact_horizon=[])
+        with self.assertRaises(enfilade.ServerError) as caught:
+            self.client.subscribe(contact_horizon=[WALL])
+        self.assertEqual(caught.exception.field, "subscribe.contact_horizon.avatars[0]")
+        self.client.welcome.capabilities.remove("contact_horizon")
+        with self.assertWarnsRegex(UserWarning, "horizon"):
+            self.client.subscribe(contact_horizon=True)
+
     def test_queries_about_unknown_entities_are_refused(self):
         for which in ("unknown", 99):
             with self.assertRaises(enfilade.ServerError) as caught:

@@ -24,11 +24,14 @@ scene::WorldSettings lengthsOf(std::vector<const char*> options) {
 }
 
 TEST(MotionOptions, SetTheWorldSettingsAndArePolicies) {
-  const scene::WorldSettings lengths = lengthsOf(
-      {"--step-height", "0.2", "--epsilon", "0.001", "--slope", "30", "--sliding", "stop"});
+  const scene::WorldSettings lengths =
+      lengthsOf({"--step-height", "0.2", "--epsilon", "0.001", "--slope", "30", "--sliding", "stop",
+                 "--speed-limit", "2.5"});
   EXPECT_EQ(lengths.stepHeight, 0.2);
   EXPECT_EQ(lengths.contactOffset, 0.001);
+  EXPECT_EQ(lengths.maxSpeed, 2.5);
   const v1::Policies policies = toProto(lengths);
+  EXPECT_EQ(policies.speed_limit(), 2.5);
   EXPECT_NEAR(policies.walkable_slope(), 30 * 3.14159265358979 / 180, 1e-12);
   EXPECT_EQ(policies.sliding(), "stop");
   EXPECT_GT(policies.jump_limit(), 0);
@@ -45,6 +48,7 @@ TEST(MotionOptions, SettingsOutOfRangeAreUsageErrors) {
                                                                {"--epsilon", "1mm"},
                                                                {"--slope", "90"},
                                                                {"--slope", "inf"},
+                                                               {"--speed-limit", "0"},
                                                                {"--sliding", "glide"}}) {
     const auto refused = read(bad);
     ASSERT_TRUE(std::holds_alternative<ExitCode>(refused)) << bad[0] << " " << bad[1];

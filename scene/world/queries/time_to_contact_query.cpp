@@ -17,14 +17,12 @@
 #include <limits>
 
 #include "collision/compound/nearest_parts.hpp"
+#include "scene/world/queries/motion_limits.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-// A push is horizontal although the normal is not: at most 1 / 0.714^2 of the body's displacement
-// (bodies/kinematic_motion.cpp).
-constexpr double kMaxPushFactor = 2;
 
 /// Bounds of an entity's motion from now on.
 struct Motion {
@@ -33,12 +31,6 @@ struct Motion {
   double immediateGrowth = 0;  ///< metres by which it may grow instantly
   bool bounded = true;         ///< false: no bound is known
 };
-
-double sumJointSpeeds(const AvatarSnapshot& avatar, const WorldSettings& settings) {
-  double speed = 0;
-  for (const JointSnapshot& joint : avatar.joints) speed += settings.maxJointSpeed * joint.leverArm;
-  return speed;
-}
 
 /// A body's snapshot with its spec: one that may carry or push, or the entity of the query.
 struct BodyInfo {
@@ -140,18 +132,8 @@ Motion computeBodyMotion(const SceneAt& sceneAt, const BodySnapshot& snapshot,
 
 // ---- any command --------------------------------------------------------------------------------
 
-/// Maximum speed of any point of the body under any command, m/s.
 double computeBodySpeedLimit(const BodyInfo& body, const WorldSettings& settings) {
-  if (isDynamic(body.spec.kind)) return kNever;
-  if (isTrigger(body.spec.kind)) return 0;
-  return std::max(settings.maxSpeed,
-                  body.spec.speed * computeMaxPointSpeed(body.spec, body.radius));
-}
-
-/// Maximum speed of an avatar by itself: it walks, steps up or falls, and keeps its contact offset.
-double computeAvatarSpeedLimit(const AvatarSnapshot& avatar, const WorldSettings& settings) {
-  const double slack = settings.stepHeight + 16 * settings.contactOffset;  // metres a tick
-  return 2 * settings.maxSpeed + slack / settings.tickDuration + sumJointSpeeds(avatar, settings);
+  return computeBodySpeedLimit(body.spec, body.radius, settings);
 }
 
 /// Bounds under any command. Until the gap of `distance` has closed, neither entity moves farther
@@ -159,7 +141,7 @@ double computeAvatarSpeedLimit(const AvatarSnapshot& avatar, const WorldSettings
 Motion boundAvatarMotion(const SceneAt& sceneAt, const AvatarSnapshot& avatar,
                          const WorldSettings& settings, double distance) {
   Motion motion;
-  motion.immediateGrowth = avatar.spawnHeight - avatar.height;  // it may have crouched
+  motion.immediateGrowth = computeGrowthLimit(avatar);
   const double ownSpeed = computeAvatarSpeedLimit(avatar, settings);
   motion.isotropicSpeed = ownSpeed;
   const Aabb box = placeBox(avatar.shape->box, avatar.footPosition);

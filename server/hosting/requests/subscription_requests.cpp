@@ -1,6 +1,7 @@
 #include "server/hosting/requests/subscription_requests.hpp"
 
 #include "server/hosting/frame_subscriptions.hpp"
+#include "server/hosting/horizon_subscriptions.hpp"
 
 namespace enfilade::server {
 
@@ -9,7 +10,11 @@ void handleSubscribe(const RequestContext& context, const v1::Subscribe& subscri
     return replyError(context, v1::ERROR_BAD_MESSAGE,
                       "subscribe.state_rate: give 0 to 1000000 per second", "subscribe.state_rate");
   }
+  if (auto error = validateHorizons(context.hosted, subscription))
+    return replyError(context, std::move(*error));
   context.client.subscription = subscription;
+  context.client.needsAllHorizons = true;
+  context.hosted.horizonSelectionChanged = true;
   context.client.nextStateTime = 0;
   v1::ServerMessage message;
   message.mutable_subscribe()->set_tick(lastTick(context.hosted));

@@ -17,6 +17,7 @@ v1::Welcome makeWelcome(const HostedWorld& hosted) {
   welcome.add_capabilities("packed_rays");
   welcome.add_capabilities("pairs");
   welcome.add_capabilities("persists");
+  welcome.add_capabilities("contact_horizon");
   welcome.add_capabilities("restart");
   if (!hosted.frames.deviceName().empty()) {
     welcome.add_capabilities("frames");

@@ -20,12 +20,12 @@ from .client import Client, connect
 from .environment import WalkEnv
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError, StartFailed
 from .process import Server, serve
-from .results import (Apart, AvatarState, Contact, Frame, Hits, Notice, Pair, Replay, Scan, State,
-                      Step, Touching, World)
+from .results import (Apart, AvatarState, Contact, Frame, Hits, Horizon, Notice, Pair, Replay, Scan,
+                      State, Step, Touching, World)
 from .vector_environment import VectorWalkEnv
 
 __all__ = [
     "Apart", "Avatar", "AvatarState", "Client", "ConnectionFailed", "Contact", "EnfiladeError", "Frame",
-    "Hits", "Notice", "OrderFailed", "Pair", "Replay", "Scan", "Server", "ServerError", "StartFailed",
+    "Hits", "Horizon", "Notice", "OrderFailed", "Pair", "Replay", "Scan", "Server", "ServerError", "StartFailed",
     "State", "Step", "Touching", "VectorWalkEnv", "WalkEnv", "World", "connect", "messages", "serve",
 ]

@@ -17,7 +17,7 @@ from .avatar import Avatar
 from .connection import Connection, Received, raise_refusal, server_error
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError
 from .questions import Point, cannot_touch_query, entity, frame_request, points, vec
-from .results import (Apart, Contact, Frame, Hits, Notice, Pair, Replay, Scan, State,
+from .results import (Apart, Contact, Frame, Hits, Horizon, Notice, Pair, Replay, Scan, State,
                       Step, Touching, World)
 
 PROTOCOL_VERSION = "1.0.0"
@@ -40,12 +40,19 @@ def connect(address: str = "127.0.0.1:7878", *, name: str = "enfilade python", t
                   timeout=timeout, world=world)
 
 
+def _some_avatars(ids: Iterable[int]) -> List[int]:
+    found = list(ids)
+    if not found:  # would mean all of them
+        raise ValueError("contact_horizon: give ids of avatars, or True for all of them")
+    return found
+
+
 class Client:
     """One connection. Not thread-safe: open one connection per thread.
 
     `timeout` (seconds) applies to the connection and to each reply; a step's reply comes after all
     its ticks. Errors of the server are raised as ServerError. Unsolicited messages are kept until
-    contacts(), notices(), states() or frames() take them. An exception from a signal handler, as
+    contacts(), notices(), horizons(), states() or frames() take them. An exception from a signal handler, as
     KeyboardInterrupt, leaves the client usable: the reply to the interrupted request is discarded.
     """
 
@@ -56,6 +63,7 @@ class Client:
         self._tags = itertools.count(1)
         self._contacts: Deque[Contact] = deque()
         self._notices: Deque[Notice] = deque()
+        self._horizons: Deque[Horizon] = deque()
         self._states: Deque[State] = deque(maxlen=1)
         self._frames: Deque[Frame] = deque(maxlen=KEPT_FRAMES)
         self._replay: Optional[Replay] = None  # as last reported
@@ -188,16 +196,19 @@ class Client:
     def _keep_events(self, received: Received) -> None:
         events = received.message.events
         if received.marks is None:
-            received.marks = (self._sequence + 1, len(self._contacts), len(self._notices))
-        sequence, contacts, notices = received.marks
+            received.marks = (self._sequence + 1, len(self._contacts), len(self._notices),
+                              len(self._horizons))
+        sequence, contacts, notices, horizons = received.marks
         if events.sequence != sequence:
             raise self._connection._failed(
                 f"received events {events.sequence} instead of {sequence}")
-        for kept, length in ((self._contacts, contacts), (self._notices, notices)):
+        for kept, length in ((self._contacts, contacts), (self._notices, notices),
+                             (self._horizons, horizons)):
             while len(kept) > length:  # of an interrupted attempt
                 kept.pop()
         self._contacts.extend([results.contact(one) for one in events.contacts])
         self._notices.extend([results.notice(one) for one in events.notices])
+        self._horizons.extend([results.horizon(one, events) for one in events.horizons])
         self._sequence = sequence
 
     def _await_events(self, seconds: float) -> bool:
@@ -240,6 +251,7 @@ class Client:
         self.request(restart=messages.Restart())
         self._contacts.clear()
         self._notices.clear()
+        self._horizons.clear()
         self._states.clear()
         self._frames.clear()
 
@@ -333,11 +345,16 @@ class Client:
 
     def subscribe(self, *, contacts: bool = False, near_misses: bool = False, notices: bool = False,
                   state: bool = False, state_rate: float = 0.0,
-                  persists: bool = False) -> List[Contact]:
+                  persists: bool = False,
+                  contact_horizon: Union[bool, Iterable[int]] = False,
+                  approaches: int = 1) -> List[Contact]:
         """Selects the unsolicited messages, instead of the previous selection. Returns the active
         contacts, as they began (with contacts=True). All contacts and notices are kept until they
         are taken. With `persists` contacts() also has each continuing contact in every tick between
-        its beginning and its end, with the values of that tick."""
+        its beginning and its end, with the values of that tick. `contact_horizon`: True for all
+        avatars, or entity ids of avatars (Notice.id, AvatarState.id). horizons() then has a proved
+        time before which each comes into contact with nothing; `approaches` (1 to 16) is the
+        maximum number of entities in it."""
         if near_misses and self.welcome.policies.near_miss <= 0:
             warnings.warn("subscribe: this server reports no near misses; start it with --near-miss "
                           "METRES", stacklevel=2)
@@ -346,6 +363,13 @@ class Client:
                           "newer one", stacklevel=2)
         wanted = messages.Subscribe(contacts=contacts, near_misses=near_misses, notices=notices,
                                     state=state, state_rate=state_rate, persists=persists)
+        if contact_horizon is not False:
+            if "contact_horizon" not in self.welcome.capabilities:
+                warnings.warn("subscribe: this server computes no contact horizons; start a newer "
+                              "one", stacklevel=2)
+            wanted.contact_horizon.approaches = approaches
+            if contact_horizon is not True:
+                wanted.contact_horizon.avatars.extend(_some_avatars(contact_horizon))
         reply, _ = self.request(subscribe=wanted)
         return [results.contact(one) for one in reply.subscribe.live]
 
@@ -377,6 +401,13 @@ class Client:
     def notices(self, seconds: float = 0.0) -> Iterator[Notice]:
         """Takes the outcomes of orders, in order. Call subscribe(notices=True) first."""
         return self._taken(self._notices, seconds)
+
+    def horizons(self, seconds: float = 0.0) -> Iterator[Horizon]:
+        """Takes the contact horizons of avatars, in order: all of them after the first tick, then
+        those that changed. One holds until its time, whatever clients command, unless an entity
+        joins the world; a later one of the same avatar replaces it. Call
+        subscribe(contact_horizon=True) first, on a server with a low --speed-limit."""
+        return self._taken(self._horizons, seconds)
 
     def states(self, seconds: float = 0.0) -> Iterator[State]:
         """Takes the states of all avatars, the latest only. Call subscribe(state=True) first."""

@@ -405,6 +405,31 @@ def apart(reply: Any) -> Apart:
 
 
 @dataclass(frozen=True)
+class Horizon:
+    """A proved time before which an avatar comes into contact with nothing: ContactHorizon of the
+    .proto. It holds for the entities that are present at `tick`, except those in `touching` and
+    dynamic bodies."""
+
+    tick: int
+    time: float  # seconds of simulated time
+    avatar: int
+    not_before: float  # seconds of simulated time; infinity: it meets nothing; <= time: unknown
+    approaches: Tuple[Tuple[int, float], ...]  # entities and their times, the earliest first;
+    #                                            entity 0: all that are not listed
+    touching: Tuple[int, ...]  # entities in contact with it, as its floor
+    unbounded: int  # the nearest dynamic body, of which nothing is proved; 0: none
+    unbounded_distance: float  # metres, lower bound
+
+
+def horizon(message: Any, events: Any) -> Horizon:
+    approaches = tuple((one.entity, one.not_before) for one in message.approaches)
+    return Horizon(tick=events.tick, time=events.time, avatar=message.avatar,
+                   not_before=approaches[0][1] if approaches else float("inf"),
+                   approaches=approaches, touching=tuple(message.touching),
+                   unbounded=message.unbounded, unbounded_distance=message.unbounded_distance)
+
+
+@dataclass(frozen=True)
 class World:
     """One of the server's worlds: World of the .proto."""
 

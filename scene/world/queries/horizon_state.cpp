@@ -1,0 +1,212 @@
+#include "scene/world/queries/horizon_state.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "collision/assert.hpp"
+#include "collision/motion/time_to_contact.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr std::uint32_t kBoxesPerLeaf = 4;
+/// Exceeds the rounding of sums of speeds, and of simulated times.
+constexpr double kRoundUp = 1 + 1e-12;
+
+const BodySpec& specOf(const Scene& scene, const BodySnapshot& body) {
+  return scene.model().bodies[body.index];
+}
+
+bool hasMoved(const AvatarSnapshot& before, const AvatarSnapshot& now) {
+  return before.footPosition != now.footPosition || before.shape != now.shape ||
+         before.groundEntity != now.groundEntity || before.height != now.height;
+}
+
+bool hasMoved(const BodySnapshot& before, const BodySnapshot& now) {
+  return before.pose.translation != now.pose.translation ||
+         before.pose.rotation.coeffs() != now.pose.rotation.coeffs();
+}
+
+/// Rounding of boxes with these coordinates, metres; as in proximity_query.cpp.
+double computeBoxRounding(const Aabb& box) {
+  return 1e-9 * (1 + std::max(box.min.cwiseAbs().maxCoeff(), box.max.cwiseAbs().maxCoeff()));
+}
+
+}  // namespace
+
+HorizonState::HorizonState(std::shared_ptr<const Scene> scene, const WorldSettings& settings)
+    : scene_(std::move(scene)),
+      settings_(settings),
+      index_(scene_),
+      staticTree_(collision::buildBoxTree(scene_->staticBoxes(), kBoxesPerLeaf)) {}
+
+bool HorizonState::isConsecutive(const Snapshot& next) const {
+  return snapshot_ && next.tick == snapshot_->tick + 1;
+}
+
+void HorizonState::update(std::shared_ptr<const Snapshot> snapshot) {
+  ENFILADE_ASSERT(snapshot && snapshot->bodies);
+  const bool consecutive = isConsecutive(*snapshot);
+  if (!consecutive) kinematicMotion_ = 0;
+  updateBodies(*snapshot, consecutive);
+  updateAvatars(*snapshot, consecutive);
+  speeds_.clear();
+  snapshot_ = std::move(snapshot);
+}
+
+void HorizonState::updateBodies(const Snapshot& next, bool consecutive) {
+  if (consecutive && snapshot_->bodies == next.bodies) return;
+  const SceneAt at{index_, next};
+  bodies_.resize(next.bodies->size());
+  pushers_.clear();
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const BodySnapshot& body = (*next.bodies)[i];
+    const BodySpec& spec = specOf(*scene_, body);
+    BodyState& state = bodies_[i];
+    const bool moved = !consecutive || hasMoved((*snapshot_->bodies)[i], body);
+    if (moved) {
+      state.lastMotion = next.tick;
+      state.box = computeBodyAabb(at, body);
+      state.speed = computeBodySpeedLimit(spec, scene_->bodyShape(i)->radius, settings_);
+    }
+    if (!isKinematic(spec.kind)) continue;
+    pushers_.push_back({state.box, state.speed});
+    if (moved) kinematicMotion_ = next.tick;
+  }
+}
+
+void HorizonState::updateAvatars(const Snapshot& next, bool consecutive) {
+  unbounded_.clear();
+  left_.clear();
+  if (!consecutive) avatarMotion_.clear();
+  const SceneAt before{index_, consecutive ? *snapshot_ : next}, now{index_, next};
+  for (const auto& [id, tick] : avatarMotion_)
+    if (!findAvatarSnapshot(now, id)) left_.push_back(id);
+  for (const EntityId id : left_) avatarMotion_.erase(id);
+  for (const AvatarSnapshot& avatar : next.avatars) {
+    const auto [known, isNew] = avatarMotion_.try_emplace(avatar.id, next.tick);
+    const AvatarSnapshot* last = isNew ? nullptr : findAvatarSnapshot(before, avatar.id);
+    if (last && hasMoved(*last, avatar)) known->second = next.tick;
+    if (!last ||
+        (standsOnDynamicBody(avatar, next) && !standsOnDynamicBody(*last, before.snapshot)))
+      unbounded_.push_back(avatar.id);
+  }
+}
+
+std::uint64_t HorizonState::lastMotion(EntityId entity) const {
+  if (const auto avatar = avatarMotion_.find(entity); avatar != avatarMotion_.end())
+    return avatar->second;
+  const BodySnapshot* body = findBodySnapshot(sceneAt(), entity);
+  return body ? bodies_[body->index].lastMotion : 0;
+}
+
+Aabb HorizonState::boxOf(EntityId entity) const {
+  if (const AvatarSnapshot* avatar = findAvatarSnapshot(sceneAt(), entity))
+    return placeBox(avatar->shape->box, avatar->footPosition);
+  if (const BodySnapshot* body = findBodySnapshot(sceneAt(), entity))
+    return bodies_[body->index].box;
+  const auto& objects = scene_->solidObjects();  // ascending
+  const auto at = std::lower_bound(objects.begin(), objects.end(), entity - 1);
+  ENFILADE_ASSERT(at != objects.end() && *at == entity - 1);
+  return scene_->staticBoxes()[static_cast<std::size_t>(at - objects.begin())];
+}
+
+bool HorizonState::standsOnDynamicBody(const AvatarSnapshot& avatar,
+                                       const Snapshot& snapshot) const {
+  const BodySnapshot* ground = findBodySnapshot({index_, snapshot}, avatar.groundEntity);
+  return ground && isDynamic(specOf(*scene_, *ground).kind);
+}
+
+double HorizonState::avatarSpeed(const AvatarSnapshot& avatar, double seconds) const {
+  const auto [known, isNew] = speeds_.try_emplace({avatar.id, seconds}, 0);
+  if (!isNew) return known->second;
+  return known->second = computeAvatarSpeedWithin(
+             avatar, pushers_, standsOnDynamicBody(avatar, *snapshot_), settings_, seconds);
+}
+
+double HorizonState::speedWithin(EntityId entity, double seconds) const {
+  if (const AvatarSnapshot* avatar = findAvatarSnapshot(sceneAt(), entity))
+    return avatarSpeed(*avatar, seconds);
+  const BodySnapshot* body = findBodySnapshot(sceneAt(), entity);
+  return body ? bodies_[body->index].speed : 0;
+}
+
+double HorizonState::growthOf(EntityId entity) const {
+  const AvatarSnapshot* avatar = findAvatarSnapshot(sceneAt(), entity);
+  return avatar ? computeGrowthLimit(*avatar) : 0;
+}
+
+double HorizonState::computeTime(EntityId a, EntityId b, double gap, double speed) const {
+  return computeTime(gap, growthOf(a) + growthOf(b), speed);
+}
+
+double HorizonState::computeTime(double gap, double growth, double speed) const {
+  const double toContact = gap - (computeContactThreshold(settings_) + growth) * kRoundUp;
+  return collision::computeTimeToContact(toContact, {speed * kRoundUp, 0});
+}
+
+double HorizonState::boxTime(EntityId a, EntityId b, double speed) const {
+  return boxTime(boxOf(a), boxOf(b), growthOf(a) + growthOf(b), speed);
+}
+
+double HorizonState::boxTime(const Aabb& own, const Aabb& other, double growth,
+                             double speed) const {
+  return computeTime(computeGap(own, other) - computeBoxRounding(own), growth, speed);
+}
+
+void HorizonState::findStaticNeighbours(const AvatarSnapshot& avatar, double speed, double seconds,
+                                        std::vector<Neighbour>& neighbours) const {
+  const Aabb own = placeBox(avatar.shape->box, avatar.footPosition);
+  const double growth = computeGrowthLimit(avatar);
+  const double reach = speed * seconds * kRoundUp + growth +
+                       2 * computeContactThreshold(settings_) + computeBoxRounding(own);
+  const auto box = collision::toFloatAabb(inflated(own, reach), staticTree_.origin);
+  collision::forEachOverlappingLeaf(
+      staticTree_, box, [&](std::uint32_t first, std::uint32_t count) {
+        for (std::uint32_t item = first; item < first + count; ++item) {
+          const std::uint32_t index = staticTree_.order[item];
+          const double earliest = boxTime(own, scene_->staticBoxes()[index], growth, speed);
+          if (earliest < seconds)
+            neighbours.push_back({scene_->solidObjects()[index] + 1, earliest});
+        }
+      });
+}
+
+std::vector<HorizonState::Neighbour> HorizonState::findNeighbours(const AvatarSnapshot& avatar,
+                                                                  double seconds) const {
+  std::vector<Neighbour> neighbours;
+  const double speed = avatarSpeed(avatar, seconds);
+  findStaticNeighbours(avatar, speed, seconds, neighbours);
+  const Aabb own = placeBox(avatar.shape->box, avatar.footPosition);
+  const auto consider = [&](EntityId id, const Aabb& box, double growth, double otherSpeed) {
+    const double earliest =
+        boxTime(own, box, computeGrowthLimit(avatar) + growth, speed + otherSpeed);
+    if (earliest < seconds) neighbours.push_back({id, earliest});
+  };
+  for (const BodySnapshot& body : *snapshot_->bodies)
+    if (isKinematic(specOf(*scene_, body).kind))
+      consider(body.id, bodies_[body.index].box, 0, bodies_[body.index].speed);
+  for (const AvatarSnapshot& other : snapshot_->avatars)
+    if (other.id != avatar.id)
+      consider(other.id, placeBox(other.shape->box, other.footPosition), computeGrowthLimit(other),
+               avatarSpeed(other, seconds));
+  return neighbours;
+}
+
+std::size_t HorizonState::boundedCount() const {
+  return scene_->solidObjects().size() + pushers_.size() + snapshot_->avatars.size();
+}
+
+HorizonState::NearestBody HorizonState::findNearestDynamicBody(const AvatarSnapshot& avatar) const {
+  NearestBody nearest{0, kInfinity};
+  const Aabb own = placeBox(avatar.shape->box, avatar.footPosition);
+  for (const BodySnapshot& body : *snapshot_->bodies) {
+    if (!isDynamic(specOf(*scene_, body).kind)) continue;
+    const double gap = computeGap(own, bodies_[body.index].box);
+    if (gap < nearest.gap) nearest = {body.id, gap};
+  }
+  return nearest.entity ? nearest : NearestBody{};
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,19 @@
+// Subscriptions to contact horizons: one schedule of pairs serves all clients of a world. Tick
+// thread only.
+#pragma once
+
+#include "server/hosting/hosted_world.hpp"
+
+namespace enfilade::server {
+
+/// Error if the subscription's request for contact horizons is invalid.
+std::optional<v1::Error> validateHorizons(const HostedWorld& hosted,
+                                          const v1::Subscribe& subscription);
+/// Advances the horizons to the last tick. They exist while a client subscribes to them.
+void updateHorizons(HostedWorld& hosted);
+/// Forgets all horizons: the world was replaced. Subscribers get all of them after the next tick.
+void resetHorizons(HostedWorld& hosted);
+/// Adds the client's horizons that changed in the last tick.
+void addHorizons(Client& client, const scene::ContactHorizons& horizons, v1::TickEvents& events);
+
+}  // namespace enfilade::server
