@@ -9,7 +9,6 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::uint32_t kBoxesPerLeaf = 4;
 /// Exceeds the rounding of sums of speeds, and of simulated times.
 constexpr double kRoundUp = 1 + 1e-12;
@@ -199,7 +198,7 @@ std::size_t HorizonState::boundedCount() const {
 }
 
 HorizonState::NearestBody HorizonState::findNearestDynamicBody(const AvatarSnapshot& avatar) const {
-  NearestBody nearest{0, kInfinity};
+  NearestBody nearest{0, std::numeric_limits<double>::infinity()};
   const Aabb own = placeBox(avatar.shape->box, avatar.footPosition);
   for (const BodySnapshot& body : *snapshot_->bodies) {
     if (!isDynamic(specOf(*scene_, body).kind)) continue;
