@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kTop = 0.9;        // metres: height of the tray's floor
+constexpr double kTrayFloor = 0.9;  // metres: height of the tray's floor
 constexpr double kPlate = 0.02;     // thickness of the tray's plates
 constexpr double kWall = 0.25;      // height of its walls
 constexpr double kGap = 0.01;       // between the tray, nearly at its lowest point, and its stand
@@ -61,13 +61,13 @@ Eigen::Quaterniond anyRotation(Random& random) {
 }
 
 void placeTray(Sketch& sketch, double in) {
-  const double out = in + kPlate, top = kTop + kWall;
+  const double out = in + kPlate, top = kTrayFloor + kWall;
   const Paint paint = Paint::paintedWood;
-  sketch.box("feeder/tray/floor", {-out, kTop - kPlate, -out}, {out, kTop, out}, paint);
-  sketch.box("feeder/tray/west", {-out, kTop, -out}, {-in, top, out}, paint);
-  sketch.box("feeder/tray/east", {in, kTop, -out}, {out, top, out}, paint);
-  sketch.box("feeder/tray/north", {-in, kTop, -out}, {in, top, -in}, paint);
-  sketch.box("feeder/tray/south", {-in, kTop, in}, {in, top, out}, paint);
+  sketch.box("feeder/tray/floor", {-out, kTrayFloor - kPlate, -out}, {out, kTrayFloor, out}, paint);
+  sketch.box("feeder/tray/west", {-out, kTrayFloor, -out}, {-in, top, out}, paint);
+  sketch.box("feeder/tray/east", {in, kTrayFloor, -out}, {out, top, out}, paint);
+  sketch.box("feeder/tray/north", {-in, kTrayFloor, -out}, {in, top, -in}, paint);
+  sketch.box("feeder/tray/south", {-in, kTrayFloor, in}, {in, top, out}, paint);
 }
 
 void placeParts(Sketch& sketch, const FeederOptions& options, double in) {
@@ -80,7 +80,7 @@ void placeParts(Sketch& sketch, const FeederOptions& options, double in) {
                     static_cast<double>(column) + 0.5);
     Eigen::Affine3d worldFromPart = Eigen::Affine3d::Identity();
     worldFromPart.linear() = anyRotation(random).toRotationMatrix();
-    worldFromPart.translation() = kSpacing * cell + Vec3(-in, kTop, -in);
+    worldFromPart.translation() = kSpacing * cell + Vec3(-in, kTrayFloor, -in);
     sketch.place(numbered("feeder/part", static_cast<int>(i + 1)), kinds[i % kinds.size()],
                  worldFromPart);
   }
@@ -104,7 +104,7 @@ scene::Model makeFeeder(const FeederOptions& options) {
   const double in = innerOf(options.parts), out = in + kPlate;
   Sketch sketch;
   sketch.box("room/floor", {-out - 3, -0.2, -out - 3}, {out + 3, 0, out + 3}, Paint::concrete);
-  sketch.box("room/stand", {-out, 0, -out}, {out, kTop - kPlate - kGap, out}, Paint::oakDark);
+  sketch.box("room/stand", {-out, 0, -out}, {out, kTrayFloor - kPlate - kGap, out}, Paint::oakDark);
   placeTray(sketch, in);
   placeParts(sketch, options, in);
   return sketch.model();

@@ -9,7 +9,7 @@ namespace {
 using Along = Wall::Along;
 
 constexpr double kStorey = 3.2, kFloorThick = 0.25, kWallThick = 0.35;
-constexpr int kRisers = 19;
+constexpr int kHouseRisers = 19;
 constexpr double kTread = 0.28, kStairWidth = 1.0;
 
 struct Plan {
@@ -68,7 +68,7 @@ void addFacades(Sketch& sketch, const Plan& p, int storey) {
 }
 
 double stairEast(const Plan& p) {
-  return -p.halfX + 0.4 + kTread * kRisers;
+  return -p.halfX + 0.4 + kTread * kHouseRisers;
 }
 
 /// Adds the slab of a storey; upper slabs are open over the stair along the back.
@@ -87,9 +87,9 @@ void addSlab(Sketch& sketch, const Plan& p, int storey) {
 }
 
 void addStairs(Sketch& sketch, const Plan& p, int storey) {
-  const double riser = kStorey / kRisers;
-  for (int k = 1; k < kRisers; ++k) {
-    const double x = stairEast(p) - kTread * (kRisers - k), y = kStorey * storey + riser * k;
+  const double riser = kStorey / kHouseRisers;
+  for (int k = 1; k < kHouseRisers; ++k) {
+    const double x = stairEast(p) - kTread * (kHouseRisers - k), y = kStorey * storey + riser * k;
     sketch.box(numbered(floorPath(storey) + "/stair/step", k),
                {x, y - riser - 0.03, -p.halfZ + 0.01},
                {x + kTread + 0.01, y, -p.halfZ + kStairWidth}, Paint::oakDark);

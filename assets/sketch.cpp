@@ -12,7 +12,7 @@ void appendBytes(std::string& bytes, const std::vector<T>& values) {
 }
 
 /// Rounds to the micrometre, so that equal sizes from different coordinates become equal.
-double rounded(double metres) {
+double roundToMicrometre(double metres) {
   return std::floor(metres * 1e6 + 0.5) / 1e6;
 }
 
@@ -53,7 +53,7 @@ void Sketch::place(const std::string& path, const Shape& shape,
 
 void Sketch::box(const std::string& path, const Vec3& low, const Vec3& high,
                  const BoxPaints& paints) {
-  const Vec3 half = (0.5 * (high - low)).unaryExpr([](double v) { return rounded(v); });
+  const Vec3 half = (0.5 * (high - low)).unaryExpr([](double v) { return roundToMicrometre(v); });
   Shape shape;
   addBox(shape, -half, half, paints);
   place(path, shape, moved(0.5 * (low + high)));

@@ -7,7 +7,7 @@ namespace {
 using namespace plan;
 
 constexpr double kRailHeight = 0.95;  ///< above the line of the nosings
-constexpr Paint kStone = Paint::limestone;
+constexpr Paint kStairPaint = Paint::limestone;
 
 /// x of the riser of step k = 1, 2, ...
 double stepWest(int k) {
@@ -21,7 +21,8 @@ void addSteps(Sketch& sketch) {
     if (k < kRisers)
       sketch.box(k == kLandingRiser ? std::string("building/hall/stair/landing")
                                     : numbered("building/hall/stair/tread", k),
-                 {x, top - 0.05, kStairLow}, {stepWest(k + 1) + 0.03, top, kStairHigh}, kStone);
+                 {x, top - 0.05, kStairLow}, {stepWest(k + 1) + 0.03, top, kStairHigh},
+                 kStairPaint);
     sketch.box(numbered("building/hall/stair/riser", k),
                {x + 0.004, top - kRiser - 0.002, kStairLow + inset},
                {x + 0.026, top - 0.048, kStairHigh - inset}, Paint::marbleWhite);

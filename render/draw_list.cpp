@@ -101,8 +101,7 @@ std::vector<BodyPlacement> computeBodyPlacements(const scene::Scene& scene,
     ENFILADE_ASSERT(body.index < placements.size());
     BodyPlacement& placement = placements[body.index];
     placement.displaced = true;
-    placement.sceneFromAuthored = Eigen::Translation3d(body.pose.translation) * body.pose.rotation *
-                                  Eigen::Translation3d(-scene.bodyShape(body.index)->origin);
+    placement.sceneFromAuthored = computeWorldFromAuthored(*scene.bodyShape(body.index), body.pose);
   }
   return placements;
 }

@@ -12,7 +12,7 @@ namespace enfilade::render {
 namespace {
 
 constexpr std::uint32_t kLeafSize = 4;
-constexpr std::uint32_t kNone = 0xFFFF'FFFFu;
+constexpr std::uint32_t kNoNode = 0xFFFF'FFFFu;
 
 EyeSpaceAabb toEyeSpaceAabb(const collision::FloatAabb& box, const Vec3& eyeFromTree) {
   EyeSpaceAabb result;
@@ -40,7 +40,7 @@ OcclusionCuller::OcclusionCuller(const std::vector<DrawItem>& items) : items_(it
   }
   tree_ = collision::buildBoxTree(boxes, kLeafSize);
   for (const std::uint32_t item : tree_.order) itemOfTreeEntry_.push_back(staticItems[item]);
-  nodeOfItem_.assign(items.size(), kNone);
+  nodeOfItem_.assign(items.size(), kNoNode);
   itemGeneration_.assign(items.size(), 0);
   parent_.assign(tree_.nodes.size(), 0);
   subtreeItemCount_.assign(tree_.nodes.size(), 0);
@@ -71,7 +71,7 @@ void OcclusionCuller::markVisible(const std::vector<std::uint32_t>& items) {
     ENFILADE_ASSERT(item < items_.size());
     itemGeneration_[item] = generation_;
     std::uint32_t node = nodeOfItem_[item];
-    while (node != kNone &&
+    while (node != kNoNode &&
            nodeGeneration_[node] != generation_) {  // up to the root or a marked node
       nodeGeneration_[node] = generation_;
       node = parent_[node];

@@ -215,26 +215,4 @@ Bytes packDepth(const Raster<std::uint16_t>& steps) {
   return packed;
 }
 
-std::vector<std::uint16_t> unpackDepth(std::span<const std::uint8_t> packed, int width,
-                                       int height) {
-  if (width < 1 || height < 1) throw std::runtime_error("unpackDepth: the image has no pixels");
-  const auto across = static_cast<std::size_t>(width);
-  const std::size_t count = across * static_cast<std::size_t>(height);
-  Bytes planes(2 * count);
-  const std::size_t bytes =
-      ZSTD_decompress(planes.data(), planes.size(), packed.data(), packed.size());
-  if (ZSTD_isError(bytes) != 0)
-    throw std::runtime_error(std::string("unpackDepth: zstd: ") + ZSTD_getErrorName(bytes));
-  if (bytes != planes.size())
-    throw std::runtime_error("unpackDepth: " + std::to_string(bytes) + " bytes are not " +
-                             std::to_string(width) + "x" + std::to_string(height) + " pixels");
-  std::vector<std::uint16_t> steps(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const unsigned last = i == 0 ? 0U : steps[i % across != 0 ? i - 1 : i - across];
-    const unsigned change = planes[i] + 256U * planes[count + i];
-    steps[i] = static_cast<std::uint16_t>((last + change) & 65535U);
-  }
-  return steps;
-}
-
 }  // namespace enfilade::render

@@ -46,7 +46,5 @@ Depth16 quantizeDepth(std::span<const float> metres, double stepsPerMetre);
 /// neighbour (first column: the value above; first pixel: 0) modulo 65536. All low bytes come
 /// first, then all high bytes. One channel.
 Bytes packDepth(const Raster<std::uint16_t>& steps);
-/// Inverse of packDepth(). Throws for bytes that packDepth() did not produce for this size.
-std::vector<std::uint16_t> unpackDepth(std::span<const std::uint8_t> packed, int width, int height);
 
 }  // namespace enfilade::render

@@ -42,10 +42,8 @@ scene::Mesh extractMesh(const AvatarMeshes& all, const MeshRange& range) {
 RayScene::RayScene(std::shared_ptr<const scene::Scene> scene, bool robust,
                    scene::EmbreeFilter maskFilter)
     : scene_(std::move(scene)),
-      robust_(robust),
       maskFilter_(maskFilter),
-      device_(orRenderError(scene::makeEmbreeDevice)),
-      meshes_(device_.get(), robust) {
+      meshes_(orRenderError([&] { return scene::MeshTrees({.robust = robust}); })) {
   if (!scene_) throw RenderError("RayRenderer: there is no scene");
   const scene::Model& model = scene_->model();
   if (!scene_->bounds().empty()) origin_ = scene_->bounds().centre().array().round().matrix();
@@ -86,9 +84,7 @@ std::vector<TriangleBatch> RayScene::collectBatches(bool isDynamic, bool transpa
 
 std::optional<RayTree> RayScene::buildTree(std::vector<TriangleBatch> batches) {
   if (batches.empty()) return std::nullopt;
-  return orRenderError([&] {
-    return RayTree(device_.get(), robust_, std::move(batches), origin_, maskFilter_, meshes_);
-  });
+  return orRenderError([&] { return RayTree(meshes_, std::move(batches), origin_, maskFilter_); });
 }
 
 void RayScene::update(const scene::Snapshot& snapshot) {

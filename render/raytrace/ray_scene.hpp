@@ -38,11 +38,9 @@ class RayScene {
   void chooseInstancing();
 
   std::shared_ptr<const scene::Scene> scene_;
-  bool robust_;
   scene::EmbreeFilter maskFilter_;
   Vec3 origin_ = Vec3::Zero();
-  scene::EmbreeDevice device_;
-  MeshTreeCache meshes_;
+  scene::MeshTrees meshes_;
   std::vector<DrawItem> items_;
   std::vector<MaterialData> materials_;  ///< one per mesh
   std::vector<bool> instanced_;          ///< one per item

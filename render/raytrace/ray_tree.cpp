@@ -55,29 +55,17 @@ bool haveCommonEdge(const BatchTriangle& a, const BatchTriangle& b) {
   return common >= 2;
 }
 
-RTCSceneTy* MeshTreeCache::findOrBuild(const scene::Mesh& mesh, scene::EmbreeFilter filter) {
-  if (const auto found = trees_.find(&mesh); found != trees_.end()) return found->second.get();
-  scene::EmbreeScene tree = scene::makeEmbreeScene(device_, {.robust = robust_});
-  const scene::TriangleBuffers buffers =
-      scene::makeTriangleBuffers(device_, mesh.positions.size(), mesh.triangleCount());
-  std::copy(mesh.positions.begin(), mesh.positions.end(), buffers.positions);
-  std::copy_n(mesh.indices.begin(), 3 * mesh.triangleCount(), buffers.corners);
-  scene::attachTriangles(buffers, tree.get(), 0, filter);
-  scene::commitScene(device_, tree.get());
-  return (trees_[&mesh] = std::move(tree)).get();
-}
-
-RayTree::RayTree(RTCDeviceTy* device, bool robust, std::vector<TriangleBatch> batches,
-                 const Vec3& origin, scene::EmbreeFilter maskFilter, MeshTreeCache& meshes)
+RayTree::RayTree(scene::MeshTrees& meshes, std::vector<TriangleBatch> batches, const Vec3& origin,
+                 scene::EmbreeFilter maskFilter)
     : batches_(std::move(batches)),
       firstTriangle_(batches_.size(), 0),
-      scene_(scene::makeEmbreeScene(device, {.robust = robust})) {
+      scene_(scene::makeEmbreeScene(meshes.device(), meshes.options())) {
   for (TriangleBatch& batch : batches_)
     batch.instanced = batch.instanced && scene::canBeInstanced(*batch.worldFromMesh);
-  copyBatches(device, false, origin, nullptr);
-  copyBatches(device, true, origin, maskFilter);
-  addInstances(device, origin, maskFilter, meshes);
-  scene::commitScene(device, scene_.get());
+  copyBatches(meshes.device(), false, origin, nullptr);
+  copyBatches(meshes.device(), true, origin, maskFilter);
+  addInstances(meshes, origin, maskFilter);
+  scene::commitScene(meshes.device(), scene_.get());
 }
 
 void RayTree::copyBatches(RTCDeviceTy* device, bool mask, const Vec3& origin,
@@ -109,14 +97,14 @@ void RayTree::copyBatches(RTCDeviceTy* device, bool mask, const Vec3& origin,
   scene::attachTriangles(buffers, scene_.get(), mask ? kMaskGeometry : kOpaqueGeometry, filter);
 }
 
-void RayTree::addInstances(RTCDeviceTy* device, const Vec3& origin, scene::EmbreeFilter filter,
-                           MeshTreeCache& meshes) {
+void RayTree::addInstances(scene::MeshTrees& meshes, const Vec3& origin,
+                           scene::EmbreeFilter filter) {
   for (std::uint32_t index = 0; index < batches_.size(); ++index) {
     const TriangleBatch& batch = batches_[index];
     if (!batch.instanced) continue;
     RTCSceneTy* tree =
         meshes.findOrBuild(*batch.mesh, batch.alphaMode == AlphaMode::mask ? filter : nullptr);
-    scene::addInstance(device, scene_.get(), kFirstInstance + index, tree,
+    scene::addInstance(meshes.device(), scene_.get(), kFirstInstance + index, tree,
                        Eigen::Translation3d(-origin) * *batch.worldFromMesh);
   }
 }

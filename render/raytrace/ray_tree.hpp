@@ -3,7 +3,6 @@
 // doubles.
 #pragma once
 
-#include <map>
 #include <vector>
 
 #include "render/draw_list.hpp"
@@ -43,28 +42,14 @@ struct BatchTriangle {
 /// Whether both are in the same batch and share two corner positions.
 bool haveCommonEdge(const BatchTriangle& a, const BatchTriangle& b);
 
-/// Cache of the trees of single meshes, for instancing.
-class MeshTreeCache {
- public:
-  MeshTreeCache(RTCDeviceTy* device, bool robust) : device_(device), robust_(robust) {}
-
-  /// `filter` may be null; only the first call for a mesh uses it.
-  RTCSceneTy* findOrBuild(const scene::Mesh& mesh, scene::EmbreeFilter filter);
-
- private:
-  RTCDeviceTy* device_;
-  bool robust_;
-  std::map<const scene::Mesh*, scene::EmbreeScene> trees_;
-};
-
 /// An Embree tree of batches.
 class RayTree {
  public:
   /// Geometry is stored relative to `origin` (world, metres); rays must be relative to it, too.
   /// `maskFilter` filters hits on triangles of AlphaMode::mask. Throws RenderError if there are
   /// more triangles than a tree can hold.
-  RayTree(RTCDeviceTy* device, bool robust, std::vector<TriangleBatch> batches, const Vec3& origin,
-          scene::EmbreeFilter maskFilter, MeshTreeCache& meshes);
+  RayTree(scene::MeshTrees& meshes, std::vector<TriangleBatch> batches, const Vec3& origin,
+          scene::EmbreeFilter maskFilter);
 
   RTCSceneTy* embreeScene() const { return scene_.get(); }
   bool empty() const { return batches_.empty(); }
@@ -75,8 +60,7 @@ class RayTree {
 
  private:
   void copyBatches(RTCDeviceTy* device, bool mask, const Vec3& origin, scene::EmbreeFilter filter);
-  void addInstances(RTCDeviceTy* device, const Vec3& origin, scene::EmbreeFilter filter,
-                    MeshTreeCache& meshes);
+  void addInstances(scene::MeshTrees& meshes, const Vec3& origin, scene::EmbreeFilter filter);
 
   std::vector<TriangleBatch> batches_;
   std::vector<std::uint32_t> firstTriangle_;       ///< of each copied batch

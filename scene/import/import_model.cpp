@@ -120,8 +120,8 @@ class MessageListener {
 [[noreturn]] void throwFailed(const ImportRequest& request, const std::string& stage,
                               const ImportExit& outcome) {
   if (outcome.reason == ImportExit::Reason::timeLimit) {
-    throw ImportError(request.file + ": not read within " + formatShortest(request.options.timeLimit) +
-                      " s (stage '" + stage +
+    throw ImportError(request.file + ": not read within " +
+                      formatShortest(request.options.timeLimit) + " s (stage '" + stage +
                       "'); simplify or split the file, re-export it as glTF, or allow more time");
   }
   std::string hint = "re-export it as glTF";

@@ -64,6 +64,13 @@ std::unique_ptr<WorldData> makeWorldData(std::shared_ptr<const Scene> scene,
   return world;
 }
 
+std::optional<std::string> validateBodyCommand(const World& world, const BodyCommand& command) {
+  for (const Body& body : world.data().bodies)
+    if (body.spec->name == command.body)
+      return validateBodyCommandFields(body, command, world.settings());
+  return "body: no body named '" + command.body + "'";
+}
+
 }  // namespace
 
 World::World(std::shared_ptr<const Scene> scene, const WorldSettings& settings)
@@ -82,12 +89,8 @@ std::shared_ptr<const Snapshot> World::snapshot() const {
   return data_->snapshot;
 }
 
-std::optional<std::string> validateAvatarCommand(const World& world, const Command& command) {
-  return validateCommandFields(command, world.settings());
-}
-
 std::optional<std::string> submitAvatarCommand(World& world, Command command) {
-  if (auto error = validateAvatarCommand(world, command)) return error;
+  if (auto error = validateCommandFields(command, world.settings())) return error;
   WorldData& data = world.data();
   if (data.queuedOrderCount + computeOrderCost(command.order) > kMaxQueuedOrders)
     return std::to_string(kMaxQueuedOrders) +
@@ -95,13 +98,6 @@ std::optional<std::string> submitAvatarCommand(World& world, Command command) {
   data.queuedOrderCount += computeOrderCost(command.order);
   data.pendingCommands.push_back(std::move(command));
   return std::nullopt;
-}
-
-std::optional<std::string> validateBodyCommand(const World& world, const BodyCommand& command) {
-  for (const Body& body : world.data().bodies)
-    if (body.spec->name == command.body)
-      return validateBodyCommandFields(body, command, world.settings());
-  return "body: no body named '" + command.body + "'";
 }
 
 std::optional<std::string> submitBodyCommand(World& world, BodyCommand command) {

@@ -35,16 +35,12 @@ class World {
   std::unique_ptr<WorldData> data_;
 };
 
-/// Error of `command`, naming the field and the value; nullopt if it is valid. Rejects NaN,
-/// infinity, coordinates beyond 1e7 m and speeds beyond the settings.
-std::optional<std::string> validateAvatarCommand(const World& world, const Command& command);
-
-/// Enqueues a command for the next tick. Returns the error and changes nothing if it is invalid or
-/// kMaxQueuedOrders is exceeded.
+/// Enqueues a command for the next tick. If it is invalid or kMaxQueuedOrders is exceeded, returns
+/// the error, which names the field and the value, and changes nothing. Rejects NaN, infinity,
+/// coordinates beyond 1e7 m and speeds beyond the settings.
 std::optional<std::string> submitAvatarCommand(World& world, Command command);
 
 /// The same for a body command.
-std::optional<std::string> validateBodyCommand(const World& world, const BodyCommand& command);
 std::optional<std::string> submitBodyCommand(World& world, BodyCommand command);
 
 /// Advances the world by WorldSettings::tickDuration.

@@ -27,7 +27,8 @@ LoadedScene loadSceneTimed(const ModelOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   Progress bar;
   scene::LoadedModel model = scene::loadModel(
-      options.file, options.import, options.cache ? scene::modelCacheFromEnvironment() : std::nullopt,
+      options.file, options.import,
+      options.cache ? scene::modelCacheFromEnvironment() : std::nullopt,
       [&](const std::string& stage, double fraction) { bar.show(fraction, stage); });
   bar.clear();
   for (const std::string& note : model.notes) spdlog::warn("cache: {}", note);

@@ -96,14 +96,18 @@ void releaseFolder(const fs::path& folder) {
 
 void writeMetadataFiles(const fs::path& folder, const scene::Scene& scene, const CapturePlan& plan,
                         const PictureOptions& options) {
-  render::writeFileAtomically(folder / "instances.json", makeInstancesJson(scene.model(), plan.avatars));
-  render::writeFileAtomically(folder / "transforms.json", makeTransformsJson(plan.frames, options, scene.model()));
+  render::writeFileAtomically(folder / "instances.json",
+                              makeInstancesJson(scene.model(), plan.avatars));
+  render::writeFileAtomically(folder / "transforms.json",
+                              makeTransformsJson(plan.frames, options, scene.model()));
   if (options.layout != FolderLayout::tum) return;
   std::size_t channel = 0;
   if (options.channels.rgb)
-    render::writeFileAtomically(folder / "rgb.txt", makeTumFileList(plan.frames, options, channel++, "color images"));
+    render::writeFileAtomically(folder / "rgb.txt",
+                                makeTumFileList(plan.frames, options, channel++, "color images"));
   if (options.channels.depth)
-    render::writeFileAtomically(folder / "depth.txt", makeTumFileList(plan.frames, options, channel, "depth maps"));
+    render::writeFileAtomically(folder / "depth.txt",
+                                makeTumFileList(plan.frames, options, channel, "depth maps"));
   render::writeFileAtomically(folder / "groundtruth.txt", makeTumGroundTruth(plan.frames));
 }
 

@@ -18,7 +18,7 @@ constexpr double kAspectTolerance = 1e-3;                 // relative, of width 
 
 enum class PathKind : std::uint8_t { tum, json, script, gltf };
 
-std::string readText(const std::filesystem::path& file) {
+std::string readPathFile(const std::filesystem::path& file) {
   std::error_code error;
   if (std::filesystem::is_directory(file, error))
     throw CameraPathError(file.string() + ": is a folder; give the file of the camera path");
@@ -159,7 +159,7 @@ CapturePlan planCapture(const std::shared_ptr<const scene::Scene>& scene,
                         const std::filesystem::path& file, const PictureOptions& options,
                         const Shard& shard) {
   const std::string source = file.string();
-  const std::string text = readText(file);
+  const std::string text = readPathFile(file);
   const PathKind kind = detectPathKind(file, text);
   CameraPath path;
   CapturePlan plan;

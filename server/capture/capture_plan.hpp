@@ -1,6 +1,7 @@
 // The frames of a capture: their cameras, and the snapshots that they show.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>

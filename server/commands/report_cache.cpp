@@ -7,8 +7,6 @@
 namespace enfilade::server {
 namespace {
 
-using Json = nlohmann::json;
-
 /// Calls `visit` with the key and value of each number of the report.
 template <class Report, class Visit>
 void visitNumbers(Report& report, const Visit& visit) {
@@ -28,15 +26,15 @@ void visitNumbers(Report& report, const Visit& visit) {
   visit("part_triangles", report.partTriangles);
 }
 
-Json toJson(const std::vector<scene::Diagnostic>& problems) {
-  Json list = Json::array();
+nlohmann::json toJson(const std::vector<scene::Diagnostic>& problems) {
+  nlohmann::json list = nlohmann::json::array();
   for (const scene::Diagnostic& p : problems)
     list.push_back({{"kind", p.kind}, {"count", p.count}, {"example", p.example}});
   return list;
 }
 
-std::string dumpJson(const Json& value) {
-  return value.dump(-1, ' ', false, Json::error_handler_t::replace);
+std::string dumpJson(const nlohmann::json& value) {
+  return value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 /// Makes the cache key. The report depends on the scene hash, on shared meshes, on groups of
@@ -55,7 +53,7 @@ std::string makeCacheKey(const scene::Scene& scene) {
 }  // namespace
 
 std::string serializeReport(const scene::SceneReport& report) {
-  Json text;
+  nlohmann::json text;
   visitNumbers(report, [&](const char* name, std::size_t number) { text[name] = number; });
   text["problems"] = toJson(report.diagnostics);
   return dumpJson(text);
@@ -63,15 +61,15 @@ std::string serializeReport(const scene::SceneReport& report) {
 
 std::optional<scene::SceneReport> parseReport(const std::string& text) {
   try {
-    const Json read = Json::parse(text);
+    const nlohmann::json read = nlohmann::json::parse(text);
     scene::SceneReport report;
     visitNumbers(report, [&](const char* name, std::size_t& number) {
       number = read.at(name).get<std::size_t>();
     });
-    for (const Json& p : read.at("problems"))
+    for (const nlohmann::json& p : read.at("problems"))
       report.diagnostics.push_back({p.at("kind"), p.at("count"), p.at("example")});
     return report;
-  } catch (const Json::exception&) {
+  } catch (const nlohmann::json::exception&) {
     return std::nullopt;
   }
 }

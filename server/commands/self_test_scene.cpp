@@ -63,6 +63,30 @@ void addBox(scene::Model& model, const char* name, const collision::Vec3& centre
   model.objects.push_back(std::move(object));
 }
 
+/// Encodes the frame like the golden picture.
+std::string encodeSelfTestFrame(const render::Frame& frame) {
+  const int width = frame.camera.width / kColumns, height = frame.camera.height / kRows;
+  std::string encoded;
+  for (int cell = 0; cell < kColumns * kRows; ++cell) {
+    const int left = cell % kColumns * width, top = cell / kColumns * height;
+    std::array<long, 3> sum{};
+    for (int y = top; y < top + height; ++y) {
+      for (int x = left; x < left + width; ++x) {
+        const auto pixel = static_cast<std::size_t>(y * frame.camera.width + x);
+        for (std::size_t c = 0; c < 3; ++c) sum[c] += frame.rgb[3 * pixel + c];
+      }
+    }
+    const auto middle =
+        static_cast<std::size_t>((top + height / 2) * frame.camera.width + left + width / 2);
+    const long pixels = static_cast<long>(width) * height;
+    std::array<char, kCellLetters + 1> text{};
+    std::snprintf(text.data(), text.size(), "%u%02lx%02lx%02lx", frame.ids[middle] % 10,
+                  sum[0] / pixels, sum[1] / pixels, sum[2] / pixels);
+    encoded += text.data();
+  }
+  return encoded;
+}
+
 int parseChannel(const std::string& encoded, std::size_t cell, std::size_t channel) {
   return std::stoi(encoded.substr(kCellLetters * cell + 1 + 2 * channel, 2), nullptr, 16);
 }
@@ -104,29 +128,6 @@ render::Camera makeSelfTestCamera(int width, int height) {
   camera.width = width;
   camera.height = height;
   return camera;
-}
-
-std::string encodeSelfTestFrame(const render::Frame& frame) {
-  const int width = frame.camera.width / kColumns, height = frame.camera.height / kRows;
-  std::string encoded;
-  for (int cell = 0; cell < kColumns * kRows; ++cell) {
-    const int left = cell % kColumns * width, top = cell / kColumns * height;
-    std::array<long, 3> sum{};
-    for (int y = top; y < top + height; ++y) {
-      for (int x = left; x < left + width; ++x) {
-        const auto pixel = static_cast<std::size_t>(y * frame.camera.width + x);
-        for (std::size_t c = 0; c < 3; ++c) sum[c] += frame.rgb[3 * pixel + c];
-      }
-    }
-    const auto middle =
-        static_cast<std::size_t>((top + height / 2) * frame.camera.width + left + width / 2);
-    const long pixels = static_cast<long>(width) * height;
-    std::array<char, kCellLetters + 1> text{};
-    std::snprintf(text.data(), text.size(), "%u%02lx%02lx%02lx", frame.ids[middle] % 10,
-                  sum[0] / pixels, sum[1] / pixels, sum[2] / pixels);
-    encoded += text.data();
-  }
-  return encoded;
 }
 
 std::string validateSelfTestFrame(const render::Frame& frame) {

@@ -17,7 +17,4 @@ render::Camera makeSelfTestCamera(int width, int height);
 /// allow for rounding of devices: edges may shift by a pixel, and colours may differ slightly.
 std::string validateSelfTestFrame(const render::Frame& frame);
 
-/// Encodes the frame as validateSelfTestFrame() compares it, for the golden picture.
-std::string encodeSelfTestFrame(const render::Frame& frame);
-
 }  // namespace enfilade::server

@@ -39,7 +39,8 @@ ModelOptions makeModelOptions(const ModelOptions& requested, const v1::Recording
   if (!model.import.up) model.import.up = recorded.import.up;
   // The automatic offset depends on all objects, so that positions of commands would shift.
   if (!model.import.offset) model.import.offset = vectorFromProto(start.scene().offset());
-  if (model.import.ifcReader == scene::IfcReader::automatic) model.import.ifcReader = recorded.import.ifcReader;
+  if (model.import.ifcReader == scene::IfcReader::automatic)
+    model.import.ifcReader = recorded.import.ifcReader;
   if (model.doors == scene::IfcDoors::movable) model.doors = recorded.doors;
   return model;
 }

@@ -1,5 +1,7 @@
 #include "server/messages/body_messages.hpp"
 
+#include <variant>
+
 #include "collision/assert.hpp"
 #include "server/messages/world_messages.hpp"
 
@@ -22,6 +24,20 @@ scene::BodyCommand::Action actionFromProto(v1::BodyCommand::ActionCase action) {
     default:
       return Action::stop;
   }
+}
+
+/// Returns the command, or an error that names a missing field. The world validates the values.
+std::variant<scene::BodyCommand, v1::Error> bodyCommandFromProto(const v1::BodyCommand& message) {
+  if (message.action_case() == v1::BodyCommand::ACTION_NOT_SET)
+    return makeError(v1::ERROR_BAD_MESSAGE,
+                     "action is missing: give open, close, stop, to, level or run", "body.action");
+  scene::BodyCommand command;
+  command.body = message.body();
+  command.action = actionFromProto(message.action_case());
+  command.target = message.to();
+  command.level = message.level();
+  if (message.has_speed()) command.speed = message.speed();
+  return command;
 }
 
 }  // namespace
@@ -51,19 +67,6 @@ v1::Body toProto(const scene::Scene& scene, std::size_t index) {
   message.set_loops(spec.loops);
   message.set_closed(spec.closedPosition);
   return message;
-}
-
-std::variant<scene::BodyCommand, v1::Error> bodyCommandFromProto(const v1::BodyCommand& message) {
-  if (message.action_case() == v1::BodyCommand::ACTION_NOT_SET)
-    return makeError(v1::ERROR_BAD_MESSAGE,
-                     "action is missing: give open, close, stop, to, level or run", "body.action");
-  scene::BodyCommand command;
-  command.body = message.body();
-  command.action = actionFromProto(message.action_case());
-  command.target = message.to();
-  command.level = message.level();
-  if (message.has_speed()) command.speed = message.speed();
-  return command;
 }
 
 std::optional<v1::Error> submitBodyCommand(scene::World& world, const v1::BodyCommand& message) {

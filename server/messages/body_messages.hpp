@@ -2,15 +2,11 @@
 #pragma once
 
 #include <optional>
-#include <variant>
 
 #include "protocol/enfilade.pb.h"
 #include "scene/world/world.hpp"
 
 namespace enfilade::server {
-
-/// Returns the command, or an error that names a missing field. The world validates the values.
-std::variant<scene::BodyCommand, v1::Error> bodyCommandFromProto(const v1::BodyCommand& message);
 
 /// Submits a command for the next tick. Returns the refusal; nullopt: accepted.
 std::optional<v1::Error> submitBodyCommand(scene::World& world, const v1::BodyCommand& message);

@@ -64,7 +64,7 @@ v1::Error toError(const scene::QueryError& failure, const std::string& prefix) {
                    field + " " + failure.text, field);
 }
 
-v1::PairState toProto(const scene::PairProximity& state, const scene::SceneAt& sceneAt) {
+v1::PairState makePairState(const scene::PairProximity& state, const scene::SceneAt& sceneAt) {
   v1::PairState message;
   message.set_a(state.a);
   message.set_b(state.b);
@@ -115,7 +115,7 @@ std::variant<v1::DistanceReply, v1::Error> answerDistances(const v1::DistanceQue
     const auto state = scene::computePairProximity(sceneAt, a, b, query.refined(), budget);
     if (const auto* failure = std::get_if<scene::QueryError>(&state))
       return toError(*failure, prefix);
-    *reply.add_pairs() = toProto(std::get<scene::PairProximity>(state), sceneAt);
+    *reply.add_pairs() = makePairState(std::get<scene::PairProximity>(state), sceneAt);
   }
   return reply;
 }
@@ -144,7 +144,7 @@ std::variant<v1::TouchingReply, v1::Error> answerTouching(const v1::TouchingQuer
   constexpr std::size_t kFieldBytes = 8;  // maximum size of a pair's tag and length in the message
   std::size_t bytes = 0;
   for (const scene::PairProximity& state : nearby.pairs) {
-    v1::PairState message = toProto(state, sceneAt);
+    v1::PairState message = makePairState(state, sceneAt);
     bytes += message.ByteSizeLong() + kFieldBytes;
     if (bytes > limits.replyBytes) break;
     *reply.add_found() = std::move(message);
@@ -176,7 +176,7 @@ std::variant<v1::CannotTouchReply, v1::Error> answerCannotTouch(
   const auto& timeToContact = std::get<scene::TimeToContact>(found);
   auto reply = makeReply<v1::CannotTouchReply>(sceneAt);
   const bool never = std::isinf(timeToContact.separatedUntil);
-  *reply.mutable_now() = toProto(timeToContact.proximity, sceneAt);
+  *reply.mutable_now() = makePairState(timeToContact.proximity, sceneAt);
   reply.set_never(never);
   reply.set_before(never ? 0 : timeToContact.separatedUntil);
   reply.set_closing_speed(timeToContact.closing.speed);

@@ -14,7 +14,7 @@ namespace {
 
 using RayQueryOrError = std::variant<ResolvedRayQuery, v1::Error>;
 
-v1::Error makeFieldError(const std::string& field, const std::string& reason) {
+v1::Error makeBadRaysError(const std::string& field, const std::string& reason) {
   return makeError(v1::ERROR_BAD_RAYS, field + reason, field);
 }
 
@@ -24,7 +24,7 @@ constexpr double kMaxRayDistance = 1e8;
 /// Checks the reach of a message: 0 means unlimited; infinity and NaN are invalid.
 std::optional<v1::Error> validateReach(const std::string& field, double metres) {
   if (metres == 0 || (metres > 0 && metres <= kMaxRayDistance)) return std::nullopt;
-  return makeFieldError(field + ".reach", ": give metres above 0 and up to 1e8, or 0 for no end");
+  return makeBadRaysError(field + ".reach", ": give metres above 0 and up to 1e8, or 0 for no end");
 }
 
 double maxDistanceFromProto(double metres) {
@@ -51,8 +51,8 @@ RayQueryOrError resolveRayList(const v1::RayQuery& query, const ServerLimits& li
   for (int i = 0; i < query.rays_size(); ++i) {
     const v1::Ray& message = query.rays(i);
     const std::string field = "rays.rays[" + std::to_string(i) + "]";
-    if (!message.has_origin()) return makeFieldError(field + ".origin", " is missing");
-    if (!message.has_direction()) return makeFieldError(field + ".direction", " is missing");
+    if (!message.has_origin()) return makeBadRaysError(field + ".origin", " is missing");
+    if (!message.has_direction()) return makeBadRaysError(field + ".direction", " is missing");
     if (auto error = validateReach(field, message.reach())) return std::move(*error);
     const scene::Ray ray{vectorFromProto(message.origin()), vectorFromProto(message.direction()),
                          maxDistanceFromProto(message.reach())};
@@ -67,7 +67,7 @@ std::optional<v1::Error> resolveScanPose(const v1::RangeScan& message,
                                          const scene::Snapshot& snapshot, scene::RangeScan& scan,
                                          scene::RayFilter& filter) {
   if (message.from_case() == v1::RangeScan::FROM_NOT_SET) {
-    return makeFieldError("rays.scan", " has no origin: give `at` or `avatar`");
+    return makeBadRaysError("rays.scan", " has no origin: give `at` or `avatar`");
   }
   scan.origin = vectorFromProto(message.at());
   if (message.has_avatar()) {
@@ -187,10 +187,11 @@ void castPacked(const ResolvedRayQuery& resolved, const scene::RayCaster& caster
 RayQueryOrError rayQueryFromProto(const v1::RayQuery& query, const scene::Snapshot& snapshot,
                                   const ServerLimits& limits) {
   if (query.has_scan() == (query.rays_size() > 0)) {
-    return makeFieldError("rays", ": give either rays or a scan");
+    return makeBadRaysError("rays", ": give either rays or a scan");
   }
   if (query.has_scan() && query.only_blocked()) {
-    return makeFieldError("rays.only_blocked", ": a scan returns distances; request rays instead");
+    return makeBadRaysError("rays.only_blocked",
+                            ": a scan returns distances; request rays instead");
   }
   RayQueryOrError resolved = query.has_scan() ? resolveScan(query.scan(), snapshot, limits)
                                               : resolveRayList(query, limits);

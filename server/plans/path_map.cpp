@@ -15,12 +15,12 @@ namespace {
 using render::Colour;
 using render::Image;
 
-constexpr double kMinStoreyShare = 0.08;  // minimum share of ticks for a storey with a plan
-constexpr std::size_t kMaxStoreys = 3;
-constexpr double kMargin = 4.0;                        // metres around the walked area
-constexpr double kMaxWidth = 1600, kMaxHeight = 1100;  // pixels of one plan
-constexpr int kLineHeight = 26;                        // pixels of a line of text
-constexpr double kMinFloorNormalY = 0.7;  // contacts with a larger y are floors and stairs
+constexpr double kMinTickShare = 0.08;  // minimum share of ticks for a storey with a plan
+constexpr std::size_t kMaxMapStoreys = 3;
+constexpr double kMapMargin = 4.0;                           // metres around the walked area
+constexpr double kMaxMapWidth = 1600, kMaxMapHeight = 1100;  // pixels of one plan
+constexpr int kLineHeight = 26;                              // pixels of a line of text
+constexpr double kMinSupportNormalY = 0.7;  // contacts with a larger y are floors and stairs
 
 constexpr Colour kInk = kPlanInk, kPaper = kPlanPaper, kContact{214, 40, 40}, kBlocked{120, 0, 120},
                  kCamera{20, 20, 24};
@@ -44,7 +44,7 @@ scene::Aabb computeWalkedBounds(const std::vector<WalkedPath>& paths) {
   for (const WalkedPath& path : paths) {
     for (const Vec3& feet : path.footPositions) bounds.include(feet);
   }
-  return collision::inflated(bounds, kMargin);
+  return collision::inflated(bounds, kMapMargin);
 }
 
 struct Pixel {
@@ -103,7 +103,7 @@ void drawContacts(std::vector<Storey>& storeys, const WalkTrace& trace) {
     drawDot(findNearestStorey(storeys, blockedWalk.point.y()), blockedWalk.point, 6, kBlocked);
   }
   for (const MapContact& contact : trace.contacts) {
-    if (std::abs(contact.normal.y()) > kMinFloorNormalY) continue;
+    if (std::abs(contact.normal.y()) > kMinSupportNormalY) continue;
     drawDot(findNearestStorey(storeys, contact.point.y() - 0.8), contact.point, 3.5, kContact);
   }
 }
@@ -184,14 +184,16 @@ std::vector<double> findWalkedStoreys(const std::vector<WalkedPath>& paths) {
         heights.push_back({path.footPositions[i].y(), 1});
     }
   }
-  return findStoreyHeights(heights, kMinStoreyShare, kMaxStoreys);
+  return findStoreyHeights(heights, kMinTickShare, kMaxMapStoreys);
 }
 
 std::optional<Image> drawMap(const WalkTrace& trace, const MapBackground& background) {
   std::vector<Storey> storeys;
   for (const double floor : findWalkedStoreys(trace.paths)) {
     Storey storey{
-        floor, makePlanCamera(computeWalkedBounds(trace.paths), floor, kMaxWidth, kMaxHeight), {}};
+        floor,
+        makePlanCamera(computeWalkedBounds(trace.paths), floor, kMaxMapWidth, kMaxMapHeight),
+        {}};
     const std::optional<PlanPicture> plan = background.renderPlan(storey.camera);
     if (!plan) return std::nullopt;
     storey.image = makePlanBackground(*plan);

@@ -277,7 +277,8 @@ std::string RunReport::writeSummary(const RunSummary& runSummary,
                {"outcomes", outcomesToJson(result)}};
   if (metrics.has_audit()) summary["audit"] = toJson(metrics.audit());
   const auto replace = Json::error_handler_t::replace;
-  render::writeFileAtomically(folder_ / "summary.json", summary.dump(2, ' ', false, replace) + "\n");
+  render::writeFileAtomically(folder_ / "summary.json",
+                              summary.dump(2, ' ', false, replace) + "\n");
   return summary.dump(-1, ' ', false, replace);
 }
 

@@ -34,12 +34,6 @@ v1::ServerMessage metricsReply(const v1::ClientMessage& request, std::uint64_t t
   return reply;
 }
 
-v1::ServerMessage eventsOf(std::uint64_t sequence) {
-  v1::ServerMessage message;
-  message.mutable_events()->set_sequence(sequence);
-  return message;
-}
-
 TEST(AsyncClient, GreetsWithoutBlockingAndReportsTheWelcomeFirst) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();

@@ -42,12 +42,6 @@ v1::ServerMessage replyTo(const v1::ClientMessage& request) {
   return reply;
 }
 
-v1::ServerMessage eventsOf(std::uint64_t sequence) {
-  v1::ServerMessage message;
-  message.mutable_events()->set_sequence(sequence);
-  return message;
-}
-
 // ---- greeting ----------------------------------------------------------------------------------
 
 TEST(Client, GreetsAndIsWelcomed) {

@@ -18,7 +18,7 @@ struct Written {
   std::vector<std::uint64_t> checkpoints;  ///< ticks
 };
 
-v1::State stateOf(std::uint64_t tick) {
+v1::State bulkyStateOf(std::uint64_t tick) {
   v1::State state;
   state.set_tick(tick);
   state.set_time(static_cast<double>(tick) * kTick);
@@ -36,7 +36,7 @@ void writeTick(RecordingWriter& writer, std::uint64_t tick, bool checkpoint) {
     commands.add_commands()->mutable_avatar()->set_avatar("ann");
     writer.write(commands, static_cast<double>(tick) * kTick);
   }
-  writer.write(stateOf(tick));
+  writer.write(bulkyStateOf(tick));
   if (!checkpoint) return;
   v1::RecordedCheckpoint made;
   made.set_tick(tick);

@@ -58,6 +58,12 @@ void TestConnection::untilClosed() {
   }
 }
 
+v1::ServerMessage eventsOf(std::uint64_t sequence) {
+  v1::ServerMessage message;
+  message.mutable_events()->set_sequence(sequence);
+  return message;
+}
+
 v1::ServerMessage welcomeTo(const v1::ClientMessage& hello) {
   v1::ServerMessage reply;
   reply.set_reply_to(hello.request_id());

@@ -13,10 +13,6 @@
 namespace enfilade::render {
 namespace {
 
-std::set<std::uint32_t> idsIn(const Frame& frame) {
-  return {frame.ids.begin(), frame.ids.end()};
-}
-
 TEST(GlRenderer, ABoxIsSeenExactlyWhereItsGeometrySays) {
   // The box's face is 2 m square, 4 m ahead; the image is 8 m wide there: the middle 50 pixels of
   // 200.

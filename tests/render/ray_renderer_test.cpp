@@ -15,10 +15,6 @@
 namespace enfilade::render {
 namespace {
 
-std::set<std::uint32_t> idsIn(const Frame& frame) {
-  return {frame.ids.begin(), frame.ids.end()};
-}
-
 /// Cameras all around a crowd that reaches 10 m from `middle`: by field of view, by a pinhole with
 /// an off-centre axis, and orthographic ones.
 std::vector<Camera> camerasAround(const Vec3& middle, int count, int width, int height) {

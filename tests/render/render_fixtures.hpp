@@ -2,6 +2,7 @@
 #pragma once
 
 #include <random>
+#include <set>
 #include <vector>
 
 #include "tests/render/hand_made_scene.hpp"
@@ -24,6 +25,10 @@ inline std::vector<PlacedBox> crowd(int count) {
     boxes.push_back(box);
   }
   return boxes;
+}
+
+inline std::set<std::uint32_t> idsIn(const Frame& frame) {
+  return {frame.ids.begin(), frame.ids.end()};
 }
 
 inline std::vector<PlacedBox> opaque(std::vector<PlacedBox> boxes) {

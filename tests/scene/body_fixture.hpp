@@ -13,6 +13,8 @@
 
 namespace enfilade::scene::testing {
 
+inline constexpr double kQuarter = 1.5707963267948966;  ///< of a turn, radians
+
 inline BodySpec bodySpec(const std::string& name, BodyKind kind,
                          std::vector<std::uint32_t> objects) {
   BodySpec spec;

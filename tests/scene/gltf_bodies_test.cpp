@@ -8,15 +8,15 @@
 #include "scene/world/data/scene.hpp"
 #include "tests/scene/body_fixture.hpp"
 #include "tests/scene/hand_made_files.hpp"
+#include "tests/scene/import_outcome.hpp"
 
 namespace enfilade::scene {
 namespace {
 
+using testing::kQuarter;
 using tests::BoxMesh;
 using tests::gltf;
 using tests::TemporaryFolder;
-
-constexpr double kQuarter = 1.5707963267948966;
 
 /// Imports a glTF file of one-metre boxes with these nodes, all of them roots. `more`: further
 /// members of the document.
@@ -33,18 +33,6 @@ std::string failureOf(const std::string& extras) {
   } catch (const ImportError& error) {
     return error.what();
   }
-  return "";
-}
-
-std::size_t countOf(const Model& model, const std::string& kind) {
-  for (const Diagnostic& problem : model.diagnostics)
-    if (problem.kind == kind) return problem.count;
-  return 0;
-}
-
-std::string diagnosticText(const Model& model, const std::string& kind) {
-  for (const Diagnostic& problem : model.diagnostics)
-    if (problem.kind == kind) return problem.example;
   return "";
 }
 

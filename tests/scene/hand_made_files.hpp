@@ -10,6 +10,8 @@
 
 namespace enfilade::tests {
 
+inline constexpr char kOneNode[] = R"({"mesh":0,"name":"box"})";
+
 inline std::string base64(const std::string& bytes) {
   static constexpr char kDigits[] =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

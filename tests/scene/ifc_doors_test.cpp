@@ -8,6 +8,7 @@
 #include "tests/scene/body_fixture.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
+#include "tests/scene/import_outcome.hpp"
 #include "tests/support/shared_folder.hpp"
 #include "tests/support/web_ifc_here.hpp"
 
@@ -17,8 +18,6 @@ namespace {
 using namespace testing;
 using tests::IfcHouse;
 using tests::TemporaryFolder;
-
-constexpr double kQuarter = 1.5707963267948966;
 
 void join(Mesh& mesh, const Mesh& other) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
@@ -74,18 +73,6 @@ std::vector<DoorPart> singleDoor() {
 std::vector<DoorPart> doubleDoor() {
   return withLeaf(
       2, {{{0.06, 0.02, 0.01}, {0.99, 0.06, 2.04}}, {{1.01, 0.02, 0.01}, {1.94, 0.06, 2.04}}});
-}
-
-std::string diagnosticText(const Model& model, const std::string& kind) {
-  for (const Diagnostic& problem : model.diagnostics)
-    if (problem.kind == kind) return problem.example;
-  return "";
-}
-
-std::size_t countOf(const Model& model, const std::string& kind) {
-  for (const Diagnostic& problem : model.diagnostics)
-    if (problem.kind == kind) return problem.count;
-  return 0;
 }
 
 Model found(Model model, IfcDoors doors = IfcDoors::movable) {

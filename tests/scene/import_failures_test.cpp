@@ -8,24 +8,14 @@
 #include "scene/import/file/model_format.hpp"
 #include "scene/import/import_model.hpp"
 #include "tests/scene/hand_made_files.hpp"
+#include "tests/scene/import_outcome.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 using tests::BoxMesh;
+using tests::kOneNode;
 using tests::TemporaryFolder;
-
-constexpr char kOneNode[] = R"({"mesh":0,"name":"box"})";
-
-/// The error message of importing `file`; "" if the import succeeds.
-std::string failureOf(const std::filesystem::path& file, const ImportOptions& options = {}) {
-  try {
-    importModel(file, options);
-  } catch (const ImportError& error) {
-    return error.what();
-  }
-  return {};
-}
 
 bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;

@@ -7,20 +7,15 @@
 #include "scene/import/import_model.hpp"
 #include "scene/world/data/scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
+#include "tests/scene/import_outcome.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 using tests::BoxMesh;
 using tests::gltf;
+using tests::kOneNode;
 using tests::TemporaryFolder;
-
-std::size_t countOf(const Model& model, const std::string& kind) {
-  for (const Diagnostic& problem : model.diagnostics) {
-    if (problem.kind == kind) return problem.count;
-  }
-  return 0;
-}
 
 void expectBounds(const Scene& scene, const Vec3& min, const Vec3& max, double tolerance = 1e-6) {
   EXPECT_LT((scene.bounds().min - min).norm(), tolerance) << scene.bounds().min.transpose();
@@ -32,8 +27,6 @@ std::vector<std::string> pathsOf(const Model& model) {
   for (const Object& object : model.objects) paths.push_back(object.path);
   return paths;
 }
-
-constexpr char kOneNode[] = R"({"mesh":0,"name":"box"})";
 
 const std::string kObj =
     "o box\nv 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";

@@ -9,6 +9,7 @@
 #include "scene/world/data/scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
+#include "tests/scene/import_outcome.hpp"
 #include "tests/scene/stored_zip.hpp"
 #include "tests/support/web_ifc_here.hpp"
 
@@ -36,15 +37,6 @@ const Diagnostic* problemOf(const Model& model, const std::string& kind) {
     if (problem.kind == kind) return &problem;
   }
   return nullptr;
-}
-
-std::string failureOf(const std::filesystem::path& file, const ImportOptions& options = {}) {
-  try {
-    importModel(file, options);
-  } catch (const ImportError& error) {
-    return error.what();
-  }
-  return {};
 }
 
 const Object& objectOf(const Model& model, const std::string& ifcClass) {

@@ -12,6 +12,7 @@
 #include "scene/import/import_model.hpp"
 #include "scene/world/data/scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
+#include "tests/scene/import_outcome.hpp"
 #include "tests/support/shared_folder.hpp"
 #include "tests/support/web_ifc_here.hpp"
 
@@ -166,13 +167,6 @@ std::size_t placedTriangles(const Model& model) {
     }
   }
   return triangles;
-}
-
-std::size_t countOf(const Model& model, const std::string& kind) {
-  for (const Diagnostic& problem : model.diagnostics) {
-    if (problem.kind == kind) return problem.count;
-  }
-  return 0;
 }
 
 class ImportSharedScene : public ::testing::TestWithParam<Expected> {};

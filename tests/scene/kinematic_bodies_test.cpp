@@ -10,8 +10,6 @@ using namespace testing;
 using Action = BodyCommand::Action;
 using Event = ContactEvent::Kind;
 
-constexpr double kQuarter = 1.5707963267948966;
-
 /// A door leaf of 1 m in the plane z = 0, hinged at x = 0, that opens towards +z or -z.
 Model hingedDoor(std::vector<NamedBox> others = {}) {
   others.insert(others.begin(), {floorBox(), {"leaf", {0, 0.01, -0.02}, {1, 2.1, 0.02}}});

@@ -18,8 +18,6 @@ using Action = BodyCommand::Action;
 using Event = ContactEvent::Kind;
 using Phase = ContactEvent::Phase;
 
-constexpr double kQuarter = 1.5707963267948966;
-
 /// A leaf in the plane z = 0 with its tip at `tip` that rotates about `hinge`.
 BodySpec leafSpec(const std::string& name, std::uint32_t object, double hinge) {
   BodySpec spec = bodySpec(name, BodyKind::hinged, {object});

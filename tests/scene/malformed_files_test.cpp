@@ -10,15 +10,15 @@
 #include "scene/world/data/scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
+#include "tests/scene/import_outcome.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 namespace fs = std::filesystem;
 using tests::BoxMesh;
+using tests::kOneNode;
 using tests::TemporaryFolder;
-
-constexpr char kOneNode[] = R"({"mesh":0,"name":"box"})";
 
 std::string replaced(std::string text, const std::string& what, const std::string& with) {
   const std::size_t at = text.find(what);
@@ -30,24 +30,9 @@ std::string boxGltf() {
   return tests::gltf(BoxMesh({1, 2, 3}), "0", kOneNode);
 }
 
-std::size_t countOf(const Model& model, const std::string& kind) {
-  for (const Diagnostic& problem : model.diagnostics)
-    if (problem.kind == kind) return problem.count;
-  return 0;
-}
-
 void expectSize(const Model& model, const Vec3& size, double tolerance = 1e-6) {
   const Scene scene{Model(model)};
   EXPECT_LT((scene.bounds().size() - size).norm(), tolerance) << scene.bounds().size().transpose();
-}
-
-std::string failureOf(const fs::path& file) {
-  try {
-    importModel(file);
-  } catch (const ImportError& error) {
-    return error.what();
-  }
-  return "";
 }
 
 // ---- files that fail ----------------------------------------------------------------------------

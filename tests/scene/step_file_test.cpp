@@ -11,7 +11,6 @@ TEST(StepFile, StatementsAreFoundByTheirNumbers) {
       "#12 = IFCWALL('a;b',#3, $ );\n#3=IFCDIRECTION((0.,-1.,2.5E-1));\n"
       "ENDSEC;\nEND-ISO-10303-21;\n");
   EXPECT_EQ(file.schema(), "IFC4");
-  EXPECT_TRUE(file.hasHeader());
   EXPECT_TRUE(file.hasEnd());
   ASSERT_NE(file.find(12), nullptr);
   EXPECT_EQ(file.find(12)->type, "IFCWALL");

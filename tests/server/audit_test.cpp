@@ -37,7 +37,7 @@ void withholdTheWall(scene::World& world) {
   world.data().broadPhase = collision::SortAndSweep(boxes);
 }
 
-std::variant<ProgramCommand, ExitCode> read(std::vector<const char*> arguments) {
+std::variant<ProgramCommand, ExitCode> readArguments(std::vector<const char*> arguments) {
   arguments.insert(arguments.begin(), "enfilade");
   return readCommandLine(static_cast<int>(arguments.size()), arguments.data());
 }
@@ -46,7 +46,7 @@ TEST(AuditOption, IsAWholeNumberOfTicksAndOffWithoutIt) {
   const auto replay = [](std::vector<const char*> audit) {
     std::vector<const char*> arguments{"replay", "room.obj", "walk.jsonl", "--out", "out"};
     arguments.insert(arguments.end(), audit.begin(), audit.end());
-    return read(arguments);
+    return readArguments(arguments);
   };
   const auto every = [&](const char* ticks) {
     return std::get<ReplayCommand>(std::get<ProgramCommand>(replay({"--audit", ticks}))).auditEvery;
@@ -61,7 +61,7 @@ TEST(AuditOption, IsAWholeNumberOfTicksAndOffWithoutIt) {
     ASSERT_TRUE(std::holds_alternative<ExitCode>(refused)) << bad;
     EXPECT_EQ(std::get<ExitCode>(refused), ExitCode::usageError);
   }
-  const auto serve = std::get<ProgramCommand>(read({"serve", "room.obj", "--audit", "7"}));
+  const auto serve = std::get<ProgramCommand>(readArguments({"serve", "room.obj", "--audit", "7"}));
   EXPECT_EQ(std::get<ServeCommand>(serve).auditEvery, 7u);
 }
 

@@ -11,7 +11,7 @@ using testing::ProgramFixture;
 using testing::write;
 
 /// Ann walks to and fro for a minute; a client that takes over finds her walking.
-class Playback : public ProgramFixture {
+class ProgramPlayback : public ProgramFixture {
  protected:
   void SetUp() override {
     ProgramFixture::SetUp();
@@ -40,7 +40,7 @@ class Playback : public ProgramFixture {
   }
 };
 
-TEST_F(Playback, IsVerifiedFromTheCheckpointBeforeATick) {
+TEST_F(ProgramPlayback, IsVerifiedFromTheCheckpointBeforeATick) {
   const auto whole = reportOf(verify("walk.mcap"));
   const std::uint64_t ticks = whole.value("ticks", 0u);
   ASSERT_GT(ticks, 2400u);
@@ -54,7 +54,7 @@ TEST_F(Playback, IsVerifiedFromTheCheckpointBeforeATick) {
   EXPECT_EQ(report.value("state_hash", ""), whole.value("state_hash", "-"));
 }
 
-TEST_F(Playback, AContinuedWalkEndsIdentically) {
+TEST_F(ProgramPlayback, AContinuedWalkEndsIdentically) {
   const Ended branched = replay({path("walk.mcap"), "--from", "1500", "--then", path("wait.jsonl"),
                                  "--out", path("branch"), "--record", path("branch.mcap")});
   ASSERT_EQ(branched.code, 0) << branched.err;
@@ -75,7 +75,7 @@ TEST_F(Playback, AContinuedWalkEndsIdentically) {
   }
 }
 
-TEST_F(Playback, ABranchIsARecordingThatCanBeSoughtAndLeftAgain) {
+TEST_F(ProgramPlayback, ABranchIsARecordingThatCanBeSoughtAndLeftAgain) {
   write(path("bob.jsonl"), R"({"spawn":"bob","at":[-3,0,5]})"
                            "\n"
                            R"({"walk":"ann","along":[[0,0,2]]})"
@@ -121,7 +121,7 @@ std::set<std::pair<std::string, std::string>> livingAtItsBeginning(const std::st
   return first;
 }
 
-TEST_F(Playback, ActiveContactsAreReportedAtTheStartOfABranch) {
+TEST_F(ProgramPlayback, ActiveContactsAreReportedAtTheStartOfABranch) {
   ASSERT_EQ(replay({path("walk.mcap"), "--from", "700", "--then", path("wait.jsonl"), "--out",
                     path("b"), "--record", path("b.mcap")})
                 .code,
@@ -130,7 +130,7 @@ TEST_F(Playback, ActiveContactsAreReportedAtTheStartOfABranch) {
   EXPECT_EQ(verify("b.mcap").code, 0);
 }
 
-TEST_F(Playback, InvalidStartsAreRefusedWithTheReason) {
+TEST_F(ProgramPlayback, InvalidStartsAreRefusedWithTheReason) {
   const Ended beyond = verify("walk.mcap", {"--from", "100000000"});
   EXPECT_EQ(beyond.code, 1);
   EXPECT_NE(beyond.err.find("give one from 0 to"), std::string::npos) << beyond.err;

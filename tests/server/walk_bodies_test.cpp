@@ -14,7 +14,7 @@ constexpr const char* kSidecar = R"({"walk": 1, "bodies": [
   {"name": "door mat", "kind": "trigger", "box": [[1, 0, -1], [2, 2, 1]]}
 ]})";
 
-constexpr const char* kWalk = R"({"spawn":"ann","at":[0,0.01,0]}
+constexpr const char* kWalkToBodies = R"({"spawn":"ann","at":[0,0.01,0]}
 {"body":"gate","to":8.5,"speed":4}
 {"wait":0.5}
 {"walk":"ann","to":[8,0,0],"speed":3}
@@ -30,7 +30,7 @@ class WalkBodies : public ProgramFixture {
   void SetUp() override {
     ProgramFixture::SetUp();
     write(folder_ / "room.walk.json", kSidecar);
-    write(folder_ / "walk.jsonl", kWalk);
+    write(folder_ / "walk.jsonl", kWalkToBodies);
   }
   std::vector<nlohmann::json> contacts(const std::string& out) const {
     std::vector<nlohmann::json> all;

@@ -12,7 +12,15 @@ import sys
 from pathlib import Path
 
 TEST = re.compile(r"\b(?:TYPED_)?TEST(?:_[FP])?\(\s*(\w+),\s*(\w+)\s*\)")
+UNITY = re.compile(r'#include "(.+\.cpp)"')
 PROGRAM = re.compile(r" -o \S*/CMakeFiles/(\w+_tests)\.dir/")
+
+
+def sources(file):
+    """The sources that a file of a unity build includes, or the file itself."""
+    if file.suffix != ".cxx":
+        return [file]
+    return [Path(name) for name in UNITY.findall(file.read_text(encoding="utf-8"))]
 
 
 def main(commands, regex):
@@ -22,7 +30,8 @@ def main(commands, regex):
         program = PROGRAM.search(command["command"])
         if not program or program[1] in programs:
             continue
-        names = TEST.findall(Path(command["file"]).read_text(encoding="utf-8"))
+        names = [name for source in sources(Path(command["file"]))
+                 for name in TEST.findall(source.read_text(encoding="utf-8"))]
         if any(wanted.search(f"{suite}.{name}") for suite, name in names):
             programs.add(program[1])
     print("\n".join(sorted(programs)) or "all")

@@ -13,13 +13,6 @@ struct PendingRequest {
   AsyncClient::OnReply onReply;
 };
 
-v1::Error makeError(v1::ErrorCode code, const std::string& text) {
-  v1::Error error;
-  error.set_code(code);
-  error.set_message(text);
-  return error;
-}
-
 Reply makeLostReply(const v1::Error& error) {
   Reply reply;
   reply.lost = true;

@@ -198,10 +198,11 @@ std::optional<Received> Connection::next() {
 }
 
 bool Connection::waitFor(short events, std::chrono::steady_clock::time_point deadline) {
-  using Clock = std::chrono::steady_clock;
   constexpr long long kMaxPollMilliseconds = 1'000'000;  // milliseconds per poll()
   while (disconnectReason_.empty()) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now())
+            .count();
     if (left < 0) return false;
     pollfd descriptor{socket_, events, 0};
     const int ready =
@@ -225,17 +226,13 @@ v1::ClientMessage makeHello(const std::string& clientName, const std::string& to
   return message;
 }
 
-namespace {
-
-v1::Error makeError(v1::ErrorCode code, const std::string& text, const std::string& field = {}) {
+v1::Error makeError(v1::ErrorCode code, const std::string& text, const std::string& field) {
   v1::Error error;
   error.set_code(code);
   error.set_message(text);
   error.set_field(field);
   return error;
 }
-
-}  // namespace
 
 std::optional<v1::Error> validateWelcome(const v1::ServerMessage& reply, const std::string& peer) {
   if (reply.has_error()) {

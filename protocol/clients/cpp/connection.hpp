@@ -76,6 +76,8 @@ class Connection {
 /// Makes the first message of a connection.
 v1::ClientMessage makeHello(const std::string& clientName, const std::string& token);
 
+v1::Error makeError(v1::ErrorCode code, const std::string& text, const std::string& field = {});
+
 /// Validates the reply to the hello: the server's Error, or ERROR_VERSION or ERROR_BAD_MESSAGE for
 /// an invalid Welcome. nullopt: valid.
 std::optional<v1::Error> validateWelcome(const v1::ServerMessage& reply, const std::string& peer);

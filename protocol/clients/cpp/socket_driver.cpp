@@ -60,8 +60,9 @@ StepOutcome SocketDriver::step() {
   }
   for (const v1::Notice& notice : outcome.notices) {
     if (notice.kind() == v1::Notice::KIND_CAPTURE) {
-      outcome.frames.push_back(captureFrame(
-          notice, format_, [&](const v1::FrameRequest& request) { return client_.frame(request); }));
+      outcome.frames.push_back(captureFrame(notice, format_, [&](const v1::FrameRequest& request) {
+        return client_.frame(request);
+      }));
     }
   }
   return outcome;

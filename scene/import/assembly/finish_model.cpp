@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "scene/import/assembly/coordinates.hpp"
-#include "scene/model/add_diagnostic.hpp"
 #include "scene/import/file/import_options.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -12,8 +12,8 @@
 #include "scene/import/assimp/nodes.hpp"
 #include "scene/import/bodies/gltf_bodies.hpp"
 #include "scene/import/bodies/name_suffixes.hpp"
-#include "scene/model/add_diagnostic.hpp"
 #include "scene/import/gltf/gltf_nodes.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {

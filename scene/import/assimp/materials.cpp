@@ -7,10 +7,10 @@
 #include <fstream>
 #include <map>
 
-#include "scene/model/add_diagnostic.hpp"
 #include "scene/import/file/decode_image.hpp"
 #include "scene/import/file/srgb.hpp"
 #include "scene/import/file/uri.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {

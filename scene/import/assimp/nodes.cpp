@@ -7,9 +7,9 @@
 
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/import/assembly/path_names.hpp"
-#include "scene/model/add_diagnostic.hpp"
 #include "scene/import/file/import_options.hpp"
 #include "scene/import/gltf/gltf_json.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -8,9 +8,9 @@
 #include "scene/import/bodies/gltf_physics.hpp"
 #include "scene/import/bodies/gltf_tree.hpp"
 #include "scene/import/bodies/sidecar.hpp"
-#include "scene/model/add_diagnostic.hpp"
 #include "scene/import/file/import_options.hpp"
 #include "scene/import/gltf/gltf_json.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -6,7 +6,6 @@
 #include <set>
 #include <string_view>
 
-#include "scene/import/bodies/body_precedence.hpp"
 #include "scene/import/bodies/door_leaf.hpp"
 #include "scene/model/add_diagnostic.hpp"
 

@@ -10,6 +10,7 @@
 
 #include "scene/import/file/import_options.hpp"
 #include "scene/import/file/uri.hpp"
+#include "scene/import/gltf/gltf_json.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -157,12 +158,11 @@ const std::string& GltfBuffers::getBuffer(std::size_t index) {
 
 GltfBuffers::Slice GltfBuffers::makeSlice(const Json& accessor, std::size_t elementBytes,
                                           std::size_t count) {
-  constexpr std::size_t kNone = ~std::size_t{0};
-  const std::size_t viewIndex = getInteger(accessor, "bufferView", kNone);
-  if (viewIndex == kNone || accessor.contains("sparse"))
+  const std::size_t viewIndex = getInteger(accessor, "bufferView", kNoIndex);
+  if (viewIndex == kNoIndex || accessor.contains("sparse"))
     fail("sparse accessors are not supported in animations");
   const Json& view = getEntry("bufferViews", viewIndex);
-  Slice slice{&getBuffer(getInteger(view, "buffer", kNone)), 0,
+  Slice slice{&getBuffer(getInteger(view, "buffer", kNoIndex)), 0,
               getInteger(view, "byteStride", elementBytes)};
   slice.first = getInteger(view, "byteOffset", 0) + getInteger(accessor, "byteOffset", 0);
   if (slice.stride < elementBytes) fail("a byteStride is smaller than its elements");

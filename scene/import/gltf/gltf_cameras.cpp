@@ -18,7 +18,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::size_t kNone = ~std::size_t{0};
 constexpr double kMaxPoses = 10'000'000;
 
 enum class Interpolation : std::uint8_t { step, linear, cubic };
@@ -31,7 +30,7 @@ struct Channel {
 };
 
 struct Node {
-  std::size_t parent = kNone, camera = kNone;
+  std::size_t parent = kNoIndex, camera = kNoIndex;
   std::string name;
   Eigen::Affine3d matrix = Eigen::Affine3d::Identity();
   bool fromMatrix = false;
@@ -47,7 +46,7 @@ const Json& getList(const Json& object, const char* key) {
 }
 
 std::size_t getIndex(const Json& object, const char* key) {
-  return readIndexMember(&object, key).value_or(kNone);
+  return readIndexMember(&object, key).value_or(kNoIndex);
 }
 
 std::string getString(const Json& object, const char* key) {
@@ -233,7 +232,7 @@ Eigen::Affine3d computeParentFromNode(const Node& node, double time) {
 // ---- the camera ---------------------------------------------------------------------------------
 
 bool GltfCameraReader::isAnimated(std::size_t node) const {
-  for (int level = 0; node != kNone && level < kMaxNodeDepth; ++level) {
+  for (int level = 0; node != kNoIndex && level < kMaxNodeDepth; ++level) {
     if (!nodes_[node].channels.empty()) return true;
     node = nodes_[node].parent;
   }
@@ -242,7 +241,7 @@ bool GltfCameraReader::isAnimated(std::size_t node) const {
 
 double GltfCameraReader::findLastKeyTime(std::size_t node) const {
   double last = 0;
-  for (int level = 0; node != kNone && level < kMaxNodeDepth; ++level) {
+  for (int level = 0; node != kNoIndex && level < kMaxNodeDepth; ++level) {
     for (const auto& [path, channel] : nodes_[node].channels)
       last = std::max(last, channel.times.back());
     node = nodes_[node].parent;
@@ -253,7 +252,7 @@ double GltfCameraReader::findLastKeyTime(std::size_t node) const {
 std::string GltfCameraReader::listCameraNames() const {
   std::string names;
   for (const Node& node : nodes_)
-    if (node.camera != kNone) names += (names.empty() ? "" : ", ") + node.name;
+    if (node.camera != kNoIndex) names += (names.empty() ? "" : ", ") + node.name;
   return names;
 }
 
@@ -263,13 +262,13 @@ std::size_t GltfCameraReader::chooseCamera(const std::string& name) {
     return node.name == name ||
            (node.camera < cameras.size() && getString(cameras[node.camera], "name") == name);
   };
-  std::size_t first = kNone;
+  std::size_t first = kNoIndex;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
-    if (nodes_[i].camera == kNone || (!name.empty() && !matchesName(nodes_[i]))) continue;
+    if (nodes_[i].camera == kNoIndex || (!name.empty() && !matchesName(nodes_[i]))) continue;
     if (!name.empty() || isAnimated(i)) return i;
-    if (first == kNone) first = i;
+    if (first == kNoIndex) first = i;
   }
-  if (first != kNone) return first;
+  if (first != kNoIndex) return first;
   const std::string available = listCameraNames();
   if (available.empty()) fail("contains no camera; add one, or use another kind of path");
   fail("contains no camera named '" + name + "'; its cameras: " + available);
@@ -277,7 +276,7 @@ std::size_t GltfCameraReader::chooseCamera(const std::string& name) {
 
 Eigen::Affine3d GltfCameraReader::computeFileFromNode(std::size_t node, double time) const {
   Eigen::Affine3d result = Eigen::Affine3d::Identity();
-  for (int level = 0; node != kNone; ++level) {
+  for (int level = 0; node != kNoIndex; ++level) {
     if (level == kMaxNodeDepth)
       fail("its nodes are nested more than 2000 levels deep, or in a cycle");
     result = computeParentFromNode(nodes_[node], time) * result;

@@ -14,7 +14,7 @@ constexpr double kMaxFloorOffset = 0.5;    // metres between a cabin's floor and
 constexpr double kMinStoreySpacing = 0.3;  // metres; closer storeys count as one
 constexpr double kCabinTolerance =
     0.02;                               // metres; ignores surfaces at the cabin's floor and ceiling
-constexpr int kGridSize = 5;            // lines per row
+constexpr int kLinesPerRow = 5;         // lines per row
 constexpr double kOutlineMargin = 0.1;  // fraction of the outline at each side without lines
 
 using Corners = std::array<Vec3, 3>;
@@ -94,12 +94,12 @@ ShaftClearance computeShaftClearance(const Model& model, const Object& elevator,
   ShaftClearance clearance{kFar, kFar};
   const std::vector<Corners> triangles = collectShaftTriangles(model, elevator, cabin);
   const Vec3 size = cabin.size();
-  for (int i = 0; i < kGridSize * kGridSize; ++i) {
+  for (int i = 0; i < kLinesPerRow * kLinesPerRow; ++i) {
     const auto toOutlineFraction = [](int k) {
-      return kOutlineMargin + (1 - 2 * kOutlineMargin) * (k + 0.51) / kGridSize;
+      return kOutlineMargin + (1 - 2 * kOutlineMargin) * (k + 0.51) / kLinesPerRow;
     };
-    const double x = cabin.min.x() + toOutlineFraction(i % kGridSize) * size.x();
-    const double z = cabin.min.z() + toOutlineFraction(i / kGridSize) * size.z();
+    const double x = cabin.min.x() + toOutlineFraction(i % kLinesPerRow) * size.x();
+    const double z = cabin.min.z() + toOutlineFraction(i / kLinesPerRow) * size.z();
     for (const Corners& triangle : triangles) {
       const auto height = intersectVerticalLine(triangle, x, z);
       if (!height) continue;

@@ -9,12 +9,12 @@
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/import/assembly/finish_model.hpp"
 #include "scene/import/assembly/path_names.hpp"
-#include "scene/model/add_diagnostic.hpp"
 #include "scene/import/file/srgb.hpp"
 #include "scene/import/ifc/elevators.hpp"
 #include "scene/import/ifc/ifc_file.hpp"
 #include "scene/import/ifc/ifc_readers.hpp"
 #include "scene/import/ifc/openings.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -186,8 +186,9 @@ class IfcImport {
 
   Model run() {
     reportProgress("open", 0);
-    const std::size_t maxBytes =
-        request_.options.memoryLimit > 0 ? request_.options.memoryLimit / kTextMemoryDivisor : kMaxTextBytes;
+    const std::size_t maxBytes = request_.options.memoryLimit > 0
+                                     ? request_.options.memoryLimit / kTextMemoryDivisor
+                                     : kMaxTextBytes;
     std::string text = readIfcFile(request_.file, maxBytes);
     if (text.find("ISO-10303-21") == std::string::npos) {
       throw ImportError(request_.file + ": not an IFC file (it does not begin with " +
@@ -257,14 +258,16 @@ class IfcImport {
   }
 
   bool isReaderAllowed(IfcReader reader) const {
-    return request_.options.ifcReader == IfcReader::automatic || request_.options.ifcReader == reader;
+    return request_.options.ifcReader == IfcReader::automatic ||
+           request_.options.ifcReader == reader;
   }
 
   /// Time limit of the next reader, seconds: the remaining time, or a part of it if another reader
   /// may follow.
   double readerTimeLimit() const {
-    return request_.options.ifcReader == IfcReader::automatic ? remainingTime() * kReaderTimeFraction
-                                                      : remainingTime();
+    return request_.options.ifcReader == IfcReader::automatic
+               ? remainingTime() * kReaderTimeFraction
+               : remainingTime();
   }
 
   Model readMeshes() {

@@ -159,10 +159,6 @@ const StepStatement* StepFile::findOfType(std::uint32_t id, std::string_view typ
   return found != nullptr && found->type == type ? found : nullptr;
 }
 
-bool StepFile::hasHeader() const {
-  return text_.find("ISO-10303-21") != std::string::npos;
-}
-
 bool StepFile::hasEnd() const {
   return text_.rfind("END-ISO-10303-21") != std::string::npos;
 }

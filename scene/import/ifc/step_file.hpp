@@ -31,7 +31,6 @@ class StepFile {
   const StepStatement* findOfType(std::uint32_t id, std::string_view type) const;
   const std::string& text() const { return text_; }
   const std::string& schema() const { return schema_; }  ///< e.g. "IFC2X3"; empty: not stated
-  bool hasHeader() const;                                ///< ISO-10303-21
   bool hasEnd() const;                                   ///< END-ISO-10303-21
   std::size_t damagedCount() const { return damagedCount_; }
 

@@ -245,7 +245,7 @@ ImportExit::Reason receiveMessages(int readEnd, const ImportRequest& request,
   auto lastMessage = start;
   std::vector<std::byte> chunk(kReadSize);
   MessageBuffer messages(request.options.memoryLimit > 0 ? request.options.memoryLimit
-                                                 : std::numeric_limits<std::size_t>::max());
+                                                         : std::numeric_limits<std::size_t>::max());
   for (;;) {  // ends with the time limit at the latest
     const double left = request.options.timeLimit - secondsSince(start);
     const double stallTime = stallLimit() - secondsSince(lastMessage);
@@ -273,7 +273,8 @@ std::optional<ImportRequest> parseImportRequest(int argc, char** argv, int& pare
   request.task = static_cast<ImportTask>(parseArgument<int>(argv[3]));
   request.options.memoryLimit = parseArgument<std::size_t>(argv[4]);
   request.options.timeLimit = parseArgument<double>(argv[5]);
-  if (std::string_view(argv[6]) != "-") request.options.metresPerUnit = parseArgument<double>(argv[6]);
+  if (std::string_view(argv[6]) != "-")
+    request.options.metresPerUnit = parseArgument<double>(argv[6]);
   if (std::string_view(argv[7]) != "-") request.options.up = argv[7][0];
   if (std::string_view(argv[8]) != "-") request.options.offset = parseVec3(argv[8]);
   request.options.ifcReader = static_cast<IfcReader>(parseArgument<int>(argv[9]));

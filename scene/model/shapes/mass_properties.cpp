@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "collision/shapes/triangle_tree.hpp"
+
 namespace enfilade::scene {
 namespace {
 
@@ -51,8 +53,7 @@ void requirePositive(double value, const char* what) {
                                 ": it must be above 0 and finite");
 }
 
-}  // namespace
-
+/// Requires triangles that are counter-clockwise seen from outside.
 MassProperties computeMeshMass(std::span<const collision::Triangle> triangles, double density) {
   requirePositive(density, "density");
   collision::Aabb box;
@@ -73,6 +74,8 @@ MassProperties computeMeshMass(std::span<const collision::Triangle> triangles, d
   result.inertia = density * computeInertia(sum.second - sum.volume * outerProduct(centre));
   return result;
 }
+
+}  // namespace
 
 MassProperties computeHullMass(const collision::Hull& hull, double density) {
   std::vector<collision::Triangle> triangles;

@@ -4,7 +4,6 @@
 #include <span>
 
 #include "collision/shapes/hull.hpp"
-#include "collision/shapes/triangle_tree.hpp"
 
 namespace enfilade::scene {
 
@@ -18,12 +17,8 @@ struct MassProperties {
   Mat3 inertia = Mat3::Zero();  ///< about the centre, in the axes of that frame, kg m^2
 };
 
-/// Mass properties of a closed mesh whose triangles are counter-clockwise seen from outside.
-/// `density` in kg / m^3. Throws std::invalid_argument if the density is not > 0 and finite, or if
-/// the mesh encloses no volume (flat, open on average, or inside out).
-MassProperties computeMeshMass(std::span<const collision::Triangle> triangles, double density);
-
-/// The same for a convex hull.
+/// Mass properties of a convex hull. `density` in kg / m^3. Throws std::invalid_argument if the
+/// density is not > 0 and finite, or if the hull encloses no volume.
 MassProperties computeHullMass(const collision::Hull& hull, double density);
 
 /// Sum of several solids that do not overlap (overlapping volume counts twice).

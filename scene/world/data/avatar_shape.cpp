@@ -17,6 +17,32 @@ double computeSlope(double normalY) {
   return std::sqrt(std::max(0.0, 1 - normalY * normalY)) / normalY;
 }
 
+/// A bevelled prism with twelve sides, metres: origin at the centre of the bottom, +Y up. The
+/// widest ring has the given radius. Requires height >= spawnHeight / 4.
+collision::Hull buildPrismHull(double radius, double height, double bevel) {
+  // cos and sin of multiples of 30 degrees, exact up to the rounding of sqrt.
+  const double s = std::sqrt(3.0) / 2;
+  const std::array<std::array<double, 2>, 12> ring{{{1, 0},
+                                                    {s, 0.5},
+                                                    {0.5, s},
+                                                    {0, 1},
+                                                    {-0.5, s},
+                                                    {-s, 0.5},
+                                                    {-1, 0},
+                                                    {-s, -0.5},
+                                                    {-0.5, -s},
+                                                    {0, -1},
+                                                    {0.5, -s},
+                                                    {s, -0.5}}};
+  const double inset = kBevelInset * radius;
+  const std::array<std::array<double, 2>, 4> levels{
+      {{0, radius - inset}, {bevel, radius}, {height - bevel, radius}, {height, radius - inset}}};
+  std::vector<collision::Vec3> points;
+  for (const auto& [y, r] : levels)
+    for (const auto& [x, z] : ring) points.emplace_back(r * x, y, r * z);
+  return collision::buildHull(points);
+}
+
 }  // namespace
 
 AvatarPart makeAvatarPart(std::shared_ptr<const collision::Hull> hull, const Vec3& offset,
@@ -53,30 +79,6 @@ std::shared_ptr<const AvatarShape> makePrismShape(double radius, double height, 
 
 double computeEyeHeight(double height) {
   return height - std::min(kEyeDepthBelowTop, 0.1 * height);
-}
-
-collision::Hull buildPrismHull(double radius, double height, double bevel) {
-  // cos and sin of multiples of 30 degrees, exact up to the rounding of sqrt.
-  const double s = std::sqrt(3.0) / 2;
-  const std::array<std::array<double, 2>, 12> ring{{{1, 0},
-                                                    {s, 0.5},
-                                                    {0.5, s},
-                                                    {0, 1},
-                                                    {-0.5, s},
-                                                    {-s, 0.5},
-                                                    {-1, 0},
-                                                    {-s, -0.5},
-                                                    {-0.5, -s},
-                                                    {0, -1},
-                                                    {0.5, -s},
-                                                    {s, -0.5}}};
-  const double inset = kBevelInset * radius;
-  const std::array<std::array<double, 2>, 4> levels{
-      {{0, radius - inset}, {bevel, radius}, {height - bevel, radius}, {height, radius - inset}}};
-  std::vector<collision::Vec3> points;
-  for (const auto& [y, r] : levels)
-    for (const auto& [x, z] : ring) points.emplace_back(r * x, y, r * z);
-  return collision::buildHull(points);
 }
 
 }  // namespace enfilade::scene

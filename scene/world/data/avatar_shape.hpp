@@ -40,11 +40,8 @@ std::shared_ptr<const AvatarShape> makeAvatarShape(std::vector<AvatarPart> parts
 /// crouching avatar lies inside the full one.
 double computeBevelHeight(double radius, double spawnHeight, const WorldSettings& settings);
 
-/// A bevelled prism with twelve sides, metres: origin at the centre of the bottom, +Y up. The
-/// widest ring has the given radius. Requires height >= spawnHeight / 4.
-collision::Hull buildPrismHull(double radius, double height, double bevel);
-
-/// A shape with the prism as its only part.
+/// A shape whose only part is a prism of twelve sides with bevels. The widest ring has the given
+/// radius. Requires height >= spawnHeight / 4.
 std::shared_ptr<const AvatarShape> makePrismShape(double radius, double height, double spawnHeight,
                                                   const WorldSettings& settings);
 

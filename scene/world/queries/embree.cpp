@@ -2,9 +2,11 @@
 
 #include <embree3/rtcore.h>
 
+#include <algorithm>
 #include <new>
 
 #include "collision/assert.hpp"
+#include "scene/model/model.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -77,6 +79,19 @@ void attachTriangles(const TriangleBuffers& buffers, RTCSceneTy* scene, unsigned
   rtcReleaseGeometry(buffers.geometry);
 }
 
+EmbreeScene buildTriangleTree(RTCDeviceTy* device, const EmbreeSceneOptions& options,
+                              std::span<const Eigen::Vector3f> positions,
+                              std::span<const std::uint32_t> corners, EmbreeFilter filter) {
+  const std::size_t triangles = corners.size() / 3;
+  const TriangleBuffers buffers = makeTriangleBuffers(device, positions.size(), triangles);
+  std::copy(positions.begin(), positions.end(), buffers.positions);
+  std::copy_n(corners.begin(), 3 * triangles, buffers.corners);
+  EmbreeScene tree = makeEmbreeScene(device, options);
+  attachTriangles(buffers, tree.get(), 0, filter);
+  commitScene(device, tree.get());
+  return tree;
+}
+
 bool canBeInstanced(const Eigen::Affine3d& sceneFromInstance) {
   const Eigen::Matrix3f linear = sceneFromInstance.linear().cast<float>();
   const Eigen::Matrix3f inverse = linear.inverse();
@@ -101,6 +116,12 @@ void addInstance(RTCDeviceTy* device, RTCSceneTy* scene, unsigned number,
 void commitScene(RTCDeviceTy* device, RTCSceneTy* scene) {
   rtcCommitScene(scene);
   throwIfEmbreeFailed(device, "building the tree of a scene");
+}
+
+RTCSceneTy* MeshTrees::findOrBuild(const Mesh& mesh, EmbreeFilter filter) {
+  if (const auto found = trees_.find(&mesh); found != trees_.end()) return found->second.get();
+  EmbreeScene tree = buildTriangleTree(device(), options_, mesh.positions, mesh.indices, filter);
+  return (trees_[&mesh] = std::move(tree)).get();
 }
 
 }  // namespace enfilade::scene

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <deque>
 #include <map>
 #include <numbers>
 #include <string>
@@ -26,100 +25,63 @@ constexpr double kFloatError = 1e-4;
 
 // ---- what Embree holds --------------------------------------------------------------------------
 
-/// Geometry of an instance in its own frame: a mesh of the model, or triangles of a hull or of a
-/// mesh that cannot be instanced.
-struct Surface {
-  const Mesh* mesh = nullptr;
-  std::shared_ptr<const collision::Hull> hull;  ///< keeps the hull of `triangles` alive
+/// A hull in Embree.
+struct HullSurface {
+  std::shared_ptr<const collision::Hull> hull;  ///< keeps the key of its map entry alive
   std::vector<Triangle> triangles;
-  EmbreeScene embree;
+  EmbreeScene tree;  ///< null without triangles
+};
 
-  Triangle corners(std::uint32_t triangle, const Eigen::Affine3d& worldFromSurface) const {
-    if (!mesh) {
-      const Triangle& t = triangles[triangle];
-      return {worldFromSurface * t[0], worldFromSurface * t[1], worldFromSurface * t[2]};
-    }
+/// A placed mesh or hull: one Embree instance. Its index in the group is Embree's instance id.
+struct SurfaceInstance {
+  EntityId entity = 0;
+  const Mesh* mesh = nullptr;
+  const HullSurface* hull = nullptr;  ///< not null: instead of `mesh`
+  Eigen::Affine3d worldFromSurface = Eigen::Affine3d::Identity();
+
+  Triangle corners(std::uint32_t triangle) const {
     Triangle t;
     for (std::size_t i = 0; i < 3; ++i) {
-      t[i] = worldFromSurface * mesh->positions[mesh->indices[3 * triangle + i]].cast<double>();
+      t[i] =
+          hull ? worldFromSurface * hull->triangles[triangle][i]
+               : worldFromSurface * mesh->positions[mesh->indices[3 * triangle + i]].cast<double>();
     }
     return t;
   }
 };
 
-/// A placed surface: one Embree instance. Its index in the group is Embree's instance id.
-struct SurfaceInstance {
-  EntityId entity = 0;
-  const Surface* surface = nullptr;
-  Eigen::Affine3d worldFromSurface = Eigen::Affine3d::Identity();
-};
-
 /// Many surface instances under one tree.
 struct InstanceGroup {
   std::vector<SurfaceInstance> instances;
-  std::deque<Surface>
-      flattened;  ///< surfaces of `instances` that cannot be instanced, in scene frame
   EmbreeScene embree;
 };
 
 constexpr EmbreeSceneOptions kSceneOptions{.robust = true, .compact = true};
 
-EmbreeScene buildTriangleScene(RTCDevice device, std::span<const Eigen::Vector3f> positions,
-                               std::span<const std::uint32_t> indices) {
-  const std::size_t triangles = indices.size() / 3;
-  const TriangleBuffers buffers = makeTriangleBuffers(device, positions.size(), triangles);
-  std::copy(positions.begin(), positions.end(), buffers.positions);
-  std::copy_n(indices.begin(), 3 * triangles, buffers.corners);
-  EmbreeScene scene = makeEmbreeScene(device, kSceneOptions);
-  attachTriangles(buffers, scene.get(), 0);
-  commitScene(device, scene.get());
-  return scene;
-}
-
-std::vector<Triangle> extractMeshTriangles(const Mesh& mesh, const Eigen::Affine3d& worldFromMesh) {
-  std::vector<Triangle> triangles;
-  const auto corner = [&](std::size_t i) {
-    return Vec3(worldFromMesh * mesh.positions[mesh.indices[i]].cast<double>());
-  };
-  for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3)
-    triangles.push_back({corner(i), corner(i + 1), corner(i + 2)});
-  return triangles;
-}
-
-/// Counter-clockwise triangle fans of the hull's faces.
-std::vector<Triangle> extractHullTriangles(const collision::Hull& hull) {
-  std::vector<Triangle> triangles;
-  for (const auto& face : hull.faces) {
-    for (std::size_t i = 2; i < face.size(); ++i) {
-      triangles.push_back(
-          {hull.vertices[face[0]], hull.vertices[face[i - 1]], hull.vertices[face[i]]});
-    }
-  }
-  return triangles;
-}
-
-/// Without triangles, the surface has no tree.
-Surface makeSurface(RTCDevice device, std::vector<Triangle> triangles) {
-  Surface surface;
-  surface.triangles = std::move(triangles);
-  if (surface.triangles.empty()) return surface;
+/// The tree of a mesh that cannot be instanced, in scene frame.
+EmbreeScene buildFlattenedTree(RTCDevice device, const Mesh& mesh,
+                               const Eigen::Affine3d& worldFromMesh) {
   std::vector<Eigen::Vector3f> positions;
-  std::vector<std::uint32_t> indices;
-  for (const Triangle& triangle : surface.triangles) {
-    for (const Vec3& corner : triangle) {
-      indices.push_back(static_cast<std::uint32_t>(positions.size()));
-      positions.push_back(corner.cast<float>());
-    }
-  }
-  surface.embree = buildTriangleScene(device, positions, indices);
-  return surface;
+  positions.reserve(mesh.positions.size());
+  for (const Eigen::Vector3f& position : mesh.positions)
+    positions.push_back((worldFromMesh * position.cast<double>()).cast<float>());
+  return buildTriangleTree(device, kSceneOptions, positions, mesh.indices);
 }
 
-void addSurfaceInstance(RTCDevice device, InstanceGroup& group, const SurfaceInstance& instance,
-                        unsigned mask) {
-  addInstance(device, group.embree.get(), static_cast<unsigned>(group.instances.size()),
-              instance.surface->embree.get(), instance.worldFromSurface, mask);
-  group.instances.push_back(instance);
+HullSurface makeHullSurface(RTCDevice device, const std::shared_ptr<const collision::Hull>& hull) {
+  HullSurface surface{hull, {}, nullptr};
+  std::vector<Eigen::Vector3f> positions;
+  std::vector<std::uint32_t> corners;
+  for (const Vec3& vertex : hull->vertices) positions.push_back(vertex.cast<float>());
+  for (const auto& face : hull->faces) {  // as counter-clockwise fans
+    for (std::size_t i = 2; i < face.size(); ++i) {
+      corners.insert(corners.end(), {face[0], face[i - 1], face[i]});
+      surface.triangles.push_back(
+          {hull->vertices[face[0]], hull->vertices[face[i - 1]], hull->vertices[face[i]]});
+    }
+  }
+  if (!corners.empty()) surface.tree = buildTriangleTree(device, kSceneOptions, positions, corners);
+  return surface;
 }
 
 // ---- one ray ------------------------------------------------------------------------------------
@@ -160,7 +122,7 @@ RTCRay makeEmbreeRay(const Ray& ray, const Vec3& unit, double maxDistance,
 /// Intersects the line with the triangle's plane, close to Embree's distance.
 RayHit computeHit(const SurfaceInstance& instance, std::uint32_t triangle, const Ray& ray,
                   const Vec3& unit, double embreeDistance) {
-  const Triangle t = instance.surface->corners(triangle, instance.worldFromSurface);
+  const Triangle t = instance.corners(triangle);
   Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
   const double normalProjection = normal.dot(unit);
   const double inPlane =
@@ -222,13 +184,16 @@ std::optional<std::string> validateMaxDistance(double maxDistance) {
 
 struct RayCaster::State {
   std::shared_ptr<const Scene> scene;
-  EmbreeDevice device = makeEmbreeDevice();
-  std::vector<Surface> meshes;  ///< one per mesh of the model; unused ones have no tree
-  std::map<const collision::Hull*, Surface> hulls;  ///< of the avatars present now
+  MeshTrees meshes{kSceneOptions};
+  std::map<const collision::Hull*, HullSurface> hulls;  ///< of the avatars present now
   InstanceGroup staticGroup, bodyGroup, avatarGroup;
   std::shared_ptr<const std::vector<BodySnapshot>>
       placedBodies;  ///< of which `bodyGroup` was built
 
+  InstanceGroup makeGroup() const { return {{}, makeEmbreeScene(meshes.device(), kSceneOptions)}; }
+  /// `worldFromTree` is the instance's worldFromSurface, except for a tree in scene frame.
+  void addSurface(InstanceGroup& group, const SurfaceInstance& instance, RTCScene tree,
+                  const Eigen::Affine3d& worldFromTree, unsigned mask);
   /// Adds instances of an object's meshes; `worldFromAuthored` moves it from its authored pose.
   void placeObject(InstanceGroup& group, std::uint32_t object, EntityId entity,
                    const Eigen::Affine3d& worldFromAuthored);
@@ -237,18 +202,15 @@ struct RayCaster::State {
   void placeStaticObjects();
   void placeBodies(const std::vector<BodySnapshot>& snapshots);
   void placeAvatars(const std::vector<AvatarSnapshot>& snapshots);
-  const Surface& getMeshSurface(std::uint32_t mesh);
-  const Surface& getHullSurface(const std::shared_ptr<const collision::Hull>& hull);
+  const HullSurface& getHullSurface(const std::shared_ptr<const collision::Hull>& hull);
 };
 
-const Surface& RayCaster::State::getMeshSurface(std::uint32_t mesh) {
-  Surface& surface = meshes[mesh];
-  if (!surface.mesh) {
-    surface.mesh = &scene->model().meshes[mesh];
-    surface.embree =
-        buildTriangleScene(device.get(), surface.mesh->positions, surface.mesh->indices);
-  }
-  return surface;
+void RayCaster::State::addSurface(InstanceGroup& group, const SurfaceInstance& instance,
+                                  RTCScene tree, const Eigen::Affine3d& worldFromTree,
+                                  unsigned mask) {
+  addInstance(meshes.device(), group.embree.get(), static_cast<unsigned>(group.instances.size()),
+              tree, worldFromTree, mask);
+  group.instances.push_back(instance);
 }
 
 void RayCaster::State::placeObject(InstanceGroup& group, std::uint32_t object, EntityId entity,
@@ -261,17 +223,15 @@ void RayCaster::State::placeObject(InstanceGroup& group, std::uint32_t object, E
     if (mesh.indices.size() < 3) continue;
     const bool transparent = model.materials.size() > mesh.material &&
                              model.materials[mesh.material].alpha == Material::Alpha::blend;
-    SurfaceInstance instance{entity, nullptr,
-                             worldFromAuthored * model.objects[object].worldFromMesh};
+    const unsigned mask = transparent ? kTransparentMask : kOpaqueMask;
+    const SurfaceInstance instance{entity, &mesh, nullptr,
+                                   worldFromAuthored * model.objects[object].worldFromMesh};
     if (canBeInstanced(instance.worldFromSurface)) {
-      instance.surface = &getMeshSurface(m);
+      addSurface(group, instance, meshes.findOrBuild(mesh), instance.worldFromSurface, mask);
     } else {
-      group.flattened.push_back(
-          makeSurface(device.get(), extractMeshTriangles(mesh, instance.worldFromSurface)));
-      instance.surface = &group.flattened.back();
-      instance.worldFromSurface.setIdentity();
+      const auto tree = buildFlattenedTree(meshes.device(), mesh, instance.worldFromSurface);
+      addSurface(group, instance, tree.get(), Eigen::Affine3d::Identity(), mask);
     }
-    addSurfaceInstance(device.get(), group, instance, transparent ? kTransparentMask : kOpaqueMask);
   }
 }
 
@@ -288,55 +248,47 @@ std::vector<std::uint32_t> RayCaster::State::findStaticVisualObjects() const {
 }
 
 void RayCaster::State::placeStaticObjects() {
-  meshes.resize(scene->model().meshes.size());
-  staticGroup.embree = makeEmbreeScene(device.get(), kSceneOptions);
+  staticGroup = makeGroup();
   for (const std::uint32_t object : findStaticVisualObjects())
     placeObject(staticGroup, object, object + 1, Eigen::Affine3d::Identity());
-  commitScene(device.get(), staticGroup.embree.get());
+  commitScene(meshes.device(), staticGroup.embree.get());
 }
 
 void RayCaster::State::placeBodies(const std::vector<BodySnapshot>& snapshots) {
-  bodyGroup = {};
-  bodyGroup.embree = makeEmbreeScene(device.get(), kSceneOptions);
+  bodyGroup = makeGroup();
   for (const BodySnapshot& body : snapshots) {
     const BodySpec& spec = scene->model().bodies[body.index];
     if (isTrigger(spec.kind)) continue;
     Eigen::Affine3d worldFromAuthored = Eigen::Affine3d::Identity();
-    if (body.displaced) {
-      worldFromAuthored.translate(body.pose.translation)
-          .rotate(body.pose.rotation)
-          .translate(-scene->bodyShape(body.index)->origin);
-    }
+    if (body.displaced)
+      worldFromAuthored = computeWorldFromAuthored(*scene->bodyShape(body.index), body.pose);
     for (const std::uint32_t object : spec.objects)
       placeObject(bodyGroup, object, body.id, worldFromAuthored);
   }
-  commitScene(device.get(), bodyGroup.embree.get());
+  commitScene(meshes.device(), bodyGroup.embree.get());
 }
 
 void RayCaster::State::placeAvatars(const std::vector<AvatarSnapshot>& snapshots) {
-  avatarGroup = {};
-  avatarGroup.embree = makeEmbreeScene(device.get(), kSceneOptions);
+  avatarGroup = makeGroup();
   std::erase_if(hulls, [](const auto& entry) { return entry.second.hull.use_count() == 1; });
   for (const AvatarSnapshot& avatar : snapshots) {
     for (const AvatarPart& part : avatar.shape->parts) {
-      const Surface& surface = getHullSurface(part.hull);
-      if (surface.triangles.empty()) continue;
+      const HullSurface& hull = getHullSurface(part.hull);
+      if (!hull.tree) continue;
       Eigen::Affine3d worldFromHull = Eigen::Affine3d(Eigen::Translation3d(avatar.footPosition));
       worldFromHull.translate(part.offset).rotate(part.rotation);
-      addSurfaceInstance(device.get(), avatarGroup, {avatar.id, &surface, worldFromHull},
-                         kOpaqueMask);
+      addSurface(avatarGroup, {avatar.id, nullptr, &hull, worldFromHull}, hull.tree.get(),
+                 worldFromHull, kOpaqueMask);
     }
   }
-  commitScene(device.get(), avatarGroup.embree.get());
+  commitScene(meshes.device(), avatarGroup.embree.get());
 }
 
-const Surface& RayCaster::State::getHullSurface(
+const HullSurface& RayCaster::State::getHullSurface(
     const std::shared_ptr<const collision::Hull>& hull) {
   auto found = hulls.find(hull.get());
-  if (found == hulls.end()) {
-    found = hulls.emplace(hull.get(), makeSurface(device.get(), extractHullTriangles(*hull))).first;
-    found->second.hull = hull;
-  }
+  if (found == hulls.end())
+    found = hulls.emplace(hull.get(), makeHullSurface(meshes.device(), hull)).first;
   return found->second;
 }
 

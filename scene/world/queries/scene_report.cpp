@@ -24,8 +24,7 @@ void countShapeDefects(const Shape& shape, const std::string& path, bool degener
   addDiagnostic(diagnostics, "convexity_untried", path, shape.notTested);
 }
 
-void countShell(const Shape& shape, const Shell& shell, const Object& object,
-                SceneReport& report) {
+void countShell(const Shape& shape, const Shell& shell, const Object& object, SceneReport& report) {
   ShellCounts& shells = report.shells;
   const bool hull = isTreatedAsHull(shape, shell, object.worldFromMesh);
   (hull ? report.hullTriangles : report.partTriangles) += shell.count;

@@ -1,6 +1,7 @@
 // Camera paths: the poses of a capture's frames.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <stdexcept>
 #include <vector>
@@ -10,6 +11,9 @@
 namespace enfilade::server {
 
 using collision::Vec3;
+
+inline constexpr double kMaxEyeCoordinate = 1e9;  ///< metres, limit of render/camera.cpp
+inline constexpr std::size_t kMaxPoses = 10'000'000;
 
 /// An invalid camera path. The text has the file, the line or element, the value and a remedy.
 struct CameraPathError : std::runtime_error {

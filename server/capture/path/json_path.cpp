@@ -12,10 +12,8 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr double kRotationTolerance = 1e-3;                 // tolerance of a rotation's entries
-constexpr double kMaxCoordinate = 1e9;                      // metres
 constexpr double kRadiansPerDegree = 0.017453292519943295;  // per degree
 constexpr double kPi = 3.141592653589793;
-constexpr std::size_t kMaxPoses = 10'000'000;
 constexpr std::size_t kMaxQuoteLength = 60;
 
 /// The position of a value in the file, for example "path.json: frames[3].eye".
@@ -56,7 +54,7 @@ std::array<double, count> parseNumbers(const Json& value, const JsonCursor& curs
 Vec3 parseVector(const Json& value, const JsonCursor& cursor) {
   const auto numbers = parseNumbers<3>(value, cursor);
   const Vec3 vector(numbers[0], numbers[1], numbers[2]);
-  if (!(vector.cwiseAbs().maxCoeff() <= kMaxCoordinate)) cursor.fail("is beyond 1e9 m");
+  if (!(vector.cwiseAbs().maxCoeff() <= kMaxEyeCoordinate)) cursor.fail("is beyond 1e9 m");
   return vector;
 }
 
@@ -78,7 +76,8 @@ void readMatrix(const Json& value, const JsonCursor& cursor, CameraAxes axes, Ca
         "(put the scale into the scene)");
   if (pose.rotation.determinant() < 0)
     cursor.fail("its left 3x3 part is a reflection; give a rotation (negate one column)");
-  if (!(pose.eye.cwiseAbs().maxCoeff() <= kMaxCoordinate)) cursor.fail("the eye is beyond 1e9 m");
+  if (!(pose.eye.cwiseAbs().maxCoeff() <= kMaxEyeCoordinate))
+    cursor.fail("the eye is beyond 1e9 m");
   pose.rotation = convertAxes(pose.rotation, axes, CameraAxes::opengl);
 }
 

@@ -8,8 +8,6 @@ namespace enfilade::server {
 namespace {
 
 constexpr double kUnitTolerance = 1e-2;  // tolerance of a quaternion's length
-constexpr double kMaxCoordinate = 1e9;   // metres, limit of render/camera.cpp
-constexpr std::size_t kMaxPoses = 10'000'000;
 
 [[noreturn]] void throwPathError(const std::string& source, std::size_t line,
                                  const std::string& what) {
@@ -61,7 +59,7 @@ CameraPose parsePose(const std::array<double, 8>& v, const std::string& source, 
   CameraPose pose;
   pose.time = v[0];
   pose.eye = Vec3(v[1], v[2], v[3]);
-  if (!(pose.eye.cwiseAbs().maxCoeff() <= kMaxCoordinate))
+  if (!(pose.eye.cwiseAbs().maxCoeff() <= kMaxEyeCoordinate))
     throwPathError(source, line, "the position is farther than 1e9 m from the scene's origin");
   pose.rotation = convertAxes(toRotation({v[4], v[5], v[6], v[7]}), axes, CameraAxes::opengl);
   return pose;
