@@ -13,18 +13,12 @@ namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
-bool isDynamicBody(const World& world, EntityId entity) {
-  for (const BodySnapshot& body : *world.snapshot()->bodies)
-    if (body.id == entity) return isDynamic(world.scene().model().bodies[body.index].kind);
-  return false;
-}
-
-/// All solid entities, without the further objects of bodies and without triggers.
-std::vector<EntityId> solidEntities(const World& world) {
+/// All solid entities except dynamic bodies, without the further objects of bodies.
+std::vector<EntityId> boundedEntities(const World& world) {
   std::vector<EntityId> entities;
   for (const std::uint32_t object : world.scene().solidObjects()) entities.push_back(object + 1);
   for (const BodySnapshot& body : *world.snapshot()->bodies)
-    if (!isTrigger(world.scene().model().bodies[body.index].kind)) entities.push_back(body.id);
+    if (isKinematic(world.scene().model().bodies[body.index].kind)) entities.push_back(body.id);
   for (const AvatarSnapshot& avatar : world.snapshot()->avatars) entities.push_back(avatar.id);
   return entities;
 }
@@ -56,16 +50,19 @@ class Checker {
     const double now = world_.snapshot()->time;
     for (const ContactEvent& event : report.contacts)
       if (event.kind == ContactEvent::Kind::begin) check({event.a, event.b}, now, "event");
-    for (const AvatarSnapshot& avatar : world_.snapshot()->avatars)
-      for (const EntityId other : solidEntities(world_))
-        if (other != avatar.id && !isDynamicBody(world_, other)) lookAt(avatar.id, other, now);
+    const std::vector<EntityId> entities = boundedEntities(world_);
+    for (const AvatarSnapshot& avatar : world_.snapshot()->avatars) {
+      const std::set<EntityId> inContact = findContacts(avatar.id);
+      for (const EntityId other : entities)
+        if (other != avatar.id) lookAt(avatar.id, other, inContact.contains(other), now);
+    }
   }
 
   ContactHorizons& all() { return horizons; }
-  int claims = 0;    ///< of a pair in a tick, about the next tick at least
-  int contacts = 0;  ///< begins of contacts of pairs with an earlier claim
-  int close = 0;     ///< of them, those that a claim came near to: half of the true time or more
-  int pairs = 0;     ///< pairs of all ticks
+  int claims = 0;     ///< of a pair in a tick, beyond the next tick
+  int farClaims = 0;  ///< of them, those that are five ticks ahead or more
+  int contacts = 0;   ///< begins of contacts of pairs with an earlier claim
+  int pairs = 0;      ///< pairs of all ticks
 
  private:
   void check(const Pair& pair, double now, const char* what) {
@@ -76,28 +73,32 @@ class Checker {
                                   << world_.snapshot()->tick;
   }
 
-  bool inContact(const Pair& pair) {
+  /// By brute force over all entities.
+  std::set<EntityId> findContacts(EntityId avatar) {
     std::size_t work = kMaxQueryWork;
-    const auto found = std::get<PairProximity>(
-        computePairProximity({index_, *world_.snapshot()}, pair.first, pair.second, false, work));
-    return found.separation.verdict != collision::Verdict::separated ||
-           found.separation.distance < computeContactThreshold(world_.settings());
+    const auto near = std::get<NearbyEntities>(findNearbyEntities(
+        {index_, *world_.snapshot()}, avatar, computeContactThreshold(world_.settings()), work));
+    EXPECT_EQ(near.skipped, 0u);
+    std::set<EntityId> found;
+    for (const PairProximity& pair : near.pairs) found.insert(pair.b);
+    return found;
   }
 
-  void lookAt(EntityId avatar, EntityId other, double now) {
+  void lookAt(EntityId avatar, EntityId other, bool inContact, double now) {
     const Pair pair(avatar, other);
     ++pairs;
-    if (inContact(pair)) {
+    if (inContact) {
       check(pair, now, "distance");
       contacts += proved_.erase(pair) > 0 ? 1 : 0;
-      first_.erase(pair);
       return;
     }
     const auto at = horizons.horizons().find(avatar);
     if (at == horizons.horizons().end()) return;
     const double proved = provedTime(at->second, other);
     if (!(proved > now)) return;
-    claims += proved > now + world_.settings().tickDuration ? 1 : 0;
+    const double tick = world_.settings().tickDuration;
+    claims += proved > now + tick ? 1 : 0;
+    farClaims += proved >= now + 5 * tick ? 1 : 0;
     double& claim = proved_[pair];
     claim = std::max(claim, proved);
   }
@@ -106,7 +107,6 @@ class Checker {
   EntityIndex index_;
   ContactHorizons horizons;
   std::map<Pair, double> proved_;  ///< the latest time of all ticks since the last contact
-  std::map<Pair, double> first_;
 };
 
 TEST(ContactHorizon, InABusyRoomNoContactBeginsBeforeItsHorizon) {
@@ -120,6 +120,7 @@ TEST(ContactHorizon, InABusyRoomNoContactBeginsBeforeItsHorizon) {
       checker.look(tickWorld(room.world));
     }
     EXPECT_GT(checker.claims, 5'000) << seed;
+    EXPECT_GT(checker.farClaims, 1'000) << seed;
     EXPECT_GT(checker.contacts, 5) << seed;
     EXPECT_EQ(checker.all().statistics().postponed, 0u);
   }
@@ -187,7 +188,7 @@ struct TwoCrowds {
 };
 
 TEST(ContactHorizon, TwoCrowdsMeetNoEarlierAndFewPairsAreExamined) {
-  TwoCrowds crowds(12);
+  TwoCrowds crowds(8);
   Checker checker(crowds.run.world);
   for (int i = 0; i < 600; ++i) {
     if (i % 120 == 0) crowds.turn();
@@ -196,11 +197,10 @@ TEST(ContactHorizon, TwoCrowdsMeetNoEarlierAndFewPairsAreExamined) {
   EXPECT_GT(checker.contacts, 20);
   const auto& counts = checker.all().statistics();
   EXPECT_EQ(counts.postponed, 0u);
-  EXPECT_LT(5 * counts.examinations, static_cast<std::uint64_t>(checker.pairs));
-  std::printf("pairs %d, examined %llu, by boxes %llu, searches %llu, claims %d, contacts %d\n",
-              checker.pairs, static_cast<unsigned long long>(counts.examinations),
-              static_cast<unsigned long long>(counts.boxChecks),
-              static_cast<unsigned long long>(counts.searches), checker.claims, checker.contacts);
+  EXPECT_LT(20 * counts.examinations, static_cast<std::uint64_t>(checker.pairs));
+  EXPECT_GT(checker.farClaims, 100'000);
+  RecordProperty("pairs", checker.pairs);
+  RecordProperty("examinations", static_cast<int>(counts.examinations));
 }
 
 TEST(ContactHorizon, FewerPairsAreExaminedThanThoseNearTheAvatars) {
@@ -218,7 +218,7 @@ TEST(ContactHorizon, FewerPairsAreExaminedThanThoseNearTheAvatars) {
     for (const auto& [id, horizon] : lazy.horizons())
       EXPECT_EQ(horizon.touching, eager.horizons().at(id).touching) << id << ", " << i;
   }
-  EXPECT_LT(5 * lazy.statistics().examinations, eager.statistics().examinations);
+  EXPECT_LT(3 * lazy.statistics().examinations, eager.statistics().examinations);
 }
 
 TEST(ContactHorizon, IsInTheFutureWhereTheWayIsClear) {
@@ -239,7 +239,7 @@ TEST(ContactHorizon, IsInTheFutureWhereTheWayIsClear) {
       if (near.pairs.size() > horizon.touching.size()) continue;
       ++clear;
       EXPECT_GT(horizon.notBefore(), world.snapshot()->time);
-      EXPECT_EQ(horizon.touching, std::vector<EntityId>{1}) << "the floor";
+      EXPECT_TRUE(std::ranges::binary_search(horizon.touching, EntityId{1})) << "the floor";
     }
   }
   EXPECT_GT(clear, 200);
@@ -257,6 +257,72 @@ TEST(ContactHorizon, WithoutEnoughWorkItIsEarlierAndNeverWrong) {
   EXPECT_GT(checker.all().statistics().postponed, 100u);
   EXPECT_GT(checker.claims, 1'000);
   EXPECT_GT(checker.contacts, 5);
+}
+
+/// Without steps and jumps an avatar's bound is twice the speed limit.
+WorldSettings flatSettings(double maxSpeed) {
+  WorldSettings settings;
+  settings.maxSpeed = maxSpeed;
+  settings.stepHeight = 0;
+  settings.maxJumpHeight = 0;
+  settings.contactOffset = 1e-5;
+  return settings;
+}
+
+TEST(ContactHorizon, AtTheSpeedLimitAHorizonIsHalfOfTheTrueTime) {
+  WorldFixture run({floorBox(), {"wall", {5, 0.001, -4}, {5.2, 3, 4}}}, flatSettings(4));
+  run.order("ann", Spawn{Vec3(-6, 0.001, 0)});
+  run.order("bob", Spawn{Vec3(0, 0.001, 0)});
+  run.ticks(20);
+  Checker checker(run.world);
+  run.order("ann", Drive{{4, 0, 0}});
+  run.order("bob", Drive{{-4, 0, 0}});
+  checker.look(run.step());
+  const EntityId ann = run.view("ann").id, bob = run.view("bob").id;
+  const double start = run.world.snapshot()->time;
+  const ContactHorizon& first = checker.all().horizons().at(ann);
+  ASSERT_EQ(first.approaches[0].entity, bob);
+  const double proved = first.notBefore() - start;
+  while (!run.open.contains({ann, bob}) && run.world.snapshot()->time < start + 5)
+    checker.look(run.step());
+  const double taken = run.world.snapshot()->time - start;
+  EXPECT_GT(proved, 0.45 * taken - 0.02);
+  EXPECT_EQ(checker.contacts, 2) << "each of the other";
+}
+
+TEST(ContactHorizon, ABodyPushesAnAvatarFasterThanItsSpeedLimit) {
+  Model model = boxModel(
+      {floorBox(), {"ram", {-3, 0.01, -1}, {-2, 2, 1}}, {"wall", {2, 0.001, -4}, {2.2, 3, 4}}});
+  BodySpec ram = bodySpec("ram", BodyKind::sliding, {1});
+  ram.axis = {1, 0, 0};
+  ram.high = 3.6;
+  ram.speed = 5;
+  model.bodies = {ram};
+  BodyFixture t(std::move(model), flatSettings(0.5));
+  t.order("ann", Spawn{Vec3(0, 0.001, 0)});
+  t.ticks(20);
+  Checker checker(t.world);
+  t.submit({"ram", BodyCommand::Action::moveTo, 3.6, 0, {}});
+  for (int i = 0; i < 120; ++i) checker.look(t.step());
+  EXPECT_GT(t.feet("ann").x(), 1.4) << "it was pushed";
+  EXPECT_GT(checker.farClaims, 5);
+  EXPECT_EQ(checker.contacts, 2) << "of the ram and of the wall";
+}
+
+TEST(ContactHorizon, AnAvatarThatStandsUpWasExpectedTo) {
+  WorldSettings settings = flatSettings(1);
+  settings.contactOffset = 0.5e-3;
+  WorldFixture run({floorBox(), {"beam", {-1, 1.7513, -1}, {1, 2, 1}}}, settings);
+  run.order("ann", Spawn{Vec3(-3, 0.001, 0)});
+  run.order("ann", Crouch{0.9});
+  run.order("ann", to(0, 0, 1));
+  run.ticks(240);
+  ASSERT_LT(run.view("ann").height, 1);
+  Checker checker(run.world);
+  for (int i = 0; i < 10; ++i) checker.look(run.step());
+  run.order("ann", Crouch{});
+  for (int i = 0; i < 10; ++i) checker.look(run.step());
+  EXPECT_TRUE(run.touched("beam"));
 }
 
 TEST(ContactHorizon, ADistantAvatarIsOneSimpleQuotient) {
@@ -282,17 +348,18 @@ TEST(ContactHorizon, ADistantAvatarIsOneSimpleQuotient) {
   EXPECT_EQ(earliest->time, horizon.notBefore());
 }
 
-TEST(ContactHorizon, AlonewithItsFloorAnAvatarMeetsNothing) {
+TEST(ContactHorizon, NewAvatarsAreIncludedAndLeftOnesAreNot) {
   WorldFixture run({floorBox()}, walkingSettings());
   run.order("ann", Spawn{Vec3(0, 0.001, 0)});
   run.ticks(20);
   ContactHorizons horizons(sharedScene(run.world), run.world.settings());
-  horizons.select(std::nullopt);
+  const EntityId ann = run.view("ann").id;
+  horizons.select(std::set{ann});  // without the new one
   horizons.update(run.world.snapshot());
   run.step();
   horizons.update(run.world.snapshot());
-  const EntityId ann = run.view("ann").id;
-  EXPECT_TRUE(horizons.horizons().at(ann).approaches.size() <= 1);
+  for (const auto& approach : horizons.horizons().at(ann).approaches)
+    EXPECT_EQ(approach.entity, 0u) << "nothing but the floor is there";
   run.order("bob", Spawn{Vec3(0.8, 0.001, 0)});
   run.step();
   horizons.update(run.world.snapshot());
@@ -314,15 +381,15 @@ TEST(ContactHorizon, RestingAvatarsCostNoExamination) {
   run.ticks(30);
   ContactHorizons horizons(sharedScene(run.world), run.world.settings());
   horizons.select(std::nullopt);
-  horizons.update(run.world.snapshot());
-  const std::uint64_t first = horizons.statistics().examinations;
-  EXPECT_EQ(first, 5u) << "two floors, two walls, and the two avatars once";
-  for (int i = 0; i < 100; ++i) {
+  std::uint64_t first = 0;
+  for (int i = 0; i < 130; ++i) {
+    if (i == 30) first = horizons.statistics().examinations;
     run.step();
     horizons.update(run.world.snapshot());
     for (const auto& [id, horizon] : horizons.horizons())
       EXPECT_GT(horizon.notBefore(), run.world.snapshot()->time);
   }
+  EXPECT_EQ(first, 5u) << "two floors, two walls, and the two avatars once";
   EXPECT_EQ(horizons.statistics().examinations, first);
 }
 
@@ -342,7 +409,7 @@ TEST(ContactHorizon, NamesTheNearestDynamicBodyAndProvesNothingOfIt) {
   EXPECT_EQ(horizon.unbounded.entity, 2u);
   EXPECT_NEAR(horizon.unbounded.gap, 1.7, 0.02);
   EXPECT_LE(horizon.unbounded.gap, 1.7 + 1e-6);
-  for (const auto& approach : horizon.approaches) EXPECT_GT(approach.entity % 4, 3u * 0) << "";
+  for (const auto& approach : horizon.approaches) EXPECT_EQ(approach.entity, 0u);
 }
 
 TEST(ContactHorizon, StartsOverAfterAGapOfTicksAndForOtherAvatars) {
@@ -351,7 +418,7 @@ TEST(ContactHorizon, StartsOverAfterAGapOfTicksAndForOtherAvatars) {
   ContactHorizons horizons(sharedScene(world), world.settings());
   horizons.select(std::nullopt);
   horizons.update(world.snapshot());
-  EXPECT_EQ(horizons.horizons().size(), 6u);
+  EXPECT_GE(horizons.horizons().size(), 4u);
   crowds.turn();
   crowds.run.ticks(200);
   horizons.update(world.snapshot());

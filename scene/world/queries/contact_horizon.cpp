@@ -19,6 +19,7 @@
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
+#include <tuple>
 
 #include "collision/assert.hpp"
 #include "scene/world/queries/proximity_query.hpp"
@@ -42,6 +43,12 @@ collision::PairSchedule::BodyPair makePair(EntityId a, EntityId b) {
 
 EntityId otherOf(const collision::PairSchedule::BodyPair& pair, EntityId one) {
   return pair.first == one ? pair.second : pair.first;
+}
+
+bool isEarlier(const ContactHorizon::Approach& x, const ContactHorizon::Approach& y) {
+  // The entity 0 comes last among equal times.
+  return std::tuple(x.notBefore, x.entity == 0, x.entity) <
+         std::tuple(y.notBefore, y.entity == 0, y.entity);
 }
 
 bool equal(const ContactHorizon& x, const ContactHorizon& y) {
@@ -322,9 +329,11 @@ void ContactHorizons::composeHorizon(EntityId avatar, Tracked& tracked) {
     if (entry.time <= tracked.restUntil)
       horizon.approaches.push_back({otherOf(entry.pair, avatar), entry.time});
   if (tracked.restUntil < kInfinity) horizon.approaches.push_back({0, tracked.restUntil});
-  std::ranges::stable_sort(horizon.approaches, {}, &ContactHorizon::Approach::notBefore);
-  if (horizon.approaches.size() > ContactHorizon::kMaxApproaches)
-    horizon.approaches.resize(ContactHorizon::kMaxApproaches);
+  const std::size_t count = std::min(horizon.approaches.size(), ContactHorizon::kMaxApproaches);
+  std::ranges::partial_sort(horizon.approaches,
+                            horizon.approaches.begin() + static_cast<std::ptrdiff_t>(count),
+                            isEarlier);
+  horizon.approaches.resize(count);
   if (isNew || !equal(known->second, horizon)) known->second = std::move(horizon);
 }
 
