@@ -59,7 +59,7 @@ class HorizonState {
   double computeTime(EntityId a, EntityId b, double gap, double speed) const;
 
   struct NearestBody {
-    EntityId entity = 0;  ///< 0: there is none
+    EntityId entity = 0;  ///< 0: no body
     double gap = 0;       ///< metres between the boxes
   };
   NearestBody findNearestDynamicBody(const AvatarSnapshot& avatar) const;
