@@ -20,6 +20,12 @@ std::uint32_t littleEndian(const std::uint8_t* bytes) {
          static_cast<std::uint32_t>(bytes[2]) << 16 | static_cast<std::uint32_t>(bytes[3]) << 24;
 }
 
+void appendLittleEndian(std::vector<std::uint8_t>& bytes, std::uint32_t value) {
+  for (int shift = 0; shift < 32; shift += 8) {
+    bytes.push_back(static_cast<std::uint8_t>(value >> shift & 0xFFu));
+  }
+}
+
 void appendVarint(std::vector<std::uint8_t>& bytes, std::uint64_t value) {
   for (; value >= 0x80; value >>= 7) bytes.push_back(static_cast<std::uint8_t>(value | 0x80));
   bytes.push_back(static_cast<std::uint8_t>(value));
@@ -38,12 +44,6 @@ std::string formatBytes(std::span<const std::uint8_t> bytes) {
 }
 
 }  // namespace
-
-void appendLittleEndian(std::vector<std::uint8_t>& bytes, std::uint32_t value) {
-  for (int shift = 0; shift < 32; shift += 8) {
-    bytes.push_back(static_cast<std::uint8_t>(value >> shift & 0xFFu));
-  }
-}
 
 int parseMajorVersion(std::string_view version) {
   int major = -1;

@@ -104,9 +104,6 @@ std::vector<std::uint8_t> encodeHead(const google::protobuf::MessageLite& header
 std::vector<std::uint8_t> encodeSplicedHead(std::uint32_t field, std::string_view first,
                                             std::size_t secondLength);
 
-/// Appends the four bytes of `value`.
-void appendLittleEndian(std::vector<std::uint8_t>& bytes, std::uint32_t value);
-
 /// Parses a message header; false if invalid. Unlike ParseFromArray() it does not write to stderr,
 /// which a hostile peer could flood.
 bool parseHeader(std::span<const std::uint8_t> header, google::protobuf::MessageLite& into);

@@ -98,8 +98,8 @@ void addMotion(CLI::App& verb, CommandArguments& into) {
   verb.add_option("--slope", into.slope, "Steepest slope that avatars stand on, in degrees (50)")
       ->check(CLI::Validator(validateSlope, "DEGREES"));
   verb.add_option("--speed-limit", into.speedLimit,
-                  "Highest speed of commands and falls, in m/s (1000); contact horizons need a low "
-                  "one")
+                  "Highest speed of commands and falls, in m/s (1000). Walks without a speed need "
+                  "1.4; for contact horizons give about 4")
       ->check(makeSettingValidator(&scene::WorldSettings::maxSpeed, "SPEED"));
   verb.add_option("--sliding", into.sliding,
                   "Reaction to obstacles: avatars slide along them, "

@@ -1,6 +1,7 @@
 #include "server/hosting/horizon_subscriptions.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "server/messages/world_messages.hpp"
 
@@ -10,15 +11,18 @@ namespace {
 using Horizon = scene::ContactHorizon;
 
 const std::string kField = "subscribe.contact_horizon";
+constexpr double kGapStep = 0.25;  // metres
 
 std::optional<v1::Error> validateAvatars(const scene::Snapshot& snapshot,
+                                         const v1::ContactHorizonRequest& present,
                                          const v1::ContactHorizonRequest& request) {
   std::set<scene::EntityId> given;
   for (int i = 0; i < request.avatars_size(); ++i) {
     const scene::EntityId id = request.avatars(i);
     const std::string field = kField + ".avatars[" + std::to_string(i) + "]";
-    if (std::ranges::find(snapshot.avatars, id, &scene::AvatarSnapshot::id) ==
-        snapshot.avatars.end())
+    const bool isPresent = std::ranges::find(snapshot.avatars, id, &scene::AvatarSnapshot::id) !=
+                           snapshot.avatars.end();
+    if (!isPresent && std::ranges::find(present.avatars(), id) == present.avatars().end())
       return makeError(v1::ERROR_UNKNOWN_ENTITY,
                        field + ": no avatar has the id " + std::to_string(id) +
                            "; give an id of a spawned avatar, or none for all avatars",
@@ -58,13 +62,14 @@ v1::ContactHorizon toProto(const Horizon& horizon, std::size_t approaches) {
   }
   for (const scene::EntityId entity : horizon.touching) message.add_touching(entity);
   message.set_unbounded(horizon.unbounded.entity);
-  message.set_unbounded_distance(horizon.unbounded.gap);
+  // Coarse, so that a body that moves far away does not change it in every tick.
+  message.set_unbounded_distance(std::floor(horizon.unbounded.gap / kGapStep) * kGapStep);
   return message;
 }
 
 }  // namespace
 
-std::optional<v1::Error> validateHorizons(const HostedWorld& hosted,
+std::optional<v1::Error> validateHorizons(const HostedWorld& hosted, const Client& client,
                                           const v1::Subscribe& subscription) {
   if (!subscription.has_contact_horizon()) return std::nullopt;
   const v1::ContactHorizonRequest& request = subscription.contact_horizon();
@@ -79,41 +84,54 @@ std::optional<v1::Error> validateHorizons(const HostedWorld& hosted,
     return makeError(v1::ERROR_BAD_MESSAGE,
                      kField + ".approaches: give 0 to " + std::to_string(Horizon::kMaxApproaches),
                      kField + ".approaches");
-  return validateAvatars(*hosted.world.snapshot(), request);
+  return validateAvatars(*hosted.world.snapshot(), client.subscription.contact_horizon(), request);
+}
+
+void changeHorizons(HostedWorld& hosted, Client& client, const v1::Subscribe& subscription) {
+  const v1::Subscribe& present = client.subscription;
+  if (present.has_contact_horizon() == subscription.has_contact_horizon() &&
+      present.contact_horizon().SerializeAsString() ==
+          subscription.contact_horizon().SerializeAsString())
+    return;
+  client.sentHorizons.clear();
+  hosted.horizonSelectionChanged = true;
 }
 
 void updateHorizons(HostedWorld& hosted) {
-  if (hosted.horizonSelectionChanged) {
-    hosted.horizonSelectionChanged = false;
-    if (!hasHorizonSubscriber(hosted))
-      hosted.horizons.reset();
-    else if (!hosted.horizons)
-      hosted.horizons =
-          std::make_unique<scene::ContactHorizons>(hosted.scene, hosted.world.settings());
-    if (hosted.horizons) hosted.horizons->select(collectSelection(hosted));
-  }
-  if (hosted.horizons) hosted.horizons->update(hosted.world.snapshot());
+  if (!hasHorizonSubscriber(hosted)) return;
+  if (!hosted.horizons)
+    hosted.horizons =
+        std::make_unique<scene::ContactHorizons>(hosted.scene, hosted.world.settings());
+  if (std::exchange(hosted.horizonSelectionChanged, false))
+    hosted.horizons->select(collectSelection(hosted));
+  hosted.horizons->update(hosted.world.snapshot());
 }
 
 void resetHorizons(HostedWorld& hosted) {
   if (hosted.horizons) hosted.horizons->reset();
-  for (auto& [id, client] : hosted.clients) client.needsAllHorizons = true;
+  for (auto& [id, client] : hosted.clients) client.sentHorizons.clear();
 }
 
 void addHorizons(Client& client, const scene::ContactHorizons& horizons, v1::TickEvents& events) {
   if (!client.subscription.has_contact_horizon()) return;
   const v1::ContactHorizonRequest& request = client.subscription.contact_horizon();
   const std::size_t approaches = std::max(1u, request.approaches());
+  std::erase_if(client.sentHorizons,
+                [&](const auto& sent) { return !horizons.horizons().contains(sent.first); });
   const auto add = [&](const Horizon& horizon) {
-    if (client.needsAllHorizons || horizon.changedTick == horizons.tick())
-      *events.add_horizons() = toProto(horizon, approaches);
+    const auto [sent, isNew] = client.sentHorizons.try_emplace(horizon.avatar);
+    if (!isNew && horizon.changedTick != horizons.tick()) return;
+    v1::ContactHorizon message = toProto(horizon, approaches);
+    std::string bytes = message.SerializeAsString();
+    if (bytes == sent->second) return;
+    sent->second = std::move(bytes);
+    *events.add_horizons() = std::move(message);
   };
   if (request.avatars().empty())
     for (const auto& [id, horizon] : horizons.horizons()) add(horizon);
   for (const scene::EntityId id : std::set(request.avatars().begin(), request.avatars().end()))
     if (const auto at = horizons.horizons().find(id); at != horizons.horizons().end())
       add(at->second);
-  client.needsAllHorizons = false;
 }
 
 }  // namespace enfilade::server

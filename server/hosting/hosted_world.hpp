@@ -67,11 +67,11 @@ struct Client {
   Role role = Role::observe;
   std::shared_ptr<OutgoingQueue> out;
   v1::Subscribe subscription;
-  std::uint64_t sequence = 0;       ///< of the last TickEvents
-  bool needsAllHorizons = false;    ///< unchanged contact horizons, too, after the next tick
-  double nextStateTime = 0;         ///< seconds of simulated time
-  std::uint64_t droppedStates = 0;  ///< since the last sent state
-  std::deque<QueuedRequest> queue;  ///< replies keep the order of requests
+  std::uint64_t sequence = 0;                           ///< of the last TickEvents
+  std::map<scene::EntityId, std::string> sentHorizons;  ///< serialized, by avatar
+  double nextStateTime = 0;                             ///< seconds of simulated time
+  std::uint64_t droppedStates = 0;                      ///< since the last sent state
+  std::deque<QueuedRequest> queue;                      ///< replies keep the order of requests
   std::optional<PendingStep> pendingStep;
   std::map<std::uint32_t, FrameSubscription> frameSubscriptions;
   std::optional<PendingReply> pendingReply;
@@ -131,7 +131,7 @@ struct HostedWorld {
   std::map<std::string, ClientId> owners;
   std::set<std::string> pendingRelease;  ///< names in `owners` that may become free
   std::map<std::pair<scene::EntityId, scene::EntityId>, v1::ContactEvent> activeContacts;
-  std::unique_ptr<scene::ContactHorizons> horizons;  ///< null without a subscriber
+  std::unique_ptr<scene::ContactHorizons> horizons;  ///< null before the first subscriber
   bool horizonSelectionChanged = false;              ///< a client subscribed or left
   TickStatistics statistics;
   bool idle = true;                  ///< of the last tick

@@ -210,9 +210,9 @@ std::string makeMetricsPage(std::span<const WorldMetrics> worlds) {
       [](const M& m) { return m.narrow_queries(); });
   add("rational_queries_total", "counter", "Pairs decided by exact arithmetic.",
       [](const M& m) { return m.rational_queries(); });
-  add("vertices_looked_at_total", "counter", "Vertices for the boxes of moving bodies.",
+  add("vertices_looked_at_total", "counter", "Vertices read for boxes of moving bodies and links.",
       [](const M& m) { return m.vertices_looked_at(); });
-  add("part_boxes_made_total", "counter", "Boxes of parts of bodies with several parts.",
+  add("part_boxes_made_total", "counter", "Part boxes computed, of bodies with several parts.",
       [](const M& m) { return m.part_boxes_made(); });
   add("frames_total", "counter", "Rendered frames.", [](const M& m) { return m.frames(); });
   add("dropped_total", "counter", "States and frames dropped for slow clients.",

@@ -153,6 +153,43 @@ TEST_F(ContactHorizons, StartOverAtARestart) {
   }
 }
 
+TEST_F(ContactHorizons, AListOutlivesItsAvatars) {
+  protocol::Client ann = client("ann");
+  EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
+  ann.step(2);
+  v1::Subscribe subscription = toHorizons({idOf(ann, "ann")});
+  ann.subscribe(subscription);
+  v1::ClientMessage restart;
+  restart.mutable_restart();
+  ann.request(restart);
+  ann.step(2);
+  ann.takeEvents();
+  subscription.set_notices(true);  // as a client does that keeps its horizons
+  EXPECT_NO_THROW(ann.subscribe(subscription));
+  EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
+  ann.step(40);
+  EXPECT_FALSE(horizonsOf(ann.takeEvents()).empty());
+}
+
+TEST_F(ContactHorizons, AreNotSentAgainBySubscribingToOtherEvents) {
+  protocol::Client ann = client("ann");
+  EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
+  ann.step(30);
+  v1::Subscribe subscription = toHorizons();
+  ann.subscribe(subscription);
+  std::string lastReport;
+  for (int i = 0; i < 60; ++i) {
+    subscription.set_notices(i % 2 == 0);
+    ann.subscribe(subscription);
+    ann.step(1);
+    for (const auto& [tick, reports] : horizonsOf(ann.takeEvents())) {
+      EXPECT_NE(reports[0].SerializeAsString(), lastReport) << "tick " << tick;
+      lastReport = reports[0].SerializeAsString();
+    }
+  }
+  EXPECT_FALSE(lastReport.empty());
+}
+
 TEST_F(ContactHorizons, InvalidRequestsAreRefusedByTheirField) {
   protocol::Client ann = client("ann");
   EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));

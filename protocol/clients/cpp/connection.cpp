@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <cmath>
 #include <memory>
+#include <system_error>
 
 namespace enfilade::protocol {
 namespace {

@@ -76,6 +76,7 @@ class Connection {
 /// Makes the first message of a connection.
 v1::ClientMessage makeHello(const std::string& clientName, const std::string& token);
 
+/// An error as the server would send it.
 v1::Error makeError(v1::ErrorCode code, const std::string& text, const std::string& field = {});
 
 /// Validates the reply to the hello: the server's Error, or ERROR_VERSION or ERROR_BAD_MESSAGE for

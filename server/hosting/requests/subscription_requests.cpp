@@ -10,11 +10,10 @@ void handleSubscribe(const RequestContext& context, const v1::Subscribe& subscri
     return replyError(context, v1::ERROR_BAD_MESSAGE,
                       "subscribe.state_rate: give 0 to 1000000 per second", "subscribe.state_rate");
   }
-  if (auto error = validateHorizons(context.hosted, subscription))
+  if (auto error = validateHorizons(context.hosted, context.client, subscription))
     return replyError(context, std::move(*error));
+  changeHorizons(context.hosted, context.client, subscription);
   context.client.subscription = subscription;
-  context.client.needsAllHorizons = true;
-  context.hosted.horizonSelectionChanged = true;
   context.client.nextStateTime = 0;
   v1::ServerMessage message;
   message.mutable_subscribe()->set_tick(lastTick(context.hosted));

@@ -41,8 +41,8 @@ def connect(address: str = "127.0.0.1:7878", *, name: str = "enfilade python", t
 
 
 def _some_avatars(ids: Iterable[int]) -> List[int]:
-    found = list(ids)
-    if not found:  # would mean all of them
+    found = list(ids) if isinstance(ids, Iterable) else []
+    if not found or not all(isinstance(one, int) for one in found):  # none would mean all of them
         raise ValueError("contact_horizon: give ids of avatars, or True for all of them")
     return found
 
@@ -270,6 +270,7 @@ class Client:
         """Moves to another tick of the recording, replay.first_tick to replay.last_tick, and
         abandons a branch. contacts() includes those that end (reason "seek") and begin by it."""
         reply, _ = self.request(seek=messages.Seek(tick=tick))
+        self._horizons.clear()
         return Step(reply.seek.tick, reply.seek.time, reply.seek.state_hash, False)
 
     def take_over(self, avatar: str = "") -> Optional[Avatar]:
@@ -404,8 +405,9 @@ class Client:
 
     def horizons(self, seconds: float = 0.0) -> Iterator[Horizon]:
         """Takes the contact horizons of avatars, in order: all of them after the first tick, then
-        those that changed. One holds until its time, whatever clients command, unless an entity
-        joins the world; a later one of the same avatar replaces it. Call
+        those that changed. One holds until its time for the entities of its tick, whatever
+        clients command, unless one of the two steps onto a dynamic body. A later one of the same
+        avatar replaces it; restart() and seek(), by any client, void all. Call
         subscribe(contact_horizon=True) first, on a server with a low --speed-limit."""
         return self._taken(self._horizons, seconds)
 
