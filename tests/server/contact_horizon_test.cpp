@@ -35,7 +35,8 @@ class ContactHorizons : public ServedRoom {
 
   /// The id of an avatar that is in the world.
   static std::uint32_t idOf(protocol::Client& client, const std::string& name) {
-    for (const v1::AvatarState& avatar : client.step(1, true).avatars())
+    const v1::StepReply reply = client.step(1, true);
+    for (const v1::AvatarState& avatar : reply.avatars())
       if (avatar.name() == name) return avatar.id();
     ADD_FAILURE() << name;
     return 0;
@@ -71,6 +72,7 @@ TEST_F(ContactHorizons, AreReportedInTheTicksInWhichTheyChange) {
   }
   EXPECT_GT(all[0].approaches(0).not_before(), now + 0.02);
   EXPECT_LT(horizons.size(), 60u) << "not in every tick";
+  bob.metrics();
   EXPECT_TRUE(horizonsOf(bob.takeEvents()).empty()) << "bob did not subscribe";
 }
 
@@ -117,13 +119,16 @@ TEST_F(ContactHorizons, OneClientGetsItsAvatarAndAnotherAll) {
   bob.subscribe(toHorizons({bobId}));
   ann.step(3);
   EXPECT_EQ(horizonsOf(ann.takeEvents()).begin()->second.size(), 2u);
+  bob.metrics();
   const auto mine = horizonsOf(bob.takeEvents());
+  ASSERT_FALSE(mine.empty());
   ASSERT_EQ(mine.begin()->second.size(), 1u);
   EXPECT_EQ(mine.begin()->second[0].avatar(), bobId);
   EXPECT_EQ(mine.begin()->second[0].approaches_size(), 1) << "the default";
   ann.subscribe({});
   ann.step(60);
   EXPECT_TRUE(horizonsOf(ann.takeEvents()).empty());
+  bob.metrics();
   for (const auto& [tick, horizons] : horizonsOf(bob.takeEvents()))
     for (const v1::ContactHorizon& one : horizons) EXPECT_EQ(one.avatar(), bobId);
 }
