@@ -175,9 +175,11 @@ Aabb climbSides(const Hull& hull, const SupportTable& table, const Mat3& rotatio
   return extents;
 }
 
+// Inlined: a call costs a tenth of a box of 8 vertices.
+
 /// Rows 0 and 1 of the rotation side by side, row 2 alone. The same sums as in project(), in the
 /// same order.
-Aabb scanVertices(const Hull& hull, const Mat3& rotation) {
+[[gnu::always_inline]] inline Aabb scanVertices(const Hull& hull, const Mat3& rotation) {
   const Double2 column0 = {rotation(0, 0), rotation(1, 0)},
                 column1 = {rotation(0, 1), rotation(1, 1)},
                 column2 = {rotation(0, 2), rotation(1, 2)};
@@ -196,7 +198,8 @@ Aabb scanVertices(const Hull& hull, const Mat3& rotation) {
 }
 
 /// `extents` at `translation`, inflated by the bound of its rounding error and by `clearance`.
-Aabb placeExtents(const Aabb& extents, const Vec3& translation, double radius, double clearance) {
+[[gnu::always_inline]] inline Aabb placeExtents(const Aabb& extents, const Vec3& translation,
+                                                double radius, double clearance) {
   const double size = 2 * radius + translation.cwiseAbs().maxCoeff() + clearance;
   const double margin = kRotationError * radius + kSumError * size + kUnderflow + clearance;
   return inflated({extents.min + translation, extents.max + translation}, margin);

@@ -42,8 +42,8 @@ struct ExtremalVertices {
 
 // The boxes below contain the exact box of all vertices at rotation * v + translation, inflated by
 // `clearance` (metres, >= 0, finite), of this matrix and of the unit quaternion that it was
-// computed from. `rotation`: from a quaternion with |q| = 1 up to 16 units of rounding; all values
-// finite.
+// computed from. `rotation`: from a quaternion with |q|^2 = 1 up to 16 units of rounding; all
+// values finite.
 
 /// Box by the method of `table`, which is that of `hull`. Adds the vertices that it looks at to
 /// `looked`.

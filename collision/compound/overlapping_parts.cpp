@@ -19,8 +19,8 @@
 // of b in descending order of size, A first among equals (a merge of two sorted lists). The last
 // one is the smaller of the two parents, B's among equals.
 //
-// Rounding. Twice the pad of compound_view.cpp inflates each branch, so that it contains the boxes of its
-// parts, and is deducted from each gap. `clock` and its users round towards an earlier test.
+// Rounding. Twice the pad of compound_view.cpp inflates each branch, so that it contains the boxes
+// of its parts, and is deducted from each gap. `clock` and its users round towards an earlier test.
 #include "collision/compound/overlapping_parts.hpp"
 
 #include <algorithm>

@@ -51,8 +51,8 @@ struct MovingShape {
 };
 
 /// Moves A against the stationary B; contract as for translations, up to the rounding of a rotated
-/// pose. The cast also stops where no step makes progress: then isWithin(separationAtStop,
-/// offset.rest) is false.
+/// pose. If they overlap, no motion is allowed. The cast also stops where no step makes progress:
+/// then isWithin(separationAtStop, offset.rest) is false.
 ShapeCastResult castShape(const MovingShape& a, const PlacedConvex& b, const ContactOffset& offset,
                           FeatureCache& cache);
 

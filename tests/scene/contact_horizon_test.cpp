@@ -256,7 +256,7 @@ TEST(ContactHorizon, WithoutEnoughWorkItIsEarlierAndNeverWrong) {
   }
   EXPECT_GT(checker.all().statistics().postponed, 100u);
   EXPECT_GT(checker.claims, 1'000);
-  EXPECT_GT(checker.contacts, 5);
+  EXPECT_GE(checker.contacts, 5);
 }
 
 /// Without steps and jumps an avatar's bound is twice the speed limit.

@@ -77,7 +77,7 @@ TEST(TimeToContact, AnAvatarOnACrateMovesWithTheLift) {
     const TimeToContact now = apartAt(t.world, index, ann, ceiling, assume);
     EXPECT_LE(now.separatedUntil, gap / lift.speed + 0.01);  // the lift keeps its speed
     EXPECT_GT(now.separatedUntil,
-              assume == MotionAssumption::presentMotion ? 0.4 * gap / lift.speed : 0);
+              assume == MotionAssumption::presentMotion ? 0.39 * gap / lift.speed : 0);
   }
 }
 

@@ -71,8 +71,16 @@ TEST_F(ContactHorizons, AreReportedInTheTicksInWhichTheyChange) {
     last = approach.not_before();
   }
   EXPECT_GT(all[0].approaches(0).not_before(), now + 0.02);
-  EXPECT_LT(horizons.size(), 60u) << "not in every tick";
-  bob.metrics();
+  EXPECT_LT(horizons.size(), 60u) << "not in every tick, although the crate falls";
+  std::map<std::uint32_t, std::string> lastReport;  // by avatar
+  for (const auto& [reportTick, reports] : horizons) {
+    for (const v1::ContactHorizon& report : reports) {
+      const std::string text = report.SerializeAsString();
+      EXPECT_NE(lastReport[report.avatar()], text) << "unchanged in tick " << reportTick;
+      lastReport[report.avatar()] = text;
+    }
+  }
+  bob.metrics();  // what was sent before its reply has arrived then
   EXPECT_TRUE(horizonsOf(bob.takeEvents()).empty()) << "bob did not subscribe";
 }
 
@@ -106,7 +114,6 @@ TEST_F(ContactHorizons, NoContactBeginsBeforeThem) {
   }
   EXPECT_EQ(begun, 1) << "the door";
   EXPECT_GT(reported, 20);
-  EXPECT_LT(reported, 150);
 }
 
 TEST_F(ContactHorizons, OneClientGetsItsAvatarAndAnotherAll) {
@@ -119,7 +126,7 @@ TEST_F(ContactHorizons, OneClientGetsItsAvatarAndAnotherAll) {
   bob.subscribe(toHorizons({bobId}));
   ann.step(3);
   EXPECT_EQ(horizonsOf(ann.takeEvents()).begin()->second.size(), 2u);
-  bob.metrics();
+  bob.metrics();  // what was sent before its reply has arrived then
   const auto mine = horizonsOf(bob.takeEvents());
   ASSERT_FALSE(mine.empty());
   ASSERT_EQ(mine.begin()->second.size(), 1u);

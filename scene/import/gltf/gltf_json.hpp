@@ -19,7 +19,8 @@ inline constexpr std::size_t kNoIndex = ~std::size_t{0};  ///< in place of a mem
 /// The JSON text of a glTF or GLB file; empty if it cannot be read.
 std::string readGltfJson(const std::filesystem::path& file, ModelFormat format);
 
-/// Returns the member of an object; null if there is none, or if `json` is null or no object.
+/// Returns the member of an object; null if the member is missing, or if `json` is null or no
+/// object.
 const nlohmann::json* findMember(const nlohmann::json* json, const char* key);
 /// Returns a member that is a number of an entry; nullopt for anything else.
 std::optional<std::size_t> readIndexMember(const nlohmann::json* json, const char* key);

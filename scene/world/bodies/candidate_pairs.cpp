@@ -64,20 +64,20 @@ SweptBounds computeSweptBounds(WorldData& world, ThreadPool* threadPool) {
   bounds.spheres.resize(dynamicBodies.bodyIndices.size());
   bounds.margins.resize(dynamicBodies.bodyIndices.size());
   bounds.boxes.resize(bounds.firstBox.back());
-  parallelForOrSerial(
-      threadPool, dynamicBodies.bodyIndices.size(), kBodiesPerTask,
-      [&](std::size_t from, std::size_t to) {
-        for (std::size_t i = from; i < to; ++i) {
-          Body& body = world.bodies[dynamicBodies.bodyIndices[i]];
-          bounds.spheres[i] = computeMotionSphere(dynamicBodies.physicsWorld.bodies[i]);
-          bounds.margins[i] = computeBoundsMargin(world, body);
-          if (world.broadPhase.overlapsOf(body.proxy).empty()) continue;
-          makePartBoxes(body);
-          for (std::uint32_t part = 0; part < getPartCount(body); ++part)
-            bounds.boxes[bounds.firstBox[i] + part] =
-                inflated(body.boxes.parts[part], bounds.margins[i]);
-        }
-      });
+  parallelForOrSerial(threadPool, dynamicBodies.bodyIndices.size(), kBodiesPerTask,
+                      [&](std::size_t from, std::size_t to) {
+                        for (std::size_t i = from; i < to; ++i) {
+                          Body& body = world.bodies[dynamicBodies.bodyIndices[i]];
+                          bounds.spheres[i] =
+                              computeMotionSphere(dynamicBodies.physicsWorld.bodies[i]);
+                          bounds.margins[i] = computeBoundsMargin(world, body);
+                          if (world.broadPhase.overlapsOf(body.proxy).empty()) continue;
+                          makePartBoxes(body);
+                          for (std::uint32_t part = 0; part < getPartCount(body); ++part)
+                            bounds.boxes[bounds.firstBox[i] + part] =
+                                inflated(body.boxes.parts[part], bounds.margins[i]);
+                        }
+                      });
   return bounds;
 }
 
@@ -110,7 +110,10 @@ struct DynamicPairCollector {
       return;
     const std::span<const Aabb> parts = bounds.findPartBoxes(physicsBody),
                                 others = bounds.findPartBoxes(other);
-    if (parts.size() * others.size() > kMaxPairsWithoutFront) return addByFront(otherBody);
+    // The box of a body with one part may be a cube, which its tree does not contain.
+    const bool areCompounds = parts.size() > 1 && others.size() > 1;
+    if (areCompounds && parts.size() * others.size() > kMaxPairsWithoutFront)
+      return addByFront(otherBody);
     for (std::uint32_t part = 0; part < parts.size(); ++part)
       for (std::uint32_t otherPart = 0; otherPart < others.size(); ++otherPart)
         if (overlaps(parts[part], others[otherPart]))
@@ -135,7 +138,7 @@ struct DynamicPairCollector {
 
   collision::CompoundView makeView(std::uint32_t index) const {
     const Body& body = world.bodies[index];
-    return makeCompoundView(*body.shape, {body.orientation, body.position});
+    return {&body.shape->tree, body.rotation, body.position, {}};  // the parts are not asked for
   }
 };
 
@@ -208,7 +211,8 @@ struct PairCollector {
     for (const std::uint32_t part : found) addPartPairs(physicsBody, parts.box(part), other, part);
   }
   void addKinematic(std::uint32_t physicsBody, std::uint32_t index) {
-    const Body& body = world.bodies[index];
+    Body& body = world.bodies[index];
+    makePartBoxes(body);
     const std::uint32_t other = ensureSceneBody(world, index);
     for (std::uint32_t part = 0; part < getPartCount(body); ++part)
       addPartPairs(physicsBody, computePartBounds(world, body, part), other, part);

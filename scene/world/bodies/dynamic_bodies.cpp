@@ -232,8 +232,10 @@ void stepDynamicBodies(WorldData& world, TickReport& report, QueryCount& count) 
                       [&](std::size_t from, std::size_t to) {
                         for (std::size_t k = from; k < to; ++k) {
                           const std::uint32_t i = dynamicBodies.activeBodies[k];
-                          if (!world.bodies[i].outOfWorld)
-                            readBackPose(world.bodies[i], findPhysicsBody(dynamicBodies, i));
+                          Body& body = world.bodies[i];
+                          if (body.outOfWorld) continue;
+                          readBackPose(body, findPhysicsBody(dynamicBodies, i));
+                          if (!world.broadPhase.overlapsOf(body.proxy).empty()) makePartBoxes(body);
                         }
                       });
   for (const std::uint32_t i : dynamicBodies.activeBodies) {

@@ -208,6 +208,7 @@ double moveUntilBlocked(WorldData& world, Body& body, const JointPose& to, Passe
   FirstHit hit;
   for (int i = 0; i < kMaxPushes; ++i) {
     hit = {};
+    if (!passengers.nearbyAvatars.empty()) makePartBoxes(body);
     const collision::ScrewMotion motion = makeScrewMotion(body, to);
     const double maxDisplacement = computeDisplacementBound(*body.shape, body.drive.pose, to);
     updateCarriedLifts(world, body, to, passengers.bodies);

@@ -187,6 +187,7 @@ void collectObstacles(WorldData& world, Avatar& avatar) {
       collectStaticObstacles(*world.scene, world.scene->solidObjects()[overlap.id],
                              avatar.cachedBounds, avatar.obstacles);
     } else if (const std::uint32_t body = world.findBodyByProxy(overlap.id); body != kNoBody) {
+      makePartBoxes(world.bodies[body]);
       appendBodyParts(world, body, avatar.obstacles);
       avatar.hasBodyObstacles = true;
     } else {

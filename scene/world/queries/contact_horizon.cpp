@@ -282,8 +282,12 @@ void ContactHorizons::renewProof(const Entry& due) {
 }
 
 void ContactHorizons::examine(const Entry& due, double boxTime, double speed) {
-  // The old proof stays: it claims less.
-  if (!spendWork(kPairWork)) return setTime(due.pair, due.time);
+  // Without work left, the old proof stays: it claims less. So does a contact.
+  const bool isTouching = touching_.contains(due.pair);
+  if (!spendWork(kPairWork)) {
+    if (!isTouching) setTime(due.pair, due.time);
+    return;
+  }
   const std::size_t granted = std::min(workLeft_, kMaxWorkPerPair);
   std::size_t work = granted;
   const auto found =
@@ -293,7 +297,7 @@ void ContactHorizons::examine(const Entry& due, double boxTime, double speed) {
     return storeExamination(due.pair, proximity->separation, speed);
   const bool tooComplex = granted == kMaxWorkPerPair;
   if (!tooComplex) ++statistics_.postponed;
-  setTime(due.pair, tooComplex ? now() + boxTime : due.time);
+  if (!isTouching) setTime(due.pair, tooComplex ? now() + boxTime : due.time);
 }
 
 void ContactHorizons::storeExamination(const BodyPair& pair,

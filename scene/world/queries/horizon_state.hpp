@@ -59,7 +59,7 @@ class HorizonState {
   double computeTime(EntityId a, EntityId b, double gap, double speed) const;
 
   struct NearestBody {
-    EntityId entity = 0;  ///< 0: there is none
+    EntityId entity = 0;  ///< 0: no body
     /// Metres between the boxes, rounded down by up to an eighth. It thus changes seldom, and holds
     /// in every tick.
     double gap = 0;

@@ -9,9 +9,10 @@
 
 namespace enfilade::scene {
 
-/// Maximum displacement of a pushed avatar per displacement of the body. A push is horizontal
-/// although the normal is not: at most 1 / 0.714^2 (bodies/kinematic_motion.cpp).
-inline constexpr double kMaxPushFactor = 2;
+/// Maximum displacement of an avatar per displacement of a body: pushed by at most 1 / 0.714 of it,
+/// since a push is horizontal although the normal is not (bodies/kinematic_motion.cpp), and carried
+/// by it.
+inline constexpr double kMaxPushFactor = 2.5;
 
 /// Maximum speed at which the joints move any point of the avatar's chain, m/s.
 double sumJointSpeeds(const AvatarSnapshot& avatar, const WorldSettings& settings);

@@ -62,7 +62,7 @@ bool isTouched(const SceneAt& sceneAt, const AvatarSnapshot& avatar, const BodyS
 }
 
 /// True if the avatar stands on a dynamic body: a distant body may carry both.
-bool standsOnRigidBody(const SceneAt& sceneAt, const AvatarSnapshot& avatar) {
+bool standsOnDynamicBody(const SceneAt& sceneAt, const AvatarSnapshot& avatar) {
   const BodySnapshot* ground = findBodySnapshot(sceneAt, avatar.groundEntity);
   return ground && isDynamic(makeBodyInfo(sceneAt, *ground).spec.kind);
 }
@@ -74,13 +74,13 @@ void addCarrierMotion(const SceneAt& sceneAt, const AvatarSnapshot& avatar,
   const double within = 4 * settings.contactOffset;
   const Aabb box =
       collision::inflated(placeBox(avatar.shape->box, avatar.footPosition), 2 * within);
-  const bool onFree = standsOnRigidBody(sceneAt, avatar);
+  const bool onDynamicBody = standsOnDynamicBody(sceneAt, avatar);
   for (const BodySnapshot& snapshot : *sceneAt.snapshot.bodies) {
     const BodyInfo body = makeBodyInfo(sceneAt, snapshot);
     if (!isKinematic(body.spec.kind) || !snapshot.moving) continue;
     const bool touched = overlaps(computeBodyAabb(sceneAt, snapshot), box) &&
                          isTouched(sceneAt, avatar, snapshot, within);
-    if (!touched && !onFree) continue;
+    if (!touched && !onDynamicBody) continue;
     if (avatar.groundEntity == snapshot.id && snapshot.angularVelocity.isZero(0)) {
       motion.bounds.velocity += snapshot.velocity;
       motion.isotropicSpeed += kMaxPushFactor * snapshot.velocityDeviation;
@@ -145,13 +145,13 @@ Motion boundAvatarMotion(const SceneAt& sceneAt, const AvatarSnapshot& avatar,
   const double ownSpeed = computeAvatarSpeedLimit(avatar, settings);
   motion.isotropicSpeed = ownSpeed;
   const Aabb box = placeBox(avatar.shape->box, avatar.footPosition);
-  const bool onFree = standsOnRigidBody(sceneAt, avatar);
+  const bool onDynamicBody = standsOnDynamicBody(sceneAt, avatar);
   for (const BodySnapshot& snapshot : *sceneAt.snapshot.bodies) {
     const BodyInfo body = makeBodyInfo(sceneAt, snapshot);
     if (!isKinematic(body.spec.kind)) continue;
     const double maxSpeed = computeBodySpeedLimit(body, settings);
     const double maxApproach = distance * (1 + maxSpeed / ownSpeed) + motion.immediateGrowth;
-    if (onFree || computeGap(box, computeBodyAabb(sceneAt, snapshot)) <= maxApproach)
+    if (onDynamicBody || computeGap(box, computeBodyAabb(sceneAt, snapshot)) <= maxApproach)
       motion.isotropicSpeed += kMaxPushFactor * maxSpeed;
   }
   return motion;
