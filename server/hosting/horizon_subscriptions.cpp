@@ -1,7 +1,6 @@
 #include "server/hosting/horizon_subscriptions.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "server/messages/world_messages.hpp"
 
@@ -11,7 +10,6 @@ namespace {
 using Horizon = scene::ContactHorizon;
 
 const std::string kField = "subscribe.contact_horizon";
-constexpr double kGapStep = 0.25;  // metres
 
 std::optional<v1::Error> validateAvatars(const scene::Snapshot& snapshot,
                                          const v1::ContactHorizonRequest& present,
@@ -62,8 +60,7 @@ v1::ContactHorizon toProto(const Horizon& horizon, std::size_t approaches) {
   }
   for (const scene::EntityId entity : horizon.touching) message.add_touching(entity);
   message.set_unbounded(horizon.unbounded.entity);
-  // Coarse, so that a body that moves far away does not change it in every tick.
-  message.set_unbounded_distance(std::floor(horizon.unbounded.gap / kGapStep) * kGapStep);
+  message.set_unbounded_distance(horizon.unbounded.gap);
   return message;
 }
 

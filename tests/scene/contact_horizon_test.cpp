@@ -407,7 +407,7 @@ TEST(ContactHorizon, NamesTheNearestDynamicBodyAndProvesNothingOfIt) {
   ASSERT_EQ(horizons.horizons().size(), 1u);
   const ContactHorizon& horizon = horizons.horizons().begin()->second;
   EXPECT_EQ(horizon.unbounded.entity, 2u);
-  EXPECT_NEAR(horizon.unbounded.gap, 1.7, 0.02);
+  EXPECT_GE(horizon.unbounded.gap, 1.7 * 7 / 8 - 0.02);
   EXPECT_LE(horizon.unbounded.gap, 1.7 + 1e-6);
   for (const auto& approach : horizon.approaches) EXPECT_EQ(approach.entity, 0u);
 }

@@ -1,6 +1,7 @@
 #include "scene/world/queries/horizon_state.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "collision/assert.hpp"
@@ -25,6 +26,14 @@ bool hasMoved(const AvatarSnapshot& before, const AvatarSnapshot& now) {
 bool hasMoved(const BodySnapshot& before, const BodySnapshot& now) {
   return before.pose.translation != now.pose.translation ||
          before.pose.rotation.coeffs() != now.pose.rotation.coeffs();
+}
+
+/// Rounds down to a multiple of a sixteenth of the next power of two; to 0 below a millimetre.
+double roundDown(double distance) {
+  if (!(distance >= 1e-3)) return 0;
+  int exponent = 0;
+  const double fraction = std::frexp(distance, &exponent);  // 0.5 to 1
+  return std::ldexp(std::floor(16 * fraction) / 16, exponent);
 }
 
 /// Rounding of boxes with these coordinates, metres; as in proximity_query.cpp.
@@ -205,7 +214,8 @@ HorizonState::NearestBody HorizonState::findNearestDynamicBody(const AvatarSnaps
     const double gap = computeGap(own, bodies_[body.index].box);
     if (gap < nearest.gap) nearest = {body.id, gap};
   }
-  return nearest.entity ? nearest : NearestBody{};
+  if (nearest.entity == 0) return {};
+  return {nearest.entity, roundDown(nearest.gap - computeBoxRounding(own))};
 }
 
 }  // namespace enfilade::scene

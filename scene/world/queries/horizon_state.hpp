@@ -60,7 +60,9 @@ class HorizonState {
 
   struct NearestBody {
     EntityId entity = 0;  ///< 0: no body
-    double gap = 0;       ///< metres between the boxes
+    /// Metres between the boxes, rounded down by up to an eighth. It thus changes seldom, and holds
+    /// in every tick.
+    double gap = 0;
   };
   NearestBody findNearestDynamicBody(const AvatarSnapshot& avatar) const;
 
