@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <memory>
 #include <system_error>
@@ -209,7 +210,7 @@ bool Connection::waitFor(short events, std::chrono::steady_clock::time_point dea
     const int ready =
         ::poll(&descriptor, 1, static_cast<int>(std::min<long long>(left, kMaxPollMilliseconds)));
     if (ready > 0) return true;
-    if (ready == 0 && Clock::now() >= deadline) return false;
+    if (ready == 0 && std::chrono::steady_clock::now() >= deadline) return false;
     if (ready < 0 && errno != EINTR) {
       disconnect(peer_ + ": cannot wait for the socket: " + getErrorText(errno));
     }
