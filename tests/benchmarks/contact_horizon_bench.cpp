@@ -6,8 +6,6 @@
 //
 // OBJECTS 0 is the bundled building; otherwise a district of so many. Avatars walk at 1.4 m/s and
 // change direction every two seconds; the speed limit is 4 m/s.
-#include <time.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -17,49 +15,16 @@
 #include "scene/world/queries/contact_horizon.hpp"
 #include "scene/world/queries/proximity_query.hpp"
 #include "scene/world/world.hpp"
+#include "tests/benchmarks/walkers.hpp"
 
 namespace {
 
 using namespace enfilade;
+using namespace enfilade::benchmarks;
 using scene::ContactHorizons;
 using scene::Vec3;
 
 constexpr int kTicksOfAllPairs = 3;  // they take seconds
-
-double uniform(std::mt19937_64& random, double low, double high) {
-  return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
-}
-
-Vec3 somewhere(std::mt19937_64& random, const scene::Aabb& b) {
-  const double x = uniform(random, b.min.x(), b.max.x());
-  const double y = uniform(random, b.min.y(), b.min.y() + 0.7 * b.size().y());
-  const double z = uniform(random, b.min.z(), b.max.z());
-  return {x, y, z};
-}
-
-void spawnAvatars(scene::World& world, std::size_t count, std::mt19937_64& random) {
-  for (std::size_t tries = 0; tries < 200 * count; ++tries) {
-    if (world.snapshot()->avatars.size() >= count) return;
-    const std::string name = "walker" + std::to_string(world.snapshot()->tick);
-    submitAvatarCommand(world, {name, scene::Spawn{somewhere(random, world.scene().bounds())}, 0});
-    tickWorld(world);
-  }
-}
-
-void turnAll(scene::World& world, std::mt19937_64& random) {
-  for (const scene::AvatarSnapshot& avatar : world.snapshot()->avatars) {
-    Vec3 way = somewhere(random, world.scene().bounds()) - avatar.footPosition;
-    way.y() = 0;
-    submitAvatarCommand(world, {avatar.name, scene::Drive{1.4 * way.normalized()}, 0});
-  }
-}
-
-/// CPU time of this thread, seconds; other load does not count.
-double processorTime() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 /// A method, and its time in each tick.
 struct Method {
@@ -139,7 +104,7 @@ void bench(std::size_t avatars, int ticks, std::size_t objects) {
   double ahead = 0;
   std::size_t horizonCount = 0;
   for (int i = 0; i < ticks; ++i) {
-    if (i % 120 == 0) turnAll(world, random);
+    if (i % 120 == 0) turnAll(world, 1.4, random);
     tickWorld(world);
     for (Method& method : methods) method.update(world);
     if (i < kTicksOfAllPairs) allPairs.push_back(examineAllPairs(world, index, pairCount));

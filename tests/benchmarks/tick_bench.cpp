@@ -9,7 +9,6 @@
 // building. Contacts are computed each tick. The maximum penetration is printed with the times, so
 // that no speed is bought with an error.
 #include <sys/resource.h>
-#include <time.h>
 
 #include <algorithm>
 #include <chrono>
@@ -23,43 +22,16 @@
 #include "scene/import/cache/model_cache.hpp"
 #include "scene/import/import_worker.hpp"
 #include "scene/world/world.hpp"
+#include "tests/benchmarks/walkers.hpp"
 #include "tests/scene/thin_geometry.hpp"
 #include "tests/support/shared_folder.hpp"
 
 namespace {
 
 using namespace enfilade;
+using namespace enfilade::benchmarks;
 using scene::Notice;
 using scene::Vec3;
-
-double uniform(std::mt19937_64& random, double low, double high) {
-  return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
-}
-
-Vec3 somewhere(std::mt19937_64& random, const scene::Aabb& b) {
-  const double x = uniform(random, b.min.x(), b.max.x());
-  const double y = uniform(random, b.min.y(), b.min.y() + 0.7 * b.size().y());
-  const double z = uniform(random, b.min.z(), b.max.z());
-  return {x, y, z};
-}
-
-/// Spawns up to `count` avatars; some walk off a building that has no ground around it.
-void spawnAvatars(scene::World& world, int count, std::mt19937_64& random) {
-  for (int tries = 0; tries < 200 * count; ++tries) {
-    if (static_cast<int>(world.snapshot()->avatars.size()) >= count) return;
-    const std::string name = "walker" + std::to_string(world.snapshot()->tick);
-    submitAvatarCommand(world, {name, scene::Spawn{somewhere(random, world.scene().bounds())}, 0});
-    tickWorld(world);
-  }
-}
-
-void turnAll(scene::World& world, std::mt19937_64& random) {
-  for (const scene::AvatarSnapshot& avatar : world.snapshot()->avatars) {
-    Vec3 way = somewhere(random, world.scene().bounds()) - avatar.footPosition;
-    way.y() = 0;
-    submitAvatarCommand(world, {avatar.name, scene::Drive{1.5 * way.normalized()}, 0});
-  }
-}
 
 double quantile(std::vector<double> values, double q) {
   std::sort(values.begin(), values.end());
@@ -69,13 +41,6 @@ double quantile(std::vector<double> values, double q) {
 void row(const char* name, const std::vector<double>& seconds) {
   std::printf("| %-8s | %9.1f | %9.1f | %9.1f |\n", name, 1e6 * quantile(seconds, 0.5),
               1e6 * quantile(seconds, 0.99), 1e6 * quantile(seconds, 1));
-}
-
-/// CPU time of this thread, seconds; other load does not count.
-double processorTime() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 double peakMegabytes() {
@@ -184,11 +149,11 @@ void bench(const std::filesystem::path& file, int avatars, int ticks) {
   const auto still = load(file);
   scene::World world(still);
   std::mt19937_64 random(1);
-  spawnAvatars(world, avatars, random);
+  spawnAvatars(world, static_cast<std::size_t>(avatars), random);
   measure(file.string(), world, ticks, [&](int i) {
     if (i % 120 != 0) return;
-    spawnAvatars(world, avatars, random);
-    turnAll(world, random);
+    spawnAvatars(world, static_cast<std::size_t>(avatars), random);
+    turnAll(world, 1.5, random);
   });
 }
 

@@ -61,6 +61,10 @@ std::shared_ptr<const std::vector<BodySnapshot>> makeBodySnapshots(const WorldDa
   return snapshots;
 }
 
+void updatePartBoxes(const WorldData& world, Body& body) {
+  if (!world.broadPhase.overlapsOf(body.proxy).empty()) makePartBoxes(body);
+}
+
 bool isBodyBusy(const Body& body) {
   const KinematicDrive& drive = body.drive;
   // A body that a looping path shakes never rests, and the path itself neither.

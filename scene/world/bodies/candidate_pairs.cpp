@@ -4,6 +4,7 @@
 #include <span>
 #include <utility>
 
+#include "scene/world/bodies/body_state.hpp"
 #include "scene/world/bodies/physics_bodies.hpp"
 
 namespace enfilade::scene {
@@ -71,8 +72,8 @@ SweptBounds computeSweptBounds(WorldData& world, ThreadPool* threadPool) {
                           bounds.spheres[i] =
                               computeMotionSphere(dynamicBodies.physicsWorld.bodies[i]);
                           bounds.margins[i] = computeBoundsMargin(world, body);
-                          if (world.broadPhase.overlapsOf(body.proxy).empty()) continue;
-                          makePartBoxes(body);
+                          updatePartBoxes(world, body);
+                          if (!body.boxes.hasParts) continue;
                           for (std::uint32_t part = 0; part < getPartCount(body); ++part)
                             bounds.boxes[bounds.firstBox[i] + part] =
                                 inflated(body.boxes.parts[part], bounds.margins[i]);

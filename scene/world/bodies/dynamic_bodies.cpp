@@ -9,6 +9,7 @@
 
 #include <algorithm>
 
+#include "scene/world/bodies/body_state.hpp"
 #include "scene/world/bodies/candidate_pairs.hpp"
 #include "scene/world/bodies/physics_bodies.hpp"
 #include "scene/world/contacts/contacts.hpp"
@@ -235,7 +236,7 @@ void stepDynamicBodies(WorldData& world, TickReport& report, QueryCount& count) 
                           Body& body = world.bodies[i];
                           if (body.outOfWorld) continue;
                           readBackPose(body, findPhysicsBody(dynamicBodies, i));
-                          if (!world.broadPhase.overlapsOf(body.proxy).empty()) makePartBoxes(body);
+                          updatePartBoxes(world, body);
                         }
                       });
   for (const std::uint32_t i : dynamicBodies.activeBodies) {

@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scene/world/bodies/body_state.hpp"
 #include "scene/world/bodies/passengers.hpp"
 #include "scene/world/contacts/contacts.hpp"
 #include "scene/world/contacts/obstacles.hpp"
@@ -283,11 +284,6 @@ void updateJointPosition(Body& body, double fraction, double tick) {
   else
     drive.jointPosition += fraction * (jointPosition - drive.jointPosition);
   drive.moving = isLoopingPath(*body.spec) || drive.jointPosition != drive.target;
-}
-
-/// The parts get boxes only while the body overlaps something.
-void updatePartBoxes(const WorldData& world, Body& body) {
-  if (!world.broadPhase.overlapsOf(body.proxy).empty()) makePartBoxes(body);
 }
 
 void moveKinematicBody(WorldData& world, Body& body, const SupportGraph& supportGraph,

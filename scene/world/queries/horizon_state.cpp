@@ -96,8 +96,7 @@ void HorizonState::updateAvatars(const Snapshot& next, bool consecutive) {
     const auto [known, isNew] = avatarMotion_.try_emplace(avatar.id, next.tick);
     const AvatarSnapshot* last = isNew ? nullptr : findAvatarSnapshot(before, avatar.id);
     if (last && hasMoved(*last, avatar)) known->second = next.tick;
-    if (!last ||
-        (standsOnDynamicBody(avatar, next) && !standsOnDynamicBody(*last, before.snapshot)))
+    if (!last || (standsOnDynamicBody(now, avatar) && !standsOnDynamicBody(before, *last)))
       unbounded_.push_back(avatar.id);
   }
 }
@@ -120,17 +119,11 @@ Aabb HorizonState::boxOf(EntityId entity) const {
   return scene_->staticBoxes()[static_cast<std::size_t>(at - objects.begin())];
 }
 
-bool HorizonState::standsOnDynamicBody(const AvatarSnapshot& avatar,
-                                       const Snapshot& snapshot) const {
-  const BodySnapshot* ground = findBodySnapshot({index_, snapshot}, avatar.groundEntity);
-  return ground && isDynamic(specOf(*scene_, *ground).kind);
-}
-
 double HorizonState::avatarSpeed(const AvatarSnapshot& avatar, double seconds) const {
   const auto [known, isNew] = speeds_.try_emplace({avatar.id, seconds}, 0);
   if (!isNew) return known->second;
   return known->second = computeAvatarSpeedWithin(
-             avatar, pushers_, standsOnDynamicBody(avatar, *snapshot_), settings_, seconds);
+             avatar, pushers_, standsOnDynamicBody(sceneAt(), avatar), settings_, seconds);
 }
 
 double HorizonState::speedWithin(EntityId entity, double seconds) const {

@@ -78,7 +78,6 @@ class HorizonState {
   void updateAvatars(const Snapshot& next, bool consecutive);
   double boxTime(const Aabb& own, const Aabb& other, double growth, double speed) const;
   double computeTime(double gap, double growth, double speed) const;
-  bool standsOnDynamicBody(const AvatarSnapshot& avatar, const Snapshot& snapshot) const;
   double avatarSpeed(const AvatarSnapshot& avatar, double seconds) const;
   void findStaticNeighbours(const AvatarSnapshot& avatar, double speed, double seconds,
                             std::vector<Neighbour>& neighbours) const;

@@ -4,9 +4,12 @@
 #include <cmath>
 #include <limits>
 
-#include "scene/world/queries/entity_index.hpp"
-
 namespace enfilade::scene {
+
+bool standsOnDynamicBody(const SceneAt& sceneAt, const AvatarSnapshot& avatar) {
+  const BodySnapshot* ground = findBodySnapshot(sceneAt, avatar.groundEntity);
+  return ground && isDynamic(sceneAt.scene().model().bodies[ground->index].kind);
+}
 
 double sumJointSpeeds(const AvatarSnapshot& avatar, const WorldSettings& settings) {
   double speed = 0;

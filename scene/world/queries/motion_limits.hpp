@@ -6,6 +6,7 @@
 #include "scene/model/body_spec.hpp"
 #include "scene/world/data/snapshot.hpp"
 #include "scene/world/data/world_settings.hpp"
+#include "scene/world/queries/entity_index.hpp"
 
 namespace enfilade::scene {
 
@@ -13,6 +14,9 @@ namespace enfilade::scene {
 /// since a push is horizontal although the normal is not (bodies/kinematic_motion.cpp), and carried
 /// by it.
 inline constexpr double kMaxPushFactor = 2.5;
+
+/// True if the avatar stands on a dynamic body: a distant body may carry both.
+bool standsOnDynamicBody(const SceneAt& sceneAt, const AvatarSnapshot& avatar);
 
 /// Maximum speed at which the joints move any point of the avatar's chain, m/s.
 double sumJointSpeeds(const AvatarSnapshot& avatar, const WorldSettings& settings);

@@ -61,12 +61,6 @@ bool isTouched(const SceneAt& sceneAt, const AvatarSnapshot& avatar, const BodyS
          collision::NearestParts::Outcome::outOfRange;
 }
 
-/// True if the avatar stands on a dynamic body: a distant body may carry both.
-bool standsOnDynamicBody(const SceneAt& sceneAt, const AvatarSnapshot& avatar) {
-  const BodySnapshot* ground = findBodySnapshot(sceneAt, avatar.groundEntity);
-  return ground && isDynamic(makeBodyInfo(sceneAt, *ground).spec.kind);
-}
-
 /// Adds the effect of the bodies that the avatar touches: a lift carries an avatar that stands on
 /// it.
 void addCarrierMotion(const SceneAt& sceneAt, const AvatarSnapshot& avatar,
