@@ -9,11 +9,8 @@ set(public_headers
   broad_phase/broad_phase_audit.hpp
   broad_phase/sort_and_sweep.hpp
   compound/compound_view.hpp
-  compound/hull_planes.hpp
-  compound/mesh_query.hpp
   compound/nearest_parts.hpp
   compound/overlapping_parts.hpp
-  compound/query_bounds.hpp
   minkowski/feature_cache.hpp
   minkowski/verdict.hpp
   motion/interpolated_motion.hpp

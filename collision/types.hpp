@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -54,6 +55,16 @@ inline bool contains(const Aabb& outer, const Aabb& inner) {
 /// `box` extended by `margin` metres in both directions of each axis.
 inline Aabb inflated(const Aabb& box, double margin) {
   return {box.min - Vec3::Constant(margin), box.max + Vec3::Constant(margin)};
+}
+
+/// Squared distance of two boxes, m^2, rounded; 0 if they overlap.
+inline double computeSquaredGap(const Aabb& a, const Aabb& b) {
+  return (a.min - b.max).cwiseMax(b.min - a.max).cwiseMax(0).squaredNorm();
+}
+
+/// Distance of two boxes, metres, rounded; 0 if they overlap.
+inline double computeGap(const Aabb& a, const Aabb& b) {
+  return std::sqrt(computeSquaredGap(a, b));
 }
 
 /// Bounding box of the motion of `box` by `displacement` (metres).

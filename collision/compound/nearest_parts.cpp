@@ -37,8 +37,7 @@ struct OpenPair {
 
 /// Distance of two boxes, at least 0. `pad`: rounding error of both.
 double computeGap(const Aabb& a, const Aabb& b, double pad) {
-  const double gap = (a.min - b.max).cwiseMax(b.min - a.max).cwiseMax(0).norm();
-  return std::max(0.0, gap - pad);
+  return std::max(0.0, computeGap(a, b) - pad);
 }
 
 /// A part of a leaf and its world box.

@@ -59,23 +59,35 @@ constexpr std::size_t kMaxTreeDepth = 96;
 /// Boxes must be finite and not empty.
 BoxTree buildBoxTree(std::span<const Aabb> boxes, std::uint32_t leafSize);
 
-/// Calls visit(first item, count) for each leaf whose box overlaps `box`, in ascending item order.
-template <typename Visit>
-void forEachOverlappingLeaf(const BoxTree& tree, const FloatAabb& box, Visit&& visit) {
-  if (tree.empty() || !overlaps(tree.root.box, box)) return;
+/// Calls visit(first item, count) for each leaf such that open(box) is true for it and for all
+/// branches above it. Of two branches, the second is visited first if isBefore(second, first).
+/// open() is called right before a visit, after everything before it has been visited.
+template <typename Open, typename IsBefore, typename Visit>
+void descend(const BoxTree& tree, Open&& open, IsBefore&& isBefore, Visit&& visit) {
+  if (tree.empty()) return;
   std::array<const BoxTree::Branch*, kMaxTreeDepth> stack;
   std::size_t depth = 0;
   stack[depth++] = &tree.root;
   while (depth > 0) {  // each branch once
     const BoxTree::Branch& branch = *stack[--depth];
+    if (!open(branch.box)) continue;
     if (branch.isLeaf()) {
       visit(branch.first, branch.count);
       continue;
     }
-    const BoxTree::Node& node = tree.nodes[branch.first];
-    if (overlaps(node.children[1].box, box)) stack[depth++] = &node.children[1];
-    if (overlaps(node.children[0].box, box)) stack[depth++] = &node.children[0];
+    const auto& [first, second] = tree.nodes[branch.first].children;
+    const bool swap = isBefore(second.box, first.box);
+    stack[depth++] = swap ? &first : &second;
+    stack[depth++] = swap ? &second : &first;
   }
+}
+
+/// The same for each leaf whose box overlaps `box`, in ascending item order.
+template <typename Visit>
+void forEachOverlappingLeaf(const BoxTree& tree, const FloatAabb& box, Visit&& visit) {
+  descend(
+      tree, [&](const FloatAabb& branch) { return overlaps(branch, box); },
+      [](const FloatAabb&, const FloatAabb&) { return false; }, visit);
 }
 
 }  // namespace enfilade::collision

@@ -68,6 +68,7 @@ void updateBroadPhase(WorldData& world) {
 
 void moveAvatars(WorldData& world, QueryCount& count) {
   for (Avatar& avatar : world.avatars) {
+    avatar.narrowQueries = avatar.partsLookedAt = 0;
     avatar.blockedBy = 0;
     avatar.requestedDisplacement = Vec3::Zero();
     avatar.idle = avatar.grounded && avatar.lastDisplacement.isZero(0) &&
@@ -75,6 +76,7 @@ void moveAvatars(WorldData& world, QueryCount& count) {
                   !avatar.pairsChanged && areNeighboursStationary(world, avatar);
     if (avatar.idle) continue;
     collectObstacles(world, avatar);
+    const AvatarWorkCounter counter(avatar, count);
     moveAvatar(world, avatar, count);
   }
 }
@@ -101,6 +103,13 @@ void reportBoxWork(WorldData& world, TickReport& report) {
   }
   for (Avatar& avatar : world.avatars)
     report.verticesLookedAt += std::exchange(avatar.chain.verticesLookedAt, 0);
+}
+
+void reportAvatarWork(const WorldData& world, TickReport& report) {
+  AvatarWork& costliest = report.costliestAvatar;
+  for (const Avatar& avatar : world.avatars)
+    if (avatar.narrowQueries > costliest.narrowQueries)
+      costliest = {avatar.id, avatar.narrowQueries, avatar.partsLookedAt, avatar.footPosition};
 }
 
 /// True if the avatar is falling, or driven by a client.
@@ -146,6 +155,7 @@ TickReport runTick(WorldData& world) {
   planDynamicMotion(world);
   stopwatch.recordStage(Stage::commands);
   updateBroadPhase(world);
+  prefetchSurroundings(world);
   stopwatch.recordStage(Stage::broad);
   if (isAuditDue(world)) {
     report.audit = auditTick(world);
@@ -178,6 +188,8 @@ TickReport runTick(WorldData& world) {
   report.narrowQueries = count.narrow;
   report.rationalQueries = count.rational;
   report.iterationLimitedCasts = count.bounded;
+  report.partsLookedAt = count.partsLookedAt;
+  reportAvatarWork(world, report);
   reportBoxWork(world, report);
   report.idle = isWorldIdle(world);
   return report;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "collision/assert.hpp"
+#include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
 
@@ -21,6 +22,15 @@ std::size_t findBucket(double seconds) {
 
 double bucketMidpoint(std::size_t bucket) {
   return std::exp2((static_cast<double>(bucket) + 0.5) / kBucketsPerOctave) * 1e-9;
+}
+
+void fillCostliestAvatar(v1::CostliestAvatar& message, const scene::AvatarWork& work,
+                         std::uint64_t tick) {
+  message.set_id(work.id);
+  message.set_tick(tick);
+  message.set_narrow_queries(work.narrowQueries);
+  message.set_parts_looked_at(work.partsLookedAt);
+  *message.mutable_position() = toProto(work.footPosition);
 }
 
 void fillTiming(v1::StageTiming& timing, const char* name, const DurationHistogram& durations) {
@@ -80,6 +90,11 @@ void TickStatistics::addTick(const scene::TickReport& report) {
   crushedBodies_ += report.crushedBodies;
   verticesLookedAt_ += report.verticesLookedAt;
   partBoxesMade_ += report.partBoxesMade;
+  partsLookedAt_ += report.partsLookedAt;
+  if (report.costliestAvatar.narrowQueries > costliestAvatar_.narrowQueries) {
+    costliestAvatar_ = report.costliestAvatar;
+    costliestTick_ = report.snapshot->tick;
+  }
   pairs_ = report.pairs;
   activeContacts_ = report.activeContacts;
   avatars_ = static_cast<std::uint32_t>(report.snapshot->avatars.size());
@@ -106,6 +121,9 @@ v1::Metrics TickStatistics::makeMetrics() const {
   metrics.set_squeezed_bodies(crushedBodies_);
   metrics.set_vertices_looked_at(verticesLookedAt_);
   metrics.set_part_boxes_made(partBoxesMade_);
+  metrics.set_parts_looked_at(partsLookedAt_);
+  if (costliestAvatar_.id != 0)
+    fillCostliestAvatar(*metrics.mutable_costliest_avatar(), costliestAvatar_, costliestTick_);
   metrics.set_avatars(avatars_);
   if (audit_.ticks > 0) fillAudit(*metrics.mutable_audit(), audit_, auditDurations_);
   return metrics;

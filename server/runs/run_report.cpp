@@ -272,6 +272,7 @@ std::string RunReport::writeSummary(const RunSummary& runSummary,
                {"rational_queries", metrics.rational_queries()},
                {"vertices_looked_at", metrics.vertices_looked_at()},
                {"part_boxes_made", metrics.part_boxes_made()},
+               {"parts_looked_at", metrics.parts_looked_at()},
                {"frames", frames},
                {"walks", walks},
                {"outcomes", outcomesToJson(result)}};

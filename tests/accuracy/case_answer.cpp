@@ -6,10 +6,11 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "collision/compound/mesh_query.hpp"
+#include "collision/compound/nearest_parts.hpp"
 #include "collision/motion/time_of_impact.hpp"
 #include "collision/motion/time_to_contact.hpp"
 #include "collision/shapes/hull.hpp"
+#include "collision/shapes/triangle_tree.hpp"
 #include "tests/accuracy/mesh_brute_force.hpp"
 
 namespace enfilade::accuracy {
@@ -120,50 +121,40 @@ PlacedConvex makeConvex(const Triangle& triangle) {
   return {triangle};
 }
 
-/// Refines the distance of a separated mesh: that of the nearest triangle, if no other is closer by
-/// exact comparison. If computeSeparation() cannot order several triangles, all are refined.
-void refineNearest(const PlacedConvex& body, const TriangleTree& tree,
-                   const std::vector<Triangle>& mesh, MeshCache& cache, MeshContact& contact) {
-  FeatureCache features;
-  const RefinedSeparation refined =
-      refineSeparation(body, makeConvex(mesh[*contact.nearest]), features);
-  if (isAnyTriangleWithin(body, tree, refined.distance * (1 - 0x1p-51), cache)) {
-    contact = bruteForceContact(body, mesh, true);
-    return;
+/// Indices of the triangles that may touch the body or be the nearest, ascending.
+std::vector<std::uint32_t> findCandidates(const PlacedConvex& body, const TriangleTree& tree) {
+  Aabb box, localBox;
+  for (const Vec3& vertex : body.vertices) {
+    localBox.include(vertex);
+    box.include(*body.rotation * vertex + body.translation);
   }
-  contact.distance = refined.distance;
-  contact.errorBound = 1e-15 * refined.distance;
-  contact.pointA = refined.pointA;
-  contact.pointB = refined.pointB;
+  const BoxTree bodyTree = buildBoxTree({&localBox, 1}, 1);
+  const CompoundView bodyView{&bodyTree, *body.rotation, body.translation,
+                              [&](std::uint32_t) { return body; }};
+  const CompoundView meshView{&tree.boxes(), Mat3::Identity(), Vec3::Zero(),
+                              [&](std::uint32_t i) { return makeConvex(tree.triangles()[i]); }};
+  std::size_t budget = std::numeric_limits<std::size_t>::max();
+  const NearestParts nearest = findNearestParts({&bodyView, 1}, {&meshView, 1},
+                                                std::numeric_limits<double>::infinity(), budget);
+  const double magnitude = 1 + box.min.cwiseAbs().maxCoeff() + box.max.cwiseAbs().maxCoeff();
+  std::vector<std::uint32_t> candidates;
+  tree.query(inflated(box, nearest.separation.distance * (1 + 1e-9) + 1e-12 * magnitude),
+             candidates);
+  for (std::uint32_t& candidate : candidates) candidate = tree.inputIndex(candidate);
+  std::sort(candidates.begin(), candidates.end());
+  return candidates;
 }
 
-std::vector<std::uint32_t> findGivenIndices(const TriangleTree& tree,
-                                            const std::vector<std::uint32_t>& triangles) {
-  std::vector<std::uint32_t> given;
-  for (const std::uint32_t i : triangles) given.push_back(tree.inputIndex(i));
-  std::sort(given.begin(), given.end());
-  return given;
-}
-
+/// The contact by the tree of the triangles: only candidates are asked.
 MeshContact meshContact(const PlacedConvex& body, const TriangleTree& tree,
                         const std::vector<Triangle>& mesh, Level level) {
-  MeshCache cache;
-  MeshContacts contacts;
-  MeshContact contact;
-  findMeshContacts(body, tree, cache, contacts);
-  const auto nearest = findNearestTriangle(body, tree, cache);
-  contact.verdict = contacts.verdict();
-  contact.penetrated = findGivenIndices(tree, contacts.penetrated);
-  contact.touched = findGivenIndices(tree, contacts.touched);
-  if (!nearest) return contact;
-  contact.nearest = tree.inputIndex(nearest->triangle);
-  contact.decidedBy = nearest->separation.certificate;
-  contact.distance = nearest->separation.distance;
-  contact.errorBound = nearest->separation.errorBound;
-  contact.pointA = nearest->separation.pointA;
-  contact.pointB = nearest->separation.pointB;
-  if (level == Level::refine && contact.verdict == Verdict::separated)
-    refineNearest(body, tree, mesh, cache, contact);
+  const std::vector<std::uint32_t> candidates = findCandidates(body, tree);
+  std::vector<Triangle> triangles;
+  for (const std::uint32_t i : candidates) triangles.push_back(mesh[i]);
+  MeshContact contact = bruteForceContact(body, triangles, level == Level::refine);
+  for (auto* list : {&contact.penetrated, &contact.touched})
+    for (std::uint32_t& i : *list) i = candidates[i];
+  if (contact.nearest) contact.nearest = candidates[*contact.nearest];
   return contact;
 }
 

@@ -1,43 +1,63 @@
-// Our mesh queries, findNearestTriangle() and findMeshContacts(). They are exact (level decide) and
-// cache the candidate triangles between queries.
-#include "collision/compound/mesh_query.hpp"
+// Our mesh queries: the distance by findNearestParts(), as a client's question; the contacts by the
+// triangles' tree and the narrow phase, as an avatar's. Both are exact and keep nothing.
+#include "collision/compound/nearest_parts.hpp"
 #include "collision/shapes/hull.hpp"
 #include "tests/benchmarks/mesh_method.hpp"
 
 namespace enfilade::benchmarks {
 namespace {
 
+using namespace collision;
+
 class OurMeshQuery : public MeshQuery {
  public:
   OurMeshQuery(const Points& body, const Triangles& mesh)
-      : hull_(collision::buildHull(body)), mesh_(mesh) {}
+      : hull_(buildHull(body)), tree_(buildBoxTree(std::span(&localBox(), 1), 1)), mesh_(mesh) {}
 
-  double distance(const Placement& body) override {
-    const auto nearest = collision::findNearestTriangle(bodyAt(body), mesh_, cache_);
-    return nearest ? nearest->separation.distance : 0;
+  double distance(const Placement& at) override {
+    const CompoundView body{&tree_, at.rotation, at.translation,
+                            [&](std::uint32_t) { return bodyAt(at); }};
+    const CompoundView mesh{&mesh_.boxes(), Mat3::Identity(), Vec3::Zero(),
+                            [this](std::uint32_t i) { return triangle(i); }};
+    std::size_t budget = std::numeric_limits<std::size_t>::max();
+    return findNearestParts({&body, 1}, {&mesh, 1}, std::numeric_limits<double>::infinity(), budget)
+        .separation.distance;
   }
-  void contacts(const Placement& body, std::vector<std::uint32_t>& triangles) override {
-    collision::findMeshContacts(bodyAt(body), mesh_, cache_, contacts_);
-    for (const auto* list : {&contacts_.penetrated, &contacts_.touched}) {
-      for (const std::uint32_t triangle : *list) triangles.push_back(mesh_.inputIndex(triangle));
+  void contacts(const Placement& at, std::vector<std::uint32_t>& triangles) override {
+    const PlacedConvex body = bodyAt(at);
+    Aabb box;
+    for (const Vec3& vertex : body.vertices) box.include(at.rotation * vertex + at.translation);
+    near_.clear();
+    mesh_.query(inflated(box, 1e-9), near_);  // more than the rounding of the box
+    for (const std::uint32_t i : near_) {
+      FeatureCache cold;
+      const auto separation = computeSeparationWithin(body, triangle(i), 0, cold);
+      if (separation && separation->verdict != Verdict::separated)
+        triangles.push_back(mesh_.inputIndex(i));
     }
   }
-  void forget() override { cache_.reset(); }
 
  private:
-  collision::PlacedConvex bodyAt(const Placement& at) const {
+  const Aabb& localBox() {
+    for (const Vec3& vertex : hull_.vertices) box_.include(vertex);
+    return box_;
+  }
+  PlacedConvex bodyAt(const Placement& at) const {
     return {hull_.vertices, at.translation, &at.rotation, &hull_};
   }
-  collision::Hull hull_;
-  collision::TriangleTree mesh_;
-  collision::MeshCache cache_;
-  collision::MeshContacts contacts_;
+  PlacedConvex triangle(std::uint32_t i) const { return {mesh_.triangles()[i]}; }
+
+  Hull hull_;
+  Aabb box_;  ///< of the hull, in its frame
+  BoxTree tree_;
+  TriangleTree mesh_;
+  std::vector<std::uint32_t> near_;  ///< scratch
 };
 
 }  // namespace
 
 std::vector<MeshMethod> ourMeshQueries() {
-  return {{"ours: decide", true, true, [](const Points& body, const Triangles& mesh) {
+  return {{"ours: decide", true, false, [](const Points& body, const Triangles& mesh) {
              return std::make_unique<OurMeshQuery>(body, mesh);
            }}};
 }

@@ -3,8 +3,8 @@
 //
 //   tick_bench [SCENE [AVATARS [TICKS]]]
 //
-// SCENE is a file, district:N for a generated district of N objects, or scan:N for one mesh of N
-// triangles like the scan of a room of 10 m: a rough floor with heaps, and rough walls. Avatars
+// SCENE is a file, district:N for a generated district of N objects, or scan:N, office:N,
+// plant_room:N or terrain:N for a generated scene of some N triangles (dense_scenes.hpp). Avatars
 // walk at 1.5 m/s towards seeded places and change direction every two seconds, like visitors of a
 // building. Contacts are computed each tick. The maximum penetration is printed with the times, so
 // that no speed is bought with an error.
@@ -24,6 +24,7 @@
 #include "scene/world/world.hpp"
 #include "tests/benchmarks/walkers.hpp"
 #include "tests/scene/thin_geometry.hpp"
+#include "tests/support/dense_scenes.hpp"
 #include "tests/support/shared_folder.hpp"
 
 namespace {
@@ -49,52 +50,16 @@ double peakMegabytes() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
-/// Adds a rough surface of 2 * steps * steps triangles to `mesh`.
-void addSurface(scene::Mesh& mesh, int steps, const std::function<Vec3(double, double)>& pointAt) {
-  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-  for (int i = 0; i <= steps; ++i)
-    for (int k = 0; k <= steps; ++k)
-      mesh.positions.push_back(pointAt(double(i) / steps, double(k) / steps).cast<float>());
-  const auto row = static_cast<std::uint32_t>(steps) + 1;
-  for (std::uint32_t i = 0; i + 1 < row; ++i) {
-    for (std::uint32_t k = 0; k + 1 < row; ++k) {
-      const std::uint32_t at = first + i * row + k;
-      mesh.indices.insert(mesh.indices.end(),
-                          {at, at + 1, at + row, at + 1, at + row + 1, at + row});
-    }
-  }
-}
-
-scene::Model makeScan(std::size_t triangles) {
-  constexpr double kEdge = 10, kHeight = 2.5, kRoughness = 0.01;  // metres
-  std::mt19937_64 random(5);
-  const auto rough = [&] { return uniform(random, -kRoughness, kRoughness); };
-  const int steps = static_cast<int>(std::sqrt(static_cast<double>(triangles) / 10));  // 5 surfaces
-  scene::Mesh mesh;
-  addSurface(mesh, steps, [&](double u, double v) {
-    const double heap = std::sin(7 * u) * std::sin(9 * v);
-    return Vec3(kEdge * v, 0.3 * heap * heap + rough(), kEdge * u);
-  });
-  for (const double side : {0.0, kEdge}) {
-    addSurface(mesh, steps, [&](double u, double v) {
-      return Vec3(side + rough(), kHeight * u - 0.1, kEdge * v);
-    });
-    addSurface(mesh, steps, [&](double u, double v) {
-      return Vec3(kEdge * v, kHeight * u - 0.1, side + rough());
-    });
-  }
-  scene::testing::Builder builder;
-  builder.add("scan", std::move(mesh));
-  return builder.model;
-}
-
 scene::Model modelOf(const std::filesystem::path& file) {
-  const std::string name = file.string(), district = "district:", scan = "scan:";
-  if (name.starts_with(scan)) return makeScan(std::stoul(name.substr(scan.size())));
-  if (!name.starts_with(district))
+  const std::string name = file.string();
+  const std::size_t colon = name.find(':');
+  if (colon == std::string::npos)
     return scene::loadModel(file, {}, scene::modelCacheFromEnvironment()).model;
+  const std::string kind = name.substr(0, colon);
+  const std::size_t number = std::stoul(name.substr(colon + 1));
+  if (const tests::DenseScene* dense = tests::findDenseScene(kind)) return dense->make(number);
   assets::BuildingOptions options;
-  options.objects = std::stoul(name.substr(district.size()));
+  options.objects = number;
   return assets::makeBuilding(options);
 }
 

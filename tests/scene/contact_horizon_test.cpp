@@ -62,6 +62,7 @@ class Checker {
   int claims = 0;     ///< of a pair in a tick, beyond the next tick
   int farClaims = 0;  ///< of them, those that are five ticks ahead or more
   int contacts = 0;   ///< begins of contacts of pairs with an earlier claim
+  int lasting = 0;    ///< contacts that were listed in the tick before, too
   int pairs = 0;      ///< pairs of all ticks
 
  private:
@@ -87,12 +88,20 @@ class Checker {
   void lookAt(EntityId avatar, EntityId other, bool inContact, double now) {
     const Pair pair(avatar, other);
     ++pairs;
+    const auto at = horizons.horizons().find(avatar);
+    const bool isListed =
+        at != horizons.horizons().end() && std::ranges::binary_search(at->second.touching, other);
+    const bool wasListed = !(isListed ? listed_.insert(pair).second : listed_.erase(pair) == 0);
     if (inContact) {
       check(pair, now, "distance");
       contacts += proved_.erase(pair) > 0 ? 1 : 0;
+      lasting += wasListed ? 1 : 0;
+      EXPECT_TRUE(isListed || !wasListed) << "a contact that lasts, tick " << now;
+      if (at != horizons.horizons().end() && !isListed) {
+        EXPECT_LE(provedTime(at->second, other), now) << "a contact that is not listed";
+      }
       return;
     }
-    const auto at = horizons.horizons().find(avatar);
     if (at == horizons.horizons().end()) return;
     const double proved = provedTime(at->second, other);
     if (!(proved > now)) return;
@@ -106,6 +115,7 @@ class Checker {
   const World& world_;
   EntityIndex index_;
   ContactHorizons horizons;
+  std::set<Pair> listed_;          ///< in `touching` of the last tick
   std::map<Pair, double> proved_;  ///< the latest time of all ticks since the last contact
 };
 
@@ -257,6 +267,7 @@ TEST(ContactHorizon, WithoutEnoughWorkItIsEarlierAndNeverWrong) {
   EXPECT_GT(checker.all().statistics().postponed, 100u);
   EXPECT_GT(checker.claims, 1'000);
   EXPECT_GE(checker.contacts, 5);
+  EXPECT_GT(checker.lasting, 1'000);
 }
 
 /// Without steps and jumps an avatar's bound is twice the speed limit.

@@ -47,6 +47,42 @@ struct CollisionGeometry {
   std::size_t bytes() const;
 };
 
+/// An object of more parts is dense: no query lists its parts, and they are built before the first
+/// tick.
+inline constexpr std::uint32_t kMaxListedParts = 64;
+
+/// Calls visit(part) for each part such that open(box) is true for all branches above it. `box` is
+/// of a branch, scene frame, and contains all its parts. A branch is opened after everything before
+/// it has been visited: hulls, then triangles; of two branches the one nearer to `core` (metres,
+/// scene frame).
+template <class Open, class Visit>
+void descendParts(const CollisionGeometry& geometry, const Aabb& core, const Open& open,
+                  const Visit& visit) {
+  const auto descendTree = [&](const collision::BoxTree& tree, const Vec3& origin,
+                               const auto& partOf) {
+    using Box = collision::FloatAabb;
+    const Vec3 at = origin + tree.origin;
+    const Vec3 pad = 0x1p-50 * (at.cwiseAbs().array() + tree.extent).matrix();  // sums below: < 4u
+    const Vec3 low = at - pad, high = at + pad;
+    const auto toScene = [&](const Box& box) {
+      return Aabb{low + Vec3(box.min[0], box.min[1], box.min[2]),
+                  high + Vec3(box.max[0], box.max[1], box.max[2])};
+    };
+    collision::descend(
+        tree, [&](const Box& box) { return open(toScene(box)); },
+        [&](const Box& a, const Box& b) {
+          return computeSquaredGap(toScene(a), core) < computeSquaredGap(toScene(b), core);
+        },
+        [&](std::uint32_t first, std::uint32_t count) {
+          for (std::uint32_t i = first; i < first + count; ++i) visit(partOf(i));
+        });
+  };
+  descendTree(geometry.hullTree, Vec3::Zero(),
+              [&](std::uint32_t item) { return geometry.hullTree.order[item]; });
+  descendTree(geometry.localTriangles.boxes(), geometry.origin,
+              [&](std::uint32_t item) { return geometry.hullCount() + item; });
+}
+
 /// An inward-facing surface is an inside-out solid if no ball of this radius (metres) fits into it.
 /// Otherwise it may be a room seen from within, and stays triangles. A convex solid of volume V and
 /// area A contains no ball with a radius above 3 V / A.

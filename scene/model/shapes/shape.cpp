@@ -4,8 +4,11 @@
 #include "scene/model/shapes/shape.hpp"
 
 #include <algorithm>
+#include <bit>
+#include <cstdint>
 #include <numeric>
 #include <tuple>
+#include <unordered_map>
 
 #include "collision/shapes/exact_orientation.hpp"
 #include "scene/model/shapes/convex_surface.hpp"
@@ -25,37 +28,38 @@ struct EdgeUse {
   auto corners() const { return std::tie(low, high); }
 };
 
-bool isLexicographicallyLess(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
-  return std::tie(a.x(), a.y(), a.z()) < std::tie(b.x(), b.y(), b.z());
-}
+struct PositionHash {
+  std::size_t operator()(const Eigen::Vector3f& p) const {
+    std::uint64_t hash = 0;
+    for (const float coordinate : {p.x(), p.y(), p.z()})
+      hash = (hash ^ std::bit_cast<std::uint32_t>(coordinate)) * 0x9e3779b97f4a7c15;
+    return hash ^ (hash >> 32);
+  }
+};
 
 /// Returns all corners of these meshes as indices into unique positions, in the order of first use;
 /// 0 and -0 are equal.
 std::vector<Index> weldVertices(std::span<const Mesh> meshes, std::span<const Index> meshIndices,
                                 std::vector<Eigen::Vector3f>& vertices) {
-  std::vector<Eigen::Vector3f> corners;
-  for (const Index mesh : meshIndices)
-    for (const Index i : meshes[mesh].indices) corners.push_back(meshes[mesh].positions[i]);
-  std::vector<Index> order(corners.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-    if (isLexicographicallyLess(corners[a], corners[b])) return true;
-    return !isLexicographicallyLess(corners[b], corners[a]) && a < b;
-  });
-  std::vector<Index> first(corners.size());  // the first corner at the same position
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const bool same = i > 0 && !isLexicographicallyLess(corners[order[i - 1]], corners[order[i]]);
-    first[order[i]] = same ? first[order[i - 1]] : order[i];
-  }
-  for (Index i = 0; i < first.size(); ++i) {
-    if (first[i] == i) {
-      first[i] = static_cast<Index>(vertices.size());
-      vertices.push_back(corners[i]);
-    } else {
-      first[i] = first[first[i]];  // its first use is already renumbered
+  constexpr Index kUnknown = 0xffffffff;
+  std::vector<Index> corners;
+  std::unordered_map<Eigen::Vector3f, Index, PositionHash> vertexAt;
+  for (const Index mesh : meshIndices) {
+    const auto& positions = meshes[mesh].positions;
+    std::vector<Index> vertexOf(positions.size(), kUnknown);
+    corners.reserve(corners.size() + meshes[mesh].indices.size());
+    for (const Index i : meshes[mesh].indices) {
+      if (vertexOf[i] == kUnknown) {
+        const Eigen::Vector3f position = positions[i].array() + 0.0F;  // turns -0 into 0
+        const auto next = static_cast<Index>(vertices.size());
+        const auto [known, isNew] = vertexAt.try_emplace(position, next);
+        if (isNew) vertices.push_back(positions[i]);
+        vertexOf[i] = known->second;
+      }
+      corners.push_back(vertexOf[i]);
     }
   }
-  return first;
+  return corners;
 }
 
 Corners sortTriangleCorners(Corners corners) {
@@ -93,18 +97,28 @@ std::vector<Corners> cleanTriangles(const std::vector<Index>& corners, Shape& sh
   return kept;
 }
 
-std::vector<EdgeUse> sortedEdges(const std::vector<Corners>& triangles) {
-  std::vector<EdgeUse> edges;
-  edges.reserve(3 * triangles.size());
-  for (Index t = 0; t < triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Index from = triangles[t][k], to = triangles[t][(k + 1) % 3];
-      edges.push_back({std::min(from, to), std::max(from, to), t, from < to});
+/// Ascending corners, then triangles: a counting sort by the lower corner, each bucket sorted.
+std::vector<EdgeUse> sortedEdges(const std::vector<Corners>& triangles, std::size_t vertexCount) {
+  std::vector<Index> end(vertexCount + 1);
+  const auto forEachEdge = [&](const auto& visit) {
+    for (Index t = 0; t < triangles.size(); ++t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Index from = triangles[t][k], to = triangles[t][(k + 1) % 3];
+        visit(EdgeUse{std::min(from, to), std::max(from, to), t, from < to});
+      }
     }
+  };
+  forEachEdge([&](const EdgeUse& edge) { ++end[edge.low + 1]; });
+  std::partial_sum(end.begin(), end.end(), end.begin());
+  std::vector<EdgeUse> edges(3 * triangles.size());
+  forEachEdge([&](const EdgeUse& edge) { edges[end[edge.low]++] = edge; });
+  // end[v] is now the end of the bucket of v.
+  for (std::size_t v = 0; v < vertexCount; ++v) {
+    const auto begin = edges.begin() + (v == 0 ? 0 : end[v - 1]);
+    std::sort(begin, edges.begin() + end[v], [](const EdgeUse& a, const EdgeUse& b) {
+      return std::tie(a.high, a.triangle) < std::tie(b.high, b.triangle);
+    });
   }
-  std::sort(edges.begin(), edges.end(), [](const EdgeUse& a, const EdgeUse& b) {
-    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-  });
   return edges;
 }
 
@@ -126,7 +140,7 @@ int findEdgeSlot(const Corners& t, const EdgeUse& edge) {
 
 std::vector<Neighbours> linkNeighbours(const std::vector<Corners>& triangles, Shape& shape) {
   std::vector<Neighbours> links(triangles.size());
-  const std::vector<EdgeUse> edges = sortedEdges(triangles);
+  const std::vector<EdgeUse> edges = sortedEdges(triangles, shape.vertices.size());
   for (auto first = edges.begin(); first != edges.end();) {
     const auto last = std::find_if(
         first, edges.end(), [&](const EdgeUse& e) { return e.corners() != first->corners(); });

@@ -45,7 +45,7 @@ EntityId findBlockingEntity(OrderContext& context, const AvatarShape& shape) {
   const Avatar& avatar = *context.findAvatar();
   const double clearance = kHeadroomFraction * context.world.settings.contactOffset;
   const Aabb box = inflated(placeBox(shape.box, avatar.footPosition), 2 * clearance);
-  std::vector<Obstacle> obstacles = collectObstaclesInBox(context.world, box, avatar.id);
+  ObstacleSet obstacles = collectObstaclesInBox(context.world, box, avatar.id);
   EntityId nearest = 0;
   return isClear(shape, avatar.footPosition, clearance, obstacles, context.count, nearest)
              ? 0

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "collision/motion/shape_cast.hpp"
+#include "scene/world/contacts/dense_obstacles.hpp"
 #include "scene/world/contacts/obstacles.hpp"
 
 namespace enfilade::scene {
@@ -51,18 +52,40 @@ struct JointMover {
 
   std::size_t basePartCount() const { return avatar.baseParts.size(); }
 
+  bool reaches(const AvatarPart& part, const JointStep& step, const StepHit& hit,
+               const Aabb& box) const {
+    const double margin = step.maxDisplacement * hit.fraction + contactOffset.rest;
+    return overlaps(inflated(placeBox(part.box, avatar.footPosition), margin), box);
+  }
+
   void castAgainst(std::size_t part, const JointStep& step, const Aabb& otherBox, EntityId entity,
                    const collision::PlacedConvex& other, collision::FeatureCache& cache,
                    StepHit& hit) {
     const AvatarPart& movedPart = avatar.shape->parts[part];
-    const double margin = step.maxDisplacement * hit.fraction + contactOffset.rest;
-    if (!overlaps(inflated(placeBox(movedPart.box, avatar.footPosition), margin), otherBox)) return;
+    if (!reaches(movedPart, step, hit, otherBox)) return;
     const auto result = castPart(movedPart, avatar.footPosition, step, hit.fraction * step.delta,
                                  other, contactOffset, cache);
     count.add(result);
     const double fraction = hit.fraction * result.fraction;
     if (!result.stopped || (hit.entity != 0 && fraction >= hit.fraction)) return;
     hit = {fraction, entity, result.separationAtStop};
+  }
+
+  /// The link may turn, so no planes are kept.
+  void castAgainst(std::size_t part, const JointStep& step, const DenseObject& object,
+                   StepHit& hit) {
+    const auto inReach = [&](const Aabb& box) {
+      return hit.fraction > 0 && reaches(avatar.shape->parts[part], step, hit, box);
+    };
+    const Aabb partBox = placeBox(avatar.shape->parts[part].box, avatar.footPosition);
+    descendParts(*object.geometry, computeCore(partBox), inReach, [&](std::uint32_t i) {
+      ++count.partsLookedAt;
+      const DensePair pair{object.entity, i, static_cast<std::uint32_t>(part)};
+      const Aabb box = object.geometry->box(i);
+      if (inReach(box))
+        castAgainst(part, step, box, object.entity, object.geometry->convex(i),
+                    avatar.obstacles.denseCaches[pair], hit);
+    });
   }
 
   /// True if the link and the part are joined, and therefore touch. The base's parts are adjacent
@@ -92,9 +115,13 @@ struct JointMover {
     for (std::size_t link = step.joint; link < avatar.chain.links.size(); ++link) {
       if (!doesJointMoveLink(avatar.chain, step.joint, link)) continue;
       const std::size_t part = basePartCount() + link;
-      for (Obstacle& obstacle : avatar.obstacles) {
+      for (Obstacle& obstacle : avatar.obstacles.list) {
         castAgainst(part, step, obstacle.box, obstacle.entity, obstacle.convex,
                     obstacle.cacheFor(part), hit);
+        if (hit.fraction == 0) return hit;
+      }
+      for (const DenseObject& object : avatar.obstacles.dense) {
+        castAgainst(part, step, object, hit);
         if (hit.fraction == 0) return hit;
       }
       if (avatar.chain.selfContact) castAgainstSelf(link, step, hit);

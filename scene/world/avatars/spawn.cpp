@@ -54,7 +54,7 @@ FloorHit findFloorBelow(PlacementSearch& search, const Avatar& avatar) {
   if (!(depth > 0)) return {};
   const Vec3 down{0, -depth, 0};
   const Aabb column = collision::sweptAabb(placeBox(avatar.shape->box, avatar.footPosition), down);
-  std::vector<Obstacle> obstacles = collectObstaclesInBox(world, column, 0);
+  ObstacleSet obstacles = collectObstaclesInBox(world, column, 0);
   const double contactOffset = world.settings.contactOffset;
   const ShapeCastHit hit = castAvatarShape(*avatar.shape, avatar.footPosition, down, obstacles,
                                            {0.5 * contactOffset, contactOffset}, search.count);
@@ -68,7 +68,7 @@ std::string formatPoint(const Vec3& v) {
 
 /// Error of the avatar's current position, without lifts; nullopt if it is valid.
 std::optional<std::string> validatePlacement(PlacementSearch& search, const Avatar& avatar,
-                                             std::vector<Obstacle>& obstacles) {
+                                             ObstacleSet& obstacles) {
   const WorldData& world = search.world;
   for (const AvatarPart& part : avatar.shape->parts)
     if (const EntityId solid = findEnclosingSolid(search, avatar.footPosition + part.box.centre()))
@@ -94,7 +94,7 @@ std::optional<std::string> tryPlacement(PlacementSearch& search, const Vec3& at,
   const WorldData& world = search.world;
   Aabb searchBox = placeBox(avatar.shape->box, at);
   searchBox.max.y() += kTrialLifts.back();
-  std::vector<Obstacle> obstacles =
+  ObstacleSet obstacles =
       collectObstaclesInBox(world, inflated(searchBox, 2 * world.settings.contactOffset), 0);
   std::optional<std::string> error;
   for (const double lift : kTrialLifts) {

@@ -58,7 +58,7 @@ void pushAvatar(WorldData& world, Avatar& avatar, Vec3 displacement,
                 const std::vector<CarriedBody>& carriedBodies, QueryCount& count) {
   collectObstacles(world, avatar);
   if (displacement.y() > 0)
-    for (Obstacle& obstacle : avatar.obstacles)
+    for (Obstacle& obstacle : avatar.obstacles.list)
       if (std::ranges::find(carriedBodies, obstacle.bodyIndex, &CarriedBody::index) !=
           carriedBodies.end())
         obstacle.box = Aabb();

@@ -147,7 +147,9 @@ void restoreProxies(const Reader& a, WorldData& world,
 /// Restores the pointers from an avatar's obstacles into their entities.
 void restoreObstacles(WorldData& world) {
   for (Avatar& avatar : world.avatars) {
-    for (Obstacle& obstacle : avatar.obstacles) {
+    for (DenseObject& object : avatar.obstacles.dense)
+      object.geometry = &world.scene->collisionGeometry(object.entity - 1);
+    for (Obstacle& obstacle : avatar.obstacles.list) {
       const auto body = world.bodyIndexById.find(obstacle.entity);
       if (body != world.bodyIndexById.end()) {
         obstacle.bodyIndex = body->second;

@@ -56,7 +56,7 @@ struct CheckpointChecker {
   }
   void checkObstacles(const Avatar& avatar, const std::string& name) const {
     const Obstacle* last = nullptr;
-    for (const Obstacle& obstacle : avatar.obstacles) {
+    for (const Obstacle& obstacle : avatar.obstacles.list) {
       require(obstacle.part < countParts(obstacle), name + " has an obstacle with an unknown part");
       require(
           avatar.pairsChanged || !isAvatar(obstacle.entity) || world.findAvatar(obstacle.entity),
@@ -67,6 +67,23 @@ struct CheckpointChecker {
           !last || std::pair(last->entity, last->part) < std::pair(obstacle.entity, obstacle.part),
           name + "'s obstacles do not ascend");
       last = &obstacle;
+    }
+  }
+  void checkDenseObjects(const Avatar& avatar, const std::string& name) const {
+    const auto& [list, dense, caches] = avatar.obstacles;
+    for (std::size_t i = 0; i < dense.size(); ++i) {
+      const EntityId id = dense[i].entity;
+      require(id != 0 && !isAvatar(id) && !findBody(id) &&
+                  world.scene->collisionGeometry(id - 1).size() > kMaxListedParts,
+              name + " has a dense obstacle of few parts");
+      require(i == 0 || dense[i - 1].entity < id, name + "'s dense obstacles do not ascend");
+    }
+    for (const auto& [pair, cache] : caches) {
+      const auto at = std::ranges::lower_bound(dense, pair.entity, {}, &DenseObject::entity);
+      require(at != dense.end() && at->entity == pair.entity &&
+                  pair.part < world.scene->collisionGeometry(pair.entity - 1).size() &&
+                  pair.avatarPart < avatar.shape->parts.size(),
+              name + " has a cache of an unknown part");
     }
   }
   void checkQueue(const Avatar& avatar) const {
@@ -102,6 +119,7 @@ struct CheckpointChecker {
                 name + " has a joint outside its limits");
       checkContacts(a, name);
       checkObstacles(a, name);
+      checkDenseObjects(a, name);
       checkQueue(a);
     }
   }

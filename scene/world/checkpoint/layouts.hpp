@@ -269,6 +269,34 @@ struct Layout<Obstacle> {
   }
 };
 
+/// `geometry` follows from `entity`.
+template <>
+struct Layout<DenseObject> {
+  template <class A>
+  static void archive(A& a, MaybeConst<A, DenseObject>& object) {
+    auto& [entity, geometry] = object;
+    a(entity);
+  }
+};
+
+template <>
+struct Layout<DensePair> {
+  template <class A>
+  static void archive(A& a, MaybeConst<A, DensePair>& pair) {
+    auto& [entity, part, avatarPart] = pair;
+    a(entity, part, avatarPart);
+  }
+};
+
+template <>
+struct Layout<ObstacleSet> {
+  template <class A>
+  static void archive(A& a, MaybeConst<A, ObstacleSet>& set) {
+    auto& [list, dense, denseCaches] = set;
+    a(list, dense, denseCaches);
+  }
+};
+
 /// `parent`, `joint`, `hull` and `maxRadius` follow from the spawn order.
 template <>
 struct Layout<ChainLink> {
@@ -303,8 +331,8 @@ struct Layout<Avatar> {
            groundEntity, flying, jumping, spawnHeight, height, radius, baseParts, chain,
            driveVelocity, desiredVelocity, walk, waitTimeLeft, stalledInAirTime, lastDisplacement,
            requestedDisplacement, idle, dirty, blockedBy, pairsChanged, blockingHit,
-           blockedReported, proxy, motionBounds, cachedBounds, obstacles, hasBodyObstacles,
-           contacts] = avatar;
+           blockedReported, proxy, motionBounds, cachedBounds, obstacles, narrowQueries,
+           partsLookedAt, hasBodyObstacles, contacts] = avatar;
     a(name, spawnOrder, spawnHeight, height, radius);
     if constexpr (!A::kWrites) restoreAvatarShape(a, avatar);  // `shape`, `baseParts`
     a(chain);

@@ -9,6 +9,7 @@
 
 #include "collision/narrow_phase/penetration_depth.hpp"
 #include "collision/narrow_phase/refine.hpp"
+#include "scene/world/contacts/dense_obstacles.hpp"
 #include "scene/world/contacts/obstacles.hpp"
 #include "scene/world/contacts/triggers.hpp"
 
@@ -18,52 +19,102 @@ namespace {
 using collision::SeparationResult;
 using collision::Verdict;
 
-double computeObstacleDepth(const collision::PlacedConvex& part, const Obstacle& obstacle,
-                            const collision::FeatureCache& cache,
-                            const SeparationResult& separation) {
-  if (separation.verdict != Verdict::penetrating) return 0;
-  collision::DepthCache emptyCache;  // avatars do not penetrate, so a warm start has no use
-  return collision::computePenetrationDepth(part, obstacle.convex, cache, emptyCache).depth;
-}
+/// The search for what is close to one part of an avatar.
+struct CloseSearch {
+  const collision::PlacedConvex part;
+  const ContactDistances& distances;
+  const Aabb box;  ///< what does not overlap it is beyond the report limit
+  std::vector<Contact>& found;
+  QueryCount& count;
+
+  CloseSearch(const AvatarPart& avatarPart, const Vec3& footPosition,
+              const ContactDistances& contactDistances, std::vector<Contact>& contacts,
+              QueryCount& queryCount)
+      : part(placeAvatarPart(avatarPart, footPosition)),
+        distances(contactDistances),
+        box(inflated(placeBox(avatarPart.box, footPosition), contactDistances.reportLimit)),
+        found(contacts),
+        count(queryCount) {}
+
+  bool isFound(EntityId entity) const { return !found.empty() && found.back().other == entity; }
+  /// Metres: parts of the entity that are farther away change nothing.
+  double computeLimit(EntityId entity) const {
+    if (!isFound(entity)) return distances.reportLimit;
+    const Contact& contact = found.back();
+    return contact.touching ? contact.separation.distance
+                            : std::max(contact.separation.distance, distances.contact);
+  }
+  /// Merges the separation of the obstacle into the contacts found so far; those of an entity come
+  /// one after the other.
+  void addObstacle(EntityId entity, const collision::PlacedConvex& obstacle,
+                   collision::FeatureCache& cache);
+};
 
 std::optional<SeparationResult> computeSeparationCounted(const collision::PlacedConvex& part,
-                                                         const Obstacle& obstacle, double limit,
+                                                         const collision::PlacedConvex& obstacle,
+                                                         double limit,
                                                          collision::FeatureCache& cache,
                                                          QueryCount& count) {
   ++count.narrow;
-  const auto separation = collision::computeSeparationWithin(part, obstacle.convex, limit, cache);
+  const auto separation = collision::computeSeparationWithin(part, obstacle, limit, cache);
   if (separation && separation->certificate == collision::Certificate::rational) ++count.rational;
   return separation;
 }
 
-/// Merges the separation of the avatar's part `i` and the obstacle into the contacts found so far.
-void addCloseObstacle(const Avatar& avatar, std::size_t i, Obstacle& obstacle,
-                      const ContactDistances& distances, std::vector<Contact>& found,
-                      QueryCount& count) {
+double computeObstacleDepth(const collision::PlacedConvex& part,
+                            const collision::PlacedConvex& obstacle,
+                            const collision::FeatureCache& cache,
+                            const SeparationResult& separation) {
+  if (separation.verdict != Verdict::penetrating) return 0;
+  collision::DepthCache emptyCache;  // avatars do not penetrate, so a warm start has no use
+  return collision::computePenetrationDepth(part, obstacle, cache, emptyCache).depth;
+}
+
+void CloseSearch::addObstacle(EntityId entity, const collision::PlacedConvex& obstacle,
+                              collision::FeatureCache& cache) {
   const double limit = distances.reportLimit;
-  const AvatarPart& part = avatar.shape->parts[i];
-  if (!overlaps(inflated(placeBox(part.box, avatar.footPosition), limit), obstacle.box)) return;
-  const bool known = !found.empty() && found.back().other == obstacle.entity;
-  const double within =
-      known ? std::max(found.back().separation.distance, distances.contact) : limit;
-  const collision::PlacedConvex placed = placeAvatarPart(part, avatar.footPosition);
-  collision::FeatureCache& cache = obstacle.cacheFor(i);
-  const auto separation = computeSeparationCounted(placed, obstacle, within, cache, count);
-  if (!separation || !collision::isCloserThan(*separation, placed, obstacle.convex, limit, cache))
-    return;
+  const bool known = isFound(entity);
+  const auto separation =
+      computeSeparationCounted(part, obstacle, computeLimit(entity), cache, count);
+  if (!separation || !collision::isCloserThan(*separation, part, obstacle, limit, cache)) return;
   if (!known) {
     found.emplace_back();
-    found.back().other = obstacle.entity;
+    found.back().other = entity;
     found.back().separation = *separation;
   } else if (isCloser(*separation, found.back().separation)) {
     found.back().separation = *separation;
   }
   Contact& contact = found.back();
-  contact.touching =
-      contact.touching || distances.contact == limit ||
-      collision::isCloserThan(*separation, placed, obstacle.convex, distances.contact, cache);
+  contact.touching = contact.touching || distances.contact == limit ||
+                     collision::isCloserThan(*separation, part, obstacle, distances.contact, cache);
   double& penetration = contact.penetration;
-  penetration = std::max(penetration, computeObstacleDepth(placed, obstacle, cache, *separation));
+  penetration = std::max(penetration, computeObstacleDepth(part, obstacle, cache, *separation));
+}
+
+/// Distances of a flat floor's triangles differ by less, so that one of them answers for all.
+double computeTieDistance(const Aabb& box) {
+  return 0x1p-40 * (1 + box.min.cwiseAbs().maxCoeff() + box.max.cwiseAbs().maxCoeff());
+}
+
+/// The distance found may exceed that of the nearest part by computeTieDistance(), which its error
+/// bound includes.
+void findCloseDense(Avatar& avatar, const DenseObject& object, const ContactDistances& distances,
+                    std::vector<Contact>& found, QueryCount& count) {
+  for (std::uint32_t i = 0; i < avatar.shape->parts.size(); ++i) {
+    CloseSearch search(avatar.shape->parts[i], avatar.footPosition, distances, found, count);
+    collision::SeparatingPlanes planes(search.part, Vec3::Zero(), distances.reportLimit);
+    const double tie = computeTieDistance(search.box);
+    forEachNearPart(
+        object, i, search.box, planes, [&](const Aabb& box) { return overlaps(search.box, box); },
+        avatar.obstacles.denseCaches, count,
+        [&](const collision::PlacedConvex& obstacle, collision::FeatureCache& cache) {
+          search.addObstacle(object.entity, obstacle, cache);
+          const double limit = search.computeLimit(object.entity);
+          planes.reduceTo(Vec3::Zero(), std::max(0.0, limit - tie));
+        });
+    if (search.isFound(object.entity) && found.back().separation.verdict == Verdict::separated)
+      found.back().separation.errorBound += tie;
+  }
 }
 
 /// All entities closer than the limit, each with its nearest part, ascending.
@@ -73,23 +124,56 @@ std::vector<Contact> findNearby(Avatar& avatar, const ContactDistances& distance
   const std::size_t partCount = avatar.shape->parts.size();
   const Aabb box =
       inflated(placeBox(avatar.shape->box, avatar.footPosition), distances.reportLimit);
-  for (Obstacle& obstacle : avatar.obstacles) {
+  for (Obstacle& obstacle : avatar.obstacles.list) {
     if (!overlaps(box, obstacle.box)) continue;
-    for (std::size_t i = 0; i < partCount; ++i)
-      addCloseObstacle(avatar, i, obstacle, distances, found, count);
+    for (std::size_t i = 0; i < partCount; ++i) {
+      CloseSearch search(avatar.shape->parts[i], avatar.footPosition, distances, found, count);
+      if (overlaps(search.box, obstacle.box))
+        search.addObstacle(obstacle.entity, obstacle.convex, obstacle.cacheFor(i));
+    }
   }
+  for (const DenseObject& object : avatar.obstacles.dense)
+    findCloseDense(avatar, object, distances, found, count);
+  std::ranges::sort(found, {}, &Contact::other);
   return found;
+}
+
+/// Current separation from a dense object. Only parts that may be nearer than the nearest so far
+/// are asked.
+SeparationResult computeDenseSeparation(const Avatar& avatar, const DenseObject& object,
+                                        QueryCount& count) {
+  SeparationResult best;
+  best.distance = std::numeric_limits<double>::infinity();
+  for (const AvatarPart& avatarPart : avatar.shape->parts) {
+    const collision::PlacedConvex part = placeAvatarPart(avatarPart, avatar.footPosition);
+    const Aabb box = placeBox(avatarPart.box, avatar.footPosition);
+    const auto mayBeNearer = [&](const Aabb& other) {
+      return overlaps(inflated(box, best.distance + best.errorBound), other);
+    };
+    descendParts(*object.geometry, computeCore(box), mayBeNearer, [&](std::uint32_t i) {
+      if (!mayBeNearer(object.geometry->box(i))) return;
+      collision::FeatureCache cold;
+      const auto separation =
+          computeSeparationCounted(part, object.geometry->convex(i), best.distance, cold, count);
+      if (separation && isCloser(*separation, best)) best = *separation;
+    });
+  }
+  return best;
 }
 
 /// Current separation of the avatar and `other`; nullopt if `other` is out of reach.
 std::optional<SeparationResult> computeSeparationFrom(Avatar& avatar, EntityId other,
                                                       QueryCount& count) {
+  const auto& dense = avatar.obstacles.dense;
+  const auto object = std::ranges::lower_bound(dense, other, {}, &DenseObject::entity);
+  if (object != dense.end() && object->entity == other)
+    return computeDenseSeparation(avatar, *object, count);
   std::optional<SeparationResult> best;
-  for (Obstacle& obstacle : avatar.obstacles) {
+  for (Obstacle& obstacle : avatar.obstacles.list) {
     if (obstacle.entity != other) continue;
     for (std::size_t i = 0; i < avatar.shape->parts.size(); ++i) {
       const auto separation = computeSeparationCounted(
-          placeAvatarPart(avatar.shape->parts[i], avatar.footPosition), obstacle,
+          placeAvatarPart(avatar.shape->parts[i], avatar.footPosition), obstacle.convex,
           std::numeric_limits<double>::infinity(), obstacle.cacheFor(i), count);
       if (!best || isCloser(*separation, *best)) best = separation;
     }
@@ -151,8 +235,8 @@ std::optional<SeparationResult> computeTouchWith(const WorldData& world, Avatar&
                                                  EntityId body, QueryCount& count) {
   const std::optional<SeparationResult> separation = computeSeparationFrom(avatar, body, count);
   if (!separation) return std::nullopt;
-  std::vector<Obstacle> parts;
-  std::ranges::copy_if(avatar.obstacles, std::back_inserter(parts),
+  ObstacleSet parts;
+  std::ranges::copy_if(avatar.obstacles.list, std::back_inserter(parts.list),
                        [&](const Obstacle& obstacle) { return obstacle.entity == body; });
   const ShapeCastHit hit =
       castAvatarShape(*avatar.shape, avatar.footPosition, separation->distance * separation->normal,
@@ -175,6 +259,7 @@ void addYieldedBodies(const WorldData& world, Avatar& avatar, std::vector<Contac
 }
 
 void updateAvatarContacts(WorldData& world, Avatar& avatar, TickReport& report, QueryCount& count) {
+  const AvatarWorkCounter counter(avatar, count);
   refreshDynamicObstacles(world, avatar);
   std::vector<Contact> now = findNearby(avatar, computeContactDistances(world.settings), count);
   // The avatar with the smaller id reports a pair of avatars.

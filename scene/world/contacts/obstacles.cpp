@@ -2,16 +2,24 @@
 
 #include <algorithm>
 
+#include "scene/world/contacts/dense_obstacles.hpp"
+
 namespace enfilade::scene {
 namespace {
 
+constexpr double kPrefetchDistance = 3, kPrefetchSeconds = 1;  // metres, seconds
 constexpr double kCollectMargin =
     0.15;  // metres: obstacles are collected for several ticks at once
 
-/// Appends the parts of static object `object` that may overlap `bounds`.
+/// Appends the parts of static object `object` that may overlap `bounds`, or the whole object if it
+/// is dense.
 void collectStaticObstacles(const Scene& scene, std::uint32_t object, const Aabb& bounds,
-                            std::vector<Obstacle>& obstacles) {
+                            ObstacleSet& obstacles) {
   const CollisionGeometry& geometry = scene.collisionGeometry(object);
+  if (geometry.size() > kMaxListedParts) {
+    obstacles.dense.push_back({object + 1, &geometry});
+    return;
+  }
   thread_local std::vector<std::uint32_t> found;
   found.clear();
   geometry.query(bounds, found);
@@ -21,7 +29,7 @@ void collectStaticObstacles(const Scene& scene, std::uint32_t object, const Aabb
     obstacle.part = part;
     obstacle.box = geometry.box(part);
     obstacle.convex = geometry.convex(part);
-    obstacles.push_back(obstacle);
+    obstacles.list.push_back(obstacle);
   }
 }
 
@@ -55,6 +63,19 @@ void sortAndKeepCaches(std::vector<Obstacle>& obstacles, std::vector<Obstacle>& 
   }
 }
 
+/// The same for dense objects; caches of parts outside of `bounds` are dropped.
+void sortAndKeepDenseCaches(ObstacleSet& obstacles, ObstacleSet& last, const Aabb& bounds) {
+  std::ranges::sort(obstacles.dense, {}, &DenseObject::entity);
+  std::erase_if(last.denseCaches, [&](const auto& entry) {
+    const DensePair& pair = entry.first;
+    const auto object =
+        std::ranges::lower_bound(obstacles.dense, pair.entity, {}, &DenseObject::entity);
+    return object == obstacles.dense.end() || object->entity != pair.entity ||
+           !overlaps(object->geometry->box(pair.part), bounds);
+  });
+  obstacles.denseCaches = std::move(last.denseCaches);
+}
+
 /// Stationary bodies are treated as static.
 bool mayMove(const WorldData& world, collision::ProxyId proxy) {
   const std::uint32_t index = world.findBodyByProxy(proxy);
@@ -75,48 +96,115 @@ void collectBodyObstacles(const WorldData& world, std::uint32_t body, const Aabb
   }
 }
 
+/// The cast of one part of an avatar's shape. Each hit shortens the rest of the motion.
+class PartCast {
+ public:
+  PartCast(const AvatarPart& part, const Vec3& footPosition, const Vec3& displacement,
+           const collision::ContactOffset& contactOffset, Vec3& rest, ShapeCastHit& hit,
+           QueryCount& count)
+      : part_(placeAvatarPart(part, footPosition)),
+        start_(placeBox(part.box, footPosition)),
+        displacement_(displacement),
+        contactOffset_(contactOffset),
+        rest_(rest),
+        hit_(hit),
+        count_(count),
+        planes_(part_, rest, contactOffset.min) {
+    updateSweptBox();
+  }
+
+  bool reaches(const Aabb& box) const { return overlaps(sweptBox_, box); }
+
+  void castAgainst(EntityId entity, const collision::PlacedConvex& obstacle,
+                   collision::FeatureCache& cache) {
+    const collision::ShapeCastResult result =
+        collision::castShape(part_, rest_, obstacle, contactOffset_, cache);
+    count_.add(result);
+    const double fraction = hit_.fraction * result.fraction;
+    if (!result.stopped || (hit_.entity != 0 && fraction >= hit_.fraction)) return;
+    hit_ = {fraction, entity, -result.separationAtStop.normal, result.separationAtStop.distance,
+            result.separationAtStop};
+    rest_ = fraction * displacement_;
+    updateSweptBox();
+    planes_.reduceTo(rest_, contactOffset_.min);
+  }
+
+  void castAgainst(const DenseObject& object, std::uint32_t avatarPart, DenseCaches& caches) {
+    forEachNearPart(
+        object, avatarPart, start_, planes_,
+        [&](const Aabb& box) { return hit_.fraction > 0 && reaches(box); }, caches, count_,
+        [&](const collision::PlacedConvex& obstacle, collision::FeatureCache& cache) {
+          castAgainst(object.entity, obstacle, cache);
+        });
+  }
+
+ private:
+  void updateSweptBox() {
+    sweptBox_ = inflated(collision::sweptAabb(start_, rest_), contactOffset_.rest);
+  }
+
+  const collision::PlacedConvex part_;
+  const Aabb start_;
+  const Vec3& displacement_;
+  const collision::ContactOffset& contactOffset_;
+  Vec3& rest_;
+  ShapeCastHit& hit_;
+  QueryCount& count_;
+  collision::SeparatingPlanes planes_;
+  Aabb sweptBox_;
+};
+
 }  // namespace
 
 ShapeCastHit castAvatarShape(const AvatarShape& shape, const Vec3& footPosition,
-                             const Vec3& displacement, std::vector<Obstacle>& obstacles,
+                             const Vec3& displacement, ObstacleSet& obstacles,
                              const collision::ContactOffset& contactOffset, QueryCount& count) {
   ShapeCastHit hit;
   Vec3 rest = displacement;  // only the displacement before the earliest hit so far matters
-  for (std::size_t i = 0; i < shape.parts.size(); ++i) {
-    const Aabb start = placeBox(shape.parts[i].box, footPosition);
-    Aabb sweptBox = inflated(collision::sweptAabb(start, rest), contactOffset.rest);
-    for (Obstacle& obstacle : obstacles) {
-      if (!overlaps(sweptBox, obstacle.box)) continue;
-      const collision::ShapeCastResult result =
-          collision::castShape(placeAvatarPart(shape.parts[i], footPosition), rest, obstacle.convex,
-                               contactOffset, obstacle.cacheFor(i));
-      count.add(result);
-      const double fraction = hit.fraction * result.fraction;
-      if (!result.stopped || (hit.entity != 0 && fraction >= hit.fraction)) continue;
-      hit = {fraction, obstacle.entity, -result.separationAtStop.normal,
-             result.separationAtStop.distance, result.separationAtStop};
-      if (fraction == 0) return hit;
-      rest = fraction * displacement;
-      sweptBox = inflated(collision::sweptAabb(start, rest), contactOffset.rest);
+  for (std::uint32_t i = 0; i < shape.parts.size(); ++i) {
+    PartCast cast(shape.parts[i], footPosition, displacement, contactOffset, rest, hit, count);
+    for (Obstacle& obstacle : obstacles.list) {
+      if (!cast.reaches(obstacle.box)) continue;
+      cast.castAgainst(obstacle.entity, obstacle.convex, obstacle.cacheFor(i));
+      if (hit.fraction == 0) return hit;
+    }
+    for (const DenseObject& object : obstacles.dense) {
+      cast.castAgainst(object, i, obstacles.denseCaches);
+      if (hit.fraction == 0) return hit;
     }
   }
   return hit;
 }
 
 bool isClear(const AvatarShape& shape, const Vec3& footPosition, double clearance,
-             std::vector<Obstacle>& obstacles, QueryCount& count, EntityId& nearest) {
-  for (std::size_t i = 0; i < shape.parts.size(); ++i) {
+             ObstacleSet& obstacles, QueryCount& count, EntityId& nearest) {
+  for (std::uint32_t i = 0; i < shape.parts.size(); ++i) {
     const Aabb box = inflated(placeBox(shape.parts[i].box, footPosition), clearance);
-    for (Obstacle& obstacle : obstacles) {
-      if (!overlaps(box, obstacle.box)) continue;
+    const collision::PlacedConvex part = placeAvatarPart(shape.parts[i], footPosition);
+    bool clear = true;
+    const auto query = [&](EntityId entity, const collision::PlacedConvex& obstacle,
+                           collision::FeatureCache& cache) {
       ++count.narrow;
-      const auto separation =
-          collision::computeSeparationWithin(placeAvatarPart(shape.parts[i], footPosition),
-                                             obstacle.convex, clearance, obstacle.cacheFor(i));
-      if (!separation) continue;
+      const auto separation = collision::computeSeparationWithin(part, obstacle, clearance, cache);
+      if (!separation) return;
       if (separation->certificate == collision::Certificate::rational) ++count.rational;
-      nearest = obstacle.entity;
-      return false;
+      nearest = entity;
+      clear = false;
+    };
+    for (Obstacle& obstacle : obstacles.list) {
+      if (overlaps(box, obstacle.box))
+        query(obstacle.entity, obstacle.convex, obstacle.cacheFor(i));
+      if (!clear) return false;
+    }
+    for (const DenseObject& object : obstacles.dense) {
+      collision::SeparatingPlanes planes(part, Vec3::Zero(), clearance);
+      forEachNearPart(
+          object, i, box, planes, [&](const Aabb& other) { return clear && overlaps(box, other); },
+          obstacles.denseCaches, count,
+          [&](const collision::PlacedConvex& obstacle, collision::FeatureCache& cache) {
+            query(object.entity, obstacle, cache);
+          });
+      if (!clear) return false;
     }
   }
   return true;
@@ -166,50 +254,68 @@ bool areNeighboursStationary(const WorldData& world, const Avatar& avatar) {
 }
 
 void refreshDynamicObstacles(const WorldData& world, Avatar& avatar) {
-  for (std::size_t i = avatar.obstacles.size(); i-- > 0;) {
-    Obstacle& obstacle = avatar.obstacles[i];
+  for (std::size_t i = avatar.obstacles.list.size(); i-- > 0;) {
+    Obstacle& obstacle = avatar.obstacles.list[i];
     // Avatars come last, bodies anywhere.
     if (!avatar.hasBodyObstacles && obstacle.entity < world.firstAvatarId()) return;
     updateObstaclePose(world, obstacle);
   }
 }
 
+void prefetchSurroundings(const WorldData& world) {
+  if (!world.scene->hasDenseObjects()) return;
+  const auto ticksPerLook =
+      static_cast<std::uint64_t>(std::max(1.0, kPrefetchSeconds / world.settings.tickDuration));
+  std::vector<std::uint32_t> objects;
+  for (const Avatar& avatar : world.avatars) {
+    const bool isNew = avatar.cachedBounds.empty();
+    if (!isNew && (world.tick + avatar.id) % ticksPerLook != 0) continue;
+    const double distance =
+        kPrefetchDistance + 2 * kPrefetchSeconds * avatar.desiredVelocity.norm();
+    for (const collision::StaticId id :
+         world.broadPhase.overlapStatic(inflated(avatar.motionBounds, distance)))
+      objects.push_back(world.scene->solidObjects()[id]);
+  }
+  world.scene->prefetchCollisionGeometry(objects);
+}
+
 void collectObstacles(WorldData& world, Avatar& avatar) {
   const bool complete = !avatar.pairsChanged && contains(avatar.cachedBounds, avatar.motionBounds);
   avatar.pairsChanged = false;
   if (complete) return refreshDynamicObstacles(world, avatar);
-  std::vector<Obstacle> last;
-  last.swap(avatar.obstacles);
+  ObstacleSet& obstacles = avatar.obstacles;
+  ObstacleSet last;
+  std::swap(last, obstacles);
   avatar.hasBodyObstacles = false;
   avatar.cachedBounds = inflated(avatar.motionBounds, kCollectMargin);
   for (const auto& overlap : world.broadPhase.overlapsOf(avatar.proxy)) {
     if (!overlap.isDynamic) {
       collectStaticObstacles(*world.scene, world.scene->solidObjects()[overlap.id],
-                             avatar.cachedBounds, avatar.obstacles);
+                             avatar.cachedBounds, obstacles);
     } else if (const std::uint32_t body = world.findBodyByProxy(overlap.id); body != kNoBody) {
       makePartBoxes(world.bodies[body]);
-      appendBodyParts(world, body, avatar.obstacles);
+      appendBodyParts(world, body, obstacles.list);
       avatar.hasBodyObstacles = true;
     } else {
       const Avatar& other = *world.findAvatarByProxy(overlap.id);
       for (std::uint32_t part = 0; part < other.shape->parts.size(); ++part) {
-        avatar.obstacles.emplace_back();
-        avatar.obstacles.back().entity = other.id;
-        avatar.obstacles.back().part = part;
+        obstacles.list.emplace_back();
+        obstacles.list.back().entity = other.id;
+        obstacles.list.back().part = part;
       }
     }
   }
-  sortAndKeepCaches(avatar.obstacles, last);
+  sortAndKeepCaches(obstacles.list, last.list);
+  sortAndKeepDenseCaches(obstacles, last, avatar.cachedBounds);
   refreshDynamicObstacles(world, avatar);
 }
 
-std::vector<Obstacle> collectObstaclesInBox(const WorldData& world, const Aabb& box,
-                                            EntityId except) {
-  std::vector<Obstacle> obstacles;
+ObstacleSet collectObstaclesInBox(const WorldData& world, const Aabb& box, EntityId except) {
+  ObstacleSet obstacles;
   for (const collision::StaticId staticId : world.broadPhase.overlapStatic(box))
     collectStaticObstacles(*world.scene, world.scene->solidObjects()[staticId], box, obstacles);
   for (std::uint32_t i = 0; i < world.bodies.size(); ++i)
-    collectBodyObstacles(world, i, box, obstacles);
+    collectBodyObstacles(world, i, box, obstacles.list);
   for (const Avatar& other : world.avatars) {
     if (other.id == except) continue;
     for (std::uint32_t part = 0; part < other.shape->parts.size(); ++part) {
@@ -218,7 +324,7 @@ std::vector<Obstacle> collectObstaclesInBox(const WorldData& world, const Aabb& 
       obstacle.part = part;
       obstacle.box = placeBox(other.shape->parts[part].box, other.footPosition);
       obstacle.convex = placeAvatarPart(other.shape->parts[part], other.footPosition);
-      if (overlaps(obstacle.box, box)) obstacles.push_back(obstacle);
+      if (overlaps(obstacle.box, box)) obstacles.list.push_back(obstacle);
     }
   }
   return obstacles;

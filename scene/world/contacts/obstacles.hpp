@@ -21,13 +21,13 @@ struct ShapeCastHit {
 
 /// Casts the shape at `footPosition` by `displacement` against `obstacles`.
 ShapeCastHit castAvatarShape(const AvatarShape& shape, const Vec3& footPosition,
-                             const Vec3& displacement, std::vector<Obstacle>& obstacles,
+                             const Vec3& displacement, ObstacleSet& obstacles,
                              const collision::ContactOffset& contactOffset, QueryCount& count);
 
 /// True if the shape at `footPosition` keeps at least `clearance` metres from every obstacle.
 /// Otherwise `nearest` is an entity that is closer (not necessarily the closest).
 bool isClear(const AvatarShape& shape, const Vec3& footPosition, double clearance,
-             std::vector<Obstacle>& obstacles, QueryCount& count, EntityId& nearest);
+             ObstacleSet& obstacles, QueryCount& count, EntityId& nearest);
 
 /// A move stops at a distance of about `rest`; only an obstacle that would come closer than `min`
 /// stops it.
@@ -43,12 +43,15 @@ double computeClipFraction(const Aabb& footBounds, const Vec3& footPosition,
 /// bounds, with the displacement of its joints.
 Aabb computeAvatarFootBounds(const WorldSettings& settings, const Avatar& avatar);
 
+/// Has the collision geometry around avatars built before they get there. Looks around each avatar
+/// about once a second, and at those that spawned.
+void prefetchSurroundings(const WorldData& world);
+
 /// Collects the obstacles inside the avatar's motion bounds, unless the cached ones suffice.
 void collectObstacles(WorldData& world, Avatar& avatar);
 
 /// All obstacles that overlap `box`, without the avatar `except`.
-std::vector<Obstacle> collectObstaclesInBox(const WorldData& world, const Aabb& box,
-                                            EntityId except);
+ObstacleSet collectObstaclesInBox(const WorldData& world, const Aabb& box, EntityId except);
 
 /// True if none of the avatar's neighbours in the broad phase moved or can move in this tick.
 bool areNeighboursStationary(const WorldData& world, const Avatar& avatar);

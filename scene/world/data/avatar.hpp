@@ -59,11 +59,12 @@ struct Avatar {
   // Caches from tick to tick. They change no verdict, but the last bits of distances and so of the
   // motion. They are determined by the commands; a copy of a world must copy them.
   collision::ProxyId proxy = 0;
-  Aabb motionBounds;                ///< bounds of its motion in this tick, scene frame, metres
-  Aabb cachedBounds;                ///< region in which `obstacles` are complete
-  std::vector<Obstacle> obstacles;  ///< ascending (entity, part)
-  bool hasBodyObstacles = false;    ///< `obstacles` contain parts of bodies
-  std::vector<Contact> contacts;    ///< ascending `other`; part of the state, not a cache
+  Aabb motionBounds;  ///< bounds of its motion in this tick, scene frame, metres
+  Aabb cachedBounds;  ///< region in which `obstacles` are complete
+  ObstacleSet obstacles;
+  std::uint32_t narrowQueries = 0, partsLookedAt = 0;  ///< in this tick; for its report
+  bool hasBodyObstacles = false;                       ///< `obstacles` contain parts of bodies
+  std::vector<Contact> contacts;  ///< ascending `other`; part of the state, not a cache
 };
 
 struct QueuedOrder {

@@ -1,9 +1,12 @@
-// A convex part that is in the way of an avatar, and the memory of the last query against it.
+// What may be in the way of an avatar, and the memory of the last queries against it.
 #pragma once
 
+#include <compare>
+#include <map>
 #include <vector>
 
 #include "collision/narrow_phase/narrow_phase.hpp"
+#include "scene/model/shapes/collision_geometry.hpp"
 #include "scene/world/data/body.hpp"
 #include "scene/world/data/snapshot.hpp"
 
@@ -25,6 +28,27 @@ struct Obstacle {
     if (moreCaches.size() < avatarPart) moreCaches.resize(avatarPart);
     return moreCaches[avatarPart - 1];
   }
+};
+
+/// A static object of more than kMaxListedParts parts. They are not listed: its trees find those
+/// that a query needs.
+struct DenseObject {
+  EntityId entity = 0;
+  const CollisionGeometry* geometry = nullptr;
+};
+
+/// A part of a dense object, and a part of the avatar.
+struct DensePair {
+  EntityId entity = 0;
+  std::uint32_t part = 0;
+  std::uint32_t avatarPart = 0;
+  auto operator<=>(const DensePair&) const = default;
+};
+
+struct ObstacleSet {
+  std::vector<Obstacle> list;                                ///< ascending (entity, part)
+  std::vector<DenseObject> dense;                            ///< ascending entity
+  std::map<DensePair, collision::FeatureCache> denseCaches;  ///< of pairs that were close
 };
 
 }  // namespace enfilade::scene

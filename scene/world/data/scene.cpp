@@ -1,9 +1,15 @@
 #include "scene/world/data/scene.hpp"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <condition_variable>
+#include <deque>
 #include <map>
+#include <mutex>
+#include <set>
 #include <stdexcept>
+#include <thread>
 
 #include "scene/model/hasher.hpp"
 
@@ -28,6 +34,7 @@ struct Scene::LazyArray {
     if (items[i].compare_exchange_strong(first, own.get())) return *own.release();
     return *first;
   }
+  bool has(std::size_t i) const { return items[i].load(std::memory_order_relaxed) != nullptr; }
   std::size_t bytes() const {
     std::size_t sum = 0;
     for (std::size_t i = 0; i < size; ++i) {
@@ -38,6 +45,43 @@ struct Scene::LazyArray {
 
   std::unique_ptr<std::atomic<const T*>[]> items;
   std::size_t size;
+};
+
+/// A thread that builds collision geometry, from the first request on.
+class Scene::Prefetcher {
+ public:
+  explicit Prefetcher(const Scene& scene) : scene_(scene) {}
+
+  void add(std::span<const std::uint32_t> objects) {
+    const std::lock_guard lock(mutex_);
+    for (const std::uint32_t object : objects)
+      if (requested_.insert(object).second) queue_.push_back(object);
+    if (!thread_.joinable()) thread_ = std::jthread([this](std::stop_token stop) { run(stop); });
+    wakeUp_.notify_one();
+  }
+
+ private:
+  void run(const std::stop_token& stop) {
+    std::unique_lock lock(mutex_);
+    while (wakeUp_.wait(lock, stop, [this] { return !queue_.empty(); })) {
+      const std::uint32_t object = queue_.front();
+      queue_.pop_front();
+      lock.unlock();
+      try {
+        scene_.collisionGeometry(object);
+      } catch (const std::bad_alloc&) {
+        // The tick that needs it will report it.
+      }
+      lock.lock();
+    }
+  }
+
+  const Scene& scene_;
+  std::mutex mutex_;
+  std::condition_variable_any wakeUp_;
+  std::deque<std::uint32_t> queue_;
+  std::set<std::uint32_t> requested_;  ///< ever
+  std::jthread thread_;                ///< last: stops before the rest goes
 };
 
 namespace {
@@ -157,6 +201,14 @@ void requireValidIndices(const Model& model) {
   }
 }
 
+/// True if the object has so many triangles that its collision geometry may be dense.
+bool mayBeDense(const Model& model, std::uint32_t object) {
+  std::size_t triangles = 0;
+  for (const std::uint32_t mesh : model.objects[object].meshes)
+    triangles += model.meshes[mesh].indices.size() / 3;
+  return triangles > kMaxListedParts;
+}
+
 }  // namespace
 
 Scene::Scene(Model model) : model_(std::move(model)) {
@@ -174,6 +226,9 @@ Scene::Scene(Model model) : model_(std::move(model)) {
   hash_ = hashModel(model_);
   shapes_ = std::make_unique<LazyArray<Shape>>(meshesOfShape_.size());
   collisionGeometries_ = std::make_unique<LazyArray<CollisionGeometry>>(model_.objects.size());
+  hasDenseObjects_ = std::ranges::any_of(
+      solidObjects_, [&](std::uint32_t object) { return mayBeDense(model_, object); });
+  prefetcher_ = std::make_unique<Prefetcher>(*this);
 }
 
 Scene::~Scene() = default;
@@ -228,6 +283,13 @@ const CollisionGeometry& Scene::collisionGeometry(std::uint32_t object) const {
     return preservesArea(placed) ? buildCollisionGeometry(shape(object), placed)
                                  : CollisionGeometry();
   });
+}
+
+void Scene::prefetchCollisionGeometry(std::span<const std::uint32_t> objects) const {
+  std::vector<std::uint32_t> dense;
+  for (const std::uint32_t object : objects)
+    if (!collisionGeometries_->has(object) && mayBeDense(model_, object)) dense.push_back(object);
+  if (!dense.empty()) prefetcher_->add(dense);
 }
 
 Scene::Memory Scene::memory() const {

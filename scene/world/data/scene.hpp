@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "scene/model/model.hpp"
@@ -38,6 +39,13 @@ class Scene {
   /// thread; all callers get the same instance.
   const CollisionGeometry& collisionGeometry(std::uint32_t object) const;
 
+  /// Builds the collision geometry of those objects that have many triangles in a thread of its
+  /// own, in this order, so that their first use holds up no tick. Returns at once; results do not
+  /// depend on it.
+  void prefetchCollisionGeometry(std::span<const std::uint32_t> objects) const;
+  /// True if any solid object has many triangles.
+  bool hasDenseObjects() const { return hasDenseObjects_; }
+
   std::size_t shapeCount() const { return meshesOfShape_.size(); }
   /// Index of the object's shape, < shapeCount().
   std::uint32_t shapeIndex(std::uint32_t object) const { return shapeIndexOfObject_[object]; }
@@ -53,6 +61,7 @@ class Scene {
  private:
   template <class T>
   struct LazyArray;
+  class Prefetcher;
   void assignShapeIndices();
   void computeObjectBounds(const std::vector<bool>& isBodyObject);
 
@@ -66,6 +75,8 @@ class Scene {
   std::vector<std::vector<std::uint32_t>> meshesOfShape_;
   std::unique_ptr<LazyArray<Shape>> shapes_;
   std::unique_ptr<LazyArray<CollisionGeometry>> collisionGeometries_;
+  bool hasDenseObjects_ = false;
+  std::unique_ptr<Prefetcher> prefetcher_;  ///< last: its thread uses all others
 };
 
 }  // namespace enfilade::scene

@@ -33,6 +33,28 @@ struct TickAudit {
   double seconds = 0;                  ///< wall time of the audit; not part of any stage
 };
 
+/// Narrow-phase work, for the tick's counters.
+struct QueryCount {
+  std::uint32_t narrow = 0;
+  std::uint32_t rational = 0;
+  std::uint32_t bounded = 0;        ///< casts that stopped at their iteration limit
+  std::uint32_t partsLookedAt = 0;  ///< triangles and hulls of dense objects
+
+  void add(const collision::ShapeCastResult& cast) {
+    narrow += cast.queries;
+    rational += cast.exactQueries;
+    bounded += cast.iterationLimitReached ? 1 : 0;
+  }
+};
+
+/// The work of one avatar in a tick.
+struct AvatarWork {
+  EntityId id = 0;  ///< 0: no avatar made a query
+  std::uint32_t narrowQueries = 0;
+  std::uint32_t partsLookedAt = 0;
+  Vec3 footPosition = Vec3::Zero();  ///< after the tick
+};
+
 /// A contact, near miss, block or trigger event of a tick.
 struct ContactEvent {
   enum class Kind : std::uint8_t { begin, end, nearMiss, blocked, enter, leave, leftWorld };
@@ -102,6 +124,8 @@ struct TickReport {
   std::uint32_t iterationLimitedCasts = 0;  ///< shape casts stopped at their iteration limit
   std::uint64_t verticesLookedAt = 0;       ///< for the boxes of moving bodies and chain links
   std::uint64_t partBoxesMade = 0;          ///< of bodies with several parts
+  std::uint64_t partsLookedAt = 0;          ///< of dense objects, by avatars
+  AvatarWork costliestAvatar;               ///< the one with the most narrow-phase queries
   std::uint32_t activeContacts = 0;
   std::uint32_t crushedBodies = 0;  ///< penetrating pairs of a kinematic and a rigid body
   /// Maximum depth of avatars and rigid bodies, metres, by the exact verdict; 0: no penetration.
@@ -109,19 +133,6 @@ struct TickReport {
   std::optional<TickAudit> audit;  ///< only if the tick was audited
   /// All queues are empty, no avatar is falling or driven, no body moves except on a path.
   bool idle = true;
-};
-
-/// Narrow-phase work, for the tick's counters.
-struct QueryCount {
-  std::uint32_t narrow = 0;
-  std::uint32_t rational = 0;
-  std::uint32_t bounded = 0;  ///< casts that stopped at their iteration limit
-
-  void add(const collision::ShapeCastResult& cast) {
-    narrow += cast.queries;
-    rational += cast.exactQueries;
-    bounded += cast.iterationLimitReached ? 1 : 0;
-  }
 };
 
 }  // namespace enfilade::scene

@@ -134,8 +134,4 @@ Aabb computeBodyAabb(const SceneAt& sceneAt, const BodySnapshot& body) {
   return collision::inflated(Aabb{middle - halfExtent, middle + halfExtent}, kRounding * size);
 }
 
-double computeGap(const Aabb& a, const Aabb& b) {
-  return (a.min - b.max).cwiseMax(b.min - a.max).cwiseMax(0).norm();
-}
-
 }  // namespace enfilade::scene

@@ -65,7 +65,4 @@ PlacedEntity makePlacedEntity(const SceneAt& sceneAt, EntityId entity);
 /// Like PlacedEntity::box, but without visiting the parts; may be larger.
 Aabb computeBodyAabb(const SceneAt& sceneAt, const BodySnapshot& body);
 
-/// Distance between two AABBs, metres.
-double computeGap(const Aabb& a, const Aabb& b);
-
 }  // namespace enfilade::scene
