@@ -262,7 +262,8 @@ TEST(Checkpoint, OfAnotherSceneOrVersionIsRefusedWithBothNamed) {
   EXPECT_NE(refusal(boxScene({floorBox()}), bytes).find("another scene"), std::string::npos);
   auto later = bytes;
   ++later[8];
-  EXPECT_NE(refusal(busyRoom(), later).find("version " + std::to_string(kCheckpointVersion)), std::string::npos);
+  EXPECT_NE(refusal(busyRoom(), later).find("version " + std::to_string(kCheckpointVersion)),
+            std::string::npos);
 }
 
 }  // namespace
