@@ -8,6 +8,7 @@
 #include <set>
 
 #include "protocol/json_depth.hpp"
+#include "protocol/nearest_word.hpp"
 
 namespace enfilade::protocol {
 
@@ -319,6 +320,18 @@ std::string listVerbNames() {
   return names;
 }
 
+/// Names the verb that a key of the line probably means.
+[[noreturn]] void refuseWithoutVerb(const json& line) {
+  std::vector<std::string> names;
+  for (const Verb& verb : verbs()) names.emplace_back(verb.name);
+  for (const auto& [key, value] : line.items()) {
+    const std::string nearest = findNearestWord(key, names);
+    if (!nearest.empty() && key != "avatar")
+      refuse("", excerpt(key) + " is no command; did you mean \"" + nearest + "\"?");
+  }
+  refuse("", "no command; a line needs one of " + listVerbNames());
+}
+
 const Verb& findVerb(const json& line) {
   const Verb* found = nullptr;
   for (const Verb& verb : verbs()) {
@@ -329,7 +342,7 @@ const Verb& findVerb(const json& line) {
     }
     found = &verb;
   }
-  if (!found) refuse("", "no command; a line needs one of " + listVerbNames());
+  if (!found) refuseWithoutVerb(line);
   return *found;
 }
 

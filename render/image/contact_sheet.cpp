@@ -2,18 +2,16 @@
 
 #include <algorithm>
 
-#include "render/image/drawing.hpp"
-#include "render/image/font.hpp"
+#include "render/image/canvas.hpp"
 
 namespace enfilade::render {
 namespace {
 
 // Pixels.
 constexpr int kMaxCellWidth = 400, kMaxCellHeight = 400;
-constexpr int kMargin = 16, kCaptionGap = 7;
-constexpr int kTitleScale = 3, kCaptionScale = 1;
-constexpr int kTitleHeight = kTitleScale * kLetterHeight + kMargin;
-constexpr int kCaptionHeight = kCaptionGap + kCaptionScale * kLetterHeight;
+constexpr int kMargin = 16, kCaptionGap = 5;
+constexpr double kTitleSize = 20, kCaptionSize = 11;
+constexpr int kTitleHeight = 40, kCaptionHeight = kCaptionGap + 15;
 
 constexpr Colour kBackground{24, 26, 31}, kTitle{240, 238, 230}, kCaption{176, 180, 188};
 constexpr Colour kRule{70, 75, 86};
@@ -40,12 +38,6 @@ Size computeCellSize(const std::vector<CaptionedImage>& pictures) {
   return cell;
 }
 
-/// Truncates the text to `width` pixels and appends dots.
-std::string shortenText(const std::string& text, int width, int scale) {
-  const auto maxLetters = static_cast<std::size_t>(std::max(3, width / (kLetterAdvance * scale)));
-  return text.size() <= maxLetters ? text : text.substr(0, maxLetters - 2) + "..";
-}
-
 }  // namespace
 
 Image makeContactSheet(const std::vector<CaptionedImage>& pictures, const std::string& title,
@@ -55,15 +47,15 @@ Image makeContactSheet(const std::vector<CaptionedImage>& pictures, const std::s
   const int across = std::clamp(columns, 1, std::max(1, count));
   const int down = (count + across - 1) / across;
   const int stepX = cell.width + kMargin, stepY = cell.height + kCaptionHeight + kMargin;
-  Image sheet = makeBlankImage(kMargin + across * stepX, 2 * kMargin + kTitleHeight + down * stepY,
-                               kBackground);
+  Canvas sheet(kMargin + across * stepX, 2 * kMargin + kTitleHeight + down * stepY, kBackground);
 
-  const int room = sheet.width - 2 * kMargin;
-  const bool large = static_cast<int>(title.size()) * kLetterAdvance * kTitleScale <= room;
-  const int titleScale = large ? kTitleScale : kTitleScale - 1;
-  drawText(sheet, kMargin, kMargin, shortenText(title, room, titleScale), titleScale, kTitle);
-  drawLine(sheet, kMargin, kMargin + kTitleHeight - 4, sheet.width - kMargin,
-           kMargin + kTitleHeight - 4, 1, kRule);
+  const double room = sheet.width() - 2 * kMargin;
+  TextStyle titleStyle, captionStyle;
+  titleStyle.size = kTitleSize, titleStyle.bold = true, titleStyle.colour = kTitle;
+  captionStyle.size = kCaptionSize, captionStyle.colour = kCaption;
+  sheet.text({kMargin, kMargin}, sheet.shorten(title, titleStyle, room), titleStyle);
+  const double rule = kMargin + kTitleHeight - 6;
+  sheet.line({kMargin, rule}, {sheet.width() - kMargin, rule}, 1, kRule);
 
   for (int i = 0; i < count; ++i) {
     const CaptionedImage& picture = pictures[static_cast<std::size_t>(i)];
@@ -71,13 +63,14 @@ Image makeContactSheet(const std::vector<CaptionedImage>& pictures, const std::s
     const int top = 2 * kMargin + kTitleHeight + i / across * stepY;
     if (!picture.image.rgb.empty()) {
       const Size size = fitSize(picture.image, cell);
-      paste(sheet, resizeImage(picture.image, size.width, size.height),
-            left + (cell.width - size.width) / 2, top + (cell.height - size.height) / 2);
+      sheet.image(resizeImage(picture.image, size.width, size.height),
+                  {left + (cell.width - size.width) / 2.0, top + (cell.height - size.height) / 2.0},
+                  size.width, size.height);
     }
-    drawText(sheet, left, top + cell.height + kCaptionGap,
-             shortenText(picture.caption, cell.width, kCaptionScale), kCaptionScale, kCaption);
+    sheet.text({static_cast<double>(left), static_cast<double>(top + cell.height + kCaptionGap)},
+               sheet.shorten(picture.caption, captionStyle, cell.width), captionStyle);
   }
-  return sheet;
+  return sheet.toImage();
 }
 
 }  // namespace enfilade::render

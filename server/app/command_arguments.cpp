@@ -349,6 +349,11 @@ void addWalkOptions(CLI::App& walk, CommandArguments& into) {
   walk.add_option("--connect", into.connect, "Address and port of the server")
       ->required()
       ->check(CLI::Validator(validateEndpoint, "HOST:PORT"));
+  walk.add_option("--world", into.world, "World of the server; default: the main world")
+      ->type_name("NAME");
+  walk.add_option("--token", into.token, "Token, if the server requires one; or ENFILADE_TOKEN")
+      ->envname("ENFILADE_TOKEN")
+      ->type_name("TOKEN");
   walk.footer("Example: enfilade walk walk.jsonl --connect 127.0.0.1:7878 --out out");
 }
 
@@ -369,6 +374,12 @@ void addInspectOptions(CLI::App& inspect, CommandArguments& into) {
   inspect.add_flag("--strict", into.strict, "Exit with 3 if there are problems");
   inspect.add_option("--plan", into.plan, "Folder for one floor plan per storey")
       ->check(CLI::Validator(validateFolder, "DIR"));
+  inspect.add_option("--plan-format", into.planFormat, "Format of the plans")
+      ->check(CLI::IsMember({"png", "svg", "pdf"}))
+      ->capture_default_str();
+  inspect.add_option("--plan-scale", into.planScale, "Scale of svg and pdf plans: 1:N")
+      ->check(CLI::Range(1.0, 100000.0))
+      ->capture_default_str();
   inspect.footer(
       "SCENE may be a RECORDING: --json and --strict apply.\n"
       "Example: enfilade inspect house.ifc --plan out/plans --strict");

@@ -28,8 +28,9 @@ struct ModelArguments {
 struct CommandArguments {
   DoctorCommand doctor;
   ModelArguments model;
-  std::string script, out, plan, listen = "127.0.0.1:7878", connect;
-  std::string from, then, run;
+  std::string script, out, plan, planFormat = "png", listen = "127.0.0.1:7878", connect;
+  double planScale = 100;
+  std::string from, then, run, world, token;
   RecordingChoice record;
   std::string recordChannels = "walk", recordFrames;
   bool strict = false, verify = false, json = false, objects = false, stopAtEndOfInput = false;

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "protocol/mcap/reader.hpp"
+#include "protocol/nearest_word.hpp"
 #include "server/app/command_arguments.hpp"
 #include "server/app/help_formatter.hpp"
 #include "server/base/parse_number.hpp"
@@ -208,16 +209,36 @@ const Verb kVerbs[] = {
      }},
     {"walk", "Run a walk script on a server", addWalkOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
-       return WalkCommand{read.script, read.out, *parseEndpoint(read.connect), read.strict};
+       return WalkCommand{read.script, read.out,   *parseEndpoint(read.connect),
+                          read.world,  read.token, read.strict};
      }},
     {"doctor", "Test all graphics devices and report missing components", addDoctorOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand { return read.doctor; }},
     {"inspect", "Report the contents and problems of a scene or a recording", addInspectOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
-       return InspectCommand{makeModelOptions(read.model), read.json, read.objects, read.strict,
-                             read.plan};
+       return InspectCommand{makeModelOptions(read.model),
+                             read.json,
+                             read.objects,
+                             read.strict,
+                             read.plan,
+                             read.planFormat,
+                             read.planScale};
      }},
 };
+
+/// Error text for a first word that is no command.
+std::string describeMissingVerb(std::string_view word) {
+  std::vector<std::string> names;
+  std::string list;
+  for (const Verb& verb : kVerbs) {
+    names.emplace_back(verb.name);
+    list += (list.empty() ? "" : ", ") + names.back();
+  }
+  if (word.empty() || word.starts_with('-')) return "give a command: " + list;
+  const std::string nearest = protocol::findNearestWord(word, names);
+  return "'" + std::string(word.substr(0, 40)) + "' is no command; " +
+         (nearest.empty() ? "the commands are " + list : "did you mean '" + nearest + "'?");
+}
 
 }  // namespace
 
@@ -225,9 +246,13 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
   CLI::App app("Enfilade: virtual walk-throughs without a display", "enfilade");
   app.require_subcommand(1);
   app.formatter(std::make_shared<HelpFormatter>());
-  app.set_version_flag("--version", formatVersion());
+  app.set_version_flag("--version,-v", formatVersion());
   CommandArguments read;
   const std::string_view requestedVerb = argc > 1 ? argv[1] : "";
+  if (argc == 2 && requestedVerb == "help") {
+    constexpr std::array<const char*, 2> kHelp{"enfilade", "--help"};
+    return readCommandLine(2, kHelp.data());
+  }
   for (const Verb& verb : kVerbs) {
     CLI::App* added = app.add_subcommand(verb.name, verb.description);
     // Only this command's options are built: all of them take half a millisecond.
@@ -243,7 +268,9 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
       return ExitCode::runtimeError;
     }
     const auto verbs = app.get_subcommands();
-    std::cerr << "enfilade: " << error.what() << "\n"
+    std::cerr << "enfilade: "
+              << (verbs.empty() ? describeMissingVerb(requestedVerb) : std::string(error.what()))
+              << "\n"
               << "enfilade " << (verbs.empty() ? "" : verbs[0]->get_name() + " ")
               << "--help lists the options\n";
     return ExitCode::usageError;

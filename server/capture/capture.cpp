@@ -200,6 +200,7 @@ ExitCode runCapture(const CaptureCommand& command) {
   // A file beyond the shell's limit then causes a write error and does not kill the process.
   std::signal(SIGXFSZ, SIG_IGN);
   if (!command.run.dryRun) prepareFolder(command.out);
+  readPathFile(command.path);  // a wrong path is reported before the model is read
   const std::shared_ptr<const scene::Scene> scene = loadScene(command.model);
   if (isInterrupted()) throw Interrupted{};
   const CapturePlan plan = planCapture(scene, command.path, command.pictures, command.run.shard);

@@ -18,17 +18,6 @@ constexpr double kAspectTolerance = 1e-3;                 // relative, of width 
 
 enum class PathKind : std::uint8_t { tum, json, script, gltf };
 
-std::string readPathFile(const std::filesystem::path& file) {
-  std::error_code error;
-  if (std::filesystem::is_directory(file, error))
-    throw CameraPathError(file.string() + ": is a folder; give the file of the camera path");
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in) throw CameraPathError(file.string() + ": cannot be read; check the path");
-  return std::move(text).str();
-}
-
 /// Detects the kind by the extension; for other names, a walk script has JSON in its first line.
 PathKind detectPathKind(const std::filesystem::path& file, const std::string& text) {
   const std::string extension = file.extension().string();
@@ -154,6 +143,17 @@ void noteUnusedOptions(const PictureOptions& options, bool script, bool gltf,
 }
 
 }  // namespace
+
+std::string readPathFile(const std::filesystem::path& file) {
+  std::error_code error;
+  if (std::filesystem::is_directory(file, error))
+    throw CameraPathError(file.string() + ": is a folder; give the file of the camera path");
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  if (!in) throw CameraPathError(file.string() + ": cannot be read; check the path");
+  return std::move(text).str();
+}
 
 CapturePlan planCapture(const std::shared_ptr<const scene::Scene>& scene,
                         const std::filesystem::path& file, const PictureOptions& options,

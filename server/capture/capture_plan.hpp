@@ -58,6 +58,9 @@ CapturePlan planCapture(const std::shared_ptr<const scene::Scene>& scene,
                         const std::filesystem::path& path, const PictureOptions& options,
                         const Shard& shard);
 
+/// The text of a camera path's file. Throws CameraPathError.
+std::string readPathFile(const std::filesystem::path& file);
+
 /// True if frame `index` belongs to the shard.
 inline bool isInShard(const Shard& shard, std::size_t index) {
   return index % shard.count == shard.index;

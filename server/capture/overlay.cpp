@@ -4,24 +4,27 @@
 #include <cmath>
 #include <optional>
 
-#include "render/image/drawing.hpp"
-#include "render/image/font.hpp"
+#include "render/image/canvas.hpp"
 #include "server/plans/plan_image.hpp"
 
 namespace enfilade::server {
 namespace {
 
+using render::Canvas;
 using render::Colour;
 using render::Image;
 
 constexpr double kMinBoxShare = 0.0005, kMaxBoxShare = 0.4;  // of the picture, for boxes
 constexpr std::size_t kMaxNames = 16;                        // largest objects with a label
-constexpr int kLabelHeight = render::kLetterHeight + 2;      // pixels
+constexpr double kLabelSize = 11;                            // pixels, of letters
+constexpr int kLabelHeight = 14;                             // pixels
 constexpr int kMaxLabelLines = 4;                            // from object to its label
 constexpr double kDepthTolerance = 0.02;                     // metres; occlusion tolerance
 constexpr double kTrailLift = 0.03;                          // metres of paths above floor
 constexpr Colour kContact{214, 40, 40}, kNearMiss{240, 150, 20}, kPaper{250, 249, 246},
     kInk{30, 30, 36};
+
+const render::TextStyle kLabelStyle{kLabelSize, kInk, false, 1.5, kPaper};
 
 /// The bounding rectangle of an object's visible pixels.
 struct ObjectRect {
@@ -63,14 +66,10 @@ std::vector<ObjectRect> findObjectRects(const render::Frame& frame) {
   return rects;
 }
 
-void drawBox(Image& image, const ObjectRect& rect) {
-  const double left = rect.left, top = rect.top, right = rect.right + 1.0,
-               bottom = rect.bottom + 1.0;
-  const Colour colour = computeAvatarColour(rect.id);
-  render::drawLine(image, left, top, right, top, 1.5, colour);
-  render::drawLine(image, right, top, right, bottom, 1.5, colour);
-  render::drawLine(image, right, bottom, left, bottom, 1.5, colour);
-  render::drawLine(image, left, bottom, left, top, 1.5, colour);
+void drawBox(Canvas& canvas, const ObjectRect& rect) {
+  canvas.rectangle({static_cast<double>(rect.left), static_cast<double>(rect.top)},
+                   rect.right + 1.0 - rect.left, rect.bottom + 1.0 - rect.top, 1.5,
+                   computeAvatarColour(rect.id));
 }
 
 /// The last part of an object's path, or an avatar's name.
@@ -108,16 +107,16 @@ int findLabelColumn(const render::Frame& frame, const ObjectRect& rect) {
 
 /// Places a label on the object, or as close above or below as free space allows; nullopt: no
 /// space.
-std::optional<Label> placeLabel(const render::Frame& frame, const ObjectRect& rect,
-                                const std::string& name, const std::vector<Label>& others) {
-  const int width = static_cast<int>(name.size()) * render::kLetterAdvance + 2;
+std::optional<Label> placeLabel(const Canvas& canvas, const render::Frame& frame,
+                                const ObjectRect& rect, const std::string& name,
+                                const std::vector<Label>& others) {
+  const int width = static_cast<int>(canvas.measure(name, kLabelStyle).width) + 4;
   if (name.empty() || width > frame.camera.width) return std::nullopt;
   const int left =
       std::clamp(findLabelColumn(frame, rect) - width / 2, 1, frame.camera.width - width);
   for (int lines = 0; lines <= kMaxLabelLines; ++lines) {
     for (const int shift : {-lines, lines}) {
-      const Label label{left, rect.middleY() - render::kLetterHeight / 2 + shift * kLabelHeight,
-                        width};
+      const Label label{left, rect.middleY() - kLabelHeight / 2 + shift * kLabelHeight, width};
       const bool inside = label.top >= 1 && label.top + kLabelHeight <= frame.camera.height;
       if (inside && std::none_of(others.begin(), others.end(),
                                  [&](const Label& other) { return isOverlapping(label, other); }))
@@ -125,13 +124,6 @@ std::optional<Label> placeLabel(const render::Frame& frame, const ObjectRect& re
     }
   }
   return std::nullopt;
-}
-
-void drawLabel(Image& image, const Label& label, const std::string& name) {
-  const int x = label.left, y = label.top;
-  for (const auto& [dx, dy] : {std::pair(-1, 0), {1, 0}, {0, -1}, {0, 1}})
-    render::drawText(image, x + dx, y + dy, name, 1, kPaper);
-  render::drawText(image, x, y, name, 1, kInk);
 }
 
 /// True if the frame shows no surface before the point. Points outside the picture are not visible.
@@ -144,17 +136,16 @@ bool isVisible(const render::Frame& frame, const Vec3& projected) {
   return std::isnan(depth) || projected.z() <= static_cast<double>(depth) + kDepthTolerance;
 }
 
-void drawContacts(Image& image, const render::Frame& frame, const CaptureFrame& captureFrame) {
+void drawContacts(Canvas& canvas, const render::Frame& frame, const CaptureFrame& captureFrame) {
   for (const ContactMark& contact : captureFrame.contacts) {
     const Vec3 at = render::project(frame.camera, contact.point);
     const bool inFront = isVisible(frame, at);
-    render::drawDisc(image, at.x(), at.y(), inFront ? 6 : 3, kPaper);
-    render::drawDisc(image, at.x(), at.y(), inFront ? 4.5 : 2,
-                     contact.isNearMiss ? kNearMiss : kContact);
+    canvas.disc({at.x(), at.y()}, inFront ? 6 : 3, kPaper);
+    canvas.disc({at.x(), at.y()}, inFront ? 4.5 : 2, contact.isNearMiss ? kNearMiss : kContact);
   }
 }
 
-void drawTrail(Image& image, const render::Frame& frame, const AvatarTrail& trail,
+void drawTrail(Canvas& canvas, const render::Frame& frame, const AvatarTrail& trail,
                std::uint64_t tick) {
   const Vec3 lift(0, kTrailLift, 0);
   for (std::size_t i = 1; i < trail.steps.size() && trail.steps[i].tick <= tick; ++i) {
@@ -162,8 +153,8 @@ void drawTrail(Image& image, const render::Frame& frame, const AvatarTrail& trai
     const Vec3 to = render::project(frame.camera, trail.steps[i].position + lift);
     if (!(from.z() > frame.camera.near && to.z() > frame.camera.near)) continue;
     const bool inFront = isVisible(frame, from) && isVisible(frame, to);
-    render::drawLine(image, from.x(), from.y(), to.x(), to.y(), inFront ? 3 : 1,
-                     computeAvatarColour(trail.id));
+    canvas.line({from.x(), from.y()}, {to.x(), to.y()}, inFront ? 3 : 1,
+                computeAvatarColour(trail.id));
   }
 }
 
@@ -172,27 +163,27 @@ void drawTrail(Image& image, const render::Frame& frame, const AvatarTrail& trai
 Image drawOverlay(const render::Frame& frame, const OverlayChoice& choice,
                   const scene::Model& model, const CapturePlan& plan,
                   const CaptureFrame& captureFrame) {
-  Image image = render::toImage(frame);
+  Canvas canvas(render::toImage(frame));
   if (choice.paths) {
-    for (const AvatarTrail& trail : plan.trails) drawTrail(image, frame, trail, frame.tick);
+    for (const AvatarTrail& trail : plan.trails) drawTrail(canvas, frame, trail, frame.tick);
   }
   const std::vector<ObjectRect> rects =
       choice.boxes || choice.names ? findObjectRects(frame) : std::vector<ObjectRect>();
   if (choice.boxes) {
-    for (const ObjectRect& rect : rects) drawBox(image, rect);
+    for (const ObjectRect& rect : rects) drawBox(canvas, rect);
   }
   if (choice.names) {
     std::vector<Label> labels;
     for (std::size_t i = 0; i < std::min(rects.size(), kMaxNames); ++i) {
       const std::string name = findName(model, plan, rects[i].id);
-      const auto label = placeLabel(frame, rects[i], name, labels);
+      const auto label = placeLabel(canvas, frame, rects[i], name, labels);
       if (!label) continue;
-      drawLabel(image, *label, name);
+      canvas.text({label->left + 2.0, static_cast<double>(label->top)}, name, kLabelStyle);
       labels.push_back(*label);
     }
   }
-  if (choice.contacts) drawContacts(image, frame, captureFrame);
-  return image;
+  if (choice.contacts) drawContacts(canvas, frame, captureFrame);
+  return canvas.toImage();
 }
 
 }  // namespace enfilade::server

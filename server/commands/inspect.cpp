@@ -17,8 +17,7 @@
 namespace enfilade::server {
 namespace {
 
-void drawPlans(const std::shared_ptr<const scene::Scene>& scene,
-               const std::filesystem::path& folder) {
+void drawPlans(const std::shared_ptr<const scene::Scene>& scene, const InspectCommand& command) {
   render::RendererSelector renderer(scene);
   const PlanRenderer picture = [&](const render::Camera& camera) {
     const render::Frame frame = renderer.render(scene::Snapshot(), camera);
@@ -26,8 +25,13 @@ void drawPlans(const std::shared_ptr<const scene::Scene>& scene,
   };
   int number = 0;
   for (const StoreyFloor& storey : findStoreys(*scene)) {
-    const auto file = folder / ("storey-" + std::to_string(++number) + ".png");
-    render::writePng(file, drawStoreyPlan(*scene, storey, picture).value());
+    const auto file =
+        command.plan / ("storey-" + std::to_string(++number) + "." + command.planFormat);
+    if (command.planFormat == "png") {
+      render::writePng(file, drawStoreyPlan(*scene, storey, picture).value());
+    } else {
+      writeStoreyPage(*scene, storey, picture, command.planScale, file);
+    }
     spdlog::info("floor at {:.2f} m: {}", storey.height, file.string());
   }
 }
@@ -44,7 +48,7 @@ ExitCode inspect(const InspectCommand& command) {
   const std::string text = command.json ? formatInspectionJson(inspection, command.objects) + "\n"
                                         : formatInspectionTable(inspection, command.objects);
   writeToStdout(text);
-  if (!command.plan.empty()) drawPlans(inspection.loaded.scene, command.plan);
+  if (!command.plan.empty()) drawPlans(inspection.loaded.scene, command);
   const auto& problems = inspection.report.diagnostics;
   const bool hasProblems =
       command.strict && std::any_of(problems.begin(), problems.end(), [](const auto& problem) {

@@ -11,9 +11,11 @@ namespace enfilade::server {
 struct InspectCommand {
   ModelOptions model;
   bool json = false;
-  bool objects = false;        ///< list all objects
-  bool strict = false;         ///< problems cause the exit code `violations`
-  std::filesystem::path plan;  ///< folder for one plan per storey; empty: no plans
+  bool objects = false;            ///< list all objects
+  bool strict = false;             ///< problems cause the exit code `violations`
+  std::filesystem::path plan;      ///< folder for one plan per storey; empty: no plans
+  std::string planFormat = "png";  ///< or svg, pdf
+  double planScale = 100;          ///< of svg and pdf: 1:planScale
 };
 
 /// Throws scene::ImportError, and render::RenderError if plans cannot be drawn.

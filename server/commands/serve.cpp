@@ -111,6 +111,7 @@ WorldOptions makeWorldOptions(const ServeCommand& command) {
 ExitCode serveUntilSignal(const ServeCommand& command) {
   Access access = command.access;
   if (!command.tokenFile.empty()) access.tokens = readTokens(command.tokenFile);
+  requireListenable(command.listen, access);  // before the model is read
   const auto scene = loadScene(command.model);
   ServerOptions options;
   options.additionalScenes = loadFurtherScenes(command);

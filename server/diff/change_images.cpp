@@ -26,6 +26,7 @@ using Snapshots = std::map<std::uint64_t, std::shared_ptr<const scene::Snapshot>
 
 constexpr int kWidth = 640, kHeight = 480;      // pixels of one view
 constexpr int kBorder = 12, kLine = 22;         // pixels
+constexpr double kRingRadius = 22;              // pixels, around the changed point
 constexpr double kSharedPictureDistance = 0.5;  // metres, and
 constexpr double kSharedPictureTime = 2;        // seconds: closer changes share a picture
 constexpr double kTrailStep = 0.05;             // metres between two points of a drawn path
@@ -214,23 +215,6 @@ class ViewpointFinder {
   scene::RayCaster rays_;
 };
 
-/// Draws a ring around the point.
-void drawRing(render::Image& image, const render::Camera& camera, const Vec3& point) {
-  constexpr int kCorners = 32;
-  constexpr double kRadius = 22;  // pixels
-  constexpr double kFullAngle = 6.283185307179586;
-  const Vec3 at = render::project(camera, point);
-  const auto corner = [&](int i) {
-    const double angle = kFullAngle * i / kCorners;
-    return std::pair(at.x() + kRadius * std::cos(angle), at.y() + kRadius * std::sin(angle));
-  };
-  for (int i = 0; i < kCorners; ++i) {
-    const auto [x0, y0] = corner(i);
-    const auto [x1, y1] = corner(i + 1);
-    render::drawLine(image, x0, y0, x1, y1, 2, {214, 40, 40});
-  }
-}
-
 render::Image renderMoment(render::RendererSelector& renderer, const scene::Scene& scene,
                            const scene::Snapshot& snapshot, const Viewpoint& from,
                            const Moment& moment) {
@@ -242,28 +226,27 @@ render::Image renderMoment(render::RendererSelector& renderer, const scene::Scen
   CaptureFrame captureFrame;
   captureFrame.camera = from.camera;
   captureFrame.contacts = {{moment.point, false}};
-  render::Image image = drawOverlay(frame, choice, scene.model(), {}, captureFrame);
-  drawRing(image, from.camera, moment.point);
-  return image;
+  render::Canvas canvas(drawOverlay(frame, choice, scene.model(), {}, captureFrame));
+  const Vec3 at = render::project(from.camera, moment.point);
+  canvas.arc({at.x(), at.y()}, kRingRadius, 0, 2 * M_PI, 2, {214, 40, 40});
+  return canvas.toImage();
 }
 
 /// Composes both views with captions. `before` may be empty.
 render::Image composeSideBySide(const render::Image& before, const render::Image& after,
                                 const Moment& moment) {
   const int width = 2 * kWidth + 3 * kBorder;
-  render::Image image =
-      render::makeBlankImage(width, kHeight + 2 * kBorder + 3 * kLine, kPlanPaper);
-  render::drawText(image, kBorder, kBorder, moment.line, 1, kPlanInk);
-  render::drawText(image, kBorder, kBorder + kLine, moment.worse ? "got worse" : "changed", 1,
-                   kPlanInk);
-  const int top = kBorder + 2 * kLine;
-  if (!before.rgb.empty()) render::paste(image, before, kBorder, top);
-  render::paste(image, after, kWidth + 2 * kBorder, top);
-  const int below = top + kHeight + 6;
-  render::drawText(image, kBorder, below, before.rgb.empty() ? "before: not available" : "before",
-                   1, kPlanInk);
-  render::drawText(image, kWidth + 2 * kBorder, below, "after", 1, kPlanInk);
-  return image;
+  render::Canvas canvas(width, kHeight + 2 * kBorder + 3 * kLine, kPlanPaper);
+  render::TextStyle style;
+  style.size = 13, style.colour = kPlanInk;
+  canvas.text({kBorder, kBorder}, canvas.shorten(moment.line, style, width - 2 * kBorder), style);
+  canvas.text({kBorder, kBorder + kLine}, moment.worse ? "got worse" : "changed", style);
+  const double top = kBorder + 2 * kLine, right = kWidth + 2 * kBorder, below = top + kHeight + 4;
+  if (!before.rgb.empty()) canvas.image(before, {kBorder, top}, kWidth, kHeight);
+  canvas.image(after, {right, top}, kWidth, kHeight);
+  canvas.text({kBorder, below}, before.rgb.empty() ? "before: not available" : "before", style);
+  canvas.text({right, below}, "after", style);
+  return canvas.toImage();
 }
 
 void drawMoments(std::vector<Moment>& moments, const WalkDifference& difference,

@@ -7,6 +7,7 @@
 #include "collision/assert.hpp"
 #include "server/base/server_error.hpp"
 #include "server/net/protocol_detector.hpp"
+#include "server/net/server.hpp"
 
 namespace enfilade::server {
 namespace asio = boost::asio;
@@ -30,20 +31,20 @@ tcp::endpoint resolveEndpoint(const Endpoint& where) {
   return {address, where.port};
 }
 
-void requireProtectedEndpoint(const Endpoint& where, const tcp::endpoint& endpoint,
-                              const Access& access) {
-  if (endpoint.address().is_loopback()) return;
+tcp::endpoint resolveProtected(const Endpoint& where, const Access& access) {
+  const tcp::endpoint endpoint = resolveEndpoint(where);
+  if (endpoint.address().is_loopback()) return endpoint;
   if (access.tokens.empty() || !access.insecure) {
     throw ServerError("will not listen on " + formatEndpoint(where) +
                       ": other machines can reach that address, and the connection is not "
                       "encrypted. Use 127.0.0.1 with a tunnel (ssh -L) or a TLS proxy, or give "
                       "--token-file and --insecure");
   }
+  return endpoint;
 }
 
 tcp::acceptor openAcceptor(asio::io_context& context, const Endpoint& where, const Access& access) {
-  const tcp::endpoint endpoint = resolveEndpoint(where);
-  requireProtectedEndpoint(where, endpoint, access);
+  const tcp::endpoint endpoint = resolveProtected(where, access);
   tcp::acceptor acceptor(context);
   try {
     acceptor.open(endpoint.protocol());
@@ -58,6 +59,10 @@ tcp::acceptor openAcceptor(asio::io_context& context, const Endpoint& where, con
 }
 
 }  // namespace
+
+void requireListenable(const Endpoint& listen, const Access& access) {
+  resolveProtected(listen, access);
+}
 
 Listener::Listener(asio::io_context& context, const Endpoint& where, WorldRegistry& worlds,
                    const ServerLimits& limits, Access access)

@@ -22,6 +22,10 @@ struct ServerOptions {
   DrawingOptions drawing;
 };
 
+/// Throws ServerError if a server would not listen on the address: it is no numeric one, or
+/// reachable from other machines without permission in `access`.
+void requireListenable(const Endpoint& listen, const Access& access);
+
 class Server {
  public:
   /// Clients may connect after construction. Throws ServerError if the address is unavailable, or

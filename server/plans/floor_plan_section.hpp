@@ -1,27 +1,28 @@
-// Horizontal sections of a scene: the lines of a floor plan. Without them, walls of single faces
-// would be invisible from above.
+// Horizontal sections of a scene: the outlines of a floor plan.
 #pragma once
 
 #include <vector>
 
-#include "render/camera.hpp"
-#include "render/image/image.hpp"
 #include "scene/world/data/scene.hpp"
 
 namespace enfilade::server {
 
-/// A line of a section: scene frame, metres, at the height of the cut.
-struct SectionLine {
-  collision::Vec3 from, to;
+using collision::Vec3;
+
+/// The section of one object: scene frame, metres, at the height of the cut.
+struct ObjectSection {
+  std::uint32_t object = 0;
+  scene::Aabb box;                       ///< of the whole object
+  std::vector<std::vector<Vec3>> loops;  ///< closed outlines; the last point joins the first
+  std::vector<std::vector<Vec3>> lines;  ///< of open surfaces
+
+  bool empty() const { return loops.empty() && lines.empty(); }
 };
 
-/// Section of solid static objects at `height` (y). Triangles inside the plane have no line.
-std::vector<SectionLine> cutStatic(const scene::Scene& scene, double height);
-/// The same, including bodies in their initial poses.
-std::vector<SectionLine> cutScene(const scene::Scene& scene, double height);
+/// Sections of solid static objects at `height` (y). Triangles inside the plane have no line.
+std::vector<ObjectSection> cutStatic(const scene::Scene& scene, double height);
 
-/// Draws a section onto a picture of `camera` whose top left corner is at (left, top) of `image`.
-void drawSection(render::Image& image, const render::Camera& camera,
-                 const std::vector<SectionLine>& section, double left = 0, double top = 0);
+/// The section of one object, as the model places it.
+ObjectSection cutObject(const scene::Model& model, std::uint32_t object, double height);
 
 }  // namespace enfilade::server

@@ -7,11 +7,14 @@
 #include <map>
 
 #include "server/plans/floor_plan_section.hpp"
+#include "server/plans/plan_drawing.hpp"
 
 namespace enfilade::server {
 namespace {
 
+using render::Canvas;
 using render::Image;
+using render::TextStyle;
 using scene::Aabb;
 
 constexpr double kMinFloorNormalY = 0.94;  // minimum y of a floor's normal: within 20 degrees
@@ -21,10 +24,9 @@ constexpr std::size_t kMaxStoreys = 12;
 constexpr double kWallBottom = 0.3, kWallTop = 1.5;  // metres above a floor that a wall spans
 constexpr double kMaxNameDistance = 0.6;  // metres between a storey's floor and its objects
 constexpr double kMargin = 2.0;           // metres around the section
-constexpr double kMaxWidth = 1600, kMaxHeight = 1200;            // pixels of the plan
-constexpr int kLeft = 84, kTop = 64, kRight = 24, kBottom = 84;  // pixels of the frame around it
-constexpr double kMinLabelSpacing = 80;  // minimum spacing of the frame's numbers
-constexpr render::Colour kGrid{214, 218, 228}, kAxis{180, 60, 40};
+constexpr double kMaxWidth = 1600, kMaxHeight = 1200;  // pixels of the plan
+constexpr double kPointsPerMetre = 72 / 0.0254;        // of a page
+constexpr double kPageUnit = 0.7;                      // points of a thin line
 
 // ---- storeys ------------------------------------------------------------------------------------
 
@@ -79,116 +81,56 @@ std::string findStoreyName(const scene::Scene& scene, double floor) {
   return mostFrequent == names.end() ? "" : mostFrequent->first;
 }
 
-// ---- the picture --------------------------------------------------------------------------------
-
-/// A plan with its frame, and the mapping from metres to pixels.
-struct Sheet {
-  render::Camera camera;
-  Image image;
-
-  double x(double metres) const {
-    return kLeft + render::project(camera, {metres, camera.eye.y(), camera.eye.z()}).x();
-  }
-  double y(double metres) const {
-    return kTop + render::project(camera, {camera.eye.x(), camera.eye.y(), metres}).y();
-  }
-  double pixelsPerMetre() const { return camera.height / camera.heightY; }
-};
-
-/// Chooses a grid step of 1, 2 or 5 times a power of ten metres with enough space for labels.
-double chooseGridStep(double pixelsPerMetre) {
-  double step = 0.01;
-  for (int i = 0; i < 60; ++i) {  // up to 10^18 m
-    if (step * pixelsPerMetre >= kMinLabelSpacing) return step;
-    step *= i % 3 == 1 ? 2.5 : 2;
-  }
-  return step;
-}
-
-std::string formatNumber(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.10g", value);
-  return text.data();
-}
-
-void drawGridLineX(Sheet& sheet, double metres, double step) {
-  const double x = sheet.x(metres);
-  const int bottom = kTop + sheet.camera.height;
-  const bool axis = std::abs(metres) < 0.5 * step;
-  render::drawLine(sheet.image, x, kTop, x, bottom, 1, axis ? kAxis : kGrid);
-  const std::string text = formatNumber(axis ? 0 : metres);
-  render::drawText(sheet.image, static_cast<int>(x) - 6 * static_cast<int>(text.size()), bottom + 8,
-                   text, 2, kPlanInk);
-}
-
-void drawGridLineZ(Sheet& sheet, double metres, double step) {
-  const double y = sheet.y(metres);
-  const bool axis = std::abs(metres) < 0.5 * step;
-  render::drawLine(sheet.image, kLeft, y, kLeft + sheet.camera.width, y, 1, axis ? kAxis : kGrid);
-  const std::string text = formatNumber(axis ? 0 : metres);
-  render::drawText(sheet.image, kLeft - 8 - 12 * static_cast<int>(text.size()),
-                   static_cast<int>(y) - 8, text, 2, kPlanInk);
-}
+// ---- the sheet ----------------------------------------------------------------------------------
 
 /// The plan shows the bounds of the section, without lawns and roofs; without a section, the scene.
-Aabb computePlanArea(const scene::Scene& scene, const std::vector<SectionLine>& section) {
+Aabb computePlanArea(const scene::Scene& scene, double height) {
   Aabb area;
-  for (const SectionLine& line : section) {
-    area.include(line.from);
-    area.include(line.to);
+  for (const ObjectSection& section : cutStatic(scene, height)) {
+    for (const auto* lines : {&section.loops, &section.lines})
+      for (const auto& line : *lines)
+        for (const Vec3& point : line) area.include(point);
   }
-  if (section.empty()) area = scene.bounds();
+  if (area.empty()) area = scene.bounds();
   Aabb drawn = collision::inflated(area, kMargin);
   drawn.min.y() = std::min(drawn.min.y(), scene.bounds().min.y());
   drawn.max.y() = std::max(drawn.max.y(), scene.bounds().max.y());
   return drawn;
 }
 
-/// Draws grid lines with coordinates. The axes have their own colour.
-void drawGrid(Sheet& sheet) {
-  const double step = chooseGridStep(sheet.pixelsPerMetre());
-  const double left = sheet.camera.eye.x() - 0.5 * sheet.camera.width / sheet.pixelsPerMetre();
-  const double top = sheet.camera.eye.z() - 0.5 * sheet.camera.heightY;
-  const double right = 2 * sheet.camera.eye.x() - left, bottom = 2 * sheet.camera.eye.z() - top;
-  for (double k = std::ceil(left / step); k * step <= right; ++k)
-    drawGridLineX(sheet, k * step, step);
-  for (double k = std::ceil(top / step); k * step <= bottom; ++k)
-    drawGridLineZ(sheet, k * step, step);
-}
+/// Space around a plan, thin lines: title above, numbers left and below, scale bar below these.
+constexpr double kLeft = 64, kTop = 62, kRight = 24, kBottom = 74;
+constexpr double kMinWidth = 560;  // thin lines, of a sheet
 
-void drawFrame(Sheet& sheet) {
-  const double right = kLeft + sheet.camera.width, bottom = kTop + sheet.camera.height;
-  const std::array<std::array<double, 4>, 4> sides{{{kLeft, kTop, right, kTop},
-                                                    {kLeft, bottom, right, bottom},
-                                                    {kLeft, kTop, kLeft, bottom},
-                                                    {right, kTop, right, bottom}}};
-  for (const auto& s : sides) render::drawLine(sheet.image, s[0], s[1], s[2], s[3], 2, kPlanInk);
-  render::drawText(sheet.image, static_cast<int>(right) - 24, static_cast<int>(bottom) + 30, "x >",
-                   2, kAxis);
-  render::drawText(sheet.image, 8, static_cast<int>(bottom) - 16, "z v", 2, kAxis);
-}
-
-void drawScale(Sheet& sheet) {
-  const double step = chooseGridStep(sheet.pixelsPerMetre());
-  const double y = kTop + sheet.camera.height + 44, end = kLeft + step * sheet.pixelsPerMetre();
-  render::drawLine(sheet.image, kLeft, y, end, y, 3, kPlanInk);
-  for (const double x : {static_cast<double>(kLeft), end})
-    render::drawLine(sheet.image, x, y - 6, x, y + 6, 3, kPlanInk);
-  render::drawText(sheet.image, static_cast<int>(end) + 12, static_cast<int>(y) - 8,
-                   formatNumber(step) + " m", 2, kPlanInk);
-}
-
-void drawTitle(Sheet& sheet, const scene::Scene& scene, const StoreyFloor& storey) {
+void drawTitle(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
+               const StoreyFloor& storey, const std::string& scale) {
   const std::string& source = scene.model().source;
   std::array<char, 96> text{};
   std::snprintf(text.data(), text.size(), "floor at y = %.2f m, cut %.1f m above", storey.height,
                 kPlanCutHeight);
-  const std::string name = storey.name.empty() ? "" : storey.name + ", ";
-  render::drawText(sheet.image, 16, 12,
-                   source.substr(source.find_last_of('/') + 1) + ": " + name + text.data(), 2,
-                   kPlanInk);
-  render::drawText(sheet.image, 16, 36,
-                   "metres of the scene; facing 0 looks right (+x), 90 up (-z)", 2, kPlanInk);
+  const double u = view.unit, width = canvas.width() - 32 * u;
+  TextStyle title, line;
+  title.size = 18 * u, title.bold = true, title.colour = kPlanInk;
+  line.size = 12 * u, line.colour = kPlanInk;
+  const std::string file = source.substr(source.find_last_of('/') + 1);
+  canvas.text({16 * u, 10 * u},
+              canvas.shorten(storey.name.empty() ? file : file + ": " + storey.name, title, width),
+              title);
+  canvas.text({16 * u, 36 * u},
+              canvas.shorten(std::string(text.data()) + (scale.empty() ? "" : ", " + scale) +
+                                 "; metres of the scene; facing 0 looks right (+x), 90 up (-z)",
+                             line, width),
+              line);
+}
+
+void drawSheet(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
+               const StoreyFloor& storey, const PlanPicture& picture, const std::string& scale) {
+  drawPlanPicture(canvas, view, picture);
+  drawGrid(canvas, view);
+  drawCut(canvas, view, scene);
+  const double below = view.topLeft.y + view.height();
+  drawScaleBar(canvas, view, {view.topLeft.x, below + 34 * view.unit});
+  drawTitle(canvas, view, scene, storey, scale);
 }
 
 }  // namespace
@@ -209,21 +151,36 @@ std::vector<StoreyFloor> findStoreys(const scene::Scene& scene) {
 
 std::optional<Image> drawStoreyPlan(const scene::Scene& scene, const StoreyFloor& storey,
                                     const PlanRenderer& renderPlan) {
-  Sheet sheet;
-  const std::vector<SectionLine> section = cutScene(scene, storey.height + kPlanCutHeight);
-  sheet.camera =
-      makePlanCamera(computePlanArea(scene, section), storey.height, kMaxWidth, kMaxHeight);
-  const std::optional<PlanPicture> plan = renderPlan(sheet.camera);
-  if (!plan) return std::nullopt;
-  sheet.image = render::makeBlankImage(std::max(720, kLeft + sheet.camera.width + kRight),
-                                       kTop + sheet.camera.height + kBottom, kPlanPaper);
-  render::paste(sheet.image, makePlanBackground(*plan), kLeft, kTop);
-  drawGrid(sheet);
-  drawSection(sheet.image, sheet.camera, section, kLeft, kTop);
-  drawFrame(sheet);
-  drawScale(sheet);
-  drawTitle(sheet, scene, storey);
-  return std::move(sheet.image);
+  const render::Camera camera = makePlanCamera(
+      computePlanArea(scene, storey.height + kPlanCutHeight), storey.height, kMaxWidth, kMaxHeight);
+  const std::optional<PlanPicture> picture = renderPlan(camera);
+  if (!picture) return std::nullopt;
+  const PlanView view =
+      makePlanView(camera, storey.height, {kLeft, kTop}, camera.height / camera.heightY, 1);
+  Canvas canvas(static_cast<int>(std::max(kMinWidth, kLeft + camera.width + kRight)),
+                static_cast<int>(kTop + camera.height + kBottom), kPlanPaper);
+  drawSheet(canvas, view, scene, storey, *picture, "");
+  return canvas.toImage();
+}
+
+bool writeStoreyPage(const scene::Scene& scene, const StoreyFloor& storey,
+                     const PlanRenderer& renderPlan, double scale,
+                     const std::filesystem::path& file) {
+  const render::Camera camera =
+      makePlanCamera(computePlanArea(scene, storey.height + kPlanCutHeight), storey.height,
+                     2 * kMaxWidth, 2 * kMaxHeight);
+  const std::optional<PlanPicture> picture = renderPlan(camera);
+  if (!picture) return false;
+  const double u = kPageUnit, unitsPerMetre = kPointsPerMetre / scale;
+  const PlanView view =
+      makePlanView(camera, storey.height, {kLeft * u, kTop * u}, unitsPerMetre, u);
+  Canvas canvas(file, std::max(kMinWidth * u, kLeft * u + view.width() + kRight * u),
+                kTop * u + view.height() + kBottom * u, {255, 255, 255});
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "scale 1:%.10g", scale);
+  drawSheet(canvas, view, scene, storey, *picture, text.data());
+  canvas.finish();
+  return true;
 }
 
 }  // namespace enfilade::server

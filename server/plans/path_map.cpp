@@ -1,37 +1,42 @@
 // Steps: find the walked storeys (peaks of a histogram of the feet's heights); render a plan of
 // each, cut 1.2 m above its floor, around the walked area; draw paths, contacts and captures on
-// the plan of the nearest storey; stack the plans with a title and a legend.
+// the plan of their nearest storey; stack the plans with a title and a legend.
 #include "server/plans/path_map.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "collision/assert.hpp"
-#include "server/plans/floor_plan_section.hpp"
+#include "server/plans/plan_drawing.hpp"
 
 namespace enfilade::server {
 namespace {
 
+using render::Canvas;
 using render::Colour;
 using render::Image;
+using render::Point;
+using render::TextStyle;
 
 constexpr double kMinTickShare = 0.08;  // minimum share of ticks for a storey with a plan
 constexpr std::size_t kMaxMapStoreys = 3;
 constexpr double kMapMargin = 4.0;                           // metres around the walked area
 constexpr double kMaxMapWidth = 1600, kMaxMapHeight = 1100;  // pixels of one plan
-constexpr int kLineHeight = 26;                              // pixels of a line of text
+constexpr double kBorder = 16, kLineHeight = 26;             // pixels
 constexpr double kMinSupportNormalY = 0.7;  // contacts with a larger y are floors and stairs
 
-constexpr Colour kInk = kPlanInk, kPaper = kPlanPaper, kContact{214, 40, 40}, kBlocked{120, 0, 120},
-                 kCamera{20, 20, 24};
+constexpr Colour kContact{214, 40, 40}, kBlocked{120, 0, 120}, kCamera{20, 20, 24};
 
 struct Storey {
   double floor = 0;
   render::Camera camera;
-  Image image;
+  PlanPicture picture;
+  PlanView view;  ///< once it has a place on the sheet
 };
 
-Storey& findNearestStorey(std::vector<Storey>& storeys, double height) {
+const Storey& findNearestStorey(const std::vector<Storey>& storeys, double height) {
   ENFILADE_ASSERT(!storeys.empty());
   const auto distance = [&](const Storey& storey) { return std::abs(storey.floor - height); };
   return *std::min_element(storeys.begin(), storeys.end(), [&](const Storey& a, const Storey& b) {
@@ -47,66 +52,103 @@ scene::Aabb computeWalkedBounds(const std::vector<WalkedPath>& paths) {
   return collision::inflated(bounds, kMapMargin);
 }
 
-struct Pixel {
-  double x = 0, y = 0;
-};
-
-Pixel toPixel(const Storey& storey, const Vec3& point) {
-  const Vec3 projected = render::project(storey.camera, point);
-  return {projected.x(), projected.y()};
+TextStyle makeStyle(double size, bool bold = false) {
+  TextStyle style;
+  style.size = size, style.bold = bold, style.colour = kPlanInk;
+  return style;
 }
 
-void drawDot(Storey& storey, const Vec3& point, double radius, Colour colour) {
-  const Pixel at = toPixel(storey, point);
-  render::drawDisc(storey.image, at.x, at.y, radius + 1.5, kPaper);
-  render::drawDisc(storey.image, at.x, at.y, radius, colour);
+void drawDot(Canvas& canvas, Point at, double radius, Colour colour) {
+  canvas.disc(at, radius + 1.5, kPlanPaper);
+  canvas.disc(at, radius, colour);
 }
 
-void drawPath(std::vector<Storey>& storeys, const WalkedPath& path, Colour colour) {
-  for (std::size_t i = 1; i < path.footPositions.size(); ++i) {
-    Storey& storey = findNearestStorey(storeys, path.footPositions[i].y());
-    const Pixel from = toPixel(storey, path.footPositions[i - 1]),
-                to = toPixel(storey, path.footPositions[i]);
-    if (from.x == to.x && from.y == to.y) continue;
-    render::drawLine(storey.image, from.x, from.y, to.x, to.y, 3, colour);
-  }
-  if (path.footPositions.empty()) return;
-  drawDot(findNearestStorey(storeys, path.footPositions.front().y()), path.footPositions.front(), 6,
-          colour);
-}
-
-/// Draws the field of view at `eye` as a wedge along the unit vector (x, y).
-void drawWedge(Image& image, const Pixel& eye, double x, double y) {
+/// The field of view at `eye` as a wedge along the unit vector (x, y).
+void drawWedge(Canvas& canvas, Point eye, double x, double y) {
   constexpr double kLength = 18, kHalfWidth = 9;
-  const Pixel left{eye.x + kLength * x + kHalfWidth * y, eye.y + kLength * y - kHalfWidth * x};
-  const Pixel right{eye.x + kLength * x - kHalfWidth * y, eye.y + kLength * y + kHalfWidth * x};
-  render::drawLine(image, eye.x, eye.y, left.x, left.y, 2, kCamera);
-  render::drawLine(image, right.x, right.y, eye.x, eye.y, 2, kCamera);
-  render::drawDisc(image, eye.x, eye.y, 3, kCamera);
+  const Point left{eye.x + kLength * x + kHalfWidth * y, eye.y + kLength * y - kHalfWidth * x};
+  const Point right{eye.x + kLength * x - kHalfWidth * y, eye.y + kLength * y + kHalfWidth * x};
+  canvas.polyline(std::array{left, eye, right}, 2, kCamera);
+  canvas.disc(eye, 3, kCamera);
 }
 
-void drawCapture(std::vector<Storey>& storeys, const MapCapture& capture) {
-  Storey& storey = findNearestStorey(storeys, capture.eye.y() - 1.6);
-  const Pixel eye = toPixel(storey, capture.eye);
-  const double length = std::hypot(capture.viewDirection.x(), capture.viewDirection.z());
-  const double x = length > 0 ? capture.viewDirection.x() / length : 1;
-  const double y = length > 0 ? capture.viewDirection.z() / length : 0;
-  Image& image = storey.image;
-  drawWedge(image, eye, x, y);
-  render::drawText(image, static_cast<int>(eye.x) + 6, static_cast<int>(eye.y) + 6, capture.name, 1,
-                   kCamera);
-}
+/// Draws the marks of a walk on one storey.
+class StoreyMarks {
+ public:
+  StoreyMarks(Canvas& canvas, const std::vector<Storey>& storeys, const Storey& storey)
+      : canvas_(canvas), storeys_(storeys), storey_(storey), captions_(storey.view) {}
 
-/// Draws contacts with walls and furniture. Floor contacts are omitted: they are permanent.
-void drawContacts(std::vector<Storey>& storeys, const WalkTrace& trace) {
-  for (const MapContact& blockedWalk : trace.blockedWalks) {
-    drawDot(findNearestStorey(storeys, blockedWalk.point.y()), blockedWalk.point, 6, kBlocked);
+  void draw(const WalkTrace& trace) {
+    canvas_.beginClip(storey_.view.topLeft, storey_.view.width(), storey_.view.height());
+    for (const WalkedPath& path : trace.paths) drawPath(path);
+    for (const MapContact& blockedWalk : trace.blockedWalks)
+      if (isHere(blockedWalk.point.y())) drawDot(canvas_, at(blockedWalk.point), 6, kBlocked);
+    for (const MapContact& contact : trace.contacts) drawContact(contact);
+    for (const MapCapture& capture : trace.captures) drawCapture(capture);
+    for (const WalkedPath& path : trace.paths) drawName(path);
+    canvas_.endClip();
   }
-  for (const MapContact& contact : trace.contacts) {
-    if (std::abs(contact.normal.y()) > kMinSupportNormalY) continue;
-    drawDot(findNearestStorey(storeys, contact.point.y() - 0.8), contact.point, 3.5, kContact);
+
+ private:
+  bool isHere(double height) const { return &findNearestStorey(storeys_, height) == &storey_; }
+  Point at(const Vec3& point) const { return storey_.view.at(point); }
+
+  /// Steps that change the storey end a line.
+  void drawPath(const WalkedPath& path) {
+    std::vector<Point> line;
+    const auto flush = [&] {
+      if (line.size() > 1) canvas_.polyline(line, 3, computeAvatarColour(path.id));
+      line.clear();
+    };
+    for (const Vec3& feet : path.footPositions) {
+      if (!isHere(feet.y())) {
+        flush();
+        continue;
+      }
+      const Point next = at(feet);
+      if (line.empty() || next.x != line.back().x || next.y != line.back().y) line.push_back(next);
+    }
+    flush();
+    if (startsHere(path))
+      drawDot(canvas_, at(path.footPositions.front()), 6, computeAvatarColour(path.id));
   }
-}
+
+  bool startsHere(const WalkedPath& path) const {
+    return !path.footPositions.empty() && isHere(path.footPositions.front().y());
+  }
+
+  void drawName(const WalkedPath& path) {
+    if (!startsHere(path)) return;
+    TextStyle style = makeStyle(13, true);
+    style.colour = computeAvatarColour(path.id), style.halo = 2;
+    captions_.draw(canvas_, at(path.footPositions.front()), path.avatar, style);
+  }
+
+  void drawCapture(const MapCapture& capture) {
+    if (!isHere(capture.eye.y() - 1.6)) return;
+    const Point eye = at(capture.eye);
+    const double length = std::hypot(capture.viewDirection.x(), capture.viewDirection.z());
+    const double x = length > 0 ? capture.viewDirection.x() / length : 1;
+    const double y = length > 0 ? capture.viewDirection.z() / length : 0;
+    drawWedge(canvas_, eye, x, y);
+    captions_.reserve({eye.x - 4, eye.y - 4}, 8, 8);
+    TextStyle style = makeStyle(11);
+    style.halo = 2;
+    captions_.draw(canvas_, eye, capture.name, style);
+  }
+
+  /// Contacts with walls and furniture. Floor contacts are omitted: they are permanent.
+  void drawContact(const MapContact& contact) {
+    if (std::abs(contact.normal.y()) > kMinSupportNormalY || !isHere(contact.point.y() - 0.8))
+      return;
+    drawDot(canvas_, at(contact.point), 3.5, kContact);
+  }
+
+  Canvas& canvas_;
+  const std::vector<Storey>& storeys_;
+  const Storey& storey_;
+  CaptionPlacer captions_;
+};
 
 struct LegendEntry {
   std::string text;
@@ -124,24 +166,25 @@ std::vector<LegendEntry> makeLegend(const WalkTrace& trace) {
   return entries;
 }
 
-constexpr int kLegendColumn = 460;  // pixels
+constexpr double kLegendColumn = 320;  // pixels
 
-int countLegendRows(const std::vector<LegendEntry>& entries, int width) {
-  const int columns = std::max(1, width / kLegendColumn);
-  return (static_cast<int>(entries.size()) + columns - 1) / columns;
+std::size_t countLegendRows(const std::vector<LegendEntry>& entries, double width) {
+  const auto columns = static_cast<std::size_t>(std::max(1.0, width / kLegendColumn));
+  return (entries.size() + columns - 1) / columns;
 }
 
-void drawLegend(Image& image, const std::vector<LegendEntry>& entries, int top) {
-  const int rows = countLegendRows(entries, image.width);
-  for (int i = 0; i < static_cast<int>(entries.size()); ++i) {
-    const LegendEntry& entry = entries[static_cast<std::size_t>(i)];
-    const int x = 24 + i / rows * kLegendColumn, y = top + i % rows * kLineHeight;
-    if (entry.wedge) {
-      drawWedge(image, {x - 8.0, y + 7.0}, 1, 0);
+void drawLegend(Canvas& canvas, const std::vector<LegendEntry>& entries, double top) {
+  const std::size_t rows = countLegendRows(entries, canvas.width());
+  const TextStyle style = makeStyle(14);
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const double x = 24 + static_cast<double>(i / rows) * kLegendColumn;
+    const double y = top + static_cast<double>(i % rows) * kLineHeight;
+    if (entries[i].wedge) {
+      drawWedge(canvas, {x - 8, y + 9}, 1, 0);
     } else {
-      render::drawDisc(image, x, y + 7, 6, entry.colour);
+      canvas.disc({x, y + 9}, 6, entries[i].colour);
     }
-    render::drawText(image, x + 16, y, entry.text, 2, kInk);
+    canvas.text({x + 16, y}, canvas.shorten(entries[i].text, style, kLegendColumn - 40), style);
   }
 }
 
@@ -152,25 +195,37 @@ std::string formatHeading(const Storey& storey) {
   return text;
 }
 
-Image composeMap(const WalkTrace& trace, const std::vector<Storey>& storeys) {
-  constexpr int kBorder = 16;
+/// Gives the storeys their places, one below the other, and returns the height of all.
+double placeStoreys(std::vector<Storey>& storeys, double top) {
+  for (Storey& storey : storeys) {
+    storey.view = makePlanView(storey.camera, storey.floor, {kBorder, top + kLineHeight},
+                               storey.camera.height / storey.camera.heightY, 1);
+    top += kLineHeight + storey.camera.height + kBorder;
+  }
+  return top;
+}
+
+Image composeMap(const WalkTrace& trace, std::vector<Storey>& storeys, const scene::Scene* scene) {
   const std::vector<LegendEntry> legend = makeLegend(trace);
-  int width = 640, height = 2 * kBorder + kLineHeight;
+  double width = 640;
+  for (const Storey& storey : storeys) width = std::max(width, storey.camera.width + 2 * kBorder);
+  const double legendTop = placeStoreys(storeys, kBorder + 2 * kLineHeight) + 2 * kLineHeight;
+  const double height =
+      legendTop + static_cast<double>(countLegendRows(legend, width)) * kLineHeight + kBorder;
+  Canvas canvas(static_cast<int>(width), static_cast<int>(height), kPlanPaper);
+  const TextStyle title = makeStyle(18, true), heading = makeStyle(14);
+  canvas.text({kBorder, kBorder}, canvas.shorten(trace.title, title, width - 2 * kBorder), title);
   for (const Storey& storey : storeys) {
-    width = std::max(width, storey.image.width + 2 * kBorder);
-    height += storey.image.height + kLineHeight + kBorder;
+    const PlanView& view = storey.view;
+    canvas.text({kBorder, view.topLeft.y - kLineHeight + 4}, formatHeading(storey), heading);
+    drawPlanPicture(canvas, view, storey.picture);
+    if (scene) drawCut(canvas, view, *scene);
+    canvas.rectangle(view.topLeft, view.width(), view.height(), 1.5, kPlanInk);
+    StoreyMarks(canvas, storeys, storey).draw(trace);
   }
-  height += countLegendRows(legend, width) * kLineHeight;
-  Image sheet = render::makeBlankImage(width, height, kPlanPaper);
-  render::drawText(sheet, kBorder, kBorder, trace.title, 2, kInk);
-  int y = kBorder + kLineHeight;
-  for (const Storey& storey : storeys) {
-    render::drawText(sheet, kBorder, y, formatHeading(storey), 2, kInk);
-    render::paste(sheet, storey.image, kBorder, y + kLineHeight);
-    y += storey.image.height + kLineHeight + kBorder;
-  }
-  drawLegend(sheet, legend, y);
-  return sheet;
+  drawScaleBar(canvas, storeys.front().view, {kBorder, legendTop - 1.6 * kLineHeight});
+  drawLegend(canvas, legend, legendTop);
+  return canvas.toImage();
 }
 
 }  // namespace
@@ -190,23 +245,17 @@ std::vector<double> findWalkedStoreys(const std::vector<WalkedPath>& paths) {
 std::optional<Image> drawMap(const WalkTrace& trace, const MapBackground& background) {
   std::vector<Storey> storeys;
   for (const double floor : findWalkedStoreys(trace.paths)) {
-    Storey storey{
-        floor,
-        makePlanCamera(computeWalkedBounds(trace.paths), floor, kMaxMapWidth, kMaxMapHeight),
-        {}};
-    const std::optional<PlanPicture> plan = background.renderPlan(storey.camera);
-    if (!plan) return std::nullopt;
-    storey.image = makePlanBackground(*plan);
-    if (background.scene)
-      drawSection(storey.image, storey.camera,
-                  cutStatic(*background.scene, floor + kPlanCutHeight));
+    Storey storey;
+    storey.floor = floor;
+    storey.camera =
+        makePlanCamera(computeWalkedBounds(trace.paths), floor, kMaxMapWidth, kMaxMapHeight);
+    std::optional<PlanPicture> picture = background.renderPlan(storey.camera);
+    if (!picture) return std::nullopt;
+    storey.picture = std::move(*picture);
     storeys.push_back(std::move(storey));
   }
   if (storeys.empty()) return std::nullopt;
-  for (const WalkedPath& path : trace.paths) drawPath(storeys, path, computeAvatarColour(path.id));
-  for (const MapCapture& capture : trace.captures) drawCapture(storeys, capture);
-  drawContacts(storeys, trace);
-  return composeMap(trace, storeys);
+  return composeMap(trace, storeys, background.scene);
 }
 
 }  // namespace enfilade::server

@@ -40,7 +40,7 @@ std::vector<double> findWalkedStoreys(const std::vector<WalkedPath>& paths);
 /// The background of a map.
 struct MapBackground {
   PlanRenderer renderPlan;
-  const scene::Scene* scene = nullptr;  ///< scene for section lines; null: not in this process
+  const scene::Scene* scene = nullptr;  ///< for walls and doors; null: not in this process
 };
 
 /// Draws the map; nullopt without paths or without a background.

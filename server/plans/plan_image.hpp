@@ -7,7 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "render/image/drawing.hpp"
+#include "render/camera.hpp"
+#include "render/image/canvas.hpp"
 
 namespace enfilade::server {
 

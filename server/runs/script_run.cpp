@@ -254,6 +254,8 @@ ExitCode walk(const WalkCommand& command) {
         RunReport report(command.out);
         protocol::ClientOptions options;
         options.name = "enfilade walk";
+        options.world = command.world;
+        options.token = command.token;
         protocol::Client client(command.connect.host, command.connect.port, options);
         protocol::SocketDriver driver(client, makeCaptureFormat());
         ScriptTarget target{driver,

@@ -35,6 +35,8 @@ struct ReplayCommand {
 struct WalkCommand {
   std::filesystem::path script, out;
   Endpoint connect;
+  std::string world;  ///< empty: the main world
+  std::string token;  ///< empty: none
   bool strict = false;
 };
 

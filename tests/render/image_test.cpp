@@ -10,9 +10,8 @@
 #include <random>
 
 #include "render/image/atomic_file.hpp"
+#include "render/image/canvas.hpp"
 #include "render/image/contact_sheet.hpp"
-#include "render/image/drawing.hpp"
-#include "render/image/font.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::render {
@@ -105,65 +104,108 @@ TEST(WriteFileWhole, AFailureNamesTheFileAndLeavesNoPart) {
   EXPECT_EQ(entriesIn(folder), 1);
 }
 
-TEST(PendingFrame, TextDrawsItsLettersWhereTheyBelong) {
-  Image image = plain(40, 20);
-  drawText(image, 3, 4, "I.", 1, {255, 255, 255});
-  for (int y = 0; y < image.height; ++y) {
-    for (int x = 0; x < image.width; ++x) {
-      const int letter = (x - 3) / kLetterAdvance, column = (x - 3) % kLetterAdvance;
-      const bool within =
-          x >= 3 && letter < 2 && column < kLetterWidth && y >= 4 && y < 4 + kLetterHeight;
-      const bool ink = within && isLetterPixel(letter == 0 ? 'I' : '.', column, y - 4);
-      EXPECT_EQ(red(image, x, y), ink ? 255 : 0) << x << ' ' << y;
-    }
-  }
-}
+constexpr Colour kBlack{0, 0, 0}, kWhite{255, 255, 255};
 
-TEST(PendingFrame, EveryLetterHasAShapeOfItsOwn) {
-  std::vector<std::vector<bool>> shapes;
-  for (char c = '!'; c <= '~'; ++c) {
-    std::vector<bool> shape;
-    for (int i = 0; i < kLetterWidth * kLetterHeight; ++i) {
-      shape.push_back(isLetterPixel(c, i % kLetterWidth, i / kLetterWidth));
-    }
-    EXPECT_EQ(std::count(shapes.begin(), shapes.end(), shape), 0) << c;
-    EXPECT_GT(std::count(shape.begin(), shape.end(), true), 1) << c;
-    shapes.push_back(shape);
-  }
-  for (int i = 0; i < kLetterWidth * kLetterHeight; ++i) {
-    EXPECT_FALSE(isLetterPixel(' ', i % kLetterWidth, i / kLetterWidth));
-  }
-}
-
-TEST(PendingFrame, ADiscHasItsArea) {
-  Image image = plain(60, 60);
-  drawDisc(image, 30.3, 29.6, 12, {255, 255, 255});
+/// Covered pixels of a canvas that is black where nothing is drawn.
+double areaOf(const Canvas& canvas) {
+  const Image image = canvas.toImage();
   double area = 0;
-  for (int i = 0; i < 3600; ++i) area += red(image, i % 60, i / 60) / 255.0;
-  EXPECT_NEAR(area, 3.14159265 * 144, 5);
+  for (std::size_t i = 0; i < image.rgb.size(); i += 3) area += image.rgb[i] / 255.0;
+  return area;
 }
 
-TEST(PendingFrame, ALineHasItsLengthTimesItsThicknessInEveryDirection) {
+TEST(Canvas, ImagesComeBackAsTheyWere) {
+  Image image = plain(7, 5);
+  for (std::size_t i = 0; i < image.rgb.size(); ++i)
+    image.rgb[i] = static_cast<std::uint8_t>(2 * i + 1);
+  EXPECT_EQ(Canvas(image).toImage().rgb, image.rgb);
+  Canvas onto(7, 5, kBlack);
+  onto.image(image, {0, 0}, 7, 5);
+  EXPECT_EQ(onto.toImage().rgb, image.rgb);
+}
+
+TEST(Canvas, ShapesHaveTheirArea) {
+  Canvas disc(60, 60, kBlack), loop(60, 60, kBlack), arc(60, 60, kBlack);
+  disc.disc({30.3, 29.6}, 12, kWhite);
+  EXPECT_NEAR(areaOf(disc), 3.14159265 * 144, 5);
+  // A square with a hole.
+  loop.fill(std::vector<std::vector<Point>>{{{10, 10}, {50, 10}, {50, 50}, {10, 50}},
+                                            {{20, 20}, {40, 20}, {40, 40}, {20, 40}}},
+            kWhite);
+  EXPECT_NEAR(areaOf(loop), 1600 - 400, 5);
+  arc.arc({30, 30}, 20, 0, 1.5, 2, kWhite);
+  EXPECT_NEAR(areaOf(arc), 1.5 * 20 * 2 + 3.14, 5);  // with its round caps
+}
+
+TEST(Canvas, ALineHasItsLengthTimesItsThicknessInEveryDirection) {
   for (int degrees = 0; degrees < 360; degrees += 15) {
     const double angle = degrees * 3.14159265358979 / 180;
-    Image image = plain(120, 120);
-    drawLine(image, 60, 60, 60 + 40 * std::cos(angle), 60 + 40 * std::sin(angle), 3,
-             {255, 255, 255});
-    double area = 0;
-    for (int i = 0; i < 120 * 120; ++i) area += red(image, i % 120, i / 120) / 255.0;
-    EXPECT_NEAR(area, 40 * 3 + 3.14159265 * 2.25, 6) << degrees;  // with its round caps
+    Canvas canvas(120, 120, kBlack);
+    canvas.line({60, 60}, {60 + 40 * std::cos(angle), 60 + 40 * std::sin(angle)}, 3, kWhite);
+    EXPECT_NEAR(areaOf(canvas), 40 * 3 + 3.14159265 * 2.25, 6) << degrees;  // with its round caps
   }
 }
 
-TEST(PendingFrame, PointsOutsideAndNonFiniteOnesAreIgnored) {
-  Image image = plain(10, 10, 7);
-  const Image before = image;
-  drawLine(image, -50, -50, -1e9, -20, 3, {255, 0, 0});
-  drawLine(image, std::nan(""), 0, 5, 5, 3, {255, 0, 0});
-  drawDisc(image, 100, 100, 3, {255, 0, 0});
-  drawDisc(image, std::nan(""), 1, 3, {255, 0, 0});
-  drawText(image, -100, -100, "text", 2, {255, 0, 0});
-  EXPECT_EQ(image.rgb, before.rgb);
+TEST(Canvas, PointsOutsideAndNonFiniteOnesDrawNothing) {
+  Canvas canvas(10, 10, kBlack);
+  canvas.line({-50, -50}, {-1e6, -20}, 3, kWhite);
+  canvas.line({std::nan(""), 0}, {5, 5}, 3, kWhite);
+  canvas.disc({100, 100}, 3, kWhite);
+  canvas.disc({std::nan(""), 1}, 3, kWhite);
+  canvas.text({-100, -100}, "text", {});
+  canvas.text({std::nan(""), 1}, "text", {});
+  EXPECT_EQ(areaOf(canvas), 0);
+}
+
+TEST(Canvas, LettersOfAllScriptsDiffer) {
+  TextStyle style;
+  style.size = 20, style.colour = kWhite;
+  std::vector<std::vector<std::uint8_t>> pictures;
+  for (const char* text : {"A", "Ä", "ß", "é", "Ж", "Ω", "A\xff"}) {
+    Canvas canvas(60, 30, kBlack);
+    canvas.text({4, 2}, text, style);
+    EXPECT_GT(areaOf(canvas), 10) << text;
+    pictures.push_back(canvas.toImage().rgb);
+    EXPECT_EQ(std::count(pictures.begin(), pictures.end(), pictures.back()), 1) << text;
+  }
+}
+
+TEST(Canvas, TextIsAlignedMeasuredAndShortened) {
+  TextStyle style;
+  style.size = 16, style.colour = kWhite;
+  Canvas canvas(400, 30, kBlack);
+  const double width = canvas.measure("Küche", style).width;
+  EXPECT_GT(canvas.measure("Küche und Flur", style).width, 2 * width);
+  EXPECT_EQ(canvas.shorten("Küche", style, width + 1), "Küche");
+  const std::string cut = canvas.shorten("Küche und Flur", style, 2 * width);
+  EXPECT_LE(canvas.measure(cut, style).width, 2 * width);
+  EXPECT_TRUE(cut.starts_with("Küche") && cut.ends_with("…")) << cut;
+  canvas.text({300, 4}, "Küche", style, Align::right);
+  const Image image = canvas.toImage();
+  int left = 400, right = 0;
+  for (int x = 0; x < 400; ++x)
+    for (int y = 0; y < 30; ++y)
+      if (red(image, x, y) > 128) left = std::min(left, x), right = std::max(right, x);
+  EXPECT_NEAR(left, 300 - width, 3);
+  EXPECT_NEAR(right, 300, 3);
+}
+
+TEST(Canvas, PagesAreWrittenWhole) {
+  const tests::TemporaryFolder folder;
+  for (const auto& [name, start] :
+       {std::pair("page.svg", std::string("<?xml")), {"page.pdf", std::string("%PDF")}}) {
+    Canvas page(folder.path() / name, 200, 100, kWhite);
+    page.line({0, 0}, {200, 100}, 1, kBlack);
+    page.text({10, 10}, "Grundriß", {});
+    page.finish();
+    std::ifstream file(folder.path() / name);
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    EXPECT_TRUE(bytes.starts_with(start)) << name;
+    EXPECT_GT(bytes.size(), 500u) << name;
+  }
+  EXPECT_THROW(Canvas(folder.path() / "page.png", 10, 10, kWhite), std::invalid_argument);
+  Canvas nowhere(folder.path() / "missing" / "page.svg", 10, 10, kWhite);
+  EXPECT_THROW(nowhere.finish(), std::runtime_error);
 }
 
 TEST(ScaledGap, TheMeanIsComputedInLinearLight) {

@@ -28,26 +28,34 @@ scene::Model columnAndSheet() {
   return model;
 }
 
-double lengthOf(const std::vector<SectionLine>& lines) {
+double lengthOf(const ObjectSection& section) {
   double length = 0;
-  for (const SectionLine& line : lines) length += (line.to - line.from).norm();
+  for (const auto& loop : section.loops)
+    for (std::size_t i = 0; i < loop.size(); ++i)
+      length += (loop[(i + 1) % loop.size()] - loop[i]).norm();
+  for (const auto& line : section.lines)
+    for (std::size_t i = 1; i < line.size(); ++i) length += (line[i] - line[i - 1]).norm();
   return length;
 }
 
-TEST(PlanCut, ClosedSolidsGiveTheirOutlineAndSingleFacesTheirLine) {
+TEST(PlanCut, ClosedSolidsGiveOneLoopAndSingleFacesOneLine) {
   const scene::Scene scene(columnAndSheet());
-  const auto both = cutScene(scene, 1.2);
-  EXPECT_NEAR(lengthOf(both), 4 + 4, 1e-6);
-  for (const SectionLine& line : both) {
-    EXPECT_EQ(line.from.y(), 1.2);
-    EXPECT_EQ(line.to.y(), 1.2);
-  }
-  EXPECT_NEAR(lengthOf(cutScene(scene, 2.5)), 4, 1e-6);  // the column alone
-  EXPECT_TRUE(cutScene(scene, 3.5).empty());
-  EXPECT_TRUE(cutScene(scene, -0.5).empty());
+  const auto both = cutStatic(scene, 1.2);
+  ASSERT_EQ(both.size(), 2u);
+  EXPECT_EQ(both[0].loops.size(), 1u);
+  EXPECT_TRUE(both[0].lines.empty());
+  EXPECT_NEAR(lengthOf(both[0]), 4, 1e-6);
+  EXPECT_EQ(both[0].box.max.y(), 3);
+  EXPECT_TRUE(both[1].loops.empty());
+  EXPECT_EQ(both[1].lines.size(), 1u);
+  EXPECT_NEAR(lengthOf(both[1]), 4, 1e-6);
+  for (const Vec3& point : both[0].loops[0]) EXPECT_EQ(point.y(), 1.2);
+  EXPECT_EQ(cutStatic(scene, 2.5).size(), 1u);  // the column alone
+  EXPECT_TRUE(cutStatic(scene, 3.5).empty());
+  EXPECT_TRUE(cutStatic(scene, -0.5).empty());
 }
 
-TEST(PlanCut, BodiesAreCutWhereTheModelHasThemAndTriggersAreNot) {
+TEST(PlanCut, BodiesAreNotStaticAndAreCutAlone) {
   scene::Model model = columnAndSheet();
   scene::BodySpec door;
   door.name = "door";
@@ -56,9 +64,17 @@ TEST(PlanCut, BodiesAreCutWhereTheModelHasThemAndTriggersAreNot) {
   door.axis = Vec3::UnitX();
   door.high = 1;
   model.bodies = {door};
-  EXPECT_NEAR(lengthOf(cutScene(scene::Scene(model), 1.2)), 8, 1e-6);
-  model.bodies[0].kind = scene::BodyKind::trigger;
-  EXPECT_NEAR(lengthOf(cutScene(scene::Scene(model), 1.2)), 4, 1e-6);
+  EXPECT_EQ(cutStatic(scene::Scene(model), 1.2).size(), 1u);
+  EXPECT_NEAR(lengthOf(cutObject(model, 1, 1.2)), 4, 1e-6);
+}
+
+TEST(PlanCut, TwoOutlinesOfOneObjectAreTwoLoops) {
+  scene::Model model = columnAndSheet();
+  for (std::size_t i = 0; i < 8; ++i)
+    model.meshes[0].positions.push_back(model.meshes[0].positions[i] + Eigen::Vector3f(3, 0, 0));
+  for (std::size_t i = 0; i < 36; ++i)
+    model.meshes[0].indices.push_back(model.meshes[0].indices[i] + 8);
+  EXPECT_EQ(cutObject(model, 0, 1.2).loops.size(), 2u);
 }
 
 }  // namespace

@@ -77,12 +77,31 @@ TEST_F(Inspect, DrawsAPlanOfEachStorey) {
   EXPECT_FALSE(fs::exists(folder_ / "plans/storey-2.png"));
 }
 
+TEST_F(Inspect, PagesOfPlansAreToScale) {
+  const auto pageWidth = [&](const std::string& scale) {
+    const Ended drawn = run({"inspect", path("room.obj"), "--plan", path("pages"), "--plan-format",
+                             "svg", "--plan-scale", scale});
+    EXPECT_EQ(drawn.code, 0) << drawn.err;
+    const std::string svg = textOf(path("pages/storey-1.svg"));
+    EXPECT_EQ(svg.rfind("<?xml", 0), 0u);
+    std::smatch width;
+    EXPECT_TRUE(std::regex_search(svg, width, std::regex("viewBox=\"0 0 ([0-9.]+)")));
+    return std::stod(width[1]);
+  };
+  const double coarse = pageWidth("20"), fine = pageWidth("10");
+  const double margins = 2 * coarse - fine;
+  EXPECT_GT(margins, 40);
+  EXPECT_LT(margins, 100);
+}
+
 TEST_F(Inspect, WrongUsageExitsWithTwoAndUnreadableFilesWithOne) {
   const std::vector<std::vector<std::string>> mistakes{
       {"inspect"},
       {"inspect", path("room.obj"), path("room.obj")},
       {"inspect", path("room.obj"), "--plan"},
       {"inspect", path("room.obj"), "--plan", ""},
+      {"inspect", path("room.obj"), "--plan-format", "dxf"},
+      {"inspect", path("room.obj"), "--plan-scale", "0"},
       {"inspect", path("room.obj"), "--jsno"},
       {"inspect", path("room.obj"), "--up", "North"}};
   for (const auto& arguments : mistakes) {

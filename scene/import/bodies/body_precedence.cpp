@@ -1,6 +1,7 @@
 #include "scene/import/bodies/body_precedence.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "scene/model/add_diagnostic.hpp"
 
@@ -13,6 +14,13 @@ std::vector<const BodySpec*> mapObjectsToBodies(const Model& model) {
   for (const BodySpec& body : model.bodies)
     for (const std::uint32_t object : body.objects) bodies[object] = &body;
   return bodies;
+}
+
+/// A file that describes a body twice in the same way is no problem.
+bool isSameBody(const BodySpec& a, const BodySpec& b) {
+  return a.kind == b.kind && a.objects == b.objects && a.anchor.isApprox(b.anchor, 1e-6) &&
+         a.axis.isApprox(b.axis, 1e-6) && std::abs(a.low - b.low) < 1e-6 &&
+         std::abs(a.high - b.high) < 1e-6;
 }
 
 std::string makeUniqueName(const std::string& wanted, std::set<std::string>& taken) {
@@ -34,6 +42,7 @@ void mergeLowerPriorityBodies(Model& model, std::vector<BodySpec> bodies,
     const auto conflict = std::find_if(body.objects.begin(), body.objects.end(),
                                        [&](std::uint32_t object) { return bodyOfObject[object]; });
     if (conflict != body.objects.end()) {
+      if (isSameBody(body, *bodyOfObject[*conflict])) continue;
       addDiagnostic(model.diagnostics, "replaced_bodies",
                     body.name + " of " + toString(body.source) + ": '" +
                         bodyOfObject[*conflict]->name + "' of " +

@@ -1,0 +1,275 @@
+#include "server/plans/plan_drawing.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "server/plans/floor_plan_section.hpp"
+
+namespace enfilade::server {
+namespace {
+
+using render::Canvas;
+using render::Colour;
+using render::Point;
+using render::TextStyle;
+
+constexpr double kCutWallBottom = 0.5, kCutWallTop = 2.0;  // metres above a floor that a wall spans
+constexpr double kMinGridSpacing = 70;  // thin lines between two numbers of the frame
+constexpr Colour kWall{52, 54, 62}, kFurniture{206, 210, 220}, kOutline{110, 114, 126},
+    kDoor{150, 90, 30}, kGrid{214, 218, 228}, kAxis{180, 60, 40};
+constexpr double kTextSize = 13;  // thin lines
+
+std::vector<Point> toPage(const PlanView& view, const std::vector<Vec3>& points) {
+  std::vector<Point> page;
+  for (const Vec3& point : points) page.push_back(view.at(point));
+  return page;
+}
+
+std::vector<std::vector<Point>> toPage(const PlanView& view,
+                                       const std::vector<std::vector<Vec3>>& lines) {
+  std::vector<std::vector<Point>> page;
+  for (const auto& line : lines) page.push_back(toPage(view, line));
+  return page;
+}
+
+void strokeSection(Canvas& canvas, const PlanView& view, const ObjectSection& section,
+                   double thickness, Colour colour) {
+  for (std::vector<Point> loop : toPage(view, section.loops)) {
+    loop.push_back(loop.front());
+    canvas.polyline(loop, thickness, colour);
+  }
+  for (const auto& line : toPage(view, section.lines)) canvas.polyline(line, thickness, colour);
+}
+
+bool isWall(const PlanView& view, const scene::Aabb& box) {
+  return box.min.y() <= view.floor + kCutWallBottom && box.max.y() >= view.floor + kCutWallTop;
+}
+
+// ---- bodies -------------------------------------------------------------------------------------
+
+/// The section of a body's objects in their initial pose.
+ObjectSection cutBody(const scene::Scene& scene, const scene::BodySpec& body, double height) {
+  ObjectSection whole;
+  for (const std::uint32_t object : body.objects) {
+    ObjectSection part = cutObject(scene.model(), object, height);
+    whole.loops.insert(whole.loops.end(), part.loops.begin(), part.loops.end());
+    whole.lines.insert(whole.lines.end(), part.lines.begin(), part.lines.end());
+  }
+  return whole;
+}
+
+/// The point of a door's leaf that is farthest from its hinge.
+Vec3 findLeafEnd(const ObjectSection& section, const Vec3& hinge) {
+  Vec3 end = hinge;
+  double longest = 0;
+  for (const auto* lines : {&section.loops, &section.lines}) {
+    for (const auto& line : *lines) {
+      for (const Vec3& point : line) {
+        const double distance = std::hypot(point.x() - hinge.x(), point.z() - hinge.z());
+        if (distance > longest) longest = distance, end = point;
+      }
+    }
+  }
+  return end;
+}
+
+/// Arcs to the limits of the leaf, and the leaf at each.
+void drawSwing(Canvas& canvas, const PlanView& view, const scene::BodySpec& door,
+               const ObjectSection& section) {
+  const Point hinge = view.at(door.anchor), end = view.at(findLeafEnd(section, door.anchor));
+  const double radius = std::hypot(end.x - hinge.x, end.y - hinge.y);
+  const double closed = std::atan2(end.y - hinge.y, end.x - hinge.x);
+  // A positive turn about +y leads from +z to +x: against the page's angles.
+  const double sign = door.axis.y() > 0 ? -1 : 1;
+  for (const double limit : {door.low, door.high}) {
+    if (limit == 0) continue;
+    const double open = closed + sign * limit;
+    canvas.arc(hinge, radius, closed, open, view.unit, kDoor, true);
+    canvas.line(hinge, {hinge.x + radius * std::cos(open), hinge.y + radius * std::sin(open)},
+                1.5 * view.unit, kDoor);
+  }
+}
+
+/// The leaf where it is open, dashed.
+void drawSlide(Canvas& canvas, const PlanView& view, const scene::BodySpec& door,
+               const ObjectSection& section) {
+  const double limit = std::abs(door.low) > std::abs(door.high) ? door.low : door.high;
+  for (std::vector<Vec3> loop : section.loops) {
+    loop.push_back(loop.front());
+    for (Vec3& point : loop) point += limit * door.axis;
+    canvas.polyline(toPage(view, loop), view.unit, kDoor, true);
+  }
+}
+
+void drawLiftCross(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
+                   const scene::BodySpec& lift) {
+  scene::Aabb box;
+  for (const std::uint32_t object : lift.objects)
+    box.include(cutObject(scene.model(), object, view.floor).box);
+  if (box.empty()) return;
+  const Point a = view.at(box.min), b = view.at(box.max);
+  canvas.rectangle(a, b.x - a.x, b.y - a.y, view.unit, kDoor);
+  canvas.line(a, b, view.unit, kDoor);
+  canvas.line({a.x, b.y}, {b.x, a.y}, view.unit, kDoor);
+}
+
+void drawBody(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
+              const scene::BodySpec& body) {
+  if (body.kind == scene::BodyKind::lift) return drawLiftCross(canvas, view, scene, body);
+  const ObjectSection section = cutBody(scene, body, view.floor + kPlanCutHeight);
+  if (section.empty() || isTrigger(body.kind)) return;
+  const bool isDoor = body.kind == scene::BodyKind::hinged || body.kind == scene::BodyKind::sliding;
+  canvas.fill(toPage(view, section.loops), isDoor ? kDoor : kFurniture);
+  strokeSection(canvas, view, section, view.unit, isDoor ? kDoor : kOutline);
+  if (body.kind == scene::BodyKind::hinged && std::abs(body.axis.y()) > 0.9)
+    drawSwing(canvas, view, body, section);
+  if (body.kind == scene::BodyKind::sliding) drawSlide(canvas, view, body, section);
+}
+
+// ---- grid ---------------------------------------------------------------------------------------
+
+/// A step of 1, 2 or 5 times a power of ten metres with enough space for the numbers.
+double chooseGridStep(const PlanView& view) {
+  double step = 0.01;
+  for (int i = 0; i < 60; ++i) {  // up to 10^18 m
+    if (step * view.unitsPerMetre >= kMinGridSpacing * view.unit) return step;
+    step *= i % 3 == 1 ? 2.5 : 2;
+  }
+  return step;
+}
+
+std::string formatNumber(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.10g", value);
+  return text;
+}
+
+/// Calls visit(coordinate) for each grid line of an axis; the axis itself is exactly 0.
+template <class Visit>
+void forEachGridLine(double from, double to, double step, const Visit& visit) {
+  for (double k = std::ceil(from / step); k * step <= to; ++k) visit(k == 0 ? 0.0 : k * step);
+}
+
+}  // namespace
+
+PlanView makePlanView(const render::Camera& camera, double floor, Point topLeft,
+                      double unitsPerMetre, double unit) {
+  const Vec3 half(0.5 * camera.heightY * camera.width / camera.height, 0, 0.5 * camera.heightY);
+  return {{camera.eye - half, camera.eye + half}, floor, topLeft, unitsPerMetre, unit};
+}
+
+void drawPlanPicture(Canvas& canvas, const PlanView& view, const PlanPicture& picture) {
+  canvas.image(makePlanBackground(picture), view.topLeft, view.width(), view.height());
+}
+
+void drawCut(Canvas& canvas, const PlanView& view, const scene::Scene& scene) {
+  canvas.beginClip(view.topLeft, view.width(), view.height());
+  const double height = view.floor + kPlanCutHeight;
+  const std::vector<ObjectSection> sections = cutStatic(scene, height);
+  // Walls come last: their edges stay sharp.
+  for (const bool walls : {false, true}) {
+    for (const ObjectSection& section : sections) {
+      if (isWall(view, section.box) != walls) continue;
+      canvas.fill(toPage(view, section.loops), walls ? kWall : kFurniture, walls ? 1 : 0.8);
+      strokeSection(canvas, view, section, (walls ? 1.2 : 0.8) * view.unit,
+                    walls ? kWall : kOutline);
+    }
+  }
+  for (const scene::BodySpec& body : scene.model().bodies) drawBody(canvas, view, scene, body);
+  canvas.endClip();
+}
+
+void drawGrid(Canvas& canvas, const PlanView& view) {
+  const double step = chooseGridStep(view), text = kTextSize * view.unit;
+  const double right = view.topLeft.x + view.width(), bottom = view.topLeft.y + view.height();
+  const auto styleOf = [&](double metres) {
+    TextStyle style;
+    style.size = text;
+    style.colour = metres == 0 ? kAxis : kPlanInk;
+    return style;
+  };
+  forEachGridLine(view.area.min.x(), view.area.max.x(), step, [&](double metres) {
+    const double x = view.at({metres, 0, 0}).x;
+    canvas.line({x, view.topLeft.y}, {x, bottom}, 0.7 * view.unit, metres == 0 ? kAxis : kGrid);
+    canvas.text({x, bottom + 0.4 * text}, formatNumber(metres), styleOf(metres),
+                render::Align::centre);
+  });
+  forEachGridLine(view.area.min.z(), view.area.max.z(), step, [&](double metres) {
+    const double y = view.at({0, 0, metres}).y;
+    canvas.line({view.topLeft.x, y}, {right, y}, 0.7 * view.unit, metres == 0 ? kAxis : kGrid);
+    canvas.text({view.topLeft.x - 0.5 * text, y - 0.6 * text}, formatNumber(metres),
+                styleOf(metres), render::Align::right);
+  });
+  canvas.rectangle(view.topLeft, view.width(), view.height(), 1.5 * view.unit, kPlanInk);
+}
+
+void drawScaleBar(Canvas& canvas, const PlanView& view, Point at) {
+  const double step = chooseGridStep(view), length = step * view.unitsPerMetre;
+  const double height = 5 * view.unit, middle = at.y + 0.6 * kTextSize * view.unit;
+  TextStyle style;
+  style.size = kTextSize * view.unit;
+  for (int i = 0; i < 2; ++i) {
+    const double left = at.x + i * length;
+    const Point corner{left, middle - 0.5 * height};
+    if (i == 0)
+      canvas.fill(std::vector<std::vector<Point>>{{corner,
+                                                   {left + length, corner.y},
+                                                   {left + length, corner.y + height},
+                                                   {left, corner.y + height}}},
+                  kPlanInk);
+    canvas.rectangle(corner, length, height, view.unit, kPlanInk);
+  }
+  const double end = at.x + 2 * length + 8 * view.unit;
+  const std::string metres = formatNumber(2 * step) + " m";
+  canvas.text({end, at.y}, metres, style);
+  // The axes: +x right, +z down, as the numbers of the frame run.
+  const Point origin{end + canvas.measure(metres, style).width + 30 * view.unit, at.y};
+  const double arm = 22 * view.unit, head = 4 * view.unit;
+  style.colour = kAxis;
+  canvas.line(origin, {origin.x + arm, origin.y}, 1.2 * view.unit, kAxis);
+  canvas.polyline(
+      std::array{Point{origin.x + arm - head, origin.y - head}, Point{origin.x + arm, origin.y},
+                 Point{origin.x + arm - head, origin.y + head}},
+      1.2 * view.unit, kAxis);
+  canvas.line(origin, {origin.x, origin.y + arm}, 1.2 * view.unit, kAxis);
+  canvas.polyline(
+      std::array{Point{origin.x - head, origin.y + arm - head}, Point{origin.x, origin.y + arm},
+                 Point{origin.x + head, origin.y + arm - head}},
+      1.2 * view.unit, kAxis);
+  canvas.text({origin.x + arm + 5 * view.unit, origin.y - 0.6 * style.size}, "x", style);
+  canvas.text({origin.x + 6 * view.unit, origin.y + arm - 0.8 * style.size}, "z", style);
+}
+
+bool CaptionPlacer::isFree(const Rectangle& r) const {
+  if (r.topLeft.x < view_.topLeft.x || r.topLeft.y < view_.topLeft.y ||
+      r.topLeft.x + r.width > view_.topLeft.x + view_.width() ||
+      r.topLeft.y + r.height > view_.topLeft.y + view_.height())
+    return false;
+  return std::ranges::none_of(taken_, [&](const Rectangle& t) {
+    return r.topLeft.x < t.topLeft.x + t.width && t.topLeft.x < r.topLeft.x + r.width &&
+           r.topLeft.y < t.topLeft.y + t.height && t.topLeft.y < r.topLeft.y + r.height;
+  });
+}
+
+void CaptionPlacer::draw(Canvas& canvas, Point at, const std::string& text,
+                         const TextStyle& style) {
+  const render::TextSize size = canvas.measure(text, style);
+  constexpr int kRings = 3, kDirections = 8;
+  for (int ring = 1; ring <= kRings; ++ring) {
+    for (int i = 0; i < kDirections; ++i) {
+      const double angle = (i + 0.5) * 2 * M_PI / kDirections;
+      const double distance = ring * 0.7 * size.height;
+      const Point anchor{at.x + distance * std::cos(angle), at.y + distance * std::sin(angle)};
+      const double left = std::cos(angle) > 0 ? anchor.x : anchor.x - size.width;
+      const Rectangle rectangle{{left, anchor.y - size.height / 2}, size.width, size.height};
+      if (!isFree(rectangle)) continue;
+      canvas.text(rectangle.topLeft, text, style);
+      taken_.push_back(rectangle);
+      return;
+    }
+  }
+}
+
+}  // namespace enfilade::server

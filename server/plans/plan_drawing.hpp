@@ -1,0 +1,68 @@
+// Draws a floor plan on a canvas: the picture from above, walls cut and filled, doors with their
+// swing, a grid with coordinates, scale bar and axes.
+#pragma once
+
+#include "render/image/canvas.hpp"
+#include "scene/world/data/scene.hpp"
+#include "server/plans/plan_image.hpp"
+
+namespace enfilade::server {
+
+/// A plan's place on a canvas. +x points right, +z down.
+struct PlanView {
+  scene::Aabb area;       ///< shown, scene frame, metres
+  double floor = 0;       ///< height of the storey's floor, metres
+  render::Point topLeft;  ///< of the area on the canvas
+  double unitsPerMetre = 1;
+  double unit = 1;  ///< canvas units of a thin line: 1 on images, less on pages
+
+  double width() const { return area.size().x() * unitsPerMetre; }
+  double height() const { return area.size().z() * unitsPerMetre; }
+  render::Point at(const Vec3& point) const {
+    return {topLeft.x + (point.x() - area.min.x()) * unitsPerMetre,
+            topLeft.y + (point.z() - area.min.z()) * unitsPerMetre};
+  }
+};
+
+/// The view of what a plan camera shows.
+PlanView makePlanView(const render::Camera& camera, double floor, render::Point topLeft,
+                      double unitsPerMetre, double unit);
+
+/// Draws the picture as the background of the view.
+void drawPlanPicture(render::Canvas& canvas, const PlanView& view, const PlanPicture& picture);
+
+/// Draws what the cut plane meets. Objects that reach from the floor to above doors are walls and
+/// filled dark; others, as shelves and windows, are filled light.
+void drawCut(render::Canvas& canvas, const PlanView& view, const scene::Scene& scene);
+
+/// Draws grid lines and their coordinates outside of the view, and a frame around it.
+void drawGrid(render::Canvas& canvas, const PlanView& view);
+
+/// Draws a scale bar with its top left corner at `at`, and the axes right of it.
+void drawScaleBar(render::Canvas& canvas, const PlanView& view, render::Point at);
+
+/// Places captions so that no two overlap.
+class CaptionPlacer {
+ public:
+  explicit CaptionPlacer(const PlanView& view) : view_(view) {}
+  /// Draws the text next to the point, or as near as space allows. A caption without space is left
+  /// out.
+  void draw(render::Canvas& canvas, render::Point at, const std::string& text,
+            const render::TextStyle& style);
+  /// No caption covers this rectangle.
+  void reserve(render::Point topLeft, double width, double height) {
+    taken_.push_back({topLeft, width, height});
+  }
+
+ private:
+  struct Rectangle {
+    render::Point topLeft;
+    double width, height;
+  };
+  bool isFree(const Rectangle& rectangle) const;
+
+  const PlanView& view_;
+  std::vector<Rectangle> taken_;
+};
+
+}  // namespace enfilade::server
