@@ -7,7 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+#include <mutex>
 #include <stdexcept>
 
 #include "collision/assert.hpp"
@@ -35,11 +35,23 @@ std::string toUtf8(const std::string& text) {
   return result;
 }
 
-/// A layout of Pango for one line of text.
+/// The fonts of all threads: Fontconfig loses what a thread's own map holds when the thread ends.
+struct Fonts {
+  std::recursive_mutex mutex;
+  PangoContext* context = pango_font_map_create_context(pango_cairo_font_map_new());
+};
+
+Fonts& fonts() {
+  static Fonts shared;
+  return shared;
+}
+
+/// A layout of Pango for one line of text. Locks the fonts.
 class Layout {
  public:
-  Layout(cairo_t* cairo, const std::string& text, const TextStyle& style)
-      : layout_(pango_cairo_create_layout(cairo)) {
+  Layout(cairo_t* cairo, const std::string& text, const TextStyle& style) : lock_(fonts().mutex) {
+    pango_cairo_update_context(cairo, fonts().context);
+    layout_ = pango_layout_new(fonts().context);
     PangoFontDescription* const font = pango_font_description_new();
     pango_font_description_set_family(font, kFontFamily);
     pango_font_description_set_absolute_size(font, style.size * PANGO_SCALE);
@@ -61,7 +73,8 @@ class Layout {
   }
 
  private:
-  PangoLayout* layout_;
+  std::lock_guard<std::recursive_mutex> lock_;
+  PangoLayout* layout_ = nullptr;
 };
 
 cairo_surface_t* makeImageSurface(int width, int height) {

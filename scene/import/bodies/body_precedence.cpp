@@ -18,7 +18,8 @@ std::vector<const BodySpec*> mapObjectsToBodies(const Model& model) {
 
 /// A file that describes a body twice in the same way is no problem.
 bool isSameBody(const BodySpec& a, const BodySpec& b) {
-  return a.kind == b.kind && a.objects == b.objects && a.anchor.isApprox(b.anchor, 1e-6) &&
+  const bool sameAnchor = a.kind != BodyKind::hinged || a.anchor.isApprox(b.anchor, 1e-6);
+  return a.kind == b.kind && a.objects == b.objects && sameAnchor &&
          a.axis.isApprox(b.axis, 1e-6) && std::abs(a.low - b.low) < 1e-6 &&
          std::abs(a.high - b.high) < 1e-6;
 }
