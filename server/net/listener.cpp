@@ -60,11 +60,11 @@ tcp::acceptor openAcceptor(asio::io_context& context, const Endpoint& where, con
 }  // namespace
 
 Listener::Listener(asio::io_context& context, const Endpoint& where, WorldRegistry& worlds,
-                   const ServerLimits& limits, Access access)
+                   const ServerLimits& limits, Access access, PageFiles page)
     : acceptor_(openAcceptor(context, where, access)),
       port_(acceptor_.local_endpoint().port()),
       retryTimer_(context),
-      context_{worlds, limits, std::move(access), {}} {}
+      context_{worlds, limits, std::move(access), std::move(page), {}} {}
 
 void Listener::start() {
   accept();
