@@ -24,9 +24,10 @@ constexpr double kMaxDepthSteps = 65535;
 constexpr std::size_t kNpyAlignment = 64;  // bytes, of the first value
 
 template <class Value>
-void validateRaster(const char* what, const Raster<Value>& pixels) {
+void validateRaster(const char* what, const Raster<Value>& pixels, bool mayHaveAlpha = false) {
   const bool shaped =
-      pixels.width > 0 && pixels.height > 0 && (pixels.channels == 1 || pixels.channels == 3);
+      pixels.width > 0 && pixels.height > 0 &&
+      (pixels.channels == 1 || pixels.channels == 3 || (mayHaveAlpha && pixels.channels == 4));
   const std::size_t wanted = shaped ? static_cast<std::size_t>(pixels.width) *
                                           static_cast<std::size_t>(pixels.height) *
                                           static_cast<std::size_t>(pixels.channels)
@@ -72,9 +73,11 @@ bool writePngRows(png_structp png, png_infop info, int width, int height, int bi
   // 16-bit depth is smooth from row to row. For 8-bit colour, no filter is the fastest.
   png_set_filter(png, PNG_FILTER_TYPE_BASE, bits == 16 ? PNG_FILTER_UP : PNG_FILTER_NONE);
   png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), bits,
-               channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
-               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-  if (bits == 8 && channels == 3) png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
+               channels == 4   ? PNG_COLOR_TYPE_RGB_ALPHA
+               : channels == 3 ? PNG_COLOR_TYPE_RGB
+                               : PNG_COLOR_TYPE_GRAY,
+               PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  if (bits == 8 && channels >= 3) png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
   png_write_info(png, info);
   if (bits == 16) png_set_swap(png);  // PNG is big-endian
   for (int y = 0; y < height; ++y) png_write_row(png, rows + static_cast<std::size_t>(y) * stride);
@@ -135,7 +138,7 @@ Bytes encodeNpyBytes(const Raster<Value>& pixels, const char* type) {
 }  // namespace
 
 Bytes encodePng(const Raster<std::uint8_t>& pixels) {
-  validateRaster("encodePng", pixels);
+  validateRaster("encodePng", pixels, true);
   return encodePngBytes(pixels.width, pixels.height, 8, pixels.channels, pixels.values.data());
 }
 

@@ -15,7 +15,7 @@ using Bytes = std::vector<std::uint8_t>;
 template <class Value>
 struct Raster {
   int width = 0, height = 0;  ///< pixels, at least 1
-  int channels = 1;           ///< 1: grey, 3: red, green, blue
+  int channels = 1;           ///< 1: grey; 3: red, green, blue; 4: with alpha, 8-bit PNG only
   std::span<const Value> values;
 };
 

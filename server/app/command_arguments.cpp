@@ -326,12 +326,20 @@ void addDiffOptions(CLI::App& verb, CommandArguments& into) {
 }
 
 void addExportOptions(CLI::App& verb, CommandArguments& into) {
-  verb.add_option("RECORDING", into.recording, "Recording (MCAP)")->required();
-  verb.add_option("--out", into.out,
-                  "Folder for contacts.jsonl, trajectories in TUM format, and cameras.glb")
-      ->required()
+  addModel(verb, into.model);
+  setGroup(verb, "Options");
+  verb.add_option("--glb", into.glb,
+                  "SCENE: file for the scene as binary glTF, with entity ids, instances and bodies")
+      ->check(CLI::Validator(validateFile, "FILE"));
+  verb.add_option(
+          "--out", into.out,
+          "RECORDING: folder for contacts.jsonl, trajectories in TUM format, and cameras.glb")
       ->check(CLI::Validator(validateFolder, "DIR"));
-  verb.footer("Example: enfilade export walk.mcap --out out/walk");
+  verb.footer(
+      "Uses:\n"
+      "  enfilade export SCENE --glb FILE       the scene for viewers, as at /scene.glb\n"
+      "  enfilade export RECORDING --out DIR    contacts, trajectories and cameras\n"
+      "Example: enfilade export house.ifc --glb house.glb");
 }
 
 void addCaptureCommandOptions(CLI::App& capture, CommandArguments& into) {

@@ -177,6 +177,24 @@ std::variant<ProgramCommand, ExitCode> makeReplayCommand(const CLI::App& replay,
   return command;
 }
 
+/// A model becomes a GLB file, a recording becomes texts: each has an option of its own.
+std::variant<ProgramCommand, ExitCode> makeExportCommand(const CLI::App& verb,
+                                                         const CommandArguments& read) {
+  const bool writesScene = verb.count("--glb") > 0;
+  if (writesScene == (verb.count("--out") > 0))
+    return reportMisuse("export",
+                        "give --glb FILE to export a model, or --out DIR to export a recording");
+  if (writesScene && protocol::mcap::isMcap(read.model.file))
+    return reportMisuse(
+        "export", read.model.file + ": a recording: give --out DIR, or a model file for --glb");
+  if (writesScene) return ExportSceneCommand{makeModelOptions(read.model), read.glb};
+  for (const char* option :
+       {"--unit", "--up", "--offset", "--no-cache", "--ifc-reader", "--ifc-doors"})
+    if (verb.count(option) > 0)
+      return reportMisuse("export", std::string(option) + " needs a model and --glb");
+  return ExportCommand{read.model.file, read.out};
+}
+
 using ParsedCommand = std::variant<ProgramCommand, ExitCode>;
 
 struct Verb {
@@ -194,10 +212,8 @@ const Verb kVerbs[] = {
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
        return DiffCommand{read.before, read.after, read.tolerance, read.json};
      }},
-    {"export", "Export contacts and trajectories of a recording as text and glTF", addExportOptions,
-     [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
-       return ExportCommand{read.recording, read.out};
-     }},
+    {"export", "Export a scene as glTF, or contacts and trajectories of a recording",
+     addExportOptions, makeExportCommand},
     {"capture", "Render colour, depth and ids along a camera path", addCaptureCommandOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
        return CaptureCommand{makeModelOptions(read.model),

@@ -7,6 +7,7 @@
 #include "server/capture/capture.hpp"
 #include "server/commands/doctor.hpp"
 #include "server/commands/export.hpp"
+#include "server/commands/export_scene.hpp"
 #include "server/commands/inspect.hpp"
 #include "server/commands/serve.hpp"
 #include "server/commands/verify.hpp"
@@ -16,9 +17,9 @@
 
 namespace enfilade::server {
 
-using ProgramCommand =
-    std::variant<DoctorCommand, ServeCommand, ReplayCommand, VerifyCommand, CaptureCommand,
-                 WalkCommand, InspectCommand, DiffCommand, ResimulateCommand, ExportCommand>;
+using ProgramCommand = std::variant<DoctorCommand, ServeCommand, ReplayCommand, VerifyCommand,
+                                    CaptureCommand, WalkCommand, InspectCommand, DiffCommand,
+                                    ResimulateCommand, ExportCommand, ExportSceneCommand>;
 
 /// Returns the command, or the exit code (--help: done; an error: usage). Help goes to stdout,
 /// errors go to stderr.

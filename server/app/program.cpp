@@ -21,6 +21,7 @@ struct CommandRunner {
   ExitCode operator()(const DiffCommand& command) const { return diff(command); }
   ExitCode operator()(const ResimulateCommand& command) const { return resimulate(command); }
   ExitCode operator()(const ExportCommand& command) const { return exportRecording(command); }
+  ExitCode operator()(const ExportSceneCommand& command) const { return exportScene(command); }
   ExitCode operator()(const InspectCommand& command) const { return inspect(command); }
 };
 

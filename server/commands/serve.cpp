@@ -13,6 +13,7 @@
 #include "server/base/load_scene.hpp"
 #include "server/base/standard_output.hpp"
 #include "server/messages/world_messages.hpp"
+#include "server/net/page_files.hpp"
 #include "server/net/server.hpp"
 #include "server/recording/world_from_recording.hpp"
 #include "server/recording/world_recorder.hpp"
@@ -120,6 +121,7 @@ ExitCode serveUntilSignal(const ServeCommand& command) {
   options.world = makeWorldOptions(command);
   options.access = std::move(access);
   options.drawing = command.drawing;
+  options.pageFolder = findPageFolder();
   Server server(scene, command.listen, std::move(options));
   printReady(server, *scene, command);
   const int signal = awaitEndingSignal(ending, server, command.stopAtEndOfInput);

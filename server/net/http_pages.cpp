@@ -103,6 +103,8 @@ const char* statusPhrase(unsigned status) {
       return "Payload Too Large";
     case 431:
       return "Request Header Fields Too Large";
+    case 500:
+      return "Internal Server Error";
     case 503:
       return "Service Unavailable";
     default:
@@ -196,7 +198,9 @@ std::variant<v1::ClientMessage, HttpError> parseRequest(const Target& target) {
     return message;
   }
   if (target.path.starts_with("/mjpeg")) return parseMjpegRequest(target);
-  return HttpError{404, "there are /healthz, /metrics and /mjpeg/..., and the WebSocket at /"};
+  return HttpError{404,
+                   "there are /, /scene.glb, /healthz, /metrics and /mjpeg/..., and the "
+                   "WebSocket at /"};
 }
 
 std::string makeMetricsPage(std::span<const WorldMetrics> worlds) {

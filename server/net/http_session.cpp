@@ -25,6 +25,8 @@ namespace {
 
 constexpr std::uint32_t kMaxHeaderBytes = 16u << 10;  // bytes; a browser's cookies are below 8 KiB
 constexpr std::uint64_t kMaxBodyBytes = 0;            // no request has a body
+/// Written at once: a peer that takes this much within the message timeout is not stuck.
+constexpr std::size_t kMaxWriteBytes = std::size_t{256} << 10;
 
 Buffer makeBuffer(const std::string& text) {
   return std::make_shared<const std::vector<std::uint8_t>>(text.begin(), text.end());
@@ -81,7 +83,7 @@ void HttpSession::end(v1::ErrorCode, const std::string& reason) {
 }
 
 bool HttpSession::evictIfAnonymous() {
-  if (closed_ || answered_ || !replies_.empty()) return false;
+  if (closed_ || answered_ || awaitsFile_ || !replies_.empty()) return false;
   spdlog::warn("{}: sent no request and was replaced by a new connection", peer_);
   close();
   return true;
@@ -96,14 +98,18 @@ void HttpSession::route(Request request) {
     return refuse(403, *reason);
   const Target target = parseTarget(toStdString(request.target()));
   path_ = target.path;
+  ifNoneMatch_ = toStdString(request[http::field::if_none_match]);
+  acceptEncoding_ = toStdString(request[http::field::accept_encoding]);
   const std::string token = extractToken(toStdString(request[http::field::authorization]), target);
   if (boost::beast::websocket::is_upgrade(request)) return upgrade(std::move(request));
   if (request.method() != http::verb::get) return refuse(405, "only GET is supported");
+  if (servePage()) return;
   const auto role = findRole(context_.access, token);
   // /healthz is public, but names of worlds are not.
   mayShowNames_ = role.has_value();
   if (!role && (path_ != "/healthz" || target.query.contains("world")))
     return refuse(401, "this server requires a token");
+  if (path_ == "/scene.glb") return requestSceneFile(target);
   const auto parsed = parseRequest(target);
   if (const auto* httpError = std::get_if<HttpError>(&parsed))
     return refuse(httpError->status, httpError->text);
@@ -140,6 +146,59 @@ void HttpSession::upgrade(Request request) {
       context_);
   session->start(deadline_, token);
   registerConnection(context_, session);
+}
+
+// ---- files --------------------------------------------------------------------------------------
+
+/// Sends a file of the page. Files are public, like /healthz: the page itself asks for the token.
+/// Returns false if the path names another resource.
+bool HttpSession::servePage() {
+  const auto file = context_.page.find(path_);
+  if (file != context_.page.end()) {
+    sendFile(file->second);
+    return true;
+  }
+  if (path_ == "/") {
+    refuse(404, kNoPage);
+    return true;
+  }
+  if (!path_.starts_with("/page/")) return false;
+  refuse(404, "the page has no such file");
+  return true;
+}
+
+/// Waits for the scene's file without a timeout: it may be made first, and a peer that leaves is
+/// noticed.
+void HttpSession::requestSceneFile(const Target& target) {
+  const auto named = target.query.find("world");
+  const auto world = context_.worlds.find(named == target.query.end() ? "" : named->second);
+  if (!world) return refuse(404, "unknown world");
+  awaitsFile_ = true;
+  timer_.expires_at(Clock::time_point::max());
+  const bool compressed = acceptsGzip(acceptEncoding_);
+  context_.worlds.sceneFileOf(*world).request(
+      compressed, [weak = weak_from_this(), executor = socket_.get_executor(),
+                   compressed](const SceneFile& file) {
+        asio::post(executor, [weak, file, compressed] {
+          if (const auto self = weak.lock()) self->sendSceneFile(file, compressed);
+        });
+      });
+  watchDisconnect();
+}
+
+void HttpSession::sendSceneFile(const SceneFile& file, bool compressed) {
+  awaitsFile_ = false;
+  if (closed_ || answered_) return;
+  if (!file.bytes) return refuse(500, "the scene cannot be written: " + file.error);
+  sendFile({file.bytes, findContentType(path_), file.tag, compressed, true, false});
+}
+
+void HttpSession::sendFile(const HttpFile& file) {
+  if (answered_) return;
+  answered_ = true;
+  if (matchesTag(ifNoneMatch_, file.tag)) return write(makeBuffer(makeNotModified(file)), true);
+  if (!file.bytes->empty()) body_ = file.bytes;
+  write(makeBuffer(makeFileHeader(file)), !body_);
 }
 
 // ---- world queries -----------------------------------------------------------------------------
@@ -253,7 +312,8 @@ void HttpSession::sendResponse(unsigned status, const std::string& type, std::st
   write(makeBuffer(makeResponse(status, type, body)), true);
 }
 
-void HttpSession::write(Buffer bytes, bool last) {
+/// Writes the bytes from `offset` on, a part at a time: the timeout applies to each part.
+void HttpSession::write(Buffer bytes, bool last, std::size_t offset) {
   writing_ = true;
   // Close if the peer does not read, as in the protocol's own sessions.
   timer_.expires_after(context_.limits.messageTimeout);
@@ -261,19 +321,24 @@ void HttpSession::write(Buffer bytes, bool last) {
     const auto self = weak.lock();
     if (!stopped && self && self->writing_) self->close();
   });
-  const auto view = asio::buffer(*bytes);
-  asio::async_write(
-      socket_, view,
-      [self = shared_from_this(), bytes = std::move(bytes), last](error_code problem, std::size_t) {
-        self->writing_ = false;
-        if (problem) return self->close();
-        if (!last) return self->pollReplies();
-        error_code ignored;
-        self->socket_.shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
-        self->timer_.expires_after(self->context_.limits.closeTimeout);
-        self->timer_.async_wait([self](error_code) { self->close(); });
-        self->watchDisconnect();
-      });
+  const auto view = asio::buffer(asio::buffer(*bytes) + offset, kMaxWriteBytes);
+  asio::async_write(socket_, view,
+                    [self = shared_from_this(), bytes = std::move(bytes), last, offset](
+                        error_code problem, std::size_t written) mutable {
+                      self->writing_ = false;
+                      if (problem) return self->close();
+                      offset += written;
+                      if (offset < bytes->size())
+                        return self->write(std::move(bytes), last, offset);
+                      if (self->body_)
+                        return self->write(std::exchange(self->body_, nullptr), true);
+                      if (!last) return self->pollReplies();
+                      error_code ignored;
+                      self->socket_.shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
+                      self->timer_.expires_after(self->context_.limits.closeTimeout);
+                      self->timer_.async_wait([self](error_code) { self->close(); });
+                      self->watchDisconnect();
+                    });
 }
 
 /// Reads and discards data, to detect the end of the connection.

@@ -1,5 +1,5 @@
-// One HTTP/1.1 request: /healthz, /metrics, /mjpeg/..., or an upgrade to WebSocket. It queries the
-// worlds like any client, through their tick loops.
+// One HTTP/1.1 request: a file of the page, /scene.glb, /healthz, /metrics, /mjpeg/..., or an
+// upgrade to WebSocket. It queries the worlds like any client, through their tick loops.
 //
 // This header uses Asio and Beast; only connection files include it.
 #pragma once
@@ -35,7 +35,11 @@ class HttpSession : public ClientConnection, public std::enable_shared_from_this
   void upgrade(Request request);
   void sendResponse(unsigned status, const std::string& type, std::string body);
   void refuse(unsigned status, const std::string& reason);
-  void write(Buffer bytes, bool last);
+  void write(Buffer bytes, bool last, std::size_t offset = 0);
+  bool servePage();
+  void requestSceneFile(const Target& target);
+  void sendSceneFile(const SceneFile& file, bool compressed);
+  void sendFile(const HttpFile& file);
   /// The query to one world, and its reply.
   struct WorldReply {
     std::shared_ptr<TickLoop> world;
@@ -66,8 +70,11 @@ class HttpSession : public ClientConnection, public std::enable_shared_from_this
   boost::beast::http::request_parser<boost::beast::http::string_body> parser_;
   std::array<char, 256> discarded_{};
   std::string path_;
-  std::vector<WorldReply> replies_;  ///< one; for metrics, one per world
-  bool mayShowNames_ = false;        ///< the response may name worlds
+  std::string ifNoneMatch_, acceptEncoding_;  ///< headers of the request
+  Buffer body_;                               ///< sent after the header
+  std::vector<WorldReply> replies_;           ///< one; for metrics, one per world
+  bool mayShowNames_ = false;                 ///< the response may name worlds
+  bool awaitsFile_ = false;                   ///< of the scene, which is being made
   bool writing_ = false, answered_ = false, watching_ = false, closed_ = false;
 };
 

@@ -65,11 +65,11 @@ void requireListenable(const Endpoint& listen, const Access& access) {
 }
 
 Listener::Listener(asio::io_context& context, const Endpoint& where, WorldRegistry& worlds,
-                   const ServerLimits& limits, Access access)
+                   const ServerLimits& limits, Access access, PageFiles page)
     : acceptor_(openAcceptor(context, where, access)),
       port_(acceptor_.local_endpoint().port()),
       retryTimer_(context),
-      context_{worlds, limits, std::move(access), {}} {}
+      context_{worlds, limits, std::move(access), std::move(page), {}} {}
 
 void Listener::start() {
   accept();

@@ -15,7 +15,7 @@ class Listener {
  public:
   /// Throws ServerError if it cannot listen on the address.
   Listener(boost::asio::io_context& context, const Endpoint& where, WorldRegistry& worlds,
-           const ServerLimits& limits, Access access);
+           const ServerLimits& limits, Access access, PageFiles page = {});
 
   std::uint16_t port() const { return port_; }
   void start();

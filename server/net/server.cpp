@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "server/net/listener.hpp"
+#include "server/net/page_files.hpp"
 
 namespace enfilade::server {
 
@@ -21,7 +22,8 @@ std::vector<std::shared_ptr<const scene::Scene>> prependScene(
 
 struct Server::State {
   State(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen, ServerOptions options)
-      : listener(context, listen, worlds, options.world.limits, std::move(options.access)),
+      : listener(context, listen, worlds, options.world.limits, std::move(options.access),
+                 readPageFiles(options.pageFolder)),
         worlds(prependScene(std::move(scene), std::move(options.additionalScenes)), options.world,
                options.drawing) {}
 

@@ -1,6 +1,7 @@
 // The server: hosts scenes for clients over TCP, WebSocket and HTTP.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,6 +21,8 @@ struct ServerOptions {
   WorldOptions world;
   Access access;
   DrawingOptions drawing;
+  /// Of the web page at "/"; see findPageFolder(). Empty: no page.
+  std::filesystem::path pageFolder = {};
 };
 
 /// Throws ServerError if a server would not listen on the address: it is no numeric one, or

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/base/access.hpp"
+#include "server/net/page_files.hpp"
 #include "server/worlds/world_registry.hpp"
 
 namespace enfilade::server {
@@ -25,6 +26,7 @@ struct ServerContext {
   WorldRegistry& worlds;
   const ServerLimits limits;
   const Access access;
+  const PageFiles page;
   std::vector<std::weak_ptr<ClientConnection>> connections;
   bool closed = false;  ///< new connections are rejected
 };

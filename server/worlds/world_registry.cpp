@@ -52,7 +52,8 @@ HostedScene::HostedScene(std::string sceneName, std::shared_ptr<const scene::Sce
     : name(std::move(sceneName)),
       scene(std::move(sceneToHost)),
       frames(scene, drawing),
-      queries(scene) {}
+      queries(scene),
+      file(scene) {}
 
 WorldRegistry::WorldRegistry(const std::vector<std::shared_ptr<const scene::Scene>>& scenes,
                              const WorldOptions& options, const DrawingOptions& drawing)
@@ -85,6 +86,12 @@ std::vector<std::shared_ptr<TickLoop>> WorldRegistry::allWorlds() const {
   for (const auto& [name, world] : worlds_)
     if (world != mainWorld_) worlds.push_back(world);
   return worlds;
+}
+
+SceneFileService& WorldRegistry::sceneFileOf(const TickLoop& world) const {
+  HostedScene* const scene = findScene(world.identity().scene);
+  ENFILADE_ASSERT(scene != nullptr);  // scenes outlive their worlds
+  return scene->file;
 }
 
 bool WorldRegistry::isStopping() const {
@@ -266,6 +273,7 @@ void WorldRegistry::finishServices() {
   for (const auto& scene : scenes_) {
     scene->frames.finish();
     scene->queries.finish();
+    scene->file.finish();
   }
 }
 

@@ -10,6 +10,7 @@
 #include "server/base/work_thread.hpp"
 #include "server/hosting/frame_service.hpp"
 #include "server/hosting/query_service.hpp"
+#include "server/hosting/scene_file_service.hpp"
 #include "server/hosting/world_directory.hpp"
 #include "server/worlds/tick_loop.hpp"
 
@@ -27,6 +28,7 @@ struct HostedScene {
   const std::shared_ptr<const scene::Scene> scene;
   FrameService frames;
   QueryService queries;
+  SceneFileService file;
 };
 
 /// Creates, finds and drops worlds.
@@ -45,6 +47,8 @@ class WorldRegistry : public WorldDirectory {
   /// Finds a world by name; "" is the main world. Null: unknown name.
   std::shared_ptr<TickLoop> find(const std::string& name) const;
   TickLoop& mainWorld() const { return *mainWorld_; }
+  /// The file of the world's scene. Lives as long as the registry.
+  SceneFileService& sceneFileOf(const TickLoop& world) const;
   /// The main world first, then by name.
   std::vector<std::shared_ptr<TickLoop>> allWorlds() const;
   v1::WorldList makeWorldList() const override;

@@ -1,0 +1,43 @@
+// Makes the GLB file of a scene at its first request, on a thread of its own, and keeps it.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "scene/world/data/scene.hpp"
+#include "server/base/work_thread.hpp"
+
+namespace enfilade::server {
+
+/// A file that is complete in memory. Shared by all its receivers.
+struct SceneFile {
+  /// Null: the file could not be made, and `error` says why.
+  std::shared_ptr<const std::vector<std::uint8_t>> bytes;
+  /// "HASH-CONTENT" in hexadecimal digits: the scene's hash, which covers what decides contact, and
+  /// a hash of the bytes, which also covers names and colours.
+  std::string tag;
+  std::string error;
+};
+
+class SceneFileService {
+ public:
+  explicit SceneFileService(std::shared_ptr<const scene::Scene> scene);
+
+  /// `done` receives the file on the service's thread, compressed on request. Requests during the
+  /// making wait for the same file.
+  void request(bool compressed, std::function<void(const SceneFile&)> done);
+  /// Waits for all requests. Make no requests afterwards.
+  void finish() { thread_.finish(); }
+
+ private:
+  const SceneFile& provide(bool compressed);
+
+  const std::shared_ptr<const scene::Scene> scene_;
+  // Only on the thread.
+  SceneFile plain_, compressed_;
+  WorkThread thread_;  // last member: it uses the others
+};
+
+}  // namespace enfilade::server
