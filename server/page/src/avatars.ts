@@ -122,7 +122,7 @@ function nameSprite(name: string, height: number): Sprite {
   canvas.width = 256;
   canvas.height = 48;
   const context = canvas.getContext("2d")!;
-  context.font = "600 26px system-ui, sans-serif";
+  context.font = "600 25px system-ui, sans-serif";
   const width = Math.min(250, context.measureText(name).width + 24);
   context.fillStyle = "rgba(255,255,255,0.88)";
   context.beginPath();
@@ -131,9 +131,10 @@ function nameSprite(name: string, height: number): Sprite {
   context.fillStyle = "#20303c";
   context.textAlign = "center";
   context.fillText(name, 128, 33, 240);
-  const sprite = new Sprite(new SpriteMaterial({ map: new CanvasTexture(canvas), depthWrite: false }));
-  sprite.scale.set(1.0, 0.1875, 1);
-  sprite.position.y = height + 0.22;
+  const sprite = new Sprite(new SpriteMaterial({ map: new CanvasTexture(canvas), depthWrite: false, sizeAttenuation: false }));
+  sprite.scale.set(0.2, 0.0375, 1); // of the picture, at every distance
+  sprite.position.y = height + 0.15;
+  sprite.center.y = 0;
   return sprite;
 }
 

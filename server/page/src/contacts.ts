@@ -1,5 +1,5 @@
 // Contacts and near misses: a list by time, and markers around the avatar in focus.
-import { ArrowHelper, Group, Mesh, MeshBasicMaterial, SphereGeometry, Vector3 } from "three";
+import { ArrowHelper, Group, Mesh, MeshBasicMaterial, SphereGeometry, Vector3, type Material } from "three";
 import type { App } from "./app";
 import type { CameraRig } from "./camera_rig";
 import { button, element, setText } from "./dom";
@@ -24,7 +24,6 @@ interface Marker {
   ball: Mesh<SphereGeometry, MeshBasicMaterial>;
   arrow: ArrowHelper;
   label: HTMLElement;
-  point: Vector3;
 }
 
 export class Contacts {
@@ -99,8 +98,8 @@ export class Contacts {
   #render(): void {
     if (!this.#isDirty || this.root.offsetParent === null) return;
     this.#isDirty = false;
-    const others = [...this.#live.values()].filter((event) => !isFloor(event)).length;
-    setText(this.#summary, `${this.#live.size} contacts now, ${others} of them with more than a floor`);
+    const floors = [...this.#live.values()].filter(isFloor).length;
+    setText(this.#summary, `Now: ${this.#live.size - floors} contacts, and ${floors} with floors`);
     const rows = this.listed.filter((event) => this.#isListed(event)).slice(0, MAX_ROWS).map((event) => this.#row(event));
     if (rows.length === 0) rows.push(element("li", { class: "empty" }, "No contact yet. Walk into something."));
     this.#list.replaceChildren(...rows);
@@ -111,10 +110,16 @@ export class Contacts {
     row.append(
       element("time", {}, clockTime(event.time)),
       element("span", { class: "what" }, wordOf(event)),
-      element("span", { class: "who" }, event.bName ? `${shortName(event.aName)} – ${shortName(event.bName)}` : event.aName),
+      element("span", { class: "who" }, this.#pairOf(event)),
       element("span", { class: "distance" }, distanceOf(event)),
     );
     return element("li", {}, row);
+  }
+
+  /** Both names; that of the focused avatar is left out. */
+  #pairOf({ aName, bName }: ContactEvent): string {
+    if (!bName) return aName;
+    return aName === this.#app.focus ? shortName(bName) : `${shortName(aName)} – ${shortName(bName)}`;
   }
 
   /** Flies to where the contact can be seen: off its normal, on the side of `a`. */
@@ -169,10 +174,14 @@ export class Contacts {
     const arrow = new ArrowHelper(new Vector3(1, 0, 0), new Vector3(), 0.3, TOUCH_COLOR, 0.08, 0.05);
     const group = new Group();
     group.add(ball, arrow);
+    for (const part of [arrow.line, arrow.cone]) {
+      (part.material as Material).depthTest = false;
+      part.renderOrder = 10;
+    }
     this.#root.add(group);
     const label = element("span", { class: "marker" });
     this.labels.append(label);
-    this.#markers.push({ group, ball, arrow, label, point: new Vector3() });
+    this.#markers.push({ group, ball, arrow, label });
   }
 
   #place(marker: Marker, pair: PairState, epsilon: number): void {
@@ -188,6 +197,9 @@ export class Contacts {
     marker.arrow.position.copy(point);
     marker.arrow.setDirection(vector(pair.normal).negate().normalize());
     marker.arrow.setColor(color);
+    // Seen from nearby, an arrow would cover what it points at.
+    const length = Math.min(0.3, 0.2 * distance);
+    marker.arrow.setLength(length, 0.22 * length, 0.12 * length);
     const screen = point.clone().project(camera);
     const isVisible = screen.z < 1 && Math.abs(screen.x) < 1 && Math.abs(screen.y) < 1;
     marker.label.hidden = !isVisible;

@@ -1,8 +1,8 @@
 // Numbers and names as text.
 
 export function metres(value: number): string {
-  if (value < 0.001 && value > 0) return `${(value * 1e6).toFixed(0)} µm`;
-  if (value < 0.01) return `${(value * 1000).toFixed(2)} mm`;
+  if (value > 0 && value < 1e-5) return `${(value * 1e6).toFixed(1)} µm`;
+  if (value > 0 && value < 0.01) return `${(value * 1000).toFixed(2)} mm`;
   if (value < 1) return `${(value * 100).toFixed(1)} cm`;
   return `${value.toFixed(2)} m`;
 }

@@ -81,7 +81,7 @@ export class Input {
     this.#isRunning = event.shiftKey;
     const onControl = event.target instanceof HTMLElement && event.target.closest("button, [role=tree], input, summary, [role=tablist]");
     // Controls keep the keys that operate them; the letters move in every case.
-    if (onControl && !event.code.startsWith("Key")) return;
+    if (onControl && !event.code.startsWith("Key") && event.code !== "Escape") return;
     if (MOVES[event.code]) {
       event.preventDefault();
       if (!event.repeat) this.#held.add(event.code);

@@ -29,7 +29,7 @@ export class MetricsPanel {
     if (this.root.offsetParent === null || document.hidden || !connection.isOpen || !welcome) return;
     try {
       const metrics = await connection.request("metrics", {});
-      const info = this.#app.view.renderer.info.render;
+      const { drawn } = this.#app.view;
       const { tick } = metrics;
       this.#show([
         ["Scene", `${welcome.scene?.source ?? ""}, ${welcome.scene?.objects ?? 0} objects`],
@@ -42,7 +42,7 @@ export class MetricsPanel {
         ["Contacts now", String(metrics.liveContacts)],
         ["Worst penetration", metrics.worstPenetration === 0 ? "0 (never)" : metres(metrics.worstPenetration)],
         ["Recording", metrics.recording ? `${metrics.recording.ticks} ticks, ${(Number(metrics.recording.bytes) / 1e6).toFixed(1)} MB` : "none"],
-        ["Page", `${frames} frames/s, ${info.triangles.toLocaleString("en")} triangles`],
+        ["Page", `${frames} frames/s, ${drawn.triangles.toLocaleString("en")} triangles, ${drawn.calls} draw calls`],
         ["Server draws with", welcome.renderer || "nothing"],
       ]);
     } catch {

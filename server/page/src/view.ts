@@ -6,7 +6,23 @@ import {
 } from "three";
 
 const BACKGROUND = new Color(0xe9eef2);
-const SLOW_FRAME = 0.05; // seconds; slower devices get fewer pixels and no shade in corners
+const SLOW_FRAME = 0.05; // seconds; slower devices get the next cheaper quality
+const SLOW_SECONDS = 1; // of slow frames in succession
+
+interface Quality {
+  samples: number; // of the multisampled picture
+  shade: boolean; // in corners
+  pixels: number; // fraction of the screen's resolution
+}
+
+// From the best to the cheapest.
+const QUALITIES: Quality[] = [
+  { samples: 4, shade: true, pixels: 1 },
+  { samples: 0, shade: true, pixels: 1 },
+  { samples: 0, shade: false, pixels: 0.8 },
+  { samples: 0, shade: false, pixels: 0.5 },
+];
+const SOFTWARE_QUALITY = 2; // where a CPU draws
 
 const COMPOSE_VERTEX = `
 in vec3 position;
@@ -75,7 +91,6 @@ export class View {
   readonly canvas: HTMLCanvasElement;
   /** Called before each frame with the seconds since the last one; true: something moves, so continue. */
   readonly updaters: ((seconds: number) => boolean)[] = [];
-  frameSeconds = 0; // mean time of a frame's drawing
   #target: WebGLRenderTarget;
   #composer = new Scene();
   #composerCamera = new OrthographicCamera(-1, 1, 1, -1, 0, 1);
@@ -83,8 +98,10 @@ export class View {
   #sun = new DirectionalLight(0xfff6e6, 1.5);
   #isRequested = false;
   #last = 0;
-  #quality = 2; // 2: all; 1: no shade, no multisampling; 0: also fewer pixels
-  #slow = 0; // consecutive slow frames
+  #level = 0; // of QUALITIES
+  #slow = 0; // seconds of slow frames in succession
+  /** Triangles and draw calls of the last picture of the scene. */
+  drawn = { triangles: 0, calls: 0 };
 
   constructor() {
     this.canvas = document.createElement("canvas");
@@ -97,7 +114,8 @@ export class View {
     const sky = new HemisphereLight(0xf6f9ff, 0xd2cabd, 2.15);
     this.#sun.position.set(0.45, 1, 0.3);
     this.scene.add(sky, this.#sun, this.camera);
-    this.#target = this.#makeTarget(4);
+    if (isSoftware(context)) this.#level = SOFTWARE_QUALITY;
+    this.#target = this.#makeTarget();
     this.#compose = new RawShaderMaterial({
       glslVersion: GLSL3, vertexShader: COMPOSE_VERTEX, fragmentShader: COMPOSE_FRAGMENT, depthTest: false,
       uniforms: {
@@ -112,8 +130,12 @@ export class View {
     new ResizeObserver(() => this.#resize()).observe(this.canvas);
   }
 
-  #makeTarget(samples: number): WebGLRenderTarget {
-    const target = new WebGLRenderTarget(4, 4, { samples, type: HalfFloatType });
+  get #quality(): Quality {
+    return QUALITIES[this.#level]!;
+  }
+
+  #makeTarget(): WebGLRenderTarget {
+    const target = new WebGLRenderTarget(4, 4, { samples: this.#quality.samples, type: HalfFloatType });
     target.depthTexture = new DepthTexture(4, 4, FloatType);
     return target;
   }
@@ -129,7 +151,7 @@ export class View {
   #resize(): void {
     const { clientWidth, clientHeight } = this.canvas;
     if (clientWidth === 0 || clientHeight === 0) return;
-    const ratio = Math.min(window.devicePixelRatio, 2) * (this.#quality === 0 ? 0.6 : 1);
+    const ratio = Math.min(window.devicePixelRatio, 2) * this.#quality.pixels;
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.#target.setSize(Math.round(clientWidth * ratio), Math.round(clientHeight * ratio));
@@ -146,13 +168,13 @@ export class View {
 
   #frame(now: number): void {
     this.#isRequested = false;
-    const seconds = Math.min(0.1, now - this.#last);
+    const interval = now - this.#last;
     this.#last = now;
     let moves = false;
-    for (const update of this.updaters) moves = update(seconds) || moves;
-    const start = performance.now();
+    // After a pause, motion begins with a short step.
+    for (const update of this.updaters) moves = update(Math.min(0.1, interval)) || moves;
     this.#draw();
-    this.#judge((performance.now() - start) / 1000, seconds, moves);
+    this.#judge(interval, moves);
     if (moves) this.invalidate();
   }
 
@@ -161,28 +183,28 @@ export class View {
     this.camera.updateMatrixWorld();
     this.renderer.setRenderTarget(this.#target);
     this.renderer.render(this.scene, this.camera);
+    const { triangles, calls } = this.renderer.info.render;
+    this.drawn = { triangles, calls };
     uniforms.colour!.value = this.#target.texture;
     uniforms.depth!.value = this.#target.depthTexture;
     uniforms.pixel!.value.set(1 / this.#target.width, 1 / this.#target.height);
     uniforms.planes!.value.set(this.camera.near, this.camera.far);
     uniforms.pixelAngle!.value = 2 * Math.tan((this.camera.fov * Math.PI) / 360) / this.#target.height;
-    uniforms.shade!.value = this.#quality === 2;
+    uniforms.shade!.value = this.#quality.shade;
     this.renderer.setRenderTarget(null);
     this.renderer.render(this.#composer, this.#composerCamera);
   }
 
-  /** Lowers the quality after a second of slow frames. */
-  #judge(drawing: number, interval: number, moves: boolean): void {
-    this.frameSeconds += 0.1 * (drawing - this.frameSeconds);
-    const isSlow = moves && Math.max(drawing, interval) > SLOW_FRAME;
+  /** Lowers the quality while motion is slow. */
+  #judge(interval: number, moves: boolean): void {
+    const isSlow = moves && interval > SLOW_FRAME && interval < 2; // longer ones are pauses
     this.#slow = isSlow ? this.#slow + interval : 0;
-    if (this.#slow < 1.5 || this.#quality === 0) return;
+    if (this.#slow < SLOW_SECONDS || this.#level === QUALITIES.length - 1) return;
     this.#slow = 0;
-    this.#quality -= 1;
-    const { width, height } = this.#target;
+    this.#level += 1;
+    this.#target.depthTexture?.dispose();
     this.#target.dispose();
-    this.#target = this.#makeTarget(0);
-    this.#target.setSize(width, height);
+    this.#target = this.#makeTarget();
     this.#resize();
   }
 
@@ -193,4 +215,11 @@ export class View {
       (blob) => (blob ? resolve(blob) : reject(new Error("the browser made no picture"))), "image/png",
     ));
   }
+}
+
+/** True if a CPU draws. Browsers may hide the name; then the time of frames decides. */
+function isSoftware(context: WebGL2RenderingContext): boolean {
+  const extension = context.getExtension("WEBGL_debug_renderer_info");
+  const name = String(extension ? context.getParameter(extension.UNMASKED_RENDERER_WEBGL) : "");
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
 }
