@@ -12,6 +12,7 @@ const RADIUS = 0.3; // metres
 const BEVEL_INSET = 0.25; // of the radius
 const BEVEL_HEIGHT = 0.05; // metres
 const SIDES = 12;
+const NEAR_CAMERA = 1.6; // metres
 const COLORS = [0x1f6f8b, 0xb5562b, 0x5b7f3a, 0x7a4f9a, 0xa8842c, 0x2f5aa8, 0x9c3d58, 0x3d8a76];
 
 interface Figure {
@@ -69,7 +70,14 @@ export class Avatars {
     const yaw = Math.atan2(-pose.gaze.z, pose.gaze.x);
     figure.face.position.set(0.9 * RADIUS * Math.cos(yaw), pose.eyeHeight, -0.9 * RADIUS * Math.sin(yaw));
     figure.face.rotation.y = yaw;
-    figure.group.visible = !(this.#rig.mode === "first" && name === this.#app.focus);
+    const isFocus = name === this.#app.focus;
+    figure.group.visible = !(this.#rig.mode === "first" && isFocus);
+    // A wall may push the camera so near that the avatar would fill the picture.
+    const distance = this.#rig.position.distanceTo(figure.group.position.clone().setY(pose.feet.y + pose.eyeHeight));
+    const material = figure.body.material as MeshLambertMaterial;
+    const isNear = isFocus && distance < NEAR_CAMERA;
+    material.opacity = isNear ? 0.3 : 1;
+    if (material.transparent !== isNear) Object.assign(material, { transparent: isNear, depthWrite: !isNear, needsUpdate: true });
   }
 
   /** The nearest avatar on a ray; the avatar whose eyes the page shows is ignored. */

@@ -16,6 +16,8 @@ const QUERY_SECONDS = 0.15; // between questions for what is near the focused av
 const NEAR = 0.25; // metres: shown as near misses if the server has no limit of its own
 const MAX_MARKERS = 12;
 const FLOOR_NORMAL = -0.7; // y of the normal from an avatar to what it stands on
+const LABEL_HEIGHT = 20; // pixels
+const LABEL_WIDTH = 180; // pixels
 const TOUCH_COLOR = 0xc0392b;
 const NEAR_COLOR = 0xd68910;
 
@@ -24,6 +26,8 @@ interface Marker {
   ball: Mesh<SphereGeometry, MeshBasicMaterial>;
   arrow: ArrowHelper;
   label: HTMLElement;
+  x: number; // pixels of the label
+  y: number;
 }
 
 export class Contacts {
@@ -110,8 +114,8 @@ export class Contacts {
     row.append(
       element("time", {}, clockTime(event.time)),
       element("span", { class: "what" }, wordOf(event)),
-      element("span", { class: "who" }, this.#pairOf(event)),
       element("span", { class: "distance" }, distanceOf(event)),
+      element("span", { class: "who" }, this.#pairOf(event)),
     );
     return element("li", {}, row);
   }
@@ -164,6 +168,7 @@ export class Contacts {
       marker.label.hidden = !pair;
       if (pair) this.#place(marker, pair, epsilon);
     });
+    this.#placeLabels();
     return false;
   }
 
@@ -181,7 +186,7 @@ export class Contacts {
     this.#root.add(group);
     const label = element("span", { class: "marker" });
     this.labels.append(label);
-    this.#markers.push({ group, ball, arrow, label });
+    this.#markers.push({ group, ball, arrow, label, x: 0, y: 0 });
   }
 
   #place(marker: Marker, pair: PairState, epsilon: number): void {
@@ -207,9 +212,19 @@ export class Contacts {
     const text = isContact ? "contact" : metres(pair.distance);
     setText(marker.label, `${text} · ${shortName(pair.bName)}`);
     marker.label.classList.toggle("near", !isContact);
-    const x = ((screen.x + 1) / 2) * canvas.clientWidth;
-    const y = ((1 - screen.y) / 2) * canvas.clientHeight;
-    marker.label.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(10px, -50%)`;
+    marker.x = ((screen.x + 1) / 2) * canvas.clientWidth;
+    marker.y = ((1 - screen.y) / 2) * canvas.clientHeight;
+  }
+
+  /** Labels from the top; each one moves down until it covers none above it. */
+  #placeLabels(): void {
+    const shown = this.#markers.filter(({ label }) => !label.hidden).sort((a, b) => a.y - b.y);
+    shown.forEach((marker, index) => {
+      for (const above of shown.slice(0, index)) {
+        if (Math.abs(above.x - marker.x) < LABEL_WIDTH) marker.y = Math.max(marker.y, above.y + LABEL_HEIGHT);
+      }
+      marker.label.style.transform = `translate(${marker.x.toFixed(1)}px, ${marker.y.toFixed(1)}px) translate(10px, -50%)`;
+    });
   }
 }
 

@@ -3,7 +3,6 @@ import type { App } from "./app";
 import { colorOf } from "./avatars";
 import type { CameraRig } from "./camera_rig";
 import { button, element } from "./dom";
-import { metres } from "./format";
 import type { AvatarState } from "./generated/enfilade_pb";
 import type { Walk } from "./walk";
 
@@ -55,7 +54,7 @@ export class People {
     const speed = made ? Math.hypot(made.x, made.y, made.z) / (this.#app.welcome?.policies?.tick ?? 1 / 60) : 0;
     const what = flying ? "flies" : !grounded ? "in the air" : speed > 0.01 ? "walks" : "stands";
     const stopped = move?.stoppedByName ? `, stopped by ${move.stoppedByName.split("/").at(-1)}` : "";
-    return `${what}, ${speed.toFixed(1)} m/s, height ${metres(feet?.y ?? 0)}${stopped}`;
+    return `${what}, ${speed.toFixed(1)} m/s, height ${(feet?.y ?? 0).toFixed(2)} m${stopped}`;
   }
 
   #follow(name: string): void {

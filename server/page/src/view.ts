@@ -23,6 +23,8 @@ const QUALITIES: Quality[] = [
   { samples: 0, shade: false, pixels: 0.5 },
 ];
 const SOFTWARE_QUALITY = 2; // where a CPU draws
+const SOFTWARE_STILL = 1;
+const STILL_DELAY = 400; // milliseconds without motion until the picture is drawn once at its best quality
 
 const COMPOSE_VERTEX = `
 in vec3 position;
@@ -98,7 +100,10 @@ export class View {
   #sun = new DirectionalLight(0xfff6e6, 1.5);
   #isRequested = false;
   #last = 0;
-  #level = 0; // of QUALITIES
+  #level = 0; // of QUALITIES, while something moves
+  #stillLevel = 0; // when nothing moves: one slow picture disturbs nobody
+  #isStill = false;
+  #stillTimer = 0;
   #slow = 0; // seconds of slow frames in succession
   /** Triangles and draw calls of the last picture of the scene. */
   drawn = { triangles: 0, calls: 0 };
@@ -114,7 +119,10 @@ export class View {
     const sky = new HemisphereLight(0xf6f9ff, 0xd2cabd, 2.15);
     this.#sun.position.set(0.45, 1, 0.3);
     this.scene.add(sky, this.#sun, this.camera);
-    if (isSoftware(context)) this.#level = SOFTWARE_QUALITY;
+    if (isSoftware(context)) {
+      this.#level = SOFTWARE_QUALITY;
+      this.#stillLevel = SOFTWARE_STILL;
+    }
     this.#target = this.#makeTarget();
     this.#compose = new RawShaderMaterial({
       glslVersion: GLSL3, vertexShader: COMPOSE_VERTEX, fragmentShader: COMPOSE_FRAGMENT, depthTest: false,
@@ -131,7 +139,7 @@ export class View {
   }
 
   get #quality(): Quality {
-    return QUALITIES[this.#level]!;
+    return QUALITIES[this.#isStill ? Math.min(this.#stillLevel, this.#level) : this.#level]!;
   }
 
   #makeTarget(): WebGLRenderTarget {
@@ -160,6 +168,20 @@ export class View {
     this.#draw(); // at once: a resized canvas is blank until it is drawn
   }
 
+  /** Changes between the quality of motion and that of a still picture. */
+  #setStill(isStill: boolean): void {
+    if (this.#isStill === isStill) return;
+    this.#isStill = isStill;
+    if (this.#stillLevel < this.#level) this.#rebuild();
+  }
+
+  #rebuild(): void {
+    this.#target.depthTexture?.dispose();
+    this.#target.dispose();
+    this.#target = this.#makeTarget();
+    this.#resize();
+  }
+
   invalidate(): void {
     if (this.#isRequested) return;
     this.#isRequested = true;
@@ -173,9 +195,12 @@ export class View {
     let moves = false;
     // After a pause, motion begins with a short step.
     for (const update of this.updaters) moves = update(Math.min(0.1, interval)) || moves;
+    clearTimeout(this.#stillTimer);
+    if (moves) this.#setStill(false);
     this.#draw();
     this.#judge(interval, moves);
     if (moves) this.invalidate();
+    else this.#stillTimer = window.setTimeout(() => this.#setStill(true), STILL_DELAY);
   }
 
   #draw(): void {
@@ -202,10 +227,7 @@ export class View {
     if (this.#slow < SLOW_SECONDS || this.#level === QUALITIES.length - 1) return;
     this.#slow = 0;
     this.#level += 1;
-    this.#target.depthTexture?.dispose();
-    this.#target.dispose();
-    this.#target = this.#makeTarget();
-    this.#resize();
+    this.#rebuild();
   }
 
   /** A PNG of the present picture. */
