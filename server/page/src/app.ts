@@ -27,6 +27,7 @@ export class App {
   selection = 0; // entity id; 0: none
   /** The avatar whose place the page shows: its own or a followed one; empty: none. */
   focus = "";
+  own = ""; // name of the page's own avatar, if it is in the world
 
   readonly opened = new Signal<Welcome>();
   readonly troubled = new Signal<Trouble>();

@@ -1,83 +1,134 @@
 // Avatars as drawn: the bevelled prism with twelve sides that the server moves, with a face that shows the view
 // direction. The server does not send radii or convex parts; every avatar is drawn with the default radius.
 import {
-  BoxGeometry, BufferGeometry, CanvasTexture, Color, Float32BufferAttribute, Group, Mesh, MeshLambertMaterial, Sprite,
-  SpriteMaterial, Vector3,
+  BoxGeometry, BufferGeometry, CanvasTexture, Color, DynamicDrawUsage, Float32BufferAttribute, InstancedMesh, Matrix4,
+  Mesh, MeshLambertMaterial, Quaternion, Sprite, SpriteMaterial, Vector3,
 } from "three";
 import type { App } from "./app";
 import type { CameraRig } from "./camera_rig";
 import type { AvatarPose } from "./world_state";
 
 const RADIUS = 0.3; // metres
+const HEIGHT = 1.75; // metres, of the drawn prism; others are scaled
 const BEVEL_INSET = 0.25; // of the radius
 const BEVEL_HEIGHT = 0.05; // metres
 const SIDES = 12;
 const NEAR_CAMERA = 1.6; // metres
+const MAX_LABELS = 16; // the nearest avatars
+const LABEL_DISTANCE = 30; // metres
+const UP = new Vector3(0, 1, 0);
 const COLORS = [0x1f6f8b, 0xb5562b, 0x5b7f3a, 0x7a4f9a, 0xa8842c, 0x2f5aa8, 0x9c3d58, 0x3d8a76];
 
-interface Figure {
-  group: Group;
-  body: Mesh;
-  face: Mesh;
-  height: number;
+export function colorOf(id: number): string {
+  return `#${colorValue(id).getHexString()}`;
 }
 
-export function colorOf(id: number): string {
-  return `#${new Color(COLORS[id % COLORS.length]!).getHexString()}`;
+function colorValue(id: number): Color {
+  return new Color(COLORS[id % COLORS.length]!);
 }
 
 export class Avatars {
   #app: App;
   #rig: CameraRig;
-  #figures = new Map<number, Figure>();
-  #root = new Group();
+  // All avatars are two drawings, so that a thousand of them cost no more calls than one.
+  #bodies: InstancedMesh | null = null;
+  #faces: InstancedMesh | null = null;
+  // The avatar in focus is drawn alone, because it may become transparent.
+  #own = new Mesh(prismGeometry(), new MeshLambertMaterial({ flatShading: true }));
+  #labels = new Map<number, Sprite>();
 
   constructor(app: App, rig: CameraRig) {
     this.#app = app;
     this.#rig = rig;
-    app.view.scene.add(this.#root);
+    app.view.scene.add(this.#own);
     app.view.updaters.unshift(() => this.#update());
   }
 
   #update(): boolean {
     const { model, state } = this.#app;
     const poses = state.avatars();
-    const present = new Set(poses.map((pose) => pose.state.id));
-    for (const [id, figure] of this.#figures) {
-      if (present.has(id)) continue;
-      figure.group.removeFromParent();
-      this.#figures.delete(id);
+    this.#reserve(poses.length);
+    this.#own.visible = false;
+    let count = 0;
+    for (const pose of poses) count += this.#place(pose, count) ? 1 : 0;
+    for (const mesh of [this.#bodies!, this.#faces!]) {
+      mesh.count = count;
+      mesh.instanceMatrix.needsUpdate = true;
+      if (mesh.instanceColor) mesh.instanceColor.needsUpdate = true;
     }
-    for (const pose of poses) this.#place(pose);
+    this.#placeLabels(poses);
     model?.applyPoses(state.bodies());
     return state.isMoving;
   }
 
-  #place(pose: AvatarPose): void {
+  #reserve(count: number): void {
+    if (this.#bodies && this.#bodies.instanceMatrix.count >= count) return;
+    this.#bodies?.removeFromParent();
+    this.#faces?.removeFromParent();
+    const capacity = Math.max(8, 2 * count);
+    this.#bodies = new InstancedMesh(prismGeometry(), new MeshLambertMaterial({ flatShading: true }), capacity);
+    this.#faces = new InstancedMesh(new BoxGeometry(0.14, 0.09, 0.3), new MeshLambertMaterial({ color: 0x20262b }), capacity);
+    for (const mesh of [this.#bodies, this.#faces]) {
+      mesh.frustumCulled = false;
+      mesh.instanceMatrix.setUsage(DynamicDrawUsage);
+      this.#app.view.scene.add(mesh);
+    }
+  }
+
+  /** Writes the avatar into the drawings; false: its eyes are the camera. */
+  #place(pose: AvatarPose, index: number): boolean {
     const { id, name, height } = pose.state;
-    let figure = this.#figures.get(id);
-    if (figure && figure.height !== height) {
-      figure.group.removeFromParent();
-      figure = undefined;
-    }
-    if (!figure) {
-      figure = makeFigure(id, name, height || 1.75);
-      figure.height = height;
-      this.#figures.set(id, figure);
-      this.#root.add(figure.group);
-    }
-    figure.group.position.copy(pose.feet);
-    const yaw = Math.atan2(-pose.gaze.z, pose.gaze.x);
-    figure.face.position.set(0.9 * RADIUS * Math.cos(yaw), pose.eyeHeight, -0.9 * RADIUS * Math.sin(yaw));
-    figure.face.rotation.y = yaw;
     const isFocus = name === this.#app.focus;
-    figure.group.visible = !(this.#rig.mode === "first" && isFocus);
+    if (isFocus && this.#rig.mode === "first") return false;
+    const scale = new Vector3(1, (height || HEIGHT) / HEIGHT, 1);
+    const upright = new Quaternion();
+    const body = new Matrix4().compose(pose.feet, upright, isFocus ? new Vector3(0, 0, 0) : scale);
+    this.#bodies!.setMatrixAt(index, body);
+    this.#bodies!.setColorAt(index, colorValue(id));
+    const yaw = Math.atan2(-pose.gaze.z, pose.gaze.x);
+    const face = new Vector3(0.9 * RADIUS * Math.cos(yaw), pose.eyeHeight, -0.9 * RADIUS * Math.sin(yaw)).add(pose.feet);
+    this.#faces!.setMatrixAt(index, new Matrix4().compose(face, upright.setFromAxisAngle(UP, yaw), new Vector3(1, 1, 1)));
+    if (isFocus) this.#placeOwn(pose, scale);
+    return true;
+  }
+
+  #placeOwn(pose: AvatarPose, scale: Vector3): void {
+    this.#own.visible = true;
+    this.#own.position.copy(pose.feet);
+    this.#own.scale.copy(scale);
+    const material = this.#own.material as MeshLambertMaterial;
+    material.color = colorValue(pose.state.id);
     // A wall may push the camera so near that the avatar would fill the picture.
-    const distance = this.#rig.position.distanceTo(figure.group.position.clone().setY(pose.feet.y + pose.eyeHeight));
-    const material = figure.body.material as MeshLambertMaterial;
-    const isNear = isFocus && distance < NEAR_CAMERA;
+    const eyes = pose.feet.clone().setY(pose.feet.y + pose.eyeHeight);
+    const isNear = this.#rig.position.distanceTo(eyes) < NEAR_CAMERA;
     material.opacity = isNear ? 0.3 : 1;
     if (material.transparent !== isNear) Object.assign(material, { transparent: isNear, depthWrite: !isNear, needsUpdate: true });
+  }
+
+  #placeLabels(poses: AvatarPose[]): void {
+    const eye = this.#rig.position;
+    const near = poses
+      .filter(({ state }) => !(state.name === this.#app.focus && this.#rig.mode === "first"))
+      .map((pose) => ({ pose, distance: pose.feet.distanceTo(eye) }))
+      .filter(({ distance }) => distance < LABEL_DISTANCE)
+      .sort((a, b) => a.distance - b.distance).slice(0, MAX_LABELS);
+    const shown = new Set(near.map(({ pose }) => pose.state.id));
+    for (const [id, sprite] of this.#labels) {
+      if (shown.has(id)) continue;
+      sprite.removeFromParent();
+      sprite.material.map?.dispose();
+      sprite.material.dispose();
+      this.#labels.delete(id);
+    }
+    for (const { pose } of near) {
+      let sprite = this.#labels.get(pose.state.id);
+      if (!sprite) {
+        sprite = nameSprite(pose.state.name);
+        this.#labels.set(pose.state.id, sprite);
+        this.#app.view.scene.add(sprite);
+      }
+      sprite.position.copy(pose.feet).setY(pose.feet.y + (pose.state.height || HEIGHT) + 0.15);
+    }
   }
 
   /** The nearest avatar on a ray; the avatar whose eyes the page shows is ignored. */
@@ -85,7 +136,7 @@ export class Avatars {
     let best: { entity: number; distance: number; point: Vector3 } | null = null;
     for (const { state, feet } of this.#app.state.avatars()) {
       if (this.#rig.mode === "first" && state.name === this.#app.focus) continue;
-      const distance = cylinderDistance(origin, direction, feet, RADIUS, state.height || 1.75);
+      const distance = cylinderDistance(origin, direction, feet, RADIUS, state.height || HEIGHT);
       if (distance === null || distance >= (best?.distance ?? Infinity)) continue;
       best = { entity: state.id, distance, point: origin.clone().addScaledVector(direction, distance) };
     }
@@ -93,18 +144,9 @@ export class Avatars {
   }
 }
 
-function makeFigure(id: number, name: string, height: number): Figure {
-  const group = new Group();
-  const color = new Color(COLORS[id % COLORS.length]!);
-  const body = new Mesh(prismGeometry(height), new MeshLambertMaterial({ color, flatShading: true }));
-  const face = new Mesh(new BoxGeometry(0.14, 0.09, 0.3), new MeshLambertMaterial({ color: 0x20262b }));
-  group.add(body, face, nameSprite(name, height));
-  return { group, body, face, height };
-}
-
-function prismGeometry(height: number): BufferGeometry {
+function prismGeometry(): BufferGeometry {
   const inner = RADIUS * (1 - BEVEL_INSET);
-  const rings: [number, number][] = [[0, inner], [BEVEL_HEIGHT, RADIUS], [height - BEVEL_HEIGHT, RADIUS], [height, inner]];
+  const rings: [number, number][] = [[0, inner], [BEVEL_HEIGHT, RADIUS], [HEIGHT - BEVEL_HEIGHT, RADIUS], [HEIGHT, inner]];
   const at = (ring: number, side: number) => {
     const [y, r] = rings[ring]!;
     const angle = (2 * Math.PI * side) / SIDES;
@@ -116,7 +158,7 @@ function prismGeometry(height: number): BufferGeometry {
       positions.push(...at(ring, side), ...at(ring + 1, side), ...at(ring + 1, side + 1));
       positions.push(...at(ring, side), ...at(ring + 1, side + 1), ...at(ring, side + 1));
     }
-    positions.push(0, height, 0, ...at(3, side + 1), ...at(3, side));
+    positions.push(0, HEIGHT, 0, ...at(3, side + 1), ...at(3, side));
     positions.push(0, 0, 0, ...at(0, side), ...at(0, side + 1));
   }
   const geometry = new BufferGeometry();
@@ -125,7 +167,7 @@ function prismGeometry(height: number): BufferGeometry {
   return geometry;
 }
 
-function nameSprite(name: string, height: number): Sprite {
+function nameSprite(name: string): Sprite {
   const canvas = document.createElement("canvas");
   canvas.width = 256;
   canvas.height = 48;
@@ -141,7 +183,6 @@ function nameSprite(name: string, height: number): Sprite {
   context.fillText(name, 128, 33, 240);
   const sprite = new Sprite(new SpriteMaterial({ map: new CanvasTexture(canvas), depthWrite: false, sizeAttenuation: false }));
   sprite.scale.set(0.2, 0.0375, 1); // of the picture, at every distance
-  sprite.position.y = height + 0.15;
   sprite.center.y = 0;
   return sprite;
 }

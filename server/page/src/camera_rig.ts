@@ -132,6 +132,8 @@ export class CameraRig {
     eyes.y += avatar.eyeHeight;
     if (this.mode === "first") {
       this.position.copy(eyes);
+      // The eyes of another avatar look where it looks.
+      if (avatar.state.name !== this.#app.own) ({ yaw: this.yaw, pitch: this.pitch } = anglesOf(avatar.gaze));
     } else {
       const back = this.forward.negate();
       const hit = this.#app.model?.raycast(eyes, back, this.#behind + MARGIN);

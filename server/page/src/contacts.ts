@@ -103,7 +103,8 @@ export class Contacts {
     if (!this.#isDirty || this.root.offsetParent === null) return;
     this.#isDirty = false;
     const floors = [...this.#live.values()].filter(isFloor).length;
-    setText(this.#summary, `Now: ${this.#live.size - floors} contacts, and ${floors} with floors`);
+    const others = this.#live.size - floors;
+    setText(this.#summary, `Now: ${others} ${others === 1 ? "contact" : "contacts"}, and ${floors} with floors`);
     const rows = this.listed.filter((event) => this.#isListed(event)).slice(0, MAX_ROWS).map((event) => this.#row(event));
     if (rows.length === 0) rows.push(element("li", { class: "empty" }, "No contact yet. Walk into something."));
     this.#list.replaceChildren(...rows);

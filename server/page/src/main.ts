@@ -48,10 +48,12 @@ function begin(): void {
   const walkButton = button("Walk", () => (walk.isWalking ? walk.leave() : void walk.start()), { class: "primary" });
   const flyButton = button("Fly", () => walk.act("fly"), { title: "Fly (F)" });
   const crouchButton = button("Crouch", () => walk.act("crouch"), { title: "Crouch (C)" });
+  // Touch screens have no space bar.
+  const jumpButton = button("Jump", () => walk.act("jump"), { class: "touch-only" });
   const viewButton = button("Third person", () => toggleView(), { title: "First or third person (V)" });
   const header = element(
     "header", { class: "top" },
-    element("strong", {}, "Enfilade"), title, element("span", { class: "spacer" }), walkButton, flyButton, crouchButton, viewButton,
+    element("strong", {}, "Enfilade"), title, element("span", { class: "spacer" }), walkButton, jumpButton, flyButton, crouchButton, viewButton,
     button("Screenshot", () => void saveScreenshot(), { title: "Save the picture" }),
     button("Share", () => void share(), { title: "Copy a link to this view" }),
   );
@@ -78,7 +80,7 @@ function begin(): void {
   function updateButtons(): void {
     setText(walkButton, walk.isStarting ? "Entering …" : walk.isWalking ? "Leave" : "Walk");
     walkButton.disabled = walk.isStarting || (!walk.isWalking && !walk.canWalk) || !app.model;
-    for (const one of [flyButton, crouchButton]) one.hidden = !walk.isWalking;
+    for (const one of [jumpButton, flyButton, crouchButton]) one.hidden = !walk.isWalking;
     flyButton.setAttribute("aria-pressed", String(walk.isFlying));
     crouchButton.setAttribute("aria-pressed", String(walk.isCrouched));
     viewButton.hidden = !app.focus;

@@ -6,6 +6,8 @@ import { button, element } from "./dom";
 import type { AvatarState } from "./generated/enfilade_pb";
 import type { Walk } from "./walk";
 
+const MAX_ROWS = 200;
+
 export class People {
   readonly root = element("div", { class: "stack" });
   #list = element("ul", { class: "people", label: "Avatars" });
@@ -24,12 +26,14 @@ export class People {
 
   #render(): void {
     if (this.root.offsetParent === null) return;
-    const avatars = this.#app.state.latest?.avatars ?? [];
-    const names = `${avatars.map(({ id, name }) => `${id} ${name}`).join()} ${this.#app.focus} ${this.#walk.name}`;
+    const all = this.#app.state.latest?.avatars ?? [];
+    const avatars = all.slice(0, MAX_ROWS);
+    const names = `${all.map(({ id, name }) => `${id} ${name}`).join()} ${this.#app.focus} ${this.#walk.name}`;
     if (names !== this.#shown) {
       this.#shown = names;
       this.#list.replaceChildren(...(avatars.length > 0 ? avatars.map((avatar) => this.#row(avatar))
-        : [element("li", { class: "empty" }, "Nobody is in the world.")]));
+        : [element("li", { class: "empty" }, "No avatar is in the world.")]));
+      if (all.length > MAX_ROWS) this.#list.append(element("li", { class: "empty" }, `and ${all.length - MAX_ROWS} more`));
     }
     avatars.forEach((avatar, index) => {
       const doing = this.#list.children[index]?.querySelector(".doing");

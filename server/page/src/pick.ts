@@ -86,7 +86,7 @@ export class Card {
     const size = box?.getSize(new Vector3());
     this.#facts.replaceChildren(...[
       ["Class", entity?.class], ["GlobalId", entity?.globalId], ["Storey", entity?.storey],
-      ["Size", size && `${size.x.toFixed(2)} × ${size.z.toFixed(2)} × ${size.y.toFixed(2)} m (x, z, height)`],
+      ["Size x, z, y", size && `${size.x.toFixed(2)} × ${size.z.toFixed(2)} × ${size.y.toFixed(2)} m`],
       ["Entity", String(id)],
     ].flatMap(([name, value]) => (value ? [element("dt", {}, name), element("dd", {}, value)] : [])));
     this.#showBody(id);

@@ -121,7 +121,10 @@ export class Tree {
       if (this.#open.has(child.key)) this.#renderGroup(child, level + 1);
     }
     const shown = MAX_ROWS + (this.#more.get(group.key) ?? 0);
-    for (const entity of group.objects.slice(0, shown)) this.#addObject(entity, level + 1, lastName(entity.path));
+    for (const entity of group.objects.slice(0, shown)) {
+      // Without the path above it, a name may stand for many objects.
+      this.#addObject(entity, level + 1, this.#grouping === "path" ? lastName(entity.path) : shortName(entity.path));
+    }
     if (group.objects.length <= shown) return;
     const row = element("div", { class: "leaf", role: "presentation" }, button(`${group.objects.length - shown} more`, () => {
       this.#more.set(group.key, shown);

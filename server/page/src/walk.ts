@@ -92,7 +92,7 @@ export class Walk {
     for (const { feet, facing } of places) {
       const degrees = (Math.atan2(-facing.z, facing.x) * 180) / Math.PI;
       const notice = await this.#order({ case: "spawn", value: { at: plain(feet), facing: degrees } }, SPAWN_SECONDS);
-      if (!notice) throw new Error("No tick runs, so nobody can enter: start the clock with ▶.");
+      if (!notice) throw new Error("No tick runs, so no avatar can enter: start the clock with ▶.");
       if (notice.kind === Notice_Kind.SPAWNED) return this.#entered(facing);
       refusal = `There is no room at that place: ${notice.text}`;
     }
@@ -105,6 +105,7 @@ export class Walk {
     this.#driven.set(0, 0, 0);
     this.#rig.lookAlong(facing);
     this.#rig.setMode("first");
+    this.#app.own = this.name;
     this.#app.setFocus(this.name);
     this.#app.view.canvas.focus({ preventScroll: true });
     this.onChanged();
@@ -118,6 +119,7 @@ export class Walk {
   #left(): void {
     this.isWalking = false;
     this.#resume = null;
+    this.#app.own = "";
     if (this.#app.focus === this.name) this.#app.setFocus("");
     this.#rig.setMode("free");
     this.onChanged();
@@ -129,6 +131,7 @@ export class Walk {
     this.isWalking = false;
     this.#waiting.clear();
     this.#pendingOrders = 0;
+    this.#app.own = "";
     this.#rig.setMode("free");
     this.#app.setFocus("");
     this.onChanged();

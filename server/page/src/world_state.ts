@@ -3,6 +3,7 @@ import { Quaternion, Vector3 } from "three";
 import type { AvatarState, BodyState, State } from "./generated/enfilade_pb";
 
 const DELAY = 0.05; // seconds of wall-clock time: three ticks, so that a late message stalls nothing
+const KEPT_MILLISECONDS = 6; // less than a frame
 const MAX_STATES = 64;
 const FAR_JUMP = 4; // metres in one state: a teleport (Seek, spawn), not a motion
 
@@ -25,8 +26,8 @@ interface Received {
 
 export class WorldState {
   #received: Received[] = [];
-  /** Simulated seconds per second: the clock's speed. Interpolation follows it. */
-  speed = 1;
+  #avatars: AvatarPose[] = [];
+  #avatarsAt = -Infinity; // milliseconds
 
   get latest(): State | null {
     return this.#received.at(-1)?.state ?? null;
@@ -34,6 +35,7 @@ export class WorldState {
 
   clear(): void {
     this.#received = [];
+    this.#avatarsAt = -Infinity;
   }
 
   add(state: State): void {
@@ -63,7 +65,17 @@ export class WorldState {
     return { from: from.state, to: to.state, fraction };
   }
 
+  /** The avatars at the displayed time. Several parts of the page ask in one frame: the reply is kept for it. */
   avatars(): AvatarPose[] {
+    const now = performance.now();
+    if (now - this.#avatarsAt > KEPT_MILLISECONDS) {
+      this.#avatars = this.#interpolateAvatars();
+      this.#avatarsAt = now;
+    }
+    return this.#avatars;
+  }
+
+  #interpolateAvatars(): AvatarPose[] {
     const around = this.#around();
     if (!around) return [];
     const before = new Map(around.from.avatars.map((avatar) => [avatar.id, avatar]));
