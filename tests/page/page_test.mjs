@@ -295,9 +295,19 @@ const tests = {
   },
 
   async "a click on the plan walks there"({ page }) {
-    const before = await page.evaluate(() => ({ ...enfilade.app.avatarState(enfilade.walk.name).feet }));
+    // Two metres along the longest free view.
+    const { before, direction } = await page.evaluate(async () => {
+      const { app, walk } = enfilade;
+      const feet = { ...app.avatarState(walk.name).feet };
+      const rays = Array.from({ length: 24 }, (_, i) => ({
+        origin: { ...feet, y: feet.y + 0.4 }, direction: { x: Math.cos(i * Math.PI / 12), y: 0, z: -Math.sin(i * Math.PI / 12) },
+      }));
+      const { hits } = await app.connection.request("rays", { rays, throughAvatar: walk.name });
+      const distances = hits.map(({ met, distance }) => (met ? distance : 100));
+      return { before: feet, direction: rays[distances.indexOf(Math.max(...distances))].direction };
+    });
     const plan = await page.locator(".minimap canvas").boundingBox();
-    await page.mouse.click(plan.x + plan.width / 2 + 4, plan.y + plan.height / 2 + 14);
+    await page.mouse.click(plan.x + plan.width / 2 + 14 * direction.x, plan.y + plan.height / 2 + 14 * direction.z);
     await page.waitForFunction(({ x, z }) => {
       const { feet } = enfilade.app.avatarState(enfilade.walk.name);
       return Math.hypot(feet.x - x, feet.z - z) > 0.3;
@@ -423,6 +433,7 @@ async function run(name, test) {
   } catch (error) {
     ++failures;
     console.log(`FAIL ${name}: ${error.stack}`);
+    await Promise.allSettled(browser.contexts().flatMap((one) => one.pages()).map((page, index) => shoot(page, `failed-${failures}-${index}`)));
   }
 }
 

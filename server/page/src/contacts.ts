@@ -207,25 +207,35 @@ export class Contacts {
     const length = Math.min(0.3, 0.2 * distance);
     marker.arrow.setLength(length, 0.22 * length, 0.12 * length);
     const screen = point.clone().project(camera);
-    const isVisible = screen.z < 1 && Math.abs(screen.x) < 1 && Math.abs(screen.y) < 1;
-    marker.label.hidden = !isVisible;
-    if (!isVisible) return;
+    marker.label.hidden = screen.z >= 1; // behind the camera
+    if (marker.label.hidden) return;
     const text = isContact ? "contact" : metres(pair.distance);
     setText(marker.label, `${text} · ${shortName(pair.bName)}`);
     marker.label.classList.toggle("near", !isContact);
-    marker.x = ((screen.x + 1) / 2) * canvas.clientWidth;
-    marker.y = ((1 - screen.y) / 2) * canvas.clientHeight;
+    // The label of a point outside the picture stays at its edge: the wall that stops an avatar is often too near to see.
+    const inside = (value: number, low: number, high: number) => Math.max(low, Math.min(high, value));
+    marker.x = inside(((screen.x + 1) / 2) * canvas.clientWidth, 0, canvas.clientWidth - LABEL_WIDTH);
+    marker.y = inside(((1 - screen.y) / 2) * canvas.clientHeight, LABEL_HEIGHT, canvas.clientHeight - LABEL_HEIGHT);
   }
 
-  /** Labels from the top; each one moves down until it covers none above it. */
+  /** Each label moves down until it covers none above it; those at the lower edge move up again. */
   #placeLabels(): void {
     const shown = this.#markers.filter(({ label }) => !label.hidden).sort((a, b) => a.y - b.y);
+    const overlap = (a: Marker, b: Marker) => Math.abs(a.x - b.x) < LABEL_WIDTH;
     shown.forEach((marker, index) => {
       for (const above of shown.slice(0, index)) {
-        if (Math.abs(above.x - marker.x) < LABEL_WIDTH) marker.y = Math.max(marker.y, above.y + LABEL_HEIGHT);
+        if (overlap(above, marker)) marker.y = Math.max(marker.y, above.y + LABEL_HEIGHT);
+      }
+    });
+    const bottom = this.#app.view.canvas.clientHeight - LABEL_HEIGHT / 2 - 2;
+    for (let index = shown.length - 1; index >= 0; --index) {
+      const marker = shown[index]!;
+      marker.y = Math.min(marker.y, bottom);
+      for (const below of shown.slice(index + 1)) {
+        if (overlap(below, marker)) marker.y = Math.min(marker.y, below.y - LABEL_HEIGHT);
       }
       marker.label.style.transform = `translate(${marker.x.toFixed(1)}px, ${marker.y.toFixed(1)}px) translate(10px, -50%)`;
-    });
+    }
   }
 }
 
