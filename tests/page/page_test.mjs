@@ -147,6 +147,45 @@ const tests = {
     assert.ok(result.differences.length <= 2, `of 200 pixels differ: ${result.differences.join("; ")}`);
   },
 
+  async "the drawn ids agree with the server's picture of ids"({ page }) {
+    await observe(page);
+    const results = await page.evaluate(async () => {
+      const { pixels } = await import("/page/enfilade.js");
+      const [width, height] = [400, 300];
+      const { app, rig } = enfilade;
+      if (!app.welcome.renderer) return [];
+      const results = [];
+      for (let view = 0; view < 4; ++view) {
+        rig.look(Math.PI / 2, 0);
+        app.view.invalidate();
+        await new Promise((resolve) => setTimeout(resolve, 300));
+        const { x, y, z } = rig.position;
+        const { camera } = app.view;
+        const { body, attachment } = await observer.client.request("frame", {
+          view: { case: "free", value: {
+            eye: { x, y, z }, gaze: { case: "forward", value: { ...rig.forward } },
+            projection: { case: "fovY", value: camera.fov * Math.PI / 180 }, near: camera.near, far: camera.far,
+          } },
+          width, height, channels: [2], glass: 2,
+        });
+        const theirs = pixels(body, attachment).ids;
+        const ours = enfilade.ids(width, height);
+        let both = 0, either = 0;
+        const known = (id) => (id <= app.welcome.scene.objects ? id : 0);
+        ours.forEach((id, i) => {
+          const other = known(theirs[i]);
+          if (id === 0 && other === 0) return;
+          both += id === other ? 1 : 0;
+          either += 1;
+        });
+        results.push(both / either);
+      }
+      return results;
+    });
+    results.forEach((agreement) => assert.ok(agreement >= 0.99, `agreement of ids: ${results}`));
+    console.log(`     agreement of ids: ${results.map((one) => one.toFixed(4)).join(", ")}`);
+  },
+
   async "a click shows the card of the object"({ page }) {
     const canvas = await page.locator(".stage > canvas").boundingBox();
     await page.mouse.click(canvas.x + canvas.width * 0.6, canvas.y + canvas.height * 0.5);

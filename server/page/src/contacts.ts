@@ -17,7 +17,7 @@ const NEAR = 0.25; // metres: shown as near misses if the server has no limit of
 const MAX_MARKERS = 12;
 const FLOOR_NORMAL = -0.7; // y of the normal from an avatar to what it stands on
 const LABEL_HEIGHT = 20; // pixels
-const LABEL_WIDTH = 180; // pixels
+const LABEL_WIDTH = 210; // pixels
 const TOUCH_COLOR = 0xc0392b;
 const NEAR_COLOR = 0xd68910;
 

@@ -7,6 +7,7 @@ import { button, element, isTyping, setText } from "./dom";
 import { Input } from "./input";
 import { MetricsPanel } from "./metrics";
 import { Minimap } from "./minimap";
+import { renderIds } from "./offscreen";
 import { makeHelp, makeTabs, makeToasts, makeTroubleDialog } from "./panel";
 import { People } from "./people";
 import { Card, pick, rayThrough } from "./pick";
@@ -149,7 +150,14 @@ function begin(): void {
   });
   updateButtons();
   // For tests: they compare the page with the server's own replies.
-  Object.assign(window, { enfilade: { app, rig, walk, contacts, pick: (x: number, y: number) => pick(app, avatars, x, y), rayThrough: (x: number, y: number) => rayThrough(app, x, y) } });
+  Object.assign(window, {
+    enfilade: {
+      app, rig, walk, contacts,
+      pick: (x: number, y: number) => pick(app, avatars, x, y),
+      rayThrough: (x: number, y: number) => rayThrough(app, x, y),
+      ids: (width: number, height: number) => renderIds(view.renderer, app.model!, view.camera, width, height),
+    },
+  });
   void app.connection.open();
 }
 

@@ -1,12 +1,11 @@
 // The plan of the storey: the scene from above, cut above the floor of the avatar or camera. Walls that are cut are
 // dark, because the inner sides of their triangles are visible there. A click orders a walk.
-import {
-  DoubleSide, OrthographicCamera, ShaderMaterial, Vector3, WebGLRenderTarget, type Object3D,
-} from "three";
+import { DoubleSide, OrthographicCamera, ShaderMaterial, Vector3 } from "three";
 import type { App } from "./app";
 import { colorOf } from "./avatars";
 import type { CameraRig } from "./camera_rig";
 import { button, element } from "./dom";
+import { renderOffscreen } from "./offscreen";
 import type { Walk } from "./walk";
 import { vector } from "./world_state";
 
@@ -141,7 +140,12 @@ export class Minimap {
     camera.position.set(this.#planCenter.x, floor + CUT_HEIGHT, this.#planCenter.z);
     camera.up.set(0, 0, -1);
     camera.lookAt(this.#planCenter.x, floor, this.#planCenter.z);
-    const pixels = renderPlan(view.renderer, model!.root, camera, model!.flags.texture);
+    const material = new ShaderMaterial({
+      vertexShader: PLAN_VERTEX, fragmentShader: PLAN_FRAGMENT, side: DoubleSide,
+      uniforms: { entityFlags: { value: model!.flags.texture } },
+    });
+    const pixels = renderOffscreen(view.renderer, model!.root, camera, material, PIXELS, PIXELS);
+    material.dispose();
     this.#plan.width = this.#plan.height = PIXELS;
     this.#plan.getContext("2d")!.putImageData(new ImageData(pixels, PIXELS, PIXELS), 0, 0);
   }
@@ -240,38 +244,4 @@ function arrow(context: CanvasRenderingContext2D, x: number, y: number, angle: n
   context.strokeStyle = "#fff";
   context.stroke();
   context.restore();
-}
-
-/** Renders the root from above; rows from the top. */
-function renderPlan(
-  renderer: import("three").WebGLRenderer, root: Object3D, camera: OrthographicCamera, flags: import("three").Texture,
-): Uint8ClampedArray<ArrayBuffer> {
-  const target = new WebGLRenderTarget(PIXELS, PIXELS);
-  const material = new ShaderMaterial({
-    vertexShader: PLAN_VERTEX, fragmentShader: PLAN_FRAGMENT, side: DoubleSide, uniforms: { entityFlags: { value: flags } },
-  });
-  const scene = root.parent as import("three").Scene;
-  const others = scene.children.filter((child) => child !== root && child.visible);
-  const { background, fog } = scene;
-  others.forEach((child) => (child.visible = false));
-  Object.assign(scene, { overrideMaterial: material, background: null, fog: null });
-  camera.updateMatrixWorld();
-  renderer.setRenderTarget(target);
-  const alpha = renderer.getClearAlpha();
-  renderer.setClearAlpha(0);
-  renderer.clear();
-  renderer.render(scene, camera);
-  renderer.setClearAlpha(alpha);
-  const raw = new Uint8Array(4 * PIXELS * PIXELS);
-  renderer.readRenderTargetPixels(target, 0, 0, PIXELS, PIXELS, raw);
-  renderer.setRenderTarget(null);
-  Object.assign(scene, { overrideMaterial: null, background, fog });
-  others.forEach((child) => (child.visible = true));
-  target.dispose();
-  material.dispose();
-  const pixels = new Uint8ClampedArray(raw.length);
-  for (let row = 0; row < PIXELS; ++row) {
-    pixels.set(raw.subarray(4 * PIXELS * row, 4 * PIXELS * (row + 1)), 4 * PIXELS * (PIXELS - 1 - row));
-  }
-  return pixels;
 }
