@@ -1,6 +1,8 @@
 // Client of Enfilade over WebSocket, for browsers and Node.js. The messages are those of
 // enfilade.proto: `client.request("step", { ticks: 60 })`, with fields in camelCase and 64-bit numbers
 // as BigInt. Their descriptor is the file of the Python client, which the build keeps up to date.
+// A browser without a bundler imports /page/enfilade.js of a running server: this file with its
+// dependencies in one module.
 import { create, createFileRegistry, fromBinary, toBinary } from "@bufbuild/protobuf";
 import { FileDescriptorSetSchema } from "@bufbuild/protobuf/wkt";
 
@@ -27,7 +29,11 @@ export async function loadSchemas() {
   const bytes = where.protocol === "file:"
     ? new Uint8Array(await (await import("node:fs/promises")).readFile(where))
     : new Uint8Array(await (await fetch(where)).arrayBuffer());
-  const registry = createFileRegistry(fromBinary(FileDescriptorSetSchema, bytes));
+  return schemasOf(createFileRegistry(fromBinary(FileDescriptorSetSchema, bytes)));
+}
+
+/** The same of a registry that a program has already, for example from generated code. */
+export function schemasOf(registry) {
   const prefix = "enfilade.v1.";
   return new Proxy({}, {
     get: (_, name) => registry.getMessage(prefix + name) ?? registry.getEnum(prefix + name),
@@ -42,11 +48,12 @@ async function webSocketClass() {
 /**
  * Connects, for example to "ws://127.0.0.1:7878", and enters a world. Events go to
  * `on.events`, `on.state`, `on.frame` (with its attachment), `on.replay` and `on.bye`, in their order.
+ * `on.closed` gets the reason once the connection has ended.
  */
 export async function connect(
-  url, { name = "enfilade javascript", token = "", world = "main", on = {} } = {},
+  url, { name = "enfilade javascript", token = "", world = "main", on = {}, schemas } = {},
 ) {
-  const schemas = await loadSchemas();
+  schemas ??= await loadSchemas();
   const Socket = await webSocketClass();
   const socket = new Socket(url);
   socket.binaryType = "arraybuffer";
@@ -58,7 +65,12 @@ export async function connect(
   });
   const client = new Client(socket, schemas, on);
   const hello = { protocolVersion: PROTOCOL_VERSION, clientName: name, token, world };
-  client.welcome = (await client.request("hello", hello)).body;
+  try {
+    client.welcome = (await client.request("hello", hello)).body;
+  } catch (refusal) {
+    client.close();
+    throw refusal;
+  }
   return client;
 }
 
@@ -76,7 +88,10 @@ export class Client {
     this.#schemas = schemas;
     this.#on = on;
     socket.addEventListener("message", (event) => this.#hear(new Uint8Array(event.data)));
-    socket.addEventListener("close", () => this.#end(new ConnectionFailed("the connection closed")));
+    socket.addEventListener("close", () => {
+      this.#end(new ConnectionFailed("the connection closed"));
+      this.#on.closed?.(this.#ended);
+    });
     socket.addEventListener("error", () => {}); // "close" follows
   }
 

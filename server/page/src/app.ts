@@ -1,0 +1,190 @@
+// The state that the parts of the page share, and the news by which they learn of changes.
+import { Connection, type Trouble } from "./connection";
+import { EntityTable } from "./entities";
+import {
+  Role, type AvatarState, type Clock, type ContactEvent, type Notice, type Replay, type State, type TickEvents,
+  type Welcome, type World,
+} from "./generated/enfilade_pb";
+import { SceneModel } from "./scene";
+import { fetchScene, parseScene, readEntities } from "./scene_file";
+import { Signal } from "./signal";
+import { View } from "./view";
+import { WorldState } from "./world_state";
+
+const POLL_SECONDS = 2; // for changes of the clock by other clients, which the server does not push
+
+export class App {
+  readonly view = new View();
+  readonly connection: Connection;
+  readonly state = new WorldState();
+  table = new EntityTable();
+  model: SceneModel | null = null;
+  welcome: Welcome | null = null;
+  clock: Clock | null = null;
+  replay: Replay | null = null;
+  tick = 0;
+  time = 0; // seconds
+  selection = 0; // entity id; 0: none
+  /** The avatar whose place the page shows: its own or a followed one; empty: none. */
+  focus = "";
+  own = ""; // name of the page's own avatar, if it is in the world
+
+  readonly opened = new Signal<Welcome>();
+  readonly troubled = new Signal<Trouble>();
+  readonly loading = new Signal<string>();
+  readonly sceneLoaded = new Signal<SceneModel>();
+  readonly stateArrived = new Signal<State>();
+  readonly contactEvents = new Signal<ContactEvent[]>();
+  readonly contactsReset = new Signal<ContactEvent[]>();
+  readonly noticed = new Signal<Notice>();
+  readonly timeChanged = new Signal();
+  readonly worldPolled = new Signal<World>();
+  readonly selected = new Signal<number>();
+  readonly focused = new Signal<string>();
+  readonly visibilityChanged = new Signal();
+  readonly said = new Signal<string>();
+  #sceneHash = 0n;
+
+  constructor(token: string, world: string) {
+    this.connection = new Connection({
+      opened: (welcome) => void this.#begin(welcome),
+      troubled: (trouble) => this.troubled.emit(trouble),
+      events: (events) => this.#takeEvents(events),
+      state: (state) => this.#takeState(state),
+      replay: (replay) => this.#takeReplay(replay),
+    }, token, world);
+    setInterval(() => void this.#poll(), POLL_SECONDS * 1000);
+  }
+
+  get mayDrive(): boolean {
+    return (this.welcome?.role ?? 0) >= Role.DRIVE;
+  }
+
+  /** Commands are refused while a recording is played. */
+  get isPlayback(): boolean {
+    return this.replay !== null && !this.replay.branched;
+  }
+
+  /** Shows a sentence to the user for some seconds. */
+  say(text: string): void {
+    this.said.emit(text);
+  }
+
+  /** Sends a request whose failure the user should read, and nothing else depends on. */
+  attempt(request: Promise<unknown>): void {
+    request.catch((error: Error) => this.say(error.message.replace(/^ERROR_\w+: /, "")));
+  }
+
+  select(entity: number): void {
+    if (this.model) {
+      this.model.flags.setMarked(this.selection, false);
+      this.model.flags.setMarked(entity, true);
+      this.view.invalidate();
+    }
+    this.selection = entity;
+    this.selected.emit(entity);
+  }
+
+  setFocus(avatar: string): void {
+    if (this.focus === avatar) return;
+    this.focus = avatar;
+    this.focused.emit(avatar);
+    this.view.invalidate();
+  }
+
+  avatarState(name: string): AvatarState | undefined {
+    return this.state.latest?.avatars.find((avatar) => avatar.name === name);
+  }
+
+  async #begin(welcome: Welcome): Promise<void> {
+    this.welcome = welcome;
+    this.state.clear();
+    this.replay = welcome.replay ?? null;
+    this.setClock(welcome.clock, Number(welcome.tick));
+    try {
+      await this.#subscribe();
+      if (!this.model || this.#sceneHash !== welcome.scene!.hash) await this.#loadScene(welcome);
+      this.opened.emit(welcome);
+    } catch (error) {
+      if (!this.connection.isOpen) return; // the connection reports its own end
+      this.troubled.emit({ kind: "final", text: (error as Error).message });
+    }
+  }
+
+  async #subscribe(): Promise<void> {
+    const { live } = await this.connection.request("subscribe", {
+      contacts: true, nearMisses: true, notices: true, state: true, stateRate: 0,
+    });
+    this.contactsReset.emit(live);
+  }
+
+  async #loadScene(welcome: Welcome): Promise<void> {
+    const scene = welcome.scene!;
+    const query = this.connection.world ? `?world=${encodeURIComponent(this.connection.world)}` : "";
+    this.loading.emit("Loading the scene …");
+    const bytes = await fetchScene(`/scene.glb${query}`, this.connection.token, (received) => {
+      this.loading.emit(`Loading the scene: ${(received / 1e6).toFixed(1)} MB`);
+    });
+    this.loading.emit("Preparing the scene …");
+    const gltf = await parseScene(bytes);
+    const table = new EntityTable();
+    for (const body of scene.bodies) {
+      for (const object of body.objects) table.bodyOf.set(object, body.id);
+    }
+    readEntities(gltf, table);
+    await table.complete(this.connection, scene.objects);
+    this.model?.dispose();
+    this.table = table;
+    this.model = new SceneModel(gltf, table, scene.bodies, scene.objects);
+    this.#sceneHash = scene.hash;
+    this.selection = 0;
+    this.view.scene.add(this.model.root);
+    this.view.setBounds(this.model.bounds);
+    this.model.prepareRays();
+    this.sceneLoaded.emit(this.model);
+  }
+
+  #takeEvents(events: TickEvents): void {
+    if (events.contacts.length > 0) this.contactEvents.emit(events.contacts);
+    for (const notice of events.notices) this.noticed.emit(notice);
+  }
+
+  #takeState(state: State): void {
+    for (const { id, name } of state.avatars) this.table.avatars.set(id, name);
+    this.state.add(state);
+    this.#setTick(Number(state.tick), state.time);
+    this.stateArrived.emit(state);
+    this.view.invalidate();
+  }
+
+  #takeReplay(replay: Replay): void {
+    this.replay = replay;
+    this.setClock(replay.clock, Number(replay.tick));
+  }
+
+  #setTick(tick: number, time: number): void {
+    this.tick = tick;
+    this.time = time;
+    this.timeChanged.emit();
+  }
+
+  setClock(clock: Clock | undefined, tick: number): void {
+    if (clock) this.clock = clock;
+    this.#setTick(tick, tick * (this.welcome?.policies?.tick ?? 0));
+  }
+
+  async #poll(): Promise<void> {
+    if (!this.connection.isOpen || document.hidden) return;
+    try {
+      const { worlds } = await this.connection.request("listWorlds", {});
+      const world = worlds.find(({ name }) => name === this.welcome?.world);
+      if (!world) return;
+      this.clock = world.clock ?? this.clock;
+      if (!this.state.latest) this.#setTick(Number(world.tick), Number(world.tick) * (this.welcome?.policies?.tick ?? 0));
+      this.timeChanged.emit();
+      this.worldPolled.emit(world);
+    } catch {
+      // The connection ended meanwhile; it reports that itself.
+    }
+  }
+}

@@ -1,0 +1,200 @@
+// Avatars as drawn: the bevelled prism with twelve sides that the server moves, with a face that shows the view
+// direction. The server does not send radii or convex parts; every avatar is drawn with the default radius.
+import {
+  BoxGeometry, BufferGeometry, CanvasTexture, Color, DynamicDrawUsage, Float32BufferAttribute, InstancedMesh, Matrix4,
+  Mesh, MeshLambertMaterial, Quaternion, Sprite, SpriteMaterial, Vector3,
+} from "three";
+import type { App } from "./app";
+import type { CameraRig } from "./camera_rig";
+import type { AvatarPose } from "./world_state";
+
+const RADIUS = 0.3; // metres
+const HEIGHT = 1.75; // metres, of the drawn prism; others are scaled
+const BEVEL_INSET = 0.25; // of the radius
+const BEVEL_HEIGHT = 0.05; // metres
+const SIDES = 12;
+const NEAR_CAMERA = 1.6; // metres
+const MAX_LABELS = 16; // the nearest avatars
+const LABEL_DISTANCE = 30; // metres
+const UP = new Vector3(0, 1, 0);
+const COLORS = [0x1f6f8b, 0xb5562b, 0x5b7f3a, 0x7a4f9a, 0xa8842c, 0x2f5aa8, 0x9c3d58, 0x3d8a76];
+
+export function colorOf(id: number): string {
+  return `#${colorValue(id).getHexString()}`;
+}
+
+function colorValue(id: number): Color {
+  return new Color(COLORS[id % COLORS.length]!);
+}
+
+export class Avatars {
+  #app: App;
+  #rig: CameraRig;
+  // All avatars are two drawings, so that a thousand of them cost no more calls than one.
+  #bodies: InstancedMesh | null = null;
+  #faces: InstancedMesh | null = null;
+  // The avatar in focus is drawn alone, because it may become transparent.
+  #own = new Mesh(prismGeometry(), new MeshLambertMaterial({ flatShading: true }));
+  #labels = new Map<number, Sprite>();
+
+  constructor(app: App, rig: CameraRig) {
+    this.#app = app;
+    this.#rig = rig;
+    app.view.scene.add(this.#own);
+    app.view.updaters.unshift(() => this.#update());
+  }
+
+  #update(): boolean {
+    const { model, state } = this.#app;
+    const poses = state.avatars();
+    this.#reserve(poses.length);
+    this.#own.visible = false;
+    let count = 0;
+    for (const pose of poses) count += this.#place(pose, count) ? 1 : 0;
+    for (const mesh of [this.#bodies!, this.#faces!]) {
+      mesh.count = count;
+      mesh.instanceMatrix.needsUpdate = true;
+      if (mesh.instanceColor) mesh.instanceColor.needsUpdate = true;
+    }
+    this.#placeLabels(poses);
+    model?.applyPoses(state.bodies());
+    return state.isMoving;
+  }
+
+  #reserve(count: number): void {
+    if (this.#bodies && this.#bodies.instanceMatrix.count >= count) return;
+    this.#bodies?.removeFromParent();
+    this.#faces?.removeFromParent();
+    const capacity = Math.max(8, 2 * count);
+    this.#bodies = new InstancedMesh(prismGeometry(), new MeshLambertMaterial({ flatShading: true }), capacity);
+    this.#faces = new InstancedMesh(new BoxGeometry(0.14, 0.09, 0.3), new MeshLambertMaterial({ color: 0x20262b }), capacity);
+    for (const mesh of [this.#bodies, this.#faces]) {
+      mesh.frustumCulled = false;
+      mesh.instanceMatrix.setUsage(DynamicDrawUsage);
+      this.#app.view.scene.add(mesh);
+    }
+  }
+
+  /** Writes the avatar into the drawings; false: its eyes are the camera. */
+  #place(pose: AvatarPose, index: number): boolean {
+    const { id, name, height } = pose.state;
+    const isFocus = name === this.#app.focus;
+    if (isFocus && this.#rig.mode === "first") return false;
+    const scale = new Vector3(1, (height || HEIGHT) / HEIGHT, 1);
+    const upright = new Quaternion();
+    const body = new Matrix4().compose(pose.feet, upright, isFocus ? new Vector3(0, 0, 0) : scale);
+    this.#bodies!.setMatrixAt(index, body);
+    this.#bodies!.setColorAt(index, colorValue(id));
+    const yaw = Math.atan2(-pose.gaze.z, pose.gaze.x);
+    const face = new Vector3(0.9 * RADIUS * Math.cos(yaw), pose.eyeHeight, -0.9 * RADIUS * Math.sin(yaw)).add(pose.feet);
+    this.#faces!.setMatrixAt(index, new Matrix4().compose(face, upright.setFromAxisAngle(UP, yaw), new Vector3(1, 1, 1)));
+    if (isFocus) this.#placeOwn(pose, scale);
+    return true;
+  }
+
+  #placeOwn(pose: AvatarPose, scale: Vector3): void {
+    this.#own.visible = true;
+    this.#own.position.copy(pose.feet);
+    this.#own.scale.copy(scale);
+    const material = this.#own.material as MeshLambertMaterial;
+    material.color = colorValue(pose.state.id);
+    // A wall may push the camera so near that the avatar would fill the picture.
+    const eyes = pose.feet.clone().setY(pose.feet.y + pose.eyeHeight);
+    const isNear = this.#rig.position.distanceTo(eyes) < NEAR_CAMERA;
+    material.opacity = isNear ? 0.3 : 1;
+    if (material.transparent !== isNear) Object.assign(material, { transparent: isNear, depthWrite: !isNear, needsUpdate: true });
+  }
+
+  #placeLabels(poses: AvatarPose[]): void {
+    const eye = this.#rig.position;
+    const near = poses
+      .filter(({ state }) => !(state.name === this.#app.focus && this.#rig.mode === "first"))
+      .map((pose) => ({ pose, distance: pose.feet.distanceTo(eye) }))
+      .filter(({ distance }) => distance < LABEL_DISTANCE)
+      .sort((a, b) => a.distance - b.distance).slice(0, MAX_LABELS);
+    const shown = new Set(near.map(({ pose }) => pose.state.id));
+    for (const [id, sprite] of this.#labels) {
+      if (shown.has(id)) continue;
+      sprite.removeFromParent();
+      sprite.material.map?.dispose();
+      sprite.material.dispose();
+      this.#labels.delete(id);
+    }
+    for (const { pose } of near) {
+      let sprite = this.#labels.get(pose.state.id);
+      if (!sprite) {
+        sprite = nameSprite(pose.state.name);
+        this.#labels.set(pose.state.id, sprite);
+        this.#app.view.scene.add(sprite);
+      }
+      sprite.position.copy(pose.feet).setY(pose.feet.y + (pose.state.height || HEIGHT) + 0.15);
+    }
+  }
+
+  /** The nearest avatar on a ray; the avatar whose eyes the page shows is ignored. */
+  raycast(origin: Vector3, direction: Vector3): { entity: number; distance: number; point: Vector3 } | null {
+    let best: { entity: number; distance: number; point: Vector3 } | null = null;
+    for (const { state, feet } of this.#app.state.avatars()) {
+      if (this.#rig.mode === "first" && state.name === this.#app.focus) continue;
+      const distance = cylinderDistance(origin, direction, feet, RADIUS, state.height || HEIGHT);
+      if (distance === null || distance >= (best?.distance ?? Infinity)) continue;
+      best = { entity: state.id, distance, point: origin.clone().addScaledVector(direction, distance) };
+    }
+    return best;
+  }
+}
+
+function prismGeometry(): BufferGeometry {
+  const inner = RADIUS * (1 - BEVEL_INSET);
+  const rings: [number, number][] = [[0, inner], [BEVEL_HEIGHT, RADIUS], [HEIGHT - BEVEL_HEIGHT, RADIUS], [HEIGHT, inner]];
+  const at = (ring: number, side: number) => {
+    const [y, r] = rings[ring]!;
+    const angle = (2 * Math.PI * side) / SIDES;
+    return [r * Math.cos(angle), y, r * Math.sin(angle)];
+  };
+  const positions: number[] = [];
+  for (let side = 0; side < SIDES; ++side) {
+    for (let ring = 0; ring < 3; ++ring) {
+      positions.push(...at(ring, side), ...at(ring + 1, side), ...at(ring + 1, side + 1));
+      positions.push(...at(ring, side), ...at(ring + 1, side + 1), ...at(ring, side + 1));
+    }
+    positions.push(0, HEIGHT, 0, ...at(3, side + 1), ...at(3, side));
+    positions.push(0, 0, 0, ...at(0, side), ...at(0, side + 1));
+  }
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new Float32BufferAttribute(positions, 3));
+  geometry.computeVertexNormals();
+  return geometry;
+}
+
+function nameSprite(name: string): Sprite {
+  const canvas = document.createElement("canvas");
+  canvas.width = 256;
+  canvas.height = 48;
+  const context = canvas.getContext("2d")!;
+  context.font = "600 25px system-ui, sans-serif";
+  const width = Math.min(250, context.measureText(name).width + 24);
+  context.fillStyle = "rgba(255,255,255,0.88)";
+  context.beginPath();
+  context.roundRect((256 - width) / 2, 4, width, 40, 10);
+  context.fill();
+  context.fillStyle = "#20303c";
+  context.textAlign = "center";
+  context.fillText(name, 128, 33, 240);
+  const sprite = new Sprite(new SpriteMaterial({ map: new CanvasTexture(canvas), depthWrite: false, sizeAttenuation: false }));
+  sprite.scale.set(0.2, 0.0375, 1); // of the picture, at every distance
+  sprite.center.y = 0;
+  return sprite;
+}
+
+function cylinderDistance(origin: Vector3, d: Vector3, feet: Vector3, radius: number, height: number): number | null {
+  const x = origin.x - feet.x;
+  const z = origin.z - feet.z;
+  const a = d.x * d.x + d.z * d.z;
+  const b = x * d.x + z * d.z;
+  const root = b * b - a * (x * x + z * z - radius * radius);
+  if (a < 1e-12 || root < 0) return null;
+  const t = (-b - Math.sqrt(root)) / a;
+  const y = origin.y + t * d.y - feet.y;
+  return t > 0 && y >= 0 && y <= height ? t : null;
+}

@@ -1,0 +1,90 @@
+// Materials whose vertices know their entity: objects are hidden and marked by one texel each, whatever batch draws
+// them. Thus hiding costs no draw call and no new geometry.
+import { DataTexture, DoubleSide, MeshLambertMaterial, NearestFilter, type Material, type MeshStandardMaterial } from "three";
+
+const WIDTH = 1024; // texels in a row of the table
+
+export class EntityFlags {
+  readonly texture: DataTexture;
+  readonly #data: Uint8Array;
+  hiddenCount = 0;
+
+  constructor(maxId: number) {
+    const rows = Math.max(1, Math.ceil((maxId + 1) / WIDTH));
+    this.#data = new Uint8Array(4 * WIDTH * rows);
+    this.texture = new DataTexture(this.#data, WIDTH, rows);
+    this.texture.minFilter = this.texture.magFilter = NearestFilter;
+    this.texture.needsUpdate = true;
+  }
+
+  isHidden(id: number): boolean {
+    return this.#data[4 * id] !== 0;
+  }
+
+  setHidden(id: number, hidden: boolean): void {
+    if (4 * id >= this.#data.length || this.isHidden(id) === hidden) return;
+    this.#data[4 * id] = hidden ? 255 : 0;
+    this.hiddenCount += hidden ? 1 : -1;
+    this.texture.needsUpdate = true;
+  }
+
+  setMarked(id: number, marked: boolean): void {
+    if (4 * id + 1 >= this.#data.length) return;
+    this.#data[4 * id + 1] = marked ? 255 : 0;
+    this.texture.needsUpdate = true;
+  }
+
+  dispose(): void {
+    this.texture.dispose();
+  }
+}
+
+const VERTEX_HEAD = `
+attribute float entityId;
+uniform sampler2D entityFlags;
+varying float entityMark;
+`;
+
+const VERTEX_BODY = `
+int entity = int(entityId + 0.5);
+vec4 flags = texelFetch(entityFlags, ivec2(entity % ${WIDTH}, entity / ${WIDTH}), 0);
+entityMark = flags.g;
+// All corners of a hidden object fall on one point behind the far plane: the triangle has no pixels.
+if (flags.r > 0.5) gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
+`;
+
+/** Adds the entity table to a material's shaders. */
+export function withEntityFlags<M extends Material>(material: M, flags: EntityFlags): M {
+  material.onBeforeCompile = (shader) => {
+    shader.uniforms.entityFlags = { value: flags.texture };
+    shader.vertexShader = VERTEX_HEAD + shader.vertexShader.replace(
+      "#include <project_vertex>", `#include <project_vertex>${VERTEX_BODY}`,
+    );
+    shader.fragmentShader = `varying float entityMark;\n${shader.fragmentShader.replace(
+      "#include <dithering_fragment>",
+      `#include <dithering_fragment>
+gl_FragColor.rgb = mix(gl_FragColor.rgb, vec3(0.05, 0.3, 0.75), 0.55 * entityMark);`,
+    )}`;
+  };
+  material.customProgramCacheKey = () => "entity-flags";
+  return material;
+}
+
+/** A diffuse material for one of the file: rooms have no environment map that metal could mirror. */
+export function diffuseMaterial(source: MeshStandardMaterial, flags: EntityFlags, hasColors: boolean): MeshLambertMaterial {
+  const isTransparent = source.transparent || source.opacity < 1;
+  const material = new MeshLambertMaterial({
+    color: source.color,
+    map: source.map,
+    emissive: source.emissive,
+    emissiveMap: source.emissiveMap,
+    alphaTest: source.alphaTest,
+    transparent: isTransparent,
+    opacity: isTransparent ? Math.max(0.15, source.opacity) : 1,
+    depthWrite: !isTransparent,
+    side: DoubleSide,
+    vertexColors: hasColors,
+    name: source.name,
+  });
+  return withEntityFlags(material, flags);
+}

@@ -1,0 +1,108 @@
+// The frame of the page: header, side panel with tabs, messages, and the dialog for troubles.
+import type { App } from "./app";
+import type { Trouble } from "./connection";
+import { button, element, setText } from "./dom";
+
+const TOAST_SECONDS = 6;
+
+export interface Tab {
+  name: string;
+  content: HTMLElement;
+}
+
+export function makeTabs(tabs: Tab[]): HTMLElement {
+  const bar = element("div", { class: "tabs", role: "tablist", label: "Panels" });
+  const buttons: HTMLButtonElement[] = [];
+  const show = (chosen: number) => tabs.forEach(({ content }, index) => {
+    content.hidden = index !== chosen;
+    buttons[index]!.setAttribute("aria-selected", String(index === chosen));
+    buttons[index]!.tabIndex = index === chosen ? 0 : -1;
+  });
+  tabs.forEach(({ name, content }, index) => {
+    content.setAttribute("role", "tabpanel");
+    content.setAttribute("aria-label", name);
+    buttons.push(button(name, () => show(index), { role: "tab" }));
+  });
+  bar.append(...buttons);
+  bar.addEventListener("keydown", (event) => {
+    const step = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
+    if (step === 0) return;
+    const at = buttons.indexOf(document.activeElement as HTMLButtonElement);
+    const next = (at + step + buttons.length) % buttons.length;
+    show(next);
+    buttons[next]!.focus();
+    event.preventDefault();
+  });
+  show(0);
+  return element("aside", { class: "panel", label: "Scene and world" }, bar, ...tabs.map(({ content }) => content));
+}
+
+/** Sentences that vanish by themselves. */
+export function makeToasts(app: App): HTMLElement {
+  const root = element("div", { class: "toasts", role: "status", "aria-live": "polite" });
+  app.said.listen((text) => {
+    const toast = element("p", {}, text);
+    root.append(toast);
+    while (root.children.length > 3) root.firstElementChild!.remove();
+    setTimeout(() => toast.remove(), TOAST_SECONDS * 1000);
+  });
+  return root;
+}
+
+/** What is wrong, in words, and the token field. */
+export function makeTroubleDialog(app: App, onToken: (token: string) => void): HTMLElement {
+  const text = element("p");
+  const detail = element("p", { class: "quiet" });
+  const token = element("input", { type: "password", autocomplete: "off", label: "Token", placeholder: "Token" });
+  const form = element("form", { hidden: true }, token, element("button", { type: "submit" }, "Connect"));
+  const retry = button("Try now", () => void app.connection.open(), { hidden: true });
+  const root = element("div", { class: "trouble", role: "alert" }, text, detail, form, retry);
+  let countdown = 0;
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    onToken(token.value.trim());
+  });
+  const showTrouble = (trouble: Trouble) => {
+    clearInterval(countdown);
+    root.hidden = false;
+    setText(text, trouble.text);
+    setText(detail, "");
+    form.hidden = trouble.kind !== "token";
+    retry.hidden = trouble.kind !== "waiting";
+    if (trouble.kind === "token") token.focus();
+    if (trouble.kind !== "waiting") return;
+    let left = Math.ceil(trouble.seconds);
+    const tell = () => setText(detail, left > 0 ? `Trying again in ${left} s …` : "Connecting …");
+    tell();
+    countdown = window.setInterval(() => {
+      --left;
+      tell();
+    }, 1000);
+  };
+  app.troubled.listen(showTrouble);
+  app.loading.listen((what) => {
+    clearInterval(countdown);
+    root.hidden = false;
+    form.hidden = retry.hidden = true;
+    setText(text, what);
+    setText(detail, "");
+  });
+  app.opened.listen(() => {
+    clearInterval(countdown);
+    root.hidden = true;
+  });
+  setText(text, "Connecting …");
+  return root;
+}
+
+export function makeHelp(): HTMLElement {
+  const keys: [string, string][] = [
+    ["W A S D, arrows", "walk (without an avatar: fly the camera)"], ["Mouse drag", "look around; M captures the mouse"],
+    ["Click", "name the object"], ["Enter", "enter the world with an avatar"], ["Shift", "run"], ["Space", "jump"],
+    ["C", "crouch"], ["F", "fly; E and Q up and down"], ["V", "first or third person"], ["P", "pause or play"],
+    ["Esc", "leave the avatar"], ["Wheel", "distance in third person"],
+    ["Touch", "left half walks, right half looks"],
+  ];
+  return element("div", { class: "stack" }, element("dl", { class: "facts keys" },
+    ...keys.flatMap(([key, what]) => [element("dt", {}, key), element("dd", {}, what)])));
+}

@@ -1,0 +1,75 @@
+// The list of avatars: follow one, in first or third person.
+import type { App } from "./app";
+import { colorOf } from "./avatars";
+import type { CameraRig } from "./camera_rig";
+import { button, element } from "./dom";
+import type { AvatarState } from "./generated/enfilade_pb";
+import type { Walk } from "./walk";
+
+const MAX_ROWS = 200;
+
+export class People {
+  readonly root = element("div", { class: "stack" });
+  #list = element("ul", { class: "people", label: "Avatars" });
+  #app: App;
+  #rig: CameraRig;
+  #walk: Walk;
+  #shown = "";
+
+  constructor(app: App, rig: CameraRig, walk: Walk) {
+    this.#app = app;
+    this.#rig = rig;
+    this.#walk = walk;
+    this.root.append(this.#list);
+    setInterval(() => this.#render(), 300);
+  }
+
+  #render(): void {
+    if (this.root.offsetParent === null) return;
+    const all = this.#app.state.latest?.avatars ?? [];
+    const avatars = all.slice(0, MAX_ROWS);
+    const names = `${all.map(({ id, name }) => `${id} ${name}`).join()} ${this.#app.focus} ${this.#walk.name}`;
+    if (names !== this.#shown) {
+      this.#shown = names;
+      this.#list.replaceChildren(...(avatars.length > 0 ? avatars.map((avatar) => this.#row(avatar))
+        : [element("li", { class: "empty" }, "No avatar is in the world.")]));
+      if (all.length > MAX_ROWS) this.#list.append(element("li", { class: "empty" }, `and ${all.length - MAX_ROWS} more`));
+    }
+    avatars.forEach((avatar, index) => {
+      const doing = this.#list.children[index]?.querySelector(".doing");
+      if (doing) doing.textContent = this.#doing(avatar);
+    });
+  }
+
+  #row({ id, name }: AvatarState): HTMLElement {
+    const dot = element("span", { class: "dot" });
+    dot.style.background = colorOf(id);
+    const isFollowed = this.#app.focus === name;
+    const follow = button(isFollowed ? "Leave view" : "Follow", () => this.#follow(name), { "aria-pressed": String(isFollowed) });
+    return element(
+      "li", {}, dot,
+      element("span", { class: "who" }, name === this.#walk.name ? `${name} (you)` : name, element("small", { class: "doing" })),
+      follow,
+    );
+  }
+
+  #doing({ feet, flying, grounded, move }: AvatarState): string {
+    const made = move?.made;
+    const speed = made ? Math.hypot(made.x, made.y, made.z) / (this.#app.welcome?.policies?.tick ?? 1 / 60) : 0;
+    const what = flying ? "flies" : !grounded ? "in the air" : speed > 0.01 ? "walks" : "stands";
+    const stopped = move?.stoppedByName ? `, stopped by ${move.stoppedByName.split("/").at(-1)}` : "";
+    return `${what}, ${speed.toFixed(1)} m/s, height ${(feet?.y ?? 0).toFixed(2)} m${stopped}`;
+  }
+
+  #follow(name: string): void {
+    if (this.#app.focus === name) {
+      this.#app.setFocus("");
+      this.#rig.setMode("free");
+    } else {
+      this.#app.setFocus(name);
+      this.#rig.setMode(name === this.#walk.name ? "first" : "third");
+    }
+    this.#shown = "";
+    this.#render();
+  }
+}

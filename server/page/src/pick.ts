@@ -1,0 +1,167 @@
+// Picking: the object or avatar under a pixel, and the card that describes it.
+import { Vector2, Vector3 } from "three";
+import type { App } from "./app";
+import type { Avatars } from "./avatars";
+import type { CameraRig } from "./camera_rig";
+import { button, element, setText } from "./dom";
+import { lastName, metres, shortName } from "./format";
+import { Verdict, type PairState } from "./generated/enfilade_pb";
+import type { Walk } from "./walk";
+
+const TOUCH_SECONDS = 1; // between questions for what touches the selected object
+const MAX_TOUCHING = 12;
+
+export interface Picked {
+  entity: number;
+  point: Vector3;
+  normal: Vector3 | null;
+}
+
+/** The ray through a pixel of the canvas, in the scene's axes. */
+export function rayThrough(app: App, x: number, y: number): { origin: Vector3; direction: Vector3 } {
+  const { camera, canvas } = app.view;
+  camera.updateMatrixWorld();
+  const point = new Vector2((2 * x) / canvas.clientWidth - 1, 1 - (2 * y) / canvas.clientHeight);
+  const origin = new Vector3().setFromMatrixPosition(camera.matrixWorld);
+  const direction = new Vector3(point.x, point.y, 0.5).unproject(camera).sub(origin).normalize();
+  return { origin, direction };
+}
+
+export function pick(app: App, avatars: Avatars, x: number, y: number): Picked | null {
+  const { origin, direction } = rayThrough(app, x, y);
+  const hit = app.model?.raycast(origin, direction) ?? null;
+  const person = avatars.raycast(origin, direction);
+  if (person && person.distance < (hit?.distance ?? Infinity)) return { ...person, normal: null };
+  return hit;
+}
+
+export class Card {
+  readonly root: HTMLElement;
+  #app: App;
+  #rig: CameraRig;
+  #walk: Walk;
+  #place: Picked | null = null;
+  #title = element("h2");
+  #path = element("p", { class: "path" });
+  #facts = element("dl");
+  #touching = element("ul", { class: "touching" });
+  #touchTitle = element("h3", {}, "Touches now");
+  #walkHere: HTMLButtonElement;
+  #hide: HTMLButtonElement;
+  #doors = element("div", { class: "row" });
+  #asked = 0;
+
+  constructor(app: App, rig: CameraRig, walk: Walk) {
+    this.#app = app;
+    this.#rig = rig;
+    this.#walk = walk;
+    this.#walkHere = button("Walk from here", () => this.#start());
+    this.#hide = button("Hide", () => this.#toggleHidden());
+    this.root = element(
+      "section", { class: "card", label: "Selected object", hidden: true },
+      element("header", {}, this.#title, button("×", () => app.select(0), { class: "close", label: "Close" })),
+      this.#path, this.#facts, this.#doors,
+      element("div", { class: "row" }, button("Go to", () => this.#goTo()), this.#hide, this.#walkHere),
+      this.#touchTitle, this.#touching,
+    );
+    app.selected.listen((id) => this.#show(id));
+    app.visibilityChanged.listen(() => this.#updateHide());
+    setInterval(() => void this.#askTouching(), TOUCH_SECONDS * 1000);
+  }
+
+  /** Remembers where the object was hit, for “Walk from here”. */
+  setPlace(place: Picked | null): void {
+    this.#place = place;
+    this.#walkHere.hidden = !(place?.normal && place.normal.y > 0.7);
+  }
+
+  #show(id: number): void {
+    this.root.hidden = id === 0;
+    if (this.#place?.entity !== id) this.setPlace(null);
+    if (id === 0) return;
+    const entity = this.#app.table.byId.get(id);
+    setText(this.#title, entity ? lastName(entity.path) : this.#app.table.nameOf(id));
+    setText(this.#path, entity?.path ?? "avatar");
+    const box = this.#app.model?.boxOf(id);
+    const size = box?.getSize(new Vector3());
+    this.#facts.replaceChildren(...[
+      ["Class", entity?.class], ["GlobalId", entity?.globalId], ["Storey", entity?.storey],
+      ["Size x, z, y", size && `${size.x.toFixed(2)} × ${size.z.toFixed(2)} × ${size.y.toFixed(2)} m`],
+      ["Entity", String(id)],
+    ].flatMap(([name, value]) => (value ? [element("dt", {}, name), element("dd", {}, value)] : [])));
+    this.#showBody(id);
+    this.#touching.replaceChildren();
+    setText(this.#touchTitle, "Touches now");
+    this.#updateHide();
+    void this.#askTouching();
+  }
+
+  /** Doors and lifts can be operated. */
+  #showBody(id: number): void {
+    const bodyId = this.#app.table.bodyOf.get(id);
+    const body = this.#app.welcome?.scene?.bodies.find((one) => one.id === bodyId);
+    this.#doors.replaceChildren();
+    if (!body) return;
+    const order = (action: { case: "open" | "close" | "run" | "stop"; value: object } | { case: "level"; value: number }) =>
+      this.#app.attempt(this.#app.connection.request("bodyCommand", { body: body.name, action }));
+    this.#facts.append(element("dt", {}, "Body"), element("dd", {}, body.mass ? `${body.kind}, ${body.mass} kg` : body.kind));
+    if (body.kind === "hinged" || body.kind === "sliding") {
+      this.#doors.append(button("Open", () => order({ case: "open", value: {} })), button("Close door", () => order({ case: "close", value: {} })));
+    } else if (body.kind === "lift") {
+      body.stops.forEach((_, level) => this.#doors.append(button(`Level ${level}`, () => order({ case: "level", value: level }))));
+    } else if (body.kind === "path") {
+      this.#doors.append(button("Run", () => order({ case: "run", value: {} })), button("Stop", () => order({ case: "stop", value: {} })));
+    }
+  }
+
+  #updateHide(): void {
+    const { selection, model } = this.#app;
+    setText(this.#hide, model?.flags.isHidden(selection) ? "Show" : "Hide");
+    this.#hide.hidden = !this.#app.table.byId.has(selection);
+  }
+
+  #toggleHidden(): void {
+    const { selection, model } = this.#app;
+    model?.flags.setHidden(selection, !model.flags.isHidden(selection));
+    this.#app.visibilityChanged.emit();
+  }
+
+  #goTo(): void {
+    const { selection, model, table } = this.#app;
+    const box = model?.presentBox(selection);
+    if (box) this.#rig.showBox(box);
+    else if (table.avatars.has(selection)) this.#app.setFocus(table.avatars.get(selection)!);
+  }
+
+  #start(): void {
+    if (this.#place) void this.#walk.start(this.#place.point.clone().setY(this.#place.point.y + 0.002));
+  }
+
+  async #askTouching(): Promise<void> {
+    const id = this.#app.selection;
+    if (id === 0 || !this.#app.connection.isOpen || document.hidden) return;
+    const asked = ++this.#asked;
+    const epsilon = this.#app.welcome?.policies?.epsilon ?? 0.0005;
+    try {
+      const { found, leftOut } = await this.#app.connection.request("touching", {
+        entity: { by: { case: "id", value: id } }, within: 2 * epsilon,
+      });
+      if (asked === this.#asked && id === this.#app.selection) this.#showTouching(found, leftOut);
+    } catch (error) {
+      setText(this.#touchTitle, (error as Error).message.replace(/^ERROR_\w+: /, ""));
+    }
+  }
+
+  #showTouching(found: PairState[], leftOut: number): void {
+    setText(this.#touchTitle, found.length === 0 ? "Touches nothing now" : `Touches now: ${found.length + leftOut}`);
+    const rows = found.slice(0, MAX_TOUCHING).map(({ b, bName, verdict, distance }) => element(
+      "li", {},
+      button(shortName(bName), () => this.#app.select(b), { title: bName, class: "link" }),
+      element("span", {}, verdict === Verdict.PENETRATING ? "penetrates" : verdict === Verdict.TOUCHING ? "touches" : metres(distance)),
+    ));
+    // A list that is not replaced keeps the focus of the keyboard.
+    if (rows.map((row) => row.textContent).join() !== [...this.#touching.children].map((row) => row.textContent).join()) {
+      this.#touching.replaceChildren(...rows);
+    }
+  }
+}

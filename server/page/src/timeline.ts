@@ -1,0 +1,166 @@
+// Time: play, pause, step, speed; for a recording a scrubber with the events that were seen, and take over.
+import type { App } from "./app";
+import { classOf, wordOf } from "./contacts";
+import { button, element, setText } from "./dom";
+import { clockTime, shortName } from "./format";
+import { Clock_Mode, ContactEvent_Kind as Kind, type ContactEvent } from "./generated/enfilade_pb";
+import type { Walk } from "./walk";
+
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 10];
+const SEEK_INTERVAL = 60; // milliseconds between seeks while the slider moves
+const MAX_MARKS = 500;
+
+export class Timeline {
+  readonly root: HTMLElement;
+  #app: App;
+  #walk: Walk;
+  #play = button("▶", () => this.toggle(), { class: "play", label: "Play or pause" });
+  #step = button("▮▶", () => this.#stepOnce(), { label: "One tick", title: "One tick" });
+  #speed = element("select", { label: "Speed" },
+    ...SPEEDS.map((speed) => element("option", { value: speed }, `${speed}×`)));
+  #slider = element("input", { type: "range", min: "0", max: "1", value: "0", step: "1", label: "Tick of the recording" });
+  #marks = element("div", { class: "marks" });
+  #track = element("div", { class: "track", hidden: true }, this.#slider, this.#marks);
+  #readout = element("output", { class: "readout" });
+  #takeOver = button("Take over", () => this.#take(), { hidden: true, title: "Leave the recording here, and walk on with the followed avatar" });
+  #note = element("span", { class: "quiet" });
+  #isScrubbing = false;
+  #seeking: number | null = null;
+  #wanted: number | null = null;
+  #seen = new Map<string, ContactEvent>(); // events that have a mark
+
+  constructor(app: App, walk: Walk) {
+    this.#app = app;
+    this.#walk = walk;
+    this.#speed.value = "1";
+    this.root = element(
+      "section", { class: "timeline", label: "Time" },
+      this.#play, this.#step, this.#speed, this.#track, this.#readout, this.#takeOver, this.#note,
+    );
+    this.#speed.addEventListener("change", () => {
+      if (app.clock?.mode === Clock_Mode.FREE_RUN) this.#run();
+    });
+    this.#slider.addEventListener("input", () => this.#scrub());
+    this.#slider.addEventListener("change", () => (this.#isScrubbing = false));
+    app.timeChanged.listen(() => this.#update());
+    app.opened.listen(() => {
+      this.#seen.clear();
+      this.#marks.replaceChildren();
+      const speed = app.clock?.speed ?? 0;
+      if (speed > 0 && SPEEDS.includes(speed)) this.#speed.value = String(speed);
+      this.#update();
+    });
+    app.contactEvents.listen((events) => this.#mark(events));
+  }
+
+  toggle(): void {
+    const { clock, replay } = this.#app;
+    if (clock?.mode === Clock_Mode.FREE_RUN) this.#setClock({ case: "pause", value: {} });
+    else if (replay?.atEnd && !replay.branched) this.#seek(Number(replay.firstTick), true);
+    else this.#run();
+  }
+
+  #run(): void {
+    this.#setClock({ case: "freeRun", value: { speed: Number(this.#speed.value) } });
+  }
+
+  #setClock(mode: Parameters<typeof this.request>[0]): void {
+    this.#app.attempt(this.request(mode));
+  }
+
+  async request(mode: { case: "pause"; value: object } | { case: "freeRun"; value: { speed: number } } | { case: "lockstep"; value: object }): Promise<void> {
+    const reply = await this.#app.connection.request("setClock", { mode });
+    this.#app.setClock(reply.clock, Number(reply.tick));
+    this.#app.view.invalidate();
+  }
+
+  /** One tick needs lockstep; the clock stays there. */
+  #stepOnce(): void {
+    const step = async () => {
+      if (this.#app.clock?.mode !== Clock_Mode.LOCKSTEP) await this.request({ case: "lockstep", value: {} });
+      await this.#app.connection.request("step", { ticks: 1 });
+    };
+    this.#app.attempt(step());
+  }
+
+  #scrub(): void {
+    this.#isScrubbing = true;
+    this.#seek(Number(this.#slider.value), false);
+  }
+
+  /** Seeks one at a time; of further wishes only the last one counts. */
+  #seek(tick: number, thenRun: boolean): void {
+    this.#wanted = tick;
+    if (this.#seeking !== null) return;
+    const next = async () => {
+      while (this.#wanted !== null) {
+        this.#seeking = this.#wanted;
+        this.#wanted = null;
+        await this.#app.connection.request("seek", { tick: BigInt(this.#seeking) });
+        await new Promise((resolve) => setTimeout(resolve, SEEK_INTERVAL));
+      }
+      if (thenRun) this.#run();
+    };
+    this.#app.attempt(next().finally(() => (this.#seeking = null)));
+  }
+
+  goToTick(tick: number): void {
+    if (this.#app.replay) this.#seek(tick, false);
+  }
+
+  #take(): void {
+    const { focus, state } = this.#app;
+    const avatar = focus || state.latest?.avatars[0]?.name || "";
+    this.#app.attempt(this.#walk.takeOver(avatar));
+  }
+
+  #update(): void {
+    const { clock, replay, tick, time } = this.#app;
+    const isRunning = clock?.mode === Clock_Mode.FREE_RUN;
+    setText(this.#play, isRunning ? "❚❚" : "▶");
+    this.#play.setAttribute("aria-label", isRunning ? "Pause" : "Play");
+    this.#play.title = isRunning ? "Pause (P)" : "Play (P)";
+    setText(this.#readout, `${clockTime(time)} · tick ${tick}`);
+    this.#track.hidden = !replay;
+    this.root.classList.toggle("replay", replay !== null);
+    this.#takeOver.hidden = !this.#app.isPlayback;
+    if (replay) {
+      this.#slider.min = String(replay.firstTick);
+      this.#slider.max = String(replay.lastTick);
+      if (!this.#isScrubbing && this.#seeking === null) this.#slider.value = String(tick);
+      this.#slider.setAttribute("aria-valuetext", `${clockTime(time)}, tick ${tick}`);
+    }
+    setText(this.#note, this.#noteText(isRunning));
+    for (const control of [this.#play, this.#step, this.#speed]) control.disabled = !this.#app.mayDrive;
+  }
+
+  #noteText(isRunning: boolean): string {
+    const { clock, replay } = this.#app;
+    if (replay?.diverged) return `The replay differs from the recording: ${replay.diverged}`;
+    if (replay?.branched) return `left the recording at tick ${replay.branchedAt}`;
+    if (replay?.atEnd) return "end of the recording";
+    if (!this.#app.mayDrive) return "this token may only observe";
+    if (clock?.mode === Clock_Mode.LOCKSTEP && !isRunning) return clock.hasDriver ? "a client steps the clock" : "the clock stands still";
+    return clock?.mode === Clock_Mode.PAUSED ? "paused" : "";
+  }
+
+  /** Marks on the track of a recording: what was seen so far. */
+  #mark(events: ContactEvent[]): void {
+    const { replay } = this.#app;
+    if (!replay) return;
+    const first = Number(replay.firstTick);
+    const span = Math.max(1, Number(replay.lastTick) - first);
+    for (const event of events) {
+      const isShown = event.kind === Kind.BEGIN && (event.normal?.y ?? 0) > -0.7 || event.kind === Kind.BLOCKED || event.kind === Kind.NEAR || event.kind === Kind.ENTER;
+      const key = `${event.tick} ${event.kind} ${event.phase} ${event.a} ${event.b}`;
+      if (!isShown || this.#seen.has(key) || this.#seen.size >= MAX_MARKS) continue;
+      this.#seen.set(key, event);
+      const mark = button("", () => this.#seek(Number(event.tick), false), {
+        class: `mark ${classOf(event)}`, tabindex: "-1",
+        title: `${clockTime(event.time)} ${wordOf(event)}: ${shortName(event.aName)} – ${shortName(event.bName)}`,
+      });
+      mark.style.left = `${(100 * (Number(event.tick) - first)) / span}%`;
+      this.#marks.append(mark);
+    }
+  }
+}

@@ -1,0 +1,489 @@
+// Tests of the page in Chromium against a real server.
+//   node page_test.mjs --server build/enfilade [--scene FILE.glb] [--glb FILE.glb] [--page build/page] [--out FOLDER] [--chromium PATH]
+// A server without a page of its own is put behind page_proxy.mjs, which sends --glb (default: the scene). Screenshots are written to the folder of --out.
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { parseArgs } from "node:util";
+import { chromium } from "playwright-core";
+import { startProxy } from "./page_proxy.mjs";
+
+const { values: options } = parseArgs({
+  options: {
+    server: { type: "string" }, scene: { type: "string", default: "build/assets/building.glb" },
+    page: { type: "string", default: "build/page" }, glb: { type: "string" }, out: { type: "string", default: "out/page" },
+    chromium: { type: "string", default: "/usr/bin/chromium" }, only: { type: "string" },
+  },
+});
+assert.ok(options.server, "--server names the program");
+mkdirSync(options.out, { recursive: true });
+const scratch = mkdtempSync(join(tmpdir(), "enfilade-page-"));
+const LONG = 40_000; // milliseconds: software rendering on a busy machine is slow
+const WALK_SPEED = 1.4; // metres per second, of the page
+const TICK = 1 / 60;
+
+const browser = await chromium.launch({
+  executablePath: options.chromium,
+  args: ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--no-sandbox"],
+});
+const cleanups = [() => browser.close(), () => rmSync(scratch, { recursive: true })];
+
+async function startServer(what, { port = 0, args = [] } = {}) {
+  const child = spawn(options.server, ["serve", what, "--listen", `127.0.0.1:${port}`, ...args], { stdio: ["ignore", "pipe", "pipe"] });
+  child.stderr.resume();
+  const ready = await new Promise((resolve, reject) => {
+    let text = "";
+    child.stdout.on("data", (data) => {
+      text += data;
+      if (text.includes("\n")) resolve(JSON.parse(text.split("\n")[0]));
+    });
+    child.once("exit", (code) => reject(new Error(`the server ended with ${code}`)));
+  });
+  const server = {
+    port: ready.port,
+    async stop() {
+      if (child.exitCode !== null) return;
+      child.kill("SIGTERM");
+      await new Promise((resolve) => child.once("exit", resolve));
+    },
+  };
+  cleanups.unshift(() => server.stop());
+  return server;
+}
+
+/** The address of the page: the server's own, or a proxy's. */
+async function addressOf(server) {
+  const own = `http://127.0.0.1:${server.port}/`;
+  const reply = await fetch(own).catch(() => null);
+  if (reply?.ok && (await reply.text()).includes("<title>Enfilade")) return own;
+  const proxy = await startProxy(options.page, options.glb ?? options.scene, server.port);
+  cleanups.unshift(() => proxy.close());
+  return `http://127.0.0.1:${proxy.address().port}/`;
+}
+
+async function openPage(address, { width = 900, height = 620 } = {}) {
+  const page = await browser.newPage({ viewport: { width, height } });
+  page.setDefaultTimeout(LONG);
+  page.problems = [];
+  page.on("console", (message) => {
+    if (message.type() === "error") page.problems.push(message.text());
+  });
+  page.on("pageerror", (error) => page.problems.push(error.message));
+  await page.goto(address);
+  return page;
+}
+
+const isReady = (page) => page.waitForFunction(() => globalThis.enfilade?.app.model && enfilade.app.connection.isOpen);
+const shoot = (page, name) => page.screenshot({ path: join(options.out, `${name}.png`), timeout: LONG });
+
+/** A second client in the page, over the page's copy of the JavaScript client: it records what the server reports. */
+async function observe(page) {
+  await page.evaluate(async () => {
+    const { connect } = await import("/page/enfilade.js");
+    const states = new Map();
+    const client = await connect(`ws://${location.host}/`, {
+      name: "observer", on: { state: (state) => states.set(Number(state.tick), state) },
+    });
+    await client.request("subscribe", { state: true });
+    globalThis.observer = { client, states };
+  });
+}
+
+async function enter(page) {
+  await page.getByRole("button", { name: "Walk", exact: true }).click();
+  await page.waitForFunction(() => enfilade.walk.isWalking && enfilade.app.avatarState(enfilade.walk.name)?.grounded);
+  return await page.evaluate(() => enfilade.walk.name);
+}
+
+async function hold(page, keys, milliseconds) {
+  for (const key of keys) await page.keyboard.down(key);
+  await page.waitForTimeout(milliseconds);
+  for (const key of [...keys].reverse()) await page.keyboard.up(key);
+  // The avatar stands when a tick has not moved it.
+  await page.waitForFunction(() => {
+    const { made } = enfilade.app.avatarState(enfilade.walk.name)?.move ?? {};
+    return made && Math.hypot(made.x, made.z) === 0;
+  });
+}
+
+const tests = {
+  async "the page opens without errors"({ page }) {
+    await shoot(page, "1-opened");
+    assert.deepEqual(page.problems, []);
+    const { triangles, calls } = await page.evaluate(() => enfilade.app.view.drawn);
+    assert.ok(triangles > 1000, `${triangles} triangles are drawn`);
+    assert.ok(calls <= 500, `${calls} draw calls`);
+  },
+
+  async "a pick names the object that the server's ray names"({ page }) {
+    const result = await page.evaluate(async () => {
+      let seed = 12345;
+      const random = () => (seed = (seed * 1103515245 + 12345) % 2147483648) / 2147483648;
+      const { app, rig } = enfilade;
+      const { clientWidth: width, clientHeight: height } = app.view.canvas;
+      const differences = [];
+      let met = 0;
+      for (let view = 0; view < 4; ++view) {
+        rig.look(Math.PI / 2, 0);
+        app.view.invalidate();
+        await new Promise((resolve) => setTimeout(resolve, 400));
+        const rays = Array.from({ length: 50 }, () => {
+          const [x, y] = [random() * width, random() * height];
+          const { origin, direction } = enfilade.rayThrough(x, y);
+          return { x, y, origin: { ...origin }, direction: { ...direction } };
+        });
+        const { hits } = await app.connection.request("rays", { rays: rays.map(({ origin, direction }) => ({ origin, direction })) });
+        hits.forEach((hit, index) => {
+          const picked = enfilade.pick(rays[index].x, rays[index].y);
+          met += hit.met ? 1 : 0;
+          if ((picked?.entity ?? 0) !== hit.entity) differences.push(`${hit.name} at ${hit.distance}, page: ${picked?.entity} ${app.table.nameOf(picked?.entity)}`);
+        });
+      }
+      return { differences, met };
+    });
+    assert.ok(result.met > 100, `${result.met} of 200 rays hit something`);
+    assert.ok(result.differences.length <= 2, `of 200 pixels differ: ${result.differences.join("; ")}`);
+  },
+
+  async "the drawn ids agree with the server's picture of ids"({ page }) {
+    await observe(page);
+    const results = await page.evaluate(async () => {
+      const { pixels } = await import("/page/enfilade.js");
+      const [width, height] = [400, 300];
+      const { app, rig } = enfilade;
+      if (!app.welcome.renderer) return [];
+      const results = [];
+      for (let view = 0; view < 4; ++view) {
+        rig.look(Math.PI / 2, 0);
+        app.view.invalidate();
+        await new Promise((resolve) => setTimeout(resolve, 300));
+        const { x, y, z } = rig.position;
+        const { camera } = app.view;
+        const { body, attachment } = await observer.client.request("frame", {
+          view: { case: "free", value: {
+            eye: { x, y, z }, gaze: { case: "forward", value: { ...rig.forward } },
+            projection: { case: "fovY", value: camera.fov * Math.PI / 180 }, near: camera.near, far: camera.far,
+          } },
+          width, height, channels: [2], glass: 2,
+        });
+        const theirs = pixels(body, attachment).ids;
+        const ours = enfilade.ids(width, height);
+        let both = 0, either = 0;
+        const known = (id) => (id <= app.welcome.scene.objects ? id : 0);
+        ours.forEach((id, i) => {
+          const other = known(theirs[i]);
+          if (id === 0 && other === 0) return;
+          both += id === other ? 1 : 0;
+          either += 1;
+        });
+        results.push(both / either);
+      }
+      return results;
+    });
+    results.forEach((agreement) => assert.ok(agreement >= 0.99, `agreement of ids: ${results}`));
+    console.log(`     agreement of ids: ${results.map((one) => one.toFixed(4)).join(", ")}`);
+  },
+
+  async "a click shows the card of the object"({ page }) {
+    const canvas = await page.locator(".stage > canvas").boundingBox();
+    await page.mouse.click(canvas.x + canvas.width * 0.6, canvas.y + canvas.height * 0.5);
+    await page.waitForFunction(() => enfilade.app.selection > 0);
+    const { path, card } = await page.evaluate(() => ({
+      path: enfilade.app.table.nameOf(enfilade.app.selection), card: document.querySelector(".card").innerText,
+    }));
+    assert.ok(card.includes(path), `the card names ${path}`);
+    await page.waitForFunction(() => /Touches (now|nothing)/.test(document.querySelector(".card h3").textContent));
+    await shoot(page, "2-picked");
+    await page.keyboard.press("Escape");
+  },
+
+  async "search, hide, isolate and show all"({ page }) {
+    const search = page.getByRole("searchbox");
+    await search.fill("picture01 canvas");
+    await page.waitForFunction(() => document.querySelectorAll(".tree [role=treeitem]").length > 0);
+    await page.locator(".tree [role=treeitem]").first().click();
+    const hidden = () => page.evaluate(() => enfilade.app.model.flags.hiddenCount);
+    await page.getByRole("button", { name: "Isolate" }).click();
+    assert.ok(await hidden() > 100, "all others are hidden");
+    await page.getByRole("button", { name: "Show all" }).click();
+    assert.equal(await hidden(), 0);
+    await page.getByRole("button", { name: "Hide", exact: true }).last().click();
+    assert.equal(await hidden(), 1);
+    await page.getByRole("button", { name: "Show all" }).click();
+    await search.fill("");
+    await page.keyboard.press("Escape");
+    await page.evaluate(() => enfilade.app.select(0));
+  },
+
+  async "W held for two seconds moves the avatar as the server says"({ page }) {
+    await observe(page);
+    const name = await enter(page);
+    const feet = () => page.evaluate((who) => {
+      const { x, z } = enfilade.app.avatarState(who).feet;
+      return [x, z];
+    }, name);
+    const start = await feet();
+    await page.evaluate(() => observer.states.clear());
+    await hold(page, ["w"], 2000);
+    const end = await feet();
+    const distance = Math.hypot(end[0] - start[0], end[1] - start[1]);
+    // States are latest-only, so the sum over ticks would miss some: compare the ends.
+    const server = await page.evaluate((who) => {
+      const states = [...observer.states.values()].map((state) => state.avatars.find((avatar) => avatar.name === who));
+      const moves = states.filter(({ move }) => Math.hypot(move.asked.x, move.asked.z) > 0);
+      const ticks = [...observer.states.values()].filter((state) => moves.includes(state.avatars.find((avatar) => avatar.name === who)));
+      const [first, last] = [ticks[0], ticks.at(-1)];
+      const feet = states.at(-1).feet;
+      return { feet: [feet.x, feet.z], asked: Number(last.tick - first.tick) + 1, blocked: moves.some(({ move }) => move.stoppedBy !== 0) };
+    }, name);
+    const moved = Math.hypot(server.feet[0] - start[0], server.feet[1] - start[1]);
+    assert.ok(distance > 1, `the avatar moved ${distance} m`);
+    assert.ok(Math.abs(distance - moved) < 1e-9, `page ${distance}, server ${moved}`);
+    if (!server.blocked) assert.ok(Math.abs(distance / (server.asked * WALK_SPEED * TICK) - 1) < 0.03, `${distance} m in ${server.asked} ticks`);
+    // The camera is at the eyes of the avatar.
+    await page.waitForTimeout(500);
+    const eyes = await page.evaluate(() => enfilade.rig.position.toArray());
+    assert.ok(Math.hypot(eyes[0] - end[0], eyes[2] - end[1]) < 0.01, "the camera follows");
+    await shoot(page, "3-walked");
+  },
+
+  async "walking into a wall stops and lists a contact"({ page }) {
+    await page.getByRole("tab", { name: "Contacts" }).click();
+    await page.locator(".stage > canvas").focus();
+    // Face the nearest object that stands still.
+    await page.evaluate(async () => {
+      const { app, rig, walk } = enfilade;
+      const { feet } = app.avatarState(walk.name);
+      const rays = Array.from({ length: 24 }, (_, i) => ({
+        origin: { ...feet, y: feet.y + 1 }, direction: { x: Math.cos(i * Math.PI / 12), y: 0, z: -Math.sin(i * Math.PI / 12) },
+      }));
+      const { hits } = await app.connection.request("rays", { rays, throughAvatar: walk.name });
+      const distance = ({ met, entity, distance }) => (met && !app.table.bodyOf.has(entity) ? distance : Infinity);
+      const nearest = hits.indexOf(hits.toSorted((a, b) => distance(a) - distance(b))[0]);
+      rig.look(nearest * Math.PI / 12 - rig.yaw, -rig.pitch);
+    });
+    await page.keyboard.down("Shift");
+    await page.keyboard.down("w");
+    await page.waitForFunction(() => enfilade.app.avatarState(enfilade.walk.name)?.move?.stoppedBy > 0);
+    await page.waitForTimeout(800);
+    await page.waitForFunction(() => document.querySelector(".events .touching"));
+    const stopped = await page.evaluate(() => {
+      const { move } = enfilade.app.avatarState(enfilade.walk.name);
+      return { by: move.stoppedByName, listed: document.querySelector(".events").innerText };
+    });
+    await page.waitForFunction(() => document.querySelector(".marker:not([hidden])"));
+    await shoot(page, "4-wall");
+    await page.keyboard.up("w");
+    await page.keyboard.up("Shift");
+    assert.match(stopped.listed, /blocked|contact/);
+    assert.ok(stopped.listed.includes(stopped.by.split("/").at(-1)), `${stopped.by} is listed: ${stopped.listed.slice(0, 200)}`);
+    const { body } = await page.evaluate(async () => {
+      const { body: metrics } = await observer.client.request("metrics");
+      return { body: metrics.worstPenetration };
+    });
+    assert.equal(body, 0, "nothing was penetrated");
+  },
+
+  async "jump, crouch, fly and third person"({ page }) {
+    const state = (field) => page.evaluate((name) => enfilade.app.avatarState(enfilade.walk.name)[name], field);
+    await page.locator(".stage > canvas").focus();
+    await page.keyboard.press("Space");
+    await page.waitForFunction(() => !enfilade.app.avatarState(enfilade.walk.name).grounded);
+    await page.waitForFunction(() => enfilade.app.avatarState(enfilade.walk.name).grounded);
+    await page.keyboard.press("c");
+    await page.waitForFunction(() => enfilade.app.avatarState(enfilade.walk.name).height < 1.5);
+    await page.waitForFunction(() => enfilade.walk.isCrouched);
+    await page.keyboard.press("c");
+    await page.waitForFunction(() => enfilade.app.avatarState(enfilade.walk.name).height > 1.5);
+    await page.keyboard.press("f");
+    await page.waitForFunction(() => enfilade.walk.isFlying);
+    assert.equal(await state("flying"), true);
+    await page.keyboard.press("f");
+    await page.waitForFunction(() => !enfilade.walk.isFlying);
+    await page.evaluate(() => enfilade.rig.look(Math.PI, 0));
+    await hold(page, ["w"], 800);
+    await page.keyboard.press("v");
+    await page.waitForFunction(() => enfilade.rig.mode === "third");
+    await page.waitForTimeout(1000);
+    await shoot(page, "5-third-person");
+  },
+
+  async "a second page sees the avatar of the first one"({ page, address }) {
+    const other = await openPage(address);
+    await isReady(other);
+    const name = await page.evaluate(() => enfilade.walk.name);
+    await other.waitForFunction((who) => enfilade.app.avatarState(who), name);
+    await other.getByRole("tab", { name: "Avatars" }).click();
+    await other.getByRole("button", { name: "Follow" }).first().click();
+    await other.waitForFunction((who) => enfilade.app.focus === who && enfilade.rig.mode === "third", name);
+    const places = await Promise.all([page, other].map((one) => one.evaluate((who) => {
+      const { x, y, z } = enfilade.app.avatarState(who).feet;
+      return [x, y, z];
+    }, name)));
+    assert.deepEqual(places[0], places[1]);
+    await other.getByRole("button", { name: "Leave view" }).click();
+    const second = await enter(other);
+    await page.waitForFunction((who) => enfilade.app.avatarState(who), second);
+    await other.waitForTimeout(1000);
+    await shoot(other, "6-second-page");
+    assert.deepEqual(other.problems, []);
+    await other.close();
+    await page.waitForFunction((who) => !enfilade.app.avatarState(who), second);
+  },
+
+  async "a click on the plan walks there"({ page }) {
+    // Two metres along the longest free view.
+    const { before, direction } = await page.evaluate(async () => {
+      const { app, walk } = enfilade;
+      const feet = { ...app.avatarState(walk.name).feet };
+      const rays = Array.from({ length: 24 }, (_, i) => ({
+        origin: { ...feet, y: feet.y + 0.4 }, direction: { x: Math.cos(i * Math.PI / 12), y: 0, z: -Math.sin(i * Math.PI / 12) },
+      }));
+      const { hits } = await app.connection.request("rays", { rays, throughAvatar: walk.name });
+      const distances = hits.map(({ met, distance }) => (met ? distance : 100));
+      return { before: feet, direction: rays[distances.indexOf(Math.max(...distances))].direction };
+    });
+    const plan = await page.locator(".minimap canvas").boundingBox();
+    await page.mouse.click(plan.x + plan.width / 2 + 14 * direction.x, plan.y + plan.height / 2 + 14 * direction.z);
+    await page.waitForFunction(({ x, z }) => {
+      const { feet } = enfilade.app.avatarState(enfilade.walk.name);
+      return Math.hypot(feet.x - x, feet.z - z) > 0.3;
+    }, before);
+    await page.waitForTimeout(1500);
+    await shoot(page, "7-plan");
+  },
+
+  async "pause, step and play"({ page }) {
+    await page.getByRole("button", { name: "Pause" }).click();
+    await page.getByRole("button", { name: "Play" }).waitFor();
+    await page.waitForTimeout(600);
+    const before = await page.evaluate(() => enfilade.app.tick);
+    await page.getByRole("button", { name: "One tick" }).click();
+    await page.waitForFunction((tick) => enfilade.app.tick === tick + 1, before);
+    await page.getByRole("button", { name: "Play" }).click();
+    await page.waitForFunction((tick) => enfilade.app.tick > tick + 20, before);
+    assert.deepEqual(page.problems, []);
+  },
+
+  async "the page survives a restart of the server"({ page, server, restart }) {
+    const before = await page.evaluate(() => ({ ...enfilade.app.avatarState(enfilade.walk.name).feet }));
+    await server.stop();
+    await page.getByText("The server does not reply.").waitFor();
+    await shoot(page, "8-server-gone");
+    await restart();
+    await page.waitForFunction(() => enfilade.app.connection.isOpen && document.querySelector(".trouble").hidden);
+    await page.waitForFunction(() => enfilade.walk.isWalking && enfilade.app.avatarState(enfilade.walk.name));
+    const after = await page.evaluate(() => ({ ...enfilade.app.avatarState(enfilade.walk.name).feet }));
+    assert.ok(Math.hypot(after.x - before.x, after.z - before.z) < 3, "the avatar is back near its old place");
+  },
+};
+
+async function testLive() {
+  const record = join(scratch, "walk.mcap");
+  const args = ["--near-miss", "0.1", "--record", record];
+  const first = await startServer(options.scene, { args });
+  const address = await addressOf(first);
+  const page = await openPage(address);
+  await isReady(page);
+  await page.waitForTimeout(1500);
+  let server = first;
+  const context = {
+    page, address,
+    get server() { return server; },
+    async restart() { server = await startServer(options.scene, { port: first.port, args: ["--near-miss", "0.1"] }); },
+  };
+  for (const [name, test] of Object.entries(tests)) await run(name, () => test(context));
+  await page.close();
+  await server.stop();
+  return record;
+}
+
+async function testReplay(record) {
+  const server = await startServer(record);
+  const page = await openPage(await addressOf(server), { width: 1100, height: 700 });
+  await isReady(page);
+  await run("scrubbing to a tick shows the recorded poses", async () => {
+    const { first, last } = await page.evaluate(() => ({ first: Number(enfilade.app.replay.firstTick), last: Number(enfilade.app.replay.lastTick) }));
+    assert.ok(last - first > 200, `${last} ticks`);
+    const tick = Math.round(first + 0.3 * (last - first));
+    const placesAt = async (wanted) => {
+      await page.getByRole("slider").fill(String(wanted));
+      await page.waitForFunction((at) => enfilade.app.tick === at && Number(enfilade.app.state.latest?.tick) === at, wanted);
+      return await page.evaluate(() => enfilade.app.state.latest.avatars.map(({ name, feet }) => [name, feet.x, feet.y, feet.z]));
+    };
+    const once = await placesAt(tick);
+    await placesAt(last - 5);
+    const again = await placesAt(tick);
+    assert.ok(once.length > 0);
+    assert.deepEqual(once, again);
+    const drawn = await page.evaluate(async () => {
+      await new Promise((resolve) => setTimeout(resolve, 500));
+      return enfilade.app.state.avatars().map(({ state, feet }) => [state.name, feet.x, feet.y, feet.z]);
+    });
+    assert.deepEqual(drawn, again);
+  });
+  await run("play marks events, and take over goes on from there", async () => {
+    await page.getByRole("combobox", { name: "Speed" }).selectOption("4");
+    await page.getByRole("slider").fill("1");
+    await page.getByRole("button", { name: "Play" }).click();
+    await page.waitForFunction(() => document.querySelectorAll(".mark").length > 0);
+    await page.getByRole("tab", { name: "Avatars" }).click();
+    await page.getByRole("button", { name: "Follow" }).first().click();
+    await page.waitForTimeout(1500);
+    await page.getByRole("button", { name: "Pause" }).click();
+    await shoot(page, "9-replay");
+    await page.getByRole("button", { name: "Take over" }).click();
+    await page.waitForFunction(() => enfilade.app.replay.branched && enfilade.walk.isWalking);
+    assert.deepEqual(page.problems, []);
+  });
+  await page.close();
+  await server.stop();
+}
+
+async function testToken() {
+  const tokens = join(scratch, "tokens");
+  writeFileSync(tokens, "observe see-only-0123456789\ndrive may-walk-0123456789\n", { mode: 0o600 });
+  const server = await startServer(options.scene, { args: ["--token-file", tokens] });
+  const page = await openPage(await addressOf(server));
+  await run("a token is asked for, and its role is respected", async () => {
+    const field = page.getByPlaceholder("Token");
+    await field.fill("wrong-token-00000");
+    await field.press("Enter");
+    await page.getByText("needs a token").waitFor();
+    await field.fill("see-only-0123456789");
+    await field.press("Enter");
+    await isReady(page);
+    await page.waitForFunction(() => document.querySelector(".trouble").hidden);
+    assert.ok(await page.getByRole("button", { name: "Walk", exact: true }).isDisabled(), "an observer cannot walk");
+  });
+  await page.close();
+  await server.stop();
+}
+
+let failures = 0;
+async function run(name, test) {
+  if (options.only && !name.includes(options.only)) return;
+  const start = Date.now();
+  try {
+    await test();
+    console.log(`ok   ${name} (${((Date.now() - start) / 1000).toFixed(1)} s)`);
+  } catch (error) {
+    ++failures;
+    console.log(`FAIL ${name}: ${error.stack}`);
+    await Promise.allSettled(browser.contexts().flatMap((one) => one.pages()).map((page, index) => shoot(page, `failed-${failures}-${index}`)));
+  }
+}
+
+try {
+  const record = await testLive();
+  await testReplay(record);
+  await testToken();
+} catch (error) {
+  ++failures;
+  console.log(`FAIL ${error.stack}`);
+} finally {
+  for (const cleanup of cleanups) await cleanup();
+}
+process.exit(failures === 0 ? 0 : 1);
