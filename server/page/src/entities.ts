@@ -34,7 +34,7 @@ export class EntityTable {
     if (typeof record !== "object" || record === null) return null;
     const fields = record as Record<string, unknown>;
     const text = (name: string) => (typeof fields[name] === "string" ? (fields[name] as string) : "");
-    const id = Number(fields.id ?? fields.entity);
+    const id = Number(fields.entity ?? fields.id);
     if (!Number.isInteger(id) || id <= 0) return null;
     const path = text("path") || text("name") || `object ${id}`;
     const entity = { id, path, globalId: text("globalId"), class: text("class"), storey: text("storey") };

@@ -1,6 +1,8 @@
 // Materials whose vertices know their entity: objects are hidden and marked by one texel each, whatever batch draws
 // them. Thus hiding costs no draw call and no new geometry.
-import { DataTexture, DoubleSide, MeshLambertMaterial, NearestFilter, type Material, type MeshStandardMaterial } from "three";
+import {
+  DataTexture, DoubleSide, MeshBasicMaterial, MeshLambertMaterial, NearestFilter, type Material, type MeshStandardMaterial,
+} from "three";
 
 const WIDTH = 1024; // texels in a row of the table
 
@@ -70,14 +72,12 @@ gl_FragColor.rgb = mix(gl_FragColor.rgb, vec3(0.05, 0.3, 0.75), 0.55 * entityMar
   return material;
 }
 
-/** A diffuse material for one of the file: rooms have no environment map that metal could mirror. */
-export function diffuseMaterial(source: MeshStandardMaterial, flags: EntityFlags, hasColors: boolean): MeshLambertMaterial {
+/** A material for one of the file. Lit ones become diffuse: rooms have no environment map that metal could mirror. */
+export function drawnMaterial(source: MeshStandardMaterial | MeshBasicMaterial, flags: EntityFlags, hasColors: boolean): Material {
   const isTransparent = source.transparent || source.opacity < 1;
-  const material = new MeshLambertMaterial({
+  const common = {
     color: source.color,
     map: source.map,
-    emissive: source.emissive,
-    emissiveMap: source.emissiveMap,
     alphaTest: source.alphaTest,
     transparent: isTransparent,
     opacity: isTransparent ? Math.max(0.15, source.opacity) : 1,
@@ -85,6 +85,9 @@ export function diffuseMaterial(source: MeshStandardMaterial, flags: EntityFlags
     side: DoubleSide,
     vertexColors: hasColors,
     name: source.name,
-  });
-  return withEntityFlags(material, flags);
+  };
+  // Unlit files have their light in the textures.
+  if (source instanceof MeshBasicMaterial) return withEntityFlags(new MeshBasicMaterial(common), flags);
+  const { emissive, emissiveMap } = source;
+  return withEntityFlags(new MeshLambertMaterial({ ...common, emissive, emissiveMap }), flags);
 }

@@ -46,6 +46,8 @@ void main() {
   vec3 top = mix(vec3(0.66, 0.71, 0.76), vec3(0.94, 0.955, 0.97), low);
   gl_FragColor = gl_FrontFacing ? vec4(mix(vec3(0.55, 0.6, 0.65), top, smoothstep(0.2, 0.9, up)), 1.0)
                                 : vec4(0.16, 0.22, 0.28, 1.0);
+  // The bottom of a wall lies on the floor: a few millimetres decide for the wall.
+  gl_FragDepth = gl_FragCoord.z - (gl_FrontFacing ? 0.0 : 0.002);
 }
 `;
 

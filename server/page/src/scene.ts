@@ -6,7 +6,7 @@ import {
 import type { GLTF } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { MeshBVH, type HitPointInfo } from "three-mesh-bvh";
 import type { EntityTable } from "./entities";
-import { diffuseMaterial, EntityFlags } from "./entity_material";
+import { drawnMaterial, EntityFlags } from "./entity_material";
 import type { Body } from "./generated/enfilade_pb";
 import { mergePieces, sortMeshes, type Piece } from "./scene_file";
 import { vector, type Pose } from "./world_state";
@@ -60,7 +60,7 @@ export class SceneModel {
   #materialFor(source: MeshStandardMaterial, geometry: BufferGeometry, made: Map<string, Material>): Material {
     const hasColors = geometry.hasAttribute("color");
     const key = `${source.uuid} ${hasColors}`;
-    const material = made.get(key) ?? diffuseMaterial(source, this.flags, hasColors);
+    const material = made.get(key) ?? drawnMaterial(source, this.flags, hasColors);
     made.set(key, material);
     return material;
   }

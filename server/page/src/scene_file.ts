@@ -48,17 +48,20 @@ export async function parseScene(bytes: ArrayBuffer): Promise<GLTF> {
   return await new GLTFLoader().parseAsync(bytes, "");
 }
 
-/** Adds the file's tables of entities (extras of nodes) to the table. */
+interface Described {
+  extras?: Record<string, unknown>;
+  name?: string;
+}
+
+/** Adds the file's tables of entities (extras of scenes and nodes) to the table. */
 export function readEntities(gltf: GLTF, table: EntityTable): void {
-  const json = gltf.parser.json as { nodes?: { extras?: Record<string, unknown>; name?: string }[] };
-  for (const { extras, name } of json.nodes ?? []) {
-    if (!extras) continue;
-    if (Array.isArray(extras.entities)) extras.entities.forEach((record) => table.addRecord(record));
-    else if (extras.entity !== undefined) {
-      // A node may only repeat the number of an entity that a table describes.
-      const isKnown = table.byId.has(Number(extras.entity));
-      if (!isKnown && (extras.path !== undefined || extras.class !== undefined)) table.addRecord({ name, ...extras });
-    }
+  const json = gltf.parser.json as { scenes?: Described[]; nodes?: Described[] };
+  for (const { extras, name } of [...(json.scenes ?? []), ...(json.nodes ?? [])]) {
+    // Nodes may also list the numbers of their entities; only records describe them.
+    if (Array.isArray(extras?.entities)) extras.entities.forEach((record) => table.addRecord(record));
+    // A node may only repeat the number of an entity that a table describes.
+    const isDescribed = extras?.path !== undefined || extras?.class !== undefined;
+    if (isDescribed && !table.byId.has(Number(extras?.entity))) table.addRecord({ name, ...extras });
   }
 }
 

@@ -17,6 +17,7 @@ interface Group {
 export class Tree {
   readonly root: HTMLElement;
   #app: App;
+  #hasStoreys = false;
   #grouping: "storey" | "path" = "path";
   #tree: Group = newGroup("", "");
   #open = new Set<string>();
@@ -57,8 +58,10 @@ export class Tree {
 
   #fill(): void {
     const entities = [...this.#app.table.byId.values()];
-    const hasStoreys = entities.some(({ storey, class: kind }) => storey || kind);
-    this.#grouping = hasStoreys ? "storey" : "path";
+    this.#hasStoreys = entities.some(({ storey }) => storey);
+    const hasClasses = entities.some(({ class: kind }) => kind);
+    this.#grouping = this.#hasStoreys || hasClasses ? "storey" : "path";
+    setText(this.#select.options[0]!, this.#hasStoreys || !hasClasses ? "By storey and class" : "By class");
     this.#select.value = this.#grouping;
     this.#build();
   }
@@ -88,7 +91,7 @@ export class Tree {
 
   #groupsOf({ path, storey, class: kind }: Entity): string[] {
     if (this.#grouping === "path") return path.split("/").slice(0, -1);
-    return [storey || "No storey", kind || "No class"];
+    return [...(this.#hasStoreys ? [storey || "No storey"] : []), kind || "No class"];
   }
 
   #render(): void {
