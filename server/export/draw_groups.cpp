@@ -12,12 +12,16 @@ namespace {
 /// file stores in single precision deviate by about 1e-7.
 constexpr double kMaxShear = 5e-7;
 
-auto makeAppearanceKey(const scene::Material& material) {
+auto makeAppearanceKey(const scene::Material& material,
+                       const std::vector<std::uint32_t>& equalTextures) {
+  const std::int32_t texture = material.baseColourTexture;
+  const bool isTextured = texture >= 0 && static_cast<std::size_t>(texture) < equalTextures.size();
   const auto& c = material.baseColour;
   const auto& e = material.emissive;
   return std::make_tuple(c.x(), c.y(), c.z(), c.w(), e.x(), e.y(), e.z(), material.metallic,
                          material.roughness, material.alpha, material.alphaCutoff,
-                         material.doubleSided, material.baseColourTexture);
+                         material.doubleSided,
+                         isTextured ? equalTextures[static_cast<std::size_t>(texture)] : ~0u);
 }
 
 std::vector<std::uint32_t> collectMeshesWithTriangles(const scene::Model& model,
@@ -111,13 +115,28 @@ std::optional<TrsTransform> decomposeTrs(const Eigen::Affine3d& transform) {
   return TrsTransform{transform.translation(), Eigen::Quaterniond(axes).normalized(), scale};
 }
 
+std::vector<std::uint32_t> findEqualTextures(const scene::Model& model) {
+  std::vector<std::uint32_t> equal;
+  for (std::uint32_t i = 0; i < model.textures.size(); ++i) {
+    const scene::Texture& texture = model.textures[i];
+    equal.push_back(i);
+    for (std::uint32_t earlier = 0; earlier < i && equal[i] == i; ++earlier) {
+      const scene::Texture& other = model.textures[earlier];
+      if (equal[earlier] == earlier && other.width == texture.width && other.rgba == texture.rgba)
+        equal[i] = earlier;
+    }
+  }
+  return equal;
+}
+
 std::vector<std::uint32_t> findEqualMaterials(const scene::Model& model) {
   const scene::Material none;
-  std::map<decltype(makeAppearanceKey(none)), std::uint32_t> first;
+  const std::vector<std::uint32_t> equalTextures = findEqualTextures(model);
+  std::map<decltype(makeAppearanceKey(none, equalTextures)), std::uint32_t> first;
   std::vector<std::uint32_t> equal;
   for (std::uint32_t i = 0; i <= model.materials.size(); ++i) {
     const scene::Material& material = i < model.materials.size() ? model.materials[i] : none;
-    equal.push_back(first.try_emplace(makeAppearanceKey(material), i).first->second);
+    equal.push_back(first.try_emplace(makeAppearanceKey(material, equalTextures), i).first->second);
   }
   return equal;
 }

@@ -62,6 +62,9 @@ struct DrawGroups {
   std::vector<std::uint32_t> bodies;     ///< indices into Model::bodies, without triggers
 };
 
+/// For each texture the first one with the same pixels.
+std::vector<std::uint32_t> findEqualTextures(const scene::Model& model);
+
 /// For each material the first one that looks the same; names may differ. One more entry at the end
 /// is that of meshes without a material.
 std::vector<std::uint32_t> findEqualMaterials(const scene::Model& model);

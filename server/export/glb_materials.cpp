@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "render/image/encode.hpp"
+#include "server/export/draw_groups.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -62,6 +63,9 @@ EncodedTexture encodeTexture(const scene::Texture& texture) {
 
 }  // namespace
 
+GlbMaterials::GlbMaterials(const scene::Model& model, GlbFile& file)
+    : model_(model), file_(file), equalTextures_(findEqualTextures(model)) {}
+
 const scene::Material& GlbMaterials::find(std::uint32_t material) const {
   static const scene::Material none;
   return material < model_.materials.size() ? model_.materials[material] : none;
@@ -78,7 +82,8 @@ std::size_t GlbMaterials::add(std::uint32_t material) {
   GlbJson json = makeMaterialJson(find(material));
   if (isTextured(material)) {
     const auto texture = static_cast<std::size_t>(find(material).baseColourTexture);
-    json["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", addTexture(texture)}};
+    json["pbrMetallicRoughness"]["baseColorTexture"] = {
+        {"index", addTexture(equalTextures_[texture])}};
   }
   return materials_[material] = file_.add("materials", std::move(json));
 }

@@ -10,7 +10,7 @@ namespace enfilade::server {
 
 class GlbMaterials {
  public:
-  GlbMaterials(const scene::Model& model, GlbFile& file) : model_(model), file_(file) {}
+  GlbMaterials(const scene::Model& model, GlbFile& file);
 
   /// Whether primitives of this material need texture coordinates. `material`: an index into
   /// Model::materials; from its end on, the default material.
@@ -24,6 +24,7 @@ class GlbMaterials {
 
   const scene::Model& model_;
   GlbFile& file_;
+  const std::vector<std::uint32_t> equalTextures_;
   std::map<std::uint32_t, std::size_t> materials_;  ///< index in the file by index in the model
   std::map<std::size_t, std::size_t> textures_;     ///< the same
 };

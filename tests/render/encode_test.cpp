@@ -80,6 +80,16 @@ TEST(EncodePng, GreyIsReadAsEqualColours) {
   for (std::size_t i = 0; i < 18; ++i) EXPECT_EQ(back.rgb[i], values[i / 3]);
 }
 
+TEST(EncodePng, AlphaIsStoredAsItIs) {
+  const std::vector<std::uint8_t> values{10, 20, 30, 255, 40, 50, 60, 0};
+  const Bytes png = encodePng(Raster<std::uint8_t>{2, 1, 4, values});
+  EXPECT_EQ(png.at(25), PNG_COLOR_TYPE_RGB_ALPHA) << "PNG, 11.2.2: the colour type";
+  const Image back = decodePng(png);
+  ASSERT_EQ(back.rgb.size(), 6U);
+  EXPECT_EQ(back.rgb[1], 20);
+  EXPECT_THROW(encodeJpeg({2, 1, 4, values}, 90), std::runtime_error) << "JPEG has no alpha";
+}
+
 TEST(Encode, ValuesThatDoNotFillThePictureAreRefused) {
   const std::vector<std::uint8_t> bytes(12);
   const std::vector<std::uint16_t> words(12);

@@ -127,11 +127,11 @@ TEST(Listening, APublicAddressRequiresATokenAndInsecure) {
   Access access;
   EXPECT_THROW(Server(smallRoom(), everywhere), ServerError);
   access.insecure = true;
-  EXPECT_THROW(Server(smallRoom(), everywhere, {{}, {}, access, {}}), ServerError);
+  EXPECT_THROW(Server(smallRoom(), everywhere, {{}, {}, access, {}, {}}), ServerError);
   access = threeTokens();
-  EXPECT_THROW(Server(smallRoom(), everywhere, {{}, {}, access, {}}), ServerError);
+  EXPECT_THROW(Server(smallRoom(), everywhere, {{}, {}, access, {}, {}}), ServerError);
   access.insecure = true;
-  EXPECT_GT(Server(smallRoom(), everywhere, {{}, {}, access, {}}).port(), 0);
+  EXPECT_GT(Server(smallRoom(), everywhere, {{}, {}, access, {}, {}}).port(), 0);
 }
 
 }  // namespace

@@ -211,6 +211,22 @@ TEST(SceneGlb, TexturesAndTransparencyAreKept) {
   EXPECT_EQ(uvs[17], 0) << "a mesh without coordinates shows the first texel";
 }
 
+TEST(SceneGlb, EqualTexturesAreStoredOnce) {
+  Model model = boxes(3);
+  model.textures.assign(3, {"", 1, 1, {1, 2, 3, 255}});
+  model.textures[2].rgba[0] = 9;
+  model.materials.resize(4);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    model.materials[i].baseColourTexture = static_cast<std::int32_t>(i);
+    model.meshes[i].material = i;
+  }
+  EXPECT_EQ(findEqualTextures(model), (std::vector<std::uint32_t>{0, 0, 2}));
+  EXPECT_EQ(findEqualMaterials(model), (std::vector<std::uint32_t>{0, 0, 2, 3, 3}));
+  const SceneGlb glb = writeSceneGlb(Scene(model));
+  EXPECT_EQ(glb.drawGroups, 2u);
+  EXPECT_EQ(GlbReader(glb.bytes).json.at("images").size(), 2u);
+}
+
 TEST(SceneGlb, NormalsAreUnitVectorsAfterScalingAndWithoutADirection) {
   Model model = boxes(1);
   model.meshes[0].normals.assign(8, Eigen::Vector3f(0.6f, 0.8f, 0));
