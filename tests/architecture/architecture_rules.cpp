@@ -44,6 +44,7 @@ const std::vector<std::string> kRooms{
     "scene/import/assembly",
     "scene/import/worker",
     "scene/import/gltf",
+    "scene/import/scan",
     "scene/import/bodies",
     "scene/import/assimp",
     "scene/import/ifc",
