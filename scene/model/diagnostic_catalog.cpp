@@ -68,7 +68,7 @@ constexpr std::array kCatalog{
     DiagnosticKind{"emissive_texture_ignored", kWarning, "emissive textures are not drawn"},
     DiagnosticKind{
         "missing_texture", kWarning,
-        "the image is missing or of an unread kind: drawn without it; PNG next to the model works"},
+        "missing, or of a kind that is not decoded: drawn without it; put a PNG next to the model"},
     DiagnosticKind{"opacity_zero", kWarning, "the material is invisible; drawn opaque"},
     DiagnosticKind{"reduced_texture", kWarning,
                    "the textures are many or large; drawn at a lower resolution"},

@@ -47,8 +47,7 @@ void GltfBinary::install(nlohmann::json& gltf) {
   gltf["buffers"].push_back(std::move(buffer));
 }
 
-std::string GltfBinary::makeGlb(const nlohmann::json& gltf) const {
-  std::string json = gltf.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+std::string GltfBinary::makeGlb(std::string json) const {
   json.resize((json.size() + 3) / 4 * 4, ' ');
   const std::size_t binary = (bytes_.size() + 3) / 4 * 4;
   const std::size_t size = 12 + 8 + json.size() + 8 + binary;

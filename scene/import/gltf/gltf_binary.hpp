@@ -18,8 +18,8 @@ class GltfBinary {
 
   /// Replaces the file's accessors, views and buffers.
   void install(nlohmann::json& gltf);
-  /// The file with `gltf` as its JSON; "" if it exceeds the four gigabytes of a GLB file.
-  std::string makeGlb(const nlohmann::json& gltf) const;
+  /// The file with this JSON; "" if it exceeds the four gigabytes of a GLB file.
+  std::string makeGlb(std::string json) const;
 
  private:
   std::size_t addAccessor(std::size_t count, int componentType, const char* type,

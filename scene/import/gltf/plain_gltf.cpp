@@ -193,10 +193,11 @@ void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGlt
   } catch (const Json::exception& error) {
     buffers.fail(std::string("its JSON is not valid glTF: ") + error.what());
   }
-  to.glb = binary.makeGlb(gltf);
+  // Names that are not UTF-8 would make dump() throw.
+  to.json = gltf.dump(-1, ' ', false, Json::error_handler_t::replace);
+  to.glb = binary.makeGlb(to.json);
   if (to.glb.empty())
     throw ImportError(file.string() + ": its meshes exceed 4 GiB when decoded; split it (open)");
-  to.json = gltf.dump(-1, ' ', false, Json::error_handler_t::replace);
   to.dependencies = buffers.dependencies();
 }
 

@@ -42,8 +42,12 @@ bool isEar(const std::vector<std::uint32_t>& left, std::size_t tip, std::span<co
 void triangulatePolygon(std::span<const std::uint32_t> corners, std::span<const Vec3> positions,
                         std::vector<std::uint32_t>& triangles) {
   if (corners.size() < 3) return;
+  if (corners.size() == 3) {
+    triangles.insert(triangles.end(), corners.begin(), corners.end());
+    return;
+  }
   std::vector<std::uint32_t> left(corners.begin(), corners.end());
-  const Vec3 normal = left.size() > 3 ? computeNewellNormal(corners, positions) : Vec3::Zero();
+  const Vec3 normal = computeNewellNormal(corners, positions);
   while (left.size() > 3) {
     std::size_t tip = 1;
     for (std::size_t i = 1; i <= left.size(); ++i) {
