@@ -7,8 +7,9 @@
 #include <fstream>
 #include <string_view>
 
+#include "scene/import/file/ascii.hpp"
 #include "scene/import/file/import_options.hpp"
-#include "scene/import/gltf/gltf_metadata.hpp"
+#include "scene/import/file/zip_archive.hpp"
 #include "scene/import/ifc/ifc_units.hpp"
 
 namespace enfilade::scene {
@@ -70,9 +71,20 @@ void rejectGlb(const std::filesystem::path& file) {
 
 // ---- COLLADA ------------------------------------------------------------------------------------
 
+constexpr std::size_t kMaxColladaBytes = std::size_t{2} << 30;  // of the document in an archive
+
+bool isZippedCollada(const std::filesystem::path& file) {
+  return toLowerCase(file.extension().string()) == ".zae";
+}
+
+std::string readColladaText(const std::filesystem::path& file, std::size_t limit) {
+  if (!isZippedCollada(file)) return readStart(file, limit);
+  return readOnlyZipMember(file, ".dae", kMaxColladaBytes).substr(0, limit);
+}
+
 FileMetadata readColladaMetadata(const std::filesystem::path& file) {
   // The <asset> of the whole document comes before all libraries.
-  const std::string start = readStart(file, 1 << 20);
+  const std::string start = readColladaText(file, 1 << 20);
   const std::size_t begin = start.find("<asset");
   const std::size_t end = begin == std::string::npos ? begin : start.find("</asset>", begin);
   const std::string asset =
@@ -169,11 +181,9 @@ FileMetadata readFileMetadata(const std::filesystem::path& file, ModelFormat for
   switch (format) {
     case ModelFormat::gltf:
       rejectGlb(file);
-      metadata.triangles = countGltfTriangles(file, format);
       break;
     case ModelFormat::glb:
       requireWholeGlb(file);
-      metadata.triangles = countGltfTriangles(file, format);
       break;
     case ModelFormat::obj:
       metadata.problems.push_back({"no_unit", 1, "OBJ has no unit: taken for metres"});
@@ -183,6 +193,8 @@ FileMetadata readFileMetadata(const std::filesystem::path& file, ModelFormat for
     case ModelFormat::fbx:
       return readFbxMetadata(file);
     case ModelFormat::ifc:
+    case ModelFormat::ply:
+    case ModelFormat::stl:
       break;
   }
   return metadata;
@@ -199,7 +211,7 @@ FileMetadata readIfcFileMetadata(const std::string& text) {
 }
 
 std::string repairCollada(const std::filesystem::path& file, FileMetadata& metadata) {
-  const std::string text = readStart(file, std::string::npos);
+  const std::string text = readColladaText(file, std::string::npos);
   std::string repaired;
   std::size_t begin = 0, count = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {

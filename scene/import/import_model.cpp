@@ -9,6 +9,7 @@
 #include <cstring>
 #include <limits>
 
+#include "scene/import/file/ascii.hpp"
 #include "scene/import/file/model_format.hpp"
 #include "scene/import/worker/model_stream.hpp"
 #include "scene/import/worker/process.hpp"
@@ -44,6 +45,9 @@ void validateReadable(const fs::path& file) {
   }
   if (!fs::is_regular_file(status)) throw ImportError(name + ": is not a regular file (open)");
   const std::string extension = file.extension().string();
+  if (toLowerCase(extension) == ".ifcxml") {
+    throw ImportError(name + ": IFC in XML is not read; export it as .ifc, the STEP form (open)");
+  }
   if (!detectModelFormat(file)) {
     throw ImportError(name + ": unknown extension '" + extension +
                       "'; supported: " + listExtensions() + " (open)");

@@ -21,8 +21,10 @@
 #include "scene/import/assimp/convert_scene.hpp"
 #include "scene/import/assimp/obj_text.hpp"
 #include "scene/import/file_metadata.hpp"
+#include "scene/import/gltf/plain_gltf.hpp"
 #include "scene/import/ifc/ifc_plus_plus.hpp"
 #include "scene/import/ifc/import_ifc.hpp"
+#include "scene/import/scan/import_scan.hpp"
 #include "scene/import/worker/model_stream.hpp"
 #include "scene/import/worker/process.hpp"
 
@@ -133,12 +135,26 @@ std::string readDescriptor(int descriptor) {
                     "(parse)");
 }
 
+/// Passes a glTF file through the pre-pass. assimp recognises GLB files by their extension.
+std::vector<std::string> prepareGltf(ConvertInput& input, AssimpInput& file) {
+  PlainGltf plain = makePlainGltf(input.file, input.format);
+  input.metadata.triangles = plain.triangles;
+  std::vector<Diagnostic>& problems = input.metadata.problems;
+  problems.insert(problems.end(), plain.problems.begin(), plain.problems.end());
+  input.gltfJson = std::move(plain.json);
+  if (plain.glb.empty()) return {};
+  file.text = std::move(plain.glb);
+  if (input.format == ModelFormat::gltf) file.file += ".glb";
+  return plain.dependencies;
+}
+
 Model importByAssimp(const ImportRequest& request) {
   ConvertInput input;
   input.file = request.file;
   input.format = detectModelFormat(request.file).value();  // checked by the parent
   input.options = request.options;
   AssimpInput file{request.file, "", request.task == ImportTask::assimp};
+  std::vector<std::string> dependencies;
   if (file.isIfc) {
     file.text = readDescriptor(kIfcFile);
     input.metadata = readIfcFileMetadata(file.text);
@@ -146,22 +162,38 @@ Model importByAssimp(const ImportRequest& request) {
     input.metadata = readFileMetadata(request.file, input.format);
     if (input.format == ModelFormat::collada)
       file.text = repairCollada(request.file, input.metadata);
+    // assimp unzips .zae by itself; a repaired document is no longer in its archive.
+    if (!file.text.empty() && input.format == ModelFormat::collada) file.file += ".dae";
     if (input.format == ModelFormat::obj) {
       const double unit = request.options.metresPerUnit.value_or(input.metadata.metresPerUnit);
       RebasedText rebased = rebaseObj(request.file, kMaxPreciseDistance / unit);
       file.text = std::move(rebased.text);
       input.shift = rebased.shift;
     }
+    if (input.format == ModelFormat::gltf || input.format == ModelFormat::glb)
+      dependencies = prepareGltf(input, file);
   }
   sendProgress("parse", 0);
   const AssimpOutput read = readWithAssimp(file);
   if (read.scene == nullptr) throwReadFailure(input, read.failure);
   Model model = convertScene(*read.scene, read.materials, input, sendProgress);
   reportMissingMaterials(read.dependencies, model.diagnostics);
-  model.dependencies.insert(model.dependencies.end(), read.dependencies.begin(),
-                            read.dependencies.end());
+  dependencies.insert(dependencies.end(), read.dependencies.begin(), read.dependencies.end());
+  model.dependencies.insert(model.dependencies.end(), dependencies.begin(), dependencies.end());
   model.dependencies.push_back(read.library);
   return model;
+}
+
+Model importByFormat(const ImportRequest& request) {
+  switch (const ModelFormat format = detectModelFormat(request.file).value(); format) {
+    case ModelFormat::ifc:
+      return importIfc(request, sendProgress);
+    case ModelFormat::ply:
+    case ModelFormat::stl:
+      return importScan(request.file, format, request.options, sendProgress);
+    default:
+      return importByAssimp(request);
+  }
 }
 
 void sendModel(const Model& model) {
@@ -195,10 +227,7 @@ void runTask(const ImportRequest& request) {
   injectFault(request.task);
   switch (request.task) {
     case ImportTask::model:
-      if (detectModelFormat(request.file) == ModelFormat::ifc) {
-        return sendModel(importIfc(request, sendProgress));
-      }
-      return sendModel(importByAssimp(request));
+      return sendModel(importByFormat(request));
     case ImportTask::assimp:
       return sendModel(importByAssimp(request));
     case ImportTask::webIfc:

@@ -128,7 +128,7 @@ void addAccess(CLI::App& verb, CommandArguments& into) {
 
 void addModel(CLI::App& verb, ModelArguments& into) {
   setGroup(verb, "Model");
-  verb.add_option("SCENE", into.file, "Model file: glTF, GLB, OBJ, COLLADA, FBX, IFC or IFCZIP")
+  verb.add_option("SCENE", into.file, "Model file: glTF, GLB, OBJ, COLLADA, FBX, IFC, PLY or STL")
       ->required();
   verb.add_option("--unit", into.unit, "Unit of the file: m, mm, cm, ft, in or a number of metres")
       ->check(CLI::Validator(validateUnit, "UNIT"));

@@ -44,6 +44,7 @@ const std::vector<std::string> kRooms{
     "scene/import/assembly",
     "scene/import/worker",
     "scene/import/gltf",
+    "scene/import/scan",
     "scene/import/bodies",
     "scene/import/assimp",
     "scene/import/ifc",
@@ -229,9 +230,11 @@ bool skippedFolder(const std::string& name) {
 }
 
 bool writtenByPeople(const std::filesystem::path& file) {
-  static const Names endings{".cpp", ".hpp",  ".inc",   ".proto", ".txt", ".cmake",
-                             ".md",  ".json", ".jsonl", ".py",    ".js"};
+  static const Names endings{".cpp",  ".hpp",   ".inc", ".proto", ".txt", ".cmake", ".md",
+                             ".json", ".jsonl", ".py",  ".js",    ".mjs", ".ts"};
   static const Names names{"dev", "run", ".gitignore", ".clang-format"};
+  if (file.filename() == "package-lock.json" || file.parent_path().filename() == "generated")
+    return false;
   return endings.count(file.extension().string()) != 0 ||
          names.count(file.filename().string()) != 0;
 }

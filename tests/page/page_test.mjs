@@ -424,7 +424,7 @@ async function testReplay(record) {
     });
     assert.deepEqual(drawn, again);
   });
-  await run("play marks events, and take over goes on from there", async () => {
+  await run("play marks events, and take over continues from there", async () => {
     await page.getByRole("combobox", { name: "Speed" }).selectOption("4");
     await page.getByRole("slider").fill("1");
     await page.getByRole("button", { name: "Play" }).click();

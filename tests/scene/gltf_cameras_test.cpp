@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -173,6 +174,22 @@ TEST(GltfCamera, BrokenFilesAreErrors) {
   beyond.json()["accessors"][1]["count"] = 2;
   beyond.json()["bufferViews"][1]["byteOffset"] = 1000;
   EXPECT_THROW(beyond.sample(1), ImportError);
+}
+
+TEST(GltfCamera, SparseKeysReplaceTheirBase) {
+  GltfFile file;
+  file.animate(1, "translation", "LINEAR", {0, 1}, {0, 0, 0, 9, 9, 9});
+  const std::size_t keys = file.json()["accessors"].size() - 1;
+  file.add({std::bit_cast<float>(1u)}, "SCALAR", 1);  // the second key
+  file.add({4, 5, 6}, "VEC3", 1);
+  const std::size_t views = file.json()["bufferViews"].size();
+  file.json()["accessors"][keys]["sparse"] = {
+      {"count", 1},
+      {"indices", {{"bufferView", views - 2}, {"componentType", 5125}}},
+      {"values", {{"bufferView", views - 1}}}};
+  const GltfCameraPath path = file.sample(1);
+  EXPECT_EQ(path.poses.at(0).eye, Vec3(10, 0, 0));
+  EXPECT_EQ(path.poses.at(1).eye, Vec3(14, 5, 6));
 }
 
 TEST(GltfCamera, AbsurdStridesAndRatesAreErrors) {

@@ -41,12 +41,13 @@ class TrackingIoSystem : public Assimp::DefaultIOSystem {
       : input_(input), dependencies_(dependencies) {}
 
   bool Exists(const char* file) const override {
+    if (isSubstituted(file)) return true;
     dependencies_.emplace_back(file);
     return DefaultIOSystem::Exists(file) || !findPercentDecoded(file).empty();
   }
   Assimp::IOStream* Open(const char* file, const char* mode) override {
-    dependencies_.emplace_back(file);
-    if (input_.text.empty() || file != input_.file) {
+    if (!isSubstituted(file)) {
+      dependencies_.emplace_back(file);
       const std::string other = findPercentDecoded(file);
       return DefaultIOSystem::Open(other.empty() ? file : other.c_str(), mode);
     }
@@ -56,6 +57,8 @@ class TrackingIoSystem : public Assimp::DefaultIOSystem {
   }
 
  private:
+  bool isSubstituted(const char* file) const { return !input_.text.empty() && file == input_.file; }
+
   /// assimp 5.2.5 does not decode %20 and the like in URIs (RFC 3986). Returns the decoded name if
   /// only a file of that name exists, otherwise "".
   std::string findPercentDecoded(const std::string& file) const {

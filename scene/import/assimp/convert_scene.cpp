@@ -66,7 +66,7 @@ Model convertScene(const aiScene& scene, const std::vector<FileMaterial>& materi
                            computeAssimpFromFile(input.metadata, input.format).inverse();
   worldFromRoot.translate(input.shift);
   const bool gltf = input.format == ModelFormat::gltf || input.format == ModelFormat::glb;
-  const GltfNodes exact = gltf ? readGltfNodes(scene, input.file, input.format) : GltfNodes();
+  const GltfNodes exact = gltf ? readGltfNodes(scene, input.gltfJson) : GltfNodes();
   NodeTransforms transforms;
   std::vector<ImportedNode> importedNodes = collectObjects(
       scene, input.format, worldFromRoot, exact, meshes, model.diagnostics, transforms);
@@ -74,7 +74,7 @@ Model convertScene(const aiScene& scene, const std::vector<FileMaterial>& materi
 
   finishModel(std::move(importedNodes), std::move(meshes), input.file, input.options.offset, model);
   std::set<std::uint32_t> staticObjects;
-  if (gltf) staticObjects = addGltfBodies(input.file, input.format, transforms, model);
+  if (gltf) staticObjects = addGltfBodies(input.file, input.gltfJson, transforms, model);
   if (input.format != ModelFormat::ifc) addNamedBodies(model, staticObjects);
   return model;
 }

@@ -16,6 +16,7 @@ struct ConvertInput {
   ModelFormat format = ModelFormat::gltf;
   FileMetadata metadata;
   ImportOptions options;
+  std::string gltfJson;       ///< of a glTF file, as assimp read it
   Vec3 shift = Vec3::Zero();  ///< subtracted before assimp read the file; file units and axes
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <map>
 
@@ -107,6 +108,13 @@ class TextureTable {
   }
 
   std::optional<Texture> decode(std::span<const std::byte> bytes, const std::string& name) {
+    static constexpr std::string_view kKtx2 = "\xabKTX 20\xbb";
+    if (bytes.size() >= kKtx2.size() &&
+        std::memcmp(bytes.data(), kKtx2.data(), kKtx2.size()) == 0) {
+      addDiagnostic(model_.diagnostics, "missing_texture",
+                    name + ": KTX2 images are not decoded; export PNG, JPEG or WebP");
+      return std::nullopt;
+    }
     auto image = decodeImage(bytes, kMaxTextureSize);
     if (auto* texture = std::get_if<Texture>(&image)) return std::move(*texture);
     addDiagnostic(model_.diagnostics, "unreadable_texture",

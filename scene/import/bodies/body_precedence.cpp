@@ -21,7 +21,8 @@ bool isSameBody(const BodySpec& a, const BodySpec& b) {
   const bool sameAnchor = a.kind != BodyKind::hinged || a.anchor.isApprox(b.anchor, 1e-6);
   return a.kind == b.kind && a.objects == b.objects && sameAnchor &&
          a.axis.isApprox(b.axis, 1e-6) && std::abs(a.low - b.low) < 1e-6 &&
-         std::abs(a.high - b.high) < 1e-6;
+         std::abs(a.high - b.high) < 1e-6 && a.mass == b.mass && a.density == b.density &&
+         a.speed == b.speed && a.keys.size() == b.keys.size();
 }
 
 std::string makeUniqueName(const std::string& wanted, std::set<std::string>& taken) {

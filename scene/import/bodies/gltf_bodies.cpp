@@ -9,7 +9,6 @@
 #include "scene/import/bodies/gltf_tree.hpp"
 #include "scene/import/bodies/sidecar.hpp"
 #include "scene/import/file/import_options.hpp"
-#include "scene/import/gltf/gltf_json.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
@@ -91,9 +90,8 @@ class ExtrasReader {
 
 }  // namespace
 
-std::set<std::uint32_t> addGltfBodies(const std::filesystem::path& file, ModelFormat format,
+std::set<std::uint32_t> addGltfBodies(const std::filesystem::path& file, const std::string& text,
                                       const NodeTransforms& transforms, Model& model) {
-  const std::string text = readGltfJson(file, format);
   const bool says = text.find("walk_") != std::string::npos ||
                     text.find("KHR_physics_rigid_bodies") != std::string::npos;
   if (!says) return {};

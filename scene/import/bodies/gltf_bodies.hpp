@@ -11,9 +11,10 @@
 
 namespace enfilade::scene {
 
-/// Adds the bodies and collision shapes that a glTF file declares for its nodes. Returns the
+/// Adds the bodies and collision shapes that the JSON of a glTF file declares for its nodes;
+/// `file` is for errors. Returns the
 /// objects that it declares static. Throws ImportError.
-std::set<std::uint32_t> addGltfBodies(const std::filesystem::path& file, ModelFormat format,
+std::set<std::uint32_t> addGltfBodies(const std::filesystem::path& file, const std::string& text,
                                       const NodeTransforms& transforms, Model& model);
 
 }  // namespace enfilade::scene

@@ -2,6 +2,7 @@
 
 #include <jpeglib.h>
 #include <png.h>
+#include <webp/decode.h>
 
 #include <algorithm>
 #include <array>
@@ -102,6 +103,26 @@ std::variant<Texture, std::string> decodeJpeg(std::span<const std::byte> bytes,
   return texture;
 }
 
+/// A WebP file: "RIFF", its size, "WEBP".
+bool isWebp(std::span<const std::byte> bytes) {
+  return bytes.size() >= 12 && std::memcmp(bytes.data(), "RIFF", 4) == 0 &&
+         std::memcmp(bytes.data() + 8, "WEBP", 4) == 0;
+}
+
+std::variant<Texture, std::string> decodeWebp(std::span<const std::byte> bytes) {
+  const auto* data = reinterpret_cast<const std::uint8_t*>(bytes.data());
+  int width = 0, height = 0;  // the format allows 16383
+  if (WebPGetInfo(data, bytes.size(), &width, &height) == 0) return std::string("WebP: damaged");
+  Texture texture;
+  texture.width = static_cast<std::uint32_t>(width);
+  texture.height = static_cast<std::uint32_t>(height);
+  texture.rgba.resize(std::size_t{texture.width} * texture.height * 4);
+  if (WebPDecodeRGBAInto(data, bytes.size(), texture.rgba.data(), texture.rgba.size(), width * 4) ==
+      nullptr)
+    return std::string("WebP: damaged or animated");
+  return texture;
+}
+
 }  // namespace
 
 void halveTexture(Texture& texture) {
@@ -131,9 +152,10 @@ std::variant<Texture, std::string> decodeImage(std::span<const std::byte> bytes,
                                                std::uint32_t maxSide) {
   static constexpr std::array<unsigned char, 4> kPng{0x89, 'P', 'N', 'G'};
   static constexpr std::array<unsigned char, 3> kJpeg{0xff, 0xd8, 0xff};
-  std::variant<Texture, std::string> image = std::string("neither PNG nor JPEG");
+  std::variant<Texture, std::string> image = std::string("neither PNG, JPEG nor WebP");
   if (startsWith(bytes, kPng)) image = decodePng(bytes);
   if (startsWith(bytes, kJpeg)) image = decodeJpeg(bytes, maxSide);
+  if (isWebp(bytes)) image = decodeWebp(bytes);
   if (auto* texture = std::get_if<Texture>(&image)) {
     while (std::max(texture->width, texture->height) > std::max(1u, maxSide))
       halveTexture(*texture);

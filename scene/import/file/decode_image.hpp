@@ -1,4 +1,4 @@
-// Decodes PNG and JPEG images.
+// Decodes PNG, JPEG and WebP images.
 #pragma once
 
 #include <cstddef>

@@ -13,7 +13,7 @@
 
 namespace enfilade::scene {
 
-enum class ModelFormat : std::uint8_t { gltf, glb, obj, collada, fbx, ifc };
+enum class ModelFormat : std::uint8_t { gltf, glb, obj, collada, fbx, ifc, ply, stl };
 
 /// Detects the format by the extension, in any case; nullopt for an unknown one.
 std::optional<ModelFormat> detectModelFormat(const std::filesystem::path& file);

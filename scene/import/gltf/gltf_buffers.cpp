@@ -11,18 +11,20 @@
 #include "scene/import/file/import_options.hpp"
 #include "scene/import/file/uri.hpp"
 #include "scene/import/gltf/gltf_json.hpp"
+#include "scene/import/gltf/meshopt_view.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::size_t kMaxBufferBytes = std::size_t{4} << 30;  // per buffer
-constexpr std::size_t kMaxAccessorNumbers = 100'000'000;       // per accessor
+constexpr std::size_t kMaxBufferBytes = std::size_t{4} << 30;     // per buffer
+constexpr std::size_t kMaxAccessorNumbers = 1'000'000'000;        // per accessor
+constexpr std::size_t kMaxExpansion = 256, kFreeBytes = 1 << 20;  // see the header
 constexpr std::size_t kFirstChunkOffset = 12,
                       kChunkHeaderSize = 8;  // bytes; a chunk has length, then type
 
-/// Size in bytes (glTF 2.0, 5.1.3); 0: not a supported component type.
+/// Size in bytes (glTF 2.0, 5.1.3); 0: not a component type.
 std::size_t getComponentSize(std::size_t componentType) {
   switch (componentType) {
     case 5120:
@@ -31,6 +33,7 @@ std::size_t getComponentSize(std::size_t componentType) {
     case 5122:
     case 5123:
       return 2;
+    case 5125:
     case 5126:
       return 4;
     default:
@@ -39,26 +42,29 @@ std::size_t getComponentSize(std::size_t componentType) {
 }
 
 template <class Value>
-double readValue(const char* bytes) {
+double readValue(const char* bytes, bool normalised) {
   Value value{};
   std::memcpy(&value, bytes, sizeof value);
-  if constexpr (std::is_floating_point_v<Value>) return static_cast<double>(value);
-  // Normalised integers: glTF 2.0, 3.6.2.1.2.
-  return std::max(static_cast<double>(value) / std::numeric_limits<Value>::max(), -1.0);
+  if (std::is_floating_point_v<Value> || !normalised) return static_cast<double>(value);
+  // Normalised integers: glTF 2.0, 3.6.2.2.
+  return std::max(
+      static_cast<double>(value) / static_cast<double>(std::numeric_limits<Value>::max()), -1.0);
 }
 
-double readComponent(const char* bytes, std::size_t componentType) {
+double readComponent(const char* bytes, std::size_t componentType, bool normalised) {
   switch (componentType) {
     case 5120:
-      return readValue<std::int8_t>(bytes);
+      return readValue<std::int8_t>(bytes, normalised);
     case 5121:
-      return readValue<std::uint8_t>(bytes);
+      return readValue<std::uint8_t>(bytes, normalised);
     case 5122:
-      return readValue<std::int16_t>(bytes);
+      return readValue<std::int16_t>(bytes, normalised);
     case 5123:
-      return readValue<std::uint16_t>(bytes);
+      return readValue<std::uint16_t>(bytes, normalised);
+    case 5125:
+      return readValue<std::uint32_t>(bytes, normalised);
     default:
-      return readValue<float>(bytes);
+      return readValue<float>(bytes, normalised);
   }
 }
 
@@ -112,13 +118,33 @@ std::string readBinaryChunk(const std::filesystem::path& file) {
   return all.substr(start, word(second));
 }
 
+/// The bytes of a data URI (RFC 2397), in Base64 or percent-encoded.
+std::string decodeDataUri(std::string_view uri) {
+  const std::size_t comma = uri.find(',');
+  if (comma == std::string_view::npos) return "";
+  const std::string_view kind = uri.substr(0, comma), data = uri.substr(comma + 1);
+  return kind.ends_with(";base64") ? decodeBase64(data) : decodePercent(data);
+}
+
 }  // namespace
 
 GltfBuffers::GltfBuffers(std::filesystem::path file, ModelFormat format, const Json& json)
-    : file_(std::move(file)), format_(format), json_(json) {}
+    : file_(std::move(file)), format_(format), json_(json) {
+  std::error_code error;
+  const auto size = std::filesystem::file_size(file_, error);
+  if (!error) loaded_ = static_cast<std::size_t>(size);
+}
 
 void GltfBuffers::fail(const std::string& message) const {
   throw ImportError(file_.string() + ": " + message + "; export the file again (open)");
+}
+
+void GltfBuffers::spend(std::size_t count, std::size_t bytesEach, const std::string& what) {
+  const std::size_t limit = kMaxExpansion * loaded_ + kFreeBytes;
+  if (bytesEach > 0 && count > (limit - std::min(spent_, limit)) / bytesEach)
+    fail(what + " has " + std::to_string(count) + " elements, more than the file's " +
+         std::to_string(loaded_) + " bytes can contain");
+  spent_ += count * bytesEach;
 }
 
 const Json& GltfBuffers::getEntry(const char* list, std::size_t index) const {
@@ -138,14 +164,25 @@ std::size_t GltfBuffers::getInteger(const Json& object, const char* key,
   return found->get<std::size_t>();
 }
 
-std::string GltfBuffers::readBuffer(std::size_t index) const {
+// ---- buffers and views --------------------------------------------------------------------------
+
+std::string GltfBuffers::readBuffer(std::size_t index) {
   const Json& buffer = getEntry("buffers", index);
-  if (!buffer.contains("uri")) return format_ == ModelFormat::glb ? readBinaryChunk(file_) : "";
+  if (!buffer.contains("uri"))  // only the first buffer may be the binary chunk: 4.4.3.3
+    return format_ == ModelFormat::glb && index == 0 ? readBinaryChunk(file_) : "";
   if (!buffer["uri"].is_string()) fail("a buffer's uri is not a string");
   const std::string uri = buffer["uri"].get<std::string>();
-  if (!uri.starts_with("data:")) return readFileBytes(file_.parent_path() / decodePercent(uri), 0);
-  const std::size_t comma = uri.find(',');
-  return comma == std::string::npos ? "" : decodeBase64(std::string_view(uri).substr(comma + 1));
+  if (uri.starts_with("data:")) return decodeDataUri(uri);
+  for (const std::string& name : {uri, decodePercent(uri)}) {
+    const std::filesystem::path path = file_.parent_path() / name;
+    dependencies_.push_back(path.string());
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) continue;
+    std::string bytes = readFileBytes(path, 0);
+    loaded_ += bytes.size();
+    return bytes;
+  }
+  fail("its buffer '" + uri + "' is missing; put it next to the model, or");
 }
 
 const std::string& GltfBuffers::getBuffer(std::size_t index) {
@@ -156,43 +193,147 @@ const std::string& GltfBuffers::getBuffer(std::size_t index) {
   return at->second;
 }
 
-GltfBuffers::Slice GltfBuffers::makeSlice(const Json& accessor, std::size_t elementBytes,
-                                          std::size_t count) {
-  const std::size_t viewIndex = getInteger(accessor, "bufferView", kNoIndex);
-  if (viewIndex == kNoIndex || accessor.contains("sparse"))
-    fail("sparse accessors are not supported in animations");
-  const Json& view = getEntry("bufferViews", viewIndex);
-  Slice slice{&getBuffer(getInteger(view, "buffer", kNoIndex)), 0,
-              getInteger(view, "byteStride", elementBytes)};
-  slice.first = getInteger(view, "byteOffset", 0) + getInteger(accessor, "byteOffset", 0);
-  if (slice.stride < elementBytes) fail("a byteStride is smaller than its elements");
-  const std::size_t last = slice.first + (count - 1) * slice.stride + elementBytes;
-  if (last > slice.bytes->size()) fail("an accessor extends beyond its buffer");
-  return slice;
+std::string_view GltfBuffers::sliceBuffer(const Json& place, const std::string& name) {
+  const std::string& bytes = getBuffer(getInteger(place, "buffer", kNoIndex));
+  const std::size_t first = getInteger(place, "byteOffset", 0);
+  // Without a byteLength, which glTF requires, the rest of the buffer.
+  const std::size_t rest = bytes.size() - std::min(first, bytes.size());
+  const std::size_t size = getInteger(place, "byteLength", rest);
+  if (first > bytes.size() || size > rest)
+    fail(name + " extends beyond its buffer of " + std::to_string(bytes.size()) + " bytes");
+  return std::string_view(bytes).substr(first, size);
 }
 
-std::vector<double> GltfBuffers::readNumbers(std::size_t accessorIndex, std::size_t perElement) {
-  static constexpr std::array<const char*, 5> kTypes{"", "SCALAR", "VEC2", "VEC3", "VEC4"};
-  const Json& accessor = getEntry("accessors", accessorIndex);
-  const std::size_t type = getInteger(accessor, "componentType", 0);
-  const std::size_t count = getInteger(accessor, "count", 0);
-  const auto name = accessor.find("type");
-  if (name == accessor.end() || *name != kTypes.at(perElement) || getComponentSize(type) == 0)
-    fail("accessors[" + std::to_string(accessorIndex) + "] is not of type " +
-         kTypes.at(perElement) + " of floats");
-  if (count == 0 || count > kMaxAccessorNumbers / perElement)
-    fail("accessors[" + std::to_string(accessorIndex) + "] has " + std::to_string(count) +
-         " elements");
-  const Slice slice = makeSlice(accessor, perElement * getComponentSize(type), count);
-  std::vector<double> values;
-  values.reserve(count * perElement);
+std::string GltfBuffers::decodeView(const Json& compressed, const std::string& name) {
+  MeshoptView view;
+  view.count = getInteger(compressed, "count", 0);
+  view.stride = getInteger(compressed, "byteStride", 0);
+  view.mode = compressed.value("mode", Json()).is_string() ? compressed["mode"] : "";
+  view.filter = compressed.value("filter", Json("NONE")).is_string()
+                    ? compressed.value("filter", "NONE")
+                    : std::string();
+  view.source = sliceBuffer(compressed, name);
+  spend(view.count, view.stride, name);
+  std::string bytes;
+  if (const std::string fault = decodeMeshoptView(view, bytes); !fault.empty())
+    fail(name + ": " + fault);
+  return bytes;
+}
+
+std::string_view GltfBuffers::getView(std::size_t index) {
+  const std::string name = "bufferViews[" + std::to_string(index) + "]";
+  const Json& view = getEntry("bufferViews", index);
+  const Json* compressed = findMeshoptExtension(view);
+  if (compressed == nullptr) return sliceBuffer(view, name);
+  const auto known = decodedViews_.find(index);
+  if (known != decodedViews_.end()) return known->second;
+  return decodedViews_.emplace(index, decodeView(*compressed, name)).first->second;
+}
+
+// ---- accessors ----------------------------------------------------------------------------------
+
+void GltfBuffers::copyElements(std::size_t view, std::size_t offset, std::size_t elementBytes,
+                               std::size_t count, const std::string& name, std::string& to) {
+  const std::string_view from = getView(view);
+  const std::size_t stride = getInteger(getEntry("bufferViews", view), "byteStride", elementBytes);
+  if (stride < elementBytes) fail(name + ": a byteStride is smaller than its elements");
+  const bool inside = offset <= from.size() && from.size() - offset >= elementBytes &&
+                      (count - 1) <= (from.size() - offset - elementBytes) / stride;
+  if (!inside) fail(name + " extends beyond its buffer view");
+  spend(count, elementBytes, name);
+  to.resize(count * elementBytes);
+  for (std::size_t i = 0; i < count; ++i)
+    std::memcpy(to.data() + i * elementBytes, from.data() + offset + i * stride, elementBytes);
+}
+
+void GltfBuffers::applySparse(const Json& sparse, const std::string& name, GltfElements& to) {
+  const Json* indices = findMember(&sparse, "indices");
+  const Json* values = findMember(&sparse, "values");
+  if (indices == nullptr || values == nullptr || !indices->is_object() || !values->is_object())
+    fail(name + ": its sparse values are incomplete");
+  const std::size_t count = getInteger(sparse, "count", 0);
+  const std::size_t type = getInteger(*indices, "componentType", 0);
+  if (type != 5121 && type != 5123 && type != 5125)
+    fail(name + ": its sparse indices are not unsigned integers");
+  if (count == 0) return;
+  const std::size_t indexBytes = getComponentSize(type);
+  const std::size_t elementBytes = to.width * getComponentSize(to.componentType);
+  std::string places, replacements;
+  copyElements(getInteger(*indices, "bufferView", kNoIndex), getInteger(*indices, "byteOffset", 0),
+               indexBytes, count, name, places);
+  copyElements(getInteger(*values, "bufferView", kNoIndex), getInteger(*values, "byteOffset", 0),
+               elementBytes, count, name, replacements);
   for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t k = 0; k < perElement; ++k) {
-      const std::size_t at = slice.first + i * slice.stride + k * getComponentSize(type);
-      values.push_back(readComponent(slice.bytes->data() + at, type));
-      if (!std::isfinite(values.back())) fail("an animation contains a non-finite number");
-    }
+    const auto at =
+        static_cast<std::size_t>(readComponent(places.data() + i * indexBytes, type, false));
+    if (at >= to.count) fail(name + ": a sparse index is out of range");
+    std::memcpy(to.bytes.data() + at * elementBytes, replacements.data() + i * elementBytes,
+                elementBytes);
   }
+}
+
+GltfElements GltfBuffers::readElements(std::size_t index, std::size_t width) {
+  static constexpr std::array<const char*, 5> kTypes{"", "SCALAR", "VEC2", "VEC3", "VEC4"};
+  const std::string name = "accessors[" + std::to_string(index) + "]";
+  const Json& accessor = getEntry("accessors", index);
+  GltfElements elements;
+  elements.width = width;
+  elements.componentType = getInteger(accessor, "componentType", 0);
+  elements.count = getInteger(accessor, "count", 0);
+  elements.normalised = accessor.value("normalized", Json(false)) == true;
+  const auto type = accessor.find("type");
+  const std::size_t componentBytes = getComponentSize(elements.componentType);
+  if (type == accessor.end() || *type != kTypes.at(width) || componentBytes == 0)
+    fail(name + " is not of type " + kTypes.at(width) + " of numbers");
+  if (elements.count == 0 || elements.count > kMaxAccessorNumbers / width)
+    fail(name + " has " + std::to_string(elements.count) + " elements");
+  const std::size_t view = getInteger(accessor, "bufferView", kNoIndex);
+  if (view == kNoIndex) {  // all zero: glTF 2.0, 3.6.2.3
+    spend(elements.count, width * componentBytes, name);
+    elements.bytes.resize(elements.count * width * componentBytes);
+  } else {
+    copyElements(view, getInteger(accessor, "byteOffset", 0), width * componentBytes,
+                 elements.count, name, elements.bytes);
+  }
+  if (const Json* sparse = findMember(&accessor, "sparse")) applySparse(*sparse, name, elements);
+  return elements;
+}
+
+std::vector<double> GltfBuffers::readNumbers(std::size_t accessor, std::size_t perElement) {
+  const GltfElements elements = readElements(accessor, perElement);
+  if (elements.componentType == 5125)
+    fail("accessors[" + std::to_string(accessor) + "] is not of type floats");
+  const std::size_t size = getComponentSize(elements.componentType);
+  std::vector<double> values;
+  values.reserve(elements.bytes.size() / size);
+  for (std::size_t at = 0; at < elements.bytes.size(); at += size) {
+    values.push_back(readComponent(elements.bytes.data() + at, elements.componentType, true));
+    if (!std::isfinite(values.back())) fail("an animation contains a non-finite number");
+  }
+  return values;
+}
+
+std::vector<float> GltfBuffers::readFloats(std::size_t accessor, std::size_t perElement) {
+  const GltfElements elements = readElements(accessor, perElement);
+  const std::size_t size = getComponentSize(elements.componentType);
+  std::vector<float> values;
+  values.reserve(elements.bytes.size() / size);
+  for (std::size_t at = 0; at < elements.bytes.size(); at += size)
+    values.push_back(static_cast<float>(
+        readComponent(elements.bytes.data() + at, elements.componentType, elements.normalised)));
+  return values;
+}
+
+std::vector<std::uint32_t> GltfBuffers::readIndices(std::size_t accessor) {
+  const GltfElements elements = readElements(accessor, 1);
+  const std::size_t type = elements.componentType, size = getComponentSize(type);
+  if (type != 5121 && type != 5123 && type != 5125)
+    fail("accessors[" + std::to_string(accessor) + "] is not of unsigned integers");
+  std::vector<std::uint32_t> values;
+  values.reserve(elements.count);
+  for (std::size_t at = 0; at < elements.bytes.size(); at += size)
+    values.push_back(
+        static_cast<std::uint32_t>(readComponent(elements.bytes.data() + at, type, false)));
   return values;
 }
 

@@ -1,47 +1,14 @@
 #include "scene/import/gltf/gltf_metadata.hpp"
 
 #include <algorithm>
-#include <array>
-#include <nlohmann/json.hpp>
-#include <string>
-#include <string_view>
+#include <optional>
 
-#include "scene/import/file/import_options.hpp"
 #include "scene/import/gltf/gltf_json.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 using Json = nlohmann::json;
-
-/// Parses only the sections needed here and skips the nodes, of which there may be a million.
-Json parseMeshSections(const std::string& text) {
-  const auto wanted = [](int depth, Json::parse_event_t event, Json& value) {
-    if (event != Json::parse_event_t::key || depth != 1) return true;
-    return value == "extensionsRequired" || value == "meshes" || value == "accessors";
-  };
-  return Json::parse(text, wanted, false);
-}
-
-/// Whether the extension is read, or does not affect the meshes.
-bool isSupportedExtension(const std::string& extension) {
-  constexpr std::array<std::string_view, 9> kKnown{
-      "KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_xmp",     "KHR_physics_",
-      "KHR_implicit_",  "EXT_texture_", "EXT_lights_", "MSFT_texture"};
-  return std::any_of(kKnown.begin(), kKnown.end(),
-                     [&](std::string_view start) { return extension.starts_with(start); });
-}
-
-/// Throws for required extensions that are not supported. assimp ignores extensionsRequired and
-/// would deliver wrong or missing meshes.
-void requireKnownExtensions(const Json& gltf, const std::filesystem::path& file) {
-  for (const Json& extension : gltf.value("extensionsRequired", Json::array())) {
-    if (!extension.is_string() || isSupportedExtension(extension.get<std::string>())) continue;
-    throw ImportError(file.string() + ": requires the glTF extension " +
-                      extension.get<std::string>() +
-                      ", which is not supported; export without it (uncompressed meshes) (open)");
-  }
-}
 
 /// Corners of a primitive: its index count, otherwise its vertex count. 0 for invalid JSON.
 std::size_t countCorners(const Json& primitive, const Json& accessors) {
@@ -62,17 +29,16 @@ std::size_t countTriangles(const Json& primitive, const Json& accessors) {
 
 }  // namespace
 
-std::optional<std::size_t> countGltfTriangles(const std::filesystem::path& file,
-                                              ModelFormat format) {
-  const Json gltf = parseMeshSections(readGltfJson(file, format));
-  if (!gltf.is_object()) return std::nullopt;
-  requireKnownExtensions(gltf, file);
-  const Json accessors = gltf.value("accessors", Json::array());
+std::size_t countGltfTriangles(const Json& gltf) {
+  const Json none = Json::array();
+  const auto getList = [&](const Json& object, const char* key) -> const Json& {
+    const Json* list = findMember(&object, key);
+    return list != nullptr && list->is_array() ? *list : none;
+  };
   std::size_t triangles = 0;
-  for (const Json& mesh : gltf.value("meshes", Json::array())) {
-    if (!mesh.is_object()) continue;
-    for (const Json& primitive : mesh.value("primitives", Json::array()))
-      triangles += countTriangles(primitive, accessors);
+  for (const Json& mesh : getList(gltf, "meshes")) {
+    for (const Json& primitive : getList(mesh, "primitives"))
+      triangles += countTriangles(primitive, getList(gltf, "accessors"));
   }
   return triangles;
 }

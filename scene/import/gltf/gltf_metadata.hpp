@@ -1,17 +1,13 @@
-// Reads mesh metadata from the JSON of a glTF file, before assimp reads the file.
+// Counts the triangles that a glTF file declares, before assimp reads it.
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
-#include <optional>
-
-#include "scene/import/file/model_format.hpp"
+#include <nlohmann/json.hpp>
 
 namespace enfilade::scene {
 
-/// Number of triangles by the accessors, each mesh counted once; nullopt for invalid JSON, which
-/// assimp will report. Throws ImportError if the file requires an unsupported extension.
-std::optional<std::size_t> countGltfTriangles(const std::filesystem::path& file,
-                                              ModelFormat format);
+/// Number of triangles by the accessors of the file's meshes, each mesh counted once. Entries that
+/// are invalid count as none: assimp reports them.
+std::size_t countGltfTriangles(const nlohmann::json& gltf);
 
 }  // namespace enfilade::scene

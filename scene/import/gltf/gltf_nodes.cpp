@@ -90,10 +90,9 @@ class NodeMatcher {
 
 }  // namespace
 
-GltfNodes readGltfNodes(const aiScene& scene, const std::filesystem::path& file,
-                        ModelFormat format) {
+GltfNodes readGltfNodes(const aiScene& scene, const std::string& gltfJson) {
   GltfNodes transforms;
-  const Json json = Json::parse(readGltfJson(file, format), nullptr, false);
+  const Json json = Json::parse(gltfJson, nullptr, false);
   if (!json.is_object() || !json.contains("nodes") || !json.contains("scenes")) return transforms;
   if (!json["nodes"].is_array()) return transforms;
   const Json chosen = json.value("scene", Json(0u));

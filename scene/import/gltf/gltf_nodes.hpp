@@ -5,12 +5,11 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
 
-#include "scene/import/file/model_format.hpp"
+#include "collision/types.hpp"
 
 struct aiNode;
 struct aiScene;
@@ -24,9 +23,9 @@ struct GltfNode {
 };
 using GltfNodes = std::map<const aiNode*, GltfNode>;
 
-/// Reads a glTF file's nodes in doubles. Nodes without a matching assimp node are left out.
-GltfNodes readGltfNodes(const aiScene& scene, const std::filesystem::path& file,
-                        ModelFormat format);
+/// Reads the nodes of a glTF file's JSON in doubles. Nodes without a matching assimp node are left
+/// out.
+GltfNodes readGltfNodes(const aiScene& scene, const std::string& gltfJson);
 
 /// The path and world transform of a glTF node.
 struct NodeTransform {

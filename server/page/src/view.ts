@@ -101,7 +101,7 @@ export class View {
   #isRequested = false;
   #last = 0;
   #level = 0; // of QUALITIES, while something moves
-  #stillLevel = 0; // when nothing moves: one slow picture disturbs nobody
+  #stillLevel = 0; // when nothing moves: one slow picture disturbs no one
   #isStill = false;
   #stillTimer = 0;
   #slow = 0; // seconds of slow frames in succession

@@ -1,0 +1,134 @@
+#include "scene/import/file/zip_archive.hpp"
+
+#include <minizip/unzip.h>
+
+#include <fstream>
+#include <memory>
+#include <type_traits>
+#include <vector>
+
+#include "scene/import/file/ascii.hpp"
+#include "scene/import/file/import_options.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr unsigned kReadSize = 1 << 20;  // bytes unpacked at once
+constexpr const char* kDamagedDirectory = "its directory is damaged";
+
+struct CloseArchive {
+  void operator()(unzFile archive) const { unzClose(archive); }
+};
+using Archive = std::unique_ptr<std::remove_pointer_t<unzFile>, CloseArchive>;
+
+bool isWantedName(std::string name, const std::string& extension) {
+  name = toLowerCase(std::move(name));
+  // macOS archivers add a metadata file for each file, with the same extension.
+  return name.ends_with(extension) && name.find("__macosx/") == std::string::npos;
+}
+
+[[noreturn]] void throwDamaged(const fs::path& file, const std::string& reason) {
+  throw ImportError(file.string() + ": cannot be unzipped: " + reason +
+                    "; copy or export it again (unzip)");
+}
+
+[[noreturn]] void throwNoMember(const fs::path& file, const std::string& extension,
+                                std::size_t others) {
+  throw ImportError(file.string() + ": contains no " + extension + " file (" +
+                    std::to_string(others) + " others); zip the " + extension +
+                    " file itself (unzip)");
+}
+
+struct ArchiveMember {
+  std::string name;
+  bool encrypted = false;
+};
+
+/// The archive's current member.
+ArchiveMember readCurrentMember(unzFile archive, const fs::path& file) {
+  unz_file_info64 info{};
+  ArchiveMember member;
+  const auto read = [&] {
+    return unzGetCurrentFileInfo64(archive, &info, member.name.data(), member.name.size(), nullptr,
+                                   0, nullptr, 0) == UNZ_OK;
+  };
+  bool known = read();
+  member.name.resize(info.size_filename);
+  known = known && read();
+  if (!known) throwDamaged(file, kDamagedDirectory);
+  member.encrypted = (info.flag & 1) != 0;  // PKWARE's APPNOTE.TXT, 4.4.4
+  return member;
+}
+
+/// Makes the archive's only file with this extension its current member.
+void seekToOnlyMember(unzFile archive, const fs::path& file, const std::string& extension) {
+  std::string names;
+  std::size_t count = 0, found = 0;
+  bool encrypted = false;
+  unz64_file_pos place{};
+  int code = unzGoToFirstFile(archive);
+  for (; code == UNZ_OK; code = unzGoToNextFile(archive), ++count) {
+    const ArchiveMember member = readCurrentMember(archive, file);
+    if (!isWantedName(member.name, extension)) continue;
+    if (++found <= 5) names += (names.empty() ? "" : ", ") + member.name;
+    encrypted = member.encrypted;
+    if (unzGetFilePos64(archive, &place) != UNZ_OK) throwDamaged(file, kDamagedDirectory);
+  }
+  if (code != UNZ_END_OF_LIST_OF_FILE) throwDamaged(file, kDamagedDirectory);
+  if (found == 0) throwNoMember(file, extension, count);
+  if (found > 1) {
+    throw ImportError(file.string() + ": has " + std::to_string(found) + " " + extension +
+                      " files (" + names + "); unzip it and name one of them (unzip)");
+  }
+  if (encrypted) {
+    throw ImportError(file.string() + ": is encrypted; unzip it with its password (unzip)");
+  }
+  if (unzGoToFilePos64(archive, &place) != UNZ_OK) throwDamaged(file, kDamagedDirectory);
+}
+
+std::string unpack(unzFile archive, const fs::path& file, const std::string& extension,
+                   std::size_t maxBytes) {
+  if (unzOpenCurrentFile(archive) != UNZ_OK) {
+    throwDamaged(file, "its " + extension + " file is damaged or uses an unsupported compression");
+  }
+  std::string text;
+  std::vector<char> chunk(kReadSize);
+  for (;;) {  // bounded by the size limit
+    const int size = unzReadCurrentFile(archive, chunk.data(), kReadSize);
+    if (size < 0) throwDamaged(file, "its " + extension + " file is damaged");
+    if (size == 0) break;
+    text.append(chunk.data(), static_cast<std::size_t>(size));
+    if (text.size() > maxBytes) {
+      throw ImportError(file.string() + ": unpacks to more than the " +
+                        std::to_string(maxBytes >> 20) +
+                        " MiB allowed; unzip it yourself if you trust it, or raise the "
+                        "memory limit (unzip)");
+    }
+  }
+  if (unzCloseCurrentFile(archive) != UNZ_OK)
+    throwDamaged(file, "its " + extension + " file is damaged");
+  return text;
+}
+
+bool isEmptyArchive(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::string start(4, '\0');
+  in.read(start.data(), 4);
+  return start == "PK\5\6";
+}
+
+}  // namespace
+
+std::string readOnlyZipMember(const fs::path& file, const std::string& extension,
+                              std::size_t maxBytes) {
+  // An empty archive starts with its end record; minizip would report it as damaged.
+  if (isEmptyArchive(file)) throwNoMember(file, extension, 0);
+  const Archive archive(unzOpen64(file.c_str()));
+  if (!archive) throwDamaged(file, "it is not a zip archive, or its end is missing");
+  seekToOnlyMember(archive.get(), file, extension);
+  return unpack(archive.get(), file, extension, maxBytes);
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,226 @@
+#include "scene/import/gltf/plain_gltf.hpp"
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "scene/import/file/import_options.hpp"
+#include "scene/import/gltf/gltf_binary.hpp"
+#include "scene/import/gltf/gltf_buffers.hpp"
+#include "scene/import/gltf/gltf_extensions.hpp"
+#include "scene/import/gltf/gltf_instances.hpp"
+#include "scene/import/gltf/gltf_json.hpp"
+#include "scene/import/gltf/gltf_metadata.hpp"
+#include "scene/import/gltf/plain_primitives.hpp"
+#include "scene/import/gltf/texture_mapping.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using Json = nlohmann::json;
+
+/// Texts in the JSON of a file that may need rewriting. Exporters sometimes forget to list an
+/// extension in extensionsUsed, so the whole text is searched.
+constexpr std::array<std::string_view, 9> kRewrittenTexts{"\"EXT_meshopt_compression\"",
+                                                          "\"KHR_meshopt_compression\"",
+                                                          "\"KHR_draco_mesh_compression\"",
+                                                          "\"EXT_mesh_gpu_instancing\"",
+                                                          "\"KHR_texture_basisu\"",
+                                                          "\"EXT_texture_webp\"",
+                                                          "\"KHR_texture_transform\"",
+                                                          "\"sparse\"",
+                                                          "\"EXT_texture_avif\""};
+
+/// Parses only the sections needed here and skips the nodes, of which there may be a million.
+Json parseMeshSections(const std::string& text) {
+  const auto wanted = [](int depth, Json::parse_event_t event, Json& value) {
+    if (event != Json::parse_event_t::key || depth != 1) return true;
+    return value == "asset" || value == "extensionsRequired" || value == "extensionsUsed" ||
+           value == "meshes" || value == "accessors" || value == "buffers" || value == "scenes" ||
+           value == "scene" || value == "materials";
+  };
+  return Json::parse(text, wanted, false);
+}
+
+const Json& getArray(const Json& gltf, const char* key) {
+  static const Json kEmpty = Json::array();
+  const auto found = gltf.find(key);
+  return found != gltf.end() && found->is_array() ? *found : kEmpty;
+}
+
+/// glTF 1.0 has dictionaries where 2.0 has arrays.
+void requireVersion2(const Json& gltf, const std::filesystem::path& file) {
+  const Json* version = findMember(findMember(&gltf, "asset"), "version");
+  const bool isOld = version != nullptr && version->is_string() &&
+                     !version->get_ref<const std::string&>().starts_with("2");
+  const Json* meshes = findMember(&gltf, "meshes");
+  if (!isOld && (meshes == nullptr || !meshes->is_object())) return;
+  throw ImportError(file.string() + ": glTF version " +
+                    (isOld ? version->get<std::string>() : "1.0") +
+                    " cannot be read; export it as glTF 2.0 (open)");
+}
+
+// ---- does the file need rewriting? --------------------------------------------------------------
+
+/// Whether assimp reads this attribute right: floats in a buffer view.
+bool isPlainAttribute(const Json& accessors, const Json& index) {
+  if (!index.is_number_unsigned() || index.get<std::size_t>() >= accessors.size()) return true;
+  const Json& accessor = accessors[index.get<std::size_t>()];
+  return readIndexMember(&accessor, "componentType").value_or(5126) == 5126 &&
+         readIndexMember(&accessor, "bufferView").has_value();
+}
+
+bool isPlainPrimitive(const Json& primitive, const Json& accessors) {
+  const std::size_t mode = readIndexMember(&primitive, "mode").value_or(4);
+  if (mode == 5 || mode == 6) return false;  // strips and fans
+  const Json* attributes = findMember(&primitive, "attributes");
+  if (attributes == nullptr || !attributes->is_object()) return true;
+  return std::all_of(attributes->items().begin(), attributes->items().end(), [&](const auto& item) {
+    const std::string& name = item.key();
+    const bool used = name == "POSITION" || name == "NORMAL" || name.starts_with("TEXCOORD_");
+    return !used || isPlainAttribute(accessors, item.value());
+  });
+}
+
+/// assimp reads data URIs in Base64 only.
+bool isPlainBuffer(const Json& buffer) {
+  const Json* uri = findMember(&buffer, "uri");
+  if (uri == nullptr || !uri->is_string()) return true;
+  const auto& text = uri->get_ref<const std::string&>();
+  return !text.starts_with("data:") || text.substr(0, text.find(',')).ends_with(";base64");
+}
+
+/// The import takes the first set of texture coordinates from assimp.
+bool usesFirstTexCoords(const Json& sections) {
+  for (std::size_t i = 0; i < getArray(sections, "materials").size(); ++i)
+    if (readTextureMapping(sections, i).set != 0) return false;
+  return true;
+}
+
+bool needsRewriting(const std::string& text, const Json& sections) {
+  if (std::any_of(kRewrittenTexts.begin(), kRewrittenTexts.end(),
+                  [&](std::string_view mark) { return text.find(mark) != std::string::npos; }))
+    return true;
+  const Json& buffers = getArray(sections, "buffers");
+  if (!std::all_of(buffers.begin(), buffers.end(), isPlainBuffer)) return true;
+  if (!usesFirstTexCoords(sections)) return true;
+  const Json& accessors = getArray(sections, "accessors");
+  for (const Json& mesh : getArray(sections, "meshes")) {
+    if (!mesh.is_object()) continue;
+    for (const Json& primitive : getArray(mesh, "primitives"))
+      if (!isPlainPrimitive(primitive, accessors)) return true;
+  }
+  return false;
+}
+
+// ---- rewriting ----------------------------------------------------------------------------------
+
+void rewriteMeshes(Json& gltf, GltfBuffers& buffers, GltfBinary& binary,
+                   std::vector<Diagnostic>& problems) {
+  const Json original{{"accessors", getArray(gltf, "accessors")},
+                      {"materials", getArray(gltf, "materials")}};
+  PlainPrimitives primitives(original, buffers, binary, problems);
+  const auto meshes = gltf.find("meshes");
+  if (meshes == gltf.end() || !meshes->is_array()) return;
+  for (std::size_t m = 0; m < meshes->size(); ++m) {
+    Json& mesh = (*meshes)[m];
+    const std::string name = "meshes[" + std::to_string(m) + "]";
+    if (!mesh.is_object() || getArray(mesh, "primitives").empty())
+      buffers.fail(name + " has no primitives");
+    mesh.erase("weights");
+    for (std::size_t p = 0; p < mesh["primitives"].size(); ++p) {
+      Json& primitive = mesh["primitives"][p];
+      const std::string place = name + ".primitives[" + std::to_string(p) + "]";
+      if (!primitive.is_object()) buffers.fail(place + " is not an object");
+      primitives.rewrite(primitive, place);
+    }
+  }
+}
+
+/// Copies images that lie in buffers.
+void rewriteImages(Json& gltf, GltfBuffers& buffers, GltfBinary& binary) {
+  const auto images = gltf.find("images");
+  if (images == gltf.end() || !images->is_array()) return;
+  for (Json& image : *images) {
+    const auto view = readIndexMember(&image, "bufferView");
+    if (!view) continue;
+    const std::string_view bytes = buffers.getView(*view);
+    buffers.spend(bytes.size(), 1, "an image");
+    image["bufferView"] = binary.addView(bytes);
+  }
+}
+
+/// Removes what refers to the old accessors. The import reads neither skins nor animations.
+void removeAnimation(Json& gltf) {
+  for (const char* section : {"animations", "skins", "extensionsRequired"}) gltf.erase(section);
+  const auto nodes = gltf.find("nodes");
+  if (nodes == gltf.end() || !nodes->is_array()) return;
+  for (Json& node : *nodes) {
+    if (!node.is_object()) continue;
+    for (const char* member : {"skin", "weights"}) node.erase(member);
+  }
+}
+
+void removeReadExtensions(Json& gltf) {
+  const auto used = gltf.find("extensionsUsed");
+  if (used == gltf.end() || !used->is_array()) return;
+  Json kept = Json::array();
+  for (const Json& name : *used) {
+    const bool read = name.is_string() &&
+                      std::any_of(kRewrittenTexts.begin(), kRewrittenTexts.end(), [&](auto text) {
+                        return text == "\"" + name.template get<std::string>() + "\"";
+                      });
+    if (!read) kept.push_back(name);
+  }
+  *used = std::move(kept);
+}
+
+void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGltf& to) {
+  const Json original = Json::parse(to.json, nullptr, false);
+  if (!original.is_object()) return;
+  GltfBuffers buffers(file, format, original);
+  GltfBinary binary;
+  Json gltf = original;
+  try {
+    expandInstances(gltf, buffers, to.problems);
+    rewriteMeshes(gltf, buffers, binary, to.problems);
+    rewriteImages(gltf, buffers, binary);
+    removeAnimation(gltf);
+    simplifyTextures(gltf);
+    removeReadExtensions(gltf);
+    binary.install(gltf);
+  } catch (const Json::exception& error) {
+    buffers.fail(std::string("its JSON is not valid glTF: ") + error.what());
+  }
+  // Names that are not UTF-8 would make dump() throw.
+  to.json = gltf.dump(-1, ' ', false, Json::error_handler_t::replace);
+  to.glb = binary.makeGlb(to.json);
+  if (to.glb.empty())
+    throw ImportError(file.string() + ": its meshes exceed 4 GiB when decoded; split it (open)");
+  to.dependencies = buffers.dependencies();
+}
+
+}  // namespace
+
+PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format) {
+  PlainGltf plain;
+  plain.json = readGltfJson(file, format);
+  Json sections = parseMeshSections(plain.json);
+  if (!sections.is_object()) return plain;
+  requireVersion2(sections, file);
+  plain.problems = checkGltfExtensions(sections, file);
+  if (const std::size_t scenes = getArray(sections, "scenes").size(); scenes > 1)
+    plain.problems.push_back({"other_scenes", scenes - 1,
+                              "scene " +
+                                  std::to_string(readIndexMember(&sections, "scene").value_or(0)) +
+                                  " was read, which is the file's default"});
+  if (needsRewriting(plain.json, sections)) {
+    rewriteGltf(file, format, plain);
+    sections = parseMeshSections(plain.json);
+  }
+  plain.triangles = countGltfTriangles(sections);
+  return plain;
+}
+
+}  // namespace enfilade::scene

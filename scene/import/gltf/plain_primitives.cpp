@@ -1,0 +1,163 @@
+#include "scene/import/gltf/plain_primitives.hpp"
+
+#include <array>
+#include <numeric>
+
+#include "scene/import/gltf/gltf_json.hpp"
+#include "scene/model/add_diagnostic.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr const char* kDraco = "KHR_draco_mesh_compression";
+constexpr std::size_t kTriangleMode = 4, kStripMode = 5, kFanMode = 6;  // glTF 2.0, 5.24.4
+/// Bytes of Draco's output that count as one of those that the file must justify: Draco compresses
+/// regular grids far better than other codecs, and draco_mesh.cpp bounds its counts itself.
+constexpr std::size_t kDracoBytesPerByte = 32;
+
+}  // namespace
+
+std::vector<std::uint32_t> unrollTriangles(const std::vector<std::uint32_t>& corners,
+                                           std::size_t mode) {
+  std::vector<std::uint32_t> triangles;
+  if (corners.size() < 3) return triangles;
+  triangles.reserve((corners.size() - 2) * 3);
+  for (std::size_t i = 0; i + 2 < corners.size(); ++i) {
+    const std::size_t odd = i % 2;
+    std::array<std::uint32_t, 3> t{corners[i], corners[i + 1 + odd], corners[i + 2 - odd]};
+    if (mode == kFanMode) t = {corners[i + 1], corners[i + 2], corners[0]};
+    if (mode == kStripMode && (t[0] == t[1] || t[1] == t[2] || t[0] == t[2])) continue;
+    triangles.insert(triangles.end(), t.begin(), t.end());
+  }
+  return triangles;
+}
+
+bool PlainPrimitives::isNormalised(const Json& accessor) const {
+  const Json* accessors = findMember(&gltf_, "accessors");
+  if (accessors == nullptr || !accessor.is_number_unsigned() ||
+      accessor.get<std::size_t>() >= accessors->size())
+    return false;
+  const Json* normalised = findMember(&(*accessors)[accessor.get<std::size_t>()], "normalized");
+  return normalised != nullptr && *normalised == true;
+}
+
+std::size_t PlainPrimitives::countElements(std::size_t accessor) const {
+  return readIndexMember(&gltf_.at("accessors").at(accessor), "count").value_or(0);
+}
+
+PlainPrimitives::Widths PlainPrimitives::listAttributes(const Json& attributes,
+                                                        const TextureMapping& mapping) const {
+  Widths widths{{"POSITION", 3}};
+  if (attributes.contains("NORMAL")) widths["NORMAL"] = 3;
+  const std::string uvs = "TEXCOORD_" + std::to_string(mapping.set);
+  if (attributes.contains(uvs)) widths[uvs] = 2;
+  return widths;
+}
+
+std::size_t PlainPrimitives::writeFloats(std::vector<float> values, std::size_t width,
+                                         const TextureMapping& mapping) {
+  if (width == 2 && !mapping.isIdentity()) mapping.apply(values);
+  return binary_.addFloats(values, width);
+}
+
+std::size_t PlainPrimitives::writeAttribute(std::size_t accessor, std::size_t width,
+                                            const TextureMapping& mapping) {
+  const std::string key =
+      std::to_string(accessor) + (width == 2 ? " uv " + mapping.makeKey() : " vector");
+  const auto known = written_.find(key);
+  if (known != written_.end()) return known->second;
+  return written_[key] = writeFloats(buffers_.readFloats(accessor, width), width, mapping);
+}
+
+const PlainPrimitives::WrittenDraco& PlainPrimitives::writeDraco(const Json& extension,
+                                                                 const Json& attributes,
+                                                                 const Widths& widths,
+                                                                 const TextureMapping& mapping,
+                                                                 const std::string& name) {
+  const std::string key = extension.dump() + mapping.makeKey() + std::to_string(mapping.set);
+  const auto known = writtenDraco_.find(key);
+  if (known != writtenDraco_.end()) return known->second;
+  DracoAttributes wanted;
+  for (const auto& [attribute, width] : widths) {
+    const auto id = readIndexMember(findMember(&extension, "attributes"), attribute.c_str());
+    if (id && *id <= 0xffffffff)
+      wanted[attribute] = {static_cast<std::uint32_t>(*id), width,
+                           isNormalised(attributes.at(attribute))};
+  }
+  if (!wanted.contains("POSITION")) buffers_.fail(name + ": its Draco data has no positions");
+  DracoMesh mesh;
+  const std::string_view bytes =
+      buffers_.getView(readIndexMember(&extension, "bufferView").value_or(kNoIndex));
+  if (const std::string fault = decodeDracoMesh(bytes, wanted, mesh); !fault.empty())
+    buffers_.fail(name + ": " + fault);
+  WrittenDraco& to = writtenDraco_[key];
+  to.vertices = mesh.attributes.at("POSITION").size() / 3;
+  to.indices = binary_.addIndices(mesh.indices);
+  std::size_t floats = mesh.indices.size();
+  for (auto& [attribute, values] : mesh.attributes) {
+    floats += values.size();
+    to.attributes[attribute] = writeFloats(std::move(values), widths.at(attribute), mapping);
+  }
+  buffers_.spend(floats * sizeof(float) / kDracoBytesPerByte, 1, name);
+  return to;
+}
+
+void PlainPrimitives::rewriteIndices(Json& primitive, std::size_t vertices) {
+  const std::size_t mode = readIndexMember(&primitive, "mode").value_or(kTriangleMode);
+  const bool unroll = mode == kStripMode || mode == kFanMode;
+  const auto accessor = readIndexMember(&primitive, "indices");
+  if (!accessor && !unroll) return;
+  const std::string key = (accessor ? std::to_string(*accessor) + " indices "
+                                    : std::to_string(vertices) + " corners ") +
+                          (unroll ? std::to_string(mode) : "");
+  auto known = written_.find(key);
+  if (known == written_.end()) {
+    std::vector<std::uint32_t> indices;
+    if (accessor) {
+      indices = buffers_.readIndices(*accessor);
+    } else {
+      indices.resize(vertices);
+      std::iota(indices.begin(), indices.end(), 0u);
+    }
+    if (unroll) indices = unrollTriangles(indices, mode);
+    // glTF forbids accessors without elements. Its one index makes no triangle.
+    if (indices.empty()) indices.push_back(0);
+    known = written_.emplace(key, binary_.addIndices(indices)).first;
+  }
+  primitive["indices"] = known->second;
+  if (unroll) primitive["mode"] = kTriangleMode;
+}
+
+void PlainPrimitives::rewrite(Json& primitive, const std::string& name) {
+  const Json attributes = primitive.value("attributes", Json::object());
+  const auto positions = readIndexMember(&attributes, "POSITION");
+  if (!positions) buffers_.fail(name + ": has no positions");
+  const TextureMapping mapping =
+      readTextureMapping(gltf_, readIndexMember(&primitive, "material").value_or(kNoIndex));
+  const Widths widths = listAttributes(attributes, mapping);
+  if (attributes.contains("COLOR_0")) addDiagnostic(problems_, "vertex_colours_ignored", name);
+  Json plain = Json::object();
+  std::map<std::string, std::size_t> written;
+  const Json* draco = findMember(findMember(&primitive, "extensions"), kDraco);
+  if (draco != nullptr) {
+    const WrittenDraco& mesh = writeDraco(*draco, attributes, widths, mapping, name);
+    written = mesh.attributes;
+    primitive["indices"] = mesh.indices;
+    primitive["mode"] = kTriangleMode;
+  }
+  for (const auto& [attribute, width] : widths) {
+    if (!written.contains(attribute)) {
+      const auto accessor = readIndexMember(&attributes, attribute.c_str());
+      if (!accessor) buffers_.fail(name + ": its " + attribute + " is not an accessor");
+      written[attribute] = writeAttribute(*accessor, width, mapping);
+    }
+    plain[width == 2 ? "TEXCOORD_0" : attribute] = written[attribute];
+  }
+  if (draco == nullptr) rewriteIndices(primitive, countElements(*positions));
+  primitive["attributes"] = std::move(plain);
+  for (const char* member : {"targets", "extensions"}) primitive.erase(member);
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,30 @@
+// The texture coordinates that a glTF material uses. Private to the import.
+#pragma once
+
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+
+namespace enfilade::scene {
+
+/// Which set of coordinates a base colour texture takes, and its KHR_texture_transform.
+struct TextureMapping {
+  std::size_t set = 0;
+  double offset[2] = {0, 0}, scale[2] = {1, 1}, rotation = 0;  // NOLINT: plain data
+
+  bool isIdentity() const;
+  /// Equal for equal mappings.
+  std::string makeKey() const;
+  /// Transforms pairs of coordinates.
+  void apply(std::span<float> uvs) const;
+};
+
+/// The mapping of the material's base colour texture.
+TextureMapping readTextureMapping(const nlohmann::json& gltf, std::size_t material);
+
+/// Removes the mappings that were applied to the coordinates of all primitives, and gives each
+/// texture without a PNG or JPEG image the image of EXT_texture_webp or KHR_texture_basisu.
+void simplifyTextures(nlohmann::json& gltf);
+
+}  // namespace enfilade::scene

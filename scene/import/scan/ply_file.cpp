@@ -1,0 +1,280 @@
+// Reads the elements in the order of the header: of "vertex" positions, normals and colours, of
+// "face" polygons, of "tristrips" strips that -1 ends. All else is skipped.
+#include "scene/import/scan/ply_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "scene/import/file/import_options.hpp"
+#include "scene/import/scan/ply_header.hpp"
+#include "scene/import/scan/polygon.hpp"
+#include "scene/import/scan/scan_bytes.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr double kMaxPlyCoordinate = 1e9;  // file units; a greater one is invalid, like NaN
+
+[[noreturn]] void failPly(const std::string& message) {
+  throw ImportError("PLY: " + message + "; export it again (open)");
+}
+
+/// Values of a PLY file in any encoding.
+class PlyValues {
+ public:
+  PlyValues(std::string_view body, PlyEncoding encoding)
+      : isText_(encoding == PlyEncoding::ascii),
+        text_(isText_ ? body : std::string_view()),
+        binary_(isText_ ? std::string_view() : body, encoding == PlyEncoding::bigEndian) {}
+
+  double read(PlyType type) { return isText_ ? text_.readNumber() : readBinary(type); }
+  std::size_t remaining() const { return isText_ ? text_.remaining() : binary_.remaining(); }
+  bool failed() const { return isText_ ? text_.failed() : binary_.failed(); }
+  /// Bytes that `count` values take at least.
+  std::size_t computeMinSize(PlyType type, std::size_t count) const {
+    return isText_ ? 2 * count - std::min<std::size_t>(count, 1) : getPlySize(type) * count;
+  }
+
+ private:
+  double readBinary(PlyType type) {
+    switch (type) {
+      case PlyType::int8:
+        return binary_.read<std::int8_t>();
+      case PlyType::uint8:
+        return binary_.read<std::uint8_t>();
+      case PlyType::int16:
+        return binary_.read<std::int16_t>();
+      case PlyType::uint16:
+        return binary_.read<std::uint16_t>();
+      case PlyType::int32:
+        return binary_.read<std::int32_t>();
+      case PlyType::uint32:
+        return binary_.read<std::uint32_t>();
+      case PlyType::float32:
+        return static_cast<double>(binary_.read<float>());
+      case PlyType::float64:
+        return binary_.read<double>();
+    }
+    return 0;
+  }
+
+  bool isText_;
+  TextCursor text_;
+  BinaryCursor binary_;
+};
+
+/// What the import takes from a vertex.
+enum class VertexField : std::uint8_t { x, y, z, nx, ny, nz, red, green, blue, count };
+constexpr std::size_t kVertexFields = static_cast<std::size_t>(VertexField::count);
+using VertexValues = std::array<double, kVertexFields>;
+
+std::size_t findVertexField(const std::string& name) {
+  static constexpr std::array<std::string_view, kVertexFields> kNames{
+      "x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"};
+  if (name.starts_with("diffuse_")) return findVertexField(name.substr(8));
+  return static_cast<std::size_t>(std::find(kNames.begin(), kNames.end(), name) - kNames.begin());
+}
+
+/// The value of a colour channel of this type that is full.
+double getFullColour(PlyType type) {
+  if (type == PlyType::float32 || type == PlyType::float64) return 1;
+  return type == PlyType::uint16 ? 65535 : 255;
+}
+
+class PlyReader {
+ public:
+  explicit PlyReader(std::string_view bytes)
+      : header_(parsePlyHeader(bytes)), values_(bytes.substr(header_.size), header_.encoding) {}
+
+  ScanMesh read() {
+    for (const PlyElement& element : header_.elements) {
+      requirePlausible(element);
+      if (element.name == "vertex") {
+        readVertices(element);
+      } else {
+        readOthers(element);
+      }
+    }
+    if (mesh_.positions.empty()) failPly("contains no vertices");
+    addFaces();
+    finishColour();
+    return std::move(mesh_);
+  }
+
+ private:
+  void requirePlausible(const PlyElement& element) const {
+    const std::size_t each = element.computeMinSize(header_.encoding);
+    if (element.count == 0 || (each > 0 && element.count <= (values_.remaining() + 1) / each))
+      return;
+    failPly("its header announces " + std::to_string(element.count) + " elements '" + element.name +
+            "', but only " + std::to_string(values_.remaining()) + " bytes follow");
+  }
+
+  void requireData(const PlyElement& element, std::size_t index) const {
+    if (values_.failed())
+      failPly("element '" + element.name + "' " + std::to_string(index) +
+              " is cut off or not a number");
+  }
+
+  void readVertices(const PlyElement& element) {
+    std::array<bool, kVertexFields + 1> has{};
+    std::vector<std::size_t> fields;
+    for (const PlyProperty& property : element.properties) {
+      fields.push_back(property.countType ? kVertexFields : findVertexField(property.name));
+      has[fields.back()] = true;
+      if (fields.back() == static_cast<std::size_t>(VertexField::red))
+        fullColour_ = getFullColour(property.type);
+    }
+    if (!has[0] || !has[1] || !has[2]) failPly("its vertices have no x, y and z");
+    hasNormals_ = has[3] && has[4] && has[5];
+    hasColours_ = has[6] && has[7] && has[8];
+    mesh_.positions.reserve(element.count);
+    if (hasNormals_) mesh_.normals.reserve(element.count);
+    for (std::size_t i = 0; i < element.count; ++i) {
+      VertexValues vertex{};
+      for (std::size_t p = 0; p < fields.size(); ++p) {
+        const PlyProperty& property = element.properties[p];
+        if (property.countType) {
+          skipList(property);
+        } else {
+          const double value = values_.read(property.type);
+          if (fields[p] < kVertexFields) vertex[fields[p]] = value;
+        }
+      }
+      requireData(element, i);
+      addVertex(vertex);
+    }
+  }
+
+  void addVertex(const VertexValues& v) {
+    mesh_.positions.emplace_back(v[0], v[1], v[2]);
+    if (hasNormals_) mesh_.normals.push_back(Vec3(v[3], v[4], v[5]).cast<float>());
+    const Vec3 colour(v[6], v[7], v[8]);
+    if (hasColours_ && colour.allFinite()) colourSum_ += colour;
+  }
+
+  /// Reads the length of a list; it is no longer than the bytes that follow.
+  std::size_t readListLength(const PlyProperty& property) {
+    const double length = values_.read(*property.countType);
+    if (!(length >= 0 && length <= 1e9)) failPly("a list has an invalid length");
+    const auto count = static_cast<std::size_t>(length);
+    if (values_.computeMinSize(property.type, count) > values_.remaining())
+      failPly("a list of " + std::to_string(count) + " values extends beyond the file");
+    return count;
+  }
+
+  void skipList(const PlyProperty& property) {
+    for (std::size_t left = readListLength(property); left > 0; --left) values_.read(property.type);
+  }
+
+  void readOthers(const PlyElement& element) {
+    const bool face = element.name == "face", strips = element.name == "tristrips";
+    for (std::size_t i = 0; i < element.count; ++i) {
+      for (const PlyProperty& property : element.properties) {
+        const bool corners = property.name == "vertex_indices" || property.name == "vertex_index";
+        if (!property.countType) {
+          values_.read(property.type);
+        } else if (corners && (face || strips)) {
+          readCorners(property, strips);
+        } else {
+          skipList(property);
+        }
+      }
+      requireData(element, i);
+    }
+  }
+
+  /// Keeps the corners until all vertices are known; the file may list faces first.
+  void readCorners(const PlyProperty& property, bool strip) {
+    const std::size_t count = readListLength(property);
+    if (!strip && count > kMaxPolygonCorners)
+      failPly("a face has " + std::to_string(count) + " corners; at most 1000 are read");
+    std::vector<std::int64_t> run;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double value = values_.read(property.type);
+      run.push_back(std::abs(value) < 1e15 ? static_cast<std::int64_t>(value) : -2);
+    }
+    if (!strip) return addRun(run, false);
+    auto begin = run.begin();
+    while (begin != run.end()) {
+      const auto end = std::find(begin, run.end(), -1);
+      addRun({begin, end}, true);
+      begin = end == run.end() ? end : end + 1;
+    }
+  }
+
+  void addRun(const std::vector<std::int64_t>& run, bool strip) {
+    runs_.push_back({corners_.size(), strip});
+    for (const std::int64_t corner : run) {
+      const bool possible = corner >= 0 && corner < kNoVertex;
+      corners_.push_back(possible ? static_cast<std::uint32_t>(corner) : kNoVertex);
+    }
+  }
+
+  bool isUsable(std::uint32_t corner) const {
+    return corner < mesh_.positions.size() &&
+           mesh_.positions[corner].cwiseAbs().maxCoeff() <= kMaxPlyCoordinate &&
+           mesh_.positions[corner].allFinite();
+  }
+
+  void addFaces() {
+    for (std::size_t i = 0; i < runs_.size(); ++i) {
+      const std::size_t end = i + 1 < runs_.size() ? runs_[i + 1].first : corners_.size();
+      const std::span<const std::uint32_t> run(corners_.data() + runs_[i].first,
+                                               end - runs_[i].first);
+      const bool usable = run.size() >= 3 &&
+                          std::all_of(run.begin(), run.end(), [&](auto c) { return isUsable(c); });
+      if (!usable) {
+        ++mesh_.brokenFaces;
+      } else if (runs_[i].strip) {
+        addStrip(run);
+      } else {
+        triangulatePolygon(run, mesh_.positions, mesh_.indices);
+      }
+    }
+  }
+
+  void addStrip(std::span<const std::uint32_t> run) {
+    for (std::size_t i = 0; i + 2 < run.size(); ++i) {
+      const std::size_t odd = i % 2;
+      const std::array<std::uint32_t, 3> t{run[i], run[i + 1 + odd], run[i + 2 - odd]};
+      if (t[0] == t[1] || t[1] == t[2] || t[0] == t[2]) continue;
+      mesh_.indices.insert(mesh_.indices.end(), t.begin(), t.end());
+    }
+  }
+
+  void finishColour() {
+    if (!hasColours_) return;
+    const Vec3 mean = colourSum_ / (static_cast<double>(mesh_.positions.size()) * fullColour_);
+    mesh_.colour = mean.cwiseMax(0).cwiseMin(1).cast<float>();
+  }
+
+  static constexpr std::uint32_t kNoVertex = 0xffffffff;
+  struct Run {
+    std::size_t first;  ///< index into corners_
+    bool strip;
+  };
+
+  PlyHeader header_;
+  PlyValues values_;
+  ScanMesh mesh_;
+  bool hasNormals_ = false, hasColours_ = false;
+  double fullColour_ = 255;
+  Vec3 colourSum_ = Vec3::Zero();
+  std::vector<std::uint32_t> corners_;
+  std::vector<Run> runs_;
+};
+
+}  // namespace
+
+ScanMesh parsePly(std::string_view bytes) {
+  ScanMesh mesh = PlyReader(bytes).read();
+  if (mesh.indices.empty() && mesh.brokenFaces == 0)
+    throw ImportError(
+        "PLY: a point cloud without faces, which has no surface to walk on; mesh it first, for "
+        "example in MeshLab or CloudCompare (open)");
+  return mesh;
+}
+
+}  // namespace enfilade::scene

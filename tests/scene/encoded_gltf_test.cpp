@@ -1,0 +1,334 @@
+// Encodings of one and the same small model give the same triangles as the plain file; damaged ones
+// are errors, and counts that a file cannot justify are refused.
+#include <gtest/gtest.h>
+#include <webp/encode.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "scene/import/import_model.hpp"
+#include "tests/scene/encoded_gltf.hpp"
+#include "tests/scene/import_outcome.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using tests::GltfWriter;
+using tests::Json;
+using tests::TemporaryFolder;
+
+// ---- triangles ----------------------------------------------------------------------------------
+
+using Triangle = std::array<Vec3, 3>;
+
+std::vector<Triangle> listTriangles(const Model& model, const Object& object) {
+  std::vector<Triangle> triangles;
+  for (const std::uint32_t m : object.meshes) {
+    const Mesh& mesh = model.meshes[m];
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3)
+      triangles.push_back({computeWorldPosition(object, mesh, mesh.indices[i]),
+                           computeWorldPosition(object, mesh, mesh.indices[i + 1]),
+                           computeWorldPosition(object, mesh, mesh.indices[i + 2])});
+  }
+  return triangles;
+}
+
+/// The largest distance of corresponding corners; triangles may begin at any corner.
+double computeDifference(const Triangle& a, const Triangle& b) {
+  double best = 1e300;
+  for (std::size_t first = 0; first < 3; ++first) {
+    double worst = 0;
+    for (std::size_t i = 0; i < 3; ++i) worst = std::max(worst, (a[i] - b[(first + i) % 3]).norm());
+    best = std::min(best, worst);
+  }
+  return best;
+}
+
+/// Expects the same triangles with the same winding, in any order.
+void expectSameTriangles(const std::vector<Triangle>& wanted, const std::vector<Triangle>& read,
+                         double tolerance) {
+  ASSERT_EQ(wanted.size(), read.size());
+  for (const Triangle& triangle : wanted) {
+    double nearest = 1e300;
+    for (const Triangle& other : read)
+      nearest = std::min(nearest, computeDifference(triangle, other));
+    EXPECT_LE(nearest, tolerance) << triangle[0].transpose();
+  }
+}
+
+std::vector<Triangle> readPlainTerrace() {
+  const TemporaryFolder folder;
+  const Model model = importModel(folder.write("plain.glb", tests::plainTerrace().glb()));
+  return listTriangles(model, model.objects.at(0));
+}
+
+// ---- one model, many encodings ------------------------------------------------------------------
+
+struct Encoding {
+  const char* name;
+  std::function<GltfWriter()> make;
+  double tolerance;  ///< metres
+};
+
+void PrintTo(const Encoding& encoding, std::ostream* to) {
+  *to << encoding.name;
+}
+
+std::vector<Encoding> listEncodings() {
+  using tests::MeshoptOptions;
+  const auto meshopt = [](MeshoptOptions options) {
+    return [options] { return tests::meshoptTerrace(options); };
+  };
+  return {
+      {"Quantized", [] { return tests::quantizedTerrace(false); }, 1e-9},
+      {"QuantizedNormalised", [] { return tests::quantizedTerrace(true); }, 1e-3},
+      {"Meshopt", meshopt({}), 0},
+      {"MeshoptWithFallback", meshopt({.fallback = true}), 0},
+      {"MeshoptOfKhronos", meshopt({.extension = "KHR_meshopt_compression"}), 0},
+      {"MeshoptIndexSequence", meshopt({.sequence = true}), 0},
+      {"MeshoptExponential", meshopt({.exponential = true}), 1e-4},
+      {"Draco", [] { return tests::dracoTerrace(14, false); }, 7.0 / (1 << 14)},
+      {"DracoSequential", [] { return tests::dracoTerrace(14, true); }, 7.0 / (1 << 14)},
+      {"Sparse", [] { return tests::sparseTerrace(true); }, 0},
+      {"SparseUponZeros", [] { return tests::sparseTerrace(false); }, 0},
+      {"Strip", tests::stripTerrace, 0},
+      {"Fans", tests::fanTerrace, 0},
+  };
+}
+
+class EncodedGltf : public ::testing::TestWithParam<Encoding> {};
+
+TEST_P(EncodedGltf, GivesTheTrianglesOfThePlainFile) {
+  const TemporaryFolder folder;
+  const GltfWriter file = GetParam().make();
+  const Model model = importModel(folder.write("encoded.glb", file.glb()));
+  ASSERT_EQ(model.objects.size(), 1u);
+  EXPECT_EQ(model.objects[0].path, "terrace");
+  EXPECT_TRUE(model.diagnostics.empty()) << model.diagnostics[0].kind;
+  expectSameTriangles(readPlainTerrace(), listTriangles(model, model.objects[0]),
+                      GetParam().tolerance);
+  // The same with the buffer in a file.
+  if (file.needsPlaceholder) return;
+  folder.write("data.bin", file.binary);
+  const Model other = importModel(folder.write("encoded.gltf", file.gltf("data.bin")));
+  expectSameTriangles(readPlainTerrace(), listTriangles(other, other.objects.at(0)),
+                      GetParam().tolerance);
+}
+
+TEST_P(EncodedGltf, DamagedAnywhereLoadsOrIsAnErrorThatNamesTheFile) {
+  const TemporaryFolder folder;
+  const std::string whole = GetParam().make().glb();
+  for (std::size_t at = 20; at < whole.size(); at += 1 + whole.size() / 12) {
+    std::string damaged = whole;
+    damaged[at] = static_cast<char>(~damaged[at]);
+    const std::string text = failureOf(folder.write("damaged.glb", damaged));
+    EXPECT_TRUE(text.empty() || text.find("damaged.glb") != std::string::npos) << text;
+  }
+  EXPECT_NE(failureOf(folder.write("cut.glb", whole.substr(0, whole.size() * 2 / 3))), "");
+}
+
+std::string nameEncoding(const ::testing::TestParamInfo<Encoding>& encoding) {
+  return encoding.param.name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Terrace, EncodedGltf, ::testing::ValuesIn(listEncodings()), nameEncoding);
+
+// ---- buffers in text and in files ---------------------------------------------------------------
+
+TEST(GltfUris, NamesArePercentEncodedOrRaw) {
+  const TemporaryFolder folder;
+  const GltfWriter file = tests::quantizedTerrace(false);
+  folder.write("my data.bin", file.binary);
+  folder.write("100%25.bin", file.binary);
+  for (const char* uri : {"my%20data.bin", "my data.bin", "100%25.bin"}) {
+    const Model model = importModel(folder.write("a.gltf", file.gltf(uri)));
+    expectSameTriangles(readPlainTerrace(), listTriangles(model, model.objects.at(0)), 1e-9);
+  }
+  const std::string text = failureOf(folder.write("b.gltf", file.gltf("lost.bin")));
+  EXPECT_NE(text.find("'lost.bin' is missing"), std::string::npos) << text;
+}
+
+TEST(GltfUris, DataIsBase64OrPercentEncoded) {
+  const TemporaryFolder folder;
+  const GltfWriter plain = tests::plainTerrace();
+  std::string percent = "data:application/octet-stream,";
+  for (const char c : plain.binary) {
+    static constexpr char kDigits[] = "0123456789abcdef";
+    const auto byte = static_cast<unsigned char>(c);
+    percent += {'%', kDigits[byte >> 4], kDigits[byte & 15]};
+  }
+  for (const GltfWriter& file : {plain, tests::sparseTerrace(true)}) {
+    const std::string base64 = "data:application/octet-stream;base64," + tests::base64(file.binary);
+    const Model model = importModel(folder.write("a.gltf", file.gltf(base64)));
+    expectSameTriangles(readPlainTerrace(), listTriangles(model, model.objects.at(0)), 0);
+  }
+  const Model model = importModel(folder.write("b.gltf", plain.gltf(percent)));
+  expectSameTriangles(readPlainTerrace(), listTriangles(model, model.objects.at(0)), 0);
+}
+
+// ---- instances ----------------------------------------------------------------------------------
+
+TEST(GltfInstances, EachIsAnObjectWhetherTheExtensionIsRequiredOrNot) {
+  const TemporaryFolder folder;
+  GltfWriter nodes = tests::plainTerrace();
+  nodes.json["nodes"] = {
+      {{"name", "a"}, {"mesh", 0}},
+      {{"name", "b"},
+       {"mesh", 0},
+       {"translation", {20, 1, 0}},
+       {"rotation", {0, std::sqrt(0.5), 0, std::sqrt(0.5)}},
+       {"scale", {2, 2, 2}}},
+      {{"name", "c"}, {"mesh", 0}, {"translation", {40, 2, 0}}, {"scale", {1, 3, 1}}}};
+  nodes.json["scenes"][0]["nodes"] = {0, 1, 2};
+  const Model wanted = importModel(folder.write("nodes.glb", nodes.glb()));
+  for (const bool required : {true, false}) {
+    const GltfWriter file = tests::instancedTerrace(required);
+    const Model model = importModel(folder.write("instances.glb", file.glb()));
+    ASSERT_EQ(model.objects.size(), 3u);
+    EXPECT_EQ(model.meshes.size(), 1u);
+    EXPECT_EQ(countOf(model, "instance_attributes_ignored"), 1u);
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(model.objects[i].path, "terrace/terrace[" + std::to_string(i) + "]");
+      expectSameTriangles(listTriangles(wanted, wanted.objects[i]),
+                          listTriangles(model, model.objects[i]), 1e-3);
+    }
+  }
+}
+
+TEST(GltfInstances, TheNodesOwnTransformAndChildrenStay) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::instancedTerrace(true);
+  file.json["nodes"][0]["translation"] = {0, 10, 0};
+  file.json["nodes"][0]["children"] = {1};
+  file.json["nodes"].push_back({{"name", "child"}, {"mesh", 0}});
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  ASSERT_EQ(model.objects.size(), 4u);
+  EXPECT_EQ(model.objects[0].path, "terrace/child");
+  EXPECT_EQ(model.objects[3].worldFromMesh.translation(), Vec3(40, 12, 0));
+}
+
+// ---- what is left out, and what is refused ------------------------------------------------------
+
+TEST(GltfExtensions, WhatIsNotReadIsRefusedOrReported) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  file.use("ACME_bent_meshes", true);
+  const std::string text = failureOf(folder.write("required.glb", file.glb()));
+  EXPECT_NE(text.find("requires the glTF extension ACME_bent_meshes"), std::string::npos) << text;
+  file.json.erase("extensionsRequired");
+  file.use("KHR_materials_sheen", false);
+  const Model model = importModel(folder.write("used.glb", file.glb()));
+  EXPECT_EQ(countOf(model, "ignored_extension"), 1u);
+  EXPECT_EQ(diagnosticText(model, "ignored_extension"), "ACME_bent_meshes");
+}
+
+TEST(GltfExtensions, OtherScenesAreReported) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  file.json["nodes"].push_back({{"name", "second"}, {"mesh", 0}});
+  file.json["scenes"].push_back({{"nodes", {1}}});
+  file.json["scene"] = 1;
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  ASSERT_EQ(model.objects.size(), 1u);
+  EXPECT_EQ(model.objects[0].path, "second");
+  EXPECT_EQ(countOf(model, "other_scenes"), 1u);
+}
+
+TEST(GltfExtensions, GltfOneIsRefusedInWords) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  file.json["asset"]["version"] = "1.0";
+  const std::string text = failureOf(folder.write("old.gltf", file.gltf("a.bin")));
+  EXPECT_NE(text.find("glTF version 1.0 cannot be read; export it as glTF 2.0"), std::string::npos)
+      << text;
+}
+
+TEST(GltfSizes, ACountThatTheFileCannotJustifyIsRefused) {
+  const TemporaryFolder folder;
+  const auto expectRefused = [&](const GltfWriter& file, const std::string& words) {
+    const std::string text = failureOf(folder.write("hostile.glb", file.glb()));
+    EXPECT_NE(text.find(words), std::string::npos) << text;
+  };
+  GltfWriter zeros = tests::sparseTerrace(false);
+  zeros.json["accessors"][0]["count"] = 300'000'000;
+  expectRefused(zeros, "more than the file's");
+  GltfWriter meshopt = tests::meshoptTerrace({});
+  meshopt.json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["count"] = 3'000'000'000u;
+  expectRefused(meshopt, "more than the file's");
+  GltfWriter instances = tests::instancedTerrace(true);
+  instances.json["accessors"].push_back(
+      {{"componentType", 5126}, {"type", "VEC3"}, {"count", 300'000}});
+  instances.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {
+      {"TRANSLATION", 5}};
+  expectRefused(instances, "more than the file's");
+  // Draco's own header: the varint of the triangle count after method, flags and vertex count.
+  GltfWriter draco = tests::dracoTerrace(14, true);
+  draco.binary.replace(11, 5, "\xff\xff\xff\xff\x0f", 5);
+  expectRefused(draco, "Draco header claims 4294967295 triangles");
+}
+
+// ---- textures -----------------------------------------------------------------------------------
+
+/// The terrace with a texture that only `extension` names.
+GltfWriter texturedTerrace(const std::string& extension, const std::string& image,
+                           const std::string& mimeType) {
+  GltfWriter file = tests::plainTerrace();
+  const unsigned view = file.addView(image);
+  const std::vector<float> uvs(tests::Terrace().positions.size() * 2, 0.25f);
+  const unsigned uv = file.addAccessor(static_cast<int>(file.addView(tests::toBytes(uvs))), 5126,
+                                       uvs.size() / 2, "VEC2");
+  Json& primitive = file.json["meshes"][0]["primitives"][0];
+  primitive["attributes"]["TEXCOORD_0"] = uv;
+  primitive["material"] = 0;
+  file.json["images"] = {{{"bufferView", view}, {"mimeType", mimeType}}};
+  file.json["textures"] = {{{"extensions", {{extension, {{"source", 0}}}}}}};
+  file.json["materials"] = {
+      {{"name", "paint"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+  file.use(extension);
+  return file;
+}
+
+std::string makeWebp() {
+  const std::vector<std::uint8_t> pixels(8 * 8 * 4, 255);
+  std::uint8_t* bytes = nullptr;
+  const std::size_t size = WebPEncodeLosslessRGBA(pixels.data(), 8, 8, 32, &bytes);
+  std::string image(reinterpret_cast<const char*>(bytes), size);
+  WebPFree(bytes);
+  return image;
+}
+
+TEST(GltfTextures, WebpIsDecoded) {
+  const TemporaryFolder folder;
+  const GltfWriter file = texturedTerrace("EXT_texture_webp", makeWebp(), "image/webp");
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  ASSERT_EQ(model.textures.size(), 1u);
+  EXPECT_EQ(model.textures[0].width, 8u);
+  EXPECT_EQ(model.materials.at(0).baseColourTexture, 0);
+  EXPECT_TRUE(model.diagnostics.empty()) << model.diagnostics[0].kind;
+  const GltfWriter damaged =
+      texturedTerrace("EXT_texture_webp", makeWebp().substr(0, 24), "image/webp");
+  const Model without = importModel(folder.write("b.glb", damaged.glb()));
+  EXPECT_EQ(countOf(without, "unreadable_texture"), 1u);
+}
+
+TEST(GltfTextures, KtxIsReportedAsMissing) {
+  const TemporaryFolder folder;
+  const GltfWriter file =
+      texturedTerrace("KHR_texture_basisu", "\xabKTX 20\xbb\r\n\x1a\n", "image/ktx2");
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  EXPECT_EQ(model.materials.at(0).baseColourTexture, -1);
+  EXPECT_EQ(countOf(model, "missing_texture"), 1u);
+}
+
+TEST(GltfTextures, TheTransformIsAppliedToCoordinates) {
+  const TemporaryFolder folder;
+  GltfWriter file = texturedTerrace("EXT_texture_webp", makeWebp(), "image/webp");
+  file.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = {
+      {"KHR_texture_transform", {{"offset", {0.5, 0.25}}, {"scale", {2, -1}}}}};
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  ASSERT_FALSE(model.meshes.at(0).uvs.empty());
+  EXPECT_LT((model.meshes[0].uvs[0] - Eigen::Vector2f(1, 0)).norm(), 1e-6);
+}
+
+}  // namespace
+}  // namespace enfilade::scene

@@ -1,0 +1,325 @@
+// PLY, STL and zipped COLLADA: the same triangles in every encoding, errors for damaged files, and
+// the up axis that is guessed.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <functional>
+
+#include "scene/import/import_model.hpp"
+#include "scene/world/data/scene.hpp"
+#include "tests/scene/hand_made_files.hpp"
+#include "tests/scene/import_outcome.hpp"
+#include "tests/scene/stored_zip.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using tests::BoxMesh;
+using tests::TemporaryFolder;
+
+/// Bytes of numbers in either byte order.
+class NumberWriter {
+ public:
+  explicit NumberWriter(bool bigEndian) : bigEndian_(bigEndian) {}
+  template <class Value>
+  NumberWriter& add(Value value) {
+    std::string bytes(reinterpret_cast<const char*>(&value), sizeof value);
+    if (bigEndian_) std::reverse(bytes.begin(), bytes.end());
+    text += bytes;
+    return *this;
+  }
+  std::string text;
+
+ private:
+  bool bigEndian_;
+};
+
+/// A room of 8 x 6 m, 3 m high, z up: its box seen from outside.
+BoxMesh makeRoom() {
+  return BoxMesh({8, 6, 3});
+}
+
+constexpr char kVertexHeader[] =
+    "element vertex 8\nproperty float x\nproperty double y\nproperty float z\n"
+    "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+
+std::string makeTextPly(const BoxMesh& box) {
+  std::string text = "ply\nformat ascii 1.0\ncomment by hand\n" + std::string(kVertexHeader) +
+                     "element face 12\nproperty list uchar int vertex_indices\nend_header\n";
+  for (const auto& p : box.positions)
+    text += std::to_string(p[0]) + " " + std::to_string(p[1]) + " " + std::to_string(p[2]) +
+            " 255 0 0\n";
+  for (std::size_t i = 0; i < box.indices.size(); i += 3)
+    text += "3 " + std::to_string(box.indices[i]) + " " + std::to_string(box.indices[i + 1]) + " " +
+            std::to_string(box.indices[i + 2]) + "\n";
+  return text;
+}
+
+/// With a list per vertex and an element that the import skips.
+std::string makeBinaryPly(const BoxMesh& box, bool bigEndian) {
+  NumberWriter body(bigEndian);
+  for (const auto& p : box.positions) {
+    body.add(p[0]).add(static_cast<double>(p[1])).add(p[2]);
+    for (const int channel : {255, 0, 0}) body.add(static_cast<std::uint8_t>(channel));
+    body.add(std::uint8_t{2}).add(std::int16_t{7}).add(std::int16_t{8});
+  }
+  for (int i = 0; i < 3; ++i) body.add(static_cast<double>(i));
+  for (std::size_t i = 0; i < box.indices.size(); i += 3) {
+    body.add(std::uint8_t{3});
+    for (std::size_t k = 0; k < 3; ++k) body.add(static_cast<std::uint32_t>(box.indices[i + k]));
+    body.add(1.0f);
+  }
+  return "ply\nformat binary_" + std::string(bigEndian ? "big" : "little") + "_endian 1.0\n" +
+         kVertexHeader +
+         "property list uchar short other\nelement camera 3\nproperty double focus\n"
+         "element face 12\nproperty list uchar uint vertex_index\nproperty float quality\n"
+         "end_header\n" +
+         body.text;
+}
+
+/// Six quads and no triangle, listed before the vertices.
+std::string makePolygonPly(const BoxMesh& box) {
+  std::string text =
+      "ply\nformat ascii 1.0\nelement face 6\nproperty list uchar int vertex_indices\n"
+      "element vertex 8\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+      "4 0 2 3 1\n4 4 5 7 6\n4 0 1 5 4\n4 2 6 7 3\n4 0 4 6 2\n4 1 3 7 5\n";
+  for (const auto& p : box.positions)
+    text += std::to_string(p[0]) + " " + std::to_string(p[1]) + " " + std::to_string(p[2]) + "\n";
+  return text;
+}
+
+std::string makeTextStl(const BoxMesh& box) {
+  std::string text = "solid room\n";
+  for (std::size_t i = 0; i < box.indices.size(); i += 3) {
+    text += " facet normal 0 0 0\n  outer loop\n";
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto& p = box.positions[box.indices[i + k]];
+      text += "   vertex " + std::to_string(p[0]) + " " + std::to_string(p[1]) + " " +
+              std::to_string(p[2]) + "\n";
+    }
+    text += "  endloop\n endfacet\n";
+  }
+  return text + "endsolid room\n";
+}
+
+/// Its header begins like a text file, as those of some programs do.
+std::string makeBinaryStl(const BoxMesh& box) {
+  NumberWriter body(false);
+  body.add(static_cast<std::uint32_t>(box.indices.size() / 3));
+  for (std::size_t i = 0; i < box.indices.size(); i += 3) {
+    for (int axis = 0; axis < 3; ++axis) body.add(0.0f);
+    for (std::size_t k = 0; k < 3; ++k)
+      for (const float v : box.positions[box.indices[i + k]]) body.add(v);
+    body.add(std::uint16_t{0});
+  }
+  std::string header = "solid exported";
+  header.resize(80, ' ');
+  return header + body.text;
+}
+
+struct ScanFile {
+  const char* name;
+  const char* file;
+  std::function<std::string(const BoxMesh&)> make;
+  bool coloured = false;
+};
+
+void PrintTo(const ScanFile& scan, std::ostream* to) {
+  *to << scan.name;
+}
+
+class ScanFiles : public ::testing::TestWithParam<ScanFile> {};
+
+TEST_P(ScanFiles, GiveTheBoxWithItsUpAxis) {
+  const TemporaryFolder folder;
+  const Model model = importModel(folder.write(GetParam().file, GetParam().make(makeRoom())));
+  ASSERT_EQ(model.objects.size(), 1u);
+  EXPECT_EQ(model.upAxis, 'z');
+  EXPECT_EQ(countOf(model, "guessed_up_axis"), 1u);
+  EXPECT_EQ(countOf(model, "no_unit"), 1u);
+  EXPECT_EQ(model.meshes.at(0).positions.size(), 8u);
+  EXPECT_EQ(model.meshes[0].triangleCount(), 12u);
+  EXPECT_EQ(countOf(model, "vertex_colours_ignored"), GetParam().coloured ? 1u : 0u);
+  if (GetParam().coloured) {
+    EXPECT_EQ(model.materials.at(0).baseColour, Eigen::Vector4f(1, 0, 0, 1));
+  }
+  const Scene scene{Model(model)};
+  EXPECT_LT((scene.bounds().size() - Vec3(8, 3, 6)).norm(), 1e-9);
+  // The winding is kept: the surface bounds the room's volume.
+  double volume = 0;
+  const Mesh& mesh = model.meshes[0];
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    const Vec3 a = mesh.positions[mesh.indices[i]].cast<double>();
+    const Vec3 b = mesh.positions[mesh.indices[i + 1]].cast<double>();
+    volume += a.dot(b.cross(mesh.positions[mesh.indices[i + 2]].cast<double>())) / 6;
+  }
+  EXPECT_NEAR(volume, 8 * 6 * 3, 1e-9);
+}
+
+TEST_P(ScanFiles, CutOffOrDamagedAnywhereLoadOrAreErrorsThatNameTheFile) {
+  const TemporaryFolder folder;
+  const std::string whole = GetParam().make(makeRoom());
+  const std::string name = std::string("damaged") + GetParam().file;
+  for (std::size_t at = 1; at < whole.size(); at += 1 + whole.size() / 12) {
+    std::string damaged = whole;
+    damaged[at] = static_cast<char>(~damaged[at]);
+    for (const std::string& content : {damaged, whole.substr(0, at)}) {
+      const std::string text = failureOf(folder.write(name, content));
+      EXPECT_TRUE(text.empty() || text.find(name) != std::string::npos) << text;
+    }
+  }
+  EXPECT_NE(failureOf(folder.write(name, whole.substr(0, whole.size() * 2 / 3))), "");
+}
+
+std::string nameScan(const ::testing::TestParamInfo<ScanFile>& scan) {
+  return scan.param.name;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Room, ScanFiles,
+    ::testing::Values(ScanFile{"TextPly", "a.ply", makeTextPly, true},
+                      ScanFile{"LittleEndianPly", "a.ply",
+                               [](const BoxMesh& box) { return makeBinaryPly(box, false); }, true},
+                      ScanFile{"BigEndianPly", "a.ply",
+                               [](const BoxMesh& box) { return makeBinaryPly(box, true); }, true},
+                      ScanFile{"PolygonsBeforeVertices", "a.ply", makePolygonPly},
+                      ScanFile{"TextStl", "a.stl", makeTextStl},
+                      ScanFile{"BinaryStl", "a.STL", makeBinaryStl}),
+    nameScan);
+
+TEST(ScanUpAxis, IsThatOfTheLargestLevelAreaAndCanBeSet) {
+  const TemporaryFolder folder;
+  const auto importBox = [&](std::array<float, 3> size, std::optional<char> up = {}) {
+    ImportOptions options;
+    options.up = up;
+    return importModel(folder.write("a.stl", makeBinaryStl(BoxMesh(size))), options);
+  };
+  EXPECT_EQ(importBox({8, 3, 6}).upAxis, 'y');
+  EXPECT_EQ(importBox({3, 8, 6}).upAxis, 'x');
+  EXPECT_EQ(importBox({5, 5, 5}).upAxis, 'z');
+  EXPECT_EQ(diagnosticText(importBox({8, 3, 6}), "guessed_up_axis"),
+            "y is up: surfaces across x, y, z have 36 96 48 square units; override it with --up");
+  const Model set = importBox({8, 3, 6}, 'z');
+  EXPECT_EQ(set.upAxis, 'z');
+  EXPECT_EQ(countOf(set, "guessed_up_axis"), 0u);
+}
+
+TEST(ScanPly, APointCloudIsRefusedInWords) {
+  const TemporaryFolder folder;
+  const std::string text = failureOf(
+      folder.write("cloud.ply",
+                   "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+                   "property float z\nend_header\n0 0 0\n1 1 1\n"));
+  EXPECT_NE(text.find("a point cloud without faces"), std::string::npos) << text;
+  EXPECT_NE(text.find("mesh it first"), std::string::npos) << text;
+}
+
+TEST(ScanPly, ConcavePolygonsAreCutWithinTheirOutline) {
+  const TemporaryFolder folder;
+  // An L of 3 square metres; a fan from its first corner would cover the notch.
+  const Model model = importModel(
+      folder.write("l.ply",
+                   "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\n"
+                   "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+                   "end_header\n2 0 0\n2 1 0\n1 1 0\n1 2 0\n0 2 0\n0 0 0\n6 0 1 2 3 4 5\n"));
+  const Mesh& mesh = model.meshes.at(0);
+  ASSERT_EQ(mesh.triangleCount(), 4u);
+  double area = 0;
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    const Vec3 a = mesh.positions[mesh.indices[i]].cast<double>();
+    const Vec3 b = mesh.positions[mesh.indices[i + 1]].cast<double>();
+    const Vec3 c = mesh.positions[mesh.indices[i + 2]].cast<double>();
+    const double z = (b - a).cross(c - a).z() / 2;
+    EXPECT_GT(z, 0);
+    area += z;
+  }
+  EXPECT_DOUBLE_EQ(area, 3);
+}
+
+TEST(ScanPly, StripsAreUnrolled) {
+  const TemporaryFolder folder;
+  const Model model = importModel(
+      folder.write("s.ply",
+                   "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+                   "property float z\nelement tristrips 1\nproperty list int int vertex_indices\n"
+                   "end_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n8 0 1 2 3 -1 0 1 3\n"));
+  EXPECT_EQ(model.meshes.at(0).indices, (std::vector<std::uint32_t>{0, 1, 2, 1, 3, 2, 0, 1, 3}));
+}
+
+TEST(ScanPly, MapCoordinatesKeepMillimetres) {
+  const TemporaryFolder folder;
+  const Model model = importModel(
+      folder.write("map.ply",
+                   "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\n"
+                   "property double z\nelement face 1\nproperty list uchar int vertex_indices\n"
+                   "end_header\n5400000.001 400000 10\n5400001 400000 10\n5400000 400001 10\n"
+                   "3 0 1 2\n"));
+  EXPECT_EQ(model.offset.x(), 5400001);
+  const Scene scene{Model(model)};
+  EXPECT_NEAR(computeWorldPosition(model.objects[0], model.meshes[0], 0).x(), -0.999, 1e-6);
+}
+
+TEST(ScanSizes, ACountThatTheFileCannotHoldIsRefused) {
+  const TemporaryFolder folder;
+  for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
+    const std::string text = failureOf(folder.write(
+        "a.ply", std::string("ply\nformat ") + format +
+                     " 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\n"
+                     "property float z\nend_header\n0 0 0\n"));
+    EXPECT_NE(text.find("announces 4000000000 elements 'vertex'"), std::string::npos) << text;
+  }
+  std::string stl =
+      makeBinaryStl(makeRoom()).replace(0, 5, "other").replace(80, 4, "\xff\xff\xff\xff");
+  const std::string text = failureOf(folder.write("a.stl", stl));
+  EXPECT_NE(text.find("4294967295 triangles announced"), std::string::npos) << text;
+}
+
+// ---- zipped COLLADA -----------------------------------------------------------------------------
+
+constexpr char kTriangleDae[] =
+    R"(<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" )"
+    R"(version="1.4.1"><asset><unit meter="0.01" name="cm"/><up_axis>Z_UP</up_axis></asset>)"
+    R"(<library_geometries><geometry id="g" name="g"><mesh><source id="p"><float_array id="pa" )"
+    R"(count="9">0 0 0 100 0 0 0 200 0</float_array><technique_common><accessor source="#pa" )"
+    R"(count="3" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>)"
+    R"(<param name="Z" type="float"/></accessor></technique_common></source><vertices id="v">)"
+    R"(<input semantic="POSITION" source="#p"/></vertices><triangles count="1"><input )"
+    R"(semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles></mesh></geometry>)"
+    R"(</library_geometries><library_visual_scenes><visual_scene id="s"><node id="n" name="part">)"
+    R"(<instance_geometry url="#g"/></node></visual_scene></library_visual_scenes><scene>)"
+    R"(<instance_visual_scene url="#s"/></scene></COLLADA>)";
+
+TEST(ZippedCollada, IsTheSameAsTheDocument) {
+  const TemporaryFolder folder;
+  std::string blank = kTriangleDae;  // one that is repaired
+  blank.replace(blank.find(">0 0 0 100"), 1, ">  ");
+  for (const std::string& document : {std::string(kTriangleDae), blank}) {
+    const Model plain = importModel(folder.write("a.dae", document));
+    const Model zipped =
+        importModel(folder.write("a.zae", tests::storedZip({{"model.dae", document}})));
+    ASSERT_EQ(zipped.objects.size(), 1u);
+    EXPECT_EQ(zipped.objects[0].path, plain.objects.at(0).path);
+    EXPECT_EQ(zipped.metresPerUnit, 0.01);
+    EXPECT_EQ(zipped.upAxis, 'z');
+    EXPECT_LT((Scene(Model(zipped)).bounds().size() - Vec3(1, 0, 2)).norm(), 1e-6);
+  }
+}
+
+TEST(ZippedCollada, WithoutADocumentOrDamagedIsAnError) {
+  const TemporaryFolder folder;
+  const std::string other =
+      failureOf(folder.write("a.zae", tests::storedZip({{"readme.txt", "hello"}})));
+  EXPECT_NE(other.find("contains no .dae file"), std::string::npos) << other;
+  const std::string damaged = failureOf(folder.write("b.zae", "PK\3\4 and no more"));
+  EXPECT_NE(damaged.find("b.zae: cannot be unzipped"), std::string::npos) << damaged;
+}
+
+TEST(IfcInXml, IsRefusedWithTheRemedy) {
+  const TemporaryFolder folder;
+  const std::string text = failureOf(folder.write("a.ifcXML", "<ifcXML/>"));
+  EXPECT_NE(text.find("export it as .ifc"), std::string::npos) << text;
+}
+
+}  // namespace
+}  // namespace enfilade::scene
