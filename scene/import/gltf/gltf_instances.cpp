@@ -1,5 +1,6 @@
 #include "scene/import/gltf/gltf_instances.hpp"
 
+#include <array>
 #include <cmath>
 #include <optional>
 #include <string>

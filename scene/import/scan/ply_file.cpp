@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "scene/import/file/import_options.hpp"
 #include "scene/import/scan/ply_header.hpp"

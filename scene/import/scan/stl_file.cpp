@@ -5,6 +5,7 @@
 #include "scene/import/scan/stl_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <unordered_map>
