@@ -1,6 +1,7 @@
 #include "server/export/draw_groups.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <tuple>
 #include <utility>

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstring>
 #include <stdexcept>
+#include <string_view>
 
 namespace enfilade::server {
 namespace {

@@ -1,9 +1,11 @@
 // Fuzz target of our own HTTP parsing: the request's target, and the headers that decide on access.
-// The lines of the input are target, Authorization, Host and Origin.
+// The lines of the input are target, Authorization, Host, Origin, If-None-Match and
+// Accept-Encoding.
 #include <array>
 #include <string_view>
 
 #include "server/base/access.hpp"
+#include "server/net/http_file.hpp"
 #include "server/net/http_pages.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
@@ -39,6 +41,12 @@ void tryBytes(std::span<const std::uint8_t> bytes) {
   const std::string_view host = takeLine(text), origin = takeLine(text);
   const auto why = server::validateOrigin(access, host, origin);
   require(!why || !why->empty(), "a refusal has a reason");
+  const std::string_view ifNoneMatch = takeLine(text), acceptEncoding = takeLine(text);
+  require(!server::matchesTag(ifNoneMatch, "a") || ifNoneMatch.find_first_of("a*") != text.npos,
+          "a match names the tag, or all");
+  require(!server::acceptsGzip(acceptEncoding) || acceptEncoding.find("gzip") != text.npos,
+          "gzip is sent to clients that name it");
+  server::findContentType(target.path);
   const auto asked = server::parseRequest(target);
   if (const auto* problem = std::get_if<server::HttpError>(&asked)) {
     require(problem->status >= 400 && problem->status < 600, "a refusal has an error status");

@@ -368,7 +368,7 @@ TEST_F(ServedWorlds, MetricsAndHealthCoverAllOfThem) {
 TEST(Listening, AClientThatConnectsDuringTheShutdownIsNotified) {
   boost::asio::io_context context{1};
   WorldRegistry worlds({smallRoom()}, {}, {});
-  Listener listener(context, {"127.0.0.1", 0}, worlds, {}, {});
+  Listener listener(context, {"127.0.0.1", 0}, worlds, {}, {}, {});
   listener.start();
   std::thread network([&] { context.run(); });
   worlds.stop();
