@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/assert.hpp"
 #include "collision/minkowski/minkowski.hpp"
 
 namespace enfilade::collision {
@@ -53,7 +54,8 @@ bool isAbove(const PlacedConvex& b, const Aabb& boxOfB, const Vec3& normal, doub
 
 SeparatingPlanes::Plane SeparatingPlanes::makePlane(const Vec3& axis) const {
   Plane plane;
-  plane.normal = axis / computeNorm(axis);
+  const Vec3 scaled = axis / maxAbsCoordinate(axis);  // its square neither overflows nor underflows
+  plane.normal = scaled / computeNorm(scaled);
   const Vec3 direction = BoundedConvex(a_).bodyFromWorld<double>(plane.normal);
   plane.support = findMaxProjection(a_.vertices, direction);
   plane.height = computeHeight(plane);
@@ -95,6 +97,7 @@ bool SeparatingPlanes::haveMissed(const PlacedConvex& b, const Aabb& boxOfB) {
 bool SeparatingPlanes::tryAxis(const PlacedConvex& b, const Aabb& boxOfB, const Vec3& axis) {
   if (axis.isZero(0)) return false;
   const Plane plane = makePlane(axis);
+  ENFILADE_ASSERT(std::abs(plane.normal.squaredNorm() - 1) < 1e-6);
   if (!isAbove(b, boxOfB, plane.normal, plane.height)) return false;
   last_ = size_ < kMaxPlanes ? size_++ : next_++ % kMaxPlanes;
   planes_[last_] = plane;

@@ -327,7 +327,7 @@ std::string listVerbNames() {
   for (const auto& [key, value] : line.items()) {
     const std::string nearest = findNearestWord(key, names);
     if (!nearest.empty() && key != "avatar")
-      refuse("", excerpt(key) + " is no command; did you mean \"" + nearest + "\"?");
+      refuse("", excerpt(key) + " is not a command; did you mean \"" + nearest + "\"?");
   }
   refuse("", "no command; a line needs one of " + listVerbNames());
 }

@@ -27,7 +27,7 @@ bool isFinite(Point p) {
   return std::isfinite(p.x) && std::isfinite(p.y);
 }
 
-/// Replaces what is no UTF-8, so that Pango shows the rest.
+/// Replaces invalid UTF-8, so that Pango shows the rest.
 std::string toUtf8(const std::string& text) {
   char* const valid = g_utf8_make_valid(text.data(), static_cast<gssize>(text.size()));
   std::string result(valid);

@@ -252,7 +252,7 @@ std::string describeMissingVerb(std::string_view word) {
   }
   if (word.empty() || word.starts_with('-')) return "give a command: " + list;
   const std::string nearest = protocol::findNearestWord(word, names);
-  return "'" + std::string(word.substr(0, 40)) + "' is no command; " +
+  return "unknown command '" + std::string(word.substr(0, 40)) + "'; " +
          (nearest.empty() ? "the commands are " + list : "did you mean '" + nearest + "'?");
 }
 

@@ -23,6 +23,8 @@ GlbJson toArray(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
+constexpr std::size_t kMaxMergedBytes = std::size_t{1} << 30;
+
 std::uint32_t toEntityId(std::uint32_t object) {
   return object + 1;
 }
@@ -34,6 +36,7 @@ class SceneWriter {
 
   SceneGlb write() {
     const DrawGroups groups = makeDrawGroups(model_);
+    requireWritable(groups);
     for (const MeshBatch& batch : groups.batches) addBatch(batch);
     for (const InstanceGroup& group : groups.instanced) addInstances(group);
     for (const std::uint32_t body : groups.bodies) addBody(body);
@@ -52,6 +55,7 @@ class SceneWriter {
   }
 
  private:
+  void requireWritable(const DrawGroups& groups) const;
   void addBatch(const MeshBatch& batch);
   void addInstances(const InstanceGroup& group);
   void addBody(std::uint32_t body);
@@ -98,6 +102,22 @@ GlbJson SceneWriter::addPrimitive(const PrimitiveData& data, std::uint32_t mater
 }
 
 // ---- static objects -----------------------------------------------------------------------------
+
+/// Merging repeats the vertices of a mesh for each of its uses: a small model may become a large
+/// file. Refuses it before the memory is needed.
+void SceneWriter::requireWritable(const DrawGroups& groups) const {
+  constexpr std::size_t kVertexBytes = (3 + 3 + 2 + 1) * sizeof(float);
+  std::size_t bytes = 0;
+  for (const MeshBatch& batch : groups.batches)
+    for (const MeshUse& use : batch.uses) {
+      const scene::Mesh& mesh = model_.meshes[use.mesh];
+      bytes += mesh.positions.size() * kVertexBytes + mesh.indices.size() * sizeof(std::uint32_t);
+    }
+  if (bytes > kMaxMergedBytes)
+    throw std::runtime_error("the merged meshes need " + std::to_string(bytes >> 20) +
+                             " MiB, more than the limit of " +
+                             std::to_string(kMaxMergedBytes >> 20) + " MiB");
+}
 
 void SceneWriter::addBatch(const MeshBatch& batch) {
   PrimitiveData data = makeData(batch.material, batch.hasNormals);

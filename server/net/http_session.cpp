@@ -190,7 +190,12 @@ void HttpSession::sendSceneFile(const SceneFile& file, bool compressed) {
   awaitsFile_ = false;
   if (closed_ || answered_) return;
   if (!file.bytes) return refuse(500, "the scene cannot be written: " + file.error);
-  sendFile({file.bytes, findContentType(path_), file.tag, compressed, true, false});
+  sendFile({.bytes = file.bytes,
+            .contentType = findContentType(path_),
+            .tag = file.tag,
+            .isCompressed = compressed,
+            .mayBeCompressed = true,
+            .isPage = false});
 }
 
 void HttpSession::sendFile(const HttpFile& file) {

@@ -42,7 +42,9 @@ fs::path findPageFolder() {
   const fs::path folder = program.parent_path();
   for (const fs::path& candidate :
        {folder / "page", folder.parent_path() / "share" / "enfilade" / "page"})
-    if (fs::is_directory(candidate, error)) return candidate;
+    if (fs::is_regular_file(candidate / "index.html", error) &&
+        fs::is_regular_file(candidate / "enfilade.js", error))
+      return candidate;
   return {};
 }
 
@@ -54,8 +56,8 @@ PageFiles readPageFiles(const fs::path& folder) {
     if (entry.symlink_status().type() != fs::file_type::regular) continue;
     bytes += entry.file_size();
     if (bytes > kMaxPageBytes)
-      throw std::runtime_error(
-          folder.string() + ": larger than a page can be (64 MiB): remove what is no part of it");
+      throw std::runtime_error(folder.string() +
+                               ": larger than a page can be (64 MiB): remove other files");
     const std::string name = entry.path().lexically_relative(folder).generic_string();
     files["/page/" + name] = readPageFile(entry.path());
   }

@@ -62,13 +62,15 @@ TEST(SeparatingPlanes, ALargeTriangleIsMissedThoughItsBoxIsNot) {
 
 TEST(SeparatingPlanes, AxesOfAnyLengthAndNoneAreAllowed) {
   const PlacedConvex cube{kUnitCube};
-  for (const double length : {5e-324, 1e-200, 1e-30, 1e30, 1e200}) {
+  for (const double length : {5e-324, 1e-200, 2.3e-162, 1e-155, 1e-30, 1.0, 1e30, 1e200, 1e308}) {
     SeparatingPlanes planes(cube, Vec3::Zero(), 0.125);
-    EXPECT_FALSE(haveMissed(planes, paneAt(1, 0), {length, 0, 0})) << length;
+    EXPECT_FALSE(haveMissed(planes, paneAt(1.121, 0), {length, 0, 0})) << length;
     EXPECT_FALSE(haveMissed(planes, paneAt(2, 0), {-length, 0, 0})) << length;
+    EXPECT_TRUE(haveMissed(planes, paneAt(1.126, 0), {length, 0, 0})) << length;
   }
+  SeparatingPlanes planes(cube, Vec3::Zero(), 0.125);
+  EXPECT_FALSE(haveMissed(planes, paneAt(2, 0), Vec3::Zero()));
 }
-
 /// Dyadic points up to `size` (a power of two) from the origin: sums with other such points are
 /// exact.
 std::vector<Vec3> dyadicPoints(Random& random, int count, double size) {

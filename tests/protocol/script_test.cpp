@@ -123,7 +123,7 @@ TEST(Script, UnknownRepeatedAndConflictingKeysAreReported) {
               R"(tour.jsonl:1: "sped" is not a key of the command walk; its keys are walk, to)");
   expectError(R"({"hop":"ann"})", "tour.jsonl:1: no command");
   expectError(R"({"spwan":"ann","at":[0,0,0]})",
-              "tour.jsonl:1: \"spwan\" is no command; did you mean \"spawn\"?");
+              "tour.jsonl:1: \"spwan\" is not a command; did you mean \"spawn\"?");
   expectError(R"({"leave":"ann","leave":"bob"})", "tour.jsonl:1: leave: occurs twice");
   expectError(R"({"walk":"ann","to":[1,2,3],"along":[[1,2,3]]})",
               R"(tour.jsonl:1: to: cannot be combined with "along")");

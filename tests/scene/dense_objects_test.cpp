@@ -134,7 +134,7 @@ TEST(DenseObjects, AWalkOnAFineFloorAsksAsLittleAsOnACoarseOne) {
   }
 }
 
-TEST(DenseObjects, ABlockedWalkAndItsEndTellTheDistanceOfTheNearestTriangle) {
+TEST(DenseObjects, ABlockedWalkAndItsEndReportTheDistanceOfTheNearestTriangle) {
   const auto scene = sceneOf(*tests::findDenseScene("plant_room"), 20'000);
   WorldFixture run(scene);
   Seeded random(5);

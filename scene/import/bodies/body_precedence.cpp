@@ -16,7 +16,7 @@ std::vector<const BodySpec*> mapObjectsToBodies(const Model& model) {
   return bodies;
 }
 
-/// A file that describes a body twice in the same way is no problem.
+/// A file may describe a body twice in the same way.
 bool isSameBody(const BodySpec& a, const BodySpec& b) {
   const bool sameAnchor = a.kind != BodyKind::hinged || a.anchor.isApprox(b.anchor, 1e-6);
   return a.kind == b.kind && a.objects == b.objects && sameAnchor &&

@@ -17,7 +17,7 @@ constexpr std::size_t kDracoHeaderSize = 11;  // bytes
 constexpr std::uint16_t kDracoMetadataFlag = 0x8000;
 /// Triangles per byte, and those of any file. A flat grid of two million triangles with positions
 /// of 11 bits has 3.5 per byte; the rest is margin for coarser positions.
-constexpr std::uint64_t kMaxDracoDensity = 512, kFreeDracoTriangles = 4096;
+constexpr std::uint64_t kMaxDracoDensity = 64, kFreeDracoTriangles = 4096;
 
 struct DracoCounts {
   std::uint32_t faces = 0, points = 0;

@@ -33,8 +33,12 @@ constexpr std::array<std::string_view, 9> kRewrittenTexts{"\"EXT_meshopt_compres
                                                           "\"EXT_texture_avif\""};
 
 /// Parses only the sections needed here and skips the nodes, of which there may be a million.
-Json parseMeshSections(const std::string& text) {
-  const auto wanted = [](int depth, Json::parse_event_t event, Json& value) {
+constexpr int kMaxJsonDepth = 512;
+
+/// Sets `tooDeep` if copies and dumps of the whole text would need much stack.
+Json parseMeshSections(const std::string& text, bool& tooDeep) {
+  const auto wanted = [&](int depth, Json::parse_event_t event, Json& value) {
+    tooDeep = tooDeep || depth > kMaxJsonDepth;
     if (event != Json::parse_event_t::key || depth != 1) return true;
     return value == "asset" || value == "extensionsRequired" || value == "extensionsUsed" ||
            value == "meshes" || value == "accessors" || value == "buffers" || value == "scenes" ||
@@ -206,7 +210,11 @@ void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGlt
 PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format) {
   PlainGltf plain;
   plain.json = readGltfJson(file, format);
-  Json sections = parseMeshSections(plain.json);
+  bool tooDeep = false;
+  Json sections = parseMeshSections(plain.json, tooDeep);
+  if (tooDeep)
+    throw ImportError(file.string() + ": its JSON is nested deeper than " +
+                      std::to_string(kMaxJsonDepth) + " levels (open)");
   if (!sections.is_object()) return plain;
   requireVersion2(sections, file);
   plain.problems = checkGltfExtensions(sections, file);
@@ -217,7 +225,7 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format) {
                                   " was read, which is the file's default"});
   if (needsRewriting(plain.json, sections)) {
     rewriteGltf(file, format, plain);
-    sections = parseMeshSections(plain.json);
+    sections = parseMeshSections(plain.json, tooDeep);
   }
   plain.triangles = countGltfTriangles(sections);
   return plain;

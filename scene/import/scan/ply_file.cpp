@@ -92,6 +92,7 @@ class PlyReader {
     for (const PlyElement& element : header_.elements) {
       requirePlausible(element);
       if (element.name == "vertex") {
+        if (!mesh_.positions.empty()) failPly("has two elements 'vertex'");
         readVertices(element);
       } else {
         readOthers(element);

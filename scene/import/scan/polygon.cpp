@@ -49,17 +49,17 @@ void triangulatePolygon(std::span<const std::uint32_t> corners, std::span<const 
   std::vector<std::uint32_t> left(corners.begin(), corners.end());
   const Vec3 normal = computeNewellNormal(corners, positions);
   while (left.size() > 3) {
-    std::size_t tip = 1;
-    for (std::size_t i = 1; i <= left.size(); ++i) {
-      if (!isEar(left, i % left.size(), positions, normal)) continue;
-      tip = i % left.size();
-      break;
-    }
+    std::size_t tip = left.size();
+    for (std::size_t i = 1; i <= left.size() && tip == left.size(); ++i)
+      if (isEar(left, i % left.size(), positions, normal)) tip = i % left.size();
+    // A polygon that crosses itself may have no ear: the rest becomes a fan, in linear time.
+    if (tip == left.size()) break;
     triangles.insert(triangles.end(), {left[(tip + left.size() - 1) % left.size()], left[tip],
                                        left[(tip + 1) % left.size()]});
     left.erase(left.begin() + static_cast<std::ptrdiff_t>(tip));
   }
-  triangles.insert(triangles.end(), left.begin(), left.end());
+  for (std::size_t i = 2; i < left.size(); ++i)
+    triangles.insert(triangles.end(), {left[0], left[i - 1], left[i]});
 }
 
 }  // namespace enfilade::scene

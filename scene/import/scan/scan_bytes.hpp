@@ -67,14 +67,14 @@ class TextCursor {
     while (!line.empty() && isBlank(line.back())) line.remove_suffix(1);
     return line;
   }
-  /// The next word as a number. Words that are none, and the end of the text, set failed().
+  /// The next word as a number. Other words, numbers out of range, and the end of the text set
+  /// failed().
   double readNumber() {
     std::string_view word = readWord();
     if (word.starts_with('+')) word.remove_prefix(1);
     double value = 0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (word.empty() || error == std::errc::invalid_argument || end != word.data() + word.size())
-      failed_ = true;
+    if (word.empty() || error != std::errc() || end != word.data() + word.size()) failed_ = true;
     return value;
   }
   std::size_t remaining() const { return text_.size(); }

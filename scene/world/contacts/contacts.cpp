@@ -112,9 +112,11 @@ void findCloseDense(Avatar& avatar, const DenseObject& object, const ContactDist
           const double limit = search.computeLimit(object.entity);
           planes.reduceTo(Vec3::Zero(), std::max(0.0, limit - tie));
         });
-    if (search.isFound(object.entity) && found.back().separation.verdict == Verdict::separated)
-      found.back().separation.errorBound += tie;
   }
+  if (!found.empty() && found.back().other == object.entity &&
+      found.back().separation.verdict == Verdict::separated)
+    found.back().separation.errorBound +=
+        computeTieDistance(placeBox(avatar.shape->box, avatar.footPosition));
 }
 
 /// All entities closer than the limit, each with its nearest part, ascending.

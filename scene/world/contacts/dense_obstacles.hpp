@@ -11,8 +11,7 @@ namespace enfilade::scene {
 
 using DenseCaches = std::map<DensePair, collision::FeatureCache>;
 
-/// The middle of a part, a segment along its longest axis: what is near to it is near to the part,
-/// if the part is about as round as an avatar.
+/// The middle of a part, a segment along its longest axis. Its nearest branches are visited first.
 inline Aabb computeCore(const Aabb& partBox) {
   const Vec3 half = 0.5 * partBox.size();
   const Vec3 core = (half.array() - std::min({half.x(), half.y(), half.z()})).matrix();

@@ -263,7 +263,8 @@ void refreshDynamicObstacles(const WorldData& world, Avatar& avatar) {
 }
 
 void prefetchSurroundings(const WorldData& world) {
-  if (!world.scene->hasDenseObjects()) return;
+  const Scene& scene = *world.scene;
+  if (scene.denseIndices().empty()) return;
   const auto ticksPerLook =
       static_cast<std::uint64_t>(std::max(1.0, kPrefetchSeconds / world.settings.tickDuration));
   std::vector<std::uint32_t> objects;
@@ -272,11 +273,11 @@ void prefetchSurroundings(const WorldData& world) {
     if (!isNew && (world.tick + avatar.id) % ticksPerLook != 0) continue;
     const double distance =
         kPrefetchDistance + 2 * kPrefetchSeconds * avatar.desiredVelocity.norm();
-    for (const collision::StaticId id :
-         world.broadPhase.overlapStatic(inflated(avatar.motionBounds, distance)))
-      objects.push_back(world.scene->solidObjects()[id]);
+    const Aabb around = inflated(avatar.motionBounds, distance);
+    for (const std::uint32_t i : scene.denseIndices())
+      if (overlaps(around, scene.staticBoxes()[i])) objects.push_back(scene.solidObjects()[i]);
   }
-  world.scene->prefetchCollisionGeometry(objects);
+  if (!objects.empty()) scene.prefetchCollisionGeometry(objects);
 }
 
 void collectObstacles(WorldData& world, Avatar& avatar) {

@@ -1,4 +1,4 @@
-// What may be in the way of an avatar, and the memory of the last queries against it.
+// Obstacles of an avatar, and the caches of the last queries against them.
 #pragma once
 
 #include <compare>

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <set>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
 
 #include "scene/model/hasher.hpp"
@@ -54,23 +55,27 @@ class Scene::Prefetcher {
 
   void add(std::span<const std::uint32_t> objects) {
     const std::lock_guard lock(mutex_);
+    try {
+      if (!thread_.joinable()) thread_ = std::jthread([this](std::stop_token stop) { run(stop); });
+    } catch (const std::system_error&) {
+      return;  // without a thread the ticks build what they need
+    }
     for (const std::uint32_t object : objects)
       if (requested_.insert(object).second) queue_.push_back(object);
-    if (!thread_.joinable()) thread_ = std::jthread([this](std::stop_token stop) { run(stop); });
     wakeUp_.notify_one();
   }
 
  private:
   void run(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
-    while (wakeUp_.wait(lock, stop, [this] { return !queue_.empty(); })) {
+    while (wakeUp_.wait(lock, stop, [this] { return !queue_.empty(); }) && !stop.stop_requested()) {
       const std::uint32_t object = queue_.front();
       queue_.pop_front();
       lock.unlock();
       try {
         scene_.collisionGeometry(object);
-      } catch (const std::bad_alloc&) {
-        // The tick that needs it will report it.
+      } catch (const std::exception&) {
+        // The tick that needs the geometry reports the error.
       }
       lock.lock();
     }
@@ -226,8 +231,8 @@ Scene::Scene(Model model) : model_(std::move(model)) {
   hash_ = hashModel(model_);
   shapes_ = std::make_unique<LazyArray<Shape>>(meshesOfShape_.size());
   collisionGeometries_ = std::make_unique<LazyArray<CollisionGeometry>>(model_.objects.size());
-  hasDenseObjects_ = std::ranges::any_of(
-      solidObjects_, [&](std::uint32_t object) { return mayBeDense(model_, object); });
+  for (std::uint32_t i = 0; i < solidObjects_.size(); ++i)
+    if (mayBeDense(model_, solidObjects_[i])) denseIndices_.push_back(i);
   prefetcher_ = std::make_unique<Prefetcher>(*this);
 }
 
@@ -286,10 +291,10 @@ const CollisionGeometry& Scene::collisionGeometry(std::uint32_t object) const {
 }
 
 void Scene::prefetchCollisionGeometry(std::span<const std::uint32_t> objects) const {
-  std::vector<std::uint32_t> dense;
+  std::vector<std::uint32_t> missing;
   for (const std::uint32_t object : objects)
-    if (!collisionGeometries_->has(object) && mayBeDense(model_, object)) dense.push_back(object);
-  if (!dense.empty()) prefetcher_->add(dense);
+    if (!collisionGeometries_->has(object)) missing.push_back(object);
+  if (!missing.empty()) prefetcher_->add(missing);
 }
 
 Scene::Memory Scene::memory() const {

@@ -39,12 +39,12 @@ class Scene {
   /// thread; all callers get the same instance.
   const CollisionGeometry& collisionGeometry(std::uint32_t object) const;
 
-  /// Builds the collision geometry of those objects that have many triangles in a thread of its
-  /// own, in this order, so that their first use holds up no tick. Returns at once; results do not
-  /// depend on it.
+  /// Builds the collision geometry of these objects in a thread of its own, in this order, so that
+  /// ticks find it ready; a tick that comes earlier builds it itself. Returns at once; results do
+  /// not depend on it.
   void prefetchCollisionGeometry(std::span<const std::uint32_t> objects) const;
-  /// True if any solid object has many triangles.
-  bool hasDenseObjects() const { return hasDenseObjects_; }
+  /// Indices into solidObjects() of those that have many triangles.
+  const std::vector<std::uint32_t>& denseIndices() const { return denseIndices_; }
 
   std::size_t shapeCount() const { return meshesOfShape_.size(); }
   /// Index of the object's shape, < shapeCount().
@@ -75,7 +75,7 @@ class Scene {
   std::vector<std::vector<std::uint32_t>> meshesOfShape_;
   std::unique_ptr<LazyArray<Shape>> shapes_;
   std::unique_ptr<LazyArray<CollisionGeometry>> collisionGeometries_;
-  bool hasDenseObjects_ = false;
+  std::vector<std::uint32_t> denseIndices_;
   std::unique_ptr<Prefetcher> prefetcher_;  ///< last: its thread uses all others
 };
 
