@@ -214,7 +214,7 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format) {
   Json sections = parseMeshSections(plain.json, tooDeep);
   if (tooDeep)
     throw ImportError(file.string() + ": its JSON is nested deeper than " +
-                      std::to_string(kMaxJsonDepth) + " levels (open)");
+                      std::to_string(kMaxJsonDepth) + " levels; export it again (open)");
   if (!sections.is_object()) return plain;
   requireVersion2(sections, file);
   plain.problems = checkGltfExtensions(sections, file);
