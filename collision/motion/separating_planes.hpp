@@ -33,10 +33,10 @@ class SeparatingPlanes {
   bool tryAxis(const PlacedConvex& b, const Aabb& boxOfB, const Vec3& axis);
 
  private:
-  struct Plane {
-    Vec3 normal = Vec3::Zero();  ///< from A to B, unit up to rounding
-    double support = 0;          ///< metres: A's rounded maximum along it
-    double height = 0;           ///< metres: the motion misses what lies above it
+  struct Plane {     // not initialised: most casts need few of them
+    Vec3 normal;     ///< from A to B, unit up to rounding
+    double support;  ///< metres: A's rounded maximum along it
+    double height;   ///< metres: the motion misses what lies above it
   };
   static constexpr std::size_t kMaxPlanes = 8;
 

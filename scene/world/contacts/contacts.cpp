@@ -123,16 +123,17 @@ void findCloseDense(Avatar& avatar, const DenseObject& object, const ContactDist
 std::vector<Contact> findNearby(Avatar& avatar, const ContactDistances& distances,
                                 QueryCount& count) {
   std::vector<Contact> found;
-  const std::size_t partCount = avatar.shape->parts.size();
+  std::vector<CloseSearch> searches;
+  searches.reserve(avatar.shape->parts.size());
+  for (const AvatarPart& part : avatar.shape->parts)
+    searches.emplace_back(part, avatar.footPosition, distances, found, count);
   const Aabb box =
       inflated(placeBox(avatar.shape->box, avatar.footPosition), distances.reportLimit);
   for (Obstacle& obstacle : avatar.obstacles.list) {
     if (!overlaps(box, obstacle.box)) continue;
-    for (std::size_t i = 0; i < partCount; ++i) {
-      CloseSearch search(avatar.shape->parts[i], avatar.footPosition, distances, found, count);
-      if (overlaps(search.box, obstacle.box))
-        search.addObstacle(obstacle.entity, obstacle.convex, obstacle.cacheFor(i));
-    }
+    for (std::size_t i = 0; i < searches.size(); ++i)
+      if (overlaps(searches[i].box, obstacle.box))
+        searches[i].addObstacle(obstacle.entity, obstacle.convex, obstacle.cacheFor(i));
   }
   for (const DenseObject& object : avatar.obstacles.dense)
     findCloseDense(avatar, object, distances, found, count);
