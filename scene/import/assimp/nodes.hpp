@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "scene/import/assembly/finish_model.hpp"
+#include "scene/import/file/model_format.hpp"
 #include "scene/import/gltf/gltf_nodes.hpp"
 
 namespace enfilade::scene {
