@@ -1,4 +1,7 @@
 // Avatars among static objects of many parts, whose parts are found by their trees.
+#include <chrono>
+#include <thread>
+
 #include "tests/scene/brute_force_contacts.hpp"
 #include "tests/scene/checkpoint_fixture.hpp"
 #include "tests/scene/thin_geometry.hpp"
@@ -132,6 +135,22 @@ TEST(DenseObjects, AWalkOnAFineFloorAsksAsLittleAsOnACoarseOne) {
     EXPECT_GT(run.feet("ann").x(), 4.9);
     EXPECT_LT(queries / 120, 15u) << steps << " steps";
   }
+}
+
+TEST(DenseObjects, GeometryIsBuiltBeforeAnAvatarGetsThere) {
+  Model model = fineFloor(2);
+  model.meshes.push_back(fineFloor(20).meshes.front());
+  model.objects.push_back({"far floor", "", {1}, Eigen::Affine3d(Eigen::Translation3d(12, 0, 0))});
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  WorldFixture run(scene);
+  run.order("ann", Spawn{Vec3(9.5, 0.1, 5)});  // 2 m from the far floor
+  run.step();
+  const std::size_t before = scene->memory().parts;
+  for (int i = 0; i < 500 && scene->memory().parts == before; ++i) {
+    run.step();
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_GT(scene->memory().parts, 800 * sizeof(collision::Triangle));
 }
 
 TEST(DenseObjects, ABlockedWalkAndItsEndReportTheDistanceOfTheNearestTriangle) {

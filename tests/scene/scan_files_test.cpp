@@ -215,6 +215,16 @@ TEST(ScanPly, APointCloudIsRefusedInWords) {
   EXPECT_NE(text.find("mesh it first"), std::string::npos) << text;
 }
 
+TEST(ScanPly, TwoVertexElementsAreRefused) {
+  const TemporaryFolder folder;
+  const std::string vertices =
+      "element vertex 1\nproperty float x\nproperty float y\n"
+      "property float z\n";
+  const std::string text = failureOf(folder.write(
+      "two.ply", "ply\nformat ascii 1.0\n" + vertices + vertices + "end_header\n0 0 0\n1 1 1\n"));
+  EXPECT_NE(text.find("two elements 'vertex'"), std::string::npos) << text;
+}
+
 TEST(ScanPly, ConcavePolygonsAreCutWithinTheirOutline) {
   const TemporaryFolder folder;
   // An L of 3 square metres; a fan from its first corner would cover the notch.

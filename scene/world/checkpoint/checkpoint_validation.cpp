@@ -79,8 +79,7 @@ struct CheckpointChecker {
       require(i == 0 || dense[i - 1].entity < id, name + "'s dense obstacles do not ascend");
     }
     for (const auto& [pair, cache] : caches) {
-      const auto at = std::ranges::lower_bound(dense, pair.entity, {}, &DenseObject::entity);
-      require(at != dense.end() && at->entity == pair.entity &&
+      require(avatar.obstacles.findDense(pair.entity) &&
                   pair.part < world.scene->collisionGeometry(pair.entity - 1).size() &&
                   pair.avatarPart < avatar.shape->parts.size(),
               name + " has a cache of an unknown part");

@@ -100,10 +100,10 @@ double computeTieDistance(const Aabb& box) {
 /// bound includes.
 void findCloseDense(Avatar& avatar, const DenseObject& object, const ContactDistances& distances,
                     std::vector<Contact>& found, QueryCount& count) {
+  const double tie = computeTieDistance(placeBox(avatar.shape->box, avatar.footPosition));
   for (std::uint32_t i = 0; i < avatar.shape->parts.size(); ++i) {
     CloseSearch search(avatar.shape->parts[i], avatar.footPosition, distances, found, count);
     collision::SeparatingPlanes planes(search.part, Vec3::Zero(), distances.reportLimit);
-    const double tie = computeTieDistance(search.box);
     forEachNearPart(
         object, i, search.box, planes, [&](const Aabb& box) { return overlaps(search.box, box); },
         avatar.obstacles.denseCaches, count,
@@ -115,8 +115,7 @@ void findCloseDense(Avatar& avatar, const DenseObject& object, const ContactDist
   }
   if (!found.empty() && found.back().other == object.entity &&
       found.back().separation.verdict == Verdict::separated)
-    found.back().separation.errorBound +=
-        computeTieDistance(placeBox(avatar.shape->box, avatar.footPosition));
+    found.back().separation.errorBound += tie;
 }
 
 /// All entities closer than the limit, each with its nearest part, ascending.
@@ -167,9 +166,7 @@ SeparationResult computeDenseSeparation(const Avatar& avatar, const DenseObject&
 /// Current separation of the avatar and `other`; nullopt if `other` is out of reach.
 std::optional<SeparationResult> computeSeparationFrom(Avatar& avatar, EntityId other,
                                                       QueryCount& count) {
-  const auto& dense = avatar.obstacles.dense;
-  const auto object = std::ranges::lower_bound(dense, other, {}, &DenseObject::entity);
-  if (object != dense.end() && object->entity == other)
+  if (const DenseObject* object = avatar.obstacles.findDense(other))
     return computeDenseSeparation(avatar, *object, count);
   std::optional<SeparationResult> best;
   for (Obstacle& obstacle : avatar.obstacles.list) {

@@ -67,11 +67,8 @@ void sortAndKeepCaches(std::vector<Obstacle>& obstacles, std::vector<Obstacle>& 
 void sortAndKeepDenseCaches(ObstacleSet& obstacles, ObstacleSet& last, const Aabb& bounds) {
   std::ranges::sort(obstacles.dense, {}, &DenseObject::entity);
   std::erase_if(last.denseCaches, [&](const auto& entry) {
-    const DensePair& pair = entry.first;
-    const auto object =
-        std::ranges::lower_bound(obstacles.dense, pair.entity, {}, &DenseObject::entity);
-    return object == obstacles.dense.end() || object->entity != pair.entity ||
-           !overlaps(object->geometry->box(pair.part), bounds);
+    const DenseObject* object = obstacles.findDense(entry.first.entity);
+    return !object || !overlaps(object->geometry->box(entry.first.part), bounds);
   });
   obstacles.denseCaches = std::move(last.denseCaches);
 }

@@ -1,6 +1,7 @@
 // Obstacles of an avatar, and the caches of the last queries against them.
 #pragma once
 
+#include <algorithm>
 #include <compare>
 #include <map>
 #include <vector>
@@ -49,6 +50,12 @@ struct ObstacleSet {
   std::vector<Obstacle> list;                                ///< ascending (entity, part)
   std::vector<DenseObject> dense;                            ///< ascending entity
   std::map<DensePair, collision::FeatureCache> denseCaches;  ///< of pairs that were close
+
+  /// Null if the entity is not a dense object of this set.
+  const DenseObject* findDense(EntityId entity) const {
+    const auto at = std::ranges::lower_bound(dense, entity, {}, &DenseObject::entity);
+    return at != dense.end() && at->entity == entity ? &*at : nullptr;
+  }
 };
 
 }  // namespace enfilade::scene
