@@ -6,108 +6,121 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr bool kInfo = true, kWarning = false;
+using enum Severity;
 
 constexpr std::array kCatalog{
     // file
-    DiagnosticKind{"cut_off_file", kWarning, "the file ends too early; copy or export it again"},
-    DiagnosticKind{"damaged_statement", kWarning, "lines that are not STEP were ignored"},
-    DiagnosticKind{"ifc_reader_absent", kWarning,
+    DiagnosticKind{"cut_off_file", error, "the file ends too early; copy or export it again"},
+    DiagnosticKind{"damaged_statement", error, "lines that are not STEP were ignored"},
+    DiagnosticKind{"ifc_reader_absent", warning,
                    "a reader is not installed: another one read the file; ./dev installs all"},
-    DiagnosticKind{"ifc_reader_failed", kWarning,
+    DiagnosticKind{"ifc_reader_failed", warning,
                    "a reader failed, and another one read the file; --ifc-reader chooses a reader"},
-    DiagnosticKind{"guessed_up_axis", kInfo,
+    DiagnosticKind{"guessed_up_axis", note,
                    "the file states no up axis: that of the largest level area; --up sets it"},
-    DiagnosticKind{"ignored_extension", kWarning,
+    DiagnosticKind{"ignored_extension", error,
                    "a glTF extension that is not read, so shapes may differ; export without it"},
-    DiagnosticKind{"mended_text", kWarning,
-                   "the text was repaired in memory; export the file again"},
-    DiagnosticKind{"missing_material_file", kWarning, "put the .mtl file next to the model"},
-    DiagnosticKind{"no_unit", kWarning, "the file defines no unit; set it with --unit"},
-    DiagnosticKind{"other_scenes", kInfo, "scenes of the file that are not its default: not read"},
-    DiagnosticKind{"unit_assumed", kWarning, "the file's unit is doubtful; set it with --unit"},
+    DiagnosticKind{"mended_text", note, "the text was repaired in memory; export the file again"},
+    DiagnosticKind{"missing_material_file", warning, "put the .mtl file next to the model"},
+    DiagnosticKind{"no_unit", warning, "the file defines no unit; set it with --unit"},
+    DiagnosticKind{"other_scenes", note, "scenes of the file that are not its default: not read"},
+    DiagnosticKind{"unit_assumed", warning, "the file's unit is doubtful; set it with --unit"},
     // placement
-    DiagnosticKind{"broken_transform_dropped", kWarning,
+    DiagnosticKind{"broken_transform_dropped", error,
                    "its transform is not finite or out of range: ignored"},
-    DiagnosticKind{"coarse_coordinates", kWarning,
+    DiagnosticKind{"coarse_coordinates", warning,
                    "far from its own origin: its vertices have low precision"},
-    DiagnosticKind{"coarse_placement", kWarning,
+    DiagnosticKind{"coarse_placement", warning,
                    "placed far from the file's origin: its position has low precision"},
-    DiagnosticKind{"far_object", kWarning,
-                   "far from all others; move or delete it in the modeller"},
-    DiagnosticKind{"far_object_dropped", kWarning,
+    DiagnosticKind{"far_object", warning, "far from all others; move or delete it in the modeller"},
+    DiagnosticKind{"far_object_dropped", error,
                    "so far that it cannot belong to the scene: ignored"},
-    DiagnosticKind{"far_reaching_object", kWarning,
-                   "extends far beyond all others; check its size"},
-    DiagnosticKind{"flat_object", kWarning, "scaled to zero along an axis: it has no inside"},
-    DiagnosticKind{"mirrored_object", kWarning,
-                   "mirrored: its faces were flipped to face outwards"},
+    DiagnosticKind{"far_reaching_object", warning, "extends far beyond all others; check its size"},
+    DiagnosticKind{"flat_object", warning, "scaled to zero along an axis: it has no inside"},
+    DiagnosticKind{"mirrored_object", note, "mirrored: its faces were flipped to face outwards"},
     // surfaces
-    DiagnosticKind{"broken_triangle_dropped", kWarning, "vertices are not finite: ignored"},
+    DiagnosticKind{"broken_triangle_dropped", error, "vertices are not finite: ignored"},
     DiagnosticKind{
-        "convexity_untried", kWarning,
+        "convexity_untried", note,
         "too large for the convexity test; it stays triangles, equally exact but slower"},
-    DiagnosticKind{"degenerate_triangle", kWarning, "triangles without area; harmless, ignored"},
-    DiagnosticKind{"duplicate_triangle", kWarning,
-                   "the same triangle twice; harmless, may flicker"},
-    DiagnosticKind{"inconsistent_winding", kWarning,
+    DiagnosticKind{"degenerate_triangle", note, "triangles without area; harmless, ignored"},
+    DiagnosticKind{"duplicate_triangle", note, "the same triangle twice; harmless, may flicker"},
+    DiagnosticKind{"inconsistent_winding", note,
                    "neighbouring faces have opposite winding; flipped to match the majority"},
-    DiagnosticKind{"inside_out_solid", kWarning,
+    DiagnosticKind{"inside_out_solid", warning,
                    "faces look inwards: treated as the solid that they bound; flip its normals"},
     DiagnosticKind{
-        "inward_shell", kWarning,
+        "inward_shell", warning,
         "a closed shell whose faces look inwards; if it is not a room, flip its normals"},
-    DiagnosticKind{"non_manifold_edge", kWarning,
+    DiagnosticKind{"non_manifold_edge", note,
                    "more than two faces share an edge, so inside and outside are undefined"},
-    DiagnosticKind{"object_without_area", kWarning, "it has no surface to collide with"},
-    DiagnosticKind{"points_and_lines_dropped", kWarning,
+    DiagnosticKind{"object_without_area", note, "it has no surface to collide with"},
+    DiagnosticKind{"points_and_lines_dropped", note,
                    "points and lines are neither drawn nor solid"},
-    DiagnosticKind{"repeated_object", kWarning,
+    DiagnosticKind{"repeated_object", warning,
                    "the same shape twice in the same place; delete one, they flicker"},
     // appearance
-    DiagnosticKind{"emissive_texture_ignored", kWarning, "emissive textures are not drawn"},
+    DiagnosticKind{"emissive_texture_ignored", warning, "emissive textures are not drawn"},
     DiagnosticKind{
-        "missing_texture", kWarning,
+        "missing_texture", warning,
         "missing, or of a kind that is not decoded: drawn without it; put a PNG next to the model"},
-    DiagnosticKind{"opacity_zero", kWarning, "the material is invisible; drawn opaque"},
-    DiagnosticKind{"reduced_texture", kWarning,
+    DiagnosticKind{"opacity_zero", warning, "the material is invisible; drawn opaque"},
+    DiagnosticKind{"reduced_texture", note,
                    "the textures are many or large; drawn at a lower resolution"},
-    DiagnosticKind{"unreadable_texture", kWarning,
+    DiagnosticKind{"unreadable_texture", warning,
                    "not a readable PNG, JPEG or WebP; drawn without it"},
-    DiagnosticKind{"vertex_colours_ignored", kWarning, "vertex colours are not drawn"},
-    DiagnosticKind{"instance_attributes_ignored", kInfo,
+    DiagnosticKind{"vertex_colours_ignored", warning, "vertex colours are not drawn"},
+    DiagnosticKind{"instance_attributes_ignored", note,
                    "attributes of instances that neither place nor shape them"},
     // of IFC
-    DiagnosticKind{"cut_away_product", kWarning, "its openings leave nothing of it"},
-    DiagnosticKind{"missing_product", kWarning, "no reader could build its shape: it is missing"},
-    DiagnosticKind{"opening_unchecked", kWarning, "its opening could not be tested"},
-    DiagnosticKind{"openings_unverified", kWarning,
+    DiagnosticKind{"cut_away_product", error, "its openings leave nothing of it"},
+    DiagnosticKind{"missing_product", error, "no reader could build its shape: it is missing"},
+    DiagnosticKind{"opening_unchecked", note, "its opening could not be tested"},
+    DiagnosticKind{"openings_unverified", warning,
                    "read by the second reader, which may leave openings closed"},
-    DiagnosticKind{"uncut_opening", kWarning,
+    DiagnosticKind{"uncut_opening", error,
                    "a door or window whose wall is closed behind it: it is impassable"},
-    DiagnosticKind{"map_place", kInfo, "where the file's own coordinates lie on a map"},
-    DiagnosticKind{"skipped_openings", kInfo, "openings are air"},
-    DiagnosticKind{"skipped_spaces", kInfo, "spaces are air"},
+    DiagnosticKind{"map_place", note, "where the file's own coordinates lie on a map"},
+    DiagnosticKind{"skipped_openings", note, "openings are air"},
+    DiagnosticKind{"skipped_spaces", note, "spaces are air"},
     // bodies
-    DiagnosticKind{"body_without_area", kWarning, "a body of objects without surface: ignored"},
-    DiagnosticKind{"collision_shape_alone", kWarning,
+    DiagnosticKind{"body_without_area", note, "a body of objects without surface: ignored"},
+    DiagnosticKind{"collision_shape_alone", warning,
                    "named as the collision shape of a missing object"},
-    DiagnosticKind{"extras_without_kind", kWarning, "walk_* without walk_kind: it is static"},
-    DiagnosticKind{"unsupported_physics", kWarning, "the file has physics that is not simulated"},
-    DiagnosticKind{"collision_suffix", kInfo, "solid, visual or moving by the suffix of its name"},
-    DiagnosticKind{"guessed_doors", kInfo, "how they open was guessed; a sidecar can define it"},
-    DiagnosticKind{"replaced_bodies", kInfo, "described in several sources; the first one wins"},
-    DiagnosticKind{"still_doors", kInfo, "doors that are static; a sidecar can move them"},
-    DiagnosticKind{"still_lifts", kInfo, "lifts that are static; a sidecar can move them"},
+    DiagnosticKind{"extras_without_kind", warning, "walk_* without walk_kind: it is static"},
+    DiagnosticKind{"unsupported_physics", warning, "the file has physics that is not simulated"},
+    DiagnosticKind{"collision_suffix", note, "solid, visual or moving by the suffix of its name"},
+    DiagnosticKind{"guessed_doors", note, "how they open was guessed; a sidecar can define it"},
+    DiagnosticKind{"replaced_bodies", note, "described in several sources; the first one wins"},
+    DiagnosticKind{"still_doors", note, "doors that are static; a sidecar can move them"},
+    DiagnosticKind{"still_lifts", note, "lifts that are static; a sidecar can move them"},
 };
 
 }  // namespace
+
+const char* toString(Severity severity) {
+  switch (severity) {
+    case note:
+      return "note";
+    case warning:
+      return "warning";
+    case error:
+      return "error";
+  }
+  return "";
+}
+
+std::vector<std::string_view> listDiagnosticKinds() {
+  std::vector<std::string_view> names;
+  for (const DiagnosticKind& kind : kCatalog) names.push_back(kind.name);
+  return names;
+}
 
 DiagnosticKind findDiagnosticKind(const Diagnostic& diagnostic) {
   const auto found =
       std::find_if(kCatalog.begin(), kCatalog.end(),
                    [&](const DiagnosticKind& kind) { return kind.name == diagnostic.kind; });
-  return found == kCatalog.end() ? DiagnosticKind{diagnostic.kind, kWarning, {}} : *found;
+  return found == kCatalog.end() ? DiagnosticKind{diagnostic.kind, warning, {}} : *found;
 }
 
 }  // namespace enfilade::scene

@@ -1,12 +1,16 @@
 #include "server/app/command_arguments.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 
+#include "protocol/nearest_word.hpp"
+#include "scene/model/diagnostic_catalog.hpp"
 #include "scene/model/rotation.hpp"
 #include "scene/world/audit.hpp"
 #include "scene/world/data/validation.hpp"
 #include "server/base/endpoint.hpp"
 #include "server/base/parse_number.hpp"
+#include "server/inspection/inspection.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -254,6 +258,17 @@ void addTolerance(CLI::App& verb, CommandArguments& into) {
       ->check(CLI::Validator(validateTolerance, "METRES"));
 }
 
+/// Empty if the word is a kind of problem; otherwise the error, with the nearest kind.
+std::string validateProblemKind(const std::string& word) {
+  std::vector<std::string> kinds{std::string(kAllWarnings)};
+  for (const std::string_view kind : scene::listDiagnosticKinds()) kinds.emplace_back(kind);
+  if (std::find(kinds.begin(), kinds.end(), word) != kinds.end()) return "";
+  const std::string nearest = protocol::findNearestWord(word, kinds);
+  return "'" + word + "' is not a kind of problem" +
+         (nearest.empty() ? "; `enfilade inspect SCENE` lists them"
+                          : "; did you mean '" + nearest + "'?");
+}
+
 }  // namespace
 
 void addServeOptions(CLI::App& serve, CommandArguments& into) {
@@ -379,7 +394,18 @@ void addInspectOptions(CLI::App& inspect, CommandArguments& into) {
   inspect.add_flag("--json", into.json, "Print one JSON object");
   inspect.add_flag("--objects", into.objects,
                    "Also list all objects: id, path, box, class, operation");
-  inspect.add_flag("--strict", into.strict, "Exit with 3 if there are problems");
+  CLI::Option* strict =
+      inspect.add_flag("--strict", into.strict, "Exit with 3 if there are warnings or errors");
+  inspect
+      .add_option("--accept", into.accepted,
+                  "Kinds of problems with which --strict does not fail, or `warnings` for all "
+                  "warnings; separated by commas")
+      ->type_name("KIND,..")
+      ->delimiter(',')
+      ->check(CLI::Validator(validateProblemKind, ""))
+      ->needs(strict);
+  inspect.add_option("--html", into.html, "Also write the report with floor plans as an HTML page")
+      ->check(CLI::Validator(validateFile, "FILE"));
   inspect.add_option("--plan", into.plan, "Folder for one floor plan per storey")
       ->check(CLI::Validator(validateFolder, "DIR"));
   inspect.add_option("--plan-format", into.planFormat, "Format of the plans")
@@ -390,6 +416,7 @@ void addInspectOptions(CLI::App& inspect, CommandArguments& into) {
       ->capture_default_str();
   inspect.footer(
       "SCENE may be a RECORDING: --json and --strict apply.\n"
+      "Notes never fail --strict; the kinds of problems are listed by every report.\n"
       "Example: enfilade inspect house.ifc --plan out/plans --strict");
 }
 

@@ -40,7 +40,8 @@ struct CommandArguments {
   std::string tokenFile;
   Access access;
   std::vector<std::filesystem::path> furtherScenes;
-  std::string before, after, glb;
+  std::string before, after, glb, html;
+  std::vector<std::string> accepted;
   double tolerance = 0.001;
   std::uint32_t pictures = 12;
   std::string auditEvery = "0", epsilon, stepHeight, nearMiss, slope, speedLimit, sliding = "slide";

@@ -236,6 +236,8 @@ const Verb kVerbs[] = {
                              read.json,
                              read.objects,
                              read.strict,
+                             read.accepted,
+                             read.html,
                              read.plan,
                              read.planFormat,
                              read.planScale};

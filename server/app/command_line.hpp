@@ -8,7 +8,7 @@
 #include "server/commands/doctor.hpp"
 #include "server/commands/export.hpp"
 #include "server/commands/export_scene.hpp"
-#include "server/commands/inspect.hpp"
+#include "server/inspection/inspect.hpp"
 #include "server/commands/serve.hpp"
 #include "server/commands/verify.hpp"
 #include "server/diff/diff.hpp"

@@ -82,6 +82,7 @@ const std::vector<std::string> kRooms{
     "server/runs",
     "server/capture/path",
     "server/capture",
+    "server/inspection",
     "server/commands",
     "server/diff",
     "server/app",

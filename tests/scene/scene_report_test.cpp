@@ -70,9 +70,9 @@ TEST(SceneReport, ReportsDiagnosticsWithTheirFirstExample) {
 }
 
 TEST(SceneReport, SpacesThatAreAirAreNotedAndNothingIsWrongWithThem) {
-  EXPECT_TRUE(findDiagnosticKind({"skipped_spaces", 3, "hall"}).isNote);
-  EXPECT_TRUE(findDiagnosticKind({"skipped_openings", 1, "door's"}).isNote);
-  EXPECT_FALSE(findDiagnosticKind({"uncut_opening", 1, "door"}).isNote);
+  EXPECT_EQ(findDiagnosticKind({"skipped_spaces", 3, "hall"}).severity, Severity::note);
+  EXPECT_EQ(findDiagnosticKind({"skipped_openings", 1, "door's"}).severity, Severity::note);
+  EXPECT_EQ(findDiagnosticKind({"uncut_opening", 1, "door"}).severity, Severity::error);
   EXPECT_NE(findDiagnosticKind({"uncut_opening", 1, "door"}).meaning, "");
   EXPECT_EQ(findDiagnosticKind({"of_a_later_version", 1, ""}).meaning, "");
 }

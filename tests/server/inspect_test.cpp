@@ -60,14 +60,45 @@ TEST_F(Inspect, DescribesThePathOfABody) {
   EXPECT_NEAR(body.at("keys").at(1).at("turn"), 3.14159265358979, 1e-12) << "radians";
 }
 
-TEST_F(Inspect, StrictEndsWithThreeWhenThereAreProblems) {
-  EXPECT_EQ(run({"inspect", path("room.obj"), "--strict", "--unit", "m"}).code, 0);
+TEST_F(Inspect, StrictFailsOnWarningsThatAreNotAccepted) {
+  const auto strictly = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"inspect", path("room.obj"), "--strict", "--unit", "m"});
+    return run(more);
+  };
+  EXPECT_EQ(strictly({}).code, 0);
   write(folder_ / "room.obj", smallRoomObj() + "o again\nf 1 2 3\nf 1 2 3\n");
+  const Ended notes = strictly({});
+  EXPECT_EQ(notes.code, 0) << "notes never fail";
+  EXPECT_NE(notes.out.find("note           1  duplicate_triangle"), std::string::npos) << notes.out;
+
+  write(folder_ / "room.obj", "mtllib absent.mtl\n" + smallRoomObj());
   EXPECT_EQ(run({"inspect", path("room.obj"), "--unit", "m"}).code, 0);
-  const Ended strict = run({"inspect", path("room.obj"), "--strict", "--unit", "m"});
-  EXPECT_EQ(strict.code, 3);
-  EXPECT_NE(strict.out.find("duplicate_triangle"), std::string::npos) << strict.out;
-  EXPECT_LT(std::count(strict.out.begin(), strict.out.end(), '\n'), 40);
+  const Ended failed = strictly({});
+  EXPECT_EQ(failed.code, 3);
+  EXPECT_NE(failed.err.find("--accept missing_material_file"), std::string::npos) << failed.err;
+  EXPECT_LT(std::count(failed.out.begin(), failed.out.end(), '\n'), 40);
+  EXPECT_EQ(strictly({"--accept", "no_unit"}).code, 3);
+  EXPECT_EQ(strictly({"--accept", "warnings"}).code, 0);
+  const Ended accepted = strictly({"--accept", "no_unit,missing_material_file", "--json"});
+  EXPECT_EQ(accepted.code, 0) << accepted.err;
+  const auto problem = nlohmann::json::parse(accepted.out).at("problems").at(0);
+  EXPECT_EQ(problem.at("kind"), "missing_material_file");
+  EXPECT_EQ(problem.at("severity"), "warning");
+  EXPECT_EQ(problem.at("accepted"), true);
+}
+
+TEST_F(Inspect, WritesAPageWithPlansAndEscapesTheFilesText) {
+  write(folder_ / "room.obj", "mtllib <b>absent.mtl\n" + smallRoomObj());
+  const Ended ended =
+      run({"inspect", path("room.obj"), "--unit", "m", "--html", path("report.html")});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const std::string page = textOf(path("report.html"));
+  EXPECT_NE(page.find("<h1>room.obj</h1>"), std::string::npos);
+  EXPECT_NE(page.find("missing_material_file"), std::string::npos);
+  EXPECT_NE(page.find("&lt;b&gt;absent.mtl"), std::string::npos);
+  EXPECT_EQ(page.find("<b>"), std::string::npos);
+  EXPECT_NE(page.find("src=\"data:image/png;base64,iVBORw0KGgo"), std::string::npos);
+  EXPECT_EQ(page.find("<script"), std::string::npos);
 }
 
 TEST_F(Inspect, DrawsAPlanOfEachStorey) {
@@ -102,6 +133,9 @@ TEST_F(Inspect, WrongUsageExitsWithTwoAndUnreadableFilesWithOne) {
       {"inspect", path("room.obj"), "--plan", ""},
       {"inspect", path("room.obj"), "--plan-format", "dxf"},
       {"inspect", path("room.obj"), "--plan-scale", "0"},
+      {"inspect", path("room.obj"), "--strict", "--accept", "no_unti"},
+      {"inspect", path("room.obj"), "--accept", "no_unit"},
+      {"inspect", path("room.obj"), "--html", ""},
       {"inspect", path("room.obj"), "--jsno"},
       {"inspect", path("room.obj"), "--up", "North"}};
   for (const auto& arguments : mistakes) {

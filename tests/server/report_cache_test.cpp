@@ -1,5 +1,5 @@
 // Tests of caching a scene's report.
-#include "server/commands/report_cache.hpp"
+#include "server/inspection/report_cache.hpp"
 
 #include <gtest/gtest.h>
 

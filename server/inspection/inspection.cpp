@@ -1,15 +1,15 @@
-#include "server/commands/inspection.hpp"
+#include "server/inspection/inspection.hpp"
 
 #include <sys/resource.h>
 
 #include <algorithm>
 #include <cstdarg>
 #include <cstdio>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "scene/model/diagnostic_catalog.hpp"
-#include "server/commands/report_cache.hpp"
+#include "server/inspection/report_cache.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -44,17 +44,23 @@ Json toJson(const scene::ShellCounts& shells) {
           {"closed", shells.closed},      {"open", shells.open}};
 }
 
-Json problemsToJson(const scene::SceneReport& report) {
+Json toJson(const std::vector<Problem>& problems) {
   Json list = Json::array();
-  for (const scene::Diagnostic& p : report.diagnostics) {
-    const scene::DiagnosticKind kind = scene::findDiagnosticKind(p);
-    list.push_back({{"kind", p.kind},
-                    {"count", p.count},
-                    {"example", p.example},
-                    {"note", kind.isNote},
-                    {"meaning", kind.meaning}});
-  }
+  for (const Problem& problem : problems)
+    list.push_back({{"kind", problem.diagnostic->kind},
+                    {"severity", toString(problem.kind.severity)},
+                    {"count", problem.diagnostic->count},
+                    {"example", problem.diagnostic->example},
+                    {"note", problem.kind.severity == scene::Severity::note},
+                    {"accepted", problem.accepted},
+                    {"meaning", problem.kind.meaning}});
   return list;
+}
+
+Json toJson(const std::vector<ClassCount>& classes) {
+  Json counts = Json::object();
+  for (const ClassCount& entry : classes) counts[entry.name] = entry.objects;
+  return counts;
 }
 
 Json objectsToJson(const scene::Scene& scene) {
@@ -186,14 +192,23 @@ void addLargest(const scene::Scene& scene, TextTable& table) {
   }
 }
 
-void addProblems(const scene::SceneReport& report, TextTable& table) {
-  table.appendLine("\nproblems: %s", report.diagnostics.empty() ? "none" : "");
-  for (const scene::Diagnostic& p : report.diagnostics) {
-    const scene::DiagnosticKind kind = scene::findDiagnosticKind(p);
-    table.appendLine("  %8zu  %-26s %s%.*s", p.count, p.kind.c_str(), kind.isNote ? "(valid) " : "",
-                     static_cast<int>(kind.meaning.size()), kind.meaning.data());
-    table.appendLine("            example: %s", p.example.c_str());
+void addProblems(const std::vector<Problem>& problems, TextTable& table) {
+  table.appendLine("\nproblems: %s", problems.empty() ? "none" : "");
+  for (const Problem& problem : problems) {
+    const std::string_view meaning = problem.kind.meaning;
+    table.appendLine("  %-7s %8zu  %-26s %s%.*s", toString(problem.kind.severity),
+                     problem.diagnostic->count, problem.diagnostic->kind.c_str(),
+                     problem.accepted ? "(accepted) " : "", static_cast<int>(meaning.size()),
+                     meaning.data());
+    table.appendLine("                    example: %s", problem.diagnostic->example.c_str());
   }
+}
+
+void addClasses(const scene::Model& model, TextTable& table) {
+  const std::vector<ClassCount> classes = countClasses(model);
+  if (!classes.empty()) table.appendLine("\nobjects by class");
+  for (const ClassCount& entry : classes)
+    table.appendLine("  %8zu  %s", entry.objects, entry.name.c_str());
 }
 
 /// Appends the number of bodies per kind and the names of the first ones.
@@ -233,7 +248,37 @@ Inspection makeInspection(LoadedScene loaded, const std::optional<scene::ModelCa
   return inspection;
 }
 
-std::string formatInspectionJson(const Inspection& inspection, bool objects) {
+std::vector<Problem> listProblems(const scene::SceneReport& report,
+                                  const std::vector<std::string>& accepted) {
+  const auto accepts = [&](std::string_view word) {
+    return std::find(accepted.begin(), accepted.end(), word) != accepted.end();
+  };
+  std::vector<Problem> problems;
+  for (const scene::Diagnostic& diagnostic : report.diagnostics) {
+    const scene::DiagnosticKind kind = scene::findDiagnosticKind(diagnostic);
+    const bool isWarning = kind.severity == scene::Severity::warning;
+    problems.push_back(
+        {&diagnostic, kind, accepts(diagnostic.kind) || (isWarning && accepts(kAllWarnings))});
+  }
+  std::stable_sort(problems.begin(), problems.end(), [](const Problem& a, const Problem& b) {
+    return a.kind.severity > b.kind.severity;
+  });
+  return problems;
+}
+
+std::vector<ClassCount> countClasses(const scene::Model& model) {
+  std::map<std::string, std::size_t> counts;
+  for (const scene::Object& object : model.objects)
+    if (!object.ifcClass.empty() && !object.partOf) ++counts[object.ifcClass];
+  std::vector<ClassCount> classes;
+  for (const auto& [name, objects] : counts) classes.push_back({name, objects});
+  std::stable_sort(classes.begin(), classes.end(),
+                   [](const ClassCount& a, const ClassCount& b) { return a.objects > b.objects; });
+  return classes;
+}
+
+std::string formatInspectionJson(const Inspection& inspection,
+                                 const std::vector<std::string>& accepted, bool objects) {
   const scene::Scene& scene = *inspection.loaded.scene;
   const scene::Model& model = scene.model();
   const scene::SceneReport& report = inspection.report;
@@ -254,8 +299,9 @@ std::string formatInspectionJson(const Inspection& inspection, bool objects) {
   all["convex_triangles"] = report.hullTriangles;
   all["triangle_parts"] = report.partTriangles;
   all["shells"] = toJson(report.shells);
+  all["classes"] = toJson(countClasses(model));
   all["bodies"] = bodiesToJson(model);
-  all["problems"] = problemsToJson(report);
+  all["problems"] = toJson(listProblems(report, accepted));
   all["import_seconds"] = inspection.loaded.importSeconds;
   all["load_seconds"] = inspection.loaded.loadSeconds;
   all["from_cache"] = inspection.loaded.fromCache;
@@ -264,12 +310,14 @@ std::string formatInspectionJson(const Inspection& inspection, bool objects) {
   return all.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
-std::string formatInspectionTable(const Inspection& inspection, bool objects) {
+std::string formatInspectionTable(const Inspection& inspection,
+                                  const std::vector<std::string>& accepted, bool objects) {
   TextTable table;
   addSummary(inspection, table);
   addLargest(*inspection.loaded.scene, table);
   addBodies(inspection.loaded.scene->model(), table);
-  addProblems(inspection.report, table);
+  addClasses(inspection.loaded.scene->model(), table);
+  addProblems(listProblems(inspection.report, accepted), table);
   if (objects) addObjects(*inspection.loaded.scene, table);
   return table.release();
 }

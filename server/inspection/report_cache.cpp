@@ -1,4 +1,4 @@
-#include "server/commands/report_cache.hpp"
+#include "server/inspection/report_cache.hpp"
 
 #include <spdlog/spdlog.h>
 

@@ -1,4 +1,4 @@
-#include "server/commands/inspect_recording.hpp"
+#include "server/inspection/inspect_recording.hpp"
 
 #include <algorithm>
 #include <cstdio>

@@ -1,0 +1,84 @@
+#include "server/inspection/inspect.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <filesystem>
+
+#include "protocol/mcap/reader.hpp"
+#include "render/image/atomic_file.hpp"
+#include "render/service/renderer_selector.hpp"
+#include "server/base/standard_output.hpp"
+#include "server/capture/capture_folder.hpp"
+#include "server/inspection/inspect_recording.hpp"
+#include "server/inspection/inspection.hpp"
+#include "server/inspection/inspection_html.hpp"
+#include "server/plans/floor_plans.hpp"
+
+namespace enfilade::server {
+namespace {
+
+PlanRenderer makePlanRenderer(render::RendererSelector& renderer) {
+  return [&renderer](const render::Camera& camera) {
+    const render::Frame frame = renderer.render(scene::Snapshot(), camera);
+    return std::optional(PlanPicture{render::toImage(frame), frame.ids});
+  };
+}
+
+void writePlans(const std::shared_ptr<const scene::Scene>& scene, const InspectCommand& command) {
+  render::RendererSelector renderer(scene);
+  const PlanRenderer picture = makePlanRenderer(renderer);
+  int number = 0;
+  for (const StoreyFloor& storey : findStoreys(*scene)) {
+    const auto file =
+        command.plan / ("storey-" + std::to_string(++number) + "." + command.planFormat);
+    if (command.planFormat == "png") {
+      render::writePng(file, drawStoreyPlan(*scene, storey, picture).value());
+    } else {
+      writeStoreyPage(*scene, storey, picture, command.planScale, file);
+    }
+    spdlog::info("floor at {:.2f} m: {}", storey.height, file.string());
+  }
+}
+
+void writePage(const Inspection& inspection, const InspectCommand& command) {
+  const std::shared_ptr<const scene::Scene>& scene = inspection.loaded.scene;
+  render::RendererSelector renderer(scene);
+  const PlanRenderer picture = makePlanRenderer(renderer);
+  std::vector<StoreyPlan> plans;
+  for (const StoreyFloor& storey : findStoreys(*scene))
+    plans.push_back(
+        {storey.name.empty() ? fmt::format("Floor at {:.2f} m", storey.height) : storey.name,
+         drawStoreyPlan(*scene, storey, picture).value()});
+  render::writeFileAtomically(command.html,
+                              formatInspectionHtml(inspection, command.accepted, plans));
+  spdlog::info("report: {}", command.html.string());
+}
+
+/// Logs the kinds that fail the check, with the option that accepts them.
+ExitCode checkProblems(const scene::SceneReport& report, const std::vector<std::string>& accepted) {
+  std::string kinds;
+  for (const Problem& problem : listProblems(report, accepted))
+    if (problem.fails()) kinds += (kinds.empty() ? "" : ",") + problem.diagnostic->kind;
+  if (kinds.empty()) return ExitCode::success;
+  spdlog::error("--strict: the scene has problems; --accept {} accepts them", kinds);
+  return ExitCode::violations;
+}
+
+}  // namespace
+
+ExitCode inspect(const InspectCommand& command) {
+  if (protocol::mcap::isMcap(command.model.file))
+    return inspectRecording(command.model.file, command.json, command.strict);
+  if (!command.plan.empty()) prepareFolder(command.plan, "--plan");
+  const Inspection inspection =
+      makeInspection(loadSceneTimed(command.model),
+                     command.model.cache ? scene::modelCacheFromEnvironment() : std::nullopt);
+  writeToStdout(command.json
+                    ? formatInspectionJson(inspection, command.accepted, command.objects) + "\n"
+                    : formatInspectionTable(inspection, command.accepted, command.objects));
+  if (!command.plan.empty()) writePlans(inspection.loaded.scene, command);
+  if (!command.html.empty()) writePage(inspection, command);
+  return command.strict ? checkProblems(inspection.report, command.accepted) : ExitCode::success;
+}
+
+}  // namespace enfilade::server

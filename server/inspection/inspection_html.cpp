@@ -1,0 +1,98 @@
+#include "server/inspection/inspection_html.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "scene/model/diagnostic_catalog.hpp"
+#include "server/base/version.hpp"
+#include "server/inspection/html_page.hpp"
+
+namespace enfilade::server {
+namespace {
+
+using Row = std::vector<HtmlCell>;
+using Vec3 = scene::Vec3;
+
+std::string formatPoint(const Vec3& point) {
+  return fmt::format("{:.3f}, {:.3f}, {:.3f} m", point.x(), point.y(), point.z());
+}
+
+void addFacts(const Inspection& inspection, HtmlPage& page) {
+  const scene::Scene& scene = *inspection.loaded.scene;
+  const scene::SceneReport& report = inspection.report;
+  const Vec3 size = scene.bounds().empty() ? Vec3::Zero().eval() : scene.bounds().size();
+  const std::size_t convex = report.shells.exact + report.shells.nearlyConvex;
+  page.addFacts(
+      {{"Size", fmt::format("{:.2f} × {:.2f} × {:.2f} m (y is up)", size.x(), size.y(), size.z())},
+       {"Unit, up axis",
+        fmt::format("{} m, {}", scene.model().metresPerUnit, std::string(1, scene.model().upAxis))},
+       {"Subtracted from the file", formatPoint(scene.model().offset)},
+       {"Objects", fmt::format("{}, of which {} are solid", report.objects, report.solidObjects)},
+       {"Meshes", fmt::format("{}", report.meshes)},
+       {"Triangles", fmt::format("{}; {} in the meshes", report.triangles, report.uniqueTriangles)},
+       {"Collision", fmt::format("{} convex parts replace {} triangles; {} triangles remain",
+                                 convex, report.hullTriangles, report.partTriangles)},
+       {"Import", fmt::format("{:.2f} s", inspection.loaded.importSeconds)}});
+}
+
+void addProblems(const Inspection& inspection, const std::vector<std::string>& accepted,
+                 HtmlPage& page) {
+  page.addHeading("Problems");
+  std::vector<Row> rows;
+  for (const Problem& problem : listProblems(inspection.report, accepted))
+    rows.push_back({{toString(problem.kind.severity), toString(problem.kind.severity)},
+                    {fmt::format("{}", problem.diagnostic->count), "number"},
+                    {problem.diagnostic->kind + (problem.accepted ? " (accepted)" : ""), "name"},
+                    {std::string(problem.kind.meaning)},
+                    {problem.diagnostic->example}});
+  if (rows.empty()) return page.addParagraph("None.");
+  page.addTable({{"Severity"}, {"Count", "number"}, {"Kind"}, {"Meaning"}, {"Example"}}, rows);
+}
+
+void addClasses(const scene::Model& model, HtmlPage& page) {
+  const std::vector<ClassCount> classes = countClasses(model);
+  if (classes.empty()) return;
+  page.addHeading("Objects by class");
+  std::vector<Row> rows;
+  for (const ClassCount& entry : classes)
+    rows.push_back({{entry.name}, {fmt::format("{}", entry.objects), "number"}});
+  page.addTable({{"Class"}, {"Objects", "number"}}, rows);
+}
+
+void addBodies(const scene::Model& model, HtmlPage& page) {
+  page.addHeading("Moving bodies");
+  if (model.bodies.empty()) return page.addParagraph("None; all objects are static.");
+  std::vector<Row> rows;
+  for (const scene::BodySpec& body : model.bodies)
+    rows.push_back({{body.name},
+                    {toString(body.kind)},
+                    {toString(body.source)},
+                    {model.objects[body.objects.front()].path}});
+  page.addTable({{"Name"}, {"Kind"}, {"Source"}, {"Object"}}, rows);
+}
+
+void addPlans(const std::vector<StoreyPlan>& plans, HtmlPage& page) {
+  if (plans.empty()) return;
+  page.addHeading("Floor plans");
+  for (const StoreyPlan& plan : plans) page.addImage(plan.image, plan.caption);
+}
+
+}  // namespace
+
+std::string formatInspectionHtml(const Inspection& inspection,
+                                 const std::vector<std::string>& accepted,
+                                 const std::vector<StoreyPlan>& plans) {
+  const scene::Model& model = inspection.loaded.scene->model();
+  const std::string file = model.source.substr(model.source.find_last_of('/') + 1);
+  const std::string reader = model.reader.empty() ? "" : "read by " + model.reader + "; ";
+  HtmlPage page(file, reader + "report by " + formatVersion());
+  addFacts(inspection, page);
+  addProblems(inspection, accepted, page);
+  addPlans(plans, page);
+  addClasses(model, page);
+  addBodies(model, page);
+  return page.finish();
+}
+
+}  // namespace enfilade::server
