@@ -14,7 +14,6 @@ namespace {
 namespace pb = google::protobuf;
 
 constexpr const char* kCommandsTopic = "/enfilade/commands";
-constexpr const char* kStateTopic = "/enfilade/state";
 constexpr const char* kNamesTopic = "/enfilade/names";
 
 void addWithImports(const pb::FileDescriptor& file, pb::FileDescriptorSet& set,
@@ -25,10 +24,7 @@ void addWithImports(const pb::FileDescriptor& file, pb::FileDescriptorSet& set,
 }
 
 mcap::ChannelSpec makeChannelSpec(const std::string& topic, const pb::Descriptor& message) {
-  pb::FileDescriptorSet set;
-  std::set<std::string> known;
-  addWithImports(*message.file(), set, known);
-  return {topic, "protobuf", message.full_name(), "protobuf", set.SerializeAsString()};
+  return {topic, "protobuf", message.full_name(), "protobuf", serializeSchema(message)};
 }
 
 /// True if the message's time is valid. Messages without a time are valid.
@@ -134,6 +130,13 @@ std::string toHex(std::uint64_t hash) {
   std::string text;
   for (int shift = 60; shift >= 0; shift -= 4) text.push_back(kDigits[(hash >> shift) & 15]);
   return text;
+}
+
+std::string serializeSchema(const pb::Descriptor& message) {
+  pb::FileDescriptorSet set;
+  std::set<std::string> known;
+  addWithImports(*message.file(), set, known);
+  return set.SerializeAsString();
 }
 
 RecordingWriter::RecordingWriter(const std::filesystem::path& file, const std::string& library,

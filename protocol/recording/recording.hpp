@@ -14,6 +14,10 @@
 
 namespace enfilade::protocol {
 
+/// A FileDescriptorSet with the message's file and all its imports, as bytes: the schema of
+/// channels with encoding "protobuf".
+std::string serializeSchema(const google::protobuf::Descriptor& message);
+
 /// Writes a recording. All functions throw mcap::RecordingError.
 class RecordingWriter {
  public:
@@ -59,6 +63,7 @@ using RecordedItem = std::variant<v1::RecordingStart, v1::RecordedCommands, v1::
 std::optional<RecordedItem> parseRecordedItem(const mcap::Message& message,
                                               const std::filesystem::path& file);
 inline constexpr const char* kStartTopic = "/enfilade/start";
+inline constexpr const char* kStateTopic = "/enfilade/state";
 inline constexpr const char* kEventsTopic = "/enfilade/events";
 inline constexpr const char* kCheckpointTopic = "/enfilade/checkpoint";
 

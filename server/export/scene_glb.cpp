@@ -34,12 +34,13 @@ class SceneWriter {
   explicit SceneWriter(const scene::Scene& scene)
       : scene_(scene), model_(scene.model()), equalMaterials_(findEqualMaterials(model_)) {}
 
-  SceneGlb write() {
+  SceneGlb write(GlbContent content) {
     const DrawGroups groups = makeDrawGroups(model_);
     requireWritable(groups);
     for (const MeshBatch& batch : groups.batches) addBatch(batch);
     for (const InstanceGroup& group : groups.instanced) addInstances(group);
-    for (const std::uint32_t body : groups.bodies) addBody(body);
+    if (content == GlbContent::everything)
+      for (const std::uint32_t body : groups.bodies) addBody(body);
     if (!groups.instanced.empty()) {
       file_.root["extensionsUsed"] = {kInstancing};
       // A viewer that ignored the extension would draw one instance in the wrong place.
@@ -279,8 +280,8 @@ GlbJson SceneWriter::makeSceneExtras() const {
 
 }  // namespace
 
-SceneGlb writeSceneGlb(const scene::Scene& scene) {
-  return SceneWriter(scene).write();
+SceneGlb writeSceneGlb(const scene::Scene& scene, GlbContent content) {
+  return SceneWriter(scene).write(content);
 }
 
 }  // namespace enfilade::server

@@ -35,7 +35,12 @@ struct SceneGlb {
   std::size_t drawGroups = 0;  ///< draw calls of a viewer that draws every primitive once
 };
 
+enum class GlbContent : std::uint8_t {
+  everything,
+  staticObjects  ///< no bodies: the viewer receives them in another way
+};
+
 /// Throws std::runtime_error if the scene exceeds the format: 4 GiB or 2^24 objects.
-SceneGlb writeSceneGlb(const scene::Scene& scene);
+SceneGlb writeSceneGlb(const scene::Scene& scene, GlbContent content = GlbContent::everything);
 
 }  // namespace enfilade::server

@@ -106,6 +106,7 @@ void broadcastTick(HostedWorld& hosted, const RecordableWorld::TickResult& resul
     --client.pendingStep->remaining;
     ++client.pendingStep->completed;
   }
+  for (auto& [id, viewer] : hosted.viewers) viewer.onTick(hosted.world, events);
   renderRecorded(hosted);
 }
 

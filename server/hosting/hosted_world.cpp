@@ -66,6 +66,7 @@ void stopAvatar(HostedWorld& hosted, const std::string& avatar) {
 }
 
 void removeClient(HostedWorld& hosted, ClientId id) {
+  hosted.viewers.erase(id);
   if (hosted.clients.erase(id) == 0) return;
   hosted.horizonSelectionChanged = true;
   if (hosted.clock.driver == id) hosted.clock.driver.reset();

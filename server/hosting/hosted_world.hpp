@@ -18,6 +18,7 @@
 #include "server/hosting/flow_control.hpp"
 #include "server/hosting/frame_service.hpp"
 #include "server/hosting/query_service.hpp"
+#include "server/hosting/viewer_feed.hpp"
 #include "server/hosting/world_options.hpp"
 #include "server/messages/outgoing_queue.hpp"
 #include "server/messages/tick_statistics.hpp"
@@ -130,7 +131,8 @@ struct HostedWorld {
   /// order until the avatar and its orders are gone.
   std::map<std::string, ClientId> owners;
   std::set<std::string> pendingRelease;  ///< names in `owners` that may become free
-  std::map<std::pair<scene::EntityId, scene::EntityId>, v1::ContactEvent> activeContacts;
+  ActiveContacts activeContacts;
+  std::map<ClientId, ViewerFeed> viewers;  ///< of clients that are viewers
   std::unique_ptr<scene::ContactHorizons> horizons;  ///< null before the first subscriber
   bool horizonSelectionChanged = false;              ///< a client subscribed or left
   TickStatistics statistics;

@@ -6,15 +6,19 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
+#include <stdexcept>
 
 #include "scene/model/hasher.hpp"
 #include "server/export/gzip.hpp"
 #include "server/export/scene_glb.hpp"
+#include "server/recording/foxglove/primitives.hpp"
 
 namespace enfilade::server {
 namespace {
 
 using FileBytes = std::vector<std::uint8_t>;
+
+constexpr std::size_t kMaxViewerModelBytes = std::size_t{1} << 30;  // protobuf ends at 2 GiB
 
 std::uint64_t hashContent(const FileBytes& bytes) {
   scene::Hasher hasher;
@@ -27,9 +31,9 @@ std::uint64_t hashContent(const FileBytes& bytes) {
   return hasher.value();
 }
 
-SceneFile makeSceneFile(const scene::Scene& scene) {
+SceneFile makeSceneFile(const scene::Scene& scene, GlbContent content) {
   const auto start = std::chrono::steady_clock::now();
-  SceneGlb glb = writeSceneGlb(scene);
+  SceneGlb glb = writeSceneGlb(scene, content);
   SceneFile file;
   file.bytes = std::make_shared<const FileBytes>(std::move(glb.bytes));
   file.tag = fmt::format("{:016x}-{:016x}", scene.hash(), hashContent(*file.bytes));
@@ -40,15 +44,26 @@ SceneFile makeSceneFile(const scene::Scene& scene) {
   return file;
 }
 
+SceneFile makeViewerScene(const scene::Scene& scene) {
+  const SceneFile file = makeSceneFile(scene, GlbContent::staticObjects);
+  if (file.bytes->size() > kMaxViewerModelBytes)
+    throw std::runtime_error("it has more than 1 GiB, the limit of viewers' messages");
+  foxglove::SceneUpdate update;
+  *update.add_entities() = makeModelEntity(*file.bytes);
+  FileBytes bytes(update.ByteSizeLong());
+  update.SerializeWithCachedSizesToArray(bytes.data());
+  return {std::make_shared<const FileBytes>(std::move(bytes)), "", ""};
+}
+
 }  // namespace
 
 SceneFileService::SceneFileService(std::shared_ptr<const scene::Scene> scene)
     : scene_(std::move(scene)) {}
 
-void SceneFileService::request(bool compressed, std::function<void(const SceneFile&)> done) {
-  thread_.post([this, compressed, done = std::move(done)] {
+void SceneFileService::request(SceneFileKind kind, std::function<void(const SceneFile&)> done) {
+  thread_.post([this, kind, done = std::move(done)] {
     try {
-      done(provide(compressed));
+      done(provide(kind));
     } catch (const std::exception& error) {  // too large, or no memory
       spdlog::error("scene.glb: {}", error.what());
       done({nullptr, "", error.what()});
@@ -56,9 +71,13 @@ void SceneFileService::request(bool compressed, std::function<void(const SceneFi
   });
 }
 
-const SceneFile& SceneFileService::provide(bool compressed) {
-  if (!plain_.bytes) plain_ = makeSceneFile(*scene_);
-  if (!compressed) return plain_;
+const SceneFile& SceneFileService::provide(SceneFileKind kind) {
+  if (kind == SceneFileKind::viewerScene) {
+    if (!viewerScene_.bytes) viewerScene_ = makeViewerScene(*scene_);
+    return viewerScene_;
+  }
+  if (!plain_.bytes) plain_ = makeSceneFile(*scene_, GlbContent::everything);
+  if (kind == SceneFileKind::glb) return plain_;
   if (!compressed_.bytes)
     compressed_ = {std::make_shared<const FileBytes>(gzip(*plain_.bytes)), plain_.tag, ""};
   return compressed_;

@@ -1,6 +1,7 @@
 // Makes the GLB file of a scene at its first request, on a thread of its own, and keeps it.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -21,22 +22,28 @@ struct SceneFile {
   std::string error;
 };
 
+enum class SceneFileKind : std::uint8_t {
+  glb,
+  gzip,        ///< the GLB file, compressed
+  viewerScene  ///< a foxglove.SceneUpdate with the GLB file without bodies
+};
+
 class SceneFileService {
  public:
   explicit SceneFileService(std::shared_ptr<const scene::Scene> scene);
 
-  /// `done` receives the file on the service's thread, compressed on request. Requests during the
-  /// making wait for the same file.
-  void request(bool compressed, std::function<void(const SceneFile&)> done);
+  /// `done` receives the file on the service's thread. Requests during the making wait for the same
+  /// file.
+  void request(SceneFileKind kind, std::function<void(const SceneFile&)> done);
   /// Waits for all requests. Make no requests afterwards.
   void finish() { thread_.finish(); }
 
  private:
-  const SceneFile& provide(bool compressed);
+  const SceneFile& provide(SceneFileKind kind);
 
   const std::shared_ptr<const scene::Scene> scene_;
   // Only on the thread.
-  SceneFile plain_, compressed_;
+  SceneFile plain_, compressed_, viewerScene_;
   WorkThread thread_;  // last member: it uses the others
 };
 

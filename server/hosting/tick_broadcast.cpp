@@ -93,6 +93,7 @@ void sendState(HostedWorld& hosted, Client& client, const scene::Snapshot& snaps
 void broadcastEvents(HostedWorld& hosted, const v1::TickEvents& events) {
   TickBroadcast shared{events};
   for (auto& [id, client] : hosted.clients) sendEvents(client, shared);
+  for (auto& [id, viewer] : hosted.viewers) viewer.onEvents(events);
 }
 
 }  // namespace enfilade::server

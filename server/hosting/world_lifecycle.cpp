@@ -42,6 +42,7 @@ void resetWorld(HostedWorld& hosted) {
   hosted.pendingRelease.clear();
   hosted.activeContacts.clear();
   hosted.idle = true;
+  for (auto& [id, viewer] : hosted.viewers) viewer.onReplaced(hosted.world, hosted.activeContacts);
 }
 
 void replaceWorld(HostedWorld& hosted, scene::World world, const v1::TickEvents& activeContacts) {
@@ -62,6 +63,7 @@ void replaceWorld(HostedWorld& hosted, scene::World world, const v1::TickEvents&
     sendState(hosted, client, *hosted.world.snapshot(), shared);
     renderSubscribed(hosted, id, client);
   }
+  for (auto& [id, viewer] : hosted.viewers) viewer.onReplaced(hosted.world, hosted.activeContacts);
 }
 
 v1::Bye makeBye(v1::ErrorCode code, const std::string& reason) {
@@ -90,6 +92,7 @@ void abortWorld(HostedWorld& hosted) {
   ENFILADE_ASSERT(hosted.closeNotice);
   for (auto& [id, client] : hosted.clients) sendBye(client, *hosted.closeNotice);
   hosted.clients.clear();
+  hosted.viewers.clear();
 }
 
 }  // namespace enfilade::server

@@ -10,7 +10,8 @@
 #include <utility>
 
 #include "collision/assert.hpp"
-#include "protocol/framing.hpp"
+#include "server/messages/decode_message.hpp"
+#include "server/net/foxglove_session.hpp"
 #include "server/net/http_pages.hpp"
 #include "server/net/session.hpp"
 #include "server/net/tcp_transport.hpp"
@@ -135,9 +136,12 @@ bool HttpSession::findWorlds(const Target& target) {
 }
 
 void HttpSession::upgrade(Request request) {
-  const std::string token = extractToken(toStdString(request[http::field::authorization]),
-                                         parseTarget(toStdString(request.target())));
+  const Target target = parseTarget(toStdString(request.target()));
+  const std::string token = extractToken(toStdString(request[http::field::authorization]), target);
   if (path_ != "/") return refuse(404, "the WebSocket is at /");
+  const std::string viewer = foxglove_protocol::chooseSubprotocol(
+      toStdString(request[http::field::sec_websocket_protocol]));
+  if (!viewer.empty()) return upgradeToViewer(std::move(request), viewer, target, token);
   closed_ = true;  // the session takes the socket
   timer_.cancel();
   const auto executor = socket_.get_executor();
@@ -145,6 +149,22 @@ void HttpSession::upgrade(Request request) {
       std::make_unique<WebSocketTransport>(std::move(socket_), std::move(request)), executor,
       context_);
   session->start(deadline_, token);
+  registerConnection(context_, session);
+}
+
+/// The Foxglove protocol has no greeting of clients: token and world are parts of the address.
+void HttpSession::upgradeToViewer(Request request, const std::string& subprotocol,
+                                  const Target& target, const std::string& token) {
+  const auto role = findRole(context_.access, token);
+  if (!role) return refuse(401, "this server requires a token: ws://HOST:PORT/?token=TOKEN");
+  const auto named = target.query.find("world");
+  auto world = context_.worlds.find(named == target.query.end() ? "" : named->second);
+  if (!world) return refuse(404, "unknown world");
+  closed_ = true;  // the session takes the socket
+  timer_.cancel();
+  const auto session = std::make_shared<FoxgloveSession>(
+      std::move(socket_), std::move(request), subprotocol, context_, std::move(world), *role);
+  session->start();
   registerConnection(context_, session);
 }
 
@@ -177,8 +197,9 @@ void HttpSession::requestSceneFile(const Target& target) {
   timer_.expires_at(Clock::time_point::max());
   const bool compressed = acceptsGzip(acceptEncoding_);
   context_.worlds.sceneFileOf(*world).request(
-      compressed, [weak = weak_from_this(), executor = socket_.get_executor(),
-                   compressed](const SceneFile& file) {
+      compressed ? SceneFileKind::gzip : SceneFileKind::glb,
+      [weak = weak_from_this(), executor = socket_.get_executor(),
+       compressed](const SceneFile& file) {
         asio::post(executor, [weak, file, compressed] {
           if (const auto self = weak.lock()) self->sendSceneFile(file, compressed);
         });
@@ -252,16 +273,8 @@ void HttpSession::pollWorld(WorldReply& reply) {
     const OutgoingQueue::Next next = reply.queue->pop();
     if (!next.message) return;
     reply.ended = next.last;
-    protocol::Decoder decoder(protocol::kClientLimits, protocol::Decoder::Expect::messages);
-    std::span<const std::uint8_t> bytes(*next.message.head);
-    auto framed = decoder.next(bytes);
-    if (!framed && next.message.body) {
-      bytes = *next.message.body;
-      framed = decoder.next(bytes);
-    }
-    v1::ServerMessage message;
-    if (framed && protocol::parseHeader(framed->header, message))
-      handleReply(reply, std::move(message), std::move(framed->attachment));
+    if (auto decoded = decodeMessage(next.message))
+      handleReply(reply, std::move(decoded->message), std::move(decoded->attachment));
   }
 }
 

@@ -33,6 +33,8 @@ class HttpSession : public ClientConnection, public std::enable_shared_from_this
 
   void route(Request request);
   void upgrade(Request request);
+  void upgradeToViewer(Request request, const std::string& subprotocol, const Target& target,
+                       const std::string& token);
   void sendResponse(unsigned status, const std::string& type, std::string body);
   void refuse(unsigned status, const std::string& reason);
   void write(Buffer bytes, bool last, std::size_t offset = 0);

@@ -41,6 +41,13 @@ v1::RecordingStart makeRecordingStart(const scene::World& world, const ModelOpti
   return start;
 }
 
+ViewerSink makeFileSink(protocol::RecordingWriter& file) {
+  return {[&file](const std::string& topic, double time, const google::protobuf::Message& message) {
+            file.write(topic, time, message);
+          },
+          [&file](double time) { return file.fileTime(time); }};
+}
+
 /// The object's GlobalId. A part has the GlobalId of its whole, followed by the part's name.
 std::string findPersistentId(const scene::Model& model, const scene::Object& object) {
   if (!object.globalId.empty() || !object.partOf) return object.globalId;
@@ -62,7 +69,8 @@ WorldRecorder::WorldRecorder(const RecordingOptions& options, const scene::World
   file_.write(start, world.snapshot()->time);
   writeNames(world.scene().model());
   if (branch) writeCheckpoint(world);
-  if (options.choice.forViewers) viewerChannels_.emplace(file_).writeScene(world);
+  if (options.choice.forViewers)
+    viewerChannels_.emplace(makeFileSink(file_), StaticObjects::asPrimitives).writeScene(world);
   if (branch) onEvents(branch->activeContacts);
 }
 

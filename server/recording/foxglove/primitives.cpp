@@ -153,6 +153,20 @@ foxglove::SceneEntity makeStaticEntity(const scene::Scene& scene, std::size_t ma
   return entity;
 }
 
+foxglove::SceneEntity makeModelEntity(std::span<const std::uint8_t> glb) {
+  foxglove::SceneEntity entity;
+  entity.set_id("still");
+  entity.set_frame_id("map");  // viewers rotate glTF to Z up, the convention of this frame
+  entity.set_frame_locked(true);
+  foxglove::ModelPrimitive& model = *entity.add_models();
+  *model.mutable_pose()->mutable_position() = toVector(scene::Vec3::Zero());
+  *model.mutable_pose()->mutable_orientation() = toQuaternion(Eigen::Quaterniond::Identity());
+  *model.mutable_scale() = toVector(scene::Vec3::Ones());
+  model.set_media_type("model/gltf-binary");
+  model.set_data(glb.data(), glb.size());
+  return entity;
+}
+
 foxglove::SceneEntity makeBodyEntity(const scene::Scene& scene, std::size_t body) {
   const scene::BodySpec& spec = scene.model().bodies[body];
   foxglove::SceneEntity entity;

@@ -1,6 +1,9 @@
 // Conversion of Enfilade's plain data to Foxglove messages.
 #pragma once
 
+#include <cstdint>
+#include <span>
+
 #include "protocol/foxglove.pb.h"
 #include "scene/world/world.hpp"
 
@@ -23,6 +26,8 @@ foxglove::CubePrimitive makeCube(const scene::Aabb& box, const foxglove::Color& 
 /// object if there are at most `maxBoxes`, otherwise the AABB of the scene.
 foxglove::SceneEntity makeStaticEntity(const scene::Scene& scene, std::size_t maxTriangles,
                                        std::size_t maxBoxes);
+/// A glTF file as the static objects.
+foxglove::SceneEntity makeModelEntity(std::span<const std::uint8_t> glb);
 /// The objects of body `body`, in the body's frame.
 foxglove::SceneEntity makeBodyEntity(const scene::Scene& scene, std::size_t body);
 /// The avatar's parts and name, in the avatar's frame.

@@ -17,9 +17,6 @@ constexpr std::size_t kMaxTriangles = 100'000, kMaxBoxes = 20'000;
 constexpr double kMarkerDiameter = 0.08;  // metres, of a contact's sphere
 const Eigen::Vector3f kMarkerColour{0.9f, 0.05f, 0.1f};
 
-constexpr const char* kTransformTopic = "/tf";
-constexpr const char* kSceneTopic = "/scene";
-
 foxglove::FrameTransform makeTransform(double time, const std::string& parent,
                                        const std::string& child, const scene::Vec3& translation,
                                        const Eigen::Quaterniond& rotation) {
@@ -78,28 +75,43 @@ bool hasKind(const v1::ContactEvent& event, v1::ContactEvent::Kind kind) {
 
 }  // namespace
 
+std::string makeImageTopic(const std::string& avatar) {
+  return "/frames/" + avatar + "/image";
+}
+
+std::string makeCalibrationTopic(const std::string& avatar) {
+  return "/frames/" + avatar + "/calibration";
+}
+
 void ViewerChannels::writeScene(const scene::World& world) {
   const scene::Scene& scene = world.scene();
   foxglove::SceneUpdate update;
   foxglove::SceneEntityDeletion& deleteAll = *update.add_deletions();
   deleteAll.set_type(foxglove::SceneEntityDeletion::ALL);
-  *deleteAll.mutable_timestamp() = toTimestamp(file_.fileTime(0));
-  *update.add_entities() = makeStaticEntity(scene, kMaxTriangles, kMaxBoxes);
+  *deleteAll.mutable_timestamp() = toTimestamp(sink_.stampTime(0));
+  if (staticObjects_ == StaticObjects::asPrimitives)
+    *update.add_entities() = makeStaticEntity(scene, kMaxTriangles, kMaxBoxes);
   for (std::size_t body = 0; body < scene.model().bodies.size(); ++body)
     if (!isTrigger(scene.model().bodies[body].kind))
       *update.add_entities() = makeBodyEntity(scene, body);
   for (foxglove::SceneEntity& entity : *update.mutable_entities())
     *entity.mutable_timestamp() = deleteAll.timestamp();
-  file_.write(kSceneTopic, 0, update);
+  sink_.write(kSceneTopic, 0, update);
   shownShapes_.clear();
   nextTransformTime_ = 0;
   writeTransforms(world, true);
 }
 
+void ViewerChannels::writePresent(const scene::World& world) {
+  nextTransformTime_ = 0;
+  writeTransforms(world, true);
+  writeAvatars(world);
+}
+
 /// `includeStatic`: also writes the root transform and the bodies at their initial poses.
 void ViewerChannels::writeTransforms(const scene::World& world, bool includeStatic) {
   const scene::Snapshot& snapshot = *world.snapshot();
-  const double time = file_.fileTime(snapshot.time);
+  const double time = sink_.stampTime(snapshot.time);
   foxglove::FrameTransforms transforms;
   const auto addTransform = [&](const std::string& parent, const std::string& child,
                                 const scene::Vec3& at, const Eigen::Quaterniond& rotation) {
@@ -116,12 +128,12 @@ void ViewerChannels::writeTransforms(const scene::World& world, bool includeStat
     if (includeStatic || body.displaced || body.moving)
       addTransform("scene", "body/" + world.scene().model().bodies[body.index].name,
                    body.pose.translation, Eigen::Quaterniond(body.pose.rotation));
-  if (!transforms.transforms().empty()) file_.write(kTransformTopic, snapshot.time, transforms);
+  if (!transforms.transforms().empty()) sink_.write(kTransformTopic, snapshot.time, transforms);
 }
 
 void ViewerChannels::writeAvatars(const scene::World& world) {
   const scene::Snapshot& snapshot = *world.snapshot();
-  const double time = file_.fileTime(snapshot.time);
+  const double time = sink_.stampTime(snapshot.time);
   foxglove::SceneUpdate update;
   auto before = std::exchange(shownShapes_, {});
   for (const scene::AvatarSnapshot& avatar : snapshot.avatars) {
@@ -134,12 +146,12 @@ void ViewerChannels::writeAvatars(const scene::World& world) {
   for (const auto& [name, shape] : before)
     *update.add_deletions() = makeDeletion(time, "avatar/" + name);
   if (!update.entities().empty() || !update.deletions().empty())
-    file_.write(kSceneTopic, snapshot.time, update);
+    sink_.write(kSceneTopic, snapshot.time, update);
 }
 
 void ViewerChannels::writeContacts(const v1::TickEvents& events) {
   foxglove::SceneUpdate update;
-  const double time = file_.fileTime(events.time());
+  const double time = sink_.stampTime(events.time());
   for (const v1::ContactEvent& event : events.contacts()) {
     if (hasKind(event, v1::ContactEvent::KIND_BEGIN))
       *update.add_entities() = makeContactMarker(event, time);
@@ -147,7 +159,7 @@ void ViewerChannels::writeContacts(const v1::TickEvents& events) {
       *update.add_deletions() = makeDeletion(time, makeContactId(event));
   }
   if (!update.entities().empty() || !update.deletions().empty())
-    file_.write(kSceneTopic, events.time(), update);
+    sink_.write(kSceneTopic, events.time(), update);
 }
 
 void ViewerChannels::writeTick(const scene::World& world, const v1::TickEvents& events) {
@@ -168,13 +180,13 @@ void ViewerChannels::writeEvents(const v1::TickEvents& events) {
 
 void ViewerChannels::writeImage(const std::string& avatar, const v1::Frame& description,
                                 const EncodedImage& encodedImage) {
-  const std::string topic = "/frames/" + avatar, frame = "eyes/" + avatar;
+  const std::string frame = "eyes/" + avatar;
   foxglove::CompressedImage image;
-  *image.mutable_timestamp() = toTimestamp(file_.fileTime(description.time()));
+  *image.mutable_timestamp() = toTimestamp(sink_.stampTime(description.time()));
   image.set_frame_id(frame);
   image.set_format(encodedImage.format);
   image.set_data(encodedImage.bytes.data(), encodedImage.bytes.size());
-  file_.write(topic + "/image", description.time(), image);
+  sink_.write(makeImageTopic(avatar), description.time(), image);
   if (!description.has_intrinsics()) return;
   const v1::Intrinsics& intrinsics = description.intrinsics();
   foxglove::CameraCalibration calibration;
@@ -189,7 +201,7 @@ void ViewerChannels::writeImage(const std::string& avatar, const v1::Frame& desc
   for (const double p : {intrinsics.fx(), 0.0, intrinsics.cx(), 0.0, 0.0, intrinsics.fy(),
                          intrinsics.cy(), 0.0, 0.0, 0.0, 1.0, 0.0})
     calibration.add_p(p);
-  file_.write(topic + "/calibration", description.time(), calibration);
+  sink_.write(makeCalibrationTopic(avatar), description.time(), calibration);
 }
 
 }  // namespace enfilade::server
