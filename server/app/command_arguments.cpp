@@ -350,11 +350,22 @@ void addExportOptions(CLI::App& verb, CommandArguments& into) {
           "--out", into.out,
           "RECORDING: folder for contacts.jsonl, trajectories in TUM format, and cameras.glb")
       ->check(CLI::Validator(validateFolder, "DIR"));
+  verb.add_option("RECORDING", into.script, "A recording, if SCENE is the model to show it in");
+  verb.add_option("--html", into.html,
+                  "RECORDING: file that replays the walk in a browser, without a server")
+      ->check(CLI::Validator(validateFile, "FILE"));
+  addRun(verb, into, "1");
+  verb.add_option("--max-size", into.maxMegabytes,
+                  "Size of the --html file; above it, textures are left out first, then pictures")
+      ->type_name("MB")
+      ->check(CLI::Range(1.0, 2000.0))
+      ->capture_default_str();
   verb.footer(
       "Uses:\n"
-      "  enfilade export SCENE --glb FILE       the scene for viewers, as at /scene.glb\n"
-      "  enfilade export RECORDING --out DIR    contacts, trajectories and cameras\n"
-      "Example: enfilade export house.ifc --glb house.glb");
+      "  enfilade export SCENE --glb FILE                the scene for viewers, as at /scene.glb\n"
+      "  enfilade export RECORDING --out DIR             contacts, trajectories and cameras\n"
+      "  enfilade export [SCENE] RECORDING --html FILE   the walk as one page, to be mailed\n"
+      "Example: enfilade export walk.mcap --html walk.html");
 }
 
 void addCaptureCommandOptions(CLI::App& capture, CommandArguments& into) {

@@ -29,7 +29,7 @@ struct CommandArguments {
   DoctorCommand doctor;
   ModelArguments model;
   std::string script, out, plan, planFormat = "png", listen = "127.0.0.1:7878", connect;
-  double planScale = 100;
+  double planScale = 100, maxMegabytes = 50;
   std::string from, then, run, world, token;
   RecordingChoice record;
   std::string recordChannels = "walk", recordFrames;

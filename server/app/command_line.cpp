@@ -177,21 +177,45 @@ std::variant<ProgramCommand, ExitCode> makeReplayCommand(const CLI::App& replay,
   return command;
 }
 
-/// A model becomes a GLB file, a recording becomes texts: each has an option of its own.
+/// The options that only the import of a model uses. Empty: none was given.
+std::string findModelOption(const CLI::App& verb, const std::vector<const char*>& options) {
+  for (const char* option : options)
+    if (verb.count(option) > 0) return option;
+  return "";
+}
+
+std::variant<ProgramCommand, ExitCode> makeExportReplayCommand(const CLI::App& verb,
+                                                               const CommandArguments& read) {
+  const VerifyCommand files = makeVerifyCommand(read);
+  if (!protocol::mcap::isMcap(files.recording))
+    return reportMisuse("export", files.recording.string() + ": not a recording; --html needs one");
+  const std::string option =
+      findModelOption(verb, {"--unit", "--up", "--offset", "--ifc-reader", "--ifc-doors"});
+  if (!option.empty())
+    return reportMisuse("export", option + " cannot be given: the recording sets it");
+  return ExportReplayCommand{files.recording,       read.html,         files.scene,
+                             files.run.value_or(1), read.maxMegabytes, files.cache};
+}
+
+/// A model becomes a GLB file, a recording becomes texts or a page: each has an option of its own.
 std::variant<ProgramCommand, ExitCode> makeExportCommand(const CLI::App& verb,
                                                          const CommandArguments& read) {
-  const bool writesScene = verb.count("--glb") > 0;
-  if (writesScene == (verb.count("--out") > 0))
+  const bool writesScene = verb.count("--glb") > 0, writesPage = verb.count("--html") > 0;
+  if (verb.count("--glb") + verb.count("--out") + verb.count("--html") != 1)
     return reportMisuse("export",
-                        "give --glb FILE to export a model, or --out DIR to export a recording");
+                        "give one of these: --glb FILE to export a model, --out DIR or --html FILE "
+                        "to export a recording");
+  if (writesPage) return makeExportReplayCommand(verb, read);
+  if (const std::string option = findModelOption(verb, {"--run", "--max-size"}); !option.empty())
+    return reportMisuse("export", option + " needs a recording and --html");
+  if (!read.script.empty()) return reportMisuse("export", "two files need --html");
   if (writesScene && protocol::mcap::isMcap(read.model.file))
     return reportMisuse(
         "export", read.model.file + ": a recording: give --out DIR, or a model file for --glb");
   if (writesScene) return ExportSceneCommand{makeModelOptions(read.model), read.glb};
-  for (const char* option :
-       {"--unit", "--up", "--offset", "--no-cache", "--ifc-reader", "--ifc-doors"})
-    if (verb.count(option) > 0)
-      return reportMisuse("export", std::string(option) + " needs a model and --glb");
+  const std::string option = findModelOption(
+      verb, {"--unit", "--up", "--offset", "--no-cache", "--ifc-reader", "--ifc-doors"});
+  if (!option.empty()) return reportMisuse("export", option + " needs a model and --glb");
   return ExportCommand{read.model.file, read.out};
 }
 
@@ -212,8 +236,8 @@ const Verb kVerbs[] = {
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
        return DiffCommand{read.before, read.after, read.tolerance, read.json};
      }},
-    {"export", "Export a scene as glTF, or contacts and trajectories of a recording",
-     addExportOptions, makeExportCommand},
+    {"export", "Export a scene as glTF, or a recording as texts or as a page", addExportOptions,
+     makeExportCommand},
     {"capture", "Render colour, depth and ids along a camera path", addCaptureCommandOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
        return CaptureCommand{makeModelOptions(read.model),

@@ -7,19 +7,21 @@
 #include "server/capture/capture.hpp"
 #include "server/commands/doctor.hpp"
 #include "server/commands/export.hpp"
+#include "server/commands/export_replay.hpp"
 #include "server/commands/export_scene.hpp"
-#include "server/inspection/inspect.hpp"
 #include "server/commands/serve.hpp"
 #include "server/commands/verify.hpp"
 #include "server/diff/diff.hpp"
 #include "server/diff/resimulate.hpp"
+#include "server/inspection/inspect.hpp"
 #include "server/runs/script_run.hpp"
 
 namespace enfilade::server {
 
-using ProgramCommand = std::variant<DoctorCommand, ServeCommand, ReplayCommand, VerifyCommand,
-                                    CaptureCommand, WalkCommand, InspectCommand, DiffCommand,
-                                    ResimulateCommand, ExportCommand, ExportSceneCommand>;
+using ProgramCommand =
+    std::variant<DoctorCommand, ServeCommand, ReplayCommand, VerifyCommand, CaptureCommand,
+                 WalkCommand, InspectCommand, DiffCommand, ResimulateCommand, ExportCommand,
+                 ExportSceneCommand, ExportReplayCommand>;
 
 /// Returns the command, or the exit code (--help: done; an error: usage). Help goes to stdout,
 /// errors go to stderr.

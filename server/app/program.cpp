@@ -22,6 +22,7 @@ struct CommandRunner {
   ExitCode operator()(const ResimulateCommand& command) const { return resimulate(command); }
   ExitCode operator()(const ExportCommand& command) const { return exportRecording(command); }
   ExitCode operator()(const ExportSceneCommand& command) const { return exportScene(command); }
+  ExitCode operator()(const ExportReplayCommand& command) const { return exportReplay(command); }
   ExitCode operator()(const InspectCommand& command) const { return inspect(command); }
 };
 

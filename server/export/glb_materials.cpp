@@ -63,8 +63,11 @@ EncodedTexture encodeTexture(const scene::Texture& texture) {
 
 }  // namespace
 
-GlbMaterials::GlbMaterials(const scene::Model& model, GlbFile& file)
-    : model_(model), file_(file), equalTextures_(findEqualTextures(model)) {}
+GlbMaterials::GlbMaterials(const scene::Model& model, GlbFile& file, bool withTextures)
+    : model_(model),
+      file_(file),
+      withTextures_(withTextures),
+      equalTextures_(findEqualTextures(model)) {}
 
 const scene::Material& GlbMaterials::find(std::uint32_t material) const {
   static const scene::Material none;
@@ -73,7 +76,8 @@ const scene::Material& GlbMaterials::find(std::uint32_t material) const {
 
 bool GlbMaterials::isTextured(std::uint32_t material) const {
   const std::int32_t texture = find(material).baseColourTexture;
-  return texture >= 0 && static_cast<std::size_t>(texture) < model_.textures.size();
+  return withTextures_ && texture >= 0 &&
+         static_cast<std::size_t>(texture) < model_.textures.size();
 }
 
 std::size_t GlbMaterials::add(std::uint32_t material) {

@@ -10,7 +10,8 @@ namespace enfilade::server {
 
 class GlbMaterials {
  public:
-  GlbMaterials(const scene::Model& model, GlbFile& file);
+  /// Without `withTextures` materials have only their colours.
+  GlbMaterials(const scene::Model& model, GlbFile& file, bool withTextures);
 
   /// Whether primitives of this material need texture coordinates. `material`: an index into
   /// Model::materials; from its end on, the default material.
@@ -24,6 +25,7 @@ class GlbMaterials {
 
   const scene::Model& model_;
   GlbFile& file_;
+  const bool withTextures_;
   const std::vector<std::uint32_t> equalTextures_;
   std::map<std::uint32_t, std::size_t> materials_;  ///< index in the file by index in the model
   std::map<std::size_t, std::size_t> textures_;     ///< the same

@@ -31,15 +31,18 @@ std::uint32_t toEntityId(std::uint32_t object) {
 
 class SceneWriter {
  public:
-  explicit SceneWriter(const scene::Scene& scene)
-      : scene_(scene), model_(scene.model()), equalMaterials_(findEqualMaterials(model_)) {}
+  SceneWriter(const scene::Scene& scene, const GlbContent& content)
+      : scene_(scene),
+        model_(scene.model()),
+        content_(content),
+        equalMaterials_(findEqualMaterials(model_)) {}
 
-  SceneGlb write(GlbContent content) {
+  SceneGlb write() {
     const DrawGroups groups = makeDrawGroups(model_);
     requireWritable(groups);
     for (const MeshBatch& batch : groups.batches) addBatch(batch);
     for (const InstanceGroup& group : groups.instanced) addInstances(group);
-    if (content == GlbContent::everything)
+    if (content_.bodies)
       for (const std::uint32_t body : groups.bodies) addBody(body);
     if (!groups.instanced.empty()) {
       file_.root["extensionsUsed"] = {kInstancing};
@@ -73,9 +76,10 @@ class SceneWriter {
 
   const scene::Scene& scene_;
   const scene::Model& model_;
+  const GlbContent content_;
   const std::vector<std::uint32_t> equalMaterials_;
   GlbFile file_;
-  GlbMaterials materials_{model_, file_};
+  GlbMaterials materials_{model_, file_, content_.textures};
   std::vector<std::size_t> topNodes_;
   std::map<std::uint32_t, GlbJson> primitives_;               ///< by index of the model's mesh
   std::map<std::vector<std::uint32_t>, std::size_t> meshes_;  ///< index in the file
@@ -280,8 +284,8 @@ GlbJson SceneWriter::makeSceneExtras() const {
 
 }  // namespace
 
-SceneGlb writeSceneGlb(const scene::Scene& scene, GlbContent content) {
-  return SceneWriter(scene).write(content);
+SceneGlb writeSceneGlb(const scene::Scene& scene, const GlbContent& content) {
+  return SceneWriter(scene, content).write();
 }
 
 }  // namespace enfilade::server

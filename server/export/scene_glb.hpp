@@ -35,12 +35,12 @@ struct SceneGlb {
   std::size_t drawGroups = 0;  ///< draw calls of a viewer that draws every primitive once
 };
 
-enum class GlbContent : std::uint8_t {
-  everything,
-  staticObjects  ///< no bodies: the viewer receives them in another way
+struct GlbContent {
+  bool bodies = true;    ///< false: the viewer receives the bodies in another way
+  bool textures = true;  ///< false: a smaller file, with the materials' colours
 };
 
 /// Throws std::runtime_error if the scene exceeds the format: 4 GiB or 2^24 objects.
-SceneGlb writeSceneGlb(const scene::Scene& scene, GlbContent content = GlbContent::everything);
+SceneGlb writeSceneGlb(const scene::Scene& scene, const GlbContent& content = {});
 
 }  // namespace enfilade::server

@@ -31,7 +31,7 @@ std::uint64_t hashContent(const FileBytes& bytes) {
   return hasher.value();
 }
 
-SceneFile makeSceneFile(const scene::Scene& scene, GlbContent content) {
+SceneFile makeSceneFile(const scene::Scene& scene, const GlbContent& content) {
   const auto start = std::chrono::steady_clock::now();
   SceneGlb glb = writeSceneGlb(scene, content);
   SceneFile file;
@@ -45,7 +45,7 @@ SceneFile makeSceneFile(const scene::Scene& scene, GlbContent content) {
 }
 
 SceneFile makeViewerScene(const scene::Scene& scene) {
-  const SceneFile file = makeSceneFile(scene, GlbContent::staticObjects);
+  const SceneFile file = makeSceneFile(scene, {.bodies = false});
   if (file.bytes->size() > kMaxViewerModelBytes)
     throw std::runtime_error("it has more than 1 GiB, the limit of viewers' messages");
   foxglove::SceneUpdate update;
@@ -76,7 +76,7 @@ const SceneFile& SceneFileService::provide(SceneFileKind kind) {
     if (!viewerScene_.bytes) viewerScene_ = makeViewerScene(*scene_);
     return viewerScene_;
   }
-  if (!plain_.bytes) plain_ = makeSceneFile(*scene_, GlbContent::everything);
+  if (!plain_.bytes) plain_ = makeSceneFile(*scene_, {});
   if (kind == SceneFileKind::glb) return plain_;
   if (!compressed_.bytes)
     compressed_ = {std::make_shared<const FileBytes>(gzip(*plain_.bytes)), plain_.tag, ""};

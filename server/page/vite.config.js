@@ -69,22 +69,38 @@ const client = path("../../protocol/clients/javascript/enfilade.js");
 const protobuf = path("node_modules/@bufbuild/protobuf");
 if (!existsSync(protobuf)) throw new Error(`run npm ci in ${dirname(path("package.json"))} first`);
 
-export default defineConfig({
+/** The page of a server: hashed files below /page/. */
+const served = {
+  outDir: out,
+  rollupOptions: {
+    input: { index: path("index.html"), enfilade: path("src/client.ts") },
+    // The client is an interface for other pages: its name is stable, and its exports stay.
+    preserveEntrySignatures: "exports-only",
+    output: {
+      entryFileNames: (chunk) => chunk.name === "enfilade" ? "enfilade.js" : "assets/[name]-[hash].js",
+    },
+  },
+};
+
+/** The page of a recording: one script and one style sheet, which `enfilade export --html` puts into a file. */
+const replay = {
+  outDir: join(out, "replay"),
+  cssCodeSplit: false,
+  rollupOptions: {
+    input: path("src/replay.ts"),
+    output: { format: "iife", entryFileNames: "replay.js", assetFileNames: "replay.[ext]", inlineDynamicImports: true },
+  },
+};
+
+export default defineConfig(({ mode }) => ({
   base: "/page/",
+  publicDir: mode === "replay" ? false : "public",
   build: {
-    outDir: out,
     emptyOutDir: true,
     target: "es2022",
     chunkSizeWarningLimit: 2000,
     assetsInlineLimit: 0,
-    rollupOptions: {
-      input: { index: path("index.html"), enfilade: path("src/client.ts") },
-      // The client is an interface for other pages: its name is stable, and its exports stay.
-      preserveEntrySignatures: "exports-only",
-      output: {
-        entryFileNames: (chunk) => chunk.name === "enfilade" ? "enfilade.js" : "assets/[name]-[hash].js",
-      },
-    },
+    ...(mode === "replay" ? replay : served),
   },
   resolve: {
     alias: [
@@ -95,4 +111,4 @@ export default defineConfig({
     ],
   },
   plugins: [clientPackages(), licenses()],
-});
+}));

@@ -1,13 +1,13 @@
 // The state that the parts of the page share, and the news by which they learn of changes.
-import { Connection, type Trouble } from "./connection";
 import { EntityTable } from "./entities";
 import {
   Role, type AvatarState, type Clock, type ContactEvent, type Notice, type Replay, type State, type TickEvents,
   type Welcome, type World,
 } from "./generated/enfilade_pb";
 import { SceneModel } from "./scene";
-import { fetchScene, parseScene, readEntities } from "./scene_file";
+import { parseScene, readEntities } from "./scene_file";
 import { Signal } from "./signal";
+import type { MakeSource, Trouble, WorldSource } from "./source";
 import { View } from "./view";
 import { WorldState } from "./world_state";
 
@@ -15,7 +15,7 @@ const POLL_SECONDS = 2; // for changes of the clock by other clients, which the 
 
 export class App {
   readonly view = new View();
-  readonly connection: Connection;
+  readonly connection: WorldSource;
   readonly state = new WorldState();
   table = new EntityTable();
   model: SceneModel | null = null;
@@ -45,14 +45,14 @@ export class App {
   readonly said = new Signal<string>();
   #sceneHash = 0n;
 
-  constructor(token: string, world: string) {
-    this.connection = new Connection({
+  constructor(makeSource: MakeSource) {
+    this.connection = makeSource({
       opened: (welcome) => void this.#begin(welcome),
       troubled: (trouble) => this.troubled.emit(trouble),
       events: (events) => this.#takeEvents(events),
       state: (state) => this.#takeState(state),
       replay: (replay) => this.#takeReplay(replay),
-    }, token, world);
+    });
     setInterval(() => void this.#poll(), POLL_SECONDS * 1000);
   }
 
@@ -120,9 +120,8 @@ export class App {
 
   async #loadScene(welcome: Welcome): Promise<void> {
     const scene = welcome.scene!;
-    const query = this.connection.world ? `?world=${encodeURIComponent(this.connection.world)}` : "";
     this.loading.emit("Loading the scene …");
-    const bytes = await fetchScene(`/scene.glb${query}`, this.connection.token, (received) => {
+    const bytes = await this.connection.fetchScene((received) => {
       this.loading.emit(`Loading the scene: ${(received / 1e6).toFixed(1)} MB`);
     });
     this.loading.emit("Preparing the scene …");
@@ -174,7 +173,7 @@ export class App {
   }
 
   async #poll(): Promise<void> {
-    if (!this.connection.isOpen || document.hidden) return;
+    if (!this.connection.isOpen || this.connection.isFile || document.hidden) return;
     try {
       const { worlds } = await this.connection.request("listWorlds", {});
       const world = worlds.find(({ name }) => name === this.welcome?.world);

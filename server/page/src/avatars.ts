@@ -1,18 +1,13 @@
-// Avatars as drawn: the bevelled prism with twelve sides that the server moves, with a face that shows the view
-// direction. The server does not send radii or convex parts; every avatar is drawn with the default radius.
+// Avatars as drawn: figures that face the view direction and, on request, the prisms that the server moves.
 import {
-  BoxGeometry, BufferGeometry, CanvasTexture, Color, DynamicDrawUsage, Float32BufferAttribute, InstancedMesh, Matrix4,
-  Mesh, MeshLambertMaterial, Quaternion, Sprite, SpriteMaterial, Vector3,
+  CanvasTexture, Color, DynamicDrawUsage, InstancedMesh, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial,
+  Quaternion, Sprite, SpriteMaterial, Vector3,
 } from "three";
 import type { App } from "./app";
 import type { CameraRig } from "./camera_rig";
+import { FIGURE_HEIGHT, figureGeometry, PRISM_RADIUS, prismGeometry } from "./figure";
 import type { AvatarPose } from "./world_state";
 
-const RADIUS = 0.3; // metres
-const HEIGHT = 1.75; // metres, of the drawn prism; others are scaled
-const BEVEL_INSET = 0.25; // of the radius
-const BEVEL_HEIGHT = 0.05; // metres
-const SIDES = 12;
 const NEAR_CAMERA = 1.6; // metres
 const MAX_LABELS = 16; // the nearest avatars
 const LABEL_DISTANCE = 30; // metres
@@ -31,11 +26,13 @@ export class Avatars {
   #app: App;
   #rig: CameraRig;
   // All avatars are two drawings, so that a thousand of them cost no more calls than one.
-  #bodies: InstancedMesh | null = null;
-  #faces: InstancedMesh | null = null;
+  #figures: InstancedMesh | null = null;
+  #prisms: InstancedMesh | null = null;
   // The avatar in focus is drawn alone, because it may become transparent.
-  #own = new Mesh(prismGeometry(), new MeshLambertMaterial({ flatShading: true }));
+  #own = new Mesh(figureGeometry(), new MeshLambertMaterial());
   #labels = new Map<number, Sprite>();
+  /** Also draws the shapes that collide. */
+  prismsShown = false;
 
   constructor(app: App, rig: CameraRig) {
     this.#app = app;
@@ -51,24 +48,26 @@ export class Avatars {
     this.#own.visible = false;
     let count = 0;
     for (const pose of poses) count += this.#place(pose, count) ? 1 : 0;
-    for (const mesh of [this.#bodies!, this.#faces!]) {
+    for (const mesh of [this.#figures!, this.#prisms!]) {
       mesh.count = count;
       mesh.instanceMatrix.needsUpdate = true;
       if (mesh.instanceColor) mesh.instanceColor.needsUpdate = true;
     }
+    this.#prisms!.visible = this.prismsShown;
     this.#placeLabels(poses);
     model?.applyPoses(state.bodies());
     return state.isMoving;
   }
 
   #reserve(count: number): void {
-    if (this.#bodies && this.#bodies.instanceMatrix.count >= count) return;
-    this.#bodies?.removeFromParent();
-    this.#faces?.removeFromParent();
+    if (this.#figures && this.#figures.instanceMatrix.count >= count) return;
+    this.#figures?.removeFromParent();
+    this.#prisms?.removeFromParent();
     const capacity = Math.max(8, 2 * count);
-    this.#bodies = new InstancedMesh(prismGeometry(), new MeshLambertMaterial({ flatShading: true }), capacity);
-    this.#faces = new InstancedMesh(new BoxGeometry(0.14, 0.09, 0.3), new MeshLambertMaterial({ color: 0x20262b }), capacity);
-    for (const mesh of [this.#bodies, this.#faces]) {
+    this.#figures = new InstancedMesh(figureGeometry(), new MeshLambertMaterial(), capacity);
+    const glass = new MeshBasicMaterial({ transparent: true, opacity: 0.3, depthWrite: false });
+    this.#prisms = new InstancedMesh(prismGeometry(), glass, capacity);
+    for (const mesh of [this.#figures, this.#prisms]) {
       mesh.frustumCulled = false;
       mesh.instanceMatrix.setUsage(DynamicDrawUsage);
       this.#app.view.scene.add(mesh);
@@ -80,21 +79,19 @@ export class Avatars {
     const { id, name, height } = pose.state;
     const isFocus = name === this.#app.focus;
     if (isFocus && this.#rig.mode === "first") return false;
-    const scale = new Vector3(1, (height || HEIGHT) / HEIGHT, 1);
-    const upright = new Quaternion();
-    const body = new Matrix4().compose(pose.feet, upright, isFocus ? new Vector3(0, 0, 0) : scale);
-    this.#bodies!.setMatrixAt(index, body);
-    this.#bodies!.setColorAt(index, colorValue(id));
-    const yaw = Math.atan2(-pose.gaze.z, pose.gaze.x);
-    const face = new Vector3(0.9 * RADIUS * Math.cos(yaw), pose.eyeHeight, -0.9 * RADIUS * Math.sin(yaw)).add(pose.feet);
-    this.#faces!.setMatrixAt(index, new Matrix4().compose(face, upright.setFromAxisAngle(UP, yaw), new Vector3(1, 1, 1)));
-    if (isFocus) this.#placeOwn(pose, scale);
+    const scale = new Vector3(1, (height || FIGURE_HEIGHT) / FIGURE_HEIGHT, 1);
+    const facing = new Quaternion().setFromAxisAngle(UP, Math.atan2(-pose.gaze.z, pose.gaze.x));
+    this.#figures!.setMatrixAt(index, new Matrix4().compose(pose.feet, facing, isFocus ? new Vector3(0, 0, 0) : scale));
+    this.#prisms!.setMatrixAt(index, new Matrix4().compose(pose.feet, new Quaternion(), scale));
+    for (const mesh of [this.#figures!, this.#prisms!]) mesh.setColorAt(index, colorValue(id));
+    if (isFocus) this.#placeOwn(pose, facing, scale);
     return true;
   }
 
-  #placeOwn(pose: AvatarPose, scale: Vector3): void {
+  #placeOwn(pose: AvatarPose, facing: Quaternion, scale: Vector3): void {
     this.#own.visible = true;
     this.#own.position.copy(pose.feet);
+    this.#own.quaternion.copy(facing);
     this.#own.scale.copy(scale);
     const material = this.#own.material as MeshLambertMaterial;
     material.color = colorValue(pose.state.id);
@@ -127,7 +124,7 @@ export class Avatars {
         this.#labels.set(pose.state.id, sprite);
         this.#app.view.scene.add(sprite);
       }
-      sprite.position.copy(pose.feet).setY(pose.feet.y + (pose.state.height || HEIGHT) + 0.15);
+      sprite.position.copy(pose.feet).setY(pose.feet.y + (pose.state.height || FIGURE_HEIGHT) + 0.15);
     }
   }
 
@@ -136,35 +133,12 @@ export class Avatars {
     let best: { entity: number; distance: number; point: Vector3 } | null = null;
     for (const { state, feet } of this.#app.state.avatars()) {
       if (this.#rig.mode === "first" && state.name === this.#app.focus) continue;
-      const distance = cylinderDistance(origin, direction, feet, RADIUS, state.height || HEIGHT);
+      const distance = cylinderDistance(origin, direction, feet, PRISM_RADIUS, state.height || FIGURE_HEIGHT);
       if (distance === null || distance >= (best?.distance ?? Infinity)) continue;
       best = { entity: state.id, distance, point: origin.clone().addScaledVector(direction, distance) };
     }
     return best;
   }
-}
-
-function prismGeometry(): BufferGeometry {
-  const inner = RADIUS * (1 - BEVEL_INSET);
-  const rings: [number, number][] = [[0, inner], [BEVEL_HEIGHT, RADIUS], [HEIGHT - BEVEL_HEIGHT, RADIUS], [HEIGHT, inner]];
-  const at = (ring: number, side: number) => {
-    const [y, r] = rings[ring]!;
-    const angle = (2 * Math.PI * side) / SIDES;
-    return [r * Math.cos(angle), y, r * Math.sin(angle)];
-  };
-  const positions: number[] = [];
-  for (let side = 0; side < SIDES; ++side) {
-    for (let ring = 0; ring < 3; ++ring) {
-      positions.push(...at(ring, side), ...at(ring + 1, side), ...at(ring + 1, side + 1));
-      positions.push(...at(ring, side), ...at(ring + 1, side + 1), ...at(ring, side + 1));
-    }
-    positions.push(0, HEIGHT, 0, ...at(3, side + 1), ...at(3, side));
-    positions.push(0, 0, 0, ...at(0, side), ...at(0, side + 1));
-  }
-  const geometry = new BufferGeometry();
-  geometry.setAttribute("position", new Float32BufferAttribute(positions, 3));
-  geometry.computeVertexNormals();
-  return geometry;
 }
 
 function nameSprite(name: string): Sprite {

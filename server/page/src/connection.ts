@@ -1,37 +1,14 @@
 // The connection to the server: one world, typed requests, reconnection with back-off.
-import { createRegistry, type MessageInitShape } from "@bufbuild/protobuf";
+import { createRegistry } from "@bufbuild/protobuf";
 import { connect, ConnectionFailed, schemasOf, ServerError, type Client } from "enfilade-client";
-import {
-  file_enfilade, type ClientMessageSchema, type Replay, type ServerMessage, type State, type TickEvents,
-  type Welcome,
-} from "./generated/enfilade_pb";
-
-type RequestBody = NonNullable<MessageInitShape<typeof ClientMessageSchema>["body"]>;
-type RequestName = Exclude<NonNullable<RequestBody["case"]>, "hello" | "bye">;
-type RequestFields<K> = Extract<RequestBody, { case: K }>["value"];
-type ReplyBody = ServerMessage["body"];
-// Replies have the names of their requests, with two exceptions.
-type ReplyName = { [K in RequestName]: K extends "describe" ? "names" : K extends "listWorlds" ? "worlds" : K };
-type ReplyOf<K extends RequestName> = Extract<ReplyBody, { case: ReplyName[K] }>["value"];
-type CommandFields = NonNullable<RequestFields<"command">>;
+import { file_enfilade } from "./generated/enfilade_pb";
+import { fetchScene } from "./scene_file";
+import type { CommandFields, Listener, ReplyOf, RequestFields, RequestName, Trouble, WorldSource } from "./source";
 
 const FIRST_WAIT = 0.5; // seconds
 const MAX_WAIT = 10; // seconds: a server that restarts is found soon, a dead one costs little
 
-export type Trouble =
-  | { kind: "token"; text: string } // the user must give one
-  | { kind: "final"; text: string } // retrying cannot help
-  | { kind: "waiting"; text: string; seconds: number };
-
-export interface Listener {
-  opened(welcome: Welcome): void;
-  troubled(trouble: Trouble): void;
-  events(events: TickEvents): void;
-  state(state: State): void;
-  replay(replay: Replay): void;
-}
-
-export class Connection {
+export class Connection implements WorldSource {
   token: string;
   readonly world: string;
   #client: Client | null = null;
@@ -44,6 +21,10 @@ export class Connection {
     this.#listener = listener;
     this.token = token;
     this.world = world;
+  }
+
+  get isFile(): boolean {
+    return false;
   }
 
   get isOpen(): boolean {
@@ -78,6 +59,11 @@ export class Connection {
 
   command(avatar: string, order: CommandFields["order"], tag = 0n): Promise<ReplyOf<"command">> {
     return this.request("command", { avatar, tag, order } as RequestFields<"command">);
+  }
+
+  fetchScene(progress: (bytes: number) => void): Promise<ArrayBuffer> {
+    const query = this.world ? `?world=${encodeURIComponent(this.world)}` : "";
+    return fetchScene(`/scene.glb${query}`, this.token, progress);
   }
 
   #lost(why: Error): void {

@@ -1,6 +1,6 @@
 // The table of entities: objects of the scene by id, with path, class, GlobalId and storey.
-import type { Connection } from "./connection";
 import { Entity_Kind } from "./generated/enfilade_pb";
+import type { WorldSource } from "./source";
 
 export interface Entity {
   id: number;
@@ -43,7 +43,7 @@ export class EntityTable {
   }
 
   /** Asks the server for the objects that the scene file did not describe. */
-  async complete(connection: Connection, objects: number): Promise<void> {
+  async complete(connection: WorldSource, objects: number): Promise<void> {
     const missing: number[] = [];
     for (let id = 1; id <= objects; ++id) if (!this.byId.has(id)) missing.push(id);
     for (let from = 0; from < missing.length; from += IDS_PER_REQUEST) {

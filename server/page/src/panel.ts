@@ -1,7 +1,7 @@
 // The frame of the page: header, side panel with tabs, messages, and the dialog for troubles.
 import type { App } from "./app";
-import type { Trouble } from "./connection";
 import { button, element, setText } from "./dom";
+import type { Trouble } from "./source";
 
 const TOAST_SECONDS = 6;
 
@@ -95,8 +95,13 @@ export function makeTroubleDialog(app: App, onToken: (token: string) => void): H
   return root;
 }
 
-export function makeHelp(): HTMLElement {
-  const keys: [string, string][] = [
+/** `isFile`: the page of a recording, in which no avatar can be driven. */
+export function makeHelp(isFile: boolean): HTMLElement {
+  const looking: [string, string][] = [
+    ["W A S D, arrows", "fly the camera"], ["Mouse drag", "look around; M captures the mouse"], ["Click", "name the object"],
+    ["V", "first or third person of the followed avatar"], ["P", "pause or play"], ["Wheel", "distance in third person"],
+  ];
+  const keys: [string, string][] = isFile ? looking : [
     ["W A S D, arrows", "walk (without an avatar: fly the camera)"], ["Mouse drag", "look around; M captures the mouse"],
     ["Click", "name the object"], ["Enter", "enter the world with an avatar"], ["Shift", "run"], ["Space", "jump"],
     ["C", "crouch"], ["F", "fly; E and Q up and down"], ["V", "first or third person"], ["P", "pause or play"],

@@ -1,6 +1,6 @@
 // The list of avatars: follow one, in first or third person.
 import type { App } from "./app";
-import { colorOf } from "./avatars";
+import { colorOf, type Avatars } from "./avatars";
 import type { CameraRig } from "./camera_rig";
 import { button, element } from "./dom";
 import type { AvatarState } from "./generated/enfilade_pb";
@@ -16,11 +16,16 @@ export class People {
   #walk: Walk;
   #shown = "";
 
-  constructor(app: App, rig: CameraRig, walk: Walk) {
+  constructor(app: App, rig: CameraRig, walk: Walk, avatars: Avatars) {
     this.#app = app;
     this.#rig = rig;
     this.#walk = walk;
-    this.root.append(this.#list);
+    const shapes = element("input", { type: "checkbox", id: "shapes" });
+    shapes.addEventListener("change", () => {
+      avatars.prismsShown = shapes.checked;
+      app.view.invalidate();
+    });
+    this.root.append(element("label", { class: "check", for: "shapes" }, shapes, "Shapes that collide"), this.#list);
     setInterval(() => this.#render(), 300);
   }
 

@@ -105,6 +105,7 @@ export class Card {
     const order = (action: { case: "open" | "close" | "run" | "stop"; value: object } | { case: "level"; value: number }) =>
       this.#app.attempt(this.#app.connection.request("bodyCommand", { body: body.name, action }));
     this.#facts.append(element("dt", {}, "Body"), element("dd", {}, body.mass ? `${body.kind}, ${body.mass} kg` : body.kind));
+    if (this.#app.connection.isFile) return;
     if (body.kind === "hinged" || body.kind === "sliding") {
       this.#doors.append(button("Open", () => order({ case: "open", value: {} })), button("Close door", () => order({ case: "close", value: {} })));
     } else if (body.kind === "lift") {

@@ -1,4 +1,4 @@
-// Time: play, pause, step, speed; for a recording a scrubber with the events that were seen, and take over.
+// Time: play, pause, step, speed; for a recording a scrubber with its events, and take over.
 import type { App } from "./app";
 import { classOf, wordOf } from "./contacts";
 import { button, element, setText } from "./dom";
@@ -8,7 +8,7 @@ import type { Walk } from "./walk";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 10];
 const SEEK_INTERVAL = 60; // milliseconds between seeks while the slider moves
-const MAX_MARKS = 500;
+const MARK_PLACES = 400; // of the track
 
 export class Timeline {
   readonly root: HTMLElement;
@@ -27,7 +27,8 @@ export class Timeline {
   #isScrubbing = false;
   #seeking: number | null = null;
   #wanted: number | null = null;
-  #seen = new Map<string, ContactEvent>(); // events that have a mark
+  #seen = new Set<string>(); // events that have a mark
+  #marked = new Map<string, { mark: HTMLButtonElement; text: string; others: number }>(); // by place and class
 
   constructor(app: App, walk: Walk) {
     this.#app = app;
@@ -45,7 +46,9 @@ export class Timeline {
     app.timeChanged.listen(() => this.#update());
     app.opened.listen(() => {
       this.#seen.clear();
+      this.#marked.clear();
       this.#marks.replaceChildren();
+      this.#mark(app.connection.recordedEvents ?? []);
       const speed = app.clock?.speed ?? 0;
       if (speed > 0 && SPEEDS.includes(speed)) this.#speed.value = String(speed);
       this.#update();
@@ -123,7 +126,7 @@ export class Timeline {
     setText(this.#readout, `${clockTime(time)} · tick ${tick}`);
     this.#track.hidden = !replay;
     this.root.classList.toggle("replay", replay !== null);
-    this.#takeOver.hidden = !this.#app.isPlayback;
+    this.#takeOver.hidden = !this.#app.isPlayback || this.#app.connection.isFile;
     if (replay) {
       this.#slider.min = String(replay.firstTick);
       this.#slider.max = String(replay.lastTick);
@@ -144,7 +147,7 @@ export class Timeline {
     return clock?.mode === Clock_Mode.PAUSED ? "paused" : "";
   }
 
-  /** Marks on the track of a recording: what was seen so far. */
+  /** Marks on the track of a recording: all of its events, or those seen so far. Near ones share a mark. */
   #mark(events: ContactEvent[]): void {
     const { replay } = this.#app;
     if (!replay) return;
@@ -153,14 +156,25 @@ export class Timeline {
     for (const event of events) {
       const isShown = event.kind === Kind.BEGIN && (event.normal?.y ?? 0) > -0.7 || event.kind === Kind.BLOCKED || event.kind === Kind.NEAR || event.kind === Kind.ENTER;
       const key = `${event.tick} ${event.kind} ${event.phase} ${event.a} ${event.b}`;
-      if (!isShown || this.#seen.has(key) || this.#seen.size >= MAX_MARKS) continue;
-      this.#seen.set(key, event);
-      const mark = button("", () => this.#seek(Number(event.tick), false), {
-        class: `mark ${classOf(event)}`, tabindex: "-1",
-        title: `${clockTime(event.time)} ${wordOf(event)}: ${shortName(event.aName)} – ${shortName(event.bName)}`,
-      });
-      mark.style.left = `${(100 * (Number(event.tick) - first)) / span}%`;
+      if (!isShown || this.#seen.has(key)) continue;
+      this.#seen.add(key);
+      const place = Math.round((MARK_PLACES * (Number(event.tick) - first)) / span);
+      const text = `${clockTime(event.time)} ${wordOf(event)}: ${shortName(event.aName)} – ${shortName(event.bName)}`;
+      const shared = this.#marked.get(`${place} ${classOf(event)}`);
+      if (shared) {
+        shared.others += 1;
+        shared.mark.title = `${shared.text}, and ${shared.others} more`;
+        continue;
+      }
+      const mark = button("", () => this.#seek(Number(event.tick), false), { class: `mark ${classOf(event)}`, tabindex: "-1", title: text });
+      mark.style.left = `${(100 * place) / MARK_PLACES}%`;
       this.#marks.append(mark);
+      this.#marked.set(`${place} ${classOf(event)}`, { mark, text, others: 0 });
     }
+  }
+
+  /** Events that have a mark. */
+  get markedEvents(): number {
+    return this.#seen.size;
   }
 }
