@@ -185,7 +185,11 @@ Model importByAssimp(const ImportRequest& request) {
 }
 
 Model importByFormat(const ImportRequest& request) {
-  switch (const ModelFormat format = detectModelFormat(request.file).value(); format) {
+  const ModelFormat format = detectModelFormat(request.file).value();
+  if (request.options.georeference && format != ModelFormat::ifc)
+    throw ImportError(request.file +
+                      ": --georeference needs an IFC file: no other format has a map (open)");
+  switch (format) {
     case ModelFormat::ifc:
       return importIfc(request, sendProgress);
     case ModelFormat::ply:

@@ -74,6 +74,8 @@ constexpr std::array kCatalog{
                    "attributes of instances that neither place nor shape them"},
     // of IFC
     DiagnosticKind{"cut_away_product", error, "its openings leave nothing of it"},
+    DiagnosticKind{"solid_product", error,
+                   "its openings could not be cut: it is solid, and doors in it are closed"},
     DiagnosticKind{"missing_product", error, "no reader could build its shape: it is missing"},
     DiagnosticKind{"opening_unchecked", note, "its opening could not be tested"},
     DiagnosticKind{"openings_unverified", warning,

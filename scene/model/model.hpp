@@ -71,9 +71,27 @@ struct Object {
   /// opens, z is up.
   std::optional<Eigen::Affine3d> worldFromPlacement = std::nullopt;
   Usage usage = Usage::both;
+  /// The storey that contains it: an index into Model::storeys; nullopt: unknown.
+  std::optional<std::uint32_t> storey = std::nullopt;
   /// The object that this one is a part of, by which people name it: for a collision shape the
   /// drawn object, for a door's frame the door.
   std::optional<std::uint32_t> partOf = std::nullopt;
+};
+
+/// A level of a building, as an IfcBuildingStorey.
+struct Storey {
+  std::string name;      ///< may be empty
+  std::string globalId;  ///< IFC GlobalId, or empty
+  double elevation = 0;  ///< metres: y of its floor in the scene frame
+};
+
+/// A room or another part of a building that is air, as an IfcSpace.
+struct Space {
+  std::string name;                                    ///< such as a number; may be empty
+  std::string longName;                                ///< such as "Living room"; may be empty
+  std::string globalId;                                ///< IFC GlobalId, or empty
+  std::optional<std::uint32_t> storey = std::nullopt;  ///< an index into Model::storeys
+  Aabb box;                                            ///< scene frame, metres; may be empty
 };
 
 /// A finding about the file for the user: degenerate triangles, missing textures, ...
@@ -89,11 +107,16 @@ struct Model {
   std::vector<Material> materials;
   std::vector<Texture> textures;
   std::vector<Mesh> meshes;
+  std::vector<Storey> storeys;  ///< ascending elevations; empty: the file states none
+  std::vector<Space> spaces;
   std::vector<Object> objects;
   std::vector<BodySpec> bodies;  ///< Scene rejects a model with invalid bodies
 
   double metresPerUnit = 1;  ///< assumed unit of the file
-  char upAxis = 'y';         ///< the file's up axis; coordinates are already converted to Y up
+  /// Name of the map whose coordinates the file's are, such as "EPSG:25832": x east, y up, -z
+  /// north. Empty: not on a map.
+  std::string map;
+  char upAxis = 'y';  ///< the file's up axis; coordinates are already converted to Y up
   /// Subtracted from the file's coordinates (metres, Y up) so that the scene lies near its origin;
   /// zero unless the scene lies far from it. file = scene + offset.
   Vec3 offset = Vec3::Zero();

@@ -70,6 +70,7 @@ void moveAvatars(WorldData& world, QueryCount& count) {
   for (Avatar& avatar : world.avatars) {
     avatar.narrowQueries = avatar.partsLookedAt = 0;
     avatar.blockedBy = 0;
+    for (ChainLink& link : avatar.chain.links) link.blockedBy = 0;
     avatar.requestedDisplacement = Vec3::Zero();
     avatar.idle = avatar.grounded && avatar.lastDisplacement.isZero(0) &&
                   avatar.desiredVelocity.isZero(0) && !avatar.dirty && avatar.chain.speed == 0 &&

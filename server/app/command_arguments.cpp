@@ -151,10 +151,12 @@ void addModel(CLI::App& verb, ModelArguments& into) {
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "web-ifc", "ifcplusplus", "assimp"}));
   verb.add_option("--ifc-doors", into.ifcDoors,
-                  "IFC doors and lifts. move: they are bodies if the file describes their motion; "
-                  "still: only the sidecar defines bodies")
+                  "IFC doors. move: they are bodies if the file describes their motion; still: "
+                  "they and lifts are static; open: static, with open leaves; none: without leaves")
       ->capture_default_str()
-      ->check(CLI::IsMember({"move", "still"}));
+      ->check(CLI::IsMember({"move", "still", "open", "none"}));
+  verb.add_flag("--georeference", into.georeference,
+                "IFC: apply the file's map conversion, so that coordinates are the map's");
 }
 
 void addDevice(CLI::App& verb, CommandArguments& into) {
@@ -441,7 +443,8 @@ ModelOptions makeModelOptions(const ModelArguments& read) {
     options.import.offset = {read.offset[0], read.offset[1], read.offset[2]};
   options.import.ifcReader =
       scene::parseIfcReader(read.ifcReader).value_or(scene::IfcReader::automatic);
-  options.doors = read.ifcDoors == "still" ? scene::IfcDoors::fixed : scene::IfcDoors::movable;
+  options.doors = scene::parseIfcDoors(read.ifcDoors);
+  options.import.georeference = read.georeference;
   return options;
 }
 

@@ -21,7 +21,7 @@ namespace enfilade::server {
 struct ModelArguments {
   std::string file, unit, up, ifcReader = "auto", ifcDoors = "move";
   std::vector<double> offset;
-  bool noCache = false;
+  bool noCache = false, georeference = false;
 };
 
 /// The option values as CLI11 reads them. Each command uses some of them.

@@ -19,6 +19,8 @@ struct ServerLimits {
   std::uint32_t describedIds = 65'536;          ///< per DescribeEntities
   std::size_t replyBytes = 8u << 20;            ///< of EntityNames; half of protocol::kClientLimits
   std::size_t connections = 256;                ///< open at the same time
+  std::size_t reservedConnections = 32;         ///< more, for health checks and refusals
+  std::size_t streams = 64;                     ///< MJPEG streams at the same time
   std::uint32_t pendingRequests = 1024;         ///< per client; above, its socket is not read
   std::size_t pendingRequestBytes = 4u << 20;   ///< of these requests
   std::uint32_t requestsPerSecond = 50'000;     ///< per client, averaged
@@ -32,6 +34,10 @@ struct ServerLimits {
   std::chrono::milliseconds emptyWorldTimeout{60'000};
   std::chrono::milliseconds messageTimeout{10'000};  ///< from a message's first byte to its last
   std::chrono::milliseconds closeTimeout{2'000};     ///< for the peer to read the final message
+  std::chrono::milliseconds streamTimeout{60'000};   ///< for a stream's first picture
+  /// A browser shows a picture of a stream when the next part begins: without a newer picture the
+  /// last one is sent again.
+  std::chrono::milliseconds repeatDelay{300};
 };
 
 }  // namespace enfilade::server

@@ -121,6 +121,7 @@ std::string makeInstancesJson(const scene::Model& model, const std::vector<Avata
     Json one{{"path", object.path}};
     if (!object.globalId.empty()) one["global_id"] = object.globalId;
     if (!object.ifcClass.empty()) one["class"] = object.ifcClass;
+    if (object.storey) one["storey"] = model.storeys[*object.storey].name;
     if (!object.operationType.empty()) one["operation"] = object.operationType;
     if (!bodies[i].empty()) one["body"] = bodies[i];
     all[std::to_string(i + 1)] = std::move(one);

@@ -1,5 +1,6 @@
 #include "server/commands/serve.hpp"
 
+#include <malloc.h>
 #include <poll.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -138,6 +139,9 @@ ExitCode serveUntilSignal(const ServeCommand& command) {
 }  // namespace
 
 ExitCode serve(const ServeCommand& command) {
+  // Without it glibc raises the threshold up to 32 MiB as blocks are freed, and keeps the memory of
+  // large pictures and messages of clients that left.
+  mallopt(M_MMAP_THRESHOLD, 1 << 20);
   try {
     return serveUntilSignal(applyRecording(command));
   } catch (const Divergence& diverged) {

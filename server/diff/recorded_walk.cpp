@@ -28,6 +28,7 @@ WalkEvent toWalkEvent(const Event& event) {
 /// Swaps the roles of a and b.
 Event swapSides(Event event) {
   std::swap(*event.mutable_a_name(), *event.mutable_b_name());
+  std::swap(*event.mutable_a_global_id(), *event.mutable_b_global_id());
   std::swap(*event.mutable_point_a(), *event.mutable_point_b());
   v1::Vec3& normal = *event.mutable_normal();
   normal.set_x(-normal.x());

@@ -42,6 +42,7 @@ ModelOptions makeModelOptions(const ModelOptions& requested, const v1::Recording
   if (model.import.ifcReader == scene::IfcReader::automatic)
     model.import.ifcReader = recorded.import.ifcReader;
   if (model.doors == scene::IfcDoors::movable) model.doors = recorded.doors;
+  model.import.georeference |= recorded.import.georeference;
   return model;
 }
 

@@ -263,6 +263,7 @@ GlbJson SceneWriter::makeEntity(std::uint32_t index) const {
   if (!object.globalId.empty()) entity["globalId"] = object.globalId;
   if (!object.ifcClass.empty()) entity["class"] = object.ifcClass;
   if (!object.operationType.empty()) entity["operation"] = object.operationType;
+  if (object.storey) entity["storey"] = model_.storeys[*object.storey].name;
   if (object.partOf) entity["partOf"] = toEntityId(*object.partOf);
   if (object.usage != scene::Object::Usage::both)
     entity["only"] = object.usage == scene::Object::Usage::visualOnly ? "drawn" : "solid";
@@ -279,7 +280,22 @@ GlbJson SceneWriter::makeSceneExtras() const {
   for (std::uint32_t i = 0; i < model_.objects.size(); ++i) entities.push_back(makeEntity(i));
   for (const scene::BodySpec& body : model_.bodies)
     for (const std::uint32_t object : body.objects) entities[object]["body"] = body.name;
-  return {{"sceneHash", hash}, {"offset", toArray(model_.offset)}, {"entities", entities}};
+  GlbJson storeys = GlbJson::array(), spaces = GlbJson::array();
+  for (const scene::Storey& storey : model_.storeys)
+    storeys.push_back(
+        {{"name", storey.name}, {"elevation", storey.elevation}, {"globalId", storey.globalId}});
+  for (const scene::Space& space : model_.spaces)
+    if (!space.box.empty())
+      spaces.push_back({{"name", space.name},
+                        {"longName", space.longName},
+                        {"globalId", space.globalId},
+                        {"min", toArray(space.box.min)},
+                        {"max", toArray(space.box.max)}});
+  return {{"sceneHash", hash},
+          {"offset", toArray(model_.offset)},
+          {"storeys", storeys},
+          {"spaces", spaces},
+          {"entities", entities}};
 }
 
 }  // namespace

@@ -2,6 +2,14 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <future>
+#include <mutex>
+#include <optional>
+#include <utility>
+
 #include "render/service/render_thread.hpp"
 #include "server/base/work_thread.hpp"
 #include "server/messages/world_messages.hpp"
@@ -31,10 +39,56 @@ EncodedMessage encodeFrameReply(PendingFrame& pending) {
 
 }  // namespace
 
+namespace {
+
+/// Frames that wait to be rendered. Owners take turns; one owner's frames keep their order.
+class FrameTurns {
+ public:
+  void push(PendingFrame pending) {
+    const void* owner = pending.job.owner.get();
+    auto turn = std::find_if(turns_.begin(), turns_.end(),
+                             [&](const Turn& one) { return one.owner == owner; });
+    if (turn == turns_.end()) turn = turns_.insert(turns_.end(), Turn{owner, {}});
+    turn->frames.push_back(std::move(pending));
+  }
+  std::optional<PendingFrame> pop() {
+    if (turns_.empty()) return std::nullopt;
+    Turn turn = std::move(turns_.front());
+    turns_.pop_front();
+    PendingFrame next = std::move(turn.frames.front());
+    turn.frames.pop_front();
+    if (!turn.frames.empty()) turns_.push_back(std::move(turn));
+    return next;
+  }
+  void cancel(const void* owner) {
+    for (Turn& turn : turns_)
+      if (turn.owner == owner)
+        std::erase_if(turn.frames, [](const PendingFrame& one) { return !one.job.onRendered; });
+    std::erase_if(turns_, [](const Turn& turn) { return turn.frames.empty(); });
+  }
+  bool empty() const { return turns_.empty(); }
+
+ private:
+  struct Turn {
+    const void* owner = nullptr;
+    std::deque<PendingFrame> frames;  ///< not empty
+  };
+  std::deque<Turn> turns_;
+};
+
+}  // namespace
+
 struct FrameService::State {
+  std::mutex mutex;  ///< guards the next three
+  FrameTurns waiting;
+  bool rendering = false;
+  std::condition_variable idle;
   std::atomic<int> pendingEncodes = 0;  ///< frames queued for encoding on `thread`
   WorkThread thread;
   std::unique_ptr<render::RenderThread> renderer;  // destroyed first: it may still call back
+
+  void startNext();
+  void deliver(const std::shared_ptr<PendingFrame>& pending);
 };
 
 namespace {
@@ -78,6 +132,10 @@ FrameService::~FrameService() {
 }
 
 void FrameService::finish() {
+  {
+    std::unique_lock lock(state_->mutex);
+    state_->idle.wait(lock, [&] { return !state_->rendering && state_->waiting.empty(); });
+  }
   state_->thread.finish();
   state_->renderer.reset();
 }
@@ -102,25 +160,50 @@ const std::string& FrameService::unavailableReason() const {
 
 /// A cheap reply is built on the render thread, which delays the next frame by one copy. Other
 /// frames are encoded on `thread`. No reply overtakes the frames queued there.
-void FrameService::renderFrame(FrameJob job, std::function<void(EncodedMessage)> done) {
-  State& state = *state_;
-  const auto pending =
-      std::make_shared<PendingFrame>(PendingFrame{std::move(job), {}, std::move(done)});
-  const FrameView& view = pending->job.view;
-  if (isCheapReply(pending->job) && state.pendingEncodes == 0) {
-    return state.renderer->render(pending->job.snapshot, view.camera, view.options, view.renderer,
-                                  [pending](std::future<render::Frame> frame) {
-                                    pending->frame = std::move(frame);
-                                    pending->done(makeReply(*pending));
-                                  });
-  }
-  ++state.pendingEncodes;
-  pending->frame =
-      state.renderer->render(pending->job.snapshot, view.camera, view.options, view.renderer);
-  state.thread.post([&state, pending] {
+void FrameService::State::deliver(const std::shared_ptr<PendingFrame>& pending) {
+  if (isCheapReply(pending->job) && pendingEncodes == 0) return pending->done(makeReply(*pending));
+  ++pendingEncodes;
+  thread.post([this, pending] {
     pending->done(makeReply(*pending));
-    --state.pendingEncodes;
+    --pendingEncodes;
   });
+}
+
+/// Gives the next frame to the render thread, unless it has one.
+void FrameService::State::startNext() {
+  std::optional<PendingFrame> next;
+  {
+    const std::lock_guard lock(mutex);
+    if (rendering) return;
+    next = waiting.pop();
+    if (!next) return idle.notify_all();
+    rendering = true;
+  }
+  const auto pending = std::make_shared<PendingFrame>(std::move(*next));
+  const FrameView& view = pending->job.view;
+  renderer->render(pending->job.snapshot, view.camera, view.options, view.renderer,
+                   [this, pending](std::future<render::Frame> frame) {
+                     pending->frame = std::move(frame);
+                     deliver(pending);
+                     {
+                       const std::lock_guard lock(mutex);
+                       rendering = false;
+                     }
+                     startNext();
+                   });
+}
+
+void FrameService::renderFrame(FrameJob job, std::function<void(EncodedMessage)> done) {
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->waiting.push({std::move(job), {}, std::move(done)});
+  }
+  state_->startNext();
+}
+
+void FrameService::cancel(const std::shared_ptr<const void>& owner) {
+  const std::lock_guard lock(state_->mutex);
+  state_->waiting.cancel(owner.get());
 }
 
 }  // namespace enfilade::server

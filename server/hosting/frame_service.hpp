@@ -1,5 +1,5 @@
-// Renders frames for clients. One thread renders and a second one encodes, so that neither the tick
-// nor the network thread waits for a frame.
+// Renders frames for clients, who take turns. One thread renders and a second one encodes, so that
+// neither the tick nor the network thread waits for a frame.
 #pragma once
 
 #include <atomic>
@@ -18,6 +18,9 @@ struct FrameJob {
   std::shared_ptr<const scene::Snapshot> snapshot;
   FrameView view;
   v1::FrameRequest request;
+  /// Owners take turns, so that one with many large frames does not delay the others. Unique per
+  /// client of all worlds; null: the recordings.
+  std::shared_ptr<const void> owner = nullptr;
   std::uint64_t requestId = 0;     ///< 0: the frame belongs to a subscription
   std::uint32_t subscription = 0;  ///< number of the subscription; 0: none
   std::uint64_t dropped = 0;       ///< Frame.dropped
@@ -47,8 +50,11 @@ class FrameService {
   const std::string& unavailableReason() const;
 
   /// `done` receives the encoded reply (a Frame or an Error) on a thread of the service, in the
-  /// order of the calls of one thread. It must not throw.
+  /// order of the calls for one owner. It must not throw.
   void renderFrame(FrameJob job, std::function<void(EncodedMessage)> done);
+  /// Drops the owner's frames that wait for their turn, without calling `done`. Frames that are
+  /// also recorded stay.
+  void cancel(const std::shared_ptr<const void>& owner);
   /// Waits for all frames. Do not request frames afterwards.
   void finish();
 

@@ -24,9 +24,12 @@ void renderAndPush(HostedWorld& hosted, ClientId id, std::uint32_t number, std::
         subscription->second.generation != generation)
       return;
     ENFILADE_ASSERT(subscription->second.rendering);
-    subscription->second.rendering = false;
-    if (std::exchange(subscription->second.stale, false))
-      renderNext(current, id, client->second, number, subscription->second);
+    FrameSubscription& done = subscription->second;
+    done.rendering = false;
+    const bool missed = std::exchange(done.missed, false);
+    if (missed) --done.dropped;  // the picture that follows is not left out
+    if (std::exchange(done.stale, false) || missed)
+      renderNext(current, id, client->second, number, done);
   };
   hosted.frames.renderFrame(std::move(job),
                             [out, number, onRendered, post = hosted.post](EncodedMessage image) {
@@ -53,6 +56,7 @@ void renderSubscription(HostedWorld& hosted, ClientId id, Client& client, std::u
   FrameJob job{snapshot,
                std::get<FrameView>(std::move(view)),
                subscription.request,
+               client.out,
                0,
                number,
                subscription.dropped,
@@ -104,7 +108,7 @@ std::optional<v1::Error> updateFrameSubscription(HostedWorld& hosted, ClientId i
   FrameSubscription& stored =
       client.frameSubscriptions.insert_or_assign(request.watch(), std::move(subscription))
           .first->second;
-  if (!error) renderSubscription(hosted, id, client, request.watch(), stored);
+  if (!error) renderNext(hosted, id, client, request.watch(), stored);
   return std::nullopt;
 }
 
@@ -153,6 +157,7 @@ void renderSubscribed(HostedWorld& hosted, ClientId id, Client& client) {
     if (now + hosted.world.settings().tickDuration / 2 < subscription.nextTime) continue;
     if (subscription.rendering) {
       ++subscription.dropped;
+      subscription.missed = true;
       continue;
     }
     renderNext(hosted, id, client, number, subscription);

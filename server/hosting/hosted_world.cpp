@@ -42,11 +42,28 @@ void updateActiveContacts(HostedWorld& hosted, const v1::TickEvents& events) {
   }
 }
 
+namespace {
+
+void broadcastClock(HostedWorld& hosted) {
+  v1::ServerMessage message;
+  *message.mutable_clock()->mutable_clock() = toProto(hosted.clock);
+  message.mutable_clock()->set_tick(hosted.world.snapshot()->tick);
+  const Buffer shared = encodeShared(message);
+  for (auto& [id, client] : hosted.clients)
+    if (client.subscription.clock()) client.out->push(shared);
+}
+
+}  // namespace
+
 void publishStatus(HostedWorld& hosted) {
+  const bool changed = hosted.status.mode != hosted.clock.mode ||
+                       hosted.status.speed != hosted.clock.speed ||
+                       hosted.status.hasDriver != hosted.clock.driver.has_value();
   hosted.status.tick = hosted.world.snapshot()->tick;
   hosted.status.mode = hosted.clock.mode;
   hosted.status.speed = hosted.clock.speed;
   hosted.status.hasDriver = hosted.clock.driver.has_value();
+  if (changed) broadcastClock(hosted);
 }
 
 v1::Clock toProto(const WorldClock& clock) {
@@ -67,7 +84,10 @@ void stopAvatar(HostedWorld& hosted, const std::string& avatar) {
 
 void removeClient(HostedWorld& hosted, ClientId id) {
   hosted.viewers.erase(id);
-  if (hosted.clients.erase(id) == 0) return;
+  const auto leaving = hosted.clients.find(id);
+  if (leaving == hosted.clients.end()) return;
+  hosted.frames.cancel(leaving->second.out);
+  hosted.clients.erase(leaving);
   hosted.horizonSelectionChanged = true;
   if (hosted.clock.driver == id) hosted.clock.driver.reset();
   publishStatus(hosted);

@@ -57,6 +57,7 @@ struct FrameSubscription {
   double rate = 0;               ///< frames per simulated second; 0: every tick
   double nextTime = 0;           ///< seconds of simulated time
   bool rendering = false;        ///< a frame is in progress
+  bool missed = false;           ///< a picture was due meanwhile: render again
   bool stale = false;            ///< the world was replaced meanwhile: render again
   std::uint64_t dropped = 0;     ///< since the start of the last frame
   std::uint64_t generation = 0;  ///< distinguishes it from a replaced subscription
@@ -66,6 +67,7 @@ struct FrameSubscription {
 struct Client {
   std::string name;
   Role role = Role::observe;
+  bool guest = false;  ///< an HTTP visitor: not counted as a client
   std::shared_ptr<OutgoingQueue> out;
   v1::Subscribe subscription;
   std::uint64_t sequence = 0;                           ///< of the last TickEvents
@@ -132,7 +134,7 @@ struct HostedWorld {
   std::map<std::string, ClientId> owners;
   std::set<std::string> pendingRelease;  ///< names in `owners` that may become free
   ActiveContacts activeContacts;
-  std::map<ClientId, ViewerFeed> viewers;  ///< of clients that are viewers
+  std::map<ClientId, ViewerFeed> viewers;            ///< of clients that are viewers
   std::unique_ptr<scene::ContactHorizons> horizons;  ///< null before the first subscriber
   bool horizonSelectionChanged = false;              ///< a client subscribed or left
   TickStatistics statistics;
@@ -159,7 +161,7 @@ scene::World makeInitialWorld(const std::shared_ptr<const scene::Scene>& scene,
 /// Updates `activeContacts` from the begin and end events.
 void updateActiveContacts(HostedWorld& hosted, const v1::TickEvents& events);
 
-/// Updates the status that other threads read.
+/// Updates the status that other threads read, and sends a change of the clock to its subscribers.
 void publishStatus(HostedWorld& hosted);
 
 v1::Clock toProto(const WorldClock& clock);

@@ -63,6 +63,30 @@ Json toJson(const std::vector<ClassCount>& classes) {
   return counts;
 }
 
+Json storeysToJson(const scene::Model& model) {
+  Json list = Json::array();
+  for (std::uint32_t i = 0; i < model.storeys.size(); ++i) {
+    const scene::Storey& storey = model.storeys[i];
+    list.push_back({{"name", storey.name},
+                    {"elevation", storey.elevation},
+                    {"global_id", storey.globalId},
+                    {"objects", countObjects(model, i)},
+                    {"classes", toJson(countClasses(model, i))}});
+  }
+  return list;
+}
+
+Json spacesToJson(const scene::Model& model) {
+  Json list = Json::array();
+  for (const scene::Space& space : model.spaces)
+    list.push_back({{"name", space.name},
+                    {"long_name", space.longName},
+                    {"global_id", space.globalId},
+                    {"storey", space.storey ? Json(model.storeys[*space.storey].name) : Json()},
+                    {"box", toJson(space.box)}});
+  return list;
+}
+
 Json objectsToJson(const scene::Scene& scene) {
   Json list = Json::array();
   for (std::uint32_t i = 0; i < scene.model().objects.size(); ++i) {
@@ -71,6 +95,7 @@ Json objectsToJson(const scene::Scene& scene) {
         {"id", i + 1}, {"path", object.path}, {"box", toJson(computeAuthoredAabb(scene, i))}};
     if (!object.globalId.empty()) entry["global_id"] = object.globalId;
     if (!object.ifcClass.empty()) entry["class"] = object.ifcClass;
+    if (object.storey) entry["storey"] = scene.model().storeys[*object.storey].name;
     if (!object.operationType.empty()) entry["operation"] = object.operationType;
     if (object.partOf) entry["piece_of"] = *object.partOf + 1;
     if (object.usage != scene::Object::Usage::both)
@@ -159,6 +184,8 @@ void addSummary(const Inspection& inspection, TextTable& table) {
   table.appendLine("  unit        %g m; up in the file: %c", model.metresPerUnit, model.upAxis);
   table.appendLine("  offset      %.3f, %.3f, %.3f m subtracted from the file", model.offset.x(),
                    model.offset.y(), model.offset.z());
+  if (!model.map.empty())
+    table.appendLine("  map         %s: x east, y up, -z north", model.map.c_str());
   table.appendLine("  objects     %zu, of which %zu are solid; %zu meshes", report.objects,
                    report.solidObjects, report.meshes);
   table.appendLine("  triangles   %zu; %zu in the meshes", report.triangles,
@@ -202,6 +229,15 @@ void addProblems(const std::vector<Problem>& problems, TextTable& table) {
                      meaning.data());
     table.appendLine("                    example: %s", problem.diagnostic->example.c_str());
   }
+}
+
+void addStoreys(const scene::Model& model, TextTable& table) {
+  if (!model.storeys.empty()) table.appendLine("\nstoreys: elevation, objects, name");
+  for (std::uint32_t i = 0; i < model.storeys.size(); ++i)
+    table.appendLine("  %9.3f m  %6zu  %s", model.storeys[i].elevation, countObjects(model, i),
+                     model.storeys[i].name.c_str());
+  if (!model.spaces.empty())
+    table.appendLine("  and %zu spaces: --json lists them", model.spaces.size());
 }
 
 void addClasses(const scene::Model& model, TextTable& table) {
@@ -266,10 +302,19 @@ std::vector<Problem> listProblems(const scene::SceneReport& report,
   return problems;
 }
 
-std::vector<ClassCount> countClasses(const scene::Model& model) {
+std::size_t countObjects(const scene::Model& model, std::uint32_t storey) {
+  return static_cast<std::size_t>(std::count_if(
+      model.objects.begin(), model.objects.end(),
+      [&](const scene::Object& object) { return object.storey == storey && !object.partOf; }));
+}
+
+std::vector<ClassCount> countClasses(const scene::Model& model,
+                                     std::optional<std::uint32_t> storey) {
   std::map<std::string, std::size_t> counts;
-  for (const scene::Object& object : model.objects)
-    if (!object.ifcClass.empty() && !object.partOf) ++counts[object.ifcClass];
+  for (const scene::Object& object : model.objects) {
+    const bool isCounted = !storey || object.storey == storey;
+    if (isCounted && !object.ifcClass.empty() && !object.partOf) ++counts[object.ifcClass];
+  }
   std::vector<ClassCount> classes;
   for (const auto& [name, objects] : counts) classes.push_back({name, objects});
   std::stable_sort(classes.begin(), classes.end(),
@@ -295,11 +340,14 @@ std::string formatInspectionJson(const Inspection& inspection,
   all["unit"] = model.metresPerUnit;
   all["up"] = std::string(1, model.upAxis);
   all["offset"] = toJson(model.offset);
+  all["map"] = model.map;
   all["convex_parts"] = report.shells.exact + report.shells.nearlyConvex;
   all["convex_triangles"] = report.hullTriangles;
   all["triangle_parts"] = report.partTriangles;
   all["shells"] = toJson(report.shells);
   all["classes"] = toJson(countClasses(model));
+  all["storeys"] = storeysToJson(model);
+  all["spaces"] = spacesToJson(model);
   all["bodies"] = bodiesToJson(model);
   all["problems"] = toJson(listProblems(report, accepted));
   all["import_seconds"] = inspection.loaded.importSeconds;
@@ -316,6 +364,7 @@ std::string formatInspectionTable(const Inspection& inspection,
   addSummary(inspection, table);
   addLargest(*inspection.loaded.scene, table);
   addBodies(inspection.loaded.scene->model(), table);
+  addStoreys(inspection.loaded.scene->model(), table);
   addClasses(inspection.loaded.scene->model(), table);
   addProblems(listProblems(inspection.report, accepted), table);
   if (objects) addObjects(*inspection.loaded.scene, table);

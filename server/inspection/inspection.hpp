@@ -1,6 +1,7 @@
 // The report of `inspect` on a scene, as a table and as JSON.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -44,8 +45,12 @@ struct ClassCount {
   std::size_t objects = 0;
 };
 
-/// Objects by IFC class, most first; empty if the file has no classes.
-std::vector<ClassCount> countClasses(const scene::Model& model);
+/// Objects by IFC class, most first; empty if the file has no classes. With `storey`: those of this
+/// storey.
+std::vector<ClassCount> countClasses(const scene::Model& model,
+                                     std::optional<std::uint32_t> storey = std::nullopt);
+/// Objects of a storey, without parts of others.
+std::size_t countObjects(const scene::Model& model, std::uint32_t storey);
 
 /// One indented JSON object. With `objects` it has "object_list": id, path and box of each object
 /// and, if known, global_id, class, operation (IFC), piece_of and only.

@@ -60,6 +60,51 @@ void addClasses(const scene::Model& model, HtmlPage& page) {
   page.addTable({{"Class"}, {"Objects", "number"}}, rows);
 }
 
+/// One row per class, one column per storey that has objects.
+void addStoreys(const scene::Model& model, HtmlPage& page) {
+  std::vector<std::uint32_t> used;
+  for (std::uint32_t i = 0; i < model.storeys.size(); ++i)
+    if (countObjects(model, i) > 0) used.push_back(i);
+  if (used.empty()) return addClasses(model, page);
+  page.addHeading("Objects by class and storey");
+  Row header{{"Class"}};
+  for (const std::uint32_t storey : used)
+    header.push_back(
+        {fmt::format("{} ({:.2f} m)", model.storeys[storey].name, model.storeys[storey].elevation),
+         "number"});
+  header.push_back({"All", "number"});
+  std::vector<Row> rows;
+  for (const ClassCount& all : countClasses(model)) {
+    Row row{{all.name}};
+    for (const std::uint32_t storey : used) {
+      std::string count;
+      for (const ClassCount& one : countClasses(model, storey))
+        if (one.name == all.name) count = std::to_string(one.objects);
+      row.push_back({count, "number"});
+    }
+    row.push_back({std::to_string(all.objects), "number"});
+    rows.push_back(std::move(row));
+  }
+  page.addTable(header, rows);
+}
+
+void addSpaces(const scene::Model& model, HtmlPage& page) {
+  if (model.spaces.empty()) return;
+  page.addHeading("Spaces");
+  std::vector<Row> rows;
+  for (const scene::Space& space : model.spaces) {
+    const auto size = space.box.empty() ? scene::Vec3::Zero().eval() : space.box.size();
+    rows.push_back({{space.name},
+                    {space.longName},
+                    {space.storey ? model.storeys[*space.storey].name : ""},
+                    {space.box.empty()
+                         ? ""
+                         : fmt::format("{:.2f} × {:.2f} × {:.2f} m", size.x(), size.z(), size.y()),
+                     "number"}});
+  }
+  page.addTable({{"Number"}, {"Name"}, {"Storey"}, {"Extent, height", "number"}}, rows);
+}
+
 void addBodies(const scene::Model& model, HtmlPage& page) {
   page.addHeading("Moving bodies");
   if (model.bodies.empty()) return page.addParagraph("None; all objects are static.");
@@ -90,7 +135,8 @@ std::string formatInspectionHtml(const Inspection& inspection,
   addFacts(inspection, page);
   addProblems(inspection, accepted, page);
   addPlans(plans, page);
-  addClasses(model, page);
+  addStoreys(model, page);
+  addSpaces(model, page);
   addBodies(model, page);
   return page.finish();
 }

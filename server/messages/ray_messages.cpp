@@ -145,13 +145,9 @@ v1::Entity makeHitEntity(const scene::Scene& scene, const scene::Snapshot& snaps
   ENFILADE_ASSERT(id != 0);
   v1::Entity entity;
   entity.set_id(id);
-  entity.set_kind(id <= scene.model().objects.size() ? v1::Entity::KIND_OBJECT
-                                                     : v1::Entity::KIND_AVATAR);
+  entity.set_kind(v1::Entity::KIND_AVATAR);
   entity.set_name(findEntityName(scene, snapshot, id));
-  if (entity.kind() == v1::Entity::KIND_OBJECT) {
-    entity.set_global_id(scene.model().objects[id - 1].globalId);
-    entity.set_operation(scene.model().objects[id - 1].operationType);
-  }
+  if (id <= scene.model().objects.size()) describeObject(scene.model(), id, entity);
   return entity;
 }
 

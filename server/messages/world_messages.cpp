@@ -101,6 +101,12 @@ v1::Feature toProto(collision::Feature feature) {
 }
 
 v1::Error makeError(v1::ErrorCode code, std::string message, std::string field) {
+  constexpr std::size_t kMaxMessageBytes = 1000;  // a client's name in it may be long
+  if (message.size() > kMaxMessageBytes) {
+    std::size_t end = kMaxMessageBytes;
+    while (end > 0 && (static_cast<unsigned char>(message[end]) & 0xc0) == 0x80) --end;  // UTF-8
+    message = message.substr(0, end) + " [...]";
+  }
   v1::Error error;
   error.set_code(code);
   error.set_message(std::move(message));
@@ -167,6 +173,23 @@ v1::ContactEvent::Phase toProto(scene::ContactEvent::Phase phase) {
 
 }  // namespace
 
+const std::string& findGlobalId(const scene::Model& model, scene::EntityId entity) {
+  static const std::string none;
+  if (entity == 0 || entity > model.objects.size()) return none;
+  const scene::Object& object = model.objects[entity - 1];
+  return object.globalId.empty() && object.partOf ? model.objects[*object.partOf].globalId
+                                                  : object.globalId;
+}
+
+void describeObject(const scene::Model& model, scene::EntityId entity, v1::Entity& into) {
+  const scene::Object& object = model.objects[entity - 1];
+  into.set_kind(v1::Entity::KIND_OBJECT);
+  into.set_global_id(object.globalId);
+  into.set_operation(object.operationType);
+  into.set_ifc_class(object.ifcClass);
+  if (object.storey) into.set_storey(model.storeys[*object.storey].name);
+}
+
 v1::ContactEvent toProto(const scene::World& world, const scene::ContactEvent& event) {
   v1::ContactEvent message;
   message.set_tick(event.tick);
@@ -180,6 +203,8 @@ v1::ContactEvent toProto(const scene::World& world, const scene::ContactEvent& e
   message.set_b(event.b);
   message.set_a_name(scene::findEntityName(world, event.a));
   message.set_b_name(scene::findEntityName(world, event.b));
+  message.set_a_global_id(findGlobalId(world.scene().model(), event.a));
+  message.set_b_global_id(findGlobalId(world.scene().model(), event.b));
   setSeparation(event.separation, message);
   return message;
 }
@@ -194,6 +219,7 @@ v1::Notice toProto(const scene::World& world, const scene::Notice& notice, std::
   *message.mutable_position() = toProto(notice.position);
   message.set_obstacle(notice.obstacle);
   message.set_obstacle_name(scene::findEntityName(world, notice.obstacle));
+  message.set_obstacle_global_id(findGlobalId(world.scene().model(), notice.obstacle));
   message.set_text(notice.text);
   return message;
 }

@@ -34,6 +34,11 @@ void setSeparation(const collision::SeparationResult& separation, Message& messa
   message.set_feature_b(toProto(separation.featureB));
 }
 
+/// The IFC GlobalId of an object or, of a part without one, of its whole; "" for all else.
+const std::string& findGlobalId(const scene::Model& model, scene::EntityId entity);
+/// Fills in what the model knows of an object. `entity` is an object's id.
+void describeObject(const scene::Model& model, scene::EntityId entity, v1::Entity& into);
+
 v1::Error makeError(v1::ErrorCode code, std::string message, std::string field = {});
 
 /// Returns null if no avatar has this name.

@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cctype>
 #include <sstream>
 
 #include "collision/assert.hpp"
@@ -186,7 +187,13 @@ Target parseTarget(std::string_view text) {
 
 std::string extractToken(std::string_view authorization, const Target& target) {
   constexpr std::string_view kBearer = "Bearer ";
-  if (authorization.starts_with(kBearer)) return std::string(authorization.substr(kBearer.size()));
+  const bool isBearer =
+      authorization.size() >= kBearer.size() &&
+      std::equal(kBearer.begin(), kBearer.end(), authorization.begin(), [](char a, char b) {
+        return std::tolower(static_cast<unsigned char>(a)) ==
+               std::tolower(static_cast<unsigned char>(b));  // RFC 7235, 2.1
+      });
+  if (isBearer) return std::string(authorization.substr(kBearer.size()));
   const auto found = target.query.find("token");
   return found == target.query.end() ? "" : found->second;
 }
@@ -256,6 +263,7 @@ std::string makeResponse(unsigned status, const std::string& type, const std::st
                      "\r\nContent-Length: " + std::to_string(body.size()) +
                      "\r\nX-Content-Type-Options: nosniff\r\nCache-Control: no-store\r\n";
   if (status == 401) head += "WWW-Authenticate: Bearer\r\n";
+  if (status == 405) head += "Allow: GET, HEAD\r\n";
   return head + "Connection: close\r\n\r\n" + body;
 }
 
@@ -263,7 +271,8 @@ std::string makeMjpegHeader() {
   return fmt::format(
       "HTTP/1.1 200 OK\r\nServer: enfilade {}\r\n"
       "Content-Type: multipart/x-mixed-replace; boundary={}\r\n"
-      "Cache-Control: no-store\r\nConnection: close\r\n\r\n",
+      "Cache-Control: no-store\r\nCross-Origin-Resource-Policy: same-origin\r\n"
+      "Connection: close\r\n\r\n",
       kServerVersion, kMultipartBoundary);
 }
 

@@ -21,7 +21,8 @@ struct Target {
 /// Parses a target and decodes %XX.
 Target parseTarget(std::string_view text);
 
-/// The token of "Authorization: Bearer TOKEN", otherwise of the query's `token`; "": no token.
+/// The token of "Authorization: Bearer TOKEN" (the scheme in any case), otherwise of the query's
+/// `token`; "": no token.
 std::string extractToken(std::string_view authorization, const Target& target);
 
 /// An error response.

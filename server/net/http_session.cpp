@@ -24,6 +24,7 @@ using boost::system::error_code;
 
 namespace {
 
+constexpr const char* kMethods = "only GET and HEAD are supported";
 constexpr std::uint32_t kMaxHeaderBytes = 16u << 10;  // bytes; a browser's cookies are below 8 KiB
 constexpr std::uint64_t kMaxBodyBytes = 0;            // no request has a body
 /// Written at once: a peer that takes this much within the message timeout is not stuck.
@@ -55,7 +56,9 @@ HttpSession::HttpSession(asio::ip::tcp::socket socket, const std::vector<std::ui
   in_.commit(asio::buffer_copy(in_.prepare(first.size()), asio::buffer(first)));
 }
 
-HttpSession::~HttpSession() = default;
+HttpSession::~HttpSession() {
+  if (streams_) --context_.streams;
+}
 
 void HttpSession::start(Clock::time_point deadline) {
   deadline_ = deadline;
@@ -66,8 +69,11 @@ void HttpSession::start(Clock::time_point deadline) {
         if (!problem) return self->route(self->parser_.release());
         if (problem == http::error::header_limit)
           return self->refuse(431, "the request's header is too long");
-        if (problem == http::error::body_limit)
-          return self->refuse(413, "requests must have no body");
+        if (problem == http::error::body_limit) {
+          const bool reads = self->parser_.get().method() == http::verb::get;
+          return reads ? self->refuse(413, "requests must have no body")
+                       : self->refuse(405, kMethods);
+        }
         if (problem.category() == http::make_error_code(http::error::bad_method).category() &&
             problem != http::error::end_of_stream && problem != http::error::partial_message) {
           return self->refuse(400, "not a request: " + problem.message());
@@ -93,17 +99,28 @@ bool HttpSession::evictIfAnonymous() {
 // ---- requests ----------------------------------------------------------------------------------
 
 void HttpSession::route(Request request) {
+  if (request.count(http::field::host) > 1) return refuse(400, "the request has several hosts");
   const std::string host = toStdString(request[http::field::host]);
   const std::string origin = toStdString(request[http::field::origin]);
   if (const auto reason = validateOrigin(context_.access, host, origin))
     return refuse(403, *reason);
+  // Without an Origin header: a picture or another element of a foreign page.
+  if (origin.empty() && toStdString(request["Sec-Fetch-Site"]) == "cross-site" &&
+      toStdString(request["Sec-Fetch-Mode"]) != "navigate")
+    return refuse(403, "pages of other sites may not embed this: see --allow-origin");
   const Target target = parseTarget(toStdString(request.target()));
   path_ = target.path;
   ifNoneMatch_ = toStdString(request[http::field::if_none_match]);
   acceptEncoding_ = toStdString(request[http::field::accept_encoding]);
   const std::string token = extractToken(toStdString(request[http::field::authorization]), target);
-  if (boost::beast::websocket::is_upgrade(request)) return upgrade(std::move(request));
-  if (request.method() != http::verb::get) return refuse(405, "only GET is supported");
+  if (boost::beast::websocket::is_upgrade(request))
+    return isFull_ ? refuse(503, kServerIsFull) : upgrade(std::move(request));
+  headOnly_ = request.method() == http::verb::head;
+  if (request.method() != http::verb::get && !headOnly_) return refuse(405, kMethods);
+  const bool isHealthCheck = path_ == "/healthz" || path_ == "/metrics";
+  if (isFull_ && !isHealthCheck) return refuse(503, kServerIsFull);
+  if (path_.starts_with("/mjpeg") && context_.streams >= context_.limits.streams)
+    return refuse(503, "the server has reached its limit of streams: try again later");
   if (servePage()) return;
   const auto role = findRole(context_.access, token);
   // /healthz is public, but names of worlds are not.
@@ -139,6 +156,9 @@ void HttpSession::upgrade(Request request) {
   const Target target = parseTarget(toStdString(request.target()));
   const std::string token = extractToken(toStdString(request[http::field::authorization]), target);
   if (path_ != "/") return refuse(404, "the WebSocket is at /");
+  // RFC 6455, 4.2.1: 16 bytes in base64.
+  if (request[http::field::sec_websocket_key].size() != 24)
+    return refuse(400, "Sec-WebSocket-Key must have 16 bytes, in base64");
   const std::string viewer = foxglove_protocol::chooseSubprotocol(
       toStdString(request[http::field::sec_websocket_protocol]));
   if (!viewer.empty()) return upgradeToViewer(std::move(request), viewer, target, token);
@@ -223,7 +243,7 @@ void HttpSession::sendFile(const HttpFile& file) {
   if (answered_) return;
   answered_ = true;
   if (matchesTag(ifNoneMatch_, file.tag)) return write(makeBuffer(makeNotModified(file)), true);
-  if (!file.bytes->empty()) body_ = file.bytes;
+  if (!file.bytes->empty() && !headOnly_) body_ = file.bytes;
   write(makeBuffer(makeFileHeader(file)), !body_);
 }
 
@@ -290,14 +310,37 @@ void HttpSession::handleReply(WorldReply& reply, v1::ServerMessage message,
   }
   if (message.has_metrics()) reply.metrics = message.metrics();
   if (message.has_watch_frames()) {
-    timer_.cancel();  // frames are sent until the peer disconnects
-    answered_ = true;
-    return write(makeBuffer(makeMjpegHeader()), false);
+    streams_ = true;
+    ++context_.streams;
+    // An avatar may enter later.
+    return armTimer(Clock::now() + context_.limits.streamTimeout, 404,
+                    "no picture within the time limit: is the avatar in the world?");
   }
-  if (message.has_frame()) {
-    std::vector<std::uint8_t> part = makeMjpegPart(message.frame(), attachment);
-    return write(std::make_shared<const std::vector<std::uint8_t>>(std::move(part)), false);
+  if (message.has_frame()) startStream(message.frame(), attachment);
+}
+
+/// Sends a picture; before the first one the header.
+void HttpSession::startStream(const v1::Frame& frame, std::span<const std::uint8_t> attachment) {
+  std::vector<std::uint8_t> part = makeMjpegPart(frame, attachment);
+  lastPart_ = std::make_shared<const std::vector<std::uint8_t>>(part);
+  if (!std::exchange(answered_, true)) {
+    const std::string header = makeMjpegHeader();
+    if (headOnly_) return write(makeBuffer(header), true);
+    part.insert(part.begin(), header.begin(), header.end());
   }
+  write(std::make_shared<const std::vector<std::uint8_t>>(std::move(part)), false);
+}
+
+/// Sends the last picture once more if none follows: Chromium shows a part when the next one
+/// begins.
+void HttpSession::waitForNextPart() {
+  if (!lastPart_ || writing_ || closed_) return;
+  timer_.expires_after(context_.limits.repeatDelay);
+  timer_.async_wait([weak = weak_from_this()](error_code stopped) {
+    const auto self = weak.lock();
+    if (stopped || !self || self->writing_ || self->closed_ || !self->lastPart_) return;
+    self->write(std::exchange(self->lastPart_, nullptr), false);
+  });
 }
 
 /// Responds with the metrics of the active worlds. A failed world makes /healthz fail; a world
@@ -327,7 +370,9 @@ void HttpSession::refuse(unsigned status, const std::string& reason) {
 void HttpSession::sendResponse(unsigned status, const std::string& type, std::string body) {
   if (answered_) return;
   answered_ = true;
-  write(makeBuffer(makeResponse(status, type, body)), true);
+  std::string response = makeResponse(status, type, body);
+  if (headOnly_) response.resize(response.size() - body.size());
+  write(makeBuffer(response), true);
 }
 
 /// Writes the bytes from `offset` on, a part at a time: the timeout applies to each part.
@@ -350,7 +395,11 @@ void HttpSession::write(Buffer bytes, bool last, std::size_t offset) {
                         return self->write(std::move(bytes), last, offset);
                       if (self->body_)
                         return self->write(std::exchange(self->body_, nullptr), true);
-                      if (!last) return self->pollReplies();
+                      if (!last) {
+                        self->timer_.cancel();
+                        self->pollReplies();
+                        return self->waitForNextPart();
+                      }
                       error_code ignored;
                       self->socket_.shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
                       self->timer_.expires_after(self->context_.limits.closeTimeout);

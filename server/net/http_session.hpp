@@ -25,6 +25,8 @@ class HttpSession : public ClientConnection, public std::enable_shared_from_this
   ~HttpSession() override;
   /// The complete request must arrive before `deadline`.
   void start(Clock::time_point deadline);
+  /// The server is full: all but /healthz and /metrics get 503.
+  void admitOnlyHealthChecks() { isFull_ = true; }
   void end(v1::ErrorCode code, const std::string& reason) override;
   bool evictIfAnonymous() override;
 
@@ -59,6 +61,8 @@ class HttpSession : public ClientConnection, public std::enable_shared_from_this
   void handleReply(WorldReply& reply, v1::ServerMessage message,
                    std::vector<std::uint8_t> attachment);
   void sendMetrics();
+  void startStream(const v1::Frame& frame, std::span<const std::uint8_t> attachment);
+  void waitForNextPart();
   void armTimer(Clock::time_point deadline, unsigned status, std::string reason);
   void watchDisconnect();
   void close();
@@ -75,6 +79,10 @@ class HttpSession : public ClientConnection, public std::enable_shared_from_this
   std::string ifNoneMatch_, acceptEncoding_;  ///< headers of the request
   Buffer body_;                               ///< sent after the header
   std::vector<WorldReply> replies_;           ///< one; for metrics, one per world
+  bool isFull_ = false;                       ///< see admitOnlyHealthChecks()
+  bool headOnly_ = false;                     ///< HEAD: the response has no body
+  bool streams_ = false;                      ///< counted in ServerContext::streams
+  Buffer lastPart_;                           ///< of a stream, until it was sent again
   bool mayShowNames_ = false;                 ///< the response may name worlds
   bool awaitsFile_ = false;                   ///< of the scene, which is being made
   bool writing_ = false, answered_ = false, watching_ = false, closed_ = false;

@@ -91,21 +91,32 @@ void Listener::accept() {
   });
 }
 
+/// Clients and idle connections share the limit; a connection without a Hello makes room for a new
+/// one. Above the limit some connections are still read: health checks are answered, and all others
+/// get the reason in their own protocol.
 void Listener::acceptSocket(tcp::socket socket) {
   ENFILADE_ASSERT(!context_.closed);
   const auto detector = std::make_shared<ProtocolDetector>(std::move(socket), context_);
-  detector->start();
   registerConnection(context_, detector);
-  if (context_.connections.size() > context_.limits.connections && !evictAnonymous(*detector))
-    detector->end(v1::ERROR_NOT_ALLOWED,
-                  "the server has reached its connection limit: try again later");
+  const std::size_t limit = context_.limits.connections;
+  while (context_.connections.size() > limit && evictAnonymous(*detector)) {
+  }
+  if (context_.connections.size() > limit + context_.limits.reservedConnections) {
+    detector->evictIfAnonymous();
+    context_.connections.pop_back();
+    return;
+  }
+  if (context_.connections.size() > limit) detector->admitOnlyHealthChecks();
+  detector->start();
 }
 
 /// Evicts the oldest connection without a Hello: idle connections must not block new clients.
 bool Listener::evictAnonymous(const ClientConnection& newcomer) {
-  for (const auto& weak : context_.connections) {
-    const auto connection = weak.lock();
-    if (connection && connection.get() != &newcomer && connection->evictIfAnonymous()) return true;
+  for (auto weak = context_.connections.begin(); weak != context_.connections.end(); ++weak) {
+    const auto connection = weak->lock();
+    if (!connection || connection.get() == &newcomer || !connection->evictIfAnonymous()) continue;
+    context_.connections.erase(weak);
+    return true;
   }
   return false;
 }

@@ -1,5 +1,7 @@
 #include "server/net/protocol_detector.hpp"
 
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -15,13 +17,30 @@ namespace enfilade::server {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
+namespace {
+
+/// A peer that vanished without closing is noticed within two minutes; the system's default is two
+/// hours, for which it would drive the clock.
+void setKeepAlive(asio::ip::tcp::socket& socket) {
+  using Idle = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_KEEPIDLE>;
+  using Interval = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_KEEPINTVL>;
+  using Count = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_KEEPCNT>;
+  error_code ignored;
+  socket.set_option(asio::socket_base::keep_alive(true), ignored);
+  socket.set_option(Idle(60), ignored);      // seconds without data until the first probe
+  socket.set_option(Interval(10), ignored);  // seconds between probes
+  socket.set_option(Count(6), ignored);
+}
+
+}  // namespace
+
 ProtocolDetector::ProtocolDetector(asio::ip::tcp::socket socket, ServerContext& context)
     : socket_(std::move(socket)), timer_(socket_.get_executor()), context_(context) {}
 
 void ProtocolDetector::start() {
   error_code ignored;  // the first read reports a closed peer
   socket_.set_option(asio::ip::tcp::no_delay(true), ignored);
-  socket_.set_option(asio::socket_base::keep_alive(true), ignored);
+  setKeepAlive(socket_);
   const int sendBuffer = context_.limits.sendBuffer;
   if (sendBuffer > 0) socket_.set_option(asio::socket_base::send_buffer_size(sendBuffer), ignored);
   timer_.expires_after(context_.limits.helloTimeout);
@@ -98,6 +117,7 @@ void ProtocolDetector::handOver(Protocol detected) {
   if (detected == Protocol::http) {
     const auto httpSession =
         std::make_shared<HttpSession>(std::move(socket_), std::move(first), context_);
+    if (isFull_) httpSession->admitOnlyHealthChecks();
     registerConnection(context_, httpSession);
     return httpSession->start(deadline);
   }
@@ -105,6 +125,7 @@ void ProtocolDetector::handOver(Protocol detected) {
       std::make_unique<TcpTransport>(std::move(socket_), std::move(first)), executor, context_);
   session->start(deadline);
   registerConnection(context_, session);
+  if (isFull_) session->end(v1::ERROR_NOT_ALLOWED, kServerIsFull);
   if (!endReason_.empty()) session->end(endCode_, endReason_);
 }
 

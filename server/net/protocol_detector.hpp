@@ -17,6 +17,8 @@ class ProtocolDetector : public ClientConnection,
  public:
   ProtocolDetector(boost::asio::ip::tcp::socket socket, ServerContext& context);
   void start();
+  /// The server is full: an HTTP request for /healthz or /metrics is answered, others are refused.
+  void admitOnlyHealthChecks() { isFull_ = true; }
   void end(v1::ErrorCode code, const std::string& reason) override;
   bool evictIfAnonymous() override;
 
@@ -32,6 +34,7 @@ class ProtocolDetector : public ClientConnection,
   ServerContext& context_;
   std::array<std::uint8_t, 4096> in_{};
   std::size_t receivedBytes_ = 0;  ///< number of received bytes
+  bool isFull_ = false;            ///< see admitOnlyHealthChecks()
   bool finished_ = false;          ///< the socket was handed over or closed
   v1::ErrorCode endCode_ = v1::ERROR_UNSPECIFIED;
   std::string endReason_;  ///< if not empty, sent to the client

@@ -12,6 +12,9 @@
 
 namespace enfilade::server {
 
+inline constexpr const char* kServerIsFull =
+    "the server has reached its connection limit: try again later";
+
 /// A connection of a client, in any protocol.
 class ClientConnection {
  public:
@@ -28,7 +31,8 @@ struct ServerContext {
   const Access access;
   const PageFiles page;
   std::vector<std::weak_ptr<ClientConnection>> connections;
-  bool closed = false;  ///< new connections are rejected
+  std::size_t streams = 0;  ///< of MJPEG
+  bool closed = false;      ///< new connections are rejected
 };
 
 /// Registers a connection, so that it is ended when the server stops.

@@ -14,7 +14,7 @@ using boost::system::error_code;
 
 namespace {
 
-constexpr std::chrono::seconds kHandshakeTimeout{10};
+constexpr std::chrono::seconds kHandshakeTimeout{10}, kIdleTimeout{240};
 constexpr std::size_t kMaxReadBytes = 1 << 16;  // bytes
 
 }  // namespace
@@ -27,10 +27,9 @@ WebSocketTransport::WebSocketTransport(asio::ip::tcp::socket socket, Request req
   stream_.read_message_max(protocol::kServerLimits.total + kFramingBytes);
   stream_.binary(true);
   stream_.auto_fragment(false);
-  // No idle timeout, as over TCP: while flow control pauses reading, pongs cannot be received. The
-  // session times incomplete messages.
-  stream_.set_option(
-      websocket::stream_base::timeout{kHandshakeTimeout, websocket::stream_base::none(), false});
+  // Pings find peers that vanished, as keep-alive probes do over TCP. While flow control pauses
+  // reading, pongs are not received: the timeout is far longer than any pause.
+  stream_.set_option(websocket::stream_base::timeout{kHandshakeTimeout, kIdleTimeout, true});
   stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
     response.set(boost::beast::http::field::server, std::string("enfilade ") + kServerVersion);
   }));
@@ -51,13 +50,20 @@ void WebSocketTransport::readMessage(ReadHandler done) {
   in_.clear();
   // Partial reads, so that the session can time incomplete messages.
   stream_.async_read_some(in_, kMaxReadBytes,
-                          [this, done = std::move(done)](error_code problem, std::size_t) {
+                          [this, done = std::move(done)](error_code problem, std::size_t) mutable {
                             if (problem) return done(problem.message(), {});
-                            if (!stream_.got_binary())
-                              return done("it sent text; only binary messages are supported", {});
+                            if (!stream_.got_binary()) return refuseText(std::move(done));
                             const auto data = in_.cdata();
                             done("", {static_cast<const std::uint8_t*>(data.data()), data.size()});
                           });
+}
+
+/// Closes with the code of unsupported data, so that the client learns why.
+void WebSocketTransport::refuseText(ReadHandler done) {
+  constexpr const char* kReason = "only binary messages are supported";
+  stream_.async_close(
+      {websocket::close_code::unknown_data, kReason},
+      [done = std::move(done)](error_code) { done(std::string("it sent text; ") + kReason, {}); });
 }
 
 void WebSocketTransport::write(EncodedMessage message, WriteHandler done) {

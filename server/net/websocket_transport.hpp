@@ -28,6 +28,7 @@ class WebSocketTransport : public Transport {
 
  private:
   void readMessage(ReadHandler done);
+  void refuseText(ReadHandler done);
 
   const std::string peer_;
   boost::beast::websocket::stream<boost::asio::ip::tcp::socket> stream_;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
+#include <set>
 
 #include "server/plans/floor_plan_section.hpp"
 #include "server/plans/plan_drawing.hpp"
@@ -22,8 +23,9 @@ constexpr double kMinFloorArea = 0.5;      // square metres: minimum floor area 
 constexpr double kMinStoreyShare = 0.04;   // minimum share of all floor area for a storey
 constexpr std::size_t kMaxStoreys = 12;
 constexpr double kWallBottom = 0.3, kWallTop = 1.5;  // metres above a floor that a wall spans
-constexpr double kMaxNameDistance = 0.6;  // metres between a storey's floor and its objects
-constexpr double kMargin = 2.0;           // metres around the section
+constexpr double kMaxFloorDistance = 0.6;  // metres between a stated elevation and its floor
+constexpr double kMaxNameDistance = 0.6;   // metres between a storey's floor and its objects
+constexpr double kMargin = 2.0;            // metres around the section
 constexpr double kMaxWidth = 1600, kMaxHeight = 1200;  // pixels of the plan
 constexpr double kPointsPerMetre = 72 / 0.0254;        // of a page
 constexpr double kPageUnit = 0.7;                      // points of a thin line
@@ -81,6 +83,39 @@ std::string findStoreyName(const scene::Scene& scene, double floor) {
   return mostFrequent == names.end() ? "" : mostFrequent->first;
 }
 
+std::vector<WeightedHeight> collectFloors(const scene::Scene& scene) {
+  std::vector<WeightedHeight> heights;
+  for (std::size_t i = 0; i < scene.solidObjects().size(); ++i) {
+    const Vec3 size = scene.staticBoxes()[i].size();
+    if (size.x() * size.z() >= kMinFloorArea) addFloors(scene, scene.solidObjects()[i], heights);
+  }
+  return heights;
+}
+
+/// The file states the elevation of a storey's structure or of its finish: the largest floor near
+/// it is the floor.
+double findFloorNear(const std::vector<WeightedHeight>& heights, double elevation) {
+  std::vector<WeightedHeight> near;
+  for (const WeightedHeight& one : heights)
+    if (std::abs(one.height - elevation) <= kMaxFloorDistance) near.push_back(one);
+  const std::vector<double> found = findStoreyHeights(near, 0, 1);
+  return found.empty() ? elevation : found.front();
+}
+
+std::vector<StoreyFloor> findStatedStoreys(const scene::Scene& scene,
+                                           const std::vector<WeightedHeight>& heights) {
+  const scene::Model& model = scene.model();
+  std::set<std::uint32_t> used;
+  for (const scene::Object& object : model.objects)
+    if (object.storey) used.insert(*object.storey);
+  std::vector<StoreyFloor> storeys;
+  for (const std::uint32_t index : used) {
+    const double height = findFloorNear(heights, model.storeys[index].elevation);
+    if (hasWallsAbove(scene, height)) storeys.push_back({height, model.storeys[index].name, index});
+  }
+  return storeys;
+}
+
 // ---- the sheet ----------------------------------------------------------------------------------
 
 /// The plan shows the bounds of the section, without lawns and roofs; without a section, the scene.
@@ -128,6 +163,7 @@ void drawSheet(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
   drawPlanPicture(canvas, view, picture);
   drawGrid(canvas, view);
   drawCut(canvas, view, scene);
+  if (storey.storey) drawSpaceNames(canvas, view, scene.model(), *storey.storey);
   const double below = view.topLeft.y + view.height();
   drawScaleBar(canvas, view, {view.topLeft.x, below + 34 * view.unit});
   drawTitle(canvas, view, scene, storey, scale);
@@ -136,12 +172,9 @@ void drawSheet(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
 }  // namespace
 
 std::vector<StoreyFloor> findStoreys(const scene::Scene& scene) {
-  std::vector<WeightedHeight> heights;
-  for (std::size_t i = 0; i < scene.solidObjects().size(); ++i) {
-    const Vec3 size = scene.staticBoxes()[i].size();
-    if (size.x() * size.z() >= kMinFloorArea) addFloors(scene, scene.solidObjects()[i], heights);
-  }
-  std::vector<StoreyFloor> storeys;
+  const std::vector<WeightedHeight> heights = collectFloors(scene);
+  std::vector<StoreyFloor> storeys = findStatedStoreys(scene, heights);
+  if (!storeys.empty()) return storeys;
   for (const double height : findStoreyHeights(heights, kMinStoreyShare, kMaxStoreys)) {
     if (hasWallsAbove(scene, height)) storeys.push_back({height, findStoreyName(scene, height)});
   }

@@ -19,7 +19,9 @@ constexpr double kCutWallBottom = 0.5, kCutWallTop = 2.0;  // metres above a flo
 constexpr double kMinGridSpacing = 70;  // thin lines between two numbers of the frame
 constexpr Colour kWall{52, 54, 62}, kFurniture{206, 210, 220}, kOutline{110, 114, 126},
     kDoor{150, 90, 30}, kGrid{214, 218, 228}, kAxis{180, 60, 40};
-constexpr double kTextSize = 13;  // thin lines
+constexpr double kTextSize = 13;       // thin lines
+constexpr double kSpaceNameSize = 12;  // thin lines
+constexpr double kSpaceLineHeight = 1.25;
 
 std::vector<Point> toPage(const PlanView& view, const std::vector<Vec3>& points) {
   std::vector<Point> page;
@@ -251,6 +253,28 @@ bool CaptionPlacer::isFree(const Rectangle& r) const {
     return r.topLeft.x < t.topLeft.x + t.width && t.topLeft.x < r.topLeft.x + r.width &&
            r.topLeft.y < t.topLeft.y + t.height && t.topLeft.y < r.topLeft.y + r.height;
   });
+}
+
+void drawSpaceNames(Canvas& canvas, const PlanView& view, const scene::Model& model,
+                    std::uint32_t storey) {
+  TextStyle style;
+  style.size = kSpaceNameSize * view.unit, style.colour = kPlanInk;
+  style.halo = 3 * view.unit, style.haloColour = kPlanPaper;
+  for (const scene::Space& space : model.spaces) {
+    if (space.storey != storey || space.box.empty()) continue;
+    const Point centre = view.at((space.box.min + space.box.max) / 2);
+    const double width = space.box.size().x() * view.unitsPerMetre;
+    std::vector<std::string> lines;
+    for (const std::string* text : {&space.longName, &space.name})
+      if (!text->empty() && (lines.empty() || lines[0] != *text)) lines.push_back(*text);
+    const double height = style.size * kSpaceLineHeight;
+    double top = centre.y - height * static_cast<double>(lines.size()) / 2;
+    for (std::size_t i = 0; i < lines.size(); ++i, top += height) {
+      style.bold = i == 0;
+      canvas.text({centre.x, top}, canvas.shorten(lines[i], style, width), style,
+                  render::Align::centre);
+    }
+  }
 }
 
 void CaptionPlacer::draw(Canvas& canvas, Point at, const std::string& text,

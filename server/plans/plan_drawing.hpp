@@ -35,6 +35,10 @@ void drawPlanPicture(render::Canvas& canvas, const PlanView& view, const PlanPic
 /// filled dark; others, as shelves and windows, are filled light.
 void drawCut(render::Canvas& canvas, const PlanView& view, const scene::Scene& scene);
 
+/// Writes the names of the storey's spaces into them: the long name, and below it the number.
+void drawSpaceNames(render::Canvas& canvas, const PlanView& view, const scene::Model& model,
+                    std::uint32_t storey);
+
 /// Draws grid lines and their coordinates outside of the view, and a frame around it.
 void drawGrid(render::Canvas& canvas, const PlanView& view);
 

@@ -252,7 +252,8 @@ v1::ModelChoices toProto(const ModelOptions& model) {
   if (model.import.offset) *message.mutable_offset() = toProto(*model.import.offset);
   for (const auto& [reader, name] : kIfcReaders)
     if (reader == model.import.ifcReader) message.set_ifc_reader(name);
-  message.set_ifc_doors(model.doors == scene::IfcDoors::fixed ? "still" : "move");
+  message.set_ifc_doors(toString(model.doors));
+  message.set_georeference(model.import.georeference);
   return message;
 }
 
@@ -263,7 +264,8 @@ ModelOptions modelOptionsFromProto(const v1::ModelChoices& message) {
   if (message.has_offset()) model.import.offset = vectorFromProto(message.offset());
   model.import.ifcReader =
       scene::parseIfcReader(message.ifc_reader()).value_or(scene::IfcReader::automatic);
-  model.doors = message.ifc_doors() == "still" ? scene::IfcDoors::fixed : scene::IfcDoors::movable;
+  model.doors = scene::parseIfcDoors(message.ifc_doors());
+  model.import.georeference = message.georeference();
   return model;
 }
 

@@ -111,12 +111,14 @@ ClientId TickLoop::join(std::string name, Role role, std::shared_ptr<OutgoingQue
     id = ++inbox_->lastId;
     if (!guest) inbox_->members.insert(id);
   }
-  const auto addClient = [id, role, requestId, name = std::move(name), out](HostedWorld& hosted) {
+  const auto addClient = [id, role, requestId, guest, name = std::move(name),
+                          out](HostedWorld& hosted) {
     if (hosted.closeNotice) return out->finish(encodeBye(*hosted.closeNotice));
     ENFILADE_ASSERT(!hosted.clients.contains(id));
     Client& client = hosted.clients[id];
     client.name = name;
     client.role = role;
+    client.guest = guest;
     client.out = out;
     v1::ServerMessage message;
     message.set_reply_to(requestId);

@@ -3,7 +3,7 @@
 // A server without a page of its own is put behind page_proxy.mjs, which sends --glb (default: the scene). Screenshots are written to the folder of --out.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
-import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { existsSync, mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { parseArgs } from "node:util";
@@ -15,6 +15,7 @@ const { values: options } = parseArgs({
     server: { type: "string" }, scene: { type: "string", default: "build/assets/building.glb" },
     page: { type: "string", default: "build/page" }, glb: { type: "string" }, out: { type: "string", default: "out/page" },
     chromium: { type: "string", default: "/usr/bin/chromium" }, only: { type: "string" },
+    shared: { type: "string", default: "../shared/scenes" }, // real buildings; their tests are skipped without it, except in CI
   },
 });
 assert.ok(options.server, "--server names the program");
@@ -109,8 +110,8 @@ async function hold(page, keys, milliseconds) {
 }
 
 const tests = {
-  async "the page opens without errors"({ page }) {
-    await shoot(page, "1-opened");
+  async "the page opens without errors"({ page, picture = "1-opened" }) {
+    await shoot(page, picture);
     assert.deepEqual(page.problems, []);
     const { triangles, calls } = await page.evaluate(() => enfilade.app.view.drawn);
     assert.ok(triangles > 1000, `${triangles} triangles are drawn`);
@@ -442,6 +443,99 @@ async function testReplay(record) {
   await server.stop();
 }
 
+/** Real buildings: an IFC house with storeys, and an estate of 16,395 objects. */
+async function testSharedScene(name, file, check) {
+  const path = join(options.shared, file);
+  if (!existsSync(path)) {
+    assert.ok(!process.env.CI, `${path} is missing`);
+    return console.log(`skip ${name}: ${path} is missing`);
+  }
+  const server = await startServer(path);
+  const page = await openPage(await addressOf(server));
+  const start = Date.now();
+  await isReady(page);
+  const seconds = ((Date.now() - start) / 1000).toFixed(1);
+  await run(`${name}: the page opens without errors`, async () => {
+    await tests["the page opens without errors"]({ page, picture: `scene-${name}` });
+    await check(page);
+    console.log(`     ready after ${seconds} s, ${await page.evaluate(() => enfilade.app.view.drawn.calls)} draw calls`);
+  });
+  await run(`${name}: a pick names the object that the server's ray names`, () => tests["a pick names the object that the server's ray names"]({ page }));
+  await run(`${name}: the drawn ids agree with the server's picture of ids`, () => tests["the drawn ids agree with the server's picture of ids"]({ page }));
+  await page.close();
+  await server.stop();
+}
+
+async function testSharedScenes() {
+  await testSharedScene("duplex", "duplex/Duplex_A_20110907.ifc", async (page) => {
+    for (const storey of ["Level 1", "Level 2", "Roof"]) await page.getByRole("treeitem").filter({ hasText: storey }).first().waitFor();
+    const storeys = await page.evaluate(() => new Set([...enfilade.app.table.byId.values()].map(({ storey }) => storey)).size);
+    assert.ok(storeys >= 4, `${storeys} storeys`);
+  });
+  await testSharedScene("estate", "schependomlaan/schependomlaan_estate.glb", async (page) => {
+    assert.equal(await page.evaluate(() => enfilade.app.table.byId.size), 16_395);
+  });
+}
+
+/** A tablet: the left half of the picture walks, the right half looks. */
+async function testTouch() {
+  const server = await startServer(options.scene);
+  const context = await browser.newContext({ viewport: { width: 1024, height: 768 }, hasTouch: true });
+  const page = await context.newPage();
+  page.setDefaultTimeout(LONG);
+  await page.goto(await addressOf(server));
+  await isReady(page);
+  await run("touch walks and looks, and a button jumps", async () => {
+    await page.getByRole("button", { name: "Walk", exact: true }).tap();
+    await page.waitForFunction(() => enfilade.walk.isWalking && enfilade.app.avatarState(enfilade.walk.name)?.grounded);
+    const placeOf = () => page.evaluate(() => {
+      const { feet } = enfilade.app.avatarState(enfilade.walk.name);
+      return { ...feet, yaw: enfilade.rig.yaw };
+    });
+    const before = await placeOf();
+    const drag = (from, to, milliseconds) => page.evaluate(async ([[x0, y0], [x1, y1], wait]) => {
+      const { canvas } = enfilade.app.view;
+      const box = canvas.getBoundingClientRect();
+      const send = (type, x, y) => canvas.dispatchEvent(new PointerEvent(type, {
+        pointerId: 7, pointerType: "touch", isPrimary: true, bubbles: true, clientX: box.left + x * box.width, clientY: box.top + y * box.height, buttons: type === "pointerup" ? 0 : 1,
+      }));
+      send("pointerdown", x0, y0);
+      for (let step = 1; step <= 5; ++step) send("pointermove", x0 + ((x1 - x0) * step) / 5, y0 + ((y1 - y0) * step) / 5);
+      await new Promise((resolve) => setTimeout(resolve, wait));
+      send("pointerup", x1, y1);
+    }, [from, to, milliseconds]);
+    await drag([0.25, 0.6], [0.25, 0.45], 1500);
+    const walked = await placeOf();
+    assert.ok(Math.hypot(walked.x - before.x, walked.z - before.z) > 0.3, `from ${JSON.stringify(before)} to ${JSON.stringify(walked)}`);
+    await drag([0.75, 0.5], [0.6, 0.5], 100);
+    const looked = await placeOf();
+    assert.ok(Math.abs(looked.yaw - walked.yaw) > 0.05, `${walked.yaw} to ${looked.yaw}`);
+    const jump = page.getByRole("button", { name: "Jump" });
+    if (await jump.isVisible()) {
+      await jump.tap();
+      await page.waitForFunction((height) => enfilade.app.avatarState(enfilade.walk.name).feet.y > height + 0.1, looked.y);
+    }
+    await shoot(page, "touch");
+  });
+  await context.close();
+  await server.stop();
+}
+
+async function testWithoutWebGl() {
+  const server = await startServer(options.scene);
+  const page = await browser.newPage();
+  await page.addInitScript(() => {
+    const { getContext } = HTMLCanvasElement.prototype;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+      return kind === "webgl2" ? null : getContext.call(this, kind, ...more);
+    };
+  });
+  await page.goto(await addressOf(server));
+  await run("without WebGL 2 the page says so", () => page.getByRole("alert").filter({ hasText: "WebGL 2" }).waitFor());
+  await page.close();
+  await server.stop();
+}
+
 async function testToken() {
   const tokens = join(scratch, "tokens");
   writeFileSync(tokens, "observe see-only-0123456789\ndrive may-walk-0123456789\n", { mode: 0o600 });
@@ -480,6 +574,9 @@ try {
   const record = await testLive();
   await testReplay(record);
   await testToken();
+  await testSharedScenes();
+  await testTouch();
+  await testWithoutWebGl();
 } catch (error) {
   ++failures;
   console.log(`FAIL ${error.stack}`);

@@ -2,6 +2,8 @@
 // static with the reason, and the doors of real buildings.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "scene/import/bodies/collect_bodies.hpp"
 #include "scene/import/bodies/ifc_doors.hpp"
 #include "scene/import/import_model.hpp"
@@ -223,6 +225,46 @@ TEST(IfcDoors, AllStandWhereTheUserSaysSoAndIdsStayTheSame) {
   const Model model = found(doorModel("SINGLE_SWING_LEFT", singleDoor()), IfcDoors::fixed);
   EXPECT_TRUE(model.bodies.empty());
   EXPECT_EQ(model.objects.size(), 3u);
+}
+
+/// The box of an object's vertices.
+Aabb boxOf(const Model& model, std::size_t object) {
+  Aabb box;
+  for (const std::uint32_t mesh : model.objects[object].meshes)
+    for (std::uint32_t i = 0; i < model.meshes[mesh].positions.size(); ++i)
+      box.include(computeWorldPosition(model.objects[object], model.meshes[mesh], i));
+  return box;
+}
+
+TEST(IfcDoors, OpenOnesAreStaticWithTheirLeavesWhereTheBodyWouldOpenThem) {
+  const Model moving = found(doorModel("SINGLE_SWING_LEFT", singleDoor()));
+  const Model open = found(doorModel("SINGLE_SWING_LEFT", singleDoor()), IfcDoors::open);
+  EXPECT_TRUE(open.bodies.empty());
+  EXPECT_EQ(open.objects.size(), moving.objects.size());
+  const std::uint32_t leaf = moving.bodies[0].objects[0];
+  Aabb expected;
+  const Aabb closed = boxOf(moving, leaf);
+  for (int corner = 0; corner < 8; ++corner)
+    expected.include(whenOpen(
+        moving, moving.bodies[0].name,
+        {corner & 1 ? closed.max.x() : closed.min.x(), corner & 2 ? closed.max.y() : closed.min.y(),
+         corner & 4 ? closed.max.z() : closed.min.z()}));
+  EXPECT_LT((boxOf(open, leaf).min - expected.min).norm(), 1e-6);
+  EXPECT_LT((boxOf(open, leaf).max - expected.max).norm(), 1e-6);
+  EXPECT_GT((boxOf(open, leaf).max - closed.max).norm(), 0.5) << "the leaf has moved";
+}
+
+TEST(IfcDoors, WithoutLeavesOnlyTheFramesStand) {
+  const Model model = found(doorModel("SINGLE_SWING_LEFT", singleDoor()), IfcDoors::absent);
+  EXPECT_TRUE(model.bodies.empty());
+  const std::uint32_t leaf =
+      found(doorModel("SINGLE_SWING_LEFT", singleDoor())).bodies[0].objects[0];
+  EXPECT_TRUE(model.objects[leaf].meshes.empty());
+  EXPECT_EQ(model.objects.size(), 3u) << "ids stay the same";
+  const auto frame = std::find_if(model.objects.begin(), model.objects.end(),
+                                  [](const Object& o) { return o.path.ends_with("/frame"); });
+  ASSERT_NE(frame, model.objects.end());
+  EXPECT_FALSE(frame->meshes.empty());
 }
 
 TEST(IfcDoors, ASidecarSaysBetterOfTheLeafAlone) {

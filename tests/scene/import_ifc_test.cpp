@@ -2,9 +2,11 @@
 // archives.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <random>
 
+#include "scene/import/ifc/openings.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/world/data/scene.hpp"
 #include "tests/scene/hand_made_files.hpp"
@@ -181,6 +183,102 @@ TEST(ImportIfc, AMapPositionIsReportedAndMovesNothing) {
         (objectOf(model, "IfcDoor").worldFromPlacement->translation() - Vec3(1.5, 0, -0.1)).norm(),
         1e-9);
   }
+}
+
+TEST(ImportIfc, OnRequestCoordinatesAreThoseOfTheMap) {
+  const TemporaryFolder folder;
+  IfcHouse house;
+  // The file's x axis points north on the map.
+  house.more =
+      "#600=IFCMAPCONVERSION(#20,#601,456789.,5428000.,110.,0.,1.,$);\n"
+      "#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,#602);\n"
+      "#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
+  const auto file = folder.write("house.ifc", house.text());
+  for (const IfcReader reader : readersHere()) {
+    ImportOptions options = by(reader);
+    options.georeference = true;
+    const Model model = importModel(file, options);
+    SCOPED_TRACE(model.reader);
+    EXPECT_EQ(model.map, "EPSG:25832");
+    // A corner of the file's (1.5, 0.1) is 0.1 m west and 1.5 m north of the origin; -z is north.
+    const Vec3 door = objectOf(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
+    EXPECT_LT((door - Vec3(456789 - 0.1, 110, -(5428000 + 1.5))).norm(), 1e-6) << door.transpose();
+    EXPECT_LT(Scene(Model(model)).bounds().size().z(), 4.01);
+    EXPECT_GT(Scene(Model(model)).bounds().size().z(), 3.99) << "the wall runs north";
+    EXPECT_LT(Scene(Model(model)).bounds().max.norm(), 100) << "the scene lies near its origin";
+  }
+}
+
+TEST(ImportIfc, AMapThatIsMissingIsAnErrorOnRequest) {
+  const TemporaryFolder folder;
+  ImportOptions options;
+  options.georeference = true;
+  for (const auto& file : {folder.write("house.ifc", IfcHouse().text()),
+                           folder.write("cube.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")}) {
+    try {
+      importModel(file, options);
+      ADD_FAILURE() << file << " was read";
+    } catch (const ImportError& error) {
+      EXPECT_NE(std::string(error.what()).find("--georeference"), std::string::npos)
+          << error.what();
+    }
+  }
+}
+
+TEST(ImportIfc, StoreysAndSpacesAreKept) {
+  const TemporaryFolder folder;
+  IfcHouse house;
+  house.more = house.placement(500, "#15", 0, 0, 3.2) +
+               "#510=IFCBUILDINGSTOREY('0000000000000000000511',$,'Upper "
+               "floor',$,$,#502,$,$,.ELEMENT.,3200.);\n"
+               "#511=IFCRELAGGREGATES('0000000000000000000512',$,$,$,#40,(#510));\n" +
+               house.placement(520, "#502", 1, 1, 0) + house.box(530, 1, 1, 0.5) +
+               "#540=IFCFURNISHINGELEMENT('0000000000000000000541',$,'Table',$,$,#522,#535,$);\n"
+               "#541=IFCRELCONTAINEDINSPATIALSTRUCTURE('0000000000000000000542',$,$,$,(#540),"
+               "#510);\n" +
+               house.placement(550, "#502", 0, 0, 0) + house.box(560, 4, 3, 2.5) +
+               "#570=IFCSPACE('0000000000000000000571',$,'201',$,$,#552,#565,'Study',"
+               ".ELEMENT.,.INTERNAL.,$);\n"
+               "#571=IFCRELAGGREGATES('0000000000000000000572',$,$,$,#510,(#570));\n";
+  const auto file = folder.write("house.ifc", house.text());
+  for (const IfcReader reader : readersHere()) {
+    const Model model = importModel(file, by(reader));
+    SCOPED_TRACE(model.reader);
+    ASSERT_EQ(model.storeys.size(), 2u);
+    EXPECT_EQ(model.storeys[0].name, "Ground/floor");
+    EXPECT_EQ(model.storeys[0].elevation, 0);
+    EXPECT_EQ(model.storeys[1].name, "Upper floor");
+    EXPECT_EQ(model.storeys[1].globalId, "0000000000000000000511");
+    EXPECT_NEAR(model.storeys[1].elevation, 3.2, 1e-9);
+    EXPECT_EQ(objectOf(model, "IfcWall").storey, 0u);
+    EXPECT_EQ(objectOf(model, "IfcDoor").storey, 0u);
+    EXPECT_EQ(objectOf(model, "IfcFurnishingElement").storey, 1u);
+    ASSERT_EQ(model.spaces.size(), 1u);
+    const Space& space = model.spaces[0];
+    EXPECT_EQ(space.name, "201");
+    EXPECT_EQ(space.longName, "Study");
+    EXPECT_EQ(space.storey, 1u);
+    for (const Object& object : model.objects) EXPECT_NE(object.ifcClass, "IfcSpace");
+    if (model.reader != "web-ifc") continue;
+    EXPECT_LT((space.box.min - Vec3(0, 3.2, -3)).norm(), 1e-5) << space.box.min.transpose();
+    EXPECT_LT((space.box.max - Vec3(4, 5.7, 0)).norm(), 1e-5) << space.box.max.transpose();
+  }
+}
+
+TEST(ImportIfc, AWallIsLargerThanItsDoorAndAFrameIsNot) {
+  const TemporaryFolder folder;
+  const std::string text = IfcHouse().text();
+  const StepFile steps(text);
+  const IfcMetadata metadata = readIfcMetadata(steps);
+  Model model = importModel(folder.write("house.ifc", text), by(readersHere()[0]));
+  const auto wall =
+      std::find_if(metadata.products.begin(), metadata.products.end(),
+                   [](const IfcProduct& product) { return product.ifcClass == "IfcWall"; });
+  ASSERT_NE(wall, metadata.products.end());
+  EXPECT_TRUE(isLargerThanOpenings(model, metadata, *wall)) << "4 x 3 m around 0.9 x 2.1 m";
+  for (Object& object : model.objects)
+    object.worldFromMesh = Eigen::Scaling(0.25, 0.7, 1.0) * object.worldFromMesh;
+  EXPECT_FALSE(isLargerThanOpenings(model, metadata, *wall)) << "1 x 2.1 m";
 }
 
 TEST(ImportIfc, APositionWithoutAMapIsNotReported) {

@@ -36,7 +36,12 @@ Model smallModel() {
   object.worldFromPlacement = Eigen::Affine3d(Eigen::Translation3d(4, 5, 6));
   object.meshes = {0, 1};
   object.worldFromMesh = Eigen::Translation3d(0.1, 0.2, 0.3) * Eigen::Scaling(-1.0, 2.0, 1.0);
+  object.storey = 1;
   model.objects.push_back(object);
+  model.storeys = {{"cellar", "", -2.5}, {"ground floor", "1xS3BCk291UvhgP2dvNflr", 0.25}};
+  model.spaces = {{"101", "Kitchen", "0BTBFw6f90Nfh9rP1dl_3P", 1, {{0, 0.25, 0}, {3, 2.75, 4}}},
+                  {"102", "", "", std::nullopt, {}}};
+  model.map = "EPSG:25832";
   model.metresPerUnit = 0.3048;
   model.upAxis = 'z';
   model.offset = {459123, 113, -5428311};
@@ -63,6 +68,18 @@ TEST(ModelStream, RoundTripKeepsEveryByte) {
   EXPECT_EQ(back.objects[0].worldFromPlacement->translation(), Vec3(4, 5, 6));
   EXPECT_EQ(back.diagnostics[0].count, 3u);
   EXPECT_EQ(back.dependencies, smallModel().dependencies);
+  EXPECT_EQ(back.objects[0].storey, 1u);
+  EXPECT_EQ(back.storeys[1].elevation, 0.25);
+  EXPECT_EQ(back.spaces[0].longName, "Kitchen");
+  EXPECT_EQ(back.spaces[0].box.max, Vec3(3, 2.75, 4));
+  EXPECT_TRUE(back.spaces[1].box.empty());
+  EXPECT_EQ(back.map, "EPSG:25832");
+}
+
+TEST(ModelStream, AStoreyThatIsMissingIsRefused) {
+  Model model = smallModel();
+  model.storeys.pop_back();
+  EXPECT_THROW(deserialiseModel(serialiseModel(model)), ModelStreamError);
 }
 
 TEST(ModelStream, EveryShorterStreamIsRefused) {

@@ -70,11 +70,11 @@ TEST_F(FrameWatches, ARateIsOfSimulatedTime) {
   ann.request(watching(1, 2));
   EXPECT_EQ(nextFrame(ann).value().tick(), 0u);
   std::vector<std::uint64_t> ticks;
-  for (int i = 0; i < 62; ++i) {
+  for (int tick = 1; tick <= 62; ++tick) {
     ann.step();
-    if (i % 30 == 0) ticks.push_back(nextFrame(ann).value().tick());
+    if (tick % 30 == 0) ticks.push_back(nextFrame(ann).value().tick());
   }
-  EXPECT_EQ(ticks, (std::vector<std::uint64_t>{1, 31, 61}));
+  EXPECT_EQ(ticks, (std::vector<std::uint64_t>{30, 60}));
   EXPECT_FALSE(nextFrame(ann, 50)) << "and no others";
 }
 

@@ -52,6 +52,89 @@ TEST_F(Http, HealthIsOkAndUnknownPagesAreNamed) {
             "HTTP/1.1 431");
 }
 
+TEST_F(Http, MethodsSchemesAndHostsFollowTheStandards) {
+  Access access;
+  access.tokens = {{Role::observe, "0123456789abcdef"}};
+  access.hosts = {"Model.Example.org"};
+  serve({}, smallRoom(), access);
+  const std::string post =
+      answerTo("POST /healthz HTTP/1.1\r\n" + kHost + "Content-Length: 3\r\n\r\nabc");
+  EXPECT_EQ(post.substr(0, 12), "HTTP/1.1 405");
+  EXPECT_NE(post.find("\r\nAllow: GET, HEAD\r\n"), std::string::npos) << post;
+  const std::string head = answerTo("HEAD /healthz HTTP/1.1\r\n" + kHost + "\r\n");
+  EXPECT_EQ(head.substr(0, 12), "HTTP/1.1 200");
+  EXPECT_NE(head.find("Content-Length: 3\r\n"), std::string::npos) << head;
+  EXPECT_TRUE(head.ends_with("\r\n\r\n")) << "no body: " << head;
+  const auto metrics = [&](const std::string& headers) {
+    return answerTo("GET /metrics HTTP/1.1\r\n" + headers + "\r\n").substr(9, 3);
+  };
+  EXPECT_EQ(metrics(kHost + "Authorization: bearer 0123456789abcdef\r\n"), "200");
+  EXPECT_EQ(metrics(kHost + "Authorization: Basic 0123456789abcdef\r\n"), "401");
+  EXPECT_EQ(metrics("Host: MODEL.example.ORG\r\nAuthorization: Bearer 0123456789abcdef\r\n"),
+            "200");
+  EXPECT_EQ(metrics(kHost + "Host: evil.example.com\r\n"), "400");
+  EXPECT_EQ(metrics(kHost + "Sec-Fetch-Site: cross-site\r\nSec-Fetch-Mode: no-cors\r\n"), "403");
+}
+
+TEST_F(Http, AWebSocketsKeyHasSixteenBytes) {
+  serve();
+  const std::string shortKey =
+      "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+      "Sec-WebSocket-Key: short\r\n";
+  EXPECT_EQ(answerTo("GET / HTTP/1.1\r\n" + kHost + shortKey + "\r\n").substr(0, 12),
+            "HTTP/1.1 400");
+}
+
+TEST_F(Http, AFullServerAnswersHealthChecksAndNoOneElse) {
+  ServerLimits limits;
+  limits.connections = 2;
+  limits.reservedConnections = 4;
+  serve(limits);
+  const protocol::Client one = client("one"), two = client("two");
+  for (int round = 0; round < 3; ++round) {
+    EXPECT_EQ(get("/healthz").substr(0, 12), "HTTP/1.1 200");
+    EXPECT_EQ(get("/metrics").substr(0, 12), "HTTP/1.1 200");
+    EXPECT_EQ(get("/scene.glb").substr(0, 12), "HTTP/1.1 503");
+    RawConnection silent(server_->port());
+    RawConnection socket(server_->port());
+    socket.send("GET / HTTP/1.1\r\n" + kHost + kUpgrade + "\r\n");
+    EXPECT_EQ(socket.readText().substr(0, 12), "HTTP/1.1 503") << "not a WebSocket";
+    RawConnection client(server_->port());
+    client.sendHello();
+    EXPECT_EQ(client.readToEnd().bye.code(), v1::ERROR_NOT_ALLOWED);
+  }
+}
+
+TEST_F(Http, AStreamWithoutAvatarEndsAndStreamsAreLimited) {
+  ServerLimits limits;
+  limits.streams = 1;
+  limits.streamTimeout = std::chrono::milliseconds(300);
+  serve(limits);
+  ENFILADE_NEED_PICTURES(*server_);
+  RawConnection first(server_->port());
+  first.send("GET /mjpeg/avatar/nemo HTTP/1.1\r\n" + kHost + "\r\n");
+  std::string second;
+  // The first stream counts once its world has answered.
+  while ((second = get("/mjpeg/avatar/nemo").substr(9, 3)) == "404") {
+  }
+  EXPECT_EQ(second, "503");
+  EXPECT_EQ(first.readText().substr(0, 12), "HTTP/1.1 404");
+}
+
+TEST_F(Http, TheLastPictureIsSentAgain) {
+  ServerLimits limits;
+  limits.repeatDelay = std::chrono::milliseconds(50);
+  serve(limits);
+  ENFILADE_NEED_PICTURES(*server_);
+  RawConnection raw(server_->port());
+  raw.send("GET /mjpeg/camera?eye=0,1,0&target=5,1,0&width=32&height=24&rate=0 HTTP/1.1\r\n" +
+           kHost + "\r\n");
+  EXPECT_NE(raw.readText("X-Tick: 0").find("X-Tick: 0"), std::string::npos);
+  EXPECT_NE(raw.readText("X-Tick: 0").find("X-Tick: 0"), std::string::npos);
+  client("other").step();
+  EXPECT_NE(raw.readText("X-Tick: 1").find("X-Tick: 1"), std::string::npos);
+}
+
 TEST_F(Http, MetricsContainTheTicks) {
   serve();
   protocol::Client other = client("other");
@@ -59,7 +142,7 @@ TEST_F(Http, MetricsContainTheTicks) {
   const std::string page = get("/metrics");
   EXPECT_NE(page.find("text/plain; version=0.0.4"), std::string::npos);
   EXPECT_NE(page.find("\nenfilade_ticks_total{world=\"main\"} 7\n"), std::string::npos) << page;
-  EXPECT_NE(page.find("\nenfilade_clients{world=\"main\"} 2\n"), std::string::npos);
+  EXPECT_NE(page.find("\nenfilade_clients{world=\"main\"} 1\n"), std::string::npos);
   EXPECT_NE(
       page.find("enfilade_stage_microseconds{world=\"main\",stage=\"tick\",quantile=\"0.5\"} "),
       std::string::npos);
@@ -96,7 +179,11 @@ TEST_F(Http, TextInAWebSocketAndTooLongMessagesEndIt) {
     raw.send("GET / HTTP/1.1\r\n" + kHost + kUpgrade + "\r\n");
     raw.readText("\r\n\r\n");
     raw.send(bytes);
-    EXPECT_EQ(raw.readText("small_room").find("small_room"), std::string::npos);
+    const std::string answer = raw.readText("small_room");
+    EXPECT_EQ(answer.find("small_room"), std::string::npos);
+    const bool isText = bytes[0] == 0x81;
+    EXPECT_EQ(answer.find("\x03\xEBonly binary messages") != std::string::npos, isText)
+        << "code 1003";
   }
   EXPECT_EQ(client("other").step().tick(), 1u);
 }

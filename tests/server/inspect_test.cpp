@@ -47,6 +47,23 @@ TEST_F(Inspect, DescribesTheOperationOfADoor) {
   EXPECT_GE(doors, 1);
 }
 
+TEST_F(Inspect, ListsStoreysOfIfcWithTheirObjects) {
+  write(folder_ / "house.ifc", tests::IfcHouse().text());
+  const Ended ended = run({"inspect", path("house.ifc"), "--json", "--objects"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const auto all = nlohmann::json::parse(ended.out);
+  ASSERT_EQ(all.at("storeys").size(), 1u);
+  const auto& storey = all.at("storeys").at(0);
+  EXPECT_EQ(storey.at("name"), "Ground/floor");
+  EXPECT_EQ(storey.at("elevation"), 0);
+  EXPECT_EQ(storey.at("objects"), 2);
+  EXPECT_EQ(storey.at("classes"), nlohmann::json({{"IfcDoor", 1}, {"IfcWall", 1}}));
+  EXPECT_EQ(all.at("classes"), storey.at("classes"));
+  EXPECT_EQ(all.at("object_list").at(0).at("storey"), "Ground/floor");
+  const Ended table = run({"inspect", path("house.ifc")});
+  EXPECT_NE(table.out.find("0.000 m       2  Ground/floor"), std::string::npos) << table.out;
+}
+
 TEST_F(Inspect, DescribesThePathOfABody) {
   write(folder_ / "room.walk.json",
         R"({"walk":1,"bodies":[{"name":"sign","kind":"path","objects":["room_wall"],

@@ -10,6 +10,7 @@
 #include "server/hosting/requests/dispatch.hpp"
 #include "server/worlds/tick_loop.hpp"
 #include "tests/server/eventually.hpp"
+#include "tests/server/raw_connection.hpp"
 #include "tests/server/served_room.hpp"
 
 namespace enfilade::server::testing {
@@ -42,6 +43,103 @@ TEST_F(Sessions, WelcomeHasTheSceneAndItsPolicies) {
   EXPECT_EQ(welcome.tick(), 0u);
   EXPECT_EQ(welcome.clock().mode(), v1::Clock::MODE_LOCKSTEP);
   EXPECT_EQ(welcome.renderer(), server_->rendererName());
+}
+
+TEST_F(Sessions, ASubscriberToStatesGetsThePresentOneAtOnce) {
+  serve();
+  protocol::Client driver = client("driver");
+  ASSERT_FALSE(driver.command(spawn("ann", 0, 0.01, 0)));
+  driver.step(5);
+  RawConnection late(server_->port());
+  late.sendHello();
+  ASSERT_TRUE(late.receive()->has_welcome());
+  v1::ClientMessage subscribe;
+  subscribe.set_request_id(2);
+  subscribe.mutable_subscribe()->set_state(true);
+  late.send(subscribe);
+  ASSERT_TRUE(late.receive()->has_subscribe());
+  const auto state = late.receive();
+  ASSERT_TRUE(state && state->has_state());
+  EXPECT_EQ(state->state().tick(), 5u);
+  ASSERT_EQ(state->state().avatars_size(), 1);
+  EXPECT_EQ(state->state().avatars(0).name(), "ann");
+}
+
+TEST_F(Sessions, ChangesOfTheClockArePushedAndItsDriverMayHandItBack) {
+  serve();
+  RawConnection watcher(server_->port());
+  watcher.sendHello();
+  ASSERT_TRUE(watcher.receive()->has_welcome());
+  v1::ClientMessage subscribe;
+  subscribe.set_request_id(2);
+  subscribe.mutable_subscribe()->set_clock(true);
+  watcher.send(subscribe);
+  ASSERT_TRUE(watcher.receive()->has_subscribe());
+
+  protocol::Client first = client("first"), second = client("second");
+  v1::ClientMessage pause;
+  pause.mutable_set_clock()->mutable_pause();
+  first.request(pause);
+  EXPECT_EQ(codeThrown([&] { second.request(pause); }), v1::ERROR_NOT_ALLOWED);
+  v1::ClientMessage release;
+  release.mutable_set_clock()->set_release(true);
+  EXPECT_EQ(codeThrown([&] { second.request(release); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_FALSE(first.request(release).set_clock().clock().has_driver());
+  second.request(pause);
+
+  std::vector<std::pair<v1::Clock::Mode, bool>> changes;
+  while (changes.size() < 4) {
+    const auto message = watcher.receive();
+    ASSERT_TRUE(message && message->has_clock()) << changes.size();
+    changes.emplace_back(message->clock().clock().mode(), message->clock().clock().has_driver());
+  }
+  using Clock = v1::Clock;
+  EXPECT_EQ(changes, (std::vector<std::pair<Clock::Mode, bool>>{{Clock::MODE_LOCKSTEP, true},
+                                                                {Clock::MODE_PAUSED, true},
+                                                                {Clock::MODE_PAUSED, false},
+                                                                {Clock::MODE_PAUSED, true}}));
+}
+
+TEST_F(Sessions, UnknownEnumValuesAreRefusedByTheirPath) {
+  serve();
+  protocol::Client ann = client("ann");
+  const auto fieldThrown = [&](const v1::ClientMessage& message) -> std::string {
+    try {
+      ann.request(message);
+    } catch (const protocol::ProtocolError& error) {
+      EXPECT_EQ(error.code, v1::ERROR_BAD_MESSAGE) << error.what();
+      return error.field;
+    }
+    return "accepted";
+  };
+  v1::ClientMessage query;
+  query.mutable_cannot_touch()->set_assume(static_cast<v1::CannotTouchQuery::Assume>(7));
+  EXPECT_EQ(fieldThrown(query), "cannot_touch.assume");
+  v1::ClientMessage frame;
+  frame.mutable_frame()->add_channels(v1::CHANNEL_RGB);
+  frame.mutable_frame()->add_channels(static_cast<v1::Channel>(99));
+  EXPECT_EQ(fieldThrown(frame), "frame.channels[1]");
+  v1::ClientMessage chain;
+  chain.mutable_command()->mutable_spawn()->add_links()->mutable_joint()->set_kind(
+      static_cast<v1::Joint::Kind>(-1));
+  EXPECT_EQ(ann.command(chain.command())->field(), "spawn.links[0].joint.kind");
+  v1::ClientMessage horizon;
+  horizon.mutable_subscribe()->mutable_contact_horizon()->set_assume(
+      static_cast<v1::CannotTouchQuery::Assume>(9));
+  EXPECT_EQ(fieldThrown(horizon), "subscribe.contact_horizon.assume");
+}
+
+TEST_F(Sessions, ALongNameIsNotEchoedInFull) {
+  serve();
+  protocol::Client ann = client("ann");
+  v1::ClientMessage message;
+  message.mutable_touching()->mutable_entity()->set_name(std::string(100'000, 'x'));
+  try {
+    ann.request(message);
+    FAIL() << "no error";
+  } catch (const protocol::ProtocolError& error) {
+    EXPECT_LT(std::string(error.what()).size(), 1200u);
+  }
 }
 
 TEST_F(Sessions, TwoClientsHearTheSameContacts) {

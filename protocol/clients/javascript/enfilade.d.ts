@@ -19,6 +19,7 @@ export interface Listeners {
   state?(body: any): void;
   frame?(body: any, attachment: Uint8Array): void;
   replay?(body: any): void;
+  clock?(body: any): void;
   bye?(body: any): void;
   error?(body: any): void;
   closed?(why: Error): void;

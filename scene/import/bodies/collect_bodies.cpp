@@ -1,6 +1,7 @@
 #include "scene/import/bodies/collect_bodies.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -10,6 +11,7 @@
 #include "scene/import/bodies/ifc_doors.hpp"
 #include "scene/import/bodies/sidecar.hpp"
 #include "scene/model/add_diagnostic.hpp"
+#include "scene/model/rotation.hpp"
 #include "scene/model/shapes/collision_geometry.hpp"
 
 namespace enfilade::scene {
@@ -63,7 +65,57 @@ void dropBodiesWithoutArea(Model& model) {
   });
 }
 
+/// Moves the objects of a door from the closed to the open end.
+void openDoor(Model& model, const BodySpec& door) {
+  const auto [low, high] = getJointLimits(door);
+  const double end =
+      std::abs(high - door.closedPosition) >= std::abs(low - door.closedPosition) ? high : low;
+  Eigen::Affine3d motion = Eigen::Affine3d::Identity();
+  if (getTraits(door.kind).rotates) {
+    motion.linear() = makeAxisRotation(door.axis, end).toRotationMatrix();
+    motion.translation() = door.anchor - motion.linear() * door.anchor;
+  } else {
+    motion.translation() = end * door.axis;
+  }
+  for (const std::uint32_t object : door.objects) {
+    Object& leaf = model.objects[object];
+    leaf.worldFromMesh = motion * leaf.worldFromMesh;
+    leaf.worldFromPlacement.reset();  // it described the closed door
+  }
+}
+
+/// Makes IFC's doors static: open, or without their leaves.
+void fixDoors(Model& model, IfcDoors doors) {
+  std::erase_if(model.bodies, [&](const BodySpec& body) {
+    if (body.source != BodySource::ifc || !getTraits(body.kind).isDoor) return false;
+    if (doors == IfcDoors::open) openDoor(model, body);
+    if (doors == IfcDoors::absent)
+      for (const std::uint32_t object : body.objects) model.objects[object].meshes.clear();
+    return true;
+  });
+}
+
 }  // namespace
+
+const char* toString(IfcDoors doors) {
+  switch (doors) {
+    case IfcDoors::movable:
+      return "move";
+    case IfcDoors::fixed:
+      return "still";
+    case IfcDoors::open:
+      return "open";
+    case IfcDoors::absent:
+      return "none";
+  }
+  return "";
+}
+
+IfcDoors parseIfcDoors(const std::string& text) {
+  for (const IfcDoors doors : {IfcDoors::fixed, IfcDoors::open, IfcDoors::absent})
+    if (text == toString(doors)) return doors;
+  return IfcDoors::movable;
+}
 
 void collectBodies(Model& model, const std::filesystem::path& file, IfcDoors doors) {
   std::vector<BodySpec> ofFile = std::move(model.bodies), ofIfc;
@@ -78,8 +130,9 @@ void collectBodies(Model& model, const std::filesystem::path& file, IfcDoors doo
                std::make_move_iterator(ofFile.end()));
   ofFile.erase(firstOfIfc, ofFile.end());
   mergeLowerPriorityBodies(model, std::move(ofFile), sidecar.staticObjects);
-  if (doors == IfcDoors::movable)
+  if (doors != IfcDoors::fixed)
     mergeLowerPriorityBodies(model, std::move(ofIfc), sidecar.staticObjects);
+  if (doors == IfcDoors::open || doors == IfcDoors::absent) fixDoors(model, doors);
   attachCollisionShapes(model);
   dropBodiesWithoutArea(model);
 }

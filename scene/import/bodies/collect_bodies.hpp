@@ -3,14 +3,27 @@
 // nodes, name suffixes), IFC doors and elevators. All other objects are static.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {
 
-/// Whether IFC doors and elevators become bodies if the file describes them well enough.
-enum class IfcDoors : std::uint8_t { movable, fixed };
+/// What IFC doors become if the file describes them well enough. Elevators are static with `fixed`,
+/// and otherwise move.
+enum class IfcDoors : std::uint8_t {
+  movable,  ///< bodies that open
+  fixed,    ///< static, as in the file
+  open,     ///< static, the leaves at their open ends
+  absent    ///< without leaves; frames stay
+};
+
+/// The words of `--ifc-doors` and of recordings: move, still, open, none. An unknown word means
+/// move.
+const char* toString(IfcDoors doors);
+IfcDoors parseIfcDoors(const std::string& text);
 
 /// Adds the bodies of the sidecar of `file`, if it exists, and those of doors to an imported model.
 /// Door frames become separate objects (see splitDoors()). Throws SidecarError.

@@ -59,6 +59,7 @@ std::string formatOptions(const ImportOptions& options) {
                 ? std::to_string(std::bit_cast<std::uint64_t>((*options.offset)[i])) + ","
                 : "-";
   text += " ifc reader " + std::to_string(static_cast<int>(options.ifcReader));
+  if (options.georeference) text += " on the map";
   return text;
 }
 

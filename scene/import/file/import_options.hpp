@@ -26,6 +26,9 @@ struct ImportOptions {
   /// near its origin).
   std::optional<Vec3> offset;
   IfcReader ifcReader = IfcReader::automatic;
+  /// IFC: applies the file's map conversion. The file's coordinates are then those of the map: x
+  /// east, y up, -z north.
+  bool georeference = false;
   double timeLimit = 120;                          ///< seconds of wall-clock time
   std::size_t memoryLimit = std::size_t{8} << 30;  ///< bytes, of each reading process
 };

@@ -233,11 +233,21 @@ class IfcMetadataReader {
     if (isDoor(statement.type) || isWindow(statement.type)) {
       readSizes(arguments, metadata_.metresPerUnit, product);
     }
+    readSpatialElement(statement.type, arguments, product);
     if (const auto placement = parseStepReference(arguments[5])) {
       product.fileFromPlacement = readIfcPlacement(file_, *placement, metadata_.metresPerUnit);
     }
     if (!metadata_.byId.emplace(product.id, metadata_.products.size()).second) return;
     metadata_.products.push_back(std::move(product));
+  }
+
+  void readSpatialElement(std::string_view type, const Arguments& arguments, IfcProduct& product) {
+    const bool isStorey = type == "IFCBUILDINGSTOREY";
+    if (!isStorey && product.role != IfcProduct::Role::space) return;
+    product.longName = parseStepString(getArgument(arguments, 7)).value_or("");
+    if (isStorey)
+      product.elevation =
+          parseStepNumber(getArgument(arguments, 9)).value_or(0) * metadata_.metresPerUnit;
   }
 
   /// Arguments of every relation: (GlobalId, owner, name, description, one side, other side).

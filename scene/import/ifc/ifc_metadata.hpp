@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "scene/import/file/step_file.hpp"
 #include "scene/import/ifc/ifc_units.hpp"
-#include "scene/import/ifc/step_file.hpp"
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {
@@ -26,6 +26,8 @@ struct IfcProduct {
   std::string globalId;
   std::string ifcClass;       ///< as "IfcDoor"
   std::string name;           ///< UTF-8, may be empty
+  std::string longName;       ///< of storeys and spaces: UTF-8, may be empty
+  double elevation = 0;       ///< metres; of storeys: as stated, relative to the building
   std::string operation;      ///< of doors, windows, elevators; see Object::operation
   std::uint32_t parent = 0;   ///< its aggregate or spatial container; 0: no parent
   std::uint32_t opening = 0;  ///< doors and windows: the opening that they fill

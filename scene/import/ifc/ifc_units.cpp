@@ -90,6 +90,11 @@ std::optional<IfcMapConversion> readIfcMapConversion(const StepFile& file, doubl
     conversion.height = unit * number(4, 0);
     const double xAxisEast = number(5, 1), xAxisNorth = number(6, 0);
     conversion.rotation = std::atan2(xAxisNorth, xAxisEast);
+    const double length = std::sqrt(xAxisEast * xAxisEast + xAxisNorth * xAxisNorth);
+    if (length > 0) {
+      conversion.xAxisEast = xAxisEast / length;
+      conversion.xAxisNorth = xAxisNorth / length;
+    }
     conversion.scale = number(7, 1);
     const double maxCoordinate = std::max(
         {std::abs(conversion.east), std::abs(conversion.north), std::abs(conversion.height)});
@@ -98,6 +103,15 @@ std::optional<IfcMapConversion> readIfcMapConversion(const StepFile& file, doubl
     return isValid ? std::optional(conversion) : std::nullopt;
   }
   return std::nullopt;
+}
+
+Eigen::Affine3d computeMapFromFile(const IfcMapConversion& conversion) {
+  Eigen::Affine3d map = Eigen::Affine3d::Identity();
+  map.linear() << conversion.xAxisEast, -conversion.xAxisNorth, 0, conversion.xAxisNorth,
+      conversion.xAxisEast, 0, 0, 0, 1;
+  map.linear() *= conversion.scale;
+  map.translation() = Eigen::Vector3d(conversion.east, conversion.north, conversion.height);
+  return map;
 }
 
 }  // namespace enfilade::scene

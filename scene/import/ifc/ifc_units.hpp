@@ -1,19 +1,21 @@
 // Reads the length unit and the map georeference of an IFC file.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <optional>
 #include <string>
 
-#include "scene/import/ifc/step_file.hpp"
+#include "scene/import/file/step_file.hpp"
 
 namespace enfilade::scene {
 
-/// The file's map georeference (IfcMapConversion). Reported, but not applied: the model keeps its
-/// own coordinates.
+/// The file's map georeference (IfcMapConversion). Reported, and applied on request: otherwise the
+/// model keeps its own coordinates.
 struct IfcMapConversion {
   std::string crs;                         ///< the map's name, e.g. "EPSG:25832"; may be empty
   double east = 0, north = 0, height = 0;  ///< of the file's origin, metres
-  double rotation = 0;                     ///< of the file's x axis, from east to north, radians
+  double xAxisEast = 1, xAxisNorth = 0;    ///< direction of the file's x axis, unit
+  double rotation = 0;                     ///< its angle, from east to north, radians
   double scale = 1;                        ///< from the file's lengths to the map's
 };
 
@@ -23,5 +25,8 @@ std::optional<double> readIfcMetresPerUnit(const StepFile& file, bool& siUnit);
 /// The map georeference; nullopt: absent or invalid. Lengths are converted to metres by the map's
 /// unit, or by `metresPerUnit` if the map has no unit.
 std::optional<IfcMapConversion> readIfcMapConversion(const StepFile& file, double metresPerUnit);
+
+/// To the map's axes (x east, y north, z up) from the file's, both in metres.
+Eigen::Affine3d computeMapFromFile(const IfcMapConversion& conversion);
 
 }  // namespace enfilade::scene

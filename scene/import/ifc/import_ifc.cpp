@@ -14,6 +14,7 @@
 #include "scene/import/ifc/ifc_file.hpp"
 #include "scene/import/ifc/ifc_readers.hpp"
 #include "scene/import/ifc/openings.hpp"
+#include "scene/import/ifc/spatial_structure.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
@@ -69,11 +70,13 @@ std::string describeProduct(const IfcProduct& product) {
 /// Converts the readers' meshes to imported nodes and meshes, with one material per colour.
 class NodeBuilder {
  public:
+  /// `worldFromFile`: from the file's axes, in metres of the file's unit.
   NodeBuilder(const IfcMetadata& metadata, const Eigen::Affine3d& worldFromFile, Model& model)
       : metadata_(metadata),
         paths_(buildIfcPaths(metadata)),
-        worldFromReader_(worldFromFile.linear() * makeYUpRotation('z').transpose() /
-                         metadata.metresPerUnit),
+        storeys_(metadata),
+        worldFromFile_(worldFromFile),
+        worldFromReader_(worldFromFile * Eigen::Affine3d(makeYUpRotation('z').transpose())),
         model_(model) {}
 
   void addProduct(const IfcProduct& product, const IfcMeshes& meshes) {
@@ -95,17 +98,21 @@ class NodeBuilder {
     object.globalId = product.globalId;
     object.ifcClass = product.ifcClass;
     object.operationType = product.operation;
+    object.storey = storeys_.find(product);
     const double scale = model_.metresPerUnit / metadata_.metresPerUnit;
     object.overallWidth = product.overallWidth * scale;
     object.overallHeight = product.overallHeight * scale;
     if (product.fileFromPlacement) {
-      const Eigen::Matrix3d rotation = makeYUpRotation(model_.upAxis);
-      object.worldFromPlacement.emplace(Eigen::Affine3d::Identity());
-      object.worldFromPlacement->linear() = rotation * product.fileFromPlacement->linear();
-      object.worldFromPlacement->translation() =
-          rotation * product.fileFromPlacement->translation() * scale;
+      object.worldFromPlacement = worldFromFile_ * *product.fileFromPlacement;
+      for (int axis = 0; axis < 3; ++axis)
+        object.worldFromPlacement->linear().col(axis).normalize();  // a placement has no scale
     }
     return object;
+  }
+
+  /// Adds storeys and spaces; call it when the model has its objects and offset.
+  void addStructure(const IfcMeshes& meshes) {
+    addSpatialStructure(metadata_, storeys_, meshes, worldFromFile_, worldFromReader_, model_);
   }
 
   std::vector<ImportedNode> importedNodes;
@@ -146,7 +153,9 @@ class NodeBuilder {
 
   const IfcMetadata& metadata_;
   std::map<std::uint32_t, std::string> paths_;
-  Eigen::Affine3d worldFromReader_;  ///< readers deliver metres, Y up
+  const StoreyTable storeys_;
+  const Eigen::Affine3d worldFromFile_;
+  const Eigen::Affine3d worldFromReader_;  ///< readers deliver metres, Y up
   Model& model_;
   std::map<std::array<float, 4>, std::uint32_t> materialByColour_;
   std::map<std::tuple<const IfcMeshes*, std::uint32_t, std::uint32_t>, std::uint32_t>
@@ -198,7 +207,11 @@ class IfcImport {
     const StepFile file(std::move(text));
     metadata_ = readIfcMetadata(file);
     reportMetadata(file);
-    input_.emplace(request_, file.text(), collectWantedProducts());
+    wanted_ = collectWantedProducts();
+    std::vector<std::uint32_t> read = wanted_;
+    for (const IfcProduct& product : metadata_.products)
+      if (product.hasBody && product.role == IfcProduct::Role::space) read.push_back(product.id);
+    input_.emplace(request_, file.text(), std::move(read));
     Model model = readMeshes();
     model.source = request_.file;
     reportProgress("openings", 0);
@@ -228,6 +241,10 @@ class IfcImport {
     if (metadata_.unitAssumption && !request_.options.metresPerUnit) {
       addDiagnostic(diagnostics_, "no_unit", *metadata_.unitAssumption);
     }
+    if (request_.options.georeference && !metadata_.mapConversion)
+      throw ImportError(request_.file +
+                        ": --georeference: the file has no IfcMapConversion; leave "
+                        "the option out, or export the file with its map (open)");
     if (metadata_.mapConversion)
       addDiagnostic(diagnostics_, "map_place", formatMapConversion(*metadata_.mapConversion));
     for (const IfcProduct& product : metadata_.products) {
@@ -304,7 +321,7 @@ class IfcImport {
   }
 
   bool hasTriangles(const IfcMeshes& meshes) const {
-    return std::any_of(input_->wanted().begin(), input_->wanted().end(),
+    return std::any_of(wanted_.begin(), wanted_.end(),
                        [&](std::uint32_t id) { return meshes.countTriangles(id) > 0; });
   }
 
@@ -313,13 +330,16 @@ class IfcImport {
     model.reader = reader;
     model.metresPerUnit = request_.options.metresPerUnit.value_or(metadata_.metresPerUnit);
     model.upAxis = request_.options.up.value_or('z');
+    if (request_.options.georeference) model.map = metadata_.mapConversion->crs;
     return model;
   }
 
-  static Eigen::Affine3d computeWorldFromFile(const Model& model) {
+  /// From the file's axes, in metres, to the world; with the map conversion on request.
+  Eigen::Affine3d computeWorldFromFile(const Model& model) const {
     Eigen::Affine3d transform = Eigen::Affine3d::Identity();
-    transform.linear() = makeYUpRotation(model.upAxis) * model.metresPerUnit;
-    return transform;
+    if (request_.options.georeference) transform = computeMapFromFile(*metadata_.mapConversion);
+    return Eigen::Affine3d(makeYUpRotation(model.upAxis)) * transform *
+           Eigen::Scaling(model.metresPerUnit / metadata_.metresPerUnit);
   }
 
   /// The reader whose meshes a product gets.
@@ -329,7 +349,7 @@ class IfcImport {
     const std::optional<IfcReadResult> second = readMissingProducts(meshes, reader);
     reportProgress("convert", 0);
     std::map<std::uint32_t, Source> sources;
-    for (const std::uint32_t id : input_->wanted()) {
+    for (const std::uint32_t id : wanted_) {
       const bool other =
           second && second->meshes.countTriangles(id) > 0 && needsSecondReader(meshes, id);
       const bool own = meshes.countTriangles(id) > 0;
@@ -354,23 +374,31 @@ class IfcImport {
     }
     finishModel(std::move(builder.importedNodes), std::move(builder.convertedMeshes), request_.file,
                 request_.options.offset, model);
+    builder.addStructure(first);
     return model;
   }
 
-  /// Drops a wall that web-ifc delivers empty and ifcplusplus delivers with its own doors closed:
-  /// its openings removed all of it (a frame's wall is often no larger than its opening). Returns
-  /// whether any wall was dropped.
+  /// Decides about walls that web-ifc delivers empty and ifcplusplus delivers with their own doors
+  /// closed. A frame's wall is often no larger than its opening: it is dropped. A larger wall stays
+  /// solid, so that no avatar walks through it. Returns whether any wall was dropped.
   bool dropFullyCutHosts(const Model& model, const IfcMeshes& first,
                          std::map<std::uint32_t, Source>& sources) {
     bool any = false;
+    std::set<std::uint32_t> decided;
     for (const UncutOpening& uncut : checkOpenings(model, metadata_).uncut) {
       const auto source = sources.find(uncut.host);
       if (source == sources.end() || source->second != Source::second) continue;
       if (first.failures.contains(uncut.host)) continue;  // unreadable, not empty
+      if (!decided.insert(uncut.host).second) continue;
+      const IfcProduct& host = *metadata_.find(uncut.host);
+      if (isLargerThanOpenings(model, metadata_, host)) {
+        addDiagnostic(diagnostics_, "solid_product",
+                      describeProduct(host) + ": its openings could not be cut");
+        continue;
+      }
       source->second = Source::none;
-      addDiagnostic(
-          diagnostics_, "cut_away_product",
-          describeProduct(*metadata_.find(uncut.host)) + ": its openings remove all of it");
+      addDiagnostic(diagnostics_, "cut_away_product",
+                    describeProduct(host) + ": its openings remove all of it");
       fullyCutHosts_.insert(uncut.host);
       any = true;
     }
@@ -403,8 +431,7 @@ class IfcImport {
   /// Reads the file with ifcplusplus if web-ifc delivered no or imprecise meshes for some product.
   std::optional<IfcReadResult> readMissingProducts(const IfcMeshes& meshes,
                                                    const std::string& reader) {
-    const auto& wanted = input_->wanted();
-    const bool whole = std::none_of(wanted.begin(), wanted.end(), [&](std::uint32_t id) {
+    const bool whole = std::none_of(wanted_.begin(), wanted_.end(), [&](std::uint32_t id) {
       return needsSecondReader(meshes, id);
     });
     if (whole || reader != "web-ifc" || request_.options.ifcReader != IfcReader::automatic) {
@@ -421,7 +448,8 @@ class IfcImport {
     for (const IfcProduct& product : metadata_.products) {
       byGlobalId.emplace(product.globalId, &product);
     }
-    const NodeBuilder builder(metadata_, computeWorldFromFile(model), model);
+    NodeBuilder builder(metadata_, computeWorldFromFile(model), model);
+    builder.addStructure({});
     std::set<std::string> taken;
     for (Object& object : model.objects) {
       const auto product = byGlobalId.find(object.globalId);
@@ -439,6 +467,7 @@ class IfcImport {
   const ImportProgress& progress_;
   Clock::time_point startTime_;
   IfcMetadata metadata_;
+  std::vector<std::uint32_t> wanted_;  ///< products of the model; readers also read spaces
   std::optional<IfcInput> input_;
   std::vector<Diagnostic> diagnostics_;
   std::set<std::uint32_t> fullyCutHosts_;

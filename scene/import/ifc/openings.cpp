@@ -9,6 +9,8 @@
 namespace enfilade::scene {
 namespace {
 
+constexpr double kMinWallShare = 1.2;  // of the area of its doors and windows: a frame has less
+
 constexpr int kGridSize = 3;              // rays per row
 constexpr int kMinRaysPassed = 7;         // of kGridSize * kGridSize rays that must pass
 constexpr double kRayMargin = 0.5;        // metres by which a ray extends the box on both sides
@@ -227,6 +229,23 @@ void reportOpenings(const OpeningCheck& check, std::vector<Diagnostic>& diagnost
              std::to_string(kGridSize * kGridSize) + " rays pass";
   }
   addDiagnostic(diagnostics, "uncut_opening", named, check.uncut.size());
+}
+
+bool isLargerThanOpenings(const Model& model, const IfcMetadata& metadata, const IfcProduct& wall) {
+  Aabb box;
+  for (const Object& object : model.objects) {
+    if (object.globalId != wall.globalId) continue;
+    for (const std::uint32_t mesh : object.meshes)
+      for (std::uint32_t i = 0; i < model.meshes[mesh].positions.size(); ++i)
+        box.include(computeWorldPosition(object, model.meshes[mesh], i));
+  }
+  if (box.empty()) return false;
+  double openings = 0;
+  for (const IfcProduct& product : metadata.products)
+    if (product.host == wall.id) openings += product.overallWidth * product.overallHeight;
+  const double scale = model.metresPerUnit / metadata.metresPerUnit;
+  const double area = std::max(box.size().x(), box.size().z()) * box.size().y();
+  return area > kMinWallShare * openings * scale * scale;
 }
 
 }  // namespace enfilade::scene

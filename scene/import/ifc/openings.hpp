@@ -35,4 +35,7 @@ OpeningCheck checkOpenings(const Model& model, const IfcMetadata& metadata);
 
 void reportOpenings(const OpeningCheck& check, std::vector<Diagnostic>& diagnostics);
 
+/// Whether a wall is larger than all doors and windows in it: cutting them leaves some of it.
+bool isLargerThanOpenings(const Model& model, const IfcMetadata& metadata, const IfcProduct& wall);
+
 }  // namespace enfilade::scene

@@ -11,7 +11,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the stream has memory byte order");
 
-constexpr std::uint32_t kNoObject = 0xffffffff;
+constexpr std::uint32_t kNone = 0xffffffff;   // an absent index
 constexpr std::uint32_t kMagic = 0x4d464e45;  // "ENFM"
 
 /// Scalars of a vector of scalars or of fixed-size Eigen vectors, which lie without gaps.
@@ -215,6 +215,51 @@ Mesh readMesh(StreamReader& in, std::size_t materials) {
   return m;
 }
 
+void write(StreamWriter& out, const Storey& storey) {
+  out.put(storey.name);
+  out.put(storey.globalId);
+  out.put(storey.elevation);
+}
+
+Storey readStorey(StreamReader& in) {
+  Storey storey;
+  storey.name = in.getText("storey name");
+  storey.globalId = in.getText("storey GlobalId");
+  storey.elevation = in.getFinite("storey elevation");
+  return storey;
+}
+
+std::optional<std::uint32_t> readStoreyIndex(StreamReader& in, std::size_t storeys) {
+  const auto index = in.get<std::uint32_t>("storey");
+  if (index == kNone) return std::nullopt;
+  if (index >= storeys) in.fail("storey", "no storey " + std::to_string(index));
+  return index;
+}
+
+void write(StreamWriter& out, const Space& space) {
+  out.put(space.name);
+  out.put(space.longName);
+  out.put(space.globalId);
+  out.put(space.storey.value_or(kNone));
+  out.put(static_cast<std::uint8_t>(space.box.empty()));
+  if (space.box.empty()) return;
+  out.putMatrix(space.box.min);
+  out.putMatrix(space.box.max);
+}
+
+Space readSpace(StreamReader& in, std::size_t storeys) {
+  Space space;
+  space.name = in.getText("space name");
+  space.longName = in.getText("space long name");
+  space.globalId = in.getText("space GlobalId");
+  space.storey = readStoreyIndex(in, storeys);
+  if (in.getBool("space is empty")) return space;
+  space.box.min = in.getMatrix<Vec3>("space minimum");
+  space.box.max = in.getMatrix<Vec3>("space maximum");
+  if (space.box.empty()) in.fail("space maximum", "below the minimum");
+  return space;
+}
+
 void write(StreamWriter& out, const Object& o) {
   out.put(o.path);
   out.put(o.globalId);
@@ -227,11 +272,12 @@ void write(StreamWriter& out, const Object& o) {
   out.put(static_cast<std::uint8_t>(o.worldFromPlacement.has_value()));
   if (o.worldFromPlacement) out.putMatrix(o.worldFromPlacement->matrix().topRows<3>());
   out.put(static_cast<std::uint8_t>(o.usage));
-  out.put(o.partOf.value_or(kNoObject));
+  out.put(o.storey.value_or(kNone));
+  out.put(o.partOf.value_or(kNone));
 }
 
 /// Parts may precede their whole; that index is checked when all objects are read.
-Object readObject(StreamReader& in, std::size_t meshes) {
+Object readObject(StreamReader& in, std::size_t meshes, std::size_t storeys) {
   Object o;
   o.path = in.getText("object path");
   o.globalId = in.getText("GlobalId");
@@ -250,8 +296,9 @@ Object readObject(StreamReader& in, std::size_t meshes) {
     o.worldFromPlacement->matrix().topRows<3>() = in.getMatrix<Rows>("placement");
   }
   o.usage = static_cast<Object::Usage>(in.getUpTo(2, "object use"));
+  o.storey = readStoreyIndex(in, storeys);
   const auto whole = in.get<std::uint32_t>("piece of");
-  if (whole != kNoObject) o.partOf = whole;
+  if (whole != kNone) o.partOf = whole;
   return o;
 }
 
@@ -392,9 +439,12 @@ std::vector<std::byte> serialiseModel(const Model& model) {
   writeAll(out, model.textures);
   writeAll(out, model.materials);
   writeAll(out, model.meshes);
+  writeAll(out, model.storeys);
+  writeAll(out, model.spaces);
   writeAll(out, model.objects);
   writeAll(out, model.bodies);
   out.put(model.metresPerUnit);
+  out.put(model.map);
   out.put(static_cast<std::uint8_t>(model.upAxis));
   out.putMatrix(model.offset);
   writeAll(out, model.diagnostics);
@@ -413,7 +463,10 @@ Model deserialiseModel(std::span<const std::byte> bytes) {
   readAll(in, model.materials, 50, "materials",
           [&] { return readMaterial(in, model.textures.size()); });
   readAll(in, model.meshes, 44, "meshes", [&] { return readMesh(in, model.materials.size()); });
-  readAll(in, model.objects, 158, "objects", [&] { return readObject(in, model.meshes.size()); });
+  readAll(in, model.storeys, 24, "storeys", [&] { return readStorey(in); });
+  readAll(in, model.spaces, 29, "spaces", [&] { return readSpace(in, model.storeys.size()); });
+  readAll(in, model.objects, 162, "objects",
+          [&] { return readObject(in, model.meshes.size(), model.storeys.size()); });
   for (const Object& object : model.objects) {
     if (object.partOf && *object.partOf >= model.objects.size())
       in.fail("piece of", "no object " + std::to_string(*object.partOf));
@@ -422,6 +475,7 @@ Model deserialiseModel(std::span<const std::byte> bytes) {
   if (const auto reason = validateBodies(model)) in.fail("bodies", *reason);
   model.metresPerUnit = in.getFinite("metres per unit");
   if (model.metresPerUnit <= 0) in.fail("metres per unit", "not positive");
+  model.map = in.getText("map");
   model.upAxis = static_cast<char>(in.get<std::uint8_t>("up axis"));
   if (model.upAxis < 'x' || model.upAxis > 'z') in.fail("up axis", "neither x, y nor z");
   model.offset = in.getMatrix<Vec3>("offset");

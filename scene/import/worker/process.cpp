@@ -106,7 +106,7 @@ struct SpawnSettings {
 
 // ---- starting -----------------------------------------------------------------------------------
 
-constexpr std::size_t kArgumentCount = 14;
+constexpr std::size_t kArgumentCount = 15;
 
 /// Formats as "x,y,z".
 std::string formatVec3(const Vec3& v) {
@@ -124,6 +124,7 @@ std::array<std::string, kArgumentCount> makeArguments(const ImportRequest& reque
           request.options.up ? std::string(1, *request.options.up) : "-",
           request.options.offset ? formatVec3(*request.options.offset) : "-",
           std::to_string(static_cast<int>(request.options.ifcReader)),
+          request.options.georeference ? "map" : "-",
           std::to_string(request.firstProduct),
           request.program,
           request.script,
@@ -278,10 +279,11 @@ std::optional<ImportRequest> parseImportRequest(int argc, char** argv, int& pare
   if (std::string_view(argv[7]) != "-") request.options.up = argv[7][0];
   if (std::string_view(argv[8]) != "-") request.options.offset = parseVec3(argv[8]);
   request.options.ifcReader = static_cast<IfcReader>(parseArgument<int>(argv[9]));
-  request.firstProduct = parseArgument<std::uint32_t>(argv[10]);
-  request.program = argv[11];
-  request.script = argv[12];
-  request.file = argv[13];
+  request.options.georeference = std::string_view(argv[10]) == "map";
+  request.firstProduct = parseArgument<std::uint32_t>(argv[11]);
+  request.program = argv[12];
+  request.script = argv[13];
+  request.file = argv[14];
   return request;
 }
 

@@ -170,7 +170,6 @@ void moveJoints(WorldData& world, Avatar& avatar, QueryCount& count) {
   const double maxDelta = chain.speed * world.settings.tickDuration;
   bool moved = false;
   for (std::size_t i = 0; i < chain.links.size(); ++i) {
-    chain.links[i].blockedBy = 0;
     const double remaining = chain.links[i].target - chain.links[i].value;
     if (remaining == 0) continue;
     const double delta = std::max(-maxDelta, std::min(maxDelta, remaining));

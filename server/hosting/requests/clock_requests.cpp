@@ -41,9 +41,11 @@ void handleStep(const RequestContext& context, const v1::Step& step) {
 void handleSetClock(const RequestContext& context, const v1::SetClock& request) {
   constexpr double kMinSpeed = 1e-3, kMaxSpeed = 1000;
   const double speed = request.free_run().speed();
-  if (request.mode_case() == v1::SetClock::MODE_NOT_SET) {
+  const bool hasMode = request.mode_case() != v1::SetClock::MODE_NOT_SET;
+  if (!hasMode && !request.release()) {
     return replyError(context, v1::ERROR_BAD_MESSAGE,
-                      "mode is missing: give lockstep, free_run or pause", "set_clock.mode");
+                      "mode is missing: give lockstep, free_run or pause, or release",
+                      "set_clock.mode");
   }
   if (speed != 0 && !(speed >= kMinSpeed && speed <= kMaxSpeed)) {
     return replyError(context, v1::ERROR_BAD_MESSAGE,
@@ -52,11 +54,14 @@ void handleSetClock(const RequestContext& context, const v1::SetClock& request) 
   }
   if (auto error = acquireClock(context)) return replyError(context, std::move(*error));
   WorldClock& clock = context.hosted.clock;
-  clock.mode = request.has_lockstep()   ? v1::Clock::MODE_LOCKSTEP
-               : request.has_free_run() ? v1::Clock::MODE_FREE_RUN
-                                        : v1::Clock::MODE_PAUSED;
-  clock.speed = speed > 0 ? speed : 1;
-  clock.nextTick = std::chrono::steady_clock::now();
+  if (hasMode) {
+    clock.mode = request.has_lockstep()   ? v1::Clock::MODE_LOCKSTEP
+                 : request.has_free_run() ? v1::Clock::MODE_FREE_RUN
+                                          : v1::Clock::MODE_PAUSED;
+    clock.speed = speed > 0 ? speed : 1;
+    clock.nextTick = std::chrono::steady_clock::now();
+  }
+  if (request.release()) clock.driver.reset();
   publishStatus(context.hosted);
   broadcastReplay(context.hosted);
   v1::ServerMessage message;

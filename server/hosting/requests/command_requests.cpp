@@ -69,6 +69,10 @@ void sendCommandReply(const RequestContext& context, std::optional<v1::Error> er
 
 }  // namespace
 
+void refuseCommand(const RequestContext& context, v1::Error error) {
+  sendCommandReply(context, std::move(error));
+}
+
 void handleCommand(const RequestContext& context, const v1::Command& command) {
   sendCommandReply(context, submitCommand(context, command));
 }

@@ -3,12 +3,15 @@
 #include <spdlog/spdlog.h>
 
 #include "collision/assert.hpp"
+#include "protocol/framing.hpp"
+#include "protocol/unknown_enums.hpp"
 #include "server/hosting/requests/clock_requests.hpp"
 #include "server/hosting/requests/command_requests.hpp"
 #include "server/hosting/requests/frame_requests.hpp"
 #include "server/hosting/requests/query_requests.hpp"
 #include "server/hosting/requests/subscription_requests.hpp"
 #include "server/hosting/requests/world_requests.hpp"
+#include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -53,6 +56,18 @@ Role requiredRole(v1::ClientMessage::BodyCase body) {
   return Role::admin;
 }
 
+/// `unknown`: as from protocol::findUnknownEnum().
+void refuseUnknownEnum(const RequestContext& context, const std::string& unknown) {
+  const std::string reason =
+      unknown + ": not a value of protocol " + std::string(protocol::kVersion);
+  std::string field = unknown.substr(0, unknown.find(' '));
+  const bool isCommand = context.message.has_command() || context.message.has_body_command();
+  if (!isCommand) return replyError(context, v1::ERROR_BAD_MESSAGE, reason, field);
+  // Fields of commands begin with the order.
+  refuseCommand(context,
+                makeError(v1::ERROR_BAD_MESSAGE, reason, field.substr(field.find('.') + 1)));
+}
+
 void dispatchRequest(const RequestContext& context) {
   const v1::ClientMessage& message = context.message;
   const Role required = requiredRole(message.body_case());
@@ -62,6 +77,8 @@ void dispatchRequest(const RequestContext& context) {
                           ", and yours is " + toString(context.client.role) +
                           ": ask the server's operator for one");
   }
+  if (const std::string unknown = protocol::findUnknownEnum(message); !unknown.empty())
+    return refuseUnknownEnum(context, unknown);
   switch (message.body_case()) {
     case v1::ClientMessage::kCommand:
       return handleCommand(context, message.command());

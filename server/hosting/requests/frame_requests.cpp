@@ -20,8 +20,14 @@ void handleFrame(const RequestContext& context, const v1::FrameRequest& request)
     if (!error->field().empty()) error->set_field("frame." + error->field());
     return replyError(context, std::move(*error));
   }
-  FrameJob job{snapshot, std::get<FrameView>(view), request, context.message.request_id(), 0,
-               0,        hosted.renderedFrames};
+  FrameJob job{snapshot,
+               std::get<FrameView>(view),
+               request,
+               context.client.out,
+               context.message.request_id(),
+               0,
+               0,
+               hosted.renderedFrames};
   job.onRendered = makeRecordingObserver(hosted, request);
   hosted.frames.renderFrame(std::move(job), deferReply(context, &OutgoingQueue::pushFrame));
 }

@@ -24,9 +24,7 @@ v1::Entity makeEntity(const scene::World& world, std::uint32_t id) {
   entity.set_id(id);
   entity.set_name(scene::findEntityName(world, id));
   if (id >= 1 && id <= objects.size()) {
-    entity.set_kind(v1::Entity::KIND_OBJECT);
-    entity.set_global_id(objects[id - 1].globalId);
-    entity.set_operation(objects[id - 1].operationType);
+    describeObject(world.scene().model(), id, entity);
   } else if (!entity.name().empty()) {
     entity.set_kind(v1::Entity::KIND_AVATAR);
   }
@@ -109,7 +107,9 @@ void handleMetrics(const RequestContext& context) {
   v1::ServerMessage message;
   v1::Metrics& metrics = *message.mutable_metrics();
   metrics = hosted.statistics.makeMetrics();
-  metrics.set_clients(static_cast<std::uint32_t>(hosted.clients.size()));
+  metrics.set_clients(
+      static_cast<std::uint32_t>(std::count_if(hosted.clients.begin(), hosted.clients.end(),
+                                               [](const auto& one) { return !one.second.guest; })));
   metrics.set_avatars(static_cast<std::uint32_t>(hosted.world.snapshot()->avatars.size()));
   metrics.set_frames(*hosted.renderedFrames);
   metrics.set_dropped(hosted.droppedStates + hosted.droppedFrames);

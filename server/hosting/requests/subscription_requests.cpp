@@ -2,6 +2,7 @@
 
 #include "server/hosting/frame_subscriptions.hpp"
 #include "server/hosting/horizon_subscriptions.hpp"
+#include "server/hosting/tick_broadcast.hpp"
 
 namespace enfilade::server {
 
@@ -23,6 +24,10 @@ void handleSubscribe(const RequestContext& context, const v1::Subscribe& subscri
     }
   }
   sendReply(context, std::move(message));
+  // A client that joins a paused world learns at once where everything is.
+  const v1::TickEvents noEvents;
+  TickBroadcast present{noEvents};
+  sendState(context.hosted, context.client, *context.hosted.world.snapshot(), present);
 }
 
 void handleWatchFrames(const RequestContext& context, const v1::WatchFrames& request) {

@@ -2,7 +2,7 @@
 import { EntityTable } from "./entities";
 import {
   Role, type AvatarState, type Clock, type ContactEvent, type Notice, type Replay, type State, type TickEvents,
-  type Welcome, type World,
+  type Welcome,
 } from "./generated/enfilade_pb";
 import { SceneModel } from "./scene";
 import { parseScene, readEntities } from "./scene_file";
@@ -10,8 +10,6 @@ import { Signal } from "./signal";
 import type { MakeSource, Trouble, WorldSource } from "./source";
 import { View } from "./view";
 import { WorldState } from "./world_state";
-
-const POLL_SECONDS = 2; // for changes of the clock by other clients, which the server does not push
 
 export class App {
   readonly view = new View();
@@ -38,7 +36,6 @@ export class App {
   readonly contactsReset = new Signal<ContactEvent[]>();
   readonly noticed = new Signal<Notice>();
   readonly timeChanged = new Signal();
-  readonly worldPolled = new Signal<World>();
   readonly selected = new Signal<number>();
   readonly focused = new Signal<string>();
   readonly visibilityChanged = new Signal();
@@ -52,8 +49,8 @@ export class App {
       events: (events) => this.#takeEvents(events),
       state: (state) => this.#takeState(state),
       replay: (replay) => this.#takeReplay(replay),
+      clock: ({ clock, tick }) => this.setClock(clock, Number(tick)),
     });
-    setInterval(() => void this.#poll(), POLL_SECONDS * 1000);
   }
 
   get mayDrive(): boolean {
@@ -113,7 +110,7 @@ export class App {
 
   async #subscribe(): Promise<void> {
     const { live } = await this.connection.request("subscribe", {
-      contacts: true, nearMisses: true, notices: true, state: true, stateRate: 0,
+      contacts: true, nearMisses: true, notices: true, state: true, stateRate: 0, clock: true,
     });
     this.contactsReset.emit(live);
   }
@@ -170,20 +167,5 @@ export class App {
   setClock(clock: Clock | undefined, tick: number): void {
     if (clock) this.clock = clock;
     this.#setTick(tick, tick * (this.welcome?.policies?.tick ?? 0));
-  }
-
-  async #poll(): Promise<void> {
-    if (!this.connection.isOpen || this.connection.isFile || document.hidden) return;
-    try {
-      const { worlds } = await this.connection.request("listWorlds", {});
-      const world = worlds.find(({ name }) => name === this.welcome?.world);
-      if (!world) return;
-      this.clock = world.clock ?? this.clock;
-      if (!this.state.latest) this.#setTick(Number(world.tick), Number(world.tick) * (this.welcome?.policies?.tick ?? 0));
-      this.timeChanged.emit();
-      this.worldPolled.emit(world);
-    } catch {
-      // The connection ended meanwhile; it reports that itself.
-    }
   }
 }

@@ -41,6 +41,7 @@ export class Connection implements WorldSource {
           events: (body) => this.#listener.events(body),
           state: (body) => this.#listener.state(body),
           replay: (body) => this.#listener.replay(body),
+          clock: (body) => this.#listener.clock(body),
           closed: (why) => this.#lost(why),
         },
       });

@@ -12,9 +12,18 @@ export interface Entity {
 
 const IDS_PER_REQUEST = 20_000; // replies then stay far below 8 MiB
 
+/** A room of the file: the middle of its floor, and its area. */
+export interface Room {
+  name: string;
+  floor: { x: number; y: number; z: number };
+  area: number; // square metres of its box
+}
+
 export class EntityTable {
   readonly byId = new Map<number, Entity>();
   readonly byPath = new Map<string, Entity>();
+  storeys: string[] = []; // names, from the lowest one up
+  rooms: Room[] = [];
   readonly avatars = new Map<number, string>(); // names, by entity id; a name stays after its avatar left
   /** Every object of a moving body, and the id of that body. */
   readonly bodyOf = new Map<number, number>();
@@ -40,6 +49,20 @@ export class EntityTable {
     const entity = { id, path, globalId: text("globalId"), class: text("class"), storey: text("storey") };
     this.add(entity);
     return entity;
+  }
+
+  /** Takes the storeys and spaces of a scene file. Unknown or wrong fields are left out. */
+  addStructure(storeys: unknown, spaces: unknown): void {
+    const listOf = (value: unknown) => (Array.isArray(value) ? value : []) as Record<string, unknown>[];
+    const text = (value: unknown) => (typeof value === "string" ? value : "");
+    const isPoint = (value: unknown): value is number[] => Array.isArray(value) && value.length === 3 && value.every(Number.isFinite);
+    this.storeys = listOf(storeys).map((storey) => text(storey?.name));
+    for (const space of listOf(spaces)) {
+      const [min, max] = [space?.min, space?.max];
+      if (!isPoint(min) || !isPoint(max)) continue;
+      const floor = { x: (min[0]! + max[0]!) / 2, y: min[1]!, z: (min[2]! + max[2]!) / 2 };
+      this.rooms.push({ name: text(space.longName) || text(space.name), floor, area: (max[0]! - min[0]!) * (max[2]! - min[2]!) });
+    }
   }
 
   /** Asks the server for the objects that the scene file did not describe. */

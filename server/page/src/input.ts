@@ -26,7 +26,7 @@ export class Input {
   #held = new Set<string>();
   #isRunning = false;
   #stick: { id: number; x: number; y: number; forward: number; right: number } | null = null;
-  #press: { id: number; x: number; y: number; travel: number; touch: boolean } | null = null;
+  #press: { id: number; x: number; y: number; lastX: number; lastY: number; travel: number } | null = null;
 
   constructor(canvas: HTMLCanvasElement) {
     this.#canvas = canvas;
@@ -108,7 +108,7 @@ export class Input {
       this.#stick = { id: event.pointerId, x: event.clientX, y: event.clientY, forward: 0, right: 0 };
     }
     if (!this.#press && this.#stick?.id !== event.pointerId || !isTouch) {
-      this.#press = { id: event.pointerId, x: event.offsetX, y: event.offsetY, travel: 0, touch: isTouch };
+      this.#press = { id: event.pointerId, x: event.offsetX, y: event.offsetY, lastX: event.clientX, lastY: event.clientY, travel: 0 };
     }
     if (!this.isLocked) this.#canvas.setPointerCapture(event.pointerId);
   }
@@ -121,12 +121,13 @@ export class Input {
       stick.right = clamp(event.clientX - stick.x);
       return this.onMove();
     }
-    const press = this.#press?.id === event.pointerId ? this.#press : null;
-    if (press) press.travel += Math.abs(event.movementX) + Math.abs(event.movementY);
-    if (!press && !this.isLocked) return;
-    // A dragged scene follows the pointer; with a captured mouse the view does.
-    const sign = this.isLocked ? -1 : 1;
-    this.onLook(sign * event.movementX * LOOK_PER_PIXEL, sign * event.movementY * LOOK_PER_PIXEL);
+    if (this.isLocked) return this.onLook(-event.movementX * LOOK_PER_PIXEL, -event.movementY * LOOK_PER_PIXEL);
+    const press = this.#press;
+    if (press?.id !== event.pointerId) return;
+    // A dragged scene follows the pointer. Not all browsers give the movement of touches.
+    const [x, y] = [event.clientX - press.lastX, event.clientY - press.lastY];
+    Object.assign(press, { lastX: event.clientX, lastY: event.clientY, travel: press.travel + Math.abs(x) + Math.abs(y) });
+    this.onLook(x * LOOK_PER_PIXEL, y * LOOK_PER_PIXEL);
   }
 
   #pointerUp(event: PointerEvent): void {

@@ -56,6 +56,7 @@ interface Described {
 /** Adds the file's tables of entities (extras of scenes and nodes) to the table. */
 export function readEntities(gltf: GLTF, table: EntityTable): void {
   const json = gltf.parser.json as { scenes?: Described[]; nodes?: Described[] };
+  for (const { extras } of json.scenes ?? []) table.addStructure(extras?.storeys, extras?.spaces);
   for (const { extras, name } of [...(json.scenes ?? []), ...(json.nodes ?? [])]) {
     // Nodes may also list the numbers of their entities; only records describe them.
     if (Array.isArray(extras?.entities)) extras.entities.forEach((record) => table.addRecord(record));

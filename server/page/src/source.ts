@@ -1,7 +1,7 @@
 // Where the page gets a world from: a server, or a recording in the page's own file.
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import type {
-  ClientMessageSchema, ContactEvent, Replay, ServerMessage, State, TickEvents, Welcome,
+  ClientMessageSchema, ClockChange, ContactEvent, Replay, ServerMessage, State, TickEvents, Welcome,
 } from "./generated/enfilade_pb";
 
 type RequestBody = NonNullable<MessageInitShape<typeof ClientMessageSchema>["body"]>;
@@ -24,6 +24,7 @@ export interface Listener {
   events(events: TickEvents): void;
   state(state: State): void;
   replay(replay: Replay): void;
+  clock(change: ClockChange): void;
 }
 
 export interface WorldSource {

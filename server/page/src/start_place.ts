@@ -13,10 +13,16 @@ const SPACING = 1.7; // metres between tried places
 const DIRECTIONS = 12;
 const HEAD_ROOM = 1.9; // metres
 const ROOM_HEIGHT = 12; // metres; below a higher ceiling counts as outdoors
+const MAX_ROOMS = 12;
 const MAX_VIEW = 15; // metres; farther views make a place no better
 
-/** Places in order of preference. `around` is tried first. */
+/** Places in order of preference. `around` is tried first; without it, the best of the largest rooms that the file names. */
 export function proposeStarts(model: SceneModel, around: Vector3 | null): StartPlace[] {
+  if (!around) {
+    const rooms = [...model.table.rooms].sort((a, b) => b.area - a.area).slice(0, MAX_ROOMS);
+    const judged = rooms.flatMap(({ floor }) => judge(model, new Vector3(floor.x, floor.y + 1, floor.z)) ?? []);
+    if (judged.length > 0) return judged.sort((a, b) => b.score - a.score).map(({ place }) => place);
+  }
   const center = around ?? middleOf(model);
   const scored: { place: StartPlace; score: number }[] = [];
   for (let ring = 0; ring <= RINGS; ++ring) {

@@ -118,7 +118,10 @@ export class Tree {
   }
 
   #renderGroup(group: Group, level: number): void {
-    const groups = [...group.groups.values()].sort((a, b) => a.name.localeCompare(b.name, "en", { numeric: true }));
+    // Storeys from the lowest one up, all else by name.
+    const { storeys } = this.#app.table;
+    const order = (name: string) => (level === 0 && this.#hasStoreys ? storeys.indexOf(name) : 0);
+    const groups = [...group.groups.values()].sort((a, b) => order(a.name) - order(b.name) || a.name.localeCompare(b.name, "en", { numeric: true }));
     for (const child of groups) {
       this.#addGroup(child, level + 1);
       if (this.#open.has(child.key)) this.#renderGroup(child, level + 1);

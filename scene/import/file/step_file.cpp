@@ -1,4 +1,4 @@
-#include "scene/import/ifc/step_file.hpp"
+#include "scene/import/file/step_file.hpp"
 
 #include <algorithm>
 #include <charconv>

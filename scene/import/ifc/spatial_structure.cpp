@@ -1,0 +1,78 @@
+#include "scene/import/ifc/spatial_structure.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace enfilade::scene {
+namespace {
+
+constexpr int kMaxContainers = 100;  // around a product; files may have rings
+
+bool isStorey(const IfcProduct& product) {
+  return product.ifcClass == "IfcBuildingStorey";
+}
+
+/// In the scene's axes, before the offset is subtracted; empty without geometry.
+Aabb computeSpaceBox(const IfcMeshes& meshes, std::uint32_t space,
+                     const Eigen::Affine3d& worldFromReader) {
+  Aabb box;
+  const auto found = meshes.products.find(space);
+  if (found == meshes.products.end()) return box;
+  for (const IfcPlacedGeometry& placed : found->second) {
+    const Eigen::Affine3d transform = worldFromReader * placed.worldFromGeometry;
+    for (const Eigen::Vector3f& position : meshes.geometries.at(placed.geometry).positions)
+      box.include(transform * position.cast<double>());
+  }
+  return box;
+}
+
+}  // namespace
+
+Vec3 findStoreyOrigin(const IfcProduct& storey) {
+  return storey.fileFromPlacement ? Vec3(storey.fileFromPlacement->translation())
+                                  : Vec3(0, 0, storey.elevation);
+}
+
+StoreyTable::StoreyTable(const IfcMetadata& metadata) : metadata_(metadata) {
+  std::vector<std::pair<double, std::uint32_t>> order;
+  for (const IfcProduct& product : metadata.products)
+    if (isStorey(product)) order.emplace_back(findStoreyOrigin(product).z(), product.id);
+  std::sort(order.begin(), order.end());
+  for (const auto& [elevation, id] : order) {
+    indexById_.emplace(id, static_cast<std::uint32_t>(storeys_.size()));
+    storeys_.push_back(id);
+  }
+}
+
+std::optional<std::uint32_t> StoreyTable::find(const IfcProduct& product) const {
+  const IfcProduct* container = &product;
+  for (int depth = 0; container != nullptr && depth < kMaxContainers; ++depth) {
+    const auto found = indexById_.find(container->id);
+    if (found != indexById_.end()) return found->second;
+    container = metadata_.find(container->parent != 0 ? container->parent : container->host);
+  }
+  return std::nullopt;
+}
+
+void addSpatialStructure(const IfcMetadata& metadata, const StoreyTable& storeys,
+                         const IfcMeshes& meshes, const Eigen::Affine3d& worldFromFile,
+                         const Eigen::Affine3d& worldFromReader, Model& model) {
+  for (const std::uint32_t id : storeys.storeys()) {
+    const IfcProduct& product = *metadata.find(id);
+    model.storeys.push_back({product.name.empty() ? product.longName : product.name,
+                             product.globalId,
+                             (worldFromFile * findStoreyOrigin(product)).y() - model.offset.y()});
+  }
+  for (const IfcProduct& product : metadata.products) {
+    if (product.role != IfcProduct::Role::space) continue;
+    Space space{product.name, product.longName, product.globalId, storeys.find(product), {}};
+    space.box = computeSpaceBox(meshes, product.id, worldFromReader);
+    if (!space.box.empty()) {
+      space.box.min -= model.offset;
+      space.box.max -= model.offset;
+    }
+    model.spaces.push_back(std::move(space));
+  }
+}
+
+}  // namespace enfilade::scene
