@@ -140,20 +140,31 @@ class Vectors(RoomCase):
         self.assertEqual((seen["position"].shape, rewards.shape), ((2, 3), (2,)))
         self.assertEqual(infos["tick"].tolist(), [tick + 6 for tick in first])
 
-    def test_after_one_has_failed_a_reset_brings_all_back(self):
+    def test_after_one_has_failed_the_next_step_restarts_it_and_the_other_goes_on(self):
         vector = self.vector()
         vector.reset(seed=1)
         for number in range(2):
             vector.envs[number].client.restart()  # without the environment: the world is empty
-            with self.assertRaises(enfilade.EnfiladeError):
+            with self.assertRaisesRegex(enfilade.EnfiladeError, f"environment {number}: "):
                 vector.step(np.zeros((2, 2)))
-            with self.assertRaisesRegex(RuntimeError, "reset"):
-                vector.step(np.zeros((2, 2)))
-            vector.reset(seed=1)
+            ticks = vector.step(np.zeros((2, 2)))[4]["tick"]
+            self.assertEqual(ticks[number], 1)
+            self.assertGreater(ticks[1 - number], 6)
             self.assertEqual(vector.step(np.zeros((2, 2)))[1].shape, (2,))
         with self.assertRaises(enfilade.OrderFailed):
             vector.reset(options={"start": (0, 0, 6)})
+        with self.assertRaisesRegex(RuntimeError, "reset"):
+            vector.step(np.zeros((2, 2)))
         self.assertEqual(len(vector.reset(seed=2)[0]["position"]), 2)
+
+    def test_a_start_that_is_refused_is_drawn_again(self):
+        vector = self.vector(starts=[(0, 0.01, 0, 0), (0, 0, 6)])  # the second lies in the column
+        for seed in range(8):
+            seen, _ = vector.reset(seed=seed)
+            self.assertEqual(np.round(seen["position"][:, 2]).tolist(), [0, 0])
+        blocked = self.vector(starts=[(0, 0, 6)])
+        with self.assertRaises(enfilade.OrderFailed):
+            blocked.reset()
 
 
 class Arguments(RoomCase):

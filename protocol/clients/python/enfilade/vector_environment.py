@@ -11,7 +11,10 @@ import numpy as np
 from . import spaces
 from .client import Client, connect
 from .environment import Observation, WalkEnv
+from .errors import OrderFailed
 from .process import Server, serve
+
+MAX_DRAWS = 32  # of a start, for one episode
 
 
 class VectorWalkEnv(spaces.VectorEnvBase):
@@ -29,9 +32,13 @@ class VectorWalkEnv(spaces.VectorEnvBase):
     An environment whose episode ended restarts with the next step(). That step ignores its action,
     and its reward is 0 (Gymnasium's "next step" mode).
 
+    A start that the world refuses is drawn again, up to 32 times, while the others go on; a start
+    that reset(options=...) names is not.
+
     A wrong number of actions or seeds, or an invalid action, is a ValueError before anything is sent.
     If an environment fails later, all replies are awaited and its error is raised with its number.
-    Call reset() then. If the server ended, create all environments again.
+    After a failed step() the next one restarts that environment, and the others go on; after a
+    failed reset() call reset(). If the server ended, create all environments again.
     """
 
     metadata: Dict[str, Any] = {"render_modes": ["rgb_array"], "autoreset_mode": spaces.NEXT_STEP}
@@ -95,8 +102,11 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         """`seed`: one per environment, or a number to which each adds its own index."""
         seeds = self._seeds(seed)
         self._over = None
-        taken = self._each(lambda i: self.envs[i]._post_reset(seeds[i], options or {}),
-                           lambda i, ids: self.envs[i]._take_reset(ids))
+        is_drawn = "start" not in (options or {})
+        taken, failures = self._each(lambda i: self.envs[i]._post_reset(seeds[i], options or {}),
+                                     lambda i, ids: self._entered(i, ids, is_drawn))
+        if failures:
+            raise self._numbered(failures)
         self._over = np.zeros(self.num_envs, bool)
         return self._stacked([one[0] for one in taken]), self._gathered([one[1] for one in taken])
 
@@ -128,17 +138,34 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         def take(i: int, ids: List[int]) -> Tuple[Observation, float, bool, bool, Dict[str, Any]]:
             if not over[i]:
                 return self.envs[i]._take_step(ids)
-            seen, info = self.envs[i]._take_reset(ids)
+            seen, info = self._entered(i, ids, True)
             return seen, 0.0, False, False, info
 
         self._over = None
-        observations, rewards, terminated, truncated, infos = zip(*self._each(post, take))
+        taken, failures = self._each(post, take)
+        if failures:
+            self._over = np.array([one is None or one[2] or one[3] for one in taken])
+            raise self._numbered(failures)
+        observations, rewards, terminated, truncated, infos = zip(*taken)
         self._over = np.array(terminated, bool) | np.array(truncated, bool)
         return (self._stacked(observations), np.array(rewards), np.array(terminated),
                 np.array(truncated), self._gathered(infos))
 
-    def _each(self, post: Callable[[int], List[int]], take: Callable[[int, List[int]], Any]) -> Any:
-        """Posts all and takes all, even if some fail; then raises the first failure."""
+    def _entered(self, i: int, ids: List[int], is_drawn: bool) -> Tuple[Observation, Dict[str, Any]]:
+        """Takes the reply to a reset. A start that is refused is drawn again."""
+        env = self.envs[i]
+        for _ in range(MAX_DRAWS - 1):
+            try:
+                return env._take_reset(ids)
+            except OrderFailed:
+                if not is_drawn or len(env.starts) == 1:
+                    raise
+                ids = env._post_reset(None, {})
+        return env._take_reset(ids)
+
+    def _each(self, post: Callable[[int], List[int]], take: Callable[[int, List[int]], Any],
+              ) -> Tuple[List[Any], List[Tuple[int, Exception]]]:
+        """Posts all and takes all, even if some fail: their results are None."""
         failures: List[Tuple[int, Exception]] = []
         posted: List[Optional[List[int]]] = []
         taken: List[Any] = []
@@ -150,16 +177,19 @@ class VectorWalkEnv(spaces.VectorEnvBase):
                 failures.append((i, error))
         for i, ids in enumerate(posted):
             try:
-                if ids is not None:
-                    taken.append(take(i, ids))
+                taken.append(None if ids is None else take(i, ids))
             except Exception as error:
+                taken.append(None)
                 failures.append((i, error))
-        if failures:
-            number, failure = failures[0]
-            if failure.args and isinstance(failure.args[0], str):
-                failure.args = (f"environment {number}: {failure.args[0]}", *failure.args[1:])
-            raise failure
-        return taken
+        return taken, failures
+
+    @staticmethod
+    def _numbered(failures: List[Tuple[int, Exception]]) -> Exception:
+        """Returns the first failure, with the number of its environment."""
+        number, failure = min(failures, key=lambda one: one[0])
+        if failure.args and isinstance(failure.args[0], str):
+            failure.args = (f"environment {number}: {failure.args[0]}", *failure.args[1:])
+        return failure
 
     def render(self) -> List[Optional[np.ndarray]]:
         return [env.render() for env in self.envs]
