@@ -5,8 +5,10 @@
 
 #include <csignal>
 #include <cstdio>
+#include <memory>
 
 #include "server/app/command_line.hpp"
+#include "server/app/rate_limited_sink.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -26,9 +28,17 @@ struct CommandRunner {
   ExitCode operator()(const InspectCommand& command) const { return inspect(command); }
 };
 
+constexpr int kMaxLinesPerSecond = 200;  // of the log; a person reads far fewer
+
 void logToStderr() {
   auto logger = spdlog::get("enfilade");
-  if (!logger) logger = spdlog::stderr_color_mt("enfilade");
+  if (!logger) {
+    logger = std::make_shared<spdlog::logger>(
+        "enfilade",
+        std::make_shared<RateLimitedSink>(std::make_shared<spdlog::sinks::stderr_color_sink_mt>(),
+                                          kMaxLinesPerSecond));
+    spdlog::initialize_logger(logger);
+  }
   logger->set_pattern("%H:%M:%S.%e %^%l%$ %v");
   spdlog::set_default_logger(std::move(logger));
 }

@@ -25,6 +25,7 @@ struct ServerLimits {
   std::size_t pendingRequestBytes = 4u << 20;   ///< of these requests
   std::uint32_t requestsPerSecond = 50'000;     ///< per client, averaged
   std::size_t outgoingBytes = 64u << 20;        ///< of unsent replies and events per client
+  std::size_t totalOutgoingBytes = 1u << 30;    ///< of all clients
   std::size_t outgoingFrames = 4;               ///< unsent frames per client
   std::size_t outgoingFrameBytes = 512u << 20;  ///< of several unsent frames
   std::uint32_t frameSubscriptions = 16;        ///< frame subscriptions per client

@@ -29,6 +29,21 @@ void resetSubscriptionTimes(Client& client) {
   for (auto& [number, subscription] : client.frameSubscriptions) subscription.nextTime = 0;
 }
 
+/// Adds a notice for each avatar of `one` that is not in `other`.
+void addPresenceNotices(const scene::Snapshot& one, const scene::Snapshot& other,
+                        v1::Notice::Kind kind, v1::TickEvents& events) {
+  for (const scene::AvatarSnapshot& avatar : one.avatars) {
+    if (findAvatar(other, avatar.name)) continue;
+    v1::Notice& notice = *events.add_notices();
+    notice.set_tick(one.tick);
+    notice.set_kind(kind);
+    notice.set_avatar(avatar.name);
+    notice.set_id(avatar.id);
+    *notice.mutable_position() = toProto(avatar.footPosition);
+    notice.set_text("the recording was sought");
+  }
+}
+
 }  // namespace
 
 void resetWorld(HostedWorld& hosted) {
@@ -46,7 +61,12 @@ void resetWorld(HostedWorld& hosted) {
 }
 
 void replaceWorld(HostedWorld& hosted, scene::World world, const v1::TickEvents& activeContacts) {
-  broadcastEvents(hosted, hosted.world.endContacts(v1::ContactEvent::REASON_SEEK));
+  const auto before = hosted.world.snapshot(), after = world.snapshot();
+  v1::TickEvents ended = hosted.world.endContacts(v1::ContactEvent::REASON_SEEK);
+  addPresenceNotices(*before, *after, v1::Notice::KIND_LEFT, ended);
+  broadcastEvents(hosted, ended);
+  v1::TickEvents begun = activeContacts;
+  addPresenceNotices(*after, *before, v1::Notice::KIND_SPAWNED, begun);
   hosted.world.switchTo(std::move(world));
   resetHorizons(hosted);
   hosted.owners.clear();
@@ -54,7 +74,7 @@ void replaceWorld(HostedWorld& hosted, scene::World world, const v1::TickEvents&
   hosted.activeContacts.clear();
   updateActiveContacts(hosted, activeContacts);
   publishStatus(hosted);
-  TickBroadcast shared{activeContacts};
+  TickBroadcast shared{begun};
   for (auto& [id, client] : hosted.clients) {
     sendEvents(client, shared);
     resetSubscriptionTimes(client);

@@ -20,6 +20,21 @@ OutgoingQueue::OutgoingQueue(const OutgoingLimits& limits, EncodedMessage overfl
                              std::function<void()> wake)
     : limits_(limits), overflowMessage_(std::move(overflowMessage)), wake_(std::move(wake)) {}
 
+OutgoingQueue::~OutgoingQueue() {
+  removeBytes(bytes_);
+}
+
+void OutgoingQueue::addBytes(std::size_t count) {
+  bytes_ += count;
+  if (limits_.budget) limits_.budget->bytes += count;
+}
+
+void OutgoingQueue::removeBytes(std::size_t count) {
+  ENFILADE_ASSERT(bytes_ >= count);
+  bytes_ -= count;
+  if (limits_.budget) limits_.budget->bytes -= count;
+}
+
 void OutgoingQueue::push(EncodedMessage message) {
   append({Kind::reliable, std::move(message)});
 }
@@ -41,7 +56,7 @@ void OutgoingQueue::append(Item item) {
     const std::lock_guard lock(mutex_);
     ENFILADE_ASSERT(item.message);  // pop() returns an empty message when the queue is empty
     if (finished_) return;
-    if (item.kind == Kind::reliable) bytes_ += item.message.size();
+    if (item.kind == Kind::reliable) addBytes(item.message.size());
     if (item.kind == Kind::frame) {
       ++frames_;
       frameBytes_ += item.message.size();
@@ -50,9 +65,12 @@ void OutgoingQueue::append(Item item) {
     items_.push_back(std::move(item));
     // A single frame may exceed frameBytes: its size has a limit of its own.
     const bool framesTooLarge = frames_ > 1 && frameBytes_ > limits_.frameBytes;
-    if (bytes_ > limits_.bytes || frames_ > limits_.frames || framesTooLarge) {
+    const bool exceedsBudget =
+        limits_.budget && bytes_ > 0 && limits_.budget->bytes > limits_.budget->maxBytes;
+    if (exceedsBudget || bytes_ > limits_.bytes || frames_ > limits_.frames || framesTooLarge) {
       overflowed_ = finished_ = true;
       items_.assign(1, {Kind::last, overflowMessage_});
+      removeBytes(bytes_);
     }
   }
   wake_();
@@ -71,8 +89,7 @@ OutgoingQueue::Next OutgoingQueue::pop() {
   Item item = std::move(items_.front());
   items_.pop_front();
   ENFILADE_ASSERT(item.kind != Kind::last || (finished_ && items_.empty()));
-  ENFILADE_ASSERT(item.kind != Kind::reliable || bytes_ >= item.message.size());
-  if (item.kind == Kind::reliable) bytes_ -= item.message.size();
+  if (item.kind == Kind::reliable) removeBytes(item.message.size());
   if (item.kind == Kind::frame) {
     ENFILADE_ASSERT(frames_ > 0 && frameBytes_ >= item.message.size());
     --frames_;

@@ -3,6 +3,7 @@
 // frames) can be withdrawn before they are sent. Callable from any thread.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -37,10 +38,19 @@ Buffer encodeShared(const google::protobuf::MessageLite& message);
 EncodedMessage encodeShared(const google::protobuf::MessageLite& message,
                             std::vector<std::uint8_t> attachment);
 
+/// Unsent replies and events of all clients of a server.
+struct OutgoingBudget {
+  explicit OutgoingBudget(std::size_t limit) : maxBytes(limit) {}
+  const std::size_t maxBytes;
+  std::atomic<std::size_t> bytes{0};
+};
+
 struct OutgoingLimits {
   std::size_t bytes = 0;   ///< of unsent replies and events, without frames
   std::size_t frames = 0;  ///< unsent requested frames
   std::size_t frameBytes = std::numeric_limits<std::size_t>::max();  ///< of these frames
+  /// Shared by all clients: the one whose message exceeds it is too slow. Null: no such limit.
+  std::shared_ptr<OutgoingBudget> budget = nullptr;
 };
 
 class OutgoingQueue {
@@ -49,6 +59,9 @@ class OutgoingQueue {
   /// the lock, after each queued message.
   OutgoingQueue(const OutgoingLimits& limits, EncodedMessage overflowMessage,
                 std::function<void()> wake);
+  ~OutgoingQueue();
+  OutgoingQueue(const OutgoingQueue&) = delete;
+  OutgoingQueue& operator=(const OutgoingQueue&) = delete;
 
   void push(EncodedMessage message);
   void pushFrame(EncodedMessage message);
@@ -76,6 +89,8 @@ class OutgoingQueue {
     std::uint32_t slot = 0;  ///< of a latest-only message
   };
   void append(Item item);
+  void addBytes(std::size_t count);
+  void removeBytes(std::size_t count);
 
   const OutgoingLimits limits_;
   const EncodedMessage overflowMessage_;

@@ -121,9 +121,7 @@ void FoxgloveSession::join() {
       if (const auto self = weak.lock()) self->sendNext();
     });
   };
-  const ServerLimits& limits = context_.limits;
-  const OutgoingLimits queueLimits{limits.outgoingBytes, limits.outgoingFrames,
-                                   limits.outgoingFrameBytes};
+  const OutgoingLimits queueLimits = makeOutgoingLimits(context_);
   const Buffer tooSlow =
       encodeBye(makeBye(v1::ERROR_TOO_SLOW, "the viewer does not read its messages in time"));
   replies_ = std::make_shared<OutgoingQueue>(queueLimits, tooSlow, wake);

@@ -267,10 +267,7 @@ void HttpSession::joinWorld(WorldReply& reply, Role role) {
       if (const auto self = weak.lock()) self->pollReplies();
     });
   };
-  const ServerLimits& limits = context_.limits;
-  reply.queue = std::make_shared<OutgoingQueue>(
-      OutgoingLimits{limits.outgoingBytes, limits.outgoingFrames, limits.outgoingFrameBytes},
-      makeBuffer(""), wake);
+  reply.queue = std::make_shared<OutgoingQueue>(makeOutgoingLimits(context_), makeBuffer(""), wake);
   reply.client = reply.world->join("http", role, reply.queue, 1, true);
 }
 

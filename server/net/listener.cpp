@@ -69,7 +69,8 @@ Listener::Listener(asio::io_context& context, const Endpoint& where, WorldRegist
     : acceptor_(openAcceptor(context, where, access)),
       port_(acceptor_.local_endpoint().port()),
       retryTimer_(context),
-      context_{worlds, limits, std::move(access), std::move(page), {}} {}
+      context_{worlds, limits, std::move(access), std::move(page),
+               std::make_shared<OutgoingBudget>(limits.totalOutgoingBytes)} {}
 
 void Listener::start() {
   accept();

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "server/base/access.hpp"
+#include "server/base/server_limits.hpp"
+#include "server/messages/outgoing_queue.hpp"
 #include "server/net/page_files.hpp"
 #include "server/worlds/world_registry.hpp"
 
@@ -30,10 +32,16 @@ struct ServerContext {
   const ServerLimits limits;
   const Access access;
   const PageFiles page;
-  std::vector<std::weak_ptr<ClientConnection>> connections;
+  const std::shared_ptr<OutgoingBudget> outgoing;
+  std::vector<std::weak_ptr<ClientConnection>> connections = {};
   std::size_t streams = 0;  ///< of MJPEG
   bool closed = false;      ///< new connections are rejected
 };
+
+inline OutgoingLimits makeOutgoingLimits(const ServerContext& context) {
+  const ServerLimits& limits = context.limits;
+  return {limits.outgoingBytes, limits.outgoingFrames, limits.outgoingFrameBytes, context.outgoing};
+}
 
 /// Registers a connection, so that it is ended when the server stops.
 inline void registerConnection(ServerContext& context,

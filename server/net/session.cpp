@@ -52,7 +52,7 @@ void Session::start(Timer::time_point deadline, std::string token) {
   };
   const ServerLimits& limits = context_.limits;
   out_ = std::make_shared<OutgoingQueue>(
-      OutgoingLimits{limits.outgoingBytes, limits.outgoingFrames, limits.outgoingFrameBytes},
+      makeOutgoingLimits(context_),
       encodeBye(
           makeBye(v1::ERROR_TOO_SLOW, "replies and events were not read in time: more than " +
                                           std::to_string(limits.outgoingBytes) + " bytes or " +

@@ -81,17 +81,13 @@ const tests = {
     const events = contacts.filter(({ event, normal }) => event === "blocked" || event === "near" || event === "enter" || (event === "begin" && (normal?.[1] ?? 0) > -0.7));
     assert.equal(await page.evaluate(() => enfilade.timeline.markedEvents), events.length);
     assert.ok(events.length > 10, `${events.length}`);
-    const place = await page.evaluate(() => {
-      const mark = document.querySelector(".mark.touching");
-      mark.click();
-      return mark.title;
-    });
-    await page.waitForFunction((first) => first.startsWith(`${Math.floor(enfilade.app.time / 60)}:`), place);
+    await page.evaluate(() => document.querySelector(".mark.touching").click());
+    const first = events.find(({ event }) => event === "begin").tick;
+    await page.waitForFunction((tick) => enfilade.app.tick === tick, first);
     const active = await page.evaluate(() => enfilade.contacts.liveCount);
-    const tick = await page.evaluate(() => enfilade.app.tick);
     const live = new Set();
     for (const { event, a, b, tick: at } of contacts) {
-      if (at > tick) break;
+      if (at > first) break;
       if (event === "begin") live.add(`${a} ${b}`);
       if (event === "end") live.delete(`${a} ${b}`);
     }

@@ -16,6 +16,32 @@ Buffer bytes(std::size_t count) {
   return std::make_shared<const std::vector<std::uint8_t>>(count);
 }
 
+TEST(OutgoingQueues, ShareABudgetAndGiveItBack) {
+  const auto message = [](std::size_t bytes) {
+    return std::make_shared<const std::vector<std::uint8_t>>(bytes);
+  };
+  OutgoingLimits limits{1000, 2};
+  limits.budget = std::make_shared<OutgoingBudget>(1500);
+  const Buffer tooSlow = message(1);
+  OutgoingQueue second(limits, tooSlow, [] {});
+  {
+    OutgoingQueue first(limits, tooSlow, [] {});
+    first.push(message(900));
+    second.push(message(500));
+    EXPECT_EQ(limits.budget->bytes, 1400u);
+    EXPECT_FALSE(second.overflowed());
+    second.push(message(200));
+    EXPECT_TRUE(second.overflowed()) << "1600 bytes of both";
+    EXPECT_FALSE(first.overflowed());
+    EXPECT_EQ(limits.budget->bytes, 900u);
+    first.push(message(100));
+    EXPECT_EQ(first.pop().message.size(), 900u);
+    EXPECT_EQ(limits.budget->bytes, 100u);
+  }
+  EXPECT_EQ(limits.budget->bytes, 0u);
+  EXPECT_EQ(second.pop().message.size(), 1u);
+}
+
 TEST(OutgoingQueue, KeepsRepliesInOrderAndOnlyTheLatestState) {
   int woken = 0;
   OutgoingQueue queue({1000, 2}, bytes(1), [&] { ++woken; });

@@ -1,5 +1,7 @@
 #include "server/hosting/requests/welcome.hpp"
 
+#include <chrono>
+
 #include "protocol/framing.hpp"
 #include "server/base/version.hpp"
 #include "server/hosting/replay_control.hpp"
@@ -40,6 +42,15 @@ v1::Welcome makeWelcome(const HostedWorld& hosted) {
   limits.set_max_requests_under_way(hosted.limits.pendingRequests);
   limits.set_max_bytes_under_way(hosted.limits.pendingRequestBytes);
   limits.set_requests_per_second(hosted.limits.requestsPerSecond);
+  const auto seconds = [](std::chrono::milliseconds time) {
+    return std::chrono::duration<double>(time).count();
+  };
+  limits.set_max_unread_bytes(hosted.limits.outgoingBytes);
+  limits.set_max_unread_pictures(static_cast<std::uint32_t>(hosted.limits.outgoingFrames));
+  limits.set_max_connections(static_cast<std::uint32_t>(hosted.limits.connections));
+  limits.set_max_described_ids(hosted.limits.describedIds);
+  limits.set_hello_seconds(seconds(hosted.limits.helloTimeout));
+  limits.set_message_seconds(seconds(hosted.limits.messageTimeout));
   welcome.set_tick(hosted.world.snapshot()->tick);
   welcome.set_renderer(hosted.frames.deviceName());
   welcome.set_software_renderer(hosted.frames.isSoftware());
