@@ -166,7 +166,8 @@ void FoxgloveSession::handle(wire::ClientRequest request) {
 void FoxgloveSession::subscribe(const wire::Subscribe& request) {
   const bool hadScene = isSubscribed(toId(ViewerChannel::scene));
   std::string problem;
-  for (const auto& [subscription, channel] : request.subscriptions) {
+  for (const auto& wanted : request.subscriptions) {
+    const std::uint32_t channel = wanted.channel;
     const bool exists =
         (channel >= toId(ViewerChannel::transforms) && channel <= toId(ViewerChannel::events)) ||
         std::any_of(views_.begin(), views_.end(),
@@ -179,7 +180,7 @@ void FoxgloveSession::subscribe(const wire::Subscribe& request) {
     else if (subscriptions_.size() == kMaxSubscriptions)
       problem = "at most " + std::to_string(kMaxSubscriptions) + " subscriptions";
     else
-      subscriptions_[channel] = subscription;
+      subscriptions_[channel] = wanted.subscription;
   }
   if (!problem.empty()) sendStatus(wire::StatusLevel::warning, "subscribe: " + problem);
   applySubscriptions(!hadScene && isSubscribed(toId(ViewerChannel::scene)));
@@ -328,7 +329,8 @@ void FoxgloveSession::sendImages(const v1::Frame& frame, std::span<const std::ui
     return view.second.watch != 0 && view.second.watch == frame.watch();
   });
   if (found == views_.end()) return;
-  const auto& [avatar, view] = *found;
+  const std::string& avatar = found->first;
+  const View& view = found->second;
   const auto image = extractImage(frame, attachment);
   if (!image) return;
   ViewerSink sink;
