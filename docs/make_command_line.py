@@ -5,7 +5,7 @@ usage: make_command_line.py PROGRAM > docs/command_line.md
 import subprocess
 import sys
 
-COMMANDS = ["serve", "replay", "capture", "inspect", "diff", "export", "walk", "doctor"]
+COMMANDS = ["serve", "replay", "capture", "inspect", "diff", "export", "route", "walk", "doctor"]
 HEAD = """# Command line
 
 `build/enfilade` is the whole program, with two modules next to it that read models. stdout carries data;

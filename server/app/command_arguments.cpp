@@ -15,11 +15,6 @@
 namespace enfilade::server {
 namespace {
 
-std::string validateUnit(const std::string& text) {
-  if (scene::parseMetresPerUnit(text)) return {};
-  return text + ": give m, mm, cm, ft, in or a positive number of metres";
-}
-
 std::string validateFile(const std::string& text) {
   return text.empty() ? "the file name is empty: give one, for example walk.mcap" : "";
 }
@@ -46,11 +41,6 @@ std::string validateAudit(const std::string& text) {
   if (ticks && *ticks <= scene::kMaxAuditInterval) return {};
   return text + ": give a whole number of ticks from 1 to " +
          std::to_string(scene::kMaxAuditInterval) + ", or 0 for no audit";
-}
-
-/// Lists the options that follow under this heading of --help.
-void setGroup(CLI::App& verb, const char* heading) {
-  verb.option_defaults()->group(heading);
 }
 
 void addAudit(CLI::App& verb, CommandArguments& into) {
@@ -128,35 +118,6 @@ void addAccess(CLI::App& verb, CommandArguments& into) {
   verb.add_option("--allow-origin", into.access.origins,
                   "Origins whose pages may connect, for example https://example.org")
       ->type_name("URL");
-}
-
-void addModel(CLI::App& verb, ModelArguments& into) {
-  setGroup(verb, "Model");
-  verb.add_option("SCENE", into.file, "Model file: glTF, GLB, OBJ, COLLADA, FBX, IFC, PLY or STL")
-      ->required();
-  verb.add_option("--unit", into.unit, "Unit of the file: m, mm, cm, ft, in or a number of metres")
-      ->check(CLI::Validator(validateUnit, "UNIT"));
-  verb.add_option("--up", into.up, "Up axis of the file")->check(CLI::IsMember({"x", "y", "z"}));
-  verb.add_option("--offset", into.offset,
-                  "Offset (m, Y up) subtracted from the file's coordinates; use one value for all "
-                  "versions of a model. Default: 0 near the origin, else the model's position")
-      ->delimiter(',')
-      ->type_name("X,Y,Z")
-      ->expected(3);
-  verb.add_flag("--no-cache", into.noCache, "Import the model again and ignore the cached import");
-  verb.add_option(
-          "--ifc-reader", into.ifcReader,
-          "IFC reader. auto: web-ifc, else ifcplusplus (also for products that web-ifc omits), "
-          "else assimp")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "web-ifc", "ifcplusplus", "assimp"}));
-  verb.add_option("--ifc-doors", into.ifcDoors,
-                  "IFC doors. move: they are bodies if the file describes their motion; still: "
-                  "they and lifts are static; open: static, with open leaves; none: without leaves")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"move", "still", "open", "none"}));
-  verb.add_flag("--georeference", into.georeference,
-                "IFC: apply the file's map conversion, so that coordinates are the map's");
 }
 
 void addDevice(CLI::App& verb, CommandArguments& into) {
@@ -433,19 +394,36 @@ void addInspectOptions(CLI::App& inspect, CommandArguments& into) {
       "Example: enfilade inspect house.ifc --plan out/plans --strict");
 }
 
-ModelOptions makeModelOptions(const ModelArguments& read) {
-  ModelOptions options;
-  options.file = read.file;
-  options.cache = !read.noCache;
-  if (!read.unit.empty()) options.import.metresPerUnit = scene::parseMetresPerUnit(read.unit);
-  if (!read.up.empty()) options.import.up = read.up.front();
-  if (!read.offset.empty())
-    options.import.offset = {read.offset[0], read.offset[1], read.offset[2]};
-  options.import.ifcReader =
-      scene::parseIfcReader(read.ifcReader).value_or(scene::IfcReader::automatic);
-  options.doors = scene::parseIfcDoors(read.ifcDoors);
-  options.import.georeference = read.georeference;
-  return options;
+void addRouteOptions(CLI::App& verb, CommandArguments& into) {
+  addModel(verb, into.model);
+  setGroup(verb, "Options");
+  constexpr const char* kPlaces =
+      ": X,Y,Z in metres, or the name of a room, a storey or an object (room:NAME, storey:NAME, "
+      "object:PATH)";
+  verb.add_option("FROM", into.route.from, std::string("Start") + kPlaces)->required();
+  verb.add_option("TO", into.route.to, std::string("Goal") + kPlaces)->required();
+  verb.add_option("--radius", into.route.agent.radius, "Radius of the walker")
+      ->type_name("METRES")
+      ->check(CLI::Range(0.05, 5.0))
+      ->capture_default_str();
+  verb.add_option("--height", into.route.agent.height, "Height of the walker")
+      ->type_name("METRES")
+      ->check(CLI::Range(0.2, 10.0))
+      ->capture_default_str();
+  verb.add_option("--speed", into.route.agent.speed, "Speed of the walk, in m/s")
+      ->type_name("SPEED")
+      ->check(CLI::Range(0.1, 20.0))
+      ->capture_default_str();
+  verb.add_flag("--doors-as-they-are", into.route.doorsAsTheyAre,
+                "Doors that move stay as in the file. Default: they are open");
+  verb.add_flag("--json", into.json, "Print one JSON object");
+  verb.add_option("--plan", into.plan, "File for a plan with the path (png)")
+      ->check(CLI::Validator(validateFile, "FILE"));
+  addMotion(verb, into);
+  verb.footer(
+      "Every leg of the path was walked by the motion of avatars. Exits with 3 if there is no\n"
+      "path; the reason names the object in the way and the clear width.\n"
+      "Example: enfilade route house.ifc room:A101 room:A203 --plan route.png");
 }
 
 DrawingOptions makeDrawingOptions(const CommandArguments& read) {

@@ -6,10 +6,12 @@
 #include <vector>
 
 #include "server/app/capture_arguments.hpp"
+#include "server/app/model_arguments.hpp"
 #include "server/base/access.hpp"
 #include "server/base/drawing_options.hpp"
 #include "server/base/load_scene.hpp"
 #include "server/commands/doctor.hpp"
+#include "server/commands/route.hpp"
 #include "server/recording/recording_options.hpp"
 
 namespace CLI {
@@ -17,12 +19,6 @@ class App;
 }
 
 namespace enfilade::server {
-
-struct ModelArguments {
-  std::string file, unit, up, ifcReader = "auto", ifcDoors = "move";
-  std::vector<double> offset;
-  bool noCache = false, georeference = false;
-};
 
 /// The option values as CLI11 reads them. Each command uses some of them.
 struct CommandArguments {
@@ -35,6 +31,7 @@ struct CommandArguments {
   std::string recordChannels = "walk", recordFrames;
   bool strict = false, verify = false, json = false, objects = false, stopAtEndOfInput = false;
   CaptureArguments capture;
+  RouteCommand route;
   std::string renderer = "auto";
   render::DeviceChoice device;
   std::string tokenFile;
@@ -56,8 +53,8 @@ void addCaptureCommandOptions(CLI::App& verb, CommandArguments& into);
 void addWalkOptions(CLI::App& verb, CommandArguments& into);
 void addDoctorOptions(CLI::App& verb, CommandArguments& into);
 void addInspectOptions(CLI::App& verb, CommandArguments& into);
+void addRouteOptions(CLI::App& verb, CommandArguments& into);
 
-ModelOptions makeModelOptions(const ModelArguments& read);
 DrawingOptions makeDrawingOptions(const CommandArguments& read);
 RecordingChoice makeRecordingChoice(const CommandArguments& read);
 scene::WorldSettings makeWorldSettings(const CommandArguments& read);

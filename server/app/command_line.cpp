@@ -256,6 +256,15 @@ const Verb kVerbs[] = {
      }},
     {"doctor", "Test all graphics devices and report missing components", addDoctorOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand { return read.doctor; }},
+    {"route", "Find a path that an avatar can walk", addRouteOptions,
+     [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
+       RouteCommand command = read.route;
+       command.model = makeModelOptions(read.model);
+       command.settings = makeWorldSettings(read);
+       command.json = read.json;
+       command.plan = read.plan;
+       return command;
+     }},
     {"inspect", "Report the contents and problems of a scene or a recording", addInspectOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
        return InspectCommand{makeModelOptions(read.model),

@@ -9,6 +9,7 @@
 #include "server/commands/export.hpp"
 #include "server/commands/export_replay.hpp"
 #include "server/commands/export_scene.hpp"
+#include "server/commands/route.hpp"
 #include "server/commands/serve.hpp"
 #include "server/commands/verify.hpp"
 #include "server/diff/diff.hpp"
@@ -21,7 +22,7 @@ namespace enfilade::server {
 using ProgramCommand =
     std::variant<DoctorCommand, ServeCommand, ReplayCommand, VerifyCommand, CaptureCommand,
                  WalkCommand, InspectCommand, DiffCommand, ResimulateCommand, ExportCommand,
-                 ExportSceneCommand, ExportReplayCommand>;
+                 ExportSceneCommand, ExportReplayCommand, RouteCommand>;
 
 /// Returns the command, or the exit code (--help: done; an error: usage). Help goes to stdout,
 /// errors go to stderr.

@@ -25,6 +25,7 @@ struct CommandRunner {
   ExitCode operator()(const ExportCommand& command) const { return exportRecording(command); }
   ExitCode operator()(const ExportSceneCommand& command) const { return exportScene(command); }
   ExitCode operator()(const ExportReplayCommand& command) const { return exportReplay(command); }
+  ExitCode operator()(const RouteCommand& command) const { return route(command); }
   ExitCode operator()(const InspectCommand& command) const { return inspect(command); }
 };
 

@@ -160,9 +160,11 @@ std::vector<LegendEntry> makeLegend(const WalkTrace& trace) {
   std::vector<LegendEntry> entries;
   for (const WalkedPath& path : trace.paths)
     entries.push_back({path.avatar, computeAvatarColour(path.id), false});
-  entries.insert(entries.end(), {{"contact begins (without floors)", kContact, false},
-                                 {"walk ends blocked", kBlocked, false},
-                                 {"picture taken, towards the open end", kCamera, true}});
+  if (!trace.contacts.empty())
+    entries.push_back({"contact begins (without floors)", kContact, false});
+  if (!trace.blockedWalks.empty()) entries.push_back({"walk ends blocked", kBlocked, false});
+  if (!trace.captures.empty())
+    entries.push_back({"picture taken, towards the open end", kCamera, true});
   return entries;
 }
 
@@ -243,8 +245,13 @@ std::vector<double> findWalkedStoreys(const std::vector<WalkedPath>& paths) {
 }
 
 std::optional<Image> drawMap(const WalkTrace& trace, const MapBackground& background) {
+  std::vector<double> floors = findWalkedStoreys(trace.paths);
+  for (const double floor : trace.floors)
+    if (std::ranges::none_of(floors, [&](double one) { return std::abs(one - floor) < 1; }))
+      floors.push_back(floor);
+  std::ranges::sort(floors);
   std::vector<Storey> storeys;
-  for (const double floor : findWalkedStoreys(trace.paths)) {
+  for (const double floor : floors) {
     Storey storey;
     storey.floor = floor;
     storey.camera =

@@ -32,6 +32,7 @@ struct WalkTrace {
   std::vector<MapContact> contacts;      ///< contacts that began
   std::vector<MapContact> blockedWalks;  ///< ends of blocked walks
   std::vector<MapCapture> captures;
+  std::vector<double> floors = {};  ///< metres: heights with a plan, however little walking is there
 };
 
 /// Finds the floor heights with much walking, ascending; empty without walks.

@@ -58,6 +58,7 @@ const std::vector<std::string> kRooms{
     "scene/world/avatars",
     "scene/world",
     "scene/world/checkpoint",
+    "scene/navigation",
     "render",
     "render/image",
     "render/gl",
@@ -97,10 +98,11 @@ struct ThirdParty {
   Names folders;        ///< where it may be used
 };
 
-const std::array<ThirdParty, 17> kThirdParties{{
+const std::array<ThirdParty, 18> kThirdParties{{
     {"GMP", "gmp.*", {"collision"}},
     {"assimp", "assimp/.*", {"scene"}},
     {"ifcplusplus", "(ifcpp|carve)/.*", {"scene"}},
+    {"Recast and Detour", "(Recast|Detour).*", {"scene"}},
     {"Embree", "embree.*", {"scene", "render"}},
     {"EGL and OpenGL", "(epoxy|EGL|GL|GLES.*)/.*", {"render"}},
     {"libpng", "png.*", {"scene", "render"}},

@@ -257,7 +257,7 @@ Aabb computeMotionBounds(const WorldSettings& settings, const Avatar& avatar) {
   return inflated(box, margin);
 }
 
-void moveAvatar(WorldData& world, Avatar& avatar, QueryCount& count) {
+void moveAvatar(const WorldData& world, Avatar& avatar, QueryCount& count) {
   AvatarMover m{world.settings, avatar, count, avatar.footPosition,
                 computeAvatarFootBounds(world.settings, avatar)};
   const Vec3 desired = avatar.desiredVelocity * world.settings.tickDuration;

@@ -10,6 +10,6 @@ namespace enfilade::scene {
 Aabb computeMotionBounds(const WorldSettings& settings, const Avatar& avatar);
 
 /// Moves an avatar: walks, slides, steps, falls or flies.
-void moveAvatar(WorldData& world, Avatar& avatar, QueryCount& count);
+void moveAvatar(const WorldData& world, Avatar& avatar, QueryCount& count);
 
 }  // namespace enfilade::scene

@@ -164,7 +164,7 @@ bool moveJoint(JointMover& mover, std::size_t joint, double delta) {
 
 }  // namespace
 
-void moveJoints(WorldData& world, Avatar& avatar, QueryCount& count) {
+void moveJoints(const WorldData& world, Avatar& avatar, QueryCount& count) {
   JointMover mover{avatar, count, makeContactOffset(world.settings)};
   Chain& chain = avatar.chain;
   const double maxDelta = chain.speed * world.settings.tickDuration;

@@ -7,6 +7,6 @@
 namespace enfilade::scene {
 
 /// Moves the joints of a chain towards their targets.
-void moveJoints(WorldData& world, Avatar& avatar, QueryCount& count);
+void moveJoints(const WorldData& world, Avatar& avatar, QueryCount& count);
 
 }  // namespace enfilade::scene

@@ -11,22 +11,16 @@
 #include "scene/world/avatars/immediate_orders.hpp"
 #include "scene/world/avatars/order_context.hpp"
 #include "scene/world/avatars/spawn.hpp"
+#include "scene/world/avatars/walk_velocity.hpp"
 #include "scene/world/bodies/physics_bodies.hpp"
 #include "scene/world/contacts/contacts.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr double kArrivalDistance = 1e-3;     // metres, horizontal distance to the way point
-constexpr double kArrivalHeight = 1.0;        // metres, vertical: excludes another storey
 constexpr double kMinProgress = 0.01;         // metres; less for slow walks
 constexpr double kMaxDepthBelowScene = 10;    // metres below the lowest point of the scene
 constexpr double kMaxDistanceOutside = 1000;  // metres beyond the scene's bounds
-
-double computeGroundDistance(const Vec3& from, const Vec3& to) {
-  const double x = to.x() - from.x(), z = to.z() - from.z();
-  return std::sqrt(x * x + z * z);
-}
 
 /// Distance to `goal`, metres: horizontal, or in space for a flying avatar.
 double computeRemainingDistance(const Avatar& avatar, const Vec3& goal) {
@@ -216,20 +210,6 @@ void enqueueCommands(WorldData& world, TickReport& report) {
   world.pendingCommands.clear();
 }
 
-Vec3 projectToGround(const Vec3& velocity) {
-  return {velocity.x(), 0, velocity.z()};
-}
-
-/// Velocity of a walk, m/s; reduced in the last tick to end exactly at the way point.
-Vec3 computeWalkVelocity(const WorldData& world, const Avatar& avatar, const Walk& walk) {
-  const Vec3& goal = walk.waypoints[avatar.walk.waypointIndex];
-  const double distance = computeRemainingDistance(avatar, goal);
-  if (!(distance > 0)) return Vec3::Zero();
-  const double speed = std::min(walk.speed, distance / world.settings.tickDuration);
-  const Vec3 toGoal = goal - avatar.footPosition;
-  return (avatar.flying ? toGoal : projectToGround(toGoal)) * (speed / distance);
-}
-
 /// Velocity requested by the front order or, without one, by Drive, m/s.
 Vec3 computeDesiredVelocity(const WorldData& world, const Avatar& avatar,
                             const std::deque<QueuedOrder>& queue) {
@@ -238,8 +218,11 @@ Vec3 computeDesiredVelocity(const WorldData& world, const Avatar& avatar,
   if (queue.empty()) return driveVelocity;
   const Order& order = queue.front().order;
   if (const Walk* walk = std::get_if<Walk>(&order))
-    return avatar.walk.minDistance < 0 ? Vec3(Vec3::Zero())
-                                       : computeWalkVelocity(world, avatar, *walk);
+    return avatar.walk.minDistance < 0
+               ? Vec3(Vec3::Zero())
+               : computeWalkVelocity(avatar.footPosition,
+                                     walk->waypoints[avatar.walk.waypointIndex], avatar.flying,
+                                     walk->speed, world.settings.tickDuration);
   if (const Jump* jump = std::get_if<Jump>(&order); jump && avatar.jumping)
     return jump->velocity ? projectToGround(*jump->velocity) : driveVelocity;
   return std::holds_alternative<DriveJoints>(order) ? driveVelocity : Vec3(Vec3::Zero());

@@ -160,6 +160,12 @@ void applySpawnShape(const Spawn& order, const WorldSettings& settings, Avatar& 
   avatar.shape = makeChainShape(avatar.baseParts, avatar.chain);
 }
 
+std::optional<std::string> placeStanding(const WorldData& world, const Vec3& position,
+                                         Avatar& avatar, QueryCount& count) {
+  PlacementSearch search{world, count, 0};
+  return tryPlacement(search, position, avatar);
+}
+
 std::optional<std::string> placeAvatar(const WorldData& world, const Spawn& order, Avatar& avatar,
                                        std::string& message, QueryCount& count) {
   applySpawnShape(order, world.settings, avatar);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "server/messages/world_messages.hpp"
+
 namespace enfilade::server {
 namespace {
 

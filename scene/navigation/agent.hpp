@@ -1,0 +1,12 @@
+// The size of who walks, for navigation: the upright prism of an avatar without parts and links.
+#pragma once
+
+namespace enfilade::scene {
+
+struct NavigationAgent {
+  double radius = 0.3;   ///< metres, as Spawn::radius
+  double height = 1.75;  ///< metres, as Spawn::height
+  double speed = 1.4;    ///< metres per second, as Walk::speed
+};
+
+}  // namespace enfilade::scene

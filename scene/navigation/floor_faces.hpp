@@ -1,0 +1,25 @@
+// The level upper faces of obstacles: how far a walk stays above even floor, so that one step of
+// the proof can be long.
+#pragma once
+
+#include <vector>
+
+#include "scene/world/data/obstacle.hpp"
+
+namespace enfilade::scene {
+
+struct FloorFace {
+  double y = 0;               ///< metres, scene frame
+  std::vector<Vec3> corners;  ///< counter-clockwise seen from above
+  Aabb box;
+};
+
+/// The level faces of `obstacles` that overlap `box`.
+std::vector<FloorFace> collectFloorFaces(const ObstacleSet& obstacles, const Aabb& box);
+
+/// How far the point below the feet stays on faces of the height that it has at `footPosition`
+/// while it moves along the horizontal unit vector `direction`, metres, at most `length`.
+double computeEvenDistance(const std::vector<FloorFace>& faces, const Vec3& footPosition,
+                           const Vec3& direction, double length);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,135 @@
+#include "scene/navigation/grid_search.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <queue>
+#include <utility>
+
+#include "scene/world/avatars/walk_velocity.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr double kStoreyHeight = 1;   // metres: places of a cell closer than this are one place
+constexpr double kSameHeight = 0.05;  // metres: of feet that come to the same place on two ways
+
+struct Cell {
+  int x = 0, z = 0, storey = 0;
+  auto operator<=>(const Cell&) const = default;
+};
+
+struct Place {
+  Vec3 feet = Vec3::Zero();
+  double cost = 0;
+  Cell parent;
+  bool done = false;
+};
+
+constexpr std::array<std::pair<int, int>, 8> kDirections{
+    {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {1, -1}, {-1, 1}, {-1, -1}}};
+
+struct Grid {
+  Vec3 origin;
+  double spacing = 0;
+
+  Vec3 centre(int x, int z) const { return origin + Vec3(x * spacing, 0, z * spacing); }
+  Cell cellOf(const Vec3& feet, int x, int z) const {
+    return {x, z, static_cast<int>(std::lround((feet.y() - origin.y()) / kStoreyHeight))};
+  }
+};
+
+std::vector<Vec3> collectPlaces(const std::map<Cell, Place>& places, Cell last) {
+  std::vector<Vec3> path;
+  for (Cell at = last;; at = places.at(at).parent) {
+    path.push_back(places.at(at).feet);
+    if (places.at(at).parent == at) break;
+  }
+  std::reverse(path.begin(), path.end());
+  return path;
+}
+
+/// True if the walker, who stands at `from`, arrives at `to`, also in height.
+bool walks(Walker& walker, const Vec3& from, const Vec3& to) {
+  walker.returnTo(from);
+  return walker.walkTo(to).kind == WalkOutcome::Kind::arrived &&
+         std::abs(walker.footPosition().y() - to.y()) < kSameHeight;
+}
+
+}  // namespace
+
+std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, const Vec3& to,
+                                              GridSearch& search) {
+  const Grid grid{from, search.spacing};
+  Aabb window;
+  window.include(from);
+  window.include(to);
+  window = inflated(window, search.margin);
+  std::map<Cell, Place> places;
+  using Entry = std::pair<double, Cell>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
+  const Cell start = grid.cellOf(from, 0, 0);
+  places[start] = {from, 0, start, false};
+  open.push({0, start});
+  while (!open.empty()) {
+    const Cell cell = open.top().second;
+    open.pop();
+    Place& here = places[cell];
+    if (here.done) continue;
+    here.done = true;
+    const Vec3 feet = here.feet;
+    const double cost = here.cost;
+    if (computeGroundDistance(feet, to) < 1.5 * search.spacing && walks(walker, feet, to)) {
+      std::vector<Vec3> path = collectPlaces(places, cell);
+      path.push_back(to);
+      return path;
+    }
+    for (const auto& [dx, dz] : kDirections) {
+      const int x = cell.x + dx, z = cell.z + dz;
+      const Vec3 target = grid.centre(x, z);
+      if (target.x() < window.min.x() || target.x() > window.max.x() ||
+          target.z() < window.min.z() || target.z() > window.max.z())
+        continue;
+      const double next = cost + computeGroundDistance(feet, target);
+      const auto known = places.find({x, z, cell.storey});
+      if (known != places.end() && known->second.cost <= next) continue;
+      if (search.maxWalks == 0) return std::nullopt;
+      --search.maxWalks;
+      walker.returnTo(feet);
+      if (walker.walkTo(target).kind != WalkOutcome::Kind::arrived) continue;
+      const Vec3 reached = walker.footPosition();
+      const Cell to2 = grid.cellOf(reached, x, z);
+      const auto [at, isNew] = places.try_emplace(to2, Place{reached, next, cell, false});
+      if (!isNew) {
+        if (at->second.done || at->second.cost <= next) continue;
+        at->second = {reached, next, cell, false};
+      }
+      open.push({next + (to - reached).norm(), to2});
+    }
+  }
+  return std::nullopt;
+}
+
+std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places) {
+  std::vector<Vec3> path{places.front()};
+  for (std::size_t at = 0; at + 1 < places.size();) {
+    // The farthest place that is found by doubling the distance, then by halving.
+    std::size_t reached = at + 1, failed = places.size();
+    for (std::size_t step = 2; reached + 1 < failed; step *= 2) {
+      const std::size_t next = std::min(at + step, failed - 1);
+      if (next <= reached) break;
+      (walks(walker, places[at], places[next]) ? reached : failed) = next;
+    }
+    while (failed < places.size() && reached + 1 < failed) {
+      const std::size_t middle = (reached + failed) / 2;
+      (walks(walker, places[at], places[middle]) ? reached : failed) = middle;
+    }
+    at = reached;
+    path.push_back(places[at]);
+  }
+  return path;
+}
+
+}  // namespace enfilade::scene

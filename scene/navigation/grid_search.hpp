@@ -1,0 +1,27 @@
+// Searches a way on a fine grid, where each edge is walked: finds the ways that a navigation mesh
+// is too coarse for.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "scene/navigation/walker.hpp"
+
+namespace enfilade::scene {
+
+struct GridSearch {
+  double spacing = 0.1;      ///< metres between places
+  double margin = 1.5;       ///< metres: how far the way may leave the box of both ends
+  std::size_t maxWalks = 0;  ///< edges to walk
+};
+
+/// The places of a way between two places where the walker stood, with both; nullopt: none was
+/// found within the limits. Each leg was walked. Subtracts the walks from `search.maxWalks`.
+std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, const Vec3& to,
+                                              GridSearch& search);
+
+/// Leaves out places of a way as long as the legs between the others can be walked.
+std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,301 @@
+#include "scene/navigation/navigation_mesh.hpp"
+
+#include <DetourAlloc.h>
+#include <DetourCommon.h>
+#include <DetourNavMesh.h>
+#include <DetourNavMeshQuery.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <limits>
+#include <numeric>
+#include <queue>
+#include <stdexcept>
+#include <string>
+
+namespace enfilade::scene {
+namespace {
+
+constexpr int kReferenceBits = 22;  // of a tile and a polygon, in a 32-bit dtPolyRef
+constexpr int kMaxNearPolygons = 256;
+constexpr int kMaxCorners = 4096;
+
+using Float3 = std::array<float, 3>;
+
+Float3 toFloats(const Vec3& v) {
+  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
+}
+
+Vec3 toVec3(const float* v) {
+  return {v[0], v[1], v[2]};
+}
+
+int countBits(std::size_t values) {
+  int bits = 0;
+  while ((std::size_t{1} << bits) < values) ++bits;
+  return bits;
+}
+
+}  // namespace
+
+struct NavigationMesh::Detour {
+  dtNavMesh mesh;
+  dtNavMeshQuery query;  ///< its functions used here keep no state, except for the node pool
+  dtQueryFilter filter;
+
+  const dtMeshTile& tile(std::uint32_t reference, const dtPoly** polygon) const {
+    const dtMeshTile* found = nullptr;
+    mesh.getTileAndPolyByRefUnsafe(reference, &found, polygon);
+    return *found;
+  }
+};
+
+NavigationMesh::NavigationMesh(const TileGrid& grid, std::vector<std::vector<std::uint8_t>> tiles)
+    : detour_(std::make_unique<Detour>()) {
+  dtNavMeshParams params{};
+  const Float3 origin = toFloats(grid.origin);
+  std::copy(origin.begin(), origin.end(), params.orig);
+  params.tileWidth = params.tileHeight = static_cast<float>(grid.tileSize());
+  std::erase_if(tiles, [](const auto& tile) { return tile.empty(); });
+  const int tileBits = countBits(std::max<std::size_t>(2, tiles.size()));
+  params.maxTiles = 1 << tileBits;
+  params.maxPolys = 1 << (kReferenceBits - tileBits);
+  if (tileBits > 14 || dtStatusFailed(detour_->mesh.init(&params)))
+    throw std::runtime_error("navigation: the scene has too many tiles (" +
+                             std::to_string(tiles.size()) + ")");
+  for (const std::vector<std::uint8_t>& tile : tiles) {
+    auto* data = static_cast<unsigned char*>(dtAlloc(tile.size(), DT_ALLOC_PERM));
+    if (!data) throw std::bad_alloc();
+    std::memcpy(data, tile.data(), tile.size());
+    bytes_ += tile.size();
+    if (dtStatusFailed(detour_->mesh.addTile(data, static_cast<int>(tile.size()), DT_TILE_FREE_DATA,
+                                             0, nullptr))) {
+      dtFree(data);
+      throw std::runtime_error("navigation: a tile has too many polygons");
+    }
+  }
+  if (dtStatusFailed(detour_->query.init(&detour_->mesh, 64)))
+    throw std::runtime_error("navigation: Detour cannot start");
+  collectPortals();
+}
+
+NavigationMesh::~NavigationMesh() = default;
+NavigationMesh::NavigationMesh(NavigationMesh&&) noexcept = default;
+NavigationMesh& NavigationMesh::operator=(NavigationMesh&&) noexcept = default;
+
+void NavigationMesh::collectPortals() {
+  const dtNavMesh& mesh = detour_->mesh;
+  for (int i = 0; i < mesh.getMaxTiles(); ++i) {
+    const dtMeshTile* tile = mesh.getTile(i);
+    firstPolygonOfTile_.push_back(static_cast<std::uint32_t>(references_.size()));
+    if (!tile->header) continue;
+    const dtPolyRef base = mesh.getPolyRefBase(tile);
+    for (int p = 0; p < tile->header->polyCount; ++p) {
+      const dtPoly& polygon = tile->polys[p];
+      references_.push_back(base | static_cast<dtPolyRef>(p));
+      Float3 centre{};
+      dtCalcPolyCenter(centre.data(), polygon.verts, polygon.vertCount, tile->verts);
+      centres_.push_back(toVec3(centre.data()));
+      double twice = 0;
+      const auto corner = [&](int k) { return toVec3(&tile->verts[polygon.verts[k] * 3]); };
+      for (int k = 2; k < polygon.vertCount; ++k) {
+        const Vec3 a = corner(k - 1) - corner(0), b = corner(k) - corner(0);
+        twice += std::abs(a.x() * b.z() - a.z() * b.x());
+      }
+      areas_.push_back(0.5 * twice);
+    }
+  }
+  for (const dtPolyRef reference : references_) {
+    firstPortal_.push_back(static_cast<std::uint32_t>(portals_.size()));
+    const dtPoly* polygon = nullptr;
+    const dtMeshTile& tile = detour_->tile(reference, &polygon);
+    for (unsigned link = polygon->firstLink; link != DT_NULL_LINK; link = tile.links[link].next) {
+      const dtLink& to = tile.links[link];
+      if (to.ref == 0) continue;
+      Vec3 a = toVec3(&tile.verts[polygon->verts[to.edge] * 3]);
+      Vec3 b = toVec3(&tile.verts[polygon->verts[(to.edge + 1) % polygon->vertCount] * 3]);
+      if (to.side != 0xff) {  // a portal to another tile may be a part of the edge
+        const double low = to.bmin / 255.0, high = to.bmax / 255.0;
+        const Vec3 start = a;
+        a = start + low * (b - start);
+        b = start + high * (b - start);
+      }
+      portals_.push_back({indexOf(to.ref), 0.5 * (a + b), false});
+    }
+  }
+  firstPortal_.push_back(static_cast<std::uint32_t>(portals_.size()));
+  bytes_ += portals_.size() * sizeof(Portal) + centres_.size() * (sizeof(Vec3) + 16);
+}
+
+std::uint32_t NavigationMesh::indexOf(std::uint32_t reference) const {
+  unsigned salt = 0, tile = 0, polygon = 0;
+  detour_->mesh.decodePolyId(reference, salt, tile, polygon);
+  return firstPolygonOfTile_[tile] + polygon;
+}
+
+double NavigationMesh::area() const {
+  return std::accumulate(areas_.begin(), areas_.end(), 0.0);
+}
+
+std::vector<std::uint32_t> NavigationMesh::findPolygons(const Vec3& point,
+                                                        const Vec3& extent) const {
+  const Float3 centre = toFloats(point), half = toFloats(extent);
+  std::array<dtPolyRef, kMaxNearPolygons> found{};
+  int count = 0;
+  detour_->query.queryPolygons(centre.data(), half.data(), &detour_->filter, found.data(), &count,
+                               kMaxNearPolygons);
+  std::vector<std::uint32_t> polygons;
+  for (int i = 0; i < count; ++i) polygons.push_back(indexOf(found[static_cast<std::size_t>(i)]));
+  return polygons;
+}
+
+Vec3 NavigationMesh::closestPoint(std::uint32_t polygon, const Vec3& point) const {
+  const Float3 to = toFloats(point);
+  Float3 closest{};
+  bool isOver = false;
+  detour_->query.closestPointOnPoly(references_[polygon], to.data(), closest.data(), &isOver);
+  return toVec3(closest.data());
+}
+
+std::optional<MeshPoint> NavigationMesh::findNearest(const Vec3& point, const Vec3& extent) const {
+  std::optional<MeshPoint> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const std::uint32_t polygon : findPolygons(point, extent)) {
+    const Vec3 candidate = closestPoint(polygon, point);
+    const double distance = (candidate - point).squaredNorm();
+    if (!(distance < least)) continue;
+    least = distance;
+    best = MeshPoint{polygon, candidate};
+  }
+  return best;
+}
+
+std::optional<Corridor> NavigationMesh::findCorridor(const MeshPoint& from,
+                                                     const MeshPoint& to) const {
+  struct Node {
+    double cost = std::numeric_limits<double>::infinity();
+    std::uint32_t parent = 0;
+    Vec3 point = Vec3::Zero();
+    std::uint32_t search = 0;  ///< the search that wrote this node
+    bool done = false;
+  };
+  thread_local std::vector<Node> nodes;
+  thread_local std::uint32_t search = 0;
+  ++search;
+  if (nodes.size() < polygonCount()) nodes.resize(polygonCount());
+  const auto node = [&](std::uint32_t polygon) -> Node& {
+    Node& one = nodes[polygon];
+    if (one.search != search) one = {.search = search};
+    return one;
+  };
+  using Entry = std::pair<double, std::uint32_t>;  // estimate of the whole cost, polygon
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
+  node(from.polygon).cost = 0;
+  node(from.polygon).point = from.point;
+  open.push({0, from.polygon});
+  while (!open.empty()) {
+    const std::uint32_t current = open.top().second;
+    open.pop();
+    Node& here = node(current);
+    if (here.done) continue;
+    here.done = true;
+    if (current == to.polygon) break;
+    for (std::uint32_t p = firstPortal_[current]; p < firstPortal_[current + 1]; ++p) {
+      const Portal& portal = portals_[p];
+      if (portal.closed) continue;
+      const Vec3 point = portal.to == to.polygon ? to.point : portal.middle;
+      const double through = portal.to == to.polygon ? (portal.middle - here.point).norm() +
+                                                           (to.point - portal.middle).norm()
+                                                     : (point - here.point).norm();
+      Node& next = node(portal.to);
+      if (next.done || !(here.cost + through < next.cost)) continue;
+      next.cost = here.cost + through;
+      next.parent = current;
+      next.point = point;
+      open.push({next.cost + (to.point - point).norm(), portal.to});
+    }
+  }
+  if (!node(to.polygon).done) return std::nullopt;
+  Corridor corridor;
+  corridor.cost =
+      from.polygon == to.polygon ? (to.point - from.point).norm() : node(to.polygon).cost;
+  for (std::uint32_t polygon = to.polygon; polygon != from.polygon; polygon = node(polygon).parent)
+    corridor.polygons.push_back(polygon);
+  corridor.polygons.push_back(from.polygon);
+  std::reverse(corridor.polygons.begin(), corridor.polygons.end());
+  return corridor;
+}
+
+std::vector<Vec3> NavigationMesh::straighten(const Corridor& corridor, const Vec3& from,
+                                             const Vec3& to) const {
+  std::vector<dtPolyRef> path;
+  for (const std::uint32_t polygon : corridor.polygons) path.push_back(references_[polygon]);
+  const Float3 start = toFloats(from), end = toFloats(to);
+  std::vector<float> corners(3 * kMaxCorners);
+  int count = 0;
+  detour_->query.findStraightPath(start.data(), end.data(), path.data(),
+                                  static_cast<int>(path.size()), corners.data(), nullptr, nullptr,
+                                  &count, kMaxCorners);
+  std::vector<Vec3> points;
+  for (int i = 0; i < count; ++i)
+    points.push_back(toVec3(&corners[static_cast<std::size_t>(3 * i)]));
+  return points;
+}
+
+Vec3 NavigationMesh::portalMiddle(std::uint32_t from, std::uint32_t to) const {
+  for (std::uint32_t p = firstPortal_[from]; p < firstPortal_[from + 1]; ++p)
+    if (portals_[p].to == to) return portals_[p].middle;
+  return centres_[from];
+}
+
+void NavigationMesh::closePortal(std::uint32_t from, std::uint32_t to) {
+  for (const auto& [a, b] : {std::pair(from, to), std::pair(to, from)})
+    for (std::uint32_t p = firstPortal_[a]; p < firstPortal_[a + 1]; ++p)
+      if (portals_[p].to == b) portals_[p].closed = true;
+}
+
+Vec3 NavigationMesh::pointInPolygon(std::uint32_t index, double s, double t) const {
+  const dtPoly* polygon = nullptr;
+  const dtMeshTile& tile = detour_->tile(references_[index], &polygon);
+  std::array<float, 3 * DT_VERTS_PER_POLYGON> corners{};
+  std::array<float, DT_VERTS_PER_POLYGON> areas{};
+  for (int i = 0; i < polygon->vertCount; ++i)
+    std::copy_n(&tile.verts[polygon->verts[i] * 3], 3, &corners[static_cast<std::size_t>(3 * i)]);
+  Float3 point{};
+  dtRandomPointInConvexPoly(corners.data(), polygon->vertCount, areas.data(), static_cast<float>(s),
+                            static_cast<float>(t), point.data());
+  return toVec3(point.data());
+}
+
+std::vector<std::uint32_t> NavigationMesh::findIslands() const {
+  constexpr std::uint32_t kNone = ~0u;
+  std::vector<std::uint32_t> island(polygonCount(), kNone), stack;
+  std::vector<double> areas;
+  for (std::uint32_t start = 0; start < polygonCount(); ++start) {
+    if (island[start] != kNone) continue;
+    const auto number = static_cast<std::uint32_t>(areas.size());
+    areas.push_back(0);
+    stack.push_back(start);
+    island[start] = number;
+    while (!stack.empty()) {
+      const std::uint32_t polygon = stack.back();
+      stack.pop_back();
+      areas.back() += areas_[polygon];
+      for (std::uint32_t p = firstPortal_[polygon]; p < firstPortal_[polygon + 1]; ++p) {
+        if (portals_[p].closed || island[portals_[p].to] != kNone) continue;
+        island[portals_[p].to] = number;
+        stack.push_back(portals_[p].to);
+      }
+    }
+  }
+  std::vector<std::uint32_t> order(areas.size()), rank(areas.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return areas[a] > areas[b]; });
+  for (std::uint32_t i = 0; i < order.size(); ++i) rank[order[i]] = i;
+  for (std::uint32_t& number : island) number = rank[number];
+  return island;
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,80 @@
+// The walkable polygons of a scene and the portals between them: proposes ways. A portal that a
+// proof refuted is closed.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "scene/navigation/tile_mesh.hpp"
+
+namespace enfilade::scene {
+
+/// A polygon, and a point of it.
+struct MeshPoint {
+  std::uint32_t polygon = 0;
+  Vec3 point = Vec3::Zero();  ///< scene frame, metres; its height is that of the polygon
+};
+
+/// A sequence of polygons; each has a portal to the next one.
+struct Corridor {
+  std::vector<std::uint32_t> polygons;
+  double cost = 0;  ///< metres, through the middles of the portals
+};
+
+/// Copies share nothing. Const functions may be called from several threads.
+class NavigationMesh {
+ public:
+  explicit NavigationMesh(const TileGrid& grid, std::vector<std::vector<std::uint8_t>> tiles);
+  ~NavigationMesh();
+  NavigationMesh(NavigationMesh&&) noexcept;
+  NavigationMesh& operator=(NavigationMesh&&) noexcept;
+
+  std::size_t polygonCount() const { return centres_.size(); }
+  double area() const;  ///< square metres, horizontal, of all polygons
+  double polygonArea(std::uint32_t polygon) const { return areas_[polygon]; }
+  const Vec3& centre(std::uint32_t polygon) const { return centres_[polygon]; }
+  /// The point of a polygon that is closest to `point`.
+  Vec3 closestPoint(std::uint32_t polygon, const Vec3& point) const;
+  std::size_t memoryBytes() const { return bytes_; }
+
+  /// The closest point of the mesh to `point` within `extent` metres on each axis.
+  std::optional<MeshPoint> findNearest(const Vec3& point, const Vec3& extent) const;
+  /// The polygons near a point: at most `limit`, in no order.
+  std::vector<std::uint32_t> findPolygons(const Vec3& point, const Vec3& extent) const;
+  /// The cheapest corridor through open portals; nullopt: not connected.
+  std::optional<Corridor> findCorridor(const MeshPoint& from, const MeshPoint& to) const;
+  /// The corners of the shortest line within a corridor, with both ends.
+  std::vector<Vec3> straighten(const Corridor& corridor, const Vec3& from, const Vec3& to) const;
+  /// The middle of the portal between two neighbours, scene frame, metres.
+  Vec3 portalMiddle(std::uint32_t from, std::uint32_t to) const;
+  /// Closes the portals between two polygons, in both directions.
+  void closePortal(std::uint32_t from, std::uint32_t to);
+  /// A point of a polygon for two numbers of 0..1, uniform in area.
+  Vec3 pointInPolygon(std::uint32_t polygon, double s, double t) const;
+  /// For each polygon the number of its island: polygons joined by open portals. The largest island
+  /// has number 0.
+  std::vector<std::uint32_t> findIslands() const;
+
+ private:
+  struct Detour;
+  struct Portal {
+    std::uint32_t to = 0;
+    Vec3 middle = Vec3::Zero();
+    bool closed = false;
+  };
+  void collectPortals();
+  std::uint32_t indexOf(std::uint32_t reference) const;
+
+  std::unique_ptr<Detour> detour_;
+  std::vector<std::uint32_t> firstPolygonOfTile_;  ///< by index of the tile in Detour
+  std::vector<std::uint32_t> references_;          ///< Detour's, by polygon
+  std::vector<Vec3> centres_;
+  std::vector<double> areas_;
+  std::vector<std::uint32_t> firstPortal_;  ///< by polygon, and the end
+  std::vector<Portal> portals_;
+  std::size_t bytes_ = 0;
+};
+
+}  // namespace enfilade::scene

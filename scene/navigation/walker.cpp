@@ -1,0 +1,143 @@
+#include "scene/navigation/walker.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "scene/world/avatars/avatar_motion.hpp"
+#include "scene/world/avatars/spawn.hpp"
+#include "scene/world/avatars/walk_velocity.hpp"
+#include "scene/world/contacts/obstacles.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr double kCellSize = 2;      // metres: obstacles are collected for a cell at once
+constexpr double kCellMargin = 0.2;  // metres
+constexpr std::size_t kMaxNeighbourhoods = 512;  // remembered; above, all are forgotten
+/// Lengths of a step on even floor, metres. A longer step than a tick's sweeps over the same space;
+/// where it meets anything it is walked again at the speed of the walk.
+constexpr double kLongStep = 0.1, kMaxStep = 1;
+constexpr double kEvenHeight = 1e-3;      // metres: a step that rises or sinks more is not even
+constexpr int kMaxTicksWithoutGain = 30;  // half a second: no progress towards the way point
+constexpr double kMinGain = 1e-3;         // metres in that time
+constexpr int kMaxTicks = 1'000'000;      // more than an hour: the goal is unreasonably far
+
+}  // namespace
+
+Walker::Walker(const WorldData& world, const NavigationAgent& agent)
+    : world_(world), agent_(agent) {
+  Spawn spawn;
+  spawn.radius = agent.radius;
+  spawn.height = agent.height;
+  applySpawnShape(spawn, world.settings, avatar_);
+}
+
+void Walker::collectNearObstacles() {
+  if (contains(avatar_.cachedBounds, avatar_.motionBounds)) return;
+  if (!avatar_.cachedBounds.empty())
+    neighbourhoods_[cell_] = {avatar_.cachedBounds, std::move(avatar_.obstacles),
+                              std::move(floor_)};
+  if (neighbourhoods_.size() > kMaxNeighbourhoods) neighbourhoods_.clear();
+  Aabb cell;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto index = static_cast<std::size_t>(axis);
+    cell_[index] = static_cast<int>(std::floor(avatar_.footPosition[axis] / kCellSize));
+    cell.min[axis] = kCellSize * cell_[index];
+    cell.max[axis] = cell.min[axis] + kCellSize;
+  }
+  const double reach = kMaxStep + world_.settings.stepHeight + kCellMargin;
+  cell.min += avatar_.shape->box.min - Vec3::Constant(reach);
+  cell.max += avatar_.shape->box.max + Vec3::Constant(reach);
+  Neighbourhood& found = neighbourhoods_[cell_];
+  if (!contains(found.box, avatar_.motionBounds)) {
+    cell.include(avatar_.motionBounds);  // a fast fall
+    found = {cell, collectObstaclesInBox(world_, cell, 0), {}};
+    found.floor = collectFloorFaces(found.obstacles, cell);
+  }
+  avatar_.cachedBounds = found.box;
+  avatar_.obstacles = std::move(found.obstacles);
+  floor_ = std::move(found.floor);
+  neighbourhoods_.erase(cell_);
+}
+
+/// Length of the next step on the way to `goal`, metres: as far as the floor is even.
+double Walker::chooseStep(const Vec3& goal, double distance) {
+  const Vec3 direction = projectToGround(goal - avatar_.footPosition) / distance;
+  return std::max(kLongStep, computeEvenDistance(floor_, avatar_.footPosition, direction,
+                                                 std::min(distance, kMaxStep)));
+}
+
+void Walker::step(const Vec3& velocity) {
+  avatar_.desiredVelocity = velocity;
+  avatar_.motionBounds = computeMotionBounds(world_.settings, avatar_);
+  collectNearObstacles();
+  avatar_.blockedBy = 0;
+  moveAvatar(world_, avatar_, count_);
+}
+
+std::optional<std::string> Walker::place(const Vec3& footPosition, double maxDrop) {
+  if (auto error = placeStanding(world_, footPosition, avatar_, count_)) return error;
+  avatar_.grounded = false;
+  avatar_.fallSpeed = 0;
+  const double lowest = footPosition.y() - maxDrop;
+  while (!avatar_.grounded) {
+    const double before = avatar_.footPosition.y();
+    step(Vec3::Zero());
+    if (avatar_.grounded) break;
+    if (avatar_.footPosition.y() < lowest) return "the floor is too far below";
+    if (before - avatar_.footPosition.y() < 1e-9 && avatar_.blockedBy != 0)
+      return "it would not stand upright on " + world_.findEntityName(avatar_.blockedBy);
+  }
+  return std::nullopt;
+}
+
+void Walker::returnTo(const Vec3& footPosition) {
+  avatar_.footPosition = footPosition;
+  avatar_.grounded = true;
+  avatar_.fallSpeed = 0;
+}
+
+WalkOutcome Walker::walkTo(const Vec3& goal) {
+  const double tick = world_.settings.tickDuration;
+  double least = computeGroundDistance(avatar_.footPosition, goal);
+  double shortDistance = 0, stepLimit = kMaxStep, lastFloor = avatar_.footPosition.y();
+  for (int ticks = 0, ticksWithoutGain = 0; ticks < kMaxTicks; ++ticks) {
+    const double distance = computeGroundDistance(avatar_.footPosition, goal);
+    if (distance <= kArrivalDistance && avatar_.grounded)
+      return {WalkOutcome::Kind::arrived, avatar_.footPosition, 0};
+    ticksWithoutGain = distance < least - kMinGain ? 0 : ticksWithoutGain + 1;
+    least = std::min(least, distance);
+    if (ticksWithoutGain > kMaxTicksWithoutGain)
+      return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.groundEntity};
+
+    const bool isLong = shortDistance <= 0;
+    const Vec3 before = avatar_.footPosition;
+    const double length = isLong ? std::min(stepLimit, chooseStep(goal, distance)) : 0;
+    const double speed = std::max(agent_.speed, length / tick);
+    step(computeWalkVelocity(before, goal, false, speed, tick));
+    if (isLong && (avatar_.blockedBy != 0 || !avatar_.grounded ||
+                   std::abs(avatar_.footPosition.y() - before.y()) > kEvenHeight)) {
+      returnTo(before);
+      // What was met on a very long step may lie far ahead.
+      if (length > kLongStep)
+        stepLimit = std::max(kLongStep, 0.25 * length);
+      else
+        shortDistance = 2 * kLongStep;
+      continue;
+    }
+    if (isLong) stepLimit = std::min(kMaxStep, 2 * stepLimit);
+    if (!avatar_.grounded) {  // falls from tread to tread of a steep stair
+      shortDistance = 2 * kLongStep;
+      if (avatar_.footPosition.y() < lastFloor - world_.settings.stepHeight)
+        return {WalkOutcome::Kind::fell, avatar_.footPosition, 0};
+      continue;
+    }
+    lastFloor = avatar_.footPosition.y();
+    if (avatar_.blockedBy != 0)
+      return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.blockedBy};
+    shortDistance -= computeGroundDistance(before, avatar_.footPosition);
+  }
+  return {WalkOutcome::Kind::blocked, avatar_.footPosition, 0};
+}
+
+}  // namespace enfilade::scene

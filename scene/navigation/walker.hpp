@@ -1,0 +1,69 @@
+// Walks an avatar that is in no world, to prove a path: by the same motion as in a tick, among the
+// static objects and the bodies at their present poses. Other avatars are no obstacles.
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "scene/navigation/agent.hpp"
+#include "scene/navigation/floor_faces.hpp"
+#include "scene/world/data/tick_report.hpp"
+#include "scene/world/data/world_data.hpp"
+
+namespace enfilade::scene {
+
+/// The end of a straight walk.
+struct WalkOutcome {
+  enum class Kind {
+    arrived,
+    blocked,  ///< an obstacle stopped the walker, or made it slide
+    fell      ///< the floor ended
+  };
+  Kind kind = Kind::arrived;
+  Vec3 footPosition = Vec3::Zero();  ///< scene frame, metres: where the walk ended
+  EntityId obstacle = 0;             ///< blocked: the entity that was hit
+};
+
+/// Not thread-safe; several walkers may share a world that does not tick.
+class Walker {
+ public:
+  /// `world` must outlive the walker.
+  Walker(const WorldData& world, const NavigationAgent& agent);
+
+  /// Stands at `footPosition`, or falls from there by at most `maxDrop` metres. Returns the error
+  /// if there is no room or no floor.
+  std::optional<std::string> place(const Vec3& footPosition, double maxDrop);
+  /// Stands where it has stood before.
+  void returnTo(const Vec3& footPosition);
+  /// Walks straight to the way point `goal`; its height decides nothing. Stops at the first
+  /// obstacle that is not a step, and where the floor ends.
+  WalkOutcome walkTo(const Vec3& goal);
+
+  const Vec3& footPosition() const { return avatar_.footPosition; }
+  const NavigationAgent& agent() const { return agent_; }
+
+ private:
+  void step(const Vec3& velocity);
+  void collectNearObstacles();
+  double chooseStep(const Vec3& goal, double distance);
+
+  const WorldData& world_;
+  const NavigationAgent agent_;
+  Avatar avatar_;
+  QueryCount count_;
+  /// Obstacles around a cell, with their caches. The avatar has those of `cell_`.
+  struct Neighbourhood {
+    Aabb box;
+    ObstacleSet obstacles;
+    std::vector<FloorFace> floor;
+  };
+  using Cell = std::array<int, 3>;
+  Cell cell_{};
+  std::vector<FloorFace> floor_;
+  std::map<Cell, Neighbourhood> neighbourhoods_;
+};
+
+}  // namespace enfilade::scene

@@ -1,0 +1,63 @@
+#include "server/app/model_arguments.hpp"
+
+#include <CLI/CLI.hpp>
+
+namespace enfilade::server {
+namespace {
+
+std::string validateUnit(const std::string& text) {
+  if (scene::parseMetresPerUnit(text)) return {};
+  return text + ": give m, mm, cm, ft, in or a positive number of metres";
+}
+
+}  // namespace
+
+void setGroup(CLI::App& verb, const char* heading) {
+  verb.option_defaults()->group(heading);
+}
+
+void addModel(CLI::App& verb, ModelArguments& into) {
+  setGroup(verb, "Model");
+  verb.add_option("SCENE", into.file, "Model file: glTF, GLB, OBJ, COLLADA, FBX, IFC, PLY or STL")
+      ->required();
+  verb.add_option("--unit", into.unit, "Unit of the file: m, mm, cm, ft, in or a number of metres")
+      ->check(CLI::Validator(validateUnit, "UNIT"));
+  verb.add_option("--up", into.up, "Up axis of the file")->check(CLI::IsMember({"x", "y", "z"}));
+  verb.add_option("--offset", into.offset,
+                  "Offset (m, Y up) subtracted from the file's coordinates; use one value for all "
+                  "versions of a model. Default: 0 near the origin, else the model's position")
+      ->delimiter(',')
+      ->type_name("X,Y,Z")
+      ->expected(3);
+  verb.add_flag("--no-cache", into.noCache, "Import the model again and ignore the cached import");
+  verb.add_option(
+          "--ifc-reader", into.ifcReader,
+          "IFC reader. auto: web-ifc, else ifcplusplus (also for products that web-ifc omits), "
+          "else assimp")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "web-ifc", "ifcplusplus", "assimp"}));
+  verb.add_option("--ifc-doors", into.ifcDoors,
+                  "IFC doors. move: they are bodies if the file describes their motion; still: "
+                  "they and lifts are static; open: static, with open leaves; none: without leaves")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"move", "still", "open", "none"}));
+  verb.add_flag("--georeference", into.georeference,
+                "IFC: apply the file's map conversion, so that coordinates are the map's");
+}
+
+ModelOptions makeModelOptions(const ModelArguments& read) {
+  ModelOptions options;
+  options.file = read.file;
+  options.cache = !read.noCache;
+  if (!read.unit.empty()) options.import.metresPerUnit = scene::parseMetresPerUnit(read.unit);
+  if (!read.up.empty()) options.import.up = read.up.front();
+  if (!read.offset.empty())
+    options.import.offset = {read.offset[0], read.offset[1], read.offset[2]};
+  options.import.ifcReader =
+      scene::parseIfcReader(read.ifcReader).value_or(scene::IfcReader::automatic);
+  options.doors = scene::parseIfcDoors(read.ifcDoors);
+  options.import.georeference = read.georeference;
+  return options;
+}
+
+}  // namespace enfilade::server

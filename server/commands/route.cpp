@@ -1,0 +1,168 @@
+#include "server/commands/route.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <charconv>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "render/service/renderer_selector.hpp"
+#include "scene/navigation/navigation.hpp"
+#include "scene/navigation/open_doors.hpp"
+#include "scene/navigation/place_names.hpp"
+#include "server/base/progress.hpp"
+#include "server/base/standard_output.hpp"
+#include "server/plans/path_map.hpp"
+
+namespace enfilade::server {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using scene::Vec3;
+
+std::optional<Vec3> parsePoint(const std::string& text) {
+  Vec3 point;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (axis > 0 && (at == end || *at++ != ',')) return std::nullopt;
+    const auto [next, error] = std::from_chars(at, end, point[axis]);
+    if (error != std::errc()) return std::nullopt;
+    at = next;
+  }
+  return at == end && point.allFinite() ? std::optional(point) : std::nullopt;
+}
+
+/// The place that an argument means. Throws std::runtime_error, which names the argument.
+Vec3 resolvePlace(const std::string& text, const char* argument, const scene::Scene& scene,
+                  scene::Navigation& navigation) {
+  constexpr double kNextTo = 1;  // metres from an object
+  if (const auto point = parsePoint(text)) return *point;
+  const auto box = scene::findNamedPlace(scene, text, navigation.agent().radius + kNextTo);
+  if (!box)
+    throw std::runtime_error(fmt::format(
+        "{}: '{}' is neither a point X,Y,Z nor the name of a room, a storey or an object; "
+        "`enfilade inspect --objects` lists the names",
+        argument, text));
+  const auto place = navigation.findPlaceIn(*box);
+  if (!place)
+    throw std::runtime_error(
+        fmt::format("{}: there is no free place to stand at '{}'", argument, text));
+  return *place;
+}
+
+Json toJson(const Vec3& point) {
+  return Json::array({point.x(), point.y(), point.z()});
+}
+
+Json makeReport(const RouteCommand& command, const scene::NavigationPath& path,
+                const std::optional<scene::NarrowPlace>& narrowest,
+                const scene::Navigation& navigation) {
+  Json report{{"found", path.found()}};
+  if (path.found()) {
+    report["length"] = path.length;
+    report["seconds"] = path.length / command.agent.speed;
+    report["points"] = Json::array();
+    for (const Vec3& point : path.points) report["points"].push_back(toJson(point));
+    if (narrowest)
+      report["narrowest"] = {{"at", toJson(narrowest->position)},
+                             {"clear_width", narrowest->clearWidth}};
+    else
+      report["narrowest"] = nullptr;
+  } else {
+    report["reason"] = path.reason;
+    if (path.obstruction)
+      report["obstruction"] = {
+          {"entity", navigation.findEntityName(path.obstruction->entity)},
+          {"at", toJson(path.obstruction->position)},
+          {"clear_width",
+           path.obstruction->clearWidth > 0 ? Json(path.obstruction->clearWidth) : Json(nullptr)}};
+  }
+  report["agent"] = {{"radius", command.agent.radius},
+                     {"height", command.agent.height},
+                     {"step_height", command.settings.stepHeight}};
+  report["mesh"] = {{"seconds", navigation.report().seconds},
+                    {"area", navigation.report().area},
+                    {"islands", navigation.report().islands},
+                    {"bytes", navigation.report().bytes}};
+  return report;
+}
+
+std::string formatText(const RouteCommand& command, const scene::NavigationPath& path,
+                       const std::optional<scene::NarrowPlace>& narrowest) {
+  if (!path.found())
+    return fmt::format("no way from {} to {}: {}\n", command.from, command.to, path.reason);
+  std::string text =
+      fmt::format("{:.2f} m from {} to {}, {:.1f} s at {:.1f} m/s\n", path.length, command.from,
+                  command.to, path.length / command.agent.speed, command.agent.speed);
+  if (narrowest)
+    text += fmt::format("narrowest: {:.3f} m at {:.2f}, {:.2f}, {:.2f}\n", narrowest->clearWidth,
+                        narrowest->position.x(), narrowest->position.y(), narrowest->position.z());
+  for (const Vec3& point : path.points)
+    text += fmt::format("  {:9.3f} {:9.3f} {:9.3f}\n", point.x(), point.y(), point.z());
+  return text;
+}
+
+/// The path as an avatar's positions, dense enough for a map.
+WalkedPath makeWalkedPath(const scene::NavigationPath& path) {
+  constexpr double kSpacing = 0.05;  // metres
+  WalkedPath walked{"route", {}, 1};
+  for (std::size_t i = 1; i < path.points.size(); ++i) {
+    const Vec3 leg = path.points[i] - path.points[i - 1];
+    const int count = std::max(1, static_cast<int>(leg.norm() / kSpacing));
+    for (int k = 0; k < count; ++k)
+      walked.footPositions.push_back(path.points[i - 1] + (static_cast<double>(k) / count) * leg);
+  }
+  walked.footPositions.push_back(path.points.back());
+  return walked;
+}
+
+void writePlan(const std::shared_ptr<const scene::Scene>& scene, const scene::Snapshot& snapshot,
+               const scene::NavigationPath& path, const RouteCommand& command) {
+  render::RendererSelector renderer(scene);
+  const PlanRenderer renderPlan = [&](const render::Camera& camera) {
+    const render::Frame frame = renderer.render(snapshot, camera);
+    return std::optional(PlanPicture{render::toImage(frame), frame.ids});
+  };
+  WalkTrace trace;
+  trace.title = fmt::format("{} to {}: {:.2f} m", command.from, command.to, path.length);
+  trace.paths.push_back(makeWalkedPath(path));
+  trace.floors = {path.points.front().y(), path.points.back().y()};
+  if (const auto image = drawMap(trace, {renderPlan, scene.get()})) {
+    render::writePng(command.plan, *image);
+    spdlog::info("plan: {}", command.plan.string());
+  }
+}
+
+}  // namespace
+
+ExitCode route(const RouteCommand& command) {
+  const auto scene = loadScene(command.model);
+  const auto snapshot = command.doorsAsTheyAre
+                            ? scene::World(scene, command.settings).snapshot()
+                            : scene::makeSnapshotWithOpenDoors(scene, command.settings);
+  Progress bar;
+  const int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  scene::Navigation navigation(scene, command.settings, command.agent, snapshot.get(), threads,
+                               [&](double done) { bar.show(done, "navigation mesh"); });
+  bar.clear();
+  const Vec3 from = resolvePlace(command.from, "FROM", *scene, navigation);
+  const Vec3 to = resolvePlace(command.to, "TO", *scene, navigation);
+  const scene::NavigationPath path = navigation.findPath(from, to);
+  const auto narrowest =
+      path.found() ? navigation.findNarrowest(path.points) : std::optional<scene::NarrowPlace>();
+  constexpr auto kReplace = Json::error_handler_t::replace;
+  writeToStdout(
+      command.json
+          ? makeReport(command, path, narrowest, navigation).dump(-1, ' ', false, kReplace) + "\n"
+          : formatText(command, path, narrowest),
+      "the path was found");
+  if (path.found() && !command.plan.empty()) writePlan(scene, *snapshot, path, command);
+  return path.found() ? ExitCode::success : ExitCode::violations;
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,325 @@
+// Navigation: paths that are found are walked by an avatar; reachability agrees with a flood fill
+// of exact places.
+#include "scene/navigation/navigation.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <queue>
+
+#include "assets/building.hpp"
+#include "scene/navigation/floor_faces.hpp"
+#include "scene/navigation/open_doors.hpp"
+#include "scene/navigation/place_names.hpp"
+#include "scene/world/contacts/obstacles.hpp"
+#include "tests/scene/body_fixture.hpp"
+
+namespace enfilade::scene::testing {
+namespace {
+
+constexpr double kWall = 2.5;  // metres, height
+
+/// A floor of 8 x 6 m with a wall at x = 4 that has a gap around z = 0.
+std::vector<NamedBox> twoRooms(double gap) {
+  return {{"floor", {0, -0.2, -3}, {8, 0, 3}},
+          {"wall/left", {3.9, 0, -3}, {4.1, kWall, -0.5 * gap}},
+          {"wall/right", {3.9, 0, 0.5 * gap}, {4.1, kWall, 3}}};
+}
+
+/// What an avatar that walks the path reports at the end.
+Notice walkPath(World& world, const NavigationPath& path, const NavigationAgent& agent) {
+  Spawn spawn;
+  spawn.position = path.points.front();
+  spawn.radius = agent.radius;
+  spawn.height = agent.height;
+  Walk walk;
+  walk.waypoints.assign(path.points.begin() + 1, path.points.end());
+  submitAvatarCommand(world, {"walker", spawn, 0});
+  submitAvatarCommand(world, {"walker", walk, 0});
+  for (int tick = 0; tick < 60 * 600; ++tick) {
+    const TickReport report = tickWorld(world);
+    EXPECT_EQ(report.maxPenetration, 0);
+    for (const Notice& notice : report.notices)
+      if (notice.kind != Notice::Kind::spawned) return notice;
+  }
+  return {};
+}
+
+double measureLength(const std::vector<Vec3>& points) {
+  double length = 0;
+  for (std::size_t i = 1; i < points.size(); ++i) length += (points[i] - points[i - 1]).norm();
+  return length;
+}
+
+TEST(Navigation, APathThroughANarrowDoorIsWalked) {
+  const auto scene = boxScene(twoRooms(0.62));
+  Navigation navigation(scene, {}, {});
+  const NavigationPath path = navigation.findPath({1, 0.1, 2}, {7, 0.1, -2});
+  ASSERT_TRUE(path.found()) << path.reason;
+  EXPECT_NEAR(path.length, measureLength(path.points), 1e-12);
+  EXPECT_GT(path.length, std::hypot(6, 4));
+  EXPECT_LT(path.length, 1.05 * std::hypot(6, 4));
+  World world(scene);
+  EXPECT_EQ(walkPath(world, path, {}).kind, Notice::Kind::arrived);
+  const auto narrowest = navigation.findNarrowest(path.points);
+  ASSERT_TRUE(narrowest);
+  EXPECT_NEAR(narrowest->clearWidth, 0.62, 0.02);
+  EXPECT_NEAR(narrowest->position.x(), 4, 0.3);
+}
+
+TEST(Navigation, ADoorThatIsTooNarrowIsNamedWithItsWidth) {
+  Navigation navigation(boxScene(twoRooms(0.58)), {}, {});
+  const NavigationPath path = navigation.findPath({1, 0.1, 2}, {7, 0.1, -2});
+  EXPECT_FALSE(path.found());
+  ASSERT_TRUE(path.obstruction);
+  EXPECT_TRUE(navigation.findEntityName(path.obstruction->entity).starts_with("wall/"))
+      << path.reason;
+  EXPECT_NEAR(path.obstruction->clearWidth, 0.58, 0.02) << path.reason;
+  EXPECT_NE(path.reason.find("needs 0.600"), std::string::npos) << path.reason;
+  EXPECT_EQ(navigation.report().islands, 2u);
+}
+
+TEST(Navigation, AThinnerAgentFitsThroughTheSameDoor) {
+  NavigationAgent thin;
+  thin.radius = 0.25;
+  Navigation navigation(boxScene(twoRooms(0.58)), {}, thin);
+  EXPECT_TRUE(navigation.findPath({1, 0.1, 2}, {7, 0.1, -2}).found());
+}
+
+TEST(Navigation, StairsAreClimbedAndALedgeIsNot) {
+  std::vector<NamedBox> boxes{{"floor", {0, -0.2, -3}, {12, 0, 3}}};
+  for (int step = 0; step < 8; ++step)
+    boxes.push_back(
+        {"stair/" + std::to_string(step), {4 + 0.28 * step, 0, -1}, {9, 0.18 * (step + 1), 1}});
+  boxes.push_back({"plinth", {9.5, 0, -1}, {11.5, 0.8, 1}});
+  const auto scene = boxScene(boxes);
+  Navigation navigation(scene, {}, {});
+  const NavigationPath path = navigation.findPath({1, 0.1, 0}, {8, 1.5, 0});
+  ASSERT_TRUE(path.found()) << path.reason;
+  EXPECT_NEAR(path.points.back().y(), 1.44, 0.01);
+  World world(scene);
+  EXPECT_EQ(walkPath(world, path, {}).kind, Notice::Kind::arrived);
+  const NavigationPath ledge = navigation.findPath({1, 0.1, 0}, {10.5, 0.9, 0});
+  EXPECT_FALSE(ledge.found());
+  EXPECT_NE(ledge.reason.find("no floor, step or stair"), std::string::npos) << ledge.reason;
+}
+
+TEST(Navigation, RefusesAStartInsideAWallAndAGoalInTheAir) {
+  Navigation navigation(boxScene(twoRooms(1)), {}, {});
+  EXPECT_NE(navigation.findPath({4, 0.1, 2}, {7, 0.1, 0}).reason.find("at the start"),
+            std::string::npos);
+  EXPECT_NE(navigation.findPath({1, 0.1, 2}, {7, 2, 0}).reason.find("at the goal"),
+            std::string::npos);
+}
+
+TEST(Navigation, RandomPlacesStandAndRepeatWithTheSeed) {
+  const auto scene = boxScene(twoRooms(0.5));
+  Navigation navigation(scene, {}, {});
+  std::mt19937_64 one(7), two(7);
+  int left = 0;
+  for (int i = 0; i < 200; ++i) {
+    const auto place = navigation.findRandomPlace(one, {}),
+               again = navigation.findRandomPlace(two, {});
+    ASSERT_TRUE(place && again);
+    EXPECT_EQ(*place, *again);
+    EXPECT_EQ(navigation.snap(*place, 0.01).value_or(Vec3::Zero()), *place);
+    left += place->x() < 4 ? 1 : 0;
+  }
+  EXPECT_GT(left, 60);
+  EXPECT_LT(left, 140);
+  RandomPlace wanted;
+  wanted.near = Vec3(1, 0, 0);
+  wanted.maxDistance = 1.5;
+  wanted.awayFrom = Vec3(1, 0, 0);
+  wanted.minDistance = 0.5;
+  for (int i = 0; i < 50; ++i) {
+    const auto place = navigation.findRandomPlace(one, wanted);
+    ASSERT_TRUE(place);
+    EXPECT_LE((*place - *wanted.near).norm(), 1.5);
+    EXPECT_GE((*place - *wanted.near).norm(), 0.5);
+  }
+  EXPECT_NE(navigation.islandOf({1, 0, 0}), navigation.islandOf({7, 0, 0}));
+  EXPECT_FALSE(navigation.islandOf({50, 0, 0}));
+}
+
+TEST(Navigation, FindsRoomsStoreysAndObjectsByName) {
+  Model model = boxModel(twoRooms(1));
+  model.storeys.push_back({"Ground", "guid-storey", 0});
+  Space room;
+  room.name = "A1";
+  room.longName = "Kitchen";
+  room.box = {{0.2, 0, -2.8}, {3.7, 2.4, 2.8}};
+  model.spaces.push_back(room);
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  Navigation navigation(scene, {}, {});
+  for (const char* name : {"A1", "Kitchen", "room:A1", "Ground", "storey:Ground", "wall/left"}) {
+    const auto box = findNamedPlace(*scene, name, 1.3);
+    ASSERT_TRUE(box) << name;
+    const auto place = navigation.findPlaceIn(*box);
+    ASSERT_TRUE(place) << name;
+    EXPECT_NEAR(place->y(), 0, 0.01) << name;
+  }
+  EXPECT_FALSE(findNamedPlace(*scene, "storey:A1", 1));
+  EXPECT_FALSE(findNamedPlace(*scene, "object:Ground", 1));
+  EXPECT_FALSE(findNamedPlace(*scene, "nowhere", 1));
+}
+
+TEST(Navigation, AClosedDoorIsNamedAndAnOpenOneIsPassed) {
+  auto boxes = twoRooms(1);
+  boxes.push_back({"leaf", {3.98, 0.01, -0.49}, {4.02, 2, 0.49}});
+  Model model = boxModel(boxes);
+  BodySpec door = bodySpec("door", BodyKind::hinged, {3});
+  door.anchor = {4, 0, -0.49};
+  door.low = 0;
+  door.high = kQuarter;
+  model.bodies.push_back(door);
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  Navigation closed(scene, {}, {});
+  const NavigationPath none = closed.findPath({1, 0.1, 2}, {7, 0.1, -2});
+  EXPECT_FALSE(none.found());
+  ASSERT_TRUE(none.obstruction) << none.reason;
+  EXPECT_EQ(closed.findEntityName(none.obstruction->entity), "door");
+  const auto snapshot = makeSnapshotWithOpenDoors(scene, {});
+  Navigation open(scene, {}, {}, snapshot.get());
+  EXPECT_TRUE(open.findPath({1, 0.1, 2}, {7, 0.1, -2}).found());
+}
+
+/// Places of a grid of 2 cm on a level floor that the agent reaches from a place, by brute force.
+class FloodFill {
+ public:
+  FloodFill(const WorldData& world, double radius, const Vec3& start) {
+    const auto shape = makePrismShape(radius, 1.75, 1.75, world.settings);
+    ObstacleSet obstacles = collectObstaclesInBox(world, world.scene->bounds(), 0);
+    QueryCount count;
+    std::array<std::vector<signed char>, 1> free{std::vector<signed char>(kSide * kSide, -1)};
+    reached_.assign(kSide * kSide, false);
+    std::queue<int> open;
+    const auto visit = [&](int cell) {
+      if (reached_[static_cast<std::size_t>(cell)]) return;
+      signed char& known = free[0][static_cast<std::size_t>(cell)];
+      EntityId nearest = 0;
+      const Vec3 feet(kStep * (cell % kSide), 1e-3, kStep * (cell / kSide));
+      if (known < 0) known = isClear(*shape, feet, 1e-5, obstacles, count, nearest) ? 1 : 0;
+      if (known == 0) return;
+      reached_[static_cast<std::size_t>(cell)] = true;
+      open.push(cell);
+    };
+    visit(cellOf(start));
+    while (!open.empty()) {
+      const int cell = open.front();
+      open.pop();
+      if (cell % kSide > 0) visit(cell - 1);
+      if (cell % kSide < kSide - 1) visit(cell + 1);
+      if (cell >= kSide) visit(cell - kSide);
+      if (cell < kSide * (kSide - 1)) visit(cell + kSide);
+    }
+  }
+  bool reaches(const Vec3& place) const {
+    return reached_[static_cast<std::size_t>(cellOf(place))];
+  }
+
+ private:
+  static constexpr int kSide = 251;
+  static constexpr double kStep = 0.02;  // metres
+  static int cellOf(const Vec3& place) {
+    return static_cast<int>(std::lround(place.x() / kStep)) +
+           kSide * static_cast<int>(std::lround(place.z() / kStep));
+  }
+  std::vector<bool> reached_;
+};
+
+TEST(Navigation, ReachabilityAgreesWithAFloodFillOfExactPlaces) {
+  int reachable = 0, unreachable = 0, undecided = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    std::mt19937_64 random(seed);
+    const auto draw = [&](double low, double high) {
+      return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+    };
+    std::vector<NamedBox> boxes{{"floor", {-1, -0.2, -1}, {6, 0, 6}}};
+    for (int side = 0; side < 4; ++side) {
+      const Vec3 low = side == 1 ? Vec3(5, 0, -1) : side == 3 ? Vec3(-1, 0, 5) : Vec3(-1, 0, -1);
+      const Vec3 high = side == 0   ? Vec3(0, kWall, 6)
+                        : side == 2 ? Vec3(6, kWall, 0)
+                                    : Vec3(6, kWall, 6);
+      boxes.push_back({"wall/" + std::to_string(side), low, high});
+    }
+    for (int i = 0; i < 14; ++i) {
+      const double x = draw(0, 4.4), z = draw(0, 4.4);
+      boxes.push_back({"box/" + std::to_string(i),
+                       {x, 0, z},
+                       {x + draw(0.1, 0.9), draw(0.5, 2), z + draw(0.1, 0.9)}});
+    }
+    const auto scene = boxScene(boxes);
+    Navigation navigation(scene, {}, {});
+    World world(scene);
+    const auto findOnFloor = [&] {  // not on top of a wall or a box
+      for (;;)
+        if (const auto place = navigation.findRandomPlace(random, {}); !place || place->y() < 0.1)
+          return place;
+    };
+    const auto from = findOnFloor();
+    ASSERT_TRUE(from);
+    const FloodFill wide(world.data(), 0.31, *from), narrow(world.data(), 0.29, *from);
+    for (int i = 0; i < 12; ++i) {
+      const auto to = findOnFloor();
+      ASSERT_TRUE(to);
+      const NavigationPath path = navigation.findPath(*from, *to);
+      const std::string where = "seed " + std::to_string(seed) + ", " + std::to_string(to->x()) +
+                                ", " + std::to_string(to->z()) + ": " + path.reason;
+      if (wide.reaches(*to)) {
+        ++reachable;
+        EXPECT_TRUE(path.found()) << where;
+      } else if (!narrow.reaches(*to)) {
+        ++unreachable;
+        EXPECT_FALSE(path.found()) << where;
+        EXPECT_FALSE(path.reason.empty());
+      } else {
+        ++undecided;
+      }
+      if (!path.found()) continue;
+      World walked(scene);
+      EXPECT_EQ(walkPath(walked, path, {}).kind, Notice::Kind::arrived) << where;
+    }
+  }
+  EXPECT_GE(reachable, 30);
+  EXPECT_LE(undecided, 20);
+  RecordProperty("unreachable", unreachable);
+}
+
+TEST(Navigation, PathsOfTheBuildingAreWalked) {
+  const auto scene = std::make_shared<const Scene>(assets::makeBuilding());
+  Navigation navigation(scene, {}, {});
+  std::mt19937_64 random(3);
+  int found = 0;
+  for (int i = 0; i < 25; ++i) {
+    const auto from = navigation.findRandomPlace(random, {});
+    const auto to = navigation.findRandomPlace(random, {});
+    ASSERT_TRUE(from && to);
+    const NavigationPath path = navigation.findPath(*from, *to);
+    if (!path.found()) continue;
+    ++found;
+    EXPECT_GE(path.length, (*to - *from).norm() - 1e-9);
+    World world(scene);
+    const Notice end = walkPath(world, path, {});
+    EXPECT_EQ(end.kind, Notice::Kind::arrived) << end.text;
+    EXPECT_LT((end.position - *to).norm(), 0.01);
+  }
+  EXPECT_GE(found, 15);
+}
+
+TEST(FloorFaces, ALineAcrossTilesStaysEvenUpToAHole) {
+  const auto scene = boxScene({{"a", {0, -0.2, 0}, {2, 0, 1}},
+                               {"b", {2, -0.2, 0}, {3, 0, 1}},
+                               {"c", {3.5, -0.2, 0}, {5, 0, 1}}});
+  World world(scene);
+  const ObstacleSet obstacles = collectObstaclesInBox(world.data(), scene->bounds(), 0);
+  const auto faces = collectFloorFaces(obstacles, scene->bounds());
+  EXPECT_EQ(faces.size(), 3u);
+  EXPECT_NEAR(computeEvenDistance(faces, {0.5, 5e-4, 0.5}, Vec3::UnitX(), 10), 2.5, 1e-12);
+  EXPECT_NEAR(computeEvenDistance(faces, {0.5, 5e-4, 0.5}, Vec3::UnitX(), 1), 1, 1e-12);
+  EXPECT_EQ(computeEvenDistance(faces, {3.2, 5e-4, 0.5}, Vec3::UnitX(), 1), 0);
+  EXPECT_EQ(computeEvenDistance(faces, {0.5, 0.1, 0.5}, Vec3::UnitX(), 1), 0);
+}
+
+}  // namespace
+}  // namespace enfilade::scene::testing
